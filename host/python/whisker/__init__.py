@@ -1,0 +1,1 @@
+"""Whiskered robots from Python: the wire format, the shared ring, tactile perception and localisation."""
