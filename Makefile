@@ -1,0 +1,44 @@
+# CrunchBot's front door. `make help` lists what there is.
+SEED ?= 1
+BUILD := build/release
+PYTHON := .venv/bin/python
+SOURCES_C = $(shell git ls-files '*.c' '*.h' '*.cpp' | grep -v '/gen/')
+
+.PHONY: help demo test test-all bench build setup gen format lint clean
+
+help: ## this list
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
+
+demo: build ## the whole chain on simulated hardware, magnet to pose: about two minutes; SEED=n chooses the seed
+	@$(PYTHON) -m whisker.demo --out build/demo --build-dir $(BUILD) --seed $(SEED)
+
+test: build lint ## everything that fits in 15 minutes on two cores
+	@tools/run_tests.sh $(BUILD)
+
+test-all: test ## and what is long: sanitizers over the whole tree, longer fuzzing
+	@tools/run_tests.sh --long
+
+bench: build ## measure speed and accuracy again, as ratios in one run: bench/results, docs/charts
+	@$(PYTHON) tools/bench.py --build-dir $(BUILD)
+
+build: setup ## compile libraries, daemon, firmware core, simulated bridge and the Python modules
+	@tools/build.sh $(BUILD)
+
+setup: ## install what is missing: Debian packages, locked Python packages
+	@tools/setup.sh
+
+gen: setup ## regenerate protocol/gen from protocol/whisker.toml
+	@$(PYTHON) tools/protogen.py
+
+format: setup ## format C, C++ and Python
+	@clang-format -i $(SOURCES_C)
+	@.venv/bin/ruff format --quiet .
+
+lint: setup ## formats, Python lint, folder arrows
+	@clang-format --dry-run --Werror $(SOURCES_C)
+	@.venv/bin/ruff format --quiet --check . || { echo "lint: Python is not formatted; run 'make format'" >&2; exit 1; }
+	@.venv/bin/ruff check --quiet .
+	@$(PYTHON) tools/check_arrows.py
+
+clean: ## remove what was built (not .venv)
+	@rm -rf build host/python/whisker/_native* sim/signals/_sim*

@@ -1,0 +1,79 @@
+#!/usr/bin/env python3
+"""Fails on a forbidden arrow: a folder that uses one it must not know. The allowed arrows are docs/architecture.md's table."""
+
+import re
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+
+# folder -> what its files may include, import or name. A folder may always use itself and protocol/gen.
+ALLOWED = {
+    "firmware/dspic": [],
+    "fpga/bridge_rtl": [],
+    "fpga/usb": ["host/python"],  # only the protocol reader, for descriptors
+    "host/libwhisker": [],
+    "host/nav": [],
+    "host/apps": ["host/libwhisker", "host/nav"],
+    "host/python": ["host/libwhisker", "host/nav", "sim/signals"],
+    "sim/mlx90333": ["sim/node"],
+    "sim/node": ["sim/mlx90333", "firmware/dspic"],
+    "sim/world": ["sim/node"],
+    "sim/signals": ["sim/world", "sim/mlx90333", "sim/node"],
+    "sim/bridge": ["sim/world", "sim/node", "sim/mlx90333", "fpga/bridge_rtl", "fpga/usb"],
+}
+INCLUDE = re.compile(r'^\s*[#`]include\s+["<]([^">]+)[">]', re.MULTILINE)
+IMPORT = re.compile(r"^\s*(?:from|import)\s+([a-zA-Z_][\w.]*)", re.MULTILINE)
+SUFFIXES = {".c", ".h", ".cpp", ".v", ".vh", ".py"}
+PYTHON_PACKAGES = {"whisker": "host/python", "signals": "sim/signals"}
+
+
+def room_of(path: Path) -> str | None:
+    """The folder of the table a file belongs to; tests and benches stand outside: they may use everything."""
+    relative = path.relative_to(ROOT).as_posix()
+    if "/tests/" in relative or "/fuzz/" in relative or "/test_" in relative:
+        return None
+    return next((room for room in ALLOWED if relative.startswith(room + "/")), None)
+
+
+def owners(files: list[Path]) -> dict[str, set[str]]:
+    """Header name (and path tails of it) -> the rooms that hold such a file."""
+    found: dict[str, set[str]] = {}
+    for path in files:
+        room = room_of(path)
+        parts = path.relative_to(ROOT).parts
+        for n in range(1, len(parts) + 1):
+            found.setdefault("/".join(parts[-n:]), set()).add(room or "")
+    return found
+
+
+def uses(path: Path, owner_of: dict[str, set[str]]) -> set[str]:
+    text = path.read_text(errors="replace")
+    if path.suffix == ".py":
+        roots = {name.split(".")[0] for name in IMPORT.findall(text)}
+        return {PYTHON_PACKAGES[name] for name in roots & PYTHON_PACKAGES.keys()}
+    return {room for name in INCLUDE.findall(text) for room in owner_of.get(name, ()) if room}
+
+
+def violations() -> list[str]:
+    files = [p for room in ALLOWED for p in (ROOT / room).rglob("*") if p.suffix in SUFFIXES]
+    owner_of = owners(files)
+    bad = []
+    for path in files:
+        room = room_of(path)
+        if room is None:
+            continue
+        for used in sorted(uses(path, owner_of) - {room} - set(ALLOWED[room])):
+            # a header of the same name in the file's own room is the one meant
+            bad.append(f"{path.relative_to(ROOT)}: {room} must not use {used}; move the code or turn the arrow round")
+    return bad
+
+
+def main() -> int:
+    bad = violations()
+    print("\n".join(bad), end="\n" if bad else "", file=sys.stderr)
+    return 1 if bad else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

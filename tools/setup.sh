@@ -1,0 +1,65 @@
+#!/bin/sh
+# Installs what the build needs and this machine lacks: Debian packages, then Python packages locked by hash into .venv.
+set -eu
+cd "$(dirname "$0")/.."
+
+# command or pkg-config module -> Debian package
+wanted() {
+    cat <<'LIST'
+cmd:gcc gcc
+cmd:g++ g++
+cmd:cmake cmake
+cmd:ninja ninja-build
+cmd:pkg-config pkg-config
+cmd:python3 python3
+cmd:perl perl
+cmd:clang clang
+cmd:clang-format clang-format
+cmd:umockdev-wrapper umockdev
+mod:libusb-1.0 libusb-1.0-0-dev
+mod:hidapi-libusb libhidapi-dev
+mod:umockdev-1.0 libumockdev-dev
+mod:cmocka libcmocka-dev
+file:/usr/lib/llvm-14/lib/clang/14.0.6/lib/linux/libclang_rt.fuzzer-x86_64.a libclang-rt-14-dev
+py:ensurepip python3-venv
+py:Python.h python3-dev
+LIST
+}
+
+present() {
+    case "$1" in
+    cmd:*) command -v "${1#cmd:}" >/dev/null 2>&1 ;;
+    mod:*) pkg-config --exists "${1#mod:}" 2>/dev/null ;;
+    file:*) [ -e "${1#file:}" ] || ls /usr/lib/llvm-*/lib/clang/*/lib/linux/libclang_rt.fuzzer-*.a >/dev/null 2>&1 ;;
+    py:Python.h) python3 -c 'import os, sysconfig, sys; sys.exit(not os.path.exists(sysconfig.get_path("include") + "/Python.h"))' 2>/dev/null ;;
+    py:*) python3 -c "import ${1#py:}" 2>/dev/null ;;
+    esac
+}
+
+missing=$(wanted | while read -r what package; do present "$what" || printf '%s ' "$package"; done)
+if [ -n "$missing" ]; then
+    echo "setup: installing Debian packages: $missing"
+    sudo=
+    if [ "$(id -u)" -ne 0 ]; then
+        command -v sudo >/dev/null 2>&1 || { echo "setup: cannot install packages; as root run: apt-get install $missing" >&2; exit 1; }
+        sudo=sudo
+    fi
+    if ! { $sudo apt-get update -qq && $sudo env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq $missing; } >build-packages.log 2>&1; then
+        tail -3 build-packages.log >&2
+        echo "setup: package installation failed; check the package mirror, then run: apt-get install $missing" >&2
+        exit 1
+    fi
+    rm -f build-packages.log
+fi
+
+python3 -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "setup: python3 is older than 3.11; install Python 3.11 or newer" >&2; exit 1; }
+stamp=.venv/.locked
+if ! [ -e "$stamp" ] || ! cmp -s requirements.lock "$stamp"; then
+    echo "setup: installing the locked Python packages into .venv (about 370 MB, one to three minutes)"
+    python3 -m venv .venv
+    .venv/bin/pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock ||
+        { echo "setup: Python packages could not be installed; check the package index or proxy, then run make again" >&2; exit 1; }
+    .venv/bin/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable . ||
+        { echo "setup: the whisker package could not be installed into .venv; delete .venv and run make again" >&2; exit 1; }
+    cp requirements.lock "$stamp"
+fi
