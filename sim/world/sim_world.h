@@ -1,0 +1,63 @@
+/* The simulated world: a Create-sized robot with whiskers in an arena, one tick (500 us) at a time.
+ *
+ * What comes out is the angle of the magnetic field at each whisker's sensor, noise included: no counts, no bits, no
+ * bytes. Equal scene, seed and commands give equal results; each purpose draws from its own stream of random
+ * numbers, so one whisker's contacts do not change another's noise.
+ */
+#ifndef SIM_WORLD_H
+#define SIM_WORLD_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "sim_field.h"
+#include "sim_scene.h"
+
+/* cffi: begin */
+typedef struct sim_world sim_world;
+
+/* What an object whisker touches, as the world knows it (for truth files and tests, never for decisions). */
+struct sim_contact {
+    bool touching;
+    bool corner;           /* true: the shaft on a corner; false: the tip on a face or a wall */
+    double radius_m;       /* radial distance of the contact from the whisker's base */
+    double theta_rad;      /* imposed angle, positive when the whisker pushes to its left */
+    double amplitude_gain; /* 1 + this contact's deviation of the whisk amplitude */
+};
+
+/* Where a texture whisker's tip is on the floor. */
+struct sim_tip {
+    double x, y;        /* m, arena frame */
+    size_t texture;     /* index in the scene's textures of the nearest tile */
+    double inside_m;    /* distance to the nearest border of its tile; 0 beyond a wall */
+    double travelled_m; /* length of the tip's path since the start */
+};
+
+/* A world at rest at the scene's start pose, or NULL if memory is short. */
+sim_world *sim_world_new(const struct sim_scene *scene, uint64_t seed);
+void sim_world_free(sim_world *world);
+
+/* Commands the base from the next step on: m/s forward, rad/s anticlockwise. A faster command than the wheels allow
+ * (0.5 m/s) is slowed down on the same curve. */
+void sim_world_drive(sim_world *world, double v_m_s, double omega_rad_s);
+
+/* Lets one tick (500 us) pass. */
+void sim_world_step(sim_world *world);
+
+/* Field angle of each lane at the last step, degrees about rest; fields holds one entry per whisker of the scene. */
+void sim_world_fields(const sim_world *world, struct sim_field *fields);
+
+struct sim_pose sim_world_pose(const sim_world *world); /* theta in (-pi, pi] */
+bool sim_world_blocked(const sim_world *world);         /* the body pushed against a wall or a box at the last step */
+
+/* Reported motion since the last call, in the frame of the last call: what a Create counts in whole millimetres and
+ * whole degrees (the remainders are kept for the next call), with the errors of its wheels. */
+void sim_world_odometry(sim_world *world, double *x_m, double *y_m, double *theta_rad);
+
+size_t sim_world_lanes(const sim_world *world);
+struct sim_contact sim_world_contact(const sim_world *world, size_t lane); /* of an object whisker */
+struct sim_tip sim_world_tip(const sim_world *world, size_t lane);         /* of a texture whisker */
+/* cffi: end */
+
+#endif
