@@ -1,0 +1,137 @@
+"""The netbook's part: samples and odometry in, wheel speeds and observation rows out. Knows no device and no world.
+
+The row of every 0.1 s is one of four kinds:
+    exploring         odometry, texture of the last 200 samples while the tips sweep at the trained speed, radial cells
+                      empty (read, no contact) or nan (touching: no measured distance)
+    body whisk        zero odometry, texture empty, radial cells nan
+    release in it     odometry since the last row that carried any, and the distance of each whisker measured
+    first after it    odometry since the release
+"""
+
+import math
+from collections import deque
+
+import numpy as np
+
+from .behaviour import BLOCK_TICKS, EXPLORE_M_S, PUSH_TICKS, TICK_S, TURN_RAD_S, Behaviour
+from .contact import Contact
+
+WINDOW_SAMPLES = 200
+WINDOW_LEAST_GOOD = 150  # fewer good samples than this are no window
+SETTLE_TICKS = 100  # the wheels' last change of speed must be this much older than a texture window
+
+
+class Pilot:
+    """One robot's decisions. The same seed, samples and odometry always give the same drives and rows."""
+
+    def __init__(self, robot, texture_models: dict, radial_models: dict, seed: int):
+        """`robot.whiskers` in lane order; models by whisker name; `seed` of the random turns."""
+        self.names = {lane: whisker.name for lane, whisker in enumerate(robot.whiskers)}
+        self.texture_lanes = [n for n, w in enumerate(robot.whiskers) if w.role == "texture"]
+        self.object_lanes = [n for n, w in enumerate(robot.whiskers) if w.role == "object"]
+        self.texture_models = texture_models
+        self.radial_models = radial_models
+        self.contacts = {lane: Contact() for lane in self.object_lanes}
+        side = {n: math.copysign(1.0, -robot.whiskers[n].base_m[1]) for n in self.object_lanes}
+        self.behaviour = Behaviour(self.contacts, side, np.random.default_rng(seed))
+        self.bad_samples = 0
+        self.whisks: list[dict] = []  # every measured contact, for the report
+        self._recent = deque(maxlen=WINDOW_SAMPLES // BLOCK_TICKS)  # of the last 0.1 s: (samples, good) of all lanes
+        self._whisk_samples: dict[int, list] = {}
+        self._measured: dict[int, tuple[int, float, float]] = {}  # lane: release tick, mm, sigma
+        self._pending = np.zeros(3)  # motion not yet in a row, in the frame of the last row that carried any
+        self._was_whisking = False
+
+    def block(self, first_tick: int, alpha, beta, status) -> tuple[float, float]:
+        """Decide on the 40 ticks from `first_tick`: arrays (40, lanes) of counts and status -> v in m/s, omega in rad/s."""
+        samples = np.stack([alpha, beta], axis=-1).astype(np.float64)[:, : len(self.names)]
+        good = np.asarray(status)[:, : len(self.names)] == 0
+        ticks = np.arange(first_tick, first_tick + len(good))
+        self.bad_samples += int(good.size - np.count_nonzero(good))
+        self._recent.append((samples, good))
+        for lane, contact in self.contacts.items():
+            use = good[:, lane]
+            contact.block(ticks[use], samples[use, lane])
+        self._follow_whisk(ticks, samples, good)
+        return self.behaviour.decide(int(ticks[-1]))
+
+    def odometry(self, tick: int, dx: float, dy: float, dtheta: float) -> dict[str, float | None]:
+        """The observation row of the 0.1 s that end at `tick`; motion in the robot frame at their start.
+
+        Cells: None is an empty cell (not read for a texture, no contact for a distance), nan is a distance not read.
+        """
+        self.behaviour.moved(tick, dx, dy, dtheta)
+        self._pending = compose(self._pending, (dx, dy, dtheta))
+        whisking = self.behaviour.whisking
+        released = {n: m for n, m in self._measured.items() if m[0] <= tick}
+        held_back = whisking and not released
+        moved = np.zeros(3) if held_back else self._pending
+        if not held_back:
+            self._pending = np.zeros(3)
+        row = {"t_s": round((tick + 1) * TICK_S, 4)}
+        row |= dict(zip(("odo_x_m", "odo_y_m", "odo_theta_rad"), map(float, moved), strict=True))
+        for lane in self.texture_lanes:
+            row |= self._texture_cells(lane, tick, held_back=whisking or self._was_whisking)
+        for lane in self.object_lanes:
+            row[f"{self.names[lane]}_mm"] = self._radial_cell(lane, released, whisking)
+        for lane in released:
+            del self._measured[lane]
+        self._was_whisking = whisking
+        return row
+
+    def _follow_whisk(self, ticks, samples, good) -> None:
+        """Gather the whisk's samples; once a whisker that was pushed long enough lets go, its distance is known."""
+        whisk = self.behaviour.whisk
+        if whisk is None or whisk.start < 0:
+            self._whisk_samples.clear()
+            return
+        for lane, contact in self.contacts.items():
+            use = good[:, lane]
+            self._whisk_samples.setdefault(lane, []).append((ticks[use], samples[use, lane]))
+            pushed = contact.onset > whisk.start and 0 <= contact.onset + PUSH_TICKS <= whisk.push_end
+            if pushed and contact.release > contact.onset and not contact.touching:
+                self._measure(lane, contact)
+
+    def _measure(self, lane: int, contact: Contact) -> None:
+        if self.whisks and (self.whisks[-1]["lane"], self.whisks[-1]["onset"]) == (lane, contact.onset):
+            return
+        ticks = np.concatenate([t for t, _ in self._whisk_samples[lane]])
+        samples = np.concatenate([s for _, s in self._whisk_samples[lane]])
+        model = self.radial_models[self.names[lane]]
+        push = (ticks >= contact.onset) & (ticks < contact.onset + PUSH_TICKS)
+        peak = model.peak(samples[push], contact.rest)
+        mm, sigma = model.predict(peak)
+        self._measured[lane] = (contact.release, float(mm), float(sigma))
+        self.whisks.append(
+            {"lane": lane, "onset": contact.onset, "release": contact.release, "peak": float(peak), "mm": float(mm)}
+        )
+
+    def _texture_cells(self, lane: int, tick: int, held_back: bool) -> dict[str, float | None]:
+        model = self.texture_models[self.names[lane]]
+        cells = {f"{self.names[lane]}_{name}": None for name in model.classes}
+        if held_back or not self._sweeping(tick):
+            return cells
+        samples = np.concatenate([s[good[:, lane], lane] for s, good in self._recent])
+        if len(samples) >= WINDOW_LEAST_GOOD:
+            loglik = model.loglik(samples)
+            cells = dict(zip(cells, map(float, loglik), strict=True))
+        return cells
+
+    def _sweeping(self, tick: int) -> bool:
+        """Whether the tips moved over the floor at the speed they were trained at during the whole window."""
+        v, omega = self.behaviour.drive
+        steady = self.behaviour.drive_since + SETTLE_TICKS <= tick + 1 - WINDOW_SAMPLES
+        return steady and (v == EXPLORE_M_S or abs(omega) == TURN_RAD_S)
+
+    def _radial_cell(self, lane: int, released: dict, whisking: bool) -> float | None:
+        if lane in released:
+            return released[lane][1]
+        if self.contacts[lane].touching or self.contacts[lane].rest is None or (whisking and not released):
+            return math.nan
+        return None
+
+
+def compose(first, then) -> np.ndarray:
+    """Motion `first` followed by `then` (each x, y in m and theta in rad, in the frame at its own start)."""
+    c, s = math.cos(first[2]), math.sin(first[2])
+    return np.array([first[0] + c * then[0] - s * then[1], first[1] + s * then[0] + c * then[1], first[2] + then[2]])

@@ -1,0 +1,151 @@
+"""Puts figures and tables on one page that opens without a network."""
+
+from html import escape
+from pathlib import Path
+
+from . import figures
+from .run import Run
+
+PAPER_STD_MM = (5.68, 2.78, 1.82, 4.37)  # the paper's table under Fig. 5, whiskers 1 to 4
+
+STYLE = """
+body { font: 16px/1.5 system-ui, sans-serif; color: #1b1b1b; background: #fff; max-width: 70rem; margin: 2rem auto; padding: 0 1.25rem; }
+h1 { font-size: 1.7rem; margin: 0 0 .3rem; } h2 { font-size: 1.2rem; margin: 2.2rem 0 .4rem; }
+.lead { color: #444; margin: 0 0 1rem; }
+.cards { display: grid; grid-template-columns: repeat(auto-fit, minmax(11rem, 1fr)); gap: .8rem; margin: 1.2rem 0; }
+.card { border: 1px solid #ccc; border-radius: 6px; padding: .6rem .8rem; } .card b { display: block; font-size: 1.35rem; }
+.card span { color: #555; font-size: .85rem; }
+figure { margin: .6rem 0; overflow-x: auto; } figure svg { width: 100%; height: auto; min-width: 44rem; }
+figcaption { color: #444; font-size: .9rem; }
+table { border-collapse: collapse; margin: .6rem 0; } caption { text-align: left; color: #444; font-size: .9rem; padding-bottom: .3rem; }
+th, td { border-bottom: 1px solid #ddd; padding: .25rem .9rem .25rem 0; text-align: right; font-variant-numeric: tabular-nums; }
+th:first-child, td:first-child { text-align: left; }
+"""
+
+
+def write_report(folder: Path) -> Path:
+    """Read the run in `folder` and write its report.html; returns the file's path."""
+    run = Run.load(folder)
+    path = folder / "report.html"
+    path.write_text(render(run))
+    return path
+
+
+def render(run: Run) -> str:
+    """The page as text."""
+    s = run.summary
+    parts = [
+        f"<h1>CrunchBot: from magnet to pose, seed {s['seed']}</h1>",
+        f'<p class="lead">{_lead(s)}</p>',
+        _cards(s),
+        "<h2>Where it was, and where it thought it was</h2>",
+        _figure(
+            figures.arena(run),
+            "The arena from above. Black blocks are obstacles. The belief starts 0.2 m and 10 degrees wrong.",
+        ),
+        _figure(figures.errors(run), "Every step from the first is counted. Medians are in the table below."),
+        _estimates_table(s),
+        "<h2>Floor texture</h2>",
+        _figure(
+            figures.texture(run),
+            "One mark for each 100 ms window that was read; none is read during body whisks, at rest, or while the speed changes. "
+            f"Accuracy {_percent(s['texture_accuracy'])} at least 50 mm inside a tile ({_percent(s['texture_windows_share'])} of moving windows), "
+            f"{_percent(s['texture_accuracy_all'])} of all windows read.",
+        ),
+        "<h2>Distance along the whisker</h2>",
+        _figure(
+            figures.radial(run),
+            "Five calibration contacts per 10 mm fit each line; the errors below are of contacts that were held out. "
+            "Markers of the two sets are shifted by 1.5 mm either way to be seen apart.",
+        ),
+        _radial_table(run),
+        "<h2>Throughput and loss</h2>",
+        _loss_table(s),
+    ]
+    title = f"CrunchBot demo, seed {s['seed']}"
+    return (
+        f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">'
+        f"<title>{title}</title><style>{STYLE}</style></head><body>\n" + "\n".join(parts) + "\n</body></html>\n"
+    )
+
+
+def _lead(s: dict) -> str:
+    return (
+        f"{s['simulated_s']:g} s of random exploration with {s['lanes']} whiskers. Sensor, firmware, lanes, USB, ring and filters are the real "
+        "parts or their bit-true models; arena, whisker mechanics and wheels are simulated."
+    )
+
+
+def _cards(s: dict) -> str:
+    cards = (
+        (f"{s['pose_error_median_m'] * 1000:.0f} mm", "median position error, grid"),
+        (_percent(s["texture_accuracy"]), "texture windows right"),
+        (f"{s['frames_lost']}", f"frames lost of {s['frames_sent']:,}"),
+        (
+            "equal" if s["records_bad_match"] else "NOT EQUAL",
+            f"{s['records_bad_injected']} bad records injected and reported",
+        ),
+        (f"{s['simulated_s'] / s['chain_wall_s']:.2f} x", "of real time, whole chain"),
+    )
+    return (
+        '<div class="cards">'
+        + "".join(f'<div class="card"><b>{b}</b><span>{t}</span></div>' for b, t in cards)
+        + "</div>"
+    )
+
+
+def _estimates_table(s: dict) -> str:
+    grid = f"{s['pose_error_p90_m']:.3f}", f"{s['heading_error_median_rad']:.3f}"
+    rows = [
+        ("grid", f"{s['pose_error_median_m']:.3f}", *grid),
+        ("foveal", f"{s['foveal_error_median_m']:.3f}", "", ""),
+        ("odometry alone", f"{s['odometry_error_median_m']:.3f}", "", ""),
+    ]
+    return _table("Errors over all steps", ("estimate", "median (m)", "90 % (m)", "heading, median (rad)"), rows)
+
+
+def _radial_table(run: Run) -> str:
+    s = run.summary
+    paper = dict(zip(run.object_names, PAPER_STD_MM, strict=False))
+    rows = [
+        (
+            name,
+            f"{s['radial_std_mm'][name]:.2f}",
+            f"{s['radial_std_predicted_mm'][name]:.2f}",
+            f"{paper[name]:.2f}" if name in paper else "",
+        )
+        for name in run.object_names
+    ]
+    return _table(
+        "Standard deviation of the radial error, mm",
+        ("whisker", "held out", "predicted from repeatability", "paper"),
+        rows,
+    )
+
+
+def _loss_table(s: dict) -> str:
+    rows = [
+        ("frames made by the bridge", f"{s['frames_sent']:,}"),
+        ("distinct frames seen by a separate reader", f"{s['frames_received']:,}"),
+        ("frames lost", f"{s['frames_lost']:,}"),
+        ("bad records injected (sensor and lane faults)", f"{s['records_bad_injected']:,}"),
+        ("bad records reported", f"{s['records_bad_reported']:,}"),
+        ("the two sets of (lane, tick)", "equal" if s["records_bad_match"] else "not equal"),
+        ("USB faults injected", f"{s['usb_faults_injected']:,}"),
+        ("simulated seconds per wall second", f"{s['simulated_s'] / s['chain_wall_s']:.2f}"),
+    ]
+    return _table("The chain from sensor to ring", ("quantity", "value"), rows)
+
+
+def _table(caption: str, header: tuple, rows: list[tuple]) -> str:
+    head = "".join(f"<th>{escape(cell)}</th>" for cell in header)
+    body = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
+    return f"<table><caption>{escape(caption)}</caption><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+
+
+def _figure(svg: str, caption: str) -> str:
+    return f"<figure>{svg}<figcaption>{escape(caption)}</figcaption></figure>"
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.1f} %"
