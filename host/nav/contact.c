@@ -1,0 +1,87 @@
+#include "contact.h"
+
+#include <math.h>
+
+void nav_contact_init(struct nav_contact *c, const struct nav_contact_config *config)
+{
+    *c = (struct nav_contact){.config = *config};
+}
+
+void nav_contact_rest(struct nav_contact *c, double alpha, double beta)
+{
+    c->rest[0] = alpha;
+    c->rest[1] = beta;
+    c->settled = c->config.settle_samples;
+}
+
+static void settle(struct nav_contact *c, double alpha, double beta)
+{
+    c->settled++;
+    c->rest[0] += (alpha - c->rest[0]) / c->settled;
+    c->rest[1] += (beta - c->rest[1]) / c->settled;
+}
+
+/* Only samples below the release threshold move the rest: what presses softly must not become the new rest at once. */
+static void follow_drift(struct nav_contact *c, double alpha, double beta)
+{
+    double share = c->config.rest_samples > 1.0 ? 1.0 / c->config.rest_samples : 0.0;
+    c->rest[0] += share * (alpha - c->rest[0]);
+    c->rest[1] += share * (beta - c->rest[1]);
+}
+
+static enum nav_contact_event begin_or_wait(struct nav_contact *c, double deflection)
+{
+    if (!(deflection > c->config.onset_counts)) {
+        c->run = 0;
+        return NAV_CONTACT_NONE;
+    }
+    c->run_peak = c->run == 0 ? deflection : fmax(c->run_peak, deflection);
+    if (++c->run < c->config.onset_samples)
+        return NAV_CONTACT_NONE;
+    c->run = 0;
+    c->touching = true;
+    c->peak = c->run_peak;
+    return NAV_CONTACT_ONSET;
+}
+
+static enum nav_contact_event end_or_stay(struct nav_contact *c, double deflection)
+{
+    c->peak = fmax(c->peak, deflection);
+    if (!(deflection < c->config.release_counts)) {
+        c->run = 0;
+        return NAV_CONTACT_NONE;
+    }
+    if (++c->run < c->config.release_samples)
+        return NAV_CONTACT_NONE;
+    c->run = 0;
+    c->touching = false;
+    return NAV_CONTACT_RELEASE;
+}
+
+enum nav_contact_event nav_contact_update(struct nav_contact *c, double alpha, double beta, bool good)
+{
+    if (!good || !isfinite(alpha) || !isfinite(beta)) {
+        c->skipped++;
+        return NAV_CONTACT_NONE;
+    }
+    if (c->settled < c->config.settle_samples) {
+        settle(c, alpha, beta);
+        return NAV_CONTACT_NONE;
+    }
+    double deflection = hypot(alpha - c->rest[0], beta - c->rest[1]);
+    if (c->touching)
+        return end_or_stay(c, deflection);
+    if (deflection < c->config.release_counts)
+        follow_drift(c, alpha, beta);
+    return begin_or_wait(c, deflection);
+}
+
+void nav_contact_run(struct nav_contact *c, const double *samples, const uint8_t *good, size_t n, uint8_t *events,
+                     double *peaks)
+{
+    for (size_t i = 0; i < n; i++) {
+        enum nav_contact_event event = nav_contact_update(c, samples[2 * i], samples[2 * i + 1], good[i] != 0);
+        events[i] = (uint8_t)event;
+        peaks[i] = event == NAV_CONTACT_RELEASE ? c->peak : 0.0;
+    }
+}

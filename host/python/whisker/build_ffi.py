@@ -1,0 +1,70 @@
+"""Compiles whisker/_native: the C libraries as a Python module (cffi, API mode).
+
+Declarations are taken from the public headers, between the lines `/* cffi: begin */` and `/* cffi: end */`, so nothing
+is declared twice. Usage: build_ffi.py --build-dir build/release
+"""
+
+import argparse
+import re
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+
+import cffi
+
+HERE = Path(__file__).resolve().parent
+HOST = HERE.parents[1]
+BLOCK = re.compile(r"/\* cffi: begin \*/\n(.*?)/\* cffi: end \*/", re.DOTALL)
+
+# What each library needs beside itself; the order is the linker's.
+LIBRARIES = {"nav": ["m"], "whisker": ["rt", "pthread"]}
+# Headers that others build on come first: cffi wants a struct before its use.
+HEADERS = {
+    "nav": [HOST / "nav" / name for name in ("contact.h", "radial.h", "texture.h")],
+    "whisker": [HOST / "libwhisker" / "include" / "whisker" / name for name in ("errors.h", "frame.h", "ring.h")],
+}
+
+
+def declarations(header: Path) -> str:
+    """What the header declares between its cffi markers."""
+    return "\n".join(BLOCK.findall(header.read_text()))
+
+
+def find_library(build: Path, name: str) -> Path | None:
+    return next(iter(sorted(build.rglob(f"lib{name}.a"))), None)
+
+
+def main(argv: list[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--build-dir", type=Path, required=True, help="CMake's build folder, with the static libraries")
+    build = parser.parse_args(argv).build_dir.resolve()
+    archives = {name: find_library(build, name) for name in LIBRARIES}
+    if archives["nav"] is None:
+        print(f"build_ffi: {build}: no libnav.a; run cmake --build {build} first", file=sys.stderr)
+        return 1
+    found = [name for name in LIBRARIES if archives[name] is not None]
+    headers = [h for name in found for h in HEADERS[name] if h.exists() and BLOCK.search(h.read_text())]
+    ffi = cffi.FFI()
+    for header in headers:
+        ffi.cdef(declarations(header))
+    ffi.set_source(
+        "_native",
+        "\n".join(f'#include "{header}"' for header in headers),
+        include_dirs=[str(HOST / "libwhisker" / "include")],
+        extra_link_args=[str(archives[name]) for name in found],
+        libraries=[library for name in found for library in LIBRARIES[name]],
+        extra_compile_args=["-O2", "-std=gnu11"],
+    )
+    with tempfile.TemporaryDirectory() as scratch:
+        made = Path(ffi.compile(tmpdir=scratch))
+        # A new file under the old name: a process that has the old module mapped keeps its own.
+        fresh = HERE / f".{made.name}.new"
+        shutil.copy(made, fresh)
+        fresh.replace(HERE / made.name)
+    print(f"build_ffi: {HERE / made.name}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

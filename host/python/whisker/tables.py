@@ -1,0 +1,56 @@
+"""CSV files with strict structure and forgiven values; every complaint is one line with file, line and remedy."""
+
+import csv
+import math
+from pathlib import Path
+
+import numpy as np
+
+
+class TableError(ValueError):
+    """A file whose structure is wrong. Its text is one line: file, line where known, what and the remedy."""
+
+    def __init__(self, path, line: int | None, text: str):
+        place = f"{path}, line {line}" if line else f"{path}"
+        super().__init__(f"{place}: {text}")
+
+
+def number(cell: str) -> float:
+    """A cell as a number; whatever is none, an empty cell too, is nan."""
+    try:
+        return float(cell)
+    except ValueError:
+        return math.nan
+
+
+def read_rows(path) -> tuple[list[str], list[list[str]]]:
+    """Header and rows of a CSV file: header first, no duplicate column, no ragged row."""
+    try:
+        lines = list(csv.reader(Path(path).read_text(encoding="utf-8").splitlines()))
+    except (OSError, UnicodeError, csv.Error) as error:
+        reason = error.strerror if isinstance(error, OSError) else "not a text file"
+        raise TableError(path, None, f"cannot be read ({reason}); give a readable CSV file") from error
+    if not lines or not lines[0]:
+        raise TableError(path, 1, "no header line; name the columns in the first line")
+    header = [name.strip() for name in lines[0]]
+    for name in header:
+        if header.count(name) > 1:
+            raise TableError(path, 1, f"column '{name}' appears twice; keep one")
+    for index, row in enumerate(lines[1:], start=2):
+        if len(row) != len(header):
+            raise TableError(path, index, f"{len(row)} cells but {len(header)} columns; give every row all its cells")
+    return header, lines[1:]
+
+
+def read_columns(path, required: list[str]) -> dict[str, list[str]]:
+    """Columns as text by name; TableError when one of `required` is missing."""
+    header, rows = read_rows(path)
+    for name in required:
+        if name not in header:
+            raise TableError(path, 1, f"column '{name}' is missing; add it to the header and every row")
+    return {name: [row[i].strip() for row in rows] for i, name in enumerate(header)}
+
+
+def numbers(cells: list[str]) -> np.ndarray:
+    """Cells as float64; whatever is no number is nan."""
+    return np.array([number(cell) for cell in cells], dtype=np.float64)
