@@ -30,7 +30,7 @@ def test_crc_matches_its_published_check_value():
 
 def test_sizes_are_those_of_the_design():
     assert (p.RECORD.size, p.FRAME_HEADER.size, p.FRAME_BYTES) == (8, 32, 256)
-    assert p.FRAME_BYTES * 2 == p.LIMITS["bulk_packet"]
+    assert p.LIMITS["bulk_packet"] == 2 * p.FRAME_BYTES
 
 
 def test_codes_fit_their_six_bits_and_error_bits_their_ten():

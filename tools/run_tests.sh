@@ -1,22 +1,27 @@
 #!/bin/sh
-# Runs every test: C and C++ by CTest, then Python, gateware and end to end by pytest. `--long`: the sanitized builds.
+# Runs every test: C and C++ by CTest, the C code again under sanitizers, then Python, gateware and end to end by pytest.
+# `--long` instead: the Verilated bridge under AddressSanitizer and a minute of fuzzing per decoder.
 set -eu
 cd "$(dirname "$0")/.."
 
-sanitized() { # preset
-    echo "test: whole tree with the $1 preset"
+with_preset() { # preset
+    echo "test: C and C++ with the $1 preset"
     [ -e "build/$1/build.ninja" ] || cmake --preset "$1" >/dev/null
-    cmake --build "build/$1" && ctest --preset "$1"
+    cmake --build "build/$1" >"build/$1.log" 2>&1 || { tail -25 "build/$1.log" >&2; exit 1; }
+    ctest --test-dir "build/$1" --output-on-failure --no-tests=error --parallel 2
 }
 
 if [ "${1:-}" = --long ]; then
-    sanitized asan
-    sanitized tsan
+    with_preset asan-rtl
+    for fuzzer in build/release/*/*/fuzz_* build/release/*/*/*/fuzz_*; do
+        [ -x "$fuzzer" ] || continue
+        echo "test: a minute of $(basename "$fuzzer")"
+        "$fuzzer" -max_total_time=60 -verbosity=0 2>"build/$(basename "$fuzzer").log" || { tail -25 "build/$(basename "$fuzzer").log" >&2; exit 1; }
+    done
     exit 0
 fi
-echo "test: C and C++"
-ctest --test-dir "$1" --output-on-failure --no-tests=error --parallel 2
-echo "test: sanitizers (libraries and firmware)"
-tools/run_sanitized.sh
+with_preset "$(basename "$1")"
+with_preset asan
+with_preset tsan
 echo "test: Python, gateware, end to end"
 WHISKER_BUILD=$1 .venv/bin/python -m pytest
