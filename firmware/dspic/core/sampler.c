@@ -1,0 +1,114 @@
+#include "sampler.h"
+
+#include "board/timer.h"      // board_timer_start
+#include "whisker_protocol.h" // WHISKER_CODE_*
+
+/* Waits, in microseconds. Each exceeds the data sheet's time by the sensor's slowest oscillator and our own fastest
+ * (FRC: 2 %); checked below. */
+#define STARTUP_US 18000u
+#define RESYNC_US 350u
+#define SELECT_US 4u
+#define GAP_US 24u /* with a byte's 21 us: slots of 45 us, a frame in 336 us of the tick's 500 */
+#define RELEASE_US 30u
+
+#define MARGIN_PERCENT (MLX90333_OSCILLATOR_PERCENT + 2u)
+#define TOO_SHORT(us, ns) ((us)*UINT32_C(100000) < (ns) * (UINT32_C(100) + MARGIN_PERCENT))
+
+#if TOO_SHORT(STARTUP_US, MLX90333_STARTUP_NS) || TOO_SHORT(RESYNC_US, MLX90333_T5_NS) ||                              \
+    TOO_SHORT(SELECT_US, MLX90333_T6_NS) || TOO_SHORT(GAP_US, MLX90333_T7_NS) || TOO_SHORT(GAP_US, MLX90333_T2_NS)
+#error "a wait is shorter than the sensor may need"
+#endif
+/* A late frame is given up while a byte may be under way: t4 counts from that byte's end. */
+#if TOO_SHORT(RELEASE_US - BOARD_SENSOR_BYTE_MAX_US, MLX90333_T4_NS)
+#error "/SS may rise too soon after the last clock edge"
+#endif
+
+static void wait_in(struct sampler *sampler, enum sampler_state state, uint16_t us)
+{
+    sampler->state = (uint8_t)state;
+    board_timer_start(sampler->board, us);
+}
+
+static void transfer_byte(struct sampler *sampler)
+{
+    sampler->state = SAMPLER_BYTE;
+    board_sensor_transfer(sampler->board, MLX90333_MASTER_BYTE);
+}
+
+void sampler_start(struct sampler *sampler, struct board *board)
+{
+    sampler->board = board;
+    sampler->unready = WHISKER_CODE_STARTING;
+    sampler->count = 0;
+    board_sensor_select(board, true);
+    wait_in(sampler, SAMPLER_STARTING, STARTUP_US);
+}
+
+uint8_t sampler_on_sync(struct sampler *sampler)
+{
+    switch (sampler->state) {
+    case SAMPLER_READY:
+        sampler->count = 0;
+        transfer_byte(sampler);
+        return WHISKER_CODE_LATE;
+    case SAMPLER_BYTE:
+    case SAMPLER_GAP:
+        wait_in(sampler, SAMPLER_RELEASE, RELEASE_US);
+        return WHISKER_CODE_RESYNC;
+    default:
+        return sampler->unready;
+    }
+}
+
+void sampler_on_timer(struct sampler *sampler)
+{
+    switch (sampler->state) {
+    case SAMPLER_RELEASE:
+        board_sensor_select(sampler->board, true);
+        wait_in(sampler, SAMPLER_RESYNC_HIGH, RESYNC_US);
+        break;
+    case SAMPLER_STARTING: /* what /SS did before the sensor was awake does not count */
+        wait_in(sampler, SAMPLER_RESYNC_HIGH, RESYNC_US);
+        break;
+    case SAMPLER_RESYNC_HIGH:
+        board_sensor_select(sampler->board, false);
+        wait_in(sampler, SAMPLER_RESYNC_LOW, SELECT_US);
+        break;
+    case SAMPLER_RESYNC_LOW:
+        sampler->unready = WHISKER_CODE_RESYNC;
+        sampler->state = SAMPLER_READY;
+        break;
+    case SAMPLER_GAP:
+        transfer_byte(sampler);
+        break;
+    default:
+        break;
+    }
+}
+
+static void end_frame(struct sampler *sampler, const struct sensor_reading *reading)
+{
+    if (reading->status >> WHISKER_STATUS_CODE_SHIFT == WHISKER_CODE_OK)
+        sampler->state = SAMPLER_READY;
+    else
+        wait_in(sampler, SAMPLER_RELEASE, RELEASE_US);
+}
+
+bool sampler_on_byte(struct sampler *sampler, uint8_t byte, struct sensor_reading *reading)
+{
+    if (sampler->state != SAMPLER_BYTE)
+        return false;
+    sampler->frame[sampler->count++] = byte;
+    if (sampler->count < MLX90333_FRAME_BYTES) {
+        wait_in(sampler, SAMPLER_GAP, GAP_US);
+        return false;
+    }
+    *reading = sensor_frame_decode(sampler->frame);
+    end_frame(sampler, reading);
+    return true;
+}
+
+bool sampler_ready(const struct sampler *sampler)
+{
+    return sampler->state == SAMPLER_READY;
+}

@@ -1,0 +1,81 @@
+/* MLX90333 on its serial pins, edge by edge: a slave in SPI mode 1 on one shared open-drain data line.
+ *
+ * The line is low if either side pulls it low, so master and sensor are a wired AND. The sensor ignores everything
+ * until its start-up time has passed, and keeps its count of bits and bytes for ever unless /SS, high long enough,
+ * resynchronises it. It also watches its master: every breach of the data sheet is counted, and tests demand zero.
+ *
+ * Not modelled yet: the asynchronous conversion and its filter (the field is taken at the latch), and the soft reset
+ * that follows a frame with error bits. */
+#ifndef MLX90333_MODEL_H
+#define MLX90333_MODEL_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "mlx90333_datasheet.h" // MLX90333_FRAME_BYTES and times: firmware/dspic/core
+#include "sim_counts.h"         // sim_counts
+
+enum sim_sensor_fault {
+    SIM_SENSOR_GOOD,
+    SIM_SENSOR_FLIP_BIT,   /* one bit of the frame is inverted at the master's end; argument 0 to 63 in order of sending
+                            */
+    SIM_SENSOR_DEAD,       /* all ones: nothing drives the line */
+    SIM_SENSOR_STUCK_LOW,  /* all zeros */
+    SIM_SENSOR_ERROR_BITS, /* a sound frame whose error word is the argument */
+};
+
+/* What a master may do wrong. */
+enum mlx90333_violation {
+    MLX90333_CLOCK_PERIOD,     /* t1 */
+    MLX90333_BYTE_GAP,         /* t2 */
+    MLX90333_SELECT_HIGH,      /* t4 */
+    MLX90333_SELECT_LOW,       /* t6 */
+    MLX90333_START_GAP,        /* t7 */
+    MLX90333_ZERO_SENT,        /* a bit of the master's was not a one */
+    MLX90333_CLOCK_IN_STARTUP, /* an edge before the sensor was awake */
+    MLX90333_VIOLATIONS        /* how many kinds there are */
+};
+
+/* Kept by the caller; the fields are the model's own. Times are nanoseconds of virtual time and never go back. */
+struct mlx90333 {
+    uint32_t t1, t2, t4, t5, t6, t7; /* stretched by this part's oscillator */
+    uint64_t awake_ns;               /* when the start-up ends */
+    uint64_t select_ns;              /* last edge of /SS */
+    uint64_t rise_ns, fall_ns;       /* last clock edges */
+    double alpha_deg, beta_deg;
+    uint64_t random;
+    uint32_t violations[MLX90333_VIOLATIONS];
+    uint16_t argument; /* of the fault */
+    uint8_t fault;     /* enum sim_sensor_fault */
+    bool select;       /* level of /SS */
+    bool fresh;        /* no clock edge since /SS fell */
+    bool enabled;      /* resynchronised since power-up */
+    bool answering;    /* the start byte was right */
+    bool level;        /* what the sensor's side lets through: false pulls the line low */
+    uint8_t byte, bit; /* position in the frame */
+    uint8_t sending;   /* bits still to send of this byte, next one on top */
+    uint8_t received;  /* of the master's byte */
+    uint8_t frame[MLX90333_FRAME_BYTES];
+};
+
+/* Supply on at `now_ns` with /SS high. `slow_permille`: this part's times in thousandths of the nominal (1000; a part
+ * with a 10 % slow oscillator has 1100). `seed` decides the resynchronisations that the data sheet leaves undefined. */
+void mlx90333_power_on(struct mlx90333 *sensor, uint64_t now_ns, uint32_t slow_permille, uint64_t seed);
+
+/* The field from now on, degrees from rest. */
+void mlx90333_set_field(struct mlx90333 *sensor, double alpha_deg, double beta_deg);
+
+/* The fault from now on, with its argument. */
+void mlx90333_set_fault(struct mlx90333 *sensor, enum sim_sensor_fault fault, unsigned argument);
+
+/* Edge of /SS. After a rising edge the sensor resynchronises surely if /SS stays high for t5, with growing likelihood
+ * before that, and never at once. */
+void mlx90333_select(struct mlx90333 *sensor, uint64_t now_ns, bool level);
+
+/* Edge of SCLK while the master lets the line go (`master` true) or pulls it low. Returns the line's level after it. */
+bool mlx90333_clock(struct mlx90333 *sensor, uint64_t now_ns, bool level, bool master);
+
+/* All violations of the master's so far. */
+uint32_t mlx90333_violations(const struct mlx90333 *sensor);
+
+#endif

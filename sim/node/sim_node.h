@@ -1,0 +1,46 @@
+/* A whisker node in virtual time: the firmware's core on a host port of its board, reading a model of the sensor.
+ *
+ * One tick of a node: sim_node_sync(), the bridge's transfer edge by edge (it takes no virtual time), sim_node_run().
+ * Nothing here is shared between nodes: each may have its own thread. */
+#ifndef SIM_NODE_H
+#define SIM_NODE_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "mlx90333_model.h" // enum sim_sensor_fault, sim_counts
+#include "sim_field.h"      // struct sim_field
+
+#define SIM_TICK_NS UINT64_C(500000) /* virtual time from one SYNC to the next: the paper's 2 kHz */
+
+typedef struct sim_node sim_node;
+
+/* A node without power: it answers nothing. `seed` decides what the sensor's data sheet leaves undefined.
+ * NULL if there is no memory. */
+sim_node *sim_node_new(uint64_t seed);
+void sim_node_free(sim_node *node);
+
+/* Supply on; virtual time then passes until the node is ready for a SYNC (about 18 ms). */
+void sim_node_power_on(sim_node *node);
+
+/* SYNC: the record of the reading before is armed, the reading of this field starts. */
+void sim_node_sync(sim_node *node, struct sim_field field);
+
+/* Edge of the link's select line; low selects. */
+void sim_node_select(sim_node *node, bool low);
+
+/* Edge of the link's SCK with the level of MOSI at that time. Returns MISO after it; true (pulled up) when idle. */
+bool sim_node_sck(sim_node *node, bool level, bool mosi);
+
+/* The rest of this tick: the sensor is read bit by bit until the time of the next SYNC. */
+void sim_node_run(sim_node *node);
+
+/* The sensor's fault for the reading that the next SYNC starts, and only that; without a reading it has no effect.
+ * A bad frame costs the tick (SENSOR_*) and the next one (RESYNC). A flipped bit 40 to 55 is in the error word: if that
+ * bit is assigned, the record is OK with this error bit and no tick is lost besides; else the frame is bad. */
+void sim_node_fault(sim_node *node, enum sim_sensor_fault fault, unsigned argument);
+
+/* What the firmware did against the sensor's data sheet or the board's contract so far. Tests demand zero. */
+uint32_t sim_node_violations(const sim_node *node);
+
+#endif
