@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-
 from whisker.radial import RadialModel, peak, read_whisks
 from whisker.tables import TableError
 

@@ -1,0 +1,142 @@
+"""Scene folders: round trip, the simulator's flat text, and one clear line for every way to break one."""
+
+import dataclasses
+
+import pytest
+from whisker import scene as scenes
+
+ARENA_TOML = """\
+size_m = [1.0, 1.5]
+tile_m = 0.5
+textures = ["VINYL", "SMOOTH"]
+floor = ["VS", "SV", "VV"]
+
+[[obstacle]]
+min_m = [0.0, 0.0]
+max_m = [0.2, 0.3]
+
+[[obstacle]]
+min_m = [0.5, 0.5]
+max_m = [0.7, 1.0]
+"""
+ROBOT_TOML = """\
+body_radius_m = 0.17
+odometry_relative_sigma = 0.05
+radial_sigma_m = 0.005
+
+[[whisker]]
+name = "floor_left"
+role = "texture"
+tip_m = [0.1, 0.2]
+
+[[whisker]]
+name = "front"
+role = "object"
+base_m = [0.16, 0.0]
+yaw_rad = -0.25
+length_m = 0.14
+"""
+PRIOR_TOML = """\
+kind = "gaussian"
+mean = [0.5, 1.2, 0.0]
+sigma = [0.1, 0.2, 0.3]
+"""
+FILES = {"arena.toml": ARENA_TOML, "robot.toml": ROBOT_TOML, "prior.toml": PRIOR_TOML}
+
+
+@pytest.fixture
+def folder(tmp_path):
+    for name, text in FILES.items():
+        (tmp_path / name).write_text(text)
+    return tmp_path
+
+
+def test_what_is_written_reads_back_equal(folder, tmp_path):
+    scene = scenes.load(folder)
+    scenes.write(tmp_path / "again", scene)
+    assert scenes.load(tmp_path / "again") == scene
+    uniform = dataclasses.replace(scene, prior=scenes.Prior("uniform"))
+    scenes.write(tmp_path / "uniform", uniform)
+    assert scenes.load(tmp_path / "uniform") == uniform
+
+
+def test_floor_rows_run_from_the_largest_y(folder):
+    assert scenes.load(folder).arena.floor_indices() == [[0, 0], [1, 0], [0, 1]]
+
+
+def test_flat_text_has_one_item_a_line_and_lanes_in_the_files_order(folder):
+    assert scenes.load(folder).flat((0.5, 1.2, 0.1)).splitlines() == [
+        "size_m 1.0 1.5",
+        "tile_m 0.5",
+        "texture VINYL",
+        "texture SMOOTH",
+        "floor VS",
+        "floor SV",
+        "floor VV",
+        "obstacle 0.0 0.0 0.2 0.3",
+        "obstacle 0.5 0.5 0.7 1.0",
+        "body_radius_m 0.17",
+        "texture_whisker floor_left 0.1 0.2",
+        "object_whisker front 0.16 0.0 -0.25 0.14",
+        "start 0.5 1.2 0.1",
+    ]
+
+
+def test_prior_may_be_absent_and_a_mean_in_an_obstacle_is_a_warning(folder):
+    assert scenes.load(folder).warnings() == []
+    (folder / "prior.toml").write_text(PRIOR_TOML.replace("0.5, 1.2", "0.6, 0.7"))
+    assert "clipped to free space" in scenes.load(folder).warnings()[0]
+    (folder / "prior.toml").unlink()
+    assert scenes.load(folder).prior is None
+
+
+BROKEN = [
+    ("arena.toml", "size_m = [1.0, 1.5]", "size_m = [0.0, 1.5]", "line 1: 'size_m' must be numbers from"),
+    ("arena.toml", "size_m = [1.0, 1.5]", "size_m = [1.0]", "line 1: 'size_m' must be a list of 2"),
+    ("arena.toml", "tile_m = 0.5", 'tile_m = "wide"', "line 2: 'tile_m' must be numbers"),
+    ("arena.toml", "tile_m = 0.5", "tile_m = nan", "line 2: 'tile_m' must be numbers"),
+    ("arena.toml", "tile_m = 0.5", "tile_m = true", "line 2: 'tile_m' must be numbers"),
+    ("arena.toml", "tile_m = 0.5", "tile_m = 0.5\ncolour = 1", "line 3: 'colour' is unknown; remove it"),
+    ("arena.toml", "tile_m = 0.5\n", "", "'tile_m' is missing; add it"),
+    ("arena.toml", '"SMOOTH"', '"VELVET"', "line 3: 'textures' has two names that begin with 'V'"),
+    ("arena.toml", '"SMOOTH"', '"SMOOTH,"', "line 3: 'textures' has the name"),
+    ("arena.toml", '"SMOOTH"', "7", "line 3: 'textures' must be a list of strings"),
+    ("arena.toml", '"SV"', '"S"', "line 4: 'floor' row 2 has 1 tiles"),
+    ("arena.toml", '"SV"', '"SX"', "line 4: 'floor' row 2 has the letter 'X'"),
+    ("arena.toml", '"SV", ', "", "line 4: 'floor' has 2 rows"),
+    ("arena.toml", "[0.7, 1.0]", "[0.7, 1.6]", "line 12: 'max_m' is outside the arena"),
+    ("arena.toml", "[0.7, 1.0]", "[0.4, 1.0]", "line 12: 'max_m' must be larger than min_m"),
+    ("arena.toml", "max_m = [0.7", "most_m = [0.7", "'max_m' is missing in [[obstacle]] number 2"),
+    ("arena.toml", "[[obstacle]]\nmin_m = [0.0, 0.0]\nmax_m = [0.2, 0.3]", "obstacle = 3", "not TOML"),
+    ("arena.toml", "tile_m = 0.5", "tile_m 0.5", "not TOML"),
+    ("robot.toml", "radial_sigma_m = 0.005", "radial_sigma_m = 0.0", "line 3: 'radial_sigma_m' must be numbers"),
+    ("robot.toml", 'role = "texture"', 'role = "nose"', "line 7: 'role' must be 'texture' or 'object'"),
+    ("robot.toml", 'name = "front"', 'name = "floor_left"', "'whisker' has the name 'floor_left' twice"),
+    ("robot.toml", 'name = "front"', 'name = "front left"', "line 11: 'name' is 'front left'"),
+    ("robot.toml", "length_m = 0.14", "length_m = 0.14\ntip_m = [0, 0]", "line 16: 'tip_m' is unknown"),
+    ("robot.toml", "length_m = 0.14", "length_m = -0.14", "line 15: 'length_m' must be numbers"),
+    ("robot.toml", "tip_m = [0.1, 0.2]", "", "'tip_m' is missing in [[whisker]] number 1"),
+    ("prior.toml", 'kind = "gaussian"', 'kind = "sharp"', "line 1: 'kind' must be 'gaussian' or 'uniform'"),
+    ("prior.toml", "0.1, 0.2, 0.3", "0.1, 0.0, 0.3", "line 3: 'sigma' must be numbers"),
+    ("prior.toml", "0.1, 0.2, 0.3", "0.1, inf, 0.3", "line 3: 'sigma' must be numbers"),
+    ("prior.toml", 'kind = "gaussian"', 'kind = "uniform"', "line 2: 'mean' is unknown"),
+]
+
+
+@pytest.mark.parametrize(("name", "old", "new", "complaint"), BROKEN)
+def test_a_broken_scene_is_one_clear_line(folder, name, old, new, complaint):
+    text = (folder / name).read_text()
+    assert old in text
+    (folder / name).write_text(text.replace(old, new, 1))
+    with pytest.raises(scenes.SceneError) as error:
+        scenes.load(folder)
+    assert complaint in str(error.value)
+    assert str(folder / name) in str(error.value) and "\n" not in str(error.value)
+
+
+def test_a_missing_file_or_folder_is_one_clear_line(folder):
+    (folder / "robot.toml").unlink()
+    with pytest.raises(scenes.SceneError, match="robot.toml: cannot be read"):
+        scenes.load(folder)
+    with pytest.raises(scenes.SceneError, match="no such folder"):
+        scenes.load(folder / "nowhere")
