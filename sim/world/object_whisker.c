@@ -1,0 +1,149 @@
+#include "object_whisker.h"
+
+#include <math.h>
+
+#include "beam.h"
+#include "whisker_constants.h"
+
+/* A face met at a glancing angle would turn any motion into an endless angle: its sine is not taken below this. */
+#define LEAST_SINE 0.25
+
+static const double SPREADS[] = SIM_WHISK_SPREADS;
+
+/* The whisker's undeformed segment in the arena. */
+struct segment {
+    struct sim_point base, along; /* along: unit vector from base to tip */
+};
+
+static double dot(struct sim_point a, struct sim_point b)
+{
+    return a.x * b.x + a.y * b.y;
+}
+
+static struct sim_point left_of(struct sim_point a)
+{
+    return (struct sim_point){-a.y, a.x};
+}
+
+static struct sim_point difference(struct sim_point a, struct sim_point b)
+{
+    return (struct sim_point){a.x - b.x, a.y - b.y};
+}
+
+static struct segment place(const struct sim_whisker *mount, struct sim_pose pose)
+{
+    double c = cos(pose.theta), s = sin(pose.theta);
+    double yaw = pose.theta + mount->yaw;
+    return (struct segment){{pose.x + c * mount->x - s * mount->y, pose.y + s * mount->x + c * mount->y},
+                            {cos(yaw), sin(yaw)}};
+}
+
+static struct sim_point point_at(struct segment segment, double radius)
+{
+    return (struct sim_point){segment.base.x + radius * segment.along.x, segment.base.y + radius * segment.along.y};
+}
+
+void sim_object_whisker_start(struct sim_object_whisker *whisker, const struct sim_whisker *mount, size_t number,
+                              struct sim_rng rng)
+{
+    size_t known = sizeof SPREADS / sizeof SPREADS[0];
+    *whisker = (struct sim_object_whisker){.mount = *mount, .spread = SPREADS[number % known], .rng = rng};
+}
+
+/* Has the shaft swept over this corner? Then radius tells where along the shaft, side on which side the corner was. */
+static bool swept(struct segment from, struct segment to, struct sim_point corner, double *radius, double *side)
+{
+    double before = dot(left_of(from.along), difference(corner, from.base));
+    double after = dot(left_of(to.along), difference(corner, to.base));
+    *radius = dot(to.along, difference(corner, to.base));
+    *side = before < 0 ? -1 : 1;
+    return (before < 0) != (after < 0) && *radius > 0;
+}
+
+/* The swept corner nearest to the base, if any within the whisker's length. */
+static bool find_corner(struct sim_object_whisker *whisker, const struct sim_scene *scene, struct segment from,
+                        struct segment to)
+{
+    double nearest = whisker->mount.length_m;
+    bool found = false;
+    for (size_t i = 0; i < 4 * scene->obstacles; i++) {
+        const struct sim_box *box = &scene->obstacle[i / 4];
+        struct sim_point corner = {i & 1 ? box->x1 : box->x0, i & 2 ? box->y1 : box->y0};
+        double radius, side;
+        if (!swept(from, to, corner, &radius, &side) || radius > nearest)
+            continue;
+        nearest = radius;
+        whisker->side = side;
+        found = true;
+    }
+    whisker->contact.corner = found;
+    whisker->contact.radius_m = nearest;
+    return found;
+}
+
+static void begin(struct sim_object_whisker *whisker, const struct sim_scene *scene, struct segment from,
+                  struct segment to, struct sim_hit shaft)
+{
+    whisker->contact.touching = true;
+    whisker->contact.theta_rad = 0;
+    whisker->contact.amplitude_gain = 1 + whisker->spread * sim_rng_normal(&whisker->rng);
+    if (find_corner(whisker, scene, from, to))
+        return;
+    /* No corner: the tip has run into a face, the one that its path crossed. A whisker that touches from the start has
+     * no path: then the face that the shaft enters. */
+    struct sim_hit hit;
+    double length = whisker->mount.length_m;
+    if (!sim_arena_ray(scene, point_at(from, length), point_at(to, length), &hit) || hit.fraction <= 0)
+        hit = shaft;
+    whisker->normal = hit.normal;
+    whisker->side = dot(left_of(to.along), hit.normal) < 0 ? -1 : 1;
+}
+
+/* Angle by which this motion pushes the whisker further (positive) or lets it come back. */
+static double pushed(const struct sim_object_whisker *whisker, struct segment from, struct segment to,
+                     struct sim_point normal)
+{
+    double radius = whisker->contact.radius_m;
+    struct sim_point motion = difference(point_at(to, radius), point_at(from, radius));
+    if (whisker->contact.corner)
+        return whisker->side * dot(motion, normal) / radius;
+    double sine = fabs(dot(normal, whisker->normal));
+    return dot(motion, whisker->normal) / fmax(sine, LEAST_SINE) / radius;
+}
+
+void sim_object_whisker_move(struct sim_object_whisker *whisker, const struct sim_scene *scene, struct sim_pose from,
+                             struct sim_pose to)
+{
+    struct segment before = place(&whisker->mount, from), now = place(&whisker->mount, to);
+    struct sim_hit hit;
+    if (!sim_arena_ray(scene, now.base, point_at(now, whisker->mount.length_m), &hit)) {
+        whisker->contact = (struct sim_contact){0};
+        return;
+    }
+    if (!whisker->contact.touching) {
+        begin(whisker, scene, before, now, hit);
+        return;
+    }
+    /* The normal halfway through the motion makes a motion and its reverse cancel exactly. */
+    struct sim_point along = {before.along.x + now.along.x, before.along.y + now.along.y};
+    double norm = hypot(along.x, along.y);
+    struct sim_point normal = left_of((struct sim_point){along.x / norm, along.y / norm});
+    double angle = whisker->side * whisker->contact.theta_rad + pushed(whisker, before, now, normal);
+    whisker->contact.theta_rad = whisker->side * fmax(0, angle);
+}
+
+double sim_object_whisker_tilt(const struct sim_object_whisker *whisker)
+{
+    const struct sim_contact *contact = &whisker->contact;
+    if (!contact->touching)
+        return 0;
+    double tilt = contact->amplitude_gain * sim_beam_tilt(contact->radius_m, contact->theta_rad, SIM_PLUG_KAPPA);
+    return fmax(-SIM_PLUG_STOP, fmin(SIM_PLUG_STOP, tilt));
+}
+
+double sim_object_whisker_reach(const struct sim_whisker *mount)
+{
+    double x = mount->x + mount->length_m * cos(mount->yaw);
+    double y = mount->y + mount->length_m * sin(mount->yaw);
+    return fmax(hypot(mount->x, mount->y), hypot(x, y));
+}

@@ -1,0 +1,20 @@
+/* Noise of one whisker's sensor: white on every sample, and a drift too slow to see in a second. */
+#ifndef SIM_SENSOR_NOISE_H
+#define SIM_SENSOR_NOISE_H
+
+#include <stdint.h>
+
+#include "rng.h"
+#include "sim_field.h"
+
+struct sim_sensor_noise {
+    struct sim_rng rng;
+    double phase[2], period_s[2]; /* of the drift: alpha, beta */
+};
+
+void sim_sensor_noise_start(struct sim_sensor_noise *noise, struct sim_rng rng);
+
+/* The field at a time since the start, with this sample's noise added. */
+struct sim_field sim_sensor_noise_add(struct sim_sensor_noise *noise, double time_s, struct sim_field field);
+
+#endif
