@@ -1,0 +1,76 @@
+// Answers the host's reads: HID reports control, counters and identity. The whole report is taken at once when a read
+// begins, so that a counter cannot change between two of its bytes, and is then shifted out.
+//
+//   settings, counters, constants --[ by id ]--start--> report --next--> data, data, ..
+
+`default_nettype none
+
+module report_reader #(
+    parameter LANES      = 28,
+    parameter FIFO_BYTES = 16384
+) (
+    input  wire             clk,             // 60 MHz
+    input  wire             read_start,      // a read begins: data is the report's first byte from the next cycle on
+    input  wire [7:0]       read_id,         // of this report
+    input  wire             read_next,       // data is taken: show the next byte
+    output wire [7:0]       read_data,       // byte of the report
+    input  wire             running,         // a run is in progress, its end included
+    input  wire             run,             // settings, as written
+    input  wire [5:0]       sck_divider,     // .
+    input  wire [7:0]       word_gap,        // .
+    input  wire [5:0]       sample_point,    // .
+    input  wire [LANES-1:0] lane_mask,       // .
+    input  wire [31:0]      tick_period,     // .
+    input  wire [31:0]      ticks,           // counters
+    input  wire [31:0]      frames,          // .
+    input  wire [31:0]      dropped,         // .
+    input  wire [31:0]      records_good,    // .
+    input  wire [31:0]      records_absent,  // .
+    input  wire [31:0]      records_crc,     // .
+    input  wire [31:0]      records_tick     // .
+);
+    `include "whisker_protocol.vh"
+
+    localparam REPORT_BITS = 8 * REPORT_COUNTERS_BYTES;  // the longest
+
+    reg [REPORT_BITS-1:0] report;
+
+    always @(posedge clk)
+        if (read_start) begin
+            report <= {REPORT_BITS{1'b0}};
+            report[7:0] <= read_id;
+            report[15:8] <= WIRE_VERSION[7:0];  // at the same place in every report
+            case (read_id)
+                REPORT_ID_CONTROL[7:0]: begin
+                    report[8*REPORT_CONTROL_RUN] <= run;
+                    report[8*REPORT_CONTROL_SCK_DIVIDER +: 6] <= sck_divider;
+                    report[8*REPORT_CONTROL_WORD_GAP +: 8] <= word_gap;
+                    report[8*REPORT_CONTROL_SAMPLE_POINT +: 6] <= sample_point;
+                    report[8*REPORT_CONTROL_LANE_MASK +: LANES] <= lane_mask;
+                    report[8*REPORT_CONTROL_TICK_PERIOD +: 32] <= tick_period;
+                end
+                REPORT_ID_COUNTERS[7:0]: begin
+                    report[8*REPORT_COUNTERS_RUNNING] <= running;
+                    report[8*REPORT_COUNTERS_TICKS +: 32] <= ticks;
+                    report[8*REPORT_COUNTERS_FRAMES +: 32] <= frames;
+                    report[8*REPORT_COUNTERS_DROPPED +: 32] <= dropped;
+                    report[8*REPORT_COUNTERS_RECORDS_GOOD +: 32] <= records_good;
+                    report[8*REPORT_COUNTERS_RECORDS_ABSENT +: 32] <= records_absent;
+                    report[8*REPORT_COUNTERS_RECORDS_CRC +: 32] <= records_crc;
+                    report[8*REPORT_COUNTERS_RECORDS_TICK +: 32] <= records_tick;
+                end
+                REPORT_ID_IDENTITY[7:0]: begin
+                    report[8*REPORT_IDENTITY_LANES +: 8] <= LANES[7:0];
+                    report[8*REPORT_IDENTITY_GATEWARE +: 8] <= LIMIT_GATEWARE_VERSION[7:0];
+                    report[8*REPORT_IDENTITY_CLOCK_HZ +: 32] <= LIMIT_CLOCK_HZ;
+                    report[8*REPORT_IDENTITY_FRAME_BYTES +: 16] <= FRAME_BYTES[15:0];
+                    report[8*REPORT_IDENTITY_FIFO_BYTES +: 16] <= FIFO_BYTES[15:0];
+                end
+                default: ;
+            endcase
+        end else if (read_next) report <= report >> 8;
+
+    assign read_data = report[7:0];
+endmodule
+
+`default_nettype wire

@@ -1,0 +1,49 @@
+// Decides when a tick begins, and numbers it. Ticks come every `period` cycles, the first at once, or from an external
+// strobe; a strobe during a transfer on the link is ignored. Time is 0 at the first tick and
+// advances by `period` per tick whatever the source, so a simulation that skips idle cycles keeps the device's time.
+//
+//   tick_strobe --\
+//                  >--[ source ]--[ enable, not busy ]--> tick, first, number, previous_time
+//   divider ------/
+
+`default_nettype none
+
+module tick_generator (
+    input  wire        clk,            // 60 MHz
+    input  wire        rst,            // synchronous
+    input  wire        restart,        // a run begins: the next tick is number 0
+    input  wire        enable,         // ticks are wanted
+    input  wire        link_busy,      // a transfer is in progress
+    input  wire        external,       // 1: ticks come from strobe, 0: from the divider
+    input  wire        strobe,         // external tick, one cycle
+    input  wire [31:0] period,         // cycles from tick to tick
+    output reg         tick,           // a tick begins: one cycle, with the values below
+    output reg         first,          // this tick is number 0: no reading was started before it
+    output reg  [31:0] number,         // of the latest tick
+    output reg  [63:0] previous_time   // cycles from tick 0 to the tick before the latest
+);
+    reg  [31:0] wait_left;  // cycles until the divider's next tick
+    reg  [63:0] tick_time;  // cycles from tick 0 to the latest tick
+    reg         fresh;      // no tick since restart
+    wire        due = external ? strobe : (wait_left == 32'd0);
+    wire        begins = enable && !link_busy && !restart && due;
+
+    always @(posedge clk)
+        if (!enable || restart) wait_left <= 32'd0;
+        else if (begins) wait_left <= period - 32'd1;
+        else if (wait_left != 32'd0) wait_left <= wait_left - 32'd1;
+
+    always @(posedge clk) begin
+        tick <= begins && !rst;
+        if (rst || restart) fresh <= 1'b1;
+        else if (begins) fresh <= 1'b0;
+        if (begins) begin
+            first <= fresh;
+            number <= fresh ? 32'd0 : number + 32'd1;
+            tick_time <= fresh ? 64'd0 : tick_time + {32'd0, period};
+            previous_time <= tick_time;
+        end
+    end
+endmodule
+
+`default_nettype wire

@@ -1,0 +1,167 @@
+// The bridge: 28 node lanes in, a USB device out, one 60 MHz clock (the PHY's). A tick pulses SYNC and clocks one record
+// out of every node; the framer turns the records of the reading before into a frame, the FIFO holds it until the host
+// reads. A USB bus reset or a SET_CONFIGURATION ends a run and empties everything; settings and power-up counters stay.
+//
+//   tick_generator --> node_link <--> nodes        control_registers <-- HID report 1 --\
+//        |                |                          run_control                        |
+//        v                v                                                             |
+//   bridge_counters   lane_receiver --> record_store --> framer --> frame_fifo --> whisker_usb <--> UTMI
+//        '------------------------------> report_reader --> HID reports 1, 2, 3 --------/
+//
+// link_busy falls when the transfer is over: the next tick may begin, for the framer works from the other bank of the
+// record store. transfer_busy falls when the frame is in the FIFO too (about 260 cycles later).
+
+`default_nettype none
+
+module whisker_bridge #(
+    parameter LANES = 28
+) (
+    input  wire             clk,                  // 60 MHz, from the PHY
+    input  wire             rst,                  // synchronous, power-up
+    output wire             sync,                 // to all nodes: start a reading
+    output wire             sck,                  // to all nodes: SPI clock, idles low
+    output wire             select_n,             // to all nodes: SPI select
+    output wire             mosi,                 // to all nodes: the order
+    input  wire [LANES-1:0] miso,                 // one line per node, pulled up: all ones when nobody is there
+    input  wire [7:0]       utmi_rx_data,         // UTMI, as its specification names it
+    input  wire             utmi_rx_active,       // .
+    input  wire             utmi_rx_valid,        // .
+    input  wire             utmi_rx_error,        // .
+    output wire [7:0]       utmi_tx_data,         // .
+    output wire             utmi_tx_valid,        // .
+    input  wire             utmi_tx_ready,        // .
+    input  wire [1:0]       utmi_line_state,      // .
+    input  wire             utmi_vbus_valid,      // .
+    input  wire             utmi_session_valid,   // .
+    input  wire             utmi_session_end,     // .
+    output wire [1:0]       utmi_xcvr_select,     // .
+    output wire             utmi_term_select,     // .
+    output wire [1:0]       utmi_op_mode,         // .
+    input  wire             tick_external,        // 1: a tick is a tick_strobe, 0: ticks come every tick_period
+    input  wire             tick_strobe,          // begin a tick: one cycle; ignored while link_busy or not running
+    output wire             running,              // from start until the last frame is in the FIFO
+    output wire             link_busy,            // SYNC and transfer in progress
+    output wire             transfer_busy,        // from SYNC until the frame is in the FIFO
+    output wire             led                   // a run is in progress
+);
+    `include "whisker_protocol.vh"
+
+    localparam FIFO_ADDRESS_BITS = 14;
+
+    // USB
+    wire       usb_restart;  // bus reset or SET_CONFIGURATION: one cycle or more
+    wire       write_valid, write_done, write_accept, read_start, read_next;
+    wire [5:0] write_index;
+    wire [7:0] write_data, read_id, read_data, stream_data;
+    wire       stream_valid, stream_last, stream_ready;
+
+    // Settings and run
+    wire             start, stop, run, stopping, final_transfer, take_ticks;
+    wire [5:0]       sck_divider, sample_point;
+    wire [7:0]       word_gap;
+    wire [LANES-1:0] lane_mask;
+    wire [31:0]      tick_period;
+    wire             halt = rst || usb_restart;
+
+    // Ticks and records
+    wire             tick, first_tick, link_active, link_done, capture, bits_valid;
+    wire [31:0]      tick_number;
+    wire [63:0]      previous_time;
+    wire [5:0]       capture_index, bits_index;
+    wire [LANES-1:0] bits, absent, crc_wrong, tick_wrong;
+    wire [31:0]      reading = tick_number - 32'd1;  // tick whose records this transfer brings
+    reg              has_records;                    // there was such a tick
+
+    // Frames
+    wire        frame_start = link_done && has_records;
+    wire        framer_busy, frame_done, record_ends, frame_dropped;
+    wire [5:0]  record_code;
+    wire [4:0]  read_lane;
+    wire [2:0]  read_byte;
+    wire [7:0]  record_data, frame_data;
+    wire        frame_valid, frame_first, frame_last, frame_keep, frame_ready;
+    wire [31:0] ticks, frames, dropped, sequence_number;
+    wire [31:0] records_good, records_absent, records_crc, records_tick;
+
+    always @(posedge clk)
+        if (tick) has_records <= !first_tick;
+
+    assign link_busy     = tick || link_active;
+    assign transfer_busy = link_busy || framer_busy;
+    assign led           = running;
+
+    control_registers #(.LANES(LANES)) control (
+        .clk(clk), .rst(rst), .halt(usb_restart),
+        .write_valid(write_valid), .write_index(write_index), .write_data(write_data),
+        .write_done(write_done), .write_accept(write_accept), .stopping(stopping),
+        .start(start), .stop(stop), .run(run), .sck_divider(sck_divider), .word_gap(word_gap),
+        .sample_point(sample_point), .lane_mask(lane_mask), .tick_period(tick_period));
+
+    run_control run_state (
+        .clk(clk), .rst(halt), .start(start), .stop(stop), .tick(tick), .last_done(frame_done && frame_keep),
+        .running(running), .stopping(stopping), .finishing(final_transfer), .take_ticks(take_ticks));
+
+    tick_generator ticker (
+        .clk(clk), .rst(halt), .restart(start), .enable(take_ticks), .link_busy(link_busy),
+        .external(tick_external), .strobe(tick_strobe), .period(tick_period),
+        .tick(tick), .first(first_tick), .number(tick_number), .previous_time(previous_time));
+
+    node_link link (
+        .clk(clk), .rst(halt), .start(tick), .order_tick(tick_number[7:0]), .order_command(COMMAND_SAMPLE[7:0]),
+        .sck_divider(sck_divider), .word_gap(word_gap), .sample_point(sample_point),
+        .busy(link_active), .done(link_done), .sync(sync), .sck(sck), .select_n(select_n), .mosi(mosi),
+        .capture(capture), .bit_index(capture_index));
+
+    lane_receiver #(.LANES(LANES)) receiver (
+        .clk(clk), .rst(halt), .clear(tick), .expected_tick(reading[7:0]),
+        .capture(capture), .capture_index(capture_index), .miso(miso),
+        .bits(bits), .bits_valid(bits_valid), .bits_index(bits_index),
+        .absent(absent), .crc_wrong(crc_wrong), .tick_wrong(tick_wrong));
+
+    record_store #(.LANES(LANES)) store (
+        .clk(clk), .rst(halt), .swap(link_done), .write(bits_valid), .bit_index(bits_index), .bits(bits),
+        .read_lane(read_lane), .read_byte(read_byte), .read_data(record_data));
+
+    framer #(.LANES(LANES)) frame_maker (
+        .clk(clk), .rst(halt), .start(frame_start), .is_last(final_transfer), .tick(reading),
+        .tick_time(previous_time), .sequence_number(sequence_number), .dropped(dropped), .lane_mask(lane_mask),
+        .absent(absent), .crc_wrong(crc_wrong), .tick_wrong(tick_wrong),
+        .busy(framer_busy), .done(frame_done), .record_ends(record_ends), .record_code(record_code),
+        .read_lane(read_lane), .read_byte(read_byte), .read_data(record_data),
+        .out_data(frame_data), .out_valid(frame_valid), .out_first(frame_first), .out_last(frame_last),
+        .out_keep(frame_keep), .out_ready(frame_ready));
+
+    frame_fifo #(.ADDRESS_BITS(FIFO_ADDRESS_BITS), .FRAME_BYTES(FRAME_BYTES)) fifo (
+        .clk(clk), .rst(halt), .in_data(frame_data), .in_valid(frame_valid), .in_first(frame_first),
+        .in_last(frame_last), .in_keep(frame_keep), .in_ready(frame_ready), .dropped(frame_dropped),
+        .out_data(stream_data), .out_valid(stream_valid), .out_last(stream_last), .out_ready(stream_ready));
+
+    bridge_counters counters (
+        .clk(clk), .rst(rst), .restart(start), .tick(tick), .frame(frame_start), .drop(frame_dropped),
+        .record_ends(record_ends), .record_code(record_code),
+        .ticks(ticks), .frames(frames), .dropped(dropped), .sequence_number(sequence_number),
+        .records_good(records_good), .records_absent(records_absent), .records_crc(records_crc),
+        .records_tick(records_tick));
+
+    report_reader #(.LANES(LANES), .FIFO_BYTES(1 << FIFO_ADDRESS_BITS)) reports (
+        .clk(clk), .read_start(read_start), .read_id(read_id), .read_next(read_next), .read_data(read_data),
+        .running(running), .run(run), .sck_divider(sck_divider), .word_gap(word_gap), .sample_point(sample_point),
+        .lane_mask(lane_mask), .tick_period(tick_period), .ticks(ticks), .frames(frames), .dropped(dropped),
+        .records_good(records_good), .records_absent(records_absent), .records_crc(records_crc),
+        .records_tick(records_tick));
+
+    whisker_usb usb (
+        .clk(clk), .rst(rst),
+        .utmi_rx_data(utmi_rx_data), .utmi_rx_active(utmi_rx_active), .utmi_rx_valid(utmi_rx_valid),
+        .utmi_rx_error(utmi_rx_error), .utmi_tx_data(utmi_tx_data), .utmi_tx_valid(utmi_tx_valid),
+        .utmi_tx_ready(utmi_tx_ready), .utmi_line_state(utmi_line_state), .utmi_vbus_valid(utmi_vbus_valid),
+        .utmi_session_valid(utmi_session_valid), .utmi_session_end(utmi_session_end),
+        .utmi_xcvr_select(utmi_xcvr_select), .utmi_term_select(utmi_term_select), .utmi_op_mode(utmi_op_mode),
+        .stream_data(stream_data), .stream_valid(stream_valid), .stream_last(stream_last),
+        .stream_ready(stream_ready), .restart(usb_restart),
+        .write_valid(write_valid), .write_index(write_index), .write_data(write_data), .write_done(write_done),
+        .write_accept(write_accept),
+        .read_start(read_start), .read_id(read_id), .read_next(read_next), .read_data(read_data));
+endmodule
+
+`default_nettype wire

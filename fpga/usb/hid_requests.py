@@ -1,0 +1,128 @@
+"""HID class requests on the control endpoint: feature reports in and out of the bridge's registers."""
+
+from amaranth import Module, Mux, Signal
+from luna.gateware.usb.request.control import ControlRequestHandler
+from usb_protocol.types import USBRequestRecipient, USBRequestType
+from whisker.protocol import LIMITS, REPORTS
+
+GET_REPORT = 0x01
+SET_REPORT = 0x09
+SET_IDLE = 0x0A
+FEATURE = 3  # report type in the high byte of wValue
+
+
+class HidRequests(ControlRequestHandler):
+    """Answers GET_REPORT and SET_REPORT of feature reports and SET_IDLE; stalls every other class request.
+
+    A request is decoded afresh at each SETUP, whatever became of the one before. A report being set is accepted or
+    refused once, at the first token of the status stage: until then the host may repeat its data, afterwards it only
+    repeats the question.
+
+        write: index, data, valid    bytes of the report; index 0 begins it again
+               done, accept          accept is read in the cycle of done; refused: STALL
+        read:  start, id             a read of report `id` begins
+               next, data            data is the report's next byte from two cycles after start on
+    """
+
+    def __init__(self):
+        super().__init__()
+        self.write_valid = Signal()
+        self.write_index = Signal(6)
+        self.write_data = Signal(8)
+        self.write_done = Signal()
+        self.write_accept = Signal()
+        self.read_start = Signal()
+        self.read_id = Signal(8)
+        self.read_next = Signal()
+        self.read_data = Signal(8)
+
+    def elaborate(self, platform):
+        m = Module()
+        self.kind = Signal(3)  # one bit per request served: get, set, idle; none: stall
+        self.size = Signal(range(max(report.size for report in REPORTS.values()) + 1))  # bytes the read may send
+        self.sending = Signal()
+        self.decided = Signal()
+        is_class = self.interface.setup.type == USBRequestType.CLASS
+        m.d.comb += self.interface.claim.eq(is_class)
+        with m.If(is_class):
+            with m.If(self.kind[0]):
+                self._get_report(m)
+            with m.Elif(self.kind[1]):
+                self._set_report(m)
+            with m.Elif(self.kind[2] & self.interface.status_requested):
+                m.d.comb += self.send_zlp()
+            with m.Elif(self._answer_wanted()):
+                m.d.comb += self.interface.handshakes_out.stall.eq(1)
+        self._decode(m)  # last: a SETUP overrides what the request before it wants
+        return m
+
+    def _answer_wanted(self):
+        itf = self.interface
+        return itf.data_requested | itf.status_requested | itf.rx_ready_for_response
+
+    def _decode(self, m):
+        """At a SETUP packet: which request is it, and how many bytes may the report send."""
+        setup = self.interface.setup
+        with m.If(setup.received):
+            m.d.usb += [self.kind.eq(0), self.sending.eq(0), self.decided.eq(0)]
+            ours = (setup.recipient == USBRequestRecipient.INTERFACE) & (setup.index == LIMITS["usb_hid_interface"])
+            feature = ours & (setup.value[8:] == FEATURE)
+            for report in REPORTS.values():
+                with m.If(feature & setup.is_in_request & (setup.request == GET_REPORT) & (setup.length != 0)):
+                    with m.If(setup.value[:8] == report.id):
+                        m.d.usb += [
+                            self.kind.eq(0b001),
+                            self.size.eq(Mux(setup.length < report.size, setup.length, report.size)),
+                        ]
+            control = REPORTS["control"]
+            right_report = (setup.value[:8] == control.id) & (setup.length == control.size)
+            with m.If(feature & ~setup.is_in_request & (setup.request == SET_REPORT) & right_report):
+                m.d.usb += self.kind.eq(0b010)
+            with m.If(ours & ~setup.is_in_request & (setup.request == SET_IDLE) & (setup.length == 0)):
+                m.d.usb += self.kind.eq(0b100)
+
+    def _get_report(self, m):
+        """Data stage: one packet, sent again from its first byte when the host asks again. Status stage: ACK."""
+        itf = self.interface
+        loading = Signal()
+        sending = self.sending
+        left = Signal.like(self.size)
+        m.d.usb += loading.eq(itf.data_requested)
+        m.d.comb += [
+            self.read_start.eq(itf.data_requested),
+            self.read_id.eq(itf.setup.value[:8]),
+            itf.tx.valid.eq(sending),
+            itf.tx.first.eq(sending & (left == self.size)),
+            itf.tx.last.eq(sending & (left == 1)),
+            itf.tx.payload.eq(self.read_data),
+            self.read_next.eq(sending & itf.tx.ready),
+            itf.handshakes_out.ack.eq(itf.status_requested),
+        ]
+        with m.If(loading):
+            m.d.usb += [sending.eq(1), left.eq(self.size)]
+        with m.Elif(self.read_next):
+            m.d.usb += [left.eq(left - 1), sending.eq(left != 1)]
+
+    def _set_report(self, m):
+        """Data stage: pass the bytes on and ACK a good packet. Status stage: nothing if accepted, STALL if refused."""
+        itf = self.interface
+        decided = self.decided
+        accepted = Signal()
+        m.d.comb += [
+            self.write_valid.eq(itf.rx.valid & itf.rx.next),
+            self.write_data.eq(itf.rx.payload),
+            itf.handshakes_out.ack.eq(itf.rx_ready_for_response),
+            self.write_done.eq(itf.status_requested & ~decided),
+        ]
+        with m.If(itf.tokenizer.new_token):
+            m.d.usb += self.write_index.eq(0)
+        with m.Elif(self.write_valid & ~self.write_index.all()):
+            m.d.usb += self.write_index.eq(self.write_index + 1)
+        with m.If(itf.status_requested):
+            m.d.usb += decided.eq(1)
+            with m.If(~decided):
+                m.d.usb += accepted.eq(self.write_accept)
+            with m.If(Mux(decided, accepted, self.write_accept)):
+                m.d.comb += self.send_zlp()
+            with m.Else():
+                m.d.comb += itf.handshakes_out.stall.eq(1)
