@@ -1,0 +1,56 @@
+/* Every error of libwhisker, once: name, code, text, remedy. The enum and the strings both come from this list. */
+#ifndef WHISKER_ERRORS_H
+#define WHISKER_ERRORS_H
+
+/* X(NAME, code, text, remedy) */
+#define WHISKER_ERRORS(X)                                                                                              \
+    X(ARGUMENT, -1, "an argument is outside its range", "see the comment of the function")                             \
+    X(MEMORY, -2, "not enough memory", "free some memory, or ask for a smaller ring")                                  \
+    X(SYSTEM, -3, "the operating system refused", "see errno")                                                         \
+    X(TRUNCATED, -10, "a frame is incomplete", "read on: the rest of it has not come")                                 \
+    X(MAGIC, -11, "a frame does not begin with its magic", "resynchronise on the next magic; check the USB cable")     \
+    X(WIRE_VERSION, -12, "bridge and host speak different wire versions", "install gateware and host of one release")  \
+    X(HEADER_CRC, -13, "the CRC of a frame's header is wrong", "check the USB cable")                                  \
+    X(LANES, -14, "a frame has another number of lanes than this host", "install gateware and host of one release")    \
+    X(RECORD_CRC, -15, "the CRC of a record in a frame is wrong", "check the USB cable")                               \
+    X(RING_NAME, -20, "the name of a ring is empty, too long, or has a slash", "use letters, digits, dash and dot")    \
+    X(RING_MISSING, -21, "there is no ring of this name", "start whiskerd with this --ring")                           \
+    X(RING_BUSY, -22, "another writer holds this ring", "stop the other whiskerd, or choose another --ring")           \
+    X(RING_LAYOUT, -23, "this shared memory is not a whisker ring", "choose another --ring, or remove the file")       \
+    X(RING_VERSION, -24, "the ring has another layout version", "install whiskerd and reader of one release")          \
+    X(TIMEOUT, -25, "no frame came in time", "wait again; check that the bridge runs")                                 \
+    X(OVERRUN, -26, "the writer overtook this reader", "read faster, or use a larger ring")                            \
+    X(CLOSED, -27, "the writer closed the ring: end of stream", "none needed")                                         \
+    X(WRITER_DEAD, -28, "the writer died without closing the ring", "start whiskerd again; see its log")               \
+    X(RESTARTED, -29, "a new writer has made a new ring of this name", "attach again")                                 \
+    X(DEVICE_MISSING, -40, "no bridge is connected", "plug it in; check its power and cable")                          \
+    X(DEVICE_ACCESS, -41, "no permission to open the bridge", "install the udev rule, or ask an administrator")        \
+    X(DEVICE_BUSY, -42, "another process uses the bridge", "stop the other whiskerd")                                  \
+    X(DEVICE_GONE, -43, "the bridge was unplugged", "plug it in again")                                                \
+    X(DEVICE_USB, -44, "a USB transfer failed", "check the USB cable; plug the bridge in again")                       \
+    X(DEVICE_CONTROL, -45, "the bridge's HID interface does not answer", "plug the bridge in again")                   \
+    X(DEVICE_REFUSED, -46, "the bridge refused the settings", "keep every setting inside its limits")                  \
+    X(DEVICE_IDENTITY, -47, "the bridge has other lanes or frames than this host",                                     \
+      "install gateware and host of one "                                                                              \
+      "release")                                                                                                       \
+    X(DEVICE_DRAIN, -48, "the bridge did not send its last frame after a stop", "plug the bridge in again")
+
+enum whisker_error {
+    WHISKER_OK = 0,
+#define WHISKER_ERROR_ENTRY(name, code, text, remedy) WHISKER_ERROR_##name = (code),
+    WHISKER_ERRORS(WHISKER_ERROR_ENTRY)
+#undef WHISKER_ERROR_ENTRY
+};
+
+#pragma GCC visibility push(default)
+/* cffi: begin */
+/* What happened, as one line; never NULL. 0 gives "no error". */
+const char *whisker_error_text(int error);
+/* What a person can do about it; never NULL. */
+const char *whisker_error_remedy(int error);
+/* The name in the list, such as "RING_BUSY"; "OK" for 0; never NULL. */
+const char *whisker_error_name(int error);
+/* cffi: end */
+#pragma GCC visibility pop
+
+#endif

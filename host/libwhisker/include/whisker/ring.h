@@ -1,0 +1,99 @@
+/*
+ * The ring: the last frames in POSIX shared memory. One process writes, any number read; a reader maps it read-only, so
+ * it can neither block nor corrupt it, and may be killed at any instruction. The memory is mapped twice in a row, so
+ * any window of frames is one array. Frames are used where they lie: peek, use, advance; advance tells whether the
+ * writer overtook the reader meanwhile, in which case what was used must be thrown away.
+ *
+ * Threads: one handle belongs to one thread at a time. Errors: 0 or a negative code of errors.h.
+ */
+#ifndef WHISKER_RING_H
+#define WHISKER_RING_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "whisker/frame.h"
+
+#pragma GCC visibility push(default)
+/* cffi: begin */
+#define WHISKER_RING_FRAMES 8192 /* 4 s at 2 kHz; the default capacity */
+
+struct whisker_reader;
+
+/* What a reader knows of its ring and of itself. */
+struct whisker_reader_info {
+    uint64_t generation;     /* another number for each ring ever made under a name on this machine since it started */
+    uint64_t published;      /* frames the writer has published */
+    uint64_t position;       /* index of the frame that peek gives first */
+    uint64_t overruns;       /* how often the writer overtook this reader */
+    uint64_t frames_overrun; /* frames this reader lost by it */
+    uint64_t frames_missing; /* sequence numbers missing between frames of the ring: lost before it */
+    uint32_t capacity;       /* frames */
+    uint32_t writer_pid;
+};
+
+/*
+ * Attaches to the ring `name` ("whisker", no slash), at its oldest frame. Waits up to timeout_ms for the ring to come
+ * up (0: no waiting, negative: for ever). Returns 0 and the reader, or RING_NAME, RING_MISSING, RING_LAYOUT,
+ * RING_VERSION, WRITER_DEAD (a ring is there, its writer is not), SYSTEM, MEMORY; then *reader is NULL.
+ */
+int whisker_reader_attach(const char *name, int timeout_ms, struct whisker_reader **reader);
+
+/* Lets go of the ring; NULL is allowed. */
+void whisker_reader_detach(struct whisker_reader *reader);
+
+/*
+ * Waits until there is a frame to peek (0: just looks, negative: for ever). Returns 0, TIMEOUT, or, when every frame
+ * has been read: CLOSED, WRITER_DEAD, RESTARTED (a new ring has the name: see whisker_reader_reattach).
+ */
+int whisker_reader_wait(struct whisker_reader *reader, int timeout_ms);
+
+/*
+ * Gives all frames published and not yet read, oldest first, as one array inside the ring; count may be 0. Never waits.
+ * Returns 0, or OVERRUN: frames were lost; the reader now stands half a ring behind the writer, peek again.
+ */
+int whisker_reader_peek(struct whisker_reader *reader, const struct whisker_frame **frames, size_t *count);
+
+/*
+ * Leaves the first `count` of the frames peeked behind. Returns 0: they were intact up to this call; OVERRUN: they may
+ * have been overwritten while they were used (position as for peek); ARGUMENT: count is more than was peeked.
+ */
+int whisker_reader_advance(struct whisker_reader *reader, size_t count);
+
+/* Goes to where at most the newest `count` frames are still to be read. Never goes back. Not counted as a loss. */
+void whisker_reader_seek_latest(struct whisker_reader *reader, size_t count);
+
+/* Lets go of an ended ring and attaches to the new one of its name, as whisker_reader_attach; counters stay. */
+int whisker_reader_reattach(struct whisker_reader *reader, int timeout_ms);
+
+/* Fills in *info. */
+void whisker_reader_info(const struct whisker_reader *reader, struct whisker_reader_info *info);
+
+struct whisker_ring;
+
+/*
+ * Makes the ring `name` of `capacity` frames (a power of two, 64 to 2^20) and becomes its writer. A ring whose writer
+ * died is replaced; its readers learn RESTARTED. Returns 0 and the ring, or ARGUMENT, RING_NAME, RING_BUSY (another
+ * writer lives), SYSTEM, MEMORY; then *ring is NULL.
+ */
+int whisker_ring_create(const char *name, uint32_t capacity, struct whisker_ring **ring);
+
+/* Copies `count` frames (at most a quarter of the capacity) into the ring and wakes waiting readers once. Never waits.
+ * Returns 0 or ARGUMENT. */
+int whisker_ring_publish(struct whisker_ring *ring, const struct whisker_frame *frames, size_t count);
+
+/* Removes the name, tells the readers that the stream has ended, and lets go; what they hold they can finish reading.
+ * NULL is allowed. */
+void whisker_ring_close(struct whisker_ring *ring);
+/* cffi: end */
+
+/*
+ * Decodes `count` bytes of the bridge's stream straight into the ring, as whisker_ring_publish. frames: if not NULL,
+ * gets the frames just published (valid until the next call), made their number.
+ * Returns 0, or ARGUMENT when the bytes could hold more than a quarter of the capacity.
+ */
+int whisker_ring_feed(struct whisker_ring *ring, struct whisker_decoder *decoder, const uint8_t *bytes, size_t count,
+                      const struct whisker_frame **frames, size_t *made);
+#pragma GCC visibility pop
+
+#endif

@@ -1,0 +1,10 @@
+/* libwhisker: from the bridge's USB interface to any number of reading processes. */
+#ifndef WHISKER_H
+#define WHISKER_H
+
+#include "whisker/device.h"
+#include "whisker/errors.h"
+#include "whisker/frame.h"
+#include "whisker/ring.h"
+
+#endif

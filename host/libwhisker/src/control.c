@@ -1,0 +1,103 @@
+#include "control.h"
+
+#include <string.h>
+
+#include "whisker/errors.h"
+#include "whisker/frame.h"
+#include "whisker_protocol.h"
+
+hid_device *control_open(void)
+{
+    return hid_open(WHISKER_LIMIT_USB_VENDOR_ID, WHISKER_LIMIT_USB_PRODUCT_ID, NULL);
+}
+
+static int get_report(hid_device *hid, uint8_t id, uint8_t *bytes, size_t count)
+{
+    memset(bytes, 0, count);
+    bytes[0] = id;
+    const int got = hid_get_feature_report(hid, bytes, count);
+    return got >= 0 && (size_t)got == count && bytes[0] == id ? WHISKER_OK : WHISKER_ERROR_DEVICE_CONTROL;
+}
+
+int control_identify(hid_device *hid, struct whisker_identity *identity)
+{
+    uint8_t bytes[WHISKER_REPORT_IDENTITY_BYTES];
+    const int error = get_report(hid, WHISKER_REPORT_ID_IDENTITY, bytes, sizeof bytes);
+    if (error) {
+        return error;
+    }
+    *identity = (struct whisker_identity){
+        .wire_version = bytes[WHISKER_REPORT_IDENTITY_WIRE_VERSION],
+        .lanes = bytes[WHISKER_REPORT_IDENTITY_LANES],
+        .gateware = bytes[WHISKER_REPORT_IDENTITY_GATEWARE],
+        .clock_hz = whisker_get_u32(bytes + WHISKER_REPORT_IDENTITY_CLOCK_HZ),
+        .frame_bytes = whisker_get_u16(bytes + WHISKER_REPORT_IDENTITY_FRAME_BYTES),
+        .fifo_bytes = whisker_get_u16(bytes + WHISKER_REPORT_IDENTITY_FIFO_BYTES),
+    };
+    if (identity->wire_version != WHISKER_WIRE_VERSION) {
+        return WHISKER_ERROR_WIRE_VERSION;
+    }
+    const bool known = identity->lanes == WHISKER_FRAME_LANES && identity->frame_bytes == WHISKER_FRAME_BYTES &&
+                       identity->clock_hz == WHISKER_LIMIT_CLOCK_HZ;
+    return known ? WHISKER_OK : WHISKER_ERROR_DEVICE_IDENTITY;
+}
+
+int control_run(hid_device *hid, const struct whisker_settings *settings, bool run)
+{
+    uint8_t bytes[WHISKER_REPORT_CONTROL_BYTES] = {WHISKER_REPORT_ID_CONTROL};
+    bytes[WHISKER_REPORT_CONTROL_WIRE_VERSION] = WHISKER_WIRE_VERSION;
+    bytes[WHISKER_REPORT_CONTROL_RUN] = run;
+    bytes[WHISKER_REPORT_CONTROL_SCK_DIVIDER] = settings->sck_divider;
+    bytes[WHISKER_REPORT_CONTROL_WORD_GAP] = settings->word_gap;
+    bytes[WHISKER_REPORT_CONTROL_SAMPLE_POINT] = settings->sample_point;
+    whisker_put_u32(bytes + WHISKER_REPORT_CONTROL_LANE_MASK, settings->lane_mask);
+    whisker_put_u32(bytes + WHISKER_REPORT_CONTROL_TICK_PERIOD, settings->tick_period);
+    return hid_send_feature_report(hid, bytes, sizeof bytes) < 0 ? WHISKER_ERROR_DEVICE_REFUSED : WHISKER_OK;
+}
+
+int control_counters(hid_device *hid, struct whisker_counters *counters)
+{
+    uint8_t bytes[WHISKER_REPORT_COUNTERS_BYTES];
+    const int error = get_report(hid, WHISKER_REPORT_ID_COUNTERS, bytes, sizeof bytes);
+    if (error) {
+        return error;
+    }
+    *counters = (struct whisker_counters){
+        .running = bytes[WHISKER_REPORT_COUNTERS_RUNNING],
+        .ticks = whisker_get_u32(bytes + WHISKER_REPORT_COUNTERS_TICKS),
+        .frames = whisker_get_u32(bytes + WHISKER_REPORT_COUNTERS_FRAMES),
+        .dropped = whisker_get_u32(bytes + WHISKER_REPORT_COUNTERS_DROPPED),
+        .records_good = whisker_get_u32(bytes + WHISKER_REPORT_COUNTERS_RECORDS_GOOD),
+        .records_absent = whisker_get_u32(bytes + WHISKER_REPORT_COUNTERS_RECORDS_ABSENT),
+        .records_crc = whisker_get_u32(bytes + WHISKER_REPORT_COUNTERS_RECORDS_CRC),
+        .records_tick = whisker_get_u32(bytes + WHISKER_REPORT_COUNTERS_RECORDS_TICK),
+    };
+    return WHISKER_OK;
+}
+
+void whisker_settings_default(struct whisker_settings *settings)
+{
+    *settings = (struct whisker_settings){
+        .lane_mask = (UINT32_C(1) << WHISKER_LIMIT_LANES) - 1,
+        .tick_period = WHISKER_LIMIT_TICK_PERIOD,
+        .sck_divider = WHISKER_LIMIT_SCK_DIVIDER_DEFAULT,
+        .word_gap = WHISKER_LIMIT_WORD_GAP_DEFAULT,
+        .sample_point = WHISKER_LIMIT_SAMPLE_POINT_DEFAULT,
+    };
+}
+
+int whisker_settings_check(const struct whisker_settings *settings)
+{
+    const bool good = settings->lane_mask >> WHISKER_LIMIT_LANES == 0 &&
+                      settings->tick_period >= WHISKER_LIMIT_TICK_PERIOD_MIN &&
+                      settings->sck_divider >= WHISKER_LIMIT_SCK_DIVIDER_MIN &&
+                      settings->sck_divider <= WHISKER_LIMIT_SCK_DIVIDER_MAX && settings->sck_divider % 2 == 0 &&
+                      settings->word_gap >= WHISKER_LIMIT_WORD_GAP_MIN && settings->sample_point >= 1 &&
+                      settings->sample_point <= settings->sck_divider;
+    return good ? WHISKER_OK : WHISKER_ERROR_DEVICE_REFUSED;
+}
+
+int whisker_wire_version(void)
+{
+    return WHISKER_WIRE_VERSION;
+}

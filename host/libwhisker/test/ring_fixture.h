@@ -1,0 +1,27 @@
+/* A ring name of this process, frames that know their index, and what the ring tests share. */
+#ifndef WHISKER_TEST_RING_FIXTURE_H
+#define WHISKER_TEST_RING_FIXTURE_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "whisker/ring.h"
+
+#define TEST_CAPACITY 64u
+
+/* A name no other test process uses. */
+const char *test_ring_name(void);
+
+/* Frame number `index`: every field follows from it. */
+struct whisker_frame test_frame(uint64_t index);
+
+/* Whether the frame is the one of this index, in every field. */
+bool test_frame_is(const struct whisker_frame *frame, uint64_t index);
+
+/* Publishes the frames of indices first .. first + count - 1, one at a time. */
+void test_publish(struct whisker_ring *ring, uint64_t first, uint64_t count);
+
+/* Whether the ring of this name has a file in shared memory. */
+bool test_ring_file_exists(const char *name);
+
+#endif
