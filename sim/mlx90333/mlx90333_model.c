@@ -62,7 +62,7 @@ static void select_fell(struct mlx90333 *sensor, uint64_t now_ns)
 {
     const uint64_t since = sensor->select_ns > sensor->awake_ns ? sensor->select_ns : sensor->awake_ns;
     const uint64_t high_ns = now_ns > since ? now_ns - since : 0;
-    if (high_ns >= sensor->t5 || (high_ns > 0 && draw(sensor) % sensor->t5 < high_ns))
+    if (draw(sensor) % sensor->t5 < high_ns) /* always from t5 on, never at 0 */
         resynchronise(sensor);
     sensor->fresh = true;
 }

@@ -5,6 +5,8 @@
 #include "board_host.h" // struct board, board_*
 #include "node.h"       // node_on_*
 
+#define OSCILLATOR_SPREAD_PERMILLE (MLX90333_OSCILLATOR_PERCENT * 10u)
+
 struct sim_node {
     struct board board;
     struct node firmware;
@@ -39,10 +41,17 @@ static void deliver_next(sim_node *node)
     }
 }
 
+/* Each node's sensor has an oscillator of its own, so that the firmware's waits are tried on slow and quick parts. */
+static uint32_t oscillator_permille(uint64_t seed)
+{
+    const uint64_t mixed = (seed * UINT64_C(0x9E3779B97F4A7C15)) >> 32;
+    return 1000u - OSCILLATOR_SPREAD_PERMILLE + (uint32_t)(mixed % (2u * OSCILLATOR_SPREAD_PERMILLE + 1u));
+}
+
 void sim_node_power_on(sim_node *node)
 {
     board_reset(&node->board, 0);
-    mlx90333_power_on(&node->board.sensor, 0, 1000, node->seed);
+    mlx90333_power_on(&node->board.sensor, 0, oscillator_permille(node->seed), node->seed);
     node_start(&node->firmware, &node->board);
     node->powered = true;
     while (!node_ready(&node->firmware) && board_next_ns(&node->board) != BOARD_NEVER)

@@ -15,8 +15,8 @@
 
 typedef struct sim_node sim_node;
 
-/* A node without power: it answers nothing. `seed` decides what the sensor's data sheet leaves undefined.
- * NULL if there is no memory. */
+/* A node without power: it answers nothing. `seed` decides the sensor's oscillator (+-10 %) and what its data sheet
+ * leaves undefined. NULL if there is no memory. */
 sim_node *sim_node_new(uint64_t seed);
 void sim_node_free(sim_node *node);
 

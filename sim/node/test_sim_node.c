@@ -287,6 +287,25 @@ static void a_sync_too_early_is_reported_late_and_costs_a_resynchronisation(void
     assert_good(record, 3, REST);
 }
 
+static void slow_and_quick_sensors_are_read_alike(void **state)
+{
+    (void)state;
+    for (uint64_t seed = 0; seed < 400; seed++) {
+        uint8_t record[8];
+        sim_node *node = sim_node_new(seed);
+        sim_node_power_on(node);
+        tick(node, 0, REST, record);
+        sim_node_fault(node, SIM_SENSOR_DEAD, 0);
+        tick(node, 1, REST, record);
+        assert_good(record, 0, REST);
+        for (uint8_t n = 2; n < 5; n++)
+            tick(node, n, REST, record);
+        assert_good(record, 3, REST);
+        assert_int_equal(sim_node_violations(node), 0);
+        sim_node_free(node);
+    }
+}
+
 #define TEST(name) cmocka_unit_test_setup_teardown(name, power_on, check_and_free)
 
 int main(void)
@@ -305,6 +324,7 @@ int main(void)
         TEST(clocks_without_select_are_another_nodes),
         TEST(a_missing_sync_is_never_passed_off_as_a_sample),
         TEST(a_sync_too_early_is_reported_late_and_costs_a_resynchronisation),
+        cmocka_unit_test(slow_and_quick_sensors_are_read_alike),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
