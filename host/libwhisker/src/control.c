@@ -75,28 +75,6 @@ int control_counters(hid_device *hid, struct whisker_counters *counters)
     return WHISKER_OK;
 }
 
-void whisker_settings_default(struct whisker_settings *settings)
-{
-    *settings = (struct whisker_settings){
-        .lane_mask = (UINT32_C(1) << WHISKER_LIMIT_LANES) - 1,
-        .tick_period = WHISKER_LIMIT_TICK_PERIOD,
-        .sck_divider = WHISKER_LIMIT_SCK_DIVIDER_DEFAULT,
-        .word_gap = WHISKER_LIMIT_WORD_GAP_DEFAULT,
-        .sample_point = WHISKER_LIMIT_SAMPLE_POINT_DEFAULT,
-    };
-}
-
-int whisker_settings_check(const struct whisker_settings *settings)
-{
-    const bool good = settings->lane_mask >> WHISKER_LIMIT_LANES == 0 &&
-                      settings->tick_period >= WHISKER_LIMIT_TICK_PERIOD_MIN &&
-                      settings->sck_divider >= WHISKER_LIMIT_SCK_DIVIDER_MIN &&
-                      settings->sck_divider <= WHISKER_LIMIT_SCK_DIVIDER_MAX && settings->sck_divider % 2 == 0 &&
-                      settings->word_gap >= WHISKER_LIMIT_WORD_GAP_MIN && settings->sample_point >= 1 &&
-                      settings->sample_point <= settings->sck_divider;
-    return good ? WHISKER_OK : WHISKER_ERROR_DEVICE_REFUSED;
-}
-
 int whisker_wire_version(void)
 {
     return WHISKER_WIRE_VERSION;

@@ -8,6 +8,8 @@
 #include "whisker_protocol.h"
 
 static_assert(WHISKER_FRAME_LANES == WHISKER_LIMIT_LANES, "the host's frame has the wire's lanes");
+static_assert(WHISKER_FRAME_LAST == WHISKER_FRAME_FLAG_LAST, "the host's flag is the wire's");
+static_assert(WHISKER_STATUS_ERROR_BITS == WHISKER_STATUS_CODE_SHIFT, "the host's status is the wire's");
 static_assert(sizeof(struct whisker_frame) == 256, "an entry of a ring is 256 bytes");
 static_assert(WHISKER_FRAME_BYTES == WHISKER_FRAME_HEADER_BYTES + WHISKER_FRAME_LANES * WHISKER_RECORD_BYTES,
               "a frame is its header and its records");

@@ -45,8 +45,11 @@ struct whisker_counters {
 /* The hardware's defaults (all 28 lanes, 500 us). */
 void whisker_settings_default(struct whisker_settings *settings);
 
-/* 0 or DEVICE_REFUSED: the same limits that the bridge checks. */
-int whisker_settings_check(const struct whisker_settings *settings);
+/*
+ * The same limits that the bridge checks. Returns 0, or DEVICE_REFUSED and, in message (n bytes; may be NULL, 0), which
+ * setting is wrong and what it may be.
+ */
+int whisker_settings_check(const struct whisker_settings *settings, char *message, size_t n);
 
 /* The wire version this library speaks. */
 int whisker_wire_version(void);

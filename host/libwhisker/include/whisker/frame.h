@@ -9,6 +9,8 @@
 #pragma GCC visibility push(default)
 /* cffi: begin */
 #define WHISKER_FRAME_LANES 28
+#define WHISKER_FRAME_LAST 1         /* bit of flags: the last frame after a stop */
+#define WHISKER_STATUS_ERROR_BITS 10 /* of a status, from bit 0: the sensor's errors; above them: the code */
 
 /* What one lane delivered: counts (0x8000 at rest, 65536 counts = 180 degrees); status: 0 good, see protocol.md. */
 struct whisker_sample {

@@ -1,0 +1,52 @@
+#include "cli.h"
+
+#include <errno.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "whisker/errors.h"
+
+static volatile sig_atomic_t stop_wanted;
+
+static void on_signal(int number)
+{
+    (void)number;
+    stop_wanted = 1;
+}
+
+void cli_catch_signals(void)
+{
+    struct sigaction action;
+    memset(&action, 0, sizeof action);
+    action.sa_handler = on_signal;
+    sigaction(SIGINT, &action, NULL);
+    sigaction(SIGTERM, &action, NULL);
+    sigaction(SIGHUP, &action, NULL);
+}
+
+bool cli_stop_wanted(void)
+{
+    return stop_wanted != 0;
+}
+
+int cli_fail(const char *program, const char *subject, int error)
+{
+    const char *detail = error == WHISKER_ERROR_SYSTEM ? strerror(errno) : whisker_error_remedy(error);
+    fprintf(stderr, "%s: %s: %s; %s\n", program, subject, whisker_error_text(error), detail);
+    return CLI_FAILED;
+}
+
+bool cli_number(const char *program, const char *option, const char *text, uint32_t min, uint32_t max, uint32_t *value)
+{
+    char *end;
+    errno = 0;
+    const unsigned long long number = strtoull(text, &end, 0);
+    if (errno || end == text || *end != '\0' || text[0] == '-' || number < min || number > max) {
+        fprintf(stderr, "%s: --%s %s: give a whole number from %u to %u\n", program, option, text, min, max);
+        return false;
+    }
+    *value = (uint32_t)number;
+    return true;
+}

@@ -1,0 +1,22 @@
+/* What the programs share: numbers from the command line, and errors as one line. */
+#ifndef WHISKER_CLI_H
+#define WHISKER_CLI_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+enum { CLI_OK = 0, CLI_FAILED = 1, CLI_USAGE = 2 };
+
+/* Prints "program: subject: text; remedy" for a code of the library and returns CLI_FAILED. */
+int cli_fail(const char *program, const char *subject, int error);
+
+/* Reads an option's number, decimal or 0x; false, with one line printed, unless it is a whole number min..max. */
+bool cli_number(const char *program, const char *option, const char *text, uint32_t min, uint32_t max, uint32_t *value);
+
+/* Turns SIGINT, SIGTERM and SIGHUP into a wish to end. Blocking calls are interrupted. */
+void cli_catch_signals(void);
+
+/* Whether one of them has come. */
+bool cli_stop_wanted(void);
+
+#endif

@@ -1,0 +1,257 @@
+/* whisker-log: a reader of its own that counts what arrived and writes down what was flagged bad. */
+#include <errno.h>
+#include <getopt.h>
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "cli.h"
+#include "follower.h"
+#include "whisker/whisker.h"
+
+#define PROGRAM "whisker-log"
+#define WAIT_MS 500
+#define BATCH 256
+/* A simulation runs up to 4096 ticks ahead; saying how far we are this often keeps it going. */
+#define TAKEN_TICKS 512
+
+struct options {
+    const char *ring, *bad, *summary, *socket;
+    uint32_t lanes, wait_s;
+};
+
+struct tally {
+    uint64_t received, gaps, repeated, first_tick, last_tick, records_bad, overruns;
+    uint32_t sequence;
+};
+
+struct session {
+    const struct options *options;
+    struct whisker_reader *reader;
+    struct follower follower;
+    FILE *bad;
+    struct tally tally;
+    uint64_t taken; /* ticks told to the simulation */
+};
+
+static void print_help(void)
+{
+    printf("Usage: whisker-log --ring NAME [OPTION...]\n"
+           "Reads a ring until its writer closes it; counts frames and logs the records flagged bad.\n\n"
+           "  --ring NAME      the ring to read\n"
+           "  --lanes N        lanes 0 to N-1 are populated; others are not judged (%d)\n"
+           "  --bad FILE       CSV: lane, tick, code, errors of each bad record\n"
+           "  --summary FILE   JSON: what was counted\n"
+           "  --wait S         wait so many seconds for the ring to come up (10)\n"
+           "  --socket PATH    follow the simulation at this socket: it never runs too far ahead\n"
+           "  --help           this text\n\n"
+           "Example: whisker-log --ring whisker --lanes 6 --bad bad.csv --summary log.json\n"
+           "Exit code: 0 the ring was closed or a signal came, 1 failed, 2 wrong use.\n",
+           WHISKER_FRAME_LANES);
+}
+
+static bool set_option(struct options *options, int option, const char *text)
+{
+    switch (option) {
+    case 'r':
+        options->ring = text;
+        return true;
+    case 'b':
+        options->bad = text;
+        return true;
+    case 's':
+        options->summary = text;
+        return true;
+    case 'f':
+        options->socket = text;
+        return true;
+    case 'l':
+        return cli_number(PROGRAM, "lanes", text, 1, WHISKER_FRAME_LANES, &options->lanes);
+    case 'w':
+        return cli_number(PROGRAM, "wait", text, 0, 3600, &options->wait_s);
+    default:
+        return false;
+    }
+}
+
+/* Returns -1 to go on, or the exit code. */
+static int parse(int argc, char **argv, struct options *options)
+{
+    static const struct option known[] = {
+        {"ring", required_argument, NULL, 'r'},    {"bad", required_argument, NULL, 'b'},
+        {"summary", required_argument, NULL, 's'}, {"socket", required_argument, NULL, 'f'},
+        {"lanes", required_argument, NULL, 'l'},   {"wait", required_argument, NULL, 'w'},
+        {"help", no_argument, NULL, 'h'},          {NULL, 0, NULL, 0},
+    };
+    for (int option; (option = getopt_long(argc, argv, "", known, NULL)) != -1;) {
+        if (option == 'h') {
+            print_help();
+            return CLI_OK;
+        }
+        if (!set_option(options, option, optarg)) {
+            return CLI_USAGE;
+        }
+    }
+    if (!options->ring || optind != argc) {
+        fprintf(stderr, PROGRAM ": %s; see " PROGRAM " --help\n",
+                options->ring ? "there is a word too many" : "--ring NAME is missing");
+        return CLI_USAGE;
+    }
+    return -1;
+}
+
+static void log_bad_records(struct session *session, const struct whisker_frame *frame)
+{
+    for (uint32_t lane = 0; lane < session->options->lanes; lane++) {
+        const unsigned status = frame->lane[lane].status;
+        if (status == 0) {
+            continue;
+        }
+        session->tally.records_bad++;
+        if (session->bad) {
+            const unsigned errors = status & ((1u << WHISKER_STATUS_ERROR_BITS) - 1);
+            fprintf(session->bad, "%u,%" PRIu64 ",%u,%u\n", lane, frame->tick, status >> WHISKER_STATUS_ERROR_BITS,
+                    errors);
+        }
+    }
+}
+
+static void count_frame(struct session *session, const struct whisker_frame *frame)
+{
+    struct tally *tally = &session->tally;
+    const uint32_t step = tally->received ? frame->sequence - tally->sequence : 1; /* modulo 2^32: it wraps */
+    if (step == 0 || step > UINT32_MAX / 2) {
+        tally->repeated++;
+        return;
+    }
+    if (tally->received == 0) {
+        tally->first_tick = frame->tick;
+    }
+    tally->received++;
+    tally->gaps += step - 1;
+    tally->sequence = frame->sequence;
+    tally->last_tick = frame->tick;
+    log_bad_records(session, frame);
+}
+
+static void tell_simulation(struct session *session)
+{
+    const struct tally *tally = &session->tally;
+    if (tally->received > 0 && tally->last_tick + 1 - session->taken >= TAKEN_TICKS) {
+        follower_taken(&session->follower, tally->last_tick);
+        session->taken = tally->last_tick + 1;
+    }
+}
+
+/* Takes a batch out of the ring. It is copied, so that only frames known to be whole are counted. */
+static void read_batch(struct session *session)
+{
+    static struct whisker_frame batch[BATCH];
+    const struct whisker_frame *frames;
+    size_t count;
+    int error = whisker_reader_peek(session->reader, &frames, &count);
+    if (!error) {
+        count = count < BATCH ? count : BATCH;
+        memcpy(batch, frames, count * sizeof *frames);
+        error = whisker_reader_advance(session->reader, count);
+    }
+    if (error) {
+        session->tally.overruns++;
+        return;
+    }
+    for (size_t i = 0; i < count; i++) {
+        count_frame(session, &batch[i]);
+    }
+    tell_simulation(session);
+}
+
+/* Reads to the end of the stream and returns how it ended. */
+static int read_stream(struct session *session)
+{
+    while (!cli_stop_wanted()) {
+        const int error = whisker_reader_wait(session->reader, WAIT_MS);
+        if (!error) {
+            read_batch(session);
+        } else if (error != WHISKER_ERROR_TIMEOUT) {
+            return error;
+        }
+    }
+    return WHISKER_OK;
+}
+
+static bool write_summary(const char *path, const struct tally *tally)
+{
+    FILE *file = path ? fopen(path, "w") : NULL;
+    if (!file) {
+        return path == NULL;
+    }
+    fprintf(file,
+            "{\"frames_received\": %" PRIu64 ", \"gaps\": %" PRIu64 ", \"repeated\": %" PRIu64
+            ", \"first_tick\": %" PRIu64 ", \"last_tick\": %" PRIu64 ", \"records_bad\": %" PRIu64
+            ", \"overruns\": %" PRIu64 "}\n",
+            tally->received, tally->gaps, tally->repeated, tally->first_tick, tally->last_tick, tally->records_bad,
+            tally->overruns);
+    const bool written = !ferror(file);
+    return fclose(file) == 0 && written;
+}
+
+static int fail_file(const char *path)
+{
+    fprintf(stderr, PROGRAM ": %s: %s; choose a path that can be written\n", path, strerror(errno));
+    return CLI_FAILED;
+}
+
+static int follow(struct session *session)
+{
+    const struct options *options = session->options;
+    const int error = whisker_reader_attach(options->ring, (int)options->wait_s * 1000, &session->reader);
+    if (error) {
+        return cli_fail(PROGRAM, options->ring, error);
+    }
+    if (follower_open(&session->follower, options->socket, "log") != 0) {
+        fprintf(stderr, PROGRAM ": %s: %s; start the simulation with this --socket\n", options->socket,
+                strerror(errno));
+        return CLI_FAILED;
+    }
+    const int end = read_stream(session);
+    if (session->tally.received > 0) {
+        follower_taken(&session->follower, session->tally.last_tick);
+    }
+    return end == WHISKER_ERROR_WRITER_DEAD ? cli_fail(PROGRAM, options->ring, end) : CLI_OK;
+}
+
+static int log_ring(struct session *session)
+{
+    const struct options *options = session->options;
+    if (options->bad) {
+        session->bad = fopen(options->bad, "w");
+        if (!session->bad) {
+            return fail_file(options->bad);
+        }
+        fputs("lane,tick,code,errors\n", session->bad);
+    }
+    int result = follow(session);
+    if (session->bad && (ferror(session->bad) | fclose(session->bad)) != 0) {
+        result = fail_file(options->bad);
+    }
+    if (!write_summary(options->summary, &session->tally)) {
+        result = fail_file(options->summary);
+    }
+    return result;
+}
+
+int main(int argc, char **argv)
+{
+    struct options options = {.lanes = WHISKER_FRAME_LANES, .wait_s = 10};
+    const int parsed = parse(argc, argv, &options);
+    if (parsed >= 0) {
+        return parsed;
+    }
+    cli_catch_signals();
+    struct session session = {.options = &options, .follower = {.fd = -1}};
+    const int result = log_ring(&session);
+    follower_close(&session.follower);
+    whisker_reader_detach(session.reader);
+    return result;
+}

@@ -1,0 +1,45 @@
+#include <stdbool.h>
+#include <stdio.h>
+
+#include "whisker/device.h"
+#include "whisker/errors.h"
+#include "whisker_protocol.h"
+
+void whisker_settings_default(struct whisker_settings *settings)
+{
+    *settings = (struct whisker_settings){
+        .lane_mask = (UINT32_C(1) << WHISKER_LIMIT_LANES) - 1,
+        .tick_period = WHISKER_LIMIT_TICK_PERIOD,
+        .sck_divider = WHISKER_LIMIT_SCK_DIVIDER_DEFAULT,
+        .word_gap = WHISKER_LIMIT_WORD_GAP_DEFAULT,
+        .sample_point = WHISKER_LIMIT_SAMPLE_POINT_DEFAULT,
+    };
+}
+
+struct limit {
+    const char *name;
+    uint32_t value, min, max;
+    bool even;
+};
+
+int whisker_settings_check(const struct whisker_settings *settings, char *message, size_t n)
+{
+    const struct limit limits[] = {
+        {"lane mask", settings->lane_mask, 0, (UINT32_C(1) << WHISKER_LIMIT_LANES) - 1, false},
+        {"tick period", settings->tick_period, WHISKER_LIMIT_TICK_PERIOD_MIN, UINT32_MAX, false},
+        {"SCK divider", settings->sck_divider, WHISKER_LIMIT_SCK_DIVIDER_MIN, WHISKER_LIMIT_SCK_DIVIDER_MAX, true},
+        {"word gap", settings->word_gap, WHISKER_LIMIT_WORD_GAP_MIN, UINT8_MAX, false},
+        {"sample point", settings->sample_point, 1, settings->sck_divider, false},
+    };
+    for (size_t i = 0; i < sizeof limits / sizeof limits[0]; i++) {
+        const struct limit *it = &limits[i];
+        if (it->value < it->min || it->value > it->max || (it->even && it->value % 2 != 0)) {
+            if (n > 0) {
+                snprintf(message, n, "the %s is %u; it must be %s%u to %u", it->name, it->value,
+                         it->even ? "even, " : "", it->min, it->max);
+            }
+            return WHISKER_ERROR_DEVICE_REFUSED;
+        }
+    }
+    return WHISKER_OK;
+}
