@@ -13,6 +13,7 @@ module control_registers #(
     input  wire             clk,           // 60 MHz
     input  wire             rst,           // synchronous: defaults
     input  wire             halt,          // a USB reset has ended the run: run reads 0, the other settings stay
+    input  wire             write_start,   // a report is to come: forget what was gathered
     input  wire             write_valid,   // write_data is a byte of the report
     input  wire [5:0]       write_index,   // its place; 0 begins a new report
     input  wire [7:0]       write_data,    // the byte
@@ -59,7 +60,7 @@ module control_registers #(
     wire apply = write_done && write_accept;
 
     always @(posedge clk)
-        if (rst) length <= 7'd0;
+        if (rst || write_start) length <= 7'd0;
         else if (write_valid) begin
             length <= {1'b0, write_index} + 7'd1;
             if ({26'd0, write_index} < REPORT_CONTROL_BYTES) incoming[8*write_index[3:0] +: 8] <= write_data;

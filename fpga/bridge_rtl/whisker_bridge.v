@@ -50,7 +50,7 @@ module whisker_bridge #(
 
     // USB
     wire       usb_restart;  // bus reset or SET_CONFIGURATION: one cycle or more
-    wire       write_valid, write_done, write_accept, read_start, read_next;
+    wire       write_start, write_valid, write_done, write_accept, read_start, read_next;
     wire [5:0] write_index;
     wire [7:0] write_data, read_id, read_data, stream_data;
     wire       stream_valid, stream_last, stream_ready;
@@ -92,7 +92,7 @@ module whisker_bridge #(
 
     control_registers #(.LANES(LANES)) control (
         .clk(clk), .rst(rst), .halt(usb_restart),
-        .write_valid(write_valid), .write_index(write_index), .write_data(write_data),
+        .write_start(write_start), .write_valid(write_valid), .write_index(write_index), .write_data(write_data),
         .write_done(write_done), .write_accept(write_accept), .stopping(stopping),
         .start(start), .stop(stop), .run(run), .sck_divider(sck_divider), .word_gap(word_gap),
         .sample_point(sample_point), .lane_mask(lane_mask), .tick_period(tick_period));
@@ -159,8 +159,8 @@ module whisker_bridge #(
         .utmi_xcvr_select(utmi_xcvr_select), .utmi_term_select(utmi_term_select), .utmi_op_mode(utmi_op_mode),
         .stream_data(stream_data), .stream_valid(stream_valid), .stream_last(stream_last),
         .stream_ready(stream_ready), .restart(usb_restart),
-        .write_valid(write_valid), .write_index(write_index), .write_data(write_data), .write_done(write_done),
-        .write_accept(write_accept),
+        .write_start(write_start), .write_valid(write_valid), .write_index(write_index), .write_data(write_data),
+        .write_done(write_done), .write_accept(write_accept),
         .read_start(read_start), .read_id(read_id), .read_next(read_next), .read_data(read_data));
 endmodule
 

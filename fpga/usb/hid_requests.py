@@ -18,7 +18,8 @@ class HidRequests(ControlRequestHandler):
     refused once, at the first token of the status stage: until then the host may repeat its data, afterwards it only
     repeats the question.
 
-        write: index, data, valid    bytes of the report; index 0 begins it again
+        write: start                 a report is to come: forget what was gathered
+               index, data, valid    its bytes; index 0 begins it again
                done, accept          accept is read in the cycle of done; refused: STALL
         read:  start, id             a read of report `id` begins
                next, data            data is the report's next byte from two cycles after start on
@@ -26,6 +27,7 @@ class HidRequests(ControlRequestHandler):
 
     def __init__(self):
         super().__init__()
+        self.write_start = Signal()
         self.write_valid = Signal()
         self.write_index = Signal(6)
         self.write_data = Signal(8)
@@ -67,17 +69,16 @@ class HidRequests(ControlRequestHandler):
             m.d.usb += [self.kind.eq(0), self.sending.eq(0), self.decided.eq(0)]
             ours = (setup.recipient == USBRequestRecipient.INTERFACE) & (setup.index == LIMITS["usb_hid_interface"])
             feature = ours & (setup.value[8:] == FEATURE)
+            get = feature & setup.is_in_request & (setup.request == GET_REPORT) & (setup.length != 0)
             for report in REPORTS.values():
-                with m.If(feature & setup.is_in_request & (setup.request == GET_REPORT) & (setup.length != 0)):
-                    with m.If(setup.value[:8] == report.id):
-                        m.d.usb += [
-                            self.kind.eq(0b001),
-                            self.size.eq(Mux(setup.length < report.size, setup.length, report.size)),
-                        ]
+                with m.If(get & (setup.value[:8] == report.id)):
+                    size = Mux(setup.length < report.size, setup.length, report.size)
+                    m.d.usb += [self.kind.eq(0b001), self.size.eq(size)]
             control = REPORTS["control"]
-            right_report = (setup.value[:8] == control.id) & (setup.length == control.size)
-            with m.If(feature & ~setup.is_in_request & (setup.request == SET_REPORT) & right_report):
+            whole = (setup.value[:8] == control.id) & (setup.length == control.size)
+            with m.If(feature & ~setup.is_in_request & (setup.request == SET_REPORT) & whole):
                 m.d.usb += self.kind.eq(0b010)
+                m.d.comb += self.write_start.eq(1)
             with m.If(ours & ~setup.is_in_request & (setup.request == SET_IDLE) & (setup.length == 0)):
                 m.d.usb += self.kind.eq(0b100)
 
