@@ -17,8 +17,7 @@
 
 enum sim_sensor_fault {
     SIM_SENSOR_GOOD,
-    SIM_SENSOR_FLIP_BIT,   /* one bit of the frame is inverted at the master's end; argument 0 to 63 in order of sending
-                            */
+    SIM_SENSOR_FLIP_BIT,   /* one bit is inverted at the master's end; argument 0 to 63 in order of sending */
     SIM_SENSOR_DEAD,       /* all ones: nothing drives the line */
     SIM_SENSOR_STUCK_LOW,  /* all zeros */
     SIM_SENSOR_ERROR_BITS, /* a sound frame whose error word is the argument */

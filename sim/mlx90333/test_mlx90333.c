@@ -34,7 +34,7 @@ static uint8_t clock_bits(struct bench *bench, uint8_t send, unsigned bits)
 {
     uint8_t received = 0;
     for (unsigned i = 0; i < bits; i++) {
-        const bool out = (send >> (7 - i) & 1u) != 0;
+        const bool out = ((unsigned)send >> (7 - i) & 1u) != 0;
         mlx90333_clock(&bench->sensor, bench->now, true, out);
         const bool in = mlx90333_clock(&bench->sensor, bench->now + bench->period / 2, false, out);
         received = (uint8_t)(received << 1 | in);
@@ -201,6 +201,17 @@ static void resynchronisation_is_certain_at_t5_never_at_once_and_seeded_between(
     assert_int_equal(resynchronised(MLX90333_T5_NS / 2), half);
 }
 
+static void what_select_did_before_the_sensor_was_awake_does_not_count(void **state)
+{
+    (void)state;
+    for (uint64_t seed = 0; seed < 100; seed++) {
+        struct bench bench;
+        mlx90333_power_on(&bench.sensor, 0, 1000, seed);
+        mlx90333_select(&bench.sensor, MLX90333_STARTUP_NS, false);
+        assert_false(bench.sensor.enabled);
+    }
+}
+
 static void a_zero_from_the_master_pulls_the_line_low(void **state)
 {
     (void)state;
@@ -318,6 +329,7 @@ int main(void)
         cmocka_unit_test(nothing_answers_before_start_up_and_resynchronisation),
         cmocka_unit_test(a_lost_clock_shifts_every_frame_until_a_resynchronisation),
         cmocka_unit_test(resynchronisation_is_certain_at_t5_never_at_once_and_seeded_between),
+        cmocka_unit_test(what_select_did_before_the_sensor_was_awake_does_not_count),
         cmocka_unit_test(a_zero_from_the_master_pulls_the_line_low),
         cmocka_unit_test(a_wrong_start_byte_gets_no_answer),
         cmocka_unit_test(faults_damage_what_they_say),

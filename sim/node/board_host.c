@@ -35,6 +35,9 @@ void board_timer_start(struct board *board, uint16_t us)
 
 void board_link_arm(struct board *board, const uint16_t *words)
 {
+    /* the words armed before must have stayed as they were until now */
+    board->misuses += board->link.words && memcmp(board->link.words, board->armed, sizeof board->armed) != 0;
+    memcpy(board->armed, words, sizeof board->armed);
     link_slave_arm(&board->link, words);
 }
 
@@ -46,7 +49,7 @@ void board_sensor_select(struct board *board, bool level)
 void board_sensor_transfer(struct board *board, uint8_t byte)
 {
     if (board->byte_ns != BOARD_NEVER) {
-        board->overlapping++;
+        board->misuses++;
         return;
     }
     board->sending = byte;

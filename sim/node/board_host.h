@@ -13,12 +13,13 @@
 /* SPI1 and one timer, with the sensor behind SPI1 and SPI2 as the link's slave. */
 struct board {
     uint64_t now_ns;
-    uint64_t timer_ns;    /* when the timer elapses, or BOARD_NEVER */
-    uint64_t byte_ns;     /* when the byte being clocked ends, or BOARD_NEVER */
-    uint32_t overlapping; /* transfers asked for while a byte was under way: against the contract, and ignored */
+    uint64_t timer_ns; /* when the timer elapses, or BOARD_NEVER */
+    uint64_t byte_ns;  /* when the byte being clocked ends, or BOARD_NEVER */
+    uint32_t misuses;  /* breaches of the board's contract by the firmware */
     uint8_t sending;
     struct mlx90333 sensor;
     struct link_slave link;
+    uint16_t armed[LINK_WORDS]; /* the link's words as they were when armed */
 };
 
 /* Reset at `now_ns`, sensor not yet powered. */

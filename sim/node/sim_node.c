@@ -101,5 +101,5 @@ void sim_node_fault(sim_node *node, enum sim_sensor_fault fault, unsigned argume
 
 uint32_t sim_node_violations(const sim_node *node)
 {
-    return mlx90333_violations(&node->board.sensor) + node->board.overlapping;
+    return mlx90333_violations(&node->board.sensor) + node->board.misuses;
 }

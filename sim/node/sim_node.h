@@ -23,7 +23,7 @@ void sim_node_free(sim_node *node);
 /* Supply on; virtual time then passes until the node is ready for a SYNC (about 18 ms). */
 void sim_node_power_on(sim_node *node);
 
-/* SYNC: the record of the reading before is armed, the reading of this field starts. */
+/* SYNC: the reading of this field starts; the next transfer brings the record of the reading before. */
 void sim_node_sync(sim_node *node, struct sim_field field);
 
 /* Edge of the link's select line; low selects. */

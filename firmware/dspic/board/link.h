@@ -8,7 +8,7 @@ struct board; /* the port's own state */
 
 /* Makes the slave ready for one transfer of LINK_WORDS from their start, whatever was clocked before: the first word is
  * preloaded, bit and word counts are zero. `words` stay unchanged until the next call.
- * When as many words were received, node_on_order() follows once; more clocks are ignored until the next call. */
+ * When as many words were received, node_on_order() follows, once per call; more clocks are ignored. */
 void board_link_arm(struct board *board, const uint16_t *words);
 
 #endif

@@ -2,13 +2,14 @@
  *
  * A port delivers the events below, one at a time: on the chip their interrupts share one priority.
  *
- *   SYNC n        record n-1 is armed on the link, reading n begins
- *   order n       the bridge says that this tick is n
- *   last byte     record n is packed
- *   SYNC n+1      record n is armed ...
+ *   SYNC n        reading n begins; the link holds record n-1
+ *   order n       the bridge has clocked out record n-1 and says that this tick is n
+ *                 the link gets a record n that says LATE (or STARTING, RESYNC)
+ *   last byte     the link gets record n
+ *   SYNC n+1      reading n+1 begins ...
  *
- * Until the reading ends, record n says LATE (or STARTING, RESYNC): at any moment the record to come is complete, and
- * SYNC does no more than start the sensor and hand over a pointer. */
+ * The link is armed well before the SYNC after which it is clocked: the bridge selects sooner after SYNC than an
+ * interrupt could load the first word. */
 #ifndef NODE_H
 #define NODE_H
 
@@ -23,8 +24,9 @@ struct node {
     struct sampler sampler;
     struct sensor_reading reading;   /* of the present tick, as far as it is known */
     uint8_t tick;                    /* low 8 bits of the present tick's number */
+    bool numbered;                   /* the order that belongs to the last SYNC has come */
     uint8_t armed;                   /* which of the records the link has */
-    uint16_t records[2][LINK_WORDS]; /* the one the link has, the one to come */
+    uint16_t records[2][LINK_WORDS]; /* one is clocked out while the other is packed */
 };
 
 /* Call once, at reset; the sensor then needs about 18 ms. */
@@ -43,7 +45,8 @@ void node_on_timer(struct node *node);
 void node_on_sensor_byte(struct node *node, uint8_t byte);
 
 /* The bridge has clocked a whole transfer: the words received. With a wrong CRC the tick's number stays the one
- * counted from SYNC to SYNC. */
+ * counted from SYNC to SYNC. A second order after one SYNC changes nothing: if that SYNC was missed, there is no
+ * reading to go by the new number, and the old record, sent again, tells the bridge so. */
 void node_on_order(struct node *node, const uint16_t words[LINK_WORDS]);
 
 #endif

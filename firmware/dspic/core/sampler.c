@@ -60,29 +60,29 @@ uint8_t sampler_on_sync(struct sampler *sampler)
     }
 }
 
-void sampler_on_timer(struct sampler *sampler)
+bool sampler_on_timer(struct sampler *sampler)
 {
     switch (sampler->state) {
     case SAMPLER_RELEASE:
         board_sensor_select(sampler->board, true);
         wait_in(sampler, SAMPLER_RESYNC_HIGH, RESYNC_US);
-        break;
+        return false;
     case SAMPLER_STARTING: /* what /SS did before the sensor was awake does not count */
         wait_in(sampler, SAMPLER_RESYNC_HIGH, RESYNC_US);
-        break;
+        return false;
     case SAMPLER_RESYNC_HIGH:
         board_sensor_select(sampler->board, false);
         wait_in(sampler, SAMPLER_RESYNC_LOW, SELECT_US);
-        break;
+        return false;
     case SAMPLER_RESYNC_LOW:
         sampler->unready = WHISKER_CODE_RESYNC;
         sampler->state = SAMPLER_READY;
-        break;
+        return true;
     case SAMPLER_GAP:
         transfer_byte(sampler);
-        break;
+        return false;
     default:
-        break;
+        return false;
     }
 }
 

@@ -41,8 +41,8 @@ void sampler_start(struct sampler *sampler, struct board *board);
  * sampler_on_byte() ends the reading before the next SYNC: LATE if one was started, else STARTING or RESYNC. */
 uint8_t sampler_on_sync(struct sampler *sampler);
 
-/* The board's timer has elapsed. */
-void sampler_on_timer(struct sampler *sampler);
+/* The board's timer has elapsed. True when this makes the sensor ready. */
+bool sampler_on_timer(struct sampler *sampler);
 
 /* The sensor's byte has arrived. True when it ends the frame, with `reading` set. */
 bool sampler_on_byte(struct sampler *sampler, uint8_t byte, struct sensor_reading *reading);

@@ -38,10 +38,10 @@ static bool sum_is_right(const uint8_t *frame, uint16_t error_word)
 
 static bool all_ones(const uint8_t *frame)
 {
-    uint8_t both = 0xFFu;
+    uint8_t common = 0xFFu;
     for (uint8_t i = 0; i < MLX90333_FRAME_BYTES; i++)
-        both &= frame[i];
-    return both == 0xFFu;
+        common &= frame[i];
+    return common == 0xFFu;
 }
 
 struct sensor_reading sensor_reading_of_code(uint8_t code)

@@ -12,8 +12,9 @@
 #include "whisker_protocol.h"
 
 struct board {
-    bool select;
-    unsigned select_edges, transfers, timer_us; /* timer_us: 0 when the timer does not run */
+    unsigned select; /* level */
+    unsigned select_edges, transfers;
+    unsigned timer_us; /* 0 when the timer does not run */
 };
 
 void board_sensor_select(struct board *board, bool level)
@@ -42,7 +43,7 @@ struct bench {
 
 static void reset(struct bench *bench)
 {
-    const struct board board = {.select = true};
+    const struct board board = {.select = 1};
     bench->board = board;
     sampler_start(&bench->sampler, &bench->board);
 }

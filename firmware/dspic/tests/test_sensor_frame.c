@@ -11,14 +11,13 @@
 #include "sensor_frame.h"
 #include "whisker_protocol.h"
 
-/* Value of `n` bits of the frame in order of sending: bytes come least significant first, bits most significant first.
- */
+/* Value of `n` bits from byte `first_byte` on: least significant byte first, most significant bit first. */
 static unsigned field_of(const uint8_t frame[8], unsigned first_byte, unsigned n)
 {
     unsigned value = 0;
     for (unsigned bit = 0; bit < n; bit++) {
         const unsigned sent_at = 8 * (first_byte + bit / 8) + (7 - bit % 8);
-        const unsigned level = frame[sent_at / 8] >> (7 - sent_at % 8) & 1u;
+        const unsigned level = (unsigned)frame[sent_at / 8] >> (7 - sent_at % 8) & 1u;
         value += level << bit;
     }
     return value;
@@ -39,7 +38,7 @@ static unsigned reference_code(const uint8_t frame[8])
 {
     unsigned ones = 0;
     for (unsigned bit = 0; bit < 64; bit++)
-        ones += frame[bit / 8] >> bit % 8 & 1u;
+        ones += (unsigned)frame[bit / 8] >> bit % 8 & 1u;
     if (ones == 64)
         return WHISKER_CODE_SENSOR_ABSENT;
     if (field_of(frame, 0, 8) != 255)
