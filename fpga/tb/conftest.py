@@ -1,0 +1,6 @@
+"""Makes bench.py importable from every bench, in pytest and in the simulator it starts."""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))

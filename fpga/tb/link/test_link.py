@@ -1,0 +1,155 @@
+"""node_link, lane_receiver and record_store against a Python model of the nodes."""
+
+import random
+
+import cocotb
+from bench import CLOCK_PS, REPO, pulse, record, run_bench, start_clock
+from cocotb.triggers import FallingEdge, RisingEdge
+from nodes import BITS, Nodes
+from whisker.protocol import COMMANDS, LANES, ORDER, RECORD
+
+SETTINGS = [(6, 30, 3), (6, 30, 5), (16, 180, 8), (32, 30, 16), (32, 255, 32), (8, 31, 1)]  # divider, gap, sample point
+SELECT_SETUP = 9  # cycles: 150 ns
+SELECT_HOLD = 6  # cycles: 100 ns
+SYNC_HIGH = 6
+CYCLES_PER_TICK = 530  # at divider 6 and gap 30: what the simulation's speed is planned with
+
+
+async def begin(dut, delay_ps: int = 0) -> Nodes:
+    """Clock and nodes running, link idle."""
+    await start_clock(dut, start=0, read_lane=0, read_byte=0)
+    nodes = Nodes(dut, delay_ps)
+    nodes.times["sck"].clear()
+    return nodes
+
+
+async def transfer(dut, nodes: Nodes, records: dict[int, bytes], tick: int, expected: int, settings=SETTINGS[0]):
+    """One tick with these records; returns the verdicts absent, crc_wrong, tick_wrong."""
+    nodes.records = records
+    dut.sck_divider.value, dut.word_gap.value, dut.sample_point.value = settings
+    dut.order_tick.value, dut.expected_tick.value = tick, expected
+    await pulse(dut, dut.start)
+    dut.sck_divider.value, dut.word_gap.value, dut.sample_point.value = 10, 77, 4  # read at start only
+    await FallingEdge(dut.busy)
+    return tuple(int(v.value) for v in (dut.absent, dut.crc_wrong, dut.tick_wrong))
+
+
+async def stored(dut, lane: int) -> bytes:
+    """The lane's record as the framer would read it."""
+    out = bytearray()
+    for i in range(RECORD.size):
+        dut.read_lane.value, dut.read_byte.value = lane, i
+        await FallingEdge(dut.clk)
+        out.append(int(dut.read_data.value))
+    return bytes(out)
+
+
+def outcome(verdict: tuple[int, int, int], lane: int) -> str:
+    """Name of a lane's verdict, with the framer's precedence."""
+    absent, crc_wrong, tick_wrong = (v >> lane & 1 for v in verdict)
+    return "absent" if absent else "link_crc" if crc_wrong else "link_tick" if tick_wrong else "good"
+
+
+def random_records(tick: int) -> dict[int, bytes]:
+    return {
+        n: record(tick, random.getrandbits(16), random.getrandbits(16), random.getrandbits(16)) for n in range(LANES)
+    }
+
+
+@cocotb.test(timeout_time=10, timeout_unit="ms")
+@cocotb.parametrize(settings=SETTINGS)
+async def good_records_arrive_whole(dut, settings):
+    nodes = await begin(dut)
+    for tick in (5, 0, 255):
+        expected = (tick - 1) & 0xFF
+        records = random_records(expected)
+        assert await transfer(dut, nodes, records, tick, expected, settings) == (0, 0, 0)
+        assert nodes.orders[-1] == ORDER.pack(tick=tick, command=COMMANDS["sample"])
+        for lane in (0, 13, LANES - 1):
+            assert await stored(dut, lane) == records[lane]
+
+
+@cocotb.test(timeout_time=10, timeout_unit="ms")
+@cocotb.parametrize(settings=SETTINGS)
+async def bus_timing(dut, settings):
+    nodes = await begin(dut)
+    divider, gap, _ = settings
+    await transfer(dut, nodes, random_records(0), 1, 0, settings)
+    await RisingEdge(dut.clk)
+    rise, fall = nodes.cycles("sck")[0::2], nodes.cycles("sck")[1::2]
+    sync, select = nodes.cycles("sync"), nodes.cycles("select_n")
+    assert len(rise) == len(fall) == BITS
+    assert all(f - r == divider // 2 for r, f in zip(rise, fall, strict=True))
+    steps = [b - a for a, b in zip(rise, rise[1:], strict=False)]
+    assert steps == [divider + gap if i % 16 == 15 else divider for i in range(BITS - 1)]
+    assert sync[1] - sync[0] == gap >= SYNC_HIGH and select[0] >= sync[1]
+    assert rise[0] - select[0] >= SELECT_SETUP and select[1] - fall[-1] >= SELECT_HOLD
+    if settings == SETTINGS[0]:
+        assert select[1] - sync[0] <= CYCLES_PER_TICK
+
+
+@cocotb.test(timeout_time=50, timeout_unit="ms")
+@cocotb.parametrize(delay_ns=[0, 10, 20, 30, 40, 50, 60, 70, 80])
+async def sample_point_window(dut, delay_ns):
+    """At /16 a record is read whole exactly when MISO has settled and not yet moved on."""
+    nodes = await begin(dut, 1000 * delay_ns)
+    records = {lane: record(0, 0x5555, 0xAAAA, 0x5555) for lane in range(LANES)}
+    for point in range(1, 17):
+        verdict = await transfer(dut, nodes, records, 1, 0, (16, 30, point))
+        settled = point * CLOCK_PS > 1000 * delay_ns
+        assert (verdict == (0, 0, 0)) == settled, f"sample point {point}, {delay_ns} ns of loop delay"
+
+
+@cocotb.test(timeout_time=10, timeout_unit="ms")
+async def every_lane_is_judged_alone(dut):
+    nodes = await begin(dut)
+    for lane in range(LANES):
+        records = random_records(41)
+        wrong = {"link_crc": bytes([41, 1]) + bytes(6), "link_tick": record(40), "absent": b"\xff" * 8}
+        kind = random.choice(sorted(wrong))
+        records[lane] = wrong[kind]
+        verdict = await transfer(dut, nodes, records, 42, 41)
+        assert [outcome(verdict, n) for n in range(LANES)] == [kind if n == lane else "good" for n in range(LANES)]
+
+
+@cocotb.test(timeout_time=10, timeout_unit="ms")
+async def any_flipped_bit_is_noticed(dut):
+    nodes = await begin(dut)
+    for first in range(0, BITS, LANES):
+        good = record(9, 0x1234, 0xABCD, 0)
+        flips = {lane: first + lane for lane in range(LANES) if first + lane < BITS}
+        records = {lane: (int.from_bytes(good, "big") ^ 1 << bit).to_bytes(8, "big") for lane, bit in flips.items()}
+        verdict = await transfer(dut, nodes, records, 10, 9)
+        assert all(outcome(verdict, lane) == "link_crc" for lane in flips)
+
+
+@cocotb.test(timeout_time=20, timeout_unit="ms")
+async def golden_records(dut):
+    """protocol/vectors/records.txt, each record on a different lane, the other lanes absent."""
+    nodes = await begin(dut)
+    lines = (REPO / "protocol" / "vectors" / "records.txt").read_text().splitlines()
+    vectors = [[f.strip() for f in line.split("|")] for line in lines if line and not line.startswith("#")]
+    assert {v[3] for v in vectors} == {"good", "absent", "link_crc", "link_tick"}
+    for i, (name, raw, expected, wanted) in enumerate(vectors):
+        lane, expected = i % LANES, int(expected)
+        verdict = await transfer(dut, nodes, {lane: bytes.fromhex(raw)}, (expected + 1) & 0xFF, expected)
+        assert outcome(verdict, lane) == wanted, name
+        assert outcome(verdict, (lane + 1) % LANES) == "absent", name
+        assert await stored(dut, lane) == bytes.fromhex(raw), name
+
+
+@cocotb.test(timeout_time=10, timeout_unit="ms")
+async def reset_ends_a_transfer(dut):
+    nodes = await begin(dut)
+    nodes.records = random_records(0)
+    dut.sck_divider.value, dut.word_gap.value, dut.sample_point.value = SETTINGS[0]
+    await pulse(dut, dut.start)
+    for _ in range(20):
+        await RisingEdge(dut.sck)
+    await pulse(dut, dut.rst)
+    await FallingEdge(dut.clk)
+    assert (int(dut.busy.value), int(dut.select_n.value), int(dut.sck.value), int(dut.sync.value)) == (0, 1, 0, 0)
+
+
+def test_link():
+    run_bench("link_bench", __file__, "node_link.v", "lane_receiver.v", "record_store.v", bench=("link_bench.v",))

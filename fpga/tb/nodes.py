@@ -1,0 +1,69 @@
+"""Python model of the nodes on the bridge's bus: SPI mode 1 slaves that answer each tick with the records given."""
+
+import cocotb
+from bench import CLOCK_PS
+from cocotb.triggers import FallingEdge, RisingEdge, Timer, ValueChange
+from cocotb.utils import get_sim_time
+from whisker.protocol import LANES, RECORD
+
+IDLE = (1 << LANES) - 1  # pull-ups
+BITS = 8 * RECORD.size
+
+
+def planes(records: dict[int, bytes]) -> list[int]:
+    """For each bit time the value of all MISO lines; a lane without a record stays high."""
+    lines = []
+    for bit in range(BITS):
+        low = sum(1 << lane for lane, r in records.items() if not r[bit // 8] >> (7 - bit % 8) & 1)
+        lines.append(IDLE & ~low)
+    return lines
+
+
+class Nodes:
+    """Drives `miso`, `delay_ps` after each rising SCK edge; gathers the order and the times of all edges."""
+
+    def __init__(self, dut, delay_ps: int = 0):
+        self.dut = dut
+        self.delay_ps = delay_ps
+        self.records: dict[int, bytes] = {}
+        self.orders: list[bytes] = []
+        self.times: dict[str, list[int]] = {}
+        dut.miso.value = IDLE
+        cocotb.start_soon(self._shift_out())
+        cocotb.start_soon(self._shift_in())
+        for name in ("sync", "sck", "select_n"):
+            self.times[name] = []
+            cocotb.start_soon(self._watch(name))
+
+    async def _shift_out(self):
+        while True:
+            await FallingEdge(self.dut.select_n)
+            for lines in planes(self.records):
+                await RisingEdge(self.dut.sck)
+                if self.delay_ps:
+                    cocotb.start_soon(self._late(lines))
+                else:
+                    self.dut.miso.value = lines
+
+    async def _late(self, lines: int):
+        await Timer(self.delay_ps, unit="ps")
+        self.dut.miso.value = lines
+
+    async def _shift_in(self):
+        while True:
+            order = 0
+            await FallingEdge(self.dut.select_n)
+            for _ in range(BITS):
+                await FallingEdge(self.dut.sck)
+                order = order << 1 | int(self.dut.mosi.value)
+            self.orders.append(order.to_bytes(RECORD.size, "big"))
+
+    async def _watch(self, name: str):
+        signal = getattr(self.dut, name)
+        while True:
+            await ValueChange(signal)
+            self.times[name].append(get_sim_time("ps"))
+
+    def cycles(self, name: str) -> list[int]:
+        """Cycle numbers of a signal's edges."""
+        return [round(t / CLOCK_PS) for t in self.times[name]]
