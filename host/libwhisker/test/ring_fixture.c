@@ -9,7 +9,9 @@
 const char *test_ring_name(void)
 {
     static char name[64];
-    snprintf(name, sizeof name, "whisker-test-%d", (int)getpid());
+    if (name[0] == '\0') { /* a forked child keeps its parent's */
+        snprintf(name, sizeof name, "whisker-test-%d", (int)getpid());
+    }
     return name;
 }
 

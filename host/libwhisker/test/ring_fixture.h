@@ -9,7 +9,7 @@
 
 #define TEST_CAPACITY 64u
 
-/* A name no other test process uses. */
+/* A name no other test process uses, but those forked after the first call. */
 const char *test_ring_name(void);
 
 /* Frame number `index`: every field follows from it. */

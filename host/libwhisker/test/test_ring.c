@@ -12,7 +12,7 @@
 #include <unistd.h>
 
 #include "ring_fixture.h"
-#include "ring_layout.h"
+#include "ring_internal.h"
 #include "vectors.h"
 #include "whisker/errors.h"
 
@@ -241,6 +241,28 @@ static void bytes_are_decoded_straight_into_the_ring(void **state)
     assert_int_equal(whisker_ring_feed(f->ring, &decoder, much, sizeof much, NULL, NULL), WHISKER_ERROR_ARGUMENT);
 }
 
+/* Whatever a mad writer puts into the shared header, a reader stays inside its own mapping. */
+static void nonsense_in_the_header_cannot_lead_a_reader_astray(void **state)
+{
+    const struct fixture *f = *state;
+    static const uint64_t values[] = {0,       1,       TEST_CAPACITY, TEST_CAPACITY + 1, UINT32_MAX,
+                                      1000000, 1000064, INT64_MAX,     UINT64_MAX - 1,    UINT64_MAX};
+    enum { VALUES = sizeof values / sizeof values[0] };
+    struct ring_header *header = f->ring->map.header;
+    for (size_t i = 0; i < VALUES * VALUES * 3; i++) {
+        ring_store(&header->head, values[i % VALUES]);
+        ring_store(&header->claim, values[i / VALUES % VALUES]);
+        header->capacity = (uint32_t)values[i % 7];
+        const struct whisker_frame *frames;
+        size_t count;
+        whisker_reader_peek(f->reader, &frames, &count);
+        assert_true(count <= TEST_CAPACITY);
+        assert_true(frames >= f->reader->map.frames && frames < f->reader->map.frames + TEST_CAPACITY);
+        whisker_reader_advance(f->reader, count);
+        whisker_reader_wait(f->reader, 0);
+    }
+}
+
 static void bad_names_and_sizes_are_refused(void **state)
 {
     (void)state;
@@ -325,6 +347,7 @@ int main(void)
         WITH_RING(new_ring_of_the_name_is_seen_and_followed),
         WITH_RING(second_writer_is_refused),
         WITH_RING(bytes_are_decoded_straight_into_the_ring),
+        WITH_RING(nonsense_in_the_header_cannot_lead_a_reader_astray),
         cmocka_unit_test(bad_names_and_sizes_are_refused),
         cmocka_unit_test(memory_that_is_no_ring_is_refused),
     };
