@@ -21,7 +21,10 @@ BLOCK = re.compile(r"/\* cffi: begin \*/\n(.*?)/\* cffi: end \*/", re.DOTALL)
 LIBRARIES = {"nav": ["m"], "whisker": ["rt", "pthread"]}
 # Headers that others build on come first: cffi wants a struct before its use.
 HEADERS = {
-    "nav": [HOST / "nav" / name for name in ("contact.h", "radial.h", "texture.h")],
+    "nav": [
+        HOST / "nav" / name
+        for name in ("contact.h", "radial.h", "texture.h", "pose.h", "arena.h", "settings.h", "filter.h")
+    ],
     "whisker": [HOST / "libwhisker" / "include" / "whisker" / name for name in ("errors.h", "frame.h", "ring.h")],
 }
 

@@ -1,0 +1,100 @@
+#include "filter.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "intake.h"
+
+static const struct nav_filter_ops *const FILTERS[] = {&nav_odometry_filter, &nav_foveal_filter, &nav_grid_filter};
+
+#define COUNT ((int)(sizeof FILTERS / sizeof FILTERS[0]))
+
+struct nav_filter {
+    const struct nav_filter_ops *ops;
+    struct nav_problem problem; /* its arrays are the filter's own */
+    struct nav_intake intake;
+    void *self;
+};
+
+const char *nav_filter_name(int index)
+{
+    return index >= 0 && index < COUNT ? FILTERS[index]->name : NULL;
+}
+
+static const struct nav_filter_ops *find(const char *name)
+{
+    for (int i = 0; i < COUNT; i++) {
+        if (strcmp(FILTERS[i]->name, name) == 0)
+            return FILTERS[i];
+    }
+    return NULL;
+}
+
+static void *copy(const void *from, int count, size_t size)
+{
+    void *to = calloc((size_t)count + 1, size);
+    if (to && count > 0)
+        memcpy(to, from, (size_t)count * size);
+    return to;
+}
+
+static int own(struct nav_problem *p)
+{
+    p->arena.floor = copy(p->arena.floor, p->arena.rows * p->arena.columns, sizeof *p->arena.floor);
+    p->arena.box = copy(p->arena.box, p->arena.boxes, sizeof *p->arena.box);
+    p->robot.tip = copy(p->robot.tip, p->robot.tips, sizeof *p->robot.tip);
+    p->robot.ray = copy(p->robot.ray, p->robot.rays, sizeof *p->robot.ray);
+    return p->arena.floor && p->arena.box && p->robot.tip && p->robot.ray ? 0 : -1;
+}
+
+struct nav_filter *nav_filter_new(const char *name, const struct nav_problem *problem)
+{
+    const struct nav_filter_ops *ops = find(name);
+    struct nav_filter *f = ops ? calloc(1, sizeof *f) : NULL;
+    if (!f)
+        return NULL;
+    f->ops = ops;
+    f->problem = *problem;
+    if (own(&f->problem) || nav_intake_init(&f->intake, &f->problem) || !(f->self = ops->create(&f->problem))) {
+        nav_filter_free(f);
+        return NULL;
+    }
+    return f;
+}
+
+void nav_filter_free(struct nav_filter *f)
+{
+    if (!f)
+        return;
+    if (f->self)
+        f->ops->destroy(f->self);
+    nav_intake_free(&f->intake);
+    free((void *)f->problem.arena.floor);
+    free((void *)f->problem.arena.box);
+    free((void *)f->problem.robot.tip);
+    free((void *)f->problem.robot.ray);
+    free(f);
+}
+
+void nav_filter_step(struct nav_filter *f, const struct nav_row *row, struct nav_estimate *estimate)
+{
+    struct nav_motion motion;
+    struct nav_evidence evidence;
+    bool news = nav_intake_take(&f->intake, row, &motion, &evidence);
+    f->ops->predict(f->self, &motion);
+    if (news)
+        f->ops->update(f->self, &evidence);
+    f->ops->estimate(f->self, estimate);
+    if (!news)
+        estimate->evaluations = 0;
+}
+
+uint64_t nav_filter_bad_cells(const struct nav_filter *f)
+{
+    return f->intake.bad_cells;
+}
+
+uint64_t nav_filter_bad_rows(const struct nav_filter *f)
+{
+    return f->intake.bad_rows;
+}

@@ -1,0 +1,82 @@
+/* Filters: where the robot is, from rows of odometry and whisker readings. One table of functions per filter. */
+#ifndef NAV_FILTER_H
+#define NAV_FILTER_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "arena.h"
+#include "pose.h"
+#include "settings.h"
+
+/* cffi: begin */
+/* Belief before the first row. uniform: over free space, mean and sigma unused. Clipped to free space either way. */
+struct nav_prior {
+    bool uniform;
+    struct nav_pose mean;
+    double sigma[3]; /* x, y m; theta rad; above 0 */
+};
+
+struct nav_problem {
+    struct nav_arena arena;
+    struct nav_robot robot;
+    struct nav_prior prior;
+    struct nav_settings settings;
+};
+
+/* One row, 0.1 s (contracts: observations.csv). A NaN texture (first class) or distance was not read. */
+struct nav_row {
+    double t_s;
+    double odometry[3];     /* motion since the previous row in its frame: x, y m, theta rad */
+    const double *texture;  /* [tips][classes] log-likelihood of the window */
+    const double *radial_m; /* [rays] distance of contact; INFINITY: read, no contact */
+};
+
+struct nav_estimate {
+    struct nav_pose pose;
+    double covariance[9]; /* row-major, x, y m, theta rad, about the pose */
+    double confidence;    /* belief mass within 0.25 m and 0.5 rad of the pose */
+    long evaluations;     /* poses, cells or hypotheses weighted for this row */
+    long states;          /* how many it holds */
+    size_t bytes;         /* and in how much memory, tables included */
+};
+
+struct nav_filter;
+
+/* Name of filter number `index`, NULL beyond the last. */
+const char *nav_filter_name(int index);
+
+/* Copies the problem, arrays included. NULL: unknown name or no memory. */
+struct nav_filter *nav_filter_new(const char *name, const struct nav_problem *);
+void nav_filter_free(struct nav_filter *);
+
+/* Takes one row and says where the robot is at its end. Any row is allowed: what is not finite or out of range is
+ * counted and treated as not read. Does not allocate. */
+void nav_filter_step(struct nav_filter *, const struct nav_row *, struct nav_estimate *);
+
+uint64_t nav_filter_bad_cells(const struct nav_filter *);
+uint64_t nav_filter_bad_rows(const struct nav_filter *); /* repeated, late or reordered */
+/* cffi: end */
+
+/* Radius and angle of `confidence`. */
+#define NAV_NEAR_M 0.25
+#define NAV_NEAR_RAD 0.5
+
+struct nav_evidence;
+struct nav_motion;
+
+/* What a filter is. `self` is its own; the problem outlives it. */
+struct nav_filter_ops {
+    const char *name;
+    void *(*create)(const struct nav_problem *);
+    void (*destroy)(void *self);
+    void (*predict)(void *self, const struct nav_motion *);    /* every row: integrates, may put work off */
+    void (*update)(void *self, const struct nav_evidence *);   /* rows with something new to read */
+    void (*estimate)(const void *self, struct nav_estimate *); /* every row; evaluations: of the last update */
+};
+
+extern const struct nav_filter_ops nav_odometry_filter; /* dead reckoning from the prior's mean */
+extern const struct nav_filter_ops nav_foveal_filter;   /* the paper's, equations 5-7 */
+extern const struct nav_filter_ops nav_grid_filter;     /* exact, equation 4 */
+
+#endif

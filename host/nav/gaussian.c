@@ -1,0 +1,79 @@
+#include "gaussian.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "filter.h"
+
+enum { X, Y, T };
+
+struct nav_gaussian nav_gaussian_prior(const struct nav_problem *problem)
+{
+    const struct nav_arena *arena = &problem->arena;
+    const struct nav_prior *prior = &problem->prior;
+    struct nav_gaussian g = {.mean = prior->mean};
+    for (int i = 0; i < 3; i++)
+        g.covariance[4 * i] = prior->sigma[i] * prior->sigma[i];
+    if (!prior->uniform)
+        return g;
+    /* Variance of a uniform distribution: width^2 / 12. */
+    g.mean = (struct nav_pose){arena->size_x / 2.0, arena->size_y / 2.0, 0.0};
+    g.covariance[0] = arena->size_x * arena->size_x / 12.0;
+    g.covariance[4] = arena->size_y * arena->size_y / 12.0;
+    g.covariance[8] = NAV_PI * NAV_PI / 3.0;
+    return g;
+}
+
+void nav_gaussian_estimate(const struct nav_gaussian *g, struct nav_estimate *estimate)
+{
+    estimate->pose = g->mean;
+    memcpy(estimate->covariance, g->covariance, sizeof g->covariance);
+    estimate->confidence = nav_gaussian_mass(g, NAV_NEAR_M, NAV_NEAR_RAD);
+}
+
+void nav_gaussian_move(struct nav_gaussian *g, struct nav_pose step, const struct nav_noise *noise)
+{
+    struct nav_pose to = nav_compose(g->mean, step);
+    /* J = [1 0 a; 0 1 b; 0 0 1]: how an error in heading moves the end point. */
+    double a = -(to.y - g->mean.y), b = to.x - g->mean.x;
+    double *p = g->covariance;
+    double xt = p[3 * X + T], yt = p[3 * Y + T], tt = p[3 * T + T];
+    p[3 * X + X] += 2.0 * a * xt + a * a * tt + noise->position;
+    p[3 * Y + Y] += 2.0 * b * yt + b * b * tt + noise->position;
+    p[3 * X + Y] += a * yt + b * xt + a * b * tt;
+    p[3 * X + T] += a * tt;
+    p[3 * Y + T] += b * tt;
+    p[3 * T + T] += noise->heading;
+    p[3 * Y + X] = p[3 * X + Y];
+    p[3 * T + X] = p[3 * X + T];
+    p[3 * T + Y] = p[3 * Y + T];
+    g->mean = (struct nav_pose){to.x, to.y, nav_wrap(to.theta)};
+}
+
+bool nav_gaussian_invert(const double c[9], double out[9])
+{
+    double xx = c[4] * c[8] - c[5] * c[5], xy = c[2] * c[5] - c[1] * c[8], xt = c[1] * c[5] - c[2] * c[4];
+    double yy = c[0] * c[8] - c[2] * c[2], yt = c[1] * c[2] - c[0] * c[5], tt = c[0] * c[4] - c[1] * c[1];
+    double determinant = c[0] * xx + c[1] * xy + c[2] * xt;
+    if (!(c[0] > 0.0 && tt > 0.0 && determinant > 0.0 && isfinite(determinant)))
+        return false;
+    const double adjoint[9] = {xx, xy, xt, xy, yy, yt, xt, yt, tt};
+    for (int i = 0; i < 9; i++)
+        out[i] = adjoint[i] / determinant;
+    return true;
+}
+
+double nav_gaussian_mass(const struct nav_gaussian *g, double radius, double angle)
+{
+    enum { DIRECTIONS = 32 };
+    const double *p = g->covariance;
+    double lx = sqrt(fmax(p[0], 1e-18)), ly = p[1] / lx, lz = sqrt(fmax(p[4] - ly * ly, 1e-18));
+    double mass = 0.0;
+    /* A standard normal in polar coordinates: along each direction the whitened radius is Rayleigh distributed. */
+    for (int i = 0; i < DIRECTIONS; i++) {
+        double u = cos(NAV_PI * i / DIRECTIONS), v = sin(NAV_PI * i / DIRECTIONS);
+        double stretch = hypot(lx * u, ly * u + lz * v);
+        mass += -expm1(-0.5 * radius * radius / (stretch * stretch)) / DIRECTIONS;
+    }
+    return mass * erf(angle / sqrt(2.0 * fmax(p[8], 1e-18)));
+}

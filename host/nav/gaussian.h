@@ -1,0 +1,34 @@
+/* Gaussian beliefs over (x, y, theta): motion, mass near the mean. Covariances are row-major 3x3, m and rad. */
+#ifndef NAV_GAUSSIAN_H
+#define NAV_GAUSSIAN_H
+
+#include <stdbool.h>
+
+#include "motion.h"
+#include "pose.h"
+
+struct nav_gaussian {
+    struct nav_pose mean;
+    double covariance[9];
+};
+
+struct nav_problem;
+struct nav_estimate;
+
+/* The prior as a Gaussian; a uniform one becomes the arena's centre with the arena's own spread. */
+struct nav_gaussian nav_gaussian_prior(const struct nav_problem *);
+
+/* Pose, covariance and confidence of a Gaussian belief. */
+void nav_gaussian_estimate(const struct nav_gaussian *, struct nav_estimate *);
+
+/* Moves a belief by `step` with noise: the paper's Gaussian approximation of the banana, to first order in the heading.
+ */
+void nav_gaussian_move(struct nav_gaussian *, struct nav_pose step, const struct nav_noise *);
+
+/* Inverse of a covariance; false when it is not positive definite (out is then untouched). */
+bool nav_gaussian_invert(const double covariance[9], double out[9]);
+
+/* Belief mass within `radius` m and `angle` rad of the mean, the heading taken as independent of the position. */
+double nav_gaussian_mass(const struct nav_gaussian *, double radius, double angle);
+
+#endif

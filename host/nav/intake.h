@@ -1,0 +1,35 @@
+/* Rows as they come into what filters take: cleans cells, orders rows, and says how new each reading is. */
+#ifndef NAV_INTAKE_H
+#define NAV_INTAKE_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "filter.h"
+#include "likelihood.h"
+#include "motion.h"
+
+enum { NAV_TIMES_KEPT = 64 };
+
+struct nav_intake {
+    const struct nav_problem *problem;
+    uint64_t bad_cells, bad_rows;
+    double times[NAV_TIMES_KEPT]; /* of the last rows, to know a repeated one */
+    long rows;
+    double latest;  /* s */
+    double usual_m; /* running means of a row's distance and turn */
+    double usual_rad;
+    double *moved;  /* [whiskers] path of the whisker since its last reading that counted, m */
+    bool *touching; /* [rays] whether that reading was a contact */
+    double *values; /* storage of the readings */
+    const double **reading;
+    double *weight;
+};
+
+int nav_intake_init(struct nav_intake *, const struct nav_problem *);
+void nav_intake_free(struct nav_intake *);
+
+/* Fills motion and evidence (which points into the intake) from one row. Returns whether anything new was read. */
+bool nav_intake_take(struct nav_intake *, const struct nav_row *, struct nav_motion *, struct nav_evidence *);
+
+#endif

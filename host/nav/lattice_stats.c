@@ -1,0 +1,136 @@
+/* What a lattice's belief amounts to: prior in, mode, mean near it, covariance out. */
+#include <math.h>
+#include <string.h>
+
+#include "lattice.h"
+
+static double normal_between(double low, double high, double mean, double sigma)
+{
+    double root = sigma * sqrt(2.0);
+    return 0.5 * (erf((high - mean) / root) - erf((low - mean) / root));
+}
+
+/* Mass of a cell along one axis; headings wrap. */
+static double heading_mass(const struct nav_lattice *l, const struct nav_prior *prior, int slice)
+{
+    double off = nav_wrap(nav_lattice_heading(l, slice) - prior->mean.theta), half = l->cell_theta / 2.0, sum = 0.0;
+    for (int turn = -1; turn <= 1; turn++) {
+        double centre = off + 2.0 * NAV_PI * turn;
+        sum += normal_between(centre - half, centre + half, 0.0, prior->sigma[2]);
+    }
+    return sum;
+}
+
+void nav_lattice_fill(struct nav_lattice *l, const struct nav_prior *prior)
+{
+    for (int p = 0; p < l->nh; p++) {
+        float *cell = nav_lattice_slice(l, p);
+        double heading = prior->uniform ? 1.0 : heading_mass(l, prior, p);
+        for (int j = 0; j < l->ny; j++) {
+            double y = j * l->cell;
+            double row = prior->uniform ? 1.0 : normal_between(y, y + l->cell, prior->mean.y, prior->sigma[1]);
+            for (int i = 0; i < l->nx; i++) {
+                double x = i * l->cell;
+                double column = prior->uniform ? 1.0 : normal_between(x, x + l->cell, prior->mean.x, prior->sigma[0]);
+                *cell++ = (float)(heading * row * column);
+            }
+        }
+    }
+}
+
+void nav_lattice_scale(struct nav_lattice *l, double factor)
+{
+    for (size_t i = 0; i < nav_lattice_cells(l); i++)
+        l->mass[i] *= (float)factor;
+}
+
+struct nav_pose nav_lattice_mode(const struct nav_lattice *l)
+{
+    size_t best = 0;
+    for (size_t i = 1; i < nav_lattice_cells(l); i++) {
+        if (l->mass[i] > l->mass[best])
+            best = i;
+    }
+    int nx = l->nx, ny = l->ny, p = (int)(best / (size_t)(nx * ny));
+    int j = (int)(best / (size_t)nx % (size_t)ny), i = (int)(best % (size_t)nx);
+    return (struct nav_pose){(i + 0.5) * l->cell + l->shift_x[p], (j + 0.5) * l->cell + l->shift_y[p],
+                             nav_wrap(nav_lattice_heading(l, p))};
+}
+
+struct sums {
+    double mass, x, y, theta; /* offsets from the pose, times mass */
+};
+
+static void near_in_slice(const struct nav_lattice *l, int p, struct nav_pose pose, double turn, struct sums *s)
+{
+    double x0 = 0.5 * l->cell + l->shift_x[p] - pose.x, y0 = 0.5 * l->cell + l->shift_y[p] - pose.y;
+    int first_j = (int)fmax(ceil((-NAV_NEAR_M - y0) / l->cell), 0.0);
+    int first_i = (int)fmax(ceil((-NAV_NEAR_M - x0) / l->cell), 0.0);
+    for (int j = first_j; j < l->ny && y0 + j * l->cell <= NAV_NEAR_M; j++) {
+        const float *row = nav_lattice_slice(l, p) + j * l->nx;
+        double y = y0 + j * l->cell;
+        for (int i = first_i; i < l->nx && x0 + i * l->cell <= NAV_NEAR_M; i++) {
+            double x = x0 + i * l->cell, mass = row[i];
+            if (x * x + y * y > NAV_NEAR_M * NAV_NEAR_M)
+                continue;
+            s->mass += mass;
+            s->x += mass * x;
+            s->y += mass * y;
+            s->theta += mass * turn;
+        }
+    }
+}
+
+double nav_lattice_near(const struct nav_lattice *l, struct nav_pose pose, struct nav_pose *mean)
+{
+    struct sums s = {.mass = 0.0};
+    for (int p = 0; p < l->nh; p++) {
+        double turn = nav_wrap(nav_lattice_heading(l, p) - pose.theta);
+        if (fabs(turn) <= NAV_NEAR_RAD)
+            near_in_slice(l, p, pose, turn, &s);
+    }
+    if (mean && s.mass > 0.0)
+        *mean =
+            (struct nav_pose){pose.x + s.x / s.mass, pose.y + s.y / s.mass, nav_wrap(pose.theta + s.theta / s.mass)};
+    return s.mass;
+}
+
+/* Adds one slice's moments: m[0..2] mass, x, y; m[3..5] xx, xy, yy, about the pose. */
+static void slice_moments(const struct nav_lattice *l, int p, struct nav_pose about, double m[6])
+{
+    double x0 = 0.5 * l->cell + l->shift_x[p] - about.x, y0 = 0.5 * l->cell + l->shift_y[p] - about.y;
+    memset(m, 0, 6 * sizeof *m);
+    for (int j = 0; j < l->ny; j++) {
+        const float *row = nav_lattice_slice(l, p) + j * l->nx;
+        float mass = 0.0f, first = 0.0f, second = 0.0f;
+        for (int i = 0; i < l->nx; i++) {
+            float x = (float)(x0 + i * l->cell), part = row[i] * x;
+            mass += row[i];
+            first += part;
+            second += part * x;
+        }
+        double y = y0 + j * l->cell;
+        const double add[6] = {(double)mass,   (double)first,     y * (double)mass,
+                               (double)second, y * (double)first, y * y * (double)mass};
+        for (int k = 0; k < 6; k++)
+            m[k] += add[k];
+    }
+}
+
+void nav_lattice_covariance(const struct nav_lattice *l, struct nav_pose about, double covariance[9])
+{
+    double xx = 0.0, xy = 0.0, yy = 0.0, xt = 0.0, yt = 0.0, tt = 0.0, m[6];
+    for (int p = 0; p < l->nh; p++) {
+        double turn = nav_wrap(nav_lattice_heading(l, p) - about.theta);
+        slice_moments(l, p, about, m);
+        xx += m[3];
+        xy += m[4];
+        yy += m[5];
+        xt += m[1] * turn;
+        yt += m[2] * turn;
+        tt += m[0] * turn * turn;
+    }
+    double within = l->cell * l->cell / 12.0, within_theta = l->cell_theta * l->cell_theta / 12.0;
+    const double all[9] = {xx + within, xy, xt, xy, yy + within, yt, xt, yt, tt + within_theta};
+    memcpy(covariance, all, sizeof all);
+}

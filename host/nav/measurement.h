@@ -1,0 +1,32 @@
+/* Measurement models: log-likelihood of one whisker's reading by what the map leads one to expect.
+ *
+ * What can be expected of a whisker is one of a few codes: for a texture whisker the texture's index, for an object
+ * whisker the contact's distance in steps, the last code meaning "nothing within reach". A model fills a table over
+ * codes once per reading, and every pose, cell or hypothesis costs a look-up. One function shape, one file per model.
+ */
+#ifndef NAV_MEASUREMENT_H
+#define NAV_MEASUREMENT_H
+
+#include "settings.h"
+
+struct nav_model;
+
+/* Fills loglik[model->codes] with weight * log p(reading | code). reading: model->values doubles, finite; for an object
+ * whisker in m, INFINITY for "no contact". weight: 0 (known already) to 1 (new). A common constant is left out. */
+typedef void nav_measurement(const struct nav_model *, const double *reading, double weight, float *loglik);
+
+struct nav_model {
+    nav_measurement *fill;
+    const struct nav_settings *settings;
+    int values;    /* doubles per reading */
+    int codes;     /* at most 256 */
+    double length; /* object whiskers: m */
+    double step;   /* m per code; code k stands for a contact at (k + 1/2) steps */
+    double sigma;  /* m, of a measured distance, the spread of a pose's cell included */
+    double edge;   /* m, of the end of reach, likewise */
+};
+
+nav_measurement nav_mm_texture; /* eq. 1's log-likelihoods, tempered, with an outlier floor */
+nav_measurement nav_mm_radial;  /* Gaussian distance, misses, ghosts, null contacts */
+
+#endif

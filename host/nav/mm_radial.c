@@ -1,0 +1,34 @@
+/* Contact distances: noticed with a probability that falls off around the whisker's length, then Gaussian (the paper);
+ * ghosts are spread evenly over the whisker; "no contact" is what is left over. */
+#include "measurement.h"
+
+#include <math.h>
+
+static const double LEAST = 1e-30;
+
+/* Probability that an object at this distance makes a contact that is noticed: 1/2 (1 - miss) at the whisker's length.
+ */
+static double noticed(const struct nav_model *model, double distance)
+{
+    double beyond = (distance - model->length) / (model->edge * sqrt(2.0));
+    return (1.0 - model->settings->radial_miss) * 0.5 * erfc(beyond);
+}
+
+static double density(const struct nav_model *model, double difference)
+{
+    double z = difference / model->sigma;
+    return exp(-0.5 * z * z) / (model->sigma * sqrt(8.0 * atan(1.0)));
+}
+
+void nav_mm_radial(const struct nav_model *model, const double *reading, double weight, float *loglik)
+{
+    double ghost = model->settings->radial_ghost;
+    for (int k = 0; k < model->codes; k++) {
+        double distance = (k + 0.5) * model->step;
+        double hit = k == model->codes - 1 ? 0.0 : noticed(model, distance);
+        double p = (1.0 - hit) * (1.0 - ghost);
+        if (isfinite(reading[0]))
+            p = hit * density(model, reading[0] - distance) + (1.0 - hit) * ghost / model->length;
+        loglik[k] = (float)(weight * log(fmax(p, LEAST)));
+    }
+}

@@ -1,0 +1,18 @@
+#include "motion.h"
+
+#include <math.h>
+
+struct nav_noise nav_motion_noise(const struct nav_robot *robot, const struct nav_settings *settings,
+                                  const struct nav_motion *motion)
+{
+    double distance = hypot(motion->step.x, motion->step.y), turn = fabs(motion->step.theta);
+    double relative = robot->odometry_relative * robot->odometry_relative;
+    double drift = settings->motion_drift_rad * settings->motion_drift_rad;
+    struct nav_noise noise = {
+        .position = relative * distance * fmax(distance, settings->motion_along_m),
+        .heading = relative * turn * fmax(turn, settings->motion_turn_rad) + drift * distance,
+    };
+    noise.position += motion->unknown_m * motion->unknown_m;
+    noise.heading += motion->unknown_rad * motion->unknown_rad;
+    return noise;
+}

@@ -1,0 +1,26 @@
+/* What odometry says and how far it can be trusted. */
+#ifndef NAV_MOTION_H
+#define NAV_MOTION_H
+
+#include "arena.h"
+#include "pose.h"
+#include "settings.h"
+
+/* Motion since the last row, in the robot's frame then. */
+struct nav_motion {
+    struct nav_pose step;
+    double unknown_m; /* distance and angle that may have gone unreported (rows lost, odometry not readable) */
+    double unknown_rad;
+};
+
+/* Variances of one motion. Position noise is taken as equal along and across. */
+struct nav_noise {
+    double position; /* m^2, per axis */
+    double heading;  /* rad^2 */
+};
+
+/* Noise of one row's motion. The robot's relative error keeps its value over a correlation length, so variance grows
+ * with distance times that length, not with each row's own square; rows may be short or long. */
+struct nav_noise nav_motion_noise(const struct nav_robot *, const struct nav_settings *, const struct nav_motion *);
+
+#endif

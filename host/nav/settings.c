@@ -1,0 +1,65 @@
+#include "settings.h"
+
+#include <stddef.h>
+#include <string.h>
+
+struct entry {
+    const char *name;
+    size_t offset;
+    double standard, low, high;
+};
+
+#define ENTRY(section, key, standard, low, high)                                                                       \
+    {                                                                                                                  \
+#section "." #key, offsetof(struct nav_settings, section##_##key), standard, low, high                         \
+    }
+
+static const struct entry ENTRIES[] = {
+    ENTRY(texture, temper, 0.05, 0.0, 1.0),     ENTRY(texture, outlier, 0.1, 0.0, 1.0),
+    ENTRY(texture, spacing_m, 0.02, 0.0, 1.0),  ENTRY(radial, miss, 0.1, 0.0, 1.0),
+    ENTRY(radial, ghost, 0.01, 0.0, 1.0),       ENTRY(radial, edge_m, 0.006, 0.0001, 0.1),
+    ENTRY(radial, spacing_m, 0.02, 0.0, 1.0),   ENTRY(motion, along_m, 0.3, 0.0, 10.0),
+    ENTRY(motion, turn_rad, 0.5, 0.0, 10.0),    ENTRY(motion, drift_rad, 0.03, 0.0, 1.0),
+    ENTRY(grid, cell_m, 0.05, 0.005, 1.0),      ENTRY(grid, cell_deg, 10.0, 0.5, 120.0),
+    ENTRY(grid, sub, 2.0, 1.0, 16.0),           ENTRY(grid, sub_heading, 2.0, 1.0, 16.0),
+    ENTRY(grid, teleport, 1e-5, 0.0, 0.1),      ENTRY(foveal, cells, 11.0, 3.0, 51.0),
+    ENTRY(foveal, diameter_m, 0.25, 0.01, 5.0), ENTRY(foveal, span_deg, 90.0, 1.0, 360.0),
+    ENTRY(foveal, quantum_m, 0.01, 0.0, 1.0),   ENTRY(foveal, quantum_deg, 2.6, 0.0, 90.0),
+};
+
+#define COUNT ((int)(sizeof ENTRIES / sizeof ENTRIES[0]))
+
+static double *field(struct nav_settings *settings, const struct entry *entry)
+{
+    return (double *)(void *)((char *)settings + entry->offset);
+}
+
+void nav_settings_default(struct nav_settings *settings)
+{
+    for (int i = 0; i < COUNT; i++)
+        *field(settings, &ENTRIES[i]) = ENTRIES[i].standard;
+}
+
+int nav_settings_set(struct nav_settings *settings, const char *name, double value)
+{
+    for (int i = 0; i < COUNT; i++) {
+        if (strcmp(ENTRIES[i].name, name) != 0)
+            continue;
+        if (!(value >= ENTRIES[i].low && value <= ENTRIES[i].high))
+            return -2;
+        *field(settings, &ENTRIES[i]) = value;
+        return 0;
+    }
+    return -1;
+}
+
+int nav_settings_describe(int index, const char **name, double *standard, double *low, double *high)
+{
+    if (index < 0 || index >= COUNT)
+        return -1;
+    *name = ENTRIES[index].name;
+    *standard = ENTRIES[index].standard;
+    *low = ENTRIES[index].low;
+    *high = ENTRIES[index].high;
+    return 0;
+}

@@ -1,0 +1,39 @@
+/* Every number of the filters that a user may change, by name: `section.key`. */
+#ifndef NAV_SETTINGS_H
+#define NAV_SETTINGS_H
+
+/* cffi: begin */
+struct nav_settings {
+    double texture_temper;    /* exponent on a window's likelihood: its samples are far from independent */
+    double texture_outlier;   /* share of windows that say nothing about the tile (borders, catches) */
+    double texture_spacing_m; /* a window counts in full after the tip has moved so far since the last one */
+    double radial_miss;       /* share of contacts that are not noticed */
+    double radial_ghost;      /* share of readings that report a contact with nothing */
+    double radial_edge_m;     /* noticing a contact falls off over this distance around the whisker's length */
+    double radial_spacing_m;  /* "no contact" counts in full after the whisker has moved so far since it last did */
+    double motion_along_m;    /* the relative odometry error keeps its value over about this distance ... */
+    double motion_turn_rad;   /* ... and this angle */
+    double motion_drift_rad;  /* heading error of a straight metre, standard deviation */
+    double grid_cell_m;       /* edge of a cell of the grid */
+    double grid_cell_deg;     /* its extent in heading; the number of slices is rounded */
+    double grid_sub;          /* likelihood: sub-poses per cell edge, */
+    double grid_sub_heading;  /* and per cell heading */
+    double grid_teleport;     /* probability per reading that the robot has been put elsewhere */
+    double foveal_cells;      /* per axis, odd (paper: 11) */
+    double foveal_diameter_m; /* between the outermost cell centres (paper: 0.25) */
+    double foveal_span_deg;   /* between the outermost headings (paper: -45 to 45) */
+    double foveal_quantum_m;  /* quantisation term added to each posterior covariance, standard deviations */
+    double foveal_quantum_deg;
+};
+
+/* The defaults. */
+void nav_settings_default(struct nav_settings *);
+
+/* Sets one by name; returns 0, -1 for an unknown name, -2 when the value is outside the setting's range. */
+int nav_settings_set(struct nav_settings *, const char *name, double value);
+
+/* Name, default, lowest and highest value of setting number `index`; 0, or -1 beyond the last. */
+int nav_settings_describe(int index, const char **name, double *standard, double *low, double *high);
+/* cffi: end */
+
+#endif
