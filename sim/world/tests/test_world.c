@@ -213,8 +213,8 @@ static void test_lanes_do_not_disturb_each_other(void **state)
     post.obstacles = 1;
     post.obstacle[0] = (struct sim_box){2.17, 2.11, 2.25, 2.2}; /* where left_inner will turn to */
     sim_world *one = sim_world_new(&open, 7), *other = sim_world_new(&post, 7);
-    run(one, 0, 0.1, 3);
-    run(other, 0, 0.1, 3);
+    run(one, 0, 0.1, 2);
+    run(other, 0, 0.1, 2);
     struct sim_field a[6], b[6];
     sim_world_fields(one, a);
     sim_world_fields(other, b);
