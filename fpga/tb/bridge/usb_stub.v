@@ -1,0 +1,47 @@
+// Stands in for the generated USB device: the same ports, driven and read by the bench through the hierarchy.
+
+`default_nettype none
+
+module whisker_usb (
+    input  wire       clk,
+    input  wire       rst,
+    input  wire [7:0] utmi_rx_data,
+    input  wire       utmi_rx_active,
+    input  wire       utmi_rx_valid,
+    input  wire       utmi_rx_error,
+    output wire [7:0] utmi_tx_data,
+    output wire       utmi_tx_valid,
+    input  wire       utmi_tx_ready,
+    input  wire [1:0] utmi_line_state,
+    input  wire       utmi_vbus_valid,
+    input  wire       utmi_session_valid,
+    input  wire       utmi_session_end,
+    output wire [1:0] utmi_xcvr_select,
+    output wire       utmi_term_select,
+    output wire [1:0] utmi_op_mode,
+    input  wire [7:0] stream_data,
+    input  wire       stream_valid,
+    input  wire       stream_last,
+    output reg        stream_ready,
+    output reg        restart,
+    output reg        write_start,
+    output reg        write_valid,
+    output reg  [5:0] write_index,
+    output reg  [7:0] write_data,
+    output reg        write_done,
+    input  wire       write_accept,
+    output reg        read_start,
+    output reg  [7:0] read_id,
+    output reg        read_next,
+    input  wire [7:0] read_data
+);
+    initial {stream_ready, restart, write_start, write_valid, write_done, read_start, read_next} = 7'd0;
+
+    assign utmi_tx_data     = 8'd0;
+    assign utmi_tx_valid    = 1'b0;
+    assign utmi_xcvr_select = 2'd0;
+    assign utmi_term_select = 1'b0;
+    assign utmi_op_mode     = 2'd0;
+endmodule
+
+`default_nettype wire
