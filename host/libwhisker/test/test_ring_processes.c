@@ -242,7 +242,8 @@ static void waiting_reader_is_woken_by_each_publication_and_the_close(void **sta
     struct whisker_ring *ring; /* made after the reader began to wait for it */
     assert_int_equal(whisker_ring_create(name, TEST_CAPACITY, &ring), 0);
     byte_from(answers[0]);
-    for (uint64_t index = 0; index < 1000; index++) {
+    for (uint64_t index = 0; index < 2000;
+         index++) { /* unwoken, it would look by itself every 100 ms: the time-out of the test */
         test_publish(ring, index, 1);
         byte_from(answers[0]);
     }

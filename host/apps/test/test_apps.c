@@ -1,0 +1,280 @@
+/* The programs from outside: exit codes, one-line errors, nothing left in shared memory, and what whisker-log writes.
+ */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+#include <fcntl.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "whisker/whisker.h"
+
+#define TEXT_BYTES 4096
+
+static char folder[] = "/tmp/whisker-apps-XXXXXX";
+
+static int make_folder(void **state)
+{
+    (void)state;
+    return mkdtemp(folder) ? 0 : -1;
+}
+
+static int remove_folder(void **state)
+{
+    (void)state;
+    const char *names[] = {"out", "bad.csv", "log.json", "socket"};
+    for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
+        char path[128];
+        snprintf(path, sizeof path, "%s/%s", folder, names[i]);
+        unlink(path);
+    }
+    return rmdir(folder);
+}
+
+/* Starts a program with its output in the file "out" of the folder. */
+static pid_t start(const char *const *words)
+{
+    const pid_t child = fork();
+    if (child == 0) {
+        char path[128];
+        snprintf(path, sizeof path, "%s/out", folder);
+        const int out = open(path, O_WRONLY | O_CREAT | O_TRUNC, 0600);
+        dup2(out, STDOUT_FILENO);
+        dup2(out, STDERR_FILENO);
+        execv(words[0], (char *const *)(uintptr_t)words);
+        _exit(127);
+    }
+    return child;
+}
+
+static int finish(pid_t child)
+{
+    int status;
+    assert_int_equal(waitpid(child, &status, 0), child);
+    assert_true(WIFEXITED(status));
+    return WEXITSTATUS(status);
+}
+
+static const char *content(const char *name)
+{
+    static char text[TEXT_BYTES];
+    char path[128];
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    FILE *file = fopen(path, "r");
+    assert_non_null(file);
+    text[fread(text, 1, sizeof text - 1, file)] = '\0';
+    fclose(file);
+    return text;
+}
+
+/* Runs a program that must fail: its exit code, and one line that contains `expected`. */
+static void assert_refused(const char *const *words, int exit_code, const char *expected)
+{
+    assert_int_equal(finish(start(words)), exit_code);
+    const char *text = content("out");
+    if (!strstr(text, expected) || strchr(text, '\n') != text + strlen(text) - 1) {
+        fail_msg("expected one line with '%s', got: %s", expected, text);
+    }
+}
+
+static const char *ring_name(void)
+{
+    static char name[64];
+    if (name[0] == '\0') {
+        snprintf(name, sizeof name, "whisker-apps-%d", (int)getpid());
+    }
+    return name;
+}
+
+static bool ring_exists(void)
+{
+    struct whisker_reader *reader;
+    const int error = whisker_reader_attach(ring_name(), 0, &reader);
+    whisker_reader_detach(reader);
+    return error != WHISKER_ERROR_RING_MISSING;
+}
+
+static void daemon_without_a_bridge_fails_in_one_line(void **state)
+{
+    (void)state;
+    const char *words[] = {WHISKERD, "--ring", ring_name(), NULL};
+    assert_refused(words, 1, "no bridge is connected; plug it in");
+    assert_false(ring_exists());
+}
+
+static void wrong_use_is_refused_in_one_line(void **state)
+{
+    (void)state;
+    const char *no_ring[] = {WHISKERD, NULL};
+    assert_refused(no_ring, 2, "--ring NAME is missing");
+    const char *odd[] = {WHISKERD, "--ring", "x", "--sck-divider", "7", NULL};
+    assert_refused(odd, 2, "the SCK divider is 7; it must be even, 6 to 32");
+    const char *lane_29[] = {WHISKERD, "--ring", "x", "--lane-mask", "0x10000000", NULL};
+    assert_refused(lane_29, 2, "the lane mask is 268435456");
+    const char *rubbish[] = {WHISKERD, "--ring", "x", "--word-gap", "3us", NULL};
+    assert_refused(rubbish, 2, "--word-gap 3us: give a whole number from 0 to 255");
+    const char *unknown[] = {WHISKERD, "--rong", "x", NULL};
+    assert_refused(unknown, 2, "--rong");
+    const char *too_much[] = {WHISKER_LOG, "--ring", "x", "y", NULL};
+    assert_refused(too_much, 2, "a word too many");
+    const char *lanes[] = {WHISKER_LOG, "--ring", "x", "--lanes", "29", NULL};
+    assert_refused(lanes, 2, "--lanes 29: give a whole number from 1 to 28");
+}
+
+static void help_has_an_example(void **state)
+{
+    (void)state;
+    const char *daemon[] = {WHISKERD, "--help", NULL};
+    assert_int_equal(finish(start(daemon)), 0);
+    assert_non_null(strstr(content("out"), "Example: whiskerd --ring whisker"));
+    const char *log[] = {WHISKER_LOG, "--help", NULL};
+    assert_int_equal(finish(start(log)), 0);
+    assert_non_null(strstr(content("out"), "Example: whisker-log --ring whisker"));
+}
+
+static void log_without_a_ring_fails_in_one_line(void **state)
+{
+    (void)state;
+    const char *words[] = {WHISKER_LOG, "--ring", ring_name(), "--wait", "0", NULL};
+    assert_refused(words, 1, "there is no ring of this name; start whiskerd");
+}
+
+static void log_to_a_path_that_cannot_be_written_fails_in_one_line(void **state)
+{
+    (void)state;
+    const char *words[] = {WHISKER_LOG, "--ring", ring_name(), "--bad", "/nowhere/bad.csv", NULL};
+    assert_refused(words, 1, "/nowhere/bad.csv: No such file or directory; choose a path");
+}
+
+/* 1000 ticks from tick 0; ticks 10..12 were lost; two lanes have a bad record; lane 7 is not populated. */
+static void publish_run(struct whisker_ring *ring)
+{
+    for (uint32_t tick = 0; tick < 1000; tick++) {
+        struct whisker_frame frame = {.tick = tick, .sequence = 5000 + tick, .lane_mask = 0x3F};
+        frame.lane[7].status = 32u << WHISKER_STATUS_ERROR_BITS;
+        frame.lane[2].status = tick == 100 ? 33u << WHISKER_STATUS_ERROR_BITS : 0;
+        frame.lane[5].status = tick == 999 ? 0x081 : 0;
+        if (tick < 10 || tick > 12) {
+            assert_int_equal(whisker_ring_publish(ring, &frame, 1), 0);
+        }
+    }
+}
+
+static int listen_at(const char *path)
+{
+    struct sockaddr_un address = {.sun_family = AF_UNIX};
+    snprintf(address.sun_path, sizeof address.sun_path, "%s", path);
+    const int listening = socket(AF_UNIX, SOCK_SEQPACKET, 0);
+    assert_int_equal(bind(listening, (const struct sockaddr *)&address, sizeof address), 0);
+    assert_int_equal(listen(listening, 1), 0);
+    return listening;
+}
+
+static void assert_said(int connection, const char *expected)
+{
+    char message[64];
+    const ssize_t count = recv(connection, message, sizeof message - 1, 0);
+    assert_true(count > 0);
+    message[count] = '\0';
+    assert_string_equal(message, expected);
+}
+
+static void log_counts_what_was_published_and_follows_the_simulation(void **state)
+{
+    (void)state;
+    char bad[128], summary[128], path[128];
+    snprintf(bad, sizeof bad, "%s/bad.csv", folder);
+    snprintf(summary, sizeof summary, "%s/log.json", folder);
+    snprintf(path, sizeof path, "%s/socket", folder);
+    const int listening = listen_at(path);
+    struct whisker_ring *ring;
+    assert_int_equal(whisker_ring_create(ring_name(), 1024, &ring), 0);
+    const char *words[] = {WHISKER_LOG, "--ring",    ring_name(), "--lanes",  "6",  "--bad",
+                           bad,         "--summary", summary,     "--socket", path, NULL};
+    const pid_t child = start(words);
+    const int connection = accept(listening, NULL, NULL);
+    assert_said(connection, "follow log");
+    publish_run(ring);
+    whisker_ring_close(ring);
+    char message[64] = "";
+    uint64_t taken =
+        0; /* where "taken" falls depends on how the batches fell; never far apart, and it ends at the end */
+    for (ssize_t count; (count = recv(connection, message, sizeof message - 1, 0)) > 0;) {
+        message[count] = '\0';
+        const uint64_t tick = strtoull(message + strlen("taken "), NULL, 10);
+        assert_memory_equal(message, "taken ", 6);
+        assert_true(tick >= taken && tick - taken < 512 + 256);
+        taken = tick;
+    }
+    assert_int_equal(taken, 999);
+    assert_int_equal(finish(child), 0);
+    assert_string_equal(content("bad.csv"), "lane,tick,code,errors\n2,100,33,0\n5,999,0,129\n");
+    assert_string_equal(content("log.json"),
+                        "{\"frames_received\": 997, \"gaps\": 3, \"repeated\": 0, \"first_tick\": 0, "
+                        "\"last_tick\": 999, \"records_bad\": 2, \"overruns\": 0}\n");
+    close(connection);
+    close(listening);
+}
+
+static void log_says_when_the_writer_dies(void **state)
+{
+    (void)state;
+    int ready[2];
+    assert_int_equal(pipe(ready), 0);
+    const char *name = ring_name();
+    const pid_t writer = fork();
+    if (writer == 0) {
+        struct whisker_ring *ring;
+        const char told = whisker_ring_create(name, 1024, &ring) == 0 ? 'y' : 'n';
+        if (write(ready[1], &told, 1) == 1) {
+            pause();
+        }
+        _exit(1);
+    }
+    char told;
+    assert_int_equal(read(ready[0], &told, 1), 1);
+    char path[128];
+    snprintf(path, sizeof path, "%s/socket", folder);
+    unlink(path);
+    const int listening = listen_at(path);
+    const char *words[] = {WHISKER_LOG, "--ring", name, "--socket", path, NULL};
+    const pid_t child = start(words);
+    const int connection = accept(listening, NULL, NULL); /* it has attached */
+    assert_said(connection, "follow log");
+    kill(writer, SIGKILL);
+    assert_int_equal(waitpid(writer, NULL, 0), writer);
+    assert_int_equal(finish(child), 1);
+    assert_non_null(strstr(content("out"), "the writer died without closing the ring"));
+    struct whisker_ring *ring; /* takes what the dead one left, and removes it */
+    assert_int_equal(whisker_ring_create(name, 1024, &ring), 0);
+    whisker_ring_close(ring);
+    assert_false(ring_exists());
+    close(connection);
+    close(listening);
+    close(ready[0]);
+    close(ready[1]);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(daemon_without_a_bridge_fails_in_one_line),
+        cmocka_unit_test(wrong_use_is_refused_in_one_line),
+        cmocka_unit_test(help_has_an_example),
+        cmocka_unit_test(log_without_a_ring_fails_in_one_line),
+        cmocka_unit_test(log_to_a_path_that_cannot_be_written_fails_in_one_line),
+        cmocka_unit_test(log_counts_what_was_published_and_follows_the_simulation),
+        cmocka_unit_test(log_says_when_the_writer_dies),
+    };
+    return cmocka_run_group_tests_name("apps", tests, make_folder, remove_folder);
+}
