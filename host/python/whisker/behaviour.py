@@ -1,8 +1,11 @@
 """Random exploration with the paper's body whisk, as a plain state machine: contacts and odometry in, wheel speeds out.
 
     SETTLE -> FORWARD -> (random) TURN -> FORWARD
-    FORWARD or TURN -> contact -> BACK_OFF -> WHISK_IN -> PUSH -> WHISK_OUT -> HOLD -> CLEAR -> TURN
-    no motion though commanded -> CLEAR -> TURN
+    FORWARD -> contact -> BACK_OFF -> WHISK_IN -> PUSH -> WHISK_OUT -> HOLD -> CLEAR -> TURN
+    TURN -> contact, or no motion though commanded -> CLEAR -> TURN
+
+A contact that begins in a turn is not whisked at: the tip then meets a face at a slant, and its bending would say
+nothing about the distance.
 
 It sees `Contact` objects and reported odometry only; it knows neither arena nor pose.
 """
@@ -13,21 +16,22 @@ from enum import Enum
 
 import numpy as np
 
-from .contact import REST_TICKS, Contact
+from .contact import Contact
 
 TICK_S = 500e-6
 BLOCK_TICKS = 40
 EFFECT_TICKS = 41  # an answer to the block ending at tick T moves the wheels from tick T + 41 on
 ODOMETRY_TICKS = 200
 
-EXPLORE_M_S = 0.13
-TURN_RAD_S = 0.62  # the texture tips, 0.21 m from the centre, then sweep the floor as fast as when driving straight
+EXPLORE_M_S = 0.15
+TURN_RAD_S = 0.71  # the texture tips, 0.21 m from the centre, then sweep the floor as fast as when driving straight
 WHISK_RAD_S = math.pi / 24  # the paper's body whisk
-BACK_OFF_M_S = 0.05
-BACK_OFF_EXTRA_M = 0.005
+# Slow, so that the whisker is but a millimetre free when the release is noticed. A tip that has met a face stands near
+# the face's closest point to the robot's centre, and turning brings it only so much nearer: from 5 mm it would miss.
+BACK_OFF_M_S = 0.03
 BACK_OFF_LIMIT_M = 0.12
 PUSH_TICKS = 1200  # 0.6 s of push from the onset: 4.5 degrees
-SEARCH_RAD = math.radians(15.0)
+SEARCH_RAD = (math.radians(5.0), math.radians(15.0))  # to one side, then to the other
 OUT_LIMIT_RAD = math.radians(25.0)
 CLEAR_M = 0.08
 STUCK_REPORTS = 3  # of 0.1 s
@@ -53,10 +57,11 @@ WHISKING = {State.BACK_OFF, State.WHISK_IN, State.PUSH, State.WHISK_OUT, State.H
 class Whisk:
     """One body whisk. Ticks are -1 until known."""
 
-    lane: int  # the whisker whose contact began it; from the onset on, the one that is measured
+    lane: int  # the whisker whose contact began it, and the only one that is measured
     direction: float  # sign of the push's rotation
     start: int = -1  # WHISK_IN began
     push_end: int = -1  # first tick that no longer pushes
+    measured: bool = False
 
 
 class Behaviour:
@@ -122,7 +127,7 @@ class Behaviour:
     # One method per state: look, and perhaps go on to another state.
 
     def _settle(self, tick: int) -> None:
-        if tick + 1 >= REST_TICKS + BLOCK_TICKS:
+        if all(contact.settled for contact in self.contacts.values()):
             self._go_forward(tick)
 
     def _forward(self, tick: int) -> None:
@@ -132,33 +137,29 @@ class Behaviour:
         elif self._stuck >= STUCK_REPORTS:
             self._enter(State.CLEAR, tick)
         elif self._done >= self._goal:
-            self._go_turn(tick, 25.0, 100.0)
+            self._go_turn(tick, 25.0, 90.0)
 
     def _turn(self, tick: int) -> None:
-        touching = [lane for lane in self._touching() if self.contacts[lane].onset > self._since]
-        if touching:
-            self._go_back_off(tick, touching[0])
+        if any(contact.touching and contact.onset > self._since for contact in self.contacts.values()):
+            self._enter(State.CLEAR, tick)
         elif self._done >= self._goal or self._stuck >= STUCK_REPORTS:
             self._go_forward(tick)
 
     def _back_off(self, tick: int) -> None:
         if self._done >= BACK_OFF_LIMIT_M or self._stuck >= STUCK_REPORTS:
             self._enter(State.CLEAR, tick)
-        elif self._touching():
-            self._goal = self._done + BACK_OFF_EXTRA_M
-        elif self._done >= self._goal:
+        elif not self.contacts[self.whisk.lane].touching:
             self.whisk.start = tick
             self._enter(State.WHISK_IN, tick)
 
     def _whisk_in(self, tick: int) -> None:
-        touching = self._touching()
-        if touching:
-            self.whisk.lane = touching[0]
+        if self.contacts[self.whisk.lane].touching:
             self._enter(State.PUSH, tick)
-        elif self._done >= 3 * SEARCH_RAD:
+        elif self._searched_one_side and self._done >= SEARCH_RAD[1]:
             self._enter(State.CLEAR, tick)
-        elif self._done >= SEARCH_RAD and not self._searched_one_side:
+        elif not self._searched_one_side and self._done >= SEARCH_RAD[0]:
             self._searched_one_side = True
+            self._done = 0.0
             self.whisk.direction = -self.whisk.direction
 
     def _push(self, tick: int) -> None:
@@ -178,13 +179,13 @@ class Behaviour:
 
     def _clear(self, tick: int) -> None:
         if self._done >= CLEAR_M or self._stuck >= STUCK_REPORTS:
-            self._go_turn(tick, 60.0, 180.0)
+            self._go_turn(tick, 60.0, 150.0)
 
     # Transitions.
 
     def _go_forward(self, tick: int) -> None:
         self._enter(State.FORWARD, tick)
-        self._goal = EXPLORE_M_S * self.rng.uniform(2.5, 6.0)
+        self._goal = EXPLORE_M_S * self.rng.uniform(3.0, 8.0)
 
     def _go_turn(self, tick: int, least_deg: float, most_deg: float) -> None:
         self._enter(State.TURN, tick)

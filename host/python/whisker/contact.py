@@ -1,67 +1,61 @@
-"""When an object whisker touches and lets go, from its samples alone.
-
-Deflection is the length of (alpha, beta) about the whisker's rest, in counts. A contact begins with the first of
-`ONSET_SAMPLES` good samples above `ONSET_COUNTS` and ends with the first of `RELEASE_SAMPLES` below `RELEASE_COUNTS`.
-Bad samples (status not zero) are skipped: they neither begin, keep nor end a contact.
-"""
+"""When an object whisker touches and when it lets go, in ticks, from its samples alone (host/nav/contact.h)."""
 
 import numpy as np
 
-# 65536 counts are 180 degrees of field. Sensor noise is 0.03 degrees (11 counts) white and 0.05 degrees of slow drift
-# (whisker_physics section 6); 0.3 degrees is ten sigma, and 0.4 degrees of body whisk at the tip.
+from .native import doubles, ffi, lib, octets
+
+# 65536 counts are 180 degrees of field. The sensor's white noise is 11 counts, its drift 18 over minutes
+# (whisker_physics section 6); 110 counts are ten sigma, and 0.4 degrees of body whisk with the contact at the tip.
 ONSET_COUNTS = 110.0
 RELEASE_COUNTS = 65.0
 ONSET_SAMPLES = 3
 RELEASE_SAMPLES = 12
-REST_TICKS = 400  # the robot stands still and untouched for its first 0.2 s
-DRIFT_SHARE = 1e-3  # of the rest's error, taken away per block while nothing touches: follows minutes, not contacts
+REST_SAMPLES = 400  # the robot stands still and untouched for its first 0.2 s
+DRIFT_SAMPLES = 40_000.0  # the rest follows minutes of drift, not seconds of contact
 
 
 class Contact:
-    """One whisker: rest position, whether it touches, and the ticks of its last onset and release."""
+    """One whisker: its rest in counts, whether it touches, and the ticks of its last onset and release (-1: none)."""
 
     def __init__(self):
-        self.rest: np.ndarray | None = None
-        self.touching = False
+        config = {
+            "onset_counts": ONSET_COUNTS,
+            "release_counts": RELEASE_COUNTS,
+            "onset_samples": ONSET_SAMPLES,
+            "release_samples": RELEASE_SAMPLES,
+            "settle_samples": REST_SAMPLES,
+            "rest_samples": DRIFT_SAMPLES,
+        }
+        self._state = ffi.new("struct nav_contact *")
+        lib.nav_contact_init(self._state, ffi.new("struct nav_contact_config *", config))
         self.onset = -1
         self.release = -1
-        self.deflection = np.zeros(2)  # mean of the last block's good samples about the rest, counts
-        self._first: list[np.ndarray] = []
-        self._run = 0
-        self._run_start = 0
 
-    def block(self, ticks: np.ndarray, samples: np.ndarray) -> None:
-        """Take the good samples of one block: ticks (n,), samples (n, 2) in counts."""
-        if len(ticks) == 0:
-            return
-        if self.rest is None:
-            self._settle(ticks, samples)
-            return
-        about_rest = samples - self.rest
-        self.deflection = about_rest.mean(axis=0)
-        length = np.hypot(about_rest[:, 0], about_rest[:, 1])
-        if not self.touching and self._run == 0 and length.max() <= ONSET_COUNTS:
-            if np.hypot(*self.deflection) < RELEASE_COUNTS:
-                self.rest = self.rest + DRIFT_SHARE * self.deflection
-            return
-        for tick, value in zip(ticks.tolist(), length.tolist(), strict=True):
-            self._sample(tick, value)
+    @property
+    def touching(self) -> bool:
+        return self._state.touching
 
-    def _settle(self, ticks: np.ndarray, samples: np.ndarray) -> None:
-        self._first.append(samples)
-        if ticks[-1] + 1 >= REST_TICKS:
-            self.rest = np.median(np.concatenate(self._first), axis=0)
-            self._first.clear()
+    @property
+    def settled(self) -> bool:
+        """Whether the rest is known."""
+        return self._state.settled >= REST_SAMPLES
 
-    def _sample(self, tick: int, length: float) -> None:
-        changing = length < RELEASE_COUNTS if self.touching else length > ONSET_COUNTS
-        if not changing:
-            self._run = 0
-            return
-        if self._run == 0:
-            self._run_start = tick
-        self._run += 1
-        if self.touching and self._run >= RELEASE_SAMPLES:
-            self.touching, self.release, self._run = False, self._run_start, 0
-        elif not self.touching and self._run >= ONSET_SAMPLES:
-            self.touching, self.onset, self._run = True, self._run_start, 0
+    @property
+    def rest(self) -> np.ndarray:
+        """Mean of (alpha, beta) untouched, counts."""
+        return np.array([self._state.rest[0], self._state.rest[1]])
+
+    def block(self, ticks: np.ndarray, samples: np.ndarray, good: np.ndarray) -> None:
+        """Take ticks (n,), samples (n, 2) in counts and good (n,): a bad sample begins, keeps and ends nothing."""
+        ticks, samples = ticks[good], np.ascontiguousarray(samples[good])
+        count = len(ticks)
+        events, peaks = np.zeros(count, np.uint8), np.zeros(count)
+        lib.nav_contact_run(
+            self._state, doubles(samples), octets(np.ones(count, np.uint8)), count, octets(events), doubles(peaks)
+        )
+        for index in np.flatnonzero(events):
+            # An event comes with the last sample of the run that proves it; the contact changed with the first.
+            if events[index] == lib.NAV_CONTACT_ONSET:
+                self.onset = int(ticks[max(0, index - ONSET_SAMPLES + 1)])
+            else:
+                self.release = int(ticks[max(0, index - RELEASE_SAMPLES + 1)])

@@ -18,6 +18,7 @@ from .contact import Contact
 
 WINDOW_SAMPLES = 200
 WINDOW_LEAST_GOOD = 150  # fewer good samples than this are no window
+NEAREST_MM = 60.0  # calibrated from 90 mm; a peak that says less was no plain contact and is not reported
 SETTLE_TICKS = 100  # the wheels' last change of speed must be this much older than a texture window
 
 
@@ -32,13 +33,15 @@ class Pilot:
         self.texture_models = texture_models
         self.radial_models = radial_models
         self.contacts = {lane: Contact() for lane in self.object_lanes}
-        side = {n: math.copysign(1.0, -robot.whiskers[n].base_m[1]) for n in self.object_lanes}
+        self.length_mm = {n: 1000.0 * robot.whiskers[n].length_m for n in self.object_lanes}
+        # A corner that the shaft met while driving forward is pressed by turning to the side on which it lies.
+        side = {n: math.copysign(1.0, -math.sin(robot.whiskers[n].yaw_rad)) for n in self.object_lanes}
         self.behaviour = Behaviour(self.contacts, side, np.random.default_rng(seed))
         self.bad_samples = 0
         self.whisks: list[dict] = []  # every measured contact, for the report
         self._recent = deque(maxlen=WINDOW_SAMPLES // BLOCK_TICKS)  # of the last 0.1 s: (samples, good) of all lanes
-        self._whisk_samples: dict[int, list] = {}
-        self._measured: dict[int, tuple[int, float, float]] = {}  # lane: release tick, mm, sigma
+        self._whisk_samples: list[tuple[np.ndarray, np.ndarray]] = []
+        self._measured: dict[int, tuple[int, float]] = {}  # lane: release tick, mm
         self._pending = np.zeros(3)  # motion not yet in a row, in the frame of the last row that carried any
         self._was_whisking = False
 
@@ -50,8 +53,7 @@ class Pilot:
         self.bad_samples += int(good.size - np.count_nonzero(good))
         self._recent.append((samples, good))
         for lane, contact in self.contacts.items():
-            use = good[:, lane]
-            contact.block(ticks[use], samples[use, lane])
+            contact.block(ticks, samples[:, lane], good[:, lane])
         self._follow_whisk(ticks, samples, good)
         return self.behaviour.decide(int(ticks[-1]))
 
@@ -85,23 +87,24 @@ class Pilot:
         if whisk is None or whisk.start < 0:
             self._whisk_samples.clear()
             return
-        for lane, contact in self.contacts.items():
-            use = good[:, lane]
-            self._whisk_samples.setdefault(lane, []).append((ticks[use], samples[use, lane]))
-            pushed = contact.onset > whisk.start and 0 <= contact.onset + PUSH_TICKS <= whisk.push_end
-            if pushed and contact.release > contact.onset and not contact.touching:
-                self._measure(lane, contact)
+        use = good[:, whisk.lane]
+        self._whisk_samples.append((ticks[use], samples[use, whisk.lane]))
+        contact = self.contacts[whisk.lane]
+        pushed = whisk.start < contact.onset <= whisk.push_end - PUSH_TICKS
+        if pushed and contact.release > contact.onset and not whisk.measured:
+            whisk.measured = True
+            self._measure(whisk.lane, contact)
 
     def _measure(self, lane: int, contact: Contact) -> None:
-        if self.whisks and (self.whisks[-1]["lane"], self.whisks[-1]["onset"]) == (lane, contact.onset):
-            return
-        ticks = np.concatenate([t for t, _ in self._whisk_samples[lane]])
-        samples = np.concatenate([s for _, s in self._whisk_samples[lane]])
-        model = self.radial_models[self.names[lane]]
+        ticks = np.concatenate([t for t, _ in self._whisk_samples])
+        samples = np.concatenate([s for _, s in self._whisk_samples])
         push = (ticks >= contact.onset) & (ticks < contact.onset + PUSH_TICKS)
+        model = self.radial_models[self.names[lane]]
         peak = model.peak(samples[push], contact.rest)
-        mm, sigma = model.predict(peak)
-        self._measured[lane] = (contact.release, float(mm), float(sigma))
+        mm, _ = model.predict(peak)
+        if mm < NEAREST_MM:
+            return
+        self._measured[lane] = (contact.release, min(float(mm), self.length_mm[lane]))
         self.whisks.append(
             {"lane": lane, "onset": contact.onset, "release": contact.release, "peak": float(peak), "mm": float(mm)}
         )
@@ -126,7 +129,7 @@ class Pilot:
     def _radial_cell(self, lane: int, released: dict, whisking: bool) -> float | None:
         if lane in released:
             return released[lane][1]
-        if self.contacts[lane].touching or self.contacts[lane].rest is None or (whisking and not released):
+        if self.contacts[lane].touching or not self.contacts[lane].settled or (whisking and not released):
             return math.nan
         return None
 
