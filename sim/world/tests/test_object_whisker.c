@@ -215,6 +215,20 @@ static void test_slides_off_a_corner(void **state)
     assert_near(whisker.contact.theta_rad, 0, 0);
 }
 
+/* A contact pushes and never pulls, whatever path led out of it. */
+static void test_contact_is_one_sided(void **state)
+{
+    (void)state;
+    struct sim_scene robot = bench(4, 2, 2, 0), scene = post_at(&robot.whisker[1], 0.11);
+    struct sim_object_whisker whisker = start(&scene, 1, 1);
+    struct sim_pose pose = turned(scene.start, GAP + 2 * SIM_DEGREE);
+    whisker.side = 1;
+    whisker.contact = (struct sim_contact){true, true, 0.11, 0.5 * SIM_DEGREE, 1};
+    turn(&whisker, &scene, pose, -1 * SIM_DEGREE);
+    assert_true(whisker.contact.touching);
+    assert_near(whisker.contact.theta_rad, 0, 0);
+}
+
 /* A whisker that touches from the start has no history: the face its shaft enters, theta 0. */
 static void test_touching_from_the_start(void **state)
 {
@@ -305,6 +319,7 @@ int main(void)
         cmocka_unit_test(test_tip_on_a_face_near_its_corner),
         cmocka_unit_test(test_shaft_on_a_corner_near_its_tip),
         cmocka_unit_test(test_slides_off_a_corner),
+        cmocka_unit_test(test_contact_is_one_sided),
         cmocka_unit_test(test_touching_from_the_start),
         cmocka_unit_test(test_radial_noise_is_the_predicted_one),
     };

@@ -161,6 +161,30 @@ static void test_noise_at_rest(void **state)
     sim_world_free(world);
 }
 
+/* Every lane and axis has noise of its own. */
+static void test_noise_is_independent(void **state)
+{
+    (void)state;
+    enum { N = 4 * TICKS_PER_S };
+    struct sim_scene scene = bench(4, 2, 2, 0);
+    sim_world *world = sim_world_new(&scene, 9);
+    struct sim_field before[6] = {{0}}, now[6];
+    double lanes = 0, axes = 0, square = 0;
+    for (int n = 0; n < N; n++) {
+        sim_world_step(world);
+        sim_world_fields(world, now);
+        /* Differences from tick to tick leave the drift out. */
+        double a = now[0].alpha_deg - before[0].alpha_deg, b = now[1].alpha_deg - before[1].alpha_deg;
+        lanes += n ? a * b : 0;
+        axes += n ? a * (now[0].beta_deg - before[0].beta_deg) : 0;
+        square += n ? a * a : 0;
+        memcpy(before, now, sizeof now);
+    }
+    assert_near(lanes / square, 0, 0.05);
+    assert_near(axes / square, 0, 0.05);
+    sim_world_free(world);
+}
+
 static void test_only_the_touching_whisker_is_tilted(void **state)
 {
     (void)state;
@@ -246,6 +270,7 @@ int main(void)
         cmocka_unit_test(test_too_tight_a_start),
         cmocka_unit_test(test_odometry_adds_up_to_the_motion),
         cmocka_unit_test(test_noise_at_rest),
+        cmocka_unit_test(test_noise_is_independent),
         cmocka_unit_test(test_only_the_touching_whisker_is_tilted),
         cmocka_unit_test(test_floor_changes_with_the_tile),
         cmocka_unit_test(test_lanes_do_not_disturb_each_other),
