@@ -1,0 +1,79 @@
+#include "bridge_model.h"
+
+#include "Vwhisker_bridge.h"
+
+namespace bridge_sim
+{
+
+namespace
+{
+
+constexpr int RESET_CYCLES = 16;
+
+} // namespace
+
+BridgeModel::BridgeModel(NodeBus &bus) : bus_(bus), top_(std::make_unique<Vwhisker_bridge>())
+{
+    top_->utmi_vbus_valid = 1;
+    top_->utmi_session_valid = 1;
+    top_->utmi_session_end = 0;
+    top_->utmi_rx_error = 0;
+    top_->tick_external = 1;
+    top_->tick_strobe = 0;
+    top_->miso = UINT32_MAX >> (32 - LANES);
+    reset();
+}
+
+BridgeModel::~BridgeModel() = default;
+
+void BridgeModel::reset()
+{
+    top_->rst = 1;
+    for (int i = 0; i < RESET_CYCLES; i++) {
+        cycle();
+    }
+    top_->rst = 0;
+    cycle();
+}
+
+void BridgeModel::start_tick()
+{
+    top_->tick_strobe = 1;
+    cycle();
+    top_->tick_strobe = 0;
+}
+
+bool BridgeModel::link_busy() const
+{
+    return top_->link_busy;
+}
+
+bool BridgeModel::running() const
+{
+    return top_->running;
+}
+
+// Inputs settle with the clock low, outputs are read as they stand at the rising edge, then the edge comes. The node
+// wires answer in between: a record's bit is on MISO at the first edge after the SCK edge that shifted it out.
+void BridgeModel::cycle()
+{
+    Vwhisker_bridge &top = *top_;
+    top.utmi_rx_data = in.rx_data;
+    top.utmi_rx_active = in.rx_active;
+    top.utmi_rx_valid = in.rx_valid;
+    top.utmi_tx_ready = in.tx_ready;
+    top.utmi_line_state = in.line_state;
+    top.clk = 0;
+    top.eval();
+    out.tx_data = top.utmi_tx_data;
+    out.tx_valid = top.utmi_tx_valid;
+    out.xcvr_select = top.utmi_xcvr_select;
+    out.term_select = top.utmi_term_select;
+    out.op_mode = top.utmi_op_mode;
+    top.miso = bus_.pins(top.sync, top.select_n, top.sck, top.mosi) & (UINT32_MAX >> (32 - LANES));
+    top.clk = 1;
+    top.eval();
+    cycles++;
+}
+
+} // namespace bridge_sim

@@ -1,0 +1,36 @@
+// The Verilated bridge with its nodes on the bus: one cycle() steps the RTL, the node wires and nothing else.
+#pragma once
+
+#include <memory>
+
+#include "node_bus.h"
+#include "utmi.h"
+
+class Vwhisker_bridge;
+
+namespace bridge_sim
+{
+
+class BridgeModel : public UtmiDevice
+{
+  public:
+    // The bridge after power-on reset, its ticks taken from start_tick(). The bus must outlive the model.
+    explicit BridgeModel(NodeBus &bus);
+    ~BridgeModel() override;
+
+    void cycle() override;
+
+    // Begins a tick: one cycle of the external tick strobe.
+    void start_tick();
+
+    bool link_busy() const; // SYNC and transfer on the node link in progress
+    bool running() const;   // from start until the last frame is in the FIFO
+
+  private:
+    void reset();
+
+    NodeBus &bus_;
+    std::unique_ptr<Vwhisker_bridge> top_;
+};
+
+} // namespace bridge_sim

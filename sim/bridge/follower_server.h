@@ -1,0 +1,78 @@
+// The socket by which readers of the ring hold the simulation back and the pilot drives the robot. One ASCII message
+// per packet (Unix SOCK_SEQPACKET):
+//   in:  follow NAME | taken T | pilot | drive T V OMEGA
+//   out: odometry T X Y THETA (to the pilot) | end N (to all)
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <poll.h>
+
+namespace bridge_sim
+{
+
+constexpr uint64_t TAKEN_WINDOW = 4096; // ticks a follower may lag behind
+constexpr uint64_t DECISION_BLOCK = 40; // ticks the pilot answers with one drive message
+constexpr uint64_t DECISION_DELAY = 40; // ticks from the end of a block to its answer's effect, besides the one between
+
+struct Drive {
+    double v_m_s;
+    double omega_rad_s;
+};
+
+class FollowerServer
+{
+  public:
+    // Listens at path (empty: nobody follows) and expects this many followers, the pilot among them.
+    // Throws std::runtime_error with one line if it cannot.
+    FollowerServer(const std::string &path, unsigned expected);
+    ~FollowerServer();
+    FollowerServer(const FollowerServer &) = delete;
+    FollowerServer &operator=(const FollowerServer &) = delete;
+
+    // File descriptors to wait on.
+    void add_to(std::vector<pollfd> &descriptors) const;
+
+    // Accepts connections and reads every message there is. Throws std::runtime_error on a message that is not in the
+    // list above or out of turn, and when the pilot leaves before the end.
+    void receive();
+
+    // May this tick be produced? Everyone is there, nobody lags, and the pilot has answered what takes effect by then.
+    bool allows(uint64_t tick) const;
+
+    // The pilot's command that takes effect at this tick, if one does.
+    std::optional<Drive> drive_at(uint64_t tick);
+
+    void send_odometry(uint64_t tick, double x_m, double y_m, double theta_rad);
+    void send_end(uint64_t ticks);
+
+  private:
+    struct Follower {
+        int descriptor;
+        std::string name; // empty: has not introduced itself
+        bool pilot = false;
+        uint64_t taken = 0; // ticks processed
+    };
+
+    void accept_all();
+    bool read_all(Follower &follower);
+    void handle(Follower &follower, const std::string &message);
+    void handle_drive(Follower &follower, const std::string &message);
+    void leave(const Follower &follower);
+    void send(const Follower &follower, const std::string &message);
+    const Follower *pilot() const;
+
+    std::string path_;
+    unsigned expected_;
+    int listener_ = -1;
+    std::vector<Follower> followers_;
+    std::map<uint64_t, Drive> drives_; // by the tick they take effect
+    uint64_t blocks_answered_ = 0;
+    bool over_ = false;
+};
+
+} // namespace bridge_sim

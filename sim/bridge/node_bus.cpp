@@ -1,0 +1,136 @@
+#include "node_bus.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+namespace bridge_sim
+{
+
+void NodeBus::NodeDeleter::operator()(sim_node *node) const
+{
+    sim_node_free(node);
+}
+
+NodeBus::NodeBus(size_t populated, uint64_t seed)
+{
+    for (size_t lane = 0; lane < std::min(populated, LANES); lane++) {
+        nodes_.emplace_back(sim_node_new(seed * LANES + lane));
+        if (!nodes_.back()) {
+            throw std::runtime_error("no memory for the nodes");
+        }
+    }
+}
+
+void NodeBus::power_on()
+{
+    for (const auto &node : nodes_) {
+        sim_node_power_on(node.get());
+    }
+}
+
+size_t NodeBus::populated() const
+{
+    return nodes_.size();
+}
+
+void NodeBus::set_fields(const sim_field *fields)
+{
+    std::copy_n(fields, nodes_.size(), fields_.begin());
+}
+
+void NodeBus::spoil_reading(size_t lane, sim_sensor_fault kind, unsigned argument)
+{
+    sim_node_fault(nodes_.at(lane).get(), kind, argument);
+}
+
+void NodeBus::spoil_transfer(size_t lane, LinkFault kind, unsigned bit)
+{
+    fault_ = kind;
+    fault_lane_ = lane;
+    fault_bit_ = bit;
+}
+
+void NodeBus::run()
+{
+    for (const auto &node : nodes_) {
+        sim_node_run(node.get());
+    }
+}
+
+void NodeBus::edges(Levels now, bool mosi)
+{
+    const Levels before = levels_;
+    levels_ = now;
+    if (now.sync && !before.sync) {
+        sync_edge();
+    }
+    if (now.select_n != before.select_n) {
+        select_edge(!now.select_n);
+    }
+    if (now.sck != before.sck) {
+        sck_edge(now.sck, mosi);
+    }
+}
+
+void NodeBus::sync_edge()
+{
+    for (size_t lane = 0; lane < nodes_.size(); lane++) {
+        sim_node_sync(nodes_[lane].get(), fields_[lane]);
+    }
+}
+
+void NodeBus::select_edge(bool low)
+{
+    for (const auto &node : nodes_) {
+        sim_node_select(node.get(), low);
+    }
+    if (low) {
+        bits_ = 0;
+        sent_.fill(0);
+    } else {
+        remember_transfer();
+    }
+    driven_ = UINT32_MAX;
+    miso_ = UINT32_MAX;
+}
+
+void NodeBus::remember_transfer()
+{
+    previous_ = sent_;
+    fault_ = LinkFault::NONE;
+}
+
+void NodeBus::sck_edge(bool level, bool mosi)
+{
+    for (size_t lane = 0; lane < nodes_.size(); lane++) {
+        const uint32_t bit = sim_node_sck(nodes_[lane].get(), level, mosi) ? 1u : 0u;
+        driven_ = (driven_ & ~(1u << lane)) | bit << lane;
+        if (level) {
+            sent_[lane] = sent_[lane] << 1 | bit;
+        }
+    }
+    bits_ += level ? 1 : 0;
+    miso_ = driven_;
+    if (fault_ != LinkFault::NONE) {
+        damage();
+    }
+}
+
+void NodeBus::damage()
+{
+    const uint32_t lane = 1u << fault_lane_;
+    const unsigned at = bits_ - 1; // the bit that the last rising edge shifted out
+    if (bits_ == 0 || at >= RECORD_BITS) {
+        return;
+    }
+    const bool stale_bit = previous_[fault_lane_] >> (RECORD_BITS - 1 - at) & 1u;
+    if (fault_ == LinkFault::DEAD || (fault_ == LinkFault::STALE && stale_bit)) {
+        miso_ |= lane;
+    } else if (fault_ == LinkFault::STALE) {
+        miso_ &= ~lane;
+    } else if (at == fault_bit_) {
+        miso_ ^= lane;
+    }
+}
+
+} // namespace bridge_sim

@@ -1,0 +1,37 @@
+// The command line of whisker-bridge-sim.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "bench.h"
+
+namespace bridge_sim
+{
+
+struct Options {
+    bool help = false;
+    bool bench = false;
+    bool progress = false;
+    std::string scene;
+    std::string socket;
+    std::string truth;
+    std::string faults;
+    std::string usb_faults;
+    std::string speed_report;
+    uint64_t seed = 1;
+    double seconds = 0;
+    unsigned followers = 0;
+    size_t lanes_populated = 0; // 0: as many as the scene has whiskers
+    BenchSettings link;         // SCK divider, word gap and sample point: bench only, else the host software sets them
+    std::vector<std::string> command;
+
+    uint64_t ticks() const;
+};
+
+// Throws std::runtime_error with one line that names the option and the remedy.
+Options parse_options(int argc, char **argv);
+
+const char *usage();
+
+} // namespace bridge_sim

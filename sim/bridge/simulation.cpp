@@ -1,0 +1,264 @@
+#include "simulation.h"
+
+#include <chrono>
+#include <cinttypes>
+#include <csignal>
+#include <stdexcept>
+
+#include <poll.h>
+#include <sys/signalfd.h>
+#include <unistd.h>
+
+namespace bridge_sim
+{
+
+namespace
+{
+
+constexpr uint64_t PROGRESS_TICKS = WHISKER_LIMIT_CLOCK_HZ / WHISKER_LIMIT_TICK_PERIOD;
+constexpr int IDLE_WAIT_MS = 1000;
+// A command that has not ended so long after SIGTERM is killed.
+constexpr double END_PATIENCE_S = 30;
+
+double now_s()
+{
+    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+// In all threads, so before umockdev starts its own.
+int block_signals()
+{
+    sigset_t set;
+    sigemptyset(&set);
+    sigaddset(&set, SIGCHLD);
+    sigaddset(&set, SIGINT);
+    sigaddset(&set, SIGTERM);
+    sigprocmask(SIG_BLOCK, &set, nullptr);
+    signal(SIGPIPE, SIG_IGN);
+    return signalfd(-1, &set, SFD_NONBLOCK | SFD_CLOEXEC);
+}
+
+sim_scene read_scene(const std::string &path)
+{
+    sim_scene scene;
+    char error[512] = "";
+    if (sim_scene_read(path.c_str(), &scene, error, sizeof error) != 0) {
+        throw std::runtime_error(error);
+    }
+    return scene;
+}
+
+size_t populated(const Options &options, const sim_scene &scene)
+{
+    if (options.lanes_populated == 0) {
+        return scene.whiskers;
+    }
+    if (options.lanes_populated < scene.whiskers) {
+        throw std::runtime_error("--lanes-populated " + std::to_string(options.lanes_populated) + ": the scene has " +
+                                 std::to_string(scene.whiskers) + " whiskers; give at least as many");
+    }
+    return options.lanes_populated;
+}
+
+std::optional<FaultPlan> plan_of(const Options &options, const sim_scene &scene)
+{
+    if (options.faults.empty()) {
+        return std::nullopt;
+    }
+    return FaultPlan(options.seed, populated(options, scene), options.ticks());
+}
+
+} // namespace
+
+void Simulation::WorldDeleter::operator()(sim_world *world) const
+{
+    sim_world_free(world);
+}
+
+Simulation::Simulation(const Options &options)
+    : options_(options), scene_(read_scene(options.scene)), world_(sim_world_new(&scene_, options.seed)),
+      signals_(block_signals()), rig_(populated(options, scene_), options.seed), scheduler_(rig_),
+      faults_(options.faults, options.usb_faults), runner_(rig_, scheduler_, plan_of(options, scene_), faults_),
+      truth_(options.truth, scene_), followers_(options.socket, options.followers), total_(options.ticks())
+{
+    if (!world_) {
+        throw std::runtime_error(options.scene + ": no world can be made of it: a texture has no known parameters");
+    }
+    Descriptors descriptors;
+    const char *error = nullptr;
+    if (!rig_.power_on(descriptors, error)) {
+        throw std::runtime_error(std::string("the bridge does not enumerate: ") + error);
+    }
+    usbfs_ = std::make_unique<UsbfsServer>(descriptors);
+}
+
+Simulation::~Simulation()
+{
+    child_.reset();
+    usbfs_.reset();
+    close(signals_);
+}
+
+int Simulation::run()
+{
+    child_ = std::make_unique<Child>(options_.command);
+    while (!child_->ended()) {
+        const bool progress = advance();
+        usbfs_->deliver(scheduler_.take_completed());
+        wait(progress ? 0 : IDLE_WAIT_MS);
+    }
+    finish();
+    return verdict();
+}
+
+// One step of whatever is due; false: all is waiting for others.
+bool Simulation::advance()
+{
+    if (over_ && now_s() > killed_at_s_) {
+        child_->kill();
+        throw std::runtime_error("the command did not end when asked to: killed");
+    }
+    if (rig_.running() && scheduler_.stop_seen()) {
+        produce_last_tick();
+        return true;
+    }
+    if (may_tick()) {
+        produce_tick();
+        return true;
+    }
+    return scheduler_.step();
+}
+
+// ----------------------------------------------------------------------------------------------------------------
+// ticks
+
+bool Simulation::may_tick()
+{
+    return !over_ && rig_.running() && runner_.ready() && followers_.allows(tick_);
+}
+
+void Simulation::produce_tick()
+{
+    if (tick_ == 0) {
+        first_tick_s_ = now_s();
+        first_tick_cycles_ = rig_.cycles();
+    }
+    step_world();
+    runner_.tick(tick_, fields_.data());
+    after_tick(tick_++);
+    if (tick_ == total_) {
+        end_run();
+    }
+}
+
+void Simulation::step_world()
+{
+    if (const std::optional<Drive> drive = followers_.drive_at(tick_)) {
+        sim_world_drive(world_.get(), drive->v_m_s, drive->omega_rad_s);
+    }
+    sim_world_step(world_.get());
+    sim_world_fields(world_.get(), fields_.data());
+}
+
+void Simulation::after_tick(uint64_t tick)
+{
+    if ((tick + 1) % TRUTH_TICKS == 0) {
+        double x_m = 0;
+        double y_m = 0;
+        double theta_rad = 0;
+        truth_.row(tick, world_.get());
+        sim_world_odometry(world_.get(), &x_m, &y_m, &theta_rad);
+        followers_.send_odometry(tick, x_m, y_m, theta_rad);
+    }
+    if ((tick + 1) % PROGRESS_TICKS == 0) {
+        show_progress();
+    }
+}
+
+// The host stopped the bridge, because the run is over or of its own accord: then it is over as well.
+void Simulation::produce_last_tick()
+{
+    runner_.last_tick(fields_.data());
+    end_run();
+}
+
+void Simulation::end_run()
+{
+    if (over_) {
+        return;
+    }
+    over_ = true;
+    speed_ = {tick_, rig_.cycles() - first_tick_cycles_, now_s() - first_tick_s_, rig_.bus().populated()};
+    killed_at_s_ = now_s() + END_PATIENCE_S;
+    followers_.send_end(tick_);
+    child_->ask_to_end();
+}
+
+// -------------------------------------------------------------------------------------------------------- surroundings
+
+void Simulation::take_requests()
+{
+    for (UsbfsRequest &request : usbfs_->take_requests()) {
+        if (request.discard) {
+            scheduler_.discard(request.urb.id);
+        } else {
+            scheduler_.submit(std::move(request.urb));
+        }
+    }
+}
+
+void Simulation::wait(int timeout_ms)
+{
+    std::vector<pollfd> descriptors = {{signals_, POLLIN, 0}, {usbfs_->wake_descriptor(), POLLIN, 0}};
+    followers_.add_to(descriptors);
+    if (poll(descriptors.data(), descriptors.size(), timeout_ms) <= 0) {
+        return;
+    }
+    if (descriptors[0].revents) {
+        read_signals();
+    }
+    if (descriptors[1].revents) {
+        take_requests();
+    }
+    followers_.receive();
+}
+
+void Simulation::read_signals()
+{
+    signalfd_siginfo signal_info;
+    while (read(signals_, &signal_info, sizeof signal_info) == sizeof signal_info) {
+        if (signal_info.ssi_signo != SIGCHLD) {
+            stopped_ = true;
+            end_run();
+        }
+    }
+}
+
+void Simulation::show_progress()
+{
+    if (options_.progress || isatty(STDERR_FILENO)) {
+        std::fprintf(stderr, "progress %" PRIu64 " %" PRIu64 "\n", tick_, total_);
+    }
+}
+
+void Simulation::finish()
+{
+    truth_.close();
+    faults_.close();
+    write_speed_report(options_.speed_report, speed_, faults_);
+}
+
+int Simulation::verdict() const
+{
+    if (child_->exit_code() != 0) {
+        return child_->exit_code();
+    }
+    if (stopped_ || tick_ < total_) {
+        throw std::runtime_error("the run ended after " + std::to_string(tick_) + " of " + std::to_string(total_) +
+                                 " ticks");
+    }
+    runner_.check_usb();
+    return 0;
+}
+
+} // namespace bridge_sim

@@ -1,0 +1,73 @@
+// The whole simulated robot as a USB device beside a running command: decides when a tick may be produced, produces it,
+// and serves USB and the socket in between. Simulated time leads; the machine's speed changes nothing that is recorded.
+#pragma once
+
+#include <array>
+#include <memory>
+
+#include "child.h"
+#include "follower_server.h"
+#include "options.h"
+#include "speed_report.h"
+#include "truth_log.h"
+#include "usbfs_server.h"
+
+namespace bridge_sim
+{
+
+class Simulation
+{
+  public:
+    // Reads the scene, builds the world, enumerates the bridge and shows it to umockdev. Blocks SIGCHLD, SIGINT and
+    // SIGTERM for good: they are read in run(). Throws std::runtime_error with one line.
+    explicit Simulation(const Options &options);
+    ~Simulation();
+    Simulation(const Simulation &) = delete;
+    Simulation &operator=(const Simulation &) = delete;
+
+    // The run, from the command's start to its end. Returns its exit code, or 1 if it ended too soon.
+    int run();
+
+  private:
+    struct WorldDeleter {
+        void operator()(sim_world *world) const;
+    };
+
+    bool advance();
+    bool may_tick();
+    void produce_tick();
+    void step_world();
+    void after_tick(uint64_t tick);
+    void produce_last_tick();
+    void end_run();
+    void take_requests();
+    void wait(int timeout_ms);
+    void read_signals();
+    void show_progress();
+    void finish();
+    int verdict() const;
+
+    const Options &options_;
+    sim_scene scene_;
+    std::unique_ptr<sim_world, WorldDeleter> world_;
+    int signals_;
+    Rig rig_;
+    UrbScheduler scheduler_;
+    FaultLog faults_;
+    TickRunner runner_;
+    TruthLog truth_;
+    FollowerServer followers_;
+    std::unique_ptr<UsbfsServer> usbfs_;
+    std::unique_ptr<Child> child_;
+    std::array<sim_field, LANES> fields_{};
+    uint64_t total_;
+    uint64_t tick_ = 0;      // produced so far
+    bool over_ = false;      // no more ticks; the command has been asked to end
+    bool stopped_ = false;   // by a signal
+    double killed_at_s_ = 0; // when the command will have had time enough to end
+    Speed speed_;
+    double first_tick_s_ = 0;
+    uint64_t first_tick_cycles_ = 0;
+};
+
+} // namespace bridge_sim

@@ -1,0 +1,45 @@
+// One tick with everything that belongs to it: planned faults, the transfer, USB traffic meanwhile. Shared by the
+// simulation and the bench.
+#pragma once
+
+#include "fault_log.h"
+#include "urb_scheduler.h"
+
+namespace bridge_sim
+{
+
+class TickRunner
+{
+  public:
+    // No plan: no faults.
+    TickRunner(Rig &rig, UrbScheduler &scheduler, std::optional<FaultPlan> plan, FaultLog &log);
+
+    // May a tick be produced as far as USB goes? Every frame made so far must have a transfer to go into; two packets
+    // may be on their way, one being framed and one being sent.
+    bool ready() const;
+
+    // Produces the tick of this number; `fields` has one entry per populated lane.
+    void tick(uint64_t number, const sim_field *fields);
+
+    // The one tick after a stop.
+    void last_tick(const sim_field *fields);
+
+    // Irregularities on the wire that the planned faults do not explain, and planned ones that did not take place.
+    // Throws std::runtime_error if there are any.
+    void check_usb() const;
+
+  private:
+    void inject_lane_fault(uint64_t number);
+    void inject_usb_fault(uint64_t number);
+    void start_usb_fault(const UsbFault &fault);
+
+    Rig &rig_;
+    UrbScheduler &scheduler_;
+    std::optional<FaultPlan> plan_;
+    FaultLog &log_;
+    std::optional<LaneFault> in_transfer_; // a link fault whose record comes with the next tick's transfer
+    uint64_t back_at_ = 0;                 // tick at which a host that stayed away returns
+    bool away_ = false;
+};
+
+} // namespace bridge_sim

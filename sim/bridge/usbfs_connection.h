@@ -1,0 +1,82 @@
+// One open file of the emulated usbfs node: its transfers in flight, its ended transfers, and the ioctl it waits in.
+#pragma once
+
+#include <deque>
+#include <map>
+#include <memory>
+
+#include <linux/types.h>
+#include <linux/usbdevice_fs.h>
+#include <umockdev.h>
+
+#include "usbfs_server.h"
+
+namespace bridge_sim
+{
+
+struct Unref {
+    void operator()(void *object) const
+    {
+        g_object_unref(object);
+    }
+};
+using IoctlDataRef = std::unique_ptr<UMockdevIoctlData, Unref>;
+
+class UsbfsConnection
+{
+  public:
+    explicit UsbfsConnection(UMockdevIoctlClient *client);
+    ~UsbfsConnection();
+    UsbfsConnection(const UsbfsConnection &) = delete;
+    UsbfsConnection &operator=(const UsbfsConnection &) = delete;
+
+    bool closed() const;
+
+    // The request the client is in, its argument as a number, and as memory of the given size (nullptr: unreadable).
+    unsigned long request() const;
+    gulong argument() const;
+    UMockdevIoctlData *argument_data(size_t size) const;
+
+    // Ends the client's ioctl: error 0, or a positive errno.
+    void answer(int error);
+
+    // Reads the client's URB into a transfer. Returns 0, or a positive errno if there is no such endpoint or memory.
+    int read_urb(Urb &urb);
+
+    // A transfer read by read_urb() is in the model now.
+    void in_flight(uint64_t id);
+
+    // Id of the transfer in flight whose usbfs_urb lies at this address of the client, 0 if none.
+    uint64_t find(gulong address) const;
+
+    // A transfer has ended. Answers a waiting reap, or a waiting ioctl that stands for a transfer.
+    void ended(const Urb &urb);
+
+    // USBDEVFS_REAPURB and its non-blocking form, which is held back for HOLD_MS: usbfs is a plain file here and always
+    // looks ready to poll(), so that libusb would spin.
+    void reap(bool wait);
+
+    // The client's ioctl is answered when this transfer has ended.
+    void wait_for(uint64_t id);
+
+  private:
+    struct Transfer {
+        IoctlDataRef urb;
+        IoctlDataRef buffer;
+    };
+
+    static int on_hold_over(void *self);
+    void hand_over();
+    void fill(Transfer &transfer, const Urb &urb);
+    void stop_holding();
+
+    UMockdevIoctlClient *client_;
+    Transfer reading_; // between read_urb() and in_flight()
+    std::map<uint64_t, Transfer> transfers_;
+    std::deque<IoctlDataRef> done_;
+    bool reaping_ = false;
+    GSource *hold_ = nullptr;
+    uint64_t waited_for_ = 0;
+};
+
+} // namespace bridge_sim
