@@ -1,0 +1,246 @@
+#include "fake_usb.h"
+
+#include <hidapi.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "whisker_protocol.h"
+
+struct fake_usb fake;
+
+static struct libusb_transfer *queued[FAKE_TRANSFERS]; /* oldest first */
+static bool cancelled[FAKE_TRANSFERS];
+static struct completion {
+    uint8_t bytes[4096];
+    size_t count;
+    enum libusb_transfer_status status;
+} completions[FAKE_TRANSFERS], held;
+static int completion_count;
+static char object; /* whatever an opaque handle points at */
+
+void fake_reset(void)
+{
+    fake = (struct fake_usb){.plugged = true, .has_hid = true, .identity_bytes = WHISKER_REPORT_IDENTITY_BYTES};
+    fake.identity[WHISKER_REPORT_CONTROL_ID] = WHISKER_REPORT_ID_IDENTITY;
+    fake.identity[WHISKER_REPORT_IDENTITY_WIRE_VERSION] = WHISKER_WIRE_VERSION;
+    fake.identity[WHISKER_REPORT_IDENTITY_LANES] = WHISKER_LIMIT_LANES;
+    whisker_put_u32(fake.identity + WHISKER_REPORT_IDENTITY_CLOCK_HZ, WHISKER_LIMIT_CLOCK_HZ);
+    whisker_put_u16(fake.identity + WHISKER_REPORT_IDENTITY_FRAME_BYTES, WHISKER_FRAME_BYTES);
+    memset(cancelled, 0, sizeof cancelled);
+    completion_count = 0;
+    held.count = 0;
+}
+
+static void fill(struct completion *completion, const void *bytes, size_t count, enum libusb_transfer_status status)
+{
+    memcpy(completion->bytes, bytes, count);
+    completion->count = count;
+    completion->status = status;
+}
+
+void fake_complete(const void *bytes, size_t count, enum libusb_transfer_status status)
+{
+    fill(&completions[completion_count++], bytes, count, status);
+}
+
+void fake_hold(const void *bytes, size_t count)
+{
+    fill(&held, bytes, count, LIBUSB_TRANSFER_CANCELLED);
+}
+
+static void note(char event)
+{
+    const size_t length = strlen(fake.events);
+    if (length + 1 < sizeof fake.events && (length == 0 || fake.events[length - 1] != event)) {
+        fake.events[length] = event; /* repetitions are noted once */
+    }
+}
+
+/* ------------------------------------------------------------------------------------------------------- libusb */
+
+int libusb_init(libusb_context **context)
+{
+    *context = (libusb_context *)&object;
+    fake.opened++;
+    return 0;
+}
+
+void libusb_exit(libusb_context *context)
+{
+    (void)context;
+    fake.opened--;
+}
+
+ssize_t libusb_get_device_list(libusb_context *context, libusb_device ***list)
+{
+    static libusb_device *devices[2];
+    (void)context;
+    devices[0] = fake.plugged ? (libusb_device *)&object : NULL;
+    *list = devices;
+    return fake.plugged;
+}
+
+void libusb_free_device_list(libusb_device **list, int unreference)
+{
+    (void)list;
+    (void)unreference;
+}
+
+int libusb_get_device_descriptor(libusb_device *device, struct libusb_device_descriptor *about)
+{
+    (void)device;
+    memset(about, 0, sizeof *about);
+    about->idVendor = WHISKER_LIMIT_USB_VENDOR_ID;
+    about->idProduct = WHISKER_LIMIT_USB_PRODUCT_ID;
+    return 0;
+}
+
+int libusb_open(libusb_device *device, libusb_device_handle **handle)
+{
+    (void)device;
+    if (fake.open_error == 0) {
+        *handle = (libusb_device_handle *)&object;
+        fake.opened++;
+    }
+    return fake.open_error;
+}
+
+void libusb_close(libusb_device_handle *handle)
+{
+    (void)handle;
+    fake.opened--;
+}
+
+int libusb_claim_interface(libusb_device_handle *handle, int interface)
+{
+    (void)handle;
+    fake.opened += fake.claim_error == 0;
+    return interface == WHISKER_LIMIT_USB_BULK_INTERFACE ? fake.claim_error : LIBUSB_ERROR_NOT_FOUND;
+}
+
+int libusb_release_interface(libusb_device_handle *handle, int interface)
+{
+    (void)handle;
+    (void)interface;
+    fake.opened--;
+    return 0;
+}
+
+struct libusb_transfer *libusb_alloc_transfer(int packets)
+{
+    (void)packets;
+    fake.opened++;
+    return calloc(1, sizeof(struct libusb_transfer));
+}
+
+void libusb_free_transfer(struct libusb_transfer *transfer)
+{
+    fake.opened -= transfer != NULL;
+    free(transfer);
+}
+
+int libusb_submit_transfer(struct libusb_transfer *transfer)
+{
+    note('q');
+    cancelled[fake.in_flight] = false;
+    queued[fake.in_flight++] = transfer;
+    return 0;
+}
+
+int libusb_cancel_transfer(struct libusb_transfer *transfer)
+{
+    for (int i = 0; i < fake.in_flight; i++) {
+        if (queued[i] == transfer) {
+            cancelled[i] = true;
+            return 0;
+        }
+    }
+    return LIBUSB_ERROR_NOT_FOUND;
+}
+
+/* Takes the oldest transfer out of the queue and ends it. */
+static void end_oldest(const struct completion *completion)
+{
+    struct libusb_transfer *transfer = queued[0];
+    fake.in_flight--;
+    memmove(queued, queued + 1, (size_t)fake.in_flight * sizeof queued[0]);
+    memmove(cancelled, cancelled + 1, (size_t)fake.in_flight * sizeof cancelled[0]);
+    memcpy(transfer->buffer, completion->bytes, completion->count);
+    transfer->actual_length = (int)completion->count;
+    transfer->status = completion->status;
+    transfer->callback(transfer);
+}
+
+int libusb_handle_events_timeout_completed(libusb_context *context, struct timeval *timeout, int *completed)
+{
+    (void)context;
+    (void)timeout;
+    (void)completed;
+    const int ready = completion_count;
+    completion_count = 0;
+    for (int i = 0; i < ready; i++) {
+        end_oldest(&completions[i]);
+    }
+    while (fake.in_flight > 0 && cancelled[0]) {
+        const struct completion end = held;
+        held = (struct completion){.status = LIBUSB_TRANSFER_CANCELLED};
+        end_oldest(&end);
+    }
+    return 0;
+}
+
+int libusb_bulk_transfer(libusb_device_handle *handle, unsigned char endpoint, unsigned char *bytes, int room,
+                         int *count, unsigned timeout_ms)
+{
+    (void)handle;
+    (void)endpoint;
+    (void)timeout_ms;
+    note('r');
+    *count = fake.stale_reads > 0 ? room : 0;
+    memset(bytes, 0xEE, (size_t)*count);
+    return fake.stale_reads-- > 0 ? 0 : LIBUSB_ERROR_TIMEOUT;
+}
+
+/* ------------------------------------------------------------------------------------------------------- hidapi */
+
+hid_device *hid_open(unsigned short vendor, unsigned short product, const wchar_t *serial)
+{
+    (void)serial;
+    const bool found = fake.has_hid && vendor == WHISKER_LIMIT_USB_VENDOR_ID && product == WHISKER_LIMIT_USB_PRODUCT_ID;
+    fake.opened += found;
+    return found ? (hid_device *)&object : NULL;
+}
+
+void hid_close(hid_device *device)
+{
+    (void)device;
+    fake.opened--;
+}
+
+int hid_exit(void)
+{
+    return 0;
+}
+
+int hid_get_feature_report(hid_device *device, unsigned char *bytes, size_t room)
+{
+    (void)device;
+    if (bytes[0] == WHISKER_REPORT_ID_IDENTITY) {
+        memcpy(bytes, fake.identity, sizeof fake.identity);
+        return fake.identity_bytes;
+    }
+    bytes[WHISKER_REPORT_COUNTERS_RUNNING] = fake.running;
+    whisker_put_u32(bytes + WHISKER_REPORT_COUNTERS_RECORDS_TICK, 0x01020304);
+    return (int)room;
+}
+
+int hid_send_feature_report(hid_device *device, const unsigned char *bytes, size_t count)
+{
+    (void)device;
+    if (fake.hid_refuses || count != sizeof fake.control) {
+        return -1;
+    }
+    memcpy(fake.control, bytes, count);
+    note(bytes[WHISKER_REPORT_CONTROL_RUN] ? 'S' : 'X');
+    return (int)count;
+}

@@ -1,0 +1,39 @@
+/* A bridge without USB: this test's own libusb and hidapi, as much of them as the library calls. */
+#ifndef WHISKER_TEST_FAKE_USB_H
+#define WHISKER_TEST_FAKE_USB_H
+
+#include <libusb.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#define FAKE_TRANSFERS 32
+
+struct fake_usb {
+    /* what the test sets */
+    bool plugged, hid_refuses;
+    bool has_hid;
+    int open_error, claim_error;
+    uint8_t identity[16];
+    int identity_bytes;
+    bool running;
+    int stale_reads; /* bulk reads that still give data after a stop */
+    /* what the library did */
+    int opened; /* contexts, handles, interfaces, HID handles and transfers not given back */
+    int in_flight;
+    uint8_t control[16];
+    char events[64]; /* in order: S start, X stop, q transfer queued, r synchronous read */
+};
+
+extern struct fake_usb fake;
+
+/* A bridge as it should be, plugged in. */
+void fake_reset(void);
+
+/* Ends the oldest transfer in flight, at the next handling of events. */
+void fake_complete(const void *bytes, size_t count, enum libusb_transfer_status status);
+
+/* What the oldest transfer in flight holds when it is cancelled. */
+void fake_hold(const void *bytes, size_t count);
+
+#endif

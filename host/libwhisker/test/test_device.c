@@ -1,0 +1,252 @@
+/* The device side against a fake libusb and hidapi: what it asks, in which order, and how it takes a refusal. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+#include <string.h>
+
+#include "fake_usb.h"
+#include "whisker/device.h"
+#include "whisker/errors.h"
+#include "whisker_protocol.h"
+
+#define QUEUED 16
+
+static struct whisker_device *device;
+static char received[256];
+static size_t received_count;
+
+static void sink(void *context, const uint8_t *bytes, size_t count)
+{
+    assert_ptr_equal(context, &device);
+    assert_true(received_count + count < sizeof received);
+    memcpy(received + received_count, bytes, count);
+    received_count += count;
+    received[received_count] = '\0';
+}
+
+static int plug_in(void **state)
+{
+    (void)state;
+    fake_reset();
+    received_count = 0;
+    received[0] = '\0';
+    return 0;
+}
+
+static void open_good(void)
+{
+    struct whisker_identity identity;
+    assert_int_equal(whisker_device_open(&device, &identity), 0);
+    assert_int_equal(identity.clock_hz, WHISKER_LIMIT_CLOCK_HZ);
+}
+
+static void start_good(void)
+{
+    struct whisker_settings settings;
+    whisker_settings_default(&settings);
+    open_good();
+    assert_int_equal(whisker_device_start(device, &settings, sink, &device), 0);
+}
+
+static void close_and_check(void)
+{
+    whisker_device_close(device);
+    assert_int_equal(fake.in_flight, 0);
+    assert_int_equal(fake.opened, 0);
+}
+
+/* Opening must fail with this error and give everything back. */
+static struct whisker_identity assert_not_opened(int error)
+{
+    struct whisker_identity identity;
+    assert_int_equal(whisker_device_open(&device, &identity), error);
+    assert_null(device);
+    assert_int_equal(fake.opened, 0);
+    return identity;
+}
+
+static void open_says_why_it_fails(void **state)
+{
+    (void)state;
+    fake.plugged = false;
+    assert_not_opened(WHISKER_ERROR_DEVICE_MISSING);
+    fake_reset();
+    fake.open_error = LIBUSB_ERROR_ACCESS;
+    assert_not_opened(WHISKER_ERROR_DEVICE_ACCESS);
+    fake_reset();
+    fake.claim_error = LIBUSB_ERROR_BUSY;
+    assert_not_opened(WHISKER_ERROR_DEVICE_BUSY);
+    fake_reset();
+    fake.has_hid = false;
+    assert_not_opened(WHISKER_ERROR_DEVICE_CONTROL);
+    fake_reset();
+    fake.identity_bytes = 8;
+    assert_not_opened(WHISKER_ERROR_DEVICE_CONTROL);
+}
+
+static void another_wire_version_or_shape_is_refused_and_named(void **state)
+{
+    (void)state;
+    fake.identity[WHISKER_REPORT_IDENTITY_WIRE_VERSION] = WHISKER_WIRE_VERSION + 1;
+    assert_int_equal(assert_not_opened(WHISKER_ERROR_WIRE_VERSION).wire_version, WHISKER_WIRE_VERSION + 1);
+    fake_reset();
+    fake.identity[WHISKER_REPORT_IDENTITY_LANES] = 27;
+    assert_int_equal(assert_not_opened(WHISKER_ERROR_DEVICE_IDENTITY).lanes, 27);
+    fake_reset();
+    whisker_put_u16(fake.identity + WHISKER_REPORT_IDENTITY_FRAME_BYTES, 128);
+    assert_int_equal(assert_not_opened(WHISKER_ERROR_DEVICE_IDENTITY).frame_bytes, 128);
+}
+
+static void start_queues_transfers_and_sends_the_settings(void **state)
+{
+    (void)state;
+    const struct whisker_settings settings = {
+        .lane_mask = 0x0A0B0C0D, .tick_period = 30000, .sck_divider = 6, .word_gap = 31, .sample_point = 5};
+    static const uint8_t report[16] = {1, 1, 1, 6, 31, 5, 0, 0, 0x0D, 0x0C, 0x0B, 0x0A, 0x30, 0x75, 0, 0};
+    open_good();
+    assert_int_equal(whisker_device_start(device, &settings, sink, &device), 0);
+    assert_memory_equal(fake.control, report, sizeof report);
+    assert_int_equal(fake.in_flight, QUEUED);
+    assert_string_equal(fake.events, "qS"); /* queued before the first frame is made */
+    assert_int_equal(whisker_device_stop(device), 0);
+    assert_int_equal(fake.control[WHISKER_REPORT_CONTROL_RUN], 0);
+    close_and_check();
+}
+
+static void a_bridge_left_running_is_stopped_and_emptied_first(void **state)
+{
+    (void)state;
+    fake.running = true;
+    fake.stale_reads = 5;
+    start_good();
+    assert_string_equal(fake.events, "XrqS");
+    assert_true(fake.stale_reads < 0);
+    assert_int_equal(received_count, 0);
+    close_and_check();
+}
+
+static void bytes_come_in_order_and_transfers_are_queued_again(void **state)
+{
+    (void)state;
+    start_good();
+    for (int i = 0; i < 3; i++) {
+        fake_complete("abc", 3, LIBUSB_TRANSFER_COMPLETED);
+        fake_complete("", 0, LIBUSB_TRANSFER_COMPLETED);
+        fake_complete("d", 1, LIBUSB_TRANSFER_COMPLETED);
+        assert_int_equal(whisker_device_poll(device, 0), 0);
+        assert_int_equal(fake.in_flight, QUEUED);
+    }
+    assert_string_equal(received, "abcdabcdabcd");
+    close_and_check();
+}
+
+static void flush_delivers_what_a_transfer_already_held(void **state)
+{
+    (void)state;
+    start_good();
+    fake_complete("first", 5, LIBUSB_TRANSFER_COMPLETED);
+    fake_hold(" and the rest", 13);
+    whisker_device_flush(device);
+    assert_string_equal(received, "first and the rest");
+    assert_int_equal(fake.in_flight, 0);
+    close_and_check();
+}
+
+static void refused_settings_are_told(void **state)
+{
+    (void)state;
+    struct whisker_settings settings;
+    whisker_settings_default(&settings);
+    open_good();
+    fake.hid_refuses = true;
+    assert_int_equal(whisker_device_start(device, &settings, sink, &device), WHISKER_ERROR_DEVICE_REFUSED);
+    close_and_check();
+}
+
+static void unplugging_and_failing_end_the_stream(void **state)
+{
+    (void)state;
+    static const struct {
+        enum libusb_transfer_status status;
+        int error;
+    } ends[] = {{LIBUSB_TRANSFER_NO_DEVICE, WHISKER_ERROR_DEVICE_GONE},
+                {LIBUSB_TRANSFER_STALL, WHISKER_ERROR_DEVICE_USB},
+                {LIBUSB_TRANSFER_OVERFLOW, WHISKER_ERROR_DEVICE_USB}};
+    for (size_t i = 0; i < sizeof ends / sizeof ends[0]; i++) {
+        plug_in(NULL);
+        start_good();
+        fake_complete("abc", 3, ends[i].status);
+        assert_int_equal(whisker_device_poll(device, 0), ends[i].error);
+        assert_int_equal(whisker_device_poll(device, 0), ends[i].error); /* and stays ended */
+        assert_string_equal(received, "abc");
+        close_and_check();
+    }
+}
+
+static void counters_are_read(void **state)
+{
+    (void)state;
+    struct whisker_counters counters;
+    open_good();
+    fake.running = true;
+    assert_int_equal(whisker_device_counters(device, &counters), 0);
+    assert_int_equal(counters.running, 1);
+    assert_int_equal(counters.records_tick, 0x01020304);
+    close_and_check();
+}
+
+static void assert_setting(struct whisker_settings settings, const char *complaint)
+{
+    char message[128] = "";
+    const int expected = complaint[0] ? WHISKER_ERROR_DEVICE_REFUSED : 0;
+    assert_int_equal(whisker_settings_check(&settings, message, sizeof message), expected);
+    assert_string_equal(message, complaint);
+    assert_int_equal(whisker_settings_check(&settings, NULL, 0), expected);
+}
+
+static void settings_outside_their_limits_are_named(void **state)
+{
+    (void)state;
+    struct whisker_settings good, bad;
+    whisker_settings_default(&good);
+    assert_setting(good, "");
+    bad = good;
+    bad.sck_divider = 7;
+    assert_setting(bad, "the SCK divider is 7; it must be even, 6 to 32");
+    bad.sck_divider = 34;
+    assert_setting(bad, "the SCK divider is 34; it must be even, 6 to 32");
+    bad = good;
+    bad.sample_point = 17;
+    assert_setting(bad, "the sample point is 17; it must be 1 to 16");
+    bad = good;
+    bad.word_gap = 29;
+    assert_setting(bad, "the word gap is 29; it must be 30 to 255");
+    bad = good;
+    bad.tick_period = 3999;
+    assert_setting(bad, "the tick period is 3999; it must be 4000 to 4294967295");
+    bad = good;
+    bad.lane_mask = 1u << 28; /* a 29th lane */
+    assert_setting(bad, "the lane mask is 268435456; it must be 0 to 268435455");
+}
+
+#define WITH_BRIDGE(test) cmocka_unit_test_setup(test, plug_in)
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        WITH_BRIDGE(open_says_why_it_fails),
+        WITH_BRIDGE(another_wire_version_or_shape_is_refused_and_named),
+        WITH_BRIDGE(start_queues_transfers_and_sends_the_settings),
+        WITH_BRIDGE(a_bridge_left_running_is_stopped_and_emptied_first),
+        WITH_BRIDGE(bytes_come_in_order_and_transfers_are_queued_again),
+        WITH_BRIDGE(flush_delivers_what_a_transfer_already_held),
+        WITH_BRIDGE(refused_settings_are_told),
+        WITH_BRIDGE(unplugging_and_failing_end_the_stream),
+        WITH_BRIDGE(counters_are_read),
+        cmocka_unit_test(settings_outside_their_limits_are_named),
+    };
+    return cmocka_run_group_tests_name("device", tests, NULL, NULL);
+}
