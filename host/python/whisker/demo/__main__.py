@@ -1,0 +1,177 @@
+"""The whole chain in one command: python -m whisker.demo --out build/demo --build-dir build/release --seed 1."""
+
+import argparse
+import csv
+import json
+import shutil
+import signal
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+from tqdm import tqdm
+
+from .. import localise
+from .. import scene as scenes
+from ..report import write_report
+from ..tables import TableError
+from . import summary as scores
+from .chain import ChainError, ChainRun, Link, run_chain
+from .pilot_process import cell
+from .scenes import make_scene
+from .training import calibrate, radial_errors, train_texture, write_radial_points
+
+TICKS_PER_S = 2000
+FILTERS = ("grid", "foveal", "odometry")
+
+
+def parse(argv: list[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="python -m whisker.demo", description=__doc__)
+    parser.add_argument("--out", type=Path, default=Path("build/demo"), help="folder for everything the run leaves")
+    parser.add_argument("--build-dir", type=Path, default=Path("build/release"))
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--seconds", type=float, default=60.0, help="simulated; a multiple of 0.1")
+    parser.add_argument("--lanes", type=int, default=6, help="populated lanes, 6 to 28; those beyond 6 have no whisker")
+    parser.add_argument("--sck-divider", type=int, default=6)
+    parser.add_argument("--word-gap", type=int, default=30)
+    parser.add_argument("--sample-point", type=int, default=5)
+    options = parser.parse_args(argv)
+    if options.seconds < 1.0 or abs(options.seconds * 10 - round(options.seconds * 10)) > 1e-9:
+        parser.error(f"--seconds {options.seconds:g}: give a multiple of 0.1, at least 1")
+    return options
+
+
+def main(argv: list[str] | None = None) -> int:
+    options = parse(argv)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        demonstrate(options)
+    except (ChainError, scenes.SceneError, TableError, localise.SettingError) as error:
+        print(f"demo: {error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print("demo: interrupted", file=sys.stderr)
+        return 130
+    return 0
+
+
+def demonstrate(options: argparse.Namespace) -> None:
+    """All steps in order; leaves summary.json and report.html in the output folder."""
+    began = time.monotonic()
+    out = options.out.resolve()
+    if out.exists():
+        shutil.rmtree(out)
+    (out / "models").mkdir(parents=True)
+    scene, start = make_scene(options.seed)
+    scenes.write(out / "scene", scene)
+    (out / "scene" / "scene.flat").write_text(scene.flat(start))
+    results = {"seed": options.seed, "simulated_s": options.seconds, "lanes": options.lanes}
+    results |= learn(out, scene, options.seed)
+    results |= run(out, options)
+    results |= judge(out, scene)
+    results["wall_s"] = time.monotonic() - began
+    (out / "summary.json").write_text(json.dumps(scores.rounded(results), indent=1) + "\n")
+    report = write_report(out)
+    tell(results)
+    print(report)
+
+
+def learn(out: Path, scene: scenes.Scene, seed: int) -> dict:
+    """Texture and radial models, from level-1 recordings."""
+    objects = [w.name for w in scene.robot.of_role("object")]
+    models, contacts = {}, {}
+    with tqdm(total=1 + len(objects), desc="train and calibrate", unit="model") as bar:
+        train_texture(out / "models", scene, seed)
+        bar.update()
+        for name in objects:
+            models[name], contacts[name] = calibrate(out / "models", scene, name, seed)
+            bar.update()
+    write_radial_points(out, models, contacts)
+    measured, predicted = radial_errors(models, contacts)
+    return {"radial_std_mm": measured, "radial_std_predicted_mm": predicted}
+
+
+def run(out: Path, options: argparse.Namespace) -> dict:
+    """The chain at RTL level; what was sent, received, spoilt and reported."""
+    ticks = round(options.seconds * TICKS_PER_S)
+    link = Link(options.sck_divider, options.word_gap, options.sample_point)
+    chain = ChainRun(out, options.build_dir.resolve(), options.seed, options.seconds, options.lanes, link)
+    with tqdm(total=ticks, desc="sensor to ring, RTL", unit="tick") as bar:
+        wall_s = run_chain(chain, lambda tick: bar.update(tick - bar.n))
+        bar.update(ticks - bar.n)
+    speed = json.loads((out / "speed.json").read_text())
+    log = json.loads((out / "log.json").read_text())
+    return {
+        "chain_wall_s": wall_s,
+        "frames_sent": speed["ticks"],
+        "frames_received": log["frames_received"],
+        "frames_lost": speed["ticks"] - log["frames_received"],
+        "usb_faults_injected": speed["usb_faults_injected"],
+    } | scores.fault_scores(out / "faults.csv", out / "bad.csv")
+
+
+def judge(out: Path, scene: scenes.Scene) -> dict:
+    """Localise with each filter and compare everything with the truth."""
+    path = localise.observations_path(out / "scene")
+    truth = read_dicts(out / "truth.csv")
+    add_truth(path, truth)
+    observations = localise.read_observations(path, scene)
+    estimates = {}
+    for name in tqdm(FILTERS, desc="localise", unit="filter"):
+        result = localise.run(name, scene, observations)
+        localise.write_estimates(out / f"est_{name}.csv", result, observations)
+        write_covariances(out / f"covariance_{name}.csv", observations.t_text, result.estimates)
+        estimates[name] = result.estimates
+    rows = [{key: float(value) if value else None for key, value in row.items()} for row in read_dicts(path)]
+    return scores.texture_scores(rows, truth, scene) | scores.pose_scores(estimates, observations.truth)
+
+
+def read_dicts(path: Path) -> list[dict[str, str]]:
+    with open(path, newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def add_truth(path: Path, truth: list[dict[str, str]]) -> None:
+    """Put the true pose beside each row of observations.csv, for whoever scores a filter later."""
+    rows = read_dicts(path)
+    if len(rows) != len(truth):
+        raise TableError(path, None, f"{len(rows)} rows but {len(truth)} true poses; see the logs beside it")
+    names = ("x_m", "y_m", "theta_rad")
+    with open(path, "w", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow([*rows[0], *(f"true_{name}" for name in names)])
+        writer.writerows(
+            [*row.values(), *(true[name] for name in names)] for row, true in zip(rows, truth, strict=True)
+        )
+
+
+def write_covariances(path: Path, t_text: list[str], estimates: list[localise.Estimate]) -> None:
+    """Position covariance of every row, for the report's ellipses."""
+    lines = ["t_s,xx_m2,xy_m2,yy_m2"]
+    for t_s, estimate in zip(t_text, estimates, strict=True):
+        c = estimate.covariance
+        lines.append(",".join([t_s, *(cell(value) for value in (c[0, 0], c[0, 1], c[1, 1]))]))
+    path.write_text("\n".join(lines) + "\n")
+
+
+def tell(s: dict) -> None:
+    """Three lines a person can read."""
+    equal = "equal" if s["records_bad_match"] else "NOT EQUAL"
+    std = np.array(list(s["radial_std_mm"].values()))
+    print(
+        f"chain: {s['frames_received']} of {s['frames_sent']} frames, {s['frames_lost']} lost; {s['records_bad_injected']} bad records "
+        f"injected and {s['records_bad_reported']} reported, sets {equal}; {s['usb_faults_injected']} USB faults survived"
+    )
+    print(
+        f"touch: texture {100 * s['texture_accuracy']:.1f} % of windows right; distance along the whisker to "
+        f"{std.min():.1f}-{std.max():.1f} mm"
+    )
+    print(
+        f"pose:  grid {1000 * s['pose_error_median_m']:.0f} mm median error, foveal {1000 * s['foveal_error_median_m']:.0f} mm, "
+        f"odometry alone {1000 * s['odometry_error_median_m']:.0f} mm"
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())

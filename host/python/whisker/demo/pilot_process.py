@@ -1,0 +1,137 @@
+"""The pilot as a process of its own: reads the ring, drives, and writes observation rows as they come.
+
+python -m whisker.demo.pilot_process --ring NAME --socket PATH --scene DIR --models DIR --out observations.csv
+"""
+
+import argparse
+import csv
+import json
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TextIO
+
+import numpy as np
+
+from .. import scene as scenes
+from ..behaviour import BLOCK_TICKS, ODOMETRY_TICKS, TICK_S
+from ..pilot import Pilot
+from ..protocol import CODES, STATUS_CODE_SHIFT
+from ..radial import RadialModel
+from ..ring import Reader, RingError
+from ..simlink import SimLink
+from ..texture import TextureModel
+
+LOST = CODES["absent"] << STATUS_CODE_SHIFT  # status of a tick that never came
+DEGREES_PER_COUNT = 180.0 / 65536.0
+
+
+def blocks(reader: Reader, lanes: int) -> Iterator[tuple[int, np.ndarray]]:
+    """(first tick, samples (40, lanes) of ring.SAMPLE) block by block; lost ticks are marked bad. The last may be short."""
+    first, block, filled = 0, None, 0
+    for frames in reader.frames():
+        ticks = frames["tick"].astype(np.int64)
+        for start in range(int(ticks[0]) // BLOCK_TICKS * BLOCK_TICKS, int(ticks[-1]) + 1, BLOCK_TICKS):
+            if block is None or start != first:
+                if block is not None:
+                    yield first, block
+                first, block, filled = start, _empty_block(frames.dtype["lane"].base, lanes), 0
+            mine = (ticks >= start) & (ticks < start + BLOCK_TICKS)
+            block[ticks[mine] - start] = frames["lane"][mine, :lanes]
+            filled = int(ticks[mine][-1]) - start + 1
+            if filled == BLOCK_TICKS:
+                yield first, block
+                block = None
+    if block is not None:
+        yield first, block[:filled]
+
+
+def _empty_block(sample: np.dtype, lanes: int) -> np.ndarray:
+    block = np.zeros((BLOCK_TICKS, lanes), sample)
+    block["status"] = LOST
+    return block
+
+
+def trace_header(pilot: Pilot) -> list[str]:
+    """Columns of traces.csv: per block, the range of each floor whisker's deflection from the middle of its scale."""
+    return ["t_s", *(f"{pilot.names[lane]}_{end}_deg" for lane in pilot.texture_lanes for end in ("min", "max"))]
+
+
+def trace_row(pilot: Pilot, first: int, samples: np.ndarray) -> list[str]:
+    cells = []
+    for lane in pilot.texture_lanes:
+        good = samples[samples[:, lane]["status"] == 0, lane]
+        about = np.hypot(good["alpha"] - 32768.0, good["beta"] - 32768.0) * DEGREES_PER_COUNT
+        cells += [f"{about.min():.3f}", f"{about.max():.3f}"] if len(about) else ["", ""]
+    return [f"{first * TICK_S:.3f}", *cells]
+
+
+def cell(value: float | None) -> str:
+    """An observation cell as the contract writes it: empty, nan, or a number."""
+    return "" if value is None else f"{value:.6g}"
+
+
+def load_models(folder: Path, robot: scenes.Robot) -> tuple[dict, dict]:
+    """Texture and radial models by whisker name, as training left them."""
+    texture = TextureModel.load(folder / "texture.json")
+    radial = {w.name: RadialModel.load(folder / f"{w.name}.json") for w in robot.of_role("object")}
+    return {w.name: texture for w in robot.of_role("texture")}, radial
+
+
+def fly(pilot: Pilot, reader: Reader, link: SimLink, out: TextIO, traces: TextIO) -> int:
+    """From the ring to drives and rows until the ring is closed; returns the ticks used."""
+    rows, trace_rows = (csv.writer(file, lineterminator="\n") for file in (out, traces))
+    trace_rows.writerow(trace_header(pilot))
+    used, header_due = 0, True
+    for first, samples in blocks(reader, len(pilot.names)):
+        drive = pilot.block(first, samples["alpha"], samples["beta"], samples["status"])
+        trace_rows.writerow(trace_row(pilot, first, samples))
+        last = first + len(samples) - 1
+        used = last + 1
+        if len(samples) == BLOCK_TICKS:
+            link.drive(last, *drive)
+        if used % ODOMETRY_TICKS != 0 or (motion := link.odometry(last)) is None:
+            continue
+        row = pilot.odometry(last, *motion)
+        if header_due:
+            rows.writerow(row)
+            header_due = False
+        rows.writerow([cell(value) for value in row.values()])
+        out.flush()
+    return used
+
+
+def main(argv: list[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--ring", required=True)
+    parser.add_argument("--socket", required=True, help="the simulation's socket: drive out, odometry in")
+    parser.add_argument("--scene", required=True, type=Path)
+    parser.add_argument("--models", required=True, type=Path)
+    parser.add_argument("--seed", type=int, default=1, help="of the random turns")
+    parser.add_argument("--out", required=True, type=Path, help="observations.csv")
+    parser.add_argument(
+        "--traces", type=Path, default="/dev/null", help="CSV of the floor whiskers' deflection, for the report"
+    )
+    parser.add_argument("--report", type=Path, help="JSON of what was used, skipped and measured")
+    options = parser.parse_args(argv)
+    try:
+        robot = scenes.load(options.scene).robot
+        pilot = Pilot(robot, *load_models(options.models, robot), options.seed)
+        with (
+            Reader(options.ring, wait_s=10.0) as reader,
+            SimLink(options.socket) as link,
+            open(options.out, "w", newline="") as out,
+            open(options.traces, "w", newline="") as traces,
+        ):
+            used = fly(pilot, reader, link, out, traces)
+    except (OSError, ValueError, RingError) as error:
+        print(f"pilot: {error}", file=sys.stderr)
+        return 1
+    if options.report:
+        content = {"ticks_used": used, "bad_samples": pilot.bad_samples, "whisks": pilot.whisks}
+        options.report.write_text(json.dumps(content, indent=1) + "\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
