@@ -170,6 +170,18 @@ async def last_frame_ends_the_stream(dut):
     assert stream.ends == [2 * FRAME_BYTES]
 
 
+@cocotb.test(timeout_time=1, timeout_unit="ms")
+async def a_frame_is_seen_only_when_whole(dut):
+    stream = await begin(dut, 1.0)
+    f = random_frame(0)
+    await send(dut, f)
+    while int(dut.busy.value):
+        assert not stream.data
+        await FallingEdge(dut.clk)
+    await drained(dut, stream)
+    assert stream.frames() == [packed(f, False)]
+
+
 async def count_drops(dut, drops: list[int]):
     """Adds an entry for every cycle in which a frame is reported dropped."""
     while True:
