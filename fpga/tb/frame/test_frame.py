@@ -175,6 +175,7 @@ async def a_frame_is_seen_only_when_whole(dut):
     stream = await begin(dut, 1.0)
     f = random_frame(0)
     await send(dut, f)
+    await FallingEdge(dut.clk)
     while int(dut.busy.value):
         assert not stream.data
         await FallingEdge(dut.clk)
