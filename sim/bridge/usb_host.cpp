@@ -6,21 +6,8 @@ namespace bridge_sim
 namespace
 {
 
-constexpr uint64_t CYCLES_PER_MS = 60000;
-// High-speed time-out: 736 to 816 bit times of 1/480 us (USB 2.0, 7.1.19.2), eight bits a cycle.
-constexpr int TIMEOUT_CYCLES = 102;
-// Quiet time between two packets: more than the 88 bit times a high-speed host keeps (USB 2.0, 7.1.18.2).
-constexpr uint64_t PACKET_GAP = 12;
-// Time a device needs to see the end of its own packet before the host's handshake.
-constexpr uint64_t HANDSHAKE_GAP = 4;
 // A host controller gives a transaction up after three errors in a row.
 constexpr int ATTEMPTS = 3;
-// Reset: a high-speed device falls back to full speed after 3 ms of SE0, then chirps within 6 ms (7.1.7.5).
-constexpr uint64_t RESET_LIMIT = 10 * CYCLES_PER_MS;
-// Chirps of the hub: 40 to 60 us each (7.1.7.5), far shorter here; the device only counts three pairs.
-constexpr uint64_t HUB_CHIRP = 400;
-constexpr int HUB_CHIRP_PAIRS = 6;
-constexpr uint8_t OP_MODE_CHIRP = 2;
 
 bool final_outcome(Outcome outcome)
 {
@@ -29,7 +16,7 @@ bool final_outcome(Outcome outcome)
 
 } // namespace
 
-UsbHost::UsbHost(UtmiDevice &device) : device_(device)
+UsbHost::UsbHost(UtmiDevice &device) : bus_(device)
 {
 }
 
@@ -38,101 +25,18 @@ const HostCounters &UsbHost::counters() const
     return counters_;
 }
 
-// --------------------------------------------------------------------------------------------------------- the line
-
-void UsbHost::hold_line(uint8_t line, uint64_t cycles)
-{
-    device_.in.line_state = line;
-    while (cycles-- > 0) {
-        device_.cycle();
-    }
-}
-
-bool UsbHost::hold_line_until_transmit(uint8_t line, bool level)
-{
-    device_.in.line_state = line;
-    for (uint64_t i = 0; i < RESET_LIMIT; i++) {
-        device_.cycle();
-        const bool chirping = device_.out.tx_valid && device_.out.op_mode == OP_MODE_CHIRP;
-        if (chirping == level) {
-            return true;
-        }
-    }
-    return false;
-}
-
-void UsbHost::rest()
-{
-    device_.in.line_state = high_speed_ ? LINE_SE0 : LINE_J;
-}
-
-void UsbHost::idle(uint64_t cycles)
-{
-    hold_line(high_speed_ ? LINE_SE0 : LINE_J, cycles);
-}
-
-bool UsbHost::chirp()
-{
-    if (!hold_line_until_transmit(LINE_SE0, true) || !hold_line_until_transmit(LINE_K, false)) {
-        return false;
-    }
-    hold_line(LINE_SE0, PACKET_GAP);
-    for (int pair = 0; pair < HUB_CHIRP_PAIRS; pair++) {
-        hold_line(LINE_K, HUB_CHIRP);
-        hold_line(LINE_J, HUB_CHIRP);
-    }
-    hold_line(LINE_SE0, HUB_CHIRP);
-    return device_.out.xcvr_select == 0 && device_.out.term_select == 0;
-}
-
 bool UsbHost::reset()
 {
-    high_speed_ = chirp();
     address_ = 0;
     toggle_in_.fill(false);
     toggle_out_.fill(false);
     copy_due_.fill(false);
-    idle(PACKET_GAP);
-    return high_speed_;
+    return bus_.reset();
 }
 
-// ------------------------------------------------------------------------------------------------------ raw packets
-
-void UsbHost::send(const Bytes &packet)
+void UsbHost::idle(uint64_t cycles)
 {
-    device_.in.line_state = LINE_J;
-    device_.in.rx_active = 1;
-    device_.cycle();
-    device_.in.rx_valid = 1;
-    for (const uint8_t byte : packet) {
-        device_.in.rx_data = byte;
-        device_.cycle();
-    }
-    device_.in.rx_valid = 0;
-    device_.in.rx_active = 0;
-    device_.cycle();
-    rest();
-}
-
-// Collects one packet of the device in packet_; false: nothing came in time. Reads a babbler to its end, up to a bound.
-bool UsbHost::receive(size_t limit)
-{
-    packet_.clear();
-    device_.cycle();
-    for (int waited = 0; !device_.out.tx_valid; waited++) {
-        if (waited == TIMEOUT_CYCLES) {
-            return false;
-        }
-        device_.cycle();
-    }
-    device_.in.line_state = LINE_J;
-    device_.in.tx_ready = 1;
-    for (device_.cycle(); device_.out.tx_valid && packet_.size() < 2 * limit; device_.cycle()) {
-        packet_.push_back(device_.out.tx_data);
-    }
-    device_.in.tx_ready = 0;
-    rest();
-    return true;
+    bus_.idle(cycles);
 }
 
 void UsbHost::send_token(Pid pid, uint8_t endpoint, bool spoil)
@@ -141,13 +45,13 @@ void UsbHost::send_token(Pid pid, uint8_t endpoint, bool spoil)
     if (spoil) {
         token[2] ^= 0x80u; // one bit of the CRC-5
     }
-    send(token);
+    bus_.send(token);
 }
 
 void UsbHost::start_of_frame()
 {
-    send(token_packet(PID_SOF, static_cast<uint16_t>((microframe_++ >> 3) & 0x7FFu)));
-    idle(PACKET_GAP);
+    bus_.send(token_packet(PID_SOF, static_cast<uint16_t>((microframe_++ >> 3) & 0x7FFu)));
+    bus_.idle(PACKET_GAP);
 }
 
 // ------------------------------------------------------------------------------------------- errors, meant and unmeant
@@ -193,11 +97,11 @@ Outcome UsbHost::irregular(PacketError error, bool deliberate)
 
 void UsbHost::expect_silence()
 {
-    if (receive(sizeof(uint64_t))) {
+    if (bus_.receive(sizeof(uint64_t), packet_)) {
         counters_.violations++;
         counters_.unexplained++;
     }
-    idle(PACKET_GAP);
+    bus_.idle(PACKET_GAP);
 }
 
 void UsbHost::spoiled_token(uint8_t endpoint)
@@ -211,8 +115,8 @@ void UsbHost::spoiled_setup(const Bytes &packet)
     Bytes spoiled = packet;
     spoiled.back() ^= 0x01u;
     send_token(PID_SETUP, 0, false);
-    idle(PACKET_GAP);
-    send(spoiled);
+    bus_.idle(PACKET_GAP);
+    bus_.send(spoiled);
     expect_silence();
     setup_may_be_lost_ = true;
 }
@@ -228,7 +132,7 @@ Outcome UsbHost::in(uint8_t endpoint, size_t limit, Bytes &data)
     for (int attempt = 0; attempt < ATTEMPTS; attempt++) {
         bool duplicate = false;
         outcome = in_once(endpoint, limit, data, duplicate);
-        idle(PACKET_GAP);
+        bus_.idle(PACKET_GAP);
         if (final_outcome(outcome) && !duplicate) {
             return outcome;
         }
@@ -240,7 +144,7 @@ Outcome UsbHost::in_once(uint8_t endpoint, size_t limit, Bytes &data, bool &dupl
 {
     counters_.transactions++;
     send_token(PID_IN, endpoint, false);
-    if (!receive(limit)) {
+    if (!bus_.receive(limit, packet_)) {
         return irregular(PacketError::EMPTY, false);
     }
     if (packet_.size() == 1) {
@@ -274,8 +178,8 @@ void UsbHost::acknowledge(uint8_t endpoint)
 {
     copy_due_[endpoint] = use(WireFault::LOST_ACK);
     if (!copy_due_[endpoint]) {
-        idle(HANDSHAKE_GAP);
-        send({PID_ACK});
+        bus_.idle(HANDSHAKE_GAP);
+        bus_.send({PID_ACK});
     }
 }
 
@@ -309,11 +213,11 @@ Outcome UsbHost::out_once(Pid pid, uint8_t endpoint, const Bytes &packet)
 {
     counters_.transactions++;
     send_token(pid, endpoint, false);
-    idle(PACKET_GAP);
-    send(packet);
-    const Outcome outcome = receive(sizeof(uint64_t)) ? handshake() : silence(pid);
+    bus_.idle(PACKET_GAP);
+    bus_.send(packet);
+    const Outcome outcome = bus_.receive(sizeof(uint64_t), packet_) ? handshake() : silence(pid);
     setup_may_be_lost_ = false;
-    idle(PACKET_GAP);
+    bus_.idle(PACKET_GAP);
     return outcome;
 }
 

@@ -1,12 +1,11 @@
-// Packet-level USB 2.0 high-speed host: reset with chirp, tokens, data toggles, handshakes, time-outs, retries and
-// deliberate faults. Every irregular answer is returned and counted.
+// Transactions of a USB 2.0 high-speed host: tokens, data toggles, handshakes, time-outs, retries and deliberate
+// faults. Every irregular answer is returned and counted.
 #pragma once
 
 #include <array>
 #include <cstdint>
 
-#include "usb_packet.h"
-#include "utmi.h"
+#include "usb_bus.h"
 
 namespace bridge_sim
 {
@@ -42,8 +41,7 @@ class UsbHost
   public:
     explicit UsbHost(UtmiDevice &device);
 
-    // Bus reset and high-speed chirp (USB 2.0, 7.1.7.5), then address 0 and all toggles DATA0.
-    // False: the device did not chirp, or did not enter high speed.
+    // Bus reset with high-speed chirp, address 0, all toggles DATA0. False: the device did not enter high speed.
     bool reset();
 
     // Start-of-frame token; the caller decides when one is due.
@@ -74,12 +72,6 @@ class UsbHost
     const HostCounters &counters() const;
 
   private:
-    bool chirp();
-    void hold_line(uint8_t line, uint64_t cycles);
-    bool hold_line_until_transmit(uint8_t line, bool level);
-    void rest();
-    void send(const Bytes &packet);
-    bool receive(size_t limit);
     void send_token(Pid pid, uint8_t endpoint, bool spoil);
     void spoiled_token(uint8_t endpoint);
     void spoiled_setup(const Bytes &packet);
@@ -94,7 +86,7 @@ class UsbHost
     Outcome silence(Pid pid);
     bool use(WireFault fault);
 
-    UtmiDevice &device_;
+    UsbBus bus_;
     Bytes packet_;
     std::array<bool, 16> toggle_in_{};
     std::array<bool, 16> toggle_out_{};
@@ -102,7 +94,6 @@ class UsbHost
     bool setup_may_be_lost_ = false;  // the SETUP before was damaged on purpose
     uint8_t address_ = 0;
     uint16_t microframe_ = 0;
-    bool high_speed_ = false;
     WireFault armed_ = WireFault::NONE;
     HostCounters counters_;
 };
