@@ -11,7 +11,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/mman.h>
+#include <sys/prctl.h>
 #include <sys/socket.h>
 #include <sys/un.h>
 #include <sys/wait.h>
@@ -41,10 +41,20 @@ static int remove_folder(void **state)
     return rmdir(folder);
 }
 
+/* A child that does not outlive the test, however that ends. */
+static pid_t fork_tied(void)
+{
+    const pid_t child = fork();
+    if (child == 0) {
+        prctl(PR_SET_PDEATHSIG, SIGKILL);
+    }
+    return child;
+}
+
 /* Starts a program with its output in the file "out" of the folder. */
 static pid_t start(const char *const *words)
 {
-    const pid_t child = fork();
+    const pid_t child = fork_tied();
     if (child == 0) {
         char path[128];
         snprintf(path, sizeof path, "%s/out", folder);
@@ -232,7 +242,7 @@ static void log_says_when_the_writer_dies(void **state)
     int ready[2];
     assert_int_equal(pipe(ready), 0);
     const char *name = ring_name();
-    const pid_t writer = fork();
+    const pid_t writer = fork_tied();
     if (writer == 0) {
         struct whisker_ring *ring;
         const char told = whisker_ring_create(name, 1024, &ring) == 0 ? 'y' : 'n';

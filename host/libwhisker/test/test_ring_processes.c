@@ -7,6 +7,7 @@
 #include <cmocka.h>
 #include <signal.h>
 #include <stdlib.h>
+#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -32,6 +33,16 @@ static uint64_t read_some(struct whisker_reader *reader)
     }
     whisker_reader_info(reader, &info);
     return info.position;
+}
+
+/* A child that does not outlive the test, however that ends. */
+static pid_t fork_tied(void)
+{
+    const pid_t child = fork();
+    if (child == 0) {
+        prctl(PR_SET_PDEATHSIG, SIGKILL);
+    }
+    return child;
 }
 
 static void byte_to(int fd)
@@ -99,7 +110,7 @@ static void killed_readers_do_not_matter(void **state)
     uint64_t index = 0;
     srand(1);
     for (unsigned tries = 0; tries < 60; tries++) {
-        const pid_t child = fork();
+        const pid_t child = fork_tied();
         if (child == 0) {
             read_until_killed(name, ready[1], tries);
         }
@@ -134,7 +145,7 @@ static void killed_writer_is_noticed_and_replaced(void **state)
     assert_int_equal(pipe(ready), 0);
     srand(2);
     for (int tries = 0; tries < 60; tries++) {
-        const pid_t child = fork();
+        const pid_t child = fork_tied();
         if (child == 0) {
             write_until_killed(name, ready[1]);
         }
@@ -188,7 +199,7 @@ static void of_writers_that_start_at_once_one_wins(void **state)
         assert_int_equal(pipe(report), 0);
         assert_int_equal(pipe(hold), 0);
         for (int i = 0; i < RIVALS; i++) {
-            if (fork() == 0) {
+            if (fork_tied() == 0) {
                 close(hold[1]);
                 compete(name, report[1], hold[0]);
             }
@@ -235,7 +246,7 @@ static void waiting_reader_is_woken_by_each_publication_and_the_close(void **sta
     int answers[2], status;
     const char *name = test_ring_name();
     assert_int_equal(pipe(answers), 0);
-    const pid_t child = fork();
+    const pid_t child = fork_tied();
     if (child == 0) {
         answer_each_frame(name, answers[1]);
     }
