@@ -2,6 +2,8 @@
 
 #include <cerrno>
 #include <chrono>
+#include <map>
+#include <set>
 #include <stdexcept>
 
 namespace bridge_sim
@@ -17,6 +19,18 @@ constexpr uint8_t HID_SET_REPORT_TYPE = 0x21;
 constexpr uint8_t HID_SET_REPORT = 0x09;
 constexpr uint16_t HID_FEATURE = 0x0300;
 constexpr uint32_t ALL_LANES = UINT32_MAX >> (32 - LANES);
+
+// How each kind of fault must be reported. A flipped bit of a sensor frame is in its start byte or spoils its sum.
+const std::map<std::string, std::set<unsigned>> CODES_OF_KINDS = {
+    {"sensor_flip", {WHISKER_CODE_SENSOR_SUM, WHISKER_CODE_SENSOR_START}},
+    {"sensor_dead", {WHISKER_CODE_SENSOR_ABSENT}},
+    {"sensor_low", {WHISKER_CODE_SENSOR_START}},
+    {"sensor_error", {WHISKER_CODE_OK}},
+    {"resync", {WHISKER_CODE_RESYNC}},
+    {"link_flip", {WHISKER_CODE_LINK_CRC}},
+    {"link_dead", {WHISKER_CODE_ABSENT}},
+    {"link_stale", {WHISKER_CODE_LINK_TICK}},
+};
 
 Bytes control_report(const BenchSettings &settings, uint8_t run)
 {
@@ -231,7 +245,7 @@ void Bench::check_lane(const CheckedFrame &frame, size_t lane)
         return;
     }
     if (record.status != 0) {
-        reported_.emplace(lane, frame.tick);
+        reported_[{lane, frame.tick}] = record.status;
         return;
     }
     const sim_field &field = sent_.at(frame.tick)[lane];
@@ -242,14 +256,18 @@ void Bench::check_lane(const CheckedFrame &frame, size_t lane)
 
 void Bench::check_faults() const
 {
-    for (const auto &[lane, tick] : reported_) {
-        if (log_.pairs().count({lane, tick}) == 0) {
-            throw std::runtime_error(at(lane, tick) + "reported bad, but nothing was injected");
+    for (const auto &[pair, status] : reported_) {
+        const auto fault = log_.pairs().find(pair);
+        if (fault == log_.pairs().end()) {
+            throw std::runtime_error(at(pair.first, pair.second) + "reported bad, but nothing was injected");
+        }
+        if (CODES_OF_KINDS.at(fault->second).count(status >> WHISKER_STATUS_CODE_SHIFT) == 0) {
+            throw std::runtime_error(at(pair.first, pair.second) + fault->second + " was reported with a wrong code");
         }
     }
-    for (const auto &[lane, tick] : log_.pairs()) {
-        if (reported_.count({lane, tick}) == 0) {
-            throw std::runtime_error(at(lane, tick) + "a fault was injected, but not reported");
+    for (const auto &[pair, kind] : log_.pairs()) {
+        if (reported_.count(pair) == 0) {
+            throw std::runtime_error(at(pair.first, pair.second) + kind + " was injected, but not reported");
         }
     }
 }

@@ -48,7 +48,7 @@ class Bench
     // Another bus reset and enumeration in the midst of a run, which that ends.
     void enumerate_again();
 
-    // Every pair (lane, tick) reported bad was injected, and the other way round.
+    // Every pair (lane, tick) reported bad was injected, and the other way round, with the code its fault must have.
     void check_faults() const;
 
     // Irregularities on the wire that no injected fault explains.
@@ -74,11 +74,11 @@ class Bench
     FrameCheck check_;
     std::mt19937_64 generator_;
     std::array<sim_field, LANES> fields_{};
-    std::vector<std::array<sim_field, LANES>> sent_; // by tick of this run
-    std::set<std::pair<size_t, uint64_t>> reported_;
-    uint64_t tick_ = 0;    // of this run
-    bool reset_ = false;   // the bus was, before this run
-    size_t submitted_ = 0; // bulk transfers waiting
+    std::vector<std::array<sim_field, LANES>> sent_;           // by tick of this run
+    std::map<std::pair<size_t, uint64_t>, uint16_t> reported_; // status of each bad record
+    uint64_t tick_ = 0;                                        // of this run
+    bool reset_ = false;                                       // the bus was, before this run
+    size_t submitted_ = 0;                                     // bulk transfers waiting
 };
 
 } // namespace bridge_sim

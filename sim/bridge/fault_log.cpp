@@ -53,7 +53,7 @@ FaultLog::FaultLog(const std::string &lane_path, const std::string &usb_path)
 void FaultLog::pair(size_t lane, uint64_t tick, const char *kind)
 {
     lanes_.row(std::to_string(lane) + "," + std::to_string(tick) + "," + kind);
-    pairs_.emplace(lane, tick);
+    pairs_[{lane, tick}] = kind;
 }
 
 void FaultLog::lane_fault(const LaneFault &fault)
@@ -70,7 +70,7 @@ void FaultLog::usb_fault(const UsbFault &fault)
     usb_counts_[static_cast<unsigned>(fault.kind)]++;
 }
 
-const std::set<std::pair<size_t, uint64_t>> &FaultLog::pairs() const
+const std::map<std::pair<size_t, uint64_t>, std::string> &FaultLog::pairs() const
 {
     return pairs_;
 }

@@ -3,7 +3,7 @@
 
 #include <array>
 #include <cstdio>
-#include <set>
+#include <map>
 #include <string>
 #include <utility>
 
@@ -39,7 +39,8 @@ class FaultLog
     void lane_fault(const LaneFault &fault);
     void usb_fault(const UsbFault &fault);
 
-    const std::set<std::pair<size_t, uint64_t>> &pairs() const;
+    // Every pair (lane, tick) so far, and the kind of its fault.
+    const std::map<std::pair<size_t, uint64_t>, std::string> &pairs() const;
     uint64_t usb_count(UsbFaultKind kind) const;
     uint64_t usb_count() const;
     void close();
@@ -47,7 +48,7 @@ class FaultLog
   private:
     CsvFile lanes_;
     CsvFile usb_;
-    std::set<std::pair<size_t, uint64_t>> pairs_;
+    std::map<std::pair<size_t, uint64_t>, std::string> pairs_;
     std::array<uint64_t, USB_FAULT_KINDS> usb_counts_{};
 };
 

@@ -39,8 +39,8 @@ UsbfsConnection &UsbfsSession::connection_of(UMockdevIoctlClient *client)
     return *connection;
 }
 
-// A closed file gives its interfaces back and its transfers are cancelled, as the kernel does; only a moment later, when
-// umockdev's thread has seen the end of its connection.
+// A closed file gives its interfaces back and its transfers are cancelled, as the kernel does; only a moment later,
+// when umockdev's thread has seen the end of its connection.
 void UsbfsSession::forget_closed()
 {
     for (auto at = connections_.begin(); at != connections_.end();) {
