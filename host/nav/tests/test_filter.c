@@ -1,0 +1,253 @@
+/* Rows in, estimates out: cleaning, order of rows, and every filter against broken rows. */
+#include "filter.h"
+
+#include <string.h>
+
+#include "intake.h"
+#include "near.h"
+#include "rooms.h"
+
+static const double READ[] = {0.0, -20.0}, NOT_READ[] = {NAN, NAN};
+
+static struct nav_row row_at(double t_s, const double *texture, const double *distance)
+{
+    return (struct nav_row){.t_s = t_s, .odometry = {0.01, 0.0, 0.0}, .texture = texture, .radial_m = distance};
+}
+
+struct taken {
+    bool news;
+    struct nav_motion motion;
+    double weight[2];
+};
+
+static struct taken take(struct nav_intake *in, const struct nav_row *row)
+{
+    struct taken t;
+    struct nav_evidence evidence;
+    t.news = nav_intake_take(in, row, &t.motion, &evidence);
+    memcpy(t.weight, evidence.weight, sizeof t.weight);
+    return t;
+}
+
+static void readings_count_by_how_far_the_whisker_has_moved(void **state)
+{
+    (void)state;
+    struct nav_problem p = room();
+    p.settings.texture_spacing_m = 0.04;
+    p.settings.radial_spacing_m = 0.02;
+    struct nav_intake in;
+    nav_intake_init(&in, &p);
+    const double nothing = INFINITY, contact = 0.1;
+    struct nav_row row = row_at(0.1, READ, &nothing);
+    struct taken t = take(&in, &row);
+    assert_near(t.weight[0], 1.0, 0.0); /* the first reading is all new */
+    assert_near(t.weight[1], 1.0, 0.0);
+    row = row_at(0.2, READ, &nothing);
+    t = take(&in, &row);
+    assert_near(t.weight[0], 0.25, 1e-12);
+    assert_near(t.weight[1], 0.5, 1e-12);
+    row = row_at(0.3, NOT_READ, &contact);
+    t = take(&in, &row);
+    assert_near(t.weight[0], 0.0, 0.0);
+    assert_near(t.weight[1], 1.0, 0.0); /* a change is news at any distance */
+    row = row_at(0.4, READ, &nothing);
+    row.odometry[0] = 0.0;
+    t = take(&in, &row);
+    assert_near(t.weight[0], 0.25, 1e-12); /* 0.01 m from the row it was not read in */
+    nav_intake_free(&in);
+}
+
+static void turning_moves_a_whisker_by_its_lever(void **state)
+{
+    (void)state;
+    struct nav_problem p = room();
+    p.settings.texture_spacing_m = 0.04;
+    struct nav_intake in;
+    nav_intake_init(&in, &p);
+    const double nan = NAN;
+    struct nav_row row = row_at(0.1, READ, &nan);
+    take(&in, &row);
+    row = row_at(0.2, READ, &nan);
+    row.odometry[0] = 0.0;
+    row.odometry[2] = -0.1;
+    assert_near(take(&in, &row).weight[0], 0.1 * 0.1 / 0.04, 1e-12);
+    nav_intake_free(&in);
+}
+
+static void bad_cells_are_counted_and_not_read(void **state)
+{
+    (void)state;
+    struct nav_problem p = room();
+    struct nav_intake in;
+    nav_intake_init(&in, &p);
+    const double infinite[] = {0.0, -INFINITY}, far = 0.5, negative = -0.01, nan = NAN;
+    struct nav_row row = row_at(0.1, infinite, &far);
+    assert_false(take(&in, &row).news);
+    assert_int_equal(in.bad_cells, 2);
+    row = row_at(0.2, NOT_READ, &negative);
+    assert_false(take(&in, &row).news);
+    assert_int_equal(in.bad_cells, 3);
+    row = row_at(0.3, NOT_READ, &nan); /* not read is not bad */
+    assert_false(take(&in, &row).news);
+    assert_int_equal(in.bad_cells, 3);
+    row = row_at(NAN, NOT_READ, &nan);
+    row.odometry[1] = 7.0;
+    struct taken t = take(&in, &row);
+    assert_int_equal(in.bad_cells, 5);
+    assert_near(t.motion.step.x, 0.0, 0.0);
+    assert_true(t.motion.unknown_m > 0.0); /* it drove before: how far now is not known */
+    assert_int_equal(in.bad_rows, 0);
+    nav_intake_free(&in);
+}
+
+static void odometry_is_never_taken_twice_nor_dropped(void **state)
+{
+    (void)state;
+    struct nav_problem p = room();
+    struct nav_intake in;
+    nav_intake_init(&in, &p);
+    const double nothing = INFINITY;
+    const double times[] = {0.1, 0.2, 0.2, 0.4, 0.3, 0.5};
+    double x = 0.0;
+    bool news[6];
+    for (int i = 0; i < 6; i++) {
+        struct nav_row row = row_at(times[i], READ, &nothing);
+        struct taken t = take(&in, &row);
+        news[i] = t.news;
+        x += t.motion.step.x;
+        assert_true((t.motion.unknown_m > 0.0) == (i == 3)); /* when 0.4 comes, 0.3 is missing */
+    }
+    assert_near(x, 0.05, 1e-12);
+    assert_int_equal(in.bad_rows, 2);
+    assert_true(news[1] && !news[2] && news[3] && !news[4] && news[5]);
+    nav_intake_free(&in);
+}
+
+static void every_filter_is_listed_and_no_other_name_is_taken(void **state)
+{
+    (void)state;
+    struct nav_problem p = room();
+    int count = 0;
+    for (; nav_filter_name(count); count++) {
+        struct nav_filter *f = nav_filter_new(nav_filter_name(count), &p);
+        assert_non_null(f);
+        nav_filter_free(f);
+    }
+    assert_int_equal(count, 3);
+    assert_null(nav_filter_new("crystal ball", &p));
+}
+
+static void assert_sane(const struct nav_estimate *e)
+{
+    assert_true(isfinite(e->pose.x) && isfinite(e->pose.y) && fabs(e->pose.theta) <= NAV_PI + 1e-9);
+    assert_true(e->confidence >= 0.0 && e->confidence <= 1.0);
+    for (int i = 0; i < 9; i++)
+        assert_true(isfinite(e->covariance[i]));
+    assert_true(e->covariance[0] > 0.0 && e->covariance[4] > 0.0 && e->covariance[8] > 0.0);
+}
+
+static void no_row_makes_any_filter_say_nonsense(void **state)
+{
+    (void)state;
+    struct nav_problem p = room();
+    const double odd[] = {NAN, INFINITY, -INFINITY, 0.0, 1e300, -1e300, 1e-300, 0.1, -0.1};
+    enum { ODD = sizeof odd / sizeof odd[0] };
+    for (int n = 0; nav_filter_name(n); n++) {
+        struct nav_filter *f = nav_filter_new(nav_filter_name(n), &p);
+        unsigned random = 12345;
+        for (int i = 0; i < 400; i++) {
+            double pick[7];
+            for (int k = 0; k < 7; k++) {
+                random = random * 1664525u + 1013904223u;
+                pick[k] = odd[(random >> 16) % ODD];
+            }
+            struct nav_row row = {
+                .t_s = pick[0], .odometry = {pick[1], pick[2], pick[3]}, .texture = &pick[4], .radial_m = &pick[6]};
+            struct nav_estimate e;
+            nav_filter_step(f, &row, &e);
+            assert_sane(&e);
+        }
+        assert_true(nav_filter_bad_cells(f) > 100 && nav_filter_bad_rows(f) > 100);
+        nav_filter_free(f);
+    }
+}
+
+static void nothing_read_makes_no_filter_surer(void **state)
+{
+    (void)state;
+    struct nav_problem p = room();
+    const double nan = NAN;
+    for (int n = 0; nav_filter_name(n); n++) {
+        struct nav_filter *f = nav_filter_new(nav_filter_name(n), &p);
+        struct nav_estimate e, before = {.covariance = {0}};
+        for (int i = 0; i < 50; i++) {
+            struct nav_row row = row_at(0.1 * i, NOT_READ, &nan);
+            row.odometry[0] = i % 2 ? 0.02 : -0.02;
+            nav_filter_step(f, &row, &e);
+            assert_true(e.covariance[8] >= before.covariance[8]);
+            assert_int_equal(e.evaluations, 0);
+            before = e;
+        }
+        nav_filter_free(f);
+    }
+}
+
+static void the_callers_arrays_may_go_after_creation(void **state)
+{
+    (void)state;
+    struct nav_problem p = room();
+    uint8_t floor[4];
+    struct nav_tip tip = ROOM_TIP[0];
+    memcpy(floor, ROOM_FLOOR, sizeof floor);
+    p.arena.floor = floor;
+    p.robot.tip = &tip;
+    struct nav_filter *kept = nav_filter_new("foveal", &p);
+    memset(floor, 1, sizeof floor);
+    tip.x = 1e9;
+    struct nav_problem fresh = room();
+    struct nav_filter *reference = nav_filter_new("foveal", &fresh);
+    const double nothing = INFINITY;
+    struct nav_row row = row_at(0.1, READ, &nothing);
+    struct nav_estimate a, b;
+    nav_filter_step(kept, &row, &a);
+    nav_filter_step(reference, &row, &b);
+    assert_memory_equal(&a.pose, &b.pose, sizeof a.pose);
+    nav_filter_free(kept);
+    nav_filter_free(reference);
+}
+
+static void settings_are_set_by_name_and_within_their_range(void **state)
+{
+    (void)state;
+    struct nav_settings s;
+    nav_settings_default(&s);
+    assert_near(s.foveal_cells, 11.0, 0.0);
+    assert_int_equal(nav_settings_set(&s, "grid.cell_m", 0.1), 0);
+    assert_near(s.grid_cell_m, 0.1, 0.0);
+    assert_int_equal(nav_settings_set(&s, "grid.cell_m", 0.0), -2);
+    assert_int_equal(nav_settings_set(&s, "grid.cell_m", NAN), -2);
+    assert_int_equal(nav_settings_set(&s, "grid.cell", 0.1), -1);
+    assert_near(s.grid_cell_m, 0.1, 0.0);
+    const char *name;
+    double standard, low, high;
+    int count = 0;
+    for (; nav_settings_describe(count, &name, &standard, &low, &high) == 0; count++)
+        assert_int_equal(nav_settings_set(&s, name, standard), 0);
+    assert_int_equal(count, sizeof s / sizeof(double)); /* every field has a name */
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(readings_count_by_how_far_the_whisker_has_moved),
+        cmocka_unit_test(turning_moves_a_whisker_by_its_lever),
+        cmocka_unit_test(bad_cells_are_counted_and_not_read),
+        cmocka_unit_test(odometry_is_never_taken_twice_nor_dropped),
+        cmocka_unit_test(every_filter_is_listed_and_no_other_name_is_taken),
+        cmocka_unit_test(no_row_makes_any_filter_say_nonsense),
+        cmocka_unit_test(nothing_read_makes_no_filter_surer),
+        cmocka_unit_test(the_callers_arrays_may_go_after_creation),
+        cmocka_unit_test(settings_are_set_by_name_and_within_their_range),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,103 @@
+/* The foveal filter by hand; its state is looked at, so its source is part of this program. */
+#include "../foveal.c"
+
+#include "near.h"
+#include "rooms.h"
+
+static struct nav_problem quiet_room(void)
+{
+    struct nav_problem p = room();
+    p.prior.mean = (struct nav_pose){0.36, 0.25, 0.0};
+    p.prior.sigma[0] = p.prior.sigma[1] = 0.1;
+    p.prior.sigma[2] = 0.3;
+    return p;
+}
+
+static void the_fovea_is_eleven_cubed_over_a_quarter_metre_and_ninety_degrees(void **state)
+{
+    (void)state;
+    struct nav_problem p = quiet_room();
+    struct foveal *f = create(&p);
+    assert_int_equal(points(f), 1331);
+    f->belief.mean.theta = NAV_PI / 2.0; /* egocentric: ahead is up */
+    struct nav_pose first = point(f, 0), last = point(f, 1330);
+    assert_near(last.y - first.y, 0.25, 1e-12);
+    assert_near(first.x - last.x, 0.25, 1e-12);
+    assert_near(last.theta - first.theta, NAV_PI / 2.0, 1e-12);
+    assert_near(point(f, 665).x, 0.36, 1e-12);
+    destroy(f);
+}
+
+static void nothing_read_keeps_the_mode_and_fits_the_clipped_prior(void **state)
+{
+    (void)state;
+    struct nav_problem p = quiet_room();
+    p.prior.sigma[0] = p.prior.sigma[1] = 0.03;
+    p.settings.foveal_quantum_m = 0.01;
+    struct foveal *f = create(&p);
+    const double none[] = {0.0, 0.0};
+    update(f, &(struct nav_evidence){NULL, none});
+    assert_near(f->belief.mean.x, 0.36, 1e-12);
+    /* A Gaussian of 0.03 m sampled every 0.025 m keeps its variance; the quantisation term is added (equation 7). */
+    assert_near(f->belief.covariance[0], 0.0009 + 0.0001, 2e-5);
+    assert_near(f->belief.covariance[1], 0.0, 1e-9);
+    destroy(f);
+}
+
+static void a_texture_moves_the_mode_to_the_nearest_point_that_fits(void **state)
+{
+    (void)state;
+    struct nav_problem p = quiet_room();
+    p.settings.texture_temper = 1.0;
+    p.settings.texture_outlier = 1e-6;
+    p.prior.sigma[2] = 0.05;
+    struct foveal *f = create(&p);
+    const double right_tile[] = {-50.0, 0.0}, weight[] = {1.0, 0.0};
+    const double *reading[] = {right_tile, NULL};
+    update(f, &(struct nav_evidence){reading, weight});
+    /* Tip 0.1 ahead, border at 0.5: the centre is at 0.4 or beyond; points lie at 0.36, 0.385, 0.41. */
+    assert_near(f->belief.mean.x, 0.41, 1e-12);
+    assert_near(f->belief.mean.y, 0.25, 1e-12);
+    assert_near(f->belief.mean.theta, 0.0, 1e-12);
+    destroy(f);
+}
+
+static void it_never_looks_outside_the_fovea(void **state)
+{
+    (void)state;
+    struct nav_problem p = quiet_room();
+    p.prior.mean.x = 0.2; /* the tip's border is 0.2 m ahead, outside the fovea's 0.125 */
+    p.settings.texture_temper = 1.0;
+    struct foveal *f = create(&p);
+    const double right_tile[] = {-50.0, 0.0}, weight[] = {1.0, 0.0};
+    const double *reading[] = {right_tile, NULL};
+    update(f, &(struct nav_evidence){reading, weight});
+    assert_near(f->belief.mean.x, 0.2, 0.126);
+    destroy(f);
+}
+
+static void a_fovea_wholly_inside_a_solid_changes_nothing(void **state)
+{
+    (void)state;
+    struct nav_problem p = quiet_room();
+    p.prior.mean = (struct nav_pose){5.0, 5.0, 0.0};
+    struct foveal *f = create(&p);
+    const double right_tile[] = {-50.0, 0.0}, weight[] = {1.0, 0.0};
+    const double *reading[] = {right_tile, NULL};
+    update(f, &(struct nav_evidence){reading, weight});
+    assert_near(f->belief.mean.x, 5.0, 0.0);
+    assert_near(f->belief.covariance[0], 0.01, 1e-12);
+    destroy(f);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_fovea_is_eleven_cubed_over_a_quarter_metre_and_ninety_degrees),
+        cmocka_unit_test(nothing_read_keeps_the_mode_and_fits_the_clipped_prior),
+        cmocka_unit_test(a_texture_moves_the_mode_to_the_nearest_point_that_fits),
+        cmocka_unit_test(it_never_looks_outside_the_fovea),
+        cmocka_unit_test(a_fovea_wholly_inside_a_solid_changes_nothing),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,88 @@
+#include "gaussian.h"
+
+#include "filter.h"
+#include "near.h"
+#include "rooms.h"
+
+static const struct nav_noise NO_NOISE = {0.0, 0.0};
+
+static void moving_turns_heading_error_into_sideways_error(void **state)
+{
+    (void)state;
+    struct nav_gaussian g = {.mean = {1.0, 2.0, NAV_PI / 2.0}, .covariance = {0.01, 0, 0, 0, 0.04, 0, 0, 0, 0.09}};
+    nav_gaussian_move(&g, (struct nav_pose){2.0, 0.0, 0.5}, &(struct nav_noise){0.001, 0.002});
+    assert_near(g.mean.x, 1.0, 1e-12);
+    assert_near(g.mean.y, 4.0, 1e-12);
+    assert_near(g.mean.theta, NAV_PI / 2.0 + 0.5, 1e-12);
+    assert_near(g.covariance[0], 0.01 + 4.0 * 0.09 + 0.001, 1e-12);
+    assert_near(g.covariance[4], 0.04 + 0.001, 1e-12);
+    assert_near(g.covariance[2], -2.0 * 0.09, 1e-12);
+    assert_near(g.covariance[6], -2.0 * 0.09, 1e-12);
+    assert_near(g.covariance[8], 0.09 + 0.002, 1e-12);
+}
+
+static void a_circle_walked_in_steps_closes(void **state)
+{
+    (void)state;
+    struct nav_gaussian g = {.mean = {1.0, 1.0, 3.0}, .covariance = {1, 0, 0, 0, 1, 0, 0, 0, 0.01}};
+    for (int i = 0; i < 360; i++)
+        nav_gaussian_move(&g, (struct nav_pose){0.01, 0.0, NAV_PI / 180.0}, &NO_NOISE);
+    assert_near(g.mean.x, 1.0, 1e-9);
+    assert_near(g.mean.theta, 3.0, 1e-9);
+    assert_near(g.covariance[0], 1.0, 1e-9); /* heading error does not move where one started */
+}
+
+static void an_inverse_undoes_and_a_flat_covariance_has_none(void **state)
+{
+    (void)state;
+    const double c[9] = {2.0, 0.3, 0.1, 0.3, 1.0, -0.2, 0.1, -0.2, 0.5};
+    double inverse[9];
+    assert_true(nav_gaussian_invert(c, inverse));
+    for (int i = 0; i < 9; i++) {
+        double sum = 0.0;
+        for (int k = 0; k < 3; k++)
+            sum += c[i / 3 * 3 + k] * inverse[3 * k + i % 3];
+        assert_near(sum, i % 4 == 0 ? 1.0 : 0.0, 1e-12);
+    }
+    const double flat[9] = {1.0, 1.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0};
+    assert_false(nav_gaussian_invert(flat, inverse));
+    const double broken[9] = {NAN, 0, 0, 0, 1, 0, 0, 0, 1};
+    assert_false(nav_gaussian_invert(broken, inverse));
+}
+
+static void mass_near_the_mean_is_the_normal_distributions(void **state)
+{
+    (void)state;
+    struct nav_gaussian g = {.covariance = {0.01, 0, 0, 0, 0.01, 0, 0, 0, 0.0625}};
+    double round = (1.0 - exp(-0.5 * 6.25)) * erf(2.0 / sqrt(2.0));
+    assert_near(nav_gaussian_mass(&g, 0.25, 0.5), round, 1e-9);
+    g.covariance[4] = 1e-12; /* a line: one dimension is left */
+    assert_near(nav_gaussian_mass(&g, 0.25, 10.0), erf(2.5 / sqrt(2.0)), 0.02);
+}
+
+static void noise_grows_with_the_way_not_with_the_number_of_rows(void **state)
+{
+    (void)state;
+    struct nav_problem p = room();
+    const struct nav_motion whole = {.step = {0.3, 0.0, 0.2}}, part = {.step = {0.03, 0.0, 0.02}};
+    struct nav_noise once = nav_motion_noise(&p.robot, &p.settings, &whole);
+    struct nav_noise tenth = nav_motion_noise(&p.robot, &p.settings, &part);
+    assert_near(10.0 * tenth.position, once.position, 1e-12);
+    assert_near(10.0 * tenth.heading, once.heading, 1e-12);
+    assert_near(once.position, pow(0.05 * 0.3, 2.0), 1e-12); /* one correlation length: the paper's 5 % of the way */
+    const struct nav_motion unknown = {.unknown_m = 0.1, .unknown_rad = 0.2};
+    assert_near(nav_motion_noise(&p.robot, &p.settings, &unknown).position, 0.01, 1e-12);
+    assert_near(nav_motion_noise(&p.robot, &p.settings, &unknown).heading, 0.04, 1e-12);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(moving_turns_heading_error_into_sideways_error),
+        cmocka_unit_test(a_circle_walked_in_steps_closes),
+        cmocka_unit_test(an_inverse_undoes_and_a_flat_covariance_has_none),
+        cmocka_unit_test(mass_near_the_mean_is_the_normal_distributions),
+        cmocka_unit_test(noise_grows_with_the_way_not_with_the_number_of_rows),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

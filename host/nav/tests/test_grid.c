@@ -1,0 +1,226 @@
+/* The grid filter against equation 4 summed naively in double precision. The filter's own state is looked at, so its
+ * source is part of this program. */
+#include "../grid.c"
+
+#include "near.h"
+#include "rooms.h"
+
+enum { N = 10, H = 4, CELLS = N * N * H };
+static const double CELL = 0.1;
+
+/* Slices of 90 degrees head along the diagonals: driving one diagonal is a move by whole cells in every slice. */
+static struct nav_problem diagonal_room(void)
+{
+    struct nav_problem p = room();
+    p.settings.grid_cell_m = CELL;
+    p.settings.grid_cell_deg = 90.0;
+    p.settings.grid_sub = 1.0;
+    p.settings.grid_sub_heading = 1.0;
+    p.settings.grid_teleport = 0.0;
+    p.settings.motion_drift_rad = 1.0; /* large enough for a heading blur in every row, */
+    p.settings.motion_along_m = 0.1;   /* and for one blur in position */
+    p.prior.sigma[0] = p.prior.sigma[1] = 0.2;
+    p.prior.sigma[2] = 0.8;
+    return p;
+}
+
+static struct nav_pose centre(int i, int j, int k)
+{
+    return (struct nav_pose){(i + 0.5) * CELL, (j + 0.5) * CELL, (k + 0.5) * NAV_PI / 2.0};
+}
+
+static double kernel(int offset, double share)
+{
+    return offset == 0 ? 1.0 - share : abs(offset) == 1 ? share / 2.0 : 0.0;
+}
+
+static int heading_offset(int a, int b)
+{
+    int d = ((a - b) % H + H) % H;
+    return d == 3 ? -1 : d;
+}
+
+/* T(X | X0, o) of equation 4: one cell along each axis of the diagonal, a quarter turn, three-point noise per axis. A
+ * motion that leads through a wall has no chance. */
+static double transition(const int to[3], const int from[3], double share, double share_heading)
+{
+    static const int DX[] = {1, -1, -1, 1}, DY[] = {1, 1, -1, -1};
+    int x = from[0] + DX[from[2]], y = from[1] + DY[from[2]];
+    int turn = heading_offset(to[2], (from[2] + 1) % H);
+    if (x < 0 || x >= N || y < 0 || y >= N)
+        return 0.0;
+    return kernel(to[0] - x, share) * kernel(to[1] - y, share) * kernel(turn, share_heading);
+}
+
+static double likelihood(const struct nav_problem *p, struct nav_likelihood *l, struct nav_pose pose)
+{
+    uint8_t codes[2];
+    if (!nav_arena_free(&p->arena, pose.x, pose.y, 0.0))
+        return 0.0;
+    nav_likelihood_expect(l, &p->arena, &p->robot, pose, codes);
+    return exp((double)nav_likelihood_of(l, codes));
+}
+
+static void cell_of(int n, int at[3])
+{
+    at[0] = n % N;
+    at[1] = n / N % N;
+    at[2] = n / (N * N);
+}
+
+static void normalise(double *belief)
+{
+    double sum = 0.0;
+    for (int n = 0; n < CELLS; n++)
+        sum += belief[n];
+    for (int n = 0; n < CELLS; n++)
+        belief[n] /= sum;
+}
+
+/* Equation 4, all pairs of cells. */
+static void naive_step(const struct nav_problem *p, struct nav_likelihood *l, double *belief, double share, double turn)
+{
+    static double next[CELLS];
+    for (int n = 0; n < CELLS; n++) {
+        int to[3], from[3];
+        cell_of(n, to);
+        next[n] = 0.0;
+        for (int m = 0; m < CELLS; m++) {
+            cell_of(m, from);
+            next[n] += belief[m] * transition(to, from, share, turn);
+        }
+        next[n] *= likelihood(p, l, centre(to[0], to[1], to[2]));
+    }
+    memcpy(belief, next, sizeof next);
+    normalise(belief);
+}
+
+/* The filter's belief by true heading: its slices turn with the robot. */
+static void by_heading(const struct grid *g, double *belief)
+{
+    for (int p = 0; p < H; p++) {
+        double heading = nav_lattice_heading(&g->lattice, p) / (NAV_PI / 2.0);
+        int k = (int)floor(heading - 4.0 * floor(heading / 4.0));
+        for (int c = 0; c < N * N; c++)
+            belief[k * N * N + c] = (double)nav_lattice_slice(&g->lattice, p)[c];
+    }
+}
+
+static double total_variation(const double *a, const double *b)
+{
+    double sum = 0.0;
+    for (int n = 0; n < CELLS; n++)
+        sum += fabs(a[n] - b[n]) / 2.0;
+    return sum;
+}
+
+static void the_grid_is_equation_4(void **state)
+{
+    (void)state;
+    struct nav_problem p = diagonal_room();
+    struct grid *g = create(&p);
+    static double naive[CELLS], fast[CELLS];
+    by_heading(g, naive);
+    const struct nav_motion motion = {.step = {CELL * sqrt(2.0), 0.0, NAV_PI / 2.0}};
+    const struct nav_noise noise = nav_motion_noise(&p.robot, &p.settings, &motion);
+    double d = CELL * sqrt(2.0), width = NAV_PI / 2.0;
+    double share = (noise.position + width * width / 12.0 * d * d) / (CELL * CELL);
+    double turn = noise.heading / (width * width);
+    assert_true(share > 0.04 && share < 0.5 && turn > 0.04 && turn < 0.5); /* paid at once, in one pass */
+    const double windows[3][2] = {{0.0, -30.0}, {-30.0, 0.0}, {0.0, -3.0}};
+    const double distances[3] = {INFINITY, 0.12, 0.2}, fresh[] = {1.0, 1.0};
+    for (int row = 0; row < 3; row++) {
+        const double *reading[] = {windows[row], &distances[row]};
+        predict(g, &motion);
+        update(g, &(struct nav_evidence){reading, fresh});
+        by_heading(g, fast);
+        naive_step(&p, g->likelihood, naive, share, turn);
+        assert_near(total_variation(naive, fast), 0.0, 1e-6);
+    }
+    destroy(g);
+}
+
+static void motion_put_off_is_kept_exactly(void **state)
+{
+    (void)state;
+    struct nav_problem p = room();
+    p.robot.odometry_relative = 0.0;
+    struct grid *g = create(&p);
+    struct nav_estimate before, after;
+    const struct nav_motion step = {.step = {0.003, 0.0, 0.01}};
+    struct nav_pose walked = g->summary.mean;
+    estimate(g, &before);
+    for (int i = 0; i < 30; i++) {
+        predict(g, &step);
+        walked = nav_compose(walked, step.step);
+    }
+    estimate(g, &after);
+    assert_near(after.pose.x, walked.x, 1e-12);
+    assert_near(after.pose.theta, walked.theta, 1e-12);
+    assert_true(after.covariance[0] > before.covariance[0]);
+    assert_near((double)g->lattice.rotation, 0.0, 0.0);
+    destroy(g);
+}
+
+static void belief_is_clipped_to_free_space(void **state)
+{
+    (void)state;
+    struct nav_problem p = room();
+    p.prior.mean = (struct nav_pose){0.95, 0.15, 0.0}; /* inside the box */
+    struct grid *g = create(&p);
+    double inside = 0.0, all = 0.0;
+    for (int s = 0; s < g->lattice.nh; s++) {
+        for (int c = 0; c < g->lattice.nx * g->lattice.ny; c++) {
+            double mass = (double)nav_lattice_slice(&g->lattice, s)[c];
+            all += mass;
+            inside += (c % g->lattice.nx >= 17 && c / g->lattice.nx <= 5) ? mass : 0.0;
+        }
+    }
+    assert_near(all, 1.0, 1e-5);
+    assert_near(inside, 0.0, 0.0);
+    destroy(g);
+}
+
+static void a_belief_with_no_room_left_starts_again_everywhere(void **state)
+{
+    (void)state;
+    struct nav_problem p = room();
+    p.settings.grid_teleport = 0.0;
+    p.prior.sigma[0] = p.prior.sigma[1] = 0.01;
+    p.prior.mean = (struct nav_pose){0.95, 0.15, 0.0};
+    struct grid *g = create(&p);
+    struct nav_estimate out;
+    estimate(g, &out);
+    assert_true(out.confidence < 0.2 && isfinite(out.pose.x));
+    destroy(g);
+}
+
+static void a_wall_felt_ahead_puts_the_robot_before_it(void **state)
+{
+    (void)state;
+    struct nav_problem p = room();
+    p.prior.mean = (struct nav_pose){0.7, 0.6, 0.0};
+    p.prior.sigma[2] = 0.05;
+    struct grid *g = create(&p);
+    const double nothing[] = {0.0, 0.0}, distance = 0.1, weight[] = {0.0, 1.0};
+    const double *reading[] = {nothing, &distance};
+    update(g, &(struct nav_evidence){reading, weight});
+    struct nav_estimate out;
+    estimate(g, &out);
+    /* Base 0.05 ahead of the centre, contact 0.1 further on, wall at 1: x = 0.85. The prior pulls it a little back. */
+    assert_near(out.pose.x, 0.85, 0.02);
+    assert_near(out.pose.y, 0.6, 0.03);
+    destroy(g);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_grid_is_equation_4),
+        cmocka_unit_test(motion_put_off_is_kept_exactly),
+        cmocka_unit_test(belief_is_clipped_to_free_space),
+        cmocka_unit_test(a_belief_with_no_room_left_starts_again_everywhere),
+        cmocka_unit_test(a_wall_felt_ahead_puts_the_robot_before_it),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,155 @@
+#include "lattice.h"
+
+#include "near.h"
+
+static const struct nav_noise NO_NOISE = {0.0, 0.0};
+
+static double total(const struct nav_lattice *l)
+{
+    double sum = 0.0;
+    for (size_t i = 0; i < nav_lattice_cells(l); i++)
+        sum += (double)l->mass[i];
+    return sum;
+}
+
+/* All mass in one cell. */
+static struct nav_lattice peak(double size, double cell, int headings, int i, int j, int p)
+{
+    struct nav_lattice l;
+    assert_int_equal(nav_lattice_init(&l, size, size, cell, headings), 0);
+    nav_lattice_slice(&l, p)[j * l.nx + i] = 1.0f;
+    return l;
+}
+
+static void small_steps_keep_a_sharp_belief_sharp_and_exact(void **state)
+{
+    (void)state;
+    struct nav_lattice l = peak(3.0, 0.05, 36, 10, 10, 2);
+    const double heading = 2.5 * NAV_PI / 18.0;
+    for (int step = 0; step < 100; step++)
+        nav_lattice_move(&l, (struct nav_pose){0.015, 0.0, 0.0}, &NO_NOISE);
+    struct nav_pose mode = nav_lattice_mode(&l);
+    assert_near(total(&l), 1.0, 0.0);
+    assert_near((double)nav_lattice_slice(&l, 2)[(int)(mode.y / 0.05) * l.nx + (int)(mode.x / 0.05)], 1.0, 0.0);
+    assert_near(mode.x, 10.5 * 0.05 + 1.5 * cos(heading), 1e-9);
+    assert_near(mode.y, 10.5 * 0.05 + 1.5 * sin(heading), 1e-9);
+    nav_lattice_free(&l);
+}
+
+static void turning_and_driving_a_square_comes_back(void **state)
+{
+    (void)state;
+    struct nav_lattice l = peak(3.0, 0.05, 36, 30, 30, 7);
+    struct nav_pose start = nav_lattice_mode(&l), expected = start;
+    for (int step = 0; step < 160; step++) {
+        struct nav_pose move =
+            step % 40 < 20 ? (struct nav_pose){0.0123, 0.001, 0.0} : (struct nav_pose){0.0, 0.0, NAV_PI / 40.0};
+        nav_lattice_move(&l, move, &NO_NOISE);
+        expected = nav_compose(expected, move);
+    }
+    struct nav_pose end = nav_lattice_mode(&l);
+    assert_near(total(&l), 1.0, 0.0);
+    assert_near(end.x, start.x, 1e-9);
+    assert_near(end.y, expected.y, 1e-9);
+    assert_near(nav_wrap(end.theta - start.theta), 0.0, 1e-9);
+    nav_lattice_free(&l);
+}
+
+static void noise_adds_the_variance_asked_for_and_keeps_the_mass(void **state)
+{
+    (void)state;
+    struct nav_lattice l = peak(3.0, 0.05, 36, 30, 30, 18);
+    struct nav_pose start = nav_lattice_mode(&l), mean = start;
+    const struct nav_noise noise = {.position = 1e-4, .heading = 4e-4};
+    double before[9], after[9];
+    nav_lattice_covariance(&l, start, before);
+    for (int step = 0; step < 50; step++)
+        nav_lattice_move(&l, (struct nav_pose){0.0, 0.0, 0.0}, &noise);
+    double owed = l.owed_position, owed_heading = l.owed_heading;
+    assert_near(total(&l), 1.0, 1e-5);
+    nav_lattice_near(&l, start, &mean);
+    nav_lattice_covariance(&l, start, after);
+    assert_near(mean.x, start.x, 5e-4); /* cells right on the circle may fall on either side */
+    assert_near(after[0] - before[0], 50 * 1e-4 - owed, 1e-5);
+    assert_near(after[4] - before[4], 50 * 1e-4 - owed, 1e-5);
+    assert_near(after[8] - before[8], 50 * 4e-4 - owed_heading, 1e-4);
+    assert_near(after[1], 0.0, 1e-6);
+    nav_lattice_free(&l);
+}
+
+static void mass_poured_between_shifted_slices_keeps_its_place(void **state)
+{
+    (void)state;
+    struct nav_lattice l = peak(2.0, 0.05, 8, 20, 20, 0);
+    /* After half a metre the slices' shifts differ by tens of millimetres. */
+    nav_lattice_move(&l, (struct nav_pose){0.512, 0.0, 0.0}, &NO_NOISE);
+    struct nav_pose there = nav_lattice_mode(&l), mean = there;
+    nav_lattice_move(&l, (struct nav_pose){0.0, 0.0, 0.0}, &(struct nav_noise){0.0, 0.1});
+    assert_near(total(&l), 1.0, 1e-6);
+    double x = 0.0, y = 0.0;
+    for (int p = 0; p < l.nh; p++) {
+        for (int c = 0; c < l.nx * l.ny; c++) {
+            double mass = (double)nav_lattice_slice(&l, p)[c];
+            x += mass * ((c % l.nx + 0.5) * l.cell + l.shift_x[p]);
+            y += mass * ((c / l.nx + 0.5) * l.cell + l.shift_y[p]);
+        }
+    }
+    assert_near(x, there.x, 1e-6);
+    assert_near(y, there.y, 1e-6);
+    assert_true(nav_lattice_near(&l, there, &mean) < 0.95);
+    nav_lattice_free(&l);
+}
+
+static void mass_that_leaves_the_lattice_is_lost(void **state)
+{
+    (void)state;
+    struct nav_lattice l = peak(1.0, 0.1, 4, 5, 5, 0);
+    nav_lattice_move(&l, (struct nav_pose){5.0, 0.0, 0.0}, &NO_NOISE);
+    assert_near(total(&l), 0.0, 0.0);
+    nav_lattice_free(&l);
+}
+
+static void a_prior_fills_cells_with_its_integral(void **state)
+{
+    (void)state;
+    struct nav_lattice l;
+    nav_lattice_init(&l, 1.0, 1.0, 0.1, 36);
+    const struct nav_prior prior = {.mean = {0.5, 0.5, 3.1}, .sigma = {0.05, 0.1, 0.3}};
+    nav_lattice_fill(&l, &prior);
+    double covariance[9];
+    assert_near(total(&l), 1.0, 1e-5);
+    nav_lattice_covariance(&l, prior.mean, covariance);
+    /* A histogram's variance: the density's, and twice the width^2 / 12 of a cell (integrating and spreading). */
+    assert_near(covariance[0], 0.0025 + 0.01 / 6.0, 2e-4);
+    assert_near(covariance[4], 0.01 + 0.01 / 6.0, 2e-4);
+    assert_near(covariance[8], 0.09 + pow(NAV_PI / 18.0, 2.0) / 6.0, 1e-3);
+    nav_lattice_free(&l);
+}
+
+static void near_counts_the_mass_around_a_pose_across_the_heading_seam(void **state)
+{
+    (void)state;
+    struct nav_lattice l = peak(2.0, 0.1, 36, 10, 10, 0);
+    nav_lattice_slice(&l, 35)[10 * l.nx + 11] = 1.0f;
+    nav_lattice_slice(&l, 0)[10 * l.nx + 14] = 1.0f;
+    nav_lattice_slice(&l, 10)[10 * l.nx + 10] = 1.0f;
+    struct nav_pose mean = {0.0, 0.0, 0.0};
+    assert_near(nav_lattice_near(&l, (struct nav_pose){1.05, 1.05, 0.0}, &mean), 2.0, 1e-6);
+    assert_near(mean.x, 1.1, 1e-9);
+    assert_near(mean.theta, 0.0, 1e-9);
+    nav_lattice_free(&l);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(small_steps_keep_a_sharp_belief_sharp_and_exact),
+        cmocka_unit_test(turning_and_driving_a_square_comes_back),
+        cmocka_unit_test(noise_adds_the_variance_asked_for_and_keeps_the_mass),
+        cmocka_unit_test(mass_poured_between_shifted_slices_keeps_its_place),
+        cmocka_unit_test(mass_that_leaves_the_lattice_is_lost),
+        cmocka_unit_test(a_prior_fills_cells_with_its_integral),
+        cmocka_unit_test(near_counts_the_mass_around_a_pose_across_the_heading_seam),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

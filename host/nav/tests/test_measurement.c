@@ -1,0 +1,188 @@
+#include "expected.h"
+#include "likelihood.h"
+#include "measurement.h"
+
+#include "near.h"
+#include "rooms.h"
+
+static struct nav_settings settings(void)
+{
+    struct nav_settings s;
+    nav_settings_default(&s);
+    s.texture_temper = 0.05;
+    s.texture_outlier = 0.2;
+    s.radial_miss = 0.1;
+    s.radial_ghost = 0.01;
+    return s;
+}
+
+static void texture_is_tempered_and_floored(void **state)
+{
+    (void)state;
+    struct nav_settings s = settings();
+    const struct nav_model m = {.fill = nav_mm_texture, .settings = &s, .values = 2, .codes = 2};
+    const double loglik[] = {-500.0, -520.0};
+    float out[2];
+    m.fill(&m, loglik, 1.0, out);
+    /* softmax(0, -1) = 0.7310586, 0.2689414; p = 0.8 share + 0.1. */
+    assert_near((double)out[0], log(0.8 * 0.7310586 + 0.1), 1e-6);
+    assert_near((double)out[1], log(0.8 * 0.2689414 + 0.1), 1e-6);
+    m.fill(&m, loglik, 0.5, out);
+    assert_near((double)out[0], 0.5 * log(0.8 * 0.7310586 + 0.1), 1e-6);
+}
+
+static void however_sure_a_window_is_the_floor_remains(void **state)
+{
+    (void)state;
+    struct nav_settings s = settings();
+    const struct nav_model m = {.fill = nav_mm_texture, .settings = &s, .values = 3, .codes = 3};
+    const double loglik[] = {0.0, -1e6, -1e6};
+    float out[3];
+    m.fill(&m, loglik, 1.0, out);
+    assert_near((double)out[2], log(0.2 / 3.0), 1e-6);
+}
+
+/* A whisker of 0.1 m in steps of 1 cm up to 0.12 m, code 12: nothing. */
+static struct nav_model whisker(const struct nav_settings *s)
+{
+    return (struct nav_model){.fill = nav_mm_radial,
+                              .settings = s,
+                              .values = 1,
+                              .codes = 13,
+                              .length = 0.1,
+                              .step = 0.01,
+                              .sigma = 0.01,
+                              .edge = 0.01};
+}
+
+static void a_measured_distance_is_gaussian_on_a_floor_of_ghosts(void **state)
+{
+    (void)state;
+    struct nav_settings s = settings();
+    const struct nav_model m = whisker(&s);
+    const double reading = 0.045, peak = 1.0 / (0.01 * sqrt(2.0 * NAV_PI)), ghost = 0.01 / 0.1;
+    float out[13];
+    m.fill(&m, &reading, 1.0, out);
+    assert_near((double)out[4], log(0.9 * peak + 0.1 * ghost), 1e-4);
+    assert_near((double)out[6], log(0.9 * 0.9997674 * peak * exp(-2.0) + 0.1 * ghost), 1e-4);
+    assert_near((double)out[12], log(ghost), 1e-5);
+}
+
+static void no_contact_is_strong_evidence_deep_in_a_wall_and_weak_at_the_tip(void **state)
+{
+    (void)state;
+    struct nav_settings s = settings();
+    const struct nav_model m = whisker(&s);
+    const double nothing = (double)INFINITY;
+    float out[13];
+    m.fill(&m, &nothing, 1.0, out);
+    assert_near((double)out[4], log((1.0 - 0.9) * 0.99), 1e-4);
+    assert_near((double)out[12], log(0.99), 1e-5);
+    /* Codes 9 and 10 lie half a step on either side of the tip: noticed with 0.9 Phi(+-0.5). */
+    assert_near((double)out[9], log((1.0 - 0.9 * 0.6914625) * 0.99), 1e-5);
+    assert_near((double)out[10], log((1.0 - 0.9 * 0.3085375) * 0.99), 1e-5);
+}
+
+static void whiskers_add_and_those_not_read_say_nothing(void **state)
+{
+    (void)state;
+    struct nav_problem p = room();
+    struct nav_likelihood *l = nav_likelihood_new(&p.arena, &p.robot, &p.settings, 0.0);
+    const double texture[] = {0.0, -20.0}, distance = 0.1;
+    const double *reading[] = {texture, &distance};
+    const double both[] = {1.0, 1.0}, one[] = {1.0, 0.0}, none[] = {0.0, 0.0};
+    uint8_t codes[2];
+    nav_likelihood_expect(l, &p.arena, &p.robot, (struct nav_pose){0.8503, 0.6, 0.0}, codes);
+    assert_int_equal(codes[0], 0);
+    assert_int_equal(codes[1], (int)floor(0.0997 / l->model[1].step));
+    nav_likelihood_read(l, &(struct nav_evidence){reading, both});
+    float all = nav_likelihood_of(l, codes);
+    nav_likelihood_read(l, &(struct nav_evidence){reading, one});
+    float texture_only = nav_likelihood_of(l, codes);
+    float table[256];
+    l->model[1].fill(&l->model[1], &distance, 1.0, table);
+    assert_near((double)all, (double)(texture_only + table[codes[1]]), 1e-6);
+    nav_likelihood_read(l, &(struct nav_evidence){reading, none});
+    assert_near((double)nav_likelihood_of(l, codes), 0.0, 0.0);
+    nav_likelihood_free(l);
+}
+
+static void the_table_holds_what_each_free_pose_expects(void **state)
+{
+    (void)state;
+    struct nav_problem p = room();
+    p.robot.body_radius = 0.06; /* half a step of grace leaves 0.035 */
+    struct nav_likelihood *l = nav_likelihood_new(&p.arena, &p.robot, &p.settings, 0.01);
+    struct nav_expected *e = nav_expected_new(&p.arena, &p.robot, l, 0.05, 8, 2);
+    int free_poses = 0;
+    for (int k = 0; k < 8; k++) {
+        for (int j = -2; j < 22; j++) {
+            for (int i = -2; i < 22; i++) {
+                struct nav_pose pose = {(i + 0.5) * 0.05, (j + 0.5) * 0.05, (k + 0.5) * NAV_PI / 4.0};
+                uint32_t signature = nav_expected_row(e, k, j)[i];
+                if (!nav_arena_free(&p.arena, pose.x, pose.y, 0.035)) {
+                    assert_int_equal(signature, 0);
+                    continue;
+                }
+                uint8_t codes[2];
+                nav_likelihood_expect(l, &p.arena, &p.robot, pose, codes);
+                assert_memory_equal(e->codes + signature * 3, codes, 2);
+                free_poses++;
+            }
+        }
+    }
+    /* 18 x 18 places are clear of the walls; 4 x 5 of them and 3 above touch the box, its corner is missed by 0.4 mm.
+     */
+    assert_int_equal(free_poses, 8 * (18 * 18 - 23));
+    assert_in_range(e->signatures, 2, 200);
+    nav_expected_free(e);
+    nav_likelihood_free(l);
+}
+
+static void a_signature_is_worked_out_once_relative_to_the_best(void **state)
+{
+    (void)state;
+    struct nav_problem p = room();
+    struct nav_likelihood *l = nav_likelihood_new(&p.arena, &p.robot, &p.settings, 0.01);
+    struct nav_expected *e = nav_expected_new(&p.arena, &p.robot, l, 0.1, 4, 1);
+    const double texture[] = {0.0, -50.0}, distance = 0.1;
+    const double *reading[] = {texture, &distance};
+    const double both[] = {1.0, 1.0};
+    nav_likelihood_read(l, &(struct nav_evidence){reading, both});
+    nav_expected_evaluate(e, l);
+    float best = 0.0f, best_log = -INFINITY;
+    for (uint32_t n = 1; n < e->signatures; n++)
+        best_log = fmaxf(best_log, nav_likelihood_of(l, e->codes + 3 * n));
+    for (uint32_t n = 1; n < e->signatures; n++) {
+        assert_near((double)e->value[n], exp((double)(nav_likelihood_of(l, e->codes + 3 * n) - best_log)), 1e-6);
+        best = fmaxf(best, e->value[n]);
+    }
+    assert_near((double)best, 1.0, 0.0);
+    assert_near((double)e->value[0], 0.0, 0.0);
+    nav_expected_free(e);
+    nav_likelihood_free(l);
+}
+
+static void a_lattice_too_large_is_refused(void **state)
+{
+    (void)state;
+    struct nav_problem p = room();
+    struct nav_likelihood *l = nav_likelihood_new(&p.arena, &p.robot, &p.settings, 0.01);
+    assert_null(nav_expected_new(&p.arena, &p.robot, l, 1e-6, 360, 2));
+    nav_likelihood_free(l);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(texture_is_tempered_and_floored),
+        cmocka_unit_test(however_sure_a_window_is_the_floor_remains),
+        cmocka_unit_test(a_measured_distance_is_gaussian_on_a_floor_of_ghosts),
+        cmocka_unit_test(no_contact_is_strong_evidence_deep_in_a_wall_and_weak_at_the_tip),
+        cmocka_unit_test(whiskers_add_and_those_not_read_say_nothing),
+        cmocka_unit_test(the_table_holds_what_each_free_pose_expects),
+        cmocka_unit_test(a_signature_is_worked_out_once_relative_to_the_best),
+        cmocka_unit_test(a_lattice_too_large_is_refused),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
