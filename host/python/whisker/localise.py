@@ -80,7 +80,7 @@ class Filter:
         self._texture[:] = np.reshape(texture, self._texture.shape)
         self._radial[:] = radial_m
         self._row.t_s = t_s
-        self._row.odometry = odometry
+        self._row.odometry = list(map(float, odometry))
         self.advance()
         return self.estimate()
 

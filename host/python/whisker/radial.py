@@ -13,6 +13,7 @@ FORMAT = "whisker radial model 1"
 FIELDS = ("a1", "a0", "sigma_mm", "low_mm", "high_mm")
 REST_SHARE = 0.05  # the first samples of a recorded whisk, before it touches, give its rest
 REST_LEAST = 10
+TIP_MM = 3.0
 
 
 def peak(samples: np.ndarray, rest) -> float:
@@ -54,8 +55,8 @@ class RadialModel:
         return lib.nav_radial_predict(self._line, peak_counts), self._line.sigma_mm
 
     def contact_type(self, radius_mm: float) -> str:
-        """'tip' within one sigma of the outermost fitted radius or beyond it, else 'shaft'."""
-        return "tip" if radius_mm > self.high_mm - self.sigma_mm else "shaft"
+        """'tip' near the outermost fitted radius (one sigma, at least TIP_MM) or beyond it, else 'shaft'."""
+        return "tip" if radius_mm > self.high_mm - max(self.sigma_mm, TIP_MM) else "shaft"
 
     def save(self, path) -> None:
         content = {"format": FORMAT} | {name: getattr(self, name) for name in FIELDS}

@@ -1,0 +1,212 @@
+"""The command line: promises of the contract, and one line with exit code 2 for every structural mistake."""
+
+import json
+
+import level0
+import numpy as np
+import pytest
+from test_radial import write_whisks
+from whisker import localise, scene
+from whisker.cli import main
+
+
+def write_observations(path, made, observations):
+    arena, robot = made.arena, made.robot
+    header = ["t_s", *localise.ODOMETRY, "note"]
+    header += [f"{w.name}_{t}" for w in robot.of_role("texture") for t in arena.textures]
+    header += [f"{w.name}_mm" for w in robot.of_role("object")] + list(localise.TRUTH)
+    lines = [",".join(header)]
+    for k, t in enumerate(observations.t_text):
+        cells = [t, *map(repr, map(float, observations.odometry[k])), "x"]
+        cells += ["" if np.isnan(v) else f"{v:.3f}" for v in observations.texture[k].ravel()]
+        cells += ["" if np.isinf(v) else f"{v * 1000:.3f}" for v in observations.radial_m[k]]
+        lines.append(",".join(cells + [repr(float(v)) for v in observations.truth[k]]))
+    path.write_text("\n".join(lines) + "\n")
+
+
+@pytest.fixture(scope="module")
+def recorded():
+    return level0.record(3, rows=40)
+
+
+@pytest.fixture
+def folder(tmp_path, recorded):
+    scene.write(tmp_path / "s", recorded[0])
+    write_observations(tmp_path / "s" / "observations.csv", *recorded)
+    return tmp_path / "s"
+
+
+def run(capsys, *arguments):
+    """Exit code, standard output, standard error."""
+    try:
+        code = main([str(a) for a in arguments])
+    except SystemExit as leaving:
+        code = leaving.code
+    return (code, *capsys.readouterr())
+
+
+def replace_cell(path, row, column, text):
+    lines = path.read_text().splitlines()
+    cells = lines[row].split(",")
+    cells[lines[0].split(",").index(column)] = text
+    lines[row] = ",".join(cells)
+    path.write_text("\n".join(lines) + "\n")
+
+
+@pytest.mark.parametrize("name", localise.filter_names())
+def test_localise_writes_a_row_per_row_and_a_summary(capsys, folder, tmp_path, name):
+    code, out, _ = run(capsys, "localise", folder, "--filter", name, "--out", tmp_path / "est.csv", "--json")
+    assert code == 0
+    summary = json.loads(out.splitlines()[-1])
+    assert summary["filter"] == name and summary["steps"] == 40 and summary["bad_cells"] == summary["bad_rows"] == 0
+    assert {"setup_s", "step_us_mean", "step_us_median", "step_us_p99", "step_us_p999"} <= summary.keys()
+    assert {"evaluations_per_step", "peak_states", "peak_bytes"} <= summary.keys()
+    assert {"pose_error_median_m", "pose_error_p90_m", "heading_error_median_rad", "coverage_90"} <= summary.keys()
+    lines = (tmp_path / "est.csv").read_text().splitlines()
+    assert lines[0] == "t_s,x_m,y_m,theta_rad,confidence" and len(lines) == 41
+    cells = np.array([line.split(",") for line in lines[1:]], dtype=float)
+    assert np.array_equal(cells[:, 0], np.round(np.arange(1, 41) * 0.1, 4))
+    assert ((cells[:, 4] >= 0) & (cells[:, 4] <= 1)).all()
+
+
+def test_files_and_arrays_give_the_same_estimates(folder, recorded):
+    made, observations = recorded
+    again = localise.read_observations(folder / "observations.csv", scene.load(folder))
+    assert np.array_equal(again.radial_m, np.round(observations.radial_m, 6), equal_nan=True)
+    assert np.array_equal(np.isnan(again.texture), np.isnan(observations.texture))
+    ours, theirs = (localise.run("grid", made, o).estimates[-1] for o in (observations, again))
+    assert (ours.x_m, ours.y_m) == pytest.approx((theirs.x_m, theirs.y_m), abs=1e-3)
+
+
+def test_filters_never_read_the_truth_and_earlier_rows_never_know_later_ones(folder, tmp_path, capsys):
+    path = folder / "observations.csv"
+    run(capsys, "localise", folder, "--out", tmp_path / "a.csv")
+    lines = path.read_text().splitlines()
+    keep = [i for i, name in enumerate(lines[0].split(",")) if not name.startswith("true_")]
+    path.write_text("\n".join(",".join(line.split(",")[i] for i in reversed(keep)) for line in lines[:21]) + "\n")
+    code, out, _ = run(capsys, "localise", folder, "--out", tmp_path / "b.csv", "--json")
+    assert code == 0 and "pose_error_median_m" not in json.loads(out)
+    assert (tmp_path / "b.csv").read_text().splitlines() == (tmp_path / "a.csv").read_text().splitlines()[:21]
+
+
+def test_bad_cells_are_counted_and_the_run_goes_on(capsys, folder):
+    path = folder / "observations.csv"
+    bad = [("odo_x_m", "inf"), ("odo_y_m", ""), ("floorL_VINYL", "nan"), ("floorR_ROUGH", "what")]
+    bad += [("w0_mm", "-5"), ("w1_mm", "what"), ("w2_mm", "inf"), ("w3_mm", "9999"), ("t_s", "soon")]
+    for row, (column, text) in enumerate(bad, start=3):
+        replace_cell(path, row, column, text)
+    replace_cell(path, 20, "w0_mm", "nan")  # not read: no mistake
+    code, out, _ = run(capsys, "localise", folder, "--json")
+    summary = json.loads(out)
+    assert code == 0 and summary["bad_cells"] == len(bad) and summary["bad_rows"] == 0 and summary["steps"] == 40
+
+
+def test_repeated_and_reordered_rows_are_counted_and_answered(capsys, folder, tmp_path):
+    path = folder / "observations.csv"
+    lines = path.read_text().splitlines()
+    lines[10], lines[11] = lines[11], lines[10]
+    lines.insert(20, lines[20])
+    path.write_text("\n".join(lines) + "\n")
+    code, out, _ = run(capsys, "localise", folder, "--json", "--out", tmp_path / "e.csv")
+    assert code == 0 and json.loads(out)["bad_rows"] == 2
+    assert len((tmp_path / "e.csv").read_text().splitlines()) == 42
+
+
+def test_no_rows_are_no_mistake(capsys, folder):
+    path = folder / "observations.csv"
+    path.write_text(path.read_text().splitlines()[0] + "\n")
+    code, out, _ = run(capsys, "localise", folder, "--json")
+    assert code == 0 and json.loads(out)["steps"] == 0
+
+
+@pytest.mark.parametrize(
+    ("spoil", "complaint"),
+    [
+        (lambda lines: lines[:1] + [lines[1] + ",7"] + lines[2:], "line 2: 19 cells but 18 columns"),
+        (lambda lines: [lines[0].replace("odo_y_m", "odo_x_m"), *lines[1:]], "line 1: column 'odo_x_m' appears twice"),
+        (lambda lines: [lines[0].replace("w2_mm", "w9_mm"), *lines[1:]], "line 1: column 'w2_mm' is missing"),
+        (lambda lines: [], "no header line"),
+    ],
+)
+def test_structural_mistakes_are_one_line_and_exit_2(capsys, folder, spoil, complaint):
+    path = folder / "observations.csv"
+    path.write_text("\n".join(spoil(path.read_text().splitlines())))
+    code, out, err = run(capsys, "localise", folder)
+    assert code == 2 and out == "" and complaint in err and str(path) in err and err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (["--filter", "crystal"], "choose one of odometry"),
+        (["--set", "grid.cel=1"], "--set grid.cel: no such setting"),
+        (["--set", "grid.cell_m=0"], "outside 0.005 to 1"),
+        (["--set", "grid.cell_m"], "not KEY=NUMBER"),
+        (["--seed", "x"], "--seed"),
+        (["--fast"], "--fast"),
+        (["--out", "/nowhere/est.csv"], "cannot be written"),
+    ],
+)
+def test_wrong_arguments_are_one_line_and_exit_2(capsys, folder, arguments, complaint):
+    code, _, err = run(capsys, "localise", folder, *arguments)
+    assert code == 2 and complaint in err and err.count("\n") == 1
+
+
+def test_a_scene_without_prior_or_observations_is_one_line(capsys, folder):
+    (folder / "observations.csv").unlink()
+    assert run(capsys, "localise", folder)[0] == 2
+    (folder / "prior.toml").unlink()
+    code, _, err = run(capsys, "localise", folder)
+    assert code == 2 and "prior.toml: missing" in err and err.count("\n") == 1
+
+
+def test_settings_reach_the_filter(capsys, folder):
+    states = []
+    for cell in ("0.05", "0.1"):
+        _, out, _ = run(capsys, "localise", folder, "--set", f"grid.cell_m={cell}", "--json")
+        states.append(json.loads(out)["peak_states"])
+    assert states == [90000, 22500]
+
+
+def test_lists_and_help(capsys):
+    code, out, _ = run(capsys, "localise", "--list-filters")
+    assert code == 0 and out.split() == ["odometry", "foveal", "grid"]
+    assert "texture.temper=0.05 (0 to 1)" in run(capsys, "localise", "--list-settings")[1]
+    for words in ([], ["localise"], ["texture"], ["texture", "train"], ["texture", "classify"], ["radial"]):
+        code, out, _ = run(capsys, *words, "--help")
+        assert code == 0 and "example:\n  whisker " in out
+    for words in (["radial", "fit"], ["radial", "predict"]):
+        assert "example:\n  whisker radial" in run(capsys, *words, "--help")[1]
+
+
+def test_texture_learns_and_tells(capsys, tmp_path):
+    rng = np.random.default_rng(1)
+    for name, spread in (("calm", 10.0), ("rough", 80.0)):
+        (tmp_path / "d" / name).mkdir(parents=True)
+        rows = [f"{i * 5e-4},{int(x)},{int(y)}" for i, (x, y) in enumerate(rng.normal(30000, spread, (2000, 2)))]
+        (tmp_path / "d" / name / "1.csv").write_text("\n".join(["t_s,x,y", *rows]))
+    model, recording = tmp_path / "m.json", tmp_path / "d" / "rough" / "1.csv"
+    assert run(capsys, "texture", "train", tmp_path / "d", "--out", model)[0] == 0
+    code, out, _ = run(capsys, "texture", "classify", model, recording, "--json")
+    decisions = [json.loads(line) for line in out.splitlines()]
+    assert code == 0 and len(decisions) == 10
+    assert set(decisions[0]) == {"t_s", "loglik", "label", "confidence", "border"}
+    assert set(decisions[0]["loglik"]) == {"calm", "rough"} and {d["label"] for d in decisions} == {"rough"}
+    assert run(capsys, "texture", "classify", model, recording, "--window-ms", "0")[0] == 2
+    recording.write_text("t_s,x\n0,1\n")
+    code, _, err = run(capsys, "texture", "classify", model, recording)
+    assert code == 2 and "1 channels, but the model has 2" in err
+
+
+def test_radial_learns_and_tells(capsys, tmp_path):
+    contacts, model = tmp_path / "c.csv", tmp_path / "m.json"
+    radii = np.repeat([90.0, 100.0, 110.0, 120.0, 130.0], 5)
+    write_whisks(contacts, (181.0 - radii) * 50, radii)
+    assert run(capsys, "radial", "fit", contacts, "--out", model)[0] == 0
+    code, out, _ = run(capsys, "radial", "predict", model, contacts, "--json")
+    answers = [json.loads(line) for line in out.splitlines()]
+    assert code == 0 and [a["radius_mm"] for a in answers] == pytest.approx(radii, abs=0.1)
+    assert answers[0]["type"] == "shaft" and answers[-1]["type"] == "tip"
+    contacts.write_text("contact,radius_mm,t_s,x,y\n0,90,0,1,2\n")
+    code, _, err = run(capsys, "radial", "fit", contacts, "--out", model)
+    assert code == 2 and "fewer than 3 usable contacts" in err and err.count("\n") == 1
