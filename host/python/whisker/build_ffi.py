@@ -43,11 +43,11 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--build-dir", type=Path, required=True, help="CMake's build folder, with the static libraries")
     build = parser.parse_args(argv).build_dir.resolve()
     archives = {name: find_library(build, name) for name in LIBRARIES}
-    if archives["nav"] is None:
-        print(f"build_ffi: {build}: no libnav.a; run cmake --build {build} first", file=sys.stderr)
+    missing = [f"lib{name}.a" for name, archive in archives.items() if archive is None]
+    if missing:
+        print(f"build_ffi: {build}: no {' and no '.join(missing)}; run cmake --build {build} first", file=sys.stderr)
         return 1
-    found = [name for name in LIBRARIES if archives[name] is not None]
-    headers = [h for name in found for h in HEADERS[name] if h.exists() and BLOCK.search(h.read_text())]
+    headers = [header for name in LIBRARIES for header in HEADERS[name]]
     ffi = cffi.FFI()
     for header in headers:
         ffi.cdef(declarations(header))
@@ -55,8 +55,8 @@ def main(argv: list[str] | None = None) -> int:
         "_native",
         "\n".join(f'#include "{header}"' for header in headers),
         include_dirs=[str(HOST / "libwhisker" / "include")],
-        extra_link_args=[str(archives[name]) for name in found],
-        libraries=[library for name in found for library in LIBRARIES[name]],
+        extra_link_args=[str(archive) for archive in archives.values()],
+        libraries=[library for needed in LIBRARIES.values() for library in needed],
         extra_compile_args=["-O2", "-std=gnu11"],
     )
     with tempfile.TemporaryDirectory() as scratch:
