@@ -20,10 +20,11 @@ from . import summary as scores
 from .chain import ChainError, ChainRun, Link, run_chain
 from .pilot_process import cell
 from .scenes import make_scene
-from .training import calibrate, radial_errors, train_texture, write_radial_points
+from .training import learn, radial_scores, write_radial_points
 
 TICKS_PER_S = 2000
 FILTERS = ("grid", "foveal", "odometry")
+MARK = "demo.txt"
 
 
 def parse(argv: list[str] | None) -> argparse.Namespace:
@@ -59,15 +60,12 @@ def main(argv: list[str] | None = None) -> int:
 def demonstrate(options: argparse.Namespace) -> None:
     """All steps in order; leaves summary.json and report.html in the output folder."""
     began = time.monotonic()
-    out = options.out.resolve()
-    if out.exists():
-        shutil.rmtree(out)
-    (out / "models").mkdir(parents=True)
+    out = fresh_folder(options.out.resolve())
     scene, start = make_scene(options.seed)
     scenes.write(out / "scene", scene)
     (out / "scene" / "scene.flat").write_text(scene.flat(start))
     results = {"seed": options.seed, "simulated_s": options.seconds, "lanes": options.lanes}
-    results |= learn(out, scene, options.seed)
+    results |= learn_models(out, scene, options.seed)
     results |= run(out, options)
     results |= judge(out, scene)
     results["wall_s"] = time.monotonic() - began
@@ -77,19 +75,23 @@ def demonstrate(options: argparse.Namespace) -> None:
     print(report)
 
 
-def learn(out: Path, scene: scenes.Scene, seed: int) -> dict:
+def fresh_folder(path: Path) -> Path:
+    """An empty output folder; what an earlier demo left there is removed, anything else is not."""
+    if path.exists() and not (path / MARK).exists() and any(path.iterdir()):
+        raise ChainError(f"{path}: not empty, and not left by an earlier demo; choose another --out")
+    if path.exists():
+        shutil.rmtree(path)
+    path.mkdir(parents=True)
+    (path / MARK).write_text("Written by python -m whisker.demo, which may remove this folder.\n")
+    return path
+
+
+def learn_models(out: Path, scene: scenes.Scene, seed: int) -> dict:
     """Texture and radial models, from level-1 recordings."""
-    objects = [w.name for w in scene.robot.of_role("object")]
-    models, contacts = {}, {}
-    with tqdm(total=1 + len(objects), desc="train and calibrate", unit="model") as bar:
-        train_texture(out / "models", scene, seed)
-        bar.update()
-        for name in objects:
-            models[name], contacts[name] = calibrate(out / "models", scene, name, seed)
-            bar.update()
+    with tqdm(total=1 + len(scene.robot.of_role("object")), desc="train and calibrate", unit="model") as bar:
+        models, contacts = learn(out / "models", scene, seed, bar.update)
     write_radial_points(out, models, contacts)
-    measured, predicted = radial_errors(models, contacts)
-    return {"radial_std_mm": measured, "radial_std_predicted_mm": predicted}
+    return radial_scores(models, contacts)
 
 
 def run(out: Path, options: argparse.Namespace) -> dict:

@@ -9,7 +9,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -68,26 +68,37 @@ class Child:
         self.process = subprocess.Popen(
             command, stdin=subprocess.DEVNULL, stdout=self._log, stderr=where, text=True, start_new_session=True
         )
-        self._reader = threading.Thread(target=self._read, args=(on_line,), daemon=True) if on_line else None
-        if self._reader:
-            self._reader.start()
+        self.ended_s: float | None = None
+        self._threads = [threading.Thread(target=self._watch, daemon=True)]
+        if on_line:
+            self._threads.append(threading.Thread(target=self._read, args=(on_line,), daemon=True))
+        for thread in self._threads:
+            thread.start()
 
-    def _read(self, on_line) -> None:
+    def _watch(self) -> None:
+        self.process.wait()
+        self.ended_s = time.monotonic()
+
+    def _read(self, on_line: Callable[[str], None]) -> None:
         for line in self.process.stderr:
             self._log.write(line)
             on_line(line)
 
-    def check(self) -> bool:
-        """Whether it has ended well; ChainError if badly."""
-        code = self.process.poll()
-        if code:
-            if self._reader:
-                self._reader.join(timeout=1.0)
-            self._log.flush()
-            lines = [line for line in self.log.read_text().splitlines() if not line.startswith("progress ")]
-            said = f": {lines[-1]}" if lines else ""
-            raise ChainError(f"{self.name} failed ({_how(code)}){said}; log: {self.log}")
-        return code is not None
+    @property
+    def running(self) -> bool:
+        return self.ended_s is None
+
+    @property
+    def failed(self) -> bool:
+        return not self.running and self.process.returncode != 0
+
+    def failure(self) -> str:
+        """One line about a bad end."""
+        self._join()
+        self._log.flush()
+        lines = [line for line in self.log.read_text().splitlines() if not line.startswith("progress ")]
+        said = f": {lines[-1]}" if lines else ""
+        return f"{self.name} failed ({_how(self.process.returncode)}){said}; log: {self.log}"
 
     def close(self) -> None:
         """End it if it still runs, with whatever it has started."""
@@ -99,9 +110,12 @@ class Child:
                 except subprocess.TimeoutExpired:
                     continue
         self._signal(signal.SIGKILL)  # grandchildren of one that died
-        if self._reader:
-            self._reader.join(timeout=1.0)
+        self._join()
         self._log.close()
+
+    def _join(self) -> None:
+        for thread in self._threads:
+            thread.join(timeout=1.0)
 
     def _signal(self, sign: signal.Signals) -> None:
         try:
@@ -119,14 +133,11 @@ def run_chain(run: ChainRun, progress: Callable[[int], None]) -> float:
         place = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="whisker-")))
         stack.callback(_remove_ring, ring)
         socket = str(place / "sim.sock")
-        children = [
-            stack.enter_context(
-                _closing(Child("bridge", _bridge(run, ring, socket), run.logs / "bridge.log", _ticks(progress)))
-            )
-        ]
-        _await_socket(Path(socket), children[0])
+        bridge = Child("bridge", _bridge(run, ring, socket), run.logs / "bridge.log", _ticks(progress))
+        children = [stack.enter_context(closing(bridge))]
+        _await_socket(Path(socket), bridge)
         for name, command in (("log", _log(run, ring, socket)), ("pilot", _pilot(run, ring, socket))):
-            children.append(stack.enter_context(_closing(Child(name, command, run.logs / f"{name}.log"))))
+            children.append(stack.enter_context(closing(Child(name, command, run.logs / f"{name}.log"))))
         _await_end(children)
     return time.monotonic() - began
 
@@ -168,32 +179,31 @@ def _ticks(progress: Callable[[int], None]) -> Callable[[str], None]:
 
 def _await_socket(path: Path, bridge: Child) -> None:
     while not path.exists():
-        if bridge.check():
+        _raise_failures([bridge])
+        if not bridge.running:
             raise ChainError(f"bridge ended before it began; log: {bridge.log}")
         time.sleep(POLL_S)
 
 
 def _await_end(children: list[Child]) -> None:
     """Wait for all; the readers must follow the simulation's end soon."""
-    running, give_up = list(children), None
-    while running:
-        running = [child for child in running if not child.check()]
-        if give_up is None and children[0] not in running:
+    give_up = None
+    while any(child.running for child in children):
+        _raise_failures(children)
+        if give_up is None and not children[0].running:
             give_up = time.monotonic() + LAGGARD_S
-        if running and give_up is not None and time.monotonic() > give_up:
-            raise ChainError(f"{running[0].name} did not end with the run; log: {running[0].log}")
+        if give_up is not None and time.monotonic() > give_up:
+            late = next(child for child in children if child.running)
+            raise ChainError(f"{late.name} did not end with the run; log: {late.log}")
         time.sleep(POLL_S)
+    _raise_failures(children)
 
 
-class _closing:
-    def __init__(self, child: Child):
-        self._child = child
-
-    def __enter__(self) -> Child:
-        return self._child
-
-    def __exit__(self, *exception) -> None:
-        self._child.close()
+def _raise_failures(children: list[Child]) -> None:
+    """ChainError if a child has failed. One that falls takes others with it: the first to fall is named."""
+    failed = [child for child in children if child.failed]
+    if failed:
+        raise ChainError(min(failed, key=lambda child: child.ended_s).failure())
 
 
 def _remove_ring(name: str) -> None:

@@ -2,6 +2,7 @@
 
 import csv
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,21 @@ RECORDED_PUSH_S = 0.7  # longer than the pilot's, which counts from the onset th
 # Whisk repeatability of whiskers 1 to 4, and the error it alone predicts over 90 to 140 mm (whisker_physics section 4).
 WHISK_SPREAD = (0.082, 0.040, 0.026, 0.063)
 PREDICTED_MM_PER_SPREAD = 68.9
+
+
+def learn(folder: Path, scene: Scene, seed: int, progress: Callable[[], object]) -> tuple[dict, dict]:
+    """All models of the scene's robot, saved in `folder`; `progress()` after each.
+
+    Returns radial models by whisker name, and their contacts as `calibrate` does.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    train_texture(folder, scene, seed)
+    progress()
+    models, contacts = {}, {}
+    for whisker in scene.robot.of_role("object"):
+        models[whisker.name], contacts[whisker.name] = calibrate(folder, scene, whisker.name, seed)
+        progress()
+    return models, contacts
 
 
 def train_texture(folder: Path, scene: Scene, seed: int) -> TextureModel:
@@ -71,14 +87,14 @@ def calibrate(folder: Path, scene: Scene, name: str, seed: int) -> tuple[RadialM
     return model, {"fit": (fit.radius_mm, fit.peak_counts), "held out": (radii, peaks)}
 
 
-def radial_errors(models: dict[str, RadialModel], contacts: dict[str, dict]) -> tuple[dict, dict]:
-    """Standard deviation of the held-out error, mm, by whisker; and what repeatability alone predicts."""
+def radial_scores(models: dict[str, RadialModel], contacts: dict[str, dict]) -> dict:
+    """Standard deviation of the held-out error, mm, by whisker, and what repeatability alone predicts."""
     measured = {}
     for name, sets in contacts.items():
         error = [models[name].predict(p)[0] - r for r, p in zip(*sets["held out"], strict=True)]
         measured[name] = float(np.std(error, ddof=1))
     predicted = {n: PREDICTED_MM_PER_SPREAD * s for n, s in zip(contacts, WHISK_SPREAD, strict=True)}
-    return measured, predicted
+    return {"radial_std_mm": measured, "radial_std_predicted_mm": predicted}
 
 
 def write_radial_points(folder: Path, models: dict[str, RadialModel], contacts: dict[str, dict]) -> None:

@@ -3,8 +3,10 @@
 from html import escape
 from pathlib import Path
 
+import numpy as np
+
 from . import figures
-from .run import Run
+from .run import FILTERS, Run
 
 PAPER_STD_MM = (5.68, 2.78, 1.82, 4.37)  # the paper's table under Fig. 5, whiskers 1 to 4
 
@@ -44,7 +46,7 @@ def render(run: Run) -> str:
             "The arena from above. Black blocks are obstacles. The belief starts 0.2 m and 10 degrees wrong.",
         ),
         _figure(figures.errors(run), "Every step from the first is counted. Medians are in the table below."),
-        _estimates_table(s),
+        _estimates_table(run),
         "<h2>Floor texture</h2>",
         _figure(
             figures.texture(run),
@@ -94,13 +96,12 @@ def _cards(s: dict) -> str:
     )
 
 
-def _estimates_table(s: dict) -> str:
-    grid = f"{s['pose_error_p90_m']:.3f}", f"{s['heading_error_median_rad']:.3f}"
-    rows = [
-        ("grid", f"{s['pose_error_median_m']:.3f}", *grid),
-        ("foveal", f"{s['foveal_error_median_m']:.3f}", "", ""),
-        ("odometry alone", f"{s['odometry_error_median_m']:.3f}", "", ""),
-    ]
+def _estimates_table(run: Run) -> str:
+    rows = []
+    for name in FILTERS:
+        position, heading = run.position_error(name), run.heading_error(name)
+        values = (np.median(position), np.quantile(position, 0.9), np.median(heading))
+        rows.append((figures.TITLES[name], *(f"{value:.3f}" for value in values)))
     return _table("Errors over all steps", ("estimate", "median (m)", "90 % (m)", "heading, median (rad)"), rows)
 
 
