@@ -1,0 +1,112 @@
+"""Bad input ends in one line that says what to do, a non-zero exit code, and nothing left behind."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from chainrun import END_S, FAST_LINK, program, running, simulation, write_flat_scene
+from whisker.demo.scenes import make_scene
+from whisker.protocol import WIRE_VERSION
+from whisker.ring import Reader
+from whisker.scene import write
+
+
+def shared_memory() -> set[str]:
+    return {path.name for path in Path("/dev/shm").iterdir() if "whisker" in path.name}
+
+
+def children_of_this_test() -> list[str]:
+    mine = []
+    for status in Path("/proc").glob("[0-9]*/status"):
+        try:
+            fields = dict(line.split(":\t", 1) for line in status.read_text().splitlines() if ":\t" in line)
+        except OSError:
+            continue
+        if fields["PPid"].strip() == str(os.getpid()) and fields["Name"].strip().startswith("whisker"):
+            mine.append(fields["Name"].strip())
+    return mine
+
+
+@pytest.fixture(autouse=True)
+def nothing_left_behind():
+    before = shared_memory()
+    yield
+    assert shared_memory() == before
+    assert children_of_this_test() == []
+
+
+def only_line(text: str, program_name: str) -> str:
+    lines = [line for line in text.splitlines() if not line.startswith(("progress", f"{program_name}: 0 frames"))]
+    assert len(lines) == 1, text
+    assert lines[0].startswith(program_name) and ";" in lines[0], "names itself and a remedy"
+    return lines[0]
+
+
+def run_chain(folder: Path, *options, seconds: float = 1.0) -> subprocess.CompletedProcess:
+    scene, _ = write_flat_scene(folder, 1)
+    ring = f"whisker-bad-{os.getpid()}"
+    command = simulation(folder, scene, seconds, 1, ring, *options)
+    return subprocess.run(command, capture_output=True, text=True, timeout=END_S)
+
+
+def test_wrong_wire_version(tmp_path):
+    done = run_chain(tmp_path, "--defect", "wire-version")
+    assert done.returncode == 1
+    line = only_line(done.stderr, "whiskerd")
+    assert f"bridge {WIRE_VERSION + 1}, host {WIRE_VERSION}" in line
+
+
+def test_corrupted_frame(tmp_path):
+    done = run_chain(tmp_path, "--defect", "frame")
+    assert done.returncode == 1
+    lines = [line for line in done.stderr.splitlines() if line.startswith("whiskerd: bridge:")]
+    assert len(lines) == 1 and "header" in lines[0] and ";" in lines[0], done.stderr
+
+
+def test_missing_device():
+    done = subprocess.run([program("whiskerd"), "--ring", "whisker-bad"], capture_output=True, text=True, timeout=END_S)
+    assert done.returncode == 1
+    assert "no bridge is connected; plug it in" in only_line(done.stderr, "whiskerd")
+
+
+def test_second_daemon(tmp_path):
+    ring = f"whisker-bad-{os.getpid()}"
+    scene, _ = write_flat_scene(tmp_path, 1)
+    second = tmp_path / "second.txt"
+    whiskerd = f"{program('whiskerd')} --ring {ring}"
+    both = f"trap : TERM; {whiskerd} {' '.join(FAST_LINK)} & first=$!; read go; {whiskerd} 2>{second}; echo $? >>{second}; kill $first; while kill -0 $first; do wait $first; done"
+    command = simulation(tmp_path, scene, 600, 1, ring)
+    command = [*command[: command.index("--") + 1], "sh", "-c", both]
+    with running(command, stdin=subprocess.PIPE) as process:
+        with Reader(ring, wait_s=10.0) as reader:
+            next(reader.frames())
+            process.stdin.write("go\n")
+            process.stdin.flush()
+            process.wait(END_S)
+        process.stdin.close()
+    *lines, code = second.read_text().splitlines()
+    assert code == "1"
+    assert "another" in only_line("\n".join(lines), "whiskerd")
+
+
+def test_scene_with_an_unknown_key(tmp_path):
+    scene, _ = make_scene(1)
+    write(tmp_path, scene)
+    arena = tmp_path / "arena.toml"
+    arena.write_text("colour = 'red'\n" + arena.read_text())
+    command = [sys.executable, "-m", "whisker.cli", "localise", tmp_path, "--filter", "grid"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=END_S)
+    assert done.returncode == 2
+    line = only_line(done.stderr, "whisker")
+    assert "arena.toml" in line and "colour" in line
+
+
+def test_flat_scene_with_an_unknown_item(tmp_path):
+    scene, text = write_flat_scene(tmp_path, 1)
+    scene.write_text("colour red\n" + text)
+    command = simulation(tmp_path, scene, 1, 1, "whisker-bad")
+    done = subprocess.run(command, capture_output=True, text=True, timeout=END_S)
+    assert done.returncode == 1
+    assert "colour" in only_line(done.stderr, "whisker-bridge-sim")
