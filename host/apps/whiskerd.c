@@ -24,6 +24,7 @@ struct session {
     struct whisker_ring *ring;
     struct whisker_decoder decoder;
     bool last_seen;
+    bool damage_told;
 };
 
 static void print_help(const struct whisker_settings *defaults)
@@ -112,6 +113,18 @@ static void on_bytes(void *context, const uint8_t *bytes, size_t count)
     }
 }
 
+/* USB guards every packet by a CRC of its own, so a malformed frame is a fault of the bridge: said once, and again in
+ * the exit code, while the other frames go on. */
+static void tell_damage(struct session *session)
+{
+    const struct whisker_decoder *decoder = &session->decoder;
+    if (decoder->first_error && !session->damage_told) {
+        fprintf(stderr, PROGRAM ": bridge: after frame %llu: %s; %s\n", (unsigned long long)decoder->counts.frames,
+                whisker_error_text(decoder->first_error), whisker_error_remedy(decoder->first_error));
+        session->damage_told = true;
+    }
+}
+
 static int open_bridge(struct session *session)
 {
     struct whisker_identity identity;
@@ -152,6 +165,7 @@ static int stream(struct session *session, const struct whisker_settings *settin
     int error = whisker_device_start(session->device, settings, on_bytes, session);
     while (!error && !cli_stop_wanted()) {
         error = whisker_device_poll(session->device, POLL_MS);
+        tell_damage(session);
     }
     return error ? cli_fail(PROGRAM, "bridge", error) : drain(session);
 }
@@ -159,6 +173,7 @@ static int stream(struct session *session, const struct whisker_settings *settin
 static void report(struct session *session)
 {
     whisker_decoder_end(&session->decoder);
+    tell_damage(session);
     const struct whisker_decoder_counts *counts = &session->decoder.counts;
     fprintf(stderr, PROGRAM ": %llu frames published, %llu with damaged records, %llu bytes skipped\n",
             (unsigned long long)counts->frames, (unsigned long long)counts->frames_damaged,
@@ -179,7 +194,7 @@ static int serve(const struct options *options)
     }
     whisker_device_close(session.device);
     whisker_ring_close(session.ring);
-    return result;
+    return session.damage_told ? CLI_FAILED : result;
 }
 
 int main(int argc, char **argv)

@@ -69,6 +69,7 @@ static size_t skip(struct whisker_decoder *decoder, int error, size_t bytes)
     if (decoder->synchronised) {
         count_error(&decoder->counts, error);
         decoder->synchronised = false;
+        decoder->first_error = decoder->first_error ? decoder->first_error : error;
     }
     decoder->counts.bytes_skipped += bytes;
     return bytes;

@@ -58,6 +58,7 @@ struct whisker_decoder {
     uint64_t tick;     /* of the last frame, extended to 64 bits */
     size_t held;       /* bytes kept from earlier chunks */
     bool synchronised; /* false from a bad byte to the next good frame */
+    int first_error;   /* why bytes were skipped for the first time; 0: never */
     uint8_t bytes[256];
 };
 
