@@ -33,7 +33,8 @@ enum Option {
     SCK_DIVIDER,
     WORD_GAP,
     SAMPLE_POINT,
-    SPEED_REPORT
+    SPEED_REPORT,
+    DEFECT
 };
 
 const option LONG_OPTIONS[] = {{"help", no_argument, nullptr, HELP},
@@ -52,6 +53,7 @@ const option LONG_OPTIONS[] = {{"help", no_argument, nullptr, HELP},
                                {"word-gap", required_argument, nullptr, WORD_GAP},
                                {"sample-point", required_argument, nullptr, SAMPLE_POINT},
                                {"speed-report", required_argument, nullptr, SPEED_REPORT},
+                               {"defect", required_argument, nullptr, DEFECT},
                                {nullptr, 0, nullptr, 0}};
 
 uint64_t whole_number(const char *name, const char *text, uint64_t least, uint64_t most)
@@ -145,6 +147,8 @@ void set_option(Options &options, int option, const char *text)
     }
     if (std::string *path = path_of(options, option)) {
         *path = text;
+    } else if (option == DEFECT) {
+        options.defect = Defect::parse(text);
     } else {
         set_number(options, option, text);
     }
@@ -224,6 +228,7 @@ const char *usage()
            "  --lanes-populated N   nodes on the first N lanes; those without a whisker are at rest (the scene's; "
            "bench: 6)\n"
            "  --speed-report OUT.json  ticks, clock cycles, wall seconds, fault counts\n"
+           "  --defect KIND         misbehave: wire-version (claims another) or frame (damages one)\n"
            "  --progress            a line 'progress TICK TICKS' every simulated second (default on a terminal)\n"
            "  --bench               no COMMAND, no umockdev: an internal host reads and checks every frame\n"
            "  --sck-divider N --word-gap N --sample-point N   bench: node link settings, in cycles of 60 MHz (6, 30, "

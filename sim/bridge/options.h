@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "bench.h"
+#include "defect.h"
 
 namespace bridge_sim
 {
@@ -24,6 +25,7 @@ struct Options {
     unsigned followers = 0;
     size_t lanes_populated = 0; // 0: as many as the scene has whiskers
     BenchSettings link;         // SCK divider, word gap and sample point: bench only, else the host software sets them
+    DefectKind defect = DefectKind::NONE;
     std::vector<std::string> command;
 
     uint64_t ticks() const;

@@ -79,7 +79,8 @@ Simulation::Simulation(const Options &options)
     : options_(options), scene_(read_scene(options.scene)), world_(sim_world_new(&scene_, options.seed)),
       signals_(block_signals()), rig_(populated(options, scene_), options.seed), scheduler_(rig_),
       faults_(options.faults, options.usb_faults), runner_(rig_, scheduler_, plan_of(options, scene_), faults_),
-      truth_(options.truth, scene_), followers_(options.socket, options.followers), total_(options.ticks())
+      truth_(options.truth, scene_), followers_(options.socket, options.followers), defect_(options.defect),
+      total_(options.ticks())
 {
     if (!world_) {
         throw std::runtime_error(options.scene + ": no world can be made of it: a texture has no known parameters");
@@ -104,7 +105,7 @@ int Simulation::run()
     child_ = std::make_unique<Child>(options_.command);
     while (!child_->ended()) {
         const bool progress = advance();
-        usbfs_->deliver(scheduler_.take_completed());
+        deliver_completed();
         wait(progress ? 0 : IDLE_WAIT_MS);
     }
     finish();
@@ -205,6 +206,13 @@ void Simulation::take_requests()
             scheduler_.submit(std::move(request.urb));
         }
     }
+}
+
+void Simulation::deliver_completed()
+{
+    std::vector<Urb> urbs = scheduler_.take_completed();
+    defect_.spoil(urbs);
+    usbfs_->deliver(std::move(urbs));
 }
 
 void Simulation::wait(int timeout_ms)

@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "child.h"
+#include "defect.h"
 #include "follower_server.h"
 #include "options.h"
 #include "speed_report.h"
@@ -41,6 +42,7 @@ class Simulation
     void produce_last_tick();
     void end_run();
     void take_requests();
+    void deliver_completed();
     void wait(int timeout_ms);
     void read_signals();
     void show_progress();
@@ -57,6 +59,7 @@ class Simulation
     TickRunner runner_;
     TruthLog truth_;
     FollowerServer followers_;
+    Defect defect_;
     std::unique_ptr<UsbfsServer> usbfs_;
     std::unique_ptr<Child> child_;
     std::array<sim_field, LANES> fields_{};
