@@ -18,6 +18,16 @@ static void texture_is_that_of_the_tile_or_of_the_nearest(void **state)
     assert_int_equal(nav_arena_texture(&a, 9.0, -9.0), 1);
 }
 
+static void floors_need_not_be_square(void **state)
+{
+    (void)state;
+    const uint8_t floor[] = {0, 1, 2, 3, 4, 5};
+    const struct nav_arena a = {.size_x = 3.0, .size_y = 2.0, .tile = 1.0, .columns = 3, .rows = 2, .floor = floor};
+    assert_int_equal(nav_arena_texture(&a, 2.5, 0.5), 2);
+    assert_int_equal(nav_arena_texture(&a, 0.5, 1.5), 3);
+    assert_int_equal(nav_arena_texture(&a, 9.0, 9.0), 5);
+}
+
 static void range_is_the_distance_to_the_first_wall_or_box(void **state)
 {
     (void)state;
@@ -62,6 +72,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(texture_is_that_of_the_tile_or_of_the_nearest),
+        cmocka_unit_test(floors_need_not_be_square),
         cmocka_unit_test(range_is_the_distance_to_the_first_wall_or_box),
         cmocka_unit_test(nothing_within_reach_is_infinite_and_inside_a_solid_is_zero),
         cmocka_unit_test(free_space_keeps_the_body_clear),

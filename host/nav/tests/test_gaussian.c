@@ -6,6 +6,16 @@
 
 static const struct nav_noise NO_NOISE = {0.0, 0.0};
 
+static void a_step_is_taken_in_the_frame_it_starts_in(void **state)
+{
+    (void)state;
+    struct nav_pose end = nav_compose((struct nav_pose){1.0, 2.0, NAV_PI / 6.0}, (struct nav_pose){0.2, 0.4, 0.1});
+    assert_near(end.x, 1.0 + 0.2 * sqrt(0.75) - 0.4 * 0.5, 1e-12);
+    assert_near(end.y, 2.0 + 0.2 * 0.5 + 0.4 * sqrt(0.75), 1e-12);
+    assert_near(end.theta, NAV_PI / 6.0 + 0.1, 1e-12);
+    assert_near(nav_wrap(3.0 * NAV_PI + 0.25), 0.25 - NAV_PI, 1e-12);
+}
+
 static void moving_turns_heading_error_into_sideways_error(void **state)
 {
     (void)state;
@@ -78,6 +88,7 @@ static void noise_grows_with_the_way_not_with_the_number_of_rows(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_step_is_taken_in_the_frame_it_starts_in),
         cmocka_unit_test(moving_turns_heading_error_into_sideways_error),
         cmocka_unit_test(a_circle_walked_in_steps_closes),
         cmocka_unit_test(an_inverse_undoes_and_a_flat_covariance_has_none),

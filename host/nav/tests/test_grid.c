@@ -213,10 +213,61 @@ static void a_wall_felt_ahead_puts_the_robot_before_it(void **state)
     destroy(g);
 }
 
+static double sub_pose_value(const struct grid *g, int i, int j, int p, int part)
+{
+    const struct nav_expected *e = g->expected;
+    const struct nav_lattice *l = &g->lattice;
+    int a = part % g->sub, b = part / g->sub % g->sub, c = part / g->sub / g->sub;
+    double x = (i + (a + 0.5) / g->sub) * l->cell + l->shift_x[p];
+    double y = (j + (b + 0.5) / g->sub) * l->cell + l->shift_y[p];
+    double heading = (p + (c + 0.5) / g->sub_heading) * l->cell_theta + l->rotation;
+    int k = (int)floor(heading / e->step_theta) % e->nh;
+    return (double)e->value[nav_expected_row(e, k, (int)floor(y / e->step))[(int)floor(x / e->step)]];
+}
+
+static void a_cells_likelihood_is_the_mean_of_its_sub_poses_where_they_now_are(void **state)
+{
+    (void)state;
+    struct nav_problem p = room();
+    p.prior.uniform = true;
+    p.settings.grid_teleport = 0.0;
+    struct grid *g = create(&p);
+    const double texture[] = {0.0, -50.0}, distance = 0.1, weight[] = {1.0, 1.0};
+    const double *reading[] = {texture, &distance};
+    for (int s = 0; s < g->lattice.nh; s++) {
+        g->lattice.shift_x[s] = 0.021;
+        g->lattice.shift_y[s] = -0.016;
+        for (int c = 0; c < g->lattice.nx * g->lattice.ny; c++)
+            nav_lattice_slice(&g->lattice, s)[c] = 1.0f;
+    }
+    g->lattice.rotation = 0.3;
+    nav_likelihood_read(g->likelihood, &(struct nav_evidence){reading, weight});
+    nav_expected_evaluate(g->expected, g->likelihood);
+    reweigh(g, 0.0);
+    int parts = g->sub * g->sub * g->sub_heading;
+    double all = 0.0, worst = 0.0;
+    for (int pass = 0; pass < 2; pass++) {
+        for (int s = 0; s < g->lattice.nh; s++) {
+            for (int c = 0; c < g->lattice.nx * g->lattice.ny; c++) {
+                double sum = 0.0;
+                for (int part = 0; part < parts; part++)
+                    sum += sub_pose_value(g, c % g->lattice.nx, c / g->lattice.nx, s, part);
+                if (pass == 0)
+                    all += sum;
+                else
+                    worst = fmax(worst, fabs(sum / all - (double)nav_lattice_slice(&g->lattice, s)[c]));
+            }
+        }
+    }
+    assert_near(worst, 0.0, 1e-8);
+    destroy(g);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_grid_is_equation_4),
+        cmocka_unit_test(a_cells_likelihood_is_the_mean_of_its_sub_poses_where_they_now_are),
         cmocka_unit_test(motion_put_off_is_kept_exactly),
         cmocka_unit_test(belief_is_clipped_to_free_space),
         cmocka_unit_test(a_belief_with_no_room_left_starts_again_everywhere),

@@ -83,6 +83,29 @@ static void no_contact_is_strong_evidence_deep_in_a_wall_and_weak_at_the_tip(voi
     assert_near((double)out[10], log((1.0 - 0.9 * 0.3085375) * 0.99), 1e-5);
 }
 
+static void whiskers_turn_with_the_robot(void **state)
+{
+    (void)state;
+    struct nav_problem p = room();
+    const struct nav_tip tip = {0.1, 0.2};
+    const struct nav_ray ray = {0.05, 0.1, NAV_PI / 2.0, 0.2};
+    p.robot.tip = &tip;
+    p.robot.ray = &ray;
+    struct nav_likelihood *l = nav_likelihood_new(&p.arena, &p.robot, &p.settings, 0.0);
+    uint8_t codes[2];
+    nav_likelihood_expect(l, &p.arena, &p.robot, (struct nav_pose){0.2, 0.4, 0.0}, codes);
+    assert_int_equal(codes[0], 1);
+    /* Facing up at (0.4, 0.4): the tip is at (0.2, 0.5+), on tile 1; the ray starts at (0.3, 0.45) and points left. */
+    nav_likelihood_expect(l, &p.arena, &p.robot, (struct nav_pose){0.4, 0.405, NAV_PI / 2.0}, codes);
+    assert_int_equal(codes[0], 1);
+    assert_int_equal(codes[1], l->model[1].codes - 1);
+    /* Facing up at (0.2503, 0.4): the ray starts at 0.1503 and meets the wall after as much. */
+    nav_likelihood_expect(l, &p.arena, &p.robot, (struct nav_pose){0.2503, 0.38, NAV_PI / 2.0}, codes);
+    assert_int_equal(codes[0], 0);
+    assert_int_equal(codes[1], (int)floor(0.1503 / l->model[1].step));
+    nav_likelihood_free(l);
+}
+
 static void whiskers_add_and_those_not_read_say_nothing(void **state)
 {
     (void)state;
@@ -179,6 +202,7 @@ int main(void)
         cmocka_unit_test(however_sure_a_window_is_the_floor_remains),
         cmocka_unit_test(a_measured_distance_is_gaussian_on_a_floor_of_ghosts),
         cmocka_unit_test(no_contact_is_strong_evidence_deep_in_a_wall_and_weak_at_the_tip),
+        cmocka_unit_test(whiskers_turn_with_the_robot),
         cmocka_unit_test(whiskers_add_and_those_not_read_say_nothing),
         cmocka_unit_test(the_table_holds_what_each_free_pose_expects),
         cmocka_unit_test(a_signature_is_worked_out_once_relative_to_the_best),
