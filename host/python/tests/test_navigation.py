@@ -1,5 +1,7 @@
 """The grid against odometry and the paper's fovea on random level-0 scenes, started 0.2 m and 10 degrees wrong."""
 
+import dataclasses
+
 import level0
 import numpy as np
 import pytest
@@ -47,7 +49,7 @@ def test_one_mode_is_not_enough(results):
 
 def test_a_uniform_prior_is_found_too():
     scene, observations = level0.record(120, rows=600)
-    lost = scene.__class__(scene.arena, scene.robot, level0.Prior("uniform"))
+    lost = dataclasses.replace(scene, prior=level0.Prior("uniform"))
     result = localise.run("grid", lost, observations)
     last = np.array([(e.x_m, e.y_m) for e in result.estimates[-100:]])
     assert np.median(np.hypot(*(last - observations.truth[-100:, :2]).T)) < 0.1
@@ -74,3 +76,26 @@ def test_pilot_rows_and_arrays_are_the_same_to_a_filter():
         values = observations.odometry[k], observations.texture[k], observations.radial_m[k]
         b = other.step_values(observations.t_s[k], *values)
         assert (a.x_m, a.y_m, a.theta_rad) == pytest.approx((b.x_m, b.y_m, b.theta_rad), abs=1e-9)
+
+
+@pytest.mark.parametrize("name", localise.filter_names())
+@pytest.mark.parametrize("whiskers", [0, 1, 12])
+def test_any_number_of_whiskers_and_any_arena_size(name, whiskers):
+    tips = [level0.Whisker(f"t{n}", "texture", tip_m=(0.0, 0.01 * n)) for n in range(whiskers)]
+    rays = [
+        level0.Whisker(f"r{n}", "object", base_m=(0.1, 0.0), yaw_rad=0.1 * n, length_m=0.3) for n in range(whiskers)
+    ]
+    arena = level0.Arena((1.33, 0.87), 0.4, ("A", "B"), ("ABAB", "BABA", "AABB"), ((0.31, 0.17, 0.62, 0.4),))
+    made = localise.Filter(name, level0.Scene(arena, level0.Robot(0.1, 0.05, 0.005, (*tips, *rays))))
+    for step in range(20):
+        texture, radial = np.tile([0.0, -9.0], (whiskers, 1)), np.full(whiskers, np.inf if step % 3 else 0.1)
+        e = made.step_values(0.1 * step, (0.02, 0.0, 0.1), texture, radial)
+        assert np.isfinite([e.x_m, e.y_m, e.theta_rad]).all() and 0.0 <= e.confidence <= 1.0
+    assert made.bad_cells == made.bad_rows == 0
+
+
+def test_a_grid_that_cannot_fit_says_so():
+    scene, _ = level0.record(123, rows=1)
+    vast = dataclasses.replace(scene.arena, size_m=(900.0, 900.0), tile_m=180.0)
+    with pytest.raises(localise.SettingError, match="choose coarser cells"):
+        localise.Filter("grid", dataclasses.replace(scene, arena=vast))
