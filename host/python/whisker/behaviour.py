@@ -31,7 +31,7 @@ WHISK_RAD_S = math.pi / 24  # the paper's body whisk
 BACK_OFF_M_S = 0.03
 BACK_OFF_LIMIT_M = 0.12
 PUSH_TICKS = 1200  # 0.6 s of push from the onset: 4.5 degrees
-SEARCH_RAD = (math.radians(5.0), math.radians(15.0))  # to one side, then to the other
+SEARCH_RAD = (math.radians(5.0), math.radians(11.0))  # to one side, then to the other
 OUT_LIMIT_RAD = math.radians(25.0)
 CLEAR_M = 0.08
 STUCK_REPORTS = 3  # of 0.1 s
@@ -67,10 +67,10 @@ class Whisk:
 class Behaviour:
     """`decide` once per block, `moved` once per odometry report; `whisk` is the present body whisk or None."""
 
-    def __init__(self, contacts: dict[int, Contact], side: dict[int, float], rng: np.random.Generator):
-        """`contacts` and `side` (sign of the first search rotation) by lane of the object whiskers."""
+    def __init__(self, contacts: dict[int, Contact], first_turn: dict[int, float], rng: np.random.Generator):
+        """`contacts` and `first_turn` (sign of the search's first rotation) by lane of the object whiskers."""
         self.contacts = contacts
-        self.side = side
+        self.first_turn = first_turn
         self.rng = rng
         self.state = State.SETTLE
         self.drive = (0.0, 0.0)
@@ -194,7 +194,7 @@ class Behaviour:
 
     def _go_back_off(self, tick: int, lane: int) -> None:
         self._enter(State.BACK_OFF, tick)
-        self.whisk = Whisk(lane, self.side[lane])
+        self.whisk = Whisk(lane, self.first_turn[lane])
         self._searched_one_side = False
 
     def _enter(self, state: State, tick: int) -> None:

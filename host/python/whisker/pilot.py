@@ -15,10 +15,10 @@ import numpy as np
 
 from .behaviour import BLOCK_TICKS, EXPLORE_M_S, PUSH_TICKS, TICK_S, TURN_RAD_S, Behaviour
 from .contact import Contact
+from .mount import Mount
 
 WINDOW_SAMPLES = 200
 WINDOW_LEAST_GOOD = 150  # fewer good samples than this are no window
-NEAREST_MM = 60.0  # calibrated from 90 mm; a peak that says less was no plain contact and is not reported
 SETTLE_TICKS = 100  # the wheels' last change of speed must be this much older than a texture window
 
 
@@ -33,12 +33,11 @@ class Pilot:
         self.texture_models = texture_models
         self.radial_models = radial_models
         self.contacts = {lane: Contact() for lane in self.object_lanes}
-        self.length_mm = {n: 1000.0 * robot.whiskers[n].length_m for n in self.object_lanes}
-        # A corner that the shaft met while driving forward is pressed by turning to the side on which it lies.
-        side = {n: math.copysign(1.0, -math.sin(robot.whiskers[n].yaw_rad)) for n in self.object_lanes}
-        self.behaviour = Behaviour(self.contacts, side, np.random.default_rng(seed))
+        self.mounts = {lane: Mount.of(robot.whiskers[lane]) for lane in self.object_lanes}
+        first_turn = {lane: mount.corner_turn for lane, mount in self.mounts.items()}
+        self.behaviour = Behaviour(self.contacts, first_turn, np.random.default_rng(seed))
         self.bad_samples = 0
-        self.whisks: list[dict] = []  # every measured contact, for the report
+        self.whisks: list[dict] = []  # every whisk that was pushed to its end
         self._recent = deque(maxlen=WINDOW_SAMPLES // BLOCK_TICKS)  # of the last 0.1 s: (samples, good) of all lanes
         self._whisk_samples: list[tuple[np.ndarray, np.ndarray]] = []
         self._measured: dict[int, tuple[int, float]] = {}  # lane: release tick, mm
@@ -93,21 +92,20 @@ class Pilot:
         pushed = whisk.start < contact.onset <= whisk.push_end - PUSH_TICKS
         if pushed and contact.release > contact.onset and not whisk.measured:
             whisk.measured = True
-            self._measure(whisk.lane, contact)
+            self._measure(whisk.lane, whisk.direction)
 
-    def _measure(self, lane: int, contact: Contact) -> None:
+    def _measure(self, lane: int, turn: float) -> None:
+        contact, model = self.contacts[lane], self.radial_models[self.names[lane]]
         ticks = np.concatenate([t for t, _ in self._whisk_samples])
         samples = np.concatenate([s for _, s in self._whisk_samples])
         push = (ticks >= contact.onset) & (ticks < contact.onset + PUSH_TICKS)
-        model = self.radial_models[self.names[lane]]
         peak = model.peak(samples[push], contact.rest)
-        mm, _ = model.predict(peak)
-        if mm < NEAREST_MM:
-            return
-        self._measured[lane] = (contact.release, min(float(mm), self.length_mm[lane]))
-        self.whisks.append(
-            {"lane": lane, "onset": contact.onset, "release": contact.release, "peak": float(peak), "mm": float(mm)}
-        )
+        line_mm, _ = model.predict(peak)
+        distance = self.mounts[lane].distance(line_mm, turn)
+        if distance is not None:
+            self._measured[lane] = (contact.release, distance)
+        whisk = {"whisker": self.names[lane], "onset": contact.onset, "release": contact.release, "turn": turn}
+        self.whisks.append(whisk | {"peak_counts": peak, "line_mm": line_mm, "distance_mm": distance})
 
     def _texture_cells(self, lane: int, tick: int, held_back: bool) -> dict[str, float | None]:
         model = self.texture_models[self.names[lane]]

@@ -28,18 +28,18 @@ DEGREES_PER_COUNT = 180.0 / 65536.0
 
 def blocks(reader: Reader, lanes: int) -> Iterator[tuple[int, np.ndarray]]:
     """(first tick, samples (40, lanes) of ring.SAMPLE) block by block; lost ticks are marked bad. The last may be short."""
-    first, block, filled = 0, None, 0
+    first, block, filled = None, None, 0
     for frames in reader.frames():
         ticks = frames["tick"].astype(np.int64)
-        for start in range(int(ticks[0]) // BLOCK_TICKS * BLOCK_TICKS, int(ticks[-1]) + 1, BLOCK_TICKS):
-            if block is None or start != first:
-                if block is not None:
-                    yield first, block
-                first, block, filled = start, _empty_block(frames.dtype["lane"].base, lanes), 0
-            mine = (ticks >= start) & (ticks < start + BLOCK_TICKS)
-            block[ticks[mine] - start] = frames["lane"][mine, :lanes]
-            filled = int(ticks[mine][-1]) - start + 1
-            if filled == BLOCK_TICKS:
+        while len(ticks) > 0:
+            if block is None:
+                first = int(ticks[0]) // BLOCK_TICKS * BLOCK_TICKS if first is None else first + BLOCK_TICKS
+                block, filled = _empty_block(frames.dtype["lane"].base, lanes), 0
+            mine = ticks < first + BLOCK_TICKS
+            block[ticks[mine] - first] = frames["lane"][mine, :lanes]
+            filled = int(ticks[mine].max(initial=first + filled - 1)) - first + 1
+            frames, ticks = frames[~mine], ticks[~mine]
+            if filled == BLOCK_TICKS or len(ticks) > 0:
                 yield first, block
                 block = None
     if block is not None:

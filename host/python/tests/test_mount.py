@@ -1,0 +1,31 @@
+"""What a pressed whisker may say, for the demo's four object whiskers."""
+
+import pytest
+from whisker.demo.scenes import make_robot
+from whisker.mount import NEAREST_MM, Mount
+
+MOUNTS = [Mount.of(whisker) for whisker in make_robot().of_role("object")]
+
+
+def test_inner_whiskers_tell_corner_from_face_by_the_turn():
+    assert [(m.corner_turn, m.face_turn) for m in MOUNTS[1:3]] == [(1.0, -1.0), (-1.0, 1.0)]
+
+
+def test_outer_whiskers_cannot():
+    assert all(m.corner_turn == m.face_turn for m in (MOUNTS[0], MOUNTS[3]))
+
+
+@pytest.mark.parametrize(
+    ("line_mm", "towards_corner", "distance"),
+    [(100.0, True, 100.0), (155.0, True, 140.0), (100.0, False, 140.0), (NEAREST_MM - 1.0, True, None)],
+)
+def test_distance_of_an_inner_whisker(line_mm, towards_corner, distance):
+    mount = MOUNTS[1]
+    turn = mount.corner_turn if towards_corner else -mount.corner_turn
+    assert mount.distance(line_mm, turn) == pytest.approx(distance)
+
+
+def test_outer_whisker_is_sure_only_of_its_tip():
+    mount = MOUNTS[0]
+    assert mount.distance(100.0, mount.corner_turn) is None
+    assert mount.distance(150.0, mount.corner_turn) == pytest.approx(140.0)

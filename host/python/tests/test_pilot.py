@@ -1,0 +1,215 @@
+"""The pilot in closed loop with the level-1 world: where it drives, what it reports, what it ignores."""
+
+import math
+
+import numpy as np
+import pytest
+from whisker import localise
+from whisker.behaviour import BLOCK_TICKS, ODOMETRY_TICKS
+from whisker.contact import Contact
+from whisker.demo.level1 import explore
+from whisker.demo.pilot_process import load_models
+from whisker.demo.scenes import make_scene
+from whisker.demo.study import study
+from whisker.demo.training import learn
+from whisker.pilot import Pilot, compose
+
+SEED = 11
+TICKS = 80_000
+BESIDE_M = 0.005  # between a corner and the shaft it has just let go
+ODOMETRY = ("odo_x_m", "odo_y_m", "odo_theta_rad")
+
+
+@pytest.fixture(scope="module")
+def models(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("models")
+    learn(folder, make_scene(SEED)[0], SEED, lambda: None)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def flown(models):
+    """Scene, pilot, rows, truth and reported odometry of one exploration."""
+    return fly(models, TICKS)
+
+
+def fly(models, ticks, seed=SEED, **options):
+    scene, start = make_scene(seed)
+    pilot = Pilot(scene.robot, *load_models(models, scene.robot), seed)
+    reported, take = [], pilot.odometry
+    pilot.odometry = lambda tick, *motion: reported.append(motion) or take(tick, *motion)
+    rows, truth = explore(scene, start, pilot, seed, ticks, **options)
+    return scene, pilot, rows, truth, reported
+
+
+def range_along(scene, whisker, pose) -> float:
+    """Distance from a whisker's base to what it touches or all but touches, mm: the truth for a radial reading.
+
+    A corner beside the shaft is met at its projection on the shaft, a face where the whisker's line meets it.
+    """
+    x, y, theta = pose
+    bx, by = whisker.base_m
+    base = np.array([x + math.cos(theta) * bx - math.sin(theta) * by, y + math.sin(theta) * bx + math.cos(theta) * by])
+    along = np.array([math.cos(theta + whisker.yaw_rad), math.sin(theta + whisker.yaw_rad)])
+    beside = [
+        (float(along @ (corner - base)), abs(float(along[0] * (corner - base)[1] - along[1] * (corner - base)[0])))
+        for corner in corners(scene)
+    ]
+    met = [reach for reach, gap in beside if 0.0 < reach <= whisker.length_m and gap < BESIDE_M]
+    met += [hit for box in scene.arena.obstacles if (hit := enters(base, along, box)) is not None]
+    walls = (0.0, 0.0, *scene.arena.size_m)
+    return 1000.0 * min([*met, leaves(base, along, walls)])
+
+
+def corners(scene):
+    return [np.array([x, y]) for x0, y0, x1, y1 in scene.arena.obstacles for x in (x0, x1) for y in (y0, y1)]
+
+
+def crossings(base, along, box):
+    """Where the line is within the box's x range, and its y range: two (near, far)."""
+    return [sorted((box[axis + end] - base[axis]) / along[axis] for end in (0, 2)) for axis in (0, 1)]
+
+
+def enters(base, along, box):
+    (near_x, far_x), (near_y, far_y) = crossings(base, along, box)
+    near, far = max(near_x, near_y), min(far_x, far_y)
+    return near if 0.0 <= near <= far else None
+
+
+def leaves(base, along, box):
+    return min(far for _, far in crossings(base, along, box))
+
+
+def readings(rows, scene):
+    """(row number, whisker, mm) of every measured distance."""
+    for number, row in enumerate(rows):
+        for whisker in scene.robot.of_role("object"):
+            value = row[f"{whisker.name}_mm"]
+            if value is not None and not math.isnan(value):
+                yield number, whisker, value
+
+
+def test_stays_inside_the_arena_and_off_the_blocks(flown):
+    scene, _, _, truth, _ = flown
+    for row in truth:
+        assert scene.arena.is_free(row["x_m"], row["y_m"], scene.robot.body_radius_m - 0.001)
+
+
+def test_explores_and_whisks(flown):
+    _, pilot, _, truth, _ = flown
+    path = sum(math.dist((a["x_m"], a["y_m"]), (b["x_m"], b["y_m"])) for a, b in zip(truth, truth[1:], strict=False))
+    assert path > 1.5
+    assert len(pilot.whisks) >= 2
+
+
+def test_radial_readings_are_the_distance_at_their_row(flown, models):
+    scene, _, rows, truth, _ = flown
+    found = [(scene, rows, truth)]
+    for seed in (12, 13, 14):
+        made = fly(models, TICKS, seed)
+        found.append((made[0], made[2], made[3]))
+    errors = [
+        value - range_along(scene, whisker, [truth[n][key] for key in ("x_m", "y_m", "theta_rad")])
+        for scene, rows, truth in found
+        for n, whisker, value in readings(rows, scene)
+    ]
+    assert len(errors) >= 6
+    assert np.median(np.abs(errors)) < 6.0
+    assert np.max(np.abs(errors)) < 30.0
+
+
+def test_every_reported_motion_reaches_a_row_once(flown):
+    _, pilot, rows, _, reported = flown
+    total, carried = np.zeros(3), np.zeros(3)
+    for motion in reported:
+        total = compose(total, motion)
+    for row in rows:
+        carried = compose(carried, [row[key] for key in ODOMETRY])
+    assert compose(carried, pilot._pending) == pytest.approx(total, abs=1e-9)
+
+
+def test_rows_of_a_whisk_hold_everything_back(flown):
+    scene, _, rows, _, _ = flown
+    objects = [f"{w.name}_mm" for w in scene.robot.of_role("object")]
+    textures = [f"{w.name}_{t}" for w in scene.robot.of_role("texture") for t in scene.arena.textures]
+    held = [row for row in rows[5:] if all(row[key] is not None and math.isnan(row[key]) for key in objects)]
+    assert len(held) > 10
+    for row in held:
+        assert [row[key] for key in ODOMETRY] == [0.0, 0.0, 0.0]
+        assert all(row[key] is None for key in textures)
+
+
+def test_release_row_carries_the_whisks_odometry(flown):
+    scene, _, rows, _, _ = flown
+    for number, whisker, _ in readings(rows, scene):
+        assert any(rows[number][key] != 0.0 for key in ODOMETRY)
+        others = [rows[number][f"{w.name}_mm"] for w in scene.robot.of_role("object") if w != whisker]
+        assert all(value is None or math.isnan(value) for value in others)
+
+
+def test_rows_fit_the_filters(flown):
+    scene, _, rows, _, _ = flown
+    grid = localise.Filter("grid", scene)
+    for row in rows:
+        grid.step(row)
+    assert grid.bad_cells == 0 and grid.bad_rows == 0
+    assert [row["t_s"] for row in rows[:3]] == [0.1, 0.2, 0.3]
+
+
+def test_bad_samples_are_counted_and_their_counts_never_used(models):
+    ticks = 24_000
+    random = np.random.default_rng(3)
+    bad = random.random((ticks, 6)) < 0.02
+
+    def status(first):
+        return bad[first : first + BLOCK_TICKS].astype(np.uint16) << 10
+
+    class Spoilt(Pilot):
+        """Sees other counts wherever the status is bad."""
+
+        value = 0
+
+        def block(self, first_tick, alpha, beta, status):
+            alpha, beta = alpha.copy(), beta.copy()
+            alpha[status != 0] = self.value
+            beta[status != 0] = self.value
+            self.drives.append(super().block(first_tick, alpha, beta, status))
+            return self.drives[-1]
+
+    flights = []
+    for value in (0, 0xFFFF):
+        scene, start = make_scene(SEED)
+        pilot = Spoilt(scene.robot, *load_models(models, scene.robot), SEED)
+        pilot.value, pilot.drives = value, []
+        rows, _ = explore(scene, start, pilot, SEED, ticks, status=status)
+        assert pilot.bad_samples == bad.sum()
+        flights.append((repr(rows), pilot.drives))
+    assert flights[0] == flights[1]
+
+
+def test_onset_and_release_are_dated_to_the_sample():
+    contact = Contact()
+    rest, pushed = [32768.0, 32768.0], [32768.0, 33268.0]
+    samples = np.array([rest] * 500 + [pushed] * 300 + [rest] * 200)
+    for first in range(0, 1000, BLOCK_TICKS):
+        block = samples[first : first + BLOCK_TICKS]
+        contact.block(np.arange(first, first + len(block)), block, np.ones(len(block), bool))
+    assert (contact.onset, contact.release, contact.touching) == (500, 800, False)
+
+
+def test_same_seed_same_figures(models):
+    first, second = (study(SEED, 8.0, models) for _ in range(2))
+    assert first == second
+    assert first != study(SEED + 1, 8.0, models) | {"seed": SEED}
+
+
+def test_grid_beats_odometry(models):
+    figures = study(SEED, 40.0, models)
+    assert figures["pose_error_median_m"] <= 0.08
+    assert figures["pose_error_median_m"] <= 0.5 * figures["odometry_error_median_m"]
+    assert figures["texture_accuracy"] >= 0.9
+
+
+def test_odometry_is_asked_for_after_each_fifth_block(flown):
+    _, _, rows, truth, reported = flown
+    assert len(rows) == len(truth) == len(reported) == TICKS // ODOMETRY_TICKS
