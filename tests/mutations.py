@@ -1,0 +1,172 @@
+#!/usr/bin/env python3
+"""Breaks one part of the chain after another, in a copy, and expects the tests to go red.
+
+    .venv/bin/python tests/mutations.py            every mutation: about fifteen minutes
+    .venv/bin/python tests/mutations.py swap       those whose name contains "swap"
+
+Exit code 1 when one survives, that is, when every test stays green although a part is broken.
+"""
+
+import argparse
+import shutil
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+BUILD = "build/release"
+
+
+@dataclass(frozen=True)
+class Mutation:
+    """A part broken: in `file`, `old` becomes `new`."""
+
+    name: str
+    file: str
+    old: str
+    new: str
+
+
+MUTATIONS = [
+    Mutation(
+        "firmware: byte order of the sensor's alpha",
+        "firmware/dspic/core/sensor_frame.c",
+        "whisker_get_u16(frame + MLX90333_FRAME_ALPHA),\n        whisker_get_u16(frame + MLX90333_FRAME_BETA)",
+        "(uint16_t)(frame[1] << 8 | frame[2]),\n        whisker_get_u16(frame + MLX90333_FRAME_BETA)",
+    ),
+    Mutation(
+        "firmware: record bytes swapped in their SPI words",
+        "firmware/dspic/core/record.c",
+        "words[i] = (uint16_t)((uint16_t)bytes[2u * i] << 8 | bytes[2u * i + 1u]);",
+        "words[i] = (uint16_t)((uint16_t)bytes[2u * i + 1u] << 8 | bytes[2u * i]);",
+    ),
+    Mutation(
+        "firmware: a node that does not count ticks",
+        "firmware/dspic/core/node.c",
+        "node->tick = order.tick;",
+        "node->tick = (uint8_t)(order.tick & 0x7Fu);",
+    ),
+    Mutation(
+        "sensor: an angle mis-scaled by one part in a hundred",
+        "sim/mlx90333/sim_counts.c",
+        "field_deg * (STEPS / SPAN_DEG)",
+        "field_deg * 1.01 * (STEPS / SPAN_DEG)",
+    ),
+    Mutation(
+        "sensor: sum without the error word",
+        "firmware/dspic/core/sensor_frame.c",
+        "if (sum == sum_of(data, MLX90333_FRAME_SUM - MLX90333_FRAME_ALPHA))",
+        "if (sum == sum_of(data, MLX90333_FRAME_ERRORS - MLX90333_FRAME_ALPHA))",
+    ),
+    Mutation(
+        "bridge: two lanes swapped",
+        "fpga/bridge_rtl/lane_receiver.v",
+        "bits <= miso;",
+        "bits <= {miso[LANES-1:2], miso[0], miso[1]};",
+    ),
+    Mutation(
+        "bridge: a sequence number dropped every 4096 frames",
+        "fpga/bridge_rtl/bridge_counters.v",
+        "sequence_number <= sequence_number + 32'd1;",
+        "sequence_number <= sequence_number + (&sequence_number[11:0] ? 32'd2 : 32'd1);",
+    ),
+    Mutation(
+        "bridge: stale records pass",
+        "fpga/bridge_rtl/framer.v",
+        "stale   <= tick_wrong;",
+        "stale   <= {LANES{1'b0}};",
+    ),
+    Mutation(
+        "bridge: order without its CRC",
+        "fpga/bridge_rtl/node_link.v",
+        "crc[7] ^ CRC8_XOR_OUT[{2'b00, ~next_index[2:0]}]",
+        "crc[7]",
+    ),
+    Mutation(
+        "usb: data toggle kept over a bus reset",
+        "fpga/usb/endpoints.py",
+        'return ResetInserter({"usb": self.restart})(self._inner)',
+        "return self._inner",
+    ),
+    Mutation(
+        "host: alpha read where beta stands",
+        "host/libwhisker/src/frame.c",
+        "sample->beta = whisker_get_u16(record + WHISKER_RECORD_BETA);",
+        "sample->beta = sample->alpha;",
+    ),
+    Mutation(
+        "host: lanes stored from the wrong end",
+        "host/libwhisker/src/frame.c",
+        "good &= decode_record(record, &frame->lane[lane]);",
+        "good &= decode_record(record, &frame->lane[WHISKER_FRAME_LANES - 1 - lane]);",
+    ),
+    Mutation(
+        "pilot: bad samples used",
+        "host/python/whisker/pilot.py",
+        "good = np.asarray(status)[:, : len(self.names)] == 0",
+        "good = np.asarray(status)[:, : len(self.names)] >= 0",
+    ),
+    Mutation(
+        "navigation: motion turned the wrong way",
+        "host/nav/pose.c",
+        "sin(",
+        "-sin(",
+    ),
+]
+
+
+def run(words: list, where: Path) -> subprocess.CompletedProcess:
+    return subprocess.run([str(word) for word in words], cwd=where, capture_output=True, text=True)
+
+
+def prepare(copy: Path) -> None:
+    """A clone with the packages of this tree, built once; mutations then build only what they touch."""
+    run(["git", "clone", "--quiet", ROOT, copy], ROOT)
+    (copy / ".venv").symlink_to(ROOT / ".venv")
+    done = run(["tools/build.sh", BUILD], copy)
+    if done.returncode:
+        sys.exit(f"mutations: the unbroken tree does not build; run 'make build' and see\n{done.stderr[-2000:]}")
+
+
+def first_red(copy: Path) -> str | None:
+    """The first check that notices, or None."""
+    if run(["tools/build.sh", BUILD], copy).returncode:
+        return "does not build"
+    ctest = run(["ctest", "--test-dir", BUILD, "--parallel", 2, "--stop-on-failure"], copy)
+    if ctest.returncode:
+        return _failed(ctest.stdout, "***")
+    tests = ["-x", "--no-header", "host/python", "sim", "fpga/tb", "tests"]
+    pytest = run(["env", f"PYTHONPATH={copy / 'host/python'}", ".venv/bin/python", "-m", "pytest", *tests], copy)
+    return _failed(pytest.stdout, "FAILED", "ERROR") if pytest.returncode else None
+
+
+def _failed(output: str, *marks: str) -> str:
+    return next((" ".join(line.split()) for line in output.splitlines() if any(m in line for m in marks)), "red")
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("part", nargs="?", default="", help="only mutations whose name contains this")
+    chosen = [m for m in MUTATIONS if parser.parse_args().part in m.name]
+    survivors = 0
+    with tempfile.TemporaryDirectory() as folder:
+        copy = Path(folder) / "tree"
+        prepare(copy)
+        for mutation in chosen:
+            path = copy / mutation.file
+            text = path.read_text()
+            if text.count(mutation.old) == 0:
+                sys.exit(f"mutations: {mutation.file} does not hold '{mutation.old}'; bring the list up to date")
+            path.write_text(text.replace(mutation.old, mutation.new, 1))
+            red = first_red(copy)
+            path.write_text(text)
+            survivors += red is None
+            print(f"{'red ' if red else 'SURVIVES'}  {mutation.name}: {red or 'no test noticed'}", flush=True)
+    shutil.rmtree(folder, ignore_errors=True)
+    return 1 if survivors else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
