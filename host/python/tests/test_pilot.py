@@ -213,3 +213,8 @@ def test_grid_beats_odometry(models):
 def test_odometry_is_asked_for_after_each_fifth_block(flown):
     _, _, rows, truth, reported = flown
     assert len(rows) == len(truth) == len(reported) == TICKS // ODOMETRY_TICKS
+
+
+def test_motions_compose_in_the_frame_they_start_in():
+    quarter = math.pi / 2
+    assert compose((1.0, 0.0, quarter), (2.0, 0.5, 0.1)) == pytest.approx([0.5, 2.0, quarter + 0.1])
