@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 
 import pytest
+
 from whisker import protocol as p
 
 HERE = Path(__file__).parent

@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
+
 from whisker.demo.scenes import make_scene
 from whisker.protocol import FRAME_FLAGS
 from whisker.ring import FRAME, Reader

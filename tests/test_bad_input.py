@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from chainrun import END_S, FAST_LINK, program, running, simulation, write_flat_scene
+
 from whisker.demo.scenes import make_scene
 from whisker.protocol import WIRE_VERSION
 from whisker.ring import Reader

@@ -8,6 +8,7 @@ import sys
 import numpy as np
 import pytest
 from chainrun import BLOCK_TICKS, BUILD, DECISION_TICKS, ROOT, TICKS_PER_S, is_last, record, write_flat_scene
+
 from whisker.protocol import CODES, LANES, STATUS_CODE_SHIFT
 
 sys.path.insert(0, str(ROOT / "sim"))

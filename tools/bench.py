@@ -25,6 +25,7 @@ matplotlib.rcParams["svg.hashsalt"] = "whisker"  # same data, same file
 import matplotlib.pyplot as plt  # noqa: E402
 import numpy as np  # noqa: E402
 from tqdm import tqdm  # noqa: E402
+
 from whisker import localise  # noqa: E402
 from whisker.demo.level1 import explore  # noqa: E402
 from whisker.demo.pilot_process import cell, load_models  # noqa: E402

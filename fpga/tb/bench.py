@@ -9,6 +9,7 @@ sys.path.insert(0, str(REPO / "host" / "python"))
 
 from cocotb.clock import Clock  # noqa: E402
 from cocotb.triggers import ClockCycles, RisingEdge  # noqa: E402
+
 from whisker.protocol import CODES, RECORD  # noqa: E402
 
 RTL = REPO / "fpga" / "bridge_rtl"

@@ -4,6 +4,7 @@ import cocotb
 from bench import CLOCK_PS
 from cocotb.triggers import FallingEdge, RisingEdge, Timer, ValueChange
 from cocotb.utils import get_sim_time
+
 from whisker.protocol import LANES, RECORD
 
 IDLE = (1 << LANES) - 1  # pull-ups

@@ -2,6 +2,7 @@
 
 from usb_protocol.emitters import DeviceDescriptorCollection
 from usb_protocol.types import USBTransferType
+
 from whisker.protocol import LIMITS, REPORTS
 
 HID_CLASS = 0x03

@@ -22,6 +22,7 @@ from endpoints import FrameEndpoint, SilentEndpoint, StandardRequests  # noqa: E
 from hid_requests import HidRequests  # noqa: E402
 from luna.gateware.interface.utmi import UTMIInterface  # noqa: E402
 from luna.gateware.usb.usb2.device import USBDevice  # noqa: E402
+
 from whisker.protocol import LIMITS  # noqa: E402
 
 NOTICE = """\

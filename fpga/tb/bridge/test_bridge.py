@@ -4,6 +4,7 @@ import cocotb
 from bench import error_record, pulse, record, run_bench, start_clock
 from cocotb.triggers import ClockCycles, FallingEdge, RisingEdge
 from nodes import Nodes
+
 from whisker.protocol import FRAME_BYTES, FRAME_FLAGS, LANES, LIMITS, ORDER, REPORTS, WIRE_VERSION, decode_frame
 
 NODES = 6

@@ -5,6 +5,7 @@ import random
 import cocotb
 from bench import pulse, run_bench, start_clock
 from cocotb.triggers import FallingEdge, RisingEdge
+
 from whisker.protocol import DEFINITION, crc8
 
 

@@ -6,6 +6,7 @@ import cocotb
 from bench import CLOCK_PS, REPO, pulse, record, run_bench, start_clock
 from cocotb.triggers import FallingEdge, RisingEdge
 from nodes import BITS, Nodes
+
 from whisker.protocol import COMMANDS, LANES, ORDER, RECORD
 
 SETTINGS = [(6, 30, 3), (6, 30, 5), (16, 180, 8), (32, 30, 16), (32, 255, 32), (8, 31, 1)]  # divider, gap, sample point

@@ -12,6 +12,7 @@ from descriptors import descriptors, report_descriptor  # noqa: E402
 from endpoints import FrameEndpoint, SilentEndpoint  # noqa: E402
 from hid_requests import FEATURE, GET_REPORT, SET_IDLE, SET_REPORT, HidRequests  # noqa: E402
 from usb_protocol.types import USBRequestRecipient, USBRequestType  # noqa: E402
+
 from whisker.protocol import LIMITS, REPORTS  # noqa: E402
 
 PACKET = LIMITS["bulk_packet"]

@@ -8,6 +8,7 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
+
 from whisker.localise import Observations
 from whisker.scene import Arena, Prior, Robot, Scene, Whisker
 

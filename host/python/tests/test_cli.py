@@ -6,6 +6,7 @@ import level0
 import numpy as np
 import pytest
 from test_radial import write_whisks
+
 from whisker import localise, scene
 from whisker.cli import main
 

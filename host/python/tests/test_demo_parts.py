@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from whisker import scene as scenes
 from whisker.demo import summary
 from whisker.demo.__main__ import fresh_folder

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from whisker import scene as scenes
 from whisker.demo.chain import ChainRun, Link, run_chain
 from whisker.demo.level1 import explore

@@ -1,6 +1,7 @@
 """What a pressed whisker may say, for the demo's four object whiskers."""
 
 import pytest
+
 from whisker.demo.scenes import make_robot
 from whisker.mount import NEAREST_MM, Mount
 

@@ -5,6 +5,7 @@ import dataclasses
 import level0
 import numpy as np
 import pytest
+
 from whisker import localise
 
 SEEDS = range(100, 106)

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+
 from whisker import localise
 from whisker.behaviour import BLOCK_TICKS, ODOMETRY_TICKS
 from whisker.contact import Contact

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+
 from whisker.behaviour import (
     BLOCK_TICKS,
     EFFECT_TICKS,

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from whisker.radial import RadialModel, peak, read_whisks
 from whisker.tables import TableError
 

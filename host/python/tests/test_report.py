@@ -5,6 +5,7 @@ import re
 
 import numpy as np
 import pytest
+
 from whisker.report import write_report
 
 ROWS = 40

@@ -3,6 +3,7 @@
 import dataclasses
 
 import pytest
+
 from whisker import scene as scenes
 
 ARENA_TOML = """\

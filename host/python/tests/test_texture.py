@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+
 from whisker.tables import TableError
 from whisker.texture import TextureModel, classify, read_folder, read_recording
 

@@ -8,6 +8,7 @@ import threading
 from pathlib import Path
 
 import pytest
+
 from whisker import protocol
 
 SIMULATION = os.environ.get("WHISKER_BRIDGE_SIM", "")

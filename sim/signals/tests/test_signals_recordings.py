@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from demo_robot import flat
+
 from signals import recordings
 
 CONE_MM = 181.739  # virtual cone length Lc of the whisker (whisker physics, section 1)

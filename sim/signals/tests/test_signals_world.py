@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from demo_robot import flat
+
 from signals import World
 
 SPAN = 65536 / 180  # counts per degree of field
