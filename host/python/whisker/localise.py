@@ -13,6 +13,7 @@ from .tables import TableError, number, numbers, read_columns
 
 TRUTH = ("true_x_m", "true_y_m", "true_theta_rad")
 ODOMETRY = ("odo_x_m", "odo_y_m", "odo_theta_rad")
+ESTIMATE_HEADER = "t_s,x_m,y_m,theta_rad,confidence"
 CHI2_90 = 4.605170185988092  # 90 % point of chi-square with two degrees of freedom
 
 
@@ -48,6 +49,14 @@ class Estimate:
     evaluations: int
     states: int
     bytes: int
+
+    @property
+    def pose(self) -> tuple[float, float, float]:
+        return self.x_m, self.y_m, self.theta_rad
+
+    def line(self, t_s: str) -> str:
+        """The row of est.csv."""
+        return f"{t_s},{self.x_m:.6f},{self.y_m:.6f},{self.theta_rad:.6f},{self.confidence:.6f}"
 
 
 class Filter:
@@ -236,21 +245,27 @@ def run(name: str, scene: Scene, observations: Observations, settings: dict[str,
     return Run(name, setup_s, step_us, estimates, made.bad_cells, made.bad_rows)
 
 
-def errors(estimates: list[Estimate], truth: np.ndarray) -> dict[str, float]:
-    """Position and heading errors over the rows whose truth is finite, and how often the 90 % region holds the truth."""
-    pose = np.array([(e.x_m, e.y_m, e.theta_rad) for e in estimates])
+def pose_errors(poses: np.ndarray, truth: np.ndarray) -> dict[str, float]:
+    """Position and heading errors of poses (n, 3) over the rows whose truth (n, 3) is finite."""
     known = np.isfinite(truth).all(axis=1)
-    off = pose[known] - truth[known]
+    off = poses[known] - truth[known]
     distance = np.hypot(off[:, 0], off[:, 1])
     heading = np.abs(np.remainder(off[:, 2] + math.pi, 2 * math.pi) - math.pi)
-    information = np.linalg.inv(np.array([e.covariance[:2, :2] for e in estimates])[known])
-    square = np.einsum("ni,nij,nj->n", off[:, :2], information, off[:, :2])
     return {
         "pose_error_median_m": float(np.median(distance)),
         "pose_error_p90_m": float(np.quantile(distance, 0.9)),
         "heading_error_median_rad": float(np.median(heading)),
-        "coverage_90": float(np.mean(square <= CHI2_90)),
     }
+
+
+def errors(estimates: list[Estimate], truth: np.ndarray) -> dict[str, float]:
+    """`pose_errors`, and how often the 90 % region holds the truth."""
+    poses = np.array([e.pose for e in estimates])
+    known = np.isfinite(truth).all(axis=1)
+    off = (poses - truth)[known, :2]
+    information = np.linalg.inv(np.array([e.covariance[:2, :2] for e in estimates])[known])
+    square = np.einsum("ni,nij,nj->n", off, information, off)
+    return pose_errors(poses, truth) | {"coverage_90": float(np.mean(square <= CHI2_90))}
 
 
 def summary(result: Run, truth: np.ndarray | None) -> dict:
@@ -278,11 +293,9 @@ def summary(result: Run, truth: np.ndarray | None) -> dict:
 
 def write_estimates(path, result: Run, observations: Observations) -> None:
     """est.csv: one row per input row, in the same order."""
-    lines = ["t_s,x_m,y_m,theta_rad,confidence"]
-    for t_s, e in zip(observations.t_text, result.estimates, strict=True):
-        lines.append(f"{t_s},{e.x_m:.6f},{e.y_m:.6f},{e.theta_rad:.6f},{e.confidence:.6f}")
+    lines = [e.line(t_s) for t_s, e in zip(observations.t_text, result.estimates, strict=True)]
     try:
-        Path(path).write_text("\n".join(lines) + "\n")
+        Path(path).write_text("\n".join([ESTIMATE_HEADER, *lines]) + "\n")
     except OSError as error:
         raise TableError(path, None, f"cannot be written ({error.strerror}); choose another --out") from error
 

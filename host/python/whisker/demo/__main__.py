@@ -18,12 +18,11 @@ from ..report import write_report
 from ..tables import TableError
 from . import summary as scores
 from .chain import ChainError, ChainRun, Link, run_chain
-from .pilot_process import cell
+from .navigator_process import FILTERS
 from .scenes import make_scene
 from .training import learn, radial_scores, write_radial_points
 
 TICKS_PER_S = 2000
-FILTERS = ("grid", "foveal", "odometry")
 MARK = "demo.txt"
 
 
@@ -114,19 +113,14 @@ def run(out: Path, options: argparse.Namespace) -> dict:
 
 
 def judge(out: Path, scene: scenes.Scene) -> dict:
-    """Localise with each filter and compare everything with the truth."""
+    """Compare what the pilot read and what the navigator thought with the truth."""
     path = localise.observations_path(out / "scene")
     truth = read_dicts(out / "truth.csv")
     add_truth(path, truth)
     observations = localise.read_observations(path, scene)
-    estimates = {}
-    for name in tqdm(FILTERS, desc="localise", unit="filter"):
-        result = localise.run(name, scene, observations)
-        localise.write_estimates(out / f"est_{name}.csv", result, observations)
-        write_covariances(out / f"covariance_{name}.csv", observations.t_text, result.estimates)
-        estimates[name] = result.estimates
+    poses = {name: read_poses(out / f"est_{name}.csv") for name in FILTERS}
     rows = [{key: float(value) if value else None for key, value in row.items()} for row in read_dicts(path)]
-    return scores.texture_scores(rows, truth, scene) | scores.pose_scores(estimates, observations.truth)
+    return scores.texture_scores(rows, truth, scene) | scores.pose_scores(poses, observations.truth)
 
 
 def read_dicts(path: Path) -> list[dict[str, str]]:
@@ -148,13 +142,9 @@ def add_truth(path: Path, truth: list[dict[str, str]]) -> None:
         )
 
 
-def write_covariances(path: Path, t_text: list[str], estimates: list[localise.Estimate]) -> None:
-    """Position covariance of every row, for the report's ellipses."""
-    lines = ["t_s,xx_m2,xy_m2,yy_m2"]
-    for t_s, estimate in zip(t_text, estimates, strict=True):
-        c = estimate.covariance
-        lines.append(",".join([t_s, *(cell(value) for value in (c[0, 0], c[0, 1], c[1, 1]))]))
-    path.write_text("\n".join(lines) + "\n")
+def read_poses(path: Path) -> np.ndarray:
+    """(n, 3) poses of an est.csv."""
+    return np.loadtxt(path, delimiter=",", skiprows=1, usecols=(1, 2, 3), ndmin=2)
 
 
 def tell(s: dict) -> None:

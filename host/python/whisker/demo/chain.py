@@ -1,4 +1,4 @@
-"""Runs the chain: simulated bridge with whiskerd inside, whisker-log and the pilot as processes of their own."""
+"""Runs the chain: simulated bridge with whiskerd inside, whisker-log, pilot and navigator as processes of their own."""
 
 import os
 import shutil
@@ -136,7 +136,14 @@ def run_chain(run: ChainRun, progress: Callable[[int], None]) -> float:
         bridge = Child("bridge", _bridge(run, ring, socket), run.logs / "bridge.log", _ticks(progress))
         children = [stack.enter_context(closing(bridge))]
         _await_socket(Path(socket), bridge)
-        for name, command in (("log", _log(run, ring, socket)), ("pilot", _pilot(run, ring, socket))):
+        rows = place / "rows"
+        os.mkfifo(rows)
+        others = {
+            "log": _log(run, ring, socket),
+            "pilot": _pilot(run, ring, socket, rows),
+            "navigator": _navigator(run, rows),
+        }
+        for name, command in others.items():
             children.append(stack.enter_context(closing(Child(name, command, run.logs / f"{name}.log"))))
         _await_end(children)
     return time.monotonic() - began
@@ -161,11 +168,16 @@ def _log(run: ChainRun, ring: str, socket: str) -> list[str]:
     return [str(word) for word in [*command, "--bad", run.out / "bad.csv", "--summary", run.out / "log.json"]]
 
 
-def _pilot(run: ChainRun, ring: str, socket: str) -> list[str]:
+def _pilot(run: ChainRun, ring: str, socket: str, rows: Path) -> list[str]:
     command = [sys.executable, "-m", "whisker.demo.pilot_process", "--ring", ring, "--socket", socket]
     command += ["--scene", run.scene, "--models", run.out / "models", "--seed", run.seed]
-    command += ["--out", run.scene / "observations.csv", "--traces", run.out / "traces.csv"]
+    command += ["--out", run.scene / "observations.csv", "--rows", rows, "--traces", run.out / "traces.csv"]
     return [str(word) for word in [*command, "--report", run.out / "pilot.json"]]
+
+
+def _navigator(run: ChainRun, rows: Path) -> list[str]:
+    command = [sys.executable, "-m", "whisker.demo.navigator_process", "--rows", rows, "--scene", run.scene]
+    return [str(word) for word in [*command, "--out", run.out]]
 
 
 def _ticks(progress: Callable[[int], None]) -> Callable[[str], None]:

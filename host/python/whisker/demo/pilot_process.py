@@ -78,11 +78,26 @@ def load_models(folder: Path, robot: scenes.Robot) -> tuple[dict, dict]:
     return {w.name: texture for w in robot.of_role("texture")}, radial
 
 
-def fly(pilot: Pilot, reader: Reader, link: SimLink, out: TextIO, traces: TextIO) -> int:
+class Rows:
+    """Observation rows into several files, line by line, the header first."""
+
+    def __init__(self, *files: TextIO):
+        self._files, self._begun = files, False
+
+    def write(self, row: dict[str, float | None]) -> None:
+        lines = [] if self._begun else [list(row)]
+        lines.append([cell(value) for value in row.values()])
+        for file in self._files:
+            csv.writer(file, lineterminator="\n").writerows(lines)
+            file.flush()
+        self._begun = True
+
+
+def fly(pilot: Pilot, reader: Reader, link: SimLink, rows: Rows, traces: TextIO) -> int:
     """From the ring to drives and rows until the ring is closed; returns the ticks used."""
-    rows, trace_rows = (csv.writer(file, lineterminator="\n") for file in (out, traces))
+    trace_rows = csv.writer(traces, lineterminator="\n")
     trace_rows.writerow(trace_header(pilot))
-    used, header_due = 0, True
+    used = 0
     for first, samples in blocks(reader, len(pilot.names)):
         drive = pilot.block(first, samples["alpha"], samples["beta"], samples["status"])
         trace_rows.writerow(trace_row(pilot, first, samples))
@@ -92,12 +107,7 @@ def fly(pilot: Pilot, reader: Reader, link: SimLink, out: TextIO, traces: TextIO
             link.drive(last, *drive)
         if used % ODOMETRY_TICKS != 0 or (motion := link.odometry(last)) is None:
             continue
-        row = pilot.odometry(last, *motion)
-        if header_due:
-            rows.writerow(row)
-            header_due = False
-        rows.writerow([cell(value) for value in row.values()])
-        out.flush()
+        rows.write(pilot.odometry(last, *motion))
     return used
 
 
@@ -109,6 +119,7 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--models", required=True, type=Path)
     parser.add_argument("--seed", type=int, default=1, help="of the random turns")
     parser.add_argument("--out", required=True, type=Path, help="observations.csv")
+    parser.add_argument("--rows", type=Path, default="/dev/null", help="the same rows once more, for the navigator")
     parser.add_argument(
         "--traces", type=Path, default="/dev/null", help="CSV of the floor whiskers' deflection, for the report"
     )
@@ -121,9 +132,10 @@ def main(argv: list[str] | None = None) -> int:
             Reader(options.ring, wait_s=10.0) as reader,
             SimLink(options.socket) as link,
             open(options.out, "w", newline="") as out,
+            open(options.rows, "w", newline="") as live,
             open(options.traces, "w", newline="") as traces,
         ):
-            used = fly(pilot, reader, link, out, traces)
+            used = fly(pilot, reader, link, Rows(out, live), traces)
     except (OSError, ValueError, RingError) as error:
         print(f"pilot: {error}", file=sys.stderr)
         return 1

@@ -28,14 +28,14 @@ def study(seed: int, seconds: float, models: Path) -> dict:
     pilot = Pilot(scene.robot, *load_models(models, scene.robot), seed)
     rows, truth = explore(scene, start, pilot, seed, round(seconds * 2000))
     poses = np.array([[row[key] for key in ("x_m", "y_m", "theta_rad")] for row in truth])
-    estimates = {name: _localise(name, scene, rows) for name in FILTERS}
-    scores = texture_scores(rows, truth, scene) | pose_scores(estimates, poses)
+    answers = {name: _localise(name, scene, rows) for name in FILTERS}
+    scores = texture_scores(rows, truth, scene) | pose_scores(answers, poses)
     return rounded({"seed": seed, "simulated_s": seconds, "whisks": len(pilot.whisks)} | scores)
 
 
-def _localise(name: str, scene: Scene, rows: list[dict]) -> list[localise.Estimate]:
+def _localise(name: str, scene: Scene, rows: list[dict]) -> np.ndarray:
     made = localise.Filter(name, scene)
-    return [made.step(row) for row in rows]
+    return np.array([made.step(row).pose for row in rows])
 
 
 def main(argv: list[str] | None = None) -> int:

@@ -48,9 +48,9 @@ def texture_scores(rows: list[dict], truth: list[dict], scene: Scene) -> dict[st
     }
 
 
-def pose_scores(estimates: dict[str, list], truth: np.ndarray) -> dict[str, float]:
-    """Errors of `grid`, `foveal` and `odometry` estimates against truth (n, 3)."""
-    grid, foveal, odometry = (localise.errors(estimates[name], truth) for name in ("grid", "foveal", "odometry"))
+def pose_scores(poses: dict[str, np.ndarray], truth: np.ndarray) -> dict[str, float]:
+    """Errors of the poses (n, 3) of `grid`, `foveal` and `odometry` against truth (n, 3)."""
+    grid, foveal, odometry = (localise.pose_errors(poses[name], truth) for name in ("grid", "foveal", "odometry"))
     return {
         "pose_error_median_m": grid["pose_error_median_m"],
         "pose_error_p90_m": grid["pose_error_p90_m"],
