@@ -19,25 +19,26 @@ from collections.abc import Callable
 from pathlib import Path
 
 import matplotlib
+import numpy as np
+from matplotlib.figure import Figure
+from tqdm import tqdm
 
-matplotlib.use("Agg")
-matplotlib.rcParams["svg.hashsalt"] = "whisker"  # same data, same file
-import matplotlib.pyplot as plt  # noqa: E402
-import numpy as np  # noqa: E402
-from tqdm import tqdm  # noqa: E402
-
-from whisker import localise  # noqa: E402
-from whisker.demo.level1 import explore  # noqa: E402
-from whisker.demo.pilot_process import cell, load_models  # noqa: E402
-from whisker.demo.scenes import make_scene  # noqa: E402
-from whisker.demo.training import learn  # noqa: E402
-from whisker.pilot import Pilot  # noqa: E402
+from whisker import localise
+from whisker.demo.level1 import explore
+from whisker.demo.pilot_process import cell, load_models
+from whisker.demo.scenes import make_scene
+from whisker.demo.training import learn
+from whisker.pilot import Pilot
+from whisker.report import figures
+from whisker.report.run import Run
 
 ROOT = Path(__file__).resolve().parent.parent
 RESULTS, CHARTS, CACHE = ROOT / "bench/results", ROOT / "docs/charts", ROOT / "build/bench"
 ROW_S = 0.1
 BENCH_SECONDS = 5
-CHAIN_SECONDS = 20
+CHAIN_SECONDS = 60
+CHAIN_LANES = (6, 28)
+DEMO = CACHE / "demo"  # the six-lane run, whose figures go into the documents
 LANES = (1, 6, 14, 28)
 LINKS = {"SCK/6, gap 0.5 us": (6, 30, 5), "SCK/16, gap 3 us (hardware)": (16, 180, 8)}
 SEEDS = tuple(range(101, 109))
@@ -77,18 +78,17 @@ def bridge_speed(build: Path, lanes: int, link: tuple[int, int, int]) -> dict:
 
 
 def chain_speed(build: Path, lanes: int) -> dict:
-    """The whole chain: whiskerd under umockdev, whisker-log and the pilot beside it, faults injected."""
-    with tempfile.TemporaryDirectory() as folder:
-        out = Path(folder) / "demo"
-        command = [sys.executable, "-m", "whisker.demo", "--out", out, "--build-dir", build, "--lanes", lanes]
-        subprocess.run(
-            [str(word) for word in [*command, "--seconds", CHAIN_SECONDS]],
-            check=True,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-        )
-        speed = json.loads((out / "speed.json").read_text())
-        summary = json.loads((out / "summary.json").read_text())
+    """The whole chain: whiskerd under umockdev, whisker-log, pilot and navigator beside it, faults injected."""
+    out = DEMO.with_name(f"demo_{lanes}") if lanes != CHAIN_LANES[0] else DEMO
+    command = [sys.executable, "-m", "whisker.demo", "--out", out, "--build-dir", build, "--lanes", lanes]
+    subprocess.run(
+        [str(word) for word in [*command, "--seconds", CHAIN_SECONDS]],
+        check=True,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    speed = json.loads((out / "speed.json").read_text())
+    summary = json.loads((out / "summary.json").read_text())
     return {"lanes": lanes, "frames_lost": summary["frames_lost"], "realtime_factor": speed["realtime_factor"]}
 
 
@@ -98,14 +98,15 @@ def measure_chain(build: Path) -> dict:
         for link in LINKS.values()
         for n in LANES
     ]
-    jobs += [(f"chain_{n}", lambda n=n: chain_speed(build, n)) for n in (6, 28)]
+    jobs += [(f"chain_{n}", lambda n=n: chain_speed(build, n)) for n in CHAIN_LANES]
     done = {name: once(name, job) for name, job in tqdm(jobs, desc="chain", unit="run")}
     bridge = {title: [done[f"bridge_{n}_{link[0]}"] for n in LANES] for title, link in LINKS.items()}
-    return {"bridge": bridge, "whole_chain": [done["chain_6"], done["chain_28"]]}
+    return {"bridge": bridge, "whole_chain": [done[f"chain_{n}"] for n in CHAIN_LANES]}
 
 
-def draw_chain(chain: dict) -> plt.Figure:
-    figure, axes = plt.subplots(figsize=(7, 4), layout="constrained")
+def draw_chain(chain: dict) -> Figure:
+    figure = Figure(figsize=(7, 4), layout="constrained")
+    axes = figure.subplots()
     for (title, points), style in zip(chain["bridge"].items(), ("o-", "s--"), strict=True):
         axes.plot(
             [p["lanes"] for p in points],
@@ -170,8 +171,9 @@ def measure_localisation() -> dict:
     }
 
 
-def draw_localisation(runs: dict) -> plt.Figure:
-    figure, axes = plt.subplots(figsize=(7, 4), layout="constrained")
+def draw_localisation(runs: dict) -> Figure:
+    figure = Figure(figsize=(7, 4), layout="constrained")
+    axes = figure.subplots()
     for title, marker in zip(FILTERS, "sv^oD", strict=True):
         cost = [run[title]["step_us_mean"] for run in runs.values()]
         error = [run[title]["error_median_m"] for run in runs.values()]
@@ -191,7 +193,7 @@ def draw_localisation(runs: dict) -> plt.Figure:
     return figure
 
 
-def save(name: str, data: dict, figure: plt.Figure) -> None:
+def save(name: str, data: dict, figure: Figure) -> None:
     for folder in (RESULTS, CHARTS):
         folder.mkdir(parents=True, exist_ok=True)
     (RESULTS / f"{name}.json").write_text(json.dumps(data, indent=1) + "\n")
@@ -200,7 +202,17 @@ def save(name: str, data: dict, figure: plt.Figure) -> None:
     print(f"bench/results/{name}.json, docs/charts/{name}.svg")
 
 
+def save_demo() -> None:
+    """The report's figures of the six-lane run, for the documents."""
+    run = Run.load(DEMO)
+    for draw in (figures.arena, figures.errors, figures.texture, figures.radial):
+        (CHARTS / f"demo_{draw.__name__}.svg").write_text(figures.svg(draw, run))
+        figures.png(draw, run, CHARTS / f"demo_{draw.__name__}.png")
+    shutil.copy(DEMO / "summary.json", RESULTS / "demo.json")
+
+
 def main() -> int:
+    matplotlib.rcParams["svg.hashsalt"] = "whisker"  # same data, same file
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--build-dir", type=Path, default=ROOT / "build/release")
     parser.add_argument("--fresh", action="store_true", help="forget what an interrupted run has measured")
@@ -209,6 +221,7 @@ def main() -> int:
         shutil.rmtree(CACHE, ignore_errors=True)
     chain = measure_chain(options.build_dir.resolve())
     save("chain_speed", chain, draw_chain(chain))
+    save_demo()
     runs = measure_localisation()
     save("localisation", runs, draw_localisation(runs))
     shutil.rmtree(CACHE)

@@ -1,9 +1,12 @@
-"""The report's figures as SVG text. Line style and marker tell the curves apart in grey; colour only helps."""
+"""The report's figures, to be drawn by `svg` or `png`. Line style and marker tell the curves apart in grey; colour only helps."""
 
 import io
+from collections.abc import Callable
+from pathlib import Path
 
 import matplotlib
 import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse, Patch, Rectangle
@@ -30,71 +33,65 @@ SETTINGS = {
 }
 
 
-def arena(run: Run) -> str:
+def arena(run: Run) -> Figure:
     """The arena from above: floor, blocks, true path, and each estimate with its two-sigma ellipses."""
-    with _settings("arena"):
-        figure = Figure(figsize=(11.4, 4.4), layout="constrained")
-        panels = figure.subplots(1, len(FILTERS), sharex=True, sharey=True)
-        for axes, name in zip(panels, FILTERS, strict=True):
-            _draw_floor(axes, run)
-            _draw_paths(axes, run, name)
-            axes.set_title(TITLES[name], fontsize=10)
-            axes.set_xlabel("x (m)")
-        panels[0].set_ylabel("y (m)")
-        handles = [*panels[0].get_legend_handles_labels()[0], *_texture_handles(run)]
-        figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
-        return _svg(figure)
+    figure = Figure(figsize=(11.4, 4.4), layout="constrained")
+    panels = figure.subplots(1, len(FILTERS), sharex=True, sharey=True)
+    for axes, name in zip(panels, FILTERS, strict=True):
+        _draw_floor(axes, run)
+        _draw_paths(axes, run, name)
+        axes.set_title(TITLES[name], fontsize=10)
+        axes.set_xlabel("x (m)")
+    panels[0].set_ylabel("y (m)")
+    handles = [*panels[0].get_legend_handles_labels()[0], *_texture_handles(run)]
+    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
+    return figure
 
 
-def texture(run: Run) -> str:
+def texture(run: Run) -> Figure:
     """As the paper's Fig. 4: what each floor whisker reported, over its true tile, with the deflection below."""
-    with _settings("texture"):
-        figure = Figure(figsize=(11.4, 5.4), layout="constrained")
-        names = run.texture_names
-        panels = figure.subplots(2 * len(names), 1, sharex=True, height_ratios=[3, 2] * len(names))
-        for n, name in enumerate(names):
-            _draw_decisions(panels[2 * n], run, name)
-            _draw_trace(panels[2 * n + 1], run, name)
-        panels[-1].set_xlabel("time (s)")
-        panels[-1].set_xlim(0, run.truth["tick"][-1] * 500e-6)
-        figure.legend(
-            handles=_texture_handles(run), loc="outside lower center", ncols=3, title="true tile under the tip"
-        )
-        return _svg(figure)
+    figure = Figure(figsize=(11.4, 5.4), layout="constrained")
+    names = run.texture_names
+    panels = figure.subplots(2 * len(names), 1, sharex=True, height_ratios=[3, 2] * len(names))
+    for n, name in enumerate(names):
+        _draw_decisions(panels[2 * n], run, name)
+        _draw_trace(panels[2 * n + 1], run, name)
+    panels[-1].set_xlabel("time (s)")
+    panels[-1].set_xlim(0, run.truth["tick"][-1] * 500e-6)
+    figure.legend(handles=_texture_handles(run), loc="outside lower center", ncols=3, title="true tile under the tip")
+    return figure
 
 
-def radial(run: Run) -> str:
+def radial(run: Run) -> Figure:
     """As the paper's Fig. 5: peak deflection against radial distance, one panel a whisker, with its fitted line."""
-    with _settings("radial"):
-        figure = Figure(figsize=(11.4, 3.2), layout="constrained")
-        panels = figure.subplots(1, len(run.object_names), sharex=True, sharey=True, squeeze=False)[0]
-        for axes, name in zip(panels, run.object_names, strict=True):
-            _draw_contacts(axes, run, name)
-        panels[0].set_ylabel("peak deflection (degrees of field)")
-        handles, labels = panels[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=3)
-        return _svg(figure)
+    figure = Figure(figsize=(11.4, 3.2), layout="constrained")
+    panels = figure.subplots(1, len(run.object_names), sharex=True, sharey=True, squeeze=False)[0]
+    for axes, name in zip(panels, run.object_names, strict=True):
+        _draw_contacts(axes, run, name)
+    panels[0].set_ylabel("peak deflection (degrees of field)")
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=3)
+    return figure
 
 
-def errors(run: Run) -> str:
+def errors(run: Run) -> Figure:
     """Position and heading error of the three estimates over time."""
-    with _settings("errors"):
-        figure = Figure(figsize=(11.4, 4.6), layout="constrained")
-        top, bottom = figure.subplots(2, 1, sharex=True)
-        seconds = (run.truth["tick"] + 1) * 500e-6
-        for name in FILTERS:
-            every = {"markevery": max(1, len(seconds) // 14), "markersize": 4.5, "linewidth": 1.4}
-            top.plot(seconds, run.position_error(name), label=TITLES[name], **STYLES[name], **every)
-            bottom.plot(seconds, np.degrees(run.heading_error(name)), **STYLES[name], **every)
-        top.set_ylabel("position error (m)")
-        bottom.set_ylabel("heading error (degrees)")
-        bottom.set_xlabel("time (s)")
-        for axes in (top, bottom):
-            axes.set_ylim(bottom=0)
-            axes.grid(axis="y", color="#e4e4e4", linewidth=0.6)
-        bottom.set_xlim(0, seconds[-1])
-        figure.legend(loc="outside lower center", ncols=len(FILTERS))
-        return _svg(figure)
+    figure = Figure(figsize=(11.4, 4.6), layout="constrained")
+    top, bottom = figure.subplots(2, 1, sharex=True)
+    seconds = (run.truth["tick"] + 1) * 500e-6
+    for name in FILTERS:
+        every = {"markevery": max(1, len(seconds) // 14), "markersize": 4.5, "linewidth": 1.4}
+        top.plot(seconds, run.position_error(name), label=TITLES[name], **STYLES[name], **every)
+        bottom.plot(seconds, np.degrees(run.heading_error(name)), **STYLES[name], **every)
+    top.set_ylabel("position error (m)")
+    bottom.set_ylabel("heading error (degrees)")
+    bottom.set_xlabel("time (s)")
+    for axes in (top, bottom):
+        axes.set_ylim(bottom=0)
+        axes.grid(axis="y", color="#e4e4e4", linewidth=0.6)
+    bottom.set_xlim(0, seconds[-1])
+    figure.legend(loc="outside lower center", ncols=len(FILTERS))
+    return figure
 
 
 def _draw_floor(axes, run: Run) -> None:
@@ -212,11 +209,19 @@ def _draw_contacts(axes, run: Run, name: str) -> None:
     axes.set_xlabel("radial distance (mm)")
 
 
-def _settings(salt: str):
-    return matplotlib.rc_context(SETTINGS | {"svg.hashsalt": salt})
-
-
-def _svg(figure: Figure) -> str:
+def svg(draw: Callable[[Run], Figure], run: Run) -> str:
+    """A figure as an <svg> element; the same data give the same text."""
     text = io.StringIO()
-    FigureCanvasSVG(figure).print_svg(text, metadata={"Date": None, "Creator": None})
-    return text.getvalue().partition("<svg")[1] + text.getvalue().partition("<svg")[2]
+    with _settings(draw):
+        FigureCanvasSVG(draw(run)).print_svg(text, metadata={"Date": None, "Creator": None})
+    return "".join(text.getvalue().partition("<svg")[1:])
+
+
+def png(draw: Callable[[Run], Figure], run: Run, path: Path) -> None:
+    """A figure as a picture file."""
+    with _settings(draw):
+        FigureCanvasAgg(draw(run)).print_png(path)
+
+
+def _settings(draw: Callable):
+    return matplotlib.rc_context(SETTINGS | {"svg.hashsalt": draw.__name__})

@@ -42,21 +42,23 @@ def render(run: Run) -> str:
         _cards(s),
         "<h2>Where it was, and where it thought it was</h2>",
         _figure(
-            figures.arena(run),
+            figures.svg(figures.arena, run),
             "The arena from above. Black blocks are obstacles. The belief starts 0.2 m and 10 degrees wrong.",
         ),
-        _figure(figures.errors(run), "Every step from the first is counted. Medians are in the table below."),
+        _figure(
+            figures.svg(figures.errors, run), "Every step from the first is counted. Medians are in the table below."
+        ),
         _estimates_table(run),
         "<h2>Floor texture</h2>",
         _figure(
-            figures.texture(run),
+            figures.svg(figures.texture, run),
             "One mark for each 100 ms window that was read; none is read during body whisks, at rest, or while the speed changes. "
             f"Accuracy {_percent(s['texture_accuracy'])} at least 50 mm inside a tile ({_percent(s['texture_windows_share'])} of moving windows), "
             f"{_percent(s['texture_accuracy_all'])} of all windows read.",
         ),
         "<h2>Distance along the whisker</h2>",
         _figure(
-            figures.radial(run),
+            figures.svg(figures.radial, run),
             "Five calibration contacts per 10 mm fit each line; the errors below are of contacts that were held out. "
             "Markers of the two sets are shifted by 1.5 mm either way to be seen apart.",
         ),

@@ -12,6 +12,7 @@ traces.csv              t_s, <whisker>_min_deg, <whisker>_max_deg: envelope of t
 
 import csv
 import json
+import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -52,8 +53,6 @@ class Run:
 
     @classmethod
     def load(cls, folder: Path) -> "Run":
-        import tomllib
-
         scene = folder / "scene"
         whiskers = tomllib.loads((scene / "robot.toml").read_text())["whisker"]
         covariances = {name: folder / f"covariance_{name}.csv" for name in FILTERS}
