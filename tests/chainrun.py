@@ -57,9 +57,10 @@ def running(command: list[str], **options):
 class Driver:
     """The pilot's side of the socket, driving by a script: block number -> (m/s, rad/s)."""
 
-    def __init__(self, path: Path, script):
+    def __init__(self, path: Path, script, simulation: subprocess.Popen):
         self._link = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         while self._link.connect_ex(str(path)) != 0:
+            assert simulation.poll() is None, simulation.stderr.read()
             os.sched_yield()
         self._link.send(b"pilot")
         self._script, self._answered = script, 0
@@ -84,7 +85,7 @@ def record(folder: Path, seconds: float, seed: int, script, *options, link=FAST_
     path = folder / "sim.sock"
     command = simulation(folder, scene, seconds, seed, ring, "--socket", path, "--followers", 1, *options, link=link)
     with running(command) as process:
-        driver = Driver(path, script)
+        driver = Driver(path, script, process)
         frames = []
         with Reader(ring, wait_s=10.0) as reader:
             for view in reader.frames():

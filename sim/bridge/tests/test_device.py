@@ -81,6 +81,7 @@ def test_command_is_killed_with_the_simulation(tmp_path):
     client = ["sh", "-c", f"echo $$ > {mark}.tmp && mv {mark}.tmp {mark} && exec sleep 1000"]
     simulation = subprocess.Popen(command(tmp_path, 1, 1, client, "--socket", tmp_path / "sock"))
     while not mark.exists():
+        assert simulation.poll() is None
         os.sched_yield()
     simulation.terminate()
     assert simulation.wait(TIMEOUT_S) != 0
@@ -95,10 +96,13 @@ class Pilot(threading.Thread):
         super().__init__()
         self.path, self.ticks, self.speed = path, ticks, speed_m_s
         self.odometry = []
+        self.over = threading.Event()  # there is no simulation to connect to any more
 
     def run(self):
         with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as link:
             while link.connect_ex(str(self.path)) != 0:
+                if self.over.is_set():
+                    return
                 os.sched_yield()
             link.send(b"pilot")
             for tick in range(BLOCK - 1, self.ticks, BLOCK):
@@ -114,8 +118,11 @@ def drive(folder: Path, speed_m_s: float):
     pilot.start()
     client = [CLIENT, folder / "stream.bin", 4096, 200]
     options = ["--socket", folder / "sock", "--followers", 1]
-    subprocess.run(command(folder, 1, 3, client, *options), check=True, timeout=TIMEOUT_S)
-    pilot.join()
+    try:
+        subprocess.run(command(folder, 1, 3, client, *options), check=True, timeout=TIMEOUT_S)
+    finally:
+        pilot.over.set()
+        pilot.join()
     with open(folder / "truth.csv") as file:
         return pilot, [float(row["x_m"]) for row in csv.DictReader(file)]
 
@@ -139,6 +146,7 @@ def test_a_message_out_of_turn_ends_the_run_with_one_line(tmp_path):
     )
     with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as link:
         while link.connect_ex(str(folder / "sock")) != 0:
+            assert simulation.poll() is None
             os.sched_yield()
         link.send(b"pilot")
         link.send(b"drive 79 0 0")
