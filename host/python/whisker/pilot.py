@@ -15,6 +15,7 @@ import numpy as np
 
 from .behaviour import BLOCK_TICKS, EXPLORE_M_S, PUSH_TICKS, TICK_S, TURN_RAD_S, Behaviour
 from .contact import Contact
+from .floor import FloorWhisker
 from .mount import Mount
 
 WINDOW_SAMPLES = 200
@@ -30,12 +31,15 @@ class Pilot:
         self.names = {lane: whisker.name for lane, whisker in enumerate(robot.whiskers)}
         self.texture_lanes = [n for n, w in enumerate(robot.whiskers) if w.role == "texture"]
         self.object_lanes = [n for n, w in enumerate(robot.whiskers) if w.role == "object"]
-        self.texture_models = texture_models
         self.radial_models = radial_models
         self.contacts = {lane: Contact() for lane in self.object_lanes}
         self.mounts = {lane: Mount.of(robot.whiskers[lane]) for lane in self.object_lanes}
         first_turn = {lane: mount.corner_turn for lane, mount in self.mounts.items()}
         self.behaviour = Behaviour(self.contacts, first_turn, np.random.default_rng(seed))
+        self.floor = {
+            lane: FloorWhisker(texture_models[self.names[lane]], np.random.default_rng([seed, lane]))
+            for lane in self.texture_lanes
+        }
         self.bad_samples = 0
         self.whisks: list[dict] = []  # every whisk that was pushed to its end
         self._recent = deque(maxlen=WINDOW_SAMPLES // BLOCK_TICKS)  # of the last 0.1 s: (samples, good) of all lanes
@@ -53,6 +57,9 @@ class Pilot:
         self._recent.append((samples, good))
         for lane, contact in self.contacts.items():
             contact.block(ticks, samples[:, lane], good[:, lane])
+        if any(self.behaviour.drive):
+            for lane, whisker in self.floor.items():
+                whisker.follow(samples[good[:, lane], lane])
         self._follow_whisk(ticks, samples, good)
         return self.behaviour.decide(int(ticks[-1]))
 
@@ -108,14 +115,13 @@ class Pilot:
         self.whisks.append(whisk | {"peak_counts": peak, "line_mm": line_mm, "distance_mm": distance})
 
     def _texture_cells(self, lane: int, tick: int, held_back: bool) -> dict[str, float | None]:
-        model = self.texture_models[self.names[lane]]
-        cells = {f"{self.names[lane]}_{name}": None for name in model.classes}
+        whisker = self.floor[lane]
+        cells = {f"{self.names[lane]}_{name}": None for name in whisker.model.classes}
         if held_back or not self._sweeping(tick):
             return cells
         samples = np.concatenate([s[good[:, lane], lane] for s, good in self._recent])
         if len(samples) >= WINDOW_LEAST_GOOD:
-            loglik = model.loglik(samples)
-            cells = dict(zip(cells, map(float, loglik), strict=True))
+            cells = dict(zip(cells, map(float, whisker.loglik(samples)), strict=True))
         return cells
 
     def _sweeping(self, tick: int) -> bool:

@@ -9,12 +9,13 @@ import numpy as np
 
 from ..behaviour import EXPLORE_M_S, PUSH_TICKS, TICK_S, TURN_RAD_S
 from ..contact import REST_SAMPLES, Contact
+from ..floor import centred
 from ..radial import RadialModel, peak, read_whisks
 from ..scene import Scene
 from ..texture import TextureModel, read_folder
 from .simulation import radial_contacts, surface_drive, write_radial_contacts
 
-# The sensor's rest drifts by more than vinyl moves the whisker: drives at different times show the model that spread.
+# Drives at different times: each has its own drift of the sensor's rest, and its own roughness.
 DRIVES = 8
 DRIVE_S = 8.0
 # What exploring consists of: share of the speed, turn (rad/s), seconds.
@@ -55,9 +56,18 @@ def train_texture(folder: Path, scene: Scene, seed: int) -> TextureModel:
             for whisker, counts in driven.items():
                 _write_recording(place / f"{whisker}_{drive + 1}.csv", counts)
     found = read_folder(recordings)
-    model = TextureModel.train({name: found[name] for name in scene.arena.textures})
+    model = fit_texture({name: found[name] for name in scene.arena.textures}, seed)
     model.save(folder / "texture.json")
     return model
+
+
+def fit_texture(recordings: dict[str, list[np.ndarray]], seed: int) -> TextureModel:
+    """A model of deflections about each recording's own mean, as the pilot uses it; its rest is the middle of all means."""
+    rng = np.random.default_rng(seed)
+    middle = np.mean([r.mean(axis=0) for group in recordings.values() for r in group], axis=0)
+    return TextureModel.train(
+        {name: [centred(r, middle, rng) for r in g] for name, g in recordings.items()}, rest=middle
+    )
 
 
 def _write_recording(path: Path, counts: np.ndarray) -> None:

@@ -1,0 +1,55 @@
+"""Floor whiskers: the rest follows the sensor's drift, and a drifted rest costs no recognition."""
+
+import numpy as np
+
+from whisker.floor import STEP_COUNTS, FloorWhisker, centred, dithered
+from whisker.texture import TextureModel
+
+SPREAD = {"VINYL": 12.0, "SMOOTH": 40.0, "ROUGH": 90.0}
+MIDDLE = np.array([32768.0, 32768.0])
+
+
+def sensed(name: str, n: int, rng, drift: float = 0.0) -> np.ndarray:
+    """Counts as the sensor gives them: in steps of 16."""
+    return np.round((MIDDLE + drift + rng.normal(0, SPREAD[name], (n, 2))) / STEP_COUNTS) * STEP_COUNTS
+
+
+def trained(rng) -> TextureModel:
+    recordings = {name: [centred(sensed(name, 4000, rng, d), MIDDLE, rng) for d in (-20, 0, 20)] for name in SPREAD}
+    return TextureModel.train(recordings, rest=MIDDLE)
+
+
+def test_dither_fills_the_steps_and_keeps_the_mean():
+    spread = dithered(np.full(100_000, 48.0), np.random.default_rng(1)) - 48.0
+    assert abs(spread.mean()) < 0.1
+    assert STEP_COUNTS / 2 - 0.1 < spread.max() <= STEP_COUNTS / 2
+    assert -STEP_COUNTS / 2 <= spread.min() < 0.1 - STEP_COUNTS / 2
+
+
+def test_recordings_are_centred_each_for_itself():
+    rng = np.random.default_rng(2)
+    assert np.allclose(centred(sensed("ROUGH", 5000, rng, 300.0), MIDDLE, rng).mean(axis=0), MIDDLE, atol=0.5)
+
+
+def test_rest_follows_drift_and_one_block_moves_it_little():
+    rng = np.random.default_rng(3)
+    whisker = FloorWhisker(trained(rng), rng)
+    whisker.follow(np.tile(MIDDLE + 100, (40, 1)))
+    assert np.all(np.abs(whisker.rest - MIDDLE) < 3.0)
+    for _ in range(1000):
+        whisker.follow(np.tile(MIDDLE + 100, (40, 1)))
+    assert np.allclose(whisker.rest, MIDDLE + 100, atol=2.5)
+    rest = whisker.rest.copy()
+    whisker.follow(np.empty((0, 2)))
+    assert np.array_equal(whisker.rest, rest)
+
+
+def test_surfaces_are_told_apart_about_a_drifted_rest():
+    rng = np.random.default_rng(4)
+    whisker = FloorWhisker(trained(rng), rng)
+    drift = 27.0  # not a multiple of the step, and more than vinyl's own spread
+    for _ in range(1000):
+        whisker.follow(sensed("VINYL", 40, rng, drift))
+    for index, name in enumerate(SPREAD):
+        right = [whisker.loglik(sensed(name, 200, rng, drift)).argmax() == index for _ in range(50)]
+        assert np.mean(right) >= 0.98, name
