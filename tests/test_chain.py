@@ -9,7 +9,10 @@ import numpy as np
 import pytest
 from chainrun import BLOCK_TICKS, BUILD, DECISION_TICKS, ROOT, TICKS_PER_S, is_last, record, write_flat_scene
 
+from whisker import localise
+from whisker.demo.navigator_process import FILTERS
 from whisker.protocol import CODES, LANES, STATUS_CODE_SHIFT
+from whisker.scene import load
 
 sys.path.insert(0, str(ROOT / "sim"))
 from signals import World  # noqa: E402
@@ -95,6 +98,15 @@ def demo(out, seed: int) -> dict:
     return json.loads((out / "summary.json").read_text())
 
 
+def live_navigation_equals_localising_the_recording(out) -> None:
+    scene = load(out / "scene")
+    observations = localise.read_observations(localise.observations_path(out / "scene"), scene)
+    for name in FILTERS:
+        again = out / f"again_{name}.csv"
+        localise.write_estimates(again, localise.run(name, scene, observations), observations)
+        assert again.read_bytes() == (out / f"est_{name}.csv").read_bytes(), name
+
+
 def test_same_seed_gives_the_same_summary_and_another_seed_another(tmp_path):
     first, again, other = (demo(tmp_path / name, seed) for name, seed in (("a", 5), ("b", 5), ("c", 6)))
     untimed = [{key: v for key, v in s.items() if "wall" not in key} for s in (first, again, other)]
@@ -109,6 +121,7 @@ def test_same_seed_gives_the_same_summary_and_another_seed_another(tmp_path):
         "truth.csv",
     ):
         assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes(), name
+    live_navigation_equals_localising_the_recording(tmp_path / "a")
     assert first["frames_lost"] == 0
     assert first["records_bad_match"] is True
     assert first["frames_sent"] == first["frames_received"] == 8000
