@@ -53,15 +53,21 @@ def surface_drive(
 
 
 def write_surface_drives(
-    folder: Path, flat: str, surfaces: Iterable[str], seed: int, seconds: float = 16.0, speeds: Sequence = SPEEDS_M_S
+    folder: Path,
+    flat: str,
+    surfaces: Iterable[str],
+    seed: int,
+    seconds: float = 16.0,
+    speeds: Sequence = SPEEDS_M_S,
+    moves: Sequence = MOVES,
 ) -> None:
-    """Write FOLDER/SURFACE/WHISKER_SPEED.csv: one recording per texture whisker and speed (in mm/s)."""
+    """Write FOLDER/SURFACE/WHISKER_N.csv: one recording per texture whisker and drive; drive N at the N-th of the speeds."""
     for n, surface in enumerate(surfaces):
         place = folder / surface
         place.mkdir(parents=True, exist_ok=True)
         for k, speed in enumerate(speeds):
-            for whisker, counts in surface_drive(flat, surface, speed, seconds, _derive(seed, n, k)).items():
-                _write_csv(place / f"{whisker}_{1e3 * speed:03.0f}.csv", "t_s,x,y", [], counts)
+            for whisker, counts in surface_drive(flat, surface, speed, seconds, _derive(seed, n, k), moves).items():
+                _write_csv(place / f"{whisker}_{k + 1}.csv", "t_s,x,y", [], counts)
 
 
 def radial_contacts(

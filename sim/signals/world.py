@@ -80,6 +80,10 @@ class World:
         c = lib.sim_world_contact(self._world, lane)
         return Contact(c.touching, c.corner, c.radius_m, c.theta_rad, c.amplitude_gain)
 
+    def spread(self, lane: int) -> float:
+        """Relative spread of an object whisker's amplitude from whisk to whisk."""
+        return lib.sim_world_spread(self._world, lane)
+
     def tip(self, lane: int) -> Tip:
         """Truth about a texture whisker."""
         tip = lib.sim_world_tip(self._world, lane)

@@ -165,6 +165,13 @@ struct sim_contact sim_world_contact(const sim_world *world, size_t lane)
     return world->lane[lane].object.contact;
 }
 
+double sim_world_spread(const sim_world *world, size_t lane)
+{
+    if (lane >= world->scene.whiskers || world->scene.whisker[lane].role != SIM_OBJECT_WHISKER)
+        return 0.0;
+    return world->lane[lane].object.spread;
+}
+
 struct sim_tip sim_world_tip(const sim_world *world, size_t lane)
 {
     if (lane >= world->scene.whiskers || world->scene.whisker[lane].role != SIM_TEXTURE_WHISKER)

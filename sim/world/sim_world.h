@@ -57,7 +57,8 @@ void sim_world_odometry(sim_world *world, double *x_m, double *y_m, double *thet
 
 size_t sim_world_lanes(const sim_world *world);
 struct sim_contact sim_world_contact(const sim_world *world, size_t lane); /* of an object whisker */
-struct sim_tip sim_world_tip(const sim_world *world, size_t lane);         /* of a texture whisker */
+double sim_world_spread(const sim_world *world, size_t lane);      /* of an object whisker's amplitudes, relative */
+struct sim_tip sim_world_tip(const sim_world *world, size_t lane); /* of a texture whisker */
 /* cffi: end */
 
 #endif

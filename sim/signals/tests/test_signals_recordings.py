@@ -71,12 +71,12 @@ def test_radial_file(tmp_path):
 
 def test_texture_folders(tmp_path):
     recordings.write_surface_drives(tmp_path, flat(), ["VINYL", "ROUGH"], seed=1, seconds=2.0, speeds=(0.05, 0.2))
-    names = {"left_floor_050.csv", "left_floor_200.csv", "right_floor_050.csv", "right_floor_200.csv"}
+    names = {"left_floor_1.csv", "left_floor_2.csv", "right_floor_1.csv", "right_floor_2.csv"}
     assert {p.name for p in (tmp_path / "VINYL").iterdir()} == names
-    assert (tmp_path / "ROUGH" / "left_floor_050.csv").read_text().startswith("t_s,x,y\n0.0000,")
+    assert (tmp_path / "ROUGH" / "left_floor_1.csv").read_text().startswith("t_s,x,y\n0.0000,")
     spread = {}
     for surface in ("VINYL", "ROUGH"):
-        table = np.loadtxt(tmp_path / surface / "left_floor_200.csv", delimiter=",", skiprows=1)
+        table = np.loadtxt(tmp_path / surface / "left_floor_2.csv", delimiter=",", skiprows=1)
         assert table.shape == (4000, 3)
         spread[surface] = table[:, 2].std()
     assert spread["ROUGH"] > 3 * spread["VINYL"]

@@ -62,3 +62,10 @@ def test_tip_knows_its_tile():
 def test_malformed_scene_is_refused_with_one_line():
     with pytest.raises(ValueError, match=r"^scene:\d+: unknown item 'wheel'; [^\n]*$"):
         World(flat() + "wheel 1\n", 1)
+
+
+def test_spreads_are_the_papers_by_object_whisker():
+    world = World(flat(), 1)
+    spreads = [world.spread(lane) for lane, name in enumerate(world.lanes) if "floor" not in name]
+    assert spreads == [0.082, 0.040, 0.026, 0.063]
+    assert all(world.spread(lane) == 0.0 for lane, name in enumerate(world.lanes) if "floor" in name)

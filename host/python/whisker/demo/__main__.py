@@ -90,7 +90,7 @@ def learn_models(out: Path, scene: scenes.Scene, seed: int) -> dict:
     with tqdm(total=1 + len(scene.robot.of_role("object")), desc="train and calibrate", unit="model") as bar:
         models, contacts = learn(out / "models", scene, seed, bar.update)
     write_radial_points(out, models, contacts)
-    return radial_scores(models, contacts)
+    return radial_scores(scene, models, contacts)
 
 
 def run(out: Path, options: argparse.Namespace) -> dict:

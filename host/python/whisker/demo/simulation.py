@@ -10,8 +10,8 @@ if str(SIM) not in sys.path:
 from signals import World  # noqa: E402
 from signals.recordings import (  # noqa: E402
     radial_contacts,
-    surface_drive,
     write_radial_contacts,
+    write_surface_drives,
 )
 
-__all__ = ["World", "radial_contacts", "surface_drive", "write_radial_contacts"]
+__all__ = ["World", "radial_contacts", "write_radial_contacts", "write_surface_drives"]

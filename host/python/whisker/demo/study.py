@@ -45,8 +45,9 @@ def main(argv: list[str] | None = None) -> int:
     options = parser.parse_args(argv)
     print("seed  whisks  texture  grid (m)  90 % (m)  foveal (m)  odometry (m)  radial std / predicted")
     for seed in options.seeds:
+        scene, _ = make_scene(seed)
         with tempfile.TemporaryDirectory() as models:
-            radial = radial_scores(*learn(Path(models), make_scene(seed)[0], seed, lambda: None))
+            radial = radial_scores(scene, *learn(Path(models), scene, seed, lambda: None))
             s = study(seed, options.seconds, Path(models))
         ratios = [radial["radial_std_mm"][n] / p for n, p in radial["radial_std_predicted_mm"].items()]
         print(

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from ..behaviour import EXPLORE_M_S, PUSH_TICKS, TICK_S, TURN_RAD_S
+from ..behaviour import EXPLORE_M_S, PUSH_TICKS, TURN_RAD_S
 from ..contact import REST_SAMPLES, Contact
 from ..floor import centred
 from ..radial import RadialModel, peak, read_whisks
 from ..scene import Scene
 from ..texture import TextureModel, read_folder
-from .simulation import radial_contacts, surface_drive, write_radial_contacts
+from .simulation import World, radial_contacts, write_radial_contacts, write_surface_drives
 
 # Drives at different times: each has its own drift of the sensor's rest, and its own roughness.
 DRIVES = 8
@@ -24,9 +24,7 @@ MOVES = ((1.0, 0.0, 3.0), (0.0, TURN_RAD_S, 1.5), (1.0, 0.0, 1.5), (0.0, -TURN_R
 FIT_CONTACTS = 5  # at each radius: the paper's calibration
 HELD_OUT_CONTACTS = 40
 RECORDED_PUSH_S = 0.7  # longer than the pilot's, which counts from the onset that it notices
-# Whisk repeatability of whiskers 1 to 4, and the error it alone predicts over 90 to 140 mm (whisker_physics section 4).
-WHISK_SPREAD = (0.082, 0.040, 0.026, 0.063)
-PREDICTED_MM_PER_SPREAD = 68.9
+PREDICTED_MM_PER_SPREAD = 68.9  # error over 90 to 140 mm from whisk repeatability alone (whisker_physics section 4)
 
 
 def learn(folder: Path, scene: Scene, seed: int, progress: Callable[[], object]) -> tuple[dict, dict]:
@@ -47,14 +45,9 @@ def learn(folder: Path, scene: Scene, seed: int, progress: Callable[[], object])
 def train_texture(folder: Path, scene: Scene, seed: int) -> TextureModel:
     """Drive over each single surface, record, and learn one model for both floor whiskers from the files."""
     recordings = folder / "texture"
-    for number, texture in enumerate(scene.arena.textures):
-        place = recordings / texture
-        place.mkdir(parents=True, exist_ok=True)
-        for drive in range(DRIVES):
-            drive_seed = _derive(seed, number, drive)
-            driven = surface_drive(flat(scene), texture, EXPLORE_M_S, DRIVE_S, drive_seed, MOVES)
-            for whisker, counts in driven.items():
-                _write_recording(place / f"{whisker}_{drive + 1}.csv", counts)
+    write_surface_drives(
+        recordings, flat(scene), scene.arena.textures, seed, DRIVE_S, speeds=[EXPLORE_M_S] * DRIVES, moves=MOVES
+    )
     found = read_folder(recordings)
     model = fit_texture({name: found[name] for name in scene.arena.textures}, seed)
     model.save(folder / "texture.json")
@@ -68,16 +61,6 @@ def fit_texture(recordings: dict[str, list[np.ndarray]], seed: int) -> TextureMo
     return TextureModel.train(
         {name: [centred(r, middle, rng) for r in g] for name, g in recordings.items()}, rest=middle
     )
-
-
-def _write_recording(path: Path, counts: np.ndarray) -> None:
-    rows = (f"{n * TICK_S:.4f},{x},{y}\n" for n, (x, y) in enumerate(counts.tolist()))
-    path.write_text("t_s,x,y\n" + "".join(rows))
-
-
-def _derive(seed: int, *path: int) -> int:
-    """A seed of its own for each recording."""
-    return int(np.random.SeedSequence([seed, *path]).generate_state(1, np.uint64)[0])
 
 
 def calibrate(folder: Path, scene: Scene, name: str, seed: int) -> tuple[RadialModel, dict]:
@@ -97,13 +80,14 @@ def calibrate(folder: Path, scene: Scene, name: str, seed: int) -> tuple[RadialM
     return model, {"fit": (fit.radius_mm, fit.peak_counts), "held out": (radii, peaks)}
 
 
-def radial_scores(models: dict[str, RadialModel], contacts: dict[str, dict]) -> dict:
+def radial_scores(scene: Scene, models: dict[str, RadialModel], contacts: dict[str, dict]) -> dict:
     """Standard deviation of the held-out error, mm, by whisker, and what repeatability alone predicts."""
     measured = {}
     for name, sets in contacts.items():
         error = [models[name].predict(p)[0] - r for r, p in zip(*sets["held out"], strict=True)]
         measured[name] = float(np.std(error, ddof=1))
-    predicted = {n: PREDICTED_MM_PER_SPREAD * s for n, s in zip(contacts, WHISK_SPREAD, strict=True)}
+    world = World(flat(scene), 0)
+    predicted = {name: PREDICTED_MM_PER_SPREAD * world.spread(world.lanes.index(name)) for name in contacts}
     return {"radial_std_mm": measured, "radial_std_predicted_mm": predicted}
 
 
