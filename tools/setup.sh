@@ -20,6 +20,8 @@ mod:libusb-1.0 libusb-1.0-0-dev
 mod:hidapi-libusb libhidapi-dev
 mod:umockdev-1.0 libumockdev-dev
 mod:cmocka libcmocka-dev
+mod:libsystemd libsystemd-dev
+cmd:spin spin
 file:/usr/lib/llvm-14/lib/clang/14.0.6/lib/linux/libclang_rt.fuzzer-x86_64.a libclang-rt-14-dev
 py:ensurepip python3-venv
 py:Python.h python3-dev
