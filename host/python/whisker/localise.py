@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from .errors import UserError
 from .native import doubles, ffi, lib, octets
 from .scene import OBSERVATIONS, Prior, Scene
 from .tables import TableError, number, numbers, read_columns
@@ -17,7 +18,7 @@ ESTIMATE_HEADER = "t_s,x_m,y_m,theta_rad,confidence"
 CHI2_90 = 4.605170185988092  # 90 % point of chi-square with two degrees of freedom
 
 
-class SettingError(ValueError):
+class SettingError(UserError, ValueError):
     """A --set that names no setting or leaves its range; one line."""
 
 

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from .errors import UserError
 from .native import ffi, lib
 from .protocol import LANES
 
@@ -22,8 +23,10 @@ FRAME = np.dtype(
 assert FRAME.itemsize == ffi.sizeof("struct whisker_frame")
 
 
-class RingError(OSError):
+class RingError(UserError, OSError):
     """A ring that cannot be read on. Its text is one line: ring, what, remedy."""
+
+    exit_code = 1
 
 
 class Reader:

@@ -9,12 +9,14 @@ import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
+from .errors import UserError
+
 ARENA, ROBOT, PRIOR, OBSERVATIONS = "arena.toml", "robot.toml", "prior.toml", "observations.csv"
 TEXTURES_MOST = 250  # texture indices are one byte in host/nav, with room for its marks
 LARGEST_M = 1000.0
 
 
-class SceneError(ValueError):
+class SceneError(UserError, ValueError):
     """A scene that breaks its contract. Its text is one line: file, line or key, what and the remedy."""
 
 

@@ -6,13 +6,20 @@ from pathlib import Path
 
 import numpy as np
 
+from .errors import UserError
 
-class TableError(ValueError):
+
+class TableError(UserError, ValueError):
     """A file whose structure is wrong. Its text is one line: file, line where known, what and the remedy."""
 
     def __init__(self, path, line: int | None, text: str):
         place = f"{path}, line {line}" if line else f"{path}"
         super().__init__(f"{place}: {text}")
+
+
+def unwritable(path, error: OSError) -> TableError:
+    """What to say of an --out that cannot be written."""
+    return TableError(path, None, f"cannot be written ({error.strerror}); choose another --out")
 
 
 def number(cell: str) -> float:
