@@ -84,9 +84,15 @@ void nav_filter_step(struct nav_filter *f, const struct nav_row *row, struct nav
     f->ops->predict(f->self, &motion);
     if (news)
         f->ops->update(f->self, &evidence);
+    *estimate = (struct nav_estimate){.evaluations = 0};
     f->ops->estimate(f->self, estimate);
     if (!news)
-        estimate->evaluations = 0;
+        estimate->evaluations = estimate->distinct = 0;
+}
+
+long nav_filter_components(const struct nav_filter *f, struct nav_component *out, long room)
+{
+    return f->ops->components(f->self, out, room);
 }
 
 uint64_t nav_filter_bad_cells(const struct nav_filter *f)

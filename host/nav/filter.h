@@ -22,6 +22,7 @@ struct nav_problem {
     struct nav_robot robot;
     struct nav_prior prior;
     struct nav_settings settings;
+    uint64_t seed; /* of every random draw: same seed, same rows, same bytes out */
 };
 
 /* One row, 0.1 s (contracts: observations.csv). A NaN texture (first class) or distance was not read. */
@@ -37,8 +38,17 @@ struct nav_estimate {
     double covariance[9]; /* row-major, x, y m, theta rad, about the pose */
     double confidence;    /* belief mass within 0.25 m and 0.5 rad of the pose */
     long evaluations;     /* poses, cells or hypotheses weighted for this row */
+    long distinct;        /* expected observations (signatures) whose likelihood was worked out for this row */
+    long touched;         /* cells, particles or hypotheses moved or weighted for this row: the work */
     long states;          /* how many it holds */
     size_t bytes;         /* and in how much memory, tables included */
+};
+
+/* A bump of belief: normal in x and y (sigma_m each) and in heading, independent. */
+struct nav_component {
+    struct nav_pose pose;
+    double sigma_m, sigma_rad;
+    double mass;
 };
 
 struct nav_filter;
@@ -53,6 +63,10 @@ void nav_filter_free(struct nav_filter *);
 /* Takes one row and says where the robot is at its end. Any row is allowed: what is not finite or out of range is
  * counted and treated as not read. Does not allocate. */
 void nav_filter_step(struct nav_filter *, const struct nav_row *, struct nav_estimate *);
+
+/* The belief after the last row as bumps whose masses sum to 1: the first `room` of them go to `out`. Returns how many
+ * there are, which may exceed `room`. For judging and drawing, not for the timed path. */
+long nav_filter_components(const struct nav_filter *, struct nav_component *out, long room);
 
 uint64_t nav_filter_bad_cells(const struct nav_filter *);
 uint64_t nav_filter_bad_rows(const struct nav_filter *); /* repeated, late or reordered */
@@ -72,7 +86,8 @@ struct nav_filter_ops {
     void (*destroy)(void *self);
     void (*predict)(void *self, const struct nav_motion *);    /* every row: integrates, may put work off */
     void (*update)(void *self, const struct nav_evidence *);   /* rows with something new to read */
-    void (*estimate)(const void *self, struct nav_estimate *); /* every row; evaluations: of the last update */
+    void (*estimate)(const void *self, struct nav_estimate *); /* every row; work counts: of the last update */
+    long (*components)(const void *self, struct nav_component *out, long room); /* as nav_filter_components */
 };
 
 extern const struct nav_filter_ops nav_odometry_filter; /* dead reckoning from the prior's mean */

@@ -153,10 +153,21 @@ static void estimate(const void *self, struct nav_estimate *out)
 {
     const struct foveal *f = self;
     nav_gaussian_estimate(&f->belief, out);
-    out->evaluations = (long)points(f);
+    out->evaluations = out->distinct = out->touched = (long)points(f);
     out->states = (long)points(f);
     out->bytes = sizeof *f + points(f) * sizeof *f->weight;
 }
 
-const struct nav_filter_ops nav_foveal_filter = {
-    .name = "foveal", .create = create, .destroy = destroy, .predict = predict, .update = update, .estimate = estimate};
+static long components(const void *self, struct nav_component *out, long room)
+{
+    const struct foveal *f = self;
+    return nav_gaussian_components(&f->belief, out, room);
+}
+
+const struct nav_filter_ops nav_foveal_filter = {.name = "foveal",
+                                                 .create = create,
+                                                 .destroy = destroy,
+                                                 .predict = predict,
+                                                 .update = update,
+                                                 .estimate = estimate,
+                                                 .components = components};

@@ -31,6 +31,45 @@ void nav_gaussian_estimate(const struct nav_gaussian *g, struct nav_estimate *es
     estimate->confidence = nav_gaussian_mass(g, NAV_NEAR_M, NAV_NEAR_RAD);
 }
 
+/* Lower triangle of the Cholesky factor, rows x, y, theta; what rounding has made negative counts as nothing. */
+static void factor(const double *p, double l[6])
+{
+    l[0] = sqrt(fmax(p[0], 1e-18));
+    l[1] = p[3] / l[0];
+    l[2] = sqrt(fmax(p[4] - l[1] * l[1], 1e-18));
+    l[3] = p[6] / l[0];
+    l[4] = (p[7] - l[3] * l[1]) / l[2];
+    l[5] = sqrt(fmax(p[8] - l[3] * l[3] - l[4] * l[4], 1e-18));
+}
+
+/* Mass of whitened lattice point i of `points`, which reach to 3 standard deviations. */
+static double share(int i, int points)
+{
+    double total = 0.0, half = (points - 1) / 2.0;
+    for (int k = 0; k < points; k++)
+        total += exp(-4.5 * (k - half) * (k - half) / (half * half));
+    return exp(-4.5 * (i - half) * (i - half) / (half * half)) / total;
+}
+
+long nav_gaussian_components(const struct nav_gaussian *g, struct nav_component *out, long room)
+{
+    enum { ACROSS = 25, TURNS = 7, ALL = ACROSS * ACROSS * TURNS };
+    double l[6], spacing = 6.0 / (ACROSS - 1), spacing_turn = 6.0 / (TURNS - 1);
+    factor(g->covariance, l);
+    for (int n = 0; n < ALL && n < room; n++) {
+        int i = n / TURNS / ACROSS, j = n / TURNS % ACROSS, k = n % TURNS;
+        double u = spacing * (i - ACROSS / 2), v = spacing * (j - ACROSS / 2), w = spacing_turn * (k - TURNS / 2);
+        out[n] = (struct nav_component){
+            .pose = {g->mean.x + l[0] * u, g->mean.y + l[1] * u + l[2] * v,
+                     nav_wrap(g->mean.theta + l[3] * u + l[4] * v + l[5] * w)},
+            .sigma_m = spacing / sqrt(12.0) * fmin(l[0], l[2]),
+            .sigma_rad = spacing_turn / sqrt(12.0) * l[5],
+            .mass = share(i, ACROSS) * share(j, ACROSS) * share(k, TURNS),
+        };
+    }
+    return ALL;
+}
+
 void nav_gaussian_move(struct nav_gaussian *g, struct nav_pose step, const struct nav_noise *noise)
 {
     struct nav_pose to = nav_compose(g->mean, step);

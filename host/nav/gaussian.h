@@ -14,12 +14,16 @@ struct nav_gaussian {
 
 struct nav_problem;
 struct nav_estimate;
+struct nav_component;
 
 /* The prior as a Gaussian; a uniform one becomes the arena's centre with the arena's own spread. */
 struct nav_gaussian nav_gaussian_prior(const struct nav_problem *);
 
 /* Pose, covariance and confidence of a Gaussian belief. */
 void nav_gaussian_estimate(const struct nav_gaussian *, struct nav_estimate *);
+
+/* The belief as a lattice of bumps, as nav_filter_components says. */
+long nav_gaussian_components(const struct nav_gaussian *, struct nav_component *out, long room);
 
 /* Moves a belief by `step` with noise: the paper's Gaussian approximation of the banana, to first order in the heading.
  */

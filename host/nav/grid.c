@@ -182,9 +182,33 @@ static void estimate(const void *self, struct nav_estimate *out)
     memcpy(out->covariance, now.covariance, sizeof now.covariance);
     out->confidence = g->confidence;
     out->evaluations = (long)nav_lattice_cells(&g->lattice);
-    out->states = out->evaluations;
+    out->states = out->touched = out->evaluations;
+    out->distinct = (long)g->expected->signatures - 1;
     out->bytes = sizeof *g + 2 * nav_lattice_cells(&g->lattice) * sizeof(float) + nav_expected_bytes(g->expected);
 }
 
-const struct nav_filter_ops nav_grid_filter = {
-    .name = "grid", .create = create, .destroy = destroy, .predict = predict, .update = update, .estimate = estimate};
+static long components(const void *self, struct nav_component *out, long room)
+{
+    const struct grid *g = self;
+    const struct nav_lattice *l = &g->lattice;
+    double sigma = sqrt(l->cell * l->cell / 12.0 + l->owed_position + g->pending_noise.position);
+    double sigma_turn = sqrt(l->cell_theta * l->cell_theta / 12.0 + l->owed_heading + g->pending_noise.heading);
+    long count = 0;
+    for (size_t n = 0; n < nav_lattice_cells(l); n++) {
+        if (!(l->mass[n] > 0.0f))
+            continue;
+        if (count < room)
+            out[count] = (struct nav_component){nav_compose(nav_lattice_centre(l, n), g->pending), sigma, sigma_turn,
+                                                (double)l->mass[n]};
+        count++;
+    }
+    return count;
+}
+
+const struct nav_filter_ops nav_grid_filter = {.name = "grid",
+                                               .create = create,
+                                               .destroy = destroy,
+                                               .predict = predict,
+                                               .update = update,
+                                               .estimate = estimate,
+                                               .components = components};

@@ -44,6 +44,9 @@ void nav_lattice_scale(struct nav_lattice *, double factor);
  */
 double nav_lattice_near(const struct nav_lattice *, struct nav_pose, struct nav_pose *mean);
 
+/* Centre of cell number `index` of `mass`. */
+struct nav_pose nav_lattice_centre(const struct nav_lattice *, size_t index);
+
 /* Centre of the cell with the most mass. */
 struct nav_pose nav_lattice_mode(const struct nav_lattice *);
 

@@ -44,6 +44,14 @@ void nav_lattice_scale(struct nav_lattice *l, double factor)
         l->mass[i] *= (float)factor;
 }
 
+struct nav_pose nav_lattice_centre(const struct nav_lattice *l, size_t index)
+{
+    size_t nx = (size_t)l->nx, ny = (size_t)l->ny;
+    int p = (int)(index / (nx * ny)), j = (int)(index / nx % ny), i = (int)(index % nx);
+    return (struct nav_pose){(i + 0.5) * l->cell + l->shift_x[p], (j + 0.5) * l->cell + l->shift_y[p],
+                             nav_wrap(nav_lattice_heading(l, p))};
+}
+
 struct nav_pose nav_lattice_mode(const struct nav_lattice *l)
 {
     size_t best = 0;
@@ -51,10 +59,7 @@ struct nav_pose nav_lattice_mode(const struct nav_lattice *l)
         if (l->mass[i] > l->mass[best])
             best = i;
     }
-    int nx = l->nx, ny = l->ny, p = (int)(best / (size_t)(nx * ny));
-    int j = (int)(best / (size_t)nx % (size_t)ny), i = (int)(best % (size_t)nx);
-    return (struct nav_pose){(i + 0.5) * l->cell + l->shift_x[p], (j + 0.5) * l->cell + l->shift_y[p],
-                             nav_wrap(nav_lattice_heading(l, p))};
+    return nav_lattice_centre(l, best);
 }
 
 struct sums {

@@ -39,5 +39,16 @@ static void estimate(const void *self, struct nav_estimate *out)
     out->bytes = sizeof *o;
 }
 
-const struct nav_filter_ops nav_odometry_filter = {
-    .name = "odometry", .create = create, .destroy = free, .predict = predict, .update = update, .estimate = estimate};
+static long components(const void *self, struct nav_component *out, long room)
+{
+    const struct odometry *o = self;
+    return nav_gaussian_components(&o->belief, out, room);
+}
+
+const struct nav_filter_ops nav_odometry_filter = {.name = "odometry",
+                                                   .create = create,
+                                                   .destroy = free,
+                                                   .predict = predict,
+                                                   .update = update,
+                                                   .estimate = estimate,
+                                                   .components = components};
