@@ -12,6 +12,7 @@ from .errors import UserError
 # name (its module has underscores for dashes): what it does
 COMMANDS = {
     "localise": "where the robot was, row by row of a scene folder",
+    "scene": "make scene folders for localise",
     "texture": "learn and tell floor surfaces",
     "radial": "learn and tell the distance of contacts along a whisker",
 }

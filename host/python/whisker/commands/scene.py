@@ -1,0 +1,36 @@
+"""`whisker scene`: draws level-0 scenes of a family (whisker.scenes)."""
+
+from .. import scenes
+from ..localise import SettingError
+from ..tables import unwritable
+from . import add_action
+
+EXAMPLE = "whisker scene make --family anchor+kidnap --seed 7 --out scenes/7"
+
+
+def add(parser) -> None:
+    actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
+    p = add_action(actions, "make", "draw a scene of a family, observations and truth included", EXAMPLE, make)
+    p.add_argument("--family", metavar="F", help="a base and any modifiers, joined by '+'; see --list-families")
+    p.add_argument("--seed", type=int, default=0, help="draws arena, path and noise (default: %(default)s)")
+    p.add_argument("--steps", type=int, metavar="N", help="rows of 0.1 s (default: the family's)")
+    p.add_argument("--out", metavar="DIR", help="folder to write")
+    p.add_argument("--list-families", action="store_true", help="print bases and modifiers and leave")
+
+
+def make(arguments) -> int:
+    if arguments.list_families:
+        print("\n".join(f"{name}: {recipe.text}" for name, recipe in scenes.BASES.items()))
+        print("\n".join(f"+{name}: {text}" for name, (text, _) in scenes.MODIFIERS.items()))
+        return 0
+    if arguments.family is None or arguments.out is None:
+        raise SettingError("scene make: needs --family and --out; see --list-families")
+    if arguments.seed < 0 or (arguments.steps is not None and arguments.steps < 1):
+        raise SettingError("scene make: --seed or --steps is too small; give 0 or more, and 1 or more")
+    made = scenes.make(arguments.family, arguments.seed, arguments.steps)
+    try:
+        scenes.write_scene(arguments.out, made.scene, made.observations)
+    except OSError as error:
+        raise unwritable(arguments.out, error) from error
+    print(f"{arguments.out}: {arguments.family}, seed {arguments.seed}, {len(made.observations.t_s)} rows")
+    return 0

@@ -1,0 +1,6 @@
+"""Scenes at level 0: what whiskers would read, without the signals between. Families by name and seed, recordings."""
+
+from .families import BASES, MODIFIERS, FamilyError, Made, make, recipe
+from .files import write_scene
+
+__all__ = ["BASES", "MODIFIERS", "FamilyError", "Made", "make", "recipe", "write_scene"]
