@@ -247,3 +247,15 @@ void whisker_reader_info(const struct whisker_reader *reader, struct whisker_rea
         .writer_pid = reader->map.header->writer_pid,
     };
 }
+
+int whisker_reader_clock(const struct whisker_reader *reader, struct whisker_clock *clock)
+{
+    const struct ring_header *header = reader->map.header;
+    return ring_cell_get(&header->clock.version, header->clock.copy[0], clock, sizeof *clock);
+}
+
+int whisker_reader_stats(const struct whisker_reader *reader, struct whisker_daemon_stats *stats)
+{
+    const struct ring_header *header = reader->map.header;
+    return ring_cell_get(&header->stats.version, header->stats.copy[0], stats, sizeof *stats);
+}

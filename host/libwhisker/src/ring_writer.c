@@ -173,6 +173,18 @@ int whisker_ring_feed(struct whisker_ring *ring, struct whisker_decoder *decoder
     return WHISKER_OK;
 }
 
+void whisker_ring_set_clock(struct whisker_ring *ring, const struct whisker_clock *clock)
+{
+    struct ring_header *header = ring->map.header;
+    ring_cell_set(&header->clock.version, header->clock.copy[0], clock, sizeof *clock);
+}
+
+void whisker_ring_set_stats(struct whisker_ring *ring, const struct whisker_daemon_stats *stats)
+{
+    struct ring_header *header = ring->map.header;
+    ring_cell_set(&header->stats.version, header->stats.copy[0], stats, sizeof *stats);
+}
+
 void whisker_ring_close(struct whisker_ring *ring)
 {
     if (!ring) {

@@ -241,6 +241,27 @@ static void bytes_are_decoded_straight_into_the_ring(void **state)
     assert_int_equal(whisker_ring_feed(f->ring, &decoder, much, sizeof much, NULL, NULL), WHISKER_ERROR_ARGUMENT);
 }
 
+static void clock_and_statistics_are_told(void **state)
+{
+    const struct fixture *f = *state;
+    struct whisker_clock clock;
+    struct whisker_daemon_stats stats;
+    assert_int_equal(whisker_reader_clock(f->reader, &clock), 0);
+    assert_int_equal(whisker_reader_stats(f->reader, &stats), 0);
+    assert_true(clock.ns_per_cycle == 0 && stats.frames == 0); /* not told yet */
+    for (uint64_t i = 1; i <= 3; i++) {
+        whisker_ring_set_clock(f->ring, &(struct whisker_clock){.device_cycles = i, .uncertainty_ns = 0.5});
+        whisker_ring_set_stats(f->ring, &(struct whisker_daemon_stats){.frames = i, .firmware = "1.0", .serial = "W7"});
+        assert_int_equal(whisker_reader_clock(f->reader, &clock), 0);
+        assert_int_equal(whisker_reader_stats(f->reader, &stats), 0);
+        assert_int_equal(clock.device_cycles, i);
+        assert_true(clock.uncertainty_ns == 0.5);
+        assert_int_equal(stats.frames, i);
+        assert_string_equal(stats.firmware, "1.0");
+        assert_string_equal(stats.serial, "W7");
+    }
+}
+
 /* Whatever a mad writer puts into the shared header, a reader stays inside its own mapping. */
 static void nonsense_in_the_header_cannot_lead_a_reader_astray(void **state)
 {
@@ -347,6 +368,7 @@ int main(void)
         WITH_RING(new_ring_of_the_name_is_seen_and_followed),
         WITH_RING(second_writer_is_refused),
         WITH_RING(bytes_are_decoded_straight_into_the_ring),
+        WITH_RING(clock_and_statistics_are_told),
         WITH_RING(nonsense_in_the_header_cannot_lead_a_reader_astray),
         cmocka_unit_test(bad_names_and_sizes_are_refused),
         cmocka_unit_test(memory_that_is_no_ring_is_refused),

@@ -25,7 +25,10 @@ HEADERS = {
         HOST / "nav" / name
         for name in ("contact.h", "radial.h", "texture.h", "pose.h", "arena.h", "settings.h", "filter.h")
     ],
-    "whisker": [HOST / "libwhisker" / "include" / "whisker" / name for name in ("errors.h", "frame.h", "ring.h")],
+    "whisker": [
+        HOST / "libwhisker" / "include" / "whisker" / name
+        for name in ("errors.h", "frame.h", "clock.h", "stats.h", "ring.h")
+    ],
 }
 
 

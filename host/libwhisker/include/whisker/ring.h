@@ -12,7 +12,9 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "whisker/clock.h"
 #include "whisker/frame.h"
+#include "whisker/stats.h"
 
 #pragma GCC visibility push(default)
 /* cffi: begin */
@@ -69,6 +71,12 @@ int whisker_reader_reattach(struct whisker_reader *reader, int timeout_ms);
 /* Fills in *info. */
 void whisker_reader_info(const struct whisker_reader *reader, struct whisker_reader_info *info);
 
+/* The latest mapping of the bridge's clock; ns_per_cycle is 0 before the first. Returns 0, or TIMEOUT: never still. */
+int whisker_reader_clock(const struct whisker_reader *reader, struct whisker_clock *clock);
+
+/* What the daemon last told of itself; all zeros before the first time. Returns 0, or TIMEOUT: never still. */
+int whisker_reader_stats(const struct whisker_reader *reader, struct whisker_daemon_stats *stats);
+
 struct whisker_ring;
 
 /*
@@ -81,6 +89,10 @@ int whisker_ring_create(const char *name, uint32_t capacity, struct whisker_ring
 /* Copies `count` frames (at most a quarter of the capacity) into the ring and wakes waiting readers once. Never waits.
  * Returns 0 or ARGUMENT. */
 int whisker_ring_publish(struct whisker_ring *ring, const struct whisker_frame *frames, size_t count);
+
+/* Tell the readers the clock mapping and the daemon's statistics; a few times a second is enough. Never waits. */
+void whisker_ring_set_clock(struct whisker_ring *ring, const struct whisker_clock *clock);
+void whisker_ring_set_stats(struct whisker_ring *ring, const struct whisker_daemon_stats *stats);
 
 /* Removes the name, tells the readers that the stream has ended, and lets go; what they hold they can finish reading.
  * NULL is allowed. */
