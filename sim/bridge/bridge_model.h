@@ -20,6 +20,9 @@ class BridgeModel : public UtmiDevice
 
     void cycle() override;
 
+    // As after power came: registers, FIFO and USB device begin anew.
+    void reset();
+
     // Begins a tick: one cycle of the external tick strobe.
     void start_tick();
 
@@ -27,8 +30,6 @@ class BridgeModel : public UtmiDevice
     bool running() const;   // from start until the last frame is in the FIFO
 
   private:
-    void reset();
-
     NodeBus &bus_;
     std::unique_ptr<Vwhisker_bridge> top_;
 };

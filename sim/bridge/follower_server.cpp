@@ -136,8 +136,10 @@ void FollowerServer::handle(Follower &follower, const std::string &message)
         follower.taken = std::max(follower.taken, tick + 1);
     } else if (message.compare(0, 6, "drive ") == 0) {
         handle_drive(follower, message);
+    } else if (message == "unplug" || message == "plug") {
+        cable_.push_back(message == "plug" ? Cable::PLUG : Cable::UNPLUG);
     } else {
-        throw std::runtime_error("socket: '" + message + "' is none of follow, taken, pilot, drive");
+        throw std::runtime_error("socket: '" + message + "' is none of follow, taken, pilot, drive, unplug, plug");
     }
 }
 
@@ -175,6 +177,16 @@ void FollowerServer::send(const Follower &follower, const std::string &message)
     if (::send(follower.descriptor, message.data(), message.size(), MSG_NOSIGNAL) < 0 && errno == EAGAIN) {
         throw std::runtime_error("socket: '" + follower.name + "' does not read its messages");
     }
+}
+
+std::optional<Cable> FollowerServer::take_cable()
+{
+    if (cable_.empty()) {
+        return std::nullopt;
+    }
+    const Cable next = cable_.front();
+    cable_.pop_front();
+    return next;
 }
 
 void FollowerServer::send_odometry(uint64_t tick, double x_m, double y_m, double theta_rad)

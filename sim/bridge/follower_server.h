@@ -1,10 +1,11 @@
 // The socket by which readers of the ring hold the simulation back and the pilot drives the robot. One ASCII message
 // per packet (Unix SOCK_SEQPACKET):
-//   in:  follow NAME | taken T | pilot | drive T V OMEGA
+//   in:  follow NAME | taken T | pilot | drive T V OMEGA | unplug | plug
 //   out: odometry T X Y THETA (to the pilot) | end N (to all)
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <map>
 #include <optional>
 #include <string>
@@ -18,6 +19,9 @@ namespace bridge_sim
 constexpr uint64_t TAKEN_WINDOW = 4096; // ticks a follower may lag behind
 constexpr uint64_t DECISION_BLOCK = 40; // ticks the pilot answers with one drive message
 constexpr uint64_t DECISION_DELAY = 40; // ticks from the end of a block to its answer's effect, besides the one between
+
+// What a connection that is no follower may do to the cable, at once.
+enum class Cable { UNPLUG, PLUG };
 
 struct Drive {
     double v_m_s;
@@ -47,6 +51,9 @@ class FollowerServer
     // The pilot's command that takes effect at this tick, if one does.
     std::optional<Drive> drive_at(uint64_t tick);
 
+    // The next thing asked of the cable, if any.
+    std::optional<Cable> take_cable();
+
     void send_odometry(uint64_t tick, double x_m, double y_m, double theta_rad);
     void send_end(uint64_t ticks);
 
@@ -71,6 +78,7 @@ class FollowerServer
     int listener_ = -1;
     std::vector<Follower> followers_;
     std::map<uint64_t, Drive> drives_; // by the tick they take effect
+    std::deque<Cable> cable_;
     uint64_t blocks_answered_ = 0;
     bool over_ = false;
 };

@@ -21,6 +21,7 @@ enum Option {
     HELP = 256,
     BENCH,
     PROGRESS,
+    UNPLUGGED,
     SCENE,
     SEED,
     SECONDS,
@@ -40,6 +41,7 @@ enum Option {
 const option LONG_OPTIONS[] = {{"help", no_argument, nullptr, HELP},
                                {"bench", no_argument, nullptr, BENCH},
                                {"progress", no_argument, nullptr, PROGRESS},
+                               {"unplugged", no_argument, nullptr, UNPLUGGED},
                                {"scene", required_argument, nullptr, SCENE},
                                {"seed", required_argument, nullptr, SEED},
                                {"seconds", required_argument, nullptr, SECONDS},
@@ -101,10 +103,11 @@ std::string *path_of(Options &options, int option)
 
 bool set_flag(Options &options, int option)
 {
-    bool *flag = option == HELP       ? &options.help
-                 : option == BENCH    ? &options.bench
-                 : option == PROGRESS ? &options.progress
-                                      : nullptr;
+    bool *flag = option == HELP        ? &options.help
+                 : option == BENCH     ? &options.bench
+                 : option == PROGRESS  ? &options.progress
+                 : option == UNPLUGGED ? &options.unplugged
+                                       : nullptr;
     if (flag) {
         *flag = true;
     }
@@ -172,6 +175,7 @@ void check(const Options &options)
     }
     require(!options.scene.empty(), "--scene is missing: give a flat scene file, or --bench");
     require(!options.command.empty(), "the command is missing: give it after --, for example -- whiskerd --ring demo");
+    require(!options.unplugged || !options.socket.empty(), "--unplugged needs --socket: say where 'plug' comes from");
     require(options.followers == 0 || !options.socket.empty(), "--followers needs --socket: say where they connect");
 }
 
@@ -229,6 +233,7 @@ const char *usage()
            "bench: 6)\n"
            "  --speed-report OUT.json  ticks, clock cycles, wall seconds, fault counts\n"
            "  --defect KIND         misbehave: wire-version (claims another) or frame (damages one)\n"
+           "  --unplugged           begin without the bridge, until 'plug' comes by the socket\n"
            "  --progress            a line 'progress TICK TICKS' every simulated second (default on a terminal)\n"
            "  --bench               no COMMAND, no umockdev: an internal host reads and checks every frame\n"
            "  --sck-divider N --word-gap N --sample-point N   bench: node link settings, in cycles of 60 MHz (6, 30, "

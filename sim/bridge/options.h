@@ -14,6 +14,7 @@ struct Options {
     bool help = false;
     bool bench = false;
     bool progress = false;
+    bool unplugged = false;
     std::string scene;
     std::string socket;
     std::string truth;

@@ -52,6 +52,13 @@ bool Rig::power_on(Descriptors &descriptors, const char *&error)
     return enumerate(host_, descriptors, error);
 }
 
+bool Rig::power_cycle(Descriptors &descriptors, const char *&error)
+{
+    forget_frames();
+    bridge_.reset();
+    return power_on(descriptors, error);
+}
+
 UsbHost &Rig::host()
 {
     return host_;

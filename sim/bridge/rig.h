@@ -19,6 +19,9 @@ class Rig
     // Nodes on, bus reset, enumeration. False: `error` names the step that failed.
     bool power_on(Descriptors &descriptors, const char *&error);
 
+    // Power goes and comes back, as when the cable is pulled and put in again; what power_on() does follows.
+    bool power_cycle(Descriptors &descriptors, const char *&error);
+
     UsbHost &host();
     NodeBus &bus();
     uint64_t cycles() const;

@@ -85,12 +85,11 @@ Simulation::Simulation(const Options &options)
     if (!world_) {
         throw std::runtime_error(options.scene + ": no world can be made of it: a texture has no known parameters");
     }
-    Descriptors descriptors;
-    const char *error = nullptr;
-    if (!rig_.power_on(descriptors, error)) {
-        throw std::runtime_error(std::string("the bridge does not enumerate: ") + error);
+    usbfs_ = std::make_unique<UsbfsServer>();
+    scheduler_.plug(false);
+    if (!options.unplugged) {
+        plug();
     }
-    usbfs_ = std::make_unique<UsbfsServer>(descriptors);
 }
 
 Simulation::~Simulation()
@@ -119,7 +118,7 @@ bool Simulation::advance()
         child_->kill();
         throw std::runtime_error("the command did not end when asked to: killed");
     }
-    if (rig_.running() && scheduler_.stop_seen()) {
+    if (plugged_ && rig_.running() && scheduler_.stop_seen()) {
         produce_last_tick();
         return true;
     }
@@ -135,7 +134,7 @@ bool Simulation::advance()
 
 bool Simulation::may_tick()
 {
-    return !over_ && rig_.running() && runner_.ready() && followers_.allows(tick_);
+    return plugged_ && !over_ && rig_.running() && runner_.ready() && followers_.allows(tick_);
 }
 
 void Simulation::produce_tick()
@@ -176,26 +175,65 @@ void Simulation::after_tick(uint64_t tick)
     }
 }
 
-// The host stopped the bridge, because the run is over or of its own accord: then it is over as well.
+// The host stopped the bridge: because the run is over, or of its own accord; then it may start it again.
 void Simulation::produce_last_tick()
 {
     runner_.last_tick(fields_.data());
-    end_run();
 }
 
 void Simulation::end_run()
 {
-    if (over_) {
-        return;
+    if (!over_) {
+        close_run();
+        killed_at_s_ = now_s() + END_PATIENCE_S;
+        child_->ask_to_end();
     }
+}
+
+void Simulation::close_run()
+{
     over_ = true;
     speed_ = {tick_, rig_.cycles() - first_tick_cycles_, now_s() - first_tick_s_, rig_.bus().populated()};
-    killed_at_s_ = now_s() + END_PATIENCE_S;
     followers_.send_end(tick_);
-    child_->ask_to_end();
 }
 
 // -------------------------------------------------------------------------------------------------------- surroundings
+
+void Simulation::obey_cable()
+{
+    while (const std::optional<Cable> asked = followers_.take_cable()) {
+        if ((*asked == Cable::PLUG) == plugged_) {
+            throw std::runtime_error(plugged_ ? "socket: 'plug', but the bridge is plugged in"
+                                              : "socket: 'unplug', but the bridge is not plugged in");
+        }
+        plugged_ ? unplug() : plug();
+    }
+}
+
+void Simulation::plug()
+{
+    Descriptors descriptors;
+    const char *error = nullptr;
+    if (!rig_.power_cycle(descriptors, error)) {
+        throw std::runtime_error(std::string("the bridge does not enumerate: ") + error);
+    }
+    scheduler_.plug(true);
+    usbfs_->plug(descriptors);
+    plugged_ = true;
+}
+
+// What is under way ends first, so that its results are handed over before the device is gone. The world stands still
+// until ticks are produced again.
+void Simulation::unplug()
+{
+    take_requests();
+    scheduler_.plug(false);
+    runner_.unplugged();
+    rig_.forget_frames();
+    deliver_completed();
+    usbfs_->unplug();
+    plugged_ = false;
+}
 
 void Simulation::take_requests()
 {
@@ -229,6 +267,7 @@ void Simulation::wait(int timeout_ms)
         take_requests();
     }
     followers_.receive();
+    obey_cable();
 }
 
 void Simulation::read_signals()
@@ -251,6 +290,9 @@ void Simulation::show_progress()
 
 void Simulation::finish()
 {
+    if (!over_) { // the command ended of its own accord
+        close_run();
+    }
     truth_.close();
     faults_.close();
     write_speed_report(options_.speed_report, speed_, faults_);

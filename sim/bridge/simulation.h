@@ -41,6 +41,10 @@ class Simulation
     void after_tick(uint64_t tick);
     void produce_last_tick();
     void end_run();
+    void close_run();
+    void obey_cable();
+    void plug();
+    void unplug();
     void take_requests();
     void deliver_completed();
     void wait(int timeout_ms);
@@ -64,7 +68,8 @@ class Simulation
     std::unique_ptr<Child> child_;
     std::array<sim_field, LANES> fields_{};
     uint64_t total_;
-    uint64_t tick_ = 0;      // produced so far
+    uint64_t tick_ = 0; // produced so far
+    bool plugged_ = false;
     bool over_ = false;      // no more ticks; the command has been asked to end
     bool stopped_ = false;   // by a signal
     double killed_at_s_ = 0; // when the command will have had time enough to end

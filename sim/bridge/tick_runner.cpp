@@ -64,6 +64,12 @@ void TickRunner::last_tick(const sim_field *fields)
     rig_.last_tick(fields, [this] { return scheduler_.step(); });
 }
 
+void TickRunner::unplugged()
+{
+    in_transfer_.reset();
+    away_ = false;
+}
+
 // A reading is spoilt at its own tick; its transfer comes one tick later.
 void TickRunner::inject_lane_fault(uint64_t number)
 {

@@ -24,6 +24,9 @@ class TickRunner
     // The one tick after a stop.
     void last_tick(const sim_field *fields);
 
+    // The bridge lost its power: a fault that waited for its next transfer goes with it.
+    void unplugged();
+
     // Irregularities on the wire that the planned faults do not explain, and planned ones that did not take place.
     // Throws std::runtime_error if there are any.
     void check_usb() const;

@@ -62,7 +62,27 @@ std::deque<Urb> &UrbScheduler::queue(UrbKind kind)
 
 void UrbScheduler::submit(Urb urb)
 {
-    queue(urb.kind).push_back(std::move(urb));
+    std::deque<Urb> &waiting = queue(urb.kind);
+    waiting.push_back(std::move(urb));
+    if (!plugged_) {
+        complete(waiting, -ENODEV);
+    }
+}
+
+void UrbScheduler::plug(bool in)
+{
+    plugged_ = in;
+    away_ = stop_seen_ = false;
+    end_all({&control_, &bulk_, &interrupt_}, -ENODEV);
+}
+
+void UrbScheduler::end_all(std::initializer_list<std::deque<Urb> *> queues, int status)
+{
+    for (std::deque<Urb> *queue : queues) {
+        while (!queue->empty()) {
+            complete(*queue, status);
+        }
+    }
 }
 
 void UrbScheduler::discard(uint64_t id)
@@ -149,11 +169,7 @@ void UrbScheduler::run_control(Urb &urb)
 void UrbScheduler::start_afresh()
 {
     rig_.forget_frames();
-    for (std::deque<Urb> *queue : {&bulk_, &interrupt_}) {
-        while (!queue->empty()) {
-            complete(*queue, -ESHUTDOWN);
-        }
-    }
+    end_all({&bulk_, &interrupt_}, -ESHUTDOWN);
 }
 
 // The report that starts and stops the bridge passes here; what it says tells which tick is a run's last.

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <deque>
+#include <initializer_list>
 #include <vector>
 
 #include "rig.h"
@@ -26,7 +27,11 @@ class UrbScheduler
   public:
     explicit UrbScheduler(Rig &rig);
 
+    // Without a cable it ends at once with -ENODEV.
     void submit(Urb urb);
+
+    // The cable is in, as at first, or out: then what waits ends with -ENODEV.
+    void plug(bool in);
 
     // Takes a waiting transfer out of its queue; it completes with -ENOENT and what it had received.
     void discard(uint64_t id);
@@ -64,6 +69,7 @@ class UrbScheduler
     void watch_run(const Urb &urb);
     void bus_reset(Urb &urb);
     void complete(std::deque<Urb> &queue, int status);
+    void end_all(std::initializer_list<std::deque<Urb> *> queues, int status);
     void start_afresh();
     std::deque<Urb> &queue(UrbKind kind);
     bool receive_packet();
@@ -81,6 +87,7 @@ class UrbScheduler
     bool interrupt_due_ = false;
     bool away_ = false;
     bool stop_seen_ = false;
+    bool plugged_ = true;
 };
 
 // errno for what a transaction came to, as Linux maps it (Documentation/driver-api/usb/error-codes).

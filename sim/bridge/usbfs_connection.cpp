@@ -58,6 +58,21 @@ bool UsbfsConnection::closed() const
     return !umockdev_ioctl_client_get_connected(client_);
 }
 
+std::string UsbfsConnection::node() const
+{
+    const char *path = umockdev_ioctl_client_get_devnode(client_);
+    return path ? path : "";
+}
+
+void UsbfsConnection::unplugged()
+{
+    gone_ = true;
+    if (reaping_) {
+        stop_holding();
+        reap(true);
+    }
+}
+
 unsigned long UsbfsConnection::request() const
 {
     return umockdev_ioctl_client_get_request(client_);
@@ -172,6 +187,9 @@ void UsbfsConnection::reap(bool wait)
     reaping_ = true;
     if (!done_.empty()) {
         hand_over();
+    } else if (gone_) {
+        reaping_ = false;
+        answer(ENODEV);
     } else if (!wait) {
         hold_ = g_timeout_source_new(HOLD_MS);
         g_source_set_callback(hold_, on_hold_over, this, nullptr);

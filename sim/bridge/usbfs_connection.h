@@ -4,6 +4,7 @@
 #include <deque>
 #include <map>
 #include <memory>
+#include <string>
 
 #include <linux/types.h>
 #include <linux/usbdevice_fs.h>
@@ -31,6 +32,12 @@ class UsbfsConnection
     UsbfsConnection &operator=(const UsbfsConnection &) = delete;
 
     bool closed() const;
+
+    // The device node that the client opened.
+    std::string node() const;
+
+    // The device is gone: a client that waits for a result learns it (ENODEV) when all results are taken.
+    void unplugged();
 
     // The request the client is in, its argument as a number, and as memory of the given size (nullptr: unreadable).
     unsigned long request() const;
@@ -77,6 +84,7 @@ class UsbfsConnection
     bool reaping_ = false;
     GSource *hold_ = nullptr;
     uint64_t waited_for_ = 0;
+    bool gone_ = false;
 };
 
 } // namespace bridge_sim

@@ -15,7 +15,21 @@ namespace bridge_sim
 namespace
 {
 
-constexpr char DEVICE_NODE[] = "/dev/bus/usb/001/002";
+constexpr char SYSFS_PATH[] = "/sys/devices/pci0000:00/0000:00:14.0/usb1/1-1";
+constexpr unsigned FIRST_NUMBER = 2; // 1 is the root hub
+constexpr unsigned LAST_NUMBER = 127;
+
+// A device's number on its bus in three digits, as in the path of its node.
+std::string three_digits(unsigned number)
+{
+    const std::string digits = std::to_string(number);
+    return std::string(3 - digits.size(), '0') + digits;
+}
+
+std::string node_of(unsigned number)
+{
+    return "/dev/bus/usb/001/" + three_digits(number);
+}
 
 std::string hexadecimal(const Bytes &bytes)
 {
@@ -29,26 +43,17 @@ std::string hexadecimal(const Bytes &bytes)
 }
 
 // The device as udev and sysfs show it, in umockdev's format. What the descriptors say is read from them.
-std::string device_record(const Descriptors &descriptors)
+std::string device_record(const Descriptors &descriptors, unsigned number)
 {
     const Bytes &device = descriptors.device;
     const std::string hex = hexadecimal(descriptors.all());
-    const std::string vendor = hexadecimal({device[9], device[8]});
-    const std::string product = hexadecimal({device[11], device[10]});
-    return "P: /devices/pci0000:00/0000:00:14.0/usb1/1-1\n"
-           "N: bus/usb/001/002=" +
-           hex +
-           "\n"
-           "E: DEVNAME=" +
-           DEVICE_NODE +
-           "\nE: DEVTYPE=usb_device\nE: SUBSYSTEM=usb\n"
-           "E: MAJOR=189\nE: MINOR=1\nE: BUSNUM=001\nE: DEVNUM=002\n"
-           "A: busnum=1\\n\nA: devnum=2\\n\nA: speed=480\\n\nA: bConfigurationValue=1\\n\n"
-           "A: idVendor=" +
-           vendor + "\\n\nA: idProduct=" + product +
-           "\\n\n"
-           "H: descriptors=" +
-           hex + "\n\n";
+    const std::string digits = three_digits(number);
+    return "P: " + std::string(SYSFS_PATH).substr(std::string("/sys").size()) + "\nN: bus/usb/001/" + digits + "=" +
+           hex + "\nE: DEVNAME=" + node_of(number) +
+           "\nE: DEVTYPE=usb_device\nE: SUBSYSTEM=usb\nE: MAJOR=189\nE: MINOR=" + std::to_string(number - 1) +
+           "\nE: BUSNUM=001\nE: DEVNUM=" + digits + "\nA: busnum=1\\n\nA: devnum=" + std::to_string(number) +
+           "\\n\nA: speed=480\\n\nA: bConfigurationValue=1\\n\nA: idVendor=" + hexadecimal({device[9], device[8]}) +
+           "\\n\nA: idProduct=" + hexadecimal({device[11], device[10]}) + "\\n\nH: descriptors=" + hex + "\n\n";
 }
 
 void require(bool ok, GError *error, const std::string &what)
@@ -69,6 +74,8 @@ struct UsbfsServer::State {
     UsbfsSession session{[this](UsbfsRequest request) { post(std::move(request)); }};
     UMockdevTestbed *testbed = nullptr;
     UMockdevIoctlBase *handler = nullptr;
+    unsigned number = FIRST_NUMBER - 1; // of the device, now or before it was unplugged
+    std::vector<std::string> nodes;     // attached; clients of a device that is gone may still hold its node open
 
     ~State()
     {
@@ -97,47 +104,71 @@ struct UsbfsServer::State {
 namespace
 {
 
-struct Delivery {
-    UsbfsSession *session;
-    std::vector<Urb> urbs;
-};
+using Job = std::function<void()>;
 
-gboolean on_delivery(gpointer data)
+gboolean on_job(gpointer job)
 {
-    auto *delivery = static_cast<Delivery *>(data);
-    delivery->session->completed(std::move(delivery->urbs));
+    (*static_cast<Job *>(job))();
     return G_SOURCE_REMOVE;
 }
 
-void free_delivery(gpointer data)
+void free_job(gpointer job)
 {
-    delete static_cast<Delivery *>(data);
+    delete static_cast<Job *>(job);
 }
 
 } // namespace
 
-UsbfsServer::UsbfsServer(const Descriptors &descriptors) : state_(std::make_shared<State>())
+// Runs it in umockdev's thread; here, while that has no client yet.
+void UsbfsServer::post(std::function<void()> job)
 {
-    GError *error = nullptr;
+    const std::lock_guard<std::mutex> lock(state_->mutex);
+    g_main_context_invoke_full(state_->context, G_PRIORITY_DEFAULT, on_job, new Job(std::move(job)), free_job);
+}
+
+UsbfsServer::UsbfsServer() : state_(std::make_shared<State>())
+{
     state_->wake = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
     state_->testbed = umockdev_testbed_new();
     if (!umockdev_in_mock_environment()) {
         throw std::runtime_error("the simulated device needs umockdev: run this program under umockdev-wrapper");
     }
-    require(umockdev_testbed_add_from_string(state_->testbed, device_record(descriptors).c_str(), &error), error,
-            "umockdev does not take the device");
     state_->handler = umockdev_ioctl_base_new();
     g_signal_connect(state_->handler, "handle-ioctl", G_CALLBACK(State::on_ioctl), state_.get());
-    require(umockdev_testbed_attach_ioctl(state_->testbed, DEVICE_NODE, state_->handler, &error), error,
+}
+
+// umockdev tells of the device before its descriptors are there, so listeners are told once more.
+void UsbfsServer::plug(const Descriptors &descriptors)
+{
+    GError *error = nullptr;
+    state_->number = state_->number < LAST_NUMBER ? state_->number + 1 : FIRST_NUMBER;
+    const std::string node = node_of(state_->number);
+    require(umockdev_testbed_attach_ioctl(state_->testbed, node.c_str(), state_->handler, &error), error,
             "umockdev does not serve the device node");
+    state_->nodes.push_back(node);
+    post([session = &state_->session, node] { session->set_node(node); });
+    require(
+        umockdev_testbed_add_from_string(state_->testbed, device_record(descriptors, state_->number).c_str(), &error),
+        error, "umockdev does not take the device");
+    umockdev_testbed_uevent(state_->testbed, SYSFS_PATH, "add");
+}
+
+void UsbfsServer::unplug()
+{
+    post([session = &state_->session] { session->set_node(""); });
+    umockdev_testbed_uevent(state_->testbed, SYSFS_PATH, "remove");
+    umockdev_testbed_remove_device(state_->testbed, SYSFS_PATH);
+    unlink(node_of(state_->number).c_str()); // umockdev leaves it
 }
 
 // Dropping the testbed joins umockdev's thread; only then may the session go.
 UsbfsServer::~UsbfsServer()
 {
-    GError *error = nullptr;
-    umockdev_testbed_detach_ioctl(state_->testbed, DEVICE_NODE, &error);
-    g_clear_error(&error);
+    for (const std::string &node : state_->nodes) {
+        GError *error = nullptr;
+        umockdev_testbed_detach_ioctl(state_->testbed, node.c_str(), &error);
+        g_clear_error(&error);
+    }
     g_object_unref(state_->testbed);
     g_object_unref(state_->handler);
 }
@@ -162,9 +193,9 @@ void UsbfsServer::deliver(std::vector<Urb> completed)
     if (completed.empty()) {
         return;
     }
-    auto *delivery = new Delivery{&state_->session, std::move(completed)};
-    const std::lock_guard<std::mutex> lock(state_->mutex);
-    g_main_context_invoke_full(state_->context, G_PRIORITY_DEFAULT, on_delivery, delivery, free_delivery);
+    post([session = &state_->session, completed = std::move(completed)]() mutable {
+        session->completed(std::move(completed));
+    });
 }
 
 } // namespace bridge_sim

@@ -2,6 +2,7 @@
 // transfers for the scheduler. The ioctls arrive in umockdev's thread; the model's thread only meets the two queues.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -19,10 +20,17 @@ struct UsbfsRequest {
 class UsbfsServer
 {
   public:
-    // Adds the device with these descriptors to a fresh testbed and attaches to its node.
+    // A fresh testbed without a device.
     // Throws std::runtime_error with one line if that fails (for one, outside umockdev-wrapper).
-    explicit UsbfsServer(const Descriptors &descriptors);
+    UsbfsServer();
     ~UsbfsServer();
+
+    // Adds the device with these descriptors under a number it has not had yet, and tells udev's listeners.
+    // Throws std::runtime_error with one line if that fails.
+    void plug(const Descriptors &descriptors);
+
+    // Removes it and tells udev's listeners. Who has it open gets ENODEV once every result handed over is fetched.
+    void unplug();
 
     // Readable when requests wait.
     int wake_descriptor() const;
@@ -35,6 +43,9 @@ class UsbfsServer
 
   private:
     struct State;
+
+    void post(std::function<void()> job);
+
     std::shared_ptr<State> state_;
 };
 

@@ -71,6 +71,10 @@ void UsbfsSession::ioctl(UMockdevIoctlClient *client)
 {
     forget_closed();
     UsbfsConnection &connection = connection_of(client);
+    if (connection.node() != node_) {
+        connection.unplugged();
+        return ioctl_of_lost_device(connection);
+    }
     switch (connection.request()) {
     case USBDEVFS_SUBMITURB:
         return submit(connection);
@@ -98,6 +102,27 @@ void UsbfsSession::ioctl(UMockdevIoctlClient *client)
     default:
         return connection.answer(ENOTTY);
     }
+}
+
+// What had ended before can still be fetched, as in the kernel.
+void UsbfsSession::ioctl_of_lost_device(UsbfsConnection &connection)
+{
+    const unsigned long request = connection.request();
+    if (request == USBDEVFS_REAPURB || request == USBDEVFS_REAPURBNDELAY) {
+        return connection.reap(false);
+    }
+    connection.answer(ENODEV);
+}
+
+void UsbfsSession::set_node(const std::string &node)
+{
+    node_ = node;
+    for (const auto &[client, connection] : connections_) {
+        if (connection->node() != node_) {
+            connection->unplugged();
+        }
+    }
+    interfaces_.clear();
 }
 
 // ---------------------------------------------------------------------------------------------------------- transfers

@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <map>
+#include <string>
 
 #include <linux/usbdevice_fs.h>
 #include <umockdev.h>
@@ -22,6 +23,9 @@ class UsbfsSession
     // One ioctl of a client; answered now, or later when a transfer has ended.
     void ioctl(UMockdevIoctlClient *client);
 
+    // The device has this node from now on; empty: it is unplugged. Clients of an earlier node have lost it.
+    void set_node(const std::string &node);
+
     // Transfers the model has ended.
     void completed(std::vector<Urb> urbs);
 
@@ -35,12 +39,14 @@ class UsbfsSession
     void clear_halt(UsbfsConnection &connection);
     void capabilities(UsbfsConnection &connection);
     UsbfsConnection &connection_of(UMockdevIoctlClient *client);
+    void ioctl_of_lost_device(UsbfsConnection &connection);
     void forget_closed();
 
     std::function<void(UsbfsRequest)> post_;
     std::map<UMockdevIoctlClient *, std::unique_ptr<UsbfsConnection>> connections_;
     std::map<uint64_t, UsbfsConnection *> owners_;     // of transfers in the model
     std::map<unsigned, UsbfsConnection *> interfaces_; // claimed
+    std::string node_;
     uint64_t next_id_ = 1;
 };
 
