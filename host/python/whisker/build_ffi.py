@@ -23,7 +23,17 @@ LIBRARIES = {"nav": ["m"], "whisker": ["rt", "pthread"]}
 HEADERS = {
     "nav": [
         HOST / "nav" / name
-        for name in ("contact.h", "radial.h", "texture.h", "pose.h", "arena.h", "settings.h", "filter.h")
+        for name in (
+            "contact.h",
+            "radial.h",
+            "texture.h",
+            "pose.h",
+            "arena.h",
+            "settings.h",
+            "filter.h",
+            "belief.h",
+            "replay.h",
+        )
     ],
     "whisker": [
         HOST / "libwhisker" / "include" / "whisker" / name

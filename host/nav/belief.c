@@ -1,0 +1,209 @@
+#include "belief.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { RASTER_MOST = 1024, BIN_HEADINGS = 12 };
+static const double BIN_M = 0.25;
+static const double SHARE = 0.9;
+static const double MASS_LEAST = 1e-7; /* lighter bumps do not stretch the raster */
+
+/* An interval of even density; an edge-less one has all its mass at one place. */
+struct slab {
+    double low, high;
+};
+
+static struct slab slab_of(double centre, double sigma)
+{
+    double half = sigma * sqrt(3.0);
+    return (struct slab){centre - half, centre + half};
+}
+
+/* Share of a slab that lies in low .. high. */
+static double overlap(struct slab s, double low, double high)
+{
+    if (!(s.high > s.low))
+        return s.low >= low && s.low < high ? 1.0 : 0.0;
+    return fmax(fmin(s.high, high) - fmax(s.low, low), 0.0) / (s.high - s.low);
+}
+
+struct raster {
+    double x0, y0, pitch; /* m */
+    int nx, ny;
+    double *mass;
+};
+
+static int index_of(double offset, double pitch, int count)
+{
+    double index = floor(offset / pitch);
+    if (!(index > 0.0))
+        return 0;
+    return index < count ? (int)index : count - 1;
+}
+
+struct extent {
+    struct slab x, y;
+    double sigma; /* of the narrowest bump */
+};
+
+static struct extent extent_of(const struct nav_component *c, long n, double total)
+{
+    struct extent e = {{INFINITY, -INFINITY}, {INFINITY, -INFINITY}, INFINITY};
+    for (long i = 0; i < n; i++) {
+        if (!(c[i].mass > MASS_LEAST * total))
+            continue;
+        struct slab x = slab_of(c[i].pose.x, c[i].sigma_m), y = slab_of(c[i].pose.y, c[i].sigma_m);
+        e.x = (struct slab){fmin(e.x.low, x.low), fmax(e.x.high, x.high)};
+        e.y = (struct slab){fmin(e.y.low, y.low), fmax(e.y.high, y.high)};
+        e.sigma = fmin(e.sigma, c[i].sigma_m);
+    }
+    return e;
+}
+
+/* Bins a quarter as wide as the narrowest bump, as far as that gives no more than RASTER_MOST a side. */
+static int raster_init(struct raster *r, const struct extent *e)
+{
+    double span = fmax(e->x.high - e->x.low, e->y.high - e->y.low);
+    double pitch = fmax(fmax(e->sigma * sqrt(3.0) / 2.0, span / (RASTER_MOST - 2)), 1e-6);
+    if (!isfinite(pitch))
+        return -1;
+    *r = (struct raster){.x0 = e->x.low - pitch / 2.0, .y0 = e->y.low - pitch / 2.0, .pitch = pitch};
+    r->nx = (int)((e->x.high - e->x.low) / pitch) + 2;
+    r->ny = (int)((e->y.high - e->y.low) / pitch) + 2;
+    r->mass = calloc((size_t)r->nx * (size_t)r->ny, sizeof *r->mass);
+    return r->mass ? 0 : -1;
+}
+
+static void draw(struct raster *r, const struct nav_component *c)
+{
+    struct slab x = slab_of(c->pose.x - r->x0, c->sigma_m), y = slab_of(c->pose.y - r->y0, c->sigma_m);
+    int first = index_of(x.low, r->pitch, r->nx), last = index_of(x.high, r->pitch, r->nx);
+    for (int j = index_of(y.low, r->pitch, r->ny); j <= index_of(y.high, r->pitch, r->ny); j++) {
+        double row = c->mass * overlap(y, j * r->pitch, (j + 1) * r->pitch);
+        for (int i = first; i <= last; i++)
+            r->mass[(size_t)j * (size_t)r->nx + (size_t)i] += row * overlap(x, i * r->pitch, (i + 1) * r->pitch);
+    }
+}
+
+static int raster_of(struct raster *r, const struct nav_component *c, long n, double total)
+{
+    struct extent e = extent_of(c, n, total);
+    if (raster_init(r, &e))
+        return -1;
+    for (long i = 0; i < n; i++) {
+        if (c[i].mass > 0.0)
+            draw(r, &c[i]);
+    }
+    return 0;
+}
+
+static int descending(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x < y) - (x > y);
+}
+
+/* Sorts the raster's masses: the point's bin is looked up before. */
+static double area_of(struct raster *r, double total)
+{
+    size_t count = 0, all = (size_t)r->nx * (size_t)r->ny;
+    for (size_t i = 0; i < all; i++) {
+        if (r->mass[i] > 0.0)
+            r->mass[count++] = r->mass[i];
+    }
+    qsort(r->mass, count, sizeof *r->mass, descending);
+    double held = 0.0, bins = 0.0;
+    for (size_t i = 0; i < count && held < SHARE * total; i++) {
+        bins += fmin(1.0, (SHARE * total - held) / r->mass[i]);
+        held += r->mass[i];
+    }
+    return bins * r->pitch * r->pitch;
+}
+
+static double level_of(const struct raster *r, double x, double y, double total)
+{
+    double i = floor((x - r->x0) / r->pitch), j = floor((y - r->y0) / r->pitch);
+    if (!(i >= 0.0 && i < r->nx && j >= 0.0 && j < r->ny))
+        return 1.0;
+    double own = r->mass[(size_t)j * (size_t)r->nx + (size_t)i], denser = own > 0.0 ? own / 2.0 : 0.0;
+    for (size_t k = 0; k < (size_t)r->nx * (size_t)r->ny; k++) {
+        if (r->mass[k] > own)
+            denser += r->mass[k];
+    }
+    return fmin(denser / total, 1.0);
+}
+
+static double total_of(const struct nav_component *c, long n)
+{
+    double total = 0.0;
+    for (long i = 0; i < n; i++)
+        total += fmax(c[i].mass, 0.0);
+    return total;
+}
+
+int nav_belief_region(const struct nav_component *c, long n, double x, double y, struct nav_region *out)
+{
+    double total = total_of(c, n);
+    struct raster r = {.mass = NULL};
+    *out = (struct nav_region){.level = 1.0};
+    if (!(total > 0.0 && isfinite(total)) || raster_of(&r, c, n, total))
+        return -1;
+    out->level = level_of(&r, x, y, total);
+    out->area_m2 = area_of(&r, total);
+    free(r.mass);
+    return 0;
+}
+
+double nav_belief_level(const struct nav_component *c, long n, double x, double y)
+{
+    struct nav_region region;
+    (void)nav_belief_region(c, n, x, y, &region);
+    return region.level;
+}
+
+/* Share of a slab in bin i of `count`; the outermost bins reach out to infinity. */
+static double bin_share(struct slab s, int i, int count)
+{
+    return overlap(s, i == 0 ? -INFINITY : i * BIN_M, i == count - 1 ? INFINITY : (i + 1) * BIN_M);
+}
+
+static double heading_share(const struct nav_component *c, int k)
+{
+    double width = 2.0 * NAV_PI / BIN_HEADINGS, off = nav_wrap(c->pose.theta - (k + 0.5) * width), sum = 0.0;
+    if (c->sigma_rad * sqrt(3.0) >= NAV_PI)
+        return 1.0 / BIN_HEADINGS;
+    for (int turn = -1; turn <= 1; turn++)
+        sum += overlap(slab_of(off + 2.0 * NAV_PI * turn, c->sigma_rad), -width / 2.0, width / 2.0);
+    return sum;
+}
+
+static void add_bins(const struct nav_component *c, int nx, int ny, double *bins)
+{
+    struct slab x = slab_of(c->pose.x, c->sigma_m), y = slab_of(c->pose.y, c->sigma_m);
+    int first = index_of(x.low, BIN_M, nx), last = index_of(x.high, BIN_M, nx);
+    for (int k = 0; k < BIN_HEADINGS; k++) {
+        double turned = c->mass * heading_share(c, k);
+        if (!(turned > 0.0))
+            continue;
+        for (int j = index_of(y.low, BIN_M, ny); j <= index_of(y.high, BIN_M, ny); j++) {
+            double row = turned * bin_share(y, j, ny);
+            for (int i = first; i <= last; i++)
+                bins[((long)k * ny + j) * nx + i] += row * bin_share(x, i, nx);
+        }
+    }
+}
+
+long nav_belief_bins(const struct nav_component *c, long n, double size_x, double size_y, double *bins, long room)
+{
+    int nx = (int)fmax(ceil(size_x / BIN_M - 1e-9), 1.0), ny = (int)fmax(ceil(size_y / BIN_M - 1e-9), 1.0);
+    long count = (long)nx * ny * BIN_HEADINGS;
+    if (count > room)
+        return count;
+    memset(bins, 0, (size_t)count * sizeof *bins);
+    for (long i = 0; i < n; i++) {
+        if (c[i].mass > 0.0)
+            add_bins(&c[i], nx, ny, bins);
+    }
+    return count;
+}

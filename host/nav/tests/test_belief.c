@@ -1,0 +1,111 @@
+/* Regions and bins of beliefs whose answers are known. */
+#include "belief.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "near.h"
+
+static const double PI = NAV_PI;
+
+/* Lattice of points of a normal with these standard deviations, as Gaussian filters list theirs. */
+static long normal(struct nav_component *out, double sx, double sy, double spacing)
+{
+    long n = 0;
+    for (double x = -5.0 * sx; x <= 5.0 * sx; x += spacing) {
+        for (double y = -5.0 * sy; y <= 5.0 * sy; y += spacing) {
+            double z = x * x / (sx * sx) + y * y / (sy * sy);
+            out[n++] = (struct nav_component){{1.0 + x, 2.0 + y, 0.0}, spacing / sqrt(12.0), 0.1, exp(-0.5 * z)};
+        }
+    }
+    return n;
+}
+
+static void levels_and_area_of_a_normal(void **state)
+{
+    (void)state;
+    static struct nav_component c[40000];
+    long n = normal(c, 0.2, 0.1, 0.02);
+    struct nav_region r;
+    for (double z = 0.5; z < 3.0; z += 0.5) { /* level of the contour at z: 1 - exp(-z^2 / 2) */
+        assert_int_equal(nav_belief_region(c, n, 1.0 + 0.2 * z, 2.0, &r), 0);
+        assert_near(r.level, 1.0 - exp(-0.5 * z * z), 0.03);
+        assert_near(nav_belief_level(c, n, 1.0, 2.0 - 0.1 * z), 1.0 - exp(-0.5 * z * z), 0.06);
+    }
+    assert_near(r.area_m2, PI * 0.2 * 0.1 * -2.0 * log(0.1), 0.003);
+    assert_near(nav_belief_level(c, n, 9.0, 9.0), 1.0, 0.0);
+}
+
+static void a_region_may_have_two_parts(void **state)
+{
+    (void)state;
+    const struct nav_component c[] = {{{0.5, 0.5, 0.0}, 0.01, 0.1, 6.0}, {{2.0, 1.5, 0.0}, 0.02, 0.1, 3.0}};
+    double first = 12.0 * 1e-4, second = 12.0 * 4e-4; /* squares with those standard deviations */
+    struct nav_region r;
+    assert_int_equal(nav_belief_region(c, 2, 2.0, 1.5, &r), 0);
+    assert_true(r.level > 6.0 / 9.0 && r.level < 1.0);
+    double area = first + second * (0.9 * 9.0 - 6.0) / 3.0; /* more by the bins that an edge cuts */
+    assert_true(r.area_m2 > 0.95 * area && r.area_m2 < 1.35 * area);
+    assert_true(nav_belief_level(c, 2, 0.5, 0.5) < 6.0 / 9.0);
+    assert_near(nav_belief_level(c, 2, 1.2, 1.0), 1.0, 1e-9);
+}
+
+static void a_point_mass_and_no_mass(void **state)
+{
+    (void)state;
+    struct nav_component c = {{0.5, 0.5, 0.0}, 0.0, 0.0, 1.0};
+    struct nav_region r;
+    assert_int_equal(nav_belief_region(&c, 1, 0.5, 0.5, &r), 0);
+    assert_near(r.level, 0.5, 1e-12);
+    assert_near(nav_belief_level(&c, 1, 0.6, 0.5), 1.0, 0.0);
+    assert_int_equal(nav_belief_region(&c, 0, 0.5, 0.5, &r), -1);
+    c.pose.x = NAN;
+    assert_int_equal(nav_belief_region(&c, 1, 0.5, 0.5, &r), -1);
+    assert_near(r.level, 1.0, 0.0);
+}
+
+static double sum(const double *v, long n)
+{
+    double total = 0.0;
+    for (long i = 0; i < n; i++)
+        total += v[i];
+    return total;
+}
+
+static void bins_share_a_bump_by_overlap(void **state)
+{
+    (void)state;
+    double bins[4 * 2 * 12];
+    double half_width = 0.1 / sqrt(3.0), half_turn = (PI / 12.0) / sqrt(3.0);
+    /* x: 0.2 wide about 0.25; y: within the lower bin; heading: 30 degrees about 0 */
+    struct nav_component c = {{0.25, 0.1, 0.0}, half_width, half_turn, 1.0};
+    assert_int_equal(nav_belief_bins(&c, 1, 1.0, 0.5, bins, 96), 96);
+    assert_near(sum(bins, 96), 1.0, 1e-12);
+    assert_near(bins[0], 0.25, 1e-12);
+    assert_near(bins[1], 0.25, 1e-12);
+    assert_near(bins[11 * 8], 0.25, 1e-12);
+    assert_int_equal(nav_belief_bins(&c, 1, 1.0, 0.5, NULL, 0), 96);
+}
+
+static void bins_keep_what_is_outside_and_all_headings(void **state)
+{
+    (void)state;
+    double bins[4 * 2 * 12];
+    struct nav_component c[] = {{{-3.0, 9.0, 0.0}, 0.0, 100.0, 1.0}, {{0.9, 0.4, -0.1}, 0.0, 0.0, 2.0}};
+    assert_int_equal(nav_belief_bins(c, 2, 1.0, 0.5, bins, 96), 96);
+    assert_near(sum(bins, 96), 3.0, 1e-12);
+    assert_near(bins[5 * 8 + 4], 1.0 / 12.0, 1e-12);
+    assert_near(bins[11 * 8 + 7], 2.0, 1e-12);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(levels_and_area_of_a_normal),
+        cmocka_unit_test(a_region_may_have_two_parts),
+        cmocka_unit_test(a_point_mass_and_no_mass),
+        cmocka_unit_test(bins_share_a_bump_by_overlap),
+        cmocka_unit_test(bins_keep_what_is_outside_and_all_headings),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
