@@ -9,8 +9,10 @@ static const double FINEST_STEP_M = 0.001;
 
 static struct nav_model texture_model(const struct nav_arena *arena, const struct nav_settings *settings)
 {
-    return (struct nav_model){
+    struct nav_model m = {
         .fill = nav_mm_texture, .settings = settings, .values = arena->classes, .codes = arena->classes};
+    nav_mm_texture_begin(&m);
+    return m;
 }
 
 static struct nav_model radial_model(const struct nav_robot *robot, int ray, const struct nav_settings *settings,
@@ -28,8 +30,10 @@ static struct nav_model radial_model(const struct nav_robot *robot, int ray, con
 static int make_tables(struct nav_likelihood *l)
 {
     for (int w = 0; w < l->whiskers; w++) {
-        l->table[w] = calloc((size_t)l->model[w].codes, sizeof **l->table);
-        if (!l->table[w])
+        size_t codes = (size_t)l->model[w].codes;
+        l->table[w] = calloc(codes, sizeof **l->table);
+        l->alone[w] = calloc(codes, sizeof **l->alone);
+        if (!l->table[w] || !l->alone[w] || nav_trust_init(&l->trust[w], (int)codes))
             return -1;
     }
     return 0;
@@ -45,38 +49,62 @@ struct nav_likelihood *nav_likelihood_new(const struct nav_arena *arena, const s
     l->whiskers = robot->tips + robot->rays;
     l->model = calloc((size_t)l->whiskers + 1, sizeof *l->model);
     l->table = calloc((size_t)l->whiskers + 1, sizeof *l->table);
+    l->alone = calloc((size_t)l->whiskers + 1, sizeof *l->alone);
+    l->weight = calloc((size_t)l->whiskers + 1, sizeof *l->weight);
+    l->trust = calloc((size_t)l->whiskers + 1, sizeof *l->trust);
     for (int w = 0; l->model && w < l->whiskers; w++)
         l->model[w] = w < l->tips ? texture_model(arena, settings) : radial_model(robot, w - l->tips, settings, blur_m);
-    if (!l->model || !l->table || make_tables(l)) {
+    if (!l->model || !l->table || !l->alone || !l->weight || !l->trust || make_tables(l)) {
         nav_likelihood_free(l);
         return NULL;
     }
     return l;
 }
 
+static void free_tables(float **tables, int count)
+{
+    for (int w = 0; tables && w < count; w++)
+        free(tables[w]);
+    free(tables);
+}
+
 void nav_likelihood_free(struct nav_likelihood *l)
 {
     if (!l)
         return;
-    for (int w = 0; l->table && w < l->whiskers; w++)
-        free(l->table[w]);
-    free(l->table);
+    for (int w = 0; l->trust && w < l->whiskers; w++)
+        nav_trust_free(&l->trust[w]);
+    free_tables(l->table, l->whiskers);
+    free_tables(l->alone, l->whiskers);
+    free(l->trust);
+    free(l->weight);
     free(l->model);
     free(l);
+}
+
+static void read_whisker(struct nav_likelihood *l, int w, const double *reading)
+{
+    struct nav_model *model = &l->model[w];
+    double trust = l->trust[w].working;
+    if (w < l->tips)
+        nav_mm_texture_watch(model, reading);
+    model->fill(model, reading, l->alone[w]);
+    for (int k = 0; k < model->codes; k++)
+        l->table[w][k] = (float)(l->weight[w] * log(trust * exp((double)l->alone[w][k]) + 1.0 - trust));
 }
 
 void nav_likelihood_read(struct nav_likelihood *l, const struct nav_evidence *evidence)
 {
     for (int w = 0; w < l->whiskers; w++) {
-        const struct nav_model *model = &l->model[w];
-        if (evidence->weight[w] > 0.0)
-            model->fill(model, evidence->reading[w], evidence->weight[w], l->table[w]);
+        l->weight[w] = evidence->weight[w];
+        if (l->weight[w] > 0.0)
+            read_whisker(l, w, evidence->reading[w]);
         else
-            memset(l->table[w], 0, (size_t)model->codes * sizeof **l->table);
+            memset(l->table[w], 0, (size_t)l->model[w].codes * sizeof **l->table);
     }
 }
 
-static uint8_t range_code(const struct nav_model *model, double range)
+uint8_t nav_likelihood_range_code(const struct nav_model *model, double range)
 {
     double code = range / model->step;
     return (uint8_t)(code < model->codes - 1 ? (int)code : model->codes - 1);
@@ -95,9 +123,9 @@ void nav_likelihood_expect(const struct nav_likelihood *l, const struct nav_aren
         const struct nav_ray *ray = &robot->ray[r];
         const struct nav_model *model = &l->model[l->tips + r];
         double reach = (model->codes - 1) * model->step;
-        codes[l->tips + r] =
-            range_code(model, nav_arena_range(arena, pose.x + c * ray->x - s * ray->y, pose.y + s * ray->x + c * ray->y,
-                                              pose.theta + ray->yaw, reach));
+        codes[l->tips + r] = nav_likelihood_range_code(model, nav_arena_range(arena, pose.x + c * ray->x - s * ray->y,
+                                                                              pose.y + s * ray->x + c * ray->y,
+                                                                              pose.theta + ray->yaw, reach));
     }
 }
 

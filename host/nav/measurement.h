@@ -11,22 +11,32 @@
 
 struct nav_model;
 
-/* Fills loglik[model->codes] with weight * log p(reading | code). reading: model->values doubles, finite; for an object
- * whisker in m, INFINITY for "no contact". weight: 0 (known already) to 1 (new). A common constant is left out. */
-typedef void nav_measurement(const struct nav_model *, const double *reading, double weight, float *loglik);
+/* Fills loglik[model->codes] with log p(reading | code) - log p(reading | whisker broken). Above 0 a reading speaks for
+ * a code, and for a whisker that works. reading: model->values doubles, finite; for an object whisker in m, INFINITY
+ * for "no contact". A broken whisker is taken to say any class, any distance, or for ever nothing. */
+typedef void nav_measurement(const struct nav_model *, const double *reading, float *loglik);
 
 struct nav_model {
     nav_measurement *fill;
     const struct nav_settings *settings;
-    int values;    /* doubles per reading */
-    int codes;     /* at most 256 */
-    double length; /* object whiskers: m */
-    double step;   /* m per code; code k stands for a contact at (k + 1/2) steps */
-    double sigma;  /* m, of a measured distance, the spread of a pose's cell included */
-    double edge;   /* m, of the end of reach, likewise */
+    int values;      /* doubles per reading */
+    int codes;       /* at most 256 */
+    double length;   /* object whiskers: m */
+    double step;     /* m per code; code k stands for a contact at (k + 1/2) steps */
+    double sigma;    /* m, of a measured distance, the spread of a pose's cell included */
+    double edge;     /* m, of the end of reach, likewise */
+    double temper;   /* texture whiskers: exponent on a window's likelihood */
+    double gap;      /* running median of log-likelihood between best class and second, 0: none seen */
+    double accuracy; /* share of windows whose best class is right, as far as is known */
 };
 
 nav_measurement nav_mm_texture; /* eq. 1's log-likelihoods, tempered, with an outlier floor */
 nav_measurement nav_mm_radial;  /* Gaussian distance, misses, ghosts, null contacts */
+
+/* Before a texture whisker's first window. */
+void nav_mm_texture_begin(struct nav_model *);
+
+/* Notes a window's spread and sets the temper for it. A fixed temper (setting above 0) stays as it is. */
+void nav_mm_texture_watch(struct nav_model *, const double *reading);
 
 #endif

@@ -1,5 +1,6 @@
 /* Contact distances: noticed with a probability that falls off around the whisker's length, then Gaussian (the paper);
- * ghosts are spread evenly over the whisker; "no contact" is what is left over. */
+ * ghosts are spread evenly over the whisker; "no contact" is what is left over. A broken whisker's distances are taken
+ * as ghosts are, 1 / length, and its silence as certain. */
 #include "measurement.h"
 
 #include <math.h>
@@ -20,7 +21,7 @@ static double density(const struct nav_model *model, double difference)
     return exp(-0.5 * z * z) / (model->sigma * sqrt(8.0 * atan(1.0)));
 }
 
-void nav_mm_radial(const struct nav_model *model, const double *reading, double weight, float *loglik)
+void nav_mm_radial(const struct nav_model *model, const double *reading, float *loglik)
 {
     double ghost = model->settings->radial_ghost;
     for (int k = 0; k < model->codes; k++) {
@@ -28,7 +29,7 @@ void nav_mm_radial(const struct nav_model *model, const double *reading, double 
         double hit = k == model->codes - 1 ? 0.0 : noticed(model, distance);
         double p = (1.0 - hit) * (1.0 - ghost);
         if (isfinite(reading[0]))
-            p = hit * density(model, reading[0] - distance) + (1.0 - hit) * ghost / model->length;
-        loglik[k] = (float)(weight * log(fmax(p, LEAST)));
+            p = model->length * hit * density(model, reading[0] - distance) + (1.0 - hit) * ghost;
+        loglik[k] = (float)log(fmax(p, LEAST));
     }
 }

@@ -15,7 +15,7 @@ struct entry {
     }
 
 static const struct entry ENTRIES[] = {
-    ENTRY(texture, temper, 0.05, 0.0, 1.0),     ENTRY(texture, outlier, 0.2, 0.0, 1.0),
+    ENTRY(texture, temper, 0.0, 0.0, 1.0),     ENTRY(texture, outlier, 0.2, 0.0, 1.0),
     ENTRY(texture, spacing_m, 0.03, 0.0, 1.0),  ENTRY(radial, miss, 0.1, 0.0, 1.0),
     ENTRY(radial, ghost, 0.01, 0.0, 1.0),       ENTRY(radial, edge_m, 0.006, 0.0001, 0.1),
     ENTRY(radial, spacing_m, 0.02, 0.0, 1.0),   ENTRY(motion, along_m, 0.3, 0.0, 10.0),

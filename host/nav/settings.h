@@ -4,7 +4,7 @@
 
 /* cffi: begin */
 struct nav_settings {
-    double texture_temper;    /* exponent on a window's likelihood: its samples are far from independent */
+    double texture_temper;    /* exponent on a window's likelihood; 0: estimated from the windows (mm_texture.c) */
     double texture_outlier;   /* share of windows that say nothing about the tile (borders, catches) */
     double texture_spacing_m; /* a window counts in full after the tip has moved so far since the last one */
     double radial_miss;       /* share of contacts that are not noticed */

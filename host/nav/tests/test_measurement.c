@@ -20,26 +20,26 @@ static void texture_is_tempered_and_floored(void **state)
 {
     (void)state;
     struct nav_settings s = settings();
-    const struct nav_model m = {.fill = nav_mm_texture, .settings = &s, .values = 2, .codes = 2};
+    struct nav_model m = {.fill = nav_mm_texture, .settings = &s, .values = 2, .codes = 2};
+    nav_mm_texture_begin(&m);
     const double loglik[] = {-500.0, -520.0};
     float out[2];
-    m.fill(&m, loglik, 1.0, out);
-    /* softmax(0, -1) = 0.7310586, 0.2689414; p = 0.8 share + 0.1. */
-    assert_near((double)out[0], log(0.8 * 0.7310586 + 0.1), 1e-6);
-    assert_near((double)out[1], log(0.8 * 0.2689414 + 0.1), 1e-6);
-    m.fill(&m, loglik, 0.5, out);
-    assert_near((double)out[0], 0.5 * log(0.8 * 0.7310586 + 0.1), 1e-6);
+    m.fill(&m, loglik, out);
+    /* softmax(0, -1) = 0.7310586, 0.2689414; p = 0.8 share + 0.1; a broken whisker would say either with 1/2. */
+    assert_near((double)out[0], log(2.0 * (0.8 * 0.7310586 + 0.1)), 1e-6);
+    assert_near((double)out[1], log(2.0 * (0.8 * 0.2689414 + 0.1)), 1e-6);
 }
 
 static void however_sure_a_window_is_the_floor_remains(void **state)
 {
     (void)state;
     struct nav_settings s = settings();
-    const struct nav_model m = {.fill = nav_mm_texture, .settings = &s, .values = 3, .codes = 3};
+    struct nav_model m = {.fill = nav_mm_texture, .settings = &s, .values = 3, .codes = 3};
+    nav_mm_texture_begin(&m);
     const double loglik[] = {0.0, -1e6, -1e6};
     float out[3];
-    m.fill(&m, loglik, 1.0, out);
-    assert_near((double)out[2], log(0.2 / 3.0), 1e-6);
+    m.fill(&m, loglik, out);
+    assert_near((double)out[2], log(0.2), 1e-6);
 }
 
 /* A whisker of 0.1 m in steps of 1 cm up to 0.12 m, code 12: nothing. */
@@ -60,11 +60,11 @@ static void a_measured_distance_is_gaussian_on_a_floor_of_ghosts(void **state)
     (void)state;
     struct nav_settings s = settings();
     const struct nav_model m = whisker(&s);
-    const double reading = 0.045, peak = 1.0 / (0.01 * sqrt(2.0 * NAV_PI)), ghost = 0.01 / 0.1;
+    const double reading = 0.045, peak = 1.0 / (0.01 * sqrt(2.0 * NAV_PI)), ghost = 0.01, length = 0.1;
     float out[13];
-    m.fill(&m, &reading, 1.0, out);
-    assert_near((double)out[4], log(0.9 * peak + 0.1 * ghost), 1e-4);
-    assert_near((double)out[6], log(0.9 * 0.9997674 * peak * exp(-2.0) + 0.1 * ghost), 1e-4);
+    m.fill(&m, &reading, out);
+    assert_near((double)out[4], log(length * 0.9 * peak + 0.1 * ghost), 1e-4);
+    assert_near((double)out[6], log(length * 0.9 * 0.9997674 * peak * exp(-2.0) + 0.1 * ghost), 1e-4);
     assert_near((double)out[12], log(ghost), 1e-5);
 }
 
@@ -75,7 +75,7 @@ static void no_contact_is_strong_evidence_deep_in_a_wall_and_weak_at_the_tip(voi
     const struct nav_model m = whisker(&s);
     const double nothing = (double)INFINITY;
     float out[13];
-    m.fill(&m, &nothing, 1.0, out);
+    m.fill(&m, &nothing, out);
     assert_near((double)out[4], log((1.0 - 0.9) * 0.99), 1e-4);
     assert_near((double)out[12], log(0.99), 1e-5);
     /* Codes 9 and 10 lie half a step on either side of the tip: noticed with 0.9 Phi(+-0.5). */
@@ -123,8 +123,12 @@ static void whiskers_add_and_those_not_read_say_nothing(void **state)
     nav_likelihood_read(l, &(struct nav_evidence){reading, one});
     float texture_only = nav_likelihood_of(l, codes);
     float table[256];
-    l->model[1].fill(&l->model[1], &distance, 1.0, table);
-    assert_near((double)all, (double)(texture_only + table[codes[1]]), 1e-6);
+    l->model[1].fill(&l->model[1], &distance, table);
+    double trust = l->trust[1].working, radial = log(trust * exp((double)table[codes[1]]) + 1.0 - trust);
+    assert_near((double)all, (double)texture_only + radial, 1e-5);
+    const double half[] = {0.0, 0.5};
+    nav_likelihood_read(l, &(struct nav_evidence){reading, half});
+    assert_near((double)nav_likelihood_of(l, codes), 0.5 * radial, 1e-5);
     nav_likelihood_read(l, &(struct nav_evidence){reading, none});
     assert_near((double)nav_likelihood_of(l, codes), 0.0, 0.0);
     nav_likelihood_free(l);
