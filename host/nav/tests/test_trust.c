@@ -31,7 +31,7 @@ static void raw_sums_and_calibrated_scores_come_out_alike(void **state)
     struct nav_rng rng;
     nav_rng_seed(&rng, 3, 0);
     for (int i = 0; i < 200; i++) {
-        double gap = 4.5 * exp(0.5 * nav_rng_normal(&rng));
+        double gap = 8.0 * exp(0.5 * nav_rng_normal(&rng));
         assert_near(odds_after(&raw, 100.0 * gap), odds_after(&calibrated, gap), 0.3);
     }
     assert_near(raw.gap / calibrated.gap, 100.0, 1e-6);
