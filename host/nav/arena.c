@@ -37,7 +37,11 @@ static struct span across(const struct nav_box *box, double x, double y, double 
 
 double nav_arena_range(const struct nav_arena *arena, double x, double y, double heading, double reach)
 {
-    double c = cos(heading), s = sin(heading);
+    return nav_arena_range_along(arena, x, y, cos(heading), sin(heading), reach);
+}
+
+double nav_arena_range_along(const struct nav_arena *arena, double x, double y, double c, double s, double reach)
+{
     const struct nav_box walls = {0.0, 0.0, arena->size_x, arena->size_y};
     if (x <= walls.x0 || x >= walls.x1 || y <= walls.y0 || y >= walls.y1)
         return 0.0;

@@ -51,6 +51,9 @@ int nav_arena_texture(const struct nav_arena *, double x, double y);
  * itself in a box or beyond a wall. */
 double nav_arena_range(const struct nav_arena *, double x, double y, double heading, double reach);
 
+/* The same along the unit vector (c, s). */
+double nav_arena_range_along(const struct nav_arena *, double x, double y, double c, double s, double reach);
+
 /* Whether a round body centred on (x, y) stands clear of walls and boxes. */
 bool nav_arena_free(const struct nav_arena *, double x, double y, double radius);
 /* cffi: end */

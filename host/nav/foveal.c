@@ -6,23 +6,21 @@
 
 #include "filter.h"
 #include "gaussian.h"
-#include "likelihood.h"
+#include "probe.h"
 
 struct foveal {
     const struct nav_problem *problem;
-    struct nav_likelihood *likelihood;
+    struct nav_probe probe;
     struct nav_gaussian belief;
     int cells;                     /* per axis */
     double spacing, spacing_theta; /* m, rad */
-    uint8_t *codes;                /* [whiskers] */
     double *weight;                /* [cells^3] log posterior, then posterior */
 };
 
 static void destroy(void *self)
 {
     struct foveal *f = self;
-    nav_likelihood_free(f->likelihood);
-    free(f->codes);
+    nav_probe_free(&f->probe);
     free(f->weight);
     free(f);
 }
@@ -43,10 +41,8 @@ static void *create(const struct nav_problem *problem)
     f->cells = (int)settings->foveal_cells;
     f->spacing = settings->foveal_diameter_m / (f->cells - 1);
     f->spacing_theta = settings->foveal_span_deg * NAV_PI / 180.0 / (f->cells - 1);
-    f->likelihood = nav_likelihood_new(&problem->arena, &problem->robot, settings, f->spacing / sqrt(12.0));
-    f->codes = calloc((size_t)(problem->robot.tips + problem->robot.rays) + 1, 1);
     f->weight = calloc(points(f), sizeof *f->weight);
-    if (!f->likelihood || !f->codes || !f->weight) {
+    if (nav_probe_init(&f->probe, problem, f->spacing / sqrt(12.0)) || !f->weight) {
         destroy(f);
         return NULL;
     }
@@ -60,20 +56,19 @@ static void predict(void *self, const struct nav_motion *motion)
     nav_gaussian_move(&f->belief, motion->step, &noise);
 }
 
-/* Pose of a grid point: egocentric offsets from the prior mode, number `index` with the heading running fastest. */
-static struct nav_pose point(const struct foveal *f, size_t index)
+/* Offset of step i from the middle of an axis. */
+static int from_middle(const struct foveal *f, size_t i)
 {
-    int n = f->cells, half = (n - 1) / 2;
-    int k = (int)(index % (size_t)n) - half, j = (int)(index / (size_t)n % (size_t)n) - half;
-    int i = (int)(index / (size_t)(n * n)) - half;
-    return nav_compose(f->belief.mean, (struct nav_pose){i * f->spacing, j * f->spacing, k * f->spacing_theta});
+    return (int)(i % (size_t)f->cells) - (f->cells - 1) / 2;
 }
 
-static void difference(const struct foveal *f, struct nav_pose pose, double d[3])
+/* Pose of a grid point: egocentric offsets from the prior mode, number `index` with the heading running slowest. */
+static struct nav_pose point(const struct foveal *f, size_t index)
 {
-    d[0] = pose.x - f->belief.mean.x;
-    d[1] = pose.y - f->belief.mean.y;
-    d[2] = nav_wrap(pose.theta - f->belief.mean.theta);
+    size_t n = (size_t)f->cells;
+    return nav_compose(f->belief.mean,
+                       (struct nav_pose){from_middle(f, index / n) * f->spacing, from_middle(f, index) * f->spacing,
+                                         from_middle(f, index / n / n) * f->spacing_theta});
 }
 
 static double log_prior(const double information[9], const double d[3])
@@ -86,25 +81,26 @@ static double log_prior(const double information[9], const double d[3])
     return -0.5 * sum;
 }
 
-/* Equation 5 at one grid point, as a logarithm; -INFINITY where the robot cannot be. */
-static double log_posterior(struct foveal *f, const double information[9], struct nav_pose pose)
+/* Equation 5 over one slice of the grid, as logarithms; -INFINITY where the robot cannot be. */
+static void weigh_slice(struct foveal *f, const double information[9], size_t slice)
 {
-    const struct nav_arena *arena = &f->problem->arena;
-    const struct nav_robot *robot = &f->problem->robot;
-    double d[3];
-    if (!nav_arena_free(arena, pose.x, pose.y, robot->body_radius))
-        return -INFINITY;
-    difference(f, pose, d);
-    nav_likelihood_expect(f->likelihood, arena, robot, pose, f->codes);
-    return log_prior(information, d) + (double)nav_likelihood_of(f->likelihood, f->codes);
+    size_t each = (size_t)f->cells * (size_t)f->cells;
+    double c = cos(point(f, slice * each).theta), s = sin(point(f, slice * each).theta);
+    for (size_t p = slice * each; p < (slice + 1) * each; p++) {
+        struct nav_pose pose = point(f, p);
+        const double d[3] = {pose.x - f->belief.mean.x, pose.y - f->belief.mean.y,
+                             from_middle(f, slice) * f->spacing_theta};
+        f->weight[p] = log_prior(information, d) + nav_probe_at(&f->probe, pose.x, pose.y, c, s);
+    }
 }
 
 /* Fills the weights; returns the mode's index, or -1 when no point is free. */
 static long weigh(struct foveal *f, const double information[9])
 {
     long mode = -1;
+    for (size_t slice = 0; slice < (size_t)f->cells; slice++)
+        weigh_slice(f, information, slice);
     for (size_t p = 0; p < points(f); p++) {
-        f->weight[p] = log_posterior(f, information, point(f, p));
         if (f->weight[p] > (mode < 0 ? -INFINITY : f->weight[mode]))
             mode = (long)p;
     }
@@ -118,7 +114,26 @@ static long weigh(struct foveal *f, const double information[9])
     return mode;
 }
 
-/* Equations 6 and 7: the mode, and the covariance about it, with the quantisation term. */
+/* The covariance of the fovea's own points about its centre: what the paper's shortcut puts in place of equation 7. */
+static void inflate(const struct foveal *f, struct nav_gaussian *g)
+{
+    double steps = ((double)f->cells * f->cells - 1.0) / 12.0; /* variance of 1 .. n */
+    *g = (struct nav_gaussian){.mean = g->mean};
+    g->covariance[0] = g->covariance[4] = steps * f->spacing * f->spacing;
+    g->covariance[8] = steps * f->spacing_theta * f->spacing_theta;
+}
+
+/* Adds the quantisation term. */
+static void add_quantum(const struct nav_settings *settings, struct nav_gaussian *g)
+{
+    double quantum_rad = settings->foveal_quantum_deg * NAV_PI / 180.0;
+    g->covariance[0] += settings->foveal_quantum_m * settings->foveal_quantum_m;
+    g->covariance[4] += settings->foveal_quantum_m * settings->foveal_quantum_m;
+    g->covariance[8] += quantum_rad * quantum_rad;
+}
+
+/* Equations 6 and 7: the mode, and the covariance about it. As printed the sum has no weights: 1331 points count alike,
+ * and the readings matter only through which point is the mode. */
 static void fit(struct foveal *f, long mode)
 {
     const struct nav_settings *settings = &f->problem->settings;
@@ -126,13 +141,13 @@ static void fit(struct foveal *f, long mode)
     for (size_t p = 0; p < points(f); p++) {
         struct nav_pose pose = point(f, p);
         double d[3] = {pose.x - fitted.mean.x, pose.y - fitted.mean.y, nav_wrap(pose.theta - fitted.mean.theta)};
+        double weight = settings->foveal_printed > 0.0 ? 1.0 : f->weight[p];
         for (int a = 0; a < 9; a++)
-            fitted.covariance[a] += f->weight[p] * d[a / 3] * d[a % 3];
+            fitted.covariance[a] += weight * d[a / 3] * d[a % 3];
     }
-    double quantum_rad = settings->foveal_quantum_deg * NAV_PI / 180.0;
-    fitted.covariance[0] += settings->foveal_quantum_m * settings->foveal_quantum_m;
-    fitted.covariance[4] += settings->foveal_quantum_m * settings->foveal_quantum_m;
-    fitted.covariance[8] += quantum_rad * quantum_rad;
+    if (settings->foveal_inflate > 0.0)
+        inflate(f, &fitted);
+    add_quantum(settings, &fitted);
     fitted.mean.theta = nav_wrap(fitted.mean.theta);
     f->belief = fitted;
 }
@@ -143,7 +158,7 @@ static void update(void *self, const struct nav_evidence *evidence)
     double information[9];
     if (!nav_gaussian_invert(f->belief.covariance, information))
         return;
-    nav_likelihood_read(f->likelihood, evidence);
+    nav_probe_read(&f->probe, evidence);
     long mode = weigh(f, information);
     if (mode >= 0)
         fit(f, mode);
@@ -155,7 +170,7 @@ static void estimate(const void *self, struct nav_estimate *out)
     nav_gaussian_estimate(&f->belief, out);
     out->evaluations = out->distinct = out->touched = (long)points(f);
     out->states = (long)points(f);
-    out->bytes = sizeof *f + points(f) * sizeof *f->weight;
+    out->bytes = sizeof *f + points(f) * sizeof *f->weight + nav_probe_bytes(&f->probe);
 }
 
 static long components(const void *self, struct nav_component *out, long room)

@@ -24,6 +24,17 @@ struct nav_settings {
     double foveal_span_deg;   /* between the outermost headings (paper: -45 to 45) */
     double foveal_quantum_m;  /* quantisation term added to each posterior covariance, standard deviations */
     double foveal_quantum_deg;
+    double foveal_printed;         /* 1: equation 7 as printed, without weights */
+    double foveal_inflate;         /* 1: every posterior covariance is blown up to the fovea's (the paper's shortcut) */
+    double particle_count;         /* how many; 0: as many as the belief's spread asks for (KLD), between */
+    double particle_least;         /* this */
+    double particle_most;          /* and this */
+    double particle_error;         /* of that belief, Kullback-Leibler divergence exceeded once in a hundred rows, */
+    double particle_bin_m;         /* in bins of this edge */
+    double particle_bin_deg;       /* and this extent in heading */
+    double particle_resample;      /* resamples when the effective share of the particles falls below this */
+    double particle_recovery;      /* slow rate at which the mean weight is followed; 0: no recovery by injection */
+    double particle_recovery_fast; /* fast rate */
 };
 
 /* The defaults. */
