@@ -157,7 +157,7 @@ def write_rows(path: Path, rows: list[dict], truth: list[dict]) -> None:
 def _judge(scene, observations: localise.Observations, name: str, settings: dict) -> dict:
     run = localise.run(name, scene, observations, settings)
     return {
-        "error_median_m": localise.errors(run.estimates, observations.truth)["pose_error_median_m"],
+        "error_median_m": localise.pose_errors(run.poses, observations.truth)["pose_error_median_m"],
         "step_us_mean": float(np.mean(run.step_us)),
         "step_us_p99": float(np.percentile(run.step_us, 99)),
         "share_of_row": float(np.mean(run.step_us) * 1e-6 / ROW_S),

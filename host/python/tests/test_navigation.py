@@ -18,7 +18,7 @@ def results():
     for seed in SEEDS:
         scene, observations = level0.record(seed)
         for name, rows in figures.items():
-            result = localise.run(name, scene, observations)
+            result = localise.run(name, scene, observations, regions=60)
             rows.append(localise.summary(result, observations.truth))
     for name, rows in figures.items():
         medians = " ".join(f"{row['pose_error_median_m']:.3f}" for row in rows)

@@ -231,8 +231,8 @@ def _arena(table: _Table) -> Arena:
         entry.done()
         if not (low[0] < high[0] and low[1] < high[1]):
             raise entry.fail("max_m", "must be larger than min_m in x and y")
-        if min(low) < 0.0 or high[0] > size[0] or high[1] > size[1]:
-            raise entry.fail("min_m" if min(low) < 0.0 else "max_m", "is outside the arena; move the obstacle inside")
+        if min(low) < -TINY or high[0] > size[0] + TINY or high[1] > size[1] + TINY:
+            raise entry.fail("min_m" if min(low) < -TINY else "max_m", "is outside the arena; move the obstacle inside")
         boxes.append((*low, *high))
     table.done()
     return Arena(size, tile, textures, floor, tuple(boxes))

@@ -7,13 +7,15 @@ from .. import localise
 from ..localise import SettingError
 from ..scene import PRIOR, SceneError, load
 
-EXAMPLE = "whisker localise scenes/paper --filter grid --set grid.cell_m=0.05 --out est.csv --json"
+EXAMPLE = "whisker localise scenes/paper --filter grid --set grid.cell_m=0.1 --out est.csv --json"
 
 
 def add(parser) -> None:
     parser.add_argument("scene", nargs="?", help="folder with arena.toml, robot.toml, prior.toml, observations.csv")
-    parser.add_argument("--filter", default="grid", metavar="NAME", help="one of --list-filters (default: %(default)s)")
-    parser.add_argument("--seed", type=int, default=0, help="for filters that use chance; those of today do not")
+    parser.add_argument(
+        "--filter", default=localise.default_filter(), metavar="NAME", help="see --list-filters (default: %(default)s)"
+    )
+    parser.add_argument("--seed", type=int, default=0, help="of every random draw (default: %(default)s)")
     parser.add_argument(
         "--set", action="append", default=[], metavar="KEY=VALUE", help="change a setting, see --list-settings"
     )
@@ -42,7 +44,8 @@ def run(arguments) -> int:
     for warning in scene.warnings():
         print(f"whisker: warning: {warning}", file=sys.stderr)
     observations = localise.read_observations(localise.observations_path(arguments.scene), scene)
-    result = localise.run(arguments.filter, scene, observations, _settings(arguments.set))
+    settings, regions = _settings(arguments.set), localise.REGION_ROWS
+    result = localise.run(arguments.filter, scene, observations, settings, arguments.seed, regions)
     if arguments.out:
         localise.write_estimates(arguments.out, result, observations)
     summary = localise.summary(result, observations.truth)

@@ -1,7 +1,7 @@
 """`whisker scene`: draws level-0 scenes of a family (whisker.scenes)."""
 
 from .. import scenes
-from ..localise import SettingError
+from ..filters import SettingError
 from ..tables import unwritable
 from . import add_action
 

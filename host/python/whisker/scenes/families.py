@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..errors import UserError
-from ..localise import Observations
+from ..observations import Observations
 from ..scene import Arena, Prior, Robot, Scene
 from . import arenas, robots, walk
 from .files import rounded

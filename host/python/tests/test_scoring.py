@@ -1,0 +1,29 @@
+"""Figures whose answers are known by hand."""
+
+import numpy as np
+import pytest
+
+from whisker import scoring
+
+
+def test_lock_is_the_first_hundred_near_rows_kept_to_the_end():
+    far, near = np.full(30, 0.2), np.full(100, 0.1)
+    assert scoring.lock_row(np.concatenate([far, near])) == 30
+    assert scoring.lock_row(np.concatenate([near[:99], far, near, near])) == 129
+    assert scoring.lock_row(np.concatenate([near, near, far])) is None
+    assert scoring.lock_row(near[:99]) is None
+
+
+def test_pose_errors_skip_rows_without_truth_and_wrap_headings():
+    poses = np.array([[0.0, 0.0, 3.1], [3.0, 4.0, 0.0], [9.0, 9.0, 9.0]])
+    truth = np.array([[0.0, 0.0, -3.1], [0.0, 0.0, 0.0], [np.nan, 0.0, 0.0]])
+    out = scoring.pose_errors(poses, truth)
+    assert out["pose_error_median_m"] == 2.5
+    assert out["heading_error_median_rad"] == pytest.approx((2 * np.pi - 6.2) / 2)
+
+
+def test_auc_counts_pairs_in_order_and_ties_by_half():
+    score, event = np.array([0.1, 0.4, 0.4, 0.8]), np.array([False, False, True, True])
+    assert scoring.auc(score, event) == pytest.approx(3.5 / 4)
+    assert scoring.auc(-score, event) == pytest.approx(0.5 / 4)
+    assert scoring.auc(score, np.ones(4, bool)) is None
