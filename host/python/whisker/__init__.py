@@ -1,1 +1,3 @@
-"""Whiskered robots from Python: the wire format, the shared ring, tactile perception and localisation."""
+"""Whiskered robots from Python: the wire format, the shared ring, recordings, tactile perception and localisation."""
+
+__version__ = "0.1.0"

@@ -11,6 +11,9 @@ from .errors import UserError
 
 # name (its module has underscores for dashes): what it does
 COMMANDS = {
+    "record": "write a ring to an MCAP file",
+    "replay": "feed a ring from a recording, as the device would",
+    "stream": "print frames as CSV or JSON lines",
     "localise": "where the robot was, row by row of a scene folder",
     "scene": "make scene folders for localise",
     "texture": "learn and tell floor surfaces",

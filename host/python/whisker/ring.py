@@ -171,6 +171,20 @@ class Reader:
         """Leave `count` frames of the last peek behind; RingError OVERRUN if they may have changed while in use."""
         check(lib.whisker_reader_advance(self._reader, count), self.name)
 
+    def take(self, wait_s: float | None = 10.0) -> np.ndarray | None:
+        """Copies of all new frames, known to be whole; an empty array after `wait_s` without any, None once the ring
+        is closed and read to its end. RingError as from `wait` and `peek`.
+        """
+        try:
+            self.wait(wait_s)
+        except RingError as error:
+            if error.name in ("TIMEOUT", "CLOSED"):
+                return np.empty(0, FRAME) if error.name == "TIMEOUT" else None
+            raise
+        frames = self.peek().copy()
+        self.advance(len(frames))
+        return frames
+
     def seek_latest(self, count: int) -> None:
         """Go to where at most the newest `count` frames are still to be read. Never goes back."""
         lib.whisker_reader_seek_latest(self._reader, count)

@@ -1,0 +1,39 @@
+"""`whisker record`: from a ring to an MCAP file (whisker.recording)."""
+
+from ..protocol import LIMITS
+from ..recording.recorder import describe, record
+from ..recording.writing import RecordingWriter
+from ..ring import Reader
+from ..scene import load
+from . import add_ring, number_above, stop_on_signals, whole_number
+
+EXAMPLE = "whisker record drive.mcap --seconds 60"
+
+
+def add(parser) -> None:
+    parser.add_argument("file", metavar="FILE.MCAP")
+    add_ring(parser)
+    parser.add_argument("--frames", type=whole_number(1), metavar="N", help="stop after so many frames")
+    parser.add_argument("--seconds", type=number_above(0.0), metavar="S", help="stop after so many seconds of frames")
+    parser.add_argument("--scene", help="scene folder whose robot.toml names the lanes, lane 0 first")
+    parser.add_argument("--overwrite", action="store_true", help="replace FILE.MCAP if it exists")
+    parser.set_defaults(run=run)
+
+
+def run(arguments) -> int:
+    names = [whisker.name for whisker in load(arguments.scene).robot.whiskers] if arguments.scene else []
+    stop = stop_on_signals()
+    with Reader(arguments.ring, arguments.wait) as reader:
+        writer = RecordingWriter(arguments.file, describe(reader), names, arguments.overwrite)
+        tally = record(reader, writer, stop, _frames(arguments, reader))
+    lost = tally.missing + tally.overrun
+    print(f"{arguments.file}: {tally.frames} frames, {lost} lost, {int(tally.records_bad.sum())} bad samples")
+    return 0
+
+
+def _frames(arguments, reader: Reader) -> int | None:
+    """The limit in frames: the smaller of --frames and --seconds; None: none."""
+    stats = reader.stats
+    period = stats.tick_period if stats and stats.tick_period else LIMITS["tick_period"]
+    by_time = None if arguments.seconds is None else max(1, round(arguments.seconds * LIMITS["clock_hz"] / period))
+    return min((limit for limit in (arguments.frames, by_time) if limit is not None), default=None)
