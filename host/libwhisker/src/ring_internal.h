@@ -2,6 +2,8 @@
 #ifndef WHISKER_RING_INTERNAL_H
 #define WHISKER_RING_INTERNAL_H
 
+#include <time.h>
+
 #include "ring_map.h"
 #include "whisker/ring.h"
 
@@ -10,6 +12,8 @@ struct whisker_ring {
     char path[RING_PATH_BYTES];
     uint64_t head; /* own copies of what the header publishes */
     uint64_t claim;
+    struct timespec asked; /* when the kernel was last asked whether readers wait */
+    bool readers_wait;     /* its answer */
 };
 
 struct whisker_reader {
@@ -18,11 +22,16 @@ struct whisker_reader {
     uint64_t generation;
     uint64_t position;
     uint64_t peeked; /* frames the last peek gave */
+    uint64_t window; /* index of the first frame of the last window */
     uint64_t overruns;
     uint64_t frames_overrun;
     uint64_t frames_missing;
-    uint32_t sequence; /* of the last frame left behind */
+    int64_t waits_since_ms; /* when the writer was first told that this reader waits; 0: not yet */
+    uint32_t sequence;      /* of the last frame left behind */
     bool has_sequence;
 };
+
+/* Maps the ring at this path, or WRITER_DEAD and what ring_map_existing may return. */
+int ring_map_living(const char *path, struct ring_map *map);
 
 #endif

@@ -19,7 +19,7 @@
  * Frame i lies at index i mod capacity. The protocol, and why each fence is where it is: docs/ring.md.
  * Writer: claim = head + n | fence | write n frames | head += n, release | signal, wake.
  * Reader: head, acquire | use frames below it | fence | claim: frame i was intact if claim - i <= capacity.
- * Locks of the file (open file description): byte 0, for writing: a writer lives; byte 1, for reading: readers wait.
+ * Locks of the file: ring_file.h.
  */
 #ifndef WHISKER_RING_LAYOUT_H
 #define WHISKER_RING_LAYOUT_H
@@ -36,9 +36,6 @@
 #define RING_LAYOUT_VERSION 2u
 #define RING_CAPACITY_MIN 64u
 #define RING_CAPACITY_MAX (UINT32_C(1) << 20)
-
-#define RING_LOCK_WRITER 0
-#define RING_LOCK_WAITING 1
 
 enum ring_state { RING_OPEN = 1, RING_CLOSED = 2 };
 

@@ -1,52 +1,11 @@
-#include <errno.h>
-#include <fcntl.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/mman.h>
-#include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
 
 #include "futex.h"
 #include "ring_internal.h"
 #include "whisker/errors.h"
-
-/* Removes what a dead writer left. RING_BUSY: it is not dead. 0 also when another process was faster: try again. */
-static int remove_stale(const char *path)
-{
-    const int fd = shm_open(path, O_RDWR | O_CLOEXEC, 0);
-    if (fd < 0) {
-        return errno == ENOENT ? WHISKER_OK : WHISKER_ERROR_SYSTEM;
-    }
-    if (!ring_lock_writer(fd)) {
-        close(fd);
-        return WHISKER_ERROR_RING_BUSY;
-    }
-    if (ring_is_named(fd, path)) { /* nobody else can remove it while we hold its lock */
-        shm_unlink(path);
-    }
-    close(fd);
-    return WHISKER_OK;
-}
-
-/* A new, empty, locked file under this name. */
-static int make_file(const char *path, int *fd)
-{
-    for (;;) {
-        *fd = shm_open(path, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, S_IRUSR | S_IWUSR | S_IRGRP | S_IROTH);
-        if (*fd >= 0) {
-            if (ring_lock_writer(*fd) && ring_is_named(*fd, path)) {
-                return WHISKER_OK;
-            }
-            close(*fd); /* another writer took it for stale before it was locked */
-            continue;
-        }
-        const int error = errno == EEXIST ? remove_stale(path) : WHISKER_ERROR_SYSTEM;
-        if (error) {
-            return error;
-        }
-    }
-}
 
 static uint64_t nanoseconds_since_boot(void)
 {
@@ -65,30 +24,27 @@ static void fill_header(const struct ring_map *map)
     header->generation = nanoseconds_since_boot();
     header->writer_pid = (uint32_t)getpid();
     ring_store(&header->state, RING_OPEN);
-    ring_store_release(&header->magic, RING_MAGIC);
+    ring_store(&header->magic, RING_MAGIC);
 }
 
-/* Memory is allotted here: a full /dev/shm shall fail now and not kill the writer at its first frame. */
+/* The file gets its name when nothing is missing, so there is no ring half made. */
 static int make_ring(const char *path, uint32_t capacity, struct ring_map *map)
 {
     int fd;
-    int error = make_file(path, &fd);
+    int error = ring_file_make(ring_file_bytes(capacity), &fd);
     if (error) {
         return error;
-    }
-    const size_t bytes = (size_t)sysconf(_SC_PAGESIZE) + capacity * sizeof(struct whisker_frame);
-    if (posix_fallocate(fd, 0, (off_t)bytes) != 0) {
-        shm_unlink(path);
-        close(fd);
-        return WHISKER_ERROR_MEMORY;
     }
     error = ring_map(fd, capacity, true, map);
     if (error) {
-        shm_unlink(path);
         return error;
     }
     fill_header(map);
-    return WHISKER_OK;
+    error = ring_file_lock(fd, RING_LOCK_WRITER) ? ring_file_name(fd, path) : WHISKER_ERROR_SYSTEM;
+    if (error) {
+        ring_unmap(map);
+    }
+    return error;
 }
 
 int whisker_ring_create(const char *name, uint32_t capacity, struct whisker_ring **ring)
@@ -127,19 +83,31 @@ static struct whisker_frame *reserve(struct whisker_ring *ring, size_t count)
     return &ring->map.frames[ring->head & (ring->map.capacity - 1)];
 }
 
-static void wake(struct ring_header *header)
+/* Asked of the kernel once per tick of its clock, for the answer costs a system call. A reader that has just begun to
+ * wait does not rely on being woken before the next tick. */
+static bool readers_wait(struct whisker_ring *ring)
 {
-    ring_signal_raise(&header->signal);
-    futex_wake_all(&header->signal);
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC_COARSE, &now);
+    if (now.tv_nsec != ring->asked.tv_nsec || now.tv_sec != ring->asked.tv_sec) {
+        ring->asked = now;
+        ring->readers_wait = ring_file_is_locked(ring->map.fd, RING_LOCK_WAITING);
+    }
+    return ring->readers_wait;
 }
 
-static void commit(struct whisker_ring *ring, size_t count)
+static int commit(struct whisker_ring *ring, size_t count)
 {
+    struct ring_header *header = ring->map.header;
     if (count > 0) {
         ring->head += count;
-        ring_store_release(&ring->map.header->head, ring->head);
-        wake(ring->map.header);
+        ring_store_release(&header->head, ring->head);
+        ring_signal_raise(&header->signal);
+        if (readers_wait(ring)) {
+            futex_wake_all(&header->signal);
+        }
     }
+    return ring_is_whole(&ring->map) ? WHISKER_OK : WHISKER_ERROR_RING_LOST;
 }
 
 int whisker_ring_publish(struct whisker_ring *ring, const struct whisker_frame *frames, size_t count)
@@ -149,8 +117,7 @@ int whisker_ring_publish(struct whisker_ring *ring, const struct whisker_frame *
         return WHISKER_ERROR_ARGUMENT;
     }
     memcpy(place, frames, count * sizeof *frames);
-    commit(ring, count);
-    return WHISKER_OK;
+    return commit(ring, count);
 }
 
 int whisker_ring_feed(struct whisker_ring *ring, struct whisker_decoder *decoder, const uint8_t *bytes, size_t count,
@@ -165,12 +132,11 @@ int whisker_ring_feed(struct whisker_ring *ring, struct whisker_decoder *decoder
     while (whisker_decoder_next(decoder, &bytes, &count, &place[decoded])) {
         decoded++;
     }
-    commit(ring, decoded);
     if (frames) {
         *frames = place;
         *made = decoded;
     }
-    return WHISKER_OK;
+    return commit(ring, decoded);
 }
 
 void whisker_ring_set_clock(struct whisker_ring *ring, const struct whisker_clock *clock)
@@ -190,11 +156,11 @@ void whisker_ring_close(struct whisker_ring *ring)
     if (!ring) {
         return;
     }
-    if (ring_is_named(ring->map.fd, ring->path)) {
-        shm_unlink(ring->path);
-    }
-    ring_store_release(&ring->map.header->state, RING_CLOSED);
-    wake(ring->map.header);
+    struct ring_header *header = ring->map.header;
+    ring_file_unname(ring->map.fd, ring->path);
+    ring_store_release(&header->state, RING_CLOSED);
+    ring_signal_raise(&header->signal);
+    futex_wake_all(&header->signal);
     ring_unmap(&ring->map);
     free(ring);
 }

@@ -7,13 +7,15 @@
     X(ARGUMENT, -1, "an argument is outside its range", "see the comment of the function")                             \
     X(MEMORY, -2, "not enough memory", "free some memory, or ask for a smaller ring")                                  \
     X(SYSTEM, -3, "the operating system refused", "see errno")                                                         \
-    X(TRUNCATED, -10, "a frame is incomplete", "read on: the rest of it has not come")                                 \
+    X(TRUNCATED, -10, "a frame is incomplete", "read on: the rest may come; check the USB cable")                      \
     X(MAGIC, -11, "a frame does not begin with its magic", "resynchronise on the next magic; check the USB cable")     \
     X(WIRE_VERSION, -12, "bridge and host speak different wire versions", "install gateware and host of one release")  \
     X(HEADER_CRC, -13, "the CRC of a frame's header is wrong", "check the USB cable")                                  \
     X(LANES, -14, "a frame has another number of lanes than this host", "install gateware and host of one release")    \
     X(RECORD_CRC, -15, "the CRC of a record in a frame is wrong", "check the USB cable")                               \
-    X(RING_NAME, -20, "the name of a ring is empty, too long, or has a slash", "use letters, digits, dash and dot")    \
+    X(RECORD_TICK, -16, "a record in a frame belongs to another tick", "install gateware and host of one release")     \
+    X(RING_NAME, -20, "the name of a ring is empty, too long, has a slash, or begins with a dot",                      \
+      "use letters, digits, dash and dot")                                                                             \
     X(RING_MISSING, -21, "there is no ring of this name", "start whiskerd with this --ring")                           \
     X(RING_BUSY, -22, "another writer holds this ring", "stop the other whiskerd, or choose another --ring")           \
     X(RING_LAYOUT, -23, "this shared memory is not a whisker ring", "choose another --ring, or remove the file")       \
@@ -23,6 +25,7 @@
     X(CLOSED, -27, "the writer closed the ring: end of stream", "none needed")                                         \
     X(WRITER_DEAD, -28, "the writer died without closing the ring", "start whiskerd again; see its log")               \
     X(RESTARTED, -29, "a new writer has made a new ring of this name", "attach again")                                 \
+    X(RING_LOST, -30, "another process has made the ring's file shorter", "start whiskerd again, attach again")        \
     X(DEVICE_MISSING, -40, "no bridge is connected", "plug it in; check its power and cable")                          \
     X(DEVICE_ACCESS, -41, "no permission to open the bridge", "install the udev rule, or ask an administrator")        \
     X(DEVICE_BUSY, -42, "another process uses the bridge", "stop the other whiskerd")                                  \
@@ -31,9 +34,10 @@
     X(DEVICE_CONTROL, -45, "the bridge's HID interface does not answer", "plug the bridge in again")                   \
     X(DEVICE_REFUSED, -46, "the bridge refused the settings", "keep every setting inside its limits")                  \
     X(DEVICE_IDENTITY, -47, "the bridge has other lanes or frames than this host",                                     \
-      "install gateware and host of one "                                                                              \
-      "release")                                                                                                       \
-    X(DEVICE_DRAIN, -48, "the bridge did not send its last frame after a stop", "plug the bridge in again")
+      "install gateware and host of one release")                                                                      \
+    X(DEVICE_DRAIN, -48, "the bridge did not send its last frame after a stop", "plug the bridge in again")            \
+    X(DEVICE_SERIAL, -49, "no bridge of this serial number is connected", "see whiskerd --list for those there are")   \
+    X(HOST_CLOCK, -50, "the host's clock was set or went backwards", "none needed; a time service avoids it")
 
 enum whisker_error {
     WHISKER_OK = 0,

@@ -4,6 +4,10 @@
  * any window of frames is one array. Frames are used where they lie: peek, use, advance; advance tells whether the
  * writer overtook the reader meanwhile, in which case what was used must be thrown away.
  *
+ * Memory: a ring's owner can make its file shorter under everybody's feet. That ends no process: from the first attach
+ * or create on, SIGBUS over a ring's memory is handled here (every other SIGBUS goes where it went before), the memory
+ * reads as zeros, and the next call says RING_LOST.
+ *
  * Threads: one handle belongs to one thread at a time. Errors: 0 or a negative code of errors.h.
  */
 #ifndef WHISKER_RING_H
@@ -46,21 +50,31 @@ void whisker_reader_detach(struct whisker_reader *reader);
 
 /*
  * Waits until there is a frame to peek (0: just looks, negative: for ever). Returns 0, TIMEOUT, or, when every frame
- * has been read: CLOSED, WRITER_DEAD, RESTARTED (a new ring has the name: see whisker_reader_reattach).
+ * has been read: CLOSED, WRITER_DEAD, RESTARTED (a new ring has the name: see whisker_reader_reattach); RING_LOST.
  */
 int whisker_reader_wait(struct whisker_reader *reader, int timeout_ms);
 
 /*
  * Gives all frames published and not yet read, oldest first, as one array inside the ring; count may be 0. Never waits.
- * Returns 0, or OVERRUN: frames were lost; the reader now stands half a ring behind the writer, peek again.
+ * Returns 0; OVERRUN: frames were lost; the reader now stands half a ring behind the writer, peek again; RING_LOST.
  */
 int whisker_reader_peek(struct whisker_reader *reader, const struct whisker_frame **frames, size_t *count);
 
 /*
  * Leaves the first `count` of the frames peeked behind. Returns 0: they were intact up to this call; OVERRUN: they may
- * have been overwritten while they were used (position as for peek); ARGUMENT: count is more than was peeked.
+ * have been overwritten while they were used (position as for peek); RING_LOST; ARGUMENT: more than was peeked.
  */
 int whisker_reader_advance(struct whisker_reader *reader, size_t count);
+
+/*
+ * Gives the newest `count` frames, oldest first, as one array inside the ring, wherever the reader stands; its position
+ * stays. Use them, then ask whisker_reader_intact. Returns how many: fewer when the ring has not had so many; or
+ * ARGUMENT: more than the capacity, RING_LOST. Never waits.
+ */
+int whisker_reader_window(struct whisker_reader *reader, size_t count, const struct whisker_frame **frames);
+
+/* Whether the last window was whole up to this call: 0; OVERRUN: what was used of it must be thrown away; RING_LOST. */
+int whisker_reader_intact(const struct whisker_reader *reader);
 
 /* Goes to where at most the newest `count` frames are still to be read. Never goes back. Not counted as a loss. */
 void whisker_reader_seek_latest(struct whisker_reader *reader, size_t count);
@@ -77,17 +91,39 @@ int whisker_reader_clock(const struct whisker_reader *reader, struct whisker_clo
 /* What the daemon last told of itself; all zeros before the first time. Returns 0, or TIMEOUT: never still. */
 int whisker_reader_stats(const struct whisker_reader *reader, struct whisker_daemon_stats *stats);
 
+#define WHISKER_RING_NAME_BYTES 208
+
+/* A ring found on this machine. */
+struct whisker_ring_entry {
+    char name[WHISKER_RING_NAME_BYTES];
+    uint64_t bytes;
+    uint64_t published;  /* frames; 0 as the rest below when it has another version */
+    uint64_t generation; /* as in struct whisker_reader_info */
+    uint32_t capacity;   /* frames */
+    uint32_t writer_pid;
+    uint32_t owner;   /* user id */
+    uint32_t version; /* of its layout */
+    int error;        /* 0: a reader can attach; WRITER_DEAD: left by a killed writer; RING_VERSION */
+};
+
+/* Finds all rings, in no order. Fills in at most `room` entries; returns how many there are, or SYSTEM. */
+int whisker_ring_list(struct whisker_ring_entry *entries, size_t room);
+
+/* Removes a ring whose writer died; the next writer of its name does so, too. Returns 0, or RING_MISSING, RING_BUSY
+ * (its writer lives), RING_LAYOUT (no ring), RING_NAME, SYSTEM (errno: another user's). */
+int whisker_ring_remove_stale(const char *name);
+
 struct whisker_ring;
 
 /*
  * Makes the ring `name` of `capacity` frames (a power of two, 64 to 2^20) and becomes its writer. A ring whose writer
  * died is replaced; its readers learn RESTARTED. Returns 0 and the ring, or ARGUMENT, RING_NAME, RING_BUSY (another
- * writer lives), SYSTEM, MEMORY; then *ring is NULL.
+ * writer lives), RING_LAYOUT (the name is that of something else), SYSTEM, MEMORY; then *ring is NULL.
  */
 int whisker_ring_create(const char *name, uint32_t capacity, struct whisker_ring **ring);
 
 /* Copies `count` frames (at most a quarter of the capacity) into the ring and wakes waiting readers once. Never waits.
- * Returns 0 or ARGUMENT. */
+ * Returns 0, ARGUMENT, or RING_LOST (make a new ring). */
 int whisker_ring_publish(struct whisker_ring *ring, const struct whisker_frame *frames, size_t count);
 
 /* Tell the readers the clock mapping and the daemon's statistics; a few times a second is enough. Never waits. */
@@ -102,7 +138,7 @@ void whisker_ring_close(struct whisker_ring *ring);
 /*
  * Decodes `count` bytes of the bridge's stream straight into the ring, as whisker_ring_publish. frames: if not NULL,
  * gets the frames just published (valid until the next call), made their number.
- * Returns 0, or ARGUMENT when the bytes could hold more than a quarter of the capacity.
+ * Returns 0, RING_LOST, or ARGUMENT when the bytes could hold more than a quarter of the capacity.
  */
 int whisker_ring_feed(struct whisker_ring *ring, struct whisker_decoder *decoder, const uint8_t *bytes, size_t count,
                       const struct whisker_frame **frames, size_t *made);

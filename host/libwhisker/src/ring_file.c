@@ -1,0 +1,193 @@
+#include "ring_file.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "ring_layout.h"
+#include "whisker/errors.h"
+
+#define READABLE_BY_ALL (S_IRUSR | S_IWUSR | S_IRGRP | S_IROTH)
+/* Whoever has a name's lock needs microseconds; after this many milliseconds it is stopped, not slow. */
+#define NAMING_TRIES_MS 2000
+
+int ring_path(const char *name, char path[RING_PATH_BYTES])
+{
+    const size_t length = name ? strlen(name) : 0;
+    if (length == 0 || length > RING_NAME_MAX || strchr(name, '/') || name[0] == '.') {
+        return WHISKER_ERROR_RING_NAME;
+    }
+    snprintf(path, RING_PATH_BYTES, RING_DIRECTORY "/%s", name);
+    return WHISKER_OK;
+}
+
+int ring_file_open(const char *path, int *fd)
+{
+    struct stat file;
+    *fd = open(path, O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
+    if (*fd < 0) {
+        return errno == ENOENT  ? WHISKER_ERROR_RING_MISSING
+               : errno == ELOOP ? WHISKER_ERROR_RING_LAYOUT
+                                : WHISKER_ERROR_SYSTEM;
+    }
+    if (fstat(*fd, &file) != 0 || !S_ISREG(file.st_mode)) {
+        close(*fd);
+        return WHISKER_ERROR_RING_LAYOUT;
+    }
+    return WHISKER_OK;
+}
+
+/* Memory is allotted here: a full /dev/shm shall fail now and not kill the writer at its first frame. */
+int ring_file_make(size_t bytes, int *fd)
+{
+    *fd = open(RING_DIRECTORY, O_TMPFILE | O_RDWR | O_CLOEXEC, READABLE_BY_ALL);
+    if (*fd < 0) {
+        return WHISKER_ERROR_SYSTEM;
+    }
+    if (posix_fallocate(*fd, 0, (off_t)bytes) != 0) {
+        close(*fd);
+        return WHISKER_ERROR_MEMORY;
+    }
+    return WHISKER_OK;
+}
+
+static bool lock_byte(int fd, short type, enum ring_lock byte)
+{
+    struct flock lock = {.l_type = type, .l_whence = SEEK_SET, .l_start = byte, .l_len = 1};
+    return fcntl(fd, F_OFD_SETLK, &lock) == 0;
+}
+
+bool ring_file_lock(int fd, enum ring_lock lock)
+{
+    return lock_byte(fd, lock == RING_LOCK_WRITER ? F_WRLCK : F_RDLCK, lock);
+}
+
+/* Asks for what conflicts with the lock and with nothing else: a reader that locks byte 0 is no writer. */
+bool ring_file_is_locked(int fd, enum ring_lock lock)
+{
+    const short conflicting = lock == RING_LOCK_WRITER ? F_RDLCK : F_WRLCK;
+    struct flock found = {.l_type = conflicting, .l_whence = SEEK_SET, .l_start = lock, .l_len = 1};
+    return fcntl(fd, F_OFD_GETLK, &found) == 0 && found.l_type != F_UNLCK;
+}
+
+bool ring_file_is_named(int fd, const char *path)
+{
+    struct stat mine, named;
+    return fstat(fd, &mine) == 0 && lstat(path, &named) == 0 && mine.st_dev == named.st_dev &&
+           mine.st_ino == named.st_ino;
+}
+
+/* Opens the lock of a name, a file that only its owner can lock: any reader could hold a lock of the ring's. */
+static int open_naming_lock(const char *lock_path)
+{
+    for (;;) { /* not O_CREAT alone: the kernel may forbid it on another user's file in a sticky directory */
+        int fd = open(lock_path, O_RDWR | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
+        if (fd < 0 && errno == ENOENT) {
+            fd = open(lock_path, O_RDWR | O_CLOEXEC | O_CREAT | O_EXCL, S_IRUSR | S_IWUSR);
+        }
+        if (fd >= 0 || (errno != EEXIST && errno != ENOENT)) {
+            return fd;
+        }
+    }
+}
+
+/* Beside the ring's name, with a dot so that no ring can have it. */
+static void naming_lock_path(const char *path, char lock_path[RING_PATH_BYTES])
+{
+    snprintf(lock_path, RING_PATH_BYTES, RING_DIRECTORY "/.%s.lock", path + sizeof RING_DIRECTORY);
+}
+
+/* Only one process at a time changes what a name stands for. */
+static int begin_naming(const char *path, int *lock)
+{
+    char lock_path[RING_PATH_BYTES];
+    naming_lock_path(path, lock_path);
+    for (int tries = 0; tries < NAMING_TRIES_MS; tries++) {
+        *lock = open_naming_lock(lock_path);
+        if (*lock < 0) {
+            return WHISKER_ERROR_SYSTEM;
+        }
+        if (lock_byte(*lock, F_WRLCK, 0) && ring_file_is_named(*lock, lock_path)) {
+            return WHISKER_OK;
+        }
+        close(*lock); /* another process has it, or had it and has removed it */
+        nanosleep(&(struct timespec){.tv_nsec = 1000000}, NULL);
+    }
+    return WHISKER_ERROR_RING_BUSY;
+}
+
+static void end_naming(const char *path, int lock)
+{
+    char lock_path[RING_PATH_BYTES];
+    naming_lock_path(path, lock_path);
+    unlink(lock_path);
+    close(lock);
+}
+
+/* Whether this is a ring, of whatever version, and may be removed. */
+static int check_stale(int fd)
+{
+    uint64_t magic = 0;
+    if (pread(fd, &magic, sizeof magic, 0) != sizeof magic || magic != RING_MAGIC) {
+        return WHISKER_ERROR_RING_LAYOUT;
+    }
+    return ring_file_is_locked(fd, RING_LOCK_WRITER) ? WHISKER_ERROR_RING_BUSY : WHISKER_OK;
+}
+
+static int remove_stale(const char *path)
+{
+    int fd;
+    int error = ring_file_open(path, &fd);
+    if (error) {
+        return error;
+    }
+    error = check_stale(fd);
+    if (!error && unlink(path) != 0) {
+        error = WHISKER_ERROR_SYSTEM;
+    }
+    close(fd);
+    return error;
+}
+
+int ring_file_remove_stale(const char *path)
+{
+    int lock;
+    int error = begin_naming(path, &lock);
+    if (!error) {
+        error = remove_stale(path);
+        end_naming(path, lock);
+    }
+    return error;
+}
+
+int ring_file_name(int fd, const char *path)
+{
+    char unnamed[64];
+    int lock;
+    int error = begin_naming(path, &lock);
+    if (error) {
+        return error;
+    }
+    error = remove_stale(path);
+    if (error == WHISKER_ERROR_RING_MISSING) {
+        error = WHISKER_OK;
+    }
+    snprintf(unnamed, sizeof unnamed, "/proc/self/fd/%d", fd);
+    if (!error && linkat(AT_FDCWD, unnamed, AT_FDCWD, path, AT_SYMLINK_FOLLOW) != 0) {
+        error = WHISKER_ERROR_SYSTEM;
+    }
+    end_naming(path, lock);
+    return error;
+}
+
+void ring_file_unname(int fd, const char *path)
+{
+    if (ring_file_is_named(fd, path)) { /* nobody else removes it while its writer lives */
+        unlink(path);
+    }
+}

@@ -1,0 +1,79 @@
+#include "futex.h"
+#include "ring_internal.h"
+#include "ring_time.h"
+#include "whisker/errors.h"
+
+/* A dead writer wakes nobody, so a waiting reader looks for itself this often. */
+#define LIVENESS_MS 100
+/* A writer asks once per tick of its clock (10 ms at most) whether readers wait; until it has surely asked since this
+ * reader began to, the reader looks for itself. */
+#define UNHEARD_MS 30
+#define UNHEARD_STEP_MS 1
+
+/* 0: there is something to peek; TIMEOUT: not yet; CLOSED, RING_LOST: never again. The state is read before the head,
+ * so frames published before the close are not missed. */
+static int look(const struct whisker_reader *reader)
+{
+    const uint64_t state = ring_load_acquire(&reader->map.header->state);
+    const uint64_t head = ring_load_acquire(&reader->map.header->head);
+    if (!ring_is_whole(&reader->map)) {
+        return WHISKER_ERROR_RING_LOST;
+    }
+    if (head != reader->position) {
+        return WHISKER_OK;
+    }
+    return state == RING_CLOSED ? WHISKER_ERROR_CLOSED : WHISKER_ERROR_TIMEOUT;
+}
+
+/* As look, with the writer's life: when it is over, what it published last is seen by looking once more. */
+static int look_closely(const struct whisker_reader *reader)
+{
+    int seen = look(reader);
+    if (seen == WHISKER_ERROR_TIMEOUT && !ring_file_is_locked(reader->map.fd, RING_LOCK_WRITER)) {
+        seen = look(reader);
+        seen = seen == WHISKER_ERROR_TIMEOUT ? WHISKER_ERROR_WRITER_DEAD : seen;
+    }
+    return seen;
+}
+
+/* An ended ring: does its name belong to a new one? */
+static int ended(const struct whisker_reader *reader, int error)
+{
+    struct ring_map other;
+    if (ring_file_is_named(reader->map.fd, reader->path) || ring_map_living(reader->path, &other) != WHISKER_OK) {
+        return error;
+    }
+    ring_unmap(&other);
+    return WHISKER_ERROR_RESTARTED;
+}
+
+/* Lets the writer know, by a lock that ends with this process, that there is someone to wake. */
+static int longest_sleep_ms(struct whisker_reader *reader)
+{
+    const int64_t now = ring_now_ms();
+    if (reader->waits_since_ms == 0 && ring_file_lock(reader->map.fd, RING_LOCK_WAITING)) {
+        reader->waits_since_ms = now;
+    }
+    const bool heard = reader->waits_since_ms != 0 && now - reader->waits_since_ms > UNHEARD_MS;
+    return heard ? LIVENESS_MS : UNHEARD_STEP_MS;
+}
+
+int whisker_reader_wait(struct whisker_reader *reader, int timeout_ms)
+{
+    const int64_t started = timeout_ms > 0 ? ring_now_ms() : 0;
+    for (;;) {
+        const uint32_t signal = ring_signal_load(&reader->map.header->signal);
+        const int seen = look_closely(reader);
+        if (seen == WHISKER_OK) {
+            return WHISKER_OK;
+        }
+        if (seen != WHISKER_ERROR_TIMEOUT) {
+            return ended(reader, seen);
+        }
+        const int step = timeout_ms == 0 ? 0 : ring_sleep_ms(timeout_ms, started, longest_sleep_ms(reader));
+        if (step == 0) {
+            return WHISKER_ERROR_TIMEOUT;
+        }
+        futex_wait(&reader->map.header->signal, signal, step);
+    }
+}

@@ -1,0 +1,369 @@
+/* Shared memory that others fill, shorten, lock or block: a reader and a writer refuse or go on, and never crash. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+#include <fcntl.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "ring_fixture.h"
+#include "ring_internal.h"
+#include "whisker/errors.h"
+
+struct fixture {
+    struct whisker_ring *ring;
+    struct whisker_reader *reader;
+};
+
+static int open_both(void **state)
+{
+    static struct fixture fixture;
+    *state = &fixture;
+    if (whisker_ring_create(test_ring_name(), TEST_CAPACITY, &fixture.ring) != 0) {
+        return -1;
+    }
+    return whisker_reader_attach(test_ring_name(), 0, &fixture.reader);
+}
+
+static int close_both(void **state)
+{
+    struct fixture *fixture = *state;
+    whisker_reader_detach(fixture->reader);
+    whisker_ring_close(fixture->ring);
+    return test_ring_file_exists(test_ring_name()) ? -1 : 0;
+}
+
+/* The path of the test's ring. */
+static const char *path(void)
+{
+    static char made[128];
+    snprintf(made, sizeof made, RING_DIRECTORY "/%s", test_ring_name());
+    return made;
+}
+
+/* Whatever a mad writer puts into the shared header, a reader stays inside its own mapping. */
+static void nonsense_in_the_header_cannot_lead_a_reader_astray(void **state)
+{
+    const struct fixture *f = *state;
+    static const uint64_t values[] = {0,       1,       TEST_CAPACITY, TEST_CAPACITY + 1, UINT32_MAX,
+                                      1000000, 1000064, INT64_MAX,     UINT64_MAX - 1,    UINT64_MAX};
+    enum { VALUES = sizeof values / sizeof values[0] };
+    struct ring_header *header = f->ring->map.header;
+    for (size_t i = 0; i < VALUES * VALUES * 3; i++) {
+        ring_store(&header->head, values[i % VALUES]);
+        ring_store(&header->claim, values[i / VALUES % VALUES]);
+        header->capacity = (uint32_t)values[i % 7];
+        const struct whisker_frame *frames;
+        size_t count;
+        whisker_reader_peek(f->reader, &frames, &count);
+        assert_true(count <= TEST_CAPACITY);
+        assert_true(frames >= f->reader->map.frames && frames < f->reader->map.frames + TEST_CAPACITY);
+        whisker_reader_advance(f->reader, count);
+        const int given = whisker_reader_window(f->reader, TEST_CAPACITY - 1, &frames);
+        assert_in_range(given, 0, TEST_CAPACITY - 1);
+        assert_true(frames >= f->reader->map.frames && frames < f->reader->map.frames + TEST_CAPACITY);
+        whisker_reader_intact(f->reader);
+        whisker_reader_wait(f->reader, 0);
+    }
+}
+
+/* Makes the shared memory of the test's name from these bytes, `size` long, and tries to attach. */
+static int attach_to(const void *bytes, size_t count, size_t size)
+{
+    const int fd = open(path(), O_RDWR | O_CREAT | O_EXCL, 0600);
+    assert_true(fd >= 0);
+    assert_int_equal(ftruncate(fd, (off_t)size), 0);
+    assert_int_equal(pwrite(fd, bytes, count, 0), count);
+    struct whisker_reader *reader;
+    const int error = whisker_reader_attach(test_ring_name(), 0, &reader);
+    assert_null(reader);
+    close(fd);
+    unlink(path());
+    return error;
+}
+
+static void memory_that_is_no_ring_is_refused(void **state)
+{
+    (void)state;
+    const size_t page = (size_t)sysconf(_SC_PAGESIZE), size = page + TEST_CAPACITY * sizeof(struct whisker_frame);
+    struct ring_header good = {.magic = RING_MAGIC,
+                               .version = RING_LAYOUT_VERSION,
+                               .header_bytes = (uint32_t)page,
+                               .frame_bytes = sizeof(struct whisker_frame),
+                               .capacity = TEST_CAPACITY};
+    assert_int_equal(attach_to(&good, sizeof good, size), WHISKER_ERROR_WRITER_DEAD); /* good, but nobody writes */
+    assert_int_equal(attach_to("", 0, 0), WHISKER_ERROR_RING_LAYOUT);
+    assert_int_equal(attach_to("", 0, size), WHISKER_ERROR_RING_LAYOUT);
+    assert_int_equal(attach_to("rubbish!", 8, size), WHISKER_ERROR_RING_LAYOUT);
+    assert_int_equal(attach_to(&good, sizeof good, page - 1), WHISKER_ERROR_RING_LAYOUT);
+    assert_int_equal(attach_to(&good, sizeof good, size - 1), WHISKER_ERROR_RING_LAYOUT);
+    struct ring_header bad = good;
+    bad.version++;
+    assert_int_equal(attach_to(&bad, sizeof bad, size), WHISKER_ERROR_RING_VERSION);
+    bad = good;
+    bad.frame_bytes = 128;
+    assert_int_equal(attach_to(&bad, sizeof bad, size), WHISKER_ERROR_RING_LAYOUT);
+    const uint32_t capacities[] = {0, 63, TEST_CAPACITY * 2, UINT32_MAX, 1u << 31};
+    for (size_t i = 0; i < sizeof capacities / sizeof capacities[0]; i++) {
+        bad = good;
+        bad.capacity = capacities[i];
+        assert_int_equal(attach_to(&bad, sizeof bad, size), WHISKER_ERROR_RING_LAYOUT);
+    }
+}
+
+static void what_has_the_name_and_is_no_file_is_refused_at_once(void **state)
+{
+    (void)state;
+    struct whisker_reader *reader;
+    struct whisker_ring *ring;
+    assert_int_equal(mkfifo(path(), 0600), 0); /* who opened it would wait for ever */
+    assert_int_equal(whisker_reader_attach(test_ring_name(), 0, &reader), WHISKER_ERROR_RING_LAYOUT);
+    assert_int_equal(whisker_ring_create(test_ring_name(), TEST_CAPACITY, &ring), WHISKER_ERROR_RING_LAYOUT);
+    unlink(path());
+    assert_int_equal(symlink("/etc/passwd", path()), 0);
+    assert_int_equal(whisker_reader_attach(test_ring_name(), 0, &reader), WHISKER_ERROR_RING_LAYOUT);
+    assert_int_equal(whisker_ring_create(test_ring_name(), TEST_CAPACITY, &ring), WHISKER_ERROR_RING_LAYOUT);
+    unlink(path());
+}
+
+static void file_of_another_program_is_not_replaced(void **state)
+{
+    (void)state;
+    struct whisker_ring *ring;
+    const int fd = open(path(), O_RDWR | O_CREAT | O_EXCL, 0600);
+    assert_int_equal(write(fd, "somebody's work", 15), 15);
+    assert_int_equal(whisker_ring_create(test_ring_name(), TEST_CAPACITY, &ring), WHISKER_ERROR_RING_LAYOUT);
+    assert_int_equal(whisker_ring_remove_stale(test_ring_name()), WHISKER_ERROR_RING_LAYOUT);
+    assert_true(test_ring_file_exists(test_ring_name()));
+    close(fd);
+    unlink(path());
+}
+
+/* Leaves the ring of a writer that is killed after 5 frames. */
+static void leave_stale_ring(void)
+{
+    int status;
+    if (fork() == 0) {
+        struct whisker_ring *ring;
+        if (whisker_ring_create(test_ring_name(), TEST_CAPACITY, &ring) == 0) {
+            test_publish(ring, 0, 5);
+        }
+        raise(SIGKILL);
+    }
+    assert_true(wait(&status) > 0);
+    assert_true(test_ring_file_exists(test_ring_name()));
+}
+
+/* Whoever may read a ring may lock its file. */
+static void locks_of_a_reader_hold_up_no_writer(void **state)
+{
+    (void)state;
+    struct whisker_ring *ring;
+    leave_stale_ring();
+    const int holder = open(path(), O_RDONLY);
+    struct flock all = {.l_type = F_RDLCK, .l_whence = SEEK_SET};
+    assert_int_equal(fcntl(holder, F_OFD_SETLK, &all), 0);
+    assert_int_equal(whisker_ring_create(test_ring_name(), TEST_CAPACITY, &ring), 0);
+    whisker_ring_close(ring);
+    close(holder);
+}
+
+/* cmocka has a handler for bus errors of its own, so these programs run outside it. */
+static int outside(const char *program)
+{
+    int status;
+    if (fork() == 0) {
+        execl("/proc/self/exe", "test_ring_hostile", program, (char *)NULL);
+        _exit(127);
+    }
+    assert_true(wait(&status) > 0);
+    return status;
+}
+
+#define OUTSIDE_ASSERT(condition)                                                                                      \
+    do {                                                                                                               \
+        if (!(condition)) {                                                                                            \
+            fprintf(stderr, "%s:%d: %s\n", __FILE__, __LINE__, #condition);                                            \
+            exit(1);                                                                                                   \
+        }                                                                                                              \
+    } while (0)
+
+/* Takes `left` bytes of the ring for all there is, under the feet of a reader, and puts the ring right again. */
+static void shorten_under_reader(int fd, const void *ring, size_t bytes, off_t left)
+{
+    struct whisker_reader *reader;
+    const struct whisker_frame *frames;
+    size_t count;
+    OUTSIDE_ASSERT(whisker_reader_attach(test_ring_name(), 0, &reader) == 0);
+    OUTSIDE_ASSERT(whisker_reader_peek(reader, &frames, &count) == 0);
+    OUTSIDE_ASSERT(whisker_reader_window(reader, TEST_CAPACITY, &frames) == TEST_CAPACITY);
+    OUTSIDE_ASSERT(ftruncate(fd, left) == 0);
+    for (uint64_t i = 0; i < count; i++) { /* what is there is a frame, or zeros */
+        const uint64_t tick = frames[i].tick;
+        OUTSIDE_ASSERT(tick == i || tick == 0);
+    }
+    OUTSIDE_ASSERT(whisker_reader_intact(reader) == WHISKER_ERROR_RING_LOST);
+    OUTSIDE_ASSERT(whisker_reader_advance(reader, count) == WHISKER_ERROR_RING_LOST);
+    OUTSIDE_ASSERT(whisker_reader_peek(reader, &frames, &count) == WHISKER_ERROR_RING_LOST);
+    OUTSIDE_ASSERT(whisker_reader_wait(reader, -1) == WHISKER_ERROR_RING_LOST);
+    whisker_reader_detach(reader);
+    OUTSIDE_ASSERT(pwrite(fd, ring, bytes, 0) == (ssize_t)bytes);
+}
+
+static int reader_of_shortened_ring(void)
+{
+    struct whisker_ring *ring;
+    OUTSIDE_ASSERT(whisker_ring_create(test_ring_name(), TEST_CAPACITY, &ring) == 0);
+    test_publish(ring, 0, TEST_CAPACITY);
+    const size_t bytes = ring_file_bytes(TEST_CAPACITY);
+    void *kept = malloc(bytes);
+    OUTSIDE_ASSERT(kept && pread(ring->map.fd, kept, bytes, 0) == (ssize_t)bytes);
+    for (off_t left = 0; left < (off_t)bytes; left += sysconf(_SC_PAGESIZE)) {
+        shorten_under_reader(ring->map.fd, kept, bytes, left);
+    }
+    free(kept);
+    whisker_ring_close(ring);
+    return 0;
+}
+
+static int writer_of_shortened_ring(void)
+{
+    struct whisker_ring *ring;
+    const struct whisker_frame frame = test_frame(0);
+    OUTSIDE_ASSERT(whisker_ring_create(test_ring_name(), TEST_CAPACITY, &ring) == 0);
+    OUTSIDE_ASSERT(truncate(path(), 0) == 0);
+    OUTSIDE_ASSERT(whisker_ring_publish(ring, &frame, 1) == WHISKER_ERROR_RING_LOST);
+    OUTSIDE_ASSERT(whisker_ring_publish(ring, &frame, 1) == WHISKER_ERROR_RING_LOST);
+    whisker_ring_close(ring);
+    OUTSIDE_ASSERT(whisker_ring_create(test_ring_name(), TEST_CAPACITY, &ring) == 0);
+    OUTSIDE_ASSERT(whisker_ring_publish(ring, &frame, 1) == 0);
+    whisker_ring_close(ring);
+    return 0;
+}
+
+/* Has a bus error that is none of the ring's business. */
+static int bus_error_elsewhere(void)
+{
+    struct whisker_ring *ring;
+    OUTSIDE_ASSERT(whisker_ring_create(test_ring_name(), TEST_CAPACITY, &ring) == 0);
+    unlink(path());
+    const int fd = open(RING_DIRECTORY, O_TMPFILE | O_RDWR, 0600);
+    const volatile char *nothing = mmap(NULL, 4096, PROT_READ, MAP_SHARED, fd, 0);
+    return nothing[0];
+}
+
+static void leave(int number)
+{
+    _exit(number == SIGBUS ? 42 : 1);
+}
+
+static int bus_error_with_handler(void)
+{
+    signal(SIGBUS, leave);
+    return bus_error_elsewhere();
+}
+
+static int bus_error_without_handler(void)
+{
+    signal(SIGBUS, SIG_DFL); /* a sanitizer has one */
+    return bus_error_elsewhere();
+}
+
+static void reader_of_a_shortened_ring_is_told(void **state)
+{
+    (void)state;
+    assert_int_equal(outside("reader"), 0);
+}
+
+static void writer_of_a_shortened_ring_is_told_and_makes_another(void **state)
+{
+    (void)state;
+    assert_int_equal(outside("writer"), 0);
+}
+
+static void other_bus_errors_go_where_they_went_before(void **state)
+{
+    (void)state;
+    const int without = outside("without"), with = outside("with");
+    assert_true(WIFSIGNALED(without) && WTERMSIG(without) == SIGBUS);
+    assert_true(WIFEXITED(with) && WEXITSTATUS(with) == 42);
+}
+
+static const struct whisker_ring_entry *entry_of_the_test(void)
+{
+    enum { ROOM = 64 };
+    static struct whisker_ring_entry entries[ROOM];
+    const int count = whisker_ring_list(entries, ROOM);
+    assert_in_range(count, 0, ROOM);
+    for (int i = 0; i < count; i++) {
+        if (strcmp(entries[i].name, test_ring_name()) == 0) {
+            return &entries[i];
+        }
+    }
+    return NULL;
+}
+
+static void rings_are_listed_and_stale_ones_removed(void **state)
+{
+    (void)state;
+    struct whisker_ring *ring;
+    assert_int_equal(whisker_ring_create(test_ring_name(), TEST_CAPACITY, &ring), 0);
+    test_publish(ring, 0, 6);
+    const struct whisker_ring_entry *entry = entry_of_the_test();
+    assert_non_null(entry);
+    assert_int_equal(entry->error, 0);
+    assert_int_equal(entry->published, 6);
+    assert_int_equal(entry->capacity, TEST_CAPACITY);
+    assert_int_equal(entry->writer_pid, getpid());
+    assert_int_equal(entry->owner, geteuid());
+    assert_int_equal(whisker_ring_remove_stale(test_ring_name()), WHISKER_ERROR_RING_BUSY);
+    ring->map.header->version++;
+    assert_int_equal(entry_of_the_test()->error, WHISKER_ERROR_RING_VERSION);
+    whisker_ring_close(ring);
+    assert_null(entry_of_the_test());
+    leave_stale_ring();
+    assert_int_equal(entry_of_the_test()->error, WHISKER_ERROR_WRITER_DEAD);
+    assert_int_equal(entry_of_the_test()->published, 5);
+    assert_int_equal(whisker_ring_remove_stale(test_ring_name()), 0);
+    assert_null(entry_of_the_test());
+    assert_int_equal(whisker_ring_remove_stale(test_ring_name()), WHISKER_ERROR_RING_MISSING);
+}
+
+#define WITH_RING(test) cmocka_unit_test_setup_teardown(test, open_both, close_both)
+
+int main(int argc, char **argv)
+{
+    static const struct {
+        const char *name;
+        int (*run)(void);
+    } programs[] = {{"reader", reader_of_shortened_ring},
+                    {"writer", writer_of_shortened_ring},
+                    {"with", bus_error_with_handler},
+                    {"without", bus_error_without_handler}};
+    for (size_t i = 0; argc == 2 && i < sizeof programs / sizeof programs[0]; i++) {
+        if (strcmp(argv[1], programs[i].name) == 0) {
+            return programs[i].run();
+        }
+    }
+    const struct CMUnitTest tests[] = {
+        WITH_RING(nonsense_in_the_header_cannot_lead_a_reader_astray),
+        cmocka_unit_test(memory_that_is_no_ring_is_refused),
+        cmocka_unit_test(what_has_the_name_and_is_no_file_is_refused_at_once),
+        cmocka_unit_test(file_of_another_program_is_not_replaced),
+        cmocka_unit_test(locks_of_a_reader_hold_up_no_writer),
+        cmocka_unit_test(reader_of_a_shortened_ring_is_told),
+        cmocka_unit_test(writer_of_a_shortened_ring_is_told_and_makes_another),
+        cmocka_unit_test(other_bus_errors_go_where_they_went_before),
+        cmocka_unit_test(rings_are_listed_and_stale_ones_removed),
+    };
+    return cmocka_run_group_tests_name("ring and hostile memory", tests, NULL, NULL);
+}
