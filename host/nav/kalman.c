@@ -14,7 +14,8 @@ struct nav_kalman *nav_kalman_new(const struct nav_problem *problem, nav_lineari
         return NULL;
     *k = (struct nav_kalman){.problem = problem, .belief = nav_gaussian_prior(problem), .linearise = linearise};
     k->likelihood = nav_likelihood_new(&problem->arena, &problem->robot, &problem->settings, 0.0);
-    if (nav_borders_init(&k->borders, &problem->arena, &problem->robot) || !k->likelihood) {
+    k->weight = calloc((size_t)(problem->robot.tips + problem->robot.rays) + 1, sizeof *k->weight);
+    if (nav_borders_init(&k->borders, &problem->arena, &problem->robot) || !k->likelihood || !k->weight) {
         nav_kalman_destroy(k);
         return NULL;
     }
@@ -26,6 +27,7 @@ void nav_kalman_destroy(void *self)
     struct nav_kalman *k = self;
     nav_likelihood_free(k->likelihood);
     nav_borders_free(&k->borders);
+    free(k->weight);
     free(k);
 }
 
@@ -155,7 +157,8 @@ void nav_kalman_update(void *self, const struct nav_evidence *evidence)
     const struct nav_robot *robot = &k->problem->robot;
     struct nav_crossing crossing;
     k->evaluations = 0;
-    nav_likelihood_read(k->likelihood, evidence);
+    memcpy(k->weight, evidence->weight, (size_t)robot->tips * sizeof *k->weight);
+    nav_likelihood_read(k->likelihood, &(struct nav_evidence){evidence->reading, k->weight});
     for (int t = 0; t < robot->tips; t++) {
         if (evidence->weight[t] > 0.0 && nav_borders_read(&k->borders, t, k->likelihood->table[t], &crossing))
             take_crossing(k, &crossing);

@@ -29,6 +29,7 @@ typedef bool nav_linearise(struct nav_kalman *, const struct nav_sighting *, str
 struct nav_kalman {
     const struct nav_problem *problem;
     struct nav_likelihood *likelihood; /* for the texture models */
+    double *weight;                    /* [whiskers] of the row, object whiskers left out */
     struct nav_borders borders;
     struct nav_gaussian belief;
     nav_linearise *linearise; /* false: the sighting cannot be expected there */

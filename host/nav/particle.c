@@ -17,7 +17,7 @@ enum { CANDIDATES = 8 };
 static const double FRESH_MOST = 0.5; /* share of the particles that may be fresh in one row */
 /* A run of bad windows lowers the fast average, too: it must fall to the slow one's 1 / MARGIN before anything is done.
  */
-static const double MARGIN = 1.5;
+static const double MARGIN = 2.0;
 /* Motion is put off while nothing is read, but not beyond this: headings that differ then fan out. */
 static const double PENDING_MOST_M = 0.05, PENDING_MOST_RAD = 0.2;
 
@@ -30,7 +30,6 @@ struct particle {
     float *scratch; /* [room] */
     long least, most;
     double slow, fast; /* averages of the mean weight; negative before the first row */
-    bool begun;
     struct nav_pose pending;
     struct nav_noise pending_noise;
     struct nav_gaussian summary;
@@ -64,6 +63,15 @@ static void summarise(struct particle *f)
     nav_particles_covariance(&f->cloud, mean, f->summary.covariance);
 }
 
+/* How many of them to keep when a share `fresh` is drawn from anywhere. */
+static long needed(struct particle *f, double fresh)
+{
+    if (f->least == f->most)
+        return f->most;
+    nav_bins_fill(&f->bins, &f->cloud);
+    return nav_bins_needed(&f->bins, f->problem->settings.particle_error, fresh, f->least, f->most);
+}
+
 static void begin(struct particle *f)
 {
     f->cloud.count = f->most;
@@ -71,6 +79,9 @@ static void begin(struct particle *f)
         nav_particles_set(&f->cloud, i, nav_particles_draw(&f->probe, &f->problem->prior, &f->rng));
         f->cloud.weight[i] = 1.0f / (float)f->most;
     }
+    f->cloud.count = needed(f, 0.0); /* drawn independently, the first few do as well as any */
+    for (long i = 0; i < f->cloud.count; i++)
+        f->cloud.weight[i] = 1.0f / (float)f->cloud.count;
     summarise(f);
 }
 
@@ -147,12 +158,7 @@ static struct nav_pose draw_fresh(struct particle *f)
 
 static void resample(struct particle *f, double fresh)
 {
-    const struct nav_settings *s = &f->problem->settings;
-    long count = f->most;
-    if (f->least < f->most) {
-        nav_bins_fill(&f->bins, &f->cloud);
-        count = nav_bins_needed(&f->bins, s->particle_error, fresh, f->least, f->most);
-    }
+    long count = needed(f, fresh);
     nav_particles_resample(&f->cloud, &f->spare, count, nav_rng_uniform(&f->rng));
     struct nav_particles drawn = f->spare;
     f->spare = f->cloud;
@@ -175,9 +181,8 @@ static void update(void *self, const struct nav_evidence *evidence)
     double fresh = decline(f, nav_particles_weigh(&f->cloud, &f->probe, f->scratch));
     bool uneven = nav_particles_effective(&f->cloud) < s->particle_resample * (double)f->cloud.count;
     summarise(f);
-    if (uneven || fresh > 0.0 || !f->begun)
+    if (uneven || fresh > 0.0)
         resample(f, fresh);
-    f->begun = true;
 }
 
 static void estimate(const void *self, struct nav_estimate *out)

@@ -100,8 +100,8 @@ double nav_particles_weigh(struct nav_particles *p, const struct nav_probe *prob
     float best = -INFINITY;
     for (long i = 0; i < p->count; i++) {
         loglik[i] = (float)nav_probe_at(probe, (double)p->x[i], (double)p->y[i], (double)p->c[i], (double)p->s[i]);
-        if (p->weight[i] > 0.0f)
-            best = fmaxf(best, loglik[i]);
+        if (p->weight[i] > 0.0f && loglik[i] > best)
+            best = loglik[i];
     }
     if (!(best > -INFINITY))
         return 0.0;

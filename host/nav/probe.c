@@ -22,8 +22,9 @@ static int map_clearance(struct nav_probe *p)
 {
     const struct nav_arena *arena = p->arena;
     p->cell = fmax(CELL_M, sqrt(arena->size_x * arena->size_y / CELLS_MOST));
-    p->columns = (int)ceil(arena->size_x / p->cell);
-    p->rows = (int)ceil(arena->size_y / p->cell);
+    p->per_m = 1.0 / p->cell;
+    p->columns = (int)(arena->size_x * p->per_m) + 1;
+    p->rows = (int)(arena->size_y * p->per_m) + 1;
     p->clearance = calloc((size_t)p->columns * (size_t)p->rows, sizeof *p->clearance);
     if (!p->clearance)
         return -1;
@@ -70,7 +71,7 @@ static double best_of(const float *table, int codes)
 {
     float best = table[0];
     for (int k = 1; k < codes; k++)
-        best = fmaxf(best, table[k]);
+        best = table[k] > best ? table[k] : best;
     return (double)best;
 }
 
@@ -96,7 +97,8 @@ static double clearance_at(const struct nav_probe *p, double x, double y)
 {
     if (!(x > 0.0 && x < p->arena->size_x && y > 0.0 && y < p->arena->size_y))
         return -1.0;
-    return (double)p->clearance[(int)(y / p->cell) * p->columns + (int)(x / p->cell)];
+    int column = (int)(x * p->per_m), row = (int)(y * p->per_m);
+    return (double)p->clearance[row * p->columns + column];
 }
 
 bool nav_probe_free_at(const struct nav_probe *p, double x, double y)

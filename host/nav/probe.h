@@ -12,12 +12,12 @@ struct nav_probe {
     const struct nav_arena *arena;
     const struct nav_robot *robot;
     struct nav_likelihood *likelihood;
-    int columns, rows; /* of the clearance map */
-    double cell;       /* m */
-    float *clearance;  /* [rows][columns] lower bound of the distance from any point of the cell to a solid, m */
-    double reach;      /* from the robot's centre to the farthest point that a whisker can sense, m */
-    double *bearing;   /* [rays][2] cosine and sine of each ray's yaw */
-    int *active;       /* whiskers read by the present row: texture whiskers, then object whiskers */
+    int columns, rows;  /* of the clearance map */
+    double cell, per_m; /* m, and cells per m */
+    float *clearance;   /* [rows][columns] lower bound of the distance from any point of the cell to a solid, m */
+    double reach;       /* from the robot's centre to the farthest point that a whisker can sense, m */
+    double *bearing;    /* [rays][2] cosine and sine of each ray's yaw */
+    int *active;        /* whiskers read by the present row: texture whiskers, then object whiskers */
     int active_tips, active_whiskers;
     double nothing; /* log-likelihood of the row's object whiskers where nothing is within reach */
     double ceiling; /* of the row at the pose that would suit every whisker best */

@@ -33,6 +33,7 @@ HEADERS = {
             "filter.h",
             "belief.h",
             "replay.h",
+            "weigh.h",
         )
     ],
     "whisker": [
