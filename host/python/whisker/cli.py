@@ -11,6 +11,9 @@ from .errors import UserError
 
 # name (its module has underscores for dashes): what it does
 COMMANDS = {
+    "info": "what ring, daemon and bridge say of themselves",
+    "top": "lanes, rates and losses in the terminal",
+    "doctor": "find out why it does not work",
     "record": "write a ring to an MCAP file",
     "replay": "feed a ring from a recording, as the device would",
     "stream": "print frames as CSV or JSON lines",

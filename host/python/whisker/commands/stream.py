@@ -63,7 +63,9 @@ def batches(reader: Reader, stop):
 
 def csv_lines(frames: np.ndarray, lanes: list[int]):
     """A line per frame: tick, seconds of the bridge's clock, sequence number, then alpha, beta, status by lane."""
-    table = np.stack([frames["lane"][field][:, lanes] for field in FIELDS], axis=2).reshape(len(frames), -1)
+    table = np.stack([frames["lane"][field][:, lanes] for field in FIELDS], axis=2).reshape(
+        len(frames), len(lanes) * len(FIELDS)
+    )
     times = frames["time_cycles"] / LIMITS["clock_hz"]
     for tick, t_s, sequence, row in zip(frames["tick"], times, frames["sequence"], table.tolist(), strict=True):
         yield f"{tick},{t_s:.7f},{sequence},{','.join(map(str, row))}\n"

@@ -1,0 +1,337 @@
+"""The commands that watch a ring: info, top, stream, record, replay, doctor; in a terminal where they have one."""
+
+import contextlib
+import json
+import os
+import pty
+import subprocess
+import sys
+import threading
+
+import numpy as np
+import pytest
+from rings import make_frames, ring_name
+
+from whisker import doctor
+from whisker.cli import COMMANDS, main
+from whisker.commands.top import BARS, sparkline
+from whisker.protocol import LIMITS, WIRE_VERSION
+from whisker.recording import read
+from whisker.recording.writing import RecordingWriter
+from whisker.ring import Clock, Reader, Writer
+
+END_S = 60
+STATS = {"started_ns": 1, "connected": 1, "wire_version": WIRE_VERSION, "serial": b"B0042", "lane_mask": 0b101}
+
+
+@pytest.fixture(autouse=True)
+def signals_as_before(monkeypatch):
+    """Commands take over signals; in this process they must not."""
+    monkeypatch.setattr("signal.signal", lambda *_: None)
+
+
+def run(capsys, *arguments):
+    """Exit code, standard output, standard error."""
+    try:
+        code = main([str(a) for a in arguments])
+    except SystemExit as leaving:
+        code = leaving.code
+    return (code, *capsys.readouterr())
+
+
+def command(*arguments):
+    return [sys.executable, "-m", "whisker.cli", *map(str, arguments)]
+
+
+@contextlib.contextmanager
+def live_ring(frames, **stats):
+    name = ring_name()
+    with Writer(name, 4096) as writer:
+        writer.set_stats(**(STATS | stats))
+        writer.set_clock(Clock(0, 10**9, 10**18, 1e9 / LIMITS["clock_hz"], 5000.0))
+        writer.publish(frames)
+        yield name
+
+
+def test_help_names_every_command_and_imports_none(capsys):
+    code, out, _ = run(capsys, "--help")
+    assert code == 0 and all(f"    {name}" in out for name in COMMANDS)
+    program = (
+        "import sys; from whisker.cli import main\ntry: main(['--help'])\nexcept SystemExit: print(sorted(sys.modules))"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=END_S)
+    assert "numpy" not in done.stdout and "cffi" not in done.stdout and "argparse" in done.stdout
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_has_an_example(capsys, name):
+    code, out, _ = run(capsys, name, "--help")
+    assert code == 0 and f"example:\n  whisker {name}" in out
+
+
+@pytest.mark.parametrize("name", ["info", "top", "stream", "record"])
+def test_a_missing_ring_is_one_line(capsys, tmp_path, name):
+    arguments = [tmp_path / "a.mcap"] if name == "record" else []
+    code, out, err = run(capsys, name, *arguments, "--ring", "whisker-none")
+    assert (
+        code == 1
+        and out == ""
+        and err == "whisker: ring whisker-none: there is no ring of this name; start whiskerd with this --ring\n"
+    )
+    assert not (tmp_path / "a.mcap").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (["stream", "--lanes", "0,28"], "'28' is no lane"),
+        (["stream", "--every", "0"], "'0' is not a whole number of 1 or more"),
+        (["replay", "x.mcap", "--speed", "fast"], "'fast' is not a number above 0, nor max"),
+        (["replay", "x.mcap", "--ring-frames", "63"], "from 64 to"),
+        (["replay", "x.mcap"], "x.mcap: cannot be read"),
+        (["record"], "FILE.MCAP"),
+        (["record", "x.mcap", "--seconds", "nan"], "'nan' is not a number above 0"),
+        (["top", "--wait", "-1"], "'-1' is not a number of seconds"),
+        (["nonsense"], "invalid choice"),
+    ],
+)
+def test_wrong_arguments_are_one_line(capsys, arguments, complaint):
+    code, _, err = run(capsys, *arguments)
+    assert code == 2 and complaint in err and err.count("\n") == 1
+
+
+def test_info_tells_ring_daemon_and_clock(capsys):
+    with live_ring(make_frames(300)) as name:
+        code, out, _ = run(capsys, "info", "--ring", name, "--json")
+        told = json.loads(out)
+        assert code == 0 and told["ring"]["published"] == 300 and told["ring"]["writer_pid"] == os.getpid()
+        assert told["daemon"]["serial"] == "B0042" and told["daemon"]["lanes"] == [0, 2]
+        assert told["clock"]["uncertainty_ns"] == 5000.0 and told["host"]["wire_version"] == WIRE_VERSION
+        assert "  serial: B0042" in run(capsys, "info", "--ring", name)[1]
+
+
+def test_stream_prints_chosen_lanes_and_ticks(capsys):
+    frames = make_frames(100)
+    with live_ring(frames) as name:
+        options = ["--ring", name, "--backlog", "--every", 10, "--frames", 4]
+        code, out, _ = run(capsys, "stream", *options, "--lanes", "2-3,5")
+        lines = out.splitlines()
+        assert code == 0 and len(lines) == 5
+        assert lines[0].startswith("tick,t_s,sequence,lane2_alpha,lane2_beta,lane2_status,lane3_alpha")
+        sample = frames["lane"][30, 5]
+        assert lines[4].split(",")[:3] == ["30", "0.0150000", "37"]
+        assert lines[4].split(",")[-3:] == [str(sample[field]) for field in ("alpha", "beta", "status")]
+        told = [json.loads(line) for line in run(capsys, "stream", *options, "--json")[1].splitlines()]
+        assert [t["tick"] for t in told] == [0, 10, 20, 30] and told[3]["lanes"]["5"][0] == sample["alpha"]
+        assert len(told[0]["lanes"]) == 28
+
+
+def test_stream_ends_quietly_with_its_reader():
+    with live_ring(make_frames(4000)) as name:
+        words = command("stream", "--ring", name, "--backlog", "--frames", 4000)
+        with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+            process.stdout.readline()
+            process.stdout.close()
+            assert process.stderr.read() == b"" and process.wait(END_S) == 0
+
+
+def test_record_and_replay_from_the_command_line(capsys, tmp_path):
+    frames = make_frames(1500)
+    first, second = tmp_path / "a.mcap", tmp_path / "b.mcap"
+    with live_ring(frames) as name:
+        code, out, _ = run(capsys, "record", first, "--ring", name, "--seconds", 0.6)
+        assert code == 0 and f"{first}: 1200 frames, 0 lost, " in out
+    recorder = threading.Thread(target=main, args=(["record", str(second), "--ring", name, "--wait", str(END_S)],))
+    recorder.start()
+    assert run(capsys, "replay", first, "--ring", name, "--speed", "max")[0] == 0
+    recorder.join()
+    with read(second) as recording:
+        assert np.array_equal(np.concatenate(list(recording.blocks())), frames[:1200])
+    with read(first) as recording:
+        assert recording.metadata["serial"] == "B0042" and recording.metadata["ring"] == name
+
+
+def test_a_recorder_told_to_stop_finishes_its_file(tmp_path):
+    path = tmp_path / "a.mcap"
+    words = ["record", path, "--ring"]
+    with (
+        live_ring(make_frames(1000)) as name,
+        subprocess.Popen(command(*words, name), stdout=subprocess.PIPE) as process,
+    ):
+        while not path.exists() or path.stat().st_size < 20_000:
+            assert process.poll() is None
+        process.terminate()
+        assert process.wait(END_S) == 0
+    with read(path) as recording:
+        assert recording.complete and sum(map(len, recording.blocks())) == 1000
+
+
+def test_replay_warns_of_a_damaged_recording(capsys, tmp_path):
+    path = tmp_path / "a.mcap"
+    with live_ring(make_frames(4000)) as name:
+        assert run(capsys, "record", path, "--ring", name, "--frames", 4000)[0] == 0
+    path.write_bytes(path.read_bytes()[:-50])
+    code, out, err = run(capsys, "replay", path, "--ring", name, "--speed", "max", "--lead", 0)
+    assert code == 0 and "4000 frames replayed" in out and "whisker: warning: " in err and err.count("\n") == 1
+
+
+def test_top_draws_in_a_terminal_and_leaves_it_as_it_was():
+    with live_ring(make_frames(3000)) as name:
+        ours, theirs = pty.openpty()
+        environment = os.environ | {"COLUMNS": "100", "LINES": "40", "TERM": "xterm"}
+        words = command("top", "--ring", name, "--interval", 0.1)
+        with subprocess.Popen(words, stdin=theirs, stdout=theirs, stderr=theirs, env=environment) as process:
+            os.close(theirs)
+            seen = b""
+            while seen.count(b"q quits") < 2:  # two pictures
+                seen += os.read(ours, 65536)
+            os.write(ours, b"q")
+            with contextlib.suppress(OSError):  # the other end closes
+                while data := os.read(ours, 65536):
+                    seen += data
+            assert process.wait(END_S) == 0
+        os.close(ours)
+    text = seen.decode()
+    assert text.startswith("\x1b[?1049h\x1b[?25l") and text.rstrip().endswith("\x1b[?25h\x1b[?1049l")
+    assert "2000.0 frames/s" in text and "27 lane27" in text and "bridge B0042 connected" in text
+    assert any(bar in text for bar in BARS)
+
+
+def test_top_once_is_plain_text(capsys):
+    frames = make_frames(1000)
+    frames["lane_mask"] = 0b11
+    frames["lane"]["status"][:, 0] = 32 << 10
+    frames["lane"]["status"][:, 1] = np.arange(1000) % 4 == 0
+    with live_ring(frames) as name:
+        code, out, _ = run(capsys, "top", "--ring", name, "--once", "--interval", 0.01)
+    assert code == 0 and "\x1b" not in out
+    absent, live = (line for line in out.splitlines() if "lane0" in line or "lane1" in line)
+    assert "nothing answers on this" in absent and "0.0 100.00" in absent
+    assert float(live.split()[6]) == pytest.approx(25, abs=3)
+
+
+def test_sparklines_show_what_moves():
+    ramp = sparkline(np.linspace(30000, 31000, 800), 8)
+    assert ramp == BARS
+    assert len(set(sparkline(0x8000 + np.arange(100) % 3, 40))) == 1
+    assert sparkline(np.array([5]), 40) in BARS and sparkline(np.empty(0), 40) == ""
+
+
+# ---------------------------------------------------------------------------------------------------------------------
+# doctor
+
+
+@pytest.fixture
+def host(tmp_path):
+    """A host whose bridge is plugged in, allowed, and named by a rule."""
+    device = tmp_path / "sys/bus/usb/devices/1-2"
+    device.mkdir(parents=True)
+    files = {"idVendor": "1209", "idProduct": "0001", "busnum": "1", "devnum": "7", "speed": "480", "serial": "B0042"}
+    for name, content in files.items():
+        (device / name).write_text(content + "\n")
+    node = tmp_path / "dev/bus/usb/001/007"
+    node.parent.mkdir(parents=True)
+    node.write_bytes(b"")
+    (tmp_path / "dev/shm").mkdir()
+    rule = tmp_path / "etc/udev/rules.d/60-whisker.rules"
+    rule.parent.mkdir(parents=True)
+    rule.write_text('ATTR{idVendor}=="1209"\n')
+    return tmp_path
+
+
+def worst(findings):
+    return [finding for finding in findings if finding.level == doctor.FAIL]
+
+
+def publish_until(stop, name):
+    with Writer(name, 4096) as writer:
+        writer.set_stats(**STATS)
+        frames = make_frames(200)
+        frames["lane_mask"] = 0b101
+        while not stop.wait(0.01):
+            frames["tick"] += 200
+            frames["sequence"] += 200
+            writer.publish(frames)
+
+
+def test_doctor_finds_nothing_where_all_is_well(host):
+    name, stop = ring_name(), threading.Event()
+    thread = threading.Thread(target=publish_until, args=(stop, name))
+    thread.start()
+    Reader(name, 10.0).close()
+    findings = doctor.examine(name, host, look_s=0.1)
+    stop.set()
+    thread.join()
+    lines = [finding.line() for finding in findings]
+    assert worst(findings) == [] and any("none lost" in line for line in lines)
+    assert any("60-whisker.rules" in line for line in lines) and any("bridge B0042" in line for line in lines)
+    assert any("lane 2" in line and "CRC" in line and "cable" in line for line in lines)  # 1 % of its samples
+    assert not any("lane 1:" in line for line in lines)  # not in the mask
+
+
+@pytest.mark.parametrize(
+    ("spoil", "text", "remedy"),
+    [
+        (lambda h: (h / "sys/bus/usb/devices/1-2/idVendor").write_text("dead\n"), "no bridge on the USB", "plug it in"),
+        (lambda h: (h / "sys/bus/usb/devices/1-2/speed").write_text("12\n"), "runs at 12 Mbit/s", "USB 2.0"),
+        (lambda h: (h / "dev/bus/usb/001/007").unlink(), "no device file", "container"),
+        (lambda h: (h / "dev/shm").rmdir(), "dev/shm", "tmpfs"),
+    ],
+)
+def test_doctor_names_what_is_wrong_with_the_cable(host, spoil, text, remedy):
+    spoil(host)
+    found = worst([*doctor.usb(host), *doctor.room(host / "dev/shm")])
+    assert len(found) == 1 and text in found[0].text and remedy in found[0].remedy
+
+
+def test_doctor_names_the_process_in_the_way(host):
+    for pid, name in ((41, "whiskerd"), (42, "thief")):
+        (host / f"proc/{pid}/fd").mkdir(parents=True)
+        (host / f"proc/{pid}/comm").write_text(name + "\n")
+        (host / f"proc/{pid}/fd/3").symlink_to(host / "dev/bus/usb/001/007")
+    found = doctor.usb(host)
+    assert [f.text for f in worst(found)] == ["process 42 (thief) holds the bridge"] and "kill 42" in worst(found)[
+        0
+    ].remedy
+    assert any("whiskerd (process 41) holds" in f.text for f in found)
+
+
+def test_doctor_asks_for_permission_and_rule(host, monkeypatch):
+    monkeypatch.setattr("os.access", lambda *_: False)
+    (host / "etc/udev/rules.d/60-whisker.rules").write_text("other\n")
+    assert "permission denied" in worst(doctor.usb(host))[0].text
+    assert doctor.rules(host)[0].level == doctor.WARN and "60" not in doctor.rules(host)[0].text
+
+
+def test_doctor_reads_the_daemons_mind(host):
+    with live_ring(make_frames(10), connected=0, error=-40) as name:
+        found = worst(doctor.stream(name, 0.01))
+        assert "no bridge is connected; plug it in" in found[0].text and "no frame" in found[1].text
+    with live_ring(make_frames(10), wire_version=9, records_crc=3, reconnects=1) as name, Reader(name) as reader:
+        lines = [finding.line() for finding in doctor.daemon(reader.stats)]
+        assert any("wire version 9" in line and "one release" in line for line in lines)
+        assert any("3 samples damaged" in line for line in lines) and any("1 times" in line for line in lines)
+    assert "start whiskerd" in worst(doctor.stream("whisker-none", 0.01))[0].text
+
+
+def test_doctor_finds_rings_left_behind(tmp_path):
+    name = ring_name()
+    program = f"import os; from whisker.ring import Writer; w = Writer('{name}', 64); os._exit(0)"
+    subprocess.run([sys.executable, "-c", program], check=True, timeout=END_S)
+    try:
+        found = doctor.stale_rings(doctor.Path("/dev/shm"), "whisker")
+        assert any(f"ring {name} was left behind" in f.text and f"rm /dev/shm/{name}" in f.remedy for f in found)
+        assert "died" in worst(doctor.stream(name, 0.01))[0].text
+    finally:
+        os.unlink(f"/dev/shm/{name}")
+
+
+def test_doctor_exits_with_what_it_found(capsys):
+    code, out, _ = run(capsys, "doctor", "--ring", "whisker-none")
+    assert code == 1 and "FAIL  ring whisker-none" in out
+
+
+def test_metadata_of_lane_names_is_checked(tmp_path):
+    with pytest.raises(ValueError, match="lane names"):
+        RecordingWriter(tmp_path / "a.mcap", {}, ["a,b"])
+    assert not (tmp_path / "a.mcap").exists()

@@ -1,0 +1,57 @@
+"""`whisker info`: what the ring, the daemon and the bridge say of themselves."""
+
+import dataclasses
+import json
+import time
+
+from .. import usbtree
+from ..protocol import WIRE_VERSION
+from ..ring import Reader, RingError
+from . import add_ring
+
+EXAMPLE = "whisker info --json"
+
+
+def add(parser) -> None:
+    add_ring(parser)
+    parser.add_argument("--json", action="store_true", help="one object on one line")
+    parser.set_defaults(run=run)
+
+
+def run(arguments) -> int:
+    told = {"host": {"wire_version": WIRE_VERSION}, "usb": [describe_usb(found) for found in usbtree.bridges()]}
+    try:
+        with Reader(arguments.ring, arguments.wait) as reader:
+            told |= describe_ring(reader)
+    except RingError as error:
+        if not told["usb"] or error.name != "RING_MISSING":
+            raise
+        told["ring"] = {"name": arguments.ring, "state": str(error)}
+    print(json.dumps(told) if arguments.json else "\n".join(lines(told)))
+    return 0
+
+
+def describe_usb(bridge: usbtree.Bridge) -> dict:
+    return {"node": str(bridge.node), "product": bridge.product, "serial": bridge.serial, "speed_mbit": bridge.speed}
+
+
+def describe_ring(reader: Reader) -> dict:
+    """What a reader of the ring can know: counters, daemon and bridge, clock."""
+    told: dict = {"ring": {"name": reader.name} | dataclasses.asdict(reader.info)}
+    if stats := reader.stats:
+        told["daemon"] = dataclasses.asdict(stats) | {"lanes": [n for n in range(32) if stats.lane_mask >> n & 1]}
+        told["daemon"]["up_s"] = round(time.time() - stats.started_ns / 1e9, 1)
+    if clock := reader.clock:
+        told["clock"] = dataclasses.asdict(clock)
+    return told
+
+
+def lines(told: dict) -> list[str]:
+    """As a person reads it: a heading per part, a line per value."""
+    out = []
+    for part, values in told.items():
+        tables = values if isinstance(values, list) else [values]
+        for table in tables:
+            out += [part, *(f"  {key}: {value}" for key, value in table.items())]
+        out += [f"{part}: no bridge is plugged in"] if not tables else []
+    return out
