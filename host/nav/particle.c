@@ -204,20 +204,27 @@ static void estimate(const void *self, struct nav_estimate *out)
         sizeof *f + 11 * (size_t)f->most * sizeof(float) + nav_bins_bytes(&f->bins) + nav_probe_bytes(&f->probe);
 }
 
+/* Width of one particle's bump: Silverman's rule, n^(-1/7) in three dimensions, for the part near the estimate. */
+static double bump(double variance, double count, double least, double most)
+{
+    return fmin(fmax(sqrt(variance) * pow(count, -1.0 / 7.0), least), most);
+}
+
 static long components(const void *self, struct nav_component *out, long room)
 {
-    static const double SIGMA_M = 0.01, SIGMA_RAD = 0.03; /* width of one particle's bump */
     const struct particle *f = self;
     const struct nav_particles *p = &f->cloud;
-    double total = 0.0;
+    const double *v = f->summary.covariance;
+    double count = fmax(nav_particles_effective(p), 1.0), total = 0.0;
+    double sigma_m = hypot(bump(fmin(v[0], v[4]), count, 0.003, 0.03), sqrt(f->pending_noise.position));
+    double sigma_rad = hypot(bump(v[8], count, 0.005, 0.1), sqrt(f->pending_noise.heading));
     for (long i = 0; i < p->count; i++)
         total += (double)p->weight[i];
     for (long i = 0; i < p->count && i < room; i++) {
         struct nav_pose at = {(double)p->x[i], (double)p->y[i], (double)atan2f(p->s[i], p->c[i])};
         at = nav_compose(at, f->pending);
         at.theta = nav_wrap(at.theta);
-        out[i] = (struct nav_component){at, hypot(SIGMA_M, sqrt(f->pending_noise.position)),
-                                        hypot(SIGMA_RAD, sqrt(f->pending_noise.heading)), (double)p->weight[i] / total};
+        out[i] = (struct nav_component){at, sigma_m, sigma_rad, (double)p->weight[i] / total};
     }
     return p->count;
 }

@@ -1,6 +1,8 @@
 /* The foveal filter by hand; its state is looked at, so its source is part of this program. */
 #include "../foveal.c"
 
+#include <string.h>
+
 #include "near.h"
 #include "rooms.h"
 
@@ -90,6 +92,48 @@ static void a_fovea_wholly_inside_a_solid_changes_nothing(void **state)
     destroy(f);
 }
 
+/* The covariance after one row that says tile 0 or tile 1. */
+static void covariance_after(struct nav_problem *p, bool right, double covariance[9])
+{
+    p->settings.texture_temper = 1.0;
+    struct foveal *f = create(p);
+    const double left_tile[] = {0.0, -50.0}, right_tile[] = {-50.0, 0.0}, weight[] = {1.0, 0.0};
+    const double *reading[] = {right ? right_tile : left_tile, NULL};
+    update(f, &(struct nav_evidence){reading, weight});
+    memcpy(covariance, f->belief.covariance, sizeof f->belief.covariance);
+    destroy(f);
+}
+
+static void as_printed_equation_7_does_not_depend_on_the_readings(void **state)
+{
+    (void)state;
+    struct nav_problem p = quiet_room();
+    p.settings.foveal_printed = 1.0;
+    double left[9];
+    covariance_after(&p, false, left);
+    /* 1331 points about the middle: 121 times the sum of squares of -5 .. 5 spacings, and the quantisation term. */
+    assert_near(left[0], 121.0 * 110.0 * 0.025 * 0.025 + 0.0001, 1e-9);
+    assert_near(left[8], 121.0 * 110.0 * pow(NAV_PI / 20.0, 2.0) + pow(2.6 * NAV_PI / 180.0, 2.0), 1e-9);
+    double right[9];
+    covariance_after(&p, true, right);
+    /* Two points further the mode is off the middle by 0.05 m: all that a reading can change. */
+    assert_near(right[0] - left[0], 1331.0 * 0.05 * 0.05, 1e-9);
+    assert_near(right[8], left[8], 1e-9);
+}
+
+static void inflation_puts_the_fovea_in_place_of_the_posterior(void **state)
+{
+    (void)state;
+    struct nav_problem p = quiet_room();
+    p.settings.foveal_inflate = 1.0;
+    double left[9], right[9];
+    covariance_after(&p, false, left);
+    covariance_after(&p, true, right);
+    assert_near(left[0], 10.0 * 0.025 * 0.025 + 0.0001, 1e-12); /* variance of -5 .. 5 is 10 */
+    assert_near(left[1], 0.0, 0.0);
+    assert_memory_equal(left, right, sizeof left);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -98,6 +142,8 @@ int main(void)
         cmocka_unit_test(a_texture_moves_the_mode_to_the_nearest_point_that_fits),
         cmocka_unit_test(it_never_looks_outside_the_fovea),
         cmocka_unit_test(a_fovea_wholly_inside_a_solid_changes_nothing),
+        cmocka_unit_test(as_printed_equation_7_does_not_depend_on_the_readings),
+        cmocka_unit_test(inflation_puts_the_fovea_in_place_of_the_posterior),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

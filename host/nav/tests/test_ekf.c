@@ -1,0 +1,114 @@
+/* The extended Kalman filter where it must equal a Kalman filter, and what it makes of textures; its state is looked
+ * at, so its source is part of this program. */
+#include "../ekf.c"
+
+#include "kalman_rooms.h"
+
+static void a_contact_square_on_is_a_kalman_update(void **state)
+{
+    (void)state;
+    struct nav_problem p = facing_wall();
+    struct nav_kalman *k = create(&p);
+    read_distance(k, 0.14);
+    assert_contact_is_a_kalman_update(k);
+    assert_int_equal(k->evaluations, 7); /* the mean and two per axis */
+    nav_kalman_destroy(k);
+}
+
+static void a_slanted_wall_turns_heading_into_range(void **state)
+{
+    (void)state;
+    struct nav_problem p = facing_wall();
+    p.prior.mean.theta = NAV_PI / 6.0;
+    struct nav_kalman *k = create(&p);
+    struct nav_linear l;
+    const struct nav_sighting s = {.ray = 0, .reach = 1.0};
+    assert_true(linearise(k, &s, &l));
+    /* Range (1 - x) / cos(a) - 0.05: its slope is -1 / cos(a) in x, and (1 - x) sin(a) / cos(a)^2 in the heading. */
+    double c = sqrt(0.75);
+    assert_near(l.expected, 0.2 / c - 0.05, 1e-9);
+    assert_near(l.cross[0], 0.0009 * -1.0 / c, 1e-8);
+    assert_near(l.cross[2], 1e-10 * 0.2 * 0.5 / 0.75, 1e-16);
+    assert_near(l.variance, 0.0009 / 0.75, 1e-8);
+    nav_kalman_destroy(k);
+}
+
+static void a_corner_has_no_derivative_and_changes_nothing(void **state)
+{
+    (void)state;
+    struct nav_problem p = facing_wall();
+    p.prior.mean = (struct nav_pose){0.68, 0.3, 0.0}; /* the whisker grazes the upper edge of the box */
+    struct nav_kalman *k = create(&p);
+    read_distance(k, 0.1);
+    assert_near(k->belief.mean.x, 0.68, 0.0);
+    assert_near(k->belief.covariance[0], 0.0009, 0.0);
+    nav_kalman_destroy(k);
+}
+
+static void what_is_too_far_off_is_not_believed(void **state)
+{
+    (void)state;
+    struct nav_problem p = facing_wall();
+    p.prior.sigma[0] = 0.005;
+    struct nav_kalman *k = create(&p);
+    read_distance(k, 0.10); /* 0.05 m off at 0.007 m */
+    assert_near(k->belief.mean.x, 0.8, 0.0);
+    assert_near(k->belief.covariance[0], 0.000025, 0.0);
+    nav_kalman_destroy(k);
+}
+
+static void no_contact_pushes_out_of_reach_and_no_further(void **state)
+{
+    (void)state;
+    struct nav_problem p = facing_wall();
+    struct nav_kalman *k = create(&p);
+    read_distance(k, INFINITY); /* the wall is expected 0.15 m along a whisker of 0.2 m: at least 0.2 */
+    double noise = 0.005 * 0.005 + p.settings.radial_edge_m * p.settings.radial_edge_m;
+    assert_near(k->belief.mean.x, 0.8 - 0.05 * 0.0009 / (0.0009 + noise), 1e-6);
+    struct nav_gaussian before = k->belief;
+    k->belief.mean.x = before.mean.x = 0.6; /* nothing within reach: nothing learned */
+    read_distance(k, INFINITY);
+    assert_memory_equal(&before, &k->belief, sizeof before);
+    nav_kalman_destroy(k);
+}
+
+static void a_border_crossed_puts_the_tip_on_the_line(void **state)
+{
+    (void)state;
+    struct nav_problem p = behind_the_border();
+    struct nav_kalman *k = create(&p);
+    cross(k);
+    /* At steps 4 and 5 the mean had the tip at 0.48 and 0.50, between them 0.49; the border is at 0.5. Its place is
+     * known to hypot(0.01, 0.01). Since then the robot has driven 0.07 m, which moves the line along with the tip. */
+    double gain = 0.0025 / (0.0025 + 0.0002);
+    assert_near(k->belief.mean.x, 0.3 + 8 * 0.02 + gain * 0.01, 1e-6);
+    assert_near(k->belief.covariance[0], 0.0025 * (1.0 - gain), 1e-8);
+    assert_near(k->belief.covariance[4], 0.0025, 1e-8);
+    nav_kalman_destroy(k);
+}
+
+static void a_texture_without_a_border_says_nothing(void **state)
+{
+    (void)state;
+    struct nav_problem p = behind_the_border();
+    struct nav_kalman *k = create(&p);
+    for (int i = 0; i < 4; i++)
+        read_texture(k, 1); /* the belief's own tile is 0: it cannot tell */
+    assert_near(k->belief.mean.x, 0.3, 0.0);
+    assert_near(k->belief.covariance[0], 0.0025, 1e-15);
+    nav_kalman_destroy(k);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_contact_square_on_is_a_kalman_update),
+        cmocka_unit_test(a_slanted_wall_turns_heading_into_range),
+        cmocka_unit_test(a_corner_has_no_derivative_and_changes_nothing),
+        cmocka_unit_test(what_is_too_far_off_is_not_believed),
+        cmocka_unit_test(no_contact_pushes_out_of_reach_and_no_further),
+        cmocka_unit_test(a_border_crossed_puts_the_tip_on_the_line),
+        cmocka_unit_test(a_texture_without_a_border_says_nothing),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,290 @@
+/* Particles by hand and against the grid; the filter's state is looked at, so its source is part of this program. */
+#include "../particle.c"
+
+#include "belief.h"
+#include "near.h"
+#include "rooms.h"
+
+static const double BOTH[] = {1.0, 1.0};
+
+static void resampling_takes_each_by_its_share(void **state)
+{
+    (void)state;
+    struct nav_particles from, to;
+    assert_int_equal(nav_particles_init(&from, 4) | nav_particles_init(&to, 10), 0);
+    const float weight[] = {0.5f, 0.0f, 0.2f, 0.3f};
+    from.count = 4;
+    for (int i = 0; i < 4; i++) {
+        from.x[i] = (float)i;
+        from.weight[i] = weight[i];
+    }
+    double taken[4] = {0.0};
+    for (int n = 0; n < 1000; n++) {
+        nav_particles_resample(&from, &to, 7, (n + 0.5) / 1000.0);
+        int now[4] = {0};
+        for (int k = 0; k < 7; k++)
+            now[(int)to.x[k]]++;
+        for (int i = 0; i < 4; i++) {
+            assert_true(fabs(now[i] - 7.0 * (double)weight[i]) < 1.0); /* systematic: never off by a whole one */
+            taken[i] += now[i] / 7000.0;
+        }
+        assert_near((double)to.weight[0], 1.0 / 7.0, 1e-7);
+    }
+    for (int i = 0; i < 4; i++)
+        assert_near(taken[i], (double)weight[i], 1e-3); /* and right on average */
+    nav_particles_free(&from);
+    nav_particles_free(&to);
+}
+
+static void the_bound_is_foxs(void **state)
+{
+    (void)state;
+    assert_near(nav_bins_bound(1.0, 0.05), 1.0, 0.0);
+    /* 2 bins: chi-square with one degree of freedom at 99 % is 6.63; Wilson and Hilferty make it 6.58. */
+    assert_near(nav_bins_bound(2.0, 0.05) * 2.0 * 0.05, 6.58, 0.01);
+    /* 101 bins: 135.8 in tables. */
+    assert_near(nav_bins_bound(101.0, 0.05) * 2.0 * 0.05, 135.8, 0.1);
+}
+
+static struct nav_problem quiet(void)
+{
+    struct nav_problem p = room();
+    p.settings.particle_recovery = 0.0;
+    p.seed = 7;
+    return p;
+}
+
+static void a_wider_belief_takes_more_particles(void **state)
+{
+    (void)state;
+    struct nav_problem p = quiet();
+    long count[3];
+    for (int n = 0; n < 3; n++) {
+        p.prior.sigma[0] = p.prior.sigma[1] = n == 0 ? 0.002 : 0.05;
+        p.prior.sigma[2] = n == 0 ? 0.002 : 0.2;
+        p.prior.uniform = n == 2;
+        struct particle *f = create(&p);
+        count[n] = f->cloud.count;
+        destroy(f);
+    }
+    assert_int_equal(count[0], 300);
+    assert_true(count[1] > 2 * count[0] && count[1] < 5000);
+    assert_true(count[2] > 10000 && count[2] <= 20000);
+    p.settings.particle_count = 1234.0;
+    struct particle *f = create(&p);
+    assert_int_equal(f->cloud.count, 1234);
+    destroy(f);
+}
+
+static void the_probe_says_what_the_likelihood_says(void **state)
+{
+    (void)state;
+    struct nav_problem p = room();
+    struct nav_probe probe;
+    assert_int_equal(nav_probe_init(&probe, &p, 0.0), 0);
+    struct nav_rng rng;
+    nav_rng_seed(&rng, 3, 0);
+    const double texture[] = {0.0, -3.0}, distance = 0.12, nothing = INFINITY;
+    const double weights[][2] = {{1.0, 1.0}, {0.5, 0.0}, {0.0, 0.5}, {1.0, 1.0}};
+    int blocked = 0;
+    for (int n = 0; n < 4000; n++) {
+        const double *reading[] = {texture, n % 4 == 3 ? &nothing : &distance};
+        nav_probe_read(&probe, &(struct nav_evidence){reading, weights[n % 4]});
+        struct nav_pose at = {1.2 * nav_rng_uniform(&rng) - 0.1, 1.2 * nav_rng_uniform(&rng) - 0.1,
+                              7.0 * nav_rng_uniform(&rng)};
+        double said = nav_probe_at(&probe, at.x, at.y, cos(at.theta), sin(at.theta));
+        uint8_t codes[2];
+        nav_likelihood_expect(probe.likelihood, &p.arena, &p.robot, at, codes);
+        if (nav_arena_free(&p.arena, at.x, at.y, p.robot.body_radius)) {
+            assert_near(said, (double)nav_likelihood_of(probe.likelihood, codes), 1e-5);
+            assert_true(said <= probe.ceiling + 1e-9);
+        } else {
+            assert_true(isinf(said) && said < 0.0);
+            blocked++;
+        }
+    }
+    assert_in_range(blocked, 500, 2500);
+    nav_probe_free(&probe);
+}
+
+static void a_move_is_the_motions_and_its_noise(void **state)
+{
+    (void)state;
+    enum { N = 20000 };
+    struct nav_particles p;
+    struct nav_rng rng;
+    assert_int_equal(nav_particles_init(&p, N), 0);
+    nav_rng_seed(&rng, 1, 0);
+    p.count = N;
+    for (long i = 0; i < N; i++) {
+        nav_particles_set(&p, i, (struct nav_pose){1.0, 2.0, NAV_PI / 2.0});
+        p.weight[i] = 1.0f / N;
+    }
+    nav_particles_move(&p, (struct nav_pose){0.3, 0.1, 0.5}, &(struct nav_noise){0.0004, 0.09}, &rng);
+    struct nav_pose mean = nav_particles_mean(&p);
+    assert_near(mean.x, 0.9, 1e-3);
+    assert_near(mean.y, 2.3, 1e-3);
+    assert_near(mean.theta, NAV_PI / 2.0 + 0.5, 1e-2);
+    double c[9];
+    nav_particles_covariance(&p, mean, c);
+    assert_near(c[0], 0.0004, 2e-5);
+    assert_near(c[4], 0.0004, 2e-5);
+    assert_near(c[8], 0.09, 3e-3);
+    for (long i = 0; i < N; i += 100)
+        assert_near((double)(p.c[i] * p.c[i] + p.s[i] * p.s[i]), 1.0, 1e-5);
+    nav_particles_free(&p);
+}
+
+/* One row of a robot that drives a bend. */
+static void step(struct nav_filter *f, int number, struct nav_estimate *e)
+{
+    static const double TEXTURE[] = {0.0, -3.0}, NOTHING = INFINITY;
+    struct nav_row row = {.t_s = 0.1 * number, .odometry = {0.03, 0.0, 0.1}, .texture = TEXTURE, .radial_m = &NOTHING};
+    nav_filter_step(f, &row, e);
+}
+
+enum { ROOM_FOR = 400000, BINS = 4 * 4 * 12 };
+
+/* Belief after six rows, in coarse bins. */
+static void believe(const struct nav_problem *p, const char *name, struct nav_component *list, double bins[BINS])
+{
+    struct nav_filter *f = nav_filter_new(name, p);
+    struct nav_estimate e;
+    for (int n = 0; n < 6; n++)
+        step(f, n, &e);
+    long count = nav_filter_components(f, list, ROOM_FOR);
+    assert_in_range(count, 2, ROOM_FOR);
+    assert_int_equal(nav_belief_bins(list, count, 1.0, 1.0, bins, BINS), BINS);
+    nav_filter_free(f);
+}
+
+static void many_particles_come_to_the_exact_posterior(void **state)
+{
+    (void)state;
+    struct nav_problem p = quiet();
+    p.prior.uniform = true;
+    p.settings.particle_count = 100000.0;
+    p.settings.grid_cell_m = 0.02;
+    p.settings.grid_cell_deg = 5.0;
+    p.settings.grid_teleport = 0.0;
+    struct nav_component *list = calloc(ROOM_FOR, sizeof *list);
+    double grid[BINS], many[BINS], few[BINS], off_many = 0.0, off_few = 0.0;
+    believe(&p, "grid", list, grid);
+    believe(&p, "particle", list, many);
+    p.settings.particle_count = 100.0;
+    believe(&p, "particle", list, few);
+    for (int n = 0; n < BINS; n++) {
+        off_many += 0.5 * fabs(many[n] - grid[n]);
+        off_few += 0.5 * fabs(few[n] - grid[n]);
+    }
+    assert_near(off_many, 0.0, 0.04);
+    assert_true(off_few > 3.0 * off_many);
+    free(list);
+}
+
+static void two_particles_follow_a_robot_that_they_know(void **state)
+{
+    (void)state;
+    struct nav_problem p = quiet();
+    p.settings.particle_count = 2.0;
+    p.prior.mean = (struct nav_pose){0.25, 0.25, 0.0};
+    p.prior.sigma[0] = p.prior.sigma[1] = p.prior.sigma[2] = 0.001;
+    p.robot.odometry_relative = 0.01;
+    struct nav_filter *f = nav_filter_new("particle", &p);
+    struct nav_estimate e;
+    struct nav_pose truth = p.prior.mean;
+    for (int n = 0; n < 20; n++) {
+        step(f, n, &e);
+        truth = nav_compose(truth, (struct nav_pose){0.03, 0.0, 0.1});
+        assert_int_equal(e.states, 2);
+        assert_int_equal(e.evaluations, 2);
+    }
+    assert_near(hypot(e.pose.x - truth.x, e.pose.y - truth.y), 0.0, 0.03);
+    nav_filter_free(f);
+}
+
+static void the_same_seed_gives_the_same_bytes(void **state)
+{
+    (void)state;
+    struct nav_problem p = room();
+    struct nav_estimate e[3];
+    for (int n = 0; n < 3; n++) {
+        p.seed = n == 2 ? 8 : 7;
+        struct nav_filter *f = nav_filter_new("particle", &p);
+        for (int i = 0; i < 30; i++)
+            step(f, i, &e[n]);
+        nav_filter_free(f);
+    }
+    assert_memory_equal(&e[0].pose, &e[1].pose, sizeof e[0].pose);
+    assert_memory_not_equal(&e[0].pose, &e[2].pose, sizeof e[0].pose);
+}
+
+/* One row whose readings fit with nothing: the tip on the other texture, a contact in the open. */
+static void contradict(struct particle *f, double distance)
+{
+    const double texture[] = {-50.0, 0.0};
+    const double *reading[] = {texture, &distance};
+    predict(f, &(struct nav_motion){.unknown_m = 0.0});
+    update(f, &(struct nav_evidence){reading, BOTH});
+}
+
+static void weights_that_stay_low_bring_fresh_particles_where_the_row_fits(void **state)
+{
+    (void)state;
+    struct nav_problem p = room();
+    p.settings.particle_count = 2000.0;
+    p.prior.mean = (struct nav_pose){0.25, 0.25, 0.0}; /* texture 0, nothing within reach */
+    p.prior.sigma[0] = p.prior.sigma[1] = p.prior.sigma[2] = 0.02;
+    struct particle *f = create(&p);
+    const double texture[] = {0.0, -50.0}, nothing = INFINITY;
+    const double *fits[] = {texture, &nothing};
+    for (int n = 0; n < 50; n++) {
+        predict(f, &(struct nav_motion){.unknown_m = 0.0});
+        update(f, &(struct nav_evidence){fits, BOTH});
+        assert_int_equal(f->weighed, 2000); /* none injected */
+    }
+    double before = f->slow;
+    assert_true(before > 0.2);
+    for (int n = 0; n < 40; n++)
+        contradict(f, 0.1);
+    assert_true(f->fast > 0.5 * before); /* those injected have taken over, and they fit */
+    long elsewhere = 0;
+    for (long i = 0; i < f->cloud.count; i++)
+        elsewhere += hypot((double)f->cloud.x[i] - 0.25, (double)f->cloud.y[i] - 0.25) > 0.2;
+    assert_true(elsewhere > 1800);
+    destroy(f);
+}
+
+static void a_row_that_no_particle_can_explain_changes_no_weight(void **state)
+{
+    (void)state;
+    struct nav_problem p = quiet();
+    p.settings.particle_count = 50.0;
+    struct particle *f = create(&p);
+    for (long i = 0; i < 50; i++)
+        nav_particles_set(&f->cloud, i, (struct nav_pose){5.0, 5.0, 0.0});
+    contradict(f, 0.1);
+    double total = 0.0;
+    for (long i = 0; i < 50; i++)
+        total += (double)f->cloud.weight[i];
+    assert_near(total, 1.0, 1e-5);
+    assert_int_equal(f->cloud.count, 50);
+    destroy(f);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(resampling_takes_each_by_its_share),
+        cmocka_unit_test(the_bound_is_foxs),
+        cmocka_unit_test(a_wider_belief_takes_more_particles),
+        cmocka_unit_test(the_probe_says_what_the_likelihood_says),
+        cmocka_unit_test(a_move_is_the_motions_and_its_noise),
+        cmocka_unit_test(many_particles_come_to_the_exact_posterior),
+        cmocka_unit_test(two_particles_follow_a_robot_that_they_know),
+        cmocka_unit_test(the_same_seed_gives_the_same_bytes),
+        cmocka_unit_test(weights_that_stay_low_bring_fresh_particles_where_the_row_fits),
+        cmocka_unit_test(a_row_that_no_particle_can_explain_changes_no_weight),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
