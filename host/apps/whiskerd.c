@@ -128,7 +128,7 @@ static void tell_damage(struct session *session)
 static int open_bridge(struct session *session)
 {
     struct whisker_identity identity;
-    const int error = whisker_device_open(&session->device, &identity);
+    const int error = whisker_device_open(NULL, &session->device, &identity);
     if (error == WHISKER_ERROR_WIRE_VERSION) {
         fprintf(stderr, PROGRAM ": bridge: %s (bridge %u, host %d); %s\n", whisker_error_text(error),
                 identity.wire_version, whisker_wire_version(), whisker_error_remedy(error));

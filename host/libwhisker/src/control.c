@@ -1,14 +1,48 @@
 #include "control.h"
 
+#include <pthread.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "whisker/errors.h"
 #include "whisker/frame.h"
 #include "whisker_protocol.h"
 
-hid_device *control_open(void)
+#define HID_PATH_BYTES 48
+
+/* hidapi's opening and its end are not safe for threads; handles, once open, are. */
+static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
+static int open_handles;
+
+/* Caller holds the lock. */
+static void release_hidapi(void)
 {
-    return hid_open(WHISKER_LIMIT_USB_VENDOR_ID, WHISKER_LIMIT_USB_PRODUCT_ID, NULL);
+    if (open_handles == 0) {
+        hid_exit();
+    }
+}
+
+hid_device *control_open(const char *path)
+{
+    char hid_path[HID_PATH_BYTES]; /* as hidapi's libusb backend names it: place, configuration, interface */
+    snprintf(hid_path, sizeof hid_path, "%s:1.%u", path, WHISKER_LIMIT_USB_HID_INTERFACE);
+    pthread_mutex_lock(&lock);
+    hid_device *hid = hid_open_path(hid_path);
+    open_handles += hid != NULL;
+    release_hidapi();
+    pthread_mutex_unlock(&lock);
+    return hid;
+}
+
+void control_close(hid_device *hid)
+{
+    if (hid) {
+        pthread_mutex_lock(&lock);
+        hid_close(hid);
+        open_handles--;
+        release_hidapi();
+        pthread_mutex_unlock(&lock);
+    }
 }
 
 static int get_report(hid_device *hid, uint8_t id, uint8_t *bytes, size_t count)
@@ -23,9 +57,11 @@ int control_identify(hid_device *hid, struct whisker_identity *identity)
 {
     uint8_t bytes[WHISKER_REPORT_IDENTITY_BYTES];
     const int error = get_report(hid, WHISKER_REPORT_ID_IDENTITY, bytes, sizeof bytes);
-    if (error) {
-        return error;
-    }
+    return error ? error : control_parse_identity(bytes, identity);
+}
+
+int control_parse_identity(const uint8_t *bytes, struct whisker_identity *identity)
+{
     *identity = (struct whisker_identity){
         .wire_version = bytes[WHISKER_REPORT_IDENTITY_WIRE_VERSION],
         .lanes = bytes[WHISKER_REPORT_IDENTITY_LANES],
@@ -55,13 +91,8 @@ int control_run(hid_device *hid, const struct whisker_settings *settings, bool r
     return hid_send_feature_report(hid, bytes, sizeof bytes) < 0 ? WHISKER_ERROR_DEVICE_REFUSED : WHISKER_OK;
 }
 
-int control_counters(hid_device *hid, struct whisker_counters *counters)
+void control_parse_counters(const uint8_t *bytes, struct whisker_counters *counters)
 {
-    uint8_t bytes[WHISKER_REPORT_COUNTERS_BYTES];
-    const int error = get_report(hid, WHISKER_REPORT_ID_COUNTERS, bytes, sizeof bytes);
-    if (error) {
-        return error;
-    }
     *counters = (struct whisker_counters){
         .running = bytes[WHISKER_REPORT_COUNTERS_RUNNING],
         .ticks = whisker_get_u32(bytes + WHISKER_REPORT_COUNTERS_TICKS),
@@ -72,7 +103,16 @@ int control_counters(hid_device *hid, struct whisker_counters *counters)
         .records_crc = whisker_get_u32(bytes + WHISKER_REPORT_COUNTERS_RECORDS_CRC),
         .records_tick = whisker_get_u32(bytes + WHISKER_REPORT_COUNTERS_RECORDS_TICK),
     };
-    return WHISKER_OK;
+}
+
+int control_counters(hid_device *hid, struct whisker_counters *counters)
+{
+    uint8_t bytes[WHISKER_REPORT_COUNTERS_BYTES];
+    const int error = get_report(hid, WHISKER_REPORT_ID_COUNTERS, bytes, sizeof bytes);
+    if (!error) {
+        control_parse_counters(bytes, counters);
+    }
+    return error;
 }
 
 int whisker_wire_version(void)

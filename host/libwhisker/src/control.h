@@ -7,8 +7,18 @@
 
 #include "whisker/device.h"
 
-/* Opens the HID interface of the first bridge. NULL: it is not there or may not be opened. */
-hid_device *control_open(void);
+/* Opens the HID interface of the bridge that is plugged in at this place. NULL: not there, or it may not be opened. */
+hid_device *control_open(const char *path);
+
+/* Closes it; NULL is allowed. hidapi has one state for all its handles: it goes with the last of them. */
+void control_close(hid_device *hid);
+
+/* The identity report's bytes as a struct, and compared with what this host knows. Returns 0, WIRE_VERSION,
+ * DEVICE_IDENTITY. */
+int control_parse_identity(const uint8_t *bytes, struct whisker_identity *identity);
+
+/* The counters report's bytes as a struct. */
+void control_parse_counters(const uint8_t *bytes, struct whisker_counters *counters);
 
 /* Reads who the bridge is and compares. Returns 0, WIRE_VERSION, DEVICE_IDENTITY, DEVICE_CONTROL. */
 int control_identify(hid_device *hid, struct whisker_identity *identity);

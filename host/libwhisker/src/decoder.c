@@ -78,8 +78,9 @@ static size_t skip(struct whisker_decoder *decoder, int error, size_t bytes)
 /* Decodes the frame at bytes and returns how many bytes to leave behind: all of it, or those up to a possible start. */
 static size_t take(struct whisker_decoder *decoder, const uint8_t *bytes, struct whisker_frame *frame, bool *made)
 {
-    const int error = whisker_frame_decode(bytes, WHISKER_FRAME_BYTES, frame);
-    if (error && error != WHISKER_ERROR_RECORD_CRC) {
+    struct frame_damage damage;
+    const int error = frame_decode(bytes, frame, &damage);
+    if (error && error != WHISKER_ERROR_RECORD_CRC && error != WHISKER_ERROR_RECORD_TICK) {
         return skip(decoder, error, next_candidate(bytes, 1));
     }
     const size_t inside = error ? frame_inside(bytes) : 0;
@@ -89,7 +90,11 @@ static size_t take(struct whisker_decoder *decoder, const uint8_t *bytes, struct
     *made = true;
     decoder->synchronised = true;
     decoder->counts.frames++;
-    decoder->counts.frames_damaged += error == WHISKER_ERROR_RECORD_CRC;
+    decoder->counts.frames_damaged += error != WHISKER_OK;
+    decoder->counts.records_damaged += damage.damaged;
+    decoder->counts.records_slipped += damage.slipped;
+    frame->flags |= decoder->mark;
+    decoder->mark = 0;
     frame->tick = decoder->tick = extend_tick(decoder->tick, (uint32_t)frame->tick);
     return WHISKER_FRAME_BYTES;
 }

@@ -1,88 +1,48 @@
 #include "whisker/device.h"
 
-#include <libusb.h>
 #include <stdbool.h>
 #include <stdlib.h>
 
 #include "control.h"
+#include "discovery.h"
 #include "whisker/errors.h"
 #include "whisker_protocol.h"
 
 /* 64 KiB queued: a quarter of a second at 2 kHz, more than the gaps a loaded machine was seen to make (61 ms). */
-#define TRANSFERS 16
-#define TRANSFER_BYTES 4096
+#define QUEUED_BYTES 65536
+#define BATCH_MIN 2 /* frames: one packet */
+#define TRANSFERS_MAX ((int)(QUEUED_BYTES / (BATCH_MIN * WHISKER_FRAME_BYTES)))
 /* What a stopped bridge still holds comes without a pause; this much silence means that it is empty. */
 #define STALE_TIMEOUT_MS 100
+#define STALE_BYTES 4096
+#define STATUS_TIMEOUT_MS 1000
 
 struct whisker_device {
     libusb_context *usb;
     libusb_device_handle *handle;
     hid_device *hid;
-    struct libusb_transfer *transfer[TRANSFERS];
-    int active;  /* transfers the kernel holds */
-    int error;   /* why the stream has ended */
-    bool ending; /* do not queue again */
-    bool claimed;
+    struct whisker_device_info about;
+    struct libusb_transfer *transfer[TRANSFERS_MAX];
+    int transfers; /* of them in use: what the batch divides QUEUED_BYTES into */
+    int active;    /* transfers the kernel holds */
+    int error;     /* why the stream has ended */
+    bool ending;   /* do not queue again */
     struct whisker_settings settings;
     whisker_sink sink;
     void *context;
-    uint8_t buffer[TRANSFERS][TRANSFER_BYTES];
+    uint8_t buffer[QUEUED_BYTES];
 };
 
-static int usb_error(int error)
+/* hidapi says only that something failed. Is the bridge still there? Asks for its status (USB 2.0, 9.4.5). */
+static int blame(struct whisker_device *device, int error)
 {
-    switch (error) {
-    case LIBUSB_ERROR_ACCESS:
-        return WHISKER_ERROR_DEVICE_ACCESS;
-    case LIBUSB_ERROR_BUSY:
-        return WHISKER_ERROR_DEVICE_BUSY;
-    case LIBUSB_ERROR_NO_DEVICE:
-        return WHISKER_ERROR_DEVICE_GONE;
-    case LIBUSB_ERROR_NO_MEM:
-        return WHISKER_ERROR_MEMORY;
-    default:
-        return WHISKER_ERROR_DEVICE_USB;
-    }
-}
-
-static bool is_bridge(libusb_device *candidate)
-{
-    struct libusb_device_descriptor about;
-    return libusb_get_device_descriptor(candidate, &about) == 0 && about.idVendor == WHISKER_LIMIT_USB_VENDOR_ID &&
-           about.idProduct == WHISKER_LIMIT_USB_PRODUCT_ID;
-}
-
-static int open_first(struct whisker_device *device)
-{
-    libusb_device **list;
-    const ssize_t count = libusb_get_device_list(device->usb, &list);
-    if (count < 0) {
-        return usb_error((int)count);
-    }
-    int error = WHISKER_ERROR_DEVICE_MISSING;
-    for (ssize_t i = 0; i < count && error == WHISKER_ERROR_DEVICE_MISSING; i++) {
-        if (is_bridge(list[i])) {
-            const int opened = libusb_open(list[i], &device->handle);
-            error = opened ? usb_error(opened) : WHISKER_OK;
-        }
-    }
-    libusb_free_device_list(list, 1);
-    return error;
-}
-
-static int open_usb(struct whisker_device *device)
-{
-    if (libusb_init(&device->usb) != 0) {
-        device->usb = NULL;
-        return WHISKER_ERROR_DEVICE_USB;
-    }
-    const int error = open_first(device);
-    if (error) {
+    uint8_t status[2];
+    if (error != WHISKER_ERROR_DEVICE_CONTROL && error != WHISKER_ERROR_DEVICE_REFUSED) {
         return error;
     }
-    const int claimed = libusb_claim_interface(device->handle, WHISKER_LIMIT_USB_BULK_INTERFACE);
-    device->claimed = claimed == 0;
-    return claimed ? usb_error(claimed) : WHISKER_OK;
+    const int got = libusb_control_transfer(device->handle, LIBUSB_ENDPOINT_IN, LIBUSB_REQUEST_GET_STATUS, 0, 0, status,
+                                            sizeof status, STATUS_TIMEOUT_MS);
+    return got == LIBUSB_ERROR_NO_DEVICE ? WHISKER_ERROR_DEVICE_GONE : error;
 }
 
 /* The bytes of a transfer that did not fill up are as good as any other's. */
@@ -106,31 +66,33 @@ static void LIBUSB_CALL on_transfer(struct libusb_transfer *transfer)
 
 static int make_transfers(struct whisker_device *device)
 {
-    for (int i = 0; i < TRANSFERS; i++) {
+    for (int i = 0; i < TRANSFERS_MAX; i++) {
         device->transfer[i] = libusb_alloc_transfer(0);
         if (!device->transfer[i]) {
             return WHISKER_ERROR_MEMORY;
         }
-        libusb_fill_bulk_transfer(device->transfer[i], device->handle, WHISKER_LIMIT_USB_BULK_IN, device->buffer[i],
-                                  TRANSFER_BYTES, on_transfer, device, 0);
     }
     return WHISKER_OK;
 }
 
-static int open_all(struct whisker_device *device, struct whisker_identity *identity)
+static int open_all(struct whisker_device *device, const char *serial, struct whisker_identity *identity)
 {
-    int error = open_usb(device);
+    if (libusb_init(&device->usb) != 0) {
+        device->usb = NULL;
+        return WHISKER_ERROR_DEVICE_USB;
+    }
+    int error = discovery_open(device->usb, serial, &device->handle, &device->about);
     if (!error) {
         error = make_transfers(device);
     }
     if (error) {
         return error;
     }
-    device->hid = control_open();
-    return device->hid ? control_identify(device->hid, identity) : WHISKER_ERROR_DEVICE_CONTROL;
+    device->hid = control_open(device->about.path);
+    return blame(device, device->hid ? control_identify(device->hid, identity) : WHISKER_ERROR_DEVICE_CONTROL);
 }
 
-int whisker_device_open(struct whisker_device **device, struct whisker_identity *identity)
+int whisker_device_open(const char *serial, struct whisker_device **device, struct whisker_identity *identity)
 {
     *device = NULL;
     *identity = (struct whisker_identity){0};
@@ -139,13 +101,18 @@ int whisker_device_open(struct whisker_device **device, struct whisker_identity 
         return WHISKER_ERROR_MEMORY;
     }
     whisker_settings_default(&opened->settings);
-    const int error = open_all(opened, identity);
+    const int error = open_all(opened, serial, identity);
     if (error) {
         whisker_device_close(opened);
         return error;
     }
     *device = opened;
     return WHISKER_OK;
+}
+
+const struct whisker_device_info *whisker_device_about(const struct whisker_device *device)
+{
+    return &device->about;
 }
 
 static void handle_events(struct whisker_device *device, int timeout_ms)
@@ -158,7 +125,7 @@ void whisker_device_flush(struct whisker_device *device)
 {
     device->ending = true;
     /* Last first: were an earlier one cancelled before a later, data could still fill the later and overtake it. */
-    for (int i = TRANSFERS - 1; i >= 0 && device->active > 0; i--) {
+    for (int i = device->transfers - 1; i >= 0 && device->active > 0; i--) {
         libusb_cancel_transfer(device->transfer[i]);
     }
     while (device->active > 0) {
@@ -172,23 +139,23 @@ void whisker_device_close(struct whisker_device *device)
         return;
     }
     whisker_device_flush(device);
-    for (int i = 0; i < TRANSFERS; i++) {
+    for (int i = 0; i < TRANSFERS_MAX; i++) {
         libusb_free_transfer(device->transfer[i]);
     }
-    if (device->hid) {
-        hid_close(device->hid);
-    }
-    hid_exit();
-    if (device->claimed) {
-        libusb_release_interface(device->handle, WHISKER_LIMIT_USB_BULK_INTERFACE);
-    }
+    control_close(device->hid);
     if (device->handle) {
+        libusb_release_interface(device->handle, WHISKER_LIMIT_USB_BULK_INTERFACE);
         libusb_close(device->handle);
     }
     if (device->usb) {
         libusb_exit(device->usb);
     }
     free(device);
+}
+
+static int stop(struct whisker_device *device)
+{
+    return control_run(device->hid, &device->settings, false) ? WHISKER_ERROR_DEVICE_CONTROL : WHISKER_OK;
 }
 
 /* A process that was killed leaves the bridge running and its FIFO full. */
@@ -199,19 +166,38 @@ static int discard_stale(struct whisker_device *device)
     if (error || !counters.running) {
         return error;
     }
-    error = whisker_device_stop(device);
+    error = stop(device);
     int got = 1;
     while (!error && got > 0) {
-        libusb_bulk_transfer(device->handle, WHISKER_LIMIT_USB_BULK_IN, device->buffer[0], TRANSFER_BYTES, &got,
+        libusb_bulk_transfer(device->handle, WHISKER_LIMIT_USB_BULK_IN, device->buffer, STALE_BYTES, &got,
                              STALE_TIMEOUT_MS);
     }
     return error;
 }
 
+static int queue_transfers(struct whisker_device *device)
+{
+    const int bytes = device->settings.batch * (int)WHISKER_FRAME_BYTES;
+    device->transfers = QUEUED_BYTES / bytes;
+    for (int i = 0; i < device->transfers; i++) {
+        libusb_fill_bulk_transfer(device->transfer[i], device->handle, WHISKER_LIMIT_USB_BULK_IN,
+                                  device->buffer + (size_t)i * (size_t)bytes, bytes, on_transfer, device, 0);
+        const int error = libusb_submit_transfer(device->transfer[i]);
+        if (error) {
+            return usb_error(error);
+        }
+        device->active++;
+    }
+    return WHISKER_OK;
+}
+
 int whisker_device_start(struct whisker_device *device, const struct whisker_settings *settings, whisker_sink sink,
                          void *context)
 {
-    int error = discard_stale(device);
+    int error = whisker_settings_check(settings, NULL, 0);
+    if (!error) {
+        error = blame(device, discard_stale(device));
+    }
     if (error) {
         return error;
     }
@@ -220,14 +206,8 @@ int whisker_device_start(struct whisker_device *device, const struct whisker_set
     device->context = context;
     device->error = WHISKER_OK;
     device->ending = false;
-    for (int i = 0; i < TRANSFERS; i++) {
-        error = libusb_submit_transfer(device->transfer[i]);
-        if (error) {
-            return usb_error(error);
-        }
-        device->active++;
-    }
-    return control_run(device->hid, &device->settings, true);
+    error = queue_transfers(device);
+    return error ? error : blame(device, control_run(device->hid, settings, true));
 }
 
 int whisker_device_poll(struct whisker_device *device, int timeout_ms)
@@ -238,10 +218,10 @@ int whisker_device_poll(struct whisker_device *device, int timeout_ms)
 
 int whisker_device_stop(struct whisker_device *device)
 {
-    return control_run(device->hid, &device->settings, false) ? WHISKER_ERROR_DEVICE_CONTROL : WHISKER_OK;
+    return blame(device, stop(device));
 }
 
 int whisker_device_counters(struct whisker_device *device, struct whisker_counters *counters)
 {
-    return control_counters(device->hid, counters);
+    return blame(device, control_counters(device->hid, counters));
 }

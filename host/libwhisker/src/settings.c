@@ -5,6 +5,14 @@
 #include "whisker/errors.h"
 #include "whisker_protocol.h"
 
+/* Frames: a packet holds two, a transfer of 4 KiB sixteen. */
+#define BATCH_MIN 2
+#define BATCH_MAX 16
+#define BATCH_DEFAULT 4
+/* Words of a record on the node link. */
+#define WORDS 4
+#define WORD_BITS 16
+
 void whisker_settings_default(struct whisker_settings *settings)
 {
     *settings = (struct whisker_settings){
@@ -13,6 +21,7 @@ void whisker_settings_default(struct whisker_settings *settings)
         .sck_divider = WHISKER_LIMIT_SCK_DIVIDER_DEFAULT,
         .word_gap = WHISKER_LIMIT_WORD_GAP_DEFAULT,
         .sample_point = WHISKER_LIMIT_SAMPLE_POINT_DEFAULT,
+        .batch = BATCH_DEFAULT,
     };
 }
 
@@ -30,6 +39,7 @@ int whisker_settings_check(const struct whisker_settings *settings, char *messag
         {"SCK divider", settings->sck_divider, WHISKER_LIMIT_SCK_DIVIDER_MIN, WHISKER_LIMIT_SCK_DIVIDER_MAX, true},
         {"word gap", settings->word_gap, WHISKER_LIMIT_WORD_GAP_MIN, UINT8_MAX, false},
         {"sample point", settings->sample_point, 1, settings->sck_divider, false},
+        {"batch", settings->batch, BATCH_MIN, BATCH_MAX, true},
     };
     for (size_t i = 0; i < sizeof limits / sizeof limits[0]; i++) {
         const struct limit *it = &limits[i];
@@ -42,4 +52,10 @@ int whisker_settings_check(const struct whisker_settings *settings, char *messag
         }
     }
     return WHISKER_OK;
+}
+
+int64_t whisker_settings_latency_ns(const struct whisker_settings *settings)
+{
+    const int64_t transfer = WORDS * WORD_BITS * settings->sck_divider + (WORDS - 1) * settings->word_gap;
+    return (settings->tick_period + transfer) * INT64_C(1000000000) / WHISKER_LIMIT_CLOCK_HZ;
 }

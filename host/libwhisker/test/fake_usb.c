@@ -1,10 +1,13 @@
 #include "fake_usb.h"
 
 #include <hidapi.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "whisker_protocol.h"
+
+#define SERIAL_INDEX 3
 
 struct fake_usb fake;
 
@@ -17,10 +20,17 @@ static struct completion {
 } completions[FAKE_TRANSFERS], held;
 static int completion_count;
 static char object; /* whatever an opaque handle points at */
+static char bus[4]; /* the devices */
+static struct {
+    libusb_hotplug_callback_fn call;
+    void *context;
+    bool due;
+} watcher;
 
 void fake_reset(void)
 {
-    fake = (struct fake_usb){.plugged = true, .has_hid = true, .identity_bytes = WHISKER_REPORT_IDENTITY_BYTES};
+    fake = (struct fake_usb){
+        .plugged = true, .bridges = 1, .has_hid = true, .identity_bytes = WHISKER_REPORT_IDENTITY_BYTES};
     fake.identity[WHISKER_REPORT_CONTROL_ID] = WHISKER_REPORT_ID_IDENTITY;
     fake.identity[WHISKER_REPORT_IDENTITY_WIRE_VERSION] = WHISKER_WIRE_VERSION;
     fake.identity[WHISKER_REPORT_IDENTITY_LANES] = WHISKER_LIMIT_LANES;
@@ -29,6 +39,13 @@ void fake_reset(void)
     memset(cancelled, 0, sizeof cancelled);
     completion_count = 0;
     held.count = 0;
+    watcher.call = NULL;
+}
+
+void fake_plug(bool event)
+{
+    fake.plugged = true;
+    watcher.due = event;
 }
 
 static void fill(struct completion *completion, const void *bytes, size_t count, enum libusb_transfer_status status)
@@ -73,11 +90,13 @@ void libusb_exit(libusb_context *context)
 
 ssize_t libusb_get_device_list(libusb_context *context, libusb_device ***list)
 {
-    static libusb_device *devices[2];
+    static libusb_device *devices[sizeof bus];
     (void)context;
-    devices[0] = fake.plugged ? (libusb_device *)&object : NULL;
+    for (int i = 0; i < fake.bridges; i++) {
+        devices[i] = (libusb_device *)&bus[i];
+    }
     *list = devices;
-    return fake.plugged;
+    return fake.plugged ? fake.bridges : 0;
 }
 
 void libusb_free_device_list(libusb_device **list, int unreference)
@@ -92,14 +111,79 @@ int libusb_get_device_descriptor(libusb_device *device, struct libusb_device_des
     memset(about, 0, sizeof *about);
     about->idVendor = WHISKER_LIMIT_USB_VENDOR_ID;
     about->idProduct = WHISKER_LIMIT_USB_PRODUCT_ID;
+    about->iSerialNumber = SERIAL_INDEX;
     return 0;
+}
+
+uint8_t libusb_get_bus_number(libusb_device *device)
+{
+    (void)device;
+    return 1;
+}
+
+int libusb_get_port_numbers(libusb_device *device, uint8_t *ports, int room)
+{
+    (void)room;
+    ports[0] = 2;
+    ports[1] = (uint8_t)((char *)device - bus + 1);
+    return 2;
+}
+
+libusb_device *libusb_get_device(libusb_device_handle *handle)
+{
+    return (libusb_device *)handle;
+}
+
+int libusb_get_string_descriptor_ascii(libusb_device_handle *handle, uint8_t index, unsigned char *text, int room)
+{
+    const char serial[] = {'0', '0', '0', (char)('1' + ((char *)handle - bus)), '\0'};
+    if (index != SERIAL_INDEX || room < (int)sizeof serial) {
+        return LIBUSB_ERROR_INVALID_PARAM;
+    }
+    memcpy(text, serial, sizeof serial);
+    return (int)sizeof serial - 1;
+}
+
+int libusb_control_transfer(libusb_device_handle *handle, uint8_t type, uint8_t request, uint16_t value, uint16_t index,
+                            unsigned char *bytes, uint16_t count, unsigned timeout_ms)
+{
+    (void)handle, (void)value, (void)index, (void)timeout_ms;
+    if (type != LIBUSB_ENDPOINT_IN || request != LIBUSB_REQUEST_GET_STATUS) {
+        return LIBUSB_ERROR_PIPE;
+    }
+    memset(bytes, 0, count);
+    return fake.gone ? LIBUSB_ERROR_NO_DEVICE : count;
+}
+
+int libusb_has_capability(uint32_t capability)
+{
+    return capability == LIBUSB_CAP_HAS_HOTPLUG;
+}
+
+int libusb_hotplug_register_callback(libusb_context *context, int events, int flags, int vendor, int product, int class,
+                                     libusb_hotplug_callback_fn call, void *user_data,
+                                     libusb_hotplug_callback_handle *handle)
+{
+    (void)context, (void)events, (void)vendor, (void)product, (void)class;
+    watcher.call = call;
+    watcher.context = user_data;
+    watcher.due = flags == LIBUSB_HOTPLUG_ENUMERATE && fake.plugged;
+    *handle = 1;
+    fake.opened++;
+    return 0;
+}
+
+void libusb_hotplug_deregister_callback(libusb_context *context, libusb_hotplug_callback_handle handle)
+{
+    (void)context;
+    watcher.call = NULL;
+    fake.opened -= handle;
 }
 
 int libusb_open(libusb_device *device, libusb_device_handle **handle)
 {
-    (void)device;
     if (fake.open_error == 0) {
-        *handle = (libusb_device_handle *)&object;
+        *handle = (libusb_device_handle *)device;
         fake.opened++;
     }
     return fake.open_error;
@@ -113,8 +197,8 @@ void libusb_close(libusb_device_handle *handle)
 
 int libusb_claim_interface(libusb_device_handle *handle, int interface)
 {
-    (void)handle;
     fake.opened += fake.claim_error == 0;
+    fake.claimed = (int)((char *)handle - bus);
     return interface == WHISKER_LIMIT_USB_BULK_INTERFACE ? fake.claim_error : LIBUSB_ERROR_NOT_FOUND;
 }
 
@@ -173,9 +257,12 @@ static void end_oldest(const struct completion *completion)
 
 int libusb_handle_events_timeout_completed(libusb_context *context, struct timeval *timeout, int *completed)
 {
-    (void)context;
     (void)timeout;
     (void)completed;
+    if (watcher.call && watcher.due) {
+        watcher.due = false;
+        watcher.call(context, (libusb_device *)&bus[0], LIBUSB_HOTPLUG_EVENT_DEVICE_ARRIVED, watcher.context);
+    }
     const int ready = completion_count;
     completion_count = 0;
     for (int i = 0; i < ready; i++) {
@@ -203,10 +290,10 @@ int libusb_bulk_transfer(libusb_device_handle *handle, unsigned char endpoint, u
 
 /* ------------------------------------------------------------------------------------------------------- hidapi */
 
-hid_device *hid_open(unsigned short vendor, unsigned short product, const wchar_t *serial)
+hid_device *hid_open_path(const char *path)
 {
-    (void)serial;
-    const bool found = fake.has_hid && vendor == WHISKER_LIMIT_USB_VENDOR_ID && product == WHISKER_LIMIT_USB_PRODUCT_ID;
+    const bool found = fake.has_hid && path[0] == '1';
+    snprintf(fake.hid_path, sizeof fake.hid_path, "%s", path);
     fake.opened += found;
     return found ? (hid_device *)&object : NULL;
 }
@@ -219,12 +306,16 @@ void hid_close(hid_device *device)
 
 int hid_exit(void)
 {
+    fake.hid_exits++;
     return 0;
 }
 
 int hid_get_feature_report(hid_device *device, unsigned char *bytes, size_t room)
 {
     (void)device;
+    if (fake.gone) {
+        return -1;
+    }
     if (bytes[0] == WHISKER_REPORT_ID_IDENTITY) {
         memcpy(bytes, fake.identity, sizeof fake.identity);
         return fake.identity_bytes;
@@ -237,7 +328,7 @@ int hid_get_feature_report(hid_device *device, unsigned char *bytes, size_t room
 int hid_send_feature_report(hid_device *device, const unsigned char *bytes, size_t count)
 {
     (void)device;
-    if (fake.hid_refuses || count != sizeof fake.control) {
+    if (fake.hid_refuses || fake.gone || count != sizeof fake.control) {
         return -1;
     }
     memcpy(fake.control, bytes, count);

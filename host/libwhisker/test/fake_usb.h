@@ -7,11 +7,13 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define FAKE_TRANSFERS 32
+#define FAKE_TRANSFERS 128
 
 struct fake_usb {
     /* what the test sets */
     bool plugged, hid_refuses;
+    bool gone;   /* unplugged while it was open: control transfers say so */
+    int bridges; /* plugged in; their serial numbers are "0001", "0002", ... */
     bool has_hid;
     int open_error, claim_error;
     uint8_t identity[16];
@@ -19,7 +21,10 @@ struct fake_usb {
     bool running;
     int stale_reads; /* bulk reads that still give data after a stop */
     /* what the library did */
-    int opened; /* contexts, handles, interfaces, HID handles and transfers not given back */
+    int opened;    /* contexts, handles, interfaces, HID handles and transfers not given back */
+    int hid_exits; /* ends of hidapi */
+    int claimed;   /* number of the bridge last claimed */
+    char hid_path[48];
     int in_flight;
     uint8_t control[16];
     char events[64]; /* in order: S start, X stop, q transfer queued, r synchronous read */
@@ -29,6 +34,9 @@ extern struct fake_usb fake;
 
 /* A bridge as it should be, plugged in. */
 void fake_reset(void);
+
+/* A bridge is plugged in while a watcher waits: told by an event, or silently. */
+void fake_plug(bool event);
 
 /* Ends the oldest transfer in flight, at the next handling of events. */
 void fake_complete(const void *bytes, size_t count, enum libusb_transfer_status status);

@@ -12,7 +12,7 @@
 #include "whisker/errors.h"
 #include "whisker_protocol.h"
 
-#define QUEUED 16
+#define QUEUED 64 /* transfers of four frames */
 
 static struct whisker_device *device;
 static char received[256];
@@ -39,7 +39,7 @@ static int plug_in(void **state)
 static void open_good(void)
 {
     struct whisker_identity identity;
-    assert_int_equal(whisker_device_open(&device, &identity), 0);
+    assert_int_equal(whisker_device_open(NULL, &device, &identity), 0);
     assert_int_equal(identity.clock_hz, WHISKER_LIMIT_CLOCK_HZ);
 }
 
@@ -62,7 +62,7 @@ static void close_and_check(void)
 static struct whisker_identity assert_not_opened(int error)
 {
     struct whisker_identity identity;
-    assert_int_equal(whisker_device_open(&device, &identity), error);
+    assert_int_equal(whisker_device_open(NULL, &device, &identity), error);
     assert_null(device);
     assert_int_equal(fake.opened, 0);
     return identity;
@@ -100,11 +100,114 @@ static void another_wire_version_or_shape_is_refused_and_named(void **state)
     assert_int_equal(assert_not_opened(WHISKER_ERROR_DEVICE_IDENTITY).frame_bytes, 128);
 }
 
+static void the_bridge_asked_for_is_opened(void **state)
+{
+    (void)state;
+    struct whisker_identity identity;
+    fake.bridges = 3;
+    assert_int_equal(whisker_device_open("0002", &device, &identity), 0);
+    assert_int_equal(fake.claimed, 1);
+    assert_string_equal(fake.hid_path, "1-2.2:1.1"); /* control goes to the same one */
+    assert_string_equal(whisker_device_about(device)->serial, "0002");
+    assert_string_equal(whisker_device_about(device)->path, "1-2.2");
+    close_and_check();
+    assert_int_equal(whisker_device_open("0009", &device, &identity), WHISKER_ERROR_DEVICE_SERIAL);
+    fake.claim_error = LIBUSB_ERROR_BUSY;
+    assert_int_equal(whisker_device_open("0003", &device, &identity), WHISKER_ERROR_DEVICE_BUSY);
+    fake.plugged = false;
+    assert_int_equal(whisker_device_open("0003", &device, &identity), WHISKER_ERROR_DEVICE_SERIAL);
+    assert_int_equal(fake.opened, 0);
+}
+
+static void bridges_are_listed_also_without_permission(void **state)
+{
+    (void)state;
+    struct whisker_device_info list[2];
+    fake.bridges = 3;
+    assert_int_equal(whisker_device_list(list, 2), 3);
+    assert_string_equal(list[1].serial, "0002");
+    assert_string_equal(list[1].path, "1-2.2");
+    assert_int_equal(list[1].error, 0);
+    fake.open_error = LIBUSB_ERROR_ACCESS;
+    assert_int_equal(whisker_device_list(list, 2), 3);
+    assert_string_equal(list[0].serial, "");
+    assert_int_equal(list[0].error, WHISKER_ERROR_DEVICE_ACCESS);
+    fake.plugged = false;
+    assert_int_equal(whisker_device_list(NULL, 0), 0);
+    assert_int_equal(fake.opened, 0);
+}
+
+/* hidapi has one state: were it ended with the first handle, the others would lose theirs. */
+static void hidapi_ends_with_its_last_handle(void **state)
+{
+    (void)state;
+    struct whisker_device *other;
+    struct whisker_identity identity;
+    fake.bridges = 2;
+    open_good();
+    assert_int_equal(whisker_device_open("0002", &other, &identity), 0);
+    whisker_device_close(other);
+    assert_int_equal(fake.hid_exits, 0);
+    close_and_check();
+    assert_int_equal(fake.hid_exits, 1);
+}
+
+static void arrivals_are_reported_by_event_and_by_looking(void **state)
+{
+    (void)state;
+    struct whisker_hotplug *hotplug;
+    assert_int_equal(whisker_hotplug_open(&hotplug), 0);
+    assert_int_equal(whisker_hotplug_wait(hotplug, 0), 0); /* it was there */
+    assert_int_equal(whisker_hotplug_wait(hotplug, 0), WHISKER_ERROR_TIMEOUT);
+    fake.plugged = false;
+    assert_int_equal(whisker_hotplug_wait(hotplug, 0), WHISKER_ERROR_TIMEOUT);
+    fake_plug(true);
+    assert_int_equal(whisker_hotplug_wait(hotplug, 0), 0);
+    assert_int_equal(whisker_hotplug_wait(hotplug, 0), WHISKER_ERROR_TIMEOUT);
+    fake_plug(false);
+    assert_int_equal(whisker_hotplug_wait(hotplug, 5000), 0); /* no event came; found when looked for */
+    whisker_hotplug_close(hotplug);
+    assert_int_equal(fake.opened, 0);
+}
+
+/* Unplugged between opening and starting: not "refused", which is what hidapi makes of it. */
+static void a_bridge_gone_before_its_start_is_told_so(void **state)
+{
+    (void)state;
+    struct whisker_counters counters;
+    struct whisker_settings settings;
+    whisker_settings_default(&settings);
+    open_good();
+    fake.gone = true;
+    assert_int_equal(whisker_device_start(device, &settings, sink, &device), WHISKER_ERROR_DEVICE_GONE);
+    assert_int_equal(whisker_device_counters(device, &counters), WHISKER_ERROR_DEVICE_GONE);
+    assert_int_equal(whisker_device_stop(device), WHISKER_ERROR_DEVICE_GONE);
+    close_and_check();
+    assert_not_opened(WHISKER_ERROR_DEVICE_GONE);
+}
+
+static void the_batch_divides_what_is_queued(void **state)
+{
+    (void)state;
+    struct whisker_settings settings;
+    whisker_settings_default(&settings);
+    open_good();
+    for (settings.batch = 2; settings.batch <= 16; settings.batch = (uint8_t)(settings.batch * 2)) {
+        assert_int_equal(whisker_device_start(device, &settings, sink, &device), 0);
+        assert_int_equal(fake.in_flight, 256 / settings.batch);
+        whisker_device_flush(device);
+        assert_int_equal(fake.in_flight, 0);
+    }
+    settings.batch = 5;
+    assert_int_equal(whisker_device_start(device, &settings, sink, &device), WHISKER_ERROR_DEVICE_REFUSED);
+    close_and_check();
+}
+
 static void start_queues_transfers_and_sends_the_settings(void **state)
 {
     (void)state;
     const struct whisker_settings settings = {
-        .lane_mask = 0x0A0B0C0D, .tick_period = 30000, .sck_divider = 6, .word_gap = 31, .sample_point = 5};
+        .lane_mask = 0x0A0B0C0D, .tick_period = 30000, .sck_divider = 6, .word_gap = 31, .sample_point = 5, .batch = 4};
     static const uint8_t report[16] = {1, 1, 1, 6, 31, 5, 0, 0, 0x0D, 0x0C, 0x0B, 0x0A, 0x30, 0x75, 0, 0};
     open_good();
     assert_int_equal(whisker_device_start(device, &settings, sink, &device), 0);
@@ -228,6 +331,9 @@ static void settings_outside_their_limits_are_named(void **state)
     bad.tick_period = 3999;
     assert_setting(bad, "the tick period is 3999; it must be 4000 to 4294967295");
     bad = good;
+    bad.batch = 3;
+    assert_setting(bad, "the batch is 3; it must be even, 2 to 16");
+    bad = good;
     bad.lane_mask = 1u << 28; /* a 29th lane */
     assert_setting(bad, "the lane mask is 268435456; it must be 0 to 268435455");
 }
@@ -239,6 +345,12 @@ int main(void)
     const struct CMUnitTest tests[] = {
         WITH_BRIDGE(open_says_why_it_fails),
         WITH_BRIDGE(another_wire_version_or_shape_is_refused_and_named),
+        WITH_BRIDGE(the_bridge_asked_for_is_opened),
+        WITH_BRIDGE(bridges_are_listed_also_without_permission),
+        WITH_BRIDGE(hidapi_ends_with_its_last_handle),
+        WITH_BRIDGE(arrivals_are_reported_by_event_and_by_looking),
+        WITH_BRIDGE(a_bridge_gone_before_its_start_is_told_so),
+        WITH_BRIDGE(the_batch_divides_what_is_queued),
         WITH_BRIDGE(start_queues_transfers_and_sends_the_settings),
         WITH_BRIDGE(a_bridge_left_running_is_stopped_and_emptied_first),
         WITH_BRIDGE(bytes_come_in_order_and_transfers_are_queued_again),

@@ -1,12 +1,17 @@
 /*
  * The bridge as a USB device: frames by asynchronous bulk transfers (libusb), control by HID feature reports (hidapi).
- * A handle belongs to one thread at a time. Errors: 0 or a negative code of errors.h.
+ *
+ * Threads: a handle belongs to one thread at a time; different handles may be used by different threads at once.
+ * Errors: 0 or a negative code of errors.h. Nothing here prints. From whisker_device_start on whisker_device_poll
+ * allocates nothing itself (libusb keeps a small block for each transfer it queues).
  */
 #ifndef WHISKER_DEVICE_H
 #define WHISKER_DEVICE_H
 
 #include <stddef.h>
 #include <stdint.h>
+
+#include "whisker/stats.h"
 
 #pragma GCC visibility push(default)
 struct whisker_device;
@@ -21,13 +26,14 @@ struct whisker_identity {
     uint16_t fifo_bytes;
 };
 
-/* How the bridge is to run; unit of all but the mask: cycle of its 60 MHz clock. */
+/* How the bridge is to run; unit of all but mask and batch: cycle of its 60 MHz clock. */
 struct whisker_settings {
     uint32_t lane_mask;   /* bit n: lane n is in use */
     uint32_t tick_period; /* 4000 or more; 30000 = 500 us */
     uint8_t sck_divider;  /* one SCK period: even, 6 to 32 */
     uint8_t word_gap;     /* SCK idle between two words: 30 to 255 */
     uint8_t sample_point; /* MISO is read this long after the edge that shifted it: 1 to sck_divider */
+    uint8_t batch;        /* frames of one USB transfer, even, 2 to 16: fewer come sooner, more cost less */
 };
 
 /* The bridge's own counts since its start. */
@@ -42,7 +48,7 @@ struct whisker_counters {
     uint32_t records_tick;
 };
 
-/* The hardware's defaults (all 28 lanes, 500 us). */
+/* The hardware's defaults (all 28 lanes, 500 us), and batches of 4: frames wait 2 ms at most for their transfer. */
 void whisker_settings_default(struct whisker_settings *settings);
 
 /*
@@ -51,15 +57,36 @@ void whisker_settings_default(struct whisker_settings *settings);
  */
 int whisker_settings_check(const struct whisker_settings *settings, char *message, size_t n);
 
+/* ns from a tick to the earliest moment at which its frame can be sent: the next tick and its transfer from the nodes.
+ */
+int64_t whisker_settings_latency_ns(const struct whisker_settings *settings);
+
 /* The wire version this library speaks. */
 int whisker_wire_version(void);
 
+/* A bridge on the bus. */
+struct whisker_device_info {
+    char serial[WHISKER_SERIAL_BYTES]; /* empty if it could not be read: then `error` says why */
+    char path[32];                     /* where it is plugged in, as the kernel writes it: "1-2.4" */
+    int error;                         /* 0, DEVICE_ACCESS, DEVICE_GONE, DEVICE_USB */
+};
+
 /*
- * Opens the first bridge found and asks who it is. Returns 0 and the device, or DEVICE_MISSING, DEVICE_ACCESS,
- * DEVICE_BUSY, DEVICE_USB, DEVICE_CONTROL, WIRE_VERSION, DEVICE_IDENTITY, MEMORY; then *device is NULL.
+ * Lists the bridges that are plugged in, also those in use or without permission; the first `room` of them go into
+ * list. Returns how many there are, or DEVICE_USB, MEMORY.
+ */
+int whisker_device_list(struct whisker_device_info *list, int room);
+
+/*
+ * Opens a bridge and asks who it is. serial: which one; NULL: the first that can be opened. Returns 0 and the device,
+ * or DEVICE_MISSING, DEVICE_SERIAL, DEVICE_ACCESS, DEVICE_BUSY, DEVICE_USB, DEVICE_GONE, DEVICE_CONTROL, WIRE_VERSION,
+ * DEVICE_IDENTITY, MEMORY; then *device is NULL.
  * identity: filled in also with WIRE_VERSION and DEVICE_IDENTITY, so that a message can name both sides.
  */
-int whisker_device_open(struct whisker_device **device, struct whisker_identity *identity);
+int whisker_device_open(const char *serial, struct whisker_device **device, struct whisker_identity *identity);
+
+/* Serial number and place of an open device; valid until it is closed. */
+const struct whisker_device_info *whisker_device_about(const struct whisker_device *device);
 
 /* Cancels what is under way and closes. NULL is allowed. Does not stop the bridge. */
 void whisker_device_close(struct whisker_device *device);
@@ -68,8 +95,9 @@ void whisker_device_close(struct whisker_device *device);
 typedef void (*whisker_sink)(void *context, const uint8_t *bytes, size_t count);
 
 /*
- * Stops a bridge that still runs for a process that is gone and throws its frames away; queues the bulk transfers; then
- * starts the bridge. Returns 0 or DEVICE_REFUSED, DEVICE_CONTROL, DEVICE_USB, DEVICE_GONE.
+ * Stops a bridge that still runs for a process that is gone and throws its frames away; queues the bulk transfers
+ * (64 KiB: a quarter of a second at 2 kHz); then starts the bridge. May be called again after stop and flush.
+ * Returns 0 or DEVICE_REFUSED, DEVICE_CONTROL, DEVICE_USB, DEVICE_GONE.
  */
 int whisker_device_start(struct whisker_device *device, const struct whisker_settings *settings, whisker_sink sink,
                          void *context);
@@ -78,14 +106,30 @@ int whisker_device_start(struct whisker_device *device, const struct whisker_set
  * Returns 0, or DEVICE_GONE, DEVICE_USB: the stream has ended. */
 int whisker_device_poll(struct whisker_device *device, int timeout_ms);
 
-/* Tells the bridge to stop: it makes one more frame, with flag LAST. Poll on to receive it. */
+/* Tells the bridge to stop: it makes one more frame, with flag LAST. Poll on to receive it. 0, DEVICE_CONTROL,
+ * DEVICE_GONE. */
 int whisker_device_stop(struct whisker_device *device);
 
 /* Ends the stream: bytes of transfers that were not yet full still reach the sink. */
 void whisker_device_flush(struct whisker_device *device);
 
-/* Asks for the bridge's counters; also while frames stream. */
+/* Asks for the bridge's counters; also while frames stream. 0, DEVICE_CONTROL, DEVICE_GONE. */
 int whisker_device_counters(struct whisker_device *device, struct whisker_counters *counters);
+
+struct whisker_hotplug;
+
+/* Begins to watch for bridges being plugged in. Returns 0, or DEVICE_USB, MEMORY; then *hotplug is NULL. */
+int whisker_hotplug_open(struct whisker_hotplug **hotplug);
+
+/*
+ * Waits until a bridge is there that was not reported yet; also reports one that is there every second, so that
+ * opening it is tried again, and so that it works where no udev tells of new devices. Returns 0: try to open; TIMEOUT
+ * (also after a signal).
+ */
+int whisker_hotplug_wait(struct whisker_hotplug *hotplug, int timeout_ms);
+
+/* NULL is allowed. */
+void whisker_hotplug_close(struct whisker_hotplug *hotplug);
 #pragma GCC visibility pop
 
 #endif

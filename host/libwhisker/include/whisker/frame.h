@@ -10,6 +10,7 @@
 /* cffi: begin */
 #define WHISKER_FRAME_LANES 28
 #define WHISKER_FRAME_LAST 1         /* bit of flags: the last frame after a stop */
+#define WHISKER_FRAME_GAP 256        /* bit of flags, set by the host: the first frame after the bridge had gone */
 #define WHISKER_STATUS_ERROR_BITS 10 /* of a status, from bit 0: the sensor's errors; above them: the code */
 
 /* What one lane delivered: counts (0x8000 at rest, 65536 counts = 180 degrees); status: 0 good, see protocol.md. */
@@ -20,7 +21,9 @@ struct whisker_sample {
     uint16_t reserved;
 };
 
-/* The entry of a ring, 256 bytes. tick counts from start and does not wrap; time_cycles is the bridge's 60 MHz clock.
+/*
+ * The entry of a ring, 256 bytes. tick counts from start and does not wrap; time_cycles is the bridge's 60 MHz clock,
+ * also from start. Both begin anew at a frame with WHISKER_FRAME_GAP.
  */
 struct whisker_frame {
     uint64_t tick;
@@ -35,15 +38,18 @@ struct whisker_frame {
 
 /*
  * Decodes one frame of the wire format. bytes: the frame's first byte on; count: how many there are (256 are used).
- * Returns 0, or TRUNCATED, MAGIC, WIRE_VERSION, HEADER_CRC, LANES (frame untouched), or RECORD_CRC: the frame is filled
- * in, and each lane whose record is damaged has status code LINK_CRC and zero angles, so the other lanes are kept.
+ * Returns 0, or TRUNCATED, MAGIC, WIRE_VERSION, HEADER_CRC, LANES (frame untouched), or RECORD_CRC or RECORD_TICK: the
+ * frame is filled in, and each lane whose record is damaged (of another tick) has status code LINK_CRC (LINK_TICK) and
+ * zero angles, so the other lanes are kept.
  */
 int whisker_frame_decode(const uint8_t *bytes, size_t count, struct whisker_frame *frame);
 
 /* What a decoder has seen. A run of bytes that is no frame counts once, under its first cause. */
 struct whisker_decoder_counts {
     uint64_t frames;
-    uint64_t frames_damaged; /* delivered, with at least one lane flagged here */
+    uint64_t frames_damaged;  /* delivered, with at least one lane flagged here */
+    uint64_t records_damaged; /* flagged here because of their CRC */
+    uint64_t records_slipped; /* flagged here because of their tick */
     uint64_t bytes_skipped;
     uint64_t bad_magic;
     uint64_t bad_wire_version;
@@ -57,6 +63,7 @@ struct whisker_decoder {
     struct whisker_decoder_counts counts;
     uint64_t tick;     /* of the last frame, extended to 64 bits */
     size_t held;       /* bytes kept from earlier chunks */
+    uint32_t mark;     /* flags for the next frame, such as WHISKER_FRAME_GAP; then 0 */
     bool synchronised; /* false from a bad byte to the next good frame */
     int first_error;   /* why bytes were skipped for the first time; 0: never */
     uint8_t bytes[256];

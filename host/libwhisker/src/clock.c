@@ -1,0 +1,193 @@
+#include "whisker/clock.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "whisker/errors.h"
+
+/* One point per second: at 2 kHz at least a hundred arrivals to choose the fastest from. */
+#define POINT_NS 1e9
+/* A crystal and a host's clock, disciplined or not, differ by less (typically 100e-6). */
+#define SKEW_MAX 500e-6
+/* Less than this cannot be told from delay; more, for so many seconds, is no delay any more. */
+#define JUMP_EARLY_NS 5e6
+#define JUMP_LATE_NS 20e6
+#define JUMP_POINTS 3
+/* What no arrival tells: the host's least delay from the end of a transfer to its callback. */
+#define FLOOR_NS 25e3
+/* Until there are points enough, arrivals may all have been held up: as long as a loaded machine was seen to (61 ms).
+ */
+#define UNKNOWN_NS 60e6
+#define POINTS_KNOWN 3
+/* A time service slews by 500e-6 at most, so what is more between two arrivals is a step. */
+#define REALTIME_STEP_NS INT64_C(10000000)
+/* A century: further away no cycle is, and sums stay inside 64 bits. */
+#define FAR_NS 3.2e18
+
+void whisker_clock_begin(struct whisker_clock_fit *fit, uint32_t clock_hz, int64_t latency_ns)
+{
+    memset(fit, 0, sizeof *fit);
+    fit->nominal_ns = 1e9 / clock_hz;
+    fit->latency_ns = latency_ns;
+}
+
+static void restart(struct whisker_clock_fit *fit, uint64_t cycles, int64_t arrival_ns)
+{
+    fit->restarts += fit->begun;
+    fit->begun = true;
+    fit->first_cycles = cycles;
+    fit->first_ns = arrival_ns;
+    fit->points = fit->late_points = 0;
+    fit->skew = fit->late_ns = fit->spread_ns = 0;
+    fit->best = (struct whisker_clock_point){0, 0};
+}
+
+/* How far a point lies above the line. */
+static double above(const struct whisker_clock_fit *fit, const struct whisker_clock_point *point)
+{
+    return point->late_ns - (fit->late_ns + fit->skew * point->x_ns);
+}
+
+static double slope(const struct whisker_clock_point *a, const struct whisker_clock_point *b)
+{
+    return (b->late_ns - a->late_ns) / (b->x_ns - a->x_ns);
+}
+
+/* The lower convex hull of the points, left to right (Andrew's monotone chain); returns how many are on it. */
+static int lower_hull(const struct whisker_clock_point *point, int count,
+                      struct whisker_clock_point hull[WHISKER_CLOCK_POINTS])
+{
+    int on = 0;
+    for (int i = 0; i < count; i++) {
+        while (on >= 2 && slope(&hull[on - 2], &hull[on - 1]) >= slope(&hull[on - 1], &point[i])) {
+            on--;
+        }
+        hull[on++] = point[i];
+    }
+    return on;
+}
+
+/*
+ * Of all lines that no point lies below, the one with the least sum of distances goes along the edge of the lower hull
+ * above the mean of x (Moon, Skelly, Towsley 1999: skew by linear programming).
+ */
+static double envelope_skew(const struct whisker_clock_fit *fit)
+{
+    struct whisker_clock_point hull[WHISKER_CLOCK_POINTS];
+    const int on = lower_hull(fit->point, fit->points, hull);
+    double mean = 0;
+    for (int i = 0; i < fit->points; i++) {
+        mean += fit->point[i].x_ns / fit->points;
+    }
+    int edge = 1;
+    while (edge < on - 1 && hull[edge].x_ns < mean) {
+        edge++;
+    }
+    return on < 2 ? 0 : fmax(-SKEW_MAX, fmin(SKEW_MAX, slope(&hull[edge - 1], &hull[edge])));
+}
+
+/* How far the fastest arrivals of a second usually lie above the line: the median. */
+static double median_above(const struct whisker_clock_fit *fit)
+{
+    double sorted[WHISKER_CLOCK_POINTS];
+    for (int i = 0; i < fit->points; i++) {
+        const double distance = above(fit, &fit->point[i]);
+        int at = i;
+        for (; at > 0 && sorted[at - 1] > distance; at--) {
+            sorted[at] = sorted[at - 1];
+        }
+        sorted[at] = distance;
+    }
+    return sorted[fit->points / 2];
+}
+
+static void fit_line(struct whisker_clock_fit *fit)
+{
+    fit->skew = envelope_skew(fit);
+    fit->late_ns = INFINITY;
+    for (int i = 0; i < fit->points; i++) {
+        fit->late_ns = fmin(fit->late_ns, fit->point[i].late_ns - fit->skew * fit->point[i].x_ns);
+    }
+    fit->spread_ns = median_above(fit);
+}
+
+static void keep_best(struct whisker_clock_fit *fit)
+{
+    if (fit->points == WHISKER_CLOCK_POINTS) {
+        fit->points--;
+        memmove(fit->point, fit->point + 1, (size_t)fit->points * sizeof fit->point[0]);
+    }
+    fit->late_points = fit->points > 0 && above(fit, &fit->best) > JUMP_LATE_NS ? fit->late_points + 1 : 0;
+    fit->point[fit->points++] = fit->best;
+    fit_line(fit);
+}
+
+static struct whisker_clock_point point_of(const struct whisker_clock_fit *fit, uint64_t cycles, int64_t arrival_ns)
+{
+    const double x_ns = (double)(cycles - fit->first_cycles) * fit->nominal_ns;
+    return (struct whisker_clock_point){x_ns, (double)(arrival_ns - fit->first_ns) - x_ns};
+}
+
+static void add_point(struct whisker_clock_fit *fit, struct whisker_clock_point now)
+{
+    if (floor(now.x_ns / POINT_NS) > floor(fit->best.x_ns / POINT_NS)) {
+        keep_best(fit);
+        fit->best = now;
+    } else if (above(fit, &now) < above(fit, &fit->best)) {
+        fit->best = now;
+    }
+    fit->late_ns += fmin(0, above(fit, &now)); /* the line is never above an arrival */
+}
+
+/* True if no delay and no crystal explains this arrival. */
+static bool jumped(const struct whisker_clock_fit *fit, struct whisker_clock_point now)
+{
+    return fit->late_points >= JUMP_POINTS || (fit->points >= POINTS_KNOWN && above(fit, &now) < -JUMP_EARLY_NS);
+}
+
+int whisker_clock_add(struct whisker_clock_fit *fit, uint64_t cycles, int64_t monotonic_ns, int64_t realtime_ns)
+{
+    const int64_t arrival_ns = monotonic_ns - fit->latency_ns;
+    const int64_t offset_ns = realtime_ns - monotonic_ns;
+    const int64_t step_ns = offset_ns - fit->realtime_offset_ns;
+    const bool back = fit->begun && arrival_ns < fit->last_ns;
+    const bool set = fit->begun && (step_ns > REALTIME_STEP_NS || step_ns < -REALTIME_STEP_NS);
+    if (!fit->begun || back || cycles < fit->last_cycles || jumped(fit, point_of(fit, cycles, arrival_ns))) {
+        restart(fit, cycles, arrival_ns);
+    }
+    fit->last_cycles = cycles;
+    fit->last_ns = arrival_ns;
+    fit->realtime_offset_ns = offset_ns;
+    add_point(fit, point_of(fit, cycles, arrival_ns));
+    return back || set ? WHISKER_ERROR_HOST_CLOCK : WHISKER_OK;
+}
+
+void whisker_clock_get(const struct whisker_clock_fit *fit, struct whisker_clock *clock)
+{
+    *clock = (struct whisker_clock){0};
+    if (!fit->begun) {
+        return;
+    }
+    const double x_ns = (double)(fit->last_cycles - fit->first_cycles) * fit->nominal_ns;
+    clock->device_cycles = fit->last_cycles;
+    clock->monotonic_ns = fit->first_ns + llround(x_ns + fit->late_ns + fit->skew * x_ns);
+    clock->realtime_ns = clock->monotonic_ns + fit->realtime_offset_ns;
+    clock->ns_per_cycle = fit->nominal_ns * (1 + fit->skew);
+    clock->uncertainty_ns = FLOOR_NS + (fit->points >= POINTS_KNOWN ? 2 * fit->spread_ns : UNKNOWN_NS);
+}
+
+static int64_t shift(const struct whisker_clock *clock, int64_t base_ns, uint64_t cycles)
+{
+    const double on_ns = (double)(int64_t)(cycles - clock->device_cycles) * clock->ns_per_cycle;
+    return clock->ns_per_cycle > 0 ? base_ns + llround(fmax(-FAR_NS, fmin(FAR_NS, on_ns))) : 0;
+}
+
+int64_t whisker_clock_to_monotonic(const struct whisker_clock *clock, uint64_t cycles)
+{
+    return shift(clock, clock->monotonic_ns, cycles);
+}
+
+int64_t whisker_clock_to_realtime(const struct whisker_clock *clock, uint64_t cycles)
+{
+    return shift(clock, clock->realtime_ns, cycles);
+}
