@@ -96,5 +96,6 @@ extern const struct nav_filter_ops nav_ukf_filter;      /* the same by the unsce
 extern const struct nav_filter_ops nav_foveal_filter;   /* the paper's, equations 5-7 */
 extern const struct nav_filter_ops nav_grid_filter;     /* exact, equation 4 */
 extern const struct nav_filter_ops nav_particle_filter; /* Monte-Carlo localisation */
+extern const struct nav_filter_ops nav_adaptive_filter; /* as much belief as the rows leave open */
 
 #endif

@@ -46,6 +46,19 @@ static const struct entry ENTRIES[] = {
     ENTRY(particle, resample, 0.5, 0.0, 1.0),
     ENTRY(particle, recovery, 0.005, 0.0, 1.0),
     ENTRY(particle, recovery_fast, 0.05, 0.0, 1.0),
+    ENTRY(adaptive, budget, 120000.0, 10000.0, 1000000000.0),
+    ENTRY(adaptive, most, 4000.0, 16.0, 100000.0),
+    ENTRY(adaptive, least, 250.0, 2.0, 100000.0),
+    ENTRY(adaptive, per_bin, 8.0, 0.1, 1000.0),
+    ENTRY(adaptive, bin_m, 0.025, 0.001, 10.0),
+    ENTRY(adaptive, bin_deg, 5.0, 0.1, 360.0),
+    ENTRY(adaptive, gain, 0.0, 0.0, 0.5),
+    ENTRY(adaptive, cell_m, 0.05, 0.005, 1.0),
+    ENTRY(adaptive, cell_deg, 10.0, 0.5, 90.0),
+    ENTRY(adaptive, rows, 4.0, 1.0, 100.0),
+    ENTRY(adaptive, hazard, 0.0001, 1e-12, 0.1),
+    ENTRY(adaptive, wake, 0.01, 1e-12, 0.4),
+    ENTRY(adaptive, scattered, 0.01, 0.0, 1.0),
 };
 
 #define COUNT ((int)(sizeof ENTRIES / sizeof ENTRIES[0]))

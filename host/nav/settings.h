@@ -35,6 +35,19 @@ struct nav_settings {
     double particle_resample;      /* resamples when the effective share of the particles falls below this */
     double particle_recovery;      /* slow rate at which the mean weight is followed; 0: no recovery by injection */
     double particle_recovery_fast; /* fast rate */
+    double adaptive_budget;        /* most cells and hypotheses touched per row */
+    double adaptive_most;          /* hypotheses in the cloud, at most */
+    double adaptive_least;         /* and at least; between, by the bins they occupy: */
+    double adaptive_per_bin;       /* so many in each */
+    double adaptive_bin_m;         /* of this edge */
+    double adaptive_bin_deg;       /* and this extent in heading */
+    double adaptive_gain;          /* spread of the hypotheses' odometry gains */
+    double adaptive_cell_m;        /* edge of the arena-wide histogram's cells, or more in large arenas */
+    double adaptive_cell_deg;      /* and their extent in heading */
+    double adaptive_rows;          /* the arena-wide histogram has at most so many budgets of cells */
+    double adaptive_hazard;        /* probability at any row that the robot has been put elsewhere */
+    double adaptive_wake;          /* odds of being elsewhere at which the histogram wakes */
+    double adaptive_scattered;     /* share of the histogram that a cloud may leave out */
 };
 
 /* The defaults. */

@@ -1,0 +1,286 @@
+/* The adaptive filter: as much belief as the rows leave open, and no more.
+ *
+ * Known: a cloud of hypotheses at exact poses, as many as its spread needs. In doubt: an arena-wide histogram wakes
+ * and goes over the rows from which on the robot may have been elsewhere; both beliefs are held, weighted by how well
+ * they explained those rows. Unknown: the histogram alone, until its mass sits in few enough cells for a cloud. Work
+ * per row is bounded by adaptive.budget in every state: what the histogram has not done waits for the next row.
+ * docs/navigation_adaptive.md tells more. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "adaptive_doubt.h"
+#include "adaptive_global.h"
+#include "adaptive_symmetry.h"
+
+struct adaptive {
+    const struct nav_problem *problem;
+    struct adaptive_sense sense;
+    struct adaptive_cloud cloud;
+    struct adaptive_global global;
+    struct adaptive_log log;
+    struct adaptive_doubt doubt;
+    bool local, awake;       /* which of the two beliefs are held; one at least */
+    double odds;             /* logarithm, elsewhere against local, before the rows that the histogram has gone over */
+    struct nav_pose pending; /* motion since the last row that was read ... */
+    struct nav_noise pending_noise; /* ... and its noise */
+    struct adaptive_summary answer; /* after the last row that was read */
+    long evaluations, distinct, touched;
+};
+
+static void destroy(void *self)
+{
+    struct adaptive *a = self;
+    adaptive_doubt_free(&a->doubt);
+    adaptive_log_free(&a->log);
+    adaptive_global_free(&a->global);
+    adaptive_cloud_free(&a->cloud);
+    adaptive_sense_free(&a->sense);
+    free(a);
+}
+
+/* Log-odds that the robot is not where the local belief has it. */
+static double odds(const struct adaptive *a)
+{
+    double hazard = log(a->problem->settings.adaptive_hazard);
+    if (!a->local)
+        return INFINITY;
+    if (a->awake && adaptive_global_current(&a->global, &a->log))
+        return a->odds + a->global.gained;
+    return hazard + a->doubt.ratio;
+}
+
+static double elsewhere(const struct adaptive *a)
+{
+    return 1.0 / (1.0 + exp(-odds(a)));
+}
+
+static struct nav_pose ahead(const struct adaptive *a)
+{
+    return adaptive_log_since(&a->log, a->global.next);
+}
+
+static double mix(double share, double a, double b)
+{
+    return (1.0 - share) * a + share * b;
+}
+
+/* Covariance of a mixture about the first belief's mean. */
+static void mix_covariance(struct nav_gaussian *g, const struct nav_gaussian *other, double share)
+{
+    double d[3] = {other->mean.x - g->mean.x, other->mean.y - g->mean.y, nav_wrap(other->mean.theta - g->mean.theta)};
+    for (int k = 0; k < 9; k++)
+        g->covariance[k] = mix(share, g->covariance[k], other->covariance[k] + d[k / 3] * d[k % 3]);
+}
+
+/* Belief of the arena as a whole, for what sleeps. */
+static struct nav_gaussian anywhere(const struct adaptive *a)
+{
+    struct nav_problem lost = *a->problem;
+    lost.prior.uniform = true;
+    return nav_gaussian_prior(&lost);
+}
+
+static void answer_local(struct adaptive *a, double share)
+{
+    a->answer = adaptive_cloud_summary(&a->cloud, a->answer.belief.mean);
+    struct nav_gaussian other = a->awake ? a->global.summary.belief : anywhere(a);
+    mix_covariance(&a->answer.belief, &other, share);
+    a->answer.near *= 1.0 - share;
+}
+
+static void answer_global(struct adaptive *a, double share)
+{
+    a->answer = a->global.summary;
+    nav_gaussian_move(&a->answer.belief, ahead(a), &(struct nav_noise){0.0, 0.0});
+    struct adaptive_summary other = a->answer;
+    if (a->local)
+        other = adaptive_cloud_summary(&a->cloud, a->answer.belief.mean);
+    mix_covariance(&a->answer.belief, &other.belief, 1.0 - share);
+    a->answer.near *= share;
+}
+
+static void answer(struct adaptive *a)
+{
+    double share = elsewhere(a);
+    if (a->awake && share > 0.5)
+        answer_global(a, share);
+    else
+        answer_local(a, share);
+}
+
+static void begin(struct adaptive *a)
+{
+    a->local = !a->problem->prior.uniform && adaptive_cloud_prior(&a->cloud, &a->sense);
+    a->awake = !a->local;
+    a->answer.belief = nav_gaussian_prior(a->problem);
+    answer(a);
+}
+
+static void *create(const struct nav_problem *problem)
+{
+    struct adaptive *a = calloc(1, sizeof *a);
+    struct nav_rng rng;
+    if (!a)
+        return NULL;
+    a->problem = problem;
+    nav_rng_seed(&rng, problem->seed, 1);
+    if (adaptive_sense_init(&a->sense, problem, (size_t)problem->settings.adaptive_most) ||
+        adaptive_cloud_init(&a->cloud, problem) || adaptive_global_init(&a->global, problem) ||
+        adaptive_log_init(&a->log, problem) || adaptive_doubt_init(&a->doubt, &a->sense, &rng)) {
+        destroy(a);
+        return NULL;
+    }
+    a->cloud.images = adaptive_symmetry(&problem->arena);
+    begin(a);
+    return a;
+}
+
+/* Wakes the histogram at the row from which on the robot may have been elsewhere. */
+static void wake(struct adaptive *a)
+{
+    uint64_t tail = adaptive_log_tail(&a->log);
+    a->awake = true;
+    a->odds = log(a->problem->settings.adaptive_hazard);
+    adaptive_global_restart(&a->global, a->doubt.since > tail ? a->doubt.since : tail);
+}
+
+static void sleep(struct adaptive *a)
+{
+    a->awake = false;
+    adaptive_doubt_clear(&a->doubt, a->log.head);
+}
+
+/* The histogram's mass sits in few cells: hypotheses take over its share. */
+static void take_over(struct adaptive *a, double share)
+{
+    const struct nav_settings *s = &a->problem->settings;
+    double count = fmin(fmax(s->adaptive_least, a->global.crowd * s->adaptive_per_bin), s->adaptive_most / 2.0);
+    if (a->local)
+        adaptive_cloud_scale(&a->cloud, 1.0 - share);
+    else
+        a->cloud.count = 0;
+    adaptive_global_draw(&a->global, &a->cloud, (long)count, share, ahead(a));
+    a->touched += (long)count;
+    a->local = true;
+    adaptive_cloud_thin(&a->cloud, true);
+    sleep(a);
+}
+
+/* What to hold on to, once the histogram has seen all rows. */
+static void decide(struct adaptive *a)
+{
+    const struct nav_settings *s = &a->problem->settings;
+    double present = odds(a);
+    if (!a->awake) {
+        if (present > log(s->adaptive_wake))
+            wake(a);
+        return;
+    }
+    if (!adaptive_global_current(&a->global, &a->log))
+        return;
+    if (a->global.scattered < s->adaptive_scattered && present > log(s->adaptive_wake))
+        take_over(a, elsewhere(a));
+    else if (a->doubt.ratio <= 0.0 && present <= log(s->adaptive_wake))
+        sleep(a);
+    else if (present > -log(s->adaptive_wake))
+        a->local = false;
+}
+
+/* Lets the histogram work within what is left of the row's budget. */
+static void work(struct adaptive *a)
+{
+    if (!a->awake)
+        return;
+    a->global.touched = a->global.distinct = 0;
+    adaptive_global_work(&a->global, &a->log, (long)a->problem->settings.adaptive_budget - a->touched);
+    a->touched += a->global.touched;
+    a->evaluations += a->global.touched;
+    a->distinct += a->global.distinct;
+}
+
+static void predict(void *self, const struct nav_motion *motion)
+{
+    struct adaptive *a = self;
+    struct nav_noise noise = nav_motion_noise(&a->problem->robot, &a->problem->settings, motion);
+    a->pending = nav_compose(a->pending, motion->step);
+    a->pending_noise.position += noise.position;
+    a->pending_noise.heading += noise.heading;
+    a->evaluations = a->distinct = a->touched = 0;
+}
+
+static void update_local(struct adaptive *a)
+{
+    a->cloud.moved = 0;
+    adaptive_cloud_move(&a->cloud, a->pending, &a->pending_noise);
+    double local = adaptive_cloud_weigh(&a->cloud, &a->sense);
+    adaptive_log_entry(&a->log, a->log.head - 1)->local = local;
+    adaptive_doubt_take(&a->doubt, a->log.head - 1, adaptive_doubt_anywhere(&a->doubt, &a->sense), local);
+    a->evaluations += a->cloud.count;
+    adaptive_cloud_thin(&a->cloud, false);
+    a->touched += a->cloud.moved;
+    a->distinct += a->sense.distinct;
+}
+
+static void update(void *self, const struct nav_evidence *evidence)
+{
+    struct adaptive *a = self;
+    adaptive_sense_read(&a->sense, evidence);
+    adaptive_log_write(&a->log, a->pending, a->pending_noise, evidence);
+    a->answer.belief.mean = nav_compose(a->answer.belief.mean, a->pending);
+    if (a->local)
+        update_local(a);
+    work(a);
+    decide(a);
+    answer(a);
+    a->pending = (struct nav_pose){0.0, 0.0, 0.0};
+    a->pending_noise = (struct nav_noise){0.0, 0.0};
+}
+
+static void estimate(const void *self, struct nav_estimate *out)
+{
+    const struct adaptive *a = self;
+    struct nav_gaussian now = a->answer.belief;
+    nav_gaussian_move(&now, a->pending, &a->pending_noise);
+    out->pose = now.mean;
+    memcpy(out->covariance, now.covariance, sizeof now.covariance);
+    out->confidence = a->answer.near;
+    out->evaluations = a->evaluations;
+    out->distinct = a->distinct;
+    out->touched = a->touched;
+    out->states = (a->local ? a->cloud.count : 0) + (a->awake ? (long)adaptive_global_cells(&a->global) : 0);
+    out->bytes = sizeof *a + adaptive_sense_bytes(&a->sense) + adaptive_global_bytes(&a->global) +
+                 adaptive_log_bytes(&a->log) + 2 * (size_t)a->cloud.room * sizeof *a->cloud.at;
+}
+
+static long list_global(const struct adaptive *a, double share, struct nav_component *out, long from, long room)
+{
+    const struct adaptive_global *g = &a->global;
+    struct nav_pose moved = nav_compose(ahead(a), a->pending);
+    for (size_t n = 0; n < adaptive_global_cells(g); n++) {
+        double mass = g->fresh ? 1.0 / (double)adaptive_global_cells(g) : (double)g->mass[n] / g->total;
+        if (!(mass > 0.0))
+            continue;
+        if (from < room)
+            out[from] = (struct nav_component){nav_compose(adaptive_global_centre(g, n), moved), g->cell / sqrt(12.0),
+                                               g->cell_theta / sqrt(12.0), share * mass};
+        from++;
+    }
+    return from;
+}
+
+static long components(const void *self, struct nav_component *out, long room)
+{
+    const struct adaptive *a = self;
+    double share = a->awake ? elsewhere(a) : 0.0;
+    long count = a->local ? adaptive_cloud_list(&a->cloud, a->pending, 1.0 - share, out, room) : 0;
+    return a->awake ? list_global(a, share, out, count, room) : count;
+}
+
+const struct nav_filter_ops nav_adaptive_filter = {.name = "adaptive",
+                                                   .create = create,
+                                                   .destroy = destroy,
+                                                   .predict = predict,
+                                                   .update = update,
+                                                   .estimate = estimate,
+                                                   .components = components};

@@ -1,0 +1,185 @@
+#include "adaptive_cloud.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { BOOK = 8192, TRIES = 20 };
+
+/* The body radius and the walls' places are no better known than this. */
+static const double GRACE_M = 0.01;
+/* Log-likelihood of standing where the map says one cannot: maps are wrong sometimes. */
+static const double BLOCKED = -7.0;
+
+int adaptive_cloud_init(struct adaptive_cloud *cloud, const struct nav_problem *problem)
+{
+    *cloud = (struct adaptive_cloud){.problem = problem, .images = 1, .room = (long)problem->settings.adaptive_most};
+    nav_rng_seed(&cloud->rng, problem->seed, 0);
+    cloud->at = calloc((size_t)cloud->room, sizeof *cloud->at);
+    cloud->spare = calloc((size_t)cloud->room, sizeof *cloud->spare);
+    cloud->stamp = calloc(BOOK, sizeof *cloud->stamp);
+    return cloud->at && cloud->spare && cloud->stamp ? 0 : -1;
+}
+
+void adaptive_cloud_free(struct adaptive_cloud *cloud)
+{
+    free(cloud->at);
+    free(cloud->spare);
+    free(cloud->stamp);
+}
+
+double adaptive_normal(struct nav_rng *rng)
+{
+    uint64_t bits = nav_rng_bits(rng);
+    double sum =
+        (double)(bits & 0xffff) + (double)(bits >> 16 & 0xffff) + (double)(bits >> 32 & 0xffff) + (double)(bits >> 48);
+    /* Four uniform numbers of 0 .. 65535: mean 131070, variance (65536^2 - 1) / 3. */
+    return (sum - 131070.0) * (1.0 / 37837.22);
+}
+
+static void turn_to(struct adaptive_particle *p, double theta)
+{
+    p->pose.theta = nav_wrap(theta);
+    p->c = cos(p->pose.theta);
+    p->s = sin(p->pose.theta);
+}
+
+void adaptive_cloud_add(struct adaptive_cloud *cloud, struct nav_pose pose, double weight, const float *share)
+{
+    if (cloud->count == cloud->room)
+        return;
+    double spread = cloud->problem->settings.adaptive_gain;
+    struct adaptive_particle *p = &cloud->at[cloud->count++];
+    *p = (struct adaptive_particle){.pose = pose, .weight = weight};
+    p->gain = 1.0 + spread * adaptive_normal(&cloud->rng);
+    p->turn_gain = 1.0 + spread * adaptive_normal(&cloud->rng);
+    memcpy(p->share, share, sizeof p->share);
+    turn_to(p, pose.theta);
+}
+
+/* How many hypotheses a number of occupied bins needs. */
+static long needed(const struct adaptive_cloud *cloud, double bins)
+{
+    const struct nav_settings *s = &cloud->problem->settings;
+    return (long)fmin(fmax(bins * s->adaptive_per_bin, s->adaptive_least), (double)cloud->room);
+}
+
+bool adaptive_cloud_prior(struct adaptive_cloud *cloud, const struct adaptive_sense *sense)
+{
+    const struct nav_prior *prior = &cloud->problem->prior;
+    const struct nav_settings *s = &cloud->problem->settings;
+    static const float FIRST[ADAPTIVE_IMAGES_MOST] = {1.0f};
+    /* Four sigmas of each axis, in bins. */
+    double bins = fmax(4.0 * prior->sigma[0] / s->adaptive_bin_m, 1.0) *
+                  fmax(4.0 * prior->sigma[1] / s->adaptive_bin_m, 1.0) *
+                  fmax(4.0 * prior->sigma[2] / (s->adaptive_bin_deg * NAV_PI / 180.0), 1.0);
+    long count = needed(cloud, bins);
+    cloud->count = 0;
+    for (long n = 0; n < count * TRIES && cloud->count < count; n++) {
+        struct nav_pose pose = {prior->mean.x + prior->sigma[0] * nav_rng_normal(&cloud->rng),
+                                prior->mean.y + prior->sigma[1] * nav_rng_normal(&cloud->rng),
+                                prior->mean.theta + prior->sigma[2] * nav_rng_normal(&cloud->rng)};
+        if (adaptive_sense_free_at(sense, pose.x, pose.y, GRACE_M))
+            adaptive_cloud_add(cloud, pose, 1.0, FIRST);
+    }
+    adaptive_cloud_scale(cloud, 1.0 / fmax((double)cloud->count, 1.0));
+    return cloud->count > 0;
+}
+
+void adaptive_cloud_scale(struct adaptive_cloud *cloud, double factor)
+{
+    for (long n = 0; n < cloud->count; n++)
+        cloud->at[n].weight *= factor;
+}
+
+void adaptive_cloud_move(struct adaptive_cloud *cloud, struct nav_pose step, const struct nav_noise *noise)
+{
+    double position = sqrt(noise->position), heading = sqrt(noise->heading);
+    for (long n = 0; n < cloud->count; n++) {
+        struct adaptive_particle *p = &cloud->at[n];
+        double dx = p->gain * step.x + position * adaptive_normal(&cloud->rng);
+        double dy = p->gain * step.y + position * adaptive_normal(&cloud->rng);
+        p->pose.x += p->c * dx - p->s * dy;
+        p->pose.y += p->s * dx + p->c * dy;
+        turn_to(p, p->pose.theta + p->turn_gain * step.theta + heading * adaptive_normal(&cloud->rng));
+    }
+    cloud->moved += cloud->count;
+}
+
+double adaptive_cloud_weigh(struct adaptive_cloud *cloud, struct adaptive_sense *sense)
+{
+    float best = -INFINITY;
+    for (long n = 0; n < cloud->count; n++) {
+        struct adaptive_particle *p = &cloud->at[n];
+        p->slot = adaptive_sense_at(sense, p->pose.x, p->pose.y, p->c, p->s);
+        best = fmaxf(best, sense->value[p->slot]);
+    }
+    double total = 0.0;
+    for (long n = 0; n < cloud->count; n++) {
+        struct adaptive_particle *p = &cloud->at[n];
+        double loglik = (double)(sense->value[p->slot] - best);
+        if (!adaptive_sense_free_at(sense, p->pose.x, p->pose.y, GRACE_M))
+            loglik += BLOCKED;
+        if (loglik < 0.0)
+            p->weight *= exp(loglik);
+        total += p->weight;
+    }
+    cloud->moved += cloud->count;
+    adaptive_cloud_scale(cloud, 1.0 / total);
+    return log(total) + (double)best;
+}
+
+static bool uneven(const struct adaptive_cloud *cloud)
+{
+    double squares = 0.0;
+    for (long n = 0; n < cloud->count; n++)
+        squares += cloud->at[n].weight * cloud->at[n].weight;
+    return squares * (double)cloud->count > 2.0;
+}
+
+/* Bins of adaptive.bin_m and adaptive.bin_deg that hold a share of weight worth a hypothesis. */
+static long occupied(struct adaptive_cloud *cloud)
+{
+    const struct nav_settings *s = &cloud->problem->settings;
+    double per_m = 1.0 / s->adaptive_bin_m, per_rad = 180.0 / (NAV_PI * s->adaptive_bin_deg);
+    double least = 0.1 / (double)cloud->count;
+    long count = 0;
+    cloud->visit++;
+    for (long n = 0; n < cloud->count; n++) {
+        const struct adaptive_particle *p = &cloud->at[n];
+        if (p->weight < least)
+            continue;
+        uint32_t key = (uint32_t)(int32_t)floor(p->pose.x * per_m) * 73856093u ^
+                       (uint32_t)(int32_t)floor(p->pose.y * per_m) * 19349663u ^
+                       (uint32_t)(int32_t)floor(p->pose.theta * per_rad) * 83492791u;
+        uint32_t *stamp = &cloud->stamp[(key ^ key >> 13) % BOOK];
+        count += *stamp != cloud->visit;
+        *stamp = cloud->visit;
+    }
+    return count;
+}
+
+void adaptive_cloud_thin(struct adaptive_cloud *cloud, bool force)
+{
+    if (cloud->count == 0 || !(force || uneven(cloud)))
+        return;
+    long count = needed(cloud, (double)occupied(cloud));
+    double step = 1.0 / (double)count, mark = step * nav_rng_uniform(&cloud->rng), sum = 0.0;
+    long taken = 0;
+    for (long n = 0; n < cloud->count; n++) {
+        sum += cloud->at[n].weight;
+        for (; mark < sum && taken < count; mark += step) {
+            cloud->spare[taken] = cloud->at[n];
+            cloud->spare[taken++].weight = step;
+        }
+    }
+    for (; taken < count; taken++) { /* the sum ended a rounding error short of 1 */
+        cloud->spare[taken] = cloud->at[cloud->count - 1];
+        cloud->spare[taken].weight = step;
+    }
+    struct adaptive_particle *drawn = cloud->spare;
+    cloud->spare = cloud->at;
+    cloud->at = drawn;
+    cloud->moved += cloud->count;
+    cloud->count = count;
+}

@@ -1,0 +1,81 @@
+#include "adaptive_doubt.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+/* Poses from which the shares of codes are counted, and draws that may miss free space for each. */
+enum { POSES = 4096, TRIES = 16 };
+
+static struct nav_pose draw(const struct adaptive_sense *sense, struct nav_rng *rng)
+{
+    struct nav_pose pose = {0.0, 0.0, 0.0};
+    for (int n = 0; n < TRIES; n++) {
+        pose = (struct nav_pose){sense->arena->size_x * nav_rng_uniform(rng),
+                                 sense->arena->size_y * nav_rng_uniform(rng), 2.0 * NAV_PI * nav_rng_uniform(rng)};
+        if (adaptive_sense_free_at(sense, pose.x, pose.y, 0.0))
+            break;
+    }
+    return pose;
+}
+
+static void count(struct adaptive_doubt *d, const struct adaptive_sense *sense, struct nav_rng *rng)
+{
+    for (int n = 0; n < POSES; n++) {
+        struct nav_pose pose = draw(sense, rng);
+        adaptive_sense_codes(sense, pose.x, pose.y, cos(pose.theta), sin(pose.theta), sense->scratch);
+        for (int w = 0; w < d->whiskers; w++)
+            d->share[w][sense->scratch[w]] += 1.0f / POSES;
+    }
+}
+
+int adaptive_doubt_init(struct adaptive_doubt *d, const struct adaptive_sense *sense, struct nav_rng *rng)
+{
+    const struct nav_likelihood *l = sense->likelihood;
+    *d = (struct adaptive_doubt){.whiskers = l->whiskers};
+    d->share = calloc((size_t)l->whiskers + 1, sizeof *d->share);
+    for (int w = 0; d->share && w < l->whiskers; w++) {
+        d->share[w] = calloc((size_t)l->model[w].codes, sizeof **d->share);
+        if (!d->share[w])
+            return -1;
+    }
+    if (!d->share)
+        return -1;
+    count(d, sense, rng);
+    return 0;
+}
+
+void adaptive_doubt_free(struct adaptive_doubt *d)
+{
+    for (int w = 0; d->share && w < d->whiskers; w++)
+        free(d->share[w]);
+    free(d->share);
+}
+
+double adaptive_doubt_anywhere(const struct adaptive_doubt *d, const struct adaptive_sense *sense)
+{
+    double sum = 0.0;
+    for (int w = 0; w < d->whiskers; w++) {
+        if (!(sense->evidence->weight[w] > 0.0))
+            continue;
+        double mean = 0.0;
+        for (int k = 0; k < sense->likelihood->model[w].codes; k++) {
+            if (d->share[w][k] > 0.0f)
+                mean += (double)(d->share[w][k] * expf(sense->likelihood->table[w][k]));
+        }
+        sum += log(mean);
+    }
+    return sum;
+}
+
+void adaptive_doubt_take(struct adaptive_doubt *d, uint64_t row, double anywhere, double local)
+{
+    d->ratio += anywhere - local;
+    if (!(d->ratio > 0.0))
+        adaptive_doubt_clear(d, row + 1);
+}
+
+void adaptive_doubt_clear(struct adaptive_doubt *d, uint64_t row)
+{
+    d->ratio = 0.0;
+    d->since = row;
+}

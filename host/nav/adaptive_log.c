@@ -1,0 +1,81 @@
+#include "adaptive_log.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+int adaptive_log_init(struct adaptive_log *log, const struct nav_problem *problem)
+{
+    size_t tips = (size_t)problem->robot.tips, classes = (size_t)problem->arena.classes;
+    *log = (struct adaptive_log){.whiskers = tips + (size_t)problem->robot.rays, .tips = problem->robot.tips};
+    log->width = tips * classes + (size_t)problem->robot.rays;
+    log->offset = calloc(log->whiskers + 1, sizeof *log->offset);
+    log->value = calloc(ADAPTIVE_ROWS_KEPT * log->width + 1, sizeof *log->value);
+    log->weight = calloc(ADAPTIVE_ROWS_KEPT * log->whiskers + 1, sizeof *log->weight);
+    log->reading = calloc(log->whiskers + 1, sizeof *log->reading);
+    if (!log->offset || !log->value || !log->weight || !log->reading)
+        return -1;
+    for (size_t w = 0; w < log->whiskers; w++)
+        log->offset[w] = w < tips ? w * classes : tips * classes + w - tips;
+    return 0;
+}
+
+void adaptive_log_free(struct adaptive_log *log)
+{
+    free(log->offset);
+    free(log->value);
+    free(log->weight);
+    free(log->reading);
+}
+
+static size_t place(uint64_t row)
+{
+    return (size_t)(row % ADAPTIVE_ROWS_KEPT);
+}
+
+void adaptive_log_write(struct adaptive_log *log, struct nav_pose step, struct nav_noise noise,
+                        const struct nav_evidence *evidence)
+{
+    size_t n = place(log->head++);
+    struct adaptive_entry *entry = &log->entry[n];
+    *entry = (struct adaptive_entry){.step = step, .noise = noise};
+    for (size_t w = 0; w < log->whiskers; w++) {
+        size_t end = w + 1 < log->whiskers ? log->offset[w + 1] : log->width;
+        log->weight[n * log->whiskers + w] = evidence->weight[w];
+        if (!(evidence->weight[w] > 0.0))
+            continue;
+        memcpy(log->value + n * log->width + log->offset[w], evidence->reading[w],
+               (end - log->offset[w]) * sizeof *log->value);
+        entry->contact = entry->contact || (w >= (size_t)log->tips && isfinite(evidence->reading[w][0]));
+    }
+}
+
+uint64_t adaptive_log_tail(const struct adaptive_log *log)
+{
+    return log->head > ADAPTIVE_ROWS_KEPT ? log->head - ADAPTIVE_ROWS_KEPT : 0;
+}
+
+struct adaptive_entry *adaptive_log_entry(struct adaptive_log *log, uint64_t row)
+{
+    return &log->entry[place(row)];
+}
+
+struct nav_evidence adaptive_log_replay(struct adaptive_log *log, uint64_t row)
+{
+    for (size_t w = 0; w < log->whiskers; w++)
+        log->reading[w] = log->value + place(row) * log->width + log->offset[w];
+    return (struct nav_evidence){.reading = log->reading, .weight = log->weight + place(row) * log->whiskers};
+}
+
+struct nav_pose adaptive_log_since(const struct adaptive_log *log, uint64_t from)
+{
+    struct nav_pose moved = {0.0, 0.0, 0.0};
+    for (uint64_t row = from; row < log->head; row++)
+        moved = nav_compose(moved, log->entry[place(row)].step);
+    return moved;
+}
+
+size_t adaptive_log_bytes(const struct adaptive_log *log)
+{
+    return sizeof *log + ADAPTIVE_ROWS_KEPT * (log->width + log->whiskers) * sizeof *log->value;
+}
