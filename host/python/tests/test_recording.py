@@ -15,6 +15,7 @@ from rings import make_frames, ring_name
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
+from whisker.native import lib
 from whisker.protocol import LANES, LIMITS
 from whisker.recording import RecordingError, read
 from whisker.recording.mcapfile import McapFile
@@ -97,9 +98,11 @@ def test_losses_before_the_ring_and_restarts_are_told(tmp_path):
     frames = make_frames(1000)
     again = make_frames(300)
     again["sequence"] = frames["sequence"][-1] + 3 + np.arange(300)
+    again["flags"][150] = lib.WHISKER_FRAME_GAP
     tally = write(tmp_path / "a.mcap", np.concatenate([frames[:100], frames[150:], again]))
-    assert (tally.missing, tally.restarts) == (52, 1)
-    assert events(tmp_path / "a.mcap") == [("missing", 150, 50), ("restarted", 0, 0), ("missing", 0, 2)]
+    assert (tally.missing, tally.restarts) == (52, 2)
+    told = [("missing", 150, 50), ("restarted", 0, 0), ("missing", 0, 2), ("restarted", 150, 0)]
+    assert events(tmp_path / "a.mcap") == told
 
 
 def test_a_recorder_overtaken_says_so(tmp_path):

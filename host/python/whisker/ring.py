@@ -1,6 +1,7 @@
 """The shared ring of frames as NumPy views, read where the frames lie (host/libwhisker/include/whisker/ring.h)."""
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -184,6 +185,18 @@ class Reader:
         frames = self.peek().copy()
         self.advance(len(frames))
         return frames
+
+    @contextmanager
+    def window(self, count: int) -> Iterator[np.ndarray]:
+        """The newest `count` frames (fewer, when the ring has not had so many), wherever the reader stands.
+
+        `with reader.window(2000) as frames:` gives a read-only view into the ring. When the block ends it is known
+        whether the view was whole: RingError OVERRUN means that what was made of it must be thrown away.
+        """
+        got = lib.whisker_reader_window(self._reader, count, self._view)
+        check(min(got, 0), self.name)
+        yield _view(self._view[0], got)
+        check(lib.whisker_reader_intact(self._reader), self.name)
 
     def seek_latest(self, count: int) -> None:
         """Go to where at most the newest `count` frames are still to be read. Never goes back."""

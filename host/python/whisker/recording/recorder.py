@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..native import lib
 from ..protocol import LANES, LIMITS
 from ..ring import Reader, RingError
 from .messages import BLOCK_FRAMES, CLOCK_SET, MISSING, OVERRUN, RESTARTED, encode_block
@@ -107,7 +108,7 @@ class Recorder:
     def _record(self, block: np.ndarray) -> None:
         time_ns = self._timeline.of(int(block["time_cycles"][0]), self._reader.clock)
         self._say_lost(int(block["tick"][0]))
-        self._say_gaps(time_ns, block["tick"], block["sequence"])
+        self._say_gaps(time_ns, block)
         self._writer.block(time_ns, block)
         self.tally.frames += len(block["tick"])
         self.tally.records_bad += np.count_nonzero(block["lanes"]["status"], axis=1)
@@ -118,11 +119,13 @@ class Recorder:
             self.tally.overrun += self._lost
             self._writer.event(self._timeline.now(), OVERRUN, tick=tick, frames=self._lost)
 
-    def _say_gaps(self, time_ns: int, ticks: np.ndarray, sequence: np.ndarray) -> None:
+    def _say_gaps(self, time_ns: int, block: np.ndarray) -> None:
         """Tell where ticks go back and sequence numbers jump; what is known as overrun is not missing too."""
+        ticks, sequence = block["tick"], block["sequence"]
         before = self._last or (int(ticks[0]) - 1, int(sequence[0]) - 1)
         self._last = (int(ticks[-1]), int(sequence[-1]))
         back = np.diff(ticks.astype(np.int64), prepend=np.int64(before[0])) <= 0
+        back |= block["flags"] & lib.WHISKER_FRAME_GAP != 0
         back[0] |= self._reattached
         steps = np.diff(sequence, prepend=np.uint32(before[1] & 0xFFFFFFFF))
         known, self._lost, self._reattached = self._lost, 0, False
