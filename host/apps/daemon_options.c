@@ -1,0 +1,146 @@
+#include "daemon_options.h"
+
+#include <getopt.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "cli.h"
+#include "daemon_log.h"
+#include "whisker/ring.h"
+
+enum { NUMBER = 'n' };
+
+static void print_help(const struct whisker_settings *defaults)
+{
+    printf(
+        "Usage: whiskerd --ring NAME [OPTION...]\n"
+        "       whiskerd --list\n"
+        "Publishes the frames of the bridge in the shared-memory ring NAME, until SIGTERM or SIGINT. When the bridge\n"
+        "is unplugged the ring stays open and the next bridge goes on in it.\n\n"
+        "  --ring NAME         name of the ring; readers attach to it\n"
+        "  --ring-frames N     its capacity, a power of two (%d)\n"
+        "  --serial TEXT       the bridge with this serial number (the first that can be opened)\n"
+        "  --wait              wait for a bridge instead of failing when there is none\n"
+        "  --once              end when the bridge goes, instead of waiting for it\n"
+        "  --replace           stop the whiskerd that has this ring, and take over\n"
+        "  --list              print serial number, place and state of each bridge\n"
+        "  --batch N           frames of one USB transfer, even, 2 to 16: latency against work (%u)\n"
+        "  --lane-mask M       bit n set: lane n is in use (0x%x)\n"
+        "  --tick-period N     cycles of 60 MHz from tick to tick (%u)\n"
+        "  --sck-divider N     cycles of 60 MHz of one SCK period (%u)\n"
+        "  --word-gap N        cycles of 60 MHz between two 16-bit words (%u)\n"
+        "  --sample-point N    cycles of 60 MHz from shifting to sampling (%u)\n"
+        "  --verbose           tell also what goes well\n"
+        "  --help              this text\n\n"
+        "SIGUSR1: statistics to the log, as at the end. Under systemd: notifies readiness, feeds the watchdog.\n\n"
+        "Example: whiskerd --ring whisker --lane-mask 0x3f\n"
+        "Example: whiskerd --ring whisker --wait --serial 0001\n"
+        "Exit code: 0 stopped as told, 1 failed, 2 wrong use.\n",
+        WHISKER_RING_FRAMES, defaults->batch, defaults->lane_mask, defaults->tick_period, defaults->sck_divider,
+        defaults->word_gap, defaults->sample_point);
+}
+
+/* The setting of one byte that has this name; NULL if there is none. */
+static uint8_t *byte_setting(struct whisker_settings *settings, const char *name)
+{
+    return !strcmp(name, "sck-divider")    ? &settings->sck_divider
+           : !strcmp(name, "word-gap")     ? &settings->word_gap
+           : !strcmp(name, "sample-point") ? &settings->sample_point
+           : !strcmp(name, "batch")        ? &settings->batch
+                                           : NULL;
+}
+
+/* Sets one numeric option; false when its text is no number. Limits of the bridge are the library's to check. */
+static bool set_number(struct daemon_options *options, const char *name, const char *text)
+{
+    struct whisker_settings *settings = &options->settings;
+    uint8_t *byte = byte_setting(settings, name);
+    uint32_t value;
+    if (!cli_number(DAEMON_PROGRAM, name, text, 0, byte ? UINT8_MAX : UINT32_MAX, &value)) {
+        return false;
+    }
+    if (byte) {
+        *byte = (uint8_t)value;
+    } else if (!strcmp(name, "ring-frames")) {
+        options->frames = value;
+    } else if (!strcmp(name, "lane-mask")) {
+        settings->lane_mask = value;
+    } else {
+        settings->tick_period = value;
+    }
+    return true;
+}
+
+static bool set_word(struct daemon_options *options, int option, const char *text)
+{
+    switch (option) {
+    case 'r':
+        options->ring = text;
+        return true;
+    case 's':
+        options->serial = text;
+        return true;
+    case 'l':
+        return options->list = true;
+    case 'w':
+        return options->wait = true;
+    case 'o':
+        return options->once = true;
+    case 'x':
+        return options->replace = true;
+    case 'v':
+        return options->verbose = true;
+    default:
+        return false;
+    }
+}
+
+static int check(const struct daemon_options *options, bool word_too_many)
+{
+    char message[128];
+    if (word_too_many || (!options->ring && !options->list)) {
+        fprintf(stderr, DAEMON_PROGRAM ": %s; see " DAEMON_PROGRAM " --help\n",
+                word_too_many ? "there is a word too many" : "--ring NAME is missing");
+        return CLI_USAGE;
+    }
+    if (whisker_settings_check(&options->settings, message, sizeof message) != 0) {
+        fprintf(stderr, DAEMON_PROGRAM ": %s\n", message);
+        return CLI_USAGE;
+    }
+    return -1;
+}
+
+int daemon_options_parse(int argc, char **argv, struct daemon_options *options)
+{
+    static const struct option known[] = {
+        {"ring", required_argument, NULL, 'r'},
+        {"serial", required_argument, NULL, 's'},
+        {"ring-frames", required_argument, NULL, NUMBER},
+        {"lane-mask", required_argument, NULL, NUMBER},
+        {"tick-period", required_argument, NULL, NUMBER},
+        {"sck-divider", required_argument, NULL, NUMBER},
+        {"word-gap", required_argument, NULL, NUMBER},
+        {"sample-point", required_argument, NULL, NUMBER},
+        {"batch", required_argument, NULL, NUMBER},
+        {"list", no_argument, NULL, 'l'},
+        {"wait", no_argument, NULL, 'w'},
+        {"once", no_argument, NULL, 'o'},
+        {"replace", no_argument, NULL, 'x'},
+        {"verbose", no_argument, NULL, 'v'},
+        {"help", no_argument, NULL, 'h'},
+        {NULL, 0, NULL, 0},
+    };
+    *options = (struct daemon_options){.frames = WHISKER_RING_FRAMES};
+    whisker_settings_default(&options->settings);
+    int which = 0;
+    for (int option; (option = getopt_long(argc, argv, "", known, &which)) != -1;) {
+        if (option == 'h') {
+            print_help(&options->settings);
+            return CLI_OK;
+        }
+        if (!(option == NUMBER ? set_number(options, known[which].name, optarg) : set_word(options, option, optarg))) {
+            return CLI_USAGE;
+        }
+    }
+    return check(options, optind != argc);
+}

@@ -1,0 +1,116 @@
+#include "daemon_stats.h"
+
+#include <inttypes.h>
+#include <stdio.h>
+#include <string.h>
+#include <time.h>
+
+#include "daemon_log.h"
+#include "whisker_protocol.h"
+
+static int64_t realtime_ns(void)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_REALTIME, &now);
+    return (int64_t)now.tv_sec * 1000000000 + now.tv_nsec;
+}
+
+void daemon_stats_begin(struct daemon_stats *stats, const struct whisker_settings *settings)
+{
+    memset(stats, 0, sizeof *stats);
+    stats->told.started_ns = realtime_ns();
+    stats->told.lane_mask = settings->lane_mask;
+    stats->told.tick_period = settings->tick_period;
+}
+
+void daemon_stats_connected(struct daemon_stats *stats, const struct whisker_device_info *about,
+                            const struct whisker_identity *identity)
+{
+    struct whisker_daemon_stats *told = &stats->told;
+    told->connected = 1;
+    told->error = WHISKER_OK;
+    told->connected_ns = realtime_ns();
+    told->wire_version = identity->wire_version;
+    told->gateware = identity->gateware;
+    memcpy(told->serial, about->serial, sizeof told->serial);
+    snprintf(told->firmware, sizeof told->firmware, "gateware %u, wire %u", identity->gateware, identity->wire_version);
+    stats->dropped_before += stats->dropped;
+    stats->dropped = 0;
+    stats->has_sequence = false;
+}
+
+void daemon_stats_lost(struct daemon_stats *stats, int error)
+{
+    if (stats->told.connected) {
+        stats->told.connected = 0;
+        stats->told.connected_ns = realtime_ns();
+        stats->told.usb_errors += error != WHISKER_ERROR_DEVICE_GONE;
+    }
+    stats->told.error = error;
+}
+
+static void count_record(struct daemon_stats *stats, unsigned status)
+{
+    switch (status >> WHISKER_STATUS_ERROR_BITS) {
+    case WHISKER_CODE_ABSENT:
+        stats->told.records_absent++;
+        break;
+    case WHISKER_CODE_LINK_CRC:
+        stats->records_link_crc++;
+        break;
+    case WHISKER_CODE_LINK_TICK:
+        stats->told.records_tick++;
+        break;
+    case WHISKER_CODE_LANE_OFF:
+        break;
+    default:
+        stats->told.records_sensor++;
+    }
+}
+
+static void count_frame(struct daemon_stats *stats, const struct whisker_frame *frame)
+{
+    const uint32_t missing = stats->has_sequence ? frame->sequence - stats->sequence - 1 : 0; /* modulo 2^32 */
+    stats->told.frames_missing += missing < UINT32_MAX / 2 ? missing : 0;
+    stats->sequence = frame->sequence;
+    stats->has_sequence = true;
+    stats->dropped = frame->dropped;
+    for (size_t lane = 0; lane < WHISKER_FRAME_LANES; lane++) {
+        const unsigned status = frame->lane[lane].status;
+        if (status != 0 && (frame->lane_mask >> lane & 1u)) {
+            count_record(stats, status);
+        }
+    }
+}
+
+void daemon_stats_frames(struct daemon_stats *stats, const struct whisker_frame *frames, size_t count)
+{
+    for (size_t i = 0; i < count; i++) {
+        count_frame(stats, &frames[i]);
+    }
+}
+
+void daemon_stats_settle(struct daemon_stats *stats, const struct whisker_decoder_counts *counts,
+                         const struct whisker_clock_fit *clock)
+{
+    struct whisker_daemon_stats *told = &stats->told;
+    told->frames = counts->frames;
+    told->frames_damaged = counts->frames_damaged;
+    told->frames_dropped = stats->dropped_before + stats->dropped;
+    told->bytes_skipped = counts->bytes_skipped;
+    told->records_usb = counts->records_damaged;
+    told->records_crc = stats->records_link_crc > told->records_usb ? stats->records_link_crc - told->records_usb : 0;
+    told->clock_restarts = clock->restarts;
+}
+
+void daemon_stats_log(const struct whisker_daemon_stats *told)
+{
+    daemon_log(LOG_NOTE,
+               "%" PRIu64 " frames published, %" PRIu64 " missing, %" PRIu64 " dropped by the bridge, %" PRIu64
+               " with damaged records, %" PRIu64 " bytes skipped; records: %" PRIu64 " absent, %" PRIu64
+               " crc, %" PRIu64 " tick, %" PRIu64 " sensor, %" PRIu64 " usb; %" PRIu64 " reconnects, %" PRIu64
+               " usb errors",
+               told->frames, told->frames_missing, told->frames_dropped, told->frames_damaged, told->bytes_skipped,
+               told->records_absent, told->records_crc, told->records_tick, told->records_sensor, told->records_usb,
+               told->reconnects, told->usb_errors);
+}
