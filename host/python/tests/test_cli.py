@@ -172,7 +172,7 @@ def test_settings_reach_the_filter(capsys, folder):
 def test_lists_and_help(capsys):
     code, out, _ = run(capsys, "localise", "--list-filters")
     assert code == 0 and {"odometry", "foveal", "grid"} <= set(out.split())
-    assert "texture.temper=0.05 (0 to 1)" in run(capsys, "localise", "--list-settings")[1]
+    assert "grid.cell_m=0.05 (0.005 to 1)" in run(capsys, "localise", "--list-settings")[1]
     for words in ([], ["localise"], ["texture"], ["texture", "train"], ["texture", "classify"], ["radial"]):
         code, out, _ = run(capsys, *words, "--help")
         assert code == 0 and "example:\n  whisker " in out

@@ -1,6 +1,7 @@
 """Scenes at level 0: what whiskers would read, without the signals between. Families by name and seed, recordings."""
 
-from .families import BASES, MODIFIERS, FamilyError, Made, make, recipe
+from .families import BASES, MODIFIERS, FamilyError, recipe
 from .files import write_scene
+from .making import Made, make
 
 __all__ = ["BASES", "MODIFIERS", "FamilyError", "Made", "make", "recipe", "write_scene"]

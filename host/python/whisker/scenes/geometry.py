@@ -81,6 +81,40 @@ def free_test(arena: Arena, radius: float):
     return free
 
 
+def range_test(arena: Arena, whisker: Whisker):
+    """A fast function (x, y, theta) -> m: `ranges` for one pose."""
+    base_x, base_y = whisker.base_m
+    yaw, length = whisker.yaw_rad, whisker.length_m
+    far = math.hypot(base_x, base_y) + length
+    walls = (0.0, 0.0, *arena.size_m)
+    boxes = arena.obstacles
+
+    def reach(x: float, y: float, heading: float) -> float:
+        by_wall = not (far < x < walls[2] - far and far < y < walls[3] - far)
+        near = [b for b in boxes if b[0] - far < x < b[2] + far and b[1] - far < y < b[3] + far]
+        if not near and not by_wall:
+            return math.inf
+        c, s = math.cos(heading), math.sin(heading)
+        from_x, from_y = x + c * base_x - s * base_y, y + s * base_x + c * base_y
+        c, s = math.cos(heading + yaw), math.sin(heading + yaw)
+        nearest = max(_crossing(walls, from_x, from_y, c, s)[1], 0.0)
+        for box in near:
+            enter, leave = _crossing(box, from_x, from_y, c, s)
+            if enter <= leave and leave > 0.0:
+                nearest = min(nearest, max(enter, 0.0))
+        return nearest if nearest <= length else math.inf
+
+    return reach
+
+
+def _crossing(box, x: float, y: float, c: float, s: float) -> tuple[float, float]:
+    """Where a ray enters and leaves a box, m."""
+    c, s = c or 1e-300, s or 1e-300  # along an edge: the strip is then entered and left at +-infinity, or never
+    a, b = sorted(((box[0] - x) / c, (box[2] - x) / c))
+    d, e = sorted(((box[1] - y) / s, (box[3] - y) / s))
+    return max(a, d), min(b, e)
+
+
 def free_lattice(arena: Arena, radius: float) -> np.ndarray:
     """(ny, nx) bool at the middles of LATTICE_M squares: whether the body stands clear there."""
     x = np.arange(LATTICE_M / 2, arena.size_m[0], LATTICE_M)
