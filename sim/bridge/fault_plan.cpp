@@ -1,5 +1,6 @@
 #include "fault_plan.h"
 
+#include <algorithm>
 #include <array>
 
 #include "whisker_protocol.h"
@@ -37,6 +38,17 @@ unsigned sensor_flip_bit(uint64_t value)
     return bit < ERROR_WORD_FIRST ? bit : bit + ERROR_WORD_BITS;
 }
 
+// The last of a list, if its tick has come; then it is gone from there.
+template <typename Fault> std::optional<Fault> take(std::vector<Fault> &list, uint64_t tick)
+{
+    if (list.empty() || list.back().tick != tick) {
+        return std::nullopt;
+    }
+    const Fault fault = list.back();
+    list.pop_back();
+    return fault;
+}
+
 } // namespace
 
 const char *fault_name(LaneFaultKind kind)
@@ -64,6 +76,13 @@ FaultPlan::FaultPlan(uint64_t seed, size_t lanes, uint64_t last_tick)
       end_(last_tick > END_MARGIN ? last_tick - END_MARGIN : 0), next_lane_(draw_lane_fault(0)),
       next_usb_(draw_usb_fault(0))
 {
+}
+
+FaultPlan::FaultPlan(std::vector<LaneFault> lane_faults, std::vector<UsbFault> usb_faults)
+    : given_(true), lane_list_(std::move(lane_faults)), usb_list_(std::move(usb_faults))
+{
+    std::reverse(lane_list_.begin(), lane_list_.end());
+    std::reverse(usb_list_.begin(), usb_list_.end());
 }
 
 // Not a standard distribution: those may differ from one C++ library to the next.
@@ -102,6 +121,9 @@ UsbFault FaultPlan::draw_usb_fault(uint64_t block)
 
 std::optional<LaneFault> FaultPlan::lane_fault(uint64_t tick)
 {
+    if (given_) {
+        return take(lane_list_, tick);
+    }
     const LaneFault fault = next_lane_;
     if (tick != fault.tick || tick >= end_) {
         return std::nullopt;
@@ -112,6 +134,9 @@ std::optional<LaneFault> FaultPlan::lane_fault(uint64_t tick)
 
 std::optional<UsbFault> FaultPlan::usb_fault(uint64_t tick)
 {
+    if (given_) {
+        return take(usb_list_, tick);
+    }
     const UsbFault fault = next_usb_;
     if (tick != fault.tick || tick >= end_) {
         return std::nullopt;

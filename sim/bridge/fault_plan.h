@@ -1,9 +1,11 @@
-// Which fault strikes when, drawn from the seed alone: lane faults (sensor, SPI link) and USB faults. Pure data.
+// Which fault strikes when, drawn from the seed alone or given as a list: lane faults (sensor, SPI link) and USB
+// faults. Pure data.
 #pragma once
 
 #include <cstdint>
 #include <optional>
 #include <random>
+#include <vector>
 
 namespace bridge_sim
 {
@@ -43,6 +45,9 @@ class FaultPlan
     // lanes: populated ones. last_tick: no fault at or after it minus a margin, so that each can be reported.
     FaultPlan(uint64_t seed, size_t lanes, uint64_t last_tick);
 
+    // These and no others; each list by rising tick.
+    FaultPlan(std::vector<LaneFault> lane_faults, std::vector<UsbFault> usb_faults);
+
     // The fault of this tick, if any. Ticks must be asked for in rising order, each at most once per kind of fault.
     std::optional<LaneFault> lane_fault(uint64_t tick);
     std::optional<UsbFault> usb_fault(uint64_t tick);
@@ -53,12 +58,15 @@ class FaultPlan
     unsigned draw_argument(LaneFaultKind kind);
     UsbFault draw_usb_fault(uint64_t block);
 
+    bool given_ = false;
+    std::vector<LaneFault> lane_list_; // given ones still to come, the next one last
+    std::vector<UsbFault> usb_list_;
     std::mt19937_64 lane_generator_;
     std::mt19937_64 usb_generator_;
-    size_t lanes_;
-    uint64_t end_;
-    LaneFault next_lane_;
-    UsbFault next_usb_;
+    size_t lanes_ = 0;
+    uint64_t end_ = 0;
+    LaneFault next_lane_{};
+    UsbFault next_usb_{};
 };
 
 } // namespace bridge_sim

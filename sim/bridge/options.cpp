@@ -29,6 +29,7 @@ enum Option {
     TRUTH,
     FAULTS,
     USB_FAULTS,
+    FAULT_LIST,
     FOLLOWERS,
     LANES_POPULATED,
     SCK_DIVIDER,
@@ -49,6 +50,7 @@ const option LONG_OPTIONS[] = {{"help", no_argument, nullptr, HELP},
                                {"truth", required_argument, nullptr, TRUTH},
                                {"faults", required_argument, nullptr, FAULTS},
                                {"usb-faults", required_argument, nullptr, USB_FAULTS},
+                               {"fault-list", required_argument, nullptr, FAULT_LIST},
                                {"followers", required_argument, nullptr, FOLLOWERS},
                                {"lanes-populated", required_argument, nullptr, LANES_POPULATED},
                                {"sck-divider", required_argument, nullptr, SCK_DIVIDER},
@@ -94,6 +96,8 @@ std::string *path_of(Options &options, int option)
         return &options.faults;
     case USB_FAULTS:
         return &options.usb_faults;
+    case FAULT_LIST:
+        return &options.fault_list;
     case SPEED_REPORT:
         return &options.speed_report;
     default:
@@ -229,6 +233,8 @@ const char *usage()
            "  --truth OUT.csv       pose and texture tips after every 0.1 s\n"
            "  --faults OUT.csv      inject lane and USB faults; log each spoilt lane,tick,kind\n"
            "  --usb-faults OUT.csv  log each USB fault: tick,kind\n"
+           "  --fault-list FILE     inject just these: lines 'lane TICK LANE KIND ARGUMENT', 'usb TICK KIND', ticks "
+           "rising\n"
            "  --lanes-populated N   nodes on the first N lanes; those without a whisker are at rest (the scene's; "
            "bench: 6)\n"
            "  --speed-report OUT.json  ticks, clock cycles, wall seconds, fault counts\n"

@@ -9,6 +9,8 @@
 #include <sys/signalfd.h>
 #include <unistd.h>
 
+#include "fault_list.h"
+
 namespace bridge_sim
 {
 
@@ -62,6 +64,10 @@ size_t populated(const Options &options, const sim_scene &scene)
 
 std::optional<FaultPlan> plan_of(const Options &options, const sim_scene &scene)
 {
+    if (!options.fault_list.empty()) {
+        FaultList list = read_fault_list(options.fault_list, populated(options, scene));
+        return FaultPlan(std::move(list.lane), std::move(list.usb));
+    }
     if (options.faults.empty()) {
         return std::nullopt;
     }

@@ -14,6 +14,7 @@ COMMANDS = {
     "info": "what ring, daemon and bridge say of themselves",
     "top": "lanes, rates and losses in the terminal",
     "doctor": "find out why it does not work",
+    "bridge-sim": "a simulated bridge to try everything with",
     "record": "write a ring to an MCAP file",
     "replay": "feed a ring from a recording, as the device would",
     "stream": "print frames as CSV or JSON lines",

@@ -1,8 +1,15 @@
 // The plan of faults: the seed alone decides, the rates hold, and no two faults get in each other's way.
 #include "cmocka_cpp.h"
 
+#include <cstdlib>
+#include <cstring>
+#include <stdexcept>
+#include <string>
 #include <vector>
 
+#include <unistd.h>
+
+#include "fault_list.h"
 #include "fault_plan.h"
 
 using namespace bridge_sim;
@@ -74,6 +81,58 @@ void the_seed_decides(void **)
     assert_true(equal < once.size() / 2);
 }
 
+FaultList read_text(const char *text)
+{
+    char path[] = "/tmp/whisker-faults-XXXXXX";
+    const int descriptor = mkstemp(path);
+    assert_true(descriptor >= 0);
+    assert_int_equal(write(descriptor, text, strlen(text)), strlen(text));
+    close(descriptor);
+    try {
+        FaultList list = read_fault_list(path, SIX);
+        unlink(path);
+        return list;
+    } catch (...) {
+        unlink(path);
+        throw;
+    }
+}
+
+void given_faults_strike_and_no_others(void **)
+{
+    FaultList list = read_text("lane 7 5 link_flip 63\nusb 7 host_away\nlane 9 0 sensor_dead 0\n");
+    FaultPlan plan(list.lane, list.usb);
+    for (uint64_t tick = 0; tick < MINUTE / 100; tick++) {
+        const std::optional<LaneFault> lane = plan.lane_fault(tick);
+        const std::optional<UsbFault> usb = plan.usb_fault(tick);
+        assert_int_equal(lane.has_value(), tick == 7 || tick == 9);
+        assert_int_equal(usb.has_value(), tick == 7);
+        if (tick == 7) {
+            assert_true(lane->lane == 5 && lane->kind == LaneFaultKind::LINK_FLIP && lane->argument == 63);
+            assert_true(usb->kind == UsbFaultKind::HOST_AWAY);
+        }
+    }
+}
+
+void wrong_lists_name_line_and_remedy(void **)
+{
+    const std::pair<const char *, const char *> wrong[] = {
+        {"usb 5 nak_storm\nlane 5 6 link_dead 0\n", "line 2: lane 6 is not populated; give 0 to 5"},
+        {"lane 5 0 nak_storm 0\n", "line 1: 'nak_storm' is no such fault; use one of sensor_flip"},
+        {"usb 5 bad_data\nusb 5 bad_data\n", "line 2: tick 5 after tick 5; give one fault per tick"},
+        {"breakfast\n", "line 1: 'breakfast'; give 'lane TICK"},
+    };
+    for (const auto &[text, complaint] : wrong) {
+        std::string said;
+        try {
+            read_text(text);
+        } catch (const std::runtime_error &error) {
+            said = error.what();
+        }
+        assert_true(said.find(complaint) != std::string::npos);
+    }
+}
+
 } // namespace
 
 int main()
@@ -82,6 +141,8 @@ int main()
         cmocka_unit_test(a_minute_has_enough_of_each),
         cmocka_unit_test(faults_keep_their_distance),
         cmocka_unit_test(the_seed_decides),
+        cmocka_unit_test(given_faults_strike_and_no_others),
+        cmocka_unit_test(wrong_lists_name_line_and_remedy),
     };
     return cmocka_run_group_tests(tests, nullptr, nullptr);
 }

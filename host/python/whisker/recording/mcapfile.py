@@ -52,6 +52,7 @@ class McapFile:
         self.path = path
         self.damage: list[str] = []
         self.topics: dict[int, str] = {}
+        self.metadata: dict[str, dict[str, str]] = {}  # records of one name together, what comes later counts
         try:
             self._file: BinaryIO = open(path, "rb")  # noqa: SIM115 - closed by close()
         except OSError as error:
@@ -94,7 +95,7 @@ class McapFile:
             self._bytes = os.fstat(self._file.fileno()).st_size
             if self._file.read(len(MAGIC)) != MAGIC:
                 raise RecordingError(f"{self.path}: not an MCAP file; give a recording made by 'whisker record'")
-            self.complete, self.metadata = False, {}
+            self.complete = False
             for _, opcode, size in self._records():
                 self.complete |= opcode == FOOTER
                 if opcode == METADATA:
@@ -108,7 +109,7 @@ class McapFile:
         try:
             cursor = Cursor(self._body(size))
             name = cursor.text()
-            self.metadata[name] = cursor.text_map()
+            self.metadata[name] = self.metadata.get(name, {}) | cursor.text_map()
         except Damaged:
             return  # names and counts only; the frames do not depend on them
 

@@ -82,7 +82,8 @@ class Recorder:
         """Say what is still to be said, write the index, close the file."""
         self._say_lost(0)
         self._tell_health()
-        self._writer.finish()
+        totals = {name: str(value) for name, value in vars(self.tally).items() if isinstance(value, int)}
+        self._writer.finish(_of_bridge(self._reader) | totals)
 
     def _take(self, most: int, partial: bool) -> int:
         """Record one block; 0: there is none. One that is not whole waits for the next look, unless `partial`."""
@@ -166,8 +167,13 @@ class Recorder:
 
 
 def describe(reader: Reader) -> dict[str, str]:
-    """What a recording's metadata tells of ring and bridge."""
-    told = {"ring": reader.name, "started": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())}
+    """What a recording's metadata tells of ring and bridge when it begins; at its end more may be known."""
+    started = {"ring": reader.name, "started": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())}
+    return started | _of_bridge(reader)
+
+
+def _of_bridge(reader: Reader) -> dict[str, str]:
+    told = {}
     if stats := reader.stats:
         told |= {name: str(getattr(stats, name)) for name in ("serial", "firmware", "wire_version", "lane_mask")}
         told["tick_period"] = str(stats.tick_period)

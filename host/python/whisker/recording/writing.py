@@ -98,8 +98,10 @@ class RecordingWriter:
         """Write what has been gathered: from now on it is safe."""
         self._guarded(self._writer.flush)
 
-    def finish(self) -> None:
-        """Write the index and close."""
+    def finish(self, metadata: dict[str, str] | None = None) -> None:
+        """Write what more is known by now and the index, and close."""
+        if metadata:
+            self._guarded(self._writer.add_metadata, METADATA, metadata)
         self._guarded(self._writer.finish)
         self._sink.flush()
         self.close()

@@ -1,0 +1,97 @@
+"""`whisker bridge-sim`: the simulated bridge with whiskerd on it, so that everything can be tried without hardware."""
+
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+from pathlib import Path
+
+from ..bridgesim import Course, flat_scene, program, read_faults
+from ..protocol import LANES, LIMITS
+from ..ring import Reader, RingError
+from . import RING, number_above, stop_on_signals, whole_number
+
+EXAMPLE = "whisker bridge-sim --lanes 6 --seconds 60 &  whisker top"
+TICKS_PER_S = LIMITS["clock_hz"] // LIMITS["tick_period"]
+DAY_S = 86400.0
+UP_S = 60.0  # for the simulated bridge to enumerate
+
+
+def add(parser) -> None:
+    parser.add_argument("--ring", default=RING, metavar="NAME", help="the ring whiskerd makes (default: %(default)s)")
+    parser.add_argument(
+        "--lanes", type=whole_number(1, LANES), metavar="N", help="populated lanes (the scene's whiskers)"
+    )
+    parser.add_argument("--scene", help="scene folder (default: the demo's of this seed)")
+    text = "TOML: [[fault]] tables with tick or t_s, kind, and, for faults of a lane, lane (and bit or error)"
+    parser.add_argument("--fault", metavar="FILE.TOML", help=text)
+    parser.add_argument(
+        "--seconds", type=number_above(0.0), default=DAY_S, metavar="S", help="simulated length (a day)"
+    )
+    parser.add_argument("--seed", type=whole_number(0, 2**32 - 1), default=1, help="of world, sensors, start (1)")
+    parser.add_argument(
+        "--drive", choices=["turn", "still"], default="turn", help="turn on the spot, or stand still (turn)"
+    )
+    text = "simulated seconds per second, at most what the machine can; 0: as fast as it can (default: 1)"
+    parser.add_argument("--pace", type=number_above(-1e-9), default=1.0, metavar="X", help=text)
+    parser.set_defaults(run=run)
+
+
+def run(arguments) -> int:
+    stop = stop_on_signals()
+    with tempfile.TemporaryDirectory(prefix="whisker-") as folder:
+        command = _command(arguments, Path(folder))
+        with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True) as process:
+            watcher = threading.Thread(target=_relay, args=(process,), daemon=True)
+            watcher.start()
+            course = Course(Path(folder) / "sim.sock", arguments.drive, arguments.pace, stop)
+            course.start()
+            _await_ring(arguments.ring, process, stop)
+            while process.poll() is None and not stop.wait(0.1):
+                continue
+            stopped = process.poll() is None
+            if stopped:
+                process.send_signal(signal.SIGTERM)
+            process.wait()
+            stop.set()
+            course.join()
+            watcher.join()
+    return 0 if stopped else process.returncode
+
+
+def _command(arguments, folder: Path) -> list[str]:
+    """The simulation under umockdev, whiskerd inside."""
+    text, whiskers = flat_scene(arguments.scene, arguments.seed)
+    lanes = max(arguments.lanes or whiskers, whiskers)
+    (folder / "scene.flat").write_text(text)
+    words = [program("umockdev-wrapper"), program("whisker-bridge-sim"), "--scene", folder / "scene.flat"]
+    words += ["--seconds", arguments.seconds, "--seed", arguments.seed, "--lanes-populated", lanes]
+    words += ["--socket", folder / "sim.sock", "--followers", 1]
+    if arguments.fault:
+        (folder / "faults").write_text(read_faults(arguments.fault, TICKS_PER_S))
+        words += ["--fault-list", folder / "faults"]
+    mask = (1 << lanes) - 1
+    words += ["--", program("whiskerd"), "--ring", arguments.ring, "--lane-mask", mask]
+    return [str(word) for word in words]
+
+
+def _await_ring(ring: str, process: subprocess.Popen, stop: threading.Event) -> None:
+    """Say when the ring is up; nothing when the simulation ended before, which says why itself."""
+    for _ in range(int(UP_S / 0.1)):
+        if process.poll() is not None or stop.is_set():
+            return
+        try:
+            with Reader(ring, 0.1) as reader:
+                reader.wait(0.1)
+        except RingError:
+            continue
+        print(f"ring {ring} is up; try: whisker top --ring {ring}", flush=True)
+        return
+
+
+def _relay(process: subprocess.Popen) -> None:
+    """Pass on what simulation and whiskerd say, without the simulation's progress."""
+    for line in process.stderr:
+        if not line.startswith("progress "):
+            sys.stderr.write(line)
