@@ -83,7 +83,7 @@ class Filter:
         if not 0 <= seed <= SEED_MOST:
             raise SettingError(f"--seed {seed}: outside 0 to 2^64 - 1; choose a number inside")
         self.scene = scene
-        problem, self._keep = _problem(scene, settings or {})
+        problem, self._keep = problem_of(scene, settings or {})
         problem.seed = seed
         made = lib.nav_filter_new(name.encode(), problem)
         if made == ffi.NULL:
@@ -161,7 +161,7 @@ def _components(array: np.ndarray):
     return ffi.cast("struct nav_component *", array.ctypes.data)
 
 
-def _problem(scene: Scene, settings: dict[str, float]):
+def problem_of(scene: Scene, settings: dict[str, float]):
     """The C problem and the arrays it points into."""
     arena, robot = scene.arena, scene.robot
     floor = np.array(arena.floor_indices(), dtype=np.uint8)
