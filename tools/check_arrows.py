@@ -17,7 +17,8 @@ ALLOWED = {
     "host/apps": ["host/libwhisker", "host/nav"],
     "host/python": ["host/libwhisker", "host/nav", "sim/signals"],
     "sim/mlx90333": ["sim/node", "firmware/dspic"],  # one copy of the data sheet
-    "sim/node": ["sim/mlx90333", "firmware/dspic"],
+    "sim/dspic": ["firmware/dspic"],  # addresses and bits, and what the accessors call
+    "sim/node": ["sim/mlx90333", "sim/dspic", "firmware/dspic"],
     "sim/world": ["sim/node"],
     "sim/signals": ["sim/world", "sim/mlx90333", "sim/node"],
     "sim/bridge": ["sim/world", "sim/node", "sim/mlx90333", "fpga/bridge_rtl", "fpga/usb"],

@@ -156,7 +156,7 @@ static bool line(const struct mlx90333 *sensor, unsigned position, bool master)
 bool mlx90333_clock(struct mlx90333 *sensor, uint64_t now_ns, bool level, bool master)
 {
     const unsigned position = sensor->byte * 8u + sensor->bit;
-    require(sensor, now_ns >= sensor->awake_ns, MLX90333_CLOCK_IN_STARTUP);
+    require(sensor, sensor->select || now_ns >= sensor->awake_ns, MLX90333_CLOCK_IN_STARTUP);
     if (sensor->select || !sensor->enabled || now_ns < sensor->awake_ns)
         return sensor->fault == SIM_SENSOR_STUCK_LOW ? false : master;
     if (level) {

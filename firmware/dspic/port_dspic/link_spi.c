@@ -1,0 +1,68 @@
+/* SPI2 as the bridge's slave: 16-bit words, the first preloaded by hand, the others by DMA. */
+#include "board/link.h"
+
+#include "port.h"
+#include "sfr.h"
+
+/* Offsets in the DMA RAM, bytes. */
+#define OUT_OFFSET 0u
+#define IN_OFFSET 32u
+
+/* CKP 0, CKE 0: mode 1. The slave has no FIFO: between two words of the bridge the DMA loads the next one, which is
+ * right whether the module keeps a preloaded word in its buffer or in its shift register. */
+#define LINK_CON1 (SPICON1_MODE16 | SPICON1_SSEN)
+#define OUT_CON (DMACON_FROM_RAM | DMACON_MODE_ONE_SHOT)
+#define IN_CON DMACON_MODE_ONE_SHOT
+
+#define DMA_REG(reg, channel) ((uint16_t)((reg) + (channel)*DMA_STRIDE))
+#define OUT_CHANNEL 0u
+#define IN_CHANNEL 1u
+
+static void set_channel(struct board *board, uint16_t channel, uint16_t offset, uint16_t words)
+{
+    sfr_write(board, DMA_REG(DMA0REQ, channel), IRQ_SPI2);
+    sfr_write(board, DMA_REG(DMA0STA, channel), offset);
+    sfr_write(board, DMA_REG(DMA0PAD, channel), SPI2BUF);
+    sfr_write(board, DMA_REG(DMA0CNT, channel), (uint16_t)(words - 1u));
+}
+
+void link_start(struct board *board)
+{
+    sfr_write(board, SPI2STAT, 0);
+    sfr_write(board, SPI2CON1, LINK_CON1);
+    set_channel(board, OUT_CHANNEL, OUT_OFFSET, LINK_WORDS - 1u); /* the first word goes by hand */
+    set_channel(board, IN_CHANNEL, IN_OFFSET, LINK_WORDS);
+}
+
+/* Module and DMA begin anew: whatever was clocked too much or too little is over. */
+void board_link_arm(struct board *board, const uint16_t *words)
+{
+    volatile uint16_t *out = DMA_WORDS_AT(board, OUT_OFFSET);
+    sfr_write(board, DMA_REG(DMA0CON, OUT_CHANNEL), OUT_CON);
+    sfr_write(board, DMA_REG(DMA0CON, IN_CHANNEL), IN_CON);
+    sfr_write(board, SPI2STAT, 0); /* bits, words, overflow */
+    for (uint16_t i = 1; i < LINK_WORDS; i++)
+        out[i - 1u] = words[i];
+    sfr_clear(board, IRQ_WORD(IFS0, IRQ_DMA1), IRQ_BIT(IRQ_DMA1));
+    sfr_write(board, DMA_REG(DMA0CON, IN_CHANNEL), IN_CON | DMACON_CHEN);
+    sfr_write(board, DMA_REG(DMA0CON, OUT_CHANNEL), OUT_CON | DMACON_CHEN);
+    sfr_write(board, SPI2STAT, SPISTAT_SPIEN);
+    sfr_write(board, SPI2BUF, words[0]);
+}
+
+void port_on_dma1(struct board *board)
+{
+    uint16_t words[LINK_WORDS];
+    const volatile uint16_t *in = DMA_WORDS_AT(board, IN_OFFSET);
+    sfr_clear(board, IRQ_WORD(IFS0, IRQ_DMA1), IRQ_BIT(IRQ_DMA1));
+    for (uint16_t i = 0; i < LINK_WORDS; i++)
+        words[i] = in[i];
+    node_on_order(&board->node, words);
+}
+
+/* More words came than were asked for: arming sets it right at the next chance. */
+void port_on_spi2_error(struct board *board)
+{
+    sfr_clear(board, IRQ_WORD(IFS0, IRQ_SPI2_ERROR), IRQ_BIT(IRQ_SPI2_ERROR));
+    sfr_clear(board, SPI2STAT, SPISTAT_SPIROV);
+}

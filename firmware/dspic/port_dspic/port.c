@@ -1,0 +1,60 @@
+#include "port.h"
+
+#include "sfr.h"
+
+#define PRIORITY 4u
+
+static const uint8_t SERVED[] = {IRQ_INT1, IRQ_T2, IRQ_SPI1, IRQ_SPI1_ERROR, IRQ_SPI2_ERROR, IRQ_DMA1};
+
+static void enable(struct board *board, uint16_t irq)
+{
+    const uint16_t shift = (uint16_t)(4u * (irq % 4u)), address = (uint16_t)(IPC0 + 2u * (irq / 4u));
+    sfr_clear(board, address, (uint16_t)(7u << shift));
+    sfr_set(board, address, (uint16_t)(PRIORITY << shift));
+    sfr_clear(board, IRQ_WORD(IFS0, irq), IRQ_BIT(irq));
+    sfr_set(board, IRQ_WORD(IEC0, irq), IRQ_BIT(irq));
+}
+
+void port_start(struct board *board)
+{
+    clock_start(board);
+    pins_start(board);
+    sensor_start(board);
+    link_start(board);
+    node_start(&board->node, board);
+    for (uint16_t i = 0; i < sizeof SERVED; i++)
+        enable(board, SERVED[i]);
+    sfr_set(board, RCON, RCON_SWDTEN);
+}
+
+void port_loop(struct board *board)
+{
+    cpu_clear_watchdog(board);
+}
+
+void port_on_int1(struct board *board)
+{
+    sfr_clear(board, IRQ_WORD(IFS0, IRQ_INT1), IRQ_BIT(IRQ_INT1));
+    node_on_sync(&board->node);
+}
+
+void port_on_t2(struct board *board)
+{
+    sfr_write(board, T2CON, 0); /* it runs once */
+    sfr_clear(board, IRQ_WORD(IFS0, IRQ_T2), IRQ_BIT(IRQ_T2));
+    node_on_timer(&board->node);
+}
+
+void port_on_spi1(struct board *board)
+{
+    sfr_clear(board, IRQ_WORD(IFS0, IRQ_SPI1), IRQ_BIT(IRQ_SPI1));
+    node_on_sensor_byte(&board->node, (uint8_t)sfr_read(board, SPI1BUF));
+}
+
+/* Cannot happen while each byte is read before the next is sent; if it does, reception must be started again. */
+void port_on_spi1_error(struct board *board)
+{
+    sfr_clear(board, IRQ_WORD(IFS0, IRQ_SPI1_ERROR), IRQ_BIT(IRQ_SPI1_ERROR));
+    sfr_read(board, SPI1BUF);
+    sfr_clear(board, SPI1STAT, SPISTAT_SPIROV);
+}

@@ -1,0 +1,47 @@
+/* SPI1 as the sensor's master, and the timer that paces it. */
+#include "board/sensor.h"
+#include "board/timer.h"
+
+#include "port.h"
+#include "sfr.h"
+
+/* FCY / (16 * 7) = 345 kHz: a bit takes 2.9 us, 2.84 on an oscillator 2 % fast, and a sensor 10 % slow wants 2.53.
+ * Only ones are ever sent: the output stays off and the pull-up sends them. */
+#define SENSOR_CON1 (SPICON1_MSTEN | SPICON1_DISSDO | 1u << SPICON1_PPRE_SHIFT | 1u << SPICON1_SPRE_SHIFT)
+
+/* Counts of T2 per microsecond at FCY 38.69 MHz, rounded up: 4.836 at 1:8 and 0.6045 at 1:64. */
+#define SHORT_MOST_US 8000u
+#define SHORT_COUNTS(us) ((uint16_t)(((uint32_t)(us)*155u >> 5) + 1u))
+#define LONG_COUNTS(us) ((uint16_t)(((uint32_t)(us)*155u >> 8) + 1u))
+#define PRESCALE_8 (1u << TCON_TCKPS_SHIFT)
+#define PRESCALE_64 (2u << TCON_TCKPS_SHIFT)
+
+void sensor_start(struct board *board)
+{
+    sfr_write(board, SPI1STAT, 0);
+    sfr_write(board, SPI1CON1, SENSOR_CON1);
+    sfr_write(board, SPI1STAT, SPISTAT_SPIEN);
+}
+
+void board_sensor_select(struct board *board, bool level)
+{
+    if (level)
+        sfr_set(board, LATB, (uint16_t)(1u << PIN_SENSOR_SELECT));
+    else
+        sfr_clear(board, LATB, (uint16_t)(1u << PIN_SENSOR_SELECT));
+}
+
+void board_sensor_transfer(struct board *board, uint8_t byte)
+{
+    sfr_write(board, SPI1BUF, byte);
+}
+
+void board_timer_start(struct board *board, uint16_t us)
+{
+    const bool is_short = us <= SHORT_MOST_US;
+    sfr_write(board, T2CON, 0);
+    sfr_write(board, TMR2, 0);
+    sfr_write(board, PR2, is_short ? SHORT_COUNTS(us) : LONG_COUNTS(us));
+    sfr_clear(board, IRQ_WORD(IFS0, IRQ_T2), IRQ_BIT(IRQ_T2)); /* an end that is waiting to be told is void */
+    sfr_write(board, T2CON, TCON_TON | (is_short ? PRESCALE_8 : PRESCALE_64));
+}

@@ -1,0 +1,75 @@
+/* DMA: each channel moves one item per request of the interrupt it is tied to. */
+#include "dspic_chip.h"
+
+static uint16_t *reg(struct dspic *chip, unsigned channel, unsigned address)
+{
+    return sfr(chip, address + channel * DMA_STRIDE);
+}
+
+static uint16_t *item(struct dspic *chip, unsigned channel)
+{
+    const struct dma *d = &chip->dma[channel];
+    const unsigned size = *reg(chip, channel, DMA0CON) & DMACON_BYTE ? 1u : 2u;
+    const unsigned start = *reg(chip, channel, d->second ? DMA0STB : DMA0STA);
+    return &chip->dma_ram[(start + d->done * size) / 2u % DSPIC_DMA_RAM_WORDS];
+}
+
+static void move(struct dspic *chip, unsigned channel)
+{
+    uint16_t *ram = item(chip, channel);
+    const uint16_t control = *reg(chip, channel, DMA0CON), pad = *reg(chip, channel, DMA0PAD);
+    const uint64_t now = chip->now_fs;
+    if (control & DMACON_FROM_RAM) {
+        const uint16_t old = *sfr(chip, pad);
+        *sfr(chip, pad) = *ram;
+        if (pad == SPI1BUF || pad == SPI2BUF)
+            spi_wrote(chip, pad == SPI2BUF, pad, old);
+    } else {
+        *ram = pad == SPI1BUF || pad == SPI2BUF ? spi_read_buffer(chip, pad == SPI2BUF) : *sfr(chip, pad);
+    }
+    chip->now_fs = now;
+}
+
+static void end_block(struct dspic *chip, unsigned channel)
+{
+    static const uint8_t IRQ[DMA_CHANNELS] = {IRQ_DMA0, IRQ_DMA1, IRQ_DMA2, 36, 46, 61, 68, 69};
+    struct dma *d = &chip->dma[channel];
+    uint16_t *control = reg(chip, channel, DMA0CON);
+    const bool ping_pong = *control & DMACON_MODE_PING_PONG;
+    d->done = 0;
+    if (*control & DMACON_MODE_ONE_SHOT && (!ping_pong || d->second))
+        *control &= (uint16_t)~DMACON_CHEN;
+    d->second = ping_pong && !d->second;
+    *sfr(chip, DMACS1) =
+        (uint16_t)((*sfr(chip, DMACS1) & ~(1u << channel) & 0x00FFu) | (unsigned)d->second << channel | channel << 8);
+    irq_raise(chip, IRQ[channel]);
+}
+
+static void serve(struct dspic *chip, unsigned channel)
+{
+    move(chip, channel);
+    if (chip->dma[channel].done++ == *reg(chip, channel, DMA0CNT))
+        end_block(chip, channel);
+}
+
+void dma_request(struct dspic *chip, unsigned irq)
+{
+    for (unsigned c = 0; c < DMA_CHANNELS; c++) {
+        if (*reg(chip, c, DMA0CON) & DMACON_CHEN && (*reg(chip, c, DMA0REQ) & 0x7Fu) == irq && irq != 0)
+            serve(chip, c);
+    }
+}
+
+/* Enabling begins a block anew; FORCE asks for one item at once. */
+void dma_wrote(struct dspic *chip, unsigned address, uint16_t old)
+{
+    const unsigned channel = (address - DMA0CON) / DMA_STRIDE, at = (address - DMA0CON) % DMA_STRIDE;
+    const uint16_t now = *sfr(chip, address);
+    if (at == DMA0CON - DMA0CON && now & ~old & DMACON_CHEN)
+        chip->dma[channel] = (struct dma){0};
+    if (at == DMA0REQ - DMA0CON && now & DMAREQ_FORCE) {
+        *sfr(chip, address) = now & (uint16_t)~DMAREQ_FORCE;
+        if (*reg(chip, channel, DMA0CON) & DMACON_CHEN)
+            serve(chip, channel);
+    }
+}

@@ -1,0 +1,99 @@
+/* The dsPIC33FJ128MC802 as its firmware sees it: registers with their side effects, in virtual time.
+ *
+ * Modelled: SPI1, SPI2, DMA with ping-pong, T1 to T3, INT1, pin select, ports, interrupt priorities and nesting, clock
+ * switch behind its unlock sequence, watchdog, flash self-programming with power cuts, reset causes. Firmware runs as
+ * native code; it takes time only where it touches the chip: each access a cycle, each interrupt its entry, exit and a
+ * fixed number of cycles for the work between. Interrupts nest at accesses. Not modelled: the CPU's own instructions,
+ * PSV, other peripherals; writes to their registers are kept and do nothing.
+ *
+ * A chip and what is wired to it belong to one thread. */
+#ifndef DSPIC_H
+#define DSPIC_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "dspic33fj128mc802.h"
+#include "sfr_model.h" // what the firmware's register accessors call
+
+struct dspic;
+
+enum dspic_drive { DSPIC_LOW, DSPIC_HIGH, DSPIC_FLOAT };
+
+enum dspic_trap { DSPIC_TRAP_OSCILLATOR, DSPIC_TRAP_STACK, DSPIC_TRAP_ADDRESS, DSPIC_TRAP_MATH, DSPIC_TRAP_DMA };
+
+/* What is not known for sure, or differs from part to part. */
+struct dspic_parameters {
+    int32_t frc_ppm;        /* error of the internal oscillator; the data sheet allows +-20 000 to 85 degrees C */
+    uint8_t slave_prefetch; /* 1: a slave's word waits in the buffer for the first clock; 2: it moves into the shift
+                             * register at once and leaves room for another. The data sheet does not say. */
+    uint8_t entry_cycles;   /* interrupt latency: 5 (A) */
+    uint8_t exit_cycles;    /* 3 (A) */
+    uint16_t work_cycles;   /* of an interrupt besides its register accesses */
+    uint16_t pll_lock_us;   /* from the switch to LOCK */
+    uint16_t watchdog_ms;   /* FWDT's period at the nominal LPRC */
+    bool pins_lock_once;    /* FOSC's IOL1WAY: a pin map that was locked stays locked until reset */
+    uint64_t seed;          /* of what a power cut leaves in the flash */
+};
+
+void dspic_parameters_default(struct dspic_parameters *parameters);
+
+/* What is connected to the chip, and the code it runs. Called from within the functions below. */
+struct dspic_wiring {
+    void *context;
+    void (*pin)(void *context, unsigned rp, enum dspic_drive, uint64_t now_fs); /* RB0 to RB15 changes */
+    void (*start)(void *context); /* from the reset vector to the main loop */
+    void (*loop)(void *context);  /* one turn of the main loop, after each interrupt that ended idle */
+    void (*interrupt)(void *context, unsigned irq); /* body of IRQ_* */
+    void (*trap)(void *context, enum dspic_trap);
+};
+
+/* What the firmware did that the data sheet forbids. Tests demand zero. */
+struct dspic_violations {
+    uint32_t overclocked;   /* FCY, VCO or PLL input outside their limits */
+    uint32_t spi_settings;  /* SPIxCON written while the module was enabled (ignored) */
+    uint32_t spi_disabled;  /* SPIxBUF written while it was disabled (ignored) */
+    uint32_t spi_overwrite; /* SPIxBUF written while SPITBF was set (the older word is lost) */
+    uint32_t pins_locked;   /* pin map written while locked (ignored) */
+    uint32_t unlock;        /* OSCCON or NVMCON written without its key sequence (ignored) */
+};
+
+/* Without power. NULL: no memory. */
+struct dspic *dspic_new(const struct dspic_parameters *parameters, const struct dspic_wiring *wiring);
+void dspic_free(struct dspic *chip);
+
+/* Times are femtoseconds since the chip was made and never go back: 5 hours at most. */
+#define DSPIC_FS_PER_NS UINT64_C(1000000)
+void dspic_power_on(struct dspic *chip, uint64_t now_fs);
+void dspic_power_off(struct dspic *chip, uint64_t now_fs);
+void dspic_run_until(struct dspic *chip, uint64_t until_fs);
+uint64_t dspic_now_fs(const struct dspic *chip);
+
+/* When something happens next by itself; UINT64_MAX: nothing. */
+uint64_t dspic_next_fs(const struct dspic *chip);
+
+/* The supply fails at this time, also in the middle of an erase or write, which is then done in part. */
+void dspic_cut_power_at(struct dspic *chip, uint64_t at_fs);
+bool dspic_powered(const struct dspic *chip);
+
+/* The outside drives pin RB0 to RB15, from `now_fs` on. Peripherals react at once, interrupts when time goes on. */
+void dspic_input(struct dspic *chip, unsigned rp, bool level, uint64_t now_fs);
+
+/* The same from within the pin callback, for a pin whose edges start nothing (data of a master). */
+void dspic_wire(struct dspic *chip, unsigned rp, bool level);
+
+enum dspic_drive dspic_output(const struct dspic *chip, unsigned rp);
+
+/* A brown-out or the reset pin (RCON_BOR, RCON_EXTR), a trap: at the present time. */
+void dspic_disturb_reset(struct dspic *chip, uint16_t cause);
+void dspic_disturb_trap(struct dspic *chip, enum dspic_trap trap);
+
+/* Flash as 24-bit words, FLASH_WORDS of them, for first programming and for tests; kept without power. */
+uint32_t *dspic_flash(struct dspic *chip);
+
+struct dspic_violations dspic_violations(const struct dspic *chip);
+uint64_t dspic_busy_fs(const struct dspic *chip); /* time in interrupts, stalls included */
+uint64_t dspic_interrupts(const struct dspic *chip);
+uint32_t dspic_fcy_hz(const struct dspic *chip);
+
+#endif

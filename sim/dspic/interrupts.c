@@ -1,0 +1,71 @@
+/* Interrupt controller: flags, enables, priorities, nesting. */
+#include "dspic_chip.h"
+
+static unsigned priority(const struct dspic *chip, unsigned irq)
+{
+    return chip->sfr[(IPC0 / 2u) + irq / 4u] >> (4u * (irq % 4u)) & 7u;
+}
+
+/* The flagged and enabled interrupt of the highest priority, the lowest number among equals; IRQ_COUNT: none. */
+static unsigned best(const struct dspic *chip, unsigned *its_priority)
+{
+    unsigned found = IRQ_COUNT;
+    *its_priority = 0;
+    for (unsigned word = 0; word * 16u < IRQ_COUNT; word++) {
+        unsigned ready = chip->sfr[IFS0 / 2u + word] & chip->sfr[IEC0 / 2u + word];
+        for (unsigned bit = 0; ready != 0; bit++, ready >>= 1) {
+            const unsigned irq = 16u * word + bit;
+            if ((ready & 1u) && priority(chip, irq) > *its_priority) {
+                *its_priority = priority(chip, irq);
+                found = irq;
+            }
+        }
+    }
+    return found;
+}
+
+static unsigned threshold(const struct dspic *chip)
+{
+    const unsigned masked = chip->sfr[SR / 2u] >> SR_IPL_SHIFT & 7u;
+    const bool nests = !(chip->sfr[INTCON1 / 2u] & INTCON1_NSTDIS);
+    if (chip->level > 0 && !nests)
+        return 7u;
+    return chip->level > masked ? chip->level : masked;
+}
+
+void irq_raise(struct dspic *chip, unsigned irq)
+{
+    *sfr(chip, IFS0 + 2u * (irq / 16u)) |= (uint16_t)(1u << irq % 16u);
+    chip->look = true;
+    dma_request(chip, irq);
+}
+
+static void serve(struct dspic *chip, unsigned irq, unsigned its)
+{
+    const unsigned before = chip->level;
+    const uint64_t since = chip->now_fs;
+    chip->level = its;
+    chip->interrupts++;
+    dspic_spend(chip, chip->parameters.entry_cycles);
+    chip->wiring.interrupt(chip->wiring.context, irq);
+    dspic_spend(chip, (uint64_t)chip->parameters.work_cycles + chip->parameters.exit_cycles);
+    chip->level = before;
+    chip->look = true; /* what had to wait for this priority */
+    if (before == 0)
+        chip->busy_fs += chip->now_fs - since;
+}
+
+void irq_take(struct dspic *chip)
+{
+    unsigned its;
+    bool woke = false;
+    if (!chip->look)
+        return;
+    chip->look = false;
+    for (unsigned irq = best(chip, &its); irq < IRQ_COUNT && its > threshold(chip); irq = best(chip, &its)) {
+        serve(chip, irq, its);
+        woke = true;
+    }
+    if (woke && chip->level == 0 && !chip->in_start)
+        chip->wiring.loop(chip->wiring.context);
+}

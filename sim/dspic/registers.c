@@ -1,0 +1,140 @@
+/* The register file: every access takes a cycle, some have side effects. */
+#include "dspic_chip.h"
+
+static bool within(unsigned address, unsigned first, unsigned last)
+{
+    return address >= first && address <= last;
+}
+
+static uint16_t look(struct dspic *chip, unsigned address)
+{
+    switch (address) {
+    case SPI1BUF:
+    case SPI2BUF:
+        return spi_read_buffer(chip, address == SPI2BUF);
+    case TMR1:
+        return timer_count(chip, 0);
+    case TMR2:
+        return timer_count(chip, 1);
+    case TMR3:
+        return timer_count(chip, 2);
+    case PORTB: {
+        uint16_t pins = chip->inputs;
+        for (unsigned rp = 0; rp < 16u; rp++) {
+            if (chip->drive[rp] != DSPIC_FLOAT)
+                pins = (uint16_t)((pins & ~(1u << rp)) | (unsigned)(chip->drive[rp] == DSPIC_HIGH) << rp);
+        }
+        return pins;
+    }
+    default:
+        return *sfr(chip, address);
+    }
+}
+
+static void keep_pin_map(struct dspic *chip, unsigned address, uint16_t old)
+{
+    if (*sfr(chip, OSCCON) & OSCCON_IOLOCK) {
+        chip->violations.pins_locked++;
+        *sfr(chip, address) = old;
+    }
+    pins_refresh(chip);
+}
+
+static void wrote(struct dspic *chip, unsigned address, uint16_t old)
+{
+    if (within(address, SPI1STAT, SPI1BUF))
+        spi_wrote(chip, 0, address, old);
+    else if (within(address, SPI2STAT, SPI2BUF))
+        spi_wrote(chip, 1, address, old);
+    else if (within(address, DMA0CON, DMACS0 - 2u))
+        dma_wrote(chip, address, old);
+    else if (within(address, TMR1, T3CON))
+        timer_wrote(chip, address, old);
+    else if (within(address, RPINR0, RPOR0 + 14u))
+        keep_pin_map(chip, address, old);
+    else if (within(address, TRISB, ODCB))
+        pins_refresh(chip);
+    else if (address == NVMCON || address == NVMKEY)
+        flash_wrote(chip, address, old);
+    else if (address == RCON && (*sfr(chip, RCON) ^ old) & RCON_SWDTEN)
+        watchdog_restart(chip);
+    else if (address == SR || within(address, INTCON1, IPC0 + 2u * (IRQ_COUNT / 4u)))
+        chip->look = true;
+    else if (address == OSCCON) { /* only byte by byte, behind the unlock sequences */
+        chip->violations.unlock++;
+        *sfr(chip, OSCCON) = old;
+    }
+}
+
+static void put(struct dspic *chip, unsigned address, uint16_t value)
+{
+    const uint16_t old = *sfr(chip, address);
+    const unsigned target = address == PORTB ? LATB : address;
+    *sfr(chip, target) = value;
+    wrote(chip, target, old);
+}
+
+uint16_t dspic_sfr_read(struct dspic *chip, uint16_t address)
+{
+    const uint16_t value = look(chip, address);
+    dspic_spend(chip, 1u);
+    return value;
+}
+
+void dspic_sfr_write(struct dspic *chip, uint16_t address, uint16_t value)
+{
+    put(chip, address, value);
+    dspic_spend(chip, 1u);
+}
+
+void dspic_sfr_modify(struct dspic *chip, uint16_t address, uint16_t mask, uint16_t value)
+{
+    put(chip, address, (uint16_t)((*sfr(chip, address) & ~mask) | value));
+    dspic_spend(chip, 1u);
+}
+
+static void osccon_high(struct dspic *chip, uint8_t value)
+{
+    uint16_t *osccon = sfr(chip, OSCCON);
+    *osccon = (uint16_t)((*osccon & ~(7u << OSCCON_NOSC_SHIFT)) | (value & 7u) << OSCCON_NOSC_SHIFT);
+}
+
+static void osccon_low(struct dspic *chip, uint8_t value)
+{
+    uint16_t *osccon = sfr(chip, OSCCON);
+    const bool was_locked = *osccon & OSCCON_IOLOCK;
+    chip->pins_were_locked |= was_locked;
+    *osccon = (uint16_t)((*osccon & ~(OSCCON_OSWEN | OSCCON_IOLOCK)) | (value & (OSCCON_OSWEN | OSCCON_IOLOCK)));
+    if (chip->parameters.pins_lock_once && chip->pins_were_locked)
+        *osccon |= OSCCON_IOLOCK;
+    if (*osccon & OSCCON_OSWEN)
+        plan_event(chip, EVENT_PLL, chip->now_fs + chip->parameters.pll_lock_us * (DSPIC_FS_PER_NS * 1000u));
+}
+
+/* One step of an unlock sequence: two keys, then the value, to the same byte. True when this is the value. */
+static bool unlock(uint8_t *step, uint8_t value, uint8_t key1, uint8_t key2)
+{
+    if (*step == 2u) {
+        *step = 0;
+        return true;
+    }
+    if (*step == 1u && value == key2)
+        *step = 2u;
+    else
+        *step = value == key1;
+    return false;
+}
+
+void dspic_byte_write(struct dspic *chip, uint16_t address, uint8_t value)
+{
+    if (address == OSCCON + 1u && unlock(&chip->high_key, value, OSCCON_HIGH_KEY1, OSCCON_HIGH_KEY2))
+        osccon_high(chip, value);
+    else if (address == OSCCON && unlock(&chip->low_key, value, OSCCON_LOW_KEY1, OSCCON_LOW_KEY2))
+        osccon_low(chip, value);
+    dspic_spend(chip, 1u);
+}
+
+uint16_t *dspic_dma_ram(struct dspic *chip)
+{
+    return chip->dma_ram;
+}

@@ -1,0 +1,229 @@
+/* SPI1 and SPI2: one receive and one transmit buffer each, no FIFO; standard mode, 8 or 16 bits, master or slave. */
+#include "dspic_chip.h"
+
+enum { STAT = SPI1STAT, CON1 = SPI1CON1, BUF = SPI1BUF, OFFSET = SPI2STAT - SPI1STAT };
+
+static const uint8_t DONE_IRQ[] = {IRQ_SPI1, IRQ_SPI2}, ERROR_IRQ[] = {IRQ_SPI1_ERROR, IRQ_SPI2_ERROR};
+
+static uint16_t *reg(struct dspic *chip, unsigned n, unsigned address)
+{
+    return sfr(chip, address + n * OFFSET);
+}
+
+static uint16_t con1(const struct dspic *chip, unsigned n)
+{
+    return chip->sfr[(CON1 + n * OFFSET) / 2u];
+}
+
+static bool enabled(const struct dspic *chip, unsigned n)
+{
+    return chip->sfr[(STAT + n * OFFSET) / 2u] & SPISTAT_SPIEN;
+}
+
+static unsigned width(const struct dspic *chip, unsigned n)
+{
+    return con1(chip, n) & SPICON1_MODE16 ? 16u : 8u;
+}
+
+static unsigned divider(uint16_t control)
+{
+    static const unsigned PRIMARY[] = {64, 16, 4, 1};
+    return PRIMARY[control >> SPICON1_PPRE_SHIFT & 3u] * (8u - (control >> SPICON1_SPRE_SHIFT & 7u));
+}
+
+/* Where a slave's /SS comes in; SPI1's is not used as one here. */
+static bool selected(const struct dspic *chip, unsigned n)
+{
+    if (!(con1(chip, n) & SPICON1_SSEN))
+        return true;
+    return n == 1u && !pin_level(chip, pin_input_field(chip, RPINR23, 0));
+}
+
+static void load(struct dspic *chip, unsigned n)
+{
+    struct spi *s = &chip->spi[n];
+    if (*reg(chip, n, STAT) & SPISTAT_SPITBF)
+        s->word = s->transmit; /* else the old contents go out again */
+    *reg(chip, n, STAT) &= (uint16_t)~SPISTAT_SPITBF;
+    s->out = (uint16_t)(s->word << (16u - width(chip, n)));
+    s->in = 0;
+    s->bit = 0;
+    s->loaded = true;
+}
+
+static void begin(struct dspic *chip, unsigned n)
+{
+    struct spi *s = &chip->spi[n];
+    load(chip, n);
+    s->half_fs = divider(con1(chip, n)) * chip->cycle_fs / 2u;
+    s->shifting = true;
+    s->high = false;
+    plan_event(chip, EVENT_SPI1 + n, chip->now_fs + s->half_fs);
+}
+
+static void shift_out(struct dspic *chip, unsigned n)
+{
+    struct spi *s = &chip->spi[n];
+    s->sdo = s->out >> 15 & 1u;
+    s->out = (uint16_t)(s->out << 1);
+}
+
+static void end_word(struct dspic *chip, unsigned n)
+{
+    struct spi *s = &chip->spi[n];
+    uint16_t *stat = reg(chip, n, STAT);
+    s->loaded = false;
+    s->bit = 0;
+    if (*stat & (SPISTAT_SPIRBF | SPISTAT_SPIROV)) { /* the word is lost, and all later ones until SPIROV is cleared */
+        if (!(*stat & SPISTAT_SPIROV)) {
+            *stat |= SPISTAT_SPIROV;
+            irq_raise(chip, ERROR_IRQ[n]);
+        }
+    } else {
+        s->receive = s->in;
+        *stat |= SPISTAT_SPIRBF;
+    }
+    irq_raise(chip, DONE_IRQ[n]);
+}
+
+static void sample(struct dspic *chip, unsigned n)
+{
+    struct spi *s = &chip->spi[n];
+    const unsigned field = pin_input_field(chip, n == 0 ? RPINR20 : RPINR22, 0);
+    s->in = (uint16_t)(s->in << 1 | pin_level(chip, field));
+    s->bit++;
+}
+
+/* Master: SCK rises and the bit goes out, SCK falls and the bit comes in (CKP 0, CKE 0, SMP 0: SPI mode 1). */
+void spi_event(struct dspic *chip, unsigned n)
+{
+    struct spi *s = &chip->spi[n];
+    s->high = !s->high;
+    if (s->high)
+        shift_out(chip, n);
+    pins_of_spi(chip, n);
+    if (!s->high)
+        sample(chip, n);
+    if (s->bit < width(chip, n) || s->high) {
+        plan_event(chip, EVENT_SPI1 + n, chip->now_fs + s->half_fs);
+        return;
+    }
+    s->shifting = false;
+    end_word(chip, n);
+    if (*reg(chip, n, STAT) & SPISTAT_SPITBF && !s->shifting)
+        begin(chip, n);
+}
+
+static void slave_edge(struct dspic *chip, unsigned n, bool level)
+{
+    struct spi *s = &chip->spi[n];
+    if (level == s->high || !selected(chip, n))
+        return;
+    s->high = level;
+    if (level) {
+        if (!s->loaded)
+            load(chip, n);
+        shift_out(chip, n);
+        pins_of_spi(chip, n);
+        return;
+    }
+    sample(chip, n);
+    if (s->bit < width(chip, n))
+        return;
+    end_word(chip, n);
+    if (chip->parameters.slave_prefetch > 1u && *reg(chip, n, STAT) & SPISTAT_SPITBF && !s->loaded)
+        load(chip, n);
+}
+
+/* /SS: a word cut short begins again at its first bit. */
+static void select_edge(struct dspic *chip, unsigned n)
+{
+    struct spi *s = &chip->spi[n];
+    if (s->loaded && s->bit > 0) {
+        s->out = (uint16_t)(s->word << (16u - width(chip, n)));
+        s->in = 0;
+        s->bit = 0;
+    }
+    s->high = false;
+    s->sdo = false;
+    pins_of_spi(chip, n);
+}
+
+void spi_input(struct dspic *chip, unsigned rp, bool level)
+{
+    for (unsigned n = 0; n < 2u; n++) {
+        if (!enabled(chip, n) || con1(chip, n) & SPICON1_MSTEN)
+            continue;
+        if (n == 1u && con1(chip, n) & SPICON1_SSEN && pin_input_field(chip, RPINR23, 0) == rp)
+            select_edge(chip, n);
+        if (pin_input_field(chip, n == 0 ? RPINR20 : RPINR22, 8u) == rp)
+            slave_edge(chip, n, level);
+    }
+}
+
+uint16_t spi_read_buffer(struct dspic *chip, unsigned n)
+{
+    *reg(chip, n, STAT) &= (uint16_t)~SPISTAT_SPIRBF;
+    return chip->spi[n].receive;
+}
+
+static void write_buffer(struct dspic *chip, unsigned n, uint16_t value)
+{
+    struct spi *s = &chip->spi[n];
+    if (!enabled(chip, n)) {
+        chip->violations.spi_disabled++;
+        return;
+    }
+    if (*reg(chip, n, STAT) & SPISTAT_SPITBF)
+        chip->violations.spi_overwrite++;
+    s->transmit = value;
+    *reg(chip, n, STAT) |= SPISTAT_SPITBF;
+    if (con1(chip, n) & SPICON1_MSTEN) {
+        if (!s->shifting)
+            begin(chip, n);
+    } else if (chip->parameters.slave_prefetch > 1u && !s->loaded) {
+        load(chip, n);
+    }
+}
+
+/* Only SPIROV (cleared) and SPIEN may be written; switching off ends what is under way and empties the buffers. */
+static void write_status(struct dspic *chip, unsigned n, uint16_t old)
+{
+    uint16_t *stat = reg(chip, n, STAT);
+    const uint16_t keep = old & (SPISTAT_SPIRBF | SPISTAT_SPITBF);
+    const uint16_t overflow = *stat & old & SPISTAT_SPIROV;
+    const uint16_t enable = *stat & SPISTAT_SPIEN;
+    *stat = (uint16_t)(enable | overflow | (enable ? keep : 0u));
+    if (!enable) {
+        chip->spi[n] = (struct spi){.word = chip->spi[n].word, .receive = chip->spi[n].receive};
+        plan_event(chip, EVENT_SPI1 + n, NEVER);
+    }
+    pins_of_spi(chip, n);
+}
+
+void spi_wrote(struct dspic *chip, unsigned n, unsigned address, uint16_t old)
+{
+    const unsigned at = address - n * OFFSET;
+    if (at == BUF) {
+        write_buffer(chip, n, *sfr(chip, address));
+    } else if (at == STAT) {
+        write_status(chip, n, old);
+    } else if (enabled(chip, n)) {
+        chip->violations.spi_settings += *sfr(chip, address) != old;
+        *sfr(chip, address) = old;
+    }
+}
+
+bool spi_drives(const struct dspic *chip, unsigned function, bool *level)
+{
+    const unsigned n = function == RP_SDO2;
+    const struct spi *s = &chip->spi[n];
+    if (!enabled(chip, n))
+        return false;
+    if (function == RP_SCK1) {
+        *level = s->high;
+        return con1(chip, n) & SPICON1_MSTEN;
+    }
+    *level = s->sdo;
+    return !(con1(chip, n) & SPICON1_DISSDO) && (con1(chip, n) & SPICON1_MSTEN || selected(chip, n));
+}

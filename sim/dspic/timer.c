@@ -1,0 +1,72 @@
+/* Timers 1 to 3 as free-running counters with a period. */
+#include "dspic_chip.h"
+
+static const uint16_t CONTROL[] = {T1CON, T2CON, T3CON}, COUNT[] = {TMR1, TMR2, TMR3}, PERIOD[] = {PR1, PR2, PR3};
+static const uint8_t NUMBER[] = {IRQ_T1, IRQ_T2, IRQ_T3};
+static const uint16_t PRESCALE[] = {1, 8, 64, 256};
+
+static bool on(const struct dspic *chip, unsigned n)
+{
+    return chip->sfr[CONTROL[n] / 2u] & TCON_TON;
+}
+
+static uint64_t count_fs(const struct dspic *chip, unsigned n)
+{
+    return PRESCALE[chip->sfr[CONTROL[n] / 2u] >> TCON_TCKPS_SHIFT & 3u] * chip->cycle_fs;
+}
+
+uint16_t timer_count(const struct dspic *chip, unsigned n)
+{
+    const struct timer *t = &chip->timer[n];
+    return on(chip, n) ? (uint16_t)(t->from + (chip->now_fs - t->since_fs) / count_fs(chip, n)) : t->from;
+}
+
+/* The count equals the period, then begins again at 0: the flag is set with the next count. */
+static void plan(struct dspic *chip, unsigned n)
+{
+    struct timer *t = &chip->timer[n];
+    const uint32_t counts = (uint32_t)(uint16_t)(*sfr(chip, PERIOD[n]) - t->from) + 1u;
+    plan_event(chip, EVENT_T1 + n, on(chip, n) ? t->since_fs + counts * count_fs(chip, n) : NEVER);
+}
+
+void timer_event(struct dspic *chip, unsigned n)
+{
+    chip->timer[n] = (struct timer){.since_fs = chip->now_fs};
+    plan(chip, n);
+    irq_raise(chip, NUMBER[n]);
+}
+
+/* Keeps the count over a change of its control register. */
+static void hold(struct dspic *chip, unsigned n, uint16_t old)
+{
+    uint16_t *control = sfr(chip, CONTROL[n]);
+    const uint16_t now = *control;
+    *control = old;
+    const uint16_t count = timer_count(chip, n);
+    *control = now;
+    chip->timer[n] = (struct timer){.since_fs = chip->now_fs, .from = count};
+}
+
+void timer_wrote(struct dspic *chip, unsigned address, uint16_t old)
+{
+    for (unsigned n = 0; n < 3u; n++) {
+        if (address == COUNT[n])
+            chip->timer[n] = (struct timer){.since_fs = chip->now_fs, .from = *sfr(chip, address)};
+        else if (address == CONTROL[n])
+            hold(chip, n, old);
+        else if (address != PERIOD[n])
+            continue;
+        plan(chip, n);
+    }
+}
+
+void timers_rescale(struct dspic *chip, uint64_t old_cycle_fs)
+{
+    const uint64_t new_cycle_fs = chip->cycle_fs;
+    for (unsigned n = 0; n < 3u; n++) {
+        chip->cycle_fs = old_cycle_fs;
+        hold(chip, n, *sfr(chip, CONTROL[n]));
+        chip->cycle_fs = new_cycle_fs;
+        plan(chip, n);
+    }
+}
