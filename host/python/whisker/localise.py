@@ -21,6 +21,7 @@ __all__ = [
     "SettingError",
     "default_filter",
     "filter_names",
+    "judged_rows",
     "observations_path",
     "pose_errors",
     "read_observations",
@@ -70,7 +71,7 @@ def run(
     made = Filter(name, scene, settings, seed)
     setup_s = time.perf_counter() - began
     first, parts, judged = 0, [], []
-    for row in _judged_rows(observations, regions):
+    for row in judged_rows(observations, regions):
         parts.append(made.replay(observations, first, row + 1 - first))
         judged.append(made.region(*observations.truth[row, :2]))
         first = row + 1
@@ -80,7 +81,8 @@ def run(
     return Run(name, setup_s, step_us, table, made.bad_cells, made.bad_rows, levels, areas)
 
 
-def _judged_rows(observations: Observations, most: int) -> list[int]:
+def judged_rows(observations: Observations, most: int) -> list[int]:
+    """At most so many rows whose truth is known, evenly spread, the first and the last among them."""
     if observations.truth is None or most <= 0:
         return []
     known = np.nonzero(np.isfinite(observations.truth).all(axis=1))[0]
