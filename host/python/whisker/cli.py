@@ -13,6 +13,7 @@ from .errors import UserError
 COMMANDS = {
     "info": "what ring, daemon and bridge say of themselves",
     "top": "lanes, rates and losses in the terminal",
+    "view": "traces, losses and health in a browser; the same as whisker-view",
     "doctor": "find out why it does not work",
     "bridge-sim": "a simulated bridge to try everything with",
     "record": "write a ring to an MCAP file",

@@ -1,0 +1,307 @@
+"""whisker-view over its WebSocket: what a page is told equals what the ring holds, whatever writer and page do."""
+
+import asyncio
+import json
+import logging
+import os
+import socket
+
+import numpy as np
+import pytest
+from viewkit import NODES, Block, made_frames, page, ring_name, ring_of, spoil, view_of
+from websockets.exceptions import ConnectionClosed
+
+from whisker.protocol import LANES
+from whisker.ring import Clock, Writer
+from whisker.view.__main__ import main
+from whisker.view.client import WINDOW
+from whisker.view.pyramid import BINS
+from whisker.view.rings import find_rings
+from whisker.view.server import MESSAGE_BYTES
+
+
+@pytest.fixture(autouse=True)
+def nothing_logged(caplog):
+    """An exception inside the server is a line in its log: there must be none."""
+    caplog.set_level(logging.WARNING)
+    yield
+    assert [record.getMessage() for record in caplog.records] == []
+
+
+def test_traces_equal_the_ring():
+    frames = made_frames(0, 3000)
+    spoil(frames, "late", 1, slice(50, 60))
+
+    async def scenario(name):
+        async with view_of(name) as port, page(port) as p:
+            await p.traces(name, width=1, bins=BINS, lanes=0b111)
+            blocks = await p.bins_until(len(frames))
+            assert blocks[0].flags == 1 and not any(block.flags for block in blocks[1:])
+            assert {(b.topic, b.width, b.mask, b.subscription) for b in blocks} == {(1, 1, 0b111, 7)}
+            assert [b.first for b in blocks[1:]] == [b.first + b.bins for b in blocks[:-1]]
+            for axis, name_of_axis in enumerate(("alpha", "beta")):
+                low, high = (np.concatenate([getattr(b, side)[axis] for b in blocks], -1) for side in ("low", "high"))
+                counts = frames["lane"][name_of_axis][:, :NODES].T
+                good = frames["lane"]["status"][:, :NODES].T == 0
+                assert np.array_equal(low[good], counts[good]) and np.array_equal(high[good], counts[good])
+                assert np.all(low[~good] > high[~good])
+            assert np.array_equal(np.concatenate([b.bad for b in blocks], -1), ~good)
+
+    with ring_of(frames) as writer:
+        asyncio.run(scenario(writer.name))
+
+
+def test_a_wide_bin_keeps_a_peak_of_one_tick():
+    frames = made_frames(0, 4096)
+    frames["lane"]["alpha"][:, 0] = 0x8000
+    frames["lane"]["alpha"][1234, 0] = 0xF000
+
+    async def scenario(name):
+        async with view_of(name) as port, page(port) as p:
+            await p.traces(name, width=512, lanes=1)
+            block = (await p.bins_until(8))[0]
+            assert block.high[0, 0].tolist() == [0x8000, 0x8000, 0xF000] + [0x8000] * 5
+            assert block.low[0, 0].tolist() == [0x8000] * 8
+
+    with ring_of(frames) as writer:
+        asyncio.run(scenario(writer.name))
+
+
+def test_new_frames_follow_without_gap_or_repeat():
+    async def scenario(writer):
+        async with view_of(writer.name) as port, page(port) as p:
+            await p.traces(writer.name, width=2, lanes=1)
+            await p.bins_until(50)
+            writer.publish(made_frames(100, 101))
+            (block,) = await p.bins_until(100)
+            assert (block.first, block.bins, block.flags) == (50, 50, 0)  # tick 200 waits for its other half
+
+    with ring_of(made_frames(0, 100)) as writer:
+        asyncio.run(scenario(writer))
+
+
+def test_status_counts_what_the_ring_counts():
+    frames = made_frames(0, 2000)
+    spoil(frames, "link_crc", 2, slice(10, 15))
+    frames = np.delete(frames, slice(600, 607))
+    frames["dropped"][1000:] = 3
+
+    async def scenario(writer):
+        async with view_of(writer.name) as port, page(port) as p:
+            await p.ask(type="subscribe", topic="status", ring=writer.name)
+            told = await p.status_where(lambda s: s["frames"] == len(frames))
+            assert (told["ring"], told["state"], told["trouble"]) == (writer.name, "live", None)
+            assert (told["reader"]["frames_missing"], told["dropped"], told["reader"]["overruns"]) == (7, 3, 0)
+            assert told["bad"]["link_crc"] == [0, 0, 5] + [0] * (LANES - 3)
+            assert told["lanes"]["lost"][:NODES] == [0, 0, 5]
+            assert told["lanes"]["state"] == ["good"] * NODES + ["absent"] * (LANES - NODES)
+            assert told["lanes"]["alpha"][0] == frames["lane"]["alpha"][-1, 0]
+            assert told["tick_s"] == pytest.approx(500e-6)
+            assert told["clock"] is None and told["daemon"] is None
+            writer.set_clock(Clock(0, 1, 2, 50 / 3, 1500.0))
+            writer.set_stats(frames=9, started_ns=1, reconnects=2, wire_version=1, error=-40, serial=b"CB-7")
+            told = await p.status_where(lambda s: s["daemon"])
+            assert told["clock"]["uncertainty_ns"] == 1500.0
+            assert (told["daemon"]["reconnects"], told["daemon"]["serial"]) == (2, "CB-7")
+            assert "no bridge is connected" in told["daemon"]["trouble"]
+
+    with ring_of(frames) as writer:
+        asyncio.run(scenario(writer))
+
+
+def test_no_ring_then_one_then_its_end_then_a_new_one():
+    name = ring_name()
+
+    async def scenario():
+        async with view_of(name) as port, page(port) as p:
+            await p.ask(type="subscribe", topic="status", ring=name)
+            told = await p.status_where(lambda s: s["state"] == "waiting")
+            assert "there is no ring of this name" in told["trouble"]
+            await p.traces(name, width=1, lanes=1)
+            with ring_of(made_frames(0, 300), name):
+                await p.status_where(lambda s: s["state"] == "live")
+                await p.bins_until(300)
+            told = await p.status_where(lambda s: s["state"] == "ended")
+            assert "closed the ring" in told["trouble"]
+            with ring_of(made_frames(0, 200, seed=1), name):
+                told = await p.status_where(lambda s: s["state"] == "live" and s["frames"] == 500)
+                assert told["restarts"] == 1
+                again = made_frames(0, 200, seed=1)["lane"]["alpha"][:, 0].tolist()
+                lows = np.concatenate([b.low[0, 0] for b in await p.bins_until(501)])
+                while lows[-1] == 0xFFFF:  # the outage, as long as it was
+                    lows = np.append(lows, Block(await p.next("traces")).low[0, 0])
+                assert lows[-200:].tolist() == again
+                assert np.all(lows[:-200] == 0xFFFF) and len(lows) > 200, "time goes on, with a gap"
+            texts = [text for _, text in told["events"]]
+            assert texts[:2] == ["attached to the ring", "whiskerd closed the ring"]
+
+    asyncio.run(scenario())
+
+
+def test_a_slow_page_gets_the_newest_and_holds_up_nobody():
+    async def scenario(writer):
+        async with view_of(writer.name) as port, page(port) as slow, page(port) as quick:
+            for p in (slow, quick):
+                await p.next("hello")
+                await p.traces(writer.name, width=1, bins=100, lanes=1)
+            first = 1000
+            while quick.count < 20:  # many more than the slow one may have under way
+                writer.publish(made_frames(first, 100))
+                first += 100
+                await quick.bins_until(first)
+            # What was sent before the page fell silent; had there been more, it would come next and not be the newest.
+            for _ in range(WINDOW):
+                await slow.socket.recv()
+            await slow.ask(type="ack", count=1 + WINDOW)
+            newest = Block(await slow.next("traces", acknowledge=False))
+            assert newest.first + newest.bins == first and newest.bins == 100, "not the newest"
+
+    with ring_of(made_frames(0, 1000)) as writer:
+        asyncio.run(scenario(writer))
+
+
+def test_rings_are_found_named_and_told_when_they_change():
+    async def scenario(writer):
+        other = ring_name()
+        async with view_of(writer.name) as port, page(port) as p:
+            assert (await p.next("hello"))["rings"][0] == writer.name
+            await p.ask(type="subscribe", topic="rings")
+            assert other not in (await p.next("rings"))["rings"]
+            with Writer(other) as second:
+                assert other in (await p.next("rings"))["rings"]
+                second.publish(made_frames(0, 64))
+                await p.ask(type="subscribe", topic="status", ring=other)
+                await p.status_where(lambda s: s["ring"] == other and s["frames"] == 64)
+
+    with ring_of(made_frames(0, 10)) as writer:
+        asyncio.run(scenario(writer))
+
+
+def test_only_rings_are_offered(tmp_path):
+    (tmp_path / "good").write_bytes(b"WHSKRING")
+    (tmp_path / "other").write_bytes(b"something")
+    (tmp_path / "short").write_bytes(b"WHSK")
+    (tmp_path / "name\nwith a line").write_bytes(b"WHSKRING")
+    (tmp_path / "link").symlink_to(tmp_path / "good")
+    (tmp_path / "folder").mkdir()
+    assert find_rings(tmp_path) == ["good"]
+    assert find_rings(tmp_path / "missing") == []
+
+
+def test_shared_memory_that_is_no_ring_is_refused_with_the_reason(tmp_path):
+    name = ring_name()
+    path = f"/dev/shm/{name}"
+    rng = np.random.default_rng(5)
+    with open(path, "wb") as file:
+        file.write(b"WHSKRING" + rng.bytes(4096 * 3))
+
+    async def scenario():
+        async with view_of(name) as port, page(port) as p:
+            await p.ask(type="subscribe", topic="status", ring=name)
+            assert "another layout version" in (await p.status_where(lambda s: s["state"] == "refused"))["trouble"]
+
+    try:
+        asyncio.run(scenario())
+    finally:
+        os.unlink(path)
+
+
+@pytest.mark.parametrize(
+    "request_text, complaint",
+    [
+        ("nonsense", "not a JSON object"),
+        ("[]", "not a JSON object"),
+        ("[" * 4000, "not a JSON object"),
+        ('{"type": "delete"}', "type: not ack, subscribe or unsubscribe"),
+        ('{"type": "subscribe", "topic": "arena"}', "topic: not one of traces, status, rings"),
+        ('{"type": "subscribe", "topic": ["traces"]}', "topic: not one of"),
+        ('{"type": "subscribe", "topic": "status", "ring": "../etc/passwd"}', "ring: not one of this machine"),
+        ('{"type": "subscribe", "topic": "status", "ring": {}}', "ring: not one of this machine"),
+        ('{"type": "ack", "count": 99}', "count: not the number"),
+        ('{"type": "ack", "count": true}', "count: not the number"),
+        ('{"type": "subscribe", "topic": "traces", "ticks_per_bin": 3}', "ticks_per_bin: 3 is not one of 1, 2"),
+        ('{"type": "subscribe", "topic": "traces", "ticks_per_bin": 1e999}', "ticks_per_bin: not a whole number"),
+        ('{"type": "subscribe", "topic": "traces", "ticks_per_bin": 1, "bins": 0}', "bins: not a whole number"),
+        (
+            '{"type": "subscribe", "topic": "traces", "ticks_per_bin": 1, "bins": 9, "lanes": 268435456}',
+            "lanes: not a whole number from 1 to 268435455",
+        ),
+    ],
+)
+def test_a_bad_request_is_answered_with_one_line_and_changes_nothing(request_text, complaint):
+    async def scenario(writer):
+        async with view_of(writer.name) as port, page(port) as p:
+            await p.socket.send(request_text)
+            told = await p.next("error")
+            assert complaint in told["text"] and "\n" not in told["text"]
+            await p.traces(writer.name, lanes=1)
+            await p.bins_until(10)
+
+    with ring_of(made_frames(0, 10)) as writer:
+        asyncio.run(scenario(writer))
+
+
+def test_a_page_that_asks_nonsense_or_too_much_or_too_long_is_cut_off():
+    async def scenario(writer):
+        async with view_of(writer.name) as port, page(port) as steady:
+            for message, times in (("nonsense", 40), (json.dumps({"type": "ack", "count": 0}), 2000), ("x" * 5000, 1)):
+                assert len(message) < MESSAGE_BYTES or times == 1
+                with pytest.raises(ConnectionClosed):
+                    async with page(port) as p:
+                        for _ in range(times):
+                            await p.socket.send(message)
+                        while True:
+                            await p.socket.recv()
+            await steady.traces(writer.name, lanes=1)
+            await steady.bins_until(10)
+
+    with ring_of(made_frames(0, 10)) as writer:
+        asyncio.run(scenario(writer))
+
+
+def test_leaving_a_topic_ends_it():
+    async def scenario(writer):
+        async with view_of(writer.name) as port, page(port) as p:
+            await p.traces(writer.name, width=1, lanes=1)
+            await p.bins_until(10)
+            await p.ask(type="unsubscribe", topic="traces")
+            await p.ask(type="unsubscribe", topic="rings")  # never had
+            await p.ask(type="subscribe", topic="status", ring=writer.name)
+            writer.publish(made_frames(10, 100))
+            seen = []
+            while len(seen) < 3:
+                message = await p.socket.recv()
+                seen += [message] if isinstance(message, str) else pytest.fail("traces still come")
+                p.count += 1
+                await p.ask(type="ack", count=p.count)
+
+    with ring_of(made_frames(0, 10)) as writer:
+        asyncio.run(scenario(writer))
+
+
+def test_port_in_use_is_one_line(capfd):
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        assert main(["--port", str(port)]) == 1
+    out, err = capfd.readouterr()
+    assert out == "" and err.count("\n") == 1
+    assert f"127.0.0.1:{port}: port in use" in err and "--port" in err
+
+
+@pytest.mark.parametrize(
+    "arguments, complaint",
+    [
+        (["--port", "70000"], "70000 is not a port"),
+        (["--host", "example.org"], "example.org is not an address"),
+        (["--host", "192.0.2.1", "--port", "0"], "not an address of this machine"),
+        (["--ring", "a/b"], "not the name of a ring"),
+        (["--ring", ""], "not the name of a ring"),
+    ],
+)
+def test_bad_arguments_are_one_line(capfd, arguments, complaint):
+    try:
+        code = main(arguments)
+    except SystemExit as leaving:
+        code = leaving.code
+    err = capfd.readouterr().err
+    assert code != 0 and complaint in err and err.count("\n") == 1

@@ -1,0 +1,148 @@
+"""One page's connection: takes its requests, and sends what its subscriptions have, as fast as it keeps up."""
+
+import asyncio
+import json
+import time
+
+from websockets.asyncio.server import ServerConnection
+from websockets.exceptions import ConnectionClosed
+from websockets.frames import CloseCode
+
+from ..protocol import CODES, DEFINITION, LANES, SENSOR_ERRORS, WIRE_VERSION
+from .hub import Hub, RequestError
+from .pyramid import BINS, WIDTHS
+from .topics import TOPICS
+
+PROTOCOL = 1  # of docs/view.md
+WINDOW = 4  # messages under way: a page that has not dealt with them gets no more
+REQUESTS_PER_S = 200  # more is no page
+ERRORS_MAX = 16  # a page that asks nonsense so often is cut off
+REST_COUNT = 0x8000  # protocol/whisker.toml, field alpha
+DEGREES_PER_COUNT = 180 / 65536
+KINDS = {name: DEFINITION["codes"][name] for name in CODES} | SENSOR_ERRORS
+
+
+def hello(hub: Hub) -> dict:
+    """The first message: what there is to subscribe to, and the numbers needed to understand it."""
+    return {
+        "topic": "hello",
+        "protocol": PROTOCOL,
+        "topics": {name: {"id": topic.id, "about": topic.about} for name, topic in TOPICS.items()},
+        "rings": hub.rings(),
+        "window": WINDOW,
+        "widths": WIDTHS,
+        "bins": BINS,
+        "lanes": LANES,
+        "degrees_per_count": DEGREES_PER_COUNT,
+        "rest_count": REST_COUNT,
+        "wire_version": WIRE_VERSION,
+        "kinds": {name: {"cause": kind["cause"], "remedy": kind["remedy"]} for name, kind in KINDS.items()},
+    }
+
+
+class Client:
+    """`run` it until the page goes. Holds no message but the one being sent."""
+
+    def __init__(self, hub: Hub, socket: ServerConnection):
+        self._hub, self._socket = hub, socket
+        self._feeds = {}
+        self._sent = self._dealt_with = self._errors = 0
+        self._may_send = asyncio.Event()
+        self._second, self._requests = 0, 0
+
+    async def run(self) -> None:
+        try:
+            async with asyncio.TaskGroup() as tasks:
+                sender = tasks.create_task(self._send_for_ever())
+                await self._receive()
+                sender.cancel()
+        except* ConnectionClosed:
+            pass
+        finally:
+            for feed in self._feeds.values():
+                feed.close()
+
+    async def _receive(self) -> None:
+        async for message in self._socket:
+            await self._answer(message)
+            await asyncio.sleep(0)  # others too, however fast this one asks
+
+    async def _send_for_ever(self) -> None:
+        await self._send(json.dumps(hello(self._hub)))
+        while True:
+            await self._hub.next_round()
+            for topic in list(self._feeds):
+                await self._send_next(topic)
+
+    async def _send_next(self, topic: str) -> None:
+        """What the feed has, once the page has room for it; by then the page may have left the topic."""
+        while self._sent - self._dealt_with >= WINDOW:
+            self._may_send.clear()
+            await self._may_send.wait()
+        message = self._feeds[topic].take() if topic in self._feeds else None
+        if message is not None:
+            await self._send(message)
+
+    async def _send(self, message: str | bytes) -> None:
+        self._sent += 1
+        await self._socket.send(message)
+
+    async def _answer(self, message: str | bytes) -> None:
+        try:
+            self._count_request()
+            self._do(parse(message))
+        except RequestError as error:
+            self._errors += 1
+            if self._errors > ERRORS_MAX:
+                await self._socket.close(CloseCode.POLICY_VIOLATION, "too many bad requests")
+            else:
+                await self._send(json.dumps({"topic": "error", "text": str(error)}))
+
+    def _count_request(self) -> None:
+        second = int(time.monotonic())
+        self._requests = self._requests + 1 if second == self._second else 1
+        self._second = second
+        if self._requests > REQUESTS_PER_S:
+            self._errors = ERRORS_MAX
+            raise RequestError("too many requests")
+
+    def _do(self, request: dict) -> None:
+        match request.get("type"):
+            case "ack":
+                self._acknowledge(request.get("count"))
+            case "subscribe":
+                name = self._topic(request)
+                feed = TOPICS[name].feed(self._hub, request)
+                self._leave(name)
+                self._feeds[name] = feed
+            case "unsubscribe":
+                self._leave(self._topic(request))
+            case _:
+                raise RequestError("type: not ack, subscribe or unsubscribe")
+
+    def _acknowledge(self, count: object) -> None:
+        if type(count) is not int or not self._dealt_with <= count <= self._sent:
+            raise RequestError("count: not the number of messages dealt with so far")
+        self._dealt_with = count
+        self._may_send.set()
+
+    def _topic(self, request: dict) -> str:
+        name = request.get("topic")
+        if not isinstance(name, str) or name not in TOPICS:
+            raise RequestError(f"topic: not one of {', '.join(TOPICS)}")
+        return name
+
+    def _leave(self, name: str) -> None:
+        if name in self._feeds:
+            self._feeds.pop(name).close()
+
+
+def parse(message: str | bytes) -> dict:
+    """The JSON object that a page sent. RequestError if it is something else."""
+    try:
+        request = json.loads(message) if isinstance(message, str) else None
+    except (ValueError, RecursionError):
+        request = None
+    if not isinstance(request, dict):
+        raise RequestError("message: not a JSON object")
+    return request

@@ -1,0 +1,81 @@
+"""Arguments of whisker-view and of `whisker view`, and what they start."""
+
+import argparse
+import asyncio
+import ipaddress
+import logging
+import signal
+import sys
+import webbrowser
+
+from .hub import Hub
+from .rings import is_name
+from .server import ViewError, serving
+
+EXAMPLE = "whisker-view --ring whisker --open"
+PORT = 8028
+RING = "whisker"
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments and set `run`."""
+    parser.add_argument(
+        "--ring", action="append", metavar="NAME", help=f"a ring to read from the start; repeatable (default: {RING})"
+    )
+    parser.add_argument("--port", type=_port, default=PORT, help="0 takes a free one (default: %(default)s)")
+    parser.add_argument(
+        "--host",
+        type=_address,
+        default="127.0.0.1",
+        metavar="ADDRESS",
+        help="address to serve at (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--allow-host",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="also answer under this name, as behind a forwarded port; repeatable",
+    )
+    parser.add_argument("--open", action="store_true", help="open the page in a browser")
+    parser.set_defaults(run=run)
+
+
+def _port(text: str) -> int:
+    if not text.isdecimal() or int(text) > 65535:
+        raise argparse.ArgumentTypeError(f"{text} is not a port; give a number from 0 to 65535")
+    return int(text)
+
+
+def _address(text: str) -> str:
+    try:
+        return str(ipaddress.ip_address(text))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text} is not an address; give one such as 127.0.0.1") from None
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Serve until interrupted or terminated."""
+    logging.getLogger("whisker.view").addHandler(logging.NullHandler())
+    rings = list(dict.fromkeys(arguments.ring or [RING]))
+    for name in rings:
+        if not is_name(name):
+            raise ViewError(f"--ring {name!r}: not the name of a ring; use letters, digits, dash and dot")
+    return asyncio.run(_serve(arguments, rings))
+
+
+async def _serve(arguments: argparse.Namespace, rings: list[str]) -> int:
+    over = asyncio.Event()
+    for sign in (signal.SIGINT, signal.SIGTERM):
+        asyncio.get_running_loop().add_signal_handler(sign, over.set)
+    async with serving(Hub(rings), arguments.host, arguments.port, arguments.allow_host) as port:
+        address = ipaddress.ip_address(arguments.host)
+        if not address.is_loopback:
+            print(f"whisker-view: {arguments.host}: whoever reaches this address can watch", file=sys.stderr)
+        host = "127.0.0.1" if address.is_unspecified else f"[{address}]" if address.version == 6 else str(address)
+        url = f"http://{host}:{port}/"
+        print(url, flush=True)
+        if arguments.open:
+            webbrowser.open(url)
+        await over.wait()
+    return 0

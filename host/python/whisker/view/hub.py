@@ -1,0 +1,68 @@
+"""Holds the taps that pages look at, reads them 30 times a second, and says so to the pages' senders."""
+
+import asyncio
+import time
+
+from .rings import find_rings
+from .tap import Tap
+
+ROUND_S = 1 / 30
+IDLE_S = 0.25  # between rounds while nobody looks: the counts go on, the ring holds seconds
+SEARCH_S = 1.0  # between looks for rings
+TAPS_MAX = 16
+
+
+class RequestError(ValueError):
+    """What a page asked for cannot be had. Its text is one line: what, remedy."""
+
+
+class Hub:
+    """Rings named at the start are read for good; others while somebody looks at them."""
+
+    def __init__(self, names: list[str]):
+        self.names = names
+        self._taps = {name: Tap(name) for name in names}
+        self._watchers = dict.fromkeys(names, 0)
+        self._found: list[str] = []
+        self._searched = float("-inf")
+        self._round = asyncio.Event()
+
+    def rings(self) -> list[str]:
+        """Rings that can be asked for: those named, then the others of this machine."""
+        now = time.monotonic()
+        if now - self._searched >= SEARCH_S:
+            self._found, self._searched = find_rings(), now
+        return self.names + [name for name in self._found if name not in self.names]
+
+    def watch(self, name: object) -> Tap:
+        """The tap of a ring, for somebody who will `unwatch` it. RequestError: there is no such ring."""
+        if not isinstance(name, str) or name not in self._taps and name not in self.rings():
+            raise RequestError("ring: not one of this machine; take one that topic rings lists")
+        if name not in self._taps:
+            if len(self._taps) >= TAPS_MAX:
+                raise RequestError(f"ring: {TAPS_MAX} are being looked at; close a page")
+            self._taps[name], self._watchers[name] = Tap(name), 0
+            self._taps[name].poll()
+        self._watchers[name] += 1
+        return self._taps[name]
+
+    def unwatch(self, tap: Tap) -> None:
+        self._watchers[tap.name] -= 1
+        if self._watchers[tap.name] == 0 and tap.name not in self.names:
+            self._taps.pop(tap.name).close()
+            del self._watchers[tap.name]
+
+    async def next_round(self) -> None:
+        """Until the rings have been read once more."""
+        await self._round.wait()
+
+    async def run(self) -> None:
+        """For ever."""
+        while True:
+            began = time.monotonic()
+            for tap in self._taps.values():
+                tap.poll()
+            self._round.set()
+            self._round = asyncio.Event()
+            period = ROUND_S if any(self._watchers.values()) else IDLE_S
+            await asyncio.sleep(max(0.0, period - (time.monotonic() - began)))
