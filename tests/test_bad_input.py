@@ -66,6 +66,13 @@ def test_corrupted_frame(tmp_path):
     assert len(lines) == 1 and "header" in lines[0] and ";" in lines[0], done.stderr
 
 
+def test_truncated_stream(tmp_path):
+    done = run_chain(tmp_path, "--defect", "truncate")
+    assert done.returncode == 1
+    lines = [line for line in done.stderr.splitlines() if line.startswith("whiskerd: bridge:")]
+    assert len(lines) == 1 and "after frame" in lines[0] and "check the USB cable" in lines[0], done.stderr
+
+
 def test_missing_device():
     done = subprocess.run([program("whiskerd"), "--ring", "whisker-bad"], capture_output=True, text=True, timeout=END_S)
     assert done.returncode == 1

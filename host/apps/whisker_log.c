@@ -120,7 +120,8 @@ static void log_bad_records(struct session *session, const struct whisker_frame 
 static void count_frame(struct session *session, const struct whisker_frame *frame)
 {
     struct tally *tally = &session->tally;
-    const uint32_t step = tally->received ? frame->sequence - tally->sequence : 1; /* modulo 2^32: it wraps */
+    const bool begins = tally->received == 0 || (frame->flags & WHISKER_FRAME_GAP) != 0;
+    const uint32_t step = begins ? 1 : frame->sequence - tally->sequence; /* modulo 2^32: it wraps */
     if (step == 0 || step > UINT32_MAX / 2) {
         tally->repeated++;
         return;

@@ -12,7 +12,8 @@ namespace bridge_sim
 enum class DefectKind {
     NONE,
     WIRE_VERSION, // identity claims the next wire version
-    FRAME         // one bit of one frame's header is wrong
+    FRAME,        // one bit of one frame's header is wrong
+    TRUNCATE      // the end of one frame is missing
 };
 
 class Defect
@@ -29,6 +30,7 @@ class Defect
   private:
     void spoil_identity(Urb &urb) const;
     void spoil_frame(Urb &urb);
+    void truncate_frame(Urb &urb);
 
     DefectKind kind_;
     uint64_t bytes_seen_ = 0; // of frames

@@ -50,12 +50,14 @@ UsbfsConnection::UsbfsConnection(UMockdevIoctlClient *client)
 UsbfsConnection::~UsbfsConnection()
 {
     stop_holding();
-    g_object_unref(client_);
+    if (!died_) { // else its socket is open for good, of which umockdev would complain
+        g_object_unref(client_);
+    }
 }
 
 bool UsbfsConnection::closed() const
 {
-    return !umockdev_ioctl_client_get_connected(client_);
+    return died_ || !umockdev_ioctl_client_get_connected(client_);
 }
 
 std::string UsbfsConnection::node() const
@@ -202,7 +204,9 @@ int UsbfsConnection::on_hold_over(void *self)
     auto *connection = static_cast<UsbfsConnection *>(self);
     connection->stop_holding();
     connection->reaping_ = false;
-    connection->answer(EAGAIN);
+    if (const IoctlDataRef pointer = connection->living_argument()) {
+        connection->answer(EAGAIN);
+    }
     return G_SOURCE_REMOVE;
 }
 
@@ -219,11 +223,19 @@ void UsbfsConnection::hand_over()
 {
     stop_holding();
     reaping_ = false;
-    UMockdevIoctlData *pointer = argument_data(sizeof(void *));
-    umockdev_ioctl_data_set_ptr(pointer, 0, done_.front().get());
-    done_.pop_front();
-    answer(0);
-    g_object_unref(pointer);
+    if (const IoctlDataRef pointer = living_argument()) {
+        umockdev_ioctl_data_set_ptr(pointer.get(), 0, done_.front().get());
+        done_.pop_front();
+        answer(0);
+    }
+}
+
+// umockdev does not notice that a process was killed in an ioctl; reading its memory shows it.
+IoctlDataRef UsbfsConnection::living_argument()
+{
+    IoctlDataRef pointer(argument_data(sizeof(void *)));
+    died_ = !pointer;
+    return pointer;
 }
 
 } // namespace bridge_sim

@@ -73,6 +73,7 @@ class UsbfsConnection
     };
 
     static int on_hold_over(void *self);
+    IoctlDataRef living_argument();
     void hand_over();
     void fill(Transfer &transfer, const Urb &urb);
     void stop_holding();
@@ -84,7 +85,8 @@ class UsbfsConnection
     bool reaping_ = false;
     GSource *hold_ = nullptr;
     uint64_t waited_for_ = 0;
-    bool gone_ = false;
+    bool gone_ = false; // the device
+    bool died_ = false; // the client
 };
 
 } // namespace bridge_sim

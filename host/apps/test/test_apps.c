@@ -166,11 +166,14 @@ static void log_to_a_path_that_cannot_be_written_fails_in_one_line(void **state)
     assert_refused(words, 1, "/nowhere/bad.csv: No such file or directory; choose a path");
 }
 
-/* 1000 ticks from tick 0; ticks 10..12 were lost; two lanes have a bad record; lane 7 is not populated. */
+/* 1000 ticks from tick 0; ticks 10..12 were lost; two lanes have a bad record; lane 7 is not populated. At tick 900 the
+ * bridge was plugged in again, and its sequence began anew. */
 static void publish_run(struct whisker_ring *ring)
 {
     for (uint32_t tick = 0; tick < 1000; tick++) {
-        struct whisker_frame frame = {.tick = tick, .sequence = 5000 + tick, .lane_mask = 0x3F};
+        struct whisker_frame frame = {.tick = tick, .sequence = tick, .lane_mask = 0x3F};
+        frame.sequence += tick < 900 ? 5000 : 0u - 900;
+        frame.flags = tick == 900 ? WHISKER_FRAME_GAP : 0;
         frame.lane[7].status = 32u << WHISKER_STATUS_ERROR_BITS;
         frame.lane[2].status = tick == 100 ? 33u << WHISKER_STATUS_ERROR_BITS : 0;
         frame.lane[5].status = tick == 999 ? 0x081 : 0;

@@ -1,0 +1,219 @@
+"""whiskerd from outside: the cable pulled and put back, killed and started again, replaced; what readers learn of it."""
+
+import os
+import signal
+import socket
+import subprocess
+import time
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+from chainrun import END_S, FAST_LINK, program, running, simulation, write_flat_scene
+
+from whisker.ring import Reader, RingError
+
+LONG_S = 600
+LAST, GAP = 1, 256  # WHISKER_FRAME_LAST, WHISKER_FRAME_GAP
+
+
+@pytest.fixture
+def ring() -> str:
+    return f"whisker-daemon-{os.getpid()}"
+
+
+class Cable:
+    """Pulls and puts back the cable of a simulated bridge."""
+
+    def __init__(self, path: Path, simulated: subprocess.Popen):
+        self._link = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        while self._link.connect_ex(str(path)) != 0:
+            assert simulated.poll() is None, simulated.stderr.read()
+            os.sched_yield()
+
+    def pull(self) -> None:
+        self._link.send(b"unplug")
+
+    def put(self) -> None:
+        self._link.send(b"plug")
+
+    def close(self) -> None:
+        self._link.close()
+
+
+def until(condition, process: subprocess.Popen) -> None:
+    """Looks until it is so; fails when the process ends or a generous time is over."""
+    give_up = time.monotonic() + END_S
+    while not condition():
+        assert process.poll() is None, process.stderr.read()
+        assert time.monotonic() < give_up, "it does not happen"
+        time.sleep(0.002)
+
+
+def connected(reader: Reader) -> bool:
+    return reader.stats is not None and reader.stats.connected == 1
+
+
+def read_to_end(reader: Reader) -> tuple[np.void, str]:
+    """Reads until the ring has ended: its last frame, and how it ended."""
+    last = None
+    while True:
+        try:
+            reader.wait(END_S)
+        except RingError as error:
+            return last, error.name
+        frames = reader.peek()
+        last = frames[-1].copy()
+        reader.advance(len(frames))
+
+
+def finish(process: subprocess.Popen) -> list[str]:
+    """Ends the simulation and its command; returns whiskerd's lines."""
+    process.terminate()
+    _, errors = process.communicate(timeout=END_S)
+    return [line for line in errors.splitlines() if line.startswith("whiskerd:")]
+
+
+@contextmanager
+def bridge(folder: Path, ring: str, *options, words=()):
+    """A simulated bridge with whiskerd, and the cable between them."""
+    scene, _ = write_flat_scene(folder, 1)
+    path = folder / "sim.sock"
+    with running([*simulation(folder, scene, LONG_S, 1, ring, "--socket", path, *options), *words]) as process:
+        cable = Cable(path, process)
+        yield process, cable
+        cable.close()
+
+
+def shell(folder: Path, ring: str, script: str) -> list[str]:
+    """A simulated bridge with a shell script, in which $D starts whiskerd on the ring."""
+    scene, _ = write_flat_scene(folder, 1)
+    command = simulation(folder, scene, LONG_S, 1, ring)
+    start = f"{program('whiskerd')} --ring {ring} {' '.join(FAST_LINK)}"
+    return [*command[: command.index("--") + 1], "bash", "-c", script.replace("$D", start)]
+
+
+# ---------------------------------------------------------------------------------------------------------------------
+# the cable
+
+
+def test_ring_lives_on_while_the_bridge_is_away(tmp_path, ring):
+    with bridge(tmp_path, ring) as (process, cable), Reader(ring, wait_s=10.0) as reader:
+        until(lambda: reader.info.published > 400, process)
+        generation = reader.info.generation
+        for away in (1, 2):
+            cable.pull()
+            until(lambda: not connected(reader), process)
+            before = reader.info.published
+            cable.put()
+            until(lambda n=before: reader.info.published > n + 400, process)
+            assert reader.stats.reconnects == away
+        frames = reader.peek().copy()
+        assert reader.info.generation == generation
+        lines = finish(process)
+    assert begins_anew_after_each_gap(frames, 2)
+    assert [line for line in lines if "unplugged" in line] == [
+        "whiskerd: bridge: the bridge was unplugged; plug it in again"
+    ] * 2
+    assert sum("0001 is back after" in line for line in lines) == 2
+
+
+def begins_anew_after_each_gap(frames: np.ndarray, gaps: int) -> bool:
+    """The first frame after a gap, and only it, is flagged; ticks run without a hole in between."""
+    flagged = np.flatnonzero(frames["flags"] & GAP)
+    steps = np.diff(frames["tick"].astype(np.int64))
+    return (
+        len(flagged) == gaps
+        and np.all(frames["tick"][flagged] == 0)
+        and np.array_equal(np.flatnonzero(steps != 1) + 1, flagged)
+    )
+
+
+def test_waits_for_its_first_bridge(tmp_path, ring):
+    with (
+        bridge(tmp_path, ring, "--unplugged", words=["--wait"]) as (process, cable),
+        Reader(ring, wait_s=10.0) as reader,
+    ):
+        until(lambda: reader.stats is not None, process)
+        assert reader.stats.connected == 0 and reader.info.published == 0
+        cable.put()
+        until(lambda: reader.info.published > 200, process)
+        assert not np.any(reader.peek()["flags"] & GAP), "nothing was missed"
+        lines = finish(process)
+    assert lines[0] == "whiskerd: bridge: no bridge is connected; plug it in; check its power and cable"
+    assert len(lines) == 2, lines
+
+
+def test_once_ends_when_the_bridge_goes(tmp_path, ring):
+    with bridge(tmp_path, ring, words=["--once"]) as (process, cable), Reader(ring, wait_s=10.0) as reader:
+        until(lambda: reader.info.published > 100, process)
+        cable.pull()
+        _, errors = process.communicate(timeout=END_S)
+    lines = [line for line in errors.splitlines() if line.startswith("whiskerd: bridge")]
+    assert lines == ["whiskerd: bridge: the bridge was unplugged; plug it in again"]
+    assert process.returncode == 1
+
+
+def test_readers_know_bridge_and_clock(tmp_path, ring):
+    with bridge(tmp_path, ring) as (process, _), Reader(ring, wait_s=10.0) as reader:
+        until(lambda: connected(reader) and reader.clock is not None, process)
+        stats, clock = reader.stats, reader.clock
+        finish(process)
+    assert (stats.serial, stats.firmware) == ("0001", "gateware 1, wire 1")
+    assert stats.lane_mask == 2**28 - 1 and stats.tick_period == 30000
+    assert stats.started_ns <= stats.connected_ns <= time.time_ns()
+    assert clock.ns_per_cycle == pytest.approx(1e9 / 60e6, rel=1e-3)
+    assert abs(clock.monotonic_ns - time.monotonic_ns()) < END_S * 1e9
+
+
+# ---------------------------------------------------------------------------------------------------------------------
+# starts and ends
+
+
+def test_killed_daemon_hinders_no_next_one(tmp_path, ring):
+    script = "trap : TERM; $D & a=$!; read go; kill -9 $a; wait $a; $D & b=$!; read go; kill $b; wait $b"
+    with running(shell(tmp_path, ring, script), stdin=subprocess.PIPE) as process, Reader(ring, wait_s=10.0) as reader:
+        until(lambda: reader.info.published > 100, process)
+        first = reader.info.generation
+        process.stdin.write("go\n")
+        process.stdin.flush()
+        assert read_to_end(reader)[1] in ("WRITER_DEAD", "RESTARTED")
+        reader.reattach(10.0)
+        assert reader.info.generation != first
+        until(lambda: reader.info.published > 100, process)
+        ticks = reader.peek()["tick"]
+        assert ticks[0] == 0, "frames left over from the killed one's run are thrown away"
+        process.communicate("go\n", timeout=END_S)
+    assert not Path("/dev/shm", ring).exists()
+
+
+def test_replacement_takes_over_name_and_bridge(tmp_path, ring):
+    script = "trap : TERM; $D & a=$!; read go; $D --replace & b=$!; wait $a; echo first $? >&2; read go; kill $b; wait $b; echo second $? >&2"
+    with running(shell(tmp_path, ring, script), stdin=subprocess.PIPE) as process, Reader(ring, wait_s=10.0) as reader:
+        until(lambda: reader.info.published > 100, process)
+        process.stdin.write("go\n")
+        process.stdin.flush()
+        last, how = read_to_end(reader)
+        assert how in ("CLOSED", "RESTARTED")
+        assert last["flags"] & LAST, "the first daemon drained its bridge"
+        reader.reattach(10.0)
+        until(lambda: reader.info.published > 100, process)
+        _, errors = process.communicate("go\n", timeout=END_S)
+    assert "first 0" in errors and "second 0" in errors
+
+
+def test_statistics_on_request(tmp_path, ring):
+    with bridge(tmp_path, ring) as (process, _), Reader(ring, wait_s=10.0) as reader:
+        until(lambda: reader.info.published > 100, process)
+        os.kill(reader.info.writer_pid, signal.SIGUSR1)
+        line = process.stderr.readline()
+        finish(process)
+    assert line.startswith("whiskerd: ") and "frames published, 0 missing, 0 dropped by the bridge" in line
+
+
+def test_bridges_are_listed(tmp_path, ring):
+    command = shell(tmp_path, ring, f"{program('whiskerd')} --list; {program('whiskerd')} --ring {ring} --serial 0009")
+    done = subprocess.run(command, capture_output=True, text=True, timeout=END_S)
+    assert done.stdout == "0001 at 1-1: can be opened\n"
+    assert "no bridge of this serial number is connected; see whiskerd --list" in done.stderr
