@@ -15,6 +15,7 @@ COMMANDS = {
     "top": "lanes, rates and losses in the terminal",
     "view": "traces, losses and health in a browser; the same as whisker-view",
     "doctor": "find out why it does not work",
+    "calibrate": "measure rest and noise, record contacts at known distances",
     "bridge-sim": "a simulated bridge to try everything with",
     "record": "write a ring to an MCAP file",
     "replay": "feed a ring from a recording, as the device would",

@@ -89,6 +89,11 @@ def number_above(bound: float) -> Callable[[str], float]:
     return number
 
 
+def number_list(text: str) -> list[float]:
+    """An argument's type: positive numbers, as in 90,100,110."""
+    return [number_above(0.0)(part) for part in text.split(",")]
+
+
 def lane_list(most: int) -> Callable[[str], list[int]]:
     """An argument's type: lanes such as 0,2,5-7, all below `most`."""
 

@@ -1,0 +1,114 @@
+"""`whisker calibrate`: rest of every lane, and contacts at known distances for `whisker radial fit`."""
+
+import itertools
+import sys
+from contextlib import closing
+from pathlib import Path
+
+from ..calibration import TICKS_PER_S, ContactsFile, Feed, Rest, WhiskFinder, collect, measure_rest, write_rest
+from ..protocol import LANES
+from ..radial import RadialModel, read_whisks
+from ..ring import Reader
+from ..scene import load
+from ..tables import unwritable
+from . import add_ring, number_above, number_list, whole_number
+
+EXAMPLE = "whisker calibrate --out calibration --lane 2 --radii 90,100,110,120,130 --repeats 5"
+
+
+def add(parser) -> None:
+    add_ring(parser)
+    parser.add_argument(
+        "--out", required=True, type=Path, metavar="DIR", help="writes rest.toml, and <lane>.csv with --lane"
+    )
+    parser.add_argument(
+        "--lane", type=whole_number(0, LANES - 1), metavar="N", help="the whisker to press against the post"
+    )
+    parser.add_argument(
+        "--radii", type=number_list, metavar="LIST", help="distances of the post in mm, as in 90,100,110"
+    )
+    parser.add_argument("--repeats", type=whole_number(1), default=5, metavar="N", help="whisks at each distance (5)")
+    parser.add_argument(
+        "--rest-seconds", type=number_above(0.2), default=2.0, metavar="S", help="how long rest is measured (2)"
+    )
+    parser.add_argument(
+        "--whisk-rad-s", type=number_above(0.0), metavar="W", help="turning rate of the whisks, if known"
+    )
+    parser.add_argument("--scene", help="scene folder whose robot.toml names the lanes, lane 0 first")
+    parser.add_argument("--yes", action="store_true", help="ask nothing: whisks at the distances follow one another")
+    parser.add_argument(
+        "--backlog", action="store_true", help="begin with the oldest frame the ring holds, not the next"
+    )
+    parser.set_defaults(run=run, parser=parser)
+
+
+def run(arguments) -> int:
+    if (arguments.lane is None) != (arguments.radii is None):
+        arguments.parser.error("--lane and --radii belong together: give both, or neither to measure rest alone")
+    names = [whisker.name for whisker in load(arguments.scene).robot.whiskers] if arguments.scene else []
+    names += [f"lane{n}" for n in range(len(names), LANES)]
+    try:
+        arguments.out.mkdir(parents=True, exist_ok=True)
+        with Reader(arguments.ring, arguments.wait) as reader:
+            feed = Feed(reader)
+            if not arguments.backlog:
+                feed.skip()
+            return _calibrate(arguments, feed, names)
+    except OSError as error:
+        if error.filename is None:
+            raise
+        raise unwritable(error.filename, error) from error
+
+
+def _calibrate(arguments, feed: Feed, names: list[str]) -> int:
+    _ask(arguments, feed, "Leave all whiskers untouched")
+    frames = feed.frames(round(arguments.rest_seconds * TICKS_PER_S))
+    rests = measure_rest(frames)
+    write_rest(arguments.out / "rest.toml", rests, names)
+    for rest in rests:
+        print(_rest_line(rest, names))
+    if arguments.lane is None:
+        return 0
+    path = arguments.out / f"{names[arguments.lane]}.csv"
+    finder = WhiskFinder(arguments.lane)
+    for _ in finder.add(frames):
+        continue  # the rest of a whisker that is touched now and then is still its rest
+    whisks = collect(feed, finder)
+    with closing(ContactsFile(path, arguments.whisk_rad_s)) as file:
+        for radius_mm in arguments.radii:
+            text = (
+                f"Post at {radius_mm:g} mm, {names[arguments.lane]} clear of it; then whisk {arguments.repeats} times"
+            )
+            if _ask(arguments, feed, text):
+                finder = WhiskFinder(arguments.lane)  # what happened while the post was moved is no contact
+                whisks = collect(feed, finder)
+            for whisk in itertools.islice(whisks, arguments.repeats):
+                file.add(radius_mm, whisk)
+                print(f"  {radius_mm:g} mm: contact of {whisk.t_s[-1] - whisk.t_s[0]:.2f} s", flush=True)
+    print(_verdict(path))
+    return 0
+
+
+def _ask(arguments, feed: Feed, text: str) -> bool:
+    """Wait for Enter, and forget what came meanwhile; False when nothing is to be asked."""
+    if arguments.yes:
+        return False
+    print(f"{text}; press Enter ", end="", flush=True)
+    sys.stdin.readline()
+    feed.skip()
+    return True
+
+
+def _rest_line(rest: Rest, names: list[str]) -> str:
+    numbers = f"rest ({rest.mean[0]:.1f}, {rest.mean[1]:.1f})  noise ({rest.noise[0]:.1f}, {rest.noise[1]:.1f}) counts"
+    warning = f"  warning: {rest.trouble}" if rest.trouble else ""
+    return f"{rest.lane:>2} {names[rest.lane]:<15} {numbers}{warning}"
+
+
+def _verdict(path: Path) -> str:
+    whisks = read_whisks(path, with_radius=True)
+    try:
+        model = RadialModel.fit(whisks.peak_counts, whisks.radius_mm)
+    except ValueError as error:
+        return f"{path}: {len(whisks.contact)} contacts; {error}"
+    return f"{path}: {len(whisks.contact)} contacts, standard error {model.sigma_mm:.2f} mm; next: whisker radial fit {path}"
