@@ -1,10 +1,12 @@
 """Compiles whisker/_native: the C libraries as a Python module (cffi, API mode).
 
 Declarations are taken from the public headers, between the lines `/* cffi: begin */` and `/* cffi: end */`, so nothing
-is declared twice. Usage: build_ffi.py --build-dir build/release
+is declared twice. Usage: build_ffi.py --build-dir build/release links the static libraries built there; setup.py takes
+`wheel_ffi` instead, which compiles the libraries' sources into the module: a wheel needs a C compiler and no CMake.
 """
 
 import argparse
+import os
 import re
 import shutil
 import sys
@@ -15,6 +17,7 @@ import cffi
 
 HERE = Path(__file__).resolve().parent
 HOST = HERE.parents[1]
+ROOT = HOST.parent
 BLOCK = re.compile(r"/\* cffi: begin \*/\n(.*?)/\* cffi: end \*/", re.DOTALL)
 
 # What each library needs beside itself; the order is the linker's.
@@ -41,11 +44,44 @@ HEADERS = {
         for name in ("errors.h", "frame.h", "clock.h", "stats.h", "ring.h")
     ],
 }
+ALL_HEADERS = [header for name in LIBRARIES for header in HEADERS[name]]
 
 
 def declarations(header: Path) -> str:
     """What the header declares between its cffi markers."""
     return "\n".join(BLOCK.findall(header.read_text()))
+
+
+def new_ffi() -> cffi.FFI:
+    ffi = cffi.FFI()
+    for header in ALL_HEADERS:
+        ffi.cdef(declarations(header))
+    return ffi
+
+
+def sources(folder: Path, target: str) -> list[Path]:
+    """The .c files of a target in this folder's CMakeLists.txt: the one list of them."""
+    listed = re.search(rf"add_library\({target} \w+([^)]*)\)", (folder / "CMakeLists.txt").read_text())
+    return [folder / name for name in listed.group(1).split()]
+
+
+def wheel_ffi() -> cffi.FFI:
+    """whisker._native from sources, without the part that needs libusb and hidapi: that is whiskerd's."""
+    ffi = new_ffi()
+    files = [*sources(HOST / "nav", "nav"), *sources(HOST / "libwhisker", "whisker_core")]
+    library = HOST / "libwhisker"
+    ffi.set_source(
+        "whisker._native",
+        "\n".join(f'#include "{header}"' for header in ALL_HEADERS),
+        sources=[os.path.relpath(file, ROOT) for file in files],
+        include_dirs=[
+            str(path) for path in (library / "include", library / "src", ROOT / "protocol/gen", HOST / "nav")
+        ],
+        define_macros=[("_GNU_SOURCE", None)],
+        libraries=[library for needed in LIBRARIES.values() for library in needed],
+        extra_compile_args=["-O3", "-std=gnu11", "-fvisibility=hidden"],
+    )
+    return ffi
 
 
 def find_library(build: Path, name: str) -> Path | None:
@@ -61,13 +97,10 @@ def main(argv: list[str] | None = None) -> int:
     if missing:
         print(f"build_ffi: {build}: no {' and no '.join(missing)}; run cmake --build {build} first", file=sys.stderr)
         return 1
-    headers = [header for name in LIBRARIES for header in HEADERS[name]]
-    ffi = cffi.FFI()
-    for header in headers:
-        ffi.cdef(declarations(header))
+    ffi = new_ffi()
     ffi.set_source(
         "_native",
-        "\n".join(f'#include "{header}"' for header in headers),
+        "\n".join(f'#include "{header}"' for header in ALL_HEADERS),
         include_dirs=[str(HOST / "libwhisker" / "include")],
         extra_link_args=[str(archive) for archive in archives.values()],
         libraries=[library for needed in LIBRARIES.values() for library in needed],
