@@ -114,7 +114,8 @@ static void keep_house(struct daemon *daemon)
 {
     daemon_notify_alive();
     tell_damage(daemon);
-    if (now_ms() >= daemon->tell_at_ms) {
+    const int64_t left_ms = daemon->tell_at_ms - now_ms();
+    if (left_ms <= 0 || left_ms > TELL_MS) { /* more: the clock went back */
         daemon->tell_at_ms = now_ms() + TELL_MS;
         tell_readers(daemon);
     }

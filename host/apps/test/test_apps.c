@@ -122,6 +122,39 @@ static void daemon_without_a_bridge_fails_in_one_line(void **state)
     assert_false(ring_exists());
 }
 
+/* See fake_bridge.c for what the word makes of the bridge. */
+static const char *const *with_fake(const char *what)
+{
+    static const char *words[] = {WHISKERD_FAKE, "--ring", NULL, NULL};
+    words[2] = ring_name();
+    setenv("WHISKER_FAKE", what, 1);
+    return words;
+}
+
+static void bridges_that_cannot_be_used_are_told_in_one_line(void **state)
+{
+    (void)state;
+    assert_refused(with_fake("access"), 1, "bridge: no permission to open the bridge; install the udev rule");
+    assert_refused(with_fake("busy"), 1, "bridge: another process uses the bridge; stop the other whiskerd");
+    assert_refused(with_fake("gone"), 1, "bridge: the bridge was unplugged; plug it in again");
+    assert_refused(with_fake("version"), 1, "(bridge 2, host 1); install gateware and host of one release");
+    assert_refused(with_fake("lanes"), 1, "bridge: the bridge has other lanes or frames than this host");
+    assert_false(ring_exists());
+}
+
+static void a_host_clock_that_goes_back_is_told_and_nothing_is_lost(void **state)
+{
+    (void)state;
+    static const char *const clocks[] = {"realtime", "monotonic"};
+    for (size_t i = 0; i < 2; i++) {
+        assert_int_equal(finish(start(with_fake(clocks[i]))), 0);
+        const char *told = strstr(content("out"), "whiskerd: clock: the host's clock was set or went backwards; none");
+        assert_non_null(told);
+        assert_null(strstr(strchr(told, '\n'), "clock:")); /* once */
+        assert_non_null(strstr(told, "whiskerd: 4001 frames published, 0 missing"));
+    }
+}
+
 static void wrong_use_is_refused_in_one_line(void **state)
 {
     (void)state;
@@ -282,6 +315,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(daemon_without_a_bridge_fails_in_one_line),
+        cmocka_unit_test(bridges_that_cannot_be_used_are_told_in_one_line),
+        cmocka_unit_test(a_host_clock_that_goes_back_is_told_and_nothing_is_lost),
         cmocka_unit_test(wrong_use_is_refused_in_one_line),
         cmocka_unit_test(help_has_an_example),
         cmocka_unit_test(log_without_a_ring_fails_in_one_line),

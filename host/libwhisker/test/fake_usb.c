@@ -263,6 +263,9 @@ int libusb_handle_events_timeout_completed(libusb_context *context, struct timev
         watcher.due = false;
         watcher.call(context, (libusb_device *)&bus[0], LIBUSB_HOTPLUG_EVENT_DEVICE_ARRIVED, watcher.context);
     }
+    if (fake.pump) {
+        fake.pump();
+    }
     const int ready = completion_count;
     completion_count = 0;
     for (int i = 0; i < ready; i++) {
