@@ -4,6 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "book.h"
+
 static const double POSES_MOST = 268435456.0;
 
 static size_t pitch(const struct nav_expected *e)
@@ -16,71 +18,13 @@ static size_t poses(const struct nav_expected *e)
     return (size_t)e->nh * (size_t)(e->ny + 2 * e->margin) * pitch(e);
 }
 
-/* Signatures while they are being collected: open addressing over numbers into a growing list of codes. */
-struct book {
-    uint32_t *slot; /* 0: empty */
-    size_t slots;   /* power of two */
-    uint8_t *codes;
-    uint32_t count, room;
-    size_t width;
-};
-
-static uint64_t hash(const uint8_t *codes, size_t width)
-{
-    uint64_t h = 14695981039346656037u; /* FNV-1a */
-    for (size_t i = 0; i < width; i++)
-        h = (h ^ codes[i]) * 1099511628211u;
-    return h ^ (h >> 29);
-}
-
-static size_t place(const struct book *b, const uint8_t *codes)
-{
-    size_t i = (size_t)hash(codes, b->width) & (b->slots - 1);
-    while (b->slot[i] && memcmp(b->codes + b->slot[i] * b->width, codes, b->width) != 0)
-        i = (i + 1) & (b->slots - 1);
-    return i;
-}
-
-static int grow(struct book *b)
-{
-    uint32_t room = b->room ? 2 * b->room : 1024;
-    uint8_t *codes = realloc(b->codes, (size_t)room * b->width + 1);
-    uint32_t *slot = calloc((size_t)room * 2, sizeof *slot);
-    if (codes)
-        b->codes = codes;
-    if (!codes || !slot) {
-        free(slot);
-        return -1;
-    }
-    free(b->slot);
-    b->slot = slot;
-    b->slots = (size_t)room * 2;
-    b->room = room;
-    for (uint32_t n = 1; n < b->count; n++)
-        b->slot[place(b, b->codes + n * b->width)] = n;
-    return 0;
-}
-
-/* Number of a signature, new or known; 0: no memory. */
-static uint32_t number_of(struct book *b, const uint8_t *codes)
-{
-    if (b->count == b->room && grow(b))
-        return 0;
-    size_t i = place(b, codes);
-    if (!b->slot[i]) {
-        memcpy(b->codes + b->count * b->width, codes, b->width);
-        b->slot[i] = b->count++;
-    }
-    return b->slot[i];
-}
-
 struct maker {
     struct nav_expected *e;
     const struct nav_arena *arena;
     const struct nav_robot *robot;
     const struct nav_likelihood *likelihood;
-    struct book book;
-    uint8_t *codes; /* [whiskers] scratch */
+    struct nav_book book;
+    uint8_t *codes; /* scratch: 1 for a free pose, then [whiskers] */
 };
 
 /* All headings of one place: whether it is free does not depend on the heading. */
@@ -94,9 +38,9 @@ static int survey(struct maker *m, int i, int j)
     size_t at = (size_t)(j + e->margin) * pitch(e) + (size_t)(i + e->margin);
     for (int k = 0; k < e->nh; k++, at += pitch(e) * (size_t)(e->ny + 2 * e->margin)) {
         nav_likelihood_expect(m->likelihood, m->arena, m->robot, (struct nav_pose){x, y, (k + 0.5) * e->step_theta},
-                              m->codes);
-        e->signature[at] = number_of(&m->book, m->codes);
-        if (!e->signature[at])
+                              m->codes + 1);
+        e->signature[at] = nav_book_number(&m->book, m->codes);
+        if (e->signature[at] == NAV_BOOK_FULL)
             return -1;
     }
     return 0;
@@ -107,9 +51,9 @@ static int survey_all(struct maker *m)
     struct nav_expected *e = m->e;
     e->signature = calloc(poses(e), sizeof *e->signature);
     m->codes = calloc(m->book.width, 1);
-    m->book.count = 1; /* number 0 is "blocked" */
-    if (!e->signature || !m->codes || grow(&m->book))
-        return -1;
+    if (!e->signature || !m->codes || nav_book_number(&m->book, m->codes) != 0)
+        return -1; /* number 0 is "blocked" */
+    m->codes[0] = 1;
     for (int j = 0; j < e->ny; j++) {
         for (int i = 0; i < e->nx; i++) {
             if (survey(m, i, j))
@@ -117,6 +61,43 @@ static int survey_all(struct maker *m)
         }
     }
     return 0;
+}
+
+static size_t code_width(int whiskers)
+{
+    return whiskers > 0 ? (size_t)whiskers : 1;
+}
+
+/* Takes the signatures over from the book, whose keys begin with the byte that tells free from blocked. */
+static int keep_codes(struct nav_expected *e, const struct nav_book *book)
+{
+    size_t whiskers = (size_t)e->whiskers;
+    e->signatures = book->count;
+    e->codes = calloc(book->count, whiskers + 1);
+    for (uint32_t n = 0; e->codes && n < book->count; n++)
+        memcpy(e->codes + n * (whiskers + 1), (const uint8_t *)nav_book_key(book, n) + 1, whiskers);
+    return e->codes ? 0 : -1;
+}
+
+/* The tree of products over the free poses' signatures. */
+static int make_factor(struct nav_expected *e, const struct nav_book *book, const struct nav_likelihood *likelihood)
+{
+    size_t width = code_width(e->whiskers), count = e->signatures - 1;
+    uint8_t *packed = calloc(count + 1, width);
+    int *codes = calloc(width, sizeof *codes), failed = -1;
+    if (packed && codes) {
+        for (uint32_t n = 0; n < count; n++)
+            memcpy(packed + n * width, (const uint8_t *)nav_book_key(book, n + 1) + 1, width);
+        codes[0] = 1;
+        for (int w = 0; w < e->whiskers; w++)
+            codes[w] = likelihood->model[w].codes;
+        failed = nav_factor_init(&e->factor, packed, (uint32_t)count, (int)width, codes);
+    }
+    free(packed);
+    free(codes);
+    if (!failed)
+        e->value = e->factor.node[e->factor.nodes - 1].value;
+    return failed;
 }
 
 struct nav_expected *nav_expected_new(const struct nav_arena *arena, const struct nav_robot *robot,
@@ -136,18 +117,14 @@ struct nav_expected *nav_expected_new(const struct nav_arena *arena, const struc
                                .step_theta = 2.0 * NAV_PI / headings,
                                .whiskers = likelihood->whiskers};
     struct maker m = {.e = e, .arena = arena, .robot = robot, .likelihood = likelihood};
-    m.book.width = (size_t)likelihood->whiskers + 1; /* one more, always 0: a robot without whiskers has codes too */
-    int failed = survey_all(&m);
+    m.book.width = code_width(e->whiskers) + 1;
+    int failed = survey_all(&m) || keep_codes(e, &m.book) || make_factor(e, &m.book, likelihood);
     free(m.codes);
-    free(m.book.slot);
-    e->codes = m.book.codes;
-    e->signatures = m.book.count;
-    e->value = calloc(e->signatures, sizeof *e->value);
-    if (failed || !e->value) {
-        nav_expected_free(e);
-        return NULL;
-    }
-    return e;
+    nav_book_free(&m.book);
+    if (!failed)
+        return e;
+    nav_expected_free(e);
+    return NULL;
 }
 
 void nav_expected_free(struct nav_expected *e)
@@ -156,20 +133,36 @@ void nav_expected_free(struct nav_expected *e)
         return;
     free(e->signature);
     free(e->codes);
-    free(e->value);
+    nav_factor_free(&e->factor);
     free(e);
+}
+
+/* A product of factors stays above 1e-304 when all their ranges together stay below this, nats. */
+static const double RANGE_MOST = 700.0;
+
+static void evaluate_leaf(const struct nav_expected *e, const struct nav_factor_node *leaf,
+                          const struct nav_likelihood *l)
+{
+    const float *table = l->table[leaf->whisker];
+    float best = table[0];
+    for (uint32_t k = 1; k < leaf->count; k++)
+        best = fmaxf(best, table[k]);
+    for (uint32_t k = 0; k < leaf->count; k++)
+        leaf->value[k] = exp(fmax((double)(table[k] - best), -RANGE_MOST / e->whiskers));
 }
 
 void nav_expected_evaluate(struct nav_expected *e, const struct nav_likelihood *likelihood)
 {
-    float best = -INFINITY;
-    size_t width = (size_t)e->whiskers + 1;
-    for (uint32_t n = 1; n < e->signatures; n++) {
-        e->value[n] = nav_likelihood_of(likelihood, e->codes + n * width);
-        best = fmaxf(best, e->value[n]);
+    for (int n = 0; n < e->factor.nodes; n++) {
+        const struct nav_factor_node *node = &e->factor.node[n];
+        if (node->left >= 0)
+            continue;
+        if (node->whisker < e->whiskers)
+            evaluate_leaf(e, node, likelihood);
+        else
+            node->value[0] = 1.0;
     }
-    for (uint32_t n = 1; n < e->signatures; n++)
-        e->value[n] = expf(e->value[n] - best);
+    nav_factor_work_out(&e->factor);
 }
 
 const uint32_t *nav_expected_row(const struct nav_expected *e, int k, int j)
@@ -178,7 +171,14 @@ const uint32_t *nav_expected_row(const struct nav_expected *e, int k, int j)
     return e->signature + row * pitch(e) + (size_t)e->margin;
 }
 
+void nav_expected_forget_poses(struct nav_expected *e)
+{
+    free(e->signature);
+    e->signature = NULL;
+}
+
 size_t nav_expected_bytes(const struct nav_expected *e)
 {
-    return poses(e) * sizeof *e->signature + e->signatures * ((size_t)e->whiskers + 1 + sizeof *e->value);
+    size_t lattice = e->signature ? poses(e) * sizeof *e->signature : 0;
+    return lattice + e->signatures * ((size_t)e->whiskers + 1) + nav_factor_bytes(&e->factor);
 }

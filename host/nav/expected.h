@@ -8,6 +8,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "factor.h"
 #include "likelihood.h"
 
 /* Lattice of nx x ny x nh poses; pose (i, j, k) is at (i + 1/2) step, (j + 1/2) step, (k + 1/2) step_theta. Around it
@@ -18,8 +19,9 @@ struct nav_expected {
     int whiskers;
     uint32_t *signature; /* [nh][ny + 2 margin][nx + 2 margin]; 0: not in free space */
     uint32_t signatures; /* how many there are, number 0 included */
-    uint8_t *codes;      /* [signatures][whiskers] */
-    float *value;        /* [signatures] likelihood of the present row relative to the best; value[0] is 0 */
+    uint8_t *codes;      /* [signatures][whiskers + 1], the last always 0 */
+    struct nav_factor factor;
+    const double *value; /* [signatures - 1] likelihood of the present row, of signature n at n - 1 */
 };
 
 /* NULL: no memory, or a lattice of more than 2^28 poses. */
@@ -27,11 +29,15 @@ struct nav_expected *nav_expected_new(const struct nav_arena *, const struct nav
                                       double step, int headings, int margin);
 void nav_expected_free(struct nav_expected *);
 
-/* Works out `value` for the row last read into the likelihood. */
+/* Works out `value` for the row last read into the likelihood, relative to the product of each whisker's best code:
+ * at most 1. Whiskers' ranges are cut so that no product underflows. */
 void nav_expected_evaluate(struct nav_expected *, const struct nav_likelihood *);
 
 /* First pose of lattice row j (-margin <= j < ny + margin) at heading k; index -margin .. nx + margin - 1 is valid. */
 const uint32_t *nav_expected_row(const struct nav_expected *, int k, int j);
+
+/* Frees the lattice and keeps the signatures: for those who have made tables of their own from it. */
+void nav_expected_forget_poses(struct nav_expected *);
 
 size_t nav_expected_bytes(const struct nav_expected *);
 

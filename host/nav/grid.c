@@ -12,14 +12,15 @@
 #include "gaussian.h"
 #include "lattice.h"
 #include "likelihood.h"
+#include "mixture.h"
 
 struct grid {
     const struct nav_problem *problem;
     struct nav_likelihood *likelihood;
     struct nav_expected *expected;
+    struct nav_mixture *mixture;
     struct nav_lattice lattice;
-    int sub, sub_heading;           /* sub-poses per cell edge and per slice */
-    float *row;                     /* [nx] sum of the sub-poses' likelihoods */
+    struct nav_layer *layer;        /* [slices] where each lies in the tables */
     struct nav_pose pending;        /* motion since the last update ... */
     struct nav_noise pending_noise; /* ... and its noise */
     struct nav_gaussian summary;    /* of the belief at the last update: mean near the mode, covariance about it */
@@ -31,91 +32,108 @@ static void destroy(void *self)
     struct grid *g = self;
     nav_likelihood_free(g->likelihood);
     nav_expected_free(g->expected);
+    nav_mixture_free(g->mixture);
     nav_lattice_free(&g->lattice);
-    free(g->row);
+    free(g->layer);
     free(g);
 }
 
-/* Sum over the sub-poses of every cell of one lattice row: likelihood[nx] += value of each sub-pose in heading k. */
-static void add_row(const struct grid *g, const uint32_t *signature, float *sum)
+/* Where a slice's sub-poses lie among those of the table, to the nearest. */
+static struct nav_layer layer(const struct grid *g, int p)
 {
-    const float *value = g->expected->value;
-    for (int i = 0; i < g->lattice.nx; i++) {
-        for (int a = 0; a < g->sub; a++)
-            sum[i] += value[*signature++];
-    }
+    const struct nav_lattice *l = &g->lattice;
+    const struct nav_expected *e = g->expected;
+    double turns = (p + 0.5 / g->mixture->turns) / l->nh + l->rotation / (2.0 * NAV_PI);
+    return (struct nav_layer){
+        .heading = (int)((turns - floor(turns)) * e->nh) % e->nh,
+        .x = (int)floor(l->shift_x[p] / e->step + 0.5),
+        .y = (int)floor(l->shift_y[p] / e->step + 0.5),
+    };
 }
 
-/* Nearest lattice steps of a shift: the table's poses are sub-poses of an unshifted cell. */
-static int steps(const struct grid *g, double shift)
+static void likelihood_row(const void *self, int p, int j, int begin, int end, float *out)
 {
-    return (int)floor(shift / g->expected->step + 0.5);
+    const struct grid *g = self;
+    nav_mixture_look_up(g->mixture, &g->layer[p], j, begin, end, out);
 }
 
-static int heading_index(const struct grid *g, int slice, int part)
-{
-    double heading = (slice + (part + 0.5) / g->sub_heading) * g->lattice.cell_theta + g->lattice.rotation;
-    double turns = heading / (2.0 * NAV_PI);
-    return (int)((turns - floor(turns)) * g->expected->nh) % g->expected->nh;
-}
-
-static double reweigh_slice(struct grid *g, int p, float spare)
+/* Multiplies by the likelihood and normalises; `extra` is added to each cell first. Returns false with no mass. */
+static bool reweigh(struct grid *g, double extra)
 {
     struct nav_lattice *l = &g->lattice;
-    int dx = steps(g, l->shift_x[p]), dy = steps(g, l->shift_y[p]);
-    float *mass = nav_lattice_slice(l, p);
-    double total = 0.0;
-    for (int j = 0; j < l->ny; j++, mass += l->nx) {
-        memset(g->row, 0, (size_t)l->nx * sizeof *g->row);
-        for (int part = 0; part < g->sub_heading; part++) {
-            int k = heading_index(g, p, part);
-            for (int b = 0; b < g->sub; b++)
-                add_row(g, nav_expected_row(g->expected, k, j * g->sub + b + dy) + dx, g->row);
-        }
-        for (int i = 0; i < l->nx; i++) {
-            mass[i] = (mass[i] + spare) * g->row[i];
-            total += (double)mass[i];
-        }
+    const struct nav_lattice_weigh weigh = {
+        .row = likelihood_row, .self = g, .begin = g->mixture->begin, .end = g->mixture->end, .extra = extra};
+    nav_mixture_begin(g->mixture, g->expected);
+    for (int p = 0; p < l->nh; p++) {
+        g->layer[p] = layer(g, p);
+        nav_mixture_work_out(g->mixture, &g->layer[p]);
     }
-    return total;
-}
-
-/* Multiplies by the table's values and normalises; `spare` is added to each cell first. Returns false with no mass. */
-static bool reweigh(struct grid *g, double spare)
-{
-    double total = 0.0;
-    for (int p = 0; p < g->lattice.nh; p++)
-        total += reweigh_slice(g, p, (float)spare);
-    if (!(total > 0.0 && isfinite(total)))
+    nav_lattice_pass(l, &weigh, g->summary.mean);
+    if (!(l->total > 0.0 && isfinite(l->total)))
         return false;
-    nav_lattice_scale(&g->lattice, 1.0 / total);
+    l->scale = 1.0 / l->total;
     return true;
 }
 
 static void summarise(struct grid *g)
 {
-    struct nav_pose mode = nav_lattice_mode(&g->lattice);
+    struct nav_lattice *l = &g->lattice;
+    if (!(l->total > 0.0)) { /* no place in the arena is free: nothing can be known */
+        struct nav_problem anywhere = *g->problem;
+        anywhere.prior.uniform = true;
+        g->summary = nav_gaussian_prior(&anywhere);
+        g->confidence = 0.0;
+        return;
+    }
+    struct nav_pose mode = nav_lattice_centre(l, nav_lattice_peak(l, l->peak_slice));
     g->summary.mean = mode;
-    nav_lattice_near(&g->lattice, mode, &g->summary.mean);
-    g->confidence = fmin(nav_lattice_near(&g->lattice, g->summary.mean, NULL), 1.0);
-    nav_lattice_covariance(&g->lattice, g->summary.mean, g->summary.covariance);
+    nav_lattice_near(l, mode, &g->summary.mean);
+    g->confidence = fmin(nav_lattice_near(l, g->summary.mean, NULL), 1.0);
+    nav_lattice_covariance(l, g->summary.mean, g->summary.covariance);
 }
 
-/* Spreads the belief over free space. */
+/* Takes a prior, clipped to free space; false when that leaves nothing. */
+static bool start(struct grid *g, const struct nav_prior *prior)
+{
+    nav_lattice_fill(&g->lattice, prior);
+    nav_lattice_clip(&g->lattice, g->mixture->begin, g->mixture->end);
+    return reweigh(g, 0.0);
+}
+
+/* Spreads the belief over free space, by what the present row says. */
 static void forget(struct grid *g)
 {
-    nav_lattice_fill(&g->lattice, &(struct nav_prior){.uniform = true});
-    reweigh(g, 0.0);
+    start(g, &(struct nav_prior){.uniform = true});
 }
 
+/* The belief before anything is read: the tables say that all is equally likely. */
 static void begin(struct grid *g)
 {
-    for (uint32_t n = 1; n < g->expected->signatures; n++)
-        g->expected->value[n] = 1.0f;
-    nav_lattice_fill(&g->lattice, &g->problem->prior);
-    if (!reweigh(g, 0.0))
+    g->summary.mean = g->problem->prior.mean;
+    nav_expected_evaluate(g->expected, g->likelihood);
+    if (!start(g, &g->problem->prior))
         forget(g);
     summarise(g);
+}
+
+static bool make_tables(struct grid *g)
+{
+    const struct nav_problem *problem = g->problem;
+    const struct nav_settings *s = &problem->settings;
+    int sub = (int)s->grid_sub, turns = (int)s->grid_sub_heading;
+    double step = s->grid_cell_m / sub, turn = g->lattice.cell_theta / turns;
+    /* A look-up stands for poses within half a step and half a turn: that spreads the distances it should give. */
+    double blur = hypot(step, 0.2 * turn) / sqrt(12.0);
+    g->likelihood = nav_likelihood_new(&problem->arena, &problem->robot, s, blur);
+    if (g->likelihood)
+        g->expected =
+            nav_expected_new(&problem->arena, &problem->robot, g->likelihood, step, g->lattice.nh * turns, 3 * sub);
+    if (g->expected)
+        g->mixture = nav_mixture_new(g->expected, g->lattice.nx, g->lattice.ny, sub, turns);
+    if (!g->mixture)
+        return false;
+    nav_expected_forget_poses(g->expected);
+    return true;
 }
 
 static void *create(const struct nav_problem *problem)
@@ -125,22 +143,11 @@ static void *create(const struct nav_problem *problem)
     if (!g)
         return NULL;
     g->problem = problem;
-    g->sub = (int)s->grid_sub;
-    g->sub_heading = (int)s->grid_sub_heading;
     int headings = (int)fmax(round(360.0 / s->grid_cell_deg), 1.0);
-    double step = s->grid_cell_m / g->sub, turn = 2.0 * NAV_PI / headings / g->sub_heading;
-    /* A look-up stands for poses within half a step and half a turn: that spreads the distances it should give. */
-    double blur = hypot(step, 0.2 * turn) / sqrt(12.0);
-    if (nav_lattice_init(&g->lattice, problem->arena.size_x, problem->arena.size_y, s->grid_cell_m, headings)) {
-        destroy(g);
-        return NULL;
-    }
-    g->row = calloc((size_t)g->lattice.nx, sizeof *g->row);
-    g->likelihood = nav_likelihood_new(&problem->arena, &problem->robot, s, blur);
-    if (g->row && g->likelihood)
-        g->expected = nav_expected_new(&problem->arena, &problem->robot, g->likelihood, step, headings * g->sub_heading,
-                                       2 * g->sub);
-    if (!g->expected) {
+    g->layer = calloc((size_t)headings, sizeof *g->layer);
+    if (!g->layer ||
+        nav_lattice_init(&g->lattice, problem->arena.size_x, problem->arena.size_y, s->grid_cell_m, headings) ||
+        !make_tables(g)) {
         destroy(g);
         return NULL;
     }
@@ -163,7 +170,8 @@ static void predict(void *self, const struct nav_motion *motion)
 static void update(void *self, const struct nav_evidence *evidence)
 {
     struct grid *g = self;
-    nav_lattice_move(&g->lattice, g->pending, &g->pending_noise);
+    nav_lattice_shift(&g->lattice, g->pending, &g->pending_noise);
+    g->summary.mean = nav_compose(g->summary.mean, g->pending);
     g->pending = (struct nav_pose){0.0, 0.0, 0.0};
     g->pending_noise = (struct nav_noise){0.0, 0.0};
     nav_likelihood_read(g->likelihood, evidence);
@@ -184,7 +192,8 @@ static void estimate(const void *self, struct nav_estimate *out)
     out->evaluations = (long)nav_lattice_cells(&g->lattice);
     out->states = out->touched = out->evaluations;
     out->distinct = (long)g->expected->signatures - 1;
-    out->bytes = sizeof *g + 2 * nav_lattice_cells(&g->lattice) * sizeof(float) + nav_expected_bytes(g->expected);
+    out->bytes = sizeof *g + 2 * nav_lattice_cells(&g->lattice) * sizeof(float) + nav_expected_bytes(g->expected) +
+                 nav_mixture_bytes(g->mixture);
 }
 
 static long components(const void *self, struct nav_component *out, long room)
@@ -199,7 +208,7 @@ static long components(const void *self, struct nav_component *out, long room)
             continue;
         if (count < room)
             out[count] = (struct nav_component){nav_compose(nav_lattice_centre(l, n), g->pending), sigma, sigma_turn,
-                                                (double)l->mass[n]};
+                                                (double)l->mass[n] * l->scale};
         count++;
     }
     return count;

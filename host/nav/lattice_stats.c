@@ -38,12 +38,6 @@ void nav_lattice_fill(struct nav_lattice *l, const struct nav_prior *prior)
     }
 }
 
-void nav_lattice_scale(struct nav_lattice *l, double factor)
-{
-    for (size_t i = 0; i < nav_lattice_cells(l); i++)
-        l->mass[i] *= (float)factor;
-}
-
 struct nav_pose nav_lattice_centre(const struct nav_lattice *l, size_t index)
 {
     size_t nx = (size_t)l->nx, ny = (size_t)l->ny;
@@ -52,14 +46,15 @@ struct nav_pose nav_lattice_centre(const struct nav_lattice *l, size_t index)
                              nav_wrap(nav_lattice_heading(l, p))};
 }
 
-struct nav_pose nav_lattice_mode(const struct nav_lattice *l)
+size_t nav_lattice_peak(const struct nav_lattice *l, int slice)
 {
-    size_t best = 0;
-    for (size_t i = 1; i < nav_lattice_cells(l); i++) {
-        if (l->mass[i] > l->mass[best])
+    size_t cells = (size_t)l->nx * (size_t)l->ny, best = 0;
+    const float *mass = nav_lattice_slice(l, slice);
+    for (size_t i = 1; i < cells; i++) {
+        if (mass[i] > mass[best])
             best = i;
     }
-    return nav_lattice_centre(l, best);
+    return (size_t)slice * cells + best;
 }
 
 struct sums {
@@ -97,45 +92,31 @@ double nav_lattice_near(const struct nav_lattice *l, struct nav_pose pose, struc
     if (mean && s.mass > 0.0)
         *mean =
             (struct nav_pose){pose.x + s.x / s.mass, pose.y + s.y / s.mass, nav_wrap(pose.theta + s.theta / s.mass)};
-    return s.mass;
+    return s.mass * l->scale;
 }
 
-/* Adds one slice's moments: m[0..2] mass, x, y; m[3..5] xx, xy, yy, about the pose. */
-static void slice_moments(const struct nav_lattice *l, int p, struct nav_pose about, double m[6])
+/* Adds one slice's moments about (x, y) to sums xx, xy, yy, xt, yt, tt, its heading being off by `turn`. */
+static void add_slice(const double m[NAV_MOMENTS], double x, double y, double turn, double sums[6])
 {
-    double x0 = 0.5 * l->cell + l->shift_x[p] - about.x, y0 = 0.5 * l->cell + l->shift_y[p] - about.y;
-    memset(m, 0, 6 * sizeof *m);
-    for (int j = 0; j < l->ny; j++) {
-        const float *row = nav_lattice_slice(l, p) + j * l->nx;
-        float mass = 0.0f, first = 0.0f, second = 0.0f;
-        for (int i = 0; i < l->nx; i++) {
-            float x = (float)(x0 + i * l->cell), part = row[i] * x;
-            mass += row[i];
-            first += part;
-            second += part * x;
-        }
-        double y = y0 + j * l->cell;
-        const double add[6] = {(double)mass,   (double)first,     y * (double)mass,
-                               (double)second, y * (double)first, y * y * (double)mass};
-        for (int k = 0; k < 6; k++)
-            m[k] += add[k];
-    }
+    double mx = m[1] - x * m[0], my = m[2] - y * m[0];
+    sums[0] += m[3] - 2.0 * x * m[1] + x * x * m[0];
+    sums[1] += m[4] - x * m[2] - y * m[1] + x * y * m[0];
+    sums[2] += m[5] - 2.0 * y * m[2] + y * y * m[0];
+    sums[3] += mx * turn;
+    sums[4] += my * turn;
+    sums[5] += m[0] * turn * turn;
 }
 
 void nav_lattice_covariance(const struct nav_lattice *l, struct nav_pose about, double covariance[9])
 {
-    double xx = 0.0, xy = 0.0, yy = 0.0, xt = 0.0, yt = 0.0, tt = 0.0, m[6];
-    for (int p = 0; p < l->nh; p++) {
-        double turn = nav_wrap(nav_lattice_heading(l, p) - about.theta);
-        slice_moments(l, p, about, m);
-        xx += m[3];
-        xy += m[4];
-        yy += m[5];
-        xt += m[1] * turn;
-        yt += m[2] * turn;
-        tt += m[0] * turn * turn;
-    }
+    double sums[6] = {0.0};
+    for (int p = 0; p < l->nh; p++)
+        add_slice(l->moment[p], about.x - l->moment_x, about.y - l->moment_y,
+                  nav_wrap(nav_lattice_heading(l, p) - about.theta), sums);
+    for (int k = 0; k < 6; k++)
+        sums[k] /= l->total;
     double within = l->cell * l->cell / 12.0, within_theta = l->cell_theta * l->cell_theta / 12.0;
-    const double all[9] = {xx + within, xy, xt, xy, yy + within, yt, xt, yt, tt + within_theta};
+    double xx = fmax(sums[0], 0.0) + within, yy = fmax(sums[2], 0.0) + within;
+    const double all[9] = {xx, sums[1], sums[3], sums[1], yy, sums[4], sums[3], sums[4], sums[5] + within_theta};
     memcpy(covariance, all, sizeof all);
 }

@@ -32,8 +32,8 @@ static int make_tables(struct nav_likelihood *l)
     for (int w = 0; w < l->whiskers; w++) {
         size_t codes = (size_t)l->model[w].codes;
         l->table[w] = calloc(codes, sizeof **l->table);
-        l->alone[w] = calloc(codes, sizeof **l->alone);
-        if (!l->table[w] || !l->alone[w] || nav_trust_init(&l->trust[w], (int)codes))
+        l->ratio[w] = calloc(codes, sizeof **l->ratio);
+        if (!l->table[w] || !l->ratio[w] || nav_trust_init(&l->trust[w], (int)codes))
             return -1;
     }
     return 0;
@@ -49,33 +49,30 @@ struct nav_likelihood *nav_likelihood_new(const struct nav_arena *arena, const s
     l->whiskers = robot->tips + robot->rays;
     l->model = calloc((size_t)l->whiskers + 1, sizeof *l->model);
     l->table = calloc((size_t)l->whiskers + 1, sizeof *l->table);
-    l->alone = calloc((size_t)l->whiskers + 1, sizeof *l->alone);
+    l->ratio = calloc((size_t)l->whiskers + 1, sizeof *l->ratio);
     l->weight = calloc((size_t)l->whiskers + 1, sizeof *l->weight);
     l->trust = calloc((size_t)l->whiskers + 1, sizeof *l->trust);
     for (int w = 0; l->model && w < l->whiskers; w++)
         l->model[w] = w < l->tips ? texture_model(arena, settings) : radial_model(robot, w - l->tips, settings, blur_m);
-    if (!l->model || !l->table || !l->alone || !l->weight || !l->trust || make_tables(l)) {
+    if (!l->model || !l->table || !l->ratio || !l->weight || !l->trust || make_tables(l)) {
         nav_likelihood_free(l);
         return NULL;
     }
     return l;
 }
 
-static void free_tables(float **tables, int count)
-{
-    for (int w = 0; tables && w < count; w++)
-        free(tables[w]);
-    free(tables);
-}
-
 void nav_likelihood_free(struct nav_likelihood *l)
 {
     if (!l)
         return;
-    for (int w = 0; l->trust && w < l->whiskers; w++)
-        nav_trust_free(&l->trust[w]);
-    free_tables(l->table, l->whiskers);
-    free_tables(l->alone, l->whiskers);
+    for (int w = 0; w < l->whiskers; w++) {
+        free(l->table ? l->table[w] : NULL);
+        free(l->ratio ? l->ratio[w] : NULL);
+        if (l->trust)
+            nav_trust_free(&l->trust[w]);
+    }
+    free(l->table);
+    free(l->ratio);
     free(l->trust);
     free(l->weight);
     free(l->model);
@@ -85,12 +82,12 @@ void nav_likelihood_free(struct nav_likelihood *l)
 static void read_whisker(struct nav_likelihood *l, int w, const double *reading)
 {
     struct nav_model *model = &l->model[w];
-    double trust = l->trust[w].working;
+    double trust = l->trust[w].working, *ratio = l->ratio[w];
     if (w < l->tips)
         nav_mm_texture_watch(model, reading);
-    model->fill(model, reading, l->alone[w]);
+    model->fill(model, reading, ratio);
     for (int k = 0; k < model->codes; k++)
-        l->table[w][k] = (float)(l->weight[w] * log(trust * exp((double)l->alone[w][k]) + 1.0 - trust));
+        l->table[w][k] = (float)(l->weight[w] * log(trust * ratio[k] + 1.0 - trust));
 }
 
 void nav_likelihood_read(struct nav_likelihood *l, const struct nav_evidence *evidence)

@@ -19,7 +19,7 @@ struct nav_likelihood {
     int tips;
     struct nav_model *model; /* [whiskers] */
     float **table;           /* [whiskers][codes] log-likelihoods of the present row, weight and trust applied */
-    float **alone;           /* [whiskers][codes] the same as its model gives them, of a whisker that works */
+    double **ratio;          /* [whiskers][codes] what the models gave, see measurement.h */
     double *weight;          /* [whiskers] of the present row */
     struct nav_trust *trust; /* [whiskers], see trust.h */
 };

@@ -11,10 +11,10 @@
 
 struct nav_model;
 
-/* Fills loglik[model->codes] with log p(reading | code) - log p(reading | whisker broken). Above 0 a reading speaks for
- * a code, and for a whisker that works. reading: model->values doubles, finite; for an object whisker in m, INFINITY
- * for "no contact". A broken whisker is taken to say any class, any distance, or for ever nothing. */
-typedef void nav_measurement(const struct nav_model *, const double *reading, float *loglik);
+/* Fills ratio[model->codes] with p(reading | code) / p(reading | whisker broken). Above 1 a reading speaks for a code,
+ * and for a whisker that works. reading: model->values doubles, finite; for an object whisker in m, INFINITY for "no
+ * contact". A broken whisker is taken to say any class, any distance, or for ever nothing. */
+typedef void nav_measurement(const struct nav_model *, const double *reading, double *ratio);
 
 struct nav_model {
     nav_measurement *fill;

@@ -6,22 +6,25 @@
 #include <math.h>
 
 static const double LEAST = 1e-30;
+static const double FAR = 7.0; /* erfc(7) < 1e-22 */
 
 /* Probability that an object at this distance makes a contact that is noticed: 1/2 (1 - miss) at the whisker's length.
  */
 static double noticed(const struct nav_model *model, double distance)
 {
-    double beyond = (distance - model->length) / (model->edge * sqrt(2.0));
-    return (1.0 - model->settings->radial_miss) * 0.5 * erfc(beyond);
+    double beyond = (distance - model->length) / (model->edge * sqrt(2.0)), most = 1.0 - model->settings->radial_miss;
+    if (beyond < -FAR)
+        return most;
+    return beyond > FAR ? 0.0 : most * 0.5 * erfc(beyond);
 }
 
 static double density(const struct nav_model *model, double difference)
 {
     double z = difference / model->sigma;
-    return exp(-0.5 * z * z) / (model->sigma * sqrt(8.0 * atan(1.0)));
+    return fabs(z) > FAR * sqrt(2.0) ? 0.0 : exp(-0.5 * z * z) / (model->sigma * sqrt(8.0 * atan(1.0)));
 }
 
-void nav_mm_radial(const struct nav_model *model, const double *reading, float *loglik)
+void nav_mm_radial(const struct nav_model *model, const double *reading, double *ratio)
 {
     double ghost = model->settings->radial_ghost;
     for (int k = 0; k < model->codes; k++) {
@@ -30,6 +33,6 @@ void nav_mm_radial(const struct nav_model *model, const double *reading, float *
         double p = (1.0 - hit) * (1.0 - ghost);
         if (isfinite(reading[0]))
             p = model->length * hit * density(model, reading[0] - distance) + (1.0 - hit) * ghost;
-        loglik[k] = (float)log(fmax(p, LEAST));
+        ratio[k] = fmax(p, LEAST);
     }
 }

@@ -43,14 +43,14 @@ void nav_mm_texture_watch(struct nav_model *model, const double *reading)
     if (model->settings->texture_temper > 0.0 || model->codes < 2)
         return;
     double gap = gap_of(reading, model->codes);
-    if (gap > GAP_LEAST)
-        model->gap *= gap > model->gap ? exp(GAP_STEP) : exp(-GAP_STEP);
     if (gap > GAP_LEAST && model->gap <= 0.0)
         model->gap = gap;
+    else if (gap > GAP_LEAST && gap != model->gap)
+        model->gap *= gap > model->gap ? exp(GAP_STEP) : exp(-GAP_STEP);
     model->temper = fmin(wanted_gap(model) / fmax(model->gap, GAP_LEAST), 1.0);
 }
 
-void nav_mm_texture(const struct nav_model *model, const double *reading, float *loglik)
+void nav_mm_texture(const struct nav_model *model, const double *reading, double *ratio)
 {
     double temper = model->temper, outlier = model->settings->texture_outlier;
     double best = reading[0], total = 0.0;
@@ -61,6 +61,6 @@ void nav_mm_texture(const struct nav_model *model, const double *reading, float 
     for (int k = 0; k < model->codes; k++) {
         double share = exp(temper * (reading[k] - best)) / total;
         double p = (1.0 - outlier) * share + outlier / model->codes;
-        loglik[k] = (float)log(fmax(p, 1e-30) * model->codes);
+        ratio[k] = fmax(p, 1e-30) * model->codes;
     }
 }

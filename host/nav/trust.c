@@ -44,7 +44,7 @@ static double surprise(const struct nav_likelihood *l, int w)
     double known = 0.0, ratio = 0.0;
     for (int k = 0; k < t->codes; k++) {
         known += t->predicted[k];
-        ratio += t->predicted[k] > 0.0 ? t->predicted[k] * exp((double)l->alone[w][k]) : 0.0;
+        ratio += t->predicted[k] * l->ratio[w][k];
     }
     ratio += fmax(1.0 - known, 0.0);
     return l->weight[w] * fmin(fmax(log(ratio), -SURPRISE_MOST), SURPRISE_MOST);
@@ -65,7 +65,7 @@ static void learn_accuracy(struct nav_likelihood *l, int w)
     int best = 0;
     double known = 0.0;
     for (int k = 0; k < model->codes; k++) {
-        best = l->alone[w][k] > l->alone[w][best] ? k : best;
+        best = l->ratio[w][k] > l->ratio[w][best] ? k : best;
         known += l->trust[w].predicted[k];
     }
     double agree = l->trust[w].predicted[best] - known * model->accuracy;

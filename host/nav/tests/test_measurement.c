@@ -23,11 +23,11 @@ static void texture_is_tempered_and_floored(void **state)
     struct nav_model m = {.fill = nav_mm_texture, .settings = &s, .values = 2, .codes = 2};
     nav_mm_texture_begin(&m);
     const double loglik[] = {-500.0, -520.0};
-    float out[2];
+    double out[2];
     m.fill(&m, loglik, out);
     /* softmax(0, -1) = 0.7310586, 0.2689414; p = 0.8 share + 0.1; a broken whisker would say either with 1/2. */
-    assert_near((double)out[0], log(2.0 * (0.8 * 0.7310586 + 0.1)), 1e-6);
-    assert_near((double)out[1], log(2.0 * (0.8 * 0.2689414 + 0.1)), 1e-6);
+    assert_near(out[0], 2.0 * (0.8 * 0.7310586 + 0.1), 1e-6);
+    assert_near(out[1], 2.0 * (0.8 * 0.2689414 + 0.1), 1e-6);
 }
 
 static void however_sure_a_window_is_the_floor_remains(void **state)
@@ -37,9 +37,9 @@ static void however_sure_a_window_is_the_floor_remains(void **state)
     struct nav_model m = {.fill = nav_mm_texture, .settings = &s, .values = 3, .codes = 3};
     nav_mm_texture_begin(&m);
     const double loglik[] = {0.0, -1e6, -1e6};
-    float out[3];
+    double out[3];
     m.fill(&m, loglik, out);
-    assert_near((double)out[2], log(0.2), 1e-6);
+    assert_near(out[2], 0.2, 1e-6);
 }
 
 /* A whisker of 0.1 m in steps of 1 cm up to 0.12 m, code 12: nothing. */
@@ -61,11 +61,11 @@ static void a_measured_distance_is_gaussian_on_a_floor_of_ghosts(void **state)
     struct nav_settings s = settings();
     const struct nav_model m = whisker(&s);
     const double reading = 0.045, peak = 1.0 / (0.01 * sqrt(2.0 * NAV_PI)), ghost = 0.01, length = 0.1;
-    float out[13];
+    double out[13];
     m.fill(&m, &reading, out);
-    assert_near((double)out[4], log(length * 0.9 * peak + 0.1 * ghost), 1e-4);
-    assert_near((double)out[6], log(length * 0.9 * 0.9997674 * peak * exp(-2.0) + 0.1 * ghost), 1e-4);
-    assert_near((double)out[12], log(ghost), 1e-5);
+    assert_near(out[4], length * 0.9 * peak + 0.1 * ghost, 1e-4);
+    assert_near(out[6], length * 0.9 * 0.9997674 * peak * exp(-2.0) + 0.1 * ghost, 1e-4);
+    assert_near(out[12], ghost, 1e-5);
 }
 
 static void no_contact_is_strong_evidence_deep_in_a_wall_and_weak_at_the_tip(void **state)
@@ -74,13 +74,13 @@ static void no_contact_is_strong_evidence_deep_in_a_wall_and_weak_at_the_tip(voi
     struct nav_settings s = settings();
     const struct nav_model m = whisker(&s);
     const double nothing = (double)INFINITY;
-    float out[13];
+    double out[13];
     m.fill(&m, &nothing, out);
-    assert_near((double)out[4], log((1.0 - 0.9) * 0.99), 1e-4);
-    assert_near((double)out[12], log(0.99), 1e-5);
+    assert_near(out[4], (1.0 - 0.9) * 0.99, 1e-4);
+    assert_near(out[12], 0.99, 1e-5);
     /* Codes 9 and 10 lie half a step on either side of the tip: noticed with 0.9 Phi(+-0.5). */
-    assert_near((double)out[9], log((1.0 - 0.9 * 0.6914625) * 0.99), 1e-5);
-    assert_near((double)out[10], log((1.0 - 0.9 * 0.3085375) * 0.99), 1e-5);
+    assert_near(out[9], (1.0 - 0.9 * 0.6914625) * 0.99, 1e-5);
+    assert_near(out[10], (1.0 - 0.9 * 0.3085375) * 0.99, 1e-5);
 }
 
 static void whiskers_turn_with_the_robot(void **state)
@@ -122,9 +122,9 @@ static void whiskers_add_and_those_not_read_say_nothing(void **state)
     float all = nav_likelihood_of(l, codes);
     nav_likelihood_read(l, &(struct nav_evidence){reading, one});
     float texture_only = nav_likelihood_of(l, codes);
-    float table[256];
-    l->model[1].fill(&l->model[1], &distance, table);
-    double trust = l->trust[1].working, radial = log(trust * exp((double)table[codes[1]]) + 1.0 - trust);
+    double ratio[256];
+    l->model[1].fill(&l->model[1], &distance, ratio);
+    double trust = l->trust[1].working, radial = log(trust * ratio[codes[1]] + 1.0 - trust);
     assert_near((double)all, (double)texture_only + radial, 1e-5);
     const double half[] = {0.0, 0.5};
     nav_likelihood_read(l, &(struct nav_evidence){reading, half});
@@ -166,7 +166,7 @@ static void the_table_holds_what_each_free_pose_expects(void **state)
     nav_likelihood_free(l);
 }
 
-static void a_signature_is_worked_out_once_relative_to_the_best(void **state)
+static void a_signature_is_worked_out_once_relative_to_a_bound(void **state)
 {
     (void)state;
     struct nav_problem p = room();
@@ -177,15 +177,64 @@ static void a_signature_is_worked_out_once_relative_to_the_best(void **state)
     const double both[] = {1.0, 1.0};
     nav_likelihood_read(l, &(struct nav_evidence){reading, both});
     nav_expected_evaluate(e, l);
-    float best = 0.0f, best_log = -INFINITY;
-    for (uint32_t n = 1; n < e->signatures; n++)
-        best_log = fmaxf(best_log, nav_likelihood_of(l, e->codes + 3 * n));
-    for (uint32_t n = 1; n < e->signatures; n++) {
-        assert_near((double)e->value[n], exp((double)(nav_likelihood_of(l, e->codes + 3 * n) - best_log)), 1e-6);
-        best = fmaxf(best, e->value[n]);
+    double bound = 0.0;
+    for (int w = 0; w < 2; w++) {
+        float most = -INFINITY;
+        for (int k = 0; k < l->model[w].codes; k++)
+            most = fmaxf(most, l->table[w][k]);
+        bound += (double)most;
     }
-    assert_near((double)best, 1.0, 0.0);
-    assert_near((double)e->value[0], 0.0, 0.0);
+    assert_in_range(e->signatures, 5, 200);
+    for (uint32_t n = 1; n < e->signatures; n++)
+        assert_near(e->value[n - 1], exp((double)nav_likelihood_of(l, e->codes + 3 * n) - bound), 1e-6);
+    nav_expected_free(e);
+    nav_likelihood_free(l);
+}
+
+static void a_robot_without_whiskers_expects_one_thing_everywhere(void **state)
+{
+    (void)state;
+    struct nav_problem p = room();
+    p.robot.tips = p.robot.rays = 0;
+    struct nav_likelihood *l = nav_likelihood_new(&p.arena, &p.robot, &p.settings, 0.01);
+    struct nav_expected *e = nav_expected_new(&p.arena, &p.robot, l, 0.1, 4, 1);
+    nav_expected_evaluate(e, l);
+    assert_int_equal(e->signatures, 2);
+    assert_near(e->value[0], 1.0, 0.0);
+    nav_expected_free(e);
+    nav_likelihood_free(l);
+}
+
+/* 20 whiskers whose tables span 60 nats each: the product would not fit a double. */
+static void many_whiskers_do_not_underflow(void **state)
+{
+    (void)state;
+    enum { WHISKERS = 20 };
+    struct nav_problem p = room();
+    struct nav_tip tip[WHISKERS];
+    const double texture[] = {0.0, -1e9};
+    double weights[WHISKERS];
+    const double *reading[WHISKERS];
+    for (int w = 0; w < WHISKERS; w++) {
+        tip[w] = ROOM_TIP[0];
+        reading[w] = texture;
+        weights[w] = 1.0;
+    }
+    p.robot.tips = WHISKERS;
+    p.robot.tip = tip;
+    p.robot.rays = 0;
+    p.settings.texture_outlier = 0.0;
+    p.settings.texture_temper = 1.0;
+    struct nav_likelihood *l = nav_likelihood_new(&p.arena, &p.robot, &p.settings, 0.01);
+    struct nav_expected *e = nav_expected_new(&p.arena, &p.robot, l, 0.1, 4, 1);
+    for (int w = 0; w < WHISKERS; w++)
+        l->trust[w].working = 1.0;
+    nav_likelihood_read(l, &(struct nav_evidence){reading, weights});
+    nav_expected_evaluate(e, l);
+    assert_int_equal(e->signatures, 3);
+    double low = fmin(e->value[0], e->value[1]);
+    assert_true(low > 0.0 && low < 1e-290);
+    assert_near(fmax(e->value[0], e->value[1]), 1.0, 1e-12);
     nav_expected_free(e);
     nav_likelihood_free(l);
 }
@@ -209,7 +258,9 @@ int main(void)
         cmocka_unit_test(whiskers_turn_with_the_robot),
         cmocka_unit_test(whiskers_add_and_those_not_read_say_nothing),
         cmocka_unit_test(the_table_holds_what_each_free_pose_expects),
-        cmocka_unit_test(a_signature_is_worked_out_once_relative_to_the_best),
+        cmocka_unit_test(a_signature_is_worked_out_once_relative_to_a_bound),
+        cmocka_unit_test(a_robot_without_whiskers_expects_one_thing_everywhere),
+        cmocka_unit_test(many_whiskers_do_not_underflow),
         cmocka_unit_test(a_lattice_too_large_is_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -15,11 +15,11 @@ static struct nav_model classifier(const struct nav_settings *s, int classes)
 
 static double odds_after(struct nav_model *m, double gap)
 {
-    float out[3];
+    double out[3];
     const double reading[] = {-gap, 0.0, -gap};
     nav_mm_texture_watch(m, reading);
     m->fill(m, reading, out);
-    return (double)(out[1] - out[0]);
+    return log(out[1] / out[0]);
 }
 
 static void raw_sums_and_calibrated_scores_come_out_alike(void **state)
@@ -36,7 +36,7 @@ static void raw_sums_and_calibrated_scores_come_out_alike(void **state)
     }
     assert_near(raw.gap / calibrated.gap, 100.0, 1e-6);
     /* A typical window: 0.87 for its class, 0.065 for each other. */
-    assert_near(odds_after(&raw, raw.gap), log(0.87 / 0.065), 0.1);
+    assert_near(odds_after(&raw, raw.gap), log(0.87 / 0.065), 0.15);
 }
 
 static void the_first_window_is_already_tempered(void **state)
@@ -77,7 +77,6 @@ static void a_window_that_says_nothing_changes_nothing(void **state)
 
 /* Two floor whiskers and an object whisker, all told by one believed pose. */
 struct bench {
-    struct nav_problem problem;
     struct nav_likelihood *likelihood;
     uint8_t codes[3];
 };
@@ -86,11 +85,12 @@ static const struct nav_tip TIPS[] = {{0.1, 0.1}, {0.1, -0.1}};
 
 static struct bench bench(void)
 {
-    struct bench b = {.problem = room()};
-    b.problem.robot.tips = 2;
-    b.problem.robot.tip = TIPS;
-    b.likelihood = nav_likelihood_new(&b.problem.arena, &b.problem.robot, &b.problem.settings, 0.0);
-    nav_likelihood_expect(b.likelihood, &b.problem.arena, &b.problem.robot, (struct nav_pose){0.2, 0.25, 0.0}, b.codes);
+    static struct nav_problem p;
+    p = room();
+    p.robot.tips = 2;
+    p.robot.tip = TIPS;
+    struct bench b = {.likelihood = nav_likelihood_new(&p.arena, &p.robot, &p.settings, 0.0)};
+    nav_likelihood_expect(b.likelihood, &p.arena, &p.robot, (struct nav_pose){0.2, 0.25, 0.0}, b.codes);
     assert_int_equal(b.codes[0], 0);
     assert_int_equal(b.codes[1], 0);
     return b;
