@@ -22,6 +22,9 @@ mod:umockdev-1.0 libumockdev-dev
 mod:cmocka libcmocka-dev
 mod:libsystemd libsystemd-dev
 cmd:spin spin
+cmd:avr-gcc gcc-avr
+file:/usr/lib/avr/include/avr/io.h avr-libc
+cmd:simavr simavr
 file:/usr/lib/llvm-14/lib/clang/14.0.6/lib/linux/libclang_rt.fuzzer-x86_64.a libclang-rt-14-dev
 py:ensurepip python3-venv
 py:Python.h python3-dev
@@ -32,7 +35,8 @@ present() {
     case "$1" in
     cmd:*) command -v "${1#cmd:}" >/dev/null 2>&1 ;;
     mod:*) pkg-config --exists "${1#mod:}" 2>/dev/null ;;
-    file:*) [ -e "${1#file:}" ] || ls /usr/lib/llvm-*/lib/clang/*/lib/linux/libclang_rt.fuzzer-*.a >/dev/null 2>&1 ;;
+    file:*llvm*) ls /usr/lib/llvm-*/lib/clang/*/lib/linux/libclang_rt.fuzzer-*.a >/dev/null 2>&1 ;;
+    file:*) [ -e "${1#file:}" ] ;;
     py:Python.h) python3 -c 'import os, sysconfig, sys; sys.exit(not os.path.exists(sysconfig.get_path("include") + "/Python.h"))' 2>/dev/null ;;
     py:*) python3 -c "import ${1#py:}" 2>/dev/null ;;
     esac

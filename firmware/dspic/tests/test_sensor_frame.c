@@ -176,8 +176,8 @@ static void each_error_bit_has_its_place_and_the_rest_have_none(void **state)
         assert_int_equal(sensor_frame_errors(rows[i].word), rows[i].status);
         assigned |= rows[i].word;
     }
-    for (unsigned word = 0; word <= 0xFFFF; word++)
-        assert_int_equal(sensor_frame_errors((uint16_t)word), reference_errors(word));
+    for (uint32_t word = 0; word <= 0xFFFF; word++)
+        assert_int_equal(sensor_frame_errors((uint16_t)word), reference_errors((unsigned)word));
     assert_int_equal(assigned, 0x8BFC);
 }
 
