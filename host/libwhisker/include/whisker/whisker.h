@@ -2,6 +2,7 @@
 #ifndef WHISKER_H
 #define WHISKER_H
 
+#include "whisker/clock.h"
 #include "whisker/device.h"
 #include "whisker/errors.h"
 #include "whisker/frame.h"
