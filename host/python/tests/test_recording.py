@@ -11,6 +11,7 @@ import mcap.records
 import mcap.stream_reader
 import numpy as np
 import pytest
+from fuzz_recording import fuzz
 from rings import make_frames, ring_name
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
@@ -328,3 +329,8 @@ def test_hostile_lengths_cost_no_memory(tmp_path):
     path.write_bytes(b"\x89MCAP0\r\n" + b"\x06" + (2**62).to_bytes(8, "little") + b"x" * 100)
     with McapFile(path) as file:
         assert list(file.messages()) == [] and "within a record" in file.damage[0]
+
+
+def test_mutated_files_end_in_frames_or_one_line():
+    readable, frames = fuzz(4000, seed=7)
+    assert 200 < readable < 2000 and frames > 1000  # the mutations reach behind the header, and hurt
