@@ -37,9 +37,12 @@ def make(name: str, seed: int, rows: int | None = None) -> Made:
     return make_recipe(recipe(name), seed, rows)
 
 
-def make_recipe(r: Recipe, seed: int, rows: int | None = None) -> Made:
-    """The scene of a recipe and seed."""
-    rng = {stream: np.random.default_rng([seed, n]) for n, stream in enumerate(STREAMS)}
+def make_recipe(r: Recipe, seed: int, rows: int | None = None, path_seed: int | None = None) -> Made:
+    """The scene of a recipe and seed; `path_seed` draws everything but the arena, where many drives of one are wanted."""
+    rng = {
+        stream: np.random.default_rng([seed if path_seed is None else path_seed, n]) for n, stream in enumerate(STREAMS)
+    }
+    rng["arena"] = np.random.default_rng([seed, STREAMS.index("arena")])
     rows = r.rows if rows is None else rows
     robot = r.robot()
     arena = r.arena(rng["arena"], robot.body_radius_m)
