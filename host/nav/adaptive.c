@@ -141,6 +141,7 @@ static void wake(struct adaptive *a)
 {
     uint64_t tail = adaptive_log_tail(&a->log);
     a->awake = true;
+    adaptive_doubt_teach(&a->doubt, a->sense.likelihood, a->global.likelihood);
     a->odds = log(a->problem->settings.adaptive_hazard);
     adaptive_global_restart(&a->global, a->doubt.since > tail ? a->doubt.since : tail);
 }
@@ -148,7 +149,7 @@ static void wake(struct adaptive *a)
 static void sleep(struct adaptive *a)
 {
     a->awake = false;
-    adaptive_doubt_clear(&a->doubt, a->log.head);
+    adaptive_doubt_clear(&a->doubt, a->sense.likelihood, a->log.head);
 }
 
 /* The histogram's mass sits in few cells: hypotheses take over its share. */
@@ -162,6 +163,8 @@ static void take_over(struct adaptive *a, double share)
         a->cloud.count = 0;
     adaptive_global_draw(&a->global, &a->cloud, (long)count, share, ahead(a));
     a->touched += (long)count;
+    if (a->local && share > 0.5) /* what contradicted the local belief was not the whiskers' fault */
+        adaptive_doubt_teach(&a->doubt, a->sense.likelihood, a->sense.likelihood);
     a->local = true;
     adaptive_cloud_thin(&a->cloud, true);
     sleep(a);
@@ -213,9 +216,12 @@ static void update_local(struct adaptive *a)
 {
     a->cloud.moved = 0;
     adaptive_cloud_move(&a->cloud, a->pending, &a->pending_noise);
+    adaptive_cloud_look(&a->cloud, &a->sense);
+    adaptive_cloud_expect(&a->cloud, &a->sense, 1.0 - elsewhere(a));
     double local = adaptive_cloud_weigh(&a->cloud, &a->sense);
     adaptive_log_entry(&a->log, a->log.head - 1)->local = local;
-    adaptive_doubt_take(&a->doubt, a->log.head - 1, adaptive_doubt_anywhere(&a->doubt, &a->sense), local);
+    adaptive_doubt_take(&a->doubt, &a->sense, a->log.head - 1, adaptive_doubt_anywhere(&a->doubt, &a->sense), local);
+    nav_trust_learn(a->sense.likelihood);
     a->evaluations += a->cloud.count;
     adaptive_cloud_thin(&a->cloud, false);
     a->touched += a->cloud.moved;

@@ -10,6 +10,7 @@ enum { BOOK = 8192, TRIES = 20 };
 static const double GRACE_M = 0.01;
 /* Log-likelihood of standing where the map says one cannot: maps are wrong sometimes. */
 static const double BLOCKED = -7.0;
+static const double MUTATION = 0.03, NUDGE = 0.2;
 
 int adaptive_cloud_init(struct adaptive_cloud *cloud, const struct nav_problem *problem)
 {
@@ -37,9 +38,48 @@ double adaptive_normal(struct nav_rng *rng)
     return (sum - 131070.0) * (1.0 / 37837.22);
 }
 
+/* Fresh guesses of how good the odometry is: three in four hold it unbiased, half hold with the model's noise and half
+ * with less, as the model's allows for errors that persist. */
+static double gain_of(const struct adaptive_cloud *cloud, struct nav_rng *rng)
+{
+    return nav_rng_bits(rng) >> 62 ? 0.0 : cloud->problem->settings.adaptive_gain * adaptive_normal(rng);
+}
+
+static double noise_of(struct nav_rng *rng)
+{
+    static const double LEVELS[] = {1.0, 0.5, 0.25, 1.0};
+    return LEVELS[nav_rng_bits(rng) >> 62];
+}
+
+/* Changes one guess of one hypothesis now and then; those whose guesses fit outlive the others. */
+static void mutate(const struct adaptive_cloud *cloud, struct adaptive_particle *p, struct nav_rng *rng)
+{
+    uint64_t bits = nav_rng_bits(rng);
+    if ((double)(bits >> 11) * 0x1p-53 >= MUTATION)
+        return;
+    switch (bits & 7) {
+    case 0:
+        p->gain = gain_of(cloud, rng);
+        break;
+    case 1:
+        p->turn_gain = gain_of(cloud, rng);
+        break;
+    case 2:
+    case 3:
+        p->gain += NUDGE * cloud->problem->settings.adaptive_gain * adaptive_normal(rng);
+        break;
+    case 4:
+    case 5:
+        p->turn_gain += NUDGE * cloud->problem->settings.adaptive_gain * adaptive_normal(rng);
+        break;
+    default:
+        p->noise = noise_of(rng);
+    }
+}
+
 static void turn_to(struct adaptive_particle *p, double theta)
 {
-    p->pose.theta = nav_wrap(theta);
+    p->pose.theta = adaptive_wrap(theta);
     p->c = cos(p->pose.theta);
     p->s = sin(p->pose.theta);
 }
@@ -48,11 +88,11 @@ void adaptive_cloud_add(struct adaptive_cloud *cloud, struct nav_pose pose, doub
 {
     if (cloud->count == cloud->room)
         return;
-    double spread = cloud->problem->settings.adaptive_gain;
     struct adaptive_particle *p = &cloud->at[cloud->count++];
     *p = (struct adaptive_particle){.pose = pose, .weight = weight};
-    p->gain = 1.0 + spread * adaptive_normal(&cloud->rng);
-    p->turn_gain = 1.0 + spread * adaptive_normal(&cloud->rng);
+    p->gain = gain_of(cloud, &cloud->rng);
+    p->turn_gain = gain_of(cloud, &cloud->rng);
+    p->noise = noise_of(&cloud->rng);
     memcpy(p->share, share, sizeof p->share);
     turn_to(p, pose.theta);
 }
@@ -97,23 +137,39 @@ void adaptive_cloud_move(struct adaptive_cloud *cloud, struct nav_pose step, con
     double position = sqrt(noise->position), heading = sqrt(noise->heading);
     for (long n = 0; n < cloud->count; n++) {
         struct adaptive_particle *p = &cloud->at[n];
-        double dx = p->gain * step.x + position * adaptive_normal(&cloud->rng);
-        double dy = p->gain * step.y + position * adaptive_normal(&cloud->rng);
+        mutate(cloud, p, &cloud->rng);
+        double dx = (1.0 + p->gain) * step.x + p->noise * position * adaptive_normal(&cloud->rng);
+        double dy = (1.0 + p->gain) * step.y + p->noise * position * adaptive_normal(&cloud->rng);
         p->pose.x += p->c * dx - p->s * dy;
         p->pose.y += p->s * dx + p->c * dy;
-        turn_to(p, p->pose.theta + p->turn_gain * step.theta + heading * adaptive_normal(&cloud->rng));
+        turn_to(p,
+                p->pose.theta + (1.0 + p->turn_gain) * step.theta + p->noise * heading * adaptive_normal(&cloud->rng));
     }
     cloud->moved += cloud->count;
 }
 
-double adaptive_cloud_weigh(struct adaptive_cloud *cloud, struct adaptive_sense *sense)
+void adaptive_cloud_look(struct adaptive_cloud *cloud, struct adaptive_sense *sense)
 {
-    float best = -INFINITY;
     for (long n = 0; n < cloud->count; n++) {
         struct adaptive_particle *p = &cloud->at[n];
         p->slot = adaptive_sense_at(sense, p->pose.x, p->pose.y, p->c, p->s);
-        best = fmaxf(best, sense->value[p->slot]);
     }
+}
+
+void adaptive_cloud_expect(const struct adaptive_cloud *cloud, struct adaptive_sense *sense, double mass)
+{
+    nav_trust_begin(sense->likelihood);
+    for (long n = 0; n < cloud->count; n++) {
+        const uint8_t *codes = sense->codes + cloud->at[n].slot * (size_t)sense->likelihood->whiskers;
+        nav_trust_add(sense->likelihood, codes, mass * cloud->at[n].weight);
+    }
+}
+
+double adaptive_cloud_weigh(struct adaptive_cloud *cloud, const struct adaptive_sense *sense)
+{
+    float best = -INFINITY;
+    for (long n = 0; n < cloud->count; n++)
+        best = fmaxf(best, sense->value[cloud->at[n].slot]);
     double total = 0.0;
     for (long n = 0; n < cloud->count; n++) {
         struct adaptive_particle *p = &cloud->at[n];

@@ -14,10 +14,17 @@
 
 enum { ADAPTIVE_IMAGES_MOST = 4 };
 
+/* nav_wrap for an angle within three half turns of 0, as of sums and differences of wrapped ones; much quicker. */
+static inline double adaptive_wrap(double angle)
+{
+    return angle > NAV_PI ? angle - 2.0 * NAV_PI : angle < -NAV_PI ? angle + 2.0 * NAV_PI : angle;
+}
+
 struct adaptive_particle {
     struct nav_pose pose;
     double c, s;            /* cosine and sine of the heading */
-    double gain, turn_gain; /* true distance and turn by the reported ones */
+    double gain, turn_gain; /* true distance and turn by the reported ones, less 1 */
+    double noise;           /* standard deviation of its odometry noise by the model's */
     double weight;
     uint32_t slot;                     /* of its signature in the present row */
     float share[ADAPTIVE_IMAGES_MOST]; /* of the weight, by image; sums to 1 */
@@ -47,8 +54,11 @@ void adaptive_cloud_free(struct adaptive_cloud *);
 /* Draws from a Gaussian prior within free space; false when nothing of it is free. */
 bool adaptive_cloud_prior(struct adaptive_cloud *, const struct adaptive_sense *);
 
-/* Adds a hypothesis with fresh odometry gains, when there is room. share: by image. */
+/* Adds a hypothesis, when there is room. share: by image. */
 void adaptive_cloud_add(struct adaptive_cloud *, struct nav_pose, double weight, const float *share);
+
+/* Tells the row's measurement models what the belief expects before it is weighed, `mass` of it counting (trust.h). */
+void adaptive_cloud_expect(const struct adaptive_cloud *, struct adaptive_sense *, double mass);
 
 /* Multiplies all weights. */
 void adaptive_cloud_scale(struct adaptive_cloud *, double factor);
@@ -56,8 +66,11 @@ void adaptive_cloud_scale(struct adaptive_cloud *, double factor);
 /* Moves by `step` in the robot's frame, each hypothesis with its own noise. */
 void adaptive_cloud_move(struct adaptive_cloud *, struct nav_pose step, const struct nav_noise *);
 
-/* Weighs with the row last read and normalises. Returns the row's log-likelihood by the belief before it. */
-double adaptive_cloud_weigh(struct adaptive_cloud *, struct adaptive_sense *);
+/* Looks up what each hypothesis expects of the row last read. */
+void adaptive_cloud_look(struct adaptive_cloud *, struct adaptive_sense *);
+
+/* Weighs with the row looked up and normalises. Returns the row's log-likelihood by the belief before it. */
+double adaptive_cloud_weigh(struct adaptive_cloud *, const struct adaptive_sense *);
 
 /* Draws as many as the spread needs when the weights have become uneven, or always when `force`. */
 void adaptive_cloud_thin(struct adaptive_cloud *, bool force);

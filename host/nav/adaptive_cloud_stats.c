@@ -16,7 +16,7 @@ struct nav_pose adaptive_image(const struct nav_arena *arena, int images, int m,
     static const int C[] = {1, 0, -1, 0}, S[] = {0, 1, 0, -1};
     return (struct nav_pose){arena->size_x / 2.0 + C[quarters] * x - S[quarters] * y,
                              arena->size_y / 2.0 + S[quarters] * x + C[quarters] * y,
-                             nav_wrap(pose.theta + quarters * (NAV_PI / 2.0))};
+                             adaptive_wrap(pose.theta + quarters * (NAV_PI / 2.0))};
 }
 
 struct sums {
@@ -27,7 +27,14 @@ static void offset(struct nav_pose from, struct nav_pose to, double d[3])
 {
     d[0] = to.x - from.x;
     d[1] = to.y - from.y;
-    d[2] = nav_wrap(to.theta - from.theta);
+    d[2] = adaptive_wrap(to.theta - from.theta);
+}
+
+/* Pose of a hypothesis in image m. */
+static struct nav_pose pose_of(const struct adaptive_cloud *cloud, long n, int m)
+{
+    struct nav_pose pose = cloud->at[n].pose;
+    return m == 0 ? pose : adaptive_image(&cloud->problem->arena, cloud->images, m, pose);
 }
 
 static struct sums near(const struct adaptive_cloud *cloud, struct nav_pose about)
@@ -37,7 +44,7 @@ static struct sums near(const struct adaptive_cloud *cloud, struct nav_pose abou
         for (long n = 0; n < cloud->count; n++) {
             const struct adaptive_particle *p = &cloud->at[n];
             double d[3], mass = p->weight * (double)p->share[m];
-            offset(about, adaptive_image(&cloud->problem->arena, cloud->images, m, p->pose), d);
+            offset(about, pose_of(cloud, n, m), d);
             if (d[0] * d[0] + d[1] * d[1] > NAV_NEAR_M * NAV_NEAR_M || fabs(d[2]) > NAV_NEAR_RAD)
                 continue;
             s.mass += mass;
@@ -57,7 +64,7 @@ static struct nav_pose settle(const struct adaptive_cloud *cloud, struct nav_pos
         *mass = s.mass;
         if (s.mass > 0.0)
             pose = (struct nav_pose){pose.x + s.x / s.mass, pose.y + s.y / s.mass,
-                                     nav_wrap(pose.theta + s.theta / s.mass)};
+                                     adaptive_wrap(pose.theta + s.theta / s.mass)};
     }
     return pose;
 }
@@ -95,7 +102,7 @@ static void covariance(const struct adaptive_cloud *cloud, struct nav_gaussian *
             double d[3], mass = p->weight * (double)p->share[m];
             if (!(mass > 0.0))
                 continue;
-            offset(g->mean, adaptive_image(&cloud->problem->arena, cloud->images, m, p->pose), d);
+            offset(g->mean, pose_of(cloud, n, m), d);
             for (int k = 0; k < 9; k++)
                 g->covariance[k] += mass * d[k / 3] * d[k % 3];
         }
@@ -106,8 +113,9 @@ struct adaptive_summary adaptive_cloud_summary(const struct adaptive_cloud *clou
 {
     double mass;
     struct adaptive_summary out = {.near = 0.0};
+    guess.theta = nav_wrap(guess.theta);
     out.belief.mean = settle(cloud, guess, &mass);
-    if (mass < MODE_LEAST)
+    if (mass * cloud->images < MODE_LEAST)
         out.belief.mean = search(cloud, out.belief.mean, &mass);
     out.near = fmin(mass, 1.0);
     covariance(cloud, &out.belief);

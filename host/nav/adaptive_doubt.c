@@ -33,13 +33,15 @@ int adaptive_doubt_init(struct adaptive_doubt *d, const struct adaptive_sense *s
     const struct nav_likelihood *l = sense->likelihood;
     *d = (struct adaptive_doubt){.whiskers = l->whiskers};
     d->share = calloc((size_t)l->whiskers + 1, sizeof *d->share);
+    d->trust = calloc((size_t)l->whiskers + 1, sizeof *d->trust);
     for (int w = 0; d->share && w < l->whiskers; w++) {
         d->share[w] = calloc((size_t)l->model[w].codes, sizeof **d->share);
         if (!d->share[w])
             return -1;
     }
-    if (!d->share)
+    if (!d->share || !d->trust)
         return -1;
+    adaptive_doubt_clear(d, l, 0);
     count(d, sense, rng);
     return 0;
 }
@@ -49,6 +51,7 @@ void adaptive_doubt_free(struct adaptive_doubt *d)
     for (int w = 0; d->share && w < d->whiskers; w++)
         free(d->share[w]);
     free(d->share);
+    free(d->trust);
 }
 
 double adaptive_doubt_anywhere(const struct adaptive_doubt *d, const struct adaptive_sense *sense)
@@ -57,25 +60,38 @@ double adaptive_doubt_anywhere(const struct adaptive_doubt *d, const struct adap
     for (int w = 0; w < d->whiskers; w++) {
         if (!(sense->evidence->weight[w] > 0.0))
             continue;
-        double mean = 0.0;
+        double ratio = 0.0; /* to a broken whisker */
         for (int k = 0; k < sense->likelihood->model[w].codes; k++) {
             if (d->share[w][k] > 0.0f)
-                mean += (double)(d->share[w][k] * expf(sense->likelihood->table[w][k]));
+                ratio += (double)d->share[w][k] * sense->likelihood->ratio[w][k];
         }
-        sum += log(mean);
+        sum += sense->evidence->weight[w] * log(d->trust[w] * ratio + 1.0 - d->trust[w]);
     }
     return sum;
 }
 
-void adaptive_doubt_take(struct adaptive_doubt *d, uint64_t row, double anywhere, double local)
+void adaptive_doubt_take(struct adaptive_doubt *d, const struct adaptive_sense *sense, uint64_t row, double anywhere,
+                         double local)
 {
     d->ratio += anywhere - local;
     if (!(d->ratio > 0.0))
-        adaptive_doubt_clear(d, row + 1);
+        adaptive_doubt_clear(d, sense->likelihood, row + 1);
 }
 
-void adaptive_doubt_clear(struct adaptive_doubt *d, uint64_t row)
+void adaptive_doubt_clear(struct adaptive_doubt *d, const struct nav_likelihood *l, uint64_t row)
 {
     d->ratio = 0.0;
     d->since = row;
+    for (int w = 0; w < d->whiskers; w++)
+        d->trust[w] = l->trust[w].working;
+}
+
+void adaptive_doubt_teach(const struct adaptive_doubt *d, const struct nav_likelihood *from, struct nav_likelihood *to)
+{
+    for (int w = 0; w < d->whiskers; w++) {
+        to->trust[w].working = d->trust[w];
+        to->model[w].temper = from->model[w].temper;
+        to->model[w].gap = from->model[w].gap;
+        to->model[w].accuracy = from->model[w].accuracy;
+    }
 }

@@ -3,7 +3,10 @@
  * Two explanations of the rows are compared: the local belief's, and that of a robot anywhere in free space. While the
  * arena-wide belief sleeps, "anywhere" is the average over the arena whisker by whisker, a table made once; the
  * running log-ratio never falls below 0, and the row after its last 0 is when the robot would have been moved (Page's
- * test). When it is awake its own likelihood of the rows takes over. */
+ * test). When it is awake its own likelihood of the rows takes over.
+ *
+ * A local belief may explain a disagreement by a broken whisker (trust.h). Elsewhere that whisker works as well as it
+ * did before: the trust of that time is kept for the other explanation. */
 #ifndef NAV_ADAPTIVE_DOUBT_H
 #define NAV_ADAPTIVE_DOUBT_H
 
@@ -13,6 +16,7 @@
 struct adaptive_doubt {
     int whiskers;
     float **share;  /* [whiskers][codes] of free space that expects the code */
+    double *trust;  /* [whiskers] before row `since` */
     double ratio;   /* log of rows since `since` by "anywhere" and by the local belief; at least 0 */
     uint64_t since; /* row of the log */
 };
@@ -25,9 +29,13 @@ void adaptive_doubt_free(struct adaptive_doubt *);
 double adaptive_doubt_anywhere(const struct adaptive_doubt *, const struct adaptive_sense *);
 
 /* Takes row `row`, explained by both. */
-void adaptive_doubt_take(struct adaptive_doubt *, uint64_t row, double anywhere, double local);
+void adaptive_doubt_take(struct adaptive_doubt *, const struct adaptive_sense *, uint64_t row, double anywhere,
+                         double local);
 
-/* Starts again at row `row`. */
-void adaptive_doubt_clear(struct adaptive_doubt *, uint64_t row);
+/* Starts again at row `row`, with the trust in whiskers that there is. */
+void adaptive_doubt_clear(struct adaptive_doubt *, const struct nav_likelihood *, uint64_t row);
+
+/* Gives the trust before row `since` to another belief, and how windows of texture are to be read. */
+void adaptive_doubt_teach(const struct adaptive_doubt *, const struct nav_likelihood *from, struct nav_likelihood *to);
 
 #endif

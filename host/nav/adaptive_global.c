@@ -119,8 +119,8 @@ void adaptive_global_restart(struct adaptive_global *g, uint64_t row)
     g->rotation = g->owed_position = g->owed_heading = g->gained = 0.0;
     memset(g->shift_x, 0, (size_t)g->nh * sizeof *g->shift_x);
     memset(g->shift_y, 0, (size_t)g->nh * sizeof *g->shift_y);
-    g->total = 1.0;
-    g->scattered = 1.0;
+    g->total = g->scattered = 1.0;
+    g->peak = 0.0;
     const struct nav_arena *arena = &g->problem->arena;
     struct nav_problem lost = *g->problem;
     lost.prior.uniform = true;
@@ -221,6 +221,7 @@ static void begin(struct adaptive_global *g, struct adaptive_log *log)
     g->job.side = side_of(&g->owed_position, g->cell, PASSES_MOST, &g->job.passes);
     g->job.side_heading = side_of(&g->owed_heading, g->cell_theta, 1, &one);
     g->job.turning = g->job.side_heading > 0.0f && !g->fresh;
+    g->job.sized = g->peak * g->room >= g->problem->settings.adaptive_per_bin; /* else too many for a cloud */
     g->jobs++;
 }
 
@@ -237,6 +238,7 @@ static void end(struct adaptive_global *g)
     g->fresh = g->job.running = false;
     g->total = g->job.total;
     g->mode = g->job.mode;
+    g->peak = (double)g->job.heaviest / g->total;
     g->gained += gain;
     g->next = next;
     adaptive_global_summarise(g);
@@ -361,17 +363,15 @@ static void blur_slice(struct adaptive_global *g, int p, float side)
     }
 }
 
+/* Works out a signature's likelihood for the present job. */
 static float value_of(struct adaptive_global *g, uint32_t signature)
 {
-    struct adaptive_value *v = &g->value[signature];
-    if (v->job == g->jobs)
-        return v->value;
     const uint8_t *codes = g->expected->codes + signature * ((size_t)g->expected->whiskers + 1);
     float product = signature ? 1.0f : 0.0f;
     for (int w = 0; signature && w < g->expected->whiskers; w++)
         product *= g->factor[w][codes[w]];
     g->distinct++;
-    *v = (struct adaptive_value){g->jobs, product};
+    g->value[signature] = (struct adaptive_value){g->jobs, product};
     return product;
 }
 
@@ -384,28 +384,40 @@ static int size_of(float mass)
     return size < 0 ? 0 : size < ADAPTIVE_SIZES ? size : ADAPTIVE_SIZES - 1;
 }
 
+/* Counts a line's cells by the size of their mass. */
+static void count_line(struct adaptive_global *g, const float *cell)
+{
+    for (int i = 0; i < g->nx; i++)
+        g->job.many[size_of(cell[i])]++;
+}
+
 /* Weighs one line of cells; returns its mass. */
 static double weigh_line(struct adaptive_global *g, float *cell, const uint32_t *signature)
 {
-    struct adaptive_job *job = &g->job;
-    double total = 0.0;
-    for (int i = 0; i < g->nx; i++) {
-        float before = cell[i] * job->scale;
+    float scale = g->job.scale, heaviest = g->job.heaviest, total = 0.0f;
+    const struct adaptive_value *value = g->value;
+    uint32_t jobs = g->jobs;
+    int n = g->nx, mode = -1;
+    for (int i = 0; i < n; i++) {
+        float before = cell[i] * scale;
         if (!(before > SHARE_LEAST)) {
             cell[i] = 0.0f;
             continue;
         }
-        float mass = cell[i] = before * value_of(g, signature[i * SUB]);
-        total += (double)mass;
-        int size = size_of(mass);
-        job->by_size[size] += (double)mass;
-        job->many[size] += 1.0;
-        if (mass > job->heaviest) {
-            job->heaviest = mass;
-            job->mode = (size_t)(&cell[i] - g->mass);
+        uint32_t code = signature[i * SUB];
+        float mass = before * (value[code].job == jobs ? value[code].value : value_of(g, code));
+        cell[i] = mass;
+        total += mass;
+        if (mass > heaviest) {
+            heaviest = mass;
+            mode = i;
         }
     }
-    return total;
+    if (mode >= 0) {
+        g->job.heaviest = heaviest;
+        g->job.mode = (size_t)(cell + mode - g->mass);
+    }
+    return (double)total;
 }
 
 /* Adds a line's moments about the arena's corner to its slice's. */
@@ -439,8 +451,11 @@ static void weigh_slice(struct adaptive_global *g, int p)
         double mass = weigh_line(g, line(g, g->mass, p, j), signature);
         g->job.total += mass;
         g->live[p * g->ny + j] = mass > 0.0;
-        if (mass > 0.0)
-            add_moments(g, p, j, line(g, g->mass, p, j));
+        if (!(mass > 0.0))
+            continue;
+        add_moments(g, p, j, line(g, g->mass, p, j));
+        if (g->job.sized)
+            count_line(g, line(g, g->mass, p, j));
     }
 }
 

@@ -23,6 +23,7 @@ enum { ADAPTIVE_SIZES = 40 };
 /* Some rows on their way into the belief. */
 struct adaptive_job {
     bool running, turning; /* turning: still blurring headings */
+    bool sized;            /* counting cells by size */
     int slice;             /* next to do */
     struct nav_pose step;
     float side; /* weight of a neighbour in a position blur of this job, 0: none; passes of it */
@@ -32,10 +33,10 @@ struct adaptive_job {
     double reference; /* log-likelihood of the best codes: factors are relative to it */
     double total;     /* mass so far */
     float heaviest;
-    size_t mode;                                          /* cell with the most mass so far */
-    double local;                                         /* log-likelihood of its rows by the local belief */
-    uint64_t end;                                         /* first row after it */
-    double by_size[ADAPTIVE_SIZES], many[ADAPTIVE_SIZES]; /* mass and number of cells by the size of their mass */
+    size_t mode;                   /* cell with the most mass so far */
+    double local;                  /* log-likelihood of its rows by the local belief */
+    uint64_t end;                  /* first row after it */
+    uint32_t many[ADAPTIVE_SIZES]; /* cells by the size of their mass */
 };
 
 struct adaptive_global {
@@ -54,11 +55,12 @@ struct adaptive_global {
     struct adaptive_value *value; /* [signatures] */
     uint32_t jobs;
     struct adaptive_job job;
-    bool fresh;      /* uniform, and not yet written out */
-    double log_free; /* logarithm of the share of cells where the robot can stand */
-    uint64_t next;   /* first row of the log that it has not seen */
-    double total;    /* mass */
-    size_t mode;
+    bool fresh;                      /* uniform, and not yet written out */
+    double log_free;                 /* logarithm of the share of cells where the robot can stand */
+    uint64_t next;                   /* first row of the log that it has not seen */
+    double total;                    /* mass */
+    size_t mode;                     /* cell with the most mass, */
+    double peak;                     /* and its share */
     double gained;                   /* log-likelihood of the rows seen, less the local belief's, since the restart */
     struct adaptive_summary summary; /* at row `next` - 1 */
     double room;                     /* hypotheses that a cloud could hold */

@@ -82,11 +82,12 @@ void adaptive_global_summarise(struct adaptive_global *g)
     s->belief.covariance[4] += g->cell * g->cell / 12.0;
     s->belief.covariance[8] += g->cell_theta * g->cell_theta / 12.0;
     double worth = g->total / g->room, size = 1.0;
-    g->scattered = g->crowd = 0.0;
+    g->scattered = g->job.sized ? 0.0 : 1.0;
+    g->crowd = 0.0;
     for (int n = 0; n < ADAPTIVE_SIZES; n++, size /= 2.0) {
-        /* Cells of this size hold size / 2 .. size. */
+        /* Cells of this size hold size / 2 .. size, about 3/4 of it. */
         if (size / 2.0 < worth)
-            g->scattered += g->job.by_size[n] / g->total;
+            g->scattered += 0.75 * size * g->job.many[n] / g->total;
         else
             g->crowd += g->job.many[n];
     }

@@ -118,11 +118,22 @@ void adaptive_sense_read(struct adaptive_sense *s, const struct nav_evidence *ev
     }
 }
 
+static int index_of(double position, int count)
+{
+    return position > 0.0 ? (position < count ? (int)position : count - 1) : 0;
+}
+
 /* Number of the square under (x, y), or of the nearest. */
 static size_t square_at(const struct adaptive_sense *s, double x, double y)
 {
-    int i = (int)fmin(fmax(x / s->edge, 0.0), s->columns - 1), j = (int)fmin(fmax(y / s->edge, 0.0), s->rows - 1);
-    return (size_t)j * (size_t)s->columns + (size_t)i;
+    double per_m = 1.0 / s->edge;
+    return (size_t)index_of(y * per_m, s->rows) * (size_t)s->columns + (size_t)index_of(x * per_m, s->columns);
+}
+
+/* Whether a square has nothing solid within reach. */
+static bool empty(const struct adaptive_sense *s, size_t square)
+{
+    return s->first[square] == s->first[square + 1] && !s->wall[square];
 }
 
 /* The arena with the boxes near a square alone. */
@@ -138,16 +149,19 @@ static void codes_of_rays(const struct adaptive_sense *s, double x, double y, do
 {
     const struct nav_likelihood *l = s->likelihood;
     size_t square = square_at(s, x, y);
+    if (empty(s, square)) {
+        for (int w = l->tips; w < l->whiskers; w++)
+            codes[w] = (uint8_t)(l->model[w].codes - 1);
+        return;
+    }
     struct nav_arena near = around(s, square);
-    bool nothing = near.boxes == 0 && !s->wall[square];
     for (int r = 0; r < s->robot->rays; r++) {
         const struct nav_ray *ray = &s->robot->ray[r];
         const struct nav_model *model = &l->model[l->tips + r];
         const double *b = s->bearing + 2 * r;
-        double range = INFINITY;
-        if (!nothing)
-            range = nav_arena_range_along(&near, x + c * ray->x - d * ray->y, y + d * ray->x + c * ray->y,
-                                          c * b[0] - d * b[1], d * b[0] + c * b[1], (model->codes - 1) * model->step);
+        double range =
+            nav_arena_range_along(&near, x + c * ray->x - d * ray->y, y + d * ray->x + c * ray->y, c * b[0] - d * b[1],
+                                  d * b[0] + c * b[1], (model->codes - 1) * model->step);
         codes[l->tips + r] = nav_likelihood_range_code(model, range);
     }
 }
@@ -161,13 +175,21 @@ void adaptive_sense_codes(const struct adaptive_sense *s, double x, double y, do
     codes_of_rays(s, x, y, c, d, codes);
 }
 
+static bool alike(const uint8_t *a, const uint8_t *b, size_t width)
+{
+    size_t w = 0;
+    while (w < width && a[w] == b[w])
+        w++;
+    return w == width;
+}
+
 static size_t slot_of(struct adaptive_sense *s, const uint8_t *codes, size_t width)
 {
     uint64_t h = 14695981039346656037u; /* FNV-1a */
     for (size_t w = 0; w < width; w++)
         h = (h ^ codes[w]) * 1099511628211u;
     size_t slot = (size_t)(h ^ (h >> 29)) & (s->slots - 1);
-    while (s->stamp[slot] == s->row && memcmp(s->codes + slot * width, codes, width) != 0)
+    while (s->stamp[slot] == s->row && !alike(s->codes + slot * width, codes, width))
         slot = (slot + 1) & (s->slots - 1);
     return slot;
 }
@@ -191,7 +213,10 @@ uint32_t adaptive_sense_at(struct adaptive_sense *s, double x, double y, double 
 
 bool adaptive_sense_free_at(const struct adaptive_sense *s, double x, double y, double grace)
 {
-    struct nav_arena near = around(s, square_at(s, x, y));
+    size_t square = square_at(s, x, y);
+    if (empty(s, square))
+        return true;
+    struct nav_arena near = around(s, square);
     return nav_arena_free(&near, x, y, fmax(s->robot->body_radius - grace, 0.0));
 }
 
