@@ -177,14 +177,17 @@ def test_rings_are_found_named_and_told_when_they_change():
         asyncio.run(scenario(writer))
 
 
-def test_only_rings_are_offered(tmp_path):
-    (tmp_path / "good").write_bytes(b"WHSKRING")
-    (tmp_path / "other").write_bytes(b"something")
-    (tmp_path / "short").write_bytes(b"WHSK")
-    (tmp_path / "name\nwith a line").write_bytes(b"WHSKRING")
-    (tmp_path / "link").symlink_to(tmp_path / "good")
-    (tmp_path / "folder").mkdir()
-    assert find_rings(tmp_path) == ["good"]
+def test_only_rings_with_a_writer_are_offered(tmp_path):
+    with ring_of(made_frames(0, 10)) as writer, ring_of(made_frames(0, 10)) as linked:
+        for name in (writer.name, "whisker-test-dead", "name\nwith a line"):
+            (tmp_path / name).write_bytes(b"WHSKRING")
+        (tmp_path / "other").write_bytes(b"something")
+        (tmp_path / "short").write_bytes(b"WHSK")
+        (tmp_path / linked.name).symlink_to(tmp_path / writer.name)
+        (tmp_path / "folder").mkdir()
+        assert find_rings(tmp_path) == [writer.name]
+        assert {writer.name, linked.name} <= set(find_rings())
+    assert find_rings(tmp_path) == []
     assert find_rings(tmp_path / "missing") == []
 
 

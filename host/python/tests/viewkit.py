@@ -52,6 +52,20 @@ def ring_of(frames: np.ndarray, name: str | None = None):
 
 
 @asynccontextmanager
+async def flowing(writer: Writer, first: int):
+    """While this lasts, frames come: ticks from `first` on."""
+
+    async def publish_for_ever():
+        for start in count(first, 64):
+            writer.publish(made_frames(start, 64))
+            await asyncio.sleep(0.032)
+
+    task = asyncio.create_task(publish_for_ever())
+    yield
+    task.cancel()
+
+
+@asynccontextmanager
 async def view_of(*names: str):
     """A server for these rings; gives its port."""
     async with serving(Hub(list(names)), "127.0.0.1", 0, []) as port:

@@ -4,6 +4,8 @@ import os
 import stat
 from pathlib import Path
 
+from ..ring import Reader, RingError
+
 SHARED_MEMORY = Path("/dev/shm")
 MARK = b"WHSKRING"
 NAMES_MAX = 64  # rings offered
@@ -12,12 +14,17 @@ NAME_CHARACTERS_MAX = 250
 
 
 def find_rings(folder: Path = SHARED_MEMORY) -> list[str]:
-    """Names of the rings that we may read, in order; none if the folder cannot be read."""
+    """Names of the rings that have a writer and that we may read, in order; none if the folder cannot be read."""
     names = []
     try:
         with os.scandir(folder) as entries:
             for _, entry in zip(range(FILES_MAX), entries, strict=False):
-                if is_name(entry.name) and entry.is_file(follow_symlinks=False) and _is_ring(entry.path):
+                if (
+                    is_name(entry.name)
+                    and entry.is_file(follow_symlinks=False)
+                    and _is_marked(entry.path)
+                    and _lives(entry.name)
+                ):
                     names.append(entry.name)
     except OSError:
         return []
@@ -29,7 +36,7 @@ def is_name(text: str) -> bool:
     return 0 < len(text) <= NAME_CHARACTERS_MAX and text.isascii() and text.isprintable() and "/" not in text
 
 
-def _is_ring(path: str) -> bool:
+def _is_marked(path: str) -> bool:
     try:
         file = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
     except OSError:
@@ -40,3 +47,11 @@ def _is_ring(path: str) -> bool:
         return False
     finally:
         os.close(file)
+
+
+def _lives(name: str) -> bool:
+    try:
+        Reader(name).close()
+    except RingError:
+        return False
+    return True

@@ -1,6 +1,7 @@
 /* The traces: a row per lane, in it a strip per axis; one bin is one column of device pixels. */
 const GUTTER = 86; // px left of the strips, for labels
 const FOOT = 22; // px below, for the time axis
+const HEAD = 280; // px of the window that are not for traces
 const ROW_MIN = 26;
 const ROW_MAX = 130;
 const SPANS = [0.5, 1, 1.5, 2, 3, 5, 7, 10, 15, 20, 30, 50, 70, 100, 180]; // degrees a strip may show
@@ -25,7 +26,7 @@ class Traces {
   /* Make a strip per lane and axis and as much room as they need. */
   layOut() {
     const { lanes, axes } = this.view;
-    const room = Math.max(240, innerHeight - this.box.getBoundingClientRect().top - scrollY - 70);
+    const room = Math.max(300, innerHeight - HEAD);
     const row = Math.min(ROW_MAX, Math.max(ROW_MIN * Math.sqrt(axes.length), Math.floor((room - FOOT) / Math.max(1, lanes.length))));
     const height = Math.max(120, row * lanes.length + FOOT);
     this.box.style.height = `${height}px`;
@@ -187,7 +188,7 @@ class Traces {
   drawTimes(pen, px) {
     const seconds = (this.columns * this.history.width * this.view.tickS) || 0;
     if (!seconds) return;
-    const step = [0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 30, 60, 120, 300].find((s) => seconds / s <= Math.max(3, this.columns / px / 90)) ?? 600;
+    const step = [0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 30, 60, 120, 300].find((s) => seconds / s <= Math.max(4, this.columns / px / 90)) ?? 600;
     const bottom = this.grid.height - FOOT * px;
     for (let back = 0; back <= seconds; back += step) {
       const x = this.grid.width - 1 - Math.round((back / seconds) * this.columns);
