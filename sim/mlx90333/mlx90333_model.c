@@ -4,31 +4,44 @@
 
 #include "whisker_protocol.h" // whisker_put_u16
 
-static uint32_t stretched(uint32_t ns, uint32_t slow_permille)
+/* Slow mode: 7 MHz for 20, but times are the data sheet's own (C): three times the gaps, five times t5. */
+static uint32_t stretched(const struct mlx90333_parameters *p, uint32_t ns, uint32_t slow_mode_factor)
 {
-    return (uint32_t)((uint64_t)ns * slow_permille / 1000u);
+    return (uint32_t)((uint64_t)ns * (p->slow_mode ? slow_mode_factor : 1u) * p->slow_permille / 1000u);
 }
 
-void mlx90333_power_on(struct mlx90333 *sensor, uint64_t now_ns, uint32_t slow_permille, uint64_t seed)
+static void start(struct mlx90333 *sensor, uint64_t now_ns)
+{
+    sensor->awake_ns = now_ns + (uint64_t)sensor->parameters.startup_ns * sensor->parameters.slow_permille / 1000u;
+    sensor->reset_due = false;
+    sensor->enabled = false;
+    sensor->answering = false;
+    sensor->level = true;
+    mlx90333_sense_start(&sensor->sense, &sensor->parameters, now_ns);
+}
+
+void mlx90333_power_on(struct mlx90333 *sensor, uint64_t now_ns, const struct mlx90333_parameters *parameters)
 {
     memset(sensor, 0, sizeof *sensor);
-    sensor->t1 = stretched(MLX90333_T1_NS, slow_permille);
-    sensor->t2 = stretched(MLX90333_T2_NS, slow_permille);
-    sensor->t4 = stretched(MLX90333_T4_NS, slow_permille);
-    sensor->t5 = stretched(MLX90333_T5_NS, slow_permille);
-    sensor->t6 = stretched(MLX90333_T6_NS, slow_permille);
-    sensor->t7 = stretched(MLX90333_T7_NS, slow_permille);
-    sensor->awake_ns = now_ns + stretched(MLX90333_STARTUP_NS, slow_permille);
+    sensor->parameters = *parameters;
+    const struct mlx90333_parameters *p = &sensor->parameters;
+    sensor->t1 = stretched(p, MLX90333_T1_NS, 3);
+    sensor->t2 = stretched(p, MLX90333_T2_NS, 3);
+    sensor->t4 = stretched(p, MLX90333_T4_NS, 3);
+    sensor->t5 = stretched(p, MLX90333_T5_NS, 5);
+    sensor->t6 = stretched(p, MLX90333_T6_NS, 3);
+    sensor->t7 = stretched(p, MLX90333_T7_NS, 3);
+    sensor->frame_bytes = p->mlx90316 ? MLX90316_FRAME_BYTES : MLX90333_FRAME_BYTES;
     sensor->select_ns = now_ns;
-    sensor->random = seed;
+    sensor->random = p->seed;
     sensor->select = true;
-    sensor->level = true;
+    start(sensor, now_ns);
 }
 
-void mlx90333_set_field(struct mlx90333 *sensor, double alpha_deg, double beta_deg)
+void mlx90333_set_field(struct mlx90333 *sensor, const struct mlx90333_field *field)
 {
-    sensor->alpha_deg = alpha_deg;
-    sensor->beta_deg = beta_deg;
+    if (sensor->fault != SIM_SENSOR_FROZEN)
+        mlx90333_sense_field(&sensor->sense, field);
 }
 
 void mlx90333_set_fault(struct mlx90333 *sensor, enum sim_sensor_fault fault, unsigned argument)
@@ -80,18 +93,45 @@ void mlx90333_select(struct mlx90333 *sensor, uint64_t now_ns, bool level)
     sensor->level = true; /* t9: high impedance within 1 us; ones either way until the next clock */
 }
 
-/* The angle is latched at the last clock before the first data byte. */
-static void latch(struct mlx90333 *sensor)
+static void make_90316_frame(struct mlx90333 *sensor, uint16_t angle, uint16_t errors)
+{
+    const uint16_t data = errors ? (uint16_t)(errors | MLX90316_KIND_ERROR)
+                                 : (uint16_t)((angle & MLX90316_ANGLE_MASK) | MLX90316_KIND_ANGLE);
+    memset(sensor->frame, 0xFF, sizeof sensor->frame);
+    for (unsigned i = 0; i < 2u; i++) {
+        const uint8_t byte = (uint8_t)(data >> (8u - 8u * i));
+        sensor->frame[MLX90316_FRAME_DATA + i] = byte;
+        sensor->frame[MLX90316_FRAME_INVERTED + i] = (uint8_t)~byte;
+    }
+}
+
+static void make_frame(struct mlx90333 *sensor, const uint16_t words[3], uint16_t errors)
 {
     uint8_t *frame = sensor->frame;
-    frame[MLX90333_FRAME_START] = MLX90333_START_BYTE;
-    whisker_put_u16(frame + MLX90333_FRAME_ALPHA, sim_counts(sensor->alpha_deg));
-    whisker_put_u16(frame + MLX90333_FRAME_BETA, sim_counts(sensor->beta_deg));
-    whisker_put_u16(frame + MLX90333_FRAME_ERRORS, sensor->fault == SIM_SENSOR_ERROR_BITS ? sensor->argument : 0);
+    const unsigned end = sensor->parameters.sum_without_errors ? MLX90333_FRAME_ERRORS : MLX90333_FRAME_SUM;
     uint8_t sum = 0;
-    for (unsigned i = MLX90333_FRAME_ALPHA; i < MLX90333_FRAME_SUM; i++)
+    frame[MLX90333_FRAME_START] = MLX90333_START_BYTE;
+    whisker_put_u16(frame + MLX90333_FRAME_ALPHA, words[0]);
+    whisker_put_u16(frame + MLX90333_FRAME_BETA, words[1]);
+    whisker_put_u16(frame + MLX90333_FRAME_ERRORS, sensor->parameters.field_mode ? words[2] : errors);
+    for (unsigned i = MLX90333_FRAME_ALPHA; i < end; i++)
         sum = (uint8_t)(sum + frame[i]);
     frame[MLX90333_FRAME_SUM] = sum;
+}
+
+/* The angle is latched at the last clock before the first data byte. */
+static void latch(struct mlx90333 *sensor, uint64_t now_ns)
+{
+    uint16_t words[3], errors;
+    sensor->age_ns = mlx90333_sense_latch(&sensor->sense, now_ns, words, &errors);
+    if (sensor->fault == SIM_SENSOR_ERROR_BITS)
+        errors |= sensor->argument;
+    if (sensor->parameters.mlx90316)
+        make_90316_frame(sensor, words[0], errors);
+    else
+        make_frame(sensor, words, errors);
+    if (errors && sensor->parameters.resets_after_error)
+        sensor->reset_due = true; /* once this frame has been sent */
 }
 
 static void check_byte_start(struct mlx90333 *sensor, uint64_t now_ns)
@@ -120,32 +160,40 @@ static void clock_rose(struct mlx90333 *sensor, uint64_t now_ns)
     sensor->rise_ns = now_ns;
 }
 
-static void end_byte(struct mlx90333 *sensor)
+static void end_byte(struct mlx90333 *sensor, uint64_t now_ns)
 {
+    const uint8_t wanted = sensor->parameters.mlx90316 ? MLX90316_MASTER_START : MLX90333_MASTER_BYTE;
     if (sensor->byte == MLX90333_FRAME_START) {
-        sensor->answering = sensor->received == MLX90333_MASTER_BYTE;
-        latch(sensor);
+        sensor->answering = sensor->received == wanted;
+        latch(sensor, now_ns);
     }
-    sensor->byte = (uint8_t)((sensor->byte + 1u) % MLX90333_FRAME_BYTES);
+    sensor->byte = (uint8_t)((sensor->byte + 1u) % sensor->frame_bytes);
     sensor->bit = 0;
+    if (sensor->byte == 0 && sensor->reset_due) { /* soft reset: start-up time again, then a resynchronisation */
+        start(sensor, now_ns);
+        sensor->restarting = true;
+    }
 }
 
 /* A falling edge samples the line. */
 static void clock_fell(struct mlx90333 *sensor, uint64_t now_ns, bool master)
 {
-    require(sensor, master, MLX90333_ZERO_SENT);
+    const bool may_be_zero = sensor->parameters.mlx90316 && sensor->byte == 0;
+    require(sensor, master || may_be_zero, MLX90333_ZERO_SENT);
     sensor->received = (uint8_t)(sensor->received << 1 | (master && sensor->level));
     sensor->fall_ns = now_ns;
 }
 
 /* The line as the master sees it, `position` bits into the frame. */
-static bool line(const struct mlx90333 *sensor, unsigned position, bool master)
+static bool line(struct mlx90333 *sensor, unsigned position, bool master)
 {
     switch (sensor->fault) {
     case SIM_SENSOR_DEAD:
         return master;
     case SIM_SENSOR_STUCK_LOW:
         return false;
+    case SIM_SENSOR_FLOATING:
+        return draw(sensor) & 1u;
     case SIM_SENSOR_FLIP_BIT:
         return (master && sensor->level) != (position == sensor->argument);
     default:
@@ -153,18 +201,35 @@ static bool line(const struct mlx90333 *sensor, unsigned position, bool master)
     }
 }
 
+/* True for both edges of the clock that the fault keeps from the sensor. */
+static bool lost(struct mlx90333 *sensor, unsigned position, bool level)
+{
+    if (level)
+        sensor->dropping = sensor->fault == SIM_SENSOR_LOST_CLOCK && position == sensor->argument;
+    if (!sensor->dropping)
+        return false;
+    if (!level) {
+        sensor->dropping = false;
+        sensor->fault = SIM_SENSOR_GOOD; /* once */
+    }
+    return true;
+}
+
 bool mlx90333_clock(struct mlx90333 *sensor, uint64_t now_ns, bool level, bool master)
 {
     const unsigned position = sensor->byte * 8u + sensor->bit;
-    require(sensor, sensor->select || now_ns >= sensor->awake_ns, MLX90333_CLOCK_IN_STARTUP);
+    const bool told = sensor->select || sensor->restarting; /* nobody told the master of a soft reset */
+    require(sensor, told || now_ns >= sensor->awake_ns, MLX90333_CLOCK_IN_STARTUP);
     if (sensor->select || !sensor->enabled || now_ns < sensor->awake_ns)
-        return sensor->fault == SIM_SENSOR_STUCK_LOW ? false : master;
+        return line(sensor, 64u, master);
+    if (lost(sensor, position, level))
+        return line(sensor, position, master);
     if (level) {
         clock_rose(sensor, now_ns);
     } else {
         clock_fell(sensor, now_ns, master);
         if (++sensor->bit == 8u)
-            end_byte(sensor);
+            end_byte(sensor, now_ns);
     }
     return line(sensor, position, master);
 }

@@ -3,16 +3,17 @@
  * The line is low if either side pulls it low, so master and sensor are a wired AND. The sensor ignores everything
  * until its start-up time has passed, and keeps its count of bits and bytes for ever unless /SS, high long enough,
  * resynchronises it. It also watches its master: every breach of the data sheet is counted, and tests demand zero.
- *
- * Not modelled yet: the asynchronous conversion and its filter (the field is taken at the latch), and the soft reset
- * that follows a frame with error bits. */
+ * What a part may be like, the older MLX90316 included, is in mlx90333_parameters.h; what it measures in
+ * mlx90333_sense.h. */
 #ifndef MLX90333_MODEL_H
 #define MLX90333_MODEL_H
 
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "mlx90333_datasheet.h" // MLX90333_FRAME_BYTES and times: firmware/dspic/core
+#include "mlx90316_datasheet.h" // MLX90316_FRAME_BYTES: firmware/dspic/core
+#include "mlx90333_datasheet.h" // times: firmware/dspic/core
+#include "mlx90333_sense.h"     // struct mlx90333_sense, struct mlx90333_field
 #include "sim_counts.h"         // sim_counts
 
 enum sim_sensor_fault {
@@ -21,6 +22,9 @@ enum sim_sensor_fault {
     SIM_SENSOR_DEAD,       /* all ones: nothing drives the line */
     SIM_SENSOR_STUCK_LOW,  /* all zeros */
     SIM_SENSOR_ERROR_BITS, /* a sound frame whose error word is the argument */
+    SIM_SENSOR_FLOATING,   /* the line follows nobody: random levels */
+    SIM_SENSOR_FROZEN,     /* sound frames, always the same angles */
+    SIM_SENSOR_LOST_CLOCK, /* one clock edge pair does not reach it; argument: which bit of the frame, 0 to 63 */
 };
 
 /* What a master may do wrong. */
@@ -38,10 +42,12 @@ enum mlx90333_violation {
 /* Kept by the caller; the fields are the model's own. Times are nanoseconds of virtual time and never go back. */
 struct mlx90333 {
     uint32_t t1, t2, t4, t5, t6, t7; /* stretched by this part's oscillator */
-    uint64_t awake_ns;               /* when the start-up ends */
-    uint64_t select_ns;              /* last edge of /SS */
-    uint64_t rise_ns, fall_ns;       /* last clock edges */
-    double alpha_deg, beta_deg;
+    struct mlx90333_parameters parameters;
+    struct mlx90333_sense sense;
+    uint64_t age_ns;           /* of the conversion in the frame last latched */
+    uint64_t awake_ns;         /* when the start-up ends */
+    uint64_t select_ns;        /* last edge of /SS */
+    uint64_t rise_ns, fall_ns; /* last clock edges */
     uint64_t random;
     uint32_t violations[MLX90333_VIOLATIONS];
     uint16_t argument; /* of the fault */
@@ -54,15 +60,18 @@ struct mlx90333 {
     uint8_t byte, bit; /* position in the frame */
     uint8_t sending;   /* bits still to send of this byte, next one on top */
     uint8_t received;  /* of the master's byte */
-    uint8_t frame[MLX90333_FRAME_BYTES];
+    bool reset_due;    /* after the present frame, which has errors */
+    bool restarting;   /* has had such a reset */
+    uint8_t frame_bytes;
+    bool dropping; /* a clock whose rising edge was lost loses its falling edge too */
+    uint8_t frame[MLX90316_FRAME_BYTES];
 };
 
-/* Supply on at `now_ns` with /SS high. `slow_permille`: this part's times in thousandths of the nominal (1000; a part
- * with a 10 % slow oscillator has 1100). `seed` decides the resynchronisations that the data sheet leaves undefined. */
-void mlx90333_power_on(struct mlx90333 *sensor, uint64_t now_ns, uint32_t slow_permille, uint64_t seed);
+/* Supply on at `now_ns` with /SS high. */
+void mlx90333_power_on(struct mlx90333 *sensor, uint64_t now_ns, const struct mlx90333_parameters *parameters);
 
-/* The field from now on, degrees from rest. */
-void mlx90333_set_field(struct mlx90333 *sensor, double alpha_deg, double beta_deg);
+/* The field from `field->since_ns` on. */
+void mlx90333_set_field(struct mlx90333 *sensor, const struct mlx90333_field *field);
 
 /* The fault from now on, with its argument. */
 void mlx90333_set_fault(struct mlx90333 *sensor, enum sim_sensor_fault fault, unsigned argument);

@@ -5,6 +5,7 @@
 #include <stdint.h>
 
 #include <cmocka.h>
+#include <math.h>
 
 #include "mlx90333_model.h"
 #include "whisker_protocol.h"
@@ -16,6 +17,21 @@ struct bench {
     uint32_t period, start_gap, gap, select_wait, release_wait;
 };
 
+static void power_on(struct bench *bench, uint16_t slow_permille, uint64_t seed)
+{
+    struct mlx90333_parameters parameters;
+    mlx90333_parameters_default(&parameters);
+    parameters.slow_permille = slow_permille;
+    parameters.seed = seed;
+    mlx90333_power_on(&bench->sensor, 0, &parameters);
+}
+
+static void set_field(struct bench *bench, double alpha_deg, double beta_deg)
+{
+    const struct mlx90333_field field = {.since_ns = bench->now, .alpha_deg = alpha_deg, .beta_deg = beta_deg};
+    mlx90333_set_field(&bench->sensor, &field);
+}
+
 static void wake(struct bench *bench, uint64_t seed)
 {
     const struct bench legal = {.period = MLX90333_T1_NS,
@@ -24,7 +40,7 @@ static void wake(struct bench *bench, uint64_t seed)
                                 .select_wait = MLX90333_T6_NS,
                                 .release_wait = MLX90333_T4_NS};
     *bench = legal;
-    mlx90333_power_on(&bench->sensor, 0, 1000, seed);
+    power_on(bench, 1000, seed);
     bench->now = MLX90333_STARTUP_NS + MLX90333_T5_NS;
     mlx90333_select(&bench->sensor, bench->now, false);
     bench->now += bench->select_wait;
@@ -115,7 +131,7 @@ static void a_legal_master_reads_frame_after_frame(void **state)
     uint8_t frame[8];
     wake(&bench, 1);
     for (int i = 0; i < 50; i++) {
-        mlx90333_set_field(&bench.sensor, i, -2.0 * i);
+        set_field(&bench, i, -2.0 * i);
         read_frame(&bench, 0xFF, frame);
         assert_frame(frame, i, -2.0 * i, 0);
     }
@@ -128,10 +144,10 @@ static void the_angle_is_latched_at_the_end_of_the_start_byte(void **state)
     struct bench bench;
     uint8_t frame[8];
     wake(&bench, 1);
-    mlx90333_set_field(&bench.sensor, 5.0, 6.0);
+    set_field(&bench, 5.0, 6.0);
     clock_bits(&bench, 0xFF, 8);
     bench.now += bench.start_gap;
-    mlx90333_set_field(&bench.sensor, -70.0, -80.0);
+    set_field(&bench, -70.0, -80.0);
     frame[0] = 0xFF;
     for (unsigned i = 1; i < 8; i++, bench.now += bench.gap)
         frame[i] = clock_bits(&bench, 0xFF, 8);
@@ -144,7 +160,7 @@ static void nothing_answers_before_start_up_and_resynchronisation(void **state)
     struct bench bench;
     uint8_t frame[8];
     wake(&bench, 1);
-    mlx90333_power_on(&bench.sensor, 0, 1000, 1);
+    power_on(&bench, 1000, 1);
     bench.now = MLX90333_STARTUP_NS / 2;
     mlx90333_select(&bench.sensor, bench.now, false);
     read_frame(&bench, 0xFF, frame);
@@ -206,7 +222,7 @@ static void what_select_did_before_the_sensor_was_awake_does_not_count(void **st
     (void)state;
     for (uint64_t seed = 0; seed < 100; seed++) {
         struct bench bench;
-        mlx90333_power_on(&bench.sensor, 0, 1000, seed);
+        power_on(&bench, 1000, seed);
         mlx90333_select(&bench.sensor, MLX90333_STARTUP_NS, false);
         assert_false(bench.sensor.enabled);
     }
@@ -217,7 +233,7 @@ static void a_zero_from_the_master_pulls_the_line_low(void **state)
     (void)state;
     struct bench bench;
     wake(&bench, 1);
-    mlx90333_set_field(&bench.sensor, 89.0, 89.0);
+    set_field(&bench, 89.0, 89.0);
     clock_bits(&bench, 0xFF, 8);
     bench.now += bench.start_gap;
     const uint8_t alpha_low = (uint8_t)(sim_counts(89.0) & 0xFF);
@@ -245,7 +261,7 @@ static void faults_damage_what_they_say(void **state)
     struct bench bench;
     uint8_t good[8], frame[8];
     wake(&bench, 1);
-    mlx90333_set_field(&bench.sensor, 12.0, 34.0);
+    set_field(&bench, 12.0, 34.0);
     read_frame(&bench, 0xFF, good);
     for (unsigned bit = 0; bit < 64; bit++) {
         mlx90333_set_fault(&bench.sensor, SIM_SENSOR_FLIP_BIT, bit);
@@ -308,7 +324,7 @@ static void a_slow_part_needs_longer_times(void **state)
     struct bench bench;
     uint8_t frame[8];
     wake(&bench, 1);
-    mlx90333_power_on(&bench.sensor, 0, 1100, 1);
+    power_on(&bench, 1100, 1);
     bench.now = 2 * MLX90333_STARTUP_NS;
     mlx90333_select(&bench.sensor, bench.now, false);
     bench.now += bench.select_wait;
@@ -317,6 +333,238 @@ static void a_slow_part_needs_longer_times(void **state)
     assert_int_equal(bench.sensor.violations[MLX90333_START_GAP], 1);
     assert_int_equal(bench.sensor.violations[MLX90333_BYTE_GAP], 6);
     assert_int_equal(bench.sensor.violations[MLX90333_CLOCK_PERIOD], 8 * 7);
+}
+
+/* Reads a frame latched at the end of its start byte and returns alpha's word. */
+static unsigned alpha_of(struct bench *bench)
+{
+    uint8_t frame[8];
+    read_frame(bench, 0xFF, frame);
+    return (unsigned)frame[1] | (unsigned)frame[2] << 8;
+}
+
+static void wake_as(struct bench *bench, const struct mlx90333_parameters *parameters)
+{
+    wake(bench, parameters->seed);
+    mlx90333_power_on(&bench->sensor, 0, parameters);
+    mlx90333_select(&bench->sensor, bench->now - bench->select_wait, false);
+}
+
+static struct mlx90333_parameters standard(void)
+{
+    struct mlx90333_parameters parameters;
+    mlx90333_parameters_default(&parameters);
+    return parameters;
+}
+
+/* The field rises steadily; what a frame shows tells when it was converted. */
+static void readings_are_up_to_one_conversion_old(void **state)
+{
+    (void)state;
+    struct mlx90333_parameters p = standard();
+    p.conversion_ns = 350000;
+    p.step_counts = 1;
+    p.seed = 5;
+    struct bench bench;
+    wake_as(&bench, &p);
+    uint64_t least = UINT64_MAX, most = 0;
+    for (int i = 0; i < 200; i++) {
+        const struct mlx90333_field field = {.since_ns = bench.now, .alpha_deg_s = 1000.0};
+        const uint64_t since = bench.now;
+        mlx90333_set_field(&bench.sensor, &field);
+        const uint64_t latch = bench.now + 7u * bench.period + bench.period / 2;
+        const unsigned alpha = alpha_of(&bench);
+        const uint64_t age = bench.sensor.age_ns;
+        least = age < least ? age : least;
+        most = age > most ? age : most;
+        if (latch - age > since) /* converted since the ramp began */
+            assert_true(alpha - mlx90333_counts(&p, (double)(latch - age - since) * 1e-6) + 2u < 4u);
+        bench.now += 123456;
+    }
+    assert_true(least < 20000 && most > 330000 && most < 350000);
+}
+
+static void filters_average_the_newest_conversions(void **state)
+{
+    (void)state;
+    const double reduction_db[] = {0.0, 2.9, 4.0, 4.7, 5.6, 6.2}; /* the data sheet's column */
+    double plain = 0.0;
+    for (uint8_t filter = 0; filter <= 5; filter++) {
+        struct mlx90333_parameters p = standard();
+        p.conversion_ns = 60000;
+        p.step_counts = 1;
+        p.noise_deg = 1.0;
+        p.filter = filter;
+        struct bench bench;
+        wake_as(&bench, &p);
+        double sum = 0.0, squares = 0.0;
+        for (int i = 0; i < 4000; i++) {
+            const double a = alpha_of(&bench);
+            sum += a;
+            squares += a * a;
+            bench.now += 700000; /* more than the taps reach */
+        }
+        const double deviation = sqrt(squares / 4000 - sum / 4000 * (sum / 4000));
+        plain = filter == 0 ? deviation : plain;
+        assert_true(fabs(20.0 * log10(plain / deviation) - reduction_db[filter]) < 0.45);
+    }
+}
+
+static void a_field_vector_becomes_the_documented_angles(void **state)
+{
+    (void)state;
+    const struct mlx90333_parameters p = standard();
+    double angles[2];
+    mlx90333_angles(&p, (double[]){0.0, 0.0, 40.0}, angles);
+    assert_true(fabs(angles[0]) < 1e-9 && fabs(angles[1]) < 1e-9);
+    mlx90333_angles(&p, (double[]){40.0, 0.0, 0.0}, angles);
+    assert_true(fabs(angles[0] + 90.0) < 1e-9); /* 0 degrees along +X, and rest is 90 */
+    mlx90333_angles(&p, (double[]){14.0, 0.0, 10.0}, angles);
+    assert_true(fabs(angles[0] + 45.0) < 1e-9); /* k 1.4 */
+}
+
+static void a_weak_or_strong_field_sets_its_error_bit(void **state)
+{
+    (void)state;
+    const double strength[] = {10.0, 40.0, 90.0};
+    const unsigned expected[] = {0x0080, 0, 0x0100};
+    for (unsigned i = 0; i < 3; i++) {
+        const struct mlx90333_parameters p = standard();
+        struct bench bench;
+        uint8_t frame[8];
+        wake_as(&bench, &p);
+        const struct mlx90333_field field = {
+            .since_ns = bench.now, .vector_mt = {0, 0, strength[i]}, .is_vector = true};
+        mlx90333_set_field(&bench.sensor, &field);
+        read_frame(&bench, 0xFF, frame);
+        assert_int_equal(frame[5] | frame[6] << 8, expected[i]);
+    }
+}
+
+static void field_mode_sends_the_vector(void **state)
+{
+    (void)state;
+    struct mlx90333_parameters p = standard();
+    p.field_mode = true;
+    struct bench bench;
+    uint8_t frame[8];
+    wake_as(&bench, &p);
+    const struct mlx90333_field field = {.since_ns = bench.now, .vector_mt = {10, -20, 30}, .is_vector = true};
+    mlx90333_set_field(&bench.sensor, &field);
+    read_frame(&bench, 0xFF, frame);
+    assert_int_equal((int16_t)(frame[3] | frame[4] << 8) / (int16_t)(frame[1] | frame[2] << 8), -2);
+    assert_int_equal((int16_t)(frame[5] | frame[6] << 8) / (int16_t)(frame[1] | frame[2] << 8), 3);
+}
+
+static void the_sum_may_leave_the_error_word_out(void **state)
+{
+    (void)state;
+    struct mlx90333_parameters p = standard();
+    p.sum_without_errors = true;
+    struct bench bench;
+    uint8_t frame[8];
+    wake_as(&bench, &p);
+    mlx90333_set_fault(&bench.sensor, SIM_SENSOR_ERROR_BITS, 0x0108);
+    read_frame(&bench, 0xFF, frame);
+    assert_int_equal(frame[7], (uint8_t)(frame[1] + frame[2] + frame[3] + frame[4]));
+}
+
+static void a_frame_with_errors_may_end_in_a_soft_reset(void **state)
+{
+    (void)state;
+    struct mlx90333_parameters p = standard();
+    p.resets_after_error = true;
+    struct bench bench;
+    uint8_t frame[8];
+    wake_as(&bench, &p);
+    mlx90333_set_fault(&bench.sensor, SIM_SENSOR_ERROR_BITS, 0x0004);
+    read_frame(&bench, 0xFF, frame);
+    assert_int_equal(frame[5], 4);
+    mlx90333_set_fault(&bench.sensor, SIM_SENSOR_GOOD, 0);
+    read_frame(&bench, 0xFF, frame);
+    assert_true(is_all_ones(frame));
+    bench.now += p.startup_ns;
+    read_frame(&bench, 0xFF, frame);
+    assert_true(is_all_ones(frame)); /* awake, but not resynchronised */
+    reselect(&bench, MLX90333_T5_NS);
+    read_frame(&bench, 0xFF, frame);
+    assert_frame(frame, 0.0, 0.0, 0);
+    assert_int_equal(mlx90333_violations(&bench.sensor), 0);
+}
+
+static void slow_mode_stretches_gaps_threefold_and_resynchronisation_fivefold(void **state)
+{
+    (void)state;
+    struct mlx90333_parameters p = standard();
+    p.slow_mode = true;
+    p.slow_permille = 1100;
+    struct bench bench;
+    wake_as(&bench, &p);
+    assert_int_equal(bench.sensor.t1, 6900 * 11 / 10);
+    assert_int_equal(bench.sensor.t2, 37500 * 11 / 10);
+    assert_int_equal(bench.sensor.t7, 45000 * 11 / 10);
+    assert_int_equal(bench.sensor.t5, 1500000 * 11 / 10);
+}
+
+static void clamps_hold_the_output(void **state)
+{
+    (void)state;
+    struct mlx90333_parameters p = standard();
+    p.clamp_low = 0x1000;
+    p.clamp_high = 0xE000;
+    assert_int_equal(mlx90333_counts(&p, -90.0), 0x1000);
+    assert_int_equal(mlx90333_counts(&p, 90.0), 0xE000);
+    assert_int_equal(mlx90333_counts(&p, 0.0), 0x8000);
+    assert_int_equal(mlx90333_counts(&p, (double)NAN), 0x1000);
+}
+
+static void the_older_sensor_wants_its_key_and_sends_data_twice(void **state)
+{
+    (void)state;
+    struct mlx90333_parameters p = standard();
+    p.mlx90316 = true;
+    struct bench bench;
+    uint8_t frame[10];
+    for (unsigned key = 0; key < 2; key++) {
+        wake_as(&bench, &p);
+        for (unsigned i = 0; i < 10; i++) {
+            frame[i] = clock_bits(&bench, i == 0 && key ? 0xAA : 0xFF, 8);
+            bench.now += i == 0 ? bench.start_gap : bench.gap;
+        }
+        assert_int_equal(frame[2] << 8 | frame[3], key ? 0x8001 : 0xFFFF);
+        assert_int_equal(frame[4] << 8 | frame[5], key ? 0x7FFE : 0xFFFF);
+        assert_int_equal(frame[0], key ? 0xAA : 0xFF); /* the wired AND shows the master its own byte */
+        assert_int_equal(mlx90333_violations(&bench.sensor), 0);
+    }
+}
+
+static void a_lost_clock_is_lost_once(void **state)
+{
+    (void)state;
+    struct bench bench;
+    uint8_t frame[8];
+    wake(&bench, 1);
+    set_field(&bench, 30.0, -20.0);
+    mlx90333_set_fault(&bench.sensor, SIM_SENSOR_LOST_CLOCK, 20);
+    read_frame(&bench, 0xFF, frame);
+    assert_int_equal(bench.sensor.byte, 7);
+    assert_int_equal(bench.sensor.bit, 7);
+    reselect(&bench, MLX90333_T5_NS);
+    read_frame(&bench, 0xFF, frame);
+    assert_frame(frame, 30.0, -20.0, 0);
+}
+
+static void a_frozen_sensor_sends_sound_frames_of_the_past(void **state)
+{
+    (void)state;
+    struct bench bench;
+    uint8_t frame[8];
+    wake(&bench, 1);
+    set_field(&bench, 30.0, -20.0);
+    mlx90333_set_fault(&bench.sensor, SIM_SENSOR_FROZEN, 0);
+    set_field(&bench, 0.0, 0.0);
+    read_frame(&bench, 0xFF, frame);
+    assert_frame(frame, 30.0, -20.0, 0);
 }
 
 int main(void)
@@ -335,6 +583,18 @@ int main(void)
         cmocka_unit_test(faults_damage_what_they_say),
         cmocka_unit_test(each_time_cut_short_is_counted_as_itself),
         cmocka_unit_test(a_slow_part_needs_longer_times),
+        cmocka_unit_test(readings_are_up_to_one_conversion_old),
+        cmocka_unit_test(filters_average_the_newest_conversions),
+        cmocka_unit_test(a_field_vector_becomes_the_documented_angles),
+        cmocka_unit_test(a_weak_or_strong_field_sets_its_error_bit),
+        cmocka_unit_test(field_mode_sends_the_vector),
+        cmocka_unit_test(the_sum_may_leave_the_error_word_out),
+        cmocka_unit_test(a_frame_with_errors_may_end_in_a_soft_reset),
+        cmocka_unit_test(slow_mode_stretches_gaps_threefold_and_resynchronisation_fivefold),
+        cmocka_unit_test(clamps_hold_the_output),
+        cmocka_unit_test(the_older_sensor_wants_its_key_and_sends_data_twice),
+        cmocka_unit_test(a_lost_clock_is_lost_once),
+        cmocka_unit_test(a_frozen_sensor_sends_sound_frames_of_the_past),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

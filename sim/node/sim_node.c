@@ -103,15 +103,19 @@ void sim_node_free(sim_node *node)
     free(node);
 }
 
-static uint32_t oscillator_permille(uint64_t seed)
+static uint16_t oscillator_permille(uint64_t seed)
 {
     const uint64_t mixed = (seed * UINT64_C(0x9E3779B97F4A7C15)) >> 32;
-    return 1000u - OSCILLATOR_SPREAD_PERMILLE + (uint32_t)(mixed % (2u * OSCILLATOR_SPREAD_PERMILLE + 1u));
+    return (uint16_t)(1000u - OSCILLATOR_SPREAD_PERMILLE + mixed % (2u * OSCILLATOR_SPREAD_PERMILLE + 1u));
 }
 
 void sim_node_power_on(sim_node *node)
 {
-    mlx90333_power_on(&node->sensor, 0, oscillator_permille(node->seed), node->seed);
+    struct mlx90333_parameters parameters;
+    mlx90333_parameters_default(&parameters);
+    parameters.slow_permille = oscillator_permille(node->seed);
+    parameters.seed = node->seed;
+    mlx90333_power_on(&node->sensor, 0, &parameters);
     dspic_wire(node->chip, PIN_LINK_SELECT, true);
     dspic_power_on(node->chip, 0);
     node->powered = true;
@@ -124,7 +128,9 @@ void sim_node_sync(sim_node *node, struct sim_field field)
 {
     if (!node->powered)
         return;
-    mlx90333_set_field(&node->sensor, field.alpha_deg, field.beta_deg);
+    mlx90333_set_field(&node->sensor, &(struct mlx90333_field){.since_ns = node->tick_fs / DSPIC_FS_PER_NS,
+                                                               .alpha_deg = field.alpha_deg,
+                                                               .beta_deg = field.beta_deg});
     mlx90333_set_fault(&node->sensor, node->fault, node->argument);
     node->fault = SIM_SENSOR_GOOD;
     dspic_input(node->chip, PIN_SYNC, true, node->tick_fs);

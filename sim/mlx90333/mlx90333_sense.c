@@ -1,0 +1,140 @@
+#include "mlx90333_sense.h"
+
+#include <math.h>
+#include <string.h>
+
+#define DEG (45.0 / atan(1.0))
+#define ERROR_FIELD_LOW 0x0080u  /* F_FIELDTOOLOW */
+#define ERROR_FIELD_HIGH 0x0100u /* F_FIELDTOOHIGH */
+#define FULL_SCALE_MT 100.0      /* of a word in field mode: not documented, so any scale will do */
+
+/* Weights of filters 0 to 5 over the newest conversions (C). */
+static const uint8_t TAPS[6][MLX90333_FILTER_TAPS] = {{1},          {1, 1},       {1, 2, 1},
+                                                      {1, 3, 3, 1}, {1, 1, 1, 1}, {1, 2, 2, 2, 1}};
+
+void mlx90333_parameters_default(struct mlx90333_parameters *parameters)
+{
+    *parameters = (struct mlx90333_parameters){.slow_permille = 1000,
+                                               .startup_ns = 16000000,
+                                               .clamp_high = 0xFFFF,
+                                               .step_counts = 16,
+                                               .span_deg = 180.0,
+                                               .k_alpha = 1.4,
+                                               .k_beta = 1.4,
+                                               .k_t = 1.0,
+                                               .field_low_mt = 20.0,
+                                               .field_high_mt = 70.0};
+}
+
+/* Knuth's MMIX generator, top bits. */
+static double uniform(struct mlx90333_sense *sense)
+{
+    sense->random = sense->random * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
+    return ((double)(sense->random >> 11) + 0.5) / 9007199254740992.0;
+}
+
+static double normal(struct mlx90333_sense *sense)
+{
+    const double r = sqrt(-2.0 * log(uniform(sense)));
+    return r * cos(2.0 * 4.0 * atan(1.0) * uniform(sense));
+}
+
+void mlx90333_sense_start(struct mlx90333_sense *sense, const struct mlx90333_parameters *parameters, uint64_t now_ns)
+{
+    const struct mlx90333_field field = sense->field;
+    memset(sense, 0, sizeof *sense);
+    sense->parameters = parameters;
+    sense->field = field;
+    sense->random = parameters->seed;
+    sense->period_ns = (uint64_t)parameters->conversion_ns * parameters->slow_permille / 1000u;
+    sense->next_ns = now_ns + (uint64_t)(uniform(sense) * (double)sense->period_ns);
+}
+
+void mlx90333_angles(const struct mlx90333_parameters *p, const double b[3], double angles_deg[2])
+{
+    angles_deg[0] = atan2(hypot(p->k_alpha * b[2], p->k_t * b[1]), b[0]) * DEG - 90.0;
+    angles_deg[1] = atan2(hypot(p->k_beta * b[2], p->k_t * b[0]), b[1]) * DEG - 90.0;
+}
+
+static void angles_at(const struct mlx90333_sense *sense, uint64_t at_ns, double angles[2])
+{
+    const struct mlx90333_field *f = &sense->field;
+    const double since_s = ((double)at_ns - (double)f->since_ns) * 1e-9;
+    if (f->is_vector) {
+        mlx90333_angles(sense->parameters, f->vector_mt, angles);
+        return;
+    }
+    angles[0] = f->alpha_deg + f->alpha_deg_s * since_s;
+    angles[1] = f->beta_deg + f->beta_deg_s * since_s;
+}
+
+static uint16_t errors_of(const struct mlx90333_sense *sense)
+{
+    const double *b = sense->field.vector_mt;
+    const double norm = sqrt(b[0] * b[0] + b[1] * b[1] + b[2] * b[2]);
+    if (!sense->field.is_vector)
+        return 0;
+    return (uint16_t)((norm < sense->parameters->field_low_mt ? ERROR_FIELD_LOW : 0u) |
+                      (norm > sense->parameters->field_high_mt ? ERROR_FIELD_HIGH : 0u));
+}
+
+static void convert(struct mlx90333_sense *sense, uint64_t at_ns)
+{
+    memmove(sense->taps[1], sense->taps[0], sizeof sense->taps - sizeof sense->taps[0]);
+    angles_at(sense, at_ns, sense->taps[0]);
+    for (int i = 0; i < 2 && sense->parameters->noise_deg > 0.0; i++)
+        sense->taps[0][i] += sense->parameters->noise_deg * normal(sense);
+    sense->errors = errors_of(sense);
+    sense->last_ns = at_ns;
+}
+
+static void convert_until(struct mlx90333_sense *sense, uint64_t now_ns)
+{
+    for (; sense->period_ns > 0 && sense->next_ns <= now_ns; sense->next_ns += sense->period_ns)
+        convert(sense, sense->next_ns);
+}
+
+void mlx90333_sense_field(struct mlx90333_sense *sense, const struct mlx90333_field *field)
+{
+    if (field->since_ns > 0)
+        convert_until(sense, field->since_ns - 1u);
+    sense->field = *field;
+}
+
+uint16_t mlx90333_counts(const struct mlx90333_parameters *p, double angle_deg)
+{
+    const double steps = 65536.0 / p->step_counts, step = steps / 2.0 + angle_deg * (steps / p->span_deg);
+    double whole = floor(fmin(fmax(step, 0.0), steps - 1.0) + 0.5);
+    whole = fmin(whole, steps - 1.0) * p->step_counts;
+    return (uint16_t)(isfinite(angle_deg) ? fmin(fmax(whole, p->clamp_low), p->clamp_high) : p->clamp_low);
+}
+
+static double filtered(const struct mlx90333_sense *sense, int axis)
+{
+    const uint8_t *weights = TAPS[sense->parameters->filter];
+    double sum = 0.0, weight = 0.0;
+    for (int i = 0; i < MLX90333_FILTER_TAPS; i++) {
+        sum += weights[i] * sense->taps[i][axis];
+        weight += weights[i];
+    }
+    return sum / weight;
+}
+
+static uint16_t field_word(double mt)
+{
+    return (uint16_t)(int16_t)fmin(fmax(mt / FULL_SCALE_MT * 32767.0, -32767.0), 32767.0);
+}
+
+uint64_t mlx90333_sense_latch(struct mlx90333_sense *sense, uint64_t now_ns, uint16_t words[3], uint16_t *errors)
+{
+    if (sense->period_ns == 0)
+        convert(sense, now_ns);
+    else
+        convert_until(sense, now_ns);
+    *errors = sense->errors;
+    for (int i = 0; i < 3; i++)
+        words[i] = sense->parameters->field_mode ? field_word(sense->field.vector_mt[i])
+                   : i < 2                       ? mlx90333_counts(sense->parameters, filtered(sense, i))
+                                                 : 0;
+    return now_ns - sense->last_ns;
+}
