@@ -59,11 +59,11 @@ EVERYWHERE void weigh_lanes(const struct nav_row_weigh *w, int i, float *out, st
     s->peak = (lanes)(((masks)v & larger) | ((masks)s->peak & ~larger));
 }
 
-EVERYWHERE void add_lanes(float sum[NAV_LANES], lanes v)
+EVERYWHERE void add_lanes(float sum[NAV_LANES], const lanes *v, float weight)
 {
     lanes s;
     memcpy(&s, sum, sizeof s);
-    s += v;
+    s += *v * weight;
     memcpy(sum, &s, sizeof s);
 }
 
@@ -72,20 +72,15 @@ EVERYWHERE void weigh_row(const struct nav_row_weigh *args, struct nav_row_sums 
     struct nav_row_weigh w = *args;
     struct wide_sums s = {{0.0f}, {0.0f}, {0.0f}, {0.0f}};
     memcpy(&s.peak, sums->peak, sizeof s.peak);
-    int i = w.begin;
-    for (; i + NAV_LANES <= w.end; i += NAV_LANES)
+    /* Likelihoods beyond the end are 0, and cells there are empty or of a row to be written later. */
+    for (int i = w.begin; i < w.end; i += NAV_LANES)
         weigh_lanes(&w, i, w.out + i, &s);
-    if (i < w.end) { /* likelihoods beyond the end are 0 */
-        float rest[NAV_LANES];
-        weigh_lanes(&w, i, rest, &s);
-        memcpy(w.out + i, rest, (size_t)(w.end - i) * sizeof *rest);
-    }
-    add_lanes(sums->moment[0], s.mass);
-    add_lanes(sums->moment[1], s.x);
-    add_lanes(sums->moment[2], s.mass * w.y);
-    add_lanes(sums->moment[3], s.xx);
-    add_lanes(sums->moment[4], s.x * w.y);
-    add_lanes(sums->moment[5], s.mass * (w.y * w.y));
+    add_lanes(sums->moment[0], &s.mass, 1.0f);
+    add_lanes(sums->moment[1], &s.x, 1.0f);
+    add_lanes(sums->moment[2], &s.mass, w.y);
+    add_lanes(sums->moment[3], &s.xx, 1.0f);
+    add_lanes(sums->moment[4], &s.x, w.y);
+    add_lanes(sums->moment[5], &s.mass, w.y * w.y);
     memcpy(sums->peak, &s.peak, sizeof s.peak);
 }
 

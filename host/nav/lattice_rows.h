@@ -32,7 +32,7 @@ struct nav_rows {
      */
     void (*mix)(const float *own, float side, const float *const from[4], const float w[8], int begin, int end,
                 float *out);
-    /* Writes a row and adds to its sums. */
+    /* Writes a row and adds to its sums. `like` is 0 in NAV_LANES places from `end`; so many cells there become 0. */
     void (*weigh)(const struct nav_row_weigh *, struct nav_row_sums *);
 };
 

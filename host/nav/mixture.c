@@ -46,11 +46,11 @@ void nav_mixture_begin(struct nav_mixture *m, const struct nav_expected *e)
     m->present++;
 }
 
-static float work_out(const struct nav_mixture *m, uint32_t mix)
+static float work_out(const struct nav_mixture *m, const struct nav_mix *mix)
 {
     float sum = 0.0f;
-    for (uint32_t i = m->first[mix]; i < m->first[mix + 1]; i++)
-        sum += m->share[i] * m->part_value[m->part[i]];
+    for (uint32_t i = mix->first; i < mix->end; i++)
+        sum += m->part[i].share * m->part_value[m->part[i].signature];
     return sum;
 }
 
@@ -58,12 +58,12 @@ void nav_mixture_work_out(struct nav_mixture *m, const struct nav_layer *layer)
 {
     size_t n = layer_of(m, layer) * (size_t)m->bands;
     for (uint32_t i = m->listed[n]; i < m->listed[n + (size_t)m->bands]; i++) {
-        uint32_t mix = m->list[i];
-        if (m->row[mix] != m->present) {
-            m->row[mix] = m->present;
-            m->value[mix] = work_out(m, mix);
+        struct nav_mix *mix = &m->mix[m->list[i]];
+        if (mix->row != m->present) {
+            mix->row = m->present;
+            mix->value = work_out(m, mix);
         }
-        m->listed_value[i] = m->value[mix];
+        m->listed_value[i] = mix->value;
     }
 }
 
@@ -83,14 +83,11 @@ void nav_mixture_free(struct nav_mixture *m)
     if (!m)
         return;
     free(m->cell);
-    free(m->first);
+    free(m->mix);
     free(m->part);
-    free(m->share);
     free(m->listed);
     free(m->list);
     free(m->listed_value);
-    free(m->value);
-    free(m->row);
     free(m->part_value);
     free(m->begin);
     free(m->end);
@@ -100,7 +97,7 @@ void nav_mixture_free(struct nav_mixture *m)
 size_t nav_mixture_bytes(const struct nav_mixture *m)
 {
     size_t lists = layers(m) * (size_t)m->bands, cells = layers(m) * (size_t)m->pitch * (size_t)(m->ny + 2);
-    return cells * sizeof *m->cell +
-           (3 * (size_t)m->count + 2 * (size_t)m->first[m->count] + lists + 2 * (size_t)m->listed[lists]) *
-               sizeof(uint32_t);
+    size_t parts = m->mix[m->count - 1].end, listed = m->listed[lists];
+    return cells * sizeof *m->cell + m->count * sizeof *m->mix + parts * sizeof *m->part +
+           (lists + 2 * listed) * sizeof(uint32_t);
 }

@@ -12,23 +12,32 @@
 
 #include "expected.h"
 
+/* A signature (less 1) and its share of the sub-poses; those not free are left out. */
+struct nav_part {
+    uint32_t signature;
+    float share;
+};
+
+/* Parts first .. end - 1, and their likelihood in a row, relative to the best signature. */
+struct nav_mix {
+    uint32_t first, end, row;
+    float value;
+};
+
 struct nav_mixture {
-    int nx, ny;       /* cells */
-    ptrdiff_t pitch;  /* nx + 2 */
-    int sub, turns;   /* sub-poses per cell edge and per heading slice */
-    int nh;           /* headings of sub-poses */
-    int bands, band;  /* a layer's ny + 2 rows fall into bands of `band` rows, each with its own list of mixes */
-    uint16_t *cell;   /* [nh][sub][sub][ny + 2][nx + 2]: by first heading, phase in y and x, cell with a margin of one;
-                         place of its mix in the band's list */
-    uint32_t count;   /* mixes; number 0: nowhere free */
-    uint32_t *first;  /* [count + 1] where a mix's parts begin */
-    uint32_t *part;   /* signatures less 1 ... */
-    float *share;     /* ... and their shares of the sub-poses; those not free are left out */
-    uint32_t *listed; /* [layers * bands + 1] where a band's list begins */
-    uint32_t *list;   /* mixes */
+    int nx, ny;      /* cells */
+    ptrdiff_t pitch; /* nx + 2 */
+    int sub, turns;  /* sub-poses per cell edge and per heading slice */
+    int nh;          /* headings of sub-poses */
+    int bands, band; /* a layer's ny + 2 rows fall into bands of `band` rows, each with its own list of mixes */
+    uint16_t *cell;  /* [nh][sub][sub][ny + 2][nx + 2]: by first heading, phase in y and x, cell with a margin of one;
+                        place of its mix in the band's list */
+    uint32_t count;  /* mixes; number 0: nowhere free */
+    struct nav_mix *mix; /* [count] */
+    struct nav_part *part;
+    uint32_t *listed;    /* [layers * bands + 1] where a band's list begins */
+    uint32_t *list;      /* mixes */
     float *listed_value; /* likelihoods of the present row, beside `list` */
-    float *value;        /* [count] the same by mix, relative to the best signature */
-    uint32_t *row;       /* [count] for which it was worked out */
     uint32_t present;
     float *part_value; /* [signatures - 1] */
     int *begin, *end;  /* [ny] cells begin .. end - 1 of a row may be free, whatever the shift and turn */

@@ -77,8 +77,8 @@ static int survey(struct maker *w)
     return 0;
 }
 
-/* Parts of mixes: equal signatures joined. With `share` NULL they are counted only. */
-static uint32_t unpack(const struct maker *w, uint32_t mix, uint32_t *part, float *share)
+/* Parts of a mix: equal signatures joined. With `part` NULL they are counted only. */
+static uint32_t unpack(const struct maker *w, uint32_t mix, struct nav_part *part)
 {
     const uint32_t *key = nav_book_key(&w->book, mix);
     uint32_t parts = 0;
@@ -87,10 +87,8 @@ static uint32_t unpack(const struct maker *w, uint32_t mix, uint32_t *part, floa
             ;
         if (key[i] == 0)
             continue;
-        if (share) {
-            part[parts] = key[i] - 1;
-            share[parts] = (float)run / (float)w->parts;
-        }
+        if (part)
+            part[parts] = (struct nav_part){key[i] - 1, (float)run / (float)w->parts};
         parts++;
     }
     return parts;
@@ -103,7 +101,7 @@ static int order_by_parts(const struct maker *w, uint32_t *order)
     uint32_t count = w->book.count, next = 0;
     for (uint32_t parts = 0; parts <= (uint32_t)w->parts; parts++) {
         for (uint32_t n = 0; n < count; n++) {
-            if (unpack(w, n, NULL, NULL) == parts)
+            if (unpack(w, n, NULL) == parts)
                 order[n] = next++;
         }
     }
@@ -131,22 +129,20 @@ static int renumber(struct maker *w)
 static int unpack_all(struct maker *w)
 {
     struct nav_mixture *m = w->m;
+    uint32_t parts = 0;
     m->count = w->book.count;
-    m->first = calloc((size_t)m->count + 1, sizeof *m->first);
-    m->value = calloc(m->count, sizeof *m->value);
-    m->row = calloc(m->count, sizeof *m->row);
+    m->mix = calloc(m->count, sizeof *m->mix);
     m->part_value = calloc(w->e->signatures, sizeof *m->part_value);
-    if (!m->first || !m->value || !m->row || !m->part_value)
+    if (!m->mix || !m->part_value)
         return -1;
-    for (uint32_t n = 0; n < m->count; n++)
-        m->first[n + 1] = m->first[n] + unpack(w, w->old[n], NULL, NULL);
-    m->part = calloc((size_t)m->first[m->count] + 1, sizeof *m->part);
-    m->share = calloc((size_t)m->first[m->count] + 1, sizeof *m->share);
-    if (!m->part || !m->share)
-        return -1;
-    for (uint32_t n = 0; n < m->count; n++)
-        unpack(w, w->old[n], m->part + m->first[n], m->share + m->first[n]);
-    return 0;
+    for (uint32_t n = 0; n < m->count; n++) {
+        m->mix[n].first = parts;
+        m->mix[n].end = parts += unpack(w, w->old[n], NULL);
+    }
+    m->part = calloc((size_t)parts + 1, sizeof *m->part);
+    for (uint32_t n = 0; m->part && n < m->count; n++)
+        unpack(w, w->old[n], m->part + m->mix[n].first);
+    return m->part ? 0 : -1;
 }
 
 /* Lists the mixes that occur in one band of cells and numbers its cells by the list. place[mix]: scratch, all
