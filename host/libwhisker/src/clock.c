@@ -162,6 +162,12 @@ int whisker_clock_add(struct whisker_clock_fit *fit, uint64_t cycles, int64_t mo
     return back || set ? WHISKER_ERROR_HOST_CLOCK : WHISKER_OK;
 }
 
+/* base_ns and a distance, which a bridge's nonsense may make as large as it likes. */
+static int64_t plus(int64_t base_ns, double on_ns)
+{
+    return base_ns + llround(fmax(-FAR_NS, fmin(FAR_NS, on_ns)));
+}
+
 void whisker_clock_get(const struct whisker_clock_fit *fit, struct whisker_clock *clock)
 {
     *clock = (struct whisker_clock){0};
@@ -170,7 +176,7 @@ void whisker_clock_get(const struct whisker_clock_fit *fit, struct whisker_clock
     }
     const double x_ns = (double)(fit->last_cycles - fit->first_cycles) * fit->nominal_ns;
     clock->device_cycles = fit->last_cycles;
-    clock->monotonic_ns = fit->first_ns + llround(x_ns + fit->late_ns + fit->skew * x_ns);
+    clock->monotonic_ns = plus(fit->first_ns, x_ns + fit->late_ns + fit->skew * x_ns);
     clock->realtime_ns = clock->monotonic_ns + fit->realtime_offset_ns;
     clock->ns_per_cycle = fit->nominal_ns * (1 + fit->skew);
     clock->uncertainty_ns = FLOOR_NS + (fit->points >= POINTS_KNOWN ? 2 * fit->spread_ns : UNKNOWN_NS);
@@ -179,7 +185,7 @@ void whisker_clock_get(const struct whisker_clock_fit *fit, struct whisker_clock
 static int64_t shift(const struct whisker_clock *clock, int64_t base_ns, uint64_t cycles)
 {
     const double on_ns = (double)(int64_t)(cycles - clock->device_cycles) * clock->ns_per_cycle;
-    return clock->ns_per_cycle > 0 ? base_ns + llround(fmax(-FAR_NS, fmin(FAR_NS, on_ns))) : 0;
+    return clock->ns_per_cycle > 0 ? plus(base_ns, on_ns) : 0;
 }
 
 int64_t whisker_clock_to_monotonic(const struct whisker_clock *clock, uint64_t cycles)
