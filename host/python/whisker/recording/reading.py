@@ -97,7 +97,8 @@ class Recording:
                 f"{self.path}: format {told:.20}, this package reads {FORMAT}; install the newer release"
             )
         if not any(message.topic == FRAMES_TOPIC for message in self._messages()):
-            text = "holds no frames" if FRAMES_TOPIC in self._file.topics.values() else f"has no topic {FRAMES_TOPIC}"
+            known = FRAMES_TOPIC in self._file.topics.values() or not self.complete
+            text = "holds no frames" if known else f"has no topic {FRAMES_TOPIC}"
             raise RecordingError(f"{self.path}: {text}; give a recording made by 'whisker record'")
 
 

@@ -184,7 +184,7 @@ def record(reader: Reader, writer: RecordingWriter, stop: threading.Event, frame
     """Record until the ring is closed, `stop` is set or `frames` are recorded.
 
     The file is finished, or, when it cannot be written on, whole up to its last second. Errors: as Recorder.run, and
-    RecordingError.
+    WriteError.
     """
     recorder = Recorder(reader, writer)
     try:

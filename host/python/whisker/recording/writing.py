@@ -22,6 +22,12 @@ TOPICS = {
 }
 
 
+class WriteError(RecordingError):
+    """A recording that cannot go on; what was written stays."""
+
+    exit_code = 1
+
+
 class Sink:
     """A file that remembers up to where it is whole, and goes back there when the disk is full."""
 
@@ -61,7 +67,7 @@ class Sink:
 class RecordingWriter:
     """An MCAP file with the topics of a recording. Times are in ns since 1970 and must not go backwards.
 
-    After a RecordingError (disk full, say) only `close` may be called; the file is whole up to the last `flush`.
+    After a WriteError (disk full, say) only `close` may be called; the file is whole up to the last `flush`.
     """
 
     def __init__(self, path, metadata: dict[str, str], lane_names: Sequence[str] = (), overwrite: bool = False):
@@ -133,4 +139,4 @@ class RecordingWriter:
         except OSError as error:
             self._sink.cut()
             text = "what was recorded before is kept; free some space and record on into another file"
-            raise RecordingError(f"{self.path}: cannot be written on ({error.strerror}); {text}") from error
+            raise WriteError(f"{self.path}: cannot be written on ({error.strerror}); {text}") from error
