@@ -106,3 +106,8 @@ uint64_t nav_filter_bad_rows(const struct nav_filter *f)
 {
     return f->intake.bad_rows;
 }
+
+uint64_t nav_filter_empty_windows(const struct nav_filter *f)
+{
+    return f->intake.empty;
+}

@@ -70,6 +70,8 @@ long nav_filter_components(const struct nav_filter *, struct nav_component *out,
 
 uint64_t nav_filter_bad_cells(const struct nav_filter *);
 uint64_t nav_filter_bad_rows(const struct nav_filter *); /* repeated, late or reordered */
+/* Windows that call all textures equally likely: not bad, but treated as not read. */
+uint64_t nav_filter_empty_windows(const struct nav_filter *);
 /* cffi: end */
 
 /* Radius and angle of `confidence`. */

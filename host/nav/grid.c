@@ -14,6 +14,9 @@
 #include "likelihood.h"
 #include "mixture.h"
 
+static const double SURE = 0.5;   /* confidence from which a belief judges whiskers, */
+static const double LIGHT = 1e-4; /* by cells with more mass than this */
+
 struct grid {
     const struct nav_problem *problem;
     struct nav_likelihood *likelihood;
@@ -51,10 +54,64 @@ static struct nav_layer layer(const struct grid *g, int p)
     };
 }
 
+static void find_layers(struct grid *g)
+{
+    for (int p = 0; p < g->lattice.nh; p++)
+        g->layer[p] = layer(g, p);
+}
+
 static void likelihood_row(const void *self, int p, int j, int begin, int end, float *out)
 {
     const struct grid *g = self;
     nav_mixture_look_up(g->mixture, &g->layer[p], j, begin, end, out);
+}
+
+/* Adds what one cell expects, where it will be after its slice's pending whole-cell move. */
+static void expect_cell(struct grid *g, int p, int i, int j, double mass)
+{
+    const struct nav_expected *e = g->expected;
+    const struct nav_mix *mix = nav_mixture_at(g->mixture, &g->layer[p], i, j);
+    for (uint32_t n = mix->first; n < mix->end; n++) {
+        const struct nav_part *part = &g->mixture->part[n];
+        const uint8_t *codes = e->codes + ((size_t)part->signature + 1) * ((size_t)e->whiskers + 1);
+        nav_trust_add(g->likelihood, codes, mass * (double)part->share);
+    }
+}
+
+/* The same for a slice's cells near the pose expected, light ones left out. */
+static void expect_slice(struct grid *g, int p)
+{
+    const struct nav_lattice *l = &g->lattice;
+    struct nav_pose at = g->summary.mean;
+    int reach = (int)ceil(NAV_NEAR_M / l->cell);
+    int x = (int)floor((at.x - l->shift_x[p]) / l->cell), y = (int)floor((at.y - l->shift_y[p]) / l->cell);
+    for (int j = y - reach; j <= y + reach; j++) {
+        int row = j - l->roll_y[p];
+        if (j < 0 || j >= l->ny || row < 0 || row >= l->ny)
+            continue;
+        for (int i = x - reach; i <= x + reach; i++) {
+            int column = i - l->roll_x[p];
+            if (i < 0 || i >= l->nx || column < 0 || column >= l->nx)
+                continue;
+            double mass = l->scale * (double)nav_lattice_slice(l, p)[row * l->nx + column];
+            if (mass > LIGHT)
+                expect_cell(g, p, i, j, mass);
+        }
+    }
+}
+
+/* Judges the row's readings by a belief that is fairly sure. */
+static void learn_trust(struct grid *g)
+{
+    const struct nav_lattice *l = &g->lattice;
+    if (g->confidence < SURE)
+        return;
+    nav_trust_begin(g->likelihood);
+    for (int p = 0; p < l->nh; p++) {
+        if (fabs(nav_wrap(nav_lattice_heading(l, p) - g->summary.mean.theta)) <= NAV_NEAR_RAD)
+            expect_slice(g, p);
+    }
+    nav_trust_learn(g->likelihood);
 }
 
 /* Multiplies by the likelihood and normalises; `extra` is added to each cell first. Returns false with no mass. */
@@ -64,10 +121,8 @@ static bool reweigh(struct grid *g, double extra)
     const struct nav_lattice_weigh weigh = {
         .row = likelihood_row, .self = g, .begin = g->mixture->begin, .end = g->mixture->end, .extra = extra};
     nav_mixture_begin(g->mixture, g->expected);
-    for (int p = 0; p < l->nh; p++) {
-        g->layer[p] = layer(g, p);
+    for (int p = 0; p < l->nh; p++)
         nav_mixture_work_out(g->mixture, &g->layer[p]);
-    }
     nav_lattice_pass(l, &weigh, g->summary.mean);
     if (!(l->total > 0.0 && isfinite(l->total)))
         return false;
@@ -110,6 +165,7 @@ static void forget(struct grid *g)
 static void begin(struct grid *g)
 {
     g->summary.mean = g->problem->prior.mean;
+    find_layers(g);
     nav_expected_evaluate(g->expected, g->likelihood);
     if (!start(g, &g->problem->prior))
         forget(g);
@@ -174,7 +230,9 @@ static void update(void *self, const struct nav_evidence *evidence)
     g->summary.mean = nav_compose(g->summary.mean, g->pending);
     g->pending = (struct nav_pose){0.0, 0.0, 0.0};
     g->pending_noise = (struct nav_noise){0.0, 0.0};
+    find_layers(g);
     nav_likelihood_read(g->likelihood, evidence);
+    learn_trust(g);
     nav_expected_evaluate(g->expected, g->likelihood);
     if (!reweigh(g, g->problem->settings.grid_teleport / (double)nav_lattice_cells(&g->lattice)))
         forget(g);

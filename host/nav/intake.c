@@ -109,6 +109,15 @@ static double novelty(double moved, double spacing)
     return moved >= spacing ? 1.0 : moved / spacing;
 }
 
+static bool says_nothing(const double *loglik, int classes)
+{
+    for (int k = 1; k < classes; k++) {
+        if (loglik[k] != loglik[0])
+            return false;
+    }
+    return classes > 1;
+}
+
 static double take_texture(struct nav_intake *in, int tip, const double *loglik)
 {
     int classes = in->problem->arena.classes;
@@ -123,6 +132,10 @@ static double take_texture(struct nav_intake *in, int tip, const double *loglik)
     }
     if (in->bad_cells != before)
         return 0.0;
+    if (says_nothing(out, classes)) {
+        in->empty++;
+        return 0.0;
+    }
     double weight = novelty(in->moved[tip], in->problem->settings.texture_spacing_m);
     in->moved[tip] = 0.0;
     return weight;

@@ -14,6 +14,7 @@ enum { NAV_TIMES_KEPT = 64 };
 struct nav_intake {
     const struct nav_problem *problem;
     uint64_t bad_cells, bad_rows;
+    uint64_t empty;               /* windows that call all textures equally likely */
     double times[NAV_TIMES_KEPT]; /* of the last rows, to know a repeated one */
     long rows;
     double latest;  /* s */

@@ -67,13 +67,32 @@ void nav_mixture_work_out(struct nav_mixture *m, const struct nav_layer *layer)
     }
 }
 
-void nav_mixture_look_up(const struct nav_mixture *m, const struct nav_layer *layer, int row, int begin, int end,
-                         float *out)
+/* A row of a layer: places of its cells' mixes in a band's list, and where that list begins. */
+struct row {
+    const uint16_t *cell;
+    uint32_t listed;
+};
+
+static struct row row_of(const struct nav_mixture *m, const struct nav_layer *layer, int row)
 {
     int x = 1 + floor_div(layer->x, m->sub), y = 1 + row + floor_div(layer->y, m->sub);
     size_t n = layer_of(m, layer);
-    const uint16_t *cell = m->cell + ((ptrdiff_t)n * (m->ny + 2) + y) * m->pitch + x;
-    const float *value = m->listed_value + m->listed[n * (size_t)m->bands + (size_t)(y / m->band)];
+    return (struct row){m->cell + ((ptrdiff_t)n * (m->ny + 2) + y) * m->pitch + x,
+                        m->listed[n * (size_t)m->bands + (size_t)(y / m->band)]};
+}
+
+const struct nav_mix *nav_mixture_at(const struct nav_mixture *m, const struct nav_layer *layer, int i, int j)
+{
+    struct row row = row_of(m, layer, j);
+    return &m->mix[m->list[row.listed + row.cell[i]]];
+}
+
+void nav_mixture_look_up(const struct nav_mixture *m, const struct nav_layer *layer, int j, int begin, int end,
+                         float *out)
+{
+    struct row row = row_of(m, layer, j);
+    const float *value = m->listed_value + row.listed;
+    const uint16_t *cell = row.cell;
     for (int i = begin; i < end; i++)
         out[i] = value[cell[i]];
 }

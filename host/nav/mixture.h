@@ -63,6 +63,9 @@ void nav_mixture_work_out(struct nav_mixture *, const struct nav_layer *);
 /* Likelihoods of cells begin .. end - 1 of a layer's row, 0 <= row < ny. */
 void nav_mixture_look_up(const struct nav_mixture *, const struct nav_layer *, int row, int begin, int end, float *out);
 
+/* Mix of one cell of a layer. */
+const struct nav_mix *nav_mixture_at(const struct nav_mixture *, const struct nav_layer *, int i, int j);
+
 size_t nav_mixture_bytes(const struct nav_mixture *);
 
 #endif
