@@ -24,6 +24,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from tqdm import tqdm
 
+import whisker
 from whisker import localise, scenes
 from whisker.scene import Prior
 from whisker.scoring import lock_row, position_errors
@@ -92,7 +93,7 @@ def program(command: list, folder: Path, scene: Path, seed: int) -> Steps:
     """A peer's own process; one thread, as everybody has."""
     out = folder / "est.csv"
     alone = {name: "1" for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "NUMBA_NUM_THREADS")}
-    environment = os.environ | alone | {"PYTHONPATH": str(ROOT / "host/python")}
+    environment = os.environ | alone | {"PYTHONPATH": str(Path(whisker.__file__).parents[1])}
     words = [str(word) for word in (*command[:-1], scene, out, *command[-1], "--seed", seed)]
     done = subprocess.run(words, env=environment, capture_output=True, text=True)
     if done.returncode != 0:
