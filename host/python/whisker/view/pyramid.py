@@ -4,16 +4,19 @@ A page asks for the width that makes one bin one column of pixels, so no peak is
 that saw no good sample has its lowest above its highest.
 """
 
+from itertools import pairwise
+
 import numpy as np
 
 from ..protocol import LANES, STATUS_CODE_SHIFT
-from .tally import EMPTY
+from .tally import CODE_KINDS, EMPTY
 
 AXES = ("alpha", "beta")
 BINS = 4096  # kept of each width: more columns than a screen has
 WIDTHS = tuple(1 << k for k in range(10))  # ticks per bin; the widest keep 17 minutes at 2 kHz
 CHUNK = BINS // 2  # slots completed at a time: what a level makes of them must still lie in the level below
 PARTS = 8  # of one batch that are shown when it has gaps wider than a chunk; the newest
+LOST = ~np.isin(np.arange(CODE_KINDS), EMPTY)  # by code
 NOTHING_LOW, NOTHING_HIGH = 0xFFFF, 0
 
 
@@ -37,10 +40,12 @@ class Level:
         first, end = self.end, finer.end // 2
         if first == end:
             return
-        into, even = np.arange(first, end) % BINS, np.arange(2 * first, 2 * end, 2) % BINS
-        self.low[..., into] = np.minimum(finer.low[..., even], finer.low[..., even + 1])
-        self.high[..., into] = np.maximum(finer.high[..., even], finer.high[..., even + 1])
-        self.bad[..., into] = finer.bad[..., even] + finer.bad[..., even + 1]
+        for part in spans(first, end, CHUNK):  # there the halves lie in one piece too
+            even = slice(2 * part.start % BINS, (2 * part.stop - 1) % BINS, 2)
+            odd = slice(even.start + 1, even.stop + 1, 2)
+            np.minimum(finer.low[..., even], finer.low[..., odd], out=self.low[..., part])
+            np.maximum(finer.high[..., even], finer.high[..., odd], out=self.high[..., part])
+            np.add(finer.bad[..., even], finer.bad[..., odd], out=self.bad[..., part])
         self.end = end
 
 
@@ -73,7 +78,7 @@ class Pyramid:
             counts = lanes[name].T
             finest.low[axis][:, at] = np.where(bad, NOTHING_LOW, counts)
             finest.high[axis][:, at] = np.where(bad, NOTHING_HIGH, counts)
-        finest.bad[:, at] = bad & ~np.isin(status >> STATUS_CODE_SHIFT, EMPTY)
+        finest.bad[:, at] = bad & LOST[status >> STATUS_CODE_SHIFT]
         finest.end = end
 
     def _skip_to(self, slot: int) -> None:
@@ -91,9 +96,7 @@ class Pyramid:
             self.levels[coarser].take_halves(self.levels[finer])
 
 
-def spans(first: int, end: int) -> list[slice]:
-    """The places of bins `first` to `end` (at most BINS of them) as one or two slices."""
-    if first >= end:
-        return []
-    start, stop = first % BINS, (end - 1) % BINS + 1
-    return [slice(start, stop)] if start < stop else [slice(start, BINS), slice(0, stop)]
+def spans(first: int, end: int, piece: int = BINS) -> list[slice]:
+    """The places of bins `first` to `end` (at most BINS of them), cut where a multiple of `piece` is crossed."""
+    edges = [first, *range(first - first % piece + piece, end, piece), end]
+    return [slice(a % BINS, a % BINS + b - a) for a, b in pairwise(edges) if a < b]
