@@ -164,7 +164,7 @@ def test_a_scene_without_prior_or_observations_is_one_line(capsys, folder):
 def test_settings_reach_the_filter(capsys, folder):
     states = []
     for cell in ("0.05", "0.1"):
-        _, out, _ = run(capsys, "localise", folder, "--set", f"grid.cell_m={cell}", "--json")
+        _, out, _ = run(capsys, "localise", folder, "--filter", "grid", "--set", f"grid.cell_m={cell}", "--json")
         states.append(json.loads(out)["peak_states"])
     assert states == [90000, 22500]
 

@@ -55,7 +55,7 @@ def live_ring(frames, **stats):
 
 def test_help_names_every_command_and_imports_none(capsys):
     code, out, _ = run(capsys, "--help")
-    assert code == 0 and all(f"    {name}" in out for name in COMMANDS)
+    assert code == 0 and all(f"\n  {name} " in out for name in COMMANDS)
     program = (
         "import sys; from whisker.cli import main\ntry: main(['--help'])\nexcept SystemExit: print(sorted(sys.modules))"
     )
@@ -282,6 +282,19 @@ def test_doctor_names_what_is_wrong_with_the_cable(host, spoil, text, remedy):
     spoil(host)
     found = worst([*doctor.usb(host), *doctor.room(host / "dev/shm")])
     assert len(found) == 1 and text in found[0].text and remedy in found[0].remedy
+
+
+def test_doctor_does_not_miss_a_cable_where_frames_arrive(host):
+    (host / "sys/bus/usb/devices/1-2/idVendor").write_text("dead\n")
+    name, stop = ring_name(), threading.Event()
+    thread = threading.Thread(target=publish_until, args=(stop, name))
+    thread.start()
+    Reader(name, 10.0).close()
+    findings = doctor.examine(name, host, look_s=0.1)
+    stop.set()
+    thread.join()
+    assert worst(findings) == [] and any(f.level == doctor.WARN and "no bridge on" in f.text for f in findings)
+    assert any("no bridge on" in f.text for f in worst(doctor.examine("whisker-none", host)))
 
 
 def test_doctor_names_the_process_in_the_way(host):

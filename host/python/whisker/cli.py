@@ -3,6 +3,7 @@
 Subcommands live in `whisker.commands`; only the one that is called is imported, so that help is quick.
 """
 
+import argparse
 import importlib
 import sys
 
@@ -45,11 +46,16 @@ def main(argv: list[str] | None = None) -> int:
 
 def _parser(chosen: str) -> Parser:
     """The parser of the whole command line, with the arguments of the chosen subcommand only."""
-    parser = Parser(prog="whisker", description="Whiskered robots: sensing, tactile perception, localisation by touch.")
-    parser.show_example("whisker localise scenes/paper --filter grid --json")
-    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    width = max(map(len, COMMANDS))
+    listed = "\n".join(f"  {name:{width}}  {text}" for name, text in COMMANDS.items())
+    purpose = "Whiskered robots: sensing, tactile perception, localisation by touch."
+    parser = Parser(prog="whisker", usage="whisker COMMAND ...", description=f"{purpose}\n\ncommands:\n{listed}")
+    parser.show_example("whisker bridge-sim &  whisker top")
+    commands = parser.add_subparsers(
+        prog="whisker", dest="command", required=True, metavar="COMMAND", help=argparse.SUPPRESS
+    )
     for name, text in COMMANDS.items():
-        command = commands.add_parser(name, help=text, description=text)
+        command = commands.add_parser(name, description=text)
         if name == chosen:
             module = importlib.import_module(f".commands.{name.replace('-', '_')}", __package__)
             command.show_example(module.EXAMPLE)
