@@ -63,7 +63,7 @@ def venv(tmp_path_factory) -> Path:
 def test_the_command_line_works(venv):
     environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
     said = run(venv / "bin/whisker", "--help", env=environment, cwd=venv).stdout
-    assert "record" in said and "whisker localise" in said
+    assert "  record " in said and "  localise " in said
     assert "adaptive" in run(venv / "bin/whisker", "localise", "--list-filters", env=environment, cwd=venv).stdout
 
 
