@@ -90,6 +90,10 @@
 #define WHISKER_CODE_SENSOR_SUM 4u /* the sum of a sensor frame is wrong */
 #define WHISKER_CODE_SENSOR_START 5u /* a sensor frame did not begin with 0xFF: line stuck low */
 #define WHISKER_CODE_SENSOR_ABSENT 6u /* the sensor did not drive its line: all ones */
+#define WHISKER_CODE_STEP 7u /* the angle jumped further in one tick than a whisker can move: a slipped frame that passed its sum */
+#define WHISKER_CODE_RESET_POWER 8u /* the node restarted after a brown-out or by its reset pin; its sensor starts */
+#define WHISKER_CODE_RESET_WATCHDOG 9u /* the node restarted because its firmware stood still; its sensor starts */
+#define WHISKER_CODE_RESET_TRAP 10u /* the node restarted after a trap (address, stack, arithmetic, oscillator, DMA); its sensor starts */
 #define WHISKER_CODE_ABSENT 32u /* nothing answers on this lane: all ones */
 #define WHISKER_CODE_LINK_CRC 33u /* the record's CRC is wrong */
 #define WHISKER_CODE_LINK_TICK 34u /* the record belongs to another tick: stale or slipped */
@@ -118,6 +122,10 @@
     X(SENSOR_SUM, 4, "the sum of a sensor frame is wrong", "check the wire between node and sensor") \
     X(SENSOR_START, 5, "a sensor frame did not begin with 0xFF: line stuck low", "check for a short on the sensor's data line") \
     X(SENSOR_ABSENT, 6, "the sensor did not drive its line: all ones", "check the sensor's supply and cable") \
+    X(STEP, 7, "the angle jumped further in one tick than a whisker can move: a slipped frame that passed its sum", "none if rare; else check the wire between node and sensor") \
+    X(RESET_POWER, 8, "the node restarted after a brown-out or by its reset pin; its sensor starts", "check the 3.3 V supply and the reset pin's pull-up") \
+    X(RESET_WATCHDOG, 9, "the node restarted because its firmware stood still; its sensor starts", "update the firmware; report what led to it") \
+    X(RESET_TRAP, 10, "the node restarted after a trap (address, stack, arithmetic, oscillator, DMA); its sensor starts", "check the supply's decoupling; update the firmware") \
     X(ABSENT, 32, "nothing answers on this lane: all ones", "connect a node or take the lane out of the lane mask") \
     X(LINK_CRC, 33, "the record's CRC is wrong", "check the lane's cable; lower the SPI clock") \
     X(LINK_TICK, 34, "the record belongs to another tick: stale or slipped", "check the SYNC and select lines of this lane") \

@@ -75,8 +75,9 @@ static void on_interrupt(void *context, unsigned irq)
 
 static void on_trap(void *context, enum dspic_trap trap)
 {
-    (void)context;
+    struct sim_node *node = context;
     (void)trap;
+    port_on_trap(&node->board);
 }
 
 sim_node *sim_node_new(uint64_t seed)

@@ -10,15 +10,15 @@ static void publish(struct node *node)
     board_link_arm(node->board, node->records[node->armed]);
 }
 
-void node_start(struct node *node, struct board *board)
+void node_start(struct node *node, struct board *board, uint8_t code)
 {
     node->board = board;
     node->tick = 0xFFu; /* the first SYNC makes it 0 */
     node->numbered = true;
     node->armed = 0;
-    node->reading = sensor_reading_of_code(WHISKER_CODE_STARTING);
+    node->reading = sensor_reading_of_code(code);
     publish(node);
-    sampler_start(&node->sampler, board);
+    sampler_start(&node->sampler, board, code);
 }
 
 bool node_ready(const struct node *node)

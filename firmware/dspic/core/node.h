@@ -29,8 +29,9 @@ struct node {
     uint16_t records[2][LINK_WORDS]; /* one is clocked out while the other is packed */
 };
 
-/* Call once, at reset; the sensor then needs about 18 ms. */
-void node_start(struct node *node, struct board *board);
+/* Call once, at reset; the sensor then needs about 18 ms. `code`: what the records say meanwhile, WHISKER_CODE_STARTING
+ * or the kind of reset, WHISKER_CODE_RESET_*. */
+void node_start(struct node *node, struct board *board, uint8_t code);
 
 /* True if a SYNC now would start a reading. */
 bool node_ready(const struct node *node);

@@ -6,16 +6,34 @@
 /* Waits, in microseconds. Each exceeds the data sheet's time by the sensor's slowest oscillator and our own fastest
  * (FRC: 2 %); checked below. */
 #define STARTUP_US 18000u
+#ifdef SAMPLER_RESYNC_EVERY_FRAME /* as short as they may be: 629 us a frame, of 667 */
+#define RESYNC_US 337u
+#define SELECT_US 3u
+#define START_GAP_US 17u
+#define GAP_US 14u
+#elif defined SENSOR_MLX90316 /* ten bytes: a frame in 430 us of the tick's 500 */
 #define RESYNC_US 350u
 #define SELECT_US 4u
-#define GAP_US 24u /* with a byte's 21 us: slots of 45 us, a frame in 336 us of the tick's 500 */
-#define RELEASE_US 30u
+#define START_GAP_US 24u
+#define GAP_US 21u
+#else
+#define RESYNC_US 350u
+#define SELECT_US 4u
+#define START_GAP_US 24u /* with a byte's 21 us: slots of 45 us, a frame in 336 us of the tick's 500 */
+#define GAP_US START_GAP_US
+#endif
+#define RELEASE_US 30u /* from a SYNC that may find a byte under way */
+#define RAISE_US 4u    /* from the last byte */
+
+/* 30 degrees in 0.5 ms: a whisker swinging by 30 degrees at 50 Hz makes 4.7. */
+#define STEP_MOST 0x2AAAu
 
 #define MARGIN_PERCENT (MLX90333_OSCILLATOR_PERCENT + 2u)
 #define TOO_SHORT(us, ns) ((us)*UINT32_C(100000) < (ns) * (UINT32_C(100) + MARGIN_PERCENT))
 
 #if TOO_SHORT(STARTUP_US, MLX90333_STARTUP_NS) || TOO_SHORT(RESYNC_US, MLX90333_T5_NS) ||                              \
-    TOO_SHORT(SELECT_US, MLX90333_T6_NS) || TOO_SHORT(GAP_US, MLX90333_T7_NS) || TOO_SHORT(GAP_US, MLX90333_T2_NS)
+    TOO_SHORT(SELECT_US, MLX90333_T6_NS) || TOO_SHORT(START_GAP_US, MLX90333_T7_NS) ||                                 \
+    TOO_SHORT(GAP_US, MLX90333_T2_NS) || TOO_SHORT(RAISE_US, MLX90333_T4_NS)
 #error "a wait is shorter than the sensor may need"
 #endif
 /* A late frame is given up while a byte may be under way: t4 counts from that byte's end. */
@@ -32,14 +50,15 @@ static void wait_in(struct sampler *sampler, enum sampler_state state, uint16_t 
 static void transfer_byte(struct sampler *sampler)
 {
     sampler->state = SAMPLER_BYTE;
-    board_sensor_transfer(sampler->board, MLX90333_MASTER_BYTE);
+    board_sensor_transfer(sampler->board, sampler->count == 0 ? SENSOR_MASTER_START : MLX90333_MASTER_BYTE);
 }
 
-void sampler_start(struct sampler *sampler, struct board *board)
+void sampler_start(struct sampler *sampler, struct board *board, uint8_t unready)
 {
     sampler->board = board;
-    sampler->unready = WHISKER_CODE_STARTING;
+    sampler->unready = unready;
     sampler->count = 0;
+    sampler->followed = false;
     board_sensor_select(board, true);
     wait_in(sampler, SAMPLER_STARTING, STARTUP_US);
 }
@@ -53,6 +72,7 @@ uint8_t sampler_on_sync(struct sampler *sampler)
         return WHISKER_CODE_LATE;
     case SAMPLER_BYTE:
     case SAMPLER_GAP:
+        sampler->followed = false;
         wait_in(sampler, SAMPLER_RELEASE, RELEASE_US);
         return WHISKER_CODE_RESYNC;
     default:
@@ -86,12 +106,39 @@ bool sampler_on_timer(struct sampler *sampler)
     }
 }
 
-static void end_frame(struct sampler *sampler, const struct sensor_reading *reading)
+static bool jumped(uint16_t before, uint16_t now)
 {
-    if (reading->status >> WHISKER_STATUS_CODE_SHIFT == WHISKER_CODE_OK)
+    const uint16_t by = (uint16_t)(now > before ? now - before : before - now);
+    return by > STEP_MOST;
+}
+
+/* Takes a reading that no whisker can have made for a bad one. */
+static void doubt(struct sampler *sampler, struct sensor_reading *reading)
+{
+    if (sampler->followed && (jumped(sampler->alpha, reading->alpha) || jumped(sampler->beta, reading->beta)))
+        *reading = sensor_reading_of_code(WHISKER_CODE_STEP);
+}
+
+static bool is_good(const struct sensor_reading *reading)
+{
+    return reading->status >> WHISKER_STATUS_CODE_SHIFT == WHISKER_CODE_OK;
+}
+
+static void end_frame(struct sampler *sampler, struct sensor_reading *reading)
+{
+    *reading = sensor_frame_decode(sampler->frame);
+    if (is_good(reading))
+        doubt(sampler, reading);
+    sampler->followed = reading->status == 0; /* angles beside an error word are no measure for the next ones */
+    sampler->alpha = reading->alpha;
+    sampler->beta = reading->beta;
+#ifndef SAMPLER_RESYNC_EVERY_FRAME
+    if (is_good(reading)) {
         sampler->state = SAMPLER_READY;
-    else
-        wait_in(sampler, SAMPLER_RELEASE, RELEASE_US);
+        return;
+    }
+#endif
+    wait_in(sampler, SAMPLER_RELEASE, RAISE_US);
 }
 
 bool sampler_on_byte(struct sampler *sampler, uint8_t byte, struct sensor_reading *reading)
@@ -99,11 +146,10 @@ bool sampler_on_byte(struct sampler *sampler, uint8_t byte, struct sensor_readin
     if (sampler->state != SAMPLER_BYTE)
         return false;
     sampler->frame[sampler->count++] = byte;
-    if (sampler->count < MLX90333_FRAME_BYTES) {
-        wait_in(sampler, SAMPLER_GAP, GAP_US);
+    if (sampler->count < SENSOR_FRAME_BYTES) {
+        wait_in(sampler, SAMPLER_GAP, sampler->count == 1u ? START_GAP_US : GAP_US);
         return false;
     }
-    *reading = sensor_frame_decode(sampler->frame);
     end_frame(sampler, reading);
     return true;
 }

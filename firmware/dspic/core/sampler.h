@@ -6,7 +6,11 @@
  *                            +----------- RELEASE <---- SYNC before the end (late), or bad frame ----+
  *
  * Frames follow each other without a resynchronisation (/SS stays low), else 2 kHz would not fit: only power-up, a bad
- * frame and a late one raise /SS for t5, which overlaps the next SYNC and so costs that tick. */
+ * frame and a late one raise /SS for t5, which overlaps the next SYNC and so costs that tick. Should real sensors
+ * refuse frames back to back, a build with -DSAMPLER_RESYNC_EVERY_FRAME raises /SS after every one; it follows 1.5 kHz.
+ *
+ * A frame that slipped by bytes passes its sum once in 256 times: an angle that jumps further than a whisker can move
+ * in a tick is not believed, and the sensor resynchronised. */
 #ifndef SAMPLER_H
 #define SAMPLER_H
 
@@ -28,14 +32,17 @@ enum sampler_state {
 
 struct sampler {
     struct board *board;
-    uint8_t state;   /* enum sampler_state */
-    uint8_t unready; /* code of a tick whose SYNC finds the sensor not ready */
-    uint8_t count;   /* bytes of the frame received */
-    uint8_t frame[MLX90333_FRAME_BYTES];
+    uint8_t state;        /* enum sampler_state */
+    uint8_t unready;      /* code of a tick whose SYNC finds the sensor not ready */
+    uint8_t count;        /* bytes of the frame received */
+    bool followed;        /* the next good frame has one right before it */
+    uint16_t alpha, beta; /* of that frame */
+    uint8_t frame[SENSOR_FRAME_BYTES];
 };
 
-/* Begins the start-up wait. Call once, at reset. */
-void sampler_start(struct sampler *sampler, struct board *board);
+/* Begins the start-up wait. Call once, at reset. `unready`: the code of ticks until the sensor is ready,
+ * WHISKER_CODE_STARTING or the kind of reset. */
+void sampler_start(struct sampler *sampler, struct board *board, uint8_t unready);
 
 /* SYNC: starts a reading if the sensor is ready. Returns the code this tick's record carries unless
  * sampler_on_byte() ends the reading before the next SYNC: LATE if one was started, else STARTING or RESYNC. */

@@ -44,12 +44,6 @@ static bool all_ones(const uint8_t *frame)
     return common == 0xFFu;
 }
 
-struct sensor_reading sensor_reading_of_code(uint8_t code)
-{
-    const struct sensor_reading reading = {0, 0, (uint16_t)((uint16_t)code << WHISKER_STATUS_CODE_SHIFT)};
-    return reading;
-}
-
 struct sensor_reading sensor_frame_decode(const uint8_t frame[MLX90333_FRAME_BYTES])
 {
     const uint16_t error_word = whisker_get_u16(frame + MLX90333_FRAME_ERRORS);

@@ -1,10 +1,12 @@
-/* Decoder of the MLX90333's 8-byte frame: pure, no state. */
+/* Decoder of the sensor's frame: pure, no state. sensor_frame.c reads the MLX90333, sensor_frame_90316.c the MLX90316.
+ */
 #ifndef SENSOR_FRAME_H
 #define SENSOR_FRAME_H
 
 #include <stdint.h>
 
-#include "mlx90333_datasheet.h"
+#include "sensor.h"           // SENSOR_FRAME_BYTES
+#include "whisker_protocol.h" // WHISKER_STATUS_CODE_SHIFT
 
 /* One reading of the sensor as a record carries it. */
 struct sensor_reading {
@@ -14,13 +16,22 @@ struct sensor_reading {
 };
 
 /* A reading that holds nothing but a code, WHISKER_CODE_*. */
-struct sensor_reading sensor_reading_of_code(uint8_t code);
+static inline struct sensor_reading sensor_reading_of_code(uint8_t code)
+{
+    const struct sensor_reading reading = {0, 0, (uint16_t)((uint16_t)code << WHISKER_STATUS_CODE_SHIFT)};
+    return reading;
+}
 
-/* Reading in a frame of MLX90333_FRAME_BYTES. All ones is a sensor that does not answer, a wrong first byte a line
+/* Reading in a frame of SENSOR_FRAME_BYTES.
+ *
+ * MLX90333: all ones is a sensor that does not answer, a wrong first byte a line
  * stuck low (all zeros has the right sum: both checks are needed). The sum covers bytes 1 to 6. Whether the error word
  * is part of it is not confirmed, so with errors set a sum over bytes 1 to 4 passes too; but then only with assigned
- * error bits, so that a flipped bit is never taken for a good frame. */
-struct sensor_reading sensor_frame_decode(const uint8_t frame[MLX90333_FRAME_BYTES]);
+ * error bits, so that a flipped bit is never taken for a good frame.
+ *
+ * MLX90316: one angle, which becomes alpha; beta is at rest. The data must equal its inverted copy; the first byte on
+ * the shared line is the master's own. */
+struct sensor_reading sensor_frame_decode(const uint8_t frame[SENSOR_FRAME_BYTES]);
 
 /* The sensor's 16-bit error word as WHISKER_ERROR_* bits 9..0; bits that are not assigned are dropped. */
 uint16_t sensor_frame_errors(uint16_t word);

@@ -1,8 +1,11 @@
 #include "port.h"
 
+#include <stdbool.h>
+
 #include "sfr.h"
 
 #define PRIORITY 4u
+#define TRAPPED 0x7EA9u /* unlikely in RAM that has lost its contents */
 
 static const uint8_t SERVED[] = {IRQ_INT1, IRQ_T2, IRQ_SPI1, IRQ_SPI1_ERROR, IRQ_SPI2_ERROR, IRQ_DMA1};
 
@@ -15,13 +18,27 @@ static void enable(struct board *board, uint16_t irq)
     sfr_set(board, IRQ_WORD(IEC0, irq), IRQ_BIT(irq));
 }
 
+/* Why the chip was reset, and forgets it. A plain power-up is none of the node's troubles. */
+static uint8_t reset_code(struct board *board)
+{
+    const uint16_t cause = sfr_read(board, RCON);
+    const bool trapped = board->trapped == TRAPPED;
+    board->trapped = 0;
+    sfr_clear(board, RCON, RCON_POR | RCON_BOR | RCON_WDTO | RCON_SWR | RCON_EXTR | RCON_TRAPR | RCON_IOPUWR);
+    if (cause & RCON_POR)
+        return WHISKER_CODE_STARTING;
+    if (trapped || cause & (RCON_TRAPR | RCON_IOPUWR))
+        return WHISKER_CODE_RESET_TRAP;
+    return cause & RCON_WDTO ? WHISKER_CODE_RESET_WATCHDOG : WHISKER_CODE_RESET_POWER;
+}
+
 void port_start(struct board *board)
 {
     clock_start(board);
     pins_start(board);
     sensor_start(board);
     link_start(board);
-    node_start(&board->node, board);
+    node_start(&board->node, board, reset_code(board));
     for (uint16_t i = 0; i < sizeof SERVED; i++)
         enable(board, SERVED[i]);
     sfr_set(board, RCON, RCON_SWDTEN);
@@ -30,6 +47,13 @@ void port_start(struct board *board)
 void port_loop(struct board *board)
 {
     cpu_clear_watchdog(board);
+}
+
+/* Nothing can be trusted after a trap: start anew, and say so. */
+void port_on_trap(struct board *board)
+{
+    board->trapped = TRAPPED;
+    cpu_reset(board);
 }
 
 void port_on_int1(struct board *board)

@@ -19,6 +19,7 @@ struct board {
 #ifndef __dsPIC33F__
     struct dspic *chip; /* the register model */
 #endif
+    uint16_t trapped; /* survives a reset: what led to it was a trap */
     struct node node;
 };
 
@@ -45,6 +46,7 @@ void port_on_spi1(struct board *board);
 void port_on_spi1_error(struct board *board);
 void port_on_spi2_error(struct board *board);
 void port_on_dma1(struct board *board);
+void port_on_trap(struct board *board); /* any of the traps; does not return */
 
 /* Steps of port_start, one file each. */
 void clock_start(struct board *board);

@@ -45,7 +45,7 @@ static void reset(struct bench *bench)
 {
     const struct board board = {.select = 1};
     bench->board = board;
-    sampler_start(&bench->sampler, &bench->board);
+    sampler_start(&bench->sampler, &bench->board, WHISKER_CODE_STARTING);
 }
 
 /* Lets the timer elapse; returns how long it ran. */
@@ -84,11 +84,11 @@ static void advance(struct bench *bench, unsigned events)
     }
 }
 
-/* From a frame given up to the next possible reading: the two waits and the levels of /SS during them. */
-static void assert_resynchronises(struct bench *bench)
+/* From a frame given up to the next possible reading: the waits and the levels of /SS during them. */
+static void assert_resynchronises(struct bench *bench, unsigned least_us)
 {
     assert_false(bench->board.select);
-    assert_true(elapse(bench) >= BOARD_SENSOR_BYTE_MAX_US + 3); /* a byte under way, then t4 */
+    assert_true(elapse(bench) >= least_us);
     assert_true(bench->board.select);
     assert_in_range(elapse(bench), 330, 400); /* t5 of a part with a 10 % slow oscillator; ready before the next SYNC */
     assert_false(bench->board.select);
@@ -173,7 +173,7 @@ static void a_bad_frame_resynchronises_once(void **state)
             assert_int_equal(deliver(&bench, i, i == bad ? 0x40 : 0), i == 7);
         }
         assert_int_equal(bench.reading.status >> 10, bad == 0 ? WHISKER_CODE_SENSOR_START : WHISKER_CODE_SENSOR_SUM);
-        assert_resynchronises(&bench);
+        assert_resynchronises(&bench, 3);
     }
 }
 
@@ -203,13 +203,53 @@ static void a_sync_at_any_moment_of_a_reading_gives_it_up_and_resynchronises(voi
         advance(&bench, events);
         const unsigned transfers = bench.board.transfers;
         assert_int_equal(sampler_on_sync(&bench.sampler), WHISKER_CODE_RESYNC);
-        assert_false(deliver(&bench, 7, 0)); /* the byte under way ends and is dropped */
-        assert_resynchronises(&bench);
+        assert_false(deliver(&bench, 7, 0));                         /* the byte under way ends and is dropped */
+        assert_resynchronises(&bench, BOARD_SENSOR_BYTE_MAX_US + 3); /* a byte under way, then t4 */
         assert_int_equal(bench.board.transfers, transfers);
         assert_int_equal(sampler_on_sync(&bench.sampler), WHISKER_CODE_LATE);
         advance(&bench, 15);
         assert_int_equal(bench.reading.status, 0);
     }
+}
+
+/* Reads a frame with this alpha; returns the record's code. */
+static unsigned read_alpha(struct bench *bench, uint16_t alpha)
+{
+    const uint8_t low = (uint8_t)alpha, high = (uint8_t)(alpha >> 8);
+    const uint8_t frame[8] = {0xFF, low, high, 0x20, 0x70, 0, 0, (uint8_t)(low + high + 0x90)};
+    sampler_on_sync(&bench->sampler);
+    for (unsigned i = 0; i < 8; i++) {
+        if (i > 0)
+            elapse(bench);
+        sampler_on_byte(&bench->sampler, frame[i], &bench->reading);
+    }
+    return bench->reading.status >> WHISKER_STATUS_CODE_SHIFT;
+}
+
+static void a_jump_is_not_believed_until_the_sensor_was_resynchronised(void **state)
+{
+    (void)state;
+    struct bench bench;
+    make_ready(&bench);
+    assert_int_equal(read_alpha(&bench, 0x8000), WHISKER_CODE_OK);
+    assert_int_equal(read_alpha(&bench, 0x9000), WHISKER_CODE_OK); /* 11 degrees */
+    assert_int_equal(read_alpha(&bench, 0xC000), WHISKER_CODE_STEP);
+    assert_int_equal(bench.reading.alpha, 0);
+    assert_resynchronises(&bench, 3);
+    assert_int_equal(read_alpha(&bench, 0xC000), WHISKER_CODE_OK);
+    assert_int_equal(read_alpha(&bench, 0x8000), WHISKER_CODE_STEP);
+}
+
+static void until_ready_ticks_tell_the_kind_of_reset(void **state)
+{
+    (void)state;
+    struct bench bench;
+    reset(&bench);
+    sampler_start(&bench.sampler, &bench.board, WHISKER_CODE_RESET_WATCHDOG);
+    assert_int_equal(sampler_on_sync(&bench.sampler), WHISKER_CODE_RESET_WATCHDOG);
+    while (!sampler_ready(&bench.sampler))
+        elapse(&bench);
+    assert_int_equal(sampler_on_sync(&bench.sampler), WHISKER_CODE_LATE);
 }
 
 static void events_nobody_asked_for_are_ignored(void **state)
@@ -236,6 +276,8 @@ int main(void)
         cmocka_unit_test(a_bad_frame_resynchronises_once),
         cmocka_unit_test(a_sync_at_any_moment_of_a_resynchronisation_reports_it_and_disturbs_nothing),
         cmocka_unit_test(a_sync_at_any_moment_of_a_reading_gives_it_up_and_resynchronises),
+        cmocka_unit_test(a_jump_is_not_believed_until_the_sensor_was_resynchronised),
+        cmocka_unit_test(until_ready_ticks_tell_the_kind_of_reset),
         cmocka_unit_test(events_nobody_asked_for_are_ignored),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -100,7 +100,7 @@ int main(void)
     TCCR1B = 1 << CS10;
     begin();
     overhead = end();
-    node_start(&node, 0);
+    node_start(&node, 0, WHISKER_CODE_STARTING);
     while (!node_ready(&node))
         node_on_timer(&node);
     paint();
