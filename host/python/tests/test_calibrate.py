@@ -4,8 +4,8 @@ import tomllib
 
 import numpy as np
 import pytest
+from commandkit import run, signals_as_before  # noqa: F401 - a fixture
 from rings import make_frames, ring_name
-from test_commands import run, signals_as_before  # noqa: F401 - a fixture
 
 from whisker.calibration import CalibrationError, Feed, WhiskFinder, measure_rest
 from whisker.contact import REST_SAMPLES

@@ -157,7 +157,7 @@ class Reader:
             self.advance(len(view))
 
     def wait(self, wait_s: float | None = 10.0) -> None:
-        """Return when there is a frame to peek; RingError TIMEOUT, or, when all is read, CLOSED, WRITER_DEAD, RESTARTED."""
+        """Return when there is a frame to peek. RingError TIMEOUT; when all is read, CLOSED, WRITER_DEAD, RESTARTED."""
         check(lib.whisker_reader_wait(self._reader, milliseconds(wait_s)), self.name)
 
     def peek(self) -> np.ndarray:

@@ -1,0 +1,43 @@
+"""What tests of commands share: running one in this process or its own, and a ring that tells of itself."""
+
+import contextlib
+import sys
+
+import pytest
+from rings import ring_name
+
+from whisker.cli import main
+from whisker.protocol import LIMITS, WIRE_VERSION
+from whisker.ring import Clock, Writer
+
+END_S = 60
+STATS = {"started_ns": 1, "connected": 1, "wire_version": WIRE_VERSION, "serial": b"B0042", "lane_mask": 0b101}
+
+
+@pytest.fixture(autouse=True)
+def signals_as_before(monkeypatch):
+    """Commands take over signals; in this process they must not."""
+    monkeypatch.setattr("signal.signal", lambda *_: None)
+
+
+def run(capsys, *arguments):
+    """Exit code, standard output, standard error."""
+    try:
+        code = main([str(a) for a in arguments])
+    except SystemExit as leaving:
+        code = leaving.code
+    return (code, *capsys.readouterr())
+
+
+def command(*arguments):
+    return [sys.executable, "-m", "whisker.cli", *map(str, arguments)]
+
+
+@contextlib.contextmanager
+def live_ring(frames, **stats):
+    name = ring_name()
+    with Writer(name, 4096) as writer:
+        writer.set_stats(**(STATS | stats))
+        writer.set_clock(Clock(0, 10**9, 10**18, 1e9 / LIMITS["clock_hz"], 5000.0))
+        writer.publish(frames)
+        yield name

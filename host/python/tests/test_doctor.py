@@ -1,0 +1,136 @@
+"""`whisker doctor` on hosts with something wrong: what it finds and what it advises."""
+
+import os
+import subprocess
+import sys
+import threading
+
+import pytest
+from commandkit import END_S, STATS, live_ring, run, signals_as_before  # noqa: F401 - a fixture
+from rings import make_frames, ring_name
+
+from whisker import doctor
+from whisker.ring import Reader, Writer
+
+
+@pytest.fixture
+def host(tmp_path):
+    """A host whose bridge is plugged in, allowed, and named by a rule."""
+    device = tmp_path / "sys/bus/usb/devices/1-2"
+    device.mkdir(parents=True)
+    files = {"idVendor": "1209", "idProduct": "0001", "busnum": "1", "devnum": "7", "speed": "480", "serial": "B0042"}
+    for name, content in files.items():
+        (device / name).write_text(content + "\n")
+    node = tmp_path / "dev/bus/usb/001/007"
+    node.parent.mkdir(parents=True)
+    node.write_bytes(b"")
+    (tmp_path / "dev/shm").mkdir()
+    rule = tmp_path / "etc/udev/rules.d/60-whisker.rules"
+    rule.parent.mkdir(parents=True)
+    rule.write_text('ATTR{idVendor}=="1209"\n')
+    return tmp_path
+
+
+def worst(findings):
+    return [finding for finding in findings if finding.level == doctor.FAIL]
+
+
+def publish_until(stop, name):
+    with Writer(name, 4096) as writer:
+        writer.set_stats(**STATS)
+        frames = make_frames(200)
+        frames["lane_mask"] = 0b101
+        while not stop.wait(0.01):
+            frames["tick"] += 200
+            frames["sequence"] += 200
+            writer.publish(frames)
+
+
+def test_doctor_finds_nothing_where_all_is_well(host):
+    name, stop = ring_name(), threading.Event()
+    thread = threading.Thread(target=publish_until, args=(stop, name))
+    thread.start()
+    Reader(name, 10.0).close()
+    findings = doctor.examine(name, host, look_s=0.1)
+    stop.set()
+    thread.join()
+    lines = [finding.line() for finding in findings]
+    assert worst(findings) == [] and any("none lost" in line for line in lines)
+    assert any("60-whisker.rules" in line for line in lines) and any("bridge B0042" in line for line in lines)
+    assert any("lane 2" in line and "CRC" in line and "cable" in line for line in lines)  # 1 % of its samples
+    assert not any("lane 1:" in line for line in lines)  # not in the mask
+
+
+@pytest.mark.parametrize(
+    ("spoil", "text", "remedy"),
+    [
+        (lambda h: (h / "sys/bus/usb/devices/1-2/idVendor").write_text("dead\n"), "no bridge on the USB", "plug it in"),
+        (lambda h: (h / "sys/bus/usb/devices/1-2/speed").write_text("12\n"), "runs at 12 Mbit/s", "USB 2.0"),
+        (lambda h: (h / "dev/bus/usb/001/007").unlink(), "no device file", "container"),
+        (lambda h: (h / "dev/shm").rmdir(), "dev/shm", "tmpfs"),
+    ],
+)
+def test_doctor_names_what_is_wrong_with_the_cable(host, spoil, text, remedy):
+    spoil(host)
+    found = worst([*doctor.usb(host), *doctor.room(host / "dev/shm")])
+    assert len(found) == 1 and text in found[0].text and remedy in found[0].remedy
+
+
+def test_doctor_does_not_miss_a_cable_where_frames_arrive(host):
+    (host / "sys/bus/usb/devices/1-2/idVendor").write_text("dead\n")
+    name, stop = ring_name(), threading.Event()
+    thread = threading.Thread(target=publish_until, args=(stop, name))
+    thread.start()
+    Reader(name, 10.0).close()
+    findings = doctor.examine(name, host, look_s=0.1)
+    stop.set()
+    thread.join()
+    assert worst(findings) == [] and any(f.level == doctor.WARN and "no bridge on" in f.text for f in findings)
+    assert any("no bridge on" in f.text for f in worst(doctor.examine("whisker-none", host)))
+
+
+def test_doctor_names_the_process_in_the_way(host):
+    for pid, name in ((41, "whiskerd"), (42, "thief")):
+        (host / f"proc/{pid}/fd").mkdir(parents=True)
+        (host / f"proc/{pid}/comm").write_text(name + "\n")
+        (host / f"proc/{pid}/fd/3").symlink_to(host / "dev/bus/usb/001/007")
+    found = doctor.usb(host)
+    assert [f.text for f in worst(found)] == ["process 42 (thief) holds the bridge"] and "kill 42" in worst(found)[
+        0
+    ].remedy
+    assert any("whiskerd (process 41) holds" in f.text for f in found)
+
+
+def test_doctor_asks_for_permission_and_rule(host, monkeypatch):
+    monkeypatch.setattr("os.access", lambda *_: False)
+    (host / "etc/udev/rules.d/60-whisker.rules").write_text("other\n")
+    assert "permission denied" in worst(doctor.usb(host))[0].text
+    assert doctor.rules(host)[0].level == doctor.WARN and "60" not in doctor.rules(host)[0].text
+
+
+def test_doctor_reads_the_daemons_mind(host):
+    with live_ring(make_frames(10), connected=0, error=-40) as name:
+        found = worst(doctor.stream(name, 0.01))
+        assert "no bridge is connected; plug it in" in found[0].text and "no frame" in found[1].text
+    with live_ring(make_frames(10), wire_version=9, records_crc=3, reconnects=1) as name, Reader(name) as reader:
+        lines = [finding.line() for finding in doctor.daemon(reader.stats)]
+        assert any("wire version 9" in line and "one release" in line for line in lines)
+        assert any("3 samples damaged" in line for line in lines) and any("1 times" in line for line in lines)
+    assert "start whiskerd" in worst(doctor.stream("whisker-none", 0.01))[0].text
+
+
+def test_doctor_finds_rings_left_behind(tmp_path):
+    name = ring_name()
+    program = f"import os; from whisker.ring import Writer; w = Writer('{name}', 64); os._exit(0)"
+    subprocess.run([sys.executable, "-c", program], check=True, timeout=END_S)
+    try:
+        found = doctor.stale_rings(doctor.Path("/dev/shm"), "whisker")
+        assert any(f"ring {name} was left behind" in f.text and f"rm /dev/shm/{name}" in f.remedy for f in found)
+        assert "died" in worst(doctor.stream(name, 0.01))[0].text
+    finally:
+        os.unlink(f"/dev/shm/{name}")
+
+
+def test_doctor_exits_with_what_it_found(capsys):
+    code, out, _ = run(capsys, "doctor", "--ring", "whisker-none")
+    assert code == 1 and "FAIL  ring whisker-none" in out
