@@ -142,3 +142,12 @@ def test_an_unknown_family_is_named():
         scenes.make("nowhere", 1)
     with pytest.raises(scenes.FamilyError, match="global"):
         scenes.make("anchor+nothing", 1)
+
+
+def test_a_run_becomes_a_scene(tmp_path):
+    made = scenes.make("robot", 17, rows=200)
+    scenes.write_scene(tmp_path / "run" / "scene", made.scene, made.observations)
+    scene, observations = scenes.read_recording(tmp_path / "run")
+    assert scene == made.scene and not differing(observations, made.observations)
+    with pytest.raises(scenes.RecordingKindError, match="folder of a run"):
+        scenes.read_recording(tmp_path)

@@ -1,4 +1,4 @@
-"""`whisker scene`: draws level-0 scenes of a family (whisker.scenes)."""
+"""`whisker scene`: draws level-0 scenes of a family, or makes one of a recording (whisker.scenes)."""
 
 from .. import scenes
 from ..filters import SettingError
@@ -16,6 +16,10 @@ def add(parser) -> None:
     p.add_argument("--steps", type=int, metavar="N", help="rows of 0.1 s (default: the family's)")
     p.add_argument("--out", metavar="DIR", help="folder to write")
     p.add_argument("--list-families", action="store_true", help="print bases and modifiers and leave")
+    example = "whisker scene from build/demo --out scenes/demo"
+    p = add_action(actions, "from", "make a scene of a run's recording", example, from_recording)
+    p.add_argument("recording", help="folder that a run left, as build/demo")
+    p.add_argument("--out", required=True, metavar="DIR", help="folder to write")
 
 
 def make(arguments) -> int:
@@ -28,9 +32,20 @@ def make(arguments) -> int:
     if arguments.seed < 0 or (arguments.steps is not None and arguments.steps < 1):
         raise SettingError("scene make: --seed or --steps is too small; give 0 or more, and 1 or more")
     made = scenes.make(arguments.family, arguments.seed, arguments.steps)
-    try:
-        scenes.write_scene(arguments.out, made.scene, made.observations)
-    except OSError as error:
-        raise unwritable(arguments.out, error) from error
+    _write(arguments.out, made.scene, made.observations)
     print(f"{arguments.out}: {arguments.family}, seed {arguments.seed}, {len(made.observations.t_s)} rows")
     return 0
+
+
+def from_recording(arguments) -> int:
+    scene, observations = scenes.read_recording(arguments.recording)
+    _write(arguments.out, scene, observations)
+    print(f"{arguments.out}: from {arguments.recording}, {len(observations)} rows")
+    return 0
+
+
+def _write(path: str, scene, observations) -> None:
+    try:
+        scenes.write_scene(path, scene, observations)
+    except OSError as error:
+        raise unwritable(path, error) from error

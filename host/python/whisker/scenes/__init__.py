@@ -3,5 +3,16 @@
 from .families import BASES, MODIFIERS, FamilyError, recipe
 from .files import write_scene
 from .making import Made, make
+from .recordings import RecordingKindError, read_recording
 
-__all__ = ["BASES", "MODIFIERS", "FamilyError", "Made", "make", "recipe", "write_scene"]
+__all__ = [
+    "BASES",
+    "MODIFIERS",
+    "FamilyError",
+    "Made",
+    "RecordingKindError",
+    "make",
+    "read_recording",
+    "recipe",
+    "write_scene",
+]

@@ -1,0 +1,51 @@
+"""Scenes from recordings of runs. A reader knows one kind of recording; a new kind is one more entry of READERS."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from ..errors import UserError
+from ..observations import Observations, observations_path, read_observations
+from ..scene import Prior, Scene, load
+from .files import rounded
+
+RUN_SCENE = "scene"  # where a run of `make demo` keeps arena, robot, prior and observation rows
+
+
+class RecordingKindError(UserError):
+    """What is no recording that a scene can be made from; one line."""
+
+
+def read_recording(path) -> tuple[Scene, Observations]:
+    """The scene a recording was made in and its rows; a start that the recording does not tell is uniform.
+
+    RecordingKindError for what no reader knows; SceneError and TableError for a recording whose files are broken.
+    """
+    path = Path(path)
+    for knows, read in READERS:
+        if knows(path):
+            return read(path)
+    raise RecordingKindError(
+        f"{path}: no recording with observation rows; give the folder of a run (it holds {RUN_SCENE}/), or a scene"
+    )
+
+
+def _read_folder(folder: Path) -> tuple[Scene, Observations]:
+    scene = load(folder)
+    rows = read_observations(observations_path(folder), scene)
+    return Scene(scene.arena, scene.robot, scene.prior or Prior("uniform")), rounded(rows)
+
+
+def _is_folder_of_rows(path: Path) -> bool:
+    return observations_path(path).is_file()
+
+
+def _is_run(path: Path) -> bool:
+    return _is_folder_of_rows(path / RUN_SCENE)
+
+
+def _read_run(path: Path) -> tuple[Scene, Observations]:
+    return _read_folder(path / RUN_SCENE)
+
+
+Reader = tuple[Callable[[Path], bool], Callable[[Path], tuple[Scene, Observations]]]
+READERS: list[Reader] = [(_is_run, _read_run), (_is_folder_of_rows, _read_folder)]
