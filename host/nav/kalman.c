@@ -70,7 +70,7 @@ void nav_kalman_correct(struct nav_kalman *k, const struct nav_sighting *s)
     if (!k->linearise(k, s, &l))
         return;
     double innovation = s->z - l.expected, variance = l.variance + s->variance;
-    if (innovation * innovation <= GATE * variance && !(s->at_least && innovation <= 0.0))
+    if (innovation * innovation <= GATE * variance)
         apply(&k->belief, &l, innovation, variance);
 }
 
@@ -86,7 +86,6 @@ static void take_radial(struct nav_kalman *k, int r, double distance, double wei
     bool contact = isfinite(distance);
     double sigma = contact ? robot->radial_sigma : hypot(robot->radial_sigma, edge);
     struct nav_sighting s = {.ray = r,
-                             .at_least = !contact,
                              .z = contact ? distance : length,
                              .variance = sigma * sigma / weight,
                              .reach = contact ? length + 3.0 * pose_sigma(k) : length};

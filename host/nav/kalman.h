@@ -12,8 +12,7 @@ struct nav_sighting {
     int ray;              /* a contact along this object whisker; -1: a border crossed */
     struct nav_tip point; /* crossing: robot frame */
     bool upright;         /* crossing: the border is a line x = z, else y = z */
-    bool at_least;        /* "no contact": the distance is z or more */
-    double z, variance;   /* m, m^2 */
+    double z, variance;   /* m, m^2; "no contact" is a distance of the whisker's length, looked up no further */
     double reach;         /* contact: ranges are looked up to here, m */
 };
 

@@ -99,6 +99,20 @@ static void a_texture_without_a_border_says_nothing(void **state)
     nav_kalman_destroy(k);
 }
 
+static void a_first_window_that_was_wrong_is_no_border(void **state)
+{
+    (void)state;
+    struct nav_problem p = behind_the_border();
+    struct nav_kalman *k = create(&p);
+    for (int i = 1; i <= 8; i++) {
+        drive(k, 0.02);
+        read_texture(k, i > 1); /* one window of tile 0, then the surface that it has been on all the time */
+    }
+    assert_near(k->belief.mean.x, 0.3 + 8 * 0.02, 1e-12);
+    assert_near(k->belief.covariance[0], 0.0025, 1e-12);
+    nav_kalman_destroy(k);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -109,6 +123,7 @@ int main(void)
         cmocka_unit_test(no_contact_pushes_out_of_reach_and_no_further),
         cmocka_unit_test(a_border_crossed_puts_the_tip_on_the_line),
         cmocka_unit_test(a_texture_without_a_border_says_nothing),
+        cmocka_unit_test(a_first_window_that_was_wrong_is_no_border),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

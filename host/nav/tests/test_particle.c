@@ -80,6 +80,8 @@ static void the_probe_says_what_the_likelihood_says(void **state)
 {
     (void)state;
     struct nav_problem p = room();
+    const struct nav_ray aslant = {0.05, 0.02, 0.6, 0.2};
+    p.robot.ray = &aslant;
     struct nav_probe probe;
     assert_int_equal(nav_probe_init(&probe, &p, 0.0), 0);
     struct nav_rng rng;
@@ -117,14 +119,14 @@ static void a_move_is_the_motions_and_its_noise(void **state)
     nav_rng_seed(&rng, 1, 0);
     p.count = N;
     for (long i = 0; i < N; i++) {
-        nav_particles_set(&p, i, (struct nav_pose){1.0, 2.0, NAV_PI / 2.0});
+        nav_particles_set(&p, i, (struct nav_pose){1.0, 2.0, NAV_PI / 6.0});
         p.weight[i] = 1.0f / N;
     }
     nav_particles_move(&p, (struct nav_pose){0.3, 0.1, 0.5}, &(struct nav_noise){0.0004, 0.09}, &rng);
     struct nav_pose mean = nav_particles_mean(&p);
-    assert_near(mean.x, 0.9, 1e-3);
-    assert_near(mean.y, 2.3, 1e-3);
-    assert_near(mean.theta, NAV_PI / 2.0 + 0.5, 1e-2);
+    assert_near(mean.x, 1.0 + 0.3 * sqrt(0.75) - 0.1 * 0.5, 1e-3);
+    assert_near(mean.y, 2.0 + 0.3 * 0.5 + 0.1 * sqrt(0.75), 1e-3);
+    assert_near(mean.theta, NAV_PI / 6.0 + 0.5, 1e-2);
     double c[9];
     nav_particles_covariance(&p, mean, c);
     assert_near(c[0], 0.0004, 2e-5);
@@ -255,6 +257,23 @@ static void weights_that_stay_low_bring_fresh_particles_where_the_row_fits(void 
     destroy(f);
 }
 
+static void weights_never_become_more_uneven_than_allowed(void **state)
+{
+    (void)state;
+    struct nav_problem p = quiet();
+    p.prior.uniform = true;
+    struct particle *f = create(&p);
+    const double texture[] = {0.0, -50.0}, nothing = INFINITY;
+    const double *reading[] = {texture, &nothing};
+    for (int n = 0; n < 30; n++) {
+        predict(f, &(struct nav_motion){.step = {0.02, 0.0, 0.1}});
+        update(f, &(struct nav_evidence){reading, BOTH});
+        assert_true(nav_particles_effective(&f->cloud) >= 0.5 * (double)f->cloud.count);
+    }
+    assert_true(f->cloud.count < 10000); /* half the room has been ruled out: fewer are needed */
+    destroy(f);
+}
+
 static void a_row_that_no_particle_can_explain_changes_no_weight(void **state)
 {
     (void)state;
@@ -284,6 +303,7 @@ int main(void)
         cmocka_unit_test(two_particles_follow_a_robot_that_they_know),
         cmocka_unit_test(the_same_seed_gives_the_same_bytes),
         cmocka_unit_test(weights_that_stay_low_bring_fresh_particles_where_the_row_fits),
+        cmocka_unit_test(weights_never_become_more_uneven_than_allowed),
         cmocka_unit_test(a_row_that_no_particle_can_explain_changes_no_weight),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
