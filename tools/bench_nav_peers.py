@@ -42,7 +42,7 @@ OURS = {
     ("ekf", ""): {},
     ("ukf", ""): {},
     ("foveal", "11x11x11"): {},
-    ("foveal", "inflated"): {"foveal.inflate": 1.0},
+    ("foveal inflated", "11x11x11"): {"foveal.inflate": 1.0},
     ("grid", "5 cm x 10 deg"): {},
     ("particle", "100"): {"particle.count": 100.0},
     ("particle", "500"): {"particle.count": 500.0},
@@ -270,7 +270,11 @@ def save(table: list[dict]) -> None:
 
 def run(build: Path, fresh: bool, seeds: int = SEEDS) -> None:
     known = localise.filter_names()
-    entries = [Entry(*key, seeds, ours(key[0], settings)) for key, settings in OURS.items() if key[0] in known]
+    entries = [
+        Entry(*key, seeds, ours(key[0].split()[0], settings))
+        for key, settings in OURS.items()
+        if key[0].split()[0] in known
+    ]
     entries += mrpt_entries(build, seeds) + python_entries(seeds) + guests(seeds)
     jobs = [(e, family, seed) for e in entries for family in FAMILIES for seed in range(e.seeds)]
     results = {}
