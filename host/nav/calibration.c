@@ -4,9 +4,9 @@
 #include <string.h>
 
 static const double LEAST = 0.7, MOST = 1.3;
-static const double START_SIGMA = 0.05, WALK_VARIANCE = 1e-6; /* per stretch */
+static const double START_SIGMA = 0.1, WALK_VARIANCE = 1e-6; /* per stretch */
 static const double SURE = 0.9;
-static const double TOLD_AGAIN = 4.0; /* a filter's spreads at both ends hide errors that they share: variance factor */
+static const double TOLD_AGAIN = 2.0; /* a filter's spreads at both ends hide errors that they share: variance factor */
 static const double JUMP = 0.5;       /* a ratio this far off is a kidnap or a wrong mode, not the wheels */
 
 void nav_calibration_init(struct nav_calibration *c)

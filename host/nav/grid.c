@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "calibration.h"
 #include "expected.h"
 #include "filter.h"
 #include "gaussian.h"
@@ -28,6 +29,8 @@ struct grid {
     struct nav_noise pending_noise; /* ... and its noise */
     struct nav_gaussian summary;    /* of the belief at the last update: mean near the mode, covariance about it */
     double confidence;
+    struct nav_calibration calibration;
+    struct nav_motion last; /* motion of the row before, as applied */
 };
 
 static void destroy(void *self)
@@ -199,6 +202,7 @@ static void *create(const struct nav_problem *problem)
     if (!g)
         return NULL;
     g->problem = problem;
+    nav_calibration_init(&g->calibration);
     int headings = (int)fmax(round(360.0 / s->grid_cell_deg), 1.0);
     g->layer = calloc((size_t)headings, sizeof *g->layer);
     if (!g->layer ||
@@ -211,14 +215,29 @@ static void *create(const struct nav_problem *problem)
     return g;
 }
 
-static void predict(void *self, const struct nav_motion *motion)
+static void estimate(const void *self, struct nav_estimate *out);
+
+/* The motion as the odometry's learned errors correct it. What is learned comes from the rows before. */
+static struct nav_motion calibrated(struct grid *g, const struct nav_motion *motion)
+{
+    if (g->problem->settings.motion_calibrate < 0.5)
+        return *motion;
+    struct nav_estimate now;
+    estimate(g, &now);
+    nav_calibration_learn(&g->calibration, &g->last, &now);
+    g->last = nav_calibration_apply(&g->calibration, motion);
+    return g->last;
+}
+
+static void predict(void *self, const struct nav_motion *told)
 {
     struct grid *g = self;
-    struct nav_noise noise = nav_motion_noise(&g->problem->robot, &g->problem->settings, motion);
+    struct nav_motion motion = calibrated(g, told);
+    struct nav_noise noise = nav_motion_noise(&g->problem->robot, &g->problem->settings, &motion);
     /* Headings differ within a slice (uniform: width^2 / 12), and a drive spreads what one cell holds. */
-    double width = g->lattice.cell_theta, distance = hypot(motion->step.x, motion->step.y);
+    double width = g->lattice.cell_theta, distance = hypot(motion.step.x, motion.step.y);
     noise.position += width * width / 12.0 * distance * fmax(distance, g->problem->settings.motion_along_m);
-    g->pending = nav_compose(g->pending, motion->step);
+    g->pending = nav_compose(g->pending, motion.step);
     g->pending_noise.position += noise.position;
     g->pending_noise.heading += noise.heading;
 }

@@ -11,9 +11,11 @@ struct nav_settings {
     double radial_ghost;      /* share of readings that report a contact with nothing */
     double radial_edge_m;     /* noticing a contact falls off over this distance around the whisker's length */
     double radial_spacing_m;  /* "no contact" counts in full after the whisker has moved so far since it last did */
-    double motion_along_m;    /* the relative odometry error keeps its value over about this distance ... */
+    double trust_learn;    /* 1: whiskers that keep disagreeing with a sure belief count for less (trust.h); 0: never */
+    double motion_along_m; /* the relative odometry error keeps its value over about this distance ... */
     double motion_turn_rad;   /* ... and this angle */
     double motion_drift_rad;  /* heading error of a straight metre, standard deviation */
+    double motion_calibrate;  /* 1: learns constant errors of the odometry (calibration.h), where the filter can */
     double grid_cell_m;       /* edge of a cell of the grid */
     double grid_cell_deg;     /* its extent in heading; the number of slices is rounded */
     double grid_sub;          /* likelihood: sub-poses per cell edge, */

@@ -100,6 +100,24 @@ static void bad_cells_are_counted_and_not_read(void **state)
     nav_intake_free(&in);
 }
 
+static void a_window_that_favours_no_texture_is_not_read(void **state)
+{
+    (void)state;
+    struct nav_problem p = room();
+    struct nav_intake in;
+    nav_intake_init(&in, &p);
+    const double zero[] = {0.0, 0.0}, constant[] = {-512.5, -512.5}, nan = NAN;
+    struct nav_row row = row_at(0.1, zero, &nan);
+    assert_false(take(&in, &row).news);
+    row = row_at(0.2, constant, &nan);
+    assert_false(take(&in, &row).news);
+    row = row_at(0.3, READ, &nan);
+    assert_near(take(&in, &row).weight[0], 1.0, 0.0); /* nothing was used up */
+    assert_int_equal(in.empty, 2);
+    assert_int_equal(in.bad_cells, 0);
+    nav_intake_free(&in);
+}
+
 static void odometry_is_never_taken_twice_nor_dropped(void **state)
 {
     (void)state;
@@ -276,6 +294,7 @@ int main(void)
         cmocka_unit_test(readings_count_by_how_far_the_whisker_has_moved),
         cmocka_unit_test(turning_moves_a_whisker_by_its_lever),
         cmocka_unit_test(bad_cells_are_counted_and_not_read),
+        cmocka_unit_test(a_window_that_favours_no_texture_is_not_read),
         cmocka_unit_test(odometry_is_never_taken_twice_nor_dropped),
         cmocka_unit_test(every_filter_is_listed_and_no_other_name_is_taken),
         cmocka_unit_test(no_row_makes_any_filter_say_nonsense),
