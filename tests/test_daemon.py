@@ -130,6 +130,20 @@ def begins_anew_after_each_gap(frames: np.ndarray, gaps: int) -> bool:
     )
 
 
+def test_loose_contact_is_survived(tmp_path, ring):
+    with bridge(tmp_path, ring) as (process, cable), Reader(ring, wait_s=10.0) as reader:
+        for blinks in range(1, 6):
+            before = reader.info.published
+            until(lambda n=before: reader.info.published > n + 100, process)
+            cable.pull()
+            cable.put()
+            until(lambda n=blinks: reader.stats.reconnects == n, process)
+        before = reader.info.published
+        until(lambda: reader.info.published > before + 100, process)
+        assert begins_anew_after_each_gap(reader.peek(), 5)
+        finish(process)
+
+
 def test_waits_for_its_first_bridge(tmp_path, ring):
     with (
         bridge(tmp_path, ring, "--unplugged", words=["--wait"]) as (process, cable),

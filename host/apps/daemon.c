@@ -191,12 +191,13 @@ static void log_refusal(int error, const struct whisker_identity *identity)
     }
 }
 
-static void announce(const struct daemon *daemon)
+static void announce(struct daemon *daemon)
 {
     const struct whisker_daemon_stats *told = &daemon->stats.told;
     char line[256];
     snprintf(line, sizeof line, "bridge %s (%s) at %s streams into ring %s", told->serial, told->firmware,
              whisker_device_about(daemon->device)->path, daemon->options->ring);
+    tell_readers(daemon);
     daemon_log(LOG_DETAIL, "%s", line);
     daemon_notify_ready(line);
 }
@@ -238,9 +239,9 @@ static void connect_again(struct daemon *daemon)
         return;
     }
     daemon->told = WHISKER_OK;
+    daemon->stats.told.reconnects += !first;
     announce(daemon);
     if (!first) {
-        daemon->stats.told.reconnects++;
         daemon_log(LOG_NOTE, BRIDGE ": %s is back after %.1f s", daemon->stats.told.serial,
                    (double)(now_ms() - daemon->lost_at_ms) * 1e-3);
     }
@@ -265,10 +266,10 @@ static void lose_bridge(struct daemon *daemon, int error)
 {
     daemon->lost_at_ms = now_ms();
     daemon->told = error;
+    whisker_device_close(daemon->device); /* publishes what had come */
+    daemon->device = NULL;
     daemon_stats_lost(&daemon->stats, error);
     tell_readers(daemon);
-    whisker_device_close(daemon->device);
-    daemon->device = NULL;
     daemon_log_error(LOG_WARN, BRIDGE, error);
     daemon_notify_ready("the bridge has gone; waiting for it");
 }

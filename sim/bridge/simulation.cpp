@@ -238,6 +238,7 @@ void Simulation::unplug()
     rig_.forget_frames();
     deliver_completed();
     usbfs_->unplug();
+    take_requests(); // those handed in meanwhile end as well
     plugged_ = false;
 }
 

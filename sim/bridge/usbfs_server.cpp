@@ -1,5 +1,6 @@
 #include "usbfs_server.h"
 
+#include <future>
 #include <mutex>
 #include <stdexcept>
 #include <string>
@@ -153,9 +154,15 @@ void UsbfsServer::plug(const Descriptors &descriptors)
     umockdev_testbed_uevent(state_->testbed, SYSFS_PATH, "add");
 }
 
+// Waits for umockdev's thread: after that no client of this device can hand in another request.
 void UsbfsServer::unplug()
 {
-    post([session = &state_->session] { session->set_node(""); });
+    std::promise<void> done;
+    post([session = &state_->session, &done] {
+        session->set_node("");
+        done.set_value();
+    });
+    done.get_future().wait();
     umockdev_testbed_uevent(state_->testbed, SYSFS_PATH, "remove");
     umockdev_testbed_remove_device(state_->testbed, SYSFS_PATH);
     unlink(node_of(state_->number).c_str()); // umockdev leaves it
