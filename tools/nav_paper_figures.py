@@ -55,9 +55,10 @@ def likelihoods(arena: Arena, data: dict) -> Figure:
     floor(world, arena)
     for n, pose in enumerate(data["poses"], start=1):
         triangle(world, pose, facecolor="white", edgecolor="black", zorder=4)
-        behind = (-17 * math.cos(pose[2]), -17 * math.sin(pose[2]))
+        aside = (-30, 13 * (n % 3 - 1))
+        leader = {"arrowstyle": "-", "linewidth": 0.8, "shrinkB": 0}
         style = {"fontsize": 11, "weight": "bold", "ha": "center", "va": "center", "zorder": 5}
-        world.annotate(str(n), pose[:2], xytext=behind, textcoords="offset points", **style)
+        world.annotate(str(n), pose[:2], xytext=aside, textcoords="offset points", arrowprops=leader, **style)
     x, y, heading = data["poses"][0]
     corner = (x - FOVEA_M / 2, y - FOVEA_M / 2)
     turn = {"angle": math.degrees(heading), "rotation_point": "center"}
