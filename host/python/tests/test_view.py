@@ -2,15 +2,19 @@
 
 import asyncio
 import json
-import logging
 import os
+import signal
 import socket
+import subprocess
+import sys
+from urllib.request import urlopen
 
 import numpy as np
 import pytest
-from viewkit import NODES, Block, made_frames, page, ring_name, ring_of, spoil, view_of
+from viewkit import NODES, PATIENCE_S, Block, made_frames, nothing_logged, page, ring_name, ring_of, spoil, view_of
 from websockets.exceptions import ConnectionClosed
 
+from whisker.cli import main as whisker_main
 from whisker.protocol import LANES
 from whisker.ring import Clock, Writer
 from whisker.view.__main__ import main
@@ -19,13 +23,7 @@ from whisker.view.pyramid import BINS
 from whisker.view.rings import find_rings
 from whisker.view.server import MESSAGE_BYTES
 
-
-@pytest.fixture(autouse=True)
-def nothing_logged(caplog):
-    """An exception inside the server is a line in its log: there must be none."""
-    caplog.set_level(logging.WARNING)
-    yield
-    assert [record.getMessage() for record in caplog.records] == []
+__all__ = ["nothing_logged"]  # a fixture that every test here uses
 
 
 def test_traces_equal_the_ring():
@@ -116,13 +114,13 @@ def test_no_ring_then_one_then_its_end_then_a_new_one():
         async with view_of(name) as port, page(port) as p:
             await p.ask(type="subscribe", topic="status", ring=name)
             told = await p.status_where(lambda s: s["state"] == "waiting")
-            assert "there is no ring of this name" in told["trouble"]
+            assert "there is no ring of this name" in told["trouble"]["text"]
             await p.traces(name, width=1, lanes=1)
             with ring_of(made_frames(0, 300), name):
                 await p.status_where(lambda s: s["state"] == "live")
                 await p.bins_until(300)
             told = await p.status_where(lambda s: s["state"] == "ended")
-            assert "closed the ring" in told["trouble"]
+            assert told["trouble"]["name"] == "CLOSED"
             with ring_of(made_frames(0, 200, seed=1), name):
                 told = await p.status_where(lambda s: s["state"] == "live" and s["frames"] == 500)
                 assert told["restarts"] == 1
@@ -201,7 +199,9 @@ def test_shared_memory_that_is_no_ring_is_refused_with_the_reason(tmp_path):
     async def scenario():
         async with view_of(name) as port, page(port) as p:
             await p.ask(type="subscribe", topic="status", ring=name)
-            assert "another layout version" in (await p.status_where(lambda s: s["state"] == "refused"))["trouble"]
+            assert (
+                "another layout version" in (await p.status_where(lambda s: s["state"] == "refused"))["trouble"]["text"]
+            )
 
     try:
         asyncio.run(scenario())
@@ -308,3 +308,28 @@ def test_bad_arguments_are_one_line(capfd, arguments, complaint):
         code = leaving.code
     err = capfd.readouterr().err
     assert code != 0 and complaint in err and err.count("\n") == 1
+
+
+def test_help_is_the_same_for_both_commands_and_shows_an_example(capsys):
+    texts = []
+    for call, words in ((main, ["--help"]), (whisker_main, ["view", "--help"])):
+        with pytest.raises(SystemExit) as leaving:
+            call(words)
+        assert leaving.value.code == 0
+        texts.append(capsys.readouterr().out)
+    for text in texts:
+        for option in ("--ring", "--port", "--host", "--allow-host", "--open"):
+            assert option in text
+    assert "whisker-view --ring whisker --open" in texts[0] and "whisker view --ring whisker --open" in texts[1]
+
+
+def test_the_program_serves_prints_its_address_and_ends_at_sigterm():
+    with ring_of(made_frames(0, 64)) as writer:
+        command = [sys.executable, "-m", "whisker.view", "--port", "0", "--ring", writer.name]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+            url = process.stdout.readline().strip()
+            with urlopen(url) as answer:
+                assert answer.status == 200
+            process.send_signal(signal.SIGTERM)
+            assert process.wait(PATIENCE_S) == 0
+            assert process.stderr.read() == ""

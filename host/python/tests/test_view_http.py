@@ -3,13 +3,12 @@
 import asyncio
 import base64
 import hashlib
-import logging
 import random
 import re
 import resource
 
 import pytest
-from viewkit import PATIENCE_S, made_frames, page, ring_of, view_of
+from viewkit import PATIENCE_S, made_frames, nothing_logged, page, ring_of, view_of
 from websockets.exceptions import InvalidStatus
 
 from whisker.view.guard import Guard
@@ -18,6 +17,8 @@ from whisker.view.server import CLIENTS_MAX, CONNECTIONS_MAX
 
 UPGRADE = "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA=="
 FUZZ_INPUTS = 20_000
+
+__all__ = ["nothing_logged"]  # a fixture that every test here uses
 
 
 async def ask(port: int, request: bytes, frames: bytes = b"") -> bytes:
@@ -55,14 +56,6 @@ def answer_to(path: str, *headers: str) -> bytes:
             return await ask(port, get(path, *(header.replace("PORT", str(port)) for header in headers)))
 
     return asyncio.run(scenario())
-
-
-@pytest.fixture(autouse=True)
-def nothing_logged(caplog):
-    """An exception inside the server is a line in its log: there must be none."""
-    caplog.set_level(logging.WARNING)
-    yield
-    assert [record.getMessage() for record in caplog.records] == []
 
 
 def test_the_page_is_served_with_headers_that_allow_only_itself():

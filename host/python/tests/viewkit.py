@@ -2,12 +2,14 @@
 
 import asyncio
 import json
+import logging
 import os
 from collections import defaultdict, deque
 from contextlib import asynccontextmanager, contextmanager
 from itertools import count
 
 import numpy as np
+import pytest
 from websockets.asyncio.client import connect
 
 from whisker.protocol import CODES, LANES, LIMITS, STATUS_CODE_SHIFT
@@ -19,6 +21,14 @@ from whisker.view.topics import BLOCK
 NODES = 3
 PATIENCE_S = 20.0  # for what must come; a test that fails ends
 _numbers = count()
+
+
+@pytest.fixture(autouse=True)
+def nothing_logged(caplog):
+    """An exception inside the server is a line in its log: there must be none."""
+    caplog.set_level(logging.WARNING)
+    yield
+    assert [record.getMessage() for record in caplog.get_records("call")] == []
 
 
 def ring_name() -> str:

@@ -48,8 +48,11 @@ class ViewServer:
         self._hub, self._guard, self._page = hub, guard, Page()
         self._clients = 0
 
-    def answer(self, connection: ServerConnection, request: Request) -> Response | None:
+    async def answer(self, connection: ServerConnection, request: Request) -> Response | None:
         """The response to a plain request; None: it is a page's live connection, go on."""
+        if connection.protocol.eof_sent:  # garbage came after the request and was answered with the end of the stream
+            connection.transport.abort()
+            await connection.wait_closed()
         refusal = self._guard.refuse(request.headers)
         if refusal:
             return _text(*refusal)

@@ -156,7 +156,7 @@ class Tap:
         return {
             "ring": self.name,
             "state": self.state,
-            "trouble": str(self._trouble) if self._trouble else None,
+            "trouble": {"name": self._trouble.name, "text": str(self._trouble)} if self._trouble else None,
             "attached_s": round(now - self._since, 1) if reader else None,
             "age_s": round(now - self._last_frame, 3) if self.tally.frames else None,
             "tick_s": self.tick_s,

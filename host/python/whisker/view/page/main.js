@@ -121,8 +121,14 @@ wire.on('hello', (hello) => {
 
 wire.on('rings', (message) => {
   rings = message.rings;
-  $('ring').replaceChildren(...rings.map((name) => new Option(name, name, false, name === view.ring)));
+  listRings();
 });
+
+/* The ring looked at stays in the list when it has gone. */
+function listRings() {
+  const names = rings.includes(view.ring) ? rings : [...rings, view.ring];
+  $('ring').replaceChildren(...names.map((name) => new Option(name, name, false, name === view.ring)));
+}
 
 wire.on('status', (status) => {
   if (status.ring !== view.ring) return;

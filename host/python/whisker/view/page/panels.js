@@ -14,7 +14,7 @@ function duration(s) {
 }
 
 function nanoseconds(ns) {
-  return ns < 1e3 ? `${Math.round(ns)} ns` : ns < 1e6 ? `${(ns / 1e3).toFixed(ns < 1e4 ? 1 : 0)} µs` : `${(ns / 1e6).toFixed(1)} ms`;
+  return ns < 1e3 ? `${Math.round(ns)} ns` : ns < 1e6 ? `${(ns / 1e3).toFixed(ns < 1e4 ? 1 : 0)} µs` : ns < 1e9 ? `${(ns / 1e6).toFixed(1)} ms` : duration(ns / 1e9);
 }
 
 /* An element with text or children; text is never read as HTML. */
@@ -41,12 +41,15 @@ function advice(s, others) {
       return [false, `There is no ring named “${s.ring}” yet`, goesOn, [
         `With a bridge plugged in, start the daemon: \`whiskerd --ring ${s.ring}\``,
         'Something is wrong? `whisker doctor` finds out what.',
-        'Without hardware: `make demo` runs a simulated robot; its ring appears above while it runs.', ...other]];
+        `Without hardware: \`whisker bridge-sim --ring ${s.ring}\` simulates a bridge with whiskers on it.`, ...other]];
     case 'refused':
-      return [true, 'This ring cannot be read', s.trouble, other];
-    case 'ended':
-      return [true, 'The ring has ended', `${s.trouble}. What was received is still shown. ${goesOn}`, [
-        `Start the daemon again: \`whiskerd --ring ${s.ring}\``, ...other]];
+      return [true, 'This ring cannot be read', s.trouble.text, other];
+    case 'ended': {
+      const closed = s.trouble.name === 'CLOSED';
+      const why = closed ? 'Its writer has closed it' : s.trouble.text;
+      return [!closed, 'The ring has ended', `${why}. What was received is still shown. ${goesOn}`, [
+        `To start the daemon again: \`whiskerd --ring ${s.ring}\``, ...other]];
+    }
     case 'stalled':
       return [true, s.age_s === null ? 'No frame yet' : `No frame for ${duration(s.age_s)}`, `${s.daemon?.trouble ?? 'The daemon runs, but no frames come'}. ${goesOn}`, [
         'Check the cable and the power of the bridge.', '`whisker doctor` finds out why.']];

@@ -5,6 +5,7 @@ const HEAD = 280; // px of the window that are not for traces
 const ROW_MIN = 26;
 const ROW_MAX = 130;
 const SPANS = [0.5, 1, 1.5, 2, 3, 5, 7, 10, 15, 20, 30, 50, 70, 100, 180]; // degrees a strip may show
+const QUIET = 1; // degrees: an automatic height does not go below, or noise would look like motion
 const SHRINK = 2.5; // an automatic height shrinks when it is so many times too large
 const LABELS_MIN = 30; // px of a strip that has room for the labels of both its ends
 const GLYPH = ['α', 'β'];
@@ -77,7 +78,7 @@ class Traces {
       const need = { auto: needs[n], alike: most }[this.view.range];
       const before = strip.degrees;
       if (need === undefined) strip.degrees = Number(this.view.range);
-      else if (need > before || need * SHRINK < before) strip.degrees = SPANS.find((span) => span >= need) ?? SPANS.at(-1);
+      else if (need > before || Math.max(need, QUIET) * SHRINK < before) strip.degrees = SPANS.find((span) => span >= Math.max(need, QUIET)) ?? SPANS.at(-1);
       if (!extents[n]) strip.degrees = 0;
       else this.centre(strip, ...extents[n], strip.degrees !== before);
     });
