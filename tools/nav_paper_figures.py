@@ -58,6 +58,7 @@ def likelihoods(arena: Arena, data: dict) -> Figure:
         aside = (-30, 13 * (n % 3 - 1))
         leader = {"arrowstyle": "-", "linewidth": 0.8, "shrinkB": 0}
         style = {"fontsize": 11, "weight": "bold", "ha": "center", "va": "center", "zorder": 5}
+        style["bbox"] = {"boxstyle": "circle,pad=0.15", "facecolor": "white", "linewidth": 0.6}
         world.annotate(str(n), pose[:2], xytext=aside, textcoords="offset points", arrowprops=leader, **style)
     x, y, heading = data["poses"][0]
     corner = (x - FOVEA_M / 2, y - FOVEA_M / 2)
