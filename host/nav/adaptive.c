@@ -125,7 +125,7 @@ static void *create(const struct nav_problem *problem)
         return NULL;
     a->problem = problem;
     nav_rng_seed(&rng, problem->seed, 1);
-    if (adaptive_sense_init(&a->sense, problem, (size_t)problem->settings.adaptive_most) ||
+    if (adaptive_sense_init(&a->sense, problem, (size_t)adaptive_cloud_room(&problem->settings)) ||
         adaptive_cloud_init(&a->cloud, problem) || adaptive_global_init(&a->global, problem) ||
         adaptive_log_init(&a->log, problem) || adaptive_doubt_init(&a->doubt, &a->sense, &rng)) {
         destroy(a);
@@ -156,17 +156,18 @@ static void sleep(struct adaptive *a)
 static void take_over(struct adaptive *a, double share)
 {
     const struct nav_settings *s = &a->problem->settings;
-    double count = fmin(fmax(s->adaptive_least, a->global.crowd * s->adaptive_per_bin), s->adaptive_most / 2.0);
+    double count = fmin(fmax(s->adaptive_least, a->global.crowd * s->adaptive_per_bin), (double)a->cloud.room / 2.0);
     if (a->local)
         adaptive_cloud_scale(&a->cloud, 1.0 - share);
     else
         a->cloud.count = 0;
     adaptive_global_draw(&a->global, &a->cloud, (long)count, share, ahead(a));
-    a->touched += (long)count;
     if (a->local && share > 0.5) /* what contradicted the local belief was not the whiskers' fault */
         adaptive_doubt_teach(&a->doubt, a->sense.likelihood, a->sense.likelihood);
     a->local = true;
+    a->cloud.moved = a->cloud.count;
     adaptive_cloud_thin(&a->cloud, true);
+    a->touched += a->cloud.moved;
     sleep(a);
 }
 
@@ -196,7 +197,11 @@ static void work(struct adaptive *a)
     if (!a->awake)
         return;
     a->global.touched = a->global.distinct = 0;
-    adaptive_global_work(&a->global, &a->log, (long)a->problem->settings.adaptive_budget - a->touched);
+    const struct nav_settings *s = &a->problem->settings;
+    /* As long as the robot is likelier where it seems to be, a look elsewhere must not take long. */
+    double budget = odds(a) < 0.0 ? fmin(s->adaptive_doubt_budget, s->adaptive_budget) : s->adaptive_budget;
+    /* Kept back: a cloud drawn from what is found. */
+    adaptive_global_work(&a->global, &a->log, (long)budget - 2 * a->cloud.room - a->touched);
     a->touched += a->global.touched;
     a->evaluations += a->global.touched;
     a->distinct += a->global.distinct;

@@ -12,9 +12,14 @@ static const double GRACE_M = 0.01;
 static const double BLOCKED = -7.0;
 static const double MUTATION = 0.03, NUDGE = 0.2;
 
+long adaptive_cloud_room(const struct nav_settings *s)
+{
+    return (long)fmax(fmin(s->adaptive_most, s->adaptive_budget / 10.0), 16.0);
+}
+
 int adaptive_cloud_init(struct adaptive_cloud *cloud, const struct nav_problem *problem)
 {
-    *cloud = (struct adaptive_cloud){.problem = problem, .images = 1, .room = (long)problem->settings.adaptive_most};
+    *cloud = (struct adaptive_cloud){.problem = problem, .images = 1, .room = adaptive_cloud_room(&problem->settings)};
     nav_rng_seed(&cloud->rng, problem->seed, 0);
     cloud->at = calloc((size_t)cloud->room, sizeof *cloud->at);
     cloud->spare = calloc((size_t)cloud->room, sizeof *cloud->spare);

@@ -47,6 +47,9 @@ struct adaptive_summary {
     double near;
 };
 
+/* Most hypotheses: adaptive.most, and a tenth of the budget, since each may be touched up to five times per row. */
+long adaptive_cloud_room(const struct nav_settings *);
+
 /* 0, or -1 without memory; adaptive_cloud_free either way. */
 int adaptive_cloud_init(struct adaptive_cloud *, const struct nav_problem *);
 void adaptive_cloud_free(struct adaptive_cloud *);

@@ -17,6 +17,8 @@ struct adaptive_value {
     float value;
 };
 
+enum { ADAPTIVE_SUB = 2 }; /* poses of the table per cell edge, and per slice's width */
+
 /* Cells are counted by powers of two of their mass, from 1 down. */
 enum { ADAPTIVE_SIZES = 40 };
 
@@ -94,6 +96,20 @@ void adaptive_global_summarise(struct adaptive_global *);
 
 /* Centre of cell n. */
 struct nav_pose adaptive_global_centre(const struct adaptive_global *, size_t n);
+
+/* Parts of a job, slice by slice: headings blurred into scratch, scratch made the belief, a slice moved and weighed. */
+void adaptive_global_turn(struct adaptive_global *, int slice);
+void adaptive_global_turned(struct adaptive_global *);
+void adaptive_global_move(struct adaptive_global *, int slice);
+
+/* Lines of a slice that hold mass. */
+int adaptive_global_lines(const struct adaptive_global *, int slice);
+
+/* Cells of a slice. */
+static inline size_t adaptive_global_plane(const struct adaptive_global *g)
+{
+    return (size_t)g->ny * (size_t)g->nx;
+}
 
 size_t adaptive_global_cells(const struct adaptive_global *);
 size_t adaptive_global_bytes(const struct adaptive_global *);

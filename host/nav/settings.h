@@ -38,6 +38,7 @@ struct nav_settings {
     double particle_recovery;      /* slow rate at which the mean weight is followed; 0: no recovery by injection */
     double particle_recovery_fast; /* fast rate */
     double adaptive_budget;        /* most cells and hypotheses touched per row */
+    double adaptive_doubt_budget;  /* while the robot is likelier to be where it seems to be than elsewhere */
     double adaptive_most;          /* hypotheses in the cloud, at most */
     double adaptive_least;         /* and at least; between, by the bins they occupy: */
     double adaptive_per_bin;       /* so many in each */

@@ -1,0 +1,190 @@
+/* The adaptive filter: work within its budget, the same bytes from a seed, found and found again, twins kept. */
+#include "adaptive_symmetry.h"
+
+#include <stdlib.h>
+
+#include "near.h"
+#include "wander.h"
+
+enum { ROWS = 400, ROOM = 200000 };
+
+static const struct nav_pose FAR = {1.6, 0.4, 2.0};
+
+static struct nav_estimate run(struct nav_filter *f, struct wander *w, long rows, double budget)
+{
+    struct nav_estimate e = {.confidence = 0.0};
+    for (long k = 0; k < rows; k++) {
+        nav_filter_step(f, wander_on(w), &e);
+        assert_true((double)e.touched <= budget);
+    }
+    return e;
+}
+
+static void it_finds_the_robot_from_nothing_and_stops_looking(void **state)
+{
+    (void)state;
+    for (uint64_t seed = 1; seed <= 5; seed++) {
+        struct wander w = wander_new(seed);
+        w.problem.prior.uniform = true;
+        struct nav_filter *f = nav_filter_new("adaptive", &w.problem);
+        struct nav_estimate first = run(f, &w, 1, w.problem.settings.adaptive_budget);
+        struct nav_estimate last = run(f, &w, ROWS, w.problem.settings.adaptive_budget);
+        assert_true(first.confidence < 0.3 && last.confidence > 0.8);
+        assert_true(wander_error(&w, &last) < 0.1);
+        assert_true(first.states > 10000 && last.states < 3000);
+        nav_filter_free(f);
+    }
+}
+
+static void it_notices_a_kidnap_and_finds_the_robot_again(void **state)
+{
+    (void)state;
+    for (uint64_t seed = 11; seed <= 15; seed++) {
+        struct wander w = wander_new(seed);
+        double budget = w.problem.settings.adaptive_budget;
+        struct nav_filter *f = nav_filter_new("adaptive", &w.problem);
+        struct nav_estimate e = run(f, &w, 100, budget);
+        assert_true(wander_error(&w, &e) < 0.1);
+        w.pose = FAR;
+        double least = 1.0;
+        for (int k = 0; k < 120; k++)
+            least = fmin(least, run(f, &w, 1, budget).confidence);
+        assert_true(least < 0.9); /* doubt shows */
+        e = run(f, &w, ROWS, budget);
+        assert_true(wander_error(&w, &e) < 0.1 && e.confidence > 0.8);
+        nav_filter_free(f);
+    }
+}
+
+static void no_row_takes_more_than_its_budget(void **state)
+{
+    (void)state;
+    struct wander w = wander_new(21);
+    w.problem.prior.uniform = true;
+    assert_int_equal(nav_settings_set(&w.problem.settings, "adaptive.budget", 40000.0), 0);
+    struct nav_filter *f = nav_filter_new("adaptive", &w.problem);
+    run(f, &w, ROWS, 40000.0);
+    w.pose = FAR;
+    struct nav_estimate e = run(f, &w, 2 * ROWS, 40000.0);
+    assert_true(wander_error(&w, &e) < 0.1);
+    nav_filter_free(f);
+}
+
+static void a_seed_gives_the_same_bytes_and_another_seed_others(void **state)
+{
+    (void)state;
+    const uint64_t seeds[] = {3, 3, 4};
+    struct nav_estimate e[3];
+    for (int n = 0; n < 3; n++) {
+        struct wander w = wander_new(31);
+        w.problem.seed = seeds[n];
+        struct nav_filter *f = nav_filter_new("adaptive", &w.problem);
+        run(f, &w, 50, INFINITY);
+        w.pose = FAR;
+        e[n] = run(f, &w, ROWS, INFINITY);
+        nav_filter_free(f);
+    }
+    assert_memory_equal(&e[0], &e[1], sizeof e[0]);
+    assert_memory_not_equal(&e[0].pose, &e[2].pose, sizeof e[0].pose);
+}
+
+/* Belief within 0.3 m of a pose's place and 1 rad of its heading. */
+static double mass_near(const struct nav_component *c, long n, struct nav_pose pose)
+{
+    double sum = 0.0;
+    for (long k = 0; k < n; k++) {
+        bool near = hypot(c[k].pose.x - pose.x, c[k].pose.y - pose.y) < 0.3 &&
+                    fabs(nav_wrap(c[k].pose.theta - pose.theta)) < 1.0;
+        sum += near ? c[k].mass : 0.0;
+    }
+    return sum;
+}
+
+static void twins_neither_drift_nor_die(void **state)
+{
+    (void)state;
+    struct wander w = wander_new(41);
+    w.problem.arena.floor = WANDER_TWIN_FLOOR;
+    w.problem.arena.boxes = 0;
+    w.problem.prior.uniform = true;
+    struct nav_filter *f = nav_filter_new("adaptive", &w.problem);
+    struct nav_component *c = calloc(ROOM, sizeof *c);
+    int both = 0;
+    for (int k = 0; k < 100; k++) {
+        run(f, &w, 20, w.problem.settings.adaptive_budget);
+        long n = nav_filter_components(f, c, ROOM);
+        double here = mass_near(c, n, w.pose);
+        double there = mass_near(c, n, (struct nav_pose){2.0 - w.pose.x, 2.0 - w.pose.y, w.pose.theta + NAV_PI});
+        if (here + there < 0.9)
+            continue;
+        both++;
+        assert_true(fabs(here / (here + there) - 0.5) < 0.05);
+    }
+    assert_true(both > 60);
+    free(c);
+    nav_filter_free(f);
+}
+
+static void what_is_not_read_makes_it_no_surer(void **state)
+{
+    (void)state;
+    struct wander w = wander_new(51);
+    struct nav_filter *f = nav_filter_new("adaptive", &w.problem);
+    struct nav_estimate e = run(f, &w, 100, INFINITY);
+    double confidence = e.confidence, variance = e.covariance[0] + e.covariance[4];
+    for (int k = 0; k < 100; k++) {
+        const struct nav_row *row = wander_on(&w);
+        for (int i = 0; i < WANDER_TIPS * WANDER_CLASSES; i++)
+            w.texture[i] = k % 2 ? NAN : INFINITY;
+        for (int r = 0; r < WANDER_RAYS; r++)
+            w.radial[r] = k % 3 ? NAN : -1.0;
+        nav_filter_step(f, row, &e);
+        assert_true(e.confidence <= confidence + 1e-9 && e.covariance[0] + e.covariance[4] >= variance * 0.999);
+    }
+    nav_filter_free(f);
+}
+
+static void a_prior_inside_a_box_starts_with_the_whole_arena(void **state)
+{
+    (void)state;
+    struct wander w = wander_new(61);
+    w.problem.prior = (struct nav_prior){.mean = {0.5, 1.35, 0.0}, .sigma = {0.001, 0.001, 0.01}};
+    struct nav_filter *f = nav_filter_new("adaptive", &w.problem);
+    struct nav_estimate e = run(f, &w, 1, INFINITY);
+    assert_true(e.states > 10000);
+    e = run(f, &w, ROWS, INFINITY);
+    assert_true(wander_error(&w, &e) < 0.1);
+    nav_filter_free(f);
+}
+
+static void symmetries_are_seen(void **state)
+{
+    (void)state;
+    struct wander w = wander_new(0);
+    struct nav_arena arena = w.problem.arena;
+    assert_int_equal(adaptive_symmetry(&arena), 1);
+    arena.floor = WANDER_TWIN_FLOOR;
+    assert_int_equal(adaptive_symmetry(&arena), 1); /* the box has no partner */
+    arena.boxes = 0;
+    assert_int_equal(adaptive_symmetry(&arena), 2);
+    static const uint8_t PLAIN[16] = {0};
+    arena.floor = PLAIN;
+    assert_int_equal(adaptive_symmetry(&arena), 4);
+    arena.size_x = 1.9; /* the last column of tiles is cut */
+    assert_int_equal(adaptive_symmetry(&arena), 1);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(it_finds_the_robot_from_nothing_and_stops_looking),
+        cmocka_unit_test(it_notices_a_kidnap_and_finds_the_robot_again),
+        cmocka_unit_test(no_row_takes_more_than_its_budget),
+        cmocka_unit_test(a_seed_gives_the_same_bytes_and_another_seed_others),
+        cmocka_unit_test(twins_neither_drift_nor_die),
+        cmocka_unit_test(what_is_not_read_makes_it_no_surer),
+        cmocka_unit_test(a_prior_inside_a_box_starts_with_the_whole_arena),
+        cmocka_unit_test(symmetries_are_seen),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
