@@ -210,6 +210,39 @@ static void nothing_read_makes_no_filter_surer(void **state)
     }
 }
 
+/* Rows that carry no information (unreadable, constant, repeated, late) after rows that did. */
+static void rows_without_information_make_no_filter_surer(void **state)
+{
+    (void)state;
+    struct nav_problem p = room();
+    const double wide[] = {INFINITY, -INFINITY}, zero[] = {0.0, 0.0}, half[] = {0.0, NAN}, none = (double)INFINITY;
+    const double *const useless[] = {NOT_READ, wide, zero, half};
+    const double nan = NAN, below = -3.0, beyond = 7.0, *const odd[] = {&nan, &below, &beyond};
+    for (int n = 0; nav_filter_name(n); n++) {
+        struct nav_filter *f = nav_filter_new(nav_filter_name(n), &p);
+        struct nav_estimate e, before;
+        for (int i = 0; i < 5; i++) {
+            struct nav_row row = row_at(0.1 * i, READ, &none);
+            nav_filter_step(f, &row, &before);
+        }
+        for (int i = 0; i < 60; i++) {
+            /* Every fourth row comes from the past and does carry readings. */
+            bool late = i % 4 == 3;
+            struct nav_row row =
+                row_at(late ? 0.05 : 1.0 + 0.1 * i, late ? READ : useless[i % 4], late ? &none : odd[i % 3]);
+            row.odometry[0] = i % 2 ? 0.02 : NAN;
+            nav_filter_step(f, &row, &e);
+            assert_sane(&e);
+            /* A cloud's moments wander a little when noise is drawn. */
+            assert_true(e.covariance[0] + e.covariance[4] >= 0.99 * (before.covariance[0] + before.covariance[4]));
+            assert_true(e.covariance[8] >= 0.99 * before.covariance[8]);
+            assert_true(e.confidence <= before.confidence + 0.01);
+            before = e;
+        }
+        nav_filter_free(f);
+    }
+}
+
 /* Moments of the listed belief about the estimate. */
 static void components_are_the_belief(void **state)
 {
@@ -299,6 +332,7 @@ int main(void)
         cmocka_unit_test(every_filter_is_listed_and_no_other_name_is_taken),
         cmocka_unit_test(no_row_makes_any_filter_say_nonsense),
         cmocka_unit_test(nothing_read_makes_no_filter_surer),
+        cmocka_unit_test(rows_without_information_make_no_filter_surer),
         cmocka_unit_test(components_are_the_belief),
         cmocka_unit_test(the_callers_arrays_may_go_after_creation),
         cmocka_unit_test(settings_are_set_by_name_and_within_their_range),

@@ -1,5 +1,6 @@
 #include "lattice.h"
 
+#include "lattice_rows.h"
 #include "near.h"
 
 static const struct nav_noise NO_NOISE = {0.0, 0.0};
@@ -157,6 +158,39 @@ static void near_counts_the_mass_around_a_pose_across_the_heading_seam(void **st
     nav_lattice_free(&l);
 }
 
+/* The inner loops, plain and as this machine runs them, on rows that end anywhere. */
+static void wide_vectors_give_the_same_bits(void **state)
+{
+    (void)state;
+    enum { N = 53, ROOM = N + 4 * NAV_LANES };
+    const struct nav_rows *kind[] = {nav_rows_plain(), nav_rows_best()};
+    float in[6][ROOM], out[2][3][ROOM] = {{{0.0f}}}, *const row = in[0] + NAV_LANES;
+    struct nav_row_sums sums[2] = {{.peak = {0.0f}}, {.peak = {0.0f}}};
+    const float w[8] = {0.01f, 0.02f, 0.03f, 0.04f, 0.05f, 0.06f, 0.07f, 0.08f};
+    for (int i = 0; i < 6 * ROOM; i++)
+        in[i / ROOM][i % ROOM] = (float)((i * 7919 % 1013) / 1013.0) + 1e-7f * (float)i;
+    for (int i = 0; i < ROOM; i++)
+        in[5][i] = i < NAV_LANES + N ? in[5][i] : 0.0f;
+    const float *const from[] = {row, in[1] + NAV_LANES, in[2] + NAV_LANES, in[3] + NAV_LANES};
+    for (int k = 0; k < 2; k++) {
+        kind[k]->blur(row, 0.1f, 0, N, out[k][0] + NAV_LANES);
+        kind[k]->mix(in[4] + NAV_LANES, 0.1f, from, w, 0, N, out[k][1] + NAV_LANES);
+        const struct nav_row_weigh weigh = {from[0], from[1], from[2], in[5] + NAV_LANES,    from[3], 0.7f, 0.15f, 0.1f,
+                                            1e-5f,   0,       N,       out[k][2] + NAV_LANES};
+        kind[k]->weigh(&weigh, &sums[k]);
+    }
+    assert_memory_equal(out[0], out[1], sizeof out[0]);
+    assert_memory_equal(&sums[0], &sums[1], sizeof sums[0]);
+    double mass = 0.0;
+    for (int i = 0; i < N; i++)
+        mass += (double)out[0][2][NAV_LANES + i];
+    double lanes = 0.0;
+    for (int k = 0; k < NAV_LANES; k++)
+        lanes += (double)sums[0].moment[0][k];
+    assert_near(lanes, mass, 1e-5);
+    assert_near((double)out[0][0][NAV_LANES + 3], 0.8 * (double)row[3] + 0.1 * (double)(row[2] + row[4]), 1e-6);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -164,6 +198,7 @@ int main(void)
         cmocka_unit_test(turning_and_driving_follow_the_pose),
         cmocka_unit_test(noise_adds_the_variance_asked_for_and_keeps_the_mass),
         cmocka_unit_test(mass_poured_between_shifted_slices_keeps_its_place),
+        cmocka_unit_test(wide_vectors_give_the_same_bits),
         cmocka_unit_test(mass_that_leaves_the_lattice_is_lost),
         cmocka_unit_test(a_prior_fills_cells_with_its_integral),
         cmocka_unit_test(near_counts_the_mass_around_a_pose_across_the_heading_seam),
