@@ -51,7 +51,7 @@ static const struct entry ENTRIES[] = {
     ENTRY(adaptive, budget, 120000.0, 40000.0, 1000000000.0),
     ENTRY(adaptive, doubt_budget, 120000.0, 10000.0, 1000000000.0),
     ENTRY(adaptive, most, 2000.0, 16.0, 100000.0),
-    ENTRY(adaptive, least, 250.0, 2.0, 100000.0),
+    ENTRY(adaptive, least, 350.0, 2.0, 100000.0),
     ENTRY(adaptive, per_bin, 8.0, 0.1, 1000.0),
     ENTRY(adaptive, bin_m, 0.025, 0.001, 10.0),
     ENTRY(adaptive, bin_deg, 5.0, 0.1, 360.0),
