@@ -62,7 +62,7 @@ long nav_gaussian_components(const struct nav_gaussian *g, struct nav_component 
         out[n] = (struct nav_component){
             .pose = {g->mean.x + l[0] * u, g->mean.y + l[1] * u + l[2] * v,
                      nav_wrap(g->mean.theta + l[3] * u + l[4] * v + l[5] * w)},
-            .sigma_m = spacing / sqrt(12.0) * fmin(l[0], l[2]),
+            .sigma_m = spacing / sqrt(12.0) * fmax(hypot(l[0], l[1]), l[2]), /* no gaps along the long axis */
             .sigma_rad = spacing_turn / sqrt(12.0) * l[5],
             .mass = share(i, ACROSS) * share(j, ACROSS) * share(k, TURNS),
         };

@@ -4,6 +4,7 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "gaussian.h"
 #include "near.h"
 
 static const double PI = NAV_PI;
@@ -34,6 +35,24 @@ static void levels_and_area_of_a_normal(void **state)
     }
     assert_near(r.area_m2, PI * 0.2 * 0.1 * -2.0 * log(0.1), 0.003);
     assert_near(nav_belief_level(c, n, 9.0, 9.0), 1.0, 0.0);
+}
+
+static void a_long_thin_gaussian_leaves_no_gaps(void **state)
+{
+    (void)state;
+    static struct nav_component c[10000];
+    /* Standard deviations 0.2 along (1, 1) and 0.05 across. */
+    const double a = (0.04 + 0.0025) / 2.0, b = (0.04 - 0.0025) / 2.0;
+    const struct nav_gaussian g = {{1.0, 1.0, 0.0}, {a, b, 0.0, b, a, 0.0, 0.0, 0.0, 0.01}};
+    long n = nav_gaussian_components(&g, c, 10000);
+    assert_in_range(n, 1, 10000);
+    for (double z = 0.2; z < 3.0; z += 0.2) { /* the 90 % contour is at 2.15 */
+        double along = 0.2 * z / sqrt(2.0), across = 0.05 * z / sqrt(2.0);
+        if (fabs(z - 2.15) < 0.25)
+            continue;
+        assert_int_equal(nav_belief_level(c, n, 1.0 + along, 1.0 + along) <= 0.9, z < 2.15);
+        assert_int_equal(nav_belief_level(c, n, 1.0 + across, 1.0 - across) <= 0.9, z < 2.15);
+    }
 }
 
 static void a_region_may_have_two_parts(void **state)
@@ -101,11 +120,9 @@ static void bins_keep_what_is_outside_and_all_headings(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(levels_and_area_of_a_normal),
-        cmocka_unit_test(a_region_may_have_two_parts),
-        cmocka_unit_test(a_point_mass_and_no_mass),
-        cmocka_unit_test(bins_share_a_bump_by_overlap),
-        cmocka_unit_test(bins_keep_what_is_outside_and_all_headings),
+        cmocka_unit_test(levels_and_area_of_a_normal),  cmocka_unit_test(a_long_thin_gaussian_leaves_no_gaps),
+        cmocka_unit_test(a_region_may_have_two_parts),  cmocka_unit_test(a_point_mass_and_no_mass),
+        cmocka_unit_test(bins_share_a_bump_by_overlap), cmocka_unit_test(bins_keep_what_is_outside_and_all_headings),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

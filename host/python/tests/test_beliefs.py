@@ -1,0 +1,40 @@
+"""What every registered filter owes whoever judges it: bumps whose masses sum to 1, and no certainty out of nothing."""
+
+import numpy as np
+import pytest
+
+from whisker import localise, scenes
+
+ROWS, BLIND = 200, 60
+
+
+@pytest.fixture(scope="module")
+def made():
+    return scenes.make("raw+global", 21, ROWS + BLIND)
+
+
+SHORT = pytest.mark.xfail(reason="its masses fall short or exceed 1 while the arena-wide part is awake", strict=False)
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=SHORT) if n == "adaptive" else n for n in localise.filter_names()]
+)
+def test_masses_sum_to_one(name, made):
+    running = localise.Filter(name, made.scene, seed=3)
+    for first in range(0, ROWS, 20):
+        running.replay(made.observations, first, 20)
+        bumps = running.components()
+        assert bumps["mass"].sum() == pytest.approx(1.0, abs=1e-3)
+        assert (bumps["mass"] >= 0.0).all() and np.isfinite(bumps["pose"]).all()
+        assert running.bins().sum() == pytest.approx(1.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("name", localise.filter_names())
+def test_nothing_read_makes_nothing_surer(name, made):
+    """Six seconds with no reading: confidence falls or stays, but for what resampling and rounding may move."""
+    rows = made.observations
+    rows.texture[ROWS:], rows.radial_m[ROWS:] = np.nan, np.nan
+    table, _ = localise.Filter(name, made.scene, seed=3).replay(rows, 0, ROWS + BLIND)
+    after = table["confidence"][ROWS - 1 :]
+    assert (after - np.minimum.accumulate(after)).max() <= 0.02
+    assert after[-1] <= after[0] + 1e-6
