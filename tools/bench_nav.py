@@ -161,8 +161,8 @@ def pareto(bench: Bench) -> None:
         for title, name, settings, seeds in bench.sizes()
     }
     data = nav_figures.pareto(bench.trials(wanted, "pareto"))
-    peers = bench.results / "nav_peers.json"
-    data["peers"] = json.loads(peers.read_text()) if peers.exists() else {}
+    measured = ROOT / "bench/results/nav_peers.json"  # bench_nav_peers' rows: on fewer seeds of the same families
+    data["peers"] = nav_figures.peers(json.loads(measured.read_text()) if measured.exists() else [], bench.filters)
     bench.save("pareto", data, ("pareto", nav_charts.pareto(data)))
 
 

@@ -38,7 +38,7 @@ def pareto(data: dict) -> Figure:
             x, y = c["step_us_median"]["median"], 1000 * c["error_median_m"]["median"]
             tail = [[0.0], [max(c["step_us_p99"]["median"] - x, 0.0)]]
             span = [[y - 1000 * c["error_median_m"]["low"]], [1000 * c["error_median_m"]["high"] - y]]
-            look = style(title) if title in table else {"marker": "D", "color": "0.4"}
+            look = style(title) if title in table else {"marker": "D", "color": "0.4", "markerfacecolor": "none"}
             ax.errorbar(x, y, xerr=tail, yerr=span, **look, markersize=7, linewidth=0.8)
             ax.annotate(title, (x, y), textcoords="offset points", xytext=(4, 4), fontsize=6)
         ax.set(xscale="log", yscale="log", title=family, xlabel="us per step, median (tail: p99)")

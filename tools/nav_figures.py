@@ -62,6 +62,21 @@ def pareto(done) -> dict:
     return {"families": by_row(done, ledger)}
 
 
+def peers(rows: list[dict], ours: list[str]) -> dict[str, dict]:
+    """bench_nav_peers' rows of filters that are not ours, as points of the Pareto chart by family and title."""
+    out = {}
+    for row in rows:
+        if row["filter"] in ours:
+            continue
+        low, high = row["error_median_quartiles_m"]
+        out.setdefault(row["family"], {})[f"{row['filter']} {row['setting']}".strip()] = {
+            "error_median_m": {"median": row["error_median_m"], "low": low, "high": high},
+            "step_us_median": {"median": row["step_us_median"]},
+            "step_us_p99": {"median": row["step_us_p99"]},
+        }
+    return out
+
+
 def tracking(done) -> dict:
     """Ledgers by family and filter, and the median ratio of errors to the reference's on the same seeds."""
     table = by_row(done, ledger)
