@@ -253,8 +253,9 @@ def test_a_page_that_asks_nonsense_or_too_much_or_too_long_is_cut_off():
                     async with page(port) as p:
                         for _ in range(times):
                             await p.socket.send(message)
-                        while True:
-                            await p.socket.recv()
+                        async with asyncio.timeout(PATIENCE_S):
+                            while True:
+                                await p.socket.recv()
             await steady.traces(writer.name, lanes=1)
             await steady.bins_until(10)
 
