@@ -186,7 +186,10 @@ def test_readers_know_bridge_and_clock(tmp_path, ring):
 
 
 def test_killed_daemon_hinders_no_next_one(tmp_path, ring):
-    script = "trap : TERM; $D & a=$!; read go; kill -9 $a; wait $a; $D & b=$!; read go; kill $b; wait $b"
+    # Stopped first, and the next one waits: umockdev, unlike a kernel, notices the end of a process only a moment later,
+    # and not at all while an answer is on its way to it.
+    end = "kill -STOP $a; sleep 0.05; kill -KILL $a; wait $a"
+    script = f"trap : TERM; $D & a=$!; read go; {end}; $D --wait & b=$!; read go; kill $b; wait $b"
     with running(shell(tmp_path, ring, script), stdin=subprocess.PIPE) as process, Reader(ring, wait_s=10.0) as reader:
         until(lambda: reader.info.published > 100, process)
         first = reader.info.generation

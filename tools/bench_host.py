@@ -242,7 +242,7 @@ def draw_cable(times: dict) -> Figure:
         values = 1e3 * np.array(times[event])
         axes.plot(values, np.full(len(values), row), marker, color="0.25", fillstyle="none")
         axes.annotate(f"median {np.median(values):.0f} ms", (1.0, row), xycoords=("axes fraction", "data"), va="center")
-    axes.set(yticks=range(len(EVENTS)), yticklabels=EVENTS.values(), xlabel="time (ms)", xscale="log")
+    axes.set(yticks=range(len(EVENTS)), yticklabels=EVENTS.values(), xlabel="time (ms)", xlim=(0, None))
     axes.set_ylim(len(EVENTS) - 0.5, -0.5)
     axes.grid(axis="x", which="both", linewidth=0.3)
     return figure
@@ -259,11 +259,11 @@ def draw_instructions(counts: dict) -> Figure:
         axes.bar(range(len(BATCHES)), values, 0.6, base, label=name, color=shade, hatch=hatch, edgecolor="0.2")
         base += values
     for x, total in enumerate(base):
-        share = f"{total:.0f}: {100 * total * HZ / ATOM_HZ:.2f} % of the Atom"
+        share = f"{total:.0f}\n{100 * total * HZ / ATOM_HZ:.2f} % of the Atom"
         axes.annotate(share, (x, total), textcoords="offset points", xytext=(0, 3), ha="center", fontsize=8)
     axes.set(xticks=range(len(BATCHES)), xticklabels=[f"{b}\n({b / HZ * 1e3:g} ms)" for b in BATCHES])
     axes.set(xlabel="frames of one USB transfer (how long the first of them waits)", ylabel="instructions per frame")
-    axes.margins(y=0.12)
+    axes.margins(y=0.3)
     axes.legend(fontsize=8)
     return figure
 

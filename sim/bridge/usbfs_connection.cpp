@@ -92,8 +92,12 @@ UMockdevIoctlData *UsbfsConnection::argument_data(size_t size) const
     return resolve(umockdev_ioctl_client_get_arg(client_), 0, size);
 }
 
+// To one that died there is no answer: umockdev would wait for it for good.
 void UsbfsConnection::answer(int error)
 {
+    if (died_) {
+        return;
+    }
     umockdev_ioctl_client_complete(client_, error ? -1 : 0, error);
 }
 
@@ -103,7 +107,8 @@ int UsbfsConnection::read_urb(Urb &urb)
 {
     reading_.urb.reset(argument_data(sizeof(usbdevfs_urb)));
     reading_.buffer.reset();
-    if (!reading_.urb) {
+    died_ = !reading_.urb;
+    if (died_) {
         return EFAULT;
     }
     const usbdevfs_urb &given = *native(reading_.urb.get());
@@ -114,7 +119,8 @@ int UsbfsConnection::read_urb(Urb &urb)
     if (size > 0) {
         reading_.buffer.reset(resolve(reading_.urb.get(), offsetof(usbdevfs_urb, buffer), size));
     }
-    if (size > 0 && !reading_.buffer) {
+    died_ = size > 0 && !reading_.buffer;
+    if (died_) {
         return EFAULT;
     }
     urb.length = size;
