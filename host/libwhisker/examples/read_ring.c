@@ -27,8 +27,8 @@ static void show(const struct whisker_reader *reader, const struct whisker_frame
         return;
     }
     printf("tick %" PRIu64 " at %.4f s: alpha %+.2f deg, beta %+.2f deg\n", frame->tick,
-           (double)whisker_clock_to_realtime(&clock, frame->time_cycles) * 1e-9, (sample->alpha - 0x8000) * 180.0 / 65536,
-           (sample->beta - 0x8000) * 180.0 / 65536);
+           (double)whisker_clock_to_realtime(&clock, frame->time_cycles) * 1e-9,
+           (sample->alpha - 0x8000) * 180.0 / 65536, (sample->beta - 0x8000) * 180.0 / 65536);
 }
 
 /* Takes what is there. Counts only once advance has confirmed that the writer did not overtake us meanwhile. */
