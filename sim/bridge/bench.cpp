@@ -2,6 +2,7 @@
 
 #include <cerrno>
 #include <chrono>
+#include <cmath>
 #include <map>
 #include <set>
 #include <stdexcept>
@@ -15,6 +16,7 @@ namespace
 constexpr size_t TRANSFERS = 4;
 constexpr size_t TRANSFER_BYTES = 4096;
 constexpr double FIELD_RANGE_DEG = 60;
+constexpr double FIELD_STEP_DEG = 25.0; // a node does not believe more than 30 in a tick
 constexpr uint8_t HID_SET_REPORT_TYPE = 0x21;
 constexpr uint8_t HID_SET_REPORT = 0x09;
 constexpr uint16_t HID_FEATURE = 0x0300;
@@ -214,12 +216,14 @@ void Bench::enumerate_again()
 // Every lane its own angles, so that lanes, axes and bytes cannot be mistaken for each other.
 void Bench::draw_fields()
 {
-    const auto angle = [this] {
-        return FIELD_RANGE_DEG * (2.0 * static_cast<double>(generator_() >> 11) * 0x1.0p-53 - 1.0);
+    const auto wander = [this](double &angle) {
+        angle += FIELD_STEP_DEG * (2.0 * static_cast<double>(generator_() >> 11) * 0x1.0p-53 - 1.0);
+        if (std::abs(angle) > FIELD_RANGE_DEG)
+            angle = std::copysign(2.0 * FIELD_RANGE_DEG, angle) - angle;
     };
     for (sim_field &field : fields_) {
-        field.alpha_deg = angle();
-        field.beta_deg = angle();
+        wander(field.alpha_deg);
+        wander(field.beta_deg);
     }
     sent_.push_back(fields_);
 }
