@@ -58,4 +58,14 @@ static inline void ring_signal_raise(ring_signal *signal)
     atomic_store_explicit(signal, value + 1, memory_order_release);
 }
 
+/* Between two looks of a reader that looks on: leaves the core to others that share it. */
+static inline void ring_pause(void)
+{
+#if defined(__x86_64__) || defined(__i386__)
+    __builtin_ia32_pause();
+#elif defined(__aarch64__) || defined(__arm__)
+    __asm__ volatile("yield");
+#endif
+}
+
 #endif

@@ -48,6 +48,7 @@ static void start_reading(struct whisker_reader *reader)
     reader->peeked = 0;
     reader->waits_since_ms = 0;
     reader->has_sequence = false;
+    reader->in_haste = false;
 }
 
 int whisker_reader_attach(const char *name, int timeout_ms, struct whisker_reader **reader)

@@ -29,6 +29,7 @@ struct whisker_reader {
     int64_t waits_since_ms; /* when the writer was first told that this reader waits; 0: not yet */
     uint32_t sequence;      /* of the last frame left behind */
     bool has_sequence;
+    bool in_haste; /* the last wait had not to sleep */
 };
 
 /* Maps the ring at this path, or WRITER_DEAD and what ring_map_existing may return. */

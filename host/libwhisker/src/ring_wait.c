@@ -9,6 +9,8 @@
  * reader began to, the reader looks for itself. */
 #define UNHEARD_MS 30
 #define UNHEARD_STEP_MS 1
+/* Looks that a reader in haste makes before it sleeps: a few microseconds, less than falling asleep and being woken. */
+#define LOOKS 100
 
 /* 0: there is something to peek; TIMEOUT: not yet; CLOSED, RING_LOST: never again. The state is read before the head,
  * so frames published before the close are not missed. */
@@ -58,9 +60,24 @@ static int longest_sleep_ms(struct whisker_reader *reader)
     return heard ? LIVENESS_MS : UNHEARD_STEP_MS;
 }
 
+/* While frames come faster than a reader can sleep between them it looks on for a moment. It is in haste as long as
+ * that finds something: a reader of a slow stream never looks in vain. */
+static void look_on(struct whisker_reader *reader)
+{
+    int looks = reader->in_haste ? LOOKS : 1;
+    while (looks > 0 && look(reader) == WHISKER_ERROR_TIMEOUT) {
+        ring_pause();
+        looks--;
+    }
+    reader->in_haste = looks > 0;
+}
+
 int whisker_reader_wait(struct whisker_reader *reader, int timeout_ms)
 {
     const int64_t started = timeout_ms > 0 ? ring_now_ms() : 0;
+    if (timeout_ms != 0) {
+        look_on(reader);
+    }
     for (;;) {
         const uint32_t signal = ring_signal_load(&reader->map.header->signal);
         const int seen = look_closely(reader);

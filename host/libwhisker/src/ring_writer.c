@@ -76,7 +76,8 @@ static struct whisker_frame *reserve(struct whisker_ring *ring, size_t count)
         return NULL;
     }
     if (ring->head + count > ring->claim) {
-        ring->claim = ring->head + count;
+        const uint64_t step = ring->map.capacity / RING_CLAIM_PARTS;
+        ring->claim = (ring->head + count + step - 1) / step * step;
         ring_store(&ring->map.header->claim, ring->claim);
     }
     ring_fence_before_writing();
