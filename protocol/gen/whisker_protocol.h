@@ -94,6 +94,7 @@
 #define WHISKER_CODE_RESET_POWER 8u /* the node restarted after a brown-out or by its reset pin; its sensor starts */
 #define WHISKER_CODE_RESET_WATCHDOG 9u /* the node restarted because its firmware stood still; its sensor starts */
 #define WHISKER_CODE_RESET_TRAP 10u /* the node restarted after a trap (address, stack, arithmetic, oscillator, DMA); its sensor starts */
+#define WHISKER_CODE_OVERRUN 13u /* a byte of the sensor was lost within the node (SPI overflow) */
 #define WHISKER_CODE_ABSENT 32u /* nothing answers on this lane: all ones */
 #define WHISKER_CODE_LINK_CRC 33u /* the record's CRC is wrong */
 #define WHISKER_CODE_LINK_TICK 34u /* the record belongs to another tick: stale or slipped */
@@ -126,6 +127,7 @@
     X(RESET_POWER, 8, "the node restarted after a brown-out or by its reset pin; its sensor starts", "check the 3.3 V supply and the reset pin's pull-up") \
     X(RESET_WATCHDOG, 9, "the node restarted because its firmware stood still; its sensor starts", "update the firmware; report what led to it") \
     X(RESET_TRAP, 10, "the node restarted after a trap (address, stack, arithmetic, oscillator, DMA); its sensor starts", "check the supply's decoupling; update the firmware") \
+    X(OVERRUN, 13, "a byte of the sensor was lost within the node (SPI overflow)", "none if rare; else check the supply's decoupling") \
     X(ABSENT, 32, "nothing answers on this lane: all ones", "connect a node or take the lane out of the lane mask") \
     X(LINK_CRC, 33, "the record's CRC is wrong", "check the lane's cable; lower the SPI clock") \
     X(LINK_TICK, 34, "the record belongs to another tick: stale or slipped", "check the SYNC and select lines of this lane") \

@@ -91,6 +91,7 @@ localparam [31:0] CODE_STEP = 7; // the angle jumped further in one tick than a 
 localparam [31:0] CODE_RESET_POWER = 8; // the node restarted after a brown-out or by its reset pin; its sensor starts
 localparam [31:0] CODE_RESET_WATCHDOG = 9; // the node restarted because its firmware stood still; its sensor starts
 localparam [31:0] CODE_RESET_TRAP = 10; // the node restarted after a trap (address, stack, arithmetic, oscillator, DMA); its sensor starts
+localparam [31:0] CODE_OVERRUN = 13; // a byte of the sensor was lost within the node (SPI overflow)
 localparam [31:0] CODE_ABSENT = 32; // nothing answers on this lane: all ones
 localparam [31:0] CODE_LINK_CRC = 33; // the record's CRC is wrong
 localparam [31:0] CODE_LINK_TICK = 34; // the record belongs to another tick: stale or slipped

@@ -1,4 +1,6 @@
 /* DMA: each channel moves one item per request of the interrupt it is tied to. */
+#include <string.h>
+
 #include "dspic_chip.h"
 
 static uint16_t *reg(struct dspic *chip, unsigned channel, unsigned address)
@@ -52,12 +54,43 @@ static void serve(struct dspic *chip, unsigned channel)
         end_block(chip, channel);
 }
 
-void dma_request(struct dspic *chip, unsigned irq)
+static void serve_all(struct dspic *chip, unsigned irq)
 {
     for (unsigned c = 0; c < DMA_CHANNELS; c++) {
         if (*reg(chip, c, DMA0CON) & DMACON_CHEN && (*reg(chip, c, DMA0REQ) & 0x7Fu) == irq && irq != 0)
             serve(chip, c);
     }
+}
+
+static bool wanted(const struct dspic *chip, unsigned irq)
+{
+    for (unsigned c = 0; c < DMA_CHANNELS; c++) {
+        const unsigned at = (DMA0CON + c * DMA_STRIDE) / 2u;
+        if (chip->sfr[at] & DMACON_CHEN && (chip->sfr[at + 1u] & 0x7Fu) == irq && irq != 0)
+            return true;
+    }
+    return false;
+}
+
+void dma_request(struct dspic *chip, unsigned irq)
+{
+    if (chip->parameters.dma_cycles == 0) {
+        serve_all(chip, irq);
+    } else if (chip->requested < sizeof chip->requests / sizeof *chip->requests && wanted(chip, irq)) {
+        const uint64_t at = chip->now_fs + chip->parameters.dma_cycles * chip->cycle_fs;
+        chip->requests[chip->requested++] = (struct request){at, (uint8_t)irq};
+        plan_event(chip, EVENT_DMA, chip->requests[0].at_fs);
+    }
+}
+
+void dma_event(struct dspic *chip)
+{
+    const unsigned irq = chip->requests[0].irq;
+    chip->requested--;
+    memmove(chip->requests, chip->requests + 1, chip->requested * sizeof *chip->requests);
+    if (chip->requested > 0)
+        plan_event(chip, EVENT_DMA, chip->requests[0].at_fs);
+    serve_all(chip, irq);
 }
 
 /* Enabling begins a block anew; FORCE asks for one item at once. */

@@ -70,11 +70,14 @@ static void handle(struct dspic *chip, enum event event)
     case EVENT_T3:
         timer_event(chip, event - EVENT_T1);
         break;
+    case EVENT_DMA:
+        dma_event(chip);
+        break;
     case EVENT_PLL:
         system_pll_event(chip);
         break;
     case EVENT_WATCHDOG:
-        throw_out(chip, RCON_WDTO);
+        watchdog_event(chip);
         break;
     case EVENT_POWER:
         throw_out(chip, 0);
@@ -235,9 +238,11 @@ void dspic_input(struct dspic *chip, unsigned rp, bool level, uint64_t now_fs)
     if (!chip->powered)
         return;
     spi_input(chip, rp, level);
-    const bool falling = *sfr(chip, INTCON2) & INTCON2_INT1EP;
-    if (pin_input_field(chip, RPINR0, 8u) == rp && level != falling)
+    const uint16_t edges = *sfr(chip, INTCON2);
+    if (pin_input_field(chip, RPINR0, 8u) == rp && level != (bool)(edges & INTCON2_INT1EP))
         irq_raise(chip, IRQ_INT1);
+    if (pin_input_field(chip, RPINR1, 0) == rp && level != (bool)(edges & INTCON2_INT2EP))
+        irq_raise(chip, IRQ_INT2);
 }
 
 static void be_reset(struct dspic *chip, uint64_t cause)
@@ -251,17 +256,37 @@ void dspic_disturb_reset(struct dspic *chip, uint16_t cause)
         enter(chip, be_reset, nothing, cause);
 }
 
+enum { TRAP_LEVEL = 15 }; /* above every interrupt */
+
 static void be_trapped(struct dspic *chip, uint64_t trap)
 {
     static const uint16_t FLAG[] = {INTCON1_OSCFAIL, INTCON1_STKERR, INTCON1_ADDRERR, INTCON1_MATHERR, INTCON1_DMACERR};
     *sfr(chip, INTCON1) |= FLAG[trap];
+    chip->level = TRAP_LEVEL;
     chip->wiring.trap(chip->wiring.context, (enum dspic_trap)trap);
+    chip->level = 0;
 }
 
 void dspic_disturb_trap(struct dspic *chip, enum dspic_trap trap)
 {
     if (chip->powered)
         enter(chip, be_trapped, nothing, trap);
+}
+
+void dspic_disturb_collision(struct dspic *chip, unsigned channel, bool peripheral)
+{
+    *sfr(chip, DMACS0) |= (uint16_t)(1u << (channel + (peripheral ? DMACS0_PERIPHERAL_SHIFT : 0u)));
+    dspic_disturb_trap(chip, DSPIC_TRAP_DMA);
+}
+
+void dspic_disturb_hang(struct dspic *chip)
+{
+    chip->hung = chip->powered;
+}
+
+void dspic_disturb_unread(struct dspic *chip, unsigned spi)
+{
+    *sfr(chip, spi == 1u ? SPI1STAT : SPI2STAT) |= SPISTAT_SPIRBF;
 }
 
 uint64_t dspic_busy_fs(const struct dspic *chip)

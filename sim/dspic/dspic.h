@@ -1,6 +1,6 @@
 /* The dsPIC33FJ128MC802 as its firmware sees it: registers with their side effects, in virtual time.
  *
- * Modelled: SPI1, SPI2, DMA with ping-pong, T1 to T3, INT1, pin select, ports, interrupt priorities and nesting, clock
+ * Modelled: SPI1, SPI2, DMA with ping-pong, T1 to T3, INT1, INT2, pin select, ports, interrupt priorities and nesting, clock
  * switch behind its unlock sequence, watchdog, flash self-programming with power cuts, reset causes. Firmware runs as
  * native code; it takes time only where it touches the chip: each access a cycle, each interrupt its entry, exit and a
  * fixed number of cycles for the work between. Interrupts nest at accesses. Not modelled: the CPU's own instructions,
@@ -32,6 +32,7 @@ struct dspic_parameters {
     uint16_t work_cycles;   /* of an interrupt besides its register accesses */
     uint16_t pll_lock_us;   /* from the switch to LOCK */
     uint16_t watchdog_ms;   /* FWDT's period at the nominal LPRC */
+    uint8_t dma_cycles;     /* from a peripheral's request to its transfer; not documented */
     bool pins_lock_once;    /* FOSC's IOL1WAY: a pin map that was locked stays locked until reset */
     uint64_t seed;          /* of what a power cut leaves in the flash */
 };
@@ -87,6 +88,15 @@ enum dspic_drive dspic_output(const struct dspic *chip, unsigned rp);
 /* A brown-out or the reset pin (RCON_BOR, RCON_EXTR), a trap: at the present time. */
 void dspic_disturb_reset(struct dspic *chip, uint16_t cause);
 void dspic_disturb_trap(struct dspic *chip, enum dspic_trap trap);
+
+/* The CPU stands still, interrupts and all, until something resets it; peripherals and DMA go on. */
+void dspic_disturb_hang(struct dspic *chip);
+
+/* CPU and DMA channel write at once, to a word of the DMA RAM or to a peripheral: its bit in DMACS0, and the trap. */
+void dspic_disturb_collision(struct dspic *chip, unsigned channel, bool peripheral);
+
+/* SPI 1 or 2 finds its receive buffer full, though nothing was left unread: the next word overflows. */
+void dspic_disturb_unread(struct dspic *chip, unsigned spi);
 
 /* Flash as 24-bit words, FLASH_WORDS of them, for first programming and for tests; kept without power. */
 uint32_t *dspic_flash(struct dspic *chip);

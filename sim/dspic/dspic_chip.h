@@ -9,7 +9,18 @@
 #define NEVER UINT64_MAX
 
 /* What happens by itself, each at one time. */
-enum event { EVENT_SPI1, EVENT_SPI2, EVENT_T1, EVENT_T2, EVENT_T3, EVENT_PLL, EVENT_WATCHDOG, EVENT_POWER, EVENTS };
+enum event {
+    EVENT_SPI1,
+    EVENT_SPI2,
+    EVENT_T1,
+    EVENT_T2,
+    EVENT_T3,
+    EVENT_DMA,
+    EVENT_PLL,
+    EVENT_WATCHDOG,
+    EVENT_POWER,
+    EVENTS
+};
 
 struct spi {
     uint16_t transmit, receive; /* the two halves of SPIxBUF */
@@ -26,6 +37,11 @@ struct spi {
 struct timer {
     uint64_t since_fs; /* when the count was `from` */
     uint16_t from;
+};
+
+struct request {
+    uint64_t at_fs;
+    uint8_t irq;
 };
 
 struct dma {
@@ -45,11 +61,15 @@ struct dspic {
     uint16_t cause;  /* of the reset under way; 0: power cut */
     unsigned level;  /* priority the CPU runs at; 0: main loop */
     bool in_start;   /* the main loop is not yet reached */
+    bool idle;       /* the main loop has stopped the CPU until the next interrupt */
+    bool hung;       /* the CPU does nothing any more */
     uint16_t sfr[DSPIC_SFR_END / 2u];
     uint16_t dma_ram[DSPIC_DMA_RAM_WORDS];
     struct spi spi[2];
     struct timer timer[3];
     struct dma dma[DMA_CHANNELS];
+    struct request requests[4]; /* of DMA, oldest first */
+    unsigned requested;
     uint16_t inputs;                      /* levels that the outside drives, RB0 to RB15 */
     uint8_t spi_pin[2][2];                /* RP number that SPI n's SCK and SDO go to; 16: none */
     bool look;                            /* an interrupt may have become ready */
@@ -89,6 +109,7 @@ bool spi_drives(const struct dspic *chip, unsigned function, bool *level); /* ou
 
 /* dma.c */
 void dma_request(struct dspic *chip, unsigned irq);
+void dma_event(struct dspic *chip);
 void dma_wrote(struct dspic *chip, unsigned address, uint16_t old);
 
 /* timer.c */
@@ -108,6 +129,7 @@ void system_reset(struct dspic *chip, uint16_t cause);
 void system_clock(struct dspic *chip);
 void system_pll_event(struct dspic *chip);
 void watchdog_restart(struct dspic *chip);
+void watchdog_event(struct dspic *chip);
 
 /* flash.c */
 void flash_wrote(struct dspic *chip, unsigned address, uint16_t old);

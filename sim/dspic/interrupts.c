@@ -45,6 +45,7 @@ static void serve(struct dspic *chip, unsigned irq, unsigned its)
     const unsigned before = chip->level;
     const uint64_t since = chip->now_fs;
     chip->level = its;
+    chip->idle = false;
     chip->interrupts++;
     dspic_spend(chip, chip->parameters.entry_cycles);
     chip->wiring.interrupt(chip->wiring.context, irq);
@@ -59,7 +60,7 @@ void irq_take(struct dspic *chip)
 {
     unsigned its;
     bool woke = false;
-    if (!chip->look)
+    if (!chip->look || chip->hung)
         return;
     chip->look = false;
     for (unsigned irq = best(chip, &its); irq < IRQ_COUNT && its > threshold(chip); irq = best(chip, &its)) {

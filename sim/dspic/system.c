@@ -59,9 +59,21 @@ void dspic_clear_watchdog(struct dspic *chip)
     dspic_spend(chip, 1u);
 }
 
+/* The model's time passes in dspic_run_until. The watchdog begins anew here too (C). */
 void dspic_idle(struct dspic *chip)
 {
-    (void)chip; /* the model's time passes in dspic_run_until */
+    chip->idle = true;
+    watchdog_restart(chip);
+}
+
+/* It wakes an idle CPU and resets any other (C). */
+void watchdog_event(struct dspic *chip)
+{
+    if (!chip->idle || chip->hung || chip->level > 0)
+        dspic_reset(chip, RCON_WDTO);
+    *sfr(chip, RCON) |= RCON_WDTO | RCON_IDLE;
+    chip->idle = false;
+    chip->wiring.loop(chip->wiring.context);
 }
 
 /* Values after any reset; RCON keeps what it knew and adds the cause. */
@@ -75,6 +87,8 @@ void system_reset(struct dspic *chip, uint16_t cause)
     for (enum event e = EVENT_SPI1; e < EVENT_POWER; e++)
         chip->due_fs[e] = NEVER;
     chip->level = 0;
+    chip->idle = chip->hung = false;
+    chip->requested = 0;
     chip->high_key = chip->low_key = chip->flash_key = 0;
     chip->pins_were_locked = false;
     *sfr(chip, RCON) = rcon | cause;

@@ -38,6 +38,13 @@ void mlx90333_power_on(struct mlx90333 *sensor, uint64_t now_ns, const struct ml
     start(sensor, now_ns);
 }
 
+void mlx90333_supply(struct mlx90333 *sensor, uint64_t now_ns, bool on)
+{
+    start(sensor, now_ns);
+    sensor->restarting = true;
+    sensor->dark = !on;
+}
+
 void mlx90333_set_field(struct mlx90333 *sensor, const struct mlx90333_field *field)
 {
     if (sensor->fault != SIM_SENSOR_FROZEN)
@@ -134,24 +141,25 @@ static void latch(struct mlx90333 *sensor, uint64_t now_ns)
         sensor->reset_due = true; /* once this frame has been sent */
 }
 
-static void check_byte_start(struct mlx90333 *sensor, uint64_t now_ns)
+/* True if the byte before was over long enough ago. */
+static bool check_byte_start(struct mlx90333 *sensor, uint64_t now_ns)
 {
-    const uint64_t gap = now_ns - sensor->fall_ns;
-    if (sensor->fresh)
-        require(sensor, now_ns - sensor->select_ns >= sensor->t6, MLX90333_SELECT_LOW);
-    else if (sensor->byte == 1)
-        require(sensor, gap >= sensor->t7, MLX90333_START_GAP);
-    else
-        require(sensor, gap >= sensor->t2, MLX90333_BYTE_GAP);
+    const uint64_t gap = now_ns - (sensor->fresh ? sensor->select_ns : sensor->fall_ns);
+    const uint32_t least = sensor->fresh ? sensor->t6 : sensor->byte == 1 ? sensor->t7 : sensor->t2;
+    require(sensor, gap >= least,
+            sensor->fresh        ? MLX90333_SELECT_LOW
+            : sensor->byte == 1 ? MLX90333_START_GAP
+                                : MLX90333_BYTE_GAP);
     sensor->fresh = false;
+    return gap >= least;
 }
 
 /* A rising edge shifts the next bit out. */
 static void clock_rose(struct mlx90333 *sensor, uint64_t now_ns)
 {
     if (sensor->bit == 0) {
-        check_byte_start(sensor, now_ns);
-        sensor->sending = sensor->answering && sensor->byte > 0 ? sensor->frame[sensor->byte] : 0xFFu;
+        const bool loaded = check_byte_start(sensor, now_ns) || !sensor->parameters.early_byte_is_ones;
+        sensor->sending = sensor->answering && sensor->byte > 0 && loaded ? sensor->frame[sensor->byte] : 0xFFu;
     } else {
         require(sensor, now_ns - sensor->rise_ns >= sensor->t1, MLX90333_CLOCK_PERIOD);
     }
@@ -194,8 +202,12 @@ static bool line(struct mlx90333 *sensor, unsigned position, bool master)
         return false;
     case SIM_SENSOR_FLOATING:
         return draw(sensor) & 1u;
+    case SIM_SENSOR_NOISY:
+        return (master && sensor->level) != ((draw(sensor) & 0xFFFFu) < sensor->argument);
     case SIM_SENSOR_FLIP_BIT:
         return (master && sensor->level) != (position == sensor->argument);
+    case SIM_SENSOR_FLIP_TWO:
+        return (master && sensor->level) != (position == (sensor->argument & 0xFFu) || position == sensor->argument >> 8);
     default:
         return master && sensor->level;
     }
@@ -215,23 +227,50 @@ static bool lost(struct mlx90333 *sensor, unsigned position, bool level)
     return true;
 }
 
+static void edge(struct mlx90333 *sensor, uint64_t now_ns, bool level, bool master)
+{
+    if (level) {
+        clock_rose(sensor, now_ns);
+        return;
+    }
+    clock_fell(sensor, now_ns, master);
+    if (++sensor->bit == 8u)
+        end_byte(sensor, now_ns);
+}
+
+/* A falling edge that is followed by a clock of the disturbance's own, once. The master is not blamed for it. */
+static bool doubled(struct mlx90333 *sensor, unsigned position, bool level)
+{
+    const bool now = !level && sensor->fault == SIM_SENSOR_EXTRA_CLOCK && position == sensor->argument;
+    if (now)
+        sensor->fault = SIM_SENSOR_GOOD;
+    return now;
+}
+
+static void glitch(struct mlx90333 *sensor, uint64_t now_ns, bool master)
+{
+    uint32_t before[MLX90333_VIOLATIONS];
+    memcpy(before, sensor->violations, sizeof before);
+    edge(sensor, now_ns, true, master);
+    edge(sensor, now_ns, false, master);
+    memcpy(sensor->violations, before, sizeof before);
+}
+
 bool mlx90333_clock(struct mlx90333 *sensor, uint64_t now_ns, bool level, bool master)
 {
     const unsigned position = sensor->byte * 8u + sensor->bit;
     const bool told = sensor->select || sensor->restarting; /* nobody told the master of a soft reset */
     require(sensor, told || now_ns >= sensor->awake_ns, MLX90333_CLOCK_IN_STARTUP);
-    if (sensor->select || !sensor->enabled || now_ns < sensor->awake_ns)
+    if (sensor->select || !sensor->enabled || sensor->dark || now_ns < sensor->awake_ns)
         return line(sensor, 64u, master);
     if (lost(sensor, position, level))
         return line(sensor, position, master);
-    if (level) {
-        clock_rose(sensor, now_ns);
-    } else {
-        clock_fell(sensor, now_ns, master);
-        if (++sensor->bit == 8u)
-            end_byte(sensor, now_ns);
-    }
-    return line(sensor, position, master);
+    const bool glitches = doubled(sensor, position, level);
+    edge(sensor, now_ns, level, master);
+    const bool seen = line(sensor, position, master);
+    if (glitches)
+        glitch(sensor, now_ns, master);
+    return seen;
 }
 
 uint32_t mlx90333_violations(const struct mlx90333 *sensor)

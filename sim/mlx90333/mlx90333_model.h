@@ -25,6 +25,9 @@ enum sim_sensor_fault {
     SIM_SENSOR_FLOATING,   /* the line follows nobody: random levels */
     SIM_SENSOR_FROZEN,     /* sound frames, always the same angles */
     SIM_SENSOR_LOST_CLOCK, /* one clock edge pair does not reach it; argument: which bit of the frame, 0 to 63 */
+    SIM_SENSOR_FLIP_TWO,    /* two bits are inverted; argument: one position, and 256 times the other */
+    SIM_SENSOR_NOISY,       /* each bit is inverted with the probability argument / 65536 */
+    SIM_SENSOR_EXTRA_CLOCK, /* it sees one clock edge pair too many; argument: after which bit of the frame */
 };
 
 /* What a master may do wrong. */
@@ -64,11 +67,16 @@ struct mlx90333 {
     bool restarting;   /* has had such a reset */
     uint8_t frame_bytes;
     bool dropping; /* a clock whose rising edge was lost loses its falling edge too */
+    bool dark;     /* without supply */
     uint8_t frame[MLX90316_FRAME_BYTES];
 };
 
 /* Supply on at `now_ns` with /SS high. */
 void mlx90333_power_on(struct mlx90333 *sensor, uint64_t now_ns, const struct mlx90333_parameters *parameters);
+
+/* The supply fails, or comes back and the start-up begins; the master is not told, so nothing that it does before the
+ * sensor is awake again counts against it. */
+void mlx90333_supply(struct mlx90333 *sensor, uint64_t now_ns, bool on);
 
 /* The field from `field->since_ns` on. */
 void mlx90333_set_field(struct mlx90333 *sensor, const struct mlx90333_field *field);

@@ -12,6 +12,7 @@ struct mlx90333_parameters {
     bool field_mode;         /* EEPROM XYZ: bytes 1 to 6 are X, Y, Z (B) */
     bool sum_without_errors; /* ? the sum covers bytes 1 to 4 only */
     bool resets_after_error; /* after a frame with an error word the part starts anew (A, sibling; ? this part) */
+    bool early_byte_is_ones; /* ? a byte asked for before its gap is over is not loaded yet: the line stays high */
     uint16_t slow_permille;  /* times of this part in thousandths of the nominal: 900 to 1100 (D) */
     uint32_t startup_ns;     /* 10 to 16 ms nominal (A sibling, B) */
     uint32_t

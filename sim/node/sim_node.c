@@ -68,6 +68,9 @@ static void on_interrupt(void *context, unsigned irq)
     case IRQ_DMA1:
         port_on_dma1(&node->board);
         break;
+    case IRQ_INT2:
+        port_on_int2(&node->board);
+        break;
     default:
         break;
     }

@@ -15,6 +15,7 @@ void node_start(struct node *node, struct board *board, uint8_t code)
     node->board = board;
     node->tick = 0xFFu; /* the first SYNC makes it 0 */
     node->numbered = true;
+    node->ordered = false;
     node->armed = 0;
     node->reading = sensor_reading_of_code(code);
     publish(node);
@@ -46,11 +47,25 @@ void node_on_sensor_byte(struct node *node, uint8_t byte)
         publish(node);
 }
 
+void node_on_sensor_overrun(struct node *node)
+{
+    if (sampler_on_overrun(&node->sampler, &node->reading))
+        publish(node);
+}
+
+void node_on_transfer_end(struct node *node)
+{
+    if (!node->ordered)
+        publish(node); /* what was clocked of the record armed is lost, with the bridge's knowledge */
+    node->ordered = false;
+}
+
 void node_on_order(struct node *node, const uint16_t words[LINK_WORDS])
 {
     struct order order;
     if (!node->numbered && order_parse(words, &order))
         node->tick = order.tick;
     node->numbered = true;
+    node->ordered = true;
     publish(node);
 }

@@ -25,6 +25,7 @@ struct node {
     struct sensor_reading reading;   /* of the present tick, as far as it is known */
     uint8_t tick;                    /* low 8 bits of the present tick's number */
     bool numbered;                   /* the order that belongs to the last SYNC has come */
+    bool ordered;                    /* an order has come in the present transfer */
     uint8_t armed;                   /* which of the records the link has */
     uint16_t records[2][LINK_WORDS]; /* one is clocked out while the other is packed */
 };
@@ -44,6 +45,12 @@ void node_on_timer(struct node *node);
 
 /* End of what board_sensor_transfer() began: the byte received. */
 void node_on_sensor_byte(struct node *node, uint8_t byte);
+
+/* A byte of the sensor was lost within the node. */
+void node_on_sensor_overrun(struct node *node);
+
+/* The bridge has ended a transfer, whole (then node_on_order() came first) or not. */
+void node_on_transfer_end(struct node *node);
 
 /* The bridge has clocked a whole transfer: the words received. With a wrong CRC the tick's number stays the one
  * counted from SYNC to SYNC. A second order after one SYNC changes nothing: if that SYNC was missed, there is no

@@ -154,6 +154,16 @@ bool sampler_on_byte(struct sampler *sampler, uint8_t byte, struct sensor_readin
     return true;
 }
 
+bool sampler_on_overrun(struct sampler *sampler, struct sensor_reading *reading)
+{
+    if (sampler->state != SAMPLER_BYTE)
+        return false;
+    *reading = sensor_reading_of_code(WHISKER_CODE_OVERRUN);
+    sampler->followed = false;
+    wait_in(sampler, SAMPLER_RELEASE, RAISE_US);
+    return true;
+}
+
 bool sampler_ready(const struct sampler *sampler)
 {
     return sampler->state == SAMPLER_READY;

@@ -54,6 +54,9 @@ bool sampler_on_timer(struct sampler *sampler);
 /* The sensor's byte has arrived. True when it ends the frame, with `reading` set. */
 bool sampler_on_byte(struct sampler *sampler, uint8_t byte, struct sensor_reading *reading);
 
+/* A byte was lost on its way. True when this ends a frame, with `reading` set. */
+bool sampler_on_overrun(struct sampler *sampler, struct sensor_reading *reading);
+
 /* True if a SYNC now would start a reading. */
 bool sampler_ready(const struct sampler *sampler);
 

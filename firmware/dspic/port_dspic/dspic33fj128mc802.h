@@ -24,6 +24,7 @@
 #define INTCON1_NSTDIS 0x8000u /* interrupts do not nest */
 #define INTCON2 0x0082u
 #define INTCON2_INT1EP 0x0002u /* 1: INT1 on the falling edge */
+#define INTCON2_INT2EP 0x0004u
 #define IFS0 0x0084u
 #define IEC0 0x0094u
 #define IPC0 0x00A4u
@@ -36,6 +37,7 @@
 #define IRQ_DMA1 14u
 #define IRQ_INT1 20u
 #define IRQ_DMA2 24u
+#define IRQ_INT2 29u
 #define IRQ_SPI2_ERROR 32u
 #define IRQ_SPI2 33u
 #define IRQ_COUNT 118u
@@ -95,6 +97,7 @@
 #define DMA_CHANNELS 8u
 #define DMACS0                                                                                                         \
     0x03E0u /* bits 7..0: write collision in RAM of channel n (XWCOL); 15..8: in the peripheral (PWCOL) (C) */
+#define DMACS0_PERIPHERAL_SHIFT 8u
 #define DMACS1 0x03E2u /* bits 7..0: ping-pong, the next block is B; 11..8: last active channel */
 #define DMACON_MODE_ONE_SHOT 0x0001u
 #define DMACON_MODE_PING_PONG 0x0002u
@@ -105,6 +108,7 @@
 
 /* Pin select. Input field: RP number, 31 ties to ground; output field: function code */
 #define RPINR0 0x0680u  /* [12:8] INT1 */
+#define RPINR1 0x0682u  /* [4:0] INT2 (C) */
 #define RPINR20 0x06A8u /* [4:0] SDI1, [12:8] SCK1 */
 #define RPINR22 0x06ACu /* [4:0] SDI2, [12:8] SCK2 */
 #define RPINR23 0x06AEu /* [4:0] SS2 */

@@ -60,6 +60,14 @@ void port_on_dma1(struct board *board)
     node_on_order(&board->node, words);
 }
 
+/* Select rose. After a whole transfer, the order's interrupt has armed the link already: its number is the lower. After
+ * one cut short, the slave and the DMA stand somewhere within the record: they begin anew. */
+void port_on_int2(struct board *board)
+{
+    sfr_clear(board, IRQ_WORD(IFS0, IRQ_INT2), IRQ_BIT(IRQ_INT2));
+    node_on_transfer_end(&board->node);
+}
+
 /* More words came than were asked for: arming sets it right at the next chance. */
 void port_on_spi2_error(struct board *board)
 {

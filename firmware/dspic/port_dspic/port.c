@@ -7,7 +7,7 @@
 #define PRIORITY 4u
 #define TRAPPED 0x7EA9u /* unlikely in RAM that has lost its contents */
 
-static const uint8_t SERVED[] = {IRQ_INT1, IRQ_T2, IRQ_SPI1, IRQ_SPI1_ERROR, IRQ_SPI2_ERROR, IRQ_DMA1};
+static const uint8_t SERVED[] = {IRQ_INT1, IRQ_T2, IRQ_SPI1, IRQ_SPI1_ERROR, IRQ_SPI2_ERROR, IRQ_DMA1, IRQ_INT2};
 
 static void enable(struct board *board, uint16_t irq)
 {
@@ -47,6 +47,7 @@ void port_start(struct board *board)
 void port_loop(struct board *board)
 {
     cpu_clear_watchdog(board);
+    cpu_idle(board);
 }
 
 /* Nothing can be trusted after a trap: start anew, and say so. */
@@ -73,12 +74,4 @@ void port_on_spi1(struct board *board)
 {
     sfr_clear(board, IRQ_WORD(IFS0, IRQ_SPI1), IRQ_BIT(IRQ_SPI1));
     node_on_sensor_byte(&board->node, (uint8_t)sfr_read(board, SPI1BUF));
-}
-
-/* Cannot happen while each byte is read before the next is sent; if it does, reception must be started again. */
-void port_on_spi1_error(struct board *board)
-{
-    sfr_clear(board, IRQ_WORD(IFS0, IRQ_SPI1_ERROR), IRQ_BIT(IRQ_SPI1_ERROR));
-    sfr_read(board, SPI1BUF);
-    sfr_clear(board, SPI1STAT, SPISTAT_SPIROV);
 }

@@ -2,7 +2,8 @@
  *
  *   SYNC   -> INT1                       node_on_sync()
  *   sensor -> SPI1 master, a byte at a time; T2 paces the gaps
- *   link   -> SPI2 slave in 16-bit words; DMA0 feeds it, DMA1 empties it and interrupts when the order is whole
+ *   link   -> SPI2 slave in 16-bit words; DMA0 feeds it, DMA1 empties it and interrupts when the order is whole;
+ *             INT2 tells when select rises
  *
  * All interrupts share one priority, so that the core sees one event at a time. Nothing waits but the clock switch at
  * start-up. */
@@ -24,6 +25,7 @@ struct board {
 };
 
 /* Pins, as numbers of port B and of RP. Sensor lines are open drain on 5 V tolerant pins. docs/hardware.md */
+#define PIN_SENSOR_SEND 6u /* MLX90316 only: tied to PIN_SENSOR_DATA */
 #define PIN_SENSOR_SELECT 7u
 #define PIN_SENSOR_CLOCK 8u
 #define PIN_SENSOR_DATA 9u
@@ -36,7 +38,7 @@ struct board {
 /* From reset to the main loop: clock, pins, peripherals, node. */
 void port_start(struct board *board);
 
-/* One turn of the main loop: shows the watchdog that interrupts are served. */
+/* One turn of the main loop: shows the watchdog that interrupts are served, then idles until the next. */
 void port_loop(struct board *board);
 
 /* Bodies of the interrupts. */
@@ -46,6 +48,7 @@ void port_on_spi1(struct board *board);
 void port_on_spi1_error(struct board *board);
 void port_on_spi2_error(struct board *board);
 void port_on_dma1(struct board *board);
+void port_on_int2(struct board *board);
 void port_on_trap(struct board *board); /* any of the traps; does not return */
 
 /* Steps of port_start, one file each. */

@@ -6,8 +6,13 @@
 #include "sfr.h"
 
 /* FCY / (16 * 7) = 345 kHz: a bit takes 2.9 us, 2.84 on an oscillator 2 % fast, and a sensor 10 % slow wants 2.53.
- * Only ones are ever sent: the output stays off and the pull-up sends them. */
-#define SENSOR_CON1 (SPICON1_MSTEN | SPICON1_DISSDO | 1u << SPICON1_PPRE_SHIFT | 1u << SPICON1_SPRE_SHIFT)
+ * The MLX90333 is only ever sent ones: the output stays off and the pull-up sends them. */
+#ifdef SENSOR_MLX90316
+#define SENSOR_SENDS 0u
+#else
+#define SENSOR_SENDS SPICON1_DISSDO
+#endif
+#define SENSOR_CON1 (SPICON1_MSTEN | SENSOR_SENDS | 1u << SPICON1_PPRE_SHIFT | 1u << SPICON1_SPRE_SHIFT)
 
 /* Counts of T2 per microsecond at FCY 38.69 MHz, rounded up: 4.836 at 1:8 and 0.6045 at 1:64. */
 #define SHORT_MOST_US 8000u
@@ -21,6 +26,16 @@ void sensor_start(struct board *board)
     sfr_write(board, SPI1STAT, 0);
     sfr_write(board, SPI1CON1, SENSOR_CON1);
     sfr_write(board, SPI1STAT, SPISTAT_SPIEN);
+}
+
+/* Cannot happen while each byte is read before the next is sent. If it does, a byte is lost and reception has stopped:
+ * the module begins anew, and the frame is given up. */
+void port_on_spi1_error(struct board *board)
+{
+    sensor_start(board);
+    sfr_clear(board, IRQ_WORD(IFS0, IRQ_SPI1_ERROR), IRQ_BIT(IRQ_SPI1_ERROR));
+    sfr_clear(board, IRQ_WORD(IFS0, IRQ_SPI1), IRQ_BIT(IRQ_SPI1)); /* what it would read is an older byte */
+    node_on_sensor_overrun(&board->node);
 }
 
 void board_sensor_select(struct board *board, bool level)
