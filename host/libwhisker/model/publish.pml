@@ -50,6 +50,7 @@ proctype writer()
         claimed = false; published = false; done = 0;
         do
         :: !claimed -> claim[mine] = frame + n; claimed = true
+        :: !claimed && CAPACITY >= 4 -> claim[mine] = frame + n + 1; claimed = true /* it may run ahead */
         :: (claimed || BUG == 2) && done != (1 << (2 * n)) - 1 ->
             select(k : 0 .. 2 * n - 1); /* any word that is still to be written */
             if

@@ -5,10 +5,12 @@
 #include <stdint.h>
 
 #include <cmocka.h>
+#include <stdio.h>
 #include <string.h>
 #include <unistd.h>
 
 #include "ring_fixture.h"
+#include "ring_layout.h"
 #include "vectors.h"
 #include "whisker/errors.h"
 
@@ -282,6 +284,33 @@ static void clock_and_statistics_are_told(void **state)
     }
 }
 
+/* The table of docs/ring.md is the layout that others program against. */
+static void documented_offsets_are_the_real_ones(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *field;
+        size_t offset, bytes;
+    } fields[] = {
+#define FIELD(name, bytes) {#name, offsetof(struct ring_header, name), bytes}
+        FIELD(magic, 8),  FIELD(generation, 8), FIELD(head, 8),   FIELD(state, 8),
+        FIELD(signal, 4), FIELD(claim, 8),      FIELD(clock, 88), FIELD(stats, sizeof((struct ring_header *)0)->stats),
+#undef FIELD
+    };
+    FILE *file = fopen(WHISKER_VECTORS "/../../docs/ring.md", "r");
+    assert_non_null(file);
+    char line[512], wanted[64];
+    size_t found = 0;
+    while (fgets(line, sizeof line, file)) {
+        for (size_t i = 0; i < sizeof fields / sizeof fields[0]; i++) {
+            snprintf(wanted, sizeof wanted, "| %zu | %zu | %s", fields[i].offset, fields[i].bytes, fields[i].field);
+            found += strncmp(line, wanted, strlen(wanted)) == 0;
+        }
+    }
+    fclose(file);
+    assert_int_equal(found, sizeof fields / sizeof fields[0]);
+}
+
 static void bad_names_and_sizes_are_refused(void **state)
 {
     (void)state;
@@ -322,6 +351,7 @@ int main(void)
         WITH_RING(second_writer_is_refused),
         WITH_RING(bytes_are_decoded_straight_into_the_ring),
         WITH_RING(clock_and_statistics_are_told),
+        cmocka_unit_test(documented_offsets_are_the_real_ones),
         cmocka_unit_test(bad_names_and_sizes_are_refused),
     };
     return cmocka_run_group_tests_name("ring", tests, NULL, NULL);

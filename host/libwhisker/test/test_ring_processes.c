@@ -12,6 +12,7 @@
 #include <unistd.h>
 
 #include "ring_fixture.h"
+#include "ring_internal.h"
 #include "whisker/errors.h"
 
 /* Reads and checks what there is. Returns the next index, or UINT64_MAX when a frame that advance vouched for is not
@@ -265,12 +266,52 @@ static void waiting_reader_is_woken_by_each_publication_and_the_close(void **sta
     close(answers[1]);
 }
 
+/* Publishes until the writer believes that readers wait, or that none does; unbelieving, until the test's time-out. */
+static void publish_until(struct whisker_ring *ring, bool readers_wait)
+{
+    do {
+        test_publish(ring, ring->head, 1);
+    } while (ring->readers_wait != readers_wait);
+}
+
+static void writer_wakes_only_while_a_reader_waits(void **state)
+{
+    (void)state;
+    int answers[2];
+    const char *name = test_ring_name();
+    struct whisker_ring *ring;
+    struct whisker_reader *polling;
+    assert_int_equal(pipe(answers), 0);
+    assert_int_equal(whisker_ring_create(name, TEST_CAPACITY, &ring), 0);
+    assert_int_equal(whisker_reader_attach(name, 0, &polling), 0);
+    publish_until(ring, false);
+    for (int tries = 0; tries < 100; tries++) {
+        read_some(polling);
+        assert_int_equal(whisker_reader_wait(polling, 0), WHISKER_ERROR_TIMEOUT); /* a look, not a wait */
+        test_publish(ring, ring->head, 1);
+        assert_false(ring->readers_wait);
+    }
+    const pid_t child = fork_tied();
+    if (child == 0) {
+        read_until_killed(name, answers[1], 1);
+    }
+    byte_from(answers[0]);
+    publish_until(ring, true);
+    kill_and_reap(child); /* and the kernel ends its lock */
+    publish_until(ring, false);
+    whisker_reader_detach(polling);
+    whisker_ring_close(ring);
+    close(answers[0]);
+    close(answers[1]);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(killed_readers_do_not_matter),
         cmocka_unit_test(killed_writer_is_noticed_and_replaced),
         cmocka_unit_test(of_writers_that_start_at_once_one_wins),
+        cmocka_unit_test(writer_wakes_only_while_a_reader_waits),
         cmocka_unit_test(waiting_reader_is_woken_by_each_publication_and_the_close),
     };
     return cmocka_run_group_tests_name("ring between processes", tests, NULL, NULL);
