@@ -81,6 +81,24 @@ def test_frame_vector(name, data, outcome):
     assert ";" in str(refused.value), "an error names its remedy"
 
 
+@pytest.mark.parametrize("name, data, outcome", vectors("services.txt"))
+def test_service_vector(name, data, outcome):
+    raw = bytes.fromhex(data)
+    again = p.service_window(raw[0], raw[1], raw[2:7], raw[8:56])
+    assert (again == raw) == (outcome == "good")
+
+
+def test_crc32_matches_its_published_check_value():
+    assert p.crc32(b"123456789") == p.DEFINITION["crc32"]["check"]
+
+
+def test_block_header_and_reports_fit_what_carries_them():
+    block = p.SERVICE.fields["data"].count
+    assert (p.SERVICE.size, block, p.IMAGE_HEADER.size, p.LIMITS["flash_row_bytes"] % block) == (60, 48, 48, 0)
+    assert p.REPORTS["service"].size <= 64, "one packet of the control endpoint"
+    assert p.REPORTS["answers"].size == 8 + 6 * p.LANES
+
+
 def test_frame_vectors_carry_every_bridge_code():
     frames = [p.decode_frame(bytes.fromhex(row[1]))[1] for row in vectors("frames.txt") if row[2] == "ok"]
     assert {r["code"] for records in frames for r in records} == set(p.CODES.values())

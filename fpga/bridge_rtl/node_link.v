@@ -13,6 +13,9 @@
 // SYNC stays high for one word gap: the nodes need to load their first word, as they need to between two words. Then
 // 9 cycles of set-up, 64 bits, 3 gaps, 4 cycles of hold: 517 cycles at divider 6 and gap 30. A divider of 6 adds 3 low
 // cycles after the last edge, so select is low for at least 7 cycles (6 wanted) after it.
+//
+// A tick with a service order has a second window of 30 words, a pause after the first. Its bits come from
+// service_store but for the tick and the two CRCs, which are added here.
 
 `default_nettype none
 
@@ -21,47 +24,65 @@ module node_link (
     input  wire       rst,           // synchronous; ends a transfer at once
     input  wire       start,         // begin a tick: one cycle, only while not busy
     input  wire [7:0] order_tick,    // low bits of the tick number, read at start
-    input  wire [7:0] order_command, // command for the nodes, read at start
+    input  wire       service,       // a service order waits: a second window follows; read at start
+    input  wire       service_bit,   // its bit `service_index`, in the same cycle
+    output wire [8:0] service_index, // next bit of the second window
     input  wire [5:0] sck_divider,   // cycles of one SCK period, even, 6 to 32; read at start
     input  wire [7:0] word_gap,      // cycles between two words, at least 30; read at start
     input  wire [5:0] sample_point,  // cycles from rising SCK edge to reading MISO, 1 to sck_divider; read at start
     output wire       busy,          // a tick is in progress
-    output wire       done,          // its last cycle
+    output wire       done,          // last cycle of the first window
+    output wire       service_begin, // the second window begins: one cycle
+    output wire       service_done,  // last cycle of the second window
+    output reg        in_service,    // from service_begin to service_done
     output reg        sync,          // to all nodes: start a reading, publish the one before
     output reg        sck,           // to all nodes
     output reg        select_n,      // to all nodes
     output reg        mosi,          // to all nodes
     output wire       capture,       // read MISO at the end of this cycle
-    output reg  [5:0] bit_index      // bit of the record being transferred, 0 first
+    output wire [5:0] record_index   // bit of the record being transferred, 0 first
 );
     `include "whisker_protocol.vh"
 
     localparam [7:0] SETUP_CYCLES = 8'd9;
     localparam [7:0] HOLD_CYCLES  = 8'd4;
-    localparam [5:0] CRC_INDEX    = {ORDER_CRC[2:0], 3'b000};  // first bit of the order's CRC
+    localparam [11:0] PAUSE_CYCLES = LIMIT_SERVICE_PAUSE[11:0];
+    localparam [5:0] CRC_BYTE     = ORDER_CRC[5:0];                      // the order's CRC, also that of the service order
+    localparam [5:0] CRC32_BYTE   = SERVICE_CRC32[5:0];                  // first byte of the service order's other one
+    localparam [8:0] ORDER_END    = {ORDER_BYTES[5:0], 3'd0} - 9'd1;      // last bits
+    localparam [8:0] SERVICE_END  = {SERVICE_BYTES[5:0], 3'd0} - 9'd1;
 
-    localparam [2:0] IDLE = 3'd0, SYNC = 3'd1, SETUP = 3'd2, BITS = 3'd3, GAP = 3'd4, HOLD = 3'd5;
+    localparam [2:0] IDLE = 3'd0, SYNC = 3'd1, SETUP = 3'd2, BITS = 3'd3, GAP = 3'd4, HOLD = 3'd5, PAUSE = 3'd6;
 
     reg  [2:0]  state;
-    reg  [7:0]  wait_left;   // cycles left of SYNC, SETUP, GAP or HOLD
+    reg  [11:0] wait_left;   // cycles left of SYNC, SETUP, GAP, HOLD or PAUSE
     reg  [5:0]  phase;       // cycles since the rising edge of SCK
     reg  [15:0] order;       // order bits not sent yet, most significant first
     reg  [7:0]  crc;         // of the order bits sent
+    reg  [31:0] crc32;       // of all bits sent in this window
+    reg  [8:0]  bit_index;   // bit being transferred in this window
+    reg         to_serve;    // a second window is to come
+    reg  [7:0]  tick;        // as at start
 
     reg  [5:0]  divider;     // the settings of this transfer
     reg  [7:0]  gap;
     reg  [5:0]  sample_at;
 
-    wire waited    = (wait_left == 8'd0);
+    wire waited    = (wait_left == 12'd0);
     wire bit_ends  = (state == BITS) && (phase == divider - 6'd1);
     wire word_ends = bit_ends && (bit_index[3:0] == 4'hF);
-    wire all_sent  = bit_ends && (bit_index == 6'h3F);
-    wire [5:0] next_index = bit_index + 6'd1;
+    wire all_sent  = bit_ends && (bit_index == (in_service ? SERVICE_END : ORDER_END));
+    wire [8:0] next_index = bit_index + 9'd1;
     wire bit_begins = ((state == SETUP || state == GAP) && waited) || (bit_ends && !word_ends);
 
     assign busy    = (state != IDLE);
-    assign done    = (state == HOLD) && waited;
-    assign capture = (state == BITS) && (phase == sample_at - 6'd1);
+    wire   window_ends = (state == HOLD) && waited;
+    assign done        = window_ends && !in_service;
+    assign service_done = window_ends && in_service;
+    assign service_begin = (state == PAUSE) && waited;
+    assign service_index = next_index;
+    assign record_index = bit_index[5:0];
+    assign capture = (state == BITS) && (phase == sample_at - 6'd1) && (bit_index <= ORDER_END);
 
     always @(posedge clk)
         if (rst) state <= IDLE;
@@ -71,7 +92,8 @@ module node_link (
             SETUP:   if (waited) state <= BITS;
             BITS:    if (all_sent) state <= HOLD; else if (word_ends) state <= GAP;
             GAP:     if (waited) state <= BITS;
-            default: if (waited) state <= IDLE;
+            HOLD:    if (waited) state <= (to_serve && !in_service) ? PAUSE : IDLE;
+            default: if (waited) state <= SETUP;
         endcase
 
     always @(posedge clk)
@@ -79,13 +101,20 @@ module node_link (
             divider   <= sck_divider;
             gap       <= word_gap;
             sample_at <= sample_point;
+            to_serve  <= service;
+            tick      <= order_tick;
         end
 
     always @(posedge clk)
-        if (start) wait_left <= word_gap - 8'd1;
-        else if (word_ends) wait_left <= (all_sent ? HOLD_CYCLES : gap) - 8'd1;
-        else if (state == SYNC && waited) wait_left <= SETUP_CYCLES - 8'd1;
-        else if (!waited) wait_left <= wait_left - 8'd1;
+        if (rst || start || service_done) in_service <= 1'b0;
+        else if (service_begin) in_service <= 1'b1;
+
+    always @(posedge clk)
+        if (start) wait_left <= {4'd0, word_gap} - 12'd1;
+        else if (word_ends) wait_left <= {4'd0, all_sent ? HOLD_CYCLES : gap} - 12'd1;
+        else if (done) wait_left <= PAUSE_CYCLES - 12'd1;
+        else if ((state == SYNC && waited) || service_begin) wait_left <= {4'd0, SETUP_CYCLES} - 12'd1;
+        else if (!waited) wait_left <= wait_left - 12'd1;
 
     always @(posedge clk) begin
         if (rst || state == IDLE) begin
@@ -94,7 +123,8 @@ module node_link (
         end else if (state == SYNC && waited) begin
             sync     <= 1'b0;
             select_n <= 1'b0;
-        end else if (done) select_n <= 1'b1;
+        end else if (service_begin) select_n <= 1'b0;
+        else if (window_ends) select_n <= 1'b1;
     end
 
     always @(posedge clk)
@@ -107,24 +137,30 @@ module node_link (
         else if (phase == {1'b0, divider[5:1]} - 6'd1) sck <= 1'b0;
 
     always @(posedge clk)
-        if (start) bit_index <= 6'h3F;
+        if (start || service_begin) bit_index <= 9'h1FF;
         else if (bit_begins) bit_index <= next_index;
 
-    // The last byte of the order is its CRC: from there on the register is sent instead of updated.
-    wire       sending_crc = (next_index >= CRC_INDEX);
-    wire       next_bit    = sending_crc ? crc[7] ^ CRC8_XOR_OUT[{2'b00, ~next_index[2:0]}] : order[15];
-    wire       feedback    = !sending_crc && (crc[7] ^ next_bit);
-    wire [7:0] crc_next    = {crc[6:0], 1'b0} ^ (feedback ? CRC8_POLYNOMIAL[7:0] : 8'h00);
+    // A CRC's own bits: from there on the register is sent instead of updated.
+    wire       in_crc32    = in_service && (next_index[8:3] >= CRC32_BYTE);
+    wire       in_crc      = (next_index[8:3] == CRC_BYTE);
+    wire       source_bit  = in_service && (next_index[8:3] != 6'd0) ? service_bit : order[15];
+    wire       next_bit    = in_crc32 ? crc32[31] ^ CRC32_XOR_OUT[31]
+                           : in_crc ? crc[7] ^ CRC8_XOR_OUT[{2'b00, ~next_index[2:0]}]
+                           : source_bit;
+    wire       feedback    = !in_crc && (crc[7] ^ next_bit);
+    wire       feedback32  = !in_crc32 && (crc32[31] ^ next_bit);
 
     always @(posedge clk)
-        if (state == IDLE) begin
+        if (state == IDLE || state == PAUSE) begin
             mosi  <= 1'b0;
-            order <= {order_tick, order_command};
+            order <= (state == IDLE) ? {order_tick, service ? COMMAND_SERVICE[7:0] : COMMAND_SAMPLE[7:0]} : {tick, 8'h00};
             crc   <= CRC8_INIT[7:0];
+            crc32 <= CRC32_INIT;
         end else if (bit_begins) begin
             mosi  <= next_bit;
             order <= {order[14:0], 1'b0};
-            crc   <= crc_next;
+            crc   <= {crc[6:0], 1'b0} ^ (feedback ? CRC8_POLYNOMIAL[7:0] : 8'h00);
+            crc32 <= {crc32[30:0], 1'b0} ^ (feedback32 ? CRC32_POLYNOMIAL : 32'd0);
         end
 endmodule
 

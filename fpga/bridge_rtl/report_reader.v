@@ -1,7 +1,9 @@
-// Answers the host's reads: HID reports control, counters and identity. The whole report is taken at once when a read
-// begins, so that a counter cannot change between two of its bytes, and is then shifted out.
+// Answers the host's reads: HID reports control, counters, identity and answers. The whole report is taken at once when a
+// read begins, so that a counter cannot change between two of its bytes, and is then shifted out; behind the header of
+// answers come the bytes of answer_store.
 //
 //   settings, counters, constants --[ by id ]--start--> report --next--> data, data, ..
+//                                             answer_store --------------^
 
 `default_nettype none
 
@@ -27,18 +29,24 @@ module report_reader #(
     input  wire [31:0]      records_good,    // .
     input  wire [31:0]      records_absent,  // .
     input  wire [31:0]      records_crc,     // .
-    input  wire [31:0]      records_tick     // .
+    input  wire [31:0]      records_tick,    // .
+    input  wire             pending,         // service order
+    input  wire [7:0]       sequence_low,    // .
+    input  wire             in_header,       // answer_store: the report's header is being read
+    input  wire [7:0]       answer_data      // byte of the report, if not
 );
     `include "whisker_protocol.vh"
 
     localparam REPORT_BITS = 8 * REPORT_COUNTERS_BYTES;  // the longest
 
     reg [REPORT_BITS-1:0] report;
+    reg                   answers;  // the report being read is this one
 
     always @(posedge clk)
         if (read_start) begin
             report <= {REPORT_BITS{1'b0}};
             report[7:0] <= read_id;
+            answers <= (read_id == REPORT_ID_ANSWERS[7:0]);
             report[15:8] <= WIRE_VERSION[7:0];  // at the same place in every report
             case (read_id)
                 REPORT_ID_CONTROL[7:0]: begin
@@ -66,11 +74,15 @@ module report_reader #(
                     report[8*REPORT_IDENTITY_FRAME_BYTES +: 16] <= FRAME_BYTES[15:0];
                     report[8*REPORT_IDENTITY_FIFO_BYTES +: 16] <= FIFO_BYTES[15:0];
                 end
+                REPORT_ID_ANSWERS[7:0]: begin
+                    report[8*REPORT_ANSWERS_PENDING] <= pending;
+                    report[8*REPORT_ANSWERS_SEQUENCE +: 8] <= sequence_low;
+                end
                 default: ;
             endcase
         end else if (read_next) report <= report >> 8;
 
-    assign read_data = report[7:0];
+    assign read_data = (answers && !in_header) ? answer_data : report[7:0];
 endmodule
 
 `default_nettype wire

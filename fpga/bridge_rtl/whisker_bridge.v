@@ -6,7 +6,9 @@
 //        |                |                          run_control                        |
 //        v                v                                                             |
 //   bridge_counters   lane_receiver --> record_store --> framer --> frame_fifo --> whisker_usb <--> UTMI
-//        '------------------------------> report_reader --> HID reports 1, 2, 3 --------/
+//        |                '------------> answer_store --\                               |
+//        '------------------------------> report_reader --> HID reports 1, 2, 3, 5 -----/
+//                  node_link <-------- service_store <-- HID report 4 -----------------'
 //
 // link_busy falls when the transfer is over: the next tick may begin, for the framer works from the other bank of the
 // record store. transfer_busy falls when the frame is in the FIFO too (about 260 cycles later).
@@ -52,7 +54,9 @@ module whisker_bridge #(
     wire       usb_restart;  // bus reset or SET_CONFIGURATION: one cycle or more
     wire       write_start, write_valid, write_done, write_accept, read_start, read_next;
     wire [5:0] write_index;
+    wire [1:0] read_packet;
     wire [7:0] write_data, read_id, read_data, stream_data;
+    wire       control_accept, service_accept;
     wire       stream_valid, stream_last, stream_ready;
 
     // Settings and run
@@ -65,12 +69,18 @@ module whisker_bridge #(
 
     // Ticks and records
     wire             tick, first_tick, link_active, link_done, capture, bits_valid;
+    wire             service_due, service_begin, service_done, in_service, service_bit, service_pending;
+    wire [8:0]       service_index;
+    wire [7:0]       service_sequence;
+    reg  [7:0]       asked_tick;  // of the service order before: its answers carry it
     wire [31:0]      tick_number;
     wire [63:0]      previous_time;
     wire [5:0]       capture_index, bits_index;
     wire [LANES-1:0] bits, absent, crc_wrong, tick_wrong;
     wire [31:0]      reading = tick_number - 32'd1;  // tick whose records this transfer brings
     reg              has_records;                    // there was such a tick
+    wire             answer_header;
+    wire [7:0]       answer_data;
 
     // Frames
     wire        frame_start = link_done && has_records;
@@ -86,6 +96,9 @@ module whisker_bridge #(
     always @(posedge clk)
         if (tick) has_records <= !first_tick;
 
+    always @(posedge clk)
+        if (service_done) asked_tick <= tick_number[7:0];
+
     assign link_busy     = tick || link_active;
     assign transfer_busy = link_busy || framer_busy;
     assign led           = running;
@@ -93,9 +106,18 @@ module whisker_bridge #(
     control_registers #(.LANES(LANES)) control (
         .clk(clk), .rst(rst), .halt(usb_restart),
         .write_start(write_start), .write_valid(write_valid), .write_index(write_index), .write_data(write_data),
-        .write_done(write_done), .write_accept(write_accept), .stopping(stopping),
+        .write_done(write_done), .write_accept(control_accept), .stopping(stopping),
         .start(start), .stop(stop), .run(run), .sck_divider(sck_divider), .word_gap(word_gap),
         .sample_point(sample_point), .lane_mask(lane_mask), .tick_period(tick_period));
+
+    assign write_accept = control_accept || service_accept;
+
+    service_store service (
+        .clk(clk), .rst(halt), .power_up(rst), .write_start(write_start), .write_valid(write_valid), .write_index(write_index),
+        .write_data(write_data), .write_done(write_done), .write_accept(service_accept), .sck_divider(sck_divider),
+        .word_gap(word_gap), .tick_period(tick_period), .due(service_due), .done(service_done),
+        .bit_index(service_index), .bit_value(service_bit), .pending(service_pending),
+        .sequence_low(service_sequence));
 
     run_control run_state (
         .clk(clk), .rst(halt), .start(start), .stop(stop), .tick(tick), .last_done(frame_done && frame_keep),
@@ -107,20 +129,29 @@ module whisker_bridge #(
         .tick(tick), .first(first_tick), .number(tick_number), .previous_time(previous_time));
 
     node_link link (
-        .clk(clk), .rst(halt), .start(tick), .order_tick(tick_number[7:0]), .order_command(COMMAND_SAMPLE[7:0]),
+        .clk(clk), .rst(halt), .start(tick), .order_tick(tick_number[7:0]),
+        .service(service_due), .service_bit(service_bit), .service_index(service_index),
+        .service_begin(service_begin), .service_done(service_done), .in_service(in_service),
         .sck_divider(sck_divider), .word_gap(word_gap), .sample_point(sample_point),
         .busy(link_active), .done(link_done), .sync(sync), .sck(sck), .select_n(select_n), .mosi(mosi),
-        .capture(capture), .bit_index(capture_index));
+        .capture(capture), .record_index(capture_index));
 
     lane_receiver #(.LANES(LANES)) receiver (
-        .clk(clk), .rst(halt), .clear(tick), .expected_tick(reading[7:0]),
+        .clk(clk), .rst(halt), .clear(tick || service_begin),
+        .expected_tick(tick ? reading[7:0] : asked_tick),
         .capture(capture), .capture_index(capture_index), .miso(miso),
         .bits(bits), .bits_valid(bits_valid), .bits_index(bits_index),
         .absent(absent), .crc_wrong(crc_wrong), .tick_wrong(tick_wrong));
 
     record_store #(.LANES(LANES)) store (
-        .clk(clk), .rst(halt), .swap(link_done), .write(bits_valid), .bit_index(bits_index), .bits(bits),
+        .clk(clk), .rst(halt), .swap(link_done), .write(bits_valid && !in_service), .bit_index(bits_index), .bits(bits),
         .read_lane(read_lane), .read_byte(read_byte), .read_data(record_data));
+
+    answer_store #(.LANES(LANES)) answers (
+        .clk(clk), .rst(halt), .write(bits_valid && in_service), .bit_index(bits_index), .bits(bits),
+        .done(service_done), .lane_mask(lane_mask), .absent(absent), .crc_wrong(crc_wrong), .tick_wrong(tick_wrong),
+        .read_start(read_start), .read_packet(read_packet), .read_next(read_next), .in_header(answer_header),
+        .data(answer_data));
 
     framer #(.LANES(LANES)) frame_maker (
         .clk(clk), .rst(halt), .start(frame_start), .is_last(final_transfer), .tick(reading),
@@ -148,7 +179,8 @@ module whisker_bridge #(
         .running(running), .run(run), .sck_divider(sck_divider), .word_gap(word_gap), .sample_point(sample_point),
         .lane_mask(lane_mask), .tick_period(tick_period), .ticks(ticks), .frames(frames), .dropped(dropped),
         .records_good(records_good), .records_absent(records_absent), .records_crc(records_crc),
-        .records_tick(records_tick));
+        .records_tick(records_tick), .pending(service_pending), .sequence_low(service_sequence),
+        .in_header(answer_header), .answer_data(answer_data));
 
     whisker_usb usb (
         .clk(clk), .rst(rst),
@@ -161,7 +193,8 @@ module whisker_bridge #(
         .stream_ready(stream_ready), .restart(usb_restart),
         .write_start(write_start), .write_valid(write_valid), .write_index(write_index), .write_data(write_data),
         .write_done(write_done), .write_accept(write_accept),
-        .read_start(read_start), .read_id(read_id), .read_next(read_next), .read_data(read_data));
+        .read_start(read_start), .read_id(read_id), .read_packet(read_packet), .read_next(read_next),
+        .read_data(read_data));
 endmodule
 
 `default_nettype wire

@@ -1,11 +1,12 @@
-"""Python model of the nodes on the bridge's bus: SPI mode 1 slaves that answer each tick with the records given."""
+"""Python model of the nodes on the bridge's bus: SPI mode 1 slaves that answer each tick with the records given, and a
+second select window in a tick with the answers given."""
 
 import cocotb
 from bench import CLOCK_PS
 from cocotb.triggers import FallingEdge, RisingEdge, Timer, ValueChange
 from cocotb.utils import get_sim_time
 
-from whisker.protocol import LANES, RECORD
+from whisker.protocol import LANES, RECORD, SERVICE
 
 IDLE = (1 << LANES) - 1  # pull-ups
 BITS = 8 * RECORD.size
@@ -27,19 +28,28 @@ class Nodes:
         self.dut = dut
         self.delay_ps = delay_ps
         self.records: dict[int, bytes] = {}
+        self.answers: dict[int, bytes] = {}
         self.orders: list[bytes] = []
+        self.services: list[bytes] = []
+        self.second = False  # the next window is the second of its tick
         self.times: dict[str, list[int]] = {}
         dut.miso.value = IDLE
         cocotb.start_soon(self._shift_out())
         cocotb.start_soon(self._shift_in())
+        cocotb.start_soon(self._begin_tick())
         for name in ("sync", "sck", "select_n"):
             self.times[name] = []
             cocotb.start_soon(self._watch(name))
 
+    async def _begin_tick(self):
+        while True:
+            await RisingEdge(self.dut.sync)
+            self.second = False
+
     async def _shift_out(self):
         while True:
             await FallingEdge(self.dut.select_n)
-            for lines in planes(self.records):
+            for lines in planes(self.answers if self.second else self.records):
                 await RisingEdge(self.dut.sck)
                 if self.delay_ps:
                     cocotb.start_soon(self._late(lines))
@@ -54,10 +64,12 @@ class Nodes:
         while True:
             order = 0
             await FallingEdge(self.dut.select_n)
-            for _ in range(BITS):
+            size = SERVICE.size if self.second else RECORD.size
+            for _ in range(8 * size):
                 await FallingEdge(self.dut.sck)
                 order = order << 1 | int(self.dut.mosi.value)
-            self.orders.append(order.to_bytes(RECORD.size, "big"))
+            (self.services if self.second else self.orders).append(order.to_bytes(size, "big"))
+            self.second = True
 
     async def _watch(self, name: str):
         signal = getattr(self.dut, name)

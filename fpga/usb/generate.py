@@ -53,7 +53,7 @@ class WhiskerUsb(Elaboratable):
         """Every port but clock and reset."""
         hid = self._hid
         reports = [hid.write_start, hid.write_valid, hid.write_index, hid.write_data, hid.write_done, hid.write_accept]
-        reports += [hid.read_start, hid.read_id, hid.read_next, hid.read_data]
+        reports += [hid.read_start, hid.read_id, hid.read_packet, hid.read_next, hid.read_data]
         stream = [self.restart, self.stream_data, self.stream_valid, self.stream_last, self.stream_ready]
         return [*self._utmi.values(), *stream, *reports]
 

@@ -10,6 +10,9 @@ GET_REPORT = 0x01
 SET_REPORT = 0x09
 SET_IDLE = 0x0A
 FEATURE = 3  # report type in the high byte of wValue
+PACKET = 64  # bytes of the control endpoint
+WRITTEN = ("control", "service")  # by the host, each in one packet
+READ = tuple(name for name in REPORTS if name != "service")
 
 
 class HidRequests(ControlRequestHandler):
@@ -22,7 +25,7 @@ class HidRequests(ControlRequestHandler):
         write: start                 a report is to come: forget what was gathered
                index, data, valid    its bytes; index 0 begins it again
                done, accept          accept is read in the cycle of done; refused: STALL
-        read:  start, id             a read of report `id` begins
+        read:  start, id, packet     a read of report `id` begins at byte 64 * packet
                next, data            data is the report's next byte from two cycles after start on
     """
 
@@ -36,13 +39,15 @@ class HidRequests(ControlRequestHandler):
         self.write_accept = Signal()
         self.read_start = Signal()
         self.read_id = Signal(8)
+        self.read_packet = Signal(2)
         self.read_next = Signal()
         self.read_data = Signal(8)
 
     def elaborate(self, platform):
         m = Module()
         self.kind = Signal(3)  # one bit per request served: get, set, idle; none: stall
-        self.size = Signal(range(max(report.size for report in REPORTS.values()) + 1))  # bytes the read may send
+        self.left = Signal(range(max(report.size for report in REPORTS.values()) + 1))  # bytes not yet acknowledged
+        self.sent = Signal()  # the packet of a read, and not yet acknowledged
         self.sending = Signal()
         self.decided = Signal()
         is_class = self.interface.setup.type == USBRequestType.CLASS
@@ -68,42 +73,49 @@ class HidRequests(ControlRequestHandler):
         setup = self.interface.setup
         with m.If(setup.received):
             m.d.usb += [self.kind.eq(0), self.sending.eq(0), self.decided.eq(0)]
+            m.d.usb += [self.sent.eq(0), self.read_packet.eq(0), self.interface.tx_data_pid.eq(1)]
             ours = (setup.recipient == USBRequestRecipient.INTERFACE) & (setup.index == LIMITS["usb_hid_interface"])
             feature = ours & (setup.value[8:] == FEATURE)
             get = feature & setup.is_in_request & (setup.request == GET_REPORT) & (setup.length != 0)
-            for report in REPORTS.values():
+            for report in (REPORTS[name] for name in READ):
                 with m.If(get & (setup.value[:8] == report.id)):
                     size = Mux(setup.length < report.size, setup.length, report.size)
-                    m.d.usb += [self.kind.eq(0b001), self.size.eq(size)]
-            control = REPORTS["control"]
-            whole = (setup.value[:8] == control.id) & (setup.length == control.size)
-            with m.If(feature & ~setup.is_in_request & (setup.request == SET_REPORT) & whole):
-                m.d.usb += self.kind.eq(0b010)
-                m.d.comb += self.write_start.eq(1)
+                    m.d.usb += [self.kind.eq(0b001), self.left.eq(size)]
+            put = feature & ~setup.is_in_request & (setup.request == SET_REPORT)
+            for report in (REPORTS[name] for name in WRITTEN):
+                with m.If(put & (setup.value[:8] == report.id) & (setup.length == report.size)):
+                    m.d.usb += self.kind.eq(0b010)
+                    m.d.comb += self.write_start.eq(1)
             with m.If(ours & ~setup.is_in_request & (setup.request == SET_IDLE) & (setup.length == 0)):
                 m.d.usb += self.kind.eq(0b100)
 
     def _get_report(self, m):
-        """Data stage: one packet, sent again from its first byte when the host asks again. Status stage: ACK."""
+        """Data stage: packets of 64 bytes, each sent again from its first byte when the host asks again before it has
+        acknowledged it. Status stage: ACK."""
         itf = self.interface
         loading = Signal()
         sending = self.sending
-        left = Signal.like(self.size)
+        in_packet = Signal(range(PACKET + 1))  # bytes of this packet not yet sent
+        size = Mux(self.left < PACKET, self.left, PACKET)
+        first = Signal()
         m.d.usb += loading.eq(itf.data_requested)
         m.d.comb += [
             self.read_start.eq(itf.data_requested),
             self.read_id.eq(itf.setup.value[:8]),
             itf.tx.valid.eq(sending),
-            itf.tx.first.eq(sending & (left == self.size)),
-            itf.tx.last.eq(sending & (left == 1)),
+            itf.tx.first.eq(sending & first),
+            itf.tx.last.eq(sending & (in_packet == 1)),
             itf.tx.payload.eq(self.read_data),
             self.read_next.eq(sending & itf.tx.ready),
             itf.handshakes_out.ack.eq(itf.status_requested),
         ]
         with m.If(loading):
-            m.d.usb += [sending.eq(1), left.eq(self.size)]
+            m.d.usb += [sending.eq(self.left != 0), first.eq(1), in_packet.eq(size), self.sent.eq(self.left != 0)]
         with m.Elif(self.read_next):
-            m.d.usb += [left.eq(left - 1), sending.eq(left != 1)]
+            m.d.usb += [in_packet.eq(in_packet - 1), first.eq(0), sending.eq(in_packet != 1)]
+        with m.If(itf.handshakes_in.ack & self.sent):
+            m.d.usb += [self.sent.eq(0), self.left.eq(self.left - size), self.read_packet.eq(self.read_packet + 1)]
+            m.d.usb += itf.tx_data_pid.eq(~itf.tx_data_pid)
 
     def _set_report(self, m):
         """Data stage: pass the bytes on and ACK a good packet. Status stage: nothing if accepted, STALL if refused."""

@@ -4,7 +4,7 @@
 
 #include <stdint.h>
 
-#define WHISKER_WIRE_VERSION 1u
+#define WHISKER_WIRE_VERSION 2u
 #define WHISKER_LIMIT_FRAME_MAGIC 19287u /* first two bytes of a frame */
 #define WHISKER_LIMIT_LANES 28u /* lanes of a bridge */
 #define WHISKER_LIMIT_CLOCK_HZ UINT32_C(60000000) /* Hz, the bridge's one clock, from the USB PHY */
@@ -25,7 +25,18 @@
 #define WHISKER_LIMIT_USB_HID_INTERFACE 1u
 #define WHISKER_LIMIT_USB_BULK_IN 129u /* frames */
 #define WHISKER_LIMIT_USB_HID_IN 130u /* HID needs one; it answers NAK */
-#define WHISKER_LIMIT_GATEWARE_VERSION 1u
+#define WHISKER_LIMIT_GATEWARE_VERSION 2u
+#define WHISKER_LIMIT_SERVICE_PAUSE 2400u /* cycle of 60 MHz, from the first window of a tick to the second: 40 us for a node to read the order */
+#define WHISKER_LIMIT_SERVICE_TICK_MIN 20000u /* cycle of 60 MHz, both windows at the default bus settings take 17070 */
+#define WHISKER_LIMIT_IMAGE_MAGIC UINT32_C(1296649047)
+#define WHISKER_LIMIT_IMAGE_FORMAT 1u
+#define WHISKER_LIMIT_CHIP_ID 1577u /* dsPIC33FJ128MC802 */
+#define WHISKER_LIMIT_FLASH_ROW_BYTES 192u /* byte, write unit: 64 instructions */
+#define WHISKER_LIMIT_FLASH_PAGE_ROWS 8u /* row, erase unit */
+#define WHISKER_LIMIT_FLASH_ROWS 688u /* row */
+#define WHISKER_LIMIT_APPLICATION_ROW 64u /* row, the loader owns the rows below; this one holds the image's header */
+#define WHISKER_LIMIT_SERIAL_NONE UINT32_C(4294967295) /* FUID0 to FUID3 as they leave the factory */
+#define WHISKER_LIMIT_BUSY_TICKS_MAX 64u /* tick, a node may be silent so long: a page erase takes 24.1 ms */
 #define WHISKER_FRAME_BYTES 256u /* header and records */
 #define WHISKER_RECORD_BYTES 8u
 #define WHISKER_RECORD_TICK 0u /* byte offset; 8 bits */
@@ -38,6 +49,24 @@
 #define WHISKER_ORDER_COMMAND 1u /* byte offset; 8 bits */
 #define WHISKER_ORDER_ARGUMENT 2u /* byte offset; 8 bits */
 #define WHISKER_ORDER_CRC 7u /* byte offset; 8 bits */
+#define WHISKER_SERVICE_BYTES 60u
+#define WHISKER_SERVICE_TICK 0u /* byte offset; 8 bits */
+#define WHISKER_SERVICE_COMMAND 1u /* byte offset; 8 bits */
+#define WHISKER_SERVICE_ARGUMENT 2u /* byte offset; 8 bits */
+#define WHISKER_SERVICE_HEAD_CRC 7u /* byte offset; 8 bits */
+#define WHISKER_SERVICE_DATA 8u /* byte offset; 8 bits */
+#define WHISKER_SERVICE_CRC32 56u /* byte offset; 32 bits */
+#define WHISKER_IMAGE_HEADER_BYTES 48u
+#define WHISKER_IMAGE_HEADER_MAGIC 0u /* byte offset; 32 bits */
+#define WHISKER_IMAGE_HEADER_CHIP 4u /* byte offset; 16 bits */
+#define WHISKER_IMAGE_HEADER_WIRE_VERSION 6u /* byte offset; 8 bits */
+#define WHISKER_IMAGE_HEADER_FORMAT 7u /* byte offset; 8 bits */
+#define WHISKER_IMAGE_HEADER_LENGTH 8u /* byte offset; 32 bits */
+#define WHISKER_IMAGE_HEADER_BODY_CRC32 12u /* byte offset; 32 bits */
+#define WHISKER_IMAGE_HEADER_VERSION 16u /* byte offset; 16 bits */
+#define WHISKER_IMAGE_HEADER_OPTIONS 18u /* byte offset; 16 bits */
+#define WHISKER_IMAGE_HEADER_FIRST_ROW 20u /* byte offset; 16 bits */
+#define WHISKER_IMAGE_HEADER_HEADER_CRC32 44u /* byte offset; 32 bits */
 #define WHISKER_FRAME_HEADER_BYTES 32u
 #define WHISKER_FRAME_HEADER_MAGIC 0u /* byte offset; 16 bits */
 #define WHISKER_FRAME_HEADER_WIRE_VERSION 2u /* byte offset; 8 bits */
@@ -80,7 +109,22 @@
 #define WHISKER_REPORT_IDENTITY_CLOCK_HZ 4u /* byte offset; 32 bits */
 #define WHISKER_REPORT_IDENTITY_FRAME_BYTES 8u /* byte offset; 16 bits */
 #define WHISKER_REPORT_IDENTITY_FIFO_BYTES 10u /* byte offset; 16 bits */
+#define WHISKER_REPORT_SERVICE_BYTES 56u
+#define WHISKER_REPORT_ID_SERVICE 4u /* HID report id */
+#define WHISKER_REPORT_SERVICE_ID 0u /* byte offset; 8 bits */
+#define WHISKER_REPORT_SERVICE_WIRE_VERSION 1u /* byte offset; 8 bits */
+#define WHISKER_REPORT_SERVICE_COMMAND 2u /* byte offset; 8 bits */
+#define WHISKER_REPORT_SERVICE_ARGUMENT 3u /* byte offset; 8 bits */
+#define WHISKER_REPORT_SERVICE_DATA 8u /* byte offset; 8 bits */
+#define WHISKER_REPORT_ANSWERS_BYTES 176u
+#define WHISKER_REPORT_ID_ANSWERS 5u /* HID report id */
+#define WHISKER_REPORT_ANSWERS_ID 0u /* byte offset; 8 bits */
+#define WHISKER_REPORT_ANSWERS_WIRE_VERSION 1u /* byte offset; 8 bits */
+#define WHISKER_REPORT_ANSWERS_PENDING 2u /* byte offset; 8 bits */
+#define WHISKER_REPORT_ANSWERS_SEQUENCE 3u /* byte offset; 8 bits */
+#define WHISKER_REPORT_ANSWERS_ANSWER 8u /* byte offset; 16 bits */
 #define WHISKER_COMMAND_SAMPLE 1u
+#define WHISKER_COMMAND_SERVICE 2u
 #define WHISKER_FRAME_FLAG_LAST 1u
 #define WHISKER_STATUS_CODE_SHIFT 10u /* the six-bit code's place in a status */
 #define WHISKER_CODE_OK 0u /* the reading is good, unless sensor error bits are set */
@@ -94,6 +138,8 @@
 #define WHISKER_CODE_RESET_POWER 8u /* the node restarted after a brown-out or by its reset pin; its sensor starts */
 #define WHISKER_CODE_RESET_WATCHDOG 9u /* the node restarted because its firmware stood still; its sensor starts */
 #define WHISKER_CODE_RESET_TRAP 10u /* the node restarted after a trap (address, stack, arithmetic, oscillator, DMA); its sensor starts */
+#define WHISKER_CODE_ANSWER 11u /* no reading: a node's answer to a service order */
+#define WHISKER_CODE_LOADER 12u /* the boot loader runs: there is no valid application, or an update is under way */
 #define WHISKER_CODE_OVERRUN 13u /* a byte of the sensor was lost within the node (SPI overflow) */
 #define WHISKER_CODE_ABSENT 32u /* nothing answers on this lane: all ones */
 #define WHISKER_CODE_LINK_CRC 33u /* the record's CRC is wrong */
@@ -109,10 +155,52 @@
 #define WHISKER_ERROR_OFFSET_CLAMP 128u /* rough-offset compensation clipped */
 #define WHISKER_ERROR_DEADZONE_ALPHA 256u /* alpha lies in its dead zone */
 #define WHISKER_ERROR_DEADZONE_BETA 512u /* beta lies in its dead zone */
+#define WHISKER_SERVICE_COMMAND_POLL 0u /* nothing new: the answer before, again */
+#define WHISKER_SERVICE_COMMAND_INFO 1u /* argument 0: an item of info. The answer is its value */
+#define WHISKER_SERVICE_COMMAND_ENTER 2u /* leave the application for the loader. Arguments 0 to 3: a serial number, little-endian, or 0 for all. The answer's alpha is 0, its beta a node_state, here and below */
+#define WHISKER_SERVICE_COMMAND_BEGIN 3u /* data is an image's header: forget the application, take this one. Arguments as for enter. Repeated with the same header it changes nothing */
+#define WHISKER_SERVICE_COMMAND_BLOCK 4u /* 48 bytes of the image. Arguments 0 and 1: its number, little-endian. The answer's alpha is the next block wanted; another block than that is ignored */
+#define WHISKER_SERVICE_COMMAND_FINISH 5u /* compare the image's CRC-32; if it is right, mark the image valid */
+#define WHISKER_SERVICE_COMMAND_RUN 6u /* start the application, if it is valid. Arguments as for enter */
+#define WHISKER_INFO_CHIP 0u /* alpha: the chip's device id; beta: node_state */
+#define WHISKER_INFO_FIRMWARE 1u /* alpha: version of the application in flash, 0 if there is none; beta: its build options */
+#define WHISKER_INFO_WIRE 2u /* alpha: wire version of what is running; beta: version of the loader */
+#define WHISKER_INFO_SERIAL 3u /* serial number, 0xFFFFFFFF if it was never given one */
+#define WHISKER_INFO_HEALTH 16u /* and up: alpha: one of the counters of health, which stays at 65535; beta: its number */
+#define WHISKER_HEALTH_ORDER_CRC 0u /* orders whose CRC was wrong */
+#define WHISKER_HEALTH_STARTING 1u /* ticks with this code */
+#define WHISKER_HEALTH_RESYNC 2u /* . */
+#define WHISKER_HEALTH_LATE 3u /* . */
+#define WHISKER_HEALTH_SENSOR_SUM 4u /* . */
+#define WHISKER_HEALTH_SENSOR_START 5u /* . */
+#define WHISKER_HEALTH_SENSOR_ABSENT 6u /* . */
+#define WHISKER_HEALTH_STEP 7u /* . */
+#define WHISKER_HEALTH_RESET_POWER 8u /* resets of this kind; 1 at most, for counters begin anew */
+#define WHISKER_HEALTH_RESET_WATCHDOG 9u /* . */
+#define WHISKER_HEALTH_RESET_TRAP 10u /* . */
+#define WHISKER_HEALTH_SENSOR_ERROR 11u /* ticks whose reading carried sensor error bits */
+#define WHISKER_HEALTH_ORDER_MISSING 12u /* ticks without an order */
+#define WHISKER_HEALTH_SERVICE_CRC 13u /* service windows whose CRC was wrong */
+#define WHISKER_HEALTH_LINK_OVERFLOW 14u /* overflows of the link's receiver */
+#define WHISKER_NODE_STATE_APPLICATION 0u /* the application runs: enter the loader first */
+#define WHISKER_NODE_STATE_LOADER 1u /* the loader waits */
+#define WHISKER_NODE_STATE_LOADING 2u /* the loader takes blocks */
+#define WHISKER_NODE_STATE_COMPLETE 3u /* the image is valid: run it */
+#define WHISKER_NODE_STATE_NOT_ADDRESSED 4u /* the serial number is another's */
+#define WHISKER_NODE_STATE_OTHER_CHIP 5u /* refused: the image is for another chip */
+#define WHISKER_NODE_STATE_OLD_WIRE 6u /* refused: the image speaks an older wire version than the loader */
+#define WHISKER_NODE_STATE_BAD_HEADER 7u /* refused: magic, format, length, place or CRC of the header is wrong */
+#define WHISKER_NODE_STATE_BAD_IMAGE 8u /* refused: the CRC-32 of what was loaded is wrong */
+#define WHISKER_NODE_STATE_FLASH_FAILED 9u /* the flash does not hold what was written: replace the node */
+#define WHISKER_HEALTH_COUNT 15u
 #define WHISKER_CRC8_POLYNOMIAL 47u
 #define WHISKER_CRC8_INIT 255u
 #define WHISKER_CRC8_XOR_OUT 255u
 #define WHISKER_CRC8_CHECK 223u
+#define WHISKER_CRC32_POLYNOMIAL UINT32_C(79764919)
+#define WHISKER_CRC32_INIT UINT32_C(4294967295)
+#define WHISKER_CRC32_XOR_OUT UINT32_C(4294967295)
+#define WHISKER_CRC32_CHECK UINT32_C(4236843288)
 
 /* X(NAME, value, cause, remedy) for every code a status can carry. */
 #define WHISKER_CODES(X) \
@@ -127,11 +215,42 @@
     X(RESET_POWER, 8, "the node restarted after a brown-out or by its reset pin; its sensor starts", "check the 3.3 V supply and the reset pin's pull-up") \
     X(RESET_WATCHDOG, 9, "the node restarted because its firmware stood still; its sensor starts", "update the firmware; report what led to it") \
     X(RESET_TRAP, 10, "the node restarted after a trap (address, stack, arithmetic, oscillator, DMA); its sensor starts", "check the supply's decoupling; update the firmware") \
+    X(ANSWER, 11, "no reading: a node's answer to a service order", "none") \
+    X(LOADER, 12, "the boot loader runs: there is no valid application, or an update is under way", "load the firmware: whisker flash") \
     X(OVERRUN, 13, "a byte of the sensor was lost within the node (SPI overflow)", "none if rare; else check the supply's decoupling") \
     X(ABSENT, 32, "nothing answers on this lane: all ones", "connect a node or take the lane out of the lane mask") \
     X(LINK_CRC, 33, "the record's CRC is wrong", "check the lane's cable; lower the SPI clock") \
     X(LINK_TICK, 34, "the record belongs to another tick: stale or slipped", "check the SYNC and select lines of this lane") \
     X(LANE_OFF, 35, "the lane is not in the lane mask", "set its bit in the lane mask")
+
+/* X(NAME, value, meaning) of every state a node tells in its answer, and of every counter of its health. */
+#define WHISKER_NODE_STATES(X) \
+    X(APPLICATION, 0, "the application runs: enter the loader first") \
+    X(LOADER, 1, "the loader waits") \
+    X(LOADING, 2, "the loader takes blocks") \
+    X(COMPLETE, 3, "the image is valid: run it") \
+    X(NOT_ADDRESSED, 4, "the serial number is another's") \
+    X(OTHER_CHIP, 5, "refused: the image is for another chip") \
+    X(OLD_WIRE, 6, "refused: the image speaks an older wire version than the loader") \
+    X(BAD_HEADER, 7, "refused: magic, format, length, place or CRC of the header is wrong") \
+    X(BAD_IMAGE, 8, "refused: the CRC-32 of what was loaded is wrong") \
+    X(FLASH_FAILED, 9, "the flash does not hold what was written: replace the node")
+#define WHISKER_HEALTH(X) \
+    X(ORDER_CRC, 0, "orders whose CRC was wrong") \
+    X(STARTING, 1, "ticks with this code") \
+    X(RESYNC, 2, ".") \
+    X(LATE, 3, ".") \
+    X(SENSOR_SUM, 4, ".") \
+    X(SENSOR_START, 5, ".") \
+    X(SENSOR_ABSENT, 6, ".") \
+    X(STEP, 7, ".") \
+    X(RESET_POWER, 8, "resets of this kind; 1 at most, for counters begin anew") \
+    X(RESET_WATCHDOG, 9, ".") \
+    X(RESET_TRAP, 10, ".") \
+    X(SENSOR_ERROR, 11, "ticks whose reading carried sensor error bits") \
+    X(ORDER_MISSING, 12, "ticks without an order") \
+    X(SERVICE_CRC, 13, "service windows whose CRC was wrong") \
+    X(LINK_OVERFLOW, 14, "overflows of the link's receiver")
 
 /* X(NAME, bit of the status, bit of the MLX90333 error word, cause, remedy) */
 #define WHISKER_SENSOR_ERRORS(X) \

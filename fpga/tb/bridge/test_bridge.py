@@ -1,14 +1,31 @@
 """whisker_bridge without its USB device: runs from start to LAST, from the nodes' pins to the byte stream."""
 
+import random
+import struct
+
 import cocotb
 from bench import error_record, pulse, record, run_bench, start_clock
 from cocotb.triggers import ClockCycles, FallingEdge, RisingEdge
 from nodes import Nodes
 
-from whisker.protocol import FRAME_BYTES, FRAME_FLAGS, LANES, LIMITS, ORDER, REPORTS, WIRE_VERSION, decode_frame
+from whisker.protocol import (
+    CODES,
+    COMMANDS,
+    FRAME_BYTES,
+    FRAME_FLAGS,
+    LANES,
+    LIMITS,
+    ORDER,
+    REPORTS,
+    STATUS_CODE_SHIFT,
+    WIRE_VERSION,
+    decode_frame,
+    service_window,
+)
 
 NODES = 6
 CYCLES_PER_TICK = 530
+SERVICE_CYCLES = 2400 + 9 + 480 * 6 + 29 * 30 + 4  # pause, set-up, bits, gaps, hold
 FAST = {"sck_divider": 6, "word_gap": 30, "sample_point": 3}
 RTL = [
     "whisker_bridge",
@@ -20,7 +37,7 @@ RTL = [
     "framer",
     "crc8",
 ]
-RTL += ["frame_fifo", "bridge_counters", "control_registers", "report_reader"]
+RTL += ["frame_fifo", "bridge_counters", "control_registers", "report_reader", "service_store", "answer_store"]
 
 
 def reading(tick: int, lane: int) -> bytes:
@@ -49,12 +66,12 @@ class Host:
                     self.ends.append(len(self.data))
             await RisingEdge(self.dut.clk)
 
-    async def control(self, run: int, **changes: int) -> bool:
-        """Writes the control report; True if it was accepted."""
-        values = {**FAST, "lane_mask": (1 << LANES) - 1, "tick_period": LIMITS["tick_period"], **changes}
-        report = REPORTS["control"]
+    async def write(self, data: bytes, stalls: bool = False) -> bool:
+        """Writes a report, with idle cycles between its bytes if asked; True if it was accepted."""
         await pulse(self.dut, self.usb.write_start)
-        for i, byte in enumerate(report.pack(id=report.id, wire_version=WIRE_VERSION, run=run, **values)):
+        for i, byte in enumerate(data):
+            while stalls and random.random() < 0.5:
+                await RisingEdge(self.dut.clk)
             self.usb.write_index.value, self.usb.write_data.value = i, byte
             await pulse(self.dut, self.usb.write_valid)
         self.usb.write_done.value = 1
@@ -65,18 +82,42 @@ class Host:
         await ClockCycles(self.dut.clk, 3)
         return accepted
 
+    async def control(self, run: int, **changes: int) -> bool:
+        """Writes the control report; True if it was accepted."""
+        values = {**FAST, "lane_mask": (1 << LANES) - 1, "tick_period": LIMITS["tick_period"], **changes}
+        report = REPORTS["control"]
+        return await self.write(report.pack(id=report.id, wire_version=WIRE_VERSION, run=run, **values))
+
+    async def order(self, command: int, argument: bytes = b"", data: bytes = b"", stalls: bool = False) -> bool:
+        """Writes the service report; True if it was accepted."""
+        head = bytes([REPORTS["service"].id, WIRE_VERSION, command])
+        return await self.write(head + argument.ljust(5, b"\0") + data.ljust(48, b"\0"), stalls)
+
+    async def read_bytes(self, report, stalls: bool = False) -> bytes:
+        """Reads a report packet by packet, the first one twice as after a lost ACK."""
+        self.usb.read_id.value = report.id
+        out = bytearray()
+        for packet in (0, *range(0, (report.size + 63) // 64)):
+            self.usb.read_packet.value = packet
+            del out[64 * packet :]
+            await pulse(self.dut, self.usb.read_start)
+            for _ in range(min(64, report.size - 64 * packet)):
+                while stalls and random.random() < 0.5:
+                    await RisingEdge(self.dut.clk)
+                await FallingEdge(self.dut.clk)
+                out.append(int(self.usb.read_data.value))
+                await RisingEdge(self.dut.clk)
+                await pulse(self.dut, self.usb.read_next)
+        return bytes(out)
+
     async def read(self, name: str) -> dict[str, int]:
         """Reads a report."""
-        report = REPORTS[name]
-        self.usb.read_id.value = report.id
-        await pulse(self.dut, self.usb.read_start)
-        out = bytearray()
-        for _ in range(report.size):
-            await FallingEdge(self.dut.clk)
-            out.append(int(self.usb.read_data.value))
-            await RisingEdge(self.dut.clk)
-            await pulse(self.dut, self.usb.read_next)
-        return report.unpack(bytes(out))
+        return REPORTS[name].unpack(await self.read_bytes(REPORTS[name]))
+
+    async def answers(self, stalls: bool = False) -> tuple[dict[str, int], list[tuple[int, int, int]]]:
+        """The answers report: its header, and alpha, beta, status per lane."""
+        raw = await self.read_bytes(REPORTS["answers"], stalls)
+        return REPORTS["answers"].unpack(raw), list(struct.iter_unpack("<HHH", raw[8:]))
 
     def frames(self) -> list[tuple[dict[str, int], list[bytes]]]:
         """Headers and raw records of all frames read; each must decode."""
@@ -283,6 +324,113 @@ async def identity_and_control_read_back(dut):
     assert (control["id"], control["wire_version"], control["run"], control["reserved"]) == (1, WIRE_VERSION, 1, 0)
     assert (control["sck_divider"], control["word_gap"], control["sample_point"]) == (20, 99, 13)
     assert (control["lane_mask"], control["tick_period"]) == (0x5A5A5A5, 123456)
+
+
+def answer(tick: int, command: int, lane: int) -> bytes:
+    """What a node that answered a service order of this tick would send."""
+    return record(tick, 7 * lane, 0x1234, CODES["answer"] << STATUS_CODE_SHIFT | command)
+
+
+def told(raw: bytes) -> tuple[int, int, int]:
+    return struct.unpack("<HHH", raw[1:7])
+
+
+@cocotb.test(timeout_time=20, timeout_unit="ms")
+@cocotb.parametrize(stalls=[False, True])
+async def a_service_order_goes_out_once_and_brings_the_answers_to_the_one_before(dut, stalls):
+    rig = await begin(dut)
+    await rig.host.control(1)
+    assert max([await rig.step() for _ in range(3)]) <= CYCLES_PER_TICK
+    data = bytes(random.randrange(256) for _ in range(48))
+    assert await rig.host.order(4, b"\x01\x02\x03\x04\x05", data, stalls)
+    header, _ = await rig.host.answers(stalls)
+    assert (header["pending"], header["sequence"]) == (1, 0)
+    assert not await rig.host.order(0), "one order at a time"
+    rig.nodes.answers = {lane: answer(255, 0, lane) for lane in range(NODES)}
+    cycles = await rig.step()
+    assert SERVICE_CYCLES < cycles <= CYCLES_PER_TICK + SERVICE_CYCLES
+    header, found = await rig.host.answers(stalls)
+    assert (header["pending"], header["sequence"]) == (0, 1)
+    assert await rig.step() <= CYCLES_PER_TICK, "the order went out once"
+    assert await rig.host.order(0)
+    rig.nodes.answers = {0: answer(3, 4, 0), 1: answer(3, 4, 1), 2: answer(4, 4, 2), 3: b"\0" * 8, 13: answer(3, 4, 13)}
+    rig.nodes.answers |= {lane: answer(3, 4, lane) for lane in range(18, 28)}
+    await rig.step()
+    _, found = await rig.host.answers(stalls)
+    wanted = [told(error_record(0, "absent"))] * LANES
+    for lane in (0, 1, 13, *range(18, 28)):
+        wanted[lane] = told(answer(3, 4, lane))
+    wanted[2], wanted[3] = told(error_record(0, "link_tick")), told(error_record(0, "link_crc"))
+    assert found == wanted
+    await rig.host.control(0)
+    await rig.step("transfer_busy")
+    await rig.quiet()
+    check(rig.host.frames(), first_sequence=0)
+    assert rig.nodes.services == [service_window(3, 4, b"\x01\x02\x03\x04\x05", data), service_window(5, 0)]
+    serving = {3, 5}
+    wanted = [ORDER.pack(tick=n, command=COMMANDS["service" if n in serving else "sample"]) for n in range(7)]
+    assert rig.nodes.orders == wanted
+
+
+@cocotb.test(timeout_time=20, timeout_unit="ms")
+async def no_service_order_is_taken_that_is_malformed_or_does_not_fit(dut):
+    rig = await begin(dut)
+    good = bytes([4, WIRE_VERSION, 1]) + bytes(53)
+    await rig.host.control(1)
+    for bad in (good[:-1], good + b"x", good[:8], bytes([6]) + good[1:], bytes([4, WIRE_VERSION + 1]) + good[2:]):
+        assert not await rig.host.write(bad)
+    for slow in ({"sck_divider": 18}, {"word_gap": 181}, {"tick_period": LIMITS["service_tick_min"] - 1}):
+        await rig.host.control(1, **slow)
+        assert not await rig.host.write(good)
+    await rig.host.control(1, sck_divider=16, word_gap=180, tick_period=LIMITS["service_tick_min"])
+    assert await rig.host.write(good)
+    assert await rig.step() < LIMITS["service_tick_min"]
+    assert await rig.host.write(good)
+    await rig.host.control(1, sck_divider=18)
+    await rig.step()
+    assert (await rig.host.answers())[0]["pending"] == 1, "it waits for settings that leave room"
+    await rig.host.control(1)
+    await rig.step()
+    assert [service[:3] for service in rig.nodes.services] == [bytes([n, 1, 0]) for n in (0, 2)]
+
+
+@cocotb.test(timeout_time=20, timeout_unit="ms")
+async def a_usb_restart_forgets_a_service_order_and_the_answers(dut):
+    rig = await begin(dut)
+    await rig.host.control(1)
+    assert await rig.host.order(1)
+    await rig.step()
+    rig.nodes.answers = {0: answer(0, 1, 0)}
+    assert await rig.host.order(0)
+    await rig.step()
+    assert (await rig.host.answers())[1][0] == told(answer(0, 1, 0))
+    await rig.host.order(1)
+    await pulse(dut, dut.tick_strobe)
+    await ClockCycles(dut.clk, 3500)
+    await pulse(dut, dut.usb.restart)
+    await FallingEdge(dut.clk)
+    assert not int(dut.link_busy.value) and int(dut.select_n.value)
+    header, found = await rig.host.answers()
+    assert (header["pending"], header["sequence"]) == (0, 2)
+    assert found == [told(error_record(0, "absent"))] * LANES
+    await rig.host.control(1)
+    rig.tick = 0
+    assert await rig.step() <= CYCLES_PER_TICK
+
+
+@cocotb.test(timeout_time=20, timeout_unit="ms")
+async def reports_of_no_known_id_read_as_zeros(dut):
+    rig = await begin(dut)
+    report = REPORTS["counters"]
+    rig.host.usb.read_id.value = 9
+    rig.host.usb.read_packet.value = 0
+    await pulse(dut, rig.host.usb.read_start)
+    out = []
+    for _ in range(report.size):
+        await FallingEdge(dut.clk)
+        out.append(int(rig.host.usb.read_data.value))
+        await pulse(dut, rig.host.usb.read_next)
+    assert out == [9, WIRE_VERSION] + [0] * (report.size - 2)
 
 
 def test_bridge():

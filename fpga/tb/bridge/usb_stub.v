@@ -32,9 +32,11 @@ module whisker_usb (
     input  wire       write_accept,
     output reg        read_start,
     output reg  [7:0] read_id,
+    output reg  [1:0] read_packet,
     output reg        read_next,
     input  wire [7:0] read_data
 );
+    initial read_packet = 2'd0;
     initial {stream_ready, restart, write_start, write_valid, write_done, read_start, read_next} = 7'd0;
 
     assign utmi_tx_data     = 8'd0;

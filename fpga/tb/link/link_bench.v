@@ -16,6 +16,12 @@ module link_bench #(
     input  wire [LANES-1:0] miso,
     input  wire [4:0]       read_lane,
     input  wire [2:0]       read_byte,
+    input  wire             service,
+    input  wire             service_bit,
+    output wire [8:0]       service_index,
+    output wire             service_begin,
+    output wire             service_done,
+    output wire             in_service,
     output wire             busy,
     output wire             done,
     output wire             sync,
@@ -32,9 +38,11 @@ module link_bench #(
     wire [LANES-1:0] bits;
 
     node_link link (
-        .clk(clk), .rst(rst), .start(start), .order_tick(order_tick), .order_command(8'h01),
+        .clk(clk), .rst(rst), .start(start), .order_tick(order_tick),
+        .service(service), .service_bit(service_bit), .service_index(service_index), .service_begin(service_begin),
+        .service_done(service_done), .in_service(in_service),
         .sck_divider(sck_divider), .word_gap(word_gap), .sample_point(sample_point), .busy(busy), .done(done),
-        .sync(sync), .sck(sck), .select_n(select_n), .mosi(mosi), .capture(capture), .bit_index(bit_index));
+        .sync(sync), .sck(sck), .select_n(select_n), .mosi(mosi), .capture(capture), .record_index(bit_index));
 
     lane_receiver #(.LANES(LANES)) receiver (
         .clk(clk), .rst(rst), .clear(start), .expected_tick(expected_tick), .capture(capture),

@@ -18,7 +18,7 @@ CYCLES_PER_TICK = 530  # at divider 6 and gap 30: what the simulation's speed is
 
 async def begin(dut, delay_ps: int = 0) -> Nodes:
     """Clock and nodes running, link idle."""
-    await start_clock(dut, start=0, read_lane=0, read_byte=0)
+    await start_clock(dut, start=0, read_lane=0, read_byte=0, service=0, service_bit=0)
     nodes = Nodes(dut, delay_ps)
     nodes.times["sck"].clear()
     return nodes

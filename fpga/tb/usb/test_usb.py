@@ -10,7 +10,7 @@ sys.path[:0] = [str(Path(__file__).parents[2] / "usb"), str(Path(__file__).paren
 from amaranth.sim import Simulator  # noqa: E402
 from descriptors import descriptors, report_descriptor  # noqa: E402
 from endpoints import FrameEndpoint, SilentEndpoint  # noqa: E402
-from hid_requests import FEATURE, GET_REPORT, SET_IDLE, SET_REPORT, HidRequests  # noqa: E402
+from hid_requests import FEATURE, GET_REPORT, READ, SET_IDLE, SET_REPORT, WRITTEN, HidRequests  # noqa: E402
 from usb_protocol.types import USBRequestRecipient, USBRequestType  # noqa: E402
 
 from whisker.protocol import LIMITS, REPORTS  # noqa: E402
@@ -225,19 +225,23 @@ class ControlHost:
         self.ctx.set(self.bus.rx.next, 0)
         return await self.ask(self.bus.rx_ready_for_response), bytes(seen)
 
-    async def read(self) -> bytes:
-        """The data stage of a read: the registers show the position as the byte."""
-        out, position = bytearray(), 0
+    async def read(self, acknowledge: bool = True) -> bytes:
+        """A packet of the data stage of a read: the registers show the position as the byte."""
         assert await self.ask(self.bus.data_requested) == ""
+        base = 64 * self.ctx.get(self.handler.read_packet)
+        out, position = bytearray(), 0
         await self.ctx.tick("usb")
         self.ctx.set(self.bus.tx.ready, 1)
         while self.ctx.get(self.bus.tx.valid):
-            self.ctx.set(self.handler.read_data, position)
+            self.ctx.set(self.handler.read_data, base + position)
             assert self.ctx.get(self.bus.tx.first) == (position == 0)
+            assert self.ctx.get(self.bus.tx_data_pid) == 1 - base // 64 % 2
             out.append(self.ctx.get(self.bus.tx.payload))
             position += self.ctx.get(self.handler.read_next)
             await self.ctx.tick("usb")
         self.ctx.set(self.bus.tx.ready, 0)
+        if acknowledge:
+            await pulse(self.ctx, self.bus.handshakes_in.ack)
         return bytes(out)
 
 
@@ -254,23 +258,39 @@ def value(report_id: int, kind: int = FEATURE) -> int:
     return kind << 8 | report_id
 
 
-@pytest.mark.parametrize("name", REPORTS)
-@pytest.mark.parametrize("asked", [64, 5, 1])
-def test_get_report_sends_the_report_or_what_fits(name, asked):
+@pytest.mark.parametrize("name", READ)
+@pytest.mark.parametrize("asked", [255, 64, 5, 1])
+def test_get_report_sends_the_report_or_what_fits_packet_by_packet(name, asked):
     report = REPORTS[name]
 
     async def scenario(host):
         await host.setup(GET_REPORT, value(report.id), asked, True)
         wanted = bytes(range(min(asked, report.size)))
-        assert await host.read() == wanted
-        assert await host.read() == wanted, "asked again when the host's ACK was lost"
+        got = b""
+        while got != wanted:
+            packet = await host.read(acknowledge=False)
+            assert packet and await host.read() == packet, "asked again when the host's ACK was lost"
+            got += packet
         assert await host.status() == "ack"
 
     on_requests(scenario)
 
 
+def test_each_read_begins_with_the_first_packet():
+    async def scenario(host):
+        for _ in range(2):
+            await host.setup(GET_REPORT, value(REPORTS["answers"].id), 255, True)
+            assert await host.read() == bytes(range(64))
+
+    on_requests(scenario)
+
+
 REFUSED = [
-    (GET_REPORT, value(4), 64, True, 1),  # no such report
+    (GET_REPORT, value(6), 64, True, 1),  # no such report
+    (GET_REPORT, value(4), 64, True, 1),  # write only
+    (SET_REPORT, value(4), 55, False, 1),  # too short
+    (SET_REPORT, value(4), 57, False, 1),  # too long
+    (SET_REPORT, value(5), 176, False, 1),  # read only
     (GET_REPORT, value(1, kind=1), 64, True, 1),  # an input report
     (GET_REPORT, value(1), 64, True, 0),  # the wrong interface
     (SET_REPORT, value(2), 32, False, 1),  # read only
@@ -291,13 +311,15 @@ def test_other_requests_stall_at_every_stage(request_, what, length, is_in, inde
     on_requests(scenario)
 
 
+@pytest.mark.parametrize("name", WRITTEN)
 @pytest.mark.parametrize("accept", [0, 1])
-def test_set_report_is_decided_once(accept):
-    data = bytes(range(10, 10 + CONTROL.size))
+def test_set_report_is_decided_once(accept, name):
+    report = REPORTS[name]
+    data = bytes(range(10, 10 + report.size))
 
     async def scenario(host):
         done = []
-        await host.setup(SET_REPORT, value(CONTROL.id), CONTROL.size, False)
+        await host.setup(SET_REPORT, value(report.id), report.size, False)
         for _ in range(2):  # the host repeats its data when our ACK was lost
             assert await host.write(data) == ("ack", data)
         host.ctx.set(host.handler.write_accept, accept)

@@ -140,7 +140,7 @@ static void the_cut_between_chunks_does_not_matter(void **state)
 static void each_cause_has_its_count(void **state)
 {
     (void)state;
-    static const char *const causes[] = {"wrong_magic", "wire_version_2", "bad_header_crc", "lanes_27"};
+    static const char *const causes[] = {"wrong_magic", "wire_version_1", "bad_header_crc", "lanes_27"};
     for (size_t i = 0; i < sizeof causes / sizeof causes[0]; i++) {
         uint8_t stream[2 * VECTOR_BYTES];
         size_t length = append(stream, 0, causes[i]);

@@ -66,10 +66,14 @@ WIRE_VERSION: int = DEFINITION["wire_version"]
 RECORD = Message(DEFINITION["record"])
 ORDER = Message(DEFINITION["order"])
 FRAME_HEADER = Message(DEFINITION["frame_header"])
+SERVICE = Message(DEFINITION["service"])
+IMAGE_HEADER = Message(DEFINITION["image_header"])
 REPORTS = {name: Message(table) for name, table in DEFINITION["reports"].items()}
 LIMITS: dict[str, int] = {name: entry["value"] for name, entry in DEFINITION["limits"].items()}
 CODES: dict[str, int] = {name: entry["value"] for name, entry in DEFINITION["codes"].items()}
 COMMANDS: dict[str, int] = {name: entry["value"] for name, entry in DEFINITION["commands"].items()}
+SERVICE_COMMANDS: dict[str, int] = {name: e["value"] for name, e in DEFINITION["service_commands"].items()}
+NODE_STATES: dict[str, int] = {name: e["value"] for name, e in DEFINITION["node_states"].items()}
 FRAME_FLAGS: dict[str, int] = {name: 1 << entry["bit"] for name, entry in DEFINITION["frame_flags"].items()}
 SENSOR_ERRORS: dict[str, dict] = DEFINITION["sensor_errors"]
 LANES: int = LIMITS["lanes"]
@@ -85,6 +89,24 @@ def crc8(data: bytes) -> int:
         for _ in range(8):
             crc = ((crc << 1) ^ p["polynomial"]) & 0xFF if crc & 0x80 else crc << 1
     return crc ^ p["xor_out"]
+
+
+def crc32(data: bytes) -> int:
+    """CRC-32 of `data`, most significant bit first, with the parameters of the definition file."""
+    p = DEFINITION["crc32"]
+    crc = p["init"]
+    for byte in data:
+        crc ^= byte << 24
+        for _ in range(8):
+            crc = ((crc << 1) ^ p["polynomial"] if crc & 0x80000000 else crc << 1) & 0xFFFFFFFF
+    return crc ^ p["xor_out"]
+
+
+def service_window(tick: int, command: int, argument: bytes = b"", data: bytes = b"") -> bytes:
+    """The bytes a bridge sends in a service window; short arguments and data are filled up with zeros."""
+    head = bytes([tick & 0xFF, command]) + argument.ljust(SERVICE.fields["argument"].count, b"\0")
+    body = head + bytes([crc8(head)]) + data.ljust(SERVICE.fields["data"].count, b"\0")
+    return body + crc32(body).to_bytes(4, "big")
 
 
 def decode_frame(data: bytes) -> tuple[dict[str, int], list[dict[str, int]]]:
