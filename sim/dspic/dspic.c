@@ -82,6 +82,9 @@ static void handle(struct dspic *chip, enum event event)
     case EVENT_POWER:
         throw_out(chip, 0);
         break;
+    case EVENT_OUTSIDE:
+        chip->wiring.outside(chip->wiring.context);
+        break;
     default:
         break;
     }
@@ -133,7 +136,7 @@ static void boot(struct dspic *chip)
 static void lose_power(struct dspic *chip)
 {
     chip->powered = false;
-    for (unsigned e = 0; e < EVENTS; e++)
+    for (unsigned e = 0; e < EVENT_OUTSIDE; e++)
         chip->due_fs[e] = NEVER;
     for (unsigned rp = 0; rp < 16u; rp++)
         chip->drive[rp] = DSPIC_FLOAT;
@@ -190,16 +193,35 @@ void dspic_power_on(struct dspic *chip, uint64_t now_fs)
 
 void dspic_power_off(struct dspic *chip, uint64_t now_fs)
 {
+    if (chip->unwind)
+        throw_out(chip, 0);
     dspic_run_until(chip, now_fs);
     lose_power(chip);
 }
 
+static void run_dark(struct dspic *chip, uint64_t until_fs)
+{
+    while (!chip->powered && chip->due_fs[EVENT_OUTSIDE] <= until_fs) {
+        if (chip->due_fs[EVENT_OUTSIDE] > chip->now_fs)
+            chip->now_fs = chip->due_fs[EVENT_OUTSIDE];
+        handle(chip, EVENT_OUTSIDE);
+    }
+}
+
 void dspic_run_until(struct dspic *chip, uint64_t until_fs)
 {
-    if (chip->powered)
-        enter(chip, run, run, until_fs);
+    do {
+        run_dark(chip, until_fs);
+        if (chip->powered)
+            enter(chip, run, run, until_fs);
+    } while (!chip->powered && chip->due_fs[EVENT_OUTSIDE] <= until_fs);
     if (until_fs > chip->now_fs)
         chip->now_fs = until_fs;
+}
+
+void dspic_outside_at(struct dspic *chip, uint64_t at_fs)
+{
+    plan_event(chip, EVENT_OUTSIDE, at_fs);
 }
 
 uint64_t dspic_now_fs(const struct dspic *chip)
@@ -252,7 +274,9 @@ static void be_reset(struct dspic *chip, uint64_t cause)
 
 void dspic_disturb_reset(struct dspic *chip, uint16_t cause)
 {
-    if (chip->powered)
+    if (chip->unwind)
+        throw_out(chip, cause);
+    else if (chip->powered)
         enter(chip, be_reset, nothing, cause);
 }
 
@@ -262,14 +286,17 @@ static void be_trapped(struct dspic *chip, uint64_t trap)
 {
     static const uint16_t FLAG[] = {INTCON1_OSCFAIL, INTCON1_STKERR, INTCON1_ADDRERR, INTCON1_MATHERR, INTCON1_DMACERR};
     *sfr(chip, INTCON1) |= FLAG[trap];
+    const unsigned before = chip->level;
     chip->level = TRAP_LEVEL;
     chip->wiring.trap(chip->wiring.context, (enum dspic_trap)trap);
-    chip->level = 0;
+    chip->level = before;
 }
 
 void dspic_disturb_trap(struct dspic *chip, enum dspic_trap trap)
 {
-    if (chip->powered)
+    if (chip->unwind)
+        be_trapped(chip, trap);
+    else if (chip->powered)
         enter(chip, be_trapped, nothing, trap);
 }
 

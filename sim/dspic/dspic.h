@@ -1,10 +1,10 @@
 /* The dsPIC33FJ128MC802 as its firmware sees it: registers with their side effects, in virtual time.
  *
- * Modelled: SPI1, SPI2, DMA with ping-pong, T1 to T3, INT1, INT2, pin select, ports, interrupt priorities and nesting, clock
- * switch behind its unlock sequence, watchdog, flash self-programming with power cuts, reset causes. Firmware runs as
- * native code; it takes time only where it touches the chip: each access a cycle, each interrupt its entry, exit and a
- * fixed number of cycles for the work between. Interrupts nest at accesses. Not modelled: the CPU's own instructions,
- * PSV, other peripherals; writes to their registers are kept and do nothing.
+ * Modelled: SPI1, SPI2, DMA with ping-pong, T1 to T3, INT1, INT2, pin select, ports, interrupt priorities and nesting,
+ * clock switch behind its unlock sequence, watchdog, flash self-programming with power cuts, reset causes. Firmware
+ * runs as native code; it takes time only where it touches the chip: each access a cycle, each interrupt its entry,
+ * exit and a fixed number of cycles for the work between. Interrupts nest at accesses. Not modelled: the CPU's own
+ * instructions, PSV, other peripherals; writes to their registers are kept and do nothing.
  *
  * A chip and what is wired to it belong to one thread. */
 #ifndef DSPIC_H
@@ -47,6 +47,7 @@ struct dspic_wiring {
     void (*loop)(void *context);  /* one turn of the main loop, after each interrupt that ended idle */
     void (*interrupt)(void *context, unsigned irq); /* body of IRQ_* */
     void (*trap)(void *context, enum dspic_trap);
+    void (*outside)(void *context); /* see dspic_outside_at */
 };
 
 /* What the firmware did that the data sheet forbids. Tests demand zero. */
@@ -79,6 +80,10 @@ bool dspic_powered(const struct dspic *chip);
 
 /* The outside drives pin RB0 to RB15, from `now_fs` on. Peripherals react at once, interrupts when time goes on. */
 void dspic_input(struct dspic *chip, unsigned rp, bool level, uint64_t now_fs);
+
+/* wiring.outside is called once at this time, exactly, whatever the firmware is doing; it may call dspic_input for the
+ * present time, dspic_outside_at and dspic_disturb_*. One such time is remembered. */
+void dspic_outside_at(struct dspic *chip, uint64_t at_fs);
 
 /* The same from within the pin callback, for a pin whose edges start nothing (data of a master). */
 void dspic_wire(struct dspic *chip, unsigned rp, bool level);

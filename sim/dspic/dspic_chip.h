@@ -19,6 +19,7 @@ enum event {
     EVENT_PLL,
     EVENT_WATCHDOG,
     EVENT_POWER,
+    EVENT_OUTSIDE, /* last: neither a reset nor a power cut stops it */
     EVENTS
 };
 
@@ -105,7 +106,8 @@ void spi_wrote(struct dspic *chip, unsigned n, unsigned address, uint16_t old);
 uint16_t spi_read_buffer(struct dspic *chip, unsigned n);
 void spi_event(struct dspic *chip, unsigned n);
 void spi_input(struct dspic *chip, unsigned rp, bool level);
-bool spi_drives(const struct dspic *chip, unsigned function, bool *level); /* output of pin function RP_* */
+/* Output of pin function RP_*; with the module off the pin stays the port's. */
+void spi_drives(const struct dspic *chip, unsigned function, bool *driven, bool *level);
 
 /* dma.c */
 void dma_request(struct dspic *chip, unsigned irq);

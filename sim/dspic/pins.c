@@ -23,7 +23,7 @@ static enum dspic_drive drive_of(const struct dspic *chip, unsigned rp)
     const unsigned function = function_of(chip, rp), mask = 1u << rp;
     bool level = chip->sfr[LATB / 2u] & mask, driven = !(chip->sfr[TRISB / 2u] & mask);
     if (function == RP_SDO1 || function == RP_SCK1 || function == RP_SDO2)
-        driven = spi_drives(chip, function, &level);
+        spi_drives(chip, function, &driven, &level);
     if (!driven || (level && chip->sfr[ODCB / 2u] & mask))
         return DSPIC_FLOAT;
     return level ? DSPIC_HIGH : DSPIC_LOW;

@@ -214,16 +214,13 @@ void spi_wrote(struct dspic *chip, unsigned n, unsigned address, uint16_t old)
     }
 }
 
-bool spi_drives(const struct dspic *chip, unsigned function, bool *level)
+void spi_drives(const struct dspic *chip, unsigned function, bool *driven, bool *level)
 {
     const unsigned n = function == RP_SDO2;
     const struct spi *s = &chip->spi[n];
+    const bool master = con1(chip, n) & SPICON1_MSTEN;
     if (!enabled(chip, n))
-        return false;
-    if (function == RP_SCK1) {
-        *level = s->high;
-        return con1(chip, n) & SPICON1_MSTEN;
-    }
-    *level = s->sdo;
-    return !(con1(chip, n) & SPICON1_DISSDO) && (con1(chip, n) & SPICON1_MSTEN || selected(chip, n));
+        return;
+    *level = function == RP_SCK1 ? s->high : s->sdo;
+    *driven = function == RP_SCK1 ? master : !(con1(chip, n) & SPICON1_DISSDO) && (master || selected(chip, n));
 }

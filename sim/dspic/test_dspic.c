@@ -79,7 +79,7 @@ static void power(const struct dspic_parameters *parameters)
 {
     memset(&bench, 0, sizeof bench);
     bench.chip =
-        dspic_new(parameters, &(struct dspic_wiring){&bench, on_pin, on_start, on_loop, on_interrupt, on_trap});
+        dspic_new(parameters, &(struct dspic_wiring){&bench, on_pin, on_start, on_loop, on_interrupt, on_trap, NULL});
     dspic_power_on(bench.chip, 0);
 }
 
@@ -631,7 +631,7 @@ static void a_power_cut_leaves_a_page_half_erased(void **state)
     dspic_free(bench.chip);
     memset(&bench, 0, sizeof bench);
     bench.chip =
-        dspic_new(&parameters, &(struct dspic_wiring){&bench, on_pin, on_start, on_loop, on_interrupt, on_trap});
+        dspic_new(&parameters, &(struct dspic_wiring){&bench, on_pin, on_start, on_loop, on_interrupt, on_trap, NULL});
     bench.starting = erase_at_start;
     for (unsigned i = 0; i < FLASH_PAGE_WORDS; i++)
         dspic_flash(bench.chip)[1024 + i] = 0;

@@ -42,7 +42,9 @@ void mlx90333_supply(struct mlx90333 *sensor, uint64_t now_ns, bool on)
 {
     start(sensor, now_ns);
     sensor->restarting = true;
+    sensor->slipped = false;
     sensor->dark = !on;
+    sensor->fault = SIM_SENSOR_GOOD;
 }
 
 void mlx90333_set_field(struct mlx90333 *sensor, const struct mlx90333_field *field)
@@ -66,13 +68,14 @@ static uint32_t draw(struct mlx90333 *sensor)
 
 static void require(struct mlx90333 *sensor, bool kept, enum mlx90333_violation violation)
 {
-    if (!kept)
+    if (!kept && !sensor->slipped)
         sensor->violations[violation]++;
 }
 
 static void resynchronise(struct mlx90333 *sensor)
 {
     sensor->enabled = true;
+    sensor->slipped = false;
     sensor->answering = false;
     sensor->byte = 0;
     sensor->bit = 0;
@@ -130,6 +133,7 @@ static void make_frame(struct mlx90333 *sensor, const uint16_t words[3], uint16_
 static void latch(struct mlx90333 *sensor, uint64_t now_ns)
 {
     uint16_t words[3], errors;
+    sensor->latch_ns = now_ns;
     sensor->age_ns = mlx90333_sense_latch(&sensor->sense, now_ns, words, &errors);
     if (sensor->fault == SIM_SENSOR_ERROR_BITS)
         errors |= sensor->argument;
@@ -147,7 +151,7 @@ static bool check_byte_start(struct mlx90333 *sensor, uint64_t now_ns)
     const uint64_t gap = now_ns - (sensor->fresh ? sensor->select_ns : sensor->fall_ns);
     const uint32_t least = sensor->fresh ? sensor->t6 : sensor->byte == 1 ? sensor->t7 : sensor->t2;
     require(sensor, gap >= least,
-            sensor->fresh        ? MLX90333_SELECT_LOW
+            sensor->fresh       ? MLX90333_SELECT_LOW
             : sensor->byte == 1 ? MLX90333_START_GAP
                                 : MLX90333_BYTE_GAP);
     sensor->fresh = false;
@@ -207,7 +211,8 @@ static bool line(struct mlx90333 *sensor, unsigned position, bool master)
     case SIM_SENSOR_FLIP_BIT:
         return (master && sensor->level) != (position == sensor->argument);
     case SIM_SENSOR_FLIP_TWO:
-        return (master && sensor->level) != (position == (sensor->argument & 0xFFu) || position == sensor->argument >> 8);
+        return (master && sensor->level) !=
+               (position == (sensor->argument & 0xFFu) || position == sensor->argument >> 8);
     default:
         return master && sensor->level;
     }
@@ -220,6 +225,7 @@ static bool lost(struct mlx90333 *sensor, unsigned position, bool level)
         sensor->dropping = sensor->fault == SIM_SENSOR_LOST_CLOCK && position == sensor->argument;
     if (!sensor->dropping)
         return false;
+    sensor->slipped = true;
     if (!level) {
         sensor->dropping = false;
         sensor->fault = SIM_SENSOR_GOOD; /* once */
@@ -238,7 +244,7 @@ static void edge(struct mlx90333 *sensor, uint64_t now_ns, bool level, bool mast
         end_byte(sensor, now_ns);
 }
 
-/* A falling edge that is followed by a clock of the disturbance's own, once. The master is not blamed for it. */
+/* A falling edge that is followed by a clock of the disturbance's own, once. */
 static bool doubled(struct mlx90333 *sensor, unsigned position, bool level)
 {
     const bool now = !level && sensor->fault == SIM_SENSOR_EXTRA_CLOCK && position == sensor->argument;
@@ -249,11 +255,9 @@ static bool doubled(struct mlx90333 *sensor, unsigned position, bool level)
 
 static void glitch(struct mlx90333 *sensor, uint64_t now_ns, bool master)
 {
-    uint32_t before[MLX90333_VIOLATIONS];
-    memcpy(before, sensor->violations, sizeof before);
+    sensor->slipped = true;
     edge(sensor, now_ns, true, master);
     edge(sensor, now_ns, false, master);
-    memcpy(sensor->violations, before, sizeof before);
 }
 
 bool mlx90333_clock(struct mlx90333 *sensor, uint64_t now_ns, bool level, bool master)

@@ -18,13 +18,13 @@
 
 enum sim_sensor_fault {
     SIM_SENSOR_GOOD,
-    SIM_SENSOR_FLIP_BIT,   /* one bit is inverted at the master's end; argument 0 to 63 in order of sending */
-    SIM_SENSOR_DEAD,       /* all ones: nothing drives the line */
-    SIM_SENSOR_STUCK_LOW,  /* all zeros */
-    SIM_SENSOR_ERROR_BITS, /* a sound frame whose error word is the argument */
-    SIM_SENSOR_FLOATING,   /* the line follows nobody: random levels */
-    SIM_SENSOR_FROZEN,     /* sound frames, always the same angles */
-    SIM_SENSOR_LOST_CLOCK, /* one clock edge pair does not reach it; argument: which bit of the frame, 0 to 63 */
+    SIM_SENSOR_FLIP_BIT,    /* one bit is inverted at the master's end; argument 0 to 63 in order of sending */
+    SIM_SENSOR_DEAD,        /* all ones: nothing drives the line */
+    SIM_SENSOR_STUCK_LOW,   /* all zeros */
+    SIM_SENSOR_ERROR_BITS,  /* a sound frame whose error word is the argument */
+    SIM_SENSOR_FLOATING,    /* the line follows nobody: random levels */
+    SIM_SENSOR_FROZEN,      /* sound frames, always the same angles */
+    SIM_SENSOR_LOST_CLOCK,  /* one clock edge pair does not reach it; argument: which bit of the frame, 0 to 63 */
     SIM_SENSOR_FLIP_TWO,    /* two bits are inverted; argument: one position, and 256 times the other */
     SIM_SENSOR_NOISY,       /* each bit is inverted with the probability argument / 65536 */
     SIM_SENSOR_EXTRA_CLOCK, /* it sees one clock edge pair too many; argument: after which bit of the frame */
@@ -47,7 +47,8 @@ struct mlx90333 {
     uint32_t t1, t2, t4, t5, t6, t7; /* stretched by this part's oscillator */
     struct mlx90333_parameters parameters;
     struct mlx90333_sense sense;
-    uint64_t age_ns;           /* of the conversion in the frame last latched */
+    uint64_t latch_ns;         /* of the newest frame */
+    uint64_t age_ns;           /* of its conversion then */
     uint64_t awake_ns;         /* when the start-up ends */
     uint64_t select_ns;        /* last edge of /SS */
     uint64_t rise_ns, fall_ns; /* last clock edges */
@@ -68,6 +69,7 @@ struct mlx90333 {
     uint8_t frame_bytes;
     bool dropping; /* a clock whose rising edge was lost loses its falling edge too */
     bool dark;     /* without supply */
+    bool slipped;  /* has counted other clocks than its master sent: what seems too soon is not the master's doing */
     uint8_t frame[MLX90316_FRAME_BYTES];
 };
 

@@ -3,8 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "dspic.h"
-#include "port.h" // struct board, port_*
+#include "sim_node_state.h"
 
 #define OSCILLATOR_SPREAD_PERMILLE (MLX90333_OSCILLATOR_PERCENT * 10u)
 #define TICK_FS (SIM_TICK_NS * DSPIC_FS_PER_NS)
@@ -12,16 +11,15 @@
 #define SELECT_FS (3000u * DSPIC_FS_PER_NS)
 #define DESELECT_FS (20000u * DSPIC_FS_PER_NS)
 
-struct sim_node {
-    struct dspic *chip;
-    struct board board;
-    struct mlx90333 sensor;
-    uint64_t seed;
-    uint64_t tick_fs; /* start of the present tick */
-    bool powered;
-    enum sim_sensor_fault fault; /* of the next reading */
-    unsigned argument;
-};
+/* The master sends ones but for the MLX90316's start byte, on a pin of its own beside its input. */
+static void clock_sensor(struct sim_node *node, bool level, uint64_t now_ns)
+{
+    const bool sent = dspic_output(node->chip, PIN_SENSOR_SEND) != DSPIC_LOW;
+    const bool seen = mlx90333_clock(&node->sensor, now_ns, level, sent);
+    dspic_wire(node->chip, PIN_SENSOR_DATA, seen);
+    if (!level)
+        node->line = node->line << 1 | seen;
+}
 
 static void on_pin(void *context, unsigned rp, enum dspic_drive drive, uint64_t now_fs)
 {
@@ -31,12 +29,13 @@ static void on_pin(void *context, unsigned rp, enum dspic_drive drive, uint64_t 
     if (rp == PIN_SENSOR_SELECT)
         mlx90333_select(&node->sensor, now_ns, level);
     else if (rp == PIN_SENSOR_CLOCK)
-        dspic_wire(node->chip, PIN_SENSOR_DATA, mlx90333_clock(&node->sensor, now_ns, level, true));
+        clock_sensor(node, level, now_ns);
 }
 
 static void on_start(void *context)
 {
     struct sim_node *node = context;
+    node->sensor.violations[MLX90333_SELECT_HIGH] = node->releases;
     port_start(&node->board);
 }
 
@@ -46,9 +45,8 @@ static void on_loop(void *context)
     port_loop(&node->board);
 }
 
-static void on_interrupt(void *context, unsigned irq)
+static void serve(struct sim_node *node, unsigned irq)
 {
-    struct sim_node *node = context;
     switch (irq) {
     case IRQ_INT1:
         port_on_int1(&node->board);
@@ -76,6 +74,23 @@ static void on_interrupt(void *context, unsigned irq)
     }
 }
 
+static void on_interrupt(void *context, unsigned irq)
+{
+    struct sim_node *node = context;
+    const uint8_t before = node->board.node.armed;
+    node->releases = node->sensor.violations[MLX90333_SELECT_HIGH];
+    serve(node, irq);
+    if (node->board.node.armed != before) /* its instructions besides register accesses are yet to come */
+        node->armed_fs = dspic_now_fs(node->chip) +
+                         node->parameters.chip.work_cycles * (UINT64_C(1000000000000000) / dspic_fcy_hz(node->chip));
+}
+
+static void on_outside(void *context)
+{
+    struct sim_node *node = context;
+    node->act(node->act_context);
+}
+
 static void on_trap(void *context, enum dspic_trap trap)
 {
     struct sim_node *node = context;
@@ -83,21 +98,43 @@ static void on_trap(void *context, enum dspic_trap trap)
     port_on_trap(&node->board);
 }
 
-sim_node *sim_node_new(uint64_t seed)
+static uint16_t oscillator_permille(uint64_t seed)
+{
+    const uint64_t mixed = (seed * UINT64_C(0x9E3779B97F4A7C15)) >> 32;
+    return (uint16_t)(1000u - OSCILLATOR_SPREAD_PERMILLE + mixed % (2u * OSCILLATOR_SPREAD_PERMILLE + 1u));
+}
+
+void sim_node_parameters_default(struct sim_node_parameters *parameters, uint64_t seed)
+{
+    dspic_parameters_default(&parameters->chip);
+    mlx90333_parameters_default(&parameters->sensor);
+    parameters->chip.seed = parameters->sensor.seed = seed;
+    parameters->sensor.slow_permille = oscillator_permille(seed);
+#ifdef SENSOR_MLX90316
+    parameters->sensor.mlx90316 = true;
+#endif
+}
+
+sim_node *sim_node_new_as(const struct sim_node_parameters *parameters)
 {
     sim_node *node = calloc(1, sizeof *node);
     if (!node)
         return NULL;
-    struct dspic_parameters parameters;
-    dspic_parameters_default(&parameters);
-    parameters.seed = seed;
-    node->chip = dspic_new(&parameters, &(struct dspic_wiring){node, on_pin, on_start, on_loop, on_interrupt, on_trap});
+    node->parameters = *parameters;
+    node->chip = dspic_new(&parameters->chip,
+                           &(struct dspic_wiring){node, on_pin, on_start, on_loop, on_interrupt, on_trap, on_outside});
     node->board.chip = node->chip;
-    node->seed = seed;
     if (node->chip)
         return node;
     free(node);
     return NULL;
+}
+
+sim_node *sim_node_new(uint64_t seed)
+{
+    struct sim_node_parameters parameters;
+    sim_node_parameters_default(&parameters, seed);
+    return sim_node_new_as(&parameters);
 }
 
 void sim_node_free(sim_node *node)
@@ -107,19 +144,9 @@ void sim_node_free(sim_node *node)
     free(node);
 }
 
-static uint16_t oscillator_permille(uint64_t seed)
-{
-    const uint64_t mixed = (seed * UINT64_C(0x9E3779B97F4A7C15)) >> 32;
-    return (uint16_t)(1000u - OSCILLATOR_SPREAD_PERMILLE + mixed % (2u * OSCILLATOR_SPREAD_PERMILLE + 1u));
-}
-
 void sim_node_power_on(sim_node *node)
 {
-    struct mlx90333_parameters parameters;
-    mlx90333_parameters_default(&parameters);
-    parameters.slow_permille = oscillator_permille(node->seed);
-    parameters.seed = node->seed;
-    mlx90333_power_on(&node->sensor, 0, &parameters);
+    mlx90333_power_on(&node->sensor, 0, &node->parameters.sensor);
     dspic_wire(node->chip, PIN_LINK_SELECT, true);
     dspic_power_on(node->chip, 0);
     node->powered = true;

@@ -37,8 +37,7 @@ void node_on_sync(struct node *node)
 
 void node_on_timer(struct node *node)
 {
-    if (sampler_on_timer(&node->sampler))
-        publish(node); /* a tick without a reading must arm the link too, should its transfer have been cut short */
+    (void)sampler_on_timer(&node->sampler); /* what a tick without a reading says, its order's interrupt has armed */
 }
 
 void node_on_sensor_byte(struct node *node, uint8_t byte)

@@ -1,0 +1,49 @@
+/* Every fault that is tried on a node on purpose, and what the bridge must then see. */
+#ifndef FAULT_MATRIX_H
+#define FAULT_MATRIX_H
+
+#include "lane_bench.h"
+
+/* The verdicts on consecutive records as letters: . good, e good frame with error bits, S starting, R resync, L late,
+ * x sensor_sum, 0 sensor_start, a sensor_absent, j step, P reset_power, W reset_watchdog, T reset_trap, O overrun,
+ * - absent, c link_crc, t link_tick. The first is that on the record which the broken tick brings: the record of the
+ * tick before. The last is the last bad one. */
+
+struct fault_case {
+    const char *name;
+    struct lane_faults faults;                        /* of each broken tick */
+    unsigned ticks;                                   /* how many in a row; 0: one */
+    enum sim_node_disturbance end;                    /* what ends it, with the first sound tick */
+    void (*part)(struct sim_node_parameters *);       /* parts that are special */
+    void (*field)(unsigned tick, struct sim_field *); /* a field that is special */
+    const char *expected;                             /* the verdicts, as an extended regular expression */
+    unsigned most;                                    /* ticks without a good record, at most */
+    const char *remark;
+    bool for_ever;     /* it has no end; good samples are not waited for */
+    bool undetectable; /* by what a node can check; the remark says why */
+    bool breaches;     /* the sensor is not the one that the firmware's times are made for */
+};
+
+extern const struct fault_case FAULT_CASES[];
+extern const unsigned FAULT_CASE_COUNT;
+
+enum { FAULT_FIRST_TICK = 6, FAULT_GOOD_RUN = 8, FAULT_TEXT = 96 };
+
+struct fault_outcome {
+    bool as_expected;
+    char verdicts[FAULT_TEXT]; /* a run of n > 9 of one letter is written as the letter and n */
+    int detected_after;        /* place of the first bad verdict, 1: that on the broken tick's own record; -1: none */
+    unsigned lost;             /* ticks without a good record */
+    unsigned causes;           /* how often a verdict named a fault anew; RESYNC between is no news */
+    unsigned altered;          /* good records that held something else */
+    uint32_t violations;       /* of the sensor's and the chip's data sheets */
+};
+
+/* Runs one case on a node with such parts. */
+struct fault_outcome fault_run(const struct fault_case *row, const struct sim_node_parameters *parts);
+
+/* Parts number `n` of FAULT_PARTS: both prefetch depths, slow, nominal and quick oscillators. */
+enum { FAULT_PARTS = 6 };
+struct sim_node_parameters fault_parts(unsigned n);
+
+#endif

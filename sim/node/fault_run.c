@@ -1,0 +1,145 @@
+/* Runs a case of the fault matrix and writes down the verdicts. */
+#define _POSIX_C_SOURCE 200809L
+#include <regex.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "fault_matrix.h"
+#include "whisker_protocol.h"
+
+enum { LONGEST = 1000 };
+
+static char letter(const struct lane_verdict *v)
+{
+    static const char CODES[] = ".SRLx0ajPWT??O";
+    switch (v->code) {
+    case WHISKER_CODE_OK:
+        return v->status == 0 ? '.' : 'e';
+    case WHISKER_CODE_ABSENT:
+        return '-';
+    case WHISKER_CODE_LINK_CRC:
+        return 'c';
+    case WHISKER_CODE_LINK_TICK:
+        return 't';
+    default:
+        return v->code < sizeof CODES - 1u ? CODES[v->code] : '?';
+    }
+}
+
+struct sim_node_parameters fault_parts(unsigned n)
+{
+    struct sim_node_parameters parts;
+    sim_node_parameters_default(&parts, n);
+    parts.chip.slave_prefetch = (uint8_t)(1u + n % 2u);
+    parts.chip.dma_cycles = 8;
+    parts.chip.frc_ppm = ((int32_t)(n / 2u) - 1) * 20000;
+    parts.sensor.slow_permille = (uint16_t)(900u + n / 2u * 100u);
+    return parts;
+}
+
+static struct sim_field field_of(const struct fault_case *row, unsigned tick)
+{
+    struct sim_field field = {0.5 * (tick % 40u), -12.0 + 0.25 * (tick % 60u)};
+    if (row->field)
+        row->field(tick, &field);
+    return field;
+}
+
+static void append(char text[FAULT_TEXT], char c, unsigned run)
+{
+    const size_t at = strlen(text);
+    if (run > 9u) {
+        snprintf(text + at, FAULT_TEXT - at, "%c%u", c, run);
+        return;
+    }
+    for (unsigned i = 0; i < run && at + i + 1u < FAULT_TEXT; i++)
+        text[at + i] = c;
+}
+
+/* `letters[0]` is the verdict on the record that the broken tick brought. */
+static void summarise(struct fault_outcome *out, const char *letters, unsigned last)
+{
+    unsigned run = 0;
+    char cause = '.';
+    for (unsigned i = 0; i < last; i++) {
+        const char c = letters[i];
+        const bool names = strchr("ex0ajPWTOL", c) != NULL;
+        out->lost += c != '.';
+        out->causes += names && c != cause;
+        cause = names || c == '.' ? c : cause;
+        if (c != '.' && out->detected_after < 0)
+            out->detected_after = (int)i;
+        run++;
+        if (i + 1u == last || letters[i + 1u] != c) {
+            append(out->verdicts, c, run);
+            run = 0;
+        }
+    }
+    if (out->lost > 0 && out->causes == 0)
+        out->causes = 1; /* the bridge's own verdict, or a resynchronisation */
+}
+
+/* The letters, not shortened, as an extended regular expression. */
+static bool matches(const char *expected, char *letters, unsigned last)
+{
+    regex_t pattern;
+    letters[last] = '\0';
+    if (regcomp(&pattern, expected, REG_EXTENDED | REG_NOSUB) != 0)
+        return false;
+    const bool yes = regexec(&pattern, letters, 0, NULL, 0) == 0;
+    regfree(&pattern);
+    return yes;
+}
+
+struct run {
+    const struct fault_case *row;
+    struct fault_outcome *out;
+    char letters[LONGEST + 1];
+    unsigned good, last;
+};
+
+static bool plan(void *context, unsigned tick, struct sim_field *field, struct lane_faults *faults)
+{
+    const struct run *run = context;
+    const struct fault_case *row = run->row;
+    const unsigned end = FAULT_FIRST_TICK + (row->ticks > 0 ? row->ticks : 1u);
+    const unsigned most = row->for_ever ? end + FAULT_GOOD_RUN : LONGEST;
+    *field = field_of(row, tick);
+    if (tick >= FAULT_FIRST_TICK && tick < end)
+        *faults = row->faults;
+    if (tick > FAULT_FIRST_TICK) /* what disturbs does so once */
+        faults->disturbance = tick == end ? row->end : SIM_NODE_NOTHING;
+    return tick < most && (tick < end + FAULT_GOOD_RUN || run->good < FAULT_GOOD_RUN);
+}
+
+/* The transfer of the first broken tick brings the record of the tick before. */
+static void judged(void *context, unsigned tick, const struct lane_verdict *v)
+{
+    struct run *run = context;
+    run->good = v->good ? run->good + 1u : 0u;
+    run->out->altered += v->altered && tick > 0;
+    if (tick < FAULT_FIRST_TICK)
+        return;
+    run->letters[tick - FAULT_FIRST_TICK] = letter(v);
+    if (!v->good)
+        run->last = tick - FAULT_FIRST_TICK + 1u;
+}
+
+struct fault_outcome fault_run(const struct fault_case *row, const struct sim_node_parameters *parts)
+{
+    struct fault_outcome out = {.detected_after = -1};
+    struct run run = {.row = row, .out = &out};
+    struct sim_node_parameters own = *parts;
+    struct lane_bench bench;
+    if (row->part)
+        row->part(&own);
+    sim_node *node = sim_node_new_as(&own);
+    sim_node_power_on(node);
+    lane_bench_start(&bench, node, lane_timing_of(16, 180, WHISKER_LIMIT_TICK_PERIOD));
+    lane_bench_run(&bench, &(struct lane_world){&run, plan, judged});
+    summarise(&out, run.letters, run.last);
+    out.as_expected = matches(row->expected, run.letters, run.last);
+    out.violations = sim_node_violations(node);
+    sim_node_free(node);
+    return out;
+}
