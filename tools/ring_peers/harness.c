@@ -30,9 +30,9 @@ struct bench {
     const char *out;
     bool publishes, waits, paced, free_running;
     uint32_t readers, index;
-    int64_t length_ns, began, ended, next_tick, last_seen;
+    int64_t length_ns, began, ended, next_tick, last_seen, handed_over;
     uint64_t sent, behind, received, lost, bad;
-    uint32_t *latencies;
+    uint32_t *times; /* a subscriber's latencies; a publisher's time per publication, at 2 kHz */
     size_t samples;
 };
 
@@ -70,9 +70,9 @@ struct bench *bench_open(int argc, char **argv)
     bench->readers = (uint32_t)atoi(argv[6]);
     bench->index = (uint32_t)atoi(argv[7]);
     bench->out = argv[8];
-    bench->latencies = bench->publishes ? NULL : malloc(SAMPLES_MAX * sizeof *bench->latencies);
-    if (bench->latencies) {
-        memset(bench->latencies, 0, SAMPLES_MAX * sizeof *bench->latencies); /* no page faults later */
+    bench->times = malloc(SAMPLES_MAX * sizeof *bench->times);
+    if (bench->times) {
+        memset(bench->times, 0, SAMPLES_MAX * sizeof *bench->times); /* no page faults later */
     }
     return bench;
 }
@@ -117,29 +117,12 @@ static uint64_t slowest(const struct bench *bench)
     return least;
 }
 
-static void pause_briefly(void)
-{
-#if defined(__x86_64__)
-    __builtin_ia32_pause();
-#endif
-}
-
-/* A reader alone on its processor keeps it. */
-static void let_others_run(const struct bench *bench)
-{
-    if (bench->readers > 1) {
-        sched_yield();
-    } else {
-        pause_briefly();
-    }
-}
-
 /* Flat out, but nobody is left behind: the same credit for every transport, whatever it does against loss itself. */
 static void wait_for_slowest(struct bench *bench)
 {
     const int64_t since = now_ns();
     while (bench->sent - slowest(bench) > BENCH_WINDOW && bench->sent > slowest(bench)) {
-        pause_briefly();
+        sched_yield();
         if (now_ns() - since > LOST_NS) {
             bench->behind++;
             return;
@@ -147,9 +130,19 @@ static void wait_for_slowest(struct bench *bench)
     }
 }
 
+static void record(struct bench *bench, int64_t nanoseconds)
+{
+    if (bench->samples < SAMPLES_MAX) {
+        bench->times[bench->samples++] = (uint32_t)nanoseconds;
+    }
+}
+
 bool bench_next(struct bench *bench, uint8_t frame[BENCH_FRAME_BYTES])
 {
     if (bench->paced) {
+        if (bench->sent > 0) {
+            record(bench, now_ns() - bench->handed_over);
+        }
         bench->next_tick += TICK_NS;
         const struct timespec at = {.tv_sec = bench->next_tick / 1000000000, .tv_nsec = bench->next_tick % 1000000000};
         clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &at, NULL);
@@ -165,15 +158,30 @@ bool bench_next(struct bench *bench, uint8_t frame[BENCH_FRAME_BYTES])
     memcpy(frame + 8, &now, 8);
     memcpy(frame + BENCH_FRAME_BYTES - 8, &bench->sent, 8);
     bench->sent++;
+    bench->handed_over = now;
     return true;
+}
+
+static int by_size(const void *a, const void *b)
+{
+    const uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
+    return (x > y) - (x < y);
+}
+
+/* Of the times recorded; 0 if there are none. */
+static uint32_t median(struct bench *bench)
+{
+    qsort(bench->times, bench->samples, sizeof *bench->times, by_size);
+    return bench->samples > 0 ? bench->times[bench->samples / 2] : 0;
 }
 
 int bench_finish(struct bench *bench)
 {
     atomic_store(&bench->control->sent, bench->sent);
     atomic_store(&bench->control->done, 1);
-    printf("{\"sent\": %llu, \"seconds\": %.6f, \"gave_up_waiting\": %llu}\n", (unsigned long long)bench->sent,
-           (double)(bench->ended - bench->began) * 1e-9, (unsigned long long)bench->behind);
+    printf("{\"sent\": %llu, \"seconds\": %.6f, \"gave_up_waiting\": %llu, \"publish_ns\": %u}\n",
+           (unsigned long long)bench->sent, (double)(bench->ended - bench->began) * 1e-9,
+           (unsigned long long)bench->behind, median(bench));
     fflush(stdout);
     nanosleep(&(struct timespec){.tv_sec = 1}, NULL); /* what is under way still arrives */
     return 0;
@@ -201,16 +209,14 @@ void bench_take(struct bench *bench, const uint8_t *frame)
     bench->lost += index - expected;
     bench->received++;
     bench->last_seen = now;
-    if (bench->samples < SAMPLES_MAX) {
-        bench->latencies[bench->samples++] = (uint32_t)(now - sent_at);
-    }
+    record(bench, now - sent_at);
     atomic_store_explicit(&bench->control->reader[bench->index].through, index + 1, memory_order_relaxed);
 }
 
 bool bench_over(struct bench *bench)
 {
     if (!bench->waits) {
-        let_others_run(bench);
+        sched_yield();
     }
     return atomic_load_explicit(&bench->control->done, memory_order_acquire) &&
            (bench->received + bench->lost >= atomic_load(&bench->control->sent) ||
@@ -220,7 +226,7 @@ bool bench_over(struct bench *bench)
 int bench_report(struct bench *bench)
 {
     FILE *file = fopen(bench->out, "wb");
-    if (!file || fwrite(bench->latencies, sizeof *bench->latencies, bench->samples, file) != bench->samples ||
+    if (!file || fwrite(bench->times, sizeof *bench->times, bench->samples, file) != bench->samples ||
         fclose(file) != 0) {
         fprintf(stderr, "%s: cannot be written\n", bench->out);
         return 1;

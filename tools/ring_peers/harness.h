@@ -21,7 +21,7 @@ struct bench;
 struct bench *bench_open(int argc, char **argv);
 
 bool bench_publishes(const struct bench *bench);
-bool bench_waits(const struct bench *bench); /* else it polls, giving the processor to the others on it */
+bool bench_waits(const struct bench *bench); /* else it polls, giving the processor away between looks */
 uint32_t bench_readers(const struct bench *bench);
 uint32_t bench_index(const struct bench *bench); /* of this subscriber */
 
@@ -36,7 +36,7 @@ int bench_finish(struct bench *bench);
 void bench_ready(struct bench *bench);
 /* Subscriber: a frame has come. */
 void bench_take(struct bench *bench, const uint8_t *frame);
-/* Subscriber: whether all is over: ask when nothing has come. Lets other subscribers run if this one polls. */
+/* Subscriber: whether all is over: ask when nothing has come. Gives the processor away if this subscriber polls. */
 bool bench_over(struct bench *bench);
 /* Subscriber: writes the latencies and prints what was received. Returns the exit code. */
 int bench_report(struct bench *bench);

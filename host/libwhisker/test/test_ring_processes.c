@@ -6,6 +6,7 @@
 
 #include <cmocka.h>
 #include <signal.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
@@ -241,6 +242,19 @@ static void answer_each_frame(const char *name, int answers)
     _exit(end == WHISKER_ERROR_CLOSED ? 0 : 2);
 }
 
+/* Returns when the process sleeps in the kernel. */
+static void until_asleep(pid_t process)
+{
+    char path[64], state = '?';
+    snprintf(path, sizeof path, "/proc/%d/stat", (int)process);
+    while (state != 'S') {
+        FILE *file = fopen(path, "r");
+        assert_non_null(file);
+        assert_int_equal(fscanf(file, "%*d (%*[^)]) %c", &state), 1);
+        fclose(file);
+    }
+}
+
 static void waiting_reader_is_woken_by_each_publication_and_the_close(void **state)
 {
     (void)state;
@@ -254,8 +268,9 @@ static void waiting_reader_is_woken_by_each_publication_and_the_close(void **sta
     struct whisker_ring *ring; /* made after the reader began to wait for it */
     assert_int_equal(whisker_ring_create(name, TEST_CAPACITY, &ring), 0);
     byte_from(answers[0]);
-    for (uint64_t index = 0; index < 2000;
-         index++) { /* unwoken, it would look by itself every 100 ms: the time-out of the test */
+    /* Unwoken, it would look by itself every 100 ms, and the test would take longer than it may. */
+    for (uint64_t index = 0; index < 2000; index++) {
+        until_asleep(child);
         test_publish(ring, index, 1);
         byte_from(answers[0]);
     }
