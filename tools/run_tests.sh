@@ -18,6 +18,9 @@ if [ "${1:-}" = --long ]; then
         echo "test: a minute of $(basename "$fuzzer")"
         "$fuzzer" -max_total_time=60 -verbosity=0 2>"build/$(basename "$fuzzer").log" || { tail -25 "build/$(basename "$fuzzer").log" >&2; exit 1; }
     done
+    echo "test: larger models of the ring, and 100000 readers and writers killed"
+    host/libwhisker/model/check.sh --long
+    build/release/host/libwhisker/test/stress_ring 100000
     echo "test: mutated recordings"
     .venv/bin/python host/python/tests/fuzz_recording.py --inputs 300000
     exit 0
