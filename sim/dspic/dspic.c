@@ -10,7 +10,9 @@ void dspic_parameters_default(struct dspic_parameters *parameters)
                                             .work_cycles = 60,
                                             .pll_lock_us = 1000,
                                             .watchdog_ms = 128,
-                                            .pins_lock_once = true};
+                                            .pins_lock_once = true,
+                                            .device_id = 0x0629,
+                                            .serial = UINT32_MAX};
 }
 
 struct dspic *dspic_new(const struct dspic_parameters *parameters, const struct dspic_wiring *wiring)

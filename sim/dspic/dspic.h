@@ -34,6 +34,8 @@ struct dspic_parameters {
     uint16_t watchdog_ms;   /* FWDT's period at the nominal LPRC */
     uint8_t dma_cycles;     /* from a peripheral's request to its transfer; not documented */
     bool pins_lock_once;    /* FOSC's IOL1WAY: a pin map that was locked stays locked until reset */
+    uint16_t device_id;     /* DEVID, what the flash's owner reads at 0xFF0000 */
+    uint32_t serial;        /* FUID0 to FUID3, lowest first; all ones as it leaves the factory */
     uint64_t seed;          /* of what a power cut leaves in the flash */
 };
 

@@ -6,10 +6,20 @@ static uint32_t program_word(const struct dspic *chip, uint16_t offset)
     return ((uint32_t)(chip->sfr[TBLPAG / 2u] & 0xFFu) << 16 | offset) / 2u;
 }
 
+/* What lies beyond the flash: device id and user identification. */
+static uint32_t special_word(const struct dspic *chip, uint32_t at)
+{
+    const uint32_t devid = ((uint32_t)DEVID_PAGE << 16 | DEVID_OFFSET) / 2u;
+    const uint32_t fuid = ((uint32_t)CONFIG_PAGE << 16 | FUID0_OFFSET) / 2u;
+    if (at == devid)
+        return chip->parameters.device_id;
+    return at >= fuid && at < fuid + 4u ? chip->parameters.serial >> 8u * (at - fuid) & 0xFFu : 0;
+}
+
 uint16_t dspic_table_read(struct dspic *chip, uint16_t offset, bool high)
 {
     const uint32_t at = program_word(chip, offset);
-    const uint32_t word = at < FLASH_WORDS ? chip->flash[at] : 0;
+    const uint32_t word = at < FLASH_WORDS ? chip->flash[at] : special_word(chip, at);
     dspic_spend(chip, 2u);
     return (uint16_t)(high ? word >> 16 : word);
 }

@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "crc32.h"
 #include "sim_node_state.h"
 
 #define OSCILLATOR_SPREAD_PERMILLE (MLX90333_OSCILLATOR_PERCENT * 10u)
@@ -10,6 +11,11 @@
 /* When in a tick the bridge selects its nodes and lets them go; its edges in between take no time here. */
 #define SELECT_FS (3000u * DSPIC_FS_PER_NS)
 #define DESELECT_FS (20000u * DSPIC_FS_PER_NS)
+/* And in the second window of a tick with a service order. */
+#define SERVICE_SELECT_FS (70000u * DSPIC_FS_PER_NS)
+#define SERVICE_DESELECT_FS (290000u * DSPIC_FS_PER_NS)
+/* A chip so far ahead of a tick's SYNC stands still: what comes in this tick passes it by. */
+#define STALLED_FS (20000u * DSPIC_FS_PER_NS)
 
 /* The master sends ones but for the MLX90316's start byte, on a pin of its own beside its input. */
 static void clock_sensor(struct sim_node *node, bool level, uint64_t now_ns)
@@ -36,7 +42,7 @@ static void on_start(void *context)
 {
     struct sim_node *node = context;
     node->sensor.violations[MLX90333_SELECT_HIGH] = node->releases;
-    port_start(&node->board);
+    port_boot(&node->board);
 }
 
 static void on_loop(void *context)
@@ -115,6 +121,8 @@ void sim_node_parameters_default(struct sim_node_parameters *parameters, uint64_
 #endif
 }
 
+static void program_default(struct sim_node *node);
+
 sim_node *sim_node_new_as(const struct sim_node_parameters *parameters)
 {
     sim_node *node = calloc(1, sizeof *node);
@@ -124,8 +132,10 @@ sim_node *sim_node_new_as(const struct sim_node_parameters *parameters)
     node->chip = dspic_new(&parameters->chip,
                            &(struct dspic_wiring){node, on_pin, on_start, on_loop, on_interrupt, on_trap, on_outside});
     node->board.chip = node->chip;
-    if (node->chip)
+    if (node->chip) {
+        program_default(node);
         return node;
+    }
     free(node);
     return NULL;
 }
@@ -150,14 +160,17 @@ void sim_node_power_on(sim_node *node)
     dspic_wire(node->chip, PIN_LINK_SELECT, true);
     dspic_power_on(node->chip, 0);
     node->powered = true;
-    while (!node_ready(&node->board.node) && dspic_next_fs(node->chip) != UINT64_MAX)
+    while (!node->board.loading && !node_ready(&node->board.node) && dspic_next_fs(node->chip) != UINT64_MAX)
         dspic_run_until(node->chip, dspic_next_fs(node->chip));
     node->tick_fs = dspic_now_fs(node->chip);
 }
 
 void sim_node_sync(sim_node *node, struct sim_field field)
 {
-    if (!node->powered)
+    node->bits = 0;
+    node->second = false;
+    node->deaf = !node->powered || sim_node_dark(node) || dspic_now_fs(node->chip) > node->tick_fs + STALLED_FS;
+    if (node->deaf)
         return;
     mlx90333_set_field(&node->sensor, &(struct mlx90333_field){.since_ns = node->tick_fs / DSPIC_FS_PER_NS,
                                                                .alpha_deg = field.alpha_deg,
@@ -171,14 +184,18 @@ void sim_node_sync(sim_node *node, struct sim_field field)
 
 void sim_node_select(sim_node *node, bool low)
 {
-    if (node->powered)
-        dspic_input(node->chip, PIN_LINK_SELECT, !low, node->tick_fs + (low ? SELECT_FS : DESELECT_FS));
+    static const uint64_t AT_FS[2][2] = {{DESELECT_FS, SELECT_FS}, {SERVICE_DESELECT_FS, SERVICE_SELECT_FS}};
+    if (low)
+        node->second = node->bits >= 8u * WHISKER_RECORD_BYTES; /* after a whole transfer, not one cut short */
+    if (!node->deaf)
+        dspic_input(node->chip, PIN_LINK_SELECT, !low, node->tick_fs + AT_FS[node->second][low]);
 }
 
 bool sim_node_sck(sim_node *node, bool level, bool mosi)
 {
-    if (!node->powered)
+    if (node->deaf)
         return true;
+    node->bits += level;
     dspic_wire(node->chip, PIN_LINK_MOSI, mosi);
     dspic_input(node->chip, PIN_LINK_CLOCK, level, node->tick_fs + SELECT_FS);
     return dspic_output(node->chip, PIN_LINK_MISO) != DSPIC_LOW;
@@ -190,6 +207,62 @@ void sim_node_run(sim_node *node)
         return;
     node->tick_fs += TICK_FS;
     dspic_run_until(node->chip, node->tick_fs);
+}
+
+void sim_node_cut(sim_node *node, uint64_t after_ns)
+{
+    dspic_cut_power_at(node->chip, node->tick_fs + after_ns * DSPIC_FS_PER_NS);
+}
+
+bool sim_node_dark(const sim_node *node)
+{
+    return node->powered && !dspic_powered(node->chip);
+}
+
+void sim_node_restore(sim_node *node)
+{
+    sim_node_disturb(node, SIM_NODE_LIGHT, 0);
+}
+
+void sim_node_program(sim_node *node, const uint8_t *image, size_t bytes)
+{
+    uint32_t *word = dspic_flash(node->chip) + WHISKER_LIMIT_APPLICATION_ROW * FLASH_ROW_WORDS;
+    for (uint32_t i = 0; i < FLASH_WORDS - WHISKER_LIMIT_APPLICATION_ROW * FLASH_ROW_WORDS; i++)
+        word[i] = UINT32_C(0xFFFFFF);
+    for (size_t i = 0; i < bytes; i++) { /* the body begins with the row after the header's */
+        const size_t at =
+            i < WHISKER_IMAGE_HEADER_BYTES ? i : i - WHISKER_IMAGE_HEADER_BYTES + WHISKER_LIMIT_FLASH_ROW_BYTES;
+        word[at / 3u] &= ~(UINT32_C(0xFF) << 8u * (at % 3u)) | (uint32_t)image[i] << 8u * (at % 3u);
+    }
+}
+
+uint16_t sim_node_version(const sim_node *node)
+{
+    const uint32_t *word = dspic_flash(node->chip) + WHISKER_LIMIT_APPLICATION_ROW * FLASH_ROW_WORDS;
+    uint8_t header[WHISKER_IMAGE_HEADER_BYTES];
+    for (size_t i = 0; i < sizeof header; i++)
+        header[i] = (uint8_t)(word[i / 3u] >> 8u * (i % 3u) & 0xFFu);
+    return node->board.loading ? 0u : whisker_get_u16(header + WHISKER_IMAGE_HEADER_VERSION);
+}
+
+/* As it comes from its first programming. */
+static void program_default(struct sim_node *node)
+{
+    uint8_t image[WHISKER_IMAGE_HEADER_BYTES + WHISKER_LIMIT_FLASH_ROW_BYTES];
+    memset(image, 0, sizeof image);
+    whisker_put_u32(image + WHISKER_IMAGE_HEADER_MAGIC, WHISKER_LIMIT_IMAGE_MAGIC);
+    whisker_put_u16(image + WHISKER_IMAGE_HEADER_CHIP, node->parameters.chip.device_id);
+    image[WHISKER_IMAGE_HEADER_WIRE_VERSION] = WHISKER_WIRE_VERSION;
+    image[WHISKER_IMAGE_HEADER_FORMAT] = WHISKER_LIMIT_IMAGE_FORMAT;
+    whisker_put_u32(image + WHISKER_IMAGE_HEADER_LENGTH, WHISKER_LIMIT_FLASH_ROW_BYTES);
+    whisker_put_u32(image + WHISKER_IMAGE_HEADER_BODY_CRC32,
+                    crc32_of(WHISKER_CRC32_INIT, image + WHISKER_IMAGE_HEADER_BYTES, WHISKER_LIMIT_FLASH_ROW_BYTES) ^
+                        WHISKER_CRC32_XOR_OUT);
+    whisker_put_u16(image + WHISKER_IMAGE_HEADER_VERSION, SIM_NODE_VERSION);
+    whisker_put_u16(image + WHISKER_IMAGE_HEADER_FIRST_ROW, WHISKER_LIMIT_APPLICATION_ROW + 1u);
+    whisker_put_u32(image + WHISKER_IMAGE_HEADER_HEADER_CRC32,
+                    crc32_of(WHISKER_CRC32_INIT, image, WHISKER_IMAGE_HEADER_HEADER_CRC32) ^ WHISKER_CRC32_XOR_OUT);
+    sim_node_program(node, image, sizeof image);
 }
 
 void sim_node_fault(sim_node *node, enum sim_sensor_fault fault, unsigned argument)

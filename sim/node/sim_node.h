@@ -6,6 +6,7 @@
 #define SIM_NODE_H
 
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
 #include "mlx90333_model.h" // enum sim_sensor_fault, sim_counts
@@ -39,6 +40,22 @@ void sim_node_run(sim_node *node);
  * A bad frame costs the tick (SENSOR_*) and the next one (RESYNC). A flipped bit 40 to 55 is in the error word: if that
  * bit is assigned, the record is OK with this error bit and no tick is lost besides; else the frame is bad. */
 void sim_node_fault(sim_node *node, enum sim_sensor_fault fault, unsigned argument);
+
+/* The supply fails so long after the present tick's SYNC, also in the midst of a flash operation, which is then done in
+ * part. */
+void sim_node_cut(sim_node *node, uint64_t after_ns);
+
+/* After a cut: is there no supply? Then this brings it back, in step with the other nodes. */
+bool sim_node_dark(const sim_node *node);
+void sim_node_restore(sim_node *node);
+
+/* First programming by wire: an image file's bytes, header and body, into the flash as the loader would leave them,
+ * without any check. A new node holds an application of version SIM_NODE_VERSION. */
+#define SIM_NODE_VERSION 1u
+void sim_node_program(sim_node *node, const uint8_t *image, size_t bytes);
+
+/* Version of the application that runs; 0: the loader does. */
+uint16_t sim_node_version(const sim_node *node);
 
 /* What the firmware did against the sensor's data sheet or the board's contract so far. Tests demand zero. */
 uint32_t sim_node_violations(const sim_node *node);

@@ -13,6 +13,9 @@ struct sim_node {
     struct sim_node_parameters parameters;
     uint64_t tick_fs; /* start of the present tick */
     bool powered;
+    bool deaf;                   /* in this tick the CPU stands still: it erases or writes flash */
+    unsigned bits;               /* clocked in this tick */
+    bool second;                 /* in its second window */
     enum sim_sensor_fault fault; /* of the next reading */
     unsigned argument;
     uint32_t releases; /* breaches of t4 by the firmware; a reset's own are nobody's fault */

@@ -11,4 +11,8 @@ struct board; /* the port's own state */
  * When as many words were received, node_on_order() follows, once per call; more clocks are ignored. */
 void board_link_arm(struct board *board, const uint16_t *words);
 
+/* The same for the second window of a tick: it sends LINK_WORDS and receives SERVICE_WORDS; node_on_service() follows.
+ */
+void board_link_arm_service(struct board *board, const uint16_t *words);
+
 #endif

@@ -2,24 +2,61 @@
 
 #include "board/link.h" // board_link_arm
 
+static void count(struct node *node, uint8_t fault)
+{
+    if (node->health[fault] < UINT16_MAX)
+        node->health[fault]++;
+}
+
+/* The tick is over: what its record said at last. */
+static void count_tick(struct node *node, uint16_t status)
+{
+    const uint8_t code = (uint8_t)(status >> WHISKER_STATUS_CODE_SHIFT);
+    if (!node->numbered)
+        count(node, WHISKER_HEALTH_ORDER_MISSING);
+    if (code != WHISKER_CODE_OK && code < WHISKER_CODE_RESET_POWER)
+        count(node, code);
+    else if (code == WHISKER_CODE_OK && status != 0)
+        count(node, WHISKER_HEALTH_SENSOR_ERROR);
+}
+
 /* Gives the link the record of the present tick, as far as it is known. */
 static void publish(struct node *node)
 {
+    if (node->serving)
+        return; /* its end will */
     node->armed ^= 1u;
     record_pack(&node->reading, node->tick, node->records[node->armed]);
     board_link_arm(node->board, node->records[node->armed]);
 }
 
-void node_start(struct node *node, struct board *board, uint8_t code)
+static void start(struct node *node, struct board *board, uint8_t code)
 {
     node->board = board;
     node->tick = 0xFFu; /* the first SYNC makes it 0 */
     node->numbered = true;
     node->ordered = false;
+    node->serving = false;
     node->armed = 0;
     node->reading = sensor_reading_of_code(code);
+    for (uint8_t i = 0; i < WHISKER_HEALTH_COUNT; i++)
+        node->health[i] = 0;
+    service_start(&node->service);
     publish(node);
+}
+
+void node_start(struct node *node, struct board *board, uint8_t code)
+{
+    start(node, board, code);
+    if (code >= WHISKER_CODE_RESET_POWER)
+        count(node, code);
     sampler_start(&node->sampler, board, code);
+}
+
+void node_start_loader(struct node *node, struct board *board)
+{
+    start(node, board, WHISKER_CODE_LOADER);
+    sampler_off(&node->sampler, board, WHISKER_CODE_LOADER);
 }
 
 bool node_ready(const struct node *node)
@@ -30,6 +67,8 @@ bool node_ready(const struct node *node)
 void node_on_sync(struct node *node)
 {
     const uint8_t code = sampler_on_sync(&node->sampler); /* first: all nodes' readings begin together */
+    count_tick(node, node->reading.status);
+    node->serving = false; /* a second window that never came */
     node->reading = sensor_reading_of_code(code);
     node->tick = (uint8_t)(node->tick + 1u);
     node->numbered = false;
@@ -54,17 +93,50 @@ void node_on_sensor_overrun(struct node *node)
 
 void node_on_transfer_end(struct node *node)
 {
-    if (!node->ordered)
+    if (!node->ordered) {
+        node->serving = false;
         publish(node); /* what was clocked of the record armed is lost, with the bridge's knowledge */
+    }
     node->ordered = false;
 }
 
 void node_on_order(struct node *node, const uint16_t words[LINK_WORDS])
 {
     struct order order;
-    if (!node->numbered && order_parse(words, &order))
+    const bool whole = order_parse(words, &order);
+    if (!whole)
+        count(node, WHISKER_HEALTH_ORDER_CRC);
+    else if (!node->numbered)
         node->tick = order.tick;
     node->numbered = true;
     node->ordered = true;
     publish(node);
+    if (whole && order.command == WHISKER_COMMAND_SERVICE) {
+        node->serving = true;
+        board_link_arm_service(node->board, service_words(&node->service));
+    }
+}
+
+void node_on_service(struct node *node, const uint16_t words[SERVICE_WORDS])
+{
+    service_take(&node->service, words);
+}
+
+void node_on_link_overflow(struct node *node)
+{
+    count(node, WHISKER_HEALTH_LINK_OVERFLOW);
+}
+
+bool node_tell_health(struct node *node)
+{
+    const uint8_t *order = service_next(&node->service);
+    if (!order) {
+        count(node, WHISKER_HEALTH_SERVICE_CRC);
+        return true;
+    }
+    const uint8_t item = (uint8_t)(order[WHISKER_SERVICE_ARGUMENT] - WHISKER_INFO_HEALTH);
+    if (order[WHISKER_SERVICE_COMMAND] != WHISKER_SERVICE_COMMAND_INFO || item >= WHISKER_HEALTH_COUNT)
+        return false;
+    service_answer(&node->service, node->health[item], item);
+    return true;
 }

@@ -8,6 +8,11 @@
  *   last byte     the link gets record n
  *   SYNC n+1      reading n+1 begins ...
  *
+ * A tick whose order says so has a second window, with a service order (service.h); the record waits for its end:
+ *
+ *   order n       the link gets the answer to the service order before
+ *   window's end  the link gets record n as far as it is known
+ *
  * The link is armed well before the SYNC after which it is clocked: the bridge selects sooner after SYNC than an
  * interrupt could load the first word. */
 #ifndef NODE_H
@@ -18,6 +23,7 @@
 
 #include "record.h"  // LINK_WORDS
 #include "sampler.h" // struct sampler
+#include "service.h" // struct service
 
 struct node {
     struct board *board;
@@ -26,13 +32,29 @@ struct node {
     uint8_t tick;                    /* low 8 bits of the present tick's number */
     bool numbered;                   /* the order that belongs to the last SYNC has come */
     bool ordered;                    /* an order has come in the present transfer */
+    bool serving;                    /* the link waits for this tick's second window, not for the next record */
     uint8_t armed;                   /* which of the records the link has */
     uint16_t records[2][LINK_WORDS]; /* one is clocked out while the other is packed */
+    struct service service;
+    uint16_t health[WHISKER_HEALTH_COUNT];
 };
 
 /* Call once, at reset; the sensor then needs about 18 ms. `code`: what the records say meanwhile, WHISKER_CODE_STARTING
  * or the kind of reset, WHISKER_CODE_RESET_*. */
 void node_start(struct node *node, struct board *board, uint8_t code);
+
+/* In place of node_start, for the loader: it leaves the sensor alone, and its records say WHISKER_CODE_LOADER. */
+void node_start_loader(struct node *node, struct board *board);
+
+/* Answers the service order that waits, if it asks for a counter. False: it is for others to answer, or not whole.
+ * Called in the main loop. */
+bool node_tell_health(struct node *node);
+
+/* A word came that the link could not take. */
+void node_on_link_overflow(struct node *node);
+
+/* The bridge has clocked the second window of a tick: the words received. */
+void node_on_service(struct node *node, const uint16_t words[SERVICE_WORDS]);
 
 /* True if a SYNC now would start a reading. */
 bool node_ready(const struct node *node);

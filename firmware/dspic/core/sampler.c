@@ -63,6 +63,13 @@ void sampler_start(struct sampler *sampler, struct board *board, uint8_t unready
     wait_in(sampler, SAMPLER_STARTING, STARTUP_US);
 }
 
+void sampler_off(struct sampler *sampler, struct board *board, uint8_t code)
+{
+    sampler->board = board;
+    sampler->unready = code;
+    sampler->state = SAMPLER_OFF;
+}
+
 uint8_t sampler_on_sync(struct sampler *sampler)
 {
     switch (sampler->state) {

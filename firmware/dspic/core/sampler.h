@@ -28,6 +28,7 @@ enum sampler_state {
     SAMPLER_BYTE,        /* a byte is being clocked */
     SAMPLER_GAP,         /* between two bytes */
     SAMPLER_RELEASE,     /* frame given up, /SS still low: t4 after the last edge */
+    SAMPLER_OFF,         /* no reading is ever started */
 };
 
 struct sampler {
@@ -43,6 +44,9 @@ struct sampler {
 /* Begins the start-up wait. Call once, at reset. `unready`: the code of ticks until the sensor is ready,
  * WHISKER_CODE_STARTING or the kind of reset. */
 void sampler_start(struct sampler *sampler, struct board *board, uint8_t unready);
+
+/* In place of sampler_start: the sensor is left alone, and every tick has this code. */
+void sampler_off(struct sampler *sampler, struct board *board, uint8_t code);
 
 /* SYNC: starts a reading if the sensor is ready. Returns the code this tick's record carries unless
  * sampler_on_byte() ends the reading before the next SYNC: LATE if one was started, else STARTING or RESYNC. */

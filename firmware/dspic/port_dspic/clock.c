@@ -1,4 +1,6 @@
 /* From the internal oscillator at 3.7 MIPS to 38.69 MIPS through the PLL. */
+#include <stdbool.h>
+
 #include "port.h"
 #include "sfr.h"
 
@@ -13,8 +15,17 @@
 #error "a fast oscillator would exceed 40 MIPS"
 #endif
 
+/* The loader may have done it for the application: the PLL must not be changed while it runs the chip. */
+static bool is_done(struct board *board)
+{
+    const uint16_t wanted = OSC_FRC_PLL << OSCCON_COSC_SHIFT | OSCCON_LOCK;
+    return (sfr_read(board, OSCCON) & (7u << OSCCON_COSC_SHIFT | OSCCON_LOCK)) == wanted;
+}
+
 void clock_start(struct board *board)
 {
+    if (is_done(board))
+        return;
     sfr_write(board, PLLFBD, PLL_M - 2u);
     sfr_write(board, CLKDIV, PLL_N1 - 2u); /* PLLPOST 0: N2 = 2 */
     cpu_write_osccon_high(board, OSC_FRC_PLL);

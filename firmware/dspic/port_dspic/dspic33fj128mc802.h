@@ -161,6 +161,10 @@
 #define NVMCON_WRITE_WORD 0x4003u
 #define NVMKEY_1 0x55u
 #define NVMKEY_2 0xAAu
+#define DEVID_PAGE 0x00FFu /* TBLPAG; 0xFF0000: the device id, 0x0629 (B) */
+#define DEVID_OFFSET 0x0000u
+#define CONFIG_PAGE 0x00F8u          /* configuration words from 0xF80000, of 8 bits each */
+#define FUID0_OFFSET 0x0010u         /* FUID0 to FUID3 */
 #define FLASH_WORDS 44032u           /* of 24 bits; each takes two addresses: 0x000000 to 0x0157FE */
 #define FLASH_ROW_WORDS 64u          /* write unit */
 #define FLASH_PAGE_WORDS 512u        /* erase unit */

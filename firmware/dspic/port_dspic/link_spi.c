@@ -35,7 +35,7 @@ void link_start(struct board *board)
 }
 
 /* Module and DMA begin anew: whatever was clocked too much or too little is over. */
-void board_link_arm(struct board *board, const uint16_t *words)
+static void arm(struct board *board, const uint16_t *words, uint16_t to_receive)
 {
     volatile uint16_t *out = DMA_WORDS_AT(board, OUT_OFFSET);
     sfr_write(board, DMA_REG(DMA0CON, OUT_CHANNEL), OUT_CON);
@@ -44,20 +44,36 @@ void board_link_arm(struct board *board, const uint16_t *words)
     for (uint16_t i = 1; i < LINK_WORDS; i++)
         out[i - 1u] = words[i];
     sfr_clear(board, IRQ_WORD(IFS0, IRQ_DMA1), IRQ_BIT(IRQ_DMA1));
+    sfr_write(board, DMA_REG(DMA0CNT, IN_CHANNEL), (uint16_t)(to_receive - 1u));
     sfr_write(board, DMA_REG(DMA0CON, IN_CHANNEL), IN_CON | DMACON_CHEN);
     sfr_write(board, DMA_REG(DMA0CON, OUT_CHANNEL), OUT_CON | DMACON_CHEN);
     sfr_write(board, SPI2STAT, SPISTAT_SPIEN);
     sfr_write(board, SPI2BUF, words[0]);
+    board->link_words = to_receive;
+}
+
+void board_link_arm(struct board *board, const uint16_t *words)
+{
+    arm(board, words, LINK_WORDS);
+}
+
+void board_link_arm_service(struct board *board, const uint16_t *words)
+{
+    arm(board, words, SERVICE_WORDS);
 }
 
 void port_on_dma1(struct board *board)
 {
-    uint16_t words[LINK_WORDS];
+    uint16_t words[SERVICE_WORDS];
+    const uint16_t count = board->link_words;
     const volatile uint16_t *in = DMA_WORDS_AT(board, IN_OFFSET);
     sfr_clear(board, IRQ_WORD(IFS0, IRQ_DMA1), IRQ_BIT(IRQ_DMA1));
-    for (uint16_t i = 0; i < LINK_WORDS; i++)
+    for (uint16_t i = 0; i < count; i++)
         words[i] = in[i];
-    node_on_order(&board->node, words);
+    if (count == SERVICE_WORDS)
+        node_on_service(&board->node, words);
+    else
+        node_on_order(&board->node, words);
 }
 
 /* Select rose. After a whole transfer, the order's interrupt has armed the link already: its number is the lower. After
@@ -73,4 +89,5 @@ void port_on_spi2_error(struct board *board)
 {
     sfr_clear(board, IRQ_WORD(IFS0, IRQ_SPI2_ERROR), IRQ_BIT(IRQ_SPI2_ERROR));
     sfr_clear(board, SPI2STAT, SPISTAT_SPIROV);
+    node_on_link_overflow(&board->node);
 }

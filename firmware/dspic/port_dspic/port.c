@@ -2,6 +2,8 @@
 
 #include <stdbool.h>
 
+#include "board/flash.h"
+#include "boot/image.h"
 #include "sfr.h"
 
 #define PRIORITY 4u
@@ -22,32 +24,97 @@ static void enable(struct board *board, uint16_t irq)
 static uint8_t reset_code(struct board *board)
 {
     const uint16_t cause = sfr_read(board, RCON);
-    const bool trapped = board->trapped == TRAPPED;
+    const bool trapped = board->trapped == TRAPPED, asked = board->asked == BOARD_ASKED_APPLICATION;
     board->trapped = 0;
+    board->asked = 0;
     sfr_clear(board, RCON, RCON_POR | RCON_BOR | RCON_WDTO | RCON_SWR | RCON_EXTR | RCON_TRAPR | RCON_IOPUWR);
-    if (cause & RCON_POR)
+    if (cause & RCON_POR || asked)
         return WHISKER_CODE_STARTING;
     if (trapped || cause & (RCON_TRAPR | RCON_IOPUWR))
         return WHISKER_CODE_RESET_TRAP;
     return cause & RCON_WDTO ? WHISKER_CODE_RESET_WATCHDOG : WHISKER_CODE_RESET_POWER;
 }
 
-void port_start(struct board *board)
+/* What a reset's cause cannot say: the application has neither failed nor been left. */
+static bool loader_is_asked_for(struct board *board)
+{
+    return board->asked == BOARD_ASKED_LOADER && !(sfr_read(board, RCON) & RCON_POR);
+}
+
+void port_boot(struct board *board)
+{
+    clock_start(board);
+    if (loader_is_asked_for(board) || !image_is_valid(board, board->loader.row))
+        port_start_loader(board);
+    else
+        port_start(board);
+}
+
+static void start_peripherals(struct board *board)
 {
     clock_start(board);
     pins_start(board);
     sensor_start(board);
     link_start(board);
-    node_start(&board->node, board, reset_code(board));
+}
+
+static void serve_interrupts(struct board *board)
+{
     for (uint16_t i = 0; i < sizeof SERVED; i++)
         enable(board, SERVED[i]);
     sfr_set(board, RCON, RCON_SWDTEN);
 }
 
+void port_start(struct board *board)
+{
+    board->loading = false;
+    start_peripherals(board);
+    node_start(&board->node, board, reset_code(board));
+    serve_interrupts(board);
+}
+
+void port_start_loader(struct board *board)
+{
+    board->loading = true;
+    start_peripherals(board);
+    (void)reset_code(board);
+    loader_start(&board->loader, board);
+    node_start_loader(&board->node, board);
+    serve_interrupts(board);
+}
+
+/* The application's answers: who it is, and the way to the loader. */
+static void serve_application(struct board *board)
+{
+    struct service *service = &board->node.service;
+    const uint8_t *order = service->bytes;
+    const uint8_t item = order[WHISKER_SERVICE_ARGUMENT];
+    uint16_t alpha = 0, beta = WHISKER_NODE_STATE_APPLICATION;
+    if (order[WHISKER_SERVICE_COMMAND] == WHISKER_SERVICE_COMMAND_INFO)
+        loader_info(board, item, WHISKER_NODE_STATE_APPLICATION, board->loader.row, &alpha, &beta);
+    else if (order[WHISKER_SERVICE_COMMAND] == WHISKER_SERVICE_COMMAND_ENTER &&
+             service_addresses(order, board_serial(board)))
+        board_enter_loader(board);
+    service_answer(service, alpha, beta);
+}
+
+static void serve(struct board *board)
+{
+    if (node_tell_health(&board->node))
+        return;
+    if (board->loading)
+        loader_serve(&board->loader, &board->node.service);
+    else
+        serve_application(board);
+}
+
 void port_loop(struct board *board)
 {
     cpu_clear_watchdog(board);
-    cpu_idle(board);
+    if (board->node.service.waiting)
+        serve(board);
+    else
+        cpu_idle(board);
 }
 
 /* Nothing can be trusted after a trap: start anew, and say so. */

@@ -10,7 +10,8 @@
 #ifndef PORT_H
 #define PORT_H
 
-#include "node.h" // struct node
+#include "boot/loader.h" // struct loader
+#include "node.h"        // struct node
 
 #ifndef __dsPIC33F__
 struct dspic;
@@ -20,8 +21,12 @@ struct board {
 #ifndef __dsPIC33F__
     struct dspic *chip; /* the register model */
 #endif
-    uint16_t trapped; /* survives a reset: what led to it was a trap */
+    uint16_t trapped;    /* survives a reset: what led to it was a trap */
+    uint16_t asked;      /* survives a reset: the firmware itself asked for it, BOARD_ASKED_* */
+    uint16_t link_words; /* that the link waits for */
+    bool loading;        /* the loader runs, not the application */
     struct node node;
+    struct loader loader;
 };
 
 /* Pins, as numbers of port B and of RP. Sensor lines are open drain on 5 V tolerant pins. docs/hardware.md */
@@ -35,10 +40,18 @@ struct board {
 #define PIN_LINK_MOSI 14u
 #define PIN_LINK_MISO 15u
 
-/* From reset to the main loop: clock, pins, peripherals, node. */
-void port_start(struct board *board);
+#define BOARD_ASKED_LOADER 0x10ADu
+#define BOARD_ASKED_APPLICATION 0xA991u
 
-/* One turn of the main loop: shows the watchdog that interrupts are served, then idles until the next. */
+/* From reset to the choice between application and loader; goes on with port_start() or port_start_loader(). */
+void port_boot(struct board *board);
+
+/* To the main loop: clock, pins, peripherals, node. */
+void port_start(struct board *board);
+void port_start_loader(struct board *board);
+
+/* One turn of the main loop: shows the watchdog that interrupts are served, deals with a service order that waits, then
+ * idles until the next interrupt. */
 void port_loop(struct board *board);
 
 /* Bodies of the interrupts. */

@@ -33,6 +33,12 @@ void board_link_arm(struct board *board, const uint16_t *words)
     (void)words;
 }
 
+void board_link_arm_service(struct board *board, const uint16_t *words)
+{
+    (void)board;
+    (void)words;
+}
+
 static struct node node;
 static const uint8_t FRAME[8] = {0xFF, 0x10, 0x80, 0x20, 0x70, 0x00, 0x00, 0x20};
 
