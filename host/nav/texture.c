@@ -1,7 +1,6 @@
 #include "texture.h"
 
 #include <math.h>
-#include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -134,4 +133,28 @@ size_t nav_texture_loglik(const struct nav_texture *t, const double *samples, si
 double *nav_texture_table(struct nav_texture *t)
 {
     return t->table;
+}
+
+int nav_texture_classes(const struct nav_texture *t)
+{
+    return t->classes;
+}
+
+int nav_texture_axes(const struct nav_texture *t)
+{
+    return t->axes;
+}
+
+int nav_texture_bins(const struct nav_texture *t)
+{
+    return t->bins;
+}
+
+bool nav_texture_place(const struct nav_texture *t, const double *sample, int *bin)
+{
+    if (!finite_sample(sample, t->axes))
+        return false;
+    for (int a = 0; a < t->axes; a++)
+        bin[a] = (int)bin_of(t, a, sample[a]);
+    return true;
 }

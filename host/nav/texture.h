@@ -2,6 +2,7 @@
 #ifndef NAV_TEXTURE_H
 #define NAV_TEXTURE_H
 
+#include <stdbool.h>
 #include <stddef.h>
 
 /* cffi: begin */
@@ -27,5 +28,12 @@ size_t nav_texture_loglik(const struct nav_texture *, const double *samples, siz
 /* The log-likelihoods themselves, [class][axis][bin], for saving and loading a model. */
 double *nav_texture_table(struct nav_texture *);
 /* cffi: end */
+
+int nav_texture_classes(const struct nav_texture *);
+int nav_texture_axes(const struct nav_texture *);
+int nav_texture_bins(const struct nav_texture *);
+
+/* The bin of each axis; false, and nothing written, for a sample that is not finite. */
+bool nav_texture_place(const struct nav_texture *, const double *sample, int *bin);
 
 #endif

@@ -1,0 +1,189 @@
+#include "texture_rung.h"
+
+#include <math.h>
+#include <stdbool.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "rng.h"
+#include "texture_features.h"
+
+struct nav_texture_rung {
+    struct nav_texture_rung_numbers n; /* its arrays are the rung's own */
+    int features;
+    struct nav_texture_features *reduce;
+    double *projection; /* [F][H]: a row per feature, so that the inner loop runs over neighbours */
+    double *threshold;  /* [H] */
+    double *expanded;   /* [F + H] */
+    double *apart;      /* [F] from a class's middle */
+};
+
+static bool finite_all(const double *x, size_t n)
+{
+    for (size_t i = 0; i < n; i++) {
+        if (!isfinite(x[i]))
+            return false;
+    }
+    return true;
+}
+
+static bool numbers_ok(const struct nav_texture_rung_numbers *n)
+{
+    return n->classes >= 1 && n->classes <= NAV_TEXTURE_CLASSES_MAX && n->hidden >= 0 &&
+           n->hidden <= NAV_TEXTURE_HIDDEN_MAX && n->axes >= 0 && isfinite(n->temper) && n->temper >= 0.0 &&
+           isfinite(n->beyond) && n->beyond >= 0.0;
+}
+
+/* Replaces the caller's array by a copy; false if it holds something that is not finite or memory is short. */
+static bool own(const double **array, size_t n)
+{
+    const double *from = *array;
+    double *copy = calloc(n + 1, sizeof *copy); /* no array is of size 0 */
+    *array = copy;
+    if (!copy || !finite_all(from, n))
+        return false;
+    memcpy(copy, from, n * sizeof *copy);
+    return true;
+}
+
+static bool own_arrays(struct nav_texture_rung *r)
+{
+    size_t f = (size_t)r->features, k = (size_t)r->n.classes, h = (size_t)r->n.hidden, a = (size_t)r->n.axes;
+    bool ok = own(&r->n.floor, (size_t)r->n.channels);
+    ok = own(&r->n.centre, f) && ok;
+    ok = own(&r->n.scale, f) && ok;
+    ok = own(&r->n.weight, (f + h) * k) && ok;
+    ok = own(&r->n.bias, k) && ok;
+    ok = own(&r->n.middle, k * f) && ok;
+    ok = own(&r->n.axis, a * f) && ok;
+    ok = own(&r->n.axis_weight, a) && ok;
+    return ok;
+}
+
+/* Directions of unit mean square on standardised features; thresholds spread as the projections are. */
+static bool make_projections(struct nav_texture_rung *r)
+{
+    size_t f = (size_t)r->features, h = (size_t)r->n.hidden;
+    r->projection = calloc(f * h + 1, sizeof *r->projection);
+    r->threshold = calloc(h + 1, sizeof *r->threshold);
+    if (!r->projection || !r->threshold)
+        return false;
+    struct nav_rng rng;
+    nav_rng_seed(&rng, r->n.seed, 0);
+    for (size_t i = 0; i < f * h; i++)
+        r->projection[i] = nav_rng_normal(&rng) / sqrt((double)f);
+    for (size_t i = 0; i < h; i++)
+        r->threshold[i] = nav_rng_normal(&rng);
+    return true;
+}
+
+static bool make(struct nav_texture_rung *r)
+{
+    bool owned = own_arrays(r);
+    r->expanded = calloc((size_t)(r->features + r->n.hidden), sizeof *r->expanded);
+    r->apart = calloc((size_t)r->features, sizeof *r->apart);
+    return make_projections(r) && owned && r->expanded && r->apart;
+}
+
+struct nav_texture_rung *nav_texture_rung_new(const struct nav_texture_rung_numbers *numbers)
+{
+    if (!numbers_ok(numbers))
+        return NULL;
+    struct nav_texture_features *reduce =
+        nav_texture_features_new(numbers->channels, numbers->length, numbers->levels, numbers->floor);
+    struct nav_texture_rung *r = reduce ? calloc(1, sizeof *r) : NULL;
+    if (!r) {
+        nav_texture_features_free(reduce);
+        return NULL;
+    }
+    *r = (struct nav_texture_rung){.n = *numbers, .reduce = reduce, .features = nav_texture_features_count(reduce)};
+    if (!make(r) || r->n.axes > r->features) {
+        nav_texture_rung_free(r);
+        return NULL;
+    }
+    return r;
+}
+
+void nav_texture_rung_free(struct nav_texture_rung *r)
+{
+    if (!r)
+        return;
+    const double *arrays[] = {r->n.floor, r->n.centre,      r->n.scale,    r->n.weight,  r->n.bias,   r->n.middle,
+                              r->n.axis,  r->n.axis_weight, r->projection, r->threshold, r->expanded, r->apart};
+    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++)
+        free((void *)arrays[i]);
+    nav_texture_features_free(r->reduce);
+    free(r);
+}
+
+int nav_texture_rung_length(const struct nav_texture_rung *r)
+{
+    return r->n.length;
+}
+
+static void project(const struct nav_texture_rung *r, const double *z, double *restrict out)
+{
+    int hidden = r->n.hidden;
+    memcpy(out, r->threshold, (size_t)hidden * sizeof *out);
+    for (int f = 0; f < r->features; f++) {
+        const double *row = r->projection + (size_t)f * (size_t)hidden;
+        for (int h = 0; h < hidden; h++)
+            out[h] += z[f] * row[h];
+    }
+    for (int h = 0; h < hidden; h++)
+        out[h] = out[h] > 0.0 ? out[h] : 0.0;
+}
+
+void nav_texture_rung_expand(struct nav_texture_rung *r, const double *window, double *out)
+{
+    nav_texture_features_work(r->reduce, window, out);
+    for (int f = 0; f < r->features; f++)
+        out[f] = (out[f] - r->n.centre[f]) * r->n.scale[f];
+    project(r, out, out + r->features);
+}
+
+/* Scores of all classes from the expanded features, tempered; the best becomes 0. */
+static void score(const struct nav_texture_rung *r, const double *x, double *loglik)
+{
+    int classes = r->n.classes;
+    memcpy(loglik, r->n.bias, (size_t)classes * sizeof *loglik);
+    for (int i = 0; i < r->features + r->n.hidden; i++) {
+        const double *row = r->n.weight + (size_t)i * (size_t)classes;
+        for (int k = 0; k < classes; k++)
+            loglik[k] += x[i] * row[k];
+    }
+    double best = loglik[0];
+    for (int k = 1; k < classes; k++)
+        best = fmax(best, loglik[k]);
+    for (int k = 0; k < classes; k++)
+        loglik[k] = (loglik[k] - best) * r->n.temper;
+}
+
+/* Squared distance from a class's middle: along each axis by its own variance, beyond the axes by a common one. */
+static double distance(struct nav_texture_rung *r, const double *middle)
+{
+    double rest = 0.0, sum = 0.0;
+    for (int f = 0; f < r->features; f++) {
+        r->apart[f] = r->expanded[f] - middle[f];
+        rest += r->apart[f] * r->apart[f];
+    }
+    for (int a = 0; a < r->n.axes; a++) {
+        const double *axis = r->n.axis + (size_t)a * (size_t)r->features;
+        double along = 0.0;
+        for (int f = 0; f < r->features; f++)
+            along += axis[f] * r->apart[f];
+        sum += along * along * r->n.axis_weight[a];
+        rest -= along * along;
+    }
+    return (sum + fmax(rest, 0.0) * r->n.beyond) / r->features;
+}
+
+double nav_texture_rung_judge(struct nav_texture_rung *r, const double *window, double *loglik)
+{
+    nav_texture_rung_expand(r, window, r->expanded);
+    score(r, r->expanded, loglik);
+    double nearest = INFINITY;
+    for (int k = 0; k < r->n.classes; k++)
+        nearest = fmin(nearest, distance(r, r->n.middle + (size_t)k * (size_t)r->features));
+    return nearest;
+}

@@ -1,0 +1,47 @@
+/* One rung of a texture model: a classifier for windows of one length.
+ *
+ * Features (texture_features.h), standardised; beside them `hidden` random projections cut at zero, which let a linear
+ * rule bend (random features, Rahimi and Recht 2008; a seed stands for the projections in model files); then a linear
+ * discriminant, whose scores are log-likelihoods up to a constant, tempered to what held-out recordings bear out. How
+ * far the features lie from every class's middle says whether the surface was ever trained.
+ */
+#ifndef NAV_TEXTURE_RUNG_H
+#define NAV_TEXTURE_RUNG_H
+
+#include <stdint.h>
+
+/* cffi: begin */
+struct nav_texture_rung;
+
+enum { NAV_TEXTURE_CLASSES_MAX = 256, NAV_TEXTURE_HIDDEN_MAX = 4096 };
+
+/* A rung's numbers. F: features, H: hidden, K: classes, R: axes. All arrays are copied. */
+struct nav_texture_rung_numbers {
+    int classes, channels, length, levels, hidden, axes;
+    uint64_t seed;                /* of the projections */
+    double temper;                /* >= 0; scores are multiplied by it */
+    double beyond;                /* R axes at most F; weight of the squared distance outside them, per feature */
+    const double *floor;          /* [channels] counts squared */
+    const double *centre, *scale; /* [F] feature -> (feature - centre) * scale */
+    const double *weight, *bias;  /* [F + H][K], [K] */
+    const double *middle;         /* [K][F] standardised features of each class */
+    const double *axis;           /* [R][F] orthonormal, of the spread within classes */
+    const double *axis_weight;    /* [R] 1 / variance */
+};
+
+/* NULL when a size is out of range, a number is not finite, or memory is short. */
+struct nav_texture_rung *nav_texture_rung_new(const struct nav_texture_rung_numbers *);
+void nav_texture_rung_free(struct nav_texture_rung *);
+
+/* Standardised features and projections of a window: out[F + H]; what a trainer fits its weights to. */
+void nav_texture_rung_expand(struct nav_texture_rung *, const double *window, double *out);
+
+/* window: [length][channels], finite and within +-1e9. loglik[K]: tempered, the largest is 0. Returns the squared
+ * distance to the nearest class's middle, divided by the number of features: about 1 for a trained surface. Allocates
+ * nothing. */
+double nav_texture_rung_judge(struct nav_texture_rung *, const double *window, double *loglik);
+/* cffi: end */
+
+int nav_texture_rung_length(const struct nav_texture_rung *);
+
+#endif

@@ -1,0 +1,236 @@
+#include "texture_stream.h"
+
+#include <math.h>
+#include <stdbool.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "texture_span.h"
+
+#define BAD_SHARE_MOST 0.25 /* of a window; with more, its spectrum is that of the gaps */
+
+struct nav_texture_stream {
+    struct nav_texture_rules rules; /* its pointers are the stream's own, but for the rungs */
+    double unknown[NAV_TEXTURE_RUNGS_MAX], border[NAV_TEXTURE_RUNGS_MAX];
+    struct nav_texture_span *span;
+    double *limits;  /* [5][channels] the stream's own */
+    double *raw;     /* [room][channels] samples since the last decision */
+    double *clean;   /* [room][channels] */
+    double *half[3]; /* [classes] evidence of the window before's second half, of the first and the second half */
+    double *before;  /* [classes] evidence of the window before */
+    int room, held;
+    bool has_before;
+    int half_rung, before_rung;
+};
+
+static bool lengths_ok(const struct nav_texture_rules *r)
+{
+    if (r->rungs < 1 || r->rungs > NAV_TEXTURE_RUNGS_MAX || r->window < 2 || r->window > NAV_TEXTURE_WINDOW_MAX)
+        return false;
+    if (r->step < 0 || (r->step > 0 && (r->patience < r->step || r->patience > NAV_TEXTURE_WINDOW_MAX)))
+        return false;
+    for (int i = 1; i < r->rungs; i++) {
+        if (nav_texture_rung_length(r->rung[i]) <= nav_texture_rung_length(r->rung[i - 1]))
+            return false;
+    }
+    return r->channels >= 1 && r->classes >= 1 && r->limits.channels == r->channels;
+}
+
+static const double *own_limit(double *to, const double *from, int channels)
+{
+    return from ? memcpy(to, from, (size_t)channels * sizeof *to) : NULL;
+}
+
+static bool allocate(struct nav_texture_stream *s)
+{
+    size_t channels = (size_t)s->rules.channels, classes = (size_t)s->rules.classes;
+    s->span = nav_texture_span_new(&s->rules);
+    s->limits = calloc(5 * channels, sizeof *s->limits);
+    s->raw = calloc((size_t)s->room * channels, sizeof *s->raw);
+    s->clean = calloc((size_t)s->room * channels, sizeof *s->clean);
+    s->before = calloc(classes, sizeof *s->before);
+    bool ok = s->span && s->limits && s->raw && s->clean && s->before;
+    for (int i = 0; i < 3; i++) {
+        s->half[i] = calloc(classes, sizeof *s->half[i]);
+        ok = ok && s->half[i];
+    }
+    return ok;
+}
+
+static void own_limits(struct nav_texture_stream *s)
+{
+    memcpy(s->unknown, s->rules.unknown, (size_t)s->rules.rungs * sizeof *s->unknown);
+    memcpy(s->border, s->rules.border, (size_t)s->rules.rungs * sizeof *s->border);
+    s->rules.unknown = s->unknown;
+    s->rules.border = s->border;
+    struct nav_texture_limits *l = &s->rules.limits;
+    int channels = l->channels;
+    l->spike = own_limit(s->limits, l->spike, channels);
+    l->still = own_limit(s->limits + channels, l->still, channels);
+    l->low = own_limit(s->limits + 2 * channels, l->low, channels);
+    l->high = own_limit(s->limits + 3 * channels, l->high, channels);
+    l->span = own_limit(s->limits + 4 * channels, l->span, channels);
+}
+
+struct nav_texture_stream *nav_texture_stream_new(const struct nav_texture_rules *rules)
+{
+    struct nav_texture_stream *s = lengths_ok(rules) ? calloc(1, sizeof *s) : NULL;
+    if (!s)
+        return NULL;
+    s->rules = *rules;
+    s->room = rules->step > 0 ? rules->patience : rules->window;
+    if (!allocate(s)) {
+        nav_texture_stream_free(s);
+        return NULL;
+    }
+    own_limits(s);
+    return s;
+}
+
+void nav_texture_stream_free(struct nav_texture_stream *s)
+{
+    if (!s)
+        return;
+    nav_texture_span_free(s->span);
+    free(s->limits);
+    free(s->raw);
+    free(s->clean);
+    free(s->before);
+    for (int i = 0; i < 3; i++)
+        free(s->half[i]);
+    free(s);
+}
+
+void nav_texture_stream_reset(struct nav_texture_stream *s)
+{
+    s->held = 0;
+    s->has_before = false;
+}
+
+/* Whether two stretches, judged at this rung, are of two surfaces: no class explains both. */
+static bool differ(const struct nav_texture_stream *s, int rung, const double *a, const double *b)
+{
+    double shared = -INFINITY;
+    for (int k = 0; k < s->rules.classes; k++)
+        shared = fmax(shared, a[k] + b[k]);
+    return rung >= 0 && -shared > s->rules.border[rung];
+}
+
+static void swap(double **a, double **b)
+{
+    double *kept = *a;
+    *a = *b;
+    *b = kept;
+}
+
+/* Looks for a border between half and half and between window and window; when the halves differ, what counts is the
+ * later one. The halves and the window become those before. */
+static bool find_border(struct nav_texture_stream *s, double *loglik, int rung)
+{
+    int first = s->held / 2, later = s->held - first, half_rung;
+    double distance;
+    nav_texture_span_judge(s->span, s->clean, first, s->half[1], &distance);
+    half_rung = nav_texture_span_judge(s->span, s->clean + (size_t)first * (size_t)s->rules.channels, later, s->half[2],
+                                       &distance);
+    bool inside = differ(s, half_rung, s->half[1], s->half[2]);
+    bool since = s->has_before && ((s->half_rung == half_rung && differ(s, half_rung, s->half[0], s->half[1])) ||
+                                   (s->before_rung == rung && differ(s, rung, s->before, loglik)));
+    size_t bytes = (size_t)s->rules.classes * sizeof *loglik;
+    if (inside)
+        memcpy(loglik, s->half[2], bytes);
+    memcpy(s->before, loglik, bytes);
+    s->before_rung = inside ? -1 : rung;
+    s->half_rung = half_rung;
+    swap(&s->half[0], &s->half[2]);
+    s->has_before = true;
+    return inside || since;
+}
+
+/* Confidence of the likeliest class under equal priors, and which. */
+static double best(const double *loglik, int classes, int *label)
+{
+    double sum = 0.0;
+    *label = 0;
+    for (int k = 0; k < classes; k++) {
+        if (loglik[k] > loglik[*label])
+            *label = k;
+    }
+    for (int k = 0; k < classes; k++)
+        sum += exp(loglik[k] - loglik[*label]);
+    return 1.0 / sum;
+}
+
+static void no_evidence(struct nav_texture_stream *s, struct nav_texture_decision *d, double *loglik)
+{
+    memset(loglik, 0, (size_t)s->rules.classes * sizeof *loglik);
+    d->label = NAV_TEXTURE_UNKNOWN;
+    d->confidence = 0.0;
+    s->has_before = false;
+}
+
+static bool unreadable(const struct nav_texture_stream *s, const struct nav_texture_decision *d)
+{
+    const struct nav_texture_health *h = &d->health;
+    return (double)h->bad > BAD_SHARE_MOST * s->held || h->still > 0 || h->railed > 0;
+}
+
+/* A surface that lies beyond every trained one is weak evidence for any of them: the farther, the weaker. */
+static bool never_trained(const struct nav_texture_stream *s, double distance, int rung, double *loglik)
+{
+    double limit = s->rules.unknown[rung];
+    if (!(distance > limit))
+        return false;
+    for (int k = 0; k < s->rules.classes; k++)
+        loglik[k] *= limit / distance;
+    return true;
+}
+
+/* Decides on the samples held. Returns whether a sequential decision may stop here. */
+static bool decide(struct nav_texture_stream *s, struct nav_texture_decision *d, double *loglik)
+{
+    memset(d, 0, sizeof *d);
+    d->samples = s->held;
+    memcpy(s->clean, s->raw, (size_t)s->held * (size_t)s->rules.channels * sizeof *s->clean);
+    d->health = nav_texture_clean(s->clean, s->held, &s->rules.limits);
+    d->border = d->health.caught > 0 && d->health.railed == 0;
+    int rung = -1;
+    if (!unreadable(s, d) && !d->health.caught)
+        rung = nav_texture_span_judge(s->span, s->clean, s->held, loglik, &d->distance);
+    if (rung < 0) {
+        no_evidence(s, d, loglik);
+        return false;
+    }
+    bool strange = never_trained(s, d->distance, rung, loglik);
+    d->confidence = best(loglik, s->rules.classes, &d->label);
+    if (s->rules.step > 0 && (d->confidence < s->rules.sure || strange) && s->held < s->room)
+        return false;
+    d->border = find_border(s, loglik, rung);
+    d->confidence = best(loglik, s->rules.classes, &d->label);
+    if (strange || d->confidence < s->rules.doubt)
+        d->label = NAV_TEXTURE_UNKNOWN;
+    return true;
+}
+
+static bool due(const struct nav_texture_stream *s)
+{
+    return s->held == s->room || (s->rules.step > 0 && s->held % s->rules.step == 0);
+}
+
+long nav_texture_stream_push(struct nav_texture_stream *s, const double *samples, long n, int *decided,
+                             struct nav_texture_decision *decision, double *loglik)
+{
+    size_t channels = (size_t)s->rules.channels;
+    *decided = 0;
+    for (long i = 0; i < n; i++) {
+        memcpy(s->raw + (size_t)s->held++ * channels, samples + (size_t)i * channels, channels * sizeof *s->raw);
+        if (!due(s))
+            continue;
+        bool may_stop = decide(s, decision, loglik);
+        if (may_stop || s->held == s->room) {
+            s->held = 0;
+            *decided = 1;
+            return i + 1;
+        }
+    }
+    return n;
+}

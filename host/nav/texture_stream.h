@@ -1,0 +1,51 @@
+/* Texture of one whisker, sample by sample: windows in a row, or as few samples as it takes to be sure. */
+#ifndef NAV_TEXTURE_STREAM_H
+#define NAV_TEXTURE_STREAM_H
+
+#include "texture_clean.h"
+#include "texture_rung.h"
+
+/* cffi: begin */
+struct nav_texture_stream;
+
+enum { NAV_TEXTURE_RUNGS_MAX = 16, NAV_TEXTURE_WINDOW_MAX = 1 << 20, NAV_TEXTURE_UNKNOWN = -1 };
+
+struct nav_texture_rules {
+    int channels, classes;
+    int window;                           /* samples, from 2 to NAV_TEXTURE_WINDOW_MAX */
+    int rungs;                            /* at least 1; their windows grow from rung to rung */
+    struct nav_texture_rung *const *rung; /* [rungs] lent for the stream's life; not for use by two threads at a time */
+    const double *unknown;                /* [rungs] squared distance beyond which a surface was never trained */
+    const double *border;                 /* [rungs] two neighbouring stretches that share a class this badly, in nats,
+                                             are two surfaces */
+    double growth;                        /* evidence of m rung lengths is m^growth that of one: 1 if independent */
+    double doubt;                         /* confidence below which the answer is "unknown" */
+    int step;                             /* 0: windows in a row. Else sequential: looks every so many samples, ... */
+    double sure;                          /* ... answers at this confidence, ... */
+    int patience;                         /* ... and after so many samples in any case */
+    struct nav_texture_limits limits;     /* channels as above */
+};
+
+struct nav_texture_decision {
+    int label;         /* class, or NAV_TEXTURE_UNKNOWN */
+    int samples;       /* that the decision took */
+    int border;        /* the surface changed within the window or since the one before it; or the whisker was caught */
+    double confidence; /* of the likeliest class, all being equally likely before: 0 without evidence */
+    double distance;   /* squared, of the features from the nearest class: about 1 for a trained surface */
+    struct nav_texture_health health;
+};
+
+/* NULL for impossible rules or without memory; nothing is allocated afterwards. */
+struct nav_texture_stream *nav_texture_stream_new(const struct nav_texture_rules *);
+void nav_texture_stream_free(struct nav_texture_stream *);
+
+/* Takes samples[n][channels] (raw counts; nan: missing) up to the first decision, and returns how many it took: fewer
+ * than n, or *decided set, when there is one. loglik[classes]: tempered log-likelihoods; all 0 without evidence. */
+long nav_texture_stream_push(struct nav_texture_stream *, const double *samples, long n, int *decided,
+                             struct nav_texture_decision *decision, double *loglik);
+
+/* Forgets what came before, as after a gap in the data. */
+void nav_texture_stream_reset(struct nav_texture_stream *);
+/* cffi: end */
+
+#endif
