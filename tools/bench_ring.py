@@ -299,7 +299,7 @@ def draw_latency(rows: list[dict]) -> Figure:
         axes.set_xlabel("readers, all on one processor")
     for line in panels:
         line[0].set_ylabel("publish to reader (us)")
-    figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=6)
+    figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=6, frameon=False)
     figure.suptitle("256-byte frames at 2 kHz. Shaded: more readers than processors, so tails are the scheduler's")
     return figure
 
@@ -317,7 +317,9 @@ def draw_throughput(rows: list[dict]) -> Figure:
         axes.set(xlabel="readers, all on one processor", title=f"readers {mode}")
         axes.grid(axis="y", color="0.9")
     panels[0].set_ylabel("frames a second that reach every reader")
-    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=6)
+    figure.legend(
+        *panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=6, fontsize=8.5, frameon=False
+    )
     return figure
 
 
@@ -326,11 +328,11 @@ def draw_writer(rows: list[dict]) -> Figure:
     figure = Figure(figsize=(9.5, 3.8), layout="constrained")
     panels = figure.subplots(1, 2)
     places = {readers: i for i, readers in enumerate((0, *READERS))}
-    for mode, style in (("poll", "o-"), ("wait", "s--")):
+    for mode, style in (("poll", STYLES["whisker"]), ("wait", STYLES["iceoryx2"])):
         paced, free = (of(rows, peer="whisker", mode=mode, pace=pace) for pace in ("2khz", "free"))
         paced = sorted(paced, key=lambda p: p["readers"])
-        panels[0].plot([places[p["readers"]] for p in paced], [p["publish_ns"] for p in paced], style, label=mode)
-        panels[1].plot([places[p["readers"]] for p in free], [1e9 / p["sent_per_s"] for p in free], style, label=mode)
+        panels[0].plot([places[p["readers"]] for p in paced], [p["publish_ns"] for p in paced], label=mode, **style)
+        panels[1].plot([places[p["readers"]] for p in free], [1e9 / p["sent_per_s"] for p in free], label=mode, **style)
     titles = ("2 kHz: median time of one publication", "without pause: time per frame")
     for axes, title in zip(panels, titles, strict=True):
         axes.set_title(title, fontsize=10)
