@@ -1,6 +1,6 @@
 #!/bin/sh
 # Checks the models with spin: each holds, and each with a bug put in (-DBUG=n) is refuted. Small bounds: seconds.
-# `--long`: larger bounds instead, a few minutes and up to 4 GB.
+# `--long`: larger bounds instead, a minute and up to 2 GB.
 set -eu
 cd "$(dirname "$0")"
 command -v spin >/dev/null || { echo "model: spin is missing; install it: apt-get install spin" >&2; exit 1; }
