@@ -19,9 +19,10 @@ ALLOWED = {
     "sim/mlx90333": ["sim/node", "firmware/dspic"],  # one copy of the data sheet
     "sim/dspic": ["firmware/dspic"],  # addresses and bits, and what the accessors call
     "sim/node": ["sim/mlx90333", "sim/dspic", "firmware/dspic"],
-    "sim/world": ["sim/node"],
-    "sim/signals": ["sim/world", "sim/mlx90333", "sim/node"],
-    "sim/bridge": ["sim/world", "sim/node", "sim/mlx90333", "fpga/bridge_rtl", "fpga/usb"],
+    "sim/mechanics": [],
+    "sim/world": ["sim/mechanics", "sim/node"],
+    "sim/signals": ["sim/world", "sim/mechanics", "sim/mlx90333", "sim/node"],
+    "sim/bridge": ["sim/world", "sim/mechanics", "sim/node", "sim/mlx90333", "fpga/bridge_rtl", "fpga/usb"],
 }
 INCLUDE = re.compile(r'^\s*[#`]include\s+["<]([^">]+)[">]', re.MULTILINE)
 IMPORT = re.compile(r"^\s*(?:from|import)\s+([a-zA-Z_][\w.]*)", re.MULTILINE)

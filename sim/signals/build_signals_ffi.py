@@ -20,7 +20,7 @@ BLOCK = re.compile(r"/\* cffi: begin \*/\n(.*?)/\* cffi: end \*/", re.DOTALL)
 HEADERS = [SIM / "world" / "sim_scene.h", SIM / "world" / "sim_world.h", HERE / "signals.h"]
 # A header of another folder that a declaration needs: the struct is known to C, opaque to Python.
 FOREIGN = "struct sim_field;"
-ARCHIVES = ["sim_signals", "sim_world", "sim_mlx90333"]  # in the order of the linker
+ARCHIVES = ["sim_signals", "sim_world", "sim_mechanics", "sim_mlx90333"]  # in the order of the linker
 
 
 def declarations() -> str:
@@ -43,7 +43,7 @@ def compile_module(archives: list[Path]) -> Path:
     ffi.set_source(
         "_sim",
         "\n".join(f'#include "{header}"' for header in HEADERS),
-        include_dirs=[str(SIM / folder) for folder in ("world", "node")],
+        include_dirs=[str(SIM / folder) for folder in ("world", "mechanics", "node")],
         extra_link_args=[*map(str, archives), "-lm"],
         extra_compile_args=["-O2", "-std=gnu11"],
     )

@@ -1,0 +1,247 @@
+#include "mech_drag.h"
+
+#include <math.h>
+
+#include "mech_static.h"
+#include "whisker_constants.h"
+
+#define TIP_PRELOAD_M 5e-3   /* [A] 0.35 mN on the default whisker */
+#define MOUNT_HEIGHT_M 80e-3 /* [A] */
+#define LARGEST_CHORD 0.98   /* of the length: the closed form's place of a caught tip */
+#define LEAVE_VIBRATION 0.25 /* share of the tolerance at which a standing whisker's vibration is dropped */
+
+double mech_drag_reach(const struct mech_whisker *whisker, const struct mech_stance *stance)
+{
+    double square = whisker->length * whisker->length - stance->height * stance->height;
+    return square > 0 ? sqrt(square) : 0;
+}
+
+struct mech_stance mech_stance_default(void)
+{
+    struct mech_whisker whisker = mech_whisker_default();
+    struct mech_stance stance = {.preload = TIP_PRELOAD_M,
+                                 .height = MOUNT_HEIGHT_M,
+                                 .catching_step = SIM_WHISKER_TIP_DIAMETER / 2,
+                                 .face_friction = INFINITY};
+    stance.behind = mech_drag_reach(&whisker, &stance) / 2;
+    return stance;
+}
+
+/* Deflection across the path that the floor under the tip asks for. */
+static double pressed(const struct mech_drag *drag, const struct sim_floor_texture *floor)
+{
+    return drag->stance.preload + drag->height + mech_profile_height(&drag->profile, floor);
+}
+
+void mech_drag_start(struct mech_drag *drag, const struct mech_whisker *whisker, const struct mech_stance *stance,
+                     const struct sim_floor_texture *floor, struct sim_rng rng, double tick_s)
+{
+    struct mech_modes modes;
+    *drag = (struct mech_drag){.whisker = *whisker, .stance = *stance, .tick_s = tick_s, .forced = MECH_AUTO};
+    drag->tolerance = mech_tolerance_default().moment;
+    drag->tip_stiffness = mech_whisker_tip_stiffness(whisker);
+    mech_modes_of(whisker, &modes);
+    mech_basis_of(whisker, &modes, false, whisker->length, tick_s, &drag->free);
+    mech_basis_of(whisker, &modes, true, whisker->length, tick_s, &drag->pinned);
+    mech_profile_start(&drag->profile, floor, rng);
+    mech_basis_settle(&drag->pinned, pressed(drag, floor), 0, &drag->motion[1]);
+    drag->moment[1] = drag->pinned.moment_static * (drag->motion[1].input - stance->preload);
+    drag->tilt[1] = drag->moment[1] * mech_whisker_compliance(whisker);
+}
+
+/* Axis 1 with vibration. Returns the normal force, N. */
+static double ride(struct mech_drag *drag, double input)
+{
+    struct mech_motion *motion = &drag->motion[1];
+    if (drag->lifted) {
+        mech_basis_step(&drag->free, motion, 0);
+        if (input <= mech_basis_answer(&drag->free, motion))
+            return 0;
+        mech_basis_change(&drag->free, &drag->pinned, motion, input);
+        drag->lifted = false;
+        return fmax(0, mech_basis_answer(&drag->pinned, motion));
+    }
+    mech_basis_step(&drag->pinned, motion, input);
+    double force = mech_basis_answer(&drag->pinned, motion);
+    if (force >= 0)
+        return force;
+    mech_basis_change(&drag->pinned, &drag->free, motion, 0);
+    drag->lifted = true;
+    return 0;
+}
+
+static void stick(struct mech_drag *drag)
+{
+    drag->contact = MECH_STICKS;
+    drag->anchor = mech_basis_answer(&drag->free, &drag->motion[0]);
+    mech_basis_change(&drag->free, &drag->pinned, &drag->motion[0], drag->anchor);
+}
+
+/* The tip comes off where it was held: it slips to this side under friction. */
+static void slip(struct mech_drag *drag, double side, double friction)
+{
+    drag->contact = MECH_SLIPS;
+    drag->slip_side = side;
+    mech_basis_change(&drag->pinned, &drag->free, &drag->motion[0], -side * friction);
+}
+
+static void sticking(struct mech_drag *drag, const struct sim_floor_texture *floor, double travel, double normal)
+{
+    drag->anchor -= travel;
+    mech_basis_step(&drag->pinned, &drag->motion[0], drag->anchor);
+    double force = mech_basis_answer(&drag->pinned, &drag->motion[0]);
+    if (fabs(force) <= (drag->whisker.friction + floor->friction_drop) * normal)
+        return;
+    slip(drag, force > 0 ? -1 : 1, drag->whisker.friction * normal);
+    drag->slips++;
+}
+
+static void slipping(struct mech_drag *drag, double travel, double normal)
+{
+    double before = mech_basis_answer(&drag->free, &drag->motion[0]);
+    mech_basis_step(&drag->free, &drag->motion[0], -drag->slip_side * drag->whisker.friction * normal);
+    double relative = mech_basis_answer(&drag->free, &drag->motion[0]) - before + travel; /* tip against floor */
+    if (normal > 0 && relative * drag->slip_side <= 0)
+        stick(drag);
+    else if (normal <= 0)
+        drag->slip_side = relative < 0 ? -1 : 1;
+}
+
+/* Deflection along the path, as the modes know it, of a tip held this far behind the mount. */
+static double held_deflection(const struct mech_drag *drag, double behind)
+{
+    const struct mech_stance *stance = &drag->stance;
+    double angle = atan2(behind, stance->height) - atan2(stance->behind, stance->height);
+    double chord = fmin(hypot(behind, stance->height), LARGEST_CHORD * drag->whisker.length);
+    double moment = mech_static_moment(&drag->whisker, chord, angle);
+    double soft = mech_whisker_compliance(&drag->whisker);
+    if (soft * fabs(moment) > drag->whisker.stop)
+        moment = copysign(drag->whisker.stop / soft, moment);
+    return -moment / drag->pinned.moment_static;
+}
+
+static void catch_tip(struct mech_drag *drag)
+{
+    if (drag->contact == MECH_SLIPS)
+        stick(drag);
+    drag->contact = MECH_CAUGHT;
+    drag->behind = drag->caught_at = drag->stance.behind - drag->anchor;
+    drag->caught_offset = drag->anchor - held_deflection(drag, drag->behind);
+    drag->catches++;
+}
+
+static bool face_lets_go(const struct mech_drag *drag)
+{
+    double reach = mech_drag_reach(&drag->whisker, &drag->stance);
+    return drag->behind >= reach ||
+           (drag->behind > 0 && drag->stance.height > drag->stance.face_friction * drag->behind);
+}
+
+static void caught(struct mech_drag *drag, double travel, double height)
+{
+    drag->behind += travel;
+    mech_basis_step(&drag->pinned, &drag->motion[0], held_deflection(drag, drag->behind) + drag->caught_offset);
+    if (face_lets_go(drag)) {
+        slip(drag, 1, 0);
+        drag->height = height;
+    } else if (drag->behind < drag->caught_at || height <= drag->height) { /* backed off */
+        drag->contact = MECH_STICKS;
+        drag->anchor = drag->motion[0].input;
+    }
+}
+
+static void vibrate(struct mech_drag *drag, const struct sim_floor_texture *floor, const struct mech_stroke *stroke)
+{
+    if (stroke->base_rate != drag->base_rate)
+        mech_basis_turn(drag->contact == MECH_SLIPS ? &drag->free : &drag->pinned, &drag->motion[0],
+                        stroke->base_rate - drag->base_rate);
+    double normal = ride(drag, pressed(drag, floor));
+    if (drag->contact == MECH_CAUGHT)
+        caught(drag, stroke->travel, stroke->height);
+    else if (drag->contact == MECH_STICKS)
+        sticking(drag, floor, stroke->travel, normal);
+    else
+        slipping(drag, stroke->travel, normal);
+    drag->moment[0] = mech_basis_moment(drag->contact == MECH_SLIPS ? &drag->free : &drag->pinned, &drag->motion[0]);
+    drag->moment[1] = mech_basis_moment(drag->lifted ? &drag->free : &drag->pinned, &drag->motion[1]);
+}
+
+/* The level without vibration. */
+static void follow(struct mech_drag *drag, const struct sim_floor_texture *floor, const struct mech_stroke *stroke)
+{
+    double input = fmax(0, pressed(drag, floor)), along;
+    if (drag->contact == MECH_CAUGHT) {
+        drag->behind += stroke->travel;
+        along = drag->anchor = held_deflection(drag, drag->behind) + drag->caught_offset;
+        if (face_lets_go(drag)) {
+            drag->contact = MECH_STICKS;
+            drag->height = stroke->height;
+            drag->anchor = 0;
+        }
+    } else {
+        double most = (drag->whisker.friction + floor->friction_drop) * input;
+        along = drag->anchor -= stroke->travel;
+        if (fabs(along) > most) {
+            along = drag->anchor = copysign(fmax(0, most - 2 * floor->friction_drop * input), along);
+            drag->slips++;
+        }
+    }
+    mech_basis_settle(&drag->pinned, along, 0, &drag->motion[0]);
+    mech_basis_settle(&drag->pinned, input, 0, &drag->motion[1]);
+    drag->moment[0] = drag->pinned.moment_static * along;
+    drag->moment[1] = drag->pinned.moment_static * input;
+}
+
+/* May a standing whisker's vibration be dropped? */
+static bool faded(const struct mech_drag *drag)
+{
+    return drag->contact != MECH_SLIPS && !drag->lifted &&
+           mech_basis_swing(&drag->pinned, &drag->motion[0], 0) + mech_basis_swing(&drag->pinned, &drag->motion[1], 0) <
+               LEAVE_VIBRATION * drag->tolerance;
+}
+
+static void stand(struct mech_drag *drag)
+{
+    drag->level = MECH_REST;
+    for (int axis = 0; axis < 2; axis++)
+        mech_basis_settle(&drag->pinned, drag->motion[axis].input, 0, &drag->motion[axis]);
+}
+
+static void meet_border(struct mech_drag *drag, const struct mech_stroke *stroke)
+{
+    if (drag->contact == MECH_CAUGHT || stroke->height == drag->height)
+        return;
+    if (stroke->height - drag->height >= drag->stance.catching_step && stroke->travel > 0)
+        catch_tip(drag);
+    else
+        drag->height = stroke->height;
+}
+
+static void choose_level(struct mech_drag *drag, bool still)
+{
+    if (drag->forced != MECH_AUTO)
+        drag->level = MECH_CLOSED | (drag->forced & MECH_VIBRATION);
+    else if (!still)
+        drag->level = MECH_CLOSED | MECH_VIBRATION;
+    else if (faded(drag))
+        stand(drag);
+}
+
+void mech_drag_step(struct mech_drag *drag, const struct sim_floor_texture *floor, const struct mech_stroke *stroke)
+{
+    bool still = stroke->travel == 0 && stroke->base_rate == drag->base_rate && stroke->height == drag->height;
+    if (!isfinite(stroke->travel + stroke->height + stroke->base_rate) || (still && drag->level == MECH_REST))
+        return;
+    choose_level(drag, still);
+    meet_border(drag, stroke);
+    mech_profile_move(&drag->profile, floor, drag->contact == MECH_CAUGHT ? 0 : stroke->travel);
+    if (drag->level & MECH_VIBRATION)
+        vibrate(drag, floor, stroke);
+    else if (drag->level != MECH_REST)
+        follow(drag, floor, stroke);
+    drag->base_rate = stroke->base_rate;
+    double soft = mech_whisker_compliance(&drag->whisker), rest = drag->pinned.moment_static * drag->stance.preload;
+    drag->moment[1] -= drag->level == MECH_REST ? 0 : rest;
+    for (int axis = 0; axis < 2; axis++)
+        drag->tilt[axis] = fmin(fmax(soft * drag->moment[axis], -drag->whisker.stop), drag->whisker.stop);
+}

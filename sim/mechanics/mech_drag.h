@@ -1,0 +1,76 @@
+/* A whisker whose tip is dragged over a floor, in two planes: along the path (axis 0: friction, stick and slip, catches
+ * at borders) and across it (axis 1: the floor's height and the preload).
+ *
+ * With vibration: the tip sticks while friction holds it (the tip is pinned to the floor), slips under kinetic friction
+ * until it moves with the floor again, and lifts off where the floor falls away faster than it follows. Normal force is
+ * preload plus what the height makes of it, vibration included. Without: the height one to one and a sawtooth whose jump
+ * is J = 2 (mu_s - mu_k) N/k_tip. A slip is an event as large as what it follows, so no bound on the vibration left out
+ * exists while the tip moves: the level is vibration from the first motion until what is left after the last has faded
+ * below the tolerance, then static; at the start, rest. Small deflections; a border catch uses the closed form at the
+ * angle from the mount, held at the plug's stop.
+ *
+ * A step of the floor holds the tip like a hook (a pile's edge) until the whisker is pulled straight: by a mount at
+ * height h, until the tip lies sqrt(length^2 - h^2) behind the mount. A step face that only rubs lets go earlier: when
+ * the pull leaves its friction cone, height over distance behind above `face_friction`.
+ */
+#ifndef MECH_DRAG_H
+#define MECH_DRAG_H
+
+#include <stdbool.h>
+
+#include "mech_profile.h"
+#include "mech_shaft.h"
+
+/* How a whisker is mounted over the floor. Lengths in m. */
+struct mech_stance {
+    double preload;       /* deflection that presses the tip on the floor */
+    double height;        /* of the mount over the floor */
+    double behind;        /* of the tip at rest, behind the mount along the path; negative: ahead */
+    double catching_step; /* a step up of the floor at least this high catches the tip */
+    double face_friction; /* of the step's face; infinity: it hooks */
+};
+
+/* What happens in a tick. */
+struct mech_stroke {
+    double travel;    /* of the mount along the path, m, signed */
+    double height;    /* of the floor under the tip over the first floor, m: it changes at borders */
+    double base_rate; /* rate of turn of the mount in the plane of the path, rad/s */
+};
+
+enum { MECH_STICKS, MECH_SLIPS, MECH_CAUGHT };
+
+struct mech_drag {
+    struct mech_whisker whisker;
+    struct mech_stance stance;
+    struct mech_basis free, pinned; /* at the tip */
+    struct mech_motion motion[2];
+    struct mech_profile profile;
+    double tick_s, tip_stiffness;
+    double tolerance; /* N m, of vibration dropped when the whisker stands */
+    int forced, level, contact;
+    bool lifted;
+    double anchor;    /* deflection of the tip along the path when it sticks, m */
+    double base_rate;
+    double slip_side; /* +1 or -1: the tip slips this way along the path */
+    double height;    /* of the floor that the tip is on, m */
+    double behind, caught_at; /* of a caught tip behind the mount, m: now, and when it was caught */
+    double caught_offset;     /* deflection when it was caught over what the angle accounts for, m */
+    long slips, catches;      /* how many so far */
+    double moment[2], tilt[2]; /* about the static preload; along the path, across it */
+};
+
+/* The mount of the outer whiskers: 5 mm preload, 80 mm high, tip tilted backwards by half its reach; steps catch from the
+ * tip's radius on; faces hook. */
+struct mech_stance mech_stance_default(void);
+
+/* Horizontal reach of a straight whisker, m; 0 if it does not reach the floor. */
+double mech_drag_reach(const struct mech_whisker *whisker, const struct mech_stance *stance);
+
+/* A whisker standing on a floor. */
+void mech_drag_start(struct mech_drag *drag, const struct mech_whisker *whisker, const struct mech_stance *stance,
+                     const struct sim_floor_texture *floor, struct sim_rng rng, double tick_s);
+
+/* Lets a tick pass over this floor. */
+void mech_drag_step(struct mech_drag *drag, const struct sim_floor_texture *floor, const struct mech_stroke *stroke);
+
+#endif

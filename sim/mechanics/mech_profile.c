@@ -1,0 +1,65 @@
+#include "mech_profile.h"
+
+#include <math.h>
+
+#include "whisker_constants.h"
+
+#define LATTICE_M 0.25e-3
+#define LEAST_STRETCH 0.5
+enum { MOST_NODES = 64 }; /* a leap further than this meets floor that has nothing to do with the last */
+
+static double stretched(struct sim_rng *rng)
+{
+    return fmax(LEAST_STRETCH, 1 + SIM_TIP_JITTER * sim_rng_normal(rng));
+}
+
+static double next_node(struct mech_profile *profile, const struct sim_floor_texture *floor)
+{
+    double keep = exp(-1e3 * LATTICE_M / floor->correlation_mm);
+    return keep * profile->node[3] + sqrt(1 - keep * keep) * sim_rng_normal(&profile->rng);
+}
+
+static void shift(struct mech_profile *profile, const struct sim_floor_texture *floor)
+{
+    double next = next_node(profile, floor);
+    for (int i = 0; i < 3; i++)
+        profile->node[i] = profile->node[i + 1];
+    profile->node[3] = next;
+}
+
+void mech_profile_start(struct mech_profile *profile, const struct sim_floor_texture *floor, struct sim_rng rng)
+{
+    *profile = (struct mech_profile){.rng = rng};
+    profile->node[3] = sim_rng_normal(&profile->rng);
+    for (int i = 0; i < 3; i++)
+        shift(profile, floor);
+    profile->phase = 2 * SIM_PI * sim_rng_uniform(&profile->rng);
+    profile->stretch = stretched(&profile->rng);
+}
+
+void mech_profile_move(struct mech_profile *profile, const struct sim_floor_texture *floor, double distance)
+{
+    profile->fraction += fabs(distance) / LATTICE_M;
+    for (int i = 0; profile->fraction >= 1 && i < MOST_NODES; i++) {
+        profile->fraction -= 1;
+        shift(profile, floor);
+    }
+    profile->fraction = fmod(profile->fraction, 1);
+    if (floor->weave_wavelength_mm <= 0)
+        return;
+    profile->phase += 2 * SIM_PI * fabs(distance) * 1e3 / (floor->weave_wavelength_mm * profile->stretch);
+    if (profile->phase >= 2 * SIM_PI) {
+        profile->phase = fmod(profile->phase, 2 * SIM_PI);
+        profile->stretch = stretched(&profile->rng);
+    }
+}
+
+/* Catmull and Rom's cubic through the nodes. */
+double mech_profile_height(const struct mech_profile *profile, const struct sim_floor_texture *floor)
+{
+    const double *n = profile->node;
+    double t = profile->fraction;
+    double rough = n[1] + t / 2 * (n[2] - n[0] + t * (2 * n[0] - 5 * n[1] + 4 * n[2] - n[3] +
+                                                      t * (3 * (n[1] - n[2]) + n[3] - n[0])));
+    return 1e-3 * (floor->rms_mm * rough + floor->weave_amplitude_mm * sin(profile->phase));
+}

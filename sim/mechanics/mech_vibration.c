@@ -1,0 +1,211 @@
+#include "mech_vibration.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { SWEEPS = 12 }; /* Jacobi's method on so small a matrix converges in half as many */
+
+typedef double square[MECH_MODES][MECH_MODES];
+
+static double dot(const double a[MECH_MODES], const double b[MECH_MODES])
+{
+    double sum = 0;
+    for (int k = 0; k < MECH_MODES; k++)
+        sum += a[k] * b[k];
+    return sum;
+}
+
+/* Turns rows and columns p and q of a symmetric matrix so that their common element vanishes. */
+static void rotate(square a, square vectors, int p, int q)
+{
+    if (fabs(a[p][q]) <= 1e-15 * sqrt(fabs(a[p][p] * a[q][q])))
+        return;
+    double ratio = (a[q][q] - a[p][p]) / (2 * a[p][q]);
+    double t = copysign(1, ratio) / (fabs(ratio) + sqrt(1 + ratio * ratio));
+    double c = 1 / sqrt(1 + t * t), s = t * c;
+    for (int k = 0; k < MECH_MODES; k++) {
+        double x = a[k][p], y = a[k][q];
+        a[k][p] = c * x - s * y;
+        a[k][q] = s * x + c * y;
+    }
+    for (int k = 0; k < MECH_MODES; k++) {
+        double x = a[p][k], y = a[q][k];
+        a[p][k] = c * x - s * y;
+        a[q][k] = s * x + c * y;
+        x = vectors[p][k];
+        y = vectors[q][k];
+        vectors[p][k] = c * x - s * y;
+        vectors[q][k] = s * x + c * y;
+    }
+}
+
+/* Eigenvalues and eigenvectors (rows) of a symmetric matrix, by Jacobi's rotations; a is used up. */
+static void eigen(square a, square vectors, double values[MECH_MODES])
+{
+    memset(vectors, 0, sizeof(square));
+    for (int k = 0; k < MECH_MODES; k++)
+        vectors[k][k] = 1;
+    for (int sweep = 0; sweep < SWEEPS; sweep++)
+        for (int p = 0; p < MECH_MODES; p++)
+            for (int q = p + 1; q < MECH_MODES; q++)
+                rotate(a, vectors, p, q);
+    for (int k = 0; k < MECH_MODES; k++)
+        values[k] = a[k][k];
+}
+
+/* Free or pinned modes and what they couple to; residual: static compliance and moment the modes leave out. */
+static void set_free(struct mech_basis *basis, const struct mech_modes *modes, const double z[MECH_MODES],
+                     double left_compliance, double left_moment)
+{
+    memset(basis->mode, 0, sizeof basis->mode);
+    for (int k = 0; k < MECH_MODES; k++) {
+        basis->mode[k][k] = 1;
+        basis->omega[k] = modes->omega[k];
+        basis->settle[k] = z[k] / (modes->omega[k] * modes->omega[k]);
+        basis->moment[k] = modes->moment[k];
+        basis->answer[k] = z[k];
+        basis->turn[k] = -modes->turn[k];
+    }
+    basis->moment_input = left_moment;
+    basis->answer_input = left_compliance;
+}
+
+static void set_pinned(struct mech_basis *basis, const struct mech_modes *modes, const double z[MECH_MODES],
+                       double left_compliance, double left_moment)
+{
+    square stiffness;
+    double values[MECH_MODES];
+    for (int i = 0; i < MECH_MODES; i++)
+        for (int j = 0; j < MECH_MODES; j++)
+            stiffness[i][j] = z[i] * z[j] / left_compliance + (i == j ? modes->omega[i] * modes->omega[i] : 0);
+    eigen(stiffness, basis->mode, values);
+    for (int k = 0; k < MECH_MODES; k++) {
+        double zk = dot(basis->mode[k], z);
+        basis->omega[k] = sqrt(values[k]);
+        basis->settle[k] = zk / left_compliance / values[k];
+        basis->moment[k] = dot(basis->mode[k], modes->moment) - left_moment * zk / left_compliance;
+        basis->answer[k] = -zk / left_compliance;
+        basis->turn[k] = -dot(basis->mode[k], modes->turn);
+    }
+    basis->moment_input = left_moment / left_compliance;
+    basis->answer_input = 1 / left_compliance;
+}
+
+/* Damped free motion over a tick: x'' + 2 damping omega x' + omega^2 x = 0. */
+static void set_steps(struct mech_basis *basis, double damping, double tick_s)
+{
+    double shrink = sqrt(1 - damping * damping);
+    basis->tick_s = tick_s;
+    basis->slack = 1 / (1 - damping);
+    basis->decay = 0;
+    for (int k = 0; k < MECH_MODES; k++) {
+        double omega = basis->omega[k], turns = omega * shrink;
+        double fade = exp(-damping * omega * tick_s), c = fade * cos(turns * tick_s), s = fade * sin(turns * tick_s);
+        basis->step[0][k] = c + damping / shrink * s;
+        basis->step[1][k] = s / turns;
+        basis->step[2][k] = -omega / shrink * s;
+        basis->step[3][k] = c - damping / shrink * s;
+        basis->lag[k] = basis->settle[k] * 2 * damping / omega;
+        basis->decay = fmax(basis->decay, fade);
+    }
+}
+
+static void set_bounds(struct mech_basis *basis, double damping)
+{
+    double shrink = sqrt(1 - damping * damping);
+    basis->ring_input = basis->ring_turn = basis->lag_moment = 0;
+    basis->moment_static = basis->moment_input + dot(basis->moment, basis->settle);
+    basis->answer_static = basis->answer_input + dot(basis->answer, basis->settle);
+    for (int k = 0; k < MECH_MODES; k++) {
+        double moment = fabs(basis->moment[k]), turns = basis->omega[k] * shrink;
+        basis->ring_input += moment * fabs(basis->settle[k]) / turns;
+        basis->ring_turn += moment * fabs(basis->turn[k]) / turns;
+        basis->lag_moment += moment * fabs(basis->lag[k]);
+    }
+}
+
+void mech_basis_of(const struct mech_whisker *whisker, const struct mech_modes *modes, bool pinned, double s,
+                   double tick_s, struct mech_basis *basis)
+{
+    double z[MECH_MODES], left_compliance = mech_modes_compliance(whisker, s, s), whole = left_compliance;
+    double left_moment = s;
+    mech_modes_at(whisker, modes, s, z);
+    for (int k = 0; k < MECH_MODES; k++) {
+        double square_omega = modes->omega[k] * modes->omega[k];
+        left_compliance -= z[k] * z[k] / square_omega;
+        left_moment -= z[k] * modes->moment[k] / square_omega;
+    }
+    left_compliance = fmax(left_compliance, 1e-9 * whole);
+    basis->pinned = pinned;
+    basis->s = s;
+    (pinned ? set_pinned : set_free)(basis, modes, z, left_compliance, left_moment);
+    set_steps(basis, whisker->damping, tick_s);
+    set_bounds(basis, whisker->damping);
+}
+
+void mech_basis_step(const struct mech_basis *basis, struct mech_motion *motion, double input)
+{
+    double rate = (input - motion->input) / basis->tick_s, before = motion->input;
+    for (int k = 0; k < MECH_MODES; k++) {
+        /* About the solution that follows the input: settle input - lag rate. */
+        double behind = basis->lag[k] * rate, follow = basis->settle[k] * rate;
+        double at = motion->at[k] - basis->settle[k] * before + behind, speed = motion->speed[k] - follow;
+        motion->at[k] = basis->step[0][k] * at + basis->step[1][k] * speed + basis->settle[k] * input - behind;
+        motion->speed[k] = basis->step[2][k] * at + basis->step[3][k] * speed + follow;
+    }
+    motion->input = input;
+}
+
+static void turn_over(const struct mech_basis *from, const struct mech_basis *to, double value[MECH_MODES])
+{
+    double free[MECH_MODES] = {0};
+    for (int k = 0; k < MECH_MODES; k++)
+        for (int j = 0; j < MECH_MODES; j++)
+            free[j] += from->mode[k][j] * value[k];
+    for (int k = 0; k < MECH_MODES; k++)
+        value[k] = dot(to->mode[k], free);
+}
+
+void mech_basis_change(const struct mech_basis *from, const struct mech_basis *to, struct mech_motion *motion,
+                       double input)
+{
+    turn_over(from, to, motion->at);
+    turn_over(from, to, motion->speed);
+    motion->input = input;
+}
+
+void mech_basis_settle(const struct mech_basis *basis, double input, double rate, struct mech_motion *motion)
+{
+    for (int k = 0; k < MECH_MODES; k++) {
+        motion->at[k] = basis->settle[k] * input - basis->lag[k] * rate;
+        motion->speed[k] = basis->settle[k] * rate;
+    }
+    motion->input = input;
+}
+
+void mech_basis_turn(const struct mech_basis *basis, struct mech_motion *motion, double jump)
+{
+    for (int k = 0; k < MECH_MODES; k++)
+        motion->speed[k] += basis->turn[k] * jump;
+}
+
+double mech_basis_moment(const struct mech_basis *basis, const struct mech_motion *motion)
+{
+    return dot(basis->moment, motion->at) + basis->moment_input * motion->input;
+}
+
+double mech_basis_answer(const struct mech_basis *basis, const struct mech_motion *motion)
+{
+    return dot(basis->answer, motion->at) + basis->answer_input * motion->input;
+}
+
+double mech_basis_swing(const struct mech_basis *basis, const struct mech_motion *motion, double rate)
+{
+    double sum = 0;
+    for (int k = 0; k < MECH_MODES; k++) {
+        double at = motion->at[k] - basis->settle[k] * motion->input + basis->lag[k] * rate;
+        double speed = motion->speed[k] - basis->settle[k] * rate;
+        sum += fabs(basis->moment[k]) * (fabs(at) + fabs(speed) / basis->omega[k]) * basis->slack;
+    }
+    return sum;
+}
