@@ -3,11 +3,11 @@
  *
  * With vibration: the tip sticks while friction holds it (the tip is pinned to the floor), slips under kinetic friction
  * until it moves with the floor again, and lifts off where the floor falls away faster than it follows. Normal force is
- * preload plus what the height makes of it, vibration included. Without: the height one to one and a sawtooth whose jump
- * is J = 2 (mu_s - mu_k) N/k_tip. A slip is an event as large as what it follows, so no bound on the vibration left out
- * exists while the tip moves: the level is vibration from the first motion until what is left after the last has faded
- * below the tolerance, then static; at the start, rest. Small deflections; a border catch uses the closed form at the
- * angle from the mount, held at the plug's stop.
+ * preload plus what the height makes of it, vibration included. Without: the height one to one and a sawtooth whose
+ * jump is J = 2 (mu_s - mu_k) N/k_tip. A slip is an event as large as what it follows, so no bound on the vibration
+ * left out exists while the tip moves: the level is vibration from the first motion until what is left after the last
+ * has faded below the tolerance, then static; at the start, rest. Small deflections; a border catch uses the closed
+ * form at the angle from the mount, held at the plug's stop.
  *
  * A step of the floor holds the tip like a hook (a pile's edge) until the whisker is pulled straight: by a mount at
  * height h, until the tip lies sqrt(length^2 - h^2) behind the mount. A step face that only rubs lets go earlier: when
@@ -49,18 +49,18 @@ struct mech_drag {
     double tolerance; /* N m, of vibration dropped when the whisker stands */
     int forced, level, contact;
     bool lifted;
-    double anchor;    /* deflection of the tip along the path when it sticks, m */
+    double anchor; /* deflection of the tip along the path when it sticks, m */
     double base_rate;
-    double slip_side; /* +1 or -1: the tip slips this way along the path */
-    double height;    /* of the floor that the tip is on, m */
-    double behind, caught_at; /* of a caught tip behind the mount, m: now, and when it was caught */
-    double caught_offset;     /* deflection when it was caught over what the angle accounts for, m */
-    long slips, catches;      /* how many so far */
+    double slip_side;          /* +1 or -1: the tip slips this way along the path */
+    double height;             /* of the floor that the tip is on, m */
+    double behind, caught_at;  /* of a caught tip behind the mount, m: now, and when it was caught */
+    double caught_offset;      /* deflection when it was caught over what the angle accounts for, m */
+    long slips, catches;       /* how many so far */
     double moment[2], tilt[2]; /* about the static preload; along the path, across it */
 };
 
-/* The mount of the outer whiskers: 5 mm preload, 80 mm high, tip tilted backwards by half its reach; steps catch from the
- * tip's radius on; faces hook. */
+/* The mount of the outer whiskers: 5 mm preload, 80 mm high, tip tilted backwards by half its reach; steps catch from
+ * the tip's radius on; faces hook. */
 struct mech_stance mech_stance_default(void);
 
 /* Horizontal reach of a straight whisker, m; 0 if it does not reach the floor. */

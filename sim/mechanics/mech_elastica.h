@@ -1,9 +1,9 @@
 /* Large deflection of a clamped tapered beam pushed by a fixed peg, exactly: the elastica.
  *
  * Everything is in units of the beam: lengths in cones, moments in E I0/cone, forces in E I0/cone^2, so that one
- * solution serves every whisker. E I(s) dtheta/ds = M(s); the peg pushes normal to the beam, plus nu times as much along
- * it towards the tip (nu > 0: friction while the peg slides towards the tip; |nu| up to the coefficient of friction).
- * Integrated from the contact to the base it is an initial-value problem, which needs no shooting.
+ * solution serves every whisker. E I(s) dtheta/ds = M(s); the peg pushes normal to the beam, plus nu times as much
+ * along it towards the tip (nu > 0: friction while the peg slides towards the tip; |nu| up to the coefficient of
+ * friction). Integrated from the contact to the base it is an initial-value problem, which needs no shooting.
  */
 #ifndef MECH_ELASTICA_H
 #define MECH_ELASTICA_H

@@ -47,8 +47,8 @@ static void symmetric_form(const struct mech_whisker *whisker, const struct mech
 {
     for (int i = 0; i < MECH_NODES; i++)
         for (int j = 0; j < MECH_NODES; j++)
-            form[i][j] = sqrt(modes->mass[i] * modes->mass[j]) *
-                         mech_modes_compliance(whisker, modes->node[i], modes->node[j]);
+            form[i][j] =
+                sqrt(modes->mass[i] * modes->mass[j]) * mech_modes_compliance(whisker, modes->node[i], modes->node[j]);
 }
 
 static double dot(const double *a, const double *b)

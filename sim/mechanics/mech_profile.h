@@ -1,14 +1,14 @@
 /* The height of a floor along the path of a whisker's tip.
  *
- * Roughness is a stationary process on a lattice of 0.25 mm, so that it holds no wavelength below 0.5 mm (2000 cycles/m):
- * exponential autocorrelation, spectrum falling as the square of the spatial frequency beyond 1/(2 pi correlation). A
- * weave is added whose every period is stretched by its own jitter.
+ * Roughness is a stationary process on a lattice of 0.25 mm, so that it holds no wavelength below 0.5 mm (2000
+ * cycles/m): exponential autocorrelation, spectrum falling as the square of the spatial frequency beyond 1/(2 pi
+ * correlation). A weave is added whose every period is stretched by its own jitter.
  */
 #ifndef MECH_PROFILE_H
 #define MECH_PROFILE_H
 
 #include "floor_textures.h"
-#include "rng.h"
+#include "sim_rng.h"
 
 struct mech_profile {
     struct sim_rng rng;

@@ -2,13 +2,13 @@
 
 #include <math.h>
 
-#define PLACE_STEP 0.25e-3  /* m: modes are worked out again when the contact has moved by this */
-#define LEAVE_LARGE 0.5     /* share of the bound at which the closed form is trusted again ... */
+#define PLACE_STEP 0.25e-3   /* m: modes are worked out again when the contact has moved by this */
+#define LEAVE_LARGE 0.5      /* share of the bound at which the closed form is trusted again ... */
 #define LEAVE_VIBRATION 0.25 /* ... and vibration ends, if ... */
 #define LEAVE_LAG 0.75       /* ... that and the lag together are below this */
-#define NEAR_LIMIT 0.5      /* share of the slip-off angle from which on it is looked out for */
-#define CREEP_OVER 1e-7     /* rad */
-#define LEAST_RADIUS 5e-3   /* m: nearer to the exit the mount is touched, not the shaft */
+#define NEAR_LIMIT 0.5       /* share of the slip-off angle from which on it is looked out for */
+#define CREEP_OVER 1e-7      /* rad */
+#define LEAST_RADIUS 5e-3    /* m: nearer to the exit the mount is touched, not the shaft */
 
 struct mech_tolerance mech_tolerance_default(void)
 {
@@ -76,8 +76,8 @@ static bool static_moment(struct mech_shaft *shaft, double radius, double theta,
     if (large)
         return mech_table_moment(shaft->table, &shaft->whisker, radius, theta, &shaft->hold, moment);
     shaft->hold = (struct mech_hold){0};
-    double bending = radius * shaft->whisker.cone /
-                     (3 * mech_whisker_bending(&shaft->whisker) * (shaft->whisker.cone - radius));
+    double bending =
+        radius * shaft->whisker.cone / (3 * mech_whisker_bending(&shaft->whisker) * (shaft->whisker.cone - radius));
     double soft = mech_whisker_compliance(&shaft->whisker);
     *moment = theta / (soft + bending);
     if (soft * *moment > shaft->whisker.stop)

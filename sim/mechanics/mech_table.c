@@ -12,8 +12,8 @@ enum { ANGLE, MOMENT, SLIDE }; /* fields: theta/slope, moment/slope, (arc - x)/s
 #define LEAST_X 0.10
 #define LARGEST_X 0.86
 #define LARGEST_SLOPE 1.75
-#define TABLE_NU 0.6       /* the quadratic in nu runs through -TABLE_NU, 0, TABLE_NU */
-#define WORST_CLOSED 0.05  /* the bound's coefficients hold up to this error */
+#define TABLE_NU 0.6      /* the quadratic in nu runs through -TABLE_NU, 0, TABLE_NU */
+#define WORST_CLOSED 0.05 /* the bound's coefficients hold up to this error */
 #define TINY_SLOPE 1e-9
 
 static const double X_STEP = (LARGEST_X - LEAST_X) / (DISTANCES - 1);
@@ -169,7 +169,8 @@ static void fill_bounds(struct mech_table *table, int i)
         table->curvature[i] = fmax(table->curvature[i], error / (at.theta * at.theta));
         for (int side = -1; side <= 1; side += 2) {
             struct branch rough = branch_at(table, x, slope, side * TABLE_NU, &hold);
-            double more = fabs(closed(x, rough.theta) / rough.moment - 1) - table->curvature[i] * rough.theta * rough.theta;
+            double more =
+                fabs(closed(x, rough.theta) / rough.moment - 1) - table->curvature[i] * rough.theta * rough.theta;
             table->friction[i] = fmax(table->friction[i], more / (TABLE_NU * rough.theta));
         }
     }

@@ -38,9 +38,9 @@ bool mech_table_moment(const mech_table *table, const struct mech_whisker *whisk
                        struct mech_hold *hold, double *moment);
 
 /* How far the closed form can be trusted at a distance, for a whisker of this friction. While the whisker itself bends
- * by an angle b (of the line to the peg, the plug's tilt taken off), the closed form's moment is off by at most the share
- * curvature b^2 + friction b, as long as that is below 5 %: both are the table's worst cases. limit: the angle b at which
- * a frictionless whisker lets go or its moment has its peak, whichever comes first. */
+ * by an angle b (of the line to the peg, the plug's tilt taken off), the closed form's moment is off by at most the
+ * share curvature b^2 + friction b, as long as that is below 5 %: both are the table's worst cases. limit: the angle b
+ * at which a frictionless whisker lets go or its moment has its peak, whichever comes first. */
 struct mech_trust {
     double curvature, friction, limit; /* 1/rad^2, 1/rad, rad */
 };

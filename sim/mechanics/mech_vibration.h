@@ -1,8 +1,8 @@
 /* Vibration about the quasi-static shape: modal coordinates, stepped exactly for an input that is linear over a tick.
  *
  * A whisker is free, with a force at a point s as input, or pinned at s, with the deflection there as input. Pinning
- * couples the free modes through the residual compliance r of what they leave out, K = diag(omega^2) + z z'/r, and turns
- * them into others: coordinates change by a rotation, nothing is lost. With a constant input either comes to rest
+ * couples the free modes through the residual compliance r of what they leave out, K = diag(omega^2) + z z'/r, and
+ * turns them into others: coordinates change by a rotation, nothing is lost. With a constant input either comes to rest
  * at the static solution exactly. This is the model of Boubenec, Shulz and Debregeas 2012 (quasi-static shape plus
  * resonant modes).
  */
@@ -14,7 +14,8 @@
 #include "mech_modes.h"
 
 /* cffi: begin */
-/* Modes under one condition at s. Input u and answer: force (N) and deflection at s (m) if free, the reverse if pinned. */
+/* Modes under one condition at s. Input u and answer: force (N) and deflection at s (m) if free, the reverse if pinned.
+ */
 struct mech_basis {
     bool pinned;
     double s;
@@ -29,11 +30,11 @@ struct mech_basis {
     double tick_s;
     double moment_static; /* base moment per input, at rest */
     double answer_static;
-    double ring_input;    /* bound on the moment's swing per jump of the input's rate */
-    double ring_turn;     /* and per jump of the mount's rate of turn */
-    double lag_moment;    /* bound on the moment's lag per rate of input */
-    double decay;         /* of the slowest mode over a tick */
-    double slack;         /* 1/(1 - damping): envelope of a swing over |position| + |speed|/omega */
+    double ring_input; /* bound on the moment's swing per jump of the input's rate */
+    double ring_turn;  /* and per jump of the mount's rate of turn */
+    double lag_moment; /* bound on the moment's lag per rate of input */
+    double decay;      /* of the slowest mode over a tick */
+    double slack;      /* 1/(1 - damping): envelope of a swing over |position| + |speed|/omega */
 };
 
 struct mech_motion {

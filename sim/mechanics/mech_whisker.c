@@ -2,7 +2,7 @@
 
 #include <math.h>
 
-#include "rng.h"
+#include "sim_rng.h"
 #include "whisker_constants.h"
 
 /* Ranges are those of the sources quoted in whisker_constants.h; every one is an assumption, none is measured. */

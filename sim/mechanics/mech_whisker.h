@@ -43,9 +43,9 @@ struct mech_whisker mech_whisker_draw(uint64_t seed, uint32_t number);
 /* The list of unknowns, count of them in *count. */
 const struct mech_unknown *mech_unknowns(size_t *count);
 
-double mech_whisker_bending(const struct mech_whisker *whisker);        /* E I0, N m^2 */
-double mech_whisker_compliance(const struct mech_whisker *whisker);     /* of the plug, 1/k, rad/(N m); 0 if clamped */
-double mech_whisker_tip_stiffness(const struct mech_whisker *whisker);  /* against a normal force at the tip, N/m */
+double mech_whisker_bending(const struct mech_whisker *whisker);       /* E I0, N m^2 */
+double mech_whisker_compliance(const struct mech_whisker *whisker);    /* of the plug, 1/k, rad/(N m); 0 if clamped */
+double mech_whisker_tip_stiffness(const struct mech_whisker *whisker); /* against a normal force at the tip, N/m */
 double mech_whisker_field(const struct mech_whisker *whisker, double tilt); /* field angle of a tilt, same sign */
 
 /* Field angles of a tilt in two planes at once: the magnet turns in the plane of the two. */

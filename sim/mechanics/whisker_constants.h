@@ -30,11 +30,11 @@
 /* Plug, magnet and sensor. */
 #define SIM_PLUG_KAPPA 1.0              /* [A] k Lc / (3 E I0): plug as stiff as the whisker */
 #define SIM_PLUG_STOP (15 * SIM_DEGREE) /* [A] */
-#define SIM_MAGNET_PIVOT_M 3e-3 /* [A] from the plug's pivot down to the magnet's centre */
-#define SIM_MAGNET_GAP_M 2e-3   /* [A] from there down to the sensor: the paper's 0.75 mm, half a magnet, the chip */
-#define SIM_FIELD_GAIN 2.75         /* [D] field angle per tilt: magnet 3 mm under the pivot, sensor 2 mm below it */
-#define SIM_FIELD_NOISE_DEG 0.03    /* [A] white, per axis and sample */
-#define SIM_FIELD_DRIFT_DEG 0.05    /* [A] slow drift stays within it ... */
+#define SIM_MAGNET_PIVOT_M 3e-3         /* [A] from the plug's pivot down to the magnet's centre */
+#define SIM_MAGNET_GAP_M 2e-3    /* [A] from there down to the sensor: the paper's 0.75 mm, half a magnet, the chip */
+#define SIM_FIELD_GAIN 2.75      /* [D] field angle per tilt: magnet 3 mm under the pivot, sensor 2 mm below it */
+#define SIM_FIELD_NOISE_DEG 0.03 /* [A] white, per axis and sample */
+#define SIM_FIELD_DRIFT_DEG 0.05 /* [A] slow drift stays within it ... */
 #define SIM_FIELD_DRIFT_MIN_S 120.0 /* [A] ... and takes minutes */
 #define SIM_FIELD_DRIFT_MAX_S 300.0 /* [A] */
 

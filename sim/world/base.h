@@ -4,7 +4,7 @@
 
 #include <stdint.h>
 
-#include "rng.h"
+#include "sim_rng.h"
 #include "sim_scene.h"
 
 #define SIM_BASE_WHEEL_LIMIT 0.5 /* m/s: the Create's limit for each wheel */

@@ -11,7 +11,7 @@
 #define SIM_OBJECT_WHISKER_H
 
 #include "arena.h"
-#include "rng.h"
+#include "sim_rng.h"
 #include "sim_world.h"
 
 struct sim_object_whisker {

@@ -4,8 +4,8 @@
 
 #include <stdint.h>
 
-#include "rng.h"
 #include "sim_field.h"
+#include "sim_rng.h"
 
 struct sim_sensor_noise {
     struct sim_rng rng;

@@ -9,8 +9,8 @@
 
 #include "arena.h"
 #include "floor_textures.h"
-#include "rng.h"
 #include "sim_field.h"
+#include "sim_rng.h"
 
 struct sim_texture_whisker {
     struct sim_whisker mount;

@@ -48,7 +48,8 @@ static void test_closed_form_table(void **state)
 {
     (void)state;
     const double theta = 5 * SIM_DEGREE;
-    struct mech_whisker clamped = with_kappa(INFINITY), one = with_kappa(1), three = with_kappa(3), soft = with_kappa(0.3);
+    struct mech_whisker clamped = with_kappa(INFINITY), one = with_kappa(1), three = with_kappa(3),
+                        soft = with_kappa(0.3);
     for (size_t i = 0; i < COUNT(TABLE); i++) {
         double a = TABLE[i].a_mm * 1e-3;
         assert_near(mech_static_moment(&clamped, a, theta) * 1e6, TABLE[i].moment_unm, 0.6e-4);

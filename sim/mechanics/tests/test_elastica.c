@@ -57,8 +57,8 @@ static double swept_to(const struct mech_whisker *w, double a, double theta)
 static const struct {
     double theta_deg, a_mm, small_unm, moment_unm, arc_mm, force_mn;
 } TABLE[] = {
-    {5, 90, 524.623, 521.529, 90.136, 5.81662},     {10, 90, 1049.246, 1024.307, 90.553, 11.55783},
-    {10, 110, 671.319, 646.151, 110.877, 6.02778},  {10, 120, 529.596, 503.142, 121.125, 4.34531},
+    {5, 90, 524.623, 521.529, 90.136, 5.81662},    {10, 90, 1049.246, 1024.307, 90.553, 11.55783},
+    {10, 110, 671.319, 646.151, 110.877, 6.02778}, {10, 120, 529.596, 503.142, 121.125, 4.34531},
     {5, 140, 153.444, 149.510, 140.475, 1.08829},
 };
 
@@ -113,13 +113,14 @@ static double slip_off(const struct mech_whisker *w, double a, double *peak, dou
     return theta / SIM_DEGREE;
 }
 
-/* The source traced these with steps of its own: 38 degrees stands for its 37-39, and so on; its last two columns are up
- * to 0.25 degrees beyond where the exact elastica's contact reaches 140 mm (10.18 and 7.29 degrees, clamped). */
+/* The source traced these with steps of its own: 38 degrees stands for its 37-39, and so on; its last two columns are
+ * up to 0.25 degrees beyond where the exact elastica's contact reaches 140 mm (10.18 and 7.29 degrees, clamped). */
 static const struct {
     double a_mm, clamped_deg, plug_deg, peak_unm, peak_deg;
 } SLIP[] = {
-    {90, 38, 0, 2406, 32.0},    {100, 33.7, 0, 1720, 28.2},    {110, 29.3, 39, 1205, 24.7}, {120, 25.0, 31.4, 819, 21.0},
-    {130, 20.5, 24.8, 531, 17.6}, {135, 15.6, 19.7, 418, 15.6}, {138, 10.4, 13.4, 303, 10.4}, {139, 7.5, 9.6, 222, 7.5},
+    {90, 38, 0, 2406, 32.0},      {100, 33.7, 0, 1720, 28.2},   {110, 29.3, 39, 1205, 24.7},
+    {120, 25.0, 31.4, 819, 21.0}, {130, 20.5, 24.8, 531, 17.6}, {135, 15.6, 19.7, 418, 15.6},
+    {138, 10.4, 13.4, 303, 10.4}, {139, 7.5, 9.6, 222, 7.5},
 };
 
 static void test_slip_off_table(void **state)
@@ -167,7 +168,8 @@ static void test_table_is_the_elastica(void **state)
     }
 }
 
-/* The stated bound holds wherever it is below 5 % (within the table's own 5e-5), and is not idle: somewhere it is near. */
+/* The stated bound holds wherever it is below 5 % (within the table's own 5e-5), and is not idle: somewhere it is near.
+ */
 static void test_bound_on_the_closed_form(void **state)
 {
     (void)state;
@@ -232,9 +234,12 @@ static void test_stop(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_elastica_table),           cmocka_unit_test(test_friction_table),
-        cmocka_unit_test(test_slip_off_table),           cmocka_unit_test(test_table_is_the_elastica),
-        cmocka_unit_test(test_bound_on_the_closed_form), cmocka_unit_test(test_friction_keeps_energy),
+        cmocka_unit_test(test_elastica_table),
+        cmocka_unit_test(test_friction_table),
+        cmocka_unit_test(test_slip_off_table),
+        cmocka_unit_test(test_table_is_the_elastica),
+        cmocka_unit_test(test_bound_on_the_closed_form),
+        cmocka_unit_test(test_friction_keeps_energy),
         cmocka_unit_test(test_stop),
     };
     return cmocka_run_group_tests(tests, make_table, drop_table);

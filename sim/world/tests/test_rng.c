@@ -5,8 +5,8 @@
 
 #include <cmocka.h>
 
-#include "rng.h"
 #include "robot.h"
+#include "sim_rng.h"
 
 static void test_equal_names_equal_streams(void **state)
 {

@@ -1,4 +1,4 @@
-#include "rng.h"
+#include "sim_rng.h"
 
 #include <math.h>
 
