@@ -54,10 +54,11 @@ static void serve(struct dspic *chip, unsigned channel)
         end_block(chip, channel);
 }
 
-static void serve_all(struct dspic *chip, unsigned irq)
+static void serve_all(struct dspic *chip, unsigned irq, uint64_t raised_fs)
 {
     for (unsigned c = 0; c < DMA_CHANNELS; c++) {
-        if (*reg(chip, c, DMA0CON) & DMACON_CHEN && (*reg(chip, c, DMA0REQ) & 0x7Fu) == irq && irq != 0)
+        const bool its = (*reg(chip, c, DMA0REQ) & 0x7Fu) == irq && irq != 0 && chip->dma[c].enabled_fs <= raised_fs;
+        if (*reg(chip, c, DMA0CON) & DMACON_CHEN && its)
             serve(chip, c);
     }
 }
@@ -75,22 +76,22 @@ static bool wanted(const struct dspic *chip, unsigned irq)
 void dma_request(struct dspic *chip, unsigned irq)
 {
     if (chip->parameters.dma_cycles == 0) {
-        serve_all(chip, irq);
+        serve_all(chip, irq, chip->now_fs);
     } else if (chip->requested < sizeof chip->requests / sizeof *chip->requests && wanted(chip, irq)) {
         const uint64_t at = chip->now_fs + chip->parameters.dma_cycles * chip->cycle_fs;
-        chip->requests[chip->requested++] = (struct request){at, (uint8_t)irq};
+        chip->requests[chip->requested++] = (struct request){chip->now_fs, at, (uint8_t)irq};
         plan_event(chip, EVENT_DMA, chip->requests[0].at_fs);
     }
 }
 
 void dma_event(struct dspic *chip)
 {
-    const unsigned irq = chip->requests[0].irq;
+    const struct request first = chip->requests[0];
     chip->requested--;
     memmove(chip->requests, chip->requests + 1, chip->requested * sizeof *chip->requests);
     if (chip->requested > 0)
         plan_event(chip, EVENT_DMA, chip->requests[0].at_fs);
-    serve_all(chip, irq);
+    serve_all(chip, first.irq, first.raised_fs);
 }
 
 /* Enabling begins a block anew; FORCE asks for one item at once. */
@@ -99,7 +100,7 @@ void dma_wrote(struct dspic *chip, unsigned address, uint16_t old)
     const unsigned channel = (address - DMA0CON) / DMA_STRIDE, at = (address - DMA0CON) % DMA_STRIDE;
     const uint16_t now = *sfr(chip, address);
     if (at == DMA0CON - DMA0CON && now & ~old & DMACON_CHEN)
-        chip->dma[channel] = (struct dma){0};
+        chip->dma[channel] = (struct dma){.enabled_fs = chip->now_fs};
     if (at == DMA0REQ - DMA0CON && now & DMAREQ_FORCE) {
         *sfr(chip, address) = now & (uint16_t)~DMAREQ_FORCE;
         if (*reg(chip, channel, DMA0CON) & DMACON_CHEN)

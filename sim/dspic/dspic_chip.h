@@ -41,13 +41,14 @@ struct timer {
 };
 
 struct request {
-    uint64_t at_fs;
+    uint64_t raised_fs, at_fs;
     uint8_t irq;
 };
 
 struct dma {
-    uint16_t done; /* transfers of the present block */
-    bool second;   /* ping-pong: in block B */
+    uint64_t enabled_fs; /* older requests are not this block's */
+    uint16_t done;       /* transfers of the present block */
+    bool second;         /* ping-pong: in block B */
 };
 
 struct dspic {

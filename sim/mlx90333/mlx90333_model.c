@@ -150,12 +150,13 @@ static bool check_byte_start(struct mlx90333 *sensor, uint64_t now_ns)
 {
     const uint64_t gap = now_ns - (sensor->fresh ? sensor->select_ns : sensor->fall_ns);
     const uint32_t least = sensor->fresh ? sensor->t6 : sensor->byte == 1 ? sensor->t7 : sensor->t2;
-    require(sensor, gap >= least,
+    const bool kept = gap >= least || (sensor->byte == 0 && !sensor->fresh); /* a frame may follow at any time (A) */
+    require(sensor, kept,
             sensor->fresh       ? MLX90333_SELECT_LOW
             : sensor->byte == 1 ? MLX90333_START_GAP
                                 : MLX90333_BYTE_GAP);
     sensor->fresh = false;
-    return gap >= least;
+    return kept;
 }
 
 /* A rising edge shifts the next bit out. */

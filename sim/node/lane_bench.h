@@ -35,6 +35,8 @@ struct lane_verdict {
     uint16_t alpha, beta;
     bool good;    /* accepted, status zero: the host uses it */
     bool altered; /* good, and yet not what the field was at that tick's SYNC */
+    uint64_t
+        line; /* the newest 64 bits of the sensor's line at the SYNC after: that tick's frame, if it was read whole */
 };
 
 /* Something done to the node at a time. */
@@ -64,6 +66,7 @@ struct lane_bench {
     unsigned tick;              /* the present one */
     struct sim_field fields[2]; /* of the ticks with an even and an odd number */
     struct lane_faults faults;
+    uint64_t line;   /* of the sensor, at this tick's SYNC */
     uint64_t record; /* bits of it as the bridge read them */
     struct lane_event events[LANE_EVENTS];
     unsigned planned, done;

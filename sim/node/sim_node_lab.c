@@ -101,5 +101,6 @@ struct sim_node_report sim_node_report(const sim_node *node)
                                     .armed_fs = node->armed_fs,
                                     .busy_fs = dspic_busy_fs(node->chip),
                                     .interrupts = dspic_interrupts(node->chip),
-                                    .fcy_hz = dspic_fcy_hz(node->chip)};
+                                    .fcy_hz = dspic_fcy_hz(node->chip),
+                                    .overwritten = dspic_violations(node->chip).spi_overwrite};
 }

@@ -60,6 +60,7 @@ struct sim_node_report {
     uint64_t busy_fs;  /* spent in interrupts */
     uint64_t interrupts;
     uint32_t fcy_hz;
+    uint32_t overwritten; /* words of an SPI module that another took the place of; also among the violations */
 };
 struct sim_node_report sim_node_report(const sim_node *node);
 

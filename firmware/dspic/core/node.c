@@ -100,13 +100,19 @@ void node_on_transfer_end(struct node *node)
     node->ordered = false;
 }
 
+/* A reading ends long after its tick's order: an order that finds a good one belongs to a SYNC that was missed. */
+static bool is_complete(const struct sensor_reading *reading)
+{
+    return reading->status >> WHISKER_STATUS_CODE_SHIFT == WHISKER_CODE_OK;
+}
+
 void node_on_order(struct node *node, const uint16_t words[LINK_WORDS])
 {
     struct order order;
     const bool whole = order_parse(words, &order);
     if (!whole)
         count(node, WHISKER_HEALTH_ORDER_CRC);
-    else if (!node->numbered)
+    else if (!node->numbered && !is_complete(&node->reading))
         node->tick = order.tick;
     node->numbered = true;
     node->ordered = true;

@@ -30,10 +30,11 @@ static bool sum_is_right(const uint8_t *frame, uint16_t error_word)
 {
     const uint8_t *data = frame + MLX90333_FRAME_ALPHA;
     const uint8_t sum = frame[MLX90333_FRAME_SUM];
+    if ((error_word & ~ASSIGNED_ERRORS) != 0)
+        return false;
     if (sum == sum_of(data, MLX90333_FRAME_SUM - MLX90333_FRAME_ALPHA))
         return true;
-    return error_word != 0 && (error_word & ~ASSIGNED_ERRORS) == 0 &&
-           sum == sum_of(data, MLX90333_FRAME_ERRORS - MLX90333_FRAME_ALPHA);
+    return error_word != 0 && sum == sum_of(data, MLX90333_FRAME_ERRORS - MLX90333_FRAME_ALPHA);
 }
 
 static bool all_ones(const uint8_t *frame)

@@ -26,14 +26,14 @@ static inline struct sensor_reading sensor_reading_of_code(uint8_t code)
  *
  * MLX90333: all ones is a sensor that does not answer, a wrong first byte a line
  * stuck low (all zeros has the right sum: both checks are needed). The sum covers bytes 1 to 6. Whether the error word
- * is part of it is not confirmed, so with errors set a sum over bytes 1 to 4 passes too; but then only with assigned
- * error bits, so that a flipped bit is never taken for a good frame.
+ * is part of it is not confirmed, so with errors set a sum over bytes 1 to 4 passes too. A bit that is not assigned is
+ * a flipped one: no frame with such a bit passes, else it and a flip in the data could make up for each other.
  *
  * MLX90316: one angle, which becomes alpha; beta is at rest. The data must equal its inverted copy; the first byte on
  * the shared line is the master's own. */
 struct sensor_reading sensor_frame_decode(const uint8_t frame[SENSOR_FRAME_BYTES]);
 
-/* The sensor's 16-bit error word as WHISKER_ERROR_* bits 9..0; bits that are not assigned are dropped. */
+/* The assigned bits of the sensor's 16-bit error word as WHISKER_ERROR_* bits 9..0. */
 uint16_t sensor_frame_errors(uint16_t word);
 
 #endif

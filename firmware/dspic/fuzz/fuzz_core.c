@@ -25,6 +25,7 @@ static void check_frame(const uint8_t *frame)
         return;
     }
     demand(frame[MLX90333_FRAME_START] == MLX90333_START_BYTE);
+    demand((reading.status == 0) == (whisker_get_u16(frame + MLX90333_FRAME_ERRORS) == 0));
     demand(reading.alpha == whisker_get_u16(frame + MLX90333_FRAME_ALPHA));
     demand(reading.beta == whisker_get_u16(frame + MLX90333_FRAME_BETA));
 }

@@ -50,9 +50,11 @@ static unsigned reference_code(const uint8_t frame[8])
         errors += field_of(frame, i, 8);
     const unsigned sum = field_of(frame, 7, 8);
     const unsigned word = field_of(frame, 5, 16);
+    if ((word & 0x7403u) != 0)
+        return WHISKER_CODE_SENSOR_SUM;
     if (sum == (angles + errors) % 256)
         return WHISKER_CODE_OK;
-    if (word != 0 && (word & 0x7403u) == 0 && sum == angles % 256)
+    if (word != 0 && sum == angles % 256)
         return WHISKER_CODE_OK;
     return WHISKER_CODE_SENSOR_SUM;
 }

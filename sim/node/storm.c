@@ -1,0 +1,257 @@
+#include "storm.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#include "lane_bench.h"
+#include "mlx90333_datasheet.h"
+#include "whisker_protocol.h"
+
+enum { SETTLED = 3, MOST_FAULTS = 3, SPREAD = 4 };
+
+#define WEIGHT(name, weight) (weight),
+static const unsigned WEIGHTS[] = {STORM_KINDS(WEIGHT)};
+#undef WEIGHT
+
+const char *storm_kind_name(enum storm_kind kind)
+{
+#define NAME(name, weight) #name,
+    static const char *const NAMES[] = {STORM_KINDS(NAME)};
+#undef NAME
+    return NAMES[kind];
+}
+
+struct storm {
+    struct storm_counts counts;
+    struct lane_bench bench;
+    uint64_t random;
+    struct sim_field field;
+    unsigned faults_left;      /* of the present schedule */
+    unsigned wait;             /* ticks to the next fault */
+    unsigned good;             /* records in a row */
+    unsigned since;            /* ticks since the last fault */
+    enum storm_kind last_kind; /* what alterations are put down to */
+    enum sim_node_disturbance end;
+    unsigned end_in; /* ticks until what is off comes on */
+    bool link_flips; /* of the present tick's record */
+    bool doubled;    /* SYNC, in the tick before: with the next one missing it would be one that is merely early */
+};
+
+/* splitmix64 (Steele, Lea, Flood 2014). */
+static uint64_t draw(struct storm *s)
+{
+    uint64_t z = s->random += UINT64_C(0x9E3779B97F4A7C15);
+    z = (z ^ z >> 30) * UINT64_C(0xBF58476D1CE4E5B9);
+    z = (z ^ z >> 27) * UINT64_C(0x94D049BB133111EB);
+    return z ^ z >> 31;
+}
+
+static uint32_t below(struct storm *s, uint32_t n)
+{
+    return (uint32_t)((draw(s) >> 32) * n >> 32);
+}
+
+static bool coin(struct storm *s)
+{
+    return draw(s) >> 63;
+}
+
+static enum storm_kind any_kind(struct storm *s)
+{
+    unsigned sum = 0, kind = 0;
+    for (unsigned k = 0; k < STORM_KIND_COUNT; k++)
+        sum += WEIGHTS[k];
+    for (unsigned at = below(s, sum); at >= WEIGHTS[kind]; kind++)
+        at -= WEIGHTS[kind];
+    return (enum storm_kind)kind;
+}
+
+static uint64_t bits(struct storm *s, unsigned count)
+{
+    uint64_t set = 0;
+    while (count-- > 0)
+        set |= UINT64_C(1) << below(s, 64);
+    return set;
+}
+
+#define ASSIGNED(name, bit, sensor_bit, cause, remedy) | 1u << (sensor_bit)
+#define ASSIGNED_ERRORS (0u WHISKER_SENSOR_ERRORS(ASSIGNED))
+
+/* Faults of the sensor and its line. */
+static void break_sensor(struct storm *s, enum storm_kind kind, struct lane_faults *f)
+{
+    static const uint8_t FAULT[] = {SIM_SENSOR_FLIP_BIT,   SIM_SENSOR_FLIP_TWO,   SIM_SENSOR_NOISY,
+                                    SIM_SENSOR_FLOATING,   SIM_SENSOR_DEAD,       SIM_SENSOR_STUCK_LOW,
+                                    SIM_SENSOR_ERROR_BITS, SIM_SENSOR_LOST_CLOCK, SIM_SENSOR_EXTRA_CLOCK};
+    f->sensor = (enum sim_sensor_fault)FAULT[kind];
+    f->sensor_argument = below(s, 64);
+    if (kind == STORM_FLIP_TWO)
+        f->sensor_argument |= (f->sensor_argument + 1u + below(s, 63)) % 64u << 8;
+    if (kind == STORM_NOISY)
+        f->sensor_argument = 1024u << below(s, 5);
+    if (kind == STORM_ERROR_BITS)
+        f->sensor_argument = (uint32_t)draw(s) & ASSIGNED_ERRORS;
+}
+
+/* Faults of the link and its timing. */
+static void break_link(struct storm *s, enum storm_kind kind, struct lane_faults *f)
+{
+    f->no_sync = kind == STORM_NO_SYNC;
+    f->no_select = kind == STORM_NO_SELECT;
+    f->select_stays = kind == STORM_SELECT_STAYS;
+    f->second_sync_ns = kind == STORM_SECOND_SYNC ? 4000u + below(s, 490000) : 0u;
+    f->shift_ns = kind == STORM_SHIFT ? (int32_t)below(s, 600000) - 300000 : 0;
+    f->mosi_flips = kind == STORM_MOSI_FLIPS ? bits(s, 1u + below(s, 8)) : 0u;
+    f->miso_flips = kind == STORM_MISO_FLIPS ? bits(s, 1u + below(s, 8)) : 0u;
+    f->extra_clocks = kind == STORM_CLOCKS ? (int32_t)below(s, 105) - 64 : 0;
+    f->glitch_bit = (uint8_t)(kind == STORM_GLITCH ? 1u + below(s, 63) : 0u);
+    f->miso_stuck = kind == STORM_MISO_STUCK;
+    f->mosi_stuck = kind == STORM_MOSI_STUCK;
+    f->miso_level = f->mosi_level = coin(s);
+}
+
+static void disturb(struct storm *s, struct lane_faults *f, enum sim_node_disturbance what, unsigned argument)
+{
+    f->disturbance = what;
+    f->disturbance_argument = argument;
+    f->disturbance_ns = below(s, 500000);
+}
+
+static void break_chip(struct storm *s, enum storm_kind kind, struct lane_faults *f)
+{
+    static const uint16_t CAUSES[] = {RCON_BOR, RCON_EXTR, RCON_IOPUWR, RCON_SWR};
+    switch (kind) {
+    case STORM_UNREAD:
+        disturb(s, f, SIM_NODE_UNREAD, 1u + below(s, 2));
+        break;
+    case STORM_RESET:
+        disturb(s, f, SIM_NODE_RESET, CAUSES[below(s, 4)]);
+        break;
+    case STORM_TRAP:
+        disturb(s, f, SIM_NODE_TRAP, below(s, 5));
+        break;
+    case STORM_COLLISION:
+        disturb(s, f, SIM_NODE_COLLISION, below(s, 2) + 256u * coin(s));
+        break;
+    case STORM_HANG:
+        disturb(s, f, SIM_NODE_HANG, 0);
+        break;
+    case STORM_SENSOR_OFF:
+    case STORM_DARK:
+        disturb(s, f, kind == STORM_DARK ? SIM_NODE_DARK : SIM_NODE_SENSOR_OFF, 0);
+        s->end = kind == STORM_DARK ? SIM_NODE_LIGHT : SIM_NODE_SENSOR_ON;
+        s->end_in = 1u + below(s, 8);
+        break;
+    default:
+        break;
+    }
+}
+
+static void strike(struct storm *s, struct lane_faults *f)
+{
+    const enum storm_kind kind = any_kind(s);
+    s->counts.kinds[kind].injected++;
+    s->last_kind = kind;
+    s->since = 0;
+    if (kind <= STORM_EXTRA_CLOCK)
+        break_sensor(s, kind, f);
+    else if (kind <= STORM_MOSI_STUCK)
+        break_link(s, kind, f);
+    else
+        break_chip(s, kind, f);
+}
+
+/* A whisker's angle: never twice the same, never further in a tick than a whisker can move. */
+static double walk(struct storm *s, double angle_deg)
+{
+    const double by = 0.1 + 7.9 * (double)below(s, 1u << 20) / (1u << 20);
+    const double to = coin(s) ? angle_deg + by : angle_deg - by;
+    return to > 60.0 || to < -60.0 ? angle_deg - (to - angle_deg) : to;
+}
+
+static bool plan(void *context, unsigned tick, struct sim_field *field, struct lane_faults *faults)
+{
+    struct storm *s = context;
+    (void)tick;
+    s->field = (struct sim_field){walk(s, s->field.alpha_deg), walk(s, s->field.beta_deg)};
+    *field = s->field;
+    s->since++;
+    if (s->end_in > 0) {
+        if (--s->end_in == 0) {
+            faults->disturbance = s->end;
+            s->since = 0;
+        }
+        return true; /* nothing more breaks while something is off */
+    }
+    if (s->faults_left > 0 && s->wait-- == 0) {
+        strike(s, faults);
+        s->faults_left--;
+        s->wait = below(s, SPREAD);
+    } else if (s->faults_left == 0 && s->good >= SETTLED && s->since > SETTLED) {
+        s->counts.schedules++;
+        s->faults_left = 1u + below(s, MOST_FAULTS);
+        s->wait = below(s, SPREAD);
+    }
+    faults->no_sync &= !s->doubled;
+    s->doubled = faults->second_sync_ns > 0;
+    s->link_flips = faults->miso_flips != 0;
+    s->counts.stuck += s->since > STORM_PATIENCE;
+    return s->counts.schedules <= STORM_SCHEDULES && s->since <= STORM_PATIENCE;
+}
+
+/* The checks once more, told apart from the firmware's: on the bits that came down the line. */
+static bool line_looks_good(uint64_t line)
+{
+    unsigned byte[8], sum = 0;
+    for (unsigned i = 0; i < 8; i++)
+        byte[i] = (unsigned)(line >> (56u - 8u * i)) & 0xFFu;
+    for (unsigned i = 1; i <= 6; i++)
+        sum += byte[i];
+    return byte[0] == 0xFFu && byte[5] == 0 && byte[6] == 0 && (sum & 0xFFu) == byte[7];
+}
+
+static void judged(void *context, unsigned tick, const struct lane_verdict *v)
+{
+    struct storm *s = context;
+    s->counts.ticks++;
+    if (tick == 0)
+        return;
+    s->counts.bad += !v->good;
+    s->counts.spurious += !v->good && s->good >= SETTLED && s->since > SETTLED;
+    s->good = v->good && !v->altered ? s->good + 1u : 0u;
+    if (!v->altered)
+        return;
+    s->counts.kinds[s->last_kind].altered++;
+    if (s->link_flips || line_looks_good(v->line))
+        s->counts.missed++;
+    else
+        s->counts.unexplained++;
+}
+
+static struct sim_node_parameters any_parts(struct storm *s)
+{
+    struct sim_node_parameters parts;
+    sim_node_parameters_default(&parts, draw(s));
+    parts.chip.slave_prefetch = (uint8_t)(1u + below(s, 2));
+    parts.chip.dma_cycles = (uint8_t)below(s, 13);
+    parts.chip.frc_ppm = (int32_t)below(s, 40001) - 20000;
+    parts.sensor.slow_permille = (uint16_t)(900u + below(s, 201));
+    return parts;
+}
+
+struct storm_counts storm_batch(uint64_t seed)
+{
+    struct storm s = {.random = seed * UINT64_C(0xD1342543DE82EF95) + 1u};
+    const struct sim_node_parameters parts = any_parts(&s);
+    sim_node *node = sim_node_new_as(&parts);
+    if (!node)
+        return s.counts;
+    sim_node_power_on(node);
+    lane_bench_start(&s.bench, node, lane_timing_of(16, 180, WHISKER_LIMIT_TICK_PERIOD));
+    lane_bench_run(&s.bench, &(struct lane_world){&s, plan, judged});
+    s.counts.schedules -= s.counts.schedules > STORM_SCHEDULES;
+    /* A transfer displaced in time may meet the link's arming, and then words. */
+    s.counts.violations = sim_node_violations(node) - sim_node_report(node).overwritten;
+    sim_node_free(node);
+    return s.counts;
+}
