@@ -1,7 +1,7 @@
 /*
  * libFuzzer target: shared memory full of anything cannot crash a reader, nor lead it out of its own mapping, nor a
- * writer that finds it under its ring's name. Input: one byte of choices, the header, then what the reader does and
- * what another process writes into the memory meanwhile, in steps of five bytes.
+ * writer that finds it under its ring's name. Input: one byte of choices, one for the header's length (in fours),
+ * the header, then what the reader does and what another process writes meanwhile, in steps of five bytes.
  */
 #include <fcntl.h>
 #include <stdio.h>
@@ -118,12 +118,14 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         prepare();
         atexit(remove_file);
     }
-    if (size < 1) {
+    if (size < 2) {
         return 0;
     }
-    const uint8_t choices = *data++;
-    size--;
-    const size_t header = size < HEADER_BYTES ? size : HEADER_BYTES;
+    const uint8_t choices = data[0];
+    const size_t asked = data[1] * 4u;
+    data += 2;
+    size -= 2;
+    const size_t header = size < asked ? size : asked;
     memset(memory, 0, HEADER_BYTES);
     memcpy(memory, data, header);
     mend_header(choices);

@@ -35,8 +35,8 @@ fn subscribe(
     }
 }
 
-fn main() -> Result<(), Box<dyn Error>> {
-    set_log_level(LogLevel::Error);
+/// The exit code, when all that lies in shared memory has been let go.
+fn run() -> Result<i32, Box<dyn Error>> {
     let mut bench = Bench::from_args();
     let node = NodeBuilder::new().create::<ipc::Service>()?;
     let frames = node
@@ -55,7 +55,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     if !bench.publishes() {
         let subscriber = frames.subscriber_builder().buffer_size(BUFFER).create()?;
         let listener = events.listener_builder().create()?;
-        std::process::exit(subscribe(&mut bench, subscriber, listener)?);
+        return subscribe(&mut bench, subscriber, listener);
     }
     let publisher = frames.publisher_builder().create()?;
     let notifier = events.notifier_builder().create()?;
@@ -67,5 +67,10 @@ fn main() -> Result<(), Box<dyn Error>> {
             let _ = notifier.notify(); // a listener that has enough events is awake
         }
     }
-    std::process::exit(bench.finish());
+    Ok(bench.finish())
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    set_log_level(LogLevel::Error);
+    std::process::exit(run()?);
 }
