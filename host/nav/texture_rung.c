@@ -70,10 +70,11 @@ static bool make_projections(struct nav_texture_rung *r)
         return false;
     struct nav_rng rng;
     nav_rng_seed(&rng, r->n.seed, 0);
-    for (size_t i = 0; i < f * h; i++)
-        r->projection[i] = nav_rng_normal(&rng) / sqrt((double)f);
-    for (size_t i = 0; i < h; i++)
+    for (size_t i = 0; i < h; i++) { /* unit by unit: fewer units are the first of more */
         r->threshold[i] = nav_rng_normal(&rng);
+        for (size_t j = 0; j < f; j++)
+            r->projection[j * h + i] = nav_rng_normal(&rng) / sqrt((double)f);
+    }
     return true;
 }
 

@@ -1,4 +1,4 @@
-"""Floor texture: the stationary naive Bayes classifier (paper, equation 1) with its training, files and recordings."""
+"""Floor texture: the stationary naive Bayes classifier (paper, equation 1), recordings, and decisions of any model."""
 
 import json
 from dataclasses import dataclass
@@ -8,12 +8,19 @@ import numpy as np
 
 from .native import doubles, ffi, lib
 from .tables import TableError, numbers, read_columns
+from .texture_spectral import FORMAT as SPECTRAL_FORMAT
+from .texture_spectral import SpectralModel
 
 FORMAT = "whisker texture model 1"
 BINS = 64
 PSEUDO = 1.0  # Laplace: one sample more in every bin
 TAIL = 0.0005  # share of the training samples on each side that the range leaves to the end bins
 TEMPER = 0.05  # 200 samples of 100 ms are worth 2-20 independent ones (whisker_physics section 7)
+SURE = 0.99  # posterior at which a sequential decision of equation 1 stops ...
+LOOKS = 8  # ... looking so often in a window ...
+PATIENCE = 4  # ... and giving up after so many windows
+GAP_PERIODS = 4.0  # a longer step of the time column is a gap: no window reaches across it
+RATES_APART = 0.1  # relative: recordings to be learnt together are sampled alike
 
 
 class TextureModel:
@@ -70,8 +77,12 @@ class TextureModel:
     @classmethod
     def load(cls, path) -> "TextureModel":
         """Read what `save` wrote; TableError with one line when it is something else."""
+        return cls.from_json(path, read_json(path))
+
+    @classmethod
+    def from_json(cls, path, content: dict) -> "TextureModel":
+        """What `save` wrote, parsed; TableError with one line when it is something else."""
         try:
-            content = json.loads(Path(path).read_text())
             if content["format"] != FORMAT:
                 raise ValueError(f"format is '{content['format']}'")
             table = np.array(content["loglik"], dtype=np.float64)
@@ -81,10 +92,32 @@ class TextureModel:
             if not all(np.isfinite(part).all() for part in (table, *edges)):
                 raise ValueError("a number is not finite")
             return cls(content["classes"], *edges, table)
-        except (OSError, ValueError, KeyError, TypeError, IndexError) as error:
-            raise TableError(
-                path, None, f"not a texture model ({error!r}); make one with 'whisker texture train'"
-            ) from error
+        except (ValueError, KeyError, TypeError, IndexError) as error:
+            raise _no_model(path, error) from error
+
+    @property
+    def channels(self) -> int:
+        return len(self.low)
+
+
+def _no_model(path, error: Exception) -> TableError:
+    return TableError(path, None, f"not a texture model ({error!r}); make one with 'whisker texture train'")
+
+
+def read_json(path) -> dict:
+    """A model file's content; TableError with one line when it is no JSON."""
+    try:
+        return json.loads(Path(path).read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise _no_model(path, error) from error
+
+
+def load(path) -> "TextureModel | SpectralModel":
+    """A model of either method, as its format says."""
+    content = read_json(path)
+    if isinstance(content, dict) and content.get("format") == SPECTRAL_FORMAT:
+        return SpectralModel.from_json(path, content)
+    return TextureModel.from_json(path, content)
 
 
 @dataclass
@@ -104,11 +137,43 @@ def posterior(loglik: np.ndarray, temper: float = TEMPER) -> np.ndarray:
     return weight / weight.sum()
 
 
-def classify(model: TextureModel, t_s: np.ndarray, samples: np.ndarray, window_ms: float = 100.0) -> list[Decision]:
-    """Decide window by window: t_s (n,), samples (n, axes); a last, shorter window is left out."""
-    length = max(2, round(window_ms / 1000.0 / sample_period(t_s)))
-    starts = range(0, len(samples) - length + 1, length)
-    return [_decide(model, float(t_s[s + length - 1]), samples[s : s + length]) for s in starts]
+def classify(model, t_s: np.ndarray, samples: np.ndarray, window_ms: float = 100.0, sequential=False) -> list[Decision]:
+    """Decide window by window, or as soon as sure: t_s (n,), samples (n, axes) of raw counts.
+
+    A last, shorter window is left out, and none reaches across a gap of the time column.
+    """
+    period = sample_period(t_s)
+    length = max(2, round(window_ms / 1000.0 / period))
+    steps = np.diff(t_s)
+    gaps = np.flatnonzero((steps > GAP_PERIODS * period) | (steps <= 0)) + 1
+    found = []
+    for some_t, some in zip(np.split(t_s, gaps), np.split(np.asarray(samples, float), gaps), strict=True):
+        if isinstance(model, SpectralModel):
+            found += [_told(model, some_t, d) for d in model.judge(some, length, sequential)]
+        elif sequential:
+            found += _sequential(model, some_t, some, length)
+        else:
+            starts = range(0, len(some) - length + 1, length)
+            found += [_decide(model, float(some_t[s + length - 1]), some[s : s + length]) for s in starts]
+    return found
+
+
+def _told(model: SpectralModel, t_s: np.ndarray, d) -> Decision:
+    label = "unknown" if d.label < 0 else model.classes[d.label]
+    by_class = dict(zip(model.classes, map(float, d.loglik), strict=True))
+    return Decision(float(t_s[d.end - 1]), by_class, label, d.confidence, d.border)
+
+
+def _sequential(model: TextureModel, t_s: np.ndarray, samples: np.ndarray, window: int) -> list[Decision]:
+    """Equation 1 until sure: "unknown" when four windows do not make it so."""
+    found, start, look = [], 0, max(1, window // LOOKS)
+    for end in range(look, len(samples) + 1, look):
+        decision = _decide(model, float(t_s[end - 1]), samples[start:end])
+        if decision.confidence >= SURE or end - start >= PATIENCE * window:
+            decision.label = decision.label if decision.confidence >= SURE else "unknown"
+            found.append(decision)
+            start = end
+    return found
 
 
 def _decide(model: TextureModel, t_s: float, window: np.ndarray) -> Decision:
@@ -134,16 +199,26 @@ def read_recording(path) -> tuple[np.ndarray, np.ndarray]:
 
 def read_folder(path) -> dict[str, list[np.ndarray]]:
     """One folder per surface, one CSV per recording -> channels by class."""
+    return read_training(path)[0]
+
+
+def read_training(path) -> tuple[dict[str, list[np.ndarray]], float]:
+    """One folder per surface, one CSV per recording -> channels by class, and the sampling rate (Hz)."""
     surfaces = sorted(folder for folder in Path(path).iterdir() if folder.is_dir()) if Path(path).is_dir() else []
-    found = {s.name: [read_recording(f)[1] for f in sorted(s.glob("*.csv"))] for s in surfaces}
-    empty = [name for name, recordings in found.items() if not recordings]
-    if len(found) < 2 or empty:
-        what = f"folder '{empty[0]}' holds no CSV file" if empty else f"{len(found)} surface folder(s)"
+    files = {s.name: sorted(s.glob("*.csv")) for s in surfaces}
+    empty = [name for name, some in files.items() if not some]
+    if len(files) < 2 or empty:
+        what = f"folder '{empty[0]}' holds no CSV file" if empty else f"{len(files)} surface folder(s)"
         raise TableError(path, None, f"{what}; give at least two folders, one per surface, with CSV recordings")
-    widths = {r.shape[1] for group in found.values() for r in group}
+    read = {name: [read_recording(file) for file in some] for name, some in files.items()}
+    widths = {channels.shape[1] for group in read.values() for _, channels in group}
     if len(widths) != 1:
         raise TableError(path, None, f"recordings have {sorted(widths)} channels; give all the same columns")
-    return found
+    periods = [sample_period(t_s) for group in read.values() for t_s, _ in group]
+    if max(periods) > (1.0 + RATES_APART) * min(periods):
+        text = f"recordings are sampled at {1 / max(periods):.4g} to {1 / min(periods):.4g} Hz; give one rate"
+        raise TableError(path, None, text)
+    return {name: [channels for _, channels in group] for name, group in read.items()}, 1.0 / float(np.median(periods))
 
 
 def sample_period(t_s: np.ndarray) -> float:

@@ -2,11 +2,12 @@
 
 import json
 
-from .. import texture
+from .. import texture, texture_train
 from ..localise import SettingError
 from ..tables import TableError, unwritable
 from . import add_action, plain
 
+METHODS = "default: spectra, calibrated on recordings held out; naive-bayes: the paper's equation 1"
 EXAMPLE = "whisker texture train recordings --out model.json"
 
 
@@ -15,19 +16,23 @@ def add(parser) -> None:
     p = add_action(actions, "train", "learn from one folder per surface, one CSV per recording", EXAMPLE, train)
     p.add_argument("folder")
     p.add_argument("--out", required=True, metavar="MODEL.JSON")
-    p.add_argument("--method", choices=["naive-bayes", "default"], default="default", help="default: naive-bayes")
+    p.add_argument("--method", choices=["naive-bayes", "default"], default="default", help=METHODS)
     example = "whisker texture classify model.json drive.csv --window-ms 100 --json"
     p = add_action(actions, "classify", "tell the surface window by window", example, classify)
     p.add_argument("model")
     p.add_argument("recording")
     p.add_argument("--window-ms", type=float, default=100.0, help="length of a window (default: %(default)s)")
+    p.add_argument("--sequential", action="store_true", help='answer as soon as sure, "unknown" after four windows')
     p.add_argument("--json", action="store_true", help="one object per line and window")
 
 
 def train(arguments) -> int:
-    recordings = texture.read_folder(arguments.folder)
+    recordings, rate_hz = texture.read_training(arguments.folder)
     try:
-        texture.TextureModel.train(recordings).save(arguments.out)
+        if arguments.method == "default":
+            texture_train.train(recordings, rate_hz).save(arguments.out)
+        else:
+            texture.TextureModel.train(recordings).save(arguments.out)
     except ValueError as error:
         raise TableError(arguments.folder, None, str(error)) from error
     except OSError as error:
@@ -39,12 +44,12 @@ def train(arguments) -> int:
 def classify(arguments) -> int:
     if not 0.0 < arguments.window_ms < float("inf"):
         raise SettingError(f"--window-ms {arguments.window_ms:g}: not a length of time; use 100")
-    model = texture.TextureModel.load(arguments.model)
+    model = texture.load(arguments.model)
     t_s, samples = texture.read_recording(arguments.recording)
-    if samples.shape[1] != len(model.low):
-        text = f"{samples.shape[1]} channels, but the model has {len(model.low)}; use recordings of the same sensor"
+    if samples.shape[1] != model.channels:
+        text = f"{samples.shape[1]} channels, but the model has {model.channels}; use recordings of the same sensor"
         raise TableError(arguments.recording, 1, text)
-    for decision in texture.classify(model, t_s, samples, arguments.window_ms):
+    for decision in texture.classify(model, t_s, samples, arguments.window_ms, arguments.sequential):
         if arguments.json:
             print(json.dumps(plain(vars(decision))))
         else:
