@@ -182,7 +182,7 @@
 #define WHISKER_HEALTH_ORDER_MISSING 12u /* ticks without an order */
 #define WHISKER_HEALTH_SERVICE_CRC 13u /* service windows whose CRC was wrong */
 #define WHISKER_HEALTH_LINK_OVERFLOW 14u /* overflows of the link's receiver */
-#define WHISKER_NODE_STATE_APPLICATION 0u /* the application runs: enter the loader first */
+#define WHISKER_NODE_STATE_APPLICATION 0u /* the application runs */
 #define WHISKER_NODE_STATE_LOADER 1u /* the loader waits */
 #define WHISKER_NODE_STATE_LOADING 2u /* the loader takes blocks */
 #define WHISKER_NODE_STATE_COMPLETE 3u /* the image is valid: run it */
@@ -225,7 +225,7 @@
 
 /* X(NAME, value, meaning) of every state a node tells in its answer, and of every counter of its health. */
 #define WHISKER_NODE_STATES(X) \
-    X(APPLICATION, 0, "the application runs: enter the loader first") \
+    X(APPLICATION, 0, "the application runs") \
     X(LOADER, 1, "the loader waits") \
     X(LOADING, 2, "the loader takes blocks") \
     X(COMPLETE, 3, "the image is valid: run it") \

@@ -1,6 +1,7 @@
 #include "node_bus.h"
 
 #include <algorithm>
+#include <iterator>
 #include <stdexcept>
 
 namespace bridge_sim
@@ -11,10 +12,34 @@ void NodeBus::NodeDeleter::operator()(sim_node *node) const
     sim_node_free(node);
 }
 
-NodeBus::NodeBus(size_t populated, uint64_t seed)
+namespace
 {
+
+constexpr uint64_t CUT_NS = SIM_TICK_NS / 2;
+constexpr uint64_t CUT_TICKS = 10;
+
+sim_node *make_node(size_t lane, uint64_t seed, const std::vector<NodeTrait> &traits)
+{
+    auto serial = static_cast<uint32_t>(lane + 1);
+    uint16_t chip = WHISKER_LIMIT_CHIP_ID;
+    for (const NodeTrait &trait : traits) {
+        if (trait.lane == lane && trait.kind == NodeTrait::Kind::SERIAL) {
+            serial = static_cast<uint32_t>(trait.value);
+        } else if (trait.lane == lane && trait.kind == NodeTrait::Kind::CHIP) {
+            chip = static_cast<uint16_t>(trait.value);
+        }
+    }
+    return sim_node_new_named(seed, serial, chip);
+}
+
+} // namespace
+
+NodeBus::NodeBus(size_t populated, uint64_t seed, const std::vector<NodeTrait> &traits)
+{
+    std::copy_if(traits.begin(), traits.end(), std::back_inserter(cuts_),
+                 [](const NodeTrait &trait) { return trait.kind == NodeTrait::Kind::CUT; });
     for (size_t lane = 0; lane < std::min(populated, LANES); lane++) {
-        nodes_.emplace_back(sim_node_new(seed * LANES + lane));
+        nodes_.emplace_back(make_node(lane, seed * LANES + lane, traits));
         if (!nodes_.back()) {
             throw std::runtime_error("no memory for the nodes");
         }
@@ -50,8 +75,21 @@ void NodeBus::spoil_transfer(size_t lane, LinkFault kind, unsigned bit)
     fault_bit_ = bit;
 }
 
+void NodeBus::fail_supplies()
+{
+    for (const NodeTrait &cut : cuts_) {
+        if (ticks_ == cut.value) {
+            sim_node_cut(nodes_[cut.lane].get(), CUT_NS);
+        } else if (ticks_ == cut.value + CUT_TICKS) {
+            sim_node_restore(nodes_[cut.lane].get());
+        }
+    }
+    ticks_++;
+}
+
 void NodeBus::run()
 {
+    fail_supplies();
     for (const auto &node : nodes_) {
         sim_node_run(node.get());
     }

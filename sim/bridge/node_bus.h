@@ -7,6 +7,7 @@
 #include <memory>
 #include <vector>
 
+#include "node_list.h"
 #include "whisker_protocol.h"
 extern "C" {
 #include "sim_node.h"
@@ -29,8 +30,9 @@ enum class LinkFault {
 class NodeBus
 {
   public:
-    // Nodes on lanes 0 .. populated-1 (at most LANES), each seeded from `seed` and its lane.
-    NodeBus(size_t populated, uint64_t seed);
+    // Nodes on lanes 0 .. populated-1 (at most LANES), each seeded from `seed` and its lane, with serial numbers from 1
+    // on but for the traits.
+    NodeBus(size_t populated, uint64_t seed, const std::vector<NodeTrait> &traits = {});
 
     // Lets every node's start-up time pass.
     void power_on();
@@ -75,12 +77,15 @@ class NodeBus
     void sck_edge(bool level, bool mosi);
     void remember_transfer();
     void damage();
+    void fail_supplies();
 
     std::vector<std::unique_ptr<sim_node, NodeDeleter>> nodes_;
     std::array<sim_field, LANES> fields_{};
     std::array<uint64_t, LANES> sent_{};     // bits of this transfer so far, first bit highest
     std::array<uint64_t, LANES> previous_{}; // bits of the transfer before
-    unsigned bits_ = 0;                      // rising SCK edges since select went low
+    std::vector<NodeTrait> cuts_;
+    uint64_t ticks_ = 0;
+    unsigned bits_ = 0; // rising SCK edges since select went low
     Levels levels_{false, true, false};
     uint32_t driven_ = UINT32_MAX; // what the nodes drive
     uint32_t miso_ = UINT32_MAX;   // what arrives

@@ -30,6 +30,7 @@ enum Option {
     FAULTS,
     USB_FAULTS,
     FAULT_LIST,
+    NODES,
     FOLLOWERS,
     LANES_POPULATED,
     SCK_DIVIDER,
@@ -51,6 +52,7 @@ const option LONG_OPTIONS[] = {{"help", no_argument, nullptr, HELP},
                                {"faults", required_argument, nullptr, FAULTS},
                                {"usb-faults", required_argument, nullptr, USB_FAULTS},
                                {"fault-list", required_argument, nullptr, FAULT_LIST},
+                               {"nodes", required_argument, nullptr, NODES},
                                {"followers", required_argument, nullptr, FOLLOWERS},
                                {"lanes-populated", required_argument, nullptr, LANES_POPULATED},
                                {"sck-divider", required_argument, nullptr, SCK_DIVIDER},
@@ -98,6 +100,8 @@ std::string *path_of(Options &options, int option)
         return &options.usb_faults;
     case FAULT_LIST:
         return &options.fault_list;
+    case NODES:
+        return &options.nodes;
     case SPEED_REPORT:
         return &options.speed_report;
     default:
@@ -235,6 +239,7 @@ const char *usage()
            "  --usb-faults OUT.csv  log each USB fault: tick,kind\n"
            "  --fault-list FILE     inject just these: lines 'lane TICK LANE KIND ARGUMENT', 'usb TICK KIND', ticks "
            "rising\n"
+           "  --nodes FILE          single nodes' traits: lines 'LANE serial N', 'LANE chip ID', 'LANE cut TICK'\n"
            "  --lanes-populated N   nodes on the first N lanes; those without a whisker are at rest (the scene's; "
            "bench: 6)\n"
            "  --speed-report OUT.json  ticks, clock cycles, wall seconds, fault counts\n"

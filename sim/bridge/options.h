@@ -20,6 +20,7 @@ struct Options {
     std::string truth;
     std::string faults;
     std::string usb_faults;
+    std::string nodes; // traits of single nodes
     std::string fault_list;
     std::string speed_report;
     uint64_t seed = 1;

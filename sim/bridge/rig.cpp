@@ -42,7 +42,8 @@ sim_sensor_fault sensor_fault(LaneFaultKind kind)
 
 } // namespace
 
-Rig::Rig(size_t populated, uint64_t seed) : bus_(populated, seed), bridge_(bus_), host_(bridge_)
+Rig::Rig(size_t populated, uint64_t seed, const std::vector<NodeTrait> &traits)
+    : bus_(populated, seed, traits), bridge_(bus_), host_(bridge_)
 {
 }
 

@@ -14,7 +14,7 @@ namespace bridge_sim
 class Rig
 {
   public:
-    Rig(size_t populated, uint64_t seed);
+    Rig(size_t populated, uint64_t seed, const std::vector<NodeTrait> &traits = {});
 
     // Nodes on, bus reset, enumeration. False: `error` names the step that failed.
     bool power_on(Descriptors &descriptors, const char *&error);

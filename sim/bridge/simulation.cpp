@@ -83,10 +83,11 @@ void Simulation::WorldDeleter::operator()(sim_world *world) const
 
 Simulation::Simulation(const Options &options)
     : options_(options), scene_(read_scene(options.scene)), world_(sim_world_new(&scene_, options.seed)),
-      signals_(block_signals()), rig_(populated(options, scene_), options.seed), scheduler_(rig_),
-      faults_(options.faults, options.usb_faults), runner_(rig_, scheduler_, plan_of(options, scene_), faults_),
-      truth_(options.truth, scene_), followers_(options.socket, options.followers), defect_(options.defect),
-      total_(options.ticks())
+      signals_(block_signals()),
+      rig_(populated(options, scene_), options.seed, read_node_list(options.nodes, populated(options, scene_))),
+      scheduler_(rig_), faults_(options.faults, options.usb_faults),
+      runner_(rig_, scheduler_, plan_of(options, scene_), faults_), truth_(options.truth, scene_),
+      followers_(options.socket, options.followers), defect_(options.defect), total_(options.ticks())
 {
     if (!world_) {
         throw std::runtime_error(options.scene + ": no world can be made of it: a texture has no known parameters");

@@ -147,6 +147,15 @@ sim_node *sim_node_new(uint64_t seed)
     return sim_node_new_as(&parameters);
 }
 
+sim_node *sim_node_new_named(uint64_t seed, uint32_t serial, uint16_t chip)
+{
+    struct sim_node_parameters parameters;
+    sim_node_parameters_default(&parameters, seed);
+    parameters.chip.serial = serial;
+    parameters.chip.device_id = chip;
+    return sim_node_new_as(&parameters);
+}
+
 void sim_node_free(sim_node *node)
 {
     if (node)

@@ -36,6 +36,7 @@ static void start(struct node *node, struct board *board, uint8_t code)
     node->tick = 0xFFu; /* the first SYNC makes it 0 */
     node->numbered = true;
     node->ordered = false;
+    node->begun = false;
     node->serving = false;
     node->armed = 0;
     node->reading = sensor_reading_of_code(code);
@@ -67,7 +68,9 @@ bool node_ready(const struct node *node)
 void node_on_sync(struct node *node)
 {
     const uint8_t code = sampler_on_sync(&node->sampler); /* first: all nodes' readings begin together */
-    count_tick(node, node->reading.status);
+    if (node->begun)
+        count_tick(node, node->reading.status);
+    node->begun = true;
     node->serving = false; /* a second window that never came */
     node->reading = sensor_reading_of_code(code);
     node->tick = (uint8_t)(node->tick + 1u);

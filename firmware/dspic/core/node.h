@@ -32,6 +32,7 @@ struct node {
     uint8_t tick;                    /* low 8 bits of the present tick's number */
     bool numbered;                   /* the order that belongs to the last SYNC has come */
     bool ordered;                    /* an order has come in the present transfer */
+    bool begun;                      /* there was a SYNC since the start */
     bool serving;                    /* the link waits for this tick's second window, not for the next record */
     uint8_t armed;                   /* which of the records the link has */
     uint16_t records[2][LINK_WORDS]; /* one is clocked out while the other is packed */

@@ -91,6 +91,21 @@ int control_run(hid_device *hid, const struct whisker_settings *settings, bool r
     return hid_send_feature_report(hid, bytes, sizeof bytes) < 0 ? WHISKER_ERROR_DEVICE_REFUSED : WHISKER_OK;
 }
 
+int control_service(hid_device *hid, const struct whisker_service_order *order)
+{
+    uint8_t bytes[WHISKER_REPORT_SERVICE_BYTES] = {WHISKER_REPORT_ID_SERVICE};
+    bytes[WHISKER_REPORT_SERVICE_WIRE_VERSION] = WHISKER_WIRE_VERSION;
+    bytes[WHISKER_REPORT_SERVICE_COMMAND] = order->command;
+    memcpy(bytes + WHISKER_REPORT_SERVICE_ARGUMENT, order->argument, sizeof order->argument);
+    memcpy(bytes + WHISKER_REPORT_SERVICE_DATA, order->data, sizeof order->data);
+    return hid_send_feature_report(hid, bytes, sizeof bytes) < 0 ? WHISKER_ERROR_DEVICE_REFUSED : WHISKER_OK;
+}
+
+int control_answers(hid_device *hid, uint8_t *report)
+{
+    return get_report(hid, WHISKER_REPORT_ID_ANSWERS, report, WHISKER_REPORT_ANSWERS_BYTES);
+}
+
 void control_parse_counters(const uint8_t *bytes, struct whisker_counters *counters)
 {
     *counters = (struct whisker_counters){

@@ -6,6 +6,7 @@
 #include <stdbool.h>
 
 #include "whisker/device.h"
+#include "whisker/service.h"
 
 /* Opens the HID interface of the bridge that is plugged in at this place. NULL: not there, or it may not be opened. */
 hid_device *control_open(const char *path);
@@ -25,6 +26,12 @@ int control_identify(hid_device *hid, struct whisker_identity *identity);
 
 /* Sends the control report. Returns 0 or DEVICE_REFUSED. */
 int control_run(hid_device *hid, const struct whisker_settings *settings, bool run);
+
+/* Hands the bridge a service order. Returns 0 or DEVICE_REFUSED. */
+int control_service(hid_device *hid, const struct whisker_service_order *order);
+
+/* Reads the report `answers`: WHISKER_REPORT_ANSWERS_BYTES bytes. Returns 0 or DEVICE_CONTROL. */
+int control_answers(hid_device *hid, uint8_t *report);
 
 /* Reads the counters. Returns 0 or DEVICE_CONTROL. */
 int control_counters(hid_device *hid, struct whisker_counters *counters);

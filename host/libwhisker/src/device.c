@@ -4,6 +4,7 @@
 #include <stdlib.h>
 
 #include "control.h"
+#include "device_service.h"
 #include "discovery.h"
 #include "whisker/errors.h"
 #include "whisker_protocol.h"
@@ -224,4 +225,14 @@ int whisker_device_stop(struct whisker_device *device)
 int whisker_device_counters(struct whisker_device *device, struct whisker_counters *counters)
 {
     return blame(device, control_counters(device->hid, counters));
+}
+
+int device_send_service(struct whisker_device *device, const struct whisker_service_order *order)
+{
+    return blame(device, control_service(device->hid, order));
+}
+
+int device_answers(struct whisker_device *device, uint8_t *report)
+{
+    return blame(device, control_answers(device->hid, report));
 }

@@ -37,6 +37,7 @@
       "install gateware and host of one release")                                                                      \
     X(DEVICE_DRAIN, -48, "the bridge did not send its last frame after a stop", "plug the bridge in again")            \
     X(DEVICE_SERIAL, -49, "no bridge of this serial number is connected", "see whiskerd --list for those there are")   \
+    X(IMAGE, -51, "this is no firmware image, or it is damaged", "build it again, or fetch it again")                  \
     X(HOST_CLOCK, -50, "the host's clock was set or went backwards", "none needed; a time service avoids it")
 
 enum whisker_error {

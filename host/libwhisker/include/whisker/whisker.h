@@ -7,5 +7,6 @@
 #include "whisker/errors.h"
 #include "whisker/frame.h"
 #include "whisker/ring.h"
+#include "whisker/service.h"
 
 #endif

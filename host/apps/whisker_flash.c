@@ -1,0 +1,296 @@
+/* whisker-flash: loads firmware into the nodes of a bridge, all at once; lists them. */
+#include <getopt.h>
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "cli.h"
+#include "flash_table.h"
+#include "whisker/whisker.h"
+#include "whisker_protocol.h"
+
+#define PROGRAM "whisker-flash"
+#define IMAGE_BYTES_MAX (WHISKER_IMAGE_HEADER_BYTES + WHISKER_LIMIT_FLASH_ROWS * WHISKER_LIMIT_FLASH_ROW_BYTES)
+#define BAR_WIDTH 40
+#define DRAIN_POLLS 10 /* of 10 ms */
+
+struct options {
+    const char *image, *bridge;
+    bool list, health, dry_run, has_lane, has_serial;
+    uint32_t lane, serial, lane_mask;
+    struct whisker_settings settings;
+};
+
+static uint8_t image_bytes[IMAGE_BYTES_MAX + 1];
+
+static void print_help(void)
+{
+    printf("Usage: whisker-flash IMAGE [OPTION...]\n"
+           "       whisker-flash --list [--health]\n"
+           "Loads a firmware image (.whex) into all nodes of a bridge at once and starts it. Stop whiskerd first.\n\n"
+           "  --lane N         only the node on this lane; it needs a serial number of its own\n"
+           "  --node SERIAL    only the node with this serial number\n"
+           "  --dry-run        say what would be done and whether the nodes would take it; change nothing\n"
+           "  --list           who the nodes are\n"
+           "  --health         with --list: their fault counters that are not zero\n"
+           "  --bridge TEXT    the bridge with this serial number (the first that can be opened)\n"
+           "  --sck-divider N --word-gap N --sample-point N   as whiskerd; at most 16 and 180\n"
+           "  --help           this text\n\n"
+           "Example: whisker-flash node-0.2.whex\n"
+           "Exit code: 0 every node has it, 1 failed for some or all, 2 wrong use.\n");
+}
+
+static bool set_number(struct options *options, int option, const char *text)
+{
+    uint32_t value = 0;
+    const bool is_lane = option == 'l', is_serial = option == 'n';
+    const uint32_t most = is_lane ? WHISKER_FRAME_LANES - 1 : is_serial ? WHISKER_LIMIT_SERIAL_NONE - 1 : UINT8_MAX;
+    static const char *const names[] = {
+        ['l'] = "lane", ['n'] = "node", ['d'] = "sck-divider", ['g'] = "word-gap", ['p'] = "sample-point"};
+    if (!cli_number(PROGRAM, names[option], text, is_serial ? 1 : 0, most, &value)) {
+        return false;
+    }
+    switch (option) {
+    case 'l':
+        options->lane = value;
+        options->has_lane = true;
+        break;
+    case 'n':
+        options->serial = value;
+        options->has_serial = true;
+        break;
+    case 'd':
+        options->settings.sck_divider = (uint8_t)value;
+        break;
+    case 'g':
+        options->settings.word_gap = (uint8_t)value;
+        break;
+    default:
+        options->settings.sample_point = (uint8_t)value;
+        break;
+    }
+    return true;
+}
+
+/* Returns 0 to go on, or an exit code plus one. */
+static int read_options(struct options *options, int argc, char **argv)
+{
+    static const struct option LONG[] = {{"lane", required_argument, NULL, 'l'},
+                                         {"node", required_argument, NULL, 'n'},
+                                         {"bridge", required_argument, NULL, 'b'},
+                                         {"sck-divider", required_argument, NULL, 'd'},
+                                         {"word-gap", required_argument, NULL, 'g'},
+                                         {"sample-point", required_argument, NULL, 'p'},
+                                         {"dry-run", no_argument, NULL, 'y'},
+                                         {"list", no_argument, NULL, 'L'},
+                                         {"health", no_argument, NULL, 'H'},
+                                         {"help", no_argument, NULL, 'h'},
+                                         {NULL, 0, NULL, 0}};
+    int option;
+    while ((option = getopt_long(argc, argv, "", LONG, NULL)) != -1) {
+        switch (option) {
+        case 'h':
+            print_help();
+            return CLI_OK + 1;
+        case 'b':
+            options->bridge = optarg;
+            break;
+        case 'y':
+            options->dry_run = true;
+            break;
+        case 'L':
+            options->list = true;
+            break;
+        case 'H':
+            options->health = true;
+            break;
+        case '?':
+            return CLI_USAGE + 1;
+        default:
+            if (!set_number(options, option, optarg)) {
+                return CLI_USAGE + 1;
+            }
+        }
+    }
+    options->image = optind < argc ? argv[optind++] : NULL;
+    const bool wrong = optind < argc || (options->image != NULL) == options->list ||
+                       (options->has_lane && options->has_serial) || (options->health && !options->list);
+    if (wrong) {
+        fprintf(stderr, PROGRAM ": give one image, or --list, and at most one of --lane and --node; see --help\n");
+    }
+    return wrong ? CLI_USAGE + 1 : 0;
+}
+
+static int read_image(const char *path, struct whisker_image *image)
+{
+    FILE *file = fopen(path, "rb");
+    if (!file) {
+        fprintf(stderr, PROGRAM ": %s: cannot be read; check the name, or make it: make firmware\n", path);
+        return CLI_FAILED;
+    }
+    const size_t count = fread(image_bytes, 1, sizeof image_bytes, file);
+    fclose(file);
+    const int error = whisker_image_parse(image_bytes, count, image);
+    return error ? cli_fail(PROGRAM, path, error) : CLI_OK;
+}
+
+static void ignore_frames(void *context, const uint8_t *bytes, size_t count)
+{
+    (void)context, (void)bytes, (void)count;
+}
+
+static void show_progress(void *context, uint32_t blocks, uint32_t total)
+{
+    (void)context;
+    const int done = (int)(blocks * BAR_WIDTH / total);
+    if (isatty(STDERR_FILENO)) {
+        fprintf(stderr, "\r[%-*.*s] %3u %%%s", BAR_WIDTH, done, "########################################",
+                (unsigned)(blocks * 100 / total), blocks == total ? "\n" : "");
+    }
+}
+
+static int print_health(struct whisker_device *device, uint32_t lanes)
+{
+    static const char *const names[] = {
+#define NAME(name, value, text) [value] = #name,
+        WHISKER_HEALTH(NAME)
+#undef NAME
+    };
+    int error = WHISKER_OK;
+    for (uint8_t i = 0; !error && i < WHISKER_HEALTH_COUNT; i++) {
+        uint16_t counts[WHISKER_FRAME_LANES] = {0};
+        error = whisker_nodes_health(device, lanes, i, counts);
+        for (int lane = 0; !error && lane < WHISKER_FRAME_LANES; lane++) {
+            if (counts[lane] > 0) {
+                printf("lane %2d: %-14s %u\n", lane, names[i], counts[lane]);
+            }
+        }
+    }
+    return error;
+}
+
+/* The lanes that are meant; 0, with one line printed, if that cannot be told. */
+static uint32_t choose(struct options *options, const struct whisker_node nodes[WHISKER_FRAME_LANES])
+{
+    if (!options->has_lane && !options->has_serial) {
+        options->serial = 0;
+        return flash_lanes(nodes);
+    }
+    if (options->has_lane) {
+        if (!nodes[options->lane].present) {
+            fprintf(stderr, PROGRAM ": lane %" PRIu32 ": no node answers; see --list\n", options->lane);
+            return 0;
+        }
+        options->serial = nodes[options->lane].serial;
+    }
+    const uint32_t lanes = flash_lanes_of(nodes, options->serial);
+    if (options->serial == WHISKER_LIMIT_SERIAL_NONE || (lanes & (lanes - 1)) != 0) {
+        fprintf(stderr, PROGRAM ": the node has no serial number of its own, so it cannot be addressed alone; "
+                                "make flash TOOL=... SERIAL=n gives it one\n");
+        return 0;
+    }
+    if (lanes == 0) {
+        fprintf(stderr, PROGRAM ": no node has serial number %" PRIu32 "; see --list\n", options->serial);
+    }
+    return lanes;
+}
+
+/* Says what an update would meet; returns how many nodes would refuse the image. */
+static int foresee(const struct whisker_node nodes[WHISKER_FRAME_LANES], uint32_t lanes,
+                   const struct whisker_image *image)
+{
+    int refusals = 0;
+    for (int lane = 0; lane < WHISKER_FRAME_LANES; lane++) {
+        if (lanes >> lane & 1) {
+            const char *trouble = nodes[lane].chip != image->chip                  ? "refused: another chip"
+                                  : image->wire_version < nodes[lane].wire_version ? "refused: older wire version"
+                                                                                   : NULL;
+            printf("lane %2d: would %s%u.%u\n", lane, trouble ? trouble : "be updated to ", image->version >> 8,
+                   image->version & 0xFFu);
+            refusals += trouble != NULL;
+        }
+    }
+    return refusals;
+}
+
+static int update(struct whisker_device *device, struct options *options,
+                  struct whisker_node nodes[WHISKER_FRAME_LANES], const struct whisker_image *image)
+{
+    struct whisker_update updates[WHISKER_FRAME_LANES];
+    flash_print_duplicates(nodes);
+    const uint32_t lanes = choose(options, nodes);
+    if (lanes == 0) {
+        return CLI_FAILED;
+    }
+    if (options->dry_run) {
+        return foresee(nodes, lanes, image) ? CLI_FAILED : CLI_OK;
+    }
+    int error = whisker_nodes_update(device, lanes, options->serial, image, show_progress, NULL, updates);
+    if (!error) {
+        error = whisker_nodes_identify(device, lanes, nodes);
+    }
+    if (error) {
+        return cli_fail(PROGRAM, "update", error);
+    }
+    return flash_print_result(updates, nodes, image->version) ? CLI_FAILED : CLI_OK;
+}
+
+static int serve(struct whisker_device *device, struct options *options, const struct whisker_image *image)
+{
+    struct whisker_node nodes[WHISKER_FRAME_LANES];
+    int error = whisker_device_start(device, &options->settings, ignore_frames, NULL);
+    if (!error) {
+        error = whisker_nodes_identify(device, options->lane_mask, nodes);
+    }
+    if (error) {
+        return cli_fail(PROGRAM, "bridge", error);
+    }
+    if (flash_lanes(nodes) == 0) {
+        fprintf(stderr, PROGRAM ": no node answers; check their supply and cables\n");
+        return CLI_FAILED;
+    }
+    if (!options->list) {
+        return update(device, options, nodes, image);
+    }
+    flash_print_nodes(nodes);
+    flash_print_duplicates(nodes);
+    error = options->health ? print_health(device, flash_lanes(nodes)) : WHISKER_OK;
+    return error ? cli_fail(PROGRAM, "health", error) : CLI_OK;
+}
+
+/* Leaves the bridge as it was found: stopped, with nothing in its FIFO. */
+static void stop(struct whisker_device *device)
+{
+    int error = whisker_device_stop(device);
+    for (int i = 0; !error && i < DRAIN_POLLS; i++) {
+        error = whisker_device_poll(device, 10);
+    }
+    whisker_device_flush(device);
+}
+
+int main(int argc, char **argv)
+{
+    struct options options = {0};
+    struct whisker_image image = {0};
+    struct whisker_device *device = NULL;
+    struct whisker_identity identity;
+    whisker_settings_default(&options.settings);
+    options.lane_mask = options.settings.lane_mask;
+    int code = read_options(&options, argc, argv);
+    if (code != 0) {
+        return code - 1;
+    }
+    if (options.image && (code = read_image(options.image, &image)) != CLI_OK) {
+        return code;
+    }
+    const int error = whisker_device_open(options.bridge, &device, &identity);
+    if (error) {
+        return cli_fail(PROGRAM, "bridge", error);
+    }
+    code = serve(device, &options, &image);
+    stop(device);
+    whisker_device_close(device);
+    return code;
+}

@@ -1,0 +1,179 @@
+/* Loads an image into many nodes at once: all that still take part are asked for the same block, the lowest that one of
+ * them wants. */
+#include <string.h>
+
+#include "whisker/errors.h"
+#include "whisker/service.h"
+#include "whisker_protocol.h"
+
+#define BLOCK_BYTES WHISKER_SERVICE_DATA_BYTES
+#define SILENT_ASKS 3 /* times as long as a node may be busy until it counts as gone */
+#define START_ROUNDS 8
+
+struct loading {
+    struct whisker_device *device;
+    const struct whisker_image *image;
+    struct whisker_service_order order; /* with the serial number as its argument */
+    struct whisker_update *updates;
+    uint32_t lanes; /* that still take part */
+};
+
+static uint32_t crc32(const uint8_t *bytes, size_t count)
+{
+    uint32_t crc = WHISKER_CRC32_INIT;
+    for (size_t i = 0; i < count; i++) {
+        crc ^= (uint32_t)bytes[i] << 24;
+        for (int bit = 0; bit < 8; bit++) {
+            crc = crc << 1 ^ (crc >> 31 ? WHISKER_CRC32_POLYNOMIAL : 0);
+        }
+    }
+    return crc ^ WHISKER_CRC32_XOR_OUT;
+}
+
+int whisker_image_parse(const uint8_t *bytes, size_t count, struct whisker_image *image)
+{
+    if (count < WHISKER_IMAGE_HEADER_BYTES) {
+        return WHISKER_ERROR_IMAGE;
+    }
+    *image = (struct whisker_image){
+        .header = bytes,
+        .body = bytes + WHISKER_IMAGE_HEADER_BYTES,
+        .length = whisker_get_u32(bytes + WHISKER_IMAGE_HEADER_LENGTH),
+        .chip = whisker_get_u16(bytes + WHISKER_IMAGE_HEADER_CHIP),
+        .version = whisker_get_u16(bytes + WHISKER_IMAGE_HEADER_VERSION),
+        .options = whisker_get_u16(bytes + WHISKER_IMAGE_HEADER_OPTIONS),
+        .wire_version = bytes[WHISKER_IMAGE_HEADER_WIRE_VERSION],
+    };
+    const bool sound =
+        whisker_get_u32(bytes + WHISKER_IMAGE_HEADER_MAGIC) == WHISKER_LIMIT_IMAGE_MAGIC &&
+        bytes[WHISKER_IMAGE_HEADER_FORMAT] == WHISKER_LIMIT_IMAGE_FORMAT &&
+        whisker_get_u32(bytes + WHISKER_IMAGE_HEADER_HEADER_CRC32) == crc32(bytes, WHISKER_IMAGE_HEADER_HEADER_CRC32) &&
+        image->length == count - WHISKER_IMAGE_HEADER_BYTES && image->length > 0 &&
+        image->length % WHISKER_LIMIT_FLASH_ROW_BYTES == 0 &&
+        whisker_get_u32(bytes + WHISKER_IMAGE_HEADER_BODY_CRC32) == crc32(image->body, image->length);
+    return sound ? WHISKER_OK : WHISKER_ERROR_IMAGE;
+}
+
+static void leave(struct loading *l, int lane)
+{
+    l->lanes &= ~(UINT32_C(1) << lane);
+}
+
+/* Asks those that take part; whoever does not answer is left behind if `must`. */
+static int ask(struct loading *l, bool must, struct whisker_answer answers[WHISKER_FRAME_LANES])
+{
+    const int error =
+        whisker_service_ask(l->device, &l->order, l->lanes, SILENT_ASKS * WHISKER_LIMIT_BUSY_TICKS_MAX, answers);
+    for (int lane = 0; !error && lane < WHISKER_FRAME_LANES; lane++) {
+        struct whisker_update *update = &l->updates[lane];
+        if (!(l->lanes >> lane & 1)) {
+            continue;
+        }
+        if (answers[lane].valid) {
+            update->state = answers[lane].beta;
+            update->blocks = answers[lane].alpha;
+        } else if (must) {
+            update->silent = true;
+            leave(l, lane);
+        }
+    }
+    return error;
+}
+
+static void leave_refused(struct loading *l)
+{
+    for (int lane = 0; lane < WHISKER_FRAME_LANES; lane++) {
+        if (l->updates[lane].state > WHISKER_NODE_STATE_COMPLETE) {
+            leave(l, lane);
+        }
+    }
+}
+
+/* Leaves the application, hands over the header. A node that has just restarted may miss either. */
+static int start(struct loading *l)
+{
+    struct whisker_answer answers[WHISKER_FRAME_LANES];
+    int error = WHISKER_OK;
+    bool all = false;
+    for (int round = 0; !error && !all && l->lanes && round < START_ROUNDS; round++) {
+        l->order.command = WHISKER_SERVICE_COMMAND_ENTER;
+        error = whisker_service_ask(l->device, &l->order, 0, 1, answers);
+        memcpy(l->order.data, l->image->header, WHISKER_IMAGE_HEADER_BYTES);
+        l->order.command = WHISKER_SERVICE_COMMAND_BEGIN;
+        if (!error) {
+            error = ask(l, true, answers);
+        }
+        leave_refused(l);
+        all = true;
+        for (int lane = 0; lane < WHISKER_FRAME_LANES; lane++) {
+            all = all && (!(l->lanes >> lane & 1) || l->updates[lane].state == WHISKER_NODE_STATE_LOADING);
+        }
+    }
+    return error;
+}
+
+static uint16_t lowest_wanted(const struct loading *l)
+{
+    uint16_t lowest = UINT16_MAX;
+    for (int lane = 0; lane < WHISKER_FRAME_LANES; lane++) {
+        if (l->lanes >> lane & 1 && l->updates[lane].blocks < lowest) {
+            lowest = l->updates[lane].blocks;
+        }
+    }
+    return lowest;
+}
+
+static int send_blocks(struct loading *l, whisker_update_progress progress, void *context)
+{
+    struct whisker_answer answers[WHISKER_FRAME_LANES];
+    const uint32_t total = l->image->length / BLOCK_BYTES;
+    int error = WHISKER_OK;
+    uint16_t block = l->lanes ? lowest_wanted(l) : UINT16_MAX;
+    while (!error && l->lanes && block < total) {
+        l->order = (struct whisker_service_order){.command = WHISKER_SERVICE_COMMAND_BLOCK};
+        whisker_put_u16(l->order.argument, block);
+        memcpy(l->order.data, l->image->body + (size_t)block * BLOCK_BYTES, BLOCK_BYTES);
+        error = ask(l, true, answers);
+        leave_refused(l);
+        block = l->lanes ? lowest_wanted(l) : UINT16_MAX;
+        if (progress && l->lanes) {
+            progress(context, block, total);
+        }
+    }
+    return error;
+}
+
+/* Is the image whole everywhere? A node that restarted meanwhile is in another state, and left behind. */
+static int finish(struct loading *l)
+{
+    struct whisker_answer answers[WHISKER_FRAME_LANES];
+    l->order = (struct whisker_service_order){.command = WHISKER_SERVICE_COMMAND_FINISH};
+    const int error = l->lanes ? ask(l, true, answers) : WHISKER_OK;
+    for (int lane = 0; !error && lane < WHISKER_FRAME_LANES; lane++) {
+        l->updates[lane].done = l->lanes >> lane & 1 && l->updates[lane].state == WHISKER_NODE_STATE_COMPLETE;
+    }
+    return error;
+}
+
+int whisker_nodes_update(struct whisker_device *device, uint32_t lanes, uint32_t serial,
+                         const struct whisker_image *image, whisker_update_progress progress, void *context,
+                         struct whisker_update updates[WHISKER_FRAME_LANES])
+{
+    struct loading l = {.device = device, .image = image, .updates = updates, .lanes = lanes};
+    struct whisker_answer answers[WHISKER_FRAME_LANES];
+    memset(updates, 0, WHISKER_FRAME_LANES * sizeof updates[0]);
+    for (int lane = 0; lane < WHISKER_FRAME_LANES; lane++) {
+        updates[lane].wanted = lanes >> lane & 1;
+    }
+    whisker_put_u32(l.order.argument, serial);
+    int error = start(&l);
+    if (!error) {
+        error = send_blocks(&l, progress, context);
+    }
+    if (!error) {
+        error = finish(&l);
+    }
+    /* Also for those that were refused: they go back to the application they have. */
+    l.order = (struct whisker_service_order){.command = WHISKER_SERVICE_COMMAND_RUN};
+    return error ? error : whisker_service_ask(device, &l.order, 0, 1, answers);
+}
