@@ -36,7 +36,7 @@ static void perform(struct lane_bench *bench, const struct lane_event *e, const 
 {
     switch (e->what) {
     case BEGIN:
-        bench->line = sim_node_report(bench->node).line;
+        bench->report = sim_node_report(bench->node);
         sim_node_field(bench->node, bench->fields[bench->tick & 1u]);
         sim_node_sensor_fault(bench->node, f->sensor, f->sensor_argument);
         break;
@@ -144,7 +144,7 @@ static bool is_field(const struct lane_verdict *v, struct sim_field field)
 static struct lane_verdict judge(const struct lane_bench *bench, uint64_t bits, uint8_t expected)
 {
     uint8_t record[WHISKER_RECORD_BYTES];
-    struct lane_verdict v = {.line = bench->line};
+    struct lane_verdict v = {.sync_fs = bench->next_fs - bench->timing.period_fs, .report = bench->report};
     for (unsigned i = 0; i < sizeof record; i++)
         record[i] = (uint8_t)(bits >> (BITS - 8u - 8u * i));
     if (bits == ~UINT64_C(0)) {

@@ -33,10 +33,11 @@ struct lane_verdict {
     uint8_t code;
     uint16_t status; /* of an accepted record: error bits and code */
     uint16_t alpha, beta;
-    bool good;    /* accepted, status zero: the host uses it */
-    bool altered; /* good, and yet not what the field was at that tick's SYNC */
-    uint64_t
-        line; /* the newest 64 bits of the sensor's line at the SYNC after: that tick's frame, if it was read whole */
+    bool good;        /* accepted, status zero: the host uses it */
+    bool altered;     /* good, and yet not what the field was at that tick's SYNC */
+    uint64_t sync_fs; /* of the record's tick, were it on time */
+    struct sim_node_report
+        report; /* of the node at the SYNC after; its line: that tick's frame, if it was read whole */
 };
 
 /* Something done to the node at a time. */
@@ -66,8 +67,8 @@ struct lane_bench {
     unsigned tick;              /* the present one */
     struct sim_field fields[2]; /* of the ticks with an even and an odd number */
     struct lane_faults faults;
-    uint64_t line;   /* of the sensor, at this tick's SYNC */
-    uint64_t record; /* bits of it as the bridge read them */
+    struct sim_node_report report; /* at this tick's SYNC */
+    uint64_t record;               /* bits of it as the bridge read them */
     struct lane_event events[LANE_EVENTS];
     unsigned planned, done;
 };

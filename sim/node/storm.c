@@ -222,7 +222,7 @@ static void judged(void *context, unsigned tick, const struct lane_verdict *v)
     if (!v->altered)
         return;
     s->counts.kinds[s->last_kind].altered++;
-    if (s->link_flips || line_looks_good(v->line))
+    if (s->link_flips || line_looks_good(v->report.line))
         s->counts.missed++;
     else
         s->counts.unexplained++;

@@ -40,9 +40,11 @@ struct sensor_reading sensor_frame_decode(const uint8_t frame[SENSOR_FRAME_BYTES
         return sensor_reading_of_code(WHISKER_CODE_SENSOR_ABSENT);
     if ((data ^ inverted) != 0xFFFFu)
         return sensor_reading_of_code(WHISKER_CODE_SENSOR_SUM);
-    if ((data & MLX90316_KIND_MASK) == MLX90316_KIND_ERROR) {
-        reading.alpha = REST;
-        reading.status = sensor_frame_errors((uint16_t)(data & ~MLX90316_KIND_MASK));
-    }
-    return reading;
+    if ((data & MLX90316_KIND_MASK) == MLX90316_KIND_ANGLE)
+        return reading;
+    reading.alpha = REST;
+    reading.status = sensor_frame_errors((uint16_t)(data & ~MLX90316_KIND_MASK));
+    if ((data & MLX90316_KIND_MASK) == MLX90316_KIND_ERROR && reading.status != 0)
+        return reading;
+    return sensor_reading_of_code(WHISKER_CODE_SENSOR_SUM); /* no such kind, or an error word that names none */
 }
