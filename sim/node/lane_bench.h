@@ -33,11 +33,10 @@ struct lane_verdict {
     uint8_t code;
     uint16_t status; /* of an accepted record: error bits and code */
     uint16_t alpha, beta;
-    bool good;        /* accepted, status zero: the host uses it */
-    bool altered;     /* good, and yet not what the field was at that tick's SYNC */
-    uint64_t sync_fs; /* of the record's tick, were it on time */
-    struct sim_node_report
-        report; /* of the node at the SYNC after; its line: that tick's frame, if it was read whole */
+    bool good;                     /* accepted, status zero: the host uses it */
+    bool altered;                  /* good, and yet not what the field was at that tick's SYNC */
+    uint64_t sync_fs;              /* of the record's tick, were it on time */
+    struct sim_node_report report; /* of the node at the SYNC after */
 };
 
 /* Something done to the node at a time. */

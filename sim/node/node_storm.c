@@ -14,11 +14,12 @@ static bool is_sound(const struct storm_counts *c)
 
 static void write_line(unsigned long long batch, const struct storm_counts *c)
 {
-    printf("{\"batch\": %llu, \"schedules\": %llu, \"ticks\": %llu, \"bad\": %llu, \"missed\": %llu, "
+    printf("{\"batch\": %llu, \"schedules\": %llu, \"ticks\": %llu, \"bad\": %llu, \"missed_line\": %llu, "
+           "\"missed_link\": %llu, "
            "\"unexplained\": %llu, \"spurious\": %llu, \"stuck\": %llu, \"violations\": %llu, \"kinds\": {",
            batch, (unsigned long long)c->schedules, (unsigned long long)c->ticks, (unsigned long long)c->bad,
-           (unsigned long long)c->missed, (unsigned long long)c->unexplained, (unsigned long long)c->spurious,
-           (unsigned long long)c->stuck, (unsigned long long)c->violations);
+           (unsigned long long)c->missed_line, (unsigned long long)c->missed_link, (unsigned long long)c->unexplained,
+           (unsigned long long)c->spurious, (unsigned long long)c->stuck, (unsigned long long)c->violations);
     for (unsigned k = 0; k < STORM_KIND_COUNT; k++)
         printf("%s\"%s\": [%llu, %llu]", k ? ", " : "", storm_kind_name((enum storm_kind)k),
                (unsigned long long)c->kinds[k].injected, (unsigned long long)c->kinds[k].altered);

@@ -86,9 +86,13 @@ static void on_interrupt(void *context, unsigned irq)
     const uint8_t before = node->board.node.armed;
     node->releases = node->sensor.violations[MLX90333_SELECT_HIGH];
     serve(node, irq);
-    if (node->board.node.armed != before) /* its instructions besides register accesses are yet to come */
-        node->armed_fs = dspic_now_fs(node->chip) +
-                         node->parameters.chip.work_cycles * (UINT64_C(1000000000000000) / dspic_fcy_hz(node->chip));
+    if (node->board.node.armed == before)
+        return;
+    if (irq == IRQ_SPI1)
+        node->frame = node->line;
+    node->armed_fs = /* its instructions besides register accesses are yet to come */
+        dspic_now_fs(node->chip) +
+        node->parameters.chip.work_cycles * (UINT64_C(1000000000000000) / dspic_fcy_hz(node->chip));
 }
 
 static void on_outside(void *context)

@@ -95,7 +95,7 @@ void sim_node_disturb(sim_node *node, enum sim_node_disturbance what, unsigned a
 
 struct sim_node_report sim_node_report(const sim_node *node)
 {
-    return (struct sim_node_report){.line = node->line,
+    return (struct sim_node_report){.line = node->frame,
                                     .latch_fs = node->sensor.latch_ns * DSPIC_FS_PER_NS,
                                     .age_fs = node->sensor.age_ns * DSPIC_FS_PER_NS,
                                     .armed_fs = node->armed_fs,

@@ -53,7 +53,7 @@ void sim_node_disturb(sim_node *node, enum sim_node_disturbance what, unsigned a
 
 /* What happened within. Times in femtoseconds. */
 struct sim_node_report {
-    uint64_t line;     /* the newest 64 bits that the chip sampled on the sensor's line, last one lowest */
+    uint64_t line;     /* the last 64 bits that the chip sampled of the newest whole frame, last one lowest */
     uint64_t latch_fs; /* of the sensor's newest frame: when its angles became those that are sent */
     uint64_t age_fs;   /* how old they were then */
     uint64_t armed_fs; /* when the link last got a record */

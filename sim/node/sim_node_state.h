@@ -20,6 +20,7 @@ struct sim_node {
     unsigned argument;
     uint32_t releases; /* breaches of t4 by the firmware; a reset's own are nobody's fault */
     uint64_t line;     /* of the sensor, as its master sampled it: the newest 64 bits */
+    uint64_t frame;    /* the same when a frame had last ended */
     void (*act)(void *context);
     void *act_context;
     uint64_t armed_fs; /* when the link last got a record */

@@ -33,7 +33,7 @@ struct storm {
     enum storm_kind last_kind; /* what alterations are put down to */
     enum sim_node_disturbance end;
     unsigned end_in; /* ticks until what is off comes on */
-    bool link_flips; /* of the present tick's record */
+    bool link_hurt;  /* of the present tick's record */
     bool doubled;    /* SYNC, in the tick before: with the next one missing it would be one that is merely early */
 };
 
@@ -194,7 +194,7 @@ static bool plan(void *context, unsigned tick, struct sim_field *field, struct l
     }
     faults->no_sync &= !s->doubled;
     s->doubled = faults->second_sync_ns > 0;
-    s->link_flips = faults->miso_flips != 0;
+    s->link_hurt = faults->miso_flips != 0 || faults->glitch_bit > 0 || faults->extra_clocks < 0;
     s->counts.stuck += s->since > STORM_PATIENCE;
     return s->counts.schedules <= STORM_SCHEDULES && s->since <= STORM_PATIENCE;
 }
@@ -222,8 +222,10 @@ static void judged(void *context, unsigned tick, const struct lane_verdict *v)
     if (!v->altered)
         return;
     s->counts.kinds[s->last_kind].altered++;
-    if (s->link_flips || line_looks_good(v->report.line))
-        s->counts.missed++;
+    if (s->link_hurt)
+        s->counts.missed_link++;
+    else if (line_looks_good(v->report.line))
+        s->counts.missed_line++;
     else
         s->counts.unexplained++;
 }
