@@ -15,6 +15,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 sys.path[:0] = [str(ROOT / "host/python"), str(Path(__file__).resolve().parent)]
 import intel_hex  # noqa: E402
+
 from whisker.protocol import IMAGE_HEADER, LIMITS, WIRE_VERSION, crc32  # noqa: E402
 
 ROW = LIMITS["flash_row_bytes"]

@@ -1,7 +1,6 @@
 #include "node_bus.h"
 
 #include <algorithm>
-#include <iterator>
 #include <stdexcept>
 
 namespace bridge_sim
@@ -36,8 +35,11 @@ sim_node *make_node(size_t lane, uint64_t seed, const std::vector<NodeTrait> &tr
 
 NodeBus::NodeBus(size_t populated, uint64_t seed, const std::vector<NodeTrait> &traits)
 {
-    std::copy_if(traits.begin(), traits.end(), std::back_inserter(cuts_),
-                 [](const NodeTrait &trait) { return trait.kind == NodeTrait::Kind::CUT; });
+    for (const NodeTrait &trait : traits) {
+        if (trait.kind == NodeTrait::Kind::CUT) {
+            cuts_.push_back({trait.lane, trait.value, 0});
+        }
+    }
     for (size_t lane = 0; lane < std::min(populated, LANES); lane++) {
         nodes_.emplace_back(make_node(lane, seed * LANES + lane, traits));
         if (!nodes_.back()) {
@@ -77,14 +79,18 @@ void NodeBus::spoil_transfer(size_t lane, LinkFault kind, unsigned bit)
 
 void NodeBus::fail_supplies()
 {
-    for (const NodeTrait &cut : cuts_) {
-        if (ticks_ == cut.value) {
-            sim_node_cut(nodes_[cut.lane].get(), CUT_NS);
-        } else if (ticks_ == cut.value + CUT_TICKS) {
-            sim_node_restore(nodes_[cut.lane].get());
+    for (SupplyCut &cut : cuts_) {
+        sim_node *node = nodes_[cut.lane].get();
+        if (cut.ticks == 0 && sim_node_blocks(node) < cut.blocks) {
+            continue;
         }
+        if (cut.ticks == 0) {
+            sim_node_cut(node, CUT_NS);
+        } else if (cut.ticks == CUT_TICKS) {
+            sim_node_restore(node);
+        }
+        cut.ticks++;
     }
-    ticks_++;
 }
 
 void NodeBus::run()

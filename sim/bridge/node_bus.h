@@ -67,6 +67,11 @@ class NodeBus
         bool select_n;
         bool sck;
     };
+    struct SupplyCut {
+        size_t lane;
+        uint64_t blocks; // of an update, after which it happens
+        uint64_t ticks;  // since then
+    };
     struct NodeDeleter {
         void operator()(sim_node *node) const;
     };
@@ -83,8 +88,7 @@ class NodeBus
     std::array<sim_field, LANES> fields_{};
     std::array<uint64_t, LANES> sent_{};     // bits of this transfer so far, first bit highest
     std::array<uint64_t, LANES> previous_{}; // bits of the transfer before
-    std::vector<NodeTrait> cuts_;
-    uint64_t ticks_ = 0;
+    std::vector<SupplyCut> cuts_;
     unsigned bits_ = 0; // rising SCK edges since select went low
     Levels levels_{false, true, false};
     uint32_t driven_ = UINT32_MAX; // what the nodes drive

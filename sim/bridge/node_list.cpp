@@ -57,7 +57,7 @@ std::vector<NodeTrait> read_node_list(const std::string &path, size_t lanes)
         if (!good) {
             throw std::runtime_error(
                 path + ":" + std::to_string(number) +
-                ": give 'LANE serial N', 'LANE chip ID' or 'LANE cut TICK', with a populated lane");
+                ": give 'LANE serial N', 'LANE chip ID' or 'LANE cut BLOCK', with a populated lane");
         }
         traits.push_back(trait);
     }

@@ -12,10 +12,10 @@ struct NodeTrait {
     enum class Kind { SERIAL, CHIP, CUT };
     size_t lane;
     Kind kind;
-    uint64_t value; // serial number, device id, or the tick in whose midst the supply fails, for CUT_TICKS
+    uint64_t value; // serial number, device id, or the blocks of an update after which the supply fails once
 };
 
-// A line per trait: "LANE serial N", "LANE chip ID" or "LANE cut TICK" (counted from the first tick). An empty path:
+// A line per trait: "LANE serial N", "LANE chip ID" or "LANE cut BLOCK" (of the first update). An empty path:
 // none. Throws std::runtime_error: file, line, what, remedy.
 std::vector<NodeTrait> read_node_list(const std::string &path, size_t lanes);
 

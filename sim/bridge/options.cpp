@@ -239,7 +239,7 @@ const char *usage()
            "  --usb-faults OUT.csv  log each USB fault: tick,kind\n"
            "  --fault-list FILE     inject just these: lines 'lane TICK LANE KIND ARGUMENT', 'usb TICK KIND', ticks "
            "rising\n"
-           "  --nodes FILE          single nodes' traits: lines 'LANE serial N', 'LANE chip ID', 'LANE cut TICK'\n"
+           "  --nodes FILE          single nodes' traits: lines 'LANE serial N', 'LANE chip ID', 'LANE cut BLOCK'\n"
            "  --lanes-populated N   nodes on the first N lanes; those without a whisker are at rest (the scene's; "
            "bench: 6)\n"
            "  --speed-report OUT.json  ticks, clock cycles, wall seconds, fault counts\n"

@@ -249,6 +249,11 @@ void sim_node_program(sim_node *node, const uint8_t *image, size_t bytes)
     }
 }
 
+uint16_t sim_node_blocks(const sim_node *node)
+{
+    return node->board.loading ? node->board.loader.next : 0u;
+}
+
 uint16_t sim_node_version(const sim_node *node)
 {
     const uint32_t *word = dspic_flash(node->chip) + WHISKER_LIMIT_APPLICATION_ROW * FLASH_ROW_WORDS;

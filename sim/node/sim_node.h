@@ -56,6 +56,9 @@ void sim_node_restore(sim_node *node);
 #define SIM_NODE_VERSION 1u
 void sim_node_program(sim_node *node, const uint8_t *image, size_t bytes);
 
+/* Blocks of an update that the loader has; 0: none is under way. */
+uint16_t sim_node_blocks(const sim_node *node);
+
 /* Version of the application that runs; 0: the loader does. */
 uint16_t sim_node_version(const sim_node *node);
 

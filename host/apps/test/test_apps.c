@@ -137,7 +137,7 @@ static void bridges_that_cannot_be_used_are_told_in_one_line(void **state)
     assert_refused(with_fake("access"), 1, "bridge: no permission to open the bridge; install the udev rule");
     assert_refused(with_fake("busy"), 1, "bridge: another process uses the bridge; stop the other whiskerd");
     assert_refused(with_fake("gone"), 1, "bridge: the bridge was unplugged; plug it in again");
-    assert_refused(with_fake("version"), 1, "(bridge 2, host 1); install gateware and host of one release");
+    assert_refused(with_fake("version"), 1, "(bridge 3, host 2); install gateware and host of one release");
     assert_refused(with_fake("lanes"), 1, "bridge: the bridge has other lanes or frames than this host");
     assert_false(ring_exists());
 }

@@ -7,9 +7,9 @@
 #include "whisker/errors.h"
 #include "whisker_protocol.h"
 
-#define REPEAT_ASKS 4        /* polls before an order is sent again: it may have met a node that was busy */
-#define WINDOW_POLLS_MAX 500 /* looks for the end of a window before ticks count as stopped */
-#define WINDOW_WAIT_MS 1
+#define REPEAT_ASKS 4         /* polls before an order is sent again: it may have met a node that was busy */
+#define WINDOW_POLLS_MAX 4000 /* looks for the end of a window before ticks count as stopped */
+#define WINDOW_WAIT_MS 0      /* the report itself is asked for in a few hundred microseconds */
 
 _Static_assert(WHISKER_SERVICE_DATA_BYTES == WHISKER_SERVICE_CRC32 - WHISKER_SERVICE_DATA, "size of an order's data");
 

@@ -112,6 +112,16 @@ static int start(struct loading *l)
     return error;
 }
 
+/* A node that restarted meanwhile waits in its loader and wants to be begun anew. */
+static void leave_restarted(struct loading *l)
+{
+    for (int lane = 0; lane < WHISKER_FRAME_LANES; lane++) {
+        if (l->updates[lane].state != WHISKER_NODE_STATE_LOADING) {
+            leave(l, lane);
+        }
+    }
+}
+
 static uint16_t lowest_wanted(const struct loading *l)
 {
     uint16_t lowest = UINT16_MAX;
@@ -129,12 +139,13 @@ static int send_blocks(struct loading *l, whisker_update_progress progress, void
     const uint32_t total = l->image->length / BLOCK_BYTES;
     int error = WHISKER_OK;
     uint16_t block = l->lanes ? lowest_wanted(l) : UINT16_MAX;
+    leave_restarted(l);
     while (!error && l->lanes && block < total) {
         l->order = (struct whisker_service_order){.command = WHISKER_SERVICE_COMMAND_BLOCK};
         whisker_put_u16(l->order.argument, block);
         memcpy(l->order.data, l->image->body + (size_t)block * BLOCK_BYTES, BLOCK_BYTES);
         error = ask(l, true, answers);
-        leave_refused(l);
+        leave_restarted(l);
         block = l->lanes ? lowest_wanted(l) : UINT16_MAX;
         if (progress && l->lanes) {
             progress(context, block, total);

@@ -2,9 +2,11 @@
 
 import dataclasses
 import json
+import os
 import time
 
 from .. import usbtree
+from ..bridgesim import program
 from ..protocol import WIRE_VERSION
 from ..ring import Reader, RingError
 from . import add_ring
@@ -15,10 +17,14 @@ EXAMPLE = "whisker info --json"
 def add(parser) -> None:
     add_ring(parser)
     parser.add_argument("--json", action="store_true", help="one object on one line")
+    parser.add_argument("--nodes", action="store_true", help="ask the nodes themselves (whiskerd must not run)")
     parser.set_defaults(run=run)
 
 
 def run(arguments) -> int:
+    if arguments.nodes:
+        lister = program("whisker-flash")
+        return os.spawnv(os.P_WAIT, lister, [lister, "--list", "--health"])
     told = {"host": {"wire_version": WIRE_VERSION}, "usb": [describe_usb(found) for found in usbtree.bridges()]}
     try:
         with Reader(arguments.ring, arguments.wait) as reader:

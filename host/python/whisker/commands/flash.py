@@ -1,0 +1,25 @@
+"""`whisker flash`: loads firmware into the nodes. The work is whisker-flash's, which speaks USB."""
+
+import os
+
+from ..bridgesim import program
+
+EXAMPLE = "whisker flash node-0.2.whex"
+
+
+def add(parser) -> None:
+    parser.add_argument("image", help="firmware image (.whex)")
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument("--lane", type=int, metavar="N", help="only the node on this lane")
+    which.add_argument("--serial", type=int, metavar="S", help="only the node with this serial number")
+    parser.add_argument("--bridge", metavar="TEXT", help="the bridge with this serial number")
+    parser.add_argument("--dry-run", action="store_true", help="say what would be done, change nothing")
+    parser.set_defaults(run=run)
+
+
+def run(arguments) -> int:
+    words = [program("whisker-flash"), arguments.image]
+    for option, value in (("lane", arguments.lane), ("node", arguments.serial), ("bridge", arguments.bridge)):
+        words += [f"--{option}", str(value)] if value is not None else []
+    words += ["--dry-run"] if arguments.dry_run else []
+    return os.spawnv(os.P_WAIT, words[0], words)
