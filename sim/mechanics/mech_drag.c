@@ -182,7 +182,9 @@ static void follow(struct mech_drag *drag, const struct sim_floor_texture *floor
         double most = (drag->whisker.friction + floor->friction_drop) * input;
         along = drag->anchor -= stroke->travel;
         if (fabs(along) > most) {
-            along = drag->anchor = copysign(fmax(0, most - 2 * floor->friction_drop * input), along);
+            /* What the tip went beyond within this tick stays: the period of slips is the jump's. */
+            double after = fabs(along) - 2 * floor->friction_drop * input;
+            along = drag->anchor = copysign(fmin(most, fmax(0, after)), along);
             drag->slips++;
         }
     }

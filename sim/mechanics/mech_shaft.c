@@ -8,6 +8,8 @@
 #define LEAVE_LAG 0.75       /* ... that and the lag together are below this */
 #define NEAR_LIMIT 0.5       /* share of the slip-off angle from which on it is looked out for */
 #define CREEP_OVER 1e-7      /* rad */
+#define LARGEST_THETA 3.2    /* rad, and ... */
+#define LARGEST_RATE 1e3     /* rad/s: more is no motion of a robot */
 #define LEAST_RADIUS 5e-3    /* m: nearer to the exit the mount is touched, not the shaft */
 
 struct mech_tolerance mech_tolerance_default(void)
@@ -190,12 +192,12 @@ static double push(struct mech_shaft *shaft, const struct mech_touch *touch)
 static bool sound(const struct mech_shaft *shaft, const struct mech_touch *touch)
 {
     return touch->touching && touch->radius >= LEAST_RADIUS && touch->radius <= shaft->whisker.length &&
-           isfinite(touch->theta);
+           fabs(touch->theta) <= LARGEST_THETA;
 }
 
 static bool at_rest(const struct mech_shaft *shaft, const struct mech_touch *touch)
 {
-    return !touch->touching && !shaft->engaged && shaft->level == MECH_REST && shaft->creep == 0 &&
+    return !touch->touching && !shaft->slipped && !shaft->engaged && shaft->level == MECH_REST && shaft->creep == 0 &&
            shaft->base_rate == touch->base_rate && (shaft->forced == MECH_AUTO || !(shaft->forced & MECH_VIBRATION));
 }
 
@@ -228,7 +230,7 @@ void mech_shaft_step(struct mech_shaft *shaft, const struct mech_touch *touch)
         shaft->moment = shaft->tilt = 0;
         return;
     }
-    double input, base_rate = isfinite(touch->base_rate) ? touch->base_rate : shaft->base_rate;
+    double input, base_rate = fabs(touch->base_rate) <= LARGEST_RATE ? touch->base_rate : shaft->base_rate;
     bool ended = follow(shaft, touch, &input);
     double rate = shaft->engaged ? (input - shaft->input) / shaft->tick_s : 0;
     if (!(shaft->level & MECH_VIBRATION))

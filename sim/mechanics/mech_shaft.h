@@ -8,9 +8,11 @@
  *   jump d of the input's rate can move the moment by at most ring d, fading with the slowest mode. These are added up;
  *   vibration is switched on before the sum plus the lag at the present rate passes `moment`.
  *
- * So at every tick |moment - moment with everything on| <= relative |moment| + 2 moment (once for what was left
- * out before vibration began, once for what was dropped when it ended). Both switch back only at a fraction of
- * the bound, so they do not chatter. The bounds hold for a contact at a fixed place of the shaft and without bounces.
+ * So at every tick |moment - moment with everything on| <= 3 relative |largest moment of the contact so far| + 2
+ * moment: 3, because vibration passes the law's error on with at most a step's overshoot, twice, and friction may start
+ * the large deflection on its other side, once; 2, once for what was left out before vibration began and once for what
+ * was dropped when it ended. Both switch back only at a fraction of the bound, so they do not chatter. The bounds hold
+ * for a contact at a fixed place of the shaft and without bounces.
  */
 #ifndef MECH_SHAFT_H
 #define MECH_SHAFT_H
@@ -66,7 +68,8 @@ struct mech_tolerance mech_tolerance_default(void);
 void mech_shaft_start(struct mech_shaft *shaft, const struct mech_whisker *whisker, const mech_table *table,
                       double tick_s);
 
-/* Lets a tick pass. Values that are not finite, or a radius outside the shaft, are taken as no touch. */
+/* Lets a tick pass. Angles beyond 3.2 rad and radii outside the shaft are taken as no touch, rates of turn beyond
+ * 1000 rad/s as no change. */
 void mech_shaft_step(struct mech_shaft *shaft, const struct mech_touch *touch);
 /* cffi: end */
 

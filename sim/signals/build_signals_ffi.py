@@ -17,7 +17,15 @@ HERE = Path(__file__).resolve().parent
 SIM = HERE.parent
 BLOCK = re.compile(r"/\* cffi: begin \*/\n(.*?)/\* cffi: end \*/", re.DOTALL)
 
-HEADERS = [SIM / "world" / "sim_scene.h", SIM / "world" / "sim_world.h", HERE / "signals.h"]
+# Headers that others build on come first: cffi wants a struct before its use.
+MECHANICS = ("whisker", "static", "elastica", "table", "modes", "vibration", "shaft")
+HEADERS = [
+    SIM / "world" / "sim_scene.h",
+    SIM / "world" / "sim_world.h",
+    HERE / "signals.h",
+    *(SIM / "mechanics" / f"mech_{name}.h" for name in MECHANICS),
+    HERE / "mechanics.h",
+]
 # A header of another folder that a declaration needs: the struct is known to C, opaque to Python.
 FOREIGN = "struct sim_field;"
 ARCHIVES = ["sim_signals", "sim_world", "sim_mechanics", "sim_mlx90333"]  # in the order of the linker

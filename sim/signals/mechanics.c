@@ -1,0 +1,221 @@
+#include "mechanics.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "sensor_noise.h"
+#include "sim_counts.h"
+#include "whisker_constants.h"
+
+enum purpose { FOR_SENSOR = 0x7369676e, FOR_FLOOR };
+
+void sim_mechanics_touch(struct mech_shaft *shaft, size_t ticks, const double *radius, const double *theta,
+                         const double *base_rate, double *tilt, unsigned char *level)
+{
+    for (size_t i = 0; i < ticks; i++) {
+        struct mech_touch touch = {radius[i] > 0, radius[i], theta[i], base_rate[i]};
+        mech_shaft_step(shaft, &touch);
+        tilt[i] = shaft->tilt;
+        level[i] = (unsigned char)shaft->level;
+    }
+}
+
+struct sim_drag {
+    struct mech_drag drag;
+};
+
+static struct mech_stance stance_of(const double stance[5])
+{
+    return (struct mech_stance){stance[0], stance[1], stance[2], stance[3], stance[4]};
+}
+
+void sim_drag_stance(double stance[5])
+{
+    struct mech_stance usual = mech_stance_default();
+    stance[0] = usual.preload;
+    stance[1] = usual.height;
+    stance[2] = usual.behind;
+    stance[3] = usual.catching_step;
+    stance[4] = usual.face_friction;
+}
+
+sim_drag *sim_drag_new(const struct mech_whisker *whisker, const double stance[5], size_t floor, uint64_t seed,
+                       double tick_s, int forced)
+{
+    if (floor >= SIM_FLOOR_TEXTURE_COUNT)
+        return NULL;
+    sim_drag *made = calloc(1, sizeof *made);
+    if (!made)
+        return NULL;
+    struct mech_stance mounted = stance_of(stance);
+    mech_drag_start(&made->drag, whisker, &mounted, &SIM_FLOOR_TEXTURES[floor], sim_rng_stream(seed, FOR_FLOOR, 0),
+                    tick_s);
+    made->drag.forced = forced;
+    return made;
+}
+
+void sim_drag_free(sim_drag *drag)
+{
+    free(drag);
+}
+
+void sim_drag_run(sim_drag *drag, size_t ticks, const double *travel, const unsigned char *floor, const double *height,
+                  double *tilt, unsigned char *event)
+{
+    for (size_t i = 0; i < ticks; i++) {
+        struct mech_stroke stroke = {travel[i], height[i], 0};
+        size_t number = floor[i] < SIM_FLOOR_TEXTURE_COUNT ? floor[i] : SIM_FLOOR_TEXTURE_COUNT - 1;
+        mech_drag_step(&drag->drag, &SIM_FLOOR_TEXTURES[number], &stroke);
+        tilt[2 * i] = drag->drag.tilt[0];
+        tilt[2 * i + 1] = drag->drag.tilt[1];
+        event[i] = (unsigned char)(drag->drag.contact + (drag->drag.lifted ? 4 : 0));
+    }
+}
+
+static void read_sensor(const struct mech_whisker *whisker, struct sim_sensor_noise *noise, double time_s,
+                        const double tilt[2], uint16_t counts[2])
+{
+    double field[2];
+    mech_whisker_fields(whisker, tilt, field);
+    struct sim_field seen = {field[0] / SIM_DEGREE, field[1] / SIM_DEGREE};
+    seen = sim_sensor_noise_add(noise, time_s, seen);
+    counts[0] = sim_counts(seen.alpha_deg);
+    counts[1] = sim_counts(seen.beta_deg);
+}
+
+void sim_mechanics_counts(const struct mech_whisker *whisker, size_t ticks, double tick_s, const double *tilt,
+                          uint64_t seed, uint16_t *counts)
+{
+    struct sim_sensor_noise noise;
+    sim_sensor_noise_start(&noise, sim_rng_stream(seed, FOR_SENSOR, 0));
+    for (size_t i = 0; i < ticks; i++)
+        read_sensor(whisker, &noise, (double)i * tick_s, tilt + 2 * i, counts + 2 * i);
+}
+
+const char *sim_mechanics_floor(size_t floor)
+{
+    return floor < SIM_FLOOR_TEXTURE_COUNT ? SIM_FLOOR_TEXTURES[floor].name : NULL;
+}
+
+enum { SHAFTS = 4, DRAGS = 8, IDLE = 16, WHISKERS = SHAFTS + DRAGS + IDLE };
+
+#define CONTACT_M 0.110 /* the pegs stand here ... */
+#define SLIDE_M 0.010   /* ... and slide by this, there and back within SLIDE_S */
+#define SLIDE_S 2.0     /* s */
+#define THETA_MEAN 0.09 /* rad: about 2 to 8 degrees, as of a body whisk, at most at the whisk's rate */
+#define THETA_SWING 0.05
+#define WHISK_RATE (SIM_PI / 24)
+#define DRAG_M_S 0.1
+
+struct sim_mechanics_scene {
+    struct sim_mechanics_setting setting;
+    mech_table *table;
+    struct mech_shaft shaft[SHAFTS + IDLE];
+    struct mech_drag drag[DRAGS];
+    struct sim_sensor_noise noise[WHISKERS];
+    size_t ticks, large, vibrating;
+};
+
+sim_mechanics_scene *sim_mechanics_scene_new(const struct sim_mechanics_setting *setting, uint64_t seed)
+{
+    sim_mechanics_scene *scene = calloc(1, sizeof *scene);
+    mech_table *table = mech_table_new();
+    if (!scene || !table) {
+        mech_table_free(table);
+        free(scene);
+        return NULL;
+    }
+    struct mech_stance stance = mech_stance_default();
+    scene->setting = *setting;
+    scene->table = table;
+    for (uint32_t i = 0; i < WHISKERS; i++) {
+        struct mech_whisker whisker = mech_whisker_draw(seed, i);
+        sim_sensor_noise_start(&scene->noise[i], sim_rng_stream(seed, FOR_SENSOR, i));
+        if (i < SHAFTS + IDLE) {
+            mech_shaft_start(&scene->shaft[i], &whisker, table, setting->tick_s);
+            scene->shaft[i].forced = i < SHAFTS ? setting->shaft_level : MECH_AUTO;
+        } else {
+            struct mech_drag *drag = &scene->drag[i - SHAFTS - IDLE];
+            mech_drag_start(drag, &whisker, &stance, &SIM_FLOOR_TEXTURES[i % SIM_FLOOR_TEXTURE_COUNT],
+                            sim_rng_stream(seed, FOR_FLOOR, i), setting->tick_s);
+            drag->forced = setting->drag_level;
+        }
+    }
+    return scene;
+}
+
+void sim_mechanics_scene_free(sim_mechanics_scene *scene)
+{
+    if (scene)
+        mech_table_free(scene->table);
+    free(scene);
+}
+
+/* There and back between -1 and 1 at constant speed, once per period. */
+static double triangle(double time_s, double period_s)
+{
+    return 4 * fabs(time_s / period_s - floor(time_s / period_s + 0.5)) - 1;
+}
+
+static double step_shafts(sim_mechanics_scene *scene, double time_s)
+{
+    double sum = 0;
+    double theta = THETA_MEAN + THETA_SWING * triangle(time_s, 4 * THETA_SWING / WHISK_RATE);
+    double slide = scene->setting.sliding ? SLIDE_M / 2 * triangle(time_s, SLIDE_S) : 0;
+    for (int i = 0; i < SHAFTS + IDLE; i++) {
+        struct mech_touch touch = {i < SHAFTS, CONTACT_M + slide, theta, 0};
+        mech_shaft_step(&scene->shaft[i], &touch);
+        sum += scene->shaft[i].tilt;
+    }
+    for (int i = 0; i < SHAFTS; i++) {
+        scene->large += (scene->shaft[i].level & MECH_LARGE) != 0;
+        scene->vibrating += (scene->shaft[i].level & MECH_VIBRATION) != 0;
+    }
+    return sum;
+}
+
+static double step_drags(sim_mechanics_scene *scene)
+{
+    double sum = 0;
+    struct mech_stroke stroke = {DRAG_M_S * scene->setting.tick_s, 0, 0};
+    for (size_t i = 0; i < DRAGS; i++) {
+        mech_drag_step(&scene->drag[i], &SIM_FLOOR_TEXTURES[i % SIM_FLOOR_TEXTURE_COUNT], &stroke);
+        sum += scene->drag[i].tilt[0] + scene->drag[i].tilt[1];
+    }
+    return sum;
+}
+
+static double read_all(sim_mechanics_scene *scene, double time_s)
+{
+    uint16_t counts[2];
+    double sum = 0;
+    for (size_t i = 0; i < WHISKERS; i++) {
+        double along[2] = {0, 0};
+        bool shaft = i < SHAFTS + IDLE;
+        const struct mech_whisker *whisker = shaft ? &scene->shaft[i].whisker : &scene->drag[i - SHAFTS - IDLE].whisker;
+        if (shaft)
+            along[0] = scene->shaft[i].tilt;
+        read_sensor(whisker, &scene->noise[i], time_s, shaft ? along : scene->drag[i - SHAFTS - IDLE].tilt, counts);
+        sum += counts[0] + counts[1];
+    }
+    return sum;
+}
+
+double sim_mechanics_scene_run(sim_mechanics_scene *scene, size_t ticks)
+{
+    double sum = 0;
+    for (size_t i = 0; i < ticks; i++) {
+        double time_s = (double)scene->ticks++ * scene->setting.tick_s;
+        sum += step_shafts(scene, time_s) + step_drags(scene);
+        if (scene->setting.counts)
+            sum += read_all(scene, time_s);
+    }
+    return sum;
+}
+
+void sim_mechanics_scene_levels(const sim_mechanics_scene *scene, double share[2])
+{
+    double all = fmax(1, (double)(SHAFTS * scene->ticks));
+    share[0] = (double)scene->large / all;
+    share[1] = (double)scene->vibrating / all;
+}

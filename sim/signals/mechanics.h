@@ -1,0 +1,61 @@
+/* Whiskers one by one at level 1, with the mechanics of sim/mechanics: contacts and sweeps that a study prescribes tick
+ * by tick, tilt of the plug and counts out; and a scene of 28 to measure speed with.
+ */
+#ifndef SIM_SIGNALS_MECHANICS_H
+#define SIM_SIGNALS_MECHANICS_H
+
+#include <stdbool.h>
+
+#include "mech_drag.h"
+#include "mech_shaft.h"
+
+/* cffi: begin */
+typedef struct sim_drag sim_drag;
+typedef struct sim_mechanics_scene sim_mechanics_scene;
+
+/* What a scene of 28 whiskers does: 4 against objects all the time, 8 dragged over floors, 16 touching nothing. */
+struct sim_mechanics_setting {
+    int shaft_level, drag_level; /* MECH_AUTO or forced ones */
+    bool sliding;                /* the contacts also slide along the shaft, at 10 mm/s */
+    bool counts;                 /* sensor noise and counts too */
+    double tick_s;
+};
+
+/* Lets ticks pass for a whisker against objects. radius[i] 0: no touch; else as struct mech_touch. Writes the tilt in
+ * the plane of bending (rad) and the level of each tick. */
+void sim_mechanics_touch(struct mech_shaft *shaft, size_t ticks, const double *radius, const double *theta,
+                         const double *base_rate, double *tilt, unsigned char *level);
+
+/* A whisker standing on floor number `floor` of floor_textures.h; NULL if memory is short or there is no such floor. */
+sim_drag *sim_drag_new(const struct mech_whisker *whisker, const double stance[5], size_t floor, uint64_t seed,
+                       double tick_s, int forced);
+void sim_drag_free(sim_drag *drag);
+
+/* The default of its stance: preload, height, behind, catching_step, face_friction (struct mech_stance). */
+void sim_drag_stance(double stance[5]);
+
+/* Lets ticks pass over floors: travel[i] m, number of the floor and its height (m). Writes tilt[tick][2] (rad; along
+ * the path, across it) and what the tip did: 0 sticks, 1 slips, 2 is caught; 4 is added if it has lifted off. A floor
+ * number out of range is taken as the last floor. */
+void sim_drag_run(sim_drag *drag, size_t ticks, const double *travel, const unsigned char *floor, const double *height,
+                  double *tilt, unsigned char *event);
+
+/* What the sensor of this whisker reads of tilt[tick][2]: counts[tick][2], with the sensor's noise of this seed. */
+void sim_mechanics_counts(const struct mech_whisker *whisker, size_t ticks, double tick_s, const double *tilt,
+                          uint64_t seed, uint16_t *counts);
+
+/* Name of a floor, or NULL beyond the last. */
+const char *sim_mechanics_floor(size_t floor);
+
+/* A scene, or NULL if memory is short; whiskers differ by the seed. */
+sim_mechanics_scene *sim_mechanics_scene_new(const struct sim_mechanics_setting *setting, uint64_t seed);
+void sim_mechanics_scene_free(sim_mechanics_scene *scene);
+
+/* Lets ticks pass. Returns a sum over all that came out, so that nothing is left out as unused. */
+double sim_mechanics_scene_run(sim_mechanics_scene *scene, size_t ticks);
+
+/* Share of contact ticks so far with large deflection [0] and with vibration [1], of the whiskers against objects. */
+void sim_mechanics_scene_levels(const sim_mechanics_scene *scene, double share[2]);
+/* cffi: end */
+
+#endif
