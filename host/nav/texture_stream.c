@@ -123,15 +123,33 @@ static void swap(double **a, double **b)
     *b = kept;
 }
 
+/* Judges both halves alone; returns their rung. */
+static int judge_halves(struct nav_texture_stream *s)
+{
+    int first = s->held / 2, later = s->held - first;
+    const double *middle = s->clean + (size_t)first * (size_t)s->rules.channels;
+    double distance;
+    int one = nav_texture_span_judge(s->span, s->clean, first, s->half[1], &distance);
+    int two = nav_texture_span_judge(s->span, middle, later, s->half[2], &distance);
+    return one == two ? one : -1;
+}
+
+/* Two views of the same samples, the whole and its halves, err differently: their mean errs less than either. */
+static void blend(const struct nav_texture_stream *s, double *loglik)
+{
+    double best = -INFINITY, both = 0.5 * pow(2.0, s->rules.growth);
+    for (int k = 0; k < s->rules.classes; k++) {
+        loglik[k] = 0.5 * (loglik[k] + both * (s->half[1][k] + s->half[2][k])) * s->rules.together;
+        best = fmax(best, loglik[k]);
+    }
+    for (int k = 0; k < s->rules.classes; k++)
+        loglik[k] -= best;
+}
+
 /* Looks for a border between half and half and between window and window; when the halves differ, what counts is the
  * later one. The halves and the window become those before. */
-static bool find_border(struct nav_texture_stream *s, double *loglik, int rung)
+static bool find_border(struct nav_texture_stream *s, double *loglik, int rung, int half_rung)
 {
-    int first = s->held / 2, later = s->held - first, half_rung;
-    double distance;
-    nav_texture_span_judge(s->span, s->clean, first, s->half[1], &distance);
-    half_rung = nav_texture_span_judge(s->span, s->clean + (size_t)first * (size_t)s->rules.channels, later, s->half[2],
-                                       &distance);
     bool inside = differ(s, half_rung, s->half[1], s->half[2]);
     bool since = s->has_before && ((s->half_rung == half_rung && differ(s, half_rung, s->half[0], s->half[1])) ||
                                    (s->before_rung == rung && differ(s, rung, s->before, loglik)));
@@ -200,13 +218,17 @@ static bool decide(struct nav_texture_stream *s, struct nav_texture_decision *d,
         no_evidence(s, d, loglik);
         return false;
     }
+    int half_rung = judge_halves(s);
+    if (half_rung >= 0)
+        blend(s, loglik);
     bool strange = never_trained(s, d->distance, rung, loglik);
     d->confidence = best(loglik, s->rules.classes, &d->label);
     if (s->rules.step > 0 && (d->confidence < s->rules.sure || strange) && s->held < s->room)
         return false;
-    d->border = find_border(s, loglik, rung);
+    d->border = find_border(s, loglik, rung, half_rung);
     d->confidence = best(loglik, s->rules.classes, &d->label);
-    if (strange || d->confidence < s->rules.doubt)
+    bool unsure = d->confidence < (s->rules.step > 0 ? s->rules.sure : s->rules.doubt);
+    if (strange || unsure)
         d->label = NAV_TEXTURE_UNKNOWN;
     return true;
 }

@@ -19,6 +19,7 @@ struct nav_texture_rules {
     const double *border;                 /* [rungs] two neighbouring stretches that share a class this badly, in nats,
                                              are two surfaces */
     double growth;                        /* evidence of m rung lengths is m^growth that of one: 1 if independent */
+    double together;                      /* factor of the mean evidence of a window and its halves */
     double doubt;                         /* confidence below which the answer is "unknown" */
     int step;                             /* 0: windows in a row. Else sequential: looks every so many samples, ... */
     double sure;                          /* ... answers at this confidence, ... */

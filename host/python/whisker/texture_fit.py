@@ -11,7 +11,7 @@ from .texture_rung import Rung, plain_features
 
 SHRINK = (1e-3, 1e-2, 1e-1)  # share of the diagonal in the covariance within classes
 HIDDEN = (0, 128, 512)  # random projections: none, few, many
-HIDDEN_MUST_GAIN = 0.05  # relative fall of the log loss that pays for the next size: it costs time in every window
+HIDDEN_MUST_GAIN = 0.02  # relative fall of the log loss that pays for the next size: it costs time in every window
 LEAST_GAIN = 0.005  # nats: a smaller fall is chance, however large a share of a small loss
 LEVELS_MUST_GAIN = 0.5  # the same for channel means: a rest drifts, and a mean may tell the session, not the surface
 AXES_MOST = 16  # of the distance that tells unknown surfaces
@@ -42,11 +42,13 @@ class Fitted:
 
 def fit(data: Windows, floor: np.ndarray) -> Fitted:
     """Choose levels, size and shrinkage by held-out log loss, then fit all the rest."""
-    chosen = None
-    for levels in (False, True):
-        found = _fit_features(data, floor, levels)
-        if chosen is None or _pays(found.loss, chosen.loss, LEVELS_MUST_GAIN):
-            chosen = found
+    chosen = _fit_features(data, floor, False, HIDDEN[:1])
+    if chosen.loss > LEAST_GAIN:
+        levelled = _fit_features(data, floor, True, HIDDEN[:1])
+        if _pays(levelled.loss, chosen.loss, LEVELS_MUST_GAIN):
+            chosen = levelled
+    if chosen.loss > LEAST_GAIN:
+        chosen = _fit_features(data, floor, chosen.rung.levels, HIDDEN)
     return chosen
 
 
@@ -54,22 +56,23 @@ def _pays(loss: float, so_far: float, must_gain: float) -> bool:
     return loss < min((1.0 - must_gain) * so_far, so_far - LEAST_GAIN)
 
 
-def _fit_features(data: Windows, floor: np.ndarray, levels: bool) -> Fitted:
+def _fit_features(data: Windows, floor: np.ndarray, levels: bool, sizes: tuple) -> Fitted:
     raw = plain_features(data.windows, levels, floor)
     centre, scale = raw.mean(axis=0), 1.0 / (raw.std(axis=0) + 1e-6)
     features, classes = raw.shape[1], data.classes
     nothing = np.zeros((0, features))
     blank = Rung(
-        data.windows.shape[1], levels, max(HIDDEN), floor, centre, scale,
-        np.zeros((features + max(HIDDEN), classes)), np.zeros(classes), np.zeros((classes, features)), nothing, np.zeros(0),
+        data.windows.shape[1], levels, max(sizes), floor, centre, scale,
+        np.zeros((features + max(sizes), classes)), np.zeros(classes), np.zeros((classes, features)), nothing, np.zeros(0),
     )  # fmt: skip
     expanded = blank.expand(data.windows)
     sums = _Sums(expanded, data)
-    best = None
-    for hidden in HIDDEN:
-        size = features + hidden
-        found = min((_held_out(sums, expanded, data, size, s) for s in SHRINK), key=lambda f: f[0])
-        if best is None or _pays(found[0], best[0], HIDDEN_MUST_GAIN):
+    best = (*min((_held_out(sums, expanded, data, features, s) for s in SHRINK), key=lambda f: f[0]), 0)
+    for hidden in sizes[1:]:
+        found = _held_out(sums, expanded, data, features + hidden, best[1])
+        if found[0] > best[0]:
+            break
+        if _pays(found[0], best[0], HIDDEN_MUST_GAIN):
             best = (*found, hidden)
     loss, shrink, temper, loglik, hidden = best
     rungs = [_finish(blank, sums, left_out, hidden, shrink, temper) for left_out in (None, *range(data.folds))]

@@ -38,6 +38,7 @@ class SpectralModel:
     limits: dict[str, np.ndarray]  # spike, still, low, high: (channels,)
     window_ms: float = 100.0
     growth: float = 0.5
+    together: float = 1.0
     doubt: float = 0.0
     sure: float = 0.99
     figures: dict = field(default_factory=dict)  # of held-out recordings, for the reader
@@ -57,7 +58,13 @@ class SpectralModel:
 
     def save(self, path) -> None:
         content = {"format": FORMAT, "classes": self.classes, "rate_hz": self.rate_hz, "window_ms": self.window_ms}
-        content |= {"growth": self.growth, "doubt": self.doubt, "sure": self.sure, "figures": self.figures}
+        content |= {
+            "growth": self.growth,
+            "together": self.together,
+            "doubt": self.doubt,
+            "sure": self.sure,
+            "figures": self.figures,
+        }
         content["limits"] = {name: _listed(self.limits[name]) for name in LIMITS}
         content["rungs"] = [
             {n: getattr(r, n) for n in Rung.NUMBERS} | {n: _listed(getattr(r, n)) for n in (*Rung.ARRAYS, "span")}
@@ -82,7 +89,9 @@ class SpectralModel:
             arrays["axis"] = arrays["axis"].reshape(-1, len(arrays["centre"]))
             rungs.append(Rung(**{name: part[name] for name in Rung.NUMBERS}, **arrays))
         limits = {name: np.array(content["limits"][name], dtype=np.float64) for name in LIMITS}
-        numbers = {name: float(content[name]) for name in ("rate_hz", "window_ms", "growth", "doubt", "sure")}
+        numbers = {
+            name: float(content[name]) for name in ("rate_hz", "window_ms", "growth", "together", "doubt", "sure")
+        }
         model = cls([str(c) for c in content["classes"]], rungs=rungs, limits=limits, **numbers)
         model.figures = content.get("figures", {})
         if not rungs or any(len(r.bias) != len(model.classes) for r in rungs):
@@ -110,7 +119,7 @@ class Stream:
         natives = ffi.new("struct nav_texture_rung *[]", [r.native for r in model.rungs])
         unknown, border = (np.array([getattr(r, n) for r in model.rungs], float) for n in ("unknown", "border"))
         rules.rung, rules.unknown, rules.border = natives, doubles(unknown), doubles(border)
-        rules.growth, rules.doubt, rules.sure = model.growth, model.doubt, model.sure
+        rules.growth, rules.together, rules.doubt, rules.sure = model.growth, model.together, model.doubt, model.sure
         rules.step, rules.patience = step, patience
         # The span of windows at least as long as those judged; the longest rung's if there is none.
         longest = patience if step else window

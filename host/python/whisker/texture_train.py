@@ -132,6 +132,9 @@ def _calibrate(model: SpectralModel, fitted: list[Fitted], parts: list, labels, 
     model.growth = _growth(twins, parts, labels, folds, base)
     for twin in twins:
         twin.growth = model.growth
+    model.together = _together(twins, parts, labels, folds, base)
+    for twin in twins:
+        twin.together = model.together
     for index, found in enumerate(fitted):
         limit = _border(twins, parts, folds, found.rung.length)
         for rung in (found.rung, *(t.rungs[index] for t in twins)):
@@ -173,6 +176,14 @@ def _growth(twins, parts, labels, folds, base: int) -> float:
     mean = np.array(groups) - np.max(groups, axis=1, keepdims=True)
     tries = np.linspace(0.0, 1.0, 11)
     return float(tries[np.argmin([log_loss(mean * 4.0**p, np.array(truth)) for p in tries])])
+
+
+def _together(twins, parts, labels, folds, base: int) -> float:
+    """Factor under which the log-likelihoods of windows cost least; never above what two independent views deserve."""
+    pairs = [(d.loglik, k) for g, k in zip(_decisions(twins, parts, folds, base), labels, strict=True) for d in g]
+    loglik, truth = np.array([p[0] for p in pairs]), np.array([p[1] for p in pairs])
+    tries = np.linspace(0.5, 2.0, 16)
+    return float(tries[np.argmin([log_loss(loglik * t, truth) for t in tries])])
 
 
 def _border(twins, parts, folds, length: int) -> float:

@@ -1,0 +1,270 @@
+#include "near.h"
+#include "rng.h"
+#include "texture_clean.h"
+#include "texture_features.h"
+#include "texture_fft.h"
+#include "texture_stream.h"
+
+enum { FEATURES_MOST = 64 };
+
+static void power_is_that_of_the_transform_written_out(void **state)
+{
+    (void)state;
+    const int sizes[] = {4, 8, 64}, given[] = {3, 8, 50};
+    struct nav_rng rng;
+    nav_rng_seed(&rng, 1, 0);
+    for (int s = 0; s < 3; s++) {
+        double x[64], power[33];
+        struct nav_fft *f = nav_fft_new(sizes[s]);
+        for (int i = 0; i < given[s]; i++)
+            x[i] = nav_rng_normal(&rng);
+        nav_fft_power(f, x, given[s], power);
+        for (int k = 0; k <= sizes[s] / 2; k++) {
+            double re = 0.0, im = 0.0, turn = 2.0 * acos(-1.0) * k / sizes[s];
+            for (int i = 0; i < given[s]; i++) {
+                re += x[i] * cos(turn * i);
+                im -= x[i] * sin(turn * i);
+            }
+            assert_near(power[k], re * re + im * im, 1e-9);
+        }
+        nav_fft_free(f);
+    }
+    assert_null(nav_fft_new(2));
+    assert_null(nav_fft_new(100));
+}
+
+static void draw(double *window, int n, uint64_t seed)
+{
+    struct nav_rng rng;
+    nav_rng_seed(&rng, seed, 0);
+    for (int i = 0; i < n; i++)
+        window[i] = 20.0 * nav_rng_normal(&rng);
+}
+
+static void an_offset_changes_no_feature_and_a_gain_moves_all_powers_alike(void **state)
+{
+    (void)state;
+    double window[2 * 50], moved[2 * 50], a[FEATURES_MOST], b[FEATURES_MOST];
+    const double floor[] = {0.0, 0.0};
+    struct nav_texture_features *f = nav_texture_features_new(2, 50, 0, floor);
+    draw(window, 100, 3);
+    for (int i = 0; i < 100; i++)
+        moved[i] = 3.0 * window[i] + 500.0 * (i % 2);
+    nav_texture_features_work(f, window, a);
+    nav_texture_features_work(f, moved, b);
+    int count = nav_texture_features_count(f);
+    for (int i = 0; i < count - 1; i++)
+        assert_near(b[i] - a[i], log(9.0), 1e-6);
+    assert_near(b[count - 1], a[count - 1], 1e-6);
+    nav_texture_features_free(f);
+}
+
+static void a_constant_window_has_finite_features(void **state)
+{
+    (void)state;
+    double window[3 * 7] = {0.0}, out[FEATURES_MOST];
+    const double floor[] = {0.0, 0.0, 0.0}, negative[] = {0.0, -1.0, 0.0};
+    struct nav_texture_features *f = nav_texture_features_new(3, 7, 1, floor);
+    nav_texture_features_work(f, window, out);
+    for (int i = 0; i < nav_texture_features_count(f); i++)
+        assert_true(isfinite(out[i]));
+    nav_texture_features_free(f);
+    assert_null(nav_texture_features_new(3, 7, 0, negative));
+    assert_null(nav_texture_features_new(3, NAV_TEXTURE_LENGTH_MIN - 1, 0, floor));
+    assert_null(nav_texture_features_new(0, 7, 0, floor));
+}
+
+static void missing_samples_and_spikes_are_bridged_and_counted(void **state)
+{
+    (void)state;
+    const double spike = 50.0;
+    const struct nav_texture_limits limits = {.channels = 1, .spike = &spike};
+    double x[] = {NAN, 2.0, 3.0, 400.0, 5.0, INFINITY, NAN, 8.0, 1e300};
+    const double wanted[] = {2.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 8.0};
+    struct nav_texture_health health = nav_texture_clean(x, 9, &limits);
+    assert_int_equal(health.bad, 5);
+    for (int i = 0; i < 9; i++)
+        assert_near(x[i], wanted[i], 1e-12);
+    double none[] = {NAN, NAN};
+    assert_int_equal(nav_texture_clean(none, 2, &limits).bad, 2);
+    assert_true(none[0] == 0.0 && none[1] == 0.0);
+}
+
+static void stuck_railed_and_caught_channels_are_told(void **state)
+{
+    (void)state;
+    const double still[] = {3.0, 3.0}, low[] = {0.0, 0.0}, high[] = {100.0, 100.0}, span[] = {60.0, 60.0};
+    const struct nav_texture_limits limits = {.channels = 2, .still = still, .low = low, .high = high, .span = span};
+    double well[] = {10, 50, 11, 51, 12, 50, 12, 49, 10, 55};
+    double ill[] = {10, 10, 10, 100, 10, 100, 10, 20, 11, 15};
+    struct nav_texture_health h = nav_texture_clean(well, 5, &limits);
+    assert_true(!h.bad && !h.still && !h.railed && !h.caught);
+    h = nav_texture_clean(ill, 5, &limits);
+    assert_int_equal(h.still, 1);
+    assert_int_equal(h.railed, 1);
+    assert_int_equal(h.caught, 1);
+}
+
+/* One channel, windows of 16 samples; two classes told by the log of the whole power alone, about 0 and about 4. */
+struct model {
+    double floor, centre[FEATURES_MOST], scale[FEATURES_MOST], weight[2 * FEATURES_MOST], bias[2],
+        middle[2 * FEATURES_MOST];
+    double unknown, border, spike;
+    struct nav_texture_rung *rung;
+};
+
+static void make_model(struct model *m)
+{
+    *m = (struct model){.bias = {0.0, -8.0}, .unknown = 20.0, .border = 1.0, .spike = 1e3};
+    struct nav_texture_features *f = nav_texture_features_new(1, 16, 0, &m->floor);
+    int count = nav_texture_features_count(f), power = count - 2;
+    nav_texture_features_free(f);
+    m->scale[power] = 1.0;
+    m->weight[2 * power + 1] = 4.0;
+    m->middle[count + power] = 4.0;
+    const double none = 0.0;
+    const struct nav_texture_rung_numbers numbers = {.classes = 2,
+                                                     .channels = 1,
+                                                     .length = 16,
+                                                     .temper = 1.0,
+                                                     .beyond = (double)count,
+                                                     .floor = &m->floor,
+                                                     .centre = m->centre,
+                                                     .scale = m->scale,
+                                                     .weight = m->weight,
+                                                     .bias = m->bias,
+                                                     .middle = m->middle,
+                                                     .axis = &none,
+                                                     .axis_weight = &none};
+    m->rung = nav_texture_rung_new(&numbers);
+    assert_non_null(m->rung);
+}
+
+static struct nav_texture_stream *stream_of(const struct model *m, int step)
+{
+    const struct nav_texture_rules rules = {.channels = 1,
+                                            .classes = 2,
+                                            .window = 32,
+                                            .rungs = 1,
+                                            .rung = &m->rung,
+                                            .unknown = &m->unknown,
+                                            .border = &m->border,
+                                            .growth = 0.5,
+                                            .together = 1.0,
+                                            .doubt = 0.6,
+                                            .step = step,
+                                            .sure = 0.99,
+                                            .patience = step ? 64 : 0,
+                                            .limits = {.channels = 1, .spike = &m->spike}};
+    struct nav_texture_stream *s = nav_texture_stream_new(&rules);
+    assert_non_null(s);
+    return s;
+}
+
+/* Pushes n samples alternating between +-amplitude; returns the last decision and how many there were. */
+static int drive(struct nav_texture_stream *s, double amplitude, int n, struct nav_texture_decision *d, double *loglik)
+{
+    int count = 0, decided;
+    for (int i = 0; i < n; i++) {
+        double x = 1000.0 + (i % 2 ? amplitude : -amplitude);
+        assert_int_equal(nav_texture_stream_push(s, &x, 1, &decided, d, loglik), 1);
+        count += decided;
+    }
+    return count;
+}
+
+static void windows_name_surfaces_borders_and_strangers(void **state)
+{
+    (void)state;
+    struct model m;
+    struct nav_texture_decision d;
+    double loglik[2];
+    make_model(&m);
+    struct nav_texture_stream *s = stream_of(&m, 0);
+    assert_int_equal(drive(s, 1.0, 64, &d, loglik), 2);
+    assert_true(d.label == 0 && !d.border && d.confidence > 0.9 && loglik[0] == 0.0 && loglik[1] < -2.0);
+    drive(s, 7.4, 32, &d, loglik);
+    assert_true(d.label == 1 && d.border);
+    drive(s, 7.4, 16, &d, loglik);
+    drive(s, 1.0, 16, &d, loglik);
+    assert_true(d.label == 0 && d.border); /* a border in the middle: the later half counts */
+    drive(s, 400.0, 32, &d, loglik);
+    assert_int_equal(d.label, NAV_TEXTURE_UNKNOWN);
+    assert_true(d.distance > m.unknown);
+    nav_texture_stream_free(s);
+    nav_texture_rung_free(m.rung);
+}
+
+static void bad_windows_are_no_evidence_and_never_nan(void **state)
+{
+    (void)state;
+    struct model m;
+    struct nav_texture_decision d;
+    double loglik[2] = {7.0, 7.0};
+    make_model(&m);
+    struct nav_texture_stream *s = stream_of(&m, 0);
+    drive(s, 1.0, 23, &d, loglik);
+    drive(s, NAN, 9, &d, loglik);
+    assert_int_equal(d.health.bad, 9);
+    assert_true(d.label == NAV_TEXTURE_UNKNOWN && d.confidence == 0.0 && loglik[0] == 0.0 && loglik[1] == 0.0);
+    nav_texture_stream_free(s);
+    nav_texture_rung_free(m.rung);
+}
+
+static void sequential_decisions_stop_when_sure_and_give_up(void **state)
+{
+    (void)state;
+    struct model m;
+    struct nav_texture_decision d;
+    double loglik[2];
+    make_model(&m);
+    struct nav_texture_stream *s = stream_of(&m, 16);
+    assert_int_equal(drive(s, 1.0, 16, &d, loglik), 1);
+    assert_true(d.label == 0 && d.samples == 16);
+    nav_texture_stream_reset(s);
+    double between = exp(1.0); /* log power 2: both classes alike */
+    assert_int_equal(drive(s, between, 63, &d, loglik), 0);
+    assert_int_equal(drive(s, between, 1, &d, loglik), 1);
+    assert_true(d.label == NAV_TEXTURE_UNKNOWN && d.samples == 64);
+    nav_texture_stream_free(s);
+    nav_texture_rung_free(m.rung);
+}
+
+static void impossible_rules_make_no_stream(void **state)
+{
+    (void)state;
+    struct model m;
+    make_model(&m);
+    struct nav_texture_rung *twice[] = {m.rung, m.rung};
+    const double limit[] = {1.0, 1.0};
+    struct nav_texture_rules rules = {.channels = 1,
+                                      .classes = 2,
+                                      .window = 32,
+                                      .rungs = 2,
+                                      .rung = twice,
+                                      .unknown = limit,
+                                      .border = limit,
+                                      .limits = {.channels = 1}};
+    assert_null(nav_texture_stream_new(&rules));
+    rules.rungs = 1;
+    rules.window = 1;
+    assert_null(nav_texture_stream_new(&rules));
+    nav_texture_stream_free(NULL);
+    nav_texture_rung_free(m.rung);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(power_is_that_of_the_transform_written_out),
+        cmocka_unit_test(an_offset_changes_no_feature_and_a_gain_moves_all_powers_alike),
+        cmocka_unit_test(a_constant_window_has_finite_features),
+        cmocka_unit_test(missing_samples_and_spikes_are_bridged_and_counted),
+        cmocka_unit_test(stuck_railed_and_caught_channels_are_told),
+        cmocka_unit_test(windows_name_surfaces_borders_and_strangers),
+        cmocka_unit_test(bad_windows_are_no_evidence_and_never_nan),
+        cmocka_unit_test(sequential_decisions_stop_when_sure_and_give_up),
+        cmocka_unit_test(impossible_rules_make_no_stream),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

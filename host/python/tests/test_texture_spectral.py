@@ -1,0 +1,219 @@
+"""The default texture method: training, calibration, faults, borders, other rates and widths, files, command line."""
+
+import json
+
+import numpy as np
+import pytest
+from commandkit import run, signals_as_before  # noqa: F401 - a fixture
+
+from whisker import texture
+from whisker.tables import TableError
+from whisker.texture_spectral import SpectralModel
+from whisker.texture_train import train
+
+RATE_HZ = 2000.0
+WINDOW = 200
+COLOUR = {"VINYL": 0.0, "SMOOTH": 0.6, "ROUGH": 0.95}  # each sample's share of the one before
+
+
+def drag(name, n, seed, channels=2, gain=1.0):
+    """Coloured noise about a rest of its own: loudness varies more within a surface than between them."""
+    rng = np.random.default_rng([seed, sum(map(ord, name))])
+    keep = COLOUR[name]
+    white = rng.normal(0, np.sqrt(1 - keep**2), (n, channels))
+    for i in range(1, n):
+        white[i] += keep * white[i - 1]
+    loud = gain * rng.uniform(20, 60)
+    return np.round(32768 + rng.uniform(-200, 200, channels) + loud * white)
+
+
+def recordings(names=tuple(COLOUR), count=5, n=2000, channels=2):
+    return {name: [drag(name, n, seed, channels) for seed in range(count)] for name in names}
+
+
+@pytest.fixture(scope="module")
+def model():
+    return train(recordings(), RATE_HZ)
+
+
+def share_right(model, window, seeds=range(20, 24), **changes):
+    found = [
+        (k, d)
+        for k, name in enumerate(COLOUR)
+        for s in seeds
+        for d in model.judge(drag(name, 1600, s, **changes), window)
+    ]
+    return np.mean([d.label == k for k, d in found])
+
+
+def test_surfaces_are_told_apart_on_recordings_never_seen(model):
+    assert share_right(model, WINDOW) > 0.95
+    assert share_right(model, WINDOW, gain=1.5) > 0.9
+
+
+def test_an_offset_changes_nothing(model):
+    x = drag("SMOOTH", 1000, 31)
+    for here, there in zip(model.judge(x, WINDOW), model.judge(x + 2000, WINDOW), strict=True):
+        assert here.label == there.label and np.allclose(here.loglik, there.loglik, atol=1e-6)
+
+
+def test_confidence_is_what_it_says(model):
+    found = [(d.loglik.argmax() == k, d.confidence) for k, n in enumerate(COLOUR) for s in range(40, 46) for d in model.judge(drag(n, 1000, s), 25)]  # fmt: skip
+    right, confidence = np.array(found, float).T
+    assert abs(right.mean() - confidence.mean()) < 0.06 and right.mean() < 0.999
+
+
+@pytest.mark.parametrize(("rate_hz", "channels", "window"), [(100.0, 1, 170), (35.0, 16, 64), (2000.0, 3, 200)])
+def test_other_rates_and_widths_work(rate_hz, channels, window):
+    names = ("VINYL", "ROUGH")
+    other = train(recordings(names, count=4, n=800, channels=channels), rate_hz)
+    found = [(k, d) for k, n in enumerate(names) for d in other.judge(drag(n, 800, 50, channels), window)]
+    assert np.mean([d.label == k for k, d in found]) > 0.9
+
+
+def test_a_surface_never_trained_is_unknown(model):
+    t = np.arange(1000)[:, None] * np.array([[0.31, 0.17]])
+    strange = np.round(32768 + 40 * np.sin(2 * np.pi * t))
+    assert [d.label for d in model.judge(strange, WINDOW)] == [-1] * 5
+
+
+def test_a_border_inside_or_between_windows_is_reported(model):
+    for before in (300, 400):
+        x = np.concatenate([drag("VINYL", before, 60), drag("ROUGH", 1000 - before, 60)])
+        x[before:] += x[before - 1] - x[before]
+        found = model.judge(x, WINDOW)
+        assert found[1 if before == 300 else 2].border
+        assert found[-1].label == 2 and not found[0].border
+
+
+def test_a_catch_is_a_border_and_no_surface(model):
+    x = drag("SMOOTH", 1000, 61)
+    x[450:750, 0] += 3000 * np.sin(np.linspace(0, np.pi, 300))
+    caught = model.judge(x, WINDOW)[2:4]
+    assert all(d.border and d.label == -1 for d in caught)
+
+
+@pytest.mark.parametrize("spoil", ["nan", "stuck", "railed", "silent"])
+def test_faults_are_unknown_with_no_confidence(model, spoil):
+    x = drag("SMOOTH", 600, 62)
+    if spoil == "nan":
+        x[::3] = np.nan
+    elif spoil == "stuck":
+        x[:, 0] = x[0, 0]
+    elif spoil == "railed":
+        x[:, 1] = np.clip((x[:, 1] - 32768) * 1e4, 0, 65535)
+    else:
+        x[:] = np.inf
+    for d in model.judge(x, WINDOW):
+        assert d.label == -1 and d.confidence == 0.0 and np.array_equal(d.loglik, np.zeros(3))
+
+
+def test_one_bad_record_in_a_hundred_is_left_out(model):
+    rng = np.random.default_rng(3)
+    right = []
+    for k, name in enumerate(COLOUR):
+        x = drag(name, 2000, 63)
+        bad = rng.choice(2000, 20, replace=False)
+        x[bad] = rng.uniform(0, 65535, (20, 2))
+        found = model.judge(x, WINDOW)
+        right += [d.label in (k, -1) for d in found]
+        assert sum(d.bad for d in found) >= 15 and all(np.isfinite(d.loglik).all() for d in found)
+    assert np.mean(right) > 0.95
+
+
+def test_sequential_decisions_take_fewer_samples_and_may_not_know(model):
+    found = [
+        (k, d) for k, name in enumerate(COLOUR) for d in model.judge(drag(name, 4000, 64), WINDOW, sequential=True)
+    ]
+    assert np.mean([d.samples for _, d in found]) <= WINDOW / 2
+    assert np.mean([d.label == k for k, d in found]) > 0.95
+    model.sure, sure = 2.0, model.sure
+    try:
+        found = model.judge(drag("SMOOTH", 1600, 65), WINDOW, sequential=True)
+        assert [(d.samples, d.label) for d in found] == [(4 * WINDOW, -1)] * 2
+    finally:
+        model.sure = sure
+
+
+def test_block_by_block_is_as_all_at_once(model):
+    x = drag("ROUGH", 1000, 66)
+    stream = model.stream(WINDOW)
+    parts = [d for block in np.array_split(x, 37) for d in stream.push(block)]
+    whole = model.judge(x, WINDOW)
+    assert [(d.end, d.label, d.confidence) for d in parts] == [(d.end, d.label, d.confidence) for d in whole]
+
+
+def test_saved_models_load_alike_and_are_small(model, tmp_path):
+    path = tmp_path / "m.json"
+    model.save(path)
+    again = texture.load(path)
+    x = drag("SMOOTH", 1000, 67)
+    assert isinstance(again, SpectralModel) and path.stat().st_size < 200_000
+    for a, b in zip(model.judge(x, WINDOW), again.judge(x, WINDOW), strict=True):
+        assert a.label == b.label and np.allclose(a.loglik, b.loglik, atol=1e-2)
+
+
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        lambda c: c.pop("rungs"),
+        lambda c: c.update(rungs=[]),
+        lambda c: c["rungs"][0]["centre"].pop(),
+        lambda c: c["rungs"][0].update(temper=float("nan")),
+        lambda c: c["rungs"][0].update(length=1 << 30),
+        lambda c: c["rungs"][0].update(hidden=1e9),
+        lambda c: c["rungs"][0]["weight"][0].pop(),
+        lambda c: c.update(rungs=c["rungs"][::-1]),
+        lambda c: c["limits"].pop("spike"),
+        lambda c: c["limits"]["still"].pop(),
+        lambda c: c.update(classes=["VINYL"]),
+        lambda c: c.update(growth="much"),
+    ],
+)
+def test_spoiled_model_files_are_one_clear_line(model, tmp_path, spoil):
+    path = tmp_path / "m.json"
+    model.save(path)
+    content = json.loads(path.read_text())
+    spoil(content)
+    path.write_text(json.dumps(content))
+    with pytest.raises(TableError, match="whisker texture train") as error:
+        texture.load(path)
+    assert "\n" not in str(error.value)
+
+
+def write(path, samples, rate_hz=RATE_HZ):
+    path.parent.mkdir(parents=True, exist_ok=True)
+    rows = [f"{i / rate_hz:.4f},{','.join(f'{v:g}' for v in s)}\n" for i, s in enumerate(samples)]
+    path.write_text("t_s,x,y\n" + "".join(rows))
+
+
+@pytest.mark.parametrize("method", ["naive-bayes", "default"])
+def test_commands_train_and_classify_as_promised(capsys, tmp_path, method):
+    for name in ("VINYL", "ROUGH"):
+        for n in range(3):
+            write(tmp_path / "set" / name / f"{n}.csv", drag(name, 1000, n))
+    assert run(capsys, "texture", "train", tmp_path / "set", "--out", tmp_path / "m.json", "--method", method)[0] == 0
+    write(tmp_path / "drive.csv", drag("ROUGH", 1000, 9))
+    for more in ([], ["--sequential"]):
+        code, out, _ = run(capsys, "texture", "classify", tmp_path / "m.json", tmp_path / "drive.csv", "--json", *more)
+        lines = [json.loads(line) for line in out.splitlines()]
+        assert code == 0 and all(set(d) == {"t_s", "loglik", "label", "confidence", "border"} for d in lines)
+        assert set(lines[0]["loglik"]) == {"VINYL", "ROUGH"} and more or len(lines) == 5
+
+
+def test_windows_do_not_reach_across_gaps(model):
+    t = np.concatenate([np.arange(300), np.arange(300) + 5000]) / RATE_HZ
+    found = texture.classify(model, t, drag("VINYL", 600, 70))
+    assert [round(d.t_s * RATE_HZ) for d in found] == [199, 5199]
+
+
+def test_recordings_of_different_rates_are_one_clear_line(tmp_path):
+    write(tmp_path / "A/1.csv", drag("VINYL", 50, 1))
+    write(tmp_path / "B/1.csv", drag("ROUGH", 50, 1), rate_hz=100.0)
+    with pytest.raises(TableError, match="100 to 2000 Hz; give one rate"):
+        texture.read_training(tmp_path)
+
+
+def test_too_little_to_learn_from_is_said():
+    with pytest.raises(ValueError, match="record each surface"):
+        train({"A": [np.zeros((3, 2))], "B": [np.zeros((3, 2))]}, RATE_HZ)
