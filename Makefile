@@ -4,7 +4,7 @@ BUILD := build/release
 PYTHON := .venv/bin/python
 SOURCES_C = $(shell git ls-files '*.c' '*.h' '*.cpp' | grep -v '/gen/')
 
-.PHONY: help demo test test-all bench build setup gen format lint clean
+.PHONY: help demo test test-all bench build setup gen firmware flash format lint clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
@@ -29,6 +29,12 @@ setup: ## install what is missing: Debian packages, locked Python packages
 
 gen: setup ## regenerate protocol/gen from protocol/whisker.toml
 	@$(PYTHON) tools/protogen.py
+
+firmware: ## build the node's firmware with XC16 or XC-DSC, where there is one
+	@tools/firmware.sh
+
+flash: ## first programming of a node by wire: TOOL=ipecmd|pk2cmd|picberry SERIAL=n [HEX=file]
+	@tools/flash.sh --tool "$(TOOL)" $(if $(SERIAL),--serial "$(SERIAL)") $(if $(HEX),--hex "$(HEX)")
 
 format: setup ## format C, C++ and Python
 	@clang-format -i $(SOURCES_C)

@@ -68,10 +68,10 @@ def make_image(
     return header(content, version, options, chip, wire) + content
 
 
-def wire_memory(loader: Path, image: bytes | None, serial: int | None) -> dict[int, int]:
-    """The loader's HEX with image and serial number put in."""
+def wire_memory(loader: Path, image: bytes | None, serial: int | None, whole: bool = False) -> dict[int, int]:
+    """The loader's HEX with image and serial number put in; whole: there is an application in it already."""
     memory = intel_hex.read(loader)
-    if any(HEADER_ROW * ROW_HEX <= address < FLASH_END for address in memory):
+    if not whole and any(HEADER_ROW * ROW_HEX <= address < FLASH_END for address in memory):
         raise intel_hex.HexError(f"{loader}: code in the application's rows; link it with boot.gld")
     if image:
         head, content = image[: IMAGE_HEADER.size], image[IMAGE_HEADER.size :]
@@ -110,6 +110,7 @@ def main() -> int:
     wire.add_argument("--app", type=Path)
     wire.add_argument("--version", type=version_number, default=1)
     wire.add_argument("--serial", type=serial_number)
+    wire.add_argument("--whole", action="store_true", help="the HEX has its application already")
     for kind in (image, wire):
         kind.add_argument("--options", type=lambda text: int(text, 0), default=0)
     words = parser.parse_args()
@@ -118,7 +119,7 @@ def main() -> int:
             words.out.write_bytes(make_image(words.hex, words.version, words.options))
         else:
             app = make_image(words.app, words.version, words.options) if words.app else None
-            intel_hex.write(words.out, wire_memory(words.hex, app, words.serial))
+            intel_hex.write(words.out, wire_memory(words.hex, app, words.serial, words.whole))
     except intel_hex.HexError as error:
         print(f"make_image: {error}", file=sys.stderr)
         return 1

@@ -23,6 +23,7 @@
 #define INTCON1_DMACERR 0x0020u
 #define INTCON1_NSTDIS 0x8000u /* interrupts do not nest */
 #define INTCON2 0x0082u
+#define INTCON2_ALTIVT 0x8000u /* the alternate vector table, from 0x000104 */
 #define INTCON2_INT1EP 0x0002u /* 1: INT1 on the falling edge */
 #define INTCON2_INT2EP 0x0004u
 #define IFS0 0x0084u

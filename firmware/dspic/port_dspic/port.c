@@ -47,7 +47,11 @@ void port_boot(struct board *board)
     if (loader_is_asked_for(board) || !image_is_valid(board, board->loader.row))
         port_start_loader(board);
     else
+#ifdef NODE_LOADER
+        port_jump_to_application(board);
+#else
         port_start(board);
+#endif
 }
 
 static void start_peripherals(struct board *board)

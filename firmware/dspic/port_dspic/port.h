@@ -50,6 +50,9 @@ void port_boot(struct board *board);
 void port_start(struct board *board);
 void port_start_loader(struct board *board);
 
+/* On the chip, where the loader is a program of its own: leaves for the other. */
+void port_jump_to_application(struct board *board);
+
 /* One turn of the main loop: shows the watchdog that interrupts are served, deals with a service order that waits, then
  * idles until the next interrupt. */
 void port_loop(struct board *board);

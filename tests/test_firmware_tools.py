@@ -1,0 +1,150 @@
+"""From the compiler's HEX to the chip: images, first programming by wire, what is missing is said; the chip's code compiles."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT / "tools"))
+import check_listing  # noqa: E402
+import intel_hex  # noqa: E402
+import make_image  # noqa: E402
+
+FIRST = make_image.FIRST_ROW * 128
+FIRMWARE = ROOT / "firmware/dspic"
+
+
+def hex_file(path: Path, words: int, first: int = FIRST) -> Path:
+    intel_hex.write(path, {2 * first + i: (7 * i + i // 4) % 251 if i % 4 != 3 else 0 for i in range(4 * words)})
+    return path
+
+
+def run(*words, **environment) -> subprocess.CompletedProcess:
+    return subprocess.run(
+        [str(word) for word in words], capture_output=True, text=True, cwd=ROOT, env=os.environ | environment
+    )
+
+
+def test_an_image_holds_the_code_and_nothing_of_the_phantom_bytes(tmp_path):
+    source = hex_file(tmp_path / "app.hex", 100)
+    image = make_image.make_image(source, 0x0102)
+    memory = intel_hex.read(source)
+    wanted = bytes(memory[2 * FIRST + i] for i in range(400) if i % 4 != 3)
+    assert image[48 : 48 + 300] == wanted and set(image[348:]) == {0xFF}
+    assert (len(image) - 48) % 192 == 0
+
+
+@pytest.mark.parametrize(
+    "spoil, message",
+    [
+        (lambda text: text.replace(":10", ":11", 1), "checksum is wrong"),
+        (lambda text: text[: text.rindex(":00000001FF")], "cut short"),
+        (lambda text: "hello\n" + text, "checksum is wrong"),
+    ],
+)
+def test_a_damaged_hex_file_is_refused_in_one_line(tmp_path, spoil, message):
+    source = hex_file(tmp_path / "app.hex", 100)
+    source.write_text(spoil(source.read_text()))
+    done = run(sys.executable, "tools/make_image.py", "image", source, tmp_path / "out.whex", "--version", "1.0")
+    assert done.returncode == 1 and message in done.stderr and done.stderr.count("\n") == 1
+
+
+def test_code_in_the_others_place_is_refused(tmp_path):
+    done = run(
+        sys.executable,
+        "tools/make_image.py",
+        "image",
+        hex_file(tmp_path / "a.hex", 9, 0x200),
+        tmp_path / "o",
+        "--version",
+        "1.0",
+    )
+    assert done.returncode == 1 and "which is the loader's" in done.stderr
+    done = run(
+        sys.executable, "tools/make_image.py", "wire", hex_file(tmp_path / "b.hex", 9), tmp_path / "o", "--serial", "5"
+    )
+    assert done.returncode == 1 and "code in the application's rows" in done.stderr
+
+
+def test_what_goes_by_wire_is_loader_header_application_and_number(tmp_path):
+    loader, app = hex_file(tmp_path / "loader.hex", 50, 0x200), hex_file(tmp_path / "app.hex", 100)
+    image = make_image.make_image(app, 1)
+    memory = make_image.wire_memory(loader, image, 0x01020304)
+    placed = make_image.flash_bytes(memory)
+    assert bytes(placed[make_image.HEADER_ROW * 192 + i] for i in range(48)) == image[:48]
+    assert bytes(placed[FIRST // 2 * 3 + i] for i in range(len(image) - 48)) == image[48:]
+    assert [memory[make_image.FUID0 + 4 * i] for i in range(4)] == [4, 3, 2, 1]
+    assert all(memory[a] == byte for a, byte in intel_hex.read(loader).items())
+
+
+WANTED = {
+    "ipecmd": "-P33FJ128MC802 -TPPPK3 -M -F{hex} -OL",
+    "pk2cmd": "-PdsPIC33FJ128MC802 -M -F{hex} -Y -R",
+    "picberry": "-w -f dspic33f -i {hex}",
+}
+
+
+@pytest.mark.parametrize("tool", WANTED)
+def test_programmers_are_called_as_they_want_it(tmp_path, tool):
+    """A stand-in on PATH writes down its arguments."""
+    source = hex_file(tmp_path / "wire.hex", 50, 0x200)
+    program = tmp_path / tool
+    program.write_text(f'#!/bin/sh\necho "$@" >{tmp_path}/called\n')
+    program.chmod(0o755)
+    path = f"{tmp_path}:{os.environ['PATH']}"
+    words = ["tools/flash.sh", "--tool", tool, "--hex", source]
+    done = run(*words, PATH=path)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "called").read_text().strip() == WANTED[tool].format(hex=source)
+    (tmp_path / "called").unlink()
+    done = run(*words, "--serial", 71, "--dry-run", PATH=path)
+    assert done.stdout.split(" ", 1)[1].strip() == WANTED[tool].format(hex="build/firmware/node_71.hex")
+    assert not (tmp_path / "called").exists()
+    assert intel_hex.read(ROOT / "build/firmware/node_71.hex")[make_image.FUID0] == 71
+    program.write_text("#!/bin/sh\nexit 3\n")
+    done = run(*words, PATH=path)
+    assert done.returncode == 1 and "check supply" in done.stderr
+
+
+@pytest.mark.parametrize(
+    "words, message",
+    [
+        ([], "which programmer"),
+        (["--tool", "stk500"], "use ipecmd, pk2cmd or picberry"),
+        (["--tool", "ipecmd", "--hex", "none.hex"], "run 'make firmware' first"),
+        (["--tool", "ipecmd", "--serial", "x"], "whole number"),
+        (["--tool", "picberry", "--hex", "README.md"], "install picberry"),
+    ],
+)
+def test_what_is_missing_for_programming_is_said(words, message):
+    done = run("tools/flash.sh", *words)
+    assert done.returncode == 1 and message in done.stderr
+
+
+def test_without_its_compiler_the_firmware_build_says_so():
+    done = run("tools/firmware.sh", PATH="/usr/bin:/bin")
+    assert done.returncode == 1 and "install MPLAB XC-DSC or XC16" in done.stderr
+
+
+@pytest.mark.parametrize("define", ["-DNODE_APPLICATION", "-DNODE_LOADER"])
+def test_the_code_for_the_chip_compiles(define):
+    sources = [
+        path for folder in ("core", "boot", "port_dspic", "port_dspic/chip") for path in FIRMWARE.glob(f"{folder}/*.c")
+    ]
+    includes = [f"-I{FIRMWARE / folder}" for folder in (".", "core", "port_dspic")] + [f"-I{ROOT}/protocol/gen"]
+    stub = ["-include", FIRMWARE / "tests/xc16_stub.h"]
+    flags = ["-std=gnu99", "-fsyntax-only", "-Wall", "-Wextra", "-Werror", "-Wno-attributes", "-D__dsPIC33F__", define]
+    done = run("cc", *flags, *stub, *includes, *sources)
+    assert done.returncode == 0, done.stderr
+
+
+def test_a_library_call_in_the_sample_path_is_found():
+    good = "00002300 <_node_on_sync>:\n 2300: 07 00 00  rcall 0x2400 <_sampler_on_sync>\n"
+    assert check_listing.findings(good) == []
+    bad = good + " 2302: 02 00 00  call 0x3000 <___udivsi3>\n0x2400 <_main>:\n"
+    assert check_listing.findings(bad) == ["_node_on_sync calls ___udivsi3"]
+    elsewhere = "00002300 <_loader_serve>:\n 2302: 02 00 00  call 0x3000 <___mulsi3>\n"
+    assert check_listing.findings(elsewhere) == []

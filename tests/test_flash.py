@@ -1,0 +1,122 @@
+"""Firmware updates end to end: whisker-flash, libusb and hidapi, RTL, nodes with their loaders; then sampling goes on."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from chainrun import END_S, FAST_LINK, ROOT, program, simulation, write_flat_scene
+
+from whisker.protocol import CODES, STATUS_CODE_SHIFT
+from whisker.ring import Reader
+
+sys.path.insert(0, str(ROOT / "tools"))
+import intel_hex  # noqa: E402
+import make_image  # noqa: E402
+
+WHISKERS = 6
+BODY_WORDS = 700
+VERSION = 0x0203
+
+
+def synthetic_hex(path, words: int = BODY_WORDS, first: int = make_image.FIRST_ROW * 128):
+    """An application of so many instructions, as a compiler's HEX file has it."""
+    random = np.random.default_rng(7)
+    memory = {}
+    for n, word in enumerate(random.integers(0, 1 << 24, words).tolist()):
+        memory |= {2 * (first + 2 * n) + i: byte for i, byte in enumerate(word.to_bytes(4, "little"))}
+    intel_hex.write(path, memory)
+    return path
+
+
+@pytest.fixture(scope="module")
+def image(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("image")
+    path = folder / "app.whex"
+    path.write_bytes(make_image.make_image(synthetic_hex(folder / "app.hex"), VERSION))
+    return path
+
+
+def bridge_with(folder, traits: str, shell: str) -> subprocess.CompletedProcess:
+    """Runs shell commands with a simulated bridge whose nodes have these traits; $FLASH is whisker-flash."""
+    scene, _ = write_flat_scene(folder, 3)
+    (folder / "nodes.txt").write_text(traits)
+    command = simulation(folder, scene, 600, 3, "unused", "--nodes", folder / "nodes.txt")
+    command = [*command[: command.index("--") + 1], "sh", "-c", shell]
+    environment = os.environ | {"FLASH": program("whisker-flash"), "LINK": " ".join(FAST_LINK)}
+    return subprocess.run(command, capture_output=True, text=True, timeout=END_S, env=environment)
+
+
+def nodes_listed(text: str) -> dict[int, tuple[str, str, str]]:
+    """lane: (serial, version, state) of whisker-flash --list."""
+    found = re.findall(r"^ +(\d+)  (\S+) +(\d+\.\d+) +0x0000 +2 +0x06\w\w +1 +(.*)$", text, re.M)
+    return {int(lane): (serial, version, state) for lane, serial, version, state in found}
+
+
+def test_all_nodes_at_once_but_for_those_that_cannot(image, tmp_path):
+    """Lane 1 loses its supply in the middle, lane 4 is another chip; the second time lane 1 takes it too."""
+    shell = f"$FLASH $LINK {image}; echo first $?; $FLASH $LINK {image} --node 2; echo second $?; $FLASH $LINK --list"
+    done = bridge_with(tmp_path, "1 cut 20\n4 chip 0x062A\n", shell)
+    first, _, rest = done.stdout.partition("first 1\n")
+    assert rest, done.stdout + done.stderr
+    fate = dict(re.findall(r"^lane +(\d): (.*)$", first, re.M))
+    assert {lane for lane, text in fate.items() if text == "updated"} == {"0", "2", "3", "5"}
+    assert fate["4"] == "refused: the image is for another chip"
+    assert "second 0" in rest, rest
+    listed = nodes_listed(rest)
+    assert {lane: version for lane, (_, version, _) in listed.items()} == {
+        lane: "0.1" if lane == 4 else "2.3" for lane in range(WHISKERS)
+    }
+    assert {state for _, _, state in listed.values()} == {"the application runs"}
+
+
+def test_serial_numbers_address_one_node_and_duplicates_are_told(image, tmp_path):
+    shell = (
+        f"$FLASH $LINK {image} --lane 0; echo one $?; $FLASH $LINK {image} --lane 2; echo two $?;"
+        f"$FLASH $LINK {image} --node 99; echo three $?; $FLASH $LINK {image} --dry-run; echo four $?;"
+        f"$FLASH $LINK {image} --node 50; echo five $?; $FLASH $LINK --list"
+    )
+    done = bridge_with(tmp_path, "0 serial 50\n1 serial 7\n2 serial 7\n3 serial 0xFFFFFFFF\n", shell)
+    assert done.stdout.count("serial number 7 is on several lanes: 1 2;") >= 2
+    assert "one 0" in done.stdout and "two 1" in done.stdout and "three 1" in done.stdout and "four 0" in done.stdout
+    assert "five 0" in done.stdout
+    assert "no serial number of its own" in done.stderr and "no node has serial number 99" in done.stderr
+    listed = nodes_listed(done.stdout)
+    assert {lane: version for lane, (_, version, _) in listed.items()} == {
+        lane: "2.3" if lane == 0 else "0.1" for lane in range(WHISKERS)
+    }
+
+
+def test_what_is_no_image_is_refused_before_the_bridge_is_touched(image, tmp_path):
+    bad = tmp_path / "bad.whex"
+    bad.write_bytes(image.read_bytes()[:-1] + b"\x00")
+    for arguments, code in (([bad], 1), ([tmp_path / "none"], 1), ([], 2), (["--list", image], 2)):
+        done = subprocess.run([program("whisker-flash"), *arguments], capture_output=True, text=True)
+        assert (done.returncode, done.stderr.count("\n")) == (code, 1), done.stderr
+
+
+def test_sampling_goes_on_after_an_update(image, tmp_path):
+    """whiskerd takes over: every lane's records are good but for the sensor's start-up."""
+    ring = f"whisker-flash-{os.getpid()}"
+    shell = f"$FLASH $LINK {image} && exec {program('whiskerd')} --ring {ring} $LINK"
+    scene, _ = write_flat_scene(tmp_path, 3)
+    command = simulation(tmp_path, scene, 20, 3, ring)
+    command = [*command[: command.index("--") + 1], "sh", "-c", shell]
+    environment = os.environ | {"FLASH": program("whisker-flash"), "LINK": " ".join(FAST_LINK)}
+    with subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL) as process:
+        with Reader(ring, wait_s=60.0) as reader:
+            frames = np.concatenate([view.copy() for view in reader.frames()])
+        assert process.wait(END_S) == 0
+    codes = frames["lane"]["status"][:, :WHISKERS] >> STATUS_CODE_SHIFT
+    assert len(frames) > 500
+    assert not codes[100:].any()
+    assert set(np.unique(codes)) <= {CODES["ok"], CODES["starting"], CODES["resync"]}
+
+
+def test_image_survives_the_way_from_hex(image):
+    raw = image.read_bytes()
+    assert len(raw) == 48 + (3 * BODY_WORDS + 191) // 192 * 192
+    assert json.dumps(make_image.IMAGE_HEADER.unpack(raw)["length"]) == str(len(raw) - 48)

@@ -1,0 +1,42 @@
+#!/usr/bin/env python3
+"""Looks through a disassembly of the node's firmware: no library routine where a sample passes.
+
+check_listing.py LISTING: exit 1, with a line per finding, if a function between SYNC and an armed record calls one of the
+compiler's helpers (float, 32-bit division or multiplication).
+"""
+
+import re
+import sys
+from pathlib import Path
+
+SAMPLE_PATH = re.compile(
+    r"_(port_on_\w+|node_on_\w+|sampler_on_\w+|sensor_frame_\w+|record_pack|order_parse|board_(link|sensor|timer)_\w+"
+    r"|_(INT[12]|T2|SPI[12](Err)?|DMA1)Interrupt)$"
+)
+HELPER = re.compile(r"<?(_{2,3}(u?div|u?mod|mul|add|sub|float|fix|lt|gt|le|ge|eq|ne|neg|cmp)\w*(si|di|sf|df|hi)\w*)>?")
+FUNCTION = re.compile(r"^\s*[0-9a-f]+ <(\w+)>:")
+CALL = re.compile(r"\b(r?call|goto|bra)\b(.*)$")
+
+
+def findings(text: str) -> list[str]:
+    found, function = [], ""
+    for line in text.splitlines():
+        if begins := FUNCTION.match(line):
+            function = begins.group(1)
+        elif (call := CALL.search(line)) and (helper := HELPER.search(call.group(2))) and SAMPLE_PATH.match(function):
+            found.append(f"{function} calls {helper.group(1)}")
+    return found
+
+
+def main() -> int:
+    text = Path(sys.argv[1]).read_text()
+    found = findings(text)
+    if not any(SAMPLE_PATH.match(name) for name in re.findall(r"<(\w+)>:", text)):
+        found.append("no function of the sample path is in it; is it a disassembly with symbols?")
+    for line in found:
+        print(f"check_listing: {sys.argv[1]}: {line}", file=sys.stderr)
+    return 1 if found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

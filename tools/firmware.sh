@@ -1,0 +1,48 @@
+#!/bin/sh
+# Builds the node's firmware with XC16 or XC-DSC: build/firmware/node.whex (for `whisker flash`) and node_wire.hex (for
+# `make flash`). Not yet run on silicon: the image's build options say so. Environment: VERSION (0.1), MDFP (device pack).
+set -eu
+cd "$(dirname "$0")/.."
+out=build/firmware
+fw=firmware/dspic
+compiler=$(command -v xc16-gcc || command -v xc-dsc-gcc || true)
+if [ -z "$compiler" ]; then
+    echo 'firmware: neither xc16-gcc nor xc-dsc-gcc is on PATH; install MPLAB XC-DSC or XC16 (microchip.com, the free' >&2
+    echo 'firmware: edition will do) and add its bin folder to PATH. Without it the firmware runs in simulation only.' >&2
+    exit 1
+fi
+tools=${compiler%gcc}
+mkdir -p "$out"
+
+# The compiler's own linker script, with the program memory of one of the two.
+script() { # name origin end
+    gld=$(find "$(dirname "$compiler")/.." ${MDFP:+"$MDFP"} -name p33FJ128MC802.gld | head -1)
+    [ -n "$gld" ] || { echo 'firmware: no p33FJ128MC802.gld; name the device pack with MDFP=FOLDER' >&2; exit 1; }
+    sed -E "s/(program *\(xr\) *: *ORIGIN *= *)0x[0-9A-Fa-f]+, *LENGTH *= *0x[0-9A-Fa-f]+/\1$2, LENGTH = $(printf '0x%X' $(($3 - $2)))/" \
+        "$gld" >"$out/$1.gld"
+    grep -q "ORIGIN = $2" "$out/$1.gld" || { echo "firmware: $gld: no program region to move" >&2; exit 1; }
+}
+
+build() { # name, defines and link options, extra sources
+    name=$1 options=$2
+    shift 2
+    # shellcheck disable=SC2086
+    "$compiler" -mcpu=33FJ128MC802 ${MDFP:+"-mdfp=$MDFP"} -omf=elf -std=gnu99 -O1 -merrata=exch -Wall -Wextra -Werror \
+        -I$fw -I$fw/core -I$fw/port_dspic -Iprotocol/gen $options $fw/core/*.c $fw/boot/*.c $fw/port_dspic/*.c \
+        $fw/port_dspic/chip/main.c "$@" -o "$out/$name.elf" \
+        -Wl,--script="$out/$name.gld",--stack=16,--check-sections,--data-init,--handles,--report-mem,--no-ivt
+    "${tools}bin2hex" "$out/$name.elf"
+    "${tools}objdump" -d "$out/$name.elf" >"$out/$name.lst"
+}
+
+script loader 0x200 0x2000
+script application 0x2280 0x15800
+rm -f "$out"/*.elf "$out"/*.hex
+build loader -DNODE_LOADER $fw/port_dspic/chip/config.c $fw/port_dspic/chip/vectors.s
+build application -Wl,--no-aivt $fw/port_dspic/chip/jump_table.s
+.venv/bin/python tools/check_listing.py "$out/application.lst"
+# Option bit 15: not yet run on silicon.
+.venv/bin/python tools/make_image.py image "$out/application.hex" "$out/node.whex" --version "${VERSION:-0.1}" --options 0x8000
+.venv/bin/python tools/make_image.py wire "$out/loader.hex" "$out/node_wire.hex" --app "$out/application.hex" \
+    --version "${VERSION:-0.1}" --options 0x8000
+echo "firmware: $out/node.whex and $out/node_wire.hex, not yet run on silicon"
