@@ -200,8 +200,8 @@ static void test_catch_table(void **state)
                     assert_true(fabs(drag.tilt[0]) <= drag.whisker.stop);
                 }
                 assert_int_equal(drag.catches, 1);
-                /* The tip already trails by what friction holds: up to 2 mm. */
-                assert_near(held * TICK, table[i].held_s[v], 0.035 * table[i].held_s[v] + 0.001);
+                /* The tip already trails by what friction holds, up to 2.3 mm; the table is rounded by up to 2 %. */
+                assert_near(held * TICK, table[i].held_s[v], 2.3e-3 / speed[v] + 0.021 * table[i].held_s[v]);
             }
         }
     }
