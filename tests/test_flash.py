@@ -18,7 +18,7 @@ import intel_hex  # noqa: E402
 import make_image  # noqa: E402
 
 WHISKERS = 6
-BODY_WORDS = 700
+BODY_WORDS = 400
 VERSION = 0x0203
 
 
@@ -59,7 +59,7 @@ def nodes_listed(text: str) -> dict[int, tuple[str, str, str]]:
 def test_all_nodes_at_once_but_for_those_that_cannot(image, tmp_path):
     """Lane 1 loses its supply in the middle, lane 4 is another chip; the second time lane 1 takes it too."""
     shell = f"$FLASH $LINK {image}; echo first $?; $FLASH $LINK {image} --node 2; echo second $?; $FLASH $LINK --list"
-    done = bridge_with(tmp_path, "1 cut 20\n4 chip 0x062A\n", shell)
+    done = bridge_with(tmp_path, "1 cut 10\n4 chip 0x062A\n", shell)
     first, _, rest = done.stdout.partition("first 1\n")
     assert rest, done.stdout + done.stderr
     fate = dict(re.findall(r"^lane +(\d): (.*)$", first, re.M))
@@ -103,7 +103,7 @@ def test_sampling_goes_on_after_an_update(image, tmp_path):
     ring = f"whisker-flash-{os.getpid()}"
     shell = f"$FLASH $LINK {image} && exec {program('whiskerd')} --ring {ring} $LINK"
     scene, _ = write_flat_scene(tmp_path, 3)
-    command = simulation(tmp_path, scene, 20, 3, ring)
+    command = simulation(tmp_path, scene, 10, 3, ring)
     command = [*command[: command.index("--") + 1], "sh", "-c", shell]
     environment = os.environ | {"FLASH": program("whisker-flash"), "LINK": " ".join(FAST_LINK)}
     with subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL) as process:
