@@ -24,6 +24,7 @@ struct adaptive {
     double odds;             /* logarithm, elsewhere against local, before the rows that the histogram has gone over */
     struct nav_pose pending; /* motion since the last row that was read ... */
     struct nav_noise pending_noise; /* ... and its noise */
+    bool pending_unknown;           /* ... and whether some of it was not reported */
     struct adaptive_summary answer; /* after the last row that was read */
     long evaluations, distinct, touched;
 };
@@ -214,13 +215,14 @@ static void predict(void *self, const struct nav_motion *motion)
     a->pending = nav_compose(a->pending, motion->step);
     a->pending_noise.position += noise.position;
     a->pending_noise.heading += noise.heading;
+    a->pending_unknown = a->pending_unknown || motion->unknown_m > 0.0 || motion->unknown_rad > 0.0;
     a->evaluations = a->distinct = a->touched = 0;
 }
 
 static void update_local(struct adaptive *a)
 {
     a->cloud.moved = 0;
-    adaptive_cloud_move(&a->cloud, a->pending, &a->pending_noise);
+    adaptive_cloud_move(&a->cloud, a->pending, &a->pending_noise, !a->pending_unknown);
     adaptive_cloud_look(&a->cloud, &a->sense);
     adaptive_cloud_expect(&a->cloud, &a->sense, 1.0 - elsewhere(a));
     double local = adaptive_cloud_weigh(&a->cloud, &a->sense);
@@ -246,6 +248,7 @@ static void update(void *self, const struct nav_evidence *evidence)
     answer(a);
     a->pending = (struct nav_pose){0.0, 0.0, 0.0};
     a->pending_noise = (struct nav_noise){0.0, 0.0};
+    a->pending_unknown = false;
 }
 
 static void estimate(const void *self, struct nav_estimate *out)

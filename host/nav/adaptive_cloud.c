@@ -8,9 +8,13 @@ enum { BOOK = 8192, TRIES = 20 };
 
 /* The body radius and the walls' places are no better known than this. */
 static const double GRACE_M = 0.01;
-/* Log-likelihood of standing where the map says one cannot: maps are wrong sometimes. */
-static const double BLOCKED = -7.0;
+/* Likelihood of standing where the map says one cannot: maps are wrong sometimes. */
+static const double BLOCKED = 0.001;
 static const double MUTATION = 0.03, NUDGE = 0.2;
+/* Chances per row: wheels begin to spin while the robot stands, or to skid, so that odometry errs by SKIDDING times its
+ * noise; both last some ten rows. So that some hypotheses always stand ready, OFTEN times as many try it, and weigh as
+ * much less. */
+static const double SPIN = 0.0005, SKID = 0.0002, GRIP = 0.1, SKIDDING = 8.0, OFTEN = 4.0;
 
 long adaptive_cloud_room(const struct nav_settings *s)
 {
@@ -71,15 +75,34 @@ static void mutate(const struct adaptive_cloud *cloud, struct adaptive_particle 
         break;
     case 2:
     case 3:
-        p->gain += NUDGE * cloud->problem->settings.adaptive_gain * adaptive_normal(rng);
+        if (p->gain != 0.0)
+            p->gain += NUDGE * cloud->problem->settings.adaptive_gain * adaptive_normal(rng);
         break;
     case 4:
     case 5:
-        p->turn_gain += NUDGE * cloud->problem->settings.adaptive_gain * adaptive_normal(rng);
+        if (p->turn_gain != 0.0)
+            p->turn_gain += NUDGE * cloud->problem->settings.adaptive_gain * adaptive_normal(rng);
         break;
     default:
         p->noise = noise_of(rng);
     }
+}
+
+/* Turns by an angle: small ones by a series whose error is below 1e-11, and no drift of the vector's length. */
+static void turn_by(struct adaptive_particle *p, double turn)
+{
+    p->pose.theta = adaptive_wrap(p->pose.theta + turn);
+    if (fabs(turn) > 0.3) {
+        p->c = cos(p->pose.theta);
+        p->s = sin(p->pose.theta);
+        return;
+    }
+    double q = turn * turn;
+    double ct = 1.0 - q / 2.0 * (1.0 - q / 12.0 * (1.0 - q / 30.0 * (1.0 - q / 56.0)));
+    double st = turn * (1.0 - q / 6.0 * (1.0 - q / 20.0 * (1.0 - q / 42.0 * (1.0 - q / 72.0))));
+    double c = p->c * ct - p->s * st, s = p->s * ct + p->c * st, length = 1.5 - 0.5 * (c * c + s * s);
+    p->c = c * length;
+    p->s = s * length;
 }
 
 static void turn_to(struct adaptive_particle *p, double theta)
@@ -137,18 +160,32 @@ void adaptive_cloud_scale(struct adaptive_cloud *cloud, double factor)
         cloud->at[n].weight *= factor;
 }
 
-void adaptive_cloud_move(struct adaptive_cloud *cloud, struct nav_pose step, const struct nav_noise *noise)
+static void drive_on(struct adaptive_particle *p, struct nav_rng *rng)
+{
+    double chance = (double)(nav_rng_bits(rng) >> 11) * 0x1p-53;
+    if (p->drive == ADAPTIVE_ROLLS && chance < OFTEN * (SPIN + SKID)) {
+        p->drive = chance < OFTEN * SPIN ? ADAPTIVE_SPINS : ADAPTIVE_SKIDS;
+        p->weight /= OFTEN;
+    } else if (p->drive != ADAPTIVE_ROLLS && chance < GRIP) {
+        p->drive = ADAPTIVE_ROLLS;
+    }
+}
+
+void adaptive_cloud_move(struct adaptive_cloud *cloud, struct nav_pose step, const struct nav_noise *noise, bool known)
 {
     double position = sqrt(noise->position), heading = sqrt(noise->heading);
     for (long n = 0; n < cloud->count; n++) {
         struct adaptive_particle *p = &cloud->at[n];
         mutate(cloud, p, &cloud->rng);
-        double dx = (1.0 + p->gain) * step.x + p->noise * position * adaptive_normal(&cloud->rng);
-        double dy = (1.0 + p->gain) * step.y + p->noise * position * adaptive_normal(&cloud->rng);
+        drive_on(p, &cloud->rng);
+        double goes = p->drive == ADAPTIVE_SPINS ? 0.0 : 1.0;
+        double level = p->drive == ADAPTIVE_SKIDS ? SKIDDING : known ? p->noise : fmax(p->noise, 1.0);
+        double dx = goes * (1.0 + p->gain) * step.x + level * position * adaptive_normal(&cloud->rng);
+        double dy = goes * (1.0 + p->gain) * step.y + level * position * adaptive_normal(&cloud->rng);
+        double turn = goes * (1.0 + p->turn_gain) * step.theta + level * heading * adaptive_normal(&cloud->rng);
         p->pose.x += p->c * dx - p->s * dy;
         p->pose.y += p->s * dx + p->c * dy;
-        turn_to(p,
-                p->pose.theta + (1.0 + p->turn_gain) * step.theta + p->noise * heading * adaptive_normal(&cloud->rng));
+        turn_by(p, turn);
     }
     cloud->moved += cloud->count;
 }
@@ -163,31 +200,44 @@ void adaptive_cloud_look(struct adaptive_cloud *cloud, struct adaptive_sense *se
 
 void adaptive_cloud_expect(const struct adaptive_cloud *cloud, struct adaptive_sense *sense, double mass)
 {
+    for (long n = 0; n < sense->distinct; n++)
+        sense->mass[sense->filled[n]] = 0.0;
+    for (long n = 0; n < cloud->count; n++)
+        sense->mass[cloud->at[n].slot] += cloud->at[n].weight;
     nav_trust_begin(sense->likelihood);
-    for (long n = 0; n < cloud->count; n++) {
-        const uint8_t *codes = sense->codes + cloud->at[n].slot * (size_t)sense->likelihood->whiskers;
-        nav_trust_add(sense->likelihood, codes, mass * cloud->at[n].weight);
+    for (long n = 0; n < sense->distinct; n++) {
+        uint32_t slot = sense->filled[n];
+        const uint8_t *codes = sense->codes + slot * (size_t)sense->likelihood->whiskers;
+        nav_trust_add(sense->likelihood, codes, mass * sense->mass[slot]);
     }
 }
 
-double adaptive_cloud_weigh(struct adaptive_cloud *cloud, const struct adaptive_sense *sense)
+/* Likelihoods of the row's signatures relative to the best; returns the best's logarithm. */
+static double factors(struct adaptive_sense *sense)
 {
     float best = -INFINITY;
-    for (long n = 0; n < cloud->count; n++)
-        best = fmaxf(best, sense->value[cloud->at[n].slot]);
-    double total = 0.0;
+    for (long n = 0; n < sense->distinct; n++)
+        best = fmaxf(best, sense->value[sense->filled[n]]);
+    for (long n = 0; n < sense->distinct; n++) {
+        uint32_t slot = sense->filled[n];
+        sense->mass[slot] = exp((double)(sense->value[slot] - best));
+    }
+    return (double)best;
+}
+
+double adaptive_cloud_weigh(struct adaptive_cloud *cloud, struct adaptive_sense *sense)
+{
+    double best = factors(sense), total = 0.0;
     for (long n = 0; n < cloud->count; n++) {
         struct adaptive_particle *p = &cloud->at[n];
-        double loglik = (double)(sense->value[p->slot] - best);
+        p->weight *= sense->mass[p->slot];
         if (!adaptive_sense_free_at(sense, p->pose.x, p->pose.y, GRACE_M))
-            loglik += BLOCKED;
-        if (loglik < 0.0)
-            p->weight *= exp(loglik);
+            p->weight *= BLOCKED;
         total += p->weight;
     }
     cloud->moved += cloud->count;
     adaptive_cloud_scale(cloud, 1.0 / total);
-    return log(total) + (double)best;
+    return log(total) + best;
 }
 
 static bool uneven(const struct adaptive_cloud *cloud)

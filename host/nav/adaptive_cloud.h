@@ -20,12 +20,16 @@ static inline double adaptive_wrap(double angle)
     return angle > NAV_PI ? angle - 2.0 * NAV_PI : angle < -NAV_PI ? angle + 2.0 * NAV_PI : angle;
 }
 
+/* What the wheels do, as a hypothesis has it. */
+enum adaptive_drive { ADAPTIVE_ROLLS, ADAPTIVE_SPINS, ADAPTIVE_SKIDS };
+
 struct adaptive_particle {
     struct nav_pose pose;
     double c, s;            /* cosine and sine of the heading */
     double gain, turn_gain; /* true distance and turn by the reported ones, less 1 */
     double noise;           /* standard deviation of its odometry noise by the model's */
     double weight;
+    enum adaptive_drive drive;
     uint32_t slot;                     /* of its signature in the present row */
     float share[ADAPTIVE_IMAGES_MOST]; /* of the weight, by image; sums to 1 */
 };
@@ -66,14 +70,15 @@ void adaptive_cloud_expect(const struct adaptive_cloud *, struct adaptive_sense 
 /* Multiplies all weights. */
 void adaptive_cloud_scale(struct adaptive_cloud *, double factor);
 
-/* Moves by `step` in the robot's frame, each hypothesis with its own noise. */
-void adaptive_cloud_move(struct adaptive_cloud *, struct nav_pose step, const struct nav_noise *);
+/* Moves by `step` in the robot's frame, each hypothesis with its own noise. known: all of the motion was reported; else
+ * no hypothesis takes less than the noise that there may be. */
+void adaptive_cloud_move(struct adaptive_cloud *, struct nav_pose step, const struct nav_noise *, bool known);
 
 /* Looks up what each hypothesis expects of the row last read. */
 void adaptive_cloud_look(struct adaptive_cloud *, struct adaptive_sense *);
 
 /* Weighs with the row looked up and normalises. Returns the row's log-likelihood by the belief before it. */
-double adaptive_cloud_weigh(struct adaptive_cloud *, const struct adaptive_sense *);
+double adaptive_cloud_weigh(struct adaptive_cloud *, struct adaptive_sense *);
 
 /* Draws as many as the spread needs when the weights have become uneven, or always when `force`. */
 void adaptive_cloud_thin(struct adaptive_cloud *, bool force);

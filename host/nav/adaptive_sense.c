@@ -70,8 +70,10 @@ static int make_book(struct adaptive_sense *s, size_t most)
     s->stamp = calloc(s->slots, sizeof *s->stamp);
     s->codes = calloc(s->slots, width);
     s->value = calloc(s->slots, sizeof *s->value);
+    s->filled = calloc(s->slots, sizeof *s->filled);
+    s->mass = calloc(s->slots, sizeof *s->mass);
     s->scratch = calloc(width, 1);
-    return s->stamp && s->codes && s->value && s->scratch ? 0 : -1;
+    return s->filled && s->mass && s->stamp && s->codes && s->value && s->scratch ? 0 : -1;
 }
 
 int adaptive_sense_init(struct adaptive_sense *s, const struct nav_problem *problem, size_t most)
@@ -104,6 +106,8 @@ void adaptive_sense_free(struct adaptive_sense *s)
     free(s->stamp);
     free(s->codes);
     free(s->value);
+    free(s->filled);
+    free(s->mass);
     free(s->scratch);
 }
 
@@ -206,7 +210,7 @@ uint32_t adaptive_sense_at(struct adaptive_sense *s, double x, double y, double 
         s->stamp[slot] = s->row;
         memcpy(s->codes + slot * width, s->scratch, width);
         s->value[slot] = nav_likelihood_of(s->likelihood, s->scratch);
-        s->distinct++;
+        s->filled[s->distinct++] = (uint32_t)slot;
     }
     return (uint32_t)slot;
 }
@@ -222,6 +226,7 @@ bool adaptive_sense_free_at(const struct adaptive_sense *s, double x, double y, 
 
 size_t adaptive_sense_bytes(const struct adaptive_sense *s)
 {
-    size_t entry = sizeof *s->stamp + sizeof *s->value + (size_t)s->likelihood->whiskers;
+    size_t entry =
+        sizeof *s->stamp + sizeof *s->filled + sizeof *s->mass + sizeof *s->value + (size_t)s->likelihood->whiskers;
     return squares(s) * (sizeof *s->first + 1) + s->first[squares(s)] * sizeof *s->box + s->slots * entry;
 }

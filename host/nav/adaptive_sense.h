@@ -27,6 +27,8 @@ struct adaptive_sense {
     uint32_t *stamp;     /* [slots] row in which the slot was filled */
     uint8_t *codes;      /* [slots][whiskers] */
     float *value;        /* [slots] log-likelihood of the present row */
+    uint32_t *filled;    /* [slots] the first `distinct` are the present row's slots */
+    double *mass;        /* [slots] belief that expects the signature, or its likelihood: a cloud's scratch */
     uint8_t *scratch;    /* [whiskers] */
     uint32_t row;
     long distinct; /* signatures weighed for the present row */

@@ -7,22 +7,21 @@
 /* The Create drives at most 0.5 m/s and a row may carry a whole body whisk; beyond this a cell is a mistake. */
 static const double ODOMETRY_MOST_M = 1.0;
 static const double LOGLIK_MOST = 1e9;
-static const double ROW_S = 0.1;
-static const double USUAL_ROWS = 20.0;  /* memory of the running means */
 static const double LENGTH_SLACK = 1.5; /* a fitted line may answer a little more than the whisker's length */
-static const int LOST_MOST = 100;
 
 int nav_intake_init(struct nav_intake *in, const struct nav_problem *problem)
 {
     size_t tips = (size_t)problem->robot.tips, rays = (size_t)problem->robot.rays, whiskers = tips + rays;
     size_t classes = (size_t)problem->arena.classes;
     *in = (struct nav_intake){.problem = problem, .latest = -INFINITY};
+    nav_gaps_init(&in->gaps);
     in->moved = calloc(whiskers + 1, sizeof *in->moved);
     in->touching = calloc(rays + 1, sizeof *in->touching);
     in->values = calloc(tips * classes + rays + 1, sizeof *in->values);
     in->reading = calloc(whiskers + 1, sizeof *in->reading);
     in->weight = calloc(whiskers + 1, sizeof *in->weight);
-    if (!in->moved || !in->touching || !in->values || !in->reading || !in->weight)
+    if (!in->moved || !in->touching || !in->values || !in->reading || !in->weight ||
+        nav_repeat_init(&in->repeat, problem->robot.tips, problem->arena.classes, problem->arena.tile))
         return -1;
     for (size_t w = 0; w < whiskers; w++) {
         in->moved[w] = INFINITY; /* the first reading is all new */
@@ -38,13 +37,13 @@ void nav_intake_free(struct nav_intake *in)
     free(in->values);
     free(in->reading);
     free(in->weight);
+    nav_repeat_free(&in->repeat);
 }
 
 enum arrival { ON_TIME, LATE, REPEATED };
 
-static enum arrival arrival_of(struct nav_intake *in, double t_s, int *lost)
+static enum arrival arrival_of(struct nav_intake *in, double t_s)
 {
-    *lost = 0;
     if (!isfinite(t_s)) {
         in->bad_cells++;
         return ON_TIME;
@@ -55,12 +54,7 @@ static enum arrival arrival_of(struct nav_intake *in, double t_s, int *lost)
             return REPEATED;
     }
     in->times[in->rows++ % NAV_TIMES_KEPT] = t_s;
-    if (t_s < in->latest)
-        return LATE;
-    double missing = isfinite(in->latest) ? floor((t_s - in->latest) / ROW_S - 0.5) : 0.0;
-    *lost = (int)fmin(fmax(missing, 0.0), LOST_MOST);
-    in->latest = t_s;
-    return ON_TIME;
+    return t_s < in->latest ? LATE : ON_TIME;
 }
 
 static bool odometry_ok(struct nav_intake *in, const double odometry[3])
@@ -73,17 +67,19 @@ static bool odometry_ok(struct nav_intake *in, const double odometry[3])
     return in->bad_cells == before;
 }
 
-static void take_odometry(struct nav_intake *in, const double odometry[3], int lost, struct nav_motion *motion)
+static struct nav_motion take_odometry(struct nav_intake *in, const struct nav_row *row, enum arrival arrival)
 {
-    if (odometry_ok(in, odometry)) {
-        motion->step = (struct nav_pose){odometry[0], odometry[1], odometry[2]};
-        in->usual_m += (hypot(odometry[0], odometry[1]) - in->usual_m) / USUAL_ROWS;
-        in->usual_rad += (fabs(odometry[2]) - in->usual_rad) / USUAL_ROWS;
-    } else {
-        lost++;
-    }
-    motion->unknown_m = lost * in->usual_m;
-    motion->unknown_rad = lost * in->usual_rad;
+    struct nav_pose step = {row->odometry[0], row->odometry[1], row->odometry[2]};
+    bool known = odometry_ok(in, row->odometry), timed = isfinite(row->t_s) != 0;
+    if (arrival == LATE && known)
+        return nav_gaps_fill(&in->gaps, step, row->t_s);
+    if (arrival == LATE)
+        return (struct nav_motion){.unknown_m = 0.0}; /* assumed when it did not come */
+    double before = in->latest;
+    int missing = timed ? nav_gaps_missing(&in->gaps, before, row->t_s) : 0;
+    if (timed)
+        in->latest = row->t_s;
+    return nav_gaps_bridge(&in->gaps, known ? &step : NULL, missing, before, row->t_s);
 }
 
 static double lever(const struct nav_robot *robot, int whisker)
@@ -118,6 +114,14 @@ static bool says_nothing(const double *loglik, int classes)
     return classes > 1;
 }
 
+static int best_of(const double *loglik, int classes)
+{
+    int best = 0;
+    for (int k = 1; k < classes; k++)
+        best = loglik[k] > loglik[best] ? k : best;
+    return best;
+}
+
 static double take_texture(struct nav_intake *in, int tip, const double *loglik)
 {
     int classes = in->problem->arena.classes;
@@ -137,6 +141,8 @@ static double take_texture(struct nav_intake *in, int tip, const double *loglik)
         return 0.0;
     }
     double weight = novelty(in->moved[tip], in->problem->settings.texture_spacing_m);
+    if (weight > 0.0)
+        weight *= nav_repeat_take(&in->repeat, tip, best_of(out, classes), in->moved[tip]);
     in->moved[tip] = 0.0;
     return weight;
 }
@@ -175,15 +181,14 @@ static bool take_readings(struct nav_intake *in, const struct nav_row *row)
 bool nav_intake_take(struct nav_intake *in, const struct nav_row *row, struct nav_motion *motion,
                      struct nav_evidence *evidence)
 {
-    int lost;
     *motion = (struct nav_motion){.unknown_m = 0.0};
     *evidence = (struct nav_evidence){.reading = in->reading, .weight = in->weight};
-    enum arrival arrival = arrival_of(in, row->t_s, &lost);
+    enum arrival arrival = arrival_of(in, row->t_s);
     if (arrival != ON_TIME)
         in->bad_rows++;
     if (arrival == REPEATED)
         return false;
-    take_odometry(in, row->odometry, lost, motion);
+    *motion = take_odometry(in, row, arrival);
     add_path(in, motion);
     /* A late row's motion is real, but its readings belong to a pose that is gone. */
     return arrival == ON_TIME && take_readings(in, row);

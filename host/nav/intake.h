@@ -6,8 +6,10 @@
 #include <stdint.h>
 
 #include "filter.h"
+#include "gap.h"
 #include "likelihood.h"
 #include "motion.h"
+#include "repeat.h"
 
 enum { NAV_TIMES_KEPT = 64 };
 
@@ -17,10 +19,10 @@ struct nav_intake {
     uint64_t empty;               /* windows that call all textures equally likely */
     double times[NAV_TIMES_KEPT]; /* of the last rows, to know a repeated one */
     long rows;
-    double latest;  /* s */
-    double usual_m; /* running means of a row's distance and turn */
-    double usual_rad;
-    double *moved;  /* [whiskers] path of the whisker since its last reading that counted, m */
+    double latest; /* s */
+    struct nav_gaps gaps;
+    double *moved; /* [whiskers] path of the whisker since its last reading that counted, m */
+    struct nav_repeat repeat;
     bool *touching; /* [rays] whether that reading was a contact */
     double *values; /* storage of the readings */
     const double **reading;

@@ -35,6 +35,12 @@ static int make_tables(struct nav_likelihood *l)
         l->ratio[w] = calloc(codes, sizeof **l->ratio);
         if (!l->table[w] || !l->ratio[w] || nav_trust_init(&l->trust[w], (int)codes))
             return -1;
+        if (w < l->tips)
+            continue;
+        l->model[w].noticed = calloc(codes, sizeof *l->model[w].noticed);
+        if (!l->model[w].noticed)
+            return -1;
+        nav_mm_radial_begin(&l->model[w]);
     }
     return 0;
 }
@@ -70,6 +76,8 @@ void nav_likelihood_free(struct nav_likelihood *l)
         free(l->ratio ? l->ratio[w] : NULL);
         if (l->trust)
             nav_trust_free(&l->trust[w]);
+        if (l->model)
+            free(l->model[w].noticed);
     }
     free(l->table);
     free(l->ratio);

@@ -25,6 +25,7 @@ struct nav_model {
     double step;     /* m per code; code k stands for a contact at (k + 1/2) steps */
     double sigma;    /* m, of a measured distance, the spread of a pose's cell included */
     double edge;     /* m, of the end of reach, likewise */
+    double *noticed; /* object whiskers: [codes] share of contacts that are noticed, from nav_mm_radial_begin */
     double temper;   /* texture whiskers: exponent on a window's likelihood */
     double gap;      /* running median of log-likelihood between best class and second, 0: none seen */
     double accuracy; /* share of windows whose best class is right, as far as is known */
@@ -32,6 +33,9 @@ struct nav_model {
 
 nav_measurement nav_mm_texture; /* eq. 1's log-likelihoods, tempered, with an outlier floor */
 nav_measurement nav_mm_radial;  /* Gaussian distance, misses, ghosts, null contacts */
+
+/* Fills model->noticed, which is the caller's, for an object whisker whose other numbers are set. */
+void nav_mm_radial_begin(struct nav_model *);
 
 /* Before a texture whisker's first window. */
 void nav_mm_texture_begin(struct nav_model *);

@@ -24,15 +24,20 @@ static double density(const struct nav_model *model, double difference)
     return fabs(z) > FAR * sqrt(2.0) ? 0.0 : exp(-0.5 * z * z) / (model->sigma * sqrt(8.0 * atan(1.0)));
 }
 
+void nav_mm_radial_begin(struct nav_model *model)
+{
+    for (int k = 0; k < model->codes; k++)
+        model->noticed[k] = k == model->codes - 1 ? 0.0 : noticed(model, (k + 0.5) * model->step);
+}
+
 void nav_mm_radial(const struct nav_model *model, const double *reading, double *ratio)
 {
     double ghost = model->settings->radial_ghost;
     for (int k = 0; k < model->codes; k++) {
-        double distance = (k + 0.5) * model->step;
-        double hit = k == model->codes - 1 ? 0.0 : noticed(model, distance);
+        double hit = model->noticed[k];
         double p = (1.0 - hit) * (1.0 - ghost);
         if (isfinite(reading[0]))
-            p = model->length * hit * density(model, reading[0] - distance) + (1.0 - hit) * ghost;
+            p = model->length * hit * density(model, reading[0] - (k + 0.5) * model->step) + (1.0 - hit) * ghost;
         ratio[k] = fmax(p, LEAST);
     }
 }

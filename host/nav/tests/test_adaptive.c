@@ -56,6 +56,35 @@ static void it_notices_a_kidnap_and_finds_the_robot_again(void **state)
     }
 }
 
+/* One row in which the wheels spin: odometry as if it had moved, readings from where it stands. */
+static const struct nav_row *spin(struct wander *w)
+{
+    struct nav_pose stays = w->pose;
+    wander_on(w);
+    w->pose = stays;
+    wander_read(w);
+    return &w->row;
+}
+
+static void spinning_wheels_do_not_lose_it(void **state)
+{
+    (void)state;
+    double sum = 0.0;
+    enum { SEEDS = 10 };
+    for (uint64_t seed = 71; seed < 71 + SEEDS; seed++) {
+        struct wander w = wander_new(seed);
+        struct nav_filter *f = nav_filter_new("adaptive", &w.problem);
+        run(f, &w, 100, INFINITY);
+        struct nav_estimate e;
+        for (int k = 0; k < 8; k++)
+            nav_filter_step(f, spin(&w), &e);
+        e = run(f, &w, 30, INFINITY);
+        sum += wander_error(&w, &e);
+        nav_filter_free(f);
+    }
+    assert_true(sum / SEEDS < 0.05); /* 0.16 m were told that never were */
+}
+
 static void no_row_takes_more_than_its_budget(void **state)
 {
     (void)state;
@@ -179,6 +208,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(it_finds_the_robot_from_nothing_and_stops_looking),
         cmocka_unit_test(it_notices_a_kidnap_and_finds_the_robot_again),
+        cmocka_unit_test(spinning_wheels_do_not_lose_it),
         cmocka_unit_test(no_row_takes_more_than_its_budget),
         cmocka_unit_test(a_seed_gives_the_same_bytes_and_another_seed_others),
         cmocka_unit_test(twins_neither_drift_nor_die),

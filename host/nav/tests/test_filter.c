@@ -7,7 +7,7 @@
 #include "near.h"
 #include "rooms.h"
 
-static const double READ[] = {0.0, -20.0}, NOT_READ[] = {NAN, NAN};
+static const double READ[] = {0.0, -20.0}, OTHER[] = {-20.0, 0.0}, NOT_READ[] = {NAN, NAN};
 
 static struct nav_row row_at(double t_s, const double *texture, const double *distance)
 {
@@ -44,16 +44,16 @@ static void readings_count_by_how_far_the_whisker_has_moved(void **state)
     assert_near(t.weight[1], 1.0, 0.0);
     row = row_at(0.2, READ, &nothing);
     t = take(&in, &row);
-    assert_near(t.weight[0], 0.25, 1e-12);
+    assert_true(t.weight[0] > 0.0 && t.weight[0] < 0.25); /* a quarter's path, and it says the same (repeat.h) */
     assert_near(t.weight[1], 0.5, 1e-12);
     row = row_at(0.3, NOT_READ, &contact);
     t = take(&in, &row);
     assert_near(t.weight[0], 0.0, 0.0);
     assert_near(t.weight[1], 1.0, 0.0); /* a change is news at any distance */
-    row = row_at(0.4, READ, &nothing);
+    row = row_at(0.4, OTHER, &nothing);
     row.odometry[0] = 0.0;
     t = take(&in, &row);
-    assert_near(t.weight[0], 0.25, 1e-12); /* 0.01 m from the row it was not read in */
+    assert_near(t.weight[0], 0.25, 1e-12); /* another class; 0.01 m from the row it was not read in */
     nav_intake_free(&in);
 }
 
@@ -67,7 +67,7 @@ static void turning_moves_a_whisker_by_its_lever(void **state)
     const double nan = NAN;
     struct nav_row row = row_at(0.1, READ, &nan);
     take(&in, &row);
-    row = row_at(0.2, READ, &nan);
+    row = row_at(0.2, OTHER, &nan);
     row.odometry[0] = 0.0;
     row.odometry[2] = -0.1;
     assert_near(take(&in, &row).weight[0], 0.1 * 0.1 / 0.04, 1e-12);

@@ -43,23 +43,27 @@ static void however_sure_a_window_is_the_floor_remains(void **state)
 }
 
 /* A whisker of 0.1 m in steps of 1 cm up to 0.12 m, code 12: nothing. */
-static struct nav_model whisker(const struct nav_settings *s)
+static struct nav_model whisker(const struct nav_settings *s, double noticed[13])
 {
-    return (struct nav_model){.fill = nav_mm_radial,
-                              .settings = s,
-                              .values = 1,
-                              .codes = 13,
-                              .length = 0.1,
-                              .step = 0.01,
-                              .sigma = 0.01,
-                              .edge = 0.01};
+    struct nav_model m = {.fill = nav_mm_radial,
+                          .settings = s,
+                          .values = 1,
+                          .codes = 13,
+                          .length = 0.1,
+                          .step = 0.01,
+                          .sigma = 0.01,
+                          .edge = 0.01,
+                          .noticed = noticed};
+    nav_mm_radial_begin(&m);
+    return m;
 }
 
 static void a_measured_distance_is_gaussian_on_a_floor_of_ghosts(void **state)
 {
     (void)state;
     struct nav_settings s = settings();
-    const struct nav_model m = whisker(&s);
+    double noticed[13];
+    const struct nav_model m = whisker(&s, noticed);
     const double reading = 0.045, peak = 1.0 / (0.01 * sqrt(2.0 * NAV_PI)), ghost = 0.01, length = 0.1;
     double out[13];
     m.fill(&m, &reading, out);
@@ -72,7 +76,8 @@ static void no_contact_is_strong_evidence_deep_in_a_wall_and_weak_at_the_tip(voi
 {
     (void)state;
     struct nav_settings s = settings();
-    const struct nav_model m = whisker(&s);
+    double noticed[13];
+    const struct nav_model m = whisker(&s, noticed);
     const double nothing = (double)INFINITY;
     double out[13];
     m.fill(&m, &nothing, out);
