@@ -76,11 +76,13 @@ void port_on_dma1(struct board *board)
         node_on_order(&board->node, words);
 }
 
-/* Select rose. After a whole transfer, the order's interrupt has armed the link already: its number is the lower. After
- * one cut short, the slave and the DMA stand somewhere within the record: they begin anew. */
+/* Select rose. At a quick SCK it does so before the DMA has moved the order's last word; by now it has, and the order
+ * comes first. After a transfer cut short, slave and DMA stand somewhere within the record: they begin anew. */
 void port_on_int2(struct board *board)
 {
     sfr_clear(board, IRQ_WORD(IFS0, IRQ_INT2), IRQ_BIT(IRQ_INT2));
+    if (sfr_read(board, IRQ_WORD(IFS0, IRQ_DMA1)) & IRQ_BIT(IRQ_DMA1))
+        port_on_dma1(board);
     node_on_transfer_end(&board->node);
 }
 
