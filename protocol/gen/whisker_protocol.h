@@ -182,6 +182,7 @@
 #define WHISKER_HEALTH_ORDER_MISSING 12u /* ticks without an order */
 #define WHISKER_HEALTH_SERVICE_CRC 13u /* service windows whose CRC was wrong */
 #define WHISKER_HEALTH_LINK_OVERFLOW 14u /* overflows of the link's receiver */
+#define WHISKER_HEALTH_OVERRUN 15u /* ticks with this code */
 #define WHISKER_NODE_STATE_APPLICATION 0u /* the application runs */
 #define WHISKER_NODE_STATE_LOADER 1u /* the loader waits */
 #define WHISKER_NODE_STATE_LOADING 2u /* the loader takes blocks */
@@ -192,7 +193,7 @@
 #define WHISKER_NODE_STATE_BAD_HEADER 7u /* refused: magic, format, length, place or CRC of the header is wrong */
 #define WHISKER_NODE_STATE_BAD_IMAGE 8u /* refused: the CRC-32 of what was loaded is wrong */
 #define WHISKER_NODE_STATE_FLASH_FAILED 9u /* the flash does not hold what was written: replace the node */
-#define WHISKER_HEALTH_COUNT 15u
+#define WHISKER_HEALTH_COUNT 16u
 #define WHISKER_CRC8_POLYNOMIAL 47u
 #define WHISKER_CRC8_INIT 255u
 #define WHISKER_CRC8_XOR_OUT 255u
@@ -250,7 +251,8 @@
     X(SENSOR_ERROR, 11, "ticks whose reading carried sensor error bits") \
     X(ORDER_MISSING, 12, "ticks without an order") \
     X(SERVICE_CRC, 13, "service windows whose CRC was wrong") \
-    X(LINK_OVERFLOW, 14, "overflows of the link's receiver")
+    X(LINK_OVERFLOW, 14, "overflows of the link's receiver") \
+    X(OVERRUN, 15, "ticks with this code")
 
 /* X(NAME, bit of the status, bit of the MLX90333 error word, cause, remedy) */
 #define WHISKER_SENSOR_ERRORS(X) \

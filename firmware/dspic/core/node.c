@@ -16,6 +16,8 @@ static void count_tick(struct node *node, uint16_t status)
         count(node, WHISKER_HEALTH_ORDER_MISSING);
     if (code != WHISKER_CODE_OK && code < WHISKER_CODE_RESET_POWER)
         count(node, code);
+    else if (code == WHISKER_CODE_OVERRUN)
+        count(node, WHISKER_HEALTH_OVERRUN);
     else if (code == WHISKER_CODE_OK && status != 0)
         count(node, WHISKER_HEALTH_SENSOR_ERROR);
 }
