@@ -207,6 +207,29 @@ static void test_catch_table(void **state)
     }
 }
 
+/* Let go by a step the whisker springs forward: the tilt, backwards until then, swings to the other side. */
+static void test_release_springs_forward(void **state)
+{
+    (void)state;
+    struct mech_stance stance = mech_stance_default();
+    struct mech_drag drag;
+    double most = 0, before = 0;
+    int was = 0;
+    start(&drag, &stance, VINYL, 5);
+    for (int k = 0; k < 4000; k++) {
+        advance(&drag, VINYL, 0.1, k > 300 ? 1e-3 : 0);
+        if (drag.contact == MECH_CAUGHT)
+            before = drag.tilt[0];
+        was |= drag.contact == MECH_CAUGHT;
+        if (was && drag.contact != MECH_CAUGHT)
+            most = fmax(most, drag.tilt[0]);
+    }
+    assert_true(before < -SIM_DEGREE);
+    assert_true(most > -0.3 * before);
+    assert_near(drag.height, 1e-3, 1e-12);
+    assert_true(drag.contact != MECH_CAUGHT);
+}
+
 /* What shortens or avoids a catch: a whisker tilted backwards, a face that only rubs, a step down, a way back. */
 static void test_catches_that_are_not(void **state)
 {
@@ -277,6 +300,7 @@ int main(void)
         cmocka_unit_test(test_stick_slip_with_vibration),
         cmocka_unit_test(test_lift_off),
         cmocka_unit_test(test_catch_table),
+        cmocka_unit_test(test_release_springs_forward),
         cmocka_unit_test(test_catches_that_are_not),
         cmocka_unit_test(test_standing_is_rest),
         cmocka_unit_test(test_garbage),

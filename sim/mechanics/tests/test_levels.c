@@ -173,6 +173,32 @@ static void test_level_follows_the_scene(void **state)
     assert_true(share[0] < 0.1 && share[1] > 0.9);
 }
 
+/* A jerk that leaves no lag behind (a stop) wakes vibration, by what it can make the moment swing; half of what may be
+ * left out does not. */
+static void test_jerks_count(void **state)
+{
+    (void)state;
+    struct mech_whisker w = plain(0.05);
+    for (int k = 0; k < 2; k++) {
+        struct mech_shaft shaft;
+        mech_shaft_start(&shaft, &w, table, TICK);
+        shaft.forced = MECH_CLOSED;
+        struct mech_touch touch = {true, 0.1, 0, 0};
+        for (int i = 0; i < 4000; i++) {
+            touch.theta += 1e-9;
+            mech_shaft_step(&shaft, &touch);
+        }
+        shaft.forced = MECH_AUTO;
+        shaft.neglected = 0;
+        double jump = (k ? 1.2 : 0.5) * shaft.tolerance.moment / shaft.pinned.ring_input; /* m/s at the contact */
+        double per_rad = mech_static_moment(&w, 0.1, 1) / shaft.pinned.moment_static;
+        assert_true(shaft.pinned.lag_moment * jump < 0.3 * shaft.tolerance.moment);
+        touch.theta += jump / per_rad * TICK;
+        mech_shaft_step(&shaft, &touch);
+        assert_int_equal((shaft.level & MECH_VIBRATION) != 0, k);
+    }
+}
+
 /* Forced levels are kept. */
 static void test_forced(void **state)
 {
@@ -214,6 +240,22 @@ static void test_slips_off_once(void **state)
         mech_shaft_step(&shaft, &again);
     }
     assert_true(shaft.engaged && shaft.tilt > 0);
+}
+
+/* Near the tip the closed form would be trusted long after the whisker has slid off: the limit brings the law in. */
+static void test_slips_off_at_any_tolerance(void **state)
+{
+    (void)state;
+    struct mech_whisker w = plain(0.1);
+    struct mech_shaft shaft;
+    mech_shaft_start(&shaft, &w, table, TICK);
+    shaft.tolerance.relative = 0.5;
+    for (int i = 1; i < 2500 && !shaft.slipped; i++) {
+        struct mech_touch touch = {true, 0.139, 1e-4 * i, 0};
+        mech_shaft_step(&shaft, &touch);
+    }
+    assert_true(shaft.slipped);
+    assert_true(shaft.level & MECH_VIBRATION); /* and rings */
 }
 
 /* Creep: the plug tilts on by its share under a constant force, and the imposed angle stays what it is. */
@@ -290,7 +332,9 @@ int main(void)
         cmocka_unit_test(test_bound_of_the_choice),
         cmocka_unit_test(test_level_follows_the_scene),
         cmocka_unit_test(test_forced),
+        cmocka_unit_test(test_jerks_count),
         cmocka_unit_test(test_slips_off_once),
+        cmocka_unit_test(test_slips_off_at_any_tolerance),
         cmocka_unit_test(test_creep),
         cmocka_unit_test(test_base_motion),
         cmocka_unit_test(test_garbage),
