@@ -60,7 +60,7 @@ static const struct entry ENTRIES[] = {
     ENTRY(adaptive, cell_deg, 10.0, 0.5, 90.0),
     ENTRY(adaptive, rows, 4.0, 1.0, 100.0),
     ENTRY(adaptive, hazard, 0.0001, 1e-12, 0.1),
-    ENTRY(adaptive, wake, 0.003, 1e-12, 0.4),
+    ENTRY(adaptive, wake, 0.001, 1e-12, 0.4),
     ENTRY(adaptive, scattered, 0.01, 0.0, 1.0),
     ENTRY(multi, modes, 64.0, 1.0, 10000.0),
     ENTRY(multi, points, 100.0, 8.0, 10000.0),
