@@ -89,8 +89,8 @@ static double range(struct view v, double low, double high, int *stops)
         bool now = x <= low || x >= high;
         *stops += now && was;
         was = now;
-        least = fmin(least, x);
-        most = fmax(most, x);
+        least = x < least ? x : least;
+        most = x > most ? x : most;
     }
     return most - least;
 }
@@ -101,7 +101,8 @@ struct nav_texture_health nav_texture_clean(double *window, int n, const struct 
     for (int c = 0; c < limits->channels; c++) {
         struct view v = {.at = window + c, .step = limits->channels, .n = n};
         long bad = mark(v, limits->spike ? limits->spike + c : NULL);
-        fill(v);
+        if (bad > 0)
+            fill(v);
         health.bad = bad > health.bad ? bad : health.bad;
         int stops;
         double span =

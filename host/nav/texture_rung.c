@@ -12,10 +12,12 @@ struct nav_texture_rung {
     struct nav_texture_rung_numbers n; /* its arrays are the rung's own */
     int features;
     struct nav_texture_features *reduce;
-    double *projection; /* [F][H]: a row per feature, so that the inner loop runs over neighbours */
-    double *threshold;  /* [H] */
-    double *expanded;   /* [F + H] */
-    double *apart;      /* [F] from a class's middle */
+    double *projection;   /* [F][H]: a row per feature, so that the inner loop runs over neighbours */
+    double *threshold;    /* [H] */
+    double *expanded;     /* [F + H] */
+    double *turned;       /* [F][axes] */
+    double *along;        /* [axes] */
+    double *middle_along; /* [K][axes] */
 };
 
 static bool finite_all(const double *x, size_t n)
@@ -78,12 +80,40 @@ static bool make_projections(struct nav_texture_rung *r)
     return true;
 }
 
+/* out[axis] = x along each axis; row by row of features, so that the inner loop runs over neighbours. */
+static void along_axes(const struct nav_texture_rung *r, const double *x, double *restrict out)
+{
+    int axes = r->n.axes;
+    memset(out, 0, (size_t)axes * sizeof *out);
+    for (int f = 0; f < r->features; f++) {
+        const double *row = r->turned + (size_t)f * (size_t)axes;
+        for (int a = 0; a < axes; a++)
+            out[a] += x[f] * row[a];
+    }
+}
+
+static bool make_axes(struct nav_texture_rung *r)
+{
+    size_t axes = (size_t)r->n.axes, features = (size_t)r->features;
+    r->turned = calloc(features * axes + 1, sizeof *r->turned);
+    r->along = calloc(axes + 1, sizeof *r->along);
+    r->middle_along = calloc((size_t)r->n.classes * axes + 1, sizeof *r->middle_along);
+    if (!r->turned || !r->along || !r->middle_along)
+        return false;
+    for (size_t a = 0; a < axes; a++) {
+        for (size_t f = 0; f < features; f++)
+            r->turned[f * axes + a] = r->n.axis[a * features + f];
+    }
+    for (size_t k = 0; k < (size_t)r->n.classes; k++)
+        along_axes(r, r->n.middle + k * features, r->middle_along + k * axes);
+    return true;
+}
+
 static bool make(struct nav_texture_rung *r)
 {
     bool owned = own_arrays(r);
     r->expanded = calloc((size_t)(r->features + r->n.hidden), sizeof *r->expanded);
-    r->apart = calloc((size_t)r->features, sizeof *r->apart);
-    return make_projections(r) && owned && r->expanded && r->apart;
+    return make_projections(r) && owned && r->expanded && r->n.axes <= r->features && make_axes(r);
 }
 
 struct nav_texture_rung *nav_texture_rung_new(const struct nav_texture_rung_numbers *numbers)
@@ -98,7 +128,7 @@ struct nav_texture_rung *nav_texture_rung_new(const struct nav_texture_rung_numb
         return NULL;
     }
     *r = (struct nav_texture_rung){.n = *numbers, .reduce = reduce, .features = nav_texture_features_count(reduce)};
-    if (!make(r) || r->n.axes > r->features) {
+    if (!make(r)) {
         nav_texture_rung_free(r);
         return NULL;
     }
@@ -109,8 +139,9 @@ void nav_texture_rung_free(struct nav_texture_rung *r)
 {
     if (!r)
         return;
-    const double *arrays[] = {r->n.floor, r->n.centre,      r->n.scale,    r->n.weight,  r->n.bias,   r->n.middle,
-                              r->n.axis,  r->n.axis_weight, r->projection, r->threshold, r->expanded, r->apart};
+    const double *arrays[] = {r->n.floor,  r->n.centre, r->n.scale,       r->n.weight,    r->n.bias,
+                              r->n.middle, r->n.axis,   r->n.axis_weight, r->projection,  r->threshold,
+                              r->expanded, r->turned,   r->along,         r->middle_along};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++)
         free((void *)arrays[i]);
     nav_texture_features_free(r->reduce);
@@ -161,20 +192,17 @@ static void score(const struct nav_texture_rung *r, const double *x, double *log
 }
 
 /* Squared distance from a class's middle: along each axis by its own variance, beyond the axes by a common one. */
-static double distance(struct nav_texture_rung *r, const double *middle)
+static double distance(const struct nav_texture_rung *r, int class_index)
 {
+    const double *middle = r->n.middle + (size_t)class_index * (size_t)r->features;
+    const double *there = r->middle_along + (size_t)class_index * (size_t)r->n.axes;
     double rest = 0.0, sum = 0.0;
-    for (int f = 0; f < r->features; f++) {
-        r->apart[f] = r->expanded[f] - middle[f];
-        rest += r->apart[f] * r->apart[f];
-    }
+    for (int f = 0; f < r->features; f++)
+        rest += (r->expanded[f] - middle[f]) * (r->expanded[f] - middle[f]);
     for (int a = 0; a < r->n.axes; a++) {
-        const double *axis = r->n.axis + (size_t)a * (size_t)r->features;
-        double along = 0.0;
-        for (int f = 0; f < r->features; f++)
-            along += axis[f] * r->apart[f];
-        sum += along * along * r->n.axis_weight[a];
-        rest -= along * along;
+        double apart = r->along[a] - there[a];
+        sum += apart * apart * r->n.axis_weight[a];
+        rest -= apart * apart;
     }
     return (sum + fmax(rest, 0.0) * r->n.beyond) / r->features;
 }
@@ -183,8 +211,9 @@ double nav_texture_rung_judge(struct nav_texture_rung *r, const double *window, 
 {
     nav_texture_rung_expand(r, window, r->expanded);
     score(r, r->expanded, loglik);
+    along_axes(r, r->expanded, r->along);
     double nearest = INFINITY;
     for (int k = 0; k < r->n.classes; k++)
-        nearest = fmin(nearest, distance(r, r->n.middle + (size_t)k * (size_t)r->features));
+        nearest = fmin(nearest, distance(r, k));
     return nearest;
 }
