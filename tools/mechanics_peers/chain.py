@@ -22,7 +22,7 @@ STEP_S = 500e-6
 STATIC_STEP_S = 50e-6  # MuJoCo's contacts do not know of damping: at long steps a peg passes through a damped beam
 MOUNT_INERTIA = 1e3  # kg m^2: what the whisker does to its mount is nothing
 STATIC_DAMPING_S = 4e-4  # damping over stiffness of every hinge
-SETTLE_S = 0.25
+SETTLE_S, AVERAGE_S, READINGS = 0.2, 0.15, 60
 FAST_DEG_S, SLOW_DEG_S = 25.0, 10.0  # the peg's speed
 FLOOR_SPEED = 0.1
 
@@ -116,7 +116,7 @@ class Peg:
         """Moves at a speed (rad/s) and settles. Angle at which contact was lost for good, or None."""
         lost, moving = None, round((end - start) / speed / STATIC_STEP_S)
         for i in range(moving + round(settle_s / STATIC_STEP_S)):
-            theta = start + (end - start) * min(1.0, (i + 1) / moving)
+            theta = start + (end - start) * min(1.0, (i + 1) / max(moving, 1))
             self.lead(theta)
             mujoco.mj_step(self.model, self.data)
             if self.data.ncon:
@@ -165,26 +165,29 @@ def average(readings: list[dict]) -> dict:
 
 
 def static(spec: dict) -> dict:
-    """Readings at growing angles until the whisker slips off.
+    """Readings at growing angles until the whisker slips off; angles at which it bounces are left out.
 
-    Without friction each is settled. MuJoCo's friction creeps, so with friction the peg goes on slowly and readings over
-    the last fifth of a degree are averaged: the contact slides towards the tip.
+    Without friction each is settled and then averaged over AVERAGE_S: what still swings cancels. MuJoCo's friction
+    creeps, so with friction the peg goes on slowly and readings over the last half degree are averaged: the contact
+    slides towards the tip.
     """
     peg = Peg(Beam(spec), spec["friction"], spec["a"])
     rows, last, rough = [], 0.0, spec["friction"] > 0
     for theta in np.radians(spec["angles_deg"]):
-        near = theta - np.radians(0.2) if rough else theta
+        near = theta - np.radians(0.5) if rough else theta
         lost = peg.run(last, near, np.radians(SLOW_DEG_S if rough else FAST_DEG_S), 0 if rough else SETTLE_S)
         found = []
-        for i in range(20 if rough and lost is None else 0):
-            step = (theta - near) / 20
-            lost = peg.run(near + i * step, near + (i + 1) * step, np.radians(SLOW_DEG_S), 0)
+        for i in range(READINGS if lost is None else 0):
+            if rough:
+                step = (theta - near) / READINGS
+                lost = peg.run(near + i * step, near + (i + 1) * step, np.radians(SLOW_DEG_S), 0)
+            else:
+                lost = peg.run(theta, theta, 1.0, AVERAGE_S / READINGS)
             found.append(peg.reading())
-        if not rough and lost is None:
-            found = [peg.reading()]
-        if lost is not None or None in found:
-            return {"rows": rows, "slipped_deg": float(np.degrees(theta if lost is None else lost))}
-        rows.append(average(found))
+        if lost is not None:
+            return {"rows": rows, "slipped_deg": float(np.degrees(lost))}
+        if None not in found:
+            rows.append(average(found))
         last = theta
     return {"rows": rows, "slipped_deg": None}
 
