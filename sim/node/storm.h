@@ -13,10 +13,20 @@
     X(FLOATING, 60)                                                                                                    \
     X(DEAD, 30)                                                                                                        \
     X(STUCK_LOW, 30)                                                                                                   \
-    X(ERROR_BITS, 40) X(LOST_CLOCK, 60) X(EXTRA_CLOCK, 60) X(NO_SYNC, 40) X(SECOND_SYNC, 60) X(SHIFT, 60)              \
-        X(MOSI_FLIPS, 40) X(MISO_FLIPS, 60) X(CLOCKS, 60) X(NO_SELECT, 30) X(SELECT_STAYS, 30) X(GLITCH, 40)           \
-            X(MISO_STUCK, 20) X(MOSI_STUCK, 20) X(UNREAD, 30) X(RESET, 4) X(TRAP, 4) X(COLLISION, 4) X(HANG, 1)        \
-                X(SENSOR_OFF, 4) X(DARK, 4)
+    X(ERROR_BITS, 40)                                                                                                  \
+    X(LOST_CLOCK, 60)                                                                                                  \
+    X(EXTRA_CLOCK, 60)                                                                                                 \
+    X(NO_SYNC, 40)                                                                                                     \
+    X(SECOND_SYNC, 60)                                                                                                 \
+    X(SHIFT, 60)                                                                                                       \
+    X(MOSI_FLIPS, 40)                                                                                                  \
+    X(MISO_FLIPS, 60)                                                                                                  \
+    X(CLOCKS, 60)                                                                                                      \
+    X(NO_SELECT, 30)                                                                                                   \
+    X(SELECT_STAYS, 30)                                                                                                \
+    X(GLITCH, 40)                                                                                                      \
+    X(MISO_STUCK, 20)                                                                                                  \
+    X(MOSI_STUCK, 20) X(UNREAD, 30) X(RESET, 4) X(TRAP, 4) X(COLLISION, 4) X(HANG, 1) X(SENSOR_OFF, 4) X(DARK, 4)
 
 #define STORM_NAME(name, weight) STORM_##name,
 enum storm_kind { STORM_KINDS(STORM_NAME) STORM_KIND_COUNT };

@@ -208,7 +208,8 @@ static void start_queues_transfers_and_sends_the_settings(void **state)
     (void)state;
     const struct whisker_settings settings = {
         .lane_mask = 0x0A0B0C0D, .tick_period = 30000, .sck_divider = 6, .word_gap = 31, .sample_point = 5, .batch = 4};
-    static const uint8_t report[16] = {1, WHISKER_WIRE_VERSION, 1, 6, 31, 5, 0, 0, 0x0D, 0x0C, 0x0B, 0x0A, 0x30, 0x75, 0, 0};
+    static const uint8_t report[16] = {
+        1, WHISKER_WIRE_VERSION, 1, 6, 31, 5, 0, 0, 0x0D, 0x0C, 0x0B, 0x0A, 0x30, 0x75, 0, 0};
     open_good();
     assert_int_equal(whisker_device_start(device, &settings, sink, &device), 0);
     assert_memory_equal(fake.control, report, sizeof report);
