@@ -279,7 +279,7 @@ def group(pairs) -> dict[str, list[np.ndarray]]:
 
 
 def draw(results: dict) -> dict[str, Figure]:
-    """Error against decision time, and against time to decide."""
+    """Error against decision time, and against time to decide; windows too short for a method are not drawn."""
     figures = {}
     with matplotlib.rc_context(SETTINGS):
         if "single_surfaces" in results:
@@ -293,7 +293,11 @@ def draw_time(scores: dict) -> Figure:
     figure = Figure(figsize=(6.4, 4.0), layout="constrained")
     axes = figure.subplots()
     for name, style in zip(METHODS, ({"color": "#c25700", "ls": "--", "marker": "^"}, {"color": "#0b5394", "marker": "o"}), strict=True):  # fmt: skip
-        points = [(int(key.split("|")[1]), s) for key, s in scores.items() if key.startswith(name) and "seq" not in key]
+        points = [
+            (int(key.split("|")[1]), s)
+            for key, s in scores.items()
+            if key.startswith(name) and "seq" not in key and s["refused"] < 1.0
+        ]
         axes.plot(
             [w / 2 for w, _ in points], [100 * (1 - s["accuracy"]) + 0.01 for _, s in points], label=name, **style
         )

@@ -227,6 +227,8 @@ static bool decide(struct nav_texture_stream *s, struct nav_texture_decision *d,
         return false;
     d->border = find_border(s, loglik, rung, half_rung);
     d->confidence = best(loglik, s->rules.classes, &d->label);
+    if (strange)
+        d->confidence *= s->rules.unknown[rung] / d->distance;
     bool unsure = d->confidence < (s->rules.step > 0 ? s->rules.sure : s->rules.doubt);
     if (strange || unsure)
         d->label = NAV_TEXTURE_UNKNOWN;

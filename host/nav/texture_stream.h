@@ -31,7 +31,8 @@ struct nav_texture_decision {
     int label;         /* class, or NAV_TEXTURE_UNKNOWN */
     int samples;       /* that the decision took */
     int border;        /* the surface changed within the window or since the one before it; or the whisker was caught */
-    double confidence; /* of the likeliest class, all being equally likely before: 0 without evidence */
+    double confidence; /* of the likeliest class, all being equally likely before: 0 without evidence;
+                        * less by as much as the distance exceeds its limit */
     double distance;   /* squared, of the features from the nearest class: about 1 for a trained surface */
     struct nav_texture_health health;
 };
