@@ -256,7 +256,7 @@ void dspic_input(struct dspic *chip, unsigned rp, bool level, uint64_t now_fs)
 {
     if (now_fs > chip->now_fs)
         dspic_run_until(chip, now_fs);
-    if (level == (bool)(chip->inputs >> rp & 1u))
+    if (level == (((unsigned)chip->inputs >> rp & 1u) != 0))
         return;
     dspic_wire(chip, rp, level);
     if (!chip->powered)

@@ -3,7 +3,7 @@
 
 static unsigned priority(const struct dspic *chip, unsigned irq)
 {
-    return chip->sfr[(IPC0 / 2u) + irq / 4u] >> (4u * (irq % 4u)) & 7u;
+    return (unsigned)chip->sfr[(IPC0 / 2u) + irq / 4u] >> (4u * (irq % 4u)) & 7u;
 }
 
 /* The flagged and enabled interrupt of the highest priority, the lowest number among equals; IRQ_COUNT: none. */
@@ -12,7 +12,7 @@ static unsigned best(const struct dspic *chip, unsigned *its_priority)
     unsigned found = IRQ_COUNT;
     *its_priority = 0;
     for (unsigned word = 0; word * 16u < IRQ_COUNT; word++) {
-        unsigned ready = chip->sfr[IFS0 / 2u + word] & chip->sfr[IEC0 / 2u + word];
+        unsigned ready = (unsigned)chip->sfr[IFS0 / 2u + word] & chip->sfr[IEC0 / 2u + word];
         for (unsigned bit = 0; ready != 0; bit++, ready >>= 1) {
             const unsigned irq = 16u * word + bit;
             if ((ready & 1u) && priority(chip, irq) > *its_priority) {
@@ -26,7 +26,7 @@ static unsigned best(const struct dspic *chip, unsigned *its_priority)
 
 static unsigned threshold(const struct dspic *chip)
 {
-    const unsigned masked = chip->sfr[SR / 2u] >> SR_IPL_SHIFT & 7u;
+    const unsigned masked = (unsigned)chip->sfr[SR / 2u] >> SR_IPL_SHIFT & 7u;
     const bool nests = !(chip->sfr[INTCON1 / 2u] & INTCON1_NSTDIS);
     if (chip->level > 0 && !nests)
         return 7u;

@@ -5,7 +5,7 @@
 
 unsigned pin_input_field(const struct dspic *chip, unsigned address, unsigned shift)
 {
-    return chip->sfr[address / 2u] >> shift & 31u;
+    return (unsigned)chip->sfr[address / 2u] >> shift & 31u;
 }
 
 bool pin_level(const struct dspic *chip, unsigned field)
@@ -15,7 +15,7 @@ bool pin_level(const struct dspic *chip, unsigned field)
 
 static unsigned function_of(const struct dspic *chip, unsigned rp)
 {
-    return chip->sfr[RPOR0 / 2u + rp / 2u] >> (8u * (rp % 2u)) & 31u;
+    return (unsigned)chip->sfr[RPOR0 / 2u + rp / 2u] >> (8u * (rp % 2u)) & 31u;
 }
 
 static enum dspic_drive drive_of(const struct dspic *chip, unsigned rp)

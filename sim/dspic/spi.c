@@ -28,7 +28,8 @@ static unsigned width(const struct dspic *chip, unsigned n)
 static unsigned divider(uint16_t control)
 {
     static const unsigned PRIMARY[] = {64, 16, 4, 1};
-    return PRIMARY[control >> SPICON1_PPRE_SHIFT & 3u] * (8u - (control >> SPICON1_SPRE_SHIFT & 7u));
+    const unsigned secondary = 8u - ((unsigned)control >> SPICON1_SPRE_SHIFT & 7u);
+    return PRIMARY[(unsigned)control >> SPICON1_PPRE_SHIFT & 3u] * secondary;
 }
 
 /* Where a slave's /SS comes in; SPI1's is not used as one here. */

@@ -119,7 +119,7 @@ static void enable(unsigned irq, unsigned priority)
 
 static bool flagged(unsigned irq)
 {
-    return get((uint16_t)(IFS0 + 2u * (irq / 16u))) >> irq % 16u & 1u;
+    return ((unsigned)get((uint16_t)(IFS0 + 2u * (irq / 16u))) >> irq % 16u & 1u) != 0;
 }
 
 static void pass(uint64_t fs)
@@ -164,7 +164,7 @@ static uint16_t clock_slave(uint16_t out, unsigned bits)
 {
     uint16_t in = 0;
     for (unsigned i = 0; i < bits; i++) {
-        dspic_wire(bench.chip, SLAVE_SDI, out >> (15u - i) & 1u);
+        dspic_wire(bench.chip, SLAVE_SDI, ((unsigned)out >> (15u - i) & 1u) != 0);
         dspic_input(bench.chip, SLAVE_SCK, true, dspic_now_fs(bench.chip));
         in = (uint16_t)(in << 1 | (dspic_output(bench.chip, SLAVE_SDO) == DSPIC_HIGH));
         dspic_input(bench.chip, SLAVE_SCK, false, dspic_now_fs(bench.chip));

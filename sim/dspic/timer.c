@@ -18,7 +18,8 @@ static uint64_t count_fs(const struct dspic *chip, unsigned n)
 uint16_t timer_count(const struct dspic *chip, unsigned n)
 {
     const struct timer *t = &chip->timer[n];
-    return on(chip, n) ? (uint16_t)(t->from + (chip->now_fs - t->since_fs) / count_fs(chip, n)) : t->from;
+    const uint64_t counts = on(chip, n) ? (chip->now_fs - t->since_fs) / count_fs(chip, n) : 0;
+    return (uint16_t)(t->from + counts);
 }
 
 /* The count equals the period, then begins again at 0: the flag is set with the next count. */

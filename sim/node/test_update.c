@@ -67,7 +67,8 @@ static void window(struct bench *b, const uint8_t *out, unsigned bytes, uint8_t 
     sim_node_select(b->node, true);
     memset(in, 0, WHISKER_RECORD_BYTES);
     for (unsigned bit = 0; bit < 8u * bytes; bit++) {
-        const bool mosi = out[bit / 8u] >> (7u - bit % 8u) & 1u, miso = sim_node_sck(b->node, true, mosi);
+        const bool mosi = ((unsigned)out[bit / 8u] >> (7u - bit % 8u) & 1u) != 0,
+                   miso = sim_node_sck(b->node, true, mosi);
         sim_node_sck(b->node, false, mosi);
         if (bit < 8u * WHISKER_RECORD_BYTES)
             in[bit / 8u] |= (uint8_t)(miso << (7u - bit % 8u));
