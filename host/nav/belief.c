@@ -66,7 +66,7 @@ static int raster_init(struct raster *r, const struct extent *e)
 {
     double span = fmax(e->x.high - e->x.low, e->y.high - e->y.low);
     double pitch = fmax(fmax(e->sigma * sqrt(3.0) / 2.0, span / (RASTER_MOST - 2)), 1e-6);
-    if (!isfinite(pitch))
+    if (!(span >= 0.0 && isfinite(pitch))) /* nothing has mass */
         return -1;
     *r = (struct raster){.x0 = e->x.low - pitch / 2.0, .y0 = e->y.low - pitch / 2.0, .pitch = pitch};
     r->nx = (int)((e->x.high - e->x.low) / pitch) + 2;
