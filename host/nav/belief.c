@@ -64,13 +64,13 @@ static struct extent extent_of(const struct nav_component *c, long n, double tot
 /* Bins a quarter as wide as the narrowest bump, as far as that gives no more than RASTER_MOST a side. */
 static int raster_init(struct raster *r, const struct extent *e)
 {
-    double span = fmax(e->x.high - e->x.low, e->y.high - e->y.low);
-    double pitch = fmax(fmax(e->sigma * sqrt(3.0) / 2.0, span / (RASTER_MOST - 2)), 1e-6);
-    if (!(span >= 0.0 && isfinite(pitch))) /* nothing has mass */
+    double width = e->x.high - e->x.low, height = e->y.high - e->y.low;
+    double pitch = fmax(fmax(e->sigma * sqrt(3.0) / 2.0, fmax(width, height) / (RASTER_MOST - 2)), 1e-6);
+    if (!(fmin(width, height) >= 0.0 && isfinite(pitch))) /* no bump lies anywhere */
         return -1;
     *r = (struct raster){.x0 = e->x.low - pitch / 2.0, .y0 = e->y.low - pitch / 2.0, .pitch = pitch};
-    r->nx = (int)((e->x.high - e->x.low) / pitch) + 2;
-    r->ny = (int)((e->y.high - e->y.low) / pitch) + 2;
+    r->nx = (int)(width / pitch) + 2;
+    r->ny = (int)(height / pitch) + 2;
     r->mass = calloc((size_t)r->nx * (size_t)r->ny, sizeof *r->mass);
     return r->mass ? 0 : -1;
 }
