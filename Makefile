@@ -19,7 +19,7 @@ test-all: test ## and what is long: sanitizers over the whole tree, longer fuzzi
 	@tools/run_tests.sh --long
 
 bench: build ## measure speed and accuracy again, as ratios in one run: bench/results, docs/charts
-	@$(PYTHON) tools/bench.py --build-dir $(BUILD)
+	@$(PYTHON) tools/run_benches.py --build-dir $(BUILD)
 
 build: setup ## compile libraries, daemon, firmware core, simulated bridge and the Python modules
 	@tools/build.sh $(BUILD)

@@ -2,7 +2,7 @@
 """Measures speed and accuracy, always as ratios in one run, and redraws every chart.
 
     make bench                        bench/results/*.json, docs/charts/*.svg and .png
-    tools/bench.py --only ring nav    some topics: each is a module bench_<topic>.py that also runs alone
+    tools/run_benches.py --only ring nav    some topics: each is a module bench_<topic>.py that also runs alone
 
 A measurement that is done is kept in build/bench: an interrupted run goes on where it stopped; `--fresh` begins again.
 """
