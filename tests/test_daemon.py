@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from chainrun import END_S, FAST_LINK, program, running, simulation, write_flat_scene
 
+from whisker.protocol import LIMITS, WIRE_VERSION
 from whisker.ring import Reader, RingError
 
 LONG_S = 600
@@ -174,7 +175,7 @@ def test_readers_know_bridge_and_clock(tmp_path, ring):
         until(lambda: connected(reader) and reader.clock is not None, process)
         stats, clock = reader.stats, reader.clock
         finish(process)
-    assert (stats.serial, stats.firmware) == ("0001", "gateware 1, wire 1")
+    assert (stats.serial, stats.firmware) == ("0001", f"gateware {LIMITS['gateware_version']}, wire {WIRE_VERSION}")
     assert stats.lane_mask == 2**28 - 1 and stats.tick_period == 30000
     assert stats.started_ns <= stats.connected_ns <= time.time_ns()
     assert clock.ns_per_cycle == pytest.approx(1e9 / 60e6, rel=1e-3)

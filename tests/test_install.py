@@ -63,7 +63,7 @@ def test_example_streams_from_the_device(examples, tmp_path):
     words = [*command[: command.index("--") + 1], str(examples / "open_device")]
     done = subprocess.run(words, capture_output=True, text=True, timeout=END_S)
     first, second = done.stdout.splitlines()
-    assert first == "bridge 0001, gateware 1"
+    assert first == f"bridge 0001, gateware {LIMITS['gateware_version']}"
     frames, good = map(int, re.fullmatch(r"(\d+) frames, (\d+) good readings", second).groups())
     assert frames > 2000 and good == 6 * frames
 

@@ -12,10 +12,10 @@ LOST_CLOCK = 7
 
 
 def _library() -> ctypes.CDLL:
-    path = os.path.join(os.environ.get("WHISKER_BUILD", REPO / "build" / "release"), "sim/node/libsim_node_pins.so")
-    if not os.path.exists(path):
+    path = REPO / os.environ.get("WHISKER_BUILD", "build/release") / "sim/node/libsim_node_pins.so"
+    if not path.exists():
         raise FileNotFoundError(f"{path}: the bench of node and bridge needs it; run 'make build' first")
-    library = ctypes.CDLL(path)
+    library = ctypes.CDLL(str(path))
     library.node_pins_new.restype = ctypes.c_void_p
     library.node_pins_new.argtypes = [ctypes.c_uint64, ctypes.c_int32, ctypes.c_uint, ctypes.c_uint, ctypes.c_uint]
     library.node_pins_field.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_double]

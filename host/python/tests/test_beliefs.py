@@ -31,8 +31,10 @@ def test_masses_sum_to_one(name, made):
 
 @pytest.mark.parametrize("name", localise.filter_names())
 def test_nothing_read_makes_nothing_surer(name, made):
-    """Six seconds with no reading: confidence falls or stays, but for what resampling and rounding may move."""
+    """Six seconds at a standstill with no reading: confidence falls or stays, but for what resampling and rounding may
+    move. (A robot that drives on may grow surer of its place: going back undoes what an uncertain heading spread.)"""
     rows = made.observations
+    rows.odometry[ROWS:] = 0.0
     rows.texture[ROWS:], rows.radial_m[ROWS:] = np.nan, np.nan
     table, _ = localise.Filter(name, made.scene, seed=3).replay(rows, 0, ROWS + BLIND)
     after = table["confidence"][ROWS - 1 :]

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from viewkit import NODES, flowing, made_frames, ring_name, ring_of, spoil, view_of
 
+from whisker.protocol import WIRE_VERSION
 from whisker.ring import Clock
 from whisker.view.hub import Hub
 from whisker.view.server import serving
@@ -79,7 +80,7 @@ def test_counters_health_and_lanes_are_those_of_the_ring():
                 "tile-bad",
             ]
             health = await b.text("#health")
-            assert "CB-0007" in health and "1 (bridge), 1 (host)" in health and "± 1.5 µs" in health
+            assert "CB-0007" in health and f"1 (bridge), {WIRE_VERSION} (host)" in health and "± 1.5 µs" in health
             rows = await b.eval("[...document.querySelectorAll('#lanes tbody tr')].map((r) => r.innerText.trim())")
             assert len(rows) == 28 and rows[1].split()[:2] == ["1", "good"] and rows[1].endswith("12 !")
             assert rows[NODES].split() == [str(NODES), "absent"]
