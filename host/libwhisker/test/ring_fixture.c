@@ -50,3 +50,21 @@ bool test_ring_file_exists(const char *name)
     }
     return fd >= 0;
 }
+
+int test_open_pair(void **state)
+{
+    static struct test_ring_pair pair;
+    *state = &pair;
+    if (whisker_ring_create(test_ring_name(), TEST_CAPACITY, &pair.ring) != 0) {
+        return -1;
+    }
+    return whisker_reader_attach(test_ring_name(), 0, &pair.reader);
+}
+
+int test_close_pair(void **state)
+{
+    struct test_ring_pair *pair = *state;
+    whisker_reader_detach(pair->reader);
+    whisker_ring_close(pair->ring);
+    return test_ring_file_exists(test_ring_name()) ? -1 : 0;
+}

@@ -9,6 +9,16 @@
 
 #define TEST_CAPACITY 64u
 
+/* A ring and a reader of it. */
+struct test_ring_pair {
+    struct whisker_ring *ring;
+    struct whisker_reader *reader;
+};
+
+/* Set-up and teardown of a test: opens a pair under the test's name; closes it, which must leave no file. */
+int test_open_pair(void **state);
+int test_close_pair(void **state);
+
 /* A name no other test process uses, but those forked after the first call. */
 const char *test_ring_name(void);
 

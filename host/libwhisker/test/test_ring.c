@@ -14,29 +14,6 @@
 #include "vectors.h"
 #include "whisker/errors.h"
 
-struct fixture {
-    struct whisker_ring *ring;
-    struct whisker_reader *reader;
-};
-
-static int open_both(void **state)
-{
-    static struct fixture fixture;
-    *state = &fixture;
-    if (whisker_ring_create(test_ring_name(), TEST_CAPACITY, &fixture.ring) != 0) {
-        return -1;
-    }
-    return whisker_reader_attach(test_ring_name(), 0, &fixture.reader);
-}
-
-static int close_both(void **state)
-{
-    struct fixture *fixture = *state;
-    whisker_reader_detach(fixture->reader);
-    whisker_ring_close(fixture->ring);
-    return test_ring_file_exists(test_ring_name()) ? -1 : 0;
-}
-
 /* Reads everything there is; each frame must be the next one. Returns the index after the last. */
 static uint64_t read_all(struct whisker_reader *reader, uint64_t index)
 {
@@ -52,7 +29,7 @@ static uint64_t read_all(struct whisker_reader *reader, uint64_t index)
 
 static void frames_come_in_order_and_once(void **state)
 {
-    const struct fixture *f = *state;
+    const struct test_ring_pair *f = *state;
     test_publish(f->ring, 0, 10);
     assert_int_equal(read_all(f->reader, 0), 10);
     assert_int_equal(read_all(f->reader, 10), 10);
@@ -62,7 +39,7 @@ static void frames_come_in_order_and_once(void **state)
 
 static void window_across_the_wrap_is_one_array(void **state)
 {
-    const struct fixture *f = *state;
+    const struct test_ring_pair *f = *state;
     test_publish(f->ring, 0, TEST_CAPACITY - 5);
     read_all(f->reader, 0);
     test_publish(f->ring, TEST_CAPACITY - 5, TEST_CAPACITY); /* a full ring that begins 5 frames before its end */
@@ -75,7 +52,7 @@ static void window_across_the_wrap_is_one_array(void **state)
 
 static void batch_across_the_wrap_arrives_whole(void **state)
 {
-    const struct fixture *f = *state;
+    const struct test_ring_pair *f = *state;
     struct whisker_frame batch[TEST_CAPACITY / 4 + 1];
     for (uint64_t first = 0; first < 5 * TEST_CAPACITY; first += 13) {
         for (uint64_t i = 0; i < 13; i++) {
@@ -89,7 +66,7 @@ static void batch_across_the_wrap_arrives_whole(void **state)
 
 static void overtaken_reader_is_told_and_goes_on(void **state)
 {
-    const struct fixture *f = *state;
+    const struct test_ring_pair *f = *state;
     test_publish(f->ring, 0, TEST_CAPACITY + 1);
     const struct whisker_frame *frames;
     size_t count;
@@ -106,7 +83,7 @@ static void overtaken_reader_is_told_and_goes_on(void **state)
 
 static void reader_overtaken_while_it_reads_is_told(void **state)
 {
-    const struct fixture *f = *state;
+    const struct test_ring_pair *f = *state;
     test_publish(f->ring, 0, 8);
     const struct whisker_frame *frames;
     size_t count;
@@ -119,7 +96,7 @@ static void reader_overtaken_while_it_reads_is_told(void **state)
 
 static void newest_frames_are_one_array_wherever_the_reader_stands(void **state)
 {
-    const struct fixture *f = *state;
+    const struct test_ring_pair *f = *state;
     const struct whisker_frame *frames;
     assert_int_equal(whisker_reader_window(f->reader, 10, &frames), 0);
     test_publish(f->ring, 0, 4);
@@ -143,7 +120,7 @@ static void newest_frames_are_one_array_wherever_the_reader_stands(void **state)
 
 static void advance_beyond_the_window_is_refused(void **state)
 {
-    const struct fixture *f = *state;
+    const struct test_ring_pair *f = *state;
     test_publish(f->ring, 0, 3);
     const struct whisker_frame *frames;
     size_t count;
@@ -156,7 +133,7 @@ static void advance_beyond_the_window_is_refused(void **state)
 
 static void missing_sequence_numbers_are_counted(void **state)
 {
-    const struct fixture *f = *state;
+    const struct test_ring_pair *f = *state;
     test_publish(f->ring, UINT32_MAX - 2, 3);
     read_all(f->reader, UINT32_MAX - 2);
     test_publish(f->ring, UINT64_C(1) << 32, 2); /* the wire's sequence goes on at 0: nothing is missing */
@@ -178,7 +155,7 @@ static void missing_sequence_numbers_are_counted(void **state)
 
 static void late_reader_starts_at_the_oldest_or_newest(void **state)
 {
-    const struct fixture *f = *state;
+    const struct test_ring_pair *f = *state;
     test_publish(f->ring, 0, 100);
     struct whisker_reader *late;
     assert_int_equal(whisker_reader_attach(test_ring_name(), 0, &late), 0);
@@ -192,7 +169,7 @@ static void late_reader_starts_at_the_oldest_or_newest(void **state)
 
 static void closed_ring_is_read_to_its_end(void **state)
 {
-    struct fixture *f = *state;
+    struct test_ring_pair *f = *state;
     test_publish(f->ring, 0, 7);
     assert_int_equal(whisker_reader_wait(f->reader, -1), 0);
     whisker_ring_close(f->ring);
@@ -205,14 +182,14 @@ static void closed_ring_is_read_to_its_end(void **state)
 
 static void empty_ring_times_out(void **state)
 {
-    const struct fixture *f = *state;
+    const struct test_ring_pair *f = *state;
     assert_int_equal(whisker_reader_wait(f->reader, 0), WHISKER_ERROR_TIMEOUT);
     assert_int_equal(whisker_reader_wait(f->reader, 1), WHISKER_ERROR_TIMEOUT);
 }
 
 static void new_ring_of_the_name_is_seen_and_followed(void **state)
 {
-    struct fixture *f = *state;
+    struct test_ring_pair *f = *state;
     test_publish(f->ring, 0, 2);
     struct whisker_reader_info before, after;
     whisker_reader_info(f->reader, &before);
@@ -242,7 +219,7 @@ static void second_writer_is_refused(void **state)
 
 static void bytes_are_decoded_straight_into_the_ring(void **state)
 {
-    const struct fixture *f = *state;
+    const struct test_ring_pair *f = *state;
     static struct vector vectors[VECTORS_MAX];
     const size_t vector_count = vectors_read(WHISKER_VECTORS "/frames.txt", vectors);
     const struct vector *good = vector_named(vectors, vector_count, "good");
@@ -265,7 +242,7 @@ static void bytes_are_decoded_straight_into_the_ring(void **state)
 
 static void clock_and_statistics_are_told(void **state)
 {
-    const struct fixture *f = *state;
+    const struct test_ring_pair *f = *state;
     struct whisker_clock clock;
     struct whisker_daemon_stats stats;
     assert_int_equal(whisker_reader_clock(f->reader, &clock), 0);
@@ -331,7 +308,7 @@ static void bad_names_and_sizes_are_refused(void **state)
     assert_int_equal(whisker_reader_attach(test_ring_name(), 0, &reader), WHISKER_ERROR_RING_MISSING);
 }
 
-#define WITH_RING(test) cmocka_unit_test_setup_teardown(test, open_both, close_both)
+#define WITH_RING(test) cmocka_unit_test_setup_teardown(test, test_open_pair, test_close_pair)
 
 int main(void)
 {

@@ -19,29 +19,6 @@
 #include "ring_internal.h"
 #include "whisker/errors.h"
 
-struct fixture {
-    struct whisker_ring *ring;
-    struct whisker_reader *reader;
-};
-
-static int open_both(void **state)
-{
-    static struct fixture fixture;
-    *state = &fixture;
-    if (whisker_ring_create(test_ring_name(), TEST_CAPACITY, &fixture.ring) != 0) {
-        return -1;
-    }
-    return whisker_reader_attach(test_ring_name(), 0, &fixture.reader);
-}
-
-static int close_both(void **state)
-{
-    struct fixture *fixture = *state;
-    whisker_reader_detach(fixture->reader);
-    whisker_ring_close(fixture->ring);
-    return test_ring_file_exists(test_ring_name()) ? -1 : 0;
-}
-
 /* The path of the test's ring. */
 static const char *path(void)
 {
@@ -53,7 +30,7 @@ static const char *path(void)
 /* Whatever a mad writer puts into the shared header, a reader stays inside its own mapping. */
 static void nonsense_in_the_header_cannot_lead_a_reader_astray(void **state)
 {
-    const struct fixture *f = *state;
+    const struct test_ring_pair *f = *state;
     static const uint64_t values[] = {0,       1,       TEST_CAPACITY, TEST_CAPACITY + 1, UINT32_MAX,
                                       1000000, 1000064, INT64_MAX,     UINT64_MAX - 1,    UINT64_MAX};
     enum { VALUES = sizeof values / sizeof values[0] };
@@ -338,7 +315,7 @@ static void rings_are_listed_and_stale_ones_removed(void **state)
     assert_int_equal(whisker_ring_remove_stale(test_ring_name()), WHISKER_ERROR_RING_MISSING);
 }
 
-#define WITH_RING(test) cmocka_unit_test_setup_teardown(test, open_both, close_both)
+#define WITH_RING(test) cmocka_unit_test_setup_teardown(test, test_open_pair, test_close_pair)
 
 int main(int argc, char **argv)
 {
