@@ -1,0 +1,181 @@
+// UTMI on one side, a ULPI PHY's pins on the other (ULPI 1.1; the PHY gives the 60 MHz clock and keeps it running).
+// ulpi_data_out, ulpi_stp and the drive bit are flip-flops at the pads, and all inputs end in flip-flops; the only logic
+// before one is the choice that ulpi_nxt and ulpi_dir make, for the PHY wants the next byte in the very next cycle.
+// ulpi_data_oe is the drive bit less ulpi_dir: the pads let go within the turnaround cycle.
+//
+//   dir nxt data_in --> | reg | --> rx: RXCMD or byte --> line_state, session, rx_active, rx_valid, rx_error
+//   data_out stp    <-- | reg | <-- IDLE -> COMMAND -> VALUE | BYTES -> STOP <-- set-up list, then every change of mode
+//                                                                       '---- four bytes ahead <-- tx_data, tx_valid
+//
+// Set-up: once dir has been low for SETTLE cycles: soft reset, wait for its end, pull-downs off, mode. Until then the
+// session has ended for the device, so that it neither chirps nor answers. A command without nxt for TIMEOUT cycles ends
+// with stp; a set-up then begins anew. dir ends a register write (tried again) or a transmission (dropped).
+
+`default_nettype none
+
+module ulpi_shim #(
+    parameter SETTLE      = 64,   // cycles of dir low before a command, at first and after a reset or a time-out
+    parameter TIMEOUT     = 1024, // cycles without nxt; a full-speed byte takes 47 at most
+    parameter IGNORE_VBUS = 0     // 1: the PHY does not see VBUS; a session always lasts
+) (
+    input  wire       clk,                 // 60 MHz, from the PHY
+    input  wire       rst,                 // synchronous, power-up
+    input  wire [7:0] ulpi_data_in,        // pads
+    output reg  [7:0] ulpi_data_out,       // .
+    output wire       ulpi_data_oe,        // . 1: drive all eight
+    input  wire       ulpi_dir,            // .
+    input  wire       ulpi_nxt,            // .
+    output reg        ulpi_stp,            // .
+    output wire       ulpi_reset,          // . never active: a PHY in reset may stop the clock that would end it
+    output wire       ready,               // the PHY is set up
+    output reg  [7:0] utmi_rx_data,        // UTMI, as its specification names it
+    output reg        utmi_rx_active,      // .
+    output reg        utmi_rx_valid,       // .
+    output reg        utmi_rx_error,       // .
+    input  wire [7:0] utmi_tx_data,        // .
+    input  wire       utmi_tx_valid,       // .
+    output wire       utmi_tx_ready,       // .
+    output reg  [1:0] utmi_line_state,     // .
+    output wire       utmi_vbus_valid,     // .
+    output wire       utmi_session_valid,  // .
+    output wire       utmi_session_end,    // .
+    input  wire [1:0] utmi_xcvr_select,    // .
+    input  wire       utmi_term_select,    // .
+    input  wire [1:0] utmi_op_mode         // .
+);
+    // ULPI 1.1: transmit command byte (table 4), registers (tables 17, 18, 20)
+    localparam [7:0] TRANSMIT = 8'h40, WRITE_FUNCTION = 8'h84, WRITE_OTG = 8'h8A;
+    localparam [7:0] SOFT_RESET = 8'h65;  // reset, suspendM high, full speed
+    localparam [7:0] NO_PULL_DOWNS = 8'h00;
+    localparam [1:0] OP_MODE_CHIRP = 2'd2;
+
+    localparam [2:0] REST = 3'd0, IDLE = 3'd1, COMMAND = 3'd2, VALUE = 3'd3, BYTES = 3'd4, STOP = 3'd5;
+    localparam [1:0] STEP_RESET = 2'd0, STEP_OTG = 2'd1, STEP_MODE = 2'd2, STEP_DONE = 2'd3;
+
+    reg [2:0]  state;
+    reg [1:0]  step;      // of the set-up
+    reg        writing;   // the command is a register write
+    reg        failed;    // it ran out of time
+    reg        drive;
+    reg [7:0]  value;     // of the register write
+    reg [7:0]  mode;      // function control as last written
+    reg [10:0] patience;  // cycles left
+
+    // ---------------------------------------------------------------------------------------------- from the PHY
+    reg       dir, dir_before, nxt;
+    reg [7:0] data;
+    reg [1:0] line, vbus;
+
+    wire heard  = dir && dir_before;    // else it is idle, or a turnaround
+    wire status = heard && !nxt;        // RXCMD, ULPI 1.1 table 7
+    wire active = status ? data[4] : dir && (utmi_rx_active || nxt);  // dir and nxt rising together begin a packet
+
+    always @(posedge clk) begin
+        {dir_before, dir, nxt, data} <= {dir, ulpi_dir, ulpi_nxt, ulpi_data_in};
+        utmi_rx_data    <= data;
+        utmi_rx_valid   <= ready && heard && nxt;
+        utmi_rx_active  <= ready && active;
+        utmi_rx_error   <= ready && status && data[5:4] == 2'b11;
+        utmi_line_state <= ready ? line : 2'b00;
+        if (status) {vbus, line} <= data[3:0];
+        if (rst) {dir_before, dir, nxt, vbus, line} <= {1'b1, 1'b1, 1'b0, 2'b11, 2'b00};
+    end
+
+    assign ulpi_reset         = 1'b0;
+    assign ready              = step == STEP_DONE;
+    assign utmi_vbus_valid    = ready && (vbus == 2'b11 || IGNORE_VBUS != 0);
+    assign utmi_session_valid = ready && (vbus[1] || IGNORE_VBUS != 0);
+    assign utmi_session_end   = !ready || (vbus == 2'b00 && IGNORE_VBUS == 0);
+
+    // --------------------------------------------------------------------------- what the device sends, four bytes ahead
+    reg [7:0] ahead [0:3];
+    reg [1:0] head, tail;
+    reg [2:0] count;
+    reg       drop;  // the rest of its packet goes nowhere
+
+    wire       push      = utmi_tx_valid && utmi_tx_ready && !drop;
+    wire       more      = count != 3'd0;
+    wire [7:0] next_byte = ahead[tail];
+    wire       chirp     = utmi_op_mode == OP_MODE_CHIRP;  // no identifier: all bytes follow the command
+
+    wire       bus_free  = !ulpi_dir && !dir && !dir_before;
+    wire [7:0] mode_due  = {3'b010, utmi_op_mode, utmi_term_select, utmi_xcvr_select};
+    wire       write_due = !ready || mode != mode_due;
+    wire       begins    = state == IDLE && bus_free && !write_due && more && !drop;
+    wire       in_packet = !writing && (state == COMMAND || state == BYTES);
+    wire       pop       = more && (begins ? !chirp : in_packet && ulpi_nxt && !ulpi_dir);
+    wire       in_command = state == COMMAND || state == VALUE || state == BYTES;
+    wire       expired   = in_command && patience == 11'd0;
+    wire       aborted   = in_command && ulpi_dir;
+
+    assign utmi_tx_ready = ready && (drop || !count[2]);
+
+    always @(posedge clk) begin
+        if (push) ahead[head] <= utmi_tx_data;
+        head  <= head + {1'b0, push};
+        tail  <= tail + {1'b0, pop};
+        count <= count + {2'b00, push} - {2'b00, pop};
+        drop  <= drop && utmi_tx_valid;
+        if ((aborted || expired) && !writing) begin
+            {head, tail, count} <= 7'd0;
+            drop <= utmi_tx_valid;
+        end
+        if (rst) {head, tail, count, drop} <= 8'd0;
+    end
+
+    // ------------------------------------------------------------------------------------------------------ to the PHY
+    wire [7:0] due_value   = step == STEP_RESET ? SOFT_RESET : step == STEP_OTG ? NO_PULL_DOWNS : mode_due;
+    wire [7:0] due_command = step == STEP_OTG ? WRITE_OTG : WRITE_FUNCTION;
+
+    always @(posedge clk) begin
+        drive    <= !ulpi_dir;
+        ulpi_stp <= 1'b0;
+        patience <= patience - 11'd1;
+        case (state)
+            REST: begin
+                if (ulpi_dir || dir) patience <= SETTLE;
+                else if (patience == 11'd0) state <= IDLE;
+            end
+            IDLE: begin
+                patience      <= TIMEOUT;
+                failed        <= 1'b0;
+                writing       <= write_due;
+                value         <= due_value;
+                ulpi_data_out <= 8'h00;
+                if (bus_free && write_due || begins) begin
+                    state         <= COMMAND;
+                    ulpi_data_out <= write_due ? due_command : TRANSMIT | (chirp ? 8'h00 : {4'h0, next_byte[3:0]});
+                end
+            end
+            COMMAND, VALUE, BYTES:
+                if (aborted || expired) begin
+                    state         <= aborted ? IDLE : STOP;
+                    failed        <= 1'b1;
+                    ulpi_stp      <= !aborted;
+                    ulpi_data_out <= 8'h00;
+                end else if (ulpi_nxt) begin
+                    patience      <= TIMEOUT;
+                    state         <= !writing ? (more ? BYTES : STOP) : state == COMMAND ? VALUE : STOP;
+                    ulpi_stp      <= writing ? state == VALUE : !more;
+                    ulpi_data_out <= !writing ? (more ? next_byte : 8'h00) : state == COMMAND ? value : 8'h00;
+                end
+            STOP: begin
+                patience <= SETTLE;
+                state    <= failed || step == STEP_RESET ? REST : IDLE;
+                if (writing && failed && !ready) step <= STEP_RESET;
+                else if (writing && !failed && !ulpi_dir) begin
+                    if (step >= STEP_MODE) mode <= value;
+                    if (!ready) step <= step + 2'd1;
+                end
+            end
+            default: state <= REST;
+        endcase
+        if (rst) begin
+            {state, step, drive, ulpi_stp, ulpi_data_out} <= {REST, STEP_RESET, 1'b0, 1'b0, 8'h00};
+            {writing, failed, mode} <= 10'd0;
+            patience <= SETTLE;
+        end
+    end
+endmodule
+
+`default_nettype wire
