@@ -78,6 +78,9 @@ static void handle(struct dspic *chip, enum event event)
     case EVENT_PLL:
         system_pll_event(chip);
         break;
+    case EVENT_DISI:
+        chip->look = true;
+        break;
     case EVENT_WATCHDOG:
         watchdog_event(chip);
         break;

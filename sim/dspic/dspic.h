@@ -31,6 +31,7 @@ struct dspic_parameters {
     uint8_t exit_cycles;    /* 3 (A) */
     uint16_t work_cycles;   /* of an interrupt besides its register accesses */
     uint16_t pll_lock_us;   /* from the switch to LOCK */
+    uint8_t pll_failures;   /* so many switches, counted from the chip's making, never end: the PLL does not lock */
     uint16_t watchdog_ms;   /* FWDT's period at the nominal LPRC */
     uint8_t dma_cycles;     /* from a peripheral's request to its transfer; not documented */
     bool pins_lock_once;    /* FOSC's IOL1WAY: a pin map that was locked stays locked until reset */
@@ -59,7 +60,7 @@ struct dspic_violations {
     uint32_t spi_disabled;  /* SPIxBUF written while it was disabled (ignored) */
     uint32_t spi_overwrite; /* SPIxBUF written while SPITBF was set (the older word is lost) */
     uint32_t pins_locked;   /* pin map written while locked (ignored) */
-    uint32_t unlock;        /* OSCCON or NVMCON written without its key sequence (ignored) */
+    uint32_t unlock;        /* OSCCON or NVMCON written without its key sequence, or too late after it (ignored) */
 };
 
 /* Without power. NULL: no memory. */

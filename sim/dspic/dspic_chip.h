@@ -17,6 +17,7 @@ enum event {
     EVENT_T3,
     EVENT_DMA,
     EVENT_PLL,
+    EVENT_DISI, /* interrupts are held off no longer */
     EVENT_WATCHDOG,
     EVENT_POWER,
     EVENT_OUTSIDE, /* last: neither a reset nor a power cut stops it */
@@ -77,6 +78,9 @@ struct dspic {
     bool look;                            /* an interrupt may have become ready */
     uint8_t drive[16];                    /* enum dspic_drive */
     uint8_t high_key, low_key, flash_key; /* steps of an unlock sequence done */
+    uint64_t key_fs;                      /* when the latest of them was */
+    uint64_t held_fs;                     /* DISI holds interrupts off until then */
+    uint8_t pll_failed;                   /* switches that never ended */
     bool pins_were_locked;
     uint32_t flash[FLASH_WORDS];
     uint32_t latch[FLASH_ROW_WORDS];
@@ -89,6 +93,14 @@ struct dspic {
 static inline uint16_t *sfr(struct dspic *chip, unsigned address)
 {
     return &chip->sfr[address / 2u];
+}
+
+/* True if at most so many cycles have passed since the latest step of an unlock sequence; notes this one. */
+static inline bool key_in_time(struct dspic *chip, unsigned cycles)
+{
+    const bool in_time = chip->now_fs - chip->key_fs <= cycles * chip->cycle_fs;
+    chip->key_fs = chip->now_fs;
+    return in_time;
 }
 
 /* dspic.c */
@@ -107,7 +119,7 @@ void spi_wrote(struct dspic *chip, unsigned n, unsigned address, uint16_t old);
 uint16_t spi_read_buffer(struct dspic *chip, unsigned n);
 void spi_event(struct dspic *chip, unsigned n);
 void spi_input(struct dspic *chip, unsigned rp, bool level);
-/* Output of pin function RP_*; with the module off the pin stays the port's. */
+/* Output of pin function RP_*; with the module or its output off the pin stays the port's. */
 void spi_drives(const struct dspic *chip, unsigned function, bool *driven, bool *level);
 
 /* dma.c */
@@ -131,6 +143,7 @@ unsigned pin_input_field(const struct dspic *chip, unsigned address, unsigned sh
 void system_reset(struct dspic *chip, uint16_t cause);
 void system_clock(struct dspic *chip);
 void system_pll_event(struct dspic *chip);
+void system_wake(struct dspic *chip); /* from idle, if it is */
 void watchdog_restart(struct dspic *chip);
 void watchdog_event(struct dspic *chip);
 

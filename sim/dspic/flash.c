@@ -86,16 +86,19 @@ static void operate(struct dspic *chip, struct operation o)
         chip->latch[i] = 0xFFFFFFu;
 }
 
-/* WR is only taken right after the two keys. */
+enum { KEY_CYCLES = 2 }; /* between two steps: as the family's documents show the sequence (C) */
+
+/* WR is only taken right after the two keys: what comes between, an interrupt, voids them. */
 void flash_wrote(struct dspic *chip, unsigned address, uint16_t old)
 {
     uint16_t *nvmcon = sfr(chip, NVMCON);
     if (address == NVMKEY) {
         const uint16_t key = *sfr(chip, NVMKEY);
-        chip->flash_key = key == NVMKEY_1 ? 1u : key == NVMKEY_2 && chip->flash_key == 1u ? 2u : 0u;
+        const bool second = key_in_time(chip, KEY_CYCLES) && chip->flash_key == 1u && key == NVMKEY_2;
+        chip->flash_key = key == NVMKEY_1 ? 1u : second ? 2u : 0u;
         return;
     }
-    const bool start = *nvmcon & ~old & NVMCON_WR, unlocked = chip->flash_key == 2u;
+    const bool start = *nvmcon & ~old & NVMCON_WR, unlocked = chip->flash_key == 2u && key_in_time(chip, KEY_CYCLES);
     chip->flash_key = 0;
     if (!start)
         return;

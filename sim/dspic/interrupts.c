@@ -28,9 +28,10 @@ static unsigned threshold(const struct dspic *chip)
 {
     const unsigned masked = (unsigned)chip->sfr[SR / 2u] >> SR_IPL_SHIFT & 7u;
     const bool nests = !(chip->sfr[INTCON1 / 2u] & INTCON1_NSTDIS);
+    const unsigned held = chip->now_fs < chip->held_fs ? 6u : 0u; /* DISI leaves the highest priority alone */
     if (chip->level > 0 && !nests)
         return 7u;
-    return chip->level > masked ? chip->level : masked;
+    return chip->level > masked ? (chip->level > held ? chip->level : held) : masked > held ? masked : held;
 }
 
 void irq_raise(struct dspic *chip, unsigned irq)
@@ -45,7 +46,7 @@ static void serve(struct dspic *chip, unsigned irq, unsigned its)
     const unsigned before = chip->level;
     const uint64_t since = chip->now_fs;
     chip->level = its;
-    chip->idle = false;
+    system_wake(chip);
     chip->interrupts++;
     dspic_spend(chip, chip->parameters.entry_cycles);
     chip->wiring.interrupt(chip->wiring.context, irq);
@@ -67,6 +68,17 @@ void irq_take(struct dspic *chip)
         serve(chip, irq, its);
         woke = true;
     }
+    if (chip->idle && its > 0) { /* not above the CPU's priority: it wakes and goes on, the interrupt waits (A) */
+        system_wake(chip);
+        woke = true;
+    }
     if (woke && chip->level == 0 && !chip->in_start)
         chip->wiring.loop(chip->wiring.context);
+}
+
+void dspic_hold_interrupts(struct dspic *chip, uint16_t cycles)
+{
+    dspic_spend(chip, 1u);
+    chip->held_fs = chip->now_fs + cycles * chip->cycle_fs;
+    plan_event(chip, EVENT_DISI, chip->held_fs);
 }

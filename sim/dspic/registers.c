@@ -107,29 +107,29 @@ static void osccon_low(struct dspic *chip, uint8_t value)
     *osccon = (uint16_t)((*osccon & ~(OSCCON_OSWEN | OSCCON_IOLOCK)) | (value & (OSCCON_OSWEN | OSCCON_IOLOCK)));
     if (chip->parameters.pins_lock_once && chip->pins_were_locked)
         *osccon |= OSCCON_IOLOCK;
-    if (*osccon & OSCCON_OSWEN)
+    if (!(*osccon & OSCCON_OSWEN))
+        return;
+    if (chip->pll_failed < chip->parameters.pll_failures)
+        chip->pll_failed++;
+    else
         plan_event(chip, EVENT_PLL, chip->now_fs + chip->parameters.pll_lock_us * (DSPIC_FS_PER_NS * 1000u));
 }
 
-/* One step of an unlock sequence: two keys, then the value, to the same byte. True when this is the value. */
-static bool unlock(uint8_t *step, uint8_t value, uint8_t key1, uint8_t key2)
+/* One step of an unlock sequence: two keys, then the value, to the same byte in back-to-back instructions (A). True
+ * when this is the value. */
+static bool unlock(struct dspic *chip, uint8_t *step, uint8_t value, uint8_t key1, uint8_t key2)
 {
-    if (*step == 2u) {
-        *step = 0;
-        return true;
-    }
-    if (*step == 1u && value == key2)
-        *step = 2u;
-    else
-        *step = value == key1;
-    return false;
+    const uint8_t before = key_in_time(chip, 1u) ? *step : 0u;
+    const bool second = before == 1u && value == key2, first = before < 2u && value == key1;
+    *step = second ? 2u : first ? 1u : 0u;
+    return before == 2u;
 }
 
 void dspic_byte_write(struct dspic *chip, uint16_t address, uint8_t value)
 {
-    if (address == OSCCON + 1u && unlock(&chip->high_key, value, OSCCON_HIGH_KEY1, OSCCON_HIGH_KEY2))
+    if (address == OSCCON + 1u && unlock(chip, &chip->high_key, value, OSCCON_HIGH_KEY1, OSCCON_HIGH_KEY2))
         osccon_high(chip, value);
-    else if (address == OSCCON && unlock(&chip->low_key, value, OSCCON_LOW_KEY1, OSCCON_LOW_KEY2))
+    else if (address == OSCCON && unlock(chip, &chip->low_key, value, OSCCON_LOW_KEY1, OSCCON_LOW_KEY2))
         osccon_low(chip, value);
     dspic_spend(chip, 1u);
 }

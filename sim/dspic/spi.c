@@ -220,8 +220,8 @@ void spi_drives(const struct dspic *chip, unsigned function, bool *driven, bool 
     const unsigned n = function == RP_SDO2;
     const struct spi *s = &chip->spi[n];
     const bool master = con1(chip, n) & SPICON1_MSTEN;
-    if (!enabled(chip, n))
+    if (!enabled(chip, n) || (function != RP_SCK1 && con1(chip, n) & SPICON1_DISSDO))
         return;
     *level = function == RP_SCK1 ? s->high : s->sdo;
-    *driven = function == RP_SCK1 ? master : !(con1(chip, n) & SPICON1_DISSDO) && (master || selected(chip, n));
+    *driven = function == RP_SCK1 ? master : master || selected(chip, n);
 }

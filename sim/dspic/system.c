@@ -66,13 +66,20 @@ void dspic_idle(struct dspic *chip)
     watchdog_restart(chip);
 }
 
+void system_wake(struct dspic *chip)
+{
+    if (chip->idle)
+        *sfr(chip, RCON) |= RCON_IDLE;
+    chip->idle = false;
+}
+
 /* It wakes an idle CPU and resets any other (C). */
 void watchdog_event(struct dspic *chip)
 {
     if (!chip->idle || chip->hung || chip->level > 0)
         dspic_reset(chip, RCON_WDTO);
-    *sfr(chip, RCON) |= RCON_WDTO | RCON_IDLE;
-    chip->idle = false;
+    *sfr(chip, RCON) |= RCON_WDTO;
+    system_wake(chip);
     chip->wiring.loop(chip->wiring.context);
 }
 
@@ -89,6 +96,7 @@ void system_reset(struct dspic *chip, uint16_t cause)
     chip->level = 0;
     chip->idle = chip->hung = false;
     chip->requested = 0;
+    chip->held_fs = 0;
     chip->high_key = chip->low_key = chip->flash_key = 0;
     chip->pins_were_locked = false;
     *sfr(chip, RCON) = rcon | cause;

@@ -15,10 +15,16 @@ static uint64_t count_fs(const struct dspic *chip, unsigned n)
     return PRESCALE[chip->sfr[CONTROL[n] / 2u] >> TCON_TCKPS_SHIFT & 3u] * chip->cycle_fs;
 }
 
+/* With a period of 0 it stays at 0 (A). */
+static bool runs(const struct dspic *chip, unsigned n)
+{
+    return on(chip, n) && (chip->sfr[PERIOD[n] / 2u] > 0 || chip->timer[n].from > 0);
+}
+
 uint16_t timer_count(const struct dspic *chip, unsigned n)
 {
     const struct timer *t = &chip->timer[n];
-    const uint64_t counts = on(chip, n) ? (chip->now_fs - t->since_fs) / count_fs(chip, n) : 0;
+    const uint64_t counts = runs(chip, n) ? (chip->now_fs - t->since_fs) / count_fs(chip, n) : 0;
     return (uint16_t)(t->from + counts);
 }
 
@@ -27,7 +33,7 @@ static void plan(struct dspic *chip, unsigned n)
 {
     struct timer *t = &chip->timer[n];
     const uint32_t counts = (uint32_t)(uint16_t)(*sfr(chip, PERIOD[n]) - t->from) + 1u;
-    plan_event(chip, EVENT_T1 + n, on(chip, n) ? t->since_fs + counts * count_fs(chip, n) : NEVER);
+    plan_event(chip, EVENT_T1 + n, runs(chip, n) ? t->since_fs + counts * count_fs(chip, n) : NEVER);
 }
 
 void timer_event(struct dspic *chip, unsigned n)
@@ -37,7 +43,8 @@ void timer_event(struct dspic *chip, unsigned n)
     irq_raise(chip, NUMBER[n]);
 }
 
-/* Keeps the count over a change of its control register. */
+/* Keeps the count over a change of its control register. The prescaler begins anew when TMRx is written or TON cleared,
+ * not when TxCON is written otherwise (A). */
 static void hold(struct dspic *chip, unsigned n, uint16_t old)
 {
     uint16_t *control = sfr(chip, CONTROL[n]);
@@ -48,14 +55,28 @@ static void hold(struct dspic *chip, unsigned n, uint16_t old)
     chip->timer[n] = (struct timer){.since_fs = chip->now_fs, .from = count};
 }
 
+/* A new period is compared from now on: one that the count has passed is met only after the count's overflow. The
+ * prescaler goes on. */
+static void compare_anew(struct dspic *chip, unsigned n, uint16_t old)
+{
+    struct timer *t = &chip->timer[n];
+    if (old == 0 && t->from == 0)
+        t->since_fs = chip->now_fs; /* it stood still */
+    const uint16_t count = timer_count(chip, n);
+    t->since_fs += (uint16_t)(count - t->from) * count_fs(chip, n);
+    t->from = count;
+}
+
 void timer_wrote(struct dspic *chip, unsigned address, uint16_t old)
 {
     for (unsigned n = 0; n < 3u; n++) {
         if (address == COUNT[n])
             chip->timer[n] = (struct timer){.since_fs = chip->now_fs, .from = *sfr(chip, address)};
-        else if (address == CONTROL[n])
+        else if (address == CONTROL[n] && *sfr(chip, address) != old)
             hold(chip, n, old);
-        else if (address != PERIOD[n])
+        else if (address == PERIOD[n] && on(chip, n))
+            compare_anew(chip, n, old);
+        else if (address != CONTROL[n] && address != PERIOD[n])
             continue;
         plan(chip, n);
     }

@@ -26,12 +26,13 @@ void clock_start(struct board *board)
 {
     if (is_done(board))
         return;
+    sfr_set(board, RCON, RCON_SWDTEN); /* a PLL that never locks would hang the node for ever: it tries again */
     sfr_write(board, PLLFBD, PLL_M - 2u);
     sfr_write(board, CLKDIV, PLL_N1 - 2u); /* PLLPOST 0: N2 = 2 */
     cpu_write_osccon_high(board, OSC_FRC_PLL);
     cpu_write_osccon_low(board, OSCCON_OSWEN);
     while ((sfr_read(board, OSCCON) >> OSCCON_COSC_SHIFT & 7u) != OSC_FRC_PLL ||
            !(sfr_read(board, OSCCON) & OSCCON_LOCK)) {
-        /* about a millisecond, once; a PLL that never locks is the watchdog's business */
+        /* about a millisecond, once */
     }
 }

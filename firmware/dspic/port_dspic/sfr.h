@@ -167,6 +167,7 @@ SFR_INLINE void cpu_reset(struct board *board)
 
 SFR_INLINE void cpu_start_flash(struct board *board)
 {
+    dspic_hold_interrupts(board->chip, 5u);
     dspic_sfr_write(board->chip, NVMKEY, NVMKEY_1);
     dspic_sfr_write(board->chip, NVMKEY, NVMKEY_2);
     dspic_sfr_modify(board->chip, NVMCON, NVMCON_WR, NVMCON_WR);

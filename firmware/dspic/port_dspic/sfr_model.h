@@ -20,6 +20,9 @@ void dspic_byte_write(struct dspic *chip, uint16_t address, uint8_t value);
 /* DSPIC_DMA_RAM_WORDS words. */
 uint16_t *dspic_dma_ram(struct dspic *chip);
 
+/* The DISI instruction: no interrupt but those of priority 7 for so many cycles. */
+void dspic_hold_interrupts(struct dspic *chip, uint16_t cycles);
+
 void dspic_idle(struct dspic *chip);
 void dspic_clear_watchdog(struct dspic *chip);
 void dspic_reset(struct dspic *chip, uint16_t cause); /* RCON_*; does not return */
