@@ -9,7 +9,8 @@
 //
 // Set-up: once dir has been low for SETTLE cycles: soft reset, wait for its end, pull-downs off, mode. Until then the
 // session has ended for the device, so that it neither chirps nor answers. A command without nxt for TIMEOUT cycles ends
-// with stp; a set-up then begins anew. dir ends a register write (tried again) or a transmission (dropped).
+// with stp; a set-up then begins anew. dir ends a register write (tried again) or a transmission (dropped, as is one that
+// has not begun when the next packet comes: its time is over).
 
 `default_nettype none
 
@@ -43,7 +44,7 @@ module ulpi_shim #(
     input  wire       utmi_term_select,    // .
     input  wire [1:0] utmi_op_mode         // .
 );
-    // ULPI 1.1: transmit command byte (table 4), registers (tables 17, 18, 20)
+    // ULPI 1.1: transmit command byte (3.8.1.1), function control (4.2.2), OTG control (4.2.4)
     localparam [7:0] TRANSMIT = 8'h40, WRITE_FUNCTION = 8'h84, WRITE_OTG = 8'h8A;
     localparam [7:0] SOFT_RESET = 8'h65;  // reset, suspendM high, full speed
     localparam [7:0] NO_PULL_DOWNS = 8'h00;
@@ -67,7 +68,7 @@ module ulpi_shim #(
     reg [1:0] line, vbus;
 
     wire heard  = dir && dir_before;    // else it is idle, or a turnaround
-    wire status = heard && !nxt;        // RXCMD, ULPI 1.1 table 7
+    wire status = heard && !nxt;        // RXCMD, ULPI 1.1 section 3.8.1.2
     wire active = status ? data[4] : dir && (utmi_rx_active || nxt);  // dir and nxt rising together begin a packet
 
     always @(posedge clk) begin
@@ -81,6 +82,7 @@ module ulpi_shim #(
         if (rst) {dir_before, dir, nxt, vbus, line} <= {1'b1, 1'b1, 1'b0, 2'b11, 2'b00};
     end
 
+    assign ulpi_data_oe       = drive && !ulpi_dir;
     assign ulpi_reset         = 1'b0;
     assign ready              = step == STEP_DONE;
     assign utmi_vbus_valid    = ready && (vbus == 2'b11 || IGNORE_VBUS != 0);
@@ -116,7 +118,7 @@ module ulpi_shim #(
         tail  <= tail + {1'b0, pop};
         count <= count + {2'b00, push} - {2'b00, pop};
         drop  <= drop && utmi_tx_valid;
-        if ((aborted || expired) && !writing) begin
+        if ((aborted || expired) && !writing || utmi_rx_active && !in_command) begin
             {head, tail, count} <= 7'd0;
             drop <= utmi_tx_valid;
         end
