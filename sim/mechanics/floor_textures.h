@@ -15,6 +15,8 @@ struct sim_floor_texture {
     double friction_drop; /* static minus kinetic friction coefficient */
 };
 
+#define SIM_TILE_LIFT_MM 0.2 /* tiles are laid within +- this of the same height */
+
 static const struct sim_floor_texture SIM_FLOOR_TEXTURES[] = {
     {"VINYL", 0.055, 5.0, 0.0, 0.0, 0.05},
     {"SMOOTH", 0.3, 1.5, 3.0, 0.15, 0.10},

@@ -44,7 +44,8 @@ void mech_drag_start(struct mech_drag *drag, const struct mech_whisker *whisker,
     mech_basis_of(whisker, &modes, false, whisker->length, tick_s, &drag->free);
     mech_basis_of(whisker, &modes, true, whisker->length, tick_s, &drag->pinned);
     mech_profile_start(&drag->profile, floor, rng);
-    mech_basis_settle(&drag->pinned, pressed(drag, floor), 0, &drag->motion[1]);
+    drag->ground = pressed(drag, floor);
+    mech_basis_settle(&drag->pinned, drag->ground, 0, &drag->motion[1]);
     drag->moment[1] = drag->pinned.moment_static * (drag->motion[1].input - stance->preload);
     drag->tilt[1] = drag->moment[1] * mech_whisker_compliance(whisker);
 }
@@ -52,16 +53,17 @@ void mech_drag_start(struct mech_drag *drag, const struct mech_whisker *whisker,
 /* Axis 1 with vibration. Returns the normal force, N. */
 static double ride(struct mech_drag *drag, double input)
 {
-    struct mech_motion *motion = &drag->motion[1];
+    struct mech_motion *motion = &drag->motion[1], before = *motion;
+    double from = drag->ground;
+    drag->ground = input;
+    mech_basis_step(drag->lifted ? &drag->free : &drag->pinned, motion, drag->lifted ? 0 : input);
     if (drag->lifted) {
-        mech_basis_step(&drag->free, motion, 0);
         if (input <= mech_basis_answer(&drag->free, motion))
             return 0;
-        mech_basis_change(&drag->free, &drag->pinned, motion, input);
+        *motion = before;
+        mech_basis_land(&drag->free, &drag->pinned, motion, from, input);
         drag->lifted = false;
-        return fmax(0, mech_basis_answer(&drag->pinned, motion));
     }
-    mech_basis_step(&drag->pinned, motion, input);
     double force = mech_basis_answer(&drag->pinned, motion);
     if (force >= 0)
         return force;
@@ -170,6 +172,7 @@ static void vibrate(struct mech_drag *drag, const struct sim_floor_texture *floo
 static void follow(struct mech_drag *drag, const struct sim_floor_texture *floor, const struct mech_stroke *stroke)
 {
     double input = fmax(0, pressed(drag, floor)), along;
+    drag->ground = input;
     if (drag->contact == MECH_CAUGHT) {
         drag->behind += stroke->travel;
         along = drag->anchor = held_deflection(drag, drag->behind) + drag->caught_offset;

@@ -49,6 +49,7 @@ struct mech_drag {
     double tolerance; /* N m, of vibration dropped when the whisker stands */
     int forced, level, contact;
     bool lifted;
+    double ground; /* deflection across the path that the floor asked for at the last tick, m */
     double anchor; /* deflection of the tip along the path when it sticks, m */
     double base_rate;
     double slip_side;          /* +1 or -1: the tip slips this way along the path */

@@ -57,8 +57,10 @@ static void engage(struct mech_shaft *shaft, const struct mech_touch *touch)
 }
 
 /* Which static law: the bound with hysteresis, or the caller's. */
-static bool wants_large(const struct mech_shaft *shaft, double theta)
+static bool wants_large(const struct mech_shaft *shaft, const struct mech_touch *touch, double theta)
 {
+    if (touch->face)
+        return false;
     if (shaft->forced != MECH_AUTO)
         return shaft->forced & MECH_LARGE;
     double bent = theta - shaft->side * shaft->moment * mech_whisker_compliance(&shaft->whisker);
@@ -133,16 +135,21 @@ static void account(struct mech_shaft *shaft, double input_rate, double base_rat
         wake(shaft);
 }
 
-/* The contact pushes only: a pinned whisker that pulls comes free, a free one that reaches the peg is pinned. */
-static void meet(struct mech_shaft *shaft, double input)
+/* A tick of the modes. The contact pushes only: a pinned whisker that pulls comes free, a free one that reaches the peg
+ * is pinned. */
+static void swing(struct mech_shaft *shaft, double input)
 {
-    if (shaft->at_pin) {
-        if (shaft->side * mech_basis_answer(&shaft->pinned, &shaft->motion) >= 0)
-            return;
+    struct mech_motion before = shaft->motion;
+    mech_basis_step(basis_now(shaft), &shaft->motion, shaft->at_pin ? input : 0);
+    if (!shaft->engaged)
+        return;
+    double answer = mech_basis_answer(basis_now(shaft), &shaft->motion);
+    if (shaft->at_pin && shaft->side * answer < 0) {
         mech_basis_change(&shaft->pinned, &shaft->free, &shaft->motion, 0);
         shaft->at_pin = false;
-    } else if (shaft->side * (input - mech_basis_answer(&shaft->free, &shaft->motion)) > 0) {
-        mech_basis_change(&shaft->free, &shaft->pinned, &shaft->motion, input);
+    } else if (!shaft->at_pin && shaft->side * (input - answer) > 0) {
+        shaft->motion = before;
+        mech_basis_land(&shaft->free, &shaft->pinned, &shaft->motion, shaft->input, input);
         shaft->at_pin = true;
     }
 }
@@ -152,9 +159,7 @@ static void vibrate(struct mech_shaft *shaft, double input, double rate, double 
 {
     if (turn != 0)
         mech_basis_turn(basis_now(shaft), &shaft->motion, turn);
-    mech_basis_step(basis_now(shaft), &shaft->motion, shaft->at_pin ? input : 0);
-    if (shaft->engaged)
-        meet(shaft, input);
+    swing(shaft, input);
     const struct mech_basis *basis = basis_now(shaft);
     shaft->moment = mech_basis_moment(basis, &shaft->motion);
     if (shaft->forced != MECH_AUTO || (shaft->engaged && !shaft->at_pin))
@@ -180,7 +185,7 @@ static void creep(struct mech_shaft *shaft)
 static double push(struct mech_shaft *shaft, const struct mech_touch *touch)
 {
     double theta = shaft->side * (touch->theta - shaft->creep), moment = 0;
-    bool large = wants_large(shaft, theta);
+    bool large = wants_large(shaft, touch, theta);
     if (!static_moment(shaft, touch->radius, theta, large, &moment)) {
         shaft->slipped = true;
         return 0;
@@ -204,7 +209,8 @@ static bool at_rest(const struct mech_shaft *shaft, const struct mech_touch *tou
 /* Ends and begins contacts; true if one ended at this tick. */
 static bool follow(struct mech_shaft *shaft, const struct mech_touch *touch, double *input)
 {
-    bool touching = sound(shaft, touch), was = shaft->engaged;
+    bool was = shaft->engaged;
+    bool touching = sound(shaft, touch) && (was || touch->theta != 0); /* until then nothing says from which side */
     *input = 0;
     if (!touching)
         shaft->slipped = false;

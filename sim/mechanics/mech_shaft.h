@@ -34,8 +34,10 @@ struct mech_tolerance {
 struct mech_touch {
     bool touching;
     double radius;    /* distance of the touched point from the follicle's exit, m */
-    double theta;     /* imposed angle of that point about the unbent whisker, rad, signed */
+    double theta;     /* imposed angle of that point about the unbent whisker, rad, signed; a contact begins with the
+                         first that is not 0 and keeps its side */
     double base_rate; /* mount's rate of turn in the plane of bending, rad/s */
+    bool face;        /* the tip on a face, which it cannot slip past: always the closed form, whatever its error */
 };
 
 struct mech_shaft {

@@ -91,22 +91,30 @@ static void set_pinned(struct mech_basis *basis, const struct mech_modes *modes,
     basis->answer_input = 1 / left_compliance;
 }
 
-/* Damped free motion over a tick: x'' + 2 damping omega x' + omega^2 x = 0. */
+/* Damped free motion: x'' + 2 damping omega x' + omega^2 x = 0 over a time. */
+static void step_of(double omega, double damping, double time_s, double step[4])
+{
+    double shrink = sqrt(1 - damping * damping), turns = omega * shrink;
+    double fade = exp(-damping * omega * time_s), c = fade * cos(turns * time_s), s = fade * sin(turns * time_s);
+    step[0] = c + damping / shrink * s;
+    step[1] = s / turns;
+    step[2] = -omega / shrink * s;
+    step[3] = c - damping / shrink * s;
+}
+
 static void set_steps(struct mech_basis *basis, double damping, double tick_s)
 {
-    double shrink = sqrt(1 - damping * damping);
     basis->tick_s = tick_s;
+    basis->damping = damping;
     basis->slack = 1 / (1 - damping);
     basis->decay = 0;
     for (int k = 0; k < MECH_MODES; k++) {
-        double omega = basis->omega[k], turns = omega * shrink;
-        double fade = exp(-damping * omega * tick_s), c = fade * cos(turns * tick_s), s = fade * sin(turns * tick_s);
-        basis->step[0][k] = c + damping / shrink * s;
-        basis->step[1][k] = s / turns;
-        basis->step[2][k] = -omega / shrink * s;
-        basis->step[3][k] = c - damping / shrink * s;
-        basis->lag[k] = basis->settle[k] * 2 * damping / omega;
-        basis->decay = fmax(basis->decay, fade);
+        double step[4];
+        step_of(basis->omega[k], damping, tick_s, step);
+        for (int i = 0; i < 4; i++)
+            basis->step[i][k] = step[i];
+        basis->lag[k] = basis->settle[k] * 2 * damping / basis->omega[k];
+        basis->decay = fmax(basis->decay, exp(-damping * basis->omega[k] * tick_s));
     }
 }
 
@@ -143,17 +151,47 @@ void mech_basis_of(const struct mech_whisker *whisker, const struct mech_modes *
     set_bounds(basis, whisker->damping);
 }
 
+/* One mode over a time: about the solution that follows the input, settle input - lag rate. */
+static void step_mode(const struct mech_basis *basis, struct mech_motion *motion, int k, const double step[4],
+                      double rate, double input)
+{
+    double behind = basis->lag[k] * rate, follow = basis->settle[k] * rate;
+    double at = motion->at[k] - basis->settle[k] * motion->input + behind, speed = motion->speed[k] - follow;
+    motion->at[k] = step[0] * at + step[1] * speed + basis->settle[k] * input - behind;
+    motion->speed[k] = step[2] * at + step[3] * speed + follow;
+}
+
 void mech_basis_step(const struct mech_basis *basis, struct mech_motion *motion, double input)
 {
-    double rate = (input - motion->input) / basis->tick_s, before = motion->input;
+    double rate = (input - motion->input) / basis->tick_s;
     for (int k = 0; k < MECH_MODES; k++) {
-        /* About the solution that follows the input: settle input - lag rate. */
-        double behind = basis->lag[k] * rate, follow = basis->settle[k] * rate;
-        double at = motion->at[k] - basis->settle[k] * before + behind, speed = motion->speed[k] - follow;
-        motion->at[k] = basis->step[0][k] * at + basis->step[1][k] * speed + basis->settle[k] * input - behind;
-        motion->speed[k] = basis->step[2][k] * at + basis->step[3][k] * speed + follow;
+        const double step[4] = {basis->step[0][k], basis->step[1][k], basis->step[2][k], basis->step[3][k]};
+        step_mode(basis, motion, k, step, rate, input);
     }
     motion->input = input;
+}
+
+void mech_basis_step_part(const struct mech_basis *basis, struct mech_motion *motion, double input, double time_s)
+{
+    double rate = time_s > 0 ? (input - motion->input) / time_s : 0;
+    for (int k = 0; k < MECH_MODES; k++) {
+        double step[4];
+        step_of(basis->omega[k], basis->damping, time_s, step);
+        step_mode(basis, motion, k, step, rate, input);
+    }
+    motion->input = input;
+}
+
+void mech_basis_land(const struct mech_basis *free, const struct mech_basis *pinned, struct mech_motion *before,
+                     double from, double to)
+{
+    struct mech_motion after = *before;
+    mech_basis_step(free, &after, 0);
+    double apart = mech_basis_answer(free, before) - from, over = to - mech_basis_answer(free, &after);
+    double share = apart * over > 0 ? apart / (apart + over) : 0;
+    mech_basis_step_part(free, before, 0, share * free->tick_s);
+    mech_basis_change(free, pinned, before, from + share * (to - from));
+    mech_basis_step_part(pinned, before, to, (1 - share) * free->tick_s);
 }
 
 static void turn_over(const struct mech_basis *from, const struct mech_basis *to, double value[MECH_MODES])

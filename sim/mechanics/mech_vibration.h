@@ -34,7 +34,8 @@ struct mech_basis {
     double ring_turn;  /* and per jump of the mount's rate of turn */
     double lag_moment; /* bound on the moment's lag per rate of input */
     double decay;      /* of the slowest mode over a tick */
-    double slack;      /* 1/(1 - damping): envelope of a swing over |position| + |speed|/omega */
+    double damping;
+    double slack; /* 1/(1 - damping): envelope of a swing over |position| + |speed|/omega */
 };
 
 struct mech_motion {
@@ -48,9 +49,18 @@ void mech_basis_of(const struct mech_whisker *whisker, const struct mech_modes *
 /* Lets a tick pass while the input goes linearly to a value. */
 void mech_basis_step(const struct mech_basis *basis, struct mech_motion *motion, double input);
 
+/* The same for a part of a tick, s. */
+void mech_basis_step_part(const struct mech_basis *basis, struct mech_motion *motion, double input, double time_s);
+
 /* Carries a motion over to another condition, whose input is now this. */
 void mech_basis_change(const struct mech_basis *from, const struct mech_basis *to, struct mech_motion *motion,
                        double input);
+
+/* A free tip or shaft that meets what it is pinned to later, within a tick. `before` is its motion at the tick's start,
+ * the pin went from `from` to `to`. Were it pinned only at the tick's end, what it went too far would be energy from
+ * nowhere, and it would bounce higher every time. The motion at the tick's end is put in place of `before`. */
+void mech_basis_land(const struct mech_basis *free, const struct mech_basis *pinned, struct mech_motion *before,
+                     double from, double to);
 
 /* At rest relative to an input that changes at a rate. */
 void mech_basis_settle(const struct mech_basis *basis, double input, double rate, struct mech_motion *motion);

@@ -45,6 +45,8 @@
         0.082, 0.040, 0.026, 0.063                                                                                     \
     }
 
+#define SIM_TURN_LAG_S 0.05 /* [A] a base's rate of turn follows its command with this lag, for its whiskers' swing */
+
 /* Tip on the floor. */
 #define SIM_TIP_NORMAL_FORCE 0.35e-3   /* [A] N: preload of 5 mm */
 #define SIM_TIP_STIFFNESS 0.0691       /* [D] N/m, at kappa = 1 */

@@ -13,7 +13,7 @@ void sim_mechanics_touch(struct mech_shaft *shaft, size_t ticks, const double *r
                          const double *base_rate, double *tilt, unsigned char *level)
 {
     for (size_t i = 0; i < ticks; i++) {
-        struct mech_touch touch = {radius[i] > 0, radius[i], theta[i], base_rate[i]};
+        struct mech_touch touch = {radius[i] > 0, radius[i], theta[i], base_rate[i], false};
         mech_shaft_step(shaft, &touch);
         tilt[i] = shaft->tilt;
         level[i] = (unsigned char)shaft->level;
@@ -163,7 +163,7 @@ static double step_shafts(sim_mechanics_scene *scene, double time_s)
     double theta = THETA_MEAN + THETA_SWING * triangle(time_s, 4 * THETA_SWING / WHISK_RATE);
     double slide = scene->setting.sliding ? SLIDE_M / 2 * triangle(time_s, SLIDE_S) : 0;
     for (int i = 0; i < SHAFTS + IDLE; i++) {
-        struct mech_touch touch = {i < SHAFTS, CONTACT_M + slide, theta, 0};
+        struct mech_touch touch = {i < SHAFTS, CONTACT_M + slide, theta, 0, false};
         mech_shaft_step(&scene->shaft[i], &touch);
         sum += scene->shaft[i].tilt;
     }

@@ -8,11 +8,15 @@ static size_t tile_index(double coordinate, double tile, size_t count)
     return (size_t)fmax(0, fmin((double)(count - 1), index));
 }
 
-size_t sim_arena_texture(const struct sim_scene *scene, struct sim_point at)
+size_t sim_arena_tile(const struct sim_scene *scene, struct sim_point at)
 {
     size_t column = tile_index(at.x, scene->tile_m, scene->columns);
-    size_t row = tile_index(at.y, scene->tile_m, scene->rows);
-    return scene->tile[row * scene->columns + column];
+    return tile_index(at.y, scene->tile_m, scene->rows) * scene->columns + column;
+}
+
+size_t sim_arena_texture(const struct sim_scene *scene, struct sim_point at)
+{
+    return scene->tile[sim_arena_tile(scene, at)];
 }
 
 /* Distance to the borders of the tile's interval along one axis; the last tile may be cut short by the wall. */

@@ -17,6 +17,9 @@ struct sim_hit {
     struct sim_point normal; /* unit vector into the box or wall */
 };
 
+/* Index of the tile under a point in scene->tile; beyond a wall of the nearest tile, over a box of the tile beneath. */
+size_t sim_arena_tile(const struct sim_scene *scene, struct sim_point at);
+
 /* Texture index of the tile under a point; beyond a wall that of the nearest tile, over a box that of the tile beneath.
  */
 size_t sim_arena_texture(const struct sim_scene *scene, struct sim_point at);

@@ -160,6 +160,30 @@ static int read_start(struct reader *reader)
     return 0;
 }
 
+static int read_mechanics(struct reader *reader)
+{
+    static const char *const NAMES[] = {"simple", "auto", "rest", "static", "elastica", "modes"};
+    for (size_t i = 0; i < sizeof NAMES / sizeof NAMES[0]; i++) {
+        if (strcmp(reader->text.word[1], NAMES[i]) == 0) {
+            reader->scene->mechanics = (enum sim_mechanics)i;
+            return 0;
+        }
+    }
+    return sim_text_refuse(&reader->text, "mechanics: '%s'; use simple, auto, rest, static, elastica or modes",
+                           reader->text.word[1]);
+}
+
+static int read_batch(struct reader *reader)
+{
+    double number = 0;
+    if (sim_text_numbers(&reader->text, 1, 1, &number))
+        return -1;
+    if (!(number >= 0 && number <= UINT32_MAX && number == floor(number)))
+        return sim_text_refuse(&reader->text, "batch: %g; give a whole number from 0 to %u", number, UINT32_MAX);
+    reader->scene->batch = (uint32_t)number;
+    return 0;
+}
+
 static const struct item {
     const char *key;
     int values;
@@ -174,6 +198,8 @@ static const struct item {
     {"texture_whisker", 3, read_texture_whisker},
     {"object_whisker", 5, read_object_whisker},
     {"start", 3, read_start},
+    {"mechanics", 1, read_mechanics},
+    {"batch", 1, read_batch},
 };
 
 static int read_item(struct reader *reader)

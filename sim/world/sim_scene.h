@@ -11,6 +11,8 @@
  *   texture_whisker NAME X Y                  tip in the robot frame (x forward, y left)
  *   object_whisker NAME X Y YAW LENGTH        base and direction in the robot frame
  *   start X Y THETA
+ *   mechanics LEVEL                           how whiskers bend (enum sim_mechanics, below); left out: simple
+ *   batch N                                   which whiskers of their kind the robot has: they differ by this number
  *
  * The whiskers in the order of the file are lanes 0, 1, ... Strict checks of what a person writes (TOML) are not
  * made here: this is what a program writes, and anything unexpected is refused with one line.
@@ -19,6 +21,7 @@
 #define SIM_SCENE_H
 
 #include <stddef.h>
+#include <stdint.h>
 
 /* cffi: begin */
 enum {
@@ -30,6 +33,19 @@ enum {
 };
 
 enum sim_role { SIM_TEXTURE_WHISKER, SIM_OBJECT_WHISKER };
+
+/* How whiskers bend. simple: this folder's own closed forms, every whisker the typical one. The others are
+ * sim/mechanics, whiskers spread as a batch is, borders of tiles catch: auto chooses the level of each whisker and
+ * moment within the bounds of mech_shaft.h and mech_drag.h; the rest force one: rest (nothing bends), static (closed
+ * form with the plug), elastica (large deflection, friction, slip-off), modes (the same and vibration). */
+enum sim_mechanics {
+    SIM_MECHANICS_SIMPLE,
+    SIM_MECHANICS_AUTO,
+    SIM_MECHANICS_REST,
+    SIM_MECHANICS_STATIC,
+    SIM_MECHANICS_ELASTICA,
+    SIM_MECHANICS_MODES
+};
 
 struct sim_pose {
     double x, y, theta; /* m, m, rad */
@@ -59,6 +75,8 @@ struct sim_scene {
     size_t whiskers;
     struct sim_whisker whisker[SIM_WHISKERS_MAX];
     struct sim_pose start;
+    enum sim_mechanics mechanics;
+    uint32_t batch;
 };
 
 /* Reads a scene from text. Returns 0, or -1 with one line in error that names the source, the line and the remedy. */

@@ -5,21 +5,26 @@
 
 #include "arena.h"
 #include "base.h"
+#include "flexible_whisker.h"
 #include "object_whisker.h"
 #include "sensor_noise.h"
 #include "texture_whisker.h"
 #include "whisker_constants.h"
 
 /* What random numbers are drawn for: one stream per purpose and lane. */
-enum purpose { FOR_ODOMETRY = 1, FOR_CONTACTS, FOR_FLOOR, FOR_SENSOR };
+enum purpose { FOR_ODOMETRY = 1, FOR_CONTACTS, FOR_FLOOR, FOR_SENSOR, FOR_TILES };
+
+#define LEAST_TURN 1e-6 /* rad/s: a rate of turn nearer to its command than this has reached it */
 
 struct lane {
     union {
         struct sim_object_whisker object;
         struct sim_texture_whisker texture;
     };
+    struct sim_flexible_whisker flexible; /* unless mechanics are simple */
     struct sim_sensor_noise noise;
     struct sim_field field;
+    size_t first_tile; /* of a texture whisker */
 };
 
 struct sim_world {
@@ -28,26 +33,52 @@ struct sim_world {
     struct sim_base base;
     struct sim_odometer odometer;
     struct sim_pose pose;
+    double turn_rate;                  /* of the whiskers' mounts, rad/s */
+    double tile_height[SIM_TILES_MAX]; /* m */
     bool blocked;
     double reach; /* no object whisker reaches further from the robot's centre, m */
     uint64_t ticks;
     struct lane lane[SIM_WHISKERS_MAX];
 };
 
-static void start_lanes(sim_world *world, uint64_t seed)
+static void lay_tiles(sim_world *world, uint64_t seed)
+{
+    struct sim_rng rng = sim_rng_stream(seed, FOR_TILES, 0);
+    for (size_t i = 0; i < world->scene.rows * world->scene.columns; i++)
+        world->tile_height[i] = 1e-3 * SIM_TILE_LIFT_MM * (2 * sim_rng_uniform(&rng) - 1);
+}
+
+static bool is_simple(const sim_world *world)
+{
+    return world->scene.mechanics == SIM_MECHANICS_SIMPLE;
+}
+
+static const struct sim_floor_texture *floor_at(const sim_world *world, struct sim_point at)
+{
+    return world->floor[sim_arena_texture(&world->scene, at)];
+}
+
+static bool start_lanes(sim_world *world, uint64_t seed)
 {
     size_t objects = 0;
+    bool ok = true;
     for (uint32_t i = 0; i < world->scene.whiskers; i++) {
         const struct sim_whisker *mount = &world->scene.whisker[i];
         struct lane *lane = &world->lane[i];
         sim_sensor_noise_start(&lane->noise, sim_rng_stream(seed, FOR_SENSOR, i));
         if (mount->role == SIM_TEXTURE_WHISKER) {
             sim_texture_whisker_start(&lane->texture, mount, world->pose, sim_rng_stream(seed, FOR_FLOOR, i));
+            lane->first_tile = sim_arena_tile(&world->scene, lane->texture.tip);
+            if (!is_simple(world))
+                sim_flexible_whisker_stand(&lane->flexible, &world->scene, i, floor_at(world, lane->texture.tip),
+                                           sim_rng_stream(seed, FOR_FLOOR, i));
             continue;
         }
+        ok = (is_simple(world) || sim_flexible_whisker_hang(&lane->flexible, &world->scene, i)) && ok;
         sim_object_whisker_start(&lane->object, mount, objects++, sim_rng_stream(seed, FOR_CONTACTS, i));
         world->reach = fmax(world->reach, sim_object_whisker_reach(mount));
     }
+    return ok;
 }
 
 sim_world *sim_world_new(const struct sim_scene *scene, uint64_t seed)
@@ -61,7 +92,11 @@ sim_world *sim_world_new(const struct sim_scene *scene, uint64_t seed)
     for (size_t i = 0; i < scene->textures; i++)
         world->floor[i] = sim_floor_texture(scene->texture[i]);
     sim_odometer_start(&world->odometer, sim_rng_stream(seed, FOR_ODOMETRY, 0));
-    start_lanes(world, seed);
+    lay_tiles(world, seed);
+    if (!start_lanes(world, seed)) {
+        sim_world_free(world);
+        return NULL;
+    }
     return world;
 }
 
@@ -97,22 +132,36 @@ static double move_body(sim_world *world)
     return clearance;
 }
 
-static struct sim_field move_texture_whisker(sim_world *world, struct sim_texture_whisker *whisker)
+static struct sim_field move_texture_whisker(sim_world *world, struct lane *lane)
 {
+    struct sim_texture_whisker *whisker = &lane->texture;
     struct sim_point tip = sim_texture_whisker_tip(&whisker->mount, world->pose);
-    const struct sim_floor_texture *floor = world->floor[sim_arena_texture(&world->scene, tip)];
+    size_t tile = sim_arena_tile(&world->scene, tip);
+    const struct sim_floor_texture *floor = world->floor[world->scene.tile[tile]];
+    if (!is_simple(world))
+        return sim_flexible_whisker_drag(&lane->flexible, floor, sim_texture_whisker_carry(whisker, world->pose),
+                                         world->tile_height[tile] - world->tile_height[lane->first_tile]);
     sim_texture_whisker_move(whisker, floor, world->pose);
     return sim_texture_whisker_field(whisker, floor);
 }
 
 /* near: is anything within reach of the whiskers? Gravity's constant tilt on beta is taken out by the rest calibration
  * and so is left out here. */
-static struct sim_field move_object_whisker(sim_world *world, struct sim_object_whisker *whisker,
-                                            struct sim_pose before, bool near)
+static struct sim_field move_object_whisker(sim_world *world, struct lane *lane, struct sim_pose before, bool near)
 {
+    struct sim_object_whisker *whisker = &lane->object;
     if (near || whisker->contact.touching)
         sim_object_whisker_move(whisker, &world->scene, before, world->pose);
+    if (!is_simple(world))
+        return sim_flexible_whisker_touch(&lane->flexible, &whisker->contact, world->turn_rate);
     return (struct sim_field){SIM_FIELD_GAIN * sim_object_whisker_tilt(whisker) / SIM_DEGREE, 0};
+}
+
+static void follow_turn(sim_world *world)
+{
+    double behind = world->base.omega - world->turn_rate;
+    world->turn_rate =
+        fabs(behind) < LEAST_TURN ? world->base.omega : world->turn_rate + behind * SIM_TICK_S / SIM_TURN_LAG_S;
 }
 
 void sim_world_step(sim_world *world)
@@ -120,11 +169,12 @@ void sim_world_step(sim_world *world)
     struct sim_pose before = world->pose;
     bool near = move_body(world) < world->reach + SIM_BASE_WHEEL_LIMIT * SIM_TICK_S;
     double time_s = (double)world->ticks++ * SIM_TICK_S;
+    follow_turn(world);
     for (size_t i = 0; i < world->scene.whiskers; i++) {
         struct lane *lane = &world->lane[i];
         struct sim_field field = world->scene.whisker[i].role == SIM_TEXTURE_WHISKER
-                                     ? move_texture_whisker(world, &lane->texture)
-                                     : move_object_whisker(world, &lane->object, before, near);
+                                     ? move_texture_whisker(world, lane)
+                                     : move_object_whisker(world, lane, before, near);
         lane->field = sim_sensor_noise_add(&lane->noise, time_s, field);
     }
 }
@@ -162,7 +212,9 @@ struct sim_contact sim_world_contact(const sim_world *world, size_t lane)
 {
     if (lane >= world->scene.whiskers || world->scene.whisker[lane].role != SIM_OBJECT_WHISKER)
         return (struct sim_contact){0};
-    return world->lane[lane].object.contact;
+    struct sim_contact contact = world->lane[lane].object.contact;
+    contact.touching = contact.touching && (is_simple(world) || !world->lane[lane].flexible.shaft.slipped);
+    return contact;
 }
 
 double sim_world_spread(const sim_world *world, size_t lane)
@@ -177,6 +229,18 @@ struct sim_tip sim_world_tip(const sim_world *world, size_t lane)
     if (lane >= world->scene.whiskers || world->scene.whisker[lane].role != SIM_TEXTURE_WHISKER)
         return (struct sim_tip){0};
     const struct sim_texture_whisker *whisker = &world->lane[lane].texture;
-    return (struct sim_tip){whisker->tip.x, whisker->tip.y, sim_arena_texture(&world->scene, whisker->tip),
-                            sim_arena_inside(&world->scene, whisker->tip), whisker->travelled_m};
+    return (struct sim_tip){whisker->tip.x,
+                            whisker->tip.y,
+                            sim_arena_texture(&world->scene, whisker->tip),
+                            sim_arena_inside(&world->scene, whisker->tip),
+                            whisker->travelled_m,
+                            !is_simple(world) && world->lane[lane].flexible.drag.contact == MECH_CAUGHT};
+}
+
+int sim_world_level(const sim_world *world, size_t lane)
+{
+    if (lane >= world->scene.whiskers || is_simple(world) || world->scene.mechanics == SIM_MECHANICS_REST)
+        return MECH_REST;
+    const struct sim_flexible_whisker *whisker = &world->lane[lane].flexible;
+    return world->scene.whisker[lane].role == SIM_OBJECT_WHISKER ? whisker->shaft.level : whisker->drag.level;
 }

@@ -19,7 +19,7 @@ typedef struct sim_world sim_world;
 
 /* What an object whisker touches, as the world knows it (for truth files and tests, never for decisions). */
 struct sim_contact {
-    bool touching;
+    bool touching;         /* false too once the whisker has slipped off */
     bool corner;           /* true: the shaft on a corner; false: the tip on a face or a wall */
     double radius_m;       /* radial distance of the contact from the whisker's base */
     double theta_rad;      /* imposed angle, positive when the whisker pushes to its left */
@@ -32,6 +32,7 @@ struct sim_tip {
     size_t texture;     /* index in the scene's textures of the nearest tile */
     double inside_m;    /* distance to the nearest border of its tile; 0 beyond a wall */
     double travelled_m; /* length of the tip's path since the start */
+    bool caught;        /* an edge between tiles holds it back behind that place (not with simple mechanics) */
 };
 
 /* A world at rest at the scene's start pose, or NULL if memory is short. */
@@ -59,6 +60,10 @@ size_t sim_world_lanes(const sim_world *world);
 struct sim_contact sim_world_contact(const sim_world *world, size_t lane); /* of an object whisker */
 double sim_world_spread(const sim_world *world, size_t lane);      /* of an object whisker's amplitudes, relative */
 struct sim_tip sim_world_tip(const sim_world *world, size_t lane); /* of a texture whisker */
+
+/* Level of detail of a lane at the last step (mech_shaft.h): 0 rest, else MECH_CLOSED or MECH_LARGE and, or not,
+ * MECH_VIBRATION. 0 with simple mechanics. */
+int sim_world_level(const sim_world *world, size_t lane);
 /* cffi: end */
 
 #endif

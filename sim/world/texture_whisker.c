@@ -73,20 +73,25 @@ static void stick_and_slip(struct sim_texture_whisker *whisker, double along_mm,
     whisker->slip_stretch = stretch(&whisker->rng);
 }
 
-void sim_texture_whisker_move(struct sim_texture_whisker *whisker, const struct sim_floor_texture *floor,
-                              struct sim_pose pose)
+double sim_texture_whisker_carry(struct sim_texture_whisker *whisker, struct sim_pose pose)
 {
     struct sim_point tip = sim_texture_whisker_tip(&whisker->mount, pose);
     double dx = tip.x - whisker->tip.x, dy = tip.y - whisker->tip.y;
     whisker->tip = tip;
     double moved = hypot(dx, dy);
-    if (moved <= 0)
-        return;
-    double forward = dx * cos(pose.theta) + dy * sin(pose.theta);
     whisker->travelled_m += moved;
-    roughen(whisker, 1e3 * moved, floor->correlation_mm);
-    weave(whisker, 1e3 * moved, floor->weave_wavelength_mm);
-    stick_and_slip(whisker, copysign(1e3 * moved, forward), sim_texture_whisker_slip_mm(floor));
+    return copysign(moved, dx * cos(pose.theta) + dy * sin(pose.theta));
+}
+
+void sim_texture_whisker_move(struct sim_texture_whisker *whisker, const struct sim_floor_texture *floor,
+                              struct sim_pose pose)
+{
+    double along_mm = 1e3 * sim_texture_whisker_carry(whisker, pose), moved_mm = fabs(along_mm);
+    if (moved_mm <= 0)
+        return;
+    roughen(whisker, moved_mm, floor->correlation_mm);
+    weave(whisker, moved_mm, floor->weave_wavelength_mm);
+    stick_and_slip(whisker, along_mm, sim_texture_whisker_slip_mm(floor));
 }
 
 struct sim_field sim_texture_whisker_field(const struct sim_texture_whisker *whisker,

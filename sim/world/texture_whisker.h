@@ -1,4 +1,4 @@
-/* A texture whisker: its tip dragged over the floor. Quasi-static; tile borders do not catch it at this level.
+/* A texture whisker: its tip dragged over the floor. With simple mechanics quasi-static, tile borders do not catch it.
  *
  * The floor moves the tip across the whisker's path (beta axis) by its roughness, an AR(1) process of the distance
  * travelled with exponential autocorrelation, and its weave. Friction moves it along the path (alpha axis): the tip
@@ -26,6 +26,10 @@ struct sim_texture_whisker {
 
 void sim_texture_whisker_start(struct sim_texture_whisker *whisker, const struct sim_whisker *mount,
                                struct sim_pose pose, struct sim_rng rng);
+
+/* Carries the tip to where the body's new pose puts it. Returns how far it went along its path, m: negative if
+ * backwards. */
+double sim_texture_whisker_carry(struct sim_texture_whisker *whisker, struct sim_pose pose);
 
 /* Drags the tip over floor of this texture to where the body's new pose puts it. */
 void sim_texture_whisker_move(struct sim_texture_whisker *whisker, const struct sim_floor_texture *floor,

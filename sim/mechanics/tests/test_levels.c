@@ -43,7 +43,7 @@ static double whisk_peak(const struct mech_whisker *w, double a, double rate, do
     mech_shaft_start(&shaft, w, table, TICK);
     shaft.forced = forced;
     for (int i = 1; i * TICK < angle / rate + 0.3; i++) {
-        struct mech_touch touch = {true, a, fmin(angle, rate * i * TICK), 0};
+        struct mech_touch touch = {true, a, fmin(angle, rate * i * TICK), 0, false};
         mech_shaft_step(&shaft, &touch);
         peak = fmax(peak, shaft.moment);
     }
@@ -71,13 +71,34 @@ static void test_overshoot_table(void **state)
     }
 }
 
+/* A whisker that bounces on its edge gains nothing by it: with the lowest damping assumed it stays near the static law,
+ * wherever along the shaft the edge lies. */
+static void test_bouncing_does_not_build_up(void **state)
+{
+    (void)state;
+    const double angle = 5 * SIM_DEGREE, rate = SIM_PI / 24;
+    for (double a = 0.09; a < 0.139; a += 0.002) {
+        struct mech_whisker w = plain(0.05);
+        struct mech_shaft shaft;
+        double largest = mech_static_moment(&w, a, angle);
+        w.kappa = 1.17;
+        mech_shaft_start(&shaft, &w, table, TICK);
+        shaft.forced = MECH_CLOSED | MECH_VIBRATION;
+        for (int i = 1; rate * i * TICK < angle; i++) {
+            struct mech_touch touch = {true, a, rate * i * TICK, 0, false};
+            mech_shaft_step(&shaft, &touch);
+            assert_near(shaft.moment, mech_static_moment(&w, a, touch.theta), 0.1 * largest);
+        }
+    }
+}
+
 /* Rest costs and does nothing; a touch ends it; after it everything comes back to rest exactly. */
 static void test_rest(void **state)
 {
     (void)state;
     struct mech_whisker w = mech_whisker_default();
     struct mech_shaft shaft, before;
-    struct mech_touch none = {false, 0, 0, 0}, push = {true, 0.11, 0.05, 0};
+    struct mech_touch none = {false, 0, 0, 0, false}, push = {true, 0.11, 0.05, 0, false};
     mech_shaft_start(&shaft, &w, table, TICK);
     before = shaft;
     mech_shaft_step(&shaft, &none);
@@ -127,7 +148,7 @@ static void test_bound_of_the_choice(void **state)
         double largest = 0;
         for (int i = 0; i < 12000; i++) {
             double theta = i < 2000 ? 0.01 * fmin(1, i / 1900.0) + 1e-6 : next_theta(&path, fastest, 0.12);
-            struct mech_touch touch = {true, a, theta, 0};
+            struct mech_touch touch = {true, a, theta, 0, false};
             mech_shaft_step(&chosen, &touch);
             mech_shaft_step(&full, &touch);
             largest = fmax(largest, fabs(full.moment));
@@ -164,7 +185,7 @@ static void test_level_follows_the_scene(void **state)
         int vibrating = 0, all = 0;
         mech_shaft_start(&shaft, &w, table, TICK);
         for (int i = 1; i * TICK < 0.06 / rate[k]; i++, all++) {
-            struct mech_touch touch = {true, 0.1, rate[k] * i * TICK, 0};
+            struct mech_touch touch = {true, 0.1, rate[k] * i * TICK, 0, false};
             mech_shaft_step(&shaft, &touch);
             vibrating += (shaft.level & MECH_VIBRATION) != 0;
         }
@@ -183,7 +204,7 @@ static void test_jerks_count(void **state)
         struct mech_shaft shaft;
         mech_shaft_start(&shaft, &w, table, TICK);
         shaft.forced = MECH_CLOSED;
-        struct mech_touch touch = {true, 0.1, 0, 0};
+        struct mech_touch touch = {true, 0.1, 0, 0, false};
         for (int i = 0; i < 4000; i++) {
             touch.theta += 1e-9;
             mech_shaft_step(&shaft, &touch);
@@ -210,7 +231,7 @@ static void test_forced(void **state)
         mech_shaft_start(&shaft, &w, table, TICK);
         shaft.forced = forced[k];
         for (int i = 1; i < 1000; i++) {
-            struct mech_touch touch = {true, 0.1, 1e-4 * i, 0};
+            struct mech_touch touch = {true, 0.1, 1e-4 * i, 0, false};
             mech_shaft_step(&shaft, &touch);
             assert_int_equal(shaft.level, forced[k]);
         }
@@ -226,17 +247,17 @@ static void test_slips_off_once(void **state)
     int off = 0;
     mech_shaft_start(&shaft, &w, table, TICK);
     for (int i = 1; i < 8000; i++) {
-        struct mech_touch touch = {true, 0.13, 1e-4 * i, 0};
+        struct mech_touch touch = {true, 0.13, 1e-4 * i, 0, false};
         mech_shaft_step(&shaft, &touch);
         if (!off && shaft.slipped)
             off = i;
     }
     assert_near(1e-4 * off / SIM_DEGREE, 24.8, 0.36);
     assert_true(!shaft.engaged && shaft.tilt == 0);
-    struct mech_touch clear = {false, 0, 0, 0};
+    struct mech_touch clear = {false, 0, 0, 0, false};
     mech_shaft_step(&shaft, &clear);
     for (int i = 1; i < 400; i++) {
-        struct mech_touch again = {true, 0.13, 1e-4 * i, 0};
+        struct mech_touch again = {true, 0.13, 1e-4 * i, 0, false};
         mech_shaft_step(&shaft, &again);
     }
     assert_true(shaft.engaged && shaft.tilt > 0);
@@ -251,7 +272,7 @@ static void test_slips_off_at_any_tolerance(void **state)
     mech_shaft_start(&shaft, &w, table, TICK);
     shaft.tolerance.relative = 0.5;
     for (int i = 1; i < 2500 && !shaft.slipped; i++) {
-        struct mech_touch touch = {true, 0.139, 1e-4 * i, 0};
+        struct mech_touch touch = {true, 0.139, 1e-4 * i, 0, false};
         mech_shaft_step(&shaft, &touch);
     }
     assert_true(shaft.slipped);
@@ -269,7 +290,7 @@ static void test_creep(void **state)
     mech_shaft_start(&shaft, &w, table, TICK);
     shaft.forced = MECH_CLOSED;
     for (int i = 0; i < 10000; i++) {
-        struct mech_touch touch = {true, 0.11, 0.05, 0};
+        struct mech_touch touch = {true, 0.11, 0.05, 0, false};
         mech_shaft_step(&shaft, &touch);
         if (i == 0)
             soon = shaft.tilt;
@@ -290,7 +311,7 @@ static void test_base_motion(void **state)
     int rises = 0, latest = 0;
     mech_shaft_start(&shaft, &w, table, TICK);
     for (int i = 0; i < 800; i++) {
-        struct mech_touch touch = {false, 0, 0, 0.5};
+        struct mech_touch touch = {false, 0, 0, 0.5, false};
         mech_shaft_step(&shaft, &touch);
         largest = fmax(largest, fabs(shaft.tilt));
         if (last < 0 && shaft.tilt >= 0 && rises++ == 0)
@@ -317,7 +338,7 @@ static void test_garbage(void **state)
         for (int k = 0; k < 3; k++)
             value[k] =
                 sim_rng_next(&rng) % 4 == 0 ? bad[sim_rng_next(&rng) % COUNT(bad)] : 0.14 * sim_rng_uniform(&rng);
-        struct mech_touch touch = {sim_rng_next(&rng) % 8 != 0, value[0], value[1], value[2]};
+        struct mech_touch touch = {sim_rng_next(&rng) % 8 != 0, value[0], value[1], value[2], false};
         mech_shaft_step(&shaft, &touch);
         assert_true(isfinite(shaft.tilt) && isfinite(shaft.moment));
         assert_true(fabs(shaft.tilt) <= 1.2 * w.stop);
@@ -328,6 +349,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_overshoot_table),
+        cmocka_unit_test(test_bouncing_does_not_build_up),
         cmocka_unit_test(test_rest),
         cmocka_unit_test(test_bound_of_the_choice),
         cmocka_unit_test(test_level_follows_the_scene),

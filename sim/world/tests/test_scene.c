@@ -51,6 +51,16 @@ static void test_good_scene(void **state)
     assert_near(scene.start.theta, 0.1, 0);
 }
 
+static void test_mechanics_and_batch(void **state)
+{
+    (void)state;
+    assert_int_equal(parse(GOOD), 0);
+    assert_int_equal(scene.mechanics, SIM_MECHANICS_SIMPLE);
+    assert_int_equal(parse(GOOD "mechanics modes\nbatch 7\n"), 0);
+    assert_int_equal(scene.mechanics, SIM_MECHANICS_MODES);
+    assert_int_equal(scene.batch, 7);
+}
+
 static void test_blanks_do_not_matter(void **state)
 {
     (void)state;
@@ -62,6 +72,9 @@ static const struct {
     const char *before, *after, *says;
 } BAD[] = {
     {"", "wall 1 2\n", "test.scene:13: unknown item 'wall'"},
+    {"", "mechanics soft\n", "mechanics: 'soft'; use simple, auto"},
+    {"", "batch -1\n", "batch: -1; give a whole number"},
+    {"", "batch 1.5\n", "batch: 1.5; give a whole number"},
     {"", "tile_m\n", "test.scene:13: tile_m: 0 values; must be 1"},
     {"", "tile_m 1 2\n", "tile_m: 2 values; must be 1"},
     {"", "tile_m one\n", "'one' is not a number"},
@@ -156,6 +169,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_good_scene),
+        cmocka_unit_test(test_mechanics_and_batch),
         cmocka_unit_test(test_blanks_do_not_matter),
         cmocka_unit_test(test_malformed_scenes_are_refused),
         cmocka_unit_test(test_missing_items_are_named),

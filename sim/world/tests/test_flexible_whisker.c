@@ -1,0 +1,225 @@
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "flexible_whisker.h"
+#include "robot.h"
+#include "sim_world.h"
+
+#define TICKS_PER_S 2000
+#define WHISK_STEP (SIM_PI / 24 / TICKS_PER_S) /* rad a tick: the body whisk */
+#define SPEED 0.15                             /* m/s: the demo's */
+enum { LANE = 1, FLOOR_LANE = 4 };             /* left_inner, left_floor */
+
+/* A robot that faces a wall, tips free, or stands in the middle of many tiles. */
+static struct sim_scene facing_a_wall(enum sim_mechanics mechanics)
+{
+    struct sim_scene scene = bench(4, 3.7, 2, 0);
+    scene.mechanics = mechanics;
+    return scene;
+}
+
+static sim_world *world_of(const struct sim_scene *scene, uint64_t seed)
+{
+    sim_world *world = sim_world_new(scene, seed);
+    assert_non_null(world);
+    return world;
+}
+
+static void run(sim_world *world, double v, double omega, double seconds)
+{
+    sim_world_drive(world, v, omega);
+    for (long i = lround(seconds * TICKS_PER_S); i > 0; i--)
+        sim_world_step(world);
+}
+
+static double alpha_of(const sim_world *world, size_t lane)
+{
+    struct sim_field fields[6];
+    sim_world_fields(world, fields);
+    return fields[lane].alpha_deg;
+}
+
+/* The level follows what touches: rest in the open, a law with vibration when the tip hits, no vibration once that has
+ * faded, rest again soon after the contact's end. */
+static void test_level_follows_what_touches(void **state)
+{
+    (void)state;
+    struct sim_scene scene = facing_a_wall(SIM_MECHANICS_AUTO);
+    sim_world *world = world_of(&scene, 1);
+    run(world, 0, 0, 0.1);
+    assert_int_equal(sim_world_level(world, LANE), MECH_REST);
+    sim_world_drive(world, 0.05, 0);
+    for (int i = 0; i < 4 * TICKS_PER_S && !sim_world_contact(world, LANE).touching; i++)
+        sim_world_step(world);
+    run(world, 0.05, 0, 0.01);
+    assert_int_equal(sim_world_level(world, LANE), MECH_CLOSED | MECH_VIBRATION);
+    run(world, 0.05, 0, 0.2);
+    run(world, 0, 0, 1.5);
+    assert_int_equal(sim_world_level(world, LANE), MECH_CLOSED);
+    run(world, -0.05, 0, 1);
+    assert_false(sim_world_contact(world, LANE).touching);
+    run(world, 0, 0, 6); /* the plug's creep has gone */
+    assert_int_equal(sim_world_level(world, LANE), MECH_REST);
+    sim_world_free(world);
+}
+
+/* Forced levels are kept, and rest bends nothing whatever touches. */
+static void test_levels_are_forced(void **state)
+{
+    (void)state;
+    const struct {
+        enum sim_mechanics mechanics;
+        int object, floor;
+    } WANTED[] = {
+        {SIM_MECHANICS_SIMPLE, 0, 0},
+        {SIM_MECHANICS_REST, 0, 0},
+        {SIM_MECHANICS_STATIC, MECH_CLOSED, MECH_CLOSED},
+        {SIM_MECHANICS_ELASTICA, MECH_LARGE, MECH_CLOSED},
+        {SIM_MECHANICS_MODES, MECH_LARGE | MECH_VIBRATION, MECH_CLOSED | MECH_VIBRATION},
+    };
+    for (size_t i = 0; i < sizeof WANTED / sizeof WANTED[0]; i++) {
+        struct sim_scene scene = bench(4, 2, 2, 0);
+        scene.mechanics = WANTED[i].mechanics;
+        scene.obstacles = 1;
+        scene.obstacle[0] = (struct sim_box){2.17, 2.11, 2.25, 2.2}; /* where left_inner will turn to */
+        sim_world *world = world_of(&scene, 7);
+        run(world, 0, 0.1, 2);
+        assert_true(sim_world_contact(world, LANE).touching);
+        assert_int_equal(sim_world_level(world, LANE), WANTED[i].object);
+        assert_int_equal(sim_world_level(world, FLOOR_LANE), WANTED[i].floor);
+        bool bent = fabs(alpha_of(world, LANE)) > 0.5;
+        assert_int_equal(bent, WANTED[i].mechanics != SIM_MECHANICS_REST);
+        sim_world_free(world);
+    }
+}
+
+/* The error of the choice is bound: 3 x 0.5 % of the moment and 2 x 0.5 uN m, at the whole of a body whisk. */
+static void test_choice_is_within_its_bound(void **state)
+{
+    (void)state;
+    struct sim_scene chosen = bench(4, 2, 2, 0);
+    chosen.obstacles = 1;
+    chosen.obstacle[0] = (struct sim_box){2.17, 2.11, 2.25, 2.2};
+    chosen.mechanics = SIM_MECHANICS_AUTO;
+    struct sim_scene all = chosen;
+    all.mechanics = SIM_MECHANICS_MODES;
+    sim_world *one = world_of(&chosen, 3), *other = world_of(&all, 3);
+    struct mech_whisker whisker = mech_whisker_draw(chosen.batch, LANE);
+    struct mech_tolerance tolerance = mech_tolerance_default();
+    double largest = 0, worst = 0;
+    sim_world_drive(one, 0, SIM_PI / 24);
+    sim_world_drive(other, 0, SIM_PI / 24);
+    for (int i = 0; i < 45 * TICKS_PER_S / 20; i++) {
+        sim_world_step(one);
+        sim_world_step(other);
+        /* The same noise in both: what is left is the mechanics'. */
+        largest = fmax(largest, fabs(alpha_of(other, LANE)));
+        worst = fmax(worst, fabs(alpha_of(one, LANE) - alpha_of(other, LANE)));
+    }
+    assert_true(largest > 5);
+    double soft = mech_whisker_compliance(&whisker) / SIM_DEGREE;
+    double bound = 3 * tolerance.relative * largest + SIM_FIELD_GAIN * 1.1 * 2 * tolerance.moment * soft;
+    assert_true(worst > 0 && worst <= bound);
+    sim_world_free(one);
+    sim_world_free(other);
+}
+
+static void test_batches_differ_and_repeat(void **state)
+{
+    (void)state;
+    double bent[3];
+    for (uint32_t i = 0; i < 3; i++) {
+        struct sim_scene scene = facing_a_wall(SIM_MECHANICS_AUTO);
+        scene.batch = i == 1 ? 5 : 4;
+        sim_world *world = world_of(&scene, 1);
+        run(world, 0.05, 0, 2.4);
+        bent[i] = alpha_of(world, LANE);
+        sim_world_free(world);
+    }
+    assert_memory_equal(&bent[0], &bent[2], sizeof bent[0]);
+    assert_true(fabs(bent[0] - bent[1]) > 0.05);
+}
+
+/* A shaft pushed far beyond its limit slips off a corner and swings free; a tip on a face does not slip. */
+static void test_slips_off_a_corner_not_off_a_face(void **state)
+{
+    (void)state;
+    struct sim_scene scene = bench(4, 2, 2, 0);
+    scene.mechanics = SIM_MECHANICS_AUTO;
+    for (int corner = 0; corner < 2; corner++) {
+        struct sim_flexible_whisker whisker;
+        assert_true(sim_flexible_whisker_hang(&whisker, &scene, LANE));
+        struct sim_contact contact = {true, corner, corner ? 0.130 : 0.140, 0, 1};
+        double largest = 0, last = 0;
+        for (int i = 0; i < 4 * TICKS_PER_S; i++) {
+            contact.theta_rad = fmin(0.6, contact.theta_rad + WHISK_STEP);
+            last = sim_flexible_whisker_touch(&whisker, &contact, 0).alpha_deg;
+            largest = fmax(largest, last);
+        }
+        assert_int_equal(whisker.shaft.slipped, corner);
+        assert_true(largest > 15);
+        assert_true(corner ? fabs(last) < 1 : last > 15);
+    }
+}
+
+static struct sim_scene checkered(void)
+{
+    struct sim_scene scene = bench(8, 0.4, 4, 0);
+    scene.mechanics = SIM_MECHANICS_AUTO;
+    scene.tile_m = 0.4;
+    scene.columns = scene.rows = 20;
+    scene.textures = 2;
+    strcpy(scene.texture[1], "SMOOTH");
+    for (size_t i = 0; i < 400; i++)
+        scene.tile[i] = (i + i / 20) % 2;
+    return scene;
+}
+
+/* Some borders catch, never in the middle of a tile's far half, and as long as it takes to pull the whisker straight:
+ * (R - behind)/v = 0.38 s at 0.15 m/s. */
+static void test_borders_catch(void **state)
+{
+    (void)state;
+    struct sim_scene scene = checkered();
+    struct mech_stance stance = mech_stance_default();
+    struct mech_whisker whisker = mech_whisker_default();
+    double longest = (mech_drag_reach(&whisker, &stance) - stance.behind) / SPEED;
+    int catches = 0, held = 0, borders = 0;
+    for (uint64_t seed = 1; seed <= 4; seed++) {
+        sim_world *world = world_of(&scene, seed);
+        size_t before = sim_world_tip(world, FLOOR_LANE).texture;
+        int length = 0;
+        sim_world_drive(world, SPEED, 0);
+        for (int i = 0; i < 40 * TICKS_PER_S; i++) {
+            sim_world_step(world);
+            struct sim_tip tip = sim_world_tip(world, FLOOR_LANE);
+            borders += tip.texture != before;
+            before = tip.texture;
+            length = tip.caught ? length + 1 : 0;
+            catches += length == 1;
+            held += tip.caught;
+            assert_true(length <= (longest + 0.02) * TICKS_PER_S);
+            struct sim_field fields[6];
+            sim_world_fields(world, fields);
+            assert_true(isfinite(fields[FLOOR_LANE].alpha_deg) && isfinite(fields[FLOOR_LANE].beta_deg));
+        }
+        sim_world_free(world);
+    }
+    assert_true(borders >= 60);
+    assert_true(catches >= borders / 20 && catches <= borders / 2);
+    assert_near((double)held / catches / TICKS_PER_S, longest, 0.1);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_level_follows_what_touches),        cmocka_unit_test(test_levels_are_forced),
+        cmocka_unit_test(test_choice_is_within_its_bound),        cmocka_unit_test(test_batches_differ_and_repeat),
+        cmocka_unit_test(test_slips_off_a_corner_not_off_a_face), cmocka_unit_test(test_borders_catch),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
