@@ -18,7 +18,7 @@ struct lane_timing lane_timing_of(unsigned sck_divider, unsigned word_gap, unsig
                                 .period_fs = tick_period * CYCLE_FS};
 }
 
-enum { SYNC_EDGE, SELECT_EDGE, SCK_EDGE, READ, BREAK, BEGIN, END };
+enum { SYNC_EDGE, SELECT_EDGE, SCK_EDGE, START, READ, BREAK, BEGIN, END };
 
 static void add(struct lane_bench *bench, uint64_t at_fs, unsigned what, bool level, bool mosi)
 {
@@ -29,6 +29,21 @@ static void add(struct lane_bench *bench, uint64_t at_fs, unsigned what, bool le
         bench->events[i] = bench->events[i - 1u];
     bench->events[i] = (struct lane_event){at_fs, (uint8_t)what, level, mosi};
     bench->planned++;
+}
+
+static void start_transfer(struct lane_bench *bench)
+{
+    const bool overlapped = bench->arms_at_end != bench->first.arms;
+    bench->first = sim_node_report(bench->node);
+    bench->stale = overlapped && bench->first.arms == bench->arms_at_end;
+}
+
+static void read_bit(struct lane_bench *bench)
+{
+    bench->read++;
+    bench->record = bench->record << 1 | sim_node_miso(bench->node);
+    if (bench->read == BITS)
+        bench->arms = sim_node_report(bench->node).arms;
 }
 
 /* A disturbance may not return: whatever comes after it must be planned by now. */
@@ -50,8 +65,11 @@ static void perform(struct lane_bench *bench, const struct lane_event *e, const 
         sim_node_pin(bench->node, SIM_NODE_MOSI, e->mosi, e->at_fs);
         sim_node_pin(bench->node, SIM_NODE_SCK, e->level, e->at_fs);
         break;
+    case START:
+        start_transfer(bench);
+        break;
     case READ:
-        bench->record = bench->record << 1 | sim_node_miso(bench->node);
+        read_bit(bench);
         break;
     case BREAK:
         sim_node_disturb(bench->node, f->disturbance, f->disturbance_argument);
@@ -93,6 +111,7 @@ static void plan_transfer(struct lane_bench *bench, uint64_t select_fs)
     const struct lane_faults *f = &bench->faults;
     const unsigned clocks = (unsigned)((int32_t)BITS + f->extra_clocks);
     uint64_t at = select_fs + t->setup_fs;
+    add(bench, select_fs, START, false, false);
     if (!f->no_select)
         add(bench, select_fs, SELECT_EDGE, false, false);
     for (unsigned i = 0; i < clocks || i < BITS; i++) {
@@ -119,6 +138,7 @@ static void plan_tick(struct lane_bench *bench, uint64_t sync_fs)
     const struct lane_faults *f = &bench->faults;
     bench->planned = bench->done = 0;
     bench->record = 0;
+    bench->read = 0;
     add(bench, sync_fs, BEGIN, false, false);
     if (!f->no_sync)
         plan_sync(bench, sync_fs);
@@ -144,7 +164,12 @@ static bool is_field(const struct lane_verdict *v, struct sim_field field)
 static struct lane_verdict judge(const struct lane_bench *bench, uint64_t bits, uint8_t expected)
 {
     uint8_t record[WHISKER_RECORD_BYTES];
-    struct lane_verdict v = {.sync_fs = bench->next_fs - bench->timing.period_fs, .report = bench->report};
+    struct lane_verdict v = {.sync_fs = bench->next_fs - bench->timing.period_fs,
+                             .report = bench->report,
+                             .armed = bench->first.record,
+                             .read = bits,
+                             .rearmed = bench->stale || bench->arms != bench->first.arms,
+                             .overlapped = bench->arms_at_end != bench->first.arms};
     for (unsigned i = 0; i < sizeof record; i++)
         record[i] = (uint8_t)(bits >> (BITS - 8u - 8u * i));
     if (bits == ~UINT64_C(0)) {
@@ -172,13 +197,21 @@ static void judge_tick(struct lane_bench *bench)
     bench->next_fs += bench->timing.period_fs;
 }
 
+/* A tick begins when the one before is over, however early its SYNC would come. */
+static uint64_t begins_at(const struct lane_bench *bench)
+{
+    const uint64_t now = sim_node_fs(bench->node);
+    const uint64_t at = bench->next_fs + (uint64_t)((int64_t)bench->faults.shift_ns * (int64_t)DSPIC_FS_PER_NS);
+    return at > now ? at : now;
+}
+
 static void begin_tick(struct lane_bench *bench)
 {
     bench->faults = (struct lane_faults){0};
     bench->ended =
         !bench->world.plan(bench->world.context, bench->tick, &bench->fields[bench->tick & 1u], &bench->faults);
     if (!bench->ended)
-        plan_tick(bench, bench->next_fs + (uint64_t)((int64_t)bench->faults.shift_ns * (int64_t)DSPIC_FS_PER_NS));
+        plan_tick(bench, begins_at(bench));
 }
 
 static void act(void *context)
@@ -187,6 +220,8 @@ static void act(void *context)
     while (!bench->ended && bench->events[bench->done].at_fs <= sim_node_fs(bench->node)) {
         const struct lane_event e = bench->events[bench->done++];
         const struct lane_faults f = bench->faults;
+        if (e.what == END)
+            bench->arms_at_end = sim_node_report(bench->node).arms;
         if (bench->done == bench->planned) {
             judge_tick(bench);
             begin_tick(bench);

@@ -15,7 +15,7 @@ struct lane_timing lane_timing_of(unsigned sck_divider, unsigned word_gap, unsig
 /* One tick as the world breaks it; all zero: nothing is broken. */
 struct lane_faults {
     bool no_sync, no_select, select_stays;
-    int32_t shift_ns;        /* SYNC and transfer come so much later (negative: sooner) */
+    int32_t shift_ns;        /* SYNC and transfer come so much later (negative: sooner, but not amid the tick before) */
     uint32_t second_sync_ns; /* another pulse so long after the first */
     int32_t extra_clocks;    /* after the 64; negative: missing */
     uint8_t glitch_bit;      /* select rises for a moment before this bit of the transfer, 1 to 63 */
@@ -33,9 +33,12 @@ struct lane_verdict {
     uint8_t code;
     uint16_t status; /* of an accepted record: error bits and code */
     uint16_t alpha, beta;
-    bool good;                     /* accepted, status zero: the host uses it */
-    bool altered;                  /* good, and yet not what the field was at that tick's SYNC */
-    uint64_t sync_fs;              /* of the record's tick, were it on time */
+    bool good;            /* accepted, status zero: the host uses it */
+    bool altered;         /* good, and yet not what the field was at that tick's SYNC */
+    uint64_t sync_fs;     /* of the record's tick, were it on time */
+    uint64_t armed, read; /* the record's bits as the link had them when the transfer began, and as they came */
+    bool rearmed;         /* the node armed its link amid this transfer, or amid the one before and not since */
+    bool overlapped;      /* amid this one, to its very end */
     struct sim_node_report report; /* of the node at the SYNC after */
 };
 
@@ -68,6 +71,10 @@ struct lane_bench {
     struct lane_faults faults;
     struct sim_node_report report; /* at this tick's SYNC */
     uint64_t record;               /* bits of it as the bridge read them */
+    unsigned read;                 /* how many */
+    struct sim_node_report first;  /* when the transfer began */
+    bool stale;                    /* it was armed amid the transfer before, and not since */
+    uint32_t arms, arms_at_end;    /* of the link: when the last was read, and when the transfer ended */
     struct lane_event events[LANE_EVENTS];
     unsigned planned, done;
 };

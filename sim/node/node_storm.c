@@ -1,5 +1,6 @@
 /* node_storm FIRST COUNT: runs batches FIRST to FIRST + COUNT - 1 and writes one line of JSON for each.
  * Exit code 1 if something was undetected that a check should have told, or good records did not come back. */
+#include <inttypes.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -8,21 +9,42 @@
 
 static bool is_sound(const struct storm_counts *c)
 {
-    return c->schedules == STORM_SCHEDULES && c->unexplained == 0 && c->spurious == 0 && c->stuck == 0 &&
-           c->violations == 0;
+    return c->schedules == STORM_SCHEDULES && c->unexplained == 0 && c->unforeseen == 0 && c->spurious == 0 &&
+           c->stuck == 0 && c->violations == 0;
+}
+
+static void write_class(bool first, const char *name, const struct storm_class *c)
+{
+    printf("%s\"%s\": [%" PRIu64 ", %" PRIu64 ", %" PRIu64 ", %.9g, %.9g]", first ? "" : ", ", name, c->events,
+           c->passed, c->good, c->expected_passed, c->expected_good);
 }
 
 static void write_line(unsigned long long batch, const struct storm_counts *c)
 {
-    printf("{\"batch\": %llu, \"schedules\": %llu, \"ticks\": %llu, \"bad\": %llu, \"missed_line\": %llu, "
-           "\"missed_link\": %llu, "
-           "\"unexplained\": %llu, \"spurious\": %llu, \"stuck\": %llu, \"violations\": %llu, \"kinds\": {",
-           batch, (unsigned long long)c->schedules, (unsigned long long)c->ticks, (unsigned long long)c->bad,
-           (unsigned long long)c->missed_line, (unsigned long long)c->missed_link, (unsigned long long)c->unexplained,
-           (unsigned long long)c->spurious, (unsigned long long)c->stuck, (unsigned long long)c->violations);
+#define FIELD(name) printf("\"" #name "\": %" PRIu64 ", ", c->name);
+    printf("{\"batch\": %llu, ", batch);
+    FIELD(schedules)
+    FIELD(ticks)
+    FIELD(bad)
+    FIELD(missed_line)
+    FIELD(missed_link)
+    FIELD(displaced)
+    FIELD(unexplained)
+    FIELD(unforeseen)
+    FIELD(spurious)
+    FIELD(stuck)
+    FIELD(violations)
+    FIELD(overwritten)
+#undef FIELD
+    printf("\"injected\": {");
     for (unsigned k = 0; k < STORM_KIND_COUNT; k++)
-        printf("%s\"%s\": [%llu, %llu]", k ? ", " : "", storm_kind_name((enum storm_kind)k),
-               (unsigned long long)c->kinds[k].injected, (unsigned long long)c->kinds[k].altered);
+        printf("%s\"%s\": %" PRIu64, k ? ", " : "", storm_kind_name((enum storm_kind)k), c->injected[k]);
+    printf("}, \"lines\": {");
+    for (unsigned k = 0; k < STORM_LINE_COUNT; k++)
+        write_class(k == 0, storm_line_name((enum storm_line)k), &c->lines[k]);
+    printf("}, \"links\": {");
+    for (unsigned k = 0; k < STORM_LINK_COUNT; k++)
+        write_class(k == 0, storm_link_name((enum storm_link)k), &c->links[k]);
     printf("}}\n");
     fflush(stdout);
 }

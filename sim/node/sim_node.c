@@ -1,9 +1,7 @@
 #include "sim_node.h"
 
 #include <stdlib.h>
-#include <string.h>
 
-#include "crc32.h"
 #include "sim_node_state.h"
 
 #define OSCILLATOR_SPREAD_PERMILLE (MLX90333_OSCILLATOR_PERCENT * 10u)
@@ -17,14 +15,47 @@
 /* A chip so far ahead of a tick's SYNC stands still: what comes in this tick passes it by. */
 #define STALLED_FS (20000u * DSPIC_FS_PER_NS)
 
+static unsigned position(const struct mlx90333 *sensor)
+{
+    return sensor->byte * 8u + sensor->bit;
+}
+
+static void begin_frame(struct sim_node *node)
+{
+    const struct sampler *sampler = &node->board.node.sampler;
+    node->begun = (struct sim_node_frame){.number = node->frame.number + 1u,
+                                          .slip = (uint8_t)(position(&node->sensor) % 64u),
+                                          .followed = sampler->followed,
+                                          .alpha_before = sampler->alpha,
+                                          .beta_before = sampler->beta};
+}
+
+static void end_frame(struct sim_node *node)
+{
+    node->frame = node->begun;
+    node->frame.line = node->line;
+    node->frame.sent = node->clean;
+}
+
 /* The master sends ones but for the MLX90316's start byte, on a pin of its own beside its input. */
 static void clock_sensor(struct sim_node *node, bool level, uint64_t now_ns)
 {
     const bool sent = dspic_output(node->chip, PIN_SENSOR_SEND) != DSPIC_LOW;
+    if (level && position(&node->twin) == 0)
+        begin_frame(node);
     const bool seen = mlx90333_clock(&node->sensor, now_ns, level, sent);
+    const bool clean = mlx90333_clock(&node->twin, now_ns, level, sent);
     dspic_wire(node->chip, PIN_SENSOR_DATA, seen);
-    if (!level)
-        node->line = node->line << 1 | seen;
+    if (level)
+        return;
+    node->line = node->line << 1 | seen;
+    node->clean = node->clean << 1 | clean;
+}
+
+static void select_sensor(struct sim_node *node, bool level, uint64_t now_ns)
+{
+    mlx90333_select(&node->sensor, now_ns, level);
+    mlx90333_select(&node->twin, now_ns, level);
 }
 
 static void on_pin(void *context, unsigned rp, enum dspic_drive drive, uint64_t now_fs)
@@ -33,7 +64,7 @@ static void on_pin(void *context, unsigned rp, enum dspic_drive drive, uint64_t 
     const bool level = drive != DSPIC_LOW; /* pulled up */
     const uint64_t now_ns = now_fs / DSPIC_FS_PER_NS;
     if (rp == PIN_SENSOR_SELECT)
-        mlx90333_select(&node->sensor, now_ns, level);
+        select_sensor(node, level, now_ns);
     else if (rp == PIN_SENSOR_CLOCK)
         clock_sensor(node, level, now_ns);
 }
@@ -41,8 +72,9 @@ static void on_pin(void *context, unsigned rp, enum dspic_drive drive, uint64_t 
 static void on_start(void *context)
 {
     struct sim_node *node = context;
-    node->sensor.violations[MLX90333_SELECT_HIGH] = node->releases;
+    node->twin.violations[MLX90333_SELECT_HIGH] = node->releases;
     port_boot(&node->board);
+    node->arms++;
 }
 
 static void on_loop(void *context)
@@ -84,12 +116,13 @@ static void on_interrupt(void *context, unsigned irq)
 {
     struct sim_node *node = context;
     const uint8_t before = node->board.node.armed;
-    node->releases = node->sensor.violations[MLX90333_SELECT_HIGH];
+    node->releases = node->twin.violations[MLX90333_SELECT_HIGH];
     serve(node, irq);
     if (node->board.node.armed == before)
         return;
+    node->arms++;
     if (irq == IRQ_SPI1)
-        node->frame = node->line;
+        end_frame(node);
     node->armed_fs = /* its instructions besides register accesses are yet to come */
         dspic_now_fs(node->chip) +
         node->parameters.chip.work_cycles * (UINT64_C(1000000000000000) / dspic_fcy_hz(node->chip));
@@ -125,8 +158,6 @@ void sim_node_parameters_default(struct sim_node_parameters *parameters, uint64_
 #endif
 }
 
-static void program_default(struct sim_node *node);
-
 sim_node *sim_node_new_as(const struct sim_node_parameters *parameters)
 {
     sim_node *node = calloc(1, sizeof *node);
@@ -137,7 +168,7 @@ sim_node *sim_node_new_as(const struct sim_node_parameters *parameters)
                            &(struct dspic_wiring){node, on_pin, on_start, on_loop, on_interrupt, on_trap, on_outside});
     node->board.chip = node->chip;
     if (node->chip) {
-        program_default(node);
+        sim_node_program_default(node);
         return node;
     }
     free(node);
@@ -170,12 +201,22 @@ void sim_node_free(sim_node *node)
 void sim_node_power_on(sim_node *node)
 {
     mlx90333_power_on(&node->sensor, 0, &node->parameters.sensor);
+    mlx90333_power_on(&node->twin, 0, &node->parameters.sensor);
+    node->twin.parameters.resets_after_error = false;
     dspic_wire(node->chip, PIN_LINK_SELECT, true);
     dspic_power_on(node->chip, 0);
     node->powered = true;
     while (!node->board.loading && !node_ready(&node->board.node) && dspic_next_fs(node->chip) != UINT64_MAX)
         dspic_run_until(node->chip, dspic_next_fs(node->chip));
     node->tick_fs = dspic_now_fs(node->chip);
+}
+
+void sim_node_set_field(sim_node *node, uint64_t since_fs, struct sim_field field)
+{
+    const struct mlx90333_field of = {
+        .since_ns = since_fs / DSPIC_FS_PER_NS, .alpha_deg = field.alpha_deg, .beta_deg = field.beta_deg};
+    mlx90333_set_field(&node->sensor, &of);
+    mlx90333_set_field(&node->twin, &of);
 }
 
 void sim_node_sync(sim_node *node, struct sim_field field)
@@ -185,9 +226,7 @@ void sim_node_sync(sim_node *node, struct sim_field field)
     node->deaf = !node->powered || sim_node_dark(node) || dspic_now_fs(node->chip) > node->tick_fs + STALLED_FS;
     if (node->deaf)
         return;
-    mlx90333_set_field(&node->sensor, &(struct mlx90333_field){.since_ns = node->tick_fs / DSPIC_FS_PER_NS,
-                                                               .alpha_deg = field.alpha_deg,
-                                                               .beta_deg = field.beta_deg});
+    sim_node_set_field(node, node->tick_fs, field);
     mlx90333_set_fault(&node->sensor, node->fault, node->argument);
     node->fault = SIM_SENSOR_GOOD;
     dspic_input(node->chip, PIN_SYNC, true, node->tick_fs);
@@ -237,52 +276,6 @@ void sim_node_restore(sim_node *node)
     sim_node_disturb(node, SIM_NODE_LIGHT, 0);
 }
 
-void sim_node_program(sim_node *node, const uint8_t *image, size_t bytes)
-{
-    uint32_t *word = dspic_flash(node->chip) + WHISKER_LIMIT_APPLICATION_ROW * FLASH_ROW_WORDS;
-    for (uint32_t i = 0; i < FLASH_WORDS - WHISKER_LIMIT_APPLICATION_ROW * FLASH_ROW_WORDS; i++)
-        word[i] = UINT32_C(0xFFFFFF);
-    for (size_t i = 0; i < bytes; i++) { /* the body begins with the row after the header's */
-        const size_t at =
-            i < WHISKER_IMAGE_HEADER_BYTES ? i : i - WHISKER_IMAGE_HEADER_BYTES + WHISKER_LIMIT_FLASH_ROW_BYTES;
-        word[at / 3u] &= ~(UINT32_C(0xFF) << 8u * (at % 3u)) | (uint32_t)image[i] << 8u * (at % 3u);
-    }
-}
-
-uint16_t sim_node_blocks(const sim_node *node)
-{
-    return node->board.loading ? node->board.loader.next : 0u;
-}
-
-uint16_t sim_node_version(const sim_node *node)
-{
-    const uint32_t *word = dspic_flash(node->chip) + WHISKER_LIMIT_APPLICATION_ROW * FLASH_ROW_WORDS;
-    uint8_t header[WHISKER_IMAGE_HEADER_BYTES];
-    for (size_t i = 0; i < sizeof header; i++)
-        header[i] = (uint8_t)(word[i / 3u] >> 8u * (i % 3u) & 0xFFu);
-    return node->board.loading ? 0u : whisker_get_u16(header + WHISKER_IMAGE_HEADER_VERSION);
-}
-
-/* As it comes from its first programming. */
-static void program_default(struct sim_node *node)
-{
-    uint8_t image[WHISKER_IMAGE_HEADER_BYTES + WHISKER_LIMIT_FLASH_ROW_BYTES];
-    memset(image, 0, sizeof image);
-    whisker_put_u32(image + WHISKER_IMAGE_HEADER_MAGIC, WHISKER_LIMIT_IMAGE_MAGIC);
-    whisker_put_u16(image + WHISKER_IMAGE_HEADER_CHIP, node->parameters.chip.device_id);
-    image[WHISKER_IMAGE_HEADER_WIRE_VERSION] = WHISKER_WIRE_VERSION;
-    image[WHISKER_IMAGE_HEADER_FORMAT] = WHISKER_LIMIT_IMAGE_FORMAT;
-    whisker_put_u32(image + WHISKER_IMAGE_HEADER_LENGTH, WHISKER_LIMIT_FLASH_ROW_BYTES);
-    whisker_put_u32(image + WHISKER_IMAGE_HEADER_BODY_CRC32,
-                    crc32_of(WHISKER_CRC32_INIT, image + WHISKER_IMAGE_HEADER_BYTES, WHISKER_LIMIT_FLASH_ROW_BYTES) ^
-                        WHISKER_CRC32_XOR_OUT);
-    whisker_put_u16(image + WHISKER_IMAGE_HEADER_VERSION, SIM_NODE_VERSION);
-    whisker_put_u16(image + WHISKER_IMAGE_HEADER_FIRST_ROW, WHISKER_LIMIT_APPLICATION_ROW + 1u);
-    whisker_put_u32(image + WHISKER_IMAGE_HEADER_HEADER_CRC32,
-                    crc32_of(WHISKER_CRC32_INIT, image, WHISKER_IMAGE_HEADER_HEADER_CRC32) ^ WHISKER_CRC32_XOR_OUT);
-    sim_node_program(node, image, sizeof image);
-}
-
 void sim_node_fault(sim_node *node, enum sim_sensor_fault fault, unsigned argument)
 {
     node->fault = fault;
@@ -292,6 +285,6 @@ void sim_node_fault(sim_node *node, enum sim_sensor_fault fault, unsigned argume
 uint32_t sim_node_violations(const sim_node *node)
 {
     const struct dspic_violations v = dspic_violations(node->chip);
-    return mlx90333_violations(&node->sensor) + v.overclocked + v.spi_settings + v.spi_disabled + v.spi_overwrite +
+    return mlx90333_violations(&node->twin) + v.overclocked + v.spi_settings + v.spi_disabled + v.spi_overwrite +
            v.pins_locked + v.unlock;
 }

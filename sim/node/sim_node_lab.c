@@ -38,9 +38,7 @@ bool sim_node_miso(const sim_node *node)
 
 void sim_node_field(sim_node *node, struct sim_field field)
 {
-    mlx90333_set_field(&node->sensor, &(struct mlx90333_field){.since_ns = sim_node_fs(node) / DSPIC_FS_PER_NS,
-                                                               .alpha_deg = field.alpha_deg,
-                                                               .beta_deg = field.beta_deg});
+    sim_node_set_field(node, sim_node_fs(node), field);
 }
 
 void sim_node_sensor_fault(sim_node *node, enum sim_sensor_fault fault, unsigned argument)
@@ -52,8 +50,11 @@ void sim_node_sensor_fault(sim_node *node, enum sim_sensor_fault fault, unsigned
 static void supply(sim_node *node, bool on)
 {
     const uint64_t now = sim_node_fs(node);
-    mlx90333_select(&node->sensor, now / DSPIC_FS_PER_NS, true);
-    mlx90333_supply(&node->sensor, now / DSPIC_FS_PER_NS, on);
+    struct mlx90333 *const sensors[] = {&node->sensor, &node->twin};
+    for (unsigned i = 0; i < 2u; i++) {
+        mlx90333_select(sensors[i], now / DSPIC_FS_PER_NS, true);
+        mlx90333_supply(sensors[i], now / DSPIC_FS_PER_NS, on);
+    }
     memset(&node->board.node, 0xA5, sizeof node->board.node);
     node->board.trapped = 0xA5A5u;
     if (on)
@@ -93,9 +94,19 @@ void sim_node_disturb(sim_node *node, enum sim_node_disturbance what, unsigned a
     }
 }
 
+static uint64_t record_of(const struct node *firmware)
+{
+    uint64_t bits = 0;
+    for (unsigned i = 0; i < LINK_WORDS; i++)
+        bits = bits << 16 | firmware->records[firmware->armed & 1u][i];
+    return bits;
+}
+
 struct sim_node_report sim_node_report(const sim_node *node)
 {
-    return (struct sim_node_report){.line = node->frame,
+    return (struct sim_node_report){.frame = node->frame,
+                                    .record = record_of(&node->board.node),
+                                    .arms = node->arms,
                                     .latch_fs = node->sensor.latch_ns * DSPIC_FS_PER_NS,
                                     .age_fs = node->sensor.age_ns * DSPIC_FS_PER_NS,
                                     .armed_fs = node->armed_fs,

@@ -51,13 +51,25 @@ enum sim_node_disturbance {
 };
 void sim_node_disturb(sim_node *node, enum sim_node_disturbance what, unsigned argument);
 
+/* A whole frame of the sensor. */
+struct sim_node_frame {
+    uint64_t line;   /* the last 64 bits that the chip sampled, last one lowest */
+    uint64_t sent;   /* what they were without any fault of sensor, wires or clock */
+    uint32_t number; /* frames so far */
+    uint8_t slip;    /* bits by which the sensor's count was ahead of the chip's when it began, modulo 64 */
+    bool followed;   /* the firmware knew the angles before it: these */
+    uint16_t alpha_before, beta_before;
+};
+
 /* What happened within. Times in femtoseconds. */
 struct sim_node_report {
-    uint64_t line;     /* the last 64 bits that the chip sampled of the newest whole frame, last one lowest */
-    uint64_t latch_fs; /* of the sensor's newest frame: when its angles became those that are sent */
-    uint64_t age_fs;   /* how old they were then */
-    uint64_t armed_fs; /* when the link last got a record */
-    uint64_t busy_fs;  /* spent in interrupts */
+    struct sim_node_frame frame; /* the newest */
+    uint64_t record;             /* the record that the link got last, first bit highest */
+    uint32_t arms;               /* how often it got one */
+    uint64_t latch_fs;           /* of the sensor's newest frame: when its angles became those that are sent */
+    uint64_t age_fs;             /* how old they were then */
+    uint64_t armed_fs;           /* when the link last got a record */
+    uint64_t busy_fs;            /* spent in interrupts */
     uint64_t interrupts;
     uint32_t fcy_hz;
     uint32_t overwritten; /* words of an SPI module that another took the place of; also among the violations */

@@ -1,10 +1,6 @@
 #include "storm.h"
 
-#include <stdio.h>
-#include <string.h>
-
-#include "lane_bench.h"
-#include "mlx90333_datasheet.h"
+#include "storm_log.h"
 #include "whisker_protocol.h"
 
 enum { SETTLED = 3, MOST_FAULTS = 3, SPREAD = 4 };
@@ -21,20 +17,31 @@ const char *storm_kind_name(enum storm_kind kind)
     return NAMES[kind];
 }
 
+#define NAME(name) #name,
+const char *storm_line_name(enum storm_line line)
+{
+    static const char *const NAMES[] = {STORM_LINES(NAME)};
+    return NAMES[line];
+}
+
+const char *storm_link_name(enum storm_link link)
+{
+    static const char *const NAMES[] = {STORM_LINKS(NAME)};
+    return NAMES[link];
+}
+#undef NAME
+
 struct storm {
-    struct storm_counts counts;
+    struct storm_log log;
     struct lane_bench bench;
     uint64_t random;
     struct sim_field field;
-    unsigned faults_left;      /* of the present schedule */
-    unsigned wait;             /* ticks to the next fault */
-    unsigned good;             /* records in a row */
-    unsigned since;            /* ticks since the last fault */
-    enum storm_kind last_kind; /* what alterations are put down to */
+    unsigned faults_left; /* of the present schedule */
+    unsigned wait;        /* ticks to the next fault */
+    unsigned good;        /* records in a row */
+    unsigned since;       /* ticks since the last fault */
     enum sim_node_disturbance end;
     unsigned end_in; /* ticks until what is off comes on */
-    bool link_hurt;  /* of the present tick's record */
-    bool doubled;    /* SYNC, in the tick before: with the next one missing it would be one that is merely early */
 };
 
 /* splitmix64 (Steele, Lea, Flood 2014). */
@@ -147,11 +154,9 @@ static void break_chip(struct storm *s, enum storm_kind kind, struct lane_faults
     }
 }
 
-static void strike(struct storm *s, struct lane_faults *f)
+static enum storm_kind strike(struct storm *s, struct lane_faults *f)
 {
     const enum storm_kind kind = any_kind(s);
-    s->counts.kinds[kind].injected++;
-    s->last_kind = kind;
     s->since = 0;
     if (kind <= STORM_EXTRA_CLOCK)
         break_sensor(s, kind, f);
@@ -159,6 +164,7 @@ static void strike(struct storm *s, struct lane_faults *f)
         break_link(s, kind, f);
     else
         break_chip(s, kind, f);
+    return kind;
 }
 
 /* A whisker's angle: never twice the same, never further in a tick than a whisker can move. */
@@ -169,65 +175,48 @@ static double walk(struct storm *s, double angle_deg)
     return to > 60.0 || to < -60.0 ? angle_deg - (to - angle_deg) : to;
 }
 
-static bool plan(void *context, unsigned tick, struct sim_field *field, struct lane_faults *faults)
+/* What breaks in this tick; false: nothing. */
+static bool break_something(struct storm *s, enum storm_kind *kind, struct lane_faults *faults)
 {
-    struct storm *s = context;
-    (void)tick;
-    s->field = (struct sim_field){walk(s, s->field.alpha_deg), walk(s, s->field.beta_deg)};
-    *field = s->field;
-    s->since++;
-    if (s->end_in > 0) {
+    if (s->end_in > 0) { /* nothing more breaks while something is off */
         if (--s->end_in == 0) {
             faults->disturbance = s->end;
             s->since = 0;
         }
-        return true; /* nothing more breaks while something is off */
-    }
-    if (s->faults_left > 0 && s->wait-- == 0) {
-        strike(s, faults);
+    } else if (s->faults_left > 0 && s->wait-- == 0) {
+        *kind = strike(s, faults);
         s->faults_left--;
         s->wait = below(s, SPREAD);
+        return true;
     } else if (s->faults_left == 0 && s->good >= SETTLED && s->since > SETTLED) {
-        s->counts.schedules++;
+        s->log.counts.schedules++;
         s->faults_left = 1u + below(s, MOST_FAULTS);
         s->wait = below(s, SPREAD);
     }
-    faults->no_sync &= !s->doubled;
-    s->doubled = faults->second_sync_ns > 0;
-    s->link_hurt = faults->miso_flips != 0 || faults->glitch_bit > 0 || faults->extra_clocks < 0;
-    s->counts.stuck += s->since > STORM_PATIENCE;
-    return s->counts.schedules <= STORM_SCHEDULES && s->since <= STORM_PATIENCE;
+    return false;
 }
 
-/* The checks once more, told apart from the firmware's: on the bits that came down the line. */
-static bool line_looks_good(uint64_t line)
+static bool plan(void *context, unsigned tick, struct sim_field *field, struct lane_faults *faults)
 {
-    unsigned byte[8], sum = 0;
-    for (unsigned i = 0; i < 8; i++)
-        byte[i] = (unsigned)(line >> (56u - 8u * i)) & 0xFFu;
-    for (unsigned i = 1; i <= 6; i++)
-        sum += byte[i];
-    return byte[0] == 0xFFu && byte[5] == 0 && byte[6] == 0 && (sum & 0xFFu) == byte[7];
+    struct storm *s = context;
+    enum storm_kind kind = STORM_FLIP_BIT;
+    (void)tick;
+    s->field = (struct sim_field){walk(s, s->field.alpha_deg), walk(s, s->field.beta_deg)};
+    *field = s->field;
+    s->since++;
+    const bool any = break_something(s, &kind, faults);
+    storm_log_deed(&s->log, any, kind, faults);
+    s->log.counts.stuck += s->since > STORM_PATIENCE;
+    return s->log.counts.schedules <= STORM_SCHEDULES && s->since <= STORM_PATIENCE;
 }
 
 static void judged(void *context, unsigned tick, const struct lane_verdict *v)
 {
     struct storm *s = context;
-    s->counts.ticks++;
     if (tick == 0)
         return;
-    s->counts.bad += !v->good;
-    s->counts.spurious += !v->good && s->good >= SETTLED && s->since > SETTLED;
-    s->good = v->good && !v->altered ? s->good + 1u : 0u;
-    if (!v->altered)
-        return;
-    s->counts.kinds[s->last_kind].altered++;
-    if (s->link_hurt)
-        s->counts.missed_link++;
-    else if (line_looks_good(v->report.line))
-        s->counts.missed_line++;
-    else
-        s->counts.unexplained++;
+    s->log.counts.spurious += !v->good && s->good >= SETTLED && s->since > SETTLED;
+    s->good = storm_log_verdict(&s->log, tick, v) ? s->good + 1u : 0u;
 }
 
 static struct sim_node_parameters any_parts(struct storm *s)
@@ -247,13 +236,12 @@ struct storm_counts storm_batch(uint64_t seed)
     const struct sim_node_parameters parts = any_parts(&s);
     sim_node *node = sim_node_new_as(&parts);
     if (!node)
-        return s.counts;
+        return s.log.counts;
     sim_node_power_on(node);
     lane_bench_start(&s.bench, node, lane_timing_of(16, 180, WHISKER_LIMIT_TICK_PERIOD));
     lane_bench_run(&s.bench, &(struct lane_world){&s, plan, judged});
-    s.counts.schedules -= s.counts.schedules > STORM_SCHEDULES;
-    /* A transfer displaced in time may meet the link's arming, and then words. */
-    s.counts.violations = sim_node_violations(node) - sim_node_report(node).overwritten;
+    s.log.counts.schedules -= s.log.counts.schedules > STORM_SCHEDULES;
+    s.log.counts.violations += sim_node_violations(node) - sim_node_report(node).overwritten;
     sim_node_free(node);
-    return s.counts;
+    return s.log.counts;
 }

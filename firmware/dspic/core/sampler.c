@@ -25,9 +25,6 @@
 #define RELEASE_US 30u /* from a SYNC that may find a byte under way */
 #define RAISE_US 4u    /* from the last byte */
 
-/* 30 degrees in 0.5 ms: a whisker swinging by 30 degrees at 50 Hz makes 4.7. */
-#define STEP_MOST 0x2AAAu
-
 #define MARGIN_PERCENT (MLX90333_OSCILLATOR_PERCENT + 2u)
 #define TOO_SHORT(us, ns) ((us)*UINT32_C(100000) < (ns) * (UINT32_C(100) + MARGIN_PERCENT))
 
@@ -116,7 +113,7 @@ bool sampler_on_timer(struct sampler *sampler)
 static bool jumped(uint16_t before, uint16_t now)
 {
     const uint16_t by = (uint16_t)(now > before ? now - before : before - now);
-    return by > STEP_MOST;
+    return by > SAMPLER_STEP_MOST;
 }
 
 /* Takes a reading that no whisker can have made for a bad one. */

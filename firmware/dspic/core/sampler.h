@@ -20,6 +20,9 @@
 #include "board/sensor.h" // struct board
 #include "sensor_frame.h" // struct sensor_reading
 
+/* In counts. 30 degrees in 0.5 ms: a whisker swinging by 30 degrees at 50 Hz makes 4.7. */
+#define SAMPLER_STEP_MOST 0x2AAAu
+
 enum sampler_state {
     SAMPLER_STARTING,    /* /SS high, the sensor ignores it */
     SAMPLER_RESYNC_HIGH, /* /SS high for t5 */

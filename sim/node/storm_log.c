@@ -1,0 +1,234 @@
+#include "storm_log.h"
+
+#include "storm_checks.h"
+#include "whisker_protocol.h"
+
+enum { NOW, BEFORE, EARLIER };
+
+/* After these neither the node's state nor the sensor's is known until a good record. */
+static bool makes_ill(const struct lane_faults *f)
+{
+    return f->disturbance != SIM_NODE_NOTHING && f->disturbance != SIM_NODE_UNREAD;
+}
+
+void storm_log_deed(struct storm_log *log, bool any, enum storm_kind kind, const struct lane_faults *faults)
+{
+    log->deeds[EARLIER] = log->deeds[BEFORE];
+    log->deeds[BEFORE] = log->deeds[NOW];
+    log->ill |= makes_ill(faults);
+    log->deeds[NOW] = (struct storm_deed){.any = any, .kind = kind, .faults = *faults, .ill = log->ill};
+    log->counts.injected[kind] += any;
+}
+
+static bool breaks_line(const struct storm_deed *deed)
+{
+    return deed->any && deed->kind <= STORM_EXTRA_CLOCK;
+}
+
+/* ------------------------------------------------------------------------------------------------- the sensor's line
+ */
+
+static enum storm_line line_of(const struct storm_deed *deed, const struct sim_node_frame *frame)
+{
+    if (deed->ill || (frame->slip != 0 && breaks_line(deed)))
+        return STORM_LINE_OTHER;
+    switch (frame->slip) {
+    case 0:
+        return breaks_line(deed) ? (enum storm_line)deed->kind : STORM_LINE_OTHER;
+    case 1:
+        return STORM_LINE_AHEAD;
+    case 63:
+        return STORM_LINE_BEHIND;
+    default:
+        return STORM_LINE_OTHER;
+    }
+}
+
+/* Is the line what the log says that this made of it? `last`: the bit before the frame. */
+static bool is_foreseen(enum storm_line line, const struct lane_faults *faults, const struct sim_node_frame *frame)
+{
+    const unsigned argument = faults->sensor_argument;
+    const uint64_t sent = frame->sent;
+    switch (line) {
+    case STORM_LINE_FLIP_BIT:
+        return frame->line == (sent ^ checks_mask(argument));
+    case STORM_LINE_FLIP_TWO:
+        return frame->line == (sent ^ checks_mask(argument & 0xFFu) ^ checks_mask(argument >> 8));
+    case STORM_LINE_DEAD:
+        return frame->line == ~UINT64_C(0);
+    case STORM_LINE_STUCK_LOW:
+        return frame->line == 0;
+    case STORM_LINE_ERROR_BITS:
+        return frame->line == checks_error_word(sent, (uint16_t)argument);
+    case STORM_LINE_LOST_CLOCK:
+        return frame->line == checks_lost_clock(sent, argument, frame->line >> 63);
+    case STORM_LINE_EXTRA_CLOCK:
+        return frame->line == checks_extra_clock(sent, argument);
+    case STORM_LINE_BEHIND:
+        return (frame->line & ~checks_mask(0)) == sent >> 1;
+    case STORM_LINE_AHEAD:
+        return frame->line == (sent << 1 | 1u);
+    default:
+        return true;
+    }
+}
+
+static struct checks_odds odds_of(enum storm_line line, const struct lane_faults *faults,
+                                  const struct sim_node_frame *frame, bool held)
+{
+    switch (line) {
+    case STORM_LINE_FLIP_TWO:
+        return checks_odds_two(frame);
+    case STORM_LINE_NOISY:
+        return checks_odds_noise(frame, faults->sensor_argument / 65536.0);
+    case STORM_LINE_LOST_CLOCK:
+        return checks_odds_lost(frame, held);
+    case STORM_LINE_EXTRA_CLOCK:
+        return checks_odds_extra(frame);
+    default:
+        return (struct checks_odds){0};
+    }
+}
+
+static void count(struct storm_class *class, bool passed, bool good, struct checks_odds odds)
+{
+    class->events++;
+    class->passed += passed;
+    class->good += good;
+    class->expected_passed += odds.passed;
+    class->expected_good += odds.good;
+}
+
+/* The frame of the tick before. True if bits of it were hurt. */
+static bool log_frame(struct storm_log *log, const struct lane_verdict *v)
+{
+    const struct sim_node_frame *frame = &v->report.frame;
+    const struct storm_deed *deed = &log->deeds[BEFORE];
+    const bool hurt = frame->line != frame->sent, passed = hurt && checks_pass_line(frame->line);
+    const bool struck = breaks_line(deed) || frame->slip != 0, held = !frame->followed || (log->line & 1u) != 0;
+    const enum storm_line line = line_of(deed, frame);
+    log->line = frame->line;
+    if (!struck && !deed->ill)
+        log->counts.unforeseen += hurt;
+    if (!struck && !hurt)
+        return false;
+    log->counts.unforeseen += !is_foreseen(line, &deed->faults, frame);
+    count(&log->counts.lines[line], passed, passed && checks_pass_step(frame, frame->line),
+          odds_of(line, &deed->faults, frame, held));
+    return hurt;
+}
+
+/* ---------------------------------------------------------------------------------------------------------- the link
+ */
+
+static bool breaks_link(const struct lane_faults *f)
+{
+    return f->miso_flips != 0 || f->glitch_bit > 0 || f->extra_clocks < 0 || f->no_select || f->miso_stuck;
+}
+
+/* Select may have stayed low since the tick before: then nothing of it is missed. */
+static bool is_selected(const struct storm_log *log)
+{
+    return !log->deeds[NOW].faults.no_select || log->deeds[BEFORE].faults.select_stays;
+}
+
+static bool link_is_foreseen(const struct storm_log *log, const struct lane_verdict *v)
+{
+    const struct storm_deed *deed = &log->deeds[NOW];
+    const struct lane_faults *f = &deed->faults;
+    if (deed->ill || v->rearmed || f->glitch_bit > 0)
+        return true;
+    if (f->miso_stuck)
+        return v->read == (f->miso_level ? ~UINT64_C(0) : 0u);
+    if (!is_selected(log))
+        return v->read == ~UINT64_C(0);
+    return v->read ==
+           (f->extra_clocks < 0 ? checks_cut(v->armed, (unsigned)-f->extra_clocks) : v->armed ^ f->miso_flips);
+}
+
+static void log_transfer(struct storm_log *log, const struct lane_verdict *v, uint8_t expected)
+{
+    const struct storm_deed *deed = &log->deeds[NOW];
+    const struct lane_faults *f = &deed->faults;
+    const bool whole = checks_pass_record(v->armed, expected) && (v->armed >> 8 & 0xFFFFu) == 0;
+    const bool passed = v->read != v->armed && v->code <= WHISKER_CODE_OVERRUN;
+    struct checks_odds odds = {0};
+    enum storm_link link;
+    log->counts.unforeseen += !link_is_foreseen(log, v);
+    if (deed->ill || !whole || !(breaks_link(f) || v->rearmed) || f->no_select || f->miso_stuck)
+        return;
+    if (f->glitch_bit > 0)
+        link = STORM_LINK_GLITCH;
+    else if (v->rearmed)
+        link = STORM_LINK_REARMED;
+    else if (f->extra_clocks < 0)
+        link = STORM_LINK_CUT;
+    else
+        link = (enum storm_link)(STORM_LINK_FLIPS_1 + __builtin_popcountll(f->miso_flips) - 1);
+    if (link == STORM_LINK_CUT)
+        odds = checks_odds_cut(v->armed);
+    count(&log->counts.links[link], passed, passed && v->good, odds);
+}
+
+/* ----------------------------------------------------------------------------------------------------- good records */
+
+/* This tick's own SYNC was kept from the node, which took a stray one before it for its. */
+static bool is_displaced(const struct storm_log *log, const struct lane_verdict *v)
+{
+    return log->deeds[BEFORE].faults.no_sync && log->deeds[EARLIER].faults.second_sync_ns > 0 &&
+           checks_are_angles(v->report.frame.sent, v->alpha, v->beta);
+}
+
+/* A good record whose bits were hurt, or whose angles are not those of its tick: which check let it pass, and had to?
+ */
+static void explain(struct storm_log *log, const struct lane_verdict *v, bool is_new, bool line_hurt, uint8_t expected)
+{
+    const struct sim_node_frame *frame = &v->report.frame;
+    const bool link_hurt = v->read != v->armed;
+    if (link_hurt && (breaks_link(&log->deeds[NOW].faults) || v->rearmed || log->ill) &&
+        checks_pass_record(v->read, expected))
+        log->counts.missed_link++;
+    else if (!link_hurt && line_hurt && checks_pass_line(frame->line) && checks_pass_step(frame, frame->line) &&
+             checks_are_angles(frame->line, v->alpha, v->beta))
+        log->counts.missed_line++;
+    else if (!link_hurt && is_new && !line_hurt && is_displaced(log, v))
+        log->counts.displaced++;
+    else
+        log->counts.unexplained++;
+}
+
+/* Arming displaces words only amid a transfer. */
+static void log_overwritten(struct storm_log *log, const struct lane_verdict *v)
+{
+    const uint32_t words = v->report.overwritten - log->overwritten;
+    log->overwritten = v->report.overwritten;
+    if (log->overlapped)
+        log->counts.overwritten += words;
+    else
+        log->counts.violations += words;
+    log->overlapped = v->overlapped;
+}
+
+/* What struck may not yet show. */
+static bool is_struck(const struct storm_log *log)
+{
+    return makes_ill(&log->deeds[NOW].faults) || makes_ill(&log->deeds[BEFORE].faults) ||
+           makes_ill(&log->deeds[EARLIER].faults);
+}
+
+bool storm_log_verdict(struct storm_log *log, unsigned tick, const struct lane_verdict *v)
+{
+    const uint8_t expected = (uint8_t)(tick - 1u);
+    const bool is_new = v->report.frame.number != log->frame;
+    const bool line_hurt = is_new && log_frame(log, v);
+    log->frame = v->report.frame.number;
+    log_transfer(log, v, expected);
+    log_overwritten(log, v);
+    log->counts.ticks++;
+    log->counts.bad += !v->good;
+    const bool sound = v->good && !v->altered && !line_hurt && v->read == v->armed;
+    if (v->good && !sound)
+        explain(log, v, is_new, line_hurt, expected);
+    log->ill &= !sound || is_struck(log);
+    return sound;
+}
