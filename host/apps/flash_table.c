@@ -47,6 +47,9 @@ static const char *outcome(const struct whisker_update *update, const struct whi
     if (update->silent) {
         return "stopped answering: check its supply and cable, then flash again";
     }
+    if (update->stuck) {
+        return "takes no more blocks: flash again; program it by wire if that does not help";
+    }
     if (update->state == WHISKER_NODE_STATE_LOADER || update->state == WHISKER_NODE_STATE_APPLICATION) {
         return "restarted during the update: check its supply, then flash again";
     }

@@ -9,13 +9,19 @@
 #define BLOCK_BYTES WHISKER_SERVICE_DATA_BYTES
 #define SILENT_ASKS 3 /* times as long as a node may be busy until it counts as gone */
 #define START_ROUNDS 8
+#define RUN_TIMES 3   /* nobody answers it: a node that misses one hears the next */
+#define STUCK_ASKS 16 /* for a block that a node says it wants, until it counts as stuck */
+#define IMAGE_BYTES_MAX                                                                                                \
+    ((WHISKER_LIMIT_FLASH_ROWS - WHISKER_LIMIT_APPLICATION_ROW - 1u) * WHISKER_LIMIT_FLASH_ROW_BYTES)
 
 struct loading {
     struct whisker_device *device;
     const struct whisker_image *image;
     struct whisker_service_order order; /* with the serial number as its argument */
     struct whisker_update *updates;
-    uint32_t lanes; /* that still take part */
+    uint32_t lanes;                     /* that still take part */
+    uint16_t most[WHISKER_FRAME_LANES]; /* blocks that a lane has ever had */
+    uint8_t tries[WHISKER_FRAME_LANES]; /* since it had so many */
 };
 
 static uint32_t crc32(const uint8_t *bytes, size_t count)
@@ -48,7 +54,7 @@ int whisker_image_parse(const uint8_t *bytes, size_t count, struct whisker_image
         whisker_get_u32(bytes + WHISKER_IMAGE_HEADER_MAGIC) == WHISKER_LIMIT_IMAGE_MAGIC &&
         bytes[WHISKER_IMAGE_HEADER_FORMAT] == WHISKER_LIMIT_IMAGE_FORMAT &&
         whisker_get_u32(bytes + WHISKER_IMAGE_HEADER_HEADER_CRC32) == crc32(bytes, WHISKER_IMAGE_HEADER_HEADER_CRC32) &&
-        image->length == count - WHISKER_IMAGE_HEADER_BYTES && image->length > 0 &&
+        image->length == count - WHISKER_IMAGE_HEADER_BYTES && image->length > 0 && image->length <= IMAGE_BYTES_MAX &&
         image->length % WHISKER_LIMIT_FLASH_ROW_BYTES == 0 &&
         whisker_get_u32(bytes + WHISKER_IMAGE_HEADER_BODY_CRC32) == crc32(image->body, image->length);
     return sound ? WHISKER_OK : WHISKER_ERROR_IMAGE;
@@ -59,8 +65,8 @@ static void leave(struct loading *l, int lane)
     l->lanes &= ~(UINT32_C(1) << lane);
 }
 
-/* Asks those that take part; whoever does not answer is left behind if `must`. */
-static int ask(struct loading *l, bool must, struct whisker_answer answers[WHISKER_FRAME_LANES])
+/* Asks those that take part; whoever does not answer is left behind. */
+static int ask(struct loading *l, struct whisker_answer answers[WHISKER_FRAME_LANES])
 {
     const int error =
         whisker_service_ask(l->device, &l->order, l->lanes, SILENT_ASKS * WHISKER_LIMIT_BUSY_TICKS_MAX, answers);
@@ -72,7 +78,7 @@ static int ask(struct loading *l, bool must, struct whisker_answer answers[WHISK
         if (answers[lane].valid) {
             update->state = answers[lane].beta;
             update->blocks = answers[lane].alpha;
-        } else if (must) {
+        } else {
             update->silent = true;
             leave(l, lane);
         }
@@ -101,7 +107,7 @@ static int start(struct loading *l)
         memcpy(l->order.data, l->image->header, WHISKER_IMAGE_HEADER_BYTES);
         l->order.command = WHISKER_SERVICE_COMMAND_BEGIN;
         if (!error) {
-            error = ask(l, true, answers);
+            error = ask(l, answers);
         }
         leave_refused(l);
         all = true;
@@ -133,6 +139,24 @@ static uint16_t lowest_wanted(const struct loading *l)
     return lowest;
 }
 
+/* Leaves a node that was sent the block it wants again and again and does not take it. */
+static void leave_stuck(struct loading *l, uint16_t sent)
+{
+    for (int lane = 0; lane < WHISKER_FRAME_LANES; lane++) {
+        const uint16_t has = l->updates[lane].blocks;
+        if (!(l->lanes >> lane & 1)) {
+            continue;
+        }
+        if (has > l->most[lane]) {
+            l->most[lane] = has;
+            l->tries[lane] = 0;
+        } else if (has <= sent && ++l->tries[lane] >= STUCK_ASKS) {
+            l->updates[lane].stuck = true;
+            leave(l, lane);
+        }
+    }
+}
+
 static int send_blocks(struct loading *l, whisker_update_progress progress, void *context)
 {
     struct whisker_answer answers[WHISKER_FRAME_LANES];
@@ -144,8 +168,9 @@ static int send_blocks(struct loading *l, whisker_update_progress progress, void
         l->order = (struct whisker_service_order){.command = WHISKER_SERVICE_COMMAND_BLOCK};
         whisker_put_u16(l->order.argument, block);
         memcpy(l->order.data, l->image->body + (size_t)block * BLOCK_BYTES, BLOCK_BYTES);
-        error = ask(l, true, answers);
+        error = ask(l, answers);
         leave_restarted(l);
+        leave_stuck(l, block);
         block = l->lanes ? lowest_wanted(l) : UINT16_MAX;
         if (progress && l->lanes) {
             progress(context, block, total);
@@ -159,7 +184,7 @@ static int finish(struct loading *l)
 {
     struct whisker_answer answers[WHISKER_FRAME_LANES];
     l->order = (struct whisker_service_order){.command = WHISKER_SERVICE_COMMAND_FINISH};
-    const int error = l->lanes ? ask(l, true, answers) : WHISKER_OK;
+    const int error = l->lanes ? ask(l, answers) : WHISKER_OK;
     for (int lane = 0; !error && lane < WHISKER_FRAME_LANES; lane++) {
         l->updates[lane].done = l->lanes >> lane & 1 && l->updates[lane].state == WHISKER_NODE_STATE_COMPLETE;
     }
@@ -186,5 +211,8 @@ int whisker_nodes_update(struct whisker_device *device, uint32_t lanes, uint32_t
     }
     /* Also for those that were refused: they go back to the application they have. */
     l.order = (struct whisker_service_order){.command = WHISKER_SERVICE_COMMAND_RUN};
-    return error ? error : whisker_service_ask(device, &l.order, 0, 1, answers);
+    for (int i = 0; !error && i < RUN_TIMES; i++) {
+        error = whisker_service_ask(device, &l.order, 0, 1, answers);
+    }
+    return error;
 }

@@ -76,7 +76,8 @@ struct whisker_update {
     bool wanted;     /* it takes part */
     bool done;       /* the new image is valid and was told to run */
     bool silent;     /* it stopped answering */
-    uint16_t state;  /* WHISKER_NODE_STATE_*: why it was refused, if neither done nor silent */
+    bool stuck;      /* it answers, but takes no more blocks */
+    uint16_t state;  /* WHISKER_NODE_STATE_*: why it was refused, if neither done nor silent nor stuck */
     uint16_t blocks; /* that it has */
 };
 
@@ -85,8 +86,8 @@ typedef void (*whisker_update_progress)(void *context, uint32_t blocks, uint32_t
 
 /*
  * Loads an image into all nodes of `lanes`, in parallel, and starts it. serial: of the one node that is addressed, 0:
- * all. A lane that is refused or falls silent is left behind; the others go on. Returns as whisker_service_ask; what
- * became of each lane is in `updates`.
+ * all. A lane that is refused, stuck or falls silent is left behind; the others go on. Returns as whisker_service_ask;
+ * what became of each lane is in `updates`.
  */
 int whisker_nodes_update(struct whisker_device *device, uint32_t lanes, uint32_t serial,
                          const struct whisker_image *image, whisker_update_progress progress, void *context,
