@@ -39,6 +39,7 @@ void mech_drag_start(struct mech_drag *drag, const struct mech_whisker *whisker,
     struct mech_modes modes;
     *drag = (struct mech_drag){.whisker = *whisker, .stance = *stance, .tick_s = tick_s, .forced = MECH_AUTO};
     drag->tolerance = mech_tolerance_default().moment;
+    drag->compliance = mech_whisker_compliance(whisker);
     drag->tip_stiffness = mech_whisker_tip_stiffness(whisker);
     mech_modes_of(whisker, &modes);
     mech_basis_of(whisker, &modes, false, whisker->length, tick_s, &drag->free);
@@ -47,7 +48,7 @@ void mech_drag_start(struct mech_drag *drag, const struct mech_whisker *whisker,
     drag->ground = pressed(drag, floor);
     mech_basis_settle(&drag->pinned, drag->ground, 0, &drag->motion[1]);
     drag->moment[1] = drag->pinned.moment_static * (drag->motion[1].input - stance->preload);
-    drag->tilt[1] = drag->moment[1] * mech_whisker_compliance(whisker);
+    drag->tilt[1] = drag->moment[1] * drag->compliance;
 }
 
 /* Axis 1 with vibration. Returns the normal force, N. */
@@ -116,7 +117,7 @@ static double held_deflection(const struct mech_drag *drag, double behind)
     double angle = atan2(behind, stance->height) - atan2(stance->behind, stance->height);
     double chord = fmin(hypot(behind, stance->height), LARGEST_CHORD * drag->whisker.length);
     double moment = mech_static_moment(&drag->whisker, chord, angle);
-    double soft = mech_whisker_compliance(&drag->whisker);
+    double soft = drag->compliance;
     if (soft * fabs(moment) > drag->whisker.stop)
         moment = copysign(drag->whisker.stop / soft, moment);
     return -moment / drag->pinned.moment_static;
@@ -245,8 +246,8 @@ void mech_drag_step(struct mech_drag *drag, const struct sim_floor_texture *floo
     else if (drag->level != MECH_REST)
         follow(drag, floor, stroke);
     drag->base_rate = stroke->base_rate;
-    double soft = mech_whisker_compliance(&drag->whisker), rest = drag->pinned.moment_static * drag->stance.preload;
+    double rest = drag->pinned.moment_static * drag->stance.preload;
     drag->moment[1] -= drag->level == MECH_REST ? 0 : rest;
     for (int axis = 0; axis < 2; axis++)
-        drag->tilt[axis] = fmin(fmax(soft * drag->moment[axis], -drag->whisker.stop), drag->whisker.stop);
+        drag->tilt[axis] = mech_whisker_stopped(&drag->whisker, drag->compliance * drag->moment[axis]);
 }

@@ -45,7 +45,7 @@ struct mech_drag {
     struct mech_basis free, pinned; /* at the tip */
     struct mech_motion motion[2];
     struct mech_profile profile;
-    double tick_s, tip_stiffness;
+    double tick_s, tip_stiffness, compliance;
     double tolerance; /* N m, of vibration dropped when the whisker stands */
     int forced, level, contact;
     bool lifted;

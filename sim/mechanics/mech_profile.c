@@ -62,5 +62,6 @@ double mech_profile_height(const struct mech_profile *profile, const struct sim_
     double rough =
         n[1] +
         t / 2 * (n[2] - n[0] + t * (2 * n[0] - 5 * n[1] + 4 * n[2] - n[3] + t * (3 * (n[1] - n[2]) + n[3] - n[0])));
-    return 1e-3 * (floor->rms_mm * rough + floor->weave_amplitude_mm * sin(profile->phase));
+    double weave = floor->weave_amplitude_mm > 0 ? floor->weave_amplitude_mm * sin(profile->phase) : 0;
+    return 1e-3 * (floor->rms_mm * rough + weave);
 }

@@ -21,6 +21,7 @@ void mech_shaft_start(struct mech_shaft *shaft, const struct mech_whisker *whisk
                       double tick_s)
 {
     *shaft = (struct mech_shaft){.whisker = *whisker, .table = table, .tick_s = tick_s, .forced = MECH_AUTO, .side = 1};
+    shaft->compliance = mech_whisker_compliance(whisker);
     shaft->tolerance = mech_tolerance_default();
     mech_modes_of(whisker, &shaft->modes);
     mech_basis_of(whisker, &shaft->modes, false, whisker->length, tick_s, &shaft->free);
@@ -63,7 +64,7 @@ static bool wants_large(const struct mech_shaft *shaft, const struct mech_touch 
         return false;
     if (shaft->forced != MECH_AUTO)
         return shaft->forced & MECH_LARGE;
-    double bent = theta - shaft->side * shaft->moment * mech_whisker_compliance(&shaft->whisker);
+    double bent = theta - shaft->side * shaft->moment * shaft->compliance;
     double error = (shaft->trust.curvature * bent + shaft->trust.friction) * bent;
     bool was = shaft->level & MECH_LARGE;
     double share = was ? LEAVE_LARGE : 1;
@@ -82,7 +83,7 @@ static bool static_moment(struct mech_shaft *shaft, double radius, double theta,
     shaft->hold = (struct mech_hold){0};
     double bending =
         radius * shaft->whisker.cone / (3 * mech_whisker_bending(&shaft->whisker) * (shaft->whisker.cone - radius));
-    double soft = mech_whisker_compliance(&shaft->whisker);
+    double soft = shaft->compliance;
     *moment = theta / (soft + bending);
     if (soft * *moment > shaft->whisker.stop)
         *moment = (theta - shaft->whisker.stop) / bending;
@@ -174,8 +175,7 @@ static void vibrate(struct mech_shaft *shaft, double input, double rate, double 
 
 static void creep(struct mech_shaft *shaft)
 {
-    double elastic = shaft->moment * mech_whisker_compliance(&shaft->whisker);
-    elastic = fmin(fmax(elastic, -shaft->whisker.stop), shaft->whisker.stop);
+    double elastic = mech_whisker_stopped(&shaft->whisker, shaft->moment * shaft->compliance);
     double share = shaft->tick_s / shaft->whisker.creep_s; /* first order is exact enough for ticks this short */
     shaft->creep += share * (shaft->whisker.creep * elastic - shaft->creep);
     shaft->tilt = elastic + shaft->creep;

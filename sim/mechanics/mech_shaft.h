@@ -49,7 +49,7 @@ struct mech_shaft {
     struct mech_trust trust;        /* there */
     struct mech_motion motion;      /* pinned or free: at_pin */
     struct mech_hold hold;
-    double tick_s;
+    double tick_s, compliance;
     int forced; /* MECH_AUTO or MECH_CLOSED or MECH_LARGE, with MECH_VIBRATION or not */
     int level;  /* of the last tick */
     bool engaged, slipped, at_pin;

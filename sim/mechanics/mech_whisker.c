@@ -20,6 +20,8 @@ static const struct mech_unknown LIST[UNKNOWNS] = {
     [GAIN] = {"gain", 1.0, 0.95, 1.05},
 };
 
+#define SMALL_TILT 0.03 /* rad: below it the series of dipole_ratio() is good to 0.01 % */
+
 enum { FOR_BATCH = 0x6d656368 }; /* purpose of the batch's stream of random numbers */
 
 const struct mech_unknown *mech_unknowns(size_t *count)
@@ -101,10 +103,24 @@ double mech_whisker_field(const struct mech_whisker *whisker, double tilt)
     return whisker->gain * dipole_angle(whisker, tilt);
 }
 
+/* dipole_angle() per tilt, of a tilt whose square is small: its series to the third order. */
+static double dipole_ratio(const struct mech_whisker *whisker, double square)
+{
+    double q = whisker->pivot / whisker->gap, first = (1 + 3 * q) / 2;
+    double bent = (1 + q) * (1 + 2 * q) / 2, across = 3 * bent - 1.5 * q - 0.5, along = q / 2 + 3 * q * bent + 1.0 / 6;
+    double third = first * (across / 2 - along / (2 * first)) - first * first * first / 3;
+    return whisker->gain * (first + third * square);
+}
+
 void mech_whisker_fields(const struct mech_whisker *whisker, const double tilt[2], double field[2])
 {
-    double whole = hypot(tilt[0], tilt[1]);
-    double ratio = whole > 0 ? mech_whisker_field(whisker, whole) / whole : 0;
+    double square = tilt[0] * tilt[0] + tilt[1] * tilt[1], ratio = 0; /* at rest: most whiskers, most of the time */
+    if (square > 0 && square < SMALL_TILT * SMALL_TILT) {
+        ratio = dipole_ratio(whisker, square);
+    } else if (square > 0) {
+        double whole = sqrt(square);
+        ratio = mech_whisker_field(whisker, whole) / whole;
+    }
     field[0] = ratio * tilt[0];
     field[1] = ratio * tilt[1];
 }

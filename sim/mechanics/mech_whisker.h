@@ -55,4 +55,10 @@ void mech_whisker_fields(const struct mech_whisker *whisker, const double tilt[2
 struct mech_whisker mech_whisker_with_tip(struct mech_whisker whisker, double tip_diameter);
 /* cffi: end */
 
+/* A tilt, held at the plug's stop. */
+static inline double mech_whisker_stopped(const struct mech_whisker *whisker, double tilt)
+{
+    return tilt > whisker->stop ? whisker->stop : tilt < -whisker->stop ? -whisker->stop : tilt;
+}
+
 #endif

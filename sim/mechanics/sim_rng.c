@@ -1,6 +1,25 @@
 #include "sim_rng.h"
 
 #include <math.h>
+#include <pthread.h>
+
+enum { LAYERS = 256 };
+
+#define TAIL_FROM 3.6541528853610088 /* where the lowest layer's rectangle ends, for 256 layers ... */
+#define LAYER_AREA 4.92867323399e-3  /* ... of this area each, under exp(-x^2/2) */
+
+static double edge[LAYERS + 1], height[LAYERS + 1]; /* right edges of the layers, outside in; exp(-x^2/2) there */
+
+static void build_ziggurat(void)
+{
+    edge[0] = LAYER_AREA / exp(-0.5 * TAIL_FROM * TAIL_FROM);
+    edge[1] = TAIL_FROM;
+    for (int i = 2; i < LAYERS; i++)
+        edge[i] = sqrt(-2 * log(LAYER_AREA / edge[i - 1] + exp(-0.5 * edge[i - 1] * edge[i - 1])));
+    edge[LAYERS] = 0;
+    for (int i = 0; i <= LAYERS; i++)
+        height[i] = exp(-0.5 * edge[i] * edge[i]);
+}
 
 /* splitmix64: spreads a seed over the state, as the authors of xoshiro advise. */
 static uint64_t spread(uint64_t *state)
@@ -14,7 +33,9 @@ static uint64_t spread(uint64_t *state)
 
 struct sim_rng sim_rng_stream(uint64_t seed, uint32_t purpose, uint32_t index)
 {
-    struct sim_rng rng = {{0}, 0, false};
+    struct sim_rng rng;
+    static pthread_once_t once = PTHREAD_ONCE_INIT;
+    pthread_once(&once, build_ziggurat);
     uint64_t name = (uint64_t)purpose << 32 | index;
     uint64_t state = seed;
     state = spread(&state) ^ spread(&name);
@@ -47,20 +68,28 @@ double sim_rng_uniform(struct sim_rng *rng)
     return (double)(sim_rng_next(rng) >> 11) * 0x1p-53;
 }
 
+/* Beyond TAIL_FROM, by Marsaglia's method. */
+static double tail(struct sim_rng *rng)
+{
+    double beyond, along;
+    do {
+        beyond = -log(1 - sim_rng_uniform(rng)) / TAIL_FROM;
+        along = -log(1 - sim_rng_uniform(rng));
+    } while (2 * along < beyond * beyond);
+    return TAIL_FROM + beyond;
+}
+
 double sim_rng_normal(struct sim_rng *rng)
 {
-    if (rng->has_spare) {
-        rng->has_spare = false;
-        return rng->spare;
+    for (;;) {
+        uint64_t bits = sim_rng_next(rng);
+        int layer = (int)(bits & (LAYERS - 1));
+        double x = ((double)(bits >> 11) * 0x1p-52 - 1) * edge[layer];
+        if (fabs(x) < edge[layer + 1])
+            return x;
+        if (layer == 0)
+            return copysign(tail(rng), x);
+        if (height[layer] + sim_rng_uniform(rng) * (height[layer + 1] - height[layer]) < exp(-0.5 * x * x))
+            return x;
     }
-    double x, y, square;
-    do {
-        x = 2 * sim_rng_uniform(rng) - 1;
-        y = 2 * sim_rng_uniform(rng) - 1;
-        square = x * x + y * y;
-    } while (square >= 1 || square == 0);
-    double scale = sqrt(-2 * log(square) / square);
-    rng->spare = y * scale;
-    rng->has_spare = true;
-    return x * scale;
 }

@@ -2,13 +2,10 @@
 #ifndef SIM_RNG_H
 #define SIM_RNG_H
 
-#include <stdbool.h>
 #include <stdint.h>
 
 struct sim_rng {
     uint64_t state[4];
-    double spare; /* second normal of a pair, for the next call */
-    bool has_spare;
 };
 
 /* Starts the stream that (seed, purpose, index) names: streams with different names are independent. */
@@ -19,7 +16,7 @@ uint64_t sim_rng_next(struct sim_rng *rng);
 /* Uniform in [0, 1), 53 bits. */
 double sim_rng_uniform(struct sim_rng *rng);
 
-/* Normal with mean 0 and standard deviation 1 (Marsaglia's polar method). */
+/* Normal with mean 0 and standard deviation 1 (the ziggurat of Marsaglia and Tsang 2000, 256 layers). */
 double sim_rng_normal(struct sim_rng *rng);
 
 #endif

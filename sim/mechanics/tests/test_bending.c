@@ -139,6 +139,10 @@ static void test_field(void **state)
     mech_whisker_fields(&w, tilt, field);
     assert_near(hypot(field[0], field[1]), mech_whisker_field(&w, 0.05), 1e-12);
     assert_near(field[0] / field[1], -0.75, 1e-12);
+    for (double small = 0.001; small < 0.031; small += 0.001) { /* a series below 0.03 rad */
+        mech_whisker_fields(&w, (double[2]){0.6 * small, 0.8 * small}, field);
+        assert_share(hypot(field[0], field[1]), mech_whisker_field(&w, small), 1e-4);
+    }
 }
 
 /* Section 7: static transfer at the tip. */
