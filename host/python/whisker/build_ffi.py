@@ -28,7 +28,10 @@ HEADERS = {
         HOST / "nav" / name
         for name in (
             "contact.h",
+            "contact_trace.h",
+            "contact_shape.h",
             "radial.h",
+            "radial_whisk.h",
             "texture.h",
             "texture_slide.h",
             "texture_features.h",
