@@ -12,6 +12,8 @@ ALLOWED = {
     "firmware/dspic": [],
     "fpga/bridge_rtl": [],
     "fpga/usb": ["host/python"],  # only the protocol reader, for descriptors
+    "fpga/formal": ["fpga/bridge_rtl"],
+    "fpga/boards": ["fpga/bridge_rtl", "fpga/usb", "host/python"],  # clock and limits of the protocol
     "host/libwhisker": [],
     "host/nav": [],
     "host/apps": ["host/libwhisker", "host/nav"],
