@@ -1,0 +1,172 @@
+/* What a frame holds, by family and mode. */
+#include "bench.h"
+
+static void a_legal_master_reads_frame_after_frame(void **state)
+{
+    (void)state;
+    struct bench bench;
+    uint8_t frame[8];
+    wake(&bench, 1);
+    for (int i = 0; i < 50; i++) {
+        set_field(&bench, i, -2.0 * i);
+        read_frame(&bench, 0xFF, frame);
+        assert_frame(frame, i, -2.0 * i, 0);
+    }
+    assert_int_equal(mlx90333_violations(&bench.sensor), 0);
+}
+
+static void the_angle_is_latched_at_the_end_of_the_start_byte(void **state)
+{
+    (void)state;
+    struct bench bench;
+    uint8_t frame[8];
+    wake(&bench, 1);
+    set_field(&bench, 5.0, 6.0);
+    clock_bits(&bench, 0xFF, 8);
+    bench.now += bench.start_gap;
+    set_field(&bench, -70.0, -80.0);
+    frame[0] = 0xFF;
+    for (unsigned i = 1; i < 8; i++, bench.now += bench.gap)
+        frame[i] = clock_bits(&bench, 0xFF, 8);
+    assert_frame(frame, 5.0, 6.0, 0);
+}
+
+static void a_zero_from_the_master_pulls_the_line_low(void **state)
+{
+    (void)state;
+    struct bench bench;
+    wake(&bench, 1);
+    set_field(&bench, 89.0, 89.0);
+    clock_bits(&bench, 0xFF, 8);
+    bench.now += bench.start_gap;
+    const uint8_t alpha_low = (uint8_t)(sim_counts(89.0) & 0xFF);
+    assert_int_equal(clock_bits(&bench, 0x0F, 8), alpha_low & 0x0F);
+    assert_int_equal(bench.sensor.violations[MLX90333_ZERO_SENT], 4);
+}
+
+static void a_wrong_start_byte_gets_no_answer(void **state)
+{
+    (void)state;
+    struct bench bench;
+    uint8_t frame[8];
+    wake(&bench, 1);
+    read_frame(&bench, 0xAA, frame);
+    assert_int_equal(frame[0], 0xAA);
+    for (unsigned i = 1; i < 8; i++)
+        assert_int_equal(frame[i], 0xFF);
+    read_frame(&bench, 0xFF, frame);
+    assert_frame(frame, 0.0, 0.0, 0);
+}
+
+static void field_mode_sends_the_vector(void **state)
+{
+    (void)state;
+    struct mlx90333_parameters p = standard();
+    p.field_mode = true;
+    struct bench bench;
+    uint8_t frame[8];
+    wake_as(&bench, &p);
+    const struct mlx90333_field field = {.since_ns = bench.now, .vector_mt = {10, -20, 30}, .is_vector = true};
+    mlx90333_set_field(&bench.sensor, &field);
+    read_frame(&bench, 0xFF, frame);
+    assert_int_equal((int16_t)(frame[3] | frame[4] << 8) / (int16_t)(frame[1] | frame[2] << 8), -2);
+    assert_int_equal((int16_t)(frame[5] | frame[6] << 8) / (int16_t)(frame[1] | frame[2] << 8), 3);
+}
+
+static void the_sum_may_leave_the_error_word_out(void **state)
+{
+    (void)state;
+    struct mlx90333_parameters p = standard();
+    p.sum_without_errors = true;
+    struct bench bench;
+    uint8_t frame[8];
+    wake_as(&bench, &p);
+    mlx90333_set_fault(&bench.sensor, SIM_SENSOR_ERROR_BITS, 0x0108);
+    read_frame(&bench, 0xFF, frame);
+    assert_int_equal(frame[7], (uint8_t)(frame[1] + frame[2] + frame[3] + frame[4]));
+}
+
+static void the_older_sensor_wants_its_key_and_sends_data_twice(void **state)
+{
+    (void)state;
+    struct mlx90333_parameters p = standard();
+    p.mlx90316 = true;
+    struct bench bench;
+    uint8_t frame[10];
+    for (unsigned key = 0; key < 2; key++) {
+        wake_as(&bench, &p);
+        for (unsigned i = 0; i < 10; i++) {
+            frame[i] = clock_bits(&bench, i == 0 && key ? 0xAA : 0xFF, 8);
+            bench.now += i == 0 ? bench.start_gap : bench.gap;
+        }
+        assert_int_equal(frame[2] << 8 | frame[3], key ? 0x8001 : 0xFFFF);
+        assert_int_equal(frame[4] << 8 | frame[5], key ? 0x7FFE : 0xFFFF);
+        assert_int_equal(frame[0], key ? 0xAA : 0xFF); /* the wired AND shows the master its own byte */
+        assert_int_equal(mlx90333_violations(&bench.sensor), 0);
+    }
+}
+
+static void a_frame_is_eight_bytes_or_ten(void **state)
+{
+    (void)state;
+    for (unsigned old = 0; old < 2; old++) {
+        struct mlx90333_parameters p = standard();
+        p.mlx90316 = old;
+        struct bench bench;
+        wake_as(&bench, &p);
+        for (unsigned i = 1; i <= 20; i++) {
+            clock_bits(&bench, old && bench.sensor.byte == 0 ? 0xAA : 0xFF, 8);
+            assert_int_equal(bench.sensor.byte, i % (old ? 10u : 8u));
+            bench.now += bench.start_gap;
+        }
+    }
+}
+
+static void the_older_sensors_error_word_takes_the_angles_place(void **state)
+{
+    (void)state;
+    struct mlx90333_parameters p = standard();
+    p.mlx90316 = true;
+    struct bench bench;
+    uint8_t frame[10];
+    wake_as(&bench, &p);
+    mlx90333_set_fault(&bench.sensor, SIM_SENSOR_ERROR_BITS, 0x0024);
+    for (unsigned i = 0; i < 10; i++) {
+        frame[i] = clock_bits(&bench, i == 0 ? 0xAA : 0xFF, 8);
+        bench.now += bench.start_gap;
+    }
+    assert_int_equal(frame[2] << 8 | frame[3], 0x0024 | 2);
+    assert_int_equal((frame[2] << 8 | frame[3]) ^ (frame[4] << 8 | frame[5]), 0xFFFF);
+}
+
+static void a_strong_field_saturates_its_word(void **state)
+{
+    (void)state;
+    struct mlx90333_parameters p = standard();
+    p.field_mode = true;
+    struct bench bench;
+    uint8_t frame[8];
+    wake_as(&bench, &p);
+    set_vector(&bench, 1e6, -1e6, 0.0);
+    read_frame(&bench, 0xFF, frame);
+    assert_int_equal((int16_t)(frame[1] | frame[2] << 8), 32767);
+    assert_int_equal((int16_t)(frame[3] | frame[4] << 8), -32767);
+    assert_int_equal(frame[5] | frame[6] << 8, 0);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_legal_master_reads_frame_after_frame),
+        cmocka_unit_test(the_angle_is_latched_at_the_end_of_the_start_byte),
+        cmocka_unit_test(a_zero_from_the_master_pulls_the_line_low),
+        cmocka_unit_test(a_wrong_start_byte_gets_no_answer),
+        cmocka_unit_test(field_mode_sends_the_vector),
+        cmocka_unit_test(the_sum_may_leave_the_error_word_out),
+        cmocka_unit_test(the_older_sensor_wants_its_key_and_sends_data_twice),
+        cmocka_unit_test(a_frame_is_eight_bytes_or_ten),
+        cmocka_unit_test(the_older_sensors_error_word_takes_the_angles_place),
+        cmocka_unit_test(a_strong_field_saturates_its_word),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,335 @@
+/* From the field to the words: transfer, conversions, filter, noise. */
+#include "bench.h"
+
+#include <math.h>
+
+static void counts_follow_the_transfer(void **state)
+{
+    (void)state;
+    assert_int_equal(sim_counts(0.0), 0x8000);
+    assert_int_equal(sim_counts(45.0), 0xC000);
+    assert_int_equal(sim_counts(-45.0), 0x4000);
+    assert_int_equal(sim_counts(-90.0), 0);
+    assert_int_equal(sim_counts(90.0), 0xFFF0);
+    assert_int_equal(sim_counts(1e300), 0xFFF0);
+    assert_int_equal(sim_counts(-1e300), 0);
+    assert_int_equal(sim_counts(1.0), 0x8000 + 368); /* 364.09 counts: the nearest multiple of 16 */
+    assert_int_equal(sim_counts(-1.0), 0x8000 - 368);
+}
+
+static void counts_never_fall_and_stay_within_half_a_step(void **state)
+{
+    (void)state;
+    uint16_t before = 0;
+    for (double deg = -90.0; deg < 89.9; deg += 0.003) {
+        const uint16_t counts = sim_counts(deg);
+        const double error = counts - (0x8000 + deg * 65536.0 / 180.0);
+        assert_true(counts >= before && counts % 16 == 0);
+        assert_true(error >= -8.0001 && error <= 8.0001);
+        before = counts;
+    }
+}
+
+static void readings_are_up_to_one_conversion_old(void **state)
+{
+    (void)state;
+    struct mlx90333_parameters p = standard();
+    p.conversion_ns = 350000;
+    p.step_counts = 1;
+    p.seed = 5;
+    struct bench bench;
+    wake_as(&bench, &p);
+    uint64_t least = UINT64_MAX, most = 0;
+    for (int i = 0; i < 200; i++) {
+        const struct mlx90333_field field = {.since_ns = bench.now, .alpha_deg_s = 1000.0};
+        const uint64_t since = bench.now;
+        mlx90333_set_field(&bench.sensor, &field);
+        const uint64_t latch = bench.now + 7u * bench.period + bench.period / 2;
+        const unsigned alpha = alpha_of(&bench);
+        const uint64_t age = bench.sensor.age_ns;
+        least = age < least ? age : least;
+        most = age > most ? age : most;
+        if (latch - age > since) /* converted since the ramp began */
+            assert_true(alpha - mlx90333_counts(&p, (double)(latch - age - since) * 1e-6) + 2u < 4u);
+        bench.now += 123456;
+    }
+    assert_true(least < 20000 && most > 330000 && most < 350000);
+}
+
+static void filters_average_the_newest_conversions(void **state)
+{
+    (void)state;
+    const double reduction_db[] = {0.0, 2.9, 4.0, 4.7, 5.6, 6.2}; /* the data sheet's column */
+    double plain = 0.0;
+    for (uint8_t filter = 0; filter <= 5; filter++) {
+        struct mlx90333_parameters p = standard();
+        p.conversion_ns = 60000;
+        p.step_counts = 1;
+        p.noise_deg = 1.0;
+        p.filter = filter;
+        struct bench bench;
+        wake_as(&bench, &p);
+        double sum = 0.0, squares = 0.0;
+        for (int i = 0; i < 4000; i++) {
+            const double a = alpha_of(&bench);
+            sum += a;
+            squares += a * a;
+            bench.now += 700000; /* more than the taps reach */
+        }
+        const double deviation = sqrt(squares / 4000 - sum / 4000 * (sum / 4000));
+        plain = filter == 0 ? deviation : plain;
+        assert_true(fabs(20.0 * log10(plain / deviation) - reduction_db[filter]) < 0.45);
+    }
+}
+
+static void a_field_vector_becomes_the_documented_angles(void **state)
+{
+    (void)state;
+    const struct mlx90333_parameters p = standard();
+    double angles[2];
+    mlx90333_angles(&p, (double[]){0.0, 0.0, 40.0}, angles);
+    assert_true(fabs(angles[0]) < 1e-9 && fabs(angles[1]) < 1e-9);
+    mlx90333_angles(&p, (double[]){40.0, 0.0, 0.0}, angles);
+    assert_true(fabs(angles[0] + 90.0) < 1e-9); /* 0 degrees along +X, and rest is 90 */
+    mlx90333_angles(&p, (double[]){14.0, 0.0, 10.0}, angles);
+    assert_true(fabs(angles[0] + 45.0) < 1e-9); /* k 1.4 */
+}
+
+static void a_weak_or_strong_field_sets_its_error_bit(void **state)
+{
+    (void)state;
+    const double strength[] = {10.0, 40.0, 90.0};
+    const unsigned expected[] = {0x0080, 0, 0x0100};
+    for (unsigned i = 0; i < 3; i++) {
+        const struct mlx90333_parameters p = standard();
+        struct bench bench;
+        uint8_t frame[8];
+        wake_as(&bench, &p);
+        const struct mlx90333_field field = {
+            .since_ns = bench.now, .vector_mt = {0, 0, strength[i]}, .is_vector = true};
+        mlx90333_set_field(&bench.sensor, &field);
+        read_frame(&bench, 0xFF, frame);
+        assert_int_equal(frame[5] | frame[6] << 8, expected[i]);
+    }
+}
+
+static void clamps_hold_the_output(void **state)
+{
+    (void)state;
+    struct mlx90333_parameters p = standard();
+    p.clamp_low = 0x1000;
+    p.clamp_high = 0xE000;
+    assert_int_equal(mlx90333_counts(&p, -90.0), 0x1000);
+    assert_int_equal(mlx90333_counts(&p, 90.0), 0xE000);
+    assert_int_equal(mlx90333_counts(&p, 0.0), 0x8000);
+    assert_int_equal(mlx90333_counts(&p, (double)NAN), 0x1000);
+}
+
+static void the_span_sets_the_counts_of_a_degree(void **state)
+{
+    (void)state;
+    struct mlx90333_parameters p = standard();
+    p.step_counts = 1;
+    assert_int_equal(mlx90333_counts(&p, 45.0), 0xC000);
+    p.span_deg = 360.0;
+    assert_int_equal(mlx90333_counts(&p, 45.0), 0xA000);
+    p.span_deg = 90.0;
+    assert_int_equal(mlx90333_counts(&p, 22.5), 0xC000);
+    assert_int_equal(mlx90333_counts(&p, 60.0), 0xFFFF);
+}
+
+static void the_resolution_rounds_to_its_steps(void **state)
+{
+    (void)state;
+    struct mlx90333_parameters p = standard();
+    p.step_counts = 1;
+    assert_int_equal(mlx90333_counts(&p, 1.0), 0x8000 + 364); /* 364.09 */
+    p.step_counts = 16;
+    assert_int_equal(mlx90333_counts(&p, 1.0), 0x8000 + 368);
+    p.step_counts = 256;
+    assert_int_equal(mlx90333_counts(&p, 1.0), 0x8000 + 256);
+}
+
+static double angle_of(const struct mlx90333_parameters *p, double x, double y, double z, int axis)
+{
+    double angles[2];
+    mlx90333_angles(p, (double[]){x, y, z}, angles);
+    return angles[axis];
+}
+
+/* Each factor where it alone decides. */
+static void each_kappa_weighs_its_own_component(void **state)
+{
+    (void)state;
+    const double deg = 180.0 / acos(-1.0);
+    struct mlx90333_parameters p = standard();
+    p.k_alpha = 1.7;
+    p.k_beta = 1.2;
+    p.k_t = 0.5;
+    assert_true(fabs(angle_of(&p, 10.0, 0.0, 10.0, 0) - (atan2(17.0, 10.0) * deg - 90.0)) < 1e-9);
+    assert_true(fabs(angle_of(&p, 0.0, 10.0, 10.0, 1) - (atan2(12.0, 10.0) * deg - 90.0)) < 1e-9);
+    assert_true(fabs(angle_of(&p, 10.0, 8.0, 0.0, 0) - (atan2(4.0, 10.0) * deg - 90.0)) < 1e-9);
+    assert_true(fabs(angle_of(&p, 8.0, 10.0, 0.0, 1) - (atan2(4.0, 10.0) * deg - 90.0)) < 1e-9);
+}
+
+static void a_wrong_kappa_shows_in_the_frame(void **state)
+{
+    (void)state;
+    struct mlx90333_parameters p = standard();
+    unsigned counts[2];
+    for (unsigned i = 0; i < 2; i++) {
+        struct bench bench;
+        p.k_alpha = i ? 1.0 : 1.4;
+        wake_as(&bench, &p);
+        set_vector(&bench, 20.0, 0.0, 30.0);
+        counts[i] = alpha_of(&bench);
+    }
+    assert_in_range(counts[0], sim_counts(atan2(42.0, 20.0) * 180.0 / acos(-1.0) - 90.0) - 16u,
+                    sim_counts(atan2(42.0, 20.0) * 180.0 / acos(-1.0) - 90.0) + 16u);
+    assert_true(counts[0] > counts[1] + 1000u);
+}
+
+/* Deviation of 4000 readings of a field at rest, degrees. */
+static double deviation(const struct mlx90333_parameters *p)
+{
+    struct bench bench;
+    double sum = 0.0, squares = 0.0;
+    wake_as(&bench, p);
+    for (int i = 0; i < 4000; i++) {
+        const double deg = ((double)alpha_of(&bench) - 32768.0) * 180.0 / 65536.0;
+        sum += deg;
+        squares += deg * deg;
+    }
+    return sqrt(squares / 4000 - sum / 4000 * (sum / 4000));
+}
+
+static void noise_is_as_large_as_told_and_seeded(void **state)
+{
+    (void)state;
+    struct mlx90333_parameters p = standard();
+    p.step_counts = 1;
+    p.seed = 3;
+    assert_true(deviation(&p) == 0.0);
+    p.noise_deg = 0.05;
+    const double once = deviation(&p);
+    assert_true(fabs(once / 0.05 - 1.0) < 0.05);
+    assert_true(deviation(&p) == once);
+    p.seed = 4;
+    assert_true(deviation(&p) != once);
+}
+
+static void without_conversions_of_its_own_a_reading_is_as_at_the_latch(void **state)
+{
+    (void)state;
+    struct bench bench;
+    wake(&bench, 1);
+    for (int i = 0; i < 20; i++) {
+        set_field(&bench, i, 0.0);
+        assert_int_equal(alpha_of(&bench), sim_counts(i));
+        assert_int_equal(bench.sensor.age_ns, 0);
+        bench.now += 77777;
+    }
+}
+
+/* The largest age seen is the period, whatever it is, stretched by the oscillator. */
+static void the_conversion_period_bounds_the_age(void **state)
+{
+    (void)state;
+    const uint32_t period_ns[] = {200000, 350000, 600000, 1500000};
+    for (unsigned i = 0; i < 8; i++) {
+        struct mlx90333_parameters p = standard();
+        p.conversion_ns = period_ns[i / 2];
+        p.slow_permille = i % 2 ? 1100 : 900;
+        const uint64_t period = (uint64_t)p.conversion_ns * p.slow_permille / 1000u;
+        struct mlx90333_sense sense = {0};
+        uint64_t most = 0;
+        uint16_t words[3], errors;
+        mlx90333_sense_start(&sense, &p, 0);
+        for (uint64_t n = 10; n < 400; n++) {
+            const uint64_t age = mlx90333_sense_latch(&sense, n * 365123u, words, &errors);
+            most = age > most ? age : most;
+        }
+        assert_true(most < period && most > period - period / 20u);
+    }
+}
+
+static void the_phase_of_the_conversions_differs_from_part_to_part(void **state)
+{
+    (void)state;
+    struct mlx90333_parameters p = standard();
+    uint64_t age[2];
+    p.conversion_ns = 350000;
+    for (unsigned i = 0; i < 2; i++) {
+        struct bench bench;
+        p.seed = i + 1u;
+        wake_as(&bench, &p);
+        alpha_of(&bench);
+        age[i] = bench.sensor.age_ns;
+    }
+    assert_true(age[0] != age[1]);
+}
+
+/* A step of the field reaches a filtered reading after as many conversions as the filter has taps. */
+static void a_step_takes_as_many_conversions_as_the_filter_has_taps(void **state)
+{
+    (void)state;
+    const unsigned taps[] = {1, 2, 3, 4, 4, 5};
+    for (uint8_t filter = 0; filter <= 5; filter++) {
+        struct mlx90333_parameters p = standard();
+        p.conversion_ns = 350000;
+        p.step_counts = 1;
+        p.filter = filter;
+        struct mlx90333_sense sense = {0};
+        uint16_t words[3], errors;
+        mlx90333_sense_start(&sense, &p, 0);
+        mlx90333_sense_latch(&sense, 10u * 350000u, words, &errors);
+        const struct mlx90333_field field = {.since_ns = 10u * 350000u, .alpha_deg = 20.0};
+        mlx90333_sense_field(&sense, &field);
+        unsigned conversions = 0;
+        for (; words[0] != mlx90333_counts(&p, 20.0); conversions++)
+            mlx90333_sense_latch(&sense, (11u + conversions) * 350000u, words, &errors);
+        assert_int_equal(conversions, taps[filter]);
+    }
+}
+
+static void the_thresholds_of_the_field_are_the_parts(void **state)
+{
+    (void)state;
+    struct mlx90333_parameters p = standard();
+    p.field_low_mt = 5.0;
+    p.field_high_mt = 12.0;
+    const double strength[] = {4.9, 5.1, 11.9, 12.1};
+    const unsigned expected[] = {0x0080, 0, 0, 0x0100};
+    for (unsigned i = 0; i < 4; i++) {
+        struct bench bench;
+        uint8_t frame[8];
+        wake_as(&bench, &p);
+        set_vector(&bench, 0.0, 0.0, strength[i]);
+        read_frame(&bench, 0xFF, frame);
+        assert_int_equal(frame[5] | frame[6] << 8, expected[i]);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(counts_follow_the_transfer),
+        cmocka_unit_test(counts_never_fall_and_stay_within_half_a_step),
+        cmocka_unit_test(readings_are_up_to_one_conversion_old),
+        cmocka_unit_test(filters_average_the_newest_conversions),
+        cmocka_unit_test(a_field_vector_becomes_the_documented_angles),
+        cmocka_unit_test(a_weak_or_strong_field_sets_its_error_bit),
+        cmocka_unit_test(clamps_hold_the_output),
+        cmocka_unit_test(the_span_sets_the_counts_of_a_degree),
+        cmocka_unit_test(the_resolution_rounds_to_its_steps),
+        cmocka_unit_test(each_kappa_weighs_its_own_component),
+        cmocka_unit_test(a_wrong_kappa_shows_in_the_frame),
+        cmocka_unit_test(noise_is_as_large_as_told_and_seeded),
+        cmocka_unit_test(without_conversions_of_its_own_a_reading_is_as_at_the_latch),
+        cmocka_unit_test(the_conversion_period_bounds_the_age),
+        cmocka_unit_test(the_phase_of_the_conversions_differs_from_part_to_part),
+        cmocka_unit_test(a_step_takes_as_many_conversions_as_the_filter_has_taps),
+        cmocka_unit_test(the_thresholds_of_the_field_are_the_parts),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
