@@ -1,6 +1,7 @@
 // Decides when a tick begins, and numbers it. Ticks come every `period` cycles, the first at once, or from an external
 // strobe; a strobe during a transfer on the link is ignored. Time is 0 at the first tick and
 // advances by `period` per tick whatever the source, so a simulation that skips idle cycles keeps the device's time.
+// While paused a run's ticks are counted but do not begin: the next frame's tick number and time tell of the gap.
 //
 //   tick_strobe --\
 //                  >--[ source ]--[ enable, not busy ]--> tick, first, number, previous_time
@@ -17,6 +18,7 @@ module tick_generator (
     input  wire        external,       // 1: ticks come from strobe, 0: from the divider
     input  wire        strobe,         // external tick, one cycle
     input  wire [31:0] period,         // cycles from tick to tick
+    input  wire        pause,          // count on without ticks
     output reg         tick,           // a tick begins: one cycle, with the values below
     output reg         first,          // this tick is number 0: no reading was started before it
     output reg  [31:0] number,         // of the latest tick
@@ -34,10 +36,10 @@ module tick_generator (
         else if (wait_left != 32'd0) wait_left <= wait_left - 32'd1;
 
     always @(posedge clk) begin
-        tick <= begins && !rst;
+        tick <= begins && !pause && !rst;
         if (rst || restart) fresh <= 1'b1;
-        else if (begins) fresh <= 1'b0;
-        if (begins) begin
+        else if (begins && !pause) fresh <= 1'b0;
+        if (begins && !(pause && fresh)) begin
             first <= fresh;
             number <= fresh ? 32'd0 : number + 32'd1;
             tick_time <= fresh ? 64'd0 : tick_time + {32'd0, period};

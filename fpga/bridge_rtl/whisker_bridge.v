@@ -39,6 +39,7 @@ module whisker_bridge #(
     output wire [1:0]       utmi_xcvr_select,     // .
     output wire             utmi_term_select,     // .
     output wire [1:0]       utmi_op_mode,         // .
+    input  wire [63:0]      serial_number,        // constant; 0: the text the USB device was generated with
     input  wire             tick_external,        // 1: a tick is a tick_strobe, 0: ticks come every tick_period
     input  wire             tick_strobe,          // begin a tick: one cycle; ignored while link_busy or not running
     output wire             running,              // from start until the last frame is in the FIFO
@@ -52,6 +53,7 @@ module whisker_bridge #(
 
     // USB
     wire       usb_restart;  // bus reset or SET_CONFIGURATION: one cycle or more
+    wire       suspended;    // the host is asleep: ticks are counted, nothing is sampled
     wire       write_start, write_valid, write_done, write_accept, read_start, read_next;
     wire [5:0] write_index;
     wire [1:0] read_packet;
@@ -125,7 +127,7 @@ module whisker_bridge #(
 
     tick_generator ticker (
         .clk(clk), .rst(halt), .restart(start), .enable(take_ticks), .link_busy(link_busy),
-        .external(tick_external), .strobe(tick_strobe), .period(tick_period),
+        .external(tick_external), .strobe(tick_strobe), .period(tick_period), .pause(suspended),
         .tick(tick), .first(first_tick), .number(tick_number), .previous_time(previous_time));
 
     node_link link (
@@ -190,7 +192,7 @@ module whisker_bridge #(
         .utmi_session_valid(utmi_session_valid), .utmi_session_end(utmi_session_end),
         .utmi_xcvr_select(utmi_xcvr_select), .utmi_term_select(utmi_term_select), .utmi_op_mode(utmi_op_mode),
         .stream_data(stream_data), .stream_valid(stream_valid), .stream_last(stream_last),
-        .stream_ready(stream_ready), .restart(usb_restart),
+        .stream_ready(stream_ready), .restart(usb_restart), .suspended(suspended), .serial_number(serial_number),
         .write_start(write_start), .write_valid(write_valid), .write_index(write_index), .write_data(write_data),
         .write_done(write_done), .write_accept(write_accept),
         .read_start(read_start), .read_id(read_id), .read_packet(read_packet), .read_next(read_next),

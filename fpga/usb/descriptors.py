@@ -1,17 +1,37 @@
 """What the bridge tells a USB host about itself: device, configuration, strings and the HID report descriptor."""
 
+import struct
+
+from standard_requests import (
+    BOS,
+    CONFIGURATION,
+    CONFIGURATION_AT_FULL_SPEED,
+    HID,
+    OTHER_SPEED,
+    OTHER_SPEED_AT_FULL_SPEED,
+    QUALIFIER,
+    REPORT,
+    WINDOWS_REQUEST,
+    WINDOWS_SET,
+)
 from usb_protocol.emitters import DeviceDescriptorCollection
+from usb_protocol.emitters.descriptors.standard import ConfigurationDescriptorEmitter
 from usb_protocol.types import USBTransferType
 
 from whisker.protocol import LIMITS, REPORTS
 
 HID_CLASS = 0x03
 VENDOR_CLASS = 0xFF
-HID_DESCRIPTOR = 0x21
-REPORT_DESCRIPTOR = 0x22
-DEVICE_QUALIFIER = 0x06
 HID_PACKET = 64  # bytes; the interrupt endpoint only ever answers NAK
 HID_INTERVAL = 8  # 2**7 microframes = 16 ms between the host's polls
+HID_INTERVAL_FULL_SPEED = 16  # ms
+FULL_SPEED_PACKET = 64  # bytes of a bulk packet at full speed, USB 2.0 section 5.8.3
+USB_RELEASE = 2.10  # the first whose devices have a BOS descriptor
+SERIAL_INDEX = 3  # of its string
+PLATFORM_CAPABILITY = bytes.fromhex("df60ddd88945c74c9cd2659d9e648a9f")  # Microsoft OS 2.0: D8DD60DF-4589-...
+WINDOWS_8_1 = 0x06030000  # the first Windows that asks
+# Programs on Windows find the frame interface under this class of devices.
+INTERFACE_GUID = "{7E2A9C51-3C0B-4B7A-9D52-5B6E1F0C28D4}"
 
 
 def report_descriptor() -> bytes:
@@ -27,20 +47,67 @@ def report_descriptor() -> bytes:
 
 def hid_descriptor(report_length: int) -> bytes:
     """HID 1.11 section 6.2.1: version 1.11, no country, one report descriptor."""
-    return bytes([9, HID_DESCRIPTOR, 0x11, 0x01, 0, 1, REPORT_DESCRIPTOR, report_length & 0xFF, report_length >> 8])
+    return bytes([9, HID, 0x11, 0x01, 0, 1, REPORT, report_length & 0xFF, report_length >> 8])
 
 
 def device_qualifier() -> bytes:
     """USB 2.0 section 9.6.2: at the other speed the device looks the same, with one configuration."""
-    return bytes([10, DEVICE_QUALIFIER, 0x00, 0x02, 0, 0, 0, 64, 1, 0])
+    return bytes([10, QUALIFIER, 0x10, 0x02, 0, 0, 0, 64, 1, 0])
+
+
+def windows_set() -> bytes:
+    """Microsoft OS 2.0 descriptor set: WinUSB for the frame interface, HID as it is, so Windows needs no driver file."""
+    name, guid = ("DeviceInterfaceGUIDs\0".encode("utf-16-le"), f"{INTERFACE_GUID}\0\0".encode("utf-16-le"))
+    compatible = struct.pack("<HH8s8s", 20, 3, b"WINUSB", b"")
+    registry = struct.pack("<HHHH", 10 + len(name) + len(guid), 4, 7, len(name)) + name  # 7: REG_MULTI_SZ
+    registry += struct.pack("<H", len(guid)) + guid
+    function = compatible + registry
+    function = struct.pack("<HHBBH", 8, 2, LIMITS["usb_bulk_interface"], 0, 8 + len(function)) + function
+    configuration = struct.pack("<HHBBH", 8, 1, 0, 0, 8 + len(function)) + function
+    return struct.pack("<HHIH", 10, 0, WINDOWS_8_1, 10 + len(configuration)) + configuration
+
+
+def binary_object_store() -> bytes:
+    """BOS descriptor (USB 3.2 section 9.6.2): the USB 2.0 extension without link power management, and where Windows
+    finds its set."""
+    extension = bytes([7, 0x10, 2, 0, 0, 0, 0])
+    platform = bytes([28, 0x10, 5, 0]) + PLATFORM_CAPABILITY
+    platform += struct.pack("<IHBB", WINDOWS_8_1, len(windows_set()), WINDOWS_REQUEST, 0)
+    return struct.pack("<BBHB", 5, BOS, 5 + len(extension) + len(platform), 2) + extension + platform
+
+
+def configuration(at_full_speed: bool, kind: int = CONFIGURATION) -> bytes:
+    """Configuration 1 as it is at that speed: interface 0 vendor bulk IN, interface 1 HID; kind 7: as other-speed
+    configuration (USB 2.0 section 9.6.4)."""
+    emitter = ConfigurationDescriptorEmitter()
+    emitter.bMaxPower = 250  # 500 mA for the FPGA board; the nodes have their own supply
+    with emitter.InterfaceDescriptor() as frames:
+        frames.bInterfaceNumber = LIMITS["usb_bulk_interface"]
+        frames.bInterfaceClass = VENDOR_CLASS
+        with frames.EndpointDescriptor() as endpoint:
+            endpoint.bEndpointAddress = LIMITS["usb_bulk_in"]
+            endpoint.bmAttributes = USBTransferType.BULK
+            endpoint.wMaxPacketSize = FULL_SPEED_PACKET if at_full_speed else LIMITS["bulk_packet"]
+    with emitter.InterfaceDescriptor() as control:
+        control.bInterfaceNumber = LIMITS["usb_hid_interface"]
+        control.bInterfaceClass = HID_CLASS
+        control.add_subordinate_descriptor(hid_descriptor(len(report_descriptor())))
+        with control.EndpointDescriptor() as endpoint:
+            endpoint.bEndpointAddress = LIMITS["usb_hid_in"]
+            endpoint.bmAttributes = USBTransferType.INTERRUPT
+            endpoint.wMaxPacketSize = HID_PACKET
+            endpoint.bInterval = HID_INTERVAL_FULL_SPEED if at_full_speed else HID_INTERVAL
+    raw = bytearray(emitter.emit())
+    raw[1] = kind
+    return bytes(raw)
 
 
 def descriptors(serial: str) -> DeviceDescriptorCollection:
-    """All descriptors of the composite device: interface 0 vendor bulk IN, interface 1 HID."""
+    """All descriptors, by the type under which they lie in the ROM (standard_requests.py)."""
     collection = DeviceDescriptorCollection()
     reports = report_descriptor()
     with collection.DeviceDescriptor() as device:
-        device.bcdUSB = 2.00
+        device.bcdUSB = USB_RELEASE
         device.idVendor = LIMITS["usb_vendor_id"]
         device.idProduct = LIMITS["usb_product_id"]
         device.bcdDevice = LIMITS["gateware_version"]
@@ -48,24 +115,13 @@ def descriptors(serial: str) -> DeviceDescriptorCollection:
         device.iProduct = "Whisker bridge"
         device.iSerialNumber = serial
         device.bNumConfigurations = 1
-    with collection.ConfigurationDescriptor() as configuration:
-        configuration.bMaxPower = 250  # 500 mA for the FPGA board; the nodes have their own supply
-        with configuration.InterfaceDescriptor() as frames:
-            frames.bInterfaceNumber = LIMITS["usb_bulk_interface"]
-            frames.bInterfaceClass = VENDOR_CLASS
-            with frames.EndpointDescriptor() as endpoint:
-                endpoint.bEndpointAddress = LIMITS["usb_bulk_in"]
-                endpoint.bmAttributes = USBTransferType.BULK
-                endpoint.wMaxPacketSize = LIMITS["bulk_packet"]
-        with configuration.InterfaceDescriptor() as control:
-            control.bInterfaceNumber = LIMITS["usb_hid_interface"]
-            control.bInterfaceClass = HID_CLASS
-            control.add_subordinate_descriptor(hid_descriptor(len(reports)))
-            with control.EndpointDescriptor() as endpoint:
-                endpoint.bEndpointAddress = LIMITS["usb_hid_in"]
-                endpoint.bmAttributes = USBTransferType.INTERRUPT
-                endpoint.wMaxPacketSize = HID_PACKET
-                endpoint.bInterval = HID_INTERVAL
-    collection.add_descriptor(device_qualifier(), index=0, descriptor_type=DEVICE_QUALIFIER)
-    collection.add_descriptor(reports, index=0, descriptor_type=REPORT_DESCRIPTOR)
+    collection.add_descriptor(configuration(False), descriptor_type=CONFIGURATION)
+    collection.add_descriptor(configuration(True), descriptor_type=CONFIGURATION_AT_FULL_SPEED)
+    collection.add_descriptor(configuration(True, OTHER_SPEED), descriptor_type=OTHER_SPEED)
+    collection.add_descriptor(configuration(False, OTHER_SPEED), descriptor_type=OTHER_SPEED_AT_FULL_SPEED)
+    collection.add_descriptor(device_qualifier(), descriptor_type=QUALIFIER)
+    collection.add_descriptor(binary_object_store(), descriptor_type=BOS)
+    collection.add_descriptor(windows_set(), descriptor_type=WINDOWS_SET)
+    collection.add_descriptor(hid_descriptor(len(reports)), descriptor_type=HID)
+    collection.add_descriptor(reports, descriptor_type=REPORT)
     return collection

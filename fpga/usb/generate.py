@@ -17,11 +17,16 @@ warnings.filterwarnings("ignore", category=DeprecationWarning)  # LUNA's, about 
 
 from amaranth import ClockDomain, Elaboratable, Module, Signal  # noqa: E402
 from amaranth.back import verilog  # noqa: E402
-from descriptors import descriptors  # noqa: E402
-from endpoints import FrameEndpoint, SilentEndpoint, StandardRequests  # noqa: E402
+from bus_guard import BusGuard  # noqa: E402
+from control_endpoint import ControlEndpoint  # noqa: E402
+from descriptors import SERIAL_INDEX, descriptors  # noqa: E402
+from endpoints import FrameEndpoint, SilentEndpoint, strobes  # noqa: E402
 from hid_requests import HidRequests  # noqa: E402
 from luna.gateware.interface.utmi import UTMIInterface  # noqa: E402
+from luna.gateware.usb.usb2 import USBSpeed  # noqa: E402
 from luna.gateware.usb.usb2.device import USBDevice  # noqa: E402
+from luna.gateware.usb.usb2.packet import USBTokenDetector  # noqa: E402
+from standard_requests import StandardRequests  # noqa: E402
 
 from whisker.protocol import LIMITS  # noqa: E402
 
@@ -32,18 +37,29 @@ NOTICE = """\
 UTMI_IN = ("rx_data", "rx_active", "rx_valid", "rx_error", "tx_ready", "line_state")
 UTMI_IN += ("vbus_valid", "session_valid", "session_end")
 UTMI_OUT = ("tx_data", "tx_valid", "xcvr_select", "term_select", "op_mode")
+GUARDED = ("rx_active", "rx_valid", "rx_data", "tx_valid", "tx_data", "line_state")
 ENDPOINT_NUMBER = 0x0F  # an endpoint address less its direction
 
 
 class WhiskerUsb(Elaboratable):
-    """The USB device with its ports: UTMI, frame stream in, report registers, restart (bus reset, SET_CONFIGURATION)."""
+    """The USB device with its ports.
+
+    utmi_*          to the PHY
+    serial_number   64 bits shown as serial number, constant; 0: the text given at generation
+    stream_*        frames in
+    restart         bus reset or SET_CONFIGURATION: begin anew
+    suspended       3 ms without traffic (USB 2.0 section 7.1.7.6): until the host resumes
+    write_*, read_* report registers (hid_requests.py)
+    """
 
     def __init__(self, serial: str):
         self._serial = serial
         self._bus = UTMIInterface()
         self._utmi = {name: Signal(len(self._bus[name]), name=f"utmi_{name}") for name in UTMI_IN + UTMI_OUT}
         self._hid = HidRequests()
+        self.serial_number = Signal(64, name="serial_number")
         self.restart = Signal(name="restart")
+        self.suspended = Signal(name="suspended")
         self.stream_data = Signal(8, name="stream_data")
         self.stream_valid = Signal(name="stream_valid")
         self.stream_last = Signal(name="stream_last")
@@ -55,7 +71,7 @@ class WhiskerUsb(Elaboratable):
         reports = [hid.write_start, hid.write_valid, hid.write_index, hid.write_data, hid.write_done, hid.write_accept]
         reports += [hid.read_start, hid.read_id, hid.read_packet, hid.read_next, hid.read_data]
         stream = [self.restart, self.stream_data, self.stream_valid, self.stream_last, self.stream_ready]
-        return [*self._utmi.values(), *stream, *reports]
+        return [*self._utmi.values(), self.serial_number, self.suspended, *stream, *reports]
 
     def elaborate(self, platform):
         m = Module()
@@ -63,25 +79,64 @@ class WhiskerUsb(Elaboratable):
         # LUNA takes a plain UTMI bus for a full-speed one; these two attributes are all that says so (LUNA issue 276).
         device.always_fs = False
         device.data_clock = LIMITS["clock_hz"]
-        control = device.add_control_endpoint()
-        control.add_request_handler(StandardRequests(descriptors(self._serial)))
-        control.add_request_handler(self._hid)
+        full_speed = Signal()
         packet = LIMITS["bulk_packet"]
         frames = FrameEndpoint(endpoint_number=LIMITS["usb_bulk_in"] & ENDPOINT_NUMBER, max_packet_size=packet)
-        device.add_endpoint(frames)
-        device.add_endpoint(SilentEndpoint(endpoint_number=LIMITS["usb_hid_in"] & ENDPOINT_NUMBER))
-        m.d.comb += [self._bus[name].eq(self._utmi[name]) for name in UTMI_IN]
-        m.d.comb += [self._utmi[name].eq(self._bus[name]) for name in UTMI_OUT]
+        silent = SilentEndpoint(endpoint_number=LIMITS["usb_hid_in"] & ENDPOINT_NUMBER)
+        control = self._add_control(m, device, full_speed, [frames, silent])
+        self._connect_bus(m, device)
         m.d.comb += [
             device.connect.eq(1),
+            full_speed.eq(device.speed != USBSpeed.HIGH),
+            self.suspended.eq(device.suspended),
             self.restart.eq(device.reset_detected | control.interface.config_changed),
             frames.restart.eq(self.restart),
+            silent.restart.eq(self.restart),
+            frames.full_speed.eq(full_speed),
             frames.stream.payload.eq(self.stream_data),
             frames.stream.valid.eq(self.stream_valid),
             frames.stream.last.eq(self.stream_last),
             self.stream_ready.eq(frames.stream.ready),
         ]
         return m
+
+    def _add_control(self, m, device, full_speed, endpoints) -> ControlEndpoint:
+        """Endpoint 0 and the others, by the order of their interfaces."""
+        control = ControlEndpoint(self._bus)
+        addresses = (LIMITS["usb_bulk_in"], LIMITS["usb_hid_in"])
+        standard = StandardRequests(
+            descriptors(self._serial), SERIAL_INDEX, addresses, len(addresses), LIMITS["usb_hid_interface"]
+        )
+        for handler in (standard, self._hid):
+            control.add_request_handler(handler)
+        for endpoint in (control, *endpoints):
+            device.add_endpoint(endpoint)
+        m.submodules.any_token = any_token = USBTokenDetector(utmi=self._bus, filter_by_address=False)
+        m.d.comb += [
+            control.reset.eq(device.reset_detected),
+            any_token.speed.eq(device.speed),
+            standard.other_token.eq(any_token.interface.new_token),
+            standard.other_address.eq(any_token.interface.address),
+            standard.full_speed.eq(full_speed),
+            standard.serial.eq(self.serial_number),
+            standard.address.eq(control.interface.active_address),
+            standard.halted.eq(strobes(endpoints, "halted")),
+            strobes(endpoints, "halt").eq(standard.halt),
+            strobes(endpoints, "unhalt").eq(standard.unhalt),
+        ]
+        return control
+
+    def _connect_bus(self, m, device) -> None:
+        utmi = self._utmi
+        m.submodules.guard = guard = BusGuard()
+        m.d.comb += [self._bus[name].eq(utmi[name]) for name in UTMI_IN if name not in ("rx_valid", "line_state")]
+        m.d.comb += [utmi[name].eq(self._bus[name]) for name in UTMI_OUT]
+        m.d.comb += [getattr(guard, name).eq(utmi[name]) for name in GUARDED]
+        m.d.comb += [
+            guard.suspended.eq(device.suspended),
+            self._bus.rx_valid.eq(guard.valid),
+            self._bus.line_state.eq(guard.line),
+        ]
 
 
 def generate(serial: str) -> str:

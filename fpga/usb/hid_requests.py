@@ -8,6 +8,7 @@ from whisker.protocol import LIMITS, REPORTS
 
 GET_REPORT = 0x01
 SET_REPORT = 0x09
+GET_IDLE = 0x02
 SET_IDLE = 0x0A
 FEATURE = 3  # report type in the high byte of wValue
 PACKET = 64  # bytes of the control endpoint
@@ -16,7 +17,8 @@ READ = tuple(name for name in REPORTS if name != "service")
 
 
 class HidRequests(ControlRequestHandler):
-    """Answers GET_REPORT and SET_REPORT of feature reports and SET_IDLE; stalls every other class request.
+    """Answers GET_REPORT and SET_REPORT of feature reports, GET_IDLE and SET_IDLE once configured; stalls every other class
+    request (GET_PROTOCOL and SET_PROTOCOL are for boot devices: HID 1.11 sections 7.2.5 and 7.2.6).
 
     A request is decoded afresh at each SETUP, whatever became of the one before. A report being set is accepted or
     refused once, at the first token of the status stage: until then the host may repeat its data, afterwards it only
@@ -45,7 +47,8 @@ class HidRequests(ControlRequestHandler):
 
     def elaborate(self, platform):
         m = Module()
-        self.kind = Signal(3)  # one bit per request served: get, set, idle; none: stall
+        self.kind = Signal(4)  # one bit per request served: get, set, idle, get idle; none: stall
+        self.idle = Signal(8)  # as the host set it, 4 ms; with nothing to report it never matters
         self.left = Signal(range(max(report.size for report in REPORTS.values()) + 1))  # bytes not yet acknowledged
         self.sent = Signal()  # the packet of a read, and not yet acknowledged
         self.sending = Signal()
@@ -59,6 +62,9 @@ class HidRequests(ControlRequestHandler):
                 self._set_report(m)
             with m.Elif(self.kind[2] & self.interface.status_requested):
                 m.d.comb += self.send_zlp()
+                m.d.usb += self.idle.eq(self.interface.setup.value[8:])
+            with m.Elif(self.kind[3]):
+                self._get_idle(m)
             with m.Elif(self._answer_wanted()):
                 m.d.comb += self.interface.handshakes_out.stall.eq(1)
         self._decode(m)  # last: a SETUP overrides what the request before it wants
@@ -75,6 +81,7 @@ class HidRequests(ControlRequestHandler):
             m.d.usb += [self.kind.eq(0), self.sending.eq(0), self.decided.eq(0)]
             m.d.usb += [self.sent.eq(0), self.read_packet.eq(0), self.interface.tx_data_pid.eq(1)]
             ours = (setup.recipient == USBRequestRecipient.INTERFACE) & (setup.index == LIMITS["usb_hid_interface"])
+            ours &= self.interface.active_config != 0
             feature = ours & (setup.value[8:] == FEATURE)
             get = feature & setup.is_in_request & (setup.request == GET_REPORT) & (setup.length != 0)
             for report in (REPORTS[name] for name in READ):
@@ -88,6 +95,18 @@ class HidRequests(ControlRequestHandler):
                     m.d.comb += self.write_start.eq(1)
             with m.If(ours & ~setup.is_in_request & (setup.request == SET_IDLE) & (setup.length == 0)):
                 m.d.usb += self.kind.eq(0b100)
+            with m.If(ours & setup.is_in_request & (setup.request == GET_IDLE) & (setup.length != 0)):
+                m.d.usb += self.kind.eq(0b1000)
+
+    def _get_idle(self, m):
+        """Data stage of one byte. Status stage: ACK."""
+        itf, tx = self.interface, self.interface.tx
+        m.d.comb += [tx.valid.eq(self.sending), tx.first.eq(self.sending), tx.last.eq(self.sending)]
+        m.d.comb += [tx.payload.eq(self.idle), itf.handshakes_out.ack.eq(itf.status_requested)]
+        with m.If(itf.data_requested):
+            m.d.usb += self.sending.eq(1)
+        with m.Elif(itf.tx.ready):
+            m.d.usb += self.sending.eq(0)
 
     def _get_report(self, m):
         """Data stage: packets of 64 bytes, each sent again from its first byte when the host asks again before it has

@@ -19,6 +19,8 @@ module whisker_usb (
     output wire [1:0] utmi_xcvr_select,
     output wire       utmi_term_select,
     output wire [1:0] utmi_op_mode,
+    input  wire [63:0] serial_number,
+    output reg        suspended,
     input  wire [7:0] stream_data,
     input  wire       stream_valid,
     input  wire       stream_last,
@@ -37,7 +39,7 @@ module whisker_usb (
     input  wire [7:0] read_data
 );
     initial read_packet = 2'd0;
-    initial {stream_ready, restart, write_start, write_valid, write_done, read_start, read_next} = 7'd0;
+    initial {suspended, stream_ready, restart, write_start, write_valid, write_done, read_start, read_next} = 8'd0;
 
     assign utmi_tx_data     = 8'd0;
     assign utmi_tx_valid    = 1'b0;

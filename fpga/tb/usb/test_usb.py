@@ -108,6 +108,7 @@ def on_endpoint(scenario) -> None:
     endpoint = FrameEndpoint(endpoint_number=LIMITS["usb_bulk_in"] & 0xF, max_packet_size=PACKET)
 
     async def bench(ctx):
+        ctx.set(endpoint.interface.active_config, 1)
         await scenario(BulkHost(ctx, endpoint))
 
     simulate(endpoint, bench)
@@ -170,13 +171,14 @@ def test_silent_endpoint_naks_its_own_tokens_only():
 
     async def bench(ctx):
         token = endpoint.interface.tokenizer
-        for number, is_in, nak in ((2, 1, 1), (1, 1, 0), (2, 0, 0)):
+        for configured, number, is_in, nak in ((1, 2, 1, 1), (1, 1, 1, 0), (1, 2, 0, 0), (0, 2, 1, 0)):
+            ctx.set(endpoint.interface.active_config, configured)
             ctx.set(token.endpoint, number)
             ctx.set(token.is_in, is_in)
             ctx.set(token.ready_for_response, 1)
             assert ctx.get(endpoint.interface.handshakes_out.nak) == nak
 
-    simulate(endpoint, bench, clocked=False)
+    simulate(endpoint, bench)
 
 
 # --- HID requests
@@ -249,6 +251,7 @@ def on_requests(scenario) -> None:
     handler = HidRequests()
 
     async def bench(ctx):
+        ctx.set(handler.interface.active_config, 1)
         await scenario(ControlHost(ctx, handler))
 
     simulate(handler, bench)
