@@ -1,6 +1,6 @@
 // The nodes' answers of the latest service window, kept until the next one, and read as the body of HID report `answers`:
 // alpha, beta and status of every lane. In place of a record that was not accepted stands the bridge's code, as in a
-// frame.
+// frame; lanes that this bridge does not have are off.
 //
 //   bits[LANES] --> record_store --> alpha, beta, status --\
 //   verdicts ------> kept ---------> code -----------------+--> data, data, ..
@@ -73,10 +73,16 @@ module answer_store #(
             end else at_byte <= at_byte + 3'd1;
         end
 
-    wire       accepted = !(off[lane] || gone[lane] || corrupt[lane] || stale[lane]);
-    wire [5:0] code = off[lane] ? CODE_LANE_OFF[5:0]
-                    : gone[lane] ? CODE_ABSENT[5:0]
-                    : corrupt[lane] ? CODE_LINK_CRC[5:0]
+    // One bit for every value of `lane`: a lane that this bridge does not have is off.
+    wire [31:0] is_off     = {{32 - LANES{1'b1}}, off};
+    wire [31:0] is_gone    = {{32 - LANES{1'b0}}, gone};
+    wire [31:0] is_corrupt = {{32 - LANES{1'b0}}, corrupt};
+    wire [31:0] is_stale   = {{32 - LANES{1'b0}}, stale};
+
+    wire       accepted = !(is_off[lane] || is_gone[lane] || is_corrupt[lane] || is_stale[lane]);
+    wire [5:0] code = is_off[lane] ? CODE_LANE_OFF[5:0]
+                    : is_gone[lane] ? CODE_ABSENT[5:0]
+                    : is_corrupt[lane] ? CODE_LINK_CRC[5:0]
                     : CODE_LINK_TICK[5:0];
 
     assign in_header = (header_left != 4'd0);

@@ -1,6 +1,7 @@
 // The settings, and the one way to change them: HID report `control`. Its bytes are gathered until the host asks whether
 // the report is accepted; it is, whole, when its length, id, wire version and every value are right, else nothing
-// changes. Start is refused while a stop is not finished. Settings take effect at the next tick.
+// changes. Start is refused while a stop is not finished. Settings take effect at the next tick. Of the lane mask, lanes
+// of the wire that this bridge does not have are accepted and stay out of use: reading the report back says so.
 //
 //   write bytes --> incoming --[ all in limits? ]--accept--> settings
 //                                                     '----> start, stop
@@ -52,7 +53,7 @@ module control_registers #(
     wire divider_right = (new_divider >= LIMIT_SCK_DIVIDER_MIN[7:0]) && (new_divider <= LIMIT_SCK_DIVIDER_MAX[7:0])
                       && !new_divider[0];
     wire sample_right  = (new_sample != 8'd0) && (new_sample <= new_divider);
-    wire mask_right    = (new_mask >> LANES == 32'd0);
+    wire mask_right    = (new_mask >> LIMIT_LANES == 32'd0);
     wire period_right  = (new_period >= LIMIT_TICK_PERIOD_MIN);
 
     assign write_accept = ours && run_right && divider_right && (new_gap >= LIMIT_WORD_GAP_MIN[7:0])

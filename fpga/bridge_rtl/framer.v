@@ -1,6 +1,7 @@
 // Makes a frame: the header, then a record per lane, as a stream of bytes, one a cycle while the reader is ready. A
 // record that was accepted goes out as it came; in place of any other stands an error record, which carries the tick
-// that was expected and a code that says why: lane_off, absent, link_crc, link_tick, in this order of precedence.
+// that was expected and a code that says why: lane_off, absent, link_crc, link_tick, in this order of precedence. A frame
+// always has the wire's 28 records: in a bridge with fewer lanes the missing ones are off.
 // Everything the frame needs is read at start, except the records' bytes, which the store keeps for one more transfer.
 //
 //   tick, time, .. --> header, shifted out ------\
@@ -43,7 +44,7 @@ module framer #(
     localparam HEADER_BITS = 8 * FRAME_HEADER_BYTES;
     localparam [4:0] HEADER_END = FRAME_HEADER_BYTES[4:0] - 5'd1;  // byte that is the header's CRC
     localparam [2:0] RECORD_END = RECORD_CRC[2:0];                 // byte that is the record's
-    localparam [4:0] LAST_LANE = LANES[4:0] - 5'd1;
+    localparam [4:0] LAST_LANE = LIMIT_LANES[4:0] - 5'd1;          // of the frame, not of this bridge
 
     reg                   in_header;  // making the header
     reg                   in_records; // making the records
@@ -63,7 +64,7 @@ module framer #(
         new_header[8*FRAME_HEADER_SEQUENCE +: 32] = sequence_number;
         new_header[8*FRAME_HEADER_DROPPED +: 32] = dropped;
         new_header[8*FRAME_HEADER_LANE_MASK +: LANES] = lane_mask;
-        new_header[8*FRAME_HEADER_LANES +: 8] = LANES[7:0];
+        new_header[8*FRAME_HEADER_LANES +: 8] = LIMIT_LANES[7:0];
     end
 
     wire       make        = (in_header || in_records) && (!out_valid || out_ready);
@@ -113,7 +114,7 @@ module framer #(
             corrupt <= crc_wrong;
             stale   <= tick_wrong;
         end else if (record_ends) begin
-            off     <= off >> 1;
+            off     <= ~(~off >> 1);
             gone    <= gone >> 1;
             corrupt <= corrupt >> 1;
             stale   <= stale >> 1;

@@ -32,7 +32,7 @@ module record_store #(
     generate
         for (j = 0; j < 8; j = j + 1) begin : plane
             reg  [LANES-1:0] word [0:15];
-            wire [LANES-1:0] read_word = word[{!bank, read_byte}];
+            wire [31:0]      read_word = {{32 - LANES{1'b0}}, word[{!bank, read_byte}]};
 
             always @(posedge clk)
                 if (write && bit_index[2:0] == 3'd7 - j[2:0]) word[{bank, bit_index[5:3]}] <= bits;

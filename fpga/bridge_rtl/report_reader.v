@@ -68,7 +68,7 @@ module report_reader #(
                     report[8*REPORT_COUNTERS_RECORDS_TICK +: 32] <= records_tick;
                 end
                 REPORT_ID_IDENTITY[7:0]: begin
-                    report[8*REPORT_IDENTITY_LANES +: 8] <= LANES[7:0];
+                    report[8*REPORT_IDENTITY_LANES +: 8] <= LIMIT_LANES[7:0];
                     report[8*REPORT_IDENTITY_GATEWARE +: 8] <= LIMIT_GATEWARE_VERSION[7:0];
                     report[8*REPORT_IDENTITY_CLOCK_HZ +: 32] <= LIMIT_CLOCK_HZ;
                     report[8*REPORT_IDENTITY_FRAME_BYTES +: 16] <= FRAME_BYTES[15:0];
