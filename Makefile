@@ -4,7 +4,7 @@ BUILD := build/release
 PYTHON := .venv/bin/python
 SOURCES_C = $(shell git ls-files '*.c' '*.h' '*.cpp' | grep -v '/gen/')
 
-.PHONY: help demo test test-all bench build setup gen firmware flash format lint clean
+.PHONY: help demo test test-all bench build setup gen firmware flash bitstream format lint clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
@@ -35,6 +35,9 @@ firmware: ## build the node's firmware with XC16 or XC-DSC, where there is one
 
 flash: ## first programming of a node by wire: TOOL=ipecmd|pk2cmd|picberry SERIAL=n [HEX=file]
 	@tools/flash.sh --tool "$(TOOL)" $(if $(SERIAL),--serial "$(SERIAL)") $(if $(HEX),--hex "$(HEX)")
+
+bitstream: setup ## the bridge for a board one can buy: BOARD=colorlight_i9|cynthion [LANES=n] [SEED=n] [SERIAL=text]
+	@$(PYTHON) fpga/boards/build.py "$(BOARD)" --seed $(SEED) $(if $(LANES),--lanes "$(LANES)") $(if $(SERIAL),--serial "$(SERIAL)")
 
 format: setup ## format C, C++ and Python
 	@clang-format -i $(SOURCES_C)

@@ -1,0 +1,59 @@
+// What every board has: the bridge, the shim to its ULPI PHY, and a reset of 16 cycles after configuration. The pads are
+// the board's own (colorlight_i9.v, cynthion.v).
+//
+//   nodes <--> whisker_bridge <-- UTMI --> ulpi_shim <--> pads <--> PHY
+//                    ^---- rst <-- power-up counter
+
+`default_nettype none
+
+module board_core #(
+    parameter LANES = 28
+) (
+    input  wire             clk,            // 60 MHz, the PHY's
+    input  wire [7:0]       ulpi_data_in,   // pads
+    output wire [7:0]       ulpi_data_out,  // .
+    output wire             ulpi_data_oe,   // . 1: drive all eight
+    input  wire             ulpi_dir,       // .
+    input  wire             ulpi_nxt,       // .
+    output wire             ulpi_stp,       // .
+    output wire             ulpi_reset,     // . 1: reset the PHY
+    output wire             sync,           // the nodes' bus, see whisker_bridge
+    output wire             sck,            // .
+    output wire             select_n,       // .
+    output wire             mosi,           // .
+    input  wire [LANES-1:0] miso,           // .
+    output reg              led             // a run is in progress
+);
+    wire [7:0] rx_data, tx_data;
+    wire       rx_active, rx_valid, rx_error, tx_valid, tx_ready, vbus_valid, session_valid, session_end, term_select;
+    wire [1:0] line_state, xcvr_select, op_mode;
+    wire       ready, running, link_busy, transfer_busy, lit;
+
+    // Flip-flops begin at zero when the FPGA has been configured.
+    reg  [4:0] awake;
+    wire       rst = !awake[4];
+    initial awake = 5'd0;
+    always @(posedge clk) if (rst) awake <= awake + 5'd1;
+
+    ulpi_shim shim (
+        .clk(clk), .rst(rst), .ulpi_data_in(ulpi_data_in), .ulpi_data_out(ulpi_data_out),
+        .ulpi_data_oe(ulpi_data_oe), .ulpi_dir(ulpi_dir), .ulpi_nxt(ulpi_nxt), .ulpi_stp(ulpi_stp),
+        .ulpi_reset(ulpi_reset), .ready(ready), .utmi_rx_data(rx_data), .utmi_rx_active(rx_active),
+        .utmi_rx_valid(rx_valid), .utmi_rx_error(rx_error), .utmi_tx_data(tx_data), .utmi_tx_valid(tx_valid),
+        .utmi_tx_ready(tx_ready), .utmi_line_state(line_state), .utmi_vbus_valid(vbus_valid),
+        .utmi_session_valid(session_valid), .utmi_session_end(session_end), .utmi_xcvr_select(xcvr_select),
+        .utmi_term_select(term_select), .utmi_op_mode(op_mode));
+
+    whisker_bridge #(.LANES(LANES)) bridge (
+        .clk(clk), .rst(rst), .sync(sync), .sck(sck), .select_n(select_n), .mosi(mosi), .miso(miso),
+        .utmi_rx_data(rx_data), .utmi_rx_active(rx_active), .utmi_rx_valid(rx_valid), .utmi_rx_error(rx_error),
+        .utmi_tx_data(tx_data), .utmi_tx_valid(tx_valid), .utmi_tx_ready(tx_ready), .utmi_line_state(line_state),
+        .utmi_vbus_valid(vbus_valid), .utmi_session_valid(session_valid), .utmi_session_end(session_end),
+        .utmi_xcvr_select(xcvr_select), .utmi_term_select(term_select), .utmi_op_mode(op_mode),
+        .tick_external(1'b0), .tick_strobe(1'b0), .running(running), .link_busy(link_busy),
+        .transfer_busy(transfer_busy), .led(lit));
+
+    always @(posedge clk) led <= lit;
+endmodule
+
+`default_nettype wire

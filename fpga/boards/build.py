@@ -1,0 +1,190 @@
+"""Makes a board's bitstream with open tools: `build.py BOARD`. Yosys synthesises, nextpnr places and routes, ecppack packs.
+
+Every step is also a function for tests and benches. Files go to build/boards/BOARD/: netlist.json, report.json, BOARD.bit.
+"""
+
+import argparse
+import subprocess
+import sys
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+REPO = HERE.parents[1]
+sys.path[:0] = [str(HERE), str(HERE.parent), str(REPO / "host" / "python")]
+
+import report  # noqa: E402
+from toolchain import ToolError, gather, must  # noqa: E402
+
+from whisker.protocol import LIMITS  # noqa: E402
+
+INCLUDES = (REPO / "fpga/bridge_rtl/crc8.vh", REPO / "protocol/gen/whisker_protocol.vh")
+CLOCK_MHZ = LIMITS["clock_hz"] / 1e6
+# Registers that lie in the pad's own cell: a route between them and the pad would eat the PHY's set-up time, and spread the
+# nodes' lines.
+PAD_REGISTERS = ("ulpi_shim/w:ulpi_data_out", "ulpi_shim/w:ulpi_stp", "*lane_receiver*/w:bits")
+PAD_REGISTERS += tuple(f"node_link/w:{name}" for name in ("sync", "sck", "select_n", "mosi"))
+
+
+@dataclass(frozen=True)
+class Board:
+    """A board's file: `pins` maps a port to a site, or a vector to its sites, bit 0 first."""
+
+    name: str
+    title: str
+    device: str
+    part: str
+    package: str
+    speed: int
+    lanes: int
+    phy_clock: str
+    pins: dict[str, str | list[str]]
+
+
+def boards() -> list[str]:
+    """Names of the boards there are."""
+    return sorted(path.stem for path in HERE.glob("*.toml"))
+
+
+def load(name: str) -> Board:
+    """The board's file; ToolError if there is none."""
+    path = HERE / f"{name}.toml"
+    if not path.exists():
+        raise ToolError(f"no board '{name}'; boards: {', '.join(boards())}")
+    return Board(name=name, **tomllib.loads(path.read_text()))
+
+
+def sites(board: Board, lanes: int) -> dict[str, str]:
+    """Site of every port bit, as nextpnr names them."""
+    if not 1 <= lanes <= len(board.pins["miso"]):
+        raise ToolError(f"{board.title} has pins for 1 to {len(board.pins['miso'])} lanes, not {lanes}")
+    wide = {"ulpi_data": board.pins["ulpi_data"], "miso": board.pins["miso"][:lanes]}
+    out = {port: site for port, site in board.pins.items() if isinstance(site, str)}
+    return out | {f"{port}[{bit}]": site for port, all_ in wide.items() for bit, site in enumerate(all_)}
+
+
+def constraints(board: Board, lanes: int) -> str:
+    """The LPF file: sites, 3.3 V, pull-ups on the lanes (nobody there reads as ones), fast edges towards the PHY, clock."""
+    lines = [f'FREQUENCY PORT "clk_60" {CLOCK_MHZ:g} MHZ;']
+    for port, site in sites(board, lanes).items():
+        extra = " PULLMODE=UP" if port.startswith("miso") else " SLEWRATE=FAST" if port.startswith("ulpi") else ""
+        lines.append(f'LOCATE COMP "{port}" SITE "{site}";')
+        lines.append(f'IOBUF PORT "{port}" IO_TYPE=LVCMOS33{extra};')
+    return "\n".join(lines) + "\n"
+
+
+def sources(usb: Path) -> list[Path]:
+    """Verilog of every board; `usb` is the generated USB device."""
+    return [
+        *sorted((REPO / "fpga/bridge_rtl").glob("*.v")),
+        REPO / "fpga/usb/ulpi_shim.v",
+        usb,
+        *sorted(HERE.glob("*.v")),
+    ]
+
+
+def generate_usb(out: Path, serial: str = "0001") -> Path:
+    """The USB device as Verilog."""
+    path = out / "whisker_usb.v"
+    command = [sys.executable, str(REPO / "fpga/usb/generate.py"), str(path), "--serial", serial]
+    subprocess.run(command, check=True)
+    return path
+
+
+def front(top: str, files: list[Path], lanes: int | None, out: Path) -> list[str]:
+    """Yosys commands that read a design and fail on latches, several drivers of a wire, and wires without one."""
+    gather(out, *INCLUDES)
+    names = gather(out, *files)
+    lanes_set = [f"chparam -set LANES {lanes} {top}"] if lanes else []
+    return [
+        "read_verilog -lib -specify +/lattice/cells_sim_ecp5.v +/lattice/cells_bb_ecp5.v",
+        "read_verilog " + " ".join(names),
+        *lanes_set,
+        f"hierarchy -check -top {top}",
+        "proc",
+        "select -assert-none t:$dlatch t:$adlatch t:$dlatchsr t:$sr",
+        "check -assert",
+    ]
+
+
+def synthesise(top: str, files: list[Path], lanes: int | None, out: Path, pads: bool = True) -> Path:
+    """Netlist of `top` for ECP5."""
+    marks = [f"setattr -set syn_useioff 1 {' '.join(PAD_REGISTERS)}"] if pads else []
+    steps = [*front(top, files, lanes, out), *marks, f"synth_ecp5 -top {top} -json netlist.json"]
+    (out / "synth.ys").write_text("\n".join(steps) + "\n")
+    must("yosys", "-q", "-s", "synth.ys", log=out / "synth.log")
+    return out / "netlist.json"
+
+
+def place(board: Board, lanes: int, netlist: Path, out: Path, seed: int = 1, speed: int | None = None) -> dict:
+    """Places and routes; the report of report.read. A missed clock is no error here: the report tells."""
+    (out / "pins.lpf").write_text(constraints(board, lanes))
+    result = f"report_{seed}.json"
+    options = ["--json", netlist.name, "--lpf", "pins.lpf", "--textcfg", f"{board.name}.config"]
+    options += ["--report", result, "--detailed-timing-report"]
+    options += [f"--{board.device}", "--package", board.package, "--speed", speed or board.speed, "--seed", seed]
+    must("nextpnr-ecp5", *options, "--timing-allow-fail", log=out / f"place_{seed}.log")
+    return report.read(out / result)
+
+
+def prepare(board: Board, lanes: int, out: Path, serial: str = "0001") -> Path:
+    """The netlist of a whole board; ToolError if a cell has another clock than the PHY's."""
+    out.mkdir(parents=True, exist_ok=True)
+    netlist = synthesise(board.name, sources(generate_usb(out, serial)), lanes, out)
+    problems = report.unconstrained_clocks(netlist, board.name, "clk_60")
+    if problems:
+        raise ToolError("; ".join(problems))
+    return netlist
+
+
+def summary(board: Board, seed: int, placed: dict) -> str:
+    """A line for the reader: speed, pins, resources."""
+    limits = report.pin_limits(board.speed, board.phy_clock)
+    pins = ", ".join(f"{name} {placed[name]:.1f} of {limit:.1f}" for name, limit in limits.items())
+    used = ", ".join(f"{number} {name}" for name, number in placed["used"].items())
+    return f"{board.title}, seed {seed}: {placed['fmax_mhz']:.1f} MHz; pins: {pins}; {used}"
+
+
+def pack(board: Board, out: Path) -> Path:
+    """The bitstream of what was placed last."""
+    names = ["--input", f"{board.name}.config", "--bit", f"{board.name}.bit"]
+    must("ecppack", "--compress", *names, log=out / "pack.log")
+    return out / f"{board.name}.bit"
+
+
+def make(board: Board, lanes: int, out: Path, seeds: list[int], serial: str) -> Path:
+    """All steps, placed with each seed; ToolError if one misses the clock or the PHY's limits."""
+    netlist = prepare(board, lanes, out, serial)
+    problems = []
+    for seed in seeds:
+        placed = place(board, lanes, netlist, out, seed)
+        print(summary(board, seed, placed), flush=True)
+        problems += [f"seed {seed}: {what}" for what in report.timing_problems(placed, board.speed, board.phy_clock)]
+    if problems:
+        raise ToolError(f"{board.title}: " + "; ".join(problems))
+    return pack(board, out)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description="Make a board's bitstream.", epilog="example: build.py colorlight_i9")
+    parser.add_argument("board", help=", ".join(boards()))
+    parser.add_argument("--lanes", type=int, help="lanes with a pin (default: the board's)")
+    parser.add_argument("--seed", type=int, default=1, help="placement seed")
+    parser.add_argument("--seeds", type=int, default=1, help="place with so many seeds from there on; each must do")
+    parser.add_argument("--serial", default="0001", help="USB serial number")
+    parser.add_argument("--out", type=Path, help="folder (default: build/boards/BOARD)")
+    arguments = parser.parse_args()
+    try:
+        board = load(arguments.board)
+        out = arguments.out or REPO / "build" / "boards" / board.name
+        seeds = [arguments.seed + n for n in range(arguments.seeds)]
+        print(make(board, arguments.lanes or board.lanes, out.resolve(), seeds, arguments.serial))
+    except ToolError as error:
+        print(f"bitstream: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,36 @@
+// Pads of the Colorlight i9 v7.2 (LFE5U-45F) on its extension board, with a USB3300 module on a Pmod pair. The module's
+// PHY gives the 60 MHz.
+
+`default_nettype none
+
+module colorlight_i9 #(
+    parameter LANES = 28
+) (
+    input  wire             clk_60,     // the PHY's CLKOUT
+    inout  wire [7:0]       ulpi_data,
+    input  wire             ulpi_dir,
+    input  wire             ulpi_nxt,
+    output wire             ulpi_stp,
+    output wire             ulpi_reset, // active high
+    output wire             sync,
+    output wire             sck,
+    output wire             select_n,
+    output wire             mosi,
+    input  wire [LANES-1:0] miso,
+    output wire             led_n
+);
+    wire [7:0] data_in, data_out;
+    wire       data_oe, dir, nxt, led;
+
+    assign ulpi_data = data_oe ? data_out : 8'hzz;
+    assign led_n     = !led;
+
+    input_delay #(.WIDTH(10)) late (.from_pad({ulpi_nxt, ulpi_dir, ulpi_data}), .delayed({nxt, dir, data_in}));
+
+    board_core #(.LANES(LANES)) core (
+        .clk(clk_60), .ulpi_data_in(data_in), .ulpi_data_out(data_out), .ulpi_data_oe(data_oe), .ulpi_dir(dir),
+        .ulpi_nxt(nxt), .ulpi_stp(ulpi_stp), .ulpi_reset(ulpi_reset), .sync(sync), .sck(sck),
+        .select_n(select_n), .mosi(mosi), .miso(miso), .led(led));
+endmodule
+
+`default_nettype wire

@@ -1,0 +1,39 @@
+// Pads of Cynthion r1.4 (LFE5U-12F): its AUX port's PHY, which takes its 60 MHz from the FPGA, as the FPGA takes it from
+// an oscillator. The other ports are left alone; AUX needs no arrangement with the board's microcontroller.
+
+`default_nettype none
+
+module cynthion #(
+    parameter LANES = 12
+) (
+    input  wire             clk_60,       // oscillator
+    output wire             ulpi_clk,     // to the PHY
+    inout  wire [7:0]       ulpi_data,
+    input  wire             ulpi_dir,
+    input  wire             ulpi_nxt,
+    output wire             ulpi_stp,
+    output wire             ulpi_reset_n,
+    output wire             sync,
+    output wire             sck,
+    output wire             select_n,
+    output wire             mosi,
+    input  wire [LANES-1:0] miso,
+    output wire             led_n
+);
+    wire [7:0] data_in, data_out;
+    wire       data_oe, dir, nxt, ulpi_reset, led;
+
+    assign ulpi_clk     = clk_60;
+    assign ulpi_data    = data_oe ? data_out : 8'hzz;
+    assign ulpi_reset_n = !ulpi_reset;
+    assign led_n        = !led;
+
+    input_delay #(.WIDTH(10)) late (.from_pad({ulpi_nxt, ulpi_dir, ulpi_data}), .delayed({nxt, dir, data_in}));
+
+    board_core #(.LANES(LANES)) core (
+        .clk(clk_60), .ulpi_data_in(data_in), .ulpi_data_out(data_out), .ulpi_data_oe(data_oe), .ulpi_dir(dir),
+        .ulpi_nxt(nxt), .ulpi_stp(ulpi_stp), .ulpi_reset(ulpi_reset), .sync(sync), .sck(sck),
+        .select_n(select_n), .mosi(mosi), .miso(miso), .led(led));
+endmodule
+
+`default_nettype wire

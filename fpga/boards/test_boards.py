@@ -1,0 +1,109 @@
+"""Boards: what their files say, that synthesis is clean, that timing problems are noticed; place and route with --long."""
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+HERE = Path(__file__).resolve().parent
+sys.path[:0] = [str(HERE), str(HERE.parent)]
+
+import build  # noqa: E402
+import report  # noqa: E402
+from toolchain import ToolError, missing, must  # noqa: E402
+
+LACKING = missing("yosys")
+needs_yosys = pytest.mark.skipif(bool(LACKING), reason=LACKING)
+CLEAN = "module top(input clk, input d, output reg q); always @(posedge clk) q <= d; endmodule"
+FAULTY = {
+    "latch": "module top(input clk, input d, output reg q); always @* if (clk) q = d; endmodule",
+    "several drivers": "module top(input clk, input d, output q); assign q = d; assign q = clk; endmodule",
+    "no driver": "module top(input clk, input d, output q); wire n; assign q = d & n; endmodule",
+    "loop": "module top(input clk, input d, output q); wire n; assign n = n & d; assign q = n; endmodule",
+}
+
+
+@pytest.mark.parametrize("name", build.boards())
+def test_every_port_has_a_pin_of_its_own(name):
+    board = build.load(name)
+    sites = build.sites(board, len(board.pins["miso"]))
+    assert len(set(sites.values())) == len(sites)
+    assert len(board.pins["miso"]) == 28 >= board.lanes and len(board.pins["ulpi_data"]) == 8
+    lpf = build.constraints(board, board.lanes)
+    assert 'FREQUENCY PORT "clk_60" 60 MHZ;' in lpf
+    text = (HERE / f"{name}.v").read_text()
+    assert all(f" {port}," in text or f" {port}\n" in text for port in board.pins)
+
+
+def test_what_a_board_has_not_is_refused():
+    with pytest.raises(ToolError, match="1 to 28 lanes, not 29"):
+        build.sites(build.load("cynthion"), 29)
+    with pytest.raises(ToolError, match="boards: colorlight_i9, cynthion"):
+        build.load("toaster")
+
+
+def checked(tmp_path: Path, text: str) -> str:
+    source = tmp_path / "top.v"
+    source.write_text(text)
+    (tmp_path / "check.ys").write_text("\n".join(build.front("top", [source], None, tmp_path)) + "\n")
+    return must("yosys", "-q", "-s", "check.ys", log=tmp_path / "check.log")
+
+
+@needs_yosys
+def test_the_check_lets_clean_designs_pass(tmp_path):
+    checked(tmp_path, CLEAN)
+
+
+@needs_yosys
+@pytest.mark.parametrize("fault", FAULTY)
+def test_the_check_notices(fault, tmp_path):
+    with pytest.raises(ToolError):
+        checked(tmp_path, FAULTY[fault])
+
+
+@needs_yosys
+def test_the_bridge_synthesises_clean_with_one_clock(tmp_path):
+    """The whole board with six lanes, USB device and all; pad registers where they belong."""
+    lanes = 6
+    netlist = build.synthesise("cynthion", build.sources(build.generate_usb(tmp_path)), lanes, tmp_path)
+    assert report.unconstrained_clocks(netlist, "cynthion", "clk_60") == []
+    cells = json.loads(netlist.read_text())["modules"]["cynthion"]["cells"].values()
+    assert not any("LATCH" in cell["type"].upper() for cell in cells)
+    pads = [cell for cell in cells if "syn_useioff" in cell["attributes"]]
+    assert len(pads) == 8 + 1 + lanes + 4  # data, stp, MISO, the nodes' bus
+
+
+def test_a_second_clock_is_noticed(tmp_path):
+    cells = {f"ff{n}": {"type": "TRELLIS_FF", "connections": {"CLK": [n]}} for n in (2, 3)}
+    path = tmp_path / "netlist.json"
+    path.write_text(json.dumps({"modules": {"top": {"ports": {"clk": {"bits": [2]}}, "cells": cells}}}))
+    assert report.unconstrained_clocks(path, "top", "clk") == ["ff3 is clocked by another net than clk"]
+
+
+def nextpnr_report(fmax: float, out: float, in_: float, through: float) -> dict:
+    """What nextpnr writes, as far as it is read."""
+    ends = {("clk", report.ASYNC): out, (report.ASYNC, "clk"): in_, (report.ASYNC, report.ASYNC): through}
+    paths = [{"from": a, "to": b, "path": [{"delay": ns - 1}, {"delay": 1}]} for (a, b), ns in ends.items()]
+    used = {cell: {"used": 1} for cell in report.USED.values()}
+    return {"fmax": {"clk": {"achieved": fmax}}, "critical_paths": paths, "utilization": used}
+
+
+@pytest.mark.parametrize(
+    ("values", "speed", "phy_clock", "problems"),
+    [
+        ((60.1, 4, 9, 4), 6, "in", 0),
+        ((59.9, 4, 9, 4), 6, "in", 1),
+        ((65.9, 4, 5, 4), 8, "out", 1),  # 10 % to spare on grade 8
+        ((66.1, 4, 5, 4), 8, "out", 0),
+        ((70, 5, 9, 4), 6, "in", 1),  # 16.67 - 5.0 - 6.8
+        ((70, 4, 12, 4), 6, "in", 1),  # 16.67 - 5.0
+        ((70, 4, 9, 5), 6, "in", 1),
+        ((70, 4, 9, 4), 8, "out", 1),  # the PHY's clock is late
+        ((50, 9, 13, 9), 6, "in", 4),
+    ],
+)
+def test_missed_limits_are_named(values, speed, phy_clock, problems, tmp_path):
+    path = tmp_path / "report.json"
+    path.write_text(json.dumps(nextpnr_report(*values)))
+    assert len(report.timing_problems(report.read(path), speed, phy_clock)) == problems
