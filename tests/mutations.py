@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Breaks one part of the chain after another, in a copy, and expects the tests to go red.
 
-    .venv/bin/python tests/mutations.py            every mutation: about fifteen minutes
+    .venv/bin/python tests/mutations.py            every mutation: about half an hour
     .venv/bin/python tests/mutations.py swap       those whose name contains "swap"
 
 Exit code 1 when one survives, that is, when every test stays green although a part is broken.
@@ -59,6 +59,72 @@ MUTATIONS = [
         "firmware/dspic/core/sensor_frame.c",
         "if (sum == sum_of(data, MLX90333_FRAME_SUM - MLX90333_FRAME_ALPHA))",
         "if (sum == sum_of(data, MLX90333_FRAME_ERRORS - MLX90333_FRAME_ALPHA))",
+    ),
+    Mutation(
+        "firmware: an overflow of the link is not cleared",
+        "firmware/dspic/port_dspic/link_spi.c",
+        "    sfr_clear(board, SPI2STAT, SPISTAT_SPIROV);\n",
+        "",
+    ),
+    Mutation(
+        "firmware: the link's module goes on where extra clocks left it",
+        "firmware/dspic/port_dspic/link_spi.c",
+        "    sfr_write(board, SPI2STAT, 0); /* bits, words, overflow */\n",
+        "",
+    ),
+    Mutation(
+        "firmware: a record's first word is not preloaded",
+        "firmware/dspic/port_dspic/link_spi.c",
+        "    sfr_write(board, SPI2BUF, words[0]);\n",
+        "",
+    ),
+    Mutation(
+        "firmware: no resynchronisation after a bad frame",
+        "firmware/dspic/core/sampler.c",
+        "    if (is_good(reading)) {",
+        "    if (reading) {",
+    ),
+    Mutation(
+        "firmware: a sum without the error word is not accepted beside one",
+        "firmware/dspic/core/sensor_frame.c",
+        "return error_word != 0 && sum == sum_of(data, MLX90333_FRAME_ERRORS - MLX90333_FRAME_ALPHA);",
+        "return false;",
+    ),
+    Mutation(
+        "firmware: any start byte will do",
+        "firmware/dspic/core/sensor_frame.c",
+        "if (frame[MLX90333_FRAME_START] != MLX90333_START_BYTE)",
+        "if (frame[MLX90333_FRAME_START] == 0)",
+    ),
+    Mutation(
+        "firmware: any step of the angle is believed",
+        "firmware/dspic/core/sampler.c",
+        "return by > SAMPLER_STEP_MOST;",
+        "return by > UINT16_MAX - 1u;",
+    ),
+    Mutation(
+        "firmware: both records packed into one buffer",
+        "firmware/dspic/core/node.c",
+        "    node->armed ^= 1u;\n",
+        "",
+    ),
+    Mutation(
+        "firmware: the watchdog is never told",
+        "firmware/dspic/port_dspic/port.c",
+        "    cpu_clear_watchdog(board);\n",
+        "",
+    ),
+    Mutation(
+        "loader: an image's body is believed unread",
+        "firmware/dspic/boot/image.c",
+        "           image_body_is_good(board, header, row);",
+        "           row;",
+    ),
+    Mutation(
+        "loader: a loaded body is not compared",
+        "firmware/dspic/boot/loader.c",
+        "if (!image_body_is_good(loader->board, loader->header, loader->row))",
+        "if (!loader)",
     ),
     Mutation(
         "bridge: two lanes swapped",
