@@ -7,6 +7,8 @@
 #define NODES 25        /* of the trapezoid rule, over ... */
 #define NODES_REACH 4.0 /* ... so many standard deviations to either side */
 
+#define CALIBRATED 3.0 /* standard deviations: pushes that are longer or shorter were not calibrated */
+
 /* The alternative "none of those calibrated". */
 #define STRANGE 0.003      /* its share among whisks */
 #define STRANGE_PEAK 0.25  /* its density of ln peak: anywhere within a factor of 50 */
@@ -14,7 +16,7 @@
 #define STRANGE_LOOK 0.3   /* its likelihood of any misfit, where a calibrated one's typical is 1 */
 #define STRANGE_FROZEN 0.1 /* of the push with equal samples, beyond calibration's: a calibrated one has it ... */
 #define FROZEN_RARELY 1e-6 /* ... this rarely */
-#define SPOILED 0.2        /* as STRANGE_FROZEN, share of samples lost */
+#define SPOILED 0.5        /* as STRANGE_FROZEN, share of samples lost */
 
 double nav_whisk_height(double kappa, double cone_mm, double radius_mm)
 {
@@ -38,6 +40,16 @@ void nav_whisk_terms(const struct nav_shape *shape, double *terms)
     terms[NAV_WHISK_BACK] = shape->back;
 }
 
+/* What of a push's length lies outside those calibrated: whatever weight these gave it, there the whisker bends as far
+ * as it is pushed. Takes it from *off. */
+static double take_far_turn(const struct nav_whisk_model *m, double *off)
+{
+    double most = CALIBRATED * m->scatter[NAV_WHISK_TURN];
+    double near = fmax(-most, fmin(most, *off)), far = *off - near;
+    *off = near;
+    return far;
+}
+
 /* ln h that the whisk shows, and its variance but for the spread. */
 static double seen_height(const struct nav_whisk_model *m, const struct nav_shape *shape, double *variance)
 {
@@ -48,6 +60,8 @@ static double seen_height(const struct nav_whisk_model *m, const struct nav_shap
     for (int k = 0; k < NAV_WHISK_TERMS; k++) {
         bool missing = !isfinite(terms[k]);
         off[k] = missing ? 0.0 : terms[k] - m->mean[k];
+        if (k == NAV_WHISK_TURN)
+            height -= take_far_turn(m, &off[k]);
         height -= m->weight[k] * off[k];
         *variance += missing ? m->weight[k] * m->weight[k] * m->scatter[k] * m->scatter[k] : 0.0;
     }

@@ -1,19 +1,35 @@
-"""Radial distance of a contact: peak deflection and a line per whisker (paper, equations 2 and 3)."""
+"""Radial distance of a contact: the paper's peak and line per whisker (equations 2 and 3), curves instead of the line,
+and the model of whole whisks; calibration recordings and model files."""
 
 import json
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from .native import doubles, ffi, lib
+from .radial_curve import CurveModel, tip_from
+from .radial_whisk import TIP_MM, Contact, WhiskModel, shape_of
 from .tables import TableError, numbers, read_columns
 
 FORMAT = "whisker radial model 1"
 FIELDS = ("a1", "a0", "sigma_mm", "low_mm", "high_mm")
 REST_SHARE = 0.05  # the first samples of a recorded whisk, before it touches, give its rest
-REST_LEAST = 10
-TIP_MM = 3.0
+REST_LEAST = 3  # samples: slow recordings have few before the touch
+WHISK_FORMAT, CURVE_FORMAT = "whisker radial whisk model 1", "whisker radial curve model 1"
+RATE_COLUMNS = ("whisk_rad_s", "base_rad_s")  # commanded; as the base reports
+NO_CHANNEL = ("contact", "radius_mm", "t_s", *RATE_COLUMNS)
+MODELS = ("paper", "linear", "quadratic", "rational", "default")
+
+
+class Estimate(NamedTuple):
+    """What a model says of one contact: mm, standard deviation, "tip" or "shaft", confidence 0..1. Never nan."""
+
+    radius_mm: float
+    sigma_mm: float
+    type: str
+    confidence: float
 
 
 def peak(samples: np.ndarray, rest) -> float:
@@ -56,7 +72,7 @@ class RadialModel:
 
     def contact_type(self, radius_mm: float) -> str:
         """'tip' near the outermost fitted radius (one sigma, at least TIP_MM) or beyond it, else 'shaft'."""
-        return "tip" if radius_mm > self.high_mm - max(self.sigma_mm, TIP_MM) else "shaft"
+        return "tip" if radius_mm > tip_from(self.high_mm, self.sigma_mm) else "shaft"
 
     def save(self, path) -> None:
         content = {"format": FORMAT} | {name: getattr(self, name) for name in FIELDS}
@@ -74,9 +90,7 @@ class RadialModel:
                 raise ValueError("a number is not finite")
             return cls(*values)
         except (OSError, ValueError, KeyError, TypeError) as error:
-            raise TableError(
-                path, None, f"not a radial model ({error!r}); make one with 'whisker radial fit'"
-            ) from error
+            raise not_a_model(path, error) from error
 
 
 @dataclass
@@ -84,24 +98,33 @@ class Whisks:
     """Recorded contacts of one whisker, in order of appearance."""
 
     contact: list[str]
+    recorded: list[Contact]
     peak_counts: np.ndarray
     radius_mm: np.ndarray | None  # None when the file has no such column
     bad_rows: int  # rows with a cell that is no finite number: left out
+
+    @property
+    def axes(self) -> int:
+        return self.recorded[0].samples.shape[1] if self.recorded else 0
 
 
 def read_whisks(path, with_radius: bool) -> Whisks:
     """Contacts of a calibration CSV; `with_radius`: the column radius_mm is required, else not even read."""
     text = read_columns(path, ["contact", "t_s"] + (["radius_mm"] if with_radius else []))
-    channels = [name for name in text if name not in ("contact", "radius_mm", "t_s", "whisk_rad_s")]
+    channels = [name for name in text if name not in NO_CHANNEL]
     if not channels:
         raise TableError(path, 1, "no channel column; add at least one, as in 'contact,radius_mm,t_s,x,y'")
     samples = np.column_stack([numbers(text[name]) for name in channels])
+    t_s = numbers(text["t_s"])
+    rates = [numbers(text[name]) if name in text else None for name in RATE_COLUMNS]
     names = list(dict.fromkeys(text["contact"]))
     ids = np.array(text["contact"])
     rows = [np.flatnonzero(ids == name) for name in names]
+    recorded = [Contact(t_s[r], samples[r], *(None if rate is None else rate[r] for rate in rates)) for r in rows]
     peaks = np.array([_peak_of(samples[r]) for r in rows])
-    radii = np.array([np.median(numbers(text["radius_mm"])[r]) for r in rows]) if with_radius else None
-    return Whisks(names, peaks, radii, int((~np.isfinite(samples)).any(axis=1).sum()))
+    radius = numbers(text["radius_mm"]) if with_radius else None
+    radii = None if radius is None else np.array([np.median(radius[r]) for r in rows])
+    return Whisks(names, recorded, peaks, radii, int((~np.isfinite(samples)).any(axis=1).sum()))
 
 
 def _peak_of(samples: np.ndarray) -> float:
@@ -109,3 +132,83 @@ def _peak_of(samples: np.ndarray) -> float:
     if len(finite) == 0:
         return float("nan")
     return peak(finite, np.median(finite[: max(REST_LEAST, int(REST_SHARE * len(finite)))], axis=0))
+
+
+class Fitted(NamedTuple):
+    """A model, and the standard error of its calibration, mm: of the paper's line its regression's, of others what is
+    left when each contact is predicted by a model that was fitted without it."""
+
+    model: "RadialModel | CurveModel | WhiskModel"
+    error_mm: float
+
+
+def fit(whisks: Whisks, name: str = "default") -> Fitted:
+    """A model of the contacts by its name (MODELS); ValueError when they do not determine one.
+
+    `default` is the model of whole whisks, or, where recordings are no whole whisks, the line or curve that predicts
+    left-out contacts best.
+    """
+    if name in ("paper", "linear"):
+        model = RadialModel.fit(whisks.peak_counts, whisks.radius_mm)
+        return Fitted(model, model.sigma_mm)
+    if name in CurveModel.KINDS:
+        model = CurveModel.fit(name, whisks.peak_counts, whisks.radius_mm)
+        return Fitted(model, model.sigma_mm)
+    try:
+        shapes = [shape_of(contact) for contact in whisks.recorded]
+        model = WhiskModel.fit(shapes, whisks.radius_mm, whisks.axes)
+        return Fitted(model, model.left_out_error(shapes, whisks.radius_mm))
+    except ValueError:
+        return _best_curve(whisks)
+
+
+def _best_curve(whisks: Whisks) -> Fitted:
+    line = fit(whisks, "linear")  # what it says of too few contacts is what a user should read
+    found = [line]
+    for kind in CurveModel.KINDS:
+        try:
+            found.append(fit(whisks, kind))
+        except ValueError:
+            continue
+    return min(found, key=lambda fitted: fitted.error_mm)
+
+
+def save(model, path) -> None:
+    """Write a model of any kind as JSON."""
+    if isinstance(model, RadialModel):
+        model.save(path)
+        return
+    name = WHISK_FORMAT if isinstance(model, WhiskModel) else CURVE_FORMAT
+    Path(path).write_text(json.dumps({"format": name} | model.content, indent=1) + "\n")
+
+
+def load(path) -> "RadialModel | CurveModel | WhiskModel":
+    """Read what `save` wrote; TableError with one line when it is something else."""
+    try:
+        content = json.loads(Path(path).read_text())
+        kinds = {WHISK_FORMAT: WhiskModel, CURVE_FORMAT: CurveModel}
+        if content["format"] in kinds:
+            return kinds[content["format"]](content)
+    except (OSError, ValueError, KeyError, TypeError, OverflowError) as error:
+        raise not_a_model(path, error) from error
+    return RadialModel.load(path)
+
+
+def not_a_model(path, error: Exception) -> TableError:
+    return TableError(path, None, f"not a radial model ({error!r}); make one with 'whisker radial fit'")
+
+
+def estimate(model, contact: Contact, peak_counts: float | None = None) -> Estimate:
+    """What a model of any kind says of one contact; `peak_counts`: equation 2, where it is known already."""
+    if isinstance(model, WhiskModel):
+        if contact.samples.shape[1] != model.axes:
+            raise ValueError(f"{contact.samples.shape[1]} channels, but the model has {model.axes}")
+        told = model.estimate(shape_of(contact))
+        return Estimate(told.radius_mm, told.sigma_mm, "tip" if told.tip > 0.5 else "shaft", told.confidence)
+    counts = _peak_of(contact.samples) if peak_counts is None else peak_counts
+    mm, sigma_mm = model.predict(float(counts))
+    if not np.isfinite(mm):
+        middle, span = 0.5 * (model.low_mm + model.high_mm), model.high_mm - model.low_mm
+        return Estimate(middle, span, "shaft", 0.0)
+    beyond = max(0.0, model.low_mm - mm, mm - model.high_mm) / max(sigma_mm, TIP_MM)
+    return Estimate(mm, sigma_mm, model.contact_type(mm), float(np.exp(-0.5 * max(0.0, beyond - 2.0) ** 2)))

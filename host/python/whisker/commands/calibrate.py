@@ -5,9 +5,21 @@ import sys
 from contextlib import closing
 from pathlib import Path
 
-from ..calibration import TICKS_PER_S, ContactsFile, Feed, Rest, WhiskFinder, collect, measure_rest, write_rest
+import numpy as np
+
+from ..calibration import (
+    TICKS_PER_S,
+    ContactsFile,
+    Feed,
+    Rest,
+    Whisk,
+    WhiskFinder,
+    collect,
+    measure_rest,
+    write_rest,
+)
 from ..protocol import LANES
-from ..radial import RadialModel, read_whisks
+from ..radial import Contact, fit, read_whisks, shape_of
 from ..ring import Reader
 from ..scene import load
 from ..tables import unwritable
@@ -74,6 +86,7 @@ def _calibrate(arguments, feed: Feed, names: list[str]) -> int:
     for _ in finder.add(frames):
         continue  # the rest of a whisker that is touched now and then is still its rest
     whisks = collect(feed, finder)
+    number, wanted = itertools.count(1), len(arguments.radii) * arguments.repeats
     with closing(ContactsFile(path, arguments.whisk_rad_s)) as file:
         for radius_mm in arguments.radii:
             text = (
@@ -84,7 +97,7 @@ def _calibrate(arguments, feed: Feed, names: list[str]) -> int:
                 whisks = collect(feed, finder)
             for whisk in itertools.islice(whisks, arguments.repeats):
                 file.add(radius_mm, whisk)
-                print(f"  {radius_mm:g} mm: contact of {whisk.t_s[-1] - whisk.t_s[0]:.2f} s", flush=True)
+                print(_progress(radius_mm, whisk, next(number), wanted), flush=True)
     print(_verdict(path))
     return 0
 
@@ -105,10 +118,20 @@ def _rest_line(rest: Rest, names: list[str]) -> str:
     return f"{rest.lane:>2} {names[rest.lane]:<15} {numbers}{warning}"
 
 
+def _progress(radius_mm: float, whisk: Whisk, number: int, wanted: int) -> str:
+    """What one contact was, and what to do better."""
+    shape = shape_of(Contact(whisk.t_s, whisk.counts))
+    begun = f"  {number} of {wanted}, {radius_mm:g} mm: "
+    if not np.isfinite(shape.back):
+        return begun + "no whole whisk; push at a steady rate and back again, without pressing twice"
+    return begun + f"pushed for {shape.stop_s - shape.onset_s:.2f} s, peak {shape.peak:.0f} counts"
+
+
 def _verdict(path: Path) -> str:
     whisks = read_whisks(path, with_radius=True)
     try:
-        model = RadialModel.fit(whisks.peak_counts, whisks.radius_mm)
+        line, whole = (fit(whisks, name).error_mm for name in ("paper", "default"))
     except ValueError as error:
         return f"{path}: {len(whisks.contact)} contacts; {error}"
-    return f"{path}: {len(whisks.contact)} contacts, standard error {model.sigma_mm:.2f} mm; next: whisker radial fit {path}"
+    errors = f"standard error {line:.2f} mm with the paper's line, {whole:.2f} mm with whole whisks, left out in turn"
+    return f"{path}: {len(whisks.contact)} contacts, {errors}; next: whisker radial fit {path}"

@@ -1,0 +1,197 @@
+"""Radial distance from whole whisks: what is taken out, how sure it is, what spoils it; curves; model files."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+from commandkit import run
+
+from whisker import radial
+from whisker.radial import Contact, Whisks
+from whisker.tables import TableError
+
+CONE_MM, TIP_MM = 181.7, 138.0
+RADII = (90.0, 100.0, 110.0, 120.0, 130.0, TIP_MM)
+RATE = math.pi / 24
+COUNTS = 28_000.0  # of field, per rad of tilt
+
+
+def whisk(radius_mm, rng, *, push_s=0.6, gain=1.0, speed=1.0, true_rate=None, hz=2000.0, channels=2, kappa=1.0):
+    """One body whisk against a post: raw counts, commanded and reported rate."""
+    x = radius_mm / CONE_MM
+    tilt_rate = gain * RATE * speed * (true_rate or 1.0) * (1 - x) / (1 - x + kappa * x)
+    t = np.arange(0.0, 0.2 + 2 * push_s + 0.3, 1 / hz)
+    pushed = np.clip(np.minimum(t - 0.2, 0.2 + 2 * push_s - t), 0.0, None)
+    along = np.array([0.8, -0.6, 0.3][:channels]) if channels > 1 else np.ones(1)
+    counts = np.round(32768 + COUNTS * tilt_rate * pushed[:, None] * along + rng.normal(0, 11, (len(t), channels)))
+    told = np.full(len(t), RATE * speed * (true_rate or 1.0))
+    return Contact(t, counts, np.full(len(t), RATE * speed), told if true_rate else None)
+
+
+def whisks(rng, repeats, spread=0.04, split="time", radii=RADII, **options) -> Whisks:
+    """Whisks whose angle and gain spread alike; the angle through the duration or the rate."""
+    recorded, truth = [], []
+    for radius in radii:
+        for _ in range(repeats):
+            angle, gain = 1 + spread / math.sqrt(2) * rng.normal(size=2)
+            how = {"push_s": 0.6 * angle} if split == "time" else {"true_rate": angle}
+            recorded.append(whisk(radius, rng, gain=gain, **how, **options))
+            truth.append(radius)
+    peaks = np.array([radial._peak_of(c.samples) for c in recorded])
+    return Whisks([str(n) for n in range(len(truth))], recorded, peaks, np.array(truth), 0)
+
+
+def errors(model, held: Whisks) -> np.ndarray:
+    told = [radial.estimate(model, c).radius_mm for c in held.recorded]
+    return np.array(told) - held.radius_mm
+
+
+def rms(values) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+@pytest.fixture(scope="module")
+def calibrated():
+    """A default model of whisks with 4 % of spread, and its calibration."""
+    made = whisks(np.random.default_rng(1), 5)
+    return radial.fit(made).model, made
+
+
+@pytest.mark.parametrize("split", ["time", "rate"])
+def test_the_angle_turned_is_taken_out(split):
+    rng = np.random.default_rng(2)
+    cal, held = (whisks(rng, n, 0.08, split) for n in (5, 25))
+    paper, whole = (rms(errors(radial.fit(cal, name).model, held)) for name in ("paper", "default"))
+    gain_alone = 68.9 * 0.08 / math.sqrt(2)  # the bound of an oracle that knows the angle (whisker_physics section 4)
+    assert paper > 1.2 * gain_alone
+    assert whole < 1.1 * gain_alone
+
+
+def test_speed_may_vary_by_three(calibrated):
+    rng = np.random.default_rng(3)
+    for speed in (0.6, 1.8):
+        held = whisks(rng, 8, 0.02, speed=speed)
+        assert rms(errors(calibrated[0], held)) < 2.5
+
+
+def test_it_is_as_sure_as_it_is_right(calibrated):
+    held = whisks(np.random.default_rng(4), 40)
+    told = [radial.estimate(calibrated[0], c) for c in held.recorded]
+    off = np.array([t.radius_mm for t in told]) - held.radius_mm
+    within = [np.mean(np.abs(off) < k * np.array([t.sigma_mm for t in told])) for k in (0.6745, 1.645)]
+    assert 0.4 < within[0] < 0.65 and 0.82 < within[1] < 0.97
+    assert np.mean([t.confidence for t in told]) > 0.97
+
+
+def test_tip_and_shaft(calibrated):
+    held = whisks(np.random.default_rng(5), 40, radii=(100.0, 120.0, 131.0, TIP_MM))
+    said = np.array([radial.estimate(calibrated[0], c).type == "tip" for c in held.recorded])
+    assert np.mean(said == (held.radius_mm == TIP_MM)) > 0.93
+
+
+@pytest.mark.parametrize(("hz", "channels"), [(2000.0, 1), (100.0, 2), (35.0, 2), (100.0, 3)])
+def test_any_rate_and_number_of_channels(hz, channels):
+    rng = np.random.default_rng(6)
+    cal, held = (whisks(rng, n, hz=hz, channels=channels) for n in (5, 10))
+    assert rms(errors(radial.fit(cal).model, held)) < 2.6
+
+
+@pytest.mark.parametrize("kappa", [0.3, 3.0])
+def test_curves_bend_with_the_plug(kappa):
+    rng = np.random.default_rng(7)
+    cal = whisks(rng, 5, 0.001, kappa=kappa)
+    line, quadratic, rational = (
+        rms(errors(radial.fit(cal, m).model, cal)) for m in ("linear", "quadratic", "rational")
+    )
+    assert line > 1.0 and quadratic < 0.55 * line and rational < 0.55 * line
+
+
+def spoil(contact: Contact, how: str, rng) -> Contact:
+    samples = contact.samples.copy()
+    middle = len(samples) // 3
+    if how == "saturated":
+        samples = np.clip(samples, 32768 - 400, 32768 + 400)
+    elif how == "stuck":
+        samples[middle:] = samples[middle]
+    elif how == "dead":
+        samples[:] = samples[0]
+    elif how == "nan":
+        samples[rng.random(len(samples)) < 0.2] = np.nan
+    elif how == "all nan":
+        samples[:] = np.nan
+    elif how == "bad records":
+        hit = rng.random(len(samples)) < 0.01
+        samples[hit] = rng.uniform(0, 65535, (hit.sum(), samples.shape[1]))
+    elif how == "flipped":
+        samples = 65536 - samples
+    elif how == "swapped axes":
+        samples = samples[:, ::-1]
+    elif how == "drift":
+        samples += np.linspace(0, 20, len(samples))[:, None]
+    return Contact(contact.t_s, samples, contact.whisk_rad_s)
+
+
+@pytest.mark.parametrize("how", ["saturated", "stuck", "dead", "all nan", "flipped", "swapped axes"])
+def test_confidence_falls_when_a_whisker_is_broken(calibrated, how):
+    rng = np.random.default_rng(8)
+    told = [radial.estimate(calibrated[0], spoil(c, how, rng)) for c in calibrated[1].recorded]
+    assert np.isfinite([t[:2] for t in told]).all()
+    assert np.median([t.confidence for t in told]) < 0.5
+
+
+@pytest.mark.parametrize("how", ["nan", "bad records", "drift"])
+def test_what_can_be_mended_is_mended(calibrated, how):
+    rng = np.random.default_rng(9)
+    found = whisks(rng, 10)
+    found.recorded = [spoil(c, how, rng) for c in found.recorded]
+    assert rms(errors(calibrated[0], found)) < 3.0
+
+
+def test_what_are_no_whole_whisks_gets_a_curve():
+    short = whisks(np.random.default_rng(10), 5, 0.001)
+    short.recorded = [Contact(c.t_s[::400], c.samples[::400]) for c in short.recorded]
+    assert radial.fit(short).model.high_mm == TIP_MM  # a line or curve, not whole whisks: these reach beyond
+
+
+@pytest.mark.parametrize("name", radial.MODELS)
+def test_saved_models_load_alike(tmp_path, calibrated, name):
+    model = radial.fit(calibrated[1], name).model
+    radial.save(model, tmp_path / "m.json")
+    again = radial.load(tmp_path / "m.json")
+    contact = calibrated[1].recorded[7]
+    assert radial.estimate(again, contact) == radial.estimate(model, contact)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"spread": "x"}, {"weight": [1.0]}, {"kappa": -1.0}, {"axes": 99}, {"cone_mm": 1.0}, {"mean": [math.nan] * 5}],
+)
+def test_spoiled_model_files_are_one_clear_line(tmp_path, calibrated, change):
+    radial.save(calibrated[0], tmp_path / "m.json")
+    content = json.loads((tmp_path / "m.json").read_text()) | change
+    (tmp_path / "m.json").write_text(json.dumps(content))
+    with pytest.raises(TableError, match="whisker radial fit"):
+        radial.load(tmp_path / "m.json")
+
+
+def write(path, made: Whisks, columns="contact,radius_mm,t_s,whisk_rad_s,x,y"):
+    lines = [columns]
+    for name, radius, c in zip(made.contact, made.radius_mm, made.recorded, strict=True):
+        cells = zip(c.t_s, c.whisk_rad_s, *c.samples.T, strict=True)
+        lines += [f"{name},{radius},{t:.5f},{rate:.5f},{','.join(f'{v:.0f}' for v in v)}" for t, rate, *v in cells]
+    path.write_text("\n".join(lines) + "\n")
+
+
+def test_the_command_tells_how_sure_it_is(capsys, tmp_path, calibrated):
+    write(tmp_path / "c.csv", calibrated[1])
+    assert run(capsys, "radial", "fit", tmp_path / "c.csv", "--out", tmp_path / "m.json")[0] == 0
+    code, out, _ = run(capsys, "radial", "predict", tmp_path / "m.json", tmp_path / "c.csv", "--json")
+    told = [json.loads(line) for line in out.splitlines()]
+    assert code == 0 and len(told) == 30
+    assert set(told[0]) == {"contact", "radius_mm", "sigma_mm", "type", "confidence"}
+    assert rms([t["radius_mm"] for t in told] - calibrated[1].radius_mm) < 2.6
+    one = whisks(np.random.default_rng(11), 1, channels=1)
+    write(tmp_path / "one.csv", one, "contact,radius_mm,t_s,whisk_rad_s,x")
+    code, _, err = run(capsys, "radial", "predict", tmp_path / "m.json", tmp_path / "one.csv")
+    assert code == 2 and "1 channels, but the model has 2" in err and err.count("\n") == 1
