@@ -6,9 +6,8 @@
 #include <stdint.h>
 
 #include <cmocka.h>
-#include <string.h>
 
-#include "crc32.h"
+#include "orders.h"
 #include "sim_node_state.h"
 
 #define US (1000u * DSPIC_FS_PER_NS)
@@ -102,15 +101,10 @@ static void begin_without_application(struct bus *bus, uint8_t header[WHISKER_IM
 /* A service order as its window would have brought it. */
 static void order(struct bus *bus, uint8_t command, const uint8_t data[SERVICE_BLOCK_BYTES])
 {
-    uint8_t bytes[WHISKER_SERVICE_BYTES] = {(uint8_t)bus->tick, command};
+    uint8_t bytes[WHISKER_SERVICE_BYTES];
     uint16_t words[SERVICE_WORDS];
-    bytes[WHISKER_SERVICE_HEAD_CRC] = whisker_crc8(bytes, WHISKER_SERVICE_HEAD_CRC);
-    memcpy(bytes + WHISKER_SERVICE_DATA, data, SERVICE_BLOCK_BYTES);
-    const uint32_t crc = crc32_of(WHISKER_CRC32_INIT, bytes, WHISKER_SERVICE_CRC32) ^ WHISKER_CRC32_XOR_OUT;
-    for (unsigned i = 0; i < 4u; i++)
-        bytes[WHISKER_SERVICE_CRC32 + i] = (uint8_t)(crc >> (24u - 8u * i) & 0xFFu);
-    for (unsigned i = 0; i < SERVICE_WORDS; i++)
-        words[i] = (uint16_t)(bytes[2u * i] << 8 | bytes[2u * i + 1u]);
+    order_of(bytes, (uint8_t)bus->tick, command, 0, data);
+    words_of(bytes, words);
     node_on_service(&bus->node->board.node, words);
 }
 

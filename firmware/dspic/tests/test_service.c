@@ -6,14 +6,12 @@
 
 #include <cmocka.h>
 
-#include "crc32.h"
-#include "service.h"
+#include "orders.h"
 
 static void take(struct service *service, const uint8_t bytes[WHISKER_SERVICE_BYTES])
 {
     uint16_t words[SERVICE_WORDS];
-    for (unsigned i = 0; i < SERVICE_WORDS; i++)
-        words[i] = (uint16_t)((uint16_t)bytes[2u * i] << 8 | bytes[2u * i + 1u]);
+    words_of(bytes, words);
     service_take(service, words);
 }
 
@@ -61,17 +59,6 @@ static void golden_windows_are_taken_or_not(void **state)
     assert_int_equal(seen, 11);
 }
 
-static void order_of(uint8_t bytes[WHISKER_SERVICE_BYTES], uint8_t tick, uint8_t command)
-{
-    memset(bytes, 0, WHISKER_SERVICE_BYTES);
-    bytes[WHISKER_SERVICE_TICK] = tick;
-    bytes[WHISKER_SERVICE_COMMAND] = command;
-    bytes[WHISKER_SERVICE_HEAD_CRC] = whisker_crc8(bytes, WHISKER_SERVICE_HEAD_CRC);
-    const uint32_t crc = crc32_of(WHISKER_CRC32_INIT, bytes, (uint16_t)WHISKER_SERVICE_CRC32) ^ WHISKER_CRC32_XOR_OUT;
-    for (unsigned i = 0; i < 4u; i++)
-        bytes[WHISKER_SERVICE_CRC32 + i] = (uint8_t)(crc >> (24u - 8u * i) & 0xFFu);
-}
-
 static void a_node_is_busy_until_it_has_answered_and_a_poll_repeats_the_answer(void **state)
 {
     (void)state;
@@ -80,15 +67,15 @@ static void a_node_is_busy_until_it_has_answered_and_a_poll_repeats_the_answer(v
     struct service service;
     service_start(&service);
     assert_memory_equal(service_words(&service), BUSY, sizeof BUSY);
-    order_of(bytes, 9, WHISKER_SERVICE_COMMAND_INFO);
+    order_of(bytes, 9, WHISKER_SERVICE_COMMAND_INFO, 0, NULL);
     take(&service, bytes);
     assert_memory_equal(service_words(&service), BUSY, sizeof BUSY);
-    order_of(other, 10, WHISKER_SERVICE_COMMAND_RUN);
+    order_of(other, 10, WHISKER_SERVICE_COMMAND_RUN, 0, NULL);
     take(&service, other); /* while the first one waits: ignored */
     assert_non_null(service_next(&service));
     service_answer(&service, 0x1234, 0xABCD);
     assert_true(is_answer(service_words(&service), 9, WHISKER_SERVICE_COMMAND_INFO, 0x1234, 0xABCD));
-    order_of(bytes, 11, WHISKER_SERVICE_COMMAND_POLL);
+    order_of(bytes, 11, WHISKER_SERVICE_COMMAND_POLL, 0, NULL);
     take(&service, bytes);
     assert_non_null(service_next(&service));
     service_answer(&service, 0, 0);

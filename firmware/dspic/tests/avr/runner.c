@@ -30,7 +30,7 @@ int run_tests(const struct CMUnitTest *tests, uint16_t count)
 }
 
 static const char VECTORS_TEXT[] PROGMEM = {
-#include "vectors.inc"
+#include VECTORS_INC
     0};
 
 static const char *reading = VECTORS_TEXT;
