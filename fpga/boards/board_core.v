@@ -50,7 +50,7 @@ module board_core #(
         .utmi_tx_data(tx_data), .utmi_tx_valid(tx_valid), .utmi_tx_ready(tx_ready), .utmi_line_state(line_state),
         .utmi_vbus_valid(vbus_valid), .utmi_session_valid(session_valid), .utmi_session_end(session_end),
         .utmi_xcvr_select(xcvr_select), .utmi_term_select(term_select), .utmi_op_mode(op_mode),
-        .tick_external(1'b0), .tick_strobe(1'b0), .running(running), .link_busy(link_busy),
+        .serial_number(64'd0), .tick_external(1'b0), .tick_strobe(1'b0), .running(running), .link_busy(link_busy),
         .transfer_busy(transfer_busy), .led(lit));
 
     always @(posedge clk) led <= lit;
