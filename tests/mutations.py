@@ -50,9 +50,9 @@ MUTATIONS = [
     ),
     Mutation(
         "sensor: an angle mis-scaled by one part in a hundred",
-        "sim/mlx90333/sim_counts.c",
-        "field_deg * (STEPS / SPAN_DEG)",
-        "field_deg * 1.01 * (STEPS / SPAN_DEG)",
+        "sim/mlx90333/mlx90333_sense.c",
+        "angle_deg * (steps / p->span_deg)",
+        "angle_deg * 1.01 * (steps / p->span_deg)",
     ),
     Mutation(
         "sensor: sum without the error word",
