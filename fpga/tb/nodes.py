@@ -8,23 +8,22 @@ from cocotb.utils import get_sim_time
 
 from whisker.protocol import LANES, RECORD, SERVICE
 
-IDLE = (1 << LANES) - 1  # pull-ups
 BITS = 8 * RECORD.size
 
 
-def planes(records: dict[int, bytes]) -> list[int]:
-    """For each bit time the value of all MISO lines; a lane without a record stays high."""
+def planes(records: dict[int, bytes], idle: int) -> list[int]:
+    """For each bit time the value of all MISO lines; a lane without a record stays high, as `idle` has it."""
     lines = []
     for bit in range(BITS):
         low = sum(1 << lane for lane, r in records.items() if not r[bit // 8] >> (7 - bit % 8) & 1)
-        lines.append(IDLE & ~low)
+        lines.append(idle & ~low)
     return lines
 
 
 class Nodes:
     """Drives `miso`, `delay_ps` after each rising SCK edge; gathers the order and the times of all edges."""
 
-    def __init__(self, dut, delay_ps: int = 0):
+    def __init__(self, dut, delay_ps: int = 0, lanes: int = LANES):
         self.dut = dut
         self.delay_ps = delay_ps
         self.records: dict[int, bytes] = {}
@@ -33,7 +32,8 @@ class Nodes:
         self.services: list[bytes] = []
         self.second = False  # the next window is the second of its tick
         self.times: dict[str, list[int]] = {}
-        dut.miso.value = IDLE
+        self.idle = (1 << lanes) - 1  # pull-ups
+        dut.miso.value = self.idle
         cocotb.start_soon(self._shift_out())
         cocotb.start_soon(self._shift_in())
         cocotb.start_soon(self._begin_tick())
@@ -49,7 +49,7 @@ class Nodes:
     async def _shift_out(self):
         while True:
             await FallingEdge(self.dut.select_n)
-            for lines in planes(self.answers if self.second else self.records):
+            for lines in planes(self.answers if self.second else self.records, self.idle):
                 await RisingEdge(self.dut.sck)
                 if self.delay_ps:
                     cocotb.start_soon(self._late(lines))

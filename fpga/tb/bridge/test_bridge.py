@@ -24,8 +24,10 @@ from whisker.protocol import (
 )
 
 NODES = 6
+FIFO_FRAMES = LIMITS["fifo_bytes"] // FRAME_BYTES
 CYCLES_PER_TICK = 530
 SERVICE_CYCLES = 2400 + 9 + 480 * 6 + 29 * 30 + 4  # pause, set-up, bits, gaps, hold
+FRAMER_CYCLES = 5  # start, output register, FIFO's memory and its output register
 FAST = {"sck_divider": 6, "word_gap": 30, "sample_point": 3}
 RTL = [
     "whisker_bridge",
@@ -38,6 +40,11 @@ RTL = [
     "crc8",
 ]
 RTL += ["frame_fifo", "bridge_counters", "control_registers", "report_reader", "service_store", "answer_store"]
+
+
+def transfer_cycles(divider: int, gap: int) -> int:
+    """SYNC, set-up, bits, gaps, hold of node_link."""
+    return gap + 9 + 64 * divider + 3 * gap + 4
 
 
 def reading(tick: int, lane: int) -> bytes:
@@ -133,15 +140,16 @@ class Host:
 class Rig:
     """Bridge, nodes and host; ticks come from tick_strobe unless `external` is 0."""
 
-    def __init__(self, dut):
+    def __init__(self, dut, lanes: int = LANES):
         self.dut = dut
-        self.nodes = Nodes(dut)
+        self.populated = min(NODES, lanes)
+        self.nodes = Nodes(dut, lanes=lanes)
         self.host = Host(dut)
         self.tick = 0
 
     async def step(self, wait_for: str = "link_busy") -> int:
         """One tick: the nodes deliver the reading before; returns the cycles until `wait_for` falls."""
-        self.nodes.records = {lane: reading(self.tick - 1, lane) for lane in range(NODES)}
+        self.nodes.records = {lane: reading(self.tick - 1, lane) for lane in range(self.populated)}
         self.tick += 1
         await pulse(self.dut, self.dut.tick_strobe)
         await FallingEdge(self.dut.clk)
@@ -160,9 +168,9 @@ class Rig:
             await ClockCycles(self.dut.clk, 20)
 
 
-async def begin(dut, external: int = 1) -> Rig:
-    await start_clock(dut, tick_external=external, tick_strobe=0, miso=(1 << LANES) - 1)
-    return Rig(dut)
+async def begin(dut, external: int = 1, lanes: int = LANES) -> Rig:
+    await start_clock(dut, tick_external=external, tick_strobe=0, miso=(1 << lanes) - 1)
+    return Rig(dut, lanes)
 
 
 def check(frames, first_sequence: int, period: int = LIMITS["tick_period"]) -> None:
@@ -416,6 +424,69 @@ async def a_usb_restart_forgets_a_service_order_and_the_answers(dut):
     await rig.host.control(1)
     rig.tick = 0
     assert await rig.step() <= CYCLES_PER_TICK
+
+
+@cocotb.test(timeout_time=20, timeout_unit="ms")
+@cocotb.parametrize(divider=[6, 16, 32], gap=[30, 180, 255])
+async def the_first_byte_comes_with_the_frames_end(dut, divider, gap):
+    """From SYNC of the tick that brings the records to the first byte for USB: the transfer, the frame, the FIFO."""
+    rig = await begin(dut)
+    await rig.host.control(1, sck_divider=divider, word_gap=gap)
+    await rig.step("transfer_busy")
+    cocotb.start_soon(rig.step())
+    await RisingEdge(dut.sync)
+    cycles = 0
+    while not int(dut.usb.stream_valid.value):
+        await FallingEdge(dut.clk)
+        cycles += 1
+    assert cycles <= transfer_cycles(divider, gap) + FRAME_BYTES + FRAMER_CYCLES
+
+
+@cocotb.test(timeout_time=20, timeout_unit="ms")
+async def a_host_that_stops_reading_loses_whole_frames_and_is_told(dut):
+    """What does not fit is dropped and counted; reading again is all it takes. However long the pause, only counts grow."""
+    rig = await begin(dut)
+    lost = 9
+    rig.host.reading = False
+    await rig.host.control(1)
+    for _ in range(FIFO_FRAMES + lost + 1):
+        await rig.step()
+    rig.host.reading = True
+    await rig.quiet()
+    for _ in range(3):
+        await rig.step()
+    await rig.host.control(0)
+    await rig.step("transfer_busy")
+    await rig.quiet()
+    headers = [header for header, _ in rig.host.frames()]
+    before, after = headers[:FIFO_FRAMES], headers[FIFO_FRAMES:]
+    assert [h["sequence"] for h in before] == list(range(FIFO_FRAMES)) and not any(h["dropped"] for h in before)
+    assert [h["sequence"] for h in after] == [FIFO_FRAMES + lost + n for n in range(4)]
+    assert {h["dropped"] for h in after} == {lost}
+    assert (await rig.host.read("counters"))["dropped"] == lost
+    assert after[-1]["flags"] == FRAME_FLAGS["last"] and not int(dut.running.value)
+
+
+@cocotb.test(timeout_time=20, timeout_unit="ms")
+@cocotb.parametrize(stalls=[False, True])
+async def junk_reports_are_refused_and_change_nothing(dut, stalls):
+    """Unknown ids, sizes that are no report's, values out of range; a run goes on, and the next right report is taken."""
+    rig = await begin(dut)
+    assert await rig.host.control(1, lane_mask=0xFFF)
+    wanted = await rig.host.read_bytes(REPORTS["control"])
+    good = REPORTS["control"].pack(id=1, wire_version=WIRE_VERSION, run=1, lane_mask=1, tick_period=5000, **FAST)
+    junk = [bytes([n]) + good[1:] for n in (0, 2, 3, 5, 6, 0x7F, 0xFF)] + [good[:n] for n in range(1, len(good))]
+    junk += [good + bytes(n) for n in (1, 16, 40, 48)] + [good[:12] + bytes(4), bytes(16), b"\xff" * 16]
+    for report in junk:
+        assert not await rig.host.write(report, stalls), report.hex()
+        assert await rig.host.read_bytes(REPORTS["control"]) == wanted
+    assert int(dut.running.value) and int(dut.led.value)
+    await rig.step()
+    assert await rig.host.write(good, stalls)
+    await rig.host.control(0)
+    assert (await rig.host.read("control"))["run"] == 0
+    await rig.step("transfer_busy")
+    assert not (int(dut.running.value) or int(dut.led.value))
 
 
 @cocotb.test(timeout_time=20, timeout_unit="ms")

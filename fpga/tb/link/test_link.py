@@ -90,15 +90,24 @@ async def bus_timing(dut, settings):
 
 
 @cocotb.test(timeout_time=50, timeout_unit="ms")
-@cocotb.parametrize(delay_ns=[0, 10, 20, 30, 40, 50, 60, 70, 80])
-async def sample_point_window(dut, delay_ns):
-    """At /16 a record is read whole exactly when MISO has settled and not yet moved on."""
+@cocotb.parametrize(divider=[6, 16], delay_ns=[0, 10, 20, 30, 40, 50, 60, 70, 80])
+async def sample_point_window(dut, divider, delay_ns):
+    """A record is read whole exactly when MISO has settled; no sample point that is allowed comes after it has moved on."""
     nodes = await begin(dut, 1000 * delay_ns)
     records = {lane: record(0, 0x5555, 0xAAAA, 0x5555) for lane in range(LANES)}
-    for point in range(1, 17):
-        verdict = await transfer(dut, nodes, records, 1, 0, (16, 30, point))
+    for point in range(1, divider + 1):
+        verdict = await transfer(dut, nodes, records, 1, 0, (divider, 30, point))
         settled = point * CLOCK_PS > 1000 * delay_ns
-        assert (verdict == (0, 0, 0)) == settled, f"sample point {point}, {delay_ns} ns of loop delay"
+        assert (verdict == (0, 0, 0)) == settled, f"sample point {point} of {divider}, {delay_ns} ns of loop delay"
+
+
+@cocotb.test(timeout_time=10, timeout_unit="ms")
+async def a_sample_point_too_late_reads_the_bit_after(dut):
+    """The window's other end, beyond what control_registers accepts: a whole SCK period later comes the next bit."""
+    nodes = await begin(dut)
+    records = {lane: record(0, 0x5555, 0xAAAA, 0x5555) for lane in range(LANES)}
+    assert await transfer(dut, nodes, records, 1, 0, (16, 30, 16)) == (0, 0, 0)
+    assert await transfer(dut, nodes, records, 1, 0, (16, 30, 17)) != (0, 0, 0)
 
 
 @cocotb.test(timeout_time=10, timeout_unit="ms")
