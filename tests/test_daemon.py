@@ -4,6 +4,7 @@ import os
 import signal
 import socket
 import subprocess
+import sys
 import time
 from contextlib import contextmanager
 from pathlib import Path
@@ -228,6 +229,23 @@ def test_statistics_on_request(tmp_path, ring):
         line = process.stderr.readline()
         finish(process)
     assert line.startswith("whiskerd: ") and "frames published, 0 missing, 0 dropped by the bridge" in line
+
+
+def test_nodes_on_request_while_frames_go_on(tmp_path, ring):
+    with bridge(tmp_path, ring) as (process, _), Reader(ring, wait_s=10.0) as reader:
+        until(lambda: reader.info.published > 100, process)
+        asked = subprocess.run(
+            [sys.executable, "-m", "whisker.cli", "info", "--nodes", "--ring", ring], capture_output=True, text=True
+        )
+        lines = [process.stderr.readline()]
+        lines += [process.stderr.readline() for _ in range(int(lines[0].split()[1]))]
+        published = reader.info.published
+        until(lambda: reader.info.published > published + 100, process)
+        finish(process)
+        missing = reader.info.frames_missing
+    assert asked.returncode == 0 and "its log lists the nodes now" in asked.stdout and asked.stdout.count("\n") == 1
+    assert len(lines) > 1 and all("the application runs" in line for line in lines[1:])
+    assert missing == 0
 
 
 def test_bridges_are_listed(tmp_path, ring):

@@ -7,6 +7,7 @@
 
 #include "cli.h"
 #include "daemon_log.h"
+#include "daemon_nodes.h"
 #include "daemon_notify.h"
 #include "daemon_stats.h"
 #include "whisker_protocol.h"
@@ -36,20 +37,24 @@ struct daemon {
     bool damage_told;
 };
 
-static volatile sig_atomic_t report_wanted;
+static volatile sig_atomic_t report_wanted, nodes_wanted;
 
-static void on_usr1(int number)
+static void on_request(int number)
 {
-    (void)number;
-    report_wanted = 1;
+    if (number == SIGUSR1) {
+        report_wanted = 1;
+    } else {
+        nodes_wanted = 1;
+    }
 }
 
-static void catch_usr1(void)
+static void catch_requests(void)
 {
     struct sigaction action;
     memset(&action, 0, sizeof action);
-    action.sa_handler = on_usr1;
+    action.sa_handler = on_request;
     sigaction(SIGUSR1, &action, NULL);
+    sigaction(SIGUSR2, &action, NULL);
 }
 
 static int64_t clock_ns(clockid_t clock)
@@ -123,6 +128,10 @@ static void keep_house(struct daemon *daemon)
         report_wanted = 0;
         tell_readers(daemon);
         daemon_stats_log(&daemon->stats.told);
+    }
+    if (nodes_wanted && daemon->device) {
+        nodes_wanted = 0;
+        daemon_nodes_log(daemon->device, daemon->options->settings.lane_mask);
     }
 }
 
@@ -337,7 +346,7 @@ static void end(struct daemon *daemon)
 int daemon_run(const struct daemon_options *options)
 {
     struct daemon daemon = {.options = options};
-    catch_usr1();
+    catch_requests();
     const int error = make_ring(&daemon);
     if (error) {
         daemon_log_error(LOG_ERROR, options->ring, error);

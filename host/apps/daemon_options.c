@@ -32,7 +32,8 @@ static void print_help(const struct whisker_settings *defaults)
         "  --sample-point N    cycles of 60 MHz from shifting to sampling (%u)\n"
         "  --verbose           tell also what goes well\n"
         "  --help              this text\n\n"
-        "SIGUSR1: statistics to the log, as at the end. Under systemd: notifies readiness, feeds the watchdog.\n\n"
+        "SIGUSR1: statistics to the log, as at the end. SIGUSR2: who the nodes are and what they counted, likewise.\n"
+        "Under systemd: notifies readiness, feeds the watchdog.\n\n"
         "Example: whiskerd --ring whisker --lane-mask 0x3f\n"
         "Example: whiskerd --ring whisker --wait --serial 0001\n"
         "Exit code: 0 stopped as told, 1 failed, 2 wrong use.\n",

@@ -5,7 +5,7 @@
 
 #include "whisker_protocol.h"
 
-static const char *state_text(uint16_t state)
+const char *flash_state_text(uint16_t state)
 {
 #define TEXT(name, value, text)                                                                                        \
     case value:                                                                                                        \
@@ -18,12 +18,22 @@ static const char *state_text(uint16_t state)
 #undef TEXT
 }
 
-static const char *serial_text(uint32_t serial, char *text, size_t room)
+const char *flash_health_name(uint8_t counter)
+{
+    static const char *const names[] = {
+#define NAME(name, value, text) [value] = #name,
+        WHISKER_HEALTH(NAME)
+#undef NAME
+    };
+    return names[counter];
+}
+
+const char *flash_serial_text(uint32_t serial, char text[FLASH_SERIAL_BYTES])
 {
     if (serial == WHISKER_LIMIT_SERIAL_NONE) {
         return "none";
     }
-    snprintf(text, room, "%" PRIu32, serial);
+    snprintf(text, FLASH_SERIAL_BYTES, "%" PRIu32, serial);
     return text;
 }
 
@@ -32,12 +42,11 @@ void flash_print_nodes(const struct whisker_node nodes[WHISKER_FRAME_LANES])
     printf("lane  serial      version  options  wire  chip    loader  state\n");
     for (int lane = 0; lane < WHISKER_FRAME_LANES; lane++) {
         const struct whisker_node *n = &nodes[lane];
-        char serial[16], version[16];
+        char serial[FLASH_SERIAL_BYTES], version[16];
         if (n->present) {
             snprintf(version, sizeof version, "%u.%u", n->firmware >> 8, n->firmware & 0xFFu);
-            printf("%4d  %-10s  %-7s  0x%04x   %-4u  0x%04x  %-6u  %s\n", lane,
-                   serial_text(n->serial, serial, sizeof serial), version, n->options, n->wire_version, n->chip,
-                   n->loader, state_text(n->state));
+            printf("%4d  %-10s  %-7s  0x%04x   %-4u  0x%04x  %-6u  %s\n", lane, flash_serial_text(n->serial, serial),
+                   version, n->options, n->wire_version, n->chip, n->loader, flash_state_text(n->state));
         }
     }
 }
@@ -54,7 +63,7 @@ static const char *outcome(const struct whisker_update *update, const struct whi
         return "restarted during the update: check its supply, then flash again";
     }
     if (!update->done) {
-        return state_text(update->state);
+        return flash_state_text(update->state);
     }
     if (!node->present || node->state != WHISKER_NODE_STATE_APPLICATION) {
         return "loaded, but the application does not answer: flash again";

@@ -4,6 +4,13 @@
 
 #include "whisker/service.h"
 
+#define FLASH_SERIAL_BYTES 16 /* room for a serial number as text */
+
+/* What a person reads for a WHISKER_NODE_STATE_*, for a counter's number (WHISKER_HEALTH_*), for a serial number. */
+const char *flash_state_text(uint16_t state);
+const char *flash_health_name(uint8_t counter);
+const char *flash_serial_text(uint32_t serial, char text[FLASH_SERIAL_BYTES]);
+
 /* A line per node. */
 void flash_print_nodes(const struct whisker_node nodes[WHISKER_FRAME_LANES]);
 

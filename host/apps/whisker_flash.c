@@ -153,18 +153,13 @@ static void show_progress(void *context, uint32_t blocks, uint32_t total)
 
 static int print_health(struct whisker_device *device, uint32_t lanes)
 {
-    static const char *const names[] = {
-#define NAME(name, value, text) [value] = #name,
-        WHISKER_HEALTH(NAME)
-#undef NAME
-    };
     int error = WHISKER_OK;
     for (uint8_t i = 0; !error && i < WHISKER_HEALTH_COUNT; i++) {
         uint16_t counts[WHISKER_FRAME_LANES] = {0};
         error = whisker_nodes_health(device, lanes, i, counts);
         for (int lane = 0; !error && lane < WHISKER_FRAME_LANES; lane++) {
             if (counts[lane] > 0) {
-                printf("lane %2d: %-14s %u\n", lane, names[i], counts[lane]);
+                printf("lane %2d: %-14s %u\n", lane, flash_health_name(i), counts[lane]);
             }
         }
     }

@@ -3,6 +3,8 @@
 import dataclasses
 import json
 import os
+import signal
+import sys
 import time
 
 from .. import usbtree
@@ -17,14 +19,15 @@ EXAMPLE = "whisker info --json"
 def add(parser) -> None:
     add_ring(parser)
     parser.add_argument("--json", action="store_true", help="one object on one line")
-    parser.add_argument("--nodes", action="store_true", help="ask the nodes themselves (whiskerd must not run)")
+    parser.add_argument(
+        "--nodes", action="store_true", help="ask the nodes themselves; a whiskerd that runs tells in its log"
+    )
     parser.set_defaults(run=run)
 
 
 def run(arguments) -> int:
     if arguments.nodes:
-        lister = program("whisker-flash")
-        return os.spawnv(os.P_WAIT, lister, [lister, "--list", "--health"])
+        return ask_nodes(arguments.ring)
     told = {"host": {"wire_version": WIRE_VERSION}, "usb": [describe_usb(found) for found in usbtree.bridges()]}
     try:
         with Reader(arguments.ring, arguments.wait) as reader:
@@ -34,6 +37,30 @@ def run(arguments) -> int:
             raise
         told["ring"] = {"name": arguments.ring, "state": str(error)}
     print(json.dumps(told) if arguments.json else "\n".join(lines(told)))
+    return 0
+
+
+def ask_nodes(ring: str) -> int:
+    """One process at a time has the bridge: a whiskerd that streams is the one to ask."""
+    try:
+        with Reader(ring) as reader:
+            streaming, pid = bool(reader.stats and reader.stats.connected), reader.info.writer_pid
+    except RingError:
+        streaming, pid = False, 0
+    if not streaming:
+        lister = program("whisker-flash")
+        return os.spawnv(os.P_WAIT, lister, [lister, "--list", "--health"])
+    try:
+        os.kill(pid, signal.SIGUSR2)
+    except PermissionError:
+        print(
+            f"whiskerd (process {pid}) has the bridge and is another user's; run: sudo kill -USR2 {pid}",
+            file=sys.stderr,
+        )
+        return 1
+    print(
+        f"whiskerd (process {pid}) has the bridge: its log lists the nodes now (journalctl -u whiskerd, or its terminal)"
+    )
     return 0
 
 
