@@ -61,10 +61,10 @@ MUTATIONS = [
         "if (sum == sum_of(data, MLX90333_FRAME_ERRORS - MLX90333_FRAME_ALPHA))",
     ),
     Mutation(
-        "firmware: an overflow of the link is not cleared",
-        "firmware/dspic/port_dspic/link_spi.c",
-        "    sfr_clear(board, SPI2STAT, SPISTAT_SPIROV);\n",
-        "",
+        "firmware: an overflow of the sensor's SPI is not cleared",
+        "firmware/dspic/port_dspic/sensor_spi.c",
+        "    sfr_write(board, SPI1STAT, 0);\n    sfr_write(board, SPI1CON1, SENSOR_CON1);\n    sfr_write(",
+        "    sfr_write(board, SPI1CON1, SENSOR_CON1);\n    sfr_set(",
     ),
     Mutation(
         "firmware: the link's module goes on where extra clocks left it",

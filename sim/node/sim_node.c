@@ -20,10 +20,11 @@ static unsigned position(const struct mlx90333 *sensor)
     return sensor->byte * 8u + sensor->bit;
 }
 
-static void begin_frame(struct sim_node *node)
+static void begin_frame(struct sim_node *node, uint64_t now_ns)
 {
     const struct sampler *sampler = &node->board.node.sampler;
     node->begun = (struct sim_node_frame){.number = node->frame.number + 1u,
+                                          .begun_fs = now_ns * DSPIC_FS_PER_NS,
                                           .slip = (uint8_t)(position(&node->sensor) % 64u),
                                           .followed = sampler->followed,
                                           .alpha_before = sampler->alpha,
@@ -42,7 +43,7 @@ static void clock_sensor(struct sim_node *node, bool level, uint64_t now_ns)
 {
     const bool sent = dspic_output(node->chip, PIN_SENSOR_SEND) != DSPIC_LOW;
     if (level && position(&node->twin) == 0)
-        begin_frame(node);
+        begin_frame(node, now_ns);
     const bool seen = mlx90333_clock(&node->sensor, now_ns, level, sent);
     const bool clean = mlx90333_clock(&node->twin, now_ns, level, sent);
     dspic_wire(node->chip, PIN_SENSOR_DATA, seen);

@@ -56,8 +56,9 @@ struct sim_node_frame {
     uint64_t line;   /* the last 64 bits that the chip sampled, last one lowest */
     uint64_t sent;   /* what they were without any fault of sensor, wires or clock */
     uint32_t number; /* frames so far */
-    uint8_t slip;    /* bits by which the sensor's count was ahead of the chip's when it began, modulo 64 */
-    bool followed;   /* the firmware knew the angles before it: these */
+    uint64_t begun_fs;
+    uint8_t slip;  /* bits by which the sensor's count was ahead of the chip's when it began, modulo 64 */
+    bool followed; /* the firmware knew the angles before it: these */
     uint16_t alpha_before, beta_before;
 };
 

@@ -11,12 +11,23 @@ static bool makes_ill(const struct lane_faults *f)
     return f->disturbance != SIM_NODE_NOTHING && f->disturbance != SIM_NODE_UNREAD;
 }
 
+static bool loses_order(const struct lane_faults *f)
+{
+    return f->mosi_flips != 0 || f->mosi_stuck || f->no_select || f->extra_clocks < 0 || f->glitch_bit > 0;
+}
+
 void storm_log_deed(struct storm_log *log, bool any, enum storm_kind kind, const struct lane_faults *faults)
 {
     log->deeds[EARLIER] = log->deeds[BEFORE];
     log->deeds[BEFORE] = log->deeds[NOW];
     log->ill |= makes_ill(faults);
-    log->deeds[NOW] = (struct storm_deed){.any = any, .kind = kind, .faults = *faults, .ill = log->ill};
+    log->deeds[NOW] = (struct storm_deed){
+        .any = any,
+        .kind = kind,
+        .faults = *faults,
+        .stray = faults->second_sync_ns > 0 || (log->deeds[BEFORE].stray && loses_order(faults)),
+        .ill = log->ill,
+    };
     log->counts.injected[kind] += any;
 }
 
@@ -99,11 +110,18 @@ static void count(struct storm_class *class, bool passed, bool good, struct chec
     class->expected_good += odds.good;
 }
 
-/* The frame of the tick before. True if bits of it were hurt. */
+/* That of the tick in which the frame began. */
+static const struct storm_deed *deed_of(const struct storm_log *log, const struct lane_verdict *v)
+{
+    const int64_t shift_fs = log->deeds[BEFORE].faults.shift_ns * (int64_t)DSPIC_FS_PER_NS;
+    return &log->deeds[(int64_t)v->report.frame.begun_fs < (int64_t)v->sync_fs + shift_fs ? EARLIER : BEFORE];
+}
+
+/* A frame that has just ended. True if bits of it were hurt. */
 static bool log_frame(struct storm_log *log, const struct lane_verdict *v)
 {
     const struct sim_node_frame *frame = &v->report.frame;
-    const struct storm_deed *deed = &log->deeds[BEFORE];
+    const struct storm_deed *deed = deed_of(log, v);
     const bool hurt = frame->line != frame->sent, passed = hurt && checks_pass_line(frame->line);
     const bool struck = breaks_line(deed) || frame->slip != 0, held = !frame->followed || (log->line & 1u) != 0;
     const enum storm_line line = line_of(deed, frame);
@@ -151,7 +169,7 @@ static void log_transfer(struct storm_log *log, const struct lane_verdict *v, ui
     const struct storm_deed *deed = &log->deeds[NOW];
     const struct lane_faults *f = &deed->faults;
     const bool whole = checks_pass_record(v->armed, expected) && (v->armed >> 8 & 0xFFFFu) == 0;
-    const bool passed = v->read != v->armed && v->code <= WHISKER_CODE_OVERRUN;
+    const bool passed = v->read != v->armed && v->read != ~UINT64_C(0) && checks_pass_record(v->read, expected);
     struct checks_odds odds = {0};
     enum storm_link link;
     log->counts.unforeseen += !link_is_foreseen(log, v);
@@ -172,16 +190,18 @@ static void log_transfer(struct storm_log *log, const struct lane_verdict *v, ui
 
 /* ----------------------------------------------------------------------------------------------------- good records */
 
-/* This tick's own SYNC was kept from the node, which took a stray one before it for its. */
+/* This tick's own SYNC was kept from the node, which took another for its: a stray one, or, where its count has been
+ * wrong since a stray one, that of the tick before. */
 static bool is_displaced(const struct storm_log *log, const struct lane_verdict *v)
 {
-    return log->deeds[BEFORE].faults.no_sync && log->deeds[EARLIER].faults.second_sync_ns > 0 &&
-           checks_are_angles(v->report.frame.sent, v->alpha, v->beta);
+    const struct sim_node_frame *frame = &v->report.frame;
+    return log->deeds[BEFORE].faults.no_sync && log->deeds[EARLIER].stray && frame->line == frame->sent &&
+           checks_are_angles(frame->sent, v->alpha, v->beta);
 }
 
 /* A good record whose bits were hurt, or whose angles are not those of its tick: which check let it pass, and had to?
  */
-static void explain(struct storm_log *log, const struct lane_verdict *v, bool is_new, bool line_hurt, uint8_t expected)
+static void explain(struct storm_log *log, const struct lane_verdict *v, bool line_hurt, uint8_t expected)
 {
     const struct sim_node_frame *frame = &v->report.frame;
     const bool link_hurt = v->read != v->armed;
@@ -191,7 +211,7 @@ static void explain(struct storm_log *log, const struct lane_verdict *v, bool is
     else if (!link_hurt && line_hurt && checks_pass_line(frame->line) && checks_pass_step(frame, frame->line) &&
              checks_are_angles(frame->line, v->alpha, v->beta))
         log->counts.missed_line++;
-    else if (!link_hurt && is_new && !line_hurt && is_displaced(log, v))
+    else if (!link_hurt && !line_hurt && is_displaced(log, v))
         log->counts.displaced++;
     else
         log->counts.unexplained++;
@@ -228,7 +248,7 @@ bool storm_log_verdict(struct storm_log *log, unsigned tick, const struct lane_v
     log->counts.bad += !v->good;
     const bool sound = v->good && !v->altered && !line_hurt && v->read == v->armed;
     if (v->good && !sound)
-        explain(log, v, is_new, line_hurt, expected);
+        explain(log, v, line_hurt, expected);
     log->ill &= !sound || is_struck(log);
     return sound;
 }

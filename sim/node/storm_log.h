@@ -10,7 +10,8 @@ struct storm_deed {
     bool any;
     enum storm_kind kind;
     struct lane_faults faults;
-    bool ill; /* chip or sensor without supply, or starting anew: no frame and no transfer of it means anything */
+    bool stray; /* a second SYNC came, or came before and no sound order has put the node's count right since */
+    bool ill;   /* chip or sensor without supply, or starting anew: no frame and no transfer of it means anything */
 };
 
 /* The fields are the log's own but for `counts`. */
