@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "whisker/device.h"
 #include "whisker/errors.h"
 
 static volatile sig_atomic_t stop_wanted;
@@ -49,4 +50,13 @@ bool cli_number(const char *program, const char *option, const char *text, uint3
     }
     *value = (uint32_t)number;
     return true;
+}
+
+uint8_t *cli_byte_setting(struct whisker_settings *settings, const char *name)
+{
+    return !strcmp(name, "sck-divider")    ? &settings->sck_divider
+           : !strcmp(name, "word-gap")     ? &settings->word_gap
+           : !strcmp(name, "sample-point") ? &settings->sample_point
+           : !strcmp(name, "batch")        ? &settings->batch
+                                           : NULL;
 }

@@ -5,6 +5,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+struct whisker_settings;
+
 enum { CLI_OK = 0, CLI_FAILED = 1, CLI_USAGE = 2 };
 
 /* Prints "program: subject: text; remedy" for a code of the library and returns CLI_FAILED. */
@@ -12,6 +14,10 @@ int cli_fail(const char *program, const char *subject, int error);
 
 /* Reads an option's number, decimal or 0x; false, with one line printed, unless it is a whole number min..max. */
 bool cli_number(const char *program, const char *option, const char *text, uint32_t min, uint32_t max, uint32_t *value);
+
+/* The bridge's setting of one byte that an option of this name stands for (sck-divider, word-gap, sample-point, batch);
+ * NULL if there is none. */
+uint8_t *cli_byte_setting(struct whisker_settings *settings, const char *name);
 
 /* Turns SIGINT, SIGTERM and SIGHUP into a wish to end. Blocking calls are interrupted. */
 void cli_catch_signals(void);

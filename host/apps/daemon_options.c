@@ -41,21 +41,11 @@ static void print_help(const struct whisker_settings *defaults)
         defaults->word_gap, defaults->sample_point);
 }
 
-/* The setting of one byte that has this name; NULL if there is none. */
-static uint8_t *byte_setting(struct whisker_settings *settings, const char *name)
-{
-    return !strcmp(name, "sck-divider")    ? &settings->sck_divider
-           : !strcmp(name, "word-gap")     ? &settings->word_gap
-           : !strcmp(name, "sample-point") ? &settings->sample_point
-           : !strcmp(name, "batch")        ? &settings->batch
-                                           : NULL;
-}
-
 /* Sets one numeric option; false when its text is no number. Limits of the bridge are the library's to check. */
 static bool set_number(struct daemon_options *options, const char *name, const char *text)
 {
     struct whisker_settings *settings = &options->settings;
-    uint8_t *byte = byte_setting(settings, name);
+    uint8_t *byte = cli_byte_setting(settings, name);
     uint32_t value;
     if (!cli_number(DAEMON_PROGRAM, name, text, 0, byte ? UINT8_MAX : UINT32_MAX, &value)) {
         return false;

@@ -16,6 +16,8 @@
 #define BAR_WIDTH 40
 #define DRAIN_POLLS 10 /* of 10 ms */
 
+enum { NUMBER = 'n' };
+
 struct options {
     const char *image, *bridge;
     bool list, health, dry_run, has_lane, has_serial;
@@ -42,76 +44,66 @@ static void print_help(void)
            "Exit code: 0 every node has it, 1 failed for some or all, 2 wrong use.\n");
 }
 
-static bool set_number(struct options *options, int option, const char *text)
+static bool set_number(struct options *options, const char *name, const char *text)
 {
+    uint8_t *byte = cli_byte_setting(&options->settings, name);
+    const bool is_lane = !strcmp(name, "lane"), is_node = !strcmp(name, "node");
+    const uint32_t most = is_lane ? WHISKER_FRAME_LANES - 1 : is_node ? WHISKER_LIMIT_SERIAL_NONE - 1 : UINT8_MAX;
     uint32_t value = 0;
-    const bool is_lane = option == 'l', is_serial = option == 'n';
-    const uint32_t most = is_lane ? WHISKER_FRAME_LANES - 1 : is_serial ? WHISKER_LIMIT_SERIAL_NONE - 1 : UINT8_MAX;
-    static const char *const names[] = {
-        ['l'] = "lane", ['n'] = "node", ['d'] = "sck-divider", ['g'] = "word-gap", ['p'] = "sample-point"};
-    if (!cli_number(PROGRAM, names[option], text, is_serial ? 1 : 0, most, &value)) {
+    if (!cli_number(PROGRAM, name, text, is_node ? 1 : 0, most, &value)) {
         return false;
     }
-    switch (option) {
-    case 'l':
+    if (byte) {
+        *byte = (uint8_t)value;
+    } else if (is_lane) {
         options->lane = value;
         options->has_lane = true;
-        break;
-    case 'n':
+    } else {
         options->serial = value;
         options->has_serial = true;
-        break;
-    case 'd':
-        options->settings.sck_divider = (uint8_t)value;
-        break;
-    case 'g':
-        options->settings.word_gap = (uint8_t)value;
-        break;
-    default:
-        options->settings.sample_point = (uint8_t)value;
-        break;
     }
     return true;
+}
+
+static bool set_word(struct options *options, int option, const char *text)
+{
+    switch (option) {
+    case 'b':
+        options->bridge = text;
+        return true;
+    case 'y':
+        return options->dry_run = true;
+    case 'L':
+        return options->list = true;
+    case 'H':
+        return options->health = true;
+    default:
+        return false;
+    }
 }
 
 /* Returns 0 to go on, or an exit code plus one. */
 static int read_options(struct options *options, int argc, char **argv)
 {
-    static const struct option LONG[] = {{"lane", required_argument, NULL, 'l'},
-                                         {"node", required_argument, NULL, 'n'},
-                                         {"bridge", required_argument, NULL, 'b'},
-                                         {"sck-divider", required_argument, NULL, 'd'},
-                                         {"word-gap", required_argument, NULL, 'g'},
-                                         {"sample-point", required_argument, NULL, 'p'},
-                                         {"dry-run", no_argument, NULL, 'y'},
-                                         {"list", no_argument, NULL, 'L'},
-                                         {"health", no_argument, NULL, 'H'},
-                                         {"help", no_argument, NULL, 'h'},
-                                         {NULL, 0, NULL, 0}};
-    int option;
-    while ((option = getopt_long(argc, argv, "", LONG, NULL)) != -1) {
-        switch (option) {
-        case 'h':
+    static const struct option known[] = {{"lane", required_argument, NULL, NUMBER},
+                                          {"node", required_argument, NULL, NUMBER},
+                                          {"sck-divider", required_argument, NULL, NUMBER},
+                                          {"word-gap", required_argument, NULL, NUMBER},
+                                          {"sample-point", required_argument, NULL, NUMBER},
+                                          {"bridge", required_argument, NULL, 'b'},
+                                          {"dry-run", no_argument, NULL, 'y'},
+                                          {"list", no_argument, NULL, 'L'},
+                                          {"health", no_argument, NULL, 'H'},
+                                          {"help", no_argument, NULL, 'h'},
+                                          {NULL, 0, NULL, 0}};
+    int which = 0;
+    for (int option; (option = getopt_long(argc, argv, "", known, &which)) != -1;) {
+        if (option == 'h') {
             print_help();
             return CLI_OK + 1;
-        case 'b':
-            options->bridge = optarg;
-            break;
-        case 'y':
-            options->dry_run = true;
-            break;
-        case 'L':
-            options->list = true;
-            break;
-        case 'H':
-            options->health = true;
-            break;
-        case '?':
+        }
+        if (!(option == NUMBER ? set_number(options, known[which].name, optarg) : set_word(options, option, optarg))) {
             return CLI_USAGE + 1;
-        default:
-            if (!set_number(options, option, optarg)) {
-                return CLI_USAGE + 1;
-            }
         }
     }
     options->image = optind < argc ? argv[optind++] : NULL;

@@ -1,34 +1,17 @@
-/* Fuzz target of the MLX90316's decoder. A broken promise traps. */
-#include <stdbool.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <string.h>
-
-#include "sensor_frame.h"
-
-static void demand(bool kept)
-{
-    if (!kept)
-        __builtin_trap();
-}
+/* Fuzz target of the MLX90316's decoder. */
+#include "demand.h"
 
 /* Good, or good but for error bits: then the data came twice, once inverted, and says what it is. */
 static void check_frame(const uint8_t *frame)
 {
     const struct sensor_reading reading = sensor_frame_decode(frame);
-    const unsigned code = (unsigned)reading.status >> WHISKER_STATUS_CODE_SHIFT;
-    if (code != WHISKER_CODE_OK) {
-        demand(code >= WHISKER_CODE_SENSOR_SUM && code <= WHISKER_CODE_SENSOR_ABSENT);
-        demand(reading.alpha == 0 && reading.beta == 0);
+    if (check_bad(&reading))
         return;
-    }
     demand(frame[0] == MLX90316_MASTER_START && reading.beta == 0x8000u);
     demand((frame[2] ^ frame[4]) == 0xFF && (frame[3] ^ frame[5]) == 0xFF);
     demand((frame[3] & 3u) == (reading.status == 0 ? 1u : 2u));
     demand(reading.status != 0 || reading.alpha == (frame[2] << 8 | (frame[3] & 0xFC)));
 }
-
-int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {

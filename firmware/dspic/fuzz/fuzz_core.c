@@ -1,29 +1,14 @@
 /* Fuzz target of what the core takes from outside: the sensor's frame and the bridge's order. Eight bytes serve as
- * both. A broken promise traps. */
-#include <stddef.h>
-#include <stdint.h>
-#include <string.h>
-
+ * both. */
+#include "demand.h"
 #include "record.h"
-#include "sensor_frame.h"
 #include "whisker_protocol.h"
-
-static void demand(bool kept)
-{
-    if (!kept)
-        __builtin_trap();
-}
 
 static void check_frame(const uint8_t *frame)
 {
     const struct sensor_reading reading = sensor_frame_decode(frame);
-    const unsigned code = (unsigned)reading.status >> WHISKER_STATUS_CODE_SHIFT;
-    if (code != WHISKER_CODE_OK) {
-        demand(code >= WHISKER_CODE_SENSOR_SUM && code <= WHISKER_CODE_SENSOR_ABSENT);
-        demand(reading.alpha == 0 && reading.beta == 0);
-        demand(reading.status == code << WHISKER_STATUS_CODE_SHIFT);
+    if (check_bad(&reading))
         return;
-    }
     demand(frame[MLX90333_FRAME_START] == MLX90333_START_BYTE);
     demand((reading.status == 0) == (whisker_get_u16(frame + MLX90333_FRAME_ERRORS) == 0));
     demand(reading.alpha == whisker_get_u16(frame + MLX90333_FRAME_ALPHA));
@@ -61,8 +46,6 @@ static void check_record(const uint8_t *bytes)
     record_pack(&reading, bytes[6], words);
     demand(order_parse(words, &order) && order.tick == bytes[6]);
 }
-
-int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
