@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""Measures the whisker node: random faults, skew between nodes, time to the armed record, processor load.
+"""Measures the whisker node: random faults, fastest link, skew between nodes, time to the armed record, processor load.
 
-    .venv/bin/python tools/bench_node.py        bench/results/node.json and node_faults.json, docs/node_faults.md,
-                                                docs/charts/node_*.svg and .png
+    .venv/bin/python tools/bench_node.py        bench/results/node.json, node_faults.json and node_cuts.json,
+                                                docs/node_faults.md, docs/charts/node_*.svg and .png
 
 All on the register model of the chip and the edge-by-edge model of the sensor; nothing here has run on silicon. A
 thousand batches of a thousand fault schedules take about six minutes of one core; what is done is kept in build/bench/node.
@@ -16,10 +16,13 @@ from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+import node_odds
+import node_page
 import numpy as np
 from matplotlib.figure import Figure
 from tqdm import tqdm
 
+from whisker.protocol import LIMITS
 from whisker.report import figures
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -28,8 +31,14 @@ BATCHES, CHUNK, PROCESSES = 1000, 50, 2
 NODES, TICKS = 28, 10_000
 TICK_CYCLES = 19_300  # of 500 us at the slowest oscillator
 CONVERSION_NS = 350_000  # the sensor's longest in fast mode
+ARMED_MOST_US = 450  # wanted, at the slowest oscillators
+CYCLES_PER_US = LIMITS["clock_hz"] / 1e6
+LINK_TICKS = 200
+DIVIDERS = (4, 6, 8, 12, 16, 24, 32)
+WAYS = ("lines", "links")
 SPREADS = {"equal": (0, 0), "2 %": (20_000, 100), "4 %": (40_000, 100)}  # ppm of chips, permille of sensors
-TOTALS = ("schedules", "ticks", "bad", "missed_line", "missed_link", "unexplained", "spurious", "stuck", "violations")
+TOTALS = ("schedules", "ticks", "bad", "missed_line", "missed_link", "displaced", "unexplained", "unforeseen")
+TOTALS += ("spurious", "stuck", "violations", "overwritten")
 
 
 def storm(build: Path, kept: Path, fresh: bool) -> dict:
@@ -48,14 +57,58 @@ def storm(build: Path, kept: Path, fresh: bool) -> dict:
     with ThreadPoolExecutor(PROCESSES) as pool:
         chunks = list(tqdm(pool.map(chunk, firsts), total=len(firsts), desc="fault schedules"))
     lines = [line for lines in chunks for line in lines]
-    kinds = {
-        kind: {
-            "injected": sum(line["kinds"][kind][0] for line in lines),
-            "altered": sum(line["kinds"][kind][1] for line in lines),
-        }
-        for kind in lines[0]["kinds"]
+    injected = {kind: sum(line["injected"][kind] for line in lines) for kind in lines[0]["injected"]}
+    classes = {way: {name: odds(name, [line[way][name] for line in lines]) for name in lines[0][way]} for way in WAYS}
+    return {name: sum(line[name] for line in lines) for name in TOTALS} | {"injected": injected} | classes
+
+
+def odds(name: str, parts: list[list]) -> dict:
+    """A class of damage: how often it passed the checks, and how often it should."""
+    totals = np.sum(parts, axis=0).tolist()
+    events, passed, good = (int(total) for total in totals[:3])
+    derived = node_odds.derived(name, totals) if events else (None, None)
+    return {
+        "events": events,
+        "passed": passed,
+        "passed_95": node_odds.interval(passed, events),
+        "passed_derived": derived[0],
+        "good": good,
+        "good_95": node_odds.interval(good, events),
+        "good_derived": derived[1],
     }
-    return {name: sum(line[name] for line in lines) for name in TOTALS} | {"kinds": kinds}
+
+
+def least(lowest: int, highest: int, step: int, lossless) -> int | None:
+    """The least of lowest, lowest + step ... that loses nothing; all above it lose nothing either."""
+    if not lossless(highest):
+        return None
+    bad, good = lowest - step, highest
+    while good - bad > step:
+        middle = bad + (good - bad) // (2 * step) * step
+        bad, good = (bad, middle) if lossless(middle) else (middle, good)
+    return good
+
+
+def link(build: Path) -> dict:
+    """The fastest settings without loss, on 36 kinds of parts: oscillators, prefetch, DMA."""
+
+    def lost(divider: int, gap: int, period: int) -> int:
+        words = [build / "sim/node/node_link", LINK_TICKS, divider, gap, period]
+        out = subprocess.run([str(word) for word in words], capture_output=True, text=True, check=True).stdout
+        return int(out.split()[0])
+
+    period = LIMITS["tick_period"]
+    gaps = {
+        divider: least(1, LIMITS["word_gap_default"], 1, lambda gap, d=divider: lost(d, gap, period) == 0)
+        for divider in tqdm(DIVIDERS, desc="link")
+    }
+    usual = LIMITS["sck_divider_default"], LIMITS["word_gap_default"]
+    quickest = LIMITS["sck_divider_min"], LIMITS["word_gap_min"]
+    periods = {
+        name: least(18000, period, 20, lambda cycles, s=setting: lost(*s, cycles) == 0)
+        for name, setting in {"default": usual, "fastest": quickest}.items()
+    }
+    return {"ticks": LINK_TICKS, "gap_cycles": gaps, "period_cycles": periods}
 
 
 def timing(build: Path, spread: tuple[int, int], work: int = 60, ticks: int = TICKS, nodes: int = NODES):
@@ -88,45 +141,93 @@ def load(build: Path) -> dict:
 
 
 def skew_chart(rows: dict) -> Figure:
-    """Spread over the nodes of each tick's sampling instant: what the node adds, and what the sensor does."""
-    figure = Figure(figsize=(9.6, 4.0), layout="constrained")
-    left, right = figure.subplots(1, 2)
+    """Spread over the nodes of each tick's sampling instant: what the nodes add."""
+    figure = Figure(figsize=(6.0, 4.0), layout="constrained")
+    axes = figure.subplots()
     styles = {"equal": ("-", "o"), "2 %": ("--", "^"), "4 %": (":", "s")}
     for name, data in rows.items():
         spread = np.sort(np.ptp(data[:, :, 0], axis=0)) / 1000
         share = np.linspace(0, 1, len(spread))
         line, marker = styles[name]
-        left.plot(spread, share, line, marker=marker, markevery=0.2, color="#0b5394", label=f"clocks {name}")
-    left.set_xlabel("SYNC to latch, spread over 28 nodes (us)")
-    left.set_ylabel("share of ticks")
-    left.set_xlim(left=0)
-    left.legend()
-    ages = rows["2 %"][:, :, 1].ravel() / 1000
-    right.hist(ages, bins=80, color="#c25700", histtype="stepfilled", alpha=0.6)
-    right.set_xlabel("age of the sensor's conversion at the latch (us)")
-    right.set_ylabel("samples")
+        axes.plot(spread, share, line, marker=marker, markevery=0.2, color="#0b5394", label=f"clocks {name}")
+    axes.set_title("What nodes add to the skew: 28 nodes, 10 000 ticks", fontsize=10)
+    axes.set_xlabel("SYNC to latch, spread over 28 nodes (us)")
+    axes.set_ylabel("share of ticks")
+    axes.set_xlim(left=0)
+    axes.legend()
     return figure
 
 
-def fault_table(build: Path) -> list[dict]:
-    """The fault matrix, written as a page too."""
-    path = RESULTS / "node_faults.json"
-    subprocess.run([build / "sim/node/test_node_faults", path], check=True)
-    rows = json.loads(path.read_text())
-    text = ["# What a node makes of faults", "", "Made by `tools/bench_node.py` from `sim/node/fault_matrix.c`.", ""]
-    text += [
-        "Verdicts on consecutive records, the first on the record that the broken tick brings (the tick before's):"
-    ]
-    text += ["`.` good, `e` error bits, `S` starting, `R` resync, `L` late, `x` sensor_sum, `0` sensor_start,"]
-    text += ["`a` sensor_absent, `j` step, `P` `W` `T` reset_power, _watchdog, _trap, `O` overrun, `-` absent,"]
-    text += ["`c` link_crc, `t` link_tick. Empty: nothing is lost.", ""]
-    text += ["| Fault | Verdicts | Ticks lost, at most | Remark |", "|---|---|---|---|"]
-    for row in rows:
-        runs = row["runs"]
-        verdicts = f"`{runs[0]['verdicts']}`" if runs[0]["verdicts"] else ""
-        text.append(f"| {row['fault']} | {verdicts} | {max(r['lost'] for r in runs)} | {row['remark']} |")
-    (ROOT / "docs/node_faults.md").write_text("\n".join(text) + "\n")
-    return rows
+def age_chart(rows: dict) -> Figure:
+    """What the sensors add: the age of their conversions, and its spread within a tick."""
+    figure = Figure(figsize=(9.6, 4.0), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    ages, instants = rows["2 %"][:, :, 1] / 1000, (rows["2 %"][:, :, 0] - rows["2 %"][:, :, 1]) / 1000
+    left.hist(ages.ravel(), bins=80, color="#b4b4b4", edgecolor="#404040", histtype="stepfilled")
+    for name in ("sensor_age_min", "sensor_age_max"):
+        left.axvline(LIMITS[name] / 1000, color="black", linestyle="--")
+        left.annotate(f" {name}", (LIMITS[name] / 1000, 1.0), xycoords=("data", "axes fraction"), rotation=90, va="top")
+    left.set_title("Age of the conversion that is read", fontsize=10)
+    left.set_xlabel("age at the latch (us)")
+    left.set_ylabel("samples of 28 sensors, 10 000 ticks")
+    spread = np.sort(np.ptp(instants, axis=0))
+    right.plot(spread, np.linspace(0, 1, len(spread)), color="#0b5394")
+    right.set_title("True instants within a tick", fontsize=10)
+    right.set_xlabel("spread over 28 sensors (us)")
+    right.set_ylabel("share of ticks")
+    right.set_xlim(left=0)
+    return figure
+
+
+def armed_chart(armed: dict) -> Figure:
+    """When the record of a tick lies ready in the link."""
+    figure = Figure(figsize=(6.0, 4.0), layout="constrained")
+    axes = figure.subplots()
+    for (name, data), style in zip(armed.items(), ("-", "--", ":"), strict=True):
+        us = np.sort(data[:, :, 2].ravel()) / 1000
+        axes.plot(us, np.linspace(0, 1, len(us)), style, color="#0b5394", label=name)
+    axes.axvline(ARMED_MOST_US, color="black", linewidth=1)
+    axes.annotate("wanted: at most ", (ARMED_MOST_US, 0.5), ha="right")
+    axes.set_title("From SYNC to the armed record, 28 nodes", fontsize=10)
+    axes.set_xlabel("SYNC to armed record (us)")
+    axes.set_ylabel("share of records")
+    axes.legend(loc="center left")
+    return figure
+
+
+def link_chart(found: dict) -> Figure:
+    """The least gap between words at each SCK."""
+    figure = Figure(figsize=(6.0, 4.0), layout="constrained")
+    axes = figure.subplots()
+    known = {divider: gap for divider, gap in found["gap_cycles"].items() if gap is not None}
+    mhz = [CYCLES_PER_US / divider for divider in known]
+    axes.plot(mhz, [gap / CYCLES_PER_US for gap in known.values()], "o-", color="#0b5394", label="least without loss")
+    axes.axhline(LIMITS["word_gap_min"] / CYCLES_PER_US, color="black", linestyle="--", label="least the bridge takes")
+    axes.axvline(CYCLES_PER_US / LIMITS["sck_divider_min"], color="black", linestyle=":", label="fastest it takes")
+    axes.set_title("Gap between words that every node follows", fontsize=10)
+    axes.set_xlabel("SCK (MHz)")
+    axes.set_ylabel("gap between words (us)")
+    axes.set_ylim(bottom=0)
+    axes.legend()
+    return figure
+
+
+def table(build: Path, program: str, name: str) -> list[dict]:
+    """What a test program writes down of its cases, kept among the results."""
+    path = RESULTS / name
+    subprocess.run([build / "sim/node" / program, path], check=True)
+    return json.loads(path.read_text())
+
+
+def draw(name: str, chart, *data) -> None:
+    """docs/charts/NAME, as .svg and .png."""
+
+    def figure(_):
+        return chart(*data)
+
+    figure.__name__ = name
+    (CHARTS / f"{name}.svg").write_text(figures.svg(figure, None))
+    figures.png(figure, None, CHARTS / f"{name}.png")
 
 
 def run(build: Path, fresh: bool) -> None:
@@ -135,14 +236,21 @@ def run(build: Path, fresh: bool) -> None:
     kept.mkdir(parents=True, exist_ok=True)
     RESULTS.mkdir(parents=True, exist_ok=True)
     rows = {name: timing(build, spread)[0] for name, spread in tqdm(SPREADS.items(), desc="skew")}
-    slowest, _ = timing(build, (-40_000, 100), ticks=500, nodes=NODES)
-    faults = fault_table(build)
+    armed = {
+        f"clocks {'equal' if not ppm else f'{-ppm // 10_000} % slow'}": timing(build, (ppm, 100), ticks=500)[0]
+        for ppm in (0, -20_000, -40_000)
+    }
+    faults = table(build, "test_node_faults", "node_faults.json")
+    cuts = table(build, "test_update_cuts", "node_cuts.json")
     result = {
         "storm": storm(build, kept, fresh),
+        "link": link(build),
         "skew": {
             name: {
                 "latch_spread_us_max": float(np.ptp(data[:, :, 0], axis=0).max() / 1000),
                 "latch_us_mean": float(data[:, :, 0].mean() / 1000),
+                "latch_us_min": float(data[:, :, 0].min() / 1000),
+                "latch_us_max": float(data[:, :, 0].max() / 1000),
                 "true_instant_spread_us_max": float(np.ptp(data[:, :, 0] - data[:, :, 1], axis=0).max() / 1000),
                 "age_us_max": float(data[:, :, 1].max() / 1000),
                 "age_us_mean": float(data[:, :, 1].mean() / 1000),
@@ -150,21 +258,19 @@ def run(build: Path, fresh: bool) -> None:
             }
             for name, data in rows.items()
         },
-        "armed_us_max_at_minus_4_percent": float(slowest[:, :, 2].max() / 1000),
+        "armed_us_max": {name: float(data[:, :, 2].max() / 1000) for name, data in armed.items()},
         "load": load(build),
-        "fault_rows": len(faults),
+        "fault_rows": len(faults) + len(cuts),
         "worst_lost": dict(
             Counter({row["fault"]: max(r["lost"] for r in row["runs"]) for row in faults}).most_common(3)
         ),
     }
     (RESULTS / "node.json").write_text(json.dumps(result, indent=1) + "\n")
-
-    def draw(_):
-        return skew_chart(rows)
-
-    draw.__name__ = "node_skew"
-    (CHARTS / "node_skew.svg").write_text(figures.svg(draw, None))
-    figures.png(draw, None, CHARTS / "node_skew.png")
+    (ROOT / "docs/node_faults.md").write_text(node_page.page(result, faults, cuts))
+    draw("node_skew", skew_chart, rows)
+    draw("node_age", age_chart, rows)
+    draw("node_armed", armed_chart, armed)
+    draw("node_link", link_chart, result["link"])
 
 
 if __name__ == "__main__":

@@ -42,6 +42,12 @@ static void the_matrix_is_large_enough(void **state)
     assert_true(FAULT_CASE_COUNT >= 30);
 }
 
+static void write_escaped(FILE *file, const char *text)
+{
+    for (; *text; text++)
+        fprintf(file, "%s%c", *text == '\\' ? "\\" : "", *text);
+}
+
 static int write_table(const char *path)
 {
     FILE *file = fopen(path, "w");
@@ -49,8 +55,11 @@ static int write_table(const char *path)
         return 1;
     for (unsigned i = 0; i < FAULT_CASE_COUNT; i++) {
         const struct fault_case *row = &FAULT_CASES[i];
-        fprintf(file, "%s{\"fault\": \"%s\", \"remark\": \"%s\", \"undetectable\": %s, \"runs\": [", i ? ",\n " : "[",
-                row->name, row->remark ? row->remark : "", row->undetectable ? "true" : "false");
+        fprintf(file, "%s{\"fault\": \"%s\", \"remark\": \"%s\", \"undetectable\": %s, \"most\": %u, \"expected\": \"",
+                i ? ",\n " : "[", row->name, row->remark ? row->remark : "", row->undetectable ? "true" : "false",
+                row->most);
+        write_escaped(file, row->expected);
+        fprintf(file, "\", \"runs\": [");
         for (unsigned n = 0; n < FAULT_PARTS; n++) {
             const struct sim_node_parameters parts = fault_parts(n);
             const struct fault_outcome o = fault_run(row, &parts);
