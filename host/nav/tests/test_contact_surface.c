@@ -50,6 +50,18 @@ static void a_corner_is_told_with_its_radius(void **state)
     }
 }
 
+static void a_whisker_may_stand_askew_to_its_arm(void **state)
+{
+    (void)state;
+    struct nav_surface_mount m = mounted();
+    m.yaw_rad += 0.6;
+    struct nav_surface_seen seen = corner_at(&m, 100.0);
+    struct nav_surface s;
+    nav_surface_of(&m, &seen, &s);
+    assert_near(s.radius_mm, 100.0, 4.0);
+    assert_true(s.radius_sigma_mm < 10.0);
+}
+
 static void a_face_is_told_with_the_way_it_lies(void **state)
 {
     (void)state;
@@ -100,6 +112,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_corner_is_told_with_its_radius),
+        cmocka_unit_test(a_whisker_may_stand_askew_to_its_arm),
         cmocka_unit_test(a_face_is_told_with_the_way_it_lies),
         cmocka_unit_test(noise_is_borne),
         cmocka_unit_test(what_is_no_number_or_fits_nothing_is_open),
