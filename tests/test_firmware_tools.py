@@ -1,6 +1,7 @@
 """From the compiler's HEX to the chip: images, first programming by wire, what is missing is said; the chip's code compiles."""
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -139,6 +140,66 @@ def test_the_code_for_the_chip_compiles(define):
     flags = ["-std=gnu99", "-fsyntax-only", "-Wall", "-Wextra", "-Werror", "-Wno-attributes", "-D__dsPIC33F__", define]
     done = run("cc", *flags, *stub, *includes, *sources)
     assert done.returncode == 0, done.stderr
+
+
+def test_the_watchdogs_period_is_the_models():
+    """LPRC runs at 32 kHz; the configuration words are the chip's, the parameter the model's."""
+    words = dict(
+        re.findall(r"CONFIG\(config_(\w+), 0x\w+,\s*0x(\w+)\)", (FIRMWARE / "port_dspic/chip/config.c").read_text())
+    )
+    fwdt = int(words["fwdt"], 16)
+    period_ms = (128 if fwdt & 0x10 else 32) * 2 ** (fwdt & 15) / 32
+    assert f".watchdog_ms = {period_ms:.0f}," in (ROOT / "sim/dspic/dspic.c").read_text()
+
+
+def stand_in_compiler(folder: Path) -> dict[str, str]:
+    """xc16-gcc and its kin as scripts that write down their arguments, and a linker script in the older style."""
+    loader, app = hex_file(folder / "loader.hex.in", 50, 0x200), hex_file(folder / "application.hex.in", 100)
+    assert loader != app
+    scripts = {
+        "xc16-gcc": f'echo "$@" >>{folder}/called; while [ "$1" != -o ]; do shift; done; : >"$2"',
+        "xc16-bin2hex": f'n=$(basename "$1" .elf); cp {folder}/$n.hex.in "${{1%.elf}}.hex"',
+        "xc16-objdump": 'echo "00002300 <_node_on_sync>:"',
+    }
+    (folder / "bin").mkdir()
+    for name, text in scripts.items():
+        (folder / "bin" / name).write_text(f"#!/bin/sh\n{text}\n")
+        (folder / "bin" / name).chmod(0o755)
+    (folder / "p33FJ128MC802.gld").write_text(
+        "MEMORY {\n  program (xr)   : ORIGIN = 0x200,        LENGTH = 0x15600\n}\nSECTIONS {\n"
+        "  .ivt __IVT_BASE :\n  {\n    LONG(0);\n  } >ivt\n  .aivt __AIVT_BASE :\n  {\n    LONG(0);\n  } >aivt\n  .text : { } >program\n}\n"
+    )
+    return {"PATH": f"{folder}/bin:{os.environ['PATH']}", "OUT": str(folder / "out")}
+
+
+def test_the_firmware_build_leaves_both_vector_tables_to_the_source(tmp_path):
+    done = run("tools/firmware.sh", **stand_in_compiler(tmp_path))
+    assert done.returncode == 0, done.stderr
+    calls = (tmp_path / "called").read_text().splitlines()
+    assert len(calls) == 2 and all("--no-ivt" in call and "-merrata=exch" in call for call in calls)
+    assert "vectors.s" in calls[0] and "jump_table.s" in calls[1] and "aivt" not in calls[1]
+    for name, origin in (("loader", "0x200, LENGTH = 0x1E00"), ("application", "0x2280, LENGTH = 0x13580")):
+        script = (tmp_path / "out" / f"{name}.gld").read_text()
+        assert f"ORIGIN = {origin}" in script and "ivt" not in script and ".text" in script
+    assert (tmp_path / "out/node.whex").exists() and (tmp_path / "out/node_wire.hex").exists()
+
+
+def test_both_tables_of_vectors_name_the_same_interrupts():
+    tables = {}
+    for name, keyword in (("jump_table.s", "goto"), ("vectors.s", ".pword")):
+        found, lines = [], (FIRMWARE / "port_dspic/chip" / name).read_text().splitlines()
+        for line in lines[[n for n, text in enumerate(lines) if "address(" in text][-1] :]:
+            if entries := re.match(r"\s+unserved (\d+)", line):
+                found += [None] * int(entries.group(1))
+            elif entry := re.match(rf"\s+{re.escape(keyword)}\s+(?:paddr\()?__(?:Alt)?(\w+)", line):
+                found.append(entry.group(1))
+        tables[name] = found
+    assert tables["jump_table.s"].pop(0) == "resetPRI"
+    assert tables["jump_table.s"] == tables["vectors.s"] and len(tables["vectors.s"]) == 126
+    interrupts = [name for name in tables["vectors.s"] if name]
+    assert set(interrupts) == set(
+        re.findall(r"HANDLER\((\w+)\)\(void\)", (FIRMWARE / "port_dspic/chip/main.c").read_text())
+    )
 
 
 def test_a_library_call_in_the_sample_path_is_found():

@@ -1,9 +1,10 @@
 #!/bin/sh
 # Builds the node's firmware with XC16 or XC-DSC: build/firmware/node.whex (for `whisker flash`) and node_wire.hex (for
-# `make flash`). Not yet run on silicon: the image's build options say so. Environment: VERSION (0.1), MDFP (device pack).
+# `make flash`). Not yet run on silicon: the image's build options say so.
+# Environment: VERSION (0.1), MDFP (device pack), OUT (where to).
 set -eu
 cd "$(dirname "$0")/.."
-out=build/firmware
+out=${OUT:-build/firmware}
 fw=firmware/dspic
 compiler=$(command -v xc16-gcc || command -v xc-dsc-gcc || true)
 if [ -z "$compiler" ]; then
@@ -14,12 +15,13 @@ fi
 tools=${compiler%gcc}
 mkdir -p "$out"
 
-# The compiler's own linker script, with the program memory of one of the two.
+# The compiler's own linker script, with the program memory of one of the two, and without the vector tables that older
+# ones bring: vectors.s and the jump table take their place.
 script() { # name origin end
     gld=$(find "$(dirname "$compiler")/.." ${MDFP:+"$MDFP"} -name p33FJ128MC802.gld | head -1)
     [ -n "$gld" ] || { echo 'firmware: no p33FJ128MC802.gld; name the device pack with MDFP=FOLDER' >&2; exit 1; }
-    sed -E "s/(program *\(xr\) *: *ORIGIN *= *)0x[0-9A-Fa-f]+, *LENGTH *= *0x[0-9A-Fa-f]+/\1$2, LENGTH = $(printf '0x%X' $(($3 - $2)))/" \
-        "$gld" >"$out/$1.gld"
+    sed -E -e "s/(program *\(xr\) *: *ORIGIN *= *)0x[0-9A-Fa-f]+, *LENGTH *= *0x[0-9A-Fa-f]+/\1$2, LENGTH = $(printf '0x%X' $(($3 - $2)))/" \
+        -e '/\.a?ivt +__A?IVT_BASE/,/\} *> *a?ivt/d' "$gld" >"$out/$1.gld"
     grep -q "ORIGIN = $2" "$out/$1.gld" || { echo "firmware: $gld: no program region to move" >&2; exit 1; }
 }
 
@@ -39,7 +41,7 @@ script loader 0x200 0x2000
 script application 0x2280 0x15800
 rm -f "$out"/*.elf "$out"/*.hex
 build loader -DNODE_LOADER $fw/port_dspic/chip/config.c $fw/port_dspic/chip/vectors.s
-build application -Wl,--no-aivt $fw/port_dspic/chip/jump_table.s
+build application '' $fw/port_dspic/chip/jump_table.s
 .venv/bin/python tools/check_listing.py "$out/application.lst"
 # Option bit 15: not yet run on silicon.
 .venv/bin/python tools/make_image.py image "$out/application.hex" "$out/node.whex" --version "${VERSION:-0.1}" --options 0x8000

@@ -45,6 +45,7 @@ void system_pll_event(struct dspic *chip)
     if (wanted == OSC_FRC_PLL)
         *osccon |= OSCCON_LOCK;
     system_clock(chip);
+    watchdog_restart(chip);
 }
 
 void watchdog_restart(struct dspic *chip)
@@ -59,7 +60,7 @@ void dspic_clear_watchdog(struct dspic *chip)
     dspic_spend(chip, 1u);
 }
 
-/* The model's time passes in dspic_run_until. The watchdog begins anew here too (C). */
+/* The model's time passes in dspic_run_until. The watchdog begins anew here too, as at its end (A). */
 void dspic_idle(struct dspic *chip)
 {
     chip->idle = true;
@@ -68,9 +69,11 @@ void dspic_idle(struct dspic *chip)
 
 void system_wake(struct dspic *chip)
 {
-    if (chip->idle)
-        *sfr(chip, RCON) |= RCON_IDLE;
+    if (!chip->idle)
+        return;
+    *sfr(chip, RCON) |= RCON_IDLE;
     chip->idle = false;
+    watchdog_restart(chip);
 }
 
 /* It wakes an idle CPU and resets any other (C). */

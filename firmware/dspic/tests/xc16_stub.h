@@ -3,7 +3,7 @@
 #define XC16_STUB_H
 
 #define interrupt unused /* attributes: on other machines they mean something else */
-#define no_auto_psv unused
+#define auto_psv unused
 
 void __builtin_write_OSCCONH(int value);
 void __builtin_write_OSCCONL(int value);

@@ -164,6 +164,37 @@ static void the_watchdog_wakes_an_idle_cpu_and_lets_it_go_on(void **state)
     assert_int_equal(get(RCON), RCON_SWDTEN | RCON_WDTO | RCON_IDLE);
 }
 
+static void what_wakes_the_cpu_begins_the_watchdogs_time_anew(void **state)
+{
+    (void)state;
+    set(RCON, RCON_SWDTEN);
+    enable(IRQ_T1, 4);
+    put(PR1, 46062); /* 100 ms at 8 cycles a count */
+    put(T1CON, TCON_TON | 1u << TCON_TCKPS_SHIFT);
+    dspic_idle(bench.chip);
+    pass(101u * MS);
+    assert_int_equal(bench.loops, 1);
+    pass(100u * MS);
+    assert_int_equal(bench.starts, 1);
+    pass(60u * MS);
+    assert_int_equal(bench.starts, 2);
+}
+
+static void a_clock_switch_begins_the_watchdogs_time_anew(void **state)
+{
+    (void)state;
+    struct dspic_parameters parameters = standard();
+    parameters.pll_lock_us = 50000;
+    power(&parameters);
+    set(RCON, RCON_SWDTEN);
+    pass(60u * MS);
+    pll(); /* done 110 ms after the watchdog began */
+    pass(170u * MS);
+    assert_int_equal(bench.starts, 1);
+    pass(20u * MS);
+    assert_int_equal(bench.starts, 2);
+}
+
 static void the_watchdog_resets_an_idle_cpu_that_stands_still(void **state)
 {
     (void)state;
@@ -234,6 +265,8 @@ int main(void)
         TEST(the_oscillators_error_is_the_clocks),
         TEST(the_watchdog_sleeps_until_it_is_switched_on),
         TEST(the_watchdog_wakes_an_idle_cpu_and_lets_it_go_on),
+        TEST(what_wakes_the_cpu_begins_the_watchdogs_time_anew),
+        TEST(a_clock_switch_begins_the_watchdogs_time_anew),
         TEST(the_watchdog_resets_an_idle_cpu_that_stands_still),
         TEST(the_watchdog_resets_a_cpu_that_idles_in_an_interrupt),
         TEST(a_reset_restores_the_registers_and_adds_its_cause),

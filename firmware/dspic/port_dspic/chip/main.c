@@ -9,7 +9,8 @@
  */
 static struct board board __attribute__((persistent, address(0x0800)));
 
-#define VECTOR __attribute__((interrupt, no_auto_psv))
+/* The constants that an interrupt reads (a busy answer, tables) lie behind PSV: auto_psv sets its page, four cycles. */
+#define VECTOR __attribute__((interrupt, auto_psv))
 
 #ifdef NODE_LOADER
 #define HANDLER(name) _Alt##name
