@@ -267,28 +267,15 @@ static void estimate(const void *self, struct nav_estimate *out)
                  adaptive_log_bytes(&a->log) + 2 * (size_t)a->cloud.room * sizeof *a->cloud.at;
 }
 
-static long list_global(const struct adaptive *a, double share, struct nav_component *out, long from, long room)
-{
-    const struct adaptive_global *g = &a->global;
-    struct nav_pose moved = nav_compose(ahead(a), a->pending);
-    for (size_t n = 0; n < adaptive_global_cells(g); n++) {
-        double mass = g->fresh ? 1.0 / (double)adaptive_global_cells(g) : (double)g->mass[n] / g->total;
-        if (!(mass > 0.0))
-            continue;
-        if (from < room)
-            out[from] = (struct nav_component){nav_compose(adaptive_global_centre(g, n), moved), g->cell / sqrt(12.0),
-                                               g->cell_theta / sqrt(12.0), share * mass};
-        from++;
-    }
-    return from;
-}
-
 static long components(const void *self, struct nav_component *out, long room)
 {
     const struct adaptive *a = self;
     double share = a->awake ? elsewhere(a) : 0.0;
     long count = a->local ? adaptive_cloud_list(&a->cloud, a->pending, 1.0 - share, out, room) : 0;
-    return a->awake ? list_global(a, share, out, count, room) : count;
+    if (!a->awake)
+        return count;
+    long left = room > count ? room - count : 0;
+    return count + adaptive_global_list(&a->global, &a->log, a->pending, share, left ? out + count : NULL, left);
 }
 
 const struct nav_filter_ops nav_adaptive_filter = {.name = "adaptive",

@@ -94,6 +94,12 @@ double adaptive_global_near(const struct adaptive_global *, struct nav_pose, str
 /* Works out summary, scattered and crowd; at the end of a job. */
 void adaptive_global_summarise(struct adaptive_global *);
 
+/* Lists cells as nav_filter_components does, at the end of the log and then moved by `moved`, masses times `mass`.
+ * Where a job is under way, slices that it has done are read after its rows and the others before them; headings keep
+ * the shares that they had. */
+long adaptive_global_list(const struct adaptive_global *, const struct adaptive_log *, struct nav_pose moved,
+                          double mass, struct nav_component *out, long room);
+
 /* Centre of cell n. */
 struct nav_pose adaptive_global_centre(const struct adaptive_global *, size_t n);
 

@@ -117,6 +117,30 @@ static void a_seed_gives_the_same_bytes_and_another_seed_others(void **state)
     assert_memory_not_equal(&e[0].pose, &e[2].pose, sizeof e[0].pose);
 }
 
+/* Masses of the belief as listed, which no state, not even half a job of the histogram, may leave short of 1. */
+static void masses_sum_to_one_in_every_row(void **state)
+{
+    (void)state;
+    struct wander w = wander_new(81);
+    w.problem.prior.uniform = true;
+    assert_int_equal(nav_settings_set(&w.problem.settings, "adaptive.budget", 40000.0), 0);
+    struct nav_filter *f = nav_filter_new("adaptive", &w.problem);
+    struct nav_component *c = calloc(ROOM, sizeof *c);
+    for (int k = 0; k < 150; k++) {
+        if (k == 80)
+            w.pose = FAR;
+        run(f, &w, 1, 40000.0);
+        long n = nav_filter_components(f, c, ROOM);
+        assert_true(n <= ROOM && n == nav_filter_components(f, NULL, 0));
+        double sum = 0.0;
+        for (long i = 0; i < n; i++)
+            sum += c[i].mass;
+        assert_near(sum, 1.0, 1e-3);
+    }
+    free(c);
+    nav_filter_free(f);
+}
+
 /* Belief within 0.3 m of a pose's place and 1 rad of its heading. */
 static double mass_near(const struct nav_component *c, long n, struct nav_pose pose)
 {
@@ -211,6 +235,7 @@ int main(void)
         cmocka_unit_test(spinning_wheels_do_not_lose_it),
         cmocka_unit_test(no_row_takes_more_than_its_budget),
         cmocka_unit_test(a_seed_gives_the_same_bytes_and_another_seed_others),
+        cmocka_unit_test(masses_sum_to_one_in_every_row),
         cmocka_unit_test(twins_neither_drift_nor_die),
         cmocka_unit_test(what_is_not_read_makes_it_no_surer),
         cmocka_unit_test(a_prior_inside_a_box_starts_with_the_whole_arena),
