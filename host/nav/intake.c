@@ -140,9 +140,10 @@ static double take_texture(struct nav_intake *in, int tip, const double *loglik)
         in->empty++;
         return 0.0;
     }
+    /* That a whisker has hardly moved and that errors repeat are two accounts of one thing: the stronger one counts. */
     double weight = novelty(in->moved[tip], in->problem->settings.texture_spacing_m);
     if (weight > 0.0)
-        weight *= nav_repeat_take(&in->repeat, tip, best_of(out, classes), in->moved[tip]);
+        weight = fmin(weight, nav_repeat_take(&in->repeat, tip, best_of(out, classes), in->moved[tip]));
     in->moved[tip] = 0.0;
     return weight;
 }
