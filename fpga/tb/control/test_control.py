@@ -117,6 +117,50 @@ async def refuses_and_changes_nothing(dut, change):
     assert settings(dut) == DEFAULTS
 
 
+def legal(values: dict[str, int]) -> bool:
+    """What the protocol's definition says of the report's values."""
+    divider = values["sck_divider"]
+    return (
+        values["run"] <= 1
+        and LIMITS["sck_divider_min"] <= divider <= LIMITS["sck_divider_max"]
+        and divider % 2 == 0
+        and values["word_gap"] >= LIMITS["word_gap_min"]
+        and 1 <= values["sample_point"] <= divider
+        and values["lane_mask"] < 1 << LANES
+        and values["tick_period"] >= LIMITS["tick_period_min"]
+    )
+
+
+def random_values() -> dict[str, int]:
+    """Any bytes at all in some fields, what is allowed in the others."""
+    divider = random.randrange(LIMITS["sck_divider_min"], LIMITS["sck_divider_max"] + 1, 2)
+    right = {
+        "run": random.getrandbits(1),
+        "sck_divider": divider,
+        "word_gap": random.randrange(LIMITS["word_gap_min"], 256),
+        "sample_point": random.randint(1, divider),
+        "lane_mask": random.getrandbits(LANES),
+        "tick_period": random.randrange(LIMITS["tick_period_min"], 1 << 32),
+    }
+    bits = {"lane_mask": 32, "tick_period": 32}
+    return {n: random.getrandbits(bits.get(n, 8)) if random.random() < 0.05 else value for n, value in right.items()}
+
+
+@cocotb.test(timeout_time=5, timeout_unit="ms")
+async def random_reports_are_taken_whole_or_not_at_all(dut):
+    await begin(dut)
+    wanted = dict(DEFAULTS)
+    verdicts = set()
+    for _ in range(200):
+        values = random_values()
+        accepted, _, _ = await send(dut, report(**values))
+        assert accepted == legal(values), values
+        verdicts.add(accepted)
+        wanted = values if accepted else wanted
+        assert settings(dut) == wanted
+    assert verdicts == {True, False}
+
+
 @cocotb.test(timeout_time=1, timeout_unit="ms")
 @cocotb.parametrize(length=[0, 1, 15, 17, 32, 63])
 async def refuses_a_wrong_length(dut, length):
