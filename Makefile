@@ -4,7 +4,7 @@ BUILD := build/release
 PYTHON := .venv/bin/python
 SOURCES_C = $(shell git ls-files '*.c' '*.h' '*.cpp' | grep -v '/gen/')
 
-.PHONY: help demo test test-all bench build setup gen firmware flash bitstream format lint clean
+.PHONY: help demo test test-all test-kernel bench build setup gen firmware flash bitstream format lint clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
@@ -17,6 +17,9 @@ test: build lint ## everything that fits in 15 minutes on two cores
 
 test-all: test ## and what is long: sanitizers over the whole tree, longer fuzzing
 	@tools/run_tests.sh --long
+
+test-kernel: build ## a stock Debian kernel in QEMU meets the simulated bridge, over usbredir and USB/IP: about ten minutes
+	@WHISKER_BUILD=$(BUILD) $(PYTHON) tests/kernel/run.py
 
 bench: build ## measure speed and accuracy again, as ratios in one run: bench/results, docs/charts
 	@$(PYTHON) tools/run_benches.py --build-dir $(BUILD)

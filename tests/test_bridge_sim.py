@@ -1,7 +1,10 @@
 """`whisker bridge-sim`: what a user without hardware starts, watched with the commands a user has."""
 
+import re
+import socket
 import subprocess
 import sys
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
@@ -9,6 +12,7 @@ from chainrun import BUILD, END_S
 
 from whisker.bridgesim import SimulationError, read_faults
 from whisker.cli import main
+from whisker.protocol import LIMITS
 from whisker.recording import read
 from whisker.ring import FRAME
 
@@ -70,6 +74,46 @@ def test_more_lanes_than_the_scene_has_are_at_rest(build, tmp_path):
     assert (np.abs(frames["lane"]["alpha"][50:-1, 7].astype(int) - 0x8000) < 2000).all()
 
 
+@contextmanager
+def served(protocol: str):
+    """A connection to the device that bridge-sim serves so; at the end bridge-sim is stopped as a user stops it."""
+    words = command("bridge-sim", f"--{protocol}", 0)
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        said = process.stdout.readline()
+        found = re.match(rf"the bridge is served by {protocol} on port (\d+) of this machine; try: ", said)
+        assert found, said + process.stderr.read()
+        with socket.create_connection(("127.0.0.1", int(found[1])), END_S) as link:
+            yield link
+        process.terminate()
+        assert process.wait(END_S) == 0
+
+
+def test_usbip_lists_the_bridge_of_the_verilog(build):
+    with served("usbip") as link:
+        link.sendall(bytes.fromhex("0111800500000000"))
+        answer = link.makefile("rb").read(12 + 312 + 2 * 4)
+    assert answer[:12] == bytes.fromhex("011100050000000000000001")
+    device = answer[12 + 256 + 32 : 12 + 312]
+    identity = LIMITS["usb_vendor_id"].to_bytes(2, "big") + LIMITS["usb_product_id"].to_bytes(2, "big")
+    assert device[:12] == bytes.fromhex("000000010000000200000003") and device[12:16] == identity
+    assert (answer[12 + 312], answer[12 + 312 + 4]) == (0xFF, 0x03)  # vendor's and HID's class
+
+
+def test_usbredir_says_hello_and_the_device_follows(build):
+    """Headers of 12 bytes until both ends have said that they can do more: type, length, id, little-endian."""
+    with served("usbredir") as link:
+        stream = link.makefile("rb")
+        kind, length = (int.from_bytes(stream.read(4), "little") for _ in range(2))
+        assert kind == 0 and length == 64 + 4
+        assert stream.read(4 + length)[4:].startswith(b"whisker-bridge-sim")
+        link.sendall(b"".join(n.to_bytes(4, "little") for n in (0, 64, 0)) + b"test".ljust(64, b"\0"))
+        kinds = []
+        for _ in range(3):
+            kinds.append(int.from_bytes(stream.read(4), "little"))
+            stream.read(4 + int.from_bytes(stream.read(4), "little"))
+    assert kinds == [5, 4, 1]  # endpoints, interfaces, device
+
+
 def test_wrong_use_is_one_line(capsys, build, tmp_path):
     faults = tmp_path / "faults.toml"
     faults.write_text("[[fault]]\ntick = 1\nlane = 9\nkind = 'link_dead'\n")
@@ -80,6 +124,17 @@ def test_wrong_use_is_one_line(capsys, build, tmp_path):
     with pytest.raises(SystemExit):
         main(["bridge-sim", "--lanes", "29"])
     assert "'29' is not a whole number from 1 to 28" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        main(["bridge-sim", "--usbip", "--usbredir"])
+    assert "not allowed with argument" in capsys.readouterr().err
+
+
+def test_a_port_that_is_taken_is_one_line(build):
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        done = subprocess.run(command("bridge-sim", "--usbip", port), capture_output=True, text=True, timeout=END_S)
+    assert done.returncode == 1 and f"port {port} of 127.0.0.1 cannot be listened on" in done.stderr
+    assert done.stderr.count("\n") == 1
 
 
 @pytest.mark.parametrize(

@@ -27,6 +27,8 @@ if [ "${1:-}" = --long ]; then
     build/release/host/libwhisker/test/stress_ring 100000
     echo "test: mutated recordings"
     .venv/bin/python host/python/tests/fuzz_recording.py --inputs 300000
+    echo "test: a Linux kernel and the simulated bridge"
+    WHISKER_BUILD=build/release .venv/bin/python tests/kernel/run.py
     exit 0
 fi
 with_preset "$(basename "$1")"

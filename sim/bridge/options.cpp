@@ -37,7 +37,9 @@ enum Option {
     WORD_GAP,
     SAMPLE_POINT,
     SPEED_REPORT,
-    DEFECT
+    DEFECT,
+    USBIP,
+    USBREDIR
 };
 
 const option LONG_OPTIONS[] = {{"help", no_argument, nullptr, HELP},
@@ -60,6 +62,8 @@ const option LONG_OPTIONS[] = {{"help", no_argument, nullptr, HELP},
                                {"sample-point", required_argument, nullptr, SAMPLE_POINT},
                                {"speed-report", required_argument, nullptr, SPEED_REPORT},
                                {"defect", required_argument, nullptr, DEFECT},
+                               {"usbip", required_argument, nullptr, USBIP},
+                               {"usbredir", required_argument, nullptr, USBREDIR},
                                {nullptr, 0, nullptr, 0}};
 
 uint64_t whole_number(const char *name, const char *text, uint64_t least, uint64_t most)
@@ -151,6 +155,16 @@ void set_number(Options &options, int option, const char *text)
     }
 }
 
+void set_port(Options &options, Serve serve, const char *text)
+{
+    if (options.serve != Serve::COMMAND) {
+        throw std::runtime_error("--usbip and --usbredir: give one of them, once");
+    }
+    options.serve = serve;
+    options.port =
+        static_cast<uint16_t>(whole_number(serve == Serve::USBIP ? "usbip" : "usbredir", text, 0, UINT16_MAX));
+}
+
 void set_option(Options &options, int option, const char *text)
 {
     if (set_flag(options, option)) {
@@ -160,6 +174,8 @@ void set_option(Options &options, int option, const char *text)
         *path = text;
     } else if (option == DEFECT) {
         options.defect = Defect::parse(text);
+    } else if (option == USBIP || option == USBREDIR) {
+        set_port(options, option == USBIP ? Serve::USBIP : Serve::USBREDIR, text);
     } else {
         set_number(options, option, text);
     }
@@ -174,15 +190,20 @@ void require(bool ok, const char *message)
 
 void check(const Options &options)
 {
+    const bool served = options.serve != Serve::COMMAND;
     require(options.seconds > 0, "--seconds is missing: say how long the run is, for example --seconds 10");
     require(options.link.sample_point <= options.link.sck_divider, "--sample-point is beyond --sck-divider: lower it");
     require(options.usb_faults.empty() || !options.faults.empty(), "--usb-faults needs --faults: give both or neither");
     if (options.bench) {
         require(options.command.empty(), "--bench runs no command: leave out what stands after --");
+        require(!served, "--bench has a host of its own: leave out --usbip and --usbredir");
         return;
     }
     require(!options.scene.empty(), "--scene is missing: give a flat scene file, or --bench");
-    require(!options.command.empty(), "the command is missing: give it after --, for example -- whiskerd --ring demo");
+    require(served || !options.command.empty(),
+            "the command is missing: give it after --, for example -- whiskerd --ring demo");
+    require(!served || options.command.empty(),
+            "a device that is served has no command here: leave out what stands after --");
     require(!options.unplugged || !options.socket.empty(), "--unplugged needs --socket: say where 'plug' comes from");
     require(options.followers == 0 || !options.socket.empty(), "--followers needs --socket: say where they connect");
 }
@@ -223,10 +244,11 @@ Options parse_options(int argc, char **argv)
 const char *usage()
 {
     return "usage: umockdev-wrapper whisker-bridge-sim --scene FLAT --seconds S [options] -- COMMAND...\n"
+           "       whisker-bridge-sim --scene FLAT --seconds S --usbip PORT | --usbredir PORT [options]\n"
            "       whisker-bridge-sim --bench --seconds S [options]\n"
            "\n"
-           "Simulates robot, nodes and bridge (RTL) as a USB device that COMMAND, and only it, sees. No tick is "
-           "produced\n"
+           "Simulates robot, nodes and bridge (RTL) as a USB device that COMMAND, and only it, sees, or a Linux "
+           "kernel. No tick is produced\n"
            "before the earlier ones are taken, so the same seed gives the same frames on any machine.\n"
            "\n"
            "  --scene FLAT          flat scene file: arena, robot, start pose\n"
@@ -245,6 +267,9 @@ const char *usage()
            "  --speed-report OUT.json  ticks, clock cycles, wall seconds, fault counts\n"
            "  --defect KIND         misbehave: wire-version (claims another), frame (damages one) or truncate (cuts "
            "one)\n"
+           "  --usbip PORT          serve the device by USB/IP on this port of 127.0.0.1 (0: a free one, which is "
+           "printed)\n"
+           "  --usbredir PORT       serve it by usbredir, for QEMU's usb-redir\n"
            "  --unplugged           begin without the bridge, until 'plug' comes by the socket\n"
            "  --progress            a line 'progress TICK TICKS' every simulated second (default on a terminal)\n"
            "  --bench               no COMMAND, no umockdev: an internal host reads and checks every frame\n"
@@ -252,7 +277,8 @@ const char *usage()
            "5)\n"
            "  --help                this text\n"
            "\n"
-           "Exit code: COMMAND's; 1 if the run could not be completed; 2 for a wrong command line.\n"
+           "Exit code: COMMAND's (0 for a device that was served until a signal came); 1 if the run could not be "
+           "completed; 2 for a wrong command line.\n"
            "\n"
            "example: umockdev-wrapper whisker-bridge-sim --scene arena.flat --seconds 10 --seed 7 --faults faults.csv "
            "\\\n"

@@ -10,6 +10,9 @@
 namespace bridge_sim
 {
 
+// Who gets the device: a command under umockdev, or whoever connects to a port.
+enum class Serve { COMMAND, USBIP, USBREDIR };
+
 struct Options {
     bool help = false;
     bool bench = false;
@@ -29,6 +32,8 @@ struct Options {
     size_t lanes_populated = 0; // 0: as many as the scene has whiskers
     BenchSettings link;         // SCK divider, word gap and sample point: bench only, else the host software sets them
     DefectKind defect = DefectKind::NONE;
+    Serve serve = Serve::COMMAND;
+    uint16_t port = 0; // of 127.0.0.1; 0: any that is free
     std::vector<std::string> command;
 
     uint64_t ticks() const;

@@ -10,6 +10,9 @@
 #include <unistd.h>
 
 #include "fault_list.h"
+#include "usbfs_server.h"
+#include "usbip_server.h"
+#include "usbredir_server.h"
 
 namespace bridge_sim
 {
@@ -74,6 +77,27 @@ std::optional<FaultPlan> plan_of(const Options &options, const sim_scene &scene)
     return FaultPlan(options.seed, populated(options, scene), options.ticks());
 }
 
+// A server says where it listens, for port 0 takes a free one.
+template <typename Server> std::unique_ptr<DevicePort> make_server(const char *protocol, uint16_t port)
+{
+    auto server = std::make_unique<Server>(port);
+    std::printf("serving %s at 127.0.0.1:%u\n", protocol, server->port());
+    std::fflush(stdout);
+    return server;
+}
+
+std::unique_ptr<DevicePort> make_port(const Options &options)
+{
+    switch (options.serve) {
+    case Serve::USBIP:
+        return make_server<UsbipServer>("usbip", options.port);
+    case Serve::USBREDIR:
+        return make_server<UsbredirServer>("usbredir", options.port);
+    default:
+        return std::make_unique<UsbfsServer>();
+    }
+}
+
 } // namespace
 
 void Simulation::WorldDeleter::operator()(sim_world *world) const
@@ -92,7 +116,7 @@ Simulation::Simulation(const Options &options)
     if (!world_) {
         throw std::runtime_error(options.scene + ": no world can be made of it: a texture has no known parameters");
     }
-    usbfs_ = std::make_unique<UsbfsServer>();
+    port_ = make_port(options);
     scheduler_.plug(false);
     if (!options.unplugged) {
         plug();
@@ -102,14 +126,16 @@ Simulation::Simulation(const Options &options)
 Simulation::~Simulation()
 {
     child_.reset();
-    usbfs_.reset();
+    port_.reset();
     close(signals_);
 }
 
 int Simulation::run()
 {
-    child_ = std::make_unique<Child>(options_.command);
-    while (!child_->ended()) {
+    if (options_.serve == Serve::COMMAND) {
+        child_ = std::make_unique<Child>(options_.command);
+    }
+    while (!ended()) {
         const bool progress = advance();
         deliver_completed();
         wait(progress ? 0 : IDLE_WAIT_MS);
@@ -118,10 +144,15 @@ int Simulation::run()
     return verdict();
 }
 
+bool Simulation::ended() const
+{
+    return child_ ? child_->ended() : over_;
+}
+
 // One step of whatever is due; false: all is waiting for others.
 bool Simulation::advance()
 {
-    if (over_ && now_s() > killed_at_s_) {
+    if (over_ && child_ && now_s() > killed_at_s_) {
         child_->kill();
         throw std::runtime_error("the command did not end when asked to: killed");
     }
@@ -193,7 +224,9 @@ void Simulation::end_run()
     if (!over_) {
         close_run();
         killed_at_s_ = now_s() + END_PATIENCE_S;
-        child_->ask_to_end();
+        if (child_) {
+            child_->ask_to_end();
+        }
     }
 }
 
@@ -225,7 +258,7 @@ void Simulation::plug()
         throw std::runtime_error(std::string("the bridge does not enumerate: ") + error);
     }
     scheduler_.plug(true);
-    usbfs_->plug(descriptors);
+    port_->plug(descriptors);
     plugged_ = true;
 }
 
@@ -238,14 +271,14 @@ void Simulation::unplug()
     runner_.unplugged();
     rig_.forget_frames();
     deliver_completed();
-    usbfs_->unplug();
+    port_->unplug();
     take_requests(); // those handed in meanwhile end as well
     plugged_ = false;
 }
 
 void Simulation::take_requests()
 {
-    for (UsbfsRequest &request : usbfs_->take_requests()) {
+    for (DeviceRequest &request : port_->take_requests()) {
         if (request.discard) {
             scheduler_.discard(request.urb.id);
         } else {
@@ -257,13 +290,17 @@ void Simulation::take_requests()
 void Simulation::deliver_completed()
 {
     std::vector<Urb> urbs = scheduler_.take_completed();
+    if (urbs.empty()) {
+        return;
+    }
     defect_.spoil(urbs);
-    usbfs_->deliver(std::move(urbs));
+    port_->deliver(std::move(urbs));
+    take_requests();
 }
 
 void Simulation::wait(int timeout_ms)
 {
-    std::vector<pollfd> descriptors = {{signals_, POLLIN, 0}, {usbfs_->wake_descriptor(), POLLIN, 0}};
+    std::vector<pollfd> descriptors = {{signals_, POLLIN, 0}, {port_->wake_descriptor(), POLLIN, 0}};
     followers_.add_to(descriptors);
     if (poll(descriptors.data(), descriptors.size(), timeout_ms) <= 0) {
         return;
@@ -308,10 +345,10 @@ void Simulation::finish()
 
 int Simulation::verdict() const
 {
-    if (child_->exit_code() != 0) {
+    if (child_ && child_->exit_code() != 0) {
         return child_->exit_code();
     }
-    if (stopped_ || tick_ < total_) {
+    if (child_ && (stopped_ || tick_ < total_)) {
         throw std::runtime_error("the run ended after " + std::to_string(tick_) + " of " + std::to_string(total_) +
                                  " ticks");
     }

@@ -1,5 +1,6 @@
-// The whole simulated robot as a USB device beside a running command: decides when a tick may be produced, produces it,
-// and serves USB and the socket in between. Simulated time leads; the machine's speed changes nothing that is recorded.
+// The whole simulated robot as a USB device beside a running command, or served by USB/IP or usbredir: decides when a
+// tick may be produced, produces it, and serves USB and the socket in between. Simulated time leads; the machine's
+// speed changes nothing that is recorded.
 #pragma once
 
 #include <array>
@@ -7,11 +8,11 @@
 
 #include "child.h"
 #include "defect.h"
+#include "device_port.h"
 #include "follower_server.h"
 #include "options.h"
 #include "speed_report.h"
 #include "truth_log.h"
-#include "usbfs_server.h"
 
 namespace bridge_sim
 {
@@ -19,14 +20,15 @@ namespace bridge_sim
 class Simulation
 {
   public:
-    // Reads the scene, builds the world, enumerates the bridge and shows it to umockdev. Blocks SIGCHLD, SIGINT and
-    // SIGTERM for good: they are read in run(). Throws std::runtime_error with one line.
+    // Reads the scene, builds the world, enumerates the bridge and shows it to umockdev, or serves it. Blocks SIGCHLD,
+    // SIGINT and SIGTERM for good: they are read in run(). Throws std::runtime_error with one line.
     explicit Simulation(const Options &options);
     ~Simulation();
     Simulation(const Simulation &) = delete;
     Simulation &operator=(const Simulation &) = delete;
 
-    // The run, from the command's start to its end. Returns its exit code, or 1 if it ended too soon.
+    // The run, from the command's start to its end. Returns its exit code, or 1 if it ended too soon. A device that is
+    // served has no command: the run ends with its time, or, as well, by a signal.
     int run();
 
   private:
@@ -34,6 +36,7 @@ class Simulation
         void operator()(sim_world *world) const;
     };
 
+    bool ended() const;
     bool advance();
     bool may_tick();
     void produce_tick();
@@ -64,7 +67,7 @@ class Simulation
     TruthLog truth_;
     FollowerServer followers_;
     Defect defect_;
-    std::unique_ptr<UsbfsServer> usbfs_;
+    std::unique_ptr<DevicePort> port_;
     std::unique_ptr<Child> child_;
     std::array<sim_field, LANES> fields_{};
     uint64_t total_;

@@ -69,10 +69,10 @@ void require(bool ok, GError *error, const std::string &what)
 // Shared with umockdev's thread.
 struct UsbfsServer::State {
     std::mutex mutex;
-    std::vector<UsbfsRequest> inbox;
+    std::vector<DeviceRequest> inbox;
     GMainContext *context = nullptr; // of umockdev's thread, known from the first ioctl on
     int wake = -1;
-    UsbfsSession session{[this](UsbfsRequest request) { post(std::move(request)); }};
+    UsbfsSession session{[this](DeviceRequest request) { post(std::move(request)); }};
     UMockdevTestbed *testbed = nullptr;
     UMockdevIoctlBase *handler = nullptr;
     unsigned number = FIRST_NUMBER - 1; // of the device, now or before it was unplugged
@@ -83,7 +83,7 @@ struct UsbfsServer::State {
         close(wake);
     }
 
-    void post(UsbfsRequest request)
+    void post(DeviceRequest request)
     {
         const std::lock_guard<std::mutex> lock(mutex);
         inbox.push_back(std::move(request));
@@ -185,9 +185,9 @@ int UsbfsServer::wake_descriptor() const
     return state_->wake;
 }
 
-std::vector<UsbfsRequest> UsbfsServer::take_requests()
+std::vector<DeviceRequest> UsbfsServer::take_requests()
 {
-    std::vector<UsbfsRequest> taken;
+    std::vector<DeviceRequest> taken;
     const std::lock_guard<std::mutex> lock(state_->mutex);
     eventfd_t count = 0;
     eventfd_read(state_->wake, &count);

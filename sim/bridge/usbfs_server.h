@@ -6,40 +6,29 @@
 #include <memory>
 #include <vector>
 
-#include "urb_scheduler.h"
+#include "device_port.h"
 
 namespace bridge_sim
 {
 
-// What a client wants of the model.
-struct UsbfsRequest {
-    bool discard = false; // else submit
-    Urb urb;              // discard: only its id counts
-};
-
-class UsbfsServer
+class UsbfsServer : public DevicePort
 {
   public:
     // A fresh testbed without a device.
     // Throws std::runtime_error with one line if that fails (for one, outside umockdev-wrapper).
     UsbfsServer();
-    ~UsbfsServer();
+    ~UsbfsServer() override;
 
     // Adds the device with these descriptors under a number it has not had yet, and tells udev's listeners.
     // Throws std::runtime_error with one line if that fails.
-    void plug(const Descriptors &descriptors);
+    void plug(const Descriptors &descriptors) override;
 
     // Removes it and tells udev's listeners. Who has it open gets ENODEV once every result handed over is fetched.
-    void unplug();
+    void unplug() override;
 
-    // Readable when requests wait.
-    int wake_descriptor() const;
-
-    // Requests since the last call, in order.
-    std::vector<UsbfsRequest> take_requests();
-
-    // Hands ended transfers to the clients that wait for them.
-    void deliver(std::vector<Urb> completed);
+    int wake_descriptor() const override;
+    std::vector<DeviceRequest> take_requests() override;
+    void deliver(std::vector<Urb> completed) override;
 
   private:
     struct State;

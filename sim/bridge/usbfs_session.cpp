@@ -26,7 +26,7 @@ bool read_number(const UsbfsConnection &connection, unsigned &number)
 
 } // namespace
 
-UsbfsSession::UsbfsSession(std::function<void(UsbfsRequest)> post) : post_(std::move(post))
+UsbfsSession::UsbfsSession(std::function<void(DeviceRequest)> post) : post_(std::move(post))
 {
 }
 
@@ -51,7 +51,7 @@ void UsbfsSession::forget_closed()
         }
         for (auto owner = owners_.begin(); owner != owners_.end();) {
             if (owner->second == connection) {
-                UsbfsRequest request;
+                DeviceRequest request;
                 request.discard = true;
                 request.urb.id = owner->first;
                 post_(std::move(request));
@@ -129,7 +129,7 @@ void UsbfsSession::set_node(const std::string &node)
 
 void UsbfsSession::submit(UsbfsConnection &connection)
 {
-    UsbfsRequest request;
+    DeviceRequest request;
     const int error = connection.read_urb(request.urb);
     if (error == 0) {
         request.urb.id = next_id_++;
@@ -143,7 +143,7 @@ void UsbfsSession::submit(UsbfsConnection &connection)
 // The transfer then ends with -ENOENT and what it had received, unless it ends by itself first.
 void UsbfsSession::discard(UsbfsConnection &connection)
 {
-    UsbfsRequest request;
+    DeviceRequest request;
     request.discard = true;
     request.urb.id = connection.find(connection.argument());
     const bool found = request.urb.id != 0;
@@ -171,7 +171,7 @@ void UsbfsSession::completed(std::vector<Urb> urbs)
 
 void UsbfsSession::control(UsbfsConnection &connection, const SetupRequest &setup, bool bus_reset)
 {
-    UsbfsRequest request;
+    DeviceRequest request;
     request.urb.id = next_id_++;
     request.urb.kind = bus_reset ? UrbKind::BUS_RESET : UrbKind::CONTROL;
     request.urb.setup = setup;

@@ -18,7 +18,7 @@ class UsbfsSession
 {
   public:
     // post: hands a request to the model; may be called until the session's end.
-    explicit UsbfsSession(std::function<void(UsbfsRequest)> post);
+    explicit UsbfsSession(std::function<void(DeviceRequest)> post);
 
     // One ioctl of a client; answered now, or later when a transfer has ended.
     void ioctl(UMockdevIoctlClient *client);
@@ -42,7 +42,7 @@ class UsbfsSession
     void ioctl_of_lost_device(UsbfsConnection &connection);
     void forget_closed();
 
-    std::function<void(UsbfsRequest)> post_;
+    std::function<void(DeviceRequest)> post_;
     std::map<UMockdevIoctlClient *, std::unique_ptr<UsbfsConnection>> connections_;
     std::map<uint64_t, UsbfsConnection *> owners_;     // of transfers in the model
     std::map<unsigned, UsbfsConnection *> interfaces_; // claimed

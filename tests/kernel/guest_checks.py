@@ -1,0 +1,321 @@
+"""Runs inside the guest: what a user's programs do with the bridge. Speaks with the host by lines on a serial port:
+
+ok NAME: what, FAILED NAME: why, note WHAT, log LINE-OF-THE-KERNEL; ask WORD, answered by a line; end.
+"""
+
+import os
+import re
+import subprocess
+import sys
+import termios
+import time
+import traceback
+import tty
+from collections.abc import Callable
+from contextlib import contextmanager
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "host/python"))
+from whisker.protocol import LIMITS, REPORTS, WIRE_VERSION  # noqa: E402
+
+PORT = "/dev/ttyS1"
+HOST = "10.0.2.2"  # the machine that runs the guest, in QEMU's user network
+LONG_RUN_FRAMES = 20000
+SHORT_RUN_FRAMES = 2000
+PROGRAM_S = 600  # the guest is emulated, and may have half a processor
+PLUG_S = 120
+POLL_S = 0.05
+RING = "kernel"
+LINK = ["--sck-divider", "6", "--word-gap", "30", "--sample-point", "5"]
+IDENTITY = f"{LIMITS['usb_vendor_id']:04x}:{LIMITS['usb_product_id']:04x}"
+# What a kernel says when it does not like a device.
+COMPLAINT = re.compile(
+    r"(usb|hid|xhci|vhci|input).*(error|fail|unable|invalid|bogus|unexpect|not accept|can.t|cannot|warn|unknown|"
+    r"exceed|ignor|skip|timed? ?out|no config|malform|did not claim)",
+    re.IGNORECASE,
+)
+
+
+class CheckError(Exception):
+    """Something is not as it should be; the text says what."""
+
+
+class Talk:
+    """The lines exchanged with the host."""
+
+    def __init__(self):
+        self._port = os.open(PORT, os.O_RDWR | os.O_NOCTTY)
+        tty.setraw(self._port, termios.TCSANOW)
+
+    def say(self, kind: str, text: str = "") -> None:
+        os.write(self._port, f"{kind} {text}".strip().replace("\n", "; ").encode() + b"\n")
+
+    def ask(self, word: str) -> str:
+        """The host's answer; it does what was asked for before it answers."""
+        self.say("ask", word)
+        answer = b""
+        while not answer.endswith(b"\n"):
+            answer += os.read(self._port, 1)
+        return answer.decode().strip()
+
+
+class Checks:
+    """Runs checks one by one; a failed one does not keep the next from running."""
+
+    def __init__(self, talk: Talk, build: Path):
+        self.talk, self.build = talk, build
+
+    def run(self, name: str, check: Callable[["Checks"], str | None]) -> None:
+        """Run one; what it returns is told beside the name."""
+        began = time.monotonic()
+        try:
+            told = check(self)
+            self.talk.say(f"ok {name}:", f"{told or 'as it should be'} ({time.monotonic() - began:.1f} s)")
+        except (CheckError, OSError, subprocess.SubprocessError) as error:
+            self.talk.say(f"FAILED {name}:", str(error))
+        except Exception:
+            self.talk.say(f"FAILED {name}:", traceback.format_exc(limit=-2))
+
+    def program(self, name: str) -> str:
+        """Path of a program of the build."""
+        return next(str(path) for path in self.build.rglob(name) if path.is_file())
+
+
+def require(ok: bool, text: str) -> None:
+    """CheckError with this text unless it is so."""
+    if not ok:
+        raise CheckError(text)
+
+
+def command(*words: str) -> str:
+    """What a program printed; CheckError with its complaint if it did not end well."""
+    done = subprocess.run(words, capture_output=True, text=True, timeout=PROGRAM_S)
+    text = (done.stderr or done.stdout).strip().splitlines()
+    require(done.returncode == 0, f"{Path(words[0]).name}: exit code {done.returncode}: {' / '.join(text[-3:])}")
+    return done.stdout
+
+
+def kernel_log() -> list[str]:
+    """The kernel's messages since the start."""
+    return command("dmesg").splitlines()
+
+
+def device() -> Path | None:
+    """The bridge in sysfs."""
+    for vendor in Path("/sys/bus/usb/devices").glob("*/idVendor"):
+        if f"{vendor.read_text().strip()}:{(vendor.parent / 'idProduct').read_text().strip()}" == IDENTITY:
+            return vendor.parent
+    return None
+
+
+def await_state(there: bool) -> None:
+    """Until the bridge is there, with its hidraw node, or gone."""
+    for _ in range(int(PLUG_S / POLL_S)):
+        if there and device() and any(Path("/sys/class/hidraw").glob("*")):
+            return
+        if not there and not device():
+            return
+        time.sleep(POLL_S)
+    raise CheckError(f"the bridge is not {'there' if there else 'gone'} after {PLUG_S} s")
+
+
+# ------------------------------------------------------------------------------------------------------------- checks
+
+
+def enumerates(_: Checks) -> str:
+    """The kernel finds the device at high speed and binds its HID driver."""
+    await_state(True)
+    speed = (device() / "speed").read_text().strip()
+    driver = (next(device().glob("*:1.1")) / "driver").resolve().name
+    require(speed == "480", f"speed {speed} Mbit/s, not 480")
+    require(driver == "usbhid", f"driver {driver}, not usbhid")
+    return f"{(device() / 'product').read_text().strip()} at {speed} Mbit/s, {driver} bound, Linux {Path('/proc/sys/kernel/osrelease').read_text().strip()}"
+
+
+def lsusb(_: Checks) -> str:
+    """`lsusb -v` reads every descriptor, the HID report descriptor's place included."""
+    done = subprocess.run(["lsusb", "-v", "-d", IDENTITY], capture_output=True, text=True, timeout=PROGRAM_S)
+    wanted = ["Whisker bridge", "CrunchBot", "Vendor Specific Class", "Human Interface Device", "HID Device Descriptor"]
+    wanted += ["EP 1 IN", "EP 2 IN", "Device Qualifier"]
+    missing = [text for text in wanted if text not in done.stdout]
+    require(done.returncode == 0 and not missing, f"exit code {done.returncode}, missing: {', '.join(missing)}")
+    return f"{len(done.stdout.splitlines())} lines"
+
+
+def libusb_stream(checks: Checks) -> str:
+    """A libusb program streams; every frame's sequence, tick and CRCs are checked."""
+    return command(checks.program("kernel_usb_probe"), "stream", str(SHORT_RUN_FRAMES)).strip()
+
+
+def libusb_stall(checks: Checks) -> str:
+    """Unknown and refused requests end with EPIPE, and the next is served."""
+    return command(checks.program("kernel_usb_probe"), "stall").strip() + " after two stalls"
+
+
+def libusb_cancel(checks: Checks) -> str:
+    """Waiting transfers can be cancelled and time out."""
+    return command(checks.program("kernel_usb_probe"), "cancel").strip() + " after cancelled transfers"
+
+
+def libusb_reset(checks: Checks) -> str:
+    """A reset in the midst of a run."""
+    return command(checks.program("kernel_usb_probe"), "reset").strip() + " after a reset"
+
+
+def hidapi_hidraw(checks: Checks) -> None:
+    """Feature reports through the kernel's hidraw."""
+    await_state(True)
+    command(checks.program("kernel_hid_probe_hidraw"))
+
+
+def hidapi_libusb(checks: Checks) -> None:
+    """The same through libusb; the kernel's driver comes back afterwards."""
+    command(checks.program("kernel_hid_probe_libusb"))
+    await_state(True)
+
+
+def pyusb(_: Checks) -> str:
+    """Strings, a stalled request, a time-out, and a run through pyusb."""
+    import usb.core
+    import usb.util
+
+    bridge = usb.core.find(idVendor=LIMITS["usb_vendor_id"], idProduct=LIMITS["usb_product_id"])
+    bridge.default_timeout = PROGRAM_S * 1000  # a second, as by default, may be too short for an emulated guest
+    names = f"{bridge.manufacturer}, {bridge.product}, serial number {bridge.serial_number}"
+    hid = LIMITS["usb_hid_interface"]
+    bridge.detach_kernel_driver(hid)
+    try:
+        expect_usb_error(usb.core.USBError, lambda: bridge.ctrl_transfer(0xC0, 0x55, 0, 0, 8))
+        expect_usb_error(usb.core.USBTimeoutError, lambda: bridge.read(LIMITS["usb_bulk_in"], 512, 100))
+        frames = pyusb_run(bridge)
+    finally:
+        usb.util.dispose_resources(bridge)
+        bridge.attach_kernel_driver(hid)
+    await_state(True)
+    return f"{names}; {frames} frames"
+
+
+def expect_usb_error(kind: type, attempt: Callable) -> None:
+    """The attempt must fail so."""
+    try:
+        attempt()
+    except kind:
+        return
+    raise CheckError(f"no {kind.__name__} where one was due")
+
+
+def pyusb_run(bridge) -> int:
+    """Start, read, stop; the number of frames."""
+    control = REPORTS["control"]
+    settings = {"id": control.id, "wire_version": WIRE_VERSION, "lane_mask": (1 << LIMITS["lanes"]) - 1}
+    settings |= {"sck_divider": 6, "word_gap": 30, "sample_point": 5, "tick_period": LIMITS["tick_period"]}
+    for run in (1, 0):
+        report = control.pack(run=run, **settings)
+        bridge.ctrl_transfer(0x21, 0x09, 0x0300 | control.id, LIMITS["usb_hid_interface"], report, PROGRAM_S * 1000)
+        data = bridge.read(LIMITS["usb_bulk_in"], 512 * 64, PROGRAM_S * 1000)
+        if run:
+            taken = len(data)
+    require(data[-256 + 3] & 1, "the last frame is not marked as the last")
+    return (taken + len(data)) // 256
+
+
+@contextmanager
+def daemon(checks: Checks):
+    """whiskerd on the bridge, stopped as a service manager stops it."""
+    words = [checks.program("whiskerd"), "--ring", RING, "--wait", *LINK]
+    with subprocess.Popen(words, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            yield process
+        finally:
+            process.terminate()
+            _, told = process.communicate(timeout=PLUG_S)
+    require(process.returncode == 0, f"whiskerd: exit code {process.returncode}: {told.strip().splitlines()[-1:]}")
+
+
+def read_ring(checks: Checks, frames: int, cuts: int = 0, at_first_thousand: Callable = lambda: None) -> str:
+    """A reader's own account of so many frames, every one in its place."""
+    words = [checks.program("kernel_ring_probe"), RING, str(frames), str(cuts)]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as reader:
+        line = ""
+        for line in reader.stdout:
+            if line.strip() == "1000":
+                at_first_thousand()
+            checks.talk.say("note", f"{line.strip()} frames read" if line.strip().isdigit() else "reader done")
+        complaint = reader.stderr.read()
+    require(reader.returncode == 0, complaint.strip())
+    return line.strip()
+
+
+def daemon_long(checks: Checks) -> str:
+    """whiskerd and a reader of its ring for the long run."""
+    with daemon(checks):
+        return read_ring(checks, LONG_RUN_FRAMES)
+
+
+def daemon_short(checks: Checks) -> str:
+    """The same, short."""
+    with daemon(checks):
+        return read_ring(checks, SHORT_RUN_FRAMES)
+
+
+def replug(checks: Checks) -> str:
+    """The cable is pulled while whiskerd runs; it goes on when the bridge is back."""
+
+    def pull_and_plug() -> None:
+        require(checks.talk.ask("unplug") == "done", "the host could not unplug")
+        await_state(False)
+        require(checks.talk.ask("plug") == "done", "the host could not plug")
+        await_state(True)
+
+    with daemon(checks):
+        return read_ring(checks, 2 * SHORT_RUN_FRAMES, 1, pull_and_plug) + ", unplugged and replugged once"
+
+
+def no_complaint(_: Checks) -> str:
+    """The kernel had nothing to say against the device."""
+    said = [line for line in kernel_log() if COMPLAINT.search(line)]
+    require(not said, "; ".join(said[:8]))
+    return "nothing in the kernel's log"
+
+
+def usbip_attach(checks: Checks) -> str:
+    """`usbip list` and `usbip attach`, as in the README."""
+    port = checks.talk.ask("usbip")
+    listed = command("usbip", "--tcp-port", port, "list", "-r", HOST)
+    require(IDENTITY in listed, f"not in the list: {listed}")
+    command("usbip", "--tcp-port", port, "attach", "-r", HOST, "-b", "1-1")
+    await_state(True)
+    return "listed and attached"
+
+
+def usbip_detach(_: Checks) -> str:
+    """`usbip detach` unplugs it."""
+    command("usbip", "detach", "-p", "00")
+    await_state(False)
+    return "detached"
+
+
+def main() -> None:
+    """All checks, first over usbredir, then over USB/IP."""
+    talk = Talk()
+    checks = Checks(talk, Path(sys.argv[1]))
+    for check in (enumerates, lsusb, libusb_stream, libusb_stall, libusb_cancel, libusb_reset):
+        checks.run(f"usbredir {check.__name__}", check)
+    for check in (hidapi_hidraw, hidapi_libusb, pyusb, daemon_short, replug, daemon_long, no_complaint):
+        checks.run(f"usbredir {check.__name__}", check)
+    talk.ask("unplug")
+    await_state(False)
+    again = [libusb_stream, libusb_stall, libusb_cancel, libusb_reset, hidapi_hidraw, hidapi_libusb, pyusb]
+    for check in (usbip_attach, enumerates, lsusb, *again, daemon_short, usbip_detach):
+        checks.run(f"usbip {check.__name__.removeprefix('usbip_')}", check)
+    checks.run("usbip attach again", usbip_attach)
+    checks.run("usbip stream again", libusb_stream)
+    checks.run("usbip no_complaint", no_complaint)
+    for line in kernel_log():
+        talk.say("log", line)
+    talk.say("end")
+
+
+if __name__ == "__main__":
+    main()
