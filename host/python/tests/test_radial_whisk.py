@@ -175,6 +175,15 @@ def test_spoiled_model_files_are_one_clear_line(tmp_path, calibrated, change):
         radial.load(tmp_path / "m.json")
 
 
+def test_a_rate_may_be_known_in_calibration_only_or_later_only(calibrated):
+    held = whisks(np.random.default_rng(12), 8)
+    silent = [Contact(c.t_s, c.samples) for c in held.recorded]
+    without = radial.fit(Whisks(held.contact, silent, held.peak_counts, held.radius_mm, 0)).model
+    for model, contacts in ((calibrated[0], silent), (without, held.recorded)):
+        held.recorded = contacts
+        assert rms(errors(model, held)) < 3.0
+
+
 def write(path, made: Whisks, columns="contact,radius_mm,t_s,whisk_rad_s,x,y"):
     lines = [columns]
     for name, radius, c in zip(made.contact, made.radius_mm, made.recorded, strict=True):

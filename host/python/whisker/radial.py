@@ -116,7 +116,7 @@ def read_whisks(path, with_radius: bool) -> Whisks:
         raise TableError(path, 1, "no channel column; add at least one, as in 'contact,radius_mm,t_s,x,y'")
     samples = np.column_stack([numbers(text[name]) for name in channels])
     t_s = numbers(text["t_s"])
-    rates = [numbers(text[name]) if name in text else None for name in RATE_COLUMNS]
+    rates = [_rate(text, name) for name in RATE_COLUMNS]
     names = list(dict.fromkeys(text["contact"]))
     ids = np.array(text["contact"])
     rows = [np.flatnonzero(ids == name) for name in names]
@@ -125,6 +125,12 @@ def read_whisks(path, with_radius: bool) -> Whisks:
     radius = numbers(text["radius_mm"]) if with_radius else None
     radii = None if radius is None else np.array([np.median(radius[r]) for r in rows])
     return Whisks(names, recorded, peaks, radii, int((~np.isfinite(samples)).any(axis=1).sum()))
+
+
+def _rate(text: dict[str, list[str]], name: str) -> np.ndarray | None:
+    """A column of rates; None where there is none or nothing in it."""
+    rate = numbers(text[name]) if name in text else np.zeros(0)
+    return rate if np.any(np.isfinite(rate) & (rate != 0.0)) else None
 
 
 def _peak_of(samples: np.ndarray) -> float:
@@ -203,7 +209,7 @@ def estimate(model, contact: Contact, peak_counts: float | None = None) -> Estim
     if isinstance(model, WhiskModel):
         if contact.samples.shape[1] != model.axes:
             raise ValueError(f"{contact.samples.shape[1]} channels, but the model has {model.axes}")
-        told = model.estimate(shape_of(contact))
+        told = model.estimate(model.shape_of(contact))
         return Estimate(told.radius_mm, told.sigma_mm, "tip" if told.tip > 0.5 else "shaft", told.confidence)
     counts = _peak_of(contact.samples) if peak_counts is None else peak_counts
     mm, sigma_mm = model.predict(float(counts))

@@ -38,6 +38,7 @@ LOG_MISFIT_LEAST = 0.5
 SAMPLES_LEAST = 8
 CROP_SHARE = 0.1  # of the peak: what is above belongs to the contact
 LEAST_CONTACTS = 5
+LOG_RATE_NONE = 1e-6  # rates were not known in calibration: seconds stand for radians
 
 
 @dataclass
@@ -142,6 +143,16 @@ class WhiskModel:
     def spread(self) -> float:
         """Relative standard deviation from whisk to whisk that is left."""
         return self._c.spread
+
+    def shape_of(self, contact: Contact):
+        """struct nav_shape of a contact, its commanded rate as in calibration where it is not known with this one."""
+        log_rate = self._c.mean[TERMS.index("rate")]
+        rate = contact.whisk_rad_s
+        if abs(log_rate) < LOG_RATE_NONE:
+            rate = None
+        elif rate is None:
+            rate = np.full(len(contact.t_s), math.exp(log_rate))
+        return shape_of(Contact(contact.t_s, contact.samples, rate, contact.told_rad_s))
 
     def estimate(self, shape):
         """struct nav_whisk_estimate of a whisk."""
