@@ -202,10 +202,15 @@ def test_both_tables_of_vectors_name_the_same_interrupts():
     )
 
 
-def test_a_library_call_in_the_sample_path_is_found():
+def test_a_library_call_and_a_lost_flag_in_the_sample_path_are_found():
     good = "00002300 <_node_on_sync>:\n 2300: 07 00 00  rcall 0x2400 <_sampler_on_sync>\n"
     assert check_listing.findings(good) == []
     bad = good + " 2302: 02 00 00  call 0x3000 <___udivsi3>\n0x2400 <_main>:\n"
     assert check_listing.findings(bad) == ["_node_on_sync calls ___udivsi3"]
+    flag = "00002400 <_port_on_t2>:\n 2400: 84 40 a9  bclr.b  0x84, #7\n"
+    assert check_listing.findings(flag) == []
+    for copy in ("mov.w  w0, 0x0084", "mov.w  #0x84, w1"):
+        lost = flag + f" 2402: 20 00 00  {copy}\n"
+        assert check_listing.findings(lost) == ["_port_on_t2 writes an interrupt flag register back as a whole"]
     elsewhere = "00002300 <_loader_serve>:\n 2302: 02 00 00  call 0x3000 <___mulsi3>\n"
     assert check_listing.findings(elsewhere) == []

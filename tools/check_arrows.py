@@ -52,13 +52,14 @@ def owners(files: list[Path]) -> dict[str, set[str]]:
 
 
 def uses(path: Path, owner_of: dict[str, set[str]], room: str) -> set[str]:
-    """Rooms whose headers or packages a file names; a header that its own room holds is the one meant."""
+    """Rooms whose headers or packages a file names; a header that its own room, or one it may use, holds is the one meant."""
     text = path.read_text(errors="replace")
     if path.suffix == ".py":
         roots = {name.split(".")[0] for name in IMPORT.findall(text)}
         return {PYTHON_PACKAGES[name] for name in roots & PYTHON_PACKAGES.keys()}
     owners_named = (owner_of.get(name, set()) for name in INCLUDE.findall(text))
-    return {used for owners_of_one in owners_named if room not in owners_of_one for used in owners_of_one if used}
+    own = {room, *ALLOWED[room]}
+    return {used for owners_of_one in owners_named if not own & owners_of_one for used in owners_of_one if used}
 
 
 def violations() -> list[str]:

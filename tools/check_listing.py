@@ -1,8 +1,10 @@
 #!/usr/bin/env python3
-"""Looks through a disassembly of the node's firmware: no library routine where a sample passes.
+"""Looks through a disassembly of the node's firmware: no library routine where a sample passes, no interrupt flag lost.
 
 check_listing.py LISTING: exit 1, with a line per finding, if a function between SYNC and an armed record calls one of the
-compiler's helpers (float, 32-bit division or multiplication).
+compiler's helpers (float, 32-bit division or multiplication), or changes a flag register (IFS0 to IFS4) by reading it,
+changing the copy and writing it back: a flag that the hardware sets in between would be gone. One bit or mask in one
+instruction is what the accessors of sfr.h are to become.
 """
 
 import re
@@ -16,6 +18,8 @@ SAMPLE_PATH = re.compile(
 HELPER = re.compile(r"<?(_{2,3}(u?div|u?mod|mul|add|sub|float|fix|lt|gt|le|ge|eq|ne|neg|cmp)\w*(si|di|sf|df|hi)\w*)>?")
 FUNCTION = re.compile(r"^\s*[0-9a-f]+ <(\w+)>:")
 CALL = re.compile(r"\b(r?call|goto|bra)\b(.*)$")
+IFS = "0x0*8[4-9a-dA-D]"  # IFS0 0x0084 to IFS4 0x008C
+WRITTEN_BACK = re.compile(rf"\bmov(?:\.\w)?\s+w\d+,\s*{IFS}\b|\bmov(?:\.\w)?\s+#{IFS},\s*w\d+")
 
 
 def findings(text: str) -> list[str]:
@@ -25,6 +29,8 @@ def findings(text: str) -> list[str]:
             function = begins.group(1)
         elif (call := CALL.search(line)) and (helper := HELPER.search(call.group(2))) and SAMPLE_PATH.match(function):
             found.append(f"{function} calls {helper.group(1)}")
+        elif WRITTEN_BACK.search(line) and SAMPLE_PATH.match(function):
+            found.append(f"{function} writes an interrupt flag register back as a whole")
     return found
 
 
