@@ -28,7 +28,7 @@ ROOT = Path(__file__).resolve().parent.parent
 RESULTS, CHARTS, CACHE = ROOT / "bench/results", ROOT / "docs/charts", ROOT / "build/bench/radial"
 METHODS = ("paper", "quadratic", "rational", "default")
 SEED = 7000  # nothing was developed on these whiskers
-WHISKERS, FIT, HELD = 4, 5, 10  # whiskers of each spread; whisks at each radius
+WHISKERS, FIT, HELD = 4, 5, 6  # whiskers of each spread; whisks at each radius
 LIMIT_MM, NEAR_MM = RADII_MM[-1] - 3.0, 3.0  # of tip and shaft; nearer to it nothing is asked
 
 

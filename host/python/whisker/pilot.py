@@ -13,13 +13,16 @@ from collections import deque
 
 import numpy as np
 
-from .behaviour import BLOCK_TICKS, EXPLORE_M_S, PUSH_TICKS, TICK_S, TURN_RAD_S, Behaviour
+from .behaviour import BLOCK_TICKS, EXPLORE_M_S, PUSH_TICKS, TICK_S, TURN_RAD_S, WHISK_RAD_S, Behaviour
 from .contact import Contact
 from .floor import FloorWhisker
 from .mount import Mount
+from .radial import Contact as Recorded
+from .radial import WhiskModel, estimate, peak
 
 WINDOW_SAMPLES = 200
 WINDOW_LEAST_GOOD = 150  # fewer good samples than this are no window
+LEAST_CONFIDENCE = 0.5  # a model of whole whisks that is less sure than this tells no distance
 SETTLE_TICKS = 100  # the wheels' last change of speed must be this much older than a texture window
 
 
@@ -27,7 +30,7 @@ class Pilot:
     """One robot's decisions. The same seed, samples and odometry always give the same drives and rows."""
 
     def __init__(self, robot, texture_models: dict, radial_models: dict, seed: int):
-        """`robot.whiskers` in lane order; models by whisker name; `seed` of the random turns."""
+        """`robot.whiskers` in lane order; models by whisker name, radial ones of any kind; `seed` of the random turns."""
         self.names = {lane: whisker.name for lane, whisker in enumerate(robot.whiskers)}
         self.texture_lanes = [n for n, w in enumerate(robot.whiskers) if w.role == "texture"]
         self.object_lanes = [n for n, w in enumerate(robot.whiskers) if w.role == "object"]
@@ -106,13 +109,14 @@ class Pilot:
         ticks = np.concatenate([t for t, _ in self._whisk_samples])
         samples = np.concatenate([s for _, s in self._whisk_samples])
         push = (ticks >= contact.onset) & (ticks < contact.onset + PUSH_TICKS)
-        peak = model.peak(samples[push], contact.rest)
-        line_mm, _ = model.predict(peak)
-        distance = self.mounts[lane].distance(line_mm, turn)
+        counts = peak(samples[push], contact.rest)
+        told = estimate(model, Recorded(ticks * TICK_S, samples, np.full(len(ticks), WHISK_RAD_S)), counts)
+        doubted = isinstance(model, WhiskModel) and told.confidence < LEAST_CONFIDENCE
+        distance = None if doubted else self.mounts[lane].distance(told.radius_mm, turn)
         if distance is not None:
             self._measured[lane] = (contact.release, distance)
         whisk = {"whisker": self.names[lane], "onset": contact.onset, "release": contact.release, "turn": turn}
-        self.whisks.append(whisk | {"peak_counts": peak, "line_mm": line_mm, "distance_mm": distance})
+        self.whisks.append(whisk | {"peak_counts": counts, "line_mm": told.radius_mm, "distance_mm": distance})
 
     def _texture_cells(self, lane: int, tick: int, held_back: bool) -> dict[str, float | None]:
         whisker = self.floor[lane]

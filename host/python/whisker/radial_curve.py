@@ -10,6 +10,18 @@ def tip_from(high_mm: float, sigma_mm: float) -> float:
     return high_mm - max(sigma_mm, TIP_MM)
 
 
+GAUSS_NEWTON_STEPS = 12
+LEAST_BELOW = 0.05  # of the rational curve's denominator: no pole among the contacts
+
+
+def _left(numbers: np.ndarray, f: np.ndarray, radii: np.ndarray) -> float:
+    """Sum of squares that a rational curve leaves; infinite with a pole."""
+    below = 1.0 + numbers[2] * f
+    if below.min() < LEAST_BELOW:
+        return float("inf")
+    return float(np.sum((radii - (numbers[0] + numbers[1] * f) / below) ** 2))
+
+
 class CurveModel:
     """r = (c0 + c1 f + c2 f^2)/(1 + d f), f = peak/scale: `quadratic` has d = 0, `rational` c2 = 0.
 
@@ -59,9 +71,22 @@ class CurveModel:
 
     @staticmethod
     def _solve(kind: str, f: np.ndarray, radii: np.ndarray) -> dict:
-        third = f**2 if kind == "quadratic" else -f * radii  # the latter: r (1 + d f) = c0 + c1 f
-        c0, c1, last = np.linalg.lstsq(np.column_stack([np.ones(len(f)), f, third]), radii, rcond=None)[0]
-        return {"c0": c0, "c1": c1} | ({"c2": last, "d": 0.0} if kind == "quadratic" else {"c2": 0.0, "d": last})
+        """Least squares of the radii; the rational curve by Gauss-Newton from the line, each step halved until it helps."""
+        if kind == "quadratic":
+            c0, c1, c2 = np.linalg.lstsq(np.column_stack([np.ones(len(f)), f, f**2]), radii, rcond=None)[0]
+            return {"c0": c0, "c1": c1, "c2": c2, "d": 0.0}
+        now = np.append(np.linalg.lstsq(np.column_stack([np.ones(len(f)), f]), radii, rcond=None)[0], 0.0)
+        for _ in range(GAUSS_NEWTON_STEPS):
+            below = 1.0 + now[2] * f
+            top = now[0] + now[1] * f
+            slopes = np.column_stack([1.0 / below, f / below, -top * f / below**2])
+            step = np.linalg.lstsq(slopes, radii - top / below, rcond=None)[0]
+            for _ in range(GAUSS_NEWTON_STEPS):
+                if _left(now + step, f, radii) < _left(now, f, radii):
+                    now = now + step
+                    break
+                step = step / 2.0
+        return {"c0": now[0], "c1": now[1], "c2": 0.0, "d": now[2]}
 
     def predict(self, peak_counts: float) -> tuple[float, float]:
         """(radius mm, sigma mm) of one contact; the radius is held where the curve is known, and 10 % beyond."""

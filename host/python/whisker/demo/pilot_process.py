@@ -17,7 +17,7 @@ from .. import scene as scenes
 from ..behaviour import BLOCK_TICKS, ODOMETRY_TICKS, TICK_S
 from ..pilot import Pilot
 from ..protocol import CODES, STATUS_CODE_SHIFT
-from ..radial import RadialModel
+from ..radial import load as load_radial
 from ..ring import Reader, RingError
 from ..simlink import SimLink
 from ..texture import TextureModel
@@ -74,7 +74,7 @@ def cell(value: float | None) -> str:
 def load_models(folder: Path, robot: scenes.Robot) -> tuple[dict, dict]:
     """Texture and radial models by whisker name, as training left them."""
     texture = TextureModel.load(folder / "texture.json")
-    radial = {w.name: RadialModel.load(folder / f"{w.name}.json") for w in robot.of_role("object")}
+    radial = {w.name: load_radial(folder / f"{w.name}.json") for w in robot.of_role("object")}
     return {w.name: texture for w in robot.of_role("texture")}, radial
 
 
