@@ -26,7 +26,8 @@ from tqdm import tqdm
 ROOT = Path(__file__).resolve().parent.parent
 STATE, RESULTS = ROOT / "build/bench/fuzz", ROOT / "bench/results"
 TOTAL = 10**8
-PYTHON_SHARE = 1 / 500  # a Python target is some hundred times slower than a compiled one
+SLOW_SHARE = 1 / 500  # of the inputs, to each target that takes some hundred times as long over one as the others
+SLOW = {"rows"}  # every filter over a whole run; and all of Python
 SLICE_S = 20  # about so long is a slice
 FIRST_SLICE = 2000
 FAILED_TEXT = 2000  # characters of a failing target's output that are shown
@@ -52,6 +53,10 @@ class Target:
     @property
     def python(self) -> bool:
         return self.program.suffix == ".py"
+
+    @property
+    def slow(self) -> bool:
+        return self.python or self.name in SLOW
 
     @property
     def folder(self) -> Path:
@@ -113,12 +118,11 @@ def run_target(target: Target, wanted: int, bar: tqdm) -> Tally:
 
 
 def shares(targets: list[Target], total: int) -> dict[str, int]:
-    """How many of the inputs each target gets: few for Python, the rest evenly."""
-    compiled = [target for target in targets if not target.python]
-    python = int(total * PYTHON_SHARE)
-    left = total - python * (len(targets) - len(compiled))
-    each = -(-left // max(1, len(compiled)))
-    return {target.name: python if target.python else each for target in targets}
+    """How many of the inputs each target gets: few for slow ones, the rest evenly."""
+    slow = sum(target.slow for target in targets)
+    few = int(total * SLOW_SHARE)
+    each = -(-(total - few * slow) // max(1, len(targets) - slow))
+    return {target.name: few if target.slow else each for target in targets}
 
 
 def write_results(tallies: list[Tally]) -> None:
