@@ -22,10 +22,11 @@ module colorlight_i9 #(
     wire [7:0] data_in, data_out;
     wire       data_oe, dir, nxt, led;
 
-    assign ulpi_data = data_oe ? data_out : 8'hzz;
-    assign led_n     = !led;
+    assign led_n = !led;
 
-    input_delay #(.WIDTH(10)) late (.from_pad({ulpi_nxt, ulpi_dir, ulpi_data}), .delayed({nxt, dir, data_in}));
+    ulpi_pads pads (
+        .ulpi_data(ulpi_data), .ulpi_dir(ulpi_dir), .ulpi_nxt(ulpi_nxt), .data_out(data_out), .data_oe(data_oe),
+        .data_in(data_in), .dir(dir), .nxt(nxt));
 
     board_core #(.LANES(LANES)) core (
         .clk(clk_60), .ulpi_data_in(data_in), .ulpi_data_out(data_out), .ulpi_data_oe(data_oe), .ulpi_dir(dir),

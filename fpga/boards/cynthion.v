@@ -24,11 +24,12 @@ module cynthion #(
     wire       data_oe, dir, nxt, ulpi_reset, led;
 
     assign ulpi_clk     = clk_60;
-    assign ulpi_data    = data_oe ? data_out : 8'hzz;
     assign ulpi_reset_n = !ulpi_reset;
     assign led_n        = !led;
 
-    input_delay #(.WIDTH(10)) late (.from_pad({ulpi_nxt, ulpi_dir, ulpi_data}), .delayed({nxt, dir, data_in}));
+    ulpi_pads pads (
+        .ulpi_data(ulpi_data), .ulpi_dir(ulpi_dir), .ulpi_nxt(ulpi_nxt), .data_out(data_out), .data_oe(data_oe),
+        .data_in(data_in), .dir(dir), .nxt(nxt));
 
     board_core #(.LANES(LANES)) core (
         .clk(clk_60), .ulpi_data_in(data_in), .ulpi_data_out(data_out), .ulpi_data_oe(data_oe), .ulpi_dir(dir),
