@@ -117,6 +117,8 @@ def test_programmers_are_called_as_they_want_it(tmp_path, tool):
         (["--tool", "stk500"], "use ipecmd, pk2cmd or picberry"),
         (["--tool", "ipecmd", "--hex", "none.hex"], "run 'make firmware' first"),
         (["--tool", "ipecmd", "--serial", "x"], "whole number"),
+        (["--tool", "ipecmd", "--hex", "README.md"], "install MPLAB X with its IPE"),
+        (["--tool", "pk2cmd", "--hex", "README.md"], "install pk2cmd for the PICkit 2"),
         (["--tool", "picberry", "--hex", "README.md"], "install picberry"),
     ],
 )
