@@ -32,8 +32,7 @@ static bool finite_all(const double *x, size_t n)
 static bool numbers_ok(const struct nav_texture_rung_numbers *n)
 {
     return n->classes >= 1 && n->classes <= NAV_TEXTURE_CLASSES_MAX && n->hidden >= 0 &&
-           n->hidden <= NAV_TEXTURE_HIDDEN_MAX && n->axes >= 0 && isfinite(n->temper) && n->temper >= 0.0 &&
-           isfinite(n->beyond) && n->beyond >= 0.0;
+           n->hidden <= NAV_TEXTURE_HIDDEN_MAX && n->axes >= 0 && isfinite(n->temper) && n->temper >= 0.0;
 }
 
 /* Replaces the caller's array by a copy; false if it holds something that is not finite or memory is short. */
@@ -58,7 +57,8 @@ static bool own_arrays(struct nav_texture_rung *r)
     ok = own(&r->n.bias, k) && ok;
     ok = own(&r->n.middle, k * f) && ok;
     ok = own(&r->n.axis, a * f) && ok;
-    ok = own(&r->n.axis_weight, a) && ok;
+    ok = own(&r->n.axis_weight, k * a) && ok;
+    ok = own(&r->n.beyond, k) && ok;
     return ok;
 }
 
@@ -139,9 +139,9 @@ void nav_texture_rung_free(struct nav_texture_rung *r)
 {
     if (!r)
         return;
-    const double *arrays[] = {r->n.floor,  r->n.centre, r->n.scale,       r->n.weight,    r->n.bias,
-                              r->n.middle, r->n.axis,   r->n.axis_weight, r->projection,  r->threshold,
-                              r->expanded, r->turned,   r->along,         r->middle_along};
+    const double *arrays[] = {r->n.floor,  r->n.centre, r->n.scale,       r->n.weight,     r->n.bias,
+                              r->n.middle, r->n.axis,   r->n.axis_weight, r->projection,   r->threshold,
+                              r->expanded, r->turned,   r->along,         r->middle_along, r->n.beyond};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++)
         free((void *)arrays[i]);
     nav_texture_features_free(r->reduce);
@@ -191,20 +191,21 @@ static void score(const struct nav_texture_rung *r, const double *x, double *log
         loglik[k] = (loglik[k] - best) * r->n.temper;
 }
 
-/* Squared distance from a class's middle: along each axis by its own variance, beyond the axes by a common one. */
+/* Squared distance from a class's middle: along each axis by the class's variance there, beyond the axes by one. */
 static double distance(const struct nav_texture_rung *r, int class_index)
 {
     const double *middle = r->n.middle + (size_t)class_index * (size_t)r->features;
     const double *there = r->middle_along + (size_t)class_index * (size_t)r->n.axes;
+    const double *weight = r->n.axis_weight + (size_t)class_index * (size_t)r->n.axes;
     double rest = 0.0, sum = 0.0;
     for (int f = 0; f < r->features; f++)
         rest += (r->expanded[f] - middle[f]) * (r->expanded[f] - middle[f]);
     for (int a = 0; a < r->n.axes; a++) {
         double apart = r->along[a] - there[a];
-        sum += apart * apart * r->n.axis_weight[a];
+        sum += apart * apart * weight[a];
         rest -= apart * apart;
     }
-    return (sum + fmax(rest, 0.0) * r->n.beyond) / r->features;
+    return (sum + fmax(rest, 0.0) * r->n.beyond[class_index]) / r->features;
 }
 
 double nav_texture_rung_judge(struct nav_texture_rung *r, const double *window, double *loglik)

@@ -20,13 +20,13 @@ struct nav_texture_rung_numbers {
     int classes, channels, length, levels, hidden, axes;
     uint64_t seed;                /* of the projections */
     double temper;                /* >= 0; scores are multiplied by it */
-    double beyond;                /* R axes at most F; weight of the squared distance outside them, per feature */
     const double *floor;          /* [channels] counts squared */
     const double *centre, *scale; /* [F] feature -> (feature - centre) * scale */
     const double *weight, *bias;  /* [F + H][K], [K] */
     const double *middle;         /* [K][F] standardised features of each class */
     const double *axis;           /* [R][F] orthonormal, of the spread within classes */
-    const double *axis_weight;    /* [R] 1 / variance */
+    const double *axis_weight;    /* [K][R] 1 / variance of each class, R at most F */
+    const double *beyond;         /* [K] the same of each feature outside the axes */
 };
 
 /* NULL when a size is out of range, a number is not finite, or memory is short. */

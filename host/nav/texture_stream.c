@@ -5,15 +5,17 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "texture_catch.h"
 #include "texture_span.h"
 
+#define HELD_WINDOWS 20     /* a tip held for longer, 2 s at 100 ms, has a new rest */
 #define BAD_SHARE_MOST 0.25 /* of a window; with more, its spectrum is that of the gaps */
 
 struct nav_texture_stream {
     struct nav_texture_rules rules; /* its pointers are the stream's own, but for the rungs */
     double unknown[NAV_TEXTURE_RUNGS_MAX], border[NAV_TEXTURE_RUNGS_MAX];
     struct nav_texture_span *span;
-    double *limits;  /* [5][channels] the stream's own */
+    double *limits;  /* [6][channels] the stream's own */
     double *raw;     /* [room][channels] samples since the last decision */
     double *clean;   /* [room][channels] */
     double *half[3]; /* [classes] evidence of the window before's second half, of the first and the second half */
@@ -21,6 +23,7 @@ struct nav_texture_stream {
     int room, held;
     bool has_before;
     int half_rung, before_rung;
+    struct nav_texture_catch edge; /* its level is the sixth row of limits */
 };
 
 static bool lengths_ok(const struct nav_texture_rules *r)
@@ -45,7 +48,7 @@ static bool allocate(struct nav_texture_stream *s)
 {
     size_t channels = (size_t)s->rules.channels, classes = (size_t)s->rules.classes;
     s->span = nav_texture_span_new(&s->rules);
-    s->limits = calloc(5 * channels, sizeof *s->limits);
+    s->limits = calloc(6 * channels, sizeof *s->limits);
     s->raw = calloc((size_t)s->room * channels, sizeof *s->raw);
     s->clean = calloc((size_t)s->room * channels, sizeof *s->clean);
     s->before = calloc(classes, sizeof *s->before);
@@ -70,6 +73,10 @@ static void own_limits(struct nav_texture_stream *s)
     l->low = own_limit(s->limits + 2 * channels, l->low, channels);
     l->high = own_limit(s->limits + 3 * channels, l->high, channels);
     l->span = own_limit(s->limits + 4 * channels, l->span, channels);
+    s->edge = (struct nav_texture_catch){.channels = channels,
+                                         .span = l->span,
+                                         .level = s->limits + 5 * channels,
+                                         .patience = (long)HELD_WINDOWS * s->rules.window};
 }
 
 struct nav_texture_stream *nav_texture_stream_new(const struct nav_texture_rules *rules)
@@ -105,6 +112,7 @@ void nav_texture_stream_reset(struct nav_texture_stream *s)
 {
     s->held = 0;
     s->has_before = false;
+    s->edge.known = s->edge.held = false;
 }
 
 /* Whether two stretches, judged at this rung, are of two surfaces: no class explains both. */
@@ -146,13 +154,15 @@ static void blend(const struct nav_texture_stream *s, double *loglik)
         loglik[k] -= best;
 }
 
-/* Looks for a border between half and half and between window and window; when the halves differ, what counts is the
- * later one. The halves and the window become those before. */
+/* Looks for a border between half and half, between window and window, and between the window before and the later
+ * half, which hold nothing of the other surface if the border lies in the earlier half; when the halves differ, what
+ * counts is the later one. The halves and the window become those before. */
 static bool find_border(struct nav_texture_stream *s, double *loglik, int rung, int half_rung)
 {
     bool inside = differ(s, half_rung, s->half[1], s->half[2]);
     bool since = s->has_before && ((s->half_rung == half_rung && differ(s, half_rung, s->half[0], s->half[1])) ||
-                                   (s->before_rung == rung && differ(s, rung, s->before, loglik)));
+                                   (s->before_rung == rung && differ(s, rung, s->before, loglik)) ||
+                                   differ(s, half_rung, s->before, s->half[2]));
     size_t bytes = (size_t)s->rules.classes * sizeof *loglik;
     if (inside)
         memcpy(loglik, s->half[2], bytes);
@@ -203,6 +213,11 @@ static bool never_trained(const struct nav_texture_stream *s, double distance, i
     return true;
 }
 
+static bool edge_holds(struct nav_texture_stream *s, bool sudden)
+{
+    return nav_texture_catch_follow(&s->edge, s->clean, s->held, s->rules.step > 0 ? s->rules.step : s->held, sudden);
+}
+
 /* Decides on the samples held. Returns whether a sequential decision may stop here. */
 static bool decide(struct nav_texture_stream *s, struct nav_texture_decision *d, double *loglik)
 {
@@ -210,9 +225,12 @@ static bool decide(struct nav_texture_stream *s, struct nav_texture_decision *d,
     d->samples = s->held;
     memcpy(s->clean, s->raw, (size_t)s->held * (size_t)s->rules.channels * sizeof *s->clean);
     d->health = nav_texture_clean(s->clean, s->held, &s->rules.limits);
+    bool readable = !unreadable(s, d);
+    if (readable && d->health.railed == 0 && edge_holds(s, d->health.caught > 0))
+        d->health.caught = d->health.caught > 0 ? d->health.caught : 1;
     d->border = d->health.caught > 0 && d->health.railed == 0;
     int rung = -1;
-    if (!unreadable(s, d) && !d->health.caught)
+    if (readable && !d->health.caught)
         rung = nav_texture_span_judge(s->span, s->clean, s->held, loglik, &d->distance);
     if (rung < 0) {
         no_evidence(s, d, loglik);

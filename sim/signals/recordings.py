@@ -5,6 +5,7 @@ calibration is one CSV file per whisker, `contact,radius_mm,t_s,x,y`. x and y ar
 """
 
 import math
+import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -24,6 +25,7 @@ REST_S = 0.2
 GAP_RAD = 0.002  # between whisker and post at rest
 POST_M = 0.03  # side of the square post
 TOWARDS_RAD = math.radians(10.0)  # between the whisker at first contact and the post's face that runs along it
+ROBOT_LINES = r"(body_|texture_|object_|mechanics |batch )"  # of a scene's flat text
 BENCH_M = 4.0  # side of the empty arena around it
 
 
@@ -135,7 +137,7 @@ def _post_scene(flat: str, whisker: str, radius_m: float) -> tuple[str, int]:
 
 def _bench(flat: str, side_m: float, surface: str, start: tuple[float, float, float]) -> str:
     """The robot of a scene in an empty square arena with one surface."""
-    robot = [line for line in flat.splitlines() if line.split("_")[0] in ("body", "texture", "object")]
+    robot = [line for line in flat.splitlines() if re.match(ROBOT_LINES, line)]
     arena = [f"size_m {side_m!r} {side_m!r}", f"tile_m {side_m!r}", f"texture {surface}", f"floor {surface[0]}"]
     return "\n".join([*arena, *robot, "start " + " ".join(map(repr, start))]) + "\n"
 

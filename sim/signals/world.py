@@ -32,6 +32,7 @@ class Tip(NamedTuple):
     texture: str
     inside_m: float
     travelled_m: float
+    caught: bool
 
 
 class World:
@@ -84,7 +85,11 @@ class World:
         """Relative spread of an object whisker's amplitude from whisk to whisk."""
         return lib.sim_world_spread(self._world, lane)
 
+    def level(self, lane: int) -> int:
+        """Level of detail of a lane at the last tick: 0 rest, else as in `signals.mechanics` (CLOSED, LARGE, VIBRATION)."""
+        return lib.sim_world_level(self._world, lane)
+
     def tip(self, lane: int) -> Tip:
         """Truth about a texture whisker."""
         tip = lib.sim_world_tip(self._world, lane)
-        return Tip(tip.x, tip.y, self.textures[tip.texture], tip.inside_m, tip.travelled_m)
+        return Tip(tip.x, tip.y, self.textures[tip.texture], tip.inside_m, tip.travelled_m, tip.caught)

@@ -1,5 +1,6 @@
 #include "near.h"
 #include "rng.h"
+#include "texture_catch.h"
 #include "texture_clean.h"
 #include "texture_features.h"
 #include "texture_fft.h"
@@ -105,6 +106,41 @@ static void stuck_railed_and_caught_channels_are_told(void **state)
     assert_int_equal(h.caught, 1);
 }
 
+static bool follow(struct nav_texture_catch *c, double level, bool sudden)
+{
+    double window[8];
+    for (int i = 0; i < 8; i++)
+        window[i] = level + (i % 2 ? 1.0 : -1.0);
+    return nav_texture_catch_follow(c, window, 8, 8, sudden);
+}
+
+/* Held from the sudden bend until the mean is back, or for so long that it must be a new rest; an offset that comes
+ * slowly is none, and without a window before nothing says where back is. */
+static void a_catch_lasts_until_the_level_is_back(void **state)
+{
+    (void)state;
+    double level = 0.0;
+    const double span = 50.0;
+    struct nav_texture_catch c = {.channels = 1, .span = &span, .level = &level, .patience = 80};
+    assert_false(follow(&c, 0.0, false));
+    assert_false(follow(&c, 200.0, false));
+    assert_false(follow(&c, 0.0, false));
+    assert_true(follow(&c, 40.0, true));
+    assert_true(follow(&c, 300.0, false));
+    assert_true(follow(&c, -60.0, false));
+    assert_false(follow(&c, -40.0, false));
+    assert_true(follow(&c, 40.0, true));
+    for (int i = 1; i < 10; i++)
+        assert_true(follow(&c, 300.0, false));
+    assert_false(follow(&c, 300.0, false));
+    assert_false(follow(&c, 300.0, false));
+    c = (struct nav_texture_catch){.channels = 1, .span = &span, .level = &level, .patience = 80};
+    assert_true(follow(&c, 300.0, true));
+    assert_false(follow(&c, 300.0, false));
+    c.span = NULL;
+    assert_false(follow(&c, 1e6, false));
+}
+
 /* One channel, windows of 16 samples; two classes told by the log of the whole power alone, about 0 and about 4. */
 struct model {
     double floor, centre[FEATURES_MOST], scale[FEATURES_MOST], weight[2 * FEATURES_MOST], bias[2],
@@ -122,12 +158,11 @@ static void make_model(struct model *m)
     m->scale[power] = 1.0;
     m->weight[2 * power + 1] = 4.0;
     m->middle[count + power] = 4.0;
-    const double none = 0.0;
+    const double none = 0.0, beyond[2] = {(double)count, (double)count};
     const struct nav_texture_rung_numbers numbers = {.classes = 2,
                                                      .channels = 1,
                                                      .length = 16,
                                                      .temper = 1.0,
-                                                     .beyond = (double)count,
                                                      .floor = &m->floor,
                                                      .centre = m->centre,
                                                      .scale = m->scale,
@@ -135,7 +170,8 @@ static void make_model(struct model *m)
                                                      .bias = m->bias,
                                                      .middle = m->middle,
                                                      .axis = &none,
-                                                     .axis_weight = &none};
+                                                     .axis_weight = &none,
+                                                     .beyond = beyond};
     m->rung = nav_texture_rung_new(&numbers);
     assert_non_null(m->rung);
 }
@@ -256,6 +292,7 @@ static void impossible_rules_make_no_stream(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_catch_lasts_until_the_level_is_back),
         cmocka_unit_test(power_is_that_of_the_transform_written_out),
         cmocka_unit_test(an_offset_changes_no_feature_and_a_gain_moves_all_powers_alike),
         cmocka_unit_test(a_constant_window_has_finite_features),

@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from whisker.floor import STEP_COUNTS, FloorWhisker, centred, dithered
+from whisker.floor import STEP_COUNTS, WINDOW_SAMPLES, FloorWhisker, centred, dithered, floor_whisker
 from whisker.texture import TextureModel
+from whisker.texture_train import train
 
 SPREAD = {"VINYL": 12.0, "SMOOTH": 40.0, "ROUGH": 90.0}
 MIDDLE = np.array([32768.0, 32768.0])
@@ -53,3 +54,43 @@ def test_surfaces_are_told_apart_about_a_drifted_rest():
     for index, name in enumerate(SPREAD):
         right = [whisker.loglik(sensed(name, 200, rng, drift)).argmax() == index for _ in range(50)]
         assert np.mean(right) >= 0.98, name
+
+
+def test_a_window_with_too_few_good_samples_says_nothing():
+    rng = np.random.default_rng(5)
+    whisker = floor_whisker(trained(rng), rng)
+    window = sensed("ROUGH", WINDOW_SAMPLES, rng)
+    window[:40] = np.nan
+    assert whisker.look(window).argmax() == 2
+    window[:60] = np.nan
+    assert whisker.look(window) is None
+
+
+def rubbed(name: str, n: int, rng, drift: float = 0.0) -> np.ndarray:
+    """Surfaces that differ in spectrum, not only in spread."""
+    keep = {"VINYL": 0.0, "SMOOTH": 0.7, "ROUGH": 0.95}[name]
+    noise = rng.normal(0, 40, (n + 200, 2))
+    for k in range(1, len(noise)):
+        noise[k] += keep * noise[k - 1]
+    return np.round((MIDDLE + drift + noise[200:]) / STEP_COUNTS) * STEP_COUNTS
+
+
+def test_the_spectral_way_needs_no_rest_and_says_what_it_doubts():
+    rng = np.random.default_rng(6)
+    model = train({name: [rubbed(name, 4000, rng) for _ in range(3)] for name in SPREAD}, 2000.0)
+    whisker = floor_whisker(model, rng)
+    for index, name in enumerate(SPREAD):
+        whisker.pause()
+        right = [whisker.look(rubbed(name, WINDOW_SAMPLES, rng, 500.0)).argmax() == index for _ in range(30)]
+        assert np.mean(right) >= 0.95, name
+    assert (whisker.windows, whisker.borders) == (90, 0)
+    assert whisker.look(np.full((WINDOW_SAMPLES, 2), np.nan)) is None
+    assert whisker.unknown >= 1
+    whisker.look(rubbed("VINYL", WINDOW_SAMPLES, rng))
+    whisker.look(rubbed("ROUGH", WINDOW_SAMPLES, rng))
+    assert whisker.borders == 1
+    whisker.look(rubbed("VINYL", WINDOW_SAMPLES, rng))
+    assert whisker.borders == 2
+    whisker.pause()  # elsewhere now: another surface is no border
+    whisker.look(rubbed("ROUGH", WINDOW_SAMPLES, rng))
+    assert whisker.borders == 2

@@ -1,5 +1,8 @@
 """Level 0 tells what level 1 tells: texture confusions, distances, misses and the timing of contacts of the `robot` family
-agree with signal-level runs of the same robot in the same arenas. Tolerances are stated where they are used."""
+agree with signal-level runs of the same robot in the same arenas. Tolerances are stated where they are used.
+
+What level 0 draws are the answers of the paper's classifier on the floor that knows neither friction nor edges.
+"""
 
 import math
 from dataclasses import dataclass, replace
@@ -36,12 +39,12 @@ class Told:
 def signals(tmp_path_factory):
     """Signal-level runs. One robot: what it learnt once serves in every arena."""
     folder = tmp_path_factory.mktemp("models")
-    learn(folder, make_scene(SEEDS[0])[0], SEEDS[0], lambda: None)
+    learn(folder, make_scene(SEEDS[0], "simple")[0], SEEDS[0], lambda: None, "paper")
     return [signal_run(seed, folder) for seed in SEEDS]
 
 
 def signal_run(seed, folder):
-    scene, start = make_scene(seed)
+    scene, start = make_scene(seed, "simple")
     pilot = Pilot(scene.robot, *load_models(folder, scene.robot), seed)
     rows, truth = explore(scene, start, pilot, seed, ROWS * TICKS_PER_ROW)
     nan = math.nan

@@ -6,9 +6,10 @@ import socket
 import threading
 import time
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
-from .demo.scenes import START_CLEARANCE_M, make_scene
+from .demo.scenes import MECHANICS, START_CLEARANCE_M, make_scene, simulated
 from .errors import UserError
 from .protocol import LIMITS, SENSOR_ERRORS
 from .scene import Scene, load
@@ -38,12 +39,15 @@ def program(name: str) -> str:
     raise SimulationError(f"{name}: not found; {remedy}, or name the folder in $WHISKER_BUILD")
 
 
-def flat_scene(folder: str | None, seed: int) -> tuple[str, int]:
-    """(the scene as the simulation reads it, number of whiskers): of this folder, or the demo's of this seed."""
+def flat_scene(folder: str | None, seed: int, mechanics: str = MECHANICS[0]) -> tuple[str, int]:
+    """(the scene as the simulation reads it, number of whiskers): of this folder, or the demo's of this seed.
+
+    `mechanics`: how its whiskers bend; which ones they are is the seed's.
+    """
     if folder is None:
-        scene, start = make_scene(seed)
+        scene, start = make_scene(seed, mechanics)
     else:
-        scene = load(folder)
+        scene = replace(load(folder), simulated=simulated(mechanics, seed))
         start = _start(scene, folder)
     return scene.flat(start), len(scene.robot.whiskers)
 

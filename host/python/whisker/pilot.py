@@ -15,13 +15,11 @@ import numpy as np
 
 from .behaviour import BLOCK_TICKS, EXPLORE_M_S, PUSH_TICKS, TICK_S, TURN_RAD_S, WHISK_RAD_S, Behaviour
 from .contact import Contact
-from .floor import FloorWhisker
+from .floor import WINDOW_SAMPLES, floor_whisker
 from .mount import Mount
 from .radial import Contact as Recorded
 from .radial import WhiskModel, estimate, peak
 
-WINDOW_SAMPLES = 200
-WINDOW_LEAST_GOOD = 150  # fewer good samples than this are no window
 LEAST_CONFIDENCE = 0.5  # a model of whole whisks that is less sure than this tells no distance
 SETTLE_TICKS = 100  # the wheels' last change of speed must be this much older than a texture window
 
@@ -40,7 +38,7 @@ class Pilot:
         first_turn = {lane: mount.corner_turn for lane, mount in self.mounts.items()}
         self.behaviour = Behaviour(self.contacts, first_turn, np.random.default_rng(seed))
         self.floor = {
-            lane: FloorWhisker(texture_models[self.names[lane]], np.random.default_rng([seed, lane]))
+            lane: floor_whisker(texture_models[self.names[lane]], np.random.default_rng([seed, lane]))
             for lane in self.texture_lanes
         }
         self.bad_samples = 0
@@ -122,11 +120,11 @@ class Pilot:
         whisker = self.floor[lane]
         cells = {f"{self.names[lane]}_{name}": None for name in whisker.model.classes}
         if held_back or not self._sweeping(tick):
+            whisker.pause()
             return cells
-        samples = np.concatenate([s[good[:, lane], lane] for s, good in self._recent])
-        if len(samples) >= WINDOW_LEAST_GOOD:
-            cells = dict(zip(cells, map(float, whisker.loglik(samples)), strict=True))
-        return cells
+        window = np.concatenate([np.where(good[:, lane, None], s[:, lane], np.nan) for s, good in self._recent])
+        loglik = whisker.look(window)
+        return cells if loglik is None else dict(zip(cells, map(float, loglik), strict=True))
 
     def _sweeping(self, tick: int) -> bool:
         """Whether the tips moved over the floor at the speed they were trained at during the whole window."""

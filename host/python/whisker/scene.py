@@ -6,7 +6,7 @@ Metres and radians. World frame: origin in the arena's lower left corner, x righ
 import math
 import re
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from .errors import UserError
@@ -78,6 +78,7 @@ class Scene:
     arena: Arena
     robot: Robot
     prior: Prior | None = None
+    simulated: tuple[str, ...] = field(default=(), compare=False)  # more lines of `flat`; no part of the folder
 
     def warnings(self) -> list[str]:
         """What is odd but allowed, one line each."""
@@ -97,7 +98,7 @@ class Scene:
         for w in robot.whiskers:
             place = w.tip_m if w.role == "texture" else (*w.base_m, w.yaw_rad, w.length_m)
             lines.append(_line(f"{w.role}_whisker", w.name, *place))
-        return "\n".join([*lines, _line("start", *start_pose)]) + "\n"
+        return "\n".join([*lines, *self.simulated, _line("start", *start_pose)]) + "\n"
 
 
 def load(path) -> Scene:

@@ -16,6 +16,7 @@ LEAST_GAIN = 0.005  # nats: a smaller fall is chance, however large a share of a
 LEVELS_MUST_GAIN = 0.5  # the same for channel means: a rest drifts, and a mean may tell the session, not the surface
 AXES_MOST = 16  # of the distance that tells unknown surfaces
 UNKNOWN_QUANTILE = 0.995  # of held-out windows of trained surfaces
+PRIOR_WINDOWS = 20.0  # with the variances of all classes, that a class's own are mixed with
 TEMPERS = np.geomspace(1e-3, 1.0, 91)  # scores are never sharpened: separable training data would ask for no end of it
 
 
@@ -63,22 +64,21 @@ def _fit_features(data: Windows, floor: np.ndarray, levels: bool, sizes: tuple) 
     nothing = np.zeros((0, features))
     blank = Rung(
         data.windows.shape[1], levels, max(sizes), floor, centre, scale,
-        np.zeros((features + max(sizes), classes)), np.zeros(classes), np.zeros((classes, features)), nothing, np.zeros(0),
+        np.zeros((features + max(sizes), classes)), np.zeros(classes), np.zeros((classes, features)), nothing, np.zeros((classes, 0)),
+        np.zeros(classes),
     )  # fmt: skip
     expanded = blank.expand(data.windows)
     sums = _Sums(expanded, data)
-    best = (*min((_held_out(sums, expanded, data, features, s) for s in SHRINK), key=lambda f: f[0]), 0)
-    for hidden in sizes[1:]:
-        found = _held_out(sums, expanded, data, features + hidden, best[1])
-        if found[0] > best[0]:
-            break
-        if _pays(found[0], best[0], HIDDEN_MUST_GAIN):
+    best = None
+    for hidden in sizes:
+        tries = (_held_out(sums, expanded, data, features + hidden, s) for s in SHRINK)
+        found = min(tries, key=lambda f: f[0])
+        if best is None or _pays(found[0], best[0], HIDDEN_MUST_GAIN):
             best = (*found, hidden)
     loss, shrink, temper, loglik, hidden = best
     rungs = [_finish(blank, sums, left_out, hidden, shrink, temper) for left_out in (None, *range(data.folds))]
-    limit = _unknown_limit(rungs[1:], expanded[:, :features], data)
-    for rung in rungs:
-        rung.unknown = limit
+    _spread(rungs, expanded[:, :features], data)
+    _limit(rungs, expanded[:, :features], data)
     return Fitted(rungs[0], rungs[1:], loglik, loss)
 
 
@@ -136,26 +136,50 @@ def _finish(blank: Rung, sums: _Sums, left_out: int | None, hidden: int, shrink:
     features = len(blank.centre)
     weight, bias = _discriminant(*sums.statistics(left_out, features + hidden), shrink)
     means, within = sums.statistics(left_out, features)
-    values, vectors = np.linalg.eigh(within)
+    _, vectors = np.linalg.eigh(within)
     axes = min(AXES_MOST, features)
-    rest = values[:-axes].mean() if features > axes else 1.0
     return Rung(
         blank.length, blank.levels, hidden, blank.floor, blank.centre, blank.scale, weight, bias, means,
-        vectors[:, ::-1][:, :axes].T, 1.0 / np.maximum(values[::-1][:axes], 1e-6), temper, 1.0 / max(rest, 1e-6),
+        vectors[:, ::-1][:, :axes].T, np.zeros((len(means), axes)), np.zeros(len(means)), temper,
     )  # fmt: skip
 
 
-def _unknown_limit(twins: list[Rung], z: np.ndarray, data: Windows) -> float:
-    distance = np.empty(len(z))
-    for f, twin in enumerate(twins):
-        distance[data.fold == f] = distances(twin, z[data.fold == f])
-    return float(np.quantile(distance, UNKNOWN_QUANTILE))
+def _spread(rungs: list[Rung], z: np.ndarray, data: Windows) -> None:
+    """Variances of each class along and beyond each rung's axes; few windows lean on what all classes have."""
+    for f, rung in enumerate(rungs, start=-1):
+        use = data.fold != f
+        along, rest = np.zeros((data.classes, len(rung.axis))), np.zeros(data.classes)
+        counts = np.bincount(data.label[use], minlength=data.classes)
+        outside = max(1, z.shape[1] - len(rung.axis))
+        for k in range(data.classes):
+            apart = z[use & (data.label == k)] - rung.middle[k]
+            squares = (apart @ rung.axis.T) ** 2
+            along[k] = squares.sum(axis=0)
+            rest[k] = max(0.0, (apart**2).sum() - squares.sum()) / outside
+        lean = PRIOR_WINDOWS / counts.sum()
+        along = (along + lean * along.sum(axis=0)) / (counts + PRIOR_WINDOWS)[:, None]
+        rest = (rest + lean * rest.sum()) / (counts + PRIOR_WINDOWS)
+        rung.axis_weight = 1.0 / np.maximum(along, 1e-6)
+        rung.beyond = 1.0 / np.maximum(rest, 1e-6) if z.shape[1] > len(rung.axis) else np.ones(data.classes)
+
+
+def _limit(rungs: list[Rung], z: np.ndarray, data: Windows) -> None:
+    """Scales distances so that each class keeps all but a few of its own held-out windows, and limits the nearest one's."""
+    held = np.empty((len(z), data.classes))
+    for f, twin in enumerate(rungs[1:]):
+        held[data.fold == f] = distances(twin, z[data.fold == f])
+    own = [np.quantile(held[data.label == k, k], UNKNOWN_QUANTILE) for k in range(data.classes)]
+    scale = 1.0 / np.maximum(own, 1e-12)
+    limit = float(np.quantile((held * scale).min(axis=1), UNKNOWN_QUANTILE))
+    for rung in rungs:
+        rung.axis_weight, rung.beyond = rung.axis_weight * scale[:, None], rung.beyond * scale
+        rung.unknown = limit
 
 
 def distances(rung: Rung, z: np.ndarray) -> np.ndarray:
-    """Squared distance of standardised features (m, F) from the nearest class, per feature, as nav_texture_rung_judge."""
+    """Squared distance of standardised features (m, F) from every class, per feature (m, K), as nav_texture_rung_judge."""
     apart = z[:, None, :] - rung.middle[None]
     along = apart @ rung.axis.T
     inside = (along**2 * rung.axis_weight).sum(axis=2)
     rest = np.maximum((apart**2).sum(axis=2) - (along**2).sum(axis=2), 0.0)
-    return ((inside + rest * rung.beyond) / z.shape[1]).min(axis=1)
+    return (inside + rest * rung.beyond) / z.shape[1]

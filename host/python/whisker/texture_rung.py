@@ -23,17 +23,17 @@ class Rung:
     bias: np.ndarray  # (classes,)
     middle: np.ndarray  # (classes, F)
     axis: np.ndarray  # (axes, F)
-    axis_weight: np.ndarray  # (axes,)
+    axis_weight: np.ndarray  # (classes, axes)
+    beyond: np.ndarray  # (classes,)
     temper: float = 1.0
-    beyond: float = 1.0
     unknown: float = 1e9  # squared distance of a surface that was never trained
     border: float = 1e9  # nats
     span: np.ndarray | None = None  # (channels,) counts: the farthest that a window of this length may reach
     seed: int = SEED
     _made: object = field(default=None, repr=False, compare=False)
 
-    ARRAYS = ("floor", "centre", "scale", "weight", "bias", "middle", "axis", "axis_weight")
-    NUMBERS = ("length", "levels", "hidden", "temper", "beyond", "unknown", "border", "seed")
+    ARRAYS = ("floor", "centre", "scale", "weight", "bias", "middle", "axis", "axis_weight", "beyond")
+    NUMBERS = ("length", "levels", "hidden", "temper", "unknown", "border", "seed")
 
     @property
     def native(self):
@@ -46,16 +46,17 @@ class Rung:
         for name in self.ARRAYS:
             setattr(self, name, np.ascontiguousarray(getattr(self, name), dtype=np.float64))
         features = feature_count(len(self.floor), self.length, self.levels)
-        classes, axes = len(self.bias), len(self.axis_weight)
+        classes, axes = len(self.bias), len(self.axis)
         shapes = {"centre": (features,), "scale": (features,), "weight": (features + self.hidden, classes)}
-        shapes |= {"middle": (classes, features), "axis": (axes, features)}
+        shapes |= {"middle": (classes, features), "axis": (axes, features), "axis_weight": (classes, axes)}
+        shapes["beyond"] = (classes,)
         for name, shape in shapes.items():
             if getattr(self, name).shape != shape:
                 raise ValueError(f"rung {self.length}: {name} has shape {getattr(self, name).shape}, not {shape}")
         numbers = ffi.new("struct nav_texture_rung_numbers *")
         numbers.classes, numbers.channels, numbers.length = classes, len(self.floor), self.length
         numbers.levels, numbers.hidden, numbers.axes = int(self.levels), self.hidden, axes
-        numbers.seed, numbers.temper, numbers.beyond = self.seed, self.temper, self.beyond
+        numbers.seed, numbers.temper = self.seed, self.temper
         for name in self.ARRAYS:
             setattr(numbers, name, doubles(getattr(self, name)))
         made = lib.nav_texture_rung_new(numbers)

@@ -10,7 +10,7 @@ from .native import doubles, ffi, lib
 from .tables import TableError
 from .texture_rung import Rung
 
-FORMAT = "whisker texture model 2"
+FORMAT = "whisker texture model 3"
 LIMITS = ("spike", "still", "low", "high")
 
 
@@ -87,6 +87,7 @@ class SpectralModel:
         for part in content["rungs"]:
             arrays = {name: np.array(part[name], dtype=np.float64) for name in (*Rung.ARRAYS, "span")}
             arrays["axis"] = arrays["axis"].reshape(-1, len(arrays["centre"]))
+            arrays["axis_weight"] = arrays["axis_weight"].reshape(len(arrays["bias"]), -1)
             rungs.append(Rung(**{name: part[name] for name in Rung.NUMBERS}, **arrays))
         limits = {name: np.array(content["limits"][name], dtype=np.float64) for name in LIMITS}
         numbers = {
@@ -151,6 +152,10 @@ class Stream:
                 found.append(self._judgement(self._taken + at))
         self._taken += len(samples)
         return found
+
+    def reset(self) -> None:
+        """Forget the samples held and what came before them: the next are no continuation."""
+        lib.nav_texture_stream_reset(self._stream)
 
     def _judgement(self, end: int) -> Judgement:
         d = self._decision

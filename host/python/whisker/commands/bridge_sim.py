@@ -12,6 +12,7 @@ import threading
 from pathlib import Path
 
 from ..bridgesim import Course, flat_scene, program, read_faults
+from ..demo.scenes import MECHANICS
 from ..protocol import LANES, LIMITS
 from ..ring import Reader, RingError
 from . import RING, number_above, stop_on_signals, whole_number
@@ -42,6 +43,8 @@ def add(parser) -> None:
     parser.add_argument(
         "--seconds", type=number_above(0.0), default=DAY_S, metavar="S", help="simulated length (a day)"
     )
+    text = "how whiskers bend (%(default)s): the level chosen by what touches, one forced, or simple"
+    parser.add_argument("--mechanics", choices=MECHANICS, default=MECHANICS[0], help=text)
     parser.add_argument("--seed", type=whole_number(0, 2**32 - 1), default=1, help="of world, sensors, start (1)")
     parser.add_argument(
         "--drive", choices=["turn", "still"], default="turn", help="turn on the spot, or stand still (turn)"
@@ -92,7 +95,7 @@ def _protocol(arguments) -> str | None:
 
 def _command(arguments, folder: Path) -> list[str]:
     """The simulation under umockdev with whiskerd inside, or as a server."""
-    text, whiskers = flat_scene(arguments.scene, arguments.seed)
+    text, whiskers = flat_scene(arguments.scene, arguments.seed, arguments.mechanics)
     lanes = max(arguments.lanes or whiskers, whiskers)
     (folder / "scene.flat").write_text(text)
     protocol = _protocol(arguments)

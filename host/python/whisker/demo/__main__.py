@@ -19,8 +19,8 @@ from ..tables import TableError
 from . import summary as scores
 from .chain import ChainError, ChainRun, Link, run_chain
 from .navigator_process import FILTERS
-from .scenes import make_scene
-from .training import learn, radial_scores, write_radial_points
+from .scenes import MECHANICS, make_scene
+from .training import METHODS, learn, radial_scores, write_radial_points
 
 TICKS_PER_S = 2000
 MARK = "demo.txt"
@@ -33,6 +33,8 @@ def parse(argv: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--seconds", type=float, default=60.0, help="simulated; a multiple of 0.1")
     parser.add_argument("--lanes", type=int, default=6, help="populated lanes, 6 to 28; those beyond 6 have no whisker")
+    parser.add_argument("--mechanics", choices=MECHANICS, default=MECHANICS[0], help="how whiskers bend (%(default)s)")
+    parser.add_argument("--texture", choices=METHODS, default=METHODS[0], help="texture classifier (%(default)s)")
     parser.add_argument("--sck-divider", type=int, default=6)
     parser.add_argument("--word-gap", type=int, default=30)
     parser.add_argument("--sample-point", type=int, default=5)
@@ -60,11 +62,11 @@ def demonstrate(options: argparse.Namespace) -> None:
     """All steps in order; leaves summary.json and report.html in the output folder."""
     began = time.monotonic()
     out = fresh_folder(options.out.resolve())
-    scene, start = make_scene(options.seed)
+    scene, start = make_scene(options.seed, options.mechanics)
     scenes.write(out / "scene", scene)
     (out / "scene" / "scene.flat").write_text(scene.flat(start))
     results = {"seed": options.seed, "simulated_s": options.seconds, "lanes": options.lanes}
-    results |= learn_models(out, scene, options.seed)
+    results |= learn_models(out, scene, options)
     results |= run(out, options)
     results |= judge(out, scene)
     results["wall_s"] = time.monotonic() - began
@@ -85,10 +87,10 @@ def fresh_folder(path: Path) -> Path:
     return path
 
 
-def learn_models(out: Path, scene: scenes.Scene, seed: int) -> dict:
+def learn_models(out: Path, scene: scenes.Scene, options: argparse.Namespace) -> dict:
     """Texture and radial models, from level-1 recordings."""
     with tqdm(total=1 + len(scene.robot.of_role("object")), desc="train and calibrate", unit="model") as bar:
-        models, contacts = learn(out / "models", scene, seed, bar.update)
+        models, contacts = learn(out / "models", scene, options.seed, bar.update, options.texture)
     write_radial_points(out, models, contacts)
     return radial_scores(scene, models, contacts)
 

@@ -20,7 +20,7 @@ from ..protocol import CODES, STATUS_CODE_SHIFT
 from ..radial import load as load_radial
 from ..ring import Reader, RingError
 from ..simlink import SimLink
-from ..texture import TextureModel
+from ..texture import load
 
 LOST = CODES["absent"] << STATUS_CODE_SHIFT  # status of a tick that never came
 DEGREES_PER_COUNT = 180.0 / 65536.0
@@ -73,7 +73,7 @@ def cell(value: float | None) -> str:
 
 def load_models(folder: Path, robot: scenes.Robot) -> tuple[dict, dict]:
     """Texture and radial models by whisker name, as training left them."""
-    texture = TextureModel.load(folder / "texture.json")
+    texture = load(folder / "texture.json")
     radial = {w.name: load_radial(folder / f"{w.name}.json") for w in robot.of_role("object")}
     return {w.name: texture for w in robot.of_role("texture")}, radial
 

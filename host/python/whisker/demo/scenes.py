@@ -22,6 +22,9 @@ WHISKER_M = 0.14  # outside the follicle
 ODOMETRY_RELATIVE_SIGMA = 0.03
 RADIAL_SIGMA_M = 0.005
 
+# Of sim/world (sim_scene.h); the first is the default.
+MECHANICS = ("auto", "rest", "static", "elastica", "modes", "simple")
+
 PRIOR_OFF_M = 0.2
 PRIOR_OFF_RAD = math.radians(10)
 PRIOR_SIGMA = (0.2, 0.2, math.radians(10))
@@ -43,7 +46,12 @@ def _object_whisker(name: str, tip_angle: float) -> Whisker:
     return Whisker(name, "object", base_m=base, yaw_rad=base_angle - outwards * math.pi / 2, length_m=WHISKER_M)
 
 
-def make_scene(seed: int) -> tuple[Scene, tuple[float, float, float]]:
+def simulated(mechanics: str, seed: int) -> tuple[str, ...]:
+    """What the simulated world is told beside a scene: how whiskers bend (one of MECHANICS), and which whiskers."""
+    return (f"mechanics {mechanics}", f"batch {seed % 2**32}")
+
+
+def make_scene(seed: int, mechanics: str = MECHANICS[0]) -> tuple[Scene, tuple[float, float, float]]:
     """The seed's scene, its prior included, and the true start pose (x, y, theta)."""
     random = np.random.default_rng([seed, 1])
     arena = _make_arena(random)
@@ -55,7 +63,8 @@ def make_scene(seed: int) -> tuple[Scene, tuple[float, float, float]]:
         start[1] + PRIOR_OFF_M * math.sin(direction),
         start[2] + turn,
     )
-    return Scene(arena, make_robot(), Prior("gaussian", mean, PRIOR_SIGMA)), start
+    prior = Prior("gaussian", mean, PRIOR_SIGMA)
+    return Scene(arena, make_robot(), prior, simulated(mechanics, seed)), start
 
 
 def _make_arena(random: np.random.Generator) -> Arena:

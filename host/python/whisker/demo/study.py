@@ -15,16 +15,16 @@ from ..pilot import Pilot
 from ..scene import Scene
 from .level1 import explore
 from .pilot_process import load_models
-from .scenes import make_scene
+from .scenes import MECHANICS, make_scene
 from .summary import pose_scores, rounded, texture_scores
-from .training import learn, radial_scores
+from .training import METHODS, learn, radial_scores
 
 FILTERS = ("grid", "foveal", "odometry")
 
 
-def study(seed: int, seconds: float, models: Path) -> dict:
+def study(seed: int, seconds: float, models: Path, mechanics: str = MECHANICS[0]) -> dict:
     """The navigation and texture figures of the summary for one seed, from a level-1 run with the models in a folder."""
-    scene, start = make_scene(seed)
+    scene, start = make_scene(seed, mechanics)
     pilot = Pilot(scene.robot, *load_models(models, scene.robot), seed)
     rows, truth = explore(scene, start, pilot, seed, round(seconds * 2000))
     poses = np.array([[row[key] for key in ("x_m", "y_m", "theta_rad")] for row in truth])
@@ -42,13 +42,15 @@ def main(argv: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m whisker.demo.study", description=__doc__.splitlines()[0])
     parser.add_argument("--seeds", type=int, nargs="+", required=True)
     parser.add_argument("--seconds", type=float, default=60.0)
+    parser.add_argument("--mechanics", choices=MECHANICS, default=MECHANICS[0])
+    parser.add_argument("--texture", choices=METHODS, default=METHODS[0])
     options = parser.parse_args(argv)
     print("seed  whisks  texture  grid (m)  90 % (m)  foveal (m)  odometry (m)  radial std / predicted")
     for seed in options.seeds:
-        scene, _ = make_scene(seed)
+        scene, _ = make_scene(seed, options.mechanics)
         with tempfile.TemporaryDirectory() as models:
-            radial = radial_scores(scene, *learn(Path(models), scene, seed, lambda: None))
-            s = study(seed, options.seconds, Path(models))
+            radial = radial_scores(scene, *learn(Path(models), scene, seed, lambda: None, options.texture))
+            s = study(seed, options.seconds, Path(models), options.mechanics)
         ratios = [radial["radial_std_mm"][n] / p for n, p in radial["radial_std_predicted_mm"].items()]
         print(
             f"{seed:4d} {s['whisks']:7d} {s['texture_accuracy']:8.3f} {s['pose_error_median_m']:9.3f} "

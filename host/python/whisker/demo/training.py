@@ -12,7 +12,9 @@ from ..contact import REST_SAMPLES, Contact
 from ..floor import centred
 from ..radial import RadialModel, peak, read_whisks
 from ..scene import Scene
-from ..texture import TextureModel, read_folder
+from ..texture import TextureModel, read_training
+from ..texture_spectral import SpectralModel
+from ..texture_train import train
 from .simulation import World, radial_contacts, write_radial_contacts, write_surface_drives
 
 # Drives at different times: each has its own drift of the sensor's rest, and its own roughness.
@@ -21,19 +23,23 @@ DRIVE_S = 8.0
 # What exploring consists of: share of the speed, turn (rad/s), seconds.
 MOVES = ((1.0, 0.0, 3.0), (0.0, TURN_RAD_S, 1.5), (1.0, 0.0, 1.5), (0.0, -TURN_RAD_S, 1.5), (-1.0, 0.0, 0.5))
 
+METHODS = ("spectral", "paper")  # of texture; the first is the default
+
 FIT_CONTACTS = 5  # at each radius: the paper's calibration
 HELD_OUT_CONTACTS = 40
 RECORDED_PUSH_S = 0.7  # longer than the pilot's, which counts from the onset that it notices
 PREDICTED_MM_PER_SPREAD = 68.9  # error over 90 to 140 mm from whisk repeatability alone (whisker_physics section 4)
 
 
-def learn(folder: Path, scene: Scene, seed: int, progress: Callable[[], object]) -> tuple[dict, dict]:
-    """All models of the scene's robot, saved in `folder`; `progress()` after each.
+def learn(
+    folder: Path, scene: Scene, seed: int, progress: Callable[[], object], method: str = METHODS[0]
+) -> tuple[dict, dict]:
+    """All models of the scene's robot, saved in `folder`; `progress()` after each. `method`: texture's, of METHODS.
 
     Returns radial models by whisker name, and their contacts as `calibrate` does.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    train_texture(folder, scene, seed)
+    train_texture(folder, scene, seed, method)
     progress()
     models, contacts = {}, {}
     for whisker in scene.robot.of_role("object"):
@@ -42,14 +48,15 @@ def learn(folder: Path, scene: Scene, seed: int, progress: Callable[[], object])
     return models, contacts
 
 
-def train_texture(folder: Path, scene: Scene, seed: int) -> TextureModel:
+def train_texture(folder: Path, scene: Scene, seed: int, method: str = METHODS[0]) -> TextureModel | SpectralModel:
     """Drive over each single surface, record, and learn one model for both floor whiskers from the files."""
     recordings = folder / "texture"
     write_surface_drives(
         recordings, flat(scene), scene.arena.textures, seed, DRIVE_S, speeds=[EXPLORE_M_S] * DRIVES, moves=MOVES
     )
-    found = read_folder(recordings)
-    model = fit_texture({name: found[name] for name in scene.arena.textures}, seed)
+    found, rate_hz = read_training(recordings)
+    known = {name: found[name] for name in scene.arena.textures}
+    model = fit_texture(known, seed) if method == "paper" else train(known, rate_hz)
     model.save(folder / "texture.json")
     return model
 
