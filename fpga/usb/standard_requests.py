@@ -70,6 +70,8 @@ class StandardRequests(ControlRequestHandler):
         self.done = Signal()  # the host has asked for the status
         self.refused = Signal()  # the descriptor does not exist
         self.rom_value = Signal(16)  # descriptor type and index in the ROM
+        self.position = Signal(11)  # in the descriptor, of the packet to send
+        self.sent = Signal()  # that packet, and not yet acknowledged
         ours = (itf.setup.type == USBRequestType.STANDARD) | (itf.setup.type == USBRequestType.VENDOR)
         asked = itf.data_requested | itf.status_requested | itf.rx_ready_for_response
         m.d.comb += itf.claim.eq(ours)
@@ -95,7 +97,7 @@ class StandardRequests(ControlRequestHandler):
         device = setup.recipient == USBRequestRecipient.DEVICE
         with m.If(setup.received):
             m.d.usb += [self.kind.eq(0), self.done.eq(0), self.refused.eq(0), itf.tx_data_pid.eq(1)]
-            m.d.usb += [self.answer.eq(0), self.answer_bytes.eq(1)]
+            m.d.usb += [self.answer.eq(0), self.answer_bytes.eq(1), self.position.eq(0), self.sent.eq(0)]
             m.d.usb += self.rom_value.eq(Cat(setup.value[:8], self._place(setup.value[8:])))
             with m.If(setup.type == USBRequestType.VENDOR):
                 windows = device & setup.is_in_request & (setup.index == WINDOWS_INDEX) & (setup.value == 0)
@@ -193,9 +195,9 @@ class StandardRequests(ControlRequestHandler):
     def _send_descriptor(self, m):
         itf, setup = self.interface, self.interface.setup
         m.submodules.rom = rom = GetDescriptorHandlerBlock(self._descriptors, max_packet_length=PACKET)
-        sent = Signal()
         m.d.comb += [
             rom.value.eq(self.rom_value),
+            rom.start_position.eq(self.position),
             rom.length.eq(setup.length),
             rom.start.eq(itf.data_requested),
             rom.tx.attach(itf.tx),
@@ -205,14 +207,11 @@ class StandardRequests(ControlRequestHandler):
         with m.If(itf.status_requested & (setup.length == 0)):
             m.d.comb += self.send_zlp()
         with m.If(rom.stall):
-            m.d.usb += [sent.eq(0), self.refused.eq(1)]
+            m.d.usb += [self.sent.eq(0), self.refused.eq(1)]
         with m.Elif(itf.data_requested):
-            m.d.usb += sent.eq(1)
-        with m.Elif(itf.handshakes_in.ack & sent):
-            m.d.usb += [sent.eq(0), itf.tx_data_pid.eq(~itf.tx_data_pid)]
-            m.d.usb += rom.start_position.eq(rom.start_position + PACKET)
-        with m.If(setup.received):
-            m.d.usb += [rom.start_position.eq(0), sent.eq(0)]
+            m.d.usb += self.sent.eq(1)
+        with m.Elif(itf.handshakes_in.ack & self.sent):
+            m.d.usb += [self.sent.eq(0), itf.tx_data_pid.eq(~itf.tx_data_pid), self.position.eq(self.position + PACKET)]
 
     def _send_serial(self, m):
         """String descriptor (section 9.6.7) of the serial number: two bytes, then a digit in UTF-16 each."""

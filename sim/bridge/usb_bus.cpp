@@ -15,6 +15,12 @@ constexpr uint64_t RESET_LIMIT = 10 * CYCLES_PER_MS;
 constexpr uint64_t HUB_CHIRP = 400;
 constexpr int HUB_CHIRP_PAIRS = 6;
 constexpr uint8_t OP_MODE_CHIRP = 2;
+// A device gives a hub 1 to 2.5 ms to answer its chirp (7.1.7.5).
+constexpr uint64_t CHIRP_PATIENCE = 3 * CYCLES_PER_MS;
+// 3 ms of idle, then up to 0.875 ms to tell suspend from reset (7.1.7.6).
+constexpr uint64_t SUSPEND_CYCLES = 4 * CYCLES_PER_MS;
+// The host ends K with two low-speed bit times of SE0 (7.1.7.7).
+constexpr uint64_t END_OF_RESUME = 80;
 
 } // namespace
 
@@ -22,9 +28,10 @@ UsbBus::UsbBus(UtmiDevice &device) : device_(device)
 {
 }
 
+// With its full-speed pull-up on, as asleep, the device itself makes the idle line J.
 uint8_t UsbBus::idle_line() const
 {
-    return high_speed_ ? LINE_SE0 : LINE_J;
+    return high_speed_ && !device_.out.term_select ? LINE_SE0 : LINE_J;
 }
 
 void UsbBus::hold_line(uint8_t line, uint64_t cycles)
@@ -37,7 +44,17 @@ void UsbBus::hold_line(uint8_t line, uint64_t cycles)
 
 void UsbBus::idle(uint64_t cycles)
 {
-    hold_line(idle_line(), cycles);
+    while (cycles-- > 0) {
+        hold_line(idle_line(), 1);
+        unasked_ = unasked_ || device_.out.tx_valid;
+    }
+}
+
+bool UsbBus::take_unasked()
+{
+    const bool unasked = unasked_;
+    unasked_ = false;
+    return unasked;
 }
 
 bool UsbBus::hold_line_until_transmit(uint8_t line, bool level)
@@ -53,10 +70,20 @@ bool UsbBus::hold_line_until_transmit(uint8_t line, bool level)
     return false;
 }
 
-bool UsbBus::chirp()
+bool UsbBus::at_speed(bool high) const
+{
+    const uint8_t select = high ? 0 : 1; // of UTMI's transceivers and terminations
+    return device_.out.xcvr_select == select && device_.out.term_select == select;
+}
+
+bool UsbBus::chirp(Speed speed)
 {
     if (!hold_line_until_transmit(LINE_SE0, true) || !hold_line_until_transmit(LINE_K, false)) {
         return false;
+    }
+    if (speed == Speed::FULL) {
+        hold_line(LINE_SE0, CHIRP_PATIENCE);
+        return true;
     }
     hold_line(LINE_SE0, PACKET_GAP);
     for (int pair = 0; pair < HUB_CHIRP_PAIRS; pair++) {
@@ -64,14 +91,37 @@ bool UsbBus::chirp()
         hold_line(LINE_J, HUB_CHIRP);
     }
     hold_line(LINE_SE0, HUB_CHIRP);
-    return device_.out.xcvr_select == 0 && device_.out.term_select == 0;
+    return true;
 }
 
-bool UsbBus::reset()
+bool UsbBus::reset(Speed speed)
 {
-    high_speed_ = chirp();
+    device_.in.rx_active = device_.in.rx_valid = device_.in.tx_ready = 0;
+    high_speed_ = chirp(speed) && speed == Speed::HIGH;
+    unasked_ = false;
     idle(PACKET_GAP);
-    return high_speed_;
+    return at_speed(speed == Speed::HIGH);
+}
+
+bool UsbBus::suspend()
+{
+    for (uint64_t i = 0; i < SUSPEND_CYCLES; i++) {
+        hold_line(idle_line(), 1);
+    }
+    return at_speed(false);
+}
+
+bool UsbBus::resume(uint64_t cycles)
+{
+    bool patient = true;
+    for (uint64_t i = 0; i < cycles; i++) {
+        hold_line(LINE_K, 1);
+        patient = patient && at_speed(false);
+    }
+    hold_line(LINE_SE0, END_OF_RESUME);
+    const bool back = at_speed(high_speed_);
+    idle(PACKET_GAP);
+    return patient && back;
 }
 
 void UsbBus::send(const Bytes &packet)

@@ -8,11 +8,13 @@ namespace
 
 constexpr size_t CONTROL_PACKET = 64;
 constexpr uint8_t TO_HOST = 0x80;
+constexpr uint8_t TO_INTERFACE = 0x01;
 constexpr uint8_t TO_ENDPOINT = 0x02;
 constexpr uint8_t CLEAR_FEATURE = 1;
 constexpr uint8_t SET_ADDRESS = 5;
 constexpr uint8_t GET_DESCRIPTOR = 6;
 constexpr uint8_t SET_CONFIGURATION = 9;
+constexpr uint8_t SET_INTERFACE = 11;
 constexpr uint16_t DEVICE_DESCRIPTOR = 0x0100;
 constexpr uint16_t CONFIGURATION_DESCRIPTOR = 0x0200;
 constexpr uint8_t ADDRESS = 1;
@@ -83,6 +85,8 @@ void follow(UsbHost &host, const SetupRequest &request)
         host.set_address(static_cast<uint8_t>(request.value & 0x7Fu));
     } else if (request.type == 0 && request.request == SET_CONFIGURATION) {
         host.clear_toggles();
+    } else if (request.type == TO_INTERFACE && request.request == SET_INTERFACE) {
+        host.clear_toggle(static_cast<uint8_t>(request.index + 1), true); // interface n has IN endpoint n + 1
     } else if (request.type == TO_ENDPOINT && request.request == CLEAR_FEATURE) {
         host.clear_toggle(request.index & 0xFu, (request.index & TO_HOST) != 0);
     }

@@ -25,18 +25,38 @@ const HostCounters &UsbHost::counters() const
     return counters_;
 }
 
-bool UsbHost::reset()
+UsbBus &UsbHost::bus()
+{
+    return bus_;
+}
+
+uint8_t UsbHost::address() const
+{
+    return address_;
+}
+
+bool UsbHost::reset(Speed speed)
 {
     address_ = 0;
     toggle_in_.fill(false);
     toggle_out_.fill(false);
     copy_due_.fill(false);
-    return bus_.reset();
+    return bus_.reset(speed);
 }
 
+// Whatever a device says while nobody asked is out of place.
 void UsbHost::idle(uint64_t cycles)
 {
     bus_.idle(cycles);
+    if (bus_.take_unasked()) {
+        violation();
+    }
+}
+
+void UsbHost::violation()
+{
+    counters_.violations++;
+    counters_.unexplained++;
 }
 
 void UsbHost::send_token(Pid pid, uint8_t endpoint, bool spoil)
@@ -51,7 +71,7 @@ void UsbHost::send_token(Pid pid, uint8_t endpoint, bool spoil)
 void UsbHost::start_of_frame()
 {
     bus_.send(token_packet(PID_SOF, static_cast<uint16_t>((microframe_++ >> 3) & 0x7FFu)));
-    bus_.idle(PACKET_GAP);
+    idle(PACKET_GAP);
 }
 
 // ------------------------------------------------------------------------------------------- errors, meant and unmeant
@@ -98,10 +118,9 @@ Outcome UsbHost::irregular(PacketError error, bool deliberate)
 void UsbHost::expect_silence()
 {
     if (bus_.receive(sizeof(uint64_t), packet_)) {
-        counters_.violations++;
-        counters_.unexplained++;
+        violation();
     }
-    bus_.idle(PACKET_GAP);
+    idle(PACKET_GAP);
 }
 
 void UsbHost::spoiled_token(uint8_t endpoint)
@@ -115,10 +134,9 @@ void UsbHost::spoiled_setup(const Bytes &packet)
     Bytes spoiled = packet;
     spoiled.back() ^= 0x01u;
     send_token(PID_SETUP, 0, false);
-    bus_.idle(PACKET_GAP);
+    idle(PACKET_GAP);
     bus_.send(spoiled);
     expect_silence();
-    setup_may_be_lost_ = true;
 }
 
 // --------------------------------------------------------------------------------------------------------------- IN
@@ -132,7 +150,7 @@ Outcome UsbHost::in(uint8_t endpoint, size_t limit, Bytes &data)
     for (int attempt = 0; attempt < ATTEMPTS; attempt++) {
         bool duplicate = false;
         outcome = in_once(endpoint, limit, data, duplicate);
-        bus_.idle(PACKET_GAP);
+        idle(PACKET_GAP);
         if (final_outcome(outcome) && !duplicate) {
             return outcome;
         }
@@ -202,22 +220,15 @@ Outcome UsbHost::handshake()
     return Outcome::OK;
 }
 
-// LUNA waits for the data of a damaged SETUP until the next token and uses that token up (USBSetupDecoder, READ_DATA),
-// so the first retry goes unanswered too; the third of the three attempts a host makes gets through.
-Outcome UsbHost::silence(Pid pid)
-{
-    return irregular(PacketError::EMPTY, pid == PID_SETUP && setup_may_be_lost_);
-}
-
 Outcome UsbHost::out_once(Pid pid, uint8_t endpoint, const Bytes &packet)
 {
     counters_.transactions++;
     send_token(pid, endpoint, false);
-    bus_.idle(PACKET_GAP);
+    idle(PACKET_GAP);
     bus_.send(packet);
-    const Outcome outcome = bus_.receive(sizeof(uint64_t), packet_) ? handshake() : silence(pid);
-    setup_may_be_lost_ = false;
-    bus_.idle(PACKET_GAP);
+    const Outcome outcome =
+        bus_.receive(sizeof(uint64_t), packet_) ? handshake() : irregular(PacketError::EMPTY, false);
+    idle(PACKET_GAP);
     return outcome;
 }
 
@@ -249,6 +260,9 @@ Outcome UsbHost::setup(const uint8_t request[8])
         spoiled_setup(packet);
     }
     const Outcome outcome = out_retried(PID_SETUP, 0, packet);
+    if (outcome == Outcome::NAK || outcome == Outcome::STALL) {
+        violation(); // a device has to take every SETUP (USB 2.0, 8.4.6.4)
+    }
     toggle_in_[0] = true;
     toggle_out_[0] = true;
     return outcome;

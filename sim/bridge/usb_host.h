@@ -41,8 +41,12 @@ class UsbHost
   public:
     explicit UsbHost(UtmiDevice &device);
 
-    // Bus reset with high-speed chirp, address 0, all toggles DATA0. False: the device did not enter high speed.
-    bool reset();
+    // Bus reset with chirp, address 0, all toggles DATA0. False: the device is not at this speed.
+    bool reset(Speed speed = Speed::HIGH);
+
+    // The wire itself, for packets that no host would send.
+    UsbBus &bus();
+    uint8_t address() const;
 
     // Start-of-frame token; the caller decides when one is due.
     void start_of_frame();
@@ -76,6 +80,7 @@ class UsbHost
     void spoiled_token(uint8_t endpoint);
     void spoiled_setup(const Bytes &packet);
     void expect_silence();
+    void violation();
     Outcome in_once(uint8_t endpoint, size_t limit, Bytes &data, bool &duplicate);
     Outcome take_data(uint8_t endpoint, Bytes &data, bool &duplicate);
     void acknowledge(uint8_t endpoint);
@@ -83,7 +88,6 @@ class UsbHost
     Outcome out_retried(Pid pid, uint8_t endpoint, const Bytes &packet);
     Outcome handshake();
     Outcome irregular(PacketError error, bool deliberate);
-    Outcome silence(Pid pid);
     bool use(WireFault fault);
 
     UsbBus bus_;
@@ -91,7 +95,6 @@ class UsbHost
     std::array<bool, 16> toggle_in_{};
     std::array<bool, 16> toggle_out_{};
     std::array<bool, 16> copy_due_{}; // the last ACK was lost on purpose
-    bool setup_may_be_lost_ = false;  // the SETUP before was damaged on purpose
     uint8_t address_ = 0;
     uint16_t microframe_ = 0;
     WireFault armed_ = WireFault::NONE;

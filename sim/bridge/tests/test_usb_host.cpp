@@ -1,8 +1,7 @@
 // The USB host model against a device made of a script: every irregular answer must be noticed and counted.
 #include "cmocka_cpp.h"
 
-#include <deque>
-
+#include "scripted_device.h"
 #include "usb_host.h"
 
 using namespace bridge_sim;
@@ -11,53 +10,6 @@ namespace
 {
 
 constexpr size_t LIMIT = 512;
-
-// Answers the packets that want an answer (IN tokens and data) with the next packet of the script; an empty one is
-// silence. Keeps what it heard.
-class ScriptedDevice : public UtmiDevice
-{
-  public:
-    std::deque<Bytes> script;
-    std::vector<Bytes> heard;
-
-    void cycle() override
-    {
-        listen();
-        talk();
-        cycles++;
-    }
-
-  private:
-    void listen()
-    {
-        if (in.rx_valid) {
-            incoming_.push_back(in.rx_data);
-        }
-        if (!in.rx_active && !incoming_.empty()) {
-            const uint8_t pid = incoming_[0];
-            heard.push_back(incoming_);
-            incoming_.clear();
-            if ((pid == PID_IN || pid == PID_DATA0 || pid == PID_DATA1) && !script.empty()) {
-                outgoing_ = script.front();
-                script.pop_front();
-                at_ = 0;
-            }
-        }
-    }
-
-    void talk()
-    {
-        out.tx_valid = at_ < outgoing_.size();
-        if (out.tx_valid) {
-            out.tx_data = outgoing_[at_];
-            at_ += in.tx_ready;
-        }
-    }
-
-    Bytes incoming_;
-    Bytes outgoing_;
-    size_t at_ = 0;
-};
 
 struct Fixture {
     ScriptedDevice device;
@@ -100,6 +52,71 @@ void tokens_carry_their_crc5(void **)
 {
     assert_true(token_packet(PID_IN, 0) == Bytes({0x69, 0x00, 0x10}));
     assert_true(token_packet(PID_IN, 9 | 2 << 7) == Bytes({0x69, 0x09, 0xB1}));
+}
+
+// The published examples of tokens: the CRC-5 as it goes out on the wire, first bit highest.
+void crc5_of_the_published_examples(void **)
+{
+    const struct {
+        uint16_t address, endpoint;
+        uint8_t sent;
+    } examples[] = {{0x15, 0xE, 0x17}, {0x3A, 0xA, 0x1C}, {0x70, 0x4, 0x0E}, {0x01, 0x0, 0x17}};
+    for (const auto &example : examples) {
+        const uint8_t crc = usb_crc5(static_cast<uint16_t>(example.address | example.endpoint << 7));
+        uint8_t sent = 0;
+        for (int bit = 0; bit < 5; bit++) {
+            sent = static_cast<uint8_t>(sent | ((crc >> bit) & 1) << (4 - bit));
+        }
+        assert_int_equal(sent, example.sent);
+    }
+}
+
+// And of data: two packets of four bytes.
+void crc16_of_the_published_examples(void **)
+{
+    const struct {
+        uint8_t data[4];
+        uint16_t sent; // first bit highest
+    } examples[] = {{{0x00, 0x01, 0x02, 0x03}, 0xF75E}, {{0x23, 0x45, 0x67, 0x89}, 0x7038}};
+    for (const auto &example : examples) {
+        const uint16_t crc = usb_crc16(example.data, sizeof example.data);
+        uint16_t sent = 0;
+        for (int bit = 0; bit < 16; bit++) {
+            sent = static_cast<uint16_t>(sent | ((crc >> bit) & 1) << (15 - bit));
+        }
+        assert_int_equal(sent, example.sent);
+    }
+}
+
+// What is left in the register after a good packet and its CRC, whatever the packet (USB 2.0, 8.3.5.1 and 8.3.5.2):
+// 01100 and 1000000000001101.
+void residuals_are_the_specifications(void **)
+{
+    const auto divide = [](const std::vector<bool> &bits, unsigned width, unsigned polynomial) {
+        const unsigned top = 1u << (width - 1);
+        unsigned remainder = (1u << width) - 1;
+        for (const bool bit : bits) {
+            const bool feedback = ((remainder & top) != 0) != bit;
+            remainder = (remainder << 1) & ((1u << width) - 1);
+            remainder ^= feedback ? polynomial : 0;
+        }
+        return remainder;
+    };
+    const auto bits_of = [](const Bytes &bytes) {
+        std::vector<bool> bits;
+        for (const uint8_t byte : bytes) {
+            for (int bit = 0; bit < 8; bit++) {
+                bits.push_back((byte >> bit & 1) != 0);
+            }
+        }
+        return bits;
+    };
+    for (unsigned seed = 0; seed < 64; seed++) {
+        const Bytes token = token_packet(PID_IN, static_cast<uint16_t>(seed * 37));
+        assert_int_equal(divide(bits_of({token[1], token[2]}), 5, 0x05), 0x0C);
+        const Bytes data = data_packet(false, payload(static_cast<uint8_t>(seed)).data(), seed % 5);
+        assert_int_equal(divide(bits_of(Bytes(data.begin() + 1, data.end())), 16, 0x8005), 0x800D);
+    }
 }
 
 // CRC-16/USB of "123456789" in the catalogue of parametrised CRC algorithms.
@@ -239,6 +256,9 @@ int main()
     const CMUnitTest tests[] = {
         cmocka_unit_test(tokens_carry_their_crc5),
         cmocka_unit_test(crc16_of_the_check_text),
+        cmocka_unit_test(crc5_of_the_published_examples),
+        cmocka_unit_test(crc16_of_the_published_examples),
+        cmocka_unit_test(residuals_are_the_specifications),
         cmocka_unit_test(sound_data_is_taken_and_acknowledged),
         cmocka_unit_test(wrong_crc16_is_not_acknowledged_but_retried),
         cmocka_unit_test(three_wrong_crcs_are_an_error),
