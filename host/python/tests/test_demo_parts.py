@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from whisker import scene as scenes
+from whisker.bridgesim import flat_scene
 from whisker.demo import summary
 from whisker.demo.__main__ import fresh_folder
 from whisker.demo.chain import ChainError, ChainRun, Link, run_chain
@@ -216,3 +217,13 @@ def test_foreign_folder_is_never_removed(tmp_path):
     mine = fresh_folder(tmp_path / "new")
     (mine / "old.csv").write_text("")
     assert not (fresh_folder(mine) / "old.csv").exists()
+
+
+def test_how_whiskers_bend_is_told_to_the_world_and_is_no_part_of_the_folder(tmp_path):
+    scene, start = make_scene(5, "elastica")
+    assert {"mechanics elastica", "batch 5"} <= set(scene.flat(start).splitlines())
+    scenes.write(tmp_path, scene)
+    assert scenes.load(tmp_path) == scene
+    text, _ = flat_scene(str(tmp_path), 7, "rest")
+    assert {"mechanics rest", "batch 7"} <= set(text.splitlines())
+    assert "mechanics auto" in flat_scene(None, 7)[0]
