@@ -109,9 +109,9 @@ MUTATIONS = [
         "",
     ),
     Mutation(
-        "firmware: the watchdog is never told",
+        "firmware: the watchdog is never switched on",
         "firmware/dspic/port_dspic/port.c",
-        "    cpu_clear_watchdog(board);\n",
+        "    sfr_set(board, RCON, RCON_SWDTEN);\n",
         "",
     ),
     Mutation(

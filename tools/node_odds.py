@@ -13,6 +13,9 @@ from whisker import protocol
 BITS = 64
 RECORD = protocol.RECORD
 FLOATING = 2.0**-32  # start byte, error word and sum right by chance
+GLITCH = (63 - 7 - 8) / 63 / 256  # before bit 1 to 63: the first 7 hurt the tick, the last 8 make a burst that is seen
+REARMED = 1 / 256
+CHANCES = {"FLOATING": FLOATING, "GLITCH": GLITCH, "REARMED": REARMED}
 Z95 = 1.959964  # normal quantile of a two-sided 95 % interval
 
 
@@ -85,8 +88,8 @@ def derived(name: str, totals: list) -> tuple[float | None, float | None]:
         return passed / events, good / events
     if name == "NOISY":
         return passed / events, None
-    if name == "FLOATING":
-        return FLOATING, None
+    if name in CHANCES:
+        return CHANCES[name], None
     if name in ("BEHIND", "AHEAD"):
         return slipped(name == "AHEAD"), None
     if name.startswith("FLIPS_"):

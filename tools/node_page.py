@@ -91,7 +91,8 @@ Derivations, for bytes evenly spread:
 - **Step**: an angle may move by 30 degrees a tick; what passes the sum and jumps further is told as `step`. It sees nothing in a first frame.
 - **CRC-8** (0x2F): all patterns of odd weight, of two bits, and of any burst up to eight bits are seen. Of the C(64, w) patterns of even weight w, those with
   syndrome zero that spare the tick are counted: 4 bits 0.46 %, 6 bits 0.34 %. They are good samples only if they spare the status, too.
-- **CRC-8, words slipped or cut**: long bursts, 1/256 if they were random; cut clocks are gone through for each record (the level of the last bit stays).
+- **CRC-8, words slipped**: a long burst is seen but for 1/256; a select glitch before bit 8 hurts the tick, one in the last 8 bits is a burst that is always
+  seen: 48/63 of 1/256. Cut clocks are gone through for each record (the level of the last bit stays).
 
 Per event; measured with its 95 % interval (Wilson). Derived for the two-bit, clock, noise and cut classes: mean over the events of each one's own probability.
 

@@ -144,6 +144,22 @@ static void a_body_other_than_announced_is_not_run(void **state)
     sim_node_free(b.node);
 }
 
+/* The header is whole, as after a flash cell has failed. */
+static void a_body_that_has_changed_since_is_not_run(void **state)
+{
+    (void)state;
+    struct update_image image = update_image_of(UPDATE_VERSION);
+    struct update_bench b = {.node = sim_node_new(9)};
+    assert_non_null(b.node);
+    image.bytes[WHISKER_IMAGE_HEADER_BYTES + 500] ^= 1u;
+    sim_node_program(b.node, image.bytes, sizeof image.bytes);
+    sim_node_power_on(b.node);
+    settle(&b);
+    assert_int_equal(sim_node_version(b.node), 0);
+    assert_int_equal(update_code(&b), WHISKER_CODE_LOADER);
+    sim_node_free(b.node);
+}
+
 static void another_chip_refuses_the_image(void **state)
 {
     (void)state;
@@ -162,6 +178,7 @@ int main(void)
         cmocka_unit_test(an_update_runs_the_new_image),
         cmocka_unit_test(unfit_images_are_refused_and_the_old_one_stays),
         cmocka_unit_test(a_body_other_than_announced_is_not_run),
+        cmocka_unit_test(a_body_that_has_changed_since_is_not_run),
         cmocka_unit_test(another_chip_refuses_the_image),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
