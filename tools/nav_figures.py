@@ -9,6 +9,7 @@ from whisker.scoring import auc
 LOST_M = 0.25
 BOOTSTRAP = 2000
 BINS = 10  # of confidence
+KIDNAP = "kidnap"  # the stability matrix's row of that name
 WANTED_COVERAGE, WANTED_COVERAGE_FAULTS = (0.85, 0.95), 0.8
 
 
@@ -166,18 +167,19 @@ def variation(by_family: dict[str, list[dict]]) -> dict:
 
 
 def matrix(done, filters: list[str]) -> dict:
-    """Ledgers by row and filter; how well confidence foretells being lost, by filter, over all rows of the matrix."""
-    foretold = {}
+    """Ledgers by row and filter; how well confidence foretells being lost, by filter, over all rows of the matrix and
+    over kidnaps alone."""
+    foretold, kidnapped = {}, {}
     for name in filters:
-        judged = [t["judged"] for (_, title), trials in done.items() if title == name for t in trials]
-        foretold[name] = foresight(
-            np.concatenate([j["confidence"] for j in judged]), np.concatenate([j["error_m"] for j in judged])
-        )
-    return {"filters": filters, "rows": by_row(done, ledger), "confidence": foretold}
+        mine = {row: [t["judged"] for t in trials] for (row, title), trials in done.items() if title == name}
+        foretold[name] = foresight(sum(mine.values(), []))
+        kidnapped[name] = foresight(mine[KIDNAP])
+    return {"filters": filters, "rows": by_row(done, ledger), "confidence": foretold, "confidence_kidnap": kidnapped}
 
 
-def foresight(confidence: np.ndarray, error_m: np.ndarray) -> dict:
+def foresight(judged: list[dict]) -> dict:
     """Area under the curve of low confidence against being lost; share near (0.25 m) by confidence."""
+    confidence, error_m = (np.concatenate([j[key] for j in judged]) for key in ("confidence", "error_m"))
     bins = np.minimum((confidence * BINS).astype(int), BINS - 1)
     table = []
     for k in range(BINS):
@@ -252,7 +254,12 @@ def _matrix_text(data: dict) -> str:
         for title, row in data["rows"].items()
     ]
     faulty = sum(cell["faulty_rows"] for row in data["rows"].values() for cell in row.values())
-    foretold = [[name, _number(f["auc"]), _number(f["calibration_error"])] for name, f in data["confidence"].items()]
+    foretold = [
+        [name, *(_number(f[key]) for f in (everywhere, kidnapped) for key in ("auc", "calibration_error"))]
+        for (name, everywhere), kidnapped in zip(
+            data["confidence"].items(), data["confidence_kidnap"].values(), strict=True
+        )
+    ]
     return (
         text
         + _table(["", *data["filters"]], rows)
