@@ -76,12 +76,12 @@ bool UsbBus::at_speed(bool high) const
     return device_.out.xcvr_select == select && device_.out.term_select == select;
 }
 
-bool UsbBus::chirp(Speed speed)
+bool UsbBus::chirp(BusSpeed speed)
 {
     if (!hold_line_until_transmit(LINE_SE0, true) || !hold_line_until_transmit(LINE_K, false)) {
         return false;
     }
-    if (speed == Speed::FULL) {
+    if (speed == BusSpeed::FULL) {
         hold_line(LINE_SE0, CHIRP_PATIENCE);
         return true;
     }
@@ -94,13 +94,13 @@ bool UsbBus::chirp(Speed speed)
     return true;
 }
 
-bool UsbBus::reset(Speed speed)
+bool UsbBus::reset(BusSpeed speed)
 {
     device_.in.rx_active = device_.in.rx_valid = device_.in.tx_ready = 0;
-    high_speed_ = chirp(speed) && speed == Speed::HIGH;
+    high_speed_ = chirp(speed) && speed == BusSpeed::HIGH;
     unasked_ = false;
     idle(PACKET_GAP);
-    return at_speed(speed == Speed::HIGH);
+    return at_speed(speed == BusSpeed::HIGH);
 }
 
 bool UsbBus::suspend()

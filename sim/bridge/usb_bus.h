@@ -12,7 +12,7 @@ constexpr uint64_t PACKET_GAP = 12;
 // Time a device needs to see the end of its own packet before the host's handshake.
 constexpr uint64_t HANDSHAKE_GAP = 4;
 
-enum class Speed { HIGH, FULL };
+enum class BusSpeed { HIGH, FULL };
 
 class UsbBus
 {
@@ -21,7 +21,7 @@ class UsbBus
 
     // Bus reset and high-speed chirp (USB 2.0, 7.1.7.5), which a hub of full speed does not answer. False: the device
     // did not chirp, or is not at the hub's speed afterwards.
-    bool reset(Speed speed);
+    bool reset(BusSpeed speed);
 
     void send(const Bytes &packet);
 
@@ -43,7 +43,7 @@ class UsbBus
     bool take_unasked();
 
   private:
-    bool chirp(Speed speed);
+    bool chirp(BusSpeed speed);
     bool at_speed(bool high) const;
     void hold_line(uint8_t line, uint64_t cycles);
     bool hold_line_until_transmit(uint8_t line, bool level);

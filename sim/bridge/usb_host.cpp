@@ -35,7 +35,7 @@ uint8_t UsbHost::address() const
     return address_;
 }
 
-bool UsbHost::reset(Speed speed)
+bool UsbHost::reset(BusSpeed speed)
 {
     address_ = 0;
     toggle_in_.fill(false);

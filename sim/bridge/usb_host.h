@@ -42,7 +42,7 @@ class UsbHost
     explicit UsbHost(UtmiDevice &device);
 
     // Bus reset with chirp, address 0, all toggles DATA0. False: the device is not at this speed.
-    bool reset(Speed speed = Speed::HIGH);
+    bool reset(BusSpeed speed = BusSpeed::HIGH);
 
     // The wire itself, for packets that no host would send.
     UsbBus &bus();

@@ -1,4 +1,4 @@
-// Speed, suspend, resume, and packets that are not for the device or not acknowledged by its host.
+// BusSpeed, suspend, resume, and packets that are not for the device or not acknowledged by its host.
 #include "cmocka_cpp.h"
 
 #include "noisy_host.h"
@@ -20,12 +20,12 @@ struct Fixture {
     UsbHost host{device};
     uint64_t read = 0; // bytes of the stream
 
-    explicit Fixture(Speed speed = Speed::HIGH)
+    explicit Fixture(BusSpeed speed = BusSpeed::HIGH)
     {
         device.byte = [](uint64_t index) { return static_cast<uint8_t>(index ^ index >> 8); };
         configure(speed);
     }
-    void configure(Speed speed)
+    void configure(BusSpeed speed)
     {
         Bytes none;
         assert_true(host.reset(speed));
@@ -67,7 +67,7 @@ size_t bulk_packet(const Bytes &configuration)
 
 void at_full_speed_packets_are_short(void **)
 {
-    Fixture f(Speed::FULL);
+    Fixture f(BusSpeed::FULL);
     assert_int_equal(bulk_packet(f.request({0x80, 6, 0x0200, 0, 255})), SLOW_PACKET);
     assert_int_equal(bulk_packet(f.request({0x80, 6, 0x0700, 0, 255})), FAST_PACKET);
     f.device.available = 20 * SLOW_PACKET;
@@ -79,9 +79,9 @@ void at_full_speed_packets_are_short(void **)
 
 void speed_may_change_at_every_reset(void **)
 {
-    Fixture f(Speed::HIGH);
-    for (Speed speed : {Speed::FULL, Speed::HIGH, Speed::FULL, Speed::HIGH}) {
-        const size_t size = speed == Speed::HIGH ? FAST_PACKET : SLOW_PACKET;
+    Fixture f(BusSpeed::HIGH);
+    for (BusSpeed speed : {BusSpeed::FULL, BusSpeed::HIGH, BusSpeed::FULL, BusSpeed::HIGH}) {
+        const size_t size = speed == BusSpeed::HIGH ? FAST_PACKET : SLOW_PACKET;
         f.configure(speed);
         f.device.available = f.device.taken() + 4 * FAST_PACKET;
         assert_int_equal(bulk_packet(f.request({0x80, 6, 0x0200, 0, 255})), size);
@@ -94,8 +94,8 @@ void speed_may_change_at_every_reset(void **)
 
 void after_suspend_everything_is_as_it_was(void **)
 {
-    for (Speed speed : {Speed::HIGH, Speed::FULL}) {
-        const size_t size = speed == Speed::HIGH ? FAST_PACKET : SLOW_PACKET;
+    for (BusSpeed speed : {BusSpeed::HIGH, BusSpeed::FULL}) {
+        const size_t size = speed == BusSpeed::HIGH ? FAST_PACKET : SLOW_PACKET;
         Fixture f(speed);
         f.device.available = 3 * FAST_PACKET;
         f.expect_packet(size);
@@ -121,7 +121,7 @@ void a_reset_ends_suspend(void **)
     f.device.available = 3 * FAST_PACKET;
     f.expect_packet(FAST_PACKET);
     assert_true(f.host.bus().suspend());
-    f.configure(Speed::HIGH);
+    f.configure(BusSpeed::HIGH);
     assert_false(f.device.suspended());
     f.expect_packet(FAST_PACKET);
     f.regular();
