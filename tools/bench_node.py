@@ -124,7 +124,7 @@ def load(build: Path) -> dict:
     """Cycles: the port's register accesses from the model, the core's work from simavr, a stand-in for the dsPIC."""
     _, (accesses, interrupts) = timing(build, (0, 0), work=0, ticks=2000, nodes=1)
     avr = subprocess.run(
-        ["ctest", "--test-dir", str(build), "-R", "firmware_avr_cycles", "-V"], capture_output=True, text=True
+        ["ctest", "--test-dir", str(build), "-R", "firmware_avr_cycles$", "-V"], capture_output=True, text=True
     ).stdout
     words = dict(re.findall(r"(\w+) (\d+)", " ".join(re.findall(r"(?:cycles|bytes) .*", avr))))
     core = int(words.get("tick", 0))
