@@ -264,8 +264,8 @@ def _matrix_text(data: dict) -> str:
         text
         + _table(["", *data["filters"]], rows)
         + f"\nAnswers that are no numbers, or confidences that are no shares: {faulty}.\n\n"
-        + "Does `confidence` foretell being lost (more than 0.25 m off)? Over all rows above:\n\n"
-        + _table(["filter", "area under curve", "calibration error"], foretold)
+        + "Does `confidence` foretell being lost (more than 0.25 m off)? Over all rows above, and over kidnaps alone:\n\n"
+        + _table(["filter", "area under curve", "calibration error", "kidnaps: area", "error"], foretold)
         + "\n![confidence and the share near the truth](charts/nav_confidence.svg)\n"
     )
 
