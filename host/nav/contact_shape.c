@@ -11,6 +11,7 @@
 #define ONSET_TO 0.70    /* ... its first part the onset */
 #define DEPART 0.04      /* of the peak: what is so far below the push's line is no longer push */
 #define AFTER_BINS 6     /* that tell the line after the push */
+#define BENDS 0.3        /* share of the deflection from which on a channel bends */
 #define AFTER_LEAST 0.35 /* of the peak */
 
 /* A trace as deflections along its main direction. */
@@ -210,6 +211,16 @@ static double value_at(const struct course *c, const double *values, double t)
     return values[i] + (values[i + 1] - values[i]) * (t - c->t[i]) / (c->t[i + 1] - c->t[i]);
 }
 
+/* Longest run of equal samples in a channel that bends, as a share of all samples. */
+static double frozen_of(const struct nav_trace *trace, const double *direction)
+{
+    int longest = 0;
+    for (int a = 0; a < trace->axes; a++)
+        if (fabs(direction[a]) > BENDS && trace->longest[a] > longest)
+            longest = trace->longest[a];
+    return (double)longest / (double)trace->good;
+}
+
 static void measure(const struct nav_trace *trace, const struct course *c, double noise, struct nav_shape *shape)
 {
     struct line early = line_through(c->t, c->p, c->from, first_above(c, ONSET_TO));
@@ -233,7 +244,7 @@ static void measure(const struct nav_trace *trace, const struct course *c, doubl
     shape->onset_s = trace->start_s + onset;
     shape->stop_s = trace->start_s + stop;
     shape->release_s = trace->start_s + release;
-    shape->frozen = (double)trace->longest / (double)trace->good * trace->last.t_s / (stop - onset);
+    shape->frozen = frozen_of(trace, shape->direction) * trace->last.t_s / (stop - onset);
     shape->quality = NAV_SHAPE_WHOLE;
 }
 

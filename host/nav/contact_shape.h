@@ -28,7 +28,7 @@ struct nav_shape {
     double back;      /* ln of (release - stop)/(stop - onset); NAN without a release */
     double misfit;    /* what a smooth push leaves unexplained, RMS as a share of the peak */
     double noise;     /* RMS of the bins before the push, as a share of the peak */
-    double frozen;    /* longest run of equal samples as a share of the push */
+    double frozen;    /* longest run of equal samples of a channel that bends, as a share of the push */
     double bad;       /* share of the samples that were not finite */
     double direction[NAV_TRACE_AXES]; /* unit vector of the deflection */
 };

@@ -9,7 +9,8 @@ void nav_trace_begin(struct nav_trace *trace, int axes)
     trace->used = trace->filled = 0;
     trace->width = 1;
     trace->good = trace->bad = 0;
-    trace->equal = trace->longest = 0;
+    for (int a = 0; a < NAV_TRACE_AXES; a++)
+        trace->equal[a] = trace->longest[a] = 0;
     trace->last = (struct nav_trace_point){0};
 }
 
@@ -86,11 +87,11 @@ static bool usable(const struct nav_trace *trace, double t_s, const double *samp
 
 static void count_equal(struct nav_trace *trace, const struct nav_trace_point *now)
 {
-    bool same = trace->good > 0;
-    for (int a = 0; a < trace->axes; a++)
-        same = same && !(now->at[a] < trace->last.at[a]) && !(now->at[a] > trace->last.at[a]);
-    trace->equal = same ? trace->equal + 1 : 0;
-    trace->longest = trace->equal > trace->longest ? trace->equal : trace->longest;
+    for (int a = 0; a < trace->axes; a++) {
+        bool same = trace->good > 0 && !(now->at[a] < trace->last.at[a]) && !(now->at[a] > trace->last.at[a]);
+        trace->equal[a] = same ? trace->equal[a] + 1 : 0;
+        trace->longest[a] = trace->equal[a] > trace->longest[a] ? trace->equal[a] : trace->longest[a];
+    }
 }
 
 static double turned(double rate, double seconds)

@@ -24,10 +24,10 @@ struct nav_trace {
     double start_s; /* time of the first sample; the times below count from it */
     int filled;     /* samples in the last bin begun */
     struct nav_trace_point sum[NAV_TRACE_BINS];
-    struct nav_trace_point recent[NAV_TRACE_MEDIAN]; /* the last samples, in a ring */
-    long good, bad;                                  /* samples taken; samples with a number that is not finite */
-    int equal, longest;                              /* in a row, equal in all channels: now; ever */
-    struct nav_trace_point last;                     /* the last good sample */
+    struct nav_trace_point recent[NAV_TRACE_MEDIAN];    /* the last samples, in a ring */
+    long good, bad;                                     /* samples taken; samples with a number that is not finite */
+    int equal[NAV_TRACE_AXES], longest[NAV_TRACE_AXES]; /* samples in a row equal to the one before: now; ever */
+    struct nav_trace_point last;                        /* the last good sample */
 };
 
 /* Begins a trace of 1..NAV_TRACE_AXES channels; more are not looked at. */

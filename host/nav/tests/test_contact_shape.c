@@ -80,6 +80,10 @@ static void what_is_clipped_or_stands_still_shows_in_frozen(void **state)
     stuck.frozen_s = 0.6;
     assert_true(shape_of_whisk(&stuck, 2).frozen > 0.5);
     assert_true(shape_of_whisk(&fine, 2).frozen < 0.02);
+    struct drawn_whisk clipped = usual_whisk();
+    clipped.clip = 900.0;
+    clipped.noise = 0.0;
+    assert_true(shape_of_whisk(&clipped, 2).frozen > 0.5);
 }
 
 static void nothing_is_nothing(void **state)
