@@ -273,6 +273,33 @@ async def ticks_of_its_own(dut):
 
 
 @cocotb.test(timeout_time=20, timeout_unit="ms")
+async def in_suspend_ticks_are_counted_but_not_made(dut):
+    """Afterwards the frames' ticks and times have jumped, their sequence has not: nothing was lost."""
+    asleep = 5
+    rig = await begin(dut)
+    await rig.host.control(1)
+    for _ in range(4):
+        await rig.step()
+    dut.usb.suspended.value = 1
+    for _ in range(asleep):
+        await pulse(dut, dut.tick_strobe)
+        await ClockCycles(dut.clk, 3)
+        assert not int(dut.link_busy.value) and int(dut.running.value)
+    dut.usb.suspended.value = 0
+    rig.tick += asleep
+    for _ in range(3):
+        await rig.step()
+    await rig.host.control(0)
+    await rig.step("running")
+    await rig.quiet()
+    headers = [header for header, _ in rig.host.frames()]
+    ticks = [0, 1, 2, *range(3 + asleep, 7 + asleep)]
+    assert [header["tick"] for header in headers] == ticks
+    assert [header["time"] for header in headers] == [tick * LIMITS["tick_period"] for tick in ticks]
+    assert [header["sequence"] for header in headers] == list(range(len(ticks)))
+
+
+@cocotb.test(timeout_time=20, timeout_unit="ms")
 async def a_stop_before_the_first_tick_ends_at_once(dut):
     rig = await begin(dut)
     await rig.host.control(1)
