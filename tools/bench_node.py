@@ -191,7 +191,7 @@ def armed_chart(armed: dict) -> Figure:
     axes.set_title("From SYNC to the armed record, 28 nodes", fontsize=10)
     axes.set_xlabel("SYNC to armed record (us)")
     axes.set_ylabel("share of records")
-    axes.legend(loc="center left")
+    axes.legend(loc="upper center")
     return figure
 
 

@@ -94,7 +94,8 @@ Derivations, for bytes evenly spread:
 - **CRC-8, words slipped**: a long burst is seen but for 1/256; a select glitch before bit 8 hurts the tick, one in the last 8 bits is a burst that is always
   seen: 48/63 of 1/256. Cut clocks are gone through for each record (the level of the last bit stays).
 
-Per event; measured with its 95 % interval (Wilson). Derived for the two-bit, clock, noise and cut classes: mean over the events of each one's own probability.
+Per event; measured with its 95 % interval (Wilson). Derived for the two-bit, clock, noise and cut classes: mean over the events of each one's own probability. Frames
+begun late or early follow one that passed, and the angles move little in a tick: they pass again more often than frames at random.
 
 | Sensor's line | events | passes the sum: derived | measured | good sample: derived | measured |
 |---|---|---|---|---|---|
