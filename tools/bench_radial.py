@@ -233,7 +233,7 @@ def draw_cost(results: dict) -> Figure:
             axes.plot(cost_of[name], scores[name], marker, color="#0b5394" if name == "default" else "#6b6b6b", mfc="none" if name in ("quadratic", "rational") else None, ms=8, label=name)  # fmt: skip
         axes.axhline(scores["oracle"], color="k", lw=1, ls="--", label="oracle: knows the angle")
         axes.axhline(PAPER_MM[n], color="#8a8a8a", lw=1, ls=":", label="paper, as printed")
-        axes.set(xscale="log", xlabel="us per contact (2600 samples)", ylim=(0, None))
+        axes.set(xscale="log", xlabel=f"us per contact of {results['cost']['samples']} samples", ylim=(0, 7))
         axes.set_title(f"whisker {n + 1}: spread {100 * spread:.1f} %", fontsize=10)
     panels[0].set_ylabel("standard error (mm)")
     handles, labels = panels[0].get_legend_handles_labels()
