@@ -20,6 +20,7 @@ import make_image  # noqa: E402
 WHISKERS = 6
 BODY_WORDS = 400
 VERSION = 0x0203
+SAMPLING_S = 4  # simulated: the update takes less than two of them
 
 
 def synthetic_hex(path, words: int = BODY_WORDS, first: int = make_image.FIRST_ROW * 128):
@@ -103,7 +104,7 @@ def test_sampling_goes_on_after_an_update(image, tmp_path):
     ring = f"whisker-flash-{os.getpid()}"
     shell = f"$FLASH $LINK {image} && exec {program('whiskerd')} --ring {ring} $LINK"
     scene, _ = write_flat_scene(tmp_path, 3)
-    command = simulation(tmp_path, scene, 10, 3, ring)
+    command = simulation(tmp_path, scene, SAMPLING_S, 3, ring)
     command = [*command[: command.index("--") + 1], "sh", "-c", shell]
     environment = os.environ | {"FLASH": program("whisker-flash"), "LINK": " ".join(FAST_LINK)}
     with subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL) as process:
