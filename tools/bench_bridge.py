@@ -127,7 +127,7 @@ def draw_seeds(found: dict) -> Figure:
     for (_, board), marker in zip(sorted(found["seeds"].items()), "os", strict=True):
         label = f"{board['title']}, grade {board['speed']}"
         left.plot(SEEDS, [run["fmax_mhz"] for run in board["runs"]], marker, color="0.2", label=label)
-        slack = [min(limit - run[name] for name, limit in board["limits"].items()) for run in board["runs"]]
+        slack = [min(limit - (run[name] or 0) for name, limit in board["limits"].items()) for run in board["runs"]]
         right.plot(SEEDS, slack, marker, color="0.2", label=label)
     for axes, level in ((left, 60), (right, 0)):
         axes.axhline(level, color="0.5", linewidth=1, linestyle="--")

@@ -141,7 +141,7 @@ def prepare(board: Board, lanes: int, out: Path, serial: str = "0001") -> Path:
 def summary(board: Board, seed: int, placed: dict) -> str:
     """A line for the reader: speed, pins, resources."""
     limits = report.pin_limits(board.speed, board.phy_clock)
-    pins = ", ".join(f"{name} {placed[name]:.1f} of {limit:.1f}" for name, limit in limits.items())
+    pins = ", ".join(f"{name} {placed[name] or 0:.1f} of {limit:.1f}" for name, limit in limits.items())
     used = ", ".join(f"{number} {name}" for name, number in placed["used"].items())
     return f"{board.title}, seed {seed}: {placed['fmax_mhz']:.1f} MHz; pins: {pins}; {used}"
 

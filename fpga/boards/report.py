@@ -30,12 +30,12 @@ CLOCKED = {  # cell type: its clock inputs
 
 
 def read(path: Path) -> dict:
-    """The report's numbers: fmax_mhz, used, and the longest paths that touch a pin (`out`, `in_`, `through`, in ns)."""
+    """The report's numbers: fmax_mhz, used, and the longest paths that touch a pin (in ns; None: there is none)."""
     text = json.loads(path.read_text())
     clocks = [clock["achieved"] for clock in text["fmax"].values()]
     if len(clocks) != 1:
         raise ValueError(f"{path}: {len(clocks)} clocks, one is expected")
-    paths = {"out_ns": 0.0, "in_ns": 0.0, "through_ns": 0.0}
+    paths: dict[str, float | None] = dict.fromkeys(("out_ns", "in_ns", "through_ns"))
     for found in text["critical_paths"]:
         kind = (found["from"] == ASYNC, found["to"] == ASYNC)
         name = {(False, True): "out_ns", (True, False): "in_ns", (True, True): "through_ns"}.get(kind)
@@ -67,7 +67,9 @@ def timing_problems(placed: dict, speed: int, phy_clock: str) -> list[str]:
     if placed["fmax_mhz"] < wanted:
         problems.append(f"{placed['fmax_mhz']:.1f} MHz, {wanted:g} wanted")
     for name, limit in pin_limits(speed, phy_clock).items():
-        if placed[name] > limit:
+        if placed[name] is None:
+            problems.append(f"no path of this kind ({name}): nextpnr has not timed the PHY's pins")
+        elif placed[name] > limit:
             problems.append(f"a path takes {placed[name]:.1f} ns ({name}), {limit:.1f} are left for it")
     return problems
 

@@ -107,3 +107,13 @@ def test_missed_limits_are_named(values, speed, phy_clock, problems, tmp_path):
     path = tmp_path / "report.json"
     path.write_text(json.dumps(nextpnr_report(*values)))
     assert len(report.timing_problems(report.read(path), speed, phy_clock)) == problems
+
+
+def test_pins_that_are_not_timed_are_named(tmp_path):
+    """A report without a path of one kind must not pass for a good one."""
+    path = tmp_path / "report.json"
+    text = nextpnr_report(70, 4, 5, 4)
+    text["critical_paths"] = [found for found in text["critical_paths"] if found["from"] != report.ASYNC]
+    path.write_text(json.dumps(text))
+    problems = report.timing_problems(report.read(path), 8, "out")
+    assert len(problems) == 2 and all("not timed" in problem for problem in problems)

@@ -1,9 +1,10 @@
-// The pins between FPGA and PHY whose timing counts. DATA is let go by one signal, one cell away from every pad. What comes
-// from the PHY passes the pads' own delay lines, until the clock has reached the flip-flops: the PHY may change its outputs
-// 2 ns after the edge, before a pad register without delay (3.3 ns on speed grade 6) has read them.
+// The pins between FPGA and PHY whose timing counts. DATA is let go by one signal, one cell away from every pad. DATA comes in
+// through the pads' own delay lines, straight to a flip-flop: the PHY may change its outputs 2 ns after the edge, and a pad
+// register without delay holds 3.3 ns (speed grade 6). DIR and NXT pass logic on their way, which delays them; a delay line
+// would hide them from nextpnr's timing.
 //
 //   data_out, data_oe --> BB --> ulpi_data --> DELAYG --> data_in
-//                                ulpi_dir, ulpi_nxt --> DELAYG --> dir, nxt
+//                                ulpi_dir, ulpi_nxt -----------> dir, nxt
 
 `default_nettype none
 
@@ -28,8 +29,8 @@ module ulpi_pads (
         end
     endgenerate
 
-    DELAYG #(.DEL_MODE("SCLK_ZEROHOLD")) dir_late (.A(ulpi_dir), .Z(dir));
-    DELAYG #(.DEL_MODE("SCLK_ZEROHOLD")) nxt_late (.A(ulpi_nxt), .Z(nxt));
+    assign dir = ulpi_dir;
+    assign nxt = ulpi_nxt;
 endmodule
 
 `default_nettype wire
