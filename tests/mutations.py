@@ -110,9 +110,9 @@ MUTATIONS = [
     ),
     Mutation(
         "firmware: the watchdog is never switched on",
-        "firmware/dspic/port_dspic/port.c",
-        "    sfr_set(board, RCON, RCON_SWDTEN);\n",
-        "",
+        "firmware/dspic/port_dspic/dspic33fj128mc802.h",
+        "#define RCON_SWDTEN 0x0020u",
+        "#define RCON_SWDTEN 0x0000u",
     ),
     Mutation(
         "loader: an image's body is believed unread",
