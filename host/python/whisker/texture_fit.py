@@ -10,7 +10,7 @@ import numpy as np
 from .texture_rung import Rung, plain_features
 
 SHRINK = (1e-3, 1e-2, 1e-1)  # share of the diagonal in the covariance within classes
-HIDDEN = (0, 128, 512)  # random projections: none, few, many
+HIDDEN = (0, 128, 256)  # random projections: none, few, many; what many cost keeps a 100 ms window near 20 us
 HIDDEN_MUST_GAIN = 0.02  # relative fall of the log loss that pays for the next size: it costs time in every window
 LEAST_GAIN = 0.005  # nats: a smaller fall is chance, however large a share of a small loss
 LEVELS_MUST_GAIN = 0.5  # the same for channel means: a rest drifts, and a mean may tell the session, not the surface
