@@ -1,6 +1,7 @@
 /* A small host program for the tests: starts the bridge, writes the bulk stream to a file as it comes, stops at
  * SIGTERM. usage: stream_client OUT.bin TRANSFER_BYTES TIMEOUT_MS. Short time-outs make libusb discard transfers all
  * the time. */
+#define _POSIX_C_SOURCE 200809L
 #include <signal.h>
 #include <stdbool.h>
 #include <stdio.h>
@@ -13,12 +14,19 @@
 
 enum { HID_SET_REPORT_TYPE = 0x21, HID_SET_REPORT = 0x09, HID_FEATURE = 0x0300, CONTROL_TIMEOUT_MS = 10000 };
 
-static volatile sig_atomic_t told_to_stop;
-
-static void on_signal(int number)
+/* SIGTERM stays blocked: umockdev's ioctl sets errno, then sleeps for a moment, and a signal in that moment turns
+ * EAGAIN into EINTR, upon which libusb cancels the transfer and reports an input/output error. */
+static bool block_sigterm(sigset_t *set)
 {
-    (void)number;
-    told_to_stop = 1;
+    sigemptyset(set);
+    sigaddset(set, SIGTERM);
+    return sigprocmask(SIG_BLOCK, set, NULL) == 0;
+}
+
+static bool told_to_stop(void)
+{
+    sigset_t waiting;
+    return sigpending(&waiting) == 0 && sigismember(&waiting, SIGTERM) == 1;
 }
 
 static int send_report(libusb_device_handle *device, uint8_t version, uint8_t run)
@@ -60,7 +68,7 @@ static int stream(libusb_device_handle *device, FILE *file, int size, unsigned t
             frame[total++ % sizeof frame] = buffer[i];
             last = total % sizeof frame == 0 && last_seen(frame);
         }
-        if (told_to_stop && !stopped) {
+        if (!stopped && told_to_stop()) {
             stopped = send_report(device, WHISKER_WIRE_VERSION, 0) > 0;
         }
     }
@@ -97,8 +105,8 @@ static bool claims_exclude(libusb_device_handle *device)
 int main(int argc, char **argv)
 {
     FILE *file = argc == 4 ? fopen(argv[1], "wb") : NULL;
-    signal(SIGTERM, on_signal);
-    if (!file || libusb_init(NULL) != 0) {
+    sigset_t blocked;
+    if (!file || !block_sigterm(&blocked) || libusb_init(NULL) != 0) {
         return EXIT_FAILURE;
     }
     libusb_device_handle *device = open_bridge();
