@@ -2,6 +2,10 @@
 
 #include <math.h>
 
+/* A deflection between the thresholds for so many samples is drift: this share of rest_samples, ... */
+#define LINGER 0.025
+#define RINGING 4.0 /* ... but not what rings: at least so many times release_samples */
+
 void nav_contact_init(struct nav_contact *c, const struct nav_contact_config *config)
 {
     *c = (struct nav_contact){.config = *config};
@@ -29,6 +33,29 @@ static void follow_drift(struct nav_contact *c, double alpha, double beta)
     c->rest[1] += share * (beta - c->rest[1]);
 }
 
+/* Counts the samples between the thresholds, downwards below them: noise takes single samples across. true: so many
+ * that it is drift. Contacts cross in milliseconds; drift faster than the rest follows stays. */
+static bool lingers(struct nav_contact *c, double deflection)
+{
+    double longest = fmax(LINGER * c->config.rest_samples, RINGING * c->config.release_samples);
+    bool between = deflection >= c->config.release_counts && deflection <= c->config.onset_counts;
+    if (between)
+        c->between = fmin(c->between + 1.0, longest);
+    else if (deflection < c->config.release_counts)
+        c->between = fmax(c->between - 1.0, 0.0);
+    return between && c->config.rest_samples > 1.0 && c->between >= longest;
+}
+
+/* Draws the rest after the sample until it is deflected by no more than the release threshold. That takes a
+ * soft press for drift by the difference of the thresholds at most; it is below the release threshold, so that nothing
+ * is felt when the press ends, and the rest comes back. */
+static void draw_after(struct nav_contact *c, double alpha, double beta, double deflection)
+{
+    double share = 1.0 - c->config.release_counts / deflection;
+    c->rest[0] += share * (alpha - c->rest[0]);
+    c->rest[1] += share * (beta - c->rest[1]);
+}
+
 static enum nav_contact_event begin_or_wait(struct nav_contact *c, double deflection)
 {
     if (!(deflection > c->config.onset_counts)) {
@@ -39,19 +66,19 @@ static enum nav_contact_event begin_or_wait(struct nav_contact *c, double deflec
     if (++c->run < c->config.onset_samples)
         return NAV_CONTACT_NONE;
     c->run = 0;
+    c->between = 0.0;
     c->touching = true;
     c->peak = c->run_peak;
     return NAV_CONTACT_ONSET;
 }
 
+/* A contact also ends when what is left of it lingers: the rest has drifted meanwhile. */
 static enum nav_contact_event end_or_stay(struct nav_contact *c, double deflection)
 {
     c->peak = fmax(c->peak, deflection);
-    if (!(deflection < c->config.release_counts)) {
-        c->run = 0;
-        return NAV_CONTACT_NONE;
-    }
-    if (++c->run < c->config.release_samples)
+    bool drifted = lingers(c, deflection);
+    c->run = deflection < c->config.release_counts ? c->run + 1 : 0;
+    if (!drifted && c->run < c->config.release_samples)
         return NAV_CONTACT_NONE;
     c->run = 0;
     c->touching = false;
@@ -71,7 +98,9 @@ enum nav_contact_event nav_contact_update(struct nav_contact *c, double alpha, d
     double deflection = hypot(alpha - c->rest[0], beta - c->rest[1]);
     if (c->touching)
         return end_or_stay(c, deflection);
-    if (deflection < c->config.release_counts)
+    if (lingers(c, deflection))
+        draw_after(c, alpha, beta, deflection);
+    else if (deflection < c->config.release_counts)
         follow_drift(c, alpha, beta);
     return begin_or_wait(c, deflection);
 }

@@ -13,7 +13,9 @@ struct nav_contact_config {
     int onset_samples;     /* for so many good samples in a row, at least 1 */
     int release_samples;   /* whiskers ring after release (16-60 Hz, whisker_physics section 5): a period is safe */
     int settle_samples;    /* the rest is the mean of so many first good samples; 0: set by nav_contact_rest */
-    double rest_samples;   /* time constant, in samples, with which the rest follows drift while nothing touches */
+    double
+        rest_samples; /* time constant, in samples, with which the rest follows drift while nothing touches; what
+                         stays between both thresholds for a fortieth of it is faster drift: no contact, or its end */
 };
 
 enum nav_contact_event { NAV_CONTACT_NONE, NAV_CONTACT_ONSET, NAV_CONTACT_RELEASE };
@@ -25,6 +27,7 @@ struct nav_contact {
     bool touching;
     int run;          /* good samples in a row beyond the threshold that would change `touching` */
     double run_peak;  /* largest deflection of that run */
+    double between;   /* samples between the thresholds, less those below since */
     int settled;      /* good samples the rest was taken from so far */
     uint64_t skipped; /* samples that were not good */
 };

@@ -91,6 +91,90 @@ static void a_block_of_samples_gives_the_same_events(void **state)
     assert_near(peaks[4], 0.0, 0.0);
 }
 
+/* As in the pilot at 2 kHz, with noise of 11 counts. */
+struct ramp {
+    struct nav_contact c;
+    double level;
+    uint32_t noise;
+};
+
+static struct ramp pilots(void)
+{
+    static const struct nav_contact_config config = {.onset_counts = 110.0,
+                                                     .release_counts = 65.0,
+                                                     .onset_samples = 3,
+                                                     .release_samples = 12,
+                                                     .settle_samples = 0,
+                                                     .rest_samples = 40000.0};
+    struct ramp r = {.noise = 1};
+    nav_contact_init(&r.c, &config);
+    nav_contact_rest(&r.c, 0.0, 0.0);
+    return r;
+}
+
+static double noise_of(struct ramp *r)
+{
+    double sum = 0.0;
+    for (int i = 0; i < 12; i++) {
+        r->noise = r->noise * 1664525u + 1013904223u;
+        sum += (double)(r->noise >> 8) / 16777216.0;
+    }
+    return 11.0 * (sum - 6.0);
+}
+
+/* Ramps by `per_second` counts for `seconds`; returns how many events came. */
+static int go(struct ramp *r, double per_second, double seconds)
+{
+    int events = 0;
+    for (int i = 0; i < (int)(2000.0 * seconds); i++) {
+        r->level += per_second / 2000.0;
+        double beta = noise_of(r);
+        events += nav_contact_update(&r->c, r->level + noise_of(r), beta, true) != NAV_CONTACT_NONE;
+    }
+    return events;
+}
+
+static void a_rest_that_drifts_past_the_release_threshold_is_no_contact(void **state)
+{
+    (void)state;
+    struct ramp r = pilots();
+    assert_int_equal(go(&r, 12.0, 120.0), 0); /* at a time constant of 20 s it lags by 240 counts if nothing else */
+    assert_true(fabs(r.level - r.c.rest[0]) < 110.0);
+    r.level += 400.0;
+    assert_int_equal(go(&r, 0.0, 0.5), 1);
+    assert_true(r.c.touching);
+    r.level -= 400.0;
+    go(&r, 0.0, 3.0);
+    assert_false(r.c.touching);
+    assert_int_equal(go(&r, 0.0, 60.0), 0);
+    assert_near(r.c.rest[0], r.level, 10.0);
+}
+
+static void a_contact_ends_although_the_rest_has_drifted_meanwhile(void **state)
+{
+    (void)state;
+    struct ramp r = pilots();
+    r.level = 500.0;
+    assert_int_equal(go(&r, 8.0, 10.0), 1);
+    r.level -= 500.0;
+    assert_int_equal(go(&r, 0.0, 3.0), 1);
+    assert_false(r.c.touching);
+    assert_int_equal(go(&r, 0.0, 60.0), 0);
+    assert_near(r.c.rest[0], 80.0, 10.0);
+}
+
+static void a_soft_press_moves_the_rest_by_less_than_the_release_threshold(void **state)
+{
+    (void)state;
+    struct ramp r = pilots();
+    r.level = 85.0;
+    assert_int_equal(go(&r, 0.0, 5.0), 0);
+    assert_true(fabs(r.c.rest[0]) < 65.0);
+    r.level = 0.0;
+    assert_int_equal(go(&r, 0.0, 60.0), 0);
+    assert_near(r.c.rest[0], 0.0, 10.0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -98,6 +182,9 @@ int main(void)
         cmocka_unit_test(contact_begins_after_the_run_and_ends_after_the_other),
         cmocka_unit_test(bad_samples_neither_begin_keep_nor_end_a_contact),
         cmocka_unit_test(rest_follows_drift_only_while_nothing_touches),
+        cmocka_unit_test(a_rest_that_drifts_past_the_release_threshold_is_no_contact),
+        cmocka_unit_test(a_contact_ends_although_the_rest_has_drifted_meanwhile),
+        cmocka_unit_test(a_soft_press_moves_the_rest_by_less_than_the_release_threshold),
         cmocka_unit_test(a_block_of_samples_gives_the_same_events),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
