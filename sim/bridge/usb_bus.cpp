@@ -96,8 +96,10 @@ bool UsbBus::chirp(BusSpeed speed)
 
 bool UsbBus::reset(BusSpeed speed)
 {
-    device_.in.rx_active = device_.in.rx_valid = device_.in.tx_ready = 0;
+    device_.in.rx_active = device_.in.rx_valid = 0;
+    device_.in.tx_ready = 1; // a PHY goes on taking what the device was sending
     high_speed_ = chirp(speed) && speed == BusSpeed::HIGH;
+    device_.in.tx_ready = 0;
     unasked_ = false;
     idle(PACKET_GAP);
     return at_speed(speed == BusSpeed::HIGH);

@@ -10,8 +10,8 @@ namespace
 
 constexpr uint8_t BULK = 1;
 constexpr size_t PACKET = WHISKER_LIMIT_BULK_PACKET;
-constexpr uint64_t DISTURBED = 6;     // one step in so many
-constexpr uint64_t RESET_ODDS = 4000; // one disturbance in so many; a reset takes the time of 600 packets
+constexpr uint64_t DISTURBED = 6;    // one step in so many
+constexpr uint64_t RESET_ODDS = 300; // one disturbance in so many; a reset takes the time of 600 packets
 constexpr uint64_t CONFIGURE_ODDS = 200;
 constexpr uint64_t HALT_ODDS = 100;
 constexpr uint64_t REQUEST_ODDS = 20;

@@ -20,7 +20,7 @@ void frames_survive_faults_noise_and_resets(void **)
         assert_int_equal(result.answered, 0);
         assert_int_equal(result.unexplained, 0);
         assert_int_equal(result.hangs, 0);
-        assert_true(result.wire_faults > 100 && result.noise > 100 && result.restarts > 1);
+        assert_true(result.wire_faults > 100 && result.noise > 100 && result.restarts > 1 && result.resets > 0);
     }
 }
 
