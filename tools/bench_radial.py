@@ -27,8 +27,9 @@ from whisker.report.figures import SETTINGS
 ROOT = Path(__file__).resolve().parent.parent
 RESULTS, CHARTS, CACHE = ROOT / "bench/results", ROOT / "docs/charts", ROOT / "build/bench/radial"
 METHODS = ("paper", "quadratic", "rational", "default")
-SEED = 7000  # nothing was developed on these whiskers
+SEED = 48611  # chosen after the last change to the models; nothing was developed on these whiskers
 WHISKERS, FIT, HELD = 4, 5, 6  # whiskers of each spread; whisks at each radius
+TIP_WHISKERS = 24  # of each spread: shares near 98 % ask for many whisks
 LIMIT_MM, NEAR_MM = RADII_MM[-1] - 3.0, 3.0  # of tip and shaft; nearer to it nothing is asked
 
 
@@ -100,7 +101,7 @@ def tips() -> dict:
     out = {}
     for k, spread in enumerate(SPREADS):
         right = {name: [] for name in METHODS}
-        for n in range(WHISKERS):
+        for n in range(TIP_WHISKERS):
             rng, whisker = rng_of(20, k, n), Whisker.drawn(SEED + k, n)
             cal = recorded(whisker, Kind(spread), FIT, rng)
             held = recorded(whisker, Kind(spread, radii_mm=None), HELD, rng)
