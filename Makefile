@@ -18,7 +18,7 @@ test: build lint ## everything that fits in 15 minutes on two cores
 test-all: test ## and what is long: sanitizers over the whole tree, longer fuzzing
 	@tools/run_tests.sh --long
 
-test-kernel: build ## a stock Debian kernel in QEMU meets the simulated bridge, over usbredir and USB/IP: about ten minutes
+test-kernel: build ## a stock Debian kernel in QEMU meets the simulated bridge, over usbredir and USB/IP: two minutes and more
 	@WHISKER_BUILD=$(BUILD) $(PYTHON) tests/kernel/run.py
 
 bench: build ## measure speed and accuracy again, as ratios in one run: bench/results, docs/charts
