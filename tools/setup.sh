@@ -62,7 +62,7 @@ fi
 python3 -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "setup: python3 is older than 3.11; install Python 3.11 or newer" >&2; exit 1; }
 stamp=.venv/.locked
 if ! [ -e "$stamp" ] || ! cmp -s requirements.lock "$stamp"; then
-    echo "setup: installing the locked Python packages into .venv (about 370 MB, one to three minutes)"
+    echo "setup: installing the locked Python packages into .venv (about 690 MB, one to three minutes)"
     python3 -m venv .venv
     .venv/bin/pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock ||
         { echo "setup: Python packages could not be installed; check the package index or proxy, then run make again" >&2; exit 1; }
