@@ -32,6 +32,7 @@ HEADERS = {
             "contact_shape.h",
             "radial.h",
             "radial_whisk.h",
+            "contact_surface.h",
             "texture.h",
             "texture_slide.h",
             "texture_features.h",
