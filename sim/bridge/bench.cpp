@@ -69,8 +69,8 @@ std::string at(size_t lane, uint64_t tick)
 } // namespace
 
 Bench::Bench(const BenchSettings &settings)
-    : settings_(settings), rig_(settings.populated, settings.seed), scheduler_(rig_),
-      log_(settings.lane_fault_path, settings.usb_fault_path), runner_(rig_, scheduler_, plan_of(settings), log_),
+    : settings_(settings), rig_(make_rig(settings.level, settings.populated, settings.seed)), scheduler_(*rig_),
+      log_(settings.lane_fault_path, settings.usb_fault_path), runner_(*rig_, scheduler_, plan_of(settings), log_),
       check_([this](const CheckedFrame &frame) { check_frame(frame); }), generator_(settings.seed)
 {
 }
@@ -94,7 +94,7 @@ void Bench::power_on()
 {
     Descriptors descriptors;
     const char *error = nullptr;
-    if (!rig_.power_on(descriptors, error)) {
+    if (!rig_->power_on(descriptors, error)) {
         throw std::runtime_error(std::string("enumeration: ") + error);
     }
 }
@@ -102,7 +102,7 @@ void Bench::power_on()
 BenchResult Bench::run()
 {
     power_on();
-    const uint64_t cycles = rig_.cycles();
+    const uint64_t cycles = rig_->cycles();
     const double begin_s = now_s();
     start();
     ticks(settings_.ticks);
@@ -111,7 +111,7 @@ BenchResult Bench::run()
     check_usb();
     check_faults();
     log_.close();
-    return {settings_.ticks, frames_of_run(), rig_.cycles() - cycles, wall_s};
+    return {settings_.ticks, frames_of_run(), rig_->cycles() - cycles, wall_s};
 }
 
 // ---------------------------------------------------------------------------------------------------------------- USB
@@ -126,7 +126,7 @@ void Bench::send(uint8_t run)
     scheduler_.submit(std::move(urb));
     scheduler_.step();
     take_transfers();
-    if (rig_.running() != (run != 0) && !scheduler_.stop_seen()) {
+    if (rig_->running() != (run != 0) && !scheduler_.stop_seen()) {
         throw std::runtime_error("the bridge did not take the control report");
     }
 }
@@ -194,7 +194,7 @@ void Bench::stop()
 {
     send(0);
     runner_.last_tick(fields_.data());
-    while (rig_.bulk_packet_due()) {
+    while (rig_->bulk_packet_due()) {
         scheduler_.step();
     }
     take_transfers();

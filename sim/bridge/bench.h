@@ -19,6 +19,7 @@ struct BenchSettings {
     uint8_t word_gap = WHISKER_LIMIT_WORD_GAP_MIN;
     uint8_t sample_point = WHISKER_LIMIT_SCK_DIVIDER_MIN - 1;
     bool faults = false;
+    Level level = Level::RTL;
     std::string lane_fault_path;
     std::string usb_fault_path;
 };
@@ -67,7 +68,7 @@ class Bench
     void check_lane(const CheckedFrame &frame, size_t lane);
 
     BenchSettings settings_;
-    Rig rig_;
+    std::unique_ptr<Rig> rig_;
     UrbScheduler scheduler_;
     FaultLog log_;
     TickRunner runner_;

@@ -38,6 +38,7 @@ enum Option {
     SAMPLE_POINT,
     SPEED_REPORT,
     DEFECT,
+    LEVEL,
     USBIP,
     USBREDIR
 };
@@ -62,6 +63,7 @@ const option LONG_OPTIONS[] = {{"help", no_argument, nullptr, HELP},
                                {"sample-point", required_argument, nullptr, SAMPLE_POINT},
                                {"speed-report", required_argument, nullptr, SPEED_REPORT},
                                {"defect", required_argument, nullptr, DEFECT},
+                               {"level", required_argument, nullptr, LEVEL},
                                {"usbip", required_argument, nullptr, USBIP},
                                {"usbredir", required_argument, nullptr, USBREDIR},
                                {nullptr, 0, nullptr, 0}};
@@ -155,6 +157,14 @@ void set_number(Options &options, int option, const char *text)
     }
 }
 
+Level level_of(const std::string &name)
+{
+    if (name != "rtl" && name != "bytes") {
+        throw std::runtime_error("--level '" + name + "': give rtl or bytes");
+    }
+    return name == "rtl" ? Level::RTL : Level::BYTES;
+}
+
 void set_port(Options &options, Serve serve, const char *text)
 {
     if (options.serve != Serve::COMMAND) {
@@ -174,6 +184,8 @@ void set_option(Options &options, int option, const char *text)
         *path = text;
     } else if (option == DEFECT) {
         options.defect = Defect::parse(text);
+    } else if (option == LEVEL) {
+        options.link.level = level_of(text);
     } else if (option == USBIP || option == USBREDIR) {
         set_port(options, option == USBIP ? Serve::USBIP : Serve::USBREDIR, text);
     } else {
@@ -267,6 +279,9 @@ const char *usage()
            "  --speed-report OUT.json  ticks, clock cycles, wall seconds, fault counts\n"
            "  --defect KIND         misbehave: wire-version (claims another), frame (damages one) or truncate (cuts "
            "one)\n"
+           "  --level rtl|bytes     the Verilated bridge, cycle by cycle, or its model at the level of transactions: "
+           "the "
+           "same frames (rtl)\n"
            "  --usbip PORT          serve the device by USB/IP on this port of 127.0.0.1 (0: a free one, which is "
            "printed)\n"
            "  --usbredir PORT       serve it by usbredir, for QEMU's usb-redir\n"

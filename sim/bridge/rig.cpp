@@ -3,14 +3,14 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "bytes_rig.h"
+#include "rtl_rig.h"
+
 namespace bridge_sim
 {
 
 namespace
 {
-
-// A tick at the slowest settings takes some 3000 cycles, a control transfer in the midst of it as many again.
-constexpr uint64_t PATIENCE_CYCLES = 1000000;
 
 LinkFault link_fault(LaneFaultKind kind)
 {
@@ -42,42 +42,34 @@ sim_sensor_fault sensor_fault(LaneFaultKind kind)
 
 } // namespace
 
-Rig::Rig(size_t populated, uint64_t seed, const std::vector<NodeTrait> &traits)
-    : bus_(populated, seed, traits), bridge_(bus_), host_(bridge_)
+Rig::Rig(size_t populated, uint64_t seed, const std::vector<NodeTrait> &traits) : bus_(populated, seed, traits)
 {
+}
+
+std::unique_ptr<Rig> make_rig(Level level, size_t populated, uint64_t seed, const std::vector<NodeTrait> &traits)
+{
+    if (level == Level::BYTES) {
+        return std::make_unique<BytesRig>(populated, seed, traits);
+    }
+    return std::make_unique<RtlRig>(populated, seed, traits);
 }
 
 bool Rig::power_on(Descriptors &descriptors, const char *&error)
 {
     bus_.power_on();
-    return enumerate(host_, descriptors, error);
+    return enumerate(descriptors, error);
 }
 
 bool Rig::power_cycle(Descriptors &descriptors, const char *&error)
 {
     forget_frames();
-    bridge_.reset();
+    power_up();
     return power_on(descriptors, error);
-}
-
-UsbHost &Rig::host()
-{
-    return host_;
 }
 
 NodeBus &Rig::bus()
 {
     return bus_;
-}
-
-uint64_t Rig::cycles() const
-{
-    return bridge_.cycles;
-}
-
-bool Rig::running() const
-{
-    return bridge_.running();
 }
 
 void Rig::spoil(const LaneFault &fault)
@@ -90,37 +82,23 @@ void Rig::spoil(const LaneFault &fault)
     }
 }
 
-void Rig::wait_while(const std::function<bool()> &busy, const std::function<bool()> &usb_step)
-{
-    const uint64_t limit = bridge_.cycles + PATIENCE_CYCLES;
-    while (busy()) {
-        if (!usb_step()) {
-            bridge_.cycle();
-        }
-        if (bridge_.cycles > limit) {
-            throw std::runtime_error("the bridge did not finish a tick");
-        }
-    }
-}
-
 void Rig::tick(const sim_field *fields, const std::function<bool()> &usb_step)
 {
+    forgot_ = false;
     bus_.set_fields(fields);
-    bridge_.start_tick();
-    if (!bridge_.link_busy()) {
+    if (!transfer(usb_step)) {
         throw std::runtime_error("the bridge ignored a tick");
     }
-    host_.start_of_frame();
-    wait_while([this] { return bridge_.link_busy(); }, usb_step);
-    bridge_.cycle(); // the nodes see select rise
     bus_.run();
-    count_frame();
+    if (!forgot_) {
+        count_frame();
+    }
 }
 
 void Rig::last_tick(const sim_field *fields, const std::function<bool()> &usb_step)
 {
     tick(fields, usb_step);
-    wait_while([this] { return bridge_.running(); }, usb_step);
+    finish_run(usb_step);
     ticked_ = false;
     end_due_ = true;
 }
@@ -155,6 +133,7 @@ void Rig::forget_frames()
     waiting_ = 0;
     ticked_ = false;
     end_due_ = false;
+    forgot_ = true;
 }
 
 } // namespace bridge_sim

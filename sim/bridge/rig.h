@@ -1,20 +1,28 @@
-// Bridge, nodes and USB host on one bench: runs one tick at a time, with USB transactions and the node link's transfer
-// interleaved cycle by cycle, and knows how many bytes of frames the FIFO must hold.
+// Bridge, nodes and USB host on one bench: runs one tick at a time, with USB transactions in between, and knows how
+// many bytes of frames the FIFO must hold. There are two: the Verilated gateware with a host at packet level
+// (rtl_rig.h), and transactions without a clock (bytes_rig.h).
 #pragma once
 
 #include <functional>
+#include <memory>
 
-#include "bridge_model.h"
 #include "fault_plan.h"
+#include "node_bus.h"
 #include "usb_control.h"
 
 namespace bridge_sim
 {
 
+// How much of the bridge is simulated; what comes over USB is the same.
+enum class Level { RTL, BYTES };
+
 class Rig
 {
   public:
-    Rig(size_t populated, uint64_t seed, const std::vector<NodeTrait> &traits = {});
+    Rig(size_t populated, uint64_t seed, const std::vector<NodeTrait> &traits);
+    virtual ~Rig() = default;
+    Rig(const Rig &) = delete;
+    Rig &operator=(const Rig &) = delete;
 
     // Nodes on, bus reset, enumeration. False: `error` names the step that failed.
     bool power_on(Descriptors &descriptors, const char *&error);
@@ -22,10 +30,20 @@ class Rig
     // Power goes and comes back, as when the cable is pulled and put in again; what power_on() does follows.
     bool power_cycle(Descriptors &descriptors, const char *&error);
 
-    UsbHost &host();
+    // What a host does to the device: bus reset with enumeration, a control transfer (usb_control.h), an IN transaction
+    // of an endpoint with packets of at most `limit` bytes, a rest.
+    virtual bool enumerate(Descriptors &descriptors, const char *&error) = 0;
+    virtual Outcome control(const SetupRequest &request, Bytes &data) = 0;
+    virtual Outcome in(uint8_t endpoint, size_t limit, Bytes &data) = 0;
+    virtual void idle(uint64_t cycles) = 0;
+
+    // Lets the next fitting transaction suffer this fault.
+    virtual void arm(WireFault fault) = 0;
+    virtual const HostCounters &counters() const = 0;
+
     NodeBus &bus();
-    uint64_t cycles() const;
-    bool running() const; // started, and the last frame not yet in the FIFO
+    virtual uint64_t cycles() const = 0; // of the bridge's clock that were simulated; 0 at level bytes
+    virtual bool running() const = 0;    // started, and the last frame not yet in the FIFO
 
     // Spoils the reading that the next tick starts, or the transfer that the next tick makes.
     void spoil(const LaneFault &fault);
@@ -48,16 +66,26 @@ class Rig
     // A bus reset and SET_CONFIGURATION end the run and empty the FIFO: nothing waits any more.
     void forget_frames();
 
+  protected:
+    virtual void power_up() = 0;
+
+    // A tick's SYNC and transfers, with usb_step() meanwhile. False: no tick is taken now.
+    virtual bool transfer(const std::function<bool()> &usb_step) = 0;
+
+    // Until the last frame is in the FIFO.
+    virtual void finish_run(const std::function<bool()> &usb_step) = 0;
+
   private:
     void count_frame();
-    void wait_while(const std::function<bool()> &busy, const std::function<bool()> &usb_step);
 
     NodeBus bus_;
-    BridgeModel bridge_;
-    UsbHost host_;
     uint64_t waiting_ = 0;
     bool ticked_ = false;  // a tick has begun since start
     bool end_due_ = false; // the packet that ends the stream has not been taken
+    bool forgot_ = false;  // in the midst of this tick
 };
+
+// Throws std::runtime_error if there is no memory for the nodes. Lanes 0 .. populated-1 have nodes (node_bus.h).
+std::unique_ptr<Rig> make_rig(Level level, size_t populated, uint64_t seed, const std::vector<NodeTrait> &traits = {});
 
 } // namespace bridge_sim

@@ -107,10 +107,10 @@ void Simulation::WorldDeleter::operator()(sim_world *world) const
 
 Simulation::Simulation(const Options &options)
     : options_(options), scene_(read_scene(options.scene)), world_(sim_world_new(&scene_, options.seed)),
-      signals_(block_signals()),
-      rig_(populated(options, scene_), options.seed, read_node_list(options.nodes, populated(options, scene_))),
-      scheduler_(rig_), faults_(options.faults, options.usb_faults),
-      runner_(rig_, scheduler_, plan_of(options, scene_), faults_), truth_(options.truth, scene_),
+      signals_(block_signals()), rig_(make_rig(options.link.level, populated(options, scene_), options.seed,
+                                               read_node_list(options.nodes, populated(options, scene_)))),
+      scheduler_(*rig_), faults_(options.faults, options.usb_faults),
+      runner_(*rig_, scheduler_, plan_of(options, scene_), faults_), truth_(options.truth, scene_),
       followers_(options.socket, options.followers), defect_(options.defect), total_(options.ticks())
 {
     if (!world_) {
@@ -156,7 +156,7 @@ bool Simulation::advance()
         child_->kill();
         throw std::runtime_error("the command did not end when asked to: killed");
     }
-    if (plugged_ && rig_.running() && scheduler_.stop_seen()) {
+    if (plugged_ && rig_->running() && scheduler_.stop_seen()) {
         produce_last_tick();
         return true;
     }
@@ -172,14 +172,14 @@ bool Simulation::advance()
 
 bool Simulation::may_tick()
 {
-    return plugged_ && !over_ && rig_.running() && runner_.ready() && followers_.allows(tick_);
+    return plugged_ && !over_ && rig_->running() && runner_.ready() && followers_.allows(tick_);
 }
 
 void Simulation::produce_tick()
 {
     if (tick_ == 0) {
         first_tick_s_ = now_s();
-        first_tick_cycles_ = rig_.cycles();
+        first_tick_cycles_ = rig_->cycles();
     }
     step_world();
     runner_.tick(tick_, fields_.data());
@@ -233,7 +233,7 @@ void Simulation::end_run()
 void Simulation::close_run()
 {
     over_ = true;
-    speed_ = {tick_, rig_.cycles() - first_tick_cycles_, now_s() - first_tick_s_, rig_.bus().populated()};
+    speed_ = {tick_, rig_->cycles() - first_tick_cycles_, now_s() - first_tick_s_, rig_->bus().populated()};
     followers_.send_end(tick_);
 }
 
@@ -254,7 +254,7 @@ void Simulation::plug()
 {
     Descriptors descriptors;
     const char *error = nullptr;
-    if (!rig_.power_cycle(descriptors, error)) {
+    if (!rig_->power_cycle(descriptors, error)) {
         throw std::runtime_error(std::string("the bridge does not enumerate: ") + error);
     }
     scheduler_.plug(true);
@@ -269,7 +269,7 @@ void Simulation::unplug()
     take_requests();
     scheduler_.plug(false);
     runner_.unplugged();
-    rig_.forget_frames();
+    rig_->forget_frames();
     deliver_completed();
     port_->unplug();
     take_requests(); // those handed in meanwhile end as well

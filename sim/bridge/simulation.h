@@ -60,7 +60,7 @@ class Simulation
     sim_scene scene_;
     std::unique_ptr<sim_world, WorldDeleter> world_;
     int signals_;
-    Rig rig_;
+    std::unique_ptr<Rig> rig_;
     UrbScheduler scheduler_;
     FaultLog faults_;
     TickRunner runner_;

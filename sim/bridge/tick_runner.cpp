@@ -105,11 +105,11 @@ void TickRunner::start_usb_fault(const UsbFault &fault)
 {
     switch (fault.kind) {
     case UsbFaultKind::LOST_ACK:
-        return rig_.host().arm(WireFault::LOST_ACK);
+        return rig_.arm(WireFault::LOST_ACK);
     case UsbFaultKind::BAD_TOKEN:
-        return rig_.host().arm(WireFault::BAD_TOKEN);
+        return rig_.arm(WireFault::BAD_TOKEN);
     case UsbFaultKind::BAD_DATA:
-        return rig_.host().arm(WireFault::BAD_DATA);
+        return rig_.arm(WireFault::BAD_DATA);
     case UsbFaultKind::BAD_SETUP:
         return scheduler_.damaged_setup();
     case UsbFaultKind::NAK_STORM:
@@ -123,7 +123,7 @@ void TickRunner::start_usb_fault(const UsbFault &fault)
 
 void TickRunner::check_usb() const
 {
-    const HostCounters &counters = rig_.host().counters();
+    const HostCounters &counters = rig_.counters();
     const uint64_t on_wire =
         log_.usb_count() - log_.usb_count(UsbFaultKind::NAK_STORM) - log_.usb_count(UsbFaultKind::HOST_AWAY);
     if (counters.unexplained > 0) {

@@ -156,7 +156,7 @@ bool UrbScheduler::step_control()
 
 void UrbScheduler::run_control(Urb &urb)
 {
-    urb.status = outcome_errno(control_transfer(rig_.host(), urb.setup, urb.data));
+    urb.status = outcome_errno(rig_.control(urb.setup, urb.data));
     if (urb.status == 0) {
         watch_run(urb);
     }
@@ -188,7 +188,7 @@ void UrbScheduler::bus_reset(Urb &urb)
 {
     Descriptors descriptors;
     const char *error = nullptr;
-    urb.status = enumerate(rig_.host(), descriptors, error) ? 0 : -ENODEV;
+    urb.status = rig_.enumerate(descriptors, error) ? 0 : -ENODEV;
     start_afresh();
 }
 
@@ -196,8 +196,8 @@ void UrbScheduler::damaged_setup()
 {
     const SetupRequest get_status{GET_STATUS_TYPE, 0, 0, 0, 2};
     Bytes status;
-    rig_.host().arm(WireFault::BAD_SETUP);
-    if (control_transfer(rig_.host(), get_status, status) != Outcome::OK) {
+    rig_.arm(WireFault::BAD_SETUP);
+    if (rig_.control(get_status, status) != Outcome::OK) {
         throw std::runtime_error("the bridge did not answer GET_STATUS after a damaged SETUP");
     }
 }
@@ -214,13 +214,13 @@ bool UrbScheduler::step_bulk()
 
 bool UrbScheduler::receive_packet()
 {
-    const Outcome outcome = rig_.host().in(BULK_ENDPOINT, WHISKER_LIMIT_BULK_PACKET, packet_);
+    const Outcome outcome = rig_.in(BULK_ENDPOINT, WHISKER_LIMIT_BULK_PACKET, packet_);
     bulk_naks_ = outcome == Outcome::NAK ? bulk_naks_ + 1 : 0;
     if (bulk_naks_ > BULK_PATIENCE) {
         throw std::runtime_error("the bridge holds a frame and does not give it: bulk endpoint answers NAK");
     }
     if (outcome == Outcome::NAK) {
-        rig_.host().idle(NAK_REST_CYCLES);
+        rig_.idle(NAK_REST_CYCLES);
     } else {
         bulk_answer(outcome);
     }
@@ -256,7 +256,7 @@ bool UrbScheduler::futile_poll()
         return false;
     }
     storm_left_--;
-    if (rig_.host().in(BULK_ENDPOINT, WHISKER_LIMIT_BULK_PACKET, packet_) != Outcome::NAK) {
+    if (rig_.in(BULK_ENDPOINT, WHISKER_LIMIT_BULK_PACKET, packet_) != Outcome::NAK) {
         throw std::runtime_error("the bridge gave data where none was due");
     }
     return true;
@@ -270,7 +270,7 @@ bool UrbScheduler::step_interrupt()
         return false;
     }
     interrupt_due_ = false;
-    const Outcome outcome = rig_.host().in(INTERRUPT_ENDPOINT, INTERRUPT_PACKET, packet_);
+    const Outcome outcome = rig_.in(INTERRUPT_ENDPOINT, INTERRUPT_PACKET, packet_);
     if (outcome == Outcome::OK) {
         interrupt_.front().data = packet_;
     }

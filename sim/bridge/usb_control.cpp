@@ -92,20 +92,20 @@ void follow(UsbHost &host, const SetupRequest &request)
     }
 }
 
-Outcome get_descriptor(UsbHost &host, uint16_t which, uint16_t length, Bytes &data)
+Outcome get_descriptor(const ControlTransfer &transfer, uint16_t which, uint16_t length, Bytes &data)
 {
-    return control_transfer(host, {TO_HOST, GET_DESCRIPTOR, which, 0, length}, data);
+    return transfer({TO_HOST, GET_DESCRIPTOR, which, 0, length}, data);
 }
 
-bool read_configuration(UsbHost &host, Bytes &configuration)
+bool read_configuration(const ControlTransfer &transfer, Bytes &configuration)
 {
     constexpr uint16_t HEADER = 9;
-    if (get_descriptor(host, CONFIGURATION_DESCRIPTOR, HEADER, configuration) != Outcome::OK ||
+    if (get_descriptor(transfer, CONFIGURATION_DESCRIPTOR, HEADER, configuration) != Outcome::OK ||
         configuration.size() != HEADER) {
         return false;
     }
     const auto total = static_cast<uint16_t>(configuration[2] | configuration[3] << 8);
-    return get_descriptor(host, CONFIGURATION_DESCRIPTOR, total, configuration) == Outcome::OK &&
+    return get_descriptor(transfer, CONFIGURATION_DESCRIPTOR, total, configuration) == Outcome::OK &&
            configuration.size() == total;
 }
 
@@ -151,26 +151,31 @@ Bytes Descriptors::all() const
 
 bool enumerate(UsbHost &host, Descriptors &descriptors, const char *&error)
 {
+    error = "no high-speed chirp";
+    const auto transfer = [&host](const SetupRequest &request, Bytes &data) {
+        return control_transfer(host, request, data);
+    };
+    return host.reset() && configure(transfer, descriptors, error);
+}
+
+bool configure(const ControlTransfer &transfer, Descriptors &descriptors, const char *&error)
+{
     constexpr uint16_t DEVICE_BYTES = 18;
     Bytes none;
-    error = "no high-speed chirp";
-    if (!host.reset()) {
-        return false;
-    }
     error = "SET_ADDRESS failed";
-    if (control_transfer(host, {0, SET_ADDRESS, ADDRESS, 0, 0}, none) != Outcome::OK) {
+    if (transfer({0, SET_ADDRESS, ADDRESS, 0, 0}, none) != Outcome::OK) {
         return false;
     }
     error = "device descriptor unreadable";
-    if (get_descriptor(host, DEVICE_DESCRIPTOR, DEVICE_BYTES, descriptors.device) != Outcome::OK) {
+    if (get_descriptor(transfer, DEVICE_DESCRIPTOR, DEVICE_BYTES, descriptors.device) != Outcome::OK) {
         return false;
     }
     error = "configuration descriptor unreadable";
-    if (!read_configuration(host, descriptors.configuration)) {
+    if (!read_configuration(transfer, descriptors.configuration)) {
         return false;
     }
     error = "SET_CONFIGURATION failed";
-    return control_transfer(host, {0, SET_CONFIGURATION, 1, 0, 0}, none) == Outcome::OK;
+    return transfer({0, SET_CONFIGURATION, 1, 0, 0}, none) == Outcome::OK;
 }
 
 } // namespace bridge_sim

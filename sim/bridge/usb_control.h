@@ -1,6 +1,8 @@
 // Control transfers and enumeration (USB 2.0, 8.5.3 and 9.4) on top of the host's transactions.
 #pragma once
 
+#include <functional>
+
 #include "usb_host.h"
 
 namespace bridge_sim
@@ -32,5 +34,9 @@ struct Descriptors {
 
 // Bus reset, address, descriptors, SET_CONFIGURATION(1). False: some step failed; `error` names it.
 bool enumerate(UsbHost &host, Descriptors &descriptors, const char *&error);
+
+// What follows the bus reset, whatever makes the control transfers.
+using ControlTransfer = std::function<Outcome(const SetupRequest &, Bytes &)>;
+bool configure(const ControlTransfer &transfer, Descriptors &descriptors, const char *&error);
 
 } // namespace bridge_sim

@@ -1,0 +1,35 @@
+// Level bytes: the bridge and its USB device without a clock. A tick begins, the host makes its transactions, and then
+// the nodes' records are taken whole.
+#pragma once
+
+#include "bytes_device.h"
+#include "rig.h"
+
+namespace bridge_sim
+{
+
+class BytesRig : public Rig
+{
+  public:
+    BytesRig(size_t populated, uint64_t seed, const std::vector<NodeTrait> &traits);
+
+    bool enumerate(Descriptors &descriptors, const char *&error) override;
+    Outcome control(const SetupRequest &request, Bytes &data) override;
+    Outcome in(uint8_t endpoint, size_t limit, Bytes &data) override;
+    void idle(uint64_t cycles) override;
+    void arm(WireFault fault) override;
+    const HostCounters &counters() const override;
+    uint64_t cycles() const override;
+    bool running() const override;
+
+  protected:
+    void power_up() override;
+    bool transfer(const std::function<bool()> &usb_step) override;
+    void finish_run(const std::function<bool()> &usb_step) override;
+
+  private:
+    BytesBridge bridge_;
+    BytesDevice device_;
+};
+
+} // namespace bridge_sim

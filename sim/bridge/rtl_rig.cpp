@@ -1,0 +1,96 @@
+#include "rtl_rig.h"
+
+#include <stdexcept>
+
+namespace bridge_sim
+{
+
+namespace
+{
+
+// A tick at the slowest settings takes some 3000 cycles, a control transfer in the midst of it as many again.
+constexpr uint64_t PATIENCE_CYCLES = 1000000;
+
+} // namespace
+
+RtlRig::RtlRig(size_t populated, uint64_t seed, const std::vector<NodeTrait> &traits)
+    : Rig(populated, seed, traits), bridge_(bus()), host_(bridge_)
+{
+}
+
+bool RtlRig::enumerate(Descriptors &descriptors, const char *&error)
+{
+    return bridge_sim::enumerate(host_, descriptors, error);
+}
+
+Outcome RtlRig::control(const SetupRequest &request, Bytes &data)
+{
+    return control_transfer(host_, request, data);
+}
+
+Outcome RtlRig::in(uint8_t endpoint, size_t limit, Bytes &data)
+{
+    return host_.in(endpoint, limit, data);
+}
+
+void RtlRig::idle(uint64_t cycles)
+{
+    host_.idle(cycles);
+}
+
+void RtlRig::arm(WireFault fault)
+{
+    host_.arm(fault);
+}
+
+const HostCounters &RtlRig::counters() const
+{
+    return host_.counters();
+}
+
+uint64_t RtlRig::cycles() const
+{
+    return bridge_.cycles;
+}
+
+bool RtlRig::running() const
+{
+    return bridge_.running();
+}
+
+void RtlRig::power_up()
+{
+    bridge_.reset();
+}
+
+bool RtlRig::transfer(const std::function<bool()> &usb_step)
+{
+    bridge_.start_tick();
+    if (!bridge_.link_busy()) {
+        return false;
+    }
+    host_.start_of_frame();
+    wait_while([this] { return bridge_.link_busy(); }, usb_step);
+    bridge_.cycle(); // the nodes see select rise
+    return true;
+}
+
+void RtlRig::finish_run(const std::function<bool()> &usb_step)
+{
+    wait_while([this] { return bridge_.running(); }, usb_step);
+}
+
+void RtlRig::wait_while(const std::function<bool()> &busy, const std::function<bool()> &usb_step)
+{
+    const uint64_t limit = bridge_.cycles + PATIENCE_CYCLES;
+    while (busy()) {
+        if (!usb_step()) {
+            bridge_.cycle();
+        }
+        if (bridge_.cycles > limit) {
+            throw std::runtime_error("the bridge did not finish a tick");
+        }
+    }
+}
+
+} // namespace bridge_sim

@@ -1,0 +1,73 @@
+// Level bytes gives what the gateware gives: random scripts on both, every packet and every report compared.
+// `test_levels SCRIPTS SEED` runs more of them.
+#include "cmocka_cpp.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+
+#include "level_script.h"
+
+using namespace bridge_sim;
+
+namespace
+{
+
+constexpr uint64_t SCRIPTS = 240;
+constexpr uint64_t SEED = 1;
+// Lanes with a node. Most scripts have few, for nodes take their time at both levels.
+constexpr size_t POPULATED[] = {1, 3, 2, LANES, 1, 6};
+constexpr uint64_t SCRIPTS_OF_RIG = 40;
+
+uint64_t scripts = SCRIPTS;
+uint64_t first_seed = SEED;
+
+void expect_every_step(const std::map<std::string, uint64_t> &taken, const LevelPair &pair)
+{
+    assert_int_equal(taken.size(), 19);
+    assert_true(pair.packets > 0 && pair.stalls > 0);
+}
+
+// Scripts on one pair follow each other, so that what one leaves behind meets the next.
+void run_rig(uint64_t rig, uint64_t count)
+{
+    const size_t populated = POPULATED[rig % std::size(POPULATED)];
+    const uint64_t seed = first_seed * 1000003 + rig;
+    uint64_t script = 0;
+    try {
+        LevelPair pair(populated, seed);
+        LevelScript steps(pair, populated, seed);
+        for (; script < count; script++) {
+            steps.run();
+        }
+        std::printf("rig %llu: %llu packets, %llu bytes, %llu refusals\n", static_cast<unsigned long long>(rig),
+                    static_cast<unsigned long long>(pair.packets), static_cast<unsigned long long>(pair.bytes / 2),
+                    static_cast<unsigned long long>(pair.stalls));
+        if (count == SCRIPTS_OF_RIG) {
+            expect_every_step(steps.taken(), pair);
+        }
+    } catch (const std::exception &error) {
+        fail_msg("seed %llu, rig %llu, script %llu: %s", static_cast<unsigned long long>(first_seed),
+                 static_cast<unsigned long long>(rig), static_cast<unsigned long long>(script), error.what());
+    }
+}
+
+void levels_agree(void **)
+{
+    for (uint64_t done = 0; done < scripts; done += SCRIPTS_OF_RIG) {
+        run_rig(done / SCRIPTS_OF_RIG, std::min(SCRIPTS_OF_RIG, scripts - done));
+    }
+}
+
+} // namespace
+
+int main(int argc, char **argv)
+{
+    if (argc == 3) {
+        scripts = std::strtoull(argv[1], nullptr, 10);
+        first_seed = std::strtoull(argv[2], nullptr, 10);
+    }
+    const CMUnitTest tests[] = {cmocka_unit_test(levels_agree)};
+    return cmocka_run_group_tests(tests, nullptr, nullptr);
+}
