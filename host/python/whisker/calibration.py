@@ -162,14 +162,16 @@ def counts_of(samples: np.ndarray) -> np.ndarray:
 
 
 class ContactsFile:
-    """The radial calibration of the contract: contact, radius_mm, t_s, x, y, and whisk_rad_s where it is known."""
+    """The radial calibration of the contract: contact, radius_mm, t_s, x, y, and what more is known."""
 
-    def __init__(self, path: Path, whisk_rad_s: float | None = None):
+    def __init__(self, path: Path, whisk_rad_s: float | None = None, node: int | None = None):
+        """`node`: serial number of the node whose whisker it is."""
         self._file = open(path, "w", newline="")  # noqa: SIM115 - closed by close()
         self._rows = csv.writer(self._file)
-        self._extra = [] if whisk_rad_s is None else [whisk_rad_s]
+        extra = {name: v for name, v in (("whisk_rad_s", whisk_rad_s), ("node", node)) if v is not None}
+        self._extra = list(extra.values())
         self._contacts = 0
-        self._rows.writerow(["contact", "radius_mm", "t_s", "x", "y", *(["whisk_rad_s"] if self._extra else [])])
+        self._rows.writerow(["contact", "radius_mm", "t_s", "x", "y", *extra])
 
     def add(self, radius_mm: float, whisk: Whisk) -> None:
         """One contact; on the disk when this returns."""

@@ -19,7 +19,8 @@ REST_SHARE = 0.05  # the first samples of a recorded whisk, before it touches, g
 REST_LEAST = 3  # samples: slow recordings have few before the touch
 WHISK_FORMAT, CURVE_FORMAT = "whisker radial whisk model 1", "whisker radial curve model 1"
 RATE_COLUMNS = ("whisk_rad_s", "base_rad_s")  # commanded; as the base reports
-NO_CHANNEL = ("contact", "radius_mm", "t_s", *RATE_COLUMNS)
+NODE_COLUMN = "node"  # serial number of the node whose whisker it is
+NO_CHANNEL = ("contact", "radius_mm", "t_s", NODE_COLUMN, *RATE_COLUMNS)
 MODELS = ("paper", "linear", "quadratic", "rational", "default")
 
 
@@ -41,6 +42,8 @@ def peak(samples: np.ndarray, rest) -> float:
 
 class RadialModel:
     """r = a1 f1 + a0 (equation 3), its standard error, and the radii it was fitted on."""
+
+    node: int | None = None  # whose whisker it is, where known
 
     def __init__(self, a1: float, a0: float, sigma_mm: float, low_mm: float, high_mm: float):
         self._line = ffi.new("struct nav_radial *", dict(zip(FIELDS, (a1, a0, sigma_mm, low_mm, high_mm), strict=True)))
@@ -74,23 +77,32 @@ class RadialModel:
         """'tip' near the outermost fitted radius (one sigma, at least TIP_MM) or beyond it, else 'shaft'."""
         return "tip" if radius_mm > tip_from(self.high_mm, self.sigma_mm) else "shaft"
 
+    @property
+    def content(self) -> dict:
+        """What makes the same model again."""
+        return {name: getattr(self, name) for name in FIELDS}
+
+    @classmethod
+    def of(cls, content: dict) -> "RadialModel":
+        """From what `content` gave."""
+        if content["format"] != FORMAT:
+            raise ValueError(f"format is '{content['format']}'")
+        values = [float(content[name]) for name in FIELDS]
+        if not np.isfinite(values).all():
+            raise ValueError("a number is not finite")
+        return cls(*values)
+
     def save(self, path) -> None:
-        content = {"format": FORMAT} | {name: getattr(self, name) for name in FIELDS}
-        Path(path).write_text(json.dumps(content, indent=1) + "\n")
+        """As JSON, for `load`."""
+        save(self, path)
 
     @classmethod
     def load(cls, path) -> "RadialModel":
         """Read what `save` wrote; TableError with one line when it is something else."""
-        try:
-            content = json.loads(Path(path).read_text())
-            if content["format"] != FORMAT:
-                raise ValueError(f"format is '{content['format']}'")
-            values = [float(content[name]) for name in FIELDS]
-            if not np.isfinite(values).all():
-                raise ValueError("a number is not finite")
-            return cls(*values)
-        except (OSError, ValueError, KeyError, TypeError) as error:
-            raise not_a_model(path, error) from error
+        model = load(path)
+        if not isinstance(model, cls):
+            raise not_a_model(path, ValueError(f"it is a {type(model).__name__}, not equation 3's line"))
+        return model
 
 
 @dataclass
@@ -102,6 +114,7 @@ class Whisks:
     peak_counts: np.ndarray
     radius_mm: np.ndarray | None  # None when the file has no such column
     bad_rows: int  # rows with a cell that is no finite number: left out
+    node: int | None = None  # serial number of the node whose whisker it is, where the file tells
 
     @property
     def axes(self) -> int:
@@ -124,7 +137,20 @@ def read_whisks(path, with_radius: bool) -> Whisks:
     peaks = np.array([_peak_of(samples[r]) for r in rows])
     radius = numbers(text["radius_mm"]) if with_radius else None
     radii = None if radius is None else np.array([np.median(radius[r]) for r in rows])
-    return Whisks(names, recorded, peaks, radii, int((~np.isfinite(samples)).any(axis=1).sum()))
+    bad = int((~np.isfinite(samples)).any(axis=1).sum())
+    return Whisks(names, recorded, peaks, radii, bad, _node(path, text.get(NODE_COLUMN, [])))
+
+
+def _node(path, cells: list[str]) -> int | None:
+    """The one serial number in a column; empty cells do not count."""
+    found = sorted({cell for cell in cells if cell != ""})
+    if len(found) > 1:
+        raise TableError(
+            path, None, f"contacts of nodes {found[0]} and {found[1]}; give each whisker a file of its own"
+        )
+    if found and not (found[0].isascii() and found[0].isdecimal()):
+        raise TableError(path, None, f"node '{found[0]}' is no serial number")
+    return int(found[0]) if found else None
 
 
 def _rate(text: dict[str, list[str]], name: str) -> np.ndarray | None:
@@ -152,8 +178,14 @@ def fit(whisks: Whisks, name: str = "default") -> Fitted:
     """A model of the contacts by its name (MODELS); ValueError when they do not determine one.
 
     `default` is the model of whole whisks, or, where recordings are no whole whisks, the line or curve that predicts
-    left-out contacts best.
+    left-out contacts best. The model belongs to the whisks' node.
     """
+    fitted = _fit(whisks, name)
+    fitted.model.node = whisks.node
+    return fitted
+
+
+def _fit(whisks: Whisks, name: str) -> Fitted:
     if name in ("paper", "linear"):
         model = RadialModel.fit(whisks.peak_counts, whisks.radius_mm)
         return Fitted(model, model.sigma_mm)
@@ -169,11 +201,11 @@ def fit(whisks: Whisks, name: str = "default") -> Fitted:
 
 
 def _best_curve(whisks: Whisks) -> Fitted:
-    line = fit(whisks, "linear")  # what it says of too few contacts is what a user should read
+    line = _fit(whisks, "linear")  # what it says of too few contacts is what a user should read
     found = [line]
     for kind in CurveModel.KINDS:
         try:
-            found.append(fit(whisks, kind))
+            found.append(_fit(whisks, kind))
         except ValueError:
             continue
     return min(found, key=lambda fitted: fitted.error_mm)
@@ -181,11 +213,9 @@ def _best_curve(whisks: Whisks) -> Fitted:
 
 def save(model, path) -> None:
     """Write a model of any kind as JSON."""
-    if isinstance(model, RadialModel):
-        model.save(path)
-        return
-    name = WHISK_FORMAT if isinstance(model, WhiskModel) else CURVE_FORMAT
-    Path(path).write_text(json.dumps({"format": name} | model.content, indent=1) + "\n")
+    formats = {RadialModel: FORMAT, WhiskModel: WHISK_FORMAT, CurveModel: CURVE_FORMAT}
+    node = {} if model.node is None else {NODE_COLUMN: model.node}
+    Path(path).write_text(json.dumps({"format": formats[type(model)]} | node | model.content, indent=1) + "\n")
 
 
 def load(path) -> "RadialModel | CurveModel | WhiskModel":
@@ -193,11 +223,12 @@ def load(path) -> "RadialModel | CurveModel | WhiskModel":
     try:
         content = json.loads(Path(path).read_text())
         kinds = {WHISK_FORMAT: WhiskModel, CURVE_FORMAT: CurveModel}
-        if content["format"] in kinds:
-            return kinds[content["format"]](content)
-    except (OSError, ValueError, KeyError, TypeError, OverflowError) as error:
+        model = kinds.get(content["format"], RadialModel.of)(content)
+        node = content.get(NODE_COLUMN)
+        model.node = None if node is None else int(node)
+        return model
+    except (OSError, ValueError, KeyError, TypeError, OverflowError, AttributeError) as error:
         raise not_a_model(path, error) from error
-    return RadialModel.load(path)
 
 
 def not_a_model(path, error: Exception) -> TableError:

@@ -29,6 +29,7 @@ class CurveModel:
     """
 
     KINDS = ("quadratic", "rational")
+    node: int | None = None  # whose whisker it is, where known
     NUMBERS = ("c0", "c1", "c2", "d", "scale", "sigma_mm", "low_mm", "high_mm")
 
     def __init__(self, content: dict):

@@ -95,6 +95,7 @@ class WhiskModel:
     """`nav_whisk_model` of one whisker: made by `fit` or from what `content` gave."""
 
     kind = "default"
+    node: int | None = None  # whose whisker it is, where known
     SCALARS = ("axes", "log_gain", "kappa", "cone_mm", "spread", "low_mm", "high_mm", "tip_mm") + (
         "direction_sd",
         "log_misfit",

@@ -18,6 +18,7 @@ from ..calibration import (
     measure_rest,
     write_rest,
 )
+from ..nodes import NodeError, read_nodes
 from ..protocol import LANES
 from ..radial import Contact, fit, read_whisks, shape_of
 from ..ring import Reader
@@ -46,6 +47,8 @@ def add(parser) -> None:
     parser.add_argument(
         "--whisk-rad-s", type=number_above(0.0), metavar="W", help="turning rate of the whisks, if known"
     )
+    text = "what 'whisker info --nodes' printed: the model then belongs to this lane's node, and is refused for others"
+    parser.add_argument("--nodes", metavar="FILE", help=text)
     parser.add_argument("--scene", help="scene folder whose robot.toml names the lanes, lane 0 first")
     parser.add_argument("--yes", action="store_true", help="ask nothing: whisks at the distances follow one another")
     parser.add_argument(
@@ -59,20 +62,33 @@ def run(arguments) -> int:
         arguments.parser.error("--lane and --radii belong together: give both, or neither to measure rest alone")
     names = [whisker.name for whisker in load(arguments.scene).robot.whiskers] if arguments.scene else []
     names += [f"lane{n}" for n in range(len(names), LANES)]
+    node = _node(arguments)
     try:
         arguments.out.mkdir(parents=True, exist_ok=True)
         with Reader(arguments.ring, arguments.wait) as reader:
             feed = Feed(reader)
             if not arguments.backlog:
                 feed.skip()
-            return _calibrate(arguments, feed, names)
+            return _calibrate(arguments, feed, names, node)
     except OSError as error:
         if error.filename is None:
             raise
         raise unwritable(error.filename, error) from error
 
 
-def _calibrate(arguments, feed: Feed, names: list[str]) -> int:
+def _node(arguments) -> int | None:
+    """Serial number of the lane's node, where a list of nodes is given."""
+    if arguments.nodes is None or arguments.lane is None:
+        return None
+    nodes = read_nodes(arguments.nodes)
+    if arguments.lane not in nodes:
+        raise NodeError(
+            f"{arguments.nodes}: lane {arguments.lane} has no node with a serial number; see whisker info --nodes"
+        )
+    return nodes[arguments.lane]
+
+
+def _calibrate(arguments, feed: Feed, names: list[str], node: int | None) -> int:
     _ask(arguments, feed, "Leave all whiskers untouched")
     frames = feed.frames(round(arguments.rest_seconds * TICKS_PER_S))
     rests = measure_rest(frames)
@@ -87,7 +103,7 @@ def _calibrate(arguments, feed: Feed, names: list[str]) -> int:
         continue  # the rest of a whisker that is touched now and then is still its rest
     whisks = collect(feed, finder)
     number, wanted = itertools.count(1), len(arguments.radii) * arguments.repeats
-    with closing(ContactsFile(path, arguments.whisk_rad_s)) as file:
+    with closing(ContactsFile(path, arguments.whisk_rad_s, node)) as file:
         for radius_mm in arguments.radii:
             text = (
                 f"Post at {radius_mm:g} mm, {names[arguments.lane]} clear of it; then whisk {arguments.repeats} times"

@@ -3,6 +3,7 @@
 import json
 
 from .. import radial
+from ..nodes import check_node
 from ..tables import TableError, unwritable
 from . import add_action, plain
 
@@ -40,6 +41,7 @@ def fit(arguments) -> int:
 def predict(arguments) -> int:
     model = radial.load(arguments.model)
     whisks = radial.read_whisks(arguments.contacts, with_radius=False)
+    check_node(model.node, whisks.node, arguments.model)
     for contact, recorded, peak in zip(whisks.contact, whisks.recorded, whisks.peak_counts, strict=True):
         try:
             told = radial.estimate(model, recorded, peak)

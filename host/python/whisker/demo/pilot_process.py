@@ -15,6 +15,7 @@ import numpy as np
 
 from .. import scene as scenes
 from ..behaviour import BLOCK_TICKS, ODOMETRY_TICKS, TICK_S
+from ..nodes import NodeError, check_node, read_nodes
 from ..pilot import Pilot
 from ..protocol import CODES, STATUS_CODE_SHIFT
 from ..radial import load as load_radial
@@ -78,6 +79,14 @@ def load_models(folder: Path, robot: scenes.Robot) -> tuple[dict, dict]:
     return {w.name: texture for w in robot.of_role("texture")}, radial
 
 
+def check_nodes(path: str, robot: scenes.Robot, radial: dict) -> None:
+    """NodeError when a radial model is of another node than the list names on its whisker's lane."""
+    nodes = read_nodes(path)
+    for lane, whisker in enumerate(robot.whiskers):
+        if whisker.name in radial:
+            check_node(radial[whisker.name].node, nodes.get(lane), whisker.name)
+
+
 class Rows:
     """Observation rows into several files, line by line, the header first."""
 
@@ -117,6 +126,7 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--socket", required=True, help="the simulation's socket: drive out, odometry in")
     parser.add_argument("--scene", required=True, type=Path)
     parser.add_argument("--models", required=True, type=Path)
+    parser.add_argument("--nodes", help="what 'whisker info --nodes' printed: models of other nodes are refused")
     parser.add_argument("--seed", type=int, default=1, help="of the random turns")
     parser.add_argument("--out", required=True, type=Path, help="observations.csv")
     parser.add_argument("--rows", type=Path, default="/dev/null", help="the same rows once more, for the navigator")
@@ -127,7 +137,10 @@ def main(argv: list[str] | None = None) -> int:
     options = parser.parse_args(argv)
     try:
         robot = scenes.load(options.scene).robot
-        pilot = Pilot(robot, *load_models(options.models, robot), options.seed)
+        texture, radial = load_models(options.models, robot)
+        if options.nodes:
+            check_nodes(options.nodes, robot, radial)
+        pilot = Pilot(robot, texture, radial, options.seed)
         with (
             Reader(options.ring, wait_s=10.0) as reader,
             SimLink(options.socket) as link,
@@ -136,7 +149,7 @@ def main(argv: list[str] | None = None) -> int:
             open(options.traces, "w", newline="") as traces,
         ):
             used = fly(pilot, reader, link, Rows(out, live), traces)
-    except (OSError, ValueError, RingError) as error:
+    except (OSError, ValueError, RingError, NodeError) as error:
         print(f"pilot: {error}", file=sys.stderr)
         return 1
     if options.report:
