@@ -37,8 +37,11 @@ def frames_of(counts: np.ndarray, lane: int = LANE) -> np.ndarray:
 
 @pytest.fixture
 def ring(whisks):
-    rest = np.tile(whisks[0].counts[:100], (10, 1))
-    frames = frames_of(np.concatenate([rest, *(whisk.counts for whisk in whisks)]))
+    # Half a second before each: the plug creeps, and comes back to rest some time after the whisker is let go.
+    pauses = [np.tile(whisk.counts[:100], (10, 1)) for whisk in whisks]
+    frames = frames_of(
+        np.concatenate([part for pair in zip(pauses, (w.counts for w in whisks), strict=True) for part in pair])
+    )
     with Writer(ring_name(), 1 << 16) as writer:
         writer.publish(frames)
         yield writer
