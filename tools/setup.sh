@@ -22,6 +22,7 @@ mod:umockdev-1.0 libumockdev-dev
 mod:libusbredirparser-0.5 libusbredirparser-dev
 mod:cmocka libcmocka-dev
 mod:libsystemd libsystemd-dev
+mod:libudev libudev-dev
 cmd:spin spin
 cmd:avr-gcc gcc-avr
 file:/usr/lib/avr/include/avr/io.h avr-libc
