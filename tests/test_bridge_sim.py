@@ -68,7 +68,7 @@ def test_faults_strike_where_the_file_says(build, tmp_path):
 
 
 def test_more_lanes_than_the_scene_has_are_at_rest(build, tmp_path):
-    frames = record(tmp_path, "whisker-test-lanes", "--seconds", 0.2, "--pace", 0, "--lanes", 8)
+    frames = record(tmp_path, "whisker-test-lanes", "--seconds", 0.2, "--pace", 0, "--lanes", 8, "--level", "bytes")
     assert frames.dtype == FRAME and (frames["lane_mask"] == 0xFF).all()
     assert (frames["lane"]["status"][:, :8] == 0).mean() > 0.9
     assert (np.abs(frames["lane"]["alpha"][50:-1, 7].astype(int) - 0x8000) < 2000).all()

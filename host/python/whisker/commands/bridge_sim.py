@@ -24,6 +24,7 @@ UP_S = 60.0  # for the simulated bridge to enumerate
 USBIP_PORT = 3240  # registered for USB/IP
 USBREDIR_PORT = 4000  # QEMU's examples take it
 PORT_MAX = 65535
+LEVELS = ("rtl", "bytes")
 # What to do with the device, by the protocol that serves it.
 REMEDIES = {
     "usbip": "sudo modprobe vhci-hcd; sudo usbip --tcp-port {port} attach -r 127.0.0.1 -b 1-1",
@@ -51,6 +52,8 @@ def add(parser) -> None:
     )
     text = "simulated seconds per second, at most what the machine can; 0: as fast as it can (default: 1)"
     parser.add_argument("--pace", type=number_above(-1e-9), default=1.0, metavar="X", help=text)
+    text = "how much of the bridge is simulated (%(default)s): the gateware, cycle by cycle, or transactions: the same frames"
+    parser.add_argument("--level", choices=LEVELS, default=LEVELS[0], help=text)
     served = parser.add_mutually_exclusive_group()
     text = (
         "no whiskerd: give the device to a Linux kernel by USB/IP, on this port of 127.0.0.1 (%(const)s; 0: a free one)"
@@ -102,7 +105,7 @@ def _command(arguments, folder: Path) -> list[str]:
     words = [] if protocol else [program("umockdev-wrapper")]
     words += [program("whisker-bridge-sim"), "--scene", folder / "scene.flat"]
     words += ["--seconds", arguments.seconds, "--seed", arguments.seed, "--lanes-populated", lanes]
-    words += ["--socket", folder / "sim.sock", "--followers", 1]
+    words += ["--socket", folder / "sim.sock", "--followers", 1, "--level", arguments.level]
     if arguments.fault:
         (folder / "faults").write_text(read_faults(arguments.fault, TICKS_PER_S))
         words += ["--fault-list", folder / "faults"]
