@@ -1,6 +1,6 @@
 """Which node is on which lane, from what `whisker info --nodes` printed or what whiskerd wrote to its log.
 
-A calibration belongs to one whisker, and no sample gives another of the same batch away: the serial number does.
+A calibration belongs to one whisker, and whisks do not give another of the same batch away: the serial number does.
 """
 
 import re
