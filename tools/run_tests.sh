@@ -25,6 +25,8 @@ if [ "${1:-}" = --long ]; then
     echo "test: larger models of the ring, and 100000 readers and writers killed"
     host/libwhisker/model/check.sh --long
     build/release/host/libwhisker/test/stress_ring 100000
+    echo "test: the bridge's two levels by more scripts"
+    build/release/sim/bridge/tests/test_bridge_levels 4000 2
     echo "test: mutated recordings"
     .venv/bin/python host/python/tests/fuzz_recording.py --inputs 300000
     echo "test: a Linux kernel and the simulated bridge"
