@@ -20,6 +20,20 @@ static void jump(unsigned tick, struct sim_field *field)
         field->alpha_deg = 60.0;
 }
 
+static void no_sync(unsigned nth, struct lane_faults *faults)
+{
+    faults->no_sync = nth == 1u;
+}
+
+/* After a bad frame: a stray SYNC meets the resynchronisation and is counted, the next order does not set the count
+ * right, and then SYNC is lost: the old reading has the right number. */
+static void count_ahead(unsigned nth, struct lane_faults *faults)
+{
+    faults->second_sync_ns = nth == 1u ? 100000u : 0u;
+    faults->mosi_flips = nth == 2u;
+    faults->no_sync = nth == 3u;
+}
+
 #define SENSOR(kind, argument_)                                                                                        \
     {                                                                                                                  \
         .sensor = SIM_SENSOR_##kind, .sensor_argument = (argument_)                                                    \
@@ -162,6 +176,25 @@ const struct fault_case FAULT_CASES[] = {
      .expected = "^\\.\\.R$",
      .most = 1,
      .remark = "the tick's own sample is safe; the next SYNC finds a reading under way"},
+    {.name = "SYNC alone 100 us early",
+     .faults = {.second_sync_ns = 400000},
+     .then = no_sync,
+     .expected = "^\\.\\.L$",
+     .most = 1,
+     .remark = "a stray pulse in the tick before, then none: told by the time from SYNC to order"},
+    {.name = "SYNC alone 30 us early",
+     .faults = {.second_sync_ns = 470000},
+     .then = no_sync,
+     .expected = "^$",
+     .remark = "the slowest link's order may come as late: the sample is 30 us early",
+     .undetectable = true},
+    {.name = "count one ahead, then SYNC missing",
+     .faults = SENSOR(FLIP_BIT, 20),
+     .then = count_ahead,
+     .expected = "^\\.xRtL$",
+     .most = 4,
+     .remark = "a stray SYNC in a resynchronisation, the next order damaged, the next SYNC lost: the reading would be "
+               "a tick old"},
     {.name = "SYNC 100 us early", .faults = {.shift_ns = -100000}, .expected = "^$", .remark = "the frame had ended"},
     {.name = "SYNC 250 us early", .faults = {.shift_ns = -250000}, .expected = "^LR$", .most = 2},
     {.name = "SYNC 100 us late", .faults = {.shift_ns = 100000}, .expected = "^$"},

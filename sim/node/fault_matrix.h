@@ -15,6 +15,7 @@ struct fault_case {
     unsigned ticks;                                   /* how many in a row; 0: one */
     enum sim_node_disturbance end;                    /* what ends it, with the first sound tick */
     void (*part)(struct sim_node_parameters *);       /* parts that are special */
+    void (*then)(unsigned nth, struct lane_faults *); /* of each tick after the broken ones, the first is 1 */
     void (*field)(unsigned tick, struct sim_field *); /* a field that is special */
     const char *expected;                             /* the verdicts, as an extended regular expression */
     unsigned most;                                    /* ticks without a good record, at most */

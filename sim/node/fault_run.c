@@ -107,6 +107,8 @@ static bool plan(void *context, unsigned tick, struct sim_field *field, struct l
     *field = field_of(row, tick);
     if (tick >= FAULT_FIRST_TICK && tick < end)
         *faults = row->faults;
+    if (row->then && tick >= end)
+        row->then(tick - end + 1u, faults);
     if (tick > FAULT_FIRST_TICK) /* what disturbs does so once */
         faults->disturbance = tick == end ? row->end : SIM_NODE_NOTHING;
     return tick < most && (tick < end + FAULT_GOOD_RUN || run->good < FAULT_GOOD_RUN);

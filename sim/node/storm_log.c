@@ -1,9 +1,14 @@
 #include "storm_log.h"
 
+#include "node.h" // NODE_ORDER_MOST_US
 #include "storm_checks.h"
 #include "whisker_protocol.h"
 
 enum { NOW, BEFORE, EARLIER };
+
+/* A SYNC that comes so much before its tick may pass: NODE_ORDER_MOST_US by a node's clock 4 % slow, told to 2 us and 2
+ * us after the edge, less the 29 us from the tick's SYNC to its order at the storm's link settings. */
+#define EARLY_MOST_FS ((NODE_ORDER_MOST_US * 26u / 25u + 4u - 29u) * 1000u * DSPIC_FS_PER_NS)
 
 /* After these neither the node's state nor the sensor's is known until a good record. */
 static bool makes_ill(const struct lane_faults *f)
@@ -190,12 +195,13 @@ static void log_transfer(struct storm_log *log, const struct lane_verdict *v, ui
 
 /* ----------------------------------------------------------------------------------------------------- good records */
 
-/* This tick's own SYNC was kept from the node, which took another for its: a stray one, or, where its count has been
- * wrong since a stray one, that of the tick before. */
+/* This tick's own SYNC was kept from the node, which took a stray one for it; so little before that its order did not
+ * come too long after. */
 static bool is_displaced(const struct storm_log *log, const struct lane_verdict *v)
 {
     const struct sim_node_frame *frame = &v->report.frame;
-    return log->deeds[BEFORE].faults.no_sync && log->deeds[EARLIER].stray && frame->line == frame->sent &&
+    return log->deeds[BEFORE].faults.no_sync && log->deeds[EARLIER].stray &&
+           frame->begun_fs + EARLY_MOST_FS > v->sync_fs && frame->line == frame->sent &&
            checks_are_angles(frame->sent, v->alpha, v->beta);
 }
 

@@ -1,6 +1,7 @@
 #include "node.h"
 
-#include "board/link.h" // board_link_arm
+#include "board/link.h"  // board_link_arm
+#include "board/timer.h" // board_watch_start
 
 static void count(struct node *node, uint8_t fault)
 {
@@ -22,9 +23,16 @@ static void count_tick(struct node *node, uint16_t status)
         count(node, WHISKER_HEALTH_SENSOR_ERROR);
 }
 
+static bool is_complete(const struct sensor_reading *reading)
+{
+    return reading->status >> WHISKER_STATUS_CODE_SHIFT == WHISKER_CODE_OK;
+}
+
 /* Gives the link the record of the present tick, as far as it is known. */
 static void publish(struct node *node)
 {
+    if (node->displaced && is_complete(&node->reading))
+        node->reading = sensor_reading_of_code(WHISKER_CODE_LATE);
     if (node->serving)
         return; /* its end will */
     node->armed ^= 1u;
@@ -38,6 +46,7 @@ static void start(struct node *node, struct board *board, uint8_t code)
     node->tick = 0xFFu; /* the first SYNC makes it 0 */
     node->numbered = true;
     node->ordered = false;
+    node->displaced = false;
     node->begun = false;
     node->serving = false;
     node->armed = 0;
@@ -70,6 +79,7 @@ bool node_ready(const struct node *node)
 void node_on_sync(struct node *node)
 {
     const uint8_t code = sampler_on_sync(&node->sampler); /* first: all nodes' readings begin together */
+    board_watch_start(node->board);
     if (node->begun)
         count_tick(node, node->reading.status);
     node->begun = true;
@@ -105,22 +115,17 @@ void node_on_transfer_end(struct node *node)
     node->ordered = false;
 }
 
-/* A reading ends long after its tick's order: an order that finds a good one belongs to a SYNC that was missed. */
-static bool is_complete(const struct sensor_reading *reading)
-{
-    return reading->status >> WHISKER_STATUS_CODE_SHIFT == WHISKER_CODE_OK;
-}
-
 void node_on_order(struct node *node, const uint16_t words[LINK_WORDS])
 {
     struct order order;
     const bool whole = order_parse(words, &order);
     if (!whole)
         count(node, WHISKER_HEALTH_ORDER_CRC);
-    else if (!node->numbered && !is_complete(&node->reading))
+    else if (!node->numbered && !is_complete(&node->reading)) /* else SYNC was missed: a reading ends after its order */
         node->tick = order.tick;
     node->numbered = true;
     node->ordered = true;
+    node->displaced = board_watch_exceeds(node->board, NODE_ORDER_MOST_US);
     publish(node);
     if (whole && order.command == WHISKER_COMMAND_SERVICE) {
         node->serving = true;

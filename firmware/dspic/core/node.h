@@ -13,6 +13,9 @@
  *   order n       the link gets the answer to the service order before
  *   window's end  the link gets record n as far as it is known
  *
+ * An order that comes too long after the last SYNC is not of the same tick: that SYNC was a stray one or the tick's own
+ * was lost. What is read meanwhile says LATE, until an order comes in time.
+ *
  * The link is armed well before the SYNC after which it is clocked: the bridge selects sooner after SYNC than an
  * interrupt could load the first word. */
 #ifndef NODE_H
@@ -25,6 +28,10 @@
 #include "sampler.h" // struct sampler
 #include "service.h" // struct service
 
+/* From SYNC to the end of its order, in microseconds: with the bridge's slowest settings (SCK divider 32, word gap 255)
+ * 4 gaps, 64 bits and 9 cycles at 60 MHz make 51.3; the rest is the interrupts' latency and an oscillator 4 % fast. */
+#define NODE_ORDER_MOST_US 70u
+
 struct node {
     struct board *board;
     struct sampler sampler;
@@ -32,6 +39,7 @@ struct node {
     uint8_t tick;                    /* low 8 bits of the present tick's number */
     bool numbered;                   /* the order that belongs to the last SYNC has come */
     bool ordered;                    /* an order has come in the present transfer */
+    bool displaced;                  /* the newest order came too long after SYNC: that SYNC was another tick's */
     bool begun;                      /* there was a SYNC since the start */
     bool serving;                    /* the link waits for this tick's second window, not for the next record */
     uint8_t armed;                   /* which of the records the link has */

@@ -9,8 +9,9 @@
  * frame and a late one raise /SS for t5, which overlaps the next SYNC and so costs that tick. Should real sensors
  * refuse frames back to back, a build with -DSAMPLER_RESYNC_EVERY_FRAME raises /SS after every one; it follows 1.5 kHz.
  *
- * A frame that slipped by bytes passes its sum once in 256 times: an angle that jumps further than a whisker can move
- * in a tick is not believed, and the sensor resynchronised. */
+ * A frame that slipped by a bit passes its sum about one time in eight, for all its bytes are halved or doubled, and so
+ * is their sum (docs/node_faults.md): an angle that jumps further than a whisker can move in a tick is not believed,
+ * and the sensor resynchronised. */
 #ifndef SAMPLER_H
 #define SAMPLER_H
 

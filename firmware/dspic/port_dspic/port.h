@@ -1,7 +1,7 @@
 /* The firmware on the dsPIC33FJ128MC802: what the core asks of its board, done with the chip's registers.
  *
  *   SYNC   -> INT1                       node_on_sync()
- *   sensor -> SPI1 master, a byte at a time; T2 paces the gaps
+ *   sensor -> SPI1 master, a byte at a time; T2 paces the gaps; T3 runs from SYNC on
  *   link   -> SPI2 slave in 16-bit words; DMA0 feeds it, DMA1 empties it and interrupts when the order is whole;
  *             INT2 tells when select rises
  *

@@ -1,4 +1,4 @@
-/* SPI1 as the sensor's master, and the timer that paces it. */
+/* SPI1 as the sensor's master, the timer that paces it, and the watch, T3, which always runs. */
 #include "board/sensor.h"
 #include "board/timer.h"
 
@@ -59,4 +59,15 @@ void board_timer_start(struct board *board, uint16_t us)
     sfr_write(board, PR2, is_short ? SHORT_COUNTS(us) : LONG_COUNTS(us));
     sfr_clear(board, IRQ_WORD(IFS0, IRQ_T2), IRQ_BIT(IRQ_T2)); /* an end that is waiting to be told is void */
     sfr_write(board, T2CON, TCON_TON | (is_short ? PRESCALE_8 : PRESCALE_64));
+}
+
+void board_watch_start(struct board *board)
+{
+    sfr_write(board, TMR3, 0);
+    sfr_write(board, T3CON, TCON_TON | PRESCALE_64);
+}
+
+bool board_watch_exceeds(struct board *board, uint16_t us)
+{
+    return sfr_read(board, TMR3) > LONG_COUNTS(us);
 }

@@ -27,6 +27,17 @@ void board_timer_start(struct board *board, uint16_t us)
     (void)us;
 }
 
+void board_watch_start(struct board *board)
+{
+    (void)board;
+}
+
+bool board_watch_exceeds(struct board *board, uint16_t us)
+{
+    (void)board;
+    return us == 0;
+}
+
 void board_link_arm(struct board *board, const uint16_t *words)
 {
     (void)board;
