@@ -1,14 +1,15 @@
 #!/usr/bin/env python3
 """Breaks one part of the chain after another, in a copy, and expects the tests to go red.
 
-    .venv/bin/python tests/mutations.py            every mutation: about half an hour
+    .venv/bin/python tests/mutations.py            every mutation: about a quarter of an hour
     .venv/bin/python tests/mutations.py swap       those whose name contains "swap"
+    .venv/bin/python tests/mutations.py --near     only the test that ought to notice first, not all when it stays green
+    .venv/bin/python tests/mutations.py --copy DIR in this copy, which is made if it is not there, and kept
 
 Exit code 1 when one survives, that is, when every test stays green although a part is broken.
 """
 
 import argparse
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -17,13 +18,15 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 BUILD = "build/release"
+PROGRAMS = {"node_slowest_link": "node_link"}  # tests whose program has another name
 
 
 @dataclass(frozen=True)
 class Mutation:
-    """A part broken: in `file`, `old` becomes `new`."""
+    """A part broken: in `file`, `old` becomes `new`. `near`: the program or pytest path that ought to notice first."""
 
     name: str
+    near: str
     file: str
     old: str
     new: str
@@ -32,150 +35,189 @@ class Mutation:
 MUTATIONS = [
     Mutation(
         "firmware: byte order of the sensor's alpha",
+        "test_sensor_frame",
         "firmware/dspic/core/sensor_frame.c",
         "whisker_get_u16(frame + MLX90333_FRAME_ALPHA),\n        whisker_get_u16(frame + MLX90333_FRAME_BETA)",
         "(uint16_t)(frame[1] << 8 | frame[2]),\n        whisker_get_u16(frame + MLX90333_FRAME_BETA)",
     ),
     Mutation(
         "firmware: record bytes swapped in their SPI words",
+        "test_record",
         "firmware/dspic/core/record.c",
         "words[i] = (uint16_t)((uint16_t)bytes[2u * i] << 8 | bytes[2u * i + 1u]);",
         "words[i] = (uint16_t)((uint16_t)bytes[2u * i + 1u] << 8 | bytes[2u * i]);",
     ),
     Mutation(
         "firmware: a node that does not count ticks",
+        "test_sim_node",
         "firmware/dspic/core/node.c",
         "node->tick = order.tick;",
         "node->tick = (uint8_t)(order.tick & 0x7Fu);",
     ),
     Mutation(
         "sensor: an angle mis-scaled by one part in a hundred",
+        "test_sense",
         "sim/mlx90333/mlx90333_sense.c",
         "angle_deg * (steps / p->span_deg)",
         "angle_deg * 1.01 * (steps / p->span_deg)",
     ),
     Mutation(
         "sensor: sum without the error word",
+        "test_sensor_frame",
         "firmware/dspic/core/sensor_frame.c",
         "if (sum == sum_of(data, MLX90333_FRAME_SUM - MLX90333_FRAME_ALPHA))",
         "if (sum == sum_of(data, MLX90333_FRAME_ERRORS - MLX90333_FRAME_ALPHA))",
     ),
     Mutation(
         "firmware: an overflow of the sensor's SPI is not cleared",
+        "test_node_faults",
         "firmware/dspic/port_dspic/sensor_spi.c",
         "    sfr_write(board, SPI1STAT, 0);\n    sfr_write(board, SPI1CON1, SENSOR_CON1);\n    sfr_write(",
         "    sfr_write(board, SPI1CON1, SENSOR_CON1);\n    sfr_set(",
     ),
     Mutation(
         "firmware: the link's module goes on where extra clocks left it",
+        "test_sim_node",
         "firmware/dspic/port_dspic/link_spi.c",
         "    sfr_write(board, SPI2STAT, 0); /* bits, words, overflow */\n",
         "",
     ),
     Mutation(
         "firmware: a record's first word is not preloaded",
+        "test_sim_node",
         "firmware/dspic/port_dspic/link_spi.c",
         "    sfr_write(board, SPI2BUF, words[0]);\n",
         "",
     ),
     Mutation(
         "firmware: no resynchronisation after a bad frame",
+        "test_sampler",
         "firmware/dspic/core/sampler.c",
         "    if (is_good(reading)) {",
         "    if (reading) {",
     ),
     Mutation(
         "firmware: a sum without the error word is not accepted beside one",
+        "test_sensor_frame",
         "firmware/dspic/core/sensor_frame.c",
         "return error_word != 0 && sum == sum_of(data, MLX90333_FRAME_ERRORS - MLX90333_FRAME_ALPHA);",
         "return false;",
     ),
     Mutation(
         "firmware: any start byte will do",
+        "test_sensor_frame",
         "firmware/dspic/core/sensor_frame.c",
         "if (frame[MLX90333_FRAME_START] != MLX90333_START_BYTE)",
         "if (frame[MLX90333_FRAME_START] == 0)",
     ),
     Mutation(
         "firmware: any step of the angle is believed",
+        "test_sampler",
         "firmware/dspic/core/sampler.c",
         "return by > SAMPLER_STEP_MOST;",
         "return by > UINT16_MAX - 1u;",
     ),
     Mutation(
+        "firmware: an order long after SYNC is believed",
+        "test_node_faults",
+        "firmware/dspic/core/node.c",
+        "node->displaced = board_watch_exceeds(node->board, NODE_ORDER_MOST_US);",
+        "node->displaced = false;",
+    ),
+    Mutation(
+        "firmware: an order in time is not believed for a slow link's",
+        "node_slowest_link",
+        "firmware/dspic/core/node.h",
+        "#define NODE_ORDER_MOST_US 70u",
+        "#define NODE_ORDER_MOST_US 48u",
+    ),
+    Mutation(
         "firmware: both records packed into one buffer",
+        "test_node_faults",
         "firmware/dspic/core/node.c",
         "    node->armed ^= 1u;\n",
         "",
     ),
     Mutation(
         "firmware: the watchdog is never switched on",
+        "test_node_faults",
         "firmware/dspic/port_dspic/dspic33fj128mc802.h",
         "#define RCON_SWDTEN 0x0020u",
         "#define RCON_SWDTEN 0x0000u",
     ),
     Mutation(
         "loader: an image's body is believed unread",
+        "test_image",
         "firmware/dspic/boot/image.c",
         "           image_body_is_good(board, header, row);",
         "           row;",
     ),
     Mutation(
         "loader: a loaded body is not compared",
+        "test_loader",
         "firmware/dspic/boot/loader.c",
         "if (!image_body_is_good(loader->board, loader->header, loader->row))",
         "if (!loader)",
     ),
     Mutation(
         "bridge: two lanes swapped",
+        "fpga/tb/lanes",
         "fpga/bridge_rtl/lane_receiver.v",
         "bits <= miso;",
         "bits <= {miso[LANES-1:2], miso[0], miso[1]};",
     ),
     Mutation(
         "bridge: a sequence number dropped every 4096 frames",
+        "fpga/tb/ticks",
         "fpga/bridge_rtl/bridge_counters.v",
         "sequence_number <= sequence_number + 32'd1;",
         "sequence_number <= sequence_number + (&sequence_number[11:0] ? 32'd2 : 32'd1);",
     ),
     Mutation(
         "bridge: stale records pass",
+        "fpga/tb/frame",
         "fpga/bridge_rtl/framer.v",
         "stale   <= tick_wrong;",
         "stale   <= {LANES{1'b0}};",
     ),
     Mutation(
         "bridge: order without its CRC",
+        "fpga/tb/link",
         "fpga/bridge_rtl/node_link.v",
         "crc[7] ^ CRC8_XOR_OUT[{2'b00, ~next_index[2:0]}]",
         "crc[7]",
     ),
     Mutation(
         "usb: data toggle kept over a bus reset",
+        "fpga/tb/usb",
         "fpga/usb/endpoints.py",
-        'return ResetInserter({"usb": self.restart})(self._inner)',
-        "return self._inner",
+        '= ResetInserter({"usb": self.restart})(inner)',
+        "= inner",
     ),
     Mutation(
         "host: alpha read where beta stands",
+        "test_frame",
         "host/libwhisker/src/frame.c",
         "sample->beta = whisker_get_u16(record + WHISKER_RECORD_BETA);",
         "sample->beta = sample->alpha;",
     ),
     Mutation(
         "host: lanes stored from the wrong end",
+        "test_frame",
         "host/libwhisker/src/frame.c",
-        "good &= decode_record(record, &frame->lane[lane]);",
-        "good &= decode_record(record, &frame->lane[WHISKER_FRAME_LANES - 1 - lane]);",
+        "&frame->lane[lane], damage);",
+        "&frame->lane[WHISKER_FRAME_LANES - 1 - lane], damage);",
     ),
     Mutation(
         "pilot: bad samples used",
+        "host/python/tests/test_pilot.py",
         "host/python/whisker/pilot.py",
         "good = np.asarray(status)[:, : len(self.names)] == 0",
         "good = np.asarray(status)[:, : len(self.names)] >= 0",
     ),
     Mutation(
         "navigation: motion turned the wrong way",
+        "test_motion",
         "host/nav/pose.c",
         "sin(",
         "-sin(",
@@ -189,49 +231,73 @@ def run(words: list, where: Path) -> subprocess.CompletedProcess:
 
 def prepare(copy: Path) -> None:
     """A clone with the packages of this tree, built once; mutations then build only what they touch."""
-    run(["git", "clone", "--quiet", ROOT, copy], ROOT)
-    (copy / ".venv").symlink_to(ROOT / ".venv")
+    if not copy.exists():
+        run(["git", "clone", "--quiet", ROOT, copy], ROOT)
+        (copy / ".venv").symlink_to(ROOT / ".venv")
     done = run(["tools/build.sh", BUILD], copy)
     if done.returncode:
         sys.exit(f"mutations: the unbroken tree does not build; run 'make build' and see\n{done.stderr[-2000:]}")
 
 
+def run_pytest(copy: Path, *paths: str) -> str | None:
+    """The first test of these that fails, or None."""
+    environment = [f"PYTHONPATH={copy / 'host/python'}", f"WHISKER_BUILD={BUILD}"]
+    done = run(["env", *environment, ".venv/bin/python", "-m", "pytest", "-x", "--no-header", *paths], copy)
+    return _failed(done.stdout, "FAILED", "ERROR") if done.returncode else None
+
+
+def run_ctest(copy: Path, *options: str) -> str | None:
+    done = run(["ctest", "--test-dir", BUILD, "--no-tests=error", *options], copy)
+    return _failed(done.stdout, "***") if done.returncode else None
+
+
+def red_nearby(copy: Path, near: str) -> str | None:
+    """What the test that ought to notice says, or None; only what it needs is built."""
+    if "/" in near:
+        return run_pytest(copy, near)
+    program = PROGRAMS.get(near, near)
+    if run(["cmake", "--build", BUILD, "--target", program], copy).returncode:
+        return "does not build"
+    return run_ctest(copy, "-R", f"(^|[_.]){near.removeprefix('test_')}$")
+
+
 def first_red(copy: Path) -> str | None:
-    """The first check that notices, or None."""
+    """The first check of all that notices, or None."""
     if run(["tools/build.sh", BUILD], copy).returncode:
         return "does not build"
-    ctest = run(["ctest", "--test-dir", BUILD, "--parallel", 2, "--stop-on-failure"], copy)
-    if ctest.returncode:
-        return _failed(ctest.stdout, "***")
-    tests = ["-x", "--no-header", "host/python", "sim", "fpga/tb", "tests"]
-    pytest = run(["env", f"PYTHONPATH={copy / 'host/python'}", ".venv/bin/python", "-m", "pytest", *tests], copy)
-    return _failed(pytest.stdout, "FAILED", "ERROR") if pytest.returncode else None
+    red = run_ctest(copy, "--parallel", "2", "--stop-on-failure")
+    return red or run_pytest(copy, "host/python", "sim", "fpga/tb", "tests")
 
 
 def _failed(output: str, *marks: str) -> str:
     return next((" ".join(line.split()) for line in output.splitlines() if any(m in line for m in marks)), "red")
 
 
+def try_one(copy: Path, mutation: Mutation, only_near: bool) -> bool:
+    """Breaks, tests, mends. True when a test was red."""
+    path = copy / mutation.file
+    text = path.read_text()
+    if text.count(mutation.old) == 0:
+        print(f"STALE     {mutation.name}: {mutation.file} does not hold '{mutation.old}'", flush=True)
+        return False
+    path.write_text(text.replace(mutation.old, mutation.new, 1))
+    red = red_nearby(copy, mutation.near) or (None if only_near else first_red(copy))
+    path.write_text(text)
+    print(f"{'red ' if red else 'SURVIVES'}  {mutation.name}: {red or 'no test noticed'}", flush=True)
+    return red is not None
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("part", nargs="?", default="", help="only mutations whose name contains this")
-    chosen = [m for m in MUTATIONS if parser.parse_args().part in m.name]
-    survivors = 0
+    parser.add_argument("--near", action="store_true", help="only the test that ought to notice first")
+    parser.add_argument("--copy", type=Path, help="a copy of the tree that is kept")
+    options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        copy = Path(folder) / "tree"
+        copy = options.copy.resolve() if options.copy else Path(folder) / "tree"
         prepare(copy)
-        for mutation in chosen:
-            path = copy / mutation.file
-            text = path.read_text()
-            if text.count(mutation.old) == 0:
-                sys.exit(f"mutations: {mutation.file} does not hold '{mutation.old}'; bring the list up to date")
-            path.write_text(text.replace(mutation.old, mutation.new, 1))
-            red = first_red(copy)
-            path.write_text(text)
-            survivors += red is None
-            print(f"{'red ' if red else 'SURVIVES'}  {mutation.name}: {red or 'no test noticed'}", flush=True)
-    shutil.rmtree(folder, ignore_errors=True)
-    return 1 if survivors else 0
+        found = [try_one(copy, m, options.near) for m in MUTATIONS if options.part in m.name]
+    return 0 if all(found) else 1
 
 
 if __name__ == "__main__":
