@@ -27,7 +27,9 @@ class BytesDevice
     const HostCounters &counters() const;
 
   private:
-    static constexpr size_t ENDPOINTS = 2; // the IN endpoints, in the order of their interfaces
+    // The IN endpoints, in the order of their interfaces.
+    static constexpr size_t ENDPOINTS = 2, BULK = 0, HID = 1;
+    static constexpr std::array<uint16_t, ENDPOINTS> ADDRESS_OF = {WHISKER_LIMIT_USB_BULK_IN, WHISKER_LIMIT_USB_HID_IN};
 
     Outcome serve(const SetupRequest &request, Bytes &data);
     Outcome serve_standard(const SetupRequest &request, Bytes &data);

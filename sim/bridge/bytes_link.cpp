@@ -92,4 +92,13 @@ uint8_t link_verdict(const Record &record, uint8_t expected_tick)
     return record[WHISKER_RECORD_TICK] == expected_tick ? WHISKER_CODE_OK : WHISKER_CODE_LINK_TICK;
 }
 
+Record error_record(uint8_t tick, uint8_t code)
+{
+    Record record{};
+    record[WHISKER_RECORD_TICK] = tick;
+    whisker_put_u16(&record[WHISKER_RECORD_STATUS], static_cast<uint16_t>(code << WHISKER_STATUS_CODE_SHIFT));
+    record[WHISKER_RECORD_CRC] = whisker_crc8(record.data(), WHISKER_RECORD_CRC);
+    return record;
+}
+
 } // namespace bridge_sim

@@ -11,7 +11,9 @@ namespace
 
 // Gateware needs time for what level bytes does at once: a frame is made in 260 cycles, a packet of 512 bytes goes to
 // the endpoint's buffer at one a cycle, and then a frame that waited for room follows.
-constexpr uint64_t SETTLE_CYCLES = 1200;
+constexpr uint64_t SETTLE_CYCLES = 900;
+// After what leaves frames and packets where they are.
+constexpr uint64_t REST_CYCLES = 32;
 
 std::string text_of(Outcome outcome, const Bytes &data)
 {
@@ -23,7 +25,7 @@ std::string text_of(Outcome outcome, const Bytes &data)
 LevelPair::LevelPair(size_t populated, uint64_t seed)
     : rigs_{make_rig(Level::RTL, populated, seed), make_rig(Level::BYTES, populated, seed)}
 {
-    both("power on", [](Rig &rig) {
+    both("power on", REST_CYCLES, [](Rig &rig) {
         Descriptors descriptors;
         const char *error = nullptr;
         const bool on = rig.power_on(descriptors, error);
@@ -32,11 +34,11 @@ LevelPair::LevelPair(size_t populated, uint64_t seed)
 }
 
 // What one level says, then what the other does.
-template <typename Action> void LevelPair::both(const char *what, Action action)
+template <typename Action> void LevelPair::both(const char *what, uint64_t rest, Action action)
 {
     for (size_t i = 0; i < 2; i++) {
         answers_[i] = action(*rigs_[i]);
-        rigs_[i]->idle(SETTLE_CYCLES);
+        rigs_[i]->idle(rest);
         answers_[i] += rigs_[i]->running() ? " running" : " idle";
         answers_[i] += " faults " + std::to_string(rigs_[i]->counters().injected);
     }
@@ -74,7 +76,7 @@ Outcome LevelPair::control(const HostRequest &request)
     const std::string what = "request " + std::to_string(s.type) + " " + std::to_string(s.request) + " value " +
                              std::to_string(s.value) + " index " + std::to_string(s.index) + " length " +
                              std::to_string(s.length);
-    both(what.c_str(), [&](Rig &rig) {
+    both(what.c_str(), REST_CYCLES, [&](Rig &rig) {
         Bytes data = request.data;
         outcome = rig.control(request.setup, data);
         return text_of(outcome, data);
@@ -85,26 +87,26 @@ Outcome LevelPair::control(const HostRequest &request)
 
 Outcome LevelPair::read_packet()
 {
-    const Outcome outcome = in(WHISKER_LIMIT_USB_BULK_IN & 0xFu);
-    packets += outcome == Outcome::OK ? 1 : 0;
-    return outcome;
+    return in(WHISKER_LIMIT_USB_BULK_IN & 0xFu);
 }
 
 Outcome LevelPair::in(uint8_t endpoint)
 {
     Outcome outcome = Outcome::OK;
-    both("IN", [&](Rig &rig) {
-        Bytes data;
+    Bytes data;
+    both("IN", SETTLE_CYCLES, [&](Rig &rig) {
+        data.clear();
         outcome = rig.in(endpoint, WHISKER_LIMIT_BULK_PACKET, data);
-        bytes += data.size();
         return text_of(outcome, data);
     });
+    packets += outcome == Outcome::OK ? 1 : 0;
+    empty_packets += outcome == Outcome::OK && data.empty() ? 1 : 0;
     return outcome;
 }
 
 void LevelPair::tick(const sim_field *fields, const std::optional<HostRequest> &meanwhile)
 {
-    both("tick", [&](Rig &rig) {
+    both("tick", SETTLE_CYCLES, [&](Rig &rig) {
         bool to_do = meanwhile.has_value();
         std::string answer;
         rig.tick(fields, [&] {
@@ -121,7 +123,7 @@ void LevelPair::tick(const sim_field *fields, const std::optional<HostRequest> &
 
 void LevelPair::bus_reset(bool within_tick, const sim_field *fields)
 {
-    both("bus reset", [&](Rig &rig) {
+    both("bus reset", REST_CYCLES, [&](Rig &rig) {
         Descriptors descriptors;
         bool to_do = true;
         bool done = false;
@@ -142,7 +144,7 @@ void LevelPair::bus_reset(bool within_tick, const sim_field *fields)
 
 void LevelPair::power_cycle()
 {
-    both("power cycle", [](Rig &rig) {
+    both("power cycle", REST_CYCLES, [](Rig &rig) {
         Descriptors descriptors;
         const char *error = nullptr;
         const bool on = rig.power_cycle(descriptors, error);

@@ -34,11 +34,11 @@ class LevelPair
 
     bool running() const;
 
-    // All there was to compare, for a test of the test.
-    uint64_t packets = 0, bytes = 0, stalls = 0;
+    // What there was to compare, for a test of the test.
+    uint64_t packets = 0, empty_packets = 0, stalls = 0;
 
   private:
-    template <typename Action> void both(const char *what, Action action);
+    template <typename Action> void both(const char *what, uint64_t rest, Action action);
     void compare(const std::string &what);
 
     std::unique_ptr<Rig> rigs_[2];

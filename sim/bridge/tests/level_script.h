@@ -3,11 +3,10 @@
 
 #include <array>
 #include <map>
-#include <random>
 #include <string>
 #include <vector>
 
-#include "level_pair.h"
+#include "level_requests.h"
 
 namespace bridge_sim
 {
@@ -20,6 +19,9 @@ class LevelScript
     // Some steps and, at the end, every report read. Scripts go on from where the one before ended.
     void run();
 
+    // There are so many kinds of steps, requests within a tick included.
+    static constexpr size_t KINDS = 19;
+
     // How often each kind of step was taken, by its name.
     const std::map<std::string, uint64_t> &taken() const;
 
@@ -30,9 +32,6 @@ class LevelScript
         void (LevelScript::*take)();
     };
     static const std::vector<Step> STEPS;
-
-    uint64_t below(uint64_t bound);
-    bool chance(uint64_t one_in);
 
     void step();
     void some_ticks();
@@ -57,17 +56,13 @@ class LevelScript
     void tick(bool with_request);
     bool takes_tick() const;
     void control(const HostRequest &request);
-    HostRequest control_report(bool run);
-    HostRequest service_report();
-    HostRequest get_report();
-    HostRequest some_request();
     HostRequest request_meanwhile();
     void draw_fields();
     void forget_run();
 
     LevelPair &pair_;
     size_t populated_;
-    std::mt19937_64 random_;
+    RequestSource draw_;
     std::array<sim_field, LANES> fields_{};
     std::map<std::string, uint64_t> taken_;
     bool run_ = false; // as last written

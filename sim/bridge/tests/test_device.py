@@ -46,11 +46,11 @@ def command(folder: Path, seconds: float, seed: int, client: list, *options) -> 
     return ["umockdev-wrapper", SIMULATION, *map(str, arguments)]
 
 
-def stream(folder: Path, seconds: float, seed: int, transfer: int, timeout_ms: int) -> dict:
+def stream(folder: Path, seconds: float, seed: int, transfer: int, timeout_ms: int, *options) -> dict:
     """Runs the simulation with a client that reads so; returns what was recorded, by file name."""
     folder.mkdir()
     client = [CLIENT, folder / "stream.bin", transfer, timeout_ms]
-    subprocess.run(command(folder, seconds, seed, client), check=True, timeout=TIMEOUT_S)
+    subprocess.run(command(folder, seconds, seed, client, *options), check=True, timeout=TIMEOUT_S)
     return {name: (folder / name).read_bytes() for name in ("stream.bin", "truth.csv", "faults.csv", "usb.csv")}
 
 
@@ -61,6 +61,12 @@ def test_reader_changes_nothing(tmp_path):
     assert patient == hasty
     assert all(patient[name] != other[name] for name in ("stream.bin", "faults.csv", "usb.csv"))
     assert len(patient["stream.bin"]) == 3 * TICKS_PER_S * protocol.FRAME_BYTES
+
+
+def test_level_changes_nothing(tmp_path):
+    gateware = stream(tmp_path / "gateware", 3, 7, 4096, 200)
+    model = stream(tmp_path / "model", 3, 7, 4096, 200, "--level", "bytes")
+    assert gateware == model
 
 
 def test_exit_code_is_the_commands(tmp_path):

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
+#include <map>
 
 #include "level_script.h"
 
@@ -14,19 +15,29 @@ using namespace bridge_sim;
 namespace
 {
 
-constexpr uint64_t SCRIPTS = 240;
+constexpr uint64_t SCRIPTS = 204;
 constexpr uint64_t SEED = 1;
 // Lanes with a node. Most scripts have few, for nodes take their time at both levels.
 constexpr size_t POPULATED[] = {1, 3, 2, LANES, 1, 6};
-constexpr uint64_t SCRIPTS_OF_RIG = 40;
+constexpr uint64_t SCRIPTS_OF_RIG = 34;
 
 uint64_t scripts = SCRIPTS;
 uint64_t first_seed = SEED;
 
-void expect_every_step(const std::map<std::string, uint64_t> &taken, const LevelPair &pair)
+struct Seen {
+    std::map<std::string, uint64_t> steps;
+    uint64_t packets = 0, empty_packets = 0, refusals = 0;
+};
+Seen seen;
+
+void add(const LevelScript &script, const LevelPair &pair)
 {
-    assert_int_equal(taken.size(), 19);
-    assert_true(pair.packets > 0 && pair.stalls > 0);
+    for (const auto &[name, count] : script.taken()) {
+        seen.steps[name] += count;
+    }
+    seen.packets += pair.packets;
+    seen.empty_packets += pair.empty_packets;
+    seen.refusals += pair.stalls;
 }
 
 // Scripts on one pair follow each other, so that what one leaves behind meets the next.
@@ -41,12 +52,7 @@ void run_rig(uint64_t rig, uint64_t count)
         for (; script < count; script++) {
             steps.run();
         }
-        std::printf("rig %llu: %llu packets, %llu bytes, %llu refusals\n", static_cast<unsigned long long>(rig),
-                    static_cast<unsigned long long>(pair.packets), static_cast<unsigned long long>(pair.bytes / 2),
-                    static_cast<unsigned long long>(pair.stalls));
-        if (count == SCRIPTS_OF_RIG) {
-            expect_every_step(steps.taken(), pair);
-        }
+        add(steps, pair);
     } catch (const std::exception &error) {
         fail_msg("seed %llu, rig %llu, script %llu: %s", static_cast<unsigned long long>(first_seed),
                  static_cast<unsigned long long>(rig), static_cast<unsigned long long>(script), error.what());
@@ -57,6 +63,15 @@ void levels_agree(void **)
 {
     for (uint64_t done = 0; done < scripts; done += SCRIPTS_OF_RIG) {
         run_rig(done / SCRIPTS_OF_RIG, std::min(SCRIPTS_OF_RIG, scripts - done));
+    }
+    for (const auto &[name, count] : seen.steps) {
+        std::printf("%s: %llu, ", name.c_str(), static_cast<unsigned long long>(count));
+    }
+    std::printf("packets: %llu, of them empty: %llu, refusals: %llu\n", static_cast<unsigned long long>(seen.packets),
+                static_cast<unsigned long long>(seen.empty_packets), static_cast<unsigned long long>(seen.refusals));
+    if (scripts >= SCRIPTS) {
+        assert_int_equal(seen.steps.size(), LevelScript::KINDS);
+        assert_true(seen.packets > 0 && seen.empty_packets > 0 && seen.refusals > 0);
     }
 }
 
