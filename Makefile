@@ -39,7 +39,7 @@ firmware: ## build the node's firmware with XC16 or XC-DSC, where there is one
 flash: ## first programming of a node by wire: TOOL=ipecmd|pk2cmd|picberry SERIAL=n [HEX=file]
 	@tools/flash.sh --tool "$(TOOL)" $(if $(SERIAL),--serial "$(SERIAL)") $(if $(HEX),--hex "$(HEX)")
 
-bitstream: setup ## the bridge for a board one can buy: BOARD=colorlight_i9|cynthion [LANES=n] [SEED=n] [SERIAL=text]
+bitstream: setup ## the bridge for a board one can buy: BOARD=ecpix5|colorlight_i9|cynthion [LANES=n] [SEED=n] [SERIAL=text]
 	@$(PYTHON) fpga/boards/build.py "$(BOARD)" --seed $(SEED) $(if $(LANES),--lanes "$(LANES)") $(if $(SERIAL),--serial "$(SERIAL)")
 
 format: setup ## format C, C++ and Python

@@ -19,16 +19,16 @@ from tqdm import tqdm
 
 ROOT = Path(__file__).resolve().parent.parent
 RESULTS, CHARTS, CACHE = ROOT / "bench/results", ROOT / "docs/charts", ROOT / "build/bench/bridge"
-sys.path.insert(0, str(ROOT / "fpga" / "boards"))
+sys.path[:0] = [str(ROOT / "fpga" / folder) for folder in ("boards", "tb")]
 
 import build as boards  # noqa: E402
+import cycles  # noqa: E402
 import report  # noqa: E402
 
 from whisker.protocol import FRAME_BYTES, LIMITS  # noqa: E402
 
 SWEPT = "colorlight_i9"  # has pins for every number of lanes
 SEEDS = tuple(range(1, 6))
-FRAMER_CYCLES = 5  # as fpga/tb/bridge has it
 
 
 def once(name: str, measure: Callable[[], dict]) -> dict:
@@ -42,14 +42,16 @@ def once(name: str, measure: Callable[[], dict]) -> dict:
 
 
 def placed(name: str, lanes: int, seed: int) -> dict:
-    """One place and route; the netlist is made once per board and number of lanes."""
+    """One place and route; the netlist is made once per top module and number of lanes."""
     board = boards.load(name)
-    out = CACHE / f"{name}_{lanes}"
-    netlist = out / "netlist.json"
+    made, out = CACHE / f"netlist_{board.top}_{lanes}", CACHE / f"{name}_{lanes}"
+    netlist = made / "netlist.json"
     if not netlist.exists():
-        boards.prepare(board, lanes, out)
+        boards.prepare(board, lanes, made)
+    out.mkdir(exist_ok=True)
+    shutil.copy(netlist, out)
     found = boards.place(board, lanes, netlist, out, seed)
-    return {**found, "problems": report.timing_problems(found, board.speed, board.phy_clock)}
+    return {**found, "problems": report.timing_problems(found, board.speed, board.phy)}
 
 
 def fabric() -> dict:
@@ -70,24 +72,21 @@ def seeds_of(done: dict, name: str) -> dict:
     board = boards.load(name)
     runs = [done[name, board.lanes, seed] for seed in SEEDS]
     facts = {key: getattr(board, key) for key in ("title", "part", "speed", "lanes")}
-    return {**facts, "limits": report.pin_limits(board.speed, board.phy_clock), "runs": runs}
-
-
-def transfer_cycles(link: tuple[int, int, int]) -> int:
-    """One tick on the nodes' bus: SYNC, set-up, bits, gaps, hold."""
-    divider, gap, _ = link
-    return gap + 9 + 64 * divider + 3 * gap + 4
+    spare = report.data_spare(board.speed, board.phy)
+    least = {"shortest_in_ns": report.hold_needed(board.speed, board.phy)}
+    return {**facts, "limits": report.pin_limits(board.speed, board.phy), "least": least, **spare, "runs": runs}
 
 
 def latency(link: tuple[int, int, int]) -> dict:
     """From the SYNC that starts a reading to the first byte of its frame for USB, at worst: a period, then the next tick."""
-    cycles = LIMITS["tick_period"] + transfer_cycles(link) + FRAME_BYTES + FRAMER_CYCLES
-    return {"transfer_cycles": transfer_cycles(link), "first_byte_us": cycles / LIMITS["clock_hz"] * 1e6}
+    transfer = cycles.transfer(*link[:2])
+    total = LIMITS["tick_period"] + transfer + FRAME_BYTES + cycles.FRAMER
+    return {"transfer_cycles": transfer, "first_byte_us": total / LIMITS["clock_hz"] * 1e6}
 
 
 def rates() -> dict:
     """What the bridge sustains when nodes can follow: by its settings' limit, and by the link at its fastest."""
-    fastest = transfer_cycles(next(iter(LINKS.values())))
+    fastest = cycles.transfer(*next(iter(LINKS.values()))[:2])
     hertz = {"settings_hz": LIMITS["clock_hz"] / LIMITS["tick_period_min"], "link_hz": LIMITS["clock_hz"] / fastest}
     return {
         **hertz,
@@ -120,15 +119,43 @@ def draw_lanes(found: dict) -> Figure:
     return figure
 
 
+def pin_slack(board: dict, run: dict) -> float:
+    """The least that one placement leaves of the limits of the PHY's pins, before and after the edge, in ns."""
+    spare = [limit - run[name] for name, limit in board["limits"].items()]
+    spare += [run[name] - least for name, least in board["least"].items()]
+    return min(*spare, board["data_setup_ns"], board["data_hold_ns"])
+
+
+def row(board: dict) -> str:
+    """A board's line in the table of docs/boards.md: the worst of its seeds."""
+    runs = board["runs"]
+    clock = min(run["fmax_mhz"] for run in runs)
+    ways = [f"{max(run[name] for run in runs):.1f} of {limit:.1f} ns" for name, limit in board["limits"].items()]
+    shortest = f"{min(run['shortest_in_ns'] for run in runs):.1f} of {board['least']['shortest_in_ns']:.1f} ns"
+    used = [f"{max(run['used'][name] for run in runs)}" for name in ("LUT", "FF", "block RAM", "distributed RAM")]
+    name = f"{board['title']} ({board['part']}, grade {board['speed']}), {board['lanes']}"
+    clock_text = f"{clock:.1f} MHz: {100 * (clock / report.CLOCK_MHZ - 1):.1f} % to spare"
+    return "| " + " | ".join([name, clock_text, *ways, shortest, *used]) + " |"
+
+
+def write_table(found: dict) -> None:
+    """Puts the boards' lines into docs/boards.md, below the head of its table of results."""
+    path = ROOT / "docs/boards.md"
+    lines = path.read_text().splitlines()
+    begin = next(n for n, line in enumerate(lines) if line.startswith("| board, lanes |")) + 2
+    end = next(n for n in range(begin, len(lines)) if not lines[n].startswith("|"))
+    lines[begin:end] = [row(board) for _, board in sorted(found["seeds"].items())]
+    path.write_text("\n".join(lines) + "\n")
+
+
 def draw_seeds(found: dict) -> Figure:
     """Clock and slack of the PHY's pins for each seed."""
     figure = Figure(figsize=(7, 3.6), layout="constrained")
     left, right = figure.subplots(1, 2)
-    for (_, board), marker in zip(sorted(found["seeds"].items()), "os", strict=True):
+    for (_, board), marker, shade in zip(sorted(found["seeds"].items()), "os^", ("0.0", "0.3", "0.6"), strict=True):
         label = f"{board['title']}, grade {board['speed']}"
-        left.plot(SEEDS, [run["fmax_mhz"] for run in board["runs"]], marker, color="0.2", label=label)
-        slack = [min(limit - (run[name] or 0) for name, limit in board["limits"].items()) for run in board["runs"]]
-        right.plot(SEEDS, slack, marker, color="0.2", label=label)
+        left.plot(SEEDS, [run["fmax_mhz"] for run in board["runs"]], marker, color=shade, label=label)
+        right.plot(SEEDS, [pin_slack(board, run) for run in board["runs"]], marker, color=shade, label=label)
     for axes, level in ((left, 60), (right, 0)):
         axes.axhline(level, color="0.5", linewidth=1, linestyle="--")
         axes.set(xlabel="seed", xticks=SEEDS)
@@ -154,6 +181,7 @@ def run(build: Path, fresh: bool) -> None:
     (RESULTS / "bridge.json").write_text(json.dumps(found, indent=1) + "\n")
     save(draw_lanes(found), "lanes")
     save(draw_seeds(found), "seeds")
+    write_table(found)
 
 
 def main() -> None:

@@ -18,7 +18,7 @@ if [ "${1:-}" = --long ]; then
         echo "test: a minute of $(basename "$fuzzer")"
         "$fuzzer" -max_total_time=60 -verbosity=0 2>"build/$(basename "$fuzzer").log" || { tail -25 "build/$(basename "$fuzzer").log" >&2; exit 1; }
     done
-    for board in colorlight_i9 cynthion; do
+    for board in colorlight_i9 cynthion ecpix5; do
         echo "test: place and route of $board with five seeds"
         .venv/bin/python fpga/boards/build.py "$board" --seeds 5
     done

@@ -1,5 +1,5 @@
 // What every board has: the bridge, the shim to its ULPI PHY, and a reset of 16 cycles after configuration. The pads are
-// the board's own (colorlight_i9.v, cynthion.v).
+// the board's own (usb3300_board.v, cynthion.v).
 //
 //   nodes <--> whisker_bridge <-- UTMI --> ulpi_shim <--> pads <--> PHY
 //                    ^---- rst <-- power-up counter
@@ -7,12 +7,15 @@
 `default_nettype none
 
 module board_core #(
-    parameter LANES = 28
+    parameter       LANES           = 28,
+    parameter [5:0] VENDOR_REGISTER = 6'h00, // of the PHY, see ulpi_shim
+    parameter [7:0] VENDOR_VALUE    = 8'h00
 ) (
     input  wire             clk,            // 60 MHz, the PHY's
     input  wire [7:0]       ulpi_data_in,   // pads
     output wire [7:0]       ulpi_data_out,  // .
     output wire             ulpi_data_oe,   // . 1: drive all eight
+    input  wire             ulpi_dir_pin,   // .
     input  wire             ulpi_dir,       // .
     input  wire             ulpi_nxt,       // .
     output wire             ulpi_stp,       // .
@@ -35,10 +38,10 @@ module board_core #(
     initial awake = 5'd0;
     always @(posedge clk) if (rst) awake <= awake + 5'd1;
 
-    ulpi_shim shim (
+    ulpi_shim #(.VENDOR_REGISTER(VENDOR_REGISTER), .VENDOR_VALUE(VENDOR_VALUE)) shim (
         .clk(clk), .rst(rst), .ulpi_data_in(ulpi_data_in), .ulpi_data_out(ulpi_data_out),
-        .ulpi_data_oe(ulpi_data_oe), .ulpi_dir(ulpi_dir), .ulpi_nxt(ulpi_nxt), .ulpi_stp(ulpi_stp),
-        .ulpi_reset(ulpi_reset), .ready(ready), .utmi_rx_data(rx_data), .utmi_rx_active(rx_active),
+        .ulpi_data_oe(ulpi_data_oe), .ulpi_dir_pin(ulpi_dir_pin), .ulpi_dir(ulpi_dir), .ulpi_nxt(ulpi_nxt),
+        .ulpi_stp(ulpi_stp), .ulpi_reset(ulpi_reset), .ready(ready), .utmi_rx_data(rx_data), .utmi_rx_active(rx_active),
         .utmi_rx_valid(rx_valid), .utmi_rx_error(rx_error), .utmi_tx_data(tx_data), .utmi_tx_valid(tx_valid),
         .utmi_tx_ready(tx_ready), .utmi_line_state(line_state), .utmi_vbus_valid(vbus_valid),
         .utmi_session_valid(session_valid), .utmi_session_end(session_end), .utmi_xcvr_select(xcvr_select),

@@ -4,6 +4,7 @@ Every step is also a function for tests and benches. Files go to build/boards/BO
 """
 
 import argparse
+import json
 import subprocess
 import sys
 import tomllib
@@ -17,28 +18,28 @@ sys.path[:0] = [str(HERE), str(HERE.parent), str(REPO / "host" / "python")]
 import report  # noqa: E402
 from toolchain import ToolError, gather, must  # noqa: E402
 
-from whisker.protocol import LIMITS  # noqa: E402
-
 INCLUDES = (REPO / "fpga/bridge_rtl/crc8.vh", REPO / "protocol/gen/whisker_protocol.vh")
-CLOCK_MHZ = LIMITS["clock_hz"] / 1e6
-# Registers that lie in the pad's own cell: a route between them and the pad would eat the PHY's set-up time, and spread the
-# nodes' lines.
-PAD_REGISTERS = ("ulpi_shim/w:ulpi_data_out", "ulpi_shim/w:ulpi_stp", "*lane_receiver*/w:bits")
+# Registers that lie in the pad's own cell: a route between them and the pad would eat the PHY's set-up time, spread the
+# nodes' lines, and behind a delay line it would not be timed.
+PAD_REGISTERS = tuple(f"ulpi_shim/w:{name}" for name in ("ulpi_data_out", "ulpi_stp", "data")) + (
+    "*lane_receiver*/w:bits",
+)
 PAD_REGISTERS += tuple(f"node_link/w:{name}" for name in ("sync", "sck", "select_n", "mosi"))
 
 
 @dataclass(frozen=True)
 class Board:
-    """A board's file: `pins` maps a port to a site, or a vector to its sites, bit 0 first."""
+    """A board's file: `top` is its module, `phy` one of report.PHYS; `pins` maps a port to a site, or a vector to its sites, bit 0 first."""
 
     name: str
     title: str
+    top: str
     device: str
     part: str
     package: str
     speed: int
     lanes: int
-    phy_clock: str
+    phy: str
     pins: dict[str, str | list[str]]
 
 
@@ -66,7 +67,7 @@ def sites(board: Board, lanes: int) -> dict[str, str]:
 
 def constraints(board: Board, lanes: int) -> str:
     """The LPF file: sites, 3.3 V, pull-ups on the lanes (nobody there reads as ones), fast edges towards the PHY, clock."""
-    lines = [f'FREQUENCY PORT "clk_60" {CLOCK_MHZ:g} MHZ;']
+    lines = [f'FREQUENCY PORT "clk_60" {report.CLOCK_MHZ:g} MHZ;']
     for port, site in sites(board, lanes).items():
         extra = " PULLMODE=UP" if port.startswith("miso") else " SLEWRATE=FAST" if port.startswith("ulpi") else ""
         lines.append(f'LOCATE COMP "{port}" SITE "{site}";')
@@ -114,7 +115,23 @@ def synthesise(top: str, files: list[Path], lanes: int | None, out: Path, pads: 
     steps = [*front(top, files, lanes, out), *marks, f"synth_ecp5 -top {top} -json netlist.json"]
     (out / "synth.ys").write_text("\n".join(steps) + "\n")
     must("yosys", "-q", "-s", "synth.ys", log=out / "synth.log")
+    agree_on_resets(out / "netlist.json", top)
     return out / "netlist.json"
+
+
+def agree_on_resets(netlist: Path, top: str) -> None:
+    """Lets the input and the output register of a pad share its cell, which has one reset and one way to take it.
+
+    Yosys ties the reset of a register without one to 0 and leaves its kind open; nextpnr would see two resets there, or make
+    the other's asynchronous.
+    """
+    design = json.loads(netlist.read_text())
+    for cell in design["modules"][top]["cells"].values():
+        if "syn_useioff" in cell["attributes"]:
+            cell["parameters"]["SRMODE"] = "LSR_OVER_CE"
+            if cell["connections"].get("LSR") == ["0"]:
+                del cell["connections"]["LSR"], cell["port_directions"]["LSR"]
+    netlist.write_text(json.dumps(design))
 
 
 def place(board: Board, lanes: int, netlist: Path, out: Path, seed: int = 1, speed: int | None = None) -> dict:
@@ -131,8 +148,8 @@ def place(board: Board, lanes: int, netlist: Path, out: Path, seed: int = 1, spe
 def prepare(board: Board, lanes: int, out: Path, serial: str = "0001") -> Path:
     """The netlist of a whole board; ToolError if a cell has another clock than the PHY's."""
     out.mkdir(parents=True, exist_ok=True)
-    netlist = synthesise(board.name, sources(generate_usb(out, serial)), lanes, out)
-    problems = report.unconstrained_clocks(netlist, board.name, "clk_60")
+    netlist = synthesise(board.top, sources(generate_usb(out, serial)), lanes, out)
+    problems = report.unconstrained_clocks(netlist, board.top, "clk_60")
     if problems:
         raise ToolError("; ".join(problems))
     return netlist
@@ -140,7 +157,7 @@ def prepare(board: Board, lanes: int, out: Path, serial: str = "0001") -> Path:
 
 def summary(board: Board, seed: int, placed: dict) -> str:
     """A line for the reader: speed, pins, resources."""
-    limits = report.pin_limits(board.speed, board.phy_clock)
+    limits = report.pin_limits(board.speed, board.phy)
     pins = ", ".join(f"{name} {placed[name] or 0:.1f} of {limit:.1f}" for name, limit in limits.items())
     used = ", ".join(f"{number} {name}" for name, number in placed["used"].items())
     return f"{board.title}, seed {seed}: {placed['fmax_mhz']:.1f} MHz; pins: {pins}; {used}"
@@ -160,7 +177,7 @@ def make(board: Board, lanes: int, out: Path, seeds: list[int], serial: str) -> 
     for seed in seeds:
         placed = place(board, lanes, netlist, out, seed)
         print(summary(board, seed, placed), flush=True)
-        problems += [f"seed {seed}: {what}" for what in report.timing_problems(placed, board.speed, board.phy_clock)]
+        problems += [f"seed {seed}: {what}" for what in report.timing_problems(placed, board.speed, board.phy)]
     if problems:
         raise ToolError(f"{board.title}: " + "; ".join(problems))
     return pack(board, out)

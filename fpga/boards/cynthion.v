@@ -20,21 +20,25 @@ module cynthion #(
     input  wire [LANES-1:0] miso,
     output wire             led_n
 );
+    // USB3343: polarity register, D+ and D- swapped, as the board has them
+    localparam [5:0] PHY_POLARITY = 6'h39;
+    localparam [7:0] PHY_SWAPPED  = 8'h06;
+
     wire [7:0] data_in, data_out;
-    wire       data_oe, dir, nxt, ulpi_reset, led;
+    wire       data_oe, dir_pin, dir, nxt, ulpi_reset, led;
 
     assign ulpi_clk     = clk_60;
     assign ulpi_reset_n = !ulpi_reset;
     assign led_n        = !led;
 
-    ulpi_pads pads (
+    ulpi_pads #(.HOLD_CELLS(0)) pads (
         .ulpi_data(ulpi_data), .ulpi_dir(ulpi_dir), .ulpi_nxt(ulpi_nxt), .data_out(data_out), .data_oe(data_oe),
-        .data_in(data_in), .dir(dir), .nxt(nxt));
+        .data_in(data_in), .dir_pin(dir_pin), .dir(dir), .nxt(nxt));
 
-    board_core #(.LANES(LANES)) core (
-        .clk(clk_60), .ulpi_data_in(data_in), .ulpi_data_out(data_out), .ulpi_data_oe(data_oe), .ulpi_dir(dir),
-        .ulpi_nxt(nxt), .ulpi_stp(ulpi_stp), .ulpi_reset(ulpi_reset), .sync(sync), .sck(sck),
-        .select_n(select_n), .mosi(mosi), .miso(miso), .led(led));
+    board_core #(.LANES(LANES), .VENDOR_REGISTER(PHY_POLARITY), .VENDOR_VALUE(PHY_SWAPPED)) core (
+        .clk(clk_60), .ulpi_data_in(data_in), .ulpi_data_out(data_out), .ulpi_data_oe(data_oe),
+        .ulpi_dir_pin(dir_pin), .ulpi_dir(dir), .ulpi_nxt(nxt), .ulpi_stp(ulpi_stp), .ulpi_reset(ulpi_reset),
+        .sync(sync), .sck(sck), .select_n(select_n), .mosi(mosi), .miso(miso), .led(led));
 endmodule
 
 `default_nettype wire

@@ -1,13 +1,15 @@
 // UTMI on one side, a ULPI PHY's pins on the other (ULPI 1.1; the PHY gives the 60 MHz clock and keeps it running).
 // ulpi_data_out, ulpi_stp and the drive bit are flip-flops at the pads, and all inputs end in flip-flops; the only logic
 // before one is the choice that ulpi_nxt and ulpi_dir make, for the PHY wants the next byte in the very next cycle.
-// ulpi_data_oe is the drive bit less ulpi_dir: the pads let go within the turnaround cycle.
+// ulpi_data_oe is the drive bit less ulpi_dir_pin: the pads let go within the turnaround cycle. So it does not matter what
+// ulpi_data_out holds while dir is high, and ulpi_dir takes no part in its choice, which would be the longest way in.
 //
 //   dir nxt data_in --> | reg | --> rx: RXCMD or byte --> line_state, session, rx_active, rx_valid, rx_error
 //   data_out stp    <-- | reg | <-- IDLE -> COMMAND -> VALUE | BYTES -> STOP <-- set-up list, then every change of mode
 //                                                                       '---- four bytes ahead <-- tx_data, tx_valid
 //
-// Set-up: once dir has been low for SETTLE cycles: soft reset, wait for its end, pull-downs off, mode. Until then the
+// Set-up: once dir has been low for SETTLE cycles: soft reset, wait for its end, pull-downs off, a register of the PHY's
+// maker if the board wants one (a board may have D+ and D- swapped, for the PHY to swap back), mode. Until then the
 // session has ended for the device, so that it neither chirps nor answers. A command without nxt for TIMEOUT cycles ends
 // with stp; a set-up then begins anew. dir ends a register write (tried again) or a transmission (dropped, as is one that
 // has not begun when the next packet comes: its time is over).
@@ -15,15 +17,18 @@
 `default_nettype none
 
 module ulpi_shim #(
-    parameter SETTLE      = 64,   // cycles of dir low before a command, at first and after a reset or a time-out
-    parameter TIMEOUT     = 1024, // cycles without nxt; a full-speed byte takes 47 at most
-    parameter IGNORE_VBUS = 0     // 1: the PHY does not see VBUS; a session always lasts
+    parameter       SETTLE          = 64,    // cycles of dir low before a command, at first and after a reset or a time-out
+    parameter       TIMEOUT         = 1024,  // cycles without nxt; a full-speed byte takes 47 at most
+    parameter       IGNORE_VBUS     = 0,     // 1: the PHY does not see VBUS; a session always lasts
+    parameter [5:0] VENDOR_REGISTER = 6'h00, // 30 to 3F: a register of the PHY's maker to be written in the set-up; 0: none
+    parameter [7:0] VENDOR_VALUE    = 8'h00  // what to write there
 ) (
     input  wire       clk,                 // 60 MHz, from the PHY
     input  wire       rst,                 // synchronous, power-up
     input  wire [7:0] ulpi_data_in,        // pads
     output reg  [7:0] ulpi_data_out,       // .
     output wire       ulpi_data_oe,        // . 1: drive all eight
+    input  wire       ulpi_dir_pin,        // . straight from the pad, to let go; the others may be some ns late
     input  wire       ulpi_dir,            // .
     input  wire       ulpi_nxt,            // .
     output reg        ulpi_stp,            // .
@@ -46,15 +51,17 @@ module ulpi_shim #(
 );
     // ULPI 1.1: transmit command byte (3.8.1.1), function control (4.2.2), OTG control (4.2.4)
     localparam [7:0] TRANSMIT = 8'h40, WRITE_FUNCTION = 8'h84, WRITE_OTG = 8'h8A;
+    localparam [7:0] WRITE_VENDOR = {2'b10, VENDOR_REGISTER};
     localparam [7:0] SOFT_RESET = 8'h65;  // reset, suspendM high, full speed
     localparam [7:0] NO_PULL_DOWNS = 8'h00;
     localparam [1:0] OP_MODE_CHIRP = 2'd2;
 
     localparam [2:0] REST = 3'd0, IDLE = 3'd1, COMMAND = 3'd2, VALUE = 3'd3, BYTES = 3'd4, STOP = 3'd5;
-    localparam [1:0] STEP_RESET = 2'd0, STEP_OTG = 2'd1, STEP_MODE = 2'd2, STEP_DONE = 2'd3;
+    localparam [2:0] STEP_RESET = 3'd0, STEP_OTG = 3'd1, STEP_VENDOR = 3'd2, STEP_MODE = 3'd3, STEP_DONE = 3'd4;
+    localparam [2:0] AFTER_OTG = VENDOR_REGISTER != 6'h00 ? STEP_VENDOR : STEP_MODE;
 
     reg [2:0]  state;
-    reg [1:0]  step;      // of the set-up
+    reg [2:0]  step;      // of the set-up
     reg        writing;   // the command is a register write
     reg        failed;    // it ran out of time
     reg        drive;
@@ -82,7 +89,7 @@ module ulpi_shim #(
         if (rst) {dir_before, dir, nxt, vbus, line} <= {1'b1, 1'b1, 1'b0, 2'b11, 2'b00};
     end
 
-    assign ulpi_data_oe       = drive && !ulpi_dir;
+    assign ulpi_data_oe       = drive && !ulpi_dir_pin;
     assign ulpi_reset         = 1'b0;
     assign ready              = step == STEP_DONE;
     assign utmi_vbus_valid    = ready && (vbus == 2'b11 || IGNORE_VBUS != 0);
@@ -100,10 +107,10 @@ module ulpi_shim #(
     wire [7:0] next_byte = ahead[tail];
     wire       chirp     = utmi_op_mode == OP_MODE_CHIRP;  // no identifier: all bytes follow the command
 
-    wire       bus_free  = !ulpi_dir && !dir && !dir_before;
     wire [7:0] mode_due  = {3'b010, utmi_op_mode, utmi_term_select, utmi_xcvr_select};
     wire       write_due = !ready || mode != mode_due;
-    wire       begins    = state == IDLE && bus_free && !write_due && more && !drop;
+    wire       may_begin = !dir && !dir_before && (write_due || more && !drop);
+    wire       begins    = state == IDLE && may_begin && !ulpi_dir && !write_due;
     wire       in_packet = !writing && (state == COMMAND || state == BYTES);
     wire       pop       = more && (begins ? !chirp : in_packet && ulpi_nxt && !ulpi_dir);
     wire       in_command = state == COMMAND || state == VALUE || state == BYTES;
@@ -126,8 +133,18 @@ module ulpi_shim #(
     end
 
     // ------------------------------------------------------------------------------------------------------ to the PHY
-    wire [7:0] due_value   = step == STEP_RESET ? SOFT_RESET : step == STEP_OTG ? NO_PULL_DOWNS : mode_due;
-    wire [7:0] due_command = step == STEP_OTG ? WRITE_OTG : WRITE_FUNCTION;
+    wire [7:0] due_value   = step == STEP_RESET  ? SOFT_RESET
+                           : step == STEP_OTG    ? NO_PULL_DOWNS
+                           : step == STEP_VENDOR ? VENDOR_VALUE : mode_due;
+    wire [7:0] due_command = step == STEP_OTG ? WRITE_OTG : step == STEP_VENDOR ? WRITE_VENDOR : WRITE_FUNCTION;
+
+    wire [7:0] first     = write_due ? due_command : TRANSMIT | (chirp ? 8'h00 : {4'h0, next_byte[3:0]});
+    wire [7:0] following = writing ? (state == COMMAND ? value : 8'h00) : more ? next_byte : 8'h00;
+
+    always @(posedge clk)
+        if (rst || expired) ulpi_data_out <= 8'h00;
+        else if (!in_command) ulpi_data_out <= state == IDLE && may_begin ? first : 8'h00;
+        else if (ulpi_nxt) ulpi_data_out <= following;
 
     always @(posedge clk) begin
         drive    <= !ulpi_dir;
@@ -139,27 +156,21 @@ module ulpi_shim #(
                 else if (patience == 11'd0) state <= IDLE;
             end
             IDLE: begin
-                patience      <= TIMEOUT;
-                failed        <= 1'b0;
-                writing       <= write_due;
-                value         <= due_value;
-                ulpi_data_out <= 8'h00;
-                if (bus_free && write_due || begins) begin
-                    state         <= COMMAND;
-                    ulpi_data_out <= write_due ? due_command : TRANSMIT | (chirp ? 8'h00 : {4'h0, next_byte[3:0]});
-                end
+                patience <= TIMEOUT;
+                failed   <= 1'b0;
+                writing  <= write_due;
+                value    <= due_value;
+                if (may_begin && !ulpi_dir) state <= COMMAND;
             end
             COMMAND, VALUE, BYTES:
                 if (aborted || expired) begin
-                    state         <= aborted ? IDLE : STOP;
-                    failed        <= 1'b1;
-                    ulpi_stp      <= !aborted;
-                    ulpi_data_out <= 8'h00;
+                    state    <= aborted ? IDLE : STOP;
+                    failed   <= 1'b1;
+                    ulpi_stp <= !aborted;
                 end else if (ulpi_nxt) begin
-                    patience      <= TIMEOUT;
-                    state         <= !writing ? (more ? BYTES : STOP) : state == COMMAND ? VALUE : STOP;
-                    ulpi_stp      <= writing ? state == VALUE : !more;
-                    ulpi_data_out <= !writing ? (more ? next_byte : 8'h00) : state == COMMAND ? value : 8'h00;
+                    patience <= TIMEOUT;
+                    state    <= !writing ? (more ? BYTES : STOP) : state == COMMAND ? VALUE : STOP;
+                    ulpi_stp <= writing ? state == VALUE : !more;
                 end
             STOP: begin
                 patience <= SETTLE;
@@ -167,13 +178,13 @@ module ulpi_shim #(
                 if (writing && failed && !ready) step <= STEP_RESET;
                 else if (writing && !failed && !ulpi_dir) begin
                     if (step >= STEP_MODE) mode <= value;
-                    if (!ready) step <= step + 2'd1;
+                    if (!ready) step <= step == STEP_OTG ? AFTER_OTG : step + 3'd1;
                 end
             end
             default: state <= REST;
         endcase
         if (rst) begin
-            {state, step, drive, ulpi_stp, ulpi_data_out} <= {REST, STEP_RESET, 1'b0, 1'b0, 8'h00};
+            {state, step, drive, ulpi_stp} <= {REST, STEP_RESET, 1'b0, 1'b0};
             {writing, failed, mode} <= 10'd0;
             patience <= SETTLE;
         end

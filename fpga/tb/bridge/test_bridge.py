@@ -6,6 +6,7 @@ import struct
 import cocotb
 from bench import error_record, pulse, record, run_bench, start_clock
 from cocotb.triggers import ClockCycles, FallingEdge, RisingEdge
+from cycles import FRAMER, service, transfer
 from nodes import Nodes
 
 from whisker.protocol import (
@@ -26,8 +27,7 @@ from whisker.protocol import (
 NODES = 6
 FIFO_FRAMES = LIMITS["fifo_bytes"] // FRAME_BYTES
 CYCLES_PER_TICK = 530
-SERVICE_CYCLES = 2400 + 9 + 480 * 6 + 29 * 30 + 4  # pause, set-up, bits, gaps, hold
-FRAMER_CYCLES = 5  # start, output register, FIFO's memory and its output register
+SERVICE_CYCLES = service(divider=6, gap=30)
 FAST = {"sck_divider": 6, "word_gap": 30, "sample_point": 3}
 RTL = [
     "whisker_bridge",
@@ -40,11 +40,6 @@ RTL = [
     "crc8",
 ]
 RTL += ["frame_fifo", "bridge_counters", "control_registers", "report_reader", "service_store", "answer_store"]
-
-
-def transfer_cycles(divider: int, gap: int) -> int:
-    """SYNC, set-up, bits, gaps, hold of node_link."""
-    return gap + 9 + 64 * divider + 3 * gap + 4
 
 
 def reading(tick: int, lane: int) -> bytes:
@@ -466,7 +461,7 @@ async def the_first_byte_comes_with_the_frames_end(dut, divider, gap):
     while not int(dut.usb.stream_valid.value):
         await FallingEdge(dut.clk)
         cycles += 1
-    assert cycles <= transfer_cycles(divider, gap) + FRAME_BYTES + FRAMER_CYCLES
+    assert cycles <= transfer(divider, gap) + FRAME_BYTES + FRAMER
 
 
 @cocotb.test(timeout_time=20, timeout_unit="ms")

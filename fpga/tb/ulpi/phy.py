@@ -137,7 +137,7 @@ class UlpiPhy:
         return self.random.random() >= self.stall
 
     def drive(self, dir_: int, nxt: int, data: int) -> tuple[int, int]:
-        self.dut.ulpi_dir.value = dir_
+        self.dut.ulpi_dir_pin.value = self.dut.ulpi_dir.value = dir_
         self.dut.ulpi_nxt.value = nxt
         self.dut.ulpi_data_in.value = data
         return dir_, nxt

@@ -4,14 +4,26 @@ import random
 
 import bench
 import cocotb
+import pytest
 from cocotb.triggers import RisingEdge
 from phy import FUNCTION_CONTROL, OTG_CONTROL, VBUS_VALID, UlpiPhy
 
 FULL_SPEED, HIGH_SPEED, CHIRP = 0x45, 0x40, 0x54  # function control with suspendM high
-WRITTEN_ANEW = [(FUNCTION_CONTROL, 0x65), (OTG_CONTROL, 0x00), (FUNCTION_CONTROL, FULL_SPEED)]
+VENDOR = {"VENDOR_REGISTER": 0x39, "VENDOR_VALUE": 0x06}  # as Cynthion needs it
 # Cycles a high-speed link has from the end of a packet to its answer: ULPI 1.1, table of section 3.8.2.6.
 LINK_DECISION = 14
 DEVICE_DECIDES = 7  # of these, what the device takes from the fall of rx_active to tx_valid (test of sim/bridge)
+
+
+def written_anew(dut) -> list[tuple[int, int]]:
+    """Registers and values of a set-up, in their order."""
+    vendor = [(int(dut.VENDOR_REGISTER.value), int(dut.VENDOR_VALUE.value))]
+    return [
+        (FUNCTION_CONTROL, 0x65),
+        (OTG_CONTROL, 0x00),
+        *(vendor if vendor[0][0] else []),
+        (FUNCTION_CONTROL, FULL_SPEED),
+    ]
 
 
 class Link:
@@ -74,7 +86,7 @@ class Link:
 
 async def start(dut, ready: bool = True, **phy_settings) -> Link:
     phy = UlpiPhy(dut, seed=1, **phy_settings)
-    inputs = {"ulpi_dir": 1, "ulpi_nxt": 0, "ulpi_data_in": 0, "utmi_tx_valid": 0, "utmi_tx_data": 0}
+    inputs = {"ulpi_dir_pin": 1, "ulpi_dir": 1, "ulpi_nxt": 0, "ulpi_data_in": 0, "utmi_tx_valid": 0, "utmi_tx_data": 0}
     await bench.start_clock(
         dut, **inputs, utmi_xcvr_select=1, utmi_term_select=1, utmi_op_mode=0, **({"rst": 1} if not ready else {})
     )
@@ -96,20 +108,20 @@ def packet(generator, size: int) -> bytes:
 @cocotb.test()
 async def set_up_resets_the_phy_and_writes_its_mode(dut):
     link = await start(dut)
-    assert link.phy.writes == WRITTEN_ANEW
+    assert link.phy.writes == written_anew(dut)
 
 
 @cocotb.test()
 @cocotb.parametrize(late=[1, 63, 64, 5000])
 async def a_phy_that_is_late_or_holds_dir_is_waited_for(dut, late):
     link = await start(dut, late=late)
-    assert link.phy.writes == WRITTEN_ANEW
+    assert link.phy.writes == written_anew(dut)
 
 
 @cocotb.test()
 async def a_command_without_nxt_is_given_up_and_tried_again(dut):
     link = await start(dut, deaf=5)
-    assert link.phy.deaf == 0 and link.phy.writes == WRITTEN_ANEW
+    assert link.phy.deaf == 0 and link.phy.writes == written_anew(dut)
 
 
 @cocotb.test()
@@ -274,5 +286,6 @@ async def a_transmission_without_nxt_ends_and_the_next_goes_through(dut):
     assert link.phy.packets == [(0xB, b"\x01\x02\x03")]
 
 
-def test_ulpi():
-    bench.run_bench("ulpi_shim", __file__, "../usb/ulpi_shim.v")
+@pytest.mark.parametrize("vendor", [{}, VENDOR], ids=["plain", "vendor register"])
+def test_ulpi(vendor):
+    bench.run_bench("ulpi_shim", __file__, "../usb/ulpi_shim.v", parameters=vendor)

@@ -1,9 +1,8 @@
-// Pads of the Colorlight i9 v7.2 (LFE5U-45F) on its extension board, with a USB3300 module on a Pmod pair. The module's
-// PHY gives the 60 MHz.
+// Pads of a board with a USB3300, which gives the 60 MHz: Colorlight i9 with a USB3300 module, ECPIX-5.
 
 `default_nettype none
 
-module colorlight_i9 #(
+module usb3300_board #(
     parameter LANES = 28
 ) (
     input  wire             clk_60,     // the PHY's CLKOUT
@@ -20,18 +19,18 @@ module colorlight_i9 #(
     output wire             led_n
 );
     wire [7:0] data_in, data_out;
-    wire       data_oe, dir, nxt, led;
+    wire       data_oe, dir_pin, dir, nxt, led;
 
     assign led_n = !led;
 
     ulpi_pads pads (
         .ulpi_data(ulpi_data), .ulpi_dir(ulpi_dir), .ulpi_nxt(ulpi_nxt), .data_out(data_out), .data_oe(data_oe),
-        .data_in(data_in), .dir(dir), .nxt(nxt));
+        .data_in(data_in), .dir_pin(dir_pin), .dir(dir), .nxt(nxt));
 
     board_core #(.LANES(LANES)) core (
-        .clk(clk_60), .ulpi_data_in(data_in), .ulpi_data_out(data_out), .ulpi_data_oe(data_oe), .ulpi_dir(dir),
-        .ulpi_nxt(nxt), .ulpi_stp(ulpi_stp), .ulpi_reset(ulpi_reset), .sync(sync), .sck(sck),
-        .select_n(select_n), .mosi(mosi), .miso(miso), .led(led));
+        .clk(clk_60), .ulpi_data_in(data_in), .ulpi_data_out(data_out), .ulpi_data_oe(data_oe),
+        .ulpi_dir_pin(dir_pin), .ulpi_dir(dir), .ulpi_nxt(nxt), .ulpi_stp(ulpi_stp), .ulpi_reset(ulpi_reset),
+        .sync(sync), .sck(sck), .select_n(select_n), .mosi(mosi), .miso(miso), .led(led));
 endmodule
 
 `default_nettype wire
