@@ -9,6 +9,7 @@ import tomllib
 from dataclasses import replace
 from pathlib import Path
 
+from .behaviour import WHISK_RAD_S
 from .demo.scenes import MECHANICS, START_CLEARANCE_M, make_scene, simulated
 from .errors import UserError
 from .protocol import LIMITS, SENSOR_ERRORS
@@ -17,6 +18,12 @@ from .scene import Scene, load
 BLOCK_TICKS = 40  # the robot is given one order per block (sim/bridge/follower_server.h)
 AHEAD_BLOCKS = 25  # orders given in advance: half a second, so that pacing is smooth
 TURN_RAD_S = 0.5  # a floor whisker's tip then goes at 0.1 m/s
+# What a robot does over and over: (seconds, rad/s). `whisk`: body whisks to either side, rest before each pair.
+COURSES = {
+    "turn": ((1.0, TURN_RAD_S),),
+    "still": ((1.0, 0.0),),
+    "whisk": ((0.6, 0.0), (0.8, WHISK_RAD_S), (1.6, -WHISK_RAD_S), (0.8, WHISK_RAD_S)),
+}
 SOURCE_TREE = Path(__file__).resolve().parents[3]
 
 
@@ -122,11 +129,11 @@ class Course(threading.Thread):
     """Drives the simulated robot and keeps its time to the wall's: the simulation waits for orders."""
 
     def __init__(self, path: Path, drive: str, pace: float, stop: threading.Event):
-        """`pace`: simulated seconds per second; 0: no limit."""
+        """`drive`: one of COURSES; `pace`: simulated seconds per second; 0: no limit."""
         super().__init__(daemon=True)
         self._path, self._stop_event = path, stop
-        self._turn = TURN_RAD_S if drive == "turn" else 0.0
         block_s = BLOCK_TICKS * LIMITS["tick_period"] / LIMITS["clock_hz"]
+        self._turns = [turn for seconds, turn in COURSES[drive] for _ in range(round(seconds / block_s))]
         self._block_s = block_s / pace if pace > 0 else 0.0
 
     def run(self) -> None:
@@ -146,7 +153,8 @@ class Course(threading.Thread):
         while not self._stop_event.is_set():
             while block < passed + AHEAD_BLOCKS:
                 block += 1
-                link.send(f"drive {block * BLOCK_TICKS - 1} 0 {self._turn}".encode())
+                turn = self._turns[(block - 1) % len(self._turns)]
+                link.send(f"drive {block * BLOCK_TICKS - 1} 0 {turn}".encode())
             message = link.recv(256).split()
             if not message or message[0] == b"end":
                 return

@@ -11,7 +11,7 @@ import tempfile
 import threading
 from pathlib import Path
 
-from ..bridgesim import Course, flat_scene, program, read_faults
+from ..bridgesim import COURSES, Course, flat_scene, program, read_faults
 from ..demo.scenes import MECHANICS
 from ..protocol import LANES, LIMITS
 from ..ring import Reader, RingError
@@ -47,9 +47,8 @@ def add(parser) -> None:
     text = "how whiskers bend (%(default)s): the level chosen by what touches, one forced, or simple"
     parser.add_argument("--mechanics", choices=MECHANICS, default=MECHANICS[0], help=text)
     parser.add_argument("--seed", type=whole_number(0, 2**32 - 1), default=1, help="of world, sensors, start (1)")
-    parser.add_argument(
-        "--drive", choices=["turn", "still"], default="turn", help="turn on the spot, or stand still (turn)"
-    )
+    text = "turn on the spot, stand still, or whisk: to one side and the other at a body whisk's rate (turn)"
+    parser.add_argument("--drive", choices=list(COURSES), default="turn", help=text)
     text = "simulated seconds per second, at most what the machine can; 0: as fast as it can (default: 1)"
     parser.add_argument("--pace", type=number_above(-1e-9), default=1.0, metavar="X", help=text)
     text = "how much of the bridge is simulated (%(default)s): the gateware, cycle by cycle, or transactions: the same frames"
