@@ -21,7 +21,7 @@ from toolchain import ToolError, gather, must  # noqa: E402
 INCLUDES = (REPO / "fpga/bridge_rtl/crc8.vh", REPO / "protocol/gen/whisker_protocol.vh")
 # Registers that lie in the pad's own cell: a route between them and the pad would eat the PHY's set-up time, spread the
 # nodes' lines, and behind a delay line it would not be timed.
-PAD_REGISTERS = tuple(f"ulpi_shim/w:{name}" for name in ("ulpi_data_out", "ulpi_stp", "data")) + (
+PAD_REGISTERS = tuple(f"*ulpi_shim*/w:{name}" for name in ("ulpi_data_out", "ulpi_stp", "data")) + (
     "*lane_receiver*/w:bits",
 )
 PAD_REGISTERS += tuple(f"node_link/w:{name}" for name in ("sync", "sck", "select_n", "mosi"))
@@ -111,7 +111,8 @@ def front(top: str, files: list[Path], lanes: int | None, out: Path) -> list[str
 
 def synthesise(top: str, files: list[Path], lanes: int | None, out: Path, pads: bool = True) -> Path:
     """Netlist of `top` for ECP5."""
-    marks = [f"setattr -set syn_useioff 1 {' '.join(PAD_REGISTERS)}"] if pads else []
+    registers = PAD_REGISTERS if pads else ()
+    marks = [f"select -assert-any {name}; setattr -set syn_useioff 1 {name}" for name in registers]
     steps = [*front(top, files, lanes, out), *marks, f"synth_ecp5 -top {top} -json netlist.json"]
     (out / "synth.ys").write_text("\n".join(steps) + "\n")
     must("yosys", "-q", "-s", "synth.ys", log=out / "synth.log")
