@@ -198,6 +198,17 @@ def test_onset_and_release_are_dated_to_the_sample():
     assert (contact.onset, contact.release, contact.touching) == (500, 800, False)
 
 
+@pytest.mark.parametrize("size", [1, 2, 7, 1000])
+def test_contacts_are_dated_alike_whatever_the_blocks(size):
+    rest, pushed = [32768.0, 32768.0], [32768.0, 33268.0]
+    samples = np.array([rest] * 500 + [pushed] * 300 + [rest] * 200)
+    contact = Contact()
+    for first in range(0, 1000, size):
+        block = samples[first : first + size]
+        contact.block(np.arange(first, first + len(block)), block, np.ones(len(block), bool))
+    assert (contact.onset, contact.release) == (500, 800)
+
+
 def test_same_seed_same_figures(models):
     first, second = (study(SEED, 8.0, models) for _ in range(2))
     assert first == second

@@ -30,6 +30,7 @@ class Contact:
         lib.nav_contact_init(self._state, ffi.new("struct nav_contact_config *", config))
         self.onset = -1
         self.release = -1
+        self._earlier = np.empty(0, np.int64)  # ticks of the last good samples of earlier blocks
 
     @property
     def touching(self) -> bool:
@@ -48,14 +49,16 @@ class Contact:
     def block(self, ticks: np.ndarray, samples: np.ndarray, good: np.ndarray) -> None:
         """Take ticks (n,), samples (n, 2) in counts and good (n,): a bad sample begins, keeps and ends nothing."""
         ticks, samples = ticks[good], np.ascontiguousarray(samples[good])
-        count = len(ticks)
+        count, before = len(ticks), len(self._earlier)
         events, peaks = np.zeros(count, np.uint8), np.zeros(count)
         lib.nav_contact_run(
             self._state, doubles(samples), octets(np.ones(count, np.uint8)), count, octets(events), doubles(peaks)
         )
-        for index in np.flatnonzero(events):
+        ticks = np.concatenate([self._earlier, ticks])
+        self._earlier = ticks[-RELEASE_SAMPLES:]
+        for index in before + np.flatnonzero(events):
             # An event comes with the last sample of the run that proves it; the contact changed with the first.
-            if events[index] == lib.NAV_CONTACT_ONSET:
+            if events[index - before] == lib.NAV_CONTACT_ONSET:
                 self.onset = int(ticks[max(0, index - ONSET_SAMPLES + 1)])
             else:
                 self.release = int(ticks[max(0, index - RELEASE_SAMPLES + 1)])
