@@ -13,14 +13,23 @@ from collections import deque
 
 import numpy as np
 
-from .behaviour import BLOCK_TICKS, EXPLORE_M_S, PUSH_TICKS, TICK_S, TURN_RAD_S, WHISK_RAD_S, Behaviour
+from .behaviour import (
+    BACK_OFF_M_S,
+    BLOCK_TICKS,
+    EFFECT_TICKS,
+    EXPLORE_M_S,
+    PUSH_TICKS,
+    TICK_S,
+    TURN_RAD_S,
+    WHISK_RAD_S,
+    Behaviour,
+)
 from .contact import Contact
 from .floor import WINDOW_SAMPLES, floor_whisker
-from .mount import Mount
+from .mount import Mount, retreat
 from .radial import Contact as Recorded
 from .radial import WhiskModel, estimate, peak
 
-LEAST_CONFIDENCE = 0.5  # a model of whole whisks that is less sure than this tells no distance
 SETTLE_TICKS = 100  # the wheels' last change of speed must be this much older than a texture window
 
 
@@ -44,6 +53,8 @@ class Pilot:
         self.bad_samples = 0
         self.whisks: list[dict] = []  # every whisk that was pushed to its end
         self._recent = deque(maxlen=WINDOW_SAMPLES // BLOCK_TICKS)  # of the last 0.1 s: (samples, good) of all lanes
+        # Ticks and samples of the whisker that began the whisk: while backing off, from then on.
+        self._retreat_samples: list[tuple[np.ndarray, np.ndarray]] = []
         self._whisk_samples: list[tuple[np.ndarray, np.ndarray]] = []
         self._measured: dict[int, tuple[int, float]] = {}  # lane: release tick, mm
         self._pending = np.zeros(3)  # motion not yet in a row, in the frame of the last row that carried any
@@ -91,11 +102,15 @@ class Pilot:
     def _follow_whisk(self, ticks, samples, good) -> None:
         """Gather the whisk's samples; once a whisker that was pushed long enough lets go, its distance is known."""
         whisk = self.behaviour.whisk
-        if whisk is None or whisk.start < 0:
+        if whisk is None:
             self._whisk_samples.clear()
+            self._retreat_samples.clear()
             return
         use = good[:, whisk.lane]
-        self._whisk_samples.append((ticks[use], samples[use, whisk.lane]))
+        kept = self._retreat_samples if whisk.start < 0 else self._whisk_samples
+        kept.append((ticks[use], samples[use, whisk.lane]))
+        if whisk.start < 0:
+            return
         contact = self.contacts[whisk.lane]
         pushed = whisk.start < contact.onset <= whisk.push_end - PUSH_TICKS
         if pushed and contact.release > contact.onset and not whisk.measured:
@@ -104,17 +119,28 @@ class Pilot:
 
     def _measure(self, lane: int, turn: float) -> None:
         contact, model = self.contacts[lane], self.radial_models[self.names[lane]]
-        ticks = np.concatenate([t for t, _ in self._whisk_samples])
-        samples = np.concatenate([s for _, s in self._whisk_samples])
+        ticks, samples = joined(self._whisk_samples)
         push = (ticks >= contact.onset) & (ticks < contact.onset + PUSH_TICKS)
         counts = peak(samples[push], contact.rest)
-        told = estimate(model, Recorded(ticks * TICK_S, samples, np.full(len(ticks), WHISK_RAD_S)), counts)
-        doubted = isinstance(model, WhiskModel) and told.confidence < LEAST_CONFIDENCE
-        distance = None if doubted else self.mounts[lane].distance(told.radius_mm, turn)
+        recorded = Recorded(ticks * TICK_S, samples, np.full(len(ticks), WHISK_RAD_S))
+        told = estimate(model, recorded, counts)
+        if isinstance(model, WhiskModel):
+            per_metre = self._per_metre(model, contact.rest)
+            distance = self.mounts[lane].whisked(model, model.shape_of(recorded), turn, per_metre)
+        else:
+            distance = self.mounts[lane].distance(told.radius_mm, turn)
         if distance is not None:
             self._measured[lane] = (contact.release, distance)
         whisk = {"whisker": self.names[lane], "onset": contact.onset, "release": contact.release, "turn": turn}
         self.whisks.append(whisk | {"peak_counts": counts, "line_mm": told.radius_mm, "distance_mm": distance})
+
+    def _per_metre(self, model: WhiskModel, rest: np.ndarray) -> float:
+        """Tilt per metre as the robot backed off, rad; nan when that is not known."""
+        ticks, samples = joined(self._retreat_samples)
+        since = ticks - ticks[:1] - (EFFECT_TICKS - 1)  # the first block answers the decision
+        gone = since >= 0
+        tilt = model.along(samples[gone] - rest) / model.counts_per_rad(WHISK_RAD_S)
+        return retreat(since[gone] * TICK_S * BACK_OFF_M_S, tilt)
 
     def _texture_cells(self, lane: int, tick: int, held_back: bool) -> dict[str, float | None]:
         whisker = self.floor[lane]
@@ -138,6 +164,12 @@ class Pilot:
         if self.contacts[lane].touching or not self.contacts[lane].settled or (whisking and not released):
             return math.nan
         return None
+
+
+def joined(blocks: list[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
+    """Ticks (n,) and samples (n, 2) of blocks in order."""
+    ticks, samples = zip(*blocks, strict=True)
+    return np.concatenate(ticks), np.concatenate(samples)
 
 
 def compose(first, then) -> np.ndarray:

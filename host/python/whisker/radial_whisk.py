@@ -137,8 +137,24 @@ class WhiskModel:
         return self._c.axes
 
     @property
+    def low_mm(self) -> float:
+        return self._c.low_mm
+
+    @property
     def high_mm(self) -> float:
         return self._c.high_mm
+
+    @property
+    def tip_mm(self) -> float:
+        return self._c.tip_mm
+
+    @property
+    def kappa(self) -> float:
+        return self._c.kappa
+
+    @property
+    def cone_mm(self) -> float:
+        return self._c.cone_mm
 
     @property
     def spread(self) -> float:
@@ -154,6 +170,28 @@ class WhiskModel:
         elif rate is None:
             rate = np.full(len(contact.t_s), math.exp(log_rate))
         return shape_of(Contact(contact.t_s, contact.samples, rate, contact.told_rad_s))
+
+    def counts_per_rad(self, whisk_rad_s: float) -> float:
+        """Counts per radian by which the plug tilts; `whisk_rad_s`: of calibration, where its file did not tell."""
+        turn = TERMS.index("turn")
+        rate = whisk_rad_s if abs(self._c.mean[TERMS.index("rate")]) < LOG_RATE_NONE else 1.0
+        return math.exp(self._c.log_gain - self._c.mean[turn]) / rate
+
+    def along(self, deflection) -> np.ndarray:
+        """Deflections (n, axes), counts, as a signed length (n,) along the direction of calibration."""
+        return np.asarray(deflection) @ np.array(list(self._c.direction)[: self.axes])
+
+    def share(self, radius_mm: float) -> float:
+        """h(a): tilt of the plug per angle pushed at this radius."""
+        return math.exp(lib.nav_whisk_height(self._c.kappa, self._c.cone_mm, radius_mm))
+
+    def share_of(self, shape) -> float:
+        """The same as a whisk shows it, negative when it bent away from the direction of calibration; nan: no whole whisk."""
+        if shape.quality != lib.NAV_SHAPE_WHOLE or not (shape.turn > 0 and shape.peak > 0):
+            return math.nan
+        turned = math.log(shape.turn) - self._c.mean[TERMS.index("turn")]
+        size = math.exp(math.log(shape.peak) - self._c.log_gain - turned)
+        return math.copysign(size, self.along([list(shape.direction)[: self.axes]])[0])
 
     def estimate(self, shape):
         """struct nav_whisk_estimate of a whisk."""
