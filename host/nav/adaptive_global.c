@@ -7,9 +7,18 @@
 /* Variance is saved up to this share of a squared cell edge, and paid in passes of at most so much (lattice.c). */
 static const double OWED_LEAST = 0.04, PASS_MOST = 0.5;
 enum { PASSES_MOST = 4 };
+
+/* A job's rows read, its motion planned and its answer found take as long as passing over about so many cells. */
+enum { JOB_CELLS = 10000 };
+
 size_t adaptive_global_cells(const struct adaptive_global *g)
 {
     return (size_t)g->nh * (size_t)g->ny * (size_t)g->nx;
+}
+
+size_t adaptive_global_stored(const struct adaptive_global *g)
+{
+    return (size_t)g->nh * (size_t)g->ny * (size_t)g->pitch;
 }
 
 /* Smallest cells for which a slice fits a quarter of the budget and the arena a few rows' budgets. */
@@ -17,7 +26,7 @@ static void choose_cells(struct adaptive_global *g)
 {
     const struct nav_settings *s = &g->problem->settings;
     const struct nav_arena *arena = &g->problem->arena;
-    double most = fmin(s->adaptive_budget / (4.0 * (3.0 + PASSES_MOST)),
+    double most = fmin(s->adaptive_budget / (4.0 * (2.0 + PASSES_MOST)),
                        s->adaptive_rows * s->adaptive_budget / fmax(round(360.0 / s->adaptive_cell_deg), 1.0));
     g->nh = (int)fmax(round(360.0 / s->adaptive_cell_deg), 1.0);
     g->nh += g->nh % 4 ? 4 - g->nh % 4 : 0; /* quarter turns map slices to slices */
@@ -25,6 +34,34 @@ static void choose_cells(struct adaptive_global *g)
     g->cell = fmax(s->adaptive_cell_m, sqrt(arena->size_x * arena->size_y / most));
     g->nx = (int)ceil(arena->size_x / g->cell - 1e-6);
     g->ny = (int)ceil(arena->size_y / g->cell - 1e-6);
+    g->pitch = (g->nx + NAV_LANES - 1) / NAV_LANES * NAV_LANES;
+}
+
+static size_t signature_row(const struct adaptive_global *g)
+{
+    return (size_t)g->pitch + 1;
+}
+
+/* Rows of signatures, phase by phase, so that neighbouring cells of a slice have theirs side by side. */
+static size_t signature_rows(const struct adaptive_global *g)
+{
+    return (size_t)g->expected->nh * ADAPTIVE_SUB * ADAPTIVE_SUB * ((size_t)g->ny + 1);
+}
+
+static void sort_signatures(struct adaptive_global *g)
+{
+    const struct nav_expected *e = g->expected;
+    uint32_t *out = g->signature;
+    for (size_t n = 0; n < signature_rows(g); n++, out += signature_row(g)) {
+        int j = (int)(n % ((size_t)g->ny + 1)), phase = (int)(n / ((size_t)g->ny + 1));
+        int px = phase % ADAPTIVE_SUB, py = phase / ADAPTIVE_SUB % ADAPTIVE_SUB;
+        int y = j * ADAPTIVE_SUB + py;
+        if (y >= e->ny + e->margin)
+            continue;
+        const uint32_t *row = nav_expected_row(e, phase / ADAPTIVE_SUB / ADAPTIVE_SUB, y);
+        for (int i = 0; i <= g->nx && i * ADAPTIVE_SUB + px < e->nx + e->margin; i++)
+            out[i] = row[i * ADAPTIVE_SUB + px];
+    }
 }
 
 static int make_tables(struct adaptive_global *g)
@@ -46,7 +83,14 @@ static int make_tables(struct adaptive_global *g)
             return -1;
     }
     g->value = calloc(g->expected->signatures, sizeof *g->value);
-    return g->value ? 0 : -1;
+    g->known = calloc(g->expected->signatures, sizeof *g->known);
+    g->signature = calloc(signature_rows(g) * signature_row(g), sizeof *g->signature);
+    if (!g->value || !g->known || !g->signature)
+        return -1;
+    for (uint32_t n = 1; n < g->expected->signatures; n++) /* where the robot cannot stand the likelihood is 0 */
+        g->value[n] = -1.0f;
+    sort_signatures(g);
+    return 0;
 }
 
 static double free_share(const struct adaptive_global *g)
@@ -62,19 +106,36 @@ static double free_share(const struct adaptive_global *g)
     return fmax(standing, 1.0) / all;
 }
 
+/* What a slice needs while it moves. */
+static int make_lines(struct adaptive_global *g)
+{
+    size_t lines = (size_t)g->nh * (size_t)g->ny, plane = (size_t)(g->ny + 2) * (size_t)(g->pitch + 2 * NAV_LANES);
+    g->span = calloc(lines, sizeof *g->span);
+    g->span_turned = calloc(lines, sizeof *g->span_turned);
+    g->moved = calloc((size_t)g->ny, sizeof *g->moved);
+    g->region = calloc((size_t)g->ny, sizeof *g->region);
+    g->coordinate = calloc((size_t)g->pitch, sizeof *g->coordinate);
+    g->like = calloc((size_t)(g->ny * g->pitch), sizeof *g->like);
+    g->missing = calloc((size_t)g->pitch, sizeof *g->missing);
+    for (int n = 0; n < 2; n++)
+        g->plane[n] = calloc(plane, sizeof **g->plane);
+    int spans = g->span && g->span_turned && g->moved && g->region;
+    return spans && g->coordinate && g->like && g->missing && g->plane[0] && g->plane[1] ? 0 : -1;
+}
+
 int adaptive_global_init(struct adaptive_global *g, const struct nav_problem *problem)
 {
     *g = (struct adaptive_global){.problem = problem, .room = (double)adaptive_cloud_room(&problem->settings)};
     choose_cells(g);
     g->shift_x = calloc((size_t)g->nh, sizeof *g->shift_x);
     g->shift_y = calloc((size_t)g->nh, sizeof *g->shift_y);
-    g->mass = calloc(adaptive_global_cells(g), sizeof *g->mass);
-    g->scratch = calloc(adaptive_global_cells(g), sizeof *g->scratch);
-    g->live = calloc((size_t)g->nh * (size_t)g->ny, 1);
-    g->moment = calloc((size_t)g->nh * 6, sizeof *g->moment);
-    if (!g->moment || !g->shift_x || !g->shift_y || !g->mass || !g->scratch || !g->live || make_tables(g))
+    g->mass = calloc(adaptive_global_stored(g), sizeof *g->mass);
+    g->turned = calloc(adaptive_global_stored(g), sizeof *g->turned);
+    g->moment = calloc((size_t)g->nh, sizeof *g->moment);
+    if (!g->moment || !g->shift_x || !g->shift_y || !g->mass || !g->turned || make_lines(g) || make_tables(g))
         return -1;
     g->log_free = log(free_share(g));
+    nav_expected_forget_poses(g->expected);
     adaptive_global_restart(g, 0);
     return 0;
 }
@@ -90,15 +151,26 @@ void adaptive_global_free(struct adaptive_global *g)
     free(g->shift_x);
     free(g->shift_y);
     free(g->mass);
-    free(g->scratch);
-    free(g->live);
+    free(g->turned);
     free(g->moment);
+    free(g->span);
+    free(g->span_turned);
+    free(g->moved);
+    free(g->region);
+    free(g->coordinate);
+    free(g->like);
+    free(g->missing);
+    free(g->plane[0]);
+    free(g->plane[1]);
+    free(g->signature);
+    free(g->known);
 }
 
 size_t adaptive_global_bytes(const struct adaptive_global *g)
 {
-    return 2 * adaptive_global_cells(g) * sizeof(float) + nav_expected_bytes(g->expected) +
-           g->expected->signatures * sizeof *g->value;
+    return 2 * adaptive_global_stored(g) * sizeof(float) + nav_expected_bytes(g->expected) +
+           signature_rows(g) * signature_row(g) * sizeof *g->signature +
+           g->expected->signatures * (sizeof *g->value + sizeof *g->known);
 }
 
 void adaptive_global_restart(struct adaptive_global *g, uint64_t row)
@@ -110,7 +182,6 @@ void adaptive_global_restart(struct adaptive_global *g, uint64_t row)
     memset(g->shift_x, 0, (size_t)g->nh * sizeof *g->shift_x);
     memset(g->shift_y, 0, (size_t)g->nh * sizeof *g->shift_y);
     g->total = g->scattered = 1.0;
-    g->peak = 0.0;
     const struct nav_arena *arena = &g->problem->arena;
     struct nav_problem lost = *g->problem;
     lost.prior.uniform = true;
@@ -172,20 +243,17 @@ static void gather(struct adaptive_global *g, struct adaptive_log *log)
     g->job.end = row;
 }
 
-/* Logarithms to factors relative to the best. */
-static double exponentiate(struct adaptive_global *g)
+/* Sum of the whiskers' best logarithms, which expected observations are weighed relative to. */
+static double best_codes(const struct adaptive_global *g)
 {
-    double reference = 0.0;
+    double sum = 0.0;
     for (int w = 0; w < g->likelihood->whiskers; w++) {
         float best = g->factor[w][0];
-        int codes = g->likelihood->model[w].codes;
-        for (int k = 1; k < codes; k++)
+        for (int k = 1; k < g->likelihood->model[w].codes; k++)
             best = fmaxf(best, g->factor[w][k]);
-        for (int k = 0; k < codes; k++)
-            g->factor[w][k] = expf(g->factor[w][k] - best);
-        reference += (double)best;
+        sum += (double)best;
     }
-    return reference;
+    return sum;
 }
 
 static float side_of(double *owed, double cell, int passes_most, int *passes)
@@ -207,16 +275,27 @@ static void begin(struct adaptive_global *g, struct adaptive_log *log)
         memset(g->factor[w], 0, (size_t)g->likelihood->model[w].codes * sizeof **g->factor);
     g->job = (struct adaptive_job){.running = true, .scale = (float)(1.0 / g->total)};
     gather(g, log);
-    g->job.reference = exponentiate(g);
+    g->job.reference = best_codes(g);
+    nav_expected_prepare(g->expected, (const float *const *)g->factor);
     g->job.side = side_of(&g->owed_position, g->cell, PASSES_MOST, &g->job.passes);
     g->job.side_heading = side_of(&g->owed_heading, g->cell_theta, 1, &one);
-    g->job.turning = g->job.side_heading > 0.0f && !g->fresh;
-    g->job.sized = g->peak * g->room >= g->problem->settings.adaptive_per_bin; /* else too many for a cloud */
-    g->jobs++;
+    g->job.phase = g->job.side_heading > 0.0f && !g->fresh ? ADAPTIVE_TURN : ADAPTIVE_MOVE;
+    g->job.about = nav_compose(g->summary.belief.mean, g->job.step);
+    adaptive_global_job_init(g);
 }
 
-/* Ends a job; a row that fits nowhere, or that lost all mass beyond the walls, leaves nothing to believe. */
-static void end(struct adaptive_global *g)
+/* The first stored cell that is as heavy as the heaviest. */
+static size_t mode(const struct adaptive_global *g)
+{
+    size_t n = (size_t)g->job.mode_slice * (size_t)g->ny * (size_t)g->pitch;
+    while (g->mass[n] < g->job.heaviest)
+        n++;
+    return n;
+}
+
+/* Ends a job; a row that fits nowhere, or that lost all mass beyond the walls, leaves nothing to believe. `many`: its
+ * cells have not been counted. */
+static void end(struct adaptive_global *g, bool many)
 {
     uint64_t next = g->job.end;
     double gain = log(g->job.total) + g->job.reference - g->job.local - (g->fresh ? g->log_free : 0.0);
@@ -227,20 +306,39 @@ static void end(struct adaptive_global *g)
     g->rotation = nav_wrap(g->rotation + g->job.step.theta);
     g->fresh = g->job.running = false;
     g->total = g->job.total;
-    g->mode = g->job.mode;
-    g->peak = (double)g->job.heaviest / g->total;
+    g->mode = mode(g);
+    g->scattered = many ? 1.0 : g->job.light / g->total;
+    g->crowd = g->job.crowd;
     g->gained += gain;
     g->next = next;
     adaptive_global_summarise(g);
 }
 
-/* Cells that the job's next slice may touch, at most. */
-static long cost(const struct adaptive_global *g)
+/* Does the job's next slice; false: that would take more than `most` cells. */
+static bool next_slice(struct adaptive_global *g, long most)
 {
-    if (g->job.turning)
-        return 3 * (long)adaptive_global_plane(g);
-    int lines = g->fresh ? g->ny : adaptive_global_lines(g, g->job.slice) + 2 * g->job.passes;
-    return (long)(lines < g->ny ? lines : g->ny) * g->nx * (3 + g->job.passes);
+    static long (*const part[])(struct adaptive_global *, int, long) = {[ADAPTIVE_TURN] = adaptive_global_turn,
+                                                                        [ADAPTIVE_MOVE] = adaptive_global_move,
+                                                                        [ADAPTIVE_COUNT] = adaptive_global_count};
+    long touched = part[g->job.phase](g, g->job.slice, most);
+    g->touched += touched > 0 ? touched : 0;
+    g->job.slice += touched >= 0;
+    return touched >= 0;
+}
+
+/* From a phase that is done to the next. */
+static void next_phase(struct adaptive_global *g)
+{
+    enum adaptive_phase done = g->job.phase;
+    g->job.slice = 0;
+    if (done == ADAPTIVE_TURN)
+        adaptive_global_turned(g);
+    g->job.phase = done == ADAPTIVE_TURN ? ADAPTIVE_MOVE : ADAPTIVE_COUNT;
+    g->job.worth = g->job.total / g->room;
+    /* While even the heaviest cell is worth less than several hypotheses there are too many for a cloud. */
+    bool many = (double)g->job.heaviest < g->problem->settings.adaptive_per_bin * g->job.worth;
+    if (done == ADAPTIVE_COUNT || (done == ADAPTIVE_MOVE && (many || !(g->job.total > 0.0))))
+        end(g, many);
 }
 
 void adaptive_global_work(struct adaptive_global *g, struct adaptive_log *log, long budget)
@@ -249,22 +347,15 @@ void adaptive_global_work(struct adaptive_global *g, struct adaptive_log *log, l
     if (g->next < adaptive_log_tail(log)) /* slept too long, or fell behind: what is lost is lost */
         adaptive_global_restart(g, adaptive_log_tail(log));
     while (g->job.running || g->next < log->head) {
-        if (!g->job.running)
+        if (!g->job.running) {
+            if (g->touched + JOB_CELLS > most)
+                return;
+            g->touched += JOB_CELLS;
             begin(g, log);
-        long next = cost(g);
-        if (g->touched + next > most)
-            return;
-        if (g->job.turning) {
-            adaptive_global_turn(g, g->job.slice);
-        } else {
-            g->touched += next;
-            adaptive_global_move(g, g->job.slice);
         }
-        if (++g->job.slice < g->nh)
-            continue;
-        if (g->job.turning)
-            adaptive_global_turned(g);
-        else
-            end(g);
+        if (!next_slice(g, most - g->touched))
+            return;
+        if (g->job.slice == g->nh)
+            next_phase(g);
     }
 }

@@ -1,68 +1,75 @@
 /* The adaptive filter's arena-wide belief: a coarse histogram that is asleep while the robot is known.
  *
  * It takes rows from the log in jobs and each job slice by slice (one slice per heading), so that any amount of work
- * can be spread over rows and none is done where no belief is: lines of cells without mass are left out. Rows without
- * contact that lie within a cell of each other make one job. As in lattice.h every slice has its own shift, so motion
- * does not smear. */
+ * can be spread over rows and none is done where no belief is: of a line of cells only the span that holds mass. Rows
+ * without contact that lie within a cell of each other make one job. As in lattice.h every slice has its own shift, so
+ * motion does not smear. */
 #ifndef NAV_ADAPTIVE_GLOBAL_H
 #define NAV_ADAPTIVE_GLOBAL_H
 
 #include "adaptive_cloud.h"
 #include "adaptive_log.h"
 #include "expected.h"
+#include "slices.h"
 
-/* Likelihood of a signature, known when `job` is the present job's number. */
-struct adaptive_value {
-    uint32_t job;
-    float value;
+/* Cells begin .. end - 1 of a line, whole lanes of them (lattice_rows.h); empty: both 0. */
+struct adaptive_span {
+    int begin, end;
 };
+
+/* What a job does, slice by slice: blurs headings, moves and weighs, counts the cells worth a hypothesis. */
+enum adaptive_phase { ADAPTIVE_TURN, ADAPTIVE_MOVE, ADAPTIVE_COUNT };
 
 enum { ADAPTIVE_SUB = 2 }; /* poses of the table per cell edge, and per slice's width */
 
-/* Cells are counted by powers of two of their mass, from 1 down. */
-enum { ADAPTIVE_SIZES = 40 };
-
 /* Some rows on their way into the belief. */
 struct adaptive_job {
-    bool running, turning; /* turning: still blurring headings */
-    bool sized;            /* counting cells by size */
-    int slice;             /* next to do */
+    bool running;
+    enum adaptive_phase phase;
+    int slice; /* next to do */
     struct nav_pose step;
     float side; /* weight of a neighbour in a position blur of this job, 0: none; passes of it */
     int passes;
     float side_heading;
-    float scale;      /* brings the mass before the job to 1 */
-    double reference; /* log-likelihood of the best codes: factors are relative to it */
-    double total;     /* mass so far */
-    float heaviest;
-    size_t mode;                   /* cell with the most mass so far */
-    double local;                  /* log-likelihood of its rows by the local belief */
-    uint64_t end;                  /* first row after it */
-    uint32_t many[ADAPTIVE_SIZES]; /* cells by the size of their mass */
+    float scale;           /* brings the mass before the job to 1 */
+    double reference;      /* log-likelihood of the best codes: factors are relative to it */
+    double total;          /* mass so far */
+    float heaviest;        /* cell so far, */
+    int mode_slice;        /* and its slice */
+    struct nav_pose about; /* moments of its slices are relative to this place */
+    double local;          /* log-likelihood of its rows by the local belief */
+    uint64_t end;          /* first row after it */
+    double worth;          /* mass of a cell that is worth one hypothesis */
+    double light, crowd;   /* mass of cells below that, and how many are not */
 };
 
 struct adaptive_global {
     const struct nav_problem *problem;
     struct nav_likelihood *likelihood; /* for what a whole cell covers */
     struct nav_expected *expected;
-    int nx, ny, nh;
+    int nx, ny, nh, pitch;   /* pitch: nx in whole lanes; cells beyond nx are empty */
     double cell, cell_theta; /* m, rad */
     double rotation;         /* as in lattice.h */
     double *shift_x, *shift_y;
-    float *mass, *scratch; /* [nh][ny][nx] */
-    uint8_t *live;         /* [nh][ny] whether the line holds mass */
+    float *mass, *turned;                     /* [nh][ny][pitch] the belief, and where headings are blurred to */
+    struct adaptive_span *span, *span_turned; /* [nh][ny] beyond which a line is empty */
+    struct adaptive_span *moved, *region;     /* [ny] of the slice that moves: its cells before and after blurs */
+    float *plane[2];                          /* [ny + 2][pitch + 2 lanes] empty but for the slice that moves */
+    float *coordinate;                        /* [pitch] of a line's cells in x */
+    float *like;                              /* [ny][pitch] likelihoods of a slice, */
+    int *missing;                             /* [pitch] and those of a line that are still to be worked out */
     double owed_position, owed_heading;
-    double *moment;               /* [nh][6] mass, x, y, xx, xy, yy of each slice about the arena's corner */
-    float **factor;               /* [whiskers][codes] likelihood of the present job, best 1 */
-    struct adaptive_value *value; /* [signatures] */
-    uint32_t jobs;
+    double (*moment)[NAV_MOMENTS]; /* [nh] of each slice */
+    float **factor;                /* [whiskers][codes] log-likelihood of the present job */
+    uint32_t *signature;           /* [expected->nh][SUB][SUB][ny + 1][pitch + 1]: by phase in y and x */
+    float *value;                  /* [signatures] likelihood in the present job, negative: not yet worked out */
+    uint32_t *known, knowns;       /* those worked out */
     struct adaptive_job job;
     bool fresh;                      /* uniform, and not yet written out */
     double log_free;                 /* logarithm of the share of cells where the robot can stand */
     uint64_t next;                   /* first row of the log that it has not seen */
     double total;                    /* mass */
-    size_t mode;                     /* cell with the most mass, */
-    double peak;                     /* and its share */
+    size_t mode;                     /* stored cell with the most mass */
     double gained;                   /* log-likelihood of the rows seen, less the local belief's, since the restart */
     struct adaptive_summary summary; /* at row `next` - 1 */
     double room;                     /* hypotheses that a cloud could hold */
@@ -100,24 +107,31 @@ void adaptive_global_summarise(struct adaptive_global *);
 long adaptive_global_list(const struct adaptive_global *, const struct adaptive_log *, struct nav_pose moved,
                           double mass, struct nav_component *out, long room);
 
-/* Centre of cell n. */
+/* Centre of stored cell n. */
 struct nav_pose adaptive_global_centre(const struct adaptive_global *, size_t n);
 
-/* Parts of a job, slice by slice: headings blurred into scratch, scratch made the belief, a slice moved and weighed. */
-void adaptive_global_turn(struct adaptive_global *, int slice);
+/* Parts of a job (adaptive_global_job.c): its beginning, and its phases for one slice each. A part that would touch
+ * more than `most` cells is not done; returns the number touched, or -1. */
+void adaptive_global_job_init(struct adaptive_global *);
+long adaptive_global_turn(struct adaptive_global *, int slice, long most);
+long adaptive_global_move(struct adaptive_global *, int slice, long most);
+long adaptive_global_count(struct adaptive_global *, int slice, long most);
+
+/* Makes the blurred headings the belief. */
 void adaptive_global_turned(struct adaptive_global *);
-void adaptive_global_move(struct adaptive_global *, int slice);
 
-/* Lines of a slice that hold mass. */
-int adaptive_global_lines(const struct adaptive_global *, int slice);
+/* Slice p as it is now, for sums. */
+struct nav_slice adaptive_global_slice(const struct adaptive_global *, int p);
 
-/* Cells of a slice. */
-static inline size_t adaptive_global_plane(const struct adaptive_global *g)
+/* First cell of a line. */
+static inline float *adaptive_global_line(const struct adaptive_global *g, float *mass, int p, int j)
 {
-    return (size_t)g->ny * (size_t)g->nx;
+    return mass + ((size_t)p * (size_t)g->ny + (size_t)j) * (size_t)g->pitch;
 }
 
+/* Cells of the arena; cells of the arrays, those beyond nx included. */
 size_t adaptive_global_cells(const struct adaptive_global *);
+size_t adaptive_global_stored(const struct adaptive_global *);
 size_t adaptive_global_bytes(const struct adaptive_global *);
 
 #endif

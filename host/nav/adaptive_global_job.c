@@ -1,6 +1,6 @@
-/* One slice of a job: moved by its heading, blurred by the motion's noise, weighed by the rows' factors. */
+/* Parts of a job for one slice: headings blurred, cells moved by the slice's heading, blurred by the motion's noise and
+ * weighed by the rows' factors, cells counted that are worth a hypothesis. */
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "adaptive_global.h"
@@ -8,234 +8,387 @@
 /* A cell with less than this share of all mass is dropped. A uniform belief has 1e-5 in each of its cells. */
 static const float SHARE_LEAST = 1e-8f;
 
-int adaptive_global_lines(const struct adaptive_global *g, int p)
+static int length(struct adaptive_span s)
 {
-    int count = 0;
-    for (int j = 0; j < g->ny; j++)
-        count += g->live[p * g->ny + j];
-    return count;
+    return s.end - s.begin;
 }
 
-static float *line(const struct adaptive_global *g, float *mass, int p, int j)
+/* Cells lo .. hi - 1 as a span of whole lanes within a line. */
+static struct adaptive_span span_of(const struct adaptive_global *g, int lo, int hi)
 {
-    return mass + ((size_t)p * (size_t)g->ny + (size_t)j) * (size_t)g->nx;
+    lo = lo > 0 ? lo : 0;
+    hi = hi < g->nx ? hi : g->nx;
+    if (lo >= hi)
+        return (struct adaptive_span){0, 0};
+    return (struct adaptive_span){lo / NAV_LANES * NAV_LANES, (hi + NAV_LANES - 1) / NAV_LANES * NAV_LANES};
 }
 
-/* Adds `side` of slice `from` to slice `to` in scratch, at the nearest cells of its other shift. */
-static void pour(struct adaptive_global *g, int to, int from, float side)
+static struct adaptive_span join(struct adaptive_span a, struct adaptive_span b)
 {
-    int dx = (int)floor((g->shift_x[from] - g->shift_x[to]) / g->cell + 0.5);
-    int dy = (int)floor((g->shift_y[from] - g->shift_y[to]) / g->cell + 0.5);
-    int first = dx > 0 ? 0 : -dx, last = dx > 0 ? g->nx - dx : g->nx;
+    if (length(a) == 0 || length(b) == 0)
+        return length(a) == 0 ? b : a;
+    return (struct adaptive_span){a.begin < b.begin ? a.begin : b.begin, a.end > b.end ? a.end : b.end};
+}
+
+/* A line's span moved by dx and grown by `by` on both sides. */
+static struct adaptive_span shifted(const struct adaptive_global *g, struct adaptive_span s, int dx, int by)
+{
+    return length(s) ? span_of(g, s.begin + dx - by, s.end + dx + by) : s;
+}
+
+static struct adaptive_span *spans(const struct adaptive_global *g, struct adaptive_span *of, int p)
+{
+    return of + (size_t)p * (size_t)g->ny;
+}
+
+void adaptive_global_job_init(struct adaptive_global *g)
+{
+    for (uint32_t n = 0; n < g->knowns; n++)
+        g->value[g->known[n]] = -1.0f;
+    g->knowns = 0;
+}
+
+/* A neighbouring slice, at the nearest cells of another's shift. */
+struct pour {
+    int slice, dx, dy;
+};
+
+static struct pour pour_from(const struct adaptive_global *g, int to, int from)
+{
+    return (struct pour){from, (int)floor((g->shift_x[from] - g->shift_x[to]) / g->cell + 0.5),
+                         (int)floor((g->shift_y[from] - g->shift_y[to]) / g->cell + 0.5)};
+}
+
+/* Span of what falls on line j. */
+static struct adaptive_span poured(const struct adaptive_global *g, const struct pour *pour, int j)
+{
+    j -= pour->dy;
+    if (j < 0 || j >= g->ny)
+        return (struct adaptive_span){0, 0};
+    return shifted(g, spans(g, g->span, pour->slice)[j], pour->dx, 0);
+}
+
+/* Adds `weight` of what falls on cells of line j. */
+static void pour_line(const struct adaptive_global *g, const struct pour *pour, int j, float weight, float *out)
+{
+    if (j - pour->dy < 0 || j - pour->dy >= g->ny)
+        return;
+    struct adaptive_span s = spans(g, g->span, pour->slice)[j - pour->dy];
+    const float *in = adaptive_global_line(g, g->mass, pour->slice, j - pour->dy) - pour->dx;
+    int begin = s.begin + pour->dx > 0 ? s.begin + pour->dx : 0;
+    int end = s.end + pour->dx < g->nx ? s.end + pour->dx : g->nx;
+    for (int i = begin; i < end; i++)
+        out[i] += weight * in[i];
+}
+
+long adaptive_global_turn(struct adaptive_global *g, int p, long most)
+{
+    float side = g->job.side_heading;
+    const float weight[3] = {1.0f - 2.0f * side, side, side};
+    const struct pour from[3] = {{p, 0, 0}, pour_from(g, p, (p + g->nh - 1) % g->nh), pour_from(g, p, (p + 1) % g->nh)};
+    struct adaptive_span *span = spans(g, g->span_turned, p);
+    long cells = 0;
     for (int j = 0; j < g->ny; j++) {
-        if (!g->live[from * g->ny + j] || j + dy < 0 || j + dy >= g->ny)
-            continue;
-        const float *in = line(g, g->mass, from, j);
-        float *out = line(g, g->scratch, to, j + dy) + dx;
-        for (int i = first; i < last; i++)
-            out[i] += side * in[i];
+        span[j] = join(join(poured(g, &from[0], j), poured(g, &from[1], j)), poured(g, &from[2], j));
+        cells += 3 * (long)length(span[j]);
     }
-}
-
-void adaptive_global_turn(struct adaptive_global *g, int p)
-{
-    float side = g->job.side_heading, centre = 1.0f - 2.0f * side;
-    int before = (p + g->nh - 1) % g->nh, after = (p + 1) % g->nh;
+    if (cells > most)
+        return -1;
+    memset(adaptive_global_line(g, g->turned, p, 0), 0, (size_t)(g->ny * g->pitch) * sizeof *g->turned);
     for (int j = 0; j < g->ny; j++) {
-        const float *in = line(g, g->mass, p, j);
-        float *out = line(g, g->scratch, p, j);
-        for (int i = 0; i < g->nx; i++)
-            out[i] = centre * in[i];
+        for (int k = 0; k < 3 && length(span[j]); k++)
+            pour_line(g, &from[k], j, weight[k], adaptive_global_line(g, g->turned, p, j));
     }
-    pour(g, p, before, side);
-    pour(g, p, after, side);
-    g->touched += 3 * (long)adaptive_global_plane(g);
+    return cells;
 }
 
 void adaptive_global_turned(struct adaptive_global *g)
 {
-    float *blurred = g->scratch;
-    g->scratch = g->mass;
-    g->mass = blurred;
-    g->job.turning = false;
-    g->job.slice = 0;
-    memset(g->live, 1, (size_t)g->nh * (size_t)g->ny); /* which lines gained mass, the next pass finds out */
+    float *mass = g->mass;
+    struct adaptive_span *span = g->span;
+    g->mass = g->turned;
+    g->span = g->span_turned;
+    g->turned = mass;
+    g->span_turned = span;
 }
 
-static int carry(double *shift, double by, double cell, int most)
+/* Line j of a plane. Lines -1 and ny, and a few cells on both sides, are always empty. */
+static float *plane_line(const struct adaptive_global *g, int plane, int j)
 {
-    double whole = floor((*shift + by) / cell + 0.5);
-    *shift += by - whole * cell;
-    return (int)fmax(fmin(whole, most), -most);
+    return g->plane[plane] + (size_t)(j + 1) * (size_t)(g->pitch + 2 * NAV_LANES) + NAV_LANES;
 }
 
-/* Moves a slice by whole cells; what enters is empty. */
-static void roll(struct adaptive_global *g, int p, int dx, int dy)
+static bool empty(const struct adaptive_global *g, int p)
 {
-    if (dx == 0 && dy == 0)
-        return;
-    float *slice = line(g, g->mass, p, 0);
-    size_t bytes = (size_t)g->nx * sizeof *slice;
-    memcpy(g->scratch, slice, adaptive_global_plane(g) * sizeof *slice);
-    uint8_t *live = g->live + p * g->ny, *was = (uint8_t *)(g->scratch + adaptive_global_plane(g));
-    memcpy(was, live, (size_t)g->ny);
+    int cells = 0;
+    for (int j = 0; j < g->ny; j++)
+        cells += length(spans(g, g->span, p)[j]);
+    return cells == 0;
+}
+
+/* Where a slice's cells will be after whole-cell moves, and what its blurs will spread them over; returns the cells of
+ * that. */
+static long plan(struct adaptive_global *g, int p, int dx, int dy)
+{
+    const struct adaptive_span none = {0, 0}, *span = spans(g, g->span, p);
+    int reach = g->job.passes;
+    long cells = 0;
+    for (int j = 0; j < g->ny; j++)
+        g->moved[j] = j - dy < 0 || j - dy >= g->ny ? none : shifted(g, span[j - dy], dx, reach);
     for (int j = 0; j < g->ny; j++) {
-        int from = j - dy;
-        live[j] = from >= 0 && from < g->ny && was[from];
-        float *out = slice + (size_t)j * (size_t)g->nx;
-        memset(out, 0, bytes);
-        if (live[j] && abs(dx) < g->nx) {
-            const float *in = g->scratch + (size_t)from * (size_t)g->nx;
-            memcpy(out + (dx > 0 ? dx : 0), in + (dx > 0 ? 0 : -dx), bytes - (size_t)abs(dx) * sizeof *out);
-        }
+        g->region[j] = g->moved[j];
+        for (int k = j - reach; k <= j + reach; k++)
+            g->region[j] = k < 0 || k >= g->ny ? g->region[j] : join(g->region[j], g->moved[k]);
+        cells += length(g->region[j]);
+    }
+    return cells;
+}
+
+/* Moves a slice into the first plane; what leaves the arena is lost. */
+static void lift(struct adaptive_global *g, int p, int dx, int dy)
+{
+    struct adaptive_span *span = spans(g, g->span, p);
+    for (int j = 0; j < g->ny; j++) {
+        struct adaptive_span s = span[j];
+        float *in = adaptive_global_line(g, g->mass, p, j);
+        int begin = s.begin + dx > 0 ? s.begin : -dx, end = s.end + dx < g->nx ? s.end : g->nx - dx;
+        if (j + dy >= 0 && j + dy < g->ny && begin < end)
+            memcpy(plane_line(g, 0, j + dy) + begin + dx, in + begin, (size_t)(end - begin) * sizeof *in);
+        memset(in + s.begin, 0, (size_t)length(s) * sizeof *in);
+        span[j] = (struct adaptive_span){0, 0};
     }
 }
 
-static void blur_line(const float *in, float *out, int n, float side)
+static void blur_along(struct adaptive_global *g)
 {
-    float centre = 1.0f - 2.0f * side;
-    for (int i = 1; i + 1 < n; i++)
-        out[i] = centre * in[i] + side * (in[i - 1] + in[i + 1]);
-    out[0] = centre * in[0] + (n > 1 ? side * in[1] : 0.0f);
-    if (n > 1)
-        out[n - 1] = centre * in[n - 1] + side * in[n - 2];
+    for (int j = 0; j < g->ny; j++)
+        nav_rows_best()->blur(plane_line(g, 0, j), g->job.side, g->region[j].begin, g->region[j].end,
+                              plane_line(g, 1, j));
 }
 
-/* One pass of a three-point blur along x and y. */
-static void blur_slice(struct adaptive_global *g, int p, float side)
+static void blur_across(struct adaptive_global *g)
 {
-    uint8_t *live = g->live + p * g->ny, *was = (uint8_t *)(g->scratch + adaptive_global_plane(g));
-    memcpy(was, live, (size_t)g->ny);
+    float side = g->job.side, centre = 1.0f - 2.0f * side;
     for (int j = 0; j < g->ny; j++) {
-        if (was[j])
-            blur_line(line(g, g->mass, p, j), g->scratch + j * g->nx, g->nx, side);
-        else
-            memset(g->scratch + j * g->nx, 0, (size_t)g->nx * sizeof *g->scratch);
+        const float *above = plane_line(g, 1, j - 1), *at = plane_line(g, 1, j), *below = plane_line(g, 1, j + 1);
+        float *out = plane_line(g, 0, j);
+        for (int i = g->region[j].begin; i < g->region[j].end; i++)
+            out[i] = centre * at[i] + side * (above[i] + below[i]);
     }
+}
+
+/* Empties both planes again. */
+static void clear_planes(struct adaptive_global *g)
+{
     for (int j = 0; j < g->ny; j++) {
-        bool below = j > 0 && was[j - 1], above = j + 1 < g->ny && was[j + 1];
-        live[j] = was[j] || below || above;
-        if (!live[j])
-            continue;
-        const float *row = g->scratch + j * g->nx, *low = below ? row - g->nx : row, *high = above ? row + g->nx : row;
-        float a = below ? side : 0.0f, b = above ? side : 0.0f, centre = 1.0f - 2.0f * side;
-        float *out = line(g, g->mass, p, j);
-        for (int i = 0; i < g->nx; i++)
-            out[i] = centre * row[i] + a * low[i] + b * high[i];
+        size_t bytes = (size_t)length(g->region[j]) * sizeof(float);
+        memset(plane_line(g, 0, j) + g->region[j].begin, 0, bytes);
+        if (g->job.passes)
+            memset(plane_line(g, 1, j) + g->region[j].begin, 0, bytes);
     }
 }
 
 /* Works out a signature's likelihood for the present job. */
 static float value_of(struct adaptive_global *g, uint32_t signature)
 {
-    const uint8_t *codes = g->expected->codes + signature * ((size_t)g->expected->whiskers + 1);
-    float product = signature ? 1.0f : 0.0f;
-    for (int w = 0; signature && w < g->expected->whiskers; w++)
-        product *= g->factor[w][codes[w]];
     g->distinct++;
-    g->value[signature] = (struct adaptive_value){g->jobs, product};
-    return product;
+    g->known[g->knowns++] = signature;
+    return g->value[signature] = (float)nav_expected_one(g->expected, signature);
 }
 
-/* Power of two of a mass up to 1, as an index: 0 for 1/2 .. 1. */
-static int size_of(float mass)
+static bool any(const float mass[NAV_LANES])
 {
-    uint32_t bits;
-    memcpy(&bits, &mass, sizeof bits);
-    int size = 126 - (int)(bits >> 23);
-    return size < 0 ? 0 : size < ADAPTIVE_SIZES ? size : ADAPTIVE_SIZES - 1;
+    uint32_t bits[NAV_LANES], all = 0;
+    memcpy(bits, mass, sizeof bits);
+    for (int k = 0; k < NAV_LANES; k++)
+        all |= bits[k];
+    return all << 1 != 0; /* but for a sign */
 }
 
-/* Counts a line's cells by the size of their mass. */
-static void count_line(struct adaptive_global *g, const float *cell)
+/* Looks up a line's likelihoods where there is mass, and lists the cells whose likelihood is still to be worked out:
+ * its sign tells. Without branches from cell to cell: which these are, nobody can predict. */
+static int look_up(const struct adaptive_global *g, const uint32_t *signature, const float *mass, float *like,
+                   struct adaptive_span s)
 {
-    for (int i = 0; i < g->nx; i++)
-        g->job.many[size_of(cell[i])]++;
-}
-
-/* Weighs one line of cells; returns its mass. */
-static double weigh_line(struct adaptive_global *g, float *cell, const uint32_t *signature)
-{
-    float scale = g->job.scale, heaviest = g->job.heaviest, total = 0.0f;
-    const struct adaptive_value *value = g->value;
-    uint32_t jobs = g->jobs;
-    int n = g->nx, mode = -1;
-    for (int i = 0; i < n; i++) {
-        float before = cell[i] * scale;
-        if (!(before > SHARE_LEAST)) {
-            cell[i] = 0.0f;
+    const float *value = g->value;
+    int *missing = g->missing, count = 0;
+    for (int first = s.begin; first < s.end; first += NAV_LANES) {
+        if (!any(mass + first))
             continue;
-        }
-        uint32_t code = signature[i * ADAPTIVE_SUB];
-        float mass = before * (value[code].job == jobs ? value[code].value : value_of(g, code));
-        cell[i] = mass;
-        total += mass;
-        if (mass > heaviest) {
-            heaviest = mass;
-            mode = i;
+        for (int i = first; i < first + NAV_LANES; i++) {
+            uint32_t bits, held;
+            memcpy(&bits, &value[signature[i]], sizeof bits);
+            memcpy(&like[i], &bits, sizeof bits);
+            memcpy(&held, &mass[i], sizeof held);
+            missing[count] = i;
+            count += (int)(bits >> 31) & (held != 0);
         }
     }
-    if (mode >= 0) {
-        g->job.heaviest = heaviest;
-        g->job.mode = (size_t)(cell + mode - g->mass);
-    }
-    return (double)total;
+    return count;
 }
 
-/* Adds a line's moments about the arena's corner to its slice's. */
-static void add_moments(struct adaptive_global *g, int p, int j, const float *cell)
+static void complete(struct adaptive_global *g, const uint32_t *signature, float *like, int count)
 {
-    float mass = 0.0f, first = 0.0f, second = 0.0f, x = (float)(0.5 * g->cell + g->shift_x[p]);
-    for (int i = 0; i < g->nx; i++) {
-        float at = x + (float)i * (float)g->cell, part = cell[i] * at;
-        mass += cell[i];
-        first += part;
-        second += part * at;
+    for (int n = 0; n < count; n++) {
+        int i = g->missing[n];
+        float known = g->value[signature[i]]; /* an earlier cell of the line may have asked for it */
+        like[i] = known < 0.0f ? value_of(g, signature[i]) : known;
     }
-    double y = (j + 0.5) * g->cell + g->shift_y[p], *m = g->moment + 6 * p;
-    const double add[6] = {(double)mass,   (double)first,     y * (double)mass,
-                           (double)second, y * (double)first, y * y * (double)mass};
-    for (int k = 0; k < 6; k++)
-        m[k] += add[k];
 }
 
-static void weigh_slice(struct adaptive_global *g, int p)
+/* First row of signatures of a slice's phase, at the heading after the job's motion. */
+static const uint32_t *signatures(const struct adaptive_global *g, int p)
 {
-    memset(g->moment + 6 * p, 0, 6 * sizeof *g->moment);
     double heading = ((p + 0.5) * g->cell_theta + g->rotation + g->job.step.theta) / (2.0 * NAV_PI);
     int k = (int)((heading - floor(heading)) * g->expected->nh) % g->expected->nh;
     int x = (int)floor(0.5 * ADAPTIVE_SUB + g->shift_x[p] / g->expected->step);
-    double y = 0.5 * ADAPTIVE_SUB + g->shift_y[p] / g->expected->step;
-    for (int j = 0; j < g->ny; j++) {
-        if (!g->live[p * g->ny + j])
-            continue;
-        const uint32_t *signature = nav_expected_row(g->expected, k, (int)floor(y + j * ADAPTIVE_SUB)) + x;
-        double mass = weigh_line(g, line(g, g->mass, p, j), signature);
-        g->job.total += mass;
-        g->live[p * g->ny + j] = mass > 0.0;
-        if (!(mass > 0.0))
-            continue;
-        add_moments(g, p, j, line(g, g->mass, p, j));
-        if (g->job.sized)
-            count_line(g, line(g, g->mass, p, j));
+    int y = (int)floor(0.5 * ADAPTIVE_SUB + g->shift_y[p] / g->expected->step);
+    size_t layer = ((size_t)k * ADAPTIVE_SUB + (size_t)(y % ADAPTIVE_SUB)) * ADAPTIVE_SUB + (size_t)(x % ADAPTIVE_SUB);
+    size_t row = layer * ((size_t)g->ny + 1) + (size_t)(y / ADAPTIVE_SUB);
+    return g->signature + row * ((size_t)g->pitch + 1) + x / ADAPTIVE_SUB;
+}
+
+/* What is left of a span without its empty ends. */
+static struct adaptive_span tighten(const float *cell, struct adaptive_span s)
+{
+    while (s.begin < s.end && !any(cell + s.begin))
+        s.begin += NAV_LANES;
+    while (s.begin < s.end && !any(cell + s.end - NAV_LANES))
+        s.end -= NAV_LANES;
+    return length(s) ? s : (struct adaptive_span){0, 0};
+}
+
+static void note(struct adaptive_global *g, int p, const struct nav_row_sums *sums)
+{
+    nav_slice_moments(sums, g->moment[p]);
+    g->job.total += g->moment[p][0];
+    for (int k = 0; k < NAV_LANES; k++) {
+        if (sums->peak[k] > g->job.heaviest) {
+            g->job.heaviest = sums->peak[k];
+            g->job.mode_slice = p;
+        }
     }
 }
 
-void adaptive_global_move(struct adaptive_global *g, int p)
+/* Line j of the likelihoods. */
+static float *likelihoods(const struct adaptive_global *g, int j)
 {
-    if (g->fresh) {
-        float each = (float)(1.0 / (double)adaptive_global_cells(g));
-        for (size_t i = 0; i < adaptive_global_plane(g); i++)
-            line(g, g->mass, p, 0)[i] = each;
-        memset(g->live + p * g->ny, 1, (size_t)g->ny);
+    return g->like + (size_t)j * (size_t)g->pitch;
+}
+
+/* Takes what the planes hold into the belief, light cells left out, and looks up what is to be multiplied. */
+static void drop(struct adaptive_global *g, int p)
+{
+    float side = g->job.passes ? g->job.side : 0.0f, scale = g->job.scale;
+    struct nav_row_weigh w = {.centre = scale * (1.0f - 2.0f * side), .side = scale * side, .least = SHARE_LEAST};
+    const uint32_t *signature = signatures(g, p);
+    int plane = g->job.passes > 0;
+    for (int j = 0; j < g->ny; j++, signature += g->pitch + 1) {
+        struct adaptive_span s = g->region[j];
+        if (length(s) == 0)
+            continue;
+        w.above = plane_line(g, plane, j - 1);
+        w.at = plane_line(g, plane, j);
+        w.below = plane_line(g, plane, j + 1);
+        w.begin = s.begin;
+        w.end = s.end;
+        w.out = adaptive_global_line(g, g->mass, p, j);
+        nav_rows_best()->thin(&w);
+        complete(g, signature, likelihoods(g, j), look_up(g, signature, w.out, likelihoods(g, j), s));
     }
+}
+
+/* Multiplies. Where there is no mass, likelihoods that nobody asked for do no harm. */
+static void weigh(struct adaptive_global *g, int p)
+{
+    const struct nav_slice slice = adaptive_global_slice(g, p);
+    struct adaptive_span *span = spans(g, g->span, p);
+    struct nav_row_sums sums = {.peak = {0.0f}};
+    struct nav_row_weigh w = {.coordinate = g->coordinate, .centre = 1.0f};
+    nav_slice_coordinates(slice.x - g->job.about.x, g->cell, g->pitch, g->coordinate);
+    for (int j = 0; j < g->ny; j++) {
+        w.at = w.above = w.below = w.out = adaptive_global_line(g, g->mass, p, j);
+        w.like = likelihoods(g, j);
+        w.y = (float)(slice.y + j * g->cell - g->job.about.y);
+        w.begin = g->region[j].begin;
+        w.end = g->region[j].end;
+        nav_rows_best()->weigh(&w, &sums);
+        span[j] = tighten(w.out, g->region[j]);
+    }
+    note(g, p, &sums);
+}
+
+/* A slice of the uniform belief stays uniform when it moves: what would enter is as likely as what leaves. */
+static void fill(struct adaptive_global *g)
+{
+    float each = (float)(1.0 / (double)adaptive_global_cells(g));
+    for (int j = 0; j < g->ny; j++) {
+        float *out = plane_line(g, 0, j);
+        for (int i = 0; i < g->nx; i++)
+            out[i] = each;
+        g->region[j] = (struct adaptive_span){0, g->pitch};
+    }
+    g->job.passes = 0;
+}
+
+long adaptive_global_move(struct adaptive_global *g, int p, long most)
+{
     double heading = (p + 0.5) * g->cell_theta + g->rotation, c = cos(heading), s = sin(heading);
-    int dx = carry(&g->shift_x[p], c * g->job.step.x - s * g->job.step.y, g->cell, g->nx);
-    int dy = carry(&g->shift_y[p], s * g->job.step.x + c * g->job.step.y, g->cell, g->ny);
-    if (!g->fresh) { /* uniform stays uniform: what would enter is as likely as what leaves */
-        roll(g, p, dx, dy);
-        for (int pass = 0; pass < g->job.passes; pass++)
-            blur_slice(g, p, g->job.side);
+    double x = g->shift_x[p], y = g->shift_y[p];
+    int dx = nav_slice_carry(&x, c * g->job.step.x - s * g->job.step.y, g->cell, g->nx);
+    int dy = nav_slice_carry(&y, s * g->job.step.x + c * g->job.step.y, g->cell, g->ny);
+    bool none = !g->fresh && empty(g, p);
+    long cells = g->fresh ? (long)g->ny * g->pitch
+                 : none   ? 0
+                          : plan(g, p, dx, dy),
+         touched = (2 + g->job.passes) * cells;
+    if (touched > most)
+        return -1;
+    g->shift_x[p] = x;
+    g->shift_y[p] = y;
+    memset(g->moment[p], 0, sizeof g->moment[p]);
+    if (none)
+        return 0;
+    if (g->fresh)
+        fill(g);
+    else
+        lift(g, p, dx, dy);
+    for (int pass = 0; pass < g->job.passes; pass++) {
+        blur_along(g);
+        if (pass + 1 < g->job.passes) /* the last is part of weighing */
+            blur_across(g);
     }
-    weigh_slice(g, p);
+    drop(g, p);
+    weigh(g, p);
+    clear_planes(g);
+    return touched;
+}
+
+static void count_line(struct adaptive_global *g, const float *cell, struct adaptive_span s)
+{
+    float worth = (float)g->job.worth, light[NAV_LANES] = {0.0f}, crowd[NAV_LANES] = {0.0f};
+    for (int i = s.begin; i < s.end; i += NAV_LANES) {
+        for (int k = 0; k < NAV_LANES; k++) {
+            float mass = cell[i + k];
+            light[k] += mass < worth ? mass : 0.0f;
+            crowd[k] += mass < worth ? 0.0f : 1.0f;
+        }
+    }
+    for (int k = 0; k < NAV_LANES; k++) {
+        g->job.light += (double)light[k];
+        g->job.crowd += (double)crowd[k];
+    }
+}
+
+long adaptive_global_count(struct adaptive_global *g, int p, long most)
+{
+    const struct adaptive_span *span = spans(g, g->span, p);
+    long cells = 0;
+    for (int j = 0; j < g->ny; j++)
+        cells += length(span[j]);
+    if (cells > most)
+        return -1;
+    for (int j = 0; j < g->ny; j++)
+        count_line(g, adaptive_global_line(g, g->mass, p, j), span[j]);
+    return cells;
 }

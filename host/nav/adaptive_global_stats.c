@@ -11,86 +11,50 @@ static double heading_of(const struct adaptive_global *g, int p)
 
 struct nav_pose adaptive_global_centre(const struct adaptive_global *g, size_t n)
 {
-    int p = (int)(n / ((size_t)g->nx * (size_t)g->ny)), j = (int)(n / (size_t)g->nx % (size_t)g->ny);
-    int i = (int)(n % (size_t)g->nx);
+    size_t pitch = (size_t)g->pitch, ny = (size_t)g->ny;
+    int p = (int)(n / pitch / ny), j = (int)(n / pitch % ny), i = (int)(n % pitch);
     return (struct nav_pose){(i + 0.5) * g->cell + g->shift_x[p], (j + 0.5) * g->cell + g->shift_y[p],
                              nav_wrap(heading_of(g, p))};
 }
 
-struct sums {
-    double mass, x, y, theta; /* offsets from the pose, times mass */
-};
-
-static void near_in_slice(const struct adaptive_global *g, int p, struct nav_pose pose, double turn, struct sums *s)
+struct nav_slice adaptive_global_slice(const struct adaptive_global *g, int p)
 {
-    double x0 = 0.5 * g->cell + g->shift_x[p] - pose.x, y0 = 0.5 * g->cell + g->shift_y[p] - pose.y;
-    int first_j = (int)fmax(ceil((-NAV_NEAR_M - y0) / g->cell), 0.0);
-    int first_i = (int)fmax(ceil((-NAV_NEAR_M - x0) / g->cell), 0.0);
-    for (int j = first_j; j < g->ny && y0 + j * g->cell <= NAV_NEAR_M; j++) {
-        const float *row = g->mass + ((size_t)p * (size_t)g->ny + (size_t)j) * (size_t)g->nx;
-        double y = y0 + j * g->cell;
-        for (int i = first_i; i < g->nx && x0 + i * g->cell <= NAV_NEAR_M; i++) {
-            double x = x0 + i * g->cell, mass = (double)row[i];
-            if (x * x + y * y > NAV_NEAR_M * NAV_NEAR_M)
-                continue;
-            s->mass += mass;
-            s->x += mass * x;
-            s->y += mass * y;
-            s->theta += mass * turn;
-        }
-    }
+    return (struct nav_slice){.mass = adaptive_global_line(g, g->mass, p, 0),
+                              .nx = g->nx,
+                              .ny = g->ny,
+                              .pitch = g->pitch,
+                              .cell = g->cell,
+                              .x = 0.5 * g->cell + g->shift_x[p],
+                              .y = 0.5 * g->cell + g->shift_y[p],
+                              .heading = heading_of(g, p)};
 }
 
 double adaptive_global_near(const struct adaptive_global *g, struct nav_pose pose, struct nav_pose *mean)
 {
-    struct sums s = {.mass = 0.0};
+    struct nav_near sums = {.mass = 0.0};
     if (g->fresh)
         return g->summary.near;
     for (int p = 0; p < g->nh; p++) {
-        double turn = nav_wrap(heading_of(g, p) - pose.theta);
-        if (fabs(turn) <= NAV_NEAR_RAD)
-            near_in_slice(g, p, pose, turn, &s);
+        const struct nav_slice slice = adaptive_global_slice(g, p);
+        nav_slice_near(&slice, pose, &sums);
     }
-    if (mean && s.mass > 0.0)
-        *mean =
-            (struct nav_pose){pose.x + s.x / s.mass, pose.y + s.y / s.mass, nav_wrap(pose.theta + s.theta / s.mass)};
-    return fmin(s.mass / g->total, 1.0);
-}
-
-/* Adds a slice's second moments about a pose. */
-static void add_slice(const struct adaptive_global *g, int p, struct nav_pose about, double covariance[9])
-{
-    const double *m = g->moment + 6 * p;
-    double x = m[1] - about.x * m[0], y = m[2] - about.y * m[0], t = nav_wrap(heading_of(g, p) - about.theta);
-    double xx = m[3] - about.x * (m[1] + x), xy = m[4] - about.x * m[2] - about.y * x;
-    double yy = m[5] - about.y * (m[2] + y);
-    const double add[9] = {xx, xy, t * x, xy, yy, t * y, t * x, t * y, t * t * m[0]};
-    for (int k = 0; k < 9; k++)
-        covariance[k] += add[k] / g->total;
+    if (mean && sums.mass > 0.0)
+        *mean = nav_near_mean(&sums, pose);
+    return fmin(sums.mass / g->total, 1.0);
 }
 
 void adaptive_global_summarise(struct adaptive_global *g)
 {
     struct adaptive_summary *s = &g->summary;
+    double sums[6] = {0.0};
     *s = (struct adaptive_summary){.near = 0.0};
     s->belief.mean = adaptive_global_centre(g, g->mode);
     adaptive_global_near(g, s->belief.mean, &s->belief.mean);
     s->near = adaptive_global_near(g, s->belief.mean, NULL);
     for (int p = 0; p < g->nh; p++)
-        add_slice(g, p, s->belief.mean, s->belief.covariance);
-    s->belief.covariance[0] += g->cell * g->cell / 12.0;
-    s->belief.covariance[4] += g->cell * g->cell / 12.0;
-    s->belief.covariance[8] += g->cell_theta * g->cell_theta / 12.0;
-    double worth = g->total / g->room, size = 1.0;
-    g->scattered = g->job.sized ? 0.0 : 1.0;
-    g->crowd = 0.0;
-    for (int n = 0; n < ADAPTIVE_SIZES; n++, size /= 2.0) {
-        /* Cells of this size hold size / 2 .. size, about 3/4 of it. */
-        if (size / 2.0 < worth)
-            g->scattered += 0.75 * size * g->job.many[n] / g->total;
-        else
-            g->crowd += g->job.many[n];
-    }
+        nav_slice_add(g->moment[p], s->belief.mean.x - g->job.about.x, s->belief.mean.y - g->job.about.y,
+                      nav_wrap(heading_of(g, p) - s->belief.mean.theta), sums);
+    nav_slice_covariance(sums, g->total, g->cell, g->cell_theta, s->belief.covariance);
 }
 
 /* Mass of the cell that holds a pose. */
@@ -101,7 +65,7 @@ static double mass_at(const struct adaptive_global *g, struct nav_pose pose)
     int i = (int)floor((pose.x - g->shift_x[p]) / g->cell), j = (int)floor((pose.y - g->shift_y[p]) / g->cell);
     if (i < 0 || j < 0 || i >= g->nx || j >= g->ny)
         return 0.0;
-    return (double)g->mass[((size_t)p * (size_t)g->ny + (size_t)j) * (size_t)g->nx + (size_t)i];
+    return (double)adaptive_global_line(g, g->mass, p, j)[i];
 }
 
 /* What each image of a cell holds of their mass together. */
@@ -128,9 +92,10 @@ void adaptive_global_draw(struct adaptive_global *g, struct adaptive_cloud *clou
 {
     double step = g->total / (double)count, mark = step * nav_rng_uniform(&cloud->rng), sum = 0.0;
     float share[ADAPTIVE_IMAGES_MOST];
-    for (size_t n = 0; n < adaptive_global_cells(g); n++) {
-        if (n % (size_t)g->nx == 0 && !g->live[n / (size_t)g->nx]) {
-            n += (size_t)g->nx - 1;
+    for (size_t n = 0; n < adaptive_global_stored(g); n++) {
+        size_t line = n / (size_t)g->pitch;
+        if (n % (size_t)g->pitch == 0 && g->span[line].begin == g->span[line].end) {
+            n += (size_t)g->pitch - 1;
             continue;
         }
         sum += (double)g->mass[n];
@@ -147,15 +112,17 @@ void adaptive_global_draw(struct adaptive_global *g, struct adaptive_cloud *clou
 /* Slices that the present job has moved and weighed. */
 static int slices_done(const struct adaptive_global *g)
 {
-    return g->job.running && !g->job.turning ? g->job.slice : 0;
+    if (!g->job.running || g->job.phase == ADAPTIVE_TURN)
+        return 0;
+    return g->job.phase == ADAPTIVE_MOVE ? g->job.slice : g->nh;
 }
 
 /* Mass of one slice's cells; a uniform belief is not written out before its first job comes by. */
 static double slice_mass(const struct adaptive_global *g, int p)
 {
-    const float *cell = g->mass + (size_t)p * adaptive_global_plane(g);
+    const float *cell = adaptive_global_line(g, g->mass, p, 0);
     double sum = 0.0;
-    for (size_t i = 0; i < adaptive_global_plane(g); i++)
+    for (int i = 0; i < g->ny * g->pitch; i++)
         sum += (double)cell[i];
     return sum;
 }
@@ -193,8 +160,10 @@ long adaptive_global_list(const struct adaptive_global *g, const struct adaptive
     struct nav_pose since_job = done ? nav_compose(adaptive_log_since(log, g->job.end), moved) : since;
     struct nav_component bump = {.sigma_m = g->cell / sqrt(12.0), .sigma_rad = g->cell_theta / sqrt(12.0)};
     long count = 0;
-    for (size_t n = 0; n < adaptive_global_cells(g); n++) {
-        bool after = n < (size_t)done * adaptive_global_plane(g);
+    for (size_t n = 0; n < adaptive_global_stored(g); n++) {
+        bool after = n < (size_t)done * (size_t)(g->ny * g->pitch);
+        if (n % (size_t)g->pitch >= (size_t)g->nx)
+            continue;
         double held = g->fresh && !after ? 1.0 / (double)adaptive_global_cells(g) : (double)g->mass[n];
         bump.mass = mass * held * (after ? worth.done : worth.waiting);
         if (!(bump.mass > 0.0))

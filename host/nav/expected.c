@@ -140,10 +140,8 @@ void nav_expected_free(struct nav_expected *e)
 /* A product of factors stays above 1e-304 when all their ranges together stay below this, nats. */
 static const double RANGE_MOST = 700.0;
 
-static void evaluate_leaf(const struct nav_expected *e, const struct nav_factor_node *leaf,
-                          const struct nav_likelihood *l)
+static void evaluate_leaf(const struct nav_expected *e, const struct nav_factor_node *leaf, const float *table)
 {
-    const float *table = l->table[leaf->whisker];
     float best = table[0];
     for (uint32_t k = 1; k < leaf->count; k++)
         best = fmaxf(best, table[k]);
@@ -151,18 +149,29 @@ static void evaluate_leaf(const struct nav_expected *e, const struct nav_factor_
         leaf->value[k] = exp(fmax((double)(table[k] - best), -RANGE_MOST / e->whiskers));
 }
 
-void nav_expected_evaluate(struct nav_expected *e, const struct nav_likelihood *likelihood)
+static void evaluate_leaves(struct nav_expected *e, const float *const *table)
 {
     for (int n = 0; n < e->factor.nodes; n++) {
         const struct nav_factor_node *node = &e->factor.node[n];
         if (node->left >= 0)
             continue;
         if (node->whisker < e->whiskers)
-            evaluate_leaf(e, node, likelihood);
+            evaluate_leaf(e, node, table[node->whisker]);
         else
             node->value[0] = 1.0;
     }
+}
+
+void nav_expected_evaluate(struct nav_expected *e, const struct nav_likelihood *likelihood)
+{
+    evaluate_leaves(e, (const float *const *)likelihood->table);
     nav_factor_work_out(&e->factor);
+}
+
+void nav_expected_prepare(struct nav_expected *e, const float *const *table)
+{
+    evaluate_leaves(e, table);
+    nav_factor_prepare(&e->factor);
 }
 
 const uint32_t *nav_expected_row(const struct nav_expected *e, int k, int j)

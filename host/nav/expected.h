@@ -29,9 +29,19 @@ struct nav_expected *nav_expected_new(const struct nav_arena *, const struct nav
                                       double step, int headings, int margin);
 void nav_expected_free(struct nav_expected *);
 
-/* Works out `value` for the row last read into the likelihood, relative to the product of each whisker's best code:
- * at most 1. Whiskers' ranges are cut so that no product underflows. */
+/* Works out `value` for the row last read into the likelihood, relative to the product of each whisker's best code: at
+ * most 1. Whiskers' ranges are cut so that no product underflows. */
 void nav_expected_evaluate(struct nav_expected *, const struct nav_likelihood *);
+
+/* The same for what one asks for only: prepares it from the whiskers' tables of log-likelihoods (table[w][code]), ...
+ */
+void nav_expected_prepare(struct nav_expected *, const float *const *table);
+
+/* ... and works out signature n > 0. */
+static inline double nav_expected_one(const struct nav_expected *e, uint32_t n)
+{
+    return nav_factor_one(&e->factor, n - 1);
+}
 
 /* First pose of lattice row j (-margin <= j < ny + margin) at heading k; index -margin .. nx + margin - 1 is valid. */
 const uint32_t *nav_expected_row(const struct nav_expected *, int k, int j);

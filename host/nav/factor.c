@@ -79,16 +79,26 @@ void nav_factor_free(struct nav_factor *f)
     free(f->node);
 }
 
+static void work_out_node(struct nav_factor *f, int n)
+{
+    struct nav_factor_node *node = &f->node[n];
+    if (node->left < 0)
+        return;
+    const double *left = f->node[node->left].value, *right = f->node[node->right].value;
+    for (uint32_t i = 0; i < node->count; i++)
+        node->value[i] = left[node->pair[i].left] * right[node->pair[i].right];
+}
+
+void nav_factor_prepare(struct nav_factor *f)
+{
+    for (int n = 0; n + 1 < f->nodes; n++)
+        work_out_node(f, n);
+}
+
 void nav_factor_work_out(struct nav_factor *f)
 {
-    for (int n = 0; n < f->nodes; n++) {
-        struct nav_factor_node *node = &f->node[n];
-        if (node->left < 0)
-            continue;
-        const double *left = f->node[node->left].value, *right = f->node[node->right].value;
-        for (uint32_t i = 0; i < node->count; i++)
-            node->value[i] = left[node->pair[i].left] * right[node->pair[i].right];
-    }
+    nav_factor_prepare(f);
+    work_out_node(f, f->nodes - 1);
 }
 
 size_t nav_factor_bytes(const struct nav_factor *f)

@@ -34,6 +34,17 @@ void nav_factor_free(struct nav_factor *);
 /* Products for all signatures, from the leaves' values: fill these first. */
 void nav_factor_work_out(struct nav_factor *);
 
+/* The same in two steps: all but the last product of each signature, and that product for one. */
+void nav_factor_prepare(struct nav_factor *);
+static inline double nav_factor_one(const struct nav_factor *f, uint32_t signature)
+{
+    const struct nav_factor_node *root = &f->node[f->nodes - 1];
+    if (root->left < 0)
+        return root->value[signature];
+    struct nav_pair pair = root->pair[signature];
+    return f->node[root->left].value[pair.left] * f->node[root->right].value[pair.right];
+}
+
 size_t nav_factor_bytes(const struct nav_factor *);
 
 #endif

@@ -59,14 +59,6 @@ float *nav_lattice_slice(const struct nav_lattice *l, int slice)
     return l->mass + (size_t)slice * slice_cells(l);
 }
 
-/* Adds to a shift and returns the whole cells it has gathered, beyond which it stays within half a cell. */
-static int carry(double *shift, double by, double cell, int most)
-{
-    double whole = floor((*shift + by) / cell + 0.5);
-    *shift += by - whole * cell;
-    return (int)fmax(fmin(whole, most), -most);
-}
-
 static int clip(int value, int most)
 {
     return value < -most ? -most : value > most ? most : value;
@@ -76,8 +68,8 @@ void nav_lattice_shift(struct nav_lattice *l, struct nav_pose step, const struct
 {
     for (int p = 0; p < l->nh; p++) {
         double c = cos(nav_lattice_heading(l, p)), s = sin(nav_lattice_heading(l, p));
-        int dx = carry(&l->shift_x[p], c * step.x - s * step.y, l->cell, l->nx);
-        int dy = carry(&l->shift_y[p], s * step.x + c * step.y, l->cell, l->ny);
+        int dx = nav_slice_carry(&l->shift_x[p], c * step.x - s * step.y, l->cell, l->nx);
+        int dy = nav_slice_carry(&l->shift_y[p], s * step.x + c * step.y, l->cell, l->ny);
         l->roll_x[p] = clip(l->roll_x[p] + dx, l->nx);
         l->roll_y[p] = clip(l->roll_y[p] + dy, l->ny);
     }

@@ -12,8 +12,7 @@
 #include "filter.h"
 #include "motion.h"
 #include "pose.h"
-
-enum { NAV_MOMENTS = 6 };
+#include "slices.h"
 
 struct nav_lattice {
     int nx, ny, nh;

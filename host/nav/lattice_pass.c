@@ -127,14 +127,6 @@ static const float *blurred_row(struct pass *s, int p, int j, float *out)
     return out;
 }
 
-static double add_up(const float v[NAV_LANES])
-{
-    double sum = 0.0;
-    for (int k = 0; k < NAV_LANES; k++)
-        sum += (double)v[k];
-    return sum;
-}
-
 static void note_peak(struct pass *s, const float peak[NAV_LANES], int slice)
 {
     for (int k = 0; k < NAV_LANES; k++) {
@@ -163,8 +155,7 @@ static void set_pour(struct pass *s, int n, int p, int q)
 static void begin_slice(struct pass *s, int p)
 {
     const struct nav_lattice *l = s->l;
-    for (int i = s->i0; i < s->i1; i++)
-        s->coordinate[i] = (float)((i + 0.5) * l->cell + l->shift_x[p] - l->moment_x);
+    nav_slice_coordinates(0.5 * l->cell + l->shift_x[p] - l->moment_x, l->cell, l->nx, s->coordinate);
     if (s->side_turn > 0.0f) {
         set_pour(s, 0, p, (p + 1) % l->nh);
         set_pour(s, 1, p, (p + l->nh - 1) % l->nh);
@@ -217,8 +208,7 @@ static void run_slice(struct pass *s, int p)
         s->rows->weigh(&w, &sums);
     }
     note_peak(s, sums.peak, p);
-    for (int k = 0; k < NAV_MOMENTS; k++)
-        l->moment[p][k] = add_up(sums.moment[k]);
+    nav_slice_moments(&sums, l->moment[p]);
     l->total += l->moment[p][0];
 }
 

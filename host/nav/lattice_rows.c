@@ -84,7 +84,21 @@ EVERYWHERE void weigh_row(const struct nav_row_weigh *args, struct nav_row_sums 
     memcpy(sums->peak, &s.peak, sizeof s.peak);
 }
 
-/* One set of the three functions, compiled for a target. */
+EVERYWHERE void thin_row(const struct nav_row_weigh *args)
+{
+    struct nav_row_weigh w = *args;
+    for (int i = w.begin; i < w.end; i += NAV_LANES) {
+        lanes v, above, below;
+        memcpy(&v, w.at + i, sizeof v);
+        memcpy(&above, w.above + i, sizeof v);
+        memcpy(&below, w.below + i, sizeof v);
+        v = w.centre * v + w.side * (above + below);
+        v = (lanes)((masks)v & (v > w.least));
+        memcpy(w.out + i, &v, sizeof v);
+    }
+}
+
+/* One set of the four functions, compiled for a target. */
 #define ROWS(name, target)                                                                                             \
     target static void name##_blur(const float *in, float side, int begin, int end, float *out)                        \
     {                                                                                                                  \
@@ -99,7 +113,11 @@ EVERYWHERE void weigh_row(const struct nav_row_weigh *args, struct nav_row_sums 
     {                                                                                                                  \
         weigh_row(w, sums);                                                                                            \
     }                                                                                                                  \
-    static const struct nav_rows name = {name##_blur, name##_mix, name##_weigh}
+    target static void name##_thin(const struct nav_row_weigh *w)                                                      \
+    {                                                                                                                  \
+        thin_row(w);                                                                                                   \
+    }                                                                                                                  \
+    static const struct nav_rows name = {name##_blur, name##_mix, name##_weigh, name##_thin}
 
 #define ANYWHERE
 ROWS(plain, ANYWHERE);

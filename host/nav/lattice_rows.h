@@ -23,17 +23,20 @@ struct nav_row_weigh {
     float centre, side, extra;
     int begin, end;
     float *out;
+    float least; /* of `thin`, see there */
 };
 
 struct nav_rows {
     /* out[i] = (1 - 2 side) in[i] + side (in[i - 1] + in[i + 1]) for begin <= i < end. */
     void (*blur)(const float *in, float side, int begin, int end, float *out);
-    /* out[i] = (1 - 2 side) own[i] + the eight cells of from[0..3] at i and i - 1, weighted by w[2 k] and w[2 k + 1].
+    /* out[i] = (1 - 2 side) own[i] + the eight cells of from[0..3] at i and i - 1, weighted by w[2 k] and w[2 k + 1]. /
      */
     void (*mix)(const float *own, float side, const float *const from[4], const float w[8], int begin, int end,
                 float *out);
     /* Writes a row and adds to its sums. `like` is 0 in NAV_LANES places from `end`; so many cells there become 0. */
     void (*weigh)(const struct nav_row_weigh *, struct nav_row_sums *);
+    /* Writes centre at + side (above + below), 0 where that is at most `least`. */
+    void (*thin)(const struct nav_row_weigh *);
 };
 
 /* The fastest this machine can run. */

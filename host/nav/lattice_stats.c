@@ -1,6 +1,5 @@
 /* What a lattice's belief amounts to: prior in, mode, mean near it, covariance out. */
 #include <math.h>
-#include <string.h>
 
 #include "lattice.h"
 
@@ -57,66 +56,30 @@ size_t nav_lattice_peak(const struct nav_lattice *l, int slice)
     return (size_t)slice * cells + best;
 }
 
-struct sums {
-    double mass, x, y, theta; /* offsets from the pose, times mass */
-};
-
-static void near_in_slice(const struct nav_lattice *l, int p, struct nav_pose pose, double turn, struct sums *s)
-{
-    double x0 = 0.5 * l->cell + l->shift_x[p] - pose.x, y0 = 0.5 * l->cell + l->shift_y[p] - pose.y;
-    int first_j = (int)fmax(ceil((-NAV_NEAR_M - y0) / l->cell), 0.0);
-    int first_i = (int)fmax(ceil((-NAV_NEAR_M - x0) / l->cell), 0.0);
-    for (int j = first_j; j < l->ny && y0 + j * l->cell <= NAV_NEAR_M; j++) {
-        const float *row = nav_lattice_slice(l, p) + j * l->nx;
-        double y = y0 + j * l->cell;
-        for (int i = first_i; i < l->nx && x0 + i * l->cell <= NAV_NEAR_M; i++) {
-            double x = x0 + i * l->cell, mass = row[i];
-            if (x * x + y * y > NAV_NEAR_M * NAV_NEAR_M)
-                continue;
-            s->mass += mass;
-            s->x += mass * x;
-            s->y += mass * y;
-            s->theta += mass * turn;
-        }
-    }
-}
-
 double nav_lattice_near(const struct nav_lattice *l, struct nav_pose pose, struct nav_pose *mean)
 {
-    struct sums s = {.mass = 0.0};
+    struct nav_near sums = {.mass = 0.0};
     for (int p = 0; p < l->nh; p++) {
-        double turn = nav_wrap(nav_lattice_heading(l, p) - pose.theta);
-        if (fabs(turn) <= NAV_NEAR_RAD)
-            near_in_slice(l, p, pose, turn, &s);
+        const struct nav_slice slice = {.mass = nav_lattice_slice(l, p),
+                                        .nx = l->nx,
+                                        .ny = l->ny,
+                                        .pitch = l->nx,
+                                        .cell = l->cell,
+                                        .x = 0.5 * l->cell + l->shift_x[p],
+                                        .y = 0.5 * l->cell + l->shift_y[p],
+                                        .heading = nav_lattice_heading(l, p)};
+        nav_slice_near(&slice, pose, &sums);
     }
-    if (mean && s.mass > 0.0)
-        *mean =
-            (struct nav_pose){pose.x + s.x / s.mass, pose.y + s.y / s.mass, nav_wrap(pose.theta + s.theta / s.mass)};
-    return s.mass * l->scale;
-}
-
-/* Adds one slice's moments about (x, y) to sums xx, xy, yy, xt, yt, tt, its heading being off by `turn`. */
-static void add_slice(const double m[NAV_MOMENTS], double x, double y, double turn, double sums[6])
-{
-    double mx = m[1] - x * m[0], my = m[2] - y * m[0];
-    sums[0] += m[3] - 2.0 * x * m[1] + x * x * m[0];
-    sums[1] += m[4] - x * m[2] - y * m[1] + x * y * m[0];
-    sums[2] += m[5] - 2.0 * y * m[2] + y * y * m[0];
-    sums[3] += mx * turn;
-    sums[4] += my * turn;
-    sums[5] += m[0] * turn * turn;
+    if (mean && sums.mass > 0.0)
+        *mean = nav_near_mean(&sums, pose);
+    return sums.mass * l->scale;
 }
 
 void nav_lattice_covariance(const struct nav_lattice *l, struct nav_pose about, double covariance[9])
 {
     double sums[6] = {0.0};
     for (int p = 0; p < l->nh; p++)
-        add_slice(l->moment[p], about.x - l->moment_x, about.y - l->moment_y,
-                  nav_wrap(nav_lattice_heading(l, p) - about.theta), sums);
-    for (int k = 0; k < 6; k++)
-        sums[k] /= l->total;
-    double within = l->cell * l->cell / 12.0, within_theta = l->cell_theta * l->cell_theta / 12.0;
-    double xx = fmax(sums[0], 0.0) + within, yy = fmax(sums[2], 0.0) + within;
-    const double all[9] = {xx, sums[1], sums[3], sums[1], yy, sums[4], sums[3], sums[4], sums[5] + within_theta};
-    memcpy(covariance, all, sizeof all);
+        nav_slice_add(l->moment[p], about.x - l->moment_x, about.y - l->moment_y,
+                      nav_wrap(nav_lattice_heading(l, p) - about.theta), sums);
+    nav_slice_covariance(sums, l->total, l->cell, l->cell_theta, covariance);
 }

@@ -164,7 +164,7 @@ static void wide_vectors_give_the_same_bits(void **state)
     (void)state;
     enum { N = 53, ROOM = N + 4 * NAV_LANES };
     const struct nav_rows *kind[] = {nav_rows_plain(), nav_rows_best()};
-    float in[6][ROOM], out[2][3][ROOM] = {{{0.0f}}}, *const row = in[0] + NAV_LANES;
+    float in[6][ROOM], out[2][4][ROOM] = {{{0.0f}}}, *const row = in[0] + NAV_LANES;
     struct nav_row_sums sums[2] = {{.peak = {0.0f}}, {.peak = {0.0f}}};
     const float w[8] = {0.01f, 0.02f, 0.03f, 0.04f, 0.05f, 0.06f, 0.07f, 0.08f};
     for (int i = 0; i < 6 * ROOM; i++)
@@ -175,12 +175,21 @@ static void wide_vectors_give_the_same_bits(void **state)
     for (int k = 0; k < 2; k++) {
         kind[k]->blur(row, 0.1f, 0, N, out[k][0] + NAV_LANES);
         kind[k]->mix(in[4] + NAV_LANES, 0.1f, from, w, 0, N, out[k][1] + NAV_LANES);
-        const struct nav_row_weigh weigh = {from[0], from[1], from[2], in[5] + NAV_LANES,    from[3], 0.7f, 0.15f, 0.1f,
-                                            1e-5f,   0,       N,       out[k][2] + NAV_LANES};
+        struct nav_row_weigh weigh = {from[0], from[1], from[2], in[5] + NAV_LANES,     from[3], 0.7f, 0.15f, 0.1f,
+                                      1e-5f,   0,       N,       out[k][2] + NAV_LANES, 0.2f};
         kind[k]->weigh(&weigh, &sums[k]);
+        weigh.out = out[k][3] + NAV_LANES;
+        kind[k]->thin(&weigh);
     }
     assert_memory_equal(out[0], out[1], sizeof out[0]);
     assert_memory_equal(&sums[0], &sums[1], sizeof sums[0]);
+    int dropped = 0;
+    for (int i = 0; i < N; i++) {
+        float spread = 0.15f * row[i] + 0.1f * (from[1][i] + from[2][i]);
+        dropped += !(spread > 0.2f);
+        assert_near((double)out[0][3][NAV_LANES + i], spread > 0.2f ? (double)spread : 0.0, 1e-6);
+    }
+    assert_in_range(dropped, 5, N - 5);
     double mass = 0.0;
     for (int i = 0; i < N; i++)
         mass += (double)out[0][2][NAV_LANES + i];
