@@ -153,6 +153,27 @@ static void missing_sequence_numbers_are_counted(void **state)
     assert_int_equal(info.frames_missing, 4);
 }
 
+/* The bridge counts ticks without sampling while the bus is asleep: ticks and times jump, the sequence goes on. */
+static void ticks_of_a_suspended_bridge_are_not_missing(void **state)
+{
+    enum { BEFORE = 3, FRAMES = 6, ASLEEP = 4000 };
+    const struct test_ring_pair *f = *state;
+    for (uint64_t i = 0; i < FRAMES; i++) {
+        struct whisker_frame frame = test_frame(i);
+        frame.tick += i < BEFORE ? 0 : ASLEEP;
+        whisker_ring_publish(f->ring, &frame, 1);
+    }
+    const struct whisker_frame *frames;
+    size_t count;
+    assert_int_equal(whisker_reader_peek(f->reader, &frames, &count), 0);
+    assert_int_equal(count, FRAMES);
+    assert_true(frames[BEFORE].tick - frames[BEFORE - 1].tick == ASLEEP + 1);
+    assert_int_equal(whisker_reader_advance(f->reader, count), 0);
+    struct whisker_reader_info info;
+    whisker_reader_info(f->reader, &info);
+    assert_int_equal(info.frames_missing, 0);
+}
+
 static void late_reader_starts_at_the_oldest_or_newest(void **state)
 {
     const struct test_ring_pair *f = *state;
@@ -321,6 +342,7 @@ int main(void)
         WITH_RING(newest_frames_are_one_array_wherever_the_reader_stands),
         WITH_RING(advance_beyond_the_window_is_refused),
         WITH_RING(missing_sequence_numbers_are_counted),
+        WITH_RING(ticks_of_a_suspended_bridge_are_not_missing),
         WITH_RING(late_reader_starts_at_the_oldest_or_newest),
         WITH_RING(closed_ring_is_read_to_its_end),
         WITH_RING(empty_ring_times_out),
