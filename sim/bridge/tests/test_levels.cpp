@@ -75,6 +75,39 @@ void levels_agree(void **)
     }
 }
 
+// Each limit by itself, one step beyond it and on it; the random scripts meet some of them too seldom.
+void limits_agree(void **)
+{
+    struct Change {
+        size_t at;
+        uint32_t beyond, within;
+        bool wide;
+    };
+    static const Change CHANGES[] = {{WHISKER_REPORT_CONTROL_SCK_DIVIDER, 15, 14, false},
+                                     {WHISKER_REPORT_CONTROL_SCK_DIVIDER, 34, 32, false},
+                                     {WHISKER_REPORT_CONTROL_SAMPLE_POINT, 17, 16, false},
+                                     {WHISKER_REPORT_CONTROL_SAMPLE_POINT, 0, 1, false},
+                                     {WHISKER_REPORT_CONTROL_WORD_GAP, 29, 30, false},
+                                     {WHISKER_REPORT_CONTROL_LANE_MASK, 1u << 28, 1u << 27, true},
+                                     {WHISKER_REPORT_CONTROL_TICK_PERIOD, 3999, 4000, true}};
+    LevelPair pair(1, first_seed);
+    RequestSource source(first_seed);
+    for (const Change &change : CHANGES) {
+        HostRequest request = source.control(false);
+        request.data[WHISKER_REPORT_CONTROL_SCK_DIVIDER] = 16;
+        request.data[WHISKER_REPORT_CONTROL_SAMPLE_POINT] = 6;
+        for (const uint32_t value : {change.beyond, change.within}) {
+            if (change.wide) {
+                whisker_put_u32(request.data.data() + change.at, value);
+            } else {
+                request.data[change.at] = static_cast<uint8_t>(value);
+            }
+            const Outcome expected = value == change.beyond ? Outcome::STALL : Outcome::OK;
+            assert_int_equal(static_cast<int>(pair.control(request)), static_cast<int>(expected));
+        }
+    }
+}
+
 } // namespace
 
 int main(int argc, char **argv)
@@ -83,6 +116,6 @@ int main(int argc, char **argv)
         scripts = std::strtoull(argv[1], nullptr, 10);
         first_seed = std::strtoull(argv[2], nullptr, 10);
     }
-    const CMUnitTest tests[] = {cmocka_unit_test(levels_agree)};
+    const CMUnitTest tests[] = {cmocka_unit_test(limits_agree), cmocka_unit_test(levels_agree)};
     return cmocka_run_group_tests(tests, nullptr, nullptr);
 }
