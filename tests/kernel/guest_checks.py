@@ -30,6 +30,7 @@ RING = "kernel"
 PYUSB = "pyusb"  # the argument that makes this program the one that pyusb() runs
 LINK = ["--sck-divider", "6", "--word-gap", "30", "--sample-point", "5"]
 IDENTITY = f"{LIMITS['usb_vendor_id']:04x}:{LIMITS['usb_product_id']:04x}"
+MICROSOFT_OS_20 = "{d8dd60df-4589-4cc7-9cd2-659d9e648a9f}"  # the platform capability by which Windows picks its driver
 # What a kernel says when it does not like a device.
 COMPLAINT = re.compile(
     r"(usb|hid|xhci|vhci|input).*(error|fail|unable|invalid|bogus|unexpect|not accept|can.t|cannot|warn|unknown|"
@@ -138,7 +139,7 @@ def lsusb(_: Checks) -> str:
     """`lsusb -v` reads every descriptor, the HID report descriptor's place included."""
     done = subprocess.run(["lsusb", "-v", "-d", IDENTITY], capture_output=True, text=True, timeout=PROGRAM_S)
     wanted = ["Whisker bridge", "CrunchBot", "Vendor Specific Class", "Human Interface Device", "HID Device Descriptor"]
-    wanted += ["EP 1 IN", "EP 2 IN", "Device Qualifier"]
+    wanted += ["EP 1 IN", "EP 2 IN", "Binary Object Store Descriptor", MICROSOFT_OS_20]
     missing = [text for text in wanted if text not in done.stdout]
     require(done.returncode == 0 and not missing, f"exit code {done.returncode}, missing: {', '.join(missing)}")
     return f"{len(done.stdout.splitlines())} lines"
@@ -191,6 +192,8 @@ def pyusb_session() -> str:
     bridge = usb.core.find(idVendor=LIMITS["usb_vendor_id"], idProduct=LIMITS["usb_product_id"])
     bridge.default_timeout = PROGRAM_S * 1000  # a second, as by default, may be too short for an emulated guest
     names = f"{bridge.manufacturer}, {bridge.product}, serial number {bridge.serial_number}"
+    # lsusb asks devices of USB 2.00 for it, not those of 2.10 (table 9-8 is the same for both)
+    require(bytes(bridge.ctrl_transfer(0x80, 6, 0x0600, 0, 10))[:4] == bytes([10, 6, 0x10, 2]), "no device qualifier")
     hid = LIMITS["usb_hid_interface"]
     bridge.detach_kernel_driver(hid)
     try:
