@@ -80,11 +80,14 @@ class WhiskerUsb(Elaboratable):
         device.always_fs = False
         device.data_clock = LIMITS["clock_hz"]
         full_speed = Signal()
+        frames_at_full_speed = Signal()  # when they were last restarted: LUNA calls a bus asleep a full-speed one
         packet = LIMITS["bulk_packet"]
         frames = FrameEndpoint(endpoint_number=LIMITS["usb_bulk_in"] & ENDPOINT_NUMBER, max_packet_size=packet)
         silent = SilentEndpoint(endpoint_number=LIMITS["usb_hid_in"] & ENDPOINT_NUMBER)
         control = self._add_control(m, device, full_speed, [frames, silent])
         self._connect_bus(m, device)
+        with m.If(self.restart):
+            m.d.usb += frames_at_full_speed.eq(full_speed)
         m.d.comb += [
             device.connect.eq(1),
             full_speed.eq(device.speed != USBSpeed.HIGH),
@@ -92,7 +95,7 @@ class WhiskerUsb(Elaboratable):
             self.restart.eq(device.reset_detected | control.interface.config_changed),
             frames.restart.eq(self.restart),
             silent.restart.eq(self.restart),
-            frames.full_speed.eq(full_speed),
+            frames.full_speed.eq(frames_at_full_speed),
             frames.stream.payload.eq(self.stream_data),
             frames.stream.valid.eq(self.stream_valid),
             frames.stream.last.eq(self.stream_last),

@@ -35,7 +35,7 @@ bool SoakResult::clean() const
     return gaps + duplicates + wrong + stale + answered + unexplained + hangs == 0;
 }
 
-FrameSoak::FrameSoak(uint64_t seed) : host_(device_), noise_(host_, seed)
+FrameSoak::FrameSoak(StreamDevice &device, uint64_t seed) : device_(device), host_(device_), noise_(host_, seed)
 {
     device_.byte = [this](uint64_t index) { return byte_of(stream_, index); };
     enumerate_device();

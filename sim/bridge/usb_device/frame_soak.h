@@ -3,8 +3,8 @@
 #pragma once
 
 #include "noisy_host.h"
+#include "stream_device.h"
 #include "usb_control.h"
-#include "usb_device.h"
 
 namespace bridge_sim
 {
@@ -31,7 +31,8 @@ struct SoakResult {
 class FrameSoak
 {
   public:
-    explicit FrameSoak(uint64_t seed);
+    // The device, fresh from power-up, must outlive the soak.
+    FrameSoak(StreamDevice &device, uint64_t seed);
 
     // Goes on until the host has accepted this many frames, or something hung.
     const SoakResult &run(uint64_t frames);
@@ -52,7 +53,7 @@ class FrameSoak
     uint8_t byte_of(uint64_t stream, uint64_t index) const;
     void expect(bool condition);
 
-    UsbDevice device_;
+    StreamDevice &device_;
     UsbHost host_;
     NoisyHost noise_;
     SoakResult result_;

@@ -4,6 +4,7 @@
 #include <cstdlib>
 
 #include "frame_soak.h"
+#include "usb_device.h"
 
 int main(int argc, char **argv)
 {
@@ -11,7 +12,8 @@ int main(int argc, char **argv)
         std::fprintf(stderr, "usb-soak: give the number of frames, e.g. usb-soak 100000 1\n");
         return 2;
     }
-    bridge_sim::FrameSoak soak(argc > 2 ? std::strtoull(argv[2], nullptr, 10) : 1);
+    bridge_sim::UsbDevice device;
+    bridge_sim::FrameSoak soak(device, argc > 2 ? std::strtoull(argv[2], nullptr, 10) : 1);
     const bridge_sim::SoakResult &result = soak.run(std::strtoull(argv[1], nullptr, 10));
     std::printf("{\"frames\": %" PRIu64 ", \"packets\": %" PRIu64 ", \"gaps\": %" PRIu64 ", \"duplicates\": %" PRIu64
                 ", \"wrong\": %" PRIu64 ", \"stale\": %" PRIu64 ", \"wire_faults\": %" PRIu64 ", \"noise\": %" PRIu64

@@ -1,9 +1,10 @@
-// BusSpeed, suspend, resume, and packets that are not for the device or not acknowledged by its host.
+// Speeds, suspend, resume, packets that are not for the device or not acknowledged by its host, and how soon it
+// answers.
 #include "cmocka_cpp.h"
 
+#include "device_kind.h"
 #include "noisy_host.h"
 #include "usb_control.h"
-#include "usb_device.h"
 
 using namespace bridge_sim;
 
@@ -15,8 +16,11 @@ constexpr size_t FAST_PACKET = 512;
 constexpr size_t SLOW_PACKET = 64;
 constexpr uint64_t RESUME_CYCLES = 2000; // a real host drives 20 ms
 
+std::unique_ptr<DeviceKind> device_kind;
+
 struct Fixture {
-    UsbDevice device;
+    std::unique_ptr<StreamDevice> made = device_kind->make();
+    StreamDevice &device = *made;
     UsbHost host{device};
     uint64_t read = 0; // bytes of the stream
 
@@ -52,6 +56,7 @@ struct Fixture {
     void regular() const
     {
         assert_int_equal(host.counters().unexplained, 0);
+        assert_true(device.slowest_answer() <= device.answer_limit());
     }
 };
 
@@ -97,7 +102,7 @@ void after_suspend_everything_is_as_it_was(void **)
     for (BusSpeed speed : {BusSpeed::HIGH, BusSpeed::FULL}) {
         const size_t size = speed == BusSpeed::HIGH ? FAST_PACKET : SLOW_PACKET;
         Fixture f(speed);
-        f.device.available = 3 * FAST_PACKET;
+        f.device.available = 20 * FAST_PACKET; // more than the device holds: the rest must not move while it sleeps
         f.expect_packet(size);
         const uint64_t restarts = f.device.restarts();
         for (int round = 0; round < 2; round++) {
@@ -107,7 +112,9 @@ void after_suspend_everything_is_as_it_was(void **)
             assert_true(f.device.suspended());
             assert_true(f.host.bus().resume(RESUME_CYCLES));
             assert_false(f.device.suspended());
-            f.expect_packet(size); // the same toggles, the next bytes
+            for (int packet = 0; packet < 4; packet++) {
+                f.expect_packet(size); // the same toggles, the next bytes
+            }
             assert_true(f.request({0x80, 8, 0, 0, 1}) == Bytes({1}));
         }
         assert_int_equal(f.device.restarts(), restarts);
@@ -174,10 +181,48 @@ void noise_is_not_answered_and_changes_nothing(void **)
     f.regular();
 }
 
+// Data, NAK, STALL, descriptors, a status stage: whatever it is, within the time a link has (checked by regular()).
+void answers_of_every_kind_are_in_time(void **)
+{
+    Fixture f;
+    f.device.available = 2 * FAST_PACKET;
+    f.expect_packet(FAST_PACKET);
+    f.expect_packet(FAST_PACKET);
+    Bytes data;
+    assert_true(f.host.in(BULK, FAST_PACKET, data) == Outcome::NAK);
+    constexpr uint16_t SIZES[] = {1, 17, 63, 64, 65, 255};
+    for (const uint16_t size : SIZES) {
+        data.clear();
+        assert_true(control_transfer(f.host, {0xC0, 0x20, 0, 7, size}, data) == Outcome::OK);
+        assert_int_equal(data.size(), size < 178 ? size : 178);
+    }
+    assert_true(control_transfer(f.host, {0x80, 6, 0x6300, 0, 9}, data) == Outcome::STALL);
+    f.request({0x02, 3, 0, 0x80 | BULK, 0});
+    assert_true(f.host.in(BULK, FAST_PACKET, data) == Outcome::STALL);
+    assert_true(f.device.slowest_answer() > 0);
+    f.regular();
+}
+
+// A report is taken only whole and right; whatever else comes is refused, and the device goes on.
+void reports_of_odd_sizes_are_refused(void **)
+{
+    Fixture f;
+    f.device.available = 100 * FAST_PACKET;
+    constexpr uint16_t SIZES[] = {1, 2, 15, 16, 17, 63, 64, 65, 127, 128, 129, 1000};
+    for (const uint16_t size : SIZES) {
+        Bytes data(size, 0x01);
+        assert_true(control_transfer(f.host, {0x21, 9, 0x0301, 1, size}, data) == Outcome::STALL);
+        assert_true(f.request({0x80, 8, 0, 0, 1}) == Bytes({1}));
+        f.expect_packet(FAST_PACKET);
+    }
+    f.regular();
+}
+
 } // namespace
 
-int main()
+int main(int argc, char **argv)
 {
+    device_kind = std::make_unique<DeviceKind>(argc, argv);
     const CMUnitTest tests[] = {
         cmocka_unit_test(at_full_speed_packets_are_short),
         cmocka_unit_test(speed_may_change_at_every_reset),
@@ -186,6 +231,8 @@ int main()
         cmocka_unit_test(frames_keep_the_device_awake),
         cmocka_unit_test(another_devices_ack_is_not_taken),
         cmocka_unit_test(noise_is_not_answered_and_changes_nothing),
+        cmocka_unit_test(answers_of_every_kind_are_in_time),
+        cmocka_unit_test(reports_of_odd_sizes_are_refused),
     };
     return cmocka_run_group_tests(tests, nullptr, nullptr);
 }

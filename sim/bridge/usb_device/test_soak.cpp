@@ -1,6 +1,7 @@
 // A short soak; usb-soak runs the same for as long as one likes.
 #include "cmocka_cpp.h"
 
+#include "device_kind.h"
 #include "frame_soak.h"
 
 using namespace bridge_sim;
@@ -8,10 +9,13 @@ using namespace bridge_sim;
 namespace
 {
 
+std::unique_ptr<DeviceKind> device_kind;
+
 void frames_survive_faults_noise_and_resets(void **)
 {
     for (uint64_t seed : {1u, 2u}) {
-        FrameSoak soak(seed);
+        const std::unique_ptr<StreamDevice> device = device_kind->make();
+        FrameSoak soak(*device, seed);
         const SoakResult &result = soak.run(6000);
         assert_int_equal(result.gaps, 0);
         assert_int_equal(result.duplicates, 0);
@@ -26,8 +30,9 @@ void frames_survive_faults_noise_and_resets(void **)
 
 } // namespace
 
-int main()
+int main(int argc, char **argv)
 {
+    device_kind = std::make_unique<DeviceKind>(argc, argv);
     const CMUnitTest tests[] = {cmocka_unit_test(frames_survive_faults_noise_and_resets)};
     return cmocka_run_group_tests(tests, nullptr, nullptr);
 }

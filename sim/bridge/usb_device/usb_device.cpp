@@ -8,7 +8,9 @@ namespace bridge_sim
 namespace
 {
 
-constexpr int RESET_CYCLES = 16;
+// Of the 14 cycles that a ULPI link has for its answer (ULPI 1.1, section 3.8.2.6) the shim takes the rest:
+// fpga/tb/ulpi counts with this number too.
+constexpr unsigned DEVICE_DECIDES = 7;
 
 } // namespace
 
@@ -17,30 +19,19 @@ UsbDevice::UsbDevice(uint64_t serial) : top_(std::make_unique<Vwhisker_usb>())
     top_->utmi_vbus_valid = 1;
     top_->utmi_session_valid = 1;
     top_->serial_number = serial;
-    top_->rst = 1;
-    for (int i = 0; i < RESET_CYCLES; i++) {
-        cycle();
-    }
-    top_->rst = 0;
-    cycle();
-    restarts_ = 0;
+    power_up(*top_);
 }
 
 UsbDevice::~UsbDevice() = default;
 
-uint64_t UsbDevice::taken() const
-{
-    return taken_;
-}
-
-uint64_t UsbDevice::restarts() const
-{
-    return restarts_;
-}
-
 bool UsbDevice::suspended() const
 {
     return top_->suspended;
+}
+
+unsigned UsbDevice::answer_limit() const
+{
+    return DEVICE_DECIDES;
 }
 
 void UsbDevice::cycle()
@@ -51,24 +42,29 @@ void UsbDevice::cycle()
     top.utmi_rx_valid = in.rx_valid;
     top.utmi_tx_ready = in.tx_ready;
     top.utmi_line_state = in.line_state;
-    top.stream_valid = taken_ < available;
-    top.stream_data = top.stream_valid ? byte(taken_) : 0;
-    top.clk = 0;
-    top.eval();
-    out.tx_data = top.utmi_tx_data;
-    out.tx_valid = top.utmi_tx_valid;
-    out.xcvr_select = top.utmi_xcvr_select;
-    out.term_select = top.utmi_term_select;
-    out.op_mode = top.utmi_op_mode;
-    taken_ += top.stream_valid && top.stream_ready ? 1u : 0u;
-    if (top.restart) {
-        restarts_ += restarting_ ? 0u : 1u;
-        taken_ = 0;
+    clock(top, [&] {
+        out.tx_data = top.utmi_tx_data;
+        out.tx_valid = top.utmi_tx_valid;
+        out.xcvr_select = top.utmi_xcvr_select;
+        out.term_select = top.utmi_term_select;
+        out.op_mode = top.utmi_op_mode;
+    });
+    time_answers();
+}
+
+// From the first edge with rx_active low to the first with tx_valid high.
+void UsbDevice::time_answers()
+{
+    if (was_active_ && !in.rx_active) {
+        waited_ = 0;
+    } else if (waited_ != UINT32_MAX) {
+        waited_++;
     }
-    restarting_ = top.restart;
-    top.clk = 1;
-    top.eval();
-    cycles++;
+    was_active_ = in.rx_active;
+    if (out.tx_valid && waited_ != UINT32_MAX) {
+        answered_after(waited_);
+        waited_ = UINT32_MAX;
+    }
 }
 
 } // namespace bridge_sim

@@ -1,17 +1,16 @@
 // The Verilated USB device without the bridge around it: frames come from a function, report registers read zero.
 #pragma once
 
-#include <functional>
 #include <memory>
 
-#include "utmi.h"
+#include "stream_device.h"
 
 class Vwhisker_usb;
 
 namespace bridge_sim
 {
 
-class UsbDevice : public UtmiDevice
+class UsbDevice : public StreamDevice
 {
   public:
     // After power-up. serial: 64 bits shown as serial number, 0: the text the device was generated with.
@@ -19,20 +18,15 @@ class UsbDevice : public UtmiDevice
     ~UsbDevice() override;
 
     void cycle() override;
-
-    // Byte `index` (from 0) of the stream since the last restart, and whether the stream has it yet.
-    std::function<uint8_t(uint64_t index)> byte;
-    uint64_t available = 0; // bytes of the stream that may be taken
-
-    uint64_t taken() const;    // bytes the device took since the last restart
-    uint64_t restarts() const; // times it asked to begin anew (rising edges)
-    bool suspended() const;
+    bool suspended() const override;
+    unsigned answer_limit() const override;
 
   private:
+    void time_answers();
+
     std::unique_ptr<Vwhisker_usb> top_;
-    uint64_t taken_ = 0;
-    uint64_t restarts_ = 0;
-    bool restarting_ = false;
+    unsigned waited_ = UINT32_MAX; // cycles since the end of a packet; UINT32_MAX: no answer is due
+    bool was_active_ = false;
 };
 
 } // namespace bridge_sim
