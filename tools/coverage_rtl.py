@@ -17,7 +17,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 RTL = ROOT / "fpga" / "bridge_rtl"
-BENCHES = ("crc8", "frame", "control", "link", "bridge", "lanes")
+BENCHES = ("crc8", "frame", "control", "link", "ticks", "stores", "bridge", "lanes")
 REASONS = ROOT / "fpga" / "tb" / "coverage.toml"
 ENOUGH = 0.95
 FIELD = re.compile("\x01([^\x02]*)\x02([^\x01']*)")
@@ -63,6 +63,12 @@ def excused(point: Point, reasons: list[dict]) -> bool:
     return any(r["module"] == module and r["kind"] == kind and re.fullmatch(r["what"], what) for r in reasons)
 
 
+def needless(total: dict[Point, int], reasons: list[dict]) -> list[dict]:
+    """Reasons for which there is no point that was not reached."""
+    never = [point for point, count in total.items() if count == 0]
+    return [reason for reason in reasons if not any(excused(point, [reason]) for point in never)]
+
+
 def table(total: dict[Point, int], reasons: list[dict]) -> list[tuple[str, str, int, int, int]]:
     """Per module and kind: points, reached, with a reason."""
     rows = []
@@ -93,6 +99,9 @@ def report(total: dict[Point, int], reasons: list[dict]) -> bool:
     for point in sorted(total):
         if total[point] == 0 and not excused(point, reasons):
             print(f"never: {point[0]}.v:{point[2]} {point[1]} {point[3]}")
+    for reason in needless(total, reasons):
+        print(f"needless reason: {reason['module']} {reason['what']}: take it out of {REASONS.name}")
+        enough = False
     return enough
 
 

@@ -17,9 +17,15 @@ CLOCK_PS = 16666  # 60 MHz, even
 
 
 def run_bench(
-    top: str, test_file: str, *rtl: str, bench: tuple[str, ...] = (), parameters: dict[str, int] | None = None
+    top: str,
+    test_file: str,
+    *rtl: str,
+    bench: tuple[str, ...] = (),
+    more: tuple[str, ...] = (),
+    parameters: dict[str, int] | None = None,
 ) -> None:
-    """Builds `top` from the named files of bridge_rtl and of the test's own folder, and runs the test file's benches.
+    """Builds `top` from the named files of bridge_rtl and of the test's own folder, and runs the test file's benches
+    and those of the modules `more` beside it.
 
     AssertionError if one of them fails. Settings are inputs at run time, so one build serves all of a file's tests; only
     another set of `parameters` needs another. WHISKER_BENCH_COVERAGE=1 leaves coverage.dat in the build folder.
@@ -39,7 +45,9 @@ def run_bench(
     parameters = parameters or {}
     name = "_".join([here.stem, *(str(value) for value in parameters.values())])
     build = Path(os.environ.get("WHISKER_BENCH_BUILD", REPO / "build" / "benches")) / name
-    covered = ["--coverage-line", "--coverage-toggle"] if os.environ.get("WHISKER_BENCH_COVERAGE") else []
+    # 512 bits: toggles of all memories but the FIFO's
+    coverage = ["--coverage-line", "--coverage-toggle", "--coverage-max-width", "512"]
+    covered = coverage if os.environ.get("WHISKER_BENCH_COVERAGE") else []
     runner = get_runner("verilator")
     runner.build(
         sources=[*(RTL / name for name in rtl), *(here.parent / name for name in bench)],
@@ -52,7 +60,7 @@ def run_bench(
     )
     sys.path.insert(0, str(here.parent))
     results = runner.test(
-        test_module=here.stem,
+        test_module=[here.stem, *more],
         hdl_toplevel=top,
         build_dir=build,
         test_dir=build,

@@ -511,20 +511,5 @@ async def junk_reports_are_refused_and_change_nothing(dut, stalls):
     assert not (int(dut.running.value) or int(dut.led.value))
 
 
-@cocotb.test(timeout_time=20, timeout_unit="ms")
-async def reports_of_no_known_id_read_as_zeros(dut):
-    rig = await begin(dut)
-    report = REPORTS["counters"]
-    rig.host.usb.read_id.value = 9
-    rig.host.usb.read_packet.value = 0
-    await pulse(dut, rig.host.usb.read_start)
-    out = []
-    for _ in range(report.size):
-        await FallingEdge(dut.clk)
-        out.append(int(rig.host.usb.read_data.value))
-        await pulse(dut, rig.host.usb.read_next)
-    assert out == [9, WIRE_VERSION] + [0] * (report.size - 2)
-
-
 def test_bridge():
-    run_bench("whisker_bridge", __file__, *(f"{name}.v" for name in RTL), bench=("usb_stub.v",))
+    run_bench("whisker_bridge", __file__, *(f"{name}.v" for name in RTL), bench=("usb_stub.v",), more=("wires",))

@@ -9,16 +9,16 @@ module whisker_usb (
     input  wire       utmi_rx_active,
     input  wire       utmi_rx_valid,
     input  wire       utmi_rx_error,
-    output wire [7:0] utmi_tx_data,
-    output wire       utmi_tx_valid,
+    output reg  [7:0] utmi_tx_data,
+    output reg        utmi_tx_valid,
     input  wire       utmi_tx_ready,
     input  wire [1:0] utmi_line_state,
     input  wire       utmi_vbus_valid,
     input  wire       utmi_session_valid,
     input  wire       utmi_session_end,
-    output wire [1:0] utmi_xcvr_select,
-    output wire       utmi_term_select,
-    output wire [1:0] utmi_op_mode,
+    output reg  [1:0] utmi_xcvr_select,
+    output reg        utmi_term_select,
+    output reg  [1:0] utmi_op_mode,
     input  wire [63:0] serial_number,
     output reg        suspended,
     input  wire [7:0] stream_data,
@@ -41,11 +41,7 @@ module whisker_usb (
     initial read_packet = 2'd0;
     initial {suspended, stream_ready, restart, write_start, write_valid, write_done, read_start, read_next} = 8'd0;
 
-    assign utmi_tx_data     = 8'd0;
-    assign utmi_tx_valid    = 1'b0;
-    assign utmi_xcvr_select = 2'd0;
-    assign utmi_term_select = 1'b0;
-    assign utmi_op_mode     = 2'd0;
+    initial {utmi_tx_data, utmi_tx_valid, utmi_xcvr_select, utmi_term_select, utmi_op_mode} = 14'd0;
 endmodule
 
 `default_nettype wire

@@ -204,7 +204,7 @@ def stored_part(window: bytes) -> list[bytes]:
 @cocotb.parametrize(stall=STALLS)
 async def an_order_goes_out_as_it_came_and_nothing_replaces_it(dut, stall):
     await begin(dut)
-    for turn in range(4):
+    for turn in range(8):
         command, argument, data = random.getrandbits(8), random.randbytes(5), random.randbytes(48)
         assert not int(dut.due.value)
         assert await write(dut, report(command, argument, data), stall)
