@@ -15,6 +15,10 @@
 #define IMAGE_BYTES_MAX (WHISKER_IMAGE_HEADER_BYTES + WHISKER_LIMIT_FLASH_ROWS * WHISKER_LIMIT_FLASH_ROW_BYTES)
 #define BAR_WIDTH 40
 #define DRAIN_POLLS 10 /* of 10 ms */
+/* Frames are thrown away: the fewer are taken, the less a simulated bridge runs on between two orders, for it waits
+ * only for its frames to be taken. */
+#define FRAMES_BATCH 2
+#define TRANSFERS 2
 
 enum { NUMBER = 'n' };
 
@@ -264,6 +268,8 @@ int main(int argc, char **argv)
     struct whisker_device *device = NULL;
     struct whisker_identity identity;
     whisker_settings_default(&options.settings);
+    options.settings.batch = FRAMES_BATCH;
+    options.settings.transfers = TRANSFERS;
     options.lane_mask = options.settings.lane_mask;
     int code = read_options(&options, argc, argv);
     if (code != 0) {

@@ -24,8 +24,10 @@ struct whisker_device {
     hid_device *hid;
     struct whisker_device_info about;
     struct libusb_transfer *transfer[TRANSFERS_MAX];
-    int transfers; /* of them in use: what the batch divides QUEUED_BYTES into */
+    int transfers; /* of them in use: what the batch divides QUEUED_BYTES into, or fewer if the settings say so */
     int active;    /* transfers the kernel holds */
+    int idle;      /* that are to be handed to it anew, in their turn */
+    int turn;      /* whose it is */
     int error;     /* why the stream has ended */
     bool ending;   /* do not queue again */
     struct whisker_settings settings;
@@ -46,6 +48,13 @@ static int blame(struct whisker_device *device, int error)
     return got == LIBUSB_ERROR_NO_DEVICE ? WHISKER_ERROR_DEVICE_GONE : error;
 }
 
+static void submit(struct whisker_device *device, struct libusb_transfer *transfer)
+{
+    const int error = libusb_submit_transfer(transfer);
+    device->active += error == 0;
+    device->error = error ? usb_error(error) : device->error;
+}
+
 /* The bytes of a transfer that did not fill up are as good as any other's. */
 static void LIBUSB_CALL on_transfer(struct libusb_transfer *transfer)
 {
@@ -55,9 +64,11 @@ static void LIBUSB_CALL on_transfer(struct libusb_transfer *transfer)
         device->sink(device->context, transfer->buffer, (size_t)transfer->actual_length);
     }
     if (transfer->status == LIBUSB_TRANSFER_COMPLETED && !device->ending) {
-        const int error = libusb_submit_transfer(transfer);
-        device->active += error == 0;
-        device->error = error ? usb_error(error) : device->error;
+        if (device->settings.transfers > 0) {
+            device->idle++;
+        } else {
+            submit(device, transfer);
+        }
     } else if (transfer->status == LIBUSB_TRANSFER_NO_DEVICE) {
         device->error = WHISKER_ERROR_DEVICE_GONE;
     } else if (transfer->status != LIBUSB_TRANSFER_CANCELLED && transfer->status != LIBUSB_TRANSFER_COMPLETED) {
@@ -179,7 +190,9 @@ static int discard_stale(struct whisker_device *device)
 static int queue_transfers(struct whisker_device *device)
 {
     const int bytes = device->settings.batch * (int)WHISKER_FRAME_BYTES;
-    device->transfers = QUEUED_BYTES / bytes;
+    const int most = QUEUED_BYTES / bytes, wanted = device->settings.transfers;
+    device->idle = device->turn = 0;
+    device->transfers = wanted > 0 && wanted < most ? wanted : most;
     for (int i = 0; i < device->transfers; i++) {
         libusb_fill_bulk_transfer(device->transfer[i], device->handle, WHISKER_LIMIT_USB_BULK_IN,
                                   device->buffer + (size_t)i * (size_t)bytes, bytes, on_transfer, device, 0);
@@ -213,6 +226,10 @@ int whisker_device_start(struct whisker_device *device, const struct whisker_set
 
 int whisker_device_poll(struct whisker_device *device, int timeout_ms)
 {
+    for (; device->idle > 0 && !device->error; device->idle--) {
+        submit(device, device->transfer[device->turn]);
+        device->turn = (device->turn + 1) % device->transfers;
+    }
     handle_events(device, timeout_ms);
     return device->error;
 }

@@ -186,6 +186,32 @@ static void a_bridge_gone_before_its_start_is_told_so(void **state)
     assert_not_opened(WHISKER_ERROR_DEVICE_GONE);
 }
 
+static void who_throws_frames_away_queues_few_and_takes_few(void **state)
+{
+    (void)state;
+    struct whisker_settings settings;
+    whisker_settings_default(&settings);
+    settings.batch = 16;
+    open_good();
+    for (settings.transfers = 1; settings.transfers <= 32; settings.transfers++) {
+        assert_int_equal(whisker_device_start(device, &settings, sink, &device), 0);
+        assert_int_equal(fake.in_flight, settings.transfers < 16 ? settings.transfers : 16);
+        whisker_device_flush(device);
+    }
+    settings.transfers = 3;
+    assert_int_equal(whisker_device_start(device, &settings, sink, &device), 0);
+    for (int i = 0; i < 4; i++) { /* what one poll takes the next one queues again */
+        fake_complete("abc", 3, LIBUSB_TRANSFER_COMPLETED);
+        fake_complete("d", 1, LIBUSB_TRANSFER_COMPLETED);
+        assert_int_equal(whisker_device_poll(device, 0), 0);
+        assert_int_equal(fake.in_flight, 1);
+        assert_int_equal(whisker_device_poll(device, 0), 0);
+        assert_int_equal(fake.in_flight, 3);
+    }
+    whisker_device_flush(device);
+    close_and_check();
+}
+
 static void the_batch_divides_what_is_queued(void **state)
 {
     (void)state;
@@ -352,6 +378,7 @@ int main(void)
         WITH_BRIDGE(arrivals_are_reported_by_event_and_by_looking),
         WITH_BRIDGE(a_bridge_gone_before_its_start_is_told_so),
         WITH_BRIDGE(the_batch_divides_what_is_queued),
+        WITH_BRIDGE(who_throws_frames_away_queues_few_and_takes_few),
         WITH_BRIDGE(start_queues_transfers_and_sends_the_settings),
         WITH_BRIDGE(a_bridge_left_running_is_stopped_and_emptied_first),
         WITH_BRIDGE(bytes_come_in_order_and_transfers_are_queued_again),
