@@ -109,8 +109,14 @@ def draw_lanes(found: dict) -> Figure:
     left.set(xlabel="lanes", ylabel="cells (of 43 848 LUT)", ylim=(0, None), xticks=LANES)
     left.legend(frameon=False)
     right.plot(LANES, [p["fmax_mhz"] for p in points], "o-", color="0.2")
-    right.axhline(60, color="0.5", linewidth=1, linestyle="--")
-    right.annotate("60 MHz wanted", (1, 60), textcoords="offset points", xytext=(0, 4), color="0.3")
+    right.axhline(report.CLOCK_MHZ, color="0.5", linewidth=1, linestyle="--")
+    right.annotate(
+        f"{report.CLOCK_MHZ:g} MHz wanted",
+        (1, report.CLOCK_MHZ),
+        textcoords="offset points",
+        xytext=(0, 4),
+        color="0.3",
+    )
     right.set(xlabel="lanes", ylabel="clock, MHz (nextpnr, one seed)", ylim=(50, None), xticks=LANES)
     return figure
 
@@ -152,7 +158,7 @@ def draw_seeds(found: dict) -> Figure:
         label = f"{board['title']}, grade {board['speed']}"
         left.plot(SEEDS, [run["fmax_mhz"] for run in board["runs"]], marker, color=shade, label=label)
         right.plot(SEEDS, [pin_slack(board, run) for run in board["runs"]], marker, color=shade, label=label)
-    for axes, level in ((left, 60), (right, 0)):
+    for axes, level in ((left, report.CLOCK_MHZ), (right, 0)):
         axes.axhline(level, color="0.5", linewidth=1, linestyle="--")
         axes.set(xlabel="seed", xticks=SEEDS)
         axes.legend(frameon=False, fontsize=8)
