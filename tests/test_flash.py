@@ -20,7 +20,7 @@ import make_image  # noqa: E402
 WHISKERS = 6
 BODY_WORDS = 400
 VERSION = 0x0203
-SAMPLING_S = 10  # simulated: the update takes about eight of them
+SAMPLING_S = 2  # simulated: the update takes less than half of one
 
 
 def synthetic_hex(path, words: int = BODY_WORDS, first: int = make_image.FIRST_ROW * 128):

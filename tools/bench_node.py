@@ -36,13 +36,14 @@ CYCLES_PER_US = LIMITS["clock_hz"] / 1e6
 LINK_TICKS = 100
 DIVIDERS = (4, 6, 8, 12, 16, 24, 32)
 WAYS = ("lines", "links")
+PARTS = ("faults", "storm", "link", "skew", "load")
 SPREADS = {"equal": (0, 0), "2 %": (20_000, 100), "4 %": (40_000, 100)}  # ppm of chips, permille of sensors
 TOTALS = ("schedules", "ticks", "bad", "missed_line", "missed_link", "displaced", "unexplained", "unforeseen")
 TOTALS += ("spurious", "stuck", "violations", "overwritten")
 
 
-def storm(build: Path, kept: Path, fresh: bool) -> dict:
-    """A million schedules of random faults: what was flagged against what was broken."""
+def storm(build: Path, kept: Path, fresh: bool, batches: int) -> dict:
+    """Schedules of random faults, a million by default: what was flagged against what was broken."""
 
     def chunk(first: int) -> list[dict]:
         path = kept / f"storm_{first}.jsonl"
@@ -53,7 +54,7 @@ def storm(build: Path, kept: Path, fresh: bool) -> dict:
             path.write_text(done.stdout)
         return [json.loads(line) for line in path.read_text().splitlines()]
 
-    firsts = range(0, BATCHES, CHUNK)
+    firsts = range(0, batches, CHUNK)
     with ThreadPoolExecutor(PROCESSES) as pool:
         chunks = list(tqdm(pool.map(chunk, firsts), total=len(firsts), desc="fault schedules"))
     lines = [line for lines in chunks for line in lines]
@@ -230,21 +231,17 @@ def draw(name: str, chart, *data) -> None:
     figures.png(figure, None, CHARTS / f"{name}.png")
 
 
-def run(build: Path, fresh: bool) -> None:
-    """All of it."""
-    kept = build / "bench/node"
-    kept.mkdir(parents=True, exist_ok=True)
-    RESULTS.mkdir(parents=True, exist_ok=True)
+def skew(build: Path) -> dict:
+    """Where the nodes' sampling instants lie, and how late their records are armed; draws them."""
     rows = {name: timing(build, spread)[0] for name, spread in tqdm(SPREADS.items(), desc="skew")}
     armed = {
         f"clocks {'equal' if not ppm else f'{-ppm // 10_000} % slow'}": timing(build, (ppm, 100), ticks=500)[0]
         for ppm in (0, -20_000, -40_000)
     }
-    faults = table(build, "test_node_faults", "node_faults.json")
-    cuts = table(build, "test_update_cuts", "node_cuts.json")
-    result = {
-        "storm": storm(build, kept, fresh),
-        "link": link(build),
+    draw("node_skew", skew_chart, rows)
+    draw("node_age", age_chart, rows)
+    draw("node_armed", armed_chart, armed)
+    return {
         "skew": {
             name: {
                 "latch_spread_us_max": float(np.ptp(data[:, :, 0], axis=0).max() / 1000),
@@ -259,23 +256,48 @@ def run(build: Path, fresh: bool) -> None:
             for name, data in rows.items()
         },
         "armed_us_max": {name: float(data[:, :, 2].max() / 1000) for name, data in armed.items()},
-        "load": load(build),
-        "fault_rows": len(faults) + len(cuts),
-        "worst_lost": dict(
-            Counter({row["fault"]: max(r["lost"] for r in row["runs"]) for row in faults}).most_common(3)
-        ),
     }
-    (RESULTS / "node.json").write_text(json.dumps(result, indent=1) + "\n")
+
+
+def tables(build: Path) -> dict:
+    faults = table(build, "test_node_faults", "node_faults.json")
+    cuts = table(build, "test_update_cuts", "node_cuts.json")
+    worst = Counter({row["fault"]: max(r["lost"] for r in row["runs"]) for row in faults}).most_common(3)
+    return {"fault_rows": len(faults) + len(cuts), "worst_lost": dict(worst)}
+
+
+def fastest(build: Path) -> dict:
+    found = link(build)
+    draw("node_link", link_chart, found)
+    return {"link": found}
+
+
+def run(build: Path, fresh: bool, only: str = "", batches: int = BATCHES) -> None:
+    """All of it, or only one part: the others stay as they were measured before."""
+    kept = build / "bench/node"
+    kept.mkdir(parents=True, exist_ok=True)
+    RESULTS.mkdir(parents=True, exist_ok=True)
+    path = RESULTS / "node.json"
+    parts = {
+        "faults": lambda: tables(build),
+        "storm": lambda: {"storm": storm(build, kept, fresh, batches)},
+        "link": lambda: fastest(build),
+        "skew": lambda: skew(build),
+        "load": lambda: {"load": load(build)},
+    }
+    result = json.loads(path.read_text()) if only else {}
+    for name in [only] if only else PARTS:
+        result |= parts[name]()
+    path.write_text(json.dumps(result, indent=1) + "\n")
+    faults, cuts = (json.loads((RESULTS / name).read_text()) for name in ("node_faults.json", "node_cuts.json"))
     (ROOT / "docs/node_faults.md").write_text(node_page.page(result, faults, cuts))
-    draw("node_skew", skew_chart, rows)
-    draw("node_age", age_chart, rows)
-    draw("node_armed", armed_chart, armed)
-    draw("node_link", link_chart, result["link"])
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--build-dir", type=Path, default=ROOT / "build/release")
     parser.add_argument("--fresh", action="store_true", help="forget what an interrupted run has measured")
+    parser.add_argument("--only", choices=PARTS, default="", help="this part; the others stay as they were")
+    parser.add_argument("--batches", type=int, default=BATCHES, help="of a thousand schedules each")
     options = parser.parse_args()
-    run(options.build_dir.resolve(), options.fresh)
+    run(options.build_dir.resolve(), options.fresh, options.only, options.batches)

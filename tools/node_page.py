@@ -62,7 +62,7 @@ them. {schedules} schedules, {ticks} ticks, {bad} records flagged:
 |---|---|
 | good samples hurt on the sensor's line that pass start byte, error word, sum and step by arithmetic | {missed_line} |
 | good samples hurt on the link that pass CRC-8 and tick by arithmetic | {missed_link} |
-| sound samples read at a wrong SYNC (see below) | {displaced} |
+| sound samples read up to 49 us before their tick (see below) | {displaced} |
 | **hurt and good otherwise: unexplained** | **{unexplained}** |
 | bits hurt otherwise than the log foresees | {unforeseen} |
 | bad records without a fault | {spurious} |
@@ -70,9 +70,11 @@ them. {schedules} schedules, {ticks} ticks, {bad} records flagged:
 | breaches of a data sheet by the firmware | {violations} |
 
 Words of the link that its arming displaced amid a transfer at a wrong time: {overwritten}, each in a record that was re-armed (CRC or tick told).
-Displaced: SYNC is doubled and the next one lost. The node then sees one SYNC and one order per tick, as always; only the time between the two is other,
-and no check of bytes can tell. The sample is sound, its instant early by as much as the stray pulse was. If the order between is damaged,
-too, the node's count stays one ahead and the sample is a tick old.
+Displaced: SYNC is doubled and the next one lost. The node then sees one SYNC and one order per tick, as always, and no check of bytes can tell; the time
+between the two does. An order that ends more than 70 us after SYNC (by a clock up to 4 % off, told to 4 us: at most 79) is not that SYNC's, and what is
+read says `late` until an order comes in time. At the slowest settings that the bridge allows an order ends 51 us after its SYNC: no false flag at any setting and clock
+(test `node_slowest_link`). What is left: at the default settings, where it ends after 29 us, a stray pulse less than 49 us before the tick passes, and the
+sample is early by so much; the sensor's own conversion is up to 385 us old.
 
 Derivations, for bytes evenly spread:
 
