@@ -133,7 +133,7 @@ MUTATIONS = [
     ),
     Mutation(
         "firmware: both records packed into one buffer",
-        "test_node_faults",
+        "node_storm",
         "firmware/dspic/core/node.c",
         "    node->armed ^= 1u;\n",
         "",
