@@ -4,6 +4,7 @@ import numpy as np
 from texture_trials import LOOK, TICK_S
 
 from whisker.texture import TextureModel, classify
+from whisker.texture_spectral import SpectralModel
 from whisker.texture_train import train
 
 HZ, WINDOW = 2000.0, 200
@@ -49,7 +50,8 @@ def strip_score(model, strip) -> dict:
     the border, and 150 ms count from the first."""
     found = decide(model, strip.counts)
     met, left = strip.borders()
-    flagged = np.array([d.end for d in found if d.border], dtype=float)
+    told = model.judge(strip.counts, WINDOW, notices=True) if isinstance(model, SpectralModel) else found
+    flagged = np.array([d.end for d in told if d.border], dtype=float)
     within = BORDER_S / TICK_S + LOOK
     seen = [bool(((flagged > m) & (flagged <= m + within)).any()) for m in met]
     near = [*zip(met, left, strict=True), *strip.held()]

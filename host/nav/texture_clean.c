@@ -49,6 +49,19 @@ static long mark(struct view v, const double *limit)
     return bad;
 }
 
+/* Whether `mark` would find anything; no branch within, so it is quick where all is well. */
+static bool suspect(struct view v, double limit)
+{
+    int bad = 0;
+    for (int i = 0; i < v.n; i++)
+        bad |= !(fabs(*sample(v, i)) <= VALUE_MOST);
+    for (int i = 1; i < v.n - 1; i++) {
+        double before = *sample(v, i) - *sample(v, i - 1), after = *sample(v, i) - *sample(v, i + 1);
+        bad |= (before * after > 0.0) & (fabs(before) > limit) & (fabs(after) > limit);
+    }
+    return bad != 0;
+}
+
 static void bridge(struct view v, int from, int to)
 {
     double left = from > 0 ? *sample(v, from - 1) : (to < v.n ? *sample(v, to) : 0.0);
@@ -100,7 +113,8 @@ struct nav_texture_health nav_texture_clean(double *window, int n, const struct 
     struct nav_texture_health health = {0};
     for (int c = 0; c < limits->channels; c++) {
         struct view v = {.at = window + c, .step = limits->channels, .n = n};
-        long bad = mark(v, limits->spike ? limits->spike + c : NULL);
+        const double *spike = limits->spike ? limits->spike + c : NULL;
+        long bad = suspect(v, spike ? *spike : INFINITY) ? mark(v, spike) : 0;
         if (bad > 0)
             fill(v);
         health.bad = bad > health.bad ? bad : health.bad;

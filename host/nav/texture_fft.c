@@ -63,7 +63,7 @@ static void scatter(struct nav_fft *f, const double *x, int n)
         f->place[2 * f->reversed[i / 2] + i % 2] = x[i];
 }
 
-static void butterfly(double *a, double *b, const double *turn)
+static void butterfly(double *restrict a, double *restrict b, const double *restrict turn)
 {
     double re = b[0] * turn[0] - b[1] * turn[1], im = b[0] * turn[1] + b[1] * turn[0];
     b[0] = a[0] - re;
@@ -72,10 +72,29 @@ static void butterfly(double *a, double *b, const double *turn)
     a[1] += im;
 }
 
+/* The first two stages at once: their turns are by quarters of the circle, which need no products. */
+static void quarters(double *place, int count)
+{
+    for (double *p = place; p < place + 2 * count; p += 8) {
+        double a_re = p[0] + p[2], a_im = p[1] + p[3], b_re = p[0] - p[2], b_im = p[1] - p[3];
+        double c_re = p[4] + p[6], c_im = p[5] + p[7], d_re = p[4] - p[6], d_im = p[5] - p[7];
+        p[0] = a_re + c_re;
+        p[1] = a_im + c_im;
+        p[2] = b_re + d_im;
+        p[3] = b_im - d_re;
+        p[4] = a_re - c_re;
+        p[5] = a_im - c_im;
+        p[6] = b_re - d_im;
+        p[7] = b_im + d_re;
+    }
+}
+
 static void transform(struct nav_fft *f)
 {
-    int count = f->size / 2;
-    for (int width = 1; width < count; width *= 2) {
+    int count = f->size / 2, done = count >= 4 ? 4 : 1;
+    if (done == 4)
+        quarters(f->place, count);
+    for (int width = done; width < count; width *= 2) {
         int stride = count / width; /* of the table, which has the whole circle's angles for `size` */
         for (int start = 0; start < count; start += 2 * width) {
             for (int k = 0; k < width; k++)
@@ -88,8 +107,9 @@ static void transform(struct nav_fft *f)
  */
 static double unravelled(const struct nav_fft *f, int k)
 {
-    int half = f->size / 2;
-    const double *z = f->place + 2 * (k % half), *y = f->place + 2 * ((half - k) % half);
+    int half = f->size / 2,
+        around = half - 1; /* a power of two less one: what the mask keeps is the rest of a division */
+    const double *z = f->place + 2 * (k & around), *y = f->place + 2 * ((half - k) & around);
     double even_re = 0.5 * (z[0] + y[0]), even_im = 0.5 * (z[1] - y[1]);
     double odd_re = 0.5 * (z[1] + y[1]), odd_im = -0.5 * (z[0] - y[0]);
     double c = k == half ? -1.0 : f->turn[2 * k], s = k == half ? 0.0 : f->turn[2 * k + 1];

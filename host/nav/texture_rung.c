@@ -12,7 +12,9 @@ struct nav_texture_rung {
     struct nav_texture_rung_numbers n; /* its arrays are the rung's own */
     int features;
     struct nav_texture_features *reduce;
-    double *projection;   /* [F][H]: a row per feature, so that the inner loop runs over neighbours */
+    float *projection;    /* [F][H]: a row per feature, so that the inner loop runs over neighbours; single precision
+                             is finer than any feature and twice as fast */
+    float *projected;     /* [H] */
     double *threshold;    /* [H] */
     double *expanded;     /* [F + H] */
     double *turned;       /* [F][axes] */
@@ -67,15 +69,16 @@ static bool make_projections(struct nav_texture_rung *r)
 {
     size_t f = (size_t)r->features, h = (size_t)r->n.hidden;
     r->projection = calloc(f * h + 1, sizeof *r->projection);
+    r->projected = calloc(h + 1, sizeof *r->projected);
     r->threshold = calloc(h + 1, sizeof *r->threshold);
-    if (!r->projection || !r->threshold)
+    if (!r->projection || !r->projected || !r->threshold)
         return false;
     struct nav_rng rng;
     nav_rng_seed(&rng, r->n.seed, 0);
     for (size_t i = 0; i < h; i++) { /* unit by unit: fewer units are the first of more */
         r->threshold[i] = nav_rng_normal(&rng);
         for (size_t j = 0; j < f; j++)
-            r->projection[j * h + i] = nav_rng_normal(&rng) / sqrt((double)f);
+            r->projection[j * h + i] = (float)(nav_rng_normal(&rng) / sqrt((double)f));
     }
     return true;
 }
@@ -139,11 +142,13 @@ void nav_texture_rung_free(struct nav_texture_rung *r)
 {
     if (!r)
         return;
-    const double *arrays[] = {r->n.floor,  r->n.centre, r->n.scale,       r->n.weight,     r->n.bias,
-                              r->n.middle, r->n.axis,   r->n.axis_weight, r->projection,   r->threshold,
-                              r->expanded, r->turned,   r->along,         r->middle_along, r->n.beyond};
+    const double *arrays[] = {r->n.floor,  r->n.centre, r->n.scale,       r->n.weight,  r->n.bias,
+                              r->n.middle, r->n.axis,   r->n.axis_weight, r->threshold, r->expanded,
+                              r->turned,   r->along,    r->middle_along,  r->n.beyond};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++)
         free((void *)arrays[i]);
+    free(r->projection);
+    free(r->projected);
     nav_texture_features_free(r->reduce);
     free(r);
 }
@@ -153,17 +158,25 @@ int nav_texture_rung_length(const struct nav_texture_rung *r)
     return r->n.length;
 }
 
+const double *nav_texture_rung_features(const struct nav_texture_rung *r, int *count)
+{
+    *count = r->features;
+    return r->expanded;
+}
+
 static void project(const struct nav_texture_rung *r, const double *z, double *restrict out)
 {
     int hidden = r->n.hidden;
-    memcpy(out, r->threshold, (size_t)hidden * sizeof *out);
+    float *restrict sum = r->projected;
+    memset(sum, 0, (size_t)hidden * sizeof *sum);
     for (int f = 0; f < r->features; f++) {
-        const double *row = r->projection + (size_t)f * (size_t)hidden;
+        const float *row = r->projection + (size_t)f * (size_t)hidden;
+        float x = (float)z[f];
         for (int h = 0; h < hidden; h++)
-            out[h] += z[f] * row[h];
+            sum[h] += x * row[h];
     }
     for (int h = 0; h < hidden; h++)
-        out[h] = out[h] > 0.0 ? out[h] : 0.0;
+        out[h] = r->threshold[h] + (double)sum[h] > 0.0 ? r->threshold[h] + (double)sum[h] : 0.0;
 }
 
 void nav_texture_rung_expand(struct nav_texture_rung *r, const double *window, double *out)

@@ -42,6 +42,9 @@ void nav_texture_rung_expand(struct nav_texture_rung *, const double *window, do
 double nav_texture_rung_judge(struct nav_texture_rung *, const double *window, double *loglik);
 /* cffi: end */
 
+/* Standardised features [F] of the last window judged. */
+const double *nav_texture_rung_features(const struct nav_texture_rung *, int *count);
+
 int nav_texture_rung_length(const struct nav_texture_rung *);
 
 #endif

@@ -8,11 +8,13 @@
 #include "texture_catch.h"
 #include "texture_span.h"
 
-#define HELD_WINDOWS 20     /* a tip held for longer, 2 s at 100 ms, has a new rest */
+#define HELD_WINDOWS 20 /* a tip held for longer, 2 s at 100 ms, has a new rest */
+#define SINCE_LONG (1 << 30)
 #define BAD_SHARE_MOST 0.25 /* of a window; with more, its spectrum is that of the gaps */
 
 struct nav_texture_stream {
-    struct nav_texture_rules rules; /* its pointers are the stream's own, but for the rungs */
+    struct nav_texture_rules rules; /* its pointers are the stream's own, but for what is lent */
+    struct nav_texture_rung *rung[NAV_TEXTURE_RUNGS_MAX];
     double unknown[NAV_TEXTURE_RUNGS_MAX], border[NAV_TEXTURE_RUNGS_MAX];
     struct nav_texture_span *span;
     double *limits;  /* [6][channels] the stream's own */
@@ -20,9 +22,12 @@ struct nav_texture_stream {
     double *clean;   /* [room][channels] */
     double *half[3]; /* [classes] evidence of the window before's second half, of the first and the second half */
     double *before;  /* [classes] evidence of the window before */
-    int room, held;
+    double *block;   /* [a block's length][channels] samples since the last block */
+    int room, held, blocked;
+    int since; /* samples since the surface changed, or SINCE_LONG */
     bool has_before;
     int half_rung, before_rung;
+    int kind; /* likeliest class of the windows in a row that are judged together, or NAV_TEXTURE_UNKNOWN */
     struct nav_texture_catch edge; /* its level is the sixth row of limits */
 };
 
@@ -52,7 +57,9 @@ static bool allocate(struct nav_texture_stream *s)
     s->raw = calloc((size_t)s->room * channels, sizeof *s->raw);
     s->clean = calloc((size_t)s->room * channels, sizeof *s->clean);
     s->before = calloc(classes, sizeof *s->before);
-    bool ok = s->span && s->limits && s->raw && s->clean && s->before;
+    size_t block = s->rules.change ? (size_t)nav_texture_change_length(s->rules.change) : 1;
+    s->block = calloc(block * channels, sizeof *s->block);
+    bool ok = s->block && s->span && s->limits && s->raw && s->clean && s->before;
     for (int i = 0; i < 3; i++) {
         s->half[i] = calloc(classes, sizeof *s->half[i]);
         ok = ok && s->half[i];
@@ -64,6 +71,8 @@ static void own_limits(struct nav_texture_stream *s)
 {
     memcpy(s->unknown, s->rules.unknown, (size_t)s->rules.rungs * sizeof *s->unknown);
     memcpy(s->border, s->rules.border, (size_t)s->rules.rungs * sizeof *s->border);
+    memcpy(s->rung, s->rules.rung, (size_t)s->rules.rungs * sizeof *s->rung);
+    s->rules.rung = s->rung;
     s->rules.unknown = s->unknown;
     s->rules.border = s->border;
     struct nav_texture_limits *l = &s->rules.limits;
@@ -91,6 +100,7 @@ struct nav_texture_stream *nav_texture_stream_new(const struct nav_texture_rules
         return NULL;
     }
     own_limits(s);
+    nav_texture_stream_reset(s);
     return s;
 }
 
@@ -103,15 +113,28 @@ void nav_texture_stream_free(struct nav_texture_stream *s)
     free(s->raw);
     free(s->clean);
     free(s->before);
+    free(s->block);
     for (int i = 0; i < 3; i++)
         free(s->half[i]);
     free(s);
 }
 
+/* The windows to come are not judged together with those before. */
+static void new_surface(struct nav_texture_stream *s)
+{
+    s->kind = NAV_TEXTURE_UNKNOWN;
+    if (s->rules.strange)
+        nav_texture_strange_reset(s->rules.strange);
+}
+
 void nav_texture_stream_reset(struct nav_texture_stream *s)
 {
-    s->held = 0;
+    s->held = s->blocked = 0;
+    s->since = SINCE_LONG;
     s->has_before = false;
+    if (s->rules.change)
+        nav_texture_change_keep(s->rules.change, 0);
+    new_surface(s);
     s->edge.known = s->edge.held = false;
 }
 
@@ -131,13 +154,13 @@ static void swap(double **a, double **b)
     *b = kept;
 }
 
-/* Judges both halves alone; returns their rung. */
-static int judge_halves(struct nav_texture_stream *s)
+/* Judges both halves of n samples alone; returns their rung. */
+static int judge_halves(struct nav_texture_stream *s, const double *from, int n)
 {
-    int first = s->held / 2, later = s->held - first;
-    const double *middle = s->clean + (size_t)first * (size_t)s->rules.channels;
+    int first = n / 2, later = n - first;
+    const double *middle = from + (size_t)first * (size_t)s->rules.channels;
     double distance;
-    int one = nav_texture_span_judge(s->span, s->clean, first, s->half[1], &distance);
+    int one = nav_texture_span_judge(s->span, from, first, s->half[1], &distance);
     int two = nav_texture_span_judge(s->span, middle, later, s->half[2], &distance);
     return one == two ? one : -1;
 }
@@ -194,28 +217,47 @@ static void no_evidence(struct nav_texture_stream *s, struct nav_texture_decisio
     d->label = NAV_TEXTURE_UNKNOWN;
     d->confidence = 0.0;
     s->has_before = false;
+    new_surface(s);
 }
 
-static bool unreadable(const struct nav_texture_stream *s, const struct nav_texture_decision *d)
+static bool unreadable(const struct nav_texture_health *h, int n)
 {
-    const struct nav_texture_health *h = &d->health;
-    return (double)h->bad > BAD_SHARE_MOST * s->held || h->still > 0 || h->railed > 0;
+    return (double)h->bad > BAD_SHARE_MOST * n || h->still > 0 || h->railed > 0;
+}
+
+/* How far beyond every trained surface this window lies, or the windows in a row that it ends: above 1 is never
+ * trained. */
+static double strangeness(struct nav_texture_stream *s, double distance, int rung, int n, int kind)
+{
+    double alone = distance / s->rules.unknown[rung];
+    struct nav_texture_strange *strange = s->rules.step > 0 ? NULL : s->rules.strange;
+    int count;
+    const double *features = nav_texture_rung_features(s->rules.rung[rung], &count);
+    if (!strange || n != nav_texture_rung_length(s->rules.rung[rung]) || count != nav_texture_strange_features(strange))
+        return alone;
+    if (kind != s->kind && s->kind != NAV_TEXTURE_UNKNOWN)
+        nav_texture_strange_reset(strange);
+    s->kind = kind;
+    return fmax(alone, nav_texture_strange_weigh(strange, features));
 }
 
 /* A surface that lies beyond every trained one is weak evidence for any of them: the farther, the weaker. */
-static bool never_trained(const struct nav_texture_stream *s, double distance, int rung, double *loglik)
+static bool never_trained(const struct nav_texture_stream *s, double beyond, double *loglik)
 {
-    double limit = s->rules.unknown[rung];
-    if (!(distance > limit))
-        return false;
-    for (int k = 0; k < s->rules.classes; k++)
-        loglik[k] *= limit / distance;
-    return true;
+    for (int k = 0; k < s->rules.classes && beyond > 1.0; k++)
+        loglik[k] /= beyond;
+    return beyond > 1.0;
 }
 
 static bool edge_holds(struct nav_texture_stream *s, bool sudden)
 {
     return nav_texture_catch_follow(&s->edge, s->clean, s->held, s->rules.step > 0 ? s->rules.step : s->held, sudden);
+}
+
+/* Whether borders are looked for block by block: then windows and halves that differ are no news. */
+static bool watched(const struct nav_texture_stream *s)
+{
+    return s->rules.step == 0 && s->rules.change;
 }
 
 /* Decides on the samples held. Returns whether a sequential decision may stop here. */
@@ -225,32 +267,74 @@ static bool decide(struct nav_texture_stream *s, struct nav_texture_decision *d,
     d->samples = s->held;
     memcpy(s->clean, s->raw, (size_t)s->held * (size_t)s->rules.channels * sizeof *s->clean);
     d->health = nav_texture_clean(s->clean, s->held, &s->rules.limits);
-    bool readable = !unreadable(s, d);
+    bool readable = !unreadable(&d->health, s->held);
     if (readable && d->health.railed == 0 && edge_holds(s, d->health.caught > 0))
         d->health.caught = d->health.caught > 0 ? d->health.caught : 1;
     d->border = d->health.caught > 0 && d->health.railed == 0;
-    int rung = -1;
+    bool cut = s->since < s->held; /* what lies before the border says nothing of the surface now */
+    int n = cut ? s->since : s->held, rung = -1;
+    const double *from = s->clean + (size_t)(s->held - n) * (size_t)s->rules.channels;
     if (readable && !d->health.caught)
-        rung = nav_texture_span_judge(s->span, s->clean, s->held, loglik, &d->distance);
+        rung = nav_texture_span_judge(s->span, from, n, loglik, &d->distance);
+    d->border = d->border || cut;
     if (rung < 0) {
         no_evidence(s, d, loglik);
         return false;
     }
-    int half_rung = judge_halves(s);
+    int half_rung = judge_halves(s, from, n);
     if (half_rung >= 0)
         blend(s, loglik);
-    bool strange = never_trained(s, d->distance, rung, loglik);
+    best(loglik, s->rules.classes, &d->label);
+    double beyond = strangeness(s, d->distance, rung, n, d->label);
+    bool strange = never_trained(s, beyond, loglik);
     d->confidence = best(loglik, s->rules.classes, &d->label);
     if (s->rules.step > 0 && (d->confidence < s->rules.sure || strange) && s->held < s->room)
         return false;
-    d->border = find_border(s, loglik, rung, half_rung);
+    bool halves = find_border(s, loglik, rung, half_rung);
+    d->border = cut || (halves && !watched(s));
     d->confidence = best(loglik, s->rules.classes, &d->label);
     if (strange)
-        d->confidence *= s->rules.unknown[rung] / d->distance;
+        d->confidence /= beyond;
     bool unsure = d->confidence < (s->rules.step > 0 ? s->rules.sure : s->rules.doubt);
     if (strange || unsure)
         d->label = NAV_TEXTURE_UNKNOWN;
     return true;
+}
+
+/* Whether the block that this sample completes shows that the surface has changed. */
+static bool changed(struct nav_texture_stream *s, const double *sample)
+{
+    struct nav_texture_change *change = s->rules.change;
+    size_t channels = (size_t)s->rules.channels;
+    s->since += s->since < SINCE_LONG;
+    if (!watched(s))
+        return false;
+    memcpy(s->block + (size_t)s->blocked++ * channels, sample, channels * sizeof *sample);
+    int length = nav_texture_change_length(change), after;
+    if (s->blocked < length)
+        return false;
+    s->blocked = 0;
+    struct nav_texture_health health = nav_texture_clean(s->block, length, &s->rules.limits);
+    if (unreadable(&health, length) || health.caught > 0 || s->edge.held) {
+        nav_texture_change_keep(change, 0);
+        return false;
+    }
+    if (!(nav_texture_change_weigh(change, s->block, &after) > nav_texture_change_limit(change)))
+        return false;
+    nav_texture_change_keep(change, after);
+    s->since = after * length;
+    s->has_before = false;
+    new_surface(s);
+    return true;
+}
+
+/* Word of a border before the window is full. */
+static void notice(struct nav_texture_stream *s, struct nav_texture_decision *d, double *loglik)
+{
+    memset(d, 0, sizeof *d);
+    no_evidence(s, d, loglik);
+    d->samples = s->held;
+    d->border = d->notice = 1;
 }
 
 static bool due(const struct nav_texture_stream *s)
@@ -265,6 +349,12 @@ long nav_texture_stream_push(struct nav_texture_stream *s, const double *samples
     *decided = 0;
     for (long i = 0; i < n; i++) {
         memcpy(s->raw + (size_t)s->held++ * channels, samples + (size_t)i * channels, channels * sizeof *s->raw);
+        bool news = changed(s, samples + (size_t)i * channels);
+        if (news && !due(s)) {
+            notice(s, decision, loglik);
+            *decided = 1;
+            return i + 1;
+        }
         if (!due(s))
             continue;
         bool may_stop = decide(s, decision, loglik);

@@ -2,8 +2,10 @@
 #ifndef NAV_TEXTURE_STREAM_H
 #define NAV_TEXTURE_STREAM_H
 
+#include "texture_change.h"
 #include "texture_clean.h"
 #include "texture_rung.h"
+#include "texture_strange.h"
 
 /* cffi: begin */
 struct nav_texture_stream;
@@ -25,12 +27,17 @@ struct nav_texture_rules {
     double sure;                          /* ... answers at this confidence, ... */
     int patience;                         /* ... and after so many samples in any case */
     struct nav_texture_limits limits;     /* channels as above */
+    struct nav_texture_change *change;   /* lent to this stream alone; NULL: borders are those of the windows' halves */
+    struct nav_texture_strange *strange; /* likewise; NULL: windows are strange one by one. Unused by windows that are
+                                            not of exactly one rung */
 };
 
 struct nav_texture_decision {
     int label;         /* class, or NAV_TEXTURE_UNKNOWN */
     int samples;       /* that the decision took */
     int border;        /* the surface changed within the window or since the one before it; or the whisker was caught */
+    int notice;        /* no window, but word of a border at once: no label, no evidence. The window goes on, and at its
+                        * end is judged by what lies behind the border */
     double confidence; /* of the likeliest class, all being equally likely before: 0 without evidence;
                         * less by as much as the distance exceeds its limit */
     double distance;   /* squared, of the features from the nearest class: about 1 for a trained surface */

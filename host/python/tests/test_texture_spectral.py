@@ -7,8 +7,10 @@ import pytest
 from commandkit import run, signals_as_before  # noqa: F401 - a fixture
 
 from whisker import texture
+from whisker.native import doubles, lib
 from whisker.tables import TableError
 from whisker.texture_spectral import SpectralModel
+from whisker.texture_strange import fit_strange
 from whisker.texture_train import train
 
 RATE_HZ = 2000.0
@@ -87,6 +89,36 @@ def test_a_border_inside_or_between_windows_is_reported(model):
         assert found[-1].label == 2 and not found[0].border
 
 
+def test_a_border_is_told_before_its_window_is_full_and_what_lies_before_it_is_left_out(model):
+    x = np.concatenate([drag("VINYL", 1010, 60), drag("ROUGH", 590, 60)])
+    x[1010:] += x[1009] - x[1010]
+    found = model.judge(x, WINDOW, notices=True)
+    told = next(d for d in found if d.notice)
+    assert told.border and told.label == -1 and 1010 < told.end <= 1160 and not told.loglik.any()
+    (cut,) = (d for d in found if d.end == 1200 and not d.notice)
+    assert cut.border and cut.label == 2
+
+
+def test_windows_in_a_row_betray_a_surface_that_one_does_not():
+    rng = np.random.default_rng(5)
+
+    def drive(middle):
+        return np.array([middle, 0, 0, 0, 0]) + rng.normal(0, 0.3, 5) + rng.normal(0, 1.5, (40, 5))
+
+    def refused(rows):
+        judge = found.native()
+        return [lib.nav_texture_strange_weigh(judge, doubles(row)) > 1.0 for row in np.ascontiguousarray(rows)]
+
+    labels, folds = np.repeat([0, 1], 10), np.tile(np.arange(5), 4)
+    features = [drive(6.0 * k) for k in labels]
+    found = fit_strange(features, labels, folds, WINDOW, 0.995)
+    between = np.array([refused(drive(3.0)) for _ in range(10)])
+    assert not between[:, 0].any() and between[:, 16:].mean() > 0.9
+    assert np.mean([refused(drive(6.0 * (n % 2))) for n in range(20)]) < 0.05
+    few = [0, 1, 2, 10, 11, 12]
+    assert fit_strange([features[n] for n in few], labels[few], folds[few], WINDOW, 0.995) is None
+
+
 def test_a_catch_is_a_border_and_no_surface(model):
     x = drag("SMOOTH", 1000, 61)
     x[450:750, 0] += 3000 * np.sin(np.linspace(0, np.pi, 300))
@@ -140,7 +172,7 @@ def test_block_by_block_is_as_all_at_once(model):
     x = drag("ROUGH", 1000, 66)
     stream = model.stream(WINDOW)
     parts = [d for block in np.array_split(x, 37) for d in stream.push(block)]
-    whole = model.judge(x, WINDOW)
+    whole = model.judge(x, WINDOW, notices=True)
     assert [(d.end, d.label, d.confidence) for d in parts] == [(d.end, d.label, d.confidence) for d in whole]
 
 

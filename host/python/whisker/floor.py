@@ -77,9 +77,9 @@ class SpectralFloorWhisker:
 
         Across a border it is that of the later half; of a surface never trained it is weak for all.
         """
-        (found,) = self._stream.push(window)
+        *notices, found = self._stream.push(window)
         self.windows += 1
-        self.borders += found.border
+        self.borders += found.border  # notices are of the same window
         self.unknown += found.label < 0
         return found.loglik if found.confidence > 0.0 else None
 

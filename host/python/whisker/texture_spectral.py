@@ -8,9 +8,12 @@ import numpy as np
 
 from .native import doubles, ffi, lib
 from .tables import TableError
+from .texture_change import Change
 from .texture_rung import Rung
+from .texture_strange import Strange
 
-FORMAT = "whisker texture model 3"
+FORMAT = "whisker texture model 4"
+PARTS = {"change": Change, "strange": Strange}  # of windows in a row
 LIMITS = ("spike", "still", "low", "high")
 
 
@@ -26,6 +29,7 @@ class Judgement:
     distance: float
     bad: int
     loglik: np.ndarray  # (classes,)
+    notice: bool = False  # no window, but word of a border at once
 
 
 @dataclass
@@ -41,6 +45,8 @@ class SpectralModel:
     together: float = 1.0
     doubt: float = 0.0
     sure: float = 0.99
+    change: Change | None = None
+    strange: Strange | None = None
     figures: dict = field(default_factory=dict)  # of held-out recordings, for the reader
 
     @property
@@ -51,10 +57,14 @@ class SpectralModel:
         """Decisions in windows of so many samples, or, with a step, sequential ones within `patience` samples."""
         return Stream(self, window, step, patience)
 
-    def judge(self, samples: np.ndarray, window: int, sequential: bool = False) -> list[Judgement]:
-        """All decisions on samples (n, channels). Sequential: looks at every shortest rung, up to four windows."""
+    def judge(
+        self, samples: np.ndarray, window: int, sequential: bool = False, notices: bool = False
+    ) -> list[Judgement]:
+        """All decisions on samples (n, channels), with notices of borders between them only if asked for. Sequential: looks
+        at every shortest rung, up to four windows."""
         step = min(self.rungs[0].length, window) if sequential else 0
-        return self.stream(window, step, 4 * window if sequential else 0).push(samples)
+        found = self.stream(window, step, 4 * window if sequential else 0).push(samples)
+        return [d for d in found if notices or not d.notice]
 
     def save(self, path) -> None:
         content = {"format": FORMAT, "classes": self.classes, "rate_hz": self.rate_hz, "window_ms": self.window_ms}
@@ -66,10 +76,10 @@ class SpectralModel:
             "figures": self.figures,
         }
         content["limits"] = {name: _listed(self.limits[name]) for name in LIMITS}
-        content["rungs"] = [
-            {n: getattr(r, n) for n in Rung.NUMBERS} | {n: _listed(getattr(r, n)) for n in (*Rung.ARRAYS, "span")}
-            for r in self.rungs
-        ]
+        for name in PARTS:
+            part = getattr(self, name)
+            content[name] = None if part is None else _fields(part)
+        content["rungs"] = [_fields(r) | {"span": _listed(r.span)} for r in self.rungs]
         Path(path).write_text(json.dumps(content) + "\n")
 
     @classmethod
@@ -94,6 +104,10 @@ class SpectralModel:
             name: float(content[name]) for name in ("rate_hz", "window_ms", "growth", "together", "doubt", "sure")
         }
         model = cls([str(c) for c in content["classes"]], rungs=rungs, limits=limits, **numbers)
+        for name, kind in PARTS.items():
+            if content[name] is not None:
+                arrays = {n: np.array(content[name][n], dtype=np.float64) for n in kind.ARRAYS}
+                setattr(model, name, kind(**{n: content[name][n] for n in kind.NUMBERS}, **arrays))
         model.figures = content.get("figures", {})
         if not rungs or any(len(r.bias) != len(model.classes) for r in rungs):
             raise ValueError("rungs and classes differ")
@@ -122,6 +136,9 @@ class Stream:
         rules.rung, rules.unknown, rules.border = natives, doubles(unknown), doubles(border)
         rules.growth, rules.together, rules.doubt, rules.sure = model.growth, model.together, model.doubt, model.sure
         rules.step, rules.patience = step, patience
+        self._change = model.change.native() if model.change is not None and not step else ffi.NULL
+        self._strange = model.strange.native() if model.strange is not None and not step else ffi.NULL
+        rules.change, rules.strange = self._change, self._strange
         # The span of windows at least as long as those judged; the longest rung's if there is none.
         longest = patience if step else window
         span = next((r.span for r in model.rungs if r.length >= longest), model.rungs[-1].span)
@@ -160,7 +177,13 @@ class Stream:
     def _judgement(self, end: int) -> Judgement:
         d = self._decision
         border = bool(d.border)
-        return Judgement(end, d.samples, d.label, d.confidence, border, d.distance, d.health.bad, self._loglik.copy())
+        return Judgement(
+            end, d.samples, d.label, d.confidence, border, d.distance, d.health.bad, self._loglik.copy(), bool(d.notice)
+        )
+
+
+def _fields(part: Rung | Change) -> dict:
+    return {n: getattr(part, n) for n in part.NUMBERS} | {n: _listed(getattr(part, n)) for n in part.ARRAYS}
 
 
 def _listed(array: np.ndarray) -> list:

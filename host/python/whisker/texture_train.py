@@ -2,13 +2,16 @@
 
 import numpy as np
 
-from .texture_fit import Fitted, Windows, fit, log_loss
+from .texture_change import fit_change
+from .texture_fit import UNKNOWN_QUANTILE, Fitted, Windows, fit, log_loss
 from .texture_spectral import SpectralModel
+from .texture_strange import fit_strange
 
 FOLDS = 5
 SHORTER, LONGER = 8, 8  # rungs from an eighth of the window to eight windows, in octaves
 LENGTH_LEAST, LENGTH_MOST = 4, 1024  # samples of a rung
 WINDOWS_MOST = 6000  # of one rung, over all recordings
+BLOCKS = 4  # of a window, in each of which a change of surface is looked for
 SPIKE_OVER = 3.0  # times what one sample in a thousand stands out from both neighbours
 STILL_OVER, STILL_LEAST = 2.0, 16  # times the longest run of equal samples; shorter runs happen to any sensor
 SPAN_OVER = 1.5  # times the farthest that a training window reaches
@@ -34,6 +37,8 @@ def train(recordings: dict[str, list[np.ndarray]], rate_hz: float, window_ms: fl
             rung.span = span
     model = SpectralModel(list(recordings), rate_hz, [f.rung for f in fitted], limits, window_ms)
     _calibrate(model, fitted, parts, labels, folds, base)
+    model.change = fit_change(parts, labels, folds, max(LENGTH_LEAST, round(base / BLOCKS)), floor)
+    model.strange = _strange(model, parts, labels, folds, base)
     return model
 
 
@@ -151,6 +156,16 @@ def _calibrate(model: SpectralModel, fitted: list[Fitted], parts: list, labels, 
         "sequential_accuracy": round(accuracy, 4),
         "sequential_samples": round(samples, 1),
     }
+
+
+def _strange(model: SpectralModel, parts, labels, folds, base: int):
+    """Of windows of the base length, the rung's features; None without such a rung."""
+    rung = next((r for r in model.rungs if r.length == base), None)
+    if rung is None:
+        return None
+    rows = [p[: len(p) // base * base].reshape(-1, base, p.shape[1]) for p in parts]
+    features = [rung.expand(r)[:, : len(rung.centre)] for r in rows]
+    return fit_strange(features, labels, folds, base, UNKNOWN_QUANTILE)
 
 
 def _decisions(twins: list[SpectralModel], parts, folds, window: int, sequential: bool = False) -> list[list]:

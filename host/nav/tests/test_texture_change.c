@@ -1,0 +1,152 @@
+/* A change of surface within a drive, and a surface never trained that no window by itself gives away. */
+#include "near.h"
+#include "texture_change.h"
+#include "texture_features.h"
+#include "texture_strange.h"
+
+enum { LENGTH = 16, FEATURES_MOST = 64 };
+
+/* One channel; two classes whose log power is 0 and 4, with unit variance within a drive. */
+struct numbers {
+    double floor, steady[2 * FEATURES_MOST], apart[4], weight[2 * FEATURES_MOST], bias[2];
+};
+
+static struct nav_texture_change *make(struct numbers *m, double limit)
+{
+    *m = (struct numbers){.apart = {0.0, 16.0, 16.0, 0.0}, .bias = {0.0, -8.0}};
+    struct nav_texture_features *f = nav_texture_features_new(1, LENGTH, 0, &m->floor);
+    int power = nav_texture_features_count(f) - 2;
+    nav_texture_features_free(f);
+    m->steady[2 * power + 1] = m->weight[2 * power + 1] = 4.0;
+    const struct nav_texture_change_numbers n = {.classes = 2,
+                                                 .channels = 1,
+                                                 .length = LENGTH,
+                                                 .share = 1.0,
+                                                 .limit = limit,
+                                                 .floor = &m->floor,
+                                                 .steady = m->steady,
+                                                 .apart = m->apart,
+                                                 .weight = m->weight,
+                                                 .bias = m->bias};
+    return nav_texture_change_new(&n);
+}
+
+static double weigh(struct nav_texture_change *c, double amplitude, int *after)
+{
+    double block[LENGTH];
+    for (int i = 0; i < LENGTH; i++)
+        block[i] = 500.0 + (i % 2 ? amplitude : -amplitude);
+    return nav_texture_change_weigh(c, block, after);
+}
+
+static void a_change_is_found_where_it_is(void **state)
+{
+    (void)state;
+    struct numbers m;
+    int after;
+    struct nav_texture_change *c = make(&m, 5.0);
+    for (int i = 0; i < 3; i++)
+        assert_true(weigh(c, 1.0, &after) < -1e8);
+    for (int i = 0; i < 40; i++)
+        assert_true(weigh(c, 1.0, &after) < 0.0);
+    assert_true(weigh(c, exp(2.0), &after) < 5.0);
+    for (int i = 2; i <= NAV_TEXTURE_CHANGE_AFTER_MOST; i++) {
+        assert_true(weigh(c, exp(2.0), &after) > 5.0);
+        assert_int_equal(after, i);
+    }
+    nav_texture_change_keep(c, 2);
+    assert_true(weigh(c, exp(2.0), &after) < -1e8); /* three blocks leave no two before two */
+    assert_true(weigh(c, exp(2.0), &after) < 0.0);
+    nav_texture_change_free(c);
+}
+
+/* The ratio written out: 6 before, 3 after, the mean of log power 4 higher, both sides named right. */
+static void the_ratio_is_the_formula(void **state)
+{
+    (void)state;
+    struct numbers m;
+    int after;
+    double last = 0.0;
+    struct nav_texture_change *c = make(&m, 5.0);
+    for (int i = 0; i < 9; i++)
+        last = weigh(c, i < 6 ? 1.0 : exp(2.0), &after);
+    assert_int_equal(after, 3);
+    assert_near(last, 3.0 * 6.0 / 9.0 * (16.0 - 8.0), 1e-6);
+    nav_texture_change_free(c);
+}
+
+/* A stretch twice as far off as the other class is hardly more evidence than the class itself: the formula without the
+ * bound would say three times as much. */
+static void a_stray_block_claims_no_more_than_the_classes_differ(void **state)
+{
+    (void)state;
+    struct numbers m;
+    int after;
+    double last = 0.0;
+    struct nav_texture_change *c = make(&m, 5.0);
+    for (int i = 0; i < 9; i++)
+        last = weigh(c, i < 6 ? 1.0 : exp(4.0), &after);
+    assert_true(last > 15.0 && last < 20.0);
+    nav_texture_change_free(c);
+}
+
+/* A whisker that is louder by the same factor throughout, halfway to the other class, has no border. */
+static void what_a_drive_has_of_its_own_is_no_change(void **state)
+{
+    (void)state;
+    struct numbers m;
+    int after;
+    struct nav_texture_change *c = make(&m, 5.0);
+    for (int i = 0; i < 30; i++)
+        assert_true(weigh(c, exp(1.0), &after) < 0.0);
+    nav_texture_change_free(c);
+}
+
+static void impossible_numbers_make_no_detector(void **state)
+{
+    (void)state;
+    struct numbers m;
+    assert_null(make(&m, NAN));
+    nav_texture_change_free(NULL);
+    const double one[] = {1.0}, none[] = {0.0};
+    struct nav_texture_strange_numbers n = {
+        .classes = 1, .features = 1, .steps = 1, .turn = one, .middle = none, .limit = none};
+    assert_null(nav_texture_strange_new(&n));
+    n.limit = one;
+    n.steps = NAV_TEXTURE_STRANGE_STEPS_MAX + 1;
+    assert_null(nav_texture_strange_new(&n));
+    nav_texture_strange_free(NULL);
+}
+
+/* Two features, turned by [[2, 0], [0, 1]]; classes at 0 and at (10, 0); steps of 2 and 4 windows. */
+static void means_of_windows_are_measured_from_the_nearest_class(void **state)
+{
+    (void)state;
+    const double turn[] = {2, 0, 0, 1, 2, 0, 0, 1}, middle[] = {0, 0, 20, 0, 0, 0, 20, 0}, limit[] = {2.0, 0.5};
+    const struct nav_texture_strange_numbers n = {
+        .classes = 2, .features = 2, .steps = 2, .turn = turn, .middle = middle, .limit = limit};
+    struct nav_texture_strange *s = nav_texture_strange_new(&n);
+    const double windows[][2] = {{1, 5}, {3, -1}, {3, 5}, {9, -1}, {9, 0}, {9, 0}, {9, 0}};
+    const double wanted[] = {0.0, (16.0 + 4.0) / 2 / 2.0, (36.0 + 4.0) / 2 / 2.0, (64.0 + 4.0) / 2 / 0.5};
+    for (int i = 0; i < 4; i++)
+        assert_near(nav_texture_strange_weigh(s, windows[i]), wanted[i], 1e-9);
+    nav_texture_strange_weigh(s, windows[4]);
+    nav_texture_strange_weigh(s, windows[5]);
+    assert_near(nav_texture_strange_weigh(s, windows[6]), (4.0 + 0.0625) / 2 / 0.5, 1e-9); /* nearer the second class */
+    nav_texture_strange_reset(s);
+    assert_true(nav_texture_strange_weigh(s, windows[0]) == 0.0);
+    nav_texture_strange_free(s);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_change_is_found_where_it_is),
+        cmocka_unit_test(the_ratio_is_the_formula),
+        cmocka_unit_test(a_stray_block_claims_no_more_than_the_classes_differ),
+        cmocka_unit_test(what_a_drive_has_of_its_own_is_no_change),
+        cmocka_unit_test(impossible_numbers_make_no_detector),
+        cmocka_unit_test(means_of_windows_are_measured_from_the_nearest_class),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
