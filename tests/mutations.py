@@ -56,7 +56,7 @@ MUTATIONS = [
     ),
     Mutation(
         "sensor: an angle mis-scaled by one part in a hundred",
-        "test_sense",
+        "test_mlx90333_sense",
         "sim/mlx90333/mlx90333_sense.c",
         "angle_deg * (steps / p->span_deg)",
         "angle_deg * 1.01 * (steps / p->span_deg)",
@@ -256,7 +256,10 @@ def red_nearby(copy: Path, near: str) -> str | None:
     if "/" in near:
         return run_pytest(copy, near)
     program = PROGRAMS.get(near, near)
-    if run(["cmake", "--build", BUILD, "--target", program], copy).returncode:
+    built = run(["cmake", "--build", BUILD, "--target", program], copy)
+    if "unknown target" in built.stdout + built.stderr:
+        sys.exit(f"mutations: there is no program {program}; bring the list up to date")
+    if built.returncode:
         return "does not build"
     return run_ctest(copy, "-R", f"(^|[_.]){near.removeprefix('test_')}$")
 
