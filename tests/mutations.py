@@ -217,7 +217,7 @@ MUTATIONS = [
     ),
     Mutation(
         "navigation: motion turned the wrong way",
-        "test_motion",
+        "nav_test_motion",
         "host/nav/pose.c",
         "sin(",
         "-sin(",
