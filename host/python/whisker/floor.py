@@ -79,7 +79,7 @@ class SpectralFloorWhisker:
         """
         *notices, found = self._stream.push(window)
         self.windows += 1
-        self.borders += found.border  # notices are of the same window
+        self.borders += bool(found.border or notices)
         self.unknown += found.label < 0
         return found.loglik if found.confidence > 0.0 else None
 
