@@ -133,7 +133,7 @@
 #define WHISKER_CODE_OK 0u /* the reading is good, unless sensor error bits are set */
 #define WHISKER_CODE_STARTING 1u /* the sensor has not yet had its start-up time */
 #define WHISKER_CODE_RESYNC 2u /* the node is resynchronising with its sensor after a bad frame */
-#define WHISKER_CODE_LATE 3u /* the reading had not ended when the next SYNC came */
+#define WHISKER_CODE_LATE 3u /* the reading had not ended when the next SYNC came, or its SYNC was not the one of its tick */
 #define WHISKER_CODE_SENSOR_SUM 4u /* the sum of a sensor frame is wrong */
 #define WHISKER_CODE_SENSOR_START 5u /* a sensor frame did not begin with 0xFF: line stuck low */
 #define WHISKER_CODE_SENSOR_ABSENT 6u /* the sensor did not drive its line: all ones */
@@ -211,7 +211,7 @@
     X(OK, 0, "the reading is good, unless sensor error bits are set", "none needed") \
     X(STARTING, 1, "the sensor has not yet had its start-up time", "wait 20 ms after power-up") \
     X(RESYNC, 2, "the node is resynchronising with its sensor after a bad frame", "none: one sample is given up") \
-    X(LATE, 3, "the reading had not ended when the next SYNC came", "check the tick period (500 us or more)") \
+    X(LATE, 3, "the reading had not ended when the next SYNC came, or its SYNC was not the one of its tick", "check the tick period (500 us or more) and the SYNC line") \
     X(SENSOR_SUM, 4, "the sum of a sensor frame is wrong", "check the wire between node and sensor") \
     X(SENSOR_START, 5, "a sensor frame did not begin with 0xFF: line stuck low", "check for a short on the sensor's data line") \
     X(SENSOR_ABSENT, 6, "the sensor did not drive its line: all ones", "check the sensor's supply and cable") \
