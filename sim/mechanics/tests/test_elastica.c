@@ -9,24 +9,9 @@
 #include "mech_static.h"
 #include "mech_table.h"
 #include "near.h"
+#include "one_table.h"
 
 enum { EXACT = 400 }; /* steps */
-
-static mech_table *table;
-
-static int make_table(void **state)
-{
-    (void)state;
-    table = mech_table_new();
-    return table ? 0 : -1;
-}
-
-static int drop_table(void **state)
-{
-    (void)state;
-    mech_table_free(table);
-    return 0;
-}
 
 static struct mech_whisker smooth(double kappa)
 {

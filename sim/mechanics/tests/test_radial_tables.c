@@ -8,25 +8,10 @@
 #include "mech_shaft.h"
 #include "mech_static.h"
 #include "near.h"
+#include "one_table.h"
 #include "sim_rng.h"
 
 enum { POINTS_MAX = 8, TERMS_MAX = 4 };
-
-static mech_table *table;
-
-static int make_table(void **state)
-{
-    (void)state;
-    table = mech_table_new();
-    return table ? 0 : -1;
-}
-
-static int drop_table(void **state)
-{
-    (void)state;
-    mech_table_free(table);
-    return 0;
-}
 
 static struct mech_whisker smooth(double kappa)
 {
