@@ -218,7 +218,7 @@ MUTATIONS = [
     Mutation(
         "navigation: motion turned the wrong way",
         "nav_test_motion",
-        "host/nav/pose.c",
+        "host/nav/models/pose.c",
         "sin(",
         "-sin(",
     ),

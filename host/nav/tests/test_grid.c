@@ -1,6 +1,6 @@
 /* The grid filter against equation 4 summed naively in double precision. The filter's own state is looked at, so its
  * source is part of this program. */
-#include "../grid.c"
+#include "../filters/grid.c"
 
 #include "near.h"
 #include "rooms.h"

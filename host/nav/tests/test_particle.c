@@ -1,5 +1,5 @@
 /* Particles by hand and against the grid; the filter's state is looked at, so its source is part of this program. */
-#include "../particle.c"
+#include "../filters/particle.c"
 
 #include "belief.h"
 #include "near.h"

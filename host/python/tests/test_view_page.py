@@ -170,6 +170,7 @@ def test_everything_is_reached_by_keyboard_and_named():
             )
             disabled = set(await b.eval("[...document.querySelectorAll(':disabled')].map((e) => e.id)"))
             assert wanted - disabled <= seen
+            await b.until(f"{columns(60)}.some((c) => c.length)")  # until then there is nothing to read out
             await b.eval("document.getElementById('plot').focus()")
             await b.press("ArrowLeft")
             assert "0α" in await b.text("#readout")

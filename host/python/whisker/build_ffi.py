@@ -27,27 +27,27 @@ HEADERS = {
     "nav": [
         HOST / "nav" / name
         for name in (
-            "contact.h",
-            "contact_trace.h",
-            "contact_shape.h",
-            "radial.h",
-            "radial_whisk.h",
-            "contact_surface.h",
-            "texture.h",
-            "texture_slide.h",
-            "texture_features.h",
-            "texture_rung.h",
-            "texture_change.h",
-            "texture_clean.h",
-            "texture_strange.h",
-            "texture_stream.h",
-            "pose.h",
-            "arena.h",
-            "settings.h",
-            "filter.h",
-            "belief.h",
-            "replay.h",
-            "weigh.h",
+            "touch/contact.h",
+            "touch/contact_trace.h",
+            "touch/contact_shape.h",
+            "touch/radial.h",
+            "touch/radial_whisk.h",
+            "touch/contact_surface.h",
+            "touch/texture.h",
+            "touch/texture_slide.h",
+            "touch/texture_features.h",
+            "touch/texture_rung.h",
+            "touch/texture_change.h",
+            "touch/texture_clean.h",
+            "touch/texture_strange.h",
+            "touch/texture_stream.h",
+            "models/pose.h",
+            "models/arena.h",
+            "models/settings.h",
+            "filters/filter.h",
+            "beliefs/belief.h",
+            "filters/replay.h",
+            "filters/weigh.h",
         )
     ],
     "whisker": [
@@ -76,6 +76,12 @@ def sources(folder: Path, target: str) -> list[Path]:
     return [folder / name for name in listed.group(1).split()]
 
 
+def nav_rooms() -> list[Path]:
+    """host/nav's folders, whose headers find each other by name: the list in its CMakeLists.txt."""
+    listed = re.search(r"set\(WHISKER_NAV_ROOMS ([^)]*)\)", (HOST / "nav" / "CMakeLists.txt").read_text())
+    return [HOST / "nav" / name for name in listed.group(1).split()]
+
+
 def wheel_ffi() -> cffi.FFI:
     """whisker._native from sources, without the part that needs libusb and hidapi: that is whiskerd's."""
     ffi = new_ffi()
@@ -86,7 +92,7 @@ def wheel_ffi() -> cffi.FFI:
         "\n".join(f'#include "{header}"' for header in ALL_HEADERS),
         sources=[os.path.relpath(file, ROOT) for file in files],
         include_dirs=[
-            str(path) for path in (library / "include", library / "src", ROOT / "protocol/gen", HOST / "nav")
+            str(path) for path in (library / "include", library / "src", ROOT / "protocol/gen", *nav_rooms())
         ],
         define_macros=[("_GNU_SOURCE", None)],
         libraries=[library for needed in LIBRARIES.values() for library in needed],
@@ -112,7 +118,7 @@ def main(argv: list[str] | None = None) -> int:
     ffi.set_source(
         "_native",
         "\n".join(f'#include "{header}"' for header in ALL_HEADERS),
-        include_dirs=[str(HOST / "libwhisker" / "include")],
+        include_dirs=[str(path) for path in (HOST / "libwhisker" / "include", *nav_rooms())],
         extra_link_args=[str(archive) for archive in archives.values()],
         libraries=[library for needed in LIBRARIES.values() for library in needed],
         extra_compile_args=["-O2", "-std=gnu11"],

@@ -49,7 +49,7 @@ class Mount:
         return line_mm
 
     def face(self, model: WhiskModel, per_metre: float, per_radian: float) -> float:
-        """Probability that the whisker met a face with its tip rather than a corner (host/nav/contact_surface.h).
+        """Probability that the whisker met a face with its tip rather than a corner (host/nav/touch/contact_surface.h).
 
         Tilt of the plug (rad) per metre driven forward and per radian turned anticlockwise, positive when the whisker
         bends clockwise; 0.5 when one is nan or neither explains them.

@@ -1,4 +1,4 @@
-"""Radial distance from whole whisks (host/nav/radial_whisk.h): recordings to shapes, calibration, model files.
+"""Radial distance from whole whisks (host/nav/touch/radial_whisk.h): recordings to shapes, calibration, model files.
 
 Calibration is a maximum a posteriori fit of ln peak, contact by contact, against the known radii, in which the relative
 spread from whisk to whisk is the same everywhere. Five contacts at six radii leave little to learn from, so every

@@ -1,4 +1,4 @@
-"""One rung of a spectral texture model: numbers in NumPy, arithmetic in C (host/nav/texture_rung.h)."""
+"""One rung of a spectral texture model: numbers in NumPy, arithmetic in C (host/nav/touch/texture_rung.h)."""
 
 from dataclasses import dataclass, field
 

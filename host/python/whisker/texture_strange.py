@@ -1,4 +1,4 @@
-"""Surfaces never trained, by the mean of several windows: numbers fitted here, arithmetic in C (host/nav/texture_strange.h)."""
+"""Surfaces never trained, by the mean of several windows: numbers fitted here, arithmetic in C (host/nav/touch/texture_strange.h)."""
 
 from dataclasses import dataclass
 
