@@ -26,7 +26,7 @@ HID_PACKET = 64  # bytes; the interrupt endpoint only ever answers NAK
 HID_INTERVAL = 8  # 2**7 microframes = 16 ms between the host's polls
 HID_INTERVAL_FULL_SPEED = 16  # ms
 FULL_SPEED_PACKET = 64  # bytes of a bulk packet at full speed, USB 2.0 section 5.8.3
-USB_RELEASE = 2.10  # the first whose devices have a BOS descriptor
+USB_RELEASE = 0x0201  # may have a BOS descriptor (LPM addendum to USB 2.0); 0x0210 is for USB 3 devices on a USB 2 bus
 SERIAL_INDEX = 3  # of its string
 PLATFORM_CAPABILITY = bytes.fromhex("df60ddd88945c74c9cd2659d9e648a9f")  # Microsoft OS 2.0: D8DD60DF-4589-...
 WINDOWS_8_1 = 0x06030000  # the first Windows that asks
@@ -52,7 +52,7 @@ def hid_descriptor(report_length: int) -> bytes:
 
 def device_qualifier() -> bytes:
     """USB 2.0 section 9.6.2: at the other speed the device looks the same, with one configuration."""
-    return bytes([10, QUALIFIER, 0x10, 0x02, 0, 0, 0, 64, 1, 0])
+    return struct.pack("<BBHBBBBBB", 10, QUALIFIER, USB_RELEASE, 0, 0, 0, 64, 1, 0)
 
 
 def windows_set() -> bytes:
@@ -68,12 +68,11 @@ def windows_set() -> bytes:
 
 
 def binary_object_store() -> bytes:
-    """BOS descriptor (USB 3.2 section 9.6.2): the USB 2.0 extension without link power management, and where Windows
-    finds its set."""
-    extension = bytes([7, 0x10, 2, 0, 0, 0, 0])
+    """BOS descriptor (USB 3.2 section 9.6.2): where Windows finds its set. No USB 2.0 extension: link power management
+    is all that it could offer."""
     platform = bytes([28, 0x10, 5, 0]) + PLATFORM_CAPABILITY
     platform += struct.pack("<IHBB", WINDOWS_8_1, len(windows_set()), WINDOWS_REQUEST, 0)
-    return struct.pack("<BBHB", 5, BOS, 5 + len(extension) + len(platform), 2) + extension + platform
+    return struct.pack("<BBHB", 5, BOS, 5 + len(platform), 1) + platform
 
 
 def configuration(at_full_speed: bool, kind: int = CONFIGURATION) -> bytes:
@@ -107,7 +106,7 @@ def descriptors(serial: str) -> DeviceDescriptorCollection:
     collection = DeviceDescriptorCollection()
     reports = report_descriptor()
     with collection.DeviceDescriptor() as device:
-        device.bcdUSB = USB_RELEASE
+        device.bcdUSB = float(f"{USB_RELEASE >> 8:x}.{USB_RELEASE & 0xFF:02x}")  # the emitter's way of writing BCD
         device.idVendor = LIMITS["usb_vendor_id"]
         device.idProduct = LIMITS["usb_product_id"]
         device.bcdDevice = LIMITS["gateware_version"]

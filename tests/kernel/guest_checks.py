@@ -192,8 +192,8 @@ def pyusb_session() -> str:
     bridge = usb.core.find(idVendor=LIMITS["usb_vendor_id"], idProduct=LIMITS["usb_product_id"])
     bridge.default_timeout = PROGRAM_S * 1000  # a second, as by default, may be too short for an emulated guest
     names = f"{bridge.manufacturer}, {bridge.product}, serial number {bridge.serial_number}"
-    # lsusb asks devices of USB 2.00 for it, not those of 2.10 (table 9-8 is the same for both)
-    require(bytes(bridge.ctrl_transfer(0x80, 6, 0x0600, 0, 10))[:4] == bytes([10, 6, 0x10, 2]), "no device qualifier")
+    # lsusb asks devices of USB 2.00 for it, not those of 2.01 (table 9-8 is the same for both)
+    require(bytes(bridge.ctrl_transfer(0x80, 6, 0x0600, 0, 10))[:4] == bytes([10, 6, 1, 2]), "no device qualifier")
     hid = LIMITS["usb_hid_interface"]
     bridge.detach_kernel_driver(hid)
     try:
