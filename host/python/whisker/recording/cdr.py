@@ -12,6 +12,10 @@ HEADER = b"\x00\x01\x00\x00"  # CDR_LE, no options
 LENGTH = np.dtype("<u4")
 
 
+class Malformed(ValueError):
+    """Bytes that are no such message; says what is wrong with them."""
+
+
 class Layout:
     """Collects the fields of a message and makes a structured dtype of them, padding included."""
 
@@ -70,6 +74,13 @@ class Encoder:
         self._bytes += bytes(-len(self._bytes) % struct.calcsize(code)) + struct.pack(f"<{code}", value)
         return self
 
+    def array(self, kind, values) -> "Encoder":
+        """Numbers of the NumPy dtype `kind` one behind another, without their count. None of them takes no room at all."""
+        data = np.asarray(values, np.dtype(kind).newbyteorder("<"))
+        if data.size:
+            self._bytes += bytes(-len(self._bytes) % data.itemsize) + data.tobytes()
+        return self
+
     def text(self, value: str) -> "Encoder":
         """A string: its length with the closing zero, its bytes, the zero."""
         data = value.encode() + b"\x00"
@@ -79,3 +90,45 @@ class Encoder:
 
     def message(self) -> bytes:
         return HEADER + bytes(self._bytes)
+
+
+class Decoder:
+    """Reads a message's values off its bytes and believes no length: Malformed when there are too few bytes for it."""
+
+    def __init__(self, data: bytes):
+        if data[: len(HEADER)] != HEADER:
+            raise Malformed("not little-endian CDR")
+        self._data, self._at = memoryview(data)[len(HEADER) :], 0
+
+    def number(self, code: str) -> float:
+        """A number of the struct module's `code`."""
+        size = struct.calcsize(code)
+        return struct.unpack(f"<{code}", self._take(1, size))[0]
+
+    def array(self, kind, count: int) -> np.ndarray:
+        """`count` numbers of the NumPy dtype `kind`, an array of their own."""
+        kind = np.dtype(kind).newbyteorder("<")
+        return np.frombuffer(self._take(count, kind.itemsize), kind).copy()
+
+    def text(self) -> str:
+        data = bytes(self._take(int(self.number("I")), 1))
+        if not data.endswith(b"\x00"):
+            raise Malformed("a string without its closing zero")
+        try:
+            return data[:-1].decode()
+        except UnicodeDecodeError:
+            raise Malformed("a string that is not UTF-8") from None
+
+    def done(self) -> None:
+        """Malformed unless all bytes have been read."""
+        if self._at != len(self._data):
+            raise Malformed(f"{len(self._data) - self._at} bytes too many")
+
+    def _take(self, count: int, size: int) -> memoryview:
+        """`count` elements of `size` bytes, which begin at a multiple of `size`."""
+        start = self._at + (-self._at % size if count else 0)
+        if count * size > len(self._data) - start:
+            left = max(len(self._data) - start, 0)
+            raise Malformed(f"{count} x {size} bytes wanted where {left} are left")
+        self._at = start + count * size
+        return self._data[start : self._at]

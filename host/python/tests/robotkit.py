@@ -1,0 +1,38 @@
+"""One message of every topic, with every field away from its default."""
+
+import numpy as np
+
+from whisker.robot import messages as m
+
+
+def examples() -> dict[str, object]:
+    rng = np.random.default_rng(5)
+    at = m.Header.at(12_345_678_901, "some frame")
+    pose = m.PoseWithCovariance.planar((1.0, -2.0, 3.0), rng.random((3, 3)))
+    twist = m.TwistWithCovariance(m.Twist(m.Vector3(0.1, 0.2, 0.3), m.Vector3(0.4, 0.5, 0.6)), rng.random(36))
+    bumps = [rng.random(7).astype("f4") for _ in range(6)]
+    return {
+        "observation": m.Observation(
+            at, 7, m.RELEASE, rng.random(3), rng.random(3), ["l_carpet", "r_mm", "é"], [0, 1, 2], [0.0, 0.0, -3.5]
+        ),
+        "odometry": m.Odometry(at, pose, twist, "base"),
+        "joints": m.JointState(at, ["a/alpha", "a/beta"], [0.5, np.nan], [1.0, 2.0], [3.0]),
+        "contact": m.Contact(at, "front", True, m.Time(1, 2), m.Time(3, 4), True, 0.1, 0.005, m.SHAFT, m.CORNER),
+        "behaviour": m.Behaviour(at, "forward", m.Time.of(10**10 + 1), "clear"),
+        "pose": m.PoseWithCovarianceStamped(at, pose),
+        "localisation": m.Localisation(at, "grid", pose, 0.75, 2**40, 2, 3, 4, 5, "uniform"),
+        "belief": m.Belief(at, "grid", 9, 8, 0.875, *bumps),
+        "truth": m.PoseStamped(at, m.Pose.planar(0.5, 0.25, -1.0)),
+        "health/pilot": m.ProcessHealth(at, "pilot", 4321, "running", [m.KeyValue("rows", "7")], "none yet"),
+    }
+
+
+def flat(message, path: str = "") -> dict[str, object]:
+    """Every number and text of a message by the path of its field; ours and those of other readers alike."""
+    if isinstance(message, (str, int, float, np.generic)):
+        return {path: message}
+    if isinstance(message, (list, tuple, np.ndarray)):
+        pairs = ((f"{path}[{n}]", item) for n, item in enumerate(message))
+    else:
+        pairs = ((f"{path}.{name}", value) for name, value in vars(message).items() if not name.startswith("_"))
+    return {key: value for name, item in pairs for key, value in flat(item, name).items()}
