@@ -2,20 +2,18 @@
 
 import os
 import shutil
-import signal
-import subprocess
 import sys
 import tempfile
-import threading
 import time
 from collections.abc import Callable
 from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..children import Child, Program
+
 FOLLOWERS = 2  # whisker-log and the pilot
 POLL_S = 0.05
-GRACE_S = 10.0  # for a child to end after SIGTERM, before SIGKILL
 LAGGARD_S = 20.0  # for the readers to end after the simulation has
 
 
@@ -58,72 +56,6 @@ class ChainRun:
         return str(found)
 
 
-class Child:
-    """A child process in a group of its own, its output in a log file."""
-
-    def __init__(self, name: str, command: list[str], log: Path, on_line: Callable[[str], None] | None = None):
-        self.name, self.log = name, log
-        self._log = open(log, "w")  # noqa: SIM115 - closed by close()
-        where = subprocess.PIPE if on_line else self._log
-        self.process = subprocess.Popen(
-            command, stdin=subprocess.DEVNULL, stdout=self._log, stderr=where, text=True, start_new_session=True
-        )
-        self.ended_s: float | None = None
-        self._threads = [threading.Thread(target=self._watch, daemon=True)]
-        if on_line:
-            self._threads.append(threading.Thread(target=self._read, args=(on_line,), daemon=True))
-        for thread in self._threads:
-            thread.start()
-
-    def _watch(self) -> None:
-        self.process.wait()
-        self.ended_s = time.monotonic()
-
-    def _read(self, on_line: Callable[[str], None]) -> None:
-        for line in self.process.stderr:
-            self._log.write(line)
-            on_line(line)
-
-    @property
-    def running(self) -> bool:
-        return self.ended_s is None
-
-    @property
-    def failed(self) -> bool:
-        return not self.running and self.process.returncode != 0
-
-    def failure(self) -> str:
-        """One line about a bad end."""
-        self._join()
-        self._log.flush()
-        lines = [line for line in self.log.read_text().splitlines() if not line.startswith("progress ")]
-        said = f": {lines[-1]}" if lines else ""
-        return f"{self.name} failed ({_how(self.process.returncode)}){said}; log: {self.log}"
-
-    def close(self) -> None:
-        """End it if it still runs, with whatever it has started."""
-        for sign in (signal.SIGTERM, signal.SIGKILL):
-            if self.process.poll() is None:
-                self._signal(sign)
-                try:
-                    self.process.wait(timeout=GRACE_S)
-                except subprocess.TimeoutExpired:
-                    continue
-        self._signal(signal.SIGKILL)  # grandchildren of one that died
-        self._join()
-        self._log.close()
-
-    def _join(self) -> None:
-        for thread in self._threads:
-            thread.join(timeout=1.0)
-
-    def _signal(self, sign: signal.Signals) -> None:
-        try:
-            os.killpg(self.process.pid, sign)
-        except ProcessLookupError:
-            return
-
-
 def run_chain(run: ChainRun, progress: Callable[[int], None]) -> float:
     """Run to the end; `progress(tick)` about once a simulated second. Returns wall seconds. Leaves no process behind."""
     run.logs.mkdir(parents=True, exist_ok=True)
@@ -133,23 +65,18 @@ def run_chain(run: ChainRun, progress: Callable[[int], None]) -> float:
         place = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="whisker-")))
         stack.callback(_remove_ring, ring)
         socket = str(place / "sim.sock")
-        bridge = Child("bridge", _bridge(run, ring, socket), run.logs / "bridge.log", _ticks(progress))
+        bridge = Child(_bridge(run, ring, socket), run.logs / "bridge.log", _ticks(progress))
         children = [stack.enter_context(closing(bridge))]
         _await_socket(Path(socket), bridge)
         rows = place / "rows"
         os.mkfifo(rows)
-        others = {
-            "log": _log(run, ring, socket),
-            "pilot": _pilot(run, ring, socket, rows),
-            "navigator": _navigator(run, rows),
-        }
-        for name, command in others.items():
-            children.append(stack.enter_context(closing(Child(name, command, run.logs / f"{name}.log"))))
+        for program in (_log(run, ring, socket), _pilot(run, ring, socket, rows), _navigator(run, rows)):
+            children.append(stack.enter_context(closing(Child(program, run.logs / f"{program.name}.log"))))
         _await_end(children)
     return time.monotonic() - began
 
 
-def _bridge(run: ChainRun, ring: str, socket: str) -> list[str]:
+def _bridge(run: ChainRun, ring: str, socket: str) -> Program:
     wrapper = shutil.which("umockdev-wrapper")
     if wrapper is None:
         raise ChainError("umockdev-wrapper is not installed; run 'make setup' first")
@@ -160,24 +87,24 @@ def _bridge(run: ChainRun, ring: str, socket: str) -> list[str]:
     simulation += ["--lanes-populated", run.lanes]
     daemon = [run.program("whiskerd"), "--ring", ring, "--sck-divider", run.link.sck_divider]
     daemon += ["--word-gap", run.link.word_gap, "--sample-point", run.link.sample_point]
-    return [str(word) for word in [*simulation, "--", *daemon]]
+    return Program.of("bridge", [*simulation, "--", *daemon])
 
 
-def _log(run: ChainRun, ring: str, socket: str) -> list[str]:
+def _log(run: ChainRun, ring: str, socket: str) -> Program:
     command = [run.program("whisker-log"), "--ring", ring, "--lanes", run.lanes, "--socket", socket]
-    return [str(word) for word in [*command, "--bad", run.out / "bad.csv", "--summary", run.out / "log.json"]]
+    return Program.of("log", [*command, "--bad", run.out / "bad.csv", "--summary", run.out / "log.json"])
 
 
-def _pilot(run: ChainRun, ring: str, socket: str, rows: Path) -> list[str]:
+def _pilot(run: ChainRun, ring: str, socket: str, rows: Path) -> Program:
     command = [sys.executable, "-m", "whisker.demo.pilot_process", "--ring", ring, "--socket", socket]
     command += ["--scene", run.scene, "--models", run.out / "models", "--seed", run.seed]
     command += ["--out", run.scene / "observations.csv", "--rows", rows, "--traces", run.out / "traces.csv"]
-    return [str(word) for word in [*command, "--report", run.out / "pilot.json"]]
+    return Program.of("pilot", [*command, "--report", run.out / "pilot.json"])
 
 
-def _navigator(run: ChainRun, rows: Path) -> list[str]:
+def _navigator(run: ChainRun, rows: Path) -> Program:
     command = [sys.executable, "-m", "whisker.demo.navigator_process", "--rows", rows, "--scene", run.scene]
-    return [str(word) for word in [*command, "--out", run.out]]
+    return Program.of("navigator", [*command, "--out", run.out])
 
 
 def _ticks(progress: Callable[[int], None]) -> Callable[[str], None]:
@@ -221,7 +148,3 @@ def _raise_failures(children: list[Child]) -> None:
 def _remove_ring(name: str) -> None:
     """whiskerd removes its ring; this is for one that was killed."""
     Path("/dev/shm", name).unlink(missing_ok=True)
-
-
-def _how(code: int) -> str:
-    return f"signal {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
