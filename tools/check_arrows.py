@@ -16,7 +16,8 @@ ALLOWED = {
     "fpga/boards": ["fpga/bridge_rtl", "fpga/usb", "host/python"],  # clock and limits of the protocol
     "host/libwhisker": [],
     "host/nav": [],
-    "host/apps": ["host/libwhisker", "host/nav"],
+    "host/create": [],
+    "host/apps": ["host/libwhisker", "host/nav", "host/create"],
     "host/python": ["host/libwhisker", "host/nav", "sim/signals"],
     "sim/mlx90333": ["sim/node", "firmware/dspic"],  # one copy of the data sheet
     "sim/dspic": ["firmware/dspic"],  # addresses and bits, and what the accessors call
@@ -24,7 +25,8 @@ ALLOWED = {
     "sim/mechanics": [],
     "sim/world": ["sim/mechanics", "sim/node"],
     "sim/signals": ["sim/world", "sim/mechanics", "sim/mlx90333", "sim/node"],
-    "sim/bridge": ["sim/world", "sim/mechanics", "sim/node", "sim/mlx90333", "fpga/bridge_rtl", "fpga/usb"],
+    "sim/create": ["sim/world", "sim/mechanics"],
+    "sim/bridge": ["sim/world", "sim/create", "sim/mechanics", "sim/node", "sim/mlx90333", "fpga/bridge_rtl", "fpga/usb"],
 }
 INCLUDE = re.compile(r'^\s*[#`]include\s+["<]([^">]+)[">]', re.MULTILINE)
 IMPORT = re.compile(r"^\s*(?:from|import)\s+([a-zA-Z_][\w.]*)", re.MULTILINE)

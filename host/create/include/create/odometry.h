@@ -1,0 +1,65 @@
+/*
+ * What the base says about its motion, frame by frame, made into steps with errors.
+ *
+ * Create 1 tells whole millimetres and degrees since they were last read. Some firmwares keep what is less than a unit
+ * for the next time, some drop it: then the body whisk (pi/24 rad/s, 0.11 degrees per frame of 15 ms) reads as no turn
+ * at all. Where that is possible the speeds that the base was asked for are integrated instead. Create 2 has encoders.
+ * The policy says which source counts. Pure: no allocation, no I/O.
+ */
+#ifndef CREATE_ODOMETRY_H
+#define CREATE_ODOMETRY_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "create/model.h"
+#include "create/motion.h"
+#include "create/stream.h"
+
+enum create_source {
+    CREATE_REPORTED,  /* packets 19 and 20 */
+    CREATE_REQUESTED, /* packets 41 and 42, times 15 ms */
+    CREATE_ENCODERS,  /* packets 43 and 44 */
+    CREATE_AUTO /* encoders if there are any; reported where the firmware keeps remainders, or the motion of a frame is
+                   well above a unit; requested otherwise */
+};
+
+enum create_remainder { CREATE_UNKNOWN, CREATE_KEPT, CREATE_DROPPED };
+
+struct create_odometry_settings {
+    enum create_model model;
+    enum create_source policy;
+    double wheel_base_m;    /* between the wheels */
+    double distance_scale;  /* true distance over told distance */
+    double angle_scale;     /* true angle over told angle */
+    double relative_sigma;  /* standard deviation of these two scales; the paper's odometry: < 0.05 */
+    double requested_sigma; /* instead of it where requested speeds are used */
+    double drift_rad_per_m; /* standard deviation of the heading per distance: wheels are not alike */
+};
+
+struct create_odometry {
+    struct create_odometry_settings settings;
+    enum create_remainder remainder;    /* what this firmware has been seen to do */
+    enum create_source distance, angle; /* in force at the newest frame */
+    uint64_t estimated;                 /* frames that never came, whose motion was estimated */
+    double kept_m, dropped_m, told_m;   /* evidence about the remainder: what it would tell, and what it told */
+    uint32_t still;                     /* frames in a row that told no motion though enough was asked for */
+    bool started;
+    int32_t left, right; /* encoders at the newest frame */
+};
+
+/* Usual settings of a model: policy CREATE_AUTO, 5 % (paper), 10 % where requested, 0.05 rad/m (assumed). */
+void create_odometry_defaults(struct create_odometry_settings *settings, enum create_model model);
+
+/* False: this policy cannot be had from this model, or a number is not positive and finite (drift: may be 0). */
+bool create_odometry_check(const struct create_odometry_settings *settings);
+
+void create_odometry_begin(struct create_odometry *odometry, const struct create_odometry_settings *settings);
+
+/* The motion of one frame, and of those missed before it. */
+struct create_step create_odometry_take(struct create_odometry *odometry, const struct create_frame *frame);
+
+/* "reported", "requested", "encoders", "auto". */
+const char *create_source_name(enum create_source source);
+
+#endif

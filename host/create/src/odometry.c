@@ -1,0 +1,198 @@
+#include "odometry.h"
+
+#include <math.h>
+#include <string.h>
+
+#define PERIOD_S (CREATE_OI_PERIOD_MS * 1e-3)
+#define DISTANCE_UNIT_M 1e-3                            /* of packet 19 */
+#define ANGLE_UNIT_RAD (3.14159265358979323846 / 180.0) /* of packet 20 */
+/* A unit dropped costs half a unit on average: at this many units per frame, as much as the paper's 5 %. */
+#define WELL_ABOVE 10
+/* A base that was asked for more than this many units in a frame, and told none in this many frames, stands. */
+#define STILL_UNITS 1.2
+#define STILL_FRAMES 3
+/* What is estimated for frames that never came may be wrong by all of it. */
+#define ESTIMATE_SIGMA 1.0
+#define SPEED_MAX_M_S (CREATE_OI_SPEED_MAX_MM_S * 1e-3)
+#define PLAUSIBLE 1.1 /* times the greatest speed: encoders that moved further have begun anew */
+
+void create_odometry_defaults(struct create_odometry_settings *settings, enum create_model model)
+{
+    *settings = (struct create_odometry_settings){
+        .model = model,
+        .policy = CREATE_AUTO,
+        .wheel_base_m = create_model_facts(model)->wheel_base_m,
+        .distance_scale = 1,
+        .angle_scale = 1,
+        .relative_sigma = 0.05,
+        .requested_sigma = 0.1,
+        .drift_rad_per_m = 0.05,
+    };
+}
+
+static bool positive(double number)
+{
+    return isfinite(number) && number > 0;
+}
+
+bool create_odometry_check(const struct create_odometry_settings *settings)
+{
+    return positive(settings->wheel_base_m) && positive(settings->distance_scale) && positive(settings->angle_scale) &&
+           positive(settings->relative_sigma) && positive(settings->requested_sigma) &&
+           isfinite(settings->drift_rad_per_m) && settings->drift_rad_per_m >= 0 &&
+           (settings->policy != CREATE_ENCODERS || create_model_facts(settings->model)->count_m > 0);
+}
+
+void create_odometry_begin(struct create_odometry *odometry, const struct create_odometry_settings *settings)
+{
+    memset(odometry, 0, sizeof *odometry);
+    odometry->settings = *settings;
+    odometry->distance = odometry->angle = CREATE_REQUESTED;
+}
+
+const char *create_source_name(enum create_source source)
+{
+    static const char *const names[] = {"reported", "requested", "encoders", "auto"};
+    return names[source];
+}
+
+double odometry_asked_distance(const struct create_frame *frame)
+{
+    const int32_t both = frame->value[CREATE_OI_REQUESTED_RIGHT] + frame->value[CREATE_OI_REQUESTED_LEFT];
+    return both * 0.5e-3 * PERIOD_S;
+}
+
+double odometry_asked_angle(const struct create_odometry *odometry, const struct create_frame *frame)
+{
+    const int32_t apart = frame->value[CREATE_OI_REQUESTED_RIGHT] - frame->value[CREATE_OI_REQUESTED_LEFT];
+    return apart * 1e-3 / odometry->settings.wheel_base_m * PERIOD_S;
+}
+
+/* Asked for enough to be told, and nothing told: 0 while it moves, else frames in a row. */
+static void watch_stillness(struct create_odometry *odometry, const struct create_frame *frame, double d, double a)
+{
+    const bool asked = fabs(d) > STILL_UNITS * DISTANCE_UNIT_M || fabs(a) > STILL_UNITS * ANGLE_UNIT_RAD;
+    const bool told = frame->value[CREATE_OI_DISTANCE] != 0 || frame->value[CREATE_OI_ANGLE] != 0;
+    odometry->still = asked && !told ? odometry->still + 1 : 0;
+}
+
+static enum create_source choose(const struct create_odometry *odometry, double asked, double unit)
+{
+    const struct create_odometry_settings *settings = &odometry->settings;
+    if (settings->policy != CREATE_AUTO) {
+        return settings->policy;
+    }
+    if (create_model_facts(settings->model)->count_m > 0) {
+        return CREATE_ENCODERS;
+    }
+    return odometry->remainder == CREATE_KEPT || fabs(asked) >= WELL_ABOVE * unit ? CREATE_REPORTED : CREATE_REQUESTED;
+}
+
+static int32_t counted(int32_t now, int32_t before)
+{
+    return (int16_t)(uint16_t)(now - before);
+}
+
+/* Motion of both wheels by their encoders, m. False: they have begun anew, or the frame is the first. */
+static bool count_wheels(struct create_odometry *odometry, const struct create_frame *frame, double *left,
+                         double *right)
+{
+    const double count_m = create_model_facts(odometry->settings.model)->count_m;
+    const double most_m = (frame->missed + 1) * PERIOD_S * SPEED_MAX_M_S * PLAUSIBLE;
+    const bool started = odometry->started;
+    *left = counted(frame->value[CREATE_OI_ENCODER_LEFT], odometry->left) * count_m;
+    *right = counted(frame->value[CREATE_OI_ENCODER_RIGHT], odometry->right) * count_m;
+    odometry->left = frame->value[CREATE_OI_ENCODER_LEFT];
+    odometry->right = frame->value[CREATE_OI_ENCODER_RIGHT];
+    odometry->started = true;
+    return started && fabs(*left) <= most_m && fabs(*right) <= most_m;
+}
+
+/* What one frame of this source says, and how surely. */
+struct reading {
+    double motion, sigma, grain;
+};
+
+static struct reading read_distance(const struct create_odometry *odometry, const struct create_frame *frame,
+                                    double asked)
+{
+    const struct create_odometry_settings *settings = &odometry->settings;
+    if (odometry->distance == CREATE_REPORTED) {
+        return (struct reading){frame->value[CREATE_OI_DISTANCE] * DISTANCE_UNIT_M * settings->distance_scale,
+                                settings->relative_sigma, DISTANCE_UNIT_M};
+    }
+    return (struct reading){odometry->still >= STILL_FRAMES ? 0 : asked * settings->distance_scale,
+                            settings->requested_sigma, 0};
+}
+
+static struct reading read_angle(const struct create_odometry *odometry, const struct create_frame *frame, double asked)
+{
+    const struct create_odometry_settings *settings = &odometry->settings;
+    if (odometry->angle == CREATE_REPORTED) {
+        return (struct reading){frame->value[CREATE_OI_ANGLE] * ANGLE_UNIT_RAD * settings->angle_scale,
+                                settings->relative_sigma, ANGLE_UNIT_RAD};
+    }
+    return (struct reading){odometry->still >= STILL_FRAMES ? 0 : asked * settings->angle_scale,
+                            settings->requested_sigma, 0};
+}
+
+static struct create_step step_of(const struct create_odometry *odometry, struct reading distance, struct reading angle)
+{
+    return (struct create_step){
+        .distance = distance.motion,
+        .angle = angle.motion,
+        .scale_distance = fabs(distance.motion) * distance.sigma,
+        .scale_angle = fabs(angle.motion) * angle.sigma,
+        .scale_drift = fabs(distance.motion) * odometry->settings.drift_rad_per_m,
+        .grain_distance = distance.grain,
+        .grain_angle = angle.grain,
+    };
+}
+
+/* Adds what was asked for in frames that never came. A turn that is read may be wrong by a whole one: both are loose.
+ */
+static void add_estimate(struct create_odometry *odometry, struct create_step *step, double frames, double d, double a)
+{
+    step->distance += frames * d;
+    step->angle += frames * a;
+    step->loose_distance = ESTIMATE_SIGMA * fabs(frames * d);
+    step->loose_angle = ESTIMATE_SIGMA * fabs(frames * a);
+    odometry->estimated += (uint64_t)frames;
+}
+
+static struct create_step step_by_encoders(struct create_odometry *odometry, const struct create_frame *frame, double d,
+                                           double a)
+{
+    const struct create_odometry_settings *settings = &odometry->settings;
+    const double count_m = create_model_facts(settings->model)->count_m;
+    double left, right;
+    if (!count_wheels(odometry, frame, &left, &right)) {
+        struct create_step step = {0};
+        add_estimate(odometry, &step, frame->missed, d, a);
+        return step;
+    }
+    /* Two wheels, each known to a count: their mean and difference are worth these units. */
+    const struct reading distance = {(right + left) / 2 * settings->distance_scale, settings->relative_sigma,
+                                     count_m / sqrt(2)};
+    const struct reading angle = {(right - left) / settings->wheel_base_m * settings->angle_scale,
+                                  settings->relative_sigma, count_m * sqrt(2) / settings->wheel_base_m};
+    return step_of(odometry, distance, angle);
+}
+
+struct create_step create_odometry_take(struct create_odometry *odometry, const struct create_frame *frame)
+{
+    const double d = odometry_asked_distance(frame), a = odometry_asked_angle(odometry, frame);
+    watch_stillness(odometry, frame, d, a);
+    remainder_watch(odometry, frame, d);
+    odometry->distance = choose(odometry, d, DISTANCE_UNIT_M);
+    odometry->angle = choose(odometry, a, ANGLE_UNIT_RAD);
+    if (odometry->distance == CREATE_ENCODERS) {
+        return step_by_encoders(odometry, frame, d, a);
+    }
+    struct create_step step = step_of(odometry, read_distance(odometry, frame, d), read_angle(odometry, frame, a));
+    if (frame->missed > 0) {
+        add_estimate(odometry, &step, frame->missed, odometry->still >= STILL_FRAMES ? 0 : d,
+                     odometry->still >= STILL_FRAMES ? 0 : a);
+    }
+    return step;
+}

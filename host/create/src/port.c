@@ -1,0 +1,87 @@
+#include "create/port.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <sys/file.h>
+#include <termios.h>
+#include <unistd.h>
+
+static const struct {
+    uint32_t baud;
+    speed_t speed;
+} speeds[] = {{300, B300},   {600, B600},     {1200, B1200},   {2400, B2400},   {4800, B4800},
+              {9600, B9600}, {19200, B19200}, {38400, B38400}, {57600, B57600}, {115200, B115200}};
+
+static bool find_speed(uint32_t baud, speed_t *speed)
+{
+    for (size_t i = 0; i < sizeof speeds / sizeof speeds[0]; i++) {
+        if (speeds[i].baud == baud) {
+            *speed = speeds[i].speed;
+            return true;
+        }
+    }
+    return false;
+}
+
+bool create_port_knows(uint32_t baud)
+{
+    speed_t speed;
+    return find_speed(baud, &speed);
+}
+
+static bool make_raw(int port, speed_t speed)
+{
+    struct termios line;
+    if (tcgetattr(port, &line) != 0) {
+        return false;
+    }
+    cfmakeraw(&line);
+    line.c_cflag &= ~(tcflag_t)(CSTOPB | CRTSCTS | HUPCL);
+    line.c_cflag |= CLOCAL | CREAD;
+    cfsetispeed(&line, speed);
+    cfsetospeed(&line, speed);
+    return tcsetattr(port, TCSANOW, &line) == 0 && tcflush(port, TCIOFLUSH) == 0;
+}
+
+int create_port_open(const char *path, uint32_t baud)
+{
+    speed_t speed;
+    if (!find_speed(baud, &speed)) {
+        errno = EINVAL;
+        return -1;
+    }
+    const int port = open(path, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
+    if (port >= 0 && (flock(port, LOCK_EX | LOCK_NB) != 0 || !make_raw(port, speed))) {
+        const int error = errno;
+        close(port);
+        errno = error;
+        return -1;
+    }
+    return port;
+}
+
+int create_port_read(int port, uint8_t *bytes, size_t room)
+{
+    const ssize_t got = read(port, bytes, room);
+    if (got > 0) {
+        return (int)got;
+    }
+    if (got < 0 && (errno == EAGAIN || errno == EINTR)) {
+        return 0;
+    }
+    errno = got == 0 ? EIO : errno; /* the end of a terminal: it was hung up */
+    return -1;
+}
+
+bool create_port_write(int port, const uint8_t *bytes, size_t count)
+{
+    while (count > 0) {
+        const ssize_t sent = write(port, bytes, count);
+        if (sent < 0 && errno != EINTR) {
+            return false;
+        }
+        bytes += sent > 0 ? sent : 0;
+        count -= sent > 0 ? (size_t)sent : 0;
+    }
+    return true;
+}
