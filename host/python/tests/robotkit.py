@@ -1,4 +1,8 @@
-"""One message of every topic, with every field away from its default."""
+"""For tests of the robot's processes: one message of every topic, a cable to cut, patience."""
+
+import contextlib
+import socket
+import threading
 
 import numpy as np
 
@@ -6,6 +10,7 @@ from whisker.robot import messages as m
 
 
 def examples() -> dict[str, object]:
+    """By topic, with every field away from its default."""
     rng = np.random.default_rng(5)
     at = m.Header.at(12_345_678_901, "some frame")
     pose = m.PoseWithCovariance.planar((1.0, -2.0, 3.0), rng.random((3, 3)))
@@ -36,3 +41,67 @@ def flat(message, path: str = "") -> dict[str, object]:
     else:
         pairs = ((f"{path}.{name}", value) for name, value in vars(message).items() if not name.startswith("_"))
     return {key: value for name, item in pairs for key, value in flat(item, name).items()}
+
+
+def free_endpoint() -> str:
+    """tcp/127.0.0.1:PORT with a port that was free a moment ago."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        return f"tcp/127.0.0.1:{server.getsockname()[1]}"
+
+
+class Cable:
+    """A way to an endpoint that can be cut and mended: connect to `endpoint`. Use as a context manager."""
+
+    def __init__(self, to: str):
+        self._target = ("127.0.0.1", int(to.rpartition(":")[2]))
+        self.endpoint = free_endpoint()
+        self._ends: list[socket.socket] = []
+        self._server: socket.socket | None = None
+
+    def __enter__(self) -> "Cable":
+        self.mend()
+        return self
+
+    def __exit__(self, *exception) -> None:
+        self.cut()
+
+    def mend(self) -> None:
+        self._server = socket.create_server(("127.0.0.1", int(self.endpoint.rpartition(":")[2])))
+        threading.Thread(target=self._serve, args=[self._server], daemon=True).start()
+
+    def cut(self) -> None:
+        """Both sides find their connection closed, and nobody to connect to."""
+        for end in [self._server, *self._ends]:
+            with contextlib.suppress(OSError):
+                end.shutdown(socket.SHUT_RDWR)
+            end.close()
+        self._ends = []
+
+    def _serve(self, server: socket.socket) -> None:
+        with contextlib.suppress(OSError):
+            while True:
+                near, _ = server.accept()
+                try:
+                    far = socket.create_connection(self._target)
+                except OSError:
+                    near.close()
+                    continue
+                self._ends += [near, far]
+                for one, other in ((near, far), (far, near)):
+                    threading.Thread(target=self._pass_on, args=[one, other], daemon=True).start()
+
+    def _pass_on(self, one: socket.socket, other: socket.socket) -> None:
+        with contextlib.suppress(OSError):
+            while data := one.recv(65536):
+                other.sendall(data)
+            other.shutdown(socket.SHUT_WR)
+
+
+def take_until(inbox, done, patience_s: float = 30.0) -> list:
+    """All that comes until `done(all of it)`."""
+    got = []
+    while not done(got):
+        batch = inbox.take(patience_s)
+        assert batch or done(got), f"nothing comes; so far {len(got)}; {inbox.tallies} {inbox.last_error}"
+        got += batch
+    return got

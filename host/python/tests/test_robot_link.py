@@ -1,0 +1,235 @@
+"""Streams over zenoh: typed, numbered, found again after every loss, and honest about what was lost."""
+
+import pytest
+import zenoh
+from robotkit import Cable, examples, free_endpoint, take_until
+
+from whisker.robot import messages as m
+from whisker.robot.link import Inbox, Link, LinkError, encoding_of, is_loopback
+from whisker.robot.streams import ENVELOPE, Envelope, EnvelopeError, Tally, envelopes
+
+PATIENCE_S = 30.0
+
+
+def row(seq: int) -> m.Observation:
+    zeros = [0.0, 0.0, 0.0]
+    return m.Observation(m.Header.at(seq * 10**8), seq, m.EXPLORING, zeros, [0.1 * seq, 0.0, 0.0], [], [], [])
+
+
+def seqs(got) -> list[int]:
+    return [received.message.seq for received in got if not received.over]
+
+
+class Pair:
+    """A pilot and a navigator that sees its rows, over loopback."""
+
+    def __init__(self, endpoint=None, way=None, **options):
+        """`way`: what the navigator connects to, when it is not the pilot's endpoint."""
+        self.endpoint = endpoint or free_endpoint()
+        self.pilot = Link("pilot", listen=[self.endpoint], **options)
+        self.navigator = Link("navigator", connect=[way or self.endpoint], **options)
+        self.inbox = self.navigator.subscribe("observation", "health/*")
+        self.navigator.announce()
+        assert self.pilot.wait_for(["navigator"], PATIENCE_S)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *exception):
+        self.navigator.close()
+        self.pilot.close()
+
+
+def test_rows_arrive_in_order_and_the_end_is_told():
+    with Pair(lock_step=True) as pair:
+        rows = pair.pilot.publish("observation")
+        for seq in range(300):
+            rows.send(row(seq))
+        rows.end(30 * 10**9, "over")
+        rows.end(30 * 10**9, "twice is once")
+        got = take_until(pair.inbox, lambda got: got and got[-1].over)
+    assert seqs(got) == list(range(300))
+    assert (got[-1].message.messages, got[-1].message.reason, got[-1].topic) == (300, "over", "observation")
+    tally = pair.inbox.tallies["observation"]
+    assert (tally.received, tally.missed, tally.joined_at, tally.ended) == (301, 0, 0, True)
+
+
+def test_every_topic_has_its_type():
+    endpoint = free_endpoint()
+    with Link("pilot", listen=[endpoint]) as pilot, Link("view", connect=[endpoint]) as view:
+        inbox = view.subscribe("**")
+        view.announce()
+        assert pilot.wait_for(["view"], PATIENCE_S)
+        sent = examples()
+        for topic, message in sent.items():
+            pilot.publish(topic).send(message)
+        got = take_until(inbox, lambda got: len(got) == len(sent))
+        with pytest.raises(TypeError, match="End where Observation belongs"):
+            pilot.publish("observation").send(m.End(m.Header(), 0))
+        with pytest.raises(KeyError):
+            pilot.publish("nonsense")
+    assert {r.topic: m.encode(r.message) for r in got} == {topic: m.encode(x) for topic, x in sent.items()}
+
+
+def test_another_robot_is_another_robot():
+    endpoint = free_endpoint()
+    with Link("pilot", "one", listen=[endpoint]) as pilot, Link("view", "two", connect=[endpoint]) as other:
+        with Link("view", "one", connect=[endpoint]) as own:
+            inboxes = [link.subscribe("observation") for link in (other, own)]
+            other.announce()
+            own.announce()
+            assert pilot.wait_for(["view"], PATIENCE_S)
+            pilot.publish("observation").send(row(0))
+            take_until(inboxes[1], lambda got: len(got) == 1)
+        assert inboxes[0].tallies == {} and not inboxes[0].take(0.0)
+
+
+def test_a_killed_sender_comes_back_as_a_new_stream():
+    with Pair() as pair:
+        rows = pair.pilot.publish("observation")
+        for seq in range(3):
+            rows.send(row(seq))
+        take_until(pair.inbox, lambda got: len(got) == 3)
+        pair.pilot.close()
+        assert pair.navigator.wait_gone("pilot", PATIENCE_S)
+        pair.pilot = Link("pilot", listen=[pair.endpoint])
+        assert pair.pilot.wait_for(["navigator"], PATIENCE_S)
+        rows = pair.pilot.publish("observation")
+        rows.send(row(0))
+        assert seqs(take_until(pair.inbox, lambda got: len(got) == 1)) == [0]
+        tally = pair.inbox.tallies["observation"]
+        assert (tally.restarts, tally.missed, tally.ended) == (1, 0, False)
+
+
+def test_a_restarted_reader_joins_where_the_stream_is():
+    with Pair() as pair:
+        rows = pair.pilot.publish("observation")
+        for seq in range(5):
+            rows.send(row(seq))
+        take_until(pair.inbox, lambda got: len(got) == 5)
+        pair.navigator.close()
+        assert pair.pilot.wait_gone("navigator", PATIENCE_S)
+        rows.send(row(5))
+        pair.navigator = Link("navigator", connect=[pair.endpoint])
+        pair.inbox = pair.navigator.subscribe("observation")
+        pair.navigator.announce()
+        assert pair.pilot.wait_for(["navigator"], PATIENCE_S)
+        rows.send(row(6))
+        assert seqs(take_until(pair.inbox, lambda got: len(got) == 1)) == [6]
+        tally = pair.inbox.tallies["observation"]
+        assert (tally.joined_at, tally.missed) == (6, 0)
+
+
+def test_a_cut_cable_is_survived_and_the_gap_is_told():
+    endpoint = free_endpoint()
+    with Cable(endpoint) as cable, Pair(endpoint, way=cable.endpoint) as pair:
+        rows = pair.pilot.publish("observation")
+        rows.send(row(0))
+        take_until(pair.inbox, lambda got: len(got) == 1)
+        cable.cut()
+        assert pair.pilot.wait_gone("navigator", PATIENCE_S)
+        for seq in range(1, 51):
+            rows.send(row(seq))
+        cable.mend()
+        assert pair.pilot.wait_for(["navigator"], PATIENCE_S)
+        rows.send(row(51))
+        assert seqs(take_until(pair.inbox, lambda got: len(got) == 1)) == [51]
+    tally = pair.inbox.tallies["observation"]
+    assert (tally.missed, tally.restarts, tally.received) == (50, 0, 2) and pair.inbox.missed == 50
+
+
+def test_what_is_no_message_is_counted_and_said_and_the_rest_goes_on():
+    with Pair() as pair:
+        key, good = "whisker/robot/observation", m.encode(row(0))
+        stream, cdr = envelopes(), encoding_of(m.Observation)
+        session = pair.pilot._session
+        session.put(key, good[:-1], encoding=cdr, attachment=next(stream).pack())
+        session.put(key, good, encoding=cdr)
+        session.put(key, good, encoding="text/plain", attachment=next(stream).pack())
+        session.put(key, good, encoding=cdr, attachment=ENVELOPE.pack(2, 0, 1, 1, 0))
+        session.put("whisker/robot/health/a/b/c", good, encoding=cdr, attachment=next(stream).pack())
+        session.put(key, good, encoding=cdr, attachment=next(stream).pack())
+        got = take_until(pair.inbox, lambda got: len(got) == 1)
+        assert seqs(got) == [0]
+        tally = pair.inbox.tallies["observation"]
+        assert (tally.refused, pair.inbox.refused, tally.missed) == (4, 4, 1)
+        assert pair.inbox.last_error == (
+            "observation: field envelope: version 2 of the stream, this release has 1; "
+            "install one release of whisker on both sides"
+        )
+
+
+def test_a_topic_of_another_release_is_refused():
+    endpoint = free_endpoint()
+    with Link("pilot", listen=[endpoint]) as pilot, Link("view", connect=[endpoint]) as view:
+        inbox = view.subscribe("**")
+        view.announce()
+        assert pilot.wait_for(["view"], PATIENCE_S)
+        pilot._session.put("whisker/robot/smell", b"", encoding="x", attachment=next(envelopes()).pack())
+        pilot.publish("observation").send(row(0))
+        take_until(inbox, lambda got: len(got) == 1)
+    assert inbox.last_error.startswith("smell: no topic of this release; ") and inbox.refused == 1
+
+
+def test_a_message_that_comes_twice_is_left_out():
+    inbox = Inbox("", None)
+    inbox.take(0.0)
+    tally = Tally()
+    numbers = [3, 4, 4, 6, 2, 7]
+    assert [tally.take(Envelope(9, n, 0)) for n in numbers] == [True, True, False, True, False, True]
+    assert (tally.joined_at, tally.repeated, tally.missed, tally.next) == (3, 2, 1, 8)
+    assert tally.take(Envelope(10, 2, 0)) and (tally.restarts, tally.missed) == (1, 3)
+
+
+class FakeSample:
+    """What an inbox reads of a zenoh sample."""
+
+    def __init__(self, envelope: Envelope, message):
+        self.key_expr, self.encoding = "observation", encoding_of(type(message))
+        self.payload, self.attachment = zenoh.ZBytes(m.encode(message)), zenoh.ZBytes(envelope.pack())
+
+
+def test_a_full_inbox_drops_the_oldest_and_counts_them():
+    inbox, stream = Inbox("", 10), envelopes()
+    for seq in range(5):
+        inbox.put(FakeSample(next(stream), row(seq)))
+    assert len(inbox.take(0.0)) == 5
+    for seq in range(5, 30):
+        inbox.put(FakeSample(next(stream), row(seq)))
+    assert seqs(inbox.take(0.0)) == list(range(20, 30))
+    assert (inbox.overflown, inbox.missed) == (15, 15)
+    inbox.close()
+    assert inbox.take() == []
+
+
+def test_envelopes():
+    assert Envelope.unpack(Envelope(1, 2, 3, True).pack()) == Envelope(1, 2, 3, True)
+    for data in (None, b"", Envelope(1, 2, 3).pack() + b"x"):
+        with pytest.raises(EnvelopeError):
+            Envelope.unpack(data)
+    assert next(envelopes()).stream != next(envelopes()).stream
+
+
+@pytest.mark.parametrize("endpoint", ["7448", "tcp/host", "udp/127.0.0.1:1", "tcp/127.0.0.1:65536", "tcp/a b:1"])
+def test_endpoints_that_are_none(endpoint):
+    with pytest.raises(LinkError, match="not an endpoint; give tcp/HOST:PORT"):
+        Link("pilot", connect=[endpoint])
+
+
+def test_names_that_are_none():
+    for names in (("pi/lot", "robot"), ("pilot", "*"), ("", "robot")):
+        with pytest.raises(LinkError, match="not a name"):
+            Link(*names)
+
+
+def test_a_port_that_is_taken():
+    endpoint = free_endpoint()
+    with Link("pilot", listen=[endpoint]), pytest.raises(LinkError) as refused:
+        Link("pilot", listen=[endpoint])
+    text = f"{endpoint}: cannot be listened on (Address already in use); end what holds the port, or choose another"
+    assert str(refused.value).startswith(text)
+
+
+def test_loopback():
+    assert all(map(is_loopback, ["tcp/127.0.0.1:1", "tcp/[::1]:1", "tcp/localhost:1", "tcp/127.9.9.9:1"]))
+    assert not any(map(is_loopback, ["tcp/0.0.0.0:1", "tcp/[::]:1", "tcp/192.168.0.1:1", "tcp/127.0.0.1.example:1"]))

@@ -1,0 +1,301 @@
+"""A process's link to the others of its robot: typed, numbered streams over zenoh.
+
+    with Link("navigator", listen=[NAVIGATOR_ENDPOINT], connect=[PILOT_ENDPOINT]) as link:
+        inbox = link.subscribe("observation")
+        poses = link.publish("pose")
+        link.announce()
+        for received in inbox.take(timeout_s=1.0):
+            ...
+
+Nothing is found by itself: a process listens where it is told and connects where it is told, on loopback unless told
+otherwise. A connection that is lost is made again, forever; what was lost meanwhile is counted by the streams' numbers.
+Each pair of processes needs a connection of its own: nobody passes messages on.
+"""
+
+import contextlib
+import json
+import re
+import threading
+from collections import deque
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import zenoh
+
+from ..errors import UserError
+from .messages import HEALTH, SCHEMAS, End, Header, MessageError, decode, encode, type_of
+from .streams import Envelope, EnvelopeError, Tally, envelopes
+
+ROBOT = "robot"
+PILOT_ENDPOINT, NAVIGATOR_ENDPOINT = "tcp/127.0.0.1:7448", "tcp/127.0.0.1:7449"
+CDR = "application/cdr"
+# Of these only the newest matters: they never hold up their sender, and when there is no room the older go.
+NEWEST_ONLY = {"belief", HEALTH}
+INBOX_MOST = 10_000  # messages of a live subscription that nobody takes: over 16 minutes of rows
+LEASE_MS = {False: 2_000, True: 60_000}  # by lock-step: a peer silent for so long is gone
+BLOCK_US = 600_000_000  # a lock-step sender waits so long for a reader that stands still
+QUEUE_BATCHES = 16  # of 64 KiB, zenoh's most: a live sender's burst finds room while the machine is busy elsewhere
+RETRY = {"period_init_ms": 100, "period_max_ms": 1000, "period_increase_factor": 2}
+ENDPOINT = re.compile(r"tcp/(\[[0-9a-fA-F:]+\]|[\w.-]+):(\d{1,5})")
+NAME = re.compile(r"[A-Za-z0-9_-]+")
+LOOPBACK = re.compile(r"tcp/(127\.[\d.]+|\[::1\]|localhost):\d+")
+
+
+class LinkError(UserError, ConnectionError):
+    """No link: an endpoint that cannot be listened on, a name that is none. One line."""
+
+    exit_code = 1
+
+
+@dataclass(frozen=True)
+class Received:
+    """One message off a stream. `message` is of the topic's class, or an End."""
+
+    topic: str
+    message: object
+    envelope: Envelope
+
+    @property
+    def over(self) -> bool:
+        return isinstance(self.message, End)
+
+
+class Inbox:
+    """What has come on some topics, oldest first, until it is taken. Tallies are those of what has been taken."""
+
+    def __init__(self, prefix: str, most: int | None):
+        self._prefix, self._condition = prefix, threading.Condition()
+        self._waiting: deque = deque(maxlen=most)
+        self._overflown, self._closed = 0, False
+        self.tallies: dict[str, Tally] = {}
+        self.last_error = ""
+
+    @property
+    def refused(self) -> int:
+        return sum(tally.refused for tally in self.tallies.values())
+
+    @property
+    def missed(self) -> int:
+        """Messages that were sent and never taken, those left out because nobody took them in time included."""
+        return sum(tally.missed for tally in self.tallies.values())
+
+    @property
+    def overflown(self) -> int:
+        """How many of those missed had come and found no room."""
+        return self._overflown
+
+    def put(self, sample: zenoh.Sample) -> None:
+        """Called by zenoh's thread; keeps what came as it came."""
+        attachment = None if sample.attachment is None else sample.attachment.to_bytes()
+        entry = (str(sample.key_expr), str(sample.encoding), sample.payload.to_bytes(), attachment)
+        with self._condition:
+            self._overflown += len(self._waiting) == self._waiting.maxlen
+            self._waiting.append(entry)
+            self._condition.notify_all()
+
+    def close(self) -> None:
+        with self._condition:
+            self._closed = True
+            self._condition.notify_all()
+
+    def take(self, timeout_s: float | None = None) -> list[Received]:
+        """All that has come, at least one message unless nothing comes within `timeout_s` (None: wait on) or at the end.
+
+        What is no message of ours is left out and counted in the tally's `refused`, with the reason in `last_error`.
+        """
+        with self._condition:
+            self._condition.wait_for(lambda: self._waiting or self._closed, timeout_s)
+            entries = list(self._waiting)
+            self._waiting.clear()
+        return [received for entry in entries if (received := self._open(*entry))]
+
+    def _open(self, key: str, encoding: str, payload: bytes, attachment: bytes | None) -> Received | None:
+        topic = key.removeprefix(self._prefix)
+        tally = self.tallies.setdefault(topic, Tally())
+        try:
+            envelope = Envelope.unpack(attachment)
+            if not tally.take(envelope):
+                return None
+            return Received(topic, decode(_kind(topic, encoding), payload, topic), envelope)
+        except EnvelopeError as error:
+            self.last_error = f"{topic}: field envelope: {error}; install one release of whisker on both sides"
+        except MessageError as error:
+            self.last_error = str(error)
+        tally.refused += 1
+        return None
+
+
+def _kind(topic: str, encoding: str) -> type:
+    """The class of a message by topic and encoding; MessageError when they do not go together."""
+    if encoding == encoding_of(End):
+        return End
+    try:
+        kind = type_of(topic)
+    except KeyError:
+        text = f"{topic}: no topic of this release; install one release of whisker on both sides"
+        raise MessageError(text) from None
+    if encoding != encoding_of(kind):
+        text = f"{encoding} where {encoding_of(kind)} belongs; install one release of whisker on both sides"
+        raise MessageError(f"{topic}: field encoding: {text}")
+    return kind
+
+
+def encoding_of(kind: type) -> str:
+    """What zenoh tells of a payload of this class."""
+    return f"{CDR};{SCHEMAS[kind]}"
+
+
+class Publisher:
+    """One stream. `send` numbers and sends; `end` says that no more will come."""
+
+    def __init__(self, session: zenoh.Session, key: str, topic: str, lock_step: bool):
+        newest_only = topic.partition("/")[0] in NEWEST_ONLY
+        blocking = lock_step and not newest_only
+        self._publisher = session.declare_publisher(
+            key,
+            congestion_control=zenoh.CongestionControl.BLOCK if blocking else zenoh.CongestionControl.DROP,
+            priority=zenoh.Priority.DATA_LOW if newest_only else zenoh.Priority.DATA,
+            reliability=zenoh.Reliability.BEST_EFFORT if newest_only else zenoh.Reliability.RELIABLE,
+        )
+        self._kind, self._envelopes = type_of(topic), envelopes()
+        self.sent, self.ended = 0, False
+
+    def send(self, message) -> None:
+        """Send a message of the topic's class; without a subscriber it is gone, and counted by nobody."""
+        if type(message) is not self._kind:
+            raise TypeError(f"{type(message).__name__} where {self._kind.__name__} belongs")
+        self._put(message)
+
+    def end(self, stamp_ns: int, reason: str = "") -> None:
+        """The stream's last message: its readers know that it is over, and why. Once."""
+        if not self.ended:
+            self.ended = True
+            self._put(End(Header.at(stamp_ns), self.sent, reason))
+
+    def _put(self, message) -> None:
+        envelope = next(self._envelopes)
+        if self.ended:
+            envelope = Envelope(envelope.stream, envelope.number, envelope.sent_ns, last=True)
+        self._publisher.put(encode(message), encoding=encoding_of(type(message)), attachment=envelope.pack())
+        self.sent += 1
+
+
+class Link:
+    """One process among those of a robot. Use as a context manager."""
+
+    def __init__(
+        self,
+        process: str,
+        robot: str = ROBOT,
+        listen: Iterable[str] = (),
+        connect: Iterable[str] = (),
+        lock_step: bool = False,
+        scout: bool = False,
+    ):
+        """Endpoints are tcp/HOST:PORT. Those of `connect` need not be there yet.
+
+        lock_step: senders wait for their readers and nothing is left out, for runs that must be alike bit for bit;
+        else the newest counts and nobody waits. scout: look for others by multicast, and be found.
+        LinkError when a name or an endpoint is none, or an endpoint of `listen` is taken.
+        """
+        for name in (process, robot):
+            if not NAME.fullmatch(name):
+                raise LinkError(f"'{name}': not a name; use letters, digits, dash and underscore")
+        self.process, self.lock_step = process, lock_step
+        self._prefix = f"whisker/{robot}/"
+        config = _config(list(listen), list(connect), lock_step, scout)
+        try:
+            self._session = zenoh.open(config)
+        except zenoh.ZError as error:
+            text = f"{', '.join(listen)}: cannot be listened on ({_reason(error)})"
+            raise LinkError(f"{text}; end what holds the port, or choose another with --listen") from None
+        self._inboxes: list[Inbox] = []
+        self._kept: list = []  # what zenoh undeclares when it is no longer held
+        self.peers: set[str] = set()
+        self._peers_changed = threading.Condition()
+        self._watch_peers()
+
+    def __enter__(self) -> "Link":
+        return self
+
+    def __exit__(self, *exception) -> None:
+        self.close()
+
+    def publish(self, topic: str) -> Publisher:
+        """A new stream on a topic of messages.TOPICS, or health/<process>."""
+        return Publisher(self._session, self._prefix + topic, topic, self.lock_step)
+
+    def subscribe(self, *topics: str) -> Inbox:
+        """One inbox for these topics; "**" is all of them, "health/*" the health of every process."""
+        inbox = Inbox(self._prefix, None if self.lock_step else INBOX_MOST)
+        self._kept += [self._session.declare_subscriber(self._prefix + topic, inbox.put) for topic in topics]
+        self._inboxes.append(inbox)
+        return inbox
+
+    def announce(self) -> None:
+        """Tell the others that this process is there and has subscribed to what it wants."""
+        self._kept.append(self._session.liveliness().declare_token(f"{self._prefix}alive/{self.process}"))
+
+    def wait_for(self, processes: Iterable[str], timeout_s: float | None = None) -> bool:
+        """Until all these have announced themselves; False when some have not within `timeout_s`."""
+        wanted = set(processes)
+        with self._peers_changed:
+            return self._peers_changed.wait_for(lambda: wanted <= self.peers, timeout_s)
+
+    def wait_gone(self, process: str, timeout_s: float | None = None) -> bool:
+        """Until a process is no longer there; False when it still is after `timeout_s`."""
+        with self._peers_changed:
+            return self._peers_changed.wait_for(lambda: process not in self.peers, timeout_s)
+
+    def close(self) -> None:
+        """Send what is under way, and close; inboxes keep what has come."""
+        with contextlib.suppress(zenoh.ZError):
+            self._session.close()
+        for inbox in self._inboxes:
+            inbox.close()
+
+    def _watch_peers(self) -> None:
+        token = self._session.liveliness()
+        self._kept.append(token.declare_subscriber(f"{self._prefix}alive/*", self._note_peer, history=True))
+
+    def _note_peer(self, sample: zenoh.Sample) -> None:
+        name = str(sample.key_expr).rpartition("/")[2]
+        with self._peers_changed:
+            (self.peers.add if sample.kind == zenoh.SampleKind.PUT else self.peers.discard)(name)
+            self._peers_changed.notify_all()
+
+
+def is_loopback(endpoint: str) -> bool:
+    """Whether only this machine reaches it."""
+    return LOOPBACK.fullmatch(endpoint) is not None
+
+
+def _config(listen: list[str], connect: list[str], lock_step: bool, scout: bool) -> zenoh.Config:
+    for endpoint in [*listen, *connect]:
+        found = ENDPOINT.fullmatch(endpoint)
+        if not found or int(found[2]) > 65535:
+            raise LinkError(f"'{endpoint}': not an endpoint; give tcp/HOST:PORT, as {PILOT_ENDPOINT}")
+    config = zenoh.Config()
+    told = {
+        "mode": "peer",
+        "listen/endpoints": listen,
+        "connect/endpoints": connect,
+        "connect/timeout_ms": -1,
+        "connect/exit_on_failure": False,
+        "connect/retry": RETRY,
+        "scouting/multicast/enabled": scout,
+        "scouting/gossip/enabled": scout,
+        "transport/link/tx/lease": LEASE_MS[lock_step],
+        "transport/link/tx/queue/congestion_control/block/wait_before_close": BLOCK_US,
+        "transport/link/tx/queue/size/data": QUEUE_BATCHES,
+        "transport/shared_memory/enabled": False,
+    }
+    for key, value in told.items():
+        config.insert_json5(key, json.dumps(value))
+    return config
+
+
+def _reason(error: zenoh.ZError) -> str:
+    """The system's word in zenoh's chain of errors, else its first sentence."""
+    found = re.search(r"([\w ]+) \(os error \d+\)", str(error))
+    return found[1].strip() if found else str(error).partition(" at /")[0]
