@@ -26,7 +26,15 @@ ALLOWED = {
     "sim/world": ["sim/mechanics", "sim/node"],
     "sim/signals": ["sim/world", "sim/mechanics", "sim/mlx90333", "sim/node"],
     "sim/create": ["sim/world", "sim/mechanics"],
-    "sim/bridge": ["sim/world", "sim/create", "sim/mechanics", "sim/node", "sim/mlx90333", "fpga/bridge_rtl", "fpga/usb"],
+    "sim/bridge": [
+        "sim/world",
+        "sim/create",
+        "sim/mechanics",
+        "sim/node",
+        "sim/mlx90333",
+        "fpga/bridge_rtl",
+        "fpga/usb",
+    ],
 }
 INCLUDE = re.compile(r'^\s*[#`]include\s+["<]([^">]+)[">]', re.MULTILINE)
 IMPORT = re.compile(r"^\s*(?:from|import)\s+([a-zA-Z_][\w.]*)", re.MULTILINE)

@@ -1,0 +1,157 @@
+/* The emulator's state, and what its parts do for each other. */
+#ifndef CREATE_STATE_H
+#define CREATE_STATE_H
+
+#include "sim_create.h"
+#include "sim_rng.h"
+#include "whisker_protocol.h"
+
+enum {
+    TICKS_PER_S = WHISKER_LIMIT_CLOCK_HZ / WHISKER_LIMIT_TICK_PERIOD,
+    PERIOD_TICKS = CREATE_OI_PERIOD_MS * TICKS_PER_S / 1000,
+    COUNT_MAX = 255,                 /* of a command whose first argument counts the others */
+    COMMAND_MAX = 3 + 2 * COUNT_MAX, /* opcode, song number, notes, and two bytes each */
+    QUEUE_MAX = 1024,
+    SONGS = 16
+};
+
+/* What differs between the models. */
+struct create_model {
+    int version;
+    unsigned baud;
+    double wheel_base_mm;
+    double speed_step_mm_s; /* 0: any */
+    uint8_t no_infrared;    /* what packet 17 tells when there is none */
+};
+
+/* A command whose bytes are still coming. */
+struct create_reader {
+    uint8_t byte[COMMAND_MAX];
+    size_t count;
+};
+
+/* Requested and wanted speeds, mm/s and mm. */
+struct create_wheels {
+    double left, right; /* as the wheels turn */
+    int16_t velocity, radius, direct_left, direct_right;
+};
+
+/* Bytes that wait for their time on the line. */
+struct create_line {
+    uint8_t waiting[QUEUE_MAX];
+    size_t count;
+    size_t frame; /* of these, how many up to the end of the last stream frame */
+    unsigned baud, next_baud;
+    uint64_t change_at; /* tick at which next_baud is in force; 0: never */
+    uint64_t credit;    /* what the line could have sent: ticks times baud */
+    uint8_t left[SIM_CREATE_OUT_MAX];
+    size_t left_count;
+    struct sim_rng out_rng, in_rng;
+};
+
+struct create_stream {
+    bool on;
+    uint8_t id[COUNT_MAX];
+    size_t count;
+};
+
+enum create_wait { WAIT_NOTHING, WAIT_TIME, WAIT_DISTANCE, WAIT_ANGLE, WAIT_EVENT };
+
+struct create_script {
+    uint8_t byte[COUNT_MAX];
+    size_t count, position;
+    bool running;
+    bool restarted; /* in this tick, by itself */
+    enum create_wait wait;
+    int target;     /* ticks, mm, degrees or the event's number */
+    uint64_t begun; /* tick */
+    double from_mm, from_deg;
+};
+
+struct create_songs {
+    unsigned units[SONGS]; /* length of each in 1/64 s */
+    uint8_t number;
+    uint64_t ends; /* tick */
+};
+
+struct sim_create {
+    struct sim_create_options options;
+    const struct create_model *model;
+    uint64_t ticks;
+    enum create_oi_mode mode;
+    uint32_t stimuli;
+    double distance_mm, angle_deg; /* counted since the start */
+    double charge_mah;
+    struct create_reader reader;
+    struct create_wheels wheels;
+    struct create_line line;
+    struct create_stream stream;
+    struct create_script script;
+    struct create_songs songs;
+    int32_t sensor[CREATE_OI_PACKET_MAX + 1]; /* by packet, as last renewed; 19 and 20 are made when they are read */
+    double renewed_mm, renewed_deg;           /* at that time */
+    double read_mm, read_deg;                 /* up to where packets 19 and 20 have told */
+    double encoder_mm, encoder_deg;           /* where the encoders stood at zero */
+};
+
+const struct create_model *create_model_of(int version);
+
+/* The power is switched on, or the robot reset. What was counted stays. */
+void create_power_up(sim_create *create);
+
+/* One byte from the host or a script. */
+void create_read_byte(sim_create *create, uint8_t byte);
+
+/* Does a whole command: its opcode and its arguments. */
+void create_obey(sim_create *create, const uint8_t *command, size_t count);
+
+/* Changes the mode; the wheels stop unless it is safe or full. */
+void create_set_mode(sim_create *create, enum create_oi_mode mode);
+/* Falls back from safe to passive if there is reason to. */
+void create_stay_safe(sim_create *create);
+
+void create_drive(sim_create *create, int16_t velocity, int16_t radius);
+void create_drive_direct(sim_create *create, int16_t right, int16_t left);
+void create_drive_pwm(sim_create *create, int16_t right, int16_t left);
+void create_stop_wheels(sim_create *create);
+
+/* Renews what packets tell. */
+void create_renew(sim_create *create);
+/* Writes the data of a packet or group; returns its bytes, 0 for one this model does not have or without room. */
+size_t create_tell(sim_create *create, uint8_t id, uint8_t *to, size_t room);
+
+void create_answer(sim_create *create, const uint8_t *id, size_t count);
+void create_start_stream(sim_create *create, const uint8_t *id, size_t count);
+void create_send_frame(sim_create *create);
+
+/* Bytes of an answer, or of a stream frame, to the line. */
+void create_line_send(struct create_line *line, const uint8_t *bytes, size_t count);
+void create_line_send_frame(struct create_line *line, const uint8_t *bytes, size_t count);
+void create_line_change_baud(sim_create *create, uint8_t code);
+void create_line_tick(sim_create *create);
+/* Does a byte from the host arrive? */
+bool create_line_arrives(sim_create *create);
+
+/* Is a script or a wait under way, so that nothing from the host is heard? */
+bool create_script_busy(const sim_create *create);
+void create_script_store(sim_create *create, const uint8_t *bytes, size_t count);
+void create_script_play(sim_create *create);
+void create_script_show(sim_create *create);
+void create_script_wait(sim_create *create, enum create_wait wait, int target);
+void create_script_tick(sim_create *create);
+
+void create_song_store(sim_create *create, const uint8_t *song);
+void create_song_play(sim_create *create, uint8_t number);
+
+void create_battery_start(sim_create *create);
+void create_battery_tick(sim_create *create);
+int32_t create_battery_current(const sim_create *create); /* mA, negative: out of the battery */
+int32_t create_battery_voltage(const sim_create *create); /* mV */
+int32_t create_battery_capacity(void);                    /* mAh */
+
+static inline int16_t create_int16(const uint8_t *bytes)
+{
+    return (int16_t)(uint16_t)(bytes[0] << 8 | bytes[1]);
+}
+
+#endif

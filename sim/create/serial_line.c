@@ -1,0 +1,81 @@
+/* The line: bytes leave it at its pace, and some are lost, damaged or made up on the way. */
+#include "create_state.h"
+
+#include <string.h>
+
+void create_line_send(struct create_line *line, const uint8_t *bytes, size_t count)
+{
+    size_t room = sizeof line->waiting - line->count;
+    size_t taken = count < room ? count : room;
+    memcpy(line->waiting + line->count, bytes, taken);
+    line->count += taken;
+}
+
+/* A frame that is still being sent when the next one is due is overwritten: what it lacks never comes. */
+void create_line_send_frame(struct create_line *line, const uint8_t *bytes, size_t count)
+{
+    if (line->frame > 0)
+        line->count = 0;
+    create_line_send(line, bytes, count);
+    line->frame = line->count;
+}
+
+void create_line_change_baud(sim_create *create, uint8_t code)
+{
+    static const unsigned BAUDS[] = {
+#define BAUD(code, baud) [code] = baud,
+        CREATE_OI_BAUDS(BAUD)
+#undef BAUD
+    };
+    if (code >= sizeof BAUDS / sizeof BAUDS[0])
+        return;
+    create->line.next_baud = BAUDS[code];
+    create->line.change_at = create->ticks + CREATE_OI_BAUD_WAIT_MS * TICKS_PER_S / 1000;
+}
+
+static bool happens(struct sim_rng *rng, double share)
+{
+    return share > 0 && sim_rng_uniform(rng) < share;
+}
+
+static void leave(struct create_line *line, uint8_t byte)
+{
+    if (line->left_count < sizeof line->left)
+        line->left[line->left_count++] = byte;
+}
+
+static void pass(sim_create *create, uint8_t byte)
+{
+    const struct sim_create_options *options = &create->options;
+    struct sim_rng *rng = &create->line.out_rng;
+    if (create->stimuli & SIM_CREATE_SILENT || happens(rng, options->lose))
+        return;
+    if (happens(rng, options->flip))
+        byte = (uint8_t)(byte ^ 1u << (sim_rng_next(rng) >> 61));
+    leave(&create->line, byte);
+    if (happens(rng, options->extra))
+        leave(&create->line, (uint8_t)(sim_rng_next(rng) >> 56));
+}
+
+void create_line_tick(sim_create *create)
+{
+    struct create_line *line = &create->line;
+    const uint64_t byte_costs = (uint64_t)CREATE_OI_BITS_PER_BYTE * TICKS_PER_S;
+    size_t sent = 0;
+    if (line->change_at && create->ticks >= line->change_at) {
+        line->baud = line->next_baud;
+        line->change_at = 0;
+    }
+    for (line->credit += line->baud; sent < line->count && line->credit >= byte_costs; line->credit -= byte_costs)
+        pass(create, line->waiting[sent++]);
+    line->count -= sent;
+    line->frame -= sent < line->frame ? sent : line->frame;
+    memmove(line->waiting, line->waiting + sent, line->count);
+    if (line->count == 0 && line->credit > byte_costs)
+        line->credit = byte_costs; /* a line that rests saves up no more than a byte */
+}
+
+bool create_line_arrives(sim_create *create)
+{
+    return !(create->stimuli & SIM_CREATE_SILENT) && !happens(&create->line.in_rng, create->options.lose_orders);
+}
