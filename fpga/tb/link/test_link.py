@@ -9,7 +9,7 @@ from nodes import BITS, Nodes
 
 from whisker.protocol import COMMANDS, LANES, ORDER, RECORD
 
-SETTINGS = [(6, 30, 3), (6, 30, 5), (16, 180, 8), (32, 30, 16), (32, 255, 32), (8, 31, 1)]  # divider, gap, sample point
+SETTINGS = [(6, 30, 3), (6, 30, 5), (16, 180, 8), (32, 30, 16), (32, 255, 32), (8, 41, 1)]  # divider, gap, sample point
 SELECT_SETUP = 9  # cycles: 150 ns
 SELECT_HOLD = 6  # cycles: 100 ns
 SYNC_HIGH = 6

@@ -3,6 +3,7 @@
 #include "cmocka_cpp.h"
 
 #include "bridge_model.h"
+#include "paced_bridge.h"
 #include "usb_control.h"
 #include "whisker_protocol.h"
 
@@ -14,6 +15,8 @@ namespace
 constexpr uint64_t RESUME_CYCLES = 2000; // a real host drives 20 ms
 constexpr size_t NODES = 6;
 constexpr size_t PACKET = WHISKER_LIMIT_BULK_PACKET;
+constexpr uint64_t LINK_CYCLES =
+    519; // a tick at divider 6 and gap 30 (fpga/tb/cycles.py), and the cycle it is asked in
 
 struct Fixture {
     NodeBus nodes{NODES, 1};
@@ -192,6 +195,14 @@ void update_orders_to_running_nodes_do_nothing(void **)
     }
 }
 
+// Beyond what the settings allow: every tick that the link has time for becomes a frame, and no faster pace does.
+void the_link_bounds_the_pace(void **)
+{
+    constexpr uint64_t TICKS = 100;
+    assert_true(run_paced(LINK_CYCLES, TICKS, 0).sustained());
+    assert_false(run_paced(LINK_CYCLES - 1, TICKS, 0).sustained());
+}
+
 } // namespace
 
 int main()
@@ -201,6 +212,7 @@ int main()
         cmocka_unit_test(frames_outlive_sleep),
         cmocka_unit_test(a_reset_wakes_and_ends_the_run),
         cmocka_unit_test(update_orders_to_running_nodes_do_nothing),
+        cmocka_unit_test(the_link_bounds_the_pace),
     };
     return cmocka_run_group_tests(tests, nullptr, nullptr);
 }
