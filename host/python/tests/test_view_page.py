@@ -166,7 +166,9 @@ def test_everything_is_reached_by_keyboard_and_named():
                 await b.press("Tab")
                 seen.add(await b.eval("document.activeElement.id"))
             wanted = set(
-                await b.eval("[...document.querySelectorAll('button, select, input, #plot')].map((e) => e.id)")
+                await b.eval(
+                    "[...document.querySelectorAll('button, select, input, #plot')].filter((e) => e.checkVisibility()).map((e) => e.id)"
+                )
             )
             disabled = set(await b.eval("[...document.querySelectorAll(':disabled')].map((e) => e.id)"))
             assert wanted - disabled <= seen

@@ -29,6 +29,7 @@ def hello(hub: Hub) -> dict:
         "protocol": PROTOCOL,
         "topics": {name: {"id": topic.id, "about": topic.about} for name, topic in TOPICS.items()},
         "rings": hub.rings(),
+        "robot": hub.source.name,
         "window": WINDOW,
         "widths": WIDTHS,
         "bins": BINS,

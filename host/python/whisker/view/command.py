@@ -8,19 +8,37 @@ import signal
 import sys
 import webbrowser
 
+from ..scene import load
 from .hub import Hub
 from .rings import is_name
+from .robot_source import NoRobot, join
 from .server import ViewError, serving
 
-EXAMPLE = "whisker-view --ring whisker --open"
+EXAMPLE = "whisker-view --ring whisker --open --robot"
 PORT = 8028
 RING = "whisker"
+ROBOT = "robot"
 
 
 def add(parser: argparse.ArgumentParser) -> None:
     """Add the arguments and set `run`."""
     parser.add_argument(
         "--ring", action="append", metavar="NAME", help=f"a ring to read from the start; repeatable (default: {RING})"
+    )
+    parser.add_argument(
+        "--robot",
+        nargs="?",
+        const=ROBOT,
+        metavar="NAME",
+        help=f"also show the whole robot: arena, belief, path, health (NAME: {ROBOT} if not given)",
+    )
+    parser.add_argument("--scene", metavar="SCENE", help="folder with the robot's arena.toml and robot.toml")
+    parser.add_argument(
+        "--connect",
+        action="append",
+        default=[],
+        metavar="tcp/HOST:PORT",
+        help="a process of the robot; repeatable (default: pilot and navigator of this machine)",
     )
     parser.add_argument("--port", type=_port, default=PORT, help="0 takes a free one (default: %(default)s)")
     parser.add_argument(
@@ -61,14 +79,25 @@ def run(arguments: argparse.Namespace) -> int:
     for name in rings:
         if not is_name(name):
             raise ViewError(f"--ring {name!r}: not the name of a ring; use letters, digits, dash and dot")
-    return asyncio.run(_serve(arguments, rings))
+    scene = None if arguments.scene is None else load(arguments.scene)
+    source = _source(arguments)
+    try:
+        return asyncio.run(_serve(arguments, Hub(rings, source, scene)))
+    finally:
+        source.close()
 
 
-async def _serve(arguments: argparse.Namespace, rings: list[str]) -> int:
+def _source(arguments: argparse.Namespace) -> NoRobot:
+    """The robot, if any option asks for it."""
+    asked = arguments.robot or arguments.scene or arguments.connect
+    return join(arguments.robot or ROBOT, arguments.connect) if asked else NoRobot()
+
+
+async def _serve(arguments: argparse.Namespace, hub: Hub) -> int:
     over = asyncio.Event()
     for sign in (signal.SIGINT, signal.SIGTERM):
         asyncio.get_running_loop().add_signal_handler(sign, over.set)
-    async with serving(Hub(rings), arguments.host, arguments.port, arguments.allow_host) as port:
+    async with serving(hub, arguments.host, arguments.port, arguments.allow_host) as port:
         address = ipaddress.ip_address(arguments.host)
         if not address.is_loopback:
             print(f"whisker-view: {arguments.host}: whoever reaches this address can watch", file=sys.stderr)

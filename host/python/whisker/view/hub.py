@@ -1,9 +1,12 @@
-"""Holds the taps that pages look at, reads them 30 times a second, and says so to the pages' senders."""
+"""Holds the taps and the robot that pages look at, reads them 30 times a second, and says so to the pages' senders."""
 
 import asyncio
 import time
 
+from ..scene import Scene
 from .rings import find_rings
+from .robot import RobotModel
+from .robot_source import NoRobot
 from .tap import Tap
 
 ROUND_S = 1 / 30
@@ -19,8 +22,11 @@ class RequestError(ValueError):
 class Hub:
     """Rings named at the start are read for good; others while somebody looks at them."""
 
-    def __init__(self, names: list[str]):
+    def __init__(self, names: list[str], source: NoRobot | None = None, scene: Scene | None = None):
+        """`source`: where the robot's messages come from; `scene`: where it is and what it looks like, if known."""
         self.names = names
+        self.source, self.robot = source or NoRobot(), RobotModel(scene)
+        self.robot_watchers = 0
         self._taps = {name: Tap(name) for name in names}
         self._watchers = dict.fromkeys(names, 0)
         self._found: list[str] = []
@@ -62,7 +68,9 @@ class Hub:
             began = time.monotonic()
             for tap in self._taps.values():
                 tap.poll()
+            for topic, message in self.source.poll():
+                self.robot.take(topic, message)
             self._round.set()
             self._round = asyncio.Event()
-            period = ROUND_S if any(self._watchers.values()) else IDLE_S
+            period = ROUND_S if self.robot_watchers or any(self._watchers.values()) else IDLE_S
             await asyncio.sleep(max(0.0, period - (time.monotonic() - began)))

@@ -5,7 +5,10 @@ import hashlib
 from pathlib import Path
 
 FOLDER = Path(__file__).resolve().parent / "page"
-SCRIPTS = ("wire.js", "history.js", "traces.js", "panels.js", "main.js")  # in the order they need each other
+SCRIPTS = (  # in the order they need each other
+    *("wire.js", "history.js", "traces.js", "panels.js"),
+    *("plan.js", "belief.js", "actors.js", "timeline.js", "said.js", "robot.js", "parts.js", "main.js"),
+)
 
 
 class Page:

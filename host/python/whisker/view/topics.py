@@ -15,6 +15,7 @@ import numpy as np
 from ..protocol import LANES
 from .hub import Hub, RequestError
 from .pyramid import BINS, WIDTHS, spans
+from .robot_topics import BELIEF_ID, BeliefFeed, RobotFeed, SceneFeed
 
 BLOCK = struct.Struct("<BBHHBBIIQ")  # topic, flags, width, bins, lanes, zero, lane mask, subscription, first bin
 BLOCK_FRESH = 1  # flag: forget what came before this block
@@ -121,4 +122,7 @@ TOPICS = {
     "traces": Topic(1, Traces, Traces.__doc__),
     "status": Topic(2, Status, Status.__doc__),
     "rings": Topic(3, Rings, Rings.__doc__),
+    "scene": Topic(4, SceneFeed, SceneFeed.__doc__),
+    "robot": Topic(5, RobotFeed, RobotFeed.__doc__),
+    "belief": Topic(BELIEF_ID, BeliefFeed, BeliefFeed.__doc__),
 }

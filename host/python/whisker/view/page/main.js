@@ -17,13 +17,20 @@ const panels = new Panels((lanes) => chooseLanes(lanes));
 panels.skipped = () => history?.skipped;
 const wire = new Wire((up) => {
   linked = up;
+  robotPart.linked(up);
   if (!up) panels.status({ state: 'gone', ring: view.ring }, []);
+});
+const robotPart = new RobotPart(wire);
+const parts = new Parts((part) => {
+  robotPart.look(part === 'robot');
+  if (traces) look();
 });
 
 function remember() {
   const hash = new URLSearchParams({ ring: view.ring, ticks: view.width, range: view.range });
   if (view.chosen) hash.set('lanes', view.lanes.join(','));
   if (view.axes.length === 1) hash.set('axes', view.axes[0] ? 'beta' : 'alpha');
+  if (parts.chosen) hash.set('part', parts.now);
   if (document.documentElement.dataset.chosen) hash.set('theme', document.documentElement.dataset.theme);
   globalThis.history.replaceState(null, '', `#${hash}`);
 }
@@ -35,7 +42,7 @@ function look() {
   $('shorter').disabled = paused || view.width <= widths[0];
   const mask = view.lanes.reduce((bits, lane) => bits + 2 ** lane, 0);
   $('empty').textContent = view.lanes.length ? '' : last?.lanes ? 'No lane is selected: tick some in the table of lanes.' : 'Traces appear here as soon as frames come.';
-  if (!mask || paused) return wire.unsubscribe('traces');
+  if (!mask || paused || parts.now !== 'traces') return wire.unsubscribe('traces');
   history.subscription = (history.subscription + 1) % 2 ** 32;
   const bins = Math.min(KEEP, traces.columns);
   wire.subscribe('traces', { ring: view.ring, ticks_per_bin: view.width, bins, lanes: mask, subscription: history.subscription });
@@ -91,6 +98,7 @@ function theme(name, chosen) {
   $('theme').textContent = name === 'dark' ? 'Light' : 'Dark';
   traces?.readColours();
   redraw();
+  robotPart.themed();
 }
 
 function redraw() {
@@ -108,6 +116,7 @@ wire.on('hello', (hello) => {
   view.degreesPerCount = hello.degrees_per_count;
   view.rest = hello.rest_count;
   panels.hello(hello);
+  if (!parts.chosen) parts.choose(hello.robot ? 'robot' : 'traces', false);
   if (!traces) {
     history = new History(hello.lanes);
     traces = new Traces(history, view);
@@ -177,7 +186,7 @@ $('axes').addEventListener('change', (event) => { view.axes = { both: [0, 1], al
 $('plot').addEventListener('pointermove', (event) => { const box = $('plot').getBoundingClientRect(); traces?.point(event.clientX - box.left, event.clientY - box.top); });
 $('plot').addEventListener('pointerleave', () => { if (traces) { traces.point(-1, -1); $('readout').textContent = ''; } });
 
-const KEYS = { ' ': () => pause(!paused), '+': () => scale(-1), '=': () => scale(-1), '-': () => scale(1), a: () => $('all').click(), n: () => $('noded').click(), d: () => $('theme').click(), '?': () => $('help').click() };
+const KEYS = { r: () => parts.choose('robot', true), w: () => parts.choose('traces', true), ' ': () => pause(!paused), '+': () => scale(-1), '=': () => scale(-1), '-': () => scale(1), a: () => $('all').click(), n: () => $('noded').click(), d: () => $('theme').click(), '?': () => $('help').click() };
 addEventListener('keydown', (event) => {
   if (event.ctrlKey || event.metaKey || event.altKey || !traces) return;
   const inPlot = event.target === $('plot');
@@ -195,4 +204,5 @@ addEventListener('keydown', (event) => {
 const dark = matchMedia('(prefers-color-scheme: dark)');
 dark.addEventListener('change', () => { if (!document.documentElement.dataset.chosen) theme(dark.matches ? 'dark' : 'light'); });
 theme(wanted.get('theme') ?? (dark.matches ? 'dark' : 'light'), wanted.has('theme'));
+parts.choose(wanted.get('part') ?? 'traces', wanted.has('part'));
 wire.connect();

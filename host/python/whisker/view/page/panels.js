@@ -93,6 +93,7 @@ class Panels {
   status(s, others, toDegrees) {
     $('state').textContent = STATES[s.state];
     $('state').dataset.state = s.state;
+    $('banner').dataset.state = s.state;
     this.banner(advice(s, others));
     if (s.state === 'gone') return;
     this.showTiles(s);

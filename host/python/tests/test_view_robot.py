@@ -1,0 +1,263 @@
+"""What whisker-view knows of the robot, and what it tells a page of it."""
+
+import asyncio
+import json
+import random
+import socket
+import struct
+
+import numpy as np
+import pytest
+from test_view_http import mutated
+from viewkit import PATIENCE_S, nothing_logged, page
+from viewrobot import ARENA, ROW_NS, SCENE, MadeUpRun, Post, belief_message, estimate, reach, robot_view, route
+
+from whisker.robot.link import Link
+from whisker.robot.messages import Contact, End, Header, KeyValue, Pose, PoseStamped, ProcessHealth, Time, encode
+from whisker.view.command import ROBOT
+from whisker.view.hub import Hub
+from whisker.view.robot import (
+    CONTACTS_MOST,
+    COUNTERS_MOST,
+    PATH_MOST,
+    PROCESSES_MOST,
+    SILENT_S,
+    TEXT_MOST,
+    RobotModel,
+)
+from whisker.view.robot_source import join
+from whisker.view.robot_topics import BELIEF_HEAD, BELIEF_ID, POINTS_MOST, BeliefFeed, RobotFeed
+
+FUZZ_INPUTS = 5000
+__all__ = ["nothing_logged"]  # a fixture that every test here uses
+
+
+class Clock:
+    """A monotonic clock that stands until it is moved."""
+
+    def __init__(self):
+        self.now = 1000.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+def told_model(rows: int, scene=SCENE, **options) -> RobotModel:
+    model = RobotModel(scene)
+    Post().play(MadeUpRun(**options), range(rows), model)
+    return model
+
+
+def health(name="pilot", pid=7, state="running", counters=(), error="") -> ProcessHealth:
+    return ProcessHealth(Header.at(0), name, pid, state, [KeyValue(*pair) for pair in counters], error)
+
+
+def test_what_no_message_has_told_is_not_known():
+    model = RobotModel()
+    assert (model.now_s, model.pose, model.truth, model.behaviour, model.row, model.belief) == (None,) * 6
+    assert model.age() is None and model.rows == {"missed": None, "unseen": 0}
+    assert [(p["name"], p["age_s"], p["silent"]) for p in model.health()] == [
+        ("navigator", None, False),
+        ("pilot", None, False),
+    ]
+    assert told_model(50, simulated=False).truth is None
+
+
+def test_a_row_is_told_by_whisker_whatever_the_names():
+    model = told_model(1)
+    tips = {tip["name"]: dict(tip["loglik"]) for tip in model.row["tips"]}
+    assert set(tips) == {"floor_left", "floor_right"} and all(set(tip) == set(ARENA.textures) for tip in tips.values())
+    assert [ray["name"] for ray in model.row["rays"]] == ["object_1", "object_2", "object_3", "object_4"]
+    without = told_model(1, scene=None)
+    assert without.row["tips"] == model.row["tips"], "names can be told apart without a scene unless textures have _"
+
+
+def test_cells_not_read_and_no_contact_are_different_things():
+    touched = next(row for row in range(2000) if row % 100 < 80 and reach(SCENE.robot.of_role("object")[1], row))
+    exploring, whisking = told_model(touched + 1), told_model(91)
+    states = {ray["name"]: (ray["state"], ray["mm"]) for ray in exploring.row["rays"]}
+    assert states["object_2"] == ("contact", round(1e3 * reach(SCENE.robot.of_role("object")[1], touched), 1))
+    assert states["object_4"] == ("none", None)
+    assert all(ray["state"] == "unread" and ray["mm"] is None for ray in whisking.row["rays"])
+    assert all(value is None for tip in whisking.row["tips"] for _, value in tip["loglik"])
+    assert whisking.row["kind"] == "body whisk"
+
+
+def test_rows_that_never_came_are_counted():
+    model = told_model(40, skip={10, 11, 30})
+    assert model.rows == {"missed": 3, "unseen": 3}
+
+
+def test_a_clock_that_began_anew_forgets_the_run_and_not_the_health():
+    model = told_model(100)
+    Post().play(MadeUpRun(), range(2), model)
+    assert model.run == 1 and model.now_s == 0.1
+    assert len(model.path.points) == len(model.true_path.points) == 2 and model.path.end == 2
+    assert not model.contacts and model.rows["unseen"] == 0 and model.health()[1]["pid"]
+
+
+def test_a_contact_is_placed_where_the_whisker_meets_something():
+    ray = SCENE.robot.of_role("object")[1]
+    onset = next(n for n in range(1, 2000) if not reach(ray, n - 1) and all(reach(ray, n + k) for k in range(4)))
+    post, model = Post(), RobotModel(SCENE)
+    post.play(MadeUpRun(), range(onset + 1), model)
+    (first,) = [contact for contact in model.touching() if contact["whisker"] == ray.name]
+    assert (first["x"], first["radius_m"], first["part"], first["release_s"]) == (None, None, None, None)
+    post.play(MadeUpRun(), range(onset + 1, onset + 3), model)
+    (contact,) = [contact for contact in model.touching() if contact["whisker"] == ray.name]
+    error = np.hypot(*np.subtract(estimate((onset + 1) / 10)[:2], route((onset + 1) / 10)[:2]))
+    assert not ARENA.is_free(contact["x"], contact["y"], 0.02 + error), "nothing to touch near it"
+    assert contact["part"] in ("tip", "shaft") and contact["surface"] in ("face", "corner")
+    over = next(row for row in range(onset + 1, 4000) if reach(ray, row) is None)
+    post.play(MadeUpRun(), range(onset + 3, over + 1), model)
+    ended = model.contacts[(ray.name, onset * ROW_NS)]
+    assert ended["release_s"] == over / 10 and ended["radius_m"] == contact["radius_m"]
+    assert ended not in model.touching()
+
+
+def test_a_process_that_fell_silent_is_told_from_one_that_ended_and_one_never_heard():
+    clock = Clock()
+    model = RobotModel(clock=clock)
+    for name in ("pilot", "bag"):
+        model.take(f"health/{name}", health(name, counters=[("rows", "12")], error="disk full"))
+    model.take("health/bag", End(Header.at(0), 1, "told to"))
+    clock.now += SILENT_S + 1.0
+    told = {process["name"]: process for process in model.health()}
+    assert told["pilot"]["silent"] and told["pilot"]["age_s"] == 4 and told["pilot"]["error"] == "disk full"
+    assert told["pilot"]["counters"] == {"rows": "12"}
+    assert not told["bag"]["silent"] and told["bag"]["ended"] and told["bag"]["state"] == "ended: told to"
+    assert told["navigator"]["age_s"] is None
+    model.take("health/pilot", health(pid=8))
+    (pilot,) = [process for process in model.health() if process["name"] == "pilot"]
+    assert (pilot["silent"], pilot["restarts"], pilot["pid"], pilot["age_s"]) == (False, 1, 8, 0)
+
+
+def test_nothing_grows_without_bound():
+    model = RobotModel(SCENE)
+    for n in range(PATH_MOST + 100):
+        model.take("truth", PoseStamped(Header.at(n * ROW_NS), Pose.planar(1.0, 1.0, 0.0)))
+        model.take("contact", Contact(Header.at(n * ROW_NS), "object_1", False, Time.of(n), Time.of(n + 1)))
+        model.take(f"health/{n}", health(f"p{n}", counters=[(f"{k}", "1") for k in range(2 * COUNTERS_MOST)]))
+    model.take("health/pilot", health(state="x\n" * 4000))
+    assert len(model.true_path.points) == PATH_MOST and len(model.contacts) == CONTACTS_MOST
+    assert len(model.processes) == PROCESSES_MOST
+    assert max(len(process.counters) for process in model.processes.values()) == COUNTERS_MOST
+    assert len(model.processes["pilot"].state) == TEXT_MOST and "\n" not in model.processes["pilot"].state
+
+
+def test_a_page_gets_the_whole_path_in_parts_and_then_only_what_is_new(monkeypatch):
+    monkeypatch.setattr("whisker.view.robot_topics.ROBOT_S", 0.0)
+    post = Post()
+    hub = Hub([], post.source, SCENE)
+    post.play(MadeUpRun(), range(POINTS_MOST + 40), hub.robot)
+    feed = RobotFeed(hub, {})
+    first, second = json.loads(feed.take()), json.loads(feed.take())
+    assert first["path"]["begin"] and len(first["path"]["points"]) == POINTS_MOST and first["pose"]
+    assert not second["path"]["begin"] and len(second["path"]["points"]) == 40
+    assert set(second) <= {"topic", "path", "true_path", "ages", "heard_s", "processes"}, "the rest has not changed"
+    post.play(MadeUpRun(), range(POINTS_MOST + 40, POINTS_MOST + 41), hub.robot)
+    third = json.loads(feed.take())
+    assert len(third["path"]["points"]) == 1 and "pose" in third and "name" not in third
+    feed.close()
+    assert hub.robot_watchers == 0
+
+
+def test_a_slow_page_gets_the_newest_belief_and_none_that_it_missed(monkeypatch):
+    monkeypatch.setattr("whisker.view.robot_topics.BELIEF_S", 0.0)
+    post = Post()
+    hub = Hub([], post.source, SCENE)
+    feed = BeliefFeed(hub, {})
+    assert feed.take() is None
+    for n in range(50):
+        hub.robot.take("belief", belief_message(n * ROW_NS, [(1.0, 1.0, 2.0, 0.5, 0.0)], number=10, mass=0.75))
+    message = feed.take()
+    assert feed.take() is None
+    assert BELIEF_HEAD.unpack_from(message) == (BELIEF_ID, 0, 10, 10, 4.9, 0.75)
+    poses = np.frombuffer(message, "<f4", -1, BELIEF_HEAD.size).reshape(10, 6)
+    assert np.allclose(poses[:, :2], (1.0, 2.0)) and np.allclose(poses[:, 3], 0.1)
+
+
+def test_a_page_that_does_not_acknowledge_holds_nothing_back():
+    async def scenario():
+        post = Post()
+        async with robot_view(post, rows=10) as (port, hub), page(port) as slow, page(port) as quick:
+            for script in (slow, quick):
+                for topic in ("scene", "robot", "belief"):
+                    await script.ask(type="subscribe", topic=topic)
+            await slow.next("scene", acknowledge=False)
+            assert (await quick.next("scene"))["arena"]["floor"] == list(ARENA.floor)
+            told = await quick.next("robot")
+            for row in range(10, 60):
+                post.play(MadeUpRun(), range(row, row + 1), hub.robot)
+            points = len(told["path"]["points"])
+            async with asyncio.timeout(PATIENCE_S):
+                while points < 60:
+                    points += len((await quick.next("robot")).get("path", {"points": []})["points"])
+            assert points == 60 and (await quick.next("traces"))[0] == BELIEF_ID
+
+    asyncio.run(scenario())
+
+
+def fuzz_robot(inputs: int, seed: int) -> int:
+    """So many mutated messages to a view; what it then tells is still JSON. Gives how many were refused."""
+    rng = random.Random(seed)
+    post = Post()
+    hub = Hub([], post.source, SCENE)
+    told = [pair for row in range(0, 400, 7) for pair in MadeUpRun(seed).messages(row)]
+    feeds = RobotFeed(hub, {}), BeliefFeed(hub, {})
+    for _ in range(inputs):
+        topic, message = rng.choice(told)
+        data = encode(message)
+        broken = mutated(rng, data) if rng.random() < 0.5 else poked(rng, data)
+        post.put(rng.choice([topic, topic, topic, "", "health/x/y", "truth"]), message, data=broken)
+        for name, message in post.source.poll():
+            hub.robot.take(name, message)
+        for feed in feeds:
+            feed._due = 0.0
+            said = feed.take()
+            if isinstance(said, str):
+                json.loads(said, parse_constant=pytest.fail)
+    return hub.source.refused()["count"]
+
+
+def poked(rng: random.Random, data: bytes) -> bytes:
+    """One number of it is another, of the same size: the message stays well-formed."""
+    at = 4 * rng.randrange(1, len(data) // 4)
+    value = rng.choice([b"\xff" * 8, b"\0" * 8, struct.pack("<d", 1e308), struct.pack("<d", -1e9), rng.randbytes(8)])
+    return data[:at] + value[: len(data) - at] + data[at + 8 :]
+
+
+def test_no_message_brings_it_down():
+    assert FUZZ_INPUTS / 20 < fuzz_robot(FUZZ_INPUTS, seed=1) < FUZZ_INPUTS
+
+
+def free_endpoint() -> str:
+    with socket.create_server(("127.0.0.1", 0)) as plug:
+        return f"tcp/127.0.0.1:{plug.getsockname()[1]}"
+
+
+def test_over_a_real_network_a_page_sees_what_a_pilot_sends():
+    pytest.importorskip("zenoh", reason="eclipse-zenoh is not installed (make setup)")
+    endpoint, run = free_endpoint(), MadeUpRun()
+
+    async def scenario(source):
+        hub = Hub([], source, SCENE)
+        publishers = {topic: pilot.publish(topic) for row in range(11) for topic, _ in run.messages(row)}
+        row = 0
+        async with asyncio.timeout(PATIENCE_S):
+            while hub.robot.belief is None or hub.robot.pose is None or not hub.robot.health()[1]["pid"]:
+                for topic, message in run.messages(row):
+                    publishers[topic].send(message)
+                row += 10
+                await asyncio.sleep(0.01)
+                for topic, message in source.poll():
+                    hub.robot.take(topic, message)
+        assert hub.robot.rows["unseen"] % 9 == 0 and hub.robot.row["tips"]
+        assert source.refused()["count"] == 0
+
+    with Link("pilot", ROBOT, listen=[endpoint]) as pilot:
+        source = join(ROBOT, [endpoint])
+        try:
+            asyncio.run(scenario(source))
+        finally:
+            source.close()

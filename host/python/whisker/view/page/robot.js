@@ -1,0 +1,124 @@
+/* The part of the page that shows the whole robot: keeps what came, draws at most once a picture, shows it while it is looked at. */
+const POINTS_MOST = 3000; // of a path: 5 min at 10 Hz
+const LAYERS = ['belief', 'estimate', 'truth', 'contacts'];
+
+class RobotPart {
+  constructor(wire) {
+    this.plan = new Plan($('plan'));
+    this.actors = new Actors(this.plan);
+    this.timeline = new Timeline($('timeline'));
+    this.plan.onSize = this.timeline.onSize = () => this.redraw();
+    this.layers = Object.fromEntries(LAYERS.map((name) => [name, true]));
+    for (const name of LAYERS) $(`layer-${name}`).addEventListener('change', (event) => { this.layers[name] = event.target.checked; this.redraw(); });
+    this.forget();
+    this.wire = wire;
+    wire.on('scene', (scene) => this.showScene(scene));
+    wire.on('robot', (word) => this.take(word));
+    wire.on('belief', (message) => { this.world.belief.take(message); this.redraw(); });
+    this.note(robotAdvice(null));
+  }
+
+  forget() {
+    this.world = { word: null, stale: false, path: [], truth: [], contacts: [], belief: new Belief() };
+  }
+
+  /* Subscribes while the part is looked at: a page of traces costs nobody a belief. */
+  look(shown) {
+    for (const topic of ['scene', 'robot', 'belief']) {
+      if (!shown) this.wire.unsubscribe(topic);
+      else if (!this.wire.wanted.has(topic)) this.wire.subscribe(topic, {});
+    }
+    if (shown) this.redraw();
+  }
+
+  linked(up) {
+    if (up) return this.forget(); // it tells everything again
+    this.pill('gone', '■ not connected');
+  }
+
+  showScene(scene) {
+    this.scene = scene;
+    this.plan.show(scene);
+    $('scene').textContent = scene.arena ? `${signed(scene.arena.size_m[0], 2)} m × ${signed(scene.arena.size_m[1], 2)} m, tiles of ${signed(scene.arena.tile_m, 2)} m` : scene.text;
+    $('textures').replaceChildren(...(scene.arena?.textures ?? []).map((name, nth) => this.swatch(name, nth)));
+    this.redraw();
+  }
+
+  swatch(name, nth) {
+    const sample = make('canvas', [], { width: 26 * (devicePixelRatio || 1), height: 16 * (devicePixelRatio || 1) });
+    const pen = sample.getContext('2d');
+    pen.fillStyle = this.plan.pattern(nth, '--pattern');
+    pen.fillRect(0, 0, sample.width, sample.height);
+    return make('li', [sample, `${name[0]} ${name}`]);
+  }
+
+  /* A message holds the parts that have changed since the one before. */
+  take(message) {
+    const { world } = this;
+    if ('run' in message) world.belief.clear();
+    const word = (world.word = { ...world.word, ...message });
+    if (message.path) keep(world.path, message.path, POINTS_MOST);
+    if (message.true_path) keep(world.truth, message.true_path, POINTS_MOST);
+    world.contacts = word.contacts;
+    world.stale = (word.ages.pose ?? 0) > AGED_S;
+    this.plan.fit([...world.path, ...world.truth].map((point) => [point[1], point[2]]));
+    this.tell(word);
+    this.redraw();
+  }
+
+  tell(word) {
+    const advice = robotAdvice(word);
+    this.note(advice);
+    if (!advice) this.pill('live', '● live');
+    else if (word.heard_s !== null) this.pill('stalled', '▲ silent');
+    else this.pill('waiting', word.link.state === 'off' ? '○ no robot' : '○ not heard yet');
+    tellPose(word, this.world.belief);
+    tellBehaviour(word);
+    tellRow(word);
+    tellContacts(word, this.world.contacts);
+    tellProcesses(word);
+    const now = word.now_s === null ? 'not known' : `${signed(word.now_s, 1)} s`;
+    $('robot-time').textContent = `Robot’s clock: ${now}`;
+    const lost = word.refused.missed ? `${count(word.refused.missed)} messages were lost on the way. ` : '';
+    $('refused').textContent = lost + (word.refused.count ? `${count(word.refused.count)} could not be read, the last: ${word.refused.last}` : '');
+    for (const [name, known] of [['belief', this.world.belief.poses], ['estimate', word.pose], ['truth', word.truth], ['contacts', this.world.contacts.length]]) $(`known-${name}`).textContent = known ? '' : ' (not known)';
+  }
+
+  pill(state, text) {
+    $('robot-state').dataset.state = state;
+    if ($('robot-state').textContent !== text) $('robot-state').textContent = text;
+  }
+
+  note(told) {
+    const box = $('robot-note');
+    box.hidden = !told;
+    if (!told) return;
+    const [headline, line, steps] = box.children;
+    box.dataset.grave = told[0] ? 'yes' : 'no';
+    if (headline.textContent !== told[1]) headline.textContent = told[1];
+    retell(line, told[2], () => rich(told[2]));
+    retell(steps, told[3], () => told[3].map((step) => make('li', rich(step))));
+  }
+
+  themed() {
+    if (this.scene) this.showScene(this.scene);
+  }
+
+  redraw() {
+    if (this.due || $('robot-part').hidden) return;
+    this.due = true;
+    requestAnimationFrame(() => {
+      this.due = false;
+      this.actors.draw(this.world, this.layers);
+      this.timeline.draw(this.plan, this.world.path, this.world.truth);
+      this.drawn = (this.drawn ?? 0) + 1;
+    });
+  }
+}
+
+/* Appends to a path; `begin`: these are its first points, what came before is forgotten. */
+function keep(points, { begin, points: more }, most) {
+  if (begin) points.length = 0;
+  points.push(...more);
+  if (points.length > most) points.splice(0, points.length - most);
+}

@@ -1,0 +1,110 @@
+/* What topic robot tells, in words: pose, behaviour, observation row, contacts, processes. What is not known is said so. */
+const AGED_S = 2; // what is older is no longer how it is
+const NATS = 10; // log-likelihoods so far below the best have no bar
+
+const ago = (s) => (typeof s !== 'number' ? 'never' : s < 0.1 ? 'just now' : `${duration(s)} ago`);
+const degreesOf = (rad, places = 0) => signed(typeof rad === 'number' ? (rad * 180) / Math.PI : null, places, '°');
+const none = (text) => make('span', text, { class: 'none' });
+
+/* Changes an element's children only if what is told has changed: a table that is read or selected stands still. */
+function retell(element, key, children) {
+  const text = JSON.stringify(key);
+  if (element.told === text) return;
+  element.told = text;
+  element.replaceChildren(...children());
+}
+
+function pairsOf(element, pairs) {
+  retell(element, pairs, () => pairs.flatMap(([name, value]) => [make('dt', name), make('dd', value.startsWith('not known') || value.startsWith('never') ? none(value) : value)]));
+}
+
+function tellPose(word, belief) {
+  const { pose, truth, ages } = word;
+  const spread = pose && typeof pose.sigma_m === 'number' ? `± ${signed(pose.sigma_m, 2)} m, ± ${degreesOf(pose.sigma_rad)}` : 'not known';
+  const error = pose && truth ? `${signed(Math.hypot(pose.x - truth.x, pose.y - truth.y), 2)} m, ${degreesOf(Math.abs(Math.atan2(Math.sin(pose.theta - truth.theta), Math.cos(pose.theta - truth.theta))))}` : 'not known';
+  pairsOf($('pose'), [
+    ['Estimate', pose ? `x ${signed(pose.x, 2)} m, y ${signed(pose.y, 2)} m, ${degreesOf(pose.theta)}` : 'not known: no pose has come'],
+    ['Spread (1 σ)', spread],
+    ['Confidence', pose ? signed(pose.confidence, 2) : 'not known'],
+    ['Truth', truth ? `x ${signed(truth.x, 2)} m, y ${signed(truth.y, 2)} m, ${degreesOf(truth.theta)}` : 'not known: only simulation tells it'],
+    ['Error', error],
+    ['Belief', belief.said()],
+    ['Filter', pose ? `${pose.filter}, from row ${count(pose.first_seq)}, prior ${pose.prior || 'not told'}` : 'not known'],
+    ['Pose came', ago(ages.pose)],
+  ]);
+}
+
+function tellBehaviour(word) {
+  const doing = word.behaviour;
+  pairsOf($('behaviour'), [
+    ['State', doing ? words(doing.state.toLowerCase()) : 'not known: no word has come'],
+    ['For', doing && word.now_s !== null ? duration(Math.max(0, word.now_s - doing.since_s)) : 'not known'],
+    ['Because', doing ? doing.reason || 'no reason told' : 'not known'],
+  ]);
+}
+
+function tellRow(word) {
+  const { row, rows } = word;
+  pairsOf($('rows'), [
+    ['Row', row ? `${count(row.seq)}, ${row.kind}` : 'not known: no row has come'],
+    ['Came', ago(word.ages.observation)],
+    ['Missed by the navigator', rows.missed === null ? 'not known' : count(rows.missed)],
+    ['Missed by this view', count(rows.unseen)],
+  ]);
+  retell($('cells'), row && [row.tips, row.rays], () => [...(row?.tips ?? []).map(tipBars), ...(row?.rays ?? []).map(rayLine)]);
+}
+
+/* A texture whisker: a bar for each texture, longest for the likeliest. */
+function tipBars(tip) {
+  const best = Math.max(...tip.loglik.map(([, value]) => value ?? -Infinity));
+  const lines = tip.loglik.map(([texture, value]) => {
+    const bar = make('i', [], { class: value === best ? 'bar best' : 'bar' });
+    bar.style.width = value === null ? '0' : `${Math.max(0, 100 * (1 + (value - best) / NATS))}%`;
+    return make('li', [make('span', texture, { class: 'what' }), make('span', bar, { class: 'room' }), make('span', value === null ? '' : signed(value - best, 1), { class: 'value' })]);
+  });
+  return make('li', [make('b', words(tip.name)), best === -Infinity ? none(' not read') : make('ul', lines)], { class: 'tip' });
+}
+
+function rayLine(ray) {
+  const told = { contact: `${signed(ray.mm, 0)} mm from its base`, none: 'no contact' }[ray.state];
+  return make('li', [make('b', words(ray.name)), told ? make('span', ` ${told}`) : none(' not read')]);
+}
+
+function tellContacts(word, contacts) {
+  retell($('contacts'), [word.touching, contacts.slice(-6)], () => {
+    if (!contacts.length) return [make('tr', make('td', none('none has come')))];
+    return contacts.slice(-6).toReversed().map((c) => {
+      const where = typeof c.radius_m === 'number' ? signed(1e3 * c.radius_m, 0) : 'not known';
+      const how = typeof c.sigma_m === 'number' ? ` ± ${signed(1e3 * c.sigma_m, 1)}` : '';
+      const cells = [words(c.whisker), c.part ?? 'not known', c.surface ?? '', where + how, c.release_s === null ? 'touching' : `${duration(Math.max(0, c.release_s - c.onset_s))}`];
+      return make('tr', cells.map((cell) => make('td', cell)));
+    });
+  });
+}
+
+function tellProcesses(word) {
+  const told = word.processes;
+  retell($('processes'), told, () => (told.length ? told.map(processCard) : [make('li', none('no process has told of itself'))]));
+}
+
+function processCard(p) {
+  const never = p.age_s === null;
+  const state = p.ended ? `■ ${p.state}` : never ? '○ never heard' : p.silent ? `▲ silent for ${duration(p.age_s)}` : `● ${p.state || 'state not told'}`;
+  const facts = [p.pid ? `process ${p.pid}` : '', p.restarts ? `restarted ${p.restarts} ×` : '', never ? '' : `last word ${ago(p.age_s)}`].filter(Boolean).join(', ');
+  const counters = Object.entries(p.counters).map(([key, value]) => make('span', [`${words(key)} `, make('b', value)]));
+  const parts = [make('div', [make('b', p.name), make('span', state, { class: 'condition' })]), make('small', facts)];
+  if (counters.length) parts.push(make('div', counters, { class: 'counters' }));
+  if (p.error) parts.push(make('div', `! last error: ${p.error}`, { class: 'fault' }));
+  return make('li', parts, { 'data-state': never || p.ended ? 'never' : p.silent ? 'silent' : 'heard' });
+}
+
+/* [grave, headline, line, steps] for the note above the plan; null when all is heard. */
+function robotAdvice(word) {
+  const goesOn = 'This page goes on by itself.';
+  const start = 'For a demonstration without hardware: `make demo`';
+  if (!word) return [false, 'Nothing is known of the robot yet', goesOn, []];
+  if (word.link.state === 'off') return [false, 'whisker-view does not listen to a robot', 'It was started for rings only.', ['Start it with `whisker-view --robot NAME --scene SCENE`']];
+  if (word.heard_s === null) return [false, `Nothing has been heard of the robot “${word.name}” yet`, `${word.link.text}. ${goesOn}`, ['Start the pilot on the robot, the navigator here; `--connect tcp/HOST:PORT` if it is elsewhere.', start]];
+  if (word.heard_s > AGED_S) return [true, `Nothing heard of the robot for ${duration(word.heard_s)}`, `What is shown is how it last was. ${goesOn}`, ['Is the pilot running? Is the network there?']];
+  return null;
+}
