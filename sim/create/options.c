@@ -136,9 +136,10 @@ static const struct {
     [FLIP_BYTES] = {"flip-bytes", "P", "share of them that have a bit flipped"},
     [EXTRA_BYTES] = {"extra-bytes", "P", "share of them that a random byte follows"},
     [LOSE_ORDERS] = {"lose-orders", "P", "share of the bytes sent to it that are lost"},
-    [EVENT] = {"event", "WHAT@START[+LENGTH]",
-               "bump[-left|-right], drop-left|-right|-caster, cliff-[front-]left|right, virtual-wall, charger or "
-               "silent, at START for LENGTH seconds (0.5); repeat for more"},
+    [EVENT] = {"event", "WHAT@S[+L]",
+               "WHAT happens S seconds after the start, for L (0.5); repeat it for more. WHAT:\n"
+               "                      bump, bump-left, bump-right, drop-left, drop-right, drop-caster, cliff-left,\n"
+               "                      cliff-front-left, cliff-front-right, cliff-right, virtual-wall, charger, silent"},
 };
 
 bool sim_create_describe(size_t number, const char **name, const char **value, const char **help)

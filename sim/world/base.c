@@ -67,8 +67,12 @@ void sim_odometer_new_move(struct sim_odometer *odometer)
 
 void sim_odometer_count(struct sim_odometer *odometer, double distance_m, double angle_rad)
 {
-    odometer->distance_mm += distance_m * 1e3 * odometer->scale_distance * odometer->gain_distance;
-    odometer->angle_deg += angle_rad / SIM_DEGREE * odometer->scale_angle * odometer->gain_angle;
+    double millimetres = distance_m * 1e3 * odometer->scale_distance * odometer->gain_distance;
+    double degrees = angle_rad / SIM_DEGREE * odometer->scale_angle * odometer->gain_angle;
+    odometer->distance_mm += millimetres;
+    odometer->angle_deg += degrees;
+    odometer->total_mm += millimetres;
+    odometer->total_deg += degrees;
 }
 
 struct sim_pose sim_odometer_report(struct sim_odometer *odometer)

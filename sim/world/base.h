@@ -22,6 +22,7 @@ struct sim_odometer {
     double scale_distance, scale_angle; /* this run */
     double gain_distance, gain_angle;   /* this move */
     double distance_mm, angle_deg;      /* counted, not yet reported */
+    double total_mm, total_deg;         /* counted since the start */
 };
 
 /* Sets the command; both wheels are slowed by the same factor if one exceeds its limit. Returns 1 if it is a new one.

@@ -203,6 +203,24 @@ void sim_world_odometry(sim_world *world, double *x_m, double *y_m, double *thet
     *theta_rad = motion.theta;
 }
 
+void sim_world_wheels(const sim_world *world, double *distance_m, double *angle_rad)
+{
+    *distance_m = world->odometer.total_mm * 1e-3;
+    *angle_rad = world->odometer.total_deg * SIM_DEGREE;
+}
+
+double sim_world_gap(const sim_world *world, double *bearing_rad)
+{
+    const double step = 1e-6; /* m: the clearance falls fastest towards what is nearest */
+    double x = world->pose.x, y = world->pose.y;
+    double east = sim_arena_clearance(&world->scene, (struct sim_point){x + step, y});
+    double west = sim_arena_clearance(&world->scene, (struct sim_point){x - step, y});
+    double north = sim_arena_clearance(&world->scene, (struct sim_point){x, y + step});
+    double south = sim_arena_clearance(&world->scene, (struct sim_point){x, y - step});
+    *bearing_rad = sim_wrap(atan2(south - north, west - east) - world->pose.theta);
+    return sim_arena_clearance(&world->scene, (struct sim_point){x, y}) - world->scene.body_radius;
+}
+
 size_t sim_world_lanes(const sim_world *world)
 {
     return world->scene.whiskers;

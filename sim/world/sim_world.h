@@ -66,4 +66,12 @@ struct sim_tip sim_world_tip(const sim_world *world, size_t lane); /* of a textu
 int sim_world_level(const sim_world *world, size_t lane);
 /* cffi: end */
 
+/* What the wheels have counted since the start, with their errors: forward and anticlockwise. Reports change nothing.
+ */
+void sim_world_wheels(const sim_world *world, double *distance_m, double *angle_rad);
+
+/* Distance between the body and the nearest wall or box, m, and where on the body that is: rad anticlockwise from
+ * straight ahead, in (-pi, pi]. */
+double sim_world_gap(const sim_world *world, double *bearing_rad);
+
 #endif

@@ -261,6 +261,55 @@ static void test_truth_of_the_wrong_role_is_empty(void **state)
     sim_world_free(world);
 }
 
+/* Reports take from what is not yet reported, not from the sum. */
+static void test_wheels_count_what_is_reported(void **state)
+{
+    (void)state;
+    struct sim_scene scene = bench(20, 2, 2, 0);
+    sim_world *world = sim_world_new(&scene, 9);
+    double distance, angle, x, y, theta, reported_x = 0, reported_theta = 0;
+    for (int i = 0; i < 30; i++) {
+        run(world, 0.2, 0, 0.1);
+        sim_world_odometry(world, &x, &y, &theta);
+        reported_x += x;
+    }
+    sim_world_wheels(world, &distance, &angle);
+    assert_near(distance, reported_x, 1e-3);
+    assert_near(angle, 0, 1e-12);
+    for (int i = 0; i < 30; i++) {
+        run(world, 0, 0.5, 0.1);
+        sim_world_odometry(world, &x, &y, &theta);
+        reported_theta += theta;
+    }
+    sim_world_wheels(world, &distance, &angle);
+    assert_near(angle, reported_theta, SIM_DEGREE);
+    sim_world_free(world);
+}
+
+/* Gap and bearing of a wall ahead, a wall on the right, and a box behind. */
+static void test_gap_to_what_is_nearest(void **state)
+{
+    (void)state;
+    double bearing;
+    struct sim_scene scene = bench(4, 3.8, 2, 0.3);
+    sim_world *world = sim_world_new(&scene, 1);
+    assert_near(sim_world_gap(world, &bearing), 0.2 - 0.165, 1e-9);
+    assert_near(bearing, -0.3, 1e-6);
+    sim_world_free(world);
+    scene = bench(4, 2, 0.5, 0);
+    world = sim_world_new(&scene, 1);
+    assert_near(sim_world_gap(world, &bearing), 0.5 - 0.165, 1e-9);
+    assert_near(bearing, -SIM_PI / 2, 1e-6);
+    sim_world_free(world);
+    scene = bench(4, 2, 2, SIM_PI / 2);
+    scene.obstacles = 1;
+    scene.obstacle[0] = (struct sim_box){1, 1, 2 - 0.3, 2 - 0.4}; /* its corner lies to the left and behind */
+    world = sim_world_new(&scene, 1);
+    assert_near(sim_world_gap(world, &bearing), 0.5 - 0.165, 1e-9);
+    assert_near(bearing, SIM_PI / 2 + atan2(0.4, 0.3), 1e-5);
+    sim_world_free(world);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -275,6 +324,8 @@ int main(void)
         cmocka_unit_test(test_floor_changes_with_the_tile),
         cmocka_unit_test(test_lanes_do_not_disturb_each_other),
         cmocka_unit_test(test_truth_of_the_wrong_role_is_empty),
+        cmocka_unit_test(test_wheels_count_what_is_reported),
+        cmocka_unit_test(test_gap_to_what_is_nearest),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,0 +1,257 @@
+/* whisker-create-sim: the emulator on a pseudo-terminal, paced by the wall clock. See --help. */
+#include <errno.h>
+#include <getopt.h>
+#include <math.h>
+#include <poll.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/signalfd.h>
+#include <sys/timerfd.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "create_ground.h"
+#include "create_pty.h"
+#include "whisker_protocol.h"
+
+#define PROGRAM "whisker-create-sim"
+
+enum {
+    FAILED = 1,
+    WRONG_USE = 2,
+    TICKS_PER_S = WHISKER_LIMIT_CLOCK_HZ / WHISKER_LIMIT_TICK_PERIOD,
+    WAKE_NS = 1000000,        /* between two looks at the line */
+    BEHIND_MAX = TICKS_PER_S, /* a machine that slept for longer does not catch up */
+    OPTIONS_MAX = 24,
+    LINE_SIZE = 512
+};
+
+enum { HELP = 1, MODEL, LINK, SEED, ARENA, ROBOT };
+
+static const struct option OWN[] = {{"help", no_argument, NULL, HELP},
+                                    {"model", required_argument, NULL, MODEL},
+                                    {"link", required_argument, NULL, LINK},
+                                    {"seed", required_argument, NULL, SEED},
+                                    {"arena", required_argument, NULL, ARENA}};
+
+enum { OWN_COUNT = sizeof OWN / sizeof OWN[0] };
+
+struct settings {
+    struct sim_create_options robot;
+    const char *link, *arena;
+};
+
+struct emulator {
+    sim_create *create;
+    sim_world *world;
+    struct create_pty pty;
+    int timer, signals;
+    enum create_oi_mode mode; /* as printed last */
+    uint64_t ticks;
+};
+
+static void print_help(void)
+{
+    const char *name, *value, *help;
+    printf("Usage: " PROGRAM " [OPTION...]\n"
+           "Emulates an iRobot Create on a pseudo-terminal, in real time, until SIGINT or SIGTERM. A driver opens the\n"
+           "printed path, or the link, as its serial port. Each change of mode is printed.\n\n"
+           "  --model 1|2         Create 1 (57600 baud) or Create 2 (115200 baud) (1)\n"
+           "  --link PATH         make a symbolic link to the pseudo-terminal\n"
+           "  --arena FLAT        flat scene file of its surroundings, with walls to bump into (an open floor)\n"
+           "  --seed N            seed of the wheels' errors and of the line's faults (1)\n");
+    for (size_t i = 0; sim_create_describe(i, &name, &value, &help); i++) {
+        char both[LINE_SIZE];
+        snprintf(both, sizeof both, "%s %s", name, value ? value : "");
+        printf("  --%-17s %s\n", both, help);
+    }
+    printf("  --help              this text\n\n"
+           "Example: " PROGRAM " --link /tmp/create --model 2\n"
+           "Example: " PROGRAM " --link /tmp/create --drop-remainder --lose-bytes 0.001\n"
+           "Example: " PROGRAM " --link /tmp/create --event bump-left@3s --event silent@10s+2s\n"
+           "Exit code: 0 stopped as told, 1 failed, 2 wrong use.\n");
+}
+
+static int complain(int code, const char *text)
+{
+    fprintf(stderr, PROGRAM ": %s\n", text);
+    return code;
+}
+
+/* Adds the robot's own options to the program's. */
+static void list_options(struct option *options)
+{
+    const char *name, *value, *help;
+    memcpy(options, OWN, sizeof OWN);
+    for (size_t i = 0; OWN_COUNT + i + 1 < OPTIONS_MAX && sim_create_describe(i, &name, &value, &help); i++)
+        options[OWN_COUNT + i] = (struct option){name, value ? required_argument : no_argument, NULL, ROBOT};
+}
+
+static int set_seed(struct settings *settings, const char *text)
+{
+    char *end;
+    errno = 0;
+    settings->robot.seed = strtoull(text, &end, 10);
+    if (errno || end == text || *end || text[0] == '-')
+        return complain(WRONG_USE, "--seed: give a whole number from 0 on");
+    return 0;
+}
+
+static int set_model(struct settings *settings, const char *text)
+{
+    if (strcmp(text, "1") && strcmp(text, "2"))
+        return complain(WRONG_USE, "--model: give 1 or 2");
+    settings->robot.version = text[0] == '1' ? CREATE_OI_V2 : CREATE_OI_V3;
+    return 0;
+}
+
+static int set_robot(struct settings *settings, const char *name, const char *value)
+{
+    char error[LINE_SIZE] = "--";
+    if (sim_create_set(&settings->robot, name, value, error + 2, sizeof error - 2))
+        return complain(WRONG_USE, error);
+    return 0;
+}
+
+/* Returns 0, an exit code, or -1 when all is done. */
+static int set_option(struct settings *settings, int option, const char *name)
+{
+    switch (option) {
+    case HELP:
+        print_help();
+        return -1;
+    case MODEL:
+        return set_model(settings, optarg);
+    case SEED:
+        return set_seed(settings, optarg);
+    case LINK:
+        settings->link = optarg;
+        return 0;
+    case ARENA:
+        settings->arena = optarg;
+        return 0;
+    case ROBOT:
+        return set_robot(settings, name, optarg);
+    default:
+        return complain(WRONG_USE, "no such option, or its value is missing; see --help");
+    }
+}
+
+static int read_options(int argc, char **argv, struct settings *settings)
+{
+    struct option options[OPTIONS_MAX] = {{0}};
+    int option, index = 0, result = 0;
+    list_options(options);
+    opterr = 0;
+    while (!result && (option = getopt_long(argc, argv, "", options, &index)) != -1)
+        result = set_option(settings, option, options[index].name);
+    if (!result && optind < argc)
+        return complain(WRONG_USE, "takes options only; see --help");
+    return result;
+}
+
+static sim_world *make_world(const struct settings *settings, char *error, size_t size)
+{
+    static const char OPEN_FLOOR[] = "size_m 1000 1000\ntile_m 1000\ntexture SMOOTH\nfloor S\n"
+                                     "body_radius_m 0.165\nstart 500 500 0\n";
+    struct sim_scene scene;
+    int result = settings->arena ? sim_scene_read(settings->arena, &scene, error, size)
+                                 : sim_scene_parse(OPEN_FLOOR, "open floor", &scene, error, size);
+    if (result)
+        return NULL;
+    sim_world *world = sim_world_new(&scene, settings->robot.seed);
+    if (!world)
+        snprintf(error, size, "no memory for a world; free some");
+    return world;
+}
+
+static int open_signals(void)
+{
+    sigset_t set;
+    sigemptyset(&set);
+    sigaddset(&set, SIGINT);
+    sigaddset(&set, SIGTERM);
+    sigprocmask(SIG_BLOCK, &set, NULL);
+    return signalfd(-1, &set, SFD_CLOEXEC);
+}
+
+static int open_timer(void)
+{
+    const struct itimerspec every = {{0, WAKE_NS}, {0, WAKE_NS}};
+    int timer = timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC);
+    if (timer >= 0)
+        timerfd_settime(timer, 0, &every, NULL);
+    return timer;
+}
+
+static void report_mode(struct emulator *emulator)
+{
+    static const char *const NAMES[] = {"off", "passive", "safe", "full"};
+    enum create_oi_mode mode = sim_create_mode(emulator->create);
+    if (mode == emulator->mode)
+        return;
+    emulator->mode = mode;
+    printf("%.3f s: mode %s\n", (double)emulator->ticks / TICKS_PER_S, NAMES[mode]);
+    fflush(stdout);
+}
+
+/* Bytes in, one tick, bytes out. */
+static void step(struct emulator *emulator)
+{
+    uint8_t bytes[LINE_SIZE];
+    size_t count = create_pty_read(&emulator->pty, bytes, sizeof bytes);
+    sim_create_receive(emulator->create, bytes, count);
+    report_mode(emulator);
+    create_ground_drive(emulator->create, emulator->world);
+    sim_world_step(emulator->world);
+    create_ground_tick(emulator->create, emulator->world);
+    emulator->ticks++;
+    report_mode(emulator);
+    while ((count = sim_create_take(emulator->create, bytes, sizeof bytes)) > 0)
+        create_pty_write(&emulator->pty, bytes, count);
+}
+
+static void run(struct emulator *emulator)
+{
+    struct pollfd wake[] = {{emulator->timer, POLLIN, 0}, {emulator->signals, POLLIN, 0}};
+    while (poll(wake, 2, -1) > 0 && !wake[1].revents) {
+        uint64_t wakes = 0;
+        if (read(emulator->timer, &wakes, sizeof wakes) != sizeof wakes)
+            continue;
+        uint64_t due = wakes * WAKE_NS / (1000000000u / TICKS_PER_S);
+        for (uint64_t i = 0; i < due && i < BEHIND_MAX; i++)
+            step(emulator);
+    }
+}
+
+static int emulate(const struct settings *settings)
+{
+    char error[LINE_SIZE] = "no memory for a robot; free some";
+    struct emulator emulator = {.world = make_world(settings, error, sizeof error)};
+    int result = FAILED;
+    emulator.create = emulator.world ? sim_create_new(&settings->robot) : NULL;
+    if (emulator.create && !create_pty_open(&emulator.pty, settings->link, error, sizeof error)) {
+        emulator.signals = open_signals();
+        emulator.timer = open_timer();
+        printf("Create %d at %s\n", settings->robot.version == CREATE_OI_V2 ? 1 : 2,
+               settings->link ? settings->link : emulator.pty.path);
+        fflush(stdout);
+        run(&emulator);
+        create_pty_close(&emulator.pty);
+        result = 0;
+    } else {
+        complain(FAILED, error);
+    }
+    sim_create_free(emulator.create);
+    sim_world_free(emulator.world);
+    return result;
+}
+
+int main(int argc, char **argv)
+{
+    struct settings settings = {.robot = sim_create_defaults(CREATE_OI_V2)};
+    int result = read_options(argc, argv, &settings);
+    return result ? (result < 0 ? 0 : result) : emulate(&settings);
+}
