@@ -1,11 +1,13 @@
 """For tests of the robot's processes: one message of every topic, a cable to cut, patience."""
 
 import contextlib
+import math
 import socket
 import threading
 
 import numpy as np
 
+from whisker.observations import ODOMETRY
 from whisker.robot import messages as m
 
 
@@ -105,3 +107,19 @@ def take_until(inbox, done, patience_s: float = 30.0) -> list:
         assert batch or done(got), f"nothing comes; so far {len(got)}; {inbox.tallies} {inbox.last_error}"
         got += batch
     return got
+
+
+def to_rows(observations, scene) -> list[dict[str, float | None]]:
+    """Rows of cells as a pilot makes them."""
+    rows = []
+    for n, t_s in enumerate(observations.t_s):
+        row = {"t_s": float(t_s)} | dict(zip(ODOMETRY, map(float, observations.odometry[n]), strict=True))
+        for tip, whisker in enumerate(scene.robot.of_role("texture")):
+            for k, texture in enumerate(scene.arena.textures):
+                value = float(observations.texture[n, tip, k])
+                row[f"{whisker.name}_{texture}"] = None if math.isnan(value) else value
+        for ray, whisker in enumerate(scene.robot.of_role("object")):
+            value = float(observations.radial_m[n, ray])
+            row[f"{whisker.name}_mm"] = None if math.isinf(value) else value * 1000.0
+        rows.append(row)
+    return rows

@@ -22,6 +22,7 @@ COMMANDS = {
     "record": "write a ring to an MCAP file",
     "replay": "feed a ring from a recording, as the device would",
     "stream": "print frames as CSV or JSON lines",
+    "navigator": "pose and belief of a robot as its rows come, over the network",
     "localise": "where the robot was, row by row of a scene folder",
     "scene": "make scene folders for localise",
     "texture": "learn and tell floor surfaces",

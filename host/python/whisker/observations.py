@@ -58,6 +58,11 @@ def read_observations(path, scene: Scene) -> Observations:
     )
 
 
+def cell(value: float | None) -> str:
+    """A cell as the contract writes it: empty, nan, or a number."""
+    return "" if value is None else f"{value:.6g}"
+
+
 def _column(cells: list[str], convert) -> list[float]:
     return [convert(cell) for cell in cells]
 

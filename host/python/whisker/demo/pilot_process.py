@@ -16,6 +16,7 @@ import numpy as np
 from .. import scene as scenes
 from ..behaviour import BLOCK_TICKS, ODOMETRY_TICKS, TICK_S
 from ..nodes import NodeError, check_node, read_nodes
+from ..observations import cell
 from ..pilot import Pilot
 from ..protocol import CODES, STATUS_CODE_SHIFT
 from ..radial import load as load_radial
@@ -65,11 +66,6 @@ def trace_row(pilot: Pilot, first: int, samples: np.ndarray) -> list[str]:
         about = np.hypot(good["alpha"] - 32768.0, good["beta"] - 32768.0) * DEGREES_PER_COUNT
         cells += [f"{about.min():.3f}", f"{about.max():.3f}"] if len(about) else ["", ""]
     return [f"{first * TICK_S:.3f}", *cells]
-
-
-def cell(value: float | None) -> str:
-    """An observation cell as the contract writes it: empty, nan, or a number."""
-    return "" if value is None else f"{value:.6g}"
 
 
 def load_models(folder: Path, robot: scenes.Robot) -> tuple[dict, dict]:

@@ -1,0 +1,61 @@
+"""A filter's belief in at most so many bumps, its shape kept: every hypothesis, not one ellipse."""
+
+import numpy as np
+
+from ..filters import COMPONENT
+from .messages import BUMPS_MOST, Belief, Header
+
+NEGLECTED = 1e-3  # share of the belief that its lightest bumps may hold together; they are left out
+FINEST = (0.02, np.radians(2.5))  # m, rad: cells to merge bumps in; doubled until few enough are left
+
+
+def condense(bumps: np.ndarray, most: int = BUMPS_MOST) -> np.ndarray:
+    """At most `most` bumps, (n,) of COMPONENT, heaviest first: the lightest left out, those of a cell become one.
+
+    A merged bump has the cell's mean pose and mass, and a width that takes in those of its parts and their distances
+    (moments kept; sigma_m is that of x and y together, per axis).
+    """
+    kept = bumps[np.argsort(-bumps["mass"], kind="stable")]
+    held = np.cumsum(kept["mass"])
+    kept = kept[: int(np.searchsorted(held, (1.0 - NEGLECTED) * held[-1])) + 1] if len(kept) else kept
+    scale = 1.0
+    while len(kept) > most:
+        cells = _cells(kept["pose"], scale)
+        if cells.max() < most:
+            kept = _merged(kept, cells)
+        scale *= 2.0
+    return kept
+
+
+def _cells(poses: np.ndarray, scale: float) -> np.ndarray:
+    """(n,) number of each pose's cell, from 0."""
+    size = np.array([FINEST[0], FINEST[0], FINEST[1]]) * scale
+    keys = np.floor(poses / size).astype(np.int64)
+    keys[:, 2] %= max(1, round(2.0 * np.pi / size[2]))
+    return np.unique(keys, axis=0, return_inverse=True)[1].ravel()
+
+
+def _merged(bumps: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """One bump a cell."""
+    mass, count = bumps["mass"], cells.max() + 1
+
+    def mean(values):
+        return np.bincount(cells, mass * values, count) / out["mass"]
+
+    out = np.zeros(count, COMPONENT)
+    out["mass"] = np.bincount(cells, mass, count)
+    x, y, theta = bumps["pose"].T
+    out["pose"][:, 0], out["pose"][:, 1] = mean(x), mean(y)
+    out["pose"][:, 2] = np.arctan2(mean(np.sin(theta)), mean(np.cos(theta)))
+    off = bumps["pose"] - out["pose"][cells]
+    turned = np.arctan2(np.sin(off[:, 2]), np.cos(off[:, 2]))
+    out["sigma_m"] = np.sqrt(mean(bumps["sigma_m"] ** 2 + (off[:, 0] ** 2 + off[:, 1] ** 2) / 2.0))
+    out["sigma_rad"] = np.sqrt(mean(bumps["sigma_rad"] ** 2 + turned**2))
+    return out[np.argsort(-out["mass"], kind="stable")]
+
+
+def to_message(header: Header, name: str, seq: int, bumps: np.ndarray) -> Belief:
+    """The Belief of a filter's components (n,) of COMPONENT after row `seq`."""
+    few = condense(bumps)
+    columns = (*few["pose"].T, few["mass"], few["sigma_m"], few["sigma_rad"])
+    return Belief(header, name, seq, len(bumps), float(few["mass"].sum()), *(c.astype("f4") for c in columns))

@@ -1,0 +1,32 @@
+"""What every process of the robot says of itself once a second."""
+
+import os
+import time
+from collections.abc import Callable
+
+from .link import Link
+from .messages import HEALTH, Header, KeyValue, ProcessHealth
+
+PERIOD_S = 1.0
+RUNNING, ENDED = "running", "ended"
+
+
+class Health:
+    """`tell` as often as convenient, at least once a second: it sends when a second has passed or the state is new.
+
+    `counters()` gives what is counted, by name; asked for only when something is sent.
+    """
+
+    def __init__(self, link: Link, counters: Callable[[], dict[str, object]]):
+        self._stream = link.publish(f"{HEALTH}/{link.process}")
+        self._process, self._counters = link.process, counters
+        self._due_s, self._state = 0.0, ""
+
+    def tell(self, stamp_ns: int, state: str = RUNNING, last_error: str = "") -> None:
+        """`stamp_ns`: the bridge's clock as far as this process knows it."""
+        now = time.monotonic()
+        if now < self._due_s and state == self._state:
+            return
+        self._due_s, self._state = now + PERIOD_S, state
+        counters = [KeyValue(key, str(value)) for key, value in self._counters().items()]
+        self._stream.send(ProcessHealth(Header.at(stamp_ns), self._process, os.getpid(), state, counters, last_error))

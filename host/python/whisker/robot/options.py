@@ -1,0 +1,39 @@
+"""Options that the commands on zenoh share: which robot, where to listen, whom to connect to."""
+
+import argparse
+import sys
+from collections.abc import Sequence
+
+from .link import NAVIGATOR_ENDPOINT, PILOT_ENDPOINT, ROBOT, Link, is_loopback
+
+NOWHERE = "none"
+
+
+def add_link(parser: argparse.ArgumentParser, listen: Sequence[str], connect: Sequence[str]) -> None:
+    """--robot, --listen, --connect, --scout and --lock-step; `listen` and `connect`: what holds when none is given."""
+    parser.add_argument("--robot", default=ROBOT, metavar="NAME", help="which robot (default: %(default)s)")
+    for option, standard, what in (
+        ("--listen", listen, "endpoint to be reached at"),
+        ("--connect", connect, "endpoint of another process"),
+    ):
+        told = " ".join(standard) or NOWHERE
+        text = f"{what}, tcp/HOST:PORT; repeatable, or '{NOWHERE}' (default: {told})"
+        parser.add_argument(option, action="append", metavar="ENDPOINT", help=text)
+    parser.add_argument("--scout", action="store_true", help="also find others, and be found, by multicast")
+    parser.add_argument("--lock-step", action="store_true", help="nothing is left out and senders wait: for simulation")
+    parser.set_defaults(standard={"listen": list(listen), "connect": list(connect)})
+
+
+def open_link(process: str, arguments: argparse.Namespace) -> Link:
+    """The link that these arguments ask for; a word on standard error when other machines can reach it."""
+    ends = {}
+    for name, standard in arguments.standard.items():
+        given = getattr(arguments, name)
+        ends[name] = [end for end in (standard if given is None else given) if end != NOWHERE]
+    for endpoint in ends["listen"]:
+        if not is_loopback(endpoint):
+            print(f"whisker: {endpoint}: whoever reaches this address can watch and take part", file=sys.stderr)
+    return Link(process, arguments.robot, **ends, lock_step=arguments.lock_step, scout=arguments.scout)
+
+
+__all__ = ["NAVIGATOR_ENDPOINT", "PILOT_ENDPOINT", "add_link", "open_link"]

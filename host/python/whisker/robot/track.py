@@ -1,0 +1,39 @@
+"""One filter of a navigator with its two files: est_<name>.csv, and covariance_<name>.csv for the report's ellipses."""
+
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TextIO
+
+from .. import localise
+from ..scene import Scene
+
+FILES = (("est", localise.ESTIMATE_HEADER), ("covariance", "t_s,xx_m2,xy_m2,yy_m2"))
+
+
+class Track:
+    """Steps a filter and writes what it believes after every row, line by line."""
+
+    def __init__(self, name: str, scene: Scene, out: Path | None, stack: ExitStack, resumed: bool = False):
+        """`out`: the folder of the files, which `stack` closes; None: no files. resumed: go on behind what they hold."""
+        self.name, self.filter = name, localise.Filter(name, scene)
+        self._poses = self._covariances = None
+        if out is not None:
+            self._poses, self._covariances = (
+                stack.enter_context(_opened(out / f"{kind}_{name}.csv", header, resumed)) for kind, header in FILES
+            )
+
+    def take(self, t_s: str, row: dict[str, float | None]) -> localise.Estimate:
+        """`t_s`: the row's time as the files tell it."""
+        estimate = self.filter.step(row)
+        if self._poses:
+            c = estimate.covariance
+            print(estimate.line(t_s), file=self._poses, flush=True)
+            print(f"{t_s},{c[0, 0]:.6g},{c[0, 1]:.6g},{c[1, 1]:.6g}", file=self._covariances, flush=True)
+        return estimate
+
+
+def _opened(path: Path, header: str, resumed: bool) -> TextIO:
+    file = path.open("a" if resumed else "w")
+    if file.tell() == 0:
+        print(header, file=file, flush=True)
+    return file
