@@ -25,7 +25,7 @@ module node_link (
     input  wire       start,         // begin a tick: one cycle, only while not busy
     input  wire [7:0] order_tick,    // low bits of the tick number, read at start
     input  wire       service,       // a service order waits: a second window follows; read at start
-    input  wire       service_bit,   // its bit `service_index`, in the same cycle
+    input  wire       service_bit,   // its bit `service_index`, in the same cycle; read a cycle before it is needed
     output wire [8:0] service_index, // next bit of the second window
     input  wire [5:0] sck_divider,   // cycles of one SCK period, even, 6 to 32; read at start
     input  wire [7:0] word_gap,      // cycles between two words, at least 30; read at start
@@ -61,6 +61,7 @@ module node_link (
     reg  [7:0]  crc;         // of the order bits sent
     reg  [31:0] crc32;       // of all bits sent in this window
     reg  [8:0]  bit_index;   // bit being transferred in this window
+    reg         bit_to_send; // the next one
     reg         to_serve;    // a second window is to come
     reg  [7:0]  tick;        // as at start
 
@@ -147,8 +148,12 @@ module node_link (
     wire       next_bit    = in_crc32 ? crc32[31] ^ CRC32_XOR_OUT[31]
                            : in_crc ? crc[7] ^ CRC8_XOR_OUT[{2'b00, ~next_index[2:0]}]
                            : source_bit;
-    wire       feedback    = !in_crc && (crc[7] ^ next_bit);
-    wire       feedback32  = !in_crc32 && (crc32[31] ^ next_bit);
+    wire       feedback    = !in_crc && (crc[7] ^ bit_to_send);
+    wire       feedback32  = !in_crc32 && (crc32[31] ^ bit_to_send);
+
+    // Nothing that it hangs on changes in the cycle before a bit begins, and MOSI's register is far away, in its pad.
+    always @(posedge clk)
+        bit_to_send <= next_bit;
 
     always @(posedge clk)
         if (state == IDLE || state == PAUSE) begin
@@ -157,7 +162,7 @@ module node_link (
             crc   <= CRC8_INIT[7:0];
             crc32 <= CRC32_INIT;
         end else if (bit_begins) begin
-            mosi  <= next_bit;
+            mosi  <= bit_to_send;
             order <= {order[14:0], 1'b0};
             crc   <= {crc[6:0], 1'b0} ^ (feedback ? CRC8_POLYNOMIAL[7:0] : 8'h00);
             crc32 <= {crc32[30:0], 1'b0} ^ (feedback32 ? CRC32_POLYNOMIAL : 32'd0);

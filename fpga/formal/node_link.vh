@@ -2,7 +2,8 @@
 // cycles left in the stage, in this order of weight. And each record, each answer is captured whole: 64 times, bit 0 to
 // bit 63. That is all lane_receiver waits for.
 //
-// Assumed: settings within their limits (control_registers refuses others), start only while not busy.
+// Assumed: settings within their limits (control_registers refuses others), start only while not busy, a service bit that
+// stays while its index does.
 
 reg f_past = 1'b0;  // there is a cycle before
 always @(posedge clk) f_past <= 1'b1;
@@ -59,6 +60,14 @@ always @* if (f_past) begin
     assert (sck == (state == BITS && phase < {1'b0, divider[5:1]}));
     assert (select_n == !(state == SETUP || state == BITS || state == GAP || state == HOLD));
     assert (sync == (state == SYNC));
+end
+
+// The bit that is sent was chosen a cycle before, and is still the right one.
+reg [9:0] f_service;  // a cycle before
+always @(posedge clk) f_service <= {service_index, service_bit};
+always @* if (f_past) begin
+    if (service_index == f_service[9:1]) assume (service_bit == f_service[0]);
+    if (bit_begins) assert (bit_to_send == next_bit);
 end
 
 always @* if (f_past) cover (service_done);

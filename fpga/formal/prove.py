@@ -71,6 +71,7 @@ PROOFS = {
                 ("word_ends) state <= GAP", "word_ends) state <= SETUP"),
                 ("bit_index == (in_service", "bit_index - 9'd1 == (in_service"),
                 ("phase == sample_at - 6'd1", "phase == sample_at"),
+                ("bit_to_send <= next_bit", "bit_to_send <= source_bit"),
             ),
         ),
     )
