@@ -2,7 +2,9 @@
 #ifndef WHISKER_DAEMON_LOG_H
 #define WHISKER_DAEMON_LOG_H
 
+#ifndef DAEMON_PROGRAM /* a build for another daemon says its name */
 #define DAEMON_PROGRAM "whiskerd"
+#endif
 
 /* As syslog numbers them. INFO goes to a journal, and to a terminal only when asked for. */
 enum daemon_priority { LOG_ERROR = 3, LOG_WARN = 4, LOG_NOTE = 5, LOG_DETAIL = 6 };

@@ -151,24 +151,24 @@ static struct create_step step_of(const struct create_odometry *odometry, struct
 
 /* Adds what was asked for in frames that never came. A turn that is read may be wrong by a whole one: both are loose.
  */
-static void add_estimate(struct create_odometry *odometry, struct create_step *step, double frames, double d, double a)
+static void add_estimate(struct create_odometry *odometry, struct create_step *step, uint32_t missed)
 {
-    step->distance += frames * d;
-    step->angle += frames * a;
-    step->loose_distance = ESTIMATE_SIGMA * fabs(frames * d);
-    step->loose_angle = ESTIMATE_SIGMA * fabs(frames * a);
-    odometry->estimated += (uint64_t)frames;
+    const double frames = odometry->still >= STILL_FRAMES ? 0 : missed;
+    step->distance += frames * odometry->asked_m;
+    step->angle += frames * odometry->asked_rad;
+    step->loose_distance = ESTIMATE_SIGMA * fabs(frames * odometry->asked_m);
+    step->loose_angle = ESTIMATE_SIGMA * fabs(frames * odometry->asked_rad);
+    odometry->estimated += missed;
 }
 
-static struct create_step step_by_encoders(struct create_odometry *odometry, const struct create_frame *frame, double d,
-                                           double a)
+static struct create_step step_by_encoders(struct create_odometry *odometry, const struct create_frame *frame)
 {
     const struct create_odometry_settings *settings = &odometry->settings;
     const double count_m = create_model_facts(settings->model)->count_m;
     double left, right;
     if (!count_wheels(odometry, frame, &left, &right)) {
         struct create_step step = {0};
-        add_estimate(odometry, &step, frame->missed, d, a);
+        add_estimate(odometry, &step, frame->missed);
         return step;
     }
     /* Two wheels, each known to a count: their mean and difference are worth these units. */
@@ -179,6 +179,16 @@ static struct create_step step_by_encoders(struct create_odometry *odometry, con
     return step_of(odometry, distance, angle);
 }
 
+static struct create_step step_by_values(struct create_odometry *odometry, const struct create_frame *frame, double d,
+                                         double a)
+{
+    struct create_step step = step_of(odometry, read_distance(odometry, frame, d), read_angle(odometry, frame, a));
+    if (frame->missed > 0) {
+        add_estimate(odometry, &step, frame->missed);
+    }
+    return step;
+}
+
 struct create_step create_odometry_take(struct create_odometry *odometry, const struct create_frame *frame)
 {
     const double d = odometry_asked_distance(frame), a = odometry_asked_angle(odometry, frame);
@@ -186,13 +196,9 @@ struct create_step create_odometry_take(struct create_odometry *odometry, const 
     remainder_watch(odometry, frame, d);
     odometry->distance = choose(odometry, d, DISTANCE_UNIT_M);
     odometry->angle = choose(odometry, a, ANGLE_UNIT_RAD);
-    if (odometry->distance == CREATE_ENCODERS) {
-        return step_by_encoders(odometry, frame, d, a);
-    }
-    struct create_step step = step_of(odometry, read_distance(odometry, frame, d), read_angle(odometry, frame, a));
-    if (frame->missed > 0) {
-        add_estimate(odometry, &step, frame->missed, odometry->still >= STILL_FRAMES ? 0 : d,
-                     odometry->still >= STILL_FRAMES ? 0 : a);
-    }
+    const struct create_step step = odometry->distance == CREATE_ENCODERS ? step_by_encoders(odometry, frame)
+                                                                          : step_by_values(odometry, frame, d, a);
+    odometry->asked_m = d;
+    odometry->asked_rad = a;
     return step;
 }

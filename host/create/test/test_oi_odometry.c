@@ -186,9 +186,14 @@ static void motion_of_missed_frames_is_estimated(void **state)
 {
     (void)state;
     struct base base = begin(CREATE_1, CREATE_REPORTED, true);
-    struct create_frame frame = {.missed = 4};
-    frame.value[CREATE_OI_DISTANCE] = 3;
+    struct create_frame frame = {0};
     frame.value[CREATE_OI_REQUESTED_LEFT] = frame.value[CREATE_OI_REQUESTED_RIGHT] = 200;
+    take(&base, &frame);
+    base.motion = (struct create_motion){0};
+    frame.missed = 4;
+    frame.value[CREATE_OI_DISTANCE] = 3;
+    frame.value[CREATE_OI_REQUESTED_LEFT] = 0; /* what it was asked before counts */
+    frame.value[CREATE_OI_REQUESTED_RIGHT] = 0;
     take(&base, &frame);
     double c[3][3];
     create_motion_covariance(&base.motion, c);

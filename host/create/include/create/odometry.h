@@ -45,7 +45,8 @@ struct create_odometry {
     double kept_m, dropped_m, told_m;   /* evidence about the remainder: what it would tell, and what it told */
     uint32_t still;                     /* frames in a row that told no motion though enough was asked for */
     bool started;
-    int32_t left, right; /* encoders at the newest frame */
+    double asked_m, asked_rad; /* motion asked for in the newest frame */
+    int32_t left, right;       /* encoders at the newest frame */
 };
 
 /* Usual settings of a model: policy CREATE_AUTO, 5 % (paper), 10 % where requested, 0.05 rad/m (assumed). */

@@ -1,0 +1,50 @@
+/*
+ * Who is connected to the socket of whisker-base: one commander (the first that drives), any number of observers up to
+ * BASE_CLIENTS. Messages: docs/create.md. Nothing here waits or allocates.
+ */
+#ifndef WHISKER_BASE_CLIENTS_H
+#define WHISKER_BASE_CLIENTS_H
+
+#include <poll.h>
+
+#include "create/motion.h"
+#include "whisker_base_robot.h"
+
+#define BASE_CLIENTS 16
+#define BASE_MESSAGE 256
+
+struct base_client {
+    int socket; /* -1: nobody */
+    bool leads; /* has said `after N`: the stream is taken in as far as it says */
+    bool waits; /* for byte `after`, with the message kept */
+    uint64_t after;
+    char message[BASE_MESSAGE];
+    struct create_motion motion; /* since its last odometry message */
+    unsigned bits;
+};
+
+struct base_clients {
+    struct base_robot *robot;
+    const uint64_t *restarts; /* of the driver, told with the health */
+    struct base_client client[BASE_CLIENTS];
+    struct base_client *commander; /* NULL: none */
+};
+
+void base_clients_begin(struct base_clients *clients, struct base_robot *robot, const uint64_t *restarts);
+
+/* Takes a connection; false: there is no place left, the connection is closed. */
+bool base_clients_add(struct base_clients *clients, int socket);
+
+/* As base_on_step: one frame's motion, for every client. */
+void base_clients_step(void *context, const struct create_step *step, unsigned bits);
+
+/* Byte of the stream up to which clients want it taken in; UINT64_MAX: nobody leads. */
+uint64_t base_clients_limit(const struct base_clients *clients);
+
+/* Fills in BASE_CLIENTS descriptors to wait on. */
+void base_clients_poll(const struct base_clients *clients, struct pollfd *polled);
+
+/* Takes what poll() has found, answers what can be answered. */
+void base_clients_serve(struct base_clients *clients, const struct pollfd *polled, int64_t now_ms);
+
+#endif

@@ -1,0 +1,169 @@
+#include "whisker_base_driver.h"
+
+#include <errno.h>
+#include <signal.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "cli.h"
+#include "daemon_log.h"
+#include "whisker_base_clients.h"
+
+#define ALIVE_MS 50
+
+enum { GUARD, LISTENING, PORT, CLIENTS, POLLED = CLIENTS + BASE_CLIENTS };
+
+struct driver {
+    struct base_driver_start start;
+    struct base_robot robot;
+    struct base_clients clients;
+    struct pollfd polled[POLLED];
+    int told_port; /* descriptor the guard holds too */
+    int64_t alive_ms, tried_ms;
+    bool opened; /* the port was open before: the next time is a reconnect */
+};
+
+static int64_t now_ms(void)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
+}
+
+/* Tells the guard one thing, with the port's descriptor where it is not negative. */
+static void tell(const struct driver *driver, enum base_tell what, int port)
+{
+    char byte = (char)what;
+    union {
+        struct cmsghdr header;
+        char room[CMSG_SPACE(sizeof port)];
+    } control = {.room = {0}};
+    struct iovec part = {.iov_base = &byte, .iov_len = 1};
+    struct msghdr message = {.msg_iov = &part, .msg_iovlen = 1};
+    if (port >= 0) {
+        message.msg_control = control.room;
+        message.msg_controllen = sizeof control.room;
+        struct cmsghdr *header = CMSG_FIRSTHDR(&message);
+        header->cmsg_level = SOL_SOCKET;
+        header->cmsg_type = SCM_RIGHTS;
+        header->cmsg_len = CMSG_LEN(sizeof port);
+        memcpy(CMSG_DATA(header), &port, sizeof port);
+    }
+    sendmsg(driver->start.guard, &message, MSG_NOSIGNAL | (what == BASE_ALIVE ? MSG_DONTWAIT : 0));
+}
+
+static void tell_port(struct driver *driver)
+{
+    driver->told_port = driver->robot.port;
+    tell(driver, driver->told_port < 0 ? BASE_NO_PORT : BASE_PORT, driver->told_port);
+}
+
+static void tell_alive(struct driver *driver)
+{
+    if (!driver->start.options->stream_clock && now_ms() - driver->alive_ms >= ALIVE_MS) {
+        driver->alive_ms = now_ms();
+        tell(driver, BASE_ALIVE, -1);
+    }
+}
+
+/* The port again, when there is none. */
+static void reopen(struct driver *driver)
+{
+    struct base_robot *robot = &driver->robot;
+    if (robot->port >= 0 || now_ms() - driver->tried_ms < BASE_REOPEN_MS) {
+        return;
+    }
+    driver->tried_ms = now_ms();
+    if (base_robot_open(robot, -1, now_ms())) {
+        robot->reconnects += driver->opened;
+        if (driver->opened) {
+            daemon_log(LOG_NOTE, "%s: is back", robot->options->port);
+        }
+        driver->opened = true;
+    }
+}
+
+static void fill(struct driver *driver)
+{
+    const bool wanted = base_robot_taken(&driver->robot) < base_clients_limit(&driver->clients);
+    driver->polled[GUARD] = (struct pollfd){.fd = driver->start.guard, .events = POLLIN};
+    driver->polled[LISTENING] = (struct pollfd){.fd = driver->start.listening, .events = POLLIN};
+    driver->polled[PORT] = (struct pollfd){.fd = driver->robot.port, .events = wanted ? POLLIN : 0};
+    base_clients_poll(&driver->clients, &driver->polled[CLIENTS]);
+}
+
+static int64_t least(int64_t a, int64_t b)
+{
+    return a < b ? a : b;
+}
+
+/* Sleeps until something comes or is due; signals end it. */
+static void await(struct driver *driver)
+{
+    sigset_t none;
+    sigemptyset(&none);
+    const int64_t due = base_robot_watch(&driver->robot, now_ms());
+    const int64_t sleep_ms = driver->start.options->stream_clock && driver->robot.port >= 0 ? -1 : least(due, ALIVE_MS);
+    const struct timespec timeout = {.tv_nsec = sleep_ms * 1000000};
+    fill(driver);
+    if (ppoll(driver->polled, POLLED, sleep_ms < 0 ? NULL : &timeout, &none) < 0) {
+        for (int i = 0; i < POLLED; i++) {
+            driver->polled[i].revents = 0;
+        }
+    }
+}
+
+static void serve(struct driver *driver)
+{
+    if (driver->polled[PORT].revents && driver->robot.port >= 0) {
+        base_robot_read(&driver->robot, base_clients_limit(&driver->clients), now_ms());
+    }
+    if (driver->polled[LISTENING].revents) {
+        const int socket = accept4(driver->start.listening, NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC);
+        if (socket >= 0) {
+            base_clients_add(&driver->clients, socket);
+        }
+    }
+    base_clients_serve(&driver->clients, &driver->polled[CLIENTS], now_ms());
+    if (driver->told_port != driver->robot.port) {
+        tell_port(driver);
+    }
+    tell_alive(driver);
+}
+
+static bool open_first(struct driver *driver)
+{
+    const struct base_driver_start *start = &driver->start;
+    driver->tried_ms = now_ms();
+    driver->opened = base_robot_open(&driver->robot, start->port, now_ms());
+    if (!driver->opened && !start->options->wait && start->restarts == 0) {
+        return false;
+    }
+    tell_port(driver);
+    return true;
+}
+
+int base_driver_run(const struct base_driver_start *start)
+{
+    static struct driver driver;
+    driver.start = *start;
+    base_robot_begin(&driver.robot, start->options, base_clients_step, &driver.clients);
+    base_clients_begin(&driver.clients, &driver.robot, &driver.start.restarts);
+    if (!open_first(&driver)) {
+        return CLI_FAILED;
+    }
+    while (!cli_stop_wanted()) {
+        reopen(&driver);
+        await(&driver);
+        if (driver.polled[GUARD].revents) {
+            daemon_log(LOG_ERROR, "the guard has died; wheels stopped, ending");
+            base_robot_end(&driver.robot);
+            return CLI_FAILED;
+        }
+        serve(&driver);
+    }
+    base_robot_end(&driver.robot);
+    return CLI_OK;
+}

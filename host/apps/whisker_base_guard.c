@@ -1,0 +1,267 @@
+#include "whisker_base_guard.h"
+
+#include <errno.h>
+#include <poll.h>
+#include <signal.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <sys/wait.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "cli.h"
+#include "create/command.h"
+#include "create/port.h"
+#include "daemon_log.h"
+#include "daemon_notify.h"
+#include "whisker_base_driver.h"
+
+#define BACKLOG 16
+/* A driver that dies so young is not started again at once. */
+#define YOUNG_MS 200
+#define PAUSE_MS 500
+#define LOOK_MS 100
+
+struct guard {
+    const struct base_options *options;
+    int listening, port, driver; /* sockets and the driver's port; -1: none */
+    pid_t child;
+    uint64_t restarts;
+    int64_t heard_ms;
+    bool stuck;
+};
+
+static int64_t now_ms(void)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
+}
+
+/* ---------------------------------------------------------------------------------------------------------- the wheels
+ */
+
+static void stop_wheels(struct guard *guard)
+{
+    uint8_t bytes[CREATE_COMMAND_BYTES];
+    if (guard->port >= 0) {
+        create_port_write(guard->port, bytes, create_put_stop(bytes));
+    }
+}
+
+static void hold_port(struct guard *guard, int port)
+{
+    if (guard->port >= 0) {
+        close(guard->port);
+    }
+    guard->port = port;
+}
+
+/* ---------------------------------------------------------------------------------------------------------- the driver
+ */
+
+/* The descriptor that came with a message; -1: none. */
+static int descriptor_of(struct msghdr *message)
+{
+    int port = -1;
+    struct cmsghdr *header = CMSG_FIRSTHDR(message);
+    if (header && header->cmsg_level == SOL_SOCKET && header->cmsg_type == SCM_RIGHTS) {
+        memcpy(&port, CMSG_DATA(header), sizeof port);
+    }
+    return port;
+}
+
+/* One message of the driver; false: it has died. */
+static bool hear(struct guard *guard)
+{
+    char byte;
+    union {
+        struct cmsghdr header;
+        char room[CMSG_SPACE(sizeof(int))];
+    } control;
+    struct iovec part = {.iov_base = &byte, .iov_len = 1};
+    struct msghdr message = {
+        .msg_iov = &part, .msg_iovlen = 1, .msg_control = control.room, .msg_controllen = sizeof control.room};
+    const ssize_t got = recvmsg(guard->driver, &message, MSG_CMSG_CLOEXEC);
+    if (got <= 0) {
+        return got < 0 && errno == EINTR;
+    }
+    guard->heard_ms = now_ms();
+    guard->stuck = false;
+    if (byte == BASE_PORT || byte == BASE_NO_PORT) {
+        hold_port(guard, descriptor_of(&message));
+        daemon_notify_ready(byte == BASE_PORT ? "drives the base" : "waiting for the port");
+    }
+    return true;
+}
+
+static void be_driver(const struct guard *guard, int socket)
+{
+    const struct base_driver_start start = {.options = guard->options,
+                                            .guard = socket,
+                                            .listening = guard->listening,
+                                            .port = guard->port,
+                                            .restarts = guard->restarts};
+    _exit(base_driver_run(&start));
+}
+
+static bool start_driver(struct guard *guard)
+{
+    int ends[2];
+    if (socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends) != 0) {
+        return false;
+    }
+    guard->heard_ms = now_ms();
+    guard->child = fork();
+    if (guard->child == 0) {
+        close(ends[0]);
+        be_driver(guard, ends[1]);
+    }
+    close(ends[1]);
+    guard->driver = ends[0];
+    return guard->child > 0;
+}
+
+/* A driver that hangs cannot stop the wheels: it is done for it, and in the end it is ended. */
+static void watch_driver(struct guard *guard)
+{
+    const int64_t silent_ms = now_ms() - guard->heard_ms;
+    if (guard->options->stream_clock || silent_ms < BASE_STUCK_MS) {
+        return;
+    }
+    if (!guard->stuck) {
+        guard->stuck = true;
+        stop_wheels(guard);
+        daemon_log(LOG_WARN, "the driver hangs; wheels stopped");
+    }
+    if (silent_ms >= BASE_DEAD_MS) {
+        kill(guard->child, SIGKILL);
+    }
+}
+
+/* Waits for the driver's end, which is passed the wish to stop. Returns its status as of waitpid(). */
+static int attend(struct guard *guard)
+{
+    bool told = false;
+    int status = 0;
+    sigset_t none;
+    sigemptyset(&none);
+    for (bool lives = true; lives;) {
+        if (cli_stop_wanted() && !told) {
+            told = true;
+            daemon_notify_stopping();
+            kill(guard->child, SIGTERM);
+        }
+        struct pollfd polled = {.fd = guard->driver, .events = POLLIN};
+        const struct timespec look = {.tv_nsec = LOOK_MS * 1000000L};
+        const bool clocked = !guard->options->stream_clock;
+        if (ppoll(&polled, 1, clocked ? &look : NULL, &none) > 0) {
+            lives = hear(guard);
+        }
+        watch_driver(guard);
+        daemon_notify_alive();
+    }
+    close(guard->driver);
+    waitpid(guard->child, &status, 0);
+    if (!WIFEXITED(status)) {
+        stop_wheels(guard);
+    }
+    return status;
+}
+
+static void pause_after(const struct guard *guard, int64_t begun_ms)
+{
+    sigset_t none;
+    sigemptyset(&none);
+    if (now_ms() - begun_ms < YOUNG_MS && guard->restarts > 1) {
+        const struct timespec pause = {.tv_nsec = PAUSE_MS * 1000000L};
+        ppoll(NULL, 0, &pause, &none);
+    }
+}
+
+/* Drivers one after the other, until one ends by itself. */
+static int keep_driver(struct guard *guard)
+{
+    while (start_driver(guard)) {
+        const int64_t begun_ms = now_ms();
+        const int status = attend(guard);
+        if (WIFEXITED(status) || cli_stop_wanted()) {
+            return WIFEXITED(status) ? WEXITSTATUS(status) : CLI_OK;
+        }
+        guard->restarts++;
+        daemon_log(LOG_ERROR, "the driver has died (signal %d); wheels stopped, starting it again", WTERMSIG(status));
+        pause_after(guard, begun_ms);
+    }
+    daemon_log(LOG_ERROR, "cannot start the driver: %s", strerror(errno));
+    return CLI_FAILED;
+}
+
+/* ---------------------------------------------------------------------------------------------------------- the socket
+ */
+
+/* Whether somebody answers at the address; a socket file of a process that was killed answers nobody. */
+static bool answered(const struct sockaddr_un *address)
+{
+    const int probe = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0);
+    const bool there = connect(probe, (const struct sockaddr *)address, sizeof *address) == 0;
+    close(probe);
+    return there;
+}
+
+static bool bind_to(int socket, const struct sockaddr_un *address)
+{
+    if (bind(socket, (const struct sockaddr *)address, sizeof *address) == 0) {
+        return true;
+    }
+    if (errno != EADDRINUSE || answered(address)) {
+        return false;
+    }
+    unlink(address->sun_path);
+    return bind(socket, (const struct sockaddr *)address, sizeof *address) == 0;
+}
+
+static bool open_socket(struct guard *guard)
+{
+    const char *path = guard->options->socket;
+    struct sockaddr_un address = {.sun_family = AF_UNIX};
+    if (strlen(path) >= sizeof address.sun_path) {
+        daemon_log(LOG_ERROR, "%s: the name is too long; choose a path of less than %zu letters", path,
+                   sizeof address.sun_path);
+        return false;
+    }
+    strcpy(address.sun_path, path);
+    guard->listening = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+    if (guard->listening < 0 || !bind_to(guard->listening, &address) || listen(guard->listening, BACKLOG) != 0) {
+        daemon_log(LOG_ERROR, "%s: %s; %s", path, strerror(errno),
+                   errno == EADDRINUSE ? "stop the whisker-base that has it" : "choose a path that can be written");
+        return false;
+    }
+    return true;
+}
+
+/* Signals are taken only where a process waits, so that none slips between looking and waiting. */
+static void block_signals(void)
+{
+    sigset_t signals;
+    sigemptyset(&signals);
+    sigaddset(&signals, SIGTERM);
+    sigaddset(&signals, SIGINT);
+    sigaddset(&signals, SIGHUP);
+    sigprocmask(SIG_BLOCK, &signals, NULL);
+}
+
+int base_guard_run(const struct base_options *options)
+{
+    struct guard guard = {.options = options, .listening = -1, .port = -1, .driver = -1};
+    block_signals();
+    if (!open_socket(&guard)) {
+        return CLI_FAILED;
+    }
+    const int code = keep_driver(&guard);
+    hold_port(&guard, -1);
+    close(guard.listening);
+    unlink(options->socket);
+    return code;
+}

@@ -1,0 +1,316 @@
+#include "whisker_base_robot.h"
+
+#include <errno.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "create/port.h"
+#include "daemon_log.h"
+
+#define READ_BYTES 256
+#define COMMANDER_FRAMES (BASE_COMMANDER_MS / CREATE_OI_PERIOD_MS)
+/* A battery of 12 cells: below a tenth of its charge, or 1.0 V a cell, the base will not drive for long. */
+#define LOW_CHARGE 10
+#define LOW_MV 12000
+
+static const uint8_t packets[] = {
+    CREATE_OI_BUMPS_DROPS,
+    CREATE_OI_CLIFF_LEFT,
+    CREATE_OI_CLIFF_FRONT_LEFT,
+    CREATE_OI_CLIFF_FRONT_RIGHT,
+    CREATE_OI_CLIFF_RIGHT,
+    CREATE_OI_DISTANCE,
+    CREATE_OI_ANGLE,
+    CREATE_OI_VOLTAGE,
+    CREATE_OI_CHARGE,
+    CREATE_OI_CAPACITY,
+    CREATE_OI_CHARGING_SOURCES,
+    CREATE_OI_MODE,
+    CREATE_OI_REQUESTED_RIGHT,
+    CREATE_OI_REQUESTED_LEFT,
+    CREATE_OI_ENCODER_LEFT,
+    CREATE_OI_ENCODER_RIGHT,
+};
+enum { ENCODERS = 2 }; /* the last two: Create 2 only */
+
+static size_t packet_count(const struct base_robot *robot)
+{
+    return sizeof packets - (robot->options->odometry.model == CREATE_2 ? 0 : ENCODERS);
+}
+
+/* ---------------------------------------------------------------------------------------------------------- the line
+ */
+
+static void lose(struct base_robot *robot, const char *doing)
+{
+    daemon_log(LOG_WARN, "%s: %s: %s; plug it in again", robot->options->port, doing, strerror(errno));
+    close(robot->port);
+    robot->port = -1;
+    robot->sent = 0;
+    robot->speeds = (struct create_speeds){0};
+}
+
+static bool order(struct base_robot *robot, const uint8_t *bytes, size_t count)
+{
+    if (robot->port < 0) {
+        return false;
+    }
+    if (!create_port_write(robot->port, bytes, count)) {
+        lose(robot, "cannot write");
+        return false;
+    }
+    robot->sent += count;
+    return true;
+}
+
+static bool order_opcode(struct base_robot *robot, enum create_oi_opcode opcode)
+{
+    uint8_t bytes[CREATE_COMMAND_BYTES];
+    return order(robot, bytes, create_put_opcode(bytes, opcode));
+}
+
+static bool ask_mode(struct base_robot *robot, enum create_oi_mode mode)
+{
+    robot->entered = false;
+    robot->wanted = mode;
+    return mode == CREATE_OI_MODE_PASSIVE
+               ? order_opcode(robot, CREATE_OI_OP_START)
+               : order_opcode(robot, mode == CREATE_OI_MODE_FULL ? CREATE_OI_OP_FULL : CREATE_OI_OP_SAFE);
+}
+
+/* Wheels first, then who commands, then what is told. arm: enter the wanted mode. */
+static bool start_base(struct base_robot *robot, bool arm)
+{
+    uint8_t bytes[CREATE_COMMAND_BYTES];
+    robot->speeds = (struct create_speeds){0};
+    return order(robot, bytes, create_put_stop(bytes)) && order_opcode(robot, CREATE_OI_OP_START) &&
+           (!arm || ask_mode(robot, robot->wanted)) &&
+           order(robot, bytes, create_put_stream(bytes, packets, packet_count(robot)));
+}
+
+static void add_counts(struct create_stream_counts *sum, const struct create_stream_counts *counts)
+{
+    sum->bytes += counts->bytes;
+    sum->frames += counts->frames;
+    sum->corrupt += counts->corrupt;
+    sum->skipped += counts->skipped;
+    sum->resyncs += counts->resyncs;
+}
+
+static const char *remedy(int error)
+{
+    switch (error) {
+    case ENOENT:
+        return "there is no such port; plug the adapter in, or look in /dev/serial/by-id for its name";
+    case EACCES:
+        return "no permission; join its group: sudo adduser $USER dialout, then log in again";
+    case EWOULDBLOCK:
+        return "another process drives it; stop that";
+    case ENOTTY:
+        return "it is no serial port; choose another";
+    default:
+        return strerror(error);
+    }
+}
+
+void base_robot_begin(struct base_robot *robot, const struct base_options *options, base_on_step *on_step,
+                      void *context)
+{
+    *robot = (struct base_robot){.options = options, .on_step = on_step, .context = context, .port = -1};
+    robot->wanted = options->full ? CREATE_OI_MODE_FULL : CREATE_OI_MODE_SAFE;
+    create_odometry_begin(&robot->odometry, &options->odometry);
+}
+
+bool base_robot_open(struct base_robot *robot, int port, int64_t now_ms)
+{
+    robot->port = port >= 0 ? port : create_port_open(robot->options->port, robot->options->baud);
+    if (robot->port < 0) {
+        if (errno != robot->error) {
+            robot->error = errno;
+            daemon_log(LOG_ERROR, "%s: %s", robot->options->port, remedy(errno));
+        }
+        return false;
+    }
+    robot->error = 0;
+    robot->sent = 0;
+    robot->opened_ms = now_ms;
+    add_counts(&robot->past, &robot->stream.counts);
+    create_stream_begin(&robot->stream, packets, packet_count(robot));
+    daemon_log(LOG_DETAIL, "%s: open, %s at %u baud", robot->options->port,
+               create_model_facts(robot->options->odometry.model)->name, robot->options->baud);
+    return start_base(robot, true);
+}
+
+uint64_t base_robot_taken(const struct base_robot *robot)
+{
+    return robot->stream.counts.bytes;
+}
+
+/* --------------------------------------------------------------------------------------------------------- the frames
+ */
+
+unsigned base_robot_bits(const struct base_robot *robot)
+{
+    const int32_t *value = robot->frame.value;
+    const bool idle = robot->port < 0 || value[CREATE_OI_MODE] != (int32_t)robot->wanted;
+    return (unsigned)value[CREATE_OI_BUMPS_DROPS] | (value[CREATE_OI_CLIFF_LEFT] ? BASE_CLIFF_LEFT : 0u) |
+           (value[CREATE_OI_CLIFF_FRONT_LEFT] ? BASE_CLIFF_FRONT_LEFT : 0u) |
+           (value[CREATE_OI_CLIFF_FRONT_RIGHT] ? BASE_CLIFF_FRONT_RIGHT : 0u) |
+           (value[CREATE_OI_CLIFF_RIGHT] ? BASE_CLIFF_RIGHT : 0u) | (idle ? BASE_IDLE : 0u);
+}
+
+static const char *mode_reason(const struct base_robot *robot)
+{
+    const unsigned bits = base_robot_bits(robot);
+    return bits & (CREATE_OI_DROP_LEFT | CREATE_OI_DROP_RIGHT | CREATE_OI_DROP_CASTER) ? "a wheel dropped; set it down"
+           : bits & (BASE_CLIFF_LEFT | BASE_CLIFF_FRONT_LEFT | BASE_CLIFF_FRONT_RIGHT | BASE_CLIFF_RIGHT)
+               ? "a cliff; move it away"
+           : robot->frame.value[CREATE_OI_CHARGING_SOURCES] ? "its charger; unplug it"
+                                                            : "its own decision; look at its buttons and battery";
+}
+
+/* A base that leaves its mode has stopped its wheels; it goes back only when the commander says so. */
+static void watch_mode(struct base_robot *robot)
+{
+    const bool in_force = robot->frame.value[CREATE_OI_MODE] == (int32_t)robot->wanted;
+    if (robot->entered && !in_force) {
+        robot->mode_losses++;
+        robot->speeds = (struct create_speeds){0};
+        daemon_log(LOG_WARN, "%s: the base has left its mode: %s, then send `mode safe`", robot->options->port,
+                   mode_reason(robot));
+    }
+    robot->entered = in_force;
+}
+
+static void watch_battery(struct base_robot *robot)
+{
+    const int32_t *value = robot->frame.value;
+    robot->low = value[CREATE_OI_VOLTAGE] < LOW_MV || value[CREATE_OI_CHARGE] * LOW_CHARGE < value[CREATE_OI_CAPACITY];
+    if (robot->low && !robot->told_low) {
+        robot->told_low = true;
+        daemon_log(LOG_WARN, "%s: the battery is low: %d mV, %d of %d mAh; charge it", robot->options->port,
+                   value[CREATE_OI_VOLTAGE], value[CREATE_OI_CHARGE], value[CREATE_OI_CAPACITY]);
+    }
+}
+
+static void stop_commander(struct base_robot *robot)
+{
+    robot->commander_stops++;
+    daemon_log(LOG_WARN, "the commander is silent; wheels stopped");
+    base_robot_stop(robot);
+}
+
+static bool moving(const struct base_robot *robot)
+{
+    return robot->speeds.left_mm_s != 0 || robot->speeds.right_mm_s != 0;
+}
+
+/* Frames that time says are missing, beside those the bytes tell of: the line was gone or silent. */
+static uint32_t frames_of_gap(const struct base_robot *robot, int64_t now_ms)
+{
+    const int64_t gap_ms = now_ms - robot->frame_ms;
+    const bool gap = !robot->options->stream_clock && robot->frame_ms > 0 && gap_ms > BASE_SILENCE_MS;
+    return gap ? (uint32_t)(gap_ms / CREATE_OI_PERIOD_MS - 1) : 0;
+}
+
+static void take_frame(struct base_robot *robot, int64_t now_ms)
+{
+    const uint32_t gap = frames_of_gap(robot, now_ms);
+    robot->frame.missed = gap > robot->frame.missed ? gap : robot->frame.missed;
+    robot->missed += robot->frame.missed;
+    robot->frame_ms = now_ms;
+    const struct create_step step = create_odometry_take(&robot->odometry, &robot->frame);
+    watch_mode(robot);
+    watch_battery(robot);
+    robot->on_step(robot->context, &step, base_robot_bits(robot));
+    robot->frames_since_drive += 1 + robot->frame.missed;
+    if (robot->options->stream_clock && moving(robot) && robot->frames_since_drive >= COMMANDER_FRAMES) {
+        stop_commander(robot);
+    }
+}
+
+bool base_robot_read(struct base_robot *robot, uint64_t limit, int64_t now_ms)
+{
+    uint8_t bytes[READ_BYTES];
+    const uint64_t left = limit - base_robot_taken(robot);
+    const int got = create_port_read(robot->port, bytes, left < sizeof bytes ? (size_t)left : sizeof bytes);
+    if (got < 0) {
+        lose(robot, "the line is gone");
+        return false;
+    }
+    for (int i = 0; i < got; i++) {
+        if (create_stream_push(&robot->stream, bytes[i], &robot->frame)) {
+            take_frame(robot, now_ms);
+        }
+    }
+    return robot->port >= 0;
+}
+
+/* --------------------------------------------------------------------------------------------------------- the orders
+ */
+
+static bool order_speeds(struct base_robot *robot, struct create_speeds speeds)
+{
+    uint8_t bytes[CREATE_COMMAND_BYTES];
+    robot->speeds = speeds;
+    return order(robot, bytes, create_put_drive_direct(bytes, speeds.right_mm_s, speeds.left_mm_s));
+}
+
+bool base_robot_drive(struct base_robot *robot, double v_m_s, double omega_rad_s, int64_t now_ms)
+{
+    const struct create_odometry_settings *settings = &robot->options->odometry;
+    robot->drive_ms = now_ms;
+    robot->frames_since_drive = 0;
+    return order_speeds(robot, create_choose_speeds(settings->model, settings->wheel_base_m, v_m_s, omega_rad_s));
+}
+
+bool base_robot_stop(struct base_robot *robot)
+{
+    return order_speeds(robot, (struct create_speeds){0});
+}
+
+bool base_robot_mode(struct base_robot *robot, enum create_oi_mode mode)
+{
+    return base_robot_stop(robot) && ask_mode(robot, mode);
+}
+
+/* Bytes have stopped: stopped wheels are all that can be had without seeing. The mode is entered again only if the base
+ * was in it: a base that left it by itself waits for the commander. */
+static void restart_stream(struct base_robot *robot, int64_t now_ms)
+{
+    robot->silences++;
+    robot->opened_ms = now_ms;
+    daemon_log(LOG_WARN,
+               "%s: no frame for %d ms; wheels stopped, stream asked for again; if it stays silent check cable, "
+               "--baud and battery",
+               robot->options->port, BASE_SILENCE_MS);
+    start_base(robot, robot->entered || robot->stream.counts.frames == 0);
+}
+
+int base_robot_watch(struct base_robot *robot, int64_t now_ms)
+{
+    if (robot->options->stream_clock || robot->port < 0) {
+        return BASE_REOPEN_MS;
+    }
+    if (moving(robot) && now_ms - robot->drive_ms >= BASE_COMMANDER_MS) {
+        stop_commander(robot);
+    }
+    const int64_t heard_ms = robot->frame_ms > robot->opened_ms ? robot->frame_ms : robot->opened_ms;
+    if (now_ms - heard_ms >= BASE_SILENCE_MS) {
+        restart_stream(robot, now_ms);
+        return BASE_SILENCE_MS;
+    }
+    const int64_t silence_ms = heard_ms + BASE_SILENCE_MS - now_ms;
+    const int64_t commander_ms = moving(robot) ? robot->drive_ms + BASE_COMMANDER_MS - now_ms : silence_ms;
+    return (int)(commander_ms < silence_ms ? commander_ms : silence_ms);
+}
+
+void base_robot_end(struct base_robot *robot)
+{
+    uint8_t bytes[CREATE_COMMAND_BYTES];
+    if (base_robot_stop(robot) && order(robot, bytes, create_put_pause(bytes)) &&
+        order_opcode(robot, CREATE_OI_OP_START)) {
+        close(robot->port);
+    }
+    robot->port = -1;
+}

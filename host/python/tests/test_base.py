@@ -1,0 +1,359 @@
+"""whisker-base and its client against a scripted base: orders, odometry, and what makes wheels stop.
+
+No test waits by the clock: each waits for bytes on the line, for an answer, or for the end of a process.
+"""
+
+import math
+import os
+import signal
+import subprocess
+import sys
+
+import pytest
+from createpeer import DRIVE, FULL, PAUSE, SAFE, START, STOP, STREAM, Driver, drive_order
+
+from whisker import base
+from whisker.base import BaseError, BaseLost
+from whisker.bridgesim import program
+
+ENDED = STOP + bytes([PAUSE, 0, START])  # last words: stopped, silent, passive
+
+
+@pytest.fixture
+def start(tmp_path):
+    """Starts whisker-base with options; it is up to date with its base when this returns."""
+    drivers = []
+
+    def begin(*options, mode=SAFE):
+        driver = Driver(tmp_path, *options)
+        drivers.append(driver)
+        assert driver.peer.await_start(mode).endswith(STOP)
+        return driver
+
+    yield begin
+    for driver in drivers:
+        driver.close()
+
+
+def await_frame(client, driver, **values):
+    """Sends one frame and waits until the driver has taken it."""
+    client.odometry(after=driver.peer.tell(driver.peer.frame(**values)))
+
+
+def test_starts_stopped_and_ends_stopped_passive_and_gone(start):
+    driver = start()
+    assert {7, 9, 12, 19, 20, 35, 41, 42} <= set(driver.peer.asked)
+    assert 43 not in driver.peer.asked
+    with driver.client() as client:
+        client.drive(0.1, 0)
+        driver.peer.await_order(drive_order(100, 100))
+        assert driver.end() == 0
+        assert driver.peer.await_order(ENDED) == b""
+        with pytest.raises(BaseLost, match="whisker-base has gone"):
+            client.health()
+    assert not driver.socket.exists()
+
+
+def test_create_2_is_asked_for_encoders_and_full_mode_is_entered(start):
+    driver = start("--model", "2", "--mode", "full", mode=FULL)
+    assert driver.peer.asked[-2:] == [43, 44]
+
+
+def test_drive_says_what_the_wheels_really_do(start):
+    driver = start("--model", "2", "--clock", "stream")
+    with driver.client() as client:
+        started = client.stop()
+        sent = client.drive(0, math.pi / 24)
+        driver.peer.await_order(STOP + drive_order(-29, 29))
+        assert sent.byte_count == started.byte_count + len(STOP)
+        assert sent.v_m_s == 0
+        assert sent.omega_rad_s == pytest.approx(2 * 0.0285 / 0.235)
+        health = client.health()
+        assert (health["left_mm_s"], health["right_mm_s"]) == ("-29", "29")
+
+
+def test_odometry_is_of_the_frames_up_to_a_byte_and_of_each_client(start):
+    driver = start("--clock", "stream", "--odometry", "reported")
+    peer = driver.peer
+    with driver.client() as client, driver.client() as other:
+        assert client.odometry(after=0).bits & base.IDLE  # no frame has come
+        one = peer.tell(peer.frame(p19=20))
+        two = peer.tell(peer.frame(p19=30, p7=base.BUMP_LEFT, p9=1))
+        first = client.odometry(after=one)
+        assert (first.x_m, first.y_m, first.theta_rad) == (0.02, 0, 0)
+        assert first.covariance[0][0] == pytest.approx(0.001**2 + 2 * 0.001**2 / 12)
+        second = client.odometry(after=two)
+        assert second.x_m == 0.03
+        assert second.bits == base.BUMP_LEFT | base.CLIFF_LEFT
+        assert other.odometry().x_m == pytest.approx(0.05)
+        peer.tell(peer.frame(p20=90))
+        third = client.odometry(after=peer.told)
+        assert third.theta_rad == pytest.approx(math.pi / 2)
+        assert client.health()["frames"] == "3"
+
+
+def test_nothing_is_taken_beyond_what_a_client_asks_for(start):
+    driver = start("--clock", "stream", "--odometry", "reported")
+    peer = driver.peer
+    with driver.client() as client:
+        client.odometry(after=0)
+        one = peer.tell(peer.frame(p19=20))
+        peer.tell(peer.frame(p19=30))
+        assert client.odometry(after=one).x_m == 0.02
+        assert client.odometry().x_m == 0
+        assert client.health()["bytes"] == str(one)
+
+
+def test_damaged_bytes_cost_one_frame_and_are_counted(start):
+    driver = start("--clock", "stream")
+    peer = driver.peer
+    with driver.client() as client:
+        frame = peer.frame()
+        peer.tell(frame + frame[:9] + frame[10:] + frame)
+        client.odometry(after=peer.told)
+        health = client.health()
+    assert {key: health[key] for key in ("frames", "corrupt", "skipped", "resyncs", "missed")} == {
+        "frames": "2",
+        "corrupt": "1",
+        "skipped": str(len(frame) - 1),
+        "resyncs": "1",
+        "missed": "1",
+    }
+
+
+# ---------------------------------------------------------------------------------------------------- what stops wheels
+
+COMMANDER = """
+import sys
+from whisker.base import Base
+base = Base(sys.argv[1])
+while True:
+    base.drive(0.2, 0)
+"""
+
+
+def test_a_killed_commander_stops_the_wheels(start):
+    driver = start()
+    commander = subprocess.Popen([sys.executable, "-c", COMMANDER, str(driver.socket)])
+    driver.peer.await_order(drive_order(200, 200))
+    commander.kill()
+    commander.wait()
+    driver.peer.await_order(STOP)
+
+
+def test_a_silent_commander_stops_the_wheels(start):
+    driver = start()
+    with driver.client() as client:
+        client.drive(0.2, 0)
+        driver.peer.await_order(drive_order(200, 200))
+        driver.peer.await_order(STOP)
+        assert client.health()["commander_stops"] == "1"
+        assert client.drive(0.1, 0).v_m_s == 0.1  # and drives on when it is back
+        driver.peer.await_order(drive_order(100, 100))
+
+
+def test_by_the_streams_clock_a_silent_commander_has_twenty_frames(start):
+    driver = start("--clock", "stream")
+    peer = driver.peer
+    with driver.client() as client:
+        before = client.drive(0.2, 0)
+        peer.tell(peer.frame() * 19)
+        client.odometry(after=peer.told)
+        assert client.health()["commander_stops"] == "0"
+        peer.tell(peer.frame())
+        client.odometry(after=peer.told)
+        assert client.health()["commander_stops"] == "1"
+        assert client.stop().byte_count == before.byte_count + 2 * len(STOP)
+        peer.tell(peer.frame() * 40)  # wheels that stand are not stopped again
+        client.odometry(after=peer.told)
+        assert client.health()["commander_stops"] == "1"
+
+
+def test_a_killed_driver_stops_the_wheels_and_another_takes_over(start):
+    driver = start("--clock", "stream")
+    with driver.client() as client:
+        client.drive(0.2, 0)
+        driver.peer.await_order(drive_order(200, 200))
+        os.kill(int(client.health()["driver_pid"]), signal.SIGKILL)
+        driver.peer.await_order(STOP)
+        with pytest.raises(BaseLost):
+            client.health()
+    driver.peer.await_start()
+    with driver.client() as client:
+        assert client.health()["restarts"] == "1"
+        client.drive(0.1, 0)
+        driver.peer.await_order(drive_order(100, 100))
+
+
+def test_a_driver_that_hangs_is_replaced(start):
+    driver = start()
+    with driver.client() as client:
+        client.drive(0.2, 0)
+        driver.peer.await_order(drive_order(200, 200))
+        os.kill(int(client.health()["driver_pid"]), signal.SIGSTOP)
+        driver.peer.await_order(STOP)
+        driver.peer.await_start()
+    with driver.client() as client:
+        assert client.health()["restarts"] == "1"
+
+
+def test_a_killed_guard_stops_the_wheels_and_ends_the_driver(start):
+    driver = start("--clock", "stream")
+    with driver.client() as client:
+        client.drive(0.2, 0)
+        driver.peer.await_order(drive_order(200, 200))
+        assert driver.end(signal.SIGKILL) == -signal.SIGKILL
+        assert driver.peer.await_order(ENDED) == b""
+        with pytest.raises(BaseLost):
+            client.health()
+    # what it left behind is no hindrance to the next one
+    again = Driver.__new__(Driver)
+    again.__dict__.update(driver.__dict__)
+    words = [program("whisker-base"), "--port", str(driver.peer.link), "--socket", str(driver.socket)]
+    again.process = subprocess.Popen(words)
+    driver.peer.await_start()
+    assert again.end() == 0
+
+
+def test_a_base_that_leaves_its_mode_waits_for_its_commander(start):
+    driver = start("--clock", "stream")
+    with driver.client() as client:
+        client.drive(0.2, 0)
+        await_frame(client, driver)
+        assert client.odometry().bits == 0
+        await_frame(client, driver, p35=1, p10=1)
+        health = client.health()
+        assert (health["mode"], health["mode_losses"], health["left_mm_s"]) == ("passive", "1", "0")
+        assert client.odometry().bits == base.IDLE | base.CLIFF_FRONT_LEFT
+        driver.peer.await_order(drive_order(200, 200))
+        client.mode("safe")
+        assert driver.peer.await_order(STOP + bytes([SAFE])) == b""  # nothing was sent before it was asked for
+        await_frame(client, driver)
+        assert client.health()["mode"] == "safe"
+    assert "has left its mode: a cliff" in driver.log.read_text()
+
+
+def test_a_line_that_goes_and_comes_back(start):
+    driver = start()
+    with driver.client() as client:
+        client.drive(0.2, 0)
+        driver.peer.await_order(drive_order(200, 200))
+        driver.peer.vanish()
+        driver.peer.come_back()
+        assert driver.peer.await_start().endswith(STOP)
+        health = client.health()
+        assert (health["reconnects"], health["port"], health["left_mm_s"]) == ("1", "open", "0")
+        client.drive(0.1, 0)
+        driver.peer.await_order(drive_order(100, 100))
+    assert driver.log.read_text().count("plug it in again") == 1
+
+
+def test_without_a_line_orders_say_so(start):
+    driver = start("--clock", "stream")
+    with driver.client() as client:
+        await_frame(client, driver)
+        driver.peer.vanish()
+        while client.health()["port"] == "open":
+            pass
+        assert client.drive(0.1, 0).byte_count == 0
+        assert client.odometry().bits & base.IDLE
+        assert client.odometry(after=10**9).x_m == 0  # nothing more will come: answered at once
+        driver.peer.come_back()
+
+
+def test_a_silent_line_is_asked_for_its_stream_again(start):
+    driver = start()
+    with driver.client() as client:
+        driver.peer.tell(driver.peer.frame())
+        assert driver.peer.await_start().endswith(STOP)
+        assert int(client.health()["silences"]) >= 1
+
+
+def test_a_silent_line_is_not_put_back_into_a_mode_that_it_left(start):
+    driver = start()
+    driver.peer.tell(driver.peer.frame() + driver.peer.frame(p35=1, p9=1))
+    assert driver.peer.await_order(bytes([START, STREAM])).endswith(STOP)
+
+
+def test_a_low_battery_is_told_once(start):
+    driver = start("--clock", "stream")
+    with driver.client() as client:
+        await_frame(client, driver)
+        assert client.health()["low_battery"] == "0"
+        await_frame(client, driver, p25=200)
+        await_frame(client, driver, p25=200)
+        assert client.health()["low_battery"] == "1"
+    assert driver.log.read_text().count("the battery is low: 14500 mV, 200 of 2700 mAh; charge it") == 1
+
+
+# --------------------------------------------------------------------------------------------------- clients and people
+
+
+def test_one_commands_and_everybody_may_stop(start):
+    driver = start("--clock", "stream")
+    with driver.client() as observer:
+        with driver.client() as commander:
+            commander.drive(0.2, 0)
+            with pytest.raises(BaseError, match="another client commands"):
+                observer.drive(0.1, 0)
+            with pytest.raises(BaseError, match="another client commands"):
+                observer.mode("full")
+            observer.stop()
+            driver.peer.await_order(drive_order(200, 200) + STOP)
+        driver.peer.await_order(STOP)  # the commander has gone
+        assert observer.health()["commander"] == "0"
+        observer.drive(0.1, 0)
+        driver.peer.await_order(drive_order(100, 100))
+
+
+def test_messages_that_are_none_are_refused(start):
+    driver = start("--clock", "stream")
+    with driver.client() as client:
+        for message in ("drive 1", "drive nan 0", "drive 1 2 3", "hello", "mode sleepy", "odometry after x", "drive"):
+            with pytest.raises(BaseError, match="say: "):
+                client._ask(message, "sent", None)
+
+
+def refused(*words) -> tuple[int, str]:
+    done = subprocess.run([program("whisker-base"), *map(str, words)], capture_output=True, text=True)
+    assert done.stderr.count("\n") == 1, done.stderr
+    return done.returncode, done.stderr
+
+
+def test_wrong_use_is_told_in_one_line(tmp_path):
+    socket = tmp_path / "s"
+    for words, expected in (
+        (["--socket", socket], "--port PATH is missing"),
+        (["--port", "p", "--socket", "s", "--model", "3"], "--model 3: give 1 or 2"),
+        (["--port", "p", "--socket", "s", "--baud", "57601"], "--baud 57601: give 57600"),
+        (["--port", "p", "--socket", "s", "--odometry", "encoders"], "a Create 1 has no encoders"),
+        (["--port", "p", "--socket", "s", "--wheel-base", "-1"], "--wheel-base -1: give a positive number"),
+        (["--port", "p", "--socket", "s", "more"], "a word too many"),
+    ):
+        code, text = refused(*words)
+        assert (code, expected in text) == (2, True), text
+    for port, expected in ((tmp_path / "none", "plug the adapter in"), ("/dev/null", "it is no serial port")):
+        code, text = refused("--port", port, "--socket", socket)
+        assert (code, expected in text) == (1, True), text
+    code, text = refused("--port", "/dev/null", "--socket", "/nowhere/s")
+    assert (code, "choose a path that can be written" in text) == (1, True), text
+
+
+def test_two_drivers_do_not_share_a_base(start, tmp_path):
+    driver = start()
+    code, text = refused("--port", driver.peer.link, "--socket", tmp_path / "other")
+    assert (code, "another process drives it" in text) == (1, True), text
+    code, text = refused("--port", driver.peer.link, "--socket", driver.socket)
+    assert (code, "stop the whisker-base that has it" in text) == (1, True), text
+
+
+def test_help_has_examples():
+    done = subprocess.run([program("whisker-base"), "--help"], capture_output=True, text=True)
+    assert done.returncode == 0
+    assert done.stdout.count("Example: whisker-base --port") == 2
+    assert str(DRIVE) not in done.stdout
+
+
+def test_a_client_without_a_driver_says_what_to_start(tmp_path):
+    with pytest.raises(BaseLost, match="start whisker-base"):
+        base.Base(str(tmp_path / "none"))
