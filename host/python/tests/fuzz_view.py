@@ -1,4 +1,5 @@
-"""Random and mutated input for a running whisker-view: it must go on serving, cost no more memory and log nothing.
+"""Random and mutated input for a running whisker-view, from pages and from the robot: it must go on serving, cost no more
+memory and log nothing.
 
 python host/python/tests/fuzz_view.py --inputs 200000 --seed 1
 """
@@ -8,6 +9,7 @@ import logging
 import sys
 
 from test_view_http import fuzz
+from test_view_robot import fuzz_robot
 
 
 class Kept(logging.Handler):
@@ -29,7 +31,11 @@ def main() -> int:
     logged = Kept()
     logging.getLogger().addHandler(logged)
     fuzz(options.inputs, options.seed)
-    print("\n".join(logged.lines) or f"{options.inputs} inputs: still serving, nothing logged")
+    refused = fuzz_robot(options.inputs, options.seed)
+    print(
+        "\n".join(logged.lines)
+        or f"{options.inputs} inputs of pages, {options.inputs} of the robot ({refused} refused): still serving, nothing logged"
+    )
     return 1 if logged.lines else 0
 
 

@@ -51,6 +51,7 @@ ARENA = Arena(
     ((0.5, 1.5, 1.0, 2.0), (1.5, 1.0, 2.0, 1.5), (0.5, 0.0, 1.0, 0.5)),
 )
 SCENE = Scene(ARENA, make_robot())
+DOINGS = (("FORWARD", "the way ahead is free"), ("TURN", "the whisk is over"), ("FORWARD", "turned far enough"))
 ROUTE = [(0.25, 0.25), (0.25, 1.2), (1.325, 1.2), (1.25, 1.25), (1.25, 2.325), (2.325, 2.25), (2.25, 0.4), (1.4, 0.3)]
 SPEED_M_S = 0.12
 REST_S = 1.0
@@ -134,8 +135,8 @@ class MadeUpRun:
         if row % 10 == 0:
             told += [(f"health/{name}", self.health(name, row)) for name in ("pilot", "navigator")]
         if row % 100 == 0:
-            state = ("FORWARD", "WHISK_IN", "TURN")[row // 100 % 3]
-            told.append(("behaviour", Behaviour(Header.at(stamp), state, Time.of(stamp), "the way ahead is free")))
+            doing = DOINGS[row // 100 % len(DOINGS)]
+            told.append(("behaviour", Behaviour(Header.at(stamp), doing[0], Time.of(stamp), doing[1])))
         return told
 
     def observation(self, row: int) -> Observation:

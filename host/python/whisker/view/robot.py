@@ -21,6 +21,7 @@ PROCESSES_MOST = 32
 COUNTERS_MOST = 24
 CELLS_MOST = 512
 TEXT_MOST = 200  # characters of anything told
+COUNTER_TEXT_MOST = 40  # of a counter's name, and of its value
 SILENT_S = 3.0  # a process speaks once a second
 BACK_S = 2.0  # a clock that goes back so far has begun anew
 EXPECTED = ("pilot", "navigator")  # shown as not heard, until they are
@@ -35,9 +36,9 @@ def real(value, places: int = 3) -> float | None:
     return round(value, places) if math.isfinite(value) else None
 
 
-def text(value: str) -> str:
+def text(value: str, most: int = TEXT_MOST) -> str:
     """One line of bounded length."""
-    return " ".join(value[: 2 * TEXT_MOST].split())[:TEXT_MOST]
+    return " ".join(value[: 2 * most].split())[:most]
 
 
 def placed(pose) -> dict | None:
@@ -214,7 +215,8 @@ class RobotModel:
         if process.heard is not None and process.pid != told.pid:
             process.restarts += 1
         process.pid, process.state, process.error = told.pid, text(told.state), text(told.last_error)
-        process.counters = {text(p.key): text(p.value) for p in told.counters[:COUNTERS_MOST]}
+        pairs = told.counters[:COUNTERS_MOST]
+        process.counters = {text(p.key, COUNTER_TEXT_MOST): text(p.value, COUNTER_TEXT_MOST) for p in pairs}
         process.heard, process.ended = self._clock(), False
 
     def _take_end(self, name: str, told) -> None:

@@ -39,7 +39,7 @@ class Belief {
     for (let at = 0; at < p.length; at += POSE) visit(p[at], p[at + 1], p[at + 2], p[at + 3], p[at + 4], p[at + 5]);
   }
 
-  /* Weight by square (edge in m) and heading sector. */
+  /* [weight, weight x, weight y, weight distance² from the origin] by square (edge in m) and heading sector. */
   bin(edge, sectors) {
     const bins = new Map();
     this.each((x, y, theta, weight, wide, turn) => {
@@ -48,7 +48,9 @@ class Belief {
       const share = bell(turn, (2 * Math.PI) / sectors, sectors / 2 - 1);
       share.forEach((part, n) => {
         const key = keyOf(i, j, (((middle + n - (share.length - 1) / 2) % sectors) + sectors) % sectors);
-        bins.set(key, (bins.get(key) ?? 0) + weight * part);
+        const held = bins.get(key) ?? [0, 0, 0, 0];
+        [weight, weight * x, weight * y, weight * (x * x + y * y + 2 * wide * wide)].forEach((value, k) => { held[k] += value * part; });
+        bins.set(key, held);
       });
     });
     return bins;
@@ -57,8 +59,8 @@ class Belief {
   /* Places, heaviest first: { share, x, y, spread } of neighbouring bins taken together. */
   gather() {
     const bins = this.bin(MODE_M, MODE_SECTORS);
-    const edge = MODE_EDGE * [...bins.values()].reduce((a, b) => Math.max(a, b));
-    const left = new Map([...bins].filter(([, weight]) => weight >= edge));
+    const edge = MODE_EDGE * [...bins.values()].reduce((most, held) => Math.max(most, held[0]), 0);
+    const left = new Map([...bins].filter(([, held]) => held[0] >= edge));
     const modes = [];
     while (left.size) modes.push(this.flood(left));
     return modes.filter((mode) => mode.share >= MODE_LEAST).sort((a, b) => b.share - a.share);
@@ -70,15 +72,14 @@ class Belief {
     const sum = { weight: 0, x: 0, y: 0, square: 0 };
     while (open.length) {
       const key = open.pop();
-      const weight = left.get(key);
-      if (weight === undefined) continue;
+      const held = left.get(key);
+      if (!held) continue;
       left.delete(key);
       const [i, j, sector] = placeOf(key);
-      const [x, y] = [(i + 0.5) * MODE_M, (j + 0.5) * MODE_M];
-      sum.weight += weight;
-      sum.x += weight * x;
-      sum.y += weight * y;
-      sum.square += weight * (x * x + y * y);
+      sum.weight += held[0];
+      sum.x += held[1];
+      sum.y += held[2];
+      sum.square += held[3];
       for (const di of [-1, 0, 1]) for (const dj of [-1, 0, 1]) for (const turn of [-1, 0, 1]) open.push(keyOf(i + di, j + dj, (sector + turn + MODE_SECTORS) % MODE_SECTORS));
     }
     const [x, y] = [sum.x / sum.weight, sum.y / sum.weight];
@@ -117,16 +118,15 @@ class Belief {
     this.image.getContext('2d').putImageData(image, 0, 0);
   }
 
-  /* Arrows from the middle of a square, each as long as its direction weighs. */
+  /* Arrows from where the poses of a square gather, each as long as its direction weighs. */
   drawHeadings(plan, pen) {
     if (!this.weight) return;
-    const bins = [...this.roses].sort((a, b) => b[1] - a[1]);
-    const most = bins[0][1];
-    for (const [key, weight] of bins.slice(0, ARROWS_MOST)) {
+    const bins = [...this.roses].sort((a, b) => b[1][0] - a[1][0]);
+    const most = bins[0][1][0];
+    for (const [key, [weight, x, y]] of bins.slice(0, ARROWS_MOST)) {
       if (weight < ARROW_LEAST * most) break;
-      const [i, j, sector] = placeOf(key);
-      const place = [plan.x((i + 0.5) * ROSE_M), plan.y((j + 0.5) * ROSE_M)];
-      this.arrow(plan, pen, place, (2 * Math.PI * sector) / SECTORS, 0.9 * ROSE_M * plan.scale * Math.sqrt(weight / most));
+      const theta = (2 * Math.PI * placeOf(key)[2]) / SECTORS;
+      this.arrow(plan, pen, [plan.x(x / weight), plan.y(y / weight)], theta, 0.9 * ROSE_M * plan.scale * Math.sqrt(weight / most));
     }
   }
 

@@ -195,7 +195,7 @@ addEventListener('keydown', (event) => {
     if (columns) { traces.step(columns * (event.shiftKey ? 20 : 1)); event.preventDefault(); }
     return;
   }
-  const typing = event.target.matches('select, input') || (event.key === ' ' && event.target.matches('button'));
+  const typing = event.target.matches('select') || (event.key === ' ' && event.target.matches('button, input'));
   if (typing || !KEYS[event.key]) return;
   event.preventDefault();
   KEYS[event.key]();

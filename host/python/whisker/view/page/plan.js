@@ -1,5 +1,5 @@
 /* The plan: metres to pixels, the floor by texture, obstacles, axes and a scale bar; drawn anew for a size, theme or scene. */
-const PLAN = { left: 34, foot: 44, edge: 10, head: 170, least: 260 }; // px around the floor; of the window above it; least height
+const PLAN = { left: 34, foot: 44, edge: 16, head: 170, least: 260 }; // px around the floor; of the window above it; least height
 const STRIPE = 9; // px from one line or dot of a pattern to the next
 const PATTERNS = [ // told apart by shape, so that grey will do
   () => {},

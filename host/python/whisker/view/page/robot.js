@@ -14,7 +14,7 @@ class RobotPart {
     this.wire = wire;
     wire.on('scene', (scene) => this.showScene(scene));
     wire.on('robot', (word) => this.take(word));
-    wire.on('belief', (message) => { this.world.belief.take(message); this.redraw(); });
+    wire.on('belief', (message) => this.takeBelief(message));
     this.note(robotAdvice(null));
   }
 
@@ -63,6 +63,12 @@ class RobotPart {
     world.stale = (word.ages.pose ?? 0) > AGED_S;
     this.plan.fit([...world.path, ...world.truth].map((point) => [point[1], point[2]]));
     this.tell(word);
+    this.redraw();
+  }
+
+  takeBelief(message) {
+    this.world.belief.take(message);
+    if (this.world.word) this.tell(this.world.word);
     this.redraw();
   }
 

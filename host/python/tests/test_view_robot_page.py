@@ -1,0 +1,301 @@
+"""The robot's part of whisker-view in headless Chromium: what a person sees is what the messages told, and no more.
+
+WHISKER_PICTURES=1 also writes docs/pictures/robot*.png.
+"""
+
+import asyncio
+import os
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+import chromium
+import pytest
+from viewrobot import ARENA, SCENE, MadeUpRun, Post, belief_message, estimate, robot_view, route
+
+from whisker.robot.messages import Behaviour, Header, KeyValue, ProcessHealth, Time
+from whisker.view.hub import Hub
+from whisker.view.robot import SILENT_S
+from whisker.view.server import serving
+
+pytestmark = pytest.mark.skipif(chromium.PROGRAM is None, reason="chromium is not installed (apt install chromium)")
+
+PICTURES = Path(__file__).resolve().parents[3] / "docs/pictures"
+ROWS = 255  # of a run that has two contacts and a belief of two places
+DRAWN = "robotPart.drawn > 1 && robotPart.world.belief.poses && robotPart.world.word"
+# Whether a line of this colour (#rrggbb) runs within 4 px of a place (m) of the plan.
+SEEN = """(() => {
+  const plan = robotPart.plan, n = 4, wanted = pixelOf('COLOUR') & 0xffffff;
+  const pen = plan.live.getContext('2d');
+  const px = new Uint32Array(pen.getImageData(Math.round(plan.x({X})) - n, Math.round(plan.y({Y})) - n, 2 * n + 1, 2 * n + 1).data.buffer);
+  return px.some((p) => (p & 0xffffff) === wanted && p >>> 24 > 200);
+})()"""
+# How strong the belief's image is at a place, 0 to 255.
+DENSITY = """(() => {
+  const { image } = robotPart.world.belief, [x0, y0, x1, y1] = robotPart.plan.bounds;
+  const at = [Math.floor(({X} - x0) / (x1 - x0) * image.width), Math.floor((y1 - {Y}) / (y1 - y0) * image.height)];
+  return image.getContext('2d').getImageData(...at, 1, 1).data[3];
+})()"""
+# Mean and spread of the brightness of a tile's middle, as grey.
+GREY = """(() => {
+  const plan = robotPart.plan, n = 36;
+  const d = plan.floor.getContext('2d').getImageData(Math.round(plan.x({X})), Math.round(plan.y({Y})), n, n).data;
+  const rows = Array.from({ length: n }, (_, y) => Array.from({ length: n }, (_, x) => d[4 * (y * n + x) + 3] / 255));
+  const sum = (list) => list.reduce((a, b) => a + b, 0);
+  return [sum(rows.map(sum)) / n / n, Math.max(...rows.map(sum)) / n];
+})()"""
+
+
+def place(script: str, x: float, y: float, colour: str = "") -> str:
+    """A script about a place."""
+    return script.replace("{X}", str(x)).replace("{Y}", str(y)).replace("COLOUR", colour)
+
+
+@asynccontextmanager
+async def looking_at(post: Post, theme: str = "light", size=(1280, 900), **view):
+    """The page on a server that shows this robot; gives browser and hub."""
+    async with robot_view(post, **view) as (port, hub), chromium.browser() as b:
+        await b.look(f"http://127.0.0.1:{port}/#theme={theme}", *size)
+        yield b, hub
+        assert b.troubles == []
+
+
+@asynccontextmanager
+async def going_on(post: Post, run: MadeUpRun, row: int):
+    """While this lasts, rows come, ten a second."""
+
+    async def send_for_ever():
+        now = row
+        while True:
+            for topic, message in run.messages(now):
+                post.put(topic, message)
+            now += 1
+            await asyncio.sleep(0.1)
+
+    task = asyncio.create_task(send_for_ever())
+    yield
+    task.cancel()
+
+
+async def colour(b, name: str) -> str:
+    return await b.eval(f"robotPart.plan.css('{name}')")
+
+
+def test_what_is_not_known_is_said_to_be_not_known():
+    async def scenario():
+        async with looking_at(Post(), scene=None) as (b, _):
+            said = await b.until("!$('robot-note').hidden && robotPart.world.word && $('robot-note').innerText")
+            assert "Nothing has been heard of the robot “robot” yet" in said
+            pose = await b.text("#pose")
+            assert pose.count("not known") == 7 and "never" in pose and not any(c.isdigit() for c in pose.split("σ")[1])
+            assert "arena not known" in await b.text("#scene")
+            assert "not known: no word has come" in await b.text("#behaviour")
+            rows = await b.text("#rows")
+            assert "not known: no row has come" in rows and "not known" in rows.split("navigator")[1]
+            assert "none has come" in await b.text("#contacts")
+            assert (await b.text("#processes")).count("never heard") == 2
+            assert (
+                await b.eval(
+                    "[...document.querySelectorAll('.keys label')].filter((l) => l.innerText.includes('not known')).length"
+                )
+                == 4
+            )
+            await b.until("robotPart.drawn")
+            empty = "!new Uint32Array(robotPart.plan.live.getContext('2d').getImageData(0, 0, robotPart.plan.live.width, robotPart.plan.live.height).data.buffer).some((p) => p)"
+            assert await b.eval(empty), "something is drawn that nobody told"
+
+    asyncio.run(scenario())
+
+
+def test_without_a_robot_the_page_is_that_of_the_rings_and_says_how_to_get_one():
+    async def scenario():
+        async with serving(Hub(["whisker-test-none"]), "127.0.0.1", 0, []) as port, chromium.browser() as b:
+            await b.look(f"http://127.0.0.1:{port}/")
+            await b.until("linked")
+            assert await b.eval("document.body.dataset.part") == "traces"
+            await b.press("r")
+            assert "whisker-view --robot NAME --scene SCENE" in await b.until(
+                "robotPart.world.word && $('robot-note').innerText"
+            )
+            await b.press("w")
+            assert await b.eval("!$('robot-part').checkVisibility() && $('plot').checkVisibility()")
+            assert b.troubles == []
+
+    asyncio.run(scenario())
+
+
+def test_the_plan_shows_estimate_truth_and_belief_where_they_were_told_to_be():
+    run = MadeUpRun(skip={100, 101})
+
+    async def scenario():
+        async with looking_at(Post(), run=run, rows=ROWS) as (b, _):
+            await b.until(DRAWN)
+            blue, orange = await colour(b, "--alpha"), await colour(b, "--beta")
+            for t_s in (5.0, 8.0, 16.0):
+                assert await b.eval(place(SEEN, *estimate(t_s)[:2], blue)), f"no estimated path at {t_s} s"
+            dashes = [await b.eval(place(SEEN, *route(t_s)[:2], orange)) for t_s in (2.0, 2.3, 2.6, 2.9, 3.2, 3.5)]
+            assert any(dashes), "no true path"
+            x, y, _ = estimate((ROWS - 1) / 10)
+            assert await b.eval(place(SEEN, x, y - SCENE.robot.body_radius_m, blue)), "no outline of the robot"
+            here, there = run.belief(ROWS - 5), (0.28 + 0.2 * y, 0.9 + 0.1 * x)
+            assert here.weight.sum() == pytest.approx(1.0)
+            strong, faint = await b.eval(place(DENSITY, x, y)), await b.eval(place(DENSITY, *there))
+            assert strong > faint > 20, "both places must be seen"
+            assert await b.eval(place(DENSITY, 2.3, 0.3)) == 0
+            shares = await b.eval("robotPart.world.belief.modes.map((m) => m.share)")
+            assert len(shares) == 2 and shares[0] > 0.65 and shares[1] > 0.1
+            assert "in 2 places" in await b.text("#pose")
+            await b.click("#layer-estimate")
+            await b.until(f"!{place(SEEN, *estimate(5.0)[:2], blue)}")
+
+    asyncio.run(scenario())
+
+
+def test_textures_are_told_apart_in_grey():
+    async def scenario():
+        async with looking_at(Post()) as (b, _):
+            await b.until("robotPart.scene?.arena && robotPart.plan.scale")
+            found = {}
+            for name in ARENA.textures:
+                row = next(n for n, letters in enumerate(ARENA.floor) if name[0] in letters)
+                x, y = ARENA.floor[row].index(name[0]) * 0.5 + 0.15, 2.5 - row * 0.5 - 0.15
+                found[name] = await b.eval(place(GREY, x, y))
+            assert found["VINYL"][0] < 0.02 < found["SMOOTH"][0] < found["ROUGH"][0]
+            assert found["SMOOTH"][1] > 1.5 * found["SMOOTH"][0], "dots stand in rows, lines do not"
+            assert await b.text("#textures") == "V VINYL\nS SMOOTH\nR ROUGH"
+
+    asyncio.run(scenario())
+
+
+def test_words_are_those_of_the_messages():
+    async def scenario():
+        post = Post()
+        async with looking_at(post, run=MadeUpRun(skip={100, 101}), rows=ROWS) as (b, hub):
+            hub.robot.take("behaviour", Behaviour(Header.at(0), "WHISK_IN", Time.of(20 * 10**9), "contact at <b>2</b>"))
+            fault = ProcessHealth(Header.at(0), "bag", 99, "waiting", [KeyValue("bytes_written", "12")], "disk full")
+            hub.robot.take("health/bag", fault)
+            await b.until(DRAWN)
+            await b.until("$('processes').innerText.includes('bag')")
+            doing = await b.text("#behaviour")
+            assert "whisk in" in doing and "contact at <b>2</b>" in doing and "5.4 s" in doing
+            processes = await b.text("#processes")
+            assert (
+                "bytes written 12" in processes and "last error: disk full" in processes and "process 99" in processes
+            )
+            rows = await b.text("#rows")
+            assert "254, exploring" in rows and [line for line in rows.splitlines() if line == "2"] == ["2", "2"]
+            pose = await b.text("#pose")
+            x, y, _ = estimate((ROWS - 1) / 10)
+            assert f"x {x:.2f} m, y {y:.2f} m" in pose and "adaptive, from row 0, prior scene" in pose
+            bars = await b.eval(
+                "[...document.querySelectorAll('#cells .best')].map((e) => e.closest('li').querySelector('.what').innerText)"
+            )
+            tips = {tip["name"]: max(tip["loglik"], key=lambda pair: pair[1])[0] for tip in hub.robot.row["tips"]}
+            assert bars == list(tips.values())
+            contacts = (await b.text("#contacts")).splitlines()
+            assert len(contacts) == len(hub.robot.contacts) and "face" in contacts[0] and "±" in contacts[0]
+
+    asyncio.run(scenario())
+
+
+def test_a_process_that_fell_silent_and_a_robot_that_is_gone_are_shown_as_such():
+    async def scenario():
+        post = Post()
+        async with looking_at(post, rows=50) as (b, hub):
+            await b.until(DRAWN)
+            assert await b.eval("$('robot-state').dataset.state") == "live"
+            clock = hub.robot._clock
+            hub.robot._clock = lambda: clock() + SILENT_S + 2
+            said = await b.until("!$('robot-note').hidden && $('robot-note').innerText")
+            assert "Nothing heard of the robot" in said and "how it last was" in said
+            assert (await b.text("#processes")).count("▲ silent for") == 2
+            assert await b.eval("$('robot-state').dataset.state") == "stalled" and await b.eval("robotPart.world.stale")
+            for topic, message in MadeUpRun().messages(50):
+                post.put(topic, message)
+            await b.until("$('robot-note').hidden && $('robot-state').dataset.state === 'live'")
+            assert "▲" not in await b.text("#processes")
+
+    asyncio.run(scenario())
+
+
+def test_a_new_run_begins_with_a_clean_plan_and_whisker_view_may_go_and_come():
+    async def scenario():
+        post = Post()
+        async with chromium.browser() as b:
+            async with robot_view(post, rows=80) as (port, hub):
+                await b.look(f"http://127.0.0.1:{port}/")
+                await b.until("robotPart.world.path.length === 80")
+                post.play(MadeUpRun(), range(3), hub.robot)
+                await b.until("robotPart.world.path.length === 3 && robotPart.world.truth.length === 3")
+            await b.until("$('robot-state').dataset.state === 'gone' && !$('banner').hidden")
+            async with serving(hub, "127.0.0.1", port, []):
+                await b.until("$('robot-state').dataset.state !== 'gone' && robotPart.world.path.length === 3")
+
+    asyncio.run(scenario())
+
+
+def test_a_belief_that_knows_nothing_is_one_wide_place():
+    async def scenario():
+        async with looking_at(Post()) as (b, hub):
+            everywhere = [(1 / 25, 0.25 + 0.5 * (n % 5), 0.25 + 0.5 * (n // 5), n, 0.15) for n in range(25)]
+            hub.robot.take("belief", belief_message(0, everywhere, number=2000, mass=0.9))
+            await b.until("robotPart.world.belief.poses")
+            said = await b.eval("robotPart.world.belief.said()")
+            assert said.startswith("2\u202f000 poses in") and "10 % too light to be sent" in said
+            widest = await b.eval("Math.max(...robotPart.world.belief.modes.map((m) => m.spread), 0)")
+            scattered = 1 - await b.eval("robotPart.world.belief.modes.reduce((a, m) => a + m.share, 0)")
+            assert widest > 0.4 or scattered > 0.5, "must not look like a robot that knows where it is"
+
+    asyncio.run(scenario())
+
+
+def test_the_part_is_used_by_keyboard_and_fits_a_phone():
+    async def scenario():
+        async with looking_at(Post(), size=(390, 844), rows=60) as (b, _):
+            await b.until(DRAWN)
+            assert await b.eval("document.documentElement.scrollWidth") == 390
+            wanted = set(
+                await b.eval(
+                    "[...document.querySelectorAll('button, select, input')].filter((e) => e.checkVisibility()).map((e) => e.id)"
+                )
+            )
+            seen = set()
+            for _ in range(2 * len(wanted)):
+                await b.press("Tab")
+                seen.add(await b.eval("document.activeElement.id"))
+            assert {"part-robot", "part-traces", "layer-belief"} <= wanted <= seen
+            await b.press("w")
+            assert "part=traces" in await b.eval("location.hash")
+
+    asyncio.run(scenario())
+
+
+@pytest.mark.parametrize(
+    "name, theme, size, grey",
+    [
+        ("robot", "light", (1280, 1380), False),
+        ("robot_dark", "dark", (1280, 1380), False),
+        ("robot_grey", "light", (1280, 1380), True),
+        ("robot_phone", "light", (390, 844), False),
+    ],
+)
+def test_pictures(name, theme, size, grey, tmp_path):
+    """A picture is of a page on which all is known and nothing is cut off; where it is kept, see above."""
+    asked = os.environ.get("WHISKER_PICTURES")
+    if not asked and name != "robot":
+        pytest.skip("WHISKER_PICTURES=1 draws this one too")
+    folder = PICTURES if asked else tmp_path
+
+    async def scenario():
+        post, run = Post(), MadeUpRun(skip={100, 101})
+        async with looking_at(post, theme, size, run=run, rows=ROWS) as (b, _), going_on(post, run, ROWS):
+            if grey:
+                await b.call("Emulation.setEmulatedVisionDeficiency", type="achromatopsia")
+            await b.until(f"{DRAWN} && $('robot-note').hidden && $('robot-state').dataset.state === 'live'")
+            await b.eval("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(true))))")
+            await b.picture(folder / f"{name}.png")
+            assert await b.eval("document.documentElement.scrollWidth") == size[0]
+            assert await b.eval("document.documentElement.dataset.theme") == theme
+            assert "not known" not in await b.text("#robot-part")
+
+    asyncio.run(scenario())
+    assert (folder / f"{name}.png").read_bytes().startswith(b"\x89PNG")
