@@ -44,7 +44,8 @@ uint64_t effect_of_block(uint64_t block)
 
 } // namespace
 
-FollowerServer::FollowerServer(const std::string &path, unsigned expected) : path_(path), expected_(expected)
+FollowerServer::FollowerServer(const std::string &path, unsigned expected, Answer answer)
+    : path_(path), expected_(expected), answer_(answer)
 {
     if (path.empty()) {
         return;
@@ -134,29 +135,53 @@ void FollowerServer::handle(Follower &follower, const std::string &message)
         follower.pilot = true;
     } else if (std::sscanf(message.c_str(), "taken %" SCNu64, &tick) == 1) {
         follower.taken = std::max(follower.taken, tick + 1);
-    } else if (message.compare(0, 6, "drive ") == 0) {
-        handle_drive(follower, message);
+    } else if (message.compare(0, 6, "drive ") == 0 || message.compare(0, 5, "base ") == 0) {
+        handle_answer(follower, message);
     } else if (message == "unplug" || message == "plug") {
         cable_.push_back(message == "plug" ? Cable::PLUG : Cable::UNPLUG);
     } else {
-        throw std::runtime_error("socket: '" + message + "' is none of follow, taken, pilot, drive, unplug, plug");
+        throw std::runtime_error("socket: '" + message +
+                                 "' is none of follow, taken, pilot, drive, base, unplug, plug");
     }
 }
 
-void FollowerServer::handle_drive(Follower &follower, const std::string &message)
+void FollowerServer::handle_answer(Follower &follower, const std::string &message)
+{
+    const uint64_t due = end_of_block(blocks_answered_);
+    const bool sound = answer_ == Answer::BASE ? take_base(message, due) : take_drive(message, due);
+    if (!sound || !follower.pilot) {
+        throw std::runtime_error("socket: '" + message + "', but the pilot's answer due is " +
+                                 (answer_ == Answer::BASE ? "base " : "drive ") + std::to_string(due) +
+                                 (answer_ == Answer::BASE ? " N" : " V OMEGA"));
+    }
+    blocks_answered_++;
+    follower.taken = std::max(follower.taken, due + 1);
+}
+
+bool FollowerServer::take_drive(const std::string &message, uint64_t due)
 {
     uint64_t tick = 0;
     Drive drive{};
-    const uint64_t due = end_of_block(blocks_answered_);
     const int items =
         std::sscanf(message.c_str(), "drive %" SCNu64 " %lf %lf", &tick, &drive.v_m_s, &drive.omega_rad_s);
-    const bool sound = items == 3 && std::isfinite(drive.v_m_s) && std::isfinite(drive.omega_rad_s);
-    if (!sound || !follower.pilot || tick != due) {
-        throw std::runtime_error("socket: '" + message + "', but the pilot's answer due is drive " +
-                                 std::to_string(due) + " V OMEGA");
+    if (items != 3 || tick != due || !std::isfinite(drive.v_m_s) || !std::isfinite(drive.omega_rad_s)) {
+        return false;
     }
-    drives_[effect_of_block(blocks_answered_++)] = drive;
-    follower.taken = std::max(follower.taken, tick + 1);
+    drives_[effect_of_block(blocks_answered_)] = drive;
+    return true;
+}
+
+// The number of bytes never falls.
+bool FollowerServer::take_base(const std::string &message, uint64_t due)
+{
+    uint64_t tick = 0;
+    uint64_t bytes = 0;
+    const int items = std::sscanf(message.c_str(), "base %" SCNu64 " %" SCNu64, &tick, &bytes);
+    if (items != 2 || tick != due || (!bytes_.empty() && bytes < bytes_.rbegin()->second)) {
+        return false;
+    }
+    bytes_[effect_of_block(blocks_answered_)] = bytes;
+    return true;
 }
 
 // A reader that leaves only stops being waited for; without its pilot the run cannot go on.
@@ -198,6 +223,14 @@ void FollowerServer::send_odometry(uint64_t tick, double x_m, double y_m, double
     }
 }
 
+void FollowerServer::send_base(uint64_t tick, uint64_t bytes)
+{
+    const Follower *follower = pilot();
+    if (follower && tick == end_of_block(tick / DECISION_BLOCK)) {
+        send(*follower, "base " + std::to_string(tick) + " " + std::to_string(bytes));
+    }
+}
+
 void FollowerServer::send_end(uint64_t ticks)
 {
     over_ = true;
@@ -236,6 +269,20 @@ std::optional<Drive> FollowerServer::drive_at(uint64_t tick)
     const Drive drive = at->second;
     drives_.erase(at);
     return drive;
+}
+
+std::optional<uint64_t> FollowerServer::bytes_at(uint64_t tick)
+{
+    if (!pilot()) {
+        return std::nullopt;
+    }
+    const auto later = bytes_.upper_bound(tick);
+    if (later == bytes_.begin()) {
+        return 0;
+    }
+    const auto now = std::prev(later);
+    bytes_.erase(bytes_.begin(), now);
+    return now->second;
 }
 
 } // namespace bridge_sim

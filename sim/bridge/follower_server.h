@@ -2,6 +2,9 @@
 // per packet (Unix SOCK_SEQPACKET):
 //   in:  follow NAME | taken T | pilot | drive T V OMEGA | unplug | plug
 //   out: odometry T X Y THETA (to the pilot) | end N (to all)
+// With a Create for a base, whose driver has a port of its own, instead of drive and odometry:
+//   in:  base T N: this answers the block that ends with tick T; the driver had written N bytes to the port by then
+//   out: base T N (to the pilot, after every block): N bytes have been written to the port for the driver to read
 #pragma once
 
 #include <cstdint>
@@ -12,6 +15,8 @@
 #include <vector>
 
 #include <poll.h>
+
+#include "sim_world.h"
 
 namespace bridge_sim
 {
@@ -28,12 +33,15 @@ struct Drive {
     double omega_rad_s;
 };
 
+// What a pilot answers a block with.
+enum class Answer { DRIVE, BASE };
+
 class FollowerServer
 {
   public:
     // Listens at path (empty: nobody follows) and expects this many followers, the pilot among them.
     // Throws std::runtime_error with one line if it cannot.
-    FollowerServer(const std::string &path, unsigned expected);
+    FollowerServer(const std::string &path, unsigned expected, Answer answer);
     ~FollowerServer();
     FollowerServer(const FollowerServer &) = delete;
     FollowerServer &operator=(const FollowerServer &) = delete;
@@ -51,10 +59,15 @@ class FollowerServer
     // The pilot's command that takes effect at this tick, if one does.
     std::optional<Drive> drive_at(uint64_t tick);
 
+    // How many of the bytes that the base's driver wrote have taken effect at this tick; none without a pilot: then
+    // they act as they come.
+    std::optional<uint64_t> bytes_at(uint64_t tick);
+
     // The next thing asked of the cable, if any.
     std::optional<Cable> take_cable();
 
     void send_odometry(uint64_t tick, double x_m, double y_m, double theta_rad);
+    void send_base(uint64_t tick, uint64_t bytes);
     void send_end(uint64_t ticks);
 
   private:
@@ -68,16 +81,20 @@ class FollowerServer
     void accept_all();
     bool read_all(Follower &follower);
     void handle(Follower &follower, const std::string &message);
-    void handle_drive(Follower &follower, const std::string &message);
+    void handle_answer(Follower &follower, const std::string &message);
+    bool take_drive(const std::string &message, uint64_t due);
+    bool take_base(const std::string &message, uint64_t due);
     void leave(const Follower &follower);
     void send(const Follower &follower, const std::string &message);
     const Follower *pilot() const;
 
     std::string path_;
     unsigned expected_;
+    Answer answer_;
     int listener_ = -1;
     std::vector<Follower> followers_;
-    std::map<uint64_t, Drive> drives_; // by the tick they take effect
+    std::map<uint64_t, Drive> drives_;   // by the tick they take effect
+    std::map<uint64_t, uint64_t> bytes_; // likewise: all that the driver had written
     std::deque<Cable> cable_;
     uint64_t blocks_answered_ = 0;
     bool over_ = false;

@@ -65,8 +65,16 @@ const option LONG_OPTIONS[] = {{"help", no_argument, nullptr, HELP},
                                {"defect", required_argument, nullptr, DEFECT},
                                {"level", required_argument, nullptr, LEVEL},
                                {"usbip", required_argument, nullptr, USBIP},
-                               {"usbredir", required_argument, nullptr, USBREDIR},
-                               {nullptr, 0, nullptr, 0}};
+                               {"usbredir", required_argument, nullptr, USBREDIR}};
+
+// All options, those of the Create among them, with the end that getopt wants.
+std::vector<option> long_options()
+{
+    std::vector<option> options = create_long_options();
+    options.insert(options.end(), std::begin(LONG_OPTIONS), std::end(LONG_OPTIONS));
+    options.push_back({nullptr, 0, nullptr, 0});
+    return options;
+}
 
 uint64_t whole_number(const char *name, const char *text, uint64_t least, uint64_t most)
 {
@@ -180,7 +188,9 @@ void set_option(Options &options, int option, const char *text)
     if (set_flag(options, option)) {
         return;
     }
-    if (std::string *path = path_of(options, option)) {
+    if (option >= CREATE_FIRST) {
+        set_create_option(options.create, option, text);
+    } else if (std::string *path = path_of(options, option)) {
         *path = text;
     } else if (option == DEFECT) {
         options.defect = Defect::parse(text);
@@ -217,6 +227,9 @@ void check(const Options &options)
     require(!served || options.command.empty(),
             "a device that is served has no command here: leave out what stands after --");
     require(!options.unplugged || !options.socket.empty(), "--unplugged needs --socket: say where 'plug' comes from");
+    require(options.create.on || options.create.link.empty(), "--create-link needs --create: say which model, 1 or 2");
+    require(!options.create.on || !options.create.link.empty(),
+            "--create needs --create-link: say where its serial port is to be linked");
     require(options.followers == 0 || !options.socket.empty(), "--followers needs --socket: say where they connect");
 }
 
@@ -230,10 +243,11 @@ uint64_t Options::ticks() const
 Options parse_options(int argc, char **argv)
 {
     Options options;
+    const std::vector<option> all_options = long_options();
     opterr = 0;
     for (;;) {
         const int given = optind;
-        const int option = getopt_long(argc, argv, "+:", LONG_OPTIONS, nullptr);
+        const int option = getopt_long(argc, argv, "+:", all_options.data(), nullptr);
         if (option == -1) {
             break;
         }
@@ -285,6 +299,11 @@ const char *usage()
            "  --usbip PORT          serve the device by USB/IP on this port of 127.0.0.1 (0: a free one, which is "
            "printed)\n"
            "  --usbredir PORT       serve it by usbredir, for QEMU's usb-redir\n"
+           "  --create 1|2          the base is an iRobot Create behind a serial port; the pilot answers with 'base T "
+           "N'\n"
+           "  --create-link PATH    where that port, a pseudo-terminal, is linked\n"
+           "  --create-NAME ...     whisker-create-sim's options for the robot and its faults, as "
+           "--create-drop-remainder\n"
            "  --unplugged           begin without the bridge, until 'plug' comes by the socket\n"
            "  --progress            a line 'progress TICK TICKS' every simulated second (default on a terminal)\n"
            "  --bench               no COMMAND, no umockdev: an internal host reads and checks every frame\n"

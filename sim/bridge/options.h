@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "bench.h"
+#include "create_options.h"
 #include "defect.h"
 
 namespace bridge_sim
@@ -34,6 +35,7 @@ struct Options {
     DefectKind defect = DefectKind::NONE;
     Serve serve = Serve::COMMAND;
     uint16_t port = 0; // of 127.0.0.1; 0: any that is free
+    CreateOptions create;
     std::vector<std::string> command;
 
     uint64_t ticks() const;

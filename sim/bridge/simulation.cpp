@@ -111,7 +111,9 @@ Simulation::Simulation(const Options &options)
                                                read_node_list(options.nodes, populated(options, scene_)))),
       scheduler_(*rig_), faults_(options.faults, options.usb_faults),
       runner_(*rig_, scheduler_, plan_of(options, scene_), faults_), truth_(options.truth, scene_),
-      followers_(options.socket, options.followers), defect_(options.defect), total_(options.ticks())
+      create_(options.create.on ? std::make_unique<CreateBase>(options.create, options.seed) : nullptr),
+      followers_(options.socket, options.followers, options.create.on ? Answer::BASE : Answer::DRIVE),
+      defect_(options.defect), total_(options.ticks())
 {
     if (!world_) {
         throw std::runtime_error(options.scene + ": no world can be made of it: a texture has no known parameters");
@@ -172,9 +174,11 @@ bool Simulation::advance()
 
 bool Simulation::may_tick()
 {
-    return plugged_ && !over_ && rig_->running() && runner_.ready() && followers_.allows(tick_);
+    return plugged_ && !over_ && rig_->running() && runner_.ready() && followers_.allows(tick_) &&
+           (!create_ || create_->has(followers_.bytes_at(tick_)));
 }
 
+// Wall time goes on while nobody takes frames: so does the world, once it has begun, unless a pilot counts its ticks.
 void Simulation::produce_tick()
 {
     if (tick_ == 0) {
@@ -191,22 +195,32 @@ void Simulation::produce_tick()
 
 void Simulation::step_world()
 {
-    if (const std::optional<Drive> drive = followers_.drive_at(tick_)) {
+    if (create_) {
+        create_->drive(world_.get(), followers_.bytes_at(tick_));
+    } else if (const std::optional<Drive> drive = followers_.drive_at(tick_)) {
         sim_world_drive(world_.get(), drive->v_m_s, drive->omega_rad_s);
     }
     sim_world_step(world_.get());
     sim_world_fields(world_.get(), fields_.data());
+    if (create_) {
+        create_->tick(world_.get());
+    }
 }
 
 void Simulation::after_tick(uint64_t tick)
 {
+    if (create_) {
+        followers_.send_base(tick, create_->sent());
+    }
     if ((tick + 1) % TRUTH_TICKS == 0) {
         double x_m = 0;
         double y_m = 0;
         double theta_rad = 0;
         truth_.row(tick, world_.get());
         sim_world_odometry(world_.get(), &x_m, &y_m, &theta_rad);
-        followers_.send_odometry(tick, x_m, y_m, theta_rad);
+        if (!create_) {
+            followers_.send_odometry(tick, x_m, y_m, theta_rad);
+        }
     }
     if ((tick + 1) % PROGRESS_TICKS == 0) {
         show_progress();
@@ -302,6 +316,9 @@ void Simulation::wait(int timeout_ms)
 {
     std::vector<pollfd> descriptors = {{signals_, POLLIN, 0}, {port_->wake_descriptor(), POLLIN, 0}};
     followers_.add_to(descriptors);
+    if (create_) {
+        create_->add_to(descriptors);
+    }
     if (poll(descriptors.data(), descriptors.size(), timeout_ms) <= 0) {
         return;
     }
@@ -310,6 +327,9 @@ void Simulation::wait(int timeout_ms)
     }
     if (descriptors[1].revents) {
         take_requests();
+    }
+    if (create_) {
+        create_->receive();
     }
     followers_.receive();
     obey_cable();

@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "child.h"
+#include "create_base.h"
 #include "defect.h"
 #include "device_port.h"
 #include "follower_server.h"
@@ -65,7 +66,8 @@ class Simulation
     FaultLog faults_;
     TickRunner runner_;
     TruthLog truth_;
-    FollowerServer followers_;
+    std::unique_ptr<CreateBase> create_; // none: the pilot drives the world's base itself
+    FollowerServer followers_;           // after it: who connects finds the port
     Defect defect_;
     std::unique_ptr<DevicePort> port_;
     std::unique_ptr<Child> child_;

@@ -1,0 +1,84 @@
+#include "create_base.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+namespace bridge_sim
+{
+
+namespace
+{
+
+constexpr size_t CHUNK_BYTES = 512;
+
+sim_create *make_create(const CreateOptions &options, uint64_t seed)
+{
+    sim_create_options robot = options.robot;
+    robot.seed = seed;
+    sim_create *create = sim_create_new(&robot);
+    if (!create) {
+        throw std::runtime_error("--create: no memory for it");
+    }
+    return create;
+}
+
+} // namespace
+
+CreateBase::CreateBase(const CreateOptions &options, uint64_t seed) : create_(make_create(options, seed))
+{
+    char error[CHUNK_BYTES] = "";
+    if (create_pty_open(&pty_, options.link.c_str(), error, sizeof error) != 0) {
+        sim_create_free(create_);
+        throw std::runtime_error(std::string("--create-link: ") + error);
+    }
+}
+
+CreateBase::~CreateBase()
+{
+    create_pty_close(&pty_);
+    sim_create_free(create_);
+}
+
+void CreateBase::add_to(std::vector<pollfd> &descriptors) const
+{
+    descriptors.push_back({pty_.master, POLLIN, 0});
+}
+
+void CreateBase::receive()
+{
+    uint8_t bytes[CHUNK_BYTES];
+    while (const size_t count = create_pty_read(&pty_, bytes, sizeof bytes)) {
+        waiting_.insert(waiting_.end(), bytes, bytes + count);
+    }
+}
+
+bool CreateBase::has(std::optional<uint64_t> written) const
+{
+    return !written || handed_ + waiting_.size() >= *written;
+}
+
+void CreateBase::drive(sim_world *world, std::optional<uint64_t> written)
+{
+    const uint64_t up_to = written ? std::max(*written, handed_) - handed_ : waiting_.size();
+    const size_t count = std::min(static_cast<size_t>(up_to), waiting_.size());
+    sim_create_receive(create_, waiting_.data(), count);
+    waiting_.erase(waiting_.begin(), waiting_.begin() + static_cast<std::ptrdiff_t>(count));
+    handed_ += count;
+    create_ground_drive(create_, world);
+}
+
+void CreateBase::tick(const sim_world *world)
+{
+    uint8_t bytes[CHUNK_BYTES];
+    create_ground_tick(create_, world);
+    while (const size_t count = sim_create_take(create_, bytes, sizeof bytes)) {
+        sent_ += create_pty_write(&pty_, bytes, count);
+    }
+}
+
+uint64_t CreateBase::sent() const
+{
+    return sent_;
+}
+
+} // namespace bridge_sim

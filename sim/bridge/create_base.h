@@ -1,0 +1,54 @@
+// The robot's base as a Create behind a serial port: the emulator on a pseudo-terminal, its wheels on the world's
+// ground.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include <poll.h>
+
+#include "create_options.h"
+extern "C" {
+#include "create_ground.h"
+#include "create_pty.h"
+}
+
+namespace bridge_sim
+{
+
+class CreateBase
+{
+  public:
+    // Opens the port. Throws std::runtime_error with one line if it cannot.
+    CreateBase(const CreateOptions &options, uint64_t seed);
+    ~CreateBase();
+    CreateBase(const CreateBase &) = delete;
+    CreateBase &operator=(const CreateBase &) = delete;
+
+    void add_to(std::vector<pollfd> &descriptors) const;
+
+    // Reads what the driver has written.
+    void receive();
+
+    // Have this many bytes come since the start? Whatever has come is enough if no number is given.
+    bool has(std::optional<uint64_t> written) const;
+
+    // Before a step of the world: the robot is handed the bytes up to this number, or all, and drives.
+    void drive(sim_world *world, std::optional<uint64_t> written);
+
+    // After it: its tick. What it sends is written to the port.
+    void tick(const sim_world *world);
+
+    // Bytes written to the port since the start.
+    uint64_t sent() const;
+
+  private:
+    sim_create *create_;
+    create_pty pty_{};
+    std::vector<uint8_t> waiting_; // come, but not handed to the robot
+    uint64_t handed_ = 0;
+    uint64_t sent_ = 0;
+};
+
+} // namespace bridge_sim
