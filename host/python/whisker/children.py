@@ -6,7 +6,7 @@ import subprocess
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 GRACE_S = 10.0  # for a child to end after SIGTERM, before SIGKILL
@@ -14,16 +14,22 @@ GRACE_S = 10.0  # for a child to end after SIGTERM, before SIGKILL
 
 @dataclass(frozen=True)
 class Program:
-    """A line of a process table: what is started, and whether it is started again when it ends (`again`)."""
+    """A line of a process table.
+
+    serves: it goes on until it is asked to end, and is missed when it ends before; tells: it tells of itself on a health
+    topic; environment: what it finds besides ours.
+    """
 
     name: str
     command: tuple[str, ...]
-    again: bool = False
+    serves: bool = False
+    tells: bool = False
+    environment: dict[str, str] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, name: str, command: list, again: bool = False) -> "Program":
+    def of(cls, name: str, command: list, **options) -> "Program":
         """The words of `command` may be anything that prints: paths, numbers."""
-        return cls(name, tuple(map(str, command)), again)
+        return cls(name, tuple(map(str, command)), **options)
 
 
 class Child:
@@ -37,11 +43,17 @@ class Child:
         on_end: Callable[[], None] | None = None,
     ):
         """`log` is written on if it exists; `on_end` is called once, from a thread, when the process has ended."""
-        self.name, self.log, self._on_end = program.name, log, on_end
+        self.program, self.name, self.log, self._on_end = program, program.name, log, on_end
         self._log = open(log, "a")  # noqa: SIM115 - closed by close()
         where = subprocess.PIPE if on_line else self._log
         self.process = subprocess.Popen(
-            program.command, stdin=subprocess.DEVNULL, stdout=self._log, stderr=where, text=True, start_new_session=True
+            program.command,
+            stdin=subprocess.DEVNULL,
+            stdout=self._log,
+            stderr=where,
+            text=True,
+            start_new_session=True,
+            env=os.environ | program.environment,
         )
         self.started_s = time.monotonic()
         self.ended_s: float | None = None

@@ -1,4 +1,5 @@
-"""The simulated robot's wheels: drive orders out, odometry in, over the simulation's Unix socket.
+"""The simulated robot's wheels, over the simulation's Unix socket: drive orders out and odometry in, or, where the
+simulation has a serial line to a base, how far that line is read and written.
 
 One ASCII message per packet (SOCK_SEQPACKET). Simulated time waits for these messages, so none is ever late.
 """
@@ -18,6 +19,7 @@ class SimLink:
             raise OSError(f"{path}: {error.strerror}; start the simulated bridge first") from error
         self.ended_after: int | None = None  # ticks of the whole run, once the simulation has said so
         self._odometry: dict[int, tuple[float, float, float]] = {}
+        self._base_sent: dict[int, int] = {}  # bytes the base had sent by a tick
         self._send("pilot")
 
     def __enter__(self):
@@ -38,6 +40,19 @@ class SimLink:
                 return None
         return self._odometry.pop(tick)
 
+    def bytes_sent(self, tick: int) -> int | None:
+        """Bytes the base had sent when the block that ends at `tick` was over; None if the run ended before."""
+        while tick not in self._base_sent:
+            if not self._receive():
+                return None
+        self._base_sent = {t: sent for t, sent in self._base_sent.items() if t >= tick}
+        return self._base_sent[tick]
+
+    def base(self, tick: int, written: int) -> None:
+        """Answer the block that ends at `tick`: bytes written to the base by then. Instead of `drive`."""
+        if self.ended_after is None:
+            self._send(f"base {tick} {written}")
+
     def _send(self, text: str) -> None:
         try:
             self._socket.send(text.encode())
@@ -54,6 +69,8 @@ class SimLink:
         if word == "odometry":
             tick, *motion = arguments
             self._odometry[int(tick)] = tuple(map(float, motion))
+        elif word == "base":
+            self._base_sent[int(arguments[0])] = int(arguments[1])
         elif word == "end":
             self.ended_after = int(arguments[0])
         return True

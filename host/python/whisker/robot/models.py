@@ -1,0 +1,23 @@
+"""The pilot's models, as training and calibration left them in a folder."""
+
+from pathlib import Path
+
+from ..nodes import check_node, read_nodes
+from ..radial import load as load_radial
+from ..scene import Robot
+from ..texture import load
+
+
+def load_models(folder: Path, robot: Robot) -> tuple[dict, dict]:
+    """Texture and radial models by whisker name: texture.json, and <whisker>.json of every object whisker."""
+    texture = load(folder / "texture.json")
+    radial = {w.name: load_radial(folder / f"{w.name}.json") for w in robot.of_role("object")}
+    return {w.name: texture for w in robot.of_role("texture")}, radial
+
+
+def check_nodes(path: str, robot: Robot, radial: dict) -> None:
+    """NodeError when a radial model is of another node than the list names on its whisker's lane."""
+    nodes = read_nodes(path)
+    for lane, whisker in enumerate(robot.whiskers):
+        if whisker.name in radial:
+            check_node(radial[whisker.name].node, nodes.get(lane), whisker.name)

@@ -1,0 +1,142 @@
+"""The pilot as a process of its own, the netbook's: reads the ring, drives the base, tells the others what it perceives.
+
+`fly_in_step` follows a simulation that waits for it, to the end of the ring. `LiveFlight` goes on whatever comes and
+goes: ring, whiskerd, base, navigator; each loss is told in the pilot's health, and the wheels stand while no samples come.
+"""
+
+import time
+from collections.abc import Callable
+
+from ..behaviour import BLOCK_TICKS, ODOMETRY_TICKS, TICK_S
+from ..pilot import Pilot
+from ..ring import Reader
+from .blocks import Block, LiveRing, blocks
+from .health import ENDED, RUNNING, Health
+from .link import Link
+from .rowfiles import Rows, Traces
+from .telling import TICK_NS, Teller
+from .wheels import LiveBase, Report
+
+SILENCE_S = 0.2  # without samples for so long the wheels are stopped
+LOOK_S = 0.05  # between looks at what else there is to do while no samples come
+LATE_BLOCKS = 10  # so far behind, a live pilot leaves out what it has not looked at
+NAVIGATOR = "navigator"
+
+
+class Flight:
+    """A pilot, its wheels, and those who are told: the part that both clocks share."""
+
+    def __init__(self, pilot: Pilot, wheels, rows: Rows, traces: Traces, teller: Teller | None):
+        self.pilot, self._wheels = pilot, wheels
+        self._rows, self._traces, self._teller = rows, traces, teller
+        self.ticks_used = self.reports_missing = 0
+
+    def take(self, block: Block) -> None:
+        """Decide on a block, drive, and, where 0.1 s are full, make a row."""
+        first, samples = block
+        drive = self.pilot.block(first, samples["alpha"], samples["beta"], samples["status"])
+        self._traces.write(first, samples)
+        last = first + len(samples) - 1
+        self.ticks_used = last + 1
+        if len(samples) == BLOCK_TICKS:
+            self._wheels.drive(last, *drive)
+        if self.ticks_used % ODOMETRY_TICKS == 0 and (report := self._wheels.odometry(last)):
+            row = self.pilot.odometry(last, *report.motion)
+            self._rows.write(row)
+            if self._teller:
+                self._teller.row(row, report, samples[-1])
+        if self._teller:
+            self._teller.block(last)
+
+
+def fly_in_step(flight: Flight, reader: Reader, teller: Teller | None) -> None:
+    """From the ring to drives and rows until the ring is closed."""
+    for block in blocks(reader, len(flight.pilot.names)):
+        flight.take(block)
+    if teller:
+        teller.end("the ring was closed")
+
+
+class LiveWheels:
+    """The live base for a Flight: where it tells nothing, a row still comes, with no motion in it."""
+
+    def __init__(self, base: LiveBase):
+        self.base, self.missing = base, 0
+
+    def odometry(self, tick: int) -> Report:
+        report = self.base.odometry(tick)
+        self.missing += report is None
+        return report or Report((0.0, 0.0, 0.0))
+
+    def drive(self, tick: int, v_m_s: float, omega_rad_s: float) -> None:
+        self.base.drive(tick, v_m_s, omega_rad_s)
+
+
+class LiveFlight:
+    """`run` until `stop()` is true. The parts may come in any order, go, and come back."""
+
+    def __init__(self, flight: Flight, ring: LiveRing, wheels: LiveWheels, link: Link, clock=time.monotonic):
+        self._flight, self._ring, self._wheels, self._link, self._clock = flight, ring, wheels, link, clock
+        self._health = Health(link, self.counters)
+        self._fed_s, self._halted = clock(), True
+        self.blocks_left_out = self.halts = self.navigator_lost = 0
+        self._navigator, self._last_error = False, ""
+
+    def run(self, stop: Callable[[], bool]) -> None:
+        """Block by block; ends with the wheels stopped."""
+        try:
+            while not stop():
+                self._step()
+        finally:
+            self._wheels.base.stop()
+            self._wheels.base.close()
+            self._health.tell(self._stamp_ns, ENDED, self._last_error)
+
+    def _step(self) -> None:
+        made = self._ring.take(LOOK_S)
+        self.blocks_left_out += max(0, len(made) - LATE_BLOCKS)
+        for block in made[-LATE_BLOCKS:]:
+            self._flight.take(block)
+            self._fed_s, self._halted = self._clock(), False
+        if not self._halted and self._clock() - self._fed_s >= SILENCE_S:
+            self._wheels.base.stop()
+            self._halted = True
+            self.halts += 1
+        self._look_for_navigator()
+        state = self.state
+        self._last_error = self._last_error if state == RUNNING else state
+        self._health.tell(self._stamp_ns, state, self._last_error)
+
+    def _look_for_navigator(self) -> None:
+        here = NAVIGATOR in self._link.peers
+        self.navigator_lost += self._navigator and not here
+        self._navigator = here
+
+    @property
+    def _stamp_ns(self) -> int:
+        return self._flight.ticks_used * TICK_NS
+
+    @property
+    def state(self) -> str:
+        """What keeps the pilot from its work, the gravest first; else RUNNING."""
+        if self._halted:
+            return self._ring.trouble or f"ring {self._ring.name}: no samples; see whisker top"
+        return self._wheels.base.trouble or RUNNING
+
+    def counters(self) -> dict[str, object]:
+        """What has been counted since the start, and the base's own health."""
+        ring = self._ring
+        return {
+            "navigator": "here" if self._navigator else "gone",
+            "seconds": f"{self._flight.ticks_used * TICK_S:.1f}",
+            "bad_samples": self._flight.pilot.bad_samples,
+            "whisks": len(self._flight.pilot.whisks),
+            "halts": self.halts,
+            "ring_restarts": ring.restarts,
+            "ring_overruns": ring.overruns,
+            "ticks_missing": ring.ticks_missing,
+            "blocks_left_out": self.blocks_left_out,
+            "base_lost": self._wheels.base.lost,
+            "reports_missing": self._wheels.missing,
+            "navigator_lost": self.navigator_lost,
+        } | {f"base_{key}": value for key, value in self._wheels.base.health().items()}

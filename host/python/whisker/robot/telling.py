@@ -1,0 +1,98 @@
+"""What the pilot tells the others over zenoh: observation rows, odometry, joints, contacts, behaviour."""
+
+import numpy as np
+
+from ..behaviour import TICK_S
+from ..pilot import Pilot
+from . import messages
+from .link import Link
+from .rows import RowPublisher, compose
+from .wheels import Report
+
+TICK_NS = round(TICK_S * 1e9)
+RAD_PER_COUNT = np.pi / 65536.0
+MIDDLE = 32768.0  # counts of a sensor at rest
+TOPICS = ("odometry", "joints", "contact", "behaviour")
+
+
+class Teller:
+    """Publishes what a pilot does; `block` after each of its blocks, `row` after each of its rows."""
+
+    def __init__(self, link: Link, pilot: Pilot):
+        self._pilot, self._streams = pilot, {topic: link.publish(topic) for topic in TOPICS}
+        self._rows, self._stamp_ns, self._pose = RowPublisher(link), 0, np.zeros(3)
+        self._contacts = {lane: (c.onset, c.release) for lane, c in pilot.contacts.items()}
+        self._measured, self._state = len(pilot.whisks), None
+
+    @property
+    def rows(self) -> int:
+        return self._rows.sent
+
+    def block(self, last: int) -> None:
+        """Contacts and behaviour as they are after the block that ends with tick `last`."""
+        self._stamp_ns = (last + 1) * TICK_NS
+        for lane, contact in self._pilot.contacts.items():
+            if (contact.onset, contact.release) != self._contacts[lane]:
+                self._contacts[lane] = (contact.onset, contact.release)
+                self._tell_contact(lane)
+        for whisk in self._pilot.whisks[self._measured :]:
+            self._tell_measured(whisk)
+        self._measured = len(self._pilot.whisks)
+        self._tell_behaviour()
+
+    def row(self, row: dict, report: Report, samples: np.ndarray) -> None:
+        """The row of the 0.1 s that end with the newest block, and the odometry and samples (lanes,) at its end."""
+        self._rows.send(row, self._kind(row))
+        self._pose = compose(self._pose, report.motion)
+        header = messages.Header.at(self._stamp_ns, messages.ODOMETRY_FRAME)
+        pose = messages.PoseWithCovariance.planar(self._pose, report.covariance)
+        self._send("odometry", messages.Odometry(header, pose))
+        self._send("joints", self._joints(samples))
+
+    def end(self, reason: str = "") -> None:
+        """The streams are over."""
+        self._rows.end(reason)
+        for stream in self._streams.values():
+            stream.end(self._stamp_ns, reason)
+
+    def _kind(self, row: dict) -> int:
+        if any(
+            row[f"{self._pilot.names[lane]}_mm"] is not None and np.isfinite(row[f"{self._pilot.names[lane]}_mm"])
+            for lane in self._pilot.object_lanes
+        ):
+            return messages.RELEASE
+        return messages.WHISK if self._pilot.behaviour.whisking else messages.EXPLORING
+
+    def _joints(self, samples: np.ndarray) -> messages.JointState:
+        names = [f"{name}/{axis}" for name in self._pilot.names.values() for axis in ("alpha", "beta")]
+        angles = np.stack([samples["alpha"], samples["beta"]], axis=-1).astype(np.float64)
+        angles[samples["status"] != 0] = np.nan
+        header = messages.Header.at(self._stamp_ns, messages.BASE_FRAME)
+        return messages.JointState(header, names, ((angles - MIDDLE) * RAD_PER_COUNT).ravel())
+
+    def _tell_contact(self, lane: int) -> None:
+        contact, name = self._pilot.contacts[lane], self._pilot.names[lane]
+        release = 0 if contact.touching else contact.release
+        self._send("contact", self._contact(name, contact.touching, contact.onset, release))
+
+    def _tell_measured(self, whisk: dict) -> None:
+        told = self._contact(whisk["whisker"], False, whisk["onset"], whisk["release"])
+        told.measured = whisk["distance_mm"] is not None
+        told.radius_m = 1e-3 * (whisk["distance_mm"] or 0.0)
+        self._send("contact", told)
+
+    def _contact(self, name: str, touching: bool, onset: int, release: int) -> messages.Contact:
+        header = messages.Header.at(self._stamp_ns, messages.BASE_FRAME)
+        times = (messages.Time.of(max(0, tick) * TICK_NS) for tick in (onset, release))
+        return messages.Contact(header, name, touching, *times)
+
+    def _tell_behaviour(self) -> None:
+        behaviour = self._pilot.behaviour
+        if behaviour.state is not self._state:
+            self._state = behaviour.state
+            since = messages.Time.of(behaviour.since * TICK_NS)
+            header = messages.Header.at(self._stamp_ns, messages.BASE_FRAME)
+            self._send("behaviour", messages.Behaviour(header, behaviour.state.value, since))
+
+    def _send(self, topic: str, message) -> None:
+        self._streams[topic].send(message)
