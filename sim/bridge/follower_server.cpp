@@ -90,7 +90,7 @@ void FollowerServer::accept_all()
         if (descriptor < 0) {
             return;
         }
-        followers_.push_back({descriptor, "", false, 0});
+        followers_.push_back({descriptor, "", false, false, 0});
     }
 }
 
@@ -137,11 +137,13 @@ void FollowerServer::handle(Follower &follower, const std::string &message)
         follower.taken = std::max(follower.taken, tick + 1);
     } else if (message.compare(0, 6, "drive ") == 0 || message.compare(0, 5, "base ") == 0) {
         handle_answer(follower, message);
+    } else if (message == "watch") {
+        follower.watching = true;
     } else if (message == "unplug" || message == "plug") {
         cable_.push_back(message == "plug" ? Cable::PLUG : Cable::UNPLUG);
     } else {
         throw std::runtime_error("socket: '" + message +
-                                 "' is none of follow, taken, pilot, drive, base, unplug, plug");
+                                 "' is none of follow, taken, pilot, drive, base, unplug, plug, watch");
     }
 }
 
@@ -231,6 +233,17 @@ void FollowerServer::send_base(uint64_t tick, uint64_t bytes)
     }
 }
 
+void FollowerServer::send_truth(uint64_t tick, const sim_pose &pose)
+{
+    char text[MESSAGE_BYTES];
+    std::snprintf(text, sizeof text, "truth %" PRIu64 " %.6f %.6f %.6f", tick, pose.x, pose.y, pose.theta);
+    for (const Follower &follower : followers_) {
+        if (follower.watching) {
+            ::send(follower.descriptor, text, std::strlen(text), MSG_NOSIGNAL);
+        }
+    }
+}
+
 void FollowerServer::send_end(uint64_t ticks)
 {
     over_ = true;
@@ -245,6 +258,11 @@ const FollowerServer::Follower *FollowerServer::pilot() const
 {
     const auto at = std::find_if(followers_.begin(), followers_.end(), [](const Follower &f) { return f.pilot; });
     return at == followers_.end() ? nullptr : &*at;
+}
+
+bool FollowerServer::in_step() const
+{
+    return pilot() != nullptr;
 }
 
 bool FollowerServer::allows(uint64_t tick) const

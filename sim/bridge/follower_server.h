@@ -1,7 +1,8 @@
 // The socket by which readers of the ring hold the simulation back and the pilot drives the robot. One ASCII message
 // per packet (Unix SOCK_SEQPACKET):
-//   in:  follow NAME | taken T | pilot | drive T V OMEGA | unplug | plug
-//   out: odometry T X Y THETA (to the pilot) | end N (to all)
+//   in:  follow NAME | taken T | pilot | drive T V OMEGA | unplug | plug | watch
+//   out: odometry T X Y THETA (to the pilot) | truth T X Y THETA (to who watches: nobody waits for him) | end N (to
+//   all)
 // With a Create for a base, whose driver has a port of its own, instead of drive and odometry:
 //   in:  base T N: this answers the block that ends with tick T; the driver had written N bytes to the port by then
 //   out: base T N (to the pilot, after every block): N bytes have been written to the port for the driver to read
@@ -56,6 +57,9 @@ class FollowerServer
     // May this tick be produced? Everyone is there, nobody lags, and the pilot has answered what takes effect by then.
     bool allows(uint64_t tick) const;
 
+    // Does simulated time go by what a pilot answers?
+    bool in_step() const;
+
     // The pilot's command that takes effect at this tick, if one does.
     std::optional<Drive> drive_at(uint64_t tick);
 
@@ -68,6 +72,7 @@ class FollowerServer
 
     void send_odometry(uint64_t tick, double x_m, double y_m, double theta_rad);
     void send_base(uint64_t tick, uint64_t bytes);
+    void send_truth(uint64_t tick, const sim_pose &pose);
     void send_end(uint64_t ticks);
 
   private:
@@ -75,6 +80,7 @@ class FollowerServer
         int descriptor;
         std::string name; // empty: has not introduced itself
         bool pilot = false;
+        bool watching = false;
         uint64_t taken = 0; // ticks processed
     };
 

@@ -15,6 +15,7 @@ namespace
 
 constexpr double TICKS_PER_SECOND = static_cast<double>(WHISKER_LIMIT_CLOCK_HZ) / WHISKER_LIMIT_TICK_PERIOD;
 constexpr double SECONDS_MAX = 86400;
+constexpr double PACE_MAX = 100;
 constexpr size_t BENCH_LANES = 6;
 
 enum Option {
@@ -25,6 +26,7 @@ enum Option {
     SCENE,
     SEED,
     SECONDS,
+    PACE,
     SOCKET,
     TRUTH,
     FAULTS,
@@ -50,6 +52,7 @@ const option LONG_OPTIONS[] = {{"help", no_argument, nullptr, HELP},
                                {"scene", required_argument, nullptr, SCENE},
                                {"seed", required_argument, nullptr, SEED},
                                {"seconds", required_argument, nullptr, SECONDS},
+                               {"pace", required_argument, nullptr, PACE},
                                {"socket", required_argument, nullptr, SOCKET},
                                {"truth", required_argument, nullptr, TRUTH},
                                {"faults", required_argument, nullptr, FAULTS},
@@ -88,13 +91,13 @@ uint64_t whole_number(const char *name, const char *text, uint64_t least, uint64
     return value;
 }
 
-double seconds_number(const char *text)
+double positive_number(const char *name, const char *text, const char *what, double most)
 {
     char *end = nullptr;
     const double value = std::strtod(text, &end);
-    if (end == text || *end != '\0' || !std::isfinite(value) || value <= 0 || value > SECONDS_MAX) {
-        throw std::runtime_error(std::string("--seconds '") + text +
-                                 "': give simulated seconds, more than 0, at most 86400");
+    if (end == text || *end != '\0' || !std::isfinite(value) || value <= 0 || value > most) {
+        throw std::runtime_error(std::string("--") + name + " '" + text + "': give " + what +
+                                 ", more than 0, at most " + std::to_string(static_cast<int>(most)));
     }
     return value;
 }
@@ -144,7 +147,10 @@ void set_number(Options &options, int option, const char *text)
         options.seed = whole_number("seed", text, 0, UINT32_MAX);
         break;
     case SECONDS:
-        options.seconds = seconds_number(text);
+        options.seconds = positive_number("seconds", text, "simulated seconds", SECONDS_MAX);
+        break;
+    case PACE:
+        options.pace = positive_number("pace", text, "simulated seconds per second", PACE_MAX);
         break;
     case FOLLOWERS:
         options.followers = static_cast<unsigned>(whole_number("followers", text, 0, LANES));
@@ -279,6 +285,8 @@ const char *usage()
            "\n"
            "  --scene FLAT          flat scene file: arena, robot, start pose\n"
            "  --seconds S           simulated length of the run\n"
+           "  --pace X              at most X simulated seconds per second; the world then goes on while nobody takes "
+           "frames\n"
            "  --seed N              seed of world, sensors and faults (1)\n"
            "  --socket PATH         where followers and the pilot connect\n"
            "  --followers K         wait for so many of them, the pilot included (0)\n"

@@ -29,6 +29,7 @@ struct Options {
     std::string speed_report;
     uint64_t seed = 1;
     double seconds = 0;
+    double pace = 0; // simulated seconds per second; 0: as fast as it can
     unsigned followers = 0;
     size_t lanes_populated = 0; // 0: as many as the scene has whiskers
     BenchSettings link;         // SCK divider, word gap and sample point: bench only, else the host software sets them

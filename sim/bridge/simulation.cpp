@@ -113,7 +113,7 @@ Simulation::Simulation(const Options &options)
       runner_(*rig_, scheduler_, plan_of(options, scene_), faults_), truth_(options.truth, scene_),
       create_(options.create.on ? std::make_unique<CreateBase>(options.create, options.seed) : nullptr),
       followers_(options.socket, options.followers, options.create.on ? Answer::BASE : Answer::DRIVE),
-      defect_(options.defect), total_(options.ticks())
+      defect_(options.defect), pace_(options.pace), total_(options.ticks())
 {
     if (!world_) {
         throw std::runtime_error(options.scene + ": no world can be made of it: a texture has no known parameters");
@@ -140,7 +140,7 @@ int Simulation::run()
     while (!ended()) {
         const bool progress = advance();
         deliver_completed();
-        wait(progress ? 0 : IDLE_WAIT_MS);
+        wait(progress ? 0 : pace_.wait_ms(tick_, IDLE_WAIT_MS));
     }
     finish();
     return verdict();
@@ -166,6 +166,10 @@ bool Simulation::advance()
         produce_tick();
         return true;
     }
+    if (may_pass()) {
+        pass_tick();
+        return true;
+    }
     return scheduler_.step();
 }
 
@@ -175,10 +179,16 @@ bool Simulation::advance()
 bool Simulation::may_tick()
 {
     return plugged_ && !over_ && rig_->running() && runner_.ready() && followers_.allows(tick_) &&
-           (!create_ || create_->has(followers_.bytes_at(tick_)));
+           (!create_ || create_->has(followers_.bytes_at(tick_))) && pace_.due(tick_);
 }
 
 // Wall time goes on while nobody takes frames: so does the world, once it has begun, unless a pilot counts its ticks.
+bool Simulation::may_pass()
+{
+    return pace_.on() && tick_ > 0 && !over_ && !(plugged_ && rig_->running()) && !followers_.in_step() &&
+           pace_.due(tick_);
+}
+
 void Simulation::produce_tick()
 {
     if (tick_ == 0) {
@@ -187,6 +197,16 @@ void Simulation::produce_tick()
     }
     step_world();
     runner_.tick(tick_, fields_.data());
+    after_tick(tick_++);
+    if (tick_ == total_) {
+        end_run();
+    }
+}
+
+// A tick of the world of which the bridge, stopped or unplugged, makes no frame.
+void Simulation::pass_tick()
+{
+    step_world();
     after_tick(tick_++);
     if (tick_ == total_) {
         end_run();
@@ -217,6 +237,7 @@ void Simulation::after_tick(uint64_t tick)
         double y_m = 0;
         double theta_rad = 0;
         truth_.row(tick, world_.get());
+        followers_.send_truth(tick, sim_world_pose(world_.get()));
         sim_world_odometry(world_.get(), &x_m, &y_m, &theta_rad);
         if (!create_) {
             followers_.send_odometry(tick, x_m, y_m, theta_rad);

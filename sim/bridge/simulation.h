@@ -12,6 +12,7 @@
 #include "device_port.h"
 #include "follower_server.h"
 #include "options.h"
+#include "pace.h"
 #include "speed_report.h"
 #include "truth_log.h"
 
@@ -40,7 +41,9 @@ class Simulation
     bool ended() const;
     bool advance();
     bool may_tick();
+    bool may_pass();
     void produce_tick();
+    void pass_tick();
     void step_world();
     void after_tick(uint64_t tick);
     void produce_last_tick();
@@ -69,6 +72,7 @@ class Simulation
     std::unique_ptr<CreateBase> create_; // none: the pilot drives the world's base itself
     FollowerServer followers_;           // after it: who connects finds the port
     Defect defect_;
+    Pace pace_;
     std::unique_ptr<DevicePort> port_;
     std::unique_ptr<Child> child_;
     std::array<sim_field, LANES> fields_{};

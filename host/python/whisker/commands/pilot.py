@@ -73,8 +73,8 @@ def _parts(arguments, stack: ExitStack) -> SimpleNamespace:
         check_nodes(arguments.nodes, robot, radial)
     pilot = Pilot(robot, texture, radial, arguments.seed)
     link = stack.enter_context(open_link("pilot", arguments))
-    out = stack.enter_context(open(arguments.out, "w", newline=""))
-    traces = stack.enter_context(open(arguments.traces, "w", newline=""))
+    out = stack.enter_context(open(arguments.out, "w", newline=""))  # noqa: SIM115
+    traces = stack.enter_context(open(arguments.traces, "w", newline=""))  # noqa: SIM115
     parts = {"rows": Rows(out), "traces": Traces(traces, pilot), "teller": Teller(link, pilot)}
     return SimpleNamespace(pilot=pilot, link=link, flight=None, base_health={}, **parts)
 
