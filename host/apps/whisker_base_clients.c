@@ -65,7 +65,7 @@ uint64_t base_clients_limit(const struct base_clients *clients)
         led |= client->leads;
         limit = client->leads && client->after > limit ? client->after : limit;
     }
-    return led ? limit : UINT64_MAX;
+    return led && clients->robot->options->stream_clock ? limit : UINT64_MAX;
 }
 
 /* ------------------------------------------------------------------------------------------------------- the messages

@@ -38,7 +38,7 @@ bool base_clients_add(struct base_clients *clients, int socket);
 /* As base_on_step: one frame's motion, for every client. */
 void base_clients_step(void *context, const struct create_step *step, unsigned bits);
 
-/* Byte of the stream up to which clients want it taken in; UINT64_MAX: nobody leads. */
+/* Byte of the stream up to which clients want it taken in; UINT64_MAX: nobody leads, or time is the wall's. */
 uint64_t base_clients_limit(const struct base_clients *clients);
 
 /* Fills in BASE_CLIENTS descriptors to wait on. */

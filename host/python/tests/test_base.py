@@ -267,6 +267,9 @@ def test_a_silent_line_is_asked_for_its_stream_again(start):
         driver.peer.tell(driver.peer.frame())
         assert driver.peer.await_start().endswith(STOP)
         assert int(client.health()["silences"]) >= 1
+        driver.peer.tell(driver.peer.frame())
+        client.odometry(after=driver.peer.told)
+        assert int(client.health()["missed"]) >= 500 // 15 - 1
 
 
 def test_a_silent_line_is_not_put_back_into_a_mode_that_it_left(start):
