@@ -6,7 +6,8 @@
 Simulated floors (level 1) are drawn from seeds that nothing was developed on. Real recordings are not part of this
 project: clone github.com/wngfra/FabricSlide (MIT) and github.com/norlab-ulaval/BorealTC (MIT) and give their folders
 data/fabric and data/borealtc, here or as FABRICSLIDE_DIR and BOREALTC_DIR; without them their part is skipped by name.
-Parts that are done are kept in build/bench/texture. Writes bench/results/texture.json and docs/charts/texture_*.
+Parts that are done are kept in build/bench/texture. Writes bench/results/texture.json,
+docs/texture_faults.md and docs/charts/texture_*.
 """
 
 import argparse
@@ -18,11 +19,13 @@ import matplotlib
 from texture_cost import cost
 from texture_course import course
 from texture_figures import draw
+from texture_page import page
 from texture_real import fabrics, terrains
 from texture_simulated import borders, other_robot, refusals, single_surfaces, stability
 from tqdm import tqdm
 
 ROOT = Path(__file__).resolve().parent.parent
+PAGE = ROOT / "docs/texture_faults.md"
 RESULTS, CHARTS, CACHE = ROOT / "bench/results", ROOT / "docs/charts", ROOT / "build/bench/texture"
 PARTS = {f.__name__: f for f in (course, cost, single_surfaces, other_robot, borders, refusals, stability)}
 REAL = {"fabricslide": fabrics, "borealtc": terrains}
@@ -46,6 +49,7 @@ def run(build: Path, fresh: bool, real: dict[str, str | None] | None = None) -> 
         results[name] = json.loads(kept.read_text())
     RESULTS.mkdir(parents=True, exist_ok=True)
     (RESULTS / "texture.json").write_text(json.dumps(results, indent=1) + "\n")
+    PAGE.write_text(page(results))
     for name, figure in draw(results).items():
         for ending in ("svg", "png"):
             figure.savefig(CHARTS / f"{name}.{ending}", dpi=120)

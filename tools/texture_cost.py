@@ -9,8 +9,8 @@ import time
 from pathlib import Path
 
 import numpy as np
-from texture_scores import METHODS, WINDOW, decide, models, summary
-from texture_simulated import TEST_SEEDS, TRAIN_SEED
+from texture_scores import METHODS, WINDOW, decide, summary
+from texture_simulated import TEST_SEEDS, TRAIN_SEED, trained
 from texture_trials import drives
 
 from whisker.texture import TextureModel
@@ -23,7 +23,7 @@ PEERS, VENV = Path(__file__).resolve().parent / "texture_peers", ROOT / "build/b
 def cost() -> dict:
     """Error against time per decision at 100 ms; peers take the default's features, whose time is added."""
     recordings, tests = drives(TRAIN_SEED, TRAIN_SEED), drives(TEST_SEEDS[0], TRAIN_SEED)
-    known, out = models(recordings), {}
+    known, out = trained(), {}
     cut = {
         s: np.concatenate([r[: len(r) // WINDOW * WINDOW].reshape(-1, WINDOW, 2) for g in part.values() for r in g])
         for s, part in (("train", recordings), ("test", tests))

@@ -9,6 +9,7 @@ from whisker.texture_train import train
 
 HZ, WINDOW = 2000.0, 200
 INSIDE_M, BORDER_S, WRONG_S = 0.05, 0.15, 0.1
+REFUSED = 0.1  # share of decisions that "unknown" may cost
 METHODS = ("naive Bayes (paper)", "default")
 
 
@@ -35,7 +36,14 @@ def summary(pairs: list[tuple[int, object]]) -> dict:
         "windows": len(pairs), "accuracy": right.mean(), "refused": (label < 0).mean(),
         "wrong_answers": ((label >= 0) & (label != truth)).mean(), "confidence": confidence.mean(),
         "calibration_error": calibration_error(right, confidence), "borders": np.mean([d.border for _, d in pairs]),
+        "cut_at_a_tenth_refused": refusal_cut(right, confidence),
     }  # fmt: skip
+
+
+def refusal_cut(right: np.ndarray, confidence: np.ndarray) -> float:
+    """By how much refusing the least confident tenth cuts the wrong decisions."""
+    kept = np.argsort(-confidence, kind="stable")[: round((1 - REFUSED) * len(right))]
+    return float((~right).sum() / max(1, (~right)[kept].sum()))
 
 
 def calibration_error(right: np.ndarray, confidence: np.ndarray, bins: int = 10) -> float:

@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ LOOK = 20  # ticks between looks at the truth
 TILE_M, STRIP_M, WIDTH_M = 0.5, 12.0, 2.0
 
 
+@cache
 def drives(seed: int, robot: int, seconds: float = 8.0, surfaces=SURFACES) -> dict[str, list[np.ndarray]]:
     """One recording (n, 2) for each surface, speed and floor whisker, of the demo's robot of a seed on floors of another."""
     from signals.recordings import surface_drive  # sim/ is on the path since whisker.demo.simulation

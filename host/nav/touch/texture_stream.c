@@ -6,27 +6,26 @@
 #include <string.h>
 
 #include "texture_catch.h"
+#include "texture_halves.h"
 #include "texture_span.h"
+#include "texture_watch.h"
 
 #define HELD_WINDOWS 20 /* a tip held for longer, 2 s at 100 ms, has a new rest */
 #define SINCE_LONG (1 << 30)
-#define BAD_SHARE_MOST 0.25 /* of a window; with more, its spectrum is that of the gaps */
+#define RINGING 0.05 /* share of its evidence that a window keeps while the whisker rings */
 
 struct nav_texture_stream {
     struct nav_texture_rules rules; /* its pointers are the stream's own, but for what is lent */
     struct nav_texture_rung *rung[NAV_TEXTURE_RUNGS_MAX];
     double unknown[NAV_TEXTURE_RUNGS_MAX], border[NAV_TEXTURE_RUNGS_MAX];
     struct nav_texture_span *span;
-    double *limits;  /* [6][channels] the stream's own */
-    double *raw;     /* [room][channels] samples since the last decision */
-    double *clean;   /* [room][channels] */
-    double *half[3]; /* [classes] evidence of the window before's second half, of the first and the second half */
-    double *before;  /* [classes] evidence of the window before */
-    double *block;   /* [a block's length][channels] samples since the last block */
-    int room, held, blocked;
+    double *limits; /* [6][channels] the stream's own */
+    double *raw;    /* [room][channels] samples since the last decision */
+    double *clean;  /* [room][channels] */
+    int room, held;
     int since; /* samples since the surface changed, or SINCE_LONG */
-    bool has_before;
-    int half_rung, before_rung;
+    struct nav_texture_halves halves;
+    struct nav_texture_watch watch;
     int kind; /* likeliest class of the windows in a row that are judged together, or NAV_TEXTURE_UNKNOWN */
     struct nav_texture_catch edge; /* its level is the sixth row of limits */
 };
@@ -41,6 +40,8 @@ static bool lengths_ok(const struct nav_texture_rules *r)
         if (nav_texture_rung_length(r->rung[i]) <= nav_texture_rung_length(r->rung[i - 1]))
             return false;
     }
+    if (r->settle && (!r->change || nav_texture_settle_length(r->settle) != nav_texture_change_length(r->change)))
+        return false;
     return r->channels >= 1 && r->classes >= 1 && r->limits.channels == r->channels;
 }
 
@@ -51,20 +52,14 @@ static const double *own_limit(double *to, const double *from, int channels)
 
 static bool allocate(struct nav_texture_stream *s)
 {
-    size_t channels = (size_t)s->rules.channels, classes = (size_t)s->rules.classes;
+    size_t channels = (size_t)s->rules.channels;
     s->span = nav_texture_span_new(&s->rules);
     s->limits = calloc(6 * channels, sizeof *s->limits);
     s->raw = calloc((size_t)s->room * channels, sizeof *s->raw);
     s->clean = calloc((size_t)s->room * channels, sizeof *s->clean);
-    s->before = calloc(classes, sizeof *s->before);
-    size_t block = s->rules.change ? (size_t)nav_texture_change_length(s->rules.change) : 1;
-    s->block = calloc(block * channels, sizeof *s->block);
-    bool ok = s->block && s->span && s->limits && s->raw && s->clean && s->before;
-    for (int i = 0; i < 3; i++) {
-        s->half[i] = calloc(classes, sizeof *s->half[i]);
-        ok = ok && s->half[i];
-    }
-    return ok;
+    bool halves = nav_texture_halves_make(&s->halves, &s->rules, s->border);
+    bool watch = nav_texture_watch_make(&s->watch, &s->rules, &s->rules.limits);
+    return halves && watch && s->span && s->limits && s->raw && s->clean;
 }
 
 static void own_limits(struct nav_texture_stream *s)
@@ -112,10 +107,8 @@ void nav_texture_stream_free(struct nav_texture_stream *s)
     free(s->limits);
     free(s->raw);
     free(s->clean);
-    free(s->before);
-    free(s->block);
-    for (int i = 0; i < 3; i++)
-        free(s->half[i]);
+    nav_texture_watch_free(&s->watch);
+    nav_texture_halves_free(&s->halves);
     free(s);
 }
 
@@ -129,72 +122,12 @@ static void new_surface(struct nav_texture_stream *s)
 
 void nav_texture_stream_reset(struct nav_texture_stream *s)
 {
-    s->held = s->blocked = 0;
+    s->held = 0;
     s->since = SINCE_LONG;
-    s->has_before = false;
-    if (s->rules.change)
-        nav_texture_change_keep(s->rules.change, 0);
+    s->halves.has_before = false;
+    nav_texture_watch_reset(&s->watch);
     new_surface(s);
     s->edge.known = s->edge.held = false;
-}
-
-/* Whether two stretches, judged at this rung, are of two surfaces: no class explains both. */
-static bool differ(const struct nav_texture_stream *s, int rung, const double *a, const double *b)
-{
-    double shared = -INFINITY;
-    for (int k = 0; k < s->rules.classes; k++)
-        shared = fmax(shared, a[k] + b[k]);
-    return rung >= 0 && -shared > s->rules.border[rung];
-}
-
-static void swap(double **a, double **b)
-{
-    double *kept = *a;
-    *a = *b;
-    *b = kept;
-}
-
-/* Judges both halves of n samples alone; returns their rung. */
-static int judge_halves(struct nav_texture_stream *s, const double *from, int n)
-{
-    int first = n / 2, later = n - first;
-    const double *middle = from + (size_t)first * (size_t)s->rules.channels;
-    double distance;
-    int one = nav_texture_span_judge(s->span, from, first, s->half[1], &distance);
-    int two = nav_texture_span_judge(s->span, middle, later, s->half[2], &distance);
-    return one == two ? one : -1;
-}
-
-/* Two views of the same samples, the whole and its halves, err differently: their mean errs less than either. */
-static void blend(const struct nav_texture_stream *s, double *loglik)
-{
-    double best = -INFINITY, both = 0.5 * pow(2.0, s->rules.growth);
-    for (int k = 0; k < s->rules.classes; k++) {
-        loglik[k] = 0.5 * (loglik[k] + both * (s->half[1][k] + s->half[2][k])) * s->rules.together;
-        best = fmax(best, loglik[k]);
-    }
-    for (int k = 0; k < s->rules.classes; k++)
-        loglik[k] -= best;
-}
-
-/* Looks for a border between half and half, between window and window, and between the window before and the later
- * half, which hold nothing of the other surface if the border lies in the earlier half; when the halves differ, what
- * counts is the later one. The halves and the window become those before. */
-static bool find_border(struct nav_texture_stream *s, double *loglik, int rung, int half_rung)
-{
-    bool inside = differ(s, half_rung, s->half[1], s->half[2]);
-    bool since = s->has_before && ((s->half_rung == half_rung && differ(s, half_rung, s->half[0], s->half[1])) ||
-                                   (s->before_rung == rung && differ(s, rung, s->before, loglik)) ||
-                                   differ(s, half_rung, s->before, s->half[2]));
-    size_t bytes = (size_t)s->rules.classes * sizeof *loglik;
-    if (inside)
-        memcpy(loglik, s->half[2], bytes);
-    memcpy(s->before, loglik, bytes);
-    s->before_rung = inside ? -1 : rung;
-    s->half_rung = half_rung;
-    swap(&s->half[0], &s->half[2]);
-    s->has_before = true;
-    return inside || since;
 }
 
 /* Confidence of the likeliest class under equal priors, and which. */
@@ -216,13 +149,8 @@ static void no_evidence(struct nav_texture_stream *s, struct nav_texture_decisio
     memset(loglik, 0, (size_t)s->rules.classes * sizeof *loglik);
     d->label = NAV_TEXTURE_UNKNOWN;
     d->confidence = 0.0;
-    s->has_before = false;
+    s->halves.has_before = false;
     new_surface(s);
-}
-
-static bool unreadable(const struct nav_texture_health *h, int n)
-{
-    return (double)h->bad > BAD_SHARE_MOST * n || h->still > 0 || h->railed > 0;
 }
 
 /* How far beyond every trained surface this window lies, or the windows in a row that it ends: above 1 is never
@@ -249,6 +177,18 @@ static bool never_trained(const struct nav_texture_stream *s, double beyond, dou
     return beyond > 1.0;
 }
 
+/* A whisker that still rings from another surface says little of this one. Windows so long that the ringing is a small
+ * part of them are taken as they are. */
+static bool rings(const struct nav_texture_stream *s, double *loglik)
+{
+    const struct nav_texture_settle *settle = s->rules.step == 0 ? s->rules.settle : NULL;
+    bool ringing = settle && s->held <= NAV_TEXTURE_SETTLE_MOST * nav_texture_settle_length(settle) &&
+                   nav_texture_settle_rings(settle);
+    for (int k = 0; k < s->rules.classes && ringing; k++)
+        loglik[k] *= RINGING;
+    return ringing;
+}
+
 static bool edge_holds(struct nav_texture_stream *s, bool sudden)
 {
     return nav_texture_catch_follow(&s->edge, s->clean, s->held, s->rules.step > 0 ? s->rules.step : s->held, sudden);
@@ -267,7 +207,7 @@ static bool decide(struct nav_texture_stream *s, struct nav_texture_decision *d,
     d->samples = s->held;
     memcpy(s->clean, s->raw, (size_t)s->held * (size_t)s->rules.channels * sizeof *s->clean);
     d->health = nav_texture_clean(s->clean, s->held, &s->rules.limits);
-    bool readable = !unreadable(&d->health, s->held);
+    bool readable = !nav_texture_unreadable(&d->health, s->held);
     if (readable && d->health.railed == 0 && edge_holds(s, d->health.caught > 0))
         d->health.caught = d->health.caught > 0 ? d->health.caught : 1;
     d->border = d->health.caught > 0 && d->health.railed == 0;
@@ -281,49 +221,34 @@ static bool decide(struct nav_texture_stream *s, struct nav_texture_decision *d,
         no_evidence(s, d, loglik);
         return false;
     }
-    int half_rung = judge_halves(s, from, n);
-    if (half_rung >= 0)
-        blend(s, loglik);
+    int half_rung = nav_texture_halves_judge(&s->halves, s->span, from, n, loglik);
     best(loglik, s->rules.classes, &d->label);
     double beyond = strangeness(s, d->distance, rung, n, d->label);
     bool strange = never_trained(s, beyond, loglik);
     d->confidence = best(loglik, s->rules.classes, &d->label);
     if (s->rules.step > 0 && (d->confidence < s->rules.sure || strange) && s->held < s->room)
         return false;
-    bool halves = find_border(s, loglik, rung, half_rung);
+    bool halves = nav_texture_halves_border(&s->halves, loglik, rung, half_rung);
     d->border = cut || (halves && !watched(s));
+    bool ringing = rings(s, loglik);
     d->confidence = best(loglik, s->rules.classes, &d->label);
     if (strange)
         d->confidence /= beyond;
     bool unsure = d->confidence < (s->rules.step > 0 ? s->rules.sure : s->rules.doubt);
-    if (strange || unsure)
+    if (strange || ringing || unsure)
         d->label = NAV_TEXTURE_UNKNOWN;
     return true;
 }
 
-/* Whether the block that this sample completes shows that the surface has changed. */
+/* Whether this sample shows that the surface has changed. */
 static bool changed(struct nav_texture_stream *s, const double *sample)
 {
-    struct nav_texture_change *change = s->rules.change;
-    size_t channels = (size_t)s->rules.channels;
     s->since += s->since < SINCE_LONG;
-    if (!watched(s))
+    int after = watched(s) ? nav_texture_watch_take(&s->watch, sample, s->edge.held) : 0;
+    if (after == 0)
         return false;
-    memcpy(s->block + (size_t)s->blocked++ * channels, sample, channels * sizeof *sample);
-    int length = nav_texture_change_length(change), after;
-    if (s->blocked < length)
-        return false;
-    s->blocked = 0;
-    struct nav_texture_health health = nav_texture_clean(s->block, length, &s->rules.limits);
-    if (unreadable(&health, length) || health.caught > 0 || s->edge.held) {
-        nav_texture_change_keep(change, 0);
-        return false;
-    }
-    if (!(nav_texture_change_weigh(change, s->block, &after) > nav_texture_change_limit(change)))
-        return false;
-    nav_texture_change_keep(change, after);
-    s->since = after * length;
-    s->has_before = false;
+    s->since = after;
+    s->halves.has_before = false;
     new_surface(s);
     return true;
 }

@@ -5,6 +5,7 @@
 #include "texture_change.h"
 #include "texture_clean.h"
 #include "texture_rung.h"
+#include "texture_settle.h"
 #include "texture_strange.h"
 
 /* cffi: begin */
@@ -30,6 +31,7 @@ struct nav_texture_rules {
     struct nav_texture_change *change;   /* lent to this stream alone; NULL: borders are those of the windows' halves */
     struct nav_texture_strange *strange; /* likewise; NULL: windows are strange one by one. Unused by windows that are
                                             not of exactly one rung */
+    struct nav_texture_settle *settle; /* likewise, of blocks as long as `change`'s; NULL: ringing passes for a floor */
 };
 
 struct nav_texture_decision {

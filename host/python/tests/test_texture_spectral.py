@@ -119,6 +119,22 @@ def test_windows_in_a_row_betray_a_surface_that_one_does_not():
     assert fit_strange([features[n] for n in few], labels[few], folds[few], WINDOW, 0.995) is None
 
 
+def test_a_whisker_that_rings_from_another_surface_names_none_and_says_little():
+    rng = np.random.default_rng(62)
+
+    def hiss(loud, n=2000):
+        return np.round(32768 + loud * rng.normal(size=(n, 2)))
+
+    model = train({f"{loud}": [hiss(loud) for _ in range(5)] for loud in (18, 60, 200)}, RATE_HZ)
+    fading = hiss(18, 1400) + np.exp(-np.maximum(np.arange(1400) - 800, 0) / 200)[:, None] * (hiss(200, 1400) - 32768)
+    found = {d.end: d for d in model.judge(fading, WINDOW)}
+    model.settle = None
+    believed = {d.end: d for d in model.judge(fading, WINDOW)}
+    assert found[800].label == 2 and (found[800].loglik == believed[800].loglik).all()
+    for end in (1000, 1200, 1400):
+        assert found[end].label == -1 and found[end].loglik.min() > 0.1 * believed[end].loglik.min()
+
+
 def test_a_catch_is_a_border_and_no_surface(model):
     x = drag("SMOOTH", 1000, 61)
     x[450:750, 0] += 3000 * np.sin(np.linspace(0, np.pi, 300))

@@ -39,6 +39,7 @@ HEADERS = {
             "touch/texture_rung.h",
             "touch/texture_change.h",
             "touch/texture_clean.h",
+            "touch/texture_settle.h",
             "touch/texture_strange.h",
             "touch/texture_stream.h",
             "models/pose.h",

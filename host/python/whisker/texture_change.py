@@ -11,7 +11,7 @@ SHRINK = 0.05  # share of the diagonal in covariances
 ROW = 4  # blocks over which their dependence is measured
 GROUP = 24  # blocks of which the largest ratio counts: while the blocks around one event are held, it shows in all
 FALSE_EVERY = (
-    4000  # blocks of one surface with one false change: a thousand windows of four, 10 m at 0.1 m/s and 100 ms
+    2000  # blocks of one surface with one false change: five hundred windows of four, 5 m at 0.1 m/s and 100 ms
 )
 TAIL = 0.2  # share of the groups that the tail is fitted to
 NEVER = 1e9  # nats

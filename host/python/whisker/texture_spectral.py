@@ -10,10 +10,11 @@ from .native import doubles, ffi, lib
 from .tables import TableError
 from .texture_change import Change
 from .texture_rung import Rung
+from .texture_settle import Settle
 from .texture_strange import Strange
 
-FORMAT = "whisker texture model 4"
-PARTS = {"change": Change, "strange": Strange}  # of windows in a row
+FORMAT = "whisker texture model 5"
+PARTS = {"change": Change, "strange": Strange, "settle": Settle}  # of windows in a row
 LIMITS = ("spike", "still", "low", "high")
 
 
@@ -47,6 +48,7 @@ class SpectralModel:
     sure: float = 0.99
     change: Change | None = None
     strange: Strange | None = None
+    settle: Settle | None = None
     figures: dict = field(default_factory=dict)  # of held-out recordings, for the reader
 
     @property
@@ -136,9 +138,11 @@ class Stream:
         rules.rung, rules.unknown, rules.border = natives, doubles(unknown), doubles(border)
         rules.growth, rules.together, rules.doubt, rules.sure = model.growth, model.together, model.doubt, model.sure
         rules.step, rules.patience = step, patience
-        self._change = model.change.native() if model.change is not None and not step else ffi.NULL
-        self._strange = model.strange.native() if model.strange is not None and not step else ffi.NULL
-        rules.change, rules.strange = self._change, self._strange
+        self._parts = {
+            name: ffi.NULL if step else _native(getattr(model, name)) for name in PARTS
+        }  # lent to the stream
+        for name, part in self._parts.items():
+            setattr(rules, name, part)
         # The span of windows at least as long as those judged; the longest rung's if there is none.
         longest = patience if step else window
         span = next((r.span for r in model.rungs if r.length >= longest), model.rungs[-1].span)
@@ -182,7 +186,11 @@ class Stream:
         )
 
 
-def _fields(part: Rung | Change) -> dict:
+def _native(part: Change | Strange | Settle | None):
+    return ffi.NULL if part is None else part.native()
+
+
+def _fields(part: Rung | Change | Strange | Settle) -> dict:
     return {n: getattr(part, n) for n in part.NUMBERS} | {n: _listed(getattr(part, n)) for n in part.ARRAYS}
 
 

@@ -4,6 +4,7 @@ import numpy as np
 
 from .texture_change import fit_change
 from .texture_fit import UNKNOWN_QUANTILE, Fitted, Windows, fit, log_loss
+from .texture_settle import fit_settle
 from .texture_spectral import SpectralModel
 from .texture_strange import fit_strange
 
@@ -37,7 +38,10 @@ def train(recordings: dict[str, list[np.ndarray]], rate_hz: float, window_ms: fl
             rung.span = span
     model = SpectralModel(list(recordings), rate_hz, [f.rung for f in fitted], limits, window_ms)
     _calibrate(model, fitted, parts, labels, folds, base)
-    model.change = fit_change(parts, labels, folds, max(LENGTH_LEAST, round(base / BLOCKS)), floor)
+    block = max(LENGTH_LEAST, round(base / BLOCKS))
+    model.change = fit_change(parts, labels, folds, block, floor)
+    if model.change is not None:
+        model.settle = fit_settle(parts, block, floor, UNKNOWN_QUANTILE)
     model.strange = _strange(model, parts, labels, folds, base)
     return model
 
@@ -226,12 +230,13 @@ def _doubt(right: np.ndarray, confidence: np.ndarray) -> float:
 
 def _sure(twins, parts, labels, folds, base: int, fixed: float) -> tuple[float, float, float]:
     """The least sureness at which sequential decisions are right as often as fixed windows; samples and accuracy."""
-    for sure in SURE:
+    tried, low, high = {}, 0, len(SURE) - 1
+    while SURE[low] not in tried:  # accuracy grows with sureness: halve what is left
+        sure = SURE[(low + high) // 2]
         for twin in twins:
             twin.sure = sure
         decisions = _decisions(twins, parts, folds, base, sequential=True)
         right, _ = _scores(decisions, labels)
-        accuracy, samples = float(right.mean()), float(np.mean([d.samples for g in decisions for d in g]))
-        if accuracy >= fixed:
-            break
-    return sure, samples, accuracy
+        tried[sure] = float(np.mean([d.samples for g in decisions for d in g])), float(right.mean())
+        low, high = (low, (low + high) // 2) if tried[sure][1] >= fixed else (min((low + high) // 2 + 1, high), high)
+    return SURE[low], *tried[SURE[low]]
