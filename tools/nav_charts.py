@@ -28,22 +28,50 @@ def panels(count: int, columns: int = 2, width: float = 4.6, height: float = 3.6
     return figure, axes[:count]
 
 
+def legend_above(figure, axes) -> None:
+    """One legend for all panels, beside none of their lines."""
+    told = {label: handle for ax in axes for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)}
+    figure.legend(told.values(), told.keys(), loc="outside upper center", ncols=len(told), frameon=False, fontsize=7)
+
+
+PEERS = {"filterpy": "D", "particles": "v", "pfilter": "h", "mrpt": "d"}
+
+
+def by_filter(points: dict) -> dict[str, list[tuple[str, dict]]]:
+    """Points of each filter, its sizes from the quickest on; a title is the filter's name and its size."""
+    sizes = {}
+    for title, point in sorted(points.items(), key=lambda item: item[1]["step_us_median"]["median"]):
+        name, _, size = title.partition(" ")
+        sizes.setdefault(name, []).append((size, point))
+    return sizes
+
+
+def draw_sizes(ax, look: dict, name: str, sizes: list[tuple[str, dict]]) -> None:
+    """One filter: its sizes joined by a line, the error's middle half as a bar, p99 as a tail to the right."""
+    x = np.array([c["step_us_median"]["median"] for _, c in sizes])
+    y, low, high = 1000 * np.array([[c["error_median_m"][k] for k in ("median", "low", "high")] for _, c in sizes]).T
+    tail = np.maximum([c["step_us_p99"]["median"] for _, c in sizes] - x, 0.0)
+    ax.errorbar(
+        x, y, xerr=[0 * tail, tail], yerr=[y - low, high - y], **look, linewidth=0.8, elinewidth=0.5, label=name
+    )
+    for (size, _), at in zip(sizes, zip(x, y, strict=True), strict=True):
+        ax.annotate(size, at, textcoords="offset points", xytext=(3, 3), fontsize=5)
+
+
 def pareto(data: dict) -> Figure:
     """Median us per step (p99 as a tail to the right) against median position error (middle half of the runs)."""
     families = data["families"]
-    figure, axes = panels(len(families), width=5.2, height=4.4)
+    figure, axes = panels(len(families), width=5.6, height=4.6)
     for ax, (family, table) in zip(axes, families.items(), strict=True):
-        points = dict(table) | data.get("peers", {}).get(family, {})
-        for title, c in points.items():
-            x, y = c["step_us_median"]["median"], 1000 * c["error_median_m"]["median"]
-            tail = [[0.0], [max(c["step_us_p99"]["median"] - x, 0.0)]]
-            span = [[y - 1000 * c["error_median_m"]["low"]], [1000 * c["error_median_m"]["high"] - y]]
-            look = style(title) if title in table else {"marker": "D", "color": "0.4", "markerfacecolor": "none"}
-            ax.errorbar(x, y, xerr=tail, yerr=span, **look, markersize=7, linewidth=0.8)
-            ax.annotate(title, (x, y), textcoords="offset points", xytext=(4, 4), fontsize=6)
+        for name, sizes in by_filter(table).items():
+            draw_sizes(ax, line(name), name, sizes)
+        for name, sizes in by_filter(data.get("peers", {}).get(family, {})).items():
+            hollow = {"marker": PEERS.get(name, "8"), "color": "0.4", "markerfacecolor": "none", "linestyle": "none"}
+            draw_sizes(ax, hollow | {"markersize": 5}, name, sizes)
         ax.set(xscale="log", yscale="log", title=family, xlabel="us per step, median (tail: p99)")
         ax.set_ylabel("median position error (mm)")
         ax.grid(True, which="both", linewidth=0.3)
+    legend_above(figure, axes)
     return figure
 
 
@@ -57,7 +85,7 @@ def cost(data: dict) -> Figure:
             ax.plot([p["x"] for p in points], [p["step_us_median"] for p in points], label=name, **line(name))
         ax.set(yscale="log", xlabel=labels[axis], ylabel="us per step, median")
         ax.grid(True, which="both", linewidth=0.3)
-        ax.legend(frameon=False, fontsize=7)
+    legend_above(figure, axes)
     return figure
 
 
@@ -80,7 +108,7 @@ def honesty(data: dict) -> Figure:
     for ax in (left, right):
         ax.set_xticks(places, families, rotation=40, ha="right")
         ax.grid(True, axis="y", linewidth=0.3)
-    left.legend(frameon=False, fontsize=7, ncols=2)
+    legend_above(figure, [left])
     return figure
 
 
@@ -96,7 +124,7 @@ def locks(data: dict) -> Figure:
                 ax.step(c["rows"], share, where="post", label=f"{name} ({c['locked']})", **look)
         ax.set(title=family, xlabel="rows until lock (0.1 s each)", ylabel="runs locked (%)", ylim=(0, 103))
         ax.grid(True, linewidth=0.3)
-        ax.legend(frameon=False, fontsize=7, loc="lower right")
+        ax.legend(framealpha=0.9, fontsize=7, loc="center right")
     return figure
 
 

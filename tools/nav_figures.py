@@ -67,7 +67,7 @@ def peers(rows: list[dict], ours: list[str]) -> dict[str, dict]:
     """bench_nav_peers' rows of filters that are not ours, as points of the Pareto chart by family and title."""
     out = {}
     for row in rows:
-        if row["filter"] in ours:
+        if row["filter"].split()[0] in ours:
             continue
         low, high = row["error_median_quartiles_m"]
         out.setdefault(row["family"], {})[f"{row['filter']} {row['setting']}".strip()] = {
