@@ -143,6 +143,7 @@ static void test_encoders_count_and_wrap(void **state)
     robot.motion.angle_rad = M_PI / 2; /* each wheel a quarter of its circle of 235 mm */
     int apart = (int)floor(M_PI / 2 * 117.5 / mm_per_count + 1000.5);
     assert_int_equal(ask(CREATE_OI_ENCODER_RIGHT, 1), apart);
+    assert_int_equal(ask(CREATE_OI_ENCODER_LEFT, 1), (int)floor(1000.5 - M_PI / 2 * 117.5 / mm_per_count));
     robot.motion = (struct sim_create_motion){.distance_m = 32768.5 * mm_per_count / 1000};
     assert_int_equal(ask(CREATE_OI_ENCODER_RIGHT, 1), -32768);
     robot.motion.distance_m = -0.5 * mm_per_count / 1000;
