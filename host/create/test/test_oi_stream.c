@@ -22,6 +22,7 @@ struct feed {
     struct create_frame frame; /* the newest */
     int32_t voltages[FRAMES];  /* of each frame: its number */
     size_t frames;
+    uint32_t missed;
 };
 
 static void push(struct feed *feed, const uint8_t *bytes, size_t count)
@@ -29,6 +30,7 @@ static void push(struct feed *feed, const uint8_t *bytes, size_t count)
     for (size_t i = 0; i < count; i++) {
         if (create_stream_push(&feed->stream, bytes[i], &feed->frame)) {
             assert_true(feed->frames < FRAMES);
+            feed->missed += feed->frame.missed;
             feed->voltages[feed->frames++] = feed->frame.value[CREATE_OI_VOLTAGE];
         }
     }
@@ -198,6 +200,7 @@ static void exactly_the_damaged_frame_is_lost(void **state)
         struct feed *feed = begin();
         push(feed, damaged, count);
         assert_int_equal(feed->frames, between ? FRAMES : FRAMES - 1);
+        assert_int_equal(feed->missed, between ? 0 : 1);
         for (size_t i = 0; i < feed->frames; i++) {
             assert_int_equal(feed->voltages[i], i + (!between && i >= at / length ? 1 : 0));
         }

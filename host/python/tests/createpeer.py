@@ -13,6 +13,7 @@ from whisker.bridgesim import program
 START, SAFE, FULL, DRIVE, STREAM, PAUSE = 128, 131, 132, 145, 148, 150
 PASSIVE_MODE, SAFE_MODE, FULL_MODE = 1, 2, 3
 STOP = bytes([DRIVE, 0, 0, 0, 0])
+FIRM_STOP = bytes(32) + STOP  # of a guard, or of a driver that starts
 SIZES = {7: 1, 9: 1, 10: 1, 11: 1, 12: 1, 19: 2, 20: 2, 22: 2, 25: 2, 26: 2, 34: 1, 35: 1, 41: 2, 42: 2, 43: 2, 44: 2}
 HEALTHY = {22: 14500, 25: 2500, 26: 2700, 35: SAFE_MODE}
 

@@ -10,7 +10,7 @@ import subprocess
 import sys
 
 import pytest
-from createpeer import DRIVE, FULL, PAUSE, SAFE, START, STOP, STREAM, Driver, drive_order
+from createpeer import DRIVE, FIRM_STOP, FULL, PAUSE, SAFE, START, STOP, STREAM, Driver, drive_order
 
 from whisker import base
 from whisker.base import BaseError, BaseLost
@@ -175,10 +175,10 @@ def test_a_killed_driver_stops_the_wheels_and_another_takes_over(start):
         client.drive(0.2, 0)
         driver.peer.await_order(drive_order(200, 200))
         os.kill(int(client.health()["driver_pid"]), signal.SIGKILL)
-        driver.peer.await_order(STOP)
+        assert driver.peer.await_order(FIRM_STOP) == b""  # the guard's
+        assert driver.peer.await_start() == FIRM_STOP  # the next driver's
         with pytest.raises(BaseLost):
             client.health()
-    driver.peer.await_start()
     with driver.client() as client:
         assert client.health()["restarts"] == "1"
         client.drive(0.1, 0)
@@ -191,8 +191,8 @@ def test_a_driver_that_hangs_is_replaced(start):
         client.drive(0.2, 0)
         driver.peer.await_order(drive_order(200, 200))
         os.kill(int(client.health()["driver_pid"]), signal.SIGSTOP)
-        driver.peer.await_order(STOP)
-        driver.peer.await_start()
+        assert FIRM_STOP not in driver.peer.await_order(FIRM_STOP)  # it hangs
+        assert driver.peer.await_start() == 2 * FIRM_STOP  # it was ended; the next one starts
     with driver.client() as client:
         assert client.health()["restarts"] == "1"
 
