@@ -91,21 +91,41 @@ static int longest_run(struct view v)
     return longest;
 }
 
-/* Lowest and highest sample; `stops`: samples at or beyond a stop whose predecessor was there too. */
-static double range(struct view v, double low, double high, int *stops)
+/* Whether more than `limit` samples in a row are equal. Such a run holds every limit-th sample and one beside it. */
+static bool still(struct view v, double limit)
 {
-    double least = INFINITY, most = -INFINITY;
-    bool was = false;
-    *stops = 0;
+    int apart = limit >= 1.0 && limit < v.n ? (int)limit : v.n;
+    bool perhaps = limit < 1.0;
+    for (int i = 0; i < v.n - 1; i += apart)
+        perhaps |= *sample(v, i) == *sample(v, i + 1) || (i > 0 && *sample(v, i) == *sample(v, i - 1));
+    return perhaps && longest_run(v) > limit;
+}
+
+struct range {
+    double least, most;
+};
+
+static struct range range(struct view v)
+{
+    struct range r = {INFINITY, -INFINITY};
     for (int i = 0; i < v.n; i++) {
         double x = *sample(v, i);
-        bool now = x <= low || x >= high;
-        *stops += now && was;
-        was = now;
-        least = x < least ? x : least;
-        most = x > most ? x : most;
+        r.least = x < r.least ? x : r.least;
+        r.most = x > r.most ? x : r.most;
     }
-    return most - least;
+    return r;
+}
+
+/* Whether a sample at or beyond a stop follows another. */
+static bool railed(struct view v, struct range r, double low, double high)
+{
+    bool was = false, found = false;
+    for (int i = 0; i < v.n && (r.least <= low || r.most >= high); i++) {
+        bool now = *sample(v, i) <= low || *sample(v, i) >= high;
+        found |= now && was;
+        was = now;
+    }
+    return found;
 }
 
 struct nav_texture_health nav_texture_clean(double *window, int n, const struct nav_texture_limits *limits)
@@ -118,12 +138,11 @@ struct nav_texture_health nav_texture_clean(double *window, int n, const struct 
         if (bad > 0)
             fill(v);
         health.bad = bad > health.bad ? bad : health.bad;
-        int stops;
-        double span =
-            range(v, limits->low ? limits->low[c] : -INFINITY, limits->high ? limits->high[c] : INFINITY, &stops);
-        health.still += limits->still && longest_run(v) > limits->still[c];
-        health.railed += stops > 0;
-        health.caught += limits->span && span > limits->span[c];
+        struct range r = range(v);
+        health.still += limits->still && still(v, limits->still[c]);
+        health.railed +=
+            railed(v, r, limits->low ? limits->low[c] : -INFINITY, limits->high ? limits->high[c] : INFINITY);
+        health.caught += limits->span && r.most - r.least > limits->span[c];
     }
     return health;
 }
