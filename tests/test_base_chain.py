@@ -14,7 +14,7 @@ from chainrun import BLOCK_TICKS, END_S, FAST_LINK, TICKS_PER_S, program, runnin
 from whisker.base import Base
 from whisker.simlink import SimLink
 
-SECONDS = 2.4
+SECONDS = 1.6
 X_M, Y_M = 1.5, 1.5
 SCENE = f"""\
 size_m 3 3

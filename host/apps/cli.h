@@ -19,6 +19,9 @@ bool cli_number(const char *program, const char *option, const char *text, uint3
  * NULL if there is none. */
 uint8_t *cli_byte_setting(struct whisker_settings *settings, const char *name);
 
+/* CLOCK_MONOTONIC in ms. */
+int64_t cli_now_ms(void);
+
 /* Turns SIGINT, SIGTERM and SIGHUP into a wish to end. Blocking calls are interrupted. */
 void cli_catch_signals(void);
 

@@ -4,7 +4,6 @@
 #include <signal.h>
 #include <string.h>
 #include <sys/socket.h>
-#include <time.h>
 #include <unistd.h>
 
 #include "cli.h"
@@ -24,13 +23,6 @@ struct driver {
     int64_t alive_ms, tried_ms;
     bool opened; /* the port was open before: the next time is a reconnect */
 };
-
-static int64_t now_ms(void)
-{
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
-}
 
 /* Tells the guard one thing, with the port's descriptor where it is not negative. */
 static void tell(const struct driver *driver, enum base_tell what, int port)
@@ -62,8 +54,8 @@ static void tell_port(struct driver *driver)
 
 static void tell_alive(struct driver *driver)
 {
-    if (!driver->start.options->stream_clock && now_ms() - driver->alive_ms >= ALIVE_MS) {
-        driver->alive_ms = now_ms();
+    if (!driver->start.options->stream_clock && cli_now_ms() - driver->alive_ms >= ALIVE_MS) {
+        driver->alive_ms = cli_now_ms();
         tell(driver, BASE_ALIVE, -1);
     }
 }
@@ -72,11 +64,11 @@ static void tell_alive(struct driver *driver)
 static void reopen(struct driver *driver)
 {
     struct base_robot *robot = &driver->robot;
-    if (robot->port >= 0 || now_ms() - driver->tried_ms < BASE_REOPEN_MS) {
+    if (robot->port >= 0 || cli_now_ms() - driver->tried_ms < BASE_REOPEN_MS) {
         return;
     }
-    driver->tried_ms = now_ms();
-    if (base_robot_open(robot, -1, now_ms())) {
+    driver->tried_ms = cli_now_ms();
+    if (base_robot_open(robot, -1, cli_now_ms())) {
         robot->reconnects += driver->opened;
         if (driver->opened) {
             daemon_log(LOG_NOTE, "%s: is back", robot->options->port);
@@ -104,7 +96,7 @@ static void await(struct driver *driver)
 {
     sigset_t none;
     sigemptyset(&none);
-    const int64_t due = base_robot_watch(&driver->robot, now_ms());
+    const int64_t due = base_robot_watch(&driver->robot, cli_now_ms());
     const int64_t sleep_ms = driver->start.options->stream_clock && driver->robot.port >= 0 ? -1 : least(due, ALIVE_MS);
     const struct timespec timeout = {.tv_nsec = sleep_ms * 1000000};
     fill(driver);
@@ -118,7 +110,7 @@ static void await(struct driver *driver)
 static void serve(struct driver *driver)
 {
     if (driver->polled[PORT].revents && driver->robot.port >= 0) {
-        base_robot_read(&driver->robot, base_clients_limit(&driver->clients), now_ms());
+        base_robot_read(&driver->robot, base_clients_limit(&driver->clients), cli_now_ms());
     }
     if (driver->polled[LISTENING].revents) {
         const int socket = accept4(driver->start.listening, NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC);
@@ -126,7 +118,7 @@ static void serve(struct driver *driver)
             base_clients_add(&driver->clients, socket);
         }
     }
-    base_clients_serve(&driver->clients, &driver->polled[CLIENTS], now_ms());
+    base_clients_serve(&driver->clients, &driver->polled[CLIENTS], cli_now_ms());
     if (driver->told_port != driver->robot.port) {
         tell_port(driver);
     }
@@ -136,8 +128,8 @@ static void serve(struct driver *driver)
 static bool open_first(struct driver *driver)
 {
     const struct base_driver_start *start = &driver->start;
-    driver->tried_ms = now_ms();
-    driver->opened = base_robot_open(&driver->robot, start->port, now_ms());
+    driver->tried_ms = cli_now_ms();
+    driver->opened = base_robot_open(&driver->robot, start->port, cli_now_ms());
     if (!driver->opened && !start->options->wait && start->restarts == 0) {
         return false;
     }

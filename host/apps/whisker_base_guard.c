@@ -8,7 +8,6 @@
 #include <sys/socket.h>
 #include <sys/un.h>
 #include <sys/wait.h>
-#include <time.h>
 #include <unistd.h>
 
 #include "cli.h"
@@ -32,13 +31,6 @@ struct guard {
     int64_t heard_ms;
     bool stuck;
 };
-
-static int64_t now_ms(void)
-{
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
-}
 
 /* ---------------------------------------------------------------------------------------------------------- the wheels
  */
@@ -88,7 +80,7 @@ static bool hear(struct guard *guard)
     if (got <= 0) {
         return got < 0 && errno == EINTR;
     }
-    guard->heard_ms = now_ms();
+    guard->heard_ms = cli_now_ms();
     guard->stuck = false;
     if (byte == BASE_PORT || byte == BASE_NO_PORT) {
         hold_port(guard, descriptor_of(&message));
@@ -113,7 +105,7 @@ static bool start_driver(struct guard *guard)
     if (socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends) != 0) {
         return false;
     }
-    guard->heard_ms = now_ms();
+    guard->heard_ms = cli_now_ms();
     guard->child = fork();
     if (guard->child == 0) {
         close(ends[0]);
@@ -127,8 +119,8 @@ static bool start_driver(struct guard *guard)
 /* A driver that hangs cannot stop the wheels: it is done for it, and in the end it is ended. */
 static void watch_driver(struct guard *guard)
 {
-    const int64_t silent_ms = now_ms() - guard->heard_ms;
-    if (guard->options->stream_clock || silent_ms < BASE_STUCK_MS) {
+    const int64_t silent_ms = cli_now_ms() - guard->heard_ms;
+    if (silent_ms < BASE_STUCK_MS) {
         return;
     }
     if (!guard->stuck) {
@@ -141,28 +133,40 @@ static void watch_driver(struct guard *guard)
     }
 }
 
-/* Waits for the driver's end, which is passed the wish to stop. Returns its status as of waitpid(). */
+/* Passes on the wish to stop; from now on the driver has to end. */
+static void end_driver(struct guard *guard)
+{
+    daemon_notify_stopping();
+    guard->heard_ms = cli_now_ms();
+    kill(guard->child, SIGTERM);
+}
+
+/* Sleeps until the driver says something, something is due, or a signal has come; false: the driver has died. */
+static bool look(struct guard *guard, bool timed)
+{
+    sigset_t none;
+    sigemptyset(&none);
+    struct pollfd polled = {.fd = guard->driver, .events = POLLIN};
+    const struct timespec due = {.tv_nsec = LOOK_MS * 1000000L};
+    const bool lives = ppoll(&polled, 1, timed ? &due : NULL, &none) <= 0 || hear(guard);
+    if (timed && lives) {
+        watch_driver(guard);
+    }
+    daemon_notify_alive();
+    return lives;
+}
+
+/* Waits for the driver's end. Returns its status as of waitpid(). */
 static int attend(struct guard *guard)
 {
     bool told = false;
     int status = 0;
-    sigset_t none;
-    sigemptyset(&none);
-    for (bool lives = true; lives;) {
+    do {
         if (cli_stop_wanted() && !told) {
             told = true;
-            daemon_notify_stopping();
-            kill(guard->child, SIGTERM);
+            end_driver(guard);
         }
-        struct pollfd polled = {.fd = guard->driver, .events = POLLIN};
-        const struct timespec look = {.tv_nsec = LOOK_MS * 1000000L};
-        const bool clocked = !guard->options->stream_clock;
-        if (ppoll(&polled, 1, clocked ? &look : NULL, &none) > 0) {
-            lives = hear(guard);
-        }
-        watch_driver(guard);
-        daemon_notify_alive();
-    }
+    } while (look(guard, told || !guard->options->stream_clock));
     close(guard->driver);
     waitpid(guard->child, &status, 0);
     if (!WIFEXITED(status)) {
@@ -175,7 +179,7 @@ static void pause_after(const struct guard *guard, int64_t begun_ms)
 {
     sigset_t none;
     sigemptyset(&none);
-    if (now_ms() - begun_ms < YOUNG_MS && guard->restarts > 1) {
+    if (cli_now_ms() - begun_ms < YOUNG_MS && guard->restarts > 1) {
         const struct timespec pause = {.tv_nsec = PAUSE_MS * 1000000L};
         ppoll(NULL, 0, &pause, &none);
     }
@@ -185,7 +189,7 @@ static void pause_after(const struct guard *guard, int64_t begun_ms)
 static int keep_driver(struct guard *guard)
 {
     while (start_driver(guard)) {
-        const int64_t begun_ms = now_ms();
+        const int64_t begun_ms = cli_now_ms();
         const int status = attend(guard);
         if (WIFEXITED(status) || cli_stop_wanted()) {
             return WIFEXITED(status) ? WEXITSTATUS(status) : CLI_OK;

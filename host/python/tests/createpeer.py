@@ -92,7 +92,11 @@ class Driver:
         self.peer = Peer(folder / "port")
         self.socket = folder / "base.sock"
         self.log = folder / "log"
-        words = [program("whisker-base"), "--port", self.peer.link, "--socket", self.socket, *options]
+        self._options = options
+        self.start()
+
+    def start(self) -> None:
+        words = [program("whisker-base"), "--port", self.peer.link, "--socket", self.socket, *self._options]
         with self.log.open("w") as log:
             self.process = subprocess.Popen([str(word) for word in words], stderr=log)
 
