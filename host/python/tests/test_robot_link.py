@@ -23,11 +23,11 @@ def seqs(got) -> list[int]:
 class Pair:
     """A pilot and a navigator that sees its rows, over loopback."""
 
-    def __init__(self, endpoint=None, way=None, **options):
+    def __init__(self, endpoint=None, way=None):
         """`way`: what the navigator connects to, when it is not the pilot's endpoint."""
         self.endpoint = endpoint or free_endpoint()
-        self.pilot = Link("pilot", listen=[self.endpoint], **options)
-        self.navigator = Link("navigator", connect=[way or self.endpoint], **options)
+        self.pilot = Link("pilot", listen=[self.endpoint], lock_step=True)
+        self.navigator = Link("navigator", connect=[way or self.endpoint], lock_step=True)
         self.inbox = self.navigator.subscribe("observation", "health/*")
         self.navigator.announce()
         assert self.pilot.wait_for(["navigator"], PATIENCE_S)
@@ -41,7 +41,7 @@ class Pair:
 
 
 def test_rows_arrive_in_order_and_the_end_is_told():
-    with Pair(lock_step=True) as pair:
+    with Pair() as pair:
         rows = pair.pilot.publish("observation")
         for seq in range(300):
             rows.send(row(seq))
@@ -56,7 +56,8 @@ def test_rows_arrive_in_order_and_the_end_is_told():
 
 def test_every_topic_has_its_type():
     endpoint = free_endpoint()
-    with Link("pilot", listen=[endpoint]) as pilot, Link("view", connect=[endpoint]) as view:
+    pilot = Link("pilot", listen=[endpoint], lock_step=True)
+    with pilot, Link("view", connect=[endpoint], lock_step=True) as view:
         inbox = view.subscribe("**")
         view.announce()
         assert pilot.wait_for(["view"], PATIENCE_S)
@@ -69,6 +70,21 @@ def test_every_topic_has_its_type():
         with pytest.raises(KeyError):
             pilot.publish("nonsense")
     assert {r.topic: m.encode(r.message) for r in got} == {topic: m.encode(x) for topic, x in sent.items()}
+
+
+def test_who_connects_to_each_other_gets_every_message_once():
+    ends = free_endpoint(), free_endpoint()
+    navigator = Link("navigator", listen=[ends[1]], connect=[ends[0]], lock_step=True)
+    with navigator, Link("pilot", listen=[ends[0]], connect=[ends[1]], lock_step=True) as pilot:
+        inbox = navigator.subscribe("observation")
+        navigator.announce()
+        assert pilot.wait_for(["navigator"], PATIENCE_S)
+        rows = pilot.publish("observation")
+        for seq in range(50):
+            rows.send(row(seq))
+        rows.end(0)
+        got = take_until(inbox, lambda got: got and got[-1].over)
+    assert seqs(got) == list(range(50)) and inbox.tallies["observation"].repeated == 0
 
 
 def test_another_robot_is_another_robot():
@@ -92,7 +108,7 @@ def test_a_killed_sender_comes_back_as_a_new_stream():
         take_until(pair.inbox, lambda got: len(got) == 3)
         pair.pilot.close()
         assert pair.navigator.wait_gone("pilot", PATIENCE_S)
-        pair.pilot = Link("pilot", listen=[pair.endpoint])
+        pair.pilot = Link("pilot", listen=[pair.endpoint], lock_step=True)
         assert pair.pilot.wait_for(["navigator"], PATIENCE_S)
         rows = pair.pilot.publish("observation")
         rows.send(row(0))
@@ -110,7 +126,7 @@ def test_a_restarted_reader_joins_where_the_stream_is():
         pair.navigator.close()
         assert pair.pilot.wait_gone("navigator", PATIENCE_S)
         rows.send(row(5))
-        pair.navigator = Link("navigator", connect=[pair.endpoint])
+        pair.navigator = Link("navigator", connect=[pair.endpoint], lock_step=True)
         pair.inbox = pair.navigator.subscribe("observation")
         pair.navigator.announce()
         assert pair.pilot.wait_for(["navigator"], PATIENCE_S)
@@ -161,7 +177,8 @@ def test_what_is_no_message_is_counted_and_said_and_the_rest_goes_on():
 
 def test_a_topic_of_another_release_is_refused():
     endpoint = free_endpoint()
-    with Link("pilot", listen=[endpoint]) as pilot, Link("view", connect=[endpoint]) as view:
+    pilot = Link("pilot", listen=[endpoint], lock_step=True)
+    with pilot, Link("view", connect=[endpoint], lock_step=True) as view:
         inbox = view.subscribe("**")
         view.announce()
         assert pilot.wait_for(["view"], PATIENCE_S)

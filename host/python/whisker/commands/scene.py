@@ -18,7 +18,7 @@ def add(parser) -> None:
     p.add_argument("--list-families", action="store_true", help="print bases and modifiers and leave")
     example = "whisker scene from build/demo --out scenes/demo"
     p = add_action(actions, "from", "make a scene of a run's recording", example, from_recording)
-    p.add_argument("recording", help="folder that a run left, as build/demo")
+    p.add_argument("recording", help="folder that a run left, as build/demo, or a robot's bag")
     p.add_argument("--out", required=True, metavar="DIR", help="folder to write")
 
 

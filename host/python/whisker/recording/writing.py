@@ -64,23 +64,72 @@ class Sink:
         self._file.close()
 
 
-class RecordingWriter:
-    """An MCAP file with the topics of a recording. Times are in ns since 1970 and must not go backwards.
+class TopicWriter:
+    """An MCAP file of typed topics that ROS 2 bag tools open. Times are in ns since 1970.
 
     After a WriteError (disk full, say) only `close` may be called; the file is whole up to the last `flush`.
     """
+
+    def __init__(self, path, record: str, metadata: dict[str, str], overwrite: bool = False):
+        """`record`: name of the metadata record, which `metadata` begins."""
+        self.path, self._record = path, record
+        self._sink = Sink(path, overwrite)
+        self._writer = Writer(self._sink)
+        self._channels: dict[str, int] = {}
+        self._guarded(self._begin, metadata)
+
+    def topic(self, topic: str, schema: str) -> None:
+        """Make a topic known; `schema`: "package/msg/Type" of whisker/msgs."""
+        text = messages.definition(schema).encode()
+        number = self._writer.register_schema(schema, SchemaEncoding.ROS2, text)
+        # The profile asks for the key; empty: the reader's default quality of service.
+        extra = {"offered_qos_profiles": ""}
+        self._channels[topic] = self._writer.register_channel(topic, MessageEncoding.CDR, number, extra)
+
+    def add(self, topic: str, time_ns: int, number: int, data: bytes) -> None:
+        """A message's CDR on a topic that is known; `number` counts the messages of its stream."""
+        self._guarded(self._writer.add_message, self._channels[topic], time_ns, data, time_ns, number & 0xFFFFFFFF)
+
+    def flush(self) -> None:
+        """Write what has been gathered: from now on it is safe."""
+        self._guarded(self._writer.flush)
+
+    def finish(self, metadata: dict[str, str] | None = None) -> None:
+        """Write what more is known by now and the index, and close."""
+        if metadata:
+            self._guarded(self._writer.add_metadata, self._record, metadata)
+        self._guarded(self._writer.finish)
+        self._sink.flush()
+        self.close()
+
+    def close(self) -> None:
+        """Close without an index, as a crash would."""
+        self._sink.close()
+
+    def _begin(self, metadata: dict[str, str]) -> None:
+        self._writer.start(profile=Profile.ROS2, library=f"whisker {__version__}")
+        self._writer.add_metadata(self._record, metadata)
+
+    def _guarded(self, action, *arguments) -> None:
+        """OSError becomes one line, and the file ends where it is whole."""
+        try:
+            action(*arguments)
+        except OSError as error:
+            self._sink.cut()
+            text = "what was recorded before is kept; free some space and record on into another file"
+            raise WriteError(f"{self.path}: cannot be written on ({error.strerror}); {text}") from error
+
+
+class RecordingWriter(TopicWriter):
+    """An MCAP file with the topics of a recording. Times must not go backwards."""
 
     def __init__(self, path, metadata: dict[str, str], lane_names: Sequence[str] = (), overwrite: bool = False):
         """`metadata`: what is known of ring and bridge; `lane_names`: without commas, lane 0 first."""
         if len(lane_names) > LANES or any("," in name for name in lane_names):
             raise RecordingError(f"{path}: lane names: give at most {LANES}, without commas")
-        self.path = path
-        self._sink = Sink(path, overwrite)
-        self._writer = Writer(self._sink)
-        self._channels: dict[str, int] = {}
-        self._sequence = dict.fromkeys(TOPICS, 0)
         told = {"format": FORMAT, "clock_hz": str(LIMITS["clock_hz"]), "lanes": ",".join(lane_names)}
-        self._guarded(self._begin, told | metadata)
+        super().__init__(path, METADATA, told | metadata, overwrite)
+        self._sequence = dict.fromkeys(TOPICS, 0)
 
     def block(self, time_ns: int, block: np.ndarray) -> None:
         """Frames as messages.encode_block gives them."""
@@ -100,43 +149,12 @@ class RecordingWriter:
         values = {"frames": frames, "frames_missing": missing, "frames_overrun": overrun, "records_bad": int(bad.sum())}
         self._add(DIAGNOSTICS_TOPIC, time_ns, messages.encode_diagnostics(time_ns, level, text, values))
 
-    def flush(self) -> None:
-        """Write what has been gathered: from now on it is safe."""
-        self._guarded(self._writer.flush)
-
-    def finish(self, metadata: dict[str, str] | None = None) -> None:
-        """Write what more is known by now and the index, and close."""
-        if metadata:
-            self._guarded(self._writer.add_metadata, METADATA, metadata)
-        self._guarded(self._writer.finish)
-        self._sink.flush()
-        self.close()
-
-    def close(self) -> None:
-        """Close without an index, as a crash would."""
-        self._sink.close()
-
     def _begin(self, metadata: dict[str, str]) -> None:
-        self._writer.start(profile=Profile.ROS2, library=f"whisker {__version__}")
-        self._writer.add_metadata(METADATA, metadata)
-        for topic, kind in TOPICS.items():
-            text = messages.definition(kind).encode()
-            schema = self._writer.register_schema(kind, SchemaEncoding.ROS2, text)
-            # The profile asks for the key; empty: the reader's default quality of service.
-            extra = {"offered_qos_profiles": ""}
-            self._channels[topic] = self._writer.register_channel(topic, MessageEncoding.CDR, schema, extra)
+        super()._begin(metadata)
+        for topic, schema in TOPICS.items():
+            self.topic(topic, schema)
         self._writer.flush()
 
     def _add(self, topic: str, time_ns: int, data: bytes) -> None:
         self._sequence[topic] += 1
-        number = self._sequence[topic] & 0xFFFFFFFF
-        self._guarded(self._writer.add_message, self._channels[topic], time_ns, data, time_ns, number)
-
-    def _guarded(self, action, *arguments) -> None:
-        """OSError becomes one line, and the file ends where it is whole."""
-        try:
-            action(*arguments)
-        except OSError as error:
-            self._sink.cut()
-            text = "what was recorded before is kept; free some space and record on into another file"
-            raise WriteError(f"{self.path}: cannot be written on ({error.strerror}); {text}") from error
+        self.add(topic, time_ns, self._sequence[topic], data)

@@ -32,7 +32,7 @@ CDR = "application/cdr"
 # Of these only the newest matters: they never hold up their sender, and when there is no room the older go.
 NEWEST_ONLY = {"belief", HEALTH}
 INBOX_MOST = 10_000  # messages of a live subscription that nobody takes: over 16 minutes of rows
-LEASE_MS = {False: 2_000, True: 60_000}  # by lock-step: a peer silent for so long is gone
+LEASE_MS = {False: 10_000, True: 60_000}  # by lock-step: a peer silent for so long is gone
 BLOCK_US = 600_000_000  # a lock-step sender waits so long for a reader that stands still
 QUEUE_BATCHES = 16  # of 64 KiB, zenoh's most: a live sender's burst finds room while the machine is busy elsewhere
 RETRY = {"period_init_ms": 100, "period_max_ms": 1000, "period_increase_factor": 2}
@@ -41,10 +41,16 @@ NAME = re.compile(r"[A-Za-z0-9_-]+")
 LOOPBACK = re.compile(r"tcp/(127\.[\d.]+|\[::1\]|localhost):\d+")
 
 
-class LinkError(UserError, ConnectionError):
-    """No link: an endpoint that cannot be listened on, a name that is none. One line."""
+class LinkError(UserError):
+    """An endpoint that cannot be listened on; one line."""
 
     exit_code = 1
+
+
+class NamingError(LinkError):
+    """What is no endpoint, or no name; one line."""
+
+    exit_code = 2
 
 
 @dataclass(frozen=True)
@@ -196,11 +202,11 @@ class Link:
 
         lock_step: senders wait for their readers and nothing is left out, for runs that must be alike bit for bit;
         else the newest counts and nobody waits. scout: look for others by multicast, and be found.
-        LinkError when a name or an endpoint is none, or an endpoint of `listen` is taken.
+        NamingError when a name or an endpoint is none; LinkError when an endpoint of `listen` is taken.
         """
         for name in (process, robot):
             if not NAME.fullmatch(name):
-                raise LinkError(f"'{name}': not a name; use letters, digits, dash and underscore")
+                raise NamingError(f"'{name}': not a name; use letters, digits, dash and underscore")
         self.process, self.lock_step = process, lock_step
         self._prefix = f"whisker/{robot}/"
         config = _config(list(listen), list(connect), lock_step, scout)
@@ -274,7 +280,7 @@ def _config(listen: list[str], connect: list[str], lock_step: bool, scout: bool)
     for endpoint in [*listen, *connect]:
         found = ENDPOINT.fullmatch(endpoint)
         if not found or int(found[2]) > 65535:
-            raise LinkError(f"'{endpoint}': not an endpoint; give tcp/HOST:PORT, as {PILOT_ENDPOINT}")
+            raise NamingError(f"'{endpoint}': not an endpoint; give tcp/HOST:PORT, as {PILOT_ENDPOINT}")
     config = zenoh.Config()
     told = {
         "mode": "peer",

@@ -6,6 +6,7 @@ from pathlib import Path
 from ..errors import UserError
 from ..observations import Observations, observations_path, read_observations
 from ..scene import Prior, Scene, load
+from .bags import is_bag, read_bag
 from .files import rounded
 
 RUN_SCENE = "scene"  # where a run of `make demo` keeps arena, robot, prior and observation rows
@@ -25,13 +26,20 @@ def read_recording(path) -> tuple[Scene, Observations]:
         if knows(path):
             return read(path)
     raise RecordingKindError(
-        f"{path}: no recording with observation rows; give the folder of a run (it holds {RUN_SCENE}/), or a scene"
+        f"{path}: no recording with observation rows; give the folder of a run (it holds {RUN_SCENE}/), its bag, or a scene"
     )
 
 
 def _read_folder(folder: Path) -> tuple[Scene, Observations]:
     scene = load(folder)
-    rows = read_observations(observations_path(folder), scene)
+    return _with_prior(scene, read_observations(observations_path(folder), scene))
+
+
+def _read_bag(path: Path) -> tuple[Scene, Observations]:
+    return _with_prior(*read_bag(path))
+
+
+def _with_prior(scene: Scene, rows: Observations) -> tuple[Scene, Observations]:
     return Scene(scene.arena, scene.robot, scene.prior or Prior("uniform")), rounded(rows)
 
 
@@ -48,4 +56,4 @@ def _read_run(path: Path) -> tuple[Scene, Observations]:
 
 
 Reader = tuple[Callable[[Path], bool], Callable[[Path], tuple[Scene, Observations]]]
-READERS: list[Reader] = [(_is_run, _read_run), (_is_folder_of_rows, _read_folder)]
+READERS: list[Reader] = [(_is_run, _read_run), (_is_folder_of_rows, _read_folder), (is_bag, _read_bag)]

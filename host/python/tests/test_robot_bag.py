@@ -1,0 +1,152 @@
+"""The robot's bag: what ROS 2 tools read of it, and the scene that comes of it again."""
+
+import subprocess
+
+import numpy as np
+import pytest
+from commandkit import END_S, command, run, signals_as_before  # noqa: F401 - a fixture
+from robotkit import examples, flat, free_endpoint, to_rows
+from rosbags.highlevel import AnyReader
+from rosbags.typesys import Stores, get_typestore
+
+from whisker import localise, scenes
+from whisker.observations import observations_path
+from whisker.pilot import compose
+from whisker.recording.mcapfile import McapFile
+from whisker.recording.writing import TopicWriter
+from whisker.robot import messages as m
+from whisker.robot.bag import RECORD, Bag, BagClock
+from whisker.robot.link import Link, Received
+from whisker.robot.rows import RowPublisher
+from whisker.robot.streams import Envelope
+from whisker.scene import load
+
+PATIENCE_S = 60.0
+ROWS = 30
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory):
+    """A scene folder and its rows with the truth."""
+    folder = tmp_path_factory.mktemp("scene")
+    made = scenes.make("robot", 7, ROWS)
+    scenes.write_scene(folder, made.scene, scenes.files.rounded(made.observations))
+    loaded = load(folder)
+    return folder, loaded, localise.read_observations(observations_path(folder), loaded)
+
+
+@pytest.fixture(scope="module")
+def bag(scene, tmp_path_factory):
+    """A bag that a process wrote: rows, truth, and one message of every other topic."""
+    folder, loaded, observations = scene
+    path, endpoint = tmp_path_factory.mktemp("bag") / "run.mcap", free_endpoint()
+    with Link("pilot", listen=[endpoint], lock_step=True) as pilot:
+        options = ["--scene", folder, "--connect", endpoint, "--lock-step"]
+        child = subprocess.Popen(command("bag", path, *options), stdout=subprocess.PIPE, text=True)
+        assert pilot.wait_for(["bag"], PATIENCE_S)
+        rows, truth = RowPublisher(pilot), pilot.publish("truth")
+        others = {topic: pilot.publish(topic) for topic in examples() if topic not in ("observation", "truth")}
+        for n, row in enumerate(to_rows(observations, loaded)):
+            sent = rows.send(row, m.EXPLORING)
+            truth.send(m.PoseStamped(sent.header, m.Pose.planar(*observations.truth[n])))
+        for topic, stream in others.items():
+            stream.send(examples()[topic])
+        for stream in (rows, *[s for topic, s in others.items() if not topic.startswith("health")], truth):
+            stream.end("over") if stream is rows else stream.end(0, "over")
+        out, _ = child.communicate(timeout=END_S)
+    assert child.returncode == 0 and out.startswith(f"{path}: messages ") and ", missed 0, refused 0" in out
+    return path
+
+
+def test_ros_tools_open_it(bag, scene):
+    _, loaded, observations = scene
+    rows, seen, times = [], {}, []
+    with AnyReader([bag], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
+        kinds = {c.topic: c.msgtype for c in reader.connections}
+        for connection, time_ns, data in reader.messages():
+            message = reader.deserialize(data, connection.msgtype)
+            if connection.topic == "/robot/observation":
+                rows.append(message)
+                times.append(time_ns)
+            elif connection.topic != "/robot/truth":
+                seen[connection.topic.removeprefix("/robot/")] = message
+    assert kinds.pop("/robot/health/bag", "whisker_msgs/msg/ProcessHealth") == "whisker_msgs/msg/ProcessHealth"
+    assert kinds == {f"/robot/{topic}": m.SCHEMAS[type(message)] for topic, message in examples().items()}
+    assert [row.seq for row in rows] == list(range(ROWS)) and set(np.diff(times)) == {10**8}
+    for topic, message in examples().items():
+        if topic in seen:
+            theirs = flat(seen[topic])
+            assert all(theirs[place] == value or value != value for place, value in flat(message).items()), topic
+
+
+def test_what_it_says_of_itself(bag, scene):
+    with McapFile(bag) as file:
+        told = file.metadata[RECORD]
+        assert file.complete and told["robot"] == "robot" and told["observation.received"] == str(ROWS + 1)
+    assert told["arena.toml"] == (scene[0] / "arena.toml").read_text() and told["missed"] == "0"
+
+
+def test_a_scene_comes_of_it_again(bag, scene, tmp_path, capsys):
+    folder, loaded, observations = scene
+    code, out, _ = run(capsys, "scene", "from", bag, "--out", tmp_path / "again")
+    assert code == 0 and out.endswith(f"{ROWS} rows\n")
+    again = load(tmp_path / "again")
+    rows = localise.read_observations(observations_path(tmp_path / "again"), again)
+    assert again.arena == loaded.arena and again.robot == loaded.robot and again.prior == loaded.prior
+    for name in ("t_s", "odometry", "texture", "radial_m", "truth"):
+        ours, theirs = getattr(rows, name), getattr(observations, name)
+        assert np.allclose(ours, theirs, rtol=1e-5, atol=1e-6, equal_nan=True), name
+
+
+def received(n: int, message, topic="observation") -> Received:
+    return Received(topic, message, Envelope(1, n, 0))
+
+
+def test_rows_that_are_not_in_the_bag_are_in_the_motion_of_the_next(scene, tmp_path, capsys):
+    folder, loaded, observations = scene
+    writer = TopicWriter(
+        tmp_path / "a.mcap", RECORD, {"robot": "r2"} | {f.name: f.read_text() for f in folder.glob("*.toml")}
+    )
+    bag, sent = Bag(writer, "r2"), []
+
+    class Sink:
+        def publish(self, topic):
+            return self
+
+        send = staticmethod(sent.append)
+
+    publisher = RowPublisher(Sink())
+    for row in to_rows(observations, loaded):
+        publisher.send(row, m.EXPLORING)
+    bag.take([received(row.seq, row) for row in sent if row.seq not in (7, 8, 9)])
+    writer.finish()
+    assert run(capsys, "scene", "from", tmp_path / "a.mcap", "--out", tmp_path / "b")[0] == 0
+    rows = localise.read_observations(observations_path(tmp_path / "b"), loaded)
+    assert len(rows) == ROWS - 3 and rows.truth is None
+    total = np.zeros(3)
+    for motion in rows.odometry:
+        total = compose(total, motion)
+    assert total == pytest.approx(publisher.pose, abs=1e-5)
+
+
+def test_bags_that_no_scene_can_be_made_from(scene, tmp_path, capsys):
+    TopicWriter(tmp_path / "empty.mcap", RECORD, {"robot": "robot"}).finish()
+    code, _, err = run(capsys, "scene", "from", tmp_path / "empty.mcap", "--out", tmp_path / "x")
+    assert code == 2 and err.startswith(f"whisker: {tmp_path}/empty.mcap: holds no arena.toml; give a bag of a robot")
+    (tmp_path / "no.mcap").write_text("nothing")
+    code, _, err = run(capsys, "scene", "from", tmp_path / "no.mcap", "--out", tmp_path / "x")
+    assert code == 2 and "no recording with observation rows" in err
+
+
+def test_log_times_follow_the_bridge_and_outlive_it():
+    clock, second = BagClock(10**18), 10**9
+    assert [clock.of(s * second) - 10**18 for s in (5, 6, 5.9)] == [0, second, 0.9 * second]
+    began_anew = clock.of(0)
+    assert began_anew == 10**18 + second + 10**8 and clock.of(second) == began_anew + second
+
+
+def test_an_existing_bag_is_kept(tmp_path, capsys):
+    (tmp_path / "a.mcap").write_text("dear")
+    code, _, err = run(capsys, "bag", tmp_path / "a.mcap", "--connect", "none")
+    assert code == 2 and "exists; choose another name, or --overwrite" in err
+    assert (tmp_path / "a.mcap").read_text() == "dear"

@@ -1,0 +1,288 @@
+"""The navigator over loopback: exact in lock-step, right when it skips, honest when it is killed or fed nonsense."""
+
+import contextlib
+import json
+import subprocess
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+from commandkit import END_S, command, run, signals_as_before  # noqa: F401 - a fixture
+from robotkit import free_endpoint, take_until, to_rows
+
+from whisker import localise, scenes
+from whisker import scene as scene_folder
+from whisker.errors import UserError
+from whisker.filters import COMPONENT
+from whisker.robot import belief, health
+from whisker.robot import messages as m
+from whisker.robot.link import Link, encoding_of
+from whisker.robot.navigator import Navigator, Settings
+from whisker.robot.rows import RowPublisher, to_message
+from whisker.robot.streams import envelopes
+
+PATIENCE_S = 60.0
+ROWS = 60
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A scene folder, its scene and its rows."""
+    folder = tmp_path_factory.mktemp("scene")
+    made = scenes.make("robot", 4, ROWS)
+    scenes.write_scene(folder, made.scene, scenes.files.rounded(made.observations))
+    scene = scene_folder.load(folder)
+    return folder, scene, to_rows(localise.read_observations(localise.observations_path(folder), scene), scene)
+
+
+class Robot:
+    """A pilot's link with a reader of the navigator's answers, and navigators to start."""
+
+    def __init__(self, *answers: str, lock_step: bool = True):
+        self.pilot_end, self.navigator_end = free_endpoint(), free_endpoint()
+        self.link = Link("pilot", listen=[self.pilot_end], connect=[self.navigator_end], lock_step=lock_step)
+        self.inbox = self.link.subscribe(*answers)
+        self.rows = RowPublisher(self.link)
+        self._lock_step = ["--lock-step"] if lock_step else []
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *exception):
+        self.link.close()
+
+    @contextlib.contextmanager
+    def navigator(self, folder: Path, *options):
+        """A process; it is there for rows when this returns, and killed at the end if it still runs."""
+        ends = ["--listen", self.navigator_end, "--connect", self.pilot_end, *self._lock_step]
+        child = subprocess.Popen(command("navigator", folder, *ends, *options), stdout=subprocess.PIPE, text=True)
+        try:
+            assert self.link.wait_for(["navigator"], PATIENCE_S)
+            yield child
+        finally:
+            child.kill()
+            child.communicate()
+
+    def send(self, rows) -> None:
+        for row in rows:
+            self.rows.send(row, m.EXPLORING)
+
+
+def lines(path: Path) -> list[str]:
+    return path.read_text().splitlines()
+
+
+def test_in_lock_step_the_process_gives_what_localise_gives(made, tmp_path):
+    folder, scene, rows = made
+    filters = ("adaptive", "foveal")
+    options = [word for name in filters for word in ("--filter", name)]
+    options += ["--out", tmp_path, "--report", tmp_path / "report.json"]
+    with Robot("pose", "localisation", "belief") as robot, robot.navigator(folder, *options) as child:
+        robot.send(rows)
+        robot.rows.end("enough")
+        got = take_until(robot.inbox, lambda got: sum(r.over for r in got) == 3, PATIENCE_S)
+        assert child.wait(END_S) == 0
+    observations = localise.read_observations(localise.observations_path(folder), scene)
+    sixfold = [{k: v if v is None or k == "t_s" else float(f"{v:.6g}") for k, v in row.items()} for row in rows]
+    for name in filters:
+        alone = localise.Filter(name, scene)
+        expected = [alone.step(row).line(f"{row['t_s']:.6g}") for row in sixfold]
+        assert lines(tmp_path / f"est_{name}.csv")[1:] == expected
+        assert len(lines(tmp_path / f"covariance_{name}.csv")) == len(observations) + 1
+    told = [r.message for r in got if r.topic == "localisation" and not r.over]
+    assert [x.filter for x in told] == [*filters] * ROWS and [x.observation_seq for x in told[::2]] == list(range(ROWS))
+    assert all((x.rows_integrated, x.rows_missed, x.first_seq, x.prior) == (1, 0, 0, "scene") for x in told)
+    poses = [r.message for r in got if r.topic == "pose" and not r.over]
+    assert [p.pose.pose.xytheta for p in poses] == [x.pose.pose.xytheta for x in told[::2]]
+    beliefs = [r.message for r in got if r.topic == "belief" and not r.over]
+    assert {b.filter for b in beliefs} == set(filters) and [b.observation_seq for b in beliefs][::2] == list(
+        range(0, ROWS, 5)
+    )
+    assert all(0.998 < b.mass < 1.001 and len(b.x) <= m.BUMPS_MOST for b in beliefs)
+    assert {r.message.reason for r in got if r.over} == {"enough"}
+    report = json.loads((tmp_path / "report.json").read_text())
+    assert (report["weighed"], report["skipped"], report["missed"], report["bad_cells"]) == (ROWS, 0, 0, 0)
+
+
+def test_a_killed_navigator_comes_back_knowing_that_it_knows_nothing(made, tmp_path):
+    folder, _, rows = made
+    with Robot("localisation", "health/*") as robot:
+        with robot.navigator(folder, "--filter", "particle", "--out", tmp_path):
+            robot.send(rows[:20])
+            take_until(robot.inbox, lambda got: sum(r.topic == "localisation" for r in got) == 20, PATIENCE_S)
+        assert robot.link.wait_gone("navigator", PATIENCE_S)
+        robot.send(rows[20:25])
+        with robot.navigator(folder, "--filter", "particle", "--out", tmp_path) as child:
+            robot.send(rows[25:])
+            robot.rows.end()
+            got = take_until(
+                robot.inbox, lambda got: got and got[-1].topic == "localisation" and got[-1].over, PATIENCE_S
+            )
+            assert child.wait(END_S) == 0
+    told = [r.message for r in got if r.topic == "localisation" and not r.over]
+    assert {(x.first_seq, x.prior, x.rows_missed) for x in told} == {(25, "uniform", 0)} and len(told) == ROWS - 25
+    assert told[0].confidence < 0.1
+    tally = robot.inbox.tallies["localisation"]
+    assert (tally.restarts, tally.missed, tally.repeated) == (1, 0, 0)
+    times = [line.split(",")[0] for line in lines(tmp_path / "est_particle.csv")]
+    assert times == ["t_s", *(f"{row['t_s']:.6g}" for row in rows[:20] + rows[25:])]
+
+
+class Inside:
+    """A navigator within this process."""
+
+    def __init__(self, scene, *answers, lock_step=False, **settings):
+        end = free_endpoint()
+        self.pilot = Link("pilot", listen=[end], lock_step=lock_step)
+        self.inbox = self.pilot.subscribe(*answers)
+        self.rows = RowPublisher(self.pilot)
+        self.link = Link("navigator", connect=[end], lock_step=lock_step)
+        self.navigator = Navigator(self.link, scene, Settings(("odometry",), **settings))
+        self.link.announce()
+        assert self.pilot.wait_for(["navigator"], PATIENCE_S)
+        self.stop, self.counters, self.error = threading.Event(), None, None
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *exception):
+        self.stop.set()
+        self.pilot.close()
+        self.link.close()
+
+    def run(self):
+        try:
+            self.counters = self.navigator.run(self.stop)
+        except UserError as error:
+            self.error = str(error)
+
+
+def test_behind_by_many_rows_it_takes_the_newest_and_all_the_motion(made):
+    _, scene, rows = made
+    with Inside(scene, "localisation", "health/*") as inside:
+        watcher = inside.link.subscribe("observation")
+        for row in rows:
+            inside.rows.send(row, m.EXPLORING)
+        inside.rows.end("over")
+        take_until(watcher, lambda got: got and got[-1].over, PATIENCE_S)
+        inside.run()
+        got = take_until(inside.inbox, lambda got: any(r.over for r in got), PATIENCE_S)
+        told = [r.message for r in got if r.topic == "localisation" and not r.over]
+        states = [r.message for r in got if r.topic == "health/navigator"]
+    assert inside.counters["weighed"] + inside.counters["skipped"] == ROWS and inside.counters["missed"] == 0
+    assert sum(x.rows_integrated for x in told) == ROWS and len(told) < ROWS and told[-1].observation_seq == ROWS - 1
+    alone = localise.Filter("odometry", scene)
+    every = [alone.step(row) for row in rows][-1]
+    assert told[-1].pose.pose.xytheta[:2] == pytest.approx(every.pose[:2], abs=2e-3)
+    assert all(state.process == "navigator" for state in states)
+
+
+def test_nonsense_is_counted_and_the_rest_goes_on(made):
+    _, scene, rows = made
+    with Inside(scene, "localisation", lock_step=True) as inside:
+        session, stream = inside.pilot._session, envelopes()
+        bad = m.encode(to_message(rows[0], m.EXPLORING, 0, np.zeros(3)))[:-4]
+        session.put(
+            "whisker/robot/observation", bad, encoding=encoding_of(m.Observation), attachment=next(stream).pack()
+        )
+        for row in rows[:3]:
+            inside.rows.send(row, m.EXPLORING)
+        inside.rows.end()
+        inside.run()
+    assert (inside.counters["refused"], inside.counters["weighed"], inside.counters["missed"]) == (1, 3, 0)
+
+
+def test_rows_of_another_robot_are_one_line(made):
+    _, scene, rows = made
+    with Inside(scene, lock_step=True) as inside:
+        inside.rows.send({k: v for k, v in rows[0].items() if not k.endswith("_mm")}, m.EXPLORING)
+        inside.run()
+    assert "_mm is missing; give the navigator the scene of this robot" in inside.error
+
+
+def test_a_navigator_that_stays_goes_on_with_the_next_run(made):
+    _, scene, rows = made
+    with Inside(scene, "localisation", lock_step=True, stay=True) as inside:
+        thread = threading.Thread(target=inside.run)
+        thread.start()
+        for publisher in (inside.rows, RowPublisher(inside.pilot)):
+            for row in rows[:4]:
+                publisher.send(row, m.EXPLORING)
+            publisher.end()
+        got = take_until(inside.inbox, lambda got: len(got) == 8, PATIENCE_S)
+        inside.stop.set()
+        thread.join()
+    assert inside.counters["restarts"] == 1 and not any(r.over for r in got)
+
+
+def test_condensed_beliefs_keep_mass_place_and_width():
+    rng = np.random.default_rng(8)
+    bumps = np.zeros(30_000, COMPONENT)
+    bumps["pose"] = rng.normal([1.0, 2.0, 3.1], [0.3, 0.1, 0.2], (len(bumps), 3))
+    bumps["sigma_m"], bumps["sigma_rad"], bumps["mass"] = 0.01, 0.02, rng.random(len(bumps))
+    bumps["mass"] /= bumps["mass"].sum()
+    few = belief.condense(bumps)
+    assert 100 < len(few) <= m.BUMPS_MOST and np.all(np.diff(few["mass"]) <= 0.0)
+    assert few["mass"].sum() == pytest.approx(1.0, abs=belief.NEGLECTED)
+    for one in (bumps, few):
+        weight = one["mass"] / one["mass"].sum()
+        mean = weight @ one["pose"][:, :2]
+        assert mean == pytest.approx([1.0, 2.0], abs=0.01)
+        off = ((one["pose"][:, :2] - mean) ** 2).sum(1)
+        assert weight @ (off / 2.0 + one["sigma_m"] ** 2) == pytest.approx((0.3**2 + 0.1**2) / 2.0 + 1e-4, rel=0.03)
+        heading = np.angle(weight @ np.exp(1j * one["pose"][:, 2]))
+        assert heading == pytest.approx(3.1, abs=0.01)
+
+
+def test_small_beliefs_are_sent_as_they_are():
+    bumps = np.zeros(3, COMPONENT)
+    bumps["pose"], bumps["mass"] = [[1, 2, 3], [4, 5, 6], [7, 8, 9]], [0.2, 0.5, 0.3]
+    told = belief.to_message(m.Header(), "grid", 4, bumps)
+    assert list(told.x) == [4, 7, 1] and list(told.theta) == [6, 9, 3] and (told.bumps, told.mass) == (3, 1.0)
+    empty = belief.to_message(m.Header(), "grid", 4, bumps[:0])
+    assert (len(empty.x), empty.bumps, empty.mass) == (0, 0, 0.0)
+
+
+def test_two_hypotheses_stay_two():
+    bumps = np.zeros(20_000, COMPONENT)
+    bumps["pose"] = np.random.default_rng(1).normal(0.0, 0.05, (20_000, 3))
+    bumps["pose"][::2] += [1.0, 0.0, np.pi]
+    bumps["mass"] = 1.0 / len(bumps)
+    few = belief.condense(bumps)
+    near = np.abs(np.sin(few["pose"][:, 2] / 2.0)) < 0.5
+    assert few["mass"][near].sum() == pytest.approx(0.5, abs=1e-3) and len(few) <= m.BUMPS_MOST
+
+
+def test_health_is_told_at_once_when_the_state_is_new(monkeypatch):
+    told, now = [], [10.0]
+
+    class Sink:
+        process = "pilot"
+
+        def publish(self, topic):
+            assert topic == "health/pilot"
+            return self
+
+        send = told.append
+
+    monkeypatch.setattr(health.time, "monotonic", lambda: now[0])
+    speaker = health.Health(Sink(), lambda: {"rows": len(told)})
+    for at, state in ((10.0, "running"), (10.5, "running"), (10.6, "waiting"), (11.5, "waiting"), (11.7, "waiting")):
+        now[0] = at
+        speaker.tell(5, state)
+    assert [(x.state, x.counts["rows"]) for x in told] == [("running", "0"), ("waiting", "1"), ("waiting", "2")]
+
+
+def test_options_of_the_command(made, capsys):
+    folder, _, _ = made
+    code, _, err = run(capsys, "navigator", folder, "--filter", "magic")
+    assert code == 2 and "magic" in err and err.count("\n") == 1
+    code, _, err = run(capsys, "navigator", folder, "--connect", "nowhere")
+    assert code == 2 and err == "whisker: 'nowhere': not an endpoint; give tcp/HOST:PORT, as tcp/127.0.0.1:7448\n"
+    code, _, err = run(capsys, "navigator", folder, "--listen", "tcp/0.0.0.0:1x", "--connect", "none")
+    assert code == 2 and "not an endpoint" in err
+    code, _, err = run(capsys, "navigator", folder, "--listen", "tcp/192.0.2.1:7449")
+    assert code == 1 and "whoever reaches this address can watch" in err and "cannot be listened on" in err
+    code, _, err = run(capsys, "navigator", folder / "none")
+    assert code == 2 and "no such folder" in err

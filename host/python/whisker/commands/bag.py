@@ -1,0 +1,32 @@
+"""`whisker bag`: everything a robot's processes say, in an MCAP file for ROS 2 tools (whisker.robot.bag)."""
+
+from pathlib import Path
+
+from ..recording.writing import TopicWriter
+from ..robot.bag import RECORD, Bag, metadata
+from ..robot.options import NAVIGATOR_ENDPOINT, PILOT_ENDPOINT, add_link, open_link
+from ..scene import load
+from . import stop_on_signals
+
+EXAMPLE = "whisker bag run.mcap --scene SCENE"
+
+
+def add(parser) -> None:
+    parser.add_argument("file", metavar="FILE.MCAP")
+    parser.add_argument("--scene", type=Path, metavar="SCENE", help="keep this scene folder's files in the bag")
+    add_link(parser, [], [PILOT_ENDPOINT, NAVIGATOR_ENDPOINT])
+    parser.add_argument("--stay", action="store_true", help="go on after the end of a run")
+    parser.add_argument("--overwrite", action="store_true", help="replace FILE.MCAP if it exists")
+    parser.set_defaults(run=run)
+
+
+def run(arguments) -> int:
+    if arguments.scene:
+        load(arguments.scene)
+    stop = stop_on_signals()
+    with open_link("bag", arguments) as link:
+        told = metadata(arguments.robot, arguments.scene)
+        bag = Bag(TopicWriter(arguments.file, RECORD, told, arguments.overwrite), arguments.robot)
+        counted = bag.run(link, stop, arguments.stay)
+    print(f"{arguments.file}: " + ", ".join(f"{name} {value}" for name, value in counted.items()))
+    return 0

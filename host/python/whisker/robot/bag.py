@@ -1,0 +1,101 @@
+"""The robot's bag: every topic of a run in an MCAP file that ROS 2 tools open, whole up to its last second.
+
+Topics are /<robot>/<topic>. Log times follow the bridge's clock from the moment the bag began; the headers' stamps are
+the bridge's own. With a scene, `whisker scene from BAG` makes a scene folder of what was observed.
+"""
+
+import threading
+import time
+from pathlib import Path
+
+from ..recording.writing import TopicWriter
+from ..scene import ARENA, PRIOR, ROBOT
+from .health import ENDED, RUNNING, Health
+from .link import Inbox, Link, Received
+from .messages import HEALTH, SCHEMAS, encode
+from .rows import ROW_NS
+
+RECORD, FORMAT = "whisker_robot", "1"  # name of the metadata record, and of what it promises
+SCENE_FILES = (ARENA, ROBOT, PRIOR)
+FLUSH_S = 1.0
+LOOK_S = 0.5
+
+
+class BagClock:
+    """Log times: the wall's when the bag began, the bridge's from then on; a bridge that begins anew goes on behind."""
+
+    def __init__(self, wall_ns: int):
+        self._wall_ns, self._offset, self.latest = wall_ns, None, wall_ns
+
+    def of(self, stamp_ns: int) -> int:
+        """The log time of a stamp. Streams of one bridge may be out of step by less than a second."""
+        if self._offset is None:
+            self._offset = self._wall_ns - stamp_ns
+        elif stamp_ns + self._offset < self.latest - 10 * ROW_NS:
+            self._offset = self.latest + ROW_NS - stamp_ns
+        told = stamp_ns + self._offset
+        self.latest = max(self.latest, told)
+        return told
+
+
+def metadata(robot: str, scene: Path | None) -> dict[str, str]:
+    """What a bag's first record holds: format, robot, when it began, and the scene's files as text."""
+    told = {"format": FORMAT, "robot": robot, "started": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())}
+    files = [scene / name for name in SCENE_FILES] if scene else []
+    return told | {file.name: file.read_text() for file in files if file.exists()}
+
+
+class Bag:
+    """Writes what comes on a link until every stream has ended. `run`, or `take` what was received elsewhere."""
+
+    def __init__(self, writer: TopicWriter, robot: str):
+        self._writer, self._robot = writer, robot
+        self._known: set[str] = set()
+        self._clock = BagClock(time.time_ns())
+        self.messages = 0
+
+    def take(self, received: list[Received]) -> None:
+        """WriteError when the file cannot go on; ends are in the metadata, not among the messages."""
+        for one in received:
+            if one.over:
+                continue
+            topic = f"/{self._robot}/{one.topic}"
+            if topic not in self._known:
+                self._known.add(topic)
+                self._writer.topic(topic, SCHEMAS[type(one.message)])
+            stamp_ns = one.message.header.stamp.ns
+            self._writer.add(topic, self._clock.of(stamp_ns), one.envelope.number, encode(one.message))
+            self.messages += 1
+
+    def run(self, link: Link, stop: threading.Event, stay: bool = False) -> dict[str, int]:
+        """Until all streams but health have ended (unless `stay`), or stopped. Returns what was counted."""
+        inbox = link.subscribe("**")
+        health = Health(link, lambda: self.counters(inbox))
+        link.announce()
+        flushed_s = time.monotonic()
+        while not stop.is_set() and (stay or not _is_over(inbox)):
+            self.take(inbox.take(LOOK_S))
+            health.tell(0, RUNNING, inbox.last_error)
+            if time.monotonic() - flushed_s >= FLUSH_S:
+                self._writer.flush()
+                flushed_s = time.monotonic()
+        self._writer.finish({name: str(value) for name, value in self._told(inbox).items()})
+        health.tell(0, ENDED, inbox.last_error)
+        return self.counters(inbox)
+
+    def counters(self, inbox: Inbox) -> dict[str, int]:
+        """Messages written, sent but never come, and refused."""
+        counted = {name: getattr(inbox, name) for name in ("missed", "refused", "overflown")}
+        return {"messages": self.messages} | counted
+
+    def _told(self, inbox: Inbox) -> dict[str, int]:
+        tallies = inbox.tallies.items()
+        each = {
+            f"{topic}.{name}": getattr(t, name) for topic, t in tallies for name in ("received", "missed", "refused")
+        }
+        return self.counters(inbox) | each
+
+
+def _is_over(inbox: Inbox) -> bool:
+    streams = [tally for topic, tally in inbox.tallies.items() if not topic.startswith(f"{HEALTH}/")]
+    return bool(streams) and all(tally.ended for tally in streams)

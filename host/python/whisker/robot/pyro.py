@@ -1,0 +1,209 @@
+"""The paper's server: a Pyro object that the netbook writes to every 0.1 s and that clients read. It speaks zenoh inside.
+
+import Pyro5.api
+results = Pyro5.api.Proxy("PYRO:whisker.results@127.0.0.1:7450")
+seen = results.observation()
+...
+seen = results.observation(seen["number"])     # seen["motion"]: everything since, however much was left unread
+"""
+
+import math
+import threading
+from collections import deque
+
+import numpy as np
+import Pyro5
+import Pyro5.api
+
+from ..errors import UserError
+from ..observations import ODOMETRY
+from ..pilot import compose
+from .health import ENDED, RUNNING, Health
+from .link import Link
+from .messages import (
+    BASE_FRAME,
+    EXPLORING,
+    HEALTH,
+    ODOMETRY_FRAME,
+    Header,
+    Localisation,
+    Observation,
+    PoseWithCovariance,
+    ProcessHealth,
+)
+from .messages import Odometry as OdometryMessage
+from .rows import Follower, RowPublisher, between
+
+OBJECT, PORT = "whisker.results", 7450
+HISTORY_ROWS = 18_000  # 30 minutes: how far back `observation(since)` reaches
+LOOK_S = 0.5
+REQUEST_MOST = 1 << 20  # bytes
+TOPICS = ("observation", "odometry", "localisation")
+
+
+class ServerError(UserError):
+    """A server that cannot start; one line."""
+
+    exit_code = 1
+
+
+class Results:
+    """What clients see. Answers are plain dicts, lists and numbers; None until there is something to tell."""
+
+    def __init__(self, link: Link, may_write: bool):
+        self._link, self._may_write = link, may_write
+        self._lock = threading.Lock()
+        self._follower, self._number, self._total = Follower(every_row=True), 0, np.zeros(3)
+        self._history: deque[tuple[int, np.ndarray]] = deque([(0, self._total)], maxlen=HISTORY_ROWS)
+        self._row: dict | None = None
+        self._odometry: OdometryMessage | None = None
+        self._answers: dict[str, Localisation] = {}
+        self._health: dict[str, ProcessHealth] = {}
+        self._rows: RowPublisher | None = None
+        self._odometries = None
+
+    @Pyro5.api.expose
+    def observation(self, since: int | None = None) -> dict | None:
+        """The newest row: its cells by the names of observations.csv, `number` (rows told so far) and `motion`.
+
+        motion: [x m, y m, theta rad] since row number `since` (None: since the row before); None when that is further
+        back than 30 minutes or not yet told.
+        """
+        with self._lock:
+            if self._row is None:
+                return None
+            since = self._number - 1 if since is None else since
+            start = next((pose for number, pose in reversed(self._history) if number == since), None)
+            motion = None if start is None else between(start, self._total).tolist()
+            return self._row | {"number": self._number, "motion": motion}
+
+    @Pyro5.api.expose
+    def odometry(self) -> dict | None:
+        """`absolute`: [x, y, theta] since the robot's start; `differential`: motion of the newest row; `t_s`."""
+        with self._lock:
+            if self._odometry is None:
+                return None
+            absolute = list(self._odometry.pose.pose.xytheta)
+            newest = [self._row[name] for name in ODOMETRY] if self._row else None
+            return {"t_s": _seconds(self._odometry), "absolute": absolute, "differential": newest}
+
+    @Pyro5.api.expose
+    def pose(self, filter: str | None = None) -> dict | None:
+        """What a filter (None: the first that answered) says: t_s, filter, pose, covariance, confidence, row counts."""
+        with self._lock:
+            answer = self._answers.get(filter) if filter else next(iter(self._answers.values()), None)
+        if answer is None:
+            return None
+        counts = {name: getattr(answer, name) for name in ("observation_seq", "rows_skipped", "rows_missed", "prior")}
+        covariance = answer.pose.planar_covariance.tolist()
+        told = {"t_s": _seconds(answer), "filter": answer.filter, "confidence": answer.confidence}
+        return told | {"pose": list(answer.pose.pose.xytheta), "covariance": covariance} | counts
+
+    @Pyro5.api.expose
+    def health(self) -> dict[str, dict]:
+        """State, counters and last error of every process that has told any."""
+        with self._lock:
+            told = self._health.items()
+            return {name: {"state": h.state, "last_error": h.last_error} | h.counts for name, h in told}
+
+    @Pyro5.api.expose
+    def write(self, row: dict) -> int:
+        """The netbook's part: publish a row (cells of observations.csv, `t_s` and motion included); returns its number.
+
+        PermissionError unless the server was started to be written to; ValueError when a cell is no number.
+        """
+        if not self._may_write:
+            raise PermissionError("this server only tells; start it with --write, and no pilot beside it")
+        checked = {str(name): _number(name, value) for name, value in row.items()}
+        for name in ("t_s", *ODOMETRY):
+            if checked.get(name) is None or not math.isfinite(checked[name]):
+                raise ValueError(f"{name}: missing or not finite; give every row its time and motion")
+        with self._lock:
+            return self._publish(checked)
+
+    def take(self, received) -> None:
+        """What came on TOPICS and health."""
+        with self._lock:
+            for step in self._follower.take([r for r in received if r.topic == "observation"]):
+                self._number += step.rows
+                self._total = compose(self._total, step.motion)
+                self._history.append((self._number, self._total))
+                self._row = step.cells()
+            for message in (r.message for r in received if not r.over):
+                self._note(message)
+
+    def _note(self, message) -> None:
+        if isinstance(message, OdometryMessage):
+            self._odometry = message
+        elif isinstance(message, Localisation):
+            self._answers[message.filter] = message
+        elif isinstance(message, ProcessHealth):
+            self._health[message.process] = message
+
+    def counters(self) -> dict[str, object]:
+        """What has been counted so far."""
+        follower = self._follower
+        return {"rows": follower.weighed, "missed": follower.missed, "restarts": follower.restarts}
+
+    def _publish(self, row: dict[str, float | None]) -> int:
+        if self._rows is None:
+            self._rows, self._odometries = RowPublisher(self._link), self._link.publish("odometry")
+        message: Observation = self._rows.send(row, EXPLORING)
+        header = Header(message.header.stamp, ODOMETRY_FRAME)
+        pose = PoseWithCovariance.planar(message.pose, np.zeros((3, 3)))
+        self._odometries.send(OdometryMessage(header, pose, child_frame_id=BASE_FRAME))
+        return message.seq
+
+    def end(self) -> None:
+        """Of what was written here: its readers know that no more comes."""
+        if self._rows:
+            self._rows.end("server stopped")
+
+
+def _number(name, value) -> float | None:
+    if value is None:
+        return None
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise ValueError(f"{name}: {value!r:.40} is no number; give a number, nan or None")
+    return float(value)
+
+
+def _seconds(message) -> float:
+    return message.header.stamp.ns / 1e9
+
+
+class Server:
+    """Serves a robot's results until stopped; `uri` is what clients connect to."""
+
+    def __init__(self, link: Link, host: str, port: int, may_write: bool = False):
+        """ServerError when the port is taken."""
+        Pyro5.config.POLLTIMEOUT = LOOK_S
+        Pyro5.config.MAX_MESSAGE_SIZE = REQUEST_MOST
+        self._link, self._results = link, Results(link, may_write)
+        self._inbox = link.subscribe(*TOPICS, f"{HEALTH}/*")
+        try:
+            self._daemon = Pyro5.api.Daemon(host, port)
+        except OSError as error:
+            text = f"{host}:{port}: cannot be listened on ({error.strerror}); choose another --port or --host"
+            raise ServerError(text) from None
+        self.uri = str(self._daemon.register(self._results, OBJECT))
+        self._health = Health(link, self._results.counters)
+
+    def run(self, stop: threading.Event) -> None:
+        """Until `stop` is set."""
+        self._link.announce()
+        listener = threading.Thread(target=self._listen, args=[stop])
+        listener.start()
+        try:
+            self._daemon.requestLoop(lambda: not stop.is_set())
+        finally:
+            stop.set()
+            listener.join()
+            self._daemon.close()
+            self._results.end()
+
+    def _listen(self, stop: threading.Event) -> None:
+        while not stop.is_set():
+            self._results.take(self._inbox.take(LOOK_S))
+            self._health.tell(0, RUNNING, self._inbox.last_error)
+        self._health.tell(0, ENDED, self._inbox.last_error)
