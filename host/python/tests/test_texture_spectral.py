@@ -250,6 +250,17 @@ def test_commands_train_and_classify_as_promised(capsys, tmp_path, method):
         assert set(lines[0]["loglik"]) == {"VINYL", "ROUGH"} and more or len(lines) == 5
 
 
+def test_training_is_for_the_window_asked_for(capsys, tmp_path):
+    for name in ("VINYL", "ROUGH"):
+        for n in range(3):
+            write(tmp_path / "set" / name / f"{n}.csv", drag(name, 1000, n))
+    command = ["texture", "train", tmp_path / "set", "--out", tmp_path / "m.json", "--window-ms"]
+    assert run(capsys, *command, "200")[0] == 0
+    assert texture.load(tmp_path / "m.json").figures["window_samples"] == 400
+    code, _, error = run(capsys, *command, "-1")
+    assert code != 0 and "--window-ms" in error and error.count("\n") == 1
+
+
 def test_windows_do_not_reach_across_gaps(model):
     t = np.concatenate([np.arange(300), np.arange(300) + 5000]) / RATE_HZ
     found = texture.classify(model, t, drag("VINYL", 600, 70))

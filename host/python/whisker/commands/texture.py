@@ -17,6 +17,7 @@ def add(parser) -> None:
     p.add_argument("folder")
     p.add_argument("--out", required=True, metavar="MODEL.JSON")
     p.add_argument("--method", choices=["naive-bayes", "default"], default="default", help=METHODS)
+    p.add_argument("--window-ms", type=float, default=100.0, help="window to train for, of method default: %(default)s")
     example = "whisker texture classify model.json drive.csv --window-ms 100 --json"
     p = add_action(actions, "classify", "tell the surface window by window", example, classify)
     p.add_argument("model")
@@ -27,10 +28,11 @@ def add(parser) -> None:
 
 
 def train(arguments) -> int:
+    window_ms = length_of_time(arguments.window_ms)
     recordings, rate_hz = texture.read_training(arguments.folder)
     try:
         if arguments.method == "default":
-            texture_train.train(recordings, rate_hz).save(arguments.out)
+            texture_train.train(recordings, rate_hz, window_ms).save(arguments.out)
         else:
             texture.TextureModel.train(recordings).save(arguments.out)
     except ValueError as error:
@@ -41,15 +43,20 @@ def train(arguments) -> int:
     return 0
 
 
+def length_of_time(window_ms: float) -> float:
+    if not 0.0 < window_ms < float("inf"):
+        raise SettingError(f"--window-ms {window_ms:g}: not a length of time; use 100")
+    return window_ms
+
+
 def classify(arguments) -> int:
-    if not 0.0 < arguments.window_ms < float("inf"):
-        raise SettingError(f"--window-ms {arguments.window_ms:g}: not a length of time; use 100")
+    window_ms = length_of_time(arguments.window_ms)
     model = texture.load(arguments.model)
     t_s, samples = texture.read_recording(arguments.recording)
     if samples.shape[1] != model.channels:
         text = f"{samples.shape[1]} channels, but the model has {model.channels}; use recordings of the same sensor"
         raise TableError(arguments.recording, 1, text)
-    for decision in texture.classify(model, t_s, samples, arguments.window_ms, arguments.sequential):
+    for decision in texture.classify(model, t_s, samples, window_ms, arguments.sequential):
         if arguments.json:
             print(json.dumps(plain(vars(decision))))
         else:
