@@ -1,15 +1,11 @@
-"""The robot's part of whisker-view in headless Chromium: what a person sees is what the messages told, and no more.
-
-WHISKER_PICTURES=1 also writes docs/pictures/robot*.png.
-"""
+"""The robot's part of whisker-view in headless Chromium: what a person sees is what the messages told, and no more."""
 
 import asyncio
-import os
-from contextlib import asynccontextmanager
-from pathlib import Path
 
 import chromium
 import pytest
+from viewkit import made_frames, ring_of
+from viewpage import DRAWN, looking_at
 from viewrobot import ARENA, SCENE, MadeUpRun, Post, belief_message, estimate, robot_view, route
 
 from whisker.robot.messages import Behaviour, Header, KeyValue, ProcessHealth, Time
@@ -19,9 +15,7 @@ from whisker.view.server import serving
 
 pytestmark = pytest.mark.skipif(chromium.PROGRAM is None, reason="chromium is not installed (apt install chromium)")
 
-PICTURES = Path(__file__).resolve().parents[3] / "docs/pictures"
 ROWS = 255  # of a run that has two contacts and a belief of two places
-DRAWN = "robotPart.drawn > 1 && robotPart.world.belief.poses && robotPart.world.word"
 # Whether a line of this colour (#rrggbb) runs within 4 px of a place (m) of the plan.
 SEEN = """(() => {
   const plan = robotPart.plan, n = 4, wanted = pixelOf('COLOUR') & 0xffffff;
@@ -48,32 +42,6 @@ GREY = """(() => {
 def place(script: str, x: float, y: float, colour: str = "") -> str:
     """A script about a place."""
     return script.replace("{X}", str(x)).replace("{Y}", str(y)).replace("COLOUR", colour)
-
-
-@asynccontextmanager
-async def looking_at(post: Post, theme: str = "light", size=(1280, 900), **view):
-    """The page on a server that shows this robot; gives browser and hub."""
-    async with robot_view(post, **view) as (port, hub), chromium.browser() as b:
-        await b.look(f"http://127.0.0.1:{port}/#theme={theme}", *size)
-        yield b, hub
-        assert b.troubles == []
-
-
-@asynccontextmanager
-async def going_on(post: Post, run: MadeUpRun, row: int):
-    """While this lasts, rows come, ten a second."""
-
-    async def send_for_ever():
-        now = row
-        while True:
-            for topic, message in run.messages(now):
-                post.put(topic, message)
-            now += 1
-            await asyncio.sleep(0.1)
-
-    task = asyncio.create_task(send_for_ever())
-    yield
-    task.cancel()
 
 
 async def colour(b, name: str) -> str:
@@ -269,33 +237,13 @@ def test_the_part_is_used_by_keyboard_and_fits_a_phone():
     asyncio.run(scenario())
 
 
-@pytest.mark.parametrize(
-    "name, theme, size, grey",
-    [
-        ("robot", "light", (1280, 1380), False),
-        ("robot_dark", "dark", (1280, 1380), False),
-        ("robot_grey", "light", (1280, 1380), True),
-        ("robot_phone", "light", (390, 844), False),
-    ],
-)
-def test_pictures(name, theme, size, grey, tmp_path):
-    """A picture is of a page on which all is known and nothing is cut off; where it is kept, see above."""
-    asked = os.environ.get("WHISKER_PICTURES")
-    if not asked and name != "robot":
-        pytest.skip("WHISKER_PICTURES=1 draws this one too")
-    folder = PICTURES if asked else tmp_path
+def test_the_daemon_of_a_ring_on_this_machine_is_among_the_processes():
+    async def scenario(writer):
+        hub = Hub([writer.name], Post().source)
+        async with serving(hub, "127.0.0.1", 0, []) as port, chromium.browser() as b:
+            await b.look(f"http://127.0.0.1:{port}/")
+            said = await b.until("$('processes').innerText.includes('ring ') && $('processes').innerText")
+            assert f"ring {writer.name}" in said and "frames 640" in said and "missing 0" in said
 
-    async def scenario():
-        post, run = Post(), MadeUpRun(skip={100, 101})
-        async with looking_at(post, theme, size, run=run, rows=ROWS) as (b, _), going_on(post, run, ROWS):
-            if grey:
-                await b.call("Emulation.setEmulatedVisionDeficiency", type="achromatopsia")
-            await b.until(f"{DRAWN} && $('robot-note').hidden && $('robot-state').dataset.state === 'live'")
-            await b.eval("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(true))))")
-            await b.picture(folder / f"{name}.png")
-            assert await b.eval("document.documentElement.scrollWidth") == size[0]
-            assert await b.eval("document.documentElement.dataset.theme") == theme
-            assert "not known" not in await b.text("#robot-part")
-
-    asyncio.run(scenario())
-    assert (folder / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+    with ring_of(made_frames(0, 640)) as writer:
+        asyncio.run(scenario(writer))

@@ -233,7 +233,7 @@ class Post:
         payload = Bytes(encode(message) if data is None else data)
         self.inbox.put(Sample(f"whisker/robot/{topic}", encoding or encoding_of(type(message)), payload, attachment))
 
-    def play(self, run: MadeUpRun, rows: range, model: RobotModel) -> None:
+    def play(self, run, rows: range, model: RobotModel) -> None:
         """All of these rows straight into a model."""
         for row in rows:
             for topic, message in run.messages(row):
@@ -243,8 +243,9 @@ class Post:
 
 
 @asynccontextmanager
-async def robot_view(post: Post, scene: Scene | None = SCENE, run: MadeUpRun | None = None, rows: int = 0):
-    """A server that shows this robot; gives its port and hub. `run`: the rows it has already been told."""
+async def robot_view(post: Post, scene: Scene | None = SCENE, run=None, rows: int = 0):
+    """A server that shows this robot; gives its port and hub. `run`: MadeUpRun or the like, whose
+    first rows it has been told."""
     hub = Hub([f"whisker-test-no-ring-{os.getpid()}"], post.source, scene)
     post.play(run or MadeUpRun(), range(rows), hub.robot)
     async with serving(hub, "127.0.0.1", 0, []) as port:

@@ -2,6 +2,7 @@
 const NOSE = 1.0; // of the body's radius: length of the heading line
 const GUESSED_M = 0.08; // of a mark for a robot whose outline is not known
 const GAP_S = 1.5; // a path is not drawn across longer silences
+const JUMP_M_S = 1.5; // nor where it was never driven: an estimate that is now of another place
 
 class Actors {
   constructor(plan) { this.plan = plan; }
@@ -14,37 +15,36 @@ class Actors {
     pen.clearRect(0, 0, plan.live.width, plan.live.height);
     pen.save();
     if (layers.belief) world.belief.draw(plan, pen);
-    if (layers.truth) this.path(world.truth, '--beta', [7, 5]);
     if (layers.estimate) this.path(world.path, '--alpha', []);
+    if (layers.truth) this.path(world.truth, '--beta', [7, 6]);
     if (layers.contacts) for (const contact of world.contacts) this.contact(contact);
-    if (layers.truth && world.word?.truth) this.robot(world.word.truth, '--beta', [5, 4], null);
     if (layers.estimate && world.word?.pose) this.robot(world.word.pose, '--alpha', [], world.word, world.stale);
+    if (layers.truth && world.word?.truth) this.robot(world.word.truth, '--beta', [6, 6], null);
     if (layers.belief) world.belief.drawHeadings(plan, pen);
     if (layers.belief) world.belief.drawShares(plan, pen);
     pen.restore();
   }
 
-  /* Points [t, x, y, theta, ...]; a light edge keeps the line apart from what it crosses. */
+  /* Points [t, x, y, theta, ...], with gaps where nothing was driven; a light edge keeps the line apart from what it crosses. */
   path(points, colour, dashes) {
     const { pen, plan } = this;
     pen.beginPath();
-    points.forEach(([t, x, y], n) => {
-      const joined = n && t - points[n - 1][0] < GAP_S;
-      pen[joined ? 'lineTo' : 'moveTo'](plan.x(x), plan.y(y));
+    points.forEach(([, x, y], n) => {
+      pen[n && driven(points[n - 1], points[n]) ? 'lineTo' : 'moveTo'](plan.x(x), plan.y(y));
     });
     this.stroke(colour, 2, dashes);
   }
 
+  /* Dashes have light edges each, so that a line beneath is seen between them. */
   stroke(colour, width, dashes) {
     const { pen, plan } = this;
-    pen.lineJoin = pen.lineCap = 'round';
+    pen.lineJoin = 'round';
+    pen.setLineDash(dashes.map((n) => n * plan.ratio));
     pen.strokeStyle = plan.css('--card');
     pen.lineWidth = (width + 2.4) * plan.ratio;
     pen.stroke();
-    pen.lineCap = 'butt';
     pen.strokeStyle = plan.css(colour);
     pen.lineWidth = width * plan.ratio;
-    pen.setLineDash(dashes.map((n) => n * plan.ratio));
     pen.stroke();
     pen.setLineDash([]);
   }
@@ -125,6 +125,12 @@ class Actors {
     pen.fill();
     if (part === 'shaft') this.stroke('--ink', 1.6, []);
   }
+}
+
+/* Whether one point of a path leads to the next. */
+function driven(from, to) {
+  const seconds = to[0] - from[0];
+  return seconds < GAP_S && Math.hypot(to[1] - from[1], to[2] - from[2]) < JUMP_M_S * Math.max(seconds, 0.1);
 }
 
 /* The texture whose log-likelihood is highest under a tip; undefined when it was not read. */

@@ -146,6 +146,7 @@ wire.on('status', (status) => {
   view.tickS = status.tick_s;
   panels.status(status, rings.filter((name) => name !== view.ring), view.toDegrees);
   followNodes(status.lanes);
+  robotPart.takeRing(status);
   if (span) $('span').textContent = duration(traces.columns * view.width * view.tickS);
 });
 

@@ -72,6 +72,12 @@ class RobotPart {
     this.redraw();
   }
 
+  /* What topic status tells of the ring. */
+  takeRing(status) {
+    this.ring = status;
+    if (this.world.word) tellProcesses(this.world.word, status);
+  }
+
   tell(word) {
     const advice = robotAdvice(word);
     this.note(advice);
@@ -82,7 +88,7 @@ class RobotPart {
     tellBehaviour(word);
     tellRow(word);
     tellContacts(word, this.world.contacts);
-    tellProcesses(word);
+    tellProcesses(word, this.ring);
     const now = word.now_s === null ? 'not known' : `${signed(word.now_s, 1)} s`;
     $('robot-time').textContent = `Robot’s clock: ${now}`;
     const lost = word.refused.missed ? `${count(word.refused.missed)} messages were lost on the way. ` : '';

@@ -76,15 +76,21 @@ function tellContacts(word, contacts) {
     return contacts.slice(-6).toReversed().map((c) => {
       const where = typeof c.radius_m === 'number' ? signed(1e3 * c.radius_m, 0) : 'not known';
       const how = typeof c.sigma_m === 'number' ? ` ± ${signed(1e3 * c.sigma_m, 1)}` : '';
-      const cells = [words(c.whisker), c.part ?? 'not known', c.surface ?? '', where + how, c.release_s === null ? 'touching' : `${duration(Math.max(0, c.release_s - c.onset_s))}`];
+      const cells = [words(c.whisker), c.part ?? 'not known', c.surface ?? 'not known', where + how, c.release_s === null ? 'touching' : `${duration(Math.max(0, c.release_s - c.onset_s))}`];
       return make('tr', cells.map((cell) => make('td', cell)));
     });
   });
 }
 
-function tellProcesses(word) {
-  const told = word.processes;
+function tellProcesses(word, ring) {
+  const told = ring && ring.state !== 'waiting' ? [...word.processes, ringProcess(ring)] : word.processes;
   retell($('processes'), told, () => (told.length ? told.map(processCard) : [make('li', none('no process has told of itself'))]));
+}
+
+/* The daemon behind the ring that the other part shows, if that ring is on this machine, in the words of topic robot. */
+function ringProcess(s) {
+  const counters = { frames: count(s.frames), missing: count(s.reader?.frames_missing ?? 0), dropped: count(s.dropped), 'bad records': count(sum(s.lanes?.lost ?? [])) };
+  return { name: `ring ${s.ring}`, pid: s.reader?.writer_pid, state: words(s.state), age_s: s.age_s === null ? null : Math.floor(s.age_s), silent: s.state === 'stalled', ended: s.state === 'ended', restarts: s.restarts, counters, error: s.trouble?.text ?? '' };
 }
 
 function processCard(p) {
