@@ -31,7 +31,7 @@ void base_robot_health(const struct base_robot *robot, char *text, size_t room)
              "angle_source=%s remainder=%s bytes=%llu frames=%llu corrupt=%llu skipped=%llu resyncs=%llu missed=%llu "
              "reconnects=%llu silences=%llu commander_stops=%llu mode_losses=%llu",
              robot->options->odometry.model == CREATE_2 ? 2 : 1, robot->port < 0 ? "gone" : "open",
-             seen ? mode_name(value[CREATE_OI_MODE]) : "unknown", mode_name((int32_t)robot->wanted),
+             seen ? mode_name(base_robot_mode_told(robot)) : "unknown", mode_name((int32_t)robot->wanted),
              value[CREATE_OI_VOLTAGE], value[CREATE_OI_CHARGE], value[CREATE_OI_CAPACITY], robot->low,
              value[CREATE_OI_CHARGING_SOURCES], robot->speeds.left_mm_s, robot->speeds.right_mm_s, robot->speeds.v_m_s,
              robot->speeds.omega_rad_s, create_source_name(odometry->settings.policy),

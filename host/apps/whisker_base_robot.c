@@ -9,6 +9,8 @@
 
 #define READ_BYTES 256
 #define COMMANDER_FRAMES (BASE_COMMANDER_MS / CREATE_OI_PERIOD_MS)
+/* A base is in the mode it was asked for long before so many frames. */
+#define MODE_FRAMES 20
 /* A battery of 12 cells: below a tenth of its charge, or 1.0 V a cell, the base will not drive for long. */
 #define LOW_CHARGE 10
 #define LOW_MV 12000
@@ -72,6 +74,7 @@ static bool order_opcode(struct base_robot *robot, enum create_oi_opcode opcode)
 static bool ask_mode(struct base_robot *robot, enum create_oi_mode mode)
 {
     robot->entered = false;
+    robot->frames_since_mode = 0;
     robot->wanted = mode;
     return mode == CREATE_OI_MODE_PASSIVE
                ? order_opcode(robot, CREATE_OI_OP_START)
@@ -149,10 +152,15 @@ uint64_t base_robot_taken(const struct base_robot *robot)
 /* --------------------------------------------------------------------------------------------------------- the frames
  */
 
+int32_t base_robot_mode_told(const struct base_robot *robot)
+{
+    return robot->frame.value[CREATE_OI_MODE] - robot->mode_offset;
+}
+
 unsigned base_robot_bits(const struct base_robot *robot)
 {
     const int32_t *value = robot->frame.value;
-    const bool idle = robot->port < 0 || value[CREATE_OI_MODE] != (int32_t)robot->wanted;
+    const bool idle = robot->port < 0 || base_robot_mode_told(robot) != (int32_t)robot->wanted;
     return (unsigned)value[CREATE_OI_BUMPS_DROPS] | (value[CREATE_OI_CLIFF_LEFT] ? BASE_CLIFF_LEFT : 0u) |
            (value[CREATE_OI_CLIFF_FRONT_LEFT] ? BASE_CLIFF_FRONT_LEFT : 0u) |
            (value[CREATE_OI_CLIFF_FRONT_RIGHT] ? BASE_CLIFF_FRONT_RIGHT : 0u) |
@@ -169,10 +177,22 @@ static const char *mode_reason(const struct base_robot *robot)
                                                             : "its own decision; look at its buttons and battery";
 }
 
+/* Nobody has asked for a higher mode than the wanted: a base that tells one for long counts them differently. */
+static void watch_mode_offset(struct base_robot *robot)
+{
+    robot->frames_since_mode++;
+    if (!robot->entered && robot->frames_since_mode >= MODE_FRAMES && robot->wanted >= CREATE_OI_MODE_SAFE &&
+        base_robot_mode_told(robot) == (int32_t)robot->wanted + 1) {
+        robot->mode_offset = 1;
+        daemon_log(LOG_NOTE, "%s: this firmware tells modes one higher than they are", robot->options->port);
+    }
+}
+
 /* A base that leaves its mode has stopped its wheels; it goes back only when the commander says so. */
 static void watch_mode(struct base_robot *robot)
 {
-    const bool in_force = robot->frame.value[CREATE_OI_MODE] == (int32_t)robot->wanted;
+    watch_mode_offset(robot);
+    const bool in_force = base_robot_mode_told(robot) == (int32_t)robot->wanted;
     if (robot->entered && !in_force) {
         robot->mode_losses++;
         robot->speeds = (struct create_speeds){0};

@@ -41,6 +41,8 @@ struct base_robot {
     struct create_frame frame;   /* newest */
     struct create_speeds speeds; /* ordered last */
     enum create_oi_mode wanted;
+    int32_t mode_offset; /* some firmwares tell a mode one higher than it is */
+    uint32_t frames_since_mode;
     bool entered;       /* the wanted mode was seen in force since it was last asked for */
     bool low, told_low; /* battery */
     int64_t drive_ms, frame_ms, opened_ms;
@@ -78,6 +80,9 @@ void base_robot_end(struct base_robot *robot);
 
 /* One line of key=value, for people and programs. */
 void base_robot_health(const struct base_robot *robot, char *text, size_t room);
+
+/* Mode of the newest frame, as of enum create_oi_mode. */
+int32_t base_robot_mode_told(const struct base_robot *robot);
 
 /* Bits of the newest frame. */
 unsigned base_robot_bits(const struct base_robot *robot);

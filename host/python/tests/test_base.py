@@ -239,6 +239,20 @@ def test_a_base_that_leaves_its_mode_waits_for_its_commander(start):
     assert "has left its mode: a cliff" in driver.log.read_text()
 
 
+def test_a_firmware_that_tells_modes_one_too_high_is_understood(start):
+    driver = start("--clock", "stream")
+    peer = driver.peer
+    with driver.client() as client:
+        peer.tell(peer.frame(p35=3) * 19)
+        assert client.odometry(after=peer.told).bits == base.IDLE
+        peer.tell(peer.frame(p35=3))
+        client.odometry(after=peer.told)
+        assert client.health()["mode"] == "safe"
+        assert client.odometry().bits == 0
+        await_frame(client, driver, p35=2)
+        assert client.health()["mode_losses"] == "1"
+
+
 def test_a_line_that_goes_and_comes_back(start):
     driver = start()
     with driver.client() as client:

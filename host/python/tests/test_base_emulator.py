@@ -136,6 +136,13 @@ def test_a_line_that_is_silent_for_a_second_is_back(robot):
         it.wait_frame()
 
 
+def test_a_firmware_that_tells_modes_one_too_high_is_understood(robot):
+    it = robot("--mode-plus-one")
+    while it.wait_frame().bits & IDLE:
+        pass
+    assert it.base.health()["mode"] == "safe"
+
+
 def test_a_bump_is_told(robot):
     it = robot("--event", "bump-left@0.3+1000")
     it.drive_until(0.1, 0, lambda motions: motions and motions[-1].bits & BUMP_LEFT)
