@@ -139,10 +139,14 @@ def test_bags_that_no_scene_can_be_made_from(scene, tmp_path, capsys):
 
 
 def test_log_times_follow_the_bridge_and_outlive_it():
-    clock, second = BagClock(10**18), 10**9
-    assert [clock.of(s * second) - 10**18 for s in (5, 6, 5.9)] == [0, second, 0.9 * second]
-    began_anew = clock.of(0)
-    assert began_anew == 10**18 + second + 10**8 and clock.of(second) == began_anew + second
+    clock, began, second = BagClock(10**18), 10**18, 10**9
+    assert clock.other(3 * second) == began
+    assert [clock.row(s * second) - began for s in (500, 501)] == [0, second]
+    assert [clock.other(s * second) - began for s in (499, 501, 502)] == [-second, second, 2 * second]
+    assert clock.other(0) == began + second  # a process that does not know the bridge's clock
+    assert clock.row(0) == began + second + 10**8  # the bridge began anew
+    assert clock.row(second) == clock.other(second) == began + 2 * second + 10**8
+    assert clock.other(501 * second) == clock.latest  # an answer to a row of the bridge before
 
 
 def test_an_existing_bag_is_kept(tmp_path, capsys):

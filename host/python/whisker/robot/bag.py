@@ -19,23 +19,32 @@ RECORD, FORMAT = "whisker_robot", "1"  # name of the metadata record, and of wha
 SCENE_FILES = (ARENA, ROBOT, PRIOR)
 FLUSH_S = 1.0
 LOOK_S = 0.5
+APART_NS = 60 * 10**9  # a message further from the newest row does not have this bridge's clock
 
 
 class BagClock:
-    """Log times: the wall's when the bag began, the bridge's from then on; a bridge that begins anew goes on behind."""
+    """Log times: the wall's when the bag began, then those of the rows; a bridge that begins anew goes on behind.
+
+    Only rows move it: they come in order, from one process. What others stamp may be late, or of a bridge before.
+    """
 
     def __init__(self, wall_ns: int):
-        self._wall_ns, self._offset, self.latest = wall_ns, None, wall_ns
+        self._offset: int | None = None
+        self._row_ns, self.latest = 0, wall_ns
 
-    def of(self, stamp_ns: int) -> int:
-        """The log time of a stamp. Streams of one bridge may be out of step by less than a second."""
+    def row(self, stamp_ns: int) -> int:
+        """The log time of a row."""
         if self._offset is None:
-            self._offset = self._wall_ns - stamp_ns
-        elif stamp_ns + self._offset < self.latest - 10 * ROW_NS:
+            self._offset = self.latest - stamp_ns
+        elif stamp_ns < self._row_ns:
             self._offset = self.latest + ROW_NS - stamp_ns
-        told = stamp_ns + self._offset
-        self.latest = max(self.latest, told)
-        return told
+        self._row_ns, self.latest = stamp_ns, stamp_ns + self._offset
+        return self.latest
+
+    def other(self, stamp_ns: int) -> int:
+        """The log time of another message with the bridge's stamp: the newest row's when that makes no sense."""
+        told = self.latest if self._offset is None else stamp_ns + self._offset
+        return told if abs(told - self.latest) <= APART_NS else self.latest
 
 
 def metadata(robot: str, scene: Path | None) -> dict[str, str]:
@@ -63,9 +72,12 @@ class Bag:
             if topic not in self._known:
                 self._known.add(topic)
                 self._writer.topic(topic, SCHEMAS[type(one.message)])
-            stamp_ns = one.message.header.stamp.ns
-            self._writer.add(topic, self._clock.of(stamp_ns), one.envelope.number, encode(one.message))
+            self._writer.add(topic, self._time(one), one.envelope.number, encode(one.message))
             self.messages += 1
+
+    def _time(self, one: Received) -> int:
+        stamp_ns = one.message.header.stamp.ns
+        return self._clock.row(stamp_ns) if one.topic == "observation" else self._clock.other(stamp_ns)
 
     def run(self, link: Link, stop: threading.Event, stay: bool = False) -> dict[str, int]:
         """Until all streams but health have ended (unless `stay`), or stopped. Returns what was counted."""

@@ -13,13 +13,12 @@ from pathlib import Path
 
 from ..errors import UserError
 from ..localise import Estimate
-from ..observations import cell
 from ..scene import Prior, Scene
 from . import belief
 from .health import ENDED, RUNNING, Health
 from .link import Link
 from .messages import ARENA_FRAME, Header, Localisation, PoseWithCovariance, PoseWithCovarianceStamped
-from .rows import Follower, Step
+from .rows import Follower, Step, time_text
 from .track import Track
 
 BELIEF_NS = 500_000_000  # 2 Hz of the bridge's clock
@@ -99,7 +98,7 @@ class Navigator:
         cells, self._now_ns = step.cells(), step.row.header.stamp.ns
         header = Header.at(self._now_ns, ARENA_FRAME)
         for track in self._tracks:
-            self._answer(track, step, header, track.take(cell(self._now_ns / 1e9), cells))
+            self._answer(track, step, header, track.take(time_text(cells), cells))
         if self._now_ns >= self._belief_due_ns or self._belief_due_ns > self._now_ns + BELIEF_NS:
             self._belief_due_ns = self._now_ns + BELIEF_NS
             for track in self._tracks:

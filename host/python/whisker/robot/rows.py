@@ -65,6 +65,11 @@ def _pairs(message: Observation):
     return zip(message.cells, message.values, strict=True)
 
 
+def time_text(row: dict[str, float | None]) -> str:
+    """A row's time as the files tell it."""
+    return f"{row['t_s']:.10g}"
+
+
 @dataclass(frozen=True)
 class Step:
     """What a filter takes: a row, and the motion since the row of the step before."""

@@ -11,7 +11,7 @@ from ..recording.mcapfile import MAGIC, McapFile
 from ..robot.bag import RECORD, SCENE_FILES
 from ..robot.link import Received
 from ..robot.messages import MessageError, Observation, PoseStamped, decode
-from ..robot.rows import Follower
+from ..robot.rows import Follower, time_text
 from ..robot.streams import Envelope
 from ..scene import Scene, load
 
@@ -61,7 +61,8 @@ def _table(rows: list[Observation], truth: list[PoseStamped]) -> list[dict[str, 
     for n, row in enumerate(rows):
         stream += n > 0 and row.seq <= rows[n - 1].seq
         (step,) = follower.take([Received("observation", row, Envelope(stream, n, 0))])
-        cells = {name: cell(value) for name, value in step.cells().items()}
+        row_cells = step.cells()
+        cells = {name: cell(value) for name, value in row_cells.items()} | {"t_s": time_text(row_cells)}
         if poses:
             pose = poses.get(row.header.stamp.ns, (np.nan,) * 3)
             cells |= {name: repr(float(value)) for name, value in zip(TRUTH, pose, strict=True)}
