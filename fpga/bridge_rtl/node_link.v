@@ -21,7 +21,7 @@
 
 module node_link (
     input  wire       clk,           // 60 MHz
-    input  wire       rst,           // synchronous; ends a transfer at once
+    input  wire       rst,           // synchronous; ends a transfer at once, the pins a cycle later
     input  wire       start,         // begin a tick: one cycle, only while not busy
     input  wire [7:0] order_tick,    // low bits of the tick number, read at start
     input  wire       service,       // a service order waits: a second window follows; read at start
@@ -117,9 +117,10 @@ module node_link (
         else if ((state == SYNC && waited) || service_begin) wait_left <= {4'd0, SETUP_CYCLES} - 12'd1;
         else if (!waited) wait_left <= wait_left - 12'd1;
 
+    // The pins' registers lie in their pads: what resets them is the state, for the reset itself would come too late there.
     always @(posedge clk) begin
-        if (rst || state == IDLE) begin
-            sync     <= start && !rst;
+        if (state == IDLE) begin
+            sync     <= start;
             select_n <= 1'b1;
         end else if (state == SYNC && waited) begin
             sync     <= 1'b0;
@@ -133,7 +134,7 @@ module node_link (
         else if (state == BITS) phase <= phase + 6'd1;
 
     always @(posedge clk)
-        if (rst) sck <= 1'b0;
+        if (state == IDLE) sck <= 1'b0;
         else if (bit_begins) sck <= 1'b1;
         else if (phase == {1'b0, divider[5:1]} - 6'd1) sck <= 1'b0;
 

@@ -55,8 +55,12 @@ always @* if (f_past && busy) begin
     if (done || service_done) assert (f_captures == 7'd64);
 end
 
-// The clock is high in the first half of a bit and at no other time; select is low from SETUP to HOLD.
-always @* if (f_past) begin
+// The clock is high in the first half of a bit and at no other time; select is low from SETUP to HOLD. Pins follow a reset
+// a cycle later.
+reg f_reset = 1'b1;
+always @(posedge clk) f_reset <= rst;
+always @* if (f_past && f_reset) assert (state == IDLE);
+always @* if (f_past && !f_reset) begin
     assert (sck == (state == BITS && phase < {1'b0, divider[5:1]}));
     assert (select_n == !(state == SETUP || state == BITS || state == GAP || state == HOLD));
     assert (sync == (state == SYNC));

@@ -158,6 +158,8 @@ async def reset_ends_a_transfer(dut):
         await RisingEdge(dut.sck)
     await pulse(dut, dut.rst)
     await FallingEdge(dut.clk)
+    assert not int(dut.busy.value)
+    await FallingEdge(dut.clk)
     assert (int(dut.busy.value), int(dut.select_n.value), int(dut.sck.value), int(dut.sync.value)) == (0, 1, 0, 0)
 
 
