@@ -6,7 +6,7 @@ import subprocess
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 GRACE_S = 10.0  # for a child to end after SIGTERM, before SIGKILL
@@ -17,14 +17,13 @@ class Program:
     """A line of a process table.
 
     serves: it goes on until it is asked to end, and is missed when it ends before; tells: it tells of itself on a health
-    topic; environment: what it finds besides ours.
+    topic.
     """
 
     name: str
     command: tuple[str, ...]
     serves: bool = False
     tells: bool = False
-    environment: dict[str, str] = field(default_factory=dict)
 
     @classmethod
     def of(cls, name: str, command: list, **options) -> "Program":
@@ -47,13 +46,7 @@ class Child:
         self._log = open(log, "a")  # noqa: SIM115 - closed by close()
         where = subprocess.PIPE if on_line else self._log
         self.process = subprocess.Popen(
-            program.command,
-            stdin=subprocess.DEVNULL,
-            stdout=self._log,
-            stderr=where,
-            text=True,
-            start_new_session=True,
-            env=os.environ | program.environment,
+            program.command, stdin=subprocess.DEVNULL, stdout=self._log, stderr=where, text=True, start_new_session=True
         )
         self.started_s = time.monotonic()
         self.ended_s: float | None = None

@@ -22,6 +22,7 @@ COMMANDS = {
     "record": "write a ring to an MCAP file",
     "replay": "feed a ring from a recording, as the device would",
     "stream": "print frames as CSV or JSON lines",
+    "robot": "all processes of a robot, on hardware or simulated",
     "pilot": "the netbook's part of a robot: samples to wheel speeds and observations",
     "navigator": "pose and belief of a robot as its rows come, over the network",
     "bag": "record everything a robot's processes say, for ROS 2 tools",

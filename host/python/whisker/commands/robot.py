@@ -1,0 +1,103 @@
+"""`whisker robot`: starts all processes of a robot, on hardware or simulated, and starts again what ends."""
+
+import tempfile
+from pathlib import Path
+
+from .. import scene as scenes
+from ..bridgesim import flat_scene
+from ..demo.scenes import make_scene
+from ..errors import UserError
+from ..robot import parts
+from ..robot.link import Link
+from ..robot.supervisor import Supervisor
+from ..robot.truth import TruthWatcher
+from . import RING, number_above, stop_on_signals, whole_number
+
+EXAMPLE = "whisker robot --simulated --desktop"
+DAY_S = 86400.0
+VIEW_PORT = 8028
+PORT = Path("/dev/ttyUSB0")
+
+
+def add(parser) -> None:
+    parser.add_argument("scene", nargs="?", type=Path, metavar="SCENE", help="scene folder: arena, robot, prior")
+    parser.add_argument("--models", type=Path, metavar="DIR", help="folder with texture.json and <whisker>.json")
+    parser.add_argument("--create", type=int, choices=(1, 2), default=1, help="the base: iRobot Create (%(default)s)")
+    parser.add_argument("--port", type=Path, default=PORT, help="the base's serial port (default: %(default)s)")
+    parser.add_argument("--ring", default=RING, metavar="NAME", help="whiskerd's ring (default: %(default)s)")
+    parser.add_argument("--desktop", action="store_true", help="also the desktop's side: navigator, bag, view")
+    parser.add_argument(
+        "--view-port", type=whole_number(0, 65535), default=VIEW_PORT, metavar="N", help="(%(default)s)"
+    )
+    parser.add_argument(
+        "--out", type=Path, default=Path("robot-run"), metavar="DIR", help="logs, bag, truth (robot-run)"
+    )
+    parser.add_argument("--no-view", action="store_true", help="no page for a browser")
+    parser.add_argument("--seed", type=whole_number(0, 2**32 - 1), default=1, help="of turns and simulation (1)")
+    text = "be reached at this address, by whoever reaches it (default: this machine only)"
+    parser.add_argument("--listen", default=parts.LOOPBACK, metavar="ADDRESS", help=text)
+    text = "of three, for supervisor, pilot and navigator (default: %(default)s)"
+    parser.add_argument("--first-port", type=whole_number(1, 65533), default=parts.FIRST_PORT, metavar="N", help=text)
+    text = "no hardware: the scene (default: the demo's of this seed) with a simulated robot, at the wall clock's pace"
+    parser.add_argument("--simulated", action="store_true", help=text)
+    parser.add_argument(
+        "--level", choices=("bytes", "rtl"), default="bytes", help="of the simulated bridge (%(default)s)"
+    )
+    parser.add_argument(
+        "--seconds", type=number_above(0.0), default=DAY_S, metavar="S", help="simulated length (a day)"
+    )
+    parser.add_argument("--pace", type=number_above(0.0), default=1.0, metavar="X", help="simulated seconds per second")
+    parser.set_defaults(run=run)
+
+
+def run(arguments) -> int:
+    stop = stop_on_signals()
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix="whisker-") as folder:
+        meeting = parts.Meeting(arguments.ring, Path(folder), arguments.listen, arguments.first_port)
+        table = _table(arguments, meeting)
+        with Link("supervisor", listen=[meeting.endpoint(0)]) as link:
+            if arguments.simulated:
+                TruthWatcher(meeting.simulation, link, stop).start()
+            until = parts.BRIDGE if arguments.simulated else None
+            supervisor = Supervisor(table, arguments.out / "logs", link, until)
+            print(
+                f"starting {', '.join(program.name for program in table)}; logs: {arguments.out / 'logs'}", flush=True
+            )
+            ended = supervisor.run(stop)
+    print(f"all ended: {ended}")
+    return 0
+
+
+def _table(arguments, meeting: parts.Meeting) -> list:
+    if arguments.simulated:
+        body, simulated = _simulated(arguments, meeting)
+        table = [parts.bridge(simulated, body, meeting)]
+    else:
+        if not (arguments.scene and arguments.models):
+            raise UserError("robot: no SCENE or no --models; give both, or --simulated")
+        body = parts.Body(arguments.scene, arguments.models, arguments.create, arguments.port, arguments.seed)
+        table = []
+    if arguments.desktop:
+        view = None if arguments.no_view else arguments.view_port
+        table += parts.desktop(body, meeting, arguments.out / "robot.mcap", view)
+    return table + parts.netbook(body, meeting, arguments.simulated)
+
+
+def _simulated(arguments, meeting: parts.Meeting) -> tuple[parts.Body, parts.Simulated]:
+    """The simulated robot; what it needs is written below --out, its models learnt there if none are given."""
+    out, seed = arguments.out, arguments.seed
+    folder = arguments.scene or out / "scene"
+    if arguments.scene is None:
+        scenes.write(folder, make_scene(seed)[0])
+    flat, _ = flat_scene(arguments.scene and str(arguments.scene), seed)
+    (out / "scene.flat").write_text(flat)
+    models = arguments.models or out / "models"
+    if arguments.models is None and not (models / "texture.json").exists():
+        from ..demo.training import learn  # needs the source tree's sim/
+
+        print("learning textures and distances of this robot: half a minute", flush=True)
+        learn(models, scenes.load(folder), seed, lambda: None)
+    body = parts.Body(folder, models, arguments.create, meeting.serial, seed)
+    told = (arguments.level, seed, arguments.seconds, arguments.pace, out / "truth.csv")
+    return body, parts.Simulated(out / "scene.flat", *told)

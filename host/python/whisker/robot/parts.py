@@ -1,0 +1,113 @@
+"""The robot's process table: what runs on the netbook, what on the desktop, and what stands in for the hardware."""
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..bridgesim import program
+from ..children import Program
+
+FIRST_PORT = 7447  # of three: supervisor, pilot, navigator; the latter two are those of robot.link
+LOOPBACK = "127.0.0.1"
+BRIDGE = "bridge"
+
+# Inside the simulated bridge's umockdev the device is seen by whoever has this environment: it is left in file $0.
+LEAVE_ENVIRONMENT = (
+    'export -p >"$0.new" && mv "$0.new" "$0"; trap "exit 0" TERM; while :; do sleep 3600 & wait $!; done'
+)
+# Waits for it, and becomes the command with it.
+WITH_ENVIRONMENT = 'while [ ! -e "$0" ]; do sleep 0.1; done; . "$0"; exec "$@"'
+
+
+@dataclass(frozen=True)
+class Meeting:
+    """Where a robot's processes meet: a ring, a folder of sockets, and three ports of one address."""
+
+    ring: str
+    folder: Path
+    address: str = LOOPBACK
+    first_port: int = FIRST_PORT
+
+    def endpoint(self, number: int) -> str:
+        """0: the supervisor's, 1: the pilot's, 2: the navigator's."""
+        return f"tcp/{self.address}:{self.first_port + number}"
+
+    @property
+    def base(self) -> Path:
+        return self.folder / "base.sock"
+
+    @property
+    def simulation(self) -> Path:
+        return self.folder / "sim.sock"
+
+    @property
+    def serial(self) -> Path:
+        """Of the simulated base."""
+        return self.folder / "create"
+
+    @property
+    def environment(self) -> Path:
+        """Of whoever is to see the simulated bridge."""
+        return self.folder / "environment"
+
+
+@dataclass(frozen=True)
+class Body:
+    """The robot: its scene folder, its models, and the base, Create 1 or 2, on a serial port."""
+
+    scene: Path
+    models: Path
+    create: int
+    port: Path
+    seed: int  # of the random turns
+
+
+def netbook(body: Body, meeting: Meeting, simulated: bool) -> list[Program]:
+    """Daemon, base and pilot. The pilot is the last, so that it is ended first, and stops the wheels."""
+    daemon = [program("whiskerd"), "--ring", meeting.ring, "--wait"]
+    if simulated:
+        daemon = ["sh", "-c", WITH_ENVIRONMENT, meeting.environment, *daemon]
+    base = [program("whisker-base"), "--port", body.port, "--socket", meeting.base, "--model", body.create, "--wait"]
+    pilot = [*_whisker("pilot"), body.scene, "--models", body.models, "--ring", meeting.ring, "--base", meeting.base]
+    pilot += ["--seed", body.seed, "--listen", meeting.endpoint(1), "--connect", meeting.endpoint(2)]
+    return [Program.of("whiskerd", daemon), Program.of("base", base), Program.of("pilot", pilot, tells=True)]
+
+
+def desktop(body: Body, meeting: Meeting, bag: Path | None, view_port: int | None) -> list[Program]:
+    """Navigator, and, where they are wanted, bag and view."""
+    navigator = [*_whisker("navigator"), body.scene, "--stay"]
+    navigator += ["--listen", meeting.endpoint(2), "--connect", meeting.endpoint(1)]
+    table = [Program.of("navigator", navigator, tells=True)]
+    everybody = [word for number in range(3) for word in ("--connect", meeting.endpoint(number))]
+    if bag:
+        command = [*_whisker("bag"), bag, "--scene", body.scene, "--stay", "--overwrite", *everybody]
+        table.append(Program.of("bag", command, tells=True))
+    if view_port is not None:
+        command = [*_whisker("view"), "--ring", meeting.ring, "--robot", "--scene", body.scene, "--port", view_port]
+        table.append(Program.of("view", [*command, *everybody]))
+    return table
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """What stands in for arena, whiskers, bridge and base. `flat`: the scene as the simulation reads it."""
+
+    flat: Path
+    level: str  # rtl or bytes
+    seed: int
+    seconds: float
+    pace: float  # simulated seconds per second
+    truth: Path
+
+
+def bridge(simulated: Simulated, body: Body, meeting: Meeting) -> Program:
+    """The simulation, at the wall's pace; whiskerd is started beside it."""
+    command = [program("umockdev-wrapper"), program("whisker-bridge-sim"), "--scene", simulated.flat]
+    command += ["--seconds", simulated.seconds, "--seed", simulated.seed, "--level", simulated.level]
+    command += ["--pace", simulated.pace, "--socket", meeting.simulation, "--truth", simulated.truth]
+    command += ["--create", body.create, "--create-link", meeting.serial]
+    return Program.of(BRIDGE, [*command, "--", "sh", "-c", LEAVE_ENVIRONMENT, meeting.environment])
+
+
+def _whisker(command: str) -> list[str]:
+    return [sys.executable, "-m", "whisker.cli", command]
