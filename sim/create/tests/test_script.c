@@ -53,6 +53,9 @@ static void test_wait_for_a_distance(void **state)
     SEND(CREATE_OI_OP_SCRIPT, 13, GO, CREATE_OI_OP_WAIT_DISTANCE, 0, 100, STOP, CREATE_OI_OP_PLAY_SCRIPT);
     assert_int_equal(ticks_until_driven(10), 1);
     assert_in_range(ticks_until_stopped(5000), 1000, 1002); /* 0.1 m at 0.2 m/s */
+    pass_ticks(1);
+    SEND(CREATE_OI_OP_FULL); /* heard again: the script is over */
+    assert_int_equal(sim_create_mode(robot.create), CREATE_OI_MODE_FULL);
 }
 
 static void test_wait_for_an_angle(void **state)
