@@ -98,35 +98,53 @@ def test_a_scene_comes_of_it_again(bag, scene, tmp_path, capsys):
         assert np.allclose(ours, theirs, rtol=1e-5, atol=1e-6, equal_nan=True), name
 
 
-def received(n: int, message, topic="observation") -> Received:
-    return Received(topic, message, Envelope(1, n, 0))
+class Kept(list):
+    """A link that keeps what is sent on it."""
+
+    def publish(self, topic):
+        return self
+
+    send = list.append
+
+
+def scene_of(messages, scene, folder, capsys):
+    """Rows of the scene that is made of a bag with these observations."""
+    toml = {file.name: file.read_text() for file in scene[0].glob("*.toml")}
+    writer = TopicWriter(folder / "a.mcap", RECORD, {"robot": "r2"} | toml)
+    Bag(writer, "r2").take([Received("observation", row, Envelope(1, n, 0)) for n, row in enumerate(messages)])
+    writer.finish()
+    assert run(capsys, "scene", "from", folder / "a.mcap", "--out", folder / "b")[0] == 0
+    return localise.read_observations(observations_path(folder / "b"), scene[1])
+
+
+def summed(motions) -> np.ndarray:
+    total = np.zeros(3)
+    for motion in motions:
+        total = compose(total, motion)
+    return total
+
+
+def sent(scene, first: int = 0, last: int = ROWS):
+    """Observations of a pilot that lived for these rows."""
+    kept = Kept()
+    publisher = RowPublisher(kept)
+    for row in to_rows(scene[2], scene[1])[first:last]:
+        publisher.send(row, m.EXPLORING)
+    return kept, publisher.pose
 
 
 def test_rows_that_are_not_in_the_bag_are_in_the_motion_of_the_next(scene, tmp_path, capsys):
-    folder, loaded, observations = scene
-    writer = TopicWriter(
-        tmp_path / "a.mcap", RECORD, {"robot": "r2"} | {f.name: f.read_text() for f in folder.glob("*.toml")}
-    )
-    bag, sent = Bag(writer, "r2"), []
-
-    class Sink:
-        def publish(self, topic):
-            return self
-
-        send = staticmethod(sent.append)
-
-    publisher = RowPublisher(Sink())
-    for row in to_rows(observations, loaded):
-        publisher.send(row, m.EXPLORING)
-    bag.take([received(row.seq, row) for row in sent if row.seq not in (7, 8, 9)])
-    writer.finish()
-    assert run(capsys, "scene", "from", tmp_path / "a.mcap", "--out", tmp_path / "b")[0] == 0
-    rows = localise.read_observations(observations_path(tmp_path / "b"), loaded)
+    messages, pose = sent(scene)
+    rows = scene_of([row for row in messages if row.seq not in (7, 8, 9)], scene, tmp_path, capsys)
     assert len(rows) == ROWS - 3 and rows.truth is None
-    total = np.zeros(3)
-    for motion in rows.odometry:
-        total = compose(total, motion)
-    assert total == pytest.approx(publisher.pose, abs=1e-5)
+    assert summed(rows.odometry) == pytest.approx(pose, abs=1e-5)
+
+
+def test_a_pilot_that_began_anew_goes_on_in_the_scene(scene, tmp_path, capsys):
+    (first, pose), (then, more) = sent(scene, 0, 12), sent(scene, 12)
+    rows = scene_of([*first, *then[2:]], scene, tmp_path, capsys)
+    assert len(rows) == ROWS - 2 and np.all(np.diff(rows.t_s) > 0.0)
+    assert summed(rows.odometry) == pytest.approx(compose(pose, more), abs=1e-5)
 
 
 def test_bags_that_no_scene_can_be_made_from(scene, tmp_path, capsys):
