@@ -188,10 +188,12 @@ def test_a_killed_driver_stops_the_wheels_and_another_takes_over(start):
 def test_a_driver_that_hangs_is_replaced(start):
     driver = start()
     with driver.client() as client:
+        pid = int(client.health()["driver_pid"])
+        await_frame(client, driver)  # the line is not silent for half a second to come
         client.drive(0.2, 0)
         driver.peer.await_order(drive_order(200, 200))
-        os.kill(int(client.health()["driver_pid"]), signal.SIGSTOP)
-        assert FIRM_STOP not in driver.peer.await_order(FIRM_STOP)  # it hangs
+        os.kill(pid, signal.SIGSTOP)
+        driver.peer.await_order(FIRM_STOP)  # it hangs
         assert driver.peer.await_start() == 2 * FIRM_STOP  # it was ended; the next one starts
     with driver.client() as client:
         assert client.health()["restarts"] == "1"
@@ -284,11 +286,11 @@ def test_without_a_line_orders_say_so(start):
 def test_a_silent_line_is_asked_for_its_stream_again(start):
     driver = start()
     with driver.client() as client:
-        driver.peer.tell(driver.peer.frame())
-        assert driver.peer.await_start().endswith(STOP)
-        assert int(client.health()["silences"]) >= 1
-        driver.peer.tell(driver.peer.frame())
-        client.odometry(after=driver.peer.told)
+        await_frame(client, driver)
+        before = client.health()["silences"]
+        while client.health()["silences"] == before:
+            assert driver.peer.await_start().endswith(STOP)
+        await_frame(client, driver)
         assert int(client.health()["missed"]) >= 500 // 15 - 1
 
 
