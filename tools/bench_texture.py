@@ -39,12 +39,14 @@ def run(build: Path, fresh: bool, real: dict[str, str | None] | None = None) -> 
     for name, measure in REAL.items():
         if given[name]:
             parts[name] = lambda measure=measure, name=name: measure(Path(given[name]))
-        elif not (CACHE / f"{name}.json").exists():
+        elif (CACHE / f"{name}.json").exists():
+            parts[name] = None  # what was measured when its folder was given
+        else:
             print(f"texture: {name} skipped: give --{name} DIR or {name.upper()}_DIR (see the module's text)")
     results = {}
     for name, measure in tqdm(parts.items(), desc="texture"):
         kept = CACHE / f"{name}.json"
-        if fresh or not kept.exists():
+        if measure and (fresh or not kept.exists()):
             kept.write_text(json.dumps(measure(), indent=1, default=float) + "\n")
         results[name] = json.loads(kept.read_text())
     RESULTS.mkdir(parents=True, exist_ok=True)

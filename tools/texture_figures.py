@@ -66,7 +66,7 @@ def draw_course(course: dict) -> Figure:
         panel.set(yticks=[-0.55, *range(len(course["surfaces"]))], ylim=(-1, len(course["surfaces"]) - 0.5))
         panel.set_yticklabels(["border", *(s.lower() for s in course["surfaces"])])
         panel.set_title(name, fontsize=9)
-    panels[0].legend(fontsize=8, loc="center")
+    panels[0].legend(fontsize=8, loc="upper right")
     for whisker, (_, color, _) in zip(course["whiskers"], marks, strict=True):
         trace = whisker["trace_deg"]
         panels[-1].plot([0.02 * n for n in range(len(trace))], trace, color=color, lw=0.8)

@@ -6,13 +6,14 @@ HEAD = """# Floor texture: faults and recordings, method by method
 
 Made by `tools/bench_texture.py`. `paper` is the naive Bayes of equation 1, which always answers; `default` the spectral
 method, which may say "unknown". [What they do](texture.md). Share of decisions in percent; `error` is the expected
-calibration error; `cut` by how much the wrong decisions fall when the least confident tenth is refused.
+calibration error; `cut` by how much the wrong decisions fall when the least confident tenth is refused (their number where none is left).
 """
 FAULTS = """
 ## Faults
 
 Simulated floors, one robot, 100 ms windows; each fault strikes recordings never trained on. Of a texture never trained no
 answer is right. "Wrong" are answers given; the likeliest class may be wrong where the answer is "unknown".
+
 """
 
 
