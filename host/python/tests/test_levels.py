@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 
 from whisker import scenes
+from whisker.behaviour_states import PLAIN
 from whisker.demo.level1 import explore
-from whisker.demo.pilot_process import load_models
 from whisker.demo.scenes import make_scene
 from whisker.demo.training import learn
 from whisker.pilot import Pilot
+from whisker.robot.models import load_models
 from whisker.scenes import geometry
 
 SEEDS = (31, 32, 33, 34)
@@ -45,7 +46,7 @@ def signals(tmp_path_factory):
 
 def signal_run(seed, folder):
     scene, start = make_scene(seed, "simple")
-    pilot = Pilot(scene.robot, *load_models(folder, scene.robot), seed)
+    pilot = Pilot(scene.robot, *load_models(folder, scene.robot), seed, habits=PLAIN)  # as level 0 behaves
     rows, truth = explore(scene, start, pilot, seed, ROWS * TICKS_PER_ROW)
     nan = math.nan
     tips, rays = scene.robot.of_role("texture"), scene.robot.of_role("object")

@@ -9,11 +9,12 @@ from whisker import localise
 from whisker.behaviour import BLOCK_TICKS, ODOMETRY_TICKS
 from whisker.contact import Contact
 from whisker.demo.level1 import explore
-from whisker.demo.pilot_process import load_models
-from whisker.demo.scenes import make_scene
+from whisker.demo.scenes import TEXTURES, make_robot, make_scene
 from whisker.demo.study import study
 from whisker.demo.training import learn
 from whisker.pilot import Pilot, compose
+from whisker.robot.models import load_models
+from whisker.scene import Arena, Scene
 
 SEED = 11
 TICKS = 80_000
@@ -230,3 +231,35 @@ def test_odometry_is_asked_for_after_each_fifth_block(flown):
 def test_motions_compose_in_the_frame_they_start_in():
     quarter = math.pi / 2
     assert compose((1.0, 0.0, quarter), (2.0, 0.5, 0.1)) == pytest.approx([0.5, 2.0, quarter + 0.1])
+
+
+def room(size_m, boxes=()):
+    """An arena without a pattern: every tile vinyl."""
+    tiles = [math.ceil(side / 0.5) for side in size_m]
+    return Scene(Arena(size_m, 0.5, TEXTURES, ("V" * tiles[0],) * tiles[1], tuple(boxes)), make_robot())
+
+
+def fly_in(scene, start, models, ticks, seed=SEED):
+    pilot = Pilot(scene.robot, *load_models(models, scene.robot), seed)
+    _, truth = explore(scene, start, pilot, seed, ticks)
+    return pilot, [(row["x_m"], row["y_m"]) for row in truth]
+
+
+@pytest.mark.parametrize("size_m", [(1.0, 1.0), (1.5, 0.8)])
+def test_does_not_stay_in_a_corner(models, size_m):
+    start = (0.25, 0.25, -0.75 * math.pi)
+    pilot, path = fly_in(room(size_m), start, models, TICKS)
+    for first in range(0, len(path) - 210, 10):
+        assert any(math.dist(path[first], place) > 0.2 for place in path[first : first + 210])  # 21 s
+    assert len(pilot.whisks) >= 1
+
+
+def test_a_contact_of_the_shaft_is_followed_by_one_of_the_tip(models):
+    kinds = []
+    for side, beside in ((1.0, 0.09), (-1.0, 0.1), (1.0, 0.11)):
+        low, high = sorted((1.25 - side * beside, 1.25 - side * (beside + 0.04)))
+        post = (1.25, low, 1.29, high)
+        pilot, _ = fly_in(room((2.5, 2.5), [post]), (0.75, 1.25, 0.0), models, 18_000)
+        kinds.append([(whisk["type"], whisk["tries"]) for whisk in pilot.whisks])
+    assert all(kind[0] == ("shaft", 0) for kind in kinds)
+    assert sum(("tip", 1) in kind or ("tip", 2) in kind for kind in kinds) >= 2

@@ -1,4 +1,4 @@
-"""The behaviour's states, driven by contacts and odometry made up here."""
+"""The behaviour's states, driven by contacts and odometry made up here; the plain behaviour, without what test_pilot_rules.py tests."""
 
 import math
 
@@ -16,6 +16,7 @@ from whisker.behaviour import (
     Behaviour,
     State,
 )
+from whisker.behaviour_states import PLAIN
 
 LEFT, RIGHT = 2, 3
 
@@ -34,9 +35,16 @@ class MadeUpContact:
 class Bench:
     """A behaviour and the tick it is asked at."""
 
-    def __init__(self, seed=1):
+    def __init__(self, seed=1, habits=PLAIN, **options):
         self.contacts = {LEFT: MadeUpContact(), RIGHT: MadeUpContact()}
-        self.behaviour = Behaviour(self.contacts, {LEFT: 1.0, RIGHT: -1.0}, np.random.default_rng(seed))
+        self.behaviour = Behaviour(
+            self.contacts,
+            {LEFT: 1.0, RIGHT: -1.0},
+            np.random.default_rng(seed),
+            {LEFT: 1.0, RIGHT: -1.0},
+            habits=habits,
+            **options,
+        )
         self.tick = -1
 
     def block(self):

@@ -22,6 +22,20 @@ OUT_LIMIT_RAD = math.radians(25.0)
 CLEAR_M = 0.08
 STUCK_REPORTS = 3  # of 0.1 s
 STUCK_SHARE = 0.25  # of the commanded motion
+LOST_TICKS = 1000  # without an odometry report for 0.5 s the base is lost
+HALT_TICKS = 200
+# The same place: a body's radius or so. Contacts so near each other so soon are one trap, not two finds.
+CROWD_M = 0.3
+CROWD_TICKS = 30_000
+CROWD = 2  # earlier encounters here, or one and LINGER_TICKS in this place
+LINGER_TICKS = 12_000  # 6 s: a body whisk and its way out take about so long
+ESCAPE_M = 0.25
+ESCAPE_MOST_M = 0.5
+AROUND_M = 0.6
+AWAY_SPREAD = 0.1  # of the free range's width, to either side of its middle
+FLIPS = 1  # changes of the turn's side in one escape
+TIP_PATIENCE_TICKS = 20_000  # in this place for so long: no further whisk for the tip
+TIP_SLACK_RAD = math.radians(3.0)  # beyond the angle at which the tip should have met the object
 
 
 class State(Enum):
@@ -33,10 +47,34 @@ class State(Enum):
     PUSH = "push"
     WHISK_OUT = "whisk out"
     HOLD = "hold"
+    RETREAT = "retreat for the tip"
     CLEAR = "clear"
+    ESCAPE = "escape"
+    TURN_AWAY = "turn away"
+    HALT = "halt"
+    STOPPED = "stopped"
 
 
-WHISKING = {State.BACK_OFF, State.WHISK_IN, State.PUSH, State.WHISK_OUT, State.HOLD}
+WHISKING = {State.BACK_OFF, State.WHISK_IN, State.PUSH, State.WHISK_OUT, State.HOLD, State.RETREAT}
+
+
+@dataclass(frozen=True)
+class Habits:
+    """What the behaviour does beyond exploring and whisking."""
+
+    tip_tries: int = 2  # whisks that may follow a contact with the shaft, to meet the object with the tip
+    escapes: bool = True  # from places where it meets something again and again
+
+
+FULL, PLAIN = Habits(), Habits(tip_tries=0, escapes=False)
+
+
+@dataclass(frozen=True)
+class TipMove:
+    """Back off by `retreat_m`, then turn by `turn_rad` (positive anticlockwise), and the tip touches."""
+
+    retreat_m: float
+    turn_rad: float
 
 
 @dataclass
@@ -45,7 +83,10 @@ class Whisk:
 
     lane: int  # the whisker whose contact began it, and the only one that is measured
     direction: float  # sign of the push's rotation
+    search_rad: float = SEARCH_RAD[0]  # to this side ...
+    other_rad: float | None = SEARCH_RAD[1]  # ... and then to the other; None: no more
+    tries: int = 0  # whisks before this one at the same object, for the tip
     start: int = -1  # WHISK_IN began
     push_end: int = -1  # first tick that no longer pushes
     measured: bool = False
-    other_side: bool = False  # the search has turned round
+    tip_move: TipMove | None = None  # set once it is known to have been the shaft that touched

@@ -19,6 +19,7 @@ LEAST_CONFIDENCE = 0.5  # a corner whose whisk is less surely one of those calib
 SURE = 0.9  # probability of face or corner; below, the bending by the turn alone decides
 # Of a retreat, the part of the bending over which a line is laid: the start rings, the end is noise.
 RETREAT_SHARES, RETREAT_TOP, RETREAT_LEAST = (0.2, 0.85), 40, 20  # the latter two in samples
+SURFACE = ("face", "normal_rad", "normal_sigma_rad", "radius_mm", "radius_sigma_mm")
 NEAREST_MM = 60.0  # the line is fitted from 90 mm on; what reads much nearer was no plain contact
 
 
@@ -48,11 +49,11 @@ class Mount:
             return None
         return line_mm
 
-    def face(self, model: WhiskModel, per_metre: float, per_radian: float) -> float:
-        """Probability that the whisker met a face with its tip rather than a corner (host/nav/touch/contact_surface.h).
+    def surface(self, model: WhiskModel, per_metre: float, per_radian: float) -> dict[str, float]:
+        """Face or corner, and how it lies (host/nav/touch/contact_surface.h, struct nav_surface).
 
         Tilt of the plug (rad) per metre driven forward and per radian turned anticlockwise, positive when the whisker
-        bends clockwise; 0.5 when one is nan or neither explains them.
+        bends clockwise; face 0.5 and the widest deviations when one is nan or neither explains them.
         """
         mount = {"base_m": list(self.base_m), "yaw_rad": self.yaw_rad, "length_m": 1e-3 * self.length_mm}
         mount |= {name: getattr(model, name) for name in ("kappa", "cone_mm", "spread")}
@@ -62,7 +63,7 @@ class Mount:
         lib.nav_surface_of(
             ffi.new("struct nav_surface_mount *", mount), ffi.new("struct nav_surface_seen *", seen), out
         )
-        return out.face
+        return {name: getattr(out, name) for name in SURFACE}
 
     def whisked(self, model: WhiskModel, shape, turn: float, per_metre: float) -> float | None:
         """Distance of a contact pressed by this turn, mm, from its whole whisk; None when unsure.
@@ -77,7 +78,7 @@ class Mount:
             return None
         if turn != self.corner_turn:
             return self.length_mm
-        face = self.face(model, self.corner_turn * per_metre, self.corner_turn * share * turn)
+        face = self.surface(model, self.corner_turn * per_metre, self.corner_turn * share * turn)["face"]
         told = model.estimate(shape)
         if max(face, 1.0 - face) < SURE:
             face = float(share < model.share(model.tip_mm))

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..behaviour import BLOCK_TICKS, EXPLORE_M_S, ODOMETRY_TICKS, PUSH_TICKS, TICK_S, TURN_RAD_S, Behaviour
+from ..behaviour_states import PLAIN
 from ..mount import Mount
 from ..scene import Arena, Robot
 from .geometry import free_test, range_test
@@ -59,7 +60,7 @@ class _Explorer:
         self.feelers = {n: _Feeler(whisker.length_m) for n, whisker in enumerate(self.rays)}
         self.mounts = {n: Mount.of(whisker) for n, whisker in enumerate(self.rays)}
         turns = {n: mount.corner_turn for n, mount in self.mounts.items()}
-        self.behaviour = Behaviour(self.feelers, turns, rng)
+        self.behaviour = Behaviour(self.feelers, turns, rng, habits=PLAIN)
         self.waiting = [(0.0, 0.0)] * (1 + DELAY_BLOCKS)
         self.tick = 0
         self.measured: dict[int, float] = {}
