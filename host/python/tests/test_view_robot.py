@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 from test_view_http import mutated
 from viewkit import PATIENCE_S, nothing_logged, page
-from viewrobot import ARENA, ROW_NS, SCENE, MadeUpRun, Post, belief_message, estimate, reach, robot_view, route
+from viewrobot import ARENA, ROW_NS, SCENE, MadeUpRun, Post, at, belief_message, estimate, reach, robot_view, route
 
 from whisker.robot.link import Link
 from whisker.robot.messages import Contact, End, Header, KeyValue, Pose, PoseStamped, ProcessHealth, Time, encode
+from whisker.scene import LARGEST_M
 from whisker.view.command import ROBOT
 from whisker.view.hub import Hub
 from whisker.view.robot import (
@@ -105,8 +106,11 @@ def test_a_contact_is_placed_where_the_whisker_meets_something():
     assert (first["x"], first["radius_m"], first["part"], first["release_s"]) == (None, None, None, None)
     post.play(MadeUpRun(), range(onset + 1, onset + 3), model)
     (contact,) = [contact for contact in model.touching() if contact["whisker"] == ray.name]
-    error = np.hypot(*np.subtract(estimate((onset + 1) / 10)[:2], route((onset + 1) / 10)[:2]))
-    assert not ARENA.is_free(contact["x"], contact["y"], 0.02 + error), "nothing to touch near it"
+    t_s, out = (onset + 1) / 10, reach(ray, onset + 1)
+    true = at(route(t_s), np.add(ray.base_m, (out * np.cos(ray.yaw_rad), out * np.sin(ray.yaw_rad))))
+    error = np.hypot(*np.subtract(estimate(t_s)[:2], route(t_s)[:2]))
+    away = np.hypot(contact["x"] - true[0], contact["y"] - true[1])
+    assert away < error + 0.02, "further from where it is than the estimate's error explains"
     assert contact["part"] in ("tip", "shaft") and contact["surface"] in ("face", "corner")
     over = next(row for row in range(onset + 1, 4000) if reach(ray, row) is None)
     post.play(MadeUpRun(), range(onset + 3, over + 1), model)
@@ -130,6 +134,12 @@ def test_a_process_that_fell_silent_is_told_from_one_that_ended_and_one_never_he
     model.take("health/pilot", health(pid=8))
     (pilot,) = [process for process in model.health() if process["name"] == "pilot"]
     assert (pilot["silent"], pilot["restarts"], pilot["pid"], pilot["age_s"]) == (False, 1, 8, 0)
+
+
+def test_a_pose_that_no_arena_can_have_is_not_known():
+    model = told_model(5)
+    model.take("truth", PoseStamped(Header.at(6 * ROW_NS), Pose.planar(2 * LARGEST_M, 0.0, 0.0)))
+    assert model.truth is None and len(model.true_path.points) == 5
 
 
 def test_nothing_grows_without_bound():

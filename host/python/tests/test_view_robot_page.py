@@ -216,6 +216,19 @@ def test_a_belief_that_knows_nothing_is_one_wide_place():
     asyncio.run(scenario())
 
 
+def test_two_places_stay_two_in_a_haze():
+    async def scenario():
+        async with looking_at(Post()) as (b, hub):
+            haze = [(0.04, 0.5 + 0.05 * n, 1.25, 0.0, 0.05) for n in range(5)]
+            haze += [(0.005, 0.6 + 0.16 * n, 1.25, 0.0, 0.03) for n in range(9)]
+            places = [(0.4, 0.4, 1.25, 0.0, 0.01), (0.35, 2.1, 1.25, 0.0, 0.01), *haze]
+            hub.robot.take("belief", belief_message(0, places, number=2000))
+            await b.until("robotPart.world.belief.poses")
+            assert await b.eval("robotPart.world.belief.modes.filter((m) => m.share > 0.3).length") == 2
+
+    asyncio.run(scenario())
+
+
 def test_the_part_is_used_by_keyboard_and_fits_a_phone():
     async def scenario():
         async with looking_at(Post(), size=(390, 844), rows=60) as (b, _):
