@@ -10,8 +10,8 @@ import pytest
 from chainrun import BLOCK_TICKS, BUILD, DECISION_TICKS, ROOT, TICKS_PER_S, is_last, record, write_flat_scene
 
 from whisker import localise
-from whisker.demo.navigator_process import FILTERS
 from whisker.protocol import CODES, LANES, STATUS_CODE_SHIFT
+from whisker.report.run import FILTERS
 from whisker.scene import load
 
 sys.path.insert(0, str(ROOT / "sim"))

@@ -22,12 +22,13 @@ from tqdm import tqdm
 
 from whisker import localise
 from whisker.demo.level1 import explore
-from whisker.demo.pilot_process import cell, load_models
 from whisker.demo.scenes import make_scene
 from whisker.demo.training import learn
+from whisker.observations import cell
 from whisker.pilot import Pilot
 from whisker.report import figures
 from whisker.report.run import Run
+from whisker.robot.models import load_models
 
 ROOT = Path(__file__).resolve().parent.parent
 RESULTS, CHARTS, CACHE = ROOT / "bench/results", ROOT / "docs/charts", ROOT / "build/bench/chain"

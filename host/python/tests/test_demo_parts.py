@@ -15,10 +15,10 @@ from whisker.bridgesim import flat_scene
 from whisker.demo import summary
 from whisker.demo.__main__ import fresh_folder
 from whisker.demo.chain import ChainError, ChainRun, Link, run_chain
-from whisker.demo.pilot_process import blocks
 from whisker.demo.scenes import BLOCKS, PRIOR_OFF_M, PRIOR_OFF_RAD, make_scene
 from whisker.native import ffi, lib
 from whisker.ring import FRAME, Reader, RingError
+from whisker.robot.blocks import blocks
 from whisker.simlink import SimLink
 
 
@@ -171,7 +171,8 @@ def chain_of(tmp_path, bridge):
     out.mkdir()
     program(build, "whisker-bridge-sim", bridge)
     program(build, "whiskerd", "exit 0\n")
-    program(build, "whisker-log", "exec sleep 100\n")
+    for name in ("whisker-log", "whisker-base"):
+        program(build, name, "exec sleep 100\n")
     return ChainRun(out, build, 1, 1.0, 6, Link(6, 30, 5))
 
 

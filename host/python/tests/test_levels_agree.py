@@ -1,4 +1,7 @@
-"""Level 1 and the RTL-level chain give the pilot the same samples: their observation rows are equal, cell by cell."""
+"""Level 1 and the RTL-level chain give the pilot the same samples: their observation rows are equal, cell by cell.
+
+Without a Create: level 1 has its wheels' numbers, not its bytes.
+"""
 
 import csv
 import os
@@ -10,11 +13,12 @@ import pytest
 from whisker import scene as scenes
 from whisker.demo.chain import ChainRun, Link, run_chain
 from whisker.demo.level1 import explore
-from whisker.demo.pilot_process import cell, load_models
 from whisker.demo.scenes import make_scene
 from whisker.demo.summary import read_pairs
 from whisker.demo.training import learn
+from whisker.observations import cell
 from whisker.pilot import Pilot
+from whisker.robot.models import load_models
 
 ROOT = Path(__file__).resolve().parents[3]
 SEED, SECONDS, LANES = 3, 8.0, 6
@@ -25,7 +29,7 @@ def run(tmp_path_factory):
     build = ROOT / os.environ.get("WHISKER_BUILD", "build/release")
     if not (build / "sim" / "bridge" / "whisker-bridge-sim").exists():
         pytest.skip(f"{build}: the simulated bridge is not built; run 'make build'")
-    made = ChainRun(tmp_path_factory.mktemp("run"), build, SEED, SECONDS, LANES, Link(6, 30, 5))
+    made = ChainRun(tmp_path_factory.mktemp("run"), build, SEED, SECONDS, LANES, Link(6, 30, 5), create=None)
     scene, start = make_scene(SEED)
     scenes.write(made.scene, scene)
     (made.scene / "scene.flat").write_text(scene.flat(start))

@@ -8,10 +8,10 @@ from test_radial_whisk import whisks
 
 from whisker import radial
 from whisker.calibration import ContactsFile, Whisk
-from whisker.demo.pilot_process import check_nodes
 from whisker.demo.scenes import make_robot
 from whisker.nodes import NodeError, read_nodes
 from whisker.ring import Writer
+from whisker.robot.models import check_nodes
 from whisker.tables import TableError
 
 TABLE = """lane  serial      version  options  wire  chip    loader  state

@@ -67,6 +67,10 @@ def run_folder(tmp_path):
     (tmp_path / "scene/arena.toml").write_text(ARENA)
     (tmp_path / "scene/robot.toml").write_text(ROBOT)
     (tmp_path / "summary.json").write_text(json.dumps(SUMMARY))
+    base = {"model": "1", "frames": "266", "corrupt": "0", "missed": "0", "angle_source": "requested"}
+    (tmp_path / "pilot.json").write_text(json.dumps({"rows": ROWS, "whisks": [], "base": base}))
+    navigator = {"weighed": ROWS, "skipped": 0, "missed": 0, "refused": 0}
+    (tmp_path / "navigator.json").write_text(json.dumps(navigator))
     (tmp_path / "radial_lines.json").write_text(json.dumps({"object_1": [-0.036, 181.0], "object_2": [-0.036, 181.0]}))
     t = np.arange(1, ROWS + 1) * 0.1
     x = 0.2 + 0.1 * t
@@ -88,7 +92,7 @@ def run_folder(tmp_path):
         tmp_path / "scene/observations.csv",
         {"t_s": t, "odo_x_m": 0 * t, "odo_y_m": 0 * t, "odo_theta_rad": 0 * t} | cells,
     )
-    for name, error in (("grid", 0.02), ("foveal", 0.05), ("odometry", 0.2)):
+    for name, error in (("grid", 0.02), ("adaptive", 0.03), ("foveal", 0.05), ("odometry", 0.2)):
         write_csv(
             tmp_path / f"est_{name}.csv",
             {"t_s": t, "x_m": x + error, "y_m": 0.25 + 0 * x, "theta_rad": 0 * x + error, "confidence": 0 * x + 1},
@@ -117,6 +121,17 @@ def test_page_is_complete_and_self_contained(run_folder):
 def test_page_shows_the_summary_beside_the_paper(run_folder):
     page = write_report(run_folder).read_text()
     for text in ("5.50", "5.60", "5.68", "2.78", "95.0 %", "8,000", ">equal<"):
+        assert text in page
+
+
+def test_page_tells_of_base_network_and_bag(run_folder):
+    page = write_report(run_folder).read_text()
+    for text in (
+        "iRobot Create 1",
+        "sensor frames of 15 ms, whole</td><td>266<",
+        "rows missed by the navigator",
+        "robot.mcap",
+    ):
         assert text in page
 
 

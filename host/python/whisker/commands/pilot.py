@@ -1,6 +1,7 @@
 """`whisker pilot`: the netbook's part of a robot: samples to wheel speeds and observation rows (whisker.robot)."""
 
 import json
+import threading
 from contextlib import ExitStack, closing
 from pathlib import Path
 from types import SimpleNamespace
@@ -11,14 +12,17 @@ from ..nodes import NodeError
 from ..pilot import Pilot
 from ..ring import Reader
 from ..robot.blocks import LiveRing
+from ..robot.health import Health
+from ..robot.link import Link
 from ..robot.models import check_nodes, load_models
 from ..robot.options import NAVIGATOR_ENDPOINT, PILOT_ENDPOINT, add_link, open_link
 from ..robot.pilot_process import Flight, LiveFlight, LiveWheels, fly_in_step
 from ..robot.rowfiles import Rows, Traces
 from ..robot.telling import Teller
-from ..robot.wheels import IdealWheels, LiveBase, SteppedBase
+from ..robot.wheels import RETRY_S, IdealWheels, LiveBase, SteppedBase, wheels_of
 from ..scene import load
 from ..simlink import SimLink
+from ..wheels import EXACT, Wheels
 from . import RING, stop_on_signals, whole_number
 
 EXAMPLE = "whisker pilot SCENE --models MODELS --base /run/user/1000/base"
@@ -55,8 +59,7 @@ def run(arguments) -> int:
         raise UserError("pilot: no wheels; give --base SOCKET, or --simulation SOCKET")
     with ExitStack() as stack:
         try:
-            parts = _parts(arguments, stack)
-            (_fly_in_step if arguments.simulation else _fly_live)(arguments, parts, stack)
+            parts = (_fly_in_step if arguments.simulation else _fly_live)(arguments, stack)
         except NodeError:
             raise
         except (OSError, ValueError) as error:
@@ -66,44 +69,58 @@ def run(arguments) -> int:
     return 0
 
 
-def _parts(arguments, stack: ExitStack) -> SimpleNamespace:
+def _parts(arguments, link: Link, wheels: Wheels, stack: ExitStack) -> SimpleNamespace:
     robot = load(arguments.scene).robot
     texture, radial = load_models(arguments.models, robot)
     if arguments.nodes:
         check_nodes(arguments.nodes, robot, radial)
-    pilot = Pilot(robot, texture, radial, arguments.seed)
-    link = stack.enter_context(open_link("pilot", arguments))
+    pilot = Pilot(robot, texture, radial, arguments.seed, wheels)
     out = stack.enter_context(open(arguments.out, "w", newline=""))  # noqa: SIM115
     traces = stack.enter_context(open(arguments.traces, "w", newline=""))  # noqa: SIM115
     parts = {"rows": Rows(out), "traces": Traces(traces, pilot), "teller": Teller(link, pilot)}
-    return SimpleNamespace(pilot=pilot, link=link, flight=None, base_health={}, **parts)
+    return SimpleNamespace(pilot=pilot, flight=None, base_health={}, **parts)
 
 
-def _fly_in_step(arguments, parts: SimpleNamespace, stack: ExitStack) -> None:
+def _fly_in_step(arguments, stack: ExitStack) -> SimpleNamespace:
     """Everybody must be there before the first tick, for what is sent then must reach them."""
-    parts.link.announce()
-    if not parts.link.wait_for(arguments.others, OTHERS_WAIT_S):
-        gone = ", ".join(sorted(set(arguments.others) - parts.link.peers))
+    link = stack.enter_context(open_link("pilot", arguments))
+    base = stack.enter_context(Base(arguments.base)) if arguments.base else None
+    parts = _parts(arguments, link, wheels_of(base.health()) if base else EXACT, stack)
+    link.announce()
+    if not link.wait_for(arguments.others, OTHERS_WAIT_S):
+        gone = ", ".join(sorted(set(arguments.others) - link.peers))
         raise PilotError(f"pilot: {gone} did not come in {OTHERS_WAIT_S:g} s; start it, and connect it to this pilot")
     reader = stack.enter_context(Reader(arguments.ring, wait_s=RING_WAIT_S))
     sim = stack.enter_context(SimLink(arguments.simulation))
-    base = stack.enter_context(closing(Base(arguments.base))) if arguments.base else None
     wheels = SteppedBase(sim, base) if base else IdealWheels(sim)
     parts.flight = Flight(parts.pilot, wheels, parts.rows, parts.traces, parts.teller)
     fly_in_step(parts.flight, reader, parts.teller)
     parts.base_health = wheels.health()
+    return parts
 
 
-def _fly_live(arguments, parts: SimpleNamespace, stack: ExitStack) -> None:
+def _fly_live(arguments, stack: ExitStack) -> SimpleNamespace:
     stop = stop_on_signals()
-    wheels = LiveWheels(LiveBase(arguments.base))
+    link = stack.enter_context(open_link("pilot", arguments))
+    base = LiveBase(arguments.base)
+    parts = _parts(arguments, link, _known_wheels(base, link, stop), stack)
+    wheels = LiveWheels(base)
     ring = stack.enter_context(closing(LiveRing(arguments.ring, len(parts.pilot.names))))
     parts.flight = Flight(parts.pilot, wheels, parts.rows, parts.traces, parts.teller)
-    live = LiveFlight(parts.flight, ring, wheels, parts.link)
-    parts.link.announce()
+    live = LiveFlight(parts.flight, ring, wheels, link)
+    link.announce()
     live.run(stop.is_set)
     parts.teller.end("stopped")
-    parts.base_health = live.counters()
+    parts.base_health = base.health()
+    return parts
+
+
+def _known_wheels(base: LiveBase, link: Link, stop: threading.Event) -> Wheels:
+    """Waits for the base to say what it can do; meanwhile the pilot's health says so."""
+    health = Health(link, dict)
+    while not (told := base.health()) and not stop.wait(RETRY_S):
+        health.tell(0, base.trouble, base.trouble)
+    return wheels_of(told) if told else EXACT
 
 
 def _write_report(path: Path, parts: SimpleNamespace) -> None:

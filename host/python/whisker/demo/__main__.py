@@ -15,10 +15,10 @@ from tqdm import tqdm
 from .. import localise
 from .. import scene as scenes
 from ..report import write_report
+from ..report.run import FILTERS
 from ..tables import TableError
 from . import summary as scores
 from .chain import ChainError, ChainRun, Link, run_chain
-from .navigator_process import FILTERS
 from .scenes import MECHANICS, make_scene
 from .training import METHODS, learn, radial_scores, write_radial_points
 
@@ -33,6 +33,9 @@ def parse(argv: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--seconds", type=float, default=60.0, help="simulated; a multiple of 0.1")
     parser.add_argument("--lanes", type=int, default=6, help="populated lanes, 6 to 28; those beyond 6 have no whisker")
+    parser.add_argument(
+        "--create", type=int, choices=(1, 2), default=1, help="the base: iRobot Create 1 or 2 (%(default)s)"
+    )
     parser.add_argument("--mechanics", choices=MECHANICS, default=MECHANICS[0], help="how whiskers bend (%(default)s)")
     parser.add_argument("--texture", choices=METHODS, default=METHODS[0], help="texture classifier (%(default)s)")
     parser.add_argument("--sck-divider", type=int, default=6)
@@ -99,8 +102,10 @@ def run(out: Path, options: argparse.Namespace) -> dict:
     """The chain at RTL level; what was sent, received, spoilt and reported."""
     ticks = round(options.seconds * TICKS_PER_S)
     link = Link(options.sck_divider, options.word_gap, options.sample_point)
-    chain = ChainRun(out, options.build_dir.resolve(), options.seed, options.seconds, options.lanes, link)
-    with tqdm(total=ticks, desc="sensor to ring, RTL", unit="tick") as bar:
+    chain = ChainRun(
+        out, options.build_dir.resolve(), options.seed, options.seconds, options.lanes, link, options.create
+    )
+    with tqdm(total=ticks, desc="the whole robot, RTL", unit="tick") as bar:
         wall_s = run_chain(chain, lambda tick: bar.update(tick - bar.n))
         bar.update(ticks - bar.n)
     speed = json.loads((out / "speed.json").read_text())
@@ -111,7 +116,9 @@ def run(out: Path, options: argparse.Namespace) -> dict:
         "frames_received": log["frames_received"],
         "frames_lost": speed["ticks"] - log["frames_received"],
         "usb_faults_injected": speed["usb_faults_injected"],
-    } | scores.fault_scores(out / "faults.csv", out / "bad.csv")
+        **scores.fault_scores(out / "faults.csv", out / "bad.csv"),
+        **scores.link_scores(*(json.loads((out / f"{name}.json").read_text()) for name in ("pilot", "navigator"))),
+    }
 
 
 def judge(out: Path, scene: scenes.Scene) -> dict:
@@ -162,8 +169,8 @@ def tell(s: dict) -> None:
         f"{std.min():.1f}-{std.max():.1f} mm"
     )
     print(
-        f"pose:  grid {1000 * s['pose_error_median_m']:.0f} mm median error, foveal {1000 * s['foveal_error_median_m']:.0f} mm, "
-        f"odometry alone {1000 * s['odometry_error_median_m']:.0f} mm"
+        f"pose:  grid {1000 * s['pose_error_median_m']:.0f} mm median error, adaptive {1000 * s['adaptive_error_median_m']:.0f} mm, "
+        f"foveal {1000 * s['foveal_error_median_m']:.0f} mm, odometry alone {1000 * s['odometry_error_median_m']:.0f} mm"
     )
 
 

@@ -1,7 +1,10 @@
-"""Runs the chain: simulated bridge with whiskerd inside, whisker-log, pilot and navigator as processes of their own."""
+"""Runs the whole robot in lock-step, each part a process: simulated bridge with whiskerd inside and the base's serial
+line, whisker-log, whisker-base, pilot; over zenoh the navigator and the bag's recorder. One seed gives one result.
+"""
 
 import os
 import shutil
+import socket
 import sys
 import tempfile
 import time
@@ -11,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..children import Child, Program
+from ..report.run import FILTERS
 
 FOLLOWERS = 2  # whisker-log and the pilot
 POLL_S = 0.05
@@ -40,6 +44,8 @@ class ChainRun:
     seconds: float
     lanes: int  # populated
     link: Link
+    create: int | None = 1  # the base: iRobot Create 1 or 2; None: wheels that obey at once, without a serial line
+    level: str = "rtl"  # of the bridge; or bytes: the same frames
 
     @property
     def scene(self) -> Path:
@@ -49,11 +55,37 @@ class ChainRun:
     def logs(self) -> Path:
         return self.out / "logs"
 
+    @property
+    def bag(self) -> Path:
+        return self.out / "robot.mcap"
+
     def program(self, name: str) -> str:
         found = next((p for p in sorted(self.build.rglob(name)) if p.is_file() and os.access(p, os.X_OK)), None)
         if found is None:
             raise ChainError(f"{self.build}: no program {name}; run 'make build' first")
         return str(found)
+
+
+@dataclass(frozen=True)
+class Places:
+    """Where the parts of one run meet."""
+
+    ring: str
+    folder: Path  # of sockets
+    pilot: str  # endpoints for zenoh
+    navigator: str
+
+    @property
+    def simulation(self) -> Path:
+        return self.folder / "sim.sock"
+
+    @property
+    def serial(self) -> Path:
+        return self.folder / "create"
+
+    @property
+    def base(self) -> Path:
+        return self.folder / "base.sock"
 
 
 def run_chain(run: ChainRun, progress: Callable[[int], None]) -> float:
@@ -62,49 +94,76 @@ def run_chain(run: ChainRun, progress: Callable[[int], None]) -> float:
     ring = f"whisker-demo-{os.getpid()}"
     began = time.monotonic()
     with ExitStack() as stack:
-        place = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="whisker-")))
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="whisker-")))
         stack.callback(_remove_ring, ring)
-        socket = str(place / "sim.sock")
-        bridge = Child(_bridge(run, ring, socket), run.logs / "bridge.log", _ticks(progress))
+        places = Places(ring, folder, *_free_endpoints(2))
+        bridge = Child(_bridge(run, places), run.logs / "bridge.log", _ticks(progress))
         children = [stack.enter_context(closing(bridge))]
-        _await_socket(Path(socket), bridge)
-        rows = place / "rows"
-        os.mkfifo(rows)
-        for program in (_log(run, ring, socket), _pilot(run, ring, socket, rows), _navigator(run, rows)):
+        _await_file(places.simulation, bridge)
+        base = [_base(run, places)] if run.create else []
+        for program in [*base, _log(run, places), _pilot(run, places), _navigator(run, places), _bag(run, places)]:
             children.append(stack.enter_context(closing(Child(program, run.logs / f"{program.name}.log"))))
         _await_end(children)
     return time.monotonic() - began
 
 
-def _bridge(run: ChainRun, ring: str, socket: str) -> Program:
+def _bridge(run: ChainRun, places: Places) -> Program:
     wrapper = shutil.which("umockdev-wrapper")
     if wrapper is None:
         raise ChainError("umockdev-wrapper is not installed; run 'make setup' first")
     simulation = [wrapper, run.program("whisker-bridge-sim"), "--scene", run.scene / "scene.flat", "--seed", run.seed]
-    simulation += ["--seconds", run.seconds, "--socket", socket, "--followers", FOLLOWERS, "--progress"]
+    simulation += ["--seconds", run.seconds, "--socket", places.simulation, "--followers", FOLLOWERS, "--progress"]
     simulation += ["--truth", run.out / "truth.csv", "--faults", run.out / "faults.csv"]
     simulation += ["--usb-faults", run.out / "usb_faults.csv", "--speed-report", run.out / "speed.json"]
-    simulation += ["--lanes-populated", run.lanes]
-    daemon = [run.program("whiskerd"), "--ring", ring, "--sck-divider", run.link.sck_divider]
+    simulation += ["--lanes-populated", run.lanes, "--level", run.level]
+    if run.create:
+        simulation += ["--create", run.create, "--create-link", places.serial]
+    daemon = [run.program("whiskerd"), "--ring", places.ring, "--sck-divider", run.link.sck_divider]
     daemon += ["--word-gap", run.link.word_gap, "--sample-point", run.link.sample_point]
     return Program.of("bridge", [*simulation, "--", *daemon])
 
 
-def _log(run: ChainRun, ring: str, socket: str) -> Program:
-    command = [run.program("whisker-log"), "--ring", ring, "--lanes", run.lanes, "--socket", socket]
+def _log(run: ChainRun, places: Places) -> Program:
+    command = [run.program("whisker-log"), "--ring", places.ring, "--lanes", run.lanes, "--socket", places.simulation]
     return Program.of("log", [*command, "--bad", run.out / "bad.csv", "--summary", run.out / "log.json"])
 
 
-def _pilot(run: ChainRun, ring: str, socket: str, rows: Path) -> Program:
-    command = [sys.executable, "-m", "whisker.demo.pilot_process", "--ring", ring, "--socket", socket]
-    command += ["--scene", run.scene, "--models", run.out / "models", "--seed", run.seed]
-    command += ["--out", run.scene / "observations.csv", "--rows", rows, "--traces", run.out / "traces.csv"]
+def _base(run: ChainRun, places: Places) -> Program:
+    command = [run.program("whisker-base"), "--port", places.serial, "--socket", places.base]
+    return Program.of("base", [*command, "--model", run.create, "--clock", "stream"], serves=True)
+
+
+def _pilot(run: ChainRun, places: Places) -> Program:
+    command = [*_whisker("pilot"), run.scene, "--models", run.out / "models", "--seed", run.seed]
+    command += ["--ring", places.ring, "--simulation", places.simulation]
+    command += ["--base", places.base] if run.create else []
+    command += ["--lock-step", "--listen", places.pilot, "--connect", "none"]
+    command += [word for name in ("navigator", "bag") for word in ("--await", name)]
+    command += ["--out", run.scene / "observations.csv", "--traces", run.out / "traces.csv"]
     return Program.of("pilot", [*command, "--report", run.out / "pilot.json"])
 
 
-def _navigator(run: ChainRun, rows: Path) -> Program:
-    command = [sys.executable, "-m", "whisker.demo.navigator_process", "--rows", rows, "--scene", run.scene]
-    return Program.of("navigator", [*command, "--out", run.out])
+def _navigator(run: ChainRun, places: Places) -> Program:
+    command = [*_whisker("navigator"), run.scene, "--lock-step", "--listen", places.navigator]
+    command += ["--connect", places.pilot]
+    command += [word for name in FILTERS for word in ("--filter", name)]
+    return Program.of("navigator", [*command, "--out", run.out, "--report", run.out / "navigator.json"])
+
+
+def _bag(run: ChainRun, places: Places) -> Program:
+    command = [*_whisker("bag"), run.bag, "--scene", run.scene, "--lock-step"]
+    return Program.of("bag", [*command, "--connect", places.pilot, "--connect", places.navigator])
+
+
+def _whisker(command: str) -> list[str]:
+    return [sys.executable, "-m", "whisker.cli", command]
+
+
+def _free_endpoints(count: int) -> list[str]:
+    """So many of this machine's that nobody listened at a moment ago."""
+    with ExitStack() as stack:
+        servers = [stack.enter_context(socket.create_server(("127.0.0.1", 0))) for _ in range(count)]
+        return [f"tcp/127.0.0.1:{server.getsockname()[1]}" for server in servers]
 
 
 def _ticks(progress: Callable[[int], None]) -> Callable[[str], None]:
@@ -116,7 +175,7 @@ def _ticks(progress: Callable[[int], None]) -> Callable[[str], None]:
     return on_line
 
 
-def _await_socket(path: Path, bridge: Child) -> None:
+def _await_file(path: Path, bridge: Child) -> None:
     while not path.exists():
         _raise_failures([bridge])
         if not bridge.running:
@@ -125,14 +184,14 @@ def _await_socket(path: Path, bridge: Child) -> None:
 
 
 def _await_end(children: list[Child]) -> None:
-    """Wait for all; the readers must follow the simulation's end soon."""
+    """Wait for all but those that serve; the readers must follow the simulation's end soon."""
     give_up = None
-    while any(child.running for child in children):
+    while any(child.running and not child.program.serves for child in children):
         _raise_failures(children)
         if give_up is None and not children[0].running:
             give_up = time.monotonic() + LAGGARD_S
         if give_up is not None and time.monotonic() > give_up:
-            late = next(child for child in children if child.running)
+            late = next(child for child in children if child.running and not child.program.serves)
             raise ChainError(f"{late.name} did not end with the run; log: {late.log}")
         time.sleep(POLL_S)
     _raise_failures(children)

@@ -12,14 +12,13 @@ import numpy as np
 
 from .. import localise
 from ..pilot import Pilot
+from ..report.run import FILTERS
+from ..robot.models import load_models
 from ..scene import Scene
 from .level1 import explore
-from .pilot_process import load_models
 from .scenes import MECHANICS, make_scene
 from .summary import pose_scores, rounded, texture_scores
 from .training import METHODS, learn, radial_scores
-
-FILTERS = ("grid", "foveal", "odometry")
 
 
 def study(seed: int, seconds: float, models: Path, mechanics: str = MECHANICS[0]) -> dict:

@@ -9,6 +9,8 @@ frames_sent             ticks of the world while the bridge was started
 frames_received         distinct sequence numbers that whisker-log saw
 records_bad_*           pairs (lane, tick): injected by the simulation, and flagged bad in what whisker-log read
 *_error_*               over every row from the first
+rows_*                  observation rows: sent by the pilot; weighed, and missed, by the navigator behind the network
+base_frames, base_bad   sensor frames of the base, whole; begun but not whole, or never come
 """
 
 import csv
@@ -49,14 +51,17 @@ def texture_scores(rows: list[dict], truth: list[dict], scene: Scene) -> dict[st
 
 
 def pose_scores(poses: dict[str, np.ndarray], truth: np.ndarray) -> dict[str, float]:
-    """Errors of the poses (n, 3) of `grid`, `foveal` and `odometry` against truth (n, 3)."""
-    grid, foveal, odometry = (localise.pose_errors(poses[name], truth) for name in ("grid", "foveal", "odometry"))
+    """Errors of the poses (n, 3) of `grid`, `adaptive`, `foveal` and `odometry` against truth (n, 3)."""
+    names = ("grid", "adaptive", "foveal", "odometry")
+    grid, adaptive, foveal, odometry = (localise.pose_errors(poses[name], truth) for name in names)
     return {
         "pose_error_median_m": grid["pose_error_median_m"],
         "pose_error_p90_m": grid["pose_error_p90_m"],
         "heading_error_median_rad": grid["heading_error_median_rad"],
         "odometry_error_median_m": odometry["pose_error_median_m"],
         "foveal_error_median_m": foveal["pose_error_median_m"],
+        "adaptive_error_median_m": adaptive["pose_error_median_m"],
+        "adaptive_error_p90_m": adaptive["pose_error_p90_m"],
     }
 
 
@@ -67,6 +72,18 @@ def fault_scores(faults: Path, bad: Path) -> dict:
         "records_bad_injected": len(injected),
         "records_bad_reported": len(reported),
         "records_bad_match": injected == reported,
+    }
+
+
+def link_scores(pilot: dict, navigator: dict) -> dict:
+    """What pilot.json and navigator.json tell of network and serial line."""
+    base = pilot["base"]
+    return {
+        "rows_sent": pilot["rows"],
+        "rows_weighed": navigator["weighed"],
+        "rows_missed": navigator["missed"],
+        "base_frames": int(base.get("frames", 0)),
+        "base_bad": int(base.get("corrupt", 0)) + int(base.get("missed", 0)),
     }
 
 

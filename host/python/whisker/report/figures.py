@@ -13,9 +13,10 @@ from matplotlib.patches import Ellipse, Patch, Rectangle
 
 from .run import FILTERS, Run
 
-TITLES = {"grid": "grid (eq. 4)", "foveal": "foveal (eqs. 5-7)", "odometry": "odometry alone"}
+TITLES = {"grid": "grid (eq. 4)", "adaptive": "adaptive", "foveal": "foveal (eqs. 5-7)", "odometry": "odometry alone"}
 STYLES = {
     "grid": {"color": "#0b5394", "linestyle": "-", "marker": "o"},
+    "adaptive": {"color": "#1d7a46", "linestyle": "-.", "marker": "D"},
     "foveal": {"color": "#c25700", "linestyle": "--", "marker": "^"},
     "odometry": {"color": "#6b6b6b", "linestyle": ":", "marker": "s"},
 }
@@ -35,14 +36,14 @@ SETTINGS = {
 
 def arena(run: Run) -> Figure:
     """The arena from above: floor, blocks, true path, and each estimate with its two-sigma ellipses."""
-    figure = Figure(figsize=(11.4, 4.4), layout="constrained")
-    panels = figure.subplots(1, len(FILTERS), sharex=True, sharey=True)
+    figure = Figure(figsize=(11.4, 11.2), layout="constrained")
+    panels = figure.subplots(2, len(FILTERS) // 2, sharex=True, sharey=True).ravel()
     for axes, name in zip(panels, FILTERS, strict=True):
         _draw_floor(axes, run)
         _draw_paths(axes, run, name)
         axes.set_title(TITLES[name], fontsize=10)
-        axes.set_xlabel("x (m)")
-    panels[0].set_ylabel("y (m)")
+        axes.set(xlabel="x (m)", ylabel="y (m)")
+        axes.label_outer()
     handles = [*panels[0].get_legend_handles_labels()[0], *_texture_handles(run)]
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
     return figure
@@ -75,7 +76,7 @@ def radial(run: Run) -> Figure:
 
 
 def errors(run: Run) -> Figure:
-    """Position and heading error of the three estimates over time."""
+    """Position and heading error of the estimates over time."""
     figure = Figure(figsize=(11.4, 4.6), layout="constrained")
     top, bottom = figure.subplots(2, 1, sharex=True)
     seconds = (run.truth["tick"] + 1) * 500e-6

@@ -63,8 +63,12 @@ def render(run: Run) -> str:
             "Markers of the two sets are shifted by 1.5 mm either way to be seen apart.",
         ),
         _radial_table(run),
+        "<h2>The base</h2>",
+        _base_table(run),
         "<h2>Throughput and loss</h2>",
         _loss_table(s),
+        _network_table(run),
+        f"<p>Every topic of the run, for ROS 2 tools and Foxglove: <code>{escape(run.bag.name)}</code>, beside this page.</p>",
     ]
     title = f"CrunchBot demo, seed {s['seed']}"
     return (
@@ -75,8 +79,8 @@ def render(run: Run) -> str:
 
 def _lead(s: dict) -> str:
     return (
-        f"{s['simulated_s']:g} s of random exploration with {s['lanes']} whiskers. Sensor, firmware, lanes, USB, ring and filters are the real "
-        "parts or their bit-true models; arena, whisker mechanics and wheels are simulated."
+        f"{s['simulated_s']:g} s of random exploration with {s['lanes']} whiskers. Sensor, firmware, lanes, USB, ring, the base's driver, "
+        "network and filters are the real parts or their bit-true models; arena, whisker mechanics and the base are simulated."
     )
 
 
@@ -140,9 +144,41 @@ def _loss_table(s: dict) -> str:
     return _table("The chain from sensor to ring", ("quantity", "value"), rows)
 
 
+BASE_ROWS = (
+    ("frames", "sensor frames of 15 ms, whole"),
+    ("corrupt", "frames begun but not whole"),
+    ("missed", "frames that never came"),
+    ("resyncs", "times the stream was found again"),
+    ("reconnects", "times the port was opened again"),
+    ("commander_stops", "stops because the pilot was silent"),
+    ("mode_losses", "times the base left its mode"),
+    ("distance_source", "distance from, at the end"),
+    ("angle_source", "angle from, at the end"),
+    ("remainder", "what is less than a unit at a reading is"),
+)
+
+
+def _base_table(run: Run) -> str:
+    """What whisker-base told of link and odometry when the run was over."""
+    base = run.pilot["base"]
+    rows = [(text, base[key]) for key, text in BASE_ROWS if key in base]
+    model = base.get("model")
+    name = (
+        f"iRobot Create {model}, by its Open Interface over a serial line" if model else "Wheels without a serial line"
+    )
+    return _table(name, ("quantity", "value"), rows)
+
+
+def _network_table(run: Run) -> str:
+    navigator = run.navigator
+    rows = [("observation rows sent by the pilot", run.pilot["rows"])]
+    rows += [(f"rows {key} by the navigator", navigator[key]) for key in ("weighed", "skipped", "missed", "refused")]
+    return _table("From netbook to desktop, over zenoh", ("quantity", "value"), rows)
+
+
 def _table(caption: str, header: tuple, rows: list[tuple]) -> str:
     head = "".join(f"<th>{escape(cell)}</th>" for cell in header)
-    body = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
+    body = "".join("<tr>" + "".join(f"<td>{escape(str(cell))}</td>" for cell in row) + "</tr>" for row in rows)
     return f"<table><caption>{escape(caption)}</caption><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
 
 

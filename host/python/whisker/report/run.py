@@ -7,6 +7,8 @@ est_<filter>.csv        t_s, x_m, y_m, theta_rad, confidence
 covariance_<filter>.csv t_s, xx_m2, xy_m2, yy_m2 (absent: no ellipses)
 radial_points.csv       whisker, set (fit or held out), radius_mm, peak_counts, predicted_mm
 radial_lines.json       whisker -> [a1 mm per count, a0 mm]
+pilot.json, navigator.json  counters of pilot, base and navigator
+robot.mcap              every topic of the run, for ROS 2 tools
 traces.csv              t_s, <whisker>_min_deg, <whisker>_max_deg: envelope of the texture whiskers' deflection
 """
 
@@ -18,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-FILTERS = ("grid", "foveal", "odometry")
+FILTERS = ("grid", "adaptive", "foveal", "odometry")
 
 
 def read_columns(path: Path) -> dict[str, np.ndarray]:
@@ -50,6 +52,9 @@ class Run:
     radial: dict[str, np.ndarray]
     radial_lines: dict[str, list[float]]
     traces: dict[str, np.ndarray]
+    pilot: dict  # rows, whisks, base: what whisker-base told of itself
+    navigator: dict  # counters
+    bag: Path
 
     @classmethod
     def load(cls, folder: Path) -> "Run":
@@ -68,6 +73,9 @@ class Run:
             radial=read_columns(folder / "radial_points.csv"),
             radial_lines=json.loads((folder / "radial_lines.json").read_text()),
             traces=read_columns(folder / "traces.csv"),
+            pilot=json.loads((folder / "pilot.json").read_text()),
+            navigator=json.loads((folder / "navigator.json").read_text()),
+            bag=folder / "robot.mcap",
         )
 
     def position_error(self, name: str) -> np.ndarray:

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from ..behaviour import BLOCK_TICKS, ODOMETRY_TICKS, TICK_S
 from ..pilot import Pilot
 from ..ring import Reader
+from ..wheels import Bumps
 from .blocks import Block, LiveRing, blocks
 from .health import ENDED, RUNNING, Health
 from .link import Link
@@ -21,6 +22,7 @@ SILENCE_S = 0.2  # without samples for so long the wheels are stopped
 LOOK_S = 0.05  # between looks at what else there is to do while no samples come
 LATE_BLOCKS = 10  # so far behind, a live pilot leaves out what it has not looked at
 NAVIGATOR = "navigator"
+LOST = Bumps(lost=True)
 
 
 class Flight:
@@ -41,12 +43,18 @@ class Flight:
         if len(samples) == BLOCK_TICKS:
             self._wheels.drive(last, *drive)
         if self.ticks_used % ODOMETRY_TICKS == 0 and (report := self._wheels.odometry(last)):
-            row = self.pilot.odometry(last, *report.motion)
+            row = self.pilot.odometry(last, *report.motion, report.bumps)
+            if report.bumps.lost and not report.bumps.wheel_drop:
+                self._wheels.recover()
             self._rows.write(row)
             if self._teller:
                 self._teller.row(row, report, samples[-1])
         if self._teller:
             self._teller.block(last)
+
+    def interrupted(self, tick: int) -> None:
+        """The wheels were stopped for want of samples: begin again as after a base that was lost."""
+        self.pilot.behaviour.moved(tick, 0.0, 0.0, 0.0, LOST)
 
 
 def fly_in_step(flight: Flight, reader: Reader, teller: Teller | None) -> None:
@@ -58,7 +66,7 @@ def fly_in_step(flight: Flight, reader: Reader, teller: Teller | None) -> None:
 
 
 class LiveWheels:
-    """The live base for a Flight: where it tells nothing, a row still comes, with no motion in it."""
+    """The live base for a Flight: where it tells nothing, a row still comes, with no motion in it, and the wheels as lost."""
 
     def __init__(self, base: LiveBase):
         self.base, self.missing = base, 0
@@ -66,7 +74,10 @@ class LiveWheels:
     def odometry(self, tick: int) -> Report:
         report = self.base.odometry(tick)
         self.missing += report is None
-        return report or Report((0.0, 0.0, 0.0))
+        return report or Report((0.0, 0.0, 0.0), bumps=LOST)
+
+    def recover(self) -> None:
+        self.base.recover()
 
     def drive(self, tick: int, v_m_s: float, omega_rad_s: float) -> None:
         self.base.drive(tick, v_m_s, omega_rad_s)
@@ -95,6 +106,8 @@ class LiveFlight:
     def _step(self) -> None:
         made = self._ring.take(LOOK_S)
         self.blocks_left_out += max(0, len(made) - LATE_BLOCKS)
+        if made and self._halted and self.halts:
+            self._flight.interrupted(made[0][0] - 1)
         for block in made[-LATE_BLOCKS:]:
             self._flight.take(block)
             self._fed_s, self._halted = self._clock(), False

@@ -12,6 +12,7 @@ from .wheels import Report
 TICK_NS = round(TICK_S * 1e9)
 RAD_PER_COUNT = np.pi / 65536.0
 MIDDLE = 32768.0  # counts of a sensor at rest
+PARTS = {"tip": messages.TIP, "shaft": messages.SHAFT, None: messages.UNKNOWN}
 TOPICS = ("odometry", "joints", "contact", "behaviour")
 
 
@@ -78,7 +79,10 @@ class Teller:
     def _tell_measured(self, whisk: dict) -> None:
         told = self._contact(whisk["whisker"], False, whisk["onset"], whisk["release"])
         told.measured = whisk["distance_mm"] is not None
-        told.radius_m = 1e-3 * (whisk["distance_mm"] or 0.0)
+        if told.measured:
+            told.radius_m, told.sigma_m = 1e-3 * whisk["distance_mm"], 1e-3 * whisk["sigma_mm"]
+        told.part = PARTS[whisk["type"]]
+        told.shape = _shape(whisk["surface"])
         self._send("contact", told)
 
     def _contact(self, name: str, touching: bool, onset: int, release: int) -> messages.Contact:
@@ -92,7 +96,14 @@ class Teller:
             self._state = behaviour.state
             since = messages.Time.of(behaviour.since * TICK_NS)
             header = messages.Header.at(self._stamp_ns, messages.BASE_FRAME)
-            self._send("behaviour", messages.Behaviour(header, behaviour.state.value, since))
+            self._send("behaviour", messages.Behaviour(header, behaviour.state.value, since, behaviour.reason))
 
     def _send(self, topic: str, message) -> None:
         self._streams[topic].send(message)
+
+
+def _shape(surface: dict[str, float] | None) -> int:
+    """What a tip met, by `Mount.surface`; its 0.5 is: either."""
+    if surface is None or surface["face"] == 0.5:
+        return messages.UNKNOWN
+    return messages.FACE if surface["face"] > 0.5 else messages.CORNER

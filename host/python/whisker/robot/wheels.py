@@ -14,17 +14,19 @@ import numpy as np
 
 from ..base import Base, BaseError, Motion
 from ..simlink import SimLink
+from ..wheels import NO_BUMPS, Bumps, Wheels
 
+MODE = "safe"  # the base then stops by itself at cliffs and wheel drops
 RETRY_S = 0.2  # between looks for a base that is not there
 
 
 @dataclass(frozen=True)
 class Report:
-    """Motion in the robot frame at its start (m, m, rad), covariance (3, 3), bits of bumps, cliffs and drops."""
+    """Motion in the robot frame at its start (m, m, rad), covariance (3, 3), and what the base feels."""
 
     motion: tuple[float, float, float]
     covariance: np.ndarray = field(default_factory=lambda: np.zeros((3, 3)))
-    bits: int = 0
+    bumps: Bumps = NO_BUMPS
 
 
 class IdealWheels:
@@ -32,7 +34,6 @@ class IdealWheels:
 
     def __init__(self, sim: SimLink):
         self._sim = sim
-        self.trouble = ""
 
     def odometry(self, tick: int) -> Report | None:
         motion = self._sim.odometry(tick)
@@ -40,6 +41,9 @@ class IdealWheels:
 
     def drive(self, tick: int, v_m_s: float, omega_rad_s: float) -> None:
         self._sim.drive(tick, v_m_s, omega_rad_s)
+
+    def recover(self) -> None:
+        """These wheels are never lost."""
 
     def health(self) -> dict[str, str]:
         return {}
@@ -50,7 +54,6 @@ class SteppedBase:
 
     def __init__(self, sim: SimLink, base: Base):
         self._sim, self._base = sim, base
-        self.trouble = ""
 
     def odometry(self, tick: int) -> Report | None:
         after = self._sim.bytes_sent(tick)
@@ -60,6 +63,10 @@ class SteppedBase:
         after = self._sim.bytes_sent(tick)
         if after is not None:
             self._sim.base(tick, self._base.drive(v_m_s, omega_rad_s, after).byte_count)
+
+    def recover(self) -> None:
+        """Take the base over again."""
+        self._base.mode(MODE)
 
     def health(self) -> dict[str, str]:
         return self._base.health()
@@ -80,6 +87,10 @@ class LiveBase:
 
     def drive(self, tick: int, v_m_s: float, omega_rad_s: float) -> None:
         self._try(lambda base: base.drive(v_m_s, omega_rad_s))
+
+    def recover(self) -> None:
+        """Take the base over again after it has left its mode, as at a cliff."""
+        self._try(lambda base: base.mode(MODE))
 
     def stop(self) -> None:
         """Stop the wheels now."""
@@ -115,4 +126,9 @@ class LiveBase:
 
 
 def _report(told: Motion) -> Report:
-    return Report((told.x_m, told.y_m, told.theta_rad), np.array(told.covariance), told.bits)
+    return Report((told.x_m, told.y_m, told.theta_rad), np.array(told.covariance), Bumps.of_bits(told.bits))
+
+
+def wheels_of(health: dict[str, str]) -> Wheels:
+    """What the base of this health can do."""
+    return Wheels.stepped(float(health["speed_step_m_s"]), float(health["wheel_base_m"]))

@@ -1,0 +1,162 @@
+"""The whole robot: in lock-step, the same to the last bit, and live, where what ends comes back."""
+
+import csv
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+from chainrun import BUILD, END_S
+
+from whisker import scene as scenes
+from whisker.demo.chain import ChainRun, Link, run_chain
+from whisker.demo.scenes import make_scene
+from whisker.demo.simulation import write_surface_drives
+from whisker.demo.training import MOVES, fit_texture, flat
+from whisker.radial import RadialModel
+from whisker.report.run import FILTERS
+from whisker.robot import link as links
+from whisker.robot import parts
+from whisker.texture import read_training
+
+SEED, SECONDS = 3, 5.0
+LINE = (-0.036, 181.0, 5.0, 90.0, 140.0)  # of a radial model: good enough for whisks that nobody judges
+
+
+@pytest.fixture(scope="module")
+def models(tmp_path_factory):
+    """Models of the right kind from next to no training."""
+    folder, (scene, _) = tmp_path_factory.mktemp("models"), make_scene(SEED)
+    write_surface_drives(folder / "texture", flat(scene), scene.arena.textures, SEED, 2.0, speeds=[0.15], moves=MOVES)
+    found, _ = read_training(folder / "texture")
+    fit_texture({name: found[name] for name in scene.arena.textures}, SEED).save(folder / "texture.json")
+    for whisker in scene.robot.of_role("object"):
+        RadialModel(*LINE).save(folder / f"{whisker.name}.json")
+    return folder
+
+
+def fly(folder, models, create: int, seconds: float = SECONDS) -> ChainRun:
+    made = ChainRun(folder, BUILD, SEED, seconds, 6, Link(6, 30, 5), create, "bytes")
+    scene, start = make_scene(SEED)
+    scenes.write(made.scene, scene)
+    (made.scene / "scene.flat").write_text(scene.flat(start))
+    (made.out / "models").symlink_to(models)
+    run_chain(made, lambda tick: None)
+    return made
+
+
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory, models):
+    return fly(tmp_path_factory.mktemp("run"), models, create=1)
+
+
+def test_the_same_seed_gives_the_same_bytes(flown, models, tmp_path):
+    again = fly(tmp_path / "again", models, create=1)
+    names = ["truth.csv", "traces.csv", "bad.csv", "faults.csv", "scene/observations.csv"]
+    for name in [*names, *(f"est_{name}.csv" for name in FILTERS)]:
+        assert (again.out / name).read_bytes() == (flown.out / name).read_bytes(), name
+
+
+def test_the_odometry_of_the_bases_bytes_follows_the_truth(flown):
+    with open(flown.out / "truth.csv", newline="") as file:
+        truth = [[float(row[key]) for key in ("x_m", "y_m")] for row in csv.DictReader(file)]
+    with open(flown.scene / "observations.csv", newline="") as file:
+        moved = [[float(row[key]) for key in ("odo_x_m", "odo_y_m")] for row in csv.DictReader(file)]
+    driven, told = (np.hypot(*np.diff(truth, axis=0).T).sum(), np.hypot(*np.array(moved).T).sum())
+    assert driven > 0.2
+    assert told == pytest.approx(driven, rel=0.1), "5 % of scale, whole millimetres, and what is on its way"
+
+
+def test_nothing_is_lost_between_netbook_and_desktop(flown):
+    pilot, navigator = (json.loads((flown.out / f"{name}.json").read_text()) for name in ("pilot", "navigator"))
+    rows = round(SECONDS * 10)
+    assert (pilot["rows"], navigator["weighed"], navigator["missed"], navigator["skipped"]) == (rows, rows, 0, 0)
+    base = pilot["base"]
+    assert (base["corrupt"], base["missed"], base["commander_stops"], base["mode_losses"]) == ("0",) * 4
+    assert int(base["frames"]) > 0.9 * SECONDS / 0.015
+
+
+def test_a_create_2_flies_as_well(models, tmp_path):
+    made = fly(tmp_path / "run", models, create=2, seconds=2.0)
+    assert json.loads((made.out / "pilot.json").read_text())["base"]["angle_source"] == "encoders"
+
+
+# ---------------------------------------------------------------------------------------------------------------------
+# live
+
+
+def free_ports() -> int:
+    """The first of three neighbours that nobody listened at a moment ago."""
+    while True:
+        with socket.create_server(("127.0.0.1", 0)) as server:
+            first = server.getsockname()[1]
+        try:
+            for number in range(3):
+                socket.create_server(("127.0.0.1", first + number)).close()
+        except OSError:
+            continue
+        return first
+
+
+@contextmanager
+def robot(folder, models):
+    """A simulated robot of all its processes, and an inbox of what they say."""
+    meeting = parts.Meeting(f"whisker-test-robot-{os.getpid()}", folder, first_port=free_ports())
+    words = [
+        "robot",
+        "--simulated",
+        "--desktop",
+        "--no-view",
+        "--models",
+        models,
+        "--seed",
+        SEED,
+        "--out",
+        folder / "out",
+    ]
+    words += ["--ring", meeting.ring, "--first-port", meeting.first_port]
+    command = [sys.executable, "-m", "whisker.cli", *map(str, words)]
+    process = subprocess.Popen(
+        command, env=os.environ | {"WHISKER_BUILD": str(BUILD)}, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
+    )
+    try:
+        with links.Link("test", connect=[meeting.endpoint(number) for number in range(3)]) as link:
+            yield process, link.subscribe("observation", "localisation", "truth", "health/*")
+    finally:
+        process.terminate()
+        process.communicate(timeout=END_S)
+
+
+def until(inbox, topic: str, wanted=lambda message: True):
+    """The first message on this topic that is wanted."""
+    while True:
+        batch = inbox.take(END_S)
+        assert batch, f"nothing more comes while {topic} is waited for; {inbox.last_error}"
+        for received in batch:
+            if received.topic == topic and not received.over and wanted(received.message):
+                return received
+
+
+def test_what_is_killed_comes_back(models, tmp_path):
+    with robot(tmp_path, models) as (process, inbox):
+        pilot = until(inbox, "health/pilot", lambda health: health.state == "running").message
+        first = until(inbox, "observation").envelope.stream
+        assert until(inbox, "truth").message.header.stamp.ns > 0
+        os.kill(pilot.pid, signal.SIGKILL)
+        again = until(inbox, "health/pilot", lambda health: health.pid != pilot.pid and health.state == "running")
+        assert int(again.message.counts["base_frames"]) > 0
+        assert until(inbox, "observation").envelope.stream != first
+        base = until(inbox, "health/base").message
+        os.kill(base.pid, signal.SIGKILL)
+        until(inbox, "health/base", lambda health: health.counts["restarts"] == "1" and health.state == "running")
+        until(inbox, "health/pilot", lambda health: int(health.counts["base_lost"]) > 0 and health.state == "running")
+        row = until(inbox, "observation", lambda row: np.abs(row.motion).sum() > 0).message
+        until(inbox, "localisation", lambda answer: answer.observation_seq >= row.seq)
+    logs = {path.stem: path.read_text() for path in (tmp_path / "out/logs").iterdir()}
+    assert "stopped" in logs["base"]
+    assert process.returncode == 0
