@@ -5,7 +5,7 @@ import zenoh
 from robotkit import Cable, examples, free_endpoint, take_until
 
 from whisker.robot import messages as m
-from whisker.robot.link import Inbox, Link, LinkError, encoding_of, is_loopback
+from whisker.robot.link import MESSAGE_MOST, Inbox, Link, LinkError, encoding_of, is_loopback
 from whisker.robot.streams import ENVELOPE, Envelope, EnvelopeError, Tally, envelopes
 
 PATIENCE_S = 30.0
@@ -173,6 +173,17 @@ def test_what_is_no_message_is_counted_and_said_and_the_rest_goes_on():
             "observation: field envelope: version 2 of the stream, this release has 1; "
             "install one release of whisker on both sides"
         )
+
+
+def test_a_message_too_large_does_not_come_and_is_missed():
+    with Pair() as pair:
+        key, stream, cdr = "whisker/robot/observation", envelopes(), encoding_of(m.Observation)
+        good = m.encode(row(0))
+        for payload in (good, bytes(MESSAGE_MOST), good):
+            pair.pilot._session.put(key, payload, encoding=cdr, attachment=next(stream).pack())
+        take_until(pair.inbox, lambda got: len(got) == 2)
+        tally = pair.inbox.tallies["observation"]
+        assert (tally.missed, tally.refused) == (1, 0)
 
 
 def test_a_topic_of_another_release_is_refused():

@@ -34,6 +34,7 @@ NEWEST_ONLY = {"belief", HEALTH}
 INBOX_MOST = 10_000  # messages of a live subscription that nobody takes: over 16 minutes of rows
 LEASE_MS = {False: 10_000, True: 60_000}  # by lock-step: a peer silent for so long is gone
 BLOCK_US = 600_000_000  # a lock-step sender waits so long for a reader that stands still
+MESSAGE_MOST = 1 << 18  # bytes: four beliefs of the most poses; zenoh drops what is larger
 QUEUE_BATCHES = 16  # of 64 KiB, zenoh's most: a live sender's burst finds room while the machine is busy elsewhere
 RETRY = {"period_init_ms": 100, "period_max_ms": 1000, "period_increase_factor": 2}
 ENDPOINT = re.compile(r"tcp/(\[[0-9a-fA-F:]+\]|[\w.-]+):(\d{1,5})")
@@ -294,6 +295,7 @@ def _config(listen: list[str], connect: list[str], lock_step: bool, scout: bool)
         "transport/link/tx/lease": LEASE_MS[lock_step],
         "transport/link/tx/queue/congestion_control/block/wait_before_close": BLOCK_US,
         "transport/link/tx/queue/size/data": QUEUE_BATCHES,
+        "transport/link/rx/max_message_size": MESSAGE_MOST,
         "transport/shared_memory/enabled": False,
     }
     for key, value in told.items():
