@@ -230,6 +230,26 @@ def test_a_full_inbox_drops_the_oldest_and_counts_them():
     assert inbox.take() == []
 
 
+def test_what_is_refused_does_not_end_the_wait_for_a_message():
+    stream = envelopes()
+    bad, good = (FakeSample(next(stream), row(seq)) for seq in range(2))
+    bad.payload = zenoh.ZBytes(b"")
+
+    class Late(Inbox):
+        """The good message comes once the bad one has been refused."""
+
+        def _open(self, *entry):
+            opened = super()._open(*entry)
+            if opened is None:
+                self.put(good)
+            return opened
+
+    inbox = Late("", None)
+    inbox.put(bad)
+    assert seqs(inbox.take(0.0)) == [1]
+    assert inbox.refused == 1
+
+
 def test_envelopes():
     assert Envelope.unpack(Envelope(1, 2, 3, True).pack()) == Envelope(1, 2, 3, True)
     for data in (None, b"", Envelope(1, 2, 3).pack() + b"x"):

@@ -14,8 +14,10 @@ Each pair of processes needs a connection of its own: nobody passes messages on.
 
 import contextlib
 import json
+import math
 import re
 import threading
+import time
 from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -110,11 +112,21 @@ class Inbox:
 
         What is no message of ours is left out and counted in the tally's `refused`, with the reason in `last_error`.
         """
+        until = math.inf if timeout_s is None else time.monotonic() + timeout_s
+        while True:
+            entries = self._come(until)
+            got = [received for entry in entries if (received := self._open(*entry))]
+            if got or not entries:
+                return got
+
+    def _come(self, until: float) -> list[tuple]:
+        """What waits to be taken, once there is something; nothing when that is not so until a monotonic time."""
         with self._condition:
-            self._condition.wait_for(lambda: self._waiting or self._closed, timeout_s)
+            left = None if until == math.inf else max(until - time.monotonic(), 0.0)
+            self._condition.wait_for(lambda: self._waiting or self._closed, left)
             entries = list(self._waiting)
             self._waiting.clear()
-        return [received for entry in entries if (received := self._open(*entry))]
+        return entries
 
     def _open(self, key: str, encoding: str, payload: bytes, attachment: bytes | None) -> Received | None:
         topic = key.removeprefix(self._prefix)
