@@ -2,6 +2,7 @@
 
 import json
 import threading
+import time
 from contextlib import ExitStack, closing
 from pathlib import Path
 from types import SimpleNamespace
@@ -28,6 +29,7 @@ from . import RING, stop_on_signals, whole_number
 EXAMPLE = "whisker pilot SCENE --models MODELS --base /run/user/1000/base"
 RING_WAIT_S = 10.0  # for the ring of a simulation that waits for us
 OTHERS_WAIT_S = 60.0
+GREETING_S = 10.0  # a live pilot goes on without them
 NOWHERE = "/dev/null"
 
 
@@ -47,7 +49,9 @@ def add(parser) -> None:
     parser.add_argument("--simulation", metavar="SOCKET", help=text)
     parser.add_argument("--seed", type=whole_number(0), default=1, help="of the random turns (default: %(default)s)")
     add_link(parser, [PILOT_ENDPOINT], [NAVIGATOR_ENDPOINT])
-    parser.add_argument("--await", action="append", default=[], dest="others", metavar="PROCESS", help="begin with it")
+    parser.add_argument(
+        "--await", action="append", default=[], dest="others", metavar="PROCESS", help="begin when it is there, too"
+    )
     parser.add_argument("--out", default=NOWHERE, metavar="FILE", help="observations.csv of the contract")
     parser.add_argument("--traces", default=NOWHERE, metavar="FILE", help="CSV of the floor whiskers' deflection")
     parser.add_argument("--report", type=Path, metavar="FILE", help="JSON of what was used, skipped and measured")
@@ -109,10 +113,18 @@ def _fly_live(arguments, stack: ExitStack) -> SimpleNamespace:
     parts.flight = Flight(parts.pilot, wheels, parts.rows, parts.traces, parts.teller)
     live = LiveFlight(parts.flight, ring, wheels, link)
     link.announce()
+    _greet(arguments.others, link, stop)
     live.run(stop.is_set)
     parts.teller.end("stopped")
     parts.base_health = base.health()
     return parts
+
+
+def _greet(others: list[str], link: Link, stop: threading.Event) -> None:
+    """Gives the others a while to come: a navigator that takes the first row knows where the run begins."""
+    give_up = time.monotonic() + GREETING_S
+    while not link.wait_for(others, RETRY_S) and time.monotonic() < give_up and not stop.is_set():
+        continue
 
 
 def _known_wheels(base: LiveBase, link: Link, stop: threading.Event) -> Wheels:

@@ -81,7 +81,7 @@ def _table(arguments, meeting: parts.Meeting) -> list:
     if arguments.desktop:
         view = None if arguments.no_view else arguments.view_port
         table += parts.desktop(body, meeting, arguments.out / "robot.mcap", view)
-    return table + parts.netbook(body, meeting, arguments.simulated)
+    return table + parts.netbook(body, meeting, arguments.simulated, arguments.desktop)
 
 
 def _simulated(arguments, meeting: parts.Meeting) -> tuple[parts.Body, parts.Simulated]:

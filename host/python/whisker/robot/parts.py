@@ -11,12 +11,20 @@ FIRST_PORT = 7447  # of three: supervisor, pilot, navigator; the latter two are 
 LOOPBACK = "127.0.0.1"
 BRIDGE = "bridge"
 
-# Inside the simulated bridge's umockdev the device is seen by whoever has this environment: it is left in file $0.
-LEAVE_ENVIRONMENT = (
-    'export -p >"$0.new" && mv "$0.new" "$0"; trap "exit 0" TERM; while :; do sleep 3600 & wait $!; done'
-)
+# Inside the simulated bridge's umockdev the device is seen by whoever has this environment: it is left in file $0. At the end
+# whoever took it ends first, for umockdev does not survive a client that is left.
+LEAVE_ENVIRONMENT = """
+end() {
+    rm -f "$0"
+    pid=$(cat "$0.pid" 2>/dev/null) && kill "$pid" 2>/dev/null && while kill -0 "$pid" 2>/dev/null; do sleep 0.05; done
+    exit 0
+}
+trap end TERM
+export -p >"$0.new" && mv "$0.new" "$0"
+while :; do sleep 3600 & wait $!; done
+"""
 # Waits for it, and becomes the command with it.
-WITH_ENVIRONMENT = 'while [ ! -e "$0" ]; do sleep 0.1; done; . "$0"; exec "$@"'
+WITH_ENVIRONMENT = 'while [ ! -e "$0" ]; do sleep 0.1; done; . "$0"; echo $$ >"$0.pid"; exec "$@"'
 
 
 @dataclass(frozen=True)
@@ -62,7 +70,7 @@ class Body:
     seed: int  # of the random turns
 
 
-def netbook(body: Body, meeting: Meeting, simulated: bool) -> list[Program]:
+def netbook(body: Body, meeting: Meeting, simulated: bool, with_desktop: bool) -> list[Program]:
     """Daemon, base and pilot. The pilot is the last, so that it is ended first, and stops the wheels."""
     daemon = [program("whiskerd"), "--ring", meeting.ring, "--wait"]
     if simulated:
@@ -70,6 +78,7 @@ def netbook(body: Body, meeting: Meeting, simulated: bool) -> list[Program]:
     base = [program("whisker-base"), "--port", body.port, "--socket", meeting.base, "--model", body.create, "--wait"]
     pilot = [*_whisker("pilot"), body.scene, "--models", body.models, "--ring", meeting.ring, "--base", meeting.base]
     pilot += ["--seed", body.seed, "--listen", meeting.endpoint(1), "--connect", meeting.endpoint(2)]
+    pilot += ["--await", "navigator"] if with_desktop else []
     return [Program.of("whiskerd", daemon), Program.of("base", base), Program.of("pilot", pilot, tells=True)]
 
 
