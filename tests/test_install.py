@@ -88,9 +88,16 @@ def test_library_exports_its_names_only_and_never_prints_or_ends(prefix):
     assert not used & (PRINTING | ENDING)
 
 
-def test_unit_is_sound_and_hardened(prefix):
-    unit = prefix / "lib/systemd/system/whiskerd.service"
-    assert f"ExecStart={prefix}/bin/whiskerd --ring whisker --wait" in unit.read_text()
+UNITS = {
+    "whiskerd.service": "whiskerd --ring whisker --wait",
+    "whisker-base@.service": "whisker-base --port /dev/%I --socket ${RUNTIME_DIRECTORY}/%i.sock --wait",
+}
+
+
+@pytest.mark.parametrize("name", UNITS)
+def test_units_are_sound_and_hardened(prefix, name):
+    unit = prefix / "lib/systemd/system" / name
+    assert f"ExecStart={prefix}/bin/{UNITS[name]}\n" in unit.read_text()
     analyze = tool("systemd-analyze")
     run(analyze, "verify", unit)
     verdict = run(analyze, "security", "--offline=true", "--no-pager", f"--threshold={EXPOSURE_MAX * 10:.0f}", unit)
