@@ -1,0 +1,187 @@
+"""The live pilot among parts that come and go, with made-up ones: what it does, and what its health says."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from whisker.base import BaseLost, Motion
+from whisker.ring import SAMPLE
+from whisker.robot import wheels as wheels_module
+from whisker.robot.health import RUNNING
+from whisker.robot.pilot_process import LOST, SILENCE_S, LiveFlight, LiveWheels
+from whisker.robot.wheels import RETRY_S, LiveBase, wheels_of
+
+
+class Clock:
+    def __init__(self):
+        self.now = 50.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+class MadeUpRing:
+    """Blocks as the test gives them."""
+
+    def __init__(self):
+        self.name, self.trouble = "made-up", ""
+        self.restarts = self.overruns = self.ticks_missing = 0
+        self.waiting = []
+
+    def take(self, wait_s):
+        made, self.waiting = self.waiting, []
+        return made
+
+    def bring(self, *firsts):
+        self.waiting += [(first, np.zeros((40, 6), SAMPLE)) for first in firsts]
+
+
+class MadeUpFlight:
+    """Notes what it is given."""
+
+    def __init__(self):
+        self.took, self.interruptions, self.ticks_used = [], [], 0
+        self.pilot = SimpleNamespace(bad_samples=0, whisks=[])
+
+    def take(self, block):
+        self.took.append(block[0])
+        self.ticks_used = block[0] + 40
+
+    def interrupted(self, tick):
+        self.interruptions.append(tick)
+
+
+class MadeUpBase:
+    def __init__(self):
+        self.trouble, self.lost, self.stops, self.closed = "", 0, 0, False
+
+    def stop(self):
+        self.stops += 1
+
+    def close(self):
+        self.closed = True
+
+    def health(self):
+        return {"mode": "safe"}
+
+
+class MadeUpLink:
+    """Keeps what is sent; `navigator` is there or not."""
+
+    process = "pilot"
+
+    def __init__(self):
+        self.peers, self.told = {"navigator"}, []
+
+    def publish(self, topic):
+        return SimpleNamespace(send=self.told.append, sent=0)
+
+
+@pytest.fixture
+def live():
+    clock, ring, base, link, flight = Clock(), MadeUpRing(), MadeUpBase(), MadeUpLink(), MadeUpFlight()
+    made = LiveFlight(flight, ring, LiveWheels(base), link, clock)
+
+    def steps(count=1, later=0.0):
+        left = iter([False] * count)
+        clock.now += later
+        made.run(lambda: next(left, True))
+        base.stops -= 1  # that of the end
+
+    return SimpleNamespace(clock=clock, ring=ring, base=base, link=link, flight=flight, made=made, steps=steps)
+
+
+def test_wheels_are_stopped_once_when_samples_stop_coming(live):
+    live.ring.bring(0)
+    live.steps()
+    assert live.made.state == RUNNING and live.base.stops == 0
+    live.steps(later=SILENCE_S / 2)
+    assert live.base.stops == 0
+    live.steps(3, later=SILENCE_S)
+    assert live.base.stops == 1 and "no samples" in live.made.state
+    live.ring.trouble = "ring made-up: the writer died"
+    assert live.made.state == "ring made-up: the writer died"
+
+
+def test_it_goes_on_as_after_a_lost_base_when_samples_are_back(live):
+    live.ring.bring(0)
+    live.steps()
+    assert live.flight.interruptions == [], "not at the start"
+    live.steps(later=2 * SILENCE_S)
+    live.ring.bring(2000, 2040)
+    live.steps()
+    assert live.flight.interruptions == [1999] and live.flight.took == [0, 2000, 2040]
+    assert live.made.state == RUNNING and live.made.counters()["halts"] == 1
+
+
+def test_what_is_too_old_is_left_out_and_counted(live):
+    live.ring.bring(*range(0, 40 * 15, 40))
+    live.steps()
+    assert live.flight.took == list(range(200, 600, 40))
+    assert live.made.counters()["blocks_left_out"] == 5
+
+
+def test_health_tells_of_navigator_and_base(live):
+    live.ring.bring(0)
+    live.steps()
+    live.link.peers, live.base.trouble = set(), "no base"
+    live.steps()
+    counters = live.made.counters()
+    assert (counters["navigator"], counters["navigator_lost"], counters["base_mode"]) == ("gone", 1, "safe")
+    assert [health.state for health in live.link.told][-2:] == ["no base", "ended"]
+    assert live.link.told[-1].last_error == "no base"
+
+
+def test_the_end_stops_the_wheels_and_closes_the_base(live):
+    live.made.run(lambda: True)
+    assert live.base.stops == 1 and live.base.closed
+
+
+# ---------------------------------------------------------------------------------------------------------------------
+
+
+class Driver:
+    """whisker-base as the client sees it; `alive` or not."""
+
+    alive = True
+
+    def __init__(self, path):
+        self._ask(None)
+
+    def _ask(self, answer):
+        if not Driver.alive:
+            raise BaseLost("base.sock: whisker-base has gone; look at its log, connect again")
+        return answer
+
+    def odometry(self):
+        return self._ask(Motion(0.01, 0.0, 0.1, ((1.0, 0.0, 0.0), (0.0, 2.0, 0.0), (0.0, 0.0, 3.0)), 2))
+
+    def close(self):
+        return None
+
+
+def test_a_base_that_goes_is_told_and_found_again(monkeypatch):
+    monkeypatch.setattr(wheels_module, "Base", Driver)
+    monkeypatch.setattr(Driver, "alive", False)
+    clock = Clock()
+    base = LiveBase("base.sock", clock)
+    wheels = LiveWheels(base)
+    report = wheels.odometry(199)
+    assert report.motion == (0.0, 0.0, 0.0) and report.bumps == LOST and wheels.missing == 1
+    assert "has gone" in base.trouble
+    monkeypatch.setattr(Driver, "alive", True)
+    assert wheels.odometry(399).bumps == LOST, "not tried again so soon"
+    clock.now += RETRY_S
+    report = wheels.odometry(599)
+    assert report.motion == (0.01, 0.0, 0.1) and report.bumps.left and not report.bumps.lost
+    assert np.diag(report.covariance).tolist() == [1.0, 2.0, 3.0] and base.trouble == ""
+    monkeypatch.setattr(Driver, "alive", False)
+    assert wheels.odometry(799).bumps == LOST and base.lost == 1
+
+
+def test_the_whisk_is_what_the_base_can_turn_at():
+    first = wheels_of({"speed_step_m_s": "0.001000", "wheel_base_m": "0.258000"})
+    second = wheels_of({"speed_step_m_s": "0.028500", "wheel_base_m": "0.235000"})
+    assert first.whisk_rad_s == pytest.approx(2 * 0.017 / 0.258) and first.back_off_m_s == pytest.approx(0.03)
+    assert second.whisk_rad_s == pytest.approx(2 * 0.0285 / 0.235) and second.back_off_m_s == pytest.approx(0.0285)
