@@ -11,7 +11,7 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
-from chainrun import BUILD, END_S
+from chainrun import BUILD, END_S, running, simulation, write_flat_scene
 
 from whisker import scene as scenes
 from whisker.demo.chain import ChainRun, Link, run_chain
@@ -20,6 +20,7 @@ from whisker.demo.simulation import write_surface_drives
 from whisker.demo.training import MOVES, fit_texture, flat
 from whisker.radial import RadialModel
 from whisker.report.run import FILTERS
+from whisker.ring import Reader
 from whisker.robot import link as links
 from whisker.robot import parts
 from whisker.texture import read_training
@@ -88,6 +89,40 @@ def test_a_create_2_flies_as_well(models, tmp_path):
 
 # ---------------------------------------------------------------------------------------------------------------------
 # live
+
+
+def test_under_a_pace_the_world_goes_on_without_its_bridge(tmp_path):
+    scene, _ = write_flat_scene(tmp_path, SEED)
+    path, ring = tmp_path / "sim.sock", f"whisker-test-pace-{os.getpid()}"
+    command = simulation(tmp_path, scene, 3600, SEED, ring, "--socket", path, "--pace", 1, "--level", "bytes")
+    with running(command) as process, Reader(ring, wait_s=10.0) as reader, watching(path) as server:
+        reader.wait(10.0)
+        server.send(b"unplug")
+        while reader.stats is None or reader.stats.connected:
+            assert process.poll() is None
+            told(server)
+        published, ticks = reader.info.published, [told(server) for _ in range(3)]
+        assert np.diff(ticks).tolist() == [200, 200] and reader.info.published == published
+        server.send(b"plug")
+        while reader.info.published == published:
+            told(server)
+
+
+@contextmanager
+def watching(path):
+    """The simulation's socket, watched for true poses."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as server:
+        server.connect(str(path))
+        server.settimeout(END_S)
+        server.send(b"watch")
+        yield server
+
+
+def told(server) -> int:
+    """The tick of the next true pose."""
+    word, tick, *pose = server.recv(256).split()
+    assert word == b"truth" and len(pose) == 3
+    return int(tick)
 
 
 def free_ports() -> int:

@@ -64,7 +64,10 @@ class LiveRing:
     """
 
     def __init__(self, name: str, lanes: int, clock=time.monotonic):
-        self.name, self.trouble = name, "no ring yet"  # why no samples come; empty: they come
+        self.name = name
+        self.trouble = (
+            f"ring {name}: not there yet; start whiskerd --ring {name}"  # why no samples come; empty: they come
+        )
         self.restarts = self.overruns = self.ticks_missing = 0  # ticks: between those that came
         self._lanes, self._clock = lanes, clock
         self._reader: Reader | None = None
