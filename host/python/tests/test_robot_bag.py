@@ -10,6 +10,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
 from whisker import localise, scenes
+from whisker.commands.bag import next_free
 from whisker.observations import observations_path
 from whisker.pilot import compose
 from whisker.recording.mcapfile import McapFile
@@ -172,3 +173,10 @@ def test_an_existing_bag_is_kept(tmp_path, capsys):
     code, _, err = run(capsys, "bag", tmp_path / "a.mcap", "--connect", "none")
     assert code == 2 and "exists; choose another name, or --overwrite" in err
     assert (tmp_path / "a.mcap").read_text() == "dear"
+
+
+def test_a_recorder_that_is_started_again_leaves_what_was_recorded(tmp_path):
+    wanted = [tmp_path / name for name in ("a.mcap", "a-2.mcap", "a-3.mcap")]
+    for path in wanted:
+        assert next_free(wanted[0]) == path
+        path.write_text("dear")

@@ -89,7 +89,7 @@ def desktop(body: Body, meeting: Meeting, bag: Path | None, view_port: int | Non
     table = [Program.of("navigator", navigator, tells=True)]
     everybody = [word for number in range(3) for word in ("--connect", meeting.endpoint(number))]
     if bag:
-        command = [*_whisker("bag"), bag, "--scene", body.scene, "--stay", "--overwrite", *everybody]
+        command = [*_whisker("bag"), bag, "--scene", body.scene, "--stay", "--next", *everybody]
         table.append(Program.of("bag", command, tells=True))
     if view_port is not None:
         command = [*_whisker("view"), "--ring", meeting.ring, "--robot", "--scene", body.scene, "--port", view_port]
