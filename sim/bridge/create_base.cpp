@@ -76,6 +76,13 @@ void CreateBase::tick(const sim_world *world)
     }
 }
 
+Drive CreateBase::speed() const
+{
+    Drive drive{};
+    sim_create_speed(create_, &drive.v_m_s, &drive.omega_rad_s);
+    return drive;
+}
+
 uint64_t CreateBase::sent() const
 {
     return sent_;

@@ -9,6 +9,7 @@
 #include <poll.h>
 
 #include "create_options.h"
+#include "follower_server.h"
 extern "C" {
 #include "create_ground.h"
 #include "create_pty.h"
@@ -39,6 +40,9 @@ class CreateBase
 
     // After it: its tick. What it sends is written to the port.
     void tick(const sim_world *world);
+
+    // What its wheels are told to do.
+    Drive speed() const;
 
     // Bytes written to the port since the start.
     uint64_t sent() const;

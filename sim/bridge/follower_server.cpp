@@ -127,6 +127,7 @@ bool FollowerServer::read_all(Follower &follower)
 void FollowerServer::handle(Follower &follower, const std::string &message)
 {
     uint64_t tick = 0;
+    size_t lane = 0;
     char name[MESSAGE_BYTES] = "";
     if (std::sscanf(message.c_str(), "follow %255s", name) == 1) {
         follower.name = name;
@@ -139,11 +140,15 @@ void FollowerServer::handle(Follower &follower, const std::string &message)
         handle_answer(follower, message);
     } else if (message == "watch") {
         follower.watching = true;
+    } else if (std::sscanf(message.c_str(), "dead %zu", &lane) == 1) {
+        lane_changes_.push_back({lane, true});
+    } else if (std::sscanf(message.c_str(), "well %zu", &lane) == 1) {
+        lane_changes_.push_back({lane, false});
     } else if (message == "unplug" || message == "plug") {
         cable_.push_back(message == "plug" ? Cable::PLUG : Cable::UNPLUG);
     } else {
         throw std::runtime_error("socket: '" + message +
-                                 "' is none of follow, taken, pilot, drive, base, unplug, plug, watch");
+                                 "' is none of follow, taken, pilot, drive, base, unplug, plug, watch, dead, well");
     }
 }
 
@@ -213,6 +218,16 @@ std::optional<Cable> FollowerServer::take_cable()
     }
     const Cable next = cable_.front();
     cable_.pop_front();
+    return next;
+}
+
+std::optional<LaneChange> FollowerServer::take_lane_change()
+{
+    if (lane_changes_.empty()) {
+        return std::nullopt;
+    }
+    const LaneChange next = lane_changes_.front();
+    lane_changes_.pop_front();
     return next;
 }
 

@@ -1,6 +1,6 @@
 // The socket by which readers of the ring hold the simulation back and the pilot drives the robot. One ASCII message
 // per packet (Unix SOCK_SEQPACKET):
-//   in:  follow NAME | taken T | pilot | drive T V OMEGA | unplug | plug | watch
+//   in:  follow NAME | taken T | pilot | drive T V OMEGA | unplug | plug | watch | dead LANE | well LANE
 //   out: odometry T X Y THETA (to the pilot) | truth T X Y THETA (to who watches: nobody waits for him) | end N (to
 //   all)
 // With a Create for a base, whose driver has a port of its own, instead of drive and odometry:
@@ -17,7 +17,9 @@
 
 #include <poll.h>
 
+extern "C" {
 #include "sim_world.h"
+}
 
 namespace bridge_sim
 {
@@ -28,6 +30,12 @@ constexpr uint64_t DECISION_DELAY = 40; // ticks from the end of a block to its 
 
 // What a connection that is no follower may do to the cable, at once.
 enum class Cable { UNPLUG, PLUG };
+
+// A lane whose sensor falls silent, or answers again, from the next tick on.
+struct LaneChange {
+    size_t lane;
+    bool dead;
+};
 
 struct Drive {
     double v_m_s;
@@ -70,6 +78,9 @@ class FollowerServer
     // The next thing asked of the cable, if any.
     std::optional<Cable> take_cable();
 
+    // The next thing asked of a sensor, if any.
+    std::optional<LaneChange> take_lane_change();
+
     void send_odometry(uint64_t tick, double x_m, double y_m, double theta_rad);
     void send_base(uint64_t tick, uint64_t bytes);
     void send_truth(uint64_t tick, const sim_pose &pose);
@@ -102,6 +113,7 @@ class FollowerServer
     std::map<uint64_t, Drive> drives_;   // by the tick they take effect
     std::map<uint64_t, uint64_t> bytes_; // likewise: all that the driver had written
     std::deque<Cable> cable_;
+    std::deque<LaneChange> lane_changes_;
     uint64_t blocks_answered_ = 0;
     bool over_ = false;
 };

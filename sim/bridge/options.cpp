@@ -29,6 +29,7 @@ enum Option {
     PACE,
     SOCKET,
     TRUTH,
+    WHEELS,
     FAULTS,
     USB_FAULTS,
     FAULT_LIST,
@@ -55,6 +56,7 @@ const option LONG_OPTIONS[] = {{"help", no_argument, nullptr, HELP},
                                {"pace", required_argument, nullptr, PACE},
                                {"socket", required_argument, nullptr, SOCKET},
                                {"truth", required_argument, nullptr, TRUTH},
+                               {"wheels", required_argument, nullptr, WHEELS},
                                {"faults", required_argument, nullptr, FAULTS},
                                {"usb-faults", required_argument, nullptr, USB_FAULTS},
                                {"fault-list", required_argument, nullptr, FAULT_LIST},
@@ -111,6 +113,8 @@ std::string *path_of(Options &options, int option)
         return &options.socket;
     case TRUTH:
         return &options.truth;
+    case WHEELS:
+        return &options.wheels;
     case FAULTS:
         return &options.faults;
     case USB_FAULTS:
@@ -236,6 +240,7 @@ void check(const Options &options)
     require(options.create.on || options.create.link.empty(), "--create-link needs --create: say which model, 1 or 2");
     require(!options.create.on || !options.create.link.empty(),
             "--create needs --create-link: say where its serial port is to be linked");
+    require(options.create.on || options.wheels.empty(), "--wheels needs --create: say which model, 1 or 2");
     require(options.followers == 0 || !options.socket.empty(), "--followers needs --socket: say where they connect");
 }
 
@@ -291,6 +296,7 @@ const char *usage()
            "  --socket PATH         where followers and the pilot connect\n"
            "  --followers K         wait for so many of them, the pilot included (0)\n"
            "  --truth OUT.csv       pose and texture tips after every 0.1 s\n"
+           "  --wheels OUT.csv      each change of what the Create's wheels are told: tick, monotonic clock, speeds\n"
            "  --faults OUT.csv      inject lane and USB faults; log each spoilt lane,tick,kind\n"
            "  --usb-faults OUT.csv  log each USB fault: tick,kind\n"
            "  --fault-list FILE     inject just these: lines 'lane TICK LANE KIND ARGUMENT', 'usb TICK KIND', ticks "

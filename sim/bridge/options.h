@@ -22,6 +22,7 @@ struct Options {
     std::string scene;
     std::string socket;
     std::string truth;
+    std::string wheels;
     std::string faults;
     std::string usb_faults;
     std::string nodes; // traits of single nodes

@@ -111,6 +111,7 @@ Simulation::Simulation(const Options &options)
                                                read_node_list(options.nodes, populated(options, scene_)))),
       scheduler_(*rig_), faults_(options.faults, options.usb_faults),
       runner_(*rig_, scheduler_, plan_of(options, scene_), faults_), truth_(options.truth, scene_),
+      wheels_(options.wheels),
       create_(options.create.on ? std::make_unique<CreateBase>(options.create, options.seed) : nullptr),
       followers_(options.socket, options.followers, options.create.on ? Answer::BASE : Answer::DRIVE),
       defect_(options.defect), pace_(options.pace), total_(options.ticks())
@@ -217,6 +218,7 @@ void Simulation::step_world()
 {
     if (create_) {
         create_->drive(world_.get(), followers_.bytes_at(tick_));
+        wheels_.note(tick_, create_->speed());
     } else if (const std::optional<Drive> drive = followers_.drive_at(tick_)) {
         sim_world_drive(world_.get(), drive->v_m_s, drive->omega_rad_s);
     }
@@ -282,6 +284,16 @@ void Simulation::obey_cable()
                                               : "socket: 'unplug', but the bridge is not plugged in");
         }
         plugged_ ? unplug() : plug();
+    }
+}
+
+void Simulation::obey_lane_changes()
+{
+    while (const std::optional<LaneChange> change = followers_.take_lane_change()) {
+        if (change->lane >= rig_->bus().populated()) {
+            throw std::runtime_error("socket: lane " + std::to_string(change->lane) + " has no node");
+        }
+        runner_.set_dead(change->lane, change->dead);
     }
 }
 
@@ -354,6 +366,7 @@ void Simulation::wait(int timeout_ms)
     }
     followers_.receive();
     obey_cable();
+    obey_lane_changes();
 }
 
 void Simulation::read_signals()
@@ -380,6 +393,7 @@ void Simulation::finish()
         close_run();
     }
     truth_.close();
+    wheels_.close();
     faults_.close();
     write_speed_report(options_.speed_report, speed_, faults_);
 }

@@ -15,6 +15,7 @@
 #include "pace.h"
 #include "speed_report.h"
 #include "truth_log.h"
+#include "wheel_log.h"
 
 namespace bridge_sim
 {
@@ -50,6 +51,7 @@ class Simulation
     void end_run();
     void close_run();
     void obey_cable();
+    void obey_lane_changes();
     void plug();
     void unplug();
     void take_requests();
@@ -69,6 +71,7 @@ class Simulation
     FaultLog faults_;
     TickRunner runner_;
     TruthLog truth_;
+    WheelLog wheels_;
     std::unique_ptr<CreateBase> create_; // none: the pilot drives the world's base itself
     FollowerServer followers_;           // after it: who connects finds the port
     Defect defect_;

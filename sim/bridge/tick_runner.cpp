@@ -47,6 +47,7 @@ void TickRunner::tick(uint64_t number, const sim_field *fields)
         inject_lane_fault(number);
         inject_usb_fault(number);
     }
+    silence_dead(number);
     if (number % INTERRUPT_POLL_TICKS == 0) {
         scheduler_.poll_interrupt();
     }
@@ -86,6 +87,20 @@ void TickRunner::inject_lane_fault(uint64_t number)
         in_transfer_ = fault;
     } else {
         rig_.spoil(*fault);
+    }
+}
+
+void TickRunner::set_dead(size_t lane, bool dead)
+{
+    dead ? (void)dead_.insert(lane) : (void)dead_.erase(lane);
+}
+
+void TickRunner::silence_dead(uint64_t number)
+{
+    for (const size_t lane : dead_) {
+        const LaneFault fault{number, lane, LaneFaultKind::SENSOR_DEAD, 0};
+        log_.lane_fault(fault);
+        rig_.spoil(fault);
     }
 }
 

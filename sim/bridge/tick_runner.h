@@ -2,6 +2,8 @@
 // simulation and the bench.
 #pragma once
 
+#include <set>
+
 #include "fault_log.h"
 #include "urb_scheduler.h"
 
@@ -24,6 +26,9 @@ class TickRunner
     // The one tick after a stop.
     void last_tick(const sim_field *fields);
 
+    // From the next tick on this lane's sensor says nothing, or answers again. A planned fault of the lane comes first.
+    void set_dead(size_t lane, bool dead);
+
     // The bridge lost its power: a fault that waited for its next transfer goes with it.
     void unplugged();
 
@@ -33,6 +38,7 @@ class TickRunner
 
   private:
     void inject_lane_fault(uint64_t number);
+    void silence_dead(uint64_t number);
     void inject_usb_fault(uint64_t number);
     void start_usb_fault(const UsbFault &fault);
 
@@ -40,6 +46,7 @@ class TickRunner
     UrbScheduler &scheduler_;
     std::optional<FaultPlan> plan_;
     FaultLog &log_;
+    std::set<size_t> dead_;                // lanes
     std::optional<LaneFault> in_transfer_; // a link fault whose record comes with the next tick's transfer
     uint64_t back_at_ = 0;                 // tick at which a host that stayed away returns
     bool away_ = false;

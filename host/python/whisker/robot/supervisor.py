@@ -100,6 +100,10 @@ class Supervisor:
         finally:
             self._close()
 
+    def pid(self, name: str) -> int:
+        """Of a program of the table; 0: it is not running."""
+        return next(keeper.pid for keeper in self._keepers if keeper.program.name == name)
+
     def _told(self) -> list[Keeper]:
         """Those that this process tells of: the others do so themselves."""
         return [k for k in self._keepers if not k.program.tells] if self._link else []
