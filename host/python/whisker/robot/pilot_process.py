@@ -53,7 +53,7 @@ class Flight:
             self._teller.block(last)
 
     def interrupted(self, tick: int) -> None:
-        """The wheels were stopped for want of samples: begin again as after a base that was lost."""
+        """The wheels were stopped for want of samples or of orders: begin again as after a base that was lost."""
         self.pilot.behaviour.moved(tick, 0.0, 0.0, 0.0, LOST)
 
 
@@ -104,11 +104,12 @@ class LiveFlight:
             self._health.tell(self._stamp_ns, ENDED, self._last_error)
 
     def _step(self) -> None:
-        made = self._ring.take(LOOK_S)
-        self.blocks_left_out += max(0, len(made) - LATE_BLOCKS)
-        if made and self._halted and self.halts:
+        come = self._ring.take(LOOK_S)
+        made = come[-LATE_BLOCKS:]
+        self.blocks_left_out += len(come) - len(made)
+        if len(come) > len(made) or (made and self._halted and self.halts):
             self._flight.interrupted(made[0][0] - 1)
-        for block in made[-LATE_BLOCKS:]:
+        for block in made:
             self._flight.take(block)
             self._fed_s, self._halted = self._clock(), False
         if not self._halted and self._clock() - self._fed_s >= SILENCE_S:
