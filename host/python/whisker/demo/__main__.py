@@ -98,14 +98,14 @@ def learn_models(out: Path, scene: scenes.Scene, options: argparse.Namespace) ->
     return radial_scores(scene, models, contacts)
 
 
-def run(out: Path, options: argparse.Namespace) -> dict:
-    """The chain at RTL level; what was sent, received, spoilt and reported."""
+def run(out: Path, options: argparse.Namespace, level: str = "rtl") -> dict:
+    """The chain at this level (chain.ChainRun); what was sent, received, spoilt and reported."""
     ticks = round(options.seconds * TICKS_PER_S)
     link = Link(options.sck_divider, options.word_gap, options.sample_point)
     chain = ChainRun(
-        out, options.build_dir.resolve(), options.seed, options.seconds, options.lanes, link, options.create
+        out, options.build_dir.resolve(), options.seed, options.seconds, options.lanes, link, options.create, level
     )
-    with tqdm(total=ticks, desc="the whole robot, RTL", unit="tick") as bar:
+    with tqdm(total=ticks, desc=f"the whole robot, {level.upper()}", unit="tick") as bar:
         wall_s = run_chain(chain, lambda tick: bar.update(tick - bar.n))
         bar.update(ticks - bar.n)
     speed = json.loads((out / "speed.json").read_text())

@@ -6,23 +6,10 @@ from pathlib import Path
 import numpy as np
 
 from . import figures
+from .html import card_row, document, figure, percent, table
 from .run import FILTERS, Run
 
 PAPER_STD_MM = (5.68, 2.78, 1.82, 4.37)  # the paper's table under Fig. 5, whiskers 1 to 4
-
-STYLE = """
-body { font: 16px/1.5 system-ui, sans-serif; color: #1b1b1b; background: #fff; max-width: 70rem; margin: 2rem auto; padding: 0 1.25rem; }
-h1 { font-size: 1.7rem; margin: 0 0 .3rem; } h2 { font-size: 1.2rem; margin: 2.2rem 0 .4rem; }
-.lead { color: #444; margin: 0 0 1rem; }
-.cards { display: grid; grid-template-columns: repeat(auto-fit, minmax(11rem, 1fr)); gap: .8rem; margin: 1.2rem 0; }
-.card { border: 1px solid #ccc; border-radius: 6px; padding: .6rem .8rem; } .card b { display: block; font-size: 1.35rem; }
-.card span { color: #555; font-size: .85rem; }
-figure { margin: .6rem 0; overflow-x: auto; } figure svg { width: 100%; height: auto; min-width: 44rem; }
-figcaption { color: #444; font-size: .9rem; }
-table { border-collapse: collapse; margin: .6rem 0; } caption { text-align: left; color: #444; font-size: .9rem; padding-bottom: .3rem; }
-th, td { border-bottom: 1px solid #ddd; padding: .25rem .9rem .25rem 0; text-align: right; font-variant-numeric: tabular-nums; }
-th:first-child, td:first-child { text-align: left; }
-"""
 
 
 def write_report(folder: Path) -> Path:
@@ -41,40 +28,36 @@ def render(run: Run) -> str:
         f'<p class="lead">{_lead(s)}</p>',
         _cards(s),
         "<h2>Where it was, and where it thought it was</h2>",
-        _figure(
+        figure(
             figures.svg(figures.arena, run),
             "The arena from above. Black blocks are obstacles. The belief starts 0.2 m and 10 degrees wrong.",
         ),
-        _figure(
+        figure(
             figures.svg(figures.errors, run), "Every step from the first is counted. Medians are in the table below."
         ),
         _estimates_table(run),
         "<h2>Floor texture</h2>",
-        _figure(
+        figure(
             figures.svg(figures.texture, run),
             "One mark for each 100 ms window that was read; none is read during body whisks, at rest, or while the speed changes. "
-            f"Accuracy {_percent(s['texture_accuracy'])} at least 50 mm inside a tile ({_percent(s['texture_windows_share'])} of moving windows), "
-            f"{_percent(s['texture_accuracy_all'])} of all windows read.",
+            f"Accuracy {percent(s['texture_accuracy'])} at least 50 mm inside a tile ({percent(s['texture_windows_share'])} of moving windows), "
+            f"{percent(s['texture_accuracy_all'])} of all windows read.",
         ),
         "<h2>Distance along the whisker</h2>",
-        _figure(
+        figure(
             figures.svg(figures.radial, run),
             "Five calibration contacts per 10 mm fit each line; the errors below are of contacts that were held out. "
             "Markers of the two sets are shifted by 1.5 mm either way to be seen apart.",
         ),
         _radial_table(run),
         "<h2>The base</h2>",
-        _base_table(run),
+        base_table(run),
         "<h2>Throughput and loss</h2>",
-        _loss_table(s),
-        _network_table(run),
+        loss_table(s),
+        network_table(run),
         f"<p>Every topic of the run, for ROS 2 tools and Foxglove: <code>{escape(run.bag.name)}</code>, beside this page.</p>",
     ]
-    title = f"CrunchBot demo, seed {s['seed']}"
-    return (
-        f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">'
-        f"<title>{title}</title><style>{STYLE}</style></head><body>\n" + "\n".join(parts) + "\n</body></html>\n"
-    )
+    return document(f"CrunchBot demo, seed {s['seed']}", parts)
 
 
 def _lead(s: dict) -> str:
@@ -87,7 +70,7 @@ def _lead(s: dict) -> str:
 def _cards(s: dict) -> str:
     cards = (
         (f"{s['pose_error_median_m'] * 1000:.0f} mm", "median position error, grid"),
-        (_percent(s["texture_accuracy"]), "texture windows right"),
+        (percent(s["texture_accuracy"]), "texture windows right"),
         (f"{s['frames_lost']}", f"frames lost of {s['frames_sent']:,}"),
         (
             "equal" if s["records_bad_match"] else "NOT EQUAL",
@@ -95,11 +78,7 @@ def _cards(s: dict) -> str:
         ),
         (f"{s['simulated_s'] / s['chain_wall_s']:.2f} x", "of real time, whole chain"),
     )
-    return (
-        '<div class="cards">'
-        + "".join(f'<div class="card"><b>{b}</b><span>{t}</span></div>' for b, t in cards)
-        + "</div>"
-    )
+    return card_row(cards)
 
 
 def _estimates_table(run: Run) -> str:
@@ -108,7 +87,7 @@ def _estimates_table(run: Run) -> str:
         position, heading = run.position_error(name), run.heading_error(name)
         values = (np.median(position), np.quantile(position, 0.9), np.median(heading))
         rows.append((figures.TITLES[name], *(f"{value:.3f}" for value in values)))
-    return _table("Errors over all steps", ("estimate", "median (m)", "90 % (m)", "heading, median (rad)"), rows)
+    return table("Errors over all steps", ("estimate", "median (m)", "90 % (m)", "heading, median (rad)"), rows)
 
 
 def _radial_table(run: Run) -> str:
@@ -123,14 +102,14 @@ def _radial_table(run: Run) -> str:
         )
         for name in run.object_names
     ]
-    return _table(
+    return table(
         "Standard deviation of the radial error, mm",
         ("whisker", "held out", "predicted from repeatability", "paper"),
         rows,
     )
 
 
-def _loss_table(s: dict) -> str:
+def loss_table(s: dict) -> str:
     rows = [
         ("frames made by the bridge", f"{s['frames_sent']:,}"),
         ("distinct frames seen by a separate reader", f"{s['frames_received']:,}"),
@@ -141,7 +120,7 @@ def _loss_table(s: dict) -> str:
         ("USB faults injected", f"{s['usb_faults_injected']:,}"),
         ("simulated seconds per wall second", f"{s['simulated_s'] / s['chain_wall_s']:.2f}"),
     ]
-    return _table("The chain from sensor to ring", ("quantity", "value"), rows)
+    return table("The chain from sensor to ring", ("quantity", "value"), rows)
 
 
 BASE_ROWS = (
@@ -158,7 +137,7 @@ BASE_ROWS = (
 )
 
 
-def _base_table(run: Run) -> str:
+def base_table(run: Run) -> str:
     """What whisker-base told of link and odometry when the run was over."""
     base = run.pilot["base"]
     rows = [(text, base[key]) for key, text in BASE_ROWS if key in base]
@@ -166,25 +145,11 @@ def _base_table(run: Run) -> str:
     name = (
         f"iRobot Create {model}, by its Open Interface over a serial line" if model else "Wheels without a serial line"
     )
-    return _table(name, ("quantity", "value"), rows)
+    return table(name, ("quantity", "value"), rows)
 
 
-def _network_table(run: Run) -> str:
+def network_table(run: Run) -> str:
     navigator = run.navigator
     rows = [("observation rows sent by the pilot", run.pilot["rows"])]
     rows += [(f"rows {key} by the navigator", navigator[key]) for key in ("weighed", "skipped", "missed", "refused")]
-    return _table("From netbook to desktop, over zenoh", ("quantity", "value"), rows)
-
-
-def _table(caption: str, header: tuple, rows: list[tuple]) -> str:
-    head = "".join(f"<th>{escape(cell)}</th>" for cell in header)
-    body = "".join("<tr>" + "".join(f"<td>{escape(str(cell))}</td>" for cell in row) + "</tr>" for row in rows)
-    return f"<table><caption>{escape(caption)}</caption><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
-
-
-def _figure(svg: str, caption: str) -> str:
-    return f"<figure>{svg}<figcaption>{escape(caption)}</figcaption></figure>"
-
-
-def _percent(share: float) -> str:
-    return f"{100 * share:.1f} %"
+    return table("From netbook to desktop, over zenoh", ("quantity", "value"), rows)
