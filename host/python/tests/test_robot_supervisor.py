@@ -1,5 +1,6 @@
 """The robot's supervisor: what ends is started again, later each time; all end together, and say so."""
 
+import os
 import threading
 
 import pytest
@@ -62,6 +63,20 @@ def test_who_ran_steadily_is_started_again_soon(tmp_path, monkeypatch):
     kept.start()
     kept.end()
     assert kept.keeper.wait_s() == pytest.approx(PAUSE_S) and STEADY_S > 0
+
+
+def test_what_a_killed_program_leaves_behind_may_finish(tmp_path):
+    """As the driver of the base, which stops the wheels when its guard is dead."""
+    go, done = tmp_path / "go", tmp_path / "done"
+    os.mkfifo(go)
+    kept = Kept(Program("guard", ("sh", "-c", f"cat {go} >{done} & kill -9 $$")), tmp_path)
+    kept.start()
+    kept.end()
+    assert kept.keeper.restarts == 0
+    go.write_text("stopped")
+    while kept.keeper.restarts == 0:
+        kept.keeper.step()
+    assert done.read_text() == "stopped"
 
 
 def test_health_tells_of_every_end_and_all_end_with_it(tmp_path):

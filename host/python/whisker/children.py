@@ -75,6 +75,17 @@ class Child:
     def failed(self) -> bool:
         return not self.running and self.process.returncode != 0
 
+    @property
+    def leaves(self) -> bool:
+        """It has ended, and processes that it started are still there."""
+        if self.running:
+            return False
+        try:
+            os.killpg(self.process.pid, 0)
+        except ProcessLookupError:
+            return False
+        return True
+
     def how(self) -> str:
         """How it ended: an exit code or a signal."""
         return _how(self.process.returncode)

@@ -16,6 +16,10 @@ from .link import Link
 from .messages import HEALTH, Header, KeyValue, ProcessHealth
 
 PAUSE_S, PAUSE_MOST_S = 0.2, 5.0
+LEAVE_S, LEAVE_LOOK_S = (
+    2.0,
+    0.05,
+)  # for what a program has left behind to end by itself: a driver stops the wheels first
 STEADY_S = 10.0
 TELL_S = 1.0
 
@@ -42,7 +46,7 @@ class Keeper:
     def step(self) -> None:
         """Start it if that is due; note it if it has ended."""
         now = self._clock()
-        if self._child and self._child.running:
+        if self._child and (self._child.running or self._leaves):
             return
         if self._child:
             self._note_end(now)
@@ -51,7 +55,15 @@ class Keeper:
 
     def wait_s(self) -> float:
         """Until `step` has something to do, as far as that is known."""
-        return TELL_S if self.pid else max(0.0, self._due_s - self._clock())
+        if self.pid:
+            return TELL_S
+        return LEAVE_LOOK_S if self._leaves else max(0.0, self._due_s - self._clock())
+
+    @property
+    def _leaves(self) -> bool:
+        """It has ended, and what it started has a little time left to do so too."""
+        child = self._child
+        return child is not None and child.leaves and self._clock() - child.ended_s < LEAVE_S
 
     def _note_end(self, now: float) -> None:
         child, self._child = self._child, None
