@@ -3,7 +3,9 @@
 
     tools/bench_nav.py                  everything: bench/results/nav_*.json, docs/charts/nav_*.svg, docs/results_nav.md
     tools/bench_nav.py --quick          few seeds, into build/bench/nav-quick: does it run?
-    tools/bench_nav.py --only matrix    one part: pareto, cost, tracking, locks, budgets, balance, variation, matrix, soak
+    tools/bench_nav.py --only matrix    one part: pareto, cost, tracking, locks, budgets, balance, variation, matrix, soak,
+                                        passes
+    tools/bench_nav.py --page           measures nothing: writes the page of what has been measured
 
 Every job leaves a file in build/bench/nav/jobs: a stopped run goes on where it was; `--fresh` begins again. Figures but
 those of time are the same for any number of workers. Seeds are none that filters were developed on.
@@ -13,6 +15,7 @@ import argparse
 import hashlib
 import json
 import shutil
+import subprocess
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,11 +24,13 @@ import matplotlib
 import nav_charts
 import nav_figures
 import nav_jobs
+import nav_page
 
 from whisker import localise, trials
 from whisker.sweep import BACKENDS, sweep
 
 ROOT = Path(__file__).resolve().parent.parent
+BUILD = ROOT / "build/release"
 FIRST_SEED = 5000
 CHUNK = 10  # seeds per job
 
@@ -106,10 +111,10 @@ QUICK = Scale(4, 0.04, 2, 2, 1000, 2, 500, 1, 20_000)
 class Bench:
     """Jobs, results and charts of one scale."""
 
-    def __init__(self, scale: Scale, cache: Path, results: Path, charts: Path, document: Path, workers, backend: str):
+    def __init__(self, scale: Scale, cache: Path, results: Path, charts: Path, document: Path, workers, backend, build):
         self.scale, self.jobs = scale, cache / "jobs"
         self.results, self.charts, self.document = results, charts, document
-        self.workers, self.backend = workers, backend
+        self.workers, self.backend, self.build = workers, backend, build
         self.filters = localise.filter_names()
 
     def sweep(self, work, jobs: dict[str, dict], label: str) -> dict[str, dict]:
@@ -282,7 +287,16 @@ def soak(bench: Bench) -> None:
     bench.save("soak", {arguments["filter"]: done[job] for job, arguments in jobs.items()})
 
 
-PARTS = {f.__name__: f for f in (pareto, cost, tracking, locks, budgets, balance, variation, matrix, soak)}
+def passes(bench: Bench) -> None:
+    """What the grid's full step costs per pose, beside plain passes over as many floats: nav_bench."""
+    name = "host/nav/nav_bench"
+    if not (bench.build / name).exists():
+        raise SystemExit(f"bench_nav: {bench.build}: no {name}; run 'make build' or give --build-dir")
+    done = subprocess.run([bench.build / name], capture_output=True, text=True, check=True)
+    bench.save("passes", [json.loads(line) for line in done.stdout.splitlines()])
+
+
+PARTS = {f.__name__: f for f in (pareto, cost, tracking, locks, budgets, balance, variation, matrix, soak, passes)}
 
 
 def measure(bench: Bench, parts: list[str]) -> None:
@@ -292,26 +306,26 @@ def measure(bench: Bench, parts: list[str]) -> None:
         PARTS[part](bench)
     done = {part: bench.results / f"nav_{part}.json" for part in PARTS}
     data = {part: json.loads(path.read_text()) for part, path in done.items() if path.exists()}
-    bench.document.write_text(nav_figures.document(data))
+    bench.document.write_text(nav_page.document(data))
 
 
-def full(workers=None, backend: str = "processes") -> Bench:
+def full(workers=None, backend: str = "processes", build: Path = BUILD) -> Bench:
     cache = ROOT / "build/bench/nav"
-    return Bench(
-        FULL, cache, ROOT / "bench/results", ROOT / "docs/charts", ROOT / "docs/results_nav.md", workers, backend
-    )
+    places = (cache, ROOT / "bench/results", ROOT / "docs/charts", ROOT / "docs/results_nav.md")
+    return Bench(FULL, *places, workers, backend, build)
 
 
-def quick(workers=None, backend: str = "processes") -> Bench:
+def quick(workers=None, backend: str = "processes", build: Path = BUILD) -> Bench:
     cache = ROOT / "build/bench/nav-quick"
-    return Bench(QUICK, cache, cache, cache, cache / "results_nav.md", workers, backend)
+    return Bench(QUICK, cache, cache, cache, cache / "results_nav.md", workers, backend, build)
 
 
 def run(build: Path, fresh: bool) -> None:
-    """What `make bench` calls; the filters are those of the Python module, so `build` is not needed."""
+    """What `make bench` calls; the filters are those of the Python module, `build` holds nav_bench."""
+    bench = full(build=build)
     if fresh:
-        shutil.rmtree(full().jobs, ignore_errors=True)
-    measure(full(), list(PARTS))
+        shutil.rmtree(bench.jobs, ignore_errors=True)
+    measure(bench, list(PARTS))
 
 
 def main() -> int:
@@ -321,11 +335,13 @@ def main() -> int:
     parser.add_argument("--fresh", action="store_true", help="forget what an earlier run has measured")
     parser.add_argument("--workers", type=int, help="processes (default: all cores)")
     parser.add_argument("--backend", choices=BACKENDS, default="processes")
+    parser.add_argument("--build-dir", type=Path, default=BUILD, help="where nav_bench is (default: build/release)")
+    parser.add_argument("--page", action="store_true", help="measure nothing: write the page of what has been measured")
     options = parser.parse_args()
-    bench = (quick if options.quick else full)(options.workers, options.backend)
+    bench = (quick if options.quick else full)(options.workers, options.backend, options.build_dir.resolve())
     if options.fresh:
         shutil.rmtree(bench.jobs, ignore_errors=True)
-    measure(bench, options.only)
+    measure(bench, [] if options.page else options.only)
     print(bench.document)
     return 0
 
