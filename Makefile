@@ -4,7 +4,7 @@ BUILD := build/release
 PYTHON := .venv/bin/python
 SOURCES_C = $(shell git ls-files '*.c' '*.h' '*.cpp' | grep -v '/gen/')
 
-.PHONY: help demo test test-all test-kernel bench build setup gen firmware flash bitstream format lint clean
+.PHONY: help demo test test-all test-kernel test-hil bench build setup gen firmware flash bitstream format lint clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
@@ -20,6 +20,10 @@ test-all: test ## and what is long: sanitizers over the whole tree, longer fuzzi
 
 test-kernel: build ## a stock Debian kernel in QEMU meets the simulated bridge, over usbredir and USB/IP: two minutes and more
 	@WHISKER_BUILD=$(BUILD) $(PYTHON) tests/kernel/run.py
+
+test-hil: build ## hardware in the loop: a plugged bridge, a base: BASE=port [MODEL=2] [WHEELS_UP=1] [INTERACTIVE=1]
+	@WHISKER_BUILD=$(BUILD) $(PYTHON) tests/hil/run.py $(if $(BASE),--base "$(BASE)") $(if $(MODEL),--model "$(MODEL)") \
+		$(if $(WHEELS_UP),--wheels-up) $(if $(INTERACTIVE),--interactive)
 
 bench: build ## measure speed and accuracy again, as ratios in one run: bench/results, docs/charts
 	@$(PYTHON) tools/run_benches.py --build-dir $(BUILD)

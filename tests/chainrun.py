@@ -54,6 +54,25 @@ def running(command: list[str], **options):
         process.stderr.close()
 
 
+class Cable:
+    """Pulls and puts back the cable of a simulated bridge."""
+
+    def __init__(self, path: Path, simulated: subprocess.Popen):
+        self._link = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        while self._link.connect_ex(str(path)) != 0:
+            assert simulated.poll() is None, simulated.stderr.read()
+            os.sched_yield()
+
+    def pull(self) -> None:
+        self._link.send(b"unplug")
+
+    def put(self) -> None:
+        self._link.send(b"plug")
+
+    def close(self) -> None:
+        self._link.close()
+
+
 class Driver:
     """The pilot's side of the socket, driving by a script: block number -> (m/s, rad/s)."""
 

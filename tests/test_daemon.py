@@ -2,7 +2,6 @@
 
 import os
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -11,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from chainrun import END_S, FAST_LINK, program, running, simulation, write_flat_scene
+from chainrun import END_S, FAST_LINK, Cable, program, running, simulation, write_flat_scene
 
 from whisker.protocol import LIMITS, WIRE_VERSION
 from whisker.ring import Reader, RingError
@@ -23,25 +22,6 @@ LAST, GAP = 1, 256  # WHISKER_FRAME_LAST, WHISKER_FRAME_GAP
 @pytest.fixture
 def ring() -> str:
     return f"whisker-daemon-{os.getpid()}"
-
-
-class Cable:
-    """Pulls and puts back the cable of a simulated bridge."""
-
-    def __init__(self, path: Path, simulated: subprocess.Popen):
-        self._link = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        while self._link.connect_ex(str(path)) != 0:
-            assert simulated.poll() is None, simulated.stderr.read()
-            os.sched_yield()
-
-    def pull(self) -> None:
-        self._link.send(b"unplug")
-
-    def put(self) -> None:
-        self._link.send(b"plug")
-
-    def close(self) -> None:
-        self._link.close()
 
 
 def until(condition, process: subprocess.Popen) -> None:

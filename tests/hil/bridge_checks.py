@@ -1,0 +1,311 @@
+"""Checks of a bridge that is plugged in, in the order in which they are made; whatever stands behind it, also a simulation."""
+
+import os
+import re
+import subprocess
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from checks import CheckError, SkipError, require, skip, until
+from usbdevice import differing_descriptors, opened
+
+from whisker import usbtree
+from whisker.bridgesim import program
+from whisker.calibration import TICKS_PER_S, measure_rest
+from whisker.native import lib
+from whisker.protocol import CODES, FRAME_BYTES, LANES, LIMITS, STATUS_CODE_SHIFT, WIRE_VERSION
+from whisker.ring import Clock, DaemonStats, Reader, RingError
+from whisker.status import explain
+
+START_S = 60.0  # for whiskerd to open its bridge; a simulation may be slow
+SILENCE_S = 30.0  # without a frame
+REPLUG_FRAMES = 8192  # 4 s: from the return to the look at it
+PERSON_S = 300.0  # to reach for a plug
+SETTLE_TICKS = 200  # 0.1 s: nodes that had no SYNC before begin with records that say so
+BAD_SHARE = 1e-3  # of a lane's records: a sample lost now and then disturbs nothing, this is a bad cable
+SWEEP_FRAMES = 400  # at each sample point
+SWEEP_MARGIN = 1  # cycles of 60 MHz that must be good on either side of the one in use
+CLOCK_NS = 100_000.0  # wanted accuracy of the mapping (docs/boards.md)
+CLOCK_PPM = 200.0  # two crystals of 100 ppm
+RUNS = "the application runs"
+NO_NODES = "nodes: none answers on any lane"
+NODE = re.compile(r"^ *(\d+) +(\d+|none) +(\d+\.\d+) +0x[0-9a-f]{4} +(\d+) +0x([0-9a-f]{4}) +\d+ +(.+)$")
+
+
+@dataclass
+class Stream:
+    """What whiskerd delivered in one run: frames, what it said of itself, its clock half way and at the end."""
+
+    frames: np.ndarray
+    stats: DaemonStats
+    half: Clock | None
+    clock: Clock | None
+
+
+@dataclass
+class Rig:
+    """The bridge under test and how it is to be tested."""
+
+    seconds: float  # of frames
+    interactive: bool  # a person is there to pull the plug
+    simulated: bool  # time is not the wall clock's: told, not judged
+    root: Path  # of the file system; another only in tests
+    unusable: str = ""  # why nothing more can be made with it
+    _stream: Stream | CheckError | None = field(default=None, repr=False)
+
+    @property
+    def bridge(self) -> usbtree.Bridge:
+        """The bridge. SkipError: none is plugged in, or it cannot be used."""
+        found = usbtree.bridges(self.root)
+        if not found:
+            raise SkipError("bridge: not plugged in")
+        return found[0] if not self.unusable else skip(self.unusable)
+
+    def require(self) -> None:
+        """SkipError as from `bridge`."""
+        _ = self.bridge
+
+    @property
+    def stream(self) -> Stream:
+        """One run for all checks that look at frames."""
+        if self._stream is None:
+            try:
+                self._stream = take_stream(self)
+            except CheckError as error:
+                self._stream = error
+        if isinstance(self._stream, CheckError):
+            raise self._stream
+        return self._stream
+
+    @property
+    def populated(self) -> list[int]:
+        """Lanes on which a node answers. SkipError: there is none."""
+        codes = self.stream.frames["lane"]["status"][SETTLE_TICKS:] >> STATUS_CODE_SHIFT
+        nobody = (codes == CODES["absent"]) | (codes == CODES["lane_off"])
+        return [lane for lane in range(LANES) if not nobody[:, lane].all()] or skip(NO_NODES)
+
+
+@contextmanager
+def daemon(rig: Rig, frames: int):
+    """whiskerd on a ring of its own with room for so many frames, and a reader of it."""
+    ring, capacity = f"whisker-hil-{os.getpid()}", 1 << max(frames - 1, 63).bit_length()
+    words = [program("whiskerd"), "--ring", ring, "--ring-frames", capacity]
+    with subprocess.Popen([str(word) for word in words], stderr=subprocess.PIPE, text=True) as process:
+        try:
+            with Reader(ring, wait_s=START_S) as reader:
+                yield reader
+        except RingError as error:
+            process.terminate()
+            raise CheckError(f"{error} {' / '.join(process.stderr.read().split(chr(10))[-3:])}".strip()) from error
+        finally:
+            process.terminate()
+            process.communicate()
+    require(process.returncode == 0, f"whiskerd ended with exit code {process.returncode}")
+
+
+def await_frames(reader: Reader, count: int) -> None:
+    """Until so many frames have been published in the ring."""
+    text = f"no frame for {SILENCE_S:g} s; see whisker doctor"
+    until(lambda: reader.info.published >= count, SILENCE_S, lambda: reader.info.published, text)
+
+
+def take_stream(rig: Rig) -> Stream:
+    count = SETTLE_TICKS + round(rig.seconds * TICKS_PER_S)
+    with daemon(rig, 2 * count) as reader:
+        await_frames(reader, count // 2)
+        half = reader.clock
+        await_frames(reader, count)
+        stats, clock = reader.stats, reader.clock
+        return Stream(reader.peek()[:count].copy(), stats, half, clock)
+
+
+# ------------------------------------------------------------------------------------------------------------- checks
+
+
+def enumerates(rig: Rig) -> str:
+    """The kernel has it at high speed, it can be opened, and every descriptor is the gateware's."""
+    bridge = rig.bridge
+    speed = f"{bridge.speed:g} Mbit/s"
+    require(bridge.speed >= usbtree.HIGH_SPEED_MBIT, f"runs at {speed}, not 480; use a USB 2.0 cable and port, no hub")
+    try:
+        with opened(bridge) as device:
+            wrong, product = differing_descriptors(device), device.product
+    except CheckError:
+        rig.unusable = "bridge: cannot be opened"
+        raise
+    require(not wrong, f"descriptors differ: {', '.join(wrong)}; install gateware and host of one release")
+    return f"{product} at {speed}, descriptors as made"
+
+
+def identity(rig: Rig) -> str:
+    """It says the same lanes, clock, sizes and versions as this host's protocol."""
+    bridge = rig.bridge
+    with opened(bridge) as device:
+        told, serial = device.report("identity"), device.serial
+    wanted = {"wire_version": WIRE_VERSION, "lanes": LANES, "gateware": LIMITS["gateware_version"]}
+    wanted |= {"clock_hz": LIMITS["clock_hz"], "frame_bytes": FRAME_BYTES, "fifo_bytes": LIMITS["fifo_bytes"]}
+    wrong = [f"{key} {told[key]}, not {value}" for key, value in wanted.items() if told[key] != value]
+    require(not wrong, f"{', '.join(wrong)}; install gateware and host of one release")
+    return f"serial number {serial}, gateware {told['gateware']}, wire version {told['wire_version']}"
+
+
+def hid_control(rig: Rig) -> str:
+    """What is set is read back; what is out of range or of another version is refused and changes nothing."""
+    set_to = {"lane_mask": 0x5, "tick_period": LIMITS["tick_period_min"], "sample_point": 1}
+    refused = {"wire_version": WIRE_VERSION + 1, "sck_divider": LIMITS["sck_divider_max"] + 2, "sample_point": 0}
+    with opened(rig.bridge) as device:
+        device.drain()
+        device.control(False, **set_to)
+        for key, value in refused.items():
+            require(device.refuses(**{key: value}), f"takes {key} {value}, which it must refuse")
+            told = device.report("control")
+            wrong = [name for name, given in set_to.items() if told[name] != given]
+            require(not wrong, f"{', '.join(wrong)} not as set, after a refused {key}")
+        counters = device.run(SWEEP_FRAMES)
+    told = f"{counters['ticks']} ticks, {counters['frames']} frames, {counters['dropped']} dropped"
+    require(counters["ticks"] - 1 == counters["frames"] >= SWEEP_FRAMES and counters["dropped"] == 0, told)
+    require(counters["running"] == 0, "it does not stop")
+    return f"{len(set_to)} settings read back, {len(refused)} refused, started and stopped"
+
+
+def sample_points(rig: Rig) -> str:
+    """Records come back whole from every node at the sample point in use, and at those beside it."""
+    divider, used = LIMITS["sck_divider_default"], LIMITS["sample_point_default"]
+    with opened(rig.bridge) as device:
+        whole = [whole_records(device, point) for point in range(1, divider + 1)]
+    nodes = round(max(whole))
+    if nodes == 0:
+        raise SkipError(NO_NODES)
+    good = [point for point, count in enumerate(whole, start=1) if count >= (1 - BAD_SHARE) * nodes]
+    remedy = "shorten the nodes' cables, raise sck_divider, or set another sample_point (docs/hardware.md)"
+    text = f"{nodes} nodes; good are {', '.join(map(str, good))} of {divider}, {used} is in use"
+    wanted = range(used - SWEEP_MARGIN, used + SWEEP_MARGIN + 1)
+    require(set(wanted) <= set(good), f"{text}; {remedy}")
+    return text
+
+
+def whole_records(device, point: int) -> float:
+    """Records per frame that came whole and in time at this sample point."""
+    before = device.report("counters")["records_good"]
+    after = device.run(SWEEP_FRAMES, sample_point=point)
+    return (after["records_good"] - before) / after["frames"]
+
+
+def node_health(rig: Rig) -> str:
+    """Every lane that answers says who it is; all run one version; what they counted."""
+    rig.require()
+    populated = rig.populated
+    done = subprocess.run([program("whisker-flash"), "--list", "--health"], capture_output=True, text=True)
+    require(done.returncode == 0, done.stderr.strip())
+    nodes = {int(row[1]): row for row in map(NODE.match, done.stdout.splitlines()) if row}
+    require(sorted(nodes) == populated, f"lanes {sorted(nodes)} answer, {populated} send samples; whisker flash")
+    versions, wires, states = ({row[n] for row in nodes.values()} for n in (3, 4, 6))
+    require(states == {RUNS}, f"{'; '.join(states - {RUNS})}: whisker flash")
+    require(len(versions) == 1 and wires == {str(WIRE_VERSION)}, f"versions {versions}, wire {wires}; whisker flash")
+    return f"{len(nodes)} nodes, version {versions.pop()}, wire version {wires.pop()}"
+
+
+def frames(rig: Rig) -> str:
+    """Every frame from first to last in its place, by the frames' own numbers and by all counters."""
+    rig.require()
+    run = rig.stream
+    gaps = int((np.diff(run.frames["sequence"]) != 1).sum() + (np.diff(run.frames["tick"].astype(np.int64)) != 1).sum())
+    require(gaps == 0, f"{gaps} gaps in the frames' numbers; free the host's processor, avoid hubs")
+    marked = gap_marks(run.frames["flags"])
+    require(len(marked) == 0, f"{len(marked)} frames are marked as the first after a gap; a loose plug?")
+    counts = ("frames_dropped", "frames_missing", "frames_damaged", "bytes_skipped", "records_usb", "usb_errors")
+    wrong = [f"{key} {value}" for key in counts if (value := getattr(run.stats, key))]
+    require(not wrong, f"{', '.join(wrong)}; check the USB cable; see whisker doctor")
+    return f"{len(run.frames)} frames, none lost, dropped or damaged"
+
+
+def gap_marks(flags: np.ndarray) -> np.ndarray:
+    """Indices of the frames that whiskerd marks as the first after a gap."""
+    return np.flatnonzero(flags & lib.WHISKER_FRAME_GAP)
+
+
+def lanes(rig: Rig) -> str:
+    """On every lane that answers the samples are good."""
+    rig.require()
+    status = rig.stream.frames["lane"]["status"][SETTLE_TICKS:, rig.populated]
+    shares = (status != 0).mean(axis=0)
+    wrong = [f"lane {lane}: {_trouble(status[:, n], shares[n])}" for n, lane in enumerate(rig.populated)]
+    bad = [text for text, share in zip(wrong, shares, strict=True) if share > BAD_SHARE]
+    require(not bad, "; ".join(bad))
+    told = ", ".join(map(str, rig.populated))
+    return f"lanes {told} answer, at most {100 * shares.max():.2g} % bad samples on one"
+
+
+def _trouble(status: np.ndarray, share: float) -> str:
+    values, counts = np.unique(status[status != 0], return_counts=True)
+    cause, remedy = explain(int(values[counts.argmax()])) if len(values) else ("", "")
+    return f"{100 * share:.3g} % bad samples: {cause}; {remedy}"
+
+
+def rest_noise(rig: Rig) -> str:
+    """Whiskers that nobody touches are still: noise below what counts as a touch."""
+    rig.require()
+    found = [rest for rest in measure_rest(rig.stream.frames[SETTLE_TICKS:]) if rest.lane in rig.populated]
+    wrong = [f"lane {rest.lane}: {rest.trouble}" for rest in found if rest.trouble]
+    require(not wrong, "; ".join(wrong))
+    noise = [rest.noise.max() for rest in found]
+    return f"{min(noise):.0f} to {max(noise):.0f} counts (standard deviation), {len(found)} lanes"
+
+
+def clock(rig: Rig) -> str:
+    """Bridge time is mapped to the host's: how far two mappings, half a run apart, differ at the end."""
+    rig.require()
+    run = rig.stream
+    require(run.half is not None and run.clock is not None, "whiskerd tells no clock")
+    text, wrong = judge_clock(run.half, run.clock)
+    if rig.simulated:
+        return f"{text} (simulated time: told, not judged)"
+    require(not wrong, f"{text}: {wrong}; free the host's processor, stop time services that jump")
+    return text
+
+
+def judge_clock(half: Clock, end: Clock) -> tuple[str, str]:
+    """(the figures, what is wrong with them)."""
+    residual_ns = abs(int(half.monotonic(end.device_cycles)) - end.monotonic_ns)
+    ppm = (end.ns_per_cycle * LIMITS["clock_hz"] / 1e9 - 1) * 1e6
+    text = f"residual {residual_ns / 1e3:.0f} us, rate {ppm:+.0f} ppm, uncertainty {end.uncertainty_ns / 1e3:.0f} us"
+    wrong = [f"more than {CLOCK_NS / 1e3:g} us"] if max(residual_ns, end.uncertainty_ns) > CLOCK_NS else []
+    wrong += [f"more than {CLOCK_PPM:g} ppm"] if abs(ppm) > CLOCK_PPM else []
+    return text, ", ".join(wrong)
+
+
+def replug(rig: Rig) -> str:
+    """The cable pulled and put back, by the person at the machine: the ring lives on, the gap is marked."""
+    rig.require()
+    if not rig.interactive:
+        raise SkipError("nobody is there to pull the plug: give --interactive")
+    with daemon(rig, REPLUG_FRAMES) as reader:
+        await_frames(reader, SETTLE_TICKS)
+        print("   unplug the bridge now", flush=True)
+        await_person(lambda: not reader.stats.connected, "the bridge was not unplugged")
+        before = reader.info.published
+        print("   plug it in again", flush=True)
+        await_person(lambda: bool(reader.stats.connected), "the bridge did not come back")
+        await_frames(reader, before + SETTLE_TICKS)
+        reader.seek_latest(reader.info.published - before)
+        stats, flags = reader.stats, reader.peek()["flags"]
+        marked = gap_marks(flags).tolist()
+    require(stats.reconnects == 1, f"it came back {stats.reconnects} times; a loose plug?")
+    require(marked == [0], f"frames {marked} after the gap are marked as its first")
+    return "ring and readers lived on, the gap is marked"
+
+
+def await_person(condition, text: str) -> None:
+    """Until the person has done what was asked."""
+    until(condition, PERSON_S, lambda: None, f"{text} in {PERSON_S:g} s")
+
+
+CHECKS = (enumerates, identity, hid_control, sample_points, node_health, frames, lanes, rest_noise, clock, replug)
+
+
+def named(rig: Rig) -> dict:
+    """The checks by name, ready to be run."""
+    return {f"bridge.{check.__name__}": partial(check, rig) for check in CHECKS}
