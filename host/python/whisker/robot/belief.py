@@ -32,7 +32,9 @@ def _cells(poses: np.ndarray, scale: float) -> np.ndarray:
     size = np.array([FINEST[0], FINEST[0], FINEST[1]]) * scale
     keys = np.floor(poses / size).astype(np.int64)
     keys[:, 2] %= max(1, round(2.0 * np.pi / size[2]))
-    return np.unique(keys, axis=0, return_inverse=True)[1].ravel()
+    keys -= keys.min(axis=0)
+    _, rows, turns = keys.max(axis=0) + 1
+    return np.unique((keys[:, 0] * rows + keys[:, 1]) * turns + keys[:, 2], return_inverse=True)[1]
 
 
 def _merged(bumps: np.ndarray, cells: np.ndarray) -> np.ndarray:

@@ -22,6 +22,7 @@ from .rows import Follower, Step, time_text
 from .track import Track
 
 BELIEF_NS = 500_000_000  # 2 Hz of the bridge's clock
+BELIEF_SHARE = 0.1  # of the navigator's time, at most, goes into telling it
 LOOK_S = 0.5  # between two words of health while nothing comes
 SCENE_PRIOR, UNIFORM = "scene", "uniform"
 WAITING = "waiting for rows"
@@ -59,7 +60,7 @@ class Navigator:
         self._poses, self._answers, self._beliefs = map(link.publish, ("pose", "localisation", "belief"))
         self._health = Health(link, self.counters)
         self._now_ns = self._belief_due_ns = 0
-        self._step_s = 0.0
+        self._step_s = self._belief_rest_s = 0.0
 
     def counters(self) -> dict[str, object]:
         """What has been counted so far; rows unless said otherwise."""
@@ -99,13 +100,22 @@ class Navigator:
         header = Header.at(self._now_ns, ARENA_FRAME)
         for track in self._tracks:
             self._answer(track, step, header, track.take(time_text(cells), cells))
-        if self._now_ns >= self._belief_due_ns or self._belief_due_ns > self._now_ns + BELIEF_NS:
-            self._belief_due_ns = self._now_ns + BELIEF_NS
-            for track in self._tracks:
-                bumps = track.filter.components()
-                self._beliefs.send(belief.to_message(header, track.name, step.row.seq, bumps))
+        if self._belief_is_due():
+            self._tell_beliefs(header, step.row.seq)
         self._step_s = time.monotonic() - began
         time.sleep(max(0.0, self._settings.drill_step_s - self._step_s))
+
+    def _belief_is_due(self) -> bool:
+        """At the belief's pace; live, rows go first: when telling it is much work it is told less often."""
+        due = self._now_ns >= self._belief_due_ns or self._belief_due_ns > self._now_ns + BELIEF_NS
+        return due and (self._link.lock_step or time.monotonic() >= self._belief_rest_s)
+
+    def _tell_beliefs(self, header: Header, seq: int) -> None:
+        began, self._belief_due_ns = time.monotonic(), self._now_ns + BELIEF_NS
+        for track in self._tracks:
+            self._beliefs.send(belief.to_message(header, track.name, seq, track.filter.components()))
+        now = time.monotonic()
+        self._belief_rest_s = now + (now - began) / BELIEF_SHARE
 
     def _begin(self, stack: ExitStack) -> None:
         """The prior is of the run's start: whoever joins later cannot use it."""
