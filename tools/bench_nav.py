@@ -274,7 +274,8 @@ def matrix(bench: Bench) -> None:
         for name in bench.filters
     }
     data = nav_figures.matrix(bench.trials(wanted, "matrix"), bench.filters)
-    bench.save("matrix", data, ("matrix", nav_charts.matrix(data)), ("confidence", nav_charts.confidence(data)))
+    charts = {"matrix": nav_charts.matrix, "regions": nav_charts.regions, "confidence": nav_charts.confidence}
+    bench.save("matrix", data, *((name, draw(data)) for name, draw in charts.items()))
 
 
 def soak(bench: Bench) -> None:

@@ -164,6 +164,31 @@ def matrix(data: dict) -> Figure:
     return figure
 
 
+def regions(data: dict) -> Figure:
+    """How often the 90 % region holds the truth, and how large it is, row by row of the matrix and filter by filter."""
+    titles, names = list(data["rows"]), data["filters"]
+    figure = Figure(figsize=(10.0, 1.4 + 0.24 * len(titles)), layout="constrained")
+    left, right = figure.subplots(1, 2, sharey=True)
+    places = np.arange(len(titles))
+    for n, name in enumerate(names):
+        cells = [data["rows"][title][name] for title in titles]
+        shift = places + (n - (len(names) - 1) / 2) * 0.08
+        covered = [np.nan if c["coverage_90"] is None else 100 * c["coverage_90"] for c in cells]
+        areas = [np.nan if c["region_90_m2"] is None else 1e4 * c["region_90_m2"] for c in cells]
+        left.plot(covered, shift, linestyle="none", label=name, markersize=4, **style(name))
+        right.plot(areas, shift, linestyle="none", markersize=4, **style(name))
+    left.axvspan(85, 95, color="0.9", zorder=0)
+    left.axvline(80, color="0.3", linewidth=0.8)
+    left.set(xlabel="90 % region holds the truth (%)", xlim=(0, 103))
+    right.set(xlabel="area of the 90 % region (cm2), median", xscale="log")
+    left.set_yticks(places, titles, fontsize=7)
+    left.invert_yaxis()
+    for ax in (left, right):
+        ax.grid(True, linewidth=0.3)
+    legend_above(figure, [left])
+    return figure
+
+
 def confidence(data: dict) -> Figure:
     """Share near the truth by what the filter gave as its confidence."""
     figure = Figure(figsize=(5.2, 4.4), layout="constrained")

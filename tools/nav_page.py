@@ -62,6 +62,13 @@ def _matrix(data: dict) -> str:
             "The first number of each cell above; the darker, the more runs were lost. What a filter cannot bear is dark in "
             "its column; a row that is dark all along asks for what no filter here can do.",
         )
+        + picture(
+            "regions",
+            "coverage and size of the 90 % regions, row by row",
+            "The third number of each cell above, and what it costs. Left: the grey band is what was wanted where the model "
+            "is the world, the line what was wanted where there is a fault; a point left of it is a filter that is surer "
+            "than it should be. Right: a region may be honest by being large.",
+        )
         + _foretold(data)
     )
 
@@ -116,7 +123,7 @@ def _foretold(data: dict) -> str:
             "confidence",
             "confidence and the share near the truth",
             "On the grey diagonal a confidence is what it says. Below it a filter is surer than it should be, above it "
-            "less sure.",
+            "less sure. Few rows lie between the ends, so points in the middle jump.",
         )
     )
 
