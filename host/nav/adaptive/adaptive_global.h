@@ -95,33 +95,11 @@ bool adaptive_global_current(const struct adaptive_global *, const struct adapti
 void adaptive_global_draw(struct adaptive_global *, struct adaptive_cloud *, long count, double weight,
                           struct nav_pose moved);
 
-/* Mass near a pose, as of row `next` - 1. */
-double adaptive_global_near(const struct adaptive_global *, struct nav_pose, struct nav_pose *mean);
-
-/* Works out summary, scattered and crowd; at the end of a job. */
-void adaptive_global_summarise(struct adaptive_global *);
-
 /* Lists cells as nav_filter_components does, at the end of the log and then moved by `moved`, masses times `mass`.
  * Where a job is under way, slices that it has done are read after its rows and the others before them; headings keep
  * the shares that they had. */
 long adaptive_global_list(const struct adaptive_global *, const struct adaptive_log *, struct nav_pose moved,
                           double mass, struct nav_component *out, long room);
-
-/* Centre of stored cell n. */
-struct nav_pose adaptive_global_centre(const struct adaptive_global *, size_t n);
-
-/* Parts of a job (adaptive_global_job.c): its beginning, and its phases for one slice each. A part that would touch
- * more than `most` cells is not done; returns the number touched, or -1. */
-void adaptive_global_job_init(struct adaptive_global *);
-long adaptive_global_turn(struct adaptive_global *, int slice, long most);
-long adaptive_global_move(struct adaptive_global *, int slice, long most);
-long adaptive_global_count(struct adaptive_global *, int slice, long most);
-
-/* Makes the blurred headings the belief. */
-void adaptive_global_turned(struct adaptive_global *);
-
-/* Slice p as it is now, for sums. */
-struct nav_slice adaptive_global_slice(const struct adaptive_global *, int p);
 
 /* First cell of a line. */
 static inline float *adaptive_global_line(const struct adaptive_global *g, float *mass, int p, int j)

@@ -1,60 +1,62 @@
-/* What the arena-wide belief amounts to, and hypotheses drawn from it. */
+/* What the arena-wide belief amounts to: its summary, the cells worth a hypothesis, and hypotheses drawn from it. */
 #include <math.h>
 #include <string.h>
 
-#include "adaptive_global.h"
+#include "adaptive_global_parts.h"
 
-static double heading_of(const struct adaptive_global *g, int p)
+struct nav_slices adaptive_global_slices(const struct adaptive_global *g)
 {
-    return (p + 0.5) * g->cell_theta + g->rotation;
-}
-
-struct nav_pose adaptive_global_centre(const struct adaptive_global *g, size_t n)
-{
-    size_t pitch = (size_t)g->pitch, ny = (size_t)g->ny;
-    int p = (int)(n / pitch / ny), j = (int)(n / pitch % ny), i = (int)(n % pitch);
-    return (struct nav_pose){(i + 0.5) * g->cell + g->shift_x[p], (j + 0.5) * g->cell + g->shift_y[p],
-                             nav_wrap(heading_of(g, p))};
-}
-
-struct nav_slice adaptive_global_slice(const struct adaptive_global *g, int p)
-{
-    return (struct nav_slice){.mass = adaptive_global_line(g, g->mass, p, 0),
-                              .nx = g->nx,
-                              .ny = g->ny,
-                              .pitch = g->pitch,
-                              .cell = g->cell,
-                              .x = 0.5 * g->cell + g->shift_x[p],
-                              .y = 0.5 * g->cell + g->shift_y[p],
-                              .heading = heading_of(g, p)};
-}
-
-double adaptive_global_near(const struct adaptive_global *g, struct nav_pose pose, struct nav_pose *mean)
-{
-    struct nav_near sums = {.mass = 0.0};
-    if (g->fresh)
-        return g->summary.near;
-    for (int p = 0; p < g->nh; p++) {
-        const struct nav_slice slice = adaptive_global_slice(g, p);
-        nav_slice_near(&slice, pose, &sums);
-    }
-    if (mean && sums.mass > 0.0)
-        *mean = nav_near_mean(&sums, pose);
-    return fmin(sums.mass / g->total, 1.0);
+    return (struct nav_slices){.mass = g->mass,
+                               .nx = g->nx,
+                               .ny = g->ny,
+                               .nh = g->nh,
+                               .pitch = g->pitch,
+                               .cell = g->cell,
+                               .cell_theta = g->cell_theta,
+                               .rotation = g->rotation,
+                               .shift_x = g->shift_x,
+                               .shift_y = g->shift_y,
+                               .moment = g->moment,
+                               .moment_x = g->job.about.x,
+                               .moment_y = g->job.about.y,
+                               .total = g->total};
 }
 
 void adaptive_global_summarise(struct adaptive_global *g)
 {
-    struct adaptive_summary *s = &g->summary;
-    double sums[6] = {0.0};
-    *s = (struct adaptive_summary){.near = 0.0};
-    s->belief.mean = adaptive_global_centre(g, g->mode);
-    adaptive_global_near(g, s->belief.mean, &s->belief.mean);
-    s->near = adaptive_global_near(g, s->belief.mean, NULL);
-    for (int p = 0; p < g->nh; p++)
-        nav_slice_add(g->moment[p], s->belief.mean.x - g->job.about.x, s->belief.mean.y - g->job.about.y,
-                      nav_wrap(heading_of(g, p) - s->belief.mean.theta), sums);
-    nav_slice_covariance(sums, g->total, g->cell, g->cell_theta, s->belief.covariance);
+    const struct nav_slices slices = adaptive_global_slices(g);
+    g->summary = (struct adaptive_summary){.near = 0.0};
+    double near = nav_slices_summarise(&slices, nav_slices_centre(&slices, g->mode), &g->summary.belief);
+    g->summary.near = fmin(near / g->total, 1.0);
+}
+
+static void count_line(struct adaptive_global *g, const float *cell, struct adaptive_span s)
+{
+    float worth = (float)g->job.worth, light[NAV_LANES] = {0.0f}, crowd[NAV_LANES] = {0.0f};
+    for (int i = s.begin; i < s.end; i += NAV_LANES) {
+        for (int k = 0; k < NAV_LANES; k++) {
+            float mass = cell[i + k];
+            light[k] += mass < worth ? mass : 0.0f;
+            crowd[k] += mass < worth ? 0.0f : 1.0f;
+        }
+    }
+    for (int k = 0; k < NAV_LANES; k++) {
+        g->job.light += (double)light[k];
+        g->job.crowd += (double)crowd[k];
+    }
+}
+
+long adaptive_global_count(struct adaptive_global *g, int p, long most)
+{
+    const struct adaptive_span *span = adaptive_spans(g, g->span, p);
+    long cells = 0;
+    for (int j = 0; j < g->ny; j++)
+        cells += adaptive_span_length(span[j]);
+    if (cells > most)
+        return -1;
+    for (int j = 0; j < g->ny; j++)
+        count_line(g, adaptive_global_line(g, g->mass, p, j), span[j]);
+    return cells;
 }
 
 /* Mass of the cell that holds a pose. */
@@ -91,6 +93,7 @@ void adaptive_global_draw(struct adaptive_global *g, struct adaptive_cloud *clou
                           struct nav_pose moved)
 {
     double step = g->total / (double)count, mark = step * nav_rng_uniform(&cloud->rng), sum = 0.0;
+    const struct nav_slices slices = adaptive_global_slices(g);
     float share[ADAPTIVE_IMAGES_MOST];
     for (size_t n = 0; n < adaptive_global_stored(g); n++) {
         size_t line = n / (size_t)g->pitch;
@@ -101,80 +104,10 @@ void adaptive_global_draw(struct adaptive_global *g, struct adaptive_cloud *clou
         sum += (double)g->mass[n];
         if (mark >= sum)
             continue;
-        struct nav_pose centre = adaptive_global_centre(g, n);
+        struct nav_pose centre = nav_slices_centre(&slices, n);
         shares(g, cloud->images, centre, share);
         for (; mark < sum; mark += step)
             adaptive_cloud_add(cloud, nav_compose(within_cell(g, centre, &cloud->rng), moved), weight / (double)count,
                                share);
     }
-}
-
-/* Slices that the present job has moved and weighed. */
-static int slices_done(const struct adaptive_global *g)
-{
-    if (!g->job.running || g->job.phase == ADAPTIVE_TURN)
-        return 0;
-    return g->job.phase == ADAPTIVE_MOVE ? g->job.slice : g->nh;
-}
-
-/* Mass of one slice's cells; a uniform belief is not written out before its first job comes by. */
-static double slice_mass(const struct adaptive_global *g, int p)
-{
-    const float *cell = adaptive_global_line(g, g->mass, p, 0);
-    double sum = 0.0;
-    for (int i = 0; i < g->ny * g->pitch; i++)
-        sum += (double)cell[i];
-    return sum;
-}
-
-/* What a unit of mass is worth in slices that are done, and in those that are not. */
-struct worth {
-    double done, waiting;
-};
-
-static struct worth worth_of(const struct adaptive_global *g)
-{
-    int done = slices_done(g);
-    double left = (double)(g->nh - done) / g->nh, weighed = 0.0;
-    for (int p = 0; p < done; p++)
-        weighed += slice_mass(g, p);
-    struct worth w = {.waiting = 1.0 / g->total};
-    if (!g->fresh) {
-        left = 0.0;
-        for (int p = done; p < g->nh; p++)
-            left += slice_mass(g, p) / g->total;
-    }
-    if (weighed > 0.0)
-        w.done = fmax(1.0 - left, 0.0) / weighed;
-    else if (left > 0.0)
-        w.waiting /= left; /* all that was weighed has come to nothing */
-    return w;
-}
-
-long adaptive_global_list(const struct adaptive_global *g, const struct adaptive_log *log, struct nav_pose moved,
-                          double mass, struct nav_component *out, long room)
-{
-    int done = slices_done(g);
-    struct worth worth = worth_of(g);
-    struct nav_pose since = nav_compose(adaptive_log_since(log, g->next), moved);
-    struct nav_pose since_job = done ? nav_compose(adaptive_log_since(log, g->job.end), moved) : since;
-    struct nav_component bump = {.sigma_m = g->cell / sqrt(12.0), .sigma_rad = g->cell_theta / sqrt(12.0)};
-    long count = 0;
-    for (size_t n = 0; n < adaptive_global_stored(g); n++) {
-        bool after = n < (size_t)done * (size_t)(g->ny * g->pitch);
-        if (n % (size_t)g->pitch >= (size_t)g->nx)
-            continue;
-        double held = g->fresh && !after ? 1.0 / (double)adaptive_global_cells(g) : (double)g->mass[n];
-        bump.mass = mass * held * (after ? worth.done : worth.waiting);
-        if (!(bump.mass > 0.0))
-            continue;
-        if (count < room) {
-            struct nav_pose at = adaptive_global_centre(g, n);
-            at.theta += after ? g->job.step.theta : 0.0;
-            out[count] = bump;
-            out[count].pose = nav_compose(at, after ? since_job : since);
-        }
-        count++;
-    }
-    return count;
 }

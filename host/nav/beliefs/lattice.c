@@ -51,7 +51,7 @@ size_t nav_lattice_cells(const struct nav_lattice *l)
 
 double nav_lattice_heading(const struct nav_lattice *l, int slice)
 {
-    return (slice + 0.5) * l->cell_theta + l->rotation;
+    return nav_slice_heading(slice, l->cell_theta, l->rotation);
 }
 
 float *nav_lattice_slice(const struct nav_lattice *l, int slice)

@@ -65,19 +65,11 @@ void nav_lattice_move(struct nav_lattice *, struct nav_pose step, const struct n
 /* Fills the lattice with a prior's mass, not yet clipped to free space. */
 void nav_lattice_fill(struct nav_lattice *, const struct nav_prior *);
 
-/* Mass within NAV_NEAR_M and NAV_NEAR_RAD of a pose, the centres of cells deciding; and its mean pose, when not NULL.
- */
-double nav_lattice_near(const struct nav_lattice *, struct nav_pose, struct nav_pose *mean);
-
-/* Centre of cell number `index` of `mass`. */
-struct nav_pose nav_lattice_centre(const struct nav_lattice *, size_t index);
+/* The belief as slices, for its sums; the moments are those of the last pass. */
+struct nav_slices nav_lattice_slices(const struct nav_lattice *);
 
 /* Number of the first cell of a slice that holds the most mass. */
 size_t nav_lattice_peak(const struct nav_lattice *, int slice);
-
-/* Covariance of the whole belief about a pose, from the moments of the last pass, which must have left mass; the spread
- * within a cell included; row-major, m and rad. */
-void nav_lattice_covariance(const struct nav_lattice *, struct nav_pose about, double covariance[9]);
 
 /* Empties all cells outside begin .. end - 1 of each row, in every slice. */
 void nav_lattice_clip(struct nav_lattice *, const int *begin, const int *end);

@@ -1,4 +1,4 @@
-/* What a lattice's belief amounts to: prior in, mode, mean near it, covariance out. */
+/* A lattice's belief: a prior in, its mode and sums out. */
 #include <math.h>
 
 #include "lattice.h"
@@ -37,12 +37,22 @@ void nav_lattice_fill(struct nav_lattice *l, const struct nav_prior *prior)
     }
 }
 
-struct nav_pose nav_lattice_centre(const struct nav_lattice *l, size_t index)
+struct nav_slices nav_lattice_slices(const struct nav_lattice *l)
 {
-    size_t nx = (size_t)l->nx, ny = (size_t)l->ny;
-    int p = (int)(index / (nx * ny)), j = (int)(index / nx % ny), i = (int)(index % nx);
-    return (struct nav_pose){(i + 0.5) * l->cell + l->shift_x[p], (j + 0.5) * l->cell + l->shift_y[p],
-                             nav_wrap(nav_lattice_heading(l, p))};
+    return (struct nav_slices){.mass = l->mass,
+                               .nx = l->nx,
+                               .ny = l->ny,
+                               .nh = l->nh,
+                               .pitch = l->nx,
+                               .cell = l->cell,
+                               .cell_theta = l->cell_theta,
+                               .rotation = l->rotation,
+                               .shift_x = l->shift_x,
+                               .shift_y = l->shift_y,
+                               .moment = l->moment,
+                               .moment_x = l->moment_x,
+                               .moment_y = l->moment_y,
+                               .total = l->total};
 }
 
 size_t nav_lattice_peak(const struct nav_lattice *l, int slice)
@@ -54,32 +64,4 @@ size_t nav_lattice_peak(const struct nav_lattice *l, int slice)
             best = i;
     }
     return (size_t)slice * cells + best;
-}
-
-double nav_lattice_near(const struct nav_lattice *l, struct nav_pose pose, struct nav_pose *mean)
-{
-    struct nav_near sums = {.mass = 0.0};
-    for (int p = 0; p < l->nh; p++) {
-        const struct nav_slice slice = {.mass = nav_lattice_slice(l, p),
-                                        .nx = l->nx,
-                                        .ny = l->ny,
-                                        .pitch = l->nx,
-                                        .cell = l->cell,
-                                        .x = 0.5 * l->cell + l->shift_x[p],
-                                        .y = 0.5 * l->cell + l->shift_y[p],
-                                        .heading = nav_lattice_heading(l, p)};
-        nav_slice_near(&slice, pose, &sums);
-    }
-    if (mean && sums.mass > 0.0)
-        *mean = nav_near_mean(&sums, pose);
-    return sums.mass * l->scale;
-}
-
-void nav_lattice_covariance(const struct nav_lattice *l, struct nav_pose about, double covariance[9])
-{
-    double sums[6] = {0.0};
-    for (int p = 0; p < l->nh; p++)
-        nav_slice_add(l->moment[p], about.x - l->moment_x, about.y - l->moment_y,
-                      nav_wrap(nav_lattice_heading(l, p) - about.theta), sums);
-    nav_slice_covariance(sums, l->total, l->cell, l->cell_theta, covariance);
 }

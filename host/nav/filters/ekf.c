@@ -43,10 +43,4 @@ static void *create(const struct nav_problem *problem)
     return nav_kalman_new(problem, linearise);
 }
 
-const struct nav_filter_ops nav_ekf_filter = {.name = "ekf",
-                                              .create = create,
-                                              .destroy = nav_kalman_destroy,
-                                              .predict = nav_kalman_predict,
-                                              .update = nav_kalman_update,
-                                              .estimate = nav_kalman_estimate,
-                                              .components = nav_kalman_components};
+const struct nav_filter_ops nav_ekf_filter = {.name = "ekf", .create = create, NAV_KALMAN_OPS};

@@ -143,11 +143,9 @@ static void summarise(struct grid *g)
         g->confidence = 0.0;
         return;
     }
-    struct nav_pose mode = nav_lattice_centre(l, nav_lattice_peak(l, l->peak_slice));
-    g->summary.mean = mode;
-    nav_lattice_near(l, mode, &g->summary.mean);
-    g->confidence = fmin(nav_lattice_near(l, g->summary.mean, NULL), 1.0);
-    nav_lattice_covariance(l, g->summary.mean, g->summary.covariance);
+    const struct nav_slices slices = nav_lattice_slices(l);
+    struct nav_pose mode = nav_slices_centre(&slices, nav_lattice_peak(l, l->peak_slice));
+    g->confidence = fmin(nav_slices_summarise(&slices, mode, &g->summary) * l->scale, 1.0);
 }
 
 /* Takes a prior, clipped to free space; false when that leaves nothing. */
@@ -234,9 +232,7 @@ static void predict(void *self, const struct nav_motion *told)
     struct grid *g = self;
     struct nav_motion motion = calibrated(g, told);
     struct nav_noise noise = nav_motion_noise(&g->problem->robot, &g->problem->settings, &motion);
-    /* Headings differ within a slice (uniform: width^2 / 12), and a drive spreads what one cell holds. */
-    double width = g->lattice.cell_theta, distance = hypot(motion.step.x, motion.step.y);
-    noise.position += width * width / 12.0 * distance * fmax(distance, g->problem->settings.motion_along_m);
+    noise.position += nav_slice_fan(motion.step, g->lattice.cell_theta, g->problem->settings.motion_along_m);
     g->pending = nav_compose(g->pending, motion.step);
     g->pending_noise.position += noise.position;
     g->pending_noise.heading += noise.heading;
@@ -277,6 +273,7 @@ static long components(const void *self, struct nav_component *out, long room)
 {
     const struct grid *g = self;
     const struct nav_lattice *l = &g->lattice;
+    const struct nav_slices slices = nav_lattice_slices(l);
     double sigma = sqrt(l->cell * l->cell / 12.0 + l->owed_position + g->pending_noise.position);
     double sigma_turn = sqrt(l->cell_theta * l->cell_theta / 12.0 + l->owed_heading + g->pending_noise.heading);
     long count = 0;
@@ -284,8 +281,8 @@ static long components(const void *self, struct nav_component *out, long room)
         if (!(l->mass[n] > 0.0f))
             continue;
         if (count < room)
-            out[count] = (struct nav_component){nav_compose(nav_lattice_centre(l, n), g->pending), sigma, sigma_turn,
-                                                (double)l->mass[n] * l->scale};
+            out[count] = (struct nav_component){nav_compose(nav_slices_centre(&slices, n), g->pending), sigma,
+                                                sigma_turn, (double)l->mass[n] * l->scale};
         count++;
     }
     return count;

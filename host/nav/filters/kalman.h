@@ -44,11 +44,14 @@ double nav_kalman_expect(struct nav_kalman *, const struct nav_sighting *, struc
 /* Corrects the belief by one sighting unless it is further off than three standard deviations. */
 void nav_kalman_correct(struct nav_kalman *, const struct nav_sighting *);
 
-/* The functions of nav_filter_ops that both filters have in common. */
+/* The functions of nav_filter_ops that both filters have in common, and their places in the table. */
 void nav_kalman_destroy(void *self);
 void nav_kalman_predict(void *self, const struct nav_motion *);
 void nav_kalman_update(void *self, const struct nav_evidence *);
 void nav_kalman_estimate(const void *self, struct nav_estimate *);
 long nav_kalman_components(const void *self, struct nav_component *out, long room);
+#define NAV_KALMAN_OPS                                                                                                 \
+    .destroy = nav_kalman_destroy, .predict = nav_kalman_predict, .update = nav_kalman_update,                         \
+    .estimate = nav_kalman_estimate, .components = nav_kalman_components
 
 #endif

@@ -20,7 +20,20 @@ static struct nav_pose mode(const struct nav_lattice *l)
         size_t cell = nav_lattice_peak(l, p);
         best = l->mass[cell] > l->mass[best] ? cell : best;
     }
-    return nav_lattice_centre(l, best);
+    const struct nav_slices slices = nav_lattice_slices(l);
+    return nav_slices_centre(&slices, best);
+}
+
+static double near(const struct nav_lattice *l, struct nav_pose pose, struct nav_pose *mean)
+{
+    const struct nav_slices slices = nav_lattice_slices(l);
+    return nav_slices_near(&slices, pose, mean) * l->scale;
+}
+
+static void spread(const struct nav_lattice *l, struct nav_pose about, double covariance[9])
+{
+    const struct nav_slices slices = nav_lattice_slices(l);
+    nav_slices_covariance(&slices, about, covariance);
 }
 
 /* All mass in one cell. */
@@ -74,13 +87,13 @@ static void noise_adds_the_variance_asked_for_and_keeps_the_mass(void **state)
     const struct nav_noise noise = {.position = 1e-4, .heading = 4e-4};
     double before[9], after[9];
     nav_lattice_pass(&l, NULL, start);
-    nav_lattice_covariance(&l, start, before);
+    spread(&l, start, before);
     for (int step = 0; step < 50; step++)
         nav_lattice_move(&l, (struct nav_pose){0.0, 0.0, 0.0}, &noise);
     double owed = l.owed_position, owed_heading = l.owed_heading;
     assert_near(total(&l), 1.0, 1e-5);
-    nav_lattice_near(&l, start, &mean);
-    nav_lattice_covariance(&l, start, after);
+    near(&l, start, &mean);
+    spread(&l, start, after);
     assert_near(mean.x, start.x, 5e-4); /* cells right on the circle may fall on either side */
     assert_near(after[0] - before[0], 50 * 1e-4 - owed, 1e-5);
     assert_near(after[4] - before[4], 50 * 1e-4 - owed, 1e-5);
@@ -108,7 +121,7 @@ static void mass_poured_between_shifted_slices_keeps_its_place(void **state)
     }
     assert_near(x, there.x, 1e-6);
     assert_near(y, there.y, 1e-6);
-    assert_true(nav_lattice_near(&l, there, &mean) < 0.95);
+    assert_true(near(&l, there, &mean) < 0.95);
     nav_lattice_free(&l);
 }
 
@@ -131,7 +144,7 @@ static void a_prior_fills_cells_with_its_integral(void **state)
     double covariance[9];
     assert_near(total(&l), 1.0, 1e-5);
     nav_lattice_pass(&l, NULL, prior.mean);
-    nav_lattice_covariance(&l, prior.mean, covariance);
+    spread(&l, prior.mean, covariance);
     /* A histogram's variance: the density's, and twice the width^2 / 12 of a cell (integrating and spreading). */
     assert_near(covariance[0], 0.0025 + 0.01 / 6.0, 2e-4);
     assert_near(covariance[4], 0.01 + 0.01 / 6.0, 2e-4);
@@ -152,7 +165,7 @@ static void near_counts_the_mass_around_a_pose_across_the_heading_seam(void **st
     nav_lattice_slice(&l, 0)[12 * l.nx + 12] = 1.0f; /* within 0.25 m of it in x and in y, not as the crow flies */
     nav_lattice_slice(&l, 10)[10 * l.nx + 10] = 1.0f;
     struct nav_pose mean = {0.0, 0.0, 0.0};
-    assert_near(nav_lattice_near(&l, (struct nav_pose){1.05, 1.05, 0.0}, &mean), 3.0, 1e-6);
+    assert_near(near(&l, (struct nav_pose){1.05, 1.05, 0.0}, &mean), 3.0, 1e-6);
     assert_near(mean.x, 1.05 + 0.1 / 3.0, 1e-9);
     assert_near(mean.theta, 2.5 * NAV_PI / 18.0 / 3.0, 1e-9);
     nav_lattice_free(&l);
