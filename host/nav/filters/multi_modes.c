@@ -57,7 +57,7 @@ static void absorb(struct multi_mode *a, const struct multi_mode *b)
     a->belief.mean.x += share * d[0];
     a->belief.mean.y += share * d[1];
     a->belief.mean.theta = nav_wrap(a->belief.mean.theta + share * d[2]);
-    a->weight += b->weight;
+    a->weight = fmin(a->weight + b->weight, 1.0); /* shares that add up to 1 may do so and a bit more */
 }
 
 void multi_merge(struct multi_modes *m, double near)

@@ -59,6 +59,17 @@ static void merged_modes_keep_their_moments(void **state)
     assert_near(mode[0].weight, 1.0, 1e-12);
 }
 
+static void all_modes_merged_weigh_no_more_than_one(void **state)
+{
+    (void)state;
+    const struct nav_gaussian there = {.covariance = {1.0, 0, 0, 0, 1.0, 0, 0, 0, 1.0}};
+    struct multi_mode mode[3] = {{there, 0.55}, {there, 0.34}, {there, 0.11}}; /* in doubles: 1 + 2^-52 */
+    struct multi_modes modes = {mode, 3, 3};
+    multi_merge(&modes, 0.5);
+    assert_int_equal(modes.count, 1);
+    assert_true(mode[0].weight <= 1.0 && mode[0].weight > 1.0 - 1e-12);
+}
+
 static void a_robot_is_tracked(void **state)
 {
     (void)state;
@@ -79,6 +90,7 @@ int main(void)
         cmocka_unit_test(points_give_their_mean_and_covariance),
         cmocka_unit_test(two_heaps_split_and_one_does_not),
         cmocka_unit_test(merged_modes_keep_their_moments),
+        cmocka_unit_test(all_modes_merged_weigh_no_more_than_one),
         cmocka_unit_test(a_robot_is_tracked),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
