@@ -141,3 +141,8 @@ def test_a_miss_is_told(data, part, path, value):
 def test_a_point_that_is_quicker_and_nearer_is_named(data):
     data["pareto"]["peers"]["anchor"]["mrpt 1000"] = ledger(0.004, 10.0)
     assert "| anchor | mrpt 1000 (10 us, 4.0 mm) | none |" in nav_page.document(data)
+
+
+def test_peers_that_were_not_run_are_not_said_to_be_worse(data):
+    del data["pareto"]["peers"]
+    assert "| anchor | not run | none |" in nav_page.document(data)

@@ -123,7 +123,7 @@ def _foretold(data: dict) -> str:
             "confidence",
             "confidence and the share near the truth",
             "On the grey diagonal a confidence is what it says. Below it a filter is surer than it should be, above it "
-            "less sure. Few rows lie between the ends, so points in the middle jump.",
+            "less sure. Where few rows lie between the ends, points in the middle jump.",
         )
     )
 
