@@ -136,6 +136,7 @@ bool base_robot_open(struct base_robot *robot, int port, int64_t now_ms)
     }
     robot->error = 0;
     robot->sent = 0;
+    robot->silent = false;
     robot->opened_ms = now_ms;
     add_counts(&robot->past, &robot->stream.counts);
     create_stream_begin(&robot->stream, packets, packet_count(robot));
@@ -160,7 +161,7 @@ int32_t base_robot_mode_told(const struct base_robot *robot)
 unsigned base_robot_bits(const struct base_robot *robot)
 {
     const int32_t *value = robot->frame.value;
-    const bool idle = robot->port < 0 || base_robot_mode_told(robot) != (int32_t)robot->wanted;
+    const bool idle = robot->port < 0 || robot->silent || base_robot_mode_told(robot) != (int32_t)robot->wanted;
     return (unsigned)value[CREATE_OI_BUMPS_DROPS] | (value[CREATE_OI_CLIFF_LEFT] ? BASE_CLIFF_LEFT : 0u) |
            (value[CREATE_OI_CLIFF_FRONT_LEFT] ? BASE_CLIFF_FRONT_LEFT : 0u) |
            (value[CREATE_OI_CLIFF_FRONT_RIGHT] ? BASE_CLIFF_FRONT_RIGHT : 0u) |
@@ -239,6 +240,7 @@ static void take_frame(struct base_robot *robot, int64_t now_ms)
     robot->frame.missed = gap > robot->frame.missed ? gap : robot->frame.missed;
     robot->missed += robot->frame.missed;
     robot->frame_ms = now_ms;
+    robot->silent = false;
     const struct create_step step = create_odometry_take(&robot->odometry, &robot->frame);
     watch_mode(robot);
     watch_battery(robot);
@@ -281,7 +283,9 @@ bool base_robot_drive(struct base_robot *robot, double v_m_s, double omega_rad_s
     const struct create_odometry_settings *settings = &robot->options->odometry;
     robot->drive_ms = now_ms;
     robot->frames_since_drive = 0;
-    return order_speeds(robot, create_choose_speeds(settings->model, settings->wheel_base_m, v_m_s, omega_rad_s));
+    const struct create_speeds wanted =
+        create_choose_speeds(settings->model, settings->wheel_base_m, v_m_s, omega_rad_s);
+    return order_speeds(robot, robot->silent ? (struct create_speeds){0} : wanted);
 }
 
 bool base_robot_stop(struct base_robot *robot)
@@ -299,6 +303,7 @@ bool base_robot_mode(struct base_robot *robot, enum create_oi_mode mode)
 static void restart_stream(struct base_robot *robot, int64_t now_ms)
 {
     robot->silences++;
+    robot->silent = robot->stream.counts.frames > 0;
     robot->opened_ms = now_ms;
     daemon_log(LOG_WARN,
                "%s: no frame for %d ms; wheels stopped, stream asked for again; if it stays silent check cable, "

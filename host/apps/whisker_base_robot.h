@@ -45,6 +45,7 @@ struct base_robot {
     uint32_t frames_since_mode;
     bool entered;       /* the wanted mode was seen in force since it was last asked for */
     bool low, told_low; /* battery */
+    bool silent;        /* it was heard, and then no more: until a frame comes the wheels stay stopped */
     int64_t drive_ms, frame_ms, opened_ms;
     uint32_t frames_since_drive;
     int error; /* why the port could not be opened, as last told */

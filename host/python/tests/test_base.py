@@ -294,6 +294,19 @@ def test_a_silent_line_is_asked_for_its_stream_again(start):
         assert int(client.health()["missed"]) >= 500 // 15 - 1
 
 
+def test_wheels_are_not_driven_blind(start):
+    driver = start()
+    with driver.client() as client:
+        await_frame(client, driver)
+        while client.health()["silences"] == "0":
+            assert driver.peer.await_start().endswith(STOP)
+        sent = client.drive(0.2, 0)
+        assert (sent.v_m_s, sent.omega_rad_s) == (0, 0)
+        assert client.odometry().bits & base.IDLE
+        await_frame(client, driver)
+        assert not client.odometry().bits & base.IDLE
+
+
 def test_a_silent_line_is_not_put_back_into_a_mode_that_it_left(start):
     driver = start()
     driver.peer.tell(driver.peer.frame() + driver.peer.frame(p35=1, p9=1))
