@@ -92,14 +92,17 @@ void TickRunner::inject_lane_fault(uint64_t number)
 
 void TickRunner::set_dead(size_t lane, bool dead)
 {
-    dead ? (void)dead_.insert(lane) : (void)dead_.erase(lane);
+    dead ? (void)dead_.insert({lane, 0}) : (void)dead_.erase(lane);
 }
 
 void TickRunner::silence_dead(uint64_t number)
 {
-    for (const size_t lane : dead_) {
+    for (auto &[lane, next_reading] : dead_) {
         const LaneFault fault{number, lane, LaneFaultKind::SENSOR_DEAD, 0};
-        log_.lane_fault(fault);
+        if (number >= next_reading) {
+            log_.lane_fault(fault);
+            next_reading = number + WHISKER_LIMIT_RESYNC_TICKS + 1;
+        }
         rig_.spoil(fault);
     }
 }

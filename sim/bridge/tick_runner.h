@@ -2,7 +2,7 @@
 // simulation and the bench.
 #pragma once
 
-#include <set>
+#include <map>
 
 #include "fault_log.h"
 #include "urb_scheduler.h"
@@ -46,7 +46,7 @@ class TickRunner
     UrbScheduler &scheduler_;
     std::optional<FaultPlan> plan_;
     FaultLog &log_;
-    std::set<size_t> dead_;                // lanes
+    std::map<size_t, uint64_t> dead_;      // by lane: the tick of its next reading, after a resynchronisation
     std::optional<LaneFault> in_transfer_; // a link fault whose record comes with the next tick's transfer
     uint64_t back_at_ = 0;                 // tick at which a host that stayed away returns
     bool away_ = false;
