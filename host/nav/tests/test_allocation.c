@@ -1,0 +1,71 @@
+/* No filter allocates after its start: the linker leads the library's malloc, calloc and realloc through here. */
+#include <stdlib.h>
+
+#include "near.h"
+#include "wander.h"
+
+/* The names that ld's --wrap gives. */
+void *__real_malloc(size_t);
+void *__real_calloc(size_t, size_t);
+void *__real_realloc(void *, size_t);
+void *__wrap_malloc(size_t);
+void *__wrap_calloc(size_t, size_t);
+void *__wrap_realloc(void *, size_t);
+
+static long allocations;
+
+void *__wrap_malloc(size_t size)
+{
+    allocations++;
+    return __real_malloc(size);
+}
+
+void *__wrap_calloc(size_t count, size_t size)
+{
+    allocations++;
+    return __real_calloc(count, size);
+}
+
+void *__wrap_realloc(void *old, size_t size)
+{
+    allocations++;
+    return __real_realloc(old, size);
+}
+
+/* Followed, carried off, lost and found: every state that a filter has. */
+static void run(struct nav_filter *f, struct wander *w)
+{
+    static struct nav_component list[20000];
+    struct nav_estimate e;
+    for (int k = 0; k < 400; k++) {
+        if (k == 150)
+            w->pose = (struct nav_pose){0.4, 0.4, 2.5};
+        nav_filter_step(f, wander_on(w), &e);
+        if (k % 50 == 0)
+            nav_filter_components(f, list, sizeof list / sizeof list[0]);
+    }
+}
+
+static void no_filter_allocates_after_its_start(void **state)
+{
+    (void)state;
+    for (int uniform = 0; uniform < 2; uniform++) {
+        for (int n = 0; nav_filter_name(n); n++) {
+            struct wander w = wander_new(5);
+            w.problem.prior.uniform = uniform;
+            allocations = 0;
+            struct nav_filter *f = nav_filter_new(nav_filter_name(n), &w.problem);
+            assert_true(f && allocations > 0); /* they are seen */
+            allocations = 0;
+            run(f, &w);
+            assert_int_equal(allocations, 0);
+            nav_filter_free(f);
+        }
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(no_filter_allocates_after_its_start)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
