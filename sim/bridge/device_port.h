@@ -28,6 +28,12 @@ class DevicePort
     // The cable is pulled; every result handed over before still reaches the host.
     virtual void unplug() = 0;
 
+    // Whoever had claimed the device is gone, and nobody has claimed it since. Known for a device under umockdev only.
+    virtual bool deserted() const
+    {
+        return false;
+    }
+
     // Readable when requests wait.
     virtual int wake_descriptor() const = 0;
 

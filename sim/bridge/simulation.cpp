@@ -184,10 +184,11 @@ bool Simulation::may_tick()
 }
 
 // Wall time goes on while nobody takes frames: so does the world, once it has begun, unless a pilot counts its ticks.
+// The bridge of a host that was killed runs on until the next host stops it.
 bool Simulation::may_pass()
 {
-    return pace_.on() && tick_ > 0 && !over_ && !(plugged_ && rig_->running()) && !followers_.in_step() &&
-           pace_.due(tick_);
+    return pace_.on() && tick_ > 0 && !over_ && !(plugged_ && rig_->running() && !port_->deserted()) &&
+           !followers_.in_step() && pace_.due(tick_);
 }
 
 void Simulation::produce_tick()

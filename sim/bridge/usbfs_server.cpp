@@ -1,5 +1,6 @@
 #include "usbfs_server.h"
 
+#include <atomic>
 #include <future>
 #include <mutex>
 #include <stdexcept>
@@ -72,6 +73,7 @@ struct UsbfsServer::State {
     std::vector<DeviceRequest> inbox;
     GMainContext *context = nullptr; // of umockdev's thread, known from the first ioctl on
     int wake = -1;
+    std::atomic<bool> claimed = false;
     UsbfsSession session{[this](DeviceRequest request) { post(std::move(request)); }};
     UMockdevTestbed *testbed = nullptr;
     UMockdevIoctlBase *handler = nullptr;
@@ -98,6 +100,7 @@ struct UsbfsServer::State {
             state->context = g_main_context_get_thread_default();
         }
         state->session.ioctl(client);
+        state->claimed = state->session.claimed();
         return TRUE;
     }
 };
@@ -180,6 +183,11 @@ UsbfsServer::~UsbfsServer()
     g_object_unref(state_->handler);
 }
 
+bool UsbfsServer::deserted() const
+{
+    return !state_->claimed;
+}
+
 int UsbfsServer::wake_descriptor() const
 {
     return state_->wake;
@@ -200,8 +208,9 @@ void UsbfsServer::deliver(std::vector<Urb> completed)
     if (completed.empty()) {
         return;
     }
-    post([session = &state_->session, completed = std::move(completed)]() mutable {
-        session->completed(std::move(completed));
+    post([state = state_.get(), completed = std::move(completed)]() mutable {
+        state->session.completed(std::move(completed));
+        state->claimed = state->session.claimed();
     });
 }
 
