@@ -12,33 +12,23 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 from chainrun import BUILD, END_S, running, simulation, write_flat_scene
+from drills.relays import free_ports
+from quickmodels import quick_models
 
 from whisker import scene as scenes
 from whisker.demo.chain import ChainRun, Link, run_chain
 from whisker.demo.scenes import make_scene
-from whisker.demo.simulation import write_surface_drives
-from whisker.demo.training import MOVES, fit_texture, flat
-from whisker.radial import RadialModel
 from whisker.report.run import FILTERS
 from whisker.ring import Reader
 from whisker.robot import link as links
 from whisker.robot import parts
-from whisker.texture import read_training
 
 SEED, SECONDS = 3, 5.0
-LINE = (-0.036, 181.0, 5.0, 90.0, 140.0)  # of a radial model: good enough for whisks that nobody judges
 
 
 @pytest.fixture(scope="module")
 def models(tmp_path_factory):
-    """Models of the right kind from next to no training."""
-    folder, (scene, _) = tmp_path_factory.mktemp("models"), make_scene(SEED)
-    write_surface_drives(folder / "texture", flat(scene), scene.arena.textures, SEED, 2.0, speeds=[0.15], moves=MOVES)
-    found, _ = read_training(folder / "texture")
-    fit_texture({name: found[name] for name in scene.arena.textures}, SEED).save(folder / "texture.json")
-    for whisker in scene.robot.of_role("object"):
-        RadialModel(*LINE).save(folder / f"{whisker.name}.json")
-    return folder
+    return quick_models(tmp_path_factory.mktemp("models"), SEED)
 
 
 def fly(folder, models, create: int, seconds: float = SECONDS) -> ChainRun:
@@ -125,23 +115,10 @@ def told(server) -> int:
     return int(tick)
 
 
-def free_ports() -> int:
-    """The first of three neighbours that nobody listened at a moment ago."""
-    while True:
-        with socket.create_server(("127.0.0.1", 0)) as server:
-            first = server.getsockname()[1]
-        try:
-            for number in range(3):
-                socket.create_server(("127.0.0.1", first + number)).close()
-        except OSError:
-            continue
-        return first
-
-
 @contextmanager
 def robot(folder, models):
     """A simulated robot of all its processes, and an inbox of what they say."""
-    meeting = parts.Meeting(f"whisker-test-robot-{os.getpid()}", folder, first_port=free_ports())
+    meeting = parts.Meeting(f"whisker-test-robot-{os.getpid()}", folder, first_port=free_ports(3))
     words = [
         "robot",
         "--simulated",

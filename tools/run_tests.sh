@@ -31,6 +31,8 @@ if [ "${1:-}" = --long ]; then
     .venv/bin/python host/python/tests/fuzz_recording.py --inputs 300000
     echo "test: a Linux kernel and the simulated bridge"
     WHISKER_BUILD=build/release .venv/bin/python tests/kernel/run.py
+    echo "test: thirty minutes of drills"
+    PYTHONPATH=tests WHISKER_BUILD=build/release .venv/bin/python -m drills --minutes 30 --out build/drills
     exit 0
 fi
 with_preset "$(basename "$1")"

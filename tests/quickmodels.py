@@ -1,0 +1,22 @@
+"""Models of a demo robot from next to no training: of the right kind, for runs that nobody judges by them."""
+
+from pathlib import Path
+
+from whisker.demo.scenes import make_scene
+from whisker.demo.simulation import write_surface_drives
+from whisker.demo.training import MOVES, fit_texture, flat
+from whisker.radial import RadialModel
+from whisker.texture import read_training
+
+LINE = (-0.036, 181.0, 5.0, 90.0, 140.0)  # of a radial model
+
+
+def quick_models(folder: Path, seed: int) -> Path:
+    """Writes texture.json and <whisker>.json into the folder; returns it."""
+    scene, _ = make_scene(seed)
+    write_surface_drives(folder / "texture", flat(scene), scene.arena.textures, seed, 2.0, speeds=[0.15], moves=MOVES)
+    found, _ = read_training(folder / "texture")
+    fit_texture({name: found[name] for name in scene.arena.textures}, seed).save(folder / "texture.json")
+    for whisker in scene.robot.of_role("object"):
+        RadialModel(*LINE).save(folder / f"{whisker.name}.json")
+    return folder
