@@ -232,17 +232,21 @@ def draw_seeds(found: dict) -> Figure:
     """Clock and slack of the PHY's pins for each seed."""
     figure = Figure(figsize=(7, 3.6), layout="constrained")
     left, right = figure.subplots(1, 2)
+    spare = report.CLOCK_MHZ * report.SPARE[8]
     for (_, board), marker, shade in zip(sorted(found["seeds"].items()), "os^", ("0.0", "0.3", "0.6"), strict=True):
         label = f"{board['title']}, grade {board['speed']}"
         left.plot(SEEDS, [run["fmax_mhz"] for run in board["runs"]], marker, color=shade, label=label)
         right.plot(SEEDS, [pin_slack(board, run) for run in board["runs"]], marker, color=shade, label=label)
-    for axes, level in ((left, report.CLOCK_MHZ), (right, 0)):
+    for axes, level, words in (
+        (left, report.CLOCK_MHZ, "wanted"),
+        (left, spare, "wanted on grade 8"),
+        (right, 0, "the limit"),
+    ):
         axes.axhline(level, color="0.5", linewidth=1, linestyle="--")
-        axes.set(xlabel="seed", xticks=SEEDS)
-        axes.legend(frameon=False, fontsize=8)
-    left.axhline(report.CLOCK_MHZ * report.SPARE[8], color="0.5", linewidth=1, linestyle=":")
-    left.set(ylabel="clock, MHz (dashed: wanted; dotted: on grade 8)", ylim=(50, None))
-    right.set(ylabel="least slack of the PHY's pins, ns")
+        axes.annotate(words, (SEEDS[2], level), xytext=(0, 3), textcoords="offset points", ha="center", fontsize=7)
+    left.set(xlabel="seed", xticks=SEEDS, ylabel="clock, MHz", ylim=(50, None))
+    right.set(xlabel="seed", xticks=SEEDS, ylabel="least slack of the PHY's pins, ns", ylim=(-0.1, None))
+    figure.legend(*left.get_legend_handles_labels(), loc="outside upper center", ncols=3, frameon=False, fontsize=8)
     return figure
 
 
