@@ -1,16 +1,20 @@
 # CrunchBot's front door. `make help` lists what there is.
 SEED ?= 1
+LEVEL ?= bytes
 BUILD := build/release
 PYTHON := .venv/bin/python
 SOURCES_C = $(shell git ls-files '*.c' '*.h' '*.cpp' | grep -v '/gen/')
 
-.PHONY: help demo test test-all test-kernel test-hil bench build setup gen firmware flash bitstream format lint clean
+.PHONY: help demo demo-long test test-all test-kernel test-hil bench build setup gen firmware flash bitstream format lint clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
 
 demo: build ## the whole chain on simulated hardware, magnet to pose: about two minutes; SEED=n chooses the seed
 	@$(PYTHON) -m whisker.demo --out build/demo --build-dir $(BUILD) --seed $(SEED)
+
+demo-long: build ## 30 simulated minutes of the whole robot, with a report; SEED=n, LEVEL=signals (half a minute), bytes or rtl
+	@$(PYTHON) -m whisker.demo.long --out build/demo-long --build-dir $(BUILD) --seed $(SEED) --level $(LEVEL)
 
 test: build lint ## everything that fits in 15 minutes on two cores
 	@tools/run_tests.sh $(BUILD)

@@ -7,6 +7,7 @@ import shutil
 import signal
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -28,10 +29,18 @@ MARK = "demo.txt"
 
 def parse(argv: list[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m whisker.demo", description=__doc__)
-    parser.add_argument("--out", type=Path, default=Path("build/demo"), help="folder for everything the run leaves")
+    add_run_options(parser, Path("build/demo"), 60.0)
+    return parser.parse_args(argv)
+
+
+def add_run_options(parser: argparse.ArgumentParser, out: Path, seconds: float) -> None:
+    """What a run is asked for, whatever its length."""
+    parser.add_argument("--out", type=Path, default=out, help="folder for everything the run leaves")
     parser.add_argument("--build-dir", type=Path, default=Path("build/release"))
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--seconds", type=float, default=60.0, help="simulated; a multiple of 0.1")
+    parser.add_argument(
+        "--seconds", type=seconds_of_rows, default=seconds, help="simulated; a multiple of 0.1, at least 1"
+    )
     parser.add_argument("--lanes", type=int, default=6, help="populated lanes, 6 to 28; those beyond 6 have no whisker")
     parser.add_argument(
         "--create", type=int, choices=(1, 2), default=1, help="the base: iRobot Create 1 or 2 (%(default)s)"
@@ -41,22 +50,30 @@ def parse(argv: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--sck-divider", type=int, default=6)
     parser.add_argument("--word-gap", type=int, default=30)
     parser.add_argument("--sample-point", type=int, default=5)
-    options = parser.parse_args(argv)
-    if options.seconds < 1.0 or abs(options.seconds * 10 - round(options.seconds * 10)) > 1e-9:
-        parser.error(f"--seconds {options.seconds:g}: give a multiple of 0.1, at least 1")
-    return options
+
+
+def seconds_of_rows(text: str) -> float:
+    """A time that whole rows fill, as argparse wants it."""
+    seconds = float(text)
+    if seconds < 1.0 or abs(seconds * 10 - round(seconds * 10)) > 1e-9:
+        raise argparse.ArgumentTypeError(f"{seconds:g}: give a multiple of 0.1, at least 1")
+    return seconds
 
 
 def main(argv: list[str] | None = None) -> int:
-    options = parse(argv)
+    return guarded("demo", demonstrate, parse(argv))
+
+
+def guarded(name: str, job: Callable[[argparse.Namespace], object], options: argparse.Namespace) -> int:
+    """Do a job; exit code 0, or a line about what is wrong and another code."""
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
-        demonstrate(options)
+        job(options)
     except (ChainError, scenes.SceneError, TableError, localise.SettingError) as error:
-        print(f"demo: {error}", file=sys.stderr)
+        print(f"{name}: {error}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
-        print("demo: interrupted", file=sys.stderr)
+        print(f"{name}: interrupted", file=sys.stderr)
         return 130
     return 0
 
@@ -64,19 +81,30 @@ def main(argv: list[str] | None = None) -> int:
 def demonstrate(options: argparse.Namespace) -> None:
     """All steps in order; leaves summary.json and report.html in the output folder."""
     began = time.monotonic()
-    out = fresh_folder(options.out.resolve())
-    scene, start = make_scene(options.seed, options.mechanics)
-    scenes.write(out / "scene", scene)
-    (out / "scene" / "scene.flat").write_text(scene.flat(start))
+    out, scene, _ = prepare(options)
     results = {"seed": options.seed, "simulated_s": options.seconds, "lanes": options.lanes}
     results |= learn_models(out, scene, options)
     results |= run(out, options)
     results |= judge(out, scene)
     results["wall_s"] = time.monotonic() - began
-    (out / "summary.json").write_text(json.dumps(scores.rounded(results), indent=1) + "\n")
+    write_summary(out, results)
     report = write_report(out)
     tell(results)
     print(report)
+
+
+def prepare(options: argparse.Namespace) -> tuple[Path, scenes.Scene, tuple[float, float, float]]:
+    """The output folder with the scene in it, the scene, and the true start."""
+    out = fresh_folder(options.out.resolve())
+    scene, start = make_scene(options.seed, options.mechanics)
+    scenes.write(out / "scene", scene)
+    (out / "scene" / "scene.flat").write_text(scene.flat(start))
+    return out, scene, start
+
+
+def write_summary(out: Path, results: dict) -> None:
+    """summary.json, with six decimals."""
+    (out / "summary.json").write_text(json.dumps(scores.rounded(results), indent=1) + "\n")
 
 
 def fresh_folder(path: Path) -> Path:

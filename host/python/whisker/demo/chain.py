@@ -8,9 +8,9 @@ import socket
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack, closing
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from ..children import Child, Program
@@ -49,6 +49,7 @@ class ChainRun:
     link: Link
     create: int | None = 1  # the base: iRobot Create 1 or 2; None: wheels that obey at once, without a serial line
     level: str = "rtl"  # of the bridge; or bytes: the same frames
+    before: Mapping[str, tuple[str, ...]] = field(default_factory=dict)  # by a program's name: words before its own
 
     @property
     def scene(self) -> Path:
@@ -105,7 +106,9 @@ def run_chain(run: ChainRun, progress: Callable[[int], None]) -> float:
         _await_file(places.simulation, bridge)
         base = [_base(run, places)] if run.create else []
         for program in [*base, _log(run, places), _pilot(run, places), _navigator(run, places), _bag(run, places)]:
-            children.append(stack.enter_context(closing(Child(program, run.logs / f"{program.name}.log"))))
+            command = (*run.before.get(program.name, ()), *program.command)
+            child = Child(replace(program, command=command), run.logs / f"{program.name}.log")
+            children.append(stack.enter_context(closing(child)))
         _await_end(children)
     return time.monotonic() - began
 

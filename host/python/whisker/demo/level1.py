@@ -22,12 +22,14 @@ def explore(
     ticks: int,
     status: Callable[[int], np.ndarray] | None = None,
     on_block: Callable[[int, np.ndarray], None] = lambda first, counts: None,
+    world: World | None = None,
 ) -> tuple[list[dict], list[dict]]:
     """Let the pilot explore for `ticks` (a multiple of 200): observation rows, and truth rows as the chain writes them.
 
     `status(first_tick)` gives the (40, lanes) status of a block, all good by default; `on_block` sees (first tick, counts).
+    `world`: another than the scene's own of this seed, as one that is watched.
     """
-    world = World(scene.flat(start), seed)
+    world = world or World(scene.flat(start), seed)
     lanes = len(scene.robot.whiskers)
     good = np.zeros((BLOCK_TICKS, lanes), np.uint16)
     waiting = deque([(0.0, 0.0)] * (1 + DELAY_BLOCKS))

@@ -39,7 +39,7 @@ def arena(run: Run) -> Figure:
     figure = Figure(figsize=(11.4, 11.2), layout="constrained")
     panels = figure.subplots(2, len(FILTERS) // 2, sharex=True, sharey=True).ravel()
     for axes, name in zip(panels, FILTERS, strict=True):
-        _draw_floor(axes, run)
+        draw_floor(axes, run)
         _draw_paths(axes, run, name)
         axes.set_title(TITLES[name], fontsize=10)
         axes.set(xlabel="x (m)", ylabel="y (m)")
@@ -95,7 +95,8 @@ def errors(run: Run) -> Figure:
     return figure
 
 
-def _draw_floor(axes, run: Run) -> None:
+def draw_floor(axes, run: Run) -> None:
+    """Floor, blocks and walls from above."""
     arena, tile = run.arena, run.arena["tile_m"]
     letters = [name[0] for name in arena["textures"]]
     for row, line in enumerate(reversed(arena["floor"])):

@@ -30,6 +30,11 @@ def read_columns(path: Path) -> dict[str, np.ndarray]:
     return {name: _column([row[n] for row in rows]) for n, name in enumerate(header)}
 
 
+def _if_there(path: Path, read) -> dict:
+    """Empty for a run at level 1, which has neither network nor traces."""
+    return read(path) if path.exists() else {}
+
+
 def _column(cells: list[str]) -> np.ndarray:
     try:
         return np.array([float(cell) if cell else np.nan for cell in cells])
@@ -72,9 +77,9 @@ class Run:
             covariances={name: read_columns(path) for name, path in covariances.items() if path.exists()},
             radial=read_columns(folder / "radial_points.csv"),
             radial_lines=json.loads((folder / "radial_lines.json").read_text()),
-            traces=read_columns(folder / "traces.csv"),
+            traces=_if_there(folder / "traces.csv", read_columns),
             pilot=json.loads((folder / "pilot.json").read_text()),
-            navigator=json.loads((folder / "navigator.json").read_text()),
+            navigator=_if_there(folder / "navigator.json", lambda path: json.loads(path.read_text())),
             bag=folder / "robot.mcap",
         )
 
