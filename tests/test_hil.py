@@ -7,17 +7,18 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
 import pytest
 from chainrun import BUILD, END_S, Cable, program, running, simulation, write_flat_scene
 
-from whisker.protocol import LIMITS
-from whisker.ring import Clock
+from whisker.protocol import CODES, LIMITS, STATUS_CODE_SHIFT
+from whisker.ring import FRAME, Clock
 
 HIL = Path(__file__).parent / "hil"
 sys.path.insert(0, str(HIL))
 from base_checks import SILENT_FRAMES, await_stop  # noqa: E402
-from bridge_checks import judge_clock  # noqa: E402
-from checks import CheckError  # noqa: E402
+from bridge_checks import SETTLE_TICKS, Rig, Stream, judge_clock  # noqa: E402
+from checks import CheckError, SkipError  # noqa: E402
 
 LONG_S = 3600
 TICKS = range(3000, 20000, 20)  # at which the broken lane's cable spoils a bit
@@ -149,6 +150,16 @@ def test_a_base_that_drives_on_is_no_good_after_half_a_second():
     with pytest.raises(CheckError, match=r"the wheels turn on 0\.495 s after the last order; switch the base off"):
         await_stop(base, "the last order")
     assert base.frames <= 6 * SILENT_FRAMES
+
+
+def test_a_bridge_without_nodes_is_told_from_a_bad_one(alone, tmp_path):
+    frames = np.zeros(SETTLE_TICKS + 10, FRAME)
+    frames["lane"]["status"] = CODES["absent"] << STATUS_CODE_SHIFT
+    rig = Rig(1.0, False, True, tmp_path, _stream=Stream(frames, None, None, None))
+    with pytest.raises(SkipError, match="nodes: none answers on any lane"):
+        _ = rig.populated
+    frames["lane"]["status"][-1, 3] = 0
+    assert rig.populated == [3]
 
 
 def test_a_clock_is_judged_by_what_it_said_half_a_run_before():
