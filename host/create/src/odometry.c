@@ -8,9 +8,6 @@
 #define ANGLE_UNIT_RAD (3.14159265358979323846 / 180.0) /* of packet 20 */
 /* A unit dropped costs half a unit on average: at this many units per frame, as much as the paper's 5 %. */
 #define WELL_ABOVE 10
-/* A base that was asked for more than this many units in a frame, and told none in this many frames, stands. */
-#define STILL_UNITS 1.2
-#define STILL_FRAMES 3
 /* What is estimated for frames that never came may be wrong by all of it. */
 #define ESTIMATE_SIGMA 1.0
 #define SPEED_MAX_M_S (CREATE_OI_SPEED_MAX_MM_S * 1e-3)
@@ -56,36 +53,31 @@ const char *create_source_name(enum create_source source)
     return names[source];
 }
 
-double odometry_asked_distance(const struct create_frame *frame)
+static double asked_distance(const struct create_frame *frame)
 {
     const int32_t both = frame->value[CREATE_OI_REQUESTED_RIGHT] + frame->value[CREATE_OI_REQUESTED_LEFT];
     return both * 0.5e-3 * PERIOD_S;
 }
 
-double odometry_asked_angle(const struct create_odometry *odometry, const struct create_frame *frame)
+static double asked_angle(const struct create_odometry *odometry, const struct create_frame *frame)
 {
     const int32_t apart = frame->value[CREATE_OI_REQUESTED_RIGHT] - frame->value[CREATE_OI_REQUESTED_LEFT];
     return apart * 1e-3 / odometry->settings.wheel_base_m * PERIOD_S;
 }
 
-/* Asked for enough to be told, and nothing told: 0 while it moves, else frames in a row. */
-static void watch_stillness(struct create_odometry *odometry, const struct create_frame *frame, double d, double a)
-{
-    const bool asked = fabs(d) > STILL_UNITS * DISTANCE_UNIT_M || fabs(a) > STILL_UNITS * ANGLE_UNIT_RAD;
-    const bool told = frame->value[CREATE_OI_DISTANCE] != 0 || frame->value[CREATE_OI_ANGLE] != 0;
-    odometry->still = asked && !told ? odometry->still + 1 : 0;
-}
-
-static enum create_source choose(const struct create_odometry *odometry, double asked, double unit)
+/* The source of a part of the motion, of which so many units were asked for. */
+static enum create_source choose(const struct create_odometry *odometry, double asked)
 {
     const struct create_odometry_settings *settings = &odometry->settings;
-    if (settings->policy != CREATE_AUTO) {
-        return settings->policy;
-    }
-    if (create_model_facts(settings->model)->count_m > 0) {
+    const bool automatic = settings->policy == CREATE_AUTO;
+    if (automatic && create_model_facts(settings->model)->count_m > 0) {
         return CREATE_ENCODERS;
     }
-    return odometry->remainder == CREATE_KEPT || fabs(asked) >= WELL_ABOVE * unit ? CREATE_REPORTED : CREATE_REQUESTED;
+    if (automatic ? odometry->remainder == CREATE_KEPT || fabs(asked) >= WELL_ABOVE
+                  : settings->policy != CREATE_REQUESTED) {
+        return automatic ? CREATE_REPORTED : settings->policy;
+    }
+    return odometry->standing == CREATE_STANDS ? CREATE_REPORTED : CREATE_REQUESTED;
 }
 
 static int32_t counted(int32_t now, int32_t before)
@@ -121,8 +113,7 @@ static struct reading read_distance(const struct create_odometry *odometry, cons
         return (struct reading){frame->value[CREATE_OI_DISTANCE] * DISTANCE_UNIT_M * settings->distance_scale,
                                 settings->relative_sigma, DISTANCE_UNIT_M};
     }
-    return (struct reading){odometry->still >= STILL_FRAMES ? 0 : asked * settings->distance_scale,
-                            settings->requested_sigma, 0};
+    return (struct reading){asked * settings->distance_scale, settings->requested_sigma, 0};
 }
 
 static struct reading read_angle(const struct create_odometry *odometry, const struct create_frame *frame, double asked)
@@ -132,8 +123,7 @@ static struct reading read_angle(const struct create_odometry *odometry, const s
         return (struct reading){frame->value[CREATE_OI_ANGLE] * ANGLE_UNIT_RAD * settings->angle_scale,
                                 settings->relative_sigma, ANGLE_UNIT_RAD};
     }
-    return (struct reading){odometry->still >= STILL_FRAMES ? 0 : asked * settings->angle_scale,
-                            settings->requested_sigma, 0};
+    return (struct reading){asked * settings->angle_scale, settings->requested_sigma, 0};
 }
 
 static struct create_step step_of(const struct create_odometry *odometry, struct reading distance, struct reading angle)
@@ -153,7 +143,7 @@ static struct create_step step_of(const struct create_odometry *odometry, struct
  */
 static void add_estimate(struct create_odometry *odometry, struct create_step *step, uint32_t missed)
 {
-    const double frames = odometry->still >= STILL_FRAMES ? 0 : missed;
+    const double frames = odometry->standing == CREATE_STANDS ? 0 : missed;
     step->distance += frames * odometry->asked_m;
     step->angle += frames * odometry->asked_rad;
     step->loose_distance = ESTIMATE_SIGMA * fabs(frames * odometry->asked_m);
@@ -191,11 +181,12 @@ static struct create_step step_by_values(struct create_odometry *odometry, const
 
 struct create_step create_odometry_take(struct create_odometry *odometry, const struct create_frame *frame)
 {
-    const double d = odometry_asked_distance(frame), a = odometry_asked_angle(odometry, frame);
-    watch_stillness(odometry, frame, d, a);
-    remainder_watch(odometry, frame, d);
-    odometry->distance = choose(odometry, d, DISTANCE_UNIT_M);
-    odometry->angle = choose(odometry, a, ANGLE_UNIT_RAD);
+    const double d = asked_distance(frame), a = asked_angle(odometry, frame);
+    const struct odometry_units asked = {d / DISTANCE_UNIT_M, a / ANGLE_UNIT_RAD};
+    standing_watch(odometry, frame, asked);
+    remainder_watch(odometry, frame, asked);
+    odometry->distance = choose(odometry, asked.distance);
+    odometry->angle = choose(odometry, asked.angle);
     const struct create_step step = odometry->distance == CREATE_ENCODERS ? step_by_encoders(odometry, frame)
                                                                           : step_by_values(odometry, frame, d, a);
     odometry->asked_m = d;

@@ -1,52 +1,100 @@
+/*
+ * Whether a Create 1 keeps or drops what is less than a unit, from every settled frame of straight drives and turns.
+ *
+ * Wheels that were asked for x units a frame turn by x within SPREAD. A firmware that keeps remainders then tells one
+ * of the two whole numbers about that, each as often as its distance from the other; one that drops them tells the
+ * lower one, always. Each way is tested by Page's test (Biometrika 41, 1954): the sum of log(chance on average if the
+ * other way counts / greatest chance if this way counts), never below 0; the greatest over all motions within SPREAD,
+ * so that no wheel error speaks against a way that is in use. The chance that such a sum reaches S within n frames
+ * is below n exp(-S): S = FIRST for the first verdict, REVISED to change it. A body that stands tells nothing, and too
+ * little is never evidence that remainders are dropped; the sums outlast interruptions, and go on: another base is
+ * noticed.
+ */
 #include <math.h>
 
 #include "odometry.h"
 
-#define UNIT_M 1e-3 /* of packet 19 */
-/* The two ways to count must differ by this share of the distance before a distance tells them apart: more than the
- * wheels' own error of 5 % (paper), twice. */
-#define CONTRAST 0.2
-#define EVIDENCE_M 0.1
+/* Chance of a number that neither way tells: an uneven period, damage that the sum of a frame does not show. */
+#define STRAY 0.01
+#define FIRST 12
+#define REVISED 20
+/* Wheels reach a new speed within 150 ms (assumed). */
+#define SETTLED_FRAMES 10
+#define POINTS 5 /* motions within SPREAD that an average is taken over */
 
-static bool straight_and_free(const struct create_frame *frame)
-{
-    return frame->missed == 0 && frame->value[CREATE_OI_BUMPS_DROPS] == 0 &&
-           frame->value[CREATE_OI_REQUESTED_LEFT] == frame->value[CREATE_OI_REQUESTED_RIGHT];
-}
+/* The chances of one told number: on average, and at best, over the motions that are possible. */
+struct chances {
+    double average, best;
+};
 
-static void forget(struct create_odometry *odometry)
+static struct chances if_kept(double least, double most, double told)
 {
-    odometry->kept_m = odometry->dropped_m = odometry->told_m = 0;
-}
-
-/* A base that stands before a wall tells nothing either: less than a firmware that drops would tell is no evidence. */
-static void judge(struct create_odometry *odometry)
-{
-    const double middle = (odometry->kept_m + odometry->dropped_m) / 2;
-    if (odometry->told_m > middle) {
-        odometry->remainder = CREATE_KEPT;
-    } else if (odometry->told_m > odometry->dropped_m / 2) {
-        odometry->remainder = CREATE_DROPPED;
+    const double away = fmax(0, fmax(told - most, least - told));
+    double sum = 0;
+    for (int i = 0; i < POINTS; i++) {
+        sum += fmax(0, 1 - fabs(told - (least + (most - least) * i / (POINTS - 1))));
     }
-    forget(odometry);
+    return (struct chances){fmax(STRAY, sum / POINTS), fmax(STRAY, 1 - away)};
 }
 
-void remainder_watch(struct create_odometry *odometry, const struct create_frame *frame, double asked_m)
+static struct chances if_dropped(double least, double most, double told)
 {
-    const double asked = fabs(asked_m);
-    if (!straight_and_free(frame) || asked == 0) {
-        forget(odometry);
+    int equal = 0;
+    for (int i = 0; i < POINTS; i++) {
+        equal += fabs(floor(least + (most - least) * i / (POINTS - 1)) - told) < 0.5;
+    }
+    const bool possible = told >= floor(least) && told <= floor(most);
+    return (struct chances){fmax(STRAY, (double)equal / POINTS), possible ? 1 : STRAY};
+}
+
+/* A number told for a motion that was asked for, both in units and in the direction of that motion. */
+static void weigh(struct create_evidence *evidence, double asked, double told)
+{
+    const double least = asked * (1 - ODOMETRY_SPREAD), most = asked * (1 + ODOMETRY_SPREAD);
+    if (told < floor(least) || told > ceil(most)) {
+        return; /* it stands or is held back, or this is not its motion */
+    }
+    const struct chances kept = if_kept(least, most, told), dropped = if_dropped(least, most, told);
+    if (told > 0) {
+        evidence->against_kept = fmax(0, evidence->against_kept + log(dropped.average / kept.best));
+    }
+    evidence->against_dropped = fmax(0, evidence->against_dropped + log(kept.average / dropped.best));
+}
+
+static void weigh_part(struct create_evidence *evidence, double asked, int32_t told)
+{
+    if (asked != 0) {
+        weigh(evidence, fabs(asked), asked > 0 ? told : -told);
+    }
+}
+
+/* Frames since the wheels were asked for other speeds, or a frame was missed. */
+static uint32_t settle(struct create_evidence *evidence, const struct create_frame *frame)
+{
+    const int32_t left = frame->value[CREATE_OI_REQUESTED_LEFT], right = frame->value[CREATE_OI_REQUESTED_RIGHT];
+    const bool same = frame->missed == 0 && left == evidence->left && right == evidence->right;
+    evidence->settled = same ? evidence->settled + 1 : 0;
+    evidence->left = left;
+    evidence->right = right;
+    return evidence->settled;
+}
+
+static void decide(struct create_odometry *odometry)
+{
+    struct create_evidence *evidence = &odometry->evidence;
+    const double enough = odometry->remainder == CREATE_UNKNOWN ? FIRST : REVISED;
+    if (evidence->against_kept >= enough || evidence->against_dropped >= enough) {
+        odometry->remainder = evidence->against_kept > evidence->against_dropped ? CREATE_DROPPED : CREATE_KEPT;
+        evidence->against_kept = evidence->against_dropped = 0;
+    }
+}
+
+void remainder_watch(struct create_odometry *odometry, const struct create_frame *frame, struct odometry_units asked)
+{
+    if (settle(&odometry->evidence, frame) < SETTLED_FRAMES || frame->value[CREATE_OI_BUMPS_DROPS] != 0) {
         return;
     }
-    odometry->kept_m += asked;
-    odometry->dropped_m += floor(asked / UNIT_M) * UNIT_M;
-    odometry->told_m += copysign(1, asked_m) * frame->value[CREATE_OI_DISTANCE] * UNIT_M;
-    if (odometry->kept_m < EVIDENCE_M) {
-        return;
-    }
-    if (odometry->kept_m - odometry->dropped_m >= CONTRAST * odometry->kept_m) {
-        judge(odometry);
-    } else {
-        forget(odometry);
-    }
+    weigh_part(&odometry->evidence, asked.distance, frame->value[CREATE_OI_DISTANCE]);
+    weigh_part(&odometry->evidence, asked.angle, frame->value[CREATE_OI_ANGLE]);
+    decide(odometry);
 }

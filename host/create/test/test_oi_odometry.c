@@ -91,10 +91,10 @@ static void auto_sees_the_whisk_before_it_knows_the_firmware(void **state)
     (void)state;
     for (int keeps = 0; keeps < 2; keeps++) {
         struct base base = begin(CREATE_1, CREATE_AUTO, keeps);
-        whisk(&base, 3);
+        whisk(&base, 0.6);
         assert_int_equal(base.odometry.remainder, CREATE_UNKNOWN);
         assert_int_equal(base.odometry.angle, CREATE_REQUESTED);
-        assert_close(base.motion.theta, 3 * WHISK_RAD_S, 1e-9);
+        assert_close(base.motion.theta, 0.6 * WHISK_RAD_S, 1e-9);
     }
 }
 
@@ -146,6 +146,74 @@ static void before_a_wall_nothing_is_integrated_nor_learnt(void **state)
     drive(&base, 100, 100, 3, 0);
     assert_int_equal(base.odometry.remainder, CREATE_UNKNOWN);
     assert_close(base.motion.x, 2 * 100e-3 * PERIOD_S, 1e-9); /* until it was noticed */
+}
+
+#define TURN_MM_S 92 /* 0.71 rad/s, the exploration's: 0.61 degrees a frame */
+#define TURN_FRAME_RAD (2 * TURN_MM_S * 1e-3 / 0.258 * PERIOD_S)
+
+/* Zeros are what a body tells that stands: only whole units in a turn are evidence, and these against dropping. */
+static void slow_turns_tell_that_remainders_are_kept_and_never_that_they_are_dropped(void **state)
+{
+    (void)state;
+    struct base base = begin(CREATE_1, CREATE_AUTO, true);
+    drive(&base, -TURN_MM_S, TURN_MM_S, 1, 0.95);
+    assert_int_equal(base.odometry.remainder, CREATE_KEPT);
+    base = begin(CREATE_1, CREATE_AUTO, false);
+    drive(&base, -TURN_MM_S, TURN_MM_S, 60, 0.95);
+    drive(&base, -30, -30, 60, 1);
+    assert_int_equal(base.odometry.remainder, CREATE_UNKNOWN);
+    assert_int_equal(base.odometry.standing, CREATE_CANNOT_TELL);
+}
+
+/* Spans of 0.3 s at the exploration's speed, a wall every other time: none alone decides. */
+static void evidence_outlasts_interruptions(void **state)
+{
+    (void)state;
+    struct base base = begin(CREATE_1, CREATE_AUTO, false);
+    for (int i = 0; i < 40; i++) {
+        drive(&base, 150, 150, 0.3, 1);
+        drive(&base, 0, 0, 0.3, 1);
+        drive(&base, -150, -150, 0.3, 0);
+    }
+    assert_int_equal(base.odometry.remainder, CREATE_DROPPED);
+}
+
+/* The bytes of a frame that was damaged in a way its sum does not show, now and then. */
+static void stray_numbers_are_not_believed(void **state)
+{
+    (void)state;
+    struct base base = begin(CREATE_1, CREATE_AUTO, false);
+    for (int i = 0; i < 50; i++) {
+        drive(&base, -TURN_MM_S, TURN_MM_S, 3, 1);
+        base.degrees += 1;
+    }
+    assert_int_equal(base.odometry.remainder, CREATE_UNKNOWN);
+}
+
+/* Known to keep remainders, a base that turns slower than a unit a frame is noticed when it is held. */
+static void a_held_turn_is_noticed_where_remainders_are_kept(void **state)
+{
+    (void)state;
+    struct base base = begin(CREATE_1, CREATE_REQUESTED, true);
+    drive(&base, -TURN_MM_S, TURN_MM_S, 1, 1);
+    assert_int_equal(base.odometry.remainder, CREATE_KEPT);
+    assert_int_equal(base.odometry.standing, CREATE_MOVES);
+    base.motion = (struct create_motion){0};
+    drive(&base, -TURN_MM_S, TURN_MM_S, 10, 0);
+    assert_int_equal(base.odometry.standing, CREATE_STANDS);
+    assert_true(base.motion.theta < 10 * TURN_FRAME_RAD); /* of 667 frames */
+    drive(&base, -TURN_MM_S, TURN_MM_S, 4 * PERIOD_S, 1);
+    assert_int_equal(base.odometry.standing, CREATE_MOVES);
+}
+
+/* Before a wall, at a third of its speed: what was told is integrated, which is at least nearer. */
+static void a_body_that_is_held_back_is_believed_rather_than_its_orders(void **state)
+{
+    (void)state;
+    struct base base = begin(CREATE_1, CREATE_REQUESTED, true);
+    drive(&base, 150, 150, 3, 0.33);
+    assert_int_equal(base.odometry.standing, CREATE_STANDS);
+    assert_close(base.motion.x, 0.33 * 0.45, 0.03);
 }
 
 static void requested_speeds_are_less_sure_than_reported_ones(void **state)
@@ -268,6 +336,11 @@ int main(void)
         cmocka_unit_test(a_straight_drive_tells_that_remainders_are_dropped),
         cmocka_unit_test(only_a_speed_that_tells_them_apart_is_evidence),
         cmocka_unit_test(before_a_wall_nothing_is_integrated_nor_learnt),
+        cmocka_unit_test(slow_turns_tell_that_remainders_are_kept_and_never_that_they_are_dropped),
+        cmocka_unit_test(evidence_outlasts_interruptions),
+        cmocka_unit_test(stray_numbers_are_not_believed),
+        cmocka_unit_test(a_held_turn_is_noticed_where_remainders_are_kept),
+        cmocka_unit_test(a_body_that_is_held_back_is_believed_rather_than_its_orders),
         cmocka_unit_test(requested_speeds_are_less_sure_than_reported_ones),
         cmocka_unit_test(wheel_base_and_scales_are_settings),
         cmocka_unit_test(motion_of_missed_frames_is_estimated),

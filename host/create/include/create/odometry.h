@@ -26,6 +26,20 @@ enum create_source {
 
 enum create_remainder { CREATE_UNKNOWN, CREATE_KEPT, CREATE_DROPPED };
 
+/* Whether the body moves as the wheels were asked to, as far as the base tells it. */
+enum create_standing {
+    CREATE_MOVES,      /* or was not asked to */
+    CREATE_STANDS,     /* less than half of the motion, over some frames */
+    CREATE_CANNOT_TELL /* less than a unit a frame, and remainders are dropped or may be: it would tell the same */
+};
+
+/* What speaks against either way to treat remainders: sums of logarithms of likelihood ratios, at least 0. */
+struct create_evidence {
+    double against_kept, against_dropped;
+    int32_t left, right; /* asked for in the newest frame, mm/s */
+    uint32_t settled;    /* frames since that changed */
+};
+
 struct create_odometry_settings {
     enum create_model model;
     enum create_source policy;
@@ -42,8 +56,9 @@ struct create_odometry {
     enum create_remainder remainder;    /* what this firmware has been seen to do */
     enum create_source distance, angle; /* in force at the newest frame */
     uint64_t estimated;                 /* frames that never came, whose motion was estimated */
-    double kept_m, dropped_m, told_m;   /* evidence about the remainder: what it would tell, and what it told */
-    uint32_t still;                     /* frames in a row that told no motion though enough was asked for */
+    struct create_evidence evidence;    /* about the remainder */
+    enum create_standing standing;
+    double owed; /* units that should have been told and were not */
     bool started;
     double asked_m, asked_rad; /* motion asked for in the newest frame */
     int32_t left, right;       /* encoders at the newest frame */

@@ -1,0 +1,41 @@
+/*
+ * A body that was asked to move and does not.
+ *
+ * Every frame a body that moves as asked tells at least so many units: all but the wheels' error where remainders are
+ * kept, whole units of that otherwise. What is owed of this is summed up; every unit told pays for two, so that only
+ * less than half of it lets the sum grow. Where the firmware drops remainders, or may, and less than a unit is asked
+ * for, nothing is owed: a body that stands cannot be told from one that moves.
+ */
+#include <math.h>
+
+#include "odometry.h"
+
+#define PATIENCE 3 /* frames' worth, or units if that is more */
+#define PAYS 2
+
+static double least(const struct create_odometry *odometry, double asked)
+{
+    const double units = fabs(asked) * (1 - ODOMETRY_SPREAD);
+    return odometry->remainder == CREATE_KEPT ? units : floor(units);
+}
+
+/* Units told in the direction that was asked for. */
+static double paid(double asked, int32_t told)
+{
+    return asked > 0 ? told : asked < 0 ? -told : 0;
+}
+
+void standing_watch(struct create_odometry *odometry, const struct create_frame *frame, struct odometry_units asked)
+{
+    const double expected = least(odometry, asked.distance) + least(odometry, asked.angle);
+    const double told =
+        paid(asked.distance, frame->value[CREATE_OI_DISTANCE]) + paid(asked.angle, frame->value[CREATE_OI_ANGLE]);
+    const double limit = PATIENCE * fmax(1, expected);
+    if (expected <= 0) {
+        odometry->owed = 0;
+        odometry->standing = asked.distance != 0 || asked.angle != 0 ? CREATE_CANNOT_TELL : CREATE_MOVES;
+        return;
+    }
+    odometry->owed = fmin(limit, fmax(0, odometry->owed + expected - PAYS * told));
+    odometry->standing = odometry->owed >= limit ? CREATE_STANDS : CREATE_MOVES;
+}
