@@ -17,7 +17,8 @@ from whisker.ring import FRAME, Clock
 HIL = Path(__file__).parent / "hil"
 sys.path.insert(0, str(HIL))
 from base_checks import SILENT_FRAMES, await_stop  # noqa: E402
-from bridge_checks import SETTLE_TICKS, Rig, Stream, judge_clock  # noqa: E402
+from bridge_checks import judge_clock  # noqa: E402
+from bridge_rig import SETTLE_TICKS, Rig, Stream  # noqa: E402
 from checks import CheckError, SkipError  # noqa: E402
 
 LONG_S = 3600

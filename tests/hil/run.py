@@ -11,6 +11,7 @@ from pathlib import Path
 
 import base_checks
 import bridge_checks
+import bridge_rig
 from checks import Checks
 
 PORT = "WHISKER_BASE_PORT"
@@ -36,7 +37,7 @@ def arguments() -> argparse.Namespace:
 def main() -> int:
     given = arguments()
     port = Path(given.base) if given.base else None
-    rigs = bridge_checks.named(bridge_checks.Rig(given.seconds, given.interactive, given.simulated, given.root))
+    rigs = bridge_checks.named(bridge_rig.Rig(given.seconds, given.interactive, given.simulated, given.root))
     rigs |= base_checks.named(base_checks.Rig(port, given.seconds, given.model, given.wheels_up, given.simulated))
     checks = Checks(given.names)
     for name, check in rigs.items():
