@@ -230,7 +230,7 @@ static bool moving(const struct base_robot *robot)
 static uint32_t frames_of_gap(const struct base_robot *robot, int64_t now_ms)
 {
     const int64_t gap_ms = now_ms - robot->frame_ms;
-    const bool gap = !robot->options->stream_clock && robot->frame_ms > 0 && gap_ms > BASE_SILENCE_MS;
+    const bool gap = !robot->options->stream_clock && robot->frame_ms > 0 && gap_ms >= BASE_SILENCE_MS;
     return gap ? (uint32_t)(gap_ms / CREATE_OI_PERIOD_MS - 1) : 0;
 }
 

@@ -47,13 +47,12 @@ static struct chances if_dropped(double least, double most, double told)
     return (struct chances){fmax(STRAY, (double)equal / POINTS), possible ? 1 : STRAY};
 }
 
-/* A number told for a motion that was asked for, both in units and in the direction of that motion. */
+/* A number told for a motion that was asked for, both in units and in the direction of that motion. What neither way
+ * tells, as of a body that stands or is held back, weighs nothing. Nor does 0 against kept remainders where dropped
+ * ones would tell it: a body that stands tells it too. */
 static void weigh(struct create_evidence *evidence, double asked, double told)
 {
     const double least = asked * (1 - ODOMETRY_SPREAD), most = asked * (1 + ODOMETRY_SPREAD);
-    if (told < floor(least) || told > ceil(most)) {
-        return; /* it stands or is held back, or this is not its motion */
-    }
     const struct chances kept = if_kept(least, most, told), dropped = if_dropped(least, most, told);
     if (told > 0) {
         evidence->against_kept = fmax(0, evidence->against_kept + log(dropped.average / kept.best));

@@ -42,7 +42,7 @@ static void a_stop_ends_any_order_cut_short(void **state)
     uint8_t bytes[CREATE_COMMAND_BYTES];
     const size_t count = create_put_stop(bytes);
     assert_true(count <= CREATE_COMMAND_BYTES);
-    assert_int_equal(bytes[count - 5], CREATE_OI_OP_DRIVE_DIRECT);
+    assert_true(count - 5 >= 16); /* the longest the driver sends: a stream of 16 packets, all of them missing */
     for (size_t i = 0; i < count; i++) {
         assert_int_equal(bytes[i], i == count - 5 ? CREATE_OI_OP_DRIVE_DIRECT : 0);
     }
