@@ -13,7 +13,7 @@ help: ## this list
 demo: build ## the whole chain on simulated hardware, magnet to pose: about two minutes; SEED=n chooses the seed
 	@$(PYTHON) -m whisker.demo --out build/demo --build-dir $(BUILD) --seed $(SEED)
 
-demo-long: build ## 30 simulated minutes of the whole robot, with a report; SEED=n, LEVEL=signals (half a minute), bytes or rtl
+demo-long: build ## 30 simulated minutes of the whole robot, with a report; SEED=n; LEVEL=bytes, or signals (a minute), or rtl
 	@$(PYTHON) -m whisker.demo.long --out build/demo-long --build-dir $(BUILD) --seed $(SEED) --level $(LEVEL)
 
 test: build lint ## everything that fits in 15 minutes on two cores

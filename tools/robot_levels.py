@@ -40,6 +40,7 @@ FIRST_SEED = 8101
 POSES = ("x_m", "y_m", "theta_rad")
 FAR_M = 0.03  # a contact may be so far beyond the whisker's straight tip
 INTERVAL, DRAWS = (2.5, 97.5), 10_000
+LEAST_SEEDS = 5  # of an interval that is worth telling
 
 
 @dataclass(frozen=True)
@@ -268,6 +269,7 @@ def paired(ours: dict[str, dict], theirs: dict[str, dict]) -> dict:
 
 # ---------------------------------------------------------------------------------------------------------------------
 
+ERROR_TICKS_M = (0.02, 0.05, 0.1, 0.2, 0.5)
 SHOWN = (
     ("adaptive_error_median_m", "o", "black", "adaptive"),
     ("pose_error_median_m", "s", "0.45", "grid"),
@@ -276,59 +278,41 @@ SHOWN = (
 
 
 def draw(found: dict) -> Figure:
-    """Error and accuracy against real-time factor: medians over seeds, bars from quartile to quartile."""
-    figure = Figure(figsize=(9.5, 7.5), layout="constrained")
-    top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+    """A row for each level, the fastest last: real-time factor, errors, texture. Medians over seeds, bars between quartiles."""
     ordered = sorted(found["levels"].items(), key=lambda item: item[1]["realtime_factor"])
-    for n, (key, marker, colour, label) in enumerate(SHOWN):
-        _draw_points(top, ordered, key, 1.0 + 0.05 * (n - 1), marker, colour, label)
-    _draw_points(bottom, ordered, "texture_accuracy", 1.0, "o", "black", None, 100.0)
-    _name_levels(bottom, ordered)
-    top.set(yscale="log", ylabel="median position error over 60 s (m)")
-    top.legend(frameon=False, ncols=3)
-    bottom.set(
-        xscale="log",
-        ylabel="texture windows right (%)",
-        xlabel="simulated seconds per processor second, world to poses",
+    figure = Figure(figsize=(11.0, 0.48 * len(ordered) + 1.6), layout="constrained")
+    speed, error, texture = figure.subplots(1, 3, sharey=True, width_ratios=(2, 3, 2))
+    speed.plot(
+        [level["realtime_factor"] for _, level in ordered], range(len(ordered)), "D-", color="0.2", linewidth=0.8
     )
-    for axes in (top, bottom):
-        axes.axvline(1.0, color="0.3", linewidth=0.8, linestyle=":")
-        axes.grid(axis="y", linewidth=0.3)
+    for n, (key, marker, colour, label) in enumerate(SHOWN):
+        _draw_points(error, ordered, key, 0.17 * (n - 1), marker, colour, label)
+    _draw_points(texture, ordered, "texture_accuracy", 0.0, "o", "black", None, 100.0)
+    speed.set(xscale="log", xlabel="simulated seconds per\nprocessor second, world to poses")
+    speed.axvline(1.0, color="0.3", linewidth=0.8, linestyle=":")
+    error.set(xscale="log", xlabel="median position error over 60 s (m)")
+    error.set_xticks(ERROR_TICKS_M, map(str, ERROR_TICKS_M))
+    error.minorticks_off()
+    texture.set(xlabel="texture windows right (%)")
+    speed.set_yticks(range(len(ordered)), [f"{TITLES[name]} (n={level['seeds']})" for name, level in ordered])
+    for axes in (speed, error, texture):
+        axes.grid(axis="both", linewidth=0.3)
+    figure.legend(*error.get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False)
     return figure
 
 
 def _draw_points(axes, ordered, key: str, shift: float, marker: str, colour: str, label: str | None, scale=1.0) -> None:
-    x = [level["realtime_factor"] * shift for _, level in ordered]
+    y = [row + shift for row in range(len(ordered))]
     low, middle, high = scale * np.array([level["quartiles"][key] for _, level in ordered]).T
-    axes.errorbar(
-        x, middle, (middle - low, high - middle), fmt=marker, color=colour, label=label, capsize=2, linewidth=0.8
-    )
-
-
-def _name_levels(axes, ordered) -> None:
-    """Names under the points, on lines of their own where they are near each other."""
-    low = 100.0 * min(level["quartiles"]["texture_accuracy"][0] for _, level in ordered)
-    floor = low - 1.0
-    for n, (name, level) in enumerate(ordered):
-        text = f"{TITLES[name]} (n={level['seeds']})"
-        y = floor - 0.9 * (n % 5)
-        axes.annotate(text, (level["realtime_factor"], y), ha="center", va="top", fontsize=7.5)
-        axes.plot(
-            [level["realtime_factor"]] * 2,
-            [y, 100.0 * level["quartiles"]["texture_accuracy"][0]],
-            color="0.8",
-            linewidth=0.6,
-            zorder=0,
-        )
-    axes.set_ylim(floor - 5.0, 100.5)
-    axes.margins(x=0.12)
+    bars = (middle - low, high - middle)
+    axes.errorbar(middle, y, xerr=bars, fmt=marker, color=colour, label=label, capsize=2, linewidth=0.9)
 
 
 def draw_pairs(found: dict) -> Figure:
-    """Paired differences with their intervals."""
+    """Paired differences with their intervals; without `rest`, whose are beyond any scale."""
     figure = Figure(figsize=(9.5, 4.2), layout="constrained")
     panels = figure.subplots(1, 3, sharey=True)
-    names = list(found["pairs"])
+    names = [name for name in found["pairs"] if not name.startswith("signals_rest")]
     keys = (
         ("adaptive_error_median_m", 1000.0, "adaptive: error (mm)"),
         ("pose_error_median_m", 1000.0, "grid: error (mm)"),
@@ -339,8 +323,10 @@ def draw_pairs(found: dict) -> Figure:
         for row, name in enumerate(names):
             pair = found["pairs"][name][key]
             low, high = (scale * value for value in pair["interval"])
-            axes.plot([low, high], [row, row], color="0.4")
-            axes.plot(scale * pair["mean"], row, "ko", fillstyle="full" if low > 0 or high < 0 else "none")
+            enough = found["pairs"][name]["seeds"] >= LEAST_SEEDS
+            axes.plot([low, high] if enough else [], [row, row] if enough else [], color="0.4")
+            certain = enough and (low > 0 or high < 0)
+            axes.plot(scale * pair["mean"], row, "ko", fillstyle="full" if certain else "none")
         axes.axvline(0.0, color="0.3", linewidth=0.8, linestyle=":")
         axes.set(
             xlabel=f"difference, {title}",
