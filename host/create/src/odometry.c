@@ -65,19 +65,19 @@ static double asked_angle(const struct create_odometry *odometry, const struct c
     return apart * 1e-3 / odometry->settings.wheel_base_m * PERIOD_S;
 }
 
-/* The source of a part of the motion, of which so many units were asked for. */
+static bool counts_encoders(const struct create_odometry_settings *settings)
+{
+    return settings->policy == CREATE_ENCODERS ||
+           (settings->policy == CREATE_AUTO && create_model_facts(settings->model)->count_m > 0);
+}
+
+/* The source of a part of the motion, of which so many units were asked for, where there are no encoders. */
 static enum create_source choose(const struct create_odometry *odometry, double asked)
 {
-    const struct create_odometry_settings *settings = &odometry->settings;
-    const bool automatic = settings->policy == CREATE_AUTO;
-    if (automatic && create_model_facts(settings->model)->count_m > 0) {
-        return CREATE_ENCODERS;
-    }
-    if (automatic ? odometry->remainder == CREATE_KEPT || fabs(asked) >= WELL_ABOVE
-                  : settings->policy != CREATE_REQUESTED) {
-        return automatic ? CREATE_REPORTED : settings->policy;
-    }
-    return odometry->standing == CREATE_STANDS ? CREATE_REPORTED : CREATE_REQUESTED;
+    const bool trusted = odometry->remainder == CREATE_KEPT || fabs(asked) >= WELL_ABOVE;
+    const bool reported = odometry->settings.policy == CREATE_REPORTED ||
+                          (odometry->settings.policy == CREATE_AUTO && trusted) || odometry->standing == CREATE_STANDS;
+    return reported ? CREATE_REPORTED : CREATE_REQUESTED;
 }
 
 static int32_t counted(int32_t now, int32_t before)
@@ -151,6 +151,11 @@ static void add_estimate(struct create_odometry *odometry, struct create_step *s
     odometry->estimated += missed;
 }
 
+static struct odometry_units units(double distance_m, double angle_rad)
+{
+    return (struct odometry_units){distance_m / DISTANCE_UNIT_M, angle_rad / ANGLE_UNIT_RAD};
+}
+
 static struct create_step step_by_encoders(struct create_odometry *odometry, const struct create_frame *frame)
 {
     const struct create_odometry_settings *settings = &odometry->settings;
@@ -172,6 +177,12 @@ static struct create_step step_by_encoders(struct create_odometry *odometry, con
 static struct create_step step_by_values(struct create_odometry *odometry, const struct create_frame *frame, double d,
                                          double a)
 {
+    const struct odometry_units asked = units(d, a);
+    const struct odometry_units told = {frame->value[CREATE_OI_DISTANCE], frame->value[CREATE_OI_ANGLE]};
+    standing_watch(odometry, asked, told, odometry->remainder == CREATE_KEPT);
+    remainder_watch(odometry, frame, asked);
+    odometry->distance = choose(odometry, asked.distance);
+    odometry->angle = choose(odometry, asked.angle);
     struct create_step step = step_of(odometry, read_distance(odometry, frame, d), read_angle(odometry, frame, a));
     if (frame->missed > 0) {
         add_estimate(odometry, &step, frame->missed);
@@ -182,13 +193,14 @@ static struct create_step step_by_values(struct create_odometry *odometry, const
 struct create_step create_odometry_take(struct create_odometry *odometry, const struct create_frame *frame)
 {
     const double d = asked_distance(frame), a = asked_angle(odometry, frame);
-    const struct odometry_units asked = {d / DISTANCE_UNIT_M, a / ANGLE_UNIT_RAD};
-    standing_watch(odometry, frame, asked);
-    remainder_watch(odometry, frame, asked);
-    odometry->distance = choose(odometry, asked.distance);
-    odometry->angle = choose(odometry, asked.angle);
-    const struct create_step step = odometry->distance == CREATE_ENCODERS ? step_by_encoders(odometry, frame)
-                                                                          : step_by_values(odometry, frame, d, a);
+    struct create_step step;
+    if (counts_encoders(&odometry->settings)) {
+        odometry->distance = odometry->angle = CREATE_ENCODERS;
+        step = step_by_encoders(odometry, frame);
+        standing_watch(odometry, units(d, a), units(step.distance, step.angle), true);
+    } else {
+        step = step_by_values(odometry, frame, d, a);
+    }
     odometry->asked_m = d;
     odometry->asked_rad = a;
     return step;

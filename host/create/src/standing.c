@@ -13,29 +13,29 @@
 #define PATIENCE 3 /* frames' worth, or units if that is more */
 #define PAYS 2
 
-static double least(const struct create_odometry *odometry, double asked)
+static double least(double asked, bool exact)
 {
     const double units = fabs(asked) * (1 - ODOMETRY_SPREAD);
-    return odometry->remainder == CREATE_KEPT ? units : floor(units);
+    return exact ? units : floor(units);
 }
 
 /* Units told in the direction that was asked for. */
-static double paid(double asked, int32_t told)
+static double paid(double asked, double told)
 {
     return asked > 0 ? told : asked < 0 ? -told : 0;
 }
 
-void standing_watch(struct create_odometry *odometry, const struct create_frame *frame, struct odometry_units asked)
+void standing_watch(struct create_odometry *odometry, struct odometry_units asked, struct odometry_units told,
+                    bool exact)
 {
-    const double expected = least(odometry, asked.distance) + least(odometry, asked.angle);
-    const double told =
-        paid(asked.distance, frame->value[CREATE_OI_DISTANCE]) + paid(asked.angle, frame->value[CREATE_OI_ANGLE]);
+    const double expected = least(asked.distance, exact) + least(asked.angle, exact);
     const double limit = PATIENCE * fmax(1, expected);
     if (expected <= 0) {
         odometry->owed = 0;
         odometry->standing = asked.distance != 0 || asked.angle != 0 ? CREATE_CANNOT_TELL : CREATE_MOVES;
         return;
     }
-    odometry->owed = fmin(limit, fmax(0, odometry->owed + expected - PAYS * told));
+    const double got = paid(asked.distance, told.distance) + paid(asked.angle, told.angle);
+    odometry->owed = fmin(limit, fmax(0, odometry->owed + expected - PAYS * got));
     odometry->standing = odometry->owed >= limit ? CREATE_STANDS : CREATE_MOVES;
 }

@@ -309,6 +309,26 @@ static void encoders_bridge_missed_frames_and_a_new_beginning_does_not_count(voi
     assert_close(base.motion.x, 91 * 0.000444565, 1e-7);
 }
 
+/* Encoders count, whatever the packets 19 and 20 of an old firmware tell: here nothing. */
+static void encoders_tell_that_a_body_stands(void **state)
+{
+    (void)state;
+    struct base base = begin(CREATE_2, CREATE_AUTO, true);
+    struct create_frame frame = {0};
+    frame.value[CREATE_OI_REQUESTED_LEFT] = -100;
+    frame.value[CREATE_OI_REQUESTED_RIGHT] = 100;
+    for (int i = 0; i < 20; i++) {
+        frame.value[CREATE_OI_ENCODER_LEFT] -= 3; /* 1.33 of 1.5 mm */
+        frame.value[CREATE_OI_ENCODER_RIGHT] += 3;
+        take(&base, &frame);
+        assert_int_equal(base.odometry.standing, CREATE_MOVES);
+    }
+    for (int i = 0; i < 10; i++) {
+        take(&base, &frame);
+    }
+    assert_int_equal(base.odometry.standing, CREATE_STANDS);
+}
+
 static void settings_that_cannot_be_are_refused(void **state)
 {
     (void)state;
@@ -346,6 +366,7 @@ int main(void)
         cmocka_unit_test(motion_of_missed_frames_is_estimated),
         cmocka_unit_test(encoders_wrap),
         cmocka_unit_test(encoders_bridge_missed_frames_and_a_new_beginning_does_not_count),
+        cmocka_unit_test(encoders_tell_that_a_body_stands),
         cmocka_unit_test(settings_that_cannot_be_are_refused),
     };
     return cmocka_run_group_tests_name("odometry", tests, NULL, NULL);
