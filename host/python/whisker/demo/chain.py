@@ -16,9 +16,6 @@ from pathlib import Path
 from ..children import Child, Program
 from ..report.run import FILTERS
 
-# What the wheels counted, by model of Create. `auto` would integrate the speeds ordered of a Create 1: at this robot's speeds
-# it cannot find out that the emulator keeps remainders; and the simulated wheels run just as ordered.
-ODOMETRY = {1: "reported", 2: "encoders"}
 FOLLOWERS = 2  # whisker-log and the pilot
 POLL_S = 0.05
 LAGGARD_S = 20.0  # for the readers to end after the simulation has
@@ -136,9 +133,7 @@ def _log(run: ChainRun, places: Places) -> Program:
 
 def _base(run: ChainRun, places: Places) -> Program:
     command = [run.program("whisker-base"), "--port", places.serial, "--socket", places.base]
-    return Program.of(
-        "base", [*command, "--model", run.create, "--odometry", ODOMETRY[run.create], "--clock", "stream"], serves=True
-    )
+    return Program.of("base", [*command, "--model", run.create, "--clock", "stream"], serves=True)
 
 
 def _pilot(run: ChainRun, places: Places) -> Program:
