@@ -22,7 +22,8 @@ import robot_levels
 import robot_odometry
 import robot_page
 
-from whisker.report import figures
+from whisker.report import figures, long_figures
+from whisker.report.run import Run
 
 ROOT = Path(__file__).resolve().parent.parent
 RESULTS, CHARTS, CACHE = ROOT / "bench/results", ROOT / "docs/charts", ROOT / "build/bench/robot"
@@ -76,14 +77,22 @@ def gather() -> dict:
     return {"levels": robot_levels.gather(CACHE / "levels")} | found
 
 
+def save(name: str, draw: Callable, data) -> None:
+    """A chart in both its forms."""
+    (CHARTS / f"{name}.svg").write_text(figures.svg(draw, data))
+    figures.png(draw, data, CHARTS / f"{name}.png")
+
+
 def publish() -> None:
     """Results, charts and the page, of what there is."""
     found = gather()
     drawings = {"levels": robot_levels, "odometry": robot_odometry, "latency": robot_latency}
     for part, module in drawings.items():
         for name, draw in module.DRAWINGS.items() if part in found else ():
-            (CHARTS / f"{name}.svg").write_text(figures.svg(draw, found[part]))
-            figures.png(draw, found[part], CHARTS / f"{name}.png")
+            save(name, draw, found[part])
+    shown = next((path for level, seed in LONG_RUNS if (path := CACHE / f"long_{level}_{seed}").is_dir()), None)
+    if shown:
+        save("robot_long", long_figures.errors, Run.load(shown))
     for part, data in found.items():
         (RESULTS / f"robot_{part}.json").write_text(json.dumps(data, indent=1) + "\n")
     (ROOT / "docs/results_robot.md").write_text(robot_page.page(found))

@@ -129,7 +129,8 @@ def _long(found: dict) -> list[str]:
         for name, run in found.items()
     ]
     names = ["run", "driven (m)", "tiles", "contacts", "whisks measured", "texture right", "times real time, wall"]
-    return [*parts, _table(header, rows), _table(names, met)]
+    chart = "![Position error of every estimate over half an hour](charts/robot_long.png)\n\nThe first run above.\n"
+    return [*parts, _table(header, rows), _table(names, met), chart]
 
 
 def _odometry(found: dict) -> list[str]:
