@@ -10,6 +10,7 @@ What is done is kept in build/bench/robot: an interrupted run goes on where it s
 import argparse
 import json
 import shutil
+import signal
 import subprocess
 import sys
 from collections.abc import Callable
@@ -118,6 +119,7 @@ def main() -> int:
     parser.add_argument("--only", nargs="+", choices=PARTS, default=PARTS, metavar="PART", help=", ".join(PARTS))
     parser.add_argument("--levels", nargs="+", type=int, choices=LEVELS, default=LEVELS, help="of the part levels")
     options = parser.parse_args()
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # a run that is ended leaves no process behind
     run(options.build_dir.resolve(), options.fresh, tuple(options.only), tuple(options.levels))
     return 0
 
