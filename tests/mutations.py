@@ -18,7 +18,15 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 BUILD = "build/release"
-PROGRAMS = {"node_slowest_link": "node_link"}  # tests whose program has another name
+# Tests whose program has another name, and what tests in Python run.
+PROGRAMS = {
+    "node_slowest_link": "node_link",
+    "sim_create.sensors": "test_create_sensors",
+    "sim_create.modes": "test_create_modes",
+    "sim_create.stream": "test_create_stream",
+    "sim_create.remainder": "test_create_remainder",
+    "host/python/tests/test_base.py": "whisker-base",
+}
 
 
 @dataclass(frozen=True)
@@ -222,6 +230,188 @@ MUTATIONS = [
         "sin(",
         "-sin(",
     ),
+    Mutation(
+        "base: a frame is believed without its sum",
+        "test_oi_stream",
+        "host/create/src/stream.c",
+        "if (!sum_is_right(stream)) {",
+        "if (!sum_is_right(stream) && stream->count == 0) {",
+    ),
+    Mutation(
+        "base: a damaged frame takes the next one's beginning with it",
+        "test_oi_stream",
+        "host/create/src/stream.c",
+        "size_t from = 1;",
+        "size_t from = stream->count;",
+    ),
+    Mutation(
+        "base: encoders do not wrap",
+        "test_oi_odometry",
+        "host/create/src/odometry.c",
+        "return (int16_t)(uint16_t)(now - before);",
+        "return now - before;",
+    ),
+    Mutation(
+        "base: a slow turn that tells nothing speaks against kept remainders",
+        "sim_create.remainder",
+        "host/create/src/remainder.c",
+        "    if (told > 0) {",
+        "    if (told >= 0) {",
+    ),
+    Mutation(
+        "base: one stray number decides",
+        "test_oi_odometry",
+        "host/create/src/remainder.c",
+        "#define STRAY 0.01",
+        "#define STRAY 1e-9",
+    ),
+    Mutation(
+        "base: evidence of remainders does not outlast an interruption",
+        "test_oi_odometry",
+        "host/create/src/remainder.c",
+        "    evidence->settled = same ?",
+        "    evidence->against_kept = same ? evidence->against_kept : 0;\n    evidence->settled = same ?",
+    ),
+    Mutation(
+        "base: a held turn is not noticed",
+        "test_oi_odometry",
+        "host/create/src/odometry.c",
+        "told, odometry->remainder == CREATE_KEPT);",
+        "told, odometry->remainder == CREATE_DROPPED);",
+    ),
+    Mutation(
+        "base: orders of a body that stands are integrated",
+        "test_oi_odometry",
+        "host/create/src/odometry.c",
+        "odometry->standing == CREATE_STANDS;\n    return reported",
+        "odometry->standing > CREATE_CANNOT_TELL;\n    return reported",
+    ),
+    Mutation(
+        "base: a stop does not end half an order before it",
+        "test_oi_command",
+        "host/create/src/command.c",
+        "    memset(bytes, 0, PADDING);\n    return PADDING + create_put_drive_direct(bytes + PADDING, 0, 0);",
+        "    return create_put_drive_direct(bytes, 0, 0);",
+    ),
+    Mutation(
+        "base: a silent commander's order goes on",
+        "host/python/tests/test_base.py",
+        "host/apps/whisker_base_robot.c",
+        "if (moving(robot) && now_ms - robot->drive_ms >= BASE_COMMANDER_MS) {",
+        "if (moving(robot) && now_ms - robot->drive_ms >= 1000 * BASE_COMMANDER_MS) {",
+    ),
+    Mutation(
+        "base: the guard leaves the wheels of a dead driver turning",
+        "host/python/tests/test_base.py",
+        "host/apps/whisker_base_guard.c",
+        "    if (!WIFEXITED(status)) {\n        stop_wheels(guard);",
+        "    if (status < 0) {\n        stop_wheels(guard);",
+    ),
+    Mutation(
+        "base: a base that fell silent is driven blind",
+        "host/python/tests/test_base.py",
+        "host/apps/whisker_base_robot.c",
+        "robot->silent = robot->stream.counts.frames > 0;",
+        "robot->silent = false;",
+    ),
+    Mutation(
+        "emulator: remainders are kept whatever the option says",
+        "sim_create.sensors",
+        "sim/create/sensors.c",
+        "create->options.drop_remainder ? now :",
+        "create->options.drop_remainder ? *read + whole / factor :",
+    ),
+    Mutation(
+        "emulator: safe mode drives over a cliff",
+        "sim_create.modes",
+        "sim/create/modes.c",
+        "create->stimuli & CLIFFS && toward_cliff(create)",
+        "create->stimuli & CLIFFS && !toward_cliff(create)",
+    ),
+    Mutation(
+        "emulator: a frame too long for its period is sent whole",
+        "sim_create.stream",
+        "sim/create/serial_line.c",
+        "if (line->frame > 0)",
+        "if (line->frame > QUEUE_MAX)",
+    ),
+    Mutation(
+        "network: messages that never came are not counted",
+        "host/python/tests/test_robot_link.py",
+        "host/python/whisker/robot/streams.py",
+        "self.missed += envelope.number - self.next",
+        "self.missed += 0",
+    ),
+    Mutation(
+        "network: a message that comes again counts twice",
+        "host/python/tests/test_robot_link.py",
+        "host/python/whisker/robot/streams.py",
+        "if envelope.number < self.next:",
+        "if envelope.number + 1 < self.next:",
+    ),
+    Mutation(
+        "network: another release's messages are believed",
+        "host/python/tests/test_robot_link.py",
+        "host/python/whisker/robot/streams.py",
+        "if version != VERSION:",
+        "if version < 0:",
+    ),
+    Mutation(
+        "network: motion of rows that never came is lost",
+        "host/python/tests/test_robot_rows.py",
+        "host/python/whisker/robot/rows.py",
+        "motion = row.motion if rows == 1 else between(last.pose, row.pose)",
+        "motion = row.motion",
+    ),
+    Mutation(
+        "network: a navigator that joins late believes the run's start",
+        "host/python/tests/test_robot_navigator.py",
+        "host/python/whisker/robot/navigator.py",
+        "resumed = self._follower.first_seq > 0",
+        "resumed = self._follower.first_seq < 0",
+    ),
+    Mutation(
+        "pilot: ticks that never came are good samples",
+        "host/python/tests/test_robot_blocks.py",
+        "host/python/whisker/robot/blocks.py",
+        'self._block["status"] = LOST',
+        'self._block["status"] = 0',
+    ),
+    Mutation(
+        "pilot: drives on without word from the base",
+        "host/python/tests/test_pilot_rules.py",
+        "host/python/whisker/behaviour_conditions.py",
+        "return b.bumps.adrift or (b.heard >= 0 and tick - b.heard > LOST_TICKS)",
+        "return b.bumps.adrift",
+    ),
+    Mutation(
+        "pilot: a cliff does not stop it",
+        "host/python/tests/test_pilot_rules.py",
+        "host/python/whisker/behaviour_conditions.py",
+        "return b.bumps.cliff and b.state not in",
+        "return b.bumps.cliff and b.state in",
+    ),
+    Mutation(
+        "pilot: the push lasts from its block's end, not from the onset",
+        "host/python/tests/test_pilot_behaviour.py",
+        "host/python/whisker/behaviour_conditions.py",
+        "return tick >= contact.onset + b.wheels.push_ticks or",
+        "return tick >= b.since + b.wheels.push_ticks or",
+    ),
+    Mutation(
+        "pilot: a blocked body is not felt in odometry",
+        "host/python/tests/test_pilot_behaviour.py",
+        "host/python/whisker/behaviour.py",
+        "self.stuck = self.stuck + 1 if blocked else 0",
+        "self.stuck = 0",
+    ),
+    Mutation(
+        "pilot: searches on the wrong side first",
+        "host/python/tests/test_pilot_behaviour.py",
+        "host/python/whisker/behaviour_effects.py",
+        "b.whisk = Whisk(lane, b.first_turn[lane])",
+        "b.whisk = Whisk(lane, -b.first_turn[lane])",
+    ),
 ]
 
 
@@ -251,16 +441,20 @@ def run_ctest(copy: Path, *options: str) -> str | None:
     return _failed(done.stdout, "***") if done.returncode else None
 
 
-def red_nearby(copy: Path, near: str) -> str | None:
-    """What the test that ought to notice says, or None; only what it needs is built."""
-    if "/" in near:
-        return run_pytest(copy, near)
-    program = PROGRAMS.get(near, near)
+def build_program(copy: Path, program: str) -> bool:
     built = run(["cmake", "--build", BUILD, "--target", program], copy)
     if "unknown target" in built.stdout + built.stderr:
         sys.exit(f"mutations: there is no program {program}; bring the list up to date")
-    if built.returncode:
+    return built.returncode == 0
+
+
+def red_nearby(copy: Path, near: str) -> str | None:
+    """What the test that ought to notice says, or None; only what it needs is built."""
+    program = PROGRAMS.get(near, "" if "/" in near else near)
+    if program and not build_program(copy, program):
         return "does not build"
+    if "/" in near:
+        return run_pytest(copy, near)
     return run_ctest(copy, "-R", f"(^|[_.]){near.removeprefix('test_')}$")
 
 
