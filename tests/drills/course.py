@@ -38,6 +38,7 @@ class Event:
     slipped_s: float = 0.0  # by which the world fell behind the wall, from the fault to the recovery
     ready: bool = False  # the estimate was near the truth before
     moving: bool = False  # so were the wheels
+    sought: bool = True  # it was waited for that the estimate be near
     answered_s: float | None = None
     silent: list[str] = field(default_factory=list)  # who did not answer in time
     found_s: float | None = None
@@ -53,6 +54,8 @@ class Event:
             wrong.append(f"wheels stopped after {self.stop_s} s")
         if self.ready and (self.found_s is None or self.found_s > FOUND_S):
             wrong.append(f"not localised within {FOUND_S:.0f} s")
+        if self.sought and not self.ready:
+            wrong.append(f"not localised before it, {READY_S:.0f} s after the fault before")
         if self.gap and not self.gap.told:
             wrong.append(f"{self.gap.real} {self.gap.unit} lost, {self.gap.reported} told")
         return wrong
@@ -120,7 +123,9 @@ class Course:
         time.sleep(self._random.uniform(*fault.lasts))
         fault.end(machine)
         ended = time.monotonic()
-        event = Event(fault.name, before.ticks / TICKS_PER_S, begun, ended, (before.ticks, 0), 0.0, ready, moving)
+        event = Event(
+            fault.name, before.ticks / TICKS_PER_S, begun, ended, (before.ticks, 0), 0.0, ready, moving, self._find
+        )
         self._recover(event, machine, witness)
         after = Count.take(machine, witness)
         event.ticks = (before.ticks, after.ticks)
