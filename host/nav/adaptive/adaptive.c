@@ -25,6 +25,7 @@ struct adaptive {
     struct nav_pose pending; /* motion since the last row that was read ... */
     struct nav_noise pending_noise; /* ... and its noise */
     bool pending_unknown;           /* ... and whether some of it was not reported */
+    bool idle;                      /* nothing was read in the row before */
     struct adaptive_summary answer; /* after the last row that was read */
     long evaluations, distinct, touched;
 };
@@ -140,11 +141,11 @@ static void *create(const struct nav_problem *problem)
 /* Wakes the histogram at the row from which on the robot may have been elsewhere. */
 static void wake(struct adaptive *a)
 {
-    uint64_t tail = adaptive_log_tail(&a->log);
+    uint64_t reach = adaptive_log_reach(&a->log);
     a->awake = true;
     adaptive_doubt_teach(&a->doubt, a->sense.likelihood, a->global.likelihood);
     a->odds = log(a->problem->settings.adaptive_hazard);
-    adaptive_global_restart(&a->global, a->doubt.since > tail ? a->doubt.since : tail);
+    adaptive_global_restart(&a->global, a->doubt.since > reach ? a->doubt.since : reach);
 }
 
 static void sleep(struct adaptive *a)
@@ -208,15 +209,27 @@ static void work(struct adaptive *a)
     a->distinct += a->global.distinct;
 }
 
+/* A row in which nothing was read leaves its time to those that wait. */
+static void catch_up(struct adaptive *a)
+{
+    if (!a->idle || !a->awake || adaptive_global_current(&a->global, &a->log))
+        return;
+    work(a);
+    decide(a);
+    answer(a);
+}
+
 static void predict(void *self, const struct nav_motion *motion)
 {
     struct adaptive *a = self;
+    a->evaluations = a->distinct = a->touched = 0;
+    catch_up(a);
+    a->idle = true;
     struct nav_noise noise = nav_motion_noise(&a->problem->robot, &a->problem->settings, motion);
     a->pending = nav_compose(a->pending, motion->step);
     a->pending_noise.position += noise.position;
     a->pending_noise.heading += noise.heading;
     a->pending_unknown = a->pending_unknown || motion->unknown_m > 0.0 || motion->unknown_rad > 0.0;
-    a->evaluations = a->distinct = a->touched = 0;
 }
 
 static void update_local(struct adaptive *a)
@@ -238,6 +251,7 @@ static void update_local(struct adaptive *a)
 static void update(void *self, const struct nav_evidence *evidence)
 {
     struct adaptive *a = self;
+    a->idle = false;
     adaptive_sense_read(&a->sense, evidence);
     adaptive_log_write(&a->log, a->pending, a->pending_noise, evidence);
     a->answer.belief.mean = nav_compose(a->answer.belief.mean, a->pending);

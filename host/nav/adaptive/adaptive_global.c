@@ -9,6 +9,9 @@
 /* Variance is saved up to this share of a squared cell edge, and paid in passes of at most so much (lattice.c). */
 static const double OWED_LEAST = 0.04, PASS_MOST = 0.5;
 
+/* A debt that would take more jobs than this is not paid: who may have moved that far unseen may be anywhere. */
+static const double JOBS_OWED_MOST = 16.0;
+
 /* A job's rows read, its motion planned and its answer found take as long as passing over about so many cells. */
 enum { JOB_CELLS = 10000 };
 
@@ -33,11 +36,12 @@ bool adaptive_global_current(const struct adaptive_global *g, const struct adapt
     return g->next == log->head && !g->job.running;
 }
 
-/* Adds one row's tables to the factors, as logarithms. */
+/* Adds one row's tables to the factors, as logarithms, and what the local belief made of it. */
 static void read_row(struct adaptive_global *g, struct adaptive_log *log, uint64_t row)
 {
     struct nav_evidence evidence = adaptive_log_replay(log, row);
     nav_likelihood_read(g->likelihood, &evidence);
+    g->job.local += adaptive_log_entry(log, row)->local;
     for (int w = 0; w < g->likelihood->whiskers; w++) {
         for (int k = 0; k < g->likelihood->model[w].codes; k++)
             g->factor[w][k] += g->likelihood->table[w][k];
@@ -51,7 +55,6 @@ static void move_row(struct adaptive_global *g, const struct adaptive_entry *ent
     g->job.step = nav_compose(g->job.step, entry->step);
     g->owed_position += entry->noise.position + nav_slice_fan(entry->step, g->cell_theta, along_m);
     g->owed_heading += entry->noise.heading;
-    g->job.local += entry->local;
 }
 
 /* How far the whiskers have gone in the job so far, m. */
@@ -60,10 +63,21 @@ static double path(const struct adaptive_job *job)
     return hypot(job->step.x, job->step.y) + 0.2 * fabs(job->step.theta);
 }
 
-/* Gathers rows: those that the log has overwritten only move; a contact is too sharp to be read at another's place. */
+/* Rows between which nothing is read while the belief is too wide to keep up: the further behind, the longer the way.
+ * Their motion counts (as the paper drops readings, odometry never). Returns the first row to be read. */
+static uint64_t skip(struct adaptive_global *g, struct adaptive_log *log)
+{
+    double late = (double)(log->head - g->next) / ADAPTIVE_ROWS_LATE - 1.0;
+    uint64_t row = g->next;
+    while (path(&g->job) < late * g->cell && row + 1 < log->head && !adaptive_log_entry(log, row)->contact)
+        move_row(g, adaptive_log_entry(log, row++));
+    return row;
+}
+
+/* Gathers rows; a contact is too sharp to be read at another's place. */
 static void gather(struct adaptive_global *g, struct adaptive_log *log)
 {
-    uint64_t row = g->next;
+    uint64_t row = skip(g, log);
     move_row(g, adaptive_log_entry(log, row));
     read_row(g, log, row);
     bool contact = adaptive_log_entry(log, row)->contact;
@@ -106,13 +120,31 @@ static float side_of(double *owed, double cell, int passes_most, int *passes)
     return (float)(each / 2.0);
 }
 
-static void begin(struct adaptive_global *g, struct adaptive_log *log)
+static bool unpayable(const struct adaptive_global *g)
 {
-    int one;
+    double most = JOBS_OWED_MOST * PASS_MOST;
+    return g->owed_position > ADAPTIVE_PASSES_MOST * most * g->cell * g->cell ||
+           g->owed_heading > most * g->cell_theta * g->cell_theta;
+}
+
+static void read_job(struct adaptive_global *g, struct adaptive_log *log)
+{
     for (int w = 0; w < g->likelihood->whiskers; w++)
         memset(g->factor[w], 0, (size_t)g->likelihood->model[w].codes * sizeof **g->factor);
     g->job = (struct adaptive_job){.running = true, .scale = (float)(1.0 / g->total)};
     gather(g, log);
+}
+
+static void begin(struct adaptive_global *g, struct adaptive_log *log)
+{
+    int one;
+    read_job(g, log);
+    if (!g->fresh && unpayable(g)) {
+        adaptive_global_restart(g, g->next);
+        read_job(g, log);
+    }
+    if (g->fresh) /* nothing blurs what is uniform */
+        g->owed_position = g->owed_heading = 0.0;
     g->job.reference = best_codes(g);
     nav_expected_prepare(g->expected, (const float *const *)g->factor);
     g->job.side = side_of(&g->owed_position, g->cell, ADAPTIVE_PASSES_MOST, &g->job.passes);
@@ -182,8 +214,6 @@ static void next_phase(struct adaptive_global *g)
 void adaptive_global_work(struct adaptive_global *g, struct adaptive_log *log, long budget)
 {
     long most = g->touched + budget;
-    if (g->next < adaptive_log_tail(log)) /* slept too long, or fell behind: what is lost is lost */
-        adaptive_global_restart(g, adaptive_log_tail(log));
     while (g->job.running || g->next < log->head) {
         if (!g->job.running) {
             if (g->touched + JOB_CELLS > most)

@@ -50,9 +50,9 @@ void adaptive_log_write(struct adaptive_log *log, struct nav_pose step, struct n
     }
 }
 
-uint64_t adaptive_log_tail(const struct adaptive_log *log)
+uint64_t adaptive_log_reach(const struct adaptive_log *log)
 {
-    return log->head > ADAPTIVE_ROWS_KEPT ? log->head - ADAPTIVE_ROWS_KEPT : 0;
+    return log->head > ADAPTIVE_ROWS_BEHIND ? log->head - ADAPTIVE_ROWS_BEHIND : 0;
 }
 
 struct adaptive_entry *adaptive_log_entry(struct adaptive_log *log, uint64_t row)

@@ -11,7 +11,9 @@
 #include "likelihood.h"
 #include "motion.h"
 
-enum { ADAPTIVE_ROWS_KEPT = 256 };
+/* Rows kept, and how many of them a job of the arena-wide belief may begin behind the last: the others are for those
+ * that come while it runs. */
+enum { ADAPTIVE_ROWS_KEPT = 256, ADAPTIVE_ROWS_BEHIND = 192, ADAPTIVE_ROWS_LATE = 48 };
 
 /* Motion up to a row, then its readings. */
 struct adaptive_entry {
@@ -39,8 +41,8 @@ void adaptive_log_free(struct adaptive_log *);
 /* Writes a row, over the oldest. */
 void adaptive_log_write(struct adaptive_log *, struct nav_pose step, struct nav_noise, const struct nav_evidence *);
 
-/* Number of the oldest row kept. */
-uint64_t adaptive_log_tail(const struct adaptive_log *);
+/* Number of the oldest row that a job may begin with. */
+uint64_t adaptive_log_reach(const struct adaptive_log *);
 
 struct adaptive_entry *adaptive_log_entry(struct adaptive_log *, uint64_t row);
 
