@@ -1,5 +1,7 @@
 """The default filter on drawn scenes: found from nothing, followed, found again, honest, replayed bit by bit."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -60,3 +62,21 @@ def test_a_dead_whisker_and_a_wrong_tile_do_not_lose_it():
             made = make(f"anchor+{fault}", seed, rows=400)
             rows = rows_of("adaptive", made.scene, made.observations)
             assert np.median(errors(rows, made.observations)) < 0.03, (fault, seed)
+
+
+def without(observations, lost):
+    """The rows that came."""
+    keep = np.flatnonzero(~lost)
+    columns = {name: getattr(observations, name)[keep] for name in ("t_s", "odometry", "texture", "radial_m", "truth")}
+    return replace(observations, t_text=[observations.t_text[k] for k in keep], **columns)
+
+
+def test_gaps_of_many_seconds_do_not_lose_it_for_good():
+    k = np.arange(900)
+    lost = (k >= 150) & (k < 280) | (k >= 400) & (k < 500)
+    for seed in SEEDS:
+        made = make("anchor", seed, rows=len(k))
+        observations = without(made.observations, lost)
+        rows = rows_of("adaptive", made.scene, observations)
+        assert errors(rows, observations)[-100:].max() < NEAR_M, seed
+        assert rows[-100:, 3].min() > 0.8, seed
