@@ -68,8 +68,9 @@ static double path(const struct adaptive_job *job)
 static uint64_t skip(struct adaptive_global *g, struct adaptive_log *log)
 {
     double late = (double)(log->head - g->next) / ADAPTIVE_ROWS_LATE - 1.0;
-    uint64_t row = g->next;
-    while (path(&g->job) < late * g->cell && row + 1 < log->head && !adaptive_log_entry(log, row)->contact)
+    uint64_t row = g->next, reach = adaptive_log_reach(log);
+    while (row < reach ||
+           (path(&g->job) < late * g->cell && row + 1 < log->head && !adaptive_log_entry(log, row)->contact))
         move_row(g, adaptive_log_entry(log, row++));
     return row;
 }
@@ -214,6 +215,8 @@ static void next_phase(struct adaptive_global *g)
 void adaptive_global_work(struct adaptive_global *g, struct adaptive_log *log, long budget)
 {
     long most = g->touched + budget;
+    if (log->head - g->next > ADAPTIVE_ROWS_KEPT) /* rows that it has not seen are overwritten */
+        adaptive_global_restart(g, adaptive_log_reach(log));
     while (g->job.running || g->next < log->head) {
         if (!g->job.running) {
             if (g->touched + JOB_CELLS > most)

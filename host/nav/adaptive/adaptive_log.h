@@ -11,8 +11,8 @@
 #include "likelihood.h"
 #include "motion.h"
 
-/* Rows kept, and how many of them a job of the arena-wide belief may begin behind the last: the others are for those
- * that come while it runs. */
+/* Rows kept; how many of them a job of the arena-wide belief may begin behind the last (the others are for those that
+ * come while it runs); and how many behind it begins to read fewer. */
 enum { ADAPTIVE_ROWS_KEPT = 256, ADAPTIVE_ROWS_BEHIND = 192, ADAPTIVE_ROWS_LATE = 48 };
 
 /* Motion up to a row, then its readings. */
