@@ -10,6 +10,7 @@ namespace
 {
 
 constexpr size_t CHUNK_BYTES = 512;
+constexpr std::chrono::seconds PATIENCE{5}; // from a driver's write to a byte at the other end of the terminal
 
 sim_create *make_create(const CreateOptions &options, uint64_t seed)
 {
@@ -52,9 +53,21 @@ void CreateBase::receive()
     }
 }
 
-bool CreateBase::has(std::optional<uint64_t> written) const
+bool CreateBase::has(std::optional<uint64_t> written)
 {
-    return !written || handed_ + waiting_.size() >= *written;
+    const uint64_t come = handed_ + waiting_.size();
+    if (!written || come >= *written) {
+        waits_since_.reset();
+        return true;
+    }
+    const auto now = std::chrono::steady_clock::now();
+    if (now - waits_since_.value_or(now) > PATIENCE) {
+        throw std::runtime_error("socket: the pilot tells " + std::to_string(*written) +
+                                 " bytes written to the base's port, but only " + std::to_string(come) +
+                                 " have come; tell what the driver has written since the run began");
+    }
+    waits_since_ = waits_since_.value_or(now);
+    return false;
 }
 
 void CreateBase::drive(sim_world *world, std::optional<uint64_t> written)

@@ -2,6 +2,7 @@
 // ground.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -32,8 +33,9 @@ class CreateBase
     // Reads what the driver has written.
     void receive();
 
-    // Have this many bytes come since the start? Whatever has come is enough if no number is given.
-    bool has(std::optional<uint64_t> written) const;
+    // Have this many bytes come since the start? Whatever has come is enough if no number is given. Throws
+    // std::runtime_error when the answer is no for too long: who counts them has written them already.
+    bool has(std::optional<uint64_t> written);
 
     // Before a step of the world: the robot is handed the bytes up to this number, or all, and drives.
     void drive(sim_world *world, std::optional<uint64_t> written);
@@ -53,6 +55,7 @@ class CreateBase
     std::vector<uint8_t> waiting_; // come, but not handed to the robot
     uint64_t handed_ = 0;
     uint64_t sent_ = 0;
+    std::optional<std::chrono::steady_clock::time_point> waits_since_; // for bytes that the pilot counts
 };
 
 } // namespace bridge_sim

@@ -5,27 +5,20 @@
 #include <list>
 #include <memory>
 
-#include "guest_transfers.h"
-#include "stream_socket.h"
+#include "guest_port.h"
 #include "usbip_codec.h"
 
 namespace bridge_sim
 {
 
-class UsbipServer : public DevicePort
+class UsbipServer : public GuestPort
 {
   public:
-    // Listens on 127.0.0.1; port 0 takes a free one. Throws std::runtime_error with one line.
     explicit UsbipServer(uint16_t port);
     ~UsbipServer() override;
 
-    uint16_t port() const;
-
     void plug(const Descriptors &descriptors) override;
     void unplug() override;
-    int wake_descriptor() const override;
-
-    // A client that breaks the protocol loses its connection, and one line on standard error says why.
     std::vector<DeviceRequest> take_requests() override;
     void deliver(std::vector<Urb> completed) override;
 
@@ -42,12 +35,9 @@ class UsbipServer : public DevicePort
     void answer(uint32_t sequence, const Urb &urb);
     void detach();
 
-    Waker waker_;
-    Listener listener_;
     std::list<Connection> connections_;
     Connection *owner_ = nullptr; // has the device, or waits for it
     std::unique_ptr<Descriptors> device_;
-    GuestTransfers transfers_;
     std::map<uint32_t, uint32_t> unlinks_; // sequence number of the transfer: that of the request to end it
 };
 

@@ -7,26 +7,19 @@
 
 #include <usbredirparser.h>
 
-#include "guest_transfers.h"
-#include "stream_socket.h"
+#include "guest_port.h"
 
 namespace bridge_sim
 {
 
-class UsbredirServer : public DevicePort
+class UsbredirServer : public GuestPort
 {
   public:
-    // Listens on 127.0.0.1; port 0 takes a free one. Throws std::runtime_error with one line.
     explicit UsbredirServer(uint16_t port);
     ~UsbredirServer() override;
 
-    uint16_t port() const;
-
     void plug(const Descriptors &descriptors) override;
     void unplug() override;
-    int wake_descriptor() const override;
-
-    // A client that breaks the protocol loses its connection, and one line on standard error says why.
     std::vector<DeviceRequest> take_requests() override;
     void deliver(std::vector<Urb> completed) override;
 
@@ -65,13 +58,10 @@ class UsbredirServer : public DevicePort
     void stop_interrupts(uint8_t endpoint);
     void cancel(uint64_t id);
 
-    Waker waker_;
-    Listener listener_;
     std::unique_ptr<Stream> stream_;
     std::unique_ptr<usbredirparser, ParserDeleter> parser_;
     bool greeted_ = false; // the client has said hello
     std::unique_ptr<UsbLayout> device_;
-    GuestTransfers transfers_;
     std::map<uint64_t, Pending> pending_; // by the name of the transfer
     std::set<uint8_t> interrupts_;        // endpoints whose packets the client wants as they come
     uint64_t next_name_ = 1;

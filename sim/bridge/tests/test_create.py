@@ -201,15 +201,29 @@ def test_wrong_use_is_refused(tmp_path):
     assert "--create-lose-bytes" in refused(tmp_path, "--create", 1, "--create-lose-bytes", 7)
 
 
-def test_a_drive_message_is_out_of_turn(tmp_path):
-    client = [CLIENT, tmp_path / "stream.bin", 4096, 200]
-    simulation = simulate(tmp_path, 1, 1, client, "--socket", tmp_path / "sock", "--followers", 1)
+def ended_by(folder: Path, *messages: bytes) -> str:
+    """The line with which a run ends whose pilot says this, and drives nothing."""
+    client = [CLIENT, folder / "stream.bin", 4096, 200]
+    simulation = simulate(folder, 1, 1, client, "--socket", folder / "sock", "--followers", 1)
     with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as link:
-        while link.connect_ex(str(tmp_path / "sock")) != 0:
+        while link.connect_ex(str(folder / "sock")) != 0:
             assert simulation.poll() is None
             os.sched_yield()
-        link.send(b"pilot")
-        link.send(b"drive 39 0 0")
-        _, error = simulation.communicate(timeout=TIMEOUT_S)
+        for message in (b"pilot", *messages):
+            link.send(message)
+        try:
+            _, error = simulation.communicate(timeout=TIMEOUT_S)
+        finally:
+            simulation.kill()
     assert simulation.returncode == 1
-    assert error.splitlines()[-1].endswith("'drive 39 0 0', but the pilot's answer due is base 39 N")
+    return error.splitlines()[-1]
+
+
+def test_a_drive_message_is_out_of_turn(tmp_path):
+    told = ended_by(tmp_path, b"drive 39 0 0")
+    assert told.endswith("'drive 39 0 0', but the pilot's answer due is base 39 N")
+
+
+def test_bytes_that_never_come_are_not_waited_for_without_end(tmp_path):
+    told = ended_by(tmp_path, b"base 39 7")
+    assert "7 bytes written to the base's port, but only 0 have come" in told

@@ -148,12 +148,22 @@ void attach(UsbipServer &server, TestClient &client)
     client.receive(DEVICE);
 }
 
+// A plugged device and the client that has it.
+struct Attached {
+    UsbipServer server{0};
+    TestClient client{server, server.port()};
+
+    Attached()
+    {
+        server.plug(test_descriptors());
+        attach(server, client);
+    }
+};
+
 void transfers_go_there_and_back(void **)
 {
-    UsbipServer server(0);
-    server.plug(test_descriptors());
-    TestClient client(server, server.port());
-    attach(server, client);
+    Attached attached;
+    auto &[server, client] = attached;
     client.send(submit(5, 1, 1, 512));
     const DeviceRequest request = client.await_request();
     assert_true(request.urb.kind == UrbKind::BULK_IN && request.urb.length == 512);
@@ -166,10 +176,8 @@ void transfers_go_there_and_back(void **)
 
 void errors_are_told(void **)
 {
-    UsbipServer server(0);
-    server.plug(test_descriptors());
-    TestClient client(server, server.port());
-    attach(server, client);
+    Attached attached;
+    auto &[server, client] = attached;
     client.send(submit(6, 1, 0, 8, {0xC0, 0x55, 0, 0, 0, 0, 8, 0}));
     complete(server, client.await_request(), -EPIPE);
     assert_true(client.receive(HEADER)[23] == static_cast<uint8_t>(-EPIPE));
@@ -181,10 +189,8 @@ void errors_are_told(void **)
 
 void unlink_ends_a_transfer(void **)
 {
-    UsbipServer server(0);
-    server.plug(test_descriptors());
-    TestClient client(server, server.port());
-    attach(server, client);
+    Attached attached;
+    auto &[server, client] = attached;
     client.send(submit(5, 1, 1, 512));
     const DeviceRequest request = client.await_request();
     client.send(unlink(6, 5));
@@ -200,10 +206,8 @@ void unlink_ends_a_transfer(void **)
 
 void unlinked_data_is_not_lost(void **)
 {
-    UsbipServer server(0);
-    server.plug(test_descriptors());
-    TestClient client(server, server.port());
-    attach(server, client);
+    Attached attached;
+    auto &[server, client] = attached;
     client.send(submit(5, 1, 1, 512));
     const DeviceRequest request = client.await_request();
     client.send(unlink(6, 5));
@@ -239,10 +243,8 @@ void one_client_has_it(void **)
 
 void the_cable_ends_the_connection(void **)
 {
-    UsbipServer server(0);
-    server.plug(test_descriptors());
-    TestClient client(server, server.port());
-    attach(server, client);
+    Attached attached;
+    auto &[server, client] = attached;
     server.unplug();
     client.expect_end();
 }
