@@ -60,13 +60,9 @@ static void append(char text[FAULT_TEXT], char c, unsigned run)
 static void summarise(struct fault_outcome *out, const char *letters, unsigned last)
 {
     unsigned run = 0;
-    char cause = '.';
     for (unsigned i = 0; i < last; i++) {
         const char c = letters[i];
-        const bool names = strchr("ex0ajPWTOL", c) != NULL;
         out->lost += c != '.';
-        out->causes += names && c != cause;
-        cause = names || c == '.' ? c : cause;
         if (c != '.' && out->detected_after < 0)
             out->detected_after = (int)i;
         run++;
@@ -75,20 +71,25 @@ static void summarise(struct fault_outcome *out, const char *letters, unsigned l
             run = 0;
         }
     }
-    if (out->lost > 0 && out->causes == 0)
-        out->causes = 1; /* the bridge's own verdict, or a resynchronisation */
 }
 
-/* The letters, not shortened, as an extended regular expression. */
-static bool matches(const char *expected, char *letters, unsigned last)
+static bool matches(const char *expected, const char *text)
 {
     regex_t pattern;
-    letters[last] = '\0';
     if (regcomp(&pattern, expected, REG_EXTENDED | REG_NOSUB) != 0)
         return false;
-    const bool yes = regexec(&pattern, letters, 0, NULL, 0) == 0;
+    const bool yes = regexec(&pattern, text, 0, NULL, 0) == 0;
     regfree(&pattern);
     return yes;
+}
+
+static void compare_counters(struct fault_outcome *out, const struct fault_case *row, const sim_node *node,
+                             const char *letters)
+{
+    char told[FAULT_TEXT];
+    fault_counted(node, out->counted);
+    fault_told(letters, told);
+    out->counted_as_expected = row->counted ? matches(row->counted, out->counted) : strcmp(told, out->counted) == 0;
 }
 
 struct run {
@@ -140,7 +141,9 @@ struct fault_outcome fault_run(const struct fault_case *row, const struct sim_no
     lane_bench_start(&bench, node, lane_timing_of(16, 180, WHISKER_LIMIT_TICK_PERIOD));
     lane_bench_run(&bench, &(struct lane_world){&run, plan, judged});
     summarise(&out, run.letters, run.last);
-    out.as_expected = matches(row->expected, run.letters, run.last);
+    run.letters[run.last] = '\0'; /* not shortened as the verdicts are */
+    out.as_expected = matches(row->expected, run.letters);
+    compare_counters(&out, row, node, run.letters);
     out.violations = sim_node_violations(node);
     sim_node_free(node);
     return out;

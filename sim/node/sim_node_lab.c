@@ -115,3 +115,8 @@ struct sim_node_report sim_node_report(const sim_node *node)
                                     .fcy_hz = dspic_fcy_hz(node->chip),
                                     .overwritten = dspic_violations(node->chip).spi_overwrite};
 }
+
+uint16_t sim_node_counted(const sim_node *node, unsigned counter)
+{
+    return node->board.node.health[counter];
+}

@@ -77,4 +77,7 @@ struct sim_node_report {
 };
 struct sim_node_report sim_node_report(const sim_node *node);
 
+/* What the node has counted since its last reset; `counter`: WHISKER_HEALTH_*. */
+uint16_t sim_node_counted(const sim_node *node, unsigned counter);
+
 #endif

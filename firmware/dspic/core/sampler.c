@@ -6,16 +6,16 @@
 /* Waits, in microseconds. Each exceeds the data sheet's time by the sensor's slowest oscillator and our own fastest
  * (FRC: 2 %); checked below. */
 #define STARTUP_US 18000u
-#ifdef SAMPLER_RESYNC_EVERY_FRAME /* as short as they may be: 629 us a frame, of 667 */
+#ifdef SAMPLER_RESYNC_EVERY_FRAME /* as short as they may be: 629 us, of 667; the interrupts' work on top */
 #define RESYNC_US 337u
 #define SELECT_US 3u
 #define START_GAP_US 17u
 #define GAP_US 14u
-#elif defined SENSOR_MLX90316 /* ten bytes: a frame in 430 us of the tick's 500 */
+#elif defined SENSOR_MLX90316 /* ten bytes: a frame in 384 us of the tick's 500; the interrupts' work on top */
 #define RESYNC_US 350u
 #define SELECT_US 4u
-#define START_GAP_US 24u
-#define GAP_US 21u
+#define START_GAP_US 18u
+#define GAP_US 16u
 #else
 #define RESYNC_US 350u
 #define SELECT_US 4u
@@ -130,6 +130,9 @@ static bool is_good(const struct sensor_reading *reading)
 
 static void end_frame(struct sampler *sampler, struct sensor_reading *reading)
 {
+#ifdef SAMPLER_RESYNC_EVERY_FRAME
+    wait_in(sampler, SAMPLER_RELEASE, RAISE_US); /* first: there is no time to wait for the decoding */
+#endif
     *reading = sensor_frame_decode(sampler->frame);
     if (is_good(reading))
         doubt(sampler, reading);
@@ -137,12 +140,11 @@ static void end_frame(struct sampler *sampler, struct sensor_reading *reading)
     sampler->alpha = reading->alpha;
     sampler->beta = reading->beta;
 #ifndef SAMPLER_RESYNC_EVERY_FRAME
-    if (is_good(reading)) {
+    if (is_good(reading))
         sampler->state = SAMPLER_READY;
-        return;
-    }
+    else
+        wait_in(sampler, SAMPLER_RELEASE, RAISE_US);
 #endif
-    wait_in(sampler, SAMPLER_RELEASE, RAISE_US);
 }
 
 bool sampler_on_byte(struct sampler *sampler, uint8_t byte, struct sensor_reading *reading)

@@ -89,9 +89,21 @@ static uint16_t painted(void)
     return n;
 }
 
+/* What the bridge sends in every tick: whole, so that the node takes its number. */
+static void make_order(uint16_t words[LINK_WORDS])
+{
+    uint8_t bytes[WHISKER_ORDER_BYTES] = {0};
+    bytes[WHISKER_ORDER_TICK] = 1;
+    bytes[WHISKER_ORDER_COMMAND] = WHISKER_COMMAND_SAMPLE;
+    bytes[WHISKER_ORDER_CRC] = whisker_crc8(bytes, WHISKER_ORDER_CRC);
+    for (uint8_t i = 0; i < LINK_WORDS; i++)
+        words[i] = (uint16_t)((uint16_t)bytes[2u * i] << 8 | bytes[2u * i + 1u]);
+}
+
 static void one_tick(uint16_t cycles[5])
 {
-    uint16_t words[LINK_WORDS] = {0, 0, 0, 0};
+    uint16_t words[LINK_WORDS];
+    make_order(words);
     begin();
     node_on_sync(&node);
     cycles[0] = end();
@@ -123,6 +135,8 @@ int main(void)
     paint();
     const uint16_t before = painted();
     one_tick(cycles);
+    if (node.health[WHISKER_HEALTH_ORDER_CRC] != 0 || node.tick != 1u || node.reading.status != 0)
+        printf("FAILED: not a tick of the usual kind\n");
     const uint16_t tick = (uint16_t)(cycles[0] + cycles[1] + 7u * cycles[2] + cycles[3] + 7u * cycles[4]);
     printf("cycles sync %u order %u byte %u last_byte %u gap %u tick %u\n", cycles[0], cycles[1], cycles[2], cycles[3],
            cycles[4], tick);
