@@ -7,10 +7,10 @@
  * docs/navigation_adaptive.md tells more. */
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "adaptive_doubt.h"
 #include "adaptive_global.h"
+#include "adaptive_prior.h"
 #include "adaptive_symmetry.h"
 
 struct adaptive {
@@ -20,10 +20,9 @@ struct adaptive {
     struct adaptive_global global;
     struct adaptive_log log;
     struct adaptive_doubt doubt;
-    bool local, awake;       /* which of the two beliefs are held; one at least */
-    double odds;             /* logarithm, elsewhere against local, before the rows that the histogram has gone over */
-    struct nav_pose pending; /* motion since the last row that was read ... */
-    struct nav_noise pending_noise; /* ... and its noise */
+    bool local, awake; /* which of the two beliefs are held; one at least */
+    double odds;       /* logarithm, elsewhere against local, before the rows that the histogram has gone over */
+    struct nav_pending pending;     /* since the last row that was read ... */
     bool pending_unknown;           /* ... and whether some of it was not reported */
     bool idle;                      /* nothing was read in the row before */
     struct adaptive_summary answer; /* after the last row that was read */
@@ -111,8 +110,22 @@ static void answer(struct adaptive *a)
         answer_local(a, share);
 }
 
+/* A mixture that a cloud can hold: in doubt from the start, by the share that it may be wrong. A wider one: unknown. */
+static void begin_mixture(struct adaptive *a)
+{
+    a->local = adaptive_prior_cloud(&a->cloud, &a->sense, &a->global);
+    a->awake = true;
+    a->odds = log(NAV_ANYWHERE / (1.0 - NAV_ANYWHERE));
+    a->answer.belief = nav_gaussian_prior(a->problem);
+    answer(a);
+}
+
 static void begin(struct adaptive *a)
 {
+    if (nav_bumps_given(&a->problem->prior)) {
+        begin_mixture(a);
+        return;
+    }
     a->local = !a->problem->prior.uniform && adaptive_cloud_prior(&a->cloud, &a->sense);
     a->awake = !a->local;
     a->answer.belief = nav_gaussian_prior(a->problem);
@@ -226,16 +239,14 @@ static void predict(void *self, const struct nav_motion *motion)
     catch_up(a);
     a->idle = true;
     struct nav_noise noise = nav_motion_noise(&a->problem->robot, &a->problem->settings, motion);
-    a->pending = nav_compose(a->pending, motion->step);
-    a->pending_noise.position += noise.position;
-    a->pending_noise.heading += noise.heading;
+    nav_pending_add(&a->pending, motion->step, noise);
     a->pending_unknown = a->pending_unknown || motion->unknown_m > 0.0 || motion->unknown_rad > 0.0;
 }
 
 static void update_local(struct adaptive *a)
 {
     a->cloud.moved = 0;
-    adaptive_cloud_move(&a->cloud, a->pending, &a->pending_noise, !a->pending_unknown);
+    adaptive_cloud_move(&a->cloud, a->pending.step, &a->pending.noise, !a->pending_unknown);
     adaptive_cloud_look(&a->cloud, &a->sense);
     adaptive_cloud_expect(&a->cloud, &a->sense, 1.0 - elsewhere(a));
     double local = adaptive_cloud_weigh(&a->cloud, &a->sense);
@@ -253,25 +264,21 @@ static void update(void *self, const struct nav_evidence *evidence)
     struct adaptive *a = self;
     a->idle = false;
     adaptive_sense_read(&a->sense, evidence);
-    adaptive_log_write(&a->log, a->pending, a->pending_noise, evidence);
-    a->answer.belief.mean = nav_compose(a->answer.belief.mean, a->pending);
+    adaptive_log_write(&a->log, a->pending.step, a->pending.noise, evidence);
+    a->answer.belief.mean = nav_compose(a->answer.belief.mean, a->pending.step);
     if (a->local)
         update_local(a);
     work(a);
     decide(a);
     answer(a);
-    a->pending = (struct nav_pose){0.0, 0.0, 0.0};
-    a->pending_noise = (struct nav_noise){0.0, 0.0};
+    a->pending = (struct nav_pending){.step = {0.0, 0.0, 0.0}};
     a->pending_unknown = false;
 }
 
 static void estimate(const void *self, struct nav_estimate *out)
 {
     const struct adaptive *a = self;
-    struct nav_gaussian now = a->answer.belief;
-    nav_gaussian_move(&now, a->pending, &a->pending_noise);
-    out->pose = now.mean;
-    memcpy(out->covariance, now.covariance, sizeof now.covariance);
+    nav_gaussian_ahead(&a->answer.belief, &a->pending, out);
     out->confidence = a->answer.near;
     out->evaluations = a->evaluations;
     out->distinct = a->distinct;
@@ -285,11 +292,11 @@ static long components(const void *self, struct nav_component *out, long room)
 {
     const struct adaptive *a = self;
     double share = a->awake ? elsewhere(a) : 0.0;
-    long count = a->local ? adaptive_cloud_list(&a->cloud, a->pending, 1.0 - share, out, room) : 0;
+    long count = a->local ? adaptive_cloud_list(&a->cloud, a->pending.step, 1.0 - share, out, room) : 0;
     if (!a->awake)
         return count;
     long left = room > count ? room - count : 0;
-    return count + adaptive_global_list(&a->global, &a->log, a->pending, share, left ? out + count : NULL, left);
+    return count + adaptive_global_list(&a->global, &a->log, a->pending.step, share, left ? out + count : NULL, left);
 }
 
 const struct nav_filter_ops nav_adaptive_filter = {.name = "adaptive",

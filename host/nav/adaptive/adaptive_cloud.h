@@ -64,6 +64,9 @@ bool adaptive_cloud_prior(struct adaptive_cloud *, const struct adaptive_sense *
 /* Adds a hypothesis, when there is room. share: by image. */
 void adaptive_cloud_add(struct adaptive_cloud *, struct nav_pose, double weight, const float *share);
 
+/* The same with weight 1, where the robot can stand. */
+void adaptive_cloud_place(struct adaptive_cloud *, const struct adaptive_sense *, struct nav_pose, const float *share);
+
 /* Tells the row's measurement models what the belief expects before it is weighed, `mass` of it counting (trust.h). */
 void adaptive_cloud_expect(const struct adaptive_cloud *, struct adaptive_sense *, double mass);
 

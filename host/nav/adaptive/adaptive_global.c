@@ -15,22 +15,6 @@ static const double JOBS_OWED_MOST = 16.0;
 /* A job's rows read, its motion planned and its answer found take as long as passing over about so many cells. */
 enum { JOB_CELLS = 10000 };
 
-void adaptive_global_restart(struct adaptive_global *g, uint64_t row)
-{
-    g->fresh = true;
-    g->next = row;
-    g->job.running = false;
-    g->rotation = g->owed_position = g->owed_heading = g->gained = 0.0;
-    memset(g->shift_x, 0, (size_t)g->nh * sizeof *g->shift_x);
-    memset(g->shift_y, 0, (size_t)g->nh * sizeof *g->shift_y);
-    g->total = g->scattered = 1.0;
-    const struct nav_arena *arena = &g->problem->arena;
-    struct nav_problem lost = *g->problem;
-    lost.prior.uniform = true;
-    g->summary = (struct adaptive_summary){.belief = nav_gaussian_prior(&lost)};
-    g->summary.near = NAV_PI * NAV_NEAR_M * NAV_NEAR_M / (arena->size_x * arena->size_y) * NAV_NEAR_RAD / NAV_PI;
-}
-
 bool adaptive_global_current(const struct adaptive_global *g, const struct adaptive_log *log)
 {
     return g->next == log->head && !g->job.running;

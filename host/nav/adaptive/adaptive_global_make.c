@@ -1,6 +1,7 @@
-/* The arena-wide belief's memory and tables, made once. */
+/* The arena-wide belief's memory and tables, made once, and the belief as it begins. */
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "adaptive_global_parts.h"
 
@@ -109,6 +110,22 @@ static int make_lines(struct adaptive_global *g)
         g->plane[n] = calloc(plane, sizeof **g->plane);
     int spans = g->span && g->span_turned && g->moved && g->region;
     return spans && g->coordinate && g->like && g->missing && g->plane[0] && g->plane[1] ? 0 : -1;
+}
+
+void adaptive_global_restart(struct adaptive_global *g, uint64_t row)
+{
+    g->fresh = true;
+    g->next = row;
+    g->job.running = false;
+    g->rotation = g->owed_position = g->owed_heading = g->gained = 0.0;
+    memset(g->shift_x, 0, (size_t)g->nh * sizeof *g->shift_x);
+    memset(g->shift_y, 0, (size_t)g->nh * sizeof *g->shift_y);
+    g->total = g->scattered = 1.0;
+    const struct nav_arena *arena = &g->problem->arena;
+    struct nav_problem lost = *g->problem;
+    lost.prior.uniform = true;
+    g->summary = (struct adaptive_summary){.belief = nav_gaussian_prior(&lost)};
+    g->summary.near = NAV_PI * NAV_NEAR_M * NAV_NEAR_M / (arena->size_x * arena->size_y) * NAV_NEAR_RAD / NAV_PI;
 }
 
 int adaptive_global_init(struct adaptive_global *g, const struct nav_problem *problem)

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "bumps.h"
 #include "filter.h"
 
 enum { X, Y, T };
@@ -11,6 +12,8 @@ struct nav_gaussian nav_gaussian_prior(const struct nav_problem *problem)
 {
     const struct nav_arena *arena = &problem->arena;
     const struct nav_prior *prior = &problem->prior;
+    if (nav_bumps_given(prior))
+        return nav_bumps_gaussian(prior);
     struct nav_gaussian g = {.mean = prior->mean};
     for (int i = 0; i < 3; i++)
         g.covariance[4 * i] = prior->sigma[i] * prior->sigma[i];
@@ -29,6 +32,14 @@ void nav_gaussian_estimate(const struct nav_gaussian *g, struct nav_estimate *es
     estimate->pose = g->mean;
     memcpy(estimate->covariance, g->covariance, sizeof g->covariance);
     estimate->confidence = nav_gaussian_mass(g, NAV_NEAR_M, NAV_NEAR_RAD);
+}
+
+void nav_gaussian_ahead(const struct nav_gaussian *g, const struct nav_pending *pending, struct nav_estimate *estimate)
+{
+    struct nav_gaussian now = *g;
+    nav_gaussian_move(&now, pending->step, &pending->noise);
+    estimate->pose = now.mean;
+    memcpy(estimate->covariance, now.covariance, sizeof now.covariance);
 }
 
 /* Lower triangle of the Cholesky factor, rows x, y, theta; what rounding has made negative counts as nothing. */

@@ -22,6 +22,9 @@ struct nav_gaussian nav_gaussian_prior(const struct nav_problem *);
 /* Pose, covariance and confidence of a Gaussian belief. */
 void nav_gaussian_estimate(const struct nav_gaussian *, struct nav_estimate *);
 
+/* Pose and covariance once the motion put off is done. */
+void nav_gaussian_ahead(const struct nav_gaussian *, const struct nav_pending *, struct nav_estimate *);
+
 /* The belief as a lattice of bumps, as nav_filter_components says. */
 long nav_gaussian_components(const struct nav_gaussian *, struct nav_component *out, long room);
 

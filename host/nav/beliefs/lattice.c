@@ -4,7 +4,6 @@
 #include <stdlib.h>
 
 #include "lattice_pass.h"
-#include "lattice_rows.h"
 
 int nav_lattice_init(struct nav_lattice *l, double size_x, double size_y, double cell, int headings)
 {
@@ -21,7 +20,7 @@ int nav_lattice_init(struct nav_lattice *l, double size_x, double size_y, double
     /* Rows are read in whole lanes, which may reach beyond the last cell. */
     l->mass = calloc(nav_lattice_cells(l) + NAV_LANES, sizeof *l->mass);
     l->spare = calloc(nav_lattice_cells(l) + NAV_LANES, sizeof *l->spare);
-    l->rows = calloc(nav_lattice_row_floats(l->nx), sizeof *l->rows);
+    l->rows = calloc(NAV_PASS_ROWS * nav_pass_pitch(l->nx), sizeof *l->rows);
     l->moment = calloc((size_t)headings, sizeof *l->moment);
     int shifts = l->shift_x && l->shift_y && l->roll_x && l->roll_y;
     return shifts && l->mass && l->spare && l->rows && l->moment ? 0 : -1;
@@ -76,12 +75,6 @@ void nav_lattice_shift(struct nav_lattice *l, struct nav_pose step, const struct
     l->rotation = nav_wrap(l->rotation + step.theta);
     l->owed_position += noise->position;
     l->owed_heading += noise->heading;
-}
-
-void nav_lattice_move(struct nav_lattice *l, struct nav_pose step, const struct nav_noise *noise)
-{
-    nav_lattice_shift(l, step, noise);
-    nav_lattice_pass(l, NULL, (struct nav_pose){0.0, 0.0, 0.0});
 }
 
 void nav_lattice_clip(struct nav_lattice *l, const int *begin, const int *end)

@@ -59,9 +59,6 @@ void nav_lattice_shift(struct nav_lattice *, struct nav_pose step, const struct 
  * more only for noise beyond half a squared cell edge, at most 100 of these. */
 void nav_lattice_pass(struct nav_lattice *, const struct nav_lattice_weigh *, struct nav_pose about);
 
-/* Both at once, without a likelihood. */
-void nav_lattice_move(struct nav_lattice *, struct nav_pose step, const struct nav_noise *);
-
 /* Fills the lattice with a prior's mass, not yet clipped to free space. */
 void nav_lattice_fill(struct nav_lattice *, const struct nav_prior *);
 

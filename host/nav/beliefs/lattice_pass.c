@@ -9,25 +9,12 @@
 #include <string.h>
 
 #include "lattice.h"
-#include "lattice_rows.h"
 
 /* Blurring costs work, so variance is saved up to this share of a squared cell edge ... */
 static const double OWED_LEAST = 0.04;
 /* ... and no pass of the three-point kernel takes more than this (its centre weight stays above 1/2). */
 static const double PASS_MOST = 0.5;
 static const double PASSES_MOST = 100.0;
-
-enum { PAD = NAV_LANES, ROWS = 11 };
-
-static size_t row_pitch(int nx)
-{
-    return (size_t)(nx + 2 * PAD + NAV_LANES);
-}
-
-size_t nav_lattice_row_floats(int nx)
-{
-    return ROWS * row_pitch(nx);
-}
 
 /* A neighbouring slice, poured into this one where its cells fall: split between four cells, so that the mean stays. */
 struct pour {
@@ -56,9 +43,9 @@ struct pass {
 
 static void lay_out(struct pass *s, struct nav_lattice *l)
 {
-    float *row[ROWS];
-    for (int r = 0; r < ROWS; r++)
-        row[r] = l->rows + (size_t)r * row_pitch(l->nx) + PAD;
+    float *row[NAV_PASS_ROWS];
+    for (int r = 0; r < NAV_PASS_ROWS; r++)
+        row[r] = l->rows + (size_t)r * nav_pass_pitch(l->nx) + NAV_PASS_PAD;
     s->coordinate = row[0];
     s->like = row[1];
     s->own = row[2];

@@ -1,10 +1,17 @@
-/* Room that a pass over the lattice works in. */
+/* Room that a pass over the lattice works in: so many rows, each padded for what is read beyond its ends. */
 #ifndef NAV_LATTICE_PASS_H
 #define NAV_LATTICE_PASS_H
 
 #include <stddef.h>
 
-/* Floats of `rows` for rows of nx cells. */
-size_t nav_lattice_row_floats(int nx);
+#include "lattice_rows.h"
+
+enum { NAV_PASS_PAD = NAV_LANES, NAV_PASS_ROWS = 11 };
+
+/* Floats of a row of nx cells. */
+static inline size_t nav_pass_pitch(int nx)
+{
+    return (size_t)(nx + 2 * NAV_PASS_PAD + NAV_LANES);
+}
 
 #endif

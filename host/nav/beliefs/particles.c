@@ -4,6 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "bumps.h"
+
 enum { TRIES = 64 };
 
 int nav_particles_init(struct nav_particles *p, long room)
@@ -27,7 +29,10 @@ void nav_particles_free(struct nav_particles *p)
 static struct nav_pose draw_once(const struct nav_arena *arena, const struct nav_prior *prior, struct nav_rng *rng)
 {
     struct nav_pose pose;
-    if (prior->uniform) {
+    bool mixture = nav_bumps_given(prior);
+    if (mixture && nav_rng_uniform(rng) >= NAV_ANYWHERE)
+        return nav_bumps_draw(prior, rng);
+    if (prior->uniform || mixture) {
         pose.x = arena->size_x * nav_rng_uniform(rng);
         pose.y = arena->size_y * nav_rng_uniform(rng);
         pose.theta = 2.0 * NAV_PI * nav_rng_uniform(rng) - NAV_PI;

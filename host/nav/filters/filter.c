@@ -1,8 +1,10 @@
 #include "filter.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "bumps.h"
 #include "intake.h"
 
 static const struct nav_filter_ops *const FILTERS[] = {&nav_odometry_filter, &nav_ekf_filter,     &nav_ukf_filter,
@@ -40,19 +42,46 @@ static void *copy(const void *from, int count, size_t size)
     return to;
 }
 
+/* Mean and deviations become the mixture's, for whoever wants one place. */
+static int own_prior(struct nav_prior *prior)
+{
+    if (!nav_bumps_given(prior)) {
+        prior->bump = NULL;
+        prior->bumps = 0;
+        return 0;
+    }
+    struct nav_component *bump = malloc((size_t)prior->bumps * sizeof *bump);
+    if (!bump)
+        return -1;
+    memcpy(bump, prior->bump, (size_t)prior->bumps * sizeof *bump);
+    nav_bumps_normalise(bump, prior->bumps);
+    prior->bump = bump;
+    struct nav_gaussian g = nav_bumps_gaussian(prior);
+    prior->mean = g.mean;
+    for (int i = 0; i < 3; i++)
+        prior->sigma[i] = sqrt(g.covariance[4 * i]);
+    return 0;
+}
+
 static int own(struct nav_problem *p)
 {
+    int prior = own_prior(&p->prior);
+    if (prior)
+        p->prior.bump = NULL;
     p->arena.floor = copy(p->arena.floor, p->arena.rows * p->arena.columns, sizeof *p->arena.floor);
     p->arena.box = copy(p->arena.box, p->arena.boxes, sizeof *p->arena.box);
     p->robot.tip = copy(p->robot.tip, p->robot.tips, sizeof *p->robot.tip);
     p->robot.ray = copy(p->robot.ray, p->robot.rays, sizeof *p->robot.ray);
-    return p->arena.floor && p->arena.box && p->robot.tip && p->robot.ray ? 0 : -1;
+    return !prior && p->arena.floor && p->arena.box && p->robot.tip && p->robot.ray ? 0 : -1;
 }
 
 struct nav_filter *nav_filter_new(const char *name, const struct nav_problem *problem)
 {
     const struct nav_filter_ops *ops = find(name);
-    struct nav_filter *f = ops ? calloc(1, sizeof *f) : NULL;
+    long which;
+    if (!ops || nav_prior_fault(&problem->arena, &problem->prior, &which))
+        return NULL;
+    struct nav_filter *f = calloc(1, sizeof *f);
     if (!f)
         return NULL;
     f->ops = ops;
@@ -75,6 +104,7 @@ void nav_filter_free(struct nav_filter *f)
     free((void *)f->problem.arena.box);
     free((void *)f->problem.robot.tip);
     free((void *)f->problem.robot.ray);
+    free((void *)f->problem.prior.bump);
     free(f);
 }
 

@@ -10,11 +10,23 @@
 #include "settings.h"
 
 /* cffi: begin */
-/* Belief before the first row. uniform: over free space, mean and sigma unused. Clipped to free space either way. */
+/* A bump of belief: normal in x and y (sigma_m each) and in heading, independent. */
+struct nav_component {
+    struct nav_pose pose;
+    double sigma_m, sigma_rad;
+    double mass;
+};
+
+enum { NAV_BUMPS_MOST = 10000 };
+
+/* Belief before the first row. uniform: over free space, all else unused. bumps above 0: their mixture, as a filter
+ * listed it, in place of mean and sigma, with NAV_ANYWHERE of the mass uniform. Clipped to free space each way. */
 struct nav_prior {
     bool uniform;
     struct nav_pose mean;
-    double sigma[3]; /* x, y m; theta rad; above 0 */
+    double sigma[3];                  /* x, y m; theta rad; above 0 */
+    const struct nav_component *bump; /* [bumps] within the arena, widths above 0, masses of any sum above 0 */
+    long bumps;                       /* at most NAV_BUMPS_MOST */
 };
 
 struct nav_problem {
@@ -44,19 +56,15 @@ struct nav_estimate {
     size_t bytes;         /* and in how much memory, tables included */
 };
 
-/* A bump of belief: normal in x and y (sigma_m each) and in heading, independent. */
-struct nav_component {
-    struct nav_pose pose;
-    double sigma_m, sigma_rad;
-    double mass;
-};
-
 struct nav_filter;
 
 /* Name of filter number `index`, NULL beyond the last. */
 const char *nav_filter_name(int index);
 
-/* Copies the problem, arrays included. NULL: unknown name or no memory. */
+/* What is wrong with a prior, NULL when nothing is; *which: the bump that it is wrong with, -1: none of them alone. */
+const char *nav_prior_fault(const struct nav_arena *, const struct nav_prior *, long *which);
+
+/* Copies the problem, arrays included. NULL: unknown name, a prior with a fault, or no memory. */
 struct nav_filter *nav_filter_new(const char *name, const struct nav_problem *);
 void nav_filter_free(struct nav_filter *);
 
@@ -77,6 +85,11 @@ uint64_t nav_filter_empty_windows(const struct nav_filter *);
 /* Radius and angle of `confidence`. */
 #define NAV_NEAR_M 0.25
 #define NAV_NEAR_RAD 0.5
+
+/* Share of the mass that a mixture is doubted by: whoever kept it was not there when the robot may have been carried
+ * off. A restart in a hundred is far more than a filter that was there doubts (adaptive.hazard, per row), and little
+ * enough that a belief which was right stays the answer. Filters that hold one Gaussian, or a few, cannot keep it. */
+#define NAV_ANYWHERE 0.01
 
 struct nav_evidence;
 struct nav_motion;

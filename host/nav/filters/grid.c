@@ -5,7 +5,6 @@
  * rows, and nothing is lost, since motions compose exactly. */
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "calibration.h"
 #include "expected.h"
@@ -24,10 +23,9 @@ struct grid {
     struct nav_expected *expected;
     struct nav_mixture *mixture;
     struct nav_lattice lattice;
-    struct nav_layer *layer;        /* [slices] where each lies in the tables */
-    struct nav_pose pending;        /* motion since the last update ... */
-    struct nav_noise pending_noise; /* ... and its noise */
-    struct nav_gaussian summary;    /* of the belief at the last update: mean near the mode, covariance about it */
+    struct nav_layer *layer;     /* [slices] where each lies in the tables */
+    struct nav_pending pending;  /* since the last update */
+    struct nav_gaussian summary; /* of the belief at the last update: mean near the mode, covariance about it */
     double confidence;
     struct nav_calibration calibration;
     struct nav_motion last; /* motion of the row before, as applied */
@@ -233,18 +231,15 @@ static void predict(void *self, const struct nav_motion *told)
     struct nav_motion motion = calibrated(g, told);
     struct nav_noise noise = nav_motion_noise(&g->problem->robot, &g->problem->settings, &motion);
     noise.position += nav_slice_fan(motion.step, g->lattice.cell_theta, g->problem->settings.motion_along_m);
-    g->pending = nav_compose(g->pending, motion.step);
-    g->pending_noise.position += noise.position;
-    g->pending_noise.heading += noise.heading;
+    nav_pending_add(&g->pending, motion.step, noise);
 }
 
 static void update(void *self, const struct nav_evidence *evidence)
 {
     struct grid *g = self;
-    nav_lattice_shift(&g->lattice, g->pending, &g->pending_noise);
-    g->summary.mean = nav_compose(g->summary.mean, g->pending);
-    g->pending = (struct nav_pose){0.0, 0.0, 0.0};
-    g->pending_noise = (struct nav_noise){0.0, 0.0};
+    nav_lattice_shift(&g->lattice, g->pending.step, &g->pending.noise);
+    g->summary.mean = nav_compose(g->summary.mean, g->pending.step);
+    g->pending = (struct nav_pending){.step = {0.0, 0.0, 0.0}};
     find_layers(g);
     nav_likelihood_read(g->likelihood, evidence);
     learn_trust(g);
@@ -257,10 +252,7 @@ static void update(void *self, const struct nav_evidence *evidence)
 static void estimate(const void *self, struct nav_estimate *out)
 {
     const struct grid *g = self;
-    struct nav_gaussian now = g->summary;
-    nav_gaussian_move(&now, g->pending, &g->pending_noise);
-    out->pose = now.mean;
-    memcpy(out->covariance, now.covariance, sizeof now.covariance);
+    nav_gaussian_ahead(&g->summary, &g->pending, out);
     out->confidence = g->confidence;
     out->evaluations = (long)nav_lattice_cells(&g->lattice);
     out->states = out->touched = out->evaluations;
@@ -274,14 +266,14 @@ static long components(const void *self, struct nav_component *out, long room)
     const struct grid *g = self;
     const struct nav_lattice *l = &g->lattice;
     const struct nav_slices slices = nav_lattice_slices(l);
-    double sigma = sqrt(l->cell * l->cell / 12.0 + l->owed_position + g->pending_noise.position);
-    double sigma_turn = sqrt(l->cell_theta * l->cell_theta / 12.0 + l->owed_heading + g->pending_noise.heading);
+    double sigma = sqrt(l->cell * l->cell / 12.0 + l->owed_position + g->pending.noise.position);
+    double sigma_turn = sqrt(l->cell_theta * l->cell_theta / 12.0 + l->owed_heading + g->pending.noise.heading);
     long count = 0;
     for (size_t n = 0; n < nav_lattice_cells(l); n++) {
         if (!(l->mass[n] > 0.0f))
             continue;
         if (count < room)
-            out[count] = (struct nav_component){nav_compose(nav_slices_centre(&slices, n), g->pending), sigma,
+            out[count] = (struct nav_component){nav_compose(nav_slices_centre(&slices, n), g->pending.step), sigma,
                                                 sigma_turn, (double)l->mass[n] * l->scale};
         count++;
     }

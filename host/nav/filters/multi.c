@@ -107,6 +107,8 @@ static void *create(const struct nav_problem *problem)
     m->modes.count = 1;
     if (problem->prior.uniform)
         spread(m);
+    else if (problem->prior.bumps > 0)
+        multi_gather(&m->modes, problem->prior.bump, problem->prior.bumps);
     return m;
 }
 

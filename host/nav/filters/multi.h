@@ -2,6 +2,7 @@
 #ifndef NAV_MULTI_H
 #define NAV_MULTI_H
 
+#include "filter.h"
 #include "gaussian.h"
 
 struct multi_mode {
@@ -22,6 +23,9 @@ void multi_prune(struct multi_modes *, double least);
 
 /* Merges pairs whose means are closer than `near` standard deviations, lighter into heavier, moments kept. */
 void multi_merge(struct multi_modes *, double near);
+
+/* Makes modes of a mixture: each bump joins the mode that it is near, or begins one while there is room. */
+void multi_gather(struct multi_modes *, const struct nav_component *, long count);
 
 /* Root of a covariance: lower triangular, row-major; a matrix that is not positive definite loses what is not. */
 void multi_root(const double covariance[9], double root[9]);

@@ -74,6 +74,40 @@ void multi_merge(struct multi_modes *m, double near)
     }
 }
 
+/* The mode whose mean is nearest to a pose, by NAV_NEAR_M and NAV_NEAR_RAD; *far: how far, NULL without modes. */
+static struct multi_mode *nearest(struct multi_modes *m, const struct nav_gaussian *g, double *far)
+{
+    struct multi_mode *best = NULL;
+    *far = INFINITY;
+    for (int k = 0; k < m->count; k++) {
+        double d[3];
+        difference(g, &m->at[k].belief, d);
+        double off = fmax(hypot(d[0], d[1]) / NAV_NEAR_M, fabs(d[2]) / NAV_NEAR_RAD);
+        if (off < *far) {
+            best = &m->at[k];
+            *far = off;
+        }
+    }
+    return best;
+}
+
+void multi_gather(struct multi_modes *m, const struct nav_component *bump, long count)
+{
+    m->count = 0;
+    for (long n = 0; n < count; n++) {
+        double far, xy = bump[n].sigma_m * bump[n].sigma_m, turn = bump[n].sigma_rad * bump[n].sigma_rad;
+        struct multi_mode one = {{bump[n].pose, {xy, 0.0, 0.0, 0.0, xy, 0.0, 0.0, 0.0, turn}}, bump[n].mass};
+        if (!(one.weight > 0.0))
+            continue;
+        struct multi_mode *mode = nearest(m, &one.belief, &far);
+        if (far > 1.0 && m->count < m->room)
+            m->at[m->count++] = one;
+        else
+            absorb(mode, &one);
+    }
+    multi_normalise(m);
+}
+
 void multi_root(const double c[9], double root[9])
 {
     double a = sqrt(fmax(c[0], 0.0)), b = a > 0.0 ? c[3] / a : 0.0, d = a > 0.0 ? c[6] / a : 0.0;

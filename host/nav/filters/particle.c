@@ -9,7 +9,6 @@
 
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "gaussian.h"
 
@@ -30,8 +29,7 @@ struct particle {
     float *scratch; /* [room] */
     long least, most;
     double slow, fast; /* averages of the mean weight; negative before the first row */
-    struct nav_pose pending;
-    struct nav_noise pending_noise;
+    struct nav_pending pending;
     struct nav_gaussian summary;
     double confidence;
     long weighed, moved; /* for the last row */
@@ -108,9 +106,8 @@ static void *create(const struct nav_problem *problem)
 
 static void catch_up(struct particle *f)
 {
-    nav_particles_move(&f->cloud, f->pending, &f->pending_noise, &f->rng);
-    f->pending = (struct nav_pose){0.0, 0.0, 0.0};
-    f->pending_noise = (struct nav_noise){0.0, 0.0};
+    nav_particles_move(&f->cloud, f->pending.step, &f->pending.noise, &f->rng);
+    f->pending = (struct nav_pending){.step = {0.0, 0.0, 0.0}};
     f->moved += f->cloud.count;
 }
 
@@ -119,10 +116,9 @@ static void predict(void *self, const struct nav_motion *motion)
     struct particle *f = self;
     struct nav_noise noise = nav_motion_noise(&f->problem->robot, &f->problem->settings, motion);
     f->moved = f->weighed = 0;
-    f->pending = nav_compose(f->pending, motion->step);
-    f->pending_noise.position += noise.position;
-    f->pending_noise.heading += noise.heading;
-    if (hypot(f->pending.x, f->pending.y) > PENDING_MOST_M || fabs(f->pending.theta) > PENDING_MOST_RAD) {
+    nav_pending_add(&f->pending, motion->step, noise);
+    if (hypot(f->pending.step.x, f->pending.step.y) > PENDING_MOST_M ||
+        fabs(f->pending.step.theta) > PENDING_MOST_RAD) {
         catch_up(f);
         summarise(f);
     }
@@ -193,9 +189,7 @@ static void estimate(const void *self, struct nav_estimate *out)
     now.covariance[0] += 1e-6;
     now.covariance[4] += 1e-6;
     now.covariance[8] += 1e-6;
-    nav_gaussian_move(&now, f->pending, &f->pending_noise);
-    out->pose = now.mean;
-    memcpy(out->covariance, now.covariance, sizeof now.covariance);
+    nav_gaussian_ahead(&now, &f->pending, out);
     out->confidence = f->confidence;
     out->evaluations = out->distinct = f->weighed;
     out->touched = f->weighed + f->moved;
@@ -216,13 +210,13 @@ static long components(const void *self, struct nav_component *out, long room)
     const struct nav_particles *p = &f->cloud;
     const double *v = f->summary.covariance;
     double count = fmax(nav_particles_effective(p), 1.0), total = 0.0;
-    double sigma_m = hypot(bump(fmin(v[0], v[4]), count, 0.003, 0.03), sqrt(f->pending_noise.position));
-    double sigma_rad = hypot(bump(v[8], count, 0.005, 0.1), sqrt(f->pending_noise.heading));
+    double sigma_m = hypot(bump(fmin(v[0], v[4]), count, 0.003, 0.03), sqrt(f->pending.noise.position));
+    double sigma_rad = hypot(bump(v[8], count, 0.005, 0.1), sqrt(f->pending.noise.heading));
     for (long i = 0; i < p->count; i++)
         total += (double)p->weight[i];
     for (long i = 0; i < p->count && i < room; i++) {
         struct nav_pose at = {(double)p->x[i], (double)p->y[i], (double)atan2f(p->s[i], p->c[i])};
-        at = nav_compose(at, f->pending);
+        at = nav_compose(at, f->pending.step);
         at.theta = nav_wrap(at.theta);
         out[i] = (struct nav_component){at, sigma_m, sigma_rad, (double)p->weight[i] / total};
     }

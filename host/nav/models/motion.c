@@ -24,3 +24,10 @@ struct nav_pose nav_motion_sample(struct nav_pose step, const struct nav_noise *
     return (struct nav_pose){c * step.x - s * step.y + spread * nav_rng_normal(rng),
                              s * step.x + c * step.y + spread * nav_rng_normal(rng), step.theta + turn};
 }
+
+void nav_pending_add(struct nav_pending *pending, struct nav_pose step, struct nav_noise noise)
+{
+    pending->step = nav_compose(pending->step, step);
+    pending->noise.position += noise.position;
+    pending->noise.heading += noise.heading;
+}

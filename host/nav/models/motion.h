@@ -20,6 +20,14 @@ struct nav_noise {
     double heading;  /* rad^2 */
 };
 
+/* Motion put off: motions compose exactly, so nothing is lost. */
+struct nav_pending {
+    struct nav_pose step;
+    struct nav_noise noise;
+};
+
+void nav_pending_add(struct nav_pending *, struct nav_pose step, struct nav_noise);
+
 /* Noise of one row's motion. The robot's relative error keeps its value over a correlation length, so variance grows
  * with distance times that length, not with each row's own square; rows may be short or long. */
 struct nav_noise nav_motion_noise(const struct nav_robot *, const struct nav_settings *, const struct nav_motion *);

@@ -49,10 +49,16 @@ static void run(struct nav_filter *f, struct wander *w)
 static void no_filter_allocates_after_its_start(void **state)
 {
     (void)state;
-    for (int uniform = 0; uniform < 2; uniform++) {
+    static const struct nav_component narrow[] = {{{1.0, 1.0, 0.5}, 0.02, 0.05, 3.0}, {{1.5, 0.5, 0.0}, 0.1, 0.2, 1.0}};
+    static const struct nav_component wide[] = {{{1.0, 1.0, 0.5}, 0.5, 2.0, 1.0}};
+    static const struct nav_prior priors[] = {{.mean = {1.0, 1.0, 0.5}, .sigma = {0.02, 0.02, 0.03}},
+                                              {.uniform = true},
+                                              {.bump = narrow, .bumps = 2},
+                                              {.bump = wide, .bumps = 1}};
+    for (size_t kind = 0; kind < sizeof priors / sizeof priors[0]; kind++) {
         for (int n = 0; nav_filter_name(n); n++) {
             struct wander w = wander_new(5);
-            w.problem.prior.uniform = uniform;
+            w.problem.prior = priors[kind];
             allocations = 0;
             struct nav_filter *f = nav_filter_new(nav_filter_name(n), &w.problem);
             assert_true(f && allocations > 0); /* they are seen */

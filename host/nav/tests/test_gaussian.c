@@ -31,6 +31,23 @@ static void moving_turns_heading_error_into_sideways_error(void **state)
     assert_near(g.covariance[8], 0.09 + 0.002, 1e-12);
 }
 
+static void a_motion_put_off_is_as_good_as_done(void **state)
+{
+    (void)state;
+    struct nav_gaussian g = {.mean = {1.0, 2.0, NAV_PI / 2.0}, .covariance = {0.01, 0, 0, 0, 0.04, 0, 0, 0, 0.09}};
+    struct nav_pending pending = {.step = {0.0, 0.0, 0.0}};
+    struct nav_estimate e;
+    nav_pending_add(&pending, (struct nav_pose){2.0, 0.0, NAV_PI / 2.0}, (struct nav_noise){0.001, 0.002});
+    nav_pending_add(&pending, (struct nav_pose){1.0, 0.0, 0.0}, (struct nav_noise){0.003, 0.004});
+    nav_gaussian_ahead(&g, &pending, &e);
+    assert_near(e.pose.x, 0.0, 1e-12);
+    assert_near(e.pose.y, 4.0, 1e-12);
+    assert_near(e.pose.theta, NAV_PI, 1e-12);
+    assert_near(e.covariance[0], 0.01 + 4.0 * 0.09 + 0.004, 1e-12);
+    assert_near(e.covariance[8], 0.09 + 0.006, 1e-12);
+    assert_near(g.mean.y, 2.0, 0.0);
+}
+
 static void a_circle_walked_in_steps_closes(void **state)
 {
     (void)state;
@@ -90,6 +107,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_step_is_taken_in_the_frame_it_starts_in),
         cmocka_unit_test(moving_turns_heading_error_into_sideways_error),
+        cmocka_unit_test(a_motion_put_off_is_as_good_as_done),
         cmocka_unit_test(a_circle_walked_in_steps_closes),
         cmocka_unit_test(an_inverse_undoes_and_a_flat_covariance_has_none),
         cmocka_unit_test(mass_near_the_mean_is_the_normal_distributions),

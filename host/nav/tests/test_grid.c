@@ -1,5 +1,7 @@
 /* The grid filter against equation 4 summed naively in double precision. The filter's own state is looked at, so its
  * source is part of this program. */
+#include <string.h>
+
 #include "../filters/grid.c"
 
 #include "near.h"

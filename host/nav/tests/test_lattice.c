@@ -36,6 +36,12 @@ static void spread(const struct nav_lattice *l, struct nav_pose about, double co
     nav_slices_covariance(&slices, about, covariance);
 }
 
+static void move(struct nav_lattice *l, struct nav_pose step, const struct nav_noise *noise)
+{
+    nav_lattice_shift(l, step, noise);
+    nav_lattice_pass(l, NULL, (struct nav_pose){0.0, 0.0, 0.0});
+}
+
 /* All mass in one cell. */
 static struct nav_lattice peak(double size, double cell, int headings, int i, int j, int p)
 {
@@ -51,7 +57,7 @@ static void small_steps_keep_a_sharp_belief_sharp_and_exact(void **state)
     struct nav_lattice l = peak(3.0, 0.05, 36, 10, 10, 2);
     const double heading = 2.5 * NAV_PI / 18.0;
     for (int step = 0; step < 100; step++)
-        nav_lattice_move(&l, (struct nav_pose){0.015, 0.0, 0.0}, &NO_NOISE);
+        move(&l, (struct nav_pose){0.015, 0.0, 0.0}, &NO_NOISE);
     struct nav_pose end = mode(&l);
     assert_near(total(&l), 1.0, 0.0);
     assert_near((double)nav_lattice_slice(&l, 2)[(int)(end.y / 0.05) * l.nx + (int)(end.x / 0.05)], 1.0, 0.0);
@@ -66,10 +72,10 @@ static void turning_and_driving_follow_the_pose(void **state)
     struct nav_lattice l = peak(3.0, 0.05, 36, 30, 30, 7);
     struct nav_pose expected = mode(&l);
     for (int step = 0; step < 110; step++) {
-        struct nav_pose move =
+        struct nav_pose way =
             step % 40 < 20 ? (struct nav_pose){0.0123, 0.001, 0.0} : (struct nav_pose){0.0, 0.0, NAV_PI / 40.0};
-        nav_lattice_move(&l, move, &NO_NOISE);
-        expected = nav_compose(expected, move);
+        move(&l, way, &NO_NOISE);
+        expected = nav_compose(expected, way);
     }
     struct nav_pose end = mode(&l);
     assert_near(total(&l), 1.0, 0.0);
@@ -89,7 +95,7 @@ static void noise_adds_the_variance_asked_for_and_keeps_the_mass(void **state)
     nav_lattice_pass(&l, NULL, start);
     spread(&l, start, before);
     for (int step = 0; step < 50; step++)
-        nav_lattice_move(&l, (struct nav_pose){0.0, 0.0, 0.0}, &noise);
+        move(&l, (struct nav_pose){0.0, 0.0, 0.0}, &noise);
     double owed = l.owed_position, owed_heading = l.owed_heading;
     assert_near(total(&l), 1.0, 1e-5);
     near(&l, start, &mean);
@@ -107,9 +113,9 @@ static void mass_poured_between_shifted_slices_keeps_its_place(void **state)
     (void)state;
     struct nav_lattice l = peak(2.0, 0.05, 8, 20, 20, 0);
     /* After half a metre the slices' shifts differ by tens of millimetres. */
-    nav_lattice_move(&l, (struct nav_pose){0.512, 0.0, 0.0}, &NO_NOISE);
+    move(&l, (struct nav_pose){0.512, 0.0, 0.0}, &NO_NOISE);
     struct nav_pose there = mode(&l), mean = there;
-    nav_lattice_move(&l, (struct nav_pose){0.0, 0.0, 0.0}, &(struct nav_noise){0.0, 0.1});
+    move(&l, (struct nav_pose){0.0, 0.0, 0.0}, &(struct nav_noise){0.0, 0.1});
     assert_near(total(&l), 1.0, 1e-6);
     double x = 0.0, y = 0.0;
     for (int p = 0; p < l.nh; p++) {
@@ -129,7 +135,7 @@ static void mass_that_leaves_the_lattice_is_lost(void **state)
 {
     (void)state;
     struct nav_lattice l = peak(1.0, 0.1, 4, 5, 5, 0);
-    nav_lattice_move(&l, (struct nav_pose){5.0, 0.0, 0.0}, &NO_NOISE);
+    move(&l, (struct nav_pose){5.0, 0.0, 0.0}, &NO_NOISE);
     assert_near(total(&l), 0.0, 0.0);
     nav_lattice_free(&l);
 }

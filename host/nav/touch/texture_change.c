@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "texture_features.h"
+#include "texture_own.h"
 #include "texture_rung.h"
 
 enum {
@@ -27,27 +28,14 @@ struct nav_texture_change {
     double *sum;     /* [4][2][K] sums before and behind the change, then both finished */
 };
 
-static bool own(const double **array, size_t n)
-{
-    const double *from = *array;
-    double *copy = calloc(n, sizeof *copy);
-    *array = copy;
-    for (size_t i = 0; copy && i < n; i++) {
-        if (!isfinite(from[i]))
-            return false;
-        copy[i] = from[i];
-    }
-    return copy != NULL;
-}
-
 static bool make(struct nav_texture_change *c)
 {
     size_t f = (size_t)c->features, k = (size_t)c->n.classes;
-    bool ok = own(&c->n.floor, (size_t)c->n.channels);
-    ok = own(&c->n.steady, f * k) && ok;
-    ok = own(&c->n.apart, k * k) && ok;
-    ok = own(&c->n.weight, f * k) && ok;
-    ok = own(&c->n.bias, k) && ok;
+    bool ok = nav_texture_own(&c->n.floor, (size_t)c->n.channels);
+    ok = nav_texture_own(&c->n.steady, f * k) && ok;
+    ok = nav_texture_own(&c->n.apart, k * k) && ok;
+    ok = nav_texture_own(&c->n.weight, f * k) && ok;
+    ok = nav_texture_own(&c->n.bias, k) && ok;
     c->feature = calloc(f, sizeof *c->feature);
     c->block = calloc(2 * HELD_MOST * k, sizeof *c->block);
     c->sum = calloc(8 * k, sizeof *c->sum);

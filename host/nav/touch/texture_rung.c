@@ -7,6 +7,7 @@
 
 #include "rng.h"
 #include "texture_features.h"
+#include "texture_own.h"
 
 struct nav_texture_rung {
     struct nav_texture_rung_numbers n; /* its arrays are the rung's own */
@@ -22,45 +23,24 @@ struct nav_texture_rung {
     double *middle_along; /* [K][axes] */
 };
 
-static bool finite_all(const double *x, size_t n)
-{
-    for (size_t i = 0; i < n; i++) {
-        if (!isfinite(x[i]))
-            return false;
-    }
-    return true;
-}
-
 static bool numbers_ok(const struct nav_texture_rung_numbers *n)
 {
     return n->classes >= 1 && n->classes <= NAV_TEXTURE_CLASSES_MAX && n->hidden >= 0 &&
            n->hidden <= NAV_TEXTURE_HIDDEN_MAX && n->axes >= 0 && isfinite(n->temper) && n->temper >= 0.0;
 }
 
-/* Replaces the caller's array by a copy; false if it holds something that is not finite or memory is short. */
-static bool own(const double **array, size_t n)
-{
-    const double *from = *array;
-    double *copy = calloc(n + 1, sizeof *copy); /* no array is of size 0 */
-    *array = copy;
-    if (!copy || !finite_all(from, n))
-        return false;
-    memcpy(copy, from, n * sizeof *copy);
-    return true;
-}
-
 static bool own_arrays(struct nav_texture_rung *r)
 {
     size_t f = (size_t)r->features, k = (size_t)r->n.classes, h = (size_t)r->n.hidden, a = (size_t)r->n.axes;
-    bool ok = own(&r->n.floor, (size_t)r->n.channels);
-    ok = own(&r->n.centre, f) && ok;
-    ok = own(&r->n.scale, f) && ok;
-    ok = own(&r->n.weight, (f + h) * k) && ok;
-    ok = own(&r->n.bias, k) && ok;
-    ok = own(&r->n.middle, k * f) && ok;
-    ok = own(&r->n.axis, a * f) && ok;
-    ok = own(&r->n.axis_weight, k * a) && ok;
-    ok = own(&r->n.beyond, k) && ok;
+    bool ok = nav_texture_own(&r->n.floor, (size_t)r->n.channels);
+    ok = nav_texture_own(&r->n.centre, f) && ok;
+    ok = nav_texture_own(&r->n.scale, f) && ok;
+    ok = nav_texture_own(&r->n.weight, (f + h) * k) && ok;
+    ok = nav_texture_own(&r->n.bias, k) && ok;
+    ok = nav_texture_own(&r->n.middle, k * f) && ok;
+    ok = nav_texture_own(&r->n.axis, a * f) && ok;
+    ok = nav_texture_own(&r->n.axis_weight, k * a) && ok;
+    ok = nav_texture_own(&r->n.beyond, k) && ok;
     return ok;
 }
 

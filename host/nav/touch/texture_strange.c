@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "texture_own.h"
 #include "texture_rung.h"
 
 struct nav_texture_strange {
@@ -16,25 +17,12 @@ struct nav_texture_strange {
 
 enum { FEATURES_MAX = 4096 };
 
-static bool own(const double **array, size_t n)
-{
-    const double *from = *array;
-    double *copy = calloc(n, sizeof *copy);
-    *array = copy;
-    for (size_t i = 0; copy && i < n; i++) {
-        if (!isfinite(from[i]))
-            return false;
-        copy[i] = from[i];
-    }
-    return copy != NULL;
-}
-
 static bool make(struct nav_texture_strange *s)
 {
     size_t f = (size_t)s->n.features, k = (size_t)s->n.classes, steps = (size_t)s->n.steps;
-    bool ok = own(&s->n.turn, steps * f * f);
-    ok = own(&s->n.middle, steps * k * f) && ok;
-    ok = own(&s->n.limit, steps) && ok;
+    bool ok = nav_texture_own(&s->n.turn, steps * f * f);
+    ok = nav_texture_own(&s->n.middle, steps * k * f) && ok;
+    ok = nav_texture_own(&s->n.limit, steps) && ok;
     s->window = calloc((size_t)1 << steps, f * sizeof *s->window);
     s->mean = calloc(f, sizeof *s->mean);
     s->turned = calloc(f, sizeof *s->turned);
