@@ -26,14 +26,18 @@ int ring_path(const char *name, char path[RING_PATH_BYTES])
     return WHISKER_OK;
 }
 
+/* Why a file of the shared directory cannot be had, by errno. */
+static int refusal(void)
+{
+    return errno == EACCES || errno == EPERM ? WHISKER_ERROR_RING_ACCESS : WHISKER_ERROR_SYSTEM;
+}
+
 int ring_file_open(const char *path, int *fd)
 {
     struct stat file;
     *fd = open(path, O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
     if (*fd < 0) {
-        return errno == ENOENT  ? WHISKER_ERROR_RING_MISSING
-               : errno == ELOOP ? WHISKER_ERROR_RING_LAYOUT
-                                : WHISKER_ERROR_SYSTEM;
+        return errno == ENOENT ? WHISKER_ERROR_RING_MISSING : errno == ELOOP ? WHISKER_ERROR_RING_LAYOUT : refusal();
     }
     if (fstat(*fd, &file) != 0 || !S_ISREG(file.st_mode)) {
         close(*fd);
@@ -110,7 +114,7 @@ static int begin_naming(const char *path, int *lock)
     for (int tries = 0; tries < NAMING_TRIES_MS; tries++) {
         *lock = open_naming_lock(lock_path);
         if (*lock < 0) {
-            return WHISKER_ERROR_SYSTEM;
+            return refusal();
         }
         if (lock_byte(*lock, F_WRLCK, 0) && ring_file_is_named(*lock, lock_path)) {
             return WHISKER_OK;
@@ -148,7 +152,7 @@ static int remove_stale(const char *path)
     }
     error = check_stale(fd);
     if (!error && unlink(path) != 0) {
-        error = WHISKER_ERROR_SYSTEM;
+        error = refusal();
     }
     close(fd);
     return error;

@@ -34,13 +34,17 @@ struct limit {
 int whisker_settings_check(const struct whisker_settings *settings, char *message, size_t n)
 {
     const struct limit limits[] = {
-        {"lane mask", settings->lane_mask, 0, (UINT32_C(1) << WHISKER_LIMIT_LANES) - 1, false},
         {"tick period", settings->tick_period, WHISKER_LIMIT_TICK_PERIOD_MIN, UINT32_MAX, false},
         {"SCK divider", settings->sck_divider, WHISKER_LIMIT_SCK_DIVIDER_MIN, WHISKER_LIMIT_SCK_DIVIDER_MAX, true},
         {"word gap", settings->word_gap, WHISKER_LIMIT_WORD_GAP_MIN, UINT8_MAX, false},
         {"sample point", settings->sample_point, 1, settings->sck_divider, false},
         {"batch", settings->batch, BATCH_MIN, BATCH_MAX, true},
     };
+    if (settings->lane_mask >> WHISKER_LIMIT_LANES != 0) {
+        snprintf(message, n, "the lane mask 0x%x names more than lanes 0 to %d; use bits of 0x%x", settings->lane_mask,
+                 WHISKER_LIMIT_LANES - 1, (1u << WHISKER_LIMIT_LANES) - 1);
+        return WHISKER_ERROR_DEVICE_REFUSED;
+    }
     for (size_t i = 0; i < sizeof limits / sizeof limits[0]; i++) {
         const struct limit *it = &limits[i];
         if (it->value < it->min || it->value > it->max || (it->even && it->value % 2 != 0)) {

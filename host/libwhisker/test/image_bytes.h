@@ -1,4 +1,4 @@
-/* A firmware image for tests, sealed as tools/make_image.py seals one. */
+/* A firmware image for tests, sealed as tools/firmware/make_image.py seals one. */
 #ifndef WHISKER_TEST_IMAGE_BYTES_H
 #define WHISKER_TEST_IMAGE_BYTES_H
 

@@ -141,6 +141,38 @@ static void leave_stale_ring(void)
 }
 
 /* Whoever may read a ring may lock its file. */
+#define NOBODY 65534
+
+/* As somebody who may not open the ring's file: both ends are told so. */
+static int attach_and_create_elsewhere(const char *name)
+{
+    struct whisker_reader *reader;
+    struct whisker_ring *ring;
+    if (geteuid() == 0 && setuid(NOBODY) != 0) {
+        return EXIT_FAILURE;
+    }
+    const bool told = whisker_reader_attach(name, 0, &reader) == WHISKER_ERROR_RING_ACCESS &&
+                      whisker_ring_create(name, TEST_CAPACITY, &ring) == WHISKER_ERROR_RING_ACCESS;
+    return told ? EXIT_SUCCESS : EXIT_FAILURE;
+}
+
+static void ring_of_another_user_is_told(void **state)
+{
+    (void)state;
+    int status;
+    const char *name = test_ring_name();
+    struct whisker_ring *ring;
+    assert_int_equal(whisker_ring_create(name, TEST_CAPACITY, &ring), 0);
+    assert_int_equal(chmod(path(), 0), 0);
+    const pid_t child = fork();
+    if (child == 0) {
+        _exit(attach_and_create_elsewhere(name));
+    }
+    waitpid(child, &status, 0);
+    assert_true(WIFEXITED(status) && WEXITSTATUS(status) == EXIT_SUCCESS);
+    whisker_ring_close(ring);
+}
+
 static void locks_of_a_reader_hold_up_no_writer(void **state)
 {
     (void)state;
@@ -336,6 +368,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(memory_that_is_no_ring_is_refused),
         cmocka_unit_test(what_has_the_name_and_is_no_file_is_refused_at_once),
         cmocka_unit_test(file_of_another_program_is_not_replaced),
+        cmocka_unit_test(ring_of_another_user_is_told),
         cmocka_unit_test(locks_of_a_reader_hold_up_no_writer),
         cmocka_unit_test(reader_of_a_shortened_ring_is_told),
         cmocka_unit_test(writer_of_a_shortened_ring_is_told_and_makes_another),

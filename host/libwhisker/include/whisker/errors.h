@@ -1,4 +1,7 @@
-/* Every error of libwhisker, once: name, code, text, remedy. The enum and the strings both come from this list. */
+/*
+ * Every error of libwhisker, once: name, code, text, remedy. The enum and the strings both come from this list.
+ * Threads: the functions are for any thread at any time; what they give is constant.
+ */
 #ifndef WHISKER_ERRORS_H
 #define WHISKER_ERRORS_H
 
@@ -26,6 +29,8 @@
     X(WRITER_DEAD, -28, "the writer died without closing the ring", "start whiskerd again; see its log")               \
     X(RESTARTED, -29, "a new writer has made a new ring of this name", "attach again")                                 \
     X(RING_LOST, -30, "another process has made the ring's file shorter", "start whiskerd again, attach again")        \
+    X(RING_ACCESS, -31, "this ring is another user's, who keeps it closed",                                            \
+      "become that user, give its whiskerd the umask 022, or choose another --ring")                                   \
     X(DEVICE_MISSING, -40, "no bridge is connected", "plug it in; check its power and cable")                          \
     X(DEVICE_ACCESS, -41, "no permission to open the bridge", "install the udev rule, or ask an administrator")        \
     X(DEVICE_BUSY, -42, "another process uses the bridge", "stop the other whiskerd")                                  \

@@ -8,7 +8,8 @@
  * or create on, SIGBUS over a ring's memory is handled here (every other SIGBUS goes where it went before), the memory
  * reads as zeros, and the next call says RING_LOST.
  *
- * Threads: one handle belongs to one thread at a time. Errors: 0 or a negative code of errors.h.
+ * Threads: one handle belongs to one thread at a time; different handles, and functions without one, may be used by
+ * different threads at once. Errors: 0 or a negative code of errors.h.
  */
 #ifndef WHISKER_RING_H
 #define WHISKER_RING_H
@@ -41,7 +42,8 @@ struct whisker_reader_info {
 /*
  * Attaches to the ring `name` ("whisker", no slash), at its oldest frame. Waits up to timeout_ms for the ring to come
  * up (0: no waiting, negative: for ever). Returns 0 and the reader, or RING_NAME, RING_MISSING, RING_LAYOUT,
- * RING_VERSION, WRITER_DEAD (a ring is there, its writer is not), SYSTEM, MEMORY; then *reader is NULL.
+ * RING_VERSION, RING_ACCESS (another user's), WRITER_DEAD (a ring is there, its writer is not), SYSTEM, MEMORY; then
+ * *reader is NULL.
  */
 int whisker_reader_attach(const char *name, int timeout_ms, struct whisker_reader **reader);
 
@@ -110,7 +112,7 @@ struct whisker_ring_entry {
 int whisker_ring_list(struct whisker_ring_entry *entries, size_t room);
 
 /* Removes a ring whose writer died; the next writer of its name does so, too. Returns 0, or RING_MISSING, RING_BUSY
- * (its writer lives), RING_LAYOUT (no ring), RING_NAME, SYSTEM (errno: another user's). */
+ * (its writer lives), RING_LAYOUT (no ring), RING_NAME, RING_ACCESS (another user's), SYSTEM. */
 int whisker_ring_remove_stale(const char *name);
 
 struct whisker_ring;
@@ -118,7 +120,8 @@ struct whisker_ring;
 /*
  * Makes the ring `name` of `capacity` frames (a power of two, 64 to 2^20) and becomes its writer. A ring whose writer
  * died is replaced; its readers learn RESTARTED. Returns 0 and the ring, or ARGUMENT, RING_NAME, RING_BUSY (another
- * writer lives), RING_LAYOUT (the name is that of something else), SYSTEM, MEMORY; then *ring is NULL.
+ * writer lives), RING_LAYOUT (the name is that of something else), RING_ACCESS (another user's), SYSTEM, MEMORY; then
+ * *ring is NULL.
  */
 int whisker_ring_create(const char *name, uint32_t capacity, struct whisker_ring **ring);
 
