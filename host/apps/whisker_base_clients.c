@@ -11,6 +11,7 @@
 #include "daemon_log.h"
 
 #define ANSWER 1024
+_Static_assert(BASE_MESSAGE == 256, "the answer to a longer message says so");
 
 void base_clients_begin(struct base_clients *clients, struct base_robot *robot, const uint64_t *restarts)
 {
@@ -193,17 +194,29 @@ static bool cut_after(char *text, uint64_t *after)
     return true;
 }
 
+/* Receives a message, ended by a zero. Returns its whole length, also of what has no room; 0 or -1 as recv() does. */
+static ssize_t receive(struct base_client *client)
+{
+    const size_t room = sizeof client->message - 1;
+    const ssize_t got = recv(client->socket, client->message, room, MSG_DONTWAIT | MSG_TRUNC);
+    client->message[got > 0 && (size_t)got < room ? (size_t)got : room] = '\0';
+    return got;
+}
+
 static void take_message(struct base_clients *clients, struct base_client *client, int64_t now_ms)
 {
-    const ssize_t got = recv(client->socket, client->message, sizeof client->message - 1, MSG_DONTWAIT);
+    const ssize_t got = receive(client);
     if (got <= 0) {
         if (got == 0 || (errno != EAGAIN && errno != EINTR)) {
             drop(clients, client);
         }
         return;
     }
-    client->message[got] = '\0';
-    if (cut_after(client->message, &client->after)) {
+    if ((size_t)got >= sizeof client->message) { /* its beginning may say something else */
+        answer(clients, client, "error message too long; 255 letters are the most");
+    } else if (strlen(client->message) != (size_t)got) {
+        answer(clients, client, "error message with a zero byte; say letters only");
+    } else if (cut_after(client->message, &client->after)) {
         client->leads = client->waits = true;
     } else {
         obey(clients, client, now_ms);

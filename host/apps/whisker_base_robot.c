@@ -9,12 +9,6 @@
 
 #define READ_BYTES 256
 #define COMMANDER_FRAMES (BASE_COMMANDER_MS / CREATE_OI_PERIOD_MS)
-/* A base is in the mode it was asked for long before so many frames. */
-#define MODE_FRAMES 20
-/* A battery of 12 cells: below a tenth of its charge, or 1.0 V a cell, the base will not drive for long. */
-#define LOW_CHARGE 10
-#define LOW_MV 12000
-
 static const uint8_t packets[] = {
     CREATE_OI_BUMPS_DROPS,
     CREATE_OI_CLIFF_LEFT,
@@ -153,67 +147,6 @@ uint64_t base_robot_taken(const struct base_robot *robot)
 /* --------------------------------------------------------------------------------------------------------- the frames
  */
 
-int32_t base_robot_mode_told(const struct base_robot *robot)
-{
-    return robot->frame.value[CREATE_OI_MODE] - robot->mode_offset;
-}
-
-unsigned base_robot_bits(const struct base_robot *robot)
-{
-    const int32_t *value = robot->frame.value;
-    const bool idle = robot->port < 0 || robot->silent || base_robot_mode_told(robot) != (int32_t)robot->wanted;
-    return (unsigned)value[CREATE_OI_BUMPS_DROPS] | (value[CREATE_OI_CLIFF_LEFT] ? BASE_CLIFF_LEFT : 0u) |
-           (value[CREATE_OI_CLIFF_FRONT_LEFT] ? BASE_CLIFF_FRONT_LEFT : 0u) |
-           (value[CREATE_OI_CLIFF_FRONT_RIGHT] ? BASE_CLIFF_FRONT_RIGHT : 0u) |
-           (value[CREATE_OI_CLIFF_RIGHT] ? BASE_CLIFF_RIGHT : 0u) | (idle ? BASE_IDLE : 0u);
-}
-
-static const char *mode_reason(const struct base_robot *robot)
-{
-    const unsigned bits = base_robot_bits(robot);
-    return bits & (CREATE_OI_DROP_LEFT | CREATE_OI_DROP_RIGHT | CREATE_OI_DROP_CASTER) ? "a wheel dropped; set it down"
-           : bits & (BASE_CLIFF_LEFT | BASE_CLIFF_FRONT_LEFT | BASE_CLIFF_FRONT_RIGHT | BASE_CLIFF_RIGHT)
-               ? "a cliff; move it away"
-           : robot->frame.value[CREATE_OI_CHARGING_SOURCES] ? "its charger; unplug it"
-                                                            : "its own decision; look at its buttons and battery";
-}
-
-/* Nobody has asked for a higher mode than the wanted: a base that tells one for long counts them differently. */
-static void watch_mode_offset(struct base_robot *robot)
-{
-    robot->frames_since_mode++;
-    if (!robot->entered && robot->frames_since_mode >= MODE_FRAMES && robot->wanted >= CREATE_OI_MODE_SAFE &&
-        base_robot_mode_told(robot) == (int32_t)robot->wanted + 1) {
-        robot->mode_offset = 1;
-        daemon_log(LOG_NOTE, "%s: this firmware tells modes one higher than they are", robot->options->port);
-    }
-}
-
-/* A base that leaves its mode has stopped its wheels; it goes back only when the commander says so. */
-static void watch_mode(struct base_robot *robot)
-{
-    watch_mode_offset(robot);
-    const bool in_force = base_robot_mode_told(robot) == (int32_t)robot->wanted;
-    if (robot->entered && !in_force) {
-        robot->mode_losses++;
-        robot->speeds = (struct create_speeds){0};
-        daemon_log(LOG_WARN, "%s: the base has left its mode: %s, then send `mode safe`", robot->options->port,
-                   mode_reason(robot));
-    }
-    robot->entered = in_force;
-}
-
-static void watch_battery(struct base_robot *robot)
-{
-    const int32_t *value = robot->frame.value;
-    robot->low = value[CREATE_OI_VOLTAGE] < LOW_MV || value[CREATE_OI_CHARGE] * LOW_CHARGE < value[CREATE_OI_CAPACITY];
-    if (robot->low && !robot->told_low) {
-        robot->told_low = true;
-        daemon_log(LOG_WARN, "%s: the battery is low: %d mV, %d of %d mAh; charge it", robot->options->port,
-                   value[CREATE_OI_VOLTAGE], value[CREATE_OI_CHARGE], value[CREATE_OI_CAPACITY]);
-    }
-}
-
 static void stop_commander(struct base_robot *robot)
 {
     robot->commander_stops++;
@@ -234,16 +167,23 @@ static uint32_t frames_of_gap(const struct base_robot *robot, int64_t now_ms)
     return gap ? (uint32_t)(gap_ms / CREATE_OI_PERIOD_MS - 1) : 0;
 }
 
+/* Of the frames missed, those since other speeds were ordered. */
+static uint32_t frames_since_change(const struct base_robot *robot, int64_t now_ms)
+{
+    const uint32_t since = (uint32_t)((now_ms - robot->changed_ms) / CREATE_OI_PERIOD_MS);
+    return robot->changed_ms <= robot->frame_ms ? 0 : since < robot->frame.missed ? since : robot->frame.missed;
+}
+
 static void take_frame(struct base_robot *robot, int64_t now_ms)
 {
     const uint32_t gap = frames_of_gap(robot, now_ms);
     robot->frame.missed = gap > robot->frame.missed ? gap : robot->frame.missed;
+    robot->frame.ordered = gap > 0 ? frames_since_change(robot, now_ms) : 0;
     robot->missed += robot->frame.missed;
     robot->frame_ms = now_ms;
     robot->silent = false;
     const struct create_step step = create_odometry_take(&robot->odometry, &robot->frame);
-    watch_mode(robot);
-    watch_battery(robot);
+    base_robot_heed(robot);
     robot->on_step(robot->context, &step, base_robot_bits(robot));
     robot->frames_since_drive += 1 + robot->frame.missed;
     if (robot->options->stream_clock && moving(robot) && robot->frames_since_drive >= COMMANDER_FRAMES) {
@@ -274,8 +214,9 @@ bool base_robot_read(struct base_robot *robot, uint64_t limit, int64_t now_ms)
 static bool order_speeds(struct base_robot *robot, struct create_speeds speeds)
 {
     uint8_t bytes[CREATE_COMMAND_BYTES];
-    robot->speeds = speeds;
-    return order(robot, bytes, create_put_drive_direct(bytes, speeds.right_mm_s, speeds.left_mm_s));
+    const bool ordered = order(robot, bytes, create_put_drive_direct(bytes, speeds.right_mm_s, speeds.left_mm_s));
+    robot->speeds = ordered ? speeds : (struct create_speeds){0};
+    return ordered;
 }
 
 bool base_robot_drive(struct base_robot *robot, double v_m_s, double omega_rad_s, int64_t now_ms)
@@ -284,8 +225,12 @@ bool base_robot_drive(struct base_robot *robot, double v_m_s, double omega_rad_s
     robot->drive_ms = now_ms;
     robot->frames_since_drive = 0;
     const struct create_speeds wanted =
-        create_choose_speeds(settings->model, settings->wheel_base_m, v_m_s, omega_rad_s);
-    return order_speeds(robot, robot->silent ? (struct create_speeds){0} : wanted);
+        robot->silent ? (struct create_speeds){0}
+                      : create_choose_speeds(settings->model, settings->wheel_base_m, v_m_s, omega_rad_s);
+    if (wanted.left_mm_s != robot->speeds.left_mm_s || wanted.right_mm_s != robot->speeds.right_mm_s) {
+        robot->changed_ms = now_ms;
+    }
+    return order_speeds(robot, wanted);
 }
 
 bool base_robot_stop(struct base_robot *robot)
@@ -303,6 +248,7 @@ bool base_robot_mode(struct base_robot *robot, enum create_oi_mode mode)
 static void restart_stream(struct base_robot *robot, int64_t now_ms)
 {
     robot->silences++;
+    robot->changed_ms = moving(robot) ? now_ms : robot->changed_ms;
     robot->silent = robot->stream.counts.frames > 0;
     robot->opened_ms = now_ms;
     daemon_log(LOG_WARN,
@@ -318,6 +264,7 @@ int base_robot_watch(struct base_robot *robot, int64_t now_ms)
         return BASE_REOPEN_MS;
     }
     if (moving(robot) && now_ms - robot->drive_ms >= BASE_COMMANDER_MS) {
+        robot->changed_ms = now_ms;
         stop_commander(robot);
     }
     const int64_t heard_ms = robot->frame_ms > robot->opened_ms ? robot->frame_ms : robot->opened_ms;

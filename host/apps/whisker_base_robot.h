@@ -47,6 +47,7 @@ struct base_robot {
     bool low, told_low; /* battery */
     bool silent;        /* it was heard, and then no more: until a frame comes the wheels stay stopped */
     int64_t drive_ms, frame_ms, opened_ms;
+    int64_t changed_ms; /* when other speeds than before were ordered */
     uint32_t frames_since_drive;
     int error; /* why the port could not be opened, as last told */
     uint64_t reconnects, silences, commander_stops, mode_losses, missed;
@@ -84,6 +85,9 @@ void base_robot_health(const struct base_robot *robot, char *text, size_t room);
 
 /* Mode of the newest frame, as of enum create_oi_mode. */
 int32_t base_robot_mode_told(const struct base_robot *robot);
+
+/* Takes note of mode and battery in a new frame, and says once what a person should know. */
+void base_robot_heed(struct base_robot *robot);
 
 /* Bits of the newest frame. */
 unsigned base_robot_bits(const struct base_robot *robot);

@@ -163,7 +163,7 @@ static void wrong_use_is_refused_in_one_line(void **state)
     const char *odd[] = {WHISKERD, "--ring", "x", "--sck-divider", "7", NULL};
     assert_refused(odd, 2, "the SCK divider is 7; it must be even, 6 to 32");
     const char *lane_29[] = {WHISKERD, "--ring", "x", "--lane-mask", "0x10000000", NULL};
-    assert_refused(lane_29, 2, "the lane mask is 268435456");
+    assert_refused(lane_29, 2, "the lane mask 0x10000000 names more than lanes 0 to 27; use bits of 0xfffffff");
     const char *rubbish[] = {WHISKERD, "--ring", "x", "--word-gap", "3us", NULL};
     assert_refused(rubbish, 2, "--word-gap 3us: give a whole number from 0 to 255");
     const char *unknown[] = {WHISKERD, "--rong", "x", NULL};

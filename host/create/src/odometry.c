@@ -139,16 +139,22 @@ static struct create_step step_of(const struct create_odometry *odometry, struct
     };
 }
 
-/* Adds what was asked for in frames that never came. A turn that is read may be wrong by a whole one: both are loose.
- */
-static void add_estimate(struct create_odometry *odometry, struct create_step *step, uint32_t missed)
+/* Adds what was asked for in frames that never came: until other speeds were ordered what it was before, then what it
+ * is now, for then the base has heard the order or goes on as it did. A turn that is read may be wrong by a whole one:
+ * both are loose. */
+static void add_estimate(struct create_odometry *odometry, struct create_step *step, const struct create_frame *frame)
 {
-    const double frames = odometry->standing == CREATE_STANDS ? 0 : missed;
-    step->distance += frames * odometry->asked_m;
-    step->angle += frames * odometry->asked_rad;
-    step->loose_distance = ESTIMATE_SIGMA * fabs(frames * odometry->asked_m);
-    step->loose_angle = ESTIMATE_SIGMA * fabs(frames * odometry->asked_rad);
-    odometry->estimated += missed;
+    const bool stands = odometry->standing == CREATE_STANDS;
+    const double after = stands ? 0 : frame->ordered, before = stands ? 0 : frame->missed - frame->ordered;
+    const double distance = before * odometry->asked_m + after * asked_distance(frame);
+    const double angle = before * odometry->asked_rad + after * asked_angle(odometry, frame);
+    step->distance += distance;
+    step->angle += angle;
+    /* Of a stop ordered more than once, it may have heard only the last. */
+    const double all = stands ? 0 : frame->missed;
+    step->loose_distance = ESTIMATE_SIGMA * fmax(fabs(distance), all * fabs(odometry->asked_m));
+    step->loose_angle = ESTIMATE_SIGMA * fmax(fabs(angle), all * fabs(odometry->asked_rad));
+    odometry->estimated += frame->missed;
 }
 
 static struct odometry_units units(double distance_m, double angle_rad)
@@ -163,7 +169,7 @@ static struct create_step step_by_encoders(struct create_odometry *odometry, con
     double left, right;
     if (!count_wheels(odometry, frame, &left, &right)) {
         struct create_step step = {0};
-        add_estimate(odometry, &step, frame->missed);
+        add_estimate(odometry, &step, frame);
         return step;
     }
     /* Two wheels, each known to a count: their mean and difference are worth these units. */
@@ -185,7 +191,7 @@ static struct create_step step_by_values(struct create_odometry *odometry, const
     odometry->angle = choose(odometry, asked.angle);
     struct create_step step = step_of(odometry, read_distance(odometry, frame, d), read_angle(odometry, frame, a));
     if (frame->missed > 0) {
-        add_estimate(odometry, &step, frame->missed);
+        add_estimate(odometry, &step, frame);
     }
     return step;
 }

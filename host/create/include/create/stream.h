@@ -20,7 +20,8 @@
 /* The newest values of the packets asked for, by packet id; the others are 0. Units: protocol/create_oi.h. */
 struct create_frame {
     int32_t value[CREATE_OI_PACKET_MAX + 1];
-    uint32_t missed; /* frames that should have come since the one before, judged by the bytes skipped */
+    uint32_t missed;  /* frames that should have come since the one before, judged by the bytes skipped */
+    uint32_t ordered; /* the last so many of them came after other speeds had been ordered; whoever orders sets it */
 };
 
 struct create_stream_counts {
