@@ -30,7 +30,7 @@ test-hil: build ## hardware in the loop: a plugged bridge, a base: BASE=port [MO
 		$(if $(WHEELS_UP),--wheels-up) $(if $(INTERACTIVE),--interactive)
 
 bench: build ## measure speed and accuracy again, as ratios in one run: bench/results, docs/charts
-	@$(PYTHON) tools/run_benches.py --build-dir $(BUILD)
+	@$(PYTHON) tools/benches --build-dir $(BUILD)
 
 build: setup ## compile libraries, daemon, firmware core, simulated bridge and the Python modules
 	@tools/build.sh $(BUILD)
@@ -42,10 +42,10 @@ gen: setup ## regenerate protocol/gen from protocol/whisker.toml
 	@$(PYTHON) tools/protogen.py
 
 firmware: ## build the node's firmware with XC16 or XC-DSC, where there is one
-	@tools/firmware.sh
+	@tools/firmware/build.sh
 
 flash: ## first programming of a node by wire: TOOL=ipecmd|pk2cmd|picberry SERIAL=n [HEX=file]
-	@tools/flash.sh --tool "$(TOOL)" $(if $(SERIAL),--serial "$(SERIAL)") $(if $(HEX),--hex "$(HEX)")
+	@tools/firmware/flash.sh --tool "$(TOOL)" $(if $(SERIAL),--serial "$(SERIAL)") $(if $(HEX),--hex "$(HEX)")
 
 bitstream: setup ## the bridge for a board one can buy: BOARD=ecpix5|colorlight_i9|cynthion [LANES=n] [SEED=n] [SERIAL=text]
 	@$(PYTHON) fpga/boards/build.py "$(BOARD)" --seed $(SEED) $(if $(LANES),--lanes "$(LANES)") $(if $(SERIAL),--serial "$(SERIAL)")

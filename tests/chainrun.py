@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from whisker.demo.scenes import make_scene
+from whisker.bridge.ring import FRAME, Reader
 from whisker.protocol import FRAME_FLAGS
-from whisker.ring import FRAME, Reader
+from whisker.simulation.scenes import make_scene
 
 ROOT = Path(__file__).resolve().parent.parent
 BUILD = ROOT / os.environ.get("WHISKER_BUILD", "build/release")

@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 from chainrun import END_S, FAST_LINK, program, running, simulation, write_flat_scene
 
-from whisker.demo.scenes import make_scene
+from whisker.bridge.ring import Reader
 from whisker.protocol import WIRE_VERSION
-from whisker.ring import Reader
 from whisker.scene import write
+from whisker.simulation.scenes import make_scene
 
 
 def shared_memory() -> set[str]:

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from chainrun import BUILD, END_S
 
-from whisker.bridgesim import SimulationError, read_faults
+from whisker.bridge.ring import FRAME
 from whisker.cli import main
 from whisker.protocol import LIMITS
 from whisker.recording import read
-from whisker.ring import FRAME
+from whisker.simulation.bridge import SimulationError, read_faults
 
 SIX = 0x3F
 FAULTS = """

@@ -10,16 +10,16 @@ import pytest
 from chainrun import BUILD, END_S
 
 from whisker import scene as scenes
-from whisker.behaviour import WHISK_RAD_S
-from whisker.demo.scenes import make_robot
-from whisker.demo.simulation import radial_contacts
-from whisker.mount import Mount
-from whisker.radial import read_whisks, shape_of
+from whisker.pilot.behaviour import WHISK_RAD_S
+from whisker.simulation.scenes import make_robot
+from whisker.simulation.world import radial_contacts
+from whisker.touch.mount import Mount
+from whisker.touch.radial.model import read_whisks, shape_of
 
 LANE, RADIUS_MM, WHISKS = 3, 110.0, 2  # object_2
 SEED = 3
 SIDE_M, POST_M, GAP_RAD, TOWARDS_RAD = 4.0, 0.03, 0.02, math.radians(10.0)
-COURSE_S, LAST_S, PUSH_S = 3.8, 2.6, 0.6  # of bridgesim's whisks: one to the side of the post in each
+COURSE_S, LAST_S, PUSH_S = 3.8, 2.6, 0.6  # of the simulated bridge's whisks: one to the side of the post in each
 
 
 def scene_with_post() -> scenes.Scene:

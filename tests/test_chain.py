@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from chainrun import BLOCK_TICKS, BUILD, DECISION_TICKS, ROOT, TICKS_PER_S, is_last, record, write_flat_scene
 
-from whisker import localise
+from whisker.nav import localise
 from whisker.protocol import CODES, LANES, STATUS_CODE_SHIFT
 from whisker.report.run import FILTERS
 from whisker.scene import load

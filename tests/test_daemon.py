@@ -1,7 +1,9 @@
 """whiskerd from outside: the cable pulled and put back, killed and started again, replaced; what readers learn of it."""
 
 import os
+import re
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -12,10 +14,12 @@ import numpy as np
 import pytest
 from chainrun import END_S, FAST_LINK, Cable, program, running, simulation, write_flat_scene
 
+from whisker.bridge.ring import Reader, RingError
 from whisker.protocol import LIMITS, WIRE_VERSION
-from whisker.ring import Reader, RingError
 
 LONG_S = 600
+LOOK_S = 0.05
+WATCHDOG_US = 400_000  # fed at a quarter of it
 LAST, GAP = 1, 256  # WHISKER_FRAME_LAST, WHISKER_FRAME_GAP
 
 
@@ -24,13 +28,27 @@ def ring() -> str:
     return f"whisker-daemon-{os.getpid()}"
 
 
-def until(condition, process: subprocess.Popen) -> None:
-    """Looks until it is so; fails when the process ends or a generous time is over."""
+def until(condition, process: subprocess.Popen, reader: Reader) -> None:
+    """Looks whenever frames come into the reader's ring, which stays where it is; fails when the process ends or a generous
+    time is over. What the daemon tells without a frame wakes nobody, so LOOK_S without one is enough too.
+    """
     give_up = time.monotonic() + END_S
-    while not condition():
-        assert process.poll() is None, process.stderr.read()
-        assert time.monotonic() < give_up, "it does not happen"
-        time.sleep(0.002)
+    with Reader(reader.name) as watcher:
+        while not condition():
+            assert process.poll() is None, process.stderr.read()
+            assert time.monotonic() < give_up, "it does not happen"
+            watcher.seek_latest(0)
+            with suppress_timeout():
+                watcher.wait(LOOK_S)
+
+
+@contextmanager
+def suppress_timeout():
+    try:
+        yield
+    except RingError as error:
+        if error.name != "TIMEOUT":
+            raise
 
 
 def connected(reader: Reader) -> bool:
@@ -58,11 +76,11 @@ def finish(process: subprocess.Popen) -> list[str]:
 
 
 @contextmanager
-def bridge(folder: Path, ring: str, *options, words=()):
+def bridge(folder: Path, ring: str, *options, words=(), **popen):
     """A simulated bridge with whiskerd, and the cable between them."""
     scene, _ = write_flat_scene(folder, 1)
     path = folder / "sim.sock"
-    with running([*simulation(folder, scene, LONG_S, 1, ring, "--socket", path, *options), *words]) as process:
+    with running([*simulation(folder, scene, LONG_S, 1, ring, "--socket", path, *options), *words], **popen) as process:
         cable = Cable(path, process)
         yield process, cable
         cable.close()
@@ -82,14 +100,14 @@ def shell(folder: Path, ring: str, script: str) -> list[str]:
 
 def test_ring_lives_on_while_the_bridge_is_away(tmp_path, ring):
     with bridge(tmp_path, ring) as (process, cable), Reader(ring, wait_s=10.0) as reader:
-        until(lambda: reader.info.published > 400, process)
+        until(lambda: reader.info.published > 400, process, reader)
         generation = reader.info.generation
         for away in (1, 2):
             cable.pull()
-            until(lambda: not connected(reader), process)
+            until(lambda: not connected(reader), process, reader)
             before = reader.info.published
             cable.put()
-            until(lambda n=before: reader.info.published > n + 400, process)
+            until(lambda n=before: reader.info.published > n + 400, process, reader)
             assert reader.stats.reconnects == away
         frames = reader.peek().copy()
         assert reader.info.generation == generation
@@ -116,12 +134,12 @@ def test_loose_contact_is_survived(tmp_path, ring):
     with bridge(tmp_path, ring) as (process, cable), Reader(ring, wait_s=10.0) as reader:
         for blinks in range(1, 6):
             before = reader.info.published
-            until(lambda n=before: reader.info.published > n + 100, process)
+            until(lambda n=before: reader.info.published > n + 100, process, reader)
             cable.pull()
             cable.put()
-            until(lambda n=blinks: reader.stats.reconnects == n, process)
+            until(lambda n=blinks: reader.stats.reconnects == n, process, reader)
         before = reader.info.published
-        until(lambda: reader.info.published > before + 100, process)
+        until(lambda: reader.info.published > before + 100, process, reader)
         assert begins_anew_after_each_gap(reader.peek(), 5)
         finish(process)
 
@@ -131,10 +149,10 @@ def test_waits_for_its_first_bridge(tmp_path, ring):
         bridge(tmp_path, ring, "--unplugged", words=["--wait"]) as (process, cable),
         Reader(ring, wait_s=10.0) as reader,
     ):
-        until(lambda: reader.stats is not None, process)
+        until(lambda: reader.stats is not None, process, reader)
         assert reader.stats.connected == 0 and reader.info.published == 0
         cable.put()
-        until(lambda: reader.info.published > 200, process)
+        until(lambda: reader.info.published > 200, process, reader)
         assert not np.any(reader.peek()["flags"] & GAP), "nothing was missed"
         lines = finish(process)
     assert lines[0] == "whiskerd: bridge: no bridge is connected; plug it in; check its power and cable"
@@ -143,7 +161,7 @@ def test_waits_for_its_first_bridge(tmp_path, ring):
 
 def test_once_ends_when_the_bridge_goes(tmp_path, ring):
     with bridge(tmp_path, ring, words=["--once"]) as (process, cable), Reader(ring, wait_s=10.0) as reader:
-        until(lambda: reader.info.published > 100, process)
+        until(lambda: reader.info.published > 100, process, reader)
         cable.pull()
         _, errors = process.communicate(timeout=END_S)
     lines = [line for line in errors.splitlines() if line.startswith("whiskerd: bridge")]
@@ -153,7 +171,7 @@ def test_once_ends_when_the_bridge_goes(tmp_path, ring):
 
 def test_readers_know_bridge_and_clock(tmp_path, ring):
     with bridge(tmp_path, ring) as (process, _), Reader(ring, wait_s=10.0) as reader:
-        until(lambda: connected(reader) and reader.clock is not None, process)
+        until(lambda: connected(reader) and reader.clock is not None, process, reader)
         stats, clock = reader.stats, reader.clock
         finish(process)
     assert (stats.serial, stats.firmware) == ("0001", f"gateware {LIMITS['gateware_version']}, wire {WIRE_VERSION}")
@@ -173,14 +191,14 @@ def test_killed_daemon_hinders_no_next_one(tmp_path, ring):
     end = "kill -STOP $a; sleep 0.05; kill -KILL $a; wait $a"
     script = f"trap : TERM; $D & a=$!; read go; {end}; $D --wait & b=$!; read go; kill $b; wait $b"
     with running(shell(tmp_path, ring, script), stdin=subprocess.PIPE) as process, Reader(ring, wait_s=10.0) as reader:
-        until(lambda: reader.info.published > 100, process)
+        until(lambda: reader.info.published > 100, process, reader)
         first = reader.info.generation
         process.stdin.write("go\n")
         process.stdin.flush()
         assert read_to_end(reader)[1] in ("WRITER_DEAD", "RESTARTED")
         reader.reattach(10.0)
         assert reader.info.generation != first
-        until(lambda: reader.info.published > 100, process)
+        until(lambda: reader.info.published > 100, process, reader)
         ticks = reader.peek()["tick"]
         assert ticks[0] == 0, "frames left over from the killed one's run are thrown away"
         process.communicate("go\n", timeout=END_S)
@@ -190,37 +208,56 @@ def test_killed_daemon_hinders_no_next_one(tmp_path, ring):
 def test_replacement_takes_over_name_and_bridge(tmp_path, ring):
     script = "trap : TERM; $D & a=$!; read go; $D --replace & b=$!; wait $a; echo first $? >&2; read go; kill $b; wait $b; echo second $? >&2"
     with running(shell(tmp_path, ring, script), stdin=subprocess.PIPE) as process, Reader(ring, wait_s=10.0) as reader:
-        until(lambda: reader.info.published > 100, process)
+        until(lambda: reader.info.published > 100, process, reader)
         process.stdin.write("go\n")
         process.stdin.flush()
         last, how = read_to_end(reader)
         assert how in ("CLOSED", "RESTARTED")
         assert last["flags"] & LAST, "the first daemon drained its bridge"
         reader.reattach(10.0)
-        until(lambda: reader.info.published > 100, process)
+        until(lambda: reader.info.published > 100, process, reader)
         _, errors = process.communicate("go\n", timeout=END_S)
     assert "first 0" in errors and "second 0" in errors
 
 
 def test_statistics_on_request(tmp_path, ring):
     with bridge(tmp_path, ring) as (process, _), Reader(ring, wait_s=10.0) as reader:
-        until(lambda: reader.info.published > 100, process)
+        until(lambda: reader.info.published > 100, process, reader)
         os.kill(reader.info.writer_pid, signal.SIGUSR1)
         line = process.stderr.readline()
         finish(process)
     assert line.startswith("whiskerd: ") and "frames published, 0 missing, 0 dropped by the bridge" in line
 
 
+@pytest.mark.parametrize("plugged", [True, False])
+def test_systemd_is_told_that_it_is_ready_lives_and_stops(tmp_path, ring, plugged):
+    if "libsystemd" not in subprocess.run(["ldd", program("whiskerd")], capture_output=True, text=True).stdout:
+        pytest.skip("whiskerd was built without libsystemd")
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listener:
+        listener.bind(str(tmp_path / "notify"))
+        listener.settimeout(END_S)
+        told = {"NOTIFY_SOCKET": str(tmp_path / "notify"), "WATCHDOG_USEC": str(WATCHDOG_US)}
+        unplugged = [] if plugged else ["--unplugged"]
+        with bridge(tmp_path, ring, *unplugged, words=["--wait"], env=os.environ | told) as (process, _):
+            heard = [listener.recv(1024).decode() for _ in range(4)]
+            finish(process)
+            while heard[-1] != "STOPPING=1":
+                heard.append(listener.recv(1024).decode())
+    status = f"bridge 0001 (.*) at 1-1 streams into ring {ring}" if plugged else "waiting for a bridge"
+    assert re.fullmatch(f"READY=1\nSTATUS={status}", heard[0])
+    assert set(heard[1:-1]) == {"WATCHDOG=1"}
+
+
 def test_nodes_on_request_while_frames_go_on(tmp_path, ring):
     with bridge(tmp_path, ring) as (process, _), Reader(ring, wait_s=10.0) as reader:
-        until(lambda: reader.info.published > 100, process)
+        until(lambda: reader.info.published > 100, process, reader)
         asked = subprocess.run(
             [sys.executable, "-m", "whisker.cli", "info", "--nodes", "--ring", ring], capture_output=True, text=True
         )
         lines = [process.stderr.readline()]
         lines += [process.stderr.readline() for _ in range(int(lines[0].split()[1]))]
         published = reader.info.published
-        until(lambda: reader.info.published > published + 100, process)
+        until(lambda: reader.info.published > published + 100, process, reader)
         finish(process)
         missing = reader.info.frames_missing
     assert asked.returncode == 0 and "its log lists the nodes now" in asked.stdout and asked.stdout.count("\n") == 1

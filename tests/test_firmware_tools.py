@@ -2,6 +2,7 @@
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -9,7 +10,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path.insert(0, str(ROOT / "tools"))
+sys.path.insert(0, str(ROOT / "tools/firmware"))
 import check_listing  # noqa: E402
 import intel_hex  # noqa: E402
 import make_image  # noqa: E402
@@ -49,14 +50,16 @@ def test_an_image_holds_the_code_and_nothing_of_the_phantom_bytes(tmp_path):
 def test_a_damaged_hex_file_is_refused_in_one_line(tmp_path, spoil, message):
     source = hex_file(tmp_path / "app.hex", 100)
     source.write_text(spoil(source.read_text()))
-    done = run(sys.executable, "tools/make_image.py", "image", source, tmp_path / "out.whex", "--version", "1.0")
+    done = run(
+        sys.executable, "tools/firmware/make_image.py", "image", source, tmp_path / "out.whex", "--version", "1.0"
+    )
     assert done.returncode == 1 and message in done.stderr and done.stderr.count("\n") == 1
 
 
 def test_code_in_the_others_place_is_refused(tmp_path):
     done = run(
         sys.executable,
-        "tools/make_image.py",
+        "tools/firmware/make_image.py",
         "image",
         hex_file(tmp_path / "a.hex", 9, 0x200),
         tmp_path / "o",
@@ -65,7 +68,13 @@ def test_code_in_the_others_place_is_refused(tmp_path):
     )
     assert done.returncode == 1 and "which is the loader's" in done.stderr
     done = run(
-        sys.executable, "tools/make_image.py", "wire", hex_file(tmp_path / "b.hex", 9), tmp_path / "o", "--serial", "5"
+        sys.executable,
+        "tools/firmware/make_image.py",
+        "wire",
+        hex_file(tmp_path / "b.hex", 9),
+        tmp_path / "o",
+        "--serial",
+        "5",
     )
     assert done.returncode == 1 and "code in the application's rows" in done.stderr
 
@@ -96,7 +105,7 @@ def test_programmers_are_called_as_they_want_it(tmp_path, tool):
     program.write_text(f'#!/bin/sh\necho "$@" >{tmp_path}/called\n')
     program.chmod(0o755)
     path = f"{tmp_path}:{os.environ['PATH']}"
-    words = ["tools/flash.sh", "--tool", tool, "--hex", source]
+    words = ["tools/firmware/flash.sh", "--tool", tool, "--hex", source]
     done = run(*words, PATH=path)
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "called").read_text().strip() == WANTED[tool].format(hex=source)
@@ -115,20 +124,29 @@ def test_programmers_are_called_as_they_want_it(tmp_path, tool):
     [
         ([], "which programmer"),
         (["--tool", "stk500"], "use ipecmd, pk2cmd or picberry"),
-        (["--tool", "ipecmd", "--hex", "none.hex"], "run 'make firmware' first"),
+        (["--tool", "ipecmd", "--hex", "none.hex", "--dry-run"], "run 'make firmware' first"),
+        (["--tool", "ipecmd", "--hex", "none.hex"], "install MPLAB X with its IPE"),
         (["--tool", "ipecmd", "--serial", "x"], "whole number"),
+        (["--hex", "README.md", "--tool"], "--tool: wants a value"),
         (["--tool", "ipecmd", "--hex", "README.md"], "install MPLAB X with its IPE"),
         (["--tool", "pk2cmd", "--hex", "README.md"], "install pk2cmd for the PICkit 2"),
         (["--tool", "picberry", "--hex", "README.md"], "install picberry"),
     ],
 )
 def test_what_is_missing_for_programming_is_said(words, message):
-    done = run("tools/flash.sh", *words)
+    done = run("tools/firmware/flash.sh", *words)
     assert done.returncode == 1 and message in done.stderr
 
 
+def test_a_serial_number_that_means_none_is_refused_in_one_line(tmp_path):
+    words = ["--tool", "pk2cmd", "--hex", hex_file(tmp_path / "wire.hex", 50, 0x200), "--dry-run"]
+    done = run("tools/firmware/flash.sh", *words, "--serial", 0xFFFFFFFF)
+    assert done.returncode == 1 and "give a number from 1 to 4294967294" in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
 def test_without_its_compiler_the_firmware_build_says_so():
-    done = run("tools/firmware.sh", PATH="/usr/bin:/bin")
+    done = run("tools/firmware/build.sh", PATH="/usr/bin:/bin")
     assert done.returncode == 1 and "install MPLAB XC-DSC or XC16" in done.stderr
 
 
@@ -144,6 +162,36 @@ def test_the_code_for_the_chip_compiles(define):
     assert done.returncode == 0, done.stderr
 
 
+SAMPLE_PATH = [
+    f"core/{name}" for name in ("sensor_frame", "sensor_frame_90316", "record", "sampler", "node", "service")
+]
+SAMPLE_PATH += [f"port_dspic/{name}" for name in ("port", "sensor_spi", "link_spi")]
+
+
+@pytest.mark.skipif(not shutil.which("avr-gcc"), reason="avr-gcc stands in for the chip's compiler")
+@pytest.mark.parametrize("name", SAMPLE_PATH)
+def test_the_sample_path_calls_no_library_where_int_has_16_bits(name):
+    """Nor does a value lose bits unsaid. The one helper allowed multiplies 16 by 16 bits: one instruction on the dsPIC."""
+    includes = [f"-I{FIRMWARE / folder}" for folder in (".", "core", "port_dspic")] + [f"-I{ROOT}/protocol/gen"]
+    flags = ["-mmcu=atmega1284p", "-std=gnu99", "-O1", "-Wall", "-Wextra", "-Werror", "-Wconversion", "-Wno-attributes"]
+    stub = ["-D__dsPIC33F__", "-include", FIRMWARE / "tests/xc16_stub.h"]
+    done = run("avr-gcc", *flags, *stub, *includes, "-S", FIRMWARE / f"{name}.c", "-o", "-")
+    assert done.returncode == 0, done.stderr
+    called = set(re.findall(r"\b(?:r?call|r?jmp)\s+(__\w+)", done.stdout))
+    assert {helper for helper in called if not helper.startswith("__builtin_")} <= {"__umulhisi3"}
+
+
+@pytest.mark.parametrize("name", SAMPLE_PATH)
+def test_the_sample_path_has_no_initialised_data(tmp_path, name):
+    """Nor any other of its own: all state is the caller's, in struct board."""
+    includes = [f"-I{FIRMWARE / folder}" for folder in (".", "core", "port_dspic")]
+    includes += [f"-I{ROOT / folder}" for folder in ("protocol/gen", "sim/dspic")]
+    done = run("cc", "-std=c99", "-O1", *includes, "-c", FIRMWARE / f"{name}.c", "-o", tmp_path / "out.o")
+    assert done.returncode == 0, done.stderr
+    symbols = run("nm", tmp_path / "out.o").stdout
+    assert " T " in symbols and not re.findall(r"^.* [bBcCdDsS] .*$", symbols, re.M)
+
+
 def test_the_watchdogs_period_is_the_models():
     """LPRC runs at 32 kHz; the configuration words are the chip's, the parameter the model's."""
     words = dict(
@@ -156,6 +204,7 @@ def test_the_watchdogs_period_is_the_models():
 
 def stand_in_compiler(folder: Path) -> dict[str, str]:
     """xc16-gcc and its kin as scripts that write down their arguments, and a linker script in the older style."""
+    folder.mkdir(exist_ok=True)
     loader, app = hex_file(folder / "loader.hex.in", 50, 0x200), hex_file(folder / "application.hex.in", 100)
     assert loader != app
     scripts = {
@@ -175,7 +224,7 @@ def stand_in_compiler(folder: Path) -> dict[str, str]:
 
 
 def test_the_firmware_build_leaves_both_vector_tables_to_the_source(tmp_path):
-    done = run("tools/firmware.sh", **stand_in_compiler(tmp_path))
+    done = run("tools/firmware/build.sh", **stand_in_compiler(tmp_path))
     assert done.returncode == 0, done.stderr
     calls = (tmp_path / "called").read_text().splitlines()
     assert len(calls) == 2 and all("--no-ivt" in call and "-merrata=exch" in call for call in calls)
@@ -183,7 +232,51 @@ def test_the_firmware_build_leaves_both_vector_tables_to_the_source(tmp_path):
     for name, origin in (("loader", "0x200, LENGTH = 0x1E00"), ("application", "0x2280, LENGTH = 0x13580")):
         script = (tmp_path / "out" / f"{name}.gld").read_text()
         assert f"ORIGIN = {origin}" in script and "ivt" not in script and ".text" in script
-    assert (tmp_path / "out/node.whex").exists() and (tmp_path / "out/node_wire.hex").exists()
+    assert (
+        (tmp_path / "out/cycles.txt").exists()
+        and (tmp_path / "out/node.whex").exists()
+        and (tmp_path / "out/node_wire.hex").exists()
+    )
+
+
+def link_as_called(call: str, folder: Path) -> subprocess.CompletedProcess:
+    """The compiler's call by the PC's own: the same sources and defines, the chip's instructions left out, linked into one."""
+    words = call.split()
+    flags = [word for word in words if word.startswith(("-I", "-D"))]
+    flags += ["-std=gnu99", "-O1", "-Wall", "-Wextra", "-Werror", "-Wno-attributes", "-D__dsPIC33F__"]
+    objects = []
+    for source in (word for word in words if word.endswith(".c")):
+        done = run("cc", *flags, "-include", FIRMWARE / "tests/xc16_stub.h", "-S", source, "-o", "-")
+        assert done.returncode == 0, done.stderr
+        objects.append(folder / f"{Path(source).stem}.o")
+        plain = re.sub(r"#APP.*?#NO_APP", "", done.stdout, flags=re.S)
+        subprocess.run(["cc", "-x", "assembler", "-c", "-", "-o", objects[-1]], input=plain, text=True, check=True)
+    return run("cc", "-r", "-nostdlib", *objects, "-o", folder / "all.o")
+
+
+OPTIONS = {"": (0x8000, ""), "SENSOR=mlx90316": (0x8001, "-DSENSOR_MLX90316")}
+OPTIONS |= {"RESYNC=1": (0x8002, "-DSAMPLER_RESYNC_EVERY_FRAME")}
+
+
+@pytest.mark.parametrize("option", OPTIONS)
+def test_each_build_of_the_firmware_links_and_names_itself(tmp_path, option):
+    bits, define = OPTIONS[option]
+    chosen = dict([option.split("=")]) if option else {}
+    done = run("tools/firmware/build.sh", **stand_in_compiler(tmp_path), **chosen)
+    assert done.returncode == 0, done.stderr
+    for call in (tmp_path / "called").read_text().splitlines():
+        assert define in call
+        linked = link_as_called(call, tmp_path)
+        assert linked.returncode == 0, linked.stderr
+        missing = set(run("nm", "-u", tmp_path / "all.o").stdout.split()) - {"U", "_GLOBAL_OFFSET_TABLE_"}
+        assert {name for name in missing if not name.startswith("__builtin_")} <= {"memcmp", "memcpy", "memset"}
+    assert make_image.IMAGE_HEADER.unpack((tmp_path / "out/node.whex").read_bytes())["options"] == bits
+
+
+def test_an_option_that_is_none_is_refused(tmp_path):
+    for chosen in ({"SENSOR": "mlx90363"}, {"RESYNC": "yes"}, {"SENSOR": "mlx90316", "RESYNC": "1"}):
+        done = run("tools/firmware/build.sh", **stand_in_compiler(tmp_path / next(iter(chosen.values()))), **chosen)
+        assert done.returncode == 1 and done.stderr.startswith("firmware: ") and done.stderr.count("\n") == 1
 
 
 def test_both_tables_of_vectors_name_the_same_interrupts():
@@ -216,3 +309,13 @@ def test_a_library_call_and_a_lost_flag_in_the_sample_path_are_found():
         assert check_listing.findings(lost) == ["_port_on_t2 writes an interrupt flag register back as a whole"]
     elsewhere = "00002300 <_loader_serve>:\n 2302: 02 00 00  call 0x3000 <___mulsi3>\n"
     assert check_listing.findings(elsewhere) == []
+
+
+def test_the_listing_tells_the_cycles_of_the_sample_path():
+    listing = (
+        "00002300 <_port_on_t2>:\n"
+        " 2300: 84 40 a9  bclr.b  0x84, #7\n 2302: 00 9f be  mov.d  w0, [w15++]\n"
+        " 2304: 02 00 00  call  0x2400 <_node_on_timer>\n 2308: 00 00 06  return\n"
+        "00002400 <_main>:\n 2400: 00 00 00  nop\n"
+    )
+    assert check_listing.passes(listing) == {"_port_on_t2": (4, 8)}

@@ -9,7 +9,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "tools"))
-import nav_page  # noqa: E402
+from benches.nav import page as nav_page  # noqa: E402
 
 OURS = nav_page.OURS
 
@@ -96,7 +96,7 @@ def test_every_table_and_chart_is_told(data):
 
 
 def test_every_picture_is_one_that_the_bench_draws(data):
-    drawn = set(re.findall(r'"(\w+)"[:,] nav_charts', (ROOT / "tools/bench_nav.py").read_text()))
+    drawn = set(re.findall(r'"(\w+)"[:,] charts', (ROOT / "tools/benches/nav/bench.py").read_text()))
     assert set(re.findall(r"charts/nav_(\w+)\.svg", nav_page.document(data))) == drawn
 
 

@@ -16,12 +16,12 @@ from drills.relays import free_ports
 from quickmodels import quick_models
 
 from whisker import scene as scenes
+from whisker.bridge.ring import Reader
 from whisker.demo.chain import ChainRun, Link, run_chain
-from whisker.demo.scenes import make_scene
 from whisker.report.run import FILTERS
-from whisker.ring import Reader
 from whisker.robot import link as links
 from whisker.robot import parts
+from whisker.simulation.scenes import make_scene
 
 SEED, SECONDS = 3, 5.0
 

@@ -23,8 +23,8 @@ NEEDED = (
 BUILT = shutil.ignore_patterns("*.so", "*.egg-info", "__pycache__", "tests")
 ROUND_TRIP = """
 import sys, numpy as np, whisker
-from whisker.ring import FRAME, Reader, Writer
-from whisker.localise import filter_names
+from whisker.bridge.ring import FRAME, Reader, Writer
+from whisker.nav.localise import filter_names
 from whisker.recording.messages import definition
 assert sys.argv[1] in whisker.__file__, whisker.__file__
 frames = np.zeros(100, FRAME)

@@ -10,8 +10,8 @@ import sys
 from pathlib import Path
 from xml.sax.saxutils import escape
 
-from whisker.behaviour_rules import RULES, Rule
-from whisker.behaviour_states import WHISKING, State
+from whisker.pilot.rules import RULES, Rule
+from whisker.pilot.states import WHISKING, State
 
 OUT = Path(__file__).resolve().parents[1] / "docs" / "pictures" / "behaviour.svg"
 BOX = (132, 34)

@@ -1,6 +1,8 @@
 #!/usr/bin/env python3
-"""Fails on a forbidden arrow: a folder that uses one it must not know. The allowed arrows are docs/architecture.md's table."""
+"""Fails on a forbidden arrow: a folder that uses one it must not know. The allowed arrows are docs/architecture.md's table,
+and host/python/README.md's for the rooms of the Python package."""
 
+import ast
 import re
 import sys
 from pathlib import Path
@@ -35,6 +37,24 @@ ALLOWED = {
         "fpga/bridge_rtl",
         "fpga/usb",
     ],
+}
+# Room of the Python package -> rooms it may use besides its own and the modules that lie in no room, which use none.
+# A room stands below all it uses: nothing reaches back.
+PACKAGE = "host/python/whisker"
+ROOMS = {
+    "": [],
+    "bridge": [],
+    "touch": ["bridge"],
+    "pilot": ["touch"],
+    "nav": [],
+    "recording": ["bridge"],
+    "simulation": ["pilot"],
+    "robot": ["bridge", "touch", "pilot", "nav", "recording", "simulation"],
+    "scenes": ["touch", "pilot", "nav", "recording", "simulation", "robot"],
+    "view": ["bridge", "robot"],
+    "report": [],
+    "demo": ["touch", "pilot", "nav", "recording", "simulation", "robot", "report"],
+    "commands": ["bridge", "touch", "pilot", "nav", "recording", "simulation", "robot", "scenes", "view", "demo"],
 }
 INCLUDE = re.compile(r'^\s*[#`]include\s+["<]([^">]+)[">]', re.MULTILINE)
 IMPORT = re.compile(r"^\s*(?:from|import)\s+([a-zA-Z_][\w.]*)", re.MULTILINE)
@@ -72,6 +92,34 @@ def uses(path: Path, owner_of: dict[str, set[str]], room: str) -> set[str]:
     return {used for owners_of_one in owners_named if not own & owners_of_one for used in owners_of_one if used}
 
 
+def imported(path: Path, package: Path) -> set[str]:
+    """Rooms and modules at the root of the Python package that one of its files imports."""
+    inside = (package.name, *path.relative_to(package).parent.parts)
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.ImportFrom):
+            start = [*inside[: len(inside) - node.level + 1], node.module] if node.level else [node.module]
+            names = [".".join([*filter(None, start), name.name]) for name in node.names]
+        else:
+            names = [name.name for name in node.names] if isinstance(node, ast.Import) else []
+        found |= {name.split(".")[1] for name in names if name.startswith(package.name + ".")}
+    return found
+
+
+def room_violations() -> list[str]:
+    """Arrows between rooms of the Python package that its table does not allow."""
+    package = ROOT / PACKAGE
+    bad = []
+    for path in sorted(package.rglob("*.py")):
+        room = (path.relative_to(package).parts[:-1] or ("",))[0]
+        used = {name for name in imported(path, package) - {room} if (package / name).is_dir()}
+        for name in sorted(used - set(ROOMS.get(room, []))):
+            bad.append(
+                f"{path.relative_to(ROOT)}: {room or 'the root'} must not use {name}; move the code or turn the arrow round"
+            )
+    return bad
+
+
 def violations() -> list[str]:
     files = [p for room in ALLOWED for p in (ROOT / room).rglob("*") if p.suffix in SUFFIXES]
     owner_of = owners(files)
@@ -86,7 +134,7 @@ def violations() -> list[str]:
 
 
 def main() -> int:
-    bad = violations()
+    bad = violations() + room_violations()
     print("\n".join(bad), end="\n" if bad else "", file=sys.stderr)
     return 1 if bad else 0
 

@@ -3,7 +3,7 @@
 
     .venv/bin/python tools/fuzz.py                    10^8 inputs in all, goes on where an earlier run stopped
     .venv/bin/python tools/fuzz.py --total 1e6        a short one
-    .venv/bin/python tools/fuzz.py --only decoder     one target
+    .venv/bin/python tools/fuzz.py --only decoder     one target; what the results say of the others stays
 
 Targets: programs `fuzz_*` of the build (libFuzzer with AddressSanitizer and UBSan) and host/python/tests/fuzz_*.py
 (--inputs, --seed). What they have found and counted is kept in build/bench/fuzz; a change of a target begins it anew.
@@ -125,9 +125,10 @@ def shares(targets: list[Target], total: int) -> dict[str, int]:
     return {target.name: few if target.slow else each for target in targets}
 
 
-def write_results(tallies: list[Tally]) -> None:
+def write_results(tallies: list[Tally], targets: dict[str, dict]) -> None:
+    """`targets`: entries of the results file that stay; those of `tallies` are added or take their place."""
     RESULTS.mkdir(parents=True, exist_ok=True)
-    targets = {
+    targets = targets | {
         tally.target: {
             "inputs": tally.inputs,
             "crashes": tally.crashes,
@@ -136,8 +137,8 @@ def write_results(tallies: list[Tally]) -> None:
         for tally in tallies
     }
     data = {
-        "inputs": sum(tally.inputs for tally in tallies),
-        "crashes": sum(tally.crashes for tally in tallies),
+        "inputs": sum(entry["inputs"] for entry in targets.values()),
+        "crashes": sum(entry["crashes"] for entry in targets.values()),
         "targets": targets,
     }
     (RESULTS / "fuzz.json").write_text(json.dumps(data, indent=1) + "\n")
@@ -148,7 +149,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--build-dir", type=Path, default=ROOT / "build/release")
     parser.add_argument("--total", type=float, default=TOTAL, help="inputs of all targets together (1e8)")
-    parser.add_argument("--only", help="the one target of this name; the results file is left as it is")
+    parser.add_argument("--only", help="the one target of this name")
     parser.add_argument("--jobs", type=int, default=2, help="targets at a time (2)")
     options = parser.parse_args()
     targets = find_targets(options.build_dir.resolve())
@@ -165,8 +166,9 @@ def main() -> int:
         ThreadPoolExecutor(options.jobs) as pool,
     ):
         tallies = list(pool.map(lambda target: run_target(target, wanted[target.name], bar), chosen))
-    if options.only is None:
-        write_results(tallies)
+    kept = RESULTS / "fuzz.json"
+    others = json.loads(kept.read_text())["targets"] if options.only and kept.exists() else {}
+    write_results(tallies, others)
     return 1 if any(tally.crashes for tally in tallies) else 0
 
 

@@ -1,6 +1,6 @@
 """How long the bridge takes, in cycles of its clock: node_link's windows, and framer's way to the first byte for USB.
 
-The bench of the whole bridge holds the Verilog to these; tools/bench_bridge.py makes figures of them.
+The bench of the whole bridge holds the Verilog to these; tools/benches bridge makes figures of them.
 """
 
 RECORD_BITS, SERVICE_BITS, WORD_BITS = 64, 480, 16  # on each lane

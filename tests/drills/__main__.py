@@ -2,12 +2,12 @@
 
 import argparse
 import json
+import signal
 import sys
 from pathlib import Path
 
-from whisker import scene as scenes
-from whisker.demo.scenes import make_scene
 from whisker.demo.training import learn
+from whisker.simulation.scenes import make_scene
 
 from .course import FAULTS, Course, as_json
 from .machine import Plan
@@ -23,12 +23,12 @@ def main() -> int:
     parser.add_argument("--only", action="append", metavar="WORDS", help="faults whose names have these words")
     parser.add_argument("--create", type=int, choices=(1, 2), default=1)
     arguments = parser.parse_args()
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit("drills: stopped"))  # as by ^C: with it all processes end
     out = arguments.out / f"seed{arguments.seed}"
     out.mkdir(parents=True, exist_ok=True)
     models = arguments.models or out / "models"
     if not (models / "texture.json").exists():
-        scenes.write(out / "scene", make_scene(arguments.seed)[0])
-        learn(models, scenes.load(out / "scene"), arguments.seed, lambda: None)
+        learn(models, make_scene(arguments.seed)[0], arguments.seed, lambda: None)
     faults = [f for f in FAULTS if not arguments.only or any(words in f.name for words in arguments.only)]
     seconds = 60.0 * arguments.minutes
     plan = Plan(out.resolve(), models.resolve(), arguments.seed, seconds, arguments.level, arguments.create)

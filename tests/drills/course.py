@@ -6,8 +6,8 @@ import time
 from bisect import bisect_left
 from dataclasses import asdict, dataclass, field, replace
 
-from whisker.demo.scenes import make_robot
 from whisker.robot.link import Link
+from whisker.simulation.scenes import make_robot
 
 from .faults import FAULTS, WHISKER, Fault
 from .gaps import GAPS, Count, Gap, slipped

@@ -9,12 +9,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from whisker import scene as scenes
-from whisker.base import Base, BaseError
-from whisker.demo.scenes import make_scene
+from whisker.pilot.base import Base, BaseError
 from whisker.robot import parts
 from whisker.robot.link import Link
 from whisker.robot.supervisor import Supervisor
 from whisker.robot.truth import TruthWatcher
+from whisker.simulation.scenes import make_scene
 
 from .relays import Hands, Line, Network, free_ports
 
@@ -87,7 +87,8 @@ class Machine:
         cut = bridge.command.index("--")
         bridge = replace(bridge, command=(*bridge.command[:cut], *map(str, more), *bridge.command[cut:]))
         desktop = parts.desktop(body, self._desktop, self.bags / "robot.mcap", self.view_port)
-        return [bridge, *desktop, *parts.netbook(body, self._netbook, simulated=True, with_desktop=True)]
+        daemon = parts.daemon(self._netbook, simulated=True)
+        return [bridge, *desktop, daemon, *parts.netbook(body, self._netbook, with_desktop=True)]
 
     @contextmanager
     def running(self):

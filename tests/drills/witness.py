@@ -12,8 +12,8 @@ from bisect import bisect_right
 
 import numpy as np
 
+from whisker.bridge.ring import Reader, RingError
 from whisker.protocol import CODES, STATUS_CODE_SHIFT
-from whisker.ring import Reader, RingError
 from whisker.robot.link import Link
 
 from .machine import Machine

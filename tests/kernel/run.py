@@ -20,8 +20,8 @@ from pathlib import Path
 
 from image import MissingError, check_tools, initramfs, kernel
 
-from whisker.bridgesim import SimulationError, flat_scene, program
 from whisker.protocol import LANES
+from whisker.simulation.bridge import SimulationError, flat_scene, program
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]

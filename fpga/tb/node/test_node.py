@@ -17,7 +17,7 @@ from whisker.protocol import CODES, LANES, RECORD, STATUS_CODE_SHIFT
 
 TICK_PS = 500_000_000
 IDLE = (1 << LANES) - 1
-LOOP_PS = 41_000  # pads, buffer, 0.6 m of cable there and back, the node's output
+LOOP_PS = 47_000  # docs/hardware.md: pads, two buffers, 0.6 m of cable there and back, the node's output
 PINS = {"sync": SYNC, "select_n": SELECT, "sck": SCK, "mosi": MOSI}
 SETTINGS = [(6, 30, 5), (6, 255, 5), (8, 30, 6), (16, 180, 8), (16, 30, 8), (32, 30, 16), (32, 255, 16)]
 TICKS = 10

@@ -6,9 +6,9 @@ import sys
 import pytest
 from rings import ring_name
 
+from whisker.bridge.ring import Clock, Writer
 from whisker.cli import main
 from whisker.protocol import LIMITS, WIRE_VERSION
-from whisker.ring import Clock, Writer
 
 END_S = 60
 STATS = {"started_ns": 1, "connected": 1, "wire_version": WIRE_VERSION, "serial": b"B0042", "lane_mask": 0b101}

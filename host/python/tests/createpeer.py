@@ -7,8 +7,8 @@ import subprocess
 import tty
 from pathlib import Path
 
-from whisker.base import Base
-from whisker.bridgesim import program
+from whisker.pilot.base import Base
+from whisker.simulation.bridge import program
 
 START, SAFE, FULL, DRIVE, STREAM, PAUSE = 128, 131, 132, 145, 148, 150
 PASSIVE_MODE, SAFE_MODE, FULL_MODE = 1, 2, 3

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from whisker.localise import Observations
+from whisker.nav.localise import Observations
 from whisker.scene import Arena, Prior, Robot, Scene, Whisker
 
 TEXTURES = ("VINYL", "SMOOTH", "ROUGH")

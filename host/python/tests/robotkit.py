@@ -7,7 +7,7 @@ import threading
 
 import numpy as np
 
-from whisker.observations import ODOMETRY
+from whisker.nav.observations import ODOMETRY
 from whisker.robot import messages as m
 
 

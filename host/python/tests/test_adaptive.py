@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from whisker import filters
+from whisker.nav import filters
 from whisker.scenes import make
 
 SEEDS = range(4000, 4004)

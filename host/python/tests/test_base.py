@@ -12,9 +12,9 @@ import sys
 import pytest
 from createpeer import FIRM_STOP, FULL, PAUSE, SAFE, START, STOP, STREAM, Driver, drive_order
 
-from whisker import base
-from whisker.base import BaseError, BaseLost
-from whisker.bridgesim import program
+from whisker.pilot import base
+from whisker.pilot.base import BaseError, BaseLost
+from whisker.simulation.bridge import program
 
 ENDED = STOP + bytes([PAUSE, 0, START])  # last words: stopped, silent, passive
 
@@ -125,7 +125,7 @@ def test_damaged_bytes_cost_one_frame_and_are_counted(start):
 
 COMMANDER = """
 import sys
-from whisker.base import Base
+from whisker.pilot.base import Base
 base = Base(sys.argv[1])
 while True:
     base.drive(0.2, 0)
@@ -277,7 +277,8 @@ def test_without_a_line_orders_say_so(start):
         driver.peer.vanish()
         while client.health()["port"] == "open":
             pass
-        assert client.drive(0.1, 0).byte_count == 0
+        assert client.drive(0.1, 0) == base.Sent(0, 0.0, 0.0)
+        assert client.health()["left_mm_s"] == "0"
         assert client.odometry().bits & base.IDLE
         assert client.odometry(after=10**9).x_m == 0  # nothing more will come: answered at once
         driver.peer.come_back()
@@ -350,6 +351,11 @@ def test_messages_that_are_none_are_refused(start):
         for message in ("drive 1", "drive nan 0", "drive 1 2 3", "hello", "mode sleepy", "odometry after x", "drive"):
             with pytest.raises(BaseError, match="say: "):
                 client._ask(message, "sent", None)
+        with pytest.raises(BaseError, match="message too long; 255 letters are the most"):
+            client._ask("drive 0.2 0." + 300 * "0" + "1e300", "sent", None)  # without its end another number
+        with pytest.raises(BaseError, match="zero byte"):
+            client._ask("stop\0 drive", "sent", None)
+        assert client.drive(0.2, 0.0).v_m_s == 0.2
 
 
 def refused(*words) -> tuple[int, str]:

@@ -8,8 +8,8 @@ import subprocess
 
 import pytest
 
-from whisker.base import BUMP_LEFT, CLIFF_FRONT_LEFT, IDLE, Base
-from whisker.bridgesim import program
+from whisker.pilot.base import BUMP_LEFT, CLIFF_FRONT_LEFT, IDLE, Base
+from whisker.simulation.bridge import program
 
 FRAME_BYTES = 38  # of what whisker-base asks a Create 1 for
 WHISK_RAD_S = math.pi / 24
@@ -134,6 +134,17 @@ def test_a_line_that_is_silent_for_a_second_is_back(robot):
     it = robot("--event", "silent@0.5+1")
     while it.count("silences") == 0 or it.base.health()["mode"] != "safe":
         it.wait_frame()
+
+
+def test_a_base_that_neither_told_nor_heard_went_on_as_it_did(robot):
+    """Driving, and 2.8 s in which it hears no order to stop, and tells so in its first frame after."""
+    it = robot("--event", "silent@1.5+2.8")
+    far = 0.0
+    while it.count("silences") == 0:
+        it.base.drive(0.15, 0)
+    while it.base.health()["mode"] != "safe" or far == 0.0:
+        far += it.wait_frame().x_m
+    assert 0.38 < far < 0.75
 
 
 def test_a_firmware_that_tells_modes_one_too_high_is_understood(robot):

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from whisker import localise, scenes
+from whisker import scenes
+from whisker.nav import localise
 
 ROWS, BLIND = 200, 60
 

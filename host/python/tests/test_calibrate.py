@@ -7,12 +7,12 @@ import pytest
 from commandkit import run, signals_as_before  # noqa: F401 - a fixture
 from rings import make_frames, ring_name
 
-from whisker.calibration import CalibrationError, Feed, WhiskFinder, measure_rest
-from whisker.contact import REST_SAMPLES
-from whisker.demo.scenes import make_scene
-from whisker.demo.simulation import radial_contacts
-from whisker.radial import RadialModel, peak, read_whisks
-from whisker.ring import FRAME, Writer
+from whisker.bridge.ring import FRAME, Writer
+from whisker.simulation.scenes import make_scene
+from whisker.simulation.world import radial_contacts
+from whisker.touch.calibration import CalibrationError, Feed, WhiskFinder, measure_rest
+from whisker.touch.contact import REST_SAMPLES
+from whisker.touch.radial.model import RadialModel, peak, read_whisks
 
 LANE = 3
 RADII = (90.0, 110.0, 130.0)
@@ -58,6 +58,17 @@ def test_contacts_at_known_distances(capsys, tmp_path, ring, whisks):
     ours, theirs = (RadialModel.fit(p, found.radius_mm) for p in (found.peak_counts, np.array(true_peaks)))
     assert ours.predict(true_peaks[2])[0] == pytest.approx(theirs.predict(true_peaks[2])[0], abs=0.5)
     assert run(capsys, "radial", "fit", tmp_path / "lane3.csv", "--out", tmp_path / "m.json")[0] == 0
+
+
+def test_one_distance_gives_no_error_estimate(capsys, tmp_path, ring):
+    options = ["--radii", "90", "--repeats", 6, "--rest-seconds", 0.5, "--yes", "--backlog"]
+    code, out, err = run(capsys, "calibrate", "--ring", ring.name, "--out", tmp_path, "--lane", LANE, *options)
+    told = out.splitlines()[-1]
+    assert (code, err) == (0, "") and "6 contacts; " in told and "standard error" not in out
+    assert "at 90 mm, and one radius gives no error estimate; record contacts at more radii" in told
+    code, _, err = run(capsys, "radial", "fit", tmp_path / "lane3.csv", "--out", tmp_path / "m.json")
+    assert code == 2 and "one radius gives no error estimate" in err and err.count("\n") == 1
+    assert not (tmp_path / "m.json").exists()
 
 
 def test_rest_and_noise_of_every_lane(capsys, tmp_path, ring):

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from test_radial import write_whisks
 
-from whisker import localise, scene
+from whisker import scene
 from whisker.cli import main
+from whisker.nav import localise
 
 
 def write_observations(path, made, observations):

@@ -118,6 +118,15 @@ def test_record_and_replay_from_the_command_line(capsys, tmp_path):
         assert recording.metadata["serial"] == "B0042" and recording.metadata["ring"] == name
 
 
+def test_lanes_without_a_node_are_no_bad_samples(capsys, tmp_path):
+    frames = make_frames(1000)
+    frames["lane"]["status"][:, 6:] = 32 << 10
+    with live_ring(frames) as name:
+        out = run(capsys, "record", tmp_path / "a.mcap", "--ring", name, "--frames", 1000)[1]
+    bad = np.count_nonzero(frames["lane"]["status"][:, :6])
+    assert f"1000 frames, 0 lost, {bad} bad samples; 22 lanes without a good one" in out
+
+
 def test_a_recorder_told_to_stop_finishes_its_file(tmp_path):
     path = tmp_path / "a.mcap"
     words = ["record", path, "--ring"]

@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 
 from whisker import scene as scenes
-from whisker.bridgesim import flat_scene
+from whisker.bridge.ring import FRAME, Reader, RingError
 from whisker.demo import summary
 from whisker.demo.__main__ import fresh_folder
 from whisker.demo.chain import ChainError, ChainRun, Link, run_chain
-from whisker.demo.scenes import BLOCKS, PRIOR_OFF_M, PRIOR_OFF_RAD, make_scene
 from whisker.native import ffi, lib
-from whisker.ring import FRAME, Reader, RingError
 from whisker.robot.blocks import blocks
-from whisker.simlink import SimLink
+from whisker.simulation.bridge import flat_scene
+from whisker.simulation.link import SimLink
+from whisker.simulation.scenes import BLOCKS, PRIOR_OFF_M, PRIOR_OFF_RAD, make_scene
 
 
 @pytest.mark.parametrize("seed", range(20))

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 from whisker import scenes
-from whisker.behaviour_states import PLAIN
 from whisker.demo.level1 import explore
-from whisker.demo.scenes import make_scene
 from whisker.demo.training import learn
-from whisker.pilot import Pilot
+from whisker.pilot.pilot import Pilot
+from whisker.pilot.states import PLAIN
 from whisker.robot.models import load_models
 from whisker.scenes import geometry
+from whisker.simulation.scenes import make_scene
 
 SEEDS = (31, 32, 33, 34)
 ROWS = 1200

@@ -13,12 +13,12 @@ import pytest
 from whisker import scene as scenes
 from whisker.demo.chain import ChainRun, Link, run_chain
 from whisker.demo.level1 import explore
-from whisker.demo.scenes import make_scene
 from whisker.demo.summary import read_pairs
 from whisker.demo.training import learn
-from whisker.observations import cell
-from whisker.pilot import Pilot
+from whisker.nav.observations import cell
+from whisker.pilot.pilot import Pilot
 from whisker.robot.models import load_models
+from whisker.simulation.scenes import make_scene
 
 ROOT = Path(__file__).resolve().parents[3]
 SEED, SECONDS, LANES = 3, 8.0, 6

@@ -6,7 +6,7 @@ import level0
 import numpy as np
 import pytest
 
-from whisker import localise
+from whisker.nav import localise
 
 SEEDS = range(100, 106)
 

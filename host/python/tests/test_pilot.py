@@ -5,16 +5,16 @@ import math
 import numpy as np
 import pytest
 
-from whisker import localise
-from whisker.behaviour import BLOCK_TICKS, ODOMETRY_TICKS
-from whisker.contact import Contact
 from whisker.demo.level1 import explore
-from whisker.demo.scenes import TEXTURES, make_robot, make_scene
 from whisker.demo.study import study
 from whisker.demo.training import learn
-from whisker.pilot import Pilot, compose
+from whisker.nav import localise
+from whisker.pilot.behaviour import BLOCK_TICKS, ODOMETRY_TICKS
+from whisker.pilot.pilot import Pilot, compose
 from whisker.robot.models import load_models
 from whisker.scene import Arena, Scene
+from whisker.simulation.scenes import TEXTURES, make_robot, make_scene
+from whisker.touch.contact import Contact
 
 SEED = 11
 TICKS = 80_000

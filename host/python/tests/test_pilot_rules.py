@@ -7,15 +7,15 @@ from pathlib import Path
 import pytest
 from test_pilot_behaviour import LEFT, RIGHT, Bench
 
-from whisker import base
-from whisker.behaviour import BACK_OFF_M_S, BLOCK_TICKS, EFFECT_TICKS, ODOMETRY_TICKS, TICK_S, WHISK_RAD_S, State
-from whisker.behaviour_rules import RULES, SPEEDS
-from whisker.behaviour_states import FULL, LOST_TICKS, TIP_SLACK_RAD, TipMove
-from whisker.demo.scenes import make_robot
-from whisker.mount import Mount
-from whisker.tip import AIM_MM, contact_type, move_for_tip
-from whisker.wheels import EXACT, NO_BUMPS, Bumps, Wheels
-from whisker.whereabouts import Whereabouts
+from whisker.pilot import base
+from whisker.pilot.behaviour import BACK_OFF_M_S, BLOCK_TICKS, EFFECT_TICKS, ODOMETRY_TICKS, TICK_S, WHISK_RAD_S, State
+from whisker.pilot.rules import RULES, SPEEDS
+from whisker.pilot.states import FULL, LOST_TICKS, TIP_SLACK_RAD, TipMove
+from whisker.pilot.tip import AIM_MM, contact_type, move_for_tip
+from whisker.pilot.wheels import EXACT, NO_BUMPS, Bumps, Wheels
+from whisker.pilot.whereabouts import Whereabouts
+from whisker.simulation.scenes import make_robot
+from whisker.touch.mount import Mount
 
 ROOT = Path(__file__).resolve().parents[3]
 STEP_M_S, TRACK_M = 0.0285, 0.235  # of a base whose wheels move in steps

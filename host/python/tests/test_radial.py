@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from whisker.radial import RadialModel, peak, read_whisks
 from whisker.tables import TableError
+from whisker.touch.radial.model import RadialModel, peak, read_whisks
 
 
 def write_whisks(path, peaks, radii, header="contact,radius_mm,t_s,x,y"):

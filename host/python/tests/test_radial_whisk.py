@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from commandkit import run
 
-from whisker import radial
-from whisker.radial import Contact, Whisks
 from whisker.tables import TableError
+from whisker.touch.radial import model as radial
+from whisker.touch.radial.model import Contact, Whisks
 
 CONE_MM, TIP_MM = 181.7, 138.0
 RADII = (90.0, 100.0, 110.0, 120.0, 130.0, TIP_MM)

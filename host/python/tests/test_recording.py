@@ -16,6 +16,7 @@ from rings import make_frames, ring_name
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
+from whisker.bridge.ring import Clock, Reader, RingError, Writer
 from whisker.native import lib
 from whisker.protocol import LANES, LIMITS
 from whisker.recording import RecordingError, read
@@ -25,7 +26,6 @@ from whisker.recording.recorder import Recorder, record
 from whisker.recording.replay import Replay
 from whisker.recording.timeline import Timeline
 from whisker.recording.writing import RecordingWriter
-from whisker.ring import Clock, Reader, RingError, Writer
 
 CAPACITY = 4096
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from rings import make_frames, ring_name
 
+from whisker.bridge.ring import FRAME, Clock, Reader, RingError, Writer
 from whisker.protocol import LIMITS
-from whisker.ring import FRAME, Clock, Reader, RingError, Writer
 
 CAPACITY = 256
 

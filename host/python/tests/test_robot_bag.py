@@ -9,10 +9,11 @@ from robotkit import examples, flat, free_endpoint, to_rows
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
-from whisker import localise, scenes
+from whisker import scenes
 from whisker.commands.bag import next_free
-from whisker.observations import observations_path
-from whisker.pilot import compose
+from whisker.nav import localise
+from whisker.nav.observations import observations_path
+from whisker.pilot.pilot import compose
 from whisker.recording.mcapfile import McapFile
 from whisker.recording.writing import TopicWriter
 from whisker.robot import messages as m

@@ -5,7 +5,7 @@ import os
 import numpy as np
 import pytest
 
-from whisker.ring import FRAME, Writer
+from whisker.bridge.ring import FRAME, Writer
 from whisker.robot.blocks import FRESH_TICKS, LiveRing
 
 LANES, WAIT_S = 6, 5.0

@@ -21,16 +21,39 @@ def seqs(got) -> list[int]:
 
 
 class Pair:
-    """A pilot and a navigator that sees its rows, over loopback."""
+    """A pilot and a navigator that sees its rows, over loopback; either may end and begin anew."""
 
     def __init__(self, endpoint=None, way=None):
         """`way`: what the navigator connects to, when it is not the pilot's endpoint."""
         self.endpoint = endpoint or free_endpoint()
+        self.way = way or self.endpoint
+        self.begin_pilot()
+        self.begin_navigator()
+
+    def begin_pilot(self):
         self.pilot = Link("pilot", listen=[self.endpoint], lock_step=True)
-        self.navigator = Link("navigator", connect=[way or self.endpoint], lock_step=True)
+        self.rows = self.pilot.publish("observation")
+
+    def begin_navigator(self):
+        self.navigator = Link("navigator", connect=[self.way], lock_step=True)
         self.inbox = self.navigator.subscribe("observation", "health/*")
         self.navigator.announce()
+        self.meet()
+
+    def meet(self):
         assert self.pilot.wait_for(["navigator"], PATIENCE_S)
+
+    def send(self, *numbers: int):
+        for seq in numbers:
+            self.rows.send(row(seq))
+
+    def come(self, *numbers: int):
+        """These rows come, and no others."""
+        assert seqs(take_until(self.inbox, lambda got: len(got) == len(numbers))) == list(numbers)
+
+    @property
+    def tally(self) -> Tally:
+        return self.inbox.tallies["observation"]
 
     def __enter__(self):
         return self
@@ -42,15 +65,13 @@ class Pair:
 
 def test_rows_arrive_in_order_and_the_end_is_told():
     with Pair() as pair:
-        rows = pair.pilot.publish("observation")
-        for seq in range(300):
-            rows.send(row(seq))
-        rows.end(30 * 10**9, "over")
-        rows.end(30 * 10**9, "twice is once")
+        pair.send(*range(300))
+        pair.rows.end(30 * 10**9, "over")
+        pair.rows.end(30 * 10**9, "twice is once")
         got = take_until(pair.inbox, lambda got: got and got[-1].over)
     assert seqs(got) == list(range(300))
     assert (got[-1].message.messages, got[-1].message.reason, got[-1].topic) == (300, "over", "observation")
-    tally = pair.inbox.tallies["observation"]
+    tally = pair.tally
     assert (tally.received, tally.missed, tally.joined_at, tally.ended) == (301, 0, 0, True)
 
 
@@ -102,56 +123,43 @@ def test_another_robot_is_another_robot():
 
 def test_a_killed_sender_comes_back_as_a_new_stream():
     with Pair() as pair:
-        rows = pair.pilot.publish("observation")
-        for seq in range(3):
-            rows.send(row(seq))
-        take_until(pair.inbox, lambda got: len(got) == 3)
+        pair.send(0, 1, 2)
+        pair.come(0, 1, 2)
         pair.pilot.close()
         assert pair.navigator.wait_gone("pilot", PATIENCE_S)
-        pair.pilot = Link("pilot", listen=[pair.endpoint], lock_step=True)
-        assert pair.pilot.wait_for(["navigator"], PATIENCE_S)
-        rows = pair.pilot.publish("observation")
-        rows.send(row(0))
-        assert seqs(take_until(pair.inbox, lambda got: len(got) == 1)) == [0]
-        tally = pair.inbox.tallies["observation"]
-        assert (tally.restarts, tally.missed, tally.ended) == (1, 0, False)
+        pair.begin_pilot()
+        pair.meet()
+        pair.send(0)
+        pair.come(0)
+    assert (pair.tally.restarts, pair.tally.missed, pair.tally.ended) == (1, 0, False)
 
 
 def test_a_restarted_reader_joins_where_the_stream_is():
     with Pair() as pair:
-        rows = pair.pilot.publish("observation")
-        for seq in range(5):
-            rows.send(row(seq))
-        take_until(pair.inbox, lambda got: len(got) == 5)
+        pair.send(*range(5))
+        pair.come(*range(5))
         pair.navigator.close()
         assert pair.pilot.wait_gone("navigator", PATIENCE_S)
-        rows.send(row(5))
-        pair.navigator = Link("navigator", connect=[pair.endpoint], lock_step=True)
-        pair.inbox = pair.navigator.subscribe("observation")
-        pair.navigator.announce()
-        assert pair.pilot.wait_for(["navigator"], PATIENCE_S)
-        rows.send(row(6))
-        assert seqs(take_until(pair.inbox, lambda got: len(got) == 1)) == [6]
-        tally = pair.inbox.tallies["observation"]
-        assert (tally.joined_at, tally.missed) == (6, 0)
+        pair.send(5)
+        pair.begin_navigator()
+        pair.send(6)
+        pair.come(6)
+    assert (pair.tally.joined_at, pair.tally.missed) == (6, 0)
 
 
 def test_a_cut_cable_is_survived_and_the_gap_is_told():
     endpoint = free_endpoint()
     with Cable(endpoint) as cable, Pair(endpoint, way=cable.endpoint) as pair:
-        rows = pair.pilot.publish("observation")
-        rows.send(row(0))
-        take_until(pair.inbox, lambda got: len(got) == 1)
+        pair.send(0)
+        pair.come(0)
         cable.cut()
         assert pair.pilot.wait_gone("navigator", PATIENCE_S)
-        for seq in range(1, 51):
-            rows.send(row(seq))
+        pair.send(*range(1, 51))
         cable.mend()
-        assert pair.pilot.wait_for(["navigator"], PATIENCE_S)
-        rows.send(row(51))
-        assert seqs(take_until(pair.inbox, lambda got: len(got) == 1)) == [51]
-    tally = pair.inbox.tallies["observation"]
-    assert (tally.missed, tally.restarts, tally.received) == (50, 0, 2) and pair.inbox.missed == 50
+        pair.meet()
+        pair.send(51)
+        pair.come(51)
+    assert (pair.tally.missed, pair.tally.restarts, pair.tally.received) == (50, 0, 2) and pair.inbox.missed == 50
 
 
 def test_what_is_no_message_is_counted_and_said_and_the_rest_goes_on():
@@ -165,10 +173,8 @@ def test_what_is_no_message_is_counted_and_said_and_the_rest_goes_on():
         session.put(key, good, encoding=cdr, attachment=ENVELOPE.pack(2, 0, 1, 1, 0))
         session.put("whisker/robot/health/a/b/c", good, encoding=cdr, attachment=next(stream).pack())
         session.put(key, good, encoding=cdr, attachment=next(stream).pack())
-        got = take_until(pair.inbox, lambda got: len(got) == 1)
-        assert seqs(got) == [0]
-        tally = pair.inbox.tallies["observation"]
-        assert (tally.refused, pair.inbox.refused, tally.missed) == (4, 4, 1)
+        pair.come(0)
+        assert (pair.tally.refused, pair.inbox.refused, pair.tally.missed) == (4, 4, 1)
         assert pair.inbox.last_error == (
             "observation: field envelope: version 2 of the stream, this release has 1; "
             "install one release of whisker on both sides"
@@ -181,9 +187,8 @@ def test_a_message_too_large_does_not_come_and_is_missed():
         good = m.encode(row(0))
         for payload in (good, bytes(MESSAGE_MOST), good):
             pair.pilot._session.put(key, payload, encoding=cdr, attachment=next(stream).pack())
-        take_until(pair.inbox, lambda got: len(got) == 2)
-        tally = pair.inbox.tallies["observation"]
-        assert (tally.missed, tally.refused) == (1, 0)
+        pair.come(0, 0)
+        assert (pair.tally.missed, pair.tally.refused) == (1, 0)
 
 
 def test_a_topic_of_another_release_is_refused():

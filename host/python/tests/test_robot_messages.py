@@ -6,6 +6,7 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
+from fuzz_messages import fuzz
 from robotkit import examples, flat
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
@@ -70,6 +71,10 @@ def test_lengths_are_not_believed():
             m.decode(m.Observation, data[:place] + b"\xff\xff\xff\xff" + data[place + 4 :], "observation")
         except m.MessageError as error:
             assert "observation: field " in str(error)
+
+
+def test_mutated_messages_are_refused_or_read_as_others_read_them():
+    assert 1000 < fuzz(3000, seed=3) < 3000
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf])

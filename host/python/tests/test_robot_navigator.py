@@ -11,11 +11,12 @@ import pytest
 from commandkit import END_S, command, run, signals_as_before  # noqa: F401 - a fixture
 from robotkit import free_endpoint, take_until, to_rows
 
-from whisker import localise, scenes
 from whisker import scene as scene_folder
+from whisker import scenes
 from whisker.errors import UserError
-from whisker.filters import COMPONENT
-from whisker.robot import belief, health
+from whisker.nav import localise
+from whisker.nav.filters import COMPONENT
+from whisker.robot import belief, checkpoint, health
 from whisker.robot import messages as m
 from whisker.robot.link import Link, encoding_of
 from whisker.robot.navigator import Navigator, Settings
@@ -129,6 +130,65 @@ def test_a_killed_navigator_comes_back_knowing_that_it_knows_nothing(made, tmp_p
     assert times == ["t_s", *(f"{row['t_s']:.6g}" for row in rows[:20] + rows[25:])]
 
 
+def _all_over(got) -> bool:
+    """The last answer and the last word of health have come, in whatever order."""
+    return any(r.over for r in got) and any(getattr(r.message, "state", "") == health.ENDED for r in got)
+
+
+def killed_and_begun_anew(robot, folder, rows, options, spoil=lambda: None):
+    """Answers of a navigator that gets rows 25 on, after one that was killed behind row 20; five rows are lost."""
+    with robot.navigator(folder, *options) as child:
+        robot.send(rows[:20])
+        take_until(robot.inbox, lambda got: sum(r.topic == "localisation" for r in got) == 20, PATIENCE_S)
+        child.kill()
+    assert robot.link.wait_gone("navigator", PATIENCE_S)
+    spoil()
+    robot.send(rows[20:25])
+    with robot.navigator(folder, *options) as child:
+        robot.send(rows[25:])
+        robot.rows.end()
+        over = take_until(robot.inbox, _all_over, PATIENCE_S)
+        assert child.wait(END_S) == 0
+    told = [r.message for r in over if r.topic == "localisation" and not r.over]
+    return told, [r.message for r in over if r.topic == "health/navigator" and not r.over]
+
+
+@pytest.mark.parametrize("name", ["adaptive", "particle", "ekf"])
+def test_a_killed_navigator_goes_on_from_its_checkpoint(made, tmp_path, name):
+    folder, scene, rows = made
+    options = ["--filter", name, "--checkpoint", tmp_path / "file"]
+    with Robot("localisation", "health/navigator") as robot:
+        told, health_told = killed_and_begun_anew(robot, folder, rows, options)
+    assert {(x.first_seq, x.prior, x.rows_missed) for x in told} == {(25, "checkpoint", 0)}
+    alone = localise.Filter(name, scene)
+    never_killed = [alone.step(row) for row in rows]
+    for answer, expected in zip(told, never_killed[25:], strict=True):
+        off = np.hypot(*np.subtract(answer.pose.pose.xytheta[:2], expected.pose[:2]))
+        assert off < 0.1, (answer.observation_seq, off)
+    # The last checkpoint is of row 15: what came between it and the first row is one motion.
+    assert told[0].rows_integrated == 10 and told[0].confidence > 0.5 * never_killed[25].confidence
+    assert {x.last_error for x in health_told} == {""} and health_told[-1].counts["prior"] == "checkpoint"
+
+
+@pytest.mark.parametrize(
+    ("spoil", "why"),
+    [
+        (lambda file: file.write_bytes(file.read_bytes()[:-1]), "cut short or damaged"),
+        (lambda file: file.write_bytes(b""), "no checkpoint"),
+        (lambda file: file.write_bytes(file.read_bytes().replace(b"checkpoint 1", b"checkpoint 9", 1)), "version 9"),
+    ],
+)
+def test_a_bad_checkpoint_is_told_and_nothing_else_is_lost(made, tmp_path, spoil, why):
+    folder, _, rows = made
+    file = tmp_path / "file"
+    with Robot("localisation", "health/navigator") as robot:
+        options = ["--filter", "particle", "--checkpoint", file]
+        told, health_told = killed_and_begun_anew(robot, folder, rows, options, lambda: spoil(file))
+    assert {(x.first_seq, x.prior) for x in told} == {(25, "uniform")} and len(told) == ROWS - 25
+    assert why in health_told[-1].last_error and health_told[-1].last_error.startswith(f"{file}: not used: ")
+    assert checkpoint.load(file).seq >= 55  # written anew
+
+
 class Inside:
     """A navigator within this process."""
 
@@ -176,6 +236,21 @@ def test_behind_by_many_rows_it_takes_the_newest_and_all_the_motion(made):
     every = [alone.step(row) for row in rows][-1]
     assert told[-1].pose.pose.xytheta[:2] == pytest.approx(every.pose[:2], abs=2e-3)
     assert all(state.process == "navigator" for state in states)
+
+
+@pytest.mark.parametrize(("took_s", "skipped"), [(1e-4, 0), (0.04, ROWS - 2), (0.3, ROWS - 1)])
+def test_rows_that_come_late_are_weighed_as_far_as_there_is_time(made, took_s, skipped):
+    _, scene, rows = made
+    with Inside(scene) as inside:
+        inside.navigator._weigh_s = took_s
+        for row in rows:
+            inside.rows.send(row, m.EXPLORING)
+        inside.rows.end("over")
+        inbox = inside.navigator._inbox
+        with inbox._condition:  # all of them have come before it looks
+            assert inbox._condition.wait_for(lambda: len(inbox._waiting) == ROWS + 1, PATIENCE_S)
+        inside.run()
+    assert (inside.counters["skipped"], inside.counters["missed"]) == (skipped, 0)
 
 
 def test_nonsense_is_counted_and_the_rest_goes_on(made):
@@ -251,9 +326,9 @@ def test_a_belief_of_everywhere_keeps_its_width():
 def test_small_beliefs_are_sent_as_they_are():
     bumps = np.zeros(3, COMPONENT)
     bumps["pose"], bumps["mass"] = [[1, 2, 3], [4, 5, 6], [7, 8, 9]], [0.2, 0.5, 0.3]
-    told = belief.to_message(m.Header(), "grid", 4, bumps)
+    told = belief.to_message(m.Header(), "grid", 4, len(bumps), belief.condense(bumps))
     assert list(told.x) == [4, 7, 1] and list(told.theta) == [6, 9, 3] and (told.bumps, told.mass) == (3, 1.0)
-    empty = belief.to_message(m.Header(), "grid", 4, bumps[:0])
+    empty = belief.to_message(m.Header(), "grid", 4, 0, belief.condense(bumps[:0]))
     assert (len(empty.x), empty.bumps, empty.mass) == (0, 0, 0.0)
 
 

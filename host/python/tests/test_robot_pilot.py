@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from whisker.base import BaseLost, Motion
-from whisker.ring import SAMPLE
+from whisker.bridge.ring import SAMPLE
+from whisker.pilot.base import BaseLost, Motion
 from whisker.robot import wheels as wheels_module
 from whisker.robot.health import RUNNING
 from whisker.robot.pilot_process import LOST, SILENCE_S, LiveFlight, LiveWheels

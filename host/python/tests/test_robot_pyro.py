@@ -9,8 +9,8 @@ import pytest
 from commandkit import END_S, command, run, signals_as_before  # noqa: F401 - a fixture
 from robotkit import examples, free_endpoint, take_until
 
-from whisker.observations import ODOMETRY
-from whisker.pilot import compose
+from whisker.nav.observations import ODOMETRY
+from whisker.pilot.pilot import compose
 from whisker.robot import messages as m
 from whisker.robot.link import Link, Received
 from whisker.robot.pyro import Results

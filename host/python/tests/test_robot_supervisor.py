@@ -6,7 +6,7 @@ import threading
 import pytest
 from robotkit import free_endpoint, take_until
 
-from whisker.children import Program
+from whisker.robot.children import Program
 from whisker.robot.link import Link
 from whisker.robot.supervisor import PAUSE_MOST_S, PAUSE_S, STEADY_S, Keeper, Supervisor
 

@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from whisker import localise, scenes
+from whisker import scenes
+from whisker.nav import localise
 from whisker.scene import load
 from whisker.scenes import geometry
 from whisker.scenes.readings import hold_back

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from whisker import scoring
+from whisker.nav import scoring
 
 
 def test_lock_is_the_first_hundred_near_rows_kept_to_the_end():

@@ -4,8 +4,8 @@ import json
 
 import pytest
 
-from whisker import trials
-from whisker.sweep import SweepError, sweep
+from whisker.scenes import trials
+from whisker.scenes.sweep import SweepError, sweep
 
 JOBS = {
     f"{name}-{seed}": {"family": "anchor+global", "seeds": [seed], "filter": name, "settings": {}, "rows": 120}

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from whisker.tables import TableError
-from whisker.texture import TextureModel, classify, read_folder, read_recording
+from whisker.touch.texture.model import TextureModel, classify, read_folder, read_recording
 
 RNG = np.random.default_rng(11)
 SPREAD = {"VINYL": 15.0, "SMOOTH": 40.0, "ROUGH": 90.0}

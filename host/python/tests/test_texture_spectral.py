@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from commandkit import run, signals_as_before  # noqa: F401 - a fixture
 
-from whisker import texture
 from whisker.native import doubles, lib
 from whisker.tables import TableError
-from whisker.texture_spectral import SpectralModel
-from whisker.texture_strange import fit_strange
-from whisker.texture_train import train
+from whisker.touch.texture import model as texture
+from whisker.touch.texture.spectral import SpectralModel
+from whisker.touch.texture.strange import fit_strange
+from whisker.touch.texture.train import train
 
 RATE_HZ = 2000.0
 WINDOW = 200

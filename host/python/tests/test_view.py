@@ -14,9 +14,9 @@ import pytest
 from viewkit import NODES, PATIENCE_S, Block, made_frames, nothing_logged, page, ring_name, ring_of, spoil, view_of
 from websockets.exceptions import ConnectionClosed
 
+from whisker.bridge.ring import Clock, Writer
 from whisker.cli import main as whisker_main
 from whisker.protocol import LANES
-from whisker.ring import Clock, Writer
 from whisker.view.__main__ import main
 from whisker.view.client import WINDOW
 from whisker.view.pyramid import BINS

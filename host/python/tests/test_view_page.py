@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from viewkit import NODES, flowing, made_frames, ring_name, ring_of, spoil, view_of
 
+from whisker.bridge.ring import Clock
 from whisker.protocol import WIRE_VERSION
-from whisker.ring import Clock
 from whisker.view.hub import Hub
 from whisker.view.server import serving
 

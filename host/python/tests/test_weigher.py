@@ -5,8 +5,8 @@ import math
 import numpy as np
 
 from whisker import scenes
-from whisker.filters import Filter
-from whisker.weigher import Weigher
+from whisker.nav.filters import Filter
+from whisker.nav.weigher import Weigher
 
 
 def test_the_true_pose_weighs_more_than_any_other_place():

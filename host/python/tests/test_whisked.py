@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from test_radial_whisk import COUNTS, RATE, whisk, whisks
 
-from whisker import radial
-from whisker.demo.scenes import make_robot
-from whisker.mount import Mount, retreat
+from whisker.simulation.scenes import make_robot
+from whisker.touch.mount import Mount, retreat
+from whisker.touch.radial import model as radial
 
 OUTER, INNER = (Mount.of(whisker) for whisker in make_robot().of_role("object")[:2])
 CORNER_MM, TIP_MM = 110.0, 140.0

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from websockets.asyncio.client import connect
 
+from whisker.bridge.ring import FRAME, Writer
 from whisker.protocol import CODES, LANES, LIMITS, STATUS_CODE_SHIFT
-from whisker.ring import FRAME, Writer
 from whisker.view.hub import Hub
 from whisker.view.server import serving
 from whisker.view.topics import BLOCK

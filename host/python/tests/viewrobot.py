@@ -9,7 +9,6 @@ from functools import cache
 
 import numpy as np
 
-from whisker.demo.scenes import make_robot
 from whisker.robot.link import Inbox, encoding_of
 from whisker.robot.messages import (
     CORNER,
@@ -37,6 +36,7 @@ from whisker.robot.messages import (
 )
 from whisker.robot.streams import envelopes
 from whisker.scene import Arena, Scene
+from whisker.simulation.scenes import make_robot
 from whisker.view.hub import Hub
 from whisker.view.robot import RobotModel
 from whisker.view.robot_source import InboxSource

@@ -6,9 +6,9 @@ from functools import partial
 import numpy as np
 from viewrobot import ROW_NS
 
-from whisker.filters import Filter
-from whisker.pilot import compose
-from whisker.robot.belief import to_message
+from whisker.nav.filters import Filter
+from whisker.pilot.pilot import compose
+from whisker.robot.belief import condense, to_message
 from whisker.robot.messages import (
     EMPTY,
     EXPLORING,
@@ -61,7 +61,8 @@ class SceneRun:
         told.append(("truth", PoseStamped(at("arena"), Pose.planar(*self._rows.truth[row]))))
         told += [("contact", contact) for ray in range(len(self._rays)) for contact in self._contact(row, ray)]
         if row % 5 == 0:
-            told.append(("belief", to_message(at("arena"), FILTER, row, self._filter.components())))
+            bumps = self._filter.components()
+            told.append(("belief", to_message(at("arena"), FILTER, row, len(bumps), condense(bumps))))
         if row % 10 == 0:
             counts = [KeyValue("rows", str(row)), KeyValue("states", str(estimate[0]["states"]))]
             told.append(("health/pilot", ProcessHealth(at(), "pilot", 4005, "running", counts[:1])))

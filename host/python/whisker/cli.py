@@ -7,7 +7,7 @@ import argparse
 import importlib
 import sys
 
-from .commands import Parser
+from .arguments import Parser
 from .errors import UserError
 
 # name (its module has underscores for dashes): what it does

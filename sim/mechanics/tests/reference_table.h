@@ -1,4 +1,4 @@
-/* Made by tools/bench_mechanics.py with a 20-link chain in MuJoCo; do not edit. Statics: tip diameter mm, kappa (0:
+/* Made by tools/benches mechanics with a 20-link chain in MuJoCo; do not edit. Statics: tip diameter mm, kappa (0:
  * clamped), friction, peg's distance mm and angle rad, base moment uN m, arc length of the contact mm. Modes: tip
  * diameter mm, kappa, pinned at mm (0: free), three frequencies Hz. */
 /* clang-format off */

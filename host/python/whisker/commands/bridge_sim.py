@@ -11,11 +11,11 @@ import tempfile
 import threading
 from pathlib import Path
 
-from ..bridgesim import COURSES, Course, flat_scene, program, read_faults
-from ..demo.scenes import MECHANICS
+from ..arguments import RING, number_above, stop_on_signals, whole_number
+from ..bridge.ring import Reader, RingError
 from ..protocol import LANES, LIMITS
-from ..ring import Reader, RingError
-from . import RING, number_above, stop_on_signals, whole_number
+from ..simulation.bridge import COURSES, Course, flat_scene, program, read_faults
+from ..simulation.scenes import MECHANICS
 
 EXAMPLE = "whisker bridge-sim --lanes 6 --seconds 60 &  whisker top"
 TICKS_PER_S = LIMITS["clock_hz"] // LIMITS["tick_period"]

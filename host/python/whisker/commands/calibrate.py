@@ -7,7 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from ..calibration import (
+from ..arguments import add_ring, number_above, number_list, whole_number
+from ..bridge.nodes import NodeError, read_nodes
+from ..bridge.ring import Reader
+from ..protocol import LANES
+from ..scene import load
+from ..tables import unwritable
+from ..touch.calibration import (
     TICKS_PER_S,
     ContactsFile,
     Feed,
@@ -18,13 +24,7 @@ from ..calibration import (
     measure_rest,
     write_rest,
 )
-from ..nodes import NodeError, read_nodes
-from ..protocol import LANES
-from ..radial import Contact, fit, read_whisks, shape_of
-from ..ring import Reader
-from ..scene import load
-from ..tables import unwritable
-from . import add_ring, number_above, number_list, whole_number
+from ..touch.radial.model import Contact, fit, read_whisks, shape_of
 
 EXAMPLE = "whisker calibrate --out calibration --lane 2 --radii 90,100,110,120,130 --repeats 5"
 

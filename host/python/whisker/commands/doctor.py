@@ -1,7 +1,7 @@
-"""`whisker doctor`: finds out why it does not work (whisker.doctor)."""
+"""`whisker doctor`: finds out why it does not work (whisker.bridge.doctor)."""
 
-from .. import doctor
-from . import RING
+from ..arguments import RING
+from ..bridge import doctor
 
 EXAMPLE = "whisker doctor --ring whisker"
 

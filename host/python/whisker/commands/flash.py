@@ -2,7 +2,7 @@
 
 import os
 
-from ..bridgesim import program
+from ..simulation.bridge import program
 
 EXAMPLE = "whisker flash node-0.2.whex"
 

@@ -7,11 +7,11 @@ import signal
 import sys
 import time
 
-from .. import usbtree
-from ..bridgesim import program
+from ..arguments import add_ring
+from ..bridge import usbtree
+from ..bridge.ring import Reader, RingError
 from ..protocol import WIRE_VERSION
-from ..ring import Reader, RingError
-from . import add_ring
+from ..simulation.bridge import program
 
 EXAMPLE = "whisker info --json"
 

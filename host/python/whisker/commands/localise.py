@@ -1,10 +1,10 @@
-"""`whisker localise`: runs a filter over a scene folder (whisker.localise)."""
+"""`whisker localise`: runs a filter over a scene folder (whisker.nav.localise)."""
 
 import json
 import sys
 
-from .. import localise
-from ..localise import SettingError
+from ..nav import localise
+from ..nav.localise import SettingError
 from ..scene import PRIOR, SceneError, load
 
 EXAMPLE = "whisker localise scenes/paper --filter grid --set grid.cell_m=0.1 --out est.csv --json"

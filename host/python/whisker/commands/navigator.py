@@ -3,12 +3,12 @@
 import sys
 from pathlib import Path
 
-from .. import localise
+from ..arguments import seconds, stop_on_signals
+from ..nav import localise
 from ..robot.navigator import Navigator, Settings, write_report
 from ..robot.options import NAVIGATOR_ENDPOINT, PILOT_ENDPOINT, add_link, open_link
 from ..scene import load
 from ..tables import unwritable
-from . import seconds, stop_on_signals
 
 EXAMPLE = "whisker navigator SCENE --connect tcp/netbook:7448"
 
@@ -23,6 +23,8 @@ def add(parser) -> None:
     )
     parser.add_argument("--report", type=Path, metavar="FILE", help="JSON of what was weighed, skipped and missed")
     parser.add_argument("--stay", action="store_true", help="after the end of a run wait for the next")
+    text = "what is believed, kept in this file and gone on from; a new run wants a new file"
+    parser.add_argument("--checkpoint", type=Path, metavar="FILE", help=text)
     text = "drill: every step takes at least so long (1 is ten times the rows' period)"
     parser.add_argument("--drill-step", type=seconds, default=0.0, metavar="S", help=text)
     parser.set_defaults(run=run)
@@ -34,7 +36,7 @@ def run(arguments) -> int:
     for warning in scene.warnings():
         print(f"whisker: warning: {warning}", file=sys.stderr)
     stop = stop_on_signals()
-    settings = Settings(filters, arguments.out, arguments.stay, arguments.drill_step)
+    settings = Settings(filters, arguments.out, arguments.stay, arguments.drill_step, arguments.checkpoint)
     try:
         with open_link("navigator", arguments) as link:
             counters = Navigator(link, scene, settings).run(stop)

@@ -7,11 +7,13 @@ from contextlib import ExitStack, closing
 from pathlib import Path
 from types import SimpleNamespace
 
-from ..base import Base
+from ..arguments import RING, stop_on_signals, whole_number
+from ..bridge.nodes import NodeError
+from ..bridge.ring import Reader
 from ..errors import UserError
-from ..nodes import NodeError
-from ..pilot import Pilot
-from ..ring import Reader
+from ..pilot.base import Base
+from ..pilot.pilot import Pilot
+from ..pilot.wheels import EXACT, Wheels
 from ..robot.blocks import LiveRing
 from ..robot.health import Health
 from ..robot.link import Link
@@ -22,9 +24,7 @@ from ..robot.rowfiles import Rows, Traces
 from ..robot.telling import Teller
 from ..robot.wheels import RETRY_S, IdealWheels, LiveBase, SteppedBase, wheels_of
 from ..scene import load
-from ..simlink import SimLink
-from ..wheels import EXACT, Wheels
-from . import RING, stop_on_signals, whole_number
+from ..simulation.link import SimLink
 
 EXAMPLE = "whisker pilot SCENE --models MODELS --base /run/user/1000/base"
 RING_WAIT_S = 10.0  # for the ring of a simulation that waits for us

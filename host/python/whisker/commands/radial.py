@@ -1,11 +1,11 @@
-"""`whisker radial`: fits contacts of known radius and predicts others (whisker.radial)."""
+"""`whisker radial`: fits contacts of known radius and predicts others (whisker.touch.radial)."""
 
 import json
 
-from .. import radial
-from ..nodes import check_node
+from ..arguments import add_action, plain
+from ..bridge.nodes import check_node
 from ..tables import TableError, unwritable
-from . import add_action, plain
+from ..touch.radial import model as radial
 
 EXAMPLE = "whisker radial fit contacts.csv --out model.json"
 KINDS = """paper or linear: equation 3, a line through the peaks; quadratic, rational: a curve instead; default: whole

@@ -1,11 +1,11 @@
 """`whisker record`: from a ring to an MCAP file (whisker.recording)."""
 
+from ..arguments import add_ring, number_above, stop_on_signals, whole_number
+from ..bridge.ring import Reader
 from ..protocol import LIMITS
-from ..recording.recorder import describe, record
+from ..recording.recorder import Tally, describe, record
 from ..recording.writing import RecordingWriter
-from ..ring import Reader
 from ..scene import load
-from . import add_ring, number_above, stop_on_signals, whole_number
 
 EXAMPLE = "whisker record drive.mcap --seconds 60"
 
@@ -26,9 +26,15 @@ def run(arguments) -> int:
     with Reader(arguments.ring, arguments.wait) as reader:
         writer = RecordingWriter(arguments.file, describe(reader), names, arguments.overwrite)
         tally = record(reader, writer, stop, _frames(arguments, reader))
-    lost = tally.missing + tally.overrun
-    print(f"{arguments.file}: {tally.frames} frames, {lost} lost, {int(tally.records_bad.sum())} bad samples")
+    print(f"{arguments.file}: {_summary(tally)}")
     return 0
+
+
+def _summary(tally: Tally) -> str:
+    """In one line; lanes that gave nothing good all the time, as those without a node, are counted apart."""
+    dead = tally.records_bad == tally.frames
+    text = f"{tally.frames} frames, {tally.missing + tally.overrun} lost, {tally.records_bad[~dead].sum()} bad samples"
+    return f"{text}; {dead.sum()} lanes without a good one" if tally.frames and dead.any() else text
 
 
 def _frames(arguments, reader: Reader) -> int | None:

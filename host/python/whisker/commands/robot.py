@@ -4,14 +4,13 @@ import tempfile
 from pathlib import Path
 
 from .. import scene as scenes
-from ..bridgesim import flat_scene
-from ..demo.scenes import make_scene
+from ..arguments import RING, number_above, stop_on_signals, whole_number
 from ..errors import UserError
 from ..robot import parts
 from ..robot.link import Link
 from ..robot.supervisor import Supervisor
 from ..robot.truth import TruthWatcher
-from . import RING, number_above, stop_on_signals, whole_number
+from ..simulation.bridge import simulated_scene
 
 EXAMPLE = "whisker robot --simulated --desktop"
 DAY_S = 86400.0
@@ -25,6 +24,8 @@ def add(parser) -> None:
     parser.add_argument("--create", type=int, choices=(1, 2), default=1, help="the base: iRobot Create (%(default)s)")
     parser.add_argument("--port", type=Path, default=PORT, help="the base's serial port (default: %(default)s)")
     parser.add_argument("--ring", default=RING, metavar="NAME", help="whiskerd's ring (default: %(default)s)")
+    text = "use the whiskerd that runs, systemd's for instance, by its --ring"
+    parser.add_argument("--no-daemon", action="store_true", help=text)
     parser.add_argument("--desktop", action="store_true", help="also the desktop's side: navigator, bag, view")
     parser.add_argument(
         "--view-port", type=whole_number(0, 65535), default=VIEW_PORT, metavar="N", help="(%(default)s)"
@@ -70,6 +71,8 @@ def run(arguments) -> int:
 
 
 def _table(arguments, meeting: parts.Meeting) -> list:
+    if arguments.simulated and arguments.no_daemon:
+        raise UserError("robot: --simulated with --no-daemon: only a whiskerd of its own sees that bridge; give one")
     if arguments.simulated:
         body, simulated = _simulated(arguments, meeting)
         table = [parts.bridge(simulated, body, meeting)]
@@ -81,23 +84,25 @@ def _table(arguments, meeting: parts.Meeting) -> list:
     if arguments.desktop:
         view = None if arguments.no_view else arguments.view_port
         table += parts.desktop(body, meeting, arguments.out / "robot.mcap", view)
-    return table + parts.netbook(body, meeting, arguments.simulated, arguments.desktop)
+    if not arguments.no_daemon:
+        table.append(parts.daemon(meeting, arguments.simulated))
+    return table + parts.netbook(body, meeting, arguments.desktop)
 
 
 def _simulated(arguments, meeting: parts.Meeting) -> tuple[parts.Body, parts.Simulated]:
     """The simulated robot; what it needs is written below --out, its models learnt there if none are given."""
     out, seed = arguments.out, arguments.seed
     folder = arguments.scene or out / "scene"
+    scene, start = simulated_scene(arguments.scene and str(arguments.scene), seed)
     if arguments.scene is None:
-        scenes.write(folder, make_scene(seed)[0])
-    flat, _ = flat_scene(arguments.scene and str(arguments.scene), seed)
-    (out / "scene.flat").write_text(flat)
+        scenes.write(folder, scene)
+    (out / "scene.flat").write_text(scene.flat(start))
     models = arguments.models or out / "models"
     if arguments.models is None and not (models / "texture.json").exists():
         from ..demo.training import learn  # needs the source tree's sim/
 
         print("learning textures and distances of this robot: half a minute", flush=True)
-        learn(models, scenes.load(folder), seed, lambda: None)
+        learn(models, scene, seed, lambda: None)
     body = parts.Body(folder, models, arguments.create, meeting.serial, seed)
     told = (arguments.level, seed, arguments.seconds, arguments.pace, out / "truth.csv")
     return body, parts.Simulated(out / "scene.flat", *told)

@@ -1,9 +1,9 @@
 """`whisker scene`: draws level-0 scenes of a family, or makes one of a recording (whisker.scenes)."""
 
 from .. import scenes
-from ..filters import SettingError
+from ..arguments import add_action
+from ..nav.filters import SettingError
 from ..tables import unwritable
-from . import add_action
 
 EXAMPLE = "whisker scene make --family anchor+kidnap --seed 7 --out scenes/7"
 

@@ -5,9 +5,9 @@ import sys
 
 import numpy as np
 
+from ..arguments import add_ring, lane_list, stop_on_signals, whole_number
+from ..bridge.ring import Reader
 from ..protocol import LANES, LIMITS
-from ..ring import Reader
-from . import add_ring, lane_list, stop_on_signals, whole_number
 
 EXAMPLE = "whisker stream --lanes 0-5 --every 20 --frames 100 > drive.csv"
 FIELDS = ("alpha", "beta", "status")

@@ -1,11 +1,12 @@
-"""`whisker texture`: learns surfaces from recordings and tells them apart (whisker.texture)."""
+"""`whisker texture`: learns surfaces from recordings and tells them apart (whisker.touch.texture)."""
 
 import json
 
-from .. import texture, texture_train
-from ..localise import SettingError
+from ..arguments import add_action, plain
+from ..nav.localise import SettingError
 from ..tables import TableError, unwritable
-from . import add_action, plain
+from ..touch.texture import model as texture
+from ..touch.texture import train as texture_train
 
 METHODS = "default: spectra, calibrated on recordings held out; naive-bayes: the paper's equation 1"
 EXAMPLE = "whisker texture train recordings --out model.json"

@@ -11,11 +11,11 @@ from collections import Counter, deque
 
 import numpy as np
 
+from ..arguments import add_ring, number_above, stop_on_signals
+from ..bridge.ring import FRAME, Reader, RingError
+from ..bridge.status import explain
 from ..protocol import LANES, LIMITS
-from ..ring import FRAME, Reader, RingError
 from ..scene import load
-from ..status import explain
-from . import add_ring, number_above, stop_on_signals
 
 EXAMPLE = "whisker top --ring whisker"
 WINDOW_S = 2.0

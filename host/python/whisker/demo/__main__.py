@@ -13,14 +13,14 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
-from .. import localise
 from .. import scene as scenes
+from ..nav import localise
 from ..report import write_report
 from ..report.run import FILTERS
+from ..simulation.scenes import MECHANICS, make_scene
 from ..tables import TableError
 from . import summary as scores
 from .chain import ChainError, ChainRun, Link, run_chain
-from .scenes import MECHANICS, make_scene
 from .training import METHODS, learn, radial_scores, write_radial_points
 
 TICKS_PER_S = 2000

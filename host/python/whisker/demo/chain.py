@@ -5,7 +5,6 @@ line, whisker-log, whisker-base, pilot; over zenoh the navigator and the bag's r
 import os
 import shutil
 import socket
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Mapping
@@ -13,8 +12,9 @@ from contextlib import ExitStack, closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from ..children import Child, Program
 from ..report.run import FILTERS
+from ..robot import parts
+from ..robot.children import Child, Program
 
 FOLLOWERS = 2  # whisker-log and the pilot
 POLL_S = 0.05
@@ -68,25 +68,11 @@ class ChainRun:
 
 
 @dataclass(frozen=True)
-class Places:
-    """Where the parts of one run meet."""
+class Places(parts.Places):
+    """With endpoints for zenoh."""
 
-    ring: str
-    folder: Path  # of sockets
-    pilot: str  # endpoints for zenoh
+    pilot: str
     navigator: str
-
-    @property
-    def simulation(self) -> Path:
-        return self.folder / "sim.sock"
-
-    @property
-    def serial(self) -> Path:
-        return self.folder / "create"
-
-    @property
-    def base(self) -> Path:
-        return self.folder / "base.sock"
 
 
 def run_chain(run: ChainRun, progress: Callable[[int], None]) -> float:
@@ -137,7 +123,7 @@ def _base(run: ChainRun, places: Places) -> Program:
 
 
 def _pilot(run: ChainRun, places: Places) -> Program:
-    command = [*_whisker("pilot"), run.scene, "--models", run.out / "models", "--seed", run.seed]
+    command = [*parts.whisker("pilot"), run.scene, "--models", run.out / "models", "--seed", run.seed]
     command += ["--ring", places.ring, "--simulation", places.simulation]
     command += ["--base", places.base] if run.create else []
     command += ["--lock-step", "--listen", places.pilot, "--connect", "none"]
@@ -147,19 +133,15 @@ def _pilot(run: ChainRun, places: Places) -> Program:
 
 
 def _navigator(run: ChainRun, places: Places) -> Program:
-    command = [*_whisker("navigator"), run.scene, "--lock-step", "--listen", places.navigator]
+    command = [*parts.whisker("navigator"), run.scene, "--lock-step", "--listen", places.navigator]
     command += ["--connect", places.pilot]
     command += [word for name in FILTERS for word in ("--filter", name)]
     return Program.of("navigator", [*command, "--out", run.out, "--report", run.out / "navigator.json"])
 
 
 def _bag(run: ChainRun, places: Places) -> Program:
-    command = [*_whisker("bag"), run.bag, "--scene", run.scene, "--lock-step"]
+    command = [*parts.whisker("bag"), run.bag, "--scene", run.scene, "--lock-step"]
     return Program.of("bag", [*command, "--connect", places.pilot, "--connect", places.navigator])
-
-
-def _whisker(command: str) -> list[str]:
-    return [sys.executable, "-m", "whisker.cli", command]
 
 
 def _free_endpoints(count: int) -> list[str]:

@@ -5,10 +5,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..behaviour import BLOCK_TICKS, EFFECT_TICKS, ODOMETRY_TICKS
-from ..pilot import Pilot
+from ..pilot.behaviour import BLOCK_TICKS, EFFECT_TICKS, ODOMETRY_TICKS
+from ..pilot.pilot import Pilot
 from ..scene import Scene
-from .simulation import World
+from ..simulation.world import World
 
 # Blocks between the end of the block a decision answers and its effect.
 DELAY_BLOCKS = (EFFECT_TICKS - 1) // BLOCK_TICKS

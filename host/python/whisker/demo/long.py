@@ -17,18 +17,18 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
-from .. import localise
 from .. import scene as scenes
-from ..behaviour import BLOCK_TICKS
-from ..observations import cell
-from ..pilot import Pilot
+from ..nav import localise
+from ..nav.observations import cell
+from ..nav.scoring import position_errors
+from ..pilot.behaviour import BLOCK_TICKS
+from ..pilot.pilot import Pilot
 from ..recording.mcapfile import McapFile
 from ..report.long_figures import LOST_M
 from ..report.long_page import write_report
 from ..report.run import FILTERS, read_columns
 from ..robot.messages import Contact, decode
 from ..robot.models import load_models
-from ..scoring import position_errors
 from .__main__ import (
     TICKS_PER_S,
     add_run_options,

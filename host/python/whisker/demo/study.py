@@ -10,13 +10,13 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import localise
-from ..pilot import Pilot
+from ..nav import localise
+from ..pilot.pilot import Pilot
 from ..report.run import FILTERS
 from ..robot.models import load_models
 from ..scene import Scene
+from ..simulation.scenes import MECHANICS, make_scene
 from .level1 import explore
-from .scenes import MECHANICS, make_scene
 from .summary import pose_scores, rounded, texture_scores
 from .training import METHODS, learn, radial_scores
 

@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import localise
+from ..nav import localise
 from ..scene import Scene
 
 MOVING_MM = 5.0

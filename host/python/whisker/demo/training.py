@@ -7,15 +7,15 @@ from pathlib import Path
 
 import numpy as np
 
-from ..behaviour import EXPLORE_M_S, PUSH_TICKS, TURN_RAD_S
-from ..contact import REST_SAMPLES, Contact
-from ..floor import centred
-from ..radial import RadialModel, peak, read_whisks
+from ..pilot.behaviour import EXPLORE_M_S, PUSH_TICKS, TURN_RAD_S
 from ..scene import Scene
-from ..texture import TextureModel, read_training
-from ..texture_spectral import SpectralModel
-from ..texture_train import train
-from .simulation import World, radial_contacts, write_radial_contacts, write_surface_drives
+from ..simulation.world import World, radial_contacts, write_radial_contacts, write_surface_drives
+from ..touch.contact import REST_SAMPLES, Contact
+from ..touch.floor import centred
+from ..touch.radial.model import RadialModel, peak, read_whisks
+from ..touch.texture.model import TextureModel, read_training
+from ..touch.texture.spectral import SpectralModel
+from ..touch.texture.train import train
 
 # Drives at different times: each has its own drift of the sensor's rest, and its own roughness.
 DRIVES = 8
@@ -114,7 +114,13 @@ def write_radial_points(folder: Path, models: dict[str, RadialModel], contacts: 
 
 
 def flat(scene: Scene) -> str:
-    """The scene's robot for the recording benches, which bring their own arena and start."""
+    """The scene's robot for the recording benches, which bring their own arena and start.
+
+    ValueError for a scene as a folder holds it: it does not tell which whiskers are simulated, and each batch of them
+    wants its own models.
+    """
+    if not scene.simulated:
+        raise ValueError("scene: field simulated: empty; take the scene of simulation.bridge.simulated_scene")
     return scene.flat((0.0, 0.0, 0.0))
 
 

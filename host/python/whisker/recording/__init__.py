@@ -4,7 +4,7 @@ from whisker.recording import read
 
 with read("drive.mcap") as recording:
     print(recording.lane_names, recording.complete)
-    for frames in recording.blocks():              # arrays of whisker.ring.FRAME, 0.1 s each
+    for frames in recording.blocks():              # arrays of whisker.bridge.ring.FRAME, 0.1 s each
         alpha = frames["lane"]["alpha"][:, 2]      # lane 2, counts
 """
 

@@ -6,8 +6,8 @@ from importlib.resources import files
 
 import numpy as np
 
+from ..bridge.ring import FRAME, SAMPLE, DaemonStats
 from ..protocol import LANES
-from ..ring import FRAME, SAMPLE, DaemonStats
 from .cdr import HEADER, Encoder, Layout
 
 BLOCK_FRAMES = 200  # 0.1 s: few enough messages to cost nothing, short enough to lose little

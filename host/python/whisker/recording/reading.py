@@ -62,7 +62,7 @@ class Recording:
         return clock_hz if 0.0 < clock_hz < float("inf") else float(LIMITS["clock_hz"])
 
     def blocks(self) -> Iterator[np.ndarray]:
-        """Frames (n,) of dtype whisker.ring.FRAME, in the order they were published; arrays of their own."""
+        """Frames (n,) of dtype whisker.bridge.ring.FRAME, in the order they were published; arrays of their own."""
         for _, frames in self.stamped_blocks():
             yield frames
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..ring import Clock, Writer
+from ..bridge.ring import Clock, Writer
 from .reading import Recording
 
 PACE_S = 0.002  # frames that fall due within it are published at once, as those of one USB transfer are

@@ -2,8 +2,8 @@
 
 import time
 
+from ..bridge.ring import Clock
 from ..protocol import LIMITS
-from ..ring import Clock
 
 STEP_NS = 10_000_000  # the wall clock against the monotonic one: more than this, and somebody has set it
 STALE_NS = 10 * 10**9  # a mapping that puts a frame further than this from now is that of an earlier start

@@ -8,8 +8,8 @@ from mcap.well_known import MessageEncoding, Profile, SchemaEncoding
 from mcap.writer import Writer
 
 from .. import __version__
+from ..bridge.ring import DaemonStats
 from ..protocol import LANES, LIMITS
-from ..ring import DaemonStats
 from . import messages
 from .mcapfile import RecordingError
 from .reading import DIAGNOSTICS_TOPIC, EVENTS_TOPIC, FORMAT, FRAMES_TOPIC, HEALTH_TOPIC, METADATA

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..filters import COMPONENT
+from ..nav.filters import COMPONENT
 from .messages import BUMPS_MOST, Belief, Header
 
 NEGLECTED = 1e-3  # share of the belief that its lightest bumps may hold together; they are left out
@@ -56,8 +56,7 @@ def _merged(bumps: np.ndarray, cells: np.ndarray) -> np.ndarray:
     return out[np.argsort(-out["mass"], kind="stable")]
 
 
-def to_message(header: Header, name: str, seq: int, bumps: np.ndarray) -> Belief:
-    """The Belief of a filter's components (n,) of COMPONENT after row `seq`."""
-    few = condense(bumps)
+def to_message(header: Header, name: str, seq: int, bumps: int, few: np.ndarray) -> Belief:
+    """The Belief of a filter after row `seq`: of as many bumps, condensed to `few`."""
     columns = (*few["pose"].T, few["mass"], few["sigma_m"], few["sigma_rad"])
-    return Belief(header, name, seq, len(bumps), float(few["mass"].sum()), *(c.astype("f4") for c in columns))
+    return Belief(header, name, seq, bumps, float(few["mass"].sum()), *(c.astype("f4") for c in columns))

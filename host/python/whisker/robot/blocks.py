@@ -5,9 +5,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..behaviour import BLOCK_TICKS, ODOMETRY_TICKS, TICK_S
+from ..bridge.ring import Reader, RingError
+from ..pilot.behaviour import BLOCK_TICKS, ODOMETRY_TICKS, TICK_S
 from ..protocol import CODES, STATUS_CODE_SHIFT
-from ..ring import Reader, RingError
 
 LOST = CODES["absent"] << STATUS_CODE_SHIFT  # status of a tick that never came
 FRESH_TICKS = 200  # a live reader that joins, or was left behind, begins this far back

@@ -134,10 +134,20 @@ class TwistWithCovariance:
     twist: Twist = field(default_factory=Twist)
     covariance: np.ndarray = field(default_factory=lambda: np.zeros(36))
 
+    @classmethod
+    def planar(cls, speeds, covariance) -> "TwistWithCovariance":
+        """(x, y, theta) per second, in m and rad, and their covariance (3, 3)."""
+        x, y, turn = map(float, speeds)
+        return cls(Twist(Vector3(x, y, 0.0), Vector3(0.0, 0.0, turn)), spread(covariance))
+
 
 @dataclass(eq=False)
 class Odometry:
-    """pose: motion since the start, in the frame "odom"; twist: now, in the robot's frame."""
+    """pose: motion since the start, in the frame "odom"; twist: of the 0.1 s that end now, in the robot's frame then.
+
+    The twist has the base's covariance. The pose has none (zeros): errors of scale are the same in every step, so that
+    covariances of steps cannot be added up.
+    """
 
     header: Header
     pose: PoseWithCovariance

@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-from ..nodes import check_node, read_nodes
-from ..radial import load as load_radial
+from ..bridge.nodes import check_node, read_nodes
 from ..scene import Robot
-from ..texture import load
+from ..touch.radial.model import load as load_radial
+from ..touch.texture.model import load
 
 
 def load_models(folder: Path, robot: Robot) -> tuple[dict, dict]:

@@ -1,30 +1,37 @@
 """The navigator, the desktop's part: observations in, pose and belief out, at its own pace.
 
-When it falls behind it weighs the newest row and takes the motion of all before it (whisker.robot.rows.Follower); in
-lock-step it weighs every row. A navigator that begins in mid-run knows nothing of the start any more: uniform prior.
+When it falls behind it weighs the newest rows that a tenth of a second is enough for, and takes the motion of all
+before them (whisker.robot.rows.Follower); in lock-step it weighs every row. A navigator that begins in mid-run goes on
+from what the one before it wrote down (whisker.robot.memory); without that it knows nothing of the start any more:
+uniform prior.
 """
 
 import json
+import math
 import threading
 import time
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from ..errors import UserError
-from ..localise import Estimate
+from ..nav.localise import Estimate
 from ..scene import Prior, Scene
 from . import belief
 from .health import ENDED, RUNNING, Health
-from .link import Link
+from .link import Link, Received
+from .memory import Memory
 from .messages import ARENA_FRAME, Header, Localisation, PoseWithCovariance, PoseWithCovarianceStamped
-from .rows import Follower, Step, time_text
+from .rows import Follower, Step
 from .track import Track
 
 BELIEF_NS = 500_000_000  # 2 Hz of the bridge's clock
 BELIEF_SHARE = 0.1  # of the navigator's time, at most, goes into telling it
+CATCH_UP_S = 0.1  # of the navigator's time for rows that came late together: no longer than until the next row
 LOOK_S = 0.5  # between two words of health while nothing comes
-SCENE_PRIOR, UNIFORM = "scene", "uniform"
+SCENE_PRIOR, UNIFORM, CHECKPOINT = "scene", "uniform", "checkpoint"
 WAITING = "waiting for rows"
 
 
@@ -39,12 +46,14 @@ class Settings:
     """filters: the first one's pose is the robot's. out: folder of est_<filter>.csv; None: none is written.
 
     stay: go on after the end of a run, for the next. drill_step_s: every step takes at least so long, for drills.
+    checkpoint: file of what is believed, for who is begun anew; None: none is kept.
     """
 
     filters: tuple[str, ...]
     out: Path | None = None
     stay: bool = False
     drill_step_s: float = 0.0
+    checkpoint: Path | None = None
 
 
 class Navigator:
@@ -54,13 +63,15 @@ class Navigator:
         self._link, self._scene, self._settings = link, scene, settings
         self._wanted = _columns(scene)
         self._inbox = link.subscribe("observation")
-        self._follower = Follower(link.lock_step)
+        self._follower = Follower()
+        self._memory = Memory(settings.checkpoint, scene, settings.filters)
+        self._beliefs_before: dict[str, np.ndarray] = {}
         self._tracks: list[Track] = []
         self._prior = ""
         self._poses, self._answers, self._beliefs = map(link.publish, ("pose", "localisation", "belief"))
         self._health = Health(link, self.counters)
         self._now_ns = self._belief_due_ns = 0
-        self._step_s = self._belief_rest_s = 0.0
+        self._weigh_s = self._step_s = self._belief_rest_s = 0.0
 
     def counters(self) -> dict[str, object]:
         """What has been counted so far; rows unless said otherwise."""
@@ -78,16 +89,34 @@ class Navigator:
         with ExitStack() as stack:
             while not stop.is_set():
                 received = self._inbox.take(LOOK_S)
-                for step in self._follower.take(received):
+                if not self._tracks:
+                    self._recall(received)
+                for step in self._follower.take(received, self._affordable()):
                     self._take(step, stack)
                 if not self._settings.stay and any(r.over for r in received):
                     reason = next(r.message.reason for r in received if r.over)
                     break
-                self._health.tell(self._now_ns, RUNNING if received else WAITING, self._inbox.last_error)
+                self._health.tell(self._now_ns, RUNNING if received else WAITING, self._last_error())
         for stream in (self._poses, self._answers, self._beliefs):
             stream.end(self._now_ns, reason)
-        self._health.tell(self._now_ns, ENDED, self._inbox.last_error)
+        self._health.tell(self._now_ns, ENDED, self._last_error())
         return self.counters()
+
+    def _affordable(self) -> float:
+        """Rows to be weighed of those that came together, by what the last one took; the newest while nothing is known."""
+        if self._link.lock_step:
+            return math.inf
+        return max(1, CATCH_UP_S // self._weigh_s) if self._weigh_s else 1
+
+    def _last_error(self) -> str:
+        return self._inbox.last_error or self._memory.note
+
+    def _recall(self, received: list[Received]) -> None:
+        """With the first row: go on from where another navigator was, if it left word."""
+        first = next((r for r in received if not r.over), None)
+        if first and (recalled := self._memory.recall(first)):
+            place, self._beliefs_before = recalled
+            self._follower.resume(place)
 
     def _take(self, step: Step, stack: ExitStack) -> None:
         began = time.monotonic()
@@ -96,12 +125,13 @@ class Navigator:
             raise NavigatorError(text)
         if not self._tracks:
             self._begin(stack)
-        cells, self._now_ns = step.cells(), step.row.header.stamp.ns
+        self._now_ns = step.row.header.stamp.ns
         header = Header.at(self._now_ns, ARENA_FRAME)
         for track in self._tracks:
-            self._answer(track, step, header, track.take(time_text(cells), cells))
+            self._answer(track, step, header, track.take(step))
+        self._weigh_s = max(time.monotonic() - began, self._settings.drill_step_s)
         if self._belief_is_due():
-            self._tell_beliefs(header, step.row.seq)
+            self._tell_beliefs(header, step)
         self._step_s = time.monotonic() - began
         time.sleep(max(0.0, self._settings.drill_step_s - self._step_s))
 
@@ -110,20 +140,24 @@ class Navigator:
         due = self._now_ns >= self._belief_due_ns or self._belief_due_ns > self._now_ns + BELIEF_NS
         return due and (self._link.lock_step or time.monotonic() >= self._belief_rest_s)
 
-    def _tell_beliefs(self, header: Header, seq: int) -> None:
+    def _tell_beliefs(self, header: Header, step: Step) -> None:
         began, self._belief_due_ns = time.monotonic(), self._now_ns + BELIEF_NS
+        few = {}
         for track in self._tracks:
-            self._beliefs.send(belief.to_message(header, track.name, seq, track.filter.components()))
+            bumps = track.filter.components()
+            few[track.name] = belief.condense(bumps)
+            self._beliefs.send(belief.to_message(header, track.name, step.row.seq, len(bumps), few[track.name]))
+        self._memory.keep(step, few)
         now = time.monotonic()
         self._belief_rest_s = now + (now - began) / BELIEF_SHARE
 
     def _begin(self, stack: ExitStack) -> None:
         """The prior is of the run's start: whoever joins later cannot use it."""
-        resumed = self._follower.first_seq > 0
-        self._prior = UNIFORM if resumed else SCENE_PRIOR
+        before, out = self._beliefs_before, self._settings.out
+        resumed = bool(before) or self._follower.first_seq > 0
+        self._prior = CHECKPOINT if before else UNIFORM if resumed else SCENE_PRIOR
         scene = replace(self._scene, prior=Prior("uniform")) if resumed else self._scene
-        out = self._settings.out
-        self._tracks = [Track(name, scene, out, stack, resumed) for name in self._settings.filters]
+        self._tracks = [Track(name, scene, out, stack, resumed, before.get(name)) for name in self._settings.filters]
 
     def _answer(self, track: Track, step: Step, header: Header, estimate: Estimate) -> None:
         pose = PoseWithCovariance.planar(estimate.pose, estimate.covariance)

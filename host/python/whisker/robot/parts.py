@@ -4,8 +4,8 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..bridgesim import program
-from ..children import Program
+from ..simulation.bridge import program
+from .children import Program
 
 FIRST_PORT = 7447  # of three: supervisor, pilot, navigator; the latter two are those of robot.link
 LOOPBACK = "127.0.0.1"
@@ -28,17 +28,11 @@ WITH_ENVIRONMENT = 'while [ ! -e "$0" ]; do sleep 0.1; done; . "$0"; echo $$ >"$
 
 
 @dataclass(frozen=True)
-class Meeting:
-    """Where a robot's processes meet: a ring, a folder of sockets, and three ports of one address."""
+class Places:
+    """Where the processes of one machine meet: a ring, and a folder of sockets."""
 
     ring: str
     folder: Path
-    address: str = LOOPBACK
-    first_port: int = FIRST_PORT
-
-    def endpoint(self, number: int) -> str:
-        """0: the supervisor's, 1: the pilot's, 2: the navigator's."""
-        return f"tcp/{self.address}:{self.first_port + number}"
 
     @property
     def base(self) -> Path:
@@ -54,9 +48,26 @@ class Meeting:
         return self.folder / "create"
 
     @property
+    def checkpoint(self) -> Path:
+        """Of the navigator; the folder's life is the run's, so none is older than that."""
+        return self.folder / "navigator.checkpoint"
+
+    @property
     def environment(self) -> Path:
         """Of whoever is to see the simulated bridge."""
         return self.folder / "environment"
+
+
+@dataclass(frozen=True)
+class Meeting(Places):
+    """With those of other machines, at three ports of one address."""
+
+    address: str = LOOPBACK
+    first_port: int = FIRST_PORT
+
+    def endpoint(self, number: int) -> str:
+        """0: the supervisor's, 1: the pilot's, 2: the navigator's."""
+        return f"tcp/{self.address}:{self.first_port + number}"
 
 
 @dataclass(frozen=True)
@@ -70,29 +81,39 @@ class Body:
     seed: int  # of the random turns
 
 
-def netbook(body: Body, meeting: Meeting, simulated: bool, with_desktop: bool) -> list[Program]:
-    """Daemon, base and pilot. The pilot is the last, so that it is ended first, and stops the wheels."""
-    daemon = [program("whiskerd"), "--ring", meeting.ring, "--wait"]
+def whisker(command: str) -> list[str]:
+    """How a command of `whisker` begins."""
+    return [sys.executable, "-m", "whisker.cli", command]
+
+
+def daemon(meeting: Meeting, simulated: bool) -> Program:
+    """What fills the ring."""
+    command = [program("whiskerd"), "--ring", meeting.ring, "--wait"]
     if simulated:
-        daemon = ["sh", "-c", WITH_ENVIRONMENT, meeting.environment, *daemon]
+        command = ["sh", "-c", WITH_ENVIRONMENT, meeting.environment, *command]
+    return Program.of("whiskerd", command)
+
+
+def netbook(body: Body, meeting: Meeting, with_desktop: bool) -> list[Program]:
+    """Base and pilot. The pilot is the last, so that it is ended first, and stops the wheels."""
     base = [program("whisker-base"), "--port", body.port, "--socket", meeting.base, "--model", body.create, "--wait"]
-    pilot = [*_whisker("pilot"), body.scene, "--models", body.models, "--ring", meeting.ring, "--base", meeting.base]
+    pilot = [*whisker("pilot"), body.scene, "--models", body.models, "--ring", meeting.ring, "--base", meeting.base]
     pilot += ["--seed", body.seed, "--listen", meeting.endpoint(1), "--connect", meeting.endpoint(2)]
     pilot += ["--await", "navigator"] if with_desktop else []
-    return [Program.of("whiskerd", daemon), Program.of("base", base), Program.of("pilot", pilot, tells=True)]
+    return [Program.of("base", base), Program.of("pilot", pilot, tells=True)]
 
 
 def desktop(body: Body, meeting: Meeting, bag: Path | None, view_port: int | None) -> list[Program]:
     """Navigator, and, where they are wanted, bag and view."""
-    navigator = [*_whisker("navigator"), body.scene, "--stay"]
+    navigator = [*whisker("navigator"), body.scene, "--stay", "--checkpoint", meeting.checkpoint]
     navigator += ["--listen", meeting.endpoint(2), "--connect", meeting.endpoint(1)]
     table = [Program.of("navigator", navigator, tells=True)]
     everybody = [word for number in range(3) for word in ("--connect", meeting.endpoint(number))]
     if bag:
-        command = [*_whisker("bag"), bag, "--scene", body.scene, "--stay", "--next", *everybody]
+        command = [*whisker("bag"), bag, "--scene", body.scene, "--stay", "--next", *everybody]
         table.append(Program.of("bag", command, tells=True))
     if view_port is not None:
-        command = [*_whisker("view"), "--ring", meeting.ring, "--robot", "--scene", body.scene, "--port", view_port]
+        command = [*whisker("view"), "--ring", meeting.ring, "--robot", "--scene", body.scene, "--port", view_port]
         table.append(Program.of("view", [*command, *everybody]))
     return table
 
@@ -116,7 +137,3 @@ def bridge(simulated: Simulated, body: Body, meeting: Meeting) -> Program:
     command += ["--pace", simulated.pace, "--socket", meeting.simulation, "--truth", simulated.truth]
     command += ["--create", body.create, "--create-link", meeting.serial]
     return Program.of(BRIDGE, [*command, "--", "sh", "-c", LEAVE_ENVIRONMENT, meeting.environment])
-
-
-def _whisker(command: str) -> list[str]:
-    return [sys.executable, "-m", "whisker.cli", command]

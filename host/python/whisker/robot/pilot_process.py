@@ -7,10 +7,10 @@ goes: ring, whiskerd, base, navigator; each loss is told in the pilot's health, 
 import time
 from collections.abc import Callable
 
-from ..behaviour import BLOCK_TICKS, ODOMETRY_TICKS, TICK_S
-from ..pilot import Pilot
-from ..ring import Reader
-from ..wheels import Bumps
+from ..bridge.ring import Reader
+from ..pilot.behaviour import BLOCK_TICKS, ODOMETRY_TICKS, TICK_S
+from ..pilot.pilot import Pilot
+from ..pilot.wheels import Bumps
 from .blocks import Block, LiveRing, blocks
 from .health import ENDED, RUNNING, Health
 from .link import Link

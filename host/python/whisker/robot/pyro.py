@@ -16,8 +16,8 @@ import Pyro5
 import Pyro5.api
 
 from ..errors import UserError
-from ..observations import ODOMETRY
-from ..pilot import compose
+from ..nav.observations import ODOMETRY
+from ..pilot.pilot import compose
 from .health import ENDED, RUNNING, Health
 from .link import Link
 from .messages import (
@@ -53,7 +53,7 @@ class Results:
     def __init__(self, link: Link, may_write: bool):
         self._link, self._may_write = link, may_write
         self._lock = threading.Lock()
-        self._follower, self._number, self._total = Follower(every_row=True), 0, np.zeros(3)
+        self._follower, self._number, self._total = Follower(), 0, np.zeros(3)
         self._history: deque[tuple[int, np.ndarray]] = deque([(0, self._total)], maxlen=HISTORY_ROWS)
         self._row: dict | None = None
         self._odometry: OdometryMessage | None = None

@@ -5,9 +5,9 @@ from typing import TextIO
 
 import numpy as np
 
-from ..behaviour import TICK_S
-from ..observations import cell
-from ..pilot import Pilot
+from ..nav.observations import cell
+from ..pilot.behaviour import TICK_S
+from ..pilot.pilot import Pilot
 
 DEGREES_PER_COUNT = 180.0 / 65536.0
 

@@ -5,12 +5,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..observations import ODOMETRY, cell
-from ..pilot import compose
+from ..nav.observations import ODOMETRY, cell
+from ..pilot.pilot import compose
 from .link import Link, Received
 from .messages import BASE_FRAME, EMPTY, NOT_READ, RELEASE, VALUE, Header, Observation
+from .streams import Envelope
 
 ROW_NS = 10**8  # the paper's 0.1 s
+# A filter takes up to 1 m and half a turn in one row (host/nav/filters/intake.c); longer motions come in such pieces.
+MOST_M, MOST_RAD = 0.5, math.pi / 2.0
+PIECE_NS = 10**6  # between two pieces of a motion of which nobody knows how long it took
+PIECES_MOST = (
+    600  # a minute of rows, some 40 ms of a filter's time; before a longer gap's last minute a filter assumes the worst
+)
 
 
 def between(start, end) -> np.ndarray:
@@ -78,24 +85,59 @@ class Step:
     motion: np.ndarray
     t_ns: int  # the row's stamp, but never going back when the bridge's clock begins anew
     rows: int  # whose motion it is: 1, or more when some were skipped or missed
+    envelope: Envelope  # the row's
+    within_ns: int = 0  # the time in which the motion was; 0: not all of what was moved since the last step is told
 
     def cells(self) -> dict[str, float | None]:
-        return to_row(self.row, self.motion, self.t_ns)
+        """With what `lead` leaves of the motion."""
+        return to_row(self.row, self._piece(self._count()), self.t_ns)
+
+    def lead(self) -> list[dict[str, float | None]]:
+        """Rows to be taken before, nothing read in them: the motion of many rows, in as many.
+
+        In one, a filter would refuse it, or take the time between for rows whose motion is lost, and assume some more.
+        """
+        count, nothing = self._count(), dict.fromkeys(self.row.names, math.nan)
+        apart_ns = min(self.within_ns // count, ROW_NS) or PIECE_NS
+        rows = []
+        for n in range(1, count):
+            row = {"t_s": round((self.t_ns - (count - n) * apart_ns) / 1e9, 9)}
+            rows.append(row | dict(zip(ODOMETRY, map(float, self._piece(n)), strict=True)) | nothing)
+        return rows
+
+    def _count(self) -> int:
+        """Of the pieces: one a row, and none that a filter refuses."""
+        x, y, turn = self.motion
+        fitting = max(math.ceil(math.hypot(x, y) / MOST_M), math.ceil(abs(turn) / MOST_RAD))
+        return max(1, min(round(self.within_ns / ROW_NS), PIECES_MOST), fitting)
+
+    def _piece(self, n: int) -> np.ndarray:
+        """The n-th, from 1, of a way straight to where the motion ends, turning evenly."""
+        count = self._count()
+        return self.motion if count == 1 else between((n - 1) / count * self.motion, n / count * self.motion)
+
+
+@dataclass(frozen=True)
+class Place:
+    """A row that another process had taken last."""
+
+    stream: int
+    seq: int
+    pose: np.ndarray
 
 
 class Follower:
     """Turns what came since the last look into steps, so that no motion is lost whatever was skipped or missed.
 
-    every_row: a step for each row. Else: one for the newest, as in the paper, and one for each row before it that
-    tells a whisk's distance, for those are few and precious. A pilot that began anew tells motion from its own start
-    only: what the robot moved in between is not known.
+    A step for each of the newest rows, as many as there is time for (the paper: one), and one for each row before them
+    that tells a whisk's distance, for those are few and precious. A pilot that began anew tells motion from its own
+    start only: what the robot moved in between is not known.
     """
 
-    def __init__(self, every_row: bool):
-        self._every_row = every_row
+    def __init__(self):
         self._stream: int | None = None
         self._first: Observation | None = None
-        self._last: Observation | None = None
+        self._last: Observation | Place | None = None
         self._last_ns: int | None = None
         self._ahead_ns = 0
         self.weighed = self.skipped = self.missed = self.restarts = 0  # rows, but for restarts: pilots after the first
@@ -105,20 +147,35 @@ class Follower:
         """Of the first row that came; 0 while none has."""
         return self._first.seq if self._first else 0
 
-    def take(self, received: list[Received]) -> list[Step]:
-        """Steps in order; ends among what was received are passed over."""
+    def resume(self, place: Place) -> None:
+        """Go on from a row that was taken before this process was there; call it before any row comes."""
+        self._last, self._stream = place, place.stream
+
+    def take(self, received: list[Received], most: float = math.inf) -> list[Step]:
+        """Steps in order, for the newest `most` at least; ends among what was received are passed over."""
         rows = [r for r in received if not r.over]
         if rows and self._first is None:
-            self._first, self._stream = rows[0].message, rows[0].envelope.stream
-        chosen = [r for n, r in enumerate(rows) if self._every_row or _is_kept(rows, n)]
+            self._join(rows[0])
+        chosen = [r for n, r in enumerate(rows) if n >= len(rows) - most or _is_kept(rows, n)]
         steps = [self._step(r) for r in chosen]
         self.weighed += len(steps)
         self.skipped += len(rows) - len(chosen)
         self.missed += sum(step.rows for step in steps) - len(rows)
         return steps
 
+    def _join(self, first: Received) -> None:
+        """Rows before the first were nobody's to miss, though their motion comes with it."""
+        self._first = first.message
+        if self._last is None:
+            self._stream = first.envelope.stream
+        elif first.envelope.stream == self._stream:
+            self.missed -= first.message.seq - self._last.seq - 1
+        else:
+            self.missed -= first.message.seq
+
     def _step(self, received: Received) -> Step:
-        row, last = received.message, self._last
+        row, last, before_ns = received.message, self._last, self._last_ns
+        known = received.envelope.stream == self._stream and before_ns is not None
         if received.envelope.stream != self._stream:
             self.restarts += 1
             motion, rows = row.pose, row.seq + 1
@@ -129,7 +186,9 @@ class Follower:
             rows = row.seq - last.seq
             motion = row.motion if rows == 1 else between(last.pose, row.pose)
         self._stream, self._last = received.envelope.stream, row
-        return Step(row, np.asarray(motion), self._time(row.header.stamp.ns), rows)
+        t_ns = self._time(row.header.stamp.ns)
+        within_ns = t_ns - before_ns if known else 0
+        return Step(row, np.asarray(motion), t_ns, rows, received.envelope, within_ns)
 
     def _time(self, stamp_ns: int) -> int:
         if self._last_ns is not None and stamp_ns + self._ahead_ns <= self._last_ns:
@@ -139,6 +198,6 @@ class Follower:
 
 
 def _is_kept(rows: list[Received], n: int) -> bool:
-    """The newest, the last of a stream that another follows, and those with a measured distance."""
-    last_of_stream = n == len(rows) - 1 or rows[n + 1].envelope.stream != rows[n].envelope.stream
+    """The last of a stream that another follows, and those with a measured distance."""
+    last_of_stream = n + 1 < len(rows) and rows[n + 1].envelope.stream != rows[n].envelope.stream
     return last_of_stream or rows[n].message.kind == RELEASE

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 
-from ..children import Child, Program
+from .children import Child, Program
 from .health import ENDED, RUNNING
 from .link import Link
 from .messages import HEALTH, Header, KeyValue, ProcessHealth

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from ..behaviour import TICK_S
-from ..pilot import Pilot
+from ..pilot.behaviour import TICK_S
+from ..pilot.pilot import Pilot
 from . import messages
 from .link import Link
-from .rows import RowPublisher, compose
+from .rows import ROW_NS, RowPublisher, compose
 from .wheels import Report
 
 TICK_NS = round(TICK_S * 1e9)
@@ -22,6 +22,7 @@ class Teller:
     def __init__(self, link: Link, pilot: Pilot):
         self._pilot, self._streams = pilot, {topic: link.publish(topic) for topic in TOPICS}
         self._rows, self._stamp_ns, self._pose = RowPublisher(link), 0, np.zeros(3)
+        self._told_ns: int | None = None  # stamp of the odometry before
         self._contacts = {lane: (c.onset, c.release) for lane, c in pilot.contacts.items()}
         self._measured, self._state = len(pilot.whisks), None
 
@@ -44,10 +45,7 @@ class Teller:
     def row(self, row: dict, report: Report, samples: np.ndarray) -> None:
         """The row of the 0.1 s that end with the newest block, and the odometry and samples (lanes,) at its end."""
         self._rows.send(row, self._kind(row))
-        self._pose = compose(self._pose, report.motion)
-        header = messages.Header.at(self._stamp_ns, messages.ODOMETRY_FRAME)
-        pose = messages.PoseWithCovariance.planar(self._pose, report.covariance)
-        self._send("odometry", messages.Odometry(header, pose))
+        self._send("odometry", self._odometry(report))
         self._send("joints", self._joints(samples))
 
     def end(self, reason: str = "") -> None:
@@ -63,6 +61,14 @@ class Teller:
         ):
             return messages.RELEASE
         return messages.WHISK if self._pilot.behaviour.whisking else messages.EXPLORING
+
+    def _odometry(self, report: Report) -> messages.Odometry:
+        since_s = 1e-9 * (ROW_NS if self._told_ns is None else self._stamp_ns - self._told_ns)
+        self._told_ns, self._pose = self._stamp_ns, compose(self._pose, report.motion)
+        header = messages.Header.at(self._stamp_ns, messages.ODOMETRY_FRAME)
+        speeds, covariance = np.divide(report.motion, since_s), report.covariance / since_s**2
+        pose = messages.PoseWithCovariance(messages.Pose.planar(*self._pose))
+        return messages.Odometry(header, pose, messages.TwistWithCovariance.planar(speeds, covariance))
 
     def _joints(self, samples: np.ndarray) -> messages.JointState:
         names = [f"{name}/{axis}" for name in self._pilot.names.values() for axis in ("alpha", "beta")]

@@ -4,8 +4,11 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TextIO
 
-from .. import localise
+import numpy as np
+
+from ..nav import localise
 from ..scene import Scene
+from .rows import Step, time_text
 
 FILES = (("est", localise.ESTIMATE_HEADER), ("covariance", "t_s,xx_m2,xy_m2,yy_m2"))
 
@@ -13,18 +16,32 @@ FILES = (("est", localise.ESTIMATE_HEADER), ("covariance", "t_s,xx_m2,xy_m2,yy_m
 class Track:
     """Steps a filter and writes what it believes after every row, line by line."""
 
-    def __init__(self, name: str, scene: Scene, out: Path | None, stack: ExitStack, resumed: bool = False):
-        """`out`: the folder of the files, which `stack` closes; None: no files. resumed: go on behind what they hold."""
-        self.name, self.filter = name, localise.Filter(name, scene)
+    def __init__(
+        self,
+        name: str,
+        scene: Scene,
+        out: Path | None,
+        stack: ExitStack,
+        resumed: bool = False,
+        bumps: np.ndarray | None = None,
+    ):
+        """`out`: the folder of the files, which `stack` closes; None: no files. resumed: go on behind what they hold.
+
+        bumps: what is believed already, in place of the scene's prior.
+        """
+        self.name, self.filter = name, localise.Filter(name, scene, bumps=bumps)
         self._poses = self._covariances = None
         if out is not None:
             self._poses, self._covariances = (
                 stack.enter_context(_opened(out / f"{kind}_{name}.csv", header, resumed)) for kind, header in FILES
             )
 
-    def take(self, t_s: str, row: dict[str, float | None]) -> localise.Estimate:
-        """`t_s`: the row's time as the files tell it."""
-        estimate = self.filter.step(row)
+    def take(self, step: Step) -> localise.Estimate:
+        """Motion first where it is long, then the row."""
+        for row in step.lead():
+            self.filter.step(row)
+        cells = step.cells()
+        t_s, estimate = time_text(cells), self.filter.step(cells)
         if self._poses:
             c = estimate.covariance
             print(estimate.line(t_s), file=self._poses, flush=True)

@@ -12,9 +12,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..base import Base, BaseError, Motion
-from ..simlink import SimLink
-from ..wheels import NO_BUMPS, Bumps, Wheels
+from ..pilot.base import Base, BaseError, Motion
+from ..pilot.wheels import NO_BUMPS, Bumps, Wheels
+from ..simulation.link import SimLink
 
 MODE = "safe"  # the base then stops by itself at cliffs and wheel drops
 RETRY_S = 0.2  # between looks for a base that is not there

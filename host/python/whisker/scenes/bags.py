@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import UserError
-from ..observations import TRUTH, cell, observations_path, read_observations
+from ..nav.observations import TRUTH, cell, observations_path, read_observations
 from ..recording.mcapfile import MAGIC, McapFile
 from ..robot.bag import RECORD, SCENE_FILES
 from ..robot.link import Received
@@ -57,7 +57,7 @@ def _decoded(bag: McapFile, kind: type, message) -> list:
 def _table(rows: list[Observation], truth: list[PoseStamped]) -> list[dict[str, str]]:
     """observations.csv as a list of rows; motion of rows that are not in the bag is in the next that is."""
     poses = {pose.header.stamp.ns: pose.pose.xytheta for pose in truth}
-    follower, out, stream = Follower(every_row=True), [], 0
+    follower, out, stream = Follower(), [], 0
     for n, row in enumerate(rows):
         stream += n > 0 and row.seq <= rows[n - 1].seq
         (step,) = follower.take([Received("observation", row, Envelope(stream, n, 0))])

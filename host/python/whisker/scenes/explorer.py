@@ -1,4 +1,4 @@
-"""The demo's robot without its signals: the pilot's own behaviour (whisker.behaviour) on contacts from geometry.
+"""The demo's robot without its signals: the pilot's own behaviour (whisker.pilot.behaviour) on contacts from geometry.
 
 Rows come out as the pilot makes them: odometry, textures and distances held back during a body whisk, a distance at the
 release. What a whisk tells was taken from signal-level runs, and tests/test_levels.py holds the two against each other.
@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..behaviour import BLOCK_TICKS, EXPLORE_M_S, ODOMETRY_TICKS, PUSH_TICKS, TICK_S, TURN_RAD_S, Behaviour
-from ..behaviour_states import PLAIN
-from ..mount import Mount
+from ..pilot.behaviour import BLOCK_TICKS, EXPLORE_M_S, ODOMETRY_TICKS, PUSH_TICKS, TICK_S, TURN_RAD_S, Behaviour
+from ..pilot.states import PLAIN
 from ..scene import Arena, Robot
+from ..touch.mount import Mount
 from .geometry import free_test, range_test
 
 NOTICED_M = 0.001  # the sensor notices a contact when the whisker is pressed so far ...

@@ -64,7 +64,9 @@ HARSH = World(
 
 
 def _demo_robot() -> Robot:
-    from ..demo.scenes import make_robot  # the demo needs this package's neighbours; most families do not need the demo
+    from ..simulation.scenes import (
+        make_robot,  # the demo needs this package's neighbours; most families do not need the demo
+    )
 
     return make_robot()
 

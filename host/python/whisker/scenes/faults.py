@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..observations import Observations
+from ..nav.observations import Observations
 from ..scene import Arena, Scene
 
 Fault = Callable[[Observations, Scene, np.random.Generator], Observations]

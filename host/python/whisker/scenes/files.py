@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..observations import ODOMETRY, TRUTH, Observations
+from ..nav.observations import ODOMETRY, TRUTH, Observations
 from ..scene import OBSERVATIONS, Scene, write
 
 DECIMALS = 6  # m, rad, nats; distances are rounded in mm to three

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..observations import Observations
+from ..nav.observations import Observations
 from ..scene import Arena, Prior, Robot, Scene
 from . import walk
 from .explorer import explore

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ..errors import UserError
-from ..observations import Observations, observations_path, read_observations
+from ..nav.observations import Observations, observations_path, read_observations
 from ..scene import Prior, Scene, load
 from .bags import is_bag, read_bag
 from .files import rounded

@@ -2,7 +2,7 @@
 
 import sys
 
-from ..commands import Parser
+from ..arguments import Parser
 from ..errors import UserError
 from .command import EXAMPLE, add
 

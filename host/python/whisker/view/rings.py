@@ -4,7 +4,7 @@ import os
 import stat
 from pathlib import Path
 
-from ..ring import Reader, RingError
+from ..bridge.ring import Reader, RingError
 
 SHARED_MEMORY = Path("/dev/shm")
 MARK = b"WHSKRING"

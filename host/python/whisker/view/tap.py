@@ -6,8 +6,8 @@ from dataclasses import asdict
 
 import numpy as np
 
+from ..bridge.ring import Reader, RingError, error_line
 from ..protocol import CODES, LANES, LIMITS, STATUS_CODE_SHIFT
-from ..ring import Reader, RingError, error_line
 from .pyramid import BINS, CHUNK, WIDTHS, Pyramid
 from .tally import NAME_OF_CODE, Tally
 

@@ -1,0 +1,62 @@
+"""What a pilot tells of its odometry: where it is by its own sums, how fast it moved, and how sure that is."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from whisker.pilot.behaviour import BLOCK_TICKS
+from whisker.pilot.states import State
+from whisker.pilot.wheels import NO_BUMPS
+from whisker.robot.messages import PLANAR
+from whisker.robot.telling import Teller
+from whisker.robot.wheels import Report
+
+ROW_BLOCKS = 5
+ROW = {"t_s": 0.1, "odo_x_m": 0.0, "odo_y_m": 0.0, "odo_theta_rad": 0.0}
+COVARIANCE = np.array([[4e-6, 1e-7, 2e-7], [1e-7, 1e-6, 3e-7], [2e-7, 3e-7, 9e-6]])
+
+
+class Heard:
+    """A link that keeps what is sent, by topic."""
+
+    def __init__(self):
+        self.topics = {}
+
+    def publish(self, topic: str):
+        return SimpleNamespace(send=self.topics.setdefault(topic, []).append)
+
+
+@pytest.fixture
+def told():
+    """A call: the odometry messages after these motions, 0.1 s each, all of the same covariance."""
+    behaviour = SimpleNamespace(state=State.FORWARD, since=0, reason="", whisking=False)
+    pilot = SimpleNamespace(contacts={}, whisks=[], names={}, object_lanes=[], behaviour=behaviour)
+
+    def after(*motions, rows_before=0):
+        link = Heard()
+        teller, samples = Teller(link, pilot), np.zeros(0, [("alpha", "u2"), ("beta", "u2"), ("status", "u1")])
+        for n, motion in enumerate(motions, start=1 + rows_before):
+            teller.block(n * ROW_BLOCKS * BLOCK_TICKS - 1)
+            teller.row(ROW, Report(motion, COVARIANCE, NO_BUMPS), samples)
+        return link.topics["odometry"]
+
+    return after
+
+
+def test_the_twist_is_the_motion_by_its_time_with_the_bases_covariance(told):
+    last = told((0.01, 0.0, 0.0), (0.02, 0.001, -0.03))[-1]
+    assert last.header.stamp.ns == 200_000_000
+    linear, angular = last.twist.twist.linear, last.twist.twist.angular
+    assert (linear.x, linear.y, angular.z) == pytest.approx((0.2, 0.01, -0.3))
+    assert last.twist.covariance.reshape(6, 6)[PLANAR] == pytest.approx(COVARIANCE * 100.0)
+
+
+def test_a_pilot_that_begins_in_mid_run_moves_no_slower(told):
+    assert told((0.01, 0.0, 0.0), rows_before=500)[0].twist.twist.linear.x == pytest.approx(0.1)
+
+
+def test_the_pose_is_the_sum_of_the_motions_and_pretends_no_covariance(told):
+    last = told((0.0, 0.0, np.pi / 2), (0.02, 0.0, 0.0))[-1]
+    assert last.pose.pose.xytheta == pytest.approx((0.0, 0.02, np.pi / 2))
+    assert not last.pose.covariance.any()

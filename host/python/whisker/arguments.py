@@ -1,0 +1,114 @@
+"""What command lines have in common: the parser, arguments that several take, types of arguments, and an end in order."""
+
+import argparse
+import math
+import signal
+import threading
+from collections.abc import Callable
+
+from .errors import UserError
+
+RING = "whisker"  # the name whiskerd's unit gives its ring
+
+
+class Parser(argparse.ArgumentParser):
+    """Complaints are one line; help keeps its line breaks."""
+
+    def __init__(self, **options):
+        super().__init__(formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False, **options)
+
+    def error(self, message: str):
+        self.exit(UserError.exit_code, f"{self.prog}: {message}; see '{self.prog} --help'\n")
+
+    def show_example(self, command_line: str) -> None:
+        """End the help with this."""
+        self.epilog = f"example:\n  {command_line}"
+
+
+def add_action(actions, name: str, text: str, example: str, run) -> Parser:
+    """One action of a command that has several, such as `whisker texture train`."""
+    parser = actions.add_parser(name, help=text, description=text)
+    parser.show_example(example)
+    parser.set_defaults(run=run)
+    return parser
+
+
+def plain(values: dict) -> dict:
+    """JSON has no nan: what could not be read is null."""
+    return {key: None if isinstance(value, float) and value != value else value for key, value in values.items()}
+
+
+def add_ring(parser) -> None:
+    """--ring and --wait, for commands that read a ring."""
+    parser.add_argument("--ring", default=RING, metavar="NAME", help="the ring to read (default: %(default)s)")
+    parser.add_argument(
+        "--wait", type=seconds, default=0.0, metavar="S", help="wait so long for the ring to come up (0)"
+    )
+
+
+def whole_number(least: int, most: int | None = None) -> Callable[[str], int]:
+    """An argument's type: a whole number of at least `least`, at most `most`."""
+
+    def whole_number_in_range(text: str) -> int:
+        value = int(text) if text.isascii() and text.isdigit() else least - 1
+        if value < least or (most is not None and value > most):
+            bounds = f"of {least} or more" if most is None else f"from {least} to {most}"
+            raise argparse.ArgumentTypeError(f"'{text}' is not a whole number {bounds}")
+        return value
+
+    return whole_number_in_range
+
+
+def seconds(text: str) -> float:
+    """An argument's type: a length of time, 0 included, at most a day."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0.0 <= value <= 86400.0:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a number of seconds from 0 to 86400")
+    return value
+
+
+def number_above(bound: float) -> Callable[[str], float]:
+    """An argument's type: a finite number greater than `bound`."""
+
+    def number(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not (math.isfinite(value) and value > bound):
+            raise argparse.ArgumentTypeError(f"'{text}' is not a number above {bound:g}")
+        return value
+
+    return number
+
+
+def number_list(text: str) -> list[float]:
+    """An argument's type: positive numbers, as in 90,100,110."""
+    return [number_above(0.0)(part) for part in text.split(",")]
+
+
+def lane_list(most: int) -> Callable[[str], list[int]]:
+    """An argument's type: lanes such as 0,2,5-7, all below `most`."""
+
+    def lanes(text: str) -> list[int]:
+        found: list[int] = []
+        for part in text.split(","):
+            first, dash, last = part.partition("-")
+            ends = [first, last if dash else first]
+            if not all(end.isascii() and end.isdigit() and int(end) < most for end in ends):
+                raise argparse.ArgumentTypeError(f"'{part}' is no lane; give lanes from 0 to {most - 1}, as in 0,2,5-7")
+            found += range(int(ends[0]), int(ends[1]) + 1)
+        return list(dict.fromkeys(found))
+
+    return lanes
+
+
+def stop_on_signals() -> threading.Event:
+    """An event that Ctrl-C and SIGTERM set, so that a command can end in good order."""
+    stop = threading.Event()
+    for sign in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(sign, lambda *_: stop.set())
+    return stop

@@ -1,0 +1,212 @@
+"""Finds out why no frames arrive, from the cable to the ring: each finding with its remedy."""
+
+import ctypes.util
+import os
+import shutil
+import time
+from collections import Counter
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from ..protocol import LANES, LIMITS, WIRE_VERSION
+from . import usbtree
+from .ring import DaemonStats, Reader, RingError, error_line
+from .status import explain
+
+OK, WARN, FAIL = "ok", "warn", "FAIL"
+RULES = (
+    "etc/udev/rules.d",
+    "run/udev/rules.d",
+    "usr/local/lib/udev/rules.d",
+    "usr/lib/udev/rules.d",
+    "lib/udev/rules.d",
+)
+LIBRARIES = {"usb-1.0": "libusb-1.0-0", "hidapi-libusb": "libhidapi-libusb0"}  # as linked: as Debian calls it
+RING_MAGIC = b"WHSKRING"
+LOOK_S = 0.5  # how long frames are watched
+ROOM_BYTES = 16 << 20  # of shared memory; a ring of the default size takes 2 MiB
+
+
+@dataclass(frozen=True)
+class Finding:
+    """level: OK, WARN or FAIL; remedy: empty when all is well."""
+
+    level: str
+    text: str
+    remedy: str = ""
+
+    def line(self) -> str:
+        return f"{self.level:4}  {self.text}" + (f"; {self.remedy}" if self.remedy else "")
+
+
+def examine(ring: str, root: Path = Path("/"), look_s: float = LOOK_S) -> list[Finding]:
+    """All findings, from the cable to the samples. `root` is another only in tests.
+
+    Where good frames arrive nothing can have failed before them: the bridge is simulated, say, or replayed.
+    """
+    before = [*libraries(), *usb(root), *rules(root), *room(root / "dev/shm")]
+    frames = stream(ring, look_s)
+    if not any(finding.level == FAIL for finding in frames):
+        before = [replace(finding, level=WARN) if finding.level == FAIL else finding for finding in before]
+    return [*before, *frames, *stale_rings(root / "dev/shm", ring)]
+
+
+def libraries() -> list[Finding]:
+    """What whiskerd needs and the package does not bring."""
+    missing = [name for name in LIBRARIES if ctypes.util.find_library(name) is None]
+    if not missing:
+        return [Finding(OK, "libusb and hidapi are installed")]
+    packages = " ".join(LIBRARIES[name] for name in missing)
+    return [Finding(FAIL, f"lib{' and lib'.join(missing)} not found", f"install: apt-get install {packages}")]
+
+
+def usb(root: Path) -> list[Finding]:
+    """Whether a bridge is plugged in, may be opened, runs at high speed, and who holds it."""
+    found = usbtree.bridges(root)
+    if not found:
+        remedy = "plug it in; check its power and cable; try another port without a hub"
+        return [Finding(FAIL, "no bridge on the USB", remedy)]
+    out = []
+    for bridge in found:
+        out.append(_permission(bridge))
+        if bridge.speed < usbtree.HIGH_SPEED_MBIT:
+            remedy = "use a USB 2.0 cable and port; avoid old hubs"
+            out.append(Finding(FAIL, f"bridge {bridge.node} runs at {bridge.speed:g} Mbit/s, not 480", remedy))
+        for pid, name in usbtree.holders(bridge, root):
+            if name == "whiskerd":
+                out.append(Finding(OK, f"whiskerd (process {pid}) holds the bridge"))
+            else:
+                out.append(Finding(FAIL, f"process {pid} ({name}) holds the bridge", f"end it: kill {pid}"))
+    return out
+
+
+def _permission(bridge: usbtree.Bridge) -> Finding:
+    said = f"bridge {bridge.node} {bridge.serial}".rstrip()
+    if not bridge.node.exists():
+        return Finding(FAIL, f"{said}: no device file", "plug the bridge in again; in a container pass /dev/bus/usb on")
+    if os.access(bridge.node, os.R_OK | os.W_OK):
+        return Finding(OK, f"{said} may be opened")
+    return Finding(FAIL, f"{said}: permission denied", "install the udev rule, plug the bridge in again, log in again")
+
+
+def rules(root: Path) -> list[Finding]:
+    """Whether a udev rule names the bridge."""
+    vendor = f"{LIMITS['usb_vendor_id']:04x}"
+    for folder in RULES:
+        for path in sorted((root / folder).glob("*.rules")):
+            try:
+                if vendor in path.read_text(errors="replace").lower():
+                    return [Finding(OK, f"udev rule {path}")]
+            except OSError:
+                continue
+    remedy = "install 70-whisker.rules, which comes with whiskerd, then: udevadm control --reload"
+    return [Finding(WARN, "no udev rule names the bridge: only root may open it", remedy)]
+
+
+def room(shared: Path) -> list[Finding]:
+    """Whether a ring fits into shared memory."""
+    try:
+        free = shutil.disk_usage(shared).free
+    except OSError as error:
+        return [Finding(FAIL, f"{shared}: {error.strerror}", "mount a tmpfs there")]
+    if free < ROOM_BYTES:
+        return [
+            Finding(FAIL, f"{shared}: {free >> 20} MiB free, a ring needs 2", "remove old rings; enlarge the tmpfs")
+        ]
+    return []
+
+
+def stream(ring: str, look_s: float) -> list[Finding]:
+    """The ring, its daemon, and the frames in it."""
+    try:
+        with Reader(ring) as reader:
+            out = [Finding(OK, f"ring {ring}: written by process {reader.info.writer_pid}")]
+            out += daemon(reader.stats)
+            return out + samples(reader, look_s)
+    except RingError as error:
+        return [Finding(FAIL, str(error))]
+
+
+def daemon(stats: DaemonStats | None) -> list[Finding]:
+    """What whiskerd tells of itself and its bridge."""
+    if stats is None:
+        return [Finding(WARN, "the ring's writer tells nothing of itself", "none needed if it is a replay")]
+    if not stats.connected:
+        text = error_line(stats.error) if stats.error else "; it is still opening its bridge"
+        return [Finding(FAIL, f"whiskerd runs, but has no bridge: {text}")]
+    out = [Finding(OK, f"bridge {stats.serial}, firmware {stats.firmware}, wire version {stats.wire_version}")]
+    if stats.wire_version != WIRE_VERSION:
+        text = f"bridge speaks wire version {stats.wire_version}, this package {WIRE_VERSION}"
+        out.append(Finding(FAIL, text, "install gateware and host of one release"))
+    for count, text, remedy in (
+        (stats.frames_dropped, "frames dropped by the bridge", "free the host's processor; avoid shared USB hubs"),
+        (stats.bytes_skipped, "bytes of the stream were no frame", "check the USB cable"),
+        (stats.records_crc, "samples damaged between node and bridge", "check the lanes' cables; lower the SPI clock"),
+        (stats.usb_errors, "USB transfers failed", "check the USB cable"),
+        (stats.reconnects, "times the bridge went and came back", "check the USB plug and the bridge's power"),
+    ):
+        out += [Finding(WARN, f"{count} {text} since whiskerd's start", remedy)] if count else []
+    return out
+
+
+def samples(reader: Reader, look_s: float) -> list[Finding]:
+    """Whether frames arrive, and what ails their lanes."""
+    frames = _watch(reader, look_s)
+    if len(frames) == 0:
+        return [Finding(FAIL, f"no frame in {look_s:g} s", "see the findings above and whiskerd's log")]
+    rate = f"{len(frames)} frames in {look_s:g} s"
+    gaps = np.diff(frames["sequence"])
+    lost = int((gaps[gaps < 1 << 31].astype(np.int64) - 1).clip(0).sum())
+    remedy = "free the host's processor; avoid shared USB hubs"
+    out = [Finding(WARN, f"{rate}, {lost} lost", remedy) if lost else Finding(OK, f"{rate}, none lost")]
+    mask = int(frames["lane_mask"][-1])
+    for lane in (n for n in range(LANES) if mask >> n & 1):
+        status = frames["lane"]["status"][:, lane]
+        counted = Counter(status[status != 0].tolist())
+        if counted:
+            cause, remedy = explain(counted.most_common(1)[0][0])
+            share = 100 * counted.total() / len(frames)
+            out.append(
+                Finding(WARN if share < 50 else FAIL, f"lane {lane}: {share:.3g} % bad samples: {cause}", remedy)
+            )
+    return out
+
+
+def _watch(reader: Reader, look_s: float) -> np.ndarray:
+    reader.seek_latest(0)
+    kept, end = [], time.monotonic() + look_s
+    while (left := end - time.monotonic()) > 0:
+        frames = reader.take(left)
+        if frames is None:
+            break
+        kept.append(frames)
+    return np.concatenate(kept) if kept else reader.peek()[:0]
+
+
+def stale_rings(shared: Path, ring: str) -> list[Finding]:
+    """Rings whose writer has died; a new writer of the same name replaces them, another name leaves them lying."""
+    out = []
+    for path in sorted(shared.iterdir()) if shared.is_dir() else []:
+        if path.name != ring and _is_ring(path) and _is_dead(path.name):
+            out.append(
+                Finding(WARN, f"ring {path.name} was left behind by a writer that died", f"remove it: rm {path}")
+            )
+    return out
+
+
+def _is_ring(path: Path) -> bool:
+    try:
+        with open(path, "rb") as file:
+            return file.read(len(RING_MAGIC)) == RING_MAGIC
+    except OSError:
+        return False
+
+
+def _is_dead(name: str) -> bool:
+    try:
+        Reader(name).close()
+    except RingError as error:
+        return error.name == "WRITER_DEAD"
+    return False

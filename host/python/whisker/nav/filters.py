@@ -1,0 +1,234 @@
+"""Filters of host/nav on a scene: made, stepped, replayed over many rows, and asked for their belief."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import UserError
+from ..native import doubles, ffi, lib, octets
+from ..scene import Prior, Scene
+from .observations import ODOMETRY, Observations
+
+FAVOURITE, SPARE = "adaptive", "grid"
+SEED_MOST = 2**64 - 1
+BUMPS_MOST = int(lib.NAV_BUMPS_MOST)  # of a belief to begin from
+
+# struct nav_estimate and struct nav_component
+ESTIMATE = np.dtype(
+    [("pose", "f8", 3), ("covariance", "f8", (3, 3)), ("confidence", "f8")]
+    + [(name, "i8") for name in ("evaluations", "distinct", "touched", "states", "bytes")]
+)
+COMPONENT = np.dtype([("pose", "f8", 3), ("sigma_m", "f8"), ("sigma_rad", "f8"), ("mass", "f8")])
+
+
+class SettingError(UserError, ValueError):
+    """A --set that names no setting or leaves its range; one line."""
+
+
+def filter_names() -> list[str]:
+    names = []
+    while (name := lib.nav_filter_name(len(names))) != ffi.NULL:
+        names.append(ffi.string(name).decode())
+    return names
+
+
+def default_filter() -> str:
+    return FAVOURITE if FAVOURITE in filter_names() else SPARE
+
+
+def settings_list() -> list[tuple[str, float, float, float]]:
+    """(name, default, lowest, highest) of every setting."""
+    name, numbers_ = ffi.new("const char **"), ffi.new("double[3]")
+    out = []
+    while lib.nav_settings_describe(len(out), name, numbers_, numbers_ + 1, numbers_ + 2) == 0:
+        out.append((ffi.string(name[0]).decode(), *numbers_))
+    return out
+
+
+@dataclass
+class Estimate:
+    """What a filter believes after one row."""
+
+    x_m: float
+    y_m: float
+    theta_rad: float
+    covariance: np.ndarray  # (3, 3): x, y in m, theta in rad
+    confidence: float
+    evaluations: int
+    states: int
+    bytes: int
+
+    @property
+    def pose(self) -> tuple[float, float, float]:
+        return self.x_m, self.y_m, self.theta_rad
+
+    def line(self, t_s: str) -> str:
+        """The row of est.csv."""
+        return f"{t_s},{self.x_m:.6f},{self.y_m:.6f},{self.theta_rad:.6f},{self.confidence:.6f}"
+
+
+def to_estimate(row: np.void) -> Estimate:
+    """One row of a table of ESTIMATE."""
+    pose = (float(value) for value in row["pose"])
+    counts = (int(row[name]) for name in ("evaluations", "states", "bytes"))
+    return Estimate(*pose, row["covariance"].copy(), float(row["confidence"]), *counts)
+
+
+class Filter:
+    """One filter on one scene. Rows are dicts of cells as the pilot makes them: None is an empty cell, nan not read."""
+
+    def __init__(
+        self,
+        name: str,
+        scene: Scene,
+        settings: dict[str, float] | None = None,
+        seed: int = 0,
+        bumps: np.ndarray | None = None,
+    ):
+        """`bumps`: (n,) of COMPONENT, to begin from in place of the scene's prior."""
+        if name not in filter_names():
+            raise SettingError(f"filter '{name}' is unknown; choose one of {', '.join(filter_names())}")
+        if not 0 <= seed <= SEED_MOST:
+            raise SettingError(f"--seed {seed}: outside 0 to 2^64 - 1; choose a number inside")
+        self.scene = scene
+        if bumps is not None and (fault := prior_fault(scene, bumps)):
+            raise SettingError(f"filter '{name}': {fault}; give what a filter listed")
+        problem, self._keep = problem_of(scene, settings or {}, bumps)
+        problem.seed = seed
+        made = lib.nav_filter_new(name.encode(), problem)
+        if made == ffi.NULL:
+            raise SettingError(f"filter '{name}' does not fit in memory; choose coarser cells with --set")
+        self._filter = ffi.gc(made, lib.nav_filter_free)
+        self._texture_keys = [[f"{w.name}_{t}" for t in scene.arena.textures] for w in scene.robot.of_role("texture")]
+        self._radial_keys = [f"{w.name}_mm" for w in scene.robot.of_role("object")]
+
+    def step(self, row: dict[str, float | None]) -> Estimate:
+        """Take one row of cells."""
+        texture = [[math.nan if row[k] is None else row[k] for k in keys] for keys in self._texture_keys]
+        radial = [math.inf if row[k] is None else row[k] / 1000.0 for k in self._radial_keys]
+        return self.step_values(row["t_s"], [row[k] for k in ODOMETRY], texture, radial)
+
+    def step_values(self, t_s: float, odometry, texture, radial_m) -> Estimate:
+        """Take one row of numbers: texture (tips, classes), nan not read; radial_m (rays), nan not read, inf no contact."""
+        rows = Observations(
+            np.array([t_s], np.float64),
+            [],
+            np.array([odometry], np.float64),
+            np.array(texture, np.float64).reshape(1, len(self._texture_keys), len(self.scene.arena.textures)),
+            np.array(radial_m, np.float64).reshape(1, -1),
+            None,
+        )
+        return to_estimate(self.replay(rows, 0, 1)[0][0])
+
+    def replay(self, rows: Observations, first: int, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """Rows first .. first + count - 1: estimates (count,) of ESTIMATE and the thread's CPU time (count,) in us."""
+        table, step_us = np.zeros(count, ESTIMATE), np.zeros(count)
+        packed = ffi.new(
+            "struct nav_rows *",
+            {
+                "t_s": doubles(rows.t_s),
+                "odometry": doubles(rows.odometry),
+                "texture": doubles(rows.texture),
+                "radial_m": doubles(rows.radial_m),
+                "texture_width": rows.texture[0].size if len(rows.t_s) else 0,
+                "radial_width": rows.radial_m.shape[1],
+            },
+        )
+        out = ffi.cast("struct nav_estimate *", table.ctypes.data)
+        lib.nav_replay(self._filter, packed, first, count, out, doubles(step_us))
+        return table, step_us
+
+    def components(self) -> np.ndarray:
+        """The belief after the last row as bumps, (n,) of COMPONENT."""
+        count = lib.nav_filter_components(self._filter, ffi.NULL, 0)
+        out = np.zeros(count, COMPONENT)
+        lib.nav_filter_components(self._filter, _components(out), count)
+        return out
+
+    def region(self, x_m: float, y_m: float) -> tuple[float, float]:
+        """Level of the highest-density region in (x, y) that holds this point, and the 90 % region's area in m^2."""
+        bumps, out = self.components(), ffi.new("struct nav_region *")
+        lib.nav_belief_region(_components(bumps), len(bumps), x_m, y_m, out)
+        return out.level, out.area_m2
+
+    def bins(self) -> np.ndarray:
+        """Belief mass in bins of 25 cm x 25 cm x 30 degrees, flat."""
+        bumps, size = _components(held := self.components()), self.scene.arena.size_m
+        out = np.zeros(lib.nav_belief_bins(bumps, 0, *size, ffi.NULL, 0))
+        lib.nav_belief_bins(bumps, len(held), *size, doubles(out), len(out))
+        return out
+
+    @property
+    def bad_cells(self) -> int:
+        return lib.nav_filter_bad_cells(self._filter)
+
+    @property
+    def bad_rows(self) -> int:
+        return lib.nav_filter_bad_rows(self._filter)
+
+
+def _components(array: np.ndarray):
+    return ffi.cast("struct nav_component *", array.ctypes.data)
+
+
+def prior_fault(scene: Scene, bumps: np.ndarray) -> str:
+    """Why these bumps, (n,) of COMPONENT, are no prior; empty: they are one."""
+    problem, keep = problem_of(scene, {}, bumps)
+    which = ffi.new("long *")
+    fault = lib.nav_prior_fault(ffi.addressof(problem.arena), ffi.addressof(problem.prior), which)
+    del keep  # until here
+    if fault == ffi.NULL:
+        return "" if len(bumps) else "no bumps"
+    return f"{f'bump {which[0]}: ' if which[0] >= 0 else ''}{ffi.string(fault).decode()}"
+
+
+def problem_of(scene: Scene, settings: dict[str, float], bumps: np.ndarray | None = None):
+    """The C problem and the arrays it points into."""
+    arena, robot = scene.arena, scene.robot
+    floor = np.array(arena.floor_indices(), dtype=np.uint8)
+    boxes = ffi.new("struct nav_box[]", [tuple(box) for box in arena.obstacles])
+    tips = ffi.new("struct nav_tip[]", [w.tip_m for w in robot.of_role("texture")])
+    rays = ffi.new("struct nav_ray[]", [(*w.base_m, w.yaw_rad, w.length_m) for w in robot.of_role("object")])
+    problem = ffi.new("struct nav_problem *")
+    problem.arena = {
+        "size_x": arena.size_m[0],
+        "size_y": arena.size_m[1],
+        "tile": arena.tile_m,
+        "columns": floor.shape[1],
+        "rows": floor.shape[0],
+        "floor": octets(floor),
+        "classes": len(arena.textures),
+        "boxes": len(boxes),
+        "box": boxes,
+    }
+    problem.robot = {
+        "body_radius": robot.body_radius_m,
+        "odometry_relative": robot.odometry_relative_sigma,
+        "radial_sigma": robot.radial_sigma_m,
+        "tips": len(tips),
+        "tip": tips,
+        "rays": len(rays),
+        "ray": rays,
+    }
+    prior = scene.prior or Prior("uniform")
+    problem.prior.uniform = prior.kind == "uniform" and bumps is None
+    if bumps is not None:
+        bumps = np.ascontiguousarray(bumps, COMPONENT)
+        problem.prior.bump, problem.prior.bumps = _components(bumps), len(bumps)
+    if prior.kind == "gaussian":
+        problem.prior.mean = dict(zip(("x", "y", "theta"), prior.mean, strict=True))
+        problem.prior.sigma = prior.sigma
+    lib.nav_settings_default(ffi.addressof(problem.settings))
+    for key, value in settings.items():
+        _set(problem, key, value)
+    return problem, (floor, boxes, tips, rays, bumps)
+
+
+def _set(problem, key: str, value: float) -> None:
+    known = {name: (low, high) for name, _, low, high in settings_list()}
+    if key not in known:
+        raise SettingError(f"--set {key}: no such setting; the names are {', '.join(known)}")
+    if lib.nav_settings_set(ffi.addressof(problem.settings), key.encode(), value) != 0:
+        low, high = known[key]
+        raise SettingError(f"--set {key}={value:g}: outside {low:g} to {high:g}; choose a value inside")

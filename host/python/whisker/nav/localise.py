@@ -1,0 +1,126 @@
+"""Localisation: a filter over all rows of a scene, with its errors and costs where the truth is known."""
+
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from ..scene import Scene
+from ..tables import unwritable
+from .filters import ESTIMATE, Estimate, Filter, SettingError, default_filter, filter_names, settings_list, to_estimate
+from .observations import ODOMETRY, TRUTH, Observations, observations_path, read_observations
+from .scoring import pose_errors
+
+__all__ = [
+    "ODOMETRY",
+    "TRUTH",
+    "Estimate",
+    "Filter",
+    "Observations",
+    "SettingError",
+    "default_filter",
+    "filter_names",
+    "judged_rows",
+    "observations_path",
+    "pose_errors",
+    "read_observations",
+    "run",
+    "settings_list",
+    "summary",
+    "write_estimates",
+]
+
+ESTIMATE_HEADER = "t_s,x_m,y_m,theta_rad,confidence"
+REGION_ROWS = 200  # coverage is judged on at most so many rows, evenly spread: a region costs more than a step
+
+
+@dataclass
+class Run:
+    """One filter's answers over all rows."""
+
+    name: str
+    setup_s: float
+    step_us: np.ndarray  # (n,) CPU time of the thread
+    table: np.ndarray  # (n,) of ESTIMATE
+    bad_cells: int
+    bad_rows: int
+    levels: np.ndarray = field(default_factory=lambda: np.zeros(0))  # of the truth's region, at the judged rows
+    areas_m2: np.ndarray = field(default_factory=lambda: np.zeros(0))  # of the 90 % regions there
+
+    @property
+    def poses(self) -> np.ndarray:
+        """(n, 3)"""
+        return self.table["pose"]
+
+    @property
+    def estimates(self) -> list[Estimate]:
+        return [to_estimate(row) for row in self.table]
+
+
+def run(
+    name: str,
+    scene: Scene,
+    observations: Observations,
+    settings: dict[str, float] | None = None,
+    seed: int = 0,
+    regions: int = 0,
+) -> Run:
+    """Run a filter over every row; judge its region against the truth at most at `regions` rows, evenly spread."""
+    began = time.perf_counter()
+    made = Filter(name, scene, settings, seed)
+    setup_s = time.perf_counter() - began
+    first, parts, judged = 0, [], []
+    for row in judged_rows(observations, regions):
+        parts.append(made.replay(observations, first, row + 1 - first))
+        judged.append(made.region(*observations.truth[row, :2]))
+        first = row + 1
+    parts.append(made.replay(observations, first, len(observations) - first))
+    table, step_us = (np.concatenate(column) for column in zip(*parts, strict=True))
+    levels, areas = np.array(judged).reshape(-1, 2).T
+    return Run(name, setup_s, step_us, table, made.bad_cells, made.bad_rows, levels, areas)
+
+
+def judged_rows(observations: Observations, most: int) -> list[int]:
+    """At most so many rows whose truth is known, evenly spread, the first and the last among them."""
+    if observations.truth is None or most <= 0:
+        return []
+    known = np.nonzero(np.isfinite(observations.truth).all(axis=1))[0]
+    return known[np.unique(np.linspace(0, len(known) - 1, min(most, len(known))).astype(int))].tolist()
+
+
+def summary(result: Run, truth: np.ndarray | None) -> dict:
+    """The object `whisker localise --json` prints."""
+    us, table = result.step_us, result.table
+    if not len(us):
+        us, table = np.zeros(1), np.zeros(1, ESTIMATE)
+    out = {
+        "filter": result.name,
+        "steps": len(result.table),
+        "setup_s": round(result.setup_s, 6),
+        "step_us_mean": round(float(us.mean()), 3),
+        "step_us_median": round(float(np.median(us)), 3),
+        "step_us_p99": round(float(np.quantile(us, 0.99)), 3),
+        "step_us_p999": round(float(np.quantile(us, 0.999)), 3),
+        "evaluations_per_step": float(table["evaluations"].mean()),
+        "distinct_per_step": float(table["distinct"].mean()),
+        "touched_max": int(table["touched"].max()),
+        "peak_states": int(table["states"].max()),
+        "peak_bytes": int(table["bytes"].max()),
+        "bad_cells": result.bad_cells,
+        "bad_rows": result.bad_rows,
+    }
+    if truth is not None and np.isfinite(truth).all(axis=1).any():
+        out |= pose_errors(result.poses, truth)
+    if len(result.levels):
+        out |= {"coverage_90": float(np.mean(result.levels <= 0.9)), "region_90_m2": float(np.median(result.areas_m2))}
+    return out
+
+
+def write_estimates(path, result: Run, observations: Observations) -> None:
+    """est.csv: one row per input row, in the same order."""
+    lines = [e.line(t_s) for t_s, e in zip(observations.t_text, result.estimates, strict=True)]
+    try:
+        Path(path).write_text("\n".join([ESTIMATE_HEADER, *lines]) + "\n")
+    except OSError as error:
+        raise unwritable(path, error) from error

@@ -1,0 +1,219 @@
+"""The netbook's part: samples and odometry in, wheel speeds and observation rows out. Knows no device and no world.
+
+The row of every 0.1 s is one of four kinds:
+    exploring         odometry, texture of the last 200 samples while the tips sweep at the trained speed, radial cells
+                      empty (read, no contact) or nan (touching: no measured distance)
+    body whisk        zero odometry, texture empty, radial cells nan
+    release in it     odometry since the last row that carried any, and the distance of each whisker measured
+    first after it    odometry since the release
+"""
+
+import math
+from collections import deque
+
+import numpy as np
+
+from ..touch.contact import Contact
+from ..touch.floor import WINDOW_LEAST_GOOD, WINDOW_SAMPLES, floor_whisker
+from ..touch.mount import Mount, retreat
+from ..touch.radial.model import Contact as Recorded
+from ..touch.radial.model import WhiskModel, estimate, peak
+from .behaviour import BLOCK_TICKS, EXPLORE_M_S, TICK_S, TURN_RAD_S, Behaviour, Habits, Whisk
+from .states import FULL
+from .tip import contact_type, move_for_tip
+from .wheels import EXACT, NO_BUMPS, Bumps, Wheels
+
+SETTLE_TICKS = 100  # the wheels' last change of speed must be this much older than a texture window
+CATCH_WINDOWS = 8  # in a row without evidence, wheels driving and samples good: an edge crossed in passing holds the tip for half of it
+
+
+class Pilot:
+    """One robot's decisions. The same seed, samples and odometry always give the same drives and rows."""
+
+    def __init__(
+        self,
+        robot,
+        texture_models: dict,
+        radial_models: dict,
+        seed: int,
+        wheels: Wheels = EXACT,
+        habits: Habits = FULL,
+    ):
+        """`robot.whiskers` in lane order; models by whisker name, radial ones of any kind, calibrated at the rate of whisking
+        of `wheels`; `seed` of the random turns."""
+        self.names = {lane: whisker.name for lane, whisker in enumerate(robot.whiskers)}
+        self.texture_lanes = [n for n, w in enumerate(robot.whiskers) if w.role == "texture"]
+        self.floor_sides = {lane: math.copysign(1.0, robot.whiskers[lane].tip_m[1]) for lane in self.texture_lanes}
+        self.object_lanes = [n for n, w in enumerate(robot.whiskers) if w.role == "object"]
+        self.radial_models = radial_models
+        self.contacts = {lane: Contact() for lane in self.object_lanes}
+        self.mounts = {lane: Mount.of(robot.whiskers[lane]) for lane in self.object_lanes}
+        first_turn = {lane: mount.corner_turn for lane, mount in self.mounts.items()}
+        sides = {lane: -mount.face_turn for lane, mount in self.mounts.items()}
+        rng = np.random.default_rng(seed)
+        self.behaviour = Behaviour(self.contacts, first_turn, rng, sides, wheels, habits)
+        self.floor = {
+            lane: floor_whisker(texture_models[self.names[lane]], np.random.default_rng([seed, lane]))
+            for lane in self.texture_lanes
+        }
+        self.bad_samples = 0
+        self.whisks: list[dict] = []  # every whisk that was pushed to its end: see `_measure`
+        self._recent = deque(maxlen=WINDOW_SAMPLES // BLOCK_TICKS)  # of the last 0.1 s: (samples, good) of all lanes
+        # Ticks and samples of the whisker that began the whisk: while backing off, from then on.
+        self._retreat_samples: list[tuple[np.ndarray, np.ndarray]] = []
+        self._whisk_samples: list[tuple[np.ndarray, np.ndarray]] = []
+        self._whisk: Whisk | None = None  # whose they are
+        self._silent = dict.fromkeys(self.texture_lanes, 0)  # windows in a row without evidence
+        self._measured: dict[int, tuple[int, float]] = {}  # lane: release tick, mm
+        self._pending = np.zeros(3)  # motion not yet in a row, in the frame of the last row that carried any
+        self._was_whisking = False
+
+    def block(self, first_tick: int, alpha, beta, status) -> tuple[float, float]:
+        """Decide on the 40 ticks from `first_tick`: arrays (40, lanes) of counts and status -> v in m/s, omega in rad/s."""
+        samples = np.stack([alpha, beta], axis=-1).astype(np.float64)[:, : len(self.names)]
+        good = np.asarray(status)[:, : len(self.names)] == 0
+        ticks = np.arange(first_tick, first_tick + len(good))
+        self.bad_samples += int(good.size - np.count_nonzero(good))
+        self._recent.append((samples, good))
+        for lane, contact in self.contacts.items():
+            contact.block(ticks, samples[:, lane], good[:, lane])
+        if any(self.behaviour.drive):
+            for lane, whisker in self.floor.items():
+                whisker.follow(samples[good[:, lane], lane])
+        self._follow_whisk(ticks, samples, good)
+        return self.behaviour.decide(int(ticks[-1]))
+
+    def odometry(
+        self, tick: int, dx: float, dy: float, dtheta: float, bumps: Bumps = NO_BUMPS
+    ) -> dict[str, float | None]:
+        """The observation row of the 0.1 s that end at `tick`; motion in the robot frame at their start.
+
+        Cells: None is an empty cell (not read for a texture, no contact for a distance), nan is a distance not read.
+        """
+        self.behaviour.moved(tick, dx, dy, dtheta, bumps)
+        self._pending = compose(self._pending, (dx, dy, dtheta))
+        whisking = self.behaviour.whisking
+        released = {n: m for n, m in self._measured.items() if m[0] <= tick}
+        held_back = whisking and not released
+        moved = np.zeros(3) if held_back else self._pending
+        if not held_back:
+            self._pending = np.zeros(3)
+        row = {"t_s": round((tick + 1) * TICK_S, 4)}
+        row |= dict(zip(("odo_x_m", "odo_y_m", "odo_theta_rad"), map(float, moved), strict=True))
+        for lane in self.texture_lanes:
+            row |= self._texture_cells(lane, tick, held_back=whisking or self._was_whisking)
+        for lane in self.object_lanes:
+            row[f"{self.names[lane]}_mm"] = self._radial_cell(lane, released, whisking)
+        for lane in released:
+            del self._measured[lane]
+        self._was_whisking = whisking
+        return row
+
+    def _follow_whisk(self, ticks, samples, good) -> None:
+        """Gather the whisk's samples; once a whisker that was pushed long enough lets go, its distance is known."""
+        whisk = self.behaviour.whisk
+        if whisk is not self._whisk:
+            self._whisk = whisk
+            self._whisk_samples.clear()
+            self._retreat_samples.clear()
+        if whisk is None:
+            return
+        use = good[:, whisk.lane]
+        kept = self._retreat_samples if whisk.start < 0 else self._whisk_samples
+        kept.append((ticks[use], samples[use, whisk.lane]))
+        if whisk.start < 0:
+            return
+        contact = self.contacts[whisk.lane]
+        pushed = whisk.start < contact.onset <= whisk.push_end - self.behaviour.wheels.push_ticks
+        if pushed and contact.release > contact.onset and not whisk.measured:
+            whisk.measured = True
+            self._measure(whisk)
+
+    def _measure(self, whisk: Whisk) -> None:
+        """Tell the distance and what kind of contact it was; after one of the shaft, how the tip gets there.
+
+        Of a whisk: whisker, onset and release (ticks), turn, peak_counts, line_mm (the model's own answer), sigma_mm,
+        distance_mm and type ("tip" or "shaft"; None: unsure), tries (whisks before it at the same object), surface (of a
+        tip with a model of whole whisks: `Mount.surface`).
+        """
+        lane, turn = whisk.lane, whisk.direction
+        contact, mount, model = self.contacts[lane], self.mounts[lane], self.radial_models[self.names[lane]]
+        ticks, samples = joined(self._whisk_samples)
+        push = (ticks >= contact.onset) & (ticks < contact.onset + self.behaviour.wheels.push_ticks)
+        counts = peak(samples[push], contact.rest)
+        recorded = Recorded(ticks * TICK_S, samples, np.full(len(ticks), self.behaviour.wheels.whisk_rad_s))
+        told = estimate(model, recorded, counts)
+        surface = None
+        if isinstance(model, WhiskModel):
+            per_metre = self._per_metre(whisk, model, contact.rest)
+            shape = model.shape_of(recorded)
+            distance = mount.whisked(model, shape, turn, per_metre)
+            surface = mount.surface(
+                model, mount.corner_turn * per_metre, mount.corner_turn * model.share_of(shape) * turn
+            )
+        else:
+            distance = mount.distance(told.radius_mm, turn)
+        kind = contact_type(mount, distance)
+        if distance is not None:
+            self._measured[lane] = (contact.release, distance)
+        if kind == "shaft" and (move := move_for_tip(mount, distance)):
+            self.behaviour.aim(move)
+        made = {"whisker": self.names[lane], "onset": contact.onset, "release": contact.release, "turn": turn}
+        made |= {"peak_counts": counts, "line_mm": told.radius_mm, "sigma_mm": told.sigma_mm, "distance_mm": distance}
+        self.whisks.append(made | {"type": kind, "tries": whisk.tries, "surface": surface if kind == "tip" else None})
+
+    def _per_metre(self, whisk: Whisk, model: WhiskModel, rest: np.ndarray) -> float:
+        """Tilt per metre as the robot backed off, rad; nan when that is not known, as when it retreated for the tip."""
+        if whisk.tries:
+            return math.nan
+        wheels = self.behaviour.wheels
+        ticks, samples = joined(self._retreat_samples)
+        since = ticks - ticks[:1] - (wheels.effect_ticks - 1)  # the first block answers the decision
+        gone = since >= 0
+        tilt = model.along(samples[gone] - rest) / model.counts_per_rad(wheels.whisk_rad_s)
+        return retreat(since[gone] * TICK_S * wheels.back_off_m_s, tilt)
+
+    def _texture_cells(self, lane: int, tick: int, held_back: bool) -> dict[str, float | None]:
+        whisker = self.floor[lane]
+        cells = {f"{self.names[lane]}_{name}": None for name in whisker.model.classes}
+        if held_back or not self._sweeping(tick):
+            whisker.pause()
+            self._silent[lane] = 0
+            return cells
+        window = np.concatenate([np.where(good[:, lane, None], s[:, lane], np.nan) for s, good in self._recent])
+        loglik = whisker.look(window)
+        self._notice_catch(lane, window, loglik)
+        return cells if loglik is None else dict(zip(cells, map(float, loglik), strict=True))
+
+    def _notice_catch(self, lane: int, window: np.ndarray, loglik: np.ndarray | None) -> None:
+        """A catch leaves good samples without evidence, window after window."""
+        told = loglik is not None or np.count_nonzero(np.isfinite(window).all(axis=1)) < WINDOW_LEAST_GOOD
+        self._silent[lane] = 0 if told else self._silent[lane] + 1
+        if self._silent[lane] >= CATCH_WINDOWS:
+            self._silent[lane] = 0
+            self.behaviour.catch(self.floor_sides[lane])
+
+    def _sweeping(self, tick: int) -> bool:
+        """Whether the tips moved over the floor at the speed they were trained at during the whole window."""
+        v, omega = self.behaviour.drive
+        steady = self.behaviour.drive_since + SETTLE_TICKS <= tick + 1 - WINDOW_SAMPLES
+        return steady and (v == EXPLORE_M_S or abs(omega) == TURN_RAD_S)
+
+    def _radial_cell(self, lane: int, released: dict, whisking: bool) -> float | None:
+        if lane in released:
+            return released[lane][1]
+        if self.contacts[lane].touching or not self.contacts[lane].settled or (whisking and not released):
+            return math.nan
+        return None
+
+
+def joined(blocks: list[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
+    """Ticks (n,) and samples (n, 2) of blocks in order."""
+    ticks, samples = zip(*blocks, strict=True)
+    return np.concatenate(ticks), np.concatenate(samples)
+
+
+def compose(first, then) -> np.ndarray:
+    """Motion `first` followed by `then` (each x, y in m and theta in rad, in the frame at its own start)."""
+    c, s = math.cos(first[2]), math.sin(first[2])
+    return np.array([first[0] + c * then[0] - s * then[1], first[1] + s * then[0] + c * then[1], first[2] + then[2]])

@@ -1,0 +1,108 @@
+"""A navigator's memory beyond its own death: what it writes down, and what a new one may believe of it.
+
+The row that the new one begins with decides. From the same pilot the summed motion tells what the robot did meanwhile,
+as for any rows that were missed. Another pilot counts from its own start: for the time that nobody counted, each bump
+grows by what the robot could have done in it (`widen`). Of the rest of what a filter learns (odometry's gains, trust
+in whiskers) nothing is kept.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+from ..nav import filters
+from ..nav.filters import COMPONENT
+from ..pilot.states import EXPLORE_M_S, TURN_RAD_S
+from ..scene import Scene
+from . import checkpoint
+from .checkpoint import Checkpoint, CheckpointError
+from .link import Received
+from .rows import ROW_NS, Place, Step
+
+AGE_MOST_S = 60.0  # what a uniform belief takes to find the place anyway
+FINEST = 1e-3  # m and rad: nobody knows a pose better
+
+
+class Memory:
+    """`recall` once, with the first row; `keep` as often as it is worth it. path None: nothing is kept."""
+
+    def __init__(self, path: Path | None, scene: Scene, names: tuple[str, ...]):
+        self._path, self._scene, self._names = path, scene, names
+        self._identity = checkpoint.identity(scene)
+        self._checked = path is None
+        self.note = ""  # why there is nothing to go on from, or why nothing could be kept; one line
+
+    def recall(self, first: Received) -> tuple[Place, dict[str, np.ndarray]] | None:
+        """The row to go on from, and bumps by filter; None: as if there had been no other navigator."""
+        if self._checked:
+            return None
+        self._checked = True
+        try:
+            told = checkpoint.load(self._path)
+            if told is None:
+                return None
+            self._check(told)
+            unknown_s = _unknown_s(told, first)
+        except CheckpointError as error:
+            self.note = f"{self._path}: not used: {error}; it is written anew"
+            return None
+        beliefs = {name: widen(told.beliefs[name], unknown_s) for name in self._names}
+        return Place(told.stream, told.seq, told.pose), beliefs
+
+    def keep(self, step: Step, beliefs: dict[str, np.ndarray]) -> None:
+        """Write down what is believed after a row: (n,) of COMPONENT by filter. What cannot be written is noted."""
+        if self._path is None:
+            return
+        row, sent = step.row, step.envelope
+        inside = {name: self._inside(bumps) for name, bumps in beliefs.items()}
+        if not all(len(bumps) for bumps in inside.values()):
+            return
+        stamp = row.header.stamp.ns
+        told = Checkpoint(self._identity, sent.stream, row.seq, row.pose, stamp, sent.sent_ns, inside)
+        try:
+            checkpoint.save(self._path, told)
+        except OSError as error:
+            self.note = f"{self._path}: cannot be written ({error.strerror}); a navigator begun anew will know nothing"
+
+    def _inside(self, bumps: np.ndarray) -> np.ndarray:
+        """Those within the arena, of widths that can be: all that a filter begins from."""
+        x, y = bumps["pose"][:, 0], bumps["pose"][:, 1]
+        size_x, size_y = self._scene.arena.size_m
+        kept = bumps[(x >= 0.0) & (x <= size_x) & (y >= 0.0) & (y <= size_y) & (bumps["mass"] > 0.0)]
+        for name in ("sigma_m", "sigma_rad"):
+            kept[name] = np.maximum(kept[name], FINEST)
+        return kept
+
+    def _check(self, told: Checkpoint) -> None:
+        if told.scene != self._identity:
+            raise CheckpointError("field scene: of another arena or robot")
+        for name in self._names:
+            if name not in told.beliefs:
+                raise CheckpointError(f"field filters: nothing of {name}")
+            if fault := filters.prior_fault(self._scene, told.beliefs[name]):
+                raise CheckpointError(f"{name}: {fault}")
+
+
+def _unknown_s(told: Checkpoint, first: Received) -> float:
+    """For how long nobody counted the motion. CheckpointError when the checkpoint is too old, or from the future."""
+    row, sent = first.message, first.envelope
+    same = sent.stream == told.stream
+    age_ns = max(row.header.stamp.ns - told.stamp_ns, sent.sent_ns - told.sent_ns)
+    if not same and row.header.stamp.ns < told.stamp_ns:
+        raise CheckpointError("of an earlier run: pilot and bridge have begun anew since")
+    if sent.sent_ns < told.sent_ns or (same and row.seq <= told.seq):
+        raise CheckpointError("of a later row than the first")
+    if age_ns > AGE_MOST_S * 1e9:
+        raise CheckpointError(f"{age_ns / 1e9:.0f} s old, {AGE_MOST_S:.0f} s are the most")
+    return 0.0 if same else max(0.0, (age_ns - (row.seq + 1) * ROW_NS) / 1e9)
+
+
+def widen(bumps: np.ndarray, unknown_s: float) -> np.ndarray:
+    """Bumps after a time in which the robot did what nobody knows, at no more than the pilot's speeds.
+
+    Even over a disc of radius v t (variance (v t)^2 / 4 on each axis) and over w t to either side ((w t)^2 / 3).
+    """
+    out = np.array(bumps, COMPONENT)
+    out["sigma_m"] = np.hypot(out["sigma_m"], EXPLORE_M_S * unknown_s / 2.0)
+    out["sigma_rad"] = np.hypot(out["sigma_rad"], min(TURN_RAD_S * unknown_s, np.pi) / np.sqrt(3.0))
+    return out

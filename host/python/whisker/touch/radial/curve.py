@@ -1,0 +1,104 @@
+"""Peak to radius by a parabola or a rational function: the paper's line bends when the plug is no match for the whisker."""
+
+import numpy as np
+
+from .whisk import TIP_MM
+
+
+def tip_from(high_mm: float, sigma_mm: float) -> float:
+    """Radius from which a contact is the tip: near the outermost fitted one, by one sigma, at least TIP_MM."""
+    return high_mm - max(sigma_mm, TIP_MM)
+
+
+GAUSS_NEWTON_STEPS = 12
+LEAST_BELOW = 0.05  # of the rational curve's denominator: no pole among the contacts
+
+
+def _left(numbers: np.ndarray, f: np.ndarray, radii: np.ndarray) -> float:
+    """Sum of squares that a rational curve leaves; infinite with a pole."""
+    below = 1.0 + numbers[2] * f
+    if below.min() < LEAST_BELOW:
+        return float("inf")
+    return float(np.sum((radii - (numbers[0] + numbers[1] * f) / below) ** 2))
+
+
+class CurveModel:
+    """r = (c0 + c1 f + c2 f^2)/(1 + d f), f = peak/scale: `quadratic` has d = 0, `rational` c2 = 0.
+
+    The rational one is exact for a conical whisker in a plug of any stiffness (whisker_physics section 4).
+    """
+
+    KINDS = ("quadratic", "rational")
+    node: int | None = None  # whose whisker it is, where known
+    NUMBERS = ("c0", "c1", "c2", "d", "scale", "sigma_mm", "low_mm", "high_mm")
+
+    def __init__(self, content: dict):
+        """`content`: "kind" and NUMBERS by name."""
+        if content["kind"] not in self.KINDS:
+            raise ValueError(f"kind is '{content['kind']}'")
+        self.kind = content["kind"]
+        values = [float(content[name]) for name in self.NUMBERS]
+        if not np.isfinite(values).all() or values[4] <= 0:
+            raise ValueError("a number is not finite, or scale not above 0")
+        self.c0, self.c1, self.c2, self.d, self.scale, self.sigma_mm, self.low_mm, self.high_mm = values
+
+    @property
+    def content(self) -> dict:
+        """What makes the same model again."""
+        return {"kind": self.kind} | {name: getattr(self, name) for name in self.NUMBERS}
+
+    @classmethod
+    def fit(cls, kind: str, peak_counts, radius_mm) -> "CurveModel":
+        """Least squares; sigma_mm is what is left of contacts left out. ValueError when they do not determine it."""
+        peaks, radii = (np.asarray(v, np.float64) for v in (peak_counts, radius_mm))
+        use = np.isfinite(peaks) & np.isfinite(radii)
+        peaks, radii = peaks[use], radii[use]
+        if len(peaks) < 5 or len(np.unique(peaks)) < 4:
+            raise ValueError(
+                f"radial fit: {kind} needs at least 5 usable contacts of different peaks; record contacts at more radii"
+            )
+        scale = float(np.abs(peaks).max())
+        numbers = cls._solve(kind, peaks / scale, radii)
+        model = cls(
+            {"kind": kind, "scale": scale, "low_mm": radii.min(), "high_mm": radii.max(), "sigma_mm": 0.0} | numbers
+        )
+        left = []
+        for n in range(len(peaks)):
+            others = np.arange(len(peaks)) != n
+            without = cls(model.content | cls._solve(kind, peaks[others] / scale, radii[others]))
+            left.append(without.predict(peaks[n])[0] - radii[n])
+        model.sigma_mm = float(np.sqrt(np.mean(np.square(left))))
+        return model
+
+    @staticmethod
+    def _solve(kind: str, f: np.ndarray, radii: np.ndarray) -> dict:
+        """Least squares of the radii; the rational curve by Gauss-Newton from the line, each step halved until it helps."""
+        if kind == "quadratic":
+            c0, c1, c2 = np.linalg.lstsq(np.column_stack([np.ones(len(f)), f, f**2]), radii, rcond=None)[0]
+            return {"c0": c0, "c1": c1, "c2": c2, "d": 0.0}
+        now = np.append(np.linalg.lstsq(np.column_stack([np.ones(len(f)), f]), radii, rcond=None)[0], 0.0)
+        for _ in range(GAUSS_NEWTON_STEPS):
+            below = 1.0 + now[2] * f
+            top = now[0] + now[1] * f
+            slopes = np.column_stack([1.0 / below, f / below, -top * f / below**2])
+            step = np.linalg.lstsq(slopes, radii - top / below, rcond=None)[0]
+            for _ in range(GAUSS_NEWTON_STEPS):
+                if _left(now + step, f, radii) < _left(now, f, radii):
+                    now = now + step
+                    break
+                step = step / 2.0
+        return {"c0": now[0], "c1": now[1], "c2": 0.0, "d": now[2]}
+
+    def predict(self, peak_counts: float) -> tuple[float, float]:
+        """(radius mm, sigma mm) of one contact; the radius is held where the curve is known, and 10 % beyond."""
+        f = peak_counts / self.scale
+        below = 1.0 + self.d * f
+        if not np.isfinite(f) or below <= 0.0:
+            return (self.high_mm if np.isfinite(f) else float("nan")), self.high_mm - self.low_mm
+        slack = 0.1 * self.high_mm
+        mm = (self.c0 + self.c1 * f + self.c2 * f * f) / below
+        return float(np.clip(mm, self.low_mm - slack, self.high_mm + slack)), self.sigma_mm
+
+    def contact_type(self, radius_mm: float) -> str:
+        """As RadialModel.contact_type."""
+        return "tip" if radius_mm > tip_from(self.high_mm, self.sigma_mm) else "shaft"

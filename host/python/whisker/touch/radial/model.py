@@ -1,0 +1,254 @@
+"""Radial distance of a contact: the paper's peak and line per whisker (equations 2 and 3), curves instead of the line,
+and the model of whole whisks; calibration recordings and model files."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from ...native import doubles, ffi, lib
+from ...tables import TableError, numbers, read_columns
+from .curve import CurveModel, tip_from
+from .whisk import TIP_MM, Contact, WhiskModel, shape_of
+
+FORMAT = "whisker radial model 1"
+FIELDS = ("a1", "a0", "sigma_mm", "low_mm", "high_mm")
+REST_SHARE = 0.05  # the first samples of a recorded whisk, before it touches, give its rest
+REST_LEAST = 3  # samples: slow recordings have few before the touch
+WHISK_FORMAT, CURVE_FORMAT = "whisker radial whisk model 1", "whisker radial curve model 1"
+RATE_COLUMNS = ("whisk_rad_s", "base_rad_s")  # commanded; as the base reports
+NODE_COLUMN = "node"  # serial number of the node whose whisker it is
+NO_CHANNEL = ("contact", "radius_mm", "t_s", NODE_COLUMN, *RATE_COLUMNS)
+MODELS = ("paper", "linear", "quadratic", "rational", "default")
+
+
+class Estimate(NamedTuple):
+    """What a model says of one contact: mm, standard deviation, "tip" or "shaft", confidence 0..1. Never nan."""
+
+    radius_mm: float
+    sigma_mm: float
+    type: str
+    confidence: float
+
+
+def peak(samples: np.ndarray, rest) -> float:
+    """Equation 2: largest deflection about `rest` over a contact, counts. samples (n, axes); nan when none is finite."""
+    samples = np.ascontiguousarray(samples, dtype=np.float64)
+    rest = np.ascontiguousarray(np.broadcast_to(np.asarray(rest, dtype=np.float64), samples.shape[1:]))
+    return lib.nav_radial_peak(doubles(samples), len(samples), samples.shape[1], doubles(rest))
+
+
+class RadialModel:
+    """r = a1 f1 + a0 (equation 3), its standard error, and the radii it was fitted on."""
+
+    node: int | None = None  # whose whisker it is, where known
+
+    def __init__(self, a1: float, a0: float, sigma_mm: float, low_mm: float, high_mm: float):
+        self._line = ffi.new("struct nav_radial *", dict(zip(FIELDS, (a1, a0, sigma_mm, low_mm, high_mm), strict=True)))
+
+    def __getattr__(self, name: str) -> float:
+        if name in FIELDS:
+            return getattr(self._line, name)
+        raise AttributeError(name)
+
+    @classmethod
+    def fit(cls, peak_counts, radius_mm) -> "RadialModel":
+        """Least squares over contacts; ValueError when fewer than three are usable or all peaks are equal."""
+        peaks = np.ascontiguousarray(peak_counts, dtype=np.float64)
+        radii = np.ascontiguousarray(radius_mm, dtype=np.float64)
+        if peaks.shape != radii.shape or peaks.ndim != 1:
+            raise ValueError(f"radial fit: {peaks.shape} peaks but {radii.shape} radii; give one radius per contact")
+        model = cls(0.0, 0.0, 0.0, 0.0, 0.0)
+        if lib.nav_radial_fit(model._line, doubles(peaks), doubles(radii), len(peaks)) < 0:
+            raise ValueError(
+                "radial fit: fewer than 3 usable contacts, or all peaks equal; record contacts at more radii"
+            )
+        return model
+
+    peak = staticmethod(peak)
+
+    def predict(self, peak_counts: float) -> tuple[float, float]:
+        """(radius mm, sigma mm) of one contact."""
+        return lib.nav_radial_predict(self._line, peak_counts), self._line.sigma_mm
+
+    def contact_type(self, radius_mm: float) -> str:
+        """'tip' near the outermost fitted radius (one sigma, at least TIP_MM) or beyond it, else 'shaft'."""
+        return "tip" if radius_mm > tip_from(self.high_mm, self.sigma_mm) else "shaft"
+
+    @property
+    def content(self) -> dict:
+        """What makes the same model again."""
+        return {name: getattr(self, name) for name in FIELDS}
+
+    @classmethod
+    def of(cls, content: dict) -> "RadialModel":
+        """From what `content` gave."""
+        if content["format"] != FORMAT:
+            raise ValueError(f"format is '{content['format']}'")
+        values = [float(content[name]) for name in FIELDS]
+        if not np.isfinite(values).all():
+            raise ValueError("a number is not finite")
+        return cls(*values)
+
+    def save(self, path) -> None:
+        """As JSON, for `load`."""
+        save(self, path)
+
+    @classmethod
+    def load(cls, path) -> "RadialModel":
+        """Read what `save` wrote; TableError with one line when it is something else."""
+        model = load(path)
+        if not isinstance(model, cls):
+            raise not_a_model(path, ValueError(f"it is a {type(model).__name__}, not equation 3's line"))
+        return model
+
+
+@dataclass
+class Whisks:
+    """Recorded contacts of one whisker, in order of appearance."""
+
+    contact: list[str]
+    recorded: list[Contact]
+    peak_counts: np.ndarray
+    radius_mm: np.ndarray | None  # None when the file has no such column
+    bad_rows: int  # rows with a cell that is no finite number: left out
+    node: int | None = None  # serial number of the node whose whisker it is, where the file tells
+
+    @property
+    def axes(self) -> int:
+        return self.recorded[0].samples.shape[1] if self.recorded else 0
+
+
+def read_whisks(path, with_radius: bool) -> Whisks:
+    """Contacts of a calibration CSV; `with_radius`: the column radius_mm is required, else not even read."""
+    text = read_columns(path, ["contact", "t_s"] + (["radius_mm"] if with_radius else []))
+    channels = [name for name in text if name not in NO_CHANNEL]
+    if not channels:
+        raise TableError(path, 1, "no channel column; add at least one, as in 'contact,radius_mm,t_s,x,y'")
+    samples = np.column_stack([numbers(text[name]) for name in channels])
+    t_s = numbers(text["t_s"])
+    rates = [_rate(text, name) for name in RATE_COLUMNS]
+    names = list(dict.fromkeys(text["contact"]))
+    ids = np.array(text["contact"])
+    rows = [np.flatnonzero(ids == name) for name in names]
+    recorded = [Contact(t_s[r], samples[r], *(None if rate is None else rate[r] for rate in rates)) for r in rows]
+    peaks = np.array([_peak_of(samples[r]) for r in rows])
+    radius = numbers(text["radius_mm"]) if with_radius else None
+    radii = None if radius is None else np.array([np.median(radius[r]) for r in rows])
+    bad = int((~np.isfinite(samples)).any(axis=1).sum())
+    return Whisks(names, recorded, peaks, radii, bad, _node(path, text.get(NODE_COLUMN, [])))
+
+
+def _node(path, cells: list[str]) -> int | None:
+    """The one serial number in a column; empty cells do not count."""
+    found = sorted({cell for cell in cells if cell != ""})
+    if len(found) > 1:
+        raise TableError(
+            path, None, f"contacts of nodes {found[0]} and {found[1]}; give each whisker a file of its own"
+        )
+    if found and not (found[0].isascii() and found[0].isdecimal()):
+        raise TableError(path, None, f"node '{found[0]}' is no serial number")
+    return int(found[0]) if found else None
+
+
+def _rate(text: dict[str, list[str]], name: str) -> np.ndarray | None:
+    """A column of rates; None where there is none or nothing in it."""
+    rate = numbers(text[name]) if name in text else np.zeros(0)
+    return rate if np.any(np.isfinite(rate) & (rate != 0.0)) else None
+
+
+def _peak_of(samples: np.ndarray) -> float:
+    finite = samples[np.isfinite(samples).all(axis=1)]
+    if len(finite) == 0:
+        return float("nan")
+    return peak(finite, np.median(finite[: max(REST_LEAST, int(REST_SHARE * len(finite)))], axis=0))
+
+
+class Fitted(NamedTuple):
+    """A model, and the standard error of its calibration, mm: of the paper's line its regression's, of others what is
+    left when each contact is predicted by a model that was fitted without it."""
+
+    model: "RadialModel | CurveModel | WhiskModel"
+    error_mm: float
+
+
+def fit(whisks: Whisks, name: str = "default") -> Fitted:
+    """A model of the contacts by its name (MODELS); ValueError when they do not determine one.
+
+    `default` is the model of whole whisks, or, where recordings are no whole whisks, the line or curve that predicts
+    left-out contacts best. The model belongs to the whisks' node.
+    """
+    fitted = _fit(whisks, name)
+    if len(set(whisks.radius_mm.tolist())) == 1:
+        at = f"radial fit: every contact is at {whisks.radius_mm[0]:g} mm"
+        raise ValueError(f"{at}, and one radius gives no error estimate; record contacts at more radii")
+    fitted.model.node = whisks.node
+    return fitted
+
+
+def _fit(whisks: Whisks, name: str) -> Fitted:
+    if name in ("paper", "linear"):
+        model = RadialModel.fit(whisks.peak_counts, whisks.radius_mm)
+        return Fitted(model, model.sigma_mm)
+    if name in CurveModel.KINDS:
+        model = CurveModel.fit(name, whisks.peak_counts, whisks.radius_mm)
+        return Fitted(model, model.sigma_mm)
+    try:
+        shapes = [shape_of(contact) for contact in whisks.recorded]
+        model = WhiskModel.fit(shapes, whisks.radius_mm, whisks.axes)
+        return Fitted(model, model.left_out_error(shapes, whisks.radius_mm))
+    except ValueError:
+        return _best_curve(whisks)
+
+
+def _best_curve(whisks: Whisks) -> Fitted:
+    line = _fit(whisks, "linear")  # what it says of too few contacts is what a user should read
+    found = [line]
+    for kind in CurveModel.KINDS:
+        try:
+            found.append(_fit(whisks, kind))
+        except ValueError:
+            continue
+    return min(found, key=lambda fitted: fitted.error_mm)
+
+
+def save(model, path) -> None:
+    """Write a model of any kind as JSON."""
+    formats = {RadialModel: FORMAT, WhiskModel: WHISK_FORMAT, CurveModel: CURVE_FORMAT}
+    node = {} if model.node is None else {NODE_COLUMN: model.node}
+    Path(path).write_text(json.dumps({"format": formats[type(model)]} | node | model.content, indent=1) + "\n")
+
+
+def load(path) -> "RadialModel | CurveModel | WhiskModel":
+    """Read what `save` wrote; TableError with one line when it is something else."""
+    try:
+        content = json.loads(Path(path).read_text())
+        kinds = {WHISK_FORMAT: WhiskModel, CURVE_FORMAT: CurveModel}
+        model = kinds.get(content["format"], RadialModel.of)(content)
+        node = content.get(NODE_COLUMN)
+        model.node = None if node is None else int(node)
+        return model
+    except (OSError, ValueError, KeyError, TypeError, OverflowError, AttributeError) as error:
+        raise not_a_model(path, error) from error
+
+
+def not_a_model(path, error: Exception) -> TableError:
+    return TableError(path, None, f"not a radial model ({error!r}); make one with 'whisker radial fit'")
+
+
+def estimate(model, contact: Contact, peak_counts: float | None = None) -> Estimate:
+    """What a model of any kind says of one contact; `peak_counts`: equation 2, where it is known already."""
+    if isinstance(model, WhiskModel):
+        if contact.samples.shape[1] != model.axes:
+            raise ValueError(f"{contact.samples.shape[1]} channels, but the model has {model.axes}")
+        told = model.estimate(model.shape_of(contact))
+        return Estimate(told.radius_mm, told.sigma_mm, "tip" if told.tip > 0.5 else "shaft", told.confidence)
+    counts = _peak_of(contact.samples) if peak_counts is None else peak_counts
+    mm, sigma_mm = model.predict(float(counts))
+    if not np.isfinite(mm):
+        middle, span = 0.5 * (model.low_mm + model.high_mm), model.high_mm - model.low_mm
+        return Estimate(middle, span, "shaft", 0.0)
+    beyond = max(0.0, model.low_mm - mm, mm - model.high_mm) / max(sigma_mm, TIP_MM)
+    return Estimate(mm, sigma_mm, model.contact_type(mm), float(np.exp(-0.5 * max(0.0, beyond - 2.0) ** 2)))

@@ -1,0 +1,128 @@
+"""Where the surface under a whisker changes: numbers fitted here, arithmetic in C (host/nav/touch/texture_change.h)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...native import doubles, ffi, lib
+from .rung import plain_features
+
+SHRINK = 0.05  # share of the diagonal in covariances
+ROW = 4  # blocks over which their dependence is measured
+GROUP = 24  # blocks of which the largest ratio counts: while the blocks around one event are held, it shows in all
+FALSE_EVERY = (
+    2000  # blocks of one surface with one false change: five hundred windows of four, 5 m at 0.1 m/s and 100 ms
+)
+TAIL = 0.2  # share of the groups that the tail is fitted to
+NEVER = 1e9  # nats
+
+
+@dataclass
+class Change:
+    """A detector for blocks of `length` samples; the arrays as in nav_texture_change_numbers."""
+
+    length: int
+    share: float
+    limit: float
+    floor: np.ndarray  # (channels,)
+    steady: np.ndarray  # (F, classes)
+    apart: np.ndarray  # (classes, classes)
+    weight: np.ndarray  # (F, classes)
+    bias: np.ndarray  # (classes,)
+
+    ARRAYS = ("floor", "steady", "apart", "weight", "bias")
+    NUMBERS = ("length", "share", "limit")
+
+    def native(self):
+        """A detector of its own, with nothing held; ValueError when a size or number is impossible."""
+        features = len(plain_features(np.zeros((1, self.length, len(self.floor))), False, self.floor)[0])
+        classes = len(self.bias)
+        shapes = {"steady": (features, classes), "apart": (classes, classes), "weight": (features, classes)}
+        numbers, kept = ffi.new("struct nav_texture_change_numbers *"), []
+        numbers.classes, numbers.channels = classes, len(self.floor)
+        numbers.length, numbers.share, numbers.limit = self.length, self.share, self.limit
+        for name in self.ARRAYS:
+            kept.append(np.ascontiguousarray(getattr(self, name), dtype=np.float64))
+            if kept[-1].shape != shapes.get(name, kept[-1].shape):
+                raise ValueError(f"change: {name} has shape {kept[-1].shape}, not {shapes[name]}")
+            setattr(numbers, name, doubles(kept[-1]))
+        made = lib.nav_texture_change_new(numbers)
+        if made == ffi.NULL:
+            raise ValueError("change: a size or number is out of range")
+        return ffi.gc(made, lib.nav_texture_change_free)
+
+    def ratios(self, samples: np.ndarray) -> np.ndarray:
+        """The likeliest change after every block of samples (n, channels), nats; without the first blocks, which are too few."""
+        detector, after = self.native(), ffi.new("int *")
+        found = [lib.nav_texture_change_weigh(detector, doubles(b), after) for b in _blocks(samples, self.length)]
+        return np.array(found[2 * lib.NAV_TEXTURE_CHANGE_AFTER_MOST :])
+
+
+def fit_change(
+    parts: list[np.ndarray], labels: np.ndarray, folds: np.ndarray, length: int, floor: np.ndarray
+) -> Change | None:
+    """From cleaned recordings (n, channels), their classes and folds; the limit from recordings left out in turn.
+
+    None when they are too short to tell a limit."""
+    if min(map(len, parts)) < length:
+        return None
+    features = [plain_features(_blocks(part, length), False, floor) for part in parts]
+    found = _fit(features, labels, length, floor)
+    peaks = []
+    for fold in sorted(set(folds)) if len(set(folds)) > 1 else ():
+        kept = [n for n in range(len(parts)) if folds[n] != fold]
+        if len(set(labels[kept])) == len(set(labels)):
+            twin = _fit([features[n] for n in kept], labels[kept], length, floor)
+            peaks += [p for n in np.flatnonzero(folds == fold) for p in _peaks(twin.ratios(parts[n]))]
+    found.limit = _limit(np.array(peaks))
+    return found if found.limit < NEVER else None
+
+
+def _blocks(samples: np.ndarray, length: int) -> np.ndarray:
+    whole = len(samples) // length
+    return np.ascontiguousarray(samples[: whole * length], dtype=np.float64).reshape(whole, length, -1)
+
+
+def _fit(features: list[np.ndarray], labels: np.ndarray, length: int, floor: np.ndarray) -> Change:
+    classes = int(labels.max()) + 1
+    mine = [[f for f, label in zip(features, labels, strict=True) if label == k] for k in range(classes)]
+    middle = np.array([np.concatenate(group).mean(axis=0) for group in mine])
+    class_cov, drive_cov = np.zeros((2, middle.shape[1], middle.shape[1]))
+    for group, centre in zip(mine, middle, strict=True):
+        count = classes * sum(map(len, group))
+        class_cov += sum((f - centre).T @ (f - centre) for f in group) / count
+        drive_cov += sum((f - f.mean(axis=0)).T @ (f - f.mean(axis=0)) for f in group) / count
+    steady, weight = (np.linalg.solve(_shrunk(cov), middle.T) for cov in (drive_cov, class_cov))
+    gram = middle @ steady
+    apart = np.diag(gram)[:, None] + np.diag(gram) - 2.0 * gram
+    bias = -0.5 * np.einsum("kf,fk->k", middle, weight)
+    return Change(length, _share(features, steady), NEVER, floor, steady, apart, weight, bias)
+
+
+def _shrunk(cov: np.ndarray) -> np.ndarray:
+    return (1.0 - SHRINK) * cov + np.diag(SHRINK * np.diag(cov) + 1e-6)
+
+
+def _share(features: list[np.ndarray], steady: np.ndarray) -> float:
+    """How much less the mean of neighbouring blocks varies than one block, over what it would if they were independent."""
+    one = row = 1e-12
+    for f in features:
+        scores = f[: len(f) // ROW * ROW] @ (steady - steady.mean(axis=1, keepdims=True))
+        scores = scores - scores.mean(axis=0)
+        one += (scores**2).sum() / ROW
+        row += ROW * (scores.reshape(-1, ROW, scores.shape[1]).mean(axis=1) ** 2).sum()
+    return float(min(1.0, one / row))
+
+
+def _peaks(ratios: np.ndarray) -> np.ndarray:
+    whole = len(ratios) // GROUP
+    return ratios[: whole * GROUP].reshape(whole, GROUP).max(axis=1) if whole else ratios[:0]
+
+
+def _limit(peaks: np.ndarray) -> float:
+    """The ratio that one group in FALSE_EVERY / GROUP exceeds: its tail is taken as exponential."""
+    if len(peaks) * TAIL < 2:
+        return NEVER
+    start = float(np.quantile(peaks, 1.0 - TAIL))
+    excess = float((peaks[peaks > start] - start).mean()) if (peaks > start).any() else 0.0
+    return max(0.0, start + excess * float(np.log(TAIL * FALSE_EVERY / GROUP)))

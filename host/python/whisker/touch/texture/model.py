@@ -1,0 +1,244 @@
+"""Floor texture: the stationary naive Bayes classifier (paper, equation 1), recordings, and decisions of any model."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ...native import doubles, ffi, lib
+from ...tables import TableError, numbers, read_columns
+from .spectral import FORMAT as SPECTRAL_FORMAT
+from .spectral import SpectralModel
+
+FORMAT = "whisker texture model 1"
+BINS = 64
+PSEUDO = 1.0  # Laplace: one sample more in every bin
+TAIL = 0.0005  # share of the training samples on each side that the range leaves to the end bins
+TEMPER = 0.05  # 200 samples of 100 ms are worth 2-20 independent ones (whisker_physics section 7)
+SURE = 0.99  # posterior at which a sequential decision of equation 1 stops ...
+LOOKS = 8  # ... looking so often in a window ...
+PATIENCE = 4  # ... and giving up after so many windows
+GAP_PERIODS = 4.0  # a longer step of the time column is a gap: no window reaches across it
+RATES_APART = 0.1  # relative: recordings to be learnt together are sampled alike
+
+
+class TextureModel:
+    """One whisker's model: class names in order, rest and bins by axis, log P(x|T) by class, axis and bin."""
+
+    def __init__(self, classes: list[str], rest, low, high, table: np.ndarray | None = None, bins: int = BINS):
+        """rest, low, high: one number per axis, counts (low and high relative to rest); table (classes, axes, bins)."""
+        self.classes = list(classes)
+        self.rest = np.atleast_1d(np.asarray(rest, dtype=np.float64))
+        self.low = np.ascontiguousarray(low, dtype=np.float64)
+        self.high = np.ascontiguousarray(high, dtype=np.float64)
+        shape = (len(self.classes), len(self.low), bins if table is None else table.shape[2])
+        made = lib.nav_texture_new(*shape, doubles(self.low), doubles(self.high))
+        if made == ffi.NULL:
+            raise ValueError(f"texture model: impossible shape {shape} or range; every range needs low < high")
+        self._model = ffi.gc(made, lib.nav_texture_free)
+        size = 8 * int(np.prod(shape))
+        self.table = np.frombuffer(ffi.buffer(lib.nav_texture_table(made), size)).reshape(shape)
+        if table is not None:
+            self.table[:] = table
+
+    @classmethod
+    def train(cls, recordings: dict[str, list[np.ndarray]], rest=None, bins: int = BINS) -> "TextureModel":
+        """Learn from raw counts, arrays (n, axes) by class. `rest`: by axis; default the median of all training data."""
+        everything = np.concatenate([_counts(r) for group in recordings.values() for r in group])
+        everything = everything[np.isfinite(everything).all(axis=1)]
+        if len(everything) == 0:
+            raise ValueError("texture training: no finite sample; record each surface for some seconds")
+        rest = np.median(everything, axis=0) if rest is None else np.broadcast_to(rest, everything.shape[1:])
+        low, high = _ranges(everything - rest, bins)
+        model = cls(list(recordings), rest, low, high, bins=bins)
+        for index, group in enumerate(recordings.values()):
+            for recording in group:
+                samples = np.ascontiguousarray(_counts(recording) - rest)
+                lib.nav_texture_add(model._model, index, doubles(samples), len(samples))
+        lib.nav_texture_finish(model._model, PSEUDO)
+        return model
+
+    def loglik(self, window: np.ndarray, rest=None) -> np.ndarray:
+        """Equation 1: log-likelihood of the window (n, axes) of raw counts by class. `rest`: default the model's."""
+        samples = np.ascontiguousarray(_counts(window) - (self.rest if rest is None else rest))
+        if samples.shape[1] != len(self.low):
+            raise ValueError(f"texture model: {len(self.low)} axes expected, {samples.shape[1]} given")
+        out = np.zeros(len(self.classes))
+        lib.nav_texture_loglik(self._model, doubles(samples), len(samples), doubles(out))
+        return out
+
+    def save(self, path) -> None:
+        content = {"format": FORMAT, "classes": self.classes}
+        content |= {key: getattr(self, key).tolist() for key in ("rest", "low", "high")}
+        content["loglik"] = np.round(self.table, 6).tolist()
+        Path(path).write_text(json.dumps(content) + "\n")
+
+    @classmethod
+    def load(cls, path) -> "TextureModel":
+        """Read what `save` wrote; TableError with one line when it is something else."""
+        return cls.from_json(path, read_json(path))
+
+    @classmethod
+    def from_json(cls, path, content: dict) -> "TextureModel":
+        """What `save` wrote, parsed; TableError with one line when it is something else."""
+        try:
+            if content["format"] != FORMAT:
+                raise ValueError(f"format is '{content['format']}'")
+            table = np.array(content["loglik"], dtype=np.float64)
+            edges = [np.array(content[key], dtype=np.float64) for key in ("rest", "low", "high")]
+            if table.shape[:2] != (len(content["classes"]), len(edges[1])) or len({len(e) for e in edges}) != 1:
+                raise ValueError("sizes of classes, axes and loglik differ")
+            if not all(np.isfinite(part).all() for part in (table, *edges)):
+                raise ValueError("a number is not finite")
+            return cls(content["classes"], *edges, table)
+        except (ValueError, KeyError, TypeError, IndexError) as error:
+            raise _no_model(path, error) from error
+
+    @property
+    def channels(self) -> int:
+        return len(self.low)
+
+
+def _no_model(path, error: Exception) -> TableError:
+    return TableError(path, None, f"not a texture model ({error!r}); make one with 'whisker texture train'")
+
+
+def read_json(path) -> dict:
+    """A model file's content; TableError with one line when it is no JSON."""
+    try:
+        return json.loads(Path(path).read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise _no_model(path, error) from error
+
+
+def load(path) -> "TextureModel | SpectralModel":
+    """A model of either method, as its format says."""
+    content = read_json(path)
+    if isinstance(content, dict) and content.get("format") == SPECTRAL_FORMAT:
+        return SpectralModel.from_json(path, content)
+    return TextureModel.from_json(path, content)
+
+
+@dataclass
+class Decision:
+    """What one window says."""
+
+    t_s: float  # end of the window
+    loglik: dict[str, float]
+    label: str  # a class, or "unknown" when no sample could be read
+    confidence: float  # tempered posterior of the label under equal priors
+    border: bool  # the two halves of the window name different classes, each with confidence
+
+
+def posterior(loglik: np.ndarray, temper: float = TEMPER) -> np.ndarray:
+    """Tempered posterior over classes under equal priors."""
+    weight = np.exp(temper * (loglik - loglik.max()))
+    return weight / weight.sum()
+
+
+def classify(model, t_s: np.ndarray, samples: np.ndarray, window_ms: float = 100.0, sequential=False) -> list[Decision]:
+    """Decide window by window, or as soon as sure: t_s (n,), samples (n, axes) of raw counts.
+
+    A last, shorter window is left out, and none reaches across a gap of the time column.
+    """
+    period = sample_period(t_s)
+    length = max(2, round(window_ms / 1000.0 / period))
+    steps = np.diff(t_s)
+    gaps = np.flatnonzero((steps > GAP_PERIODS * period) | (steps <= 0)) + 1
+    found = []
+    for some_t, some in zip(np.split(t_s, gaps), np.split(np.asarray(samples, float), gaps), strict=True):
+        if isinstance(model, SpectralModel):
+            found += [_told(model, some_t, d) for d in model.judge(some, length, sequential)]
+        elif sequential:
+            found += _sequential(model, some_t, some, length)
+        else:
+            starts = range(0, len(some) - length + 1, length)
+            found += [_decide(model, float(some_t[s + length - 1]), some[s : s + length]) for s in starts]
+    return found
+
+
+def _told(model: SpectralModel, t_s: np.ndarray, d) -> Decision:
+    label = "unknown" if d.label < 0 else model.classes[d.label]
+    by_class = dict(zip(model.classes, map(float, d.loglik), strict=True))
+    return Decision(float(t_s[d.end - 1]), by_class, label, d.confidence, d.border)
+
+
+def _sequential(model: TextureModel, t_s: np.ndarray, samples: np.ndarray, window: int) -> list[Decision]:
+    """Equation 1 until sure: "unknown" when four windows do not make it so."""
+    found, start, look = [], 0, max(1, window // LOOKS)
+    for end in range(look, len(samples) + 1, look):
+        decision = _decide(model, float(t_s[end - 1]), samples[start:end])
+        if decision.confidence >= SURE or end - start >= PATIENCE * window:
+            decision.label = decision.label if decision.confidence >= SURE else "unknown"
+            found.append(decision)
+            start = end
+    return found
+
+
+def _decide(model: TextureModel, t_s: float, window: np.ndarray) -> Decision:
+    loglik = model.loglik(window)
+    if not np.isfinite(window).all(axis=1).any():
+        return Decision(t_s, dict.fromkeys(model.classes, 0.0), "unknown", 0.0, False)
+    chance = posterior(loglik)
+    best = int(chance.argmax())
+    halves = [posterior(model.loglik(half)) for half in np.array_split(window, 2)]
+    border = halves[0].argmax() != halves[1].argmax() and min(h.max() for h in halves) > 0.9
+    by_class = dict(zip(model.classes, map(float, loglik), strict=True))
+    return Decision(t_s, by_class, model.classes[best], float(chance[best]), bool(border))
+
+
+def read_recording(path) -> tuple[np.ndarray, np.ndarray]:
+    """One CSV recording -> t_s (n,), channels (n, axes)."""
+    text = read_columns(path, required=["t_s"])
+    channels = [name for name in text if name != "t_s"]
+    if not channels:
+        raise TableError(path, 1, "no channel column beside t_s; name at least one, as in 't_s,x,y'")
+    return numbers(text["t_s"]), np.column_stack([numbers(text[name]) for name in channels])
+
+
+def read_folder(path) -> dict[str, list[np.ndarray]]:
+    """One folder per surface, one CSV per recording -> channels by class."""
+    return read_training(path)[0]
+
+
+def read_training(path) -> tuple[dict[str, list[np.ndarray]], float]:
+    """One folder per surface, one CSV per recording -> channels by class, and the sampling rate (Hz)."""
+    surfaces = sorted(folder for folder in Path(path).iterdir() if folder.is_dir()) if Path(path).is_dir() else []
+    files = {s.name: sorted(s.glob("*.csv")) for s in surfaces}
+    empty = [name for name, some in files.items() if not some]
+    if len(files) < 2 or empty:
+        what = f"folder '{empty[0]}' holds no CSV file" if empty else f"{len(files)} surface folder(s)"
+        raise TableError(path, None, f"{what}; give at least two folders, one per surface, with CSV recordings")
+    read = {name: [read_recording(file) for file in some] for name, some in files.items()}
+    widths = {channels.shape[1] for group in read.values() for _, channels in group}
+    if len(widths) != 1:
+        raise TableError(path, None, f"recordings have {sorted(widths)} channels; give all the same columns")
+    periods = [sample_period(t_s) for group in read.values() for t_s, _ in group]
+    if max(periods) > (1.0 + RATES_APART) * min(periods):
+        text = f"recordings are sampled at {1 / max(periods):.4g} to {1 / min(periods):.4g} Hz; give one rate"
+        raise TableError(path, None, text)
+    return {name: [channels for _, channels in group] for name, group in read.items()}, 1.0 / float(np.median(periods))
+
+
+def sample_period(t_s: np.ndarray) -> float:
+    """Median step of the time column, s."""
+    steps = np.diff(t_s[np.isfinite(t_s)])
+    steps = steps[steps > 0]
+    return float(np.median(steps)) if len(steps) else 0.0005
+
+
+def _counts(samples) -> np.ndarray:
+    samples = np.asarray(samples, dtype=np.float64)
+    return samples.reshape(len(samples), -1)
+
+
+def _ranges(samples: np.ndarray, bins: int) -> tuple[np.ndarray, np.ndarray]:
+    """Range of each axis: all but the tails, in bins no narrower than the sensor's own step (12 of 16 bits)."""
+    low, high = np.quantile(samples, [TAIL, 1.0 - TAIL], axis=0)
+    for axis in range(samples.shape[1]):
+        values = np.unique(samples[:, axis])
+        step = float(np.diff(values).min()) if len(values) > 1 else 1.0
+        middle, width = (low[axis] + high[axis]) / 2.0, max(high[axis] - low[axis], step * bins)
+        low[axis], high[axis] = middle - 0.55 * width, middle + 0.55 * width
+    return low, high

@@ -1,0 +1,96 @@
+"""One rung of a spectral texture model: numbers in NumPy, arithmetic in C (host/nav/touch/texture_rung.h)."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ...native import doubles, ffi, lib
+
+SEED = 2011  # of the random projections; any will do
+
+
+@dataclass
+class Rung:
+    """A classifier for windows of `length` samples; the arrays as in nav_texture_rung_numbers."""
+
+    length: int
+    levels: bool
+    hidden: int
+    floor: np.ndarray  # (channels,)
+    centre: np.ndarray  # (F,)
+    scale: np.ndarray  # (F,)
+    weight: np.ndarray  # (F + hidden, classes)
+    bias: np.ndarray  # (classes,)
+    middle: np.ndarray  # (classes, F)
+    axis: np.ndarray  # (axes, F)
+    axis_weight: np.ndarray  # (classes, axes)
+    beyond: np.ndarray  # (classes,)
+    temper: float = 1.0
+    unknown: float = 1e9  # squared distance of a surface that was never trained
+    border: float = 1e9  # nats
+    span: np.ndarray | None = None  # (channels,) counts: the farthest that a window of this length may reach
+    seed: int = SEED
+    _made: object = field(default=None, repr=False, compare=False)
+
+    ARRAYS = ("floor", "centre", "scale", "weight", "bias", "middle", "axis", "axis_weight", "beyond")
+    NUMBERS = ("length", "levels", "hidden", "temper", "unknown", "border", "seed")
+
+    @property
+    def native(self):
+        """The C rung; ValueError when the sizes do not fit each other or a number is impossible."""
+        if self._made is None:
+            self._made = self._make()
+        return self._made
+
+    def _make(self):
+        for name in self.ARRAYS:
+            setattr(self, name, np.ascontiguousarray(getattr(self, name), dtype=np.float64))
+        features = feature_count(len(self.floor), self.length, self.levels)
+        classes, axes = len(self.bias), len(self.axis)
+        shapes = {"centre": (features,), "scale": (features,), "weight": (features + self.hidden, classes)}
+        shapes |= {"middle": (classes, features), "axis": (axes, features), "axis_weight": (classes, axes)}
+        shapes["beyond"] = (classes,)
+        for name, shape in shapes.items():
+            if getattr(self, name).shape != shape:
+                raise ValueError(f"rung {self.length}: {name} has shape {getattr(self, name).shape}, not {shape}")
+        numbers = ffi.new("struct nav_texture_rung_numbers *")
+        numbers.classes, numbers.channels, numbers.length = classes, len(self.floor), self.length
+        numbers.levels, numbers.hidden, numbers.axes = int(self.levels), self.hidden, axes
+        numbers.seed, numbers.temper = self.seed, self.temper
+        for name in self.ARRAYS:
+            setattr(numbers, name, doubles(getattr(self, name)))
+        made = lib.nav_texture_rung_new(numbers)
+        if made == ffi.NULL:
+            raise ValueError(f"rung {self.length}: a size or number is out of range")
+        return ffi.gc(made, lib.nav_texture_rung_free)
+
+    def expand(self, windows: np.ndarray) -> np.ndarray:
+        """Windows (m, length, channels) -> standardised features and projections (m, F + hidden)."""
+        out = np.empty((len(windows), len(self.centre) + self.hidden))
+        windows = np.ascontiguousarray(windows, dtype=np.float64)
+        for window, row in zip(windows, out, strict=True):
+            lib.nav_texture_rung_expand(self.native, doubles(window), doubles(row))
+        return out
+
+
+def feature_count(channels: int, length: int, levels: bool) -> int:
+    """Numbers that a window is reduced to; ValueError for a size out of range."""
+    floor = np.zeros(channels)
+    made = lib.nav_texture_features_new(channels, length, int(levels), doubles(floor))
+    if made == ffi.NULL:
+        raise ValueError(f"texture: {channels} channels in windows of {length} samples are out of range")
+    return lib.nav_texture_features_count(ffi.gc(made, lib.nav_texture_features_free))
+
+
+def plain_features(windows: np.ndarray, levels: bool, floor: np.ndarray) -> np.ndarray:
+    """Windows (m, length, channels) -> features (m, F), not standardised."""
+    windows = np.ascontiguousarray(windows, dtype=np.float64)
+    floor = np.ascontiguousarray(floor, dtype=np.float64)
+    _, length, channels = windows.shape
+    out = np.empty((len(windows), feature_count(channels, length, levels)))
+    made = ffi.gc(
+        lib.nav_texture_features_new(channels, length, int(levels), doubles(floor)), lib.nav_texture_features_free
+    )
+    for window, row in zip(windows, out, strict=True):
+        lib.nav_texture_features_work(made, doubles(window), doubles(row))
+    return out

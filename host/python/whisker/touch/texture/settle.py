@@ -1,0 +1,63 @@
+"""A whisker that still rings from another surface: limits fitted here, arithmetic in C (host/nav/touch/texture_settle.h)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...native import doubles, ffi, lib
+
+FALLS_LEAST = 400  # fewer do not show how fast a floor gets quieter
+
+
+def counts() -> range:
+    """Blocks that a fall is measured over."""
+    return range(lib.NAV_TEXTURE_SETTLE_LEAST, lib.NAV_TEXTURE_SETTLE_MOST + 1)
+
+
+@dataclass
+class Settle:
+    """For blocks of `length` samples; the arrays as in nav_texture_settle_numbers."""
+
+    length: int
+    floor: np.ndarray  # (channels,)
+    limit: np.ndarray  # (NAV_TEXTURE_SETTLE_LIMITS,)
+
+    ARRAYS = ("floor", "limit")
+    NUMBERS = ("length",)
+
+    def native(self):
+        """A judge of its own, that has heard nothing; ValueError when a size or number is impossible."""
+        if len(self.limit) != lib.NAV_TEXTURE_SETTLE_LIMITS:
+            raise ValueError(f"settle: {len(self.limit)} limits, not {lib.NAV_TEXTURE_SETTLE_LIMITS}")
+        numbers = ffi.new("struct nav_texture_settle_numbers *")
+        floor, limit = (np.ascontiguousarray(a, dtype=np.float64) for a in (self.floor, self.limit))
+        numbers.channels, numbers.length = len(floor), self.length
+        numbers.floor, numbers.limit = doubles(floor), doubles(limit)
+        made = lib.nav_texture_settle_new(numbers)
+        if made == ffi.NULL:
+            raise ValueError("settle: a size or number is out of range")
+        return ffi.gc(made, lib.nav_texture_settle_free)
+
+    def falls(self, samples: np.ndarray) -> np.ndarray:
+        """Fall of the power after every block of samples (n, channels), over each of counts(): (m, limits), nats per block;
+        without the first blocks, which are too few."""
+        judge, found = self.native(), []
+        whole = len(samples) // self.length
+        blocks = np.ascontiguousarray(samples[: whole * self.length], dtype=np.float64)
+        for block in blocks.reshape(whole, self.length, -1):
+            lib.nav_texture_settle_take(judge, doubles(block))
+            found.append([lib.nav_texture_settle_fall(judge, count) for count in counts()])
+        return np.array(found).reshape(whole, -1)[counts()[-1] - 1 :]
+
+
+def fit_settle(parts: list[np.ndarray], length: int, floor: np.ndarray, quantile: float) -> Settle | None:
+    """From cleaned recordings (n, channels) of one surface each: limits that keep `quantile` of their falls. None when
+    they are too short to tell."""
+    if max(map(len, parts)) < length:
+        return None
+    found = Settle(length, floor, np.ones(len(counts())))
+    falls = np.concatenate([found.falls(part) for part in parts if len(part) >= length])
+    if len(falls) < FALLS_LEAST:
+        return None
+    found.limit = np.quantile(falls, quantile, axis=0)
+    return found if (found.limit > 0.0).all() else None

@@ -1,0 +1,242 @@
+"""Trains the default texture method from recordings; everything that is chosen is chosen on recordings held out."""
+
+import numpy as np
+
+from .change import fit_change
+from .fit import UNKNOWN_QUANTILE, Fitted, Windows, fit, log_loss
+from .settle import fit_settle
+from .spectral import SpectralModel
+from .strange import fit_strange
+
+FOLDS = 5
+SHORTER, LONGER = 8, 8  # rungs from an eighth of the window to eight windows, in octaves
+LENGTH_LEAST, LENGTH_MOST = 4, 1024  # samples of a rung
+WINDOWS_MOST = 6000  # of one rung, over all recordings
+BLOCKS = 4  # of a window, in each of which a change of surface is looked for
+SPIKE_OVER = 3.0  # times what one sample in a thousand stands out from both neighbours
+STILL_OVER, STILL_LEAST = 2.0, 16  # times the longest run of equal samples; shorter runs happen to any sensor
+SPAN_OVER = 1.5  # times the farthest that a training window reaches
+SENSOR_STOPS = (0.0, 65535.0)  # of raw counts, 16 bits
+BORDER_QUANTILE, BORDER_OVER = 0.999, 1.25  # of neighbouring held-out stretches of one surface
+REFUSE_MOST = 0.05  # share of held-out windows that "unknown" may cost ...
+REFUSE_UNTIL = 10.0  # ... unless fewer already cut wrong answers by this factor
+SURE = (0.5, 0.6, 0.7, 0.8, 0.85, 0.9, 0.93, 0.95, 0.97, 0.98, 0.99, 0.995, 0.998, 0.999)
+
+
+def train(recordings: dict[str, list[np.ndarray]], rate_hz: float, window_ms: float = 100.0) -> SpectralModel:
+    """Learn from raw counts (n, channels) by class. ValueError when there is too little to learn from."""
+    parts = [_clean(np.asarray(r, dtype=np.float64)) for group in recordings.values() for r in group]
+    labels = [k for k, group in enumerate(recordings.values()) for _ in group]
+    parts, labels, folds = _fold(parts, labels)
+    base = max(LENGTH_LEAST, round(rate_hz * window_ms / 1000.0))
+    lengths = _ladder(base, min(map(len, parts)))
+    limits, floor = _limits(parts), _floor(parts)
+    fitted = [fit(_windows(parts, labels, folds, length, len(recordings)), floor) for length in lengths]
+    for length, found in zip(lengths, fitted, strict=True):
+        span = SPAN_OVER * _widest(parts, length)
+        for rung in (found.rung, *found.twins):
+            rung.span = span
+    model = SpectralModel(list(recordings), rate_hz, [f.rung for f in fitted], limits, window_ms)
+    _calibrate(model, fitted, parts, labels, folds, base)
+    block = max(LENGTH_LEAST, round(base / BLOCKS))
+    model.change = fit_change(parts, labels, folds, block, floor)
+    if model.change is not None:
+        model.settle = fit_settle(parts, block, floor, UNKNOWN_QUANTILE)
+    model.strange = _strange(model, parts, labels, folds, base)
+    return model
+
+
+def _clean(recording: np.ndarray) -> np.ndarray:
+    """Without records that are not finite."""
+    recording = recording.reshape(len(recording), -1)
+    return recording[np.isfinite(recording).all(axis=1)]
+
+
+def _fold(parts: list, labels: list) -> tuple[list, np.ndarray, np.ndarray]:
+    """Spread each class's recordings over the folds; a class with one recording is cut into stretches of time."""
+    out, classes, folds = [], [], []
+    for k in sorted(set(labels)):
+        mine = [part for part, label in zip(parts, labels, strict=True) if label == k]
+        if len(mine) == 1:
+            mine = np.array_split(mine[0], FOLDS)
+        for n, part in enumerate(sorted(mine, key=len, reverse=True)):
+            out.append(part)
+            classes.append(k)
+            folds.append(n % FOLDS)
+    return out, np.array(classes), np.array(folds)
+
+
+def _ladder(base: int, shortest: int) -> list[int]:
+    """Window lengths: the base and octaves around it, no longer than the shortest recording."""
+    tries = [base * 2.0**octave for octave in range(-int(np.log2(SHORTER)), int(np.log2(LONGER)) + 1)]
+    top = min(LENGTH_MOST, shortest)
+    while base <= LENGTH_LEAST * SHORTER and tries[-1] * 2 <= min(top, LENGTH_MOST // 2):
+        tries.append(tries[-1] * 2)  # a slow sensor: its windows of use are many times 100 ms
+    lengths = sorted({round(t) for t in tries if LENGTH_LEAST <= round(t) <= top})
+    if not lengths:
+        raise ValueError(f"the shortest recording has {shortest} samples; record each surface for some seconds")
+    return lengths
+
+
+def _windows(parts: list, labels: np.ndarray, folds: np.ndarray, length: int, classes: int) -> Windows:
+    """Half overlapping windows of all recordings, thinned evenly to at most WINDOWS_MOST."""
+    starts = [np.arange(0, len(part) - length + 1, max(1, length // 2)) for part in parts]
+    keep = min(1.0, WINDOWS_MOST / sum(map(len, starts)))
+    chosen = [s[np.linspace(0, len(s) - 1, max(1, round(keep * len(s)))).astype(int)] for s in starts]
+    windows = np.stack([part[i : i + length] for part, some in zip(parts, chosen, strict=True) for i in some])
+    counts = list(map(len, chosen))
+    return Windows(windows, np.repeat(labels, counts), np.repeat(folds, counts), classes, int(folds.max()) + 1)
+
+
+def _floor(parts: list) -> np.ndarray:
+    """Power of quantisation by channel: a twelfth of the smallest step squared."""
+    return np.array([_step(np.concatenate([p[:, c] for p in parts])) ** 2 / 12 for c in range(parts[0].shape[1])])
+
+
+def _step(values: np.ndarray) -> float:
+    steps = np.diff(np.unique(values))
+    return float(np.median(steps)) if len(steps) else 0.0
+
+
+def _limits(parts: list) -> dict[str, np.ndarray]:
+    found = {"spike": [], "still": [], "low": [], "high": []}
+    for c in range(parts[0].shape[1]):
+        channel = [p[:, c] for p in parts]
+        everything = np.concatenate(channel)
+        outstanding = np.concatenate([_outstanding(x) for x in channel])
+        found["spike"].append(SPIKE_OVER * np.quantile(outstanding, 0.999) + 4 * _step(everything))
+        found["still"].append(max(STILL_LEAST, STILL_OVER * max(map(_longest_run, channel))))
+        counts = np.array_equal(everything, np.round(everything)) and everything.min() > SENSOR_STOPS[0]
+        counts = counts and everything.max() < SENSOR_STOPS[1]
+        low, high = SENSOR_STOPS if counts else (-1e300, 1e300)
+        found["low"].append(low)
+        found["high"].append(high)
+    return {name: np.array(values, dtype=float) for name, values in found.items()}
+
+
+def _outstanding(x: np.ndarray) -> np.ndarray:
+    """How far each sample stands out to one side of both its neighbours."""
+    before, after = x[1:-1] - x[:-2], x[1:-1] - x[2:]
+    return np.where(before * after > 0, np.minimum(abs(before), abs(after)), 0.0)
+
+
+def _longest_run(x: np.ndarray) -> int:
+    changes = np.flatnonzero(np.diff(x)) + 1
+    return int(np.diff(np.concatenate([[0], changes, [len(x)]])).max())
+
+
+def _widest(parts: list, length: int) -> np.ndarray:
+    """Farthest from lowest to highest sample of any window, by channel."""
+    hop = max(1, length // 4)
+    spans = [np.ptp(p[i : i + length], axis=0) for p in parts for i in range(0, len(p) - length + 1, hop)]
+    return np.maximum(np.max(spans, axis=0), 1.0)
+
+
+def _calibrate(model: SpectralModel, fitted: list[Fitted], parts: list, labels, folds, base: int) -> None:
+    """Growth, border, doubt and sureness, from decisions of twins on recordings that they have not seen."""
+    twins = [
+        SpectralModel(model.classes, model.rate_hz, [f.twins[n] for f in fitted], model.limits, model.window_ms)
+        for n in range(len(fitted[0].twins))
+    ]
+    model.growth = _growth(twins, parts, labels, folds, base)
+    for twin in twins:
+        twin.growth = model.growth
+    model.together = _together(twins, parts, labels, folds, base)
+    for twin in twins:
+        twin.together = model.together
+    for index, found in enumerate(fitted):
+        limit = _border(twins, parts, folds, found.rung.length)
+        for rung in (found.rung, *(t.rungs[index] for t in twins)):
+            rung.border = limit
+    fixed = _decisions(twins, parts, folds, base)
+    right, confidence = _scores(fixed, labels)
+    model.doubt = _doubt(right, confidence)
+    model.sure, samples, accuracy = _sure(twins, parts, labels, folds, base, float(right.mean()))
+    model.figures = {
+        "window_samples": base,
+        "held_out_accuracy": round(float(right.mean()), 4),
+        "refused": round(float((confidence < model.doubt).mean()), 4),
+        "accuracy_of_answers": round(float(right[confidence >= model.doubt].mean()), 4),
+        "sequential_accuracy": round(accuracy, 4),
+        "sequential_samples": round(samples, 1),
+    }
+
+
+def _strange(model: SpectralModel, parts, labels, folds, base: int):
+    """Of windows of the base length, the rung's features; None without such a rung."""
+    rung = next((r for r in model.rungs if r.length == base), None)
+    if rung is None:
+        return None
+    rows = [p[: len(p) // base * base].reshape(-1, base, p.shape[1]) for p in parts]
+    features = [rung.expand(r)[:, : len(rung.centre)] for r in rows]
+    return fit_strange(features, labels, folds, base, UNKNOWN_QUANTILE)
+
+
+def _decisions(twins: list[SpectralModel], parts, folds, window: int, sequential: bool = False) -> list[list]:
+    return [twins[f].judge(part, window, sequential) for part, f in zip(parts, folds, strict=True)]
+
+
+def _scores(decisions: list[list], labels) -> tuple[np.ndarray, np.ndarray]:
+    """Whether each decision's likeliest class is right, and its confidence."""
+    pairs = [(d.loglik.argmax() == k, d.confidence) for group, k in zip(decisions, labels, strict=True) for d in group]
+    right, confidence = np.array(pairs, dtype=float).reshape(-1, 2).T
+    return right, confidence
+
+
+def _growth(twins, parts, labels, folds, base: int) -> float:
+    """How evidence grows with length: the exponent under which four windows' log-likelihoods cost least."""
+    groups, truth = [], []
+    for group, k in zip(_decisions(twins, parts, folds, base), labels, strict=True):
+        for at in range(0, len(group) - 3, 4):
+            groups.append(np.mean([d.loglik for d in group[at : at + 4]], axis=0))
+            truth.append(k)
+    if not groups:
+        return 0.5
+    mean = np.array(groups) - np.max(groups, axis=1, keepdims=True)
+    tries = np.linspace(0.0, 1.0, 11)
+    return float(tries[np.argmin([log_loss(mean * 4.0**p, np.array(truth)) for p in tries])])
+
+
+def _together(twins, parts, labels, folds, base: int) -> float:
+    """Factor under which the log-likelihoods of windows cost least; never above what two independent views deserve."""
+    pairs = [(d.loglik, k) for g, k in zip(_decisions(twins, parts, folds, base), labels, strict=True) for d in g]
+    loglik, truth = np.array([p[0] for p in pairs]), np.array([p[1] for p in pairs])
+    tries = np.linspace(0.5, 2.0, 16)
+    return float(tries[np.argmin([log_loss(loglik * t, truth) for t in tries])])
+
+
+def _border(twins, parts, folds, length: int) -> float:
+    """How badly neighbouring stretches of one surface share a class, nats, at most."""
+    worst = [0.0]
+    for group in _decisions(twins, parts, folds, length):
+        loglik = np.array([d.loglik for d in group])
+        if len(loglik) > 1:
+            worst += list(-(loglik[1:] + loglik[:-1]).max(axis=1))
+    return float(BORDER_OVER * np.quantile(worst, BORDER_QUANTILE) + 1.0)
+
+
+def _doubt(right: np.ndarray, confidence: np.ndarray) -> float:
+    """Confidence below which "unknown" is said: as little as cuts wrong answers enough, within what it may cost."""
+    if right.all():
+        return 0.0
+    wrong = 1.0 - right.mean()
+    for share in np.linspace(0.0, REFUSE_MOST, 26):
+        limit = np.quantile(confidence, share)
+        kept = right[confidence >= limit]
+        if (1.0 - kept).sum() / len(right) <= wrong / REFUSE_UNTIL:
+            break
+    return float(limit)
+
+
+def _sure(twins, parts, labels, folds, base: int, fixed: float) -> tuple[float, float, float]:
+    """The least sureness at which sequential decisions are right as often as fixed windows; samples and accuracy."""
+    tried, low, high = {}, 0, len(SURE) - 1
+    while SURE[low] not in tried:  # accuracy grows with sureness: halve what is left
+        sure = SURE[(low + high) // 2]
+        for twin in twins:
+            twin.sure = sure
+        decisions = _decisions(twins, parts, folds, base, sequential=True)
+        right, _ = _scores(decisions, labels)
+        tried[sure] = float(np.mean([d.samples for g in decisions for d in g])), float(right.mean())
+        low, high = (low, (low + high) // 2) if tried[sure][1] >= fixed else (min((low + high) // 2 + 1, high), high)
+    return SURE[low], *tried[SURE[low]]

@@ -1,0 +1,1 @@
+"""What is measured: a room per part of the project, one front (__main__.py)."""

@@ -1,0 +1,84 @@
+"""Measures speed and accuracy, always as ratios in one run, and redraws every chart.
+
+    make bench                                        all topics: bench/results/*.json, docs/charts/*.svg and .png
+    .venv/bin/python tools/benches --only ring nav    some topics, one after the other
+    .venv/bin/python tools/benches nav --quick        one topic, with options of its own; `nav --help` tells them
+
+A measurement that is done is kept in build/bench: an interrupted run goes on where it stopped; `--fresh` begins again.
+"""
+
+import argparse
+import importlib
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import matplotlib
+
+ROOT = Path(__file__).resolve().parents[2]
+TOPICS = {  # topic -> module, by room
+    "bridge": "bridge.bench",
+    "chain": "bridge.chain",
+    "host": "host.bench",
+    "levels": "bridge.levels",
+    "mechanics": "mechanics.bench",
+    "nav": "nav.bench",
+    "nav_paper": "nav.paper",
+    "nav_peers": "nav.peer_runs",
+    "node": "node.bench",
+    "radial": "radial.bench",
+    "record": "host.record",
+    "restart": "robot.restart",
+    "ring": "host.ring",
+    "robot": "robot.bench",
+    "texture": "texture.bench",
+    "usb": "bridge.usb",
+    "view": "host.view",
+}
+
+
+def main() -> None:
+    sys.path[0] = str(ROOT / "tools")  # the benches are a package; this file's own folder is none of its modules'
+    matplotlib.rcParams["svg.hashsalt"] = "whisker"  # same data, same file
+    topic, *words = sys.argv[1:] or [""]
+    if topic in TOPICS:
+        run_one(topic, words)
+    else:
+        run_many(sys.argv[1:])
+
+
+def run_one(topic: str, words: list[str]) -> None:
+    bench = bench_of(topic)
+    parser = front(f"tools/benches {topic}", bench.__doc__)
+    if hasattr(bench, "options"):
+        bench.options(parser)
+    chosen = vars(parser.parse_args(words))
+    bench.run(chosen.pop("build_dir").resolve(), chosen.pop("fresh"), **chosen)
+
+
+def run_many(words: list[str]) -> None:
+    topics = list(TOPICS)
+    parser = front("tools/benches", __doc__)
+    parser.add_argument("--only", nargs="+", choices=topics, default=topics, metavar="TOPIC", help=", ".join(topics))
+    chosen = parser.parse_args(words)
+    for topic in chosen.only:
+        print(f"bench: {topic}", flush=True)
+        bench_of(topic).run(chosen.build_dir.resolve(), chosen.fresh)
+
+
+def bench_of(topic: str) -> ModuleType:
+    """A module with run(build, fresh, ...), what it measures in its text, and options(parser) if run takes more."""
+    return importlib.import_module(f"benches.{TOPICS[topic]}")
+
+
+def front(name: str, description: str | None) -> argparse.ArgumentParser:
+    """What every bench is told."""
+    form = argparse.RawDescriptionHelpFormatter
+    parser = argparse.ArgumentParser(prog=name, description=description, formatter_class=form)
+    parser.add_argument("--build-dir", type=Path, default=ROOT / "build/release")
+    parser.add_argument("--fresh", action="store_true", help="forget what an interrupted run has measured")
+    return parser
+
+
+if __name__ == "__main__":
+    main()

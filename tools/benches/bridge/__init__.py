@@ -1,0 +1,1 @@
+"""The bridge: in an FPGA, as Verilated gateware and as transactions; the chain behind it; its USB soak."""

@@ -1,0 +1,1 @@
+"""Whisker mechanics beside a chain of rigid links."""

@@ -1,0 +1,84 @@
+"""Whisker mechanics beside a chain of rigid links in MuJoCo: error of the base moment, natural frequencies, speed.
+
+The chain (peers/chain.py) knows nothing of the simulator: an independent reference. Its 20-link results
+are also written to sim/mechanics/tests/reference_table.h, where `make test` compares the simulator with them.
+Speed: 28 whiskers at 2 kHz on one core, 4 against objects all the time, 8 dragged over floors, 16 free; ours and
+MuJoCo's rounds take turns.
+"""
+
+import json
+import shutil
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+from tqdm import tqdm
+
+from .charts import draw_moment, draw_speed
+from .measure import (
+    CACHE,
+    LINKS,
+    ROOT,
+    ROUNDS,
+    Ours,
+    chain,
+    measure_links,
+    measure_modes,
+    measure_speed,
+    measure_static,
+    mode_cases,
+    spec,
+    static_cases,
+    whisker_of,
+)
+from .summary import summary, write_table
+
+RESULTS, CHARTS = ROOT / "bench/results", ROOT / "docs/charts"
+
+
+def save(data: dict) -> None:
+    for folder in (RESULTS, CHARTS):
+        folder.mkdir(parents=True, exist_ok=True)
+    (RESULTS / "mechanics.json").write_text(json.dumps(data, indent=1) + "\n")
+    for name, draw in (("speed", draw_speed), ("moment", draw_moment)):
+        figure = draw(data)
+        figure.savefig(CHARTS / f"mechanics_{name}.svg", metadata={"Date": None})
+        figure.savefig(CHARTS / f"mechanics_{name}.png", dpi=120)
+    print("bench/results/mechanics.json, docs/charts/mechanics_speed.svg, mechanics_moment.svg")
+
+
+def keep(ours: Ours, links: list[dict]) -> None:
+    """Marks what is before slip-off, and where the closed form is trusted at the default tolerance."""
+    relative = ours.lib.mech_tolerance_default().relative
+    for row in links:
+        row["kept"] = []
+        for p in row["points"]:
+            whisker = whisker_of({"tip": 0.3e-3, "kappa": 1.0})
+            a, theta = p["a"] * 1e-3, np.radians(p["theta_deg"])
+            trust = ours.lib.mech_table_trust(ours.table, whisker.c, a)
+            bent = theta - ours.lib.mech_static_tilt(whisker.c, a, theta)
+            p["trusted"] = bool(
+                (trust.curvature * bent + trust.friction) * bent <= relative and bent <= 0.5 * trust.limit
+            )
+            if p["theta_deg"] <= 0.95 * ours.slip_deg(whisker, a):
+                row["kept"].append(p)
+
+
+def run(build: Path, fresh: bool) -> None:
+    """Measure what is not measured yet, and redraw. The simulator is the one that tools/build.sh has built."""
+    matplotlib.rcParams["svg.hashsalt"] = "whisker"
+    if fresh:
+        for folder in ("chain", "speed"):
+            shutil.rmtree(CACHE / folder, ignore_errors=True)
+    ours = Ours()
+    with tqdm(total=len(static_cases()) + len(LINKS) + len(mode_cases()) + ROUNDS, desc="mechanics") as bar:
+        speed = measure_speed(ours, bar)
+        modes = measure_modes(ours, bar)
+        static = measure_static(ours, bar)
+        links = measure_links(ours, bar)
+    keep(ours, links)
+    data = {"summary": summary(static, modes, speed), "speed": speed, "modes": modes, "static": static, "links": links}
+    data["mujoco"] = chain("modes", spec(0.3e-3, 1.0, 20, pinned_at=0.0))["mujoco"]
+    write_table(static, modes)
+    save(data)
+    print(json.dumps(data["summary"], indent=1))

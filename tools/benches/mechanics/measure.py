@@ -1,0 +1,263 @@
+"""What the bench measures: the chain's answers, the simulator's beside them, and the speed of both."""
+
+import hashlib
+import json
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[3]
+SOURCES = ROOT / "tools/benches/mechanics/peers"
+CACHE = ROOT / "build/bench/mechanics"
+sys.path.insert(0, str(ROOT / "sim"))
+
+LINKS = (5, 10, 20)
+FINEST = 80  # links, for frequencies
+ROUNDS = 3
+OURS_S, MUJOCO_S = 20.0, 0.6  # simulated seconds a round
+ANGLES = [2.5, 5.0, 7.5, *np.arange(10, 60, 5).tolist()]
+EXIT, LENGTH, YOUNG, DENSITY = 1.30625e-3, 0.140, 2.5e9, 1200.0
+STOP_FREE = 1e3  # no stop of the plug: MuJoCo's has none
+SMALL_DEG = 5.0
+
+# level -> title, forced level of whiskers against objects and on floors, sliding contacts, counts
+LEVELS = {
+    "closed": ("closed form", 1, 1, False, False),
+    "large": ("large deflection", 2, 1, False, False),
+    "closed_vibration": ("closed form, vibration", 5, 4, False, False),
+    "large_vibration": ("large deflection, vibration", 6, 4, False, False),
+    "auto": ("as the scene needs", -1, -1, False, False),
+    "auto_sliding": ("as needed, contacts slide", -1, -1, True, False),
+    "auto_counts": ("as needed, noise and counts too", -1, -1, False, True),
+}
+
+
+def cone(tip: float) -> float:
+    return LENGTH / (1 - tip / EXIT)
+
+
+def plug(kappa: float | None, tip: float) -> float | None:
+    """Stiffness, N m/rad."""
+    return None if kappa is None else kappa * 3 * YOUNG * np.pi * EXIT**4 / 64 / cone(tip)
+
+
+def spec(tip: float, kappa: float | None, links: int, **more) -> dict:
+    return {
+        "length": LENGTH,
+        "exit_diameter": EXIT,
+        "cone": cone(tip),
+        "young": YOUNG,
+        "density": DENSITY,
+        "plug": plug(kappa, tip),
+        "links": links,
+        **more,
+    }
+
+
+def static_cases() -> list[dict]:
+    """Tip diameter, kappa, friction, distance."""
+    rows = [(0.3e-3, kappa, 0.0, a) for kappa in (None, 1.0) for a in (80, 90, 100, 110, 120, 130, 135)]
+    rows += [(0.3e-3, 3.0, 0.0, a) for a in (90, 120)]
+    rows += [(0.3e-3, kappa, 0.3, a) for kappa in (None, 1.0) for a in (90, 110, 130)]
+    rows += [(tip, kappa, 0.0, a) for tip in (0.2e-3, 0.6e-3, 0.9e-3) for kappa in (None, 1.0) for a in (90, 120)]
+    return [{"tip": t, "kappa": k, "friction": f, "a": a * 1e-3} for t, k, f, a in rows]
+
+
+def mode_cases() -> list[dict]:
+    return [
+        {"tip": tip, "kappa": kappa, "pinned_at": at}
+        for tip in (0.3e-3, 0.6e-3)
+        for kappa in (None, 1.0)
+        for at in (0.0, 0.110, 0.140)
+    ]
+
+
+def python() -> Path:
+    """The interpreter with MuJoCo, in a virtual environment of the bench's own."""
+    folder = CACHE / "venv"
+    found = folder / "bin/python"
+    if not (folder / "ready").exists():
+        subprocess.run([sys.executable, "-m", "venv", str(folder)], check=True)
+        install = [str(folder / "bin/pip"), "install", "--quiet", "--disable-pip-version-check", "--require-hashes"]
+        subprocess.run([*install, "-r", str(SOURCES / "requirements.lock")], check=True)
+        (folder / "ready").touch()
+    return found
+
+
+def chain(kind: str, job: dict) -> dict:
+    """A result of the chain, kept once it is there."""
+    text = json.dumps(job, sort_keys=True)
+    kept = CACHE / "chain" / f"{kind}_{hashlib.sha256(text.encode()).hexdigest()[:16]}.json"
+    if not kept.exists():
+        kept.parent.mkdir(parents=True, exist_ok=True)
+        done = subprocess.run([str(python()), str(SOURCES / "chain.py"), kind, text], capture_output=True, text=True)
+        if done.returncode:
+            raise RuntimeError(f"mechanics bench: chain.py {kind} failed: {done.stderr.strip().splitlines()[-1]}")
+        kept.write_text(done.stdout)
+    return json.loads(kept.read_text())
+
+
+def whisker_of(case: dict):
+    from signals.mechanics import Whisker
+
+    kappa = np.inf if case["kappa"] is None else case["kappa"]
+    parameters = {"young": YOUNG, "density": DENSITY, "kappa": kappa, "stop": STOP_FREE}
+    return Whisker(exit_diameter=EXIT, cone=cone(case["tip"]), friction=case.get("friction", 0.0), **parameters)
+
+
+class Ours:
+    """The simulator's levels by name: base moment at a peg (m, rad), swept up from the unbent whisker."""
+
+    def __init__(self):
+        from signals._sim import ffi, lib
+
+        from signals.mechanics import _shared_table
+
+        self.ffi, self.lib, self.table = ffi, lib, _shared_table()
+
+    def closed(self, whisker, a: float, theta: float) -> float:
+        return self.lib.mech_static_moment(whisker.c, a, theta)
+
+    def large(self, whisker, a: float, theta: float) -> float:
+        """NaN once slipped off."""
+        hold, moment = self.ffi.new("struct mech_hold *"), self.ffi.new("double *")
+        for part in np.linspace(0, theta, 101)[1:]:
+            if not self.lib.mech_table_moment(self.table, whisker.c, a, part, hold, moment):
+                return float("nan")
+        self.arc = hold.arc * whisker.cone
+        return moment[0]
+
+    def slip_deg(self, whisker, a: float) -> float:
+        hold, moment = self.ffi.new("struct mech_hold *"), self.ffi.new("double *")
+        angles = np.arange(0.05, 90, 0.05)
+        for angle in angles:
+            if not self.lib.mech_table_moment(self.table, whisker.c, a, np.radians(angle), hold, moment):
+                return float(angle)
+        return float("inf")
+
+    def elastica(self, whisker, a: float, theta: float) -> float:
+        """The exact equation's moment with a plug, frictionless: bisection for the beam's own angle."""
+        unit = self.lib.mech_whisker_bending(whisker.c) / whisker.cone
+        bend = self.ffi.new("struct mech_bend *")
+        low, high = 0.0, theta
+        for _ in range(40 if np.isfinite(whisker.kappa) else 1):
+            middle = (low + high) / 2 if np.isfinite(whisker.kappa) else theta
+            there = self.lib.mech_elastica_at_angle(a / whisker.cone, middle, 0.0, 200, bend)
+            if not there or middle + bend.moment / (3 * whisker.kappa) > theta:
+                high = middle
+            else:
+                low = middle
+        return unit * bend.moment if there else float("nan")
+
+    def hertz(self, case: dict) -> list[float]:
+        whisker, modes = whisker_of(case), self.ffi.new("struct mech_modes *")
+        self.lib.mech_modes_of(whisker.c, modes)
+        omega = list(modes.omega)
+        if case["pinned_at"]:
+            basis = self.ffi.new("struct mech_basis *")
+            self.lib.mech_basis_of(whisker.c, modes, True, case["pinned_at"], 5e-4, basis)
+            omega = list(basis.omega)
+        return (np.sort(omega)[:3] / (2 * np.pi)).tolist()
+
+
+def measure_static(ours: Ours, bar) -> list[dict]:
+    """Per case: what 20 links say, and the levels' errors against it."""
+    rows = []
+    for case in static_cases():
+        angles = ANGLES[1:] if case["friction"] else ANGLES  # the first touch takes time to settle
+        wanted = {"friction": case["friction"], "a": case["a"], "angles_deg": angles}
+        found = chain("static", spec(case["tip"], case["kappa"], 20, **wanted))
+        whisker = whisker_of(case)
+        points = []
+        for row in found["rows"]:
+            large = ours.large(whisker, row["a"], row["theta"])
+            points.append(
+                {
+                    "theta_deg": float(np.degrees(row["theta"])),
+                    "chain": row,
+                    "large": large / row["moment"] - 1,
+                    "closed": ours.closed(whisker, row["a"], row["theta"]) / row["moment"] - 1,
+                    "arc_mm": 1e3 * (ours.arc - row["arc"]),
+                }
+            )
+        slip = found["slipped_deg"]
+        rows.append(case | {"points": points, "chain_slips_deg": slip, "slips_deg": ours.slip_deg(whisker, case["a"])})
+        bar.update()
+    return rows
+
+
+def measure_links(ours: Ours, bar) -> list[dict]:
+    """Error of 5, 10 and 20 links against the exact elastica, in a plug with kappa 1."""
+    rows = []
+    for links in LINKS:
+        points = []
+        for a in (80, 100, 120, 130):
+            case = {"tip": 0.3e-3, "kappa": 1.0, "friction": 0.0, "a": a * 1e-3}
+            job = spec(case["tip"], 1.0, links, friction=0.0, a=case["a"], angles_deg=ANGLES)
+            whisker = whisker_of(case)
+            for row in chain("static", job)["rows"]:
+                exact = ours.elastica(whisker, row["a"], row["theta"])
+                errors = {"chain": row["moment"] / exact - 1}
+                errors |= {
+                    name: getattr(ours, name)(whisker, row["a"], row["theta"]) / exact - 1
+                    for name in ("closed", "large")
+                }
+                points.append({"a": a, "theta_deg": float(np.degrees(row["theta"])), **errors})
+        rows.append({"links": links, "points": points})
+        bar.update()
+    return rows
+
+
+def measure_modes(ours: Ours, bar) -> list[dict]:
+    rows = []
+    for case in mode_cases():
+        row = case | {"ours_hz": ours.hertz(case), "chain_hz": {}}
+        for links in (*LINKS, FINEST):
+            job = spec(case["tip"], case["kappa"], links, pinned_at=case["pinned_at"])
+            row["chain_hz"][links] = chain("modes", job)["hz"][:3]
+        rows.append(row)
+        bar.update()
+    return rows
+
+
+def run_scene(ours: Ours, level: str) -> dict:
+    _, shaft, drag, sliding, counts = LEVELS[level]
+    setting = {"shaft_level": shaft, "drag_level": drag, "sliding": sliding, "counts": counts, "tick_s": 500e-6}
+    scene = ours.lib.sim_mechanics_scene_new(ours.ffi.new("struct sim_mechanics_setting *", setting), 11)
+    ours.lib.sim_mechanics_scene_run(scene, 4000)
+    started = time.process_time()
+    ours.lib.sim_mechanics_scene_run(scene, round(OURS_S / 500e-6))
+    spent = time.process_time() - started
+    share = ours.ffi.new("double[2]")
+    ours.lib.sim_mechanics_scene_levels(scene, share)
+    ours.lib.sim_mechanics_scene_free(scene)
+    return {"times_real": OURS_S / spent, "large": share[0], "vibrating": share[1]}
+
+
+def measure_speed(ours: Ours, bar) -> dict:
+    """Median of rounds in turn; all on one core."""
+    found: dict[str, list[dict]] = {}
+    for turn in range(ROUNDS):
+        for level in LEVELS:
+            found.setdefault(level, []).append(kept_round(level, turn, lambda level=level: run_scene(ours, level)))
+        for links in LINKS:
+            name, job = f"mujoco_{links}", spec(0.3e-3, 1.0, links, seconds=MUJOCO_S)
+            found.setdefault(name, []).append(chain("speed", job | {"turn": turn}))
+        bar.update()
+    return {name: median_of(rounds) for name, rounds in found.items()}
+
+
+def kept_round(level: str, turn: int, measure) -> dict:
+    kept = CACHE / "speed" / f"{level}_{turn}.json"
+    if not kept.exists():
+        kept.parent.mkdir(parents=True, exist_ok=True)
+        kept.write_text(json.dumps(measure()))
+    return json.loads(kept.read_text())
+
+
+def median_of(rounds: list[dict]) -> dict:
+    middle = sorted(rounds, key=lambda one: one["times_real"])[len(rounds) // 2]
+    return middle | {"rounds": [one["times_real"] for one in rounds]}

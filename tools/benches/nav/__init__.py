@@ -1,0 +1,1 @@
+"""The filters: speed against accuracy, the paper's figures, other projects' filters."""

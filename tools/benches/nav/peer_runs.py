@@ -1,0 +1,287 @@
+"""Particle filters of other projects beside this one's filters: same scenes, same likelihood, same clock.
+
+    make bench, or .venv/bin/python tools/benches nav_peers [--seeds N]
+
+Every filter takes the rows of the same contract scenes through host/nav's intake and weighs poses by host/nav's
+likelihood; what differs is the filter. Times are CPU time per row, all of it: intake, motion, weights, resampling,
+estimate. A run that is done is kept in build/bench/nav_peers. A peer that is not there is skipped by name. A program of
+one's own joins by NAV_PEER_<NAME>=PROGRAM, called as PROGRAM SCENE.txt EST.csv --particles N --seed S (peer.hpp).
+"""
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+from matplotlib.figure import Figure
+from tqdm import tqdm
+
+import whisker
+from whisker import scenes
+from whisker.nav import localise
+from whisker.nav.scoring import lock_row, position_errors
+from whisker.scene import Prior
+
+ROOT = Path(__file__).resolve().parents[3]
+RESULTS, CHARTS, CACHE = ROOT / "bench/results", ROOT / "docs/charts", ROOT / "build/bench/nav_peers"
+PEERS = Path(__file__).resolve().parent / "peers"
+VENV, NATIVE = ROOT / "build/bench/peers-venv", ROOT / "build/bench/peers"
+APT = "apt-get install libmrpt-slam-dev"
+FAMILIES = ("anchor", "anchor+global", "anchor+kidnap")
+SEEDS, PYTHON_SEEDS = 100, 20  # packages in Python take seconds a run
+FIRST_SEED = 5000  # nothing was developed on these
+OURS = {
+    ("odometry", ""): {},
+    ("ekf", ""): {},
+    ("ukf", ""): {},
+    ("foveal", "11x11x11"): {},
+    ("foveal inflated", "11x11x11"): {"foveal.inflate": 1.0},
+    ("grid", "5 cm x 10 deg"): {},
+    ("particle", "100"): {"particle.count": 100.0},
+    ("particle", "500"): {"particle.count": 500.0},
+    ("particle", "2000"): {"particle.count": 2000.0},
+    ("particle", "300-20000 KLD"): {},
+    ("adaptive", ""): {},
+}
+Steps = tuple[np.ndarray, np.ndarray]  # poses (n, 3), CPU time (n,) in us
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One filter at one size, on every family and seed."""
+
+    filter: str
+    setting: str
+    seeds: int
+    run: Callable[[Path, scenes.Made, int], Steps]
+
+
+def flat(made: scenes.Made) -> str:
+    """A scene and its rows as the numbers that peer.cpp reads, in its order."""
+    arena, robot, rows = made.scene.arena, made.scene.robot, made.observations
+    floor = np.array(arena.floor_indices())
+    prior = made.scene.prior or Prior("uniform")
+    gaussian = prior.kind == "gaussian"
+    tips, rays = robot.of_role("texture"), robot.of_role("object")
+    head = [*arena.size_m, arena.tile_m, floor.shape[1], floor.shape[0], len(arena.textures), *floor.ravel()]
+    head += [len(arena.obstacles), *(edge for box in arena.obstacles for edge in box)]
+    head += [robot.body_radius_m, robot.odometry_relative_sigma, robot.radial_sigma_m]
+    head += [len(tips), *(v for w in tips for v in w.tip_m)]
+    head += [len(rays), *(v for w in rays for v in (*w.base_m, w.yaw_rad, w.length_m))]
+    head += [int(not gaussian), *(prior.mean if gaussian else (0, 0, 0)), *(prior.sigma if gaussian else (1, 1, 1))]
+    cells = np.column_stack([rows.t_s, rows.odometry, rows.texture.reshape(len(rows), -1), rows.radial_m])
+    lines = [" ".join(repr(float(v)) for v in line) for line in (head, [len(rows)], *cells)]
+    return "\n".join(lines) + "\n"
+
+
+def ours(name: str, settings: dict[str, float]) -> Callable:
+    def run(_folder: Path, made: scenes.Made, seed: int) -> Steps:
+        result = localise.run(name, made.scene, made.observations, settings, seed)
+        return result.poses, result.step_us
+
+    return run
+
+
+def program(command: list, folder: Path, scene: Path, seed: int) -> Steps:
+    """A peer's own process; one thread, as everybody has."""
+    out = folder / "est.csv"
+    alone = {name: "1" for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "NUMBA_NUM_THREADS")}
+    environment = os.environ | alone | {"PYTHONPATH": str(Path(whisker.__file__).parents[1])}
+    words = [str(word) for word in (*command[:-1], scene, out, *command[-1], "--seed", seed)]
+    done = subprocess.run(words, env=environment, capture_output=True, text=True)
+    if done.returncode != 0:
+        raise RuntimeError(f"{words[0]} failed: {done.stderr.strip().splitlines()[-1:]}")
+    table = np.genfromtxt(out, delimiter=",", names=True)
+    return np.column_stack([table["x_m"], table["y_m"], table["theta_rad"]]), table["step_us"]
+
+
+def native(path: Path, *options) -> Callable:
+    def run(folder: Path, made: scenes.Made, seed: int) -> Steps:
+        (folder / "scene.txt").write_text(flat(made))
+        return program([path, options], folder, folder / "scene.txt", seed)
+
+    return run
+
+
+def python(peer: str, *options) -> Callable:
+    def run(folder: Path, made: scenes.Made, seed: int) -> Steps:
+        scenes.write_scene(folder / "scene", made.scene, made.observations)
+        command = [VENV / "bin/python", PEERS / "python_peer.py", peer, options]
+        return program(command, folder, folder / "scene", seed)
+
+    return run
+
+
+def quietly(*command) -> bool:
+    return subprocess.run([str(word) for word in command], capture_output=True).returncode == 0
+
+
+def python_entries(most: int) -> list[Entry]:
+    """Installs the packages into a virtual environment of their own, once."""
+    pip = (VENV / "bin/pip", "install", "--disable-pip-version-check", "--require-hashes")
+    ready = VENV / "ready"
+    if not ready.exists():
+        made = quietly(sys.executable, "-m", "venv", VENV) and quietly(*pip, "-r", PEERS / "build.lock")
+        if not made or not quietly(*pip, "--no-build-isolation", "-r", PEERS / "requirements.lock"):
+            print(
+                "nav_peers: filterpy, particles, pfilter skipped: tools/benches/nav/peers/requirements.lock cannot be installed"
+            )
+            return []
+        ready.touch()
+    return [
+        Entry(peer, str(n), min(most, PYTHON_SEEDS), python(peer, "--particles", n))
+        for peer in ("filterpy", "particles", "pfilter")
+        for n in (500, 2000)
+    ]
+
+
+def mrpt_entries(build: Path, most: int) -> list[Entry]:
+    """Builds the program if MRPT is there."""
+    library = next(iter(sorted(build.rglob("libnav.a"))), None)
+    cmake = ("cmake", "-S", PEERS, "-B", NATIVE, f"-DNAV_LIBRARY={library}")
+    if not (quietly(*cmake) and quietly("cmake", "--build", NATIVE) and (NATIVE / "mrpt_peer").exists()):
+        print(f"nav_peers: MRPT skipped: not installed; {APT}")
+        return []
+    peer = NATIVE / "mrpt_peer"
+    sizes = [Entry("mrpt standard", str(n), most, native(peer, "--particles", n)) for n in (100, 500, 2000)]
+    kld = Entry("mrpt standard", "300-20000 KLD", most, native(peer, "--particles", 20000, "--kld", 20000))
+    others = [
+        Entry(f"mrpt {kind}", str(n), min(most, PYTHON_SEEDS), native(peer, "--particles", n, "--algorithm", kind))
+        for kind, n in (("auxiliary", 500), ("optimal", 100))
+    ]
+    return [*sizes, kld, *others]
+
+
+def guests(most: int) -> list[Entry]:
+    """Programs named in the environment."""
+    prefix = "NAV_PEER_"
+    found = {key.removeprefix(prefix).lower(): value for key, value in os.environ.items() if key.startswith(prefix)}
+    for name in {"beluga", "nav2"} - found.keys():
+        print(f"nav_peers: {name} skipped: no program; set {prefix}{name.upper()} to one that peer.hpp describes")
+    return [
+        Entry(name, str(n), min(most, PYTHON_SEEDS), native(Path(path), "--particles", n))
+        for name, path in sorted(found.items())
+        for n in (500, 2000)
+    ]
+
+
+def judge(made: scenes.Made, steps: Steps) -> dict:
+    poses, us = steps
+    distance = position_errors(poses, made.observations.truth)
+    return {
+        "step_us_median": float(np.median(us)),
+        "step_us_p99": float(np.quantile(us, 0.99)),
+        "error_median_m": float(np.median(distance)),
+        "error_rms_m": float(np.sqrt(np.mean(distance**2))),
+        "lost": lock_row(distance) is None,
+    }
+
+
+def measure(entry: Entry, family: str, seed: int, fresh: bool) -> dict:
+    name = "_".join([entry.filter, entry.setting, family, str(seed)]).replace(" ", "-")
+    kept = CACHE / f"{name}.json"
+    if fresh or not kept.exists():
+        made = scenes.make(family, FIRST_SEED + seed)
+        with tempfile.TemporaryDirectory() as folder:
+            result = judge(made, entry.run(Path(folder), made, seed))
+        kept.parent.mkdir(parents=True, exist_ok=True)
+        kept.write_text(json.dumps(result) + "\n")
+    return json.loads(kept.read_text())
+
+
+def summed_up(entry: Entry, family: str, runs: list[dict]) -> dict:
+    """Medians over seeds; the spread is the quartiles'."""
+
+    def over(key: str) -> np.ndarray:
+        return np.array([run[key] for run in runs])
+
+    quartiles = np.quantile(over("error_median_m"), (0.25, 0.75)).tolist()
+    return {
+        "filter": entry.filter,
+        "setting": entry.setting,
+        "family": family,
+        "seeds": len(runs),
+        "step_us_median": float(np.median(over("step_us_median"))),
+        "step_us_p99": float(np.median(over("step_us_p99"))),
+        "error_median_m": float(np.median(over("error_median_m"))),
+        "error_median_quartiles_m": quartiles,
+        "error_rms_m": float(np.median(over("error_rms_m"))),
+        "lost_share": float(np.mean(over("lost"))),
+    }
+
+
+def draw(table: list[dict]) -> Figure:
+    """Error against time while tracking; share of runs lost from a global start and after a kidnap."""
+    figure = Figure(figsize=(11.5, 4.6), layout="constrained")
+    panels = figure.subplots(1, 2, width_ratios=(3, 2))
+    names = list(dict.fromkeys(row["filter"] for row in table))
+    mine = {name for name, _ in OURS}
+    for axes, families in zip(panels, (FAMILIES[:1], FAMILIES[1:]), strict=True):
+        for n, name in enumerate(names):
+            draw_filter(
+                axes, [row for row in table if row["filter"] == name and row["family"] in families], name in mine, n
+            )
+    panels[0].set(xscale="log", yscale="log", xlabel="CPU time per row (us, median)", ylabel="position error (m)")
+    panels[0].set_title("tracking: median error, quartiles of the seeds", fontsize=10)
+    panels[1].set(xscale="log", xlabel="CPU time per row (us, median)", ylabel="share of runs not locked at the end")
+    panels[1].set_title("global start, kidnap (larger marks)", fontsize=10)
+    for axes in panels:
+        axes.grid(color="#e4e4e4", linewidth=0.6)
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside right upper", fontsize=8, frameon=False)
+    return figure
+
+
+def draw_filter(axes, rows: list[dict], mine: bool, number: int) -> None:
+    style = {"color": f"C{number % 10}", "marker": "os^vDP*X<>hdp"[number % 13]}
+    face = style["color"] if mine else "none"  # hollow: somebody else's
+    for family in dict.fromkeys(row["family"] for row in rows):
+        part = sorted((r for r in rows if r["family"] == family), key=lambda r: r["step_us_median"])
+        us = [r["step_us_median"] for r in part]
+        if family == FAMILIES[0]:
+            error = np.array([r["error_median_m"] for r in part])
+            low, high = np.array([r["error_median_quartiles_m"] for r in part]).T
+            bars = {"yerr": [error - low, high - error], "elinewidth": 0.8}
+            line = "-" if mine else "--"
+            axes.errorbar(us, error, linestyle=line, markerfacecolor=face, label=part[0]["filter"], **bars, **style)
+        else:
+            size = 9 if family.endswith("kidnap") else 5
+            lost = [r["lost_share"] for r in part]
+            axes.plot(us, lost, linestyle="none", markersize=size, markerfacecolor=face, **style)
+
+
+def save(table: list[dict]) -> None:
+    for folder in (RESULTS, CHARTS):
+        folder.mkdir(parents=True, exist_ok=True)
+    (RESULTS / "nav_peers.json").write_text(json.dumps(table, indent=1) + "\n")
+    with matplotlib.rc_context({"svg.hashsalt": "whisker", "svg.fonttype": "none"}):
+        figure = draw(table)
+        figure.savefig(CHARTS / "nav_peers.svg", metadata={"Date": None})
+        figure.savefig(CHARTS / "nav_peers.png", dpi=120)
+    print("bench/results/nav_peers.json, docs/charts/nav_peers.svg")
+
+
+def run(build: Path, fresh: bool, seeds: int = SEEDS) -> None:
+    known = localise.filter_names()
+    entries = [
+        Entry(*key, seeds, ours(key[0].split()[0], settings))
+        for key, settings in OURS.items()
+        if key[0].split()[0] in known
+    ]
+    entries += mrpt_entries(build, seeds) + python_entries(seeds) + guests(seeds)
+    jobs = [(e, family, seed) for e in entries for family in FAMILIES for seed in range(e.seeds)]
+    results = {}
+    for entry, family, seed in tqdm(jobs, desc="nav_peers", unit="run"):
+        results.setdefault((entry, family), []).append(measure(entry, family, seed, fresh))
+    save([summed_up(*key, runs) for key, runs in results.items()])
+
+
+def options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--seeds", type=int, default=SEEDS)

@@ -1,0 +1,1 @@
+"""The whisker node: faults, link, skew, processor load."""

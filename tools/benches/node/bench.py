@@ -1,0 +1,317 @@
+"""Measures the whisker node: random faults, fastest link, skew between nodes, time to the armed record, processor load.
+
+    .venv/bin/python tools/benches node        bench/results/node.json, node_faults.json and node_cuts.json,
+                                                docs/node_faults.md, docs/charts/node_*.svg and .png
+
+All on the register model of the chip and the edge-by-edge model of the sensor; nothing here has run on silicon. A
+thousand batches of a thousand fault schedules take about six minutes of one core; what is done is kept in build/bench/node.
+"""
+
+import argparse
+import json
+import re
+import subprocess
+import sys
+from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+from tqdm import tqdm
+
+from whisker.protocol import LIMITS
+from whisker.report import figures
+
+from . import odds, page
+
+ROOT = Path(__file__).resolve().parents[3]
+RESULTS, CHARTS = ROOT / "bench/results", ROOT / "docs/charts"
+BATCHES, CHUNK, PROCESSES = 1000, 50, 2
+NODES, TICKS = 28, 10_000
+TICK_CYCLES = 19_300  # of 500 us at the slowest oscillator
+FCY_HZ = 38.6925e6  # 7.37 MHz x 42 / 8: firmware/dspic/port_dspic/clock.c
+CONVERSION_NS = 350_000  # the sensor's longest in fast mode
+ARMED_MOST_US = 450  # wanted, at the slowest oscillators
+CYCLES_PER_US = LIMITS["clock_hz"] / 1e6
+LINK_TICKS = 100
+DIVIDERS = (4, 6, 8, 12, 16, 24, 32)
+WAYS = ("lines", "links")
+PARTS = ("faults", "storm", "link", "skew", "load")
+SPREADS = {"equal": (0, 0), "2 %": (20_000, 100), "4 %": (40_000, 100)}  # ppm of chips, permille of sensors
+TOTALS = ("schedules", "ticks", "bad", "missed_line", "missed_link", "displaced", "unexplained", "unforeseen")
+TOTALS += ("spurious", "stuck", "violations", "overwritten")
+
+
+def storm(build: Path, kept: Path, fresh: bool, batches: int) -> dict:
+    """Schedules of random faults, a million by default: what was flagged against what was broken."""
+
+    def chunk(first: int) -> list[dict]:
+        path = kept / f"storm_{first}.jsonl"
+        if fresh or not path.exists():
+            done = subprocess.run(
+                [build / "sim/node/node_storm", str(first), str(CHUNK)], capture_output=True, text=True
+            )
+            path.write_text(done.stdout)
+        lines = [json.loads(line) for line in path.read_text().splitlines()]
+        if [line["batch"] for line in lines] != list(range(first, first + CHUNK)):
+            sys.exit(f"bench_node: {path}: not {CHUNK} whole batches; delete it and start again")
+        return lines
+
+    firsts = range(0, batches, CHUNK)
+    with ThreadPoolExecutor(PROCESSES) as pool:
+        chunks = list(tqdm(pool.map(chunk, firsts), total=len(firsts), desc="fault schedules"))
+    lines = [line for lines in chunks for line in lines]
+    injected = {kind: sum(line["injected"][kind] for line in lines) for kind in lines[0]["injected"]}
+    classes = {way: {name: fate(name, [line[way][name] for line in lines]) for name in lines[0][way]} for way in WAYS}
+    return {name: sum(line[name] for line in lines) for name in TOTALS} | {"injected": injected} | classes
+
+
+def fate(name: str, parts: list[list]) -> dict:
+    """A class of damage: how often it passed the checks, and how often it should."""
+    totals = np.sum(parts, axis=0).tolist()
+    events, passed, good = (int(total) for total in totals[:3])
+    derived = odds.derived(name, totals) if events else (None, None)
+    return {
+        "events": events,
+        "passed": passed,
+        "passed_95": odds.interval(passed, events),
+        "passed_derived": derived[0],
+        "good": good,
+        "good_95": odds.interval(good, events),
+        "good_derived": derived[1],
+    }
+
+
+def least(lowest: int, highest: int, step: int, lossless) -> int | None:
+    """The least of lowest, lowest + step ... that loses nothing; all above it lose nothing either."""
+    if not lossless(highest):
+        return None
+    bad, good = lowest - step, highest
+    while good - bad > step:
+        middle = bad + (good - bad) // (2 * step) * step
+        bad, good = (bad, middle) if lossless(middle) else (middle, good)
+    return good
+
+
+def link(build: Path) -> dict:
+    """The fastest settings without loss, on 36 kinds of parts: oscillators, prefetch, DMA."""
+
+    def lost(divider: int, gap: int, period: int) -> int:
+        words = [build / "sim/node/node_link", LINK_TICKS, divider, gap, period]
+        out = subprocess.run([str(word) for word in words], capture_output=True, text=True, check=True).stdout
+        return int(out.split()[0])
+
+    period = LIMITS["tick_period"]
+    gaps = {
+        divider: least(1, LIMITS["word_gap_default"], 1, lambda gap, d=divider: lost(d, gap, period) == 0)
+        for divider in tqdm(DIVIDERS, desc="link")
+    }
+    usual = LIMITS["sck_divider_default"], LIMITS["word_gap_default"]
+    quickest = LIMITS["sck_divider_min"], LIMITS["word_gap_min"]
+    periods = {
+        name: least(18000, period, 20, lambda cycles, s=setting: lost(*s, cycles) == 0)
+        for name, setting in {"default": usual, "fastest": quickest}.items()
+    }
+    return {"ticks": LINK_TICKS, "gap_cycles": gaps, "period_cycles": periods}
+
+
+def timing(build: Path, spread: tuple[int, int], work=60, ticks=TICKS, nodes=NODES, lead=0):
+    """ns from SYNC to latch, conversion's age, ns from SYNC to armed record, as [node, tick]; cycles line."""
+    command = [build / "sim/node/node_timing", ticks, nodes, spread[0], spread[1], CONVERSION_NS, work, lead, 7]
+    out = subprocess.run([str(word) for word in command], capture_output=True, text=True, check=True).stdout
+    cycles = [line.split()[1:] for line in out.splitlines() if line.startswith("cycles")][0]
+    rows = np.array([line.split() for line in out.splitlines() if not line.startswith("cycles")], float)
+    return rows.reshape(nodes, -1, 3), [float(c) for c in cycles]
+
+
+def avr_figures(build: Path) -> dict[str, int]:
+    """The core's cycles and bytes by event, from simavr: a stand-in for the dsPIC, whose instructions do more."""
+    command = ["ctest", "--test-dir", str(build), "-R", "firmware_avr_cycles$", "-V"]
+    out = subprocess.run(command, capture_output=True, text=True).stdout
+    words = re.findall(r"(\w+) (\d+)", " ".join(re.findall(r"(?:cycles|bytes) .*", out)))
+    if not words:
+        sys.exit("bench_node: no cycles from simavr; install gcc-avr and simavr, build again")
+    return {name: int(number) for name, number in words}
+
+
+def armed_late(build: Path, ppm: int) -> np.ndarray:
+    """ns from SYNC to the armed record by [node, tick], everything computed before what it is computed for."""
+    avr = avr_figures(build)
+    lead = (avr["byte"] + avr["gap"]) // 2
+    rows, _ = timing(build, (ppm, 100), work=0, ticks=500, lead=lead)
+    return rows[:, :, 2] + (avr["last_byte"] - lead) * 1e9 / (FCY_HZ * (1 + ppm / 1e6))
+
+
+def load(build: Path) -> dict:
+    """Cycles: the port's register accesses from the model, the core's work from simavr."""
+    _, (accesses, interrupts) = timing(build, (0, 0), work=0, ticks=2000, nodes=1)
+    words = avr_figures(build)
+    core = words["tick"]
+    return {
+        "port_cycles_per_tick": accesses,
+        "interrupts_per_tick": interrupts,
+        "core_cycles_per_tick_atmega1284p": core,
+        "of_cycles_per_tick": TICK_CYCLES,
+        "margin": 1 - (accesses + core) / TICK_CYCLES,
+        "node_bytes_atmega1284p": words["node"],
+        "stack_bytes_atmega1284p": words["stack"],
+        "atmega1284p": words,
+    }
+
+
+def skew_chart(rows: dict) -> Figure:
+    """Spread over the nodes of each tick's sampling instant: what the nodes add."""
+    figure = Figure(figsize=(6.0, 4.0), layout="constrained")
+    axes = figure.subplots()
+    styles = {"equal": ("-", "o"), "2 %": ("--", "^"), "4 %": (":", "s")}
+    for name, data in rows.items():
+        spread = np.sort(np.ptp(data[:, :, 0], axis=0)) / 1000
+        share = np.linspace(0, 1, len(spread))
+        line, marker = styles[name]
+        axes.plot(spread, share, line, marker=marker, markevery=0.2, color="#0b5394", label=f"clocks {name}")
+    axes.set_title("What nodes add to the skew: 28 nodes, 10 000 ticks", fontsize=10)
+    axes.set_xlabel("SYNC to latch, spread over 28 nodes (us)")
+    axes.set_ylabel("share of ticks")
+    axes.set_xlim(left=0)
+    axes.legend()
+    return figure
+
+
+def age_chart(rows: dict) -> Figure:
+    """What the sensors add: the age of their conversions, and its spread within a tick."""
+    figure = Figure(figsize=(9.6, 4.0), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    ages, instants = rows["2 %"][:, :, 1] / 1000, (rows["2 %"][:, :, 0] - rows["2 %"][:, :, 1]) / 1000
+    left.hist(ages.ravel(), bins=80, color="#b4b4b4", edgecolor="#404040", histtype="stepfilled")
+    for name in ("sensor_age_min", "sensor_age_max"):
+        left.axvline(LIMITS[name] / 1000, color="black", linestyle="--")
+        left.annotate(f" {name}", (LIMITS[name] / 1000, 1.0), xycoords=("data", "axes fraction"), rotation=90, va="top")
+    left.set_title("Age of the conversion that is read", fontsize=10)
+    left.set_xlabel("age at the latch (us)")
+    left.set_ylabel("samples of 28 sensors, 10 000 ticks")
+    spread = np.sort(np.ptp(instants, axis=0))
+    right.plot(spread, np.linspace(0, 1, len(spread)), color="#0b5394")
+    right.set_title("True instants within a tick", fontsize=10)
+    right.set_xlabel("spread over 28 sensors (us)")
+    right.set_ylabel("share of ticks")
+    right.set_xlim(left=0)
+    return figure
+
+
+def armed_chart(armed: dict) -> Figure:
+    """When the record of a tick lies ready in the link."""
+    figure = Figure(figsize=(6.0, 4.0), layout="constrained")
+    axes = figure.subplots()
+    for (name, data), style in zip(armed.items(), ("-", "--", ":"), strict=True):
+        us = np.sort(data.ravel()) / 1000
+        axes.plot(us, np.linspace(0, 1, len(us)), style, color="#0b5394", label=name)
+    axes.axvline(ARMED_MOST_US, color="black", linewidth=1)
+    axes.annotate("wanted: at most ", (ARMED_MOST_US, 0.5), ha="right")
+    axes.set_title("From SYNC to the armed record, 28 nodes", fontsize=10)
+    axes.set_xlabel("SYNC to armed record (us)")
+    axes.set_ylabel("share of records")
+    axes.legend(loc="upper right", bbox_to_anchor=(0.93, 1.0))  # between the last curve and the bound
+    return figure
+
+
+def link_chart(found: dict) -> Figure:
+    """The least gap between words at each SCK."""
+    figure = Figure(figsize=(6.0, 4.0), layout="constrained")
+    axes = figure.subplots()
+    known = {divider: gap for divider, gap in found["gap_cycles"].items() if gap is not None}
+    mhz = [CYCLES_PER_US / divider for divider in known]
+    axes.plot(mhz, [gap / CYCLES_PER_US for gap in known.values()], "o-", color="#0b5394", label="least without loss")
+    axes.axhline(LIMITS["word_gap_min"] / CYCLES_PER_US, color="black", linestyle="--", label="least the bridge takes")
+    axes.axvline(CYCLES_PER_US / LIMITS["sck_divider_min"], color="black", linestyle=":", label="fastest it takes")
+    axes.set_title("Gap between words that every node follows", fontsize=10)
+    axes.set_xlabel("SCK (MHz)")
+    axes.set_ylabel("gap between words (us)")
+    axes.set_ylim(bottom=0)
+    axes.legend()
+    return figure
+
+
+def table(build: Path, program: str, name: str) -> list[dict]:
+    """What a test program writes down of its cases, kept among the results."""
+    path = RESULTS / name
+    subprocess.run([build / "sim/node" / program, path], check=True)
+    return json.loads(path.read_text())
+
+
+def draw(name: str, chart, *data) -> None:
+    """docs/charts/NAME, as .svg and .png."""
+
+    def figure(_):
+        return chart(*data)
+
+    figure.__name__ = name
+    (CHARTS / f"{name}.svg").write_text(figures.svg(figure, None))
+    figures.png(figure, None, CHARTS / f"{name}.png")
+
+
+def skew(build: Path) -> dict:
+    """Where the nodes' sampling instants lie, and how late their records are armed; draws them."""
+    rows = {name: timing(build, spread)[0] for name, spread in tqdm(SPREADS.items(), desc="skew")}
+    armed = {
+        f"clocks {'equal' if not ppm else f'{-ppm // 10_000} % slow'}": armed_late(build, ppm)
+        for ppm in (0, -20_000, -40_000)
+    }
+    draw("node_skew", skew_chart, rows)
+    draw("node_age", age_chart, rows)
+    draw("node_armed", armed_chart, armed)
+    return {
+        "skew": {
+            name: {
+                "latch_spread_us_max": float(np.ptp(data[:, :, 0], axis=0).max() / 1000),
+                "latch_us_mean": float(data[:, :, 0].mean() / 1000),
+                "latch_us_min": float(data[:, :, 0].min() / 1000),
+                "latch_us_max": float(data[:, :, 0].max() / 1000),
+                "true_instant_spread_us_max": float(np.ptp(data[:, :, 0] - data[:, :, 1], axis=0).max() / 1000),
+                "age_us_max": float(data[:, :, 1].max() / 1000),
+                "age_us_mean": float(data[:, :, 1].mean() / 1000),
+                "armed_us_max": float(data[:, :, 2].max() / 1000),
+            }
+            for name, data in rows.items()
+        },
+        "armed_us_max": {name: float(data.max() / 1000) for name, data in armed.items()},
+    }
+
+
+def tables(build: Path) -> dict:
+    faults = table(build, "test_node_faults", "node_faults.json")
+    cuts = table(build, "test_update_cuts", "node_cuts.json")
+    worst = Counter({row["fault"]: max(r["lost"] for r in row["runs"]) for row in faults}).most_common(3)
+    return {"fault_rows": len(faults) + len(cuts), "worst_lost": dict(worst)}
+
+
+def fastest(build: Path) -> dict:
+    found = link(build)
+    draw("node_link", link_chart, found)
+    return {"link": found}
+
+
+def run(build: Path, fresh: bool, only: str = "", batches: int = BATCHES) -> None:
+    """All of it, or only one part: the others stay as they were measured before."""
+    kept = build / "bench/node"
+    kept.mkdir(parents=True, exist_ok=True)
+    RESULTS.mkdir(parents=True, exist_ok=True)
+    path = RESULTS / "node.json"
+    parts = {
+        "faults": lambda: tables(build),
+        "storm": lambda: {"storm": storm(build, kept, fresh, batches)},
+        "link": lambda: fastest(build),
+        "skew": lambda: skew(build),
+        "load": lambda: {"load": load(build)},
+    }
+    result = json.loads(path.read_text()) if only else {}
+    for name in [only] if only else PARTS:
+        result |= parts[name]()
+    path.write_text(json.dumps(result, indent=1) + "\n")
+    faults, cuts = (json.loads((RESULTS / name).read_text()) for name in ("node_faults.json", "node_cuts.json"))
+    (ROOT / "docs/node_faults.md").write_text(page.page(result, faults, cuts))
+
+
+def options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--only", choices=PARTS, default="", help="this part; the others stay as they were")
+    parser.add_argument("--batches", type=int, default=BATCHES, help="of a thousand schedules each")

@@ -1,0 +1,1 @@
+"""Radial distance: the paper's line, curves, whole whisks."""

@@ -1,0 +1,121 @@
+"""The whole robot: levels of simulation, half an hour, odometry, latency, instructions; docs/results_robot.md.
+
+    .venv/bin/python tools/benches robot                       all of it: two hours and more, most of it the RTL level
+    .venv/bin/python tools/benches robot --only levels page    some parts; --levels 0 1: of the levels only the fast ones
+
+What is done is kept in build/bench/robot: an interrupted run goes on where it stopped, seed by seed; `page` tells what there is so far.
+"""
+
+import argparse
+import json
+import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from whisker.report import figures, long_figures
+from whisker.report.run import Run
+
+from . import instructions, latency, levels, odometry, page
+
+ROOT = Path(__file__).resolve().parents[3]
+RESULTS, CHARTS, CACHE = ROOT / "bench/results", ROOT / "docs/charts", ROOT / "build/bench/robot"
+LONG_RUNS = (("signals", 7301), ("signals", 7302), ("signals", 7303), ("bytes", 7301))
+LEVELS = (0, 1, 2, 3)
+ALONE = ("odometry", "latency", "instructions")  # parts whose results stand in one file
+
+
+def once(path: Path, measure: Callable[[], dict]) -> dict:
+    """A measurement, from the cache if an earlier run has made it."""
+    if not path.exists():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(measure(), indent=1) + "\n")
+    return json.loads(path.read_text())
+
+
+def long_run(build: Path, level: str, seed: int) -> dict:
+    """The summary of a demo-long."""
+    out = CACHE / f"long_{level}_{seed}"
+    command = [sys.executable, "-m", "whisker.demo.long", "--level", level, "--seed", seed, "--out", out]
+    subprocess.run([str(word) for word in [*command, "--build-dir", build]], check=True, stdout=subprocess.DEVNULL)
+    return json.loads((out / "summary.json").read_text())
+
+
+def models() -> Path:
+    """Of the robot that the levels are compared with."""
+    case = next(case for case in levels.CASES if case.name == levels.SIGNALS_AUTO)
+    return levels.Bench(case, levels.FIRST_SEED, Path(), CACHE / "levels/models").learnt()
+
+
+def measure(build: Path, part: str, chosen: set[int]) -> None:
+    """One part into the cache."""
+    if part == "levels":
+        levels.measure(build, CACHE / "levels", chosen)
+    elif part == "long":
+        for level, seed in LONG_RUNS:
+            once(CACHE / f"long_{level}_{seed}.json", lambda level=level, seed=seed: long_run(build, level, seed))
+    elif part == "odometry":
+        once(CACHE / "odometry.json", lambda: odometry.measure(build))
+    elif part == "latency":
+        once(CACHE / "latency.json", lambda: latency.measure(models()))
+    elif part == "instructions":
+        once(CACHE / "instructions.json", lambda: instructions.measure(build, models()))
+
+
+def gather() -> dict:
+    """Everything measured so far, by part: here, or else what has been published.
+
+    Levels are compared seed by seed: those measured here stand alone.
+    """
+    found = {part: data for part in (*ALONE, "long", "levels") if (data := read(RESULTS / f"robot_{part}.json"))}
+    found |= {part: data for part in ALONE if (data := read(CACHE / f"{part}.json"))}
+    paths = {f"{level}, seed {seed}": CACHE / f"long_{level}_{seed}.json" for level, seed in LONG_RUNS}
+    found["long"] = found.get("long", {}) | {name: data for name, path in paths.items() if (data := read(path))}
+    made = levels.gather(CACHE / "levels")
+    return found | ({"levels": made} if made["levels"] or "levels" not in found else {})
+
+
+def read(path: Path) -> dict | None:
+    """Results in a file; None when there is none."""
+    return json.loads(path.read_text()) if path.exists() else None
+
+
+def save(name: str, draw: Callable, data) -> None:
+    """A chart in both its forms."""
+    (CHARTS / f"{name}.svg").write_text(figures.svg(draw, data))
+    figures.png(draw, data, CHARTS / f"{name}.png")
+
+
+def publish() -> None:
+    """Results, charts and the page, of what there is."""
+    found = gather()
+    drawings = {"levels": levels, "odometry": odometry, "latency": latency}
+    for part, module in drawings.items():
+        for name, draw in module.DRAWINGS.items() if part in found else ():
+            save(name, draw, found[part])
+    shown = next((path for level, seed in LONG_RUNS if (path := CACHE / f"long_{level}_{seed}").is_dir()), None)
+    if shown:
+        save("robot_long", long_figures.errors, Run.load(shown))
+    for part, data in found.items():
+        (RESULTS / f"robot_{part}.json").write_text(json.dumps(data, indent=1) + "\n")
+    (ROOT / "docs/results_robot.md").write_text(page.page(found))
+    print("bench/results/robot_*.json, docs/charts/robot_*.svg, docs/results_robot.md")
+
+
+PARTS = ("odometry", "levels", "latency", "instructions", "long", "page")
+
+
+def run(build: Path, fresh: bool, only: Sequence[str] = PARTS, levels: Sequence[int] = LEVELS) -> None:
+    if fresh:
+        shutil.rmtree(CACHE, ignore_errors=True)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # a run that is ended leaves no process behind
+    for part in only:
+        measure(build, part, set(levels))
+    publish()
+
+
+def options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--only", nargs="+", choices=PARTS, default=PARTS, metavar="PART", help=", ".join(PARTS))
+    parser.add_argument("--levels", nargs="+", type=int, choices=LEVELS, default=LEVELS, help="of the part levels")

@@ -1,0 +1,346 @@
+"""The same scenes at every level of simulation: pose error, texture accuracy and real-time factor.
+
+One arena, start, prior and seed of the pilot's turns per scene; one robot's whiskers, which learn anew at each mechanics.
+A level's cost is processor time of all that runs, from the world to the poses of four filters, start-up included; training is not.
+"""
+
+import json
+import resource
+import shutil
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+from tqdm import tqdm
+
+from whisker import scene as scene_files
+from whisker import scenes
+from whisker.demo.__main__ import judge
+from whisker.demo.chain import ChainRun, Link, run_chain
+from whisker.demo.level1 import explore
+from whisker.demo.summary import pose_scores, texture_scores
+from whisker.demo.training import learn
+from whisker.nav import localise
+from whisker.pilot.pilot import Pilot
+from whisker.report.run import FILTERS
+from whisker.robot.models import load_models
+from whisker.scene import Scene
+from whisker.scenes import geometry, readings
+from whisker.scenes.families import SIGNALS
+from whisker.simulation.scenes import MECHANICS, make_scene, simulated
+
+SECONDS, ROWS, TICKS = 60.0, 600, 120_000
+LANES, LINK = 6, Link(6, 30, 5)
+ROBOT = 901  # seed of the whiskers and their training
+FIRST_SEED = 8101
+POSES = ("x_m", "y_m", "theta_rad")
+FAR_M = 0.03  # a contact may be so far beyond the whisker's straight tip
+INTERVAL, DRAWS = (2.5, 97.5), 10_000
+LEAST_SEEDS = 5  # of an interval that is worth telling
+
+
+@dataclass(frozen=True)
+class Case:
+    """A level, with how many seeds it is given."""
+
+    name: str
+    title: str
+    seeds: int
+    level: int
+    mechanics: str = MECHANICS[0]
+    create: int | None = None
+
+
+SIGNAL_CASES = tuple(
+    Case(f"signals_{name}", f"1 signals, {name}", 24 if name == MECHANICS[0] else 16, 1, name) for name in MECHANICS[:5]
+)
+SIGNALS_AUTO = SIGNAL_CASES[0].name
+CASES = (
+    Case("drawn", "0 drawn observations", 24, 0),
+    *SIGNAL_CASES,
+    Case("bytes_bare", "2 bytes, no Create", 2, 2),
+    Case("bytes", "2 bytes, Create 1", 8, 2, create=1),
+    Case("rtl", "3 RTL, Create 1", 2, 3, create=1),
+)
+PAIRS = (
+    ("drawn", SIGNALS_AUTO),
+    *((case.name, SIGNALS_AUTO) for case in SIGNAL_CASES[1:]),
+    ("bytes_bare", SIGNALS_AUTO),
+    ("bytes", SIGNALS_AUTO),
+    ("rtl", "bytes"),
+)
+TITLES = {case.name: case.title for case in CASES}
+SCORES = {
+    "adaptive_error_median_m": "adaptive (m)",
+    "pose_error_median_m": "grid (m)",
+    "foveal_error_median_m": "foveal (m)",
+    "odometry_error_median_m": "odometry (m)",
+    "texture_accuracy": "texture right",
+}
+
+
+@dataclass
+class Bench:
+    """One seed's scene at one level, run once."""
+
+    case: Case
+    seed: int
+    build: Path
+    models: Path  # folder of the models of every mechanics
+
+    @cached_property
+    def scene(self) -> tuple[Scene, tuple[float, float, float]]:
+        """With this robot's whiskers."""
+        scene, start = make_scene(self.seed, self.case.mechanics)
+        return replace(scene, simulated=simulated(self.case.mechanics, ROBOT)), start
+
+    def learnt(self) -> Path:
+        """The models at this mechanics, learnt on first use."""
+        folder = self.models / self.case.mechanics
+        if not (folder / "whole").exists():
+            learn(folder, self.scene[0], ROBOT, lambda: None)
+            (folder / "whole").touch()
+        return folder
+
+    def run(self) -> dict:
+        folder = self.learnt()
+        return (self._drawn, self._signals, self._chain, self._chain)[self.case.level](folder)
+
+    def _explored(self, folder: Path) -> tuple[Pilot, list[dict], list[dict]]:
+        scene, start = self.scene
+        pilot = Pilot(scene.robot, *load_models(folder, scene.robot), self.seed)
+        return pilot, *explore(scene, start, pilot, self.seed, TICKS)
+
+    def _signals(self, folder: Path) -> dict:
+        began = time.process_time()
+        pilot, rows, truth = self._explored(folder)
+        answers = localised(self.scene[0], rows)
+        cost = time.process_time() - began
+        return self._scores(rows, truth, answers) | {"whisks": len(pilot.whisks), "processor_s": cost}
+
+    def _drawn(self, folder: Path) -> dict:
+        """The path of the signal-level run, with answers drawn as `whisker scene make robot` draws them; its cost is that command's."""
+        pilot, rows, truth = self._explored(folder)
+        rows = drawn_rows(*self.scene, rows, truth, self.seed)
+        began = time.process_time()
+        scenes.make("robot", self.seed, ROWS)
+        answers = localised(self.scene[0], rows)
+        cost = time.process_time() - began
+        return self._scores(rows, truth, answers) | {"whisks": len(pilot.whisks), "processor_s": cost}
+
+    def _scores(self, rows: list[dict], truth: list[dict], answers: dict[str, np.ndarray]) -> dict:
+        return texture_scores(rows, truth, self.scene[0]) | pose_scores(answers, poses_of(truth))
+
+    def _chain(self, folder: Path) -> dict:
+        scene, start = self.scene
+        level = ("", "", "bytes", "rtl")[self.case.level]
+        with tempfile.TemporaryDirectory() as out:
+            run = ChainRun(Path(out), self.build, self.seed, SECONDS, LANES, LINK, self.case.create, level)
+            scene_files.write(run.scene, scene)
+            (run.scene / "scene.flat").write_text(scene.flat(start))
+            shutil.copytree(folder, run.out / "models")
+            before = children_s()
+            wall_s = run_chain(run, lambda tick: None)
+            cost = children_s() - before
+            pilot = json.loads((run.out / "pilot.json").read_text())
+            rows = localise.observations_path(run.scene).read_text()
+            scores = judge(run.out, scene)
+        return scores | {"whisks": len(pilot["whisks"]), "processor_s": cost, "wall_s": wall_s, "rows": rows}
+
+
+def children_s() -> float:
+    """Processor seconds of all children that have ended."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
+def poses_of(truth: list[dict]) -> np.ndarray:
+    """(n, 3)"""
+    return np.array([[float(row[key]) for key in POSES] for row in truth])
+
+
+def localised(scene: Scene, rows: list[dict]) -> dict[str, np.ndarray]:
+    """(n, 3) poses of every filter."""
+    made = {name: localise.Filter(name, scene) for name in FILTERS}
+    return {name: np.array([filter_.step(row).pose for row in rows]) for name, filter_ in made.items()}
+
+
+def drawn_rows(
+    scene: Scene, start: tuple[float, float, float], rows: list[dict], truth: list[dict], seed: int
+) -> list[dict]:
+    """Level 0 along the same path: what was read stays read, and when; the answers are drawn from level 0's models."""
+    rng, path = np.random.default_rng([seed, 0]), np.vstack([start, poses_of(truth)])
+    told = np.array([[row[key] for key in localise.ODOMETRY] for row in rows])
+    odometry = readings.hold_back(readings.odometry(path, SIGNALS, rng), ~told.any(axis=1))
+    texture = readings.texture_windows(scene.arena, scene.robot, path[1:], SIGNALS, rng)
+    rays = [replace(w, length_m=w.length_m + FAR_M) for w in scene.robot.of_role("object")]
+    ranges = np.array([geometry.ranges(scene.arena, path[1:], ray) for ray in rays]).T
+    distance = ranges + SIGNALS.radial_sigma_m * rng.standard_normal(ranges.shape)
+    return [
+        row
+        | dict(zip(localise.ODOMETRY, map(float, odometry[n]), strict=True))
+        | _drawn_textures(scene, row, texture[n])
+        | _drawn_distances(scene, row, distance[n])
+        for n, row in enumerate(rows)
+    ]
+
+
+def _drawn_textures(scene: Scene, row: dict, logliks: np.ndarray) -> dict:
+    tips, textures = scene.robot.of_role("texture"), scene.arena.textures
+    names = [[f"{whisker.name}_{texture}" for texture in textures] for whisker in tips]
+    read = [not any(row[name] is None for name in of_tip) for of_tip in names]
+    return {
+        name: float(logliks[tip, k]) for tip, of_tip in enumerate(names) if read[tip] for k, name in enumerate(of_tip)
+    }
+
+
+def _drawn_distances(scene: Scene, row: dict, distance_m: np.ndarray) -> dict:
+    """Where the signals gave a distance; a whisk that met nothing the map knows is not read."""
+    named = {f"{w.name}_mm": m for w, m in zip(scene.robot.of_role("object"), distance_m, strict=True)}
+    measured = {name for name in named if row[name] is not None and np.isfinite(row[name])}
+    return {name: 1000.0 * max(named[name], 0.0) if np.isfinite(named[name]) else np.nan for name in measured}
+
+
+# ---------------------------------------------------------------------------------------------------------------------
+
+
+def turns() -> list[tuple[Case, int]]:
+    """Every case and seed; seed by seed, so that what is done when the bench is interrupted is alike for all."""
+    most = max(case.seeds for case in CASES)
+    return [(case, FIRST_SEED + n) for n in range(most) for case in CASES if n < case.seeds]
+
+
+def measure(build: Path, cache: Path, levels: set[int]) -> None:
+    """What is not measured yet of these levels, into the cache."""
+    for case, seed in tqdm([turn for turn in turns() if turn[0].level in levels], desc="levels", unit="run"):
+        path = cache / f"{case.name}_{seed}.json"
+        if not path.exists():
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(json.dumps(Bench(case, seed, build, cache / "models").run()) + "\n")
+
+
+def gather(cache: Path) -> dict:
+    """Everything measured so far: {"runs": case -> seed -> scores, "levels": summary, "pairs": differences, "equal"}."""
+    runs = {
+        case.name: {
+            str(seed): json.loads(path.read_text())
+            for seed in range(FIRST_SEED, FIRST_SEED + case.seeds)
+            if (path := cache / f"{case.name}_{seed}.json").exists()
+        }
+        for case in CASES
+    }
+    runs = {name: by_seed for name, by_seed in runs.items() if by_seed}
+    equal = {
+        seed: run["rows"] == runs["bytes"][seed]["rows"]
+        for seed, run in runs.get("rtl", {}).items()
+        if seed in runs["bytes"]
+    }
+    kept = {name: {seed: _without_rows(run) for seed, run in by.items()} for name, by in runs.items()}
+    levels = {name: summary(list(by_seed.values())) for name, by_seed in kept.items()}
+    pairs = {f"{a} - {b}": paired(kept[a], kept[b]) for a, b in PAIRS if a in kept and b in kept}
+    return {"seconds": SECONDS, "levels": levels, "pairs": pairs, "rtl_rows_equal_bytes": equal, "runs": kept}
+
+
+def _without_rows(run: dict) -> dict:
+    return {key: round(value, 6) for key, value in run.items() if key != "rows"}
+
+
+def summary(runs: list[dict]) -> dict:
+    """Median and quartiles over seeds of every score; real-time factor from the median cost."""
+    quartiles = {key: [float(q) for q in np.quantile([run[key] for run in runs], (0.25, 0.5, 0.75))] for key in SCORES}
+    cost = float(np.median([run["processor_s"] for run in runs]))
+    return {"seeds": len(runs), "realtime_factor": SECONDS / cost, "quartiles": quartiles}
+
+
+def paired(ours: dict[str, dict], theirs: dict[str, dict]) -> dict:
+    """Mean difference over the seeds both have, with its 95 % bootstrap interval."""
+    seeds, rng = sorted(set(ours) & set(theirs)), np.random.default_rng(0)
+    out = {"seeds": len(seeds)}
+    for key in SCORES:
+        difference = np.array([ours[seed][key] - theirs[seed][key] for seed in seeds])
+        means = rng.choice(difference, (DRAWS, len(difference))).mean(axis=1)
+        out[key] = {"mean": float(difference.mean()), "interval": [float(v) for v in np.percentile(means, INTERVAL)]}
+    return out
+
+
+# ---------------------------------------------------------------------------------------------------------------------
+
+ERROR_TICKS_M = (0.02, 0.05, 0.1, 0.2, 0.5)
+SHOWN = (
+    ("adaptive_error_median_m", "o", "black", "adaptive"),
+    ("pose_error_median_m", "s", "0.45", "grid"),
+    ("foveal_error_median_m", "^", "0.7", "foveal (the paper's)"),
+)
+
+
+def draw(found: dict) -> Figure:
+    """A row for each level, the fastest last: real-time factor, errors, texture. Medians over seeds, bars between quartiles."""
+    ordered = sorted(found["levels"].items(), key=lambda item: item[1]["realtime_factor"])
+    figure = Figure(figsize=(11.0, 0.48 * len(ordered) + 1.6), layout="constrained")
+    speed, error, texture = figure.subplots(1, 3, sharey=True, width_ratios=(2, 3, 2))
+    speed.plot(
+        [level["realtime_factor"] for _, level in ordered], range(len(ordered)), "D-", color="0.2", linewidth=0.8
+    )
+    for n, (key, marker, colour, label) in enumerate(SHOWN):
+        _draw_points(error, ordered, key, 0.17 * (n - 1), marker, colour, label)
+    _draw_points(texture, ordered, "texture_accuracy", 0.0, "o", "black", None, 100.0)
+    speed.set(xscale="log", xlabel="simulated seconds per\nprocessor second, world to poses")
+    speed.axvline(1.0, color="0.3", linewidth=0.8, linestyle=":")
+    error.set(xscale="log", xlabel="median position error over 60 s (m)")
+    error.set_xticks(ERROR_TICKS_M, map(str, ERROR_TICKS_M))
+    error.minorticks_off()
+    texture.set(xlabel="texture windows right (%)")
+    speed.set_yticks(range(len(ordered)), [f"{TITLES[name]} (n={level['seeds']})" for name, level in ordered])
+    for axes in (speed, error, texture):
+        axes.grid(axis="both", linewidth=0.3)
+    figure.legend(*error.get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False)
+    return figure
+
+
+def _draw_points(axes, ordered, key: str, shift: float, marker: str, colour: str, label: str | None, scale=1.0) -> None:
+    y = [row + shift for row in range(len(ordered))]
+    low, middle, high = scale * np.array([level["quartiles"][key] for _, level in ordered]).T
+    bars = (middle - low, high - middle)
+    axes.errorbar(middle, y, xerr=bars, fmt=marker, color=colour, label=label, capsize=2, linewidth=0.9)
+
+
+def draw_pairs(found: dict) -> Figure:
+    """Paired differences with their intervals; without `rest`, whose are beyond any scale."""
+    figure = Figure(figsize=(9.5, 4.2), layout="constrained")
+    panels = figure.subplots(1, 3, sharey=True)
+    names = [name for name in found["pairs"] if not name.startswith("signals_rest")]
+    keys = (
+        ("adaptive_error_median_m", 1000.0, "adaptive: error (mm)"),
+        ("pose_error_median_m", 1000.0, "grid: error (mm)"),
+    )
+    for axes, (key, scale, title) in zip(
+        panels, (*keys, ("texture_accuracy", 100.0, "texture right (points)")), strict=True
+    ):
+        for row, name in enumerate(names):
+            pair = found["pairs"][name][key]
+            low, high = (scale * value for value in pair["interval"])
+            enough = found["pairs"][name]["seeds"] >= LEAST_SEEDS
+            axes.plot([low, high] if enough else [], [row, row] if enough else [], color="0.4")
+            certain = enough and (low > 0 or high < 0)
+            axes.plot(scale * pair["mean"], row, "ko", fillstyle="full" if certain else "none")
+        axes.axvline(0.0, color="0.3", linewidth=0.8, linestyle=":")
+        axes.set(
+            xlabel=f"difference, {title}",
+            yticks=range(len(names)),
+            yticklabels=map(_pair_title, names, [found] * len(names)),
+        )
+    panels[0].invert_yaxis()
+    return figure
+
+
+def _pair_title(name: str, found: dict) -> str:
+    ours, theirs = name.split(" - ")
+    return f"{TITLES[ours]}\nless {TITLES[theirs]} (n={found['pairs'][name]['seeds']})"
+
+
+DRAWINGS: dict[str, Callable[[dict], Figure]] = {"robot_levels": draw, "robot_level_pairs": draw_pairs}

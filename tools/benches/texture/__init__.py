@@ -1,0 +1,1 @@
+"""Floor texture: the paper's classifier, the default method, peers."""

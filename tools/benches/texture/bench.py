@@ -1,0 +1,61 @@
+"""Floor texture: errors, times and stability of the paper's classifier, the default method and peers.
+
+    make bench, or .venv/bin/python tools/benches texture [--fabricslide DIR] [--borealtc DIR]
+
+Simulated floors (level 1) are drawn from seeds that nothing was developed on. Real recordings are not part of this
+project: clone github.com/wngfra/FabricSlide (MIT) and github.com/norlab-ulaval/BorealTC (MIT) and give their folders
+data/fabric and data/borealtc, here or as FABRICSLIDE_DIR and BOREALTC_DIR; without them their part is skipped by name.
+Parts that are done are kept in build/bench/texture. Writes bench/results/texture.json,
+docs/texture_faults.md and docs/charts/texture_*.
+"""
+
+import argparse
+import json
+import os
+from pathlib import Path
+
+from tqdm import tqdm
+
+from .charts import draw
+from .cost import cost
+from .course import course
+from .page import page
+from .real import fabrics, terrains
+from .simulated import borders, other_robot, refusals, single_surfaces, stability
+
+ROOT = Path(__file__).resolve().parents[3]
+PAGE = ROOT / "docs/texture_faults.md"
+RESULTS, CHARTS, CACHE = ROOT / "bench/results", ROOT / "docs/charts", ROOT / "build/bench/texture"
+PARTS = {f.__name__: f for f in (course, cost, single_surfaces, other_robot, borders, refusals, stability)}
+REAL = {"fabricslide": fabrics, "borealtc": terrains}
+
+
+def run(build: Path, fresh: bool, **folders: str | None) -> None:
+    """Measure what is not yet measured, and redraw. `build` is not used: the C library comes with the Python module."""
+    CACHE.mkdir(parents=True, exist_ok=True)
+    given = {n: folders.get(n) or os.environ.get(f"{n.upper()}_DIR") for n in REAL}
+    parts = dict(PARTS)
+    for name, measure in REAL.items():
+        if given[name]:
+            parts[name] = lambda measure=measure, name=name: measure(Path(given[name]))
+        elif (CACHE / f"{name}.json").exists():
+            parts[name] = None  # what was measured when its folder was given
+        else:
+            print(f"texture: {name} skipped: give --{name} DIR or {name.upper()}_DIR (see the module's text)")
+    results = {}
+    for name, measure in tqdm(parts.items(), desc="texture"):
+        kept = CACHE / f"{name}.json"
+        if measure and (fresh or not kept.exists()):
+            kept.write_text(json.dumps(measure(), indent=1, default=float) + "\n")
+        results[name] = json.loads(kept.read_text())
+    RESULTS.mkdir(parents=True, exist_ok=True)
+    (RESULTS / "texture.json").write_text(json.dumps(results, indent=1) + "\n")
+    PAGE.write_text(page(results))
+    for name, figure in draw(results).items():
+        for ending in ("svg", "png"):
+            figure.savefig(CHARTS / f"{name}.{ending}", dpi=120)
+
+
+def options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--fabricslide", metavar="DIR", help="FabricSlide's data/fabric")
+    parser.add_argument("--borealtc", metavar="DIR", help="BorealTC's data/borealtc")
