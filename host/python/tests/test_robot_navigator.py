@@ -106,6 +106,11 @@ def test_in_lock_step_the_process_gives_what_localise_gives(made, tmp_path):
     assert (report["weighed"], report["skipped"], report["missed"], report["bad_cells"]) == (ROWS, 0, 0, 0)
 
 
+def _all_over(got) -> bool:
+    """The last answer and the last word of health have come, in whatever order."""
+    return any(r.over for r in got) and any(getattr(r.message, "state", "") == health.ENDED for r in got)
+
+
 def test_a_killed_navigator_comes_back_knowing_that_it_knows_nothing(made, tmp_path):
     folder, _, rows = made
     with Robot("localisation", "health/*") as robot:
@@ -117,9 +122,7 @@ def test_a_killed_navigator_comes_back_knowing_that_it_knows_nothing(made, tmp_p
         with robot.navigator(folder, "--filter", "particle", "--out", tmp_path) as child:
             robot.send(rows[25:])
             robot.rows.end()
-            got = take_until(
-                robot.inbox, lambda got: got and got[-1].topic == "localisation" and got[-1].over, PATIENCE_S
-            )
+            got = take_until(robot.inbox, _all_over, PATIENCE_S)
             assert child.wait(END_S) == 0
     told = [r.message for r in got if r.topic == "localisation" and not r.over]
     assert {(x.first_seq, x.prior, x.rows_missed) for x in told} == {(25, "uniform", 0)} and len(told) == ROWS - 25
@@ -128,11 +131,6 @@ def test_a_killed_navigator_comes_back_knowing_that_it_knows_nothing(made, tmp_p
     assert (tally.restarts, tally.missed, tally.repeated) == (1, 0, 0)
     times = [line.split(",")[0] for line in lines(tmp_path / "est_particle.csv")]
     assert times == ["t_s", *(f"{row['t_s']:.6g}" for row in rows[:20] + rows[25:])]
-
-
-def _all_over(got) -> bool:
-    """The last answer and the last word of health have come, in whatever order."""
-    return any(r.over for r in got) and any(getattr(r.message, "state", "") == health.ENDED for r in got)
 
 
 def killed_and_begun_anew(robot, folder, rows, options, spoil=lambda: None):
