@@ -131,7 +131,7 @@ def _long(found: dict) -> list[str]:
         for name, run in found.items()
     ]
     names = ["run", "driven (m)", "tiles", "contacts", "whisks measured", "texture right", "times real time, wall"]
-    chart = "![Position error of every estimate over half an hour](charts/robot_long.png)\n\nThe first run above.\n"
+    chart = "![Position error of every estimate over half an hour](charts/robot_long.png)\n\nThe run at bytes level.\n"
     return [*parts, _table(header, rows), _table(names, met), chart]
 
 
