@@ -28,7 +28,7 @@ if [ "${1:-}" = --long ]; then
     echo "test: the bridge's two levels by more scripts"
     build/release/sim/bridge/tests/test_bridge_levels 4000 2
     echo "test: mutated recordings"
-    .venv/bin/python host/python/tests/fuzz_recording.py --inputs 300000
+    .venv/bin/python host/python/tests/fuzz.py recording --inputs 300000
     echo "test: a Linux kernel and the simulated bridge"
     WHISKER_BUILD=build/release .venv/bin/python tests/kernel/run.py
     echo "test: thirty minutes of drills"

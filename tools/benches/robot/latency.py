@@ -182,7 +182,7 @@ def _round(publisher: RowPublisher, poses, row: dict) -> float:
     began = time.monotonic()
     publisher.send(row, EXPLORING)
     if not poses.take(PATIENCE_S):
-        raise RuntimeError("bench_robot: no pose came; run tests/test_robot_navigator.py")
+        raise RuntimeError("bench_robot: no pose came; run host/python/tests/robot/test_robot_navigator.py")
     return MS * (time.monotonic() - began)
 
 

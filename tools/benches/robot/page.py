@@ -19,7 +19,7 @@ WHY = """Why:
 - `static` and `elastica` bend floor whiskers alike (the trained texture models are equal, byte by byte); the lines fitted to object whiskers differ by 0.1 % in slope.
   No score of these scenes changes.
 - Bytes without a Create differ from signals by the faults put in (bad records of sensors and lanes) alone: with the same bad samples the rows are equal, cell by cell
-  (`host/python/tests/test_levels_agree.py`).
+  (`host/python/tests/demo/test_levels_agree.py`).
 - The Create's odometry comes in whole millimetres and degrees of its counters, 15 ms apart, and its wheels obey a serial line later: another path through the same arena.
 - Gateware and bytes give the same frames.
 """

@@ -45,7 +45,7 @@ class Recipe:
     map_fault: Callable[[Arena, np.random.Generator], Arena] | None = None
 
 
-# As signal-level runs of the demo's robot: see tests/test_levels.py.
+# As signal-level runs of the demo's robot: see tests/scenes/test_levels.py.
 SIGNALS = World(
     odometry=0.02,
     odometry_memory_m=0.5,

@@ -5,7 +5,7 @@ import zlib
 
 import numpy as np
 import pytest
-from fuzz_checkpoint import seed_file, tried
+from fuzz_checkpoint import fuzz, seed_file
 from robotkit import to_rows
 
 from whisker import scenes
@@ -137,7 +137,7 @@ def test_what_is_no_checkpoint_is_refused_by_field(data, why):
 
 
 def test_whatever_a_file_holds_is_read_or_refused():
-    assert tried(inputs=3000, seed=1) == 3000
+    assert 1000 < fuzz(3000, seed=1)["refused in one line"] < 3000
 
 
 def test_a_filter_begins_from_what_a_filter_listed(made):

@@ -17,7 +17,7 @@ from whisker.pilot.whereabouts import Whereabouts
 from whisker.simulation.scenes import make_robot
 from whisker.touch.mount import Mount
 
-ROOT = Path(__file__).resolve().parents[3]
+ROOT = Path(__file__).resolve().parents[4]
 STEP_M_S, TRACK_M = 0.0285, 0.235  # of a base whose wheels move in steps
 BLOCK_S = BLOCK_TICKS * TICK_S
 

@@ -2,18 +2,10 @@
 
 import numpy as np
 import pytest
+from whisks import write_whisks
 
 from whisker.tables import TableError
 from whisker.touch.radial.model import RadialModel, peak, read_whisks
-
-
-def write_whisks(path, peaks, radii, header="contact,radius_mm,t_s,x,y"):
-    lines = [header]
-    for contact, (height, radius) in enumerate(zip(peaks, radii, strict=True)):
-        for sample in range(100):
-            bend = height * max(0.0, 1.0 - abs(sample - 60) / 30.0)
-            lines.append(f"{contact},{radius},{sample * 5e-4},{1000 + 0.6 * bend},{2000 - 0.8 * bend}")
-    path.write_text("\n".join(lines) + "\n")
 
 
 def test_peak_is_the_largest_length_about_rest():

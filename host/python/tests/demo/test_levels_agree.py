@@ -20,7 +20,7 @@ from whisker.pilot.pilot import Pilot
 from whisker.robot.models import load_models
 from whisker.simulation.scenes import make_scene
 
-ROOT = Path(__file__).resolve().parents[3]
+ROOT = Path(__file__).resolve().parents[4]
 SEED, SECONDS, LANES = 3, 8.0, 6
 
 

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from test_radial_whisk import COUNTS, RATE, whisk, whisks
+from whisks import COUNTS, RATE, whisk, whisks
 
 from whisker.simulation.scenes import make_robot
 from whisker.touch.mount import Mount, retreat

@@ -1,18 +1,12 @@
-"""Mutated recordings: whatever a file holds, reading it ends well or in the one-line error, and costs little memory.
+"""Mutated recordings: whatever a file holds, reading it ends well or in the one-line error, and costs little memory."""
 
-python host/python/tests/fuzz_recording.py --inputs 100000 --seed 1
-"""
-
-import argparse
 import io
-import resource
-import struct
-import sys
 import tempfile
 from pathlib import Path
 
 import numpy as np
 from mcap.writer import CompressionType, Writer
+from mutate import mutate
 from rings import make_frames
 
 from whisker.recording import RecordingError, read
@@ -26,9 +20,6 @@ from whisker.recording.messages import (
     encode_event,
 )
 from whisker.recording.reading import EVENTS_TOPIC, FRAMES_TOPIC, METADATA
-
-EDGES = (0, 1, 0x7F, 0x80, 0xFF, 0xFFFF, 2**31 - 1, 2**31, 2**32 - 1, 2**62, 2**63, 2**64 - 1)
-MEMORY_MOST = 2 << 30  # address space a run may take: what a length in a file asks for is not believed
 
 
 def seed_file(compression: CompressionType, crcs: bool) -> bytes:
@@ -47,34 +38,6 @@ def seed_file(compression: CompressionType, crcs: bool) -> bytes:
         writer.add_message(channels[EVENTS_TOPIC], k, encode_event(k, MISSING, tick=k, frames=1), k)
     writer.finish()
     return out.getvalue()
-
-
-def mutate(data: bytes, rng: np.random.Generator) -> bytes:
-    """One to four changes: bits, bytes, numbers at their edges, pieces cut, doubled or moved."""
-    out = bytearray(data)
-    for _ in range(rng.integers(1, 5)):
-        if len(out) < 2:
-            break
-        place, length = int(rng.integers(len(out))), int(rng.integers(1, 64))
-        match rng.integers(7):
-            case 0:
-                out[place] ^= 1 << int(rng.integers(8))
-            case 1:
-                out[place] = int(rng.integers(256))
-            case 2:
-                edge, code = EDGES[rng.integers(len(EDGES))], "<Q" if rng.integers(2) else "<I"
-                out[place : place + struct.calcsize(code)] = struct.pack(
-                    code, edge & (2 ** (8 * struct.calcsize(code)) - 1)
-                )
-            case 3:
-                del out[place:]
-            case 4:
-                del out[place : place + length]
-            case 5:
-                out[place:place] = out[place : place + length]
-            case 6:
-                out[place : place + length] = rng.bytes(length)
-    return bytes(out)
 
 
 def use(path: Path) -> int:
@@ -100,8 +63,8 @@ def use_message(data: bytes) -> None:
             continue
 
 
-def fuzz(inputs: int, seed: int) -> tuple[int, int]:
-    """(files from which frames were read, frames) of so many inputs; half of them files, half single messages."""
+def fuzz(inputs: int, seed: int) -> dict[str, int]:
+    """Half of the inputs are files, half single messages."""
     rng = np.random.default_rng(seed)
     kinds = (
         (CompressionType.NONE, False),
@@ -123,19 +86,4 @@ def fuzz(inputs: int, seed: int) -> tuple[int, int]:
             got = use(path)
             readable += got > 0
             frames += got
-    return readable, frames
-
-
-def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--inputs", type=int, default=10_000)
-    parser.add_argument("--seed", type=int, default=1)
-    options = parser.parse_args()
-    resource.setrlimit(resource.RLIMIT_AS, (MEMORY_MOST, MEMORY_MOST))
-    readable, frames = fuzz(options.inputs, options.seed)
-    print(f"{options.inputs} inputs: {readable} files still gave frames ({frames}); no other error than the one line")
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+    return {"files still gave frames": readable, "frames": frames}

@@ -5,7 +5,7 @@ import json
 import level0
 import numpy as np
 import pytest
-from test_radial import write_whisks
+from whisks import write_whisks
 
 from whisker import scene
 from whisker.cli import main

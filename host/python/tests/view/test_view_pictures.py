@@ -18,7 +18,7 @@ from whisker.protocol import WIRE_VERSION
 
 pytestmark = pytest.mark.skipif(chromium.PROGRAM is None, reason="chromium is not installed (apt install chromium)")
 
-PICTURES = Path(__file__).resolve().parents[3] / "docs/pictures"
+PICTURES = Path(__file__).resolve().parents[4] / "docs/pictures"
 SEED, ROWS = 5, 425
 RING, SHOWN, DRIVEN = 32768, 20000, 80000  # frames: of the ring, there at the beginning, of the drive
 DRIVE_SEED = 19  # of an arena where whiskers meet something on the way

@@ -220,7 +220,7 @@ def kilobytes() -> int:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
 
-def fuzz(inputs: int, seed: int) -> None:
+def fuzz_pages(inputs: int, seed: int) -> None:
     """So many inputs at a running server; then it must still serve, with no more memory than a little."""
     rng = random.Random(seed)
 
@@ -241,4 +241,4 @@ def fuzz(inputs: int, seed: int) -> None:
 
 
 def test_nothing_that_strangers_send_brings_it_down():
-    fuzz(FUZZ_INPUTS, seed=1)
+    fuzz_pages(FUZZ_INPUTS, seed=1)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from commandkit import run, signals_as_before  # noqa: F401 - a fixture
 from rings import make_frames, ring_name
-from test_radial_whisk import whisks
+from whisks import whisks
 
 from whisker.bridge.nodes import NodeError, read_nodes
 from whisker.bridge.ring import Writer
