@@ -5,19 +5,14 @@ Metres and radians. World frame: origin in the arena's lower left corner, x righ
 
 import math
 import re
-import tomllib
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from .errors import UserError
+from .scene_table import SceneError, Table
 
 ARENA, ROBOT, PRIOR, OBSERVATIONS = "arena.toml", "robot.toml", "prior.toml", "observations.csv"
 TEXTURES_MOST = 250  # texture indices are one byte in host/nav, with room for its marks
 LARGEST_M = 1000.0
-
-
-class SceneError(UserError, ValueError):
-    """A scene that breaks its contract. Its text is one line: file, line or key, what and the remedy."""
 
 
 @dataclass(frozen=True)
@@ -106,8 +101,8 @@ def load(path) -> Scene:
     folder = Path(path)
     if not folder.is_dir():
         raise SceneError(f"{folder}: no such folder; give a scene folder with {ARENA} and {ROBOT}")
-    prior = _prior(_Table.read(folder / PRIOR)) if (folder / PRIOR).exists() else None
-    return Scene(_arena(_Table.read(folder / ARENA)), _robot(_Table.read(folder / ROBOT)), prior)
+    prior = _prior(Table.read(folder / PRIOR)) if (folder / PRIOR).exists() else None
+    return Scene(_arena(Table.read(folder / ARENA)), _robot(Table.read(folder / ROBOT)), prior)
 
 
 def write(path, scene: Scene) -> None:
@@ -141,87 +136,10 @@ def _toml(key: str, value) -> str:
     return f"{key} = {text(value)}"
 
 
-class _Table:
-    """One TOML table with strict accessors: what is taken is checked, what is left over is an error."""
-
-    def __init__(self, path: Path, source: str, content: dict, header: str | None = None, nth: int = 0):
-        self.path, self.source, self.content, self.header, self.nth = path, source, dict(content), header, nth
-
-    @classmethod
-    def read(cls, path: Path) -> "_Table":
-        try:
-            source = path.read_text(encoding="utf-8")
-            return cls(path, source, tomllib.loads(source))
-        except OSError as error:
-            raise SceneError(f"{path}: cannot be read ({error.strerror}); a scene folder needs it") from error
-        except (UnicodeError, tomllib.TOMLDecodeError) as error:
-            raise SceneError(f"{path}: not TOML ({error}); mend that place") from error
-
-    def fail(self, key: str, text: str) -> SceneError:
-        line = self._line_of(key)
-        place = f"{self.path}, line {line}" if line else f"{self.path}"
-        return SceneError(f"{place}: '{key}' {text}")
-
-    def take(self, key: str):
-        if key not in self.content:
-            raise self.fail(
-                key, f"is missing{f' in [[{self.header}]] number {self.nth + 1}' if self.header else ''}; add it"
-            )
-        return self.content.pop(key)
-
-    def number(self, key: str, low: float, high: float) -> float:
-        return self._checked(key, self.take(key), low, high)
-
-    def numbers(self, key: str, count: int, low: float, high: float) -> tuple[float, ...]:
-        value = self.take(key)
-        if not isinstance(value, list) or len(value) != count:
-            raise self.fail(key, f"must be a list of {count} numbers")
-        return tuple(self._checked(key, item, low, high) for item in value)
-
-    def strings(self, key: str) -> tuple[str, ...]:
-        value = self.take(key)
-        if not isinstance(value, list) or not value or not all(isinstance(item, str) and item for item in value):
-            raise self.fail(key, 'must be a list of strings, as in ["A", "B"]')
-        return tuple(value)
-
-    def string(self, key: str, allowed: tuple[str, ...] | None = None) -> str:
-        value = self.take(key)
-        if not isinstance(value, str) or not value or (allowed and value not in allowed):
-            raise self.fail(key, f"must be {' or '.join(map(repr, allowed)) if allowed else 'a string'}")
-        return value
-
-    def tables(self, key: str) -> list["_Table"]:
-        value = self.content.pop(key, [])
-        if not isinstance(value, list) or not all(isinstance(item, dict) for item in value):
-            raise self.fail(key, f"must be tables; write each as [[{key}]]")
-        return [_Table(self.path, self.source, item, key, nth) for nth, item in enumerate(value)]
-
-    def done(self) -> None:
-        for key in self.content:
-            raise self.fail(key, "is unknown; remove it")
-
-    def _checked(self, key: str, value, low: float, high: float) -> float:
-        if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
-            raise self.fail(key, f"must be numbers from {low:g} to {high:g}, not {value!r}")
-        return float(value)
-
-    def _line_of(self, key: str) -> int | None:
-        """Line of `key` in this table: after the nth header, if it has one."""
-        lines = list(enumerate(self.source.splitlines(), start=1))
-        if self.header:
-            heads = [n for n, text in lines if re.match(rf"\s*\[\[\s*{self.header}\s*\]\]", text)]
-            if self.nth >= len(heads):
-                return None
-            end = heads[self.nth + 1] if self.nth + 1 < len(heads) else len(lines) + 1
-            lines = lines[heads[self.nth] - 1 : end - 1]
-        wanted = re.compile(rf"\s*(\[+\s*)?[\"']?{re.escape(key)}[\"']?\s*[=\].]")
-        return next((n for n, text in lines if wanted.match(text)), lines[0][0] if self.header else None)
-
-
 TINY = 1e-9
 
 
-def _arena(table: _Table) -> Arena:
+def _arena(table: Table) -> Arena:
     size = table.numbers("size_m", 2, TINY, LARGEST_M)
     tile = table.number("tile_m", TINY, LARGEST_M)
     textures = _textures(table)
@@ -239,7 +157,7 @@ def _arena(table: _Table) -> Arena:
     return Arena(size, tile, textures, floor, tuple(boxes))
 
 
-def _textures(table: _Table) -> tuple[str, ...]:
+def _textures(table: Table) -> tuple[str, ...]:
     names = table.strings("textures")
     letters = [name[0] for name in names]
     for name in names:
@@ -252,7 +170,7 @@ def _textures(table: _Table) -> tuple[str, ...]:
     return names
 
 
-def _floor(table: _Table, size, tile: float, textures) -> tuple[str, ...]:
+def _floor(table: Table, size, tile: float, textures) -> tuple[str, ...]:
     rows = table.strings("floor")
     columns_wanted, rows_wanted = (math.ceil(side / tile - 1e-6) for side in size)
     if len(rows) != rows_wanted:
@@ -267,7 +185,7 @@ def _floor(table: _Table, size, tile: float, textures) -> tuple[str, ...]:
     return rows
 
 
-def _robot(table: _Table) -> Robot:
+def _robot(table: Table) -> Robot:
     radius = table.number("body_radius_m", 0.0, LARGEST_M)
     odometry = table.number("odometry_relative_sigma", 0.0, 10.0)
     radial = table.number("radial_sigma_m", TINY, LARGEST_M)
@@ -280,7 +198,7 @@ def _robot(table: _Table) -> Robot:
     return Robot(radius, odometry, radial, whiskers)
 
 
-def _whisker(entry: _Table) -> Whisker:
+def _whisker(entry: Table) -> Whisker:
     name = entry.string("name")
     if not re.fullmatch(r"\w+", name):
         raise entry.fail("name", f"is '{name}'; use letters, digits and underscores")
@@ -299,7 +217,7 @@ def _whisker(entry: _Table) -> Whisker:
     return whisker
 
 
-def _prior(table: _Table) -> Prior:
+def _prior(table: Table) -> Prior:
     kind = table.string("kind", ("gaussian", "uniform"))
     if kind == "uniform":
         table.done()

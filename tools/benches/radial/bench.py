@@ -19,7 +19,8 @@ from tqdm import tqdm
 from whisker.native import doubles, ffi, lib
 from whisker.report.figures import SETTINGS
 from whisker.touch.radial import model as radial
-from whisker.touch.radial.whisk import WhiskModel, shape_of
+from whisker.touch.radial.shape import shape_of
+from whisker.touch.radial.whisk import WhiskModel
 
 from .trials import PAPER_MM, RADII_MM, SOURCES, SPOILS, SPREADS, Kind, Set, Whisker, recorded, spoilt
 

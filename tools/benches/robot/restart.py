@@ -25,7 +25,7 @@ from whisker.demo.level1 import explore
 from whisker.demo.training import learn
 from whisker.pilot.pilot import Pilot
 from whisker.robot import belief
-from whisker.robot.link import Received
+from whisker.robot.inbox import Received
 from whisker.robot.memory import Memory
 from whisker.robot.models import load_models
 from whisker.robot.rows import Follower, to_message

@@ -18,7 +18,8 @@ from whisker.recording.mcapfile import McapFile
 from whisker.recording.writing import TopicWriter
 from whisker.robot import messages as m
 from whisker.robot.bag import RECORD, Bag, BagClock
-from whisker.robot.link import Link, Received
+from whisker.robot.inbox import Received
+from whisker.robot.link import Link
 from whisker.robot.rows import RowPublisher
 from whisker.robot.streams import Envelope
 from whisker.scene import load

@@ -15,7 +15,7 @@ from whisker.pilot.pilot import compose
 from whisker.robot import belief, checkpoint, parts
 from whisker.robot import messages as m
 from whisker.robot.checkpoint import Checkpoint, CheckpointError
-from whisker.robot.link import Received
+from whisker.robot.inbox import Received
 from whisker.robot.memory import AGE_MOST_S, Memory, widen
 from whisker.robot.rows import ROW_NS, Follower, Place, Step, to_message
 from whisker.robot.streams import Envelope

@@ -5,7 +5,8 @@ import zenoh
 from robotkit import Cable, examples, free_endpoint, take_until
 
 from whisker.robot import messages as m
-from whisker.robot.link import MESSAGE_MOST, Inbox, Link, LinkError, encoding_of, is_loopback
+from whisker.robot.inbox import Inbox, encoding_of
+from whisker.robot.link import MESSAGE_MOST, Link, LinkError, is_loopback
 from whisker.robot.streams import ENVELOPE, Envelope, EnvelopeError, Tally, envelopes
 
 PATIENCE_S = 30.0

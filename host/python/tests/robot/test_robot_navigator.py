@@ -18,7 +18,8 @@ from whisker.nav import localise
 from whisker.nav.filters import COMPONENT
 from whisker.robot import belief, checkpoint, health
 from whisker.robot import messages as m
-from whisker.robot.link import Link, encoding_of
+from whisker.robot.inbox import encoding_of
+from whisker.robot.link import Link
 from whisker.robot.navigator import Navigator, Settings
 from whisker.robot.rows import RowPublisher, to_message
 from whisker.robot.streams import envelopes

@@ -12,7 +12,8 @@ from robotkit import examples, free_endpoint, take_until
 from whisker.nav.observations import ODOMETRY
 from whisker.pilot.pilot import compose
 from whisker.robot import messages as m
-from whisker.robot.link import Link, Received
+from whisker.robot.inbox import Received
+from whisker.robot.link import Link
 from whisker.robot.pyro import Results
 from whisker.robot.rows import to_message
 from whisker.robot.streams import Envelope

@@ -12,7 +12,7 @@ from whisker.nav import localise
 from whisker.nav.observations import cell
 from whisker.pilot.pilot import compose
 from whisker.robot import messages as m
-from whisker.robot.link import Received
+from whisker.robot.inbox import Received
 from whisker.robot.rows import Follower, RowPublisher, Step, between, to_message, to_row
 from whisker.robot.streams import Envelope
 

@@ -8,7 +8,7 @@ import pytest
 from whisker.pilot.behaviour import BLOCK_TICKS
 from whisker.pilot.states import State
 from whisker.pilot.wheels import NO_BUMPS
-from whisker.robot.messages import PLANAR
+from whisker.robot.ros import PLANAR
 from whisker.robot.telling import Teller
 from whisker.robot.wheels import Report
 

@@ -9,7 +9,7 @@ from functools import cache
 
 import numpy as np
 
-from whisker.robot.link import Inbox, encoding_of
+from whisker.robot.inbox import Inbox, encoding_of
 from whisker.robot.messages import (
     CORNER,
     EMPTY,

@@ -11,7 +11,8 @@ from pathlib import Path
 from ..recording.writing import TopicWriter
 from ..scene import ARENA, PRIOR, ROBOT
 from .health import ENDED, RUNNING, Health
-from .link import Inbox, Link, Received
+from .inbox import Inbox, Received
+from .link import Link
 from .messages import HEALTH, SCHEMAS, encode
 from .rows import ROW_NS
 

@@ -16,7 +16,7 @@ from ..pilot.states import EXPLORE_M_S, TURN_RAD_S
 from ..scene import Scene
 from . import checkpoint
 from .checkpoint import Checkpoint, CheckpointError
-from .link import Received
+from .inbox import Received
 from .rows import ROW_NS, Place, Step
 
 AGE_MOST_S = 60.0  # what a uniform belief takes to find the place anyway

@@ -21,9 +21,11 @@ from ..nav.localise import Estimate
 from ..scene import Prior, Scene
 from . import belief
 from .health import ENDED, RUNNING, Health
-from .link import Link, Received
+from .inbox import Received
+from .link import Link
 from .memory import Memory
-from .messages import ARENA_FRAME, Header, Localisation, PoseWithCovariance, PoseWithCovarianceStamped
+from .messages import Header, Localisation, PoseWithCovariance, PoseWithCovarianceStamped
+from .ros import ARENA_FRAME
 from .rows import Follower, Step
 from .track import Track
 

@@ -21,10 +21,8 @@ from ..pilot.pilot import compose
 from .health import ENDED, RUNNING, Health
 from .link import Link
 from .messages import (
-    BASE_FRAME,
     EXPLORING,
     HEALTH,
-    ODOMETRY_FRAME,
     Header,
     Localisation,
     Observation,
@@ -32,6 +30,7 @@ from .messages import (
     ProcessHealth,
 )
 from .messages import Odometry as OdometryMessage
+from .ros import BASE_FRAME, ODOMETRY_FRAME
 from .rows import Follower, RowPublisher, between
 
 OBJECT, PORT = "whisker.results", 7450

@@ -7,8 +7,10 @@ import numpy as np
 
 from ..nav.observations import ODOMETRY, cell
 from ..pilot.pilot import compose
-from .link import Link, Received
-from .messages import BASE_FRAME, EMPTY, NOT_READ, RELEASE, VALUE, Header, Observation
+from .inbox import Received
+from .link import Link
+from .messages import EMPTY, NOT_READ, RELEASE, VALUE, Header, Observation
+from .ros import BASE_FRAME
 from .streams import Envelope
 
 ROW_NS = 10**8  # the paper's 0.1 s

@@ -6,6 +6,7 @@ from ..pilot.behaviour import TICK_S
 from ..pilot.pilot import Pilot
 from . import messages
 from .link import Link
+from .ros import BASE_FRAME, ODOMETRY_FRAME
 from .rows import ROW_NS, RowPublisher, compose
 from .wheels import Report
 
@@ -65,7 +66,7 @@ class Teller:
     def _odometry(self, report: Report) -> messages.Odometry:
         since_s = 1e-9 * (ROW_NS if self._told_ns is None else self._stamp_ns - self._told_ns)
         self._told_ns, self._pose = self._stamp_ns, compose(self._pose, report.motion)
-        header = messages.Header.at(self._stamp_ns, messages.ODOMETRY_FRAME)
+        header = messages.Header.at(self._stamp_ns, ODOMETRY_FRAME)
         speeds, covariance = np.divide(report.motion, since_s), report.covariance / since_s**2
         pose = messages.PoseWithCovariance(messages.Pose.planar(*self._pose))
         return messages.Odometry(header, pose, messages.TwistWithCovariance.planar(speeds, covariance))
@@ -74,7 +75,7 @@ class Teller:
         names = [f"{name}/{axis}" for name in self._pilot.names.values() for axis in ("alpha", "beta")]
         angles = np.stack([samples["alpha"], samples["beta"]], axis=-1).astype(np.float64)
         angles[samples["status"] != 0] = np.nan
-        header = messages.Header.at(self._stamp_ns, messages.BASE_FRAME)
+        header = messages.Header.at(self._stamp_ns, BASE_FRAME)
         return messages.JointState(header, names, ((angles - MIDDLE) * RAD_PER_COUNT).ravel())
 
     def _tell_contact(self, lane: int) -> None:
@@ -92,7 +93,7 @@ class Teller:
         self._send("contact", told)
 
     def _contact(self, name: str, touching: bool, onset: int, release: int) -> messages.Contact:
-        header = messages.Header.at(self._stamp_ns, messages.BASE_FRAME)
+        header = messages.Header.at(self._stamp_ns, BASE_FRAME)
         times = (messages.Time.of(max(0, tick) * TICK_NS) for tick in (onset, release))
         return messages.Contact(header, name, touching, *times)
 
@@ -101,7 +102,7 @@ class Teller:
         if behaviour.state is not self._state:
             self._state = behaviour.state
             since = messages.Time.of(behaviour.since * TICK_NS)
-            header = messages.Header.at(self._stamp_ns, messages.BASE_FRAME)
+            header = messages.Header.at(self._stamp_ns, BASE_FRAME)
             self._send("behaviour", messages.Behaviour(header, behaviour.state.value, since, behaviour.reason))
 
     def _send(self, topic: str, message) -> None:

@@ -6,7 +6,8 @@ from pathlib import Path
 
 from ..pilot.behaviour import TICK_S
 from .link import Link
-from .messages import ARENA_FRAME, Header, Pose, PoseStamped
+from .messages import Header, Pose, PoseStamped
+from .ros import ARENA_FRAME
 
 RETRY_S = 0.2
 MESSAGE_BYTES = 256

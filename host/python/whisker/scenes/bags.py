@@ -9,7 +9,7 @@ from ..errors import UserError
 from ..nav.observations import TRUTH, cell, observations_path, read_observations
 from ..recording.mcapfile import MAGIC, McapFile
 from ..robot.bag import RECORD, SCENE_FILES
-from ..robot.link import Received
+from ..robot.inbox import Received
 from ..robot.messages import MessageError, Observation, PoseStamped, decode
 from ..robot.rows import Follower, time_text
 from ..robot.streams import Envelope

@@ -1,4 +1,4 @@
-"""Where the robot's messages come from: an inbox of whisker.robot.link, which the server's rounds empty."""
+"""Where the robot's messages come from: a whisker.robot.inbox, which the server's rounds empty."""
 
 from collections.abc import Callable
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from .whisk import TIP_MM
+from .whisk_fit import TIP_MM
 
 
 def tip_from(high_mm: float, sigma_mm: float) -> float:

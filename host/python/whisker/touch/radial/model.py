@@ -11,7 +11,9 @@ import numpy as np
 from ...native import doubles, ffi, lib
 from ...tables import TableError, numbers, read_columns
 from .curve import CurveModel, tip_from
-from .whisk import TIP_MM, Contact, WhiskModel, shape_of
+from .shape import Contact, shape_of
+from .whisk import WhiskModel
+from .whisk_fit import TIP_MM
 
 FORMAT = "whisker radial model 1"
 FIELDS = ("a1", "a0", "sigma_mm", "low_mm", "high_mm")

@@ -1,94 +1,15 @@
-"""Radial distance from whole whisks (host/nav/touch/radial_whisk.h): recordings to shapes, calibration, model files.
-
-Calibration is a maximum a posteriori fit of ln peak, contact by contact, against the known radii, in which the relative
-spread from whisk to whisk is the same everywhere. Five contacts at six radii leave little to learn from, so every
-parameter has a prior, from physics; a number is learned only as far as the contacts speak for it.
-"""
+"""Radial distance from whole whisks: the model of one whisker (host/nav/touch/radial_whisk.h)."""
 
 import math
-from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
-from ...native import doubles, ffi, lib
+from ...native import ffi, lib
+from .shape import TERMS, Contact, shape_of
+from .whisk_fit import learn
 
-TERMS = ("turn", "rate", "told", "bow", "back")
-
-# Priors of the weights, mean and standard deviation. The whisker bends as far as it is pushed, so the angle's weight is
-# 1; unless the base turns otherwise than it is told, and the duration
-# says little. Which of the two it is, the evidence decides. Faster by 3:1 changes the bending by some percent
-# (overshoot, creep); a report of the angle is worth something; bow and return may tell of creep and rate, either way.
-WEIGHT_MEAN = np.array([1.0, 0.0, 0.5, 0.0, 0.0])
-WEIGHT_SD = np.array([0.03, 0.05, 0.5, 0.5, 0.5])
-DOUBTED_MEAN, DOUBTED_SD = 0.5, 0.5  # of the angle's weight
-TRUST = 3.0  # ln of the odds, before anything is seen, that duration tells the angle
-LOG_KAPPA_SD = 1.5  # about 1, whisker_physics section 6: plugs from 0.1 to clamped are conceivable
-# The cone's point over the outermost radius: 181.7 mm over 138 for this whisker; blunter and sharper ones are conceivable.
-CONE_OVER_HIGH, LOG_CONE_SD = 1.3, 0.15
-LOG_KAPPA_LIMITS, LOG_CONE_LIMITS = (-4.0, 4.0), (0.02, 2.0)  # of kappa; of cone over outermost radius
-SPREAD_FIRST = 0.05  # of ln peak, where the iteration begins; the paper's whisks: 0.026 to 0.082
-SPREAD_LEAST = 0.002
-ROUNDS = 12
-
-# Radii that are possible beyond the calibrated ones: one calibrated step inwards, outwards as far as the tip.
-TIP_MM = 3.0
-DIRECTION_LEAST_RAD = 0.05
-LOG_MISFIT_LEAST = 0.5
-SAMPLES_LEAST = 8
-CROP_SHARE = 0.1  # of the peak: what is above belongs to the contact
 LEAST_CONTACTS = 5
 LOG_RATE_NONE = 1e-6  # rates were not known in calibration: seconds stand for radians
-
-
-@dataclass
-class Contact:
-    """One recorded whisk: times (n,) s, samples (n, axes), rates of turn (n,) rad/s commanded and reported, or None."""
-
-    t_s: np.ndarray
-    samples: np.ndarray
-    whisk_rad_s: np.ndarray | None = None
-    told_rad_s: np.ndarray | None = None
-
-
-def shape_of(contact: Contact):
-    """struct nav_shape of a recorded whisk; what is recorded long before and after it is left out."""
-    part = _crop(contact)
-    trace, shape = ffi.new("struct nav_trace *"), ffi.new("struct nav_shape *")
-    t_s = np.ascontiguousarray(contact.t_s[part], np.float64)
-    samples = np.ascontiguousarray(contact.samples[part, : lib.NAV_TRACE_AXES], np.float64)
-    rates = [
-        None if rate is None else np.ascontiguousarray(rate[part], np.float64)
-        for rate in (contact.whisk_rad_s, contact.told_rad_s)
-    ]
-    lib.nav_trace_begin(trace, samples.shape[1])
-    pointers = [ffi.NULL if rate is None else doubles(rate) for rate in rates]
-    lib.nav_trace_run(trace, len(t_s), doubles(t_s), doubles(samples), *pointers)
-    lib.nav_shape_of(trace, shape)
-    return shape
-
-
-def _crop(contact: Contact) -> slice:
-    """The contact and as much before and after it as it lasts, at least an eighth of the recording each."""
-    finite = np.isfinite(contact.samples).all(axis=1)
-    count = len(finite)
-    if np.count_nonzero(finite) < 2 * SAMPLES_LEAST:
-        return slice(0, count)
-    rest = np.median(contact.samples[finite][: max(SAMPLES_LEAST, count // 20)], axis=0)
-    size = np.where(finite, np.abs(contact.samples - rest).sum(axis=1), 0.0)
-    level = np.sort(size)[-max(2, count // 50)]  # not the largest: that may be a bad record
-    runs = np.flatnonzero(np.convolve(size > CROP_SHARE * level, np.ones(3), "same") == 3)
-    if len(runs) == 0:
-        return slice(0, count)
-    margin = max(runs[-1] - runs[0], count // 8)
-    return slice(max(0, runs[0] - margin), min(count, runs[-1] + margin))
-
-
-def terms_of(shape) -> np.ndarray:
-    """The model's terms of a whisk (TERMS); nan where one was not measured."""
-    out = np.empty(len(TERMS))
-    lib.nav_whisk_terms(shape, doubles(out))
-    return out
 
 
 class WhiskModel:
@@ -212,8 +133,7 @@ class WhiskModel:
                 f"radial fit: {len(use)} of {len(shapes)} contacts are whole whisks with a radius above 0; "
                 f"at least {LEAST_CONTACTS}, at 3 radii or more, are needed: record more"
             )
-        shapes = [shapes[n] for n in use]
-        return cls(_learn(radii, shapes) | _looks(shapes) | _possible(radii) | {"axes": axes})
+        return cls(learn([shapes[n] for n in use], radii) | {"axes": axes})
 
     def left_out_error(self, shapes: list, radius_mm) -> float:
         """RMS error, mm, of contacts each predicted by a model that was fitted without it; nan when there are too few."""
@@ -228,103 +148,3 @@ class WhiskModel:
             left.append(without.estimate(shapes[n]).radius_mm - radii[n])
         found = np.square(left)[np.isfinite(left)]
         return float(np.sqrt(found.mean())) if len(found) else float("nan")
-
-
-def _possible(radii: np.ndarray) -> dict:
-    steps = np.diff(np.unique(radii))
-    return {
-        "low_mm": max(1.0, radii.min() - float(np.median(steps))),
-        "high_mm": radii.max() + TIP_MM,
-        "tip_mm": radii.max() - TIP_MM,
-    }
-
-
-def _looks(shapes: list) -> dict:
-    """Direction, misfit and frozen samples of calibrated whisks."""
-    directions = np.array([list(s.direction) for s in shapes])
-    mean = directions.mean(axis=0)
-    mean /= max(1e-9, float(np.linalg.norm(mean)))
-    off = np.arccos(np.clip(directions @ mean, -1.0, 1.0))
-    misfit = np.log([s.misfit + 1e-9 for s in shapes])
-    return {
-        "direction": mean.tolist(),
-        "direction_sd": max(DIRECTION_LEAST_RAD, float(np.sqrt(np.mean(off**2)))),
-        "log_misfit": float(misfit.mean()),
-        "log_misfit_sd": max(LOG_MISFIT_LEAST, float(misfit.std())),
-        "frozen": max(s.frozen for s in shapes),
-    }
-
-
-def _heights(log_kappa: float, log_cone: float, radii: np.ndarray) -> np.ndarray:
-    kappa, cone = math.exp(log_kappa), math.exp(log_cone)
-    return np.array([lib.nav_whisk_height(kappa, cone, r) for r in radii])
-
-
-class _Posterior(NamedTuple):
-    theta: np.ndarray  # log gain, log kappa, log cone/high, weights
-    covariance: np.ndarray
-    spread: float
-    evidence: float  # ln, by Laplace's approximation
-    shape_share: float  # variance of ln peak that gain, kappa and cone leave open, mean over the contacts
-
-
-def _learn(radii: np.ndarray, shapes: list) -> dict:
-    """Gain, kappa, cone, the terms' weights and the spread from whisk to whisk."""
-    high = radii.max() + TIP_MM
-    raw = np.array([terms_of(s) for s in shapes])
-    known = np.isfinite(raw)
-    mean = np.array([raw[k, n].mean() if k.any() else 0.0 for n, k in enumerate(known.T)])
-    off = np.where(known, raw - mean, 0.0)
-    log_peak = np.log([s.peak for s in shapes])
-    doubted = (np.array([DOUBTED_MEAN, *WEIGHT_MEAN[1:]]), np.array([DOUBTED_SD, *WEIGHT_SD[1:]]))
-    found = [_posterior(radii, high, log_peak, off, *prior) for prior in ((WEIGHT_MEAN, WEIGHT_SD), doubted)]
-    best = found[0] if found[0].evidence + TRUST >= found[1].evidence else found[1]
-    return {
-        "log_gain": float(best.theta[0]),
-        "kappa": math.exp(best.theta[1]),
-        "cone_mm": high * math.exp(best.theta[2]),
-        "weight": best.theta[3:].tolist(),
-        "mean": mean.tolist(),
-        "scatter": [float(raw[k, n].std()) if k.any() else 1.0 for n, k in enumerate(known.T)],
-        "covariance": best.covariance[3:, 3:].tolist(),
-        "spread": math.sqrt(best.spread**2 + best.shape_share),
-    }
-
-
-def _posterior(radii, high, log_peak, off, weight_mean, weight_sd) -> _Posterior:
-    """Gauss-Newton on the posterior, its spread by its own residuals."""
-    prior_mean = np.array([0.0, 0.0, math.log(CONE_OVER_HIGH), *weight_mean])
-    prior_sd = np.array([1e3, LOG_KAPPA_SD, LOG_CONE_SD, *weight_sd])
-    theta = prior_mean.copy()
-    theta[0] = np.mean(log_peak - _heights(0.0, math.log(CONE_OVER_HIGH * high), radii))
-    spread = SPREAD_FIRST
-    for _ in range(ROUNDS):
-        left = log_peak - _model(theta, high, radii, off)
-        slopes = np.column_stack([np.ones(len(radii)), *_slopes(theta, high, radii), off])
-        covariance = np.linalg.inv(slopes.T @ slopes / spread**2 + np.diag(prior_sd**-2.0))
-        theta = theta + covariance @ (slopes.T @ left / spread**2 + (prior_mean - theta) / prior_sd**2)
-        theta[1] = np.clip(theta[1], *LOG_KAPPA_LIMITS)
-        theta[2] = np.clip(theta[2], *LOG_CONE_LIMITS)
-        used = np.trace(covariance @ slopes.T @ slopes) / spread**2
-        left = log_peak - _model(theta, high, radii, off)
-        spread = max(SPREAD_LEAST, math.sqrt(float(left @ left) / max(1.0, len(radii) - used)))
-    misfit = float(left @ left) / spread**2 + float(np.sum(((theta - prior_mean) / prior_sd) ** 2))
-    evidence = 0.5 * np.linalg.slogdet(covariance)[1] - np.log(prior_sd).sum() - len(radii) * math.log(spread)
-    shape_share = float(np.mean([row @ covariance[:3, :3] @ row for row in slopes[:, :3]]))
-    return _Posterior(theta, covariance, spread, float(evidence) - 0.5 * misfit, shape_share)
-
-
-def _model(theta: np.ndarray, high: float, radii: np.ndarray, off: np.ndarray) -> np.ndarray:
-    """ln peak of each contact."""
-    return theta[0] + _heights(theta[1], theta[2] + math.log(high), radii) + off @ theta[3:]
-
-
-def _slopes(theta: np.ndarray, high: float, radii: np.ndarray, step: float = 1e-4) -> list[np.ndarray]:
-    """Derivatives of ln h by log kappa and log cone."""
-    out = []
-    for shift in ((step, 0.0), (0.0, step)):
-        ends = [
-            _heights(theta[1] + sign * shift[0], theta[2] + math.log(high) + sign * shift[1], radii) for sign in (1, -1)
-        ]
-        out.append((ends[0] - ends[1]) / (2 * step))
-    return out
