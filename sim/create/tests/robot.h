@@ -2,7 +2,6 @@
 #ifndef TESTS_ROBOT_H
 #define TESTS_ROBOT_H
 
-#include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -12,6 +11,7 @@
 #include <cmocka.h>
 
 #include "create_state.h"
+#include "near.h"
 
 enum { HEARD_MAX = 1 << 16 };
 
@@ -26,8 +26,6 @@ static struct robot robot; /* of the test that runs: every test begins with swit
 
 #define SEND(...)                                                                                                      \
     sim_create_receive(robot.create, (const uint8_t[]){__VA_ARGS__}, sizeof((const uint8_t[]){__VA_ARGS__}))
-
-#define assert_near(value, expected, error) assert_true(fabs((value) - (expected)) <= (error))
 
 #define HIGH(word) (uint8_t)((uint16_t)(word) >> 8)
 #define LOW(word) (uint8_t)(uint16_t)(word)

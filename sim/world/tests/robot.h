@@ -1,4 +1,4 @@
-/* The demo's robot in an arena of choice, and comparison of doubles. Include cmocka's headers first. */
+/* The demo's robot in an arena of choice. Include cmocka's headers first. */
 #ifndef SIM_TEST_ROBOT_H
 #define SIM_TEST_ROBOT_H
 
@@ -6,16 +6,9 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "near.h"
 #include "sim_world.h"
 #include "whisker_constants.h"
-
-/* NaN is never near. */
-#define assert_near(got, wanted, tolerance)                                                                            \
-    do {                                                                                                               \
-        double got_ = (got), wanted_ = (wanted);                                                                       \
-        if (!(fabs(got_ - wanted_) <= (tolerance)))                                                                    \
-            fail_msg("%s is %.9g, wanted %.9g +- %.3g", #got, got_, wanted_, (double)(tolerance));                     \
-    } while (0)
 
 #define ROBOT_ARM 0.16 /* m, centre to the base of an object whisker; the whisker is perpendicular to it */
 

@@ -5,10 +5,10 @@ import json
 import level0
 import numpy as np
 import pytest
+from commandkit import run
 from whisks import write_whisks
 
 from whisker import scene
-from whisker.cli import main
 from whisker.nav import localise
 
 
@@ -36,15 +36,6 @@ def folder(tmp_path, recorded):
     scene.write(tmp_path / "s", recorded[0])
     write_observations(tmp_path / "s" / "observations.csv", *recorded)
     return tmp_path / "s"
-
-
-def run(capsys, *arguments):
-    """Exit code, standard output, standard error."""
-    try:
-        code = main([str(a) for a in arguments])
-    except SystemExit as leaving:
-        code = leaving.code
-    return (code, *capsys.readouterr())
 
 
 def replace_cell(path, row, column, text):

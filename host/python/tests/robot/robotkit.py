@@ -6,6 +6,7 @@ import socket
 import threading
 
 import numpy as np
+from linkkit import free_endpoint
 
 from whisker.nav.observations import ODOMETRY
 from whisker.robot import messages as m
@@ -43,12 +44,6 @@ def flat(message, path: str = "") -> dict[str, object]:
     else:
         pairs = ((f"{path}.{name}", value) for name, value in vars(message).items() if not name.startswith("_"))
     return {key: value for name, item in pairs for key, value in flat(item, name).items()}
-
-
-def free_endpoint() -> str:
-    """tcp/127.0.0.1:PORT with a port that was free a moment ago."""
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        return f"tcp/127.0.0.1:{server.getsockname()[1]}"
 
 
 class Cable:

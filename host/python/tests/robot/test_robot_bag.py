@@ -5,7 +5,8 @@ import subprocess
 import numpy as np
 import pytest
 from commandkit import END_S, command, run, signals_as_before  # noqa: F401 - a fixture
-from robotkit import examples, flat, free_endpoint, to_rows
+from linkkit import free_endpoint
+from robotkit import examples, flat, to_rows
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 

@@ -4,7 +4,7 @@ import threading
 
 import pytest
 from commandkit import run, signals_as_before  # noqa: F401 - a fixture
-from robotkit import free_endpoint
+from linkkit import free_endpoint
 
 from whisker import scene as scenes
 from whisker.commands import robot

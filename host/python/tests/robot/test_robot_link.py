@@ -1,8 +1,8 @@
 """Streams over zenoh: typed, numbered, found again after every loss, and honest about what was lost."""
 
 import pytest
-import zenoh
-from robotkit import Cable, examples, free_endpoint, take_until
+from linkkit import free_endpoint, sample
+from robotkit import Cable, examples, take_until
 
 from whisker.robot import messages as m
 from whisker.robot.inbox import Inbox, encoding_of
@@ -215,21 +215,13 @@ def test_a_message_that_comes_twice_is_left_out():
     assert tally.take(Envelope(10, 2, 0)) and (tally.restarts, tally.missed) == (1, 3)
 
 
-class FakeSample:
-    """What an inbox reads of a zenoh sample."""
-
-    def __init__(self, envelope: Envelope, message):
-        self.key_expr, self.encoding = "observation", encoding_of(type(message))
-        self.payload, self.attachment = zenoh.ZBytes(m.encode(message)), zenoh.ZBytes(envelope.pack())
-
-
 def test_a_full_inbox_drops_the_oldest_and_counts_them():
     inbox, stream = Inbox("", 10), envelopes()
     for seq in range(5):
-        inbox.put(FakeSample(next(stream), row(seq)))
+        inbox.put(sample("observation", row(seq), next(stream)))
     assert len(inbox.take(0.0)) == 5
     for seq in range(5, 30):
-        inbox.put(FakeSample(next(stream), row(seq)))
+        inbox.put(sample("observation", row(seq), next(stream)))
     assert seqs(inbox.take(0.0)) == list(range(20, 30))
     assert (inbox.overflown, inbox.missed) == (15, 15)
     inbox.close()
@@ -238,8 +230,7 @@ def test_a_full_inbox_drops_the_oldest_and_counts_them():
 
 def test_what_is_refused_does_not_end_the_wait_for_a_message():
     stream = envelopes()
-    bad, good = (FakeSample(next(stream), row(seq)) for seq in range(2))
-    bad.payload = zenoh.ZBytes(b"")
+    bad, good = (sample("observation", row(seq), next(stream), data=data) for seq, data in enumerate((b"", None)))
 
     class Late(Inbox):
         """The good message comes once the bad one has been refused."""

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from commandkit import END_S, command, run, signals_as_before  # noqa: F401 - a fixture
-from robotkit import free_endpoint, take_until, to_rows
+from linkkit import free_endpoint
+from robotkit import take_until, to_rows
 
 from whisker import scene as scene_folder
 from whisker import scenes

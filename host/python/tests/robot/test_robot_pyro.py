@@ -7,7 +7,8 @@ import numpy as np
 import Pyro5.api
 import pytest
 from commandkit import END_S, command, run, signals_as_before  # noqa: F401 - a fixture
-from robotkit import examples, free_endpoint, take_until
+from linkkit import free_endpoint
+from robotkit import examples, take_until
 
 from whisker.nav.observations import ODOMETRY
 from whisker.pilot.pilot import compose

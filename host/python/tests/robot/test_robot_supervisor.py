@@ -4,7 +4,8 @@ import os
 import threading
 
 import pytest
-from robotkit import free_endpoint, take_until
+from linkkit import free_endpoint
+from robotkit import take_until
 
 from whisker.robot.children import Program
 from whisker.robot.link import Link

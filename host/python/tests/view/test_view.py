@@ -11,7 +11,8 @@ from urllib.request import urlopen
 
 import numpy as np
 import pytest
-from viewkit import NODES, PATIENCE_S, Block, made_frames, nothing_logged, page, ring_name, ring_of, spoil, view_of
+from rings import ring_name
+from viewkit import NODES, PATIENCE_S, Block, made_frames, nothing_logged, page, ring_of, spoil, view_of
 from websockets.exceptions import ConnectionClosed
 
 from whisker.bridge.ring import Clock, Writer

@@ -6,7 +6,8 @@ from contextlib import asynccontextmanager
 import chromium
 import numpy as np
 import pytest
-from viewkit import NODES, flowing, made_frames, ring_name, ring_of, spoil, view_of
+from rings import ring_name
+from viewkit import NODES, flowing, made_frames, ring_of, spoil, view_of
 
 from whisker.bridge.ring import Clock
 from whisker.protocol import WIRE_VERSION

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import chromium
 import pytest
-from viewkit import ring_name, view_of
+from rings import ring_name
+from viewkit import view_of
 from viewpage import DRAWN, going_on, looking_at
 from viewrobot import Post
 from viewscene import ALIKE, SceneRun

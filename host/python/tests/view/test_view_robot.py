@@ -3,11 +3,11 @@
 import asyncio
 import json
 import random
-import socket
 import struct
 
 import numpy as np
 import pytest
+from linkkit import free_endpoint
 from test_view_http import mutated
 from viewkit import PATIENCE_S, nothing_logged, page
 from viewrobot import ARENA, ROW_NS, SCENE, MadeUpRun, Post, at, belief_message, estimate, reach, robot_view, route
@@ -239,11 +239,6 @@ def poked(rng: random.Random, data: bytes) -> bytes:
 
 def test_no_message_brings_it_down():
     assert FUZZ_INPUTS / 20 < fuzz_robot(FUZZ_INPUTS, seed=1) < FUZZ_INPUTS
-
-
-def free_endpoint() -> str:
-    with socket.create_server(("127.0.0.1", 0)) as plug:
-        return f"tcp/127.0.0.1:{plug.getsockname()[1]}"
 
 
 def test_over_a_real_network_a_page_sees_what_a_pilot_sends():

@@ -3,13 +3,13 @@
 import asyncio
 import json
 import logging
-import os
 from collections import defaultdict, deque
 from contextlib import asynccontextmanager, contextmanager
 from itertools import count
 
 import numpy as np
 import pytest
+from rings import ring_name
 from websockets.asyncio.client import connect
 
 from whisker.bridge.ring import FRAME, Writer
@@ -20,7 +20,6 @@ from whisker.view.topics import BLOCK
 
 NODES = 3
 PATIENCE_S = 20.0  # for what must come; a test that fails ends
-_numbers = count()
 
 
 @pytest.fixture(autouse=True)
@@ -29,10 +28,6 @@ def nothing_logged(caplog):
     caplog.set_level(logging.WARNING)
     yield
     assert [record.getMessage() for record in caplog.get_records("call")] == []
-
-
-def ring_name() -> str:
-    return f"whisker-test-view-{os.getpid()}-{next(_numbers)}"
 
 
 def made_frames(first: int, n: int, seed: int = 0) -> np.ndarray:

@@ -8,32 +8,10 @@ from dataclasses import dataclass, field
 from functools import cache
 
 import numpy as np
+from linkkit import sample
 
-from whisker.robot.inbox import Inbox, encoding_of
-from whisker.robot.messages import (
-    CORNER,
-    EMPTY,
-    EXPLORING,
-    FACE,
-    NOT_READ,
-    SHAFT,
-    TIP,
-    VALUE,
-    WHISK,
-    Behaviour,
-    Belief,
-    Contact,
-    Header,
-    KeyValue,
-    Localisation,
-    Observation,
-    Pose,
-    PoseStamped,
-    PoseWithCovariance,
-    ProcessHealth,
-    Time,
-    encode,
-)
+from whisker.robot import messages as m
+from whisker.robot.inbox import Inbox
 from whisker.robot.streams import envelopes
 from whisker.scene import Arena, Scene
 from whisker.simulation.scenes import make_robot
@@ -101,7 +79,7 @@ def reach(ray, row: int) -> float | None:
     return None
 
 
-def belief_message(stamp_ns: int, places, seed: int = 1, number: int = 400, mass: float = 1.0) -> Belief:
+def belief_message(stamp_ns: int, places, seed: int = 1, number: int = 400, mass: float = 1.0) -> m.Belief:
     """Poses about each of `places` (share, x, y, theta, sigma_m), heaviest first."""
     rng = np.random.default_rng(seed)
     rows = []
@@ -110,7 +88,7 @@ def belief_message(stamp_ns: int, places, seed: int = 1, number: int = 400, mass
         around = rng.normal((x, y, theta), (sigma, sigma, 0.15), (n, 3))
         rows.append(np.column_stack([around, np.full(n, share / n), np.full(n, 0.02), np.full(n, 0.1)]))
     columns = np.concatenate(rows).T.astype(np.float32)
-    return Belief(Header.at(stamp_ns, "arena"), "adaptive", stamp_ns // ROW_NS, columns.shape[1], mass, *columns)
+    return m.Belief(m.Header.at(stamp_ns, "arena"), "adaptive", stamp_ns // ROW_NS, columns.shape[1], mass, *columns)
 
 
 @dataclass
@@ -129,17 +107,17 @@ class MadeUpRun:
             told.append(("observation", self.observation(row)))
         told += [("localisation", self.localisation(row))] + self.contact(row)
         if self.simulated:
-            told.append(("truth", PoseStamped(Header.at(stamp, "arena"), Pose.planar(*route(stamp / 1e9)))))
+            told.append(("truth", m.PoseStamped(m.Header.at(stamp, "arena"), m.Pose.planar(*route(stamp / 1e9)))))
         if row % 5 == 0:
             told.append(("belief", self.belief(row)))
         if row % 10 == 0:
             told += [(f"health/{name}", self.health(name, row)) for name in ("pilot", "navigator")]
         if row % 100 == 0:
             doing = DOINGS[row // 100 % len(DOINGS)]
-            told.append(("behaviour", Behaviour(Header.at(stamp), doing[0], Time.of(stamp), doing[1])))
+            told.append(("behaviour", m.Behaviour(m.Header.at(stamp), doing[0], m.Time.of(stamp), doing[1])))
         return told
 
-    def observation(self, row: int) -> Observation:
+    def observation(self, row: int) -> m.Observation:
         rng = np.random.default_rng((self.seed, row))
         names, cells, values = [], [], []
         true = route(row / 10)
@@ -148,47 +126,47 @@ class MadeUpRun:
             under = texture_at(*at(true, tip.tip_m))
             for name in ARENA.textures:
                 names.append(f"{tip.name}_{name}")
-                cells.append(EMPTY if whisking else VALUE)
+                cells.append(m.EMPTY if whisking else m.VALUE)
                 values.append(0.0 if whisking else float(rng.normal(-1.0 if name[0] == under else -6.0, 0.8)))
         for ray in SCENE.robot.of_role("object"):
             radius = None if whisking else reach(ray, row)
             names.append(f"{ray.name}_mm")
-            cells.append(NOT_READ if whisking else EMPTY if radius is None else VALUE)
+            cells.append(m.NOT_READ if whisking else m.EMPTY if radius is None else m.VALUE)
             values.append(1e3 * (radius or 0.0))
-        kind = WHISK if whisking else EXPLORING
+        kind = m.WHISK if whisking else m.EXPLORING
         motion, pose = np.array([0.012, 0.0, 0.0]), np.array(true)
-        return Observation(
-            Header.at(row * ROW_NS), row, kind, motion, pose, names, np.array(cells, np.uint8), np.array(values)
+        return m.Observation(
+            m.Header.at(row * ROW_NS), row, kind, motion, pose, names, np.array(cells, np.uint8), np.array(values)
         )
 
-    def localisation(self, row: int) -> Localisation:
+    def localisation(self, row: int) -> m.Localisation:
         t_s = row / 10
         sigma = 0.12 * math.exp(-t_s / 12) + 0.02
-        pose = PoseWithCovariance.planar(estimate(t_s), np.diag([sigma**2, sigma**2, 0.01]))
+        pose = m.PoseWithCovariance.planar(estimate(t_s), np.diag([sigma**2, sigma**2, 0.01]))
         confidence = min(0.97, 1.0 - 0.75 * math.exp(-t_s / 9)) - 0.3 * math.exp(-(((t_s - 30) / 3) ** 2))
         missed = len([k for k in self.skip if k < row])
-        header = Header.at(row * ROW_NS, "arena")
-        return Localisation(header, "adaptive", pose, confidence, row, 1, 0, missed, 0, "scene")
+        header = m.Header.at(row * ROW_NS, "arena")
+        return m.Localisation(header, "adaptive", pose, confidence, row, 1, 0, missed, 0, "scene")
 
-    def contact(self, row: int) -> list[tuple[str, Contact]]:
+    def contact(self, row: int) -> list[tuple[str, m.Contact]]:
         """What each object whisker has to tell: a touch that begins, is measured a row later, or is over."""
         return [("contact", told) for ray in SCENE.robot.of_role("object") if (told := self.touch(ray, row))]
 
-    def touch(self, ray, row: int) -> Contact | None:
+    def touch(self, ray, row: int) -> m.Contact | None:
         began = row
         while began > 0 and reach(ray, began - 1) is not None:
             began -= 1
         radius = reach(ray, row)
-        header, onset = Header.at(row * ROW_NS), Time.of(began * ROW_NS)
+        header, onset = m.Header.at(row * ROW_NS), m.Time.of(began * ROW_NS)
         if radius is None:
-            return None if began == row else Contact(header, ray.name, False, onset, Time.of(row * ROW_NS))
+            return None if began == row else m.Contact(header, ray.name, False, onset, m.Time.of(row * ROW_NS))
         if row - began > 1:
             return None
         tip = radius > 0.6 * ray.length_m
-        measured = (True, radius, 0.0014, TIP if tip else SHAFT, FACE if tip else CORNER) if row > began else ()
-        return Contact(header, ray.name, True, onset, Time(), *measured)
+        measured = (True, radius, 0.0014, m.TIP if tip else m.SHAFT, m.FACE if tip else m.CORNER) if row > began else ()
+        return m.Contact(header, ray.name, True, onset, m.Time(), *measured)
 
-    def belief(self, row: int) -> Belief:
+    def belief(self, row: int) -> m.Belief:
         """About the estimate, and for half a minute also about the place that looks alike."""
         x, y, theta = estimate(row / 10)
         sigma = 0.1 * math.exp(-row / 120) + 0.025
@@ -198,25 +176,10 @@ class MadeUpRun:
             places.append((other, 0.28 + 0.2 * y, 0.9 + 0.1 * x, theta + 2.0, 1.6 * sigma))
         return belief_message(row * ROW_NS, places, seed=row)
 
-    def health(self, name: str, row: int) -> ProcessHealth:
+    def health(self, name: str, row: int) -> m.ProcessHealth:
         counts = {"pilot": {"rows": row, "contacts": row // 100}, "navigator": {"rows": row, "step_us": 240}}[name]
-        pairs = [KeyValue(key, str(value)) for key, value in counts.items()]
-        return ProcessHealth(Header.at(row * ROW_NS), name, 4000 + len(name), "running", pairs)
-
-
-@dataclass
-class Sample:
-    """What zenoh hands to an inbox."""
-
-    key_expr: str
-    encoding: str
-    payload: "Bytes"
-    attachment: "Bytes"
-
-
-class Bytes(bytes):
-    def to_bytes(self) -> bytes:
-        return bytes(self)
+        pairs = [m.KeyValue(key, str(value)) for key, value in counts.items()]
+        return m.ProcessHealth(m.Header.at(row * ROW_NS), name, 4000 + len(name), "running", pairs)
 
 
 class Post:
@@ -229,9 +192,7 @@ class Post:
 
     def put(self, topic: str, message, encoding: str | None = None, data: bytes | None = None) -> None:
         """A message, or in its place any `data` of any `encoding`."""
-        attachment = Bytes(next(self._streams[topic]).pack())
-        payload = Bytes(encode(message) if data is None else data)
-        self.inbox.put(Sample(f"whisker/robot/{topic}", encoding or encoding_of(type(message)), payload, attachment))
+        self.inbox.put(sample(f"whisker/robot/{topic}", message, next(self._streams[topic]), encoding, data))
 
     def play(self, run, rows: range, model: RobotModel) -> None:
         """All of these rows straight into a model."""

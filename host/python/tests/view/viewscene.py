@@ -8,26 +8,8 @@ from viewrobot import ROW_NS
 
 from whisker.nav.filters import Filter
 from whisker.pilot.pilot import compose
+from whisker.robot import messages as m
 from whisker.robot.belief import condense, to_message
-from whisker.robot.messages import (
-    EMPTY,
-    EXPLORING,
-    NOT_READ,
-    SHAFT,
-    TIP,
-    VALUE,
-    Behaviour,
-    Contact,
-    Header,
-    KeyValue,
-    Localisation,
-    Observation,
-    Pose,
-    PoseStamped,
-    PoseWithCovariance,
-    ProcessHealth,
-    Time,
-)
 from whisker.scenes import arenas
 from whisker.scenes.families import Recipe, recipe
 from whisker.scenes.making import make_recipe
@@ -53,46 +35,46 @@ class SceneRun:
     def messages(self, row: int) -> list[tuple[str, object]]:
         """(topic, message) in the order they are sent."""
         estimate, _ = self._filter.replay(self._rows, row, 1)
-        at = partial(Header.at, row * ROW_NS)
-        pose = PoseWithCovariance.planar(estimate[0]["pose"], estimate[0]["covariance"])
+        at = partial(m.Header.at, row * ROW_NS)
+        pose = m.PoseWithCovariance.planar(estimate[0]["pose"], estimate[0]["covariance"])
         told = [("observation", self._observation(row))]
         confidence = float(estimate[0]["confidence"])
-        told.append(("localisation", Localisation(at("arena"), FILTER, pose, confidence, row, prior="uniform")))
-        told.append(("truth", PoseStamped(at("arena"), Pose.planar(*self._rows.truth[row]))))
+        told.append(("localisation", m.Localisation(at("arena"), FILTER, pose, confidence, row, prior="uniform")))
+        told.append(("truth", m.PoseStamped(at("arena"), m.Pose.planar(*self._rows.truth[row]))))
         told += [("contact", contact) for ray in range(len(self._rays)) for contact in self._contact(row, ray)]
         if row % 5 == 0:
             bumps = self._filter.components()
             told.append(("belief", to_message(at("arena"), FILTER, row, len(bumps), condense(bumps))))
         if row % 10 == 0:
-            counts = [KeyValue("rows", str(row)), KeyValue("states", str(estimate[0]["states"]))]
-            told.append(("health/pilot", ProcessHealth(at(), "pilot", 4005, "running", counts[:1])))
-            told.append(("health/navigator", ProcessHealth(at(), "navigator", 4009, "running", counts)))
+            counts = [m.KeyValue("rows", str(row)), m.KeyValue("states", str(estimate[0]["states"]))]
+            told.append(("health/pilot", m.ProcessHealth(at(), "pilot", 4005, "running", counts[:1])))
+            told.append(("health/navigator", m.ProcessHealth(at(), "navigator", 4009, "running", counts)))
         if row == 0:
-            told.append(("behaviour", Behaviour(at(), "EXPLORE", Time(), "replayed from a drawn scene")))
+            told.append(("behaviour", m.Behaviour(at(), "EXPLORE", m.Time(), "replayed from a drawn scene")))
         return told
 
-    def _observation(self, row: int) -> Observation:
+    def _observation(self, row: int) -> m.Observation:
         texture, radial = self._rows.texture[row].ravel(), 1e3 * self._rows.radial_m[row]
-        cells = np.where(np.isnan(texture), EMPTY, VALUE)
-        cells = np.append(cells, np.select([np.isnan(radial), np.isinf(radial)], [NOT_READ, EMPTY], VALUE))
-        values = np.where(cells == VALUE, np.append(texture, radial), 0.0)
+        cells = np.where(np.isnan(texture), m.EMPTY, m.VALUE)
+        cells = np.append(cells, np.select([np.isnan(radial), np.isinf(radial)], [m.NOT_READ, m.EMPTY], m.VALUE))
+        values = np.where(cells == m.VALUE, np.append(texture, radial), 0.0)
         motion = self._rows.odometry[row]
         self._pose = compose(self._pose, motion)
-        return Observation(
-            Header.at(row * ROW_NS), row, EXPLORING, motion, self._pose, self._names, cells.astype(np.uint8), values
+        return m.Observation(
+            m.Header.at(row * ROW_NS), row, m.EXPLORING, motion, self._pose, self._names, cells.astype(np.uint8), values
         )
 
-    def _contact(self, row: int, ray: int) -> list[Contact]:
+    def _contact(self, row: int, ray: int) -> list[m.Contact]:
         """A touch that begins, measured at once, or that is over."""
-        radius, header = float(self._rows.radial_m[row, ray]), Header.at(row * ROW_NS)
+        radius, header = float(self._rows.radial_m[row, ray]), m.Header.at(row * ROW_NS)
         name, whisker = self._rays[ray], self.scene.robot.of_role("object")[ray]
         if not np.isfinite(radius):
             began = self._onset.pop(ray, None)
             over = began is not None
-            return [Contact(header, name, False, Time.of(began * ROW_NS), Time.of(row * ROW_NS))] if over else []
+            return [m.Contact(header, name, False, m.Time.of(began * ROW_NS), m.Time.of(row * ROW_NS))] if over else []
         if ray in self._onset:
             return []
         self._onset[ray] = row
-        part = TIP if radius > 0.6 * whisker.length_m else SHAFT
+        part = m.TIP if radius > 0.6 * whisker.length_m else m.SHAFT
         sigma = self.scene.robot.radial_sigma_m
-        return [Contact(header, name, True, Time.of(row * ROW_NS), Time(), True, radius, sigma, part)]
+        return [m.Contact(header, name, True, m.Time.of(row * ROW_NS), m.Time(), True, radius, sigma, part)]
