@@ -13,9 +13,11 @@ from whisker.protocol import WIRE_VERSION
 from whisker.scene import write
 from whisker.simulation.scenes import make_scene
 
+RING = f"whisker-bad-{os.getpid()}"  # no other test's, which may run beside this one
+
 
 def shared_memory() -> set[str]:
-    return {path.name for path in Path("/dev/shm").iterdir() if "whisker" in path.name}
+    return {path.name for path in Path("/dev/shm").iterdir() if RING in path.name}
 
 
 def children_of_this_test() -> list[str]:
@@ -47,8 +49,7 @@ def only_line(text: str, program_name: str) -> str:
 
 def run_chain(folder: Path, *options, seconds: float = 1.0) -> subprocess.CompletedProcess:
     scene, _ = write_flat_scene(folder, 1)
-    ring = f"whisker-bad-{os.getpid()}"
-    command = simulation(folder, scene, seconds, 1, ring, *options)
+    command = simulation(folder, scene, seconds, 1, RING, *options)
     return subprocess.run(command, capture_output=True, text=True, timeout=END_S)
 
 
@@ -74,21 +75,20 @@ def test_truncated_stream(tmp_path):
 
 
 def test_missing_device():
-    done = subprocess.run([program("whiskerd"), "--ring", "whisker-bad"], capture_output=True, text=True, timeout=END_S)
+    done = subprocess.run([program("whiskerd"), "--ring", RING], capture_output=True, text=True, timeout=END_S)
     assert done.returncode == 1
     assert "no bridge is connected; plug it in" in only_line(done.stderr, "whiskerd")
 
 
 def test_second_daemon(tmp_path):
-    ring = f"whisker-bad-{os.getpid()}"
     scene, _ = write_flat_scene(tmp_path, 1)
     second = tmp_path / "second.txt"
-    whiskerd = f"{program('whiskerd')} --ring {ring}"
+    whiskerd = f"{program('whiskerd')} --ring {RING}"
     both = f"trap : TERM; {whiskerd} {' '.join(FAST_LINK)} & first=$!; read go; {whiskerd} 2>{second}; echo $? >>{second}; kill $first; while kill -0 $first; do wait $first; done"
-    command = simulation(tmp_path, scene, 600, 1, ring)
+    command = simulation(tmp_path, scene, 600, 1, RING)
     command = [*command[: command.index("--") + 1], "sh", "-c", both]
     with running(command, stdin=subprocess.PIPE) as process:
-        with Reader(ring, wait_s=10.0) as reader:
+        with Reader(RING, wait_s=10.0) as reader:
             next(reader.frames())
             process.stdin.write("go\n")
             process.stdin.flush()

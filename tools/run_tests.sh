@@ -39,4 +39,4 @@ with_preset "$(basename "$1")"
 with_preset asan
 with_preset tsan
 echo "test: Python, gateware, end to end"
-WHISKER_BUILD=$1 .venv/bin/python -m pytest --numprocesses 2 --dist loadfile
+WHISKER_BUILD=$1 .venv/bin/python -m pytest --numprocesses 2 --dist loadfile --no-loadscope-reorder
