@@ -42,7 +42,7 @@ static void drop(struct base_clients *clients, struct base_client *client)
     if (clients->commander == client) {
         clients->commander = NULL;
         daemon_log(LOG_NOTE, "the commander has gone; wheels stopped");
-        base_robot_stop(clients->robot);
+        base_robot_stop(clients->robot, clients->now_ms);
     }
 }
 
@@ -109,13 +109,13 @@ static bool read_number(const char **text, double *value)
     return read;
 }
 
-static void on_drive(struct base_clients *clients, struct base_client *client, const char *text, int64_t now_ms)
+static void on_drive(struct base_clients *clients, struct base_client *client, const char *text)
 {
     double v, omega;
     if (!read_number(&text, &v) || !read_number(&text, &omega) || *text != '\0') {
         answer(clients, client, "error say: drive V OMEGA, in m/s and rad/s");
     } else if (may_command(clients, client)) {
-        base_robot_drive(clients->robot, v, omega, now_ms);
+        base_robot_drive(clients->robot, v, omega, clients->now_ms);
         answer_sent(clients, client);
     }
 }
@@ -126,7 +126,7 @@ static void on_mode(struct base_clients *clients, struct base_client *client, co
     for (int i = 0; i < 3; i++) {
         if (!strcmp(text, names[i])) {
             if (may_command(clients, client)) {
-                base_robot_mode(clients->robot, (enum create_oi_mode)(CREATE_OI_MODE_PASSIVE + i));
+                base_robot_mode(clients->robot, (enum create_oi_mode)(CREATE_OI_MODE_PASSIVE + i), clients->now_ms);
                 answer_sent(clients, client);
             }
             return;
@@ -158,18 +158,18 @@ static void on_health(struct base_clients *clients, struct base_client *client)
     answer(clients, client, text);
 }
 
-static void obey(struct base_clients *clients, struct base_client *client, int64_t now_ms)
+static void obey(struct base_clients *clients, struct base_client *client)
 {
     const char *text = client->message;
     client->waits = false;
     if (!strncmp(text, "drive ", 6)) {
-        on_drive(clients, client, text + 6, now_ms);
+        on_drive(clients, client, text + 6);
     } else if (!strncmp(text, "mode", 4)) {
         on_mode(clients, client, text + 4);
     } else if (!strcmp(text, "odometry")) {
         on_odometry(clients, client);
     } else if (!strcmp(text, "stop")) { /* anybody may */
-        base_robot_stop(clients->robot);
+        base_robot_stop(clients->robot, clients->now_ms);
         answer_sent(clients, client);
     } else if (!strcmp(text, "health")) {
         on_health(clients, client);
@@ -203,7 +203,7 @@ static ssize_t receive(struct base_client *client)
     return got;
 }
 
-static void take_message(struct base_clients *clients, struct base_client *client, int64_t now_ms)
+static void take_message(struct base_clients *clients, struct base_client *client)
 {
     const ssize_t got = receive(client);
     if (got <= 0) {
@@ -219,7 +219,7 @@ static void take_message(struct base_clients *clients, struct base_client *clien
     } else if (cut_after(client->message, &client->after)) {
         client->leads = client->waits = true;
     } else {
-        obey(clients, client, now_ms);
+        obey(clients, client);
     }
 }
 
@@ -233,6 +233,7 @@ void base_clients_poll(const struct base_clients *clients, struct pollfd *polled
 
 void base_clients_serve(struct base_clients *clients, const struct pollfd *polled, int64_t now_ms)
 {
+    clients->now_ms = now_ms;
     for (int i = 0; i < BASE_CLIENTS; i++) {
         struct base_client *client = &clients->client[i];
         if (client->socket < 0 || client->socket != polled[i].fd) {
@@ -241,10 +242,10 @@ void base_clients_serve(struct base_clients *clients, const struct pollfd *polle
         if (client->waits && polled[i].revents & (POLLHUP | POLLERR)) {
             drop(clients, client);
         } else if (!client->waits && polled[i].revents) {
-            take_message(clients, client, now_ms);
+            take_message(clients, client);
         }
         if (client->waits && (clients->robot->port < 0 || base_robot_taken(clients->robot) >= client->after)) {
-            obey(clients, client, now_ms);
+            obey(clients, client);
         }
     }
 }

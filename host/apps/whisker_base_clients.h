@@ -28,6 +28,7 @@ struct base_clients {
     const uint64_t *restarts; /* of the driver, told with the health */
     struct base_client client[BASE_CLIENTS];
     struct base_client *commander; /* NULL: none */
+    int64_t now_ms;                /* as base_clients_serve() was told */
 };
 
 void base_clients_begin(struct base_clients *clients, struct base_robot *robot, const uint64_t *restarts);

@@ -151,11 +151,11 @@ int base_driver_run(const struct base_driver_start *start)
         await(&driver);
         if (driver.polled[GUARD].revents) {
             daemon_log(LOG_ERROR, "the guard has died; wheels stopped, ending");
-            base_robot_end(&driver.robot);
+            base_robot_end(&driver.robot, cli_now_ms());
             return CLI_FAILED;
         }
         serve(&driver);
     }
-    base_robot_end(&driver.robot);
+    base_robot_end(&driver.robot, cli_now_ms());
     return CLI_OK;
 }

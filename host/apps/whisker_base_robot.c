@@ -75,13 +75,32 @@ static bool ask_mode(struct base_robot *robot, enum create_oi_mode mode)
                : order_opcode(robot, mode == CREATE_OI_MODE_FULL ? CREATE_OI_OP_FULL : CREATE_OI_OP_SAFE);
 }
 
-/* Wheels first, then who commands, then what is told. arm: enter the wanted mode. */
-static bool start_base(struct base_robot *robot, bool arm)
+/* Orders the wheels, by a command of so many bytes. A base that is not heard goes by its new speeds from now on. */
+static bool order_wheels(struct base_robot *robot, const uint8_t *bytes, size_t count, struct create_speeds speeds,
+                         int64_t now_ms)
+{
+    const struct create_speeds before = robot->speeds;
+    const bool ordered = order(robot, bytes, count);
+    if (ordered && (speeds.left_mm_s != before.left_mm_s || speeds.right_mm_s != before.right_mm_s)) {
+        robot->changed_ms = now_ms;
+    }
+    robot->speeds = ordered ? speeds : (struct create_speeds){0};
+    return ordered;
+}
+
+static bool order_speeds(struct base_robot *robot, struct create_speeds speeds, int64_t now_ms)
 {
     uint8_t bytes[CREATE_COMMAND_BYTES];
-    robot->speeds = (struct create_speeds){0};
-    return order(robot, bytes, create_put_stop(bytes)) && order_opcode(robot, CREATE_OI_OP_START) &&
-           (!arm || ask_mode(robot, robot->wanted)) &&
+    return order_wheels(robot, bytes, create_put_drive_direct(bytes, speeds.right_mm_s, speeds.left_mm_s), speeds,
+                        now_ms);
+}
+
+/* Wheels first, then who commands, then what is told. arm: enter the wanted mode. */
+static bool start_base(struct base_robot *robot, bool arm, int64_t now_ms)
+{
+    uint8_t bytes[CREATE_COMMAND_BYTES];
+    return order_wheels(robot, bytes, create_put_stop(bytes), (struct create_speeds){0}, now_ms) &&
+           order_opcode(robot, CREATE_OI_OP_START) && (!arm || ask_mode(robot, robot->wanted)) &&
            order(robot, bytes, create_put_stream(bytes, packets, packet_count(robot)));
 }
 
@@ -136,7 +155,7 @@ bool base_robot_open(struct base_robot *robot, int port, int64_t now_ms)
     create_stream_begin(&robot->stream, packets, packet_count(robot));
     daemon_log(LOG_DETAIL, "%s: open, %s at %u baud", robot->options->port,
                create_model_facts(robot->options->odometry.model)->name, robot->options->baud);
-    return start_base(robot, true);
+    return start_base(robot, true, now_ms);
 }
 
 uint64_t base_robot_taken(const struct base_robot *robot)
@@ -147,11 +166,11 @@ uint64_t base_robot_taken(const struct base_robot *robot)
 /* --------------------------------------------------------------------------------------------------------- the frames
  */
 
-static void stop_commander(struct base_robot *robot)
+static void stop_commander(struct base_robot *robot, int64_t now_ms)
 {
     robot->commander_stops++;
     daemon_log(LOG_WARN, "the commander is silent; wheels stopped");
-    base_robot_stop(robot);
+    base_robot_stop(robot, now_ms);
 }
 
 static bool moving(const struct base_robot *robot)
@@ -187,7 +206,7 @@ static void take_frame(struct base_robot *robot, int64_t now_ms)
     robot->on_step(robot->context, &step, base_robot_bits(robot));
     robot->frames_since_drive += 1 + robot->frame.missed;
     if (robot->options->stream_clock && moving(robot) && robot->frames_since_drive >= COMMANDER_FRAMES) {
-        stop_commander(robot);
+        stop_commander(robot, now_ms);
     }
 }
 
@@ -211,14 +230,6 @@ bool base_robot_read(struct base_robot *robot, uint64_t limit, int64_t now_ms)
 /* --------------------------------------------------------------------------------------------------------- the orders
  */
 
-static bool order_speeds(struct base_robot *robot, struct create_speeds speeds)
-{
-    uint8_t bytes[CREATE_COMMAND_BYTES];
-    const bool ordered = order(robot, bytes, create_put_drive_direct(bytes, speeds.right_mm_s, speeds.left_mm_s));
-    robot->speeds = ordered ? speeds : (struct create_speeds){0};
-    return ordered;
-}
-
 bool base_robot_drive(struct base_robot *robot, double v_m_s, double omega_rad_s, int64_t now_ms)
 {
     const struct create_odometry_settings *settings = &robot->options->odometry;
@@ -227,20 +238,17 @@ bool base_robot_drive(struct base_robot *robot, double v_m_s, double omega_rad_s
     const struct create_speeds wanted =
         robot->silent ? (struct create_speeds){0}
                       : create_choose_speeds(settings->model, settings->wheel_base_m, v_m_s, omega_rad_s);
-    if (wanted.left_mm_s != robot->speeds.left_mm_s || wanted.right_mm_s != robot->speeds.right_mm_s) {
-        robot->changed_ms = now_ms;
-    }
-    return order_speeds(robot, wanted);
+    return order_speeds(robot, wanted, now_ms);
 }
 
-bool base_robot_stop(struct base_robot *robot)
+bool base_robot_stop(struct base_robot *robot, int64_t now_ms)
 {
-    return order_speeds(robot, (struct create_speeds){0});
+    return order_speeds(robot, (struct create_speeds){0}, now_ms);
 }
 
-bool base_robot_mode(struct base_robot *robot, enum create_oi_mode mode)
+bool base_robot_mode(struct base_robot *robot, enum create_oi_mode mode, int64_t now_ms)
 {
-    return base_robot_stop(robot) && ask_mode(robot, mode);
+    return base_robot_stop(robot, now_ms) && ask_mode(robot, mode);
 }
 
 /* Bytes have stopped: stopped wheels are all that can be had without seeing. The mode is entered again only if the base
@@ -248,14 +256,13 @@ bool base_robot_mode(struct base_robot *robot, enum create_oi_mode mode)
 static void restart_stream(struct base_robot *robot, int64_t now_ms)
 {
     robot->silences++;
-    robot->changed_ms = moving(robot) ? now_ms : robot->changed_ms;
     robot->silent = robot->stream.counts.frames > 0;
     robot->opened_ms = now_ms;
     daemon_log(LOG_WARN,
                "%s: no frame for %d ms; wheels stopped, stream asked for again; if it stays silent check cable, "
                "--baud and battery",
                robot->options->port, BASE_SILENCE_MS);
-    start_base(robot, robot->entered || robot->stream.counts.frames == 0);
+    start_base(robot, robot->entered || robot->stream.counts.frames == 0, now_ms);
 }
 
 int base_robot_watch(struct base_robot *robot, int64_t now_ms)
@@ -264,8 +271,7 @@ int base_robot_watch(struct base_robot *robot, int64_t now_ms)
         return BASE_REOPEN_MS;
     }
     if (moving(robot) && now_ms - robot->drive_ms >= BASE_COMMANDER_MS) {
-        robot->changed_ms = now_ms;
-        stop_commander(robot);
+        stop_commander(robot, now_ms);
     }
     const int64_t heard_ms = robot->frame_ms > robot->opened_ms ? robot->frame_ms : robot->opened_ms;
     if (now_ms - heard_ms >= BASE_SILENCE_MS) {
@@ -277,10 +283,10 @@ int base_robot_watch(struct base_robot *robot, int64_t now_ms)
     return (int)(commander_ms < silence_ms ? commander_ms : silence_ms);
 }
 
-void base_robot_end(struct base_robot *robot)
+void base_robot_end(struct base_robot *robot, int64_t now_ms)
 {
     uint8_t bytes[CREATE_COMMAND_BYTES];
-    if (base_robot_stop(robot) && order(robot, bytes, create_put_pause(bytes)) &&
+    if (base_robot_stop(robot, now_ms) && order(robot, bytes, create_put_pause(bytes)) &&
         order_opcode(robot, CREATE_OI_OP_START)) {
         close(robot->port);
     }

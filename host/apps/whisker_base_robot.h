@@ -68,17 +68,17 @@ uint64_t base_robot_taken(const struct base_robot *robot);
 
 /* Orders the wheels; false: there is no line. Speeds really ordered: robot->speeds. */
 bool base_robot_drive(struct base_robot *robot, double v_m_s, double omega_rad_s, int64_t now_ms);
-bool base_robot_stop(struct base_robot *robot);
+bool base_robot_stop(struct base_robot *robot, int64_t now_ms);
 
 /* Enters a mode, stopped; passive lets go. */
-bool base_robot_mode(struct base_robot *robot, enum create_oi_mode mode);
+bool base_robot_mode(struct base_robot *robot, enum create_oi_mode mode, int64_t now_ms);
 
 /* What time brings: stops wheels whose commander is silent, restarts a silent stream. Returns ms until the next is due.
  */
 int base_robot_watch(struct base_robot *robot, int64_t now_ms);
 
 /* Stopped, stream paused, passive; closed. */
-void base_robot_end(struct base_robot *robot);
+void base_robot_end(struct base_robot *robot, int64_t now_ms);
 
 /* One line of key=value, for people and programs. */
 void base_robot_health(const struct base_robot *robot, char *text, size_t room);

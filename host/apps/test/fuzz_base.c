@@ -306,7 +306,7 @@ static void answer_all(void)
 static void end(void)
 {
     if (robot.port >= 0) {
-        base_robot_end(&robot);
+        base_robot_end(&robot, now_ms);
     }
     for (int i = 0; i < BASE_CLIENTS; i++) {
         if (clients.client[i].socket >= 0) {
