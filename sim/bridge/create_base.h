@@ -10,7 +10,7 @@
 #include <poll.h>
 
 #include "create_options.h"
-#include "follower_server.h"
+#include "pilot_answers.h"
 extern "C" {
 #include "create_ground.h"
 #include "create_pty.h"

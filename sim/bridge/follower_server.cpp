@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cerrno>
 #include <cinttypes>
-#include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <stdexcept>
@@ -32,20 +31,10 @@ sockaddr_un address_of(const std::string &path)
     return address;
 }
 
-uint64_t end_of_block(uint64_t block)
-{
-    return (block + 1) * DECISION_BLOCK - 1;
-}
-
-uint64_t effect_of_block(uint64_t block)
-{
-    return end_of_block(block) + 1 + DECISION_DELAY;
-}
-
 } // namespace
 
 FollowerServer::FollowerServer(const std::string &path, unsigned expected, Answer answer)
-    : path_(path), expected_(expected), answer_(answer)
+    : path_(path), expected_(expected), answers_(answer)
 {
     if (path.empty()) {
         return;
@@ -154,41 +143,10 @@ void FollowerServer::handle(Follower &follower, const std::string &message)
 
 void FollowerServer::handle_answer(Follower &follower, const std::string &message)
 {
-    const uint64_t due = end_of_block(blocks_answered_);
-    const bool sound = answer_ == Answer::BASE ? take_base(message, due) : take_drive(message, due);
-    if (!sound || !follower.pilot) {
-        throw std::runtime_error("socket: '" + message + "', but the pilot's answer due is " +
-                                 (answer_ == Answer::BASE ? "base " : "drive ") + std::to_string(due) +
-                                 (answer_ == Answer::BASE ? " N" : " V OMEGA"));
+    if (!follower.pilot || !answers_.take(message)) {
+        throw std::runtime_error("socket: '" + message + "', but the pilot's answer due is " + answers_.due());
     }
-    blocks_answered_++;
-    follower.taken = std::max(follower.taken, due + 1);
-}
-
-bool FollowerServer::take_drive(const std::string &message, uint64_t due)
-{
-    uint64_t tick = 0;
-    Drive drive{};
-    const int items =
-        std::sscanf(message.c_str(), "drive %" SCNu64 " %lf %lf", &tick, &drive.v_m_s, &drive.omega_rad_s);
-    if (items != 3 || tick != due || !std::isfinite(drive.v_m_s) || !std::isfinite(drive.omega_rad_s)) {
-        return false;
-    }
-    drives_[effect_of_block(blocks_answered_)] = drive;
-    return true;
-}
-
-// The number of bytes never falls.
-bool FollowerServer::take_base(const std::string &message, uint64_t due)
-{
-    uint64_t tick = 0;
-    uint64_t bytes = 0;
-    const int items = std::sscanf(message.c_str(), "base %" SCNu64 " %" SCNu64, &tick, &bytes);
-    if (items != 2 || tick != due || (!bytes_.empty() && bytes < bytes_.rbegin()->second)) {
-        return false;
-    }
-    bytes_[effect_of_block(blocks_answered_)] = bytes;
-    return true;
+    follower.taken = std::max(follower.taken, answers_.ticks_answered());
 }
 
 // A reader that leaves only stops being waited for; without its pilot the run cannot go on.
@@ -243,7 +201,7 @@ void FollowerServer::send_odometry(uint64_t tick, double x_m, double y_m, double
 void FollowerServer::send_base(uint64_t tick, uint64_t bytes)
 {
     const Follower *follower = pilot();
-    if (follower && tick == end_of_block(tick / DECISION_BLOCK)) {
+    if (follower && PilotAnswers::ends_block(tick)) {
         send(*follower, "base " + std::to_string(tick) + " " + std::to_string(bytes));
     }
 }
@@ -290,32 +248,17 @@ bool FollowerServer::allows(uint64_t tick) const
     if (here < static_cast<std::ptrdiff_t>(expected_) || !std::all_of(followers_.begin(), followers_.end(), keeps_up)) {
         return false;
     }
-    return !pilot() || tick < effect_of_block(blocks_answered_);
+    return !pilot() || answers_.cover(tick);
 }
 
 std::optional<Drive> FollowerServer::drive_at(uint64_t tick)
 {
-    const auto at = drives_.find(tick);
-    if (at == drives_.end()) {
-        return std::nullopt;
-    }
-    const Drive drive = at->second;
-    drives_.erase(at);
-    return drive;
+    return answers_.drive_at(tick);
 }
 
 std::optional<uint64_t> FollowerServer::bytes_at(uint64_t tick)
 {
-    if (!pilot()) {
-        return std::nullopt;
-    }
-    const auto later = bytes_.upper_bound(tick);
-    if (later == bytes_.begin()) {
-        return 0;
-    }
-    const auto now = std::prev(later);
-    bytes_.erase(bytes_.begin(), now);
-    return now->second;
+    return pilot() ? std::optional(answers_.bytes_at(tick)) : std::nullopt;
 }
 
 } // namespace bridge_sim

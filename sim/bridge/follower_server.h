@@ -10,13 +10,13 @@
 
 #include <cstdint>
 #include <deque>
-#include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include <poll.h>
 
+#include "pilot_answers.h"
 extern "C" {
 #include "sim_world.h"
 }
@@ -25,8 +25,6 @@ namespace bridge_sim
 {
 
 constexpr uint64_t TAKEN_WINDOW = 4096; // ticks a follower may lag behind
-constexpr uint64_t DECISION_BLOCK = 40; // ticks the pilot answers with one drive message
-constexpr uint64_t DECISION_DELAY = 40; // ticks from the end of a block to its answer's effect, besides the one between
 
 // What a connection that is no follower may do to the cable, at once.
 enum class Cable { UNPLUG, PLUG };
@@ -36,14 +34,6 @@ struct LaneChange {
     size_t lane;
     bool dead;
 };
-
-struct Drive {
-    double v_m_s;
-    double omega_rad_s;
-};
-
-// What a pilot answers a block with.
-enum class Answer { DRIVE, BASE };
 
 class FollowerServer
 {
@@ -99,22 +89,17 @@ class FollowerServer
     bool read_all(Follower &follower);
     void handle(Follower &follower, const std::string &message);
     void handle_answer(Follower &follower, const std::string &message);
-    bool take_drive(const std::string &message, uint64_t due);
-    bool take_base(const std::string &message, uint64_t due);
     void leave(const Follower &follower);
     void send(const Follower &follower, const std::string &message);
     const Follower *pilot() const;
 
     std::string path_;
     unsigned expected_;
-    Answer answer_;
+    PilotAnswers answers_;
     int listener_ = -1;
     std::vector<Follower> followers_;
-    std::map<uint64_t, Drive> drives_;   // by the tick they take effect
-    std::map<uint64_t, uint64_t> bytes_; // likewise: all that the driver had written
     std::deque<Cable> cable_;
     std::deque<LaneChange> lane_changes_;
-    uint64_t blocks_answered_ = 0;
     bool over_ = false;
 };
 

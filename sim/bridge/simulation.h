@@ -50,6 +50,11 @@ class Simulation
     void produce_last_tick();
     void end_run();
     void close_run();
+    void show_progress();
+    void finish();
+    int verdict() const;
+
+    // Surroundings: what is heard from outside.
     void obey_cable();
     void obey_lane_changes();
     void plug();
@@ -58,9 +63,6 @@ class Simulation
     void deliver_completed();
     void wait(int timeout_ms);
     void read_signals();
-    void show_progress();
-    void finish();
-    int verdict() const;
 
     const Options &options_;
     sim_scene scene_;

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "fault_log.h"
-#include "follower_server.h"
+#include "pilot_answers.h"
 
 namespace bridge_sim
 {

@@ -1,0 +1,62 @@
+// The text of --help.
+#include "options.h"
+
+namespace bridge_sim
+{
+
+const char *usage()
+{
+    return "usage: umockdev-wrapper whisker-bridge-sim --scene FLAT --seconds S [options] -- COMMAND...\n"
+           "       whisker-bridge-sim --scene FLAT --seconds S --usbip PORT | --usbredir PORT [options]\n"
+           "       whisker-bridge-sim --bench --seconds S [options]\n"
+           "\n"
+           "Simulates robot, nodes and bridge (RTL) as a USB device that COMMAND, and only it, sees, or a Linux "
+           "kernel. No tick is produced\n"
+           "before the earlier ones are taken, so the same seed gives the same frames on any machine.\n"
+           "\n"
+           "  --scene FLAT          flat scene file: arena, robot, start pose\n"
+           "  --seconds S           simulated length of the run\n"
+           "  --pace X              at most X simulated seconds per second; the world then goes on while nobody takes "
+           "frames\n"
+           "  --seed N              seed of world, sensors and faults (1)\n"
+           "  --socket PATH         where followers and the pilot connect\n"
+           "  --followers K         wait for so many of them, the pilot included (0)\n"
+           "  --truth OUT.csv       pose and texture tips after every 0.1 s\n"
+           "  --wheels OUT.csv      each change of what the Create's wheels are told: tick, monotonic clock, speeds\n"
+           "  --faults OUT.csv      inject lane and USB faults; log each spoilt lane,tick,kind\n"
+           "  --usb-faults OUT.csv  log each USB fault: tick,kind\n"
+           "  --fault-list FILE     inject just these: lines 'lane TICK LANE KIND ARGUMENT', 'usb TICK KIND', ticks "
+           "rising\n"
+           "  --nodes FILE          single nodes' traits: lines 'LANE serial N', 'LANE chip ID', 'LANE cut BLOCK'\n"
+           "  --lanes-populated N   nodes on the first N lanes; those without a whisker are at rest (the scene's; "
+           "bench: 6)\n"
+           "  --speed-report OUT.json  ticks, clock cycles, wall seconds, fault counts\n"
+           "  --defect KIND         misbehave: wire-version (claims another), frame (damages one) or truncate (cuts "
+           "one)\n"
+           "  --level rtl|bytes     the Verilated bridge, cycle by cycle, or its model at the level of transactions: "
+           "the "
+           "same frames (rtl)\n"
+           "  --usbip PORT          serve the device by USB/IP on this port of 127.0.0.1 (0: a free one, which is "
+           "printed)\n"
+           "  --usbredir PORT       serve it by usbredir, for QEMU's usb-redir\n"
+           "  --create 1|2          the base is an iRobot Create behind a serial port; the pilot answers with 'base T "
+           "N'\n"
+           "  --create-link PATH    where that port, a pseudo-terminal, is linked\n"
+           "  --create-NAME ...     whisker-create-sim's options for the robot and its faults, as "
+           "--create-drop-remainder\n"
+           "  --unplugged           begin without the bridge, until 'plug' comes by the socket\n"
+           "  --progress            a line 'progress TICK TICKS' every simulated second (default on a terminal)\n"
+           "  --bench               no COMMAND, no umockdev: an internal host reads and checks every frame\n"
+           "  --sck-divider N --word-gap N --sample-point N   bench: node link settings, in cycles of 60 MHz (6, 30, "
+           "5)\n"
+           "  --help                this text\n"
+           "\n"
+           "Exit code: COMMAND's (0 for a device that was served until a signal came); 1 if the run could not be "
+           "completed; 2 for a wrong command line.\n"
+           "\n"
+           "example: umockdev-wrapper whisker-bridge-sim --scene arena.flat --seconds 10 --seed 7 --faults faults.csv "
+           "\\\n"
+           "             -- whiskerd --ring demo --sck-divider 6 --word-gap 30 --sample-point 5\n";
+}
+
+} // namespace bridge_sim
