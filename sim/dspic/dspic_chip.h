@@ -104,7 +104,17 @@ static inline bool key_in_time(struct dspic *chip, unsigned cycles)
 }
 
 /* dspic.c */
+typedef void chip_step(struct dspic *chip, uint64_t argument);
+/* Runs a step that may run firmware; a reset within it boots the chip and goes on in `again`. */
+void chip_enter(struct dspic *chip, chip_step *first, chip_step *again, uint64_t argument);
+/* Leaves the running firmware, wherever it is: a reset (cause RCON_*) or the end of the supply (0). */
+void chip_throw_out(struct dspic *chip, uint16_t cause);
+
+/* events.c */
 void plan_event(struct dspic *chip, enum event event, uint64_t at_fs);
+void event_handle(struct dspic *chip, enum event event);
+/* Lets everything happen that is due up to `until_fs`, interrupts apart. */
+void events_pass(struct dspic *chip, uint64_t until_fs);
 /* Time passes for the firmware; interrupts of a higher priority may come in. */
 void dspic_spend(struct dspic *chip, uint64_t cycles);
 /* Time passes with the CPU stalled: peripherals go on, interrupts wait. */

@@ -1,0 +1,101 @@
+/* Events and time: what happens by itself, in its order. */
+#include "dspic_chip.h"
+
+void plan_event(struct dspic *chip, enum event event, uint64_t at_fs)
+{
+    chip->due_fs[event] = at_fs;
+    if (at_fs < chip->soon_fs)
+        chip->soon_fs = at_fs;
+}
+
+static enum event next_event(const struct dspic *chip)
+{
+    enum event next = EVENT_SPI1;
+    for (enum event e = EVENT_SPI1; e < EVENTS; e++) {
+        if (chip->due_fs[e] < chip->due_fs[next])
+            next = e;
+    }
+    return next;
+}
+
+void event_handle(struct dspic *chip, enum event event)
+{
+    chip->due_fs[event] = NEVER;
+    switch (event) {
+    case EVENT_SPI1:
+    case EVENT_SPI2:
+        spi_event(chip, event - EVENT_SPI1);
+        break;
+    case EVENT_T1:
+    case EVENT_T2:
+    case EVENT_T3:
+        timer_event(chip, event - EVENT_T1);
+        break;
+    case EVENT_DMA:
+        dma_event(chip);
+        break;
+    case EVENT_PLL:
+        system_pll_event(chip);
+        break;
+    case EVENT_DISI:
+        chip->look = true;
+        break;
+    case EVENT_WATCHDOG:
+        watchdog_event(chip);
+        break;
+    case EVENT_POWER:
+        chip_throw_out(chip, 0);
+        break;
+    case EVENT_OUTSIDE:
+        chip->wiring.outside(chip->wiring.context);
+        break;
+    default:
+        break;
+    }
+}
+
+void events_pass(struct dspic *chip, uint64_t until_fs)
+{
+    while (chip->soon_fs <= until_fs) {
+        const enum event e = next_event(chip);
+        chip->soon_fs = chip->due_fs[e];
+        if (chip->soon_fs > until_fs)
+            break;
+        if (chip->soon_fs > chip->now_fs)
+            chip->now_fs = chip->soon_fs;
+        event_handle(chip, e);
+    }
+    if (until_fs > chip->now_fs)
+        chip->now_fs = until_fs;
+}
+
+void dspic_stall(struct dspic *chip, uint64_t until_fs)
+{
+    events_pass(chip, until_fs);
+}
+
+void dspic_spend(struct dspic *chip, uint64_t cycles)
+{
+    events_pass(chip, chip->now_fs + cycles * chip->cycle_fs);
+    irq_take(chip);
+}
+
+void dspic_outside_at(struct dspic *chip, uint64_t at_fs)
+{
+    plan_event(chip, EVENT_OUTSIDE, at_fs);
+}
+
+uint64_t dspic_now_fs(const struct dspic *chip)
+{
+    return chip->now_fs;
+}
+
+uint64_t dspic_next_fs(const struct dspic *chip)
+{
+    return chip->due_fs[next_event(chip)];
+}
+
+void dspic_cut_power_at(struct dspic *chip, uint64_t at_fs)
+{
+    plan_event(chip, EVENT_POWER, at_fs);
+}
