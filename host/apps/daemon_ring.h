@@ -1,0 +1,13 @@
+/* The daemon's ring: a new one, or the name of a daemon that is to be replaced. */
+#ifndef WHISKER_DAEMON_RING_H
+#define WHISKER_DAEMON_RING_H
+
+#include "daemon_options.h"
+
+struct whisker_ring;
+
+/* Makes the ring that the options name. With `replace` a daemon that has it is told to stop, and waited for. Returns 0,
+ * or why there is none. */
+int daemon_ring_make(const struct daemon_options *options, struct whisker_ring **ring);
+
+#endif
