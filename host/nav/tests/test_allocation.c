@@ -1,36 +1,7 @@
-/* No filter allocates after its start: the linker leads the library's malloc, calloc and realloc through here. */
-#include <stdlib.h>
-
+/* No filter allocates after its start. */
+#include "count_allocations.h"
 #include "near.h"
 #include "wander.h"
-
-/* The names that ld's --wrap gives. */
-void *__real_malloc(size_t);
-void *__real_calloc(size_t, size_t);
-void *__real_realloc(void *, size_t);
-void *__wrap_malloc(size_t);
-void *__wrap_calloc(size_t, size_t);
-void *__wrap_realloc(void *, size_t);
-
-static long allocations;
-
-void *__wrap_malloc(size_t size)
-{
-    allocations++;
-    return __real_malloc(size);
-}
-
-void *__wrap_calloc(size_t count, size_t size)
-{
-    allocations++;
-    return __real_calloc(count, size);
-}
-
-void *__wrap_realloc(void *old, size_t size)
-{
-    allocations++;
-    return __real_realloc(old, size);
-}
 
 /* Followed, carried off, lost and found: every state that a filter has. */
 static void run(struct nav_filter *f, struct wander *w)
