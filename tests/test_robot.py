@@ -8,6 +8,7 @@ import socket
 import subprocess
 import sys
 from contextlib import contextmanager
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -96,6 +97,9 @@ def test_under_a_pace_the_world_goes_on_without_its_bridge(tmp_path):
         server.send(b"plug")
         while reader.info.published == published:
             told(server)
+        process.terminate()
+        process.wait(END_S)
+    assert not Path("/dev/shm", ring).exists()
 
 
 @contextmanager
