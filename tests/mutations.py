@@ -385,6 +385,13 @@ MUTATIONS = [
         "robot->silent = false;",
     ),
     Mutation(
+        "base: a stop ordered in a silence is not counted",
+        "test_base_silence",
+        "host/apps/whisker_base_robot.c",
+        "speeds.left_mm_s != before.left_mm_s || speeds.right_mm_s != before.right_mm_s",
+        "speeds.left_mm_s > before.left_mm_s || speeds.right_mm_s > before.right_mm_s",
+    ),
+    Mutation(
         "emulator: remainders are kept whatever the option says",
         "sim_create.sensors",
         "sim/create/sensors.c",
