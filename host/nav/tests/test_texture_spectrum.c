@@ -47,7 +47,7 @@ static void an_offset_changes_no_feature_and_a_gain_moves_all_powers_alike(void 
     (void)state;
     double window[2 * 50], moved[2 * 50], a[FEATURES_MOST], b[FEATURES_MOST];
     const double floor[] = {0.0, 0.0};
-    struct nav_texture_features *f = nav_texture_features_new(2, 50, 0, floor);
+    struct nav_texture_features *f = nav_texture_features_new(2, 50, 0, 0, floor);
     draw(window, 100, 3);
     for (int i = 0; i < 100; i++)
         moved[i] = 3.0 * window[i] + 500.0 * (i % 2);
@@ -60,19 +60,84 @@ static void an_offset_changes_no_feature_and_a_gain_moves_all_powers_alike(void 
     nav_texture_features_free(f);
 }
 
+/* Of one channel, with the stretches behind the whole: their means first, then their spreads. */
+static void reduce(const double *window, int length, int shorter, double *out, int *whole, int *count)
+{
+    const double floor = 0.0;
+    struct nav_texture_features *f = nav_texture_features_new(1, length, 0, 0, &floor);
+    *whole = nav_texture_features_count(f);
+    nav_texture_features_free(f);
+    f = nav_texture_features_new(1, length, 0, shorter, &floor);
+    *count = nav_texture_features_count(f);
+    assert_true(*count <= FEATURES_MOST);
+    nav_texture_features_work(f, window, out);
+    nav_texture_features_free(f);
+}
+
+static void shorter_stretches_are_the_windows_that_they_would_be_alone(void **state)
+{
+    (void)state;
+    enum { LENGTH = 64, PARTS = 4, STRETCH = LENGTH / PARTS, STRETCHES = 2 * PARTS - 1 };
+    double window[LENGTH], out[FEATURES_MOST], alone[STRETCHES][FEATURES_MOST];
+    int whole, count, none, each = 0;
+    draw(window, LENGTH, 5);
+    reduce(window, LENGTH, PARTS, out, &whole, &count);
+    for (int i = 0; i < STRETCHES; i++)
+        reduce(window + i * STRETCH / 2, STRETCH, 0, alone[i], &none, &each);
+    assert_int_equal(count, whole + 2 * each);
+    for (int c = 0; c < each; c++) {
+        double mean = 0.0, squares = 0.0;
+        for (int i = 0; i < STRETCHES; i++)
+            mean += alone[i][c] / STRETCHES;
+        for (int i = 0; i < STRETCHES; i++)
+            squares += (alone[i][c] - mean) * (alone[i][c] - mean) / STRETCHES;
+        assert_near(out[whole + c], mean, 1e-9);
+        assert_near(out[whole + each + c], sqrt(squares), 1e-9);
+    }
+}
+
+/* A knock among quiet samples: the power of the whole is the knock's, the mean of the stretches stays near the quiet.
+ */
+static void a_knock_moves_the_stretches_less_than_the_whole(void **state)
+{
+    (void)state;
+    enum { LENGTH = 128 };
+    double window[LENGTH], quiet[FEATURES_MOST], knocked[FEATURES_MOST];
+    int whole, count;
+    draw(window, LENGTH, 9);
+    reduce(window, LENGTH, 8, quiet, &whole, &count);
+    window[100] += 2000.0;
+    reduce(window, LENGTH, 8, knocked, &whole, &count);
+    int power = whole - 2, mean = whole + (count - whole) / 2 - 2, spread = count - 2;
+    double moved = knocked[power] - quiet[power];
+    assert_true(moved > 4.0);
+    assert_true(knocked[mean] - quiet[mean] < 0.3 * moved);
+    assert_true(knocked[spread] > quiet[spread] + 1.0);
+}
+
+static void stretches_too_short_or_single_are_refused(void **state)
+{
+    (void)state;
+    const double floor[] = {0.0, 0.0};
+    const int refused[] = {-1, 1, 9};
+    for (int i = 0; i < 3; i++)
+        assert_null(nav_texture_features_new(2, 8 * NAV_TEXTURE_LENGTH_MIN, 0, refused[i], floor));
+    nav_texture_features_free(nav_texture_features_new(2, 8 * NAV_TEXTURE_LENGTH_MIN, 0, 8, floor));
+}
+
 static void a_constant_window_has_finite_features(void **state)
 {
     (void)state;
-    double window[3 * 7] = {0.0}, out[FEATURES_MOST];
+    double window[3 * 8] = {0.0}, out[FEATURES_MOST];
     const double floor[] = {0.0, 0.0, 0.0}, negative[] = {0.0, -1.0, 0.0};
-    struct nav_texture_features *f = nav_texture_features_new(3, 7, 1, floor);
+    struct nav_texture_features *f = nav_texture_features_new(3, 8, 1, 2, floor);
     nav_texture_features_work(f, window, out);
     for (int i = 0; i < nav_texture_features_count(f); i++)
         assert_true(isfinite(out[i]));
     nav_texture_features_free(f);
-    assert_null(nav_texture_features_new(3, 7, 0, negative));
-    assert_null(nav_texture_features_new(3, NAV_TEXTURE_LENGTH_MIN - 1, 0, floor));
-    assert_null(nav_texture_features_new(0, 7, 0, floor));
+    assert_null(nav_texture_features_new(3, 7, 0, 0, negative));
+    assert_null(nav_texture_features_new(3, NAV_TEXTURE_LENGTH_MIN - 1, 0, 0, floor));
+    assert_null(nav_texture_features_new(0, 7, 0, 0, floor));
 }
 
 static void missing_samples_and_spikes_are_bridged_and_counted(void **state)
@@ -152,7 +217,7 @@ struct model {
 static void make_model(struct model *m)
 {
     *m = (struct model){.bias = {0.0, -8.0}, .unknown = 20.0, .border = 1.0, .spike = 1e3};
-    struct nav_texture_features *f = nav_texture_features_new(1, 16, 0, &m->floor);
+    struct nav_texture_features *f = nav_texture_features_new(1, 16, 0, 0, &m->floor);
     int count = nav_texture_features_count(f), power = count - 2;
     nav_texture_features_free(f);
     m->scale[power] = 1.0;
@@ -295,6 +360,9 @@ int main(void)
         cmocka_unit_test(a_catch_lasts_until_the_level_is_back),
         cmocka_unit_test(power_is_that_of_the_transform_written_out),
         cmocka_unit_test(an_offset_changes_no_feature_and_a_gain_moves_all_powers_alike),
+        cmocka_unit_test(shorter_stretches_are_the_windows_that_they_would_be_alone),
+        cmocka_unit_test(a_knock_moves_the_stretches_less_than_the_whole),
+        cmocka_unit_test(stretches_too_short_or_single_are_refused),
         cmocka_unit_test(a_constant_window_has_finite_features),
         cmocka_unit_test(missing_samples_and_spikes_are_bridged_and_counted),
         cmocka_unit_test(stuck_railed_and_caught_channels_are_told),

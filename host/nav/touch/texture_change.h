@@ -13,7 +13,7 @@ struct nav_texture_change;
 
 enum { NAV_TEXTURE_CHANGE_AFTER_LEAST = 2, NAV_TEXTURE_CHANGE_AFTER_MOST = 6, NAV_TEXTURE_CHANGE_BEFORE_MOST = 16 };
 
-/* F: features of a block (texture_features.h, without levels), K: classes. All arrays are copied. */
+/* F: features of a block (texture_features.h, neither levels nor shorter), K: classes. All arrays are copied. */
 struct nav_texture_change_numbers {
     int classes, channels, length; /* samples of a block */
     double share;                  /* of its independent evidence that a block in a row holds, 0 to 1 */

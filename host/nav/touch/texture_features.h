@@ -1,7 +1,8 @@
 /* What a window of vibration is reduced to: logarithms of band powers of each channel, and how channels move together.
  *
  * Of each channel: log of the power in bands of a third of an octave (fewer where the window resolves less), log of the
- * whole power and log of the power of the steps from sample to sample; with `levels` also its mean. Of each pair of
+ * whole power and log of the power of the steps from sample to sample; with `levels` also its mean, and with `shorter`
+ * the mean and the spread of the same logs over shorter stretches of the window (texture_shorter.h). Of each pair of
  * channels: Fisher's z (atanh) of their correlation. Means apart, an offset changes nothing, and a gain (load, whisker
  * stiffness) moves all the powers of a channel alike, which a linear rule can take out. Nothing depends on units of
  * time: bands count cycles per window, so any sampling rate will do.
@@ -14,10 +15,12 @@ struct nav_texture_features;
 
 enum { NAV_TEXTURE_LENGTH_MIN = 4, NAV_TEXTURE_LENGTH_MAX = 4096, NAV_TEXTURE_CHANNELS_MAX = 64 };
 
-/* Windows of `length` samples of `channels`; floor[channels] (counts squared, >= 0): power below which a band says
+/* Windows of `length` samples of `channels`; shorter: 0, or how many stretches lie end to end in a window, at least 2,
+ * each at least NAV_TEXTURE_LENGTH_MIN long; floor[channels] (counts squared, >= 0): power below which a band says
  * nothing, as quantisation's. NULL for a size out of range, a floor that is negative or not finite, or without memory.
  */
-struct nav_texture_features *nav_texture_features_new(int channels, int length, int levels, const double *floor);
+struct nav_texture_features *nav_texture_features_new(int channels, int length, int levels, int shorter,
+                                                      const double *floor);
 void nav_texture_features_free(struct nav_texture_features *);
 
 /* Numbers that a window is reduced to. */

@@ -104,7 +104,7 @@ struct nav_texture_rung *nav_texture_rung_new(const struct nav_texture_rung_numb
     if (!numbers_ok(numbers))
         return NULL;
     struct nav_texture_features *reduce =
-        nav_texture_features_new(numbers->channels, numbers->length, numbers->levels, numbers->floor);
+        nav_texture_features_new(numbers->channels, numbers->length, numbers->levels, numbers->shorter, numbers->floor);
     struct nav_texture_rung *r = reduce ? calloc(1, sizeof *r) : NULL;
     if (!r) {
         nav_texture_features_free(reduce);

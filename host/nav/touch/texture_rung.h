@@ -18,6 +18,7 @@ enum { NAV_TEXTURE_CLASSES_MAX = 256, NAV_TEXTURE_HIDDEN_MAX = 4096 };
 /* A rung's numbers. F: features, H: hidden, K: classes, R: axes. All arrays are copied. */
 struct nav_texture_rung_numbers {
     int classes, channels, length, levels, hidden, axes;
+    int shorter;                  /* as in texture_features.h */
     uint64_t seed;                /* of the projections */
     double temper;                /* >= 0; scores are multiplied by it */
     const double *floor;          /* [channels] counts squared */

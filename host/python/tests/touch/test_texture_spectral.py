@@ -9,6 +9,7 @@ from commandkit import run, signals_as_before  # noqa: F401 - a fixture
 from whisker.native import doubles, lib
 from whisker.tables import TableError
 from whisker.touch.texture import model as texture
+from whisker.touch.texture.fit import STRETCHES
 from whisker.touch.texture.spectral import SpectralModel
 from whisker.touch.texture.strange import fit_strange
 from whisker.touch.texture.train import train
@@ -71,6 +72,33 @@ def test_other_rates_and_widths_work(rate_hz, channels, window):
     other = train(recordings(names, count=4, n=800, channels=channels), rate_hz)
     found = [(k, d) for k, n in enumerate(names) for d in other.judge(drag(n, 800, 50, channels), window)]
     assert np.mean([d.label == k for k, d in found]) > 0.9
+
+
+def hiss(seed, bursts, gain=1.0, n=2000, length=25):
+    """White noise of one loudness on average: even, or in bursts shorter than any window asked for."""
+    rng = np.random.default_rng([seed, bursts])
+    loud = np.repeat(rng.permutation(np.arange(n // length) % 2), length) if bursts else np.full(n, 0.5)
+    return np.round(32768 + gain * rng.uniform(40, 80) * np.sqrt(2 * loud + 0.2)[:, None] * rng.normal(size=(n, 1)))
+
+
+def test_what_comes_in_bursts_is_told_by_shorter_stretches(tmp_path):
+    bursty = train({f"{b}": [hiss(s, b) for s in range(6)] for b in (False, True)}, RATE_HZ)
+    assert {r.shorter for r in bursty.rungs if r.length >= WINDOW} == {STRETCHES}
+    right = np.mean(
+        [d.loglik.argmax() == b for b in (0, 1) for s in (30, 31, 32) for d in bursty.judge(hiss(s, bool(b)), WINDOW)]
+    )
+    assert right > 0.95
+    bursty.save(tmp_path / "m.json")
+    again = texture.load(tmp_path / "m.json")
+    x = hiss(40, True)
+    for a, b in zip(bursty.judge(x, WINDOW), again.judge(x, WINDOW), strict=True):
+        assert a.label == b.label and np.allclose(a.loglik, b.loglik, atol=1e-2)
+
+
+def test_stretches_that_do_not_pay_are_left_out():
+    """Of even noises the whole's power says as much as anything does."""
+    even = train({f"{k}": [hiss(s, False, 1.0 + 0.2 * k) for s in range(6 * k, 6 * k + 6)] for k in (0, 1)}, RATE_HZ)
+    assert {r.shorter for r in even.rungs} == {0}
 
 
 def test_a_surface_never_trained_is_unknown(model):
@@ -211,6 +239,11 @@ def test_saved_models_load_alike_and_are_small(model, tmp_path):
         lambda c: c["rungs"][0].update(temper=float("nan")),
         lambda c: c["rungs"][0].update(length=1 << 30),
         lambda c: c["rungs"][0].update(hidden=1e9),
+        lambda c: c["rungs"][0].pop("shorter"),
+        lambda c: c["rungs"][-1].update(shorter=8),
+        lambda c: c["rungs"][-1].update(shorter=-1),
+        lambda c: c["rungs"][-1].update(shorter="eight"),
+        lambda c: c.update(format="whisker texture model 5"),
         lambda c: c["rungs"][0]["weight"][0].pop(),
         lambda c: c.update(rungs=c["rungs"][::-1]),
         lambda c: c["limits"].pop("spike"),

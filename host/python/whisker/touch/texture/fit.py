@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...native import lib
 from .rung import Rung, plain_features
 
 SHRINK = (1e-3, 1e-2, 1e-1)  # share of the diagonal in the covariance within classes
@@ -14,6 +15,8 @@ HIDDEN = (0, 128, 256)  # random projections: none, few, many; what many cost ke
 HIDDEN_MUST_GAIN = 0.02  # relative fall of the log loss that pays for the next size: it costs time in every window
 LEAST_GAIN = 0.005  # nats: a smaller fall is chance, however large a share of a small loss
 LEVELS_MUST_GAIN = 0.5  # the same for channel means: a rest drifts, and a mean may tell the session, not the surface
+STRETCHES = 8  # of a window, end to end, judged beside the whole where they pay ...
+STRETCHES_MUST_GAIN = 0.05  # ... in nats a window: they cost it a third more time, however little there is left to gain
 AXES_MOST = 16  # of the distance that tells unknown surfaces
 UNKNOWN_QUANTILE = 0.995  # of held-out windows of trained surfaces
 PRIOR_WINDOWS = 20.0  # with the variances of all classes, that a class's own are mixed with
@@ -42,14 +45,18 @@ class Fitted:
 
 
 def fit(data: Windows, floor: np.ndarray) -> Fitted:
-    """Choose levels, size and shrinkage by held-out log loss, then fit all the rest."""
-    chosen = _fit_features(data, floor, False, HIDDEN[:1])
+    """Choose levels, shorter stretches, size and shrinkage by held-out log loss, then fit all the rest."""
+    chosen = _fit_features(data, floor, False, 0, HIDDEN[:1])
     if chosen.loss > LEAST_GAIN:
-        levelled = _fit_features(data, floor, True, HIDDEN[:1])
+        levelled = _fit_features(data, floor, True, 0, HIDDEN[:1])
         if _pays(levelled.loss, chosen.loss, LEVELS_MUST_GAIN):
             chosen = levelled
+    if chosen.loss > LEAST_GAIN and data.windows.shape[1] >= STRETCHES * lib.NAV_TEXTURE_LENGTH_MIN:
+        beside = _fit_features(data, floor, chosen.rung.levels, STRETCHES, HIDDEN[:1])
+        if beside.loss < chosen.loss - STRETCHES_MUST_GAIN:
+            chosen = beside
     if chosen.loss > LEAST_GAIN:
-        chosen = _fit_features(data, floor, chosen.rung.levels, HIDDEN)
+        chosen = _fit_features(data, floor, chosen.rung.levels, chosen.rung.shorter, HIDDEN)
     return chosen
 
 
@@ -57,13 +64,13 @@ def _pays(loss: float, so_far: float, must_gain: float) -> bool:
     return loss < min((1.0 - must_gain) * so_far, so_far - LEAST_GAIN)
 
 
-def _fit_features(data: Windows, floor: np.ndarray, levels: bool, sizes: tuple) -> Fitted:
-    raw = plain_features(data.windows, levels, floor)
+def _fit_features(data: Windows, floor: np.ndarray, levels: bool, shorter: int, sizes: tuple) -> Fitted:
+    raw = plain_features(data.windows, levels, floor, shorter)
     centre, scale = raw.mean(axis=0), 1.0 / (raw.std(axis=0) + 1e-6)
     features, classes = raw.shape[1], data.classes
     nothing = np.zeros((0, features))
     blank = Rung(
-        data.windows.shape[1], levels, max(sizes), floor, centre, scale,
+        data.windows.shape[1], levels, shorter, max(sizes), floor, centre, scale,
         np.zeros((features + max(sizes), classes)), np.zeros(classes), np.zeros((classes, features)), nothing, np.zeros((classes, 0)),
         np.zeros(classes),
     )  # fmt: skip
@@ -139,7 +146,7 @@ def _finish(blank: Rung, sums: _Sums, left_out: int | None, hidden: int, shrink:
     _, vectors = np.linalg.eigh(within)
     axes = min(AXES_MOST, features)
     return Rung(
-        blank.length, blank.levels, hidden, blank.floor, blank.centre, blank.scale, weight, bias, means,
+        blank.length, blank.levels, blank.shorter, hidden, blank.floor, blank.centre, blank.scale, weight, bias, means,
         vectors[:, ::-1][:, :axes].T, np.zeros((len(means), axes)), np.zeros(len(means)), temper,
     )  # fmt: skip
 

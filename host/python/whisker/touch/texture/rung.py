@@ -15,6 +15,7 @@ class Rung:
 
     length: int
     levels: bool
+    shorter: int
     hidden: int
     floor: np.ndarray  # (channels,)
     centre: np.ndarray  # (F,)
@@ -33,7 +34,7 @@ class Rung:
     _made: object = field(default=None, repr=False, compare=False)
 
     ARRAYS = ("floor", "centre", "scale", "weight", "bias", "middle", "axis", "axis_weight", "beyond")
-    NUMBERS = ("length", "levels", "hidden", "temper", "unknown", "border", "seed")
+    NUMBERS = ("length", "levels", "shorter", "hidden", "temper", "unknown", "border", "seed")
 
     @property
     def native(self):
@@ -45,7 +46,7 @@ class Rung:
     def _make(self):
         for name in self.ARRAYS:
             setattr(self, name, np.ascontiguousarray(getattr(self, name), dtype=np.float64))
-        features = feature_count(len(self.floor), self.length, self.levels)
+        features = feature_count(len(self.floor), self.length, self.levels, self.shorter)
         classes, axes = len(self.bias), len(self.axis)
         shapes = {"centre": (features,), "scale": (features,), "weight": (features + self.hidden, classes)}
         shapes |= {"middle": (classes, features), "axis": (axes, features), "axis_weight": (classes, axes)}
@@ -55,7 +56,8 @@ class Rung:
                 raise ValueError(f"rung {self.length}: {name} has shape {getattr(self, name).shape}, not {shape}")
         numbers = ffi.new("struct nav_texture_rung_numbers *")
         numbers.classes, numbers.channels, numbers.length = classes, len(self.floor), self.length
-        numbers.levels, numbers.hidden, numbers.axes = int(self.levels), self.hidden, axes
+        numbers.levels, numbers.shorter = int(self.levels), self.shorter
+        numbers.hidden, numbers.axes = self.hidden, axes
         numbers.seed, numbers.temper = self.seed, self.temper
         for name in self.ARRAYS:
             setattr(numbers, name, doubles(getattr(self, name)))
@@ -73,24 +75,23 @@ class Rung:
         return out
 
 
-def feature_count(channels: int, length: int, levels: bool) -> int:
+def feature_count(channels: int, length: int, levels: bool, shorter: int = 0) -> int:
     """Numbers that a window is reduced to; ValueError for a size out of range."""
     floor = np.zeros(channels)
-    made = lib.nav_texture_features_new(channels, length, int(levels), doubles(floor))
+    made = lib.nav_texture_features_new(channels, length, int(levels), shorter, doubles(floor))
     if made == ffi.NULL:
         raise ValueError(f"texture: {channels} channels in windows of {length} samples are out of range")
     return lib.nav_texture_features_count(ffi.gc(made, lib.nav_texture_features_free))
 
 
-def plain_features(windows: np.ndarray, levels: bool, floor: np.ndarray) -> np.ndarray:
-    """Windows (m, length, channels) -> features (m, F), not standardised."""
+def plain_features(windows: np.ndarray, levels: bool, floor: np.ndarray, shorter: int = 0) -> np.ndarray:
+    """Windows (m, length, channels) -> features (m, F), not standardised; `shorter` as in nav_texture_features_new."""
     windows = np.ascontiguousarray(windows, dtype=np.float64)
     floor = np.ascontiguousarray(floor, dtype=np.float64)
     _, length, channels = windows.shape
-    out = np.empty((len(windows), feature_count(channels, length, levels)))
-    made = ffi.gc(
-        lib.nav_texture_features_new(channels, length, int(levels), doubles(floor)), lib.nav_texture_features_free
-    )
+    out = np.empty((len(windows), feature_count(channels, length, levels, shorter)))
+    made = lib.nav_texture_features_new(channels, length, int(levels), shorter, doubles(floor))
+    made = ffi.gc(made, lib.nav_texture_features_free)
     for window, row in zip(windows, out, strict=True):
         lib.nav_texture_features_work(made, doubles(window), doubles(row))
     return out

@@ -13,7 +13,7 @@ from .rung import Rung
 from .settle import Settle
 from .strange import Strange
 
-FORMAT = "whisker texture model 5"
+FORMAT = "whisker texture model 6"
 PARTS = {"change": Change, "strange": Strange, "settle": Settle}  # of windows in a row
 LIMITS = ("spike", "still", "low", "high")
 
