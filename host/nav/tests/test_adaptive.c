@@ -99,6 +99,28 @@ static void no_row_takes_more_than_its_budget(void **state)
     nav_filter_free(f);
 }
 
+static void rows_without_readings_leave_the_next_its_budget(void **state)
+{
+    (void)state;
+    for (uint64_t seed = 22; seed < 27; seed++) {
+        struct wander w = wander_new(seed);
+        w.problem.prior = (struct nav_prior){.mean = {1.6, 0.4, 2.0}, .sigma = {0.3, 0.3, 0.8}};
+        assert_int_equal(nav_settings_set(&w.problem.settings, "adaptive.budget", 40000.0), 0);
+        struct nav_filter *f = nav_filter_new("adaptive", &w.problem);
+        for (int k = 0; k < ROWS; k++) {
+            const struct nav_row *row = wander_on(&w);
+            for (int i = 0; k % 2 && i < WANDER_TIPS * WANDER_CLASSES; i++)
+                w.texture[i] = NAN;
+            for (int r = 0; k % 2 && r < WANDER_RAYS; r++)
+                w.radial[r] = NAN;
+            struct nav_estimate e;
+            nav_filter_step(f, row, &e);
+            assert_true((double)e.touched <= 40000.0);
+        }
+        nav_filter_free(f);
+    }
+}
+
 static void a_seed_gives_the_same_bytes_and_another_seed_others(void **state)
 {
     (void)state;
@@ -234,6 +256,7 @@ int main(void)
         cmocka_unit_test(it_notices_a_kidnap_and_finds_the_robot_again),
         cmocka_unit_test(spinning_wheels_do_not_lose_it),
         cmocka_unit_test(no_row_takes_more_than_its_budget),
+        cmocka_unit_test(rows_without_readings_leave_the_next_its_budget),
         cmocka_unit_test(a_seed_gives_the_same_bytes_and_another_seed_others),
         cmocka_unit_test(masses_sum_to_one_in_every_row),
         cmocka_unit_test(twins_neither_drift_nor_die),
