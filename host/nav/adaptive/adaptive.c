@@ -8,6 +8,7 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "adaptive_answer.h"
 #include "adaptive_doubt.h"
 #include "adaptive_global.h"
 #include "adaptive_prior.h"
@@ -61,53 +62,14 @@ static struct nav_pose ahead(const struct adaptive *a)
     return adaptive_log_since(&a->log, a->global.next);
 }
 
-static double mix(double share, double a, double b)
-{
-    return (1.0 - share) * a + share * b;
-}
-
-/* Covariance of a mixture about the first belief's mean. */
-static void mix_covariance(struct nav_gaussian *g, const struct nav_gaussian *other, double share)
-{
-    double d[3] = {other->mean.x - g->mean.x, other->mean.y - g->mean.y, nav_wrap(other->mean.theta - g->mean.theta)};
-    for (int k = 0; k < 9; k++)
-        g->covariance[k] = mix(share, g->covariance[k], other->covariance[k] + d[k / 3] * d[k % 3]);
-}
-
-/* Belief of the arena as a whole, for what sleeps. */
-static struct nav_gaussian anywhere(const struct adaptive *a)
-{
-    struct nav_problem lost = *a->problem;
-    lost.prior.uniform = true;
-    return nav_gaussian_prior(&lost);
-}
-
-static void answer_local(struct adaptive *a, double share)
-{
-    a->answer = adaptive_cloud_summary(&a->cloud, a->answer.belief.mean);
-    struct nav_gaussian other = a->awake ? a->global.summary.belief : anywhere(a);
-    mix_covariance(&a->answer.belief, &other, share);
-    a->answer.near *= 1.0 - share;
-}
-
-static void answer_global(struct adaptive *a, double share)
-{
-    a->answer = a->global.summary;
-    nav_gaussian_move(&a->answer.belief, ahead(a), &(struct nav_noise){0.0, 0.0});
-    struct adaptive_summary other = a->answer;
-    if (a->local)
-        other = adaptive_cloud_summary(&a->cloud, a->answer.belief.mean);
-    mix_covariance(&a->answer.belief, &other.belief, 1.0 - share);
-    a->answer.near *= share;
-}
-
 static void answer(struct adaptive *a)
 {
-    double share = elsewhere(a);
-    if (a->awake && share > 0.5)
-        answer_global(a, share);
-    else
-        answer_local(a, share);
+    struct adaptive_held held = {.problem = a->problem,
+                                 .local = a->local ? &a->cloud : NULL,
+                                 .global = a->awake ? &a->global : NULL,
+                                 .log = &a->log,
+                                 .share = elsewhere(a)};
+    a->answer = adaptive_answer(&held, a->answer.belief.mean);
 }
 
 /* A mixture that a cloud can hold: in doubt from the start, by the share that it may be wrong. A wider one: unknown. */

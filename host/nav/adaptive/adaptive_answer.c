@@ -1,0 +1,54 @@
+#include "adaptive_answer.h"
+
+static double mix(double share, double a, double b)
+{
+    return (1.0 - share) * a + share * b;
+}
+
+/* Covariance of a mixture about the first belief's mean. */
+static void mix_covariance(struct nav_gaussian *g, const struct nav_gaussian *other, double share)
+{
+    double d[3] = {other->mean.x - g->mean.x, other->mean.y - g->mean.y, nav_wrap(other->mean.theta - g->mean.theta)};
+    for (int k = 0; k < 9; k++)
+        g->covariance[k] = mix(share, g->covariance[k], other->covariance[k] + d[k / 3] * d[k % 3]);
+}
+
+/* Belief of the arena as a whole, for what sleeps. */
+static struct nav_gaussian anywhere(const struct adaptive_held *h)
+{
+    struct nav_problem lost = *h->problem;
+    lost.prior.uniform = true;
+    return nav_gaussian_prior(&lost);
+}
+
+static struct adaptive_summary from_local(const struct adaptive_held *h, struct adaptive_summary local)
+{
+    struct nav_gaussian other = h->global ? h->global->summary.belief : anywhere(h);
+    mix_covariance(&local.belief, &other, h->share);
+    local.near *= 1.0 - h->share;
+    return local;
+}
+
+static struct adaptive_summary from_global(const struct adaptive_held *h)
+{
+    struct adaptive_summary global = h->global->summary;
+    nav_gaussian_move(&global.belief, adaptive_log_since(h->log, h->global->next), &(struct nav_noise){0.0, 0.0});
+    struct adaptive_summary other = global;
+    if (h->local)
+        other = adaptive_cloud_summary(h->local, global.belief.mean);
+    mix_covariance(&global.belief, &other.belief, 1.0 - h->share);
+    global.near *= h->share;
+    return global;
+}
+
+/* A belief that is likelier as a whole may hold less near any one pose: while it is spread, its heaviest place is a
+ * guess. */
+struct adaptive_summary adaptive_answer(const struct adaptive_held *h, struct nav_pose guess)
+{
+    if (!h->local)
+        return from_global(h);
+    struct adaptive_summary local = adaptive_cloud_summary(h->local, guess);
+    if (h->global && h->share > 0.5 && h->share * h->global->summary.near > (1.0 - h->share) * local.near)
+        return from_global(h);
+    return from_local(h, local);
+}
