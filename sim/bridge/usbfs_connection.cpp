@@ -42,17 +42,33 @@ bool kind_of(const usbdevfs_urb &urb, UrbKind &kind)
 
 } // namespace
 
-UsbfsConnection::UsbfsConnection(UMockdevIoctlClient *client)
-    : client_(static_cast<UMockdevIoctlClient *>(g_object_ref(client)))
+UsbfsConnection::UsbfsConnection(UMockdevIoctlClient *client) : client_(client)
 {
+    g_object_add_toggle_ref(G_OBJECT(client_), on_last_reference, this);
 }
 
 UsbfsConnection::~UsbfsConnection()
 {
     stop_holding();
-    if (!died_) { // else its socket is open for good, of which umockdev would complain
-        g_object_unref(client_);
+    if (died_) {
+        g_object_ref(client_); // its socket is open for good, of which umockdev would complain
     }
+    g_object_remove_toggle_ref(G_OBJECT(client_), on_last_reference, this);
+}
+
+// umockdev keeps a client while it answers it and while it waits for its next ioctl. It lets go of one that was killed
+// before it had the answer without closing it.
+void UsbfsConnection::on_last_reference(gpointer self, GObject *, gboolean last)
+{
+    auto *connection = static_cast<UsbfsConnection *>(self);
+    if (last && connection->answered_ && umockdev_ioctl_client_get_connected(connection->client_)) {
+        connection->died_ = true;
+    }
+}
+
+void UsbfsConnection::asked()
+{
+    answered_ = false;
 }
 
 bool UsbfsConnection::closed() const
@@ -98,6 +114,7 @@ void UsbfsConnection::answer(int error)
     if (died_) {
         return;
     }
+    answered_ = true;
     umockdev_ioctl_client_complete(client_, error ? -1 : 0, error);
 }
 

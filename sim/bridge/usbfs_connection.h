@@ -44,6 +44,9 @@ class UsbfsConnection
     gulong argument() const;
     UMockdevIoctlData *argument_data(size_t size) const;
 
+    // An ioctl of the client has come.
+    void asked();
+
     // Ends the client's ioctl: error 0, or a positive errno.
     void answer(int error);
 
@@ -72,6 +75,7 @@ class UsbfsConnection
         IoctlDataRef buffer;
     };
 
+    static void on_last_reference(gpointer self, GObject *client, gboolean last);
     static int on_hold_over(void *self);
     IoctlDataRef living_argument();
     void hand_over();
@@ -85,8 +89,9 @@ class UsbfsConnection
     bool reaping_ = false;
     GSource *hold_ = nullptr;
     uint64_t waited_for_ = 0;
-    bool gone_ = false; // the device
-    bool died_ = false; // the client
+    bool answered_ = false; // its ioctl
+    bool gone_ = false;     // the device
+    bool died_ = false;     // the client
 };
 
 } // namespace bridge_sim

@@ -71,6 +71,7 @@ void UsbfsSession::ioctl(UMockdevIoctlClient *client)
 {
     forget_closed();
     UsbfsConnection &connection = connection_of(client);
+    connection.asked();
     if (connection.node() != node_) {
         connection.unplugged();
         return ioctl_of_lost_device(connection);
