@@ -22,11 +22,12 @@ static size_t mapped_bytes(const struct ring_map *map)
     return map->header_bytes + 2 * map->capacity * sizeof(struct whisker_frame);
 }
 
-/* Header and frames at `base`, the frames once more behind them, over address space already reserved. */
+/* Header and frames at `base`, the frames once more behind them, over address space already reserved. Populated: else
+ * every 16th frame of the first round would wait for a page fault. */
 static bool map_over(uint8_t *base, const struct ring_map *map, int protection)
 {
     const size_t once = ring_file_bytes(map->capacity);
-    const int flags = MAP_SHARED | MAP_FIXED;
+    const int flags = MAP_SHARED | MAP_FIXED | MAP_POPULATE;
     return mmap(base, once, protection, flags, map->fd, 0) != MAP_FAILED &&
            mmap(base + once, once - map->header_bytes, protection, flags, map->fd, (off_t)map->header_bytes) !=
                MAP_FAILED;

@@ -1,4 +1,5 @@
-/* From USB to a reader, nothing of the library allocates once the stream is up; USB is this test's own. */
+/* From USB to a reader, nothing of the library allocates once the stream is up, and no page of the ring is left to
+ * fault; USB is this test's own. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -6,6 +7,7 @@
 
 #include <cmocka.h>
 #include <stdio.h>
+#include <string.h>
 #include <unistd.h>
 
 #include "count_allocations.h"
@@ -56,6 +58,13 @@ static void start(struct chain *chain)
     assert_int_equal(whisker_device_start(chain->device, &settings, on_bytes, chain), 0);
 }
 
+static void stop(struct chain *chain)
+{
+    whisker_device_close(chain->device);
+    whisker_reader_detach(chain->reader);
+    whisker_ring_close(chain->ring);
+}
+
 /* One transfer of frames, some damaged, from USB through decoder and ring to the reader. */
 static void pass_batch(struct chain *chain)
 {
@@ -73,6 +82,41 @@ static void pass_batch(struct chain *chain)
     assert_int_equal(whisker_reader_advance(chain->reader, count), 0);
 }
 
+/* Mappings of this process whose file is in /dev/shm: their size, and how much of it is in its page tables. */
+static void mapped_rings(long *size_kb, long *resident_kb)
+{
+    char line[512];
+    long kb;
+    unsigned long from, to;
+    bool ring = false;
+    FILE *file = fopen("/proc/self/smaps", "r");
+    assert_non_null(file);
+    *size_kb = *resident_kb = 0;
+    while (fgets(line, sizeof line, file)) {
+        if (sscanf(line, "%lx-%lx ", &from, &to) == 2) {
+            ring = strstr(line, " /dev/shm/") != NULL;
+        } else if (ring && sscanf(line, "Size: %ld kB", &kb) == 1) {
+            *size_kb += kb;
+        } else if (ring && sscanf(line, "Rss: %ld kB", &kb) == 1) {
+            *resident_kb += kb;
+        }
+    }
+    fclose(file);
+}
+
+static void no_page_of_a_ring_is_left_to_fault(void **state)
+{
+    (void)state;
+    static struct chain chain;
+    long size_kb, resident_kb;
+    start(&chain);
+    mapped_rings(&size_kb, &resident_kb);
+    const long frames_kb = WHISKER_RING_FRAMES * WHISKER_FRAME_BYTES / 1024;
+    assert_true(size_kb > 4 * frames_kb); /* twice by the writer, twice by the reader */
+    assert_int_equal(resident_kb, size_kb);
+    stop(&chain);
+}
+
 static void nothing_is_allocated_while_streaming(void **state)
 {
     (void)state;
@@ -87,13 +131,14 @@ static void nothing_is_allocated_while_streaming(void **state)
     assert_int_equal(allocations, before);
     assert_true(chain.decoder.counts.frames > BATCHES * (BATCH - 1));
     assert_true(chain.decoder.counts.frames_damaged > 0 && chain.decoder.counts.bytes_skipped > 0);
-    whisker_device_close(chain.device);
-    whisker_reader_detach(chain.reader);
-    whisker_ring_close(chain.ring);
+    stop(&chain);
 }
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(nothing_is_allocated_while_streaming)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(no_page_of_a_ring_is_left_to_fault),
+        cmocka_unit_test(nothing_is_allocated_while_streaming),
+    };
     return cmocka_run_group_tests_name("no allocation", tests, NULL, NULL);
 }
