@@ -45,7 +45,7 @@ int nav_texture_shorter_count(const struct nav_texture_shorter *s)
 }
 
 /* Mean of a column over all stretches, and its standard deviation. */
-static void weigh(const struct nav_texture_shorter *s, int column, int count, double *mean, double *spread)
+static void mean_and_spread(const struct nav_texture_shorter *s, int column, int count, double *mean, double *spread)
 {
     double sum = 0.0, squares = 0.0;
     for (int i = 0; i < s->stretches; i++)
@@ -68,6 +68,6 @@ double *nav_texture_shorter_work(struct nav_texture_shorter *s, const double *x,
         row = nav_texture_bands_work(s->bands, s->centred, squares, floor, row);
     }
     for (int c = 0; c < count; c++)
-        weigh(s, c, count, out + c, out + count + c);
+        mean_and_spread(s, c, count, out + c, out + count + c);
     return out + 2 * count;
 }
