@@ -5,7 +5,7 @@ import random
 import cocotb
 from bench import error_record, pulse, record
 from cocotb.triggers import ClockCycles, FallingEdge
-from test_bridge import FAST, FIFO_FRAMES, answer, begin, told
+from rig import FAST, FIFO_FRAMES, answer, begin, told
 
 from whisker.protocol import FRAME_FLAGS, LANES, REPORTS, WIRE_VERSION
 

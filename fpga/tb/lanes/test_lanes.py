@@ -5,7 +5,7 @@ import os
 import cocotb
 import pytest
 from bench import error_record, run_bench
-from bridge.test_bridge import RTL, Rig, answer, begin, reading, told
+from bridge.rig import RTL, Rig, answer, begin, reading, told
 
 from whisker.protocol import FRAME_BYTES, LANES
 
