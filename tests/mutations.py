@@ -322,6 +322,13 @@ MUTATIONS = [
         "reader->frames_missing += 0;",
     ),
     Mutation(
+        "ring: pages are left to fault under the samples",
+        "test_no_allocation",
+        "host/libwhisker/src/ring_map.c",
+        "MAP_SHARED | MAP_FIXED | MAP_POPULATE",
+        "MAP_SHARED | MAP_FIXED",
+    ),
+    Mutation(
         "ring: a writer takes the name of one that lives",
         "test_ring",
         "host/libwhisker/src/ring_file.c",
