@@ -39,7 +39,7 @@ def draw_latency(rows: list[dict]) -> Figure:
         axes.set_xlabel("readers, all on one processor")
     for line in panels:
         line[0].set_ylabel("publish to reader (us)")
-    figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=6, frameon=False)
+    figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False)
     figure.suptitle("256-byte frames at 2 kHz. Shaded: more readers than processors, so tails are the scheduler's")
     return figure
 

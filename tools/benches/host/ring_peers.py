@@ -19,7 +19,7 @@ PEERS = {
     "zenoh": ("zenoh, shared memory", "peer_zenoh", ("poll", "wait")),
     "zeromq": ("ZeroMQ, ipc", "peer_zeromq", ("poll", "wait")),
     "lcm": ("LCM, UDP multicast", "peer_lcm", ("poll", "wait")),
-    "memory": ("limit: 256 bytes of shared memory", "peer_memory", ("poll",)),  # no queue: of latency alone
+    "memory": ("limit: bare shared memory", "peer_memory", ("poll",)),  # no queue: of latency alone
 }
 
 
