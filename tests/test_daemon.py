@@ -206,6 +206,14 @@ def test_killed_daemon_hinders_no_next_one(tmp_path, ring):
     assert not Path("/dev/shm", ring).exists()
 
 
+def test_a_client_that_died_before_its_answer_holds_no_interface(tmp_path, ring):
+    client = f"{sys.executable} {Path(__file__).with_name('dying_client.py')}"
+    script = f"trap : TERM; {client} || exit 9; $D --wait & b=$!; read go; kill $b; wait $b"
+    with running(shell(tmp_path, ring, script), stdin=subprocess.PIPE) as process, Reader(ring, wait_s=10.0) as reader:
+        until(lambda: reader.info.published > 100, process, reader)
+        process.communicate("go\n", timeout=END_S)
+
+
 def test_replacement_takes_over_name_and_bridge(tmp_path, ring):
     script = "trap : TERM; $D & a=$!; read go; $D --replace & b=$!; wait $a; echo first $? >&2; read go; kill $b; wait $b; echo second $? >&2"
     with running(shell(tmp_path, ring, script), stdin=subprocess.PIPE) as process, Reader(ring, wait_s=10.0) as reader:
