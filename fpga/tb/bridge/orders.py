@@ -76,11 +76,7 @@ async def no_service_order_is_taken_that_is_malformed_or_does_not_fit(dut):
 async def a_usb_restart_forgets_a_service_order_and_the_answers(dut):
     rig = await begin(dut)
     await rig.host.control(1)
-    assert await rig.host.order(1)
-    await rig.step()
-    rig.nodes.answers = {0: answer(0, 1, 0)}
-    assert await rig.host.order(0)
-    await rig.step()
+    await rig.answered_order()
     assert (await rig.host.answers())[1][0] == told(answer(0, 1, 0))
     await rig.host.order(1)
     await pulse(dut, dut.tick_strobe)

@@ -150,6 +150,14 @@ class Rig:
             cycles += 1
         return cycles
 
+    async def answered_order(self):
+        """A first service order, answered by lane 0, and the order that fetches the answers."""
+        assert await self.host.order(1)
+        await self.step()
+        self.nodes.answers = {0: answer(0, 1, 0)}
+        assert await self.host.order(0)
+        await self.step()
+
     async def quiet(self):
         """Until every byte in the FIFO has been read."""
         length = -1

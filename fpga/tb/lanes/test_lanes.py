@@ -51,11 +51,7 @@ async def a_mask_with_lanes_it_lacks_is_taken_without_them(dut):
 async def answers_of_lanes_it_lacks_are_off(dut):
     rig = await begin(dut, lanes=HAVE)
     await rig.host.control(1)
-    assert await rig.host.order(1)
-    await rig.step()
-    rig.nodes.answers = {0: answer(0, 1, 0)}
-    assert await rig.host.order(0)
-    await rig.step()
+    await rig.answered_order()
     _, found = await rig.host.answers()
     absent, off = told(error_record(0, "absent")), told(error_record(0, "lane_off"))
     assert found == [told(answer(0, 1, 0))] + [absent] * (HAVE - 1) + [off] * (LANES - HAVE)
