@@ -178,7 +178,8 @@ static void work(struct adaptive *a)
     /* As long as the robot is likelier where it seems to be, a look elsewhere must not take long. */
     double budget = odds(a) < 0.0 ? fmin(s->adaptive_doubt_budget, s->adaptive_budget) : s->adaptive_budget;
     /* Kept back: a cloud drawn from what is found, and that it is moved, weighed and thinned when the row comes. */
-    long kept = (a->idle ? 5 : 2) * a->cloud.room;
+    const long drawn = 2, taken = 3; /* poses looked at for each of the cloud's */
+    long kept = (a->idle ? drawn + taken : drawn) * a->cloud.room;
     adaptive_global_work(&a->global, &a->log, (long)budget - kept - a->touched);
     a->touched += a->global.touched;
     a->evaluations += a->global.touched;
