@@ -33,7 +33,7 @@ static struct slot *map_slot(int flags)
 
 static int publish(struct bench *bench)
 {
-    struct slot *slot = map_slot(O_CREAT | O_RDWR);
+    struct slot *slot = map_slot(O_CREAT | O_TRUNC | O_RDWR);
     uint8_t frame[BENCH_FRAME_BYTES] = {0};
     if (!slot) {
         fprintf(stderr, "peer_memory: no shared memory\n");
