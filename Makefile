@@ -1,11 +1,12 @@
 # CrunchBot's front door. `make help` lists what there is.
 SEED ?= 1
+COUNT ?= 300
 LEVEL ?= bytes
 BUILD := build/release
 PYTHON := .venv/bin/python
 SOURCES_C = $(shell git ls-files '*.c' '*.h' '*.cpp' | grep -v '/gen/')
 
-.PHONY: help demo demo-long test test-all test-kernel test-hil bench build setup gen firmware flash bitstream format lint clean
+.PHONY: help demo demo-long test test-all test-kernel test-hil mutants bench build setup gen firmware flash bitstream format lint clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
@@ -28,6 +29,9 @@ test-kernel: build ## a stock Debian kernel in QEMU meets the simulated bridge, 
 test-hil: build ## hardware in the loop: a plugged bridge, a base: BASE=port [MODEL=2] [WHEELS_UP=1] [INTERACTIVE=1]
 	@WHISKER_BUILD=$(BUILD) $(PYTHON) tests/hil/run.py $(if $(BASE),--base "$(BASE)") $(if $(MODEL),--model "$(MODEL)") \
 		$(if $(WHEELS_UP),--wheels-up) $(if $(INTERACTIVE),--interactive)
+
+mutants: build ## change COUNT=300 lines at random, one at a time, and count what the tests notice; hours, resumable; SEED=n
+	@PYTHONPATH=tests $(PYTHON) -m mutants --count $(COUNT) --seed $(SEED)
 
 bench: build ## measure speed and accuracy again, as ratios in one run: bench/results, docs/charts
 	@$(PYTHON) tools/benches --build-dir $(BUILD)

@@ -1,0 +1,1 @@
+"""Mutation testing: one-line changes drawn at random from the product's C, Verilog and Python, each met by the tests."""

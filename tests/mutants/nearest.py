@@ -1,0 +1,104 @@
+"""Which tests can notice a change of a file: the nearest first, then every test that can reach it.
+
+A step is a list of commands that all must pass for the mutant to go on to the next step.
+"""
+
+import ast
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+BUILD = "build/release"
+PACKAGE = "host/python"
+PYTHON_TESTS = ("host/python/tests", "tests", "sim/signals/tests")
+C_FOLDERS = ("firmware/dspic", "host/libwhisker", "host/nav", "host/create", "host/apps")
+# What the tests of a folder's own programs do not reach: processes driven from Python, nodes on the simulated chip.
+ALSO = {
+    "firmware/dspic": ("sim/node",),
+    "host/apps": ("host/python/tests/pilot/test_base.py", "tests/test_daemon.py", "tests/test_flash.py"),
+}
+SLOW_PROGRAMS = "stress_ring|model"
+FPGA_TESTS = ("fpga/formal", "fpga/tb")
+
+
+@dataclass(frozen=True)
+class Step:
+    """build: targets of the release build; ctest: folders of it; pytest: paths; sanitizers: CTest under ASan as well."""
+
+    build: tuple[str, ...] = ()
+    ctest: tuple[str, ...] = ()
+    pytest: tuple[str, ...] = ()
+    sanitizers: bool = False
+
+
+def steps_for(root: Path, file: str) -> list[Step]:
+    """Nearest tests, then all that can reach `file` (a path below `root`)."""
+    if file.endswith(".v"):
+        return [
+            Step(pytest=_benches(root, file)),
+            Step(build=("all",), ctest=("sim/bridge", "fpga"), pytest=FPGA_TESTS),
+        ]
+    if file.endswith(".py"):
+        return [Step(pytest=near) for near in [_importers(root, file)] if near] + [Step(pytest=PYTHON_TESTS)]
+    folder = next(folder for folder in C_FOLDERS if file.startswith(folder))
+    also = ALSO.get(folder, ())
+    folders = (folder, *(place for place in also if not place.endswith(".py")))
+    near = Step(tuple(f"{place}/all" for place in folders), folders, tuple(p for p in also if p.endswith(".py")))
+    return [near, Step(("all",), (".",), PYTHON_TESTS, sanitizers=True)]
+
+
+def _benches(root: Path, file: str) -> tuple[str, ...]:
+    """Benches and proofs whose text names the module."""
+    module = Path(file).stem
+    texts = [path for folder in FPGA_TESTS for path in sorted((root / folder).rglob("test_*.py"))]
+    named = [path.relative_to(root).as_posix() for path in texts if module in _bench_text(path.parent)]
+    return tuple(named) or FPGA_TESTS
+
+
+@cache
+def _bench_text(folder: Path) -> str:
+    kinds = (".py", ".v", ".sby", ".toml", ".txt")
+    return "\n".join(path.read_text() for path in sorted(folder.iterdir()) if path.suffix in kinds)
+
+
+def _importers(root: Path, file: str) -> tuple[str, ...]:
+    """Test files that import this module; where there are none, those that import a module that does."""
+    module = _module(Path(file).relative_to(PACKAGE)) if file.startswith(PACKAGE) else ""
+    tests = _imports(root, PYTHON_TESTS)
+    direct = tuple(path for path, names in tests.items() if module in names and Path(path).name.startswith("test_"))
+    if direct:
+        return direct
+    users = {_module(Path(path).relative_to(PACKAGE)) for path, names in _product(root).items() if module in names}
+    return tuple(path for path, names in tests.items() if users & names and Path(path).name.startswith("test_"))
+
+
+@cache
+def _imports(root: Path, folders: tuple[str, ...]) -> dict[str, frozenset[str]]:
+    paths = [path for folder in folders for path in sorted((root / folder).rglob("*.py"))]
+    return {path.relative_to(root).as_posix(): _names(path, "") for path in paths}
+
+
+@cache
+def _product(root: Path) -> dict[str, frozenset[str]]:
+    paths = sorted((root / PACKAGE / "whisker").rglob("*.py"))
+    modules = {path: _module(path.relative_to(root / PACKAGE)) for path in paths}
+    return {path.relative_to(root).as_posix(): _names(path, name) for path, name in modules.items()}
+
+
+def _module(path: Path) -> str:
+    parts = path.with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def _names(path: Path, module: str) -> frozenset[str]:
+    """Modules that a file imports, absolute; `from package import name` counts as both package and package.name."""
+    found: set[str] = set()
+    package = module if path.name == "__init__.py" else module.rpartition(".")[0]
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            above = package.split(".")[: len(package.split(".")) - node.level + 1] if node.level else []
+            base = ".".join([*above, *([node.module] if node.module else [])])
+            found |= {base} | {f"{base}.{alias.name}" for alias in node.names}
+    return frozenset(found)
