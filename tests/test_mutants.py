@@ -42,14 +42,14 @@ def test_each_mutant_changes_one_thing_that_runs(file, text, expected):
 
 
 def test_one_seed_gives_one_draw_of_all_languages():
-    first, again = (list(islice(draw(7), 200)) for _ in range(2))
-    assert first == again != list(islice(draw(8), 200))
+    first, again = (list(islice(draw(ROOT, 7), 200)) for _ in range(2))
+    assert first == again != list(islice(draw(ROOT, 8), 200))
     assert {Path(mutant.file).suffix for mutant in first} >= {".c", ".py", ".v"}
     assert len(set(first)) == 200
 
 
 def test_every_file_drawn_has_tests_that_are_there():
-    for file in sorted({mutant.file for mutant in islice(draw(3), 2000)}):
+    for file in sorted({mutant.file for mutant in islice(draw(ROOT, 3), 2000)}):
         for step in steps_for(ROOT, file):
             assert step.ctest or step.pytest, file
             assert all((ROOT / path).exists() for path in (*step.ctest, *step.pytest)), file

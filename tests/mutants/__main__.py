@@ -39,14 +39,13 @@ class Unbuildable(Exception):
 class Tree:
     """A clone of the committed tree, built; a mutant lives in it for the length of its tests."""
 
-    def __init__(self, folder: Path):
-        """`folder` is made and built when it is not there, else brought to the commit of this tree."""
+    def __init__(self, folder: Path, commit: str):
+        """`folder` is made when it is not there, brought to `commit`, and built."""
         self.folder = folder
         if not folder.exists():
             subprocess.run(["git", "clone", "--quiet", ROOT, folder], check=True)
             (folder / ".venv").symlink_to(ROOT / ".venv")
-        head = commit()
-        for words in (["fetch", "--quiet", "origin", head], ["checkout", "--quiet", "--force", head]):
+        for words in (["fetch", "--quiet", "origin", commit], ["checkout", "--quiet", "--force", commit]):
             subprocess.run(["git", *words], cwd=folder, check=True)
         for preset in ("release", "asan"):
             if not (folder / "build" / preset / "build.ninja").exists():
@@ -56,7 +55,9 @@ class Tree:
 
     def run(self, *words: str) -> tuple[bool, str]:
         """Whether a command ended well, and what it wrote. One that takes longer than TIMEOUT_S has failed."""
-        environment = os.environ | {"PYTHONPATH": str(self.folder / "host/python"), "WHISKER_BUILD": BUILD}
+        # No bytecode: what was compiled of a mutant must not stand for the file restored within the same second.
+        environment = os.environ | {"WHISKER_BUILD": BUILD, "PYTHONDONTWRITEBYTECODE": "1"}
+        environment["PYTHONPATH"] = str(self.folder / "host/python")
         process = subprocess.Popen(
             words,
             cwd=self.folder,
@@ -125,7 +126,7 @@ class Tree:
         path.write_text(mutant.apply(text))
         red, step = "", 0
         try:
-            for step, tests in enumerate(steps_for(ROOT, mutant.file)[: 1 if near_only else None]):  # noqa: B007
+            for step, tests in enumerate(steps_for(self.folder, mutant.file)[: 1 if near_only else None]):  # noqa: B007
                 if red := self.first_red(tests):
                     break
             outcome = "killed" if red else "survived"
@@ -139,22 +140,21 @@ class Tree:
         return told | {"outcome": outcome, "red": red, "step": step, "near_only": near_only, "seconds": spent}
 
 
-def commit() -> str:
-    """Of the tree; what is not committed is not mutated."""
-    return subprocess.run(
-        ["git", "rev-parse", "HEAD"], cwd=ROOT, capture_output=True, text=True, check=True
-    ).stdout.strip()
+def hash_of(commit: str) -> str:
+    """The whole hash of a commit of this tree."""
+    words = ["git", "rev-parse", "--verify", f"{commit}^{{commit}}"]
+    return subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True).stdout.strip()
 
 
-def draw(seed: int):
+def draw(root: Path, seed: int):
     """Mutants without end, by SHARES; each once."""
-    listed = subprocess.run(["git", "ls-files", *PRODUCT], cwd=ROOT, capture_output=True, text=True, check=True)
+    listed = subprocess.run(["git", "ls-files", *PRODUCT], cwd=root, capture_output=True, text=True, check=True)
     files = [file for file in listed.stdout.split() if not NOT_PRODUCT.search(file)]
     chance, pools = random.Random(seed), {}
     for language in SHARES:
         suffixes = (".c", ".h") if language == "c" else (f".{language}",)
         mine = [file for file in files if file.endswith(suffixes)]
-        pools[language] = [mutant for file in mine for mutant in mutants_of(file, (ROOT / file).read_text())]
+        pools[language] = [mutant for file in mine for mutant in mutants_of(file, (root / file).read_text())]
         chance.shuffle(pools[language])
     while all(pools.values()):
         (language,) = chance.choices(list(SHARES), list(SHARES.values()))
@@ -167,17 +167,18 @@ def main() -> int:
     )
     parser.add_argument("--count", type=int, default=300, help="mutants that compile (300)")
     parser.add_argument("--seed", type=int, default=1, help="of the draw (1)")
+    parser.add_argument("--commit", type=hash_of, default="HEAD", help="which to mutate (HEAD)")
     parser.add_argument("--out", type=Path, default=ROOT / "build/mutants", help="clone and results (build/mutants)")
     parser.add_argument("--near", action="store_true", help="only the nearest tests; survivors wait for a run without")
     parser.add_argument("--least", type=float, default=0.9, help="exit code 1 when a smaller share is killed (0.9)")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
-    results = options.out / f"{commit()[:12]}-seed{options.seed}.jsonl"
+    results = options.out / f"{options.commit[:12]}-seed{options.seed}.jsonl"
     known = _read(results)
-    tree = Tree(options.out.resolve() / "tree")
+    tree = Tree(options.out.resolve() / "tree", options.commit)
     with tqdm(total=options.count, unit="mutant", smoothing=0) as bar:
         valid = 0
-        for number, mutant in zip(counter(), draw(options.seed), strict=False):
+        for number, mutant in zip(counter(), draw(tree.folder, options.seed), strict=False):
             if valid == options.count:
                 break
             if not _settled(known.get(number), options.near):
@@ -187,7 +188,7 @@ def main() -> int:
             if known[number]["outcome"] != "invalid":
                 valid += 1
                 bar.update()
-    summary = summarise([known[number] for number in sorted(known)], options.seed, commit())
+    summary = summarise([known[number] for number in sorted(known)], options.seed, options.commit)
     (options.out / "mutants.json").write_text(json.dumps(summary, indent=1) + "\n")
     print(summary["line"])
     return int(summary["killed_share"] < options.least)
