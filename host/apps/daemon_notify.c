@@ -2,13 +2,40 @@
 
 #ifdef WHISKER_SYSTEMD
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <sys/un.h>
 #include <systemd/sd-daemon.h>
 #include <time.h>
+#include <unistd.h>
+
+/* As sd_notify(), which waits while the socket of a manager that hangs is full: a daemon must not hang with it. */
+static void notify(const char *text)
+{
+    const char *path = getenv("NOTIFY_SOCKET");
+    struct sockaddr_un address = {.sun_family = AF_UNIX};
+    if (!path || strlen(path) < 2 || strlen(path) >= sizeof address.sun_path) {
+        return;
+    }
+    memcpy(address.sun_path, path, strlen(path));
+    address.sun_path[0] = path[0] == '@' ? '\0' : path[0];
+    const int manager = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+    if (manager >= 0) {
+        sendto(manager, text, strlen(text), MSG_NOSIGNAL, (const struct sockaddr *)&address,
+               (socklen_t)(offsetof(struct sockaddr_un, sun_path) + strlen(path)));
+        close(manager);
+    }
+}
 
 void daemon_notify_ready(const char *status)
 {
-    sd_notifyf(0, "READY=1\nSTATUS=%s", status);
+    char text[256];
+    snprintf(text, sizeof text, "READY=1\nSTATUS=%s", status);
+    notify(text);
 }
 
 static uint64_t now_us(void)
@@ -29,13 +56,13 @@ void daemon_notify_alive(void)
     }
     if (period_us > 0 && now_us() - fed_us >= period_us) {
         fed_us = now_us();
-        sd_notify(0, "WATCHDOG=1");
+        notify("WATCHDOG=1");
     }
 }
 
 void daemon_notify_stopping(void)
 {
-    sd_notify(0, "STOPPING=1");
+    notify("STOPPING=1");
 }
 #else
 void daemon_notify_ready(const char *status)

@@ -1,4 +1,5 @@
-/* What systemd wants to hear (sd_notify(3)); without systemd, or built without libsystemd, nothing happens. */
+/* What systemd wants to hear (sd_notify(3)); without systemd, or built without libsystemd, nothing happens. Nothing
+ * here waits: what a manager that hangs has no room for is lost. */
 #ifndef WHISKER_DAEMON_NOTIFY_H
 #define WHISKER_DAEMON_NOTIFY_H
 

@@ -143,7 +143,7 @@ static void on_odometry(struct base_clients *clients, struct base_client *client
     create_motion_covariance(motion, c);
     snprintf(text, sizeof text, "odometry %.17g %.17g %.17g %.9g %.9g %.9g %.9g %.9g %.9g %u", motion->x, motion->y,
              motion->theta, c[0][0], c[0][1], c[0][2], c[1][1], c[1][2], c[2][2],
-             client->bits | (clients->robot->port < 0 || clients->robot->silent ? BASE_IDLE : 0u));
+             client->bits | (base_robot_kept(clients->robot) ? BASE_IDLE : 0u));
     client->motion = (struct create_motion){0};
     client->bits = base_robot_bits(clients->robot);
     answer(clients, client, text);

@@ -91,12 +91,34 @@ static int64_t least(int64_t a, int64_t b)
     return a < b ? a : b;
 }
 
+/* Takes the guard's newest lease. False: the guard has died. */
+static bool take_lease(struct driver *driver)
+{
+    struct base_lease lease;
+    ssize_t got;
+    while ((got = recv(driver->start.guard, &lease, sizeof lease, MSG_DONTWAIT)) == sizeof lease) {
+        driver->start.lease = lease;
+    }
+    return got < 0 && (errno == EAGAIN || errno == EINTR);
+}
+
+/* Without a lease the wheels stand. Returns ms until the one that there is runs out. */
+static int64_t watch_lease(struct driver *driver)
+{
+    if (driver->start.options->stream_clock) {
+        return ALIVE_MS;
+    }
+    const int64_t left_ms = driver->start.lease.until_ms - cli_now_ms();
+    base_robot_hold(&driver->robot, BASE_HOLD_HEARTBEAT, left_ms <= 0, cli_now_ms());
+    return left_ms > 0 ? left_ms : ALIVE_MS;
+}
+
 /* Sleeps until something comes or is due; signals end it. */
 static void await(struct driver *driver)
 {
     sigset_t none;
     sigemptyset(&none);
-    const int64_t due = base_robot_watch(&driver->robot, cli_now_ms());
+    const int64_t due = least(base_robot_watch(&driver->robot, cli_now_ms()), watch_lease(driver));
     const int64_t sleep_ms = driver->start.options->stream_clock && driver->robot.port >= 0 ? -1 : least(due, ALIVE_MS);
     const struct timespec timeout = {.tv_nsec = sleep_ms * 1000000};
     fill(driver);
@@ -149,11 +171,12 @@ int base_driver_run(const struct base_driver_start *start)
     while (!cli_stop_wanted()) {
         reopen(&driver);
         await(&driver);
-        if (driver.polled[GUARD].revents) {
+        if (driver.polled[GUARD].revents && !take_lease(&driver)) {
             daemon_log(LOG_ERROR, "the guard has died; wheels stopped, ending");
             base_robot_end(&driver.robot, cli_now_ms());
             return CLI_FAILED;
         }
+        watch_lease(&driver); /* before a commander is obeyed */
         serve(&driver);
     }
     base_robot_end(&driver.robot, cli_now_ms());

@@ -4,6 +4,7 @@
 #include <poll.h>
 #include <signal.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
 #include <sys/un.h>
@@ -15,13 +16,15 @@
 #include "create/port.h"
 #include "daemon_log.h"
 #include "daemon_notify.h"
+#include "heartbeat.h"
 #include "whisker_base_driver.h"
 
 #define BACKLOG 16
 /* A driver that dies so young is not started again at once. */
 #define YOUNG_MS 200
 #define PAUSE_MS 500
-#define LOOK_MS 100
+/* Between two looks at the driver, two leases for it, and two feedings of the watchdog: at most. */
+#define LOOK_MS 50
 
 struct guard {
     const struct base_options *options;
@@ -30,6 +33,8 @@ struct guard {
     uint64_t restarts;
     int64_t heard_ms;
     bool stuck;
+    struct heartbeat heartbeat; /* of the supervisor */
+    bool orphaned;              /* the supervisor has ended */
 };
 
 /* ---------------------------------------------------------------------------------------------------------- the wheels
@@ -89,9 +94,25 @@ static bool hear(struct guard *guard)
     return true;
 }
 
+static struct base_lease lease_of(const struct guard *guard)
+{
+    const int64_t own_ms = cli_now_ms() + BASE_STUCK_MS, supervisor_ms = heartbeat_until_ms(&guard->heartbeat);
+    return (struct base_lease){own_ms < supervisor_ms ? own_ms : supervisor_ms};
+}
+
+/* In lock-step simulation time stands still between messages: there the wheels go by their frames alone. */
+static void send_lease(const struct guard *guard)
+{
+    const struct base_lease lease = lease_of(guard);
+    if (!guard->options->stream_clock) {
+        send(guard->driver, &lease, sizeof lease, MSG_NOSIGNAL | MSG_DONTWAIT);
+    }
+}
+
 static void be_driver(const struct guard *guard, int socket)
 {
     const struct base_driver_start start = {.options = guard->options,
+                                            .lease = lease_of(guard),
                                             .guard = socket,
                                             .listening = guard->listening,
                                             .port = guard->port,
@@ -109,6 +130,7 @@ static bool start_driver(struct guard *guard)
     guard->child = fork();
     if (guard->child == 0) {
         close(ends[0]);
+        close(guard->heartbeat.fd);
         be_driver(guard, ends[1]);
     }
     close(ends[1]);
@@ -133,25 +155,46 @@ static void watch_driver(struct guard *guard)
     }
 }
 
-/* Passes on the wish to stop; from now on the driver has to end. */
+/* Passes on the wish to stop; from now on the driver has to end, also one that had not to tell that it lives. */
 static void end_driver(struct guard *guard)
 {
     daemon_notify_stopping();
-    guard->heard_ms = cli_now_ms();
+    guard->heard_ms = guard->options->stream_clock ? cli_now_ms() : guard->heard_ms;
     kill(guard->child, SIGTERM);
 }
 
-/* Sleeps until the driver says something, something is due, or a signal has come; false: the driver has died. */
+/* What the supervisor's pipe has for us. */
+static void hear_supervisor(struct guard *guard)
+{
+    if (!heartbeat_read(&guard->heartbeat, cli_now_ms())) {
+        guard->orphaned = true;
+        daemon_log(LOG_ERROR, "the supervisor has ended; wheels stopped, ending");
+    }
+}
+
+/* Sleeps until the driver or the supervisor says something, something is due, or a signal has come; false: the driver
+ * has died, or cannot be watched any more. */
 static bool look(struct guard *guard, bool timed)
 {
+    enum { DRIVER, SUPERVISOR, POLLED };
     sigset_t none;
     sigemptyset(&none);
-    struct pollfd polled = {.fd = guard->driver, .events = POLLIN};
+    struct pollfd polled[POLLED] = {{.fd = guard->driver, .events = POLLIN},
+                                    {.fd = guard->heartbeat.fd, .events = POLLIN}};
     const struct timespec due = {.tv_nsec = LOOK_MS * 1000000L};
-    const bool lives = ppoll(&polled, 1, timed ? &due : NULL, &none) <= 0 || hear(guard);
+    const int ready = ppoll(polled, POLLED, &due, &none);
+    if (ready < 0 && errno != EINTR) {
+        daemon_log(LOG_ERROR, "cannot watch the driver: %s; ending", strerror(errno));
+        return false;
+    }
+    if (ready > 0 && polled[SUPERVISOR].revents) {
+        hear_supervisor(guard);
+    }
+    const bool lives = ready <= 0 || !polled[DRIVER].revents || hear(guard);
     if (timed && lives) {
         watch_driver(guard);
     }
+    send_lease(guard);
     daemon_notify_alive();
     return lives;
 }
@@ -162,7 +205,7 @@ static int attend(struct guard *guard)
     bool told = false;
     int status = 0;
     do {
-        if (cli_stop_wanted() && !told) {
+        if ((cli_stop_wanted() || guard->orphaned) && !told) {
             told = true;
             end_driver(guard);
         }
@@ -191,7 +234,7 @@ static int keep_driver(struct guard *guard)
     while (start_driver(guard)) {
         const int64_t begun_ms = cli_now_ms();
         const int status = attend(guard);
-        if (WIFEXITED(status) || cli_stop_wanted()) {
+        if (WIFEXITED(status) || cli_stop_wanted() || guard->orphaned) {
             return WIFEXITED(status) ? WEXITSTATUS(status) : CLI_OK;
         }
         guard->restarts++;
@@ -260,6 +303,13 @@ int base_guard_run(const struct base_options *options)
 {
     struct guard guard = {.options = options, .listening = -1, .port = -1, .driver = -1};
     block_signals();
+    if (!heartbeat_begin(&guard.heartbeat, cli_now_ms())) {
+        daemon_log(LOG_ERROR,
+                   HEARTBEAT_VARIABLE "=%s: no open descriptor; give it the read end of the supervisor's pipe, "
+                                      "or unset it",
+                   getenv(HEARTBEAT_VARIABLE));
+        return CLI_USAGE;
+    }
     if (!open_socket(&guard)) {
         return CLI_FAILED;
     }

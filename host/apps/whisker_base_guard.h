@@ -1,6 +1,7 @@
 /*
  * The two processes of whisker-base. The guard starts the driver and holds the same port. When the driver dies it stops
- * the wheels and starts another; when the guard dies the driver stops the wheels and ends.
+ * the wheels and starts another; when the guard dies the driver stops the wheels and ends. When guard or supervisor
+ * hang the driver stops the wheels until they are back; when the supervisor ends so does whisker-base.
  */
 #ifndef WHISKER_BASE_GUARD_H
 #define WHISKER_BASE_GUARD_H
@@ -13,6 +14,15 @@
 /* What the driver tells its guard, one per packet; PORT comes with the descriptor. */
 enum base_tell { BASE_PORT = 'P', BASE_NO_PORT = 'N', BASE_ALIVE = 'A' };
 
+/*
+ * What the guard tells the driver again and again: until when, by CLOCK_MONOTONIC, the wheels may turn. It is never
+ * further off than BASE_STUCK_MS, nor than the heartbeat of the supervisor allows: so a guard that hangs is noticed as
+ * well as a supervisor that does. A message that was read late says so by itself.
+ */
+struct base_lease {
+    int64_t until_ms;
+};
+
 /* What the guard gives a driver. */
 struct base_driver_start {
     const struct base_options *options;
@@ -20,6 +30,7 @@ struct base_driver_start {
     int listening; /* socket of the clients */
     int port;      /* of the driver before; -1: none */
     uint64_t restarts;
+    struct base_lease lease;
 };
 
 /* Without a word from the driver for so long the wheels are stopped; for so long it is ended and another started. */

@@ -32,7 +32,9 @@ static void print_help(void)
         "  --wait              wait for the port instead of failing when there is none\n"
         "  --verbose           tell also what goes well\n"
         "  --help              this text\n\n"
-        "Under systemd: notifies readiness, feeds the watchdog.\n\n"
+        "Under systemd: notifies readiness, feeds the watchdog. WHISKER_HEARTBEAT_FD: a pipe of the supervisor that "
+        "is\n"
+        "watched; the wheels stop when it is silent for 0.3 s, and at its end whisker-base ends (docs/create.md).\n\n"
         "Example: " DAEMON_PROGRAM " --port /dev/ttyUSB0 --socket /run/user/1000/base\n"
         "Example: " DAEMON_PROGRAM " --port /dev/ttyUSB0 --socket base.sock --model 2 --wait --mode full\n"
         "Exit code: 0 stopped as told, 1 failed, 2 wrong use.\n",

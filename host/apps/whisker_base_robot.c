@@ -236,14 +236,43 @@ bool base_robot_drive(struct base_robot *robot, double v_m_s, double omega_rad_s
     robot->drive_ms = now_ms;
     robot->frames_since_drive = 0;
     const struct create_speeds wanted =
-        robot->silent ? (struct create_speeds){0}
-                      : create_choose_speeds(settings->model, settings->wheel_base_m, v_m_s, omega_rad_s);
+        base_robot_kept(robot) ? (struct create_speeds){0}
+                               : create_choose_speeds(settings->model, settings->wheel_base_m, v_m_s, omega_rad_s);
     return order_speeds(robot, wanted, now_ms);
 }
 
 bool base_robot_stop(struct base_robot *robot, int64_t now_ms)
 {
     return order_speeds(robot, (struct create_speeds){0}, now_ms);
+}
+
+bool base_robot_kept(const struct base_robot *robot)
+{
+    return robot->port < 0 || robot->silent || robot->held != 0;
+}
+
+static void log_hold(enum base_hold reason, bool on)
+{
+    const bool heartbeat = reason == BASE_HOLD_HEARTBEAT;
+    if (on) {
+        daemon_log(heartbeat ? LOG_ERROR : LOG_NOTE, "%s; wheels stopped",
+                   heartbeat ? "no heartbeat: the guard or the supervisor hangs" : "the machine goes to sleep");
+    } else {
+        daemon_log(LOG_NOTE, "%s; the commander may drive again",
+                   heartbeat ? "the heartbeat is back" : "the machine is awake");
+    }
+}
+
+void base_robot_hold(struct base_robot *robot, enum base_hold reason, bool on, int64_t now_ms)
+{
+    if (((robot->held & reason) != 0) == on) {
+        return;
+    }
+    robot->held ^= reason;
+    if (on) {
+        base_robot_stop(robot, now_ms);
+    }
+    log_hold(reason, on);
 }
 
 bool base_robot_mode(struct base_robot *robot, enum create_oi_mode mode, int64_t now_ms)

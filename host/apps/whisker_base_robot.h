@@ -17,13 +17,19 @@
 #define BASE_SILENCE_MS 500
 #define BASE_REOPEN_MS 250
 
+/* Why the wheels are kept stopped, whatever the commander says: bits. */
+enum base_hold {
+    BASE_HOLD_HEARTBEAT = 1, /* guard or supervisor hang */
+    BASE_HOLD_SLEEP = 2      /* the machine goes to sleep or is shut down */
+};
+
 /* Bits told with the odometry: 0 to 4 are packet 7's (bumps, wheel drops). */
 enum {
     BASE_CLIFF_LEFT = 1 << 5,
     BASE_CLIFF_FRONT_LEFT = 1 << 6,
     BASE_CLIFF_FRONT_RIGHT = 1 << 7,
     BASE_CLIFF_RIGHT = 1 << 8,
-    BASE_IDLE = 1 << 9 /* wheels will not turn: the base has left its mode, or is not connected */
+    BASE_IDLE = 1 << 9 /* wheels will not turn: the base has left its mode, is not connected, or is held */
 };
 
 /* Told of every frame's motion. */
@@ -46,6 +52,7 @@ struct base_robot {
     bool entered;       /* the wanted mode was seen in force since it was last asked for */
     bool low, told_low; /* battery */
     bool silent;        /* it was heard, and then no more: until a frame comes the wheels stay stopped */
+    unsigned held;      /* bits of enum base_hold: while one is set the wheels stay stopped */
     int64_t drive_ms, frame_ms, opened_ms;
     int64_t changed_ms; /* when other speeds than before were ordered */
     uint32_t frames_since_drive;
@@ -69,6 +76,12 @@ uint64_t base_robot_taken(const struct base_robot *robot);
 /* Orders the wheels; false: there is no line. Speeds really ordered: robot->speeds. */
 bool base_robot_drive(struct base_robot *robot, double v_m_s, double omega_rad_s, int64_t now_ms);
 bool base_robot_stop(struct base_robot *robot, int64_t now_ms);
+
+/* Stops the wheels and keeps them so for this reason, or takes the reason back. */
+void base_robot_hold(struct base_robot *robot, enum base_hold reason, bool on, int64_t now_ms);
+
+/* Whether the wheels are kept stopped, whatever is ordered: no port, a silent base, or held. */
+bool base_robot_kept(const struct base_robot *robot);
 
 /* Enters a mode, stopped; passive lets go. */
 bool base_robot_mode(struct base_robot *robot, enum create_oi_mode mode, int64_t now_ms);

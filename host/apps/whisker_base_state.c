@@ -16,7 +16,7 @@ int32_t base_robot_mode_told(const struct base_robot *robot)
 unsigned base_robot_bits(const struct base_robot *robot)
 {
     const int32_t *value = robot->frame.value;
-    const bool idle = robot->port < 0 || robot->silent || base_robot_mode_told(robot) != (int32_t)robot->wanted;
+    const bool idle = base_robot_kept(robot) || base_robot_mode_told(robot) != (int32_t)robot->wanted;
     return (unsigned)value[CREATE_OI_BUMPS_DROPS] | (value[CREATE_OI_CLIFF_LEFT] ? BASE_CLIFF_LEFT : 0u) |
            (value[CREATE_OI_CLIFF_FRONT_LEFT] ? BASE_CLIFF_FRONT_LEFT : 0u) |
            (value[CREATE_OI_CLIFF_FRONT_RIGHT] ? BASE_CLIFF_FRONT_RIGHT : 0u) |

@@ -4,6 +4,7 @@ import os
 import pty
 import signal
 import subprocess
+import threading
 import tty
 from pathlib import Path
 
@@ -85,20 +86,61 @@ class Peer:
         return self.told
 
 
-class Driver:
-    """whisker-base on a peer."""
+class Heart:
+    """The heartbeat of a supervisor, from a thread: `fd` is for the process that watches it."""
 
-    def __init__(self, folder: Path, *options: str):
+    PERIOD_S = 0.05
+
+    def __init__(self):
+        self.fd, self._write = os.pipe()
+        self._beating, self._ended = threading.Event(), threading.Event()
+        self._beating.set()
+        self._thread = threading.Thread(target=self._beat, daemon=True)
+        self._thread.start()
+
+    def _beat(self) -> None:
+        while not self._ended.wait(self.PERIOD_S):
+            if self._beating.is_set():
+                os.write(self._write, b".")
+
+    def hang(self) -> None:
+        self._beating.clear()
+
+    def go_on(self) -> None:
+        self._beating.set()
+
+    def end(self) -> None:
+        """As a supervisor that dies: the pipe has an end."""
+        self._ended.set()
+        self._thread.join()
+        os.close(self._write)
+
+    def close(self) -> None:
+        if not self._ended.is_set():
+            self.end()
+        os.close(self.fd)
+
+
+class Driver:
+    """whisker-base on a peer; with a heart it has a supervisor."""
+
+    def __init__(self, folder: Path, *options: str, heart: Heart | None = None, **environment: str):
         self.peer = Peer(folder / "port")
         self.socket = folder / "base.sock"
         self.log = folder / "log"
-        self._options = options
+        self._options, self._heart, self._environment = options, heart, environment
         self.start()
 
     def start(self) -> None:
         words = [program("whisker-base"), "--port", self.peer.link, "--socket", self.socket, *self._options]
         with self.log.open("w") as log:
-            self.process = subprocess.Popen([str(word) for word in words], stderr=log)
+            self.process = subprocess.Popen(
+                [str(word) for word in words],
+                stderr=log,
+                env={**os.environ, **self._environment}
+                | ({"WHISKER_HEARTBEAT_FD": str(self._heart.fd)} if self._heart else {}),
+                pass_fds=(self._heart.fd,) if self._heart else (),
+            )
 
     def client(self) -> Base:
         return Base(str(self.socket))
@@ -111,3 +153,5 @@ class Driver:
         if self.process.poll() is None:
             self.end()
         self.peer.close()
+        if self._heart:
+            self._heart.close()

@@ -6,11 +6,12 @@ No test waits by the clock: each waits for bytes on the line, for an answer, or 
 import math
 import os
 import signal
+import socket
 import subprocess
 import sys
 
 import pytest
-from createpeer import FIRM_STOP, FULL, PAUSE, SAFE, START, STOP, STREAM, Driver, drive_order
+from createpeer import FIRM_STOP, FULL, PAUSE, SAFE, START, STOP, STREAM, Driver, Heart, drive_order
 
 from whisker.pilot import base
 from whisker.pilot.base import BaseError, BaseLost
@@ -24,8 +25,8 @@ def start(tmp_path):
     """Starts whisker-base with options; it is up to date with its base when this returns."""
     drivers = []
 
-    def begin(*options, mode=SAFE):
-        driver = Driver(tmp_path, *options)
+    def begin(*options, mode=SAFE, **more):
+        driver = Driver(tmp_path, *options, **more)
         drivers.append(driver)
         assert driver.peer.await_start(mode).endswith(STOP)
         return driver
@@ -223,6 +224,113 @@ def test_a_driver_that_hangs_is_no_hindrance_to_an_end(start):
         assert driver.process.wait() == 0
 
 
+def drive_until_held(client):
+    """A commander that says so all the time drives, until the wheels are kept stopped."""
+    assert client.drive(0.2, 0).v_m_s == 0.2
+    while client.health()["held"] != "heartbeat":
+        client.drive(0.2, 0)
+    assert client.health()["commander_stops"] == "0"
+    assert client.drive(0.2, 0).v_m_s == 0
+    assert client.odometry().bits & base.IDLE
+
+
+def drive_again(client):
+    while client.drive(0.1, 0).v_m_s == 0:
+        pass
+
+
+def test_a_supervisor_that_hangs_stops_the_wheels_until_it_is_back(start):
+    heart = Heart()
+    driver = start(heart=heart)
+    with driver.client() as client:
+        heart.hang()
+        drive_until_held(client)
+        driver.peer.await_order(drive_order(200, 200))
+        driver.peer.await_order(STOP)
+        heart.go_on()
+        drive_again(client)
+        driver.peer.await_order(drive_order(100, 100))
+    assert "no heartbeat" in driver.log.read_text()
+
+
+def test_a_supervisor_that_ends_stops_the_wheels_and_ends_the_driver(start):
+    for options in ((), ("--clock", "stream")):
+        heart = Heart()
+        driver = start(*options, heart=heart)
+        with driver.client() as client:
+            client.drive(0.2, 0)
+            driver.peer.await_order(drive_order(200, 200))
+            heart.end()
+            driver.peer.await_order(ENDED)
+            assert driver.process.wait() == 0
+        driver.peer.link.unlink()
+        assert not driver.socket.exists()
+
+
+def test_a_supervisor_that_ends_and_a_driver_that_hangs_stop_the_wheels(start):
+    heart = Heart()
+    driver = start(heart=heart)
+    with driver.client() as client:
+        client.drive(0.2, 0)
+        driver.peer.await_order(drive_order(200, 200))
+        os.kill(int(client.health()["driver_pid"]), signal.SIGSTOP)
+        heart.end()
+        driver.peer.await_order(FIRM_STOP)
+        assert driver.process.wait() == 0
+
+
+def test_by_the_streams_clock_a_supervisor_may_hang(start):
+    heart = Heart()
+    heart.hang()
+    driver = start("--clock", "stream", heart=heart, WATCHDOG_USEC="1000")
+    with driver.client() as client:
+        assert client.drive(0.2, 0).v_m_s == 0.2
+        assert client.health()["held"] == "no"
+
+
+def test_a_guard_that_hangs_stops_the_wheels_until_it_is_back(start):
+    driver = start()
+    with driver.client() as client:
+        driver.process.send_signal(signal.SIGSTOP)
+        drive_until_held(client)
+        driver.process.send_signal(signal.SIGCONT)
+        drive_again(client)
+
+
+def test_a_heartbeat_that_is_none_is_refused(tmp_path):
+    for number in ("x", "-1", "", "999", "99999999999999999999"):
+        with_heartbeat = {**os.environ, "WHISKER_HEARTBEAT_FD": number}
+        code, text = refused("--port", "p", "--socket", tmp_path / "s", env=with_heartbeat)
+        assert (code, f"WHISKER_HEARTBEAT_FD={number}: no open descriptor" in text) == (2, True), text
+
+
+@pytest.fixture
+def manager(tmp_path):
+    """The datagram socket of a service manager."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
+        manager.bind(str(tmp_path / "notify"))
+        yield manager
+
+
+def test_the_watchdog_is_fed_also_by_the_streams_clock(start, manager):
+    start("--clock", "stream", NOTIFY_SOCKET=manager.getsockname(), WATCHDOG_USEC="200000")
+    fed = 0
+    while fed < 5:
+        fed += manager.recv(256) == b"WATCHDOG=1"
+
+
+def test_a_service_manager_that_hangs_is_no_hindrance(start, manager):
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as full, pytest.raises(BlockingIOError):
+        full.setblocking(False)
+        while True:
+            full.sendto(b"full", manager.getsockname())
+    driver = start(NOTIFY_SOCKET=manager.getsockname(), WATCHDOG_USEC="100000")
+    with driver.client() as client:
+        client.drive(0.2, 0)
+        driver.peer.await_order(drive_order(200, 200))
+    assert driver.end() == 0
+
+
 def test_a_base_that_leaves_its_mode_waits_for_its_commander(start):
     driver = start("--clock", "stream")
     with driver.client() as client:
@@ -358,8 +466,8 @@ def test_messages_that_are_none_are_refused(start):
         assert client.drive(0.2, 0.0).v_m_s == 0.2
 
 
-def refused(*words) -> tuple[int, str]:
-    done = subprocess.run([program("whisker-base"), *map(str, words)], capture_output=True, text=True)
+def refused(*words, env=None) -> tuple[int, str]:
+    done = subprocess.run([program("whisker-base"), *map(str, words)], capture_output=True, text=True, env=env)
     assert done.stderr.count("\n") == 1, done.stderr
     return done.returncode, done.stderr
 
