@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ._sim import ffi, lib
+from .border import ffi, lib, pointer
 from .world import TICK_S
 
 AUTO, CLOSED, LARGE, VIBRATION = lib.MECH_AUTO, lib.MECH_CLOSED, lib.MECH_LARGE, lib.MECH_VIBRATION
@@ -95,15 +95,11 @@ class Series(NamedTuple):
 
 
 def _counts(whisker: Whisker, tilt: np.ndarray, tick_s: float, seed: int) -> np.ndarray:
-    counts = np.empty(tilt.shape, np.uint16)
-    lib.sim_mechanics_counts(
-        whisker.c, len(tilt), tick_s, _in(tilt), seed, ffi.from_buffer("uint16_t[]", counts, require_writable=True)
-    )
+    shape = (len(tilt), 2)
+    counts = np.empty(shape, np.uint16)
+    given = pointer("double[]", tilt, "tilt", shape), seed, pointer("uint16_t[]", counts, "counts", shape)
+    lib.sim_mechanics_counts(whisker.c, len(tilt), tick_s, *given)
     return counts
-
-
-def _in(values: np.ndarray):
-    return ffi.from_buffer("double[]", values)
 
 
 def touch(
@@ -117,11 +113,11 @@ def touch(
     shaft = ffi.new("struct mech_shaft *")
     lib.mech_shaft_start(shaft, whisker.c, _shared_table(), tick_s)
     shaft.forced = level
-    tilt, levels = np.zeros((len(theta), 2)), np.empty(len(theta), np.uint8)
-    bent = np.empty(len(theta))
-    lib.sim_mechanics_touch(
-        shaft, len(theta), _in(radius), _in(theta), _in(rate), _in(bent), ffi.from_buffer("unsigned char[]", levels)
-    )
+    each = theta.shape
+    tilt, levels, bent = np.zeros((len(theta), 2)), np.empty(each, np.uint8), np.empty(each)
+    columns = {"radius_m": radius, "theta_rad": theta, "base_rate_rad_s": rate, "bent": bent}
+    given = [pointer("double[]", column, name, each) for name, column in columns.items()]
+    lib.sim_mechanics_touch(shaft, len(theta), *given, pointer("unsigned char[]", levels, "levels", each))
     tilt[:, 0] = bent
     return Series(_counts(whisker, tilt, tick_s, seed), tilt, levels)
 
@@ -180,15 +176,16 @@ def drag(
         raise MemoryError("no memory for a dragged whisker")
     travel, height = (np.ascontiguousarray(a, np.float64) for a in (travel, height))
     numbers = np.ascontiguousarray(floors, np.uint8)
-    tilt, event = np.empty((len(travel), 2)), np.empty(len(travel), np.uint8)
+    each = travel.shape
+    tilt, event = np.empty((len(travel), 2)), np.empty(each, np.uint8)
     lib.sim_drag_run(
         whiskers,
         len(travel),
-        _in(travel),
-        ffi.from_buffer("unsigned char[]", numbers),
-        _in(height),
-        _in(tilt),
-        ffi.from_buffer("unsigned char[]", event),
+        pointer("double[]", travel, "travel_m", each),
+        pointer("unsigned char[]", numbers, "floor", each),
+        pointer("double[]", height, "height_m", each),
+        pointer("double[]", tilt, "tilt", (len(travel), 2)),
+        pointer("unsigned char[]", event, "event", each),
     )
     return Series(_counts(whisker, tilt, tick_s, seed), tilt, event)
 

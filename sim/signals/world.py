@@ -4,12 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-try:
-    from ._sim import ffi, lib
-except ImportError as error:
-    raise ImportError(
-        "signals: its C module is not built; run sim/signals/build_signals_ffi.py --build-dir BUILD"
-    ) from error
+from .border import ffi, lib, pointer
 
 TICK_S = 500e-6  # one sample of every whisker
 
@@ -56,7 +51,7 @@ class World:
     def run(self, ticks: int) -> np.ndarray:
         """Let ticks pass. Raw counts, shape (ticks, lanes, 2), uint16; axis 0 of the last is alpha, 1 is beta."""
         counts = np.empty((ticks, len(self.lanes), 2), dtype=np.uint16)
-        lib.sim_signals_run(self._world, ticks, ffi.from_buffer("uint16_t[]", counts, require_writable=True))
+        lib.sim_signals_run(self._world, ticks, pointer("uint16_t[]", counts, "counts", (ticks, len(self.lanes), 2)))
         return counts
 
     def odometry(self) -> tuple[float, float, float]:

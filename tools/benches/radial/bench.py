@@ -152,19 +152,20 @@ def cost() -> dict:
     cal = recorded(Whisker.drawn(SEED, 0), Kind(SPREADS[1]), FIT, rng_of(40))
     contact = cal.whisks.recorded[12]
     samples, t_s = np.ascontiguousarray(contact.samples), np.ascontiguousarray(contact.t_s)
-    rest = np.array([32768.0, 32768.0])
+    given = doubles(t_s, "t_s", (len(samples),)), doubles(samples, "samples", (len(samples), 2))
+    rest = doubles(np.array([32768.0, 32768.0]), "rest", (2,))
     trace, shape = ffi.new("struct nav_trace *"), ffi.new("struct nav_shape *")
     told_c, model = ffi.new("struct nav_whisk_estimate *"), fitted("default", cal)
     line = ffi.new("struct nav_radial *", {"a1": -0.03, "a0": 180.0})
 
     def trace_all():
         lib.nav_trace_begin(trace, 2)
-        lib.nav_trace_run(trace, len(t_s), doubles(t_s), doubles(samples), ffi.NULL, ffi.NULL)
+        lib.nav_trace_run(trace, len(t_s), *given, ffi.NULL, ffi.NULL)
 
     trace_all()
     lib.nav_shape_of(trace, shape)
     parts = {
-        "peak": least_us(lambda: lib.nav_radial_peak(doubles(samples), len(samples), 2, doubles(rest)), 20),
+        "peak": least_us(lambda: lib.nav_radial_peak(given[1], len(samples), 2, rest), 20),
         "line": least_us(lambda: lib.nav_radial_predict(line, 1500.0), 2000),
         "trace": least_us(trace_all, 20),
         "shape": least_us(lambda: lib.nav_shape_of(trace, shape), 500),

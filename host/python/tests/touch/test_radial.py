@@ -32,7 +32,7 @@ def test_tip_and_shaft_are_told_by_the_outermost_radius():
 def test_too_few_contacts_are_refused():
     with pytest.raises(ValueError, match="at more radii"):
         RadialModel.fit([1.0, 2.0], [100.0, 90.0])
-    with pytest.raises(ValueError, match="one radius per contact"):
+    with pytest.raises(ValueError, match="radius_mm: shape"):
         RadialModel.fit([1.0, 2.0, 3.0], [100.0, 90.0])
 
 

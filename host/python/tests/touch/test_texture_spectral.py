@@ -135,7 +135,9 @@ def test_windows_in_a_row_betray_a_surface_that_one_does_not():
 
     def refused(rows):
         judge = found.native()
-        return [lib.nav_texture_strange_weigh(judge, doubles(row)) > 1.0 for row in np.ascontiguousarray(rows)]
+        return [
+            lib.nav_texture_strange_weigh(judge, doubles(row, "row", (5,))) > 1.0 for row in np.ascontiguousarray(rows)
+        ]
 
     labels, folds = np.repeat([0, 1], 10), np.tile(np.arange(5), 4)
     features = [drive(6.0 * k) for k in labels]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import UserError
-from ..native import ffi, lib
+from ..native import ffi, lib, pointer
 from ..protocol import LANES
 
 SAMPLE = np.dtype([("alpha", "<u2"), ("beta", "<u2"), ("status", "<u2"), ("reserved", "<u2")])
@@ -23,6 +23,7 @@ FRAME = np.dtype(
     ]
 )
 assert FRAME.itemsize == ffi.sizeof("struct whisker_frame")
+FRAMES = ffi.typeof("struct whisker_frame[]")
 CAPACITY: int = lib.WHISKER_RING_FRAMES
 
 
@@ -251,11 +252,11 @@ class Writer:
 
     def publish(self, frames: np.ndarray) -> None:
         """Publish frames (n,) of dtype FRAME, contiguous, in runs the ring takes; wakes readers once per run."""
-        data = np.ascontiguousarray(frames, dtype=FRAME)
+        data = np.ascontiguousarray(frames)
         for start in range(0, len(data), self.capacity // 4):
             run = data[start : start + self.capacity // 4]
-            pointer = ffi.cast("const struct whisker_frame *", run.ctypes.data)
-            check(lib.whisker_ring_publish(self._ring, pointer, len(run)), self.name)
+            given = pointer(FRAMES, FRAME, run, "frames", (None,))
+            check(lib.whisker_ring_publish(self._ring, given, len(run)), self.name)
 
     def set_clock(self, clock: Clock) -> None:
         """Tell the readers the mapping of the bridge's clock."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import UserError
-from ..native import doubles, ffi, lib, octets
+from ..native import as_doubles, doubles, ffi, lib, octets, pointer
 from ..scene import Prior, Scene
 from .observations import ODOMETRY, Observations
 
@@ -20,6 +20,10 @@ ESTIMATE = np.dtype(
     + [(name, "i8") for name in ("evaluations", "distinct", "touched", "states", "bytes")]
 )
 COMPONENT = np.dtype([("pose", "f8", 3), ("sigma_m", "f8"), ("sigma_rad", "f8"), ("mass", "f8")])
+ESTIMATES, COMPONENTS = ffi.typeof("struct nav_estimate[]"), ffi.typeof("struct nav_component[]")
+assert ESTIMATE.itemsize == ffi.sizeof("struct nav_estimate") and COMPONENT.itemsize == ffi.sizeof(
+    "struct nav_component"
+)
 
 
 class SettingError(UserError, ValueError):
@@ -100,7 +104,9 @@ class Filter:
         if made == ffi.NULL:
             raise SettingError(f"filter '{name}' does not fit in memory; choose coarser cells with --set")
         self._filter = ffi.gc(made, lib.nav_filter_free)
+        self._tips, self._rays = len(scene.robot.of_role("texture")), len(scene.robot.of_role("object"))
         self._texture_keys = [[f"{w.name}_{t}" for t in scene.arena.textures] for w in scene.robot.of_role("texture")]
+        self._classes = len(scene.arena.textures)
         self._radial_keys = [f"{w.name}_mm" for w in scene.robot.of_role("object")]
 
     def step(self, row: dict[str, float | None]) -> Estimate:
@@ -110,33 +116,39 @@ class Filter:
         return self.step_values(row["t_s"], [row[k] for k in ODOMETRY], texture, radial)
 
     def step_values(self, t_s: float, odometry, texture, radial_m) -> Estimate:
-        """Take one row of numbers: texture (tips, classes), nan not read; radial_m (rays), nan not read, inf no contact."""
+        """Take one row of numbers: odometry (3,): m, m, rad; texture (tips, classes), nan not read; radial_m (rays,) in m,
+        nan not read, inf no contact. ValueError when one has another shape."""
         rows = Observations(
-            np.array([t_s], np.float64),
+            as_doubles(t_s, "t_s", ()).reshape(1),
             [],
-            np.array([odometry], np.float64),
-            np.array(texture, np.float64).reshape(1, len(self._texture_keys), len(self.scene.arena.textures)),
-            np.array(radial_m, np.float64).reshape(1, -1),
+            as_doubles(odometry, "odometry", (3,))[None],
+            as_doubles(texture, "texture", (self._tips, self._classes))[None],
+            as_doubles(radial_m, "radial_m", (self._rays,))[None],
             None,
         )
         return to_estimate(self.replay(rows, 0, 1)[0][0])
 
     def replay(self, rows: Observations, first: int, count: int) -> tuple[np.ndarray, np.ndarray]:
-        """Rows first .. first + count - 1: estimates (count,) of ESTIMATE and the thread's CPU time (count,) in us."""
+        """Rows first .. first + count - 1: estimates (count,) of ESTIMATE and the thread's CPU time (count,) in us.
+
+        ValueError when the rows are not of this scene's robot, or not so many."""
+        held = len(rows.t_s)
+        if not 0 <= first <= first + count <= held:
+            raise ValueError(f"rows {first} to {first + count}: outside the {held} rows given; choose rows inside")
         table, step_us = np.zeros(count, ESTIMATE), np.zeros(count)
         packed = ffi.new(
             "struct nav_rows *",
             {
-                "t_s": doubles(rows.t_s),
-                "odometry": doubles(rows.odometry),
-                "texture": doubles(rows.texture),
-                "radial_m": doubles(rows.radial_m),
-                "texture_width": rows.texture[0].size if len(rows.t_s) else 0,
-                "radial_width": rows.radial_m.shape[1],
+                "t_s": doubles(rows.t_s, "t_s", (held,)),
+                "odometry": doubles(rows.odometry, "odometry", (held, 3)),
+                "texture": doubles(rows.texture, "texture", (held, self._tips, self._classes)),
+                "radial_m": doubles(rows.radial_m, "radial_m", (held, self._rays)),
+                "texture_width": self._tips * self._classes,
+                "radial_width": self._rays,
             },
         )
-        out = ffi.cast("struct nav_estimate *", table.ctypes.data)
-        lib.nav_replay(self._filter, packed, first, count, out, doubles(step_us))
+        out = pointer(ESTIMATES, ESTIMATE, table, "table", (count,))
+        lib.nav_replay(self._filter, packed, first, count, out, doubles(step_us, "step_us", (count,)))
         return table, step_us
 
     def components(self) -> np.ndarray:
@@ -156,7 +168,7 @@ class Filter:
         """Belief mass in bins of 25 cm x 25 cm x 30 degrees, flat."""
         bumps, size = _components(held := self.components()), self.scene.arena.size_m
         out = np.zeros(lib.nav_belief_bins(bumps, 0, *size, ffi.NULL, 0))
-        lib.nav_belief_bins(bumps, len(held), *size, doubles(out), len(out))
+        lib.nav_belief_bins(bumps, len(held), *size, doubles(out, "bins", (len(out),)), len(out))
         return out
 
     @property
@@ -169,7 +181,7 @@ class Filter:
 
 
 def _components(array: np.ndarray):
-    return ffi.cast("struct nav_component *", array.ctypes.data)
+    return pointer(COMPONENTS, COMPONENT, array, "bumps", (None,))
 
 
 def prior_fault(scene: Scene, bumps: np.ndarray) -> str:
@@ -197,7 +209,7 @@ def problem_of(scene: Scene, settings: dict[str, float], bumps: np.ndarray | Non
         "tile": arena.tile_m,
         "columns": floor.shape[1],
         "rows": floor.shape[0],
-        "floor": octets(floor),
+        "floor": octets(floor, "floor", (None, None)),
         "classes": len(arena.textures),
         "boxes": len(boxes),
         "box": boxes,
@@ -214,7 +226,6 @@ def problem_of(scene: Scene, settings: dict[str, float], bumps: np.ndarray | Non
     prior = scene.prior or Prior("uniform")
     problem.prior.uniform = prior.kind == "uniform" and bumps is None
     if bumps is not None:
-        bumps = np.ascontiguousarray(bumps, COMPONENT)
         problem.prior.bump, problem.prior.bumps = _components(bumps), len(bumps)
     if prior.kind == "gaussian":
         problem.prior.mean = dict(zip(("x", "y", "theta"), prior.mean, strict=True))

@@ -48,11 +48,18 @@ class Contact:
 
     def block(self, ticks: np.ndarray, samples: np.ndarray, good: np.ndarray) -> None:
         """Take ticks (n,), samples (n, 2) in counts and good (n,): a bad sample begins, keeps and ends nothing."""
+        if not len(ticks) == len(samples) == len(good):
+            raise ValueError(f"{len(ticks)} ticks, {len(samples)} samples, {len(good)} good; give one of each")
         ticks, samples = ticks[good], np.ascontiguousarray(samples[good])
         count, before = len(ticks), len(self._earlier)
-        events, peaks = np.zeros(count, np.uint8), np.zeros(count)
+        events, peaks, all_good = np.zeros(count, np.uint8), np.zeros(count), np.ones(count, np.uint8)
         lib.nav_contact_run(
-            self._state, doubles(samples), octets(np.ones(count, np.uint8)), count, octets(events), doubles(peaks)
+            self._state,
+            doubles(samples, "samples", (count, 2)),
+            octets(all_good, "good", (count,)),
+            count,
+            octets(events, "events", (count,)),
+            doubles(peaks, "peaks", (count,)),
         )
         ticks = np.concatenate([self._earlier, ticks])
         self._earlier = ticks[-RELEASE_SAMPLES:]

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...native import doubles, ffi, lib
+from ...native import as_doubles, doubles, ffi, lib
 from ...tables import TableError, numbers, read_columns
 from .curve import CurveModel, tip_from
 from .shape import Contact, shape_of
@@ -37,9 +37,10 @@ class Estimate(NamedTuple):
 
 def peak(samples: np.ndarray, rest) -> float:
     """Equation 2: largest deflection about `rest` over a contact, counts. samples (n, axes); nan when none is finite."""
-    samples = np.ascontiguousarray(samples, dtype=np.float64)
-    rest = np.ascontiguousarray(np.broadcast_to(np.asarray(rest, dtype=np.float64), samples.shape[1:]))
-    return lib.nav_radial_peak(doubles(samples), len(samples), samples.shape[1], doubles(rest))
+    samples = as_doubles(samples, "samples", (None, None))
+    count, axes = samples.shape
+    rest = as_doubles(rest, "rest", (axes,))
+    return lib.nav_radial_peak(doubles(samples, "samples", (count, axes)), count, axes, doubles(rest, "rest", (axes,)))
 
 
 class RadialModel:
@@ -58,12 +59,11 @@ class RadialModel:
     @classmethod
     def fit(cls, peak_counts, radius_mm) -> "RadialModel":
         """Least squares over contacts; ValueError when fewer than three are usable or all peaks are equal."""
-        peaks = np.ascontiguousarray(peak_counts, dtype=np.float64)
-        radii = np.ascontiguousarray(radius_mm, dtype=np.float64)
-        if peaks.shape != radii.shape or peaks.ndim != 1:
-            raise ValueError(f"radial fit: {peaks.shape} peaks but {radii.shape} radii; give one radius per contact")
+        peaks = as_doubles(peak_counts, "peak_counts", (None,))
+        radii = as_doubles(radius_mm, "radius_mm", peaks.shape)
         model = cls(0.0, 0.0, 0.0, 0.0, 0.0)
-        if lib.nav_radial_fit(model._line, doubles(peaks), doubles(radii), len(peaks)) < 0:
+        given = doubles(peaks, "peak_counts", peaks.shape), doubles(radii, "radius_mm", peaks.shape)
+        if lib.nav_radial_fit(model._line, *given, len(peaks)) < 0:
             raise ValueError(
                 "radial fit: fewer than 3 usable contacts, or all peaks equal; record contacts at more radii"
             )

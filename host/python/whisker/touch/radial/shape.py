@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...native import doubles, ffi, lib
+from ...native import as_doubles, doubles, ffi, lib
 
 TERMS = ("turn", "rate", "told", "bow", "back")
 SAMPLES_LEAST = 8
@@ -22,20 +22,29 @@ class Contact:
 
 
 def shape_of(contact: Contact):
-    """struct nav_shape of a recorded whisk; what is recorded long before and after it is left out."""
+    """struct nav_shape of a recorded whisk; what is recorded long before and after it is left out. ValueError: a column has
+    another length than the others, or no channel."""
+    samples = as_doubles(contact.samples, "samples", (None, None))[:, : lib.NAV_TRACE_AXES]
+    if not samples.shape[1]:
+        raise ValueError(f"samples: shape {samples.shape}; give at least one channel")
     part = _crop(contact)
-    trace, shape = ffi.new("struct nav_trace *"), ffi.new("struct nav_shape *")
-    t_s = np.ascontiguousarray(contact.t_s[part], np.float64)
-    samples = np.ascontiguousarray(contact.samples[part, : lib.NAV_TRACE_AXES], np.float64)
+    t_s = _column(contact, "t_s", part)
     rates = [
-        None if rate is None else np.ascontiguousarray(rate[part], np.float64)
-        for rate in (contact.whisk_rad_s, contact.told_rad_s)
+        ffi.NULL if getattr(contact, name) is None else _column(contact, name, part)
+        for name in ("whisk_rad_s", "told_rad_s")
     ]
+    samples = np.ascontiguousarray(samples[part])
+    trace, shape = ffi.new("struct nav_trace *"), ffi.new("struct nav_shape *")
     lib.nav_trace_begin(trace, samples.shape[1])
-    pointers = [ffi.NULL if rate is None else doubles(rate) for rate in rates]
-    lib.nav_trace_run(trace, len(t_s), doubles(t_s), doubles(samples), *pointers)
+    lib.nav_trace_run(trace, len(samples), t_s, doubles(samples, "samples", samples.shape), *rates)
     lib.nav_shape_of(trace, shape)
     return shape
+
+
+def _column(contact: Contact, name: str, part: slice):
+    """Part of a column for C, which keeps its array alive."""
+    values = as_doubles(getattr(contact, name), name, (len(contact.samples),))[part]
+    return doubles(values, name, values.shape)
 
 
 def _crop(contact: Contact) -> slice:
@@ -57,5 +66,5 @@ def _crop(contact: Contact) -> slice:
 def terms_of(shape) -> np.ndarray:
     """The model's terms of a whisk (TERMS); nan where one was not measured."""
     out = np.empty(len(TERMS))
-    lib.nav_whisk_terms(shape, doubles(out))
+    lib.nav_whisk_terms(shape, doubles(out, "terms", (len(TERMS),)))
     return out

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...native import doubles, ffi, lib
-from .rung import plain_features
+from ...native import as_doubles, doubles, ffi, lib
+from .rung import blocks_of, plain_features
 
 SHRINK = 0.05  # share of the diagonal in covariances
 ROW = 4  # blocks over which their dependence is measured
@@ -37,15 +37,14 @@ class Change:
         """A detector of its own, with nothing held; ValueError when a size or number is impossible."""
         features = len(plain_features(np.zeros((1, self.length, len(self.floor))), False, self.floor)[0])
         classes = len(self.bias)
-        shapes = {"steady": (features, classes), "apart": (classes, classes), "weight": (features, classes)}
+        shapes = {"floor": (len(self.floor),), "bias": (classes,), "steady": (features, classes)}
+        shapes |= {"apart": (classes, classes), "weight": (features, classes)}
         numbers, kept = ffi.new("struct nav_texture_change_numbers *"), []
         numbers.classes, numbers.channels = classes, len(self.floor)
         numbers.length, numbers.share, numbers.limit = self.length, self.share, self.limit
         for name in self.ARRAYS:
-            kept.append(np.ascontiguousarray(getattr(self, name), dtype=np.float64))
-            if kept[-1].shape != shapes.get(name, kept[-1].shape):
-                raise ValueError(f"change: {name} has shape {kept[-1].shape}, not {shapes[name]}")
-            setattr(numbers, name, doubles(kept[-1]))
+            kept.append(as_doubles(getattr(self, name), f"change: {name}", shapes[name]))
+            setattr(numbers, name, doubles(kept[-1], name, shapes[name]))
         made = lib.nav_texture_change_new(numbers)
         if made == ffi.NULL:
             raise ValueError("change: a size or number is out of range")
@@ -54,7 +53,11 @@ class Change:
     def ratios(self, samples: np.ndarray) -> np.ndarray:
         """The likeliest change after every block of samples (n, channels), nats; without the first blocks, which are too few."""
         detector, after = self.native(), ffi.new("int *")
-        found = [lib.nav_texture_change_weigh(detector, doubles(b), after) for b in _blocks(samples, self.length)]
+        shape = (self.length, len(self.floor))
+        found = [
+            lib.nav_texture_change_weigh(detector, doubles(block, "block", shape), after)
+            for block in blocks_of(samples, *shape)
+        ]
         return np.array(found[2 * lib.NAV_TEXTURE_CHANGE_AFTER_MOST :])
 
 
@@ -66,7 +69,7 @@ def fit_change(
     None when they are too short to tell a limit."""
     if min(map(len, parts)) < length:
         return None
-    features = [plain_features(_blocks(part, length), False, floor) for part in parts]
+    features = [plain_features(blocks_of(part, length, len(floor)), False, floor) for part in parts]
     found = _fit(features, labels, length, floor)
     peaks = []
     for fold in sorted(set(folds)) if len(set(folds)) > 1 else ():
@@ -76,11 +79,6 @@ def fit_change(
             peaks += [p for n in np.flatnonzero(folds == fold) for p in _peaks(twin.ratios(parts[n]))]
     found.limit = _limit(np.array(peaks))
     return found if found.limit < NEVER else None
-
-
-def _blocks(samples: np.ndarray, length: int) -> np.ndarray:
-    whole = len(samples) // length
-    return np.ascontiguousarray(samples[: whole * length], dtype=np.float64).reshape(whole, length, -1)
 
 
 def _fit(features: list[np.ndarray], labels: np.ndarray, length: int, floor: np.ndarray) -> Change:

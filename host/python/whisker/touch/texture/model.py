@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...native import doubles, ffi, lib
+from ...native import as_doubles, doubles, ffi, lib
 from ...tables import TableError, numbers, read_columns
 from .spectral import FORMAT as SPECTRAL_FORMAT
 from .spectral import SpectralModel
@@ -30,10 +30,11 @@ class TextureModel:
         """rest, low, high: one number per axis, counts (low and high relative to rest); table (classes, axes, bins)."""
         self.classes = list(classes)
         self.rest = np.atleast_1d(np.asarray(rest, dtype=np.float64))
-        self.low = np.ascontiguousarray(low, dtype=np.float64)
-        self.high = np.ascontiguousarray(high, dtype=np.float64)
-        shape = (len(self.classes), len(self.low), bins if table is None else table.shape[2])
-        made = lib.nav_texture_new(*shape, doubles(self.low), doubles(self.high))
+        self.low = as_doubles(low, "low", self.rest.shape)
+        self.high = as_doubles(high, "high", self.rest.shape)
+        axes = len(self.rest)
+        shape = (len(self.classes), axes, bins if table is None else table.shape[2])
+        made = lib.nav_texture_new(*shape, doubles(self.low, "low", (axes,)), doubles(self.high, "high", (axes,)))
         if made == ffi.NULL:
             raise ValueError(f"texture model: impossible shape {shape} or range; every range needs low < high")
         self._model = ffi.gc(made, lib.nav_texture_free)
@@ -45,7 +46,11 @@ class TextureModel:
     @classmethod
     def train(cls, recordings: dict[str, list[np.ndarray]], rest=None, bins: int = BINS) -> "TextureModel":
         """Learn from raw counts, arrays (n, axes) by class. `rest`: by axis; default the median of all training data."""
-        everything = np.concatenate([_counts(r) for group in recordings.values() for r in group])
+        recordings = {name: [_counts(r, "recording") for r in group] for name, group in recordings.items()}
+        widths = {r.shape[1] for group in recordings.values() for r in group}
+        if len(widths) != 1:
+            raise ValueError(f"texture training: recordings of {sorted(widths)} channels; give recordings of one width")
+        everything = np.concatenate([r for group in recordings.values() for r in group])
         everything = everything[np.isfinite(everything).all(axis=1)]
         if len(everything) == 0:
             raise ValueError("texture training: no finite sample; record each surface for some seconds")
@@ -54,18 +59,20 @@ class TextureModel:
         model = cls(list(recordings), rest, low, high, bins=bins)
         for index, group in enumerate(recordings.values()):
             for recording in group:
-                samples = np.ascontiguousarray(_counts(recording) - rest)
-                lib.nav_texture_add(model._model, index, doubles(samples), len(samples))
+                samples = np.ascontiguousarray(recording - rest)
+                given = doubles(samples, "recording", (len(recording), model.channels))
+                lib.nav_texture_add(model._model, index, given, len(samples))
         lib.nav_texture_finish(model._model, PSEUDO)
         return model
 
     def loglik(self, window: np.ndarray, rest=None) -> np.ndarray:
         """Equation 1: log-likelihood of the window (n, axes) of raw counts by class. `rest`: default the model's."""
-        samples = np.ascontiguousarray(_counts(window) - (self.rest if rest is None else rest))
-        if samples.shape[1] != len(self.low):
-            raise ValueError(f"texture model: {len(self.low)} axes expected, {samples.shape[1]} given")
+        window = _counts(window, "window", self.channels)
+        rest = self.rest if rest is None else as_doubles(rest, "rest", (self.channels,))
+        samples = np.ascontiguousarray(window - rest)
         out = np.zeros(len(self.classes))
-        lib.nav_texture_loglik(self._model, doubles(samples), len(samples), doubles(out))
+        given = doubles(samples, "window", (len(window), self.channels))
+        lib.nav_texture_loglik(self._model, given, len(samples), doubles(out, "out", (len(self.classes),)))
         return out
 
     def save(self, path) -> None:
@@ -228,9 +235,10 @@ def sample_period(t_s: np.ndarray) -> float:
     return float(np.median(steps)) if len(steps) else 0.0005
 
 
-def _counts(samples) -> np.ndarray:
+def _counts(samples, name: str, channels: int | None = None) -> np.ndarray:
+    """Samples (n, channels), or (n,) of one channel, as (n, channels)."""
     samples = np.asarray(samples, dtype=np.float64)
-    return samples.reshape(len(samples), -1)
+    return as_doubles(samples[:, None] if samples.ndim == 1 else samples, name, (None, channels))
 
 
 def _ranges(samples: np.ndarray, bins: int) -> tuple[np.ndarray, np.ndarray]:

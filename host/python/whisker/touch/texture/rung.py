@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...native import doubles, ffi, lib
+from ...native import as_doubles, doubles, ffi, lib
 
 SEED = 2011  # of the random projections; any will do
 
@@ -44,23 +44,20 @@ class Rung:
         return self._made
 
     def _make(self):
-        for name in self.ARRAYS:
-            setattr(self, name, np.ascontiguousarray(getattr(self, name), dtype=np.float64))
         features = feature_count(len(self.floor), self.length, self.levels, self.shorter)
         classes, axes = len(self.bias), len(self.axis)
         shapes = {"centre": (features,), "scale": (features,), "weight": (features + self.hidden, classes)}
         shapes |= {"middle": (classes, features), "axis": (axes, features), "axis_weight": (classes, axes)}
-        shapes["beyond"] = (classes,)
+        shapes |= {"floor": (len(self.floor),), "bias": (classes,), "beyond": (classes,)}
         for name, shape in shapes.items():
-            if getattr(self, name).shape != shape:
-                raise ValueError(f"rung {self.length}: {name} has shape {getattr(self, name).shape}, not {shape}")
+            setattr(self, name, as_doubles(getattr(self, name), f"rung {self.length}: {name}", shape))
         numbers = ffi.new("struct nav_texture_rung_numbers *")
         numbers.classes, numbers.channels, numbers.length = classes, len(self.floor), self.length
         numbers.levels, numbers.shorter = int(self.levels), self.shorter
         numbers.hidden, numbers.axes = self.hidden, axes
         numbers.seed, numbers.temper = self.seed, self.temper
         for name in self.ARRAYS:
-            setattr(numbers, name, doubles(getattr(self, name)))
+            setattr(numbers, name, doubles(getattr(self, name), name, shapes[name]))
         made = lib.nav_texture_rung_new(numbers)
         if made == ffi.NULL:
             raise ValueError(f"rung {self.length}: a size or number is out of range")
@@ -68,17 +65,20 @@ class Rung:
 
     def expand(self, windows: np.ndarray) -> np.ndarray:
         """Windows (m, length, channels) -> standardised features and projections (m, F + hidden)."""
-        out = np.empty((len(windows), len(self.centre) + self.hidden))
-        windows = np.ascontiguousarray(windows, dtype=np.float64)
+        shape, width = (self.length, len(self.floor)), len(self.centre) + self.hidden
+        windows = as_doubles(windows, "windows", (None, *shape))
+        out = np.empty((len(windows), width))
         for window, row in zip(windows, out, strict=True):
-            lib.nav_texture_rung_expand(self.native, doubles(window), doubles(row))
+            lib.nav_texture_rung_expand(
+                self.native, doubles(window, "window", shape), doubles(row, "features", (width,))
+            )
         return out
 
 
 def feature_count(channels: int, length: int, levels: bool, shorter: int = 0) -> int:
     """Numbers that a window is reduced to; ValueError for a size out of range."""
-    floor = np.zeros(channels)
-    made = lib.nav_texture_features_new(channels, length, int(levels), shorter, doubles(floor))
+    floor = doubles(np.zeros(channels), "floor", (channels,))
+    made = lib.nav_texture_features_new(channels, length, int(levels), shorter, floor)
     if made == ffi.NULL:
         raise ValueError(f"texture: {channels} channels in windows of {length} samples are out of range")
     return lib.nav_texture_features_count(ffi.gc(made, lib.nav_texture_features_free))
@@ -86,12 +86,21 @@ def feature_count(channels: int, length: int, levels: bool, shorter: int = 0) ->
 
 def plain_features(windows: np.ndarray, levels: bool, floor: np.ndarray, shorter: int = 0) -> np.ndarray:
     """Windows (m, length, channels) -> features (m, F), not standardised; `shorter` as in nav_texture_features_new."""
-    windows = np.ascontiguousarray(windows, dtype=np.float64)
-    floor = np.ascontiguousarray(floor, dtype=np.float64)
+    windows = as_doubles(windows, "windows", (None, None, None))
     _, length, channels = windows.shape
-    out = np.empty((len(windows), feature_count(channels, length, levels, shorter)))
-    made = lib.nav_texture_features_new(channels, length, int(levels), shorter, doubles(floor))
+    floor = doubles(as_doubles(floor, "floor", (channels,)), "floor", (channels,))
+    width = feature_count(channels, length, levels, shorter)
+    out = np.empty((len(windows), width))
+    made = lib.nav_texture_features_new(channels, length, int(levels), shorter, floor)
     made = ffi.gc(made, lib.nav_texture_features_free)
     for window, row in zip(windows, out, strict=True):
-        lib.nav_texture_features_work(made, doubles(window), doubles(row))
+        given = doubles(window, "window", (length, channels)), doubles(row, "features", (width,))
+        lib.nav_texture_features_work(made, *given)
     return out
+
+
+def blocks_of(samples: np.ndarray, length: int, channels: int) -> np.ndarray:
+    """Samples (n, channels) in whole blocks, (n // length, length, channels)."""
+    samples = as_doubles(samples, "samples", (None, channels))
+    whole = len(samples) // length
+    return samples[: whole * length].reshape(whole, length, channels)

@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...native import doubles, ffi, lib
+from ...native import as_doubles, doubles, ffi, lib
+from .rung import blocks_of
 
 FALLS_LEAST = 400  # fewer do not show how fast a floor gets quieter
 
@@ -27,12 +28,11 @@ class Settle:
 
     def native(self):
         """A judge of its own, that has heard nothing; ValueError when a size or number is impossible."""
-        if len(self.limit) != lib.NAV_TEXTURE_SETTLE_LIMITS:
-            raise ValueError(f"settle: {len(self.limit)} limits, not {lib.NAV_TEXTURE_SETTLE_LIMITS}")
         numbers = ffi.new("struct nav_texture_settle_numbers *")
-        floor, limit = (np.ascontiguousarray(a, dtype=np.float64) for a in (self.floor, self.limit))
+        floor = as_doubles(self.floor, "settle: floor", (None,))
+        limit = as_doubles(self.limit, "settle: limit", (lib.NAV_TEXTURE_SETTLE_LIMITS,))
         numbers.channels, numbers.length = len(floor), self.length
-        numbers.floor, numbers.limit = doubles(floor), doubles(limit)
+        numbers.floor, numbers.limit = doubles(floor, "floor", floor.shape), doubles(limit, "limit", limit.shape)
         made = lib.nav_texture_settle_new(numbers)
         if made == ffi.NULL:
             raise ValueError("settle: a size or number is out of range")
@@ -42,12 +42,10 @@ class Settle:
         """Fall of the power after every block of samples (n, channels), over each of counts(): (m, limits), nats per block;
         without the first blocks, which are too few."""
         judge, found = self.native(), []
-        whole = len(samples) // self.length
-        blocks = np.ascontiguousarray(samples[: whole * self.length], dtype=np.float64)
-        for block in blocks.reshape(whole, self.length, -1):
-            lib.nav_texture_settle_take(judge, doubles(block))
+        for block in blocks_of(samples, self.length, len(self.floor)):
+            lib.nav_texture_settle_take(judge, doubles(block, "block", (self.length, len(self.floor))))
             found.append([lib.nav_texture_settle_fall(judge, count) for count in counts()])
-        return np.array(found).reshape(whole, -1)[counts()[-1] - 1 :]
+        return np.array(found).reshape(len(found), -1)[counts()[-1] - 1 :]
 
 
 def fit_settle(parts: list[np.ndarray], length: int, floor: np.ndarray, quantile: float) -> Settle | None:

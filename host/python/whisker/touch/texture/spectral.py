@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...native import doubles, ffi, lib
+from ...native import as_doubles, doubles, ffi, lib
 from ...tables import TableError
 from .change import Change
 from .rung import Rung
@@ -135,7 +135,12 @@ class Stream:
         )
         natives = ffi.new("struct nav_texture_rung *[]", [r.native for r in model.rungs])
         unknown, border = (np.array([getattr(r, n) for r in model.rungs], float) for n in ("unknown", "border"))
-        rules.rung, rules.unknown, rules.border = natives, doubles(unknown), doubles(border)
+        each = (len(model.rungs),)
+        rules.rung, rules.unknown, rules.border = (
+            natives,
+            doubles(unknown, "unknown", each),
+            doubles(border, "border", each),
+        )
         rules.growth, rules.together, rules.doubt, rules.sure = model.growth, model.together, model.doubt, model.sure
         rules.step, rules.patience = step, patience
         self._parts = {
@@ -146,10 +151,11 @@ class Stream:
         # The span of windows at least as long as those judged; the longest rung's if there is none.
         longest = patience if step else window
         span = next((r.span for r in model.rungs if r.length >= longest), model.rungs[-1].span)
-        limits = {n: np.ascontiguousarray(v, dtype=float) for n, v in (model.limits | {"span": span}).items()}
+        shape = (model.channels,)
+        limits = {n: as_doubles(v, n, shape) for n, v in (model.limits | {"span": span}).items()}
         rules.limits.channels = model.channels
         for name, values in limits.items():
-            setattr(rules.limits, name, doubles(values))
+            setattr(rules.limits, name, doubles(values, name, shape))
         made = lib.nav_texture_stream_new(rules)
         if made == ffi.NULL:
             raise ValueError(f"texture: no stream of windows of {window} samples")
@@ -160,14 +166,13 @@ class Stream:
 
     def push(self, samples: np.ndarray) -> list[Judgement]:
         """Take samples (n, channels) of raw counts, nan where missing; the decisions that they complete."""
-        samples = np.ascontiguousarray(np.asarray(samples, dtype=np.float64).reshape(len(samples), -1))
-        if samples.shape[1] != self._channels:
-            raise ValueError(f"texture model: {self._channels} channels expected, {samples.shape[1]} given")
-        found, at, start = [], 0, doubles(samples)
+        samples = as_doubles(samples, "samples", (None, self._channels))
+        found, at, start = [], 0, doubles(samples, "samples", samples.shape)
+        loglik = doubles(self._loglik, "loglik", (self._classes,))
         while at < len(samples):
             rest = start + at * self._channels
             at += lib.nav_texture_stream_push(
-                self._stream, rest, len(samples) - at, self._decided, self._decision, doubles(self._loglik)
+                self._stream, rest, len(samples) - at, self._decided, self._decision, loglik
             )
             if self._decided[0]:
                 found.append(self._judgement(self._taken + at))

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...native import doubles, ffi, lib
+from ...native import as_doubles, doubles, ffi, lib
 
 STEPS = 4  # means of 2, 4, 8 and 16 windows
 SHRINK = 0.1  # share of the diagonal in the covariance of the means
@@ -27,14 +27,13 @@ class Strange:
 
     def native(self):
         """A judge of its own, that has seen no window; ValueError when a size or number is impossible."""
-        steps, classes, features = self.middle.shape
-        if self.turn.shape != (steps, features, features) or self.limit.shape != (steps,):
-            raise ValueError("strange: arrays do not fit each other")
+        steps, classes, features = as_doubles(self.middle, "strange: middle", (None, None, None)).shape
+        shapes = {"turn": (steps, features, features), "middle": (steps, classes, features), "limit": (steps,)}
         numbers, kept = ffi.new("struct nav_texture_strange_numbers *"), []
         numbers.classes, numbers.features, numbers.steps = classes, features, steps
         for name in self.ARRAYS:
-            kept.append(np.ascontiguousarray(getattr(self, name), dtype=np.float64))
-            setattr(numbers, name, doubles(kept[-1]))
+            kept.append(as_doubles(getattr(self, name), f"strange: {name}", shapes[name]))
+            setattr(numbers, name, doubles(kept[-1], name, shapes[name]))
         made = lib.nav_texture_strange_new(numbers)
         if made == ffi.NULL:
             raise ValueError("strange: a size or number is out of range")

@@ -1,0 +1,309 @@
+"""Arrays on their way into C: every function that hands one over refuses the shapes that C would read past.
+
+`CASES` holds each such function with arrays that it takes; the source says which functions there are. Each axis that C
+assumes a length of is made one shorter and one longer, each array gets an axis more.
+"""
+
+import ast
+import dataclasses
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import level0
+import numpy as np
+import pytest
+from rings import ring_name
+
+import whisker
+from whisker.bridge.ring import FRAME, Writer
+from whisker.native import as_doubles, doubles, ffi, octets
+from whisker.nav.filters import COMPONENT, Filter, prior_fault
+from whisker.nav.weigher import Weigher
+from whisker.simulation.world import SIM
+from whisker.touch.contact import Contact
+from whisker.touch.radial.model import RadialModel, peak
+from whisker.touch.radial.shape import Contact as Whisk
+from whisker.touch.radial.shape import shape_of
+from whisker.touch.texture.change import Change
+from whisker.touch.texture.model import TextureModel
+from whisker.touch.texture.rung import Rung, blocks_of, feature_count, plain_features
+from whisker.touch.texture.settle import Settle, counts
+from whisker.touch.texture.spectral import SpectralModel
+from whisker.touch.texture.strange import Strange
+
+PACKAGE = Path(whisker.__file__).parent
+HELPERS = {"doubles", "octets", "pointer"}
+AROUND = {"cast", "from_buffer", "ctypes"}  # ways around the helpers
+# Functions that hand over only arrays of their own making.
+OWN = {
+    "nav.filters.Filter.bins",
+    "nav.filters.problem_of",
+    "touch.radial.shape.terms_of",
+    "touch.texture.rung.feature_count",
+    "signals.world.World.run",
+    "signals.mechanics._counts",
+    "signals.mechanics.touch",
+    "signals.mechanics.drag",
+}
+ROWS = 12
+CHANNELS, LENGTH, CLASSES = 2, 64, 3
+FEATURES = feature_count(CHANNELS, LENGTH, False)
+
+
+class Case(NamedTuple):
+    """A function that takes `arrays` by name, and the axes of each whose lengths C assumes."""
+
+    call: Callable
+    arrays: dict[str, np.ndarray]
+    fixed: dict[str, tuple[int, ...]]
+
+
+def of_rows(call: Callable) -> Case:
+    columns = {name: getattr(OBSERVATIONS, name) for name in ("t_s", "odometry", "texture", "radial_m")}
+    fixed = {"t_s": (0,), "odometry": (0, 1), "texture": (0, 1, 2), "radial_m": (0, 1)}
+    return Case(lambda **changed: call(dataclasses.replace(OBSERVATIONS, **changed)), columns, fixed)
+
+
+def of_part(part, call: Callable, **fixed) -> Case:
+    """A part of a texture model with its arrays."""
+    arrays = {name: getattr(part, name) for name in fixed}
+    return Case(lambda **changed: call(dataclasses.replace(part, **changed)), arrays, fixed)
+
+
+def of_one(call: Callable, name: str, array: np.ndarray, *fixed: int) -> Case:
+    return Case(lambda **changed: call(changed[name]), {name: array}, {name: fixed})
+
+
+def published(frames) -> None:
+    with Writer(ring_name(), 64) as writer:
+        writer.publish(frames)
+
+
+def rung() -> Rung:
+    sizes = {"centre": (FEATURES,), "weight": (FEATURES, CLASSES), "bias": (CLASSES,), "middle": (CLASSES, FEATURES)}
+    sizes |= {"axis": (1, FEATURES), "axis_weight": (CLASSES, 1)}
+    arrays = {name: np.zeros(shape) for name, shape in sizes.items()}
+    ones = {"floor": np.ones(CHANNELS), "scale": np.ones(FEATURES), "beyond": np.ones(CLASSES)}
+    return Rung(LENGTH, False, 0, 0, **arrays, **ones, span=np.full(CHANNELS, 1e4))
+
+
+def change() -> Change:
+    wide, square = np.zeros((FEATURES, CLASSES)), np.zeros((CLASSES, CLASSES))
+    return Change(LENGTH, 0.5, 1.0, np.ones(CHANNELS), wide, square, wide, np.zeros(CLASSES))
+
+
+def strange() -> Strange:
+    turn = np.tile(np.eye(FEATURES), (2, 1, 1))
+    return Strange(LENGTH, turn, np.zeros((2, CLASSES, FEATURES)), np.ones(2))
+
+
+def settle() -> Settle:
+    return Settle(LENGTH, np.ones(CHANNELS), np.ones(len(counts())))
+
+
+def model(**limits) -> SpectralModel:
+    return SpectralModel(["A", "B", "C"], 2000.0, [rung()], LIMITS | limits)
+
+
+def of_texture_model() -> Case:
+    names = {"rest": np.zeros(2), "low": -np.ones(2), "high": np.ones(2)}
+    return Case(lambda **changed: TextureModel(["A"], **changed), names, dict.fromkeys(names, (0,)))
+
+
+SCENE, OBSERVATIONS = level0.record(3, rows=ROWS)
+ROW = {name: getattr(OBSERVATIONS, name)[1] for name in ("odometry", "texture", "radial_m")}
+LIMITS = {"spike": [9.0, 9.0], "still": [1.0, 1.0], "low": [0.0, 0.0], "high": [65535.0, 65535.0]}
+LIMITS = {name: np.array(values) for name, values in LIMITS.items()}
+NOISE = np.random.default_rng(1).normal(0.0, 5.0, (10 * LENGTH, CHANNELS))
+BUMPS = np.zeros(2, COMPONENT)
+BUMPS["pose"], BUMPS["sigma_m"], BUMPS["sigma_rad"], BUMPS["mass"] = (0.5, 0.5, 0.0), 0.1, 0.1, 0.5
+PLAIN = TextureModel.train({"A": [NOISE], "B": [3.0 * NOISE]})
+WHISK = {"t_s": np.arange(64.0), "samples": NOISE[:64], "whisk_rad_s": np.ones(64), "told_rad_s": np.ones(64)}
+BLOCK = {"ticks": np.arange(8), "samples": NOISE[:8], "good": np.ones(8, bool)}
+
+CASES = {
+    "nav.filters.Filter.step_values": Case(
+        lambda **row: Filter("odometry", SCENE).step_values(0.1, *row.values()),
+        ROW,
+        {"odometry": (0,), "texture": (0, 1), "radial_m": (0,)},
+    ),
+    "nav.filters.Filter.replay": of_rows(lambda rows: Filter("odometry", SCENE).replay(rows, 0, len(rows))),
+    "nav.filters._components": of_one(lambda bumps: prior_fault(SCENE, bumps), "bumps", BUMPS),
+    "nav.weigher.Weigher.take": Case(
+        lambda **row: Weigher(SCENE).take(dataclasses.replace(OBSERVATIONS, **{n: a[None] for n, a in row.items()}), 0),
+        ROW,
+        {"odometry": (0,), "texture": (0, 1), "radial_m": (0,)},
+    ),
+    "nav.weigher.Weigher.weigh": of_one(Weigher(SCENE).weigh, "poses", np.zeros((4, 3)), 1),
+    "touch.contact.Contact.block": Case(
+        lambda **block: Contact().block(*block.values()), BLOCK, {"ticks": (0,), "samples": (0, 1), "good": (0,)}
+    ),
+    "touch.radial.model.peak": Case(
+        lambda **given: peak(*given.values()), {"samples": NOISE, "rest": np.zeros(2)}, {"samples": (1,), "rest": (0,)}
+    ),
+    "touch.radial.model.RadialModel.fit": Case(
+        lambda **given: RadialModel.fit(*given.values()),
+        {"peak_counts": np.arange(5.0), "radius_mm": 90.0 + np.arange(5.0)},
+        {"peak_counts": (0,), "radius_mm": (0,)},
+    ),
+    "touch.radial.shape.shape_of": Case(
+        lambda **columns: shape_of(Whisk(**columns)),
+        WHISK,
+        {"t_s": (0,), "samples": (0,), "whisk_rad_s": (0,), "told_rad_s": (0,)},
+    ),
+    "touch.texture.model.TextureModel.__init__": of_texture_model(),
+    "touch.texture.model.TextureModel.train": of_one(
+        lambda recording: TextureModel.train({"A": [recording], "B": [NOISE]}), "recording", NOISE, 1
+    ),
+    "touch.texture.model.TextureModel.loglik": of_one(PLAIN.loglik, "window", NOISE, 1),
+    "touch.texture.strange.Strange.native": of_part(
+        strange(), Strange.native, turn=(0, 1, 2), middle=(0, 2), limit=(0,)
+    ),
+    "touch.texture.settle.Settle.native": of_part(settle(), Settle.native, floor=(), limit=(0,)),
+    "touch.texture.settle.Settle.falls": of_one(settle().falls, "samples", NOISE, 1),
+    "touch.texture.change.Change.native": of_part(
+        change(), Change.native, floor=(0,), steady=(0, 1), apart=(0, 1), weight=(0, 1), bias=(0,)
+    ),
+    "touch.texture.change.Change.ratios": of_one(change().ratios, "samples", NOISE, 1),
+    "touch.texture.rung.Rung._make": of_part(
+        rung(),
+        Rung._make,
+        floor=(0,),
+        centre=(0,),
+        scale=(0,),
+        weight=(0, 1),
+        bias=(0,),
+        middle=(0, 1),
+        axis=(1,),
+        axis_weight=(0, 1),
+        beyond=(0,),
+    ),
+    "touch.texture.rung.Rung.expand": of_one(rung().expand, "windows", np.zeros((2, LENGTH, CHANNELS)), 1, 2),
+    "touch.texture.rung.plain_features": Case(
+        lambda **given: plain_features(given["windows"], False, given["floor"]),
+        {"windows": np.zeros((2, LENGTH, CHANNELS)), "floor": np.ones(CHANNELS)},
+        {"windows": (2,), "floor": (0,)},
+    ),
+    "touch.texture.rung.blocks_of": of_one(lambda samples: blocks_of(samples, LENGTH, CHANNELS), "samples", NOISE, 1),
+    "touch.texture.spectral.Stream.__init__": Case(
+        lambda **limits: model(**limits).stream(LENGTH), LIMITS, dict.fromkeys(LIMITS, (0,))
+    ),
+    "touch.texture.spectral.Stream.push": of_one(model().stream(LENGTH).push, "samples", NOISE, 1),
+    "bridge.ring.Writer.publish": of_one(published, "frames", np.zeros(3, FRAME)),
+}
+CASES["touch.radial.shape._column"] = CASES["touch.radial.shape.shape_of"]
+
+
+def sources() -> dict[str, Path]:
+    """Python modules that may call into C, by name."""
+    ours = {".".join(p.relative_to(PACKAGE).with_suffix("").parts): p for p in PACKAGE.rglob("*.py")}
+    theirs = {f"signals.{p.stem}": p for p in (SIM / "signals").glob("*.py")}
+    return {name: path for name, path in (ours | theirs).items() if name not in ("native", "signals.border")}
+
+
+def functions(tree: ast.AST, inside: str):
+    """(qualified name, node) of every function."""
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            name = f"{inside}.{node.name}"
+            yield from [(name, node)] if isinstance(node, ast.FunctionDef) else functions(node, name)
+
+
+def calls_helper(node: ast.AST) -> bool:
+    called = {n.func.id for n in ast.walk(node) if isinstance(n, ast.Call) and isinstance(n.func, ast.Name)}
+    return bool(called & HELPERS)
+
+
+def test_no_array_goes_around_the_helpers():
+    found = [
+        f"{name}, line {node.lineno}: {node.attr}"
+        for name, path in sources().items()
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.Attribute) and node.attr in AROUND
+    ]
+    assert found == []
+
+
+def test_every_function_that_hands_an_array_to_c_is_tried():
+    found = {
+        function
+        for name, path in sources().items()
+        for function, node in functions(ast.parse(path.read_text()), name)
+        if calls_helper(node)
+    }
+    assert found - OWN <= CASES.keys() and found >= OWN
+
+
+@pytest.mark.parametrize("function", CASES)
+def test_arrays_of_the_right_shape_are_taken(function):
+    CASES[function].call(**CASES[function].arrays)
+
+
+def shorter(array: np.ndarray, axis: int) -> np.ndarray:
+    return np.ascontiguousarray(np.delete(array, -1, axis))
+
+
+def longer(array: np.ndarray, axis: int) -> np.ndarray:
+    return np.concatenate([array, np.take(array, [-1], axis)], axis)
+
+
+def wrong(case: Case):
+    """(name, array of another shape)"""
+    for name, array in case.arrays.items():
+        yield name, array[None]
+        for axis in case.fixed[name]:
+            yield name, shorter(array, axis)
+            yield name, longer(array, axis)
+
+
+@pytest.mark.parametrize("function", CASES)
+def test_another_shape_is_refused_in_one_line_that_names_the_argument(function):
+    case = CASES[function]
+    for name, array in wrong(case):
+        with pytest.raises(ValueError) as refusal:
+            case.call(**(case.arrays | {name: array}))
+        text = str(refusal.value)
+        assert "\n" not in text and any(argument in text for argument in case.arrays), text
+
+
+def test_rows_outside_those_given_are_refused():
+    made = Filter("odometry", SCENE)
+    for first, count in ((-1, 1), (0, ROWS + 1), (ROWS, 1), (ROWS + 1, 0), (3, -1), (2**62, 2**62)):
+        with pytest.raises(ValueError, match="rows given"):
+            made.replay(OBSERVATIONS, first, count)
+    for row in (-1, ROWS):
+        with pytest.raises(ValueError, match="rows given"):
+            Weigher(SCENE).take(OBSERVATIONS, row)
+    assert len(made.replay(OBSERVATIONS, ROWS, 0)[0]) == 0
+
+
+@pytest.mark.parametrize(
+    ("array", "text"),
+    [
+        ([1.0, 2.0, 3.0], "x: list; give an array of float64 with shape (3,)"),
+        (np.zeros(3, np.float32), "x: float32 with shape (3,); give float64"),
+        (np.zeros(3, ">f8"), "x: >f8 with shape (3,); give float64"),
+        (np.zeros(6)[::2], "x: shape (3,), but not contiguous; give np.ascontiguousarray of it"),
+        (np.zeros((1, 3)), "x: shape (1, 3); give shape (3,)"),
+    ],
+)
+def test_a_pointer_needs_type_shape_and_order(array, text):
+    with pytest.raises(ValueError) as refusal:
+        doubles(array, "x", (3,))
+    assert str(refusal.value) == text
+
+
+def test_a_pointer_keeps_its_array():
+    held = octets(np.arange(100, dtype=np.uint8), "x", (None,))
+    assert list(held) == list(range(100)) and ffi.sizeof(held) == 100
+
+
+@pytest.mark.parametrize("values", ["abc", [[1.0], [1.0, 2.0]], [None, {}], {1.0}, [10**400, 1, 1]])
+def test_what_is_no_numbers_is_named(values):
+    with pytest.raises(ValueError, match=r"^x: no array of numbers; give shape \(n, 3\)$"):
+        as_doubles(values, "x", (None, 3))
+
+
+def test_a_robot_without_whiskers_takes_no_numbers():
+    assert as_doubles([], "x", (0, 3)).shape == (0, 3)
