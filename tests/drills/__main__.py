@@ -2,12 +2,12 @@
 
 import argparse
 import json
-import signal
 import sys
 from pathlib import Path
 
 from whisker.demo.training import learn
 from whisker.simulation.scenes import make_scene
+from whisker.stopping import interrupt_on_signals
 
 from .course import FAULTS, Course, as_json
 from .machine import Plan
@@ -23,7 +23,7 @@ def main() -> int:
     parser.add_argument("--only", action="append", metavar="WORDS", help="faults whose names have these words")
     parser.add_argument("--create", type=int, choices=(1, 2), default=1)
     arguments = parser.parse_args()
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit("drills: stopped"))  # as by ^C: with it all processes end
+    interrupt_on_signals()  # with it all processes end
     out = arguments.out / f"seed{arguments.seed}"
     out.mkdir(parents=True, exist_ok=True)
     models = arguments.models or out / "models"
@@ -49,4 +49,7 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    try:
+        sys.exit(main())
+    except KeyboardInterrupt:
+        sys.exit("drills: stopped")

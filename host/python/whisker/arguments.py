@@ -1,9 +1,7 @@
-"""What command lines have in common: the parser, arguments that several take, types of arguments, and an end in order."""
+"""What command lines have in common: the parser, arguments that several take, and types of arguments."""
 
 import argparse
 import math
-import signal
-import threading
 from collections.abc import Callable
 
 from .errors import UserError
@@ -104,11 +102,3 @@ def lane_list(most: int) -> Callable[[str], list[int]]:
         return list(dict.fromkeys(found))
 
     return lanes
-
-
-def stop_on_signals() -> threading.Event:
-    """An event that Ctrl-C and SIGTERM set, so that a command can end in good order."""
-    stop = threading.Event()
-    for sign in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(sign, lambda *_: stop.set())
-    return stop

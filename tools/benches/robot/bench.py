@@ -9,7 +9,6 @@ What is done is kept in build/bench/robot: an interrupted run goes on where it s
 import argparse
 import json
 import shutil
-import signal
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
@@ -17,6 +16,7 @@ from pathlib import Path
 
 from whisker.report import figures, long_figures
 from whisker.report.run import Run
+from whisker.stopping import interrupt_on_signals
 
 from . import instructions, latency, levels, odometry, page
 
@@ -110,7 +110,7 @@ PARTS = ("odometry", "levels", "latency", "instructions", "long", "page")
 def run(build: Path, fresh: bool, only: Sequence[str] = PARTS, levels: Sequence[int] = LEVELS) -> None:
     if fresh:
         shutil.rmtree(CACHE, ignore_errors=True)
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # a run that is ended leaves no process behind
+    interrupt_on_signals()  # a run that is ended leaves no process behind
     for part in only:
         measure(build, part, set(levels))
     publish()

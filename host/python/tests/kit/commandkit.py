@@ -17,7 +17,7 @@ STATS = {"started_ns": 1, "connected": 1, "wire_version": WIRE_VERSION, "serial"
 @pytest.fixture(autouse=True)
 def signals_as_before(monkeypatch):
     """Commands take over signals; in this process they must not."""
-    monkeypatch.setattr("signal.signal", lambda *_: None)
+    monkeypatch.setattr("whisker.stopping.listen", lambda *_: None)
 
 
 def run(capsys, *arguments):

@@ -1,5 +1,7 @@
 """The shared ring of frames as NumPy views, read where the frames lie (host/libwhisker/include/whisker/ring.h)."""
 
+import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -25,6 +27,7 @@ FRAME = np.dtype(
 assert FRAME.itemsize == ffi.sizeof("struct whisker_frame")
 FRAMES = ffi.typeof("struct whisker_frame[]")
 CAPACITY: int = lib.WHISKER_RING_FRAMES
+STOP_S = 0.2  # how soon the wish to stop is noticed while a ring is waited for
 
 
 class RingError(UserError, OSError):
@@ -228,6 +231,18 @@ class Reader:
         if lib.whisker_reader_stats(self._reader, stats) != 0 or stats.started_ns == 0:
             return None
         return DaemonStats(*(_plain(getattr(stats, field)) for field in DaemonStats.__dataclass_fields__))
+
+
+def await_reader(name: str, wait_s: float, stop: threading.Event) -> Reader:
+    """A Reader of a ring that is waited for until `wait_s` are over or `stop` is set; RingError says why there is none."""
+    until = time.monotonic() + wait_s
+    while True:
+        left_s = max(0.0, until - time.monotonic())
+        try:
+            return Reader(name, min(left_s, STOP_S))
+        except RingError as error:
+            if error.name not in ("RING_MISSING", "WRITER_DEAD") or left_s <= STOP_S or stop.is_set():
+                raise
 
 
 class Writer:

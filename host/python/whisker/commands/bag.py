@@ -3,11 +3,11 @@
 from itertools import chain, count
 from pathlib import Path
 
-from ..arguments import stop_on_signals
 from ..recording.writing import TopicWriter
 from ..robot.bag import RECORD, Bag, metadata
 from ..robot.options import NAVIGATOR_ENDPOINT, PILOT_ENDPOINT, add_link, open_link
 from ..scene import load
+from ..stopping import stop_on_signals
 
 EXAMPLE = "whisker bag run.mcap --scene SCENE"
 

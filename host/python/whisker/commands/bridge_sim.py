@@ -11,11 +11,12 @@ import tempfile
 import threading
 from pathlib import Path
 
-from ..arguments import RING, number_above, stop_on_signals, whole_number
+from ..arguments import RING, number_above, whole_number
 from ..bridge.ring import Reader, RingError
 from ..protocol import LANES, LIMITS
 from ..simulation.bridge import COURSES, Course, flat_scene, program, read_faults
 from ..simulation.scenes import MECHANICS
+from ..stopping import stop_on_signals
 
 EXAMPLE = "whisker bridge-sim --lanes 6 --seconds 60 &  whisker top"
 TICKS_PER_S = LIMITS["clock_hz"] // LIMITS["tick_period"]

@@ -7,7 +7,7 @@ from contextlib import ExitStack, closing
 from pathlib import Path
 from types import SimpleNamespace
 
-from ..arguments import RING, stop_on_signals, whole_number
+from ..arguments import RING, whole_number
 from ..bridge.nodes import NodeError
 from ..bridge.ring import Reader
 from ..errors import UserError
@@ -25,6 +25,7 @@ from ..robot.telling import Teller
 from ..robot.wheels import RETRY_S, IdealWheels, LiveBase, SteppedBase, wheels_of
 from ..scene import load
 from ..simulation.link import SimLink
+from ..stopping import stop_on_signals
 
 EXAMPLE = "whisker pilot SCENE --models MODELS --base /run/user/1000/base"
 RING_WAIT_S = 10.0  # for the ring of a simulation that waits for us

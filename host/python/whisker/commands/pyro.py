@@ -3,9 +3,10 @@
 import ipaddress
 import sys
 
-from ..arguments import stop_on_signals, whole_number
+from ..arguments import whole_number
 from ..robot.options import NAVIGATOR_ENDPOINT, PILOT_ENDPOINT, add_link, open_link
 from ..robot.pyro import PORT, Server
+from ..stopping import stop_on_signals
 
 EXAMPLE = "whisker pyro --connect tcp/netbook:7448 --connect tcp/127.0.0.1:7449"
 

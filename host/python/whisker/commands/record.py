@@ -1,11 +1,12 @@
 """`whisker record`: from a ring to an MCAP file (whisker.recording)."""
 
-from ..arguments import add_ring, number_above, stop_on_signals, whole_number
-from ..bridge.ring import Reader
+from ..arguments import add_ring, number_above, whole_number
+from ..bridge.ring import Reader, await_reader
 from ..protocol import LIMITS
 from ..recording.recorder import Tally, describe, record
 from ..recording.writing import RecordingWriter
 from ..scene import load
+from ..stopping import stop_on_signals
 
 EXAMPLE = "whisker record drive.mcap --seconds 60"
 
@@ -23,7 +24,7 @@ def add(parser) -> None:
 def run(arguments) -> int:
     names = [whisker.name for whisker in load(arguments.scene).robot.whiskers] if arguments.scene else []
     stop = stop_on_signals()
-    with Reader(arguments.ring, arguments.wait) as reader:
+    with await_reader(arguments.ring, arguments.wait, stop) as reader:
         writer = RecordingWriter(arguments.file, describe(reader), names, arguments.overwrite)
         tally = record(reader, writer, stop, _frames(arguments, reader))
     print(f"{arguments.file}: {_summary(tally)}")

@@ -3,10 +3,11 @@
 import argparse
 import sys
 
-from ..arguments import RING, number_above, seconds, stop_on_signals, whole_number
+from ..arguments import RING, number_above, seconds, whole_number
 from ..bridge.ring import CAPACITY, Writer
 from ..recording import read
 from ..recording.replay import Replay
+from ..stopping import stop_on_signals
 
 EXAMPLE = "whisker replay drive.mcap --speed 2 --ring replayed"
 

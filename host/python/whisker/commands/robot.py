@@ -4,13 +4,14 @@ import tempfile
 from pathlib import Path
 
 from .. import scene as scenes
-from ..arguments import RING, number_above, stop_on_signals, whole_number
+from ..arguments import RING, number_above, whole_number
 from ..errors import UserError
 from ..robot import parts
 from ..robot.link import Link
 from ..robot.supervisor import Supervisor
 from ..robot.truth import TruthWatcher
 from ..simulation.bridge import simulated_scene
+from ..stopping import stop_on_signals
 
 EXAMPLE = "whisker robot --simulated --desktop"
 DAY_S = 86400.0

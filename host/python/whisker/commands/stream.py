@@ -5,9 +5,10 @@ import sys
 
 import numpy as np
 
-from ..arguments import add_ring, lane_list, stop_on_signals, whole_number
-from ..bridge.ring import Reader
+from ..arguments import add_ring, lane_list, whole_number
+from ..bridge.ring import Reader, await_reader
 from ..protocol import LANES, LIMITS
+from ..stopping import stop_on_signals
 
 EXAMPLE = "whisker stream --lanes 0-5 --every 20 --frames 100 > drive.csv"
 FIELDS = ("alpha", "beta", "status")
@@ -32,7 +33,7 @@ def add(parser) -> None:
 def run(arguments) -> int:
     stop = stop_on_signals()
     left = arguments.frames
-    with Reader(arguments.ring, arguments.wait) as reader:
+    with await_reader(arguments.ring, arguments.wait, stop) as reader:
         if not arguments.backlog:
             reader.seek_latest(0)
         lanes, header = arguments.lanes, not arguments.json

@@ -6,19 +6,22 @@ import select
 import shutil
 import sys
 import termios
+import time
 import tty
 from collections import Counter, deque
 
 import numpy as np
 
-from ..arguments import add_ring, number_above, stop_on_signals
-from ..bridge.ring import FRAME, Reader, RingError
+from ..arguments import add_ring, number_above
+from ..bridge.ring import FRAME, Reader, RingError, await_reader
 from ..bridge.status import explain
 from ..protocol import LANES, LIMITS
 from ..scene import load
+from ..stopping import stop_on_signals
 
 EXAMPLE = "whisker top --ring whisker"
 WINDOW_S = 2.0
+STOP_S = 0.2  # how soon a signal is noticed
 BARS = "▁▂▃▄▅▆▇█"
 BARS_SPAN = 256  # counts from the lowest bar to the highest, at least: noise is to look flat
 HEAD = f"{'lane':<18}{'alpha':>7}{'beta':>7}{'noise':>7}{'good/s':>8}{'bad %':>7}  "
@@ -36,7 +39,7 @@ def add(parser) -> None:
 def run(arguments) -> int:
     names = [whisker.name for whisker in load(arguments.scene).robot.whiskers] if arguments.scene else []
     stop = stop_on_signals()
-    with Reader(arguments.ring, arguments.wait) as reader:
+    with await_reader(arguments.ring, arguments.wait, stop) as reader:
         reader.seek_latest(round(arguments.interval * LIMITS["clock_hz"] / LIMITS["tick_period"]))
         view = View(reader, names)
         if arguments.once or not sys.stdout.isatty():
@@ -51,7 +54,7 @@ def run(arguments) -> int:
                 shown = view.lines(size.columns)[: size.lines - 1]
                 sys.stdout.write(HOME + "".join(line + LINE for line in shown) + REST)
                 sys.stdout.flush()
-                if _pressed(arguments.interval) == "q":
+                if _pressed(arguments.interval, stop) == "q":
                     return 0
     print(f"ring {arguments.ring}: closed by its writer")
     return 0
@@ -74,10 +77,12 @@ def _terminal():
             termios.tcsetattr(sys.stdin, termios.TCSADRAIN, kept)
 
 
-def _pressed(wait_s: float) -> str:
-    """The key pressed within `wait_s`, or nothing."""
-    if select.select([sys.stdin], [], [], wait_s)[0]:
-        return os.read(sys.stdin.fileno(), 1).decode("ascii", "replace")
+def _pressed(wait_s: float, stop) -> str:
+    """The key pressed within `wait_s` and before `stop` is set, or nothing."""
+    until = time.monotonic() + wait_s
+    while not stop.is_set() and (left_s := until - time.monotonic()) > 0:
+        if select.select([sys.stdin], [], [], min(left_s, STOP_S))[0]:
+            return os.read(sys.stdin.fileno(), 1).decode("ascii", "replace")
     return ""
 
 

@@ -4,7 +4,6 @@ import argparse
 import csv
 import json
 import shutil
-import signal
 import sys
 import time
 from collections.abc import Callable
@@ -18,6 +17,7 @@ from ..nav import localise
 from ..report import write_report
 from ..report.run import FILTERS
 from ..simulation.scenes import MECHANICS, make_scene
+from ..stopping import interrupt_on_signals
 from ..tables import TableError
 from . import summary as scores
 from .chain import ChainError, ChainRun, Link, run_chain
@@ -66,7 +66,7 @@ def main(argv: list[str] | None = None) -> int:
 
 def guarded(name: str, job: Callable[[argparse.Namespace], object], options: argparse.Namespace) -> int:
     """Do a job; exit code 0, or a line about what is wrong and another code."""
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    interrupt_on_signals()
     try:
         job(options)
     except (ChainError, scenes.SceneError, TableError, localise.SettingError) as error:

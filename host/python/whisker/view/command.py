@@ -2,13 +2,14 @@
 
 import argparse
 import asyncio
+import contextlib
 import ipaddress
 import logging
-import signal
 import sys
 import webbrowser
 
 from ..scene import load
+from ..stopping import listen
 from .hub import Hub
 from .rings import is_name
 from .robot_source import NoRobot, join
@@ -94,9 +95,13 @@ def _source(arguments: argparse.Namespace) -> NoRobot:
 
 
 async def _serve(arguments: argparse.Namespace, hub: Hub) -> int:
-    over = asyncio.Event()
-    for sign in (signal.SIGINT, signal.SIGTERM):
-        asyncio.get_running_loop().add_signal_handler(sign, over.set)
+    over, loop = asyncio.Event(), asyncio.get_running_loop()
+
+    def end() -> None:
+        with contextlib.suppress(RuntimeError):  # the loop has been closed already
+            loop.call_soon_threadsafe(over.set)
+
+    listen(end)
     async with serving(hub, arguments.host, arguments.port, arguments.allow_host) as port:
         address = ipaddress.ip_address(arguments.host)
         if not address.is_loopback:

@@ -1,0 +1,51 @@
+"""What signals do to a process that ends in good order."""
+
+import signal
+import subprocess
+import sys
+import threading
+
+import pytest
+
+from whisker.bridge.ring import RingError, await_reader
+
+END_S = 60
+TWICE = """
+import signal
+from whisker.stopping import {use}
+{before}
+try:
+    signal.raise_signal(signal.{first})
+    {waits}
+finally:
+    signal.raise_signal(signal.{second})
+    print("ended in order")
+"""
+
+
+def run(**parts) -> subprocess.CompletedProcess:
+    return subprocess.run([sys.executable, "-c", TWICE.format(**parts)], capture_output=True, text=True, timeout=END_S)
+
+
+@pytest.mark.parametrize("first", ["SIGINT", "SIGTERM", "SIGHUP"])
+@pytest.mark.parametrize("second", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_a_second_signal_breaks_no_ending(first, second):
+    told = run(
+        use="stop_on_signals", before="stop = stop_on_signals()", waits="stop.wait()", first=first, second=second
+    )
+    assert (told.stdout, told.stderr, told.returncode) == ("ended in order\n", "", 0)
+
+
+def test_who_ends_by_an_interrupt_gets_one():
+    told = run(
+        use="interrupt_on_signals", before="interrupt_on_signals()", waits="pass", first="SIGTERM", second="SIGINT"
+    )
+    assert told.stdout == "ended in order\n" and told.stderr.count("KeyboardInterrupt") == 1
+    assert told.returncode == -signal.SIGINT
+
+
+def test_a_ring_is_not_waited_for_when_it_is_to_stop():
+    stop = threading.Event()
+    stop.set()
+    with pytest.raises(RingError):
+        await_reader("whisker-test-no-such-ring", 1e6, stop)
