@@ -22,6 +22,7 @@ mod:umockdev-1.0 libumockdev-dev
 mod:libusbredirparser-0.5 libusbredirparser-dev
 mod:cmocka libcmocka-dev
 mod:libsystemd libsystemd-dev
+cmd:dbus-daemon dbus-daemon
 mod:libudev libudev-dev
 cmd:spin spin
 cmd:avr-gcc gcc-avr

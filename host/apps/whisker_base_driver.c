@@ -9,15 +9,17 @@
 #include "cli.h"
 #include "daemon_log.h"
 #include "whisker_base_clients.h"
+#include "whisker_base_sleep.h"
 
 #define ALIVE_MS 50
 
-enum { GUARD, LISTENING, PORT, CLIENTS, POLLED = CLIENTS + BASE_CLIENTS };
+enum { GUARD, LISTENING, PORT, BUS, CLIENTS, POLLED = CLIENTS + BASE_CLIENTS };
 
 struct driver {
     struct base_driver_start start;
     struct base_robot robot;
     struct base_clients clients;
+    struct base_sleep sleep;
     struct pollfd polled[POLLED];
     int told_port; /* descriptor the guard holds too */
     int64_t alive_ms, tried_ms;
@@ -77,18 +79,20 @@ static void reopen(struct driver *driver)
     }
 }
 
-static void fill(struct driver *driver)
+static int64_t least(int64_t a, int64_t b)
+{
+    return a < b ? a : b;
+}
+
+/* What is waited for. Returns for how many ms at most. */
+static int64_t fill(struct driver *driver)
 {
     const bool wanted = base_robot_taken(&driver->robot) < base_clients_limit(&driver->clients);
     driver->polled[GUARD] = (struct pollfd){.fd = driver->start.guard, .events = POLLIN};
     driver->polled[LISTENING] = (struct pollfd){.fd = driver->start.listening, .events = POLLIN};
     driver->polled[PORT] = (struct pollfd){.fd = driver->robot.port, .events = wanted ? POLLIN : 0};
     base_clients_poll(&driver->clients, &driver->polled[CLIENTS]);
-}
-
-static int64_t least(int64_t a, int64_t b)
-{
-    return a < b ? a : b;
+    return base_sleep_poll(&driver->sleep, &driver->polled[BUS], cli_now_ms());
 }
 
 /* Takes the guard's newest lease. False: the guard has died. */
@@ -113,24 +117,27 @@ static int64_t watch_lease(struct driver *driver)
     return left_ms > 0 ? left_ms : ALIVE_MS;
 }
 
-/* Sleeps until something comes or is due; signals end it. */
-static void await(struct driver *driver)
+/* Sleeps until something comes or is due; signals end it. False: it cannot sleep so. */
+static bool await(struct driver *driver)
 {
     sigset_t none;
     sigemptyset(&none);
-    const int64_t due = least(base_robot_watch(&driver->robot, cli_now_ms()), watch_lease(driver));
+    const int64_t watched_ms = least(base_robot_watch(&driver->robot, cli_now_ms()), watch_lease(driver));
+    const int64_t due = least(watched_ms, fill(driver));
     const int64_t sleep_ms = driver->start.options->stream_clock && driver->robot.port >= 0 ? -1 : least(due, ALIVE_MS);
     const struct timespec timeout = {.tv_nsec = sleep_ms * 1000000};
-    fill(driver);
-    if (ppoll(driver->polled, POLLED, sleep_ms < 0 ? NULL : &timeout, &none) < 0) {
-        for (int i = 0; i < POLLED; i++) {
-            driver->polled[i].revents = 0;
-        }
+    const int ready = ppoll(driver->polled, POLLED, sleep_ms < 0 ? NULL : &timeout, &none);
+    for (int i = 0; i < POLLED && ready < 0; i++) {
+        driver->polled[i].revents = 0;
     }
+    return ready >= 0 || errno == EINTR;
 }
 
 static void serve(struct driver *driver)
 {
+    if (!driver->start.options->stream_clock) {
+        base_sleep_serve(&driver->sleep, cli_now_ms());
+    }
     if (driver->polled[PORT].revents && driver->robot.port >= 0) {
         base_robot_read(&driver->robot, base_clients_limit(&driver->clients), cli_now_ms());
     }
@@ -147,6 +154,12 @@ static void serve(struct driver *driver)
     tell_alive(driver);
 }
 
+static void on_sleep(void *context, bool about_to)
+{
+    struct driver *driver = context;
+    base_robot_hold(&driver->robot, BASE_HOLD_SLEEP, about_to, cli_now_ms());
+}
+
 static bool open_first(struct driver *driver)
 {
     const struct base_driver_start *start = &driver->start;
@@ -159,6 +172,26 @@ static bool open_first(struct driver *driver)
     return true;
 }
 
+/* Until it is told to end, or has nothing to go on with. Returns the exit code. */
+static int run(struct driver *driver)
+{
+    while (!cli_stop_wanted()) {
+        reopen(driver);
+        if (!await(driver)) {
+            daemon_log(LOG_ERROR, "cannot wait for %d descriptors: %s; wheels stopped, ending; allow more (ulimit -n)",
+                       POLLED, strerror(errno));
+            return CLI_FAILED;
+        }
+        if (driver->polled[GUARD].revents && !take_lease(driver)) {
+            daemon_log(LOG_ERROR, "the guard has died; wheels stopped, ending");
+            return CLI_FAILED;
+        }
+        watch_lease(driver); /* before a commander is obeyed */
+        serve(driver);
+    }
+    return CLI_OK;
+}
+
 int base_driver_run(const struct base_driver_start *start)
 {
     static struct driver driver;
@@ -168,17 +201,11 @@ int base_driver_run(const struct base_driver_start *start)
     if (!open_first(&driver)) {
         return CLI_FAILED;
     }
-    while (!cli_stop_wanted()) {
-        reopen(&driver);
-        await(&driver);
-        if (driver.polled[GUARD].revents && !take_lease(&driver)) {
-            daemon_log(LOG_ERROR, "the guard has died; wheels stopped, ending");
-            base_robot_end(&driver.robot, cli_now_ms());
-            return CLI_FAILED;
-        }
-        watch_lease(&driver); /* before a commander is obeyed */
-        serve(&driver);
+    if (!start->options->stream_clock) { /* a simulation does not sleep */
+        base_sleep_begin(&driver.sleep, on_sleep, &driver, cli_now_ms());
     }
+    const int code = run(&driver);
     base_robot_end(&driver.robot, cli_now_ms());
-    return CLI_OK;
+    base_sleep_end(&driver.sleep);
+    return code;
 }

@@ -256,7 +256,8 @@ static void log_hold(enum base_hold reason, bool on)
     const bool heartbeat = reason == BASE_HOLD_HEARTBEAT;
     if (on) {
         daemon_log(heartbeat ? LOG_ERROR : LOG_NOTE, "%s; wheels stopped",
-                   heartbeat ? "no heartbeat: the guard or the supervisor hangs" : "the machine goes to sleep");
+                   heartbeat ? "no heartbeat: the guard or the supervisor hangs"
+                             : "the machine is about to sleep or to be shut down");
     } else {
         daemon_log(LOG_NOTE, "%s; the commander may drive again",
                    heartbeat ? "the heartbeat is back" : "the machine is awake");
