@@ -36,7 +36,7 @@ def run(arguments) -> int:
     with open_link("bag", arguments) as link:
         told = metadata(arguments.robot, arguments.scene)
         file = next_free(Path(arguments.file)) if arguments.next else arguments.file
-        bag = Bag(TopicWriter(file, RECORD, told, arguments.overwrite), arguments.robot)
-        counted = bag.run(link, stop, arguments.stay)
+        with TopicWriter(file, RECORD, told, arguments.overwrite) as writer:
+            counted = Bag(writer, arguments.robot).run(link, stop, arguments.stay)
     print(f"{file}: " + ", ".join(f"{name} {value}" for name, value in counted.items()))
     return 0

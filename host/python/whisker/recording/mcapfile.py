@@ -24,6 +24,7 @@ CHUNK_HEAD = struct.Struct("<QQQI")  # first time, last time, bytes unpacked, th
 CHUNK_MOST = 1 << 26  # bytes unpacked; recordings have 1 MiB
 RECORD_MOST = 1 << 26  # bytes of a record that is read whole; index and attachment records are skipped unread
 DAMAGE_MOST = 100  # lines kept
+NUMBERED = "whisker_numbered"  # key of a channel's metadata: sequence numbers count its messages in the file, from 1 on
 
 
 class RecordingError(UserError, ValueError):

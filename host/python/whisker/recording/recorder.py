@@ -46,7 +46,6 @@ class Recorder:
         self.tally = Tally()
         self._second = Tally()  # the tally when the last health message was written
         self._second_ns = self._timeline.now()
-        self._flushed_s = time.monotonic()
         self._last: tuple[int, int] | None = None  # tick and sequence number of the last frame
         self._overrun = reader.info.frames_overrun
         self._lost = 0  # frames overrun since the last block
@@ -155,9 +154,7 @@ class Recorder:
             self._writer.event(self._timeline.now(), CLOCK_SET, step_ns=step)
         if self._timeline.now() - self._second_ns >= SECOND_NS:
             self._tell_health()
-        if time.monotonic() - self._flushed_s >= 1.0:
-            self._writer.flush()
-            self._flushed_s = time.monotonic()
+        self._writer.flush_when_due()
 
     def _tell_health(self) -> None:
         now, second = self._timeline.now(), self.tally - self._second

@@ -18,7 +18,6 @@ from .rows import ROW_NS
 
 RECORD, FORMAT = "whisker_robot", "1"  # name of the metadata record, and of what it promises
 SCENE_FILES = (ARENA, ROBOT, PRIOR)
-FLUSH_S = 1.0
 LOOK_S = 0.5
 APART_NS = 60 * 10**9  # a message further from the newest row does not have this bridge's clock
 
@@ -73,7 +72,7 @@ class Bag:
             if topic not in self._known:
                 self._known.add(topic)
                 self._writer.topic(topic, SCHEMAS[type(one.message)])
-            self._writer.add(topic, self._time(one), one.envelope.number, encode(one.message))
+            self._writer.add(topic, self._time(one), encode(one.message))
             self.messages += 1
 
     def _time(self, one: Received) -> int:
@@ -85,13 +84,10 @@ class Bag:
         inbox = link.subscribe("**")
         health = Health(link, lambda: self.counters(inbox))
         link.announce()
-        flushed_s = time.monotonic()
         while not stop.is_set() and (stay or not _is_over(inbox)):
             self.take(inbox.take(LOOK_S))
             health.tell(0, RUNNING, inbox.last_error)
-            if time.monotonic() - flushed_s >= FLUSH_S:
-                self._writer.flush()
-                flushed_s = time.monotonic()
+            self._writer.flush_when_due()
         self._writer.finish({name: str(value) for name, value in self._told(inbox).items()})
         health.tell(0, ENDED, inbox.last_error)
         return self.counters(inbox)
