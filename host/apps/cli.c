@@ -1,6 +1,7 @@
 #include "cli.h"
 
 #include <errno.h>
+#include <pwd.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -9,6 +10,7 @@
 
 #include "whisker/device.h"
 #include "whisker/errors.h"
+#include "whisker/ring.h"
 
 static volatile sig_atomic_t stop_wanted;
 
@@ -45,6 +47,31 @@ int cli_fail(const char *program, const char *subject, int error)
     const char *detail = error == WHISKER_ERROR_SYSTEM ? strerror(errno) : whisker_error_remedy(error);
     fprintf(stderr, "%s: %s: %s; %s\n", program, subject, whisker_error_text(error), detail);
     return CLI_FAILED;
+}
+
+int cli_fail_ring(const char *program, const char *name, int error)
+{
+    char line[WHISKER_RING_LINE_BYTES];
+    if (error == WHISKER_ERROR_SYSTEM) {
+        return cli_fail(program, name, error);
+    }
+    whisker_ring_explain(name, error, line, sizeof line);
+    fprintf(stderr, "%s: %s: %s\n", program, name, line);
+    return CLI_FAILED;
+}
+
+bool cli_user(const char *program, const char *option, const char *text, uint32_t *id)
+{
+    const struct passwd *entry = getpwnam(text);
+    char *end;
+    const unsigned long number = strtoul(text, &end, 10);
+    const bool is_number = text[0] >= '0' && text[0] <= '9' && *end == '\0' && number < UINT32_MAX;
+    if (!entry && !is_number) {
+        fprintf(stderr, "%s: --%s %s: there is no such user; give a user's name or number\n", program, option, text);
+        return false;
+    }
+    *id = entry ? entry->pw_uid : (uint32_t)number;
+    return true;
 }
 
 bool cli_number(const char *program, const char *option, const char *text, uint32_t min, uint32_t max, uint32_t *value)

@@ -12,6 +12,12 @@ enum { CLI_OK = 0, CLI_FAILED = 1, CLI_USAGE = 2 };
 /* Prints "program: subject: text; remedy" for a code of the library and returns CLI_FAILED. */
 int cli_fail(const char *program, const char *subject, int error);
 
+/* As cli_fail for the ring `name`: says also which file is meant and whose it is. */
+int cli_fail_ring(const char *program, const char *name, int error);
+
+/* Reads an option's user, by name or number; false, with one line printed, if there is none. */
+bool cli_user(const char *program, const char *option, const char *text, uint32_t *id);
+
 /* Reads an option's number, decimal or 0x; false, with one line printed, unless it is a whole number min..max. */
 bool cli_number(const char *program, const char *option, const char *text, uint32_t min, uint32_t max, uint32_t *value);
 

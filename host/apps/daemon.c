@@ -150,9 +150,7 @@ int daemon_run(const struct daemon_options *options)
     struct daemon daemon = {0};
     struct whisker_ring *ring;
     daemon_stream_catch_requests();
-    const int error = daemon_ring_make(options, &ring);
-    if (error) {
-        daemon_log_error(LOG_ERROR, options->ring, error);
+    if (daemon_ring_make(options, &ring) != WHISKER_OK) {
         return CLI_FAILED;
     }
     daemon_stream_init(&daemon.stream, options, ring);

@@ -28,7 +28,7 @@ void daemon_log_begin(int verbose)
 
 void daemon_log(enum daemon_priority priority, const char *format, ...)
 {
-    char line[512];
+    char line[2048];
     va_list arguments;
     if (priority == LOG_DETAIL && !details) {
         return;

@@ -22,7 +22,8 @@ static void print_help(const struct whisker_settings *defaults)
         "  --serial TEXT       the bridge with this serial number (the first that can be opened)\n"
         "  --wait              wait for a bridge instead of failing when there is none\n"
         "  --once              end when the bridge goes, instead of waiting for it\n"
-        "  --replace           stop the whiskerd that has this ring, and take over\n"
+        "  --replace           stop the whiskerd that has this ring, if it is yours, root's or the service's, and take "
+        "over\n"
         "  --list              print serial number, place and state of each bridge\n"
         "  --batch N           frames of one USB transfer, even, 2 to 16: latency against work (%u)\n"
         "  --lane-mask M       bit n set: lane n is in use (0x%x)\n"
@@ -33,7 +34,8 @@ static void print_help(const struct whisker_settings *defaults)
         "  --verbose           tell also what goes well\n"
         "  --help              this text\n\n"
         "SIGUSR1: statistics to the log, as at the end. SIGUSR2: who the nodes are and what they counted, likewise.\n"
-        "Under systemd: notifies readiness, feeds the watchdog.\n\n"
+        "Under systemd: notifies readiness, feeds the watchdog; with RUNTIME_DIRECTORY=" WHISKER_RING_SERVICE_DIRECTORY
+        " the ring lies\nthere, else in " WHISKER_RING_DIRECTORY ". Readers look in both, in this order.\n\n"
         "Example: whiskerd --ring whisker --lane-mask 0x3f\n"
         "Example: whiskerd --ring whisker --wait --serial 0001\n"
         "Exit code: 0 stopped as told, 1 failed, 2 wrong use.\n",

@@ -2,6 +2,7 @@
 #include <errno.h>
 #include <getopt.h>
 #include <inttypes.h>
+#include <pwd.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -18,7 +19,7 @@
 
 struct options {
     const char *ring, *bad, *summary, *socket;
-    uint32_t lanes, wait_s;
+    uint32_t lanes, wait_s, owner;
 };
 
 struct tally {
@@ -40,6 +41,7 @@ static void print_help(void)
     printf("Usage: whisker-log --ring NAME [OPTION...]\n"
            "Reads a ring until its writer closes it; counts frames and logs the records flagged bad.\n\n"
            "  --ring NAME      the ring to read\n"
+           "  --ring-owner U   accept a ring of this user, too, not only root's, your own and the service's\n"
            "  --lanes N        lanes 0 to N-1 are populated; others are not judged (%d)\n"
            "  --bad FILE       CSV: lane, tick, code, errors of each bad record\n"
            "  --summary FILE   JSON: what was counted\n"
@@ -66,6 +68,8 @@ static bool set_option(struct options *options, int option, const char *text)
     case 'f':
         options->socket = text;
         return true;
+    case 'o':
+        return cli_user(PROGRAM, "ring-owner", text, &options->owner);
     case 'l':
         return cli_number(PROGRAM, "lanes", text, 1, WHISKER_FRAME_LANES, &options->lanes);
     case 'w':
@@ -79,10 +83,15 @@ static bool set_option(struct options *options, int option, const char *text)
 static int parse(int argc, char **argv, struct options *options)
 {
     static const struct option known[] = {
-        {"ring", required_argument, NULL, 'r'},    {"bad", required_argument, NULL, 'b'},
-        {"summary", required_argument, NULL, 's'}, {"socket", required_argument, NULL, 'f'},
-        {"lanes", required_argument, NULL, 'l'},   {"wait", required_argument, NULL, 'w'},
-        {"help", no_argument, NULL, 'h'},          {NULL, 0, NULL, 0},
+        {"ring", required_argument, NULL, 'r'},
+        {"bad", required_argument, NULL, 'b'},
+        {"summary", required_argument, NULL, 's'},
+        {"socket", required_argument, NULL, 'f'},
+        {"lanes", required_argument, NULL, 'l'},
+        {"wait", required_argument, NULL, 'w'},
+        {"ring-owner", required_argument, NULL, 'o'},
+        {"help", no_argument, NULL, 'h'},
+        {NULL, 0, NULL, 0},
     };
     for (int option; (option = getopt_long(argc, argv, "", known, NULL)) != -1;) {
         if (option == 'h') {
@@ -145,8 +154,9 @@ static void tell_simulation(struct session *session)
     }
 }
 
-/* Takes a batch out of the ring. It is copied, so that only frames known to be whole are counted. */
-static void read_batch(struct session *session)
+/* Takes a batch out of the ring. It is copied, so that only frames known to be whole are counted. Returns 0, or why the
+ * ring gives nothing more. */
+static int read_batch(struct session *session)
 {
     static struct whisker_frame batch[BATCH];
     const struct whisker_frame *frames;
@@ -158,23 +168,23 @@ static void read_batch(struct session *session)
         error = whisker_reader_advance(session->reader, count);
     }
     if (error) {
-        session->tally.overruns++;
-        return;
+        session->tally.overruns += error == WHISKER_ERROR_OVERRUN;
+        return error == WHISKER_ERROR_OVERRUN ? WHISKER_OK : error;
     }
     for (size_t i = 0; i < count; i++) {
         count_frame(session, &batch[i]);
     }
     tell_simulation(session);
+    return WHISKER_OK;
 }
 
 /* Reads to the end of the stream and returns how it ended. */
 static int read_stream(struct session *session)
 {
     while (!cli_stop_wanted()) {
-        const int error = whisker_reader_wait(session->reader, WAIT_MS);
-        if (!error) {
-            read_batch(session);
-        } else if (error != WHISKER_ERROR_TIMEOUT) {
+        int error = whisker_reader_wait(session->reader, WAIT_MS);
+        error = error ? error : read_batch(session);
+        if (error && error != WHISKER_ERROR_TIMEOUT) {
             return error;
         }
     }
@@ -203,13 +213,28 @@ static int fail_file(const char *path)
     return CLI_FAILED;
 }
 
+static void print_ring(const struct whisker_reader *reader, const char *name)
+{
+    struct whisker_reader_info info;
+    whisker_reader_info(reader, &info);
+    const struct passwd *owner = getpwuid(info.owner);
+    if (owner) {
+        printf(PROGRAM ": reading ring %s of user %s\n", name, owner->pw_name);
+    } else {
+        printf(PROGRAM ": reading ring %s of user %u\n", name, info.owner);
+    }
+    fflush(stdout);
+}
+
 static int follow(struct session *session)
 {
     const struct options *options = session->options;
-    const int error = whisker_reader_attach(options->ring, (int)options->wait_s * 1000, &session->reader);
+    const int error =
+        whisker_reader_attach_owned(options->ring, options->owner, (int)options->wait_s * 1000, &session->reader);
     if (error) {
-        return cli_fail(PROGRAM, options->ring, error);
+        return cli_fail_ring(PROGRAM, options->ring, error);
     }
+    print_ring(session->reader, options->ring);
     if (follower_open(&session->follower, options->socket, "log") != 0) {
         fprintf(stderr, PROGRAM ": %s: %s; start the simulation with this --socket\n", options->socket,
                 strerror(errno));
@@ -219,7 +244,8 @@ static int follow(struct session *session)
     if (session->tally.received > 0) {
         follower_taken(&session->follower, session->tally.last_tick);
     }
-    return end == WHISKER_ERROR_WRITER_DEAD ? cli_fail(PROGRAM, options->ring, end) : CLI_OK;
+    const bool ended_well = end == WHISKER_OK || end == WHISKER_ERROR_CLOSED || end == WHISKER_ERROR_RESTARTED;
+    return ended_well ? CLI_OK : cli_fail_ring(PROGRAM, options->ring, end);
 }
 
 static int log_ring(struct session *session)
@@ -244,7 +270,7 @@ static int log_ring(struct session *session)
 
 int main(int argc, char **argv)
 {
-    struct options options = {.lanes = WHISKER_FRAME_LANES, .wait_s = 10};
+    struct options options = {.lanes = WHISKER_FRAME_LANES, .wait_s = 10, .owner = WHISKER_RING_NO_OWNER};
     const int parsed = parse(argc, argv, &options);
     if (parsed >= 0) {
         return parsed;

@@ -1,4 +1,5 @@
 #include <stdlib.h>
+#include <string.h>
 
 #include "ring_internal.h"
 #include "ring_time.h"
@@ -7,22 +8,12 @@
 /* How often attach looks for a ring that is not there yet. */
 #define ATTACH_MS 5
 
-int ring_map_living(const char *path, struct ring_map *map)
-{
-    const int error = ring_map_existing(path, map);
-    if (!error && !ring_file_is_locked(map->fd, RING_LOCK_WRITER)) {
-        ring_unmap(map);
-        return WHISKER_ERROR_WRITER_DEAD;
-    }
-    return error;
-}
-
 /* Waits for a ring to come up: one that is missing, or whose writer is dead, may be made anew at any time. */
-static int map_awaited(const char *path, int timeout_ms, struct ring_map *map)
+static int find_awaited(const char *name, uid_t named, int timeout_ms, struct ring_found *found)
 {
     const int64_t started = timeout_ms > 0 ? ring_now_ms() : 0;
     for (;;) {
-        const int error = ring_map_living(path, map);
+        const int error = ring_find(name, named, found);
         if (error != WHISKER_ERROR_RING_MISSING && error != WHISKER_ERROR_WRITER_DEAD) {
             return error;
         }
@@ -34,11 +25,11 @@ static int map_awaited(const char *path, int timeout_ms, struct ring_map *map)
     }
 }
 
-/* The oldest frame that is still whole. */
+/* The oldest frame that is still whole. A claim that was not counted is no place to begin: peek says what is wrong. */
 static uint64_t oldest(const struct ring_map *map)
 {
     const uint64_t claim = ring_load_acquire(&map->header->claim);
-    return claim > map->capacity ? claim - map->capacity : 0;
+    return claim > map->capacity && claim <= RING_COUNT_MAX ? claim - map->capacity : 0;
 }
 
 static void start_reading(struct whisker_reader *reader)
@@ -51,37 +42,54 @@ static void start_reading(struct whisker_reader *reader)
     reader->in_haste = false;
 }
 
-int whisker_reader_attach(const char *name, int timeout_ms, struct whisker_reader **reader)
+/* Takes what was found in place of what the reader has; on an error that stays. */
+static int attach(struct whisker_reader *reader, int timeout_ms)
 {
-    *reader = NULL;
-    struct whisker_reader *made = calloc(1, sizeof *made);
-    if (!made) {
-        return WHISKER_ERROR_MEMORY;
-    }
-    int error = ring_path(name, made->path);
-    if (!error) {
-        error = map_awaited(made->path, timeout_ms, &made->map);
-    }
-    if (error) {
-        free(made);
-        return error;
-    }
-    start_reading(made);
-    *reader = made;
-    return WHISKER_OK;
-}
-
-int whisker_reader_reattach(struct whisker_reader *reader, int timeout_ms)
-{
+    struct ring_found found;
     struct ring_map map;
-    const int error = map_awaited(reader->path, timeout_ms, &map);
+    int error = find_awaited(reader->name, reader->named, timeout_ms, &found);
+    error = error ? error : ring_map(found.fd, found.capacity, false, &map);
     if (error) {
         return error;
     }
     ring_unmap(&reader->map);
     reader->map = map;
+    reader->owner = found.file.st_uid;
     start_reading(reader);
     return WHISKER_OK;
+}
+
+int whisker_reader_attach_owned(const char *name, uint32_t owner, int timeout_ms, struct whisker_reader **reader)
+{
+    *reader = NULL;
+    char path[RING_PATH_BYTES];
+    int error = ring_path(name, RING_PLACE_SHARED, path);
+    if (error) {
+        return error;
+    }
+    struct whisker_reader *made = calloc(1, sizeof *made);
+    if (!made) {
+        return WHISKER_ERROR_MEMORY;
+    }
+    strcpy(made->name, name); /* ring_path has measured it */
+    made->named = owner;
+    error = attach(made, timeout_ms);
+    if (error) {
+        free(made);
+        return error;
+    }
+    *reader = made;
+    return WHISKER_OK;
+}
+
+int whisker_reader_attach(const char *name, int timeout_ms, struct whisker_reader **reader)
+{
+    return whisker_reader_attach_owned(name, WHISKER_RING_NO_OWNER, timeout_ms, reader);
+}
+
+int whisker_reader_reattach(struct whisker_reader *reader, int timeout_ms)
+{
+    return attach(reader, timeout_ms);
 }
 
 void whisker_reader_detach(struct whisker_reader *reader)

@@ -16,40 +16,29 @@
 /* Whoever has a name's lock needs microseconds; after this many milliseconds it is stopped, not slow. */
 #define NAMING_TRIES_MS 2000
 
-int ring_path(const char *name, char path[RING_PATH_BYTES])
-{
-    const size_t length = name ? strlen(name) : 0;
-    if (length == 0 || length > RING_NAME_MAX || strchr(name, '/') || name[0] == '.') {
-        return WHISKER_ERROR_RING_NAME;
-    }
-    snprintf(path, RING_PATH_BYTES, RING_DIRECTORY "/%s", name);
-    return WHISKER_OK;
-}
-
 /* Why a file of the shared directory cannot be had, by errno. */
 static int refusal(void)
 {
     return errno == EACCES || errno == EPERM ? WHISKER_ERROR_RING_ACCESS : WHISKER_ERROR_SYSTEM;
 }
 
-int ring_file_open(const char *path, int *fd)
+int ring_file_open(const char *path, int *fd, struct stat *file)
 {
-    struct stat file;
     *fd = open(path, O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
     if (*fd < 0) {
         return errno == ENOENT ? WHISKER_ERROR_RING_MISSING : errno == ELOOP ? WHISKER_ERROR_RING_LAYOUT : refusal();
     }
-    if (fstat(*fd, &file) != 0 || !S_ISREG(file.st_mode)) {
+    if (fstat(*fd, file) != 0 || !S_ISREG(file->st_mode)) {
         close(*fd);
         return WHISKER_ERROR_RING_LAYOUT;
     }
     return WHISKER_OK;
 }
 
-/* Memory is allotted here: a full /dev/shm shall fail now and not kill the writer at its first frame. */
-int ring_file_make(size_t bytes, int *fd)
+/* Memory is allotted here: a full directory shall fail now and not kill the writer at its first frame. */
+int ring_file_make(const char *directory, size_t bytes, int *fd)
 {
-    *fd = open(RING_DIRECTORY, O_TMPFILE | O_RDWR | O_CLOEXEC, READABLE_BY_ALL);
+    *fd = open(directory, O_TMPFILE | O_RDWR | O_CLOEXEC, READABLE_BY_ALL);
     if (*fd < 0) {
         return WHISKER_ERROR_SYSTEM;
     }
@@ -79,11 +68,15 @@ bool ring_file_is_locked(int fd, enum ring_lock lock)
     return fcntl(fd, F_OFD_GETLK, &found) == 0 && found.l_type != F_UNLCK;
 }
 
+bool ring_file_is_same(const struct stat *a, const struct stat *b)
+{
+    return a->st_dev == b->st_dev && a->st_ino == b->st_ino;
+}
+
 bool ring_file_is_named(int fd, const char *path)
 {
     struct stat mine, named;
-    return fstat(fd, &mine) == 0 && lstat(path, &named) == 0 && mine.st_dev == named.st_dev &&
-           mine.st_ino == named.st_ino;
+    return fstat(fd, &mine) == 0 && lstat(path, &named) == 0 && ring_file_is_same(&mine, &named);
 }
 
 /* Opens the lock of a name, a file that only its owner can lock: any reader could hold a lock of the ring's. */
@@ -101,16 +94,17 @@ static int open_naming_lock(const char *lock_path)
 }
 
 /* Beside the ring's name, with a dot so that no ring can have it. */
-static void naming_lock_path(const char *path, char lock_path[RING_PATH_BYTES])
+void ring_file_lock_path(const char *path, char lock_path[RING_PATH_BYTES])
 {
-    snprintf(lock_path, RING_PATH_BYTES, RING_DIRECTORY "/.%s.lock", path + sizeof RING_DIRECTORY);
+    const char *name = strrchr(path, '/') + 1;
+    snprintf(lock_path, RING_PATH_BYTES, "%.*s.%s.lock", (int)(name - path), path, name);
 }
 
 /* Only one process at a time changes what a name stands for. */
 static int begin_naming(const char *path, int *lock)
 {
     char lock_path[RING_PATH_BYTES];
-    naming_lock_path(path, lock_path);
+    ring_file_lock_path(path, lock_path);
     for (int tries = 0; tries < NAMING_TRIES_MS; tries++) {
         *lock = open_naming_lock(lock_path);
         if (*lock < 0) {
@@ -128,7 +122,7 @@ static int begin_naming(const char *path, int *lock)
 static void end_naming(const char *path, int lock)
 {
     char lock_path[RING_PATH_BYTES];
-    naming_lock_path(path, lock_path);
+    ring_file_lock_path(path, lock_path);
     unlink(lock_path);
     close(lock);
 }
@@ -146,7 +140,8 @@ static int check_stale(int fd)
 static int remove_stale(const char *path)
 {
     int fd;
-    int error = ring_file_open(path, &fd);
+    struct stat file;
+    int error = ring_file_open(path, &fd, &file);
     if (error) {
         return error;
     }

@@ -4,10 +4,9 @@
 
 #include <stdbool.h>
 #include <stddef.h>
+#include <sys/stat.h>
 
-#define RING_DIRECTORY "/dev/shm" /* where shm_open keeps its names */
-#define RING_NAME_MAX 200
-#define RING_PATH_BYTES 256
+#include "ring_place.h"
 
 /* Bytes of the file that are locked (open file description locks, which end with whoever holds them). */
 enum ring_lock {
@@ -15,15 +14,12 @@ enum ring_lock {
     RING_LOCK_WAITING = 1, /* for reading: readers wait, so publications must wake them */
 };
 
-/* The path of a ring's file, or RING_NAME. */
-int ring_path(const char *name, char path[RING_PATH_BYTES]);
+/* Opens an existing file for reading, without waiting and without following links, and says what it is. RING_MISSING,
+ * RING_LAYOUT (no regular file), RING_ACCESS, SYSTEM. */
+int ring_file_open(const char *path, int *fd, struct stat *file);
 
-/* Opens an existing file for reading, without waiting and without following links. RING_MISSING, RING_LAYOUT (no
- * regular file), SYSTEM. */
-int ring_file_open(const char *path, int *fd);
-
-/* Makes a file without a name, `bytes` long and all allotted. MEMORY: there is no room. SYSTEM. */
-int ring_file_make(size_t bytes, int *fd);
+/* Makes a file without a name in this directory, `bytes` long and all allotted. MEMORY: there is no room. SYSTEM. */
+int ring_file_make(const char *directory, size_t bytes, int *fd);
 
 /* Takes the lock. False: another one has it. */
 bool ring_file_lock(int fd, enum ring_lock lock);
@@ -34,14 +30,20 @@ bool ring_file_is_locked(int fd, enum ring_lock lock);
 /* Whether the file still has this name. */
 bool ring_file_is_named(int fd, const char *path);
 
+/* Whether these are one file. */
+bool ring_file_is_same(const struct stat *a, const struct stat *b);
+
+/* The path of the lock that whoever changes what this path stands for must have. */
+void ring_file_lock_path(const char *path, char lock_path[RING_PATH_BYTES]);
+
 /* Gives the complete file its name, in place of a ring whose writer is dead. RING_BUSY (its writer lives), RING_LAYOUT
- * (something else has the name), SYSTEM. */
+ * (something else has the name), RING_ACCESS, SYSTEM. */
 int ring_file_name(int fd, const char *path);
 
 /* Removes the name if it is this file's. */
 void ring_file_unname(int fd, const char *path);
 
-/* Removes the ring of this name if its writer is dead. RING_MISSING, RING_BUSY, RING_LAYOUT, SYSTEM. */
+/* Removes the ring of this path if its writer is dead. RING_MISSING, RING_BUSY, RING_LAYOUT, RING_ACCESS, SYSTEM. */
 int ring_file_remove_stale(const char *path);
 
 #endif

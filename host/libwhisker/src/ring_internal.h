@@ -4,6 +4,7 @@
 
 #include <time.h>
 
+#include "ring_find.h"
 #include "ring_map.h"
 #include "whisker/ring.h"
 
@@ -18,7 +19,9 @@ struct whisker_ring {
 
 struct whisker_reader {
     struct ring_map map;
-    char path[RING_PATH_BYTES];
+    char name[RING_NAME_MAX + 1];
+    uid_t owner; /* whose ring it is */
+    uid_t named; /* whose rings are believed beside the usual ones, or WHISKER_RING_NO_OWNER */
     uint64_t generation;
     uint64_t position;
     uint64_t peeked; /* frames the last peek gave */
@@ -31,8 +34,5 @@ struct whisker_reader {
     bool has_sequence;
     bool in_haste; /* the last wait had not to sleep */
 };
-
-/* Maps the ring at this path, or WRITER_DEAD and what ring_map_existing may return. */
-int ring_map_living(const char *path, struct ring_map *map);
 
 #endif

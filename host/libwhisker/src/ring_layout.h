@@ -17,7 +17,7 @@
  *      512   456  stats: version, two copies of struct whisker_daemon_stats
  *
  * Frame i lies at index i mod capacity. The protocol, and why each fence is where it is: docs/ring.md.
- * Writer: claim >= head + n | fence | write n frames | head += n, release | signal, wake.
+ * Writer: claim >= head + n, release | fence | write n frames | head += n, release | signal, wake.
  * Reader: head, acquire | use frames below it | fence | claim: frame i was intact if claim - i <= capacity.
  * Locks of the file: ring_file.h.
  */
@@ -36,6 +36,8 @@
 #define RING_LAYOUT_VERSION 2u
 #define RING_CAPACITY_MIN 64u
 #define RING_CAPACITY_MAX (UINT32_C(1) << 20)
+/* What no count of frames reaches: a head or a claim above it was not counted. */
+#define RING_COUNT_MAX ((uint64_t)INT64_MAX)
 /* Claims are made in steps of a capacity's 64th: the line they are in then seldom moves between writer and readers. */
 #define RING_CLAIM_PARTS 64u
 

@@ -7,6 +7,8 @@
 #include "ring_guard.h"
 #include "whisker/errors.h"
 
+#define STAT_BLOCK_BYTES 512 /* of st_blocks, whatever the file system's are (stat(2)) */
+
 static size_t page_bytes(void)
 {
     return (size_t)sysconf(_SC_PAGESIZE);
@@ -62,7 +64,7 @@ void ring_unmap(struct ring_map *map)
     map->header = NULL;
 }
 
-static int check_header(const struct ring_header *header, off_t file_bytes)
+static int check_header(const struct ring_header *header, const struct stat *file)
 {
     const uint32_t frames = header->capacity;
     if (header->magic != RING_MAGIC) {
@@ -74,38 +76,26 @@ static int check_header(const struct ring_header *header, off_t file_bytes)
     const bool sizes_fit = header->header_bytes == page_bytes() &&
                            header->frame_bytes == sizeof(struct whisker_frame) && frames >= RING_CAPACITY_MIN &&
                            frames <= RING_CAPACITY_MAX && (frames & (frames - 1)) == 0 &&
-                           (uint64_t)file_bytes == ring_file_bytes(frames);
-    return sizes_fit ? WHISKER_OK : WHISKER_ERROR_RING_LAYOUT;
+                           (uint64_t)file->st_size == ring_file_bytes(frames);
+    const bool counts_fit = header->head <= RING_COUNT_MAX && header->claim <= RING_COUNT_MAX;
+    return sizes_fit && counts_fit ? WHISKER_OK : WHISKER_ERROR_RING_LAYOUT;
+}
+
+/* Mapping populates, and pages that the file lacks would be allotted for that: a small file with holes would cost its
+ * readers the largest ring's memory. */
+static bool has_holes(const struct stat *file)
+{
+    return (uint64_t)file->st_blocks * STAT_BLOCK_BYTES < (uint64_t)file->st_size;
 }
 
 /* Read, not mapped: reading a file that becomes shorter meanwhile only gives less. */
-static int read_capacity(int fd, uint32_t *capacity)
+int ring_map_check(int fd, const struct stat *file, uint32_t *capacity)
 {
-    struct stat file;
     struct ring_header header;
-    if (fstat(fd, &file) != 0) {
-        return WHISKER_ERROR_SYSTEM;
-    }
     if (pread(fd, &header, sizeof header, 0) != sizeof header) {
         return WHISKER_ERROR_RING_LAYOUT;
     }
     *capacity = header.capacity;
-    return check_header(&header, file.st_size);
-}
-
-int ring_map_existing(const char *path, struct ring_map *map)
-{
-    map->header = NULL;
-    int fd;
-    int error = ring_file_open(path, &fd);
-    if (error) {
-        return error;
-    }
-    uint32_t capacity;
-    error = read_capacity(fd, &capacity);
-    if (error) {
-        close(fd);
-        return error;
-    }
-    return ring_map(fd, capacity, false, map);
+    const int error = check_header(&header, file);
+    return !error && has_holes(file) ? WHISKER_ERROR_RING_LAYOUT : error;
 }

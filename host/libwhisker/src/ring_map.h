@@ -19,8 +19,10 @@ size_t ring_file_bytes(uint32_t capacity);
 /* Maps `capacity` frames of fd twice. Takes fd over: it is closed by ring_unmap, and on failure. */
 int ring_map(int fd, uint32_t capacity, bool writable, struct ring_map *map);
 
-/* Opens and maps an existing ring for reading and checks its header. */
-int ring_map_existing(const char *path, struct ring_map *map);
+/* Checks that the open file is a ring with all its memory, and reads its capacity. Returns 0, RING_LAYOUT,
+ * RING_VERSION.
+ */
+int ring_map_check(int fd, const struct stat *file, uint32_t *capacity);
 
 void ring_unmap(struct ring_map *map);
 

@@ -14,18 +14,22 @@ static const struct whisker_frame *place(const struct whisker_reader *reader, ui
     return &reader->map.frames[index & (reader->map.capacity - 1)];
 }
 
-/* Half a ring behind the writer, so that the next overrun is not at once. */
+/* Half a ring behind the writer, so that the next overrun is not at once. A writer that has overtaken this reader is
+ * further than that: a head that is not, or that went back, was not counted, and nothing is to be had of such a ring.
+ */
 static int skip_lost(struct whisker_reader *reader)
 {
-    const uint64_t head = ring_load_acquire(&reader->map.header->head);
-    const uint64_t target = head - reader->map.capacity / 2;
-    if (head > reader->map.capacity / 2 && target > reader->position) {
-        reader->frames_overrun += target - reader->position;
-        reader->position = target;
+    ring_fence_after_reading(); /* the head is not older than the claim that told of the overrun */
+    const uint64_t ahead = ring_load_acquire(&reader->map.header->head) - reader->position;
+    const uint64_t half = reader->map.capacity / 2;
+    reader->peeked = 0;
+    if (ahead > RING_COUNT_MAX || ahead <= half) {
+        return WHISKER_ERROR_RING_LOST;
     }
+    reader->frames_overrun += ahead - half;
+    reader->position += ahead - half;
     reader->overruns++;
     reader->has_sequence = false;
-    reader->peeked = 0;
     return WHISKER_ERROR_OVERRUN;
 }
 
@@ -87,7 +91,7 @@ int whisker_reader_window(struct whisker_reader *reader, size_t count, const str
         return WHISKER_ERROR_ARGUMENT;
     }
     const uint64_t head = ring_load_acquire(&reader->map.header->head);
-    if (!ring_is_whole(&reader->map)) {
+    if (!ring_is_whole(&reader->map) || head > RING_COUNT_MAX) {
         return WHISKER_ERROR_RING_LOST;
     }
     const size_t given = head < count ? (size_t)head : count;
@@ -108,7 +112,7 @@ int whisker_reader_intact(const struct whisker_reader *reader)
 void whisker_reader_seek_latest(struct whisker_reader *reader, size_t count)
 {
     const uint64_t head = ring_load_acquire(&reader->map.header->head);
-    if (head > count && head - count > reader->position) {
+    if (head > count && head <= RING_COUNT_MAX && head - count > reader->position) {
         reader->position = head - count;
         reader->has_sequence = false;
     }
@@ -126,6 +130,7 @@ void whisker_reader_info(const struct whisker_reader *reader, struct whisker_rea
         .frames_missing = reader->frames_missing,
         .capacity = reader->map.capacity,
         .writer_pid = reader->map.header->writer_pid,
+        .owner = reader->owner,
     };
 }
 

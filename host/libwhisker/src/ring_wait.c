@@ -1,3 +1,5 @@
+#include <unistd.h>
+
 #include "futex.h"
 #include "ring_internal.h"
 #include "ring_time.h"
@@ -18,8 +20,8 @@ static int look(const struct whisker_reader *reader)
 {
     const uint64_t state = ring_load_acquire(&reader->map.header->state);
     const uint64_t head = ring_load_acquire(&reader->map.header->head);
-    if (!ring_is_whole(&reader->map)) {
-        return WHISKER_ERROR_RING_LOST;
+    if (!ring_is_whole(&reader->map) || head - reader->position > RING_COUNT_MAX) {
+        return WHISKER_ERROR_RING_LOST; /* a head behind what was read, or beyond any count */
     }
     if (head != reader->position) {
         return WHISKER_OK;
@@ -41,12 +43,14 @@ static int look_closely(const struct whisker_reader *reader)
 /* An ended ring: does its name belong to a new one? */
 static int ended(const struct whisker_reader *reader, int error)
 {
-    struct ring_map other;
-    if (ring_file_is_named(reader->map.fd, reader->path) || ring_map_living(reader->path, &other) != WHISKER_OK) {
+    struct ring_found other;
+    struct stat mine;
+    if (ring_find(reader->name, reader->named, &other) != WHISKER_OK) {
         return error;
     }
-    ring_unmap(&other);
-    return WHISKER_ERROR_RESTARTED;
+    close(other.fd);
+    const bool is_mine = fstat(reader->map.fd, &mine) == 0 && ring_file_is_same(&mine, &other.file);
+    return is_mine ? error : WHISKER_ERROR_RESTARTED;
 }
 
 /* Lets the writer know, by a lock that ends with this process, that there is someone to wake. */

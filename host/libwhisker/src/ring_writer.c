@@ -28,10 +28,10 @@ static void fill_header(const struct ring_map *map)
 }
 
 /* The file gets its name when nothing is missing, so there is no ring half made. */
-static int make_ring(const char *path, uint32_t capacity, struct ring_map *map)
+static int make_ring(const char *path, const char *directory, uint32_t capacity, struct ring_map *map)
 {
     int fd;
-    int error = ring_file_make(ring_file_bytes(capacity), &fd);
+    int error = ring_file_make(directory, ring_file_bytes(capacity), &fd);
     if (error) {
         return error;
     }
@@ -47,26 +47,61 @@ static int make_ring(const char *path, uint32_t capacity, struct ring_map *map)
     return error;
 }
 
-int whisker_ring_create(const char *name, uint32_t capacity, struct whisker_ring **ring)
+/* The place of this directory, or RING_PLACES. */
+static enum ring_place place_of(const char *directory)
 {
+    enum ring_place place = 0;
+    while (place < RING_PLACES && strcmp(directory, ring_directories[place]) != 0) {
+        place++;
+    }
+    return place;
+}
+
+/* Whether readers would find another ring of this name first. */
+static bool is_hidden(const char *name, enum ring_place place)
+{
+    char path[RING_PATH_BYTES];
+    bool hidden = false;
+    for (enum ring_place before = 0; before < place; before++) {
+        hidden |= ring_path(name, before, path) == WHISKER_OK && ring_lives(path);
+    }
+    return hidden;
+}
+
+static int create_at(enum ring_place place, const char *name, uint32_t capacity, struct whisker_ring *ring)
+{
+    const int error = ring_path(name, place, ring->path);
+    if (error) {
+        return error;
+    }
+    return is_hidden(name, place) ? WHISKER_ERROR_RING_BUSY
+                                  : make_ring(ring->path, ring_directories[place], capacity, &ring->map);
+}
+
+int whisker_ring_create_in(const char *directory, const char *name, uint32_t capacity, struct whisker_ring **ring)
+{
+    const enum ring_place place = place_of(directory);
     *ring = NULL;
-    if (capacity < RING_CAPACITY_MIN || capacity > RING_CAPACITY_MAX || (capacity & (capacity - 1)) != 0) {
+    if (place == RING_PLACES || capacity < RING_CAPACITY_MIN || capacity > RING_CAPACITY_MAX ||
+        (capacity & (capacity - 1)) != 0) {
         return WHISKER_ERROR_ARGUMENT;
     }
     struct whisker_ring *made = calloc(1, sizeof *made);
     if (!made) {
         return WHISKER_ERROR_MEMORY;
     }
-    int error = ring_path(name, made->path);
-    if (!error) {
-        error = make_ring(made->path, capacity, &made->map);
-    }
+    const int error = create_at(place, name, capacity, made);
     if (error) {
         free(made);
         return error;
     }
     *ring = made;
     return WHISKER_OK;
+}
+
+int whisker_ring_create(const char *name, uint32_t capacity, struct whisker_ring **ring)
+{
+    return whisker_ring_create_in(ring_directories[RING_PLACE_SHARED], name, capacity, ring);
 }
 
 /* Where the next frames go, as one array; readers know from now on that these places change. NULL: too many. */
@@ -78,7 +113,7 @@ static struct whisker_frame *reserve(struct whisker_ring *ring, size_t count)
     if (ring->head + count > ring->claim) {
         const uint64_t step = ring->map.capacity / RING_CLAIM_PARTS;
         ring->claim = (ring->head + count + step - 1) / step * step;
-        ring_store(&ring->map.header->claim, ring->claim);
+        ring_store_release(&ring->map.header->claim, ring->claim); /* who sees it sees the head before it, too */
     }
     ring_fence_before_writing();
     return &ring->map.frames[ring->head & (ring->map.capacity - 1)];

@@ -27,9 +27,9 @@ static void prepare(void)
 {
     bytes = ring_file_bytes(CAPACITY);
     snprintf(name, sizeof name, "whisker-fuzz-%d", (int)getpid());
-    snprintf(path, sizeof path, RING_DIRECTORY "/%s", name);
+    snprintf(path, sizeof path, WHISKER_RING_DIRECTORY "/%s", name);
     file = open(path, O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
-    if (file < 0 || ftruncate(file, (off_t)bytes) != 0) {
+    if (file < 0 || posix_fallocate(file, 0, (off_t)bytes) != 0) {
         abort();
     }
     memory = mmap(NULL, bytes, PROT_READ | PROT_WRITE, MAP_SHARED, file, 0);

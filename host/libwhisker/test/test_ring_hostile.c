@@ -23,7 +23,7 @@
 static const char *path(void)
 {
     static char made[128];
-    snprintf(made, sizeof made, RING_DIRECTORY "/%s", test_ring_name());
+    snprintf(made, sizeof made, WHISKER_RING_DIRECTORY "/%s", test_ring_name());
     return made;
 }
 
@@ -46,20 +46,31 @@ static void nonsense_in_the_header_cannot_lead_a_reader_astray(void **state)
         assert_true(frames >= f->reader->map.frames && frames < f->reader->map.frames + TEST_CAPACITY);
         whisker_reader_advance(f->reader, count);
         const int given = whisker_reader_window(f->reader, TEST_CAPACITY - 1, &frames);
-        assert_in_range(given, 0, TEST_CAPACITY - 1);
+        if (values[i % VALUES] > INT64_MAX) {
+            assert_int_equal(given, WHISKER_ERROR_RING_LOST);
+        } else {
+            assert_in_range(given, 0, TEST_CAPACITY - 1);
+        }
         assert_true(frames >= f->reader->map.frames && frames < f->reader->map.frames + TEST_CAPACITY);
         whisker_reader_intact(f->reader);
         whisker_reader_wait(f->reader, 0);
     }
 }
 
-/* Makes the shared memory of the test's name from these bytes, `size` long, and tries to attach. */
-static int attach_to(const void *bytes, size_t count, size_t size)
+/* Makes the shared memory of the test's name from these bytes, `size` long and all allotted. */
+static int make_memory(const void *bytes, size_t count, size_t size)
 {
     const int fd = open(path(), O_RDWR | O_CREAT | O_EXCL, 0600);
     assert_true(fd >= 0);
-    assert_int_equal(ftruncate(fd, (off_t)size), 0);
+    assert_int_equal(size > 0 ? posix_fallocate(fd, 0, (off_t)size) : 0, 0);
     assert_int_equal(pwrite(fd, bytes, count, 0), count);
+    return fd;
+}
+
+/* Makes that memory and tries to attach. */
+static int attach_to(const void *bytes, size_t count, size_t size)
+{
+    const int fd = make_memory(bytes, count, size);
     struct whisker_reader *reader;
     const int error = whisker_reader_attach(test_ring_name(), 0, &reader);
     assert_null(reader);
@@ -68,15 +79,20 @@ static int attach_to(const void *bytes, size_t count, size_t size)
     return error;
 }
 
+static struct ring_header good_header(uint32_t capacity)
+{
+    return (struct ring_header){.magic = RING_MAGIC,
+                                .version = RING_LAYOUT_VERSION,
+                                .header_bytes = (uint32_t)sysconf(_SC_PAGESIZE),
+                                .frame_bytes = sizeof(struct whisker_frame),
+                                .capacity = capacity};
+}
+
 static void memory_that_is_no_ring_is_refused(void **state)
 {
     (void)state;
     const size_t page = (size_t)sysconf(_SC_PAGESIZE), size = page + TEST_CAPACITY * sizeof(struct whisker_frame);
-    struct ring_header good = {.magic = RING_MAGIC,
-                               .version = RING_LAYOUT_VERSION,
-                               .header_bytes = (uint32_t)page,
-                               .frame_bytes = sizeof(struct whisker_frame),
-                               .capacity = TEST_CAPACITY};
+    const struct ring_header good = good_header(TEST_CAPACITY);
     assert_int_equal(attach_to(&good, sizeof good, size), WHISKER_ERROR_WRITER_DEAD); /* good, but nobody writes */
     assert_int_equal(attach_to("", 0, 0), WHISKER_ERROR_RING_LAYOUT);
     assert_int_equal(attach_to("", 0, size), WHISKER_ERROR_RING_LAYOUT);
@@ -110,6 +126,121 @@ static void what_has_the_name_and_is_no_file_is_refused_at_once(void **state)
     assert_int_equal(whisker_reader_attach(test_ring_name(), 0, &reader), WHISKER_ERROR_RING_LAYOUT);
     assert_int_equal(whisker_ring_create(test_ring_name(), TEST_CAPACITY, &ring), WHISKER_ERROR_RING_LAYOUT);
     unlink(path());
+}
+
+/* A living ring that a link leads to: whoever makes the link would choose what a reader reads. */
+static void link_to_a_living_ring_is_not_followed(void **state)
+{
+    (void)state;
+    struct whisker_ring *ring;
+    struct whisker_reader *reader;
+    char target[64], target_path[128];
+    snprintf(target, sizeof target, "%s-target", test_ring_name());
+    snprintf(target_path, sizeof target_path, WHISKER_RING_DIRECTORY "/%s", target);
+    assert_int_equal(whisker_ring_create(target, TEST_CAPACITY, &ring), 0);
+    assert_int_equal(symlink(target_path, path()), 0);
+    assert_int_equal(whisker_reader_attach(test_ring_name(), 0, &reader), WHISKER_ERROR_RING_LAYOUT);
+    unlink(path());
+    assert_int_equal(whisker_reader_attach(target, 0, &reader), 0);
+    whisker_reader_detach(reader);
+    whisker_ring_close(ring);
+}
+
+/* A file with holes as large as the largest ring: a reader that mapped it would pay for memory that the file lacks. */
+static void file_with_holes_costs_its_reader_nothing(void **state)
+{
+    (void)state;
+    const struct ring_header header = good_header(RING_CAPACITY_MAX);
+    struct whisker_reader *reader;
+    struct stat file;
+    const int fd = make_memory(&header, sizeof header, header.header_bytes);
+    assert_int_equal(ftruncate(fd, (off_t)ring_file_bytes(RING_CAPACITY_MAX)), 0);
+    assert_true(ring_file_lock(fd, RING_LOCK_WRITER));
+    assert_int_equal(whisker_reader_attach(test_ring_name(), 0, &reader), WHISKER_ERROR_RING_LAYOUT);
+    assert_int_equal(fstat(fd, &file), 0);
+    assert_in_range(file.st_blocks * 512, 1, header.header_bytes);
+    close(fd);
+    unlink(path());
+}
+
+/* Reads as whisker-log does, until nothing comes or the ring gives nothing more. Returns how that ended; looks are
+ * counted, so that a reader that makes no progress fails instead of reading for ever. */
+static int read_to_the_end(struct whisker_reader *reader)
+{
+    const struct whisker_frame *frames;
+    size_t count;
+    for (int looks = 0; looks < 100; looks++) {
+        int error = whisker_reader_wait(reader, 0);
+        error = error ? error : whisker_reader_peek(reader, &frames, &count);
+        error = error ? error : whisker_reader_advance(reader, count);
+        if (error && error != WHISKER_ERROR_OVERRUN) {
+            return error;
+        }
+    }
+    return WHISKER_OK;
+}
+
+/* No writer counts so: the reader says so once instead of telling overruns for ever. */
+static void counts_that_cannot_be_end_a_reader(void **state)
+{
+    const struct test_ring_pair *f = *state;
+    static const struct {
+        uint64_t head, claim;
+        int end;
+    } cases[] = {
+        {UINT64_MAX, 0, WHISKER_ERROR_RING_LOST},
+        {UINT64_MAX, UINT64_MAX, WHISKER_ERROR_RING_LOST},
+        {(uint64_t)INT64_MAX + 1, (uint64_t)INT64_MAX + 1, WHISKER_ERROR_RING_LOST},
+        {1000000, 0, WHISKER_ERROR_RING_LOST},         /* never claimed */
+        {1000000, INT64_MAX, WHISKER_ERROR_RING_LOST}, /* claimed beyond what one publication may */
+        {1000000, 1000000, WHISKER_ERROR_TIMEOUT},     /* a reader that was late, and has caught up */
+        {1000100, 1000100, WHISKER_ERROR_TIMEOUT},
+        {1000050, 1000100, WHISKER_ERROR_RING_LOST}, /* gone back */
+    };
+    struct ring_header *header = f->ring->map.header;
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        ring_store(&header->head, cases[i].head);
+        ring_store(&header->claim, cases[i].claim);
+        assert_int_equal(read_to_the_end(f->reader), cases[i].end);
+    }
+}
+
+static void counts_that_cannot_be_are_no_ring_to_a_new_reader(void **state)
+{
+    (void)state;
+    const size_t size = ring_file_bytes(TEST_CAPACITY);
+    struct ring_header bad = good_header(TEST_CAPACITY);
+    ring_store(&bad.head, UINT64_MAX);
+    assert_int_equal(attach_to(&bad, sizeof bad, size), WHISKER_ERROR_RING_LAYOUT);
+    bad = good_header(TEST_CAPACITY);
+    ring_store(&bad.claim, (uint64_t)INT64_MAX + 1);
+    assert_int_equal(attach_to(&bad, sizeof bad, size), WHISKER_ERROR_RING_LAYOUT);
+}
+
+/* Looks at the lock of the test's name at the moment when a writer must have it. */
+static struct stat lock_seen;
+int __real_linkat(int from, const char *old, int to, const char *new, int flags);
+int __wrap_linkat(int from, const char *old, int to, const char *new, int flags);
+int __wrap_linkat(int from, const char *old, int to, const char *new, int flags)
+{
+    char lock_path[RING_PATH_BYTES];
+    ring_file_lock_path(new, lock_path);
+    if (lstat(lock_path, &lock_seen) != 0) {
+        lock_seen = (struct stat){0};
+    }
+    return __real_linkat(from, old, to, new, flags);
+}
+
+/* Whoever can open it can hold every writer of the name up. */
+static void lock_of_a_name_is_its_owners_alone(void **state)
+{
+    (void)state;
+    struct whisker_ring *ring;
+    const mode_t before = umask(0);
+    assert_int_equal(whisker_ring_create(test_ring_name(), TEST_CAPACITY, &ring), 0);
+    umask(before);
+    assert_int_equal(lock_seen.st_mode, S_IFREG | S_IRUSR | S_IWUSR);
+    whisker_ring_close(ring);
 }
 
 static void file_of_another_program_is_not_replaced(void **state)
@@ -265,7 +396,7 @@ static int bus_error_elsewhere(void)
     struct whisker_ring *ring;
     OUTSIDE_ASSERT(whisker_ring_create(test_ring_name(), TEST_CAPACITY, &ring) == 0);
     unlink(path());
-    const int fd = open(RING_DIRECTORY, O_TMPFILE | O_RDWR, 0600);
+    const int fd = open(WHISKER_RING_DIRECTORY, O_TMPFILE | O_RDWR, 0600);
     const volatile char *nothing = mmap(NULL, 4096, PROT_READ, MAP_SHARED, fd, 0);
     return nothing[0];
 }
@@ -367,6 +498,11 @@ int main(int argc, char **argv)
         WITH_RING(nonsense_in_the_header_cannot_lead_a_reader_astray),
         cmocka_unit_test(memory_that_is_no_ring_is_refused),
         cmocka_unit_test(what_has_the_name_and_is_no_file_is_refused_at_once),
+        cmocka_unit_test(link_to_a_living_ring_is_not_followed),
+        cmocka_unit_test(file_with_holes_costs_its_reader_nothing),
+        WITH_RING(counts_that_cannot_be_end_a_reader),
+        cmocka_unit_test(counts_that_cannot_be_are_no_ring_to_a_new_reader),
+        cmocka_unit_test(lock_of_a_name_is_its_owners_alone),
         cmocka_unit_test(file_of_another_program_is_not_replaced),
         cmocka_unit_test(ring_of_another_user_is_told),
         cmocka_unit_test(locks_of_a_reader_hold_up_no_writer),

@@ -2,10 +2,12 @@
 
 import argparse
 import math
+import pwd
 from collections.abc import Callable
 
 from .errors import UserError
 
+NO_USER = 2**32 - 1  # as a user id: nobody's
 RING = "whisker"  # the name whiskerd's unit gives its ring
 
 
@@ -37,11 +39,23 @@ def plain(values: dict) -> dict:
 
 
 def add_ring(parser) -> None:
-    """--ring and --wait, for commands that read a ring."""
+    """--ring, --ring-owner and --wait, for commands that read a ring."""
     parser.add_argument("--ring", default=RING, metavar="NAME", help="the ring to read (default: %(default)s)")
+    text = "accept a ring of this user, too, not only root's, your own and the service's"
+    parser.add_argument("--ring-owner", type=user, metavar="USER", help=text)
     parser.add_argument(
         "--wait", type=seconds, default=0.0, metavar="S", help="wait so long for the ring to come up (0)"
     )
+
+
+def user(text: str) -> int:
+    """An argument's type: a user of this machine, by name or number; gives the id."""
+    try:
+        return pwd.getpwnam(text).pw_uid
+    except (KeyError, ValueError):
+        if text.isascii() and text.isdigit() and int(text) < NO_USER:
+            return int(text)
+    raise argparse.ArgumentTypeError(f"there is no user '{text}'; give a user's name or number")
 
 
 def whole_number(least: int, most: int | None = None) -> Callable[[str], int]:

@@ -28,9 +28,13 @@
     X(CLOSED, -27, "the writer closed the ring: end of stream", "none needed")                                         \
     X(WRITER_DEAD, -28, "the writer died without closing the ring", "start whiskerd again; see its log")               \
     X(RESTARTED, -29, "a new writer has made a new ring of this name", "attach again")                                 \
-    X(RING_LOST, -30, "another process has made the ring's file shorter", "start whiskerd again, attach again")        \
+    X(RING_LOST, -30, "another process has changed the ring's memory", "start whiskerd again, attach again")           \
     X(RING_ACCESS, -31, "this ring is another user's, who keeps it closed",                                            \
       "become that user, give its whiskerd the umask 022, or choose another --ring")                                   \
+    X(RING_OWNER, -32, "this ring is another user's, whom this reader was not told to trust",                          \
+      "name that user with --ring-owner, or choose another --ring")                                                    \
+    X(RING_WRITER, -33, "the process that this ring names as its writer does not hold the ring",                       \
+      "its writer may run in another container: stop it there, or choose another --ring")                              \
     X(DEVICE_MISSING, -40, "no bridge is connected", "plug it in; check its power and cable")                          \
     X(DEVICE_ACCESS, -41, "no permission to open the bridge", "install the udev rule, or ask an administrator")        \
     X(DEVICE_BUSY, -42, "another process uses the bridge", "stop the other whiskerd")                                  \

@@ -4,6 +4,10 @@
  * any window of frames is one array. Frames are used where they lie: peek, use, advance; advance tells whether the
  * writer overtook the reader meanwhile, in which case what was used must be thrown away.
  *
+ * Places and trust: the service's ring lies in a directory that only the service can write, every other ring where any
+ * user can make one; readers look in this order. A reader accepts a ring of root, of its own user, of the service's,
+ * and of the user that it is told to accept; another user's is refused unread.
+ *
  * Memory: a ring's owner can make its file shorter under everybody's feet. That ends no process: from the first attach
  * or create on, SIGBUS over a ring's memory is handled here (every other SIGBUS goes where it went before), the memory
  * reads as zeros, and the next call says RING_LOST.
@@ -21,9 +25,14 @@
 #include "whisker/frame.h"
 #include "whisker/stats.h"
 
+#define WHISKER_RING_SERVICE_DIRECTORY "/run/whiskerd" /* the RuntimeDirectory of whiskerd's unit */
+#define WHISKER_RING_SERVICE_USER "whisker"            /* its user; without such a user there is no service to trust */
+#define WHISKER_RING_DIRECTORY "/dev/shm"              /* everybody else's */
+
 #pragma GCC visibility push(default)
 /* cffi: begin */
-#define WHISKER_RING_FRAMES 8192 /* 4 s at 2 kHz; the default capacity */
+#define WHISKER_RING_NO_OWNER 4294967295U /* as a user id: nobody's */
+#define WHISKER_RING_FRAMES 8192          /* 4 s at 2 kHz; the default capacity */
 
 struct whisker_reader;
 
@@ -36,16 +45,20 @@ struct whisker_reader_info {
     uint64_t frames_overrun; /* frames this reader lost by it */
     uint64_t frames_missing; /* sequence numbers missing between frames of the ring: lost before it */
     uint32_t capacity;       /* frames */
-    uint32_t writer_pid;
+    uint32_t writer_pid;     /* as the writer says */
+    uint32_t owner;          /* user id: whose ring it is */
 };
 
 /*
  * Attaches to the ring `name` ("whisker", no slash), at its oldest frame. Waits up to timeout_ms for the ring to come
  * up (0: no waiting, negative: for ever). Returns 0 and the reader, or RING_NAME, RING_MISSING, RING_LAYOUT,
- * RING_VERSION, RING_ACCESS (another user's), WRITER_DEAD (a ring is there, its writer is not), SYSTEM, MEMORY; then
- * *reader is NULL.
+ * RING_VERSION, RING_OWNER (of a user who is not accepted), RING_ACCESS (unreadable), WRITER_DEAD (a ring is there, its
+ * writer is not), SYSTEM, MEMORY; then *reader is NULL. Waits for no ring of another user's.
  */
 int whisker_reader_attach(const char *name, int timeout_ms, struct whisker_reader **reader);
+
+/* As whisker_reader_attach; also accepts rings of the user with id `owner`. WHISKER_RING_NO_OWNER: no other user's. */
+int whisker_reader_attach_owned(const char *name, uint32_t owner, int timeout_ms, struct whisker_reader **reader);
 
 /* Lets go of the ring; NULL is allowed. */
 void whisker_reader_detach(struct whisker_reader *reader);
@@ -94,10 +107,13 @@ int whisker_reader_clock(const struct whisker_reader *reader, struct whisker_clo
 int whisker_reader_stats(const struct whisker_reader *reader, struct whisker_daemon_stats *stats);
 
 #define WHISKER_RING_NAME_BYTES 208
+#define WHISKER_RING_PATH_BYTES 512
+#define WHISKER_RING_LINE_BYTES 1536
 
 /* A ring found on this machine. */
 struct whisker_ring_entry {
     char name[WHISKER_RING_NAME_BYTES];
+    char path[WHISKER_RING_PATH_BYTES];
     uint64_t bytes;
     uint64_t published;  /* frames; 0 as the rest below when it has another version */
     uint64_t generation; /* as in struct whisker_reader_info */
@@ -105,14 +121,31 @@ struct whisker_ring_entry {
     uint32_t writer_pid;
     uint32_t owner;   /* user id */
     uint32_t version; /* of its layout */
-    int error;        /* 0: a reader can attach; WRITER_DEAD: left by a killed writer; RING_VERSION */
+    int error;        /* 0: a reader can attach; WRITER_DEAD: left by a killed writer; else as whisker_reader_attach */
 };
 
-/* Finds all rings, in no order. Fills in at most `room` entries; returns how many there are, or SYSTEM. */
+/* Finds all rings, those of the service first, else in no order. Fills in at most `room` entries; returns how many
+ * there are, or SYSTEM. */
 int whisker_ring_list(struct whisker_ring_entry *entries, size_t room);
 
-/* Removes a ring whose writer died; the next writer of its name does so, too. Returns 0, or RING_MISSING, RING_BUSY
- * (its writer lives), RING_LAYOUT (no ring), RING_NAME, RING_ACCESS (another user's), SYSTEM. */
+/*
+ * Says in one line what an error about the ring `name` means here and now: "text; remedy" of errors.h, with the file it
+ * is about, whose that is, and what to do about a file that another user left there. `room` bytes of `line` are enough
+ * if they are WHISKER_RING_LINE_BYTES; a longer line is cut.
+ */
+void whisker_ring_explain(const char *name, int error, char *line, size_t room);
+
+/*
+ * Sends a signal to the writer of the ring `name` that a reader would attach to. The ring only says which process its
+ * writer is; that process gets the signal only if it holds the writer's lock on this very file. Returns 0, or
+ * RING_NAME, RING_MISSING, RING_OWNER, RING_LAYOUT, RING_VERSION, WRITER_DEAD, RING_WRITER (no such process here),
+ * RING_ACCESS (it is another user's), SYSTEM.
+ */
+int whisker_ring_signal_writer(const char *name, int number);
+
+/* Removes a ring of WHISKER_RING_DIRECTORY whose writer died; the next writer of its name does so, too. Returns 0, or
+ * RING_MISSING, RING_BUSY (its writer lives), RING_LAYOUT (no ring), RING_NAME, RING_ACCESS (another user's), SYSTEM.
+ */
 int whisker_ring_remove_stale(const char *name);
 
 struct whisker_ring;
@@ -120,10 +153,15 @@ struct whisker_ring;
 /*
  * Makes the ring `name` of `capacity` frames (a power of two, 64 to 2^20) and becomes its writer. A ring whose writer
  * died is replaced; its readers learn RESTARTED. Returns 0 and the ring, or ARGUMENT, RING_NAME, RING_BUSY (another
- * writer lives), RING_LAYOUT (the name is that of something else), RING_ACCESS (another user's), SYSTEM, MEMORY; then
- * *ring is NULL.
+ * writer lives, be it in the service's directory, where readers look first), RING_LAYOUT (the name is that of something
+ * else), RING_ACCESS (another user's), SYSTEM, MEMORY; then *ring is NULL.
  */
 int whisker_ring_create(const char *name, uint32_t capacity, struct whisker_ring **ring);
+
+/* As whisker_ring_create, but in this directory: WHISKER_RING_SERVICE_DIRECTORY or WHISKER_RING_DIRECTORY, else
+ * ARGUMENT.
+ */
+int whisker_ring_create_in(const char *directory, const char *name, uint32_t capacity, struct whisker_ring **ring);
 
 /* Copies `count` frames (at most a quarter of the capacity) into the ring and wakes waiting readers once. Never waits.
  * Returns 0, ARGUMENT, or RING_LOST (make a new ring). */

@@ -1,15 +1,19 @@
 """The ring from Python: views without copies, read-only, confirmed after use."""
 
+import getpass
 import multiprocessing
+import os
+import signal
 
 import numpy as np
 import pytest
 from rings import make_frames, ring_name
 
-from whisker.bridge.ring import FRAME, Clock, Reader, RingError, Writer
+from whisker.bridge.ring import FRAME, Clock, Reader, RingError, Writer, found_rings, signal_writer
 from whisker.protocol import LIMITS
 
 CAPACITY = 256
+STRANGER = 4242  # a user id that no machine gives away
 
 
 @pytest.fixture
@@ -97,13 +101,40 @@ def test_what_the_daemon_tells_arrives_as_text_and_numbers(ring):
 
 
 def test_a_second_writer_and_a_missing_ring_are_one_line(ring):
-    with pytest.raises(RingError, match=f"ring {ring.name}: another writer holds this ring; stop"):
+    held = f"another writer holds this ring \\(/dev/shm/{ring.name}, user {getpass.getuser()}'s\\); stop"
+    with pytest.raises(RingError, match=f"ring {ring.name}: {held}"):
         Writer(ring.name, CAPACITY)
     with pytest.raises(RingError) as told:
         Reader("whisker-none")
     assert told.value.name == "RING_MISSING" and told.value.exit_code == 1 and "\n" not in str(told.value)
     with pytest.raises(RingError, match="range"):
         Writer(ring_name(), 100)
+
+
+def test_readers_say_whose_ring_it_is(ring):
+    with Reader(ring.name) as reader:
+        assert reader.owner == reader.info.owner == getpass.getuser()
+    found = [entry for entry in found_rings() if entry.name == ring.name]
+    assert [(entry.path, entry.owner, entry.error) for entry in found] == [
+        (f"/dev/shm/{ring.name}", getpass.getuser(), "OK")
+    ]
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can give a file to another user")
+def test_a_ring_of_another_user_is_refused_unless_that_user_is_named(ring):
+    path = f"/dev/shm/{ring.name}"
+    os.chown(path, STRANGER, STRANGER)
+    with pytest.raises(RingError, match=f"the ring {path} is user {STRANGER}'s, .* --ring-owner {STRANGER}") as told:
+        Reader(ring.name)
+    assert told.value.name == "RING_OWNER" and "\n" not in str(told.value)
+    with pytest.raises(RingError):
+        Reader(ring.name, owner=STRANGER + 1)
+    with pytest.raises(RingError) as told:
+        signal_writer(ring.name, signal.SIGTERM)  # this process: it would end here
+    assert told.value.name == "RING_OWNER"
+    with Reader(ring.name, owner=STRANGER) as reader:
+        assert reader.owner == str(STRANGER)
+    assert [entry.error for entry in found_rings() if entry.name == ring.name] == ["RING_OWNER"]
 
 
 def _read_all(name, out):

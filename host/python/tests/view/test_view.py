@@ -1,12 +1,14 @@
 """whisker-view over its WebSocket: what a page is told equals what the ring holds, whatever writer and page do."""
 
 import asyncio
+import getpass
 import json
 import os
 import signal
 import socket
 import subprocess
 import sys
+from pathlib import Path
 from urllib.request import urlopen
 
 import numpy as np
@@ -167,7 +169,8 @@ def test_rings_are_found_named_and_told_when_they_change():
             await p.ask(type="subscribe", topic="rings")
             assert other not in (await p.next("rings"))["rings"]
             with Writer(other) as second:
-                assert other in (await p.next("rings"))["rings"]
+                told = await p.next("rings")
+                assert other in told["rings"] and told["owners"][other] == getpass.getuser()
                 second.publish(made_frames(0, 64))
                 await p.ask(type="subscribe", topic="status", ring=other)
                 await p.status_where(lambda s: s["ring"] == other and s["frames"] == 64)
@@ -176,18 +179,22 @@ def test_rings_are_found_named_and_told_when_they_change():
         asyncio.run(scenario(writer))
 
 
-def test_only_rings_with_a_writer_are_offered(tmp_path):
-    with ring_of(made_frames(0, 10)) as writer, ring_of(made_frames(0, 10)) as linked:
-        for name in (writer.name, "whisker-test-dead", "name\nwith a line"):
-            (tmp_path / name).write_bytes(b"WHSKRING")
-        (tmp_path / "other").write_bytes(b"something")
-        (tmp_path / "short").write_bytes(b"WHSK")
-        (tmp_path / linked.name).symlink_to(tmp_path / writer.name)
-        (tmp_path / "folder").mkdir()
-        assert find_rings(tmp_path) == [writer.name]
-        assert {writer.name, linked.name} <= set(find_rings())
-    assert find_rings(tmp_path) == []
-    assert find_rings(tmp_path / "missing") == []
+def test_only_rings_with_a_writer_are_offered():
+    with ring_of(made_frames(0, 10)) as writer:
+        shared, odd = Path("/dev/shm"), [f"{writer.name}-{what}" for what in ("dead", "other", "short", "name\nline")]
+        linked, folder = (shared / f"{writer.name}-{what}" for what in ("link", "folder"))
+        try:
+            for name, content in zip(odd, (b"WHSKRING" * 10, b"something", b"WHSK", b"WHSKRING" * 10), strict=True):
+                (shared / name).write_bytes(content)
+            linked.symlink_to(shared / writer.name)
+            folder.mkdir()
+            found = {name: owner for name, owner in find_rings().items() if name.startswith(writer.name)}
+            assert found == {writer.name: getpass.getuser()}
+        finally:
+            for path in (*(shared / name for name in odd), linked):
+                path.unlink(missing_ok=True)
+            folder.rmdir()
+    assert writer.name not in find_rings()
 
 
 def test_shared_memory_that_is_no_ring_is_refused_with_the_reason(tmp_path):

@@ -1,5 +1,6 @@
 """The shared ring of frames as NumPy views, read where the frames lie (host/libwhisker/include/whisker/ring.h)."""
 
+import pwd
 import threading
 import time
 from collections.abc import Iterator
@@ -41,9 +42,20 @@ class RingError(UserError, OSError):
 
 
 def check(error: int, ring: str) -> None:
-    """RingError for a code of errors.h other than 0."""
+    """RingError for a code of errors.h other than 0; names the ring's file and its owner where they matter."""
     if error:
-        raise RingError(f"ring {ring}: {error_line(error)}", ffi.string(lib.whisker_error_name(error)).decode())
+        line = ffi.new("char[]", lib.WHISKER_RING_LINE_BYTES)
+        lib.whisker_ring_explain(ring.encode(), error, line, len(line))
+        name = ffi.string(lib.whisker_error_name(error)).decode()
+        raise RingError(f"ring {ring}: {ffi.string(line).decode(errors='replace')}", name)
+
+
+def user_name(user: int) -> str:
+    """The name of the user with this id, or its digits where there is none."""
+    try:
+        return pwd.getpwuid(user).pw_name
+    except KeyError:
+        return str(user)
 
 
 def milliseconds(seconds: float | None) -> int:
@@ -63,6 +75,39 @@ class ReaderInfo:
     frames_missing: int
     capacity: int
     writer_pid: int
+    owner: str
+
+
+@dataclass(frozen=True)
+class FoundRing:
+    """A ring of this machine (struct whisker_ring_entry). error: the name in errors.h, "OK" if a reader can attach."""
+
+    name: str
+    path: str
+    owner: str
+    error: str
+
+
+def found_rings() -> list[FoundRing]:
+    """All rings, those of the service first. RingError SYSTEM when their directories cannot be read."""
+    room = 0
+    count = lib.whisker_ring_list(ffi.NULL, room)
+    while count > room:
+        room = count
+        entries = ffi.new("struct whisker_ring_entry[]", room)
+        count = lib.whisker_ring_list(entries, room)
+    check(min(count, 0), "*")
+    return [_found(entries[index]) for index in range(count)]
+
+
+def _found(entry) -> FoundRing:
+    name, path = (ffi.string(text).decode(errors="surrogateescape") for text in (entry.name, entry.path))
+    return FoundRing(name, path, user_name(entry.owner), ffi.string(lib.whisker_error_name(entry.error)).decode())
+
+
+def signal_writer(ring: str, number: int) -> None:
+    """Send a signal to the process that writes the ring; RingError when there is none or it cannot be proved to be it."""
+    check(lib.whisker_ring_signal_writer(ring.encode(), number), ring)
 
 
 @dataclass(frozen=True)
@@ -125,19 +170,32 @@ def error_line(error: int) -> str:
 class Reader:
     """One reader of one ring. Use as a context manager, by one thread at a time."""
 
-    def __init__(self, name: str, wait_s: float | None = 0.0):
-        """Attach at the ring's oldest frame, waiting so long for the ring to come up (None: for ever)."""
+    def __init__(self, name: str, wait_s: float | None = 0.0, owner: int | None = None):
+        """Attach at the ring's oldest frame, waiting so long for the ring to come up (None: for ever).
+
+        A ring of root, of this user, of the service's user, or of the user with the id `owner` is read. Another user's is
+        refused: RingError RING_OWNER.
+        """
         self.name = name
         handle = ffi.new("struct whisker_reader **")
-        check(lib.whisker_reader_attach(name.encode(), milliseconds(wait_s), handle), name)
+        accepted = lib.WHISKER_RING_NO_OWNER if owner is None else owner
+        error = lib.whisker_reader_attach_owned(name.encode(), accepted, milliseconds(wait_s), handle)
+        check(error, name)
         self._reader = ffi.gc(handle[0], lib.whisker_reader_detach)
         self._view, self._count = ffi.new("const struct whisker_frame **"), ffi.new("size_t *")
+        self._attached()
 
     def __enter__(self) -> "Reader":
         return self
 
     def __exit__(self, *exception) -> None:
         self.close()
+
+    def _attached(self) -> None:
+        """Look up whose ring it is: once, for a name may come from another machine."""
+        info = ffi.new("struct whisker_reader_info *")
+        lib.whisker_reader_info(self._reader, info)
+        self.owner = user_name(info.owner)
 
     def close(self) -> None:
         """Let go of the ring; views into it must not be used any more."""
@@ -209,13 +267,15 @@ class Reader:
     def reattach(self, wait_s: float | None = 0.0) -> None:
         """Attach to the new ring of this name after WRITER_DEAD or RESTARTED; counters stay."""
         check(lib.whisker_reader_reattach(self._reader, milliseconds(wait_s)), self.name)
+        self._attached()
 
     @property
     def info(self) -> ReaderInfo:
         """Counters of ring and reader, as of now."""
         info = ffi.new("struct whisker_reader_info *")
         lib.whisker_reader_info(self._reader, info)
-        return ReaderInfo(*(getattr(info, field) for field in ReaderInfo.__dataclass_fields__))
+        told = {field: getattr(info, field) for field in ReaderInfo.__dataclass_fields__}
+        return ReaderInfo(**told | {"owner": self.owner})
 
     @property
     def clock(self) -> Clock | None:
@@ -233,13 +293,13 @@ class Reader:
         return DaemonStats(*(_plain(getattr(stats, field)) for field in DaemonStats.__dataclass_fields__))
 
 
-def await_reader(name: str, wait_s: float, stop: threading.Event) -> Reader:
+def await_reader(name: str, wait_s: float, stop: threading.Event, owner: int | None = None) -> Reader:
     """A Reader of a ring that is waited for until `wait_s` are over or `stop` is set; RingError says why there is none."""
     until = time.monotonic() + wait_s
     while True:
         left_s = max(0.0, until - time.monotonic())
         try:
-            return Reader(name, min(left_s, STOP_S))
+            return Reader(name, min(left_s, STOP_S), owner)
         except RingError as error:
             if error.name not in ("RING_MISSING", "WRITER_DEAD") or left_s <= STOP_S or stop.is_set():
                 raise

@@ -65,7 +65,7 @@ def run(arguments) -> int:
     node = _node(arguments)
     try:
         arguments.out.mkdir(parents=True, exist_ok=True)
-        with Reader(arguments.ring, arguments.wait) as reader:
+        with Reader(arguments.ring, arguments.wait, arguments.ring_owner) as reader:
             feed = Feed(reader)
             if not arguments.backlog:
                 feed.skip()

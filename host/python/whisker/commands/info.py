@@ -3,13 +3,14 @@
 import dataclasses
 import json
 import os
+import shlex
 import signal
 import sys
 import time
 
 from ..arguments import add_ring
 from ..bridge import usbtree
-from ..bridge.ring import Reader, RingError
+from ..bridge.ring import Reader, RingError, signal_writer
 from ..protocol import WIRE_VERSION
 from ..simulation.bridge import program
 
@@ -30,7 +31,7 @@ def run(arguments) -> int:
         return ask_nodes(arguments.ring)
     told = {"host": {"wire_version": WIRE_VERSION}, "usb": [describe_usb(found) for found in usbtree.bridges()]}
     try:
-        with Reader(arguments.ring, arguments.wait) as reader:
+        with Reader(arguments.ring, arguments.wait, arguments.ring_owner) as reader:
             told |= describe_ring(reader)
     except RingError as error:
         if not told["usb"] or error.name != "RING_MISSING":
@@ -44,23 +45,21 @@ def ask_nodes(ring: str) -> int:
     """One process at a time has the bridge: a whiskerd that streams is the one to ask."""
     try:
         with Reader(ring) as reader:
-            streaming, pid = bool(reader.stats and reader.stats.connected), reader.info.writer_pid
+            streaming, owner = bool(reader.stats and reader.stats.connected), reader.owner
     except RingError:
-        streaming, pid = False, 0
+        streaming = False
     if not streaming:
         lister = program("whisker-flash")
         return os.spawnv(os.P_WAIT, lister, [lister, "--list", "--health"])
     try:
-        os.kill(pid, signal.SIGUSR2)
-    except PermissionError:
-        print(
-            f"whiskerd (process {pid}) has the bridge and is another user's; run: sudo kill -USR2 {pid}",
-            file=sys.stderr,
-        )
+        signal_writer(ring, signal.SIGUSR2)
+    except RingError as error:
+        if error.name != "RING_ACCESS":
+            raise
+        text = f"whiskerd of user {owner} has the bridge; run: sudo whisker info --nodes --ring {shlex.quote(ring)}"
+        print(text, file=sys.stderr)
         return 1
-    print(
-        f"whiskerd (process {pid}) has the bridge: its log lists the nodes now (journalctl -u whiskerd, or its terminal)"
-    )
+    print("whiskerd has the bridge: its log lists the nodes now (journalctl -u whiskerd, or its terminal)")
     return 0
 
 

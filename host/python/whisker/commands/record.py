@@ -24,7 +24,7 @@ def add(parser) -> None:
 def run(arguments) -> int:
     names = [whisker.name for whisker in load(arguments.scene).robot.whiskers] if arguments.scene else []
     stop = stop_on_signals()
-    with await_reader(arguments.ring, arguments.wait, stop) as reader:
+    with await_reader(arguments.ring, arguments.wait, stop, arguments.ring_owner) as reader:
         writer = RecordingWriter(arguments.file, describe(reader), names, arguments.overwrite)
         tally = record(reader, writer, stop, _frames(arguments, reader))
     print(f"{arguments.file}: {_summary(tally)}")

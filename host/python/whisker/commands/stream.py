@@ -33,7 +33,7 @@ def add(parser) -> None:
 def run(arguments) -> int:
     stop = stop_on_signals()
     left = arguments.frames
-    with await_reader(arguments.ring, arguments.wait, stop) as reader:
+    with await_reader(arguments.ring, arguments.wait, stop, arguments.ring_owner) as reader:
         if not arguments.backlog:
             reader.seek_latest(0)
         lanes, header = arguments.lanes, not arguments.json

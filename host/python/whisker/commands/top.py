@@ -39,7 +39,7 @@ def add(parser) -> None:
 def run(arguments) -> int:
     names = [whisker.name for whisker in load(arguments.scene).robot.whiskers] if arguments.scene else []
     stop = stop_on_signals()
-    with await_reader(arguments.ring, arguments.wait, stop) as reader:
+    with await_reader(arguments.ring, arguments.wait, stop, arguments.ring_owner) as reader:
         reader.seek_latest(round(arguments.interval * LIMITS["clock_hz"] / LIMITS["tick_period"]))
         view = View(reader, names)
         if arguments.once or not sys.stdout.isatty():
@@ -123,7 +123,7 @@ class View:
     def _status(self, frames: np.ndarray) -> list[str]:
         info, stats, clock = self._reader.info, self._reader.stats, self._reader.clock
         lost = f"{info.frames_missing} lost, {info.frames_overrun} not read in time"
-        out = [f"ring {self._reader.name}: {_rate(frames):.1f} frames/s, {lost}; q quits"]
+        out = [f"ring {self._reader.name} of user {self._reader.owner}: {_rate(frames):.1f} frames/s, {lost}; q quits"]
         if stats:
             state = "connected" if stats.connected else "no bridge"
             text = f"bridge {stats.serial} {state}, wire version {stats.wire_version}, {stats.reconnects} reconnects"

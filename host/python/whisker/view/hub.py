@@ -29,7 +29,7 @@ class Hub:
         self.robot_watchers = 0
         self._taps = {name: Tap(name) for name in names}
         self._watchers = dict.fromkeys(names, 0)
-        self._found: list[str] = []
+        self._found: dict[str, str] = {}
         self._searched = float("-inf")
         self._round = asyncio.Event()
 
@@ -39,6 +39,10 @@ class Hub:
         if now - self._searched >= SEARCH_S:
             self._found, self._searched = find_rings(), now
         return self.names + [name for name in self._found if name not in self.names]
+
+    def owners(self) -> dict[str, str]:
+        """Whose each ring is that was found at the last look."""
+        return self._found
 
     def watch(self, name: object) -> Tap:
         """The tap of a ring, for somebody who will `unwatch` it. RequestError: there is no such ring."""

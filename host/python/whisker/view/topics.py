@@ -93,17 +93,17 @@ class Status:
 
 
 class Rings:
-    """Names of the rings that can be asked for, as JSON, at first and when they change."""
+    """Names of the rings that can be asked for and whose they are, as JSON, at first and when they change."""
 
     def __init__(self, hub: Hub, options: dict):
         self._hub, self._told = hub, None
 
     def take(self) -> str | None:
-        names = self._hub.rings()
-        if names == self._told:
+        message = {"topic": "rings", "rings": self._hub.rings(), "owners": self._hub.owners()}
+        if message == self._told:
             return None
-        self._told = names
-        return json.dumps({"topic": "rings", "rings": names})
+        self._told = message
+        return json.dumps(message)
 
     def close(self) -> None:
         return

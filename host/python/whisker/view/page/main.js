@@ -11,7 +11,7 @@ const view = {
   stateOf: (lane) => words(last?.lanes?.state[lane] ?? 'no data'),
   toDegrees: (counts) => (counts - view.rest) * view.degreesPerCount,
 };
-let history, traces, last, rings = [], widths = [], paused = false, due = false, linked = false;
+let history, traces, last, rings = [], owners = {}, widths = [], paused = false, due = false, linked = false;
 
 const panels = new Panels((lanes) => chooseLanes(lanes));
 panels.skipped = () => history?.skipped;
@@ -129,14 +129,14 @@ wire.on('hello', (hello) => {
 });
 
 wire.on('rings', (message) => {
-  rings = message.rings;
+  ({ rings, owners } = message);
   listRings();
 });
 
 /* The ring looked at stays in the list when it has gone. */
 function listRings() {
   const names = rings.includes(view.ring) ? rings : [...rings, view.ring];
-  $('ring').replaceChildren(...names.map((name) => new Option(name, name, false, name === view.ring)));
+  $('ring').replaceChildren(...names.map((name) => new Option(owners[name] ? `${name} of ${owners[name]}` : name, name, false, name === view.ring)));
 }
 
 wire.on('status', (status) => {

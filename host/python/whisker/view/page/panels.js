@@ -149,7 +149,7 @@ class Panels {
       ['Daemon’s loss', d ? `${count(d.frames_missing)} frames missing, ${count(d.records_crc + d.records_tick + d.records_usb + d.records_sensor)} records bad, ${count(d.usb_errors)} USB errors` : none],
       ['Clock', s.clock ? `to ± ${nanoseconds(s.clock.uncertainty_ns)}` : none],
       ['Tick', `${Number((s.tick_s * 1e6).toPrecision(6))} µs`],
-      ['Ring', s.reader ? `${count(s.reader.capacity)} frames, ${duration(s.reader.capacity * s.tick_s)}; ${count(s.reader.published)} written` : 'none'],
+      ['Ring', s.reader ? `${count(s.reader.capacity)} frames, ${duration(s.reader.capacity * s.tick_s)}; ${count(s.reader.published)} written; of user ${s.reader.owner}` : 'none'],
       ['Counted for', s.attached_s === null ? 'not attached' : duration(s.attached_s)],
       ['This page', `${count(this.skipped?.() ?? 0)} columns skipped`],
     ];
