@@ -8,8 +8,6 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include "daemon_log.h"
-
 #define ANSWER 1024
 _Static_assert(BASE_MESSAGE == 256, "the answer to a longer message says so");
 
@@ -21,19 +19,6 @@ void base_clients_begin(struct base_clients *clients, struct base_robot *robot, 
     }
 }
 
-bool base_clients_add(struct base_clients *clients, int socket)
-{
-    for (int i = 0; i < BASE_CLIENTS; i++) {
-        if (clients->client[i].socket < 0) {
-            clients->client[i] = (struct base_client){.socket = socket, .bits = base_robot_bits(clients->robot)};
-            return true;
-        }
-    }
-    daemon_log(LOG_WARN, "more than %d clients; one turned away", BASE_CLIENTS);
-    close(socket);
-    return false;
-}
-
 /* A commander that goes leaves standing wheels behind. */
 static void drop(struct base_clients *clients, struct base_client *client)
 {
@@ -41,9 +26,85 @@ static void drop(struct base_clients *clients, struct base_client *client)
     *client = (struct base_client){.socket = -1};
     if (clients->commander == client) {
         clients->commander = NULL;
-        daemon_log(LOG_NOTE, "the commander has gone; wheels stopped");
+        base_log(&clients->log_commander, LOG_NOTE, "the commander has gone; wheels stopped");
         base_robot_stop(clients->robot, clients->now_ms);
     }
+}
+
+/* ---------------------------------------------------------------------------------------------------------- the places
+ */
+
+/* Whether there is a commander that has ordered something of late. */
+static bool commanded(const struct base_clients *clients)
+{
+    const bool silent = clients->robot->options->stream_clock
+                            ? base_robot_frames(clients->robot) - clients->ordered_frame >= BASE_PLACE_FRAMES
+                            : clients->now_ms - clients->ordered_ms >= BASE_PLACE_MS;
+    return clients->commander && !silent;
+}
+
+static bool keeps_place(const struct base_clients *clients, const struct base_client *client)
+{
+    return (client == clients->commander && commanded(clients)) ||
+           (client->leads && clients->robot->options->stream_clock);
+}
+
+/* Whether the one of two clients that are to lose their places does so first. */
+static bool before(const struct base_client *a, const struct base_client *b)
+{
+    return a->known != b->known ? !a->known : a->heard_ms < b->heard_ms;
+}
+
+/* Number of an empty place, or of the client that is first to lose its own; -1: nobody does. *speaks: there is a client
+ * that has said nothing yet, and still has time to. */
+static int find_place(const struct base_clients *clients, int64_t now_ms, bool *speaks)
+{
+    int found = -1;
+    *speaks = false;
+    for (int i = 0; i < BASE_CLIENTS; i++) {
+        const struct base_client *client = &clients->client[i];
+        if (client->socket < 0) {
+            return i;
+        }
+        const bool silent = now_ms - client->heard_ms >= (client->known ? BASE_PLACE_MS : BASE_SPEAK_MS);
+        *speaks |= !client->known && !silent;
+        if (silent && !keeps_place(clients, client) && (found < 0 || before(client, &clients->client[found]))) {
+            found = i;
+        }
+    }
+    return found;
+}
+
+bool base_clients_crowded(const struct base_clients *clients, int64_t now_ms)
+{
+    bool speaks;
+    return find_place(clients, now_ms, &speaks) < 0 && speaks;
+}
+
+static void turn_away(struct base_clients *clients, int socket)
+{
+    char text[80];
+    snprintf(text, sizeof text, "error %d clients are connected; end one of them first", BASE_CLIENTS);
+    send(socket, text, strlen(text), MSG_NOSIGNAL | MSG_DONTWAIT);
+    close(socket);
+    base_log(&clients->log_places, LOG_WARN, "more than %d clients; one turned away", BASE_CLIENTS);
+}
+
+bool base_clients_add(struct base_clients *clients, int socket, int64_t now_ms)
+{
+    bool speaks;
+    const int found = find_place(clients, now_ms, &speaks);
+    if (found < 0) {
+        turn_away(clients, socket);
+        return false;
+    }
+    struct base_client *place = &clients->client[found];
+    if (place->socket >= 0) {
+        base_log(&clients->log_places, LOG_WARN, "more than %d clients; a silent one lost its place", BASE_CLIENTS);
+        drop(clients, place);
+    }
+    *place = (struct base_client){.socket = socket, .heard_ms = now_ms, .bits = base_robot_bits(clients->robot)};
+    return true;
 }
 
 void base_clients_step(void *context, const struct create_step *step, unsigned bits)
@@ -74,6 +135,10 @@ uint64_t base_clients_limit(const struct base_clients *clients)
 
 static void answer(struct base_clients *clients, struct base_client *client, const char *text)
 {
+    if (strncmp(text, "error", 5) != 0) {
+        client->known = true;
+        client->heard_ms = clients->now_ms;
+    }
     if (send(client->socket, text, strlen(text), MSG_NOSIGNAL | MSG_DONTWAIT) < 0) {
         drop(clients, client); /* gone, or it does not read */
     }
@@ -88,15 +153,23 @@ static void answer_sent(struct base_clients *clients, struct base_client *client
     answer(clients, client, text);
 }
 
+static void note_order(struct base_clients *clients)
+{
+    clients->ordered_ms = clients->now_ms;
+    clients->ordered_frame = base_robot_frames(clients->robot);
+}
+
 static bool may_command(struct base_clients *clients, struct base_client *client)
 {
-    if (!clients->commander) {
+    if (!commanded(clients)) {
         clients->commander = client;
     }
     if (clients->commander != client) {
         answer(clients, client, "error another client commands; end that one first");
+        return false;
     }
-    return clients->commander == client;
+    note_order(clients);
+    return true;
 }
 
 /* Reads the number at *text and goes on behind it. */
@@ -118,6 +191,16 @@ static void on_drive(struct base_clients *clients, struct base_client *client, c
         base_robot_drive(clients->robot, v, omega, clients->now_ms);
         answer_sent(clients, client);
     }
+}
+
+/* Anybody may. */
+static void on_stop(struct base_clients *clients, struct base_client *client)
+{
+    if (client == clients->commander) {
+        note_order(clients);
+    }
+    base_robot_stop(clients->robot, clients->now_ms);
+    answer_sent(clients, client);
 }
 
 static void on_mode(struct base_clients *clients, struct base_client *client, const char *text)
@@ -153,7 +236,7 @@ static void on_health(struct base_clients *clients, struct base_client *client)
 {
     char text[ANSWER];
     int at = snprintf(text, sizeof text, "health driver_pid=%d guard_pid=%d restarts=%llu commander=%d ", (int)getpid(),
-                      (int)getppid(), (unsigned long long)*clients->restarts, clients->commander != NULL);
+                      (int)getppid(), (unsigned long long)*clients->restarts, commanded(clients));
     base_robot_health(clients->robot, text + at, sizeof text - (size_t)at);
     answer(clients, client, text);
 }
@@ -168,9 +251,8 @@ static void obey(struct base_clients *clients, struct base_client *client)
         on_mode(clients, client, text + 4);
     } else if (!strcmp(text, "odometry")) {
         on_odometry(clients, client);
-    } else if (!strcmp(text, "stop")) { /* anybody may */
-        base_robot_stop(clients->robot, clients->now_ms);
-        answer_sent(clients, client);
+    } else if (!strcmp(text, "stop")) {
+        on_stop(clients, client);
     } else if (!strcmp(text, "health")) {
         on_health(clients, client);
     } else {

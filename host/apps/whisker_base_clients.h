@@ -1,6 +1,11 @@
 /*
  * Who is connected to the socket of whisker-base: one commander (the first that drives), any number of observers up to
  * BASE_CLIENTS. Messages: docs/create.md. Nothing here waits or allocates.
+ *
+ * A commander without an order for BASE_PLACE_MS loses the command to the next that drives. When all places are taken
+ * a new client gets the place of one that has said nothing valid since BASE_SPEAK_MS, the first to come first; or else
+ * of the one that has been silent longest, for at least BASE_PLACE_MS. The commander keeps its place, and in lock-step
+ * simulation whoever leads the stream.
  */
 #ifndef WHISKER_BASE_CLIENTS_H
 #define WHISKER_BASE_CLIENTS_H
@@ -12,11 +17,16 @@
 
 #define BASE_CLIENTS 16
 #define BASE_MESSAGE 256
+#define BASE_PLACE_MS 1000
+#define BASE_PLACE_FRAMES (BASE_PLACE_MS / CREATE_OI_PERIOD_MS) /* instead, by the stream's clock */
+#define BASE_SPEAK_MS 20                                        /* for a new client to say something valid */
 
 struct base_client {
-    int socket; /* -1: nobody */
-    bool leads; /* has said `after N`: the stream is taken in as far as it says */
-    bool waits; /* for byte `after`, with the message kept */
+    int socket;       /* -1: nobody */
+    bool known;       /* has said something valid */
+    int64_t heard_ms; /* when it said so last, or came */
+    bool leads;       /* has said `after N`: the stream is taken in as far as it says */
+    bool waits;       /* for byte `after`, with the message kept */
     uint64_t after;
     char message[BASE_MESSAGE];
     struct create_motion motion; /* since its last odometry message */
@@ -29,12 +39,18 @@ struct base_clients {
     struct base_client client[BASE_CLIENTS];
     struct base_client *commander; /* NULL: none */
     int64_t now_ms;                /* as base_clients_serve() was told */
+    int64_t ordered_ms;            /* when the commander ordered something last, */
+    uint64_t ordered_frame;        /* by either clock */
+    struct base_log_limit log_places, log_commander;
 };
 
 void base_clients_begin(struct base_clients *clients, struct base_robot *robot, const uint64_t *restarts);
 
-/* Takes a connection; false: there is no place left, the connection is closed. */
-bool base_clients_add(struct base_clients *clients, int socket);
+/* Takes a connection; false: there is no place left, the connection is told so and closed. */
+bool base_clients_add(struct base_clients *clients, int socket, int64_t now_ms);
+
+/* Whether a new client had better wait: there is no place, and a client that may lose its own has still to speak. */
+bool base_clients_crowded(const struct base_clients *clients, int64_t now_ms);
 
 /* As base_on_step: one frame's motion, for every client. */
 void base_clients_step(void *context, const struct create_step *step, unsigned bits);

@@ -12,6 +12,7 @@
 #include "whisker_base_sleep.h"
 
 #define ALIVE_MS 50
+#define ACCEPT_MS 100
 
 enum { GUARD, LISTENING, PORT, BUS, CLIENTS, POLLED = CLIENTS + BASE_CLIENTS };
 
@@ -23,7 +24,9 @@ struct driver {
     struct pollfd polled[POLLED];
     int told_port; /* descriptor the guard holds too */
     int64_t alive_ms, tried_ms;
-    bool opened; /* the port was open before: the next time is a reconnect */
+    bool opened;       /* the port was open before: the next time is a reconnect */
+    int64_t accept_ms; /* until then no connection is taken: there was no descriptor for one */
+    struct base_log_limit log;
 };
 
 /* Tells the guard one thing, with the port's descriptor where it is not negative. */
@@ -73,7 +76,7 @@ static void reopen(struct driver *driver)
     if (base_robot_open(robot, -1, cli_now_ms())) {
         robot->reconnects += driver->opened;
         if (driver->opened) {
-            daemon_log(LOG_NOTE, "%s: is back", robot->options->port);
+            base_log(&robot->log.back, LOG_NOTE, "%s: is back", robot->options->port);
         }
         driver->opened = true;
     }
@@ -84,15 +87,22 @@ static int64_t least(int64_t a, int64_t b)
     return a < b ? a : b;
 }
 
+/* Whether connections are taken at the moment. */
+static bool accepts(const struct driver *driver)
+{
+    return cli_now_ms() >= driver->accept_ms && !base_clients_crowded(&driver->clients, cli_now_ms());
+}
+
 /* What is waited for. Returns for how many ms at most. */
 static int64_t fill(struct driver *driver)
 {
     const bool wanted = base_robot_taken(&driver->robot) < base_clients_limit(&driver->clients);
     driver->polled[GUARD] = (struct pollfd){.fd = driver->start.guard, .events = POLLIN};
-    driver->polled[LISTENING] = (struct pollfd){.fd = driver->start.listening, .events = POLLIN};
+    driver->polled[LISTENING] = (struct pollfd){.fd = driver->start.listening, .events = accepts(driver) ? POLLIN : 0};
     driver->polled[PORT] = (struct pollfd){.fd = driver->robot.port, .events = wanted ? POLLIN : 0};
     base_clients_poll(&driver->clients, &driver->polled[CLIENTS]);
-    return base_sleep_poll(&driver->sleep, &driver->polled[BUS], cli_now_ms());
+    const int64_t sleep_ms = base_sleep_poll(&driver->sleep, &driver->polled[BUS], cli_now_ms());
+    return accepts(driver) ? sleep_ms : BASE_SPEAK_MS;
 }
 
 /* Takes the guard's newest lease. False: the guard has died. */
@@ -124,13 +134,26 @@ static bool await(struct driver *driver)
     sigemptyset(&none);
     const int64_t watched_ms = least(base_robot_watch(&driver->robot, cli_now_ms()), watch_lease(driver));
     const int64_t due = least(watched_ms, fill(driver));
-    const int64_t sleep_ms = driver->start.options->stream_clock && driver->robot.port >= 0 ? -1 : least(due, ALIVE_MS);
+    const bool untimed = driver->start.options->stream_clock && driver->robot.port >= 0 && accepts(driver);
+    const int64_t sleep_ms = least(due, ALIVE_MS);
     const struct timespec timeout = {.tv_nsec = sleep_ms * 1000000};
-    const int ready = ppoll(driver->polled, POLLED, sleep_ms < 0 ? NULL : &timeout, &none);
+    const int ready = ppoll(driver->polled, POLLED, untimed ? NULL : &timeout, &none);
     for (int i = 0; i < POLLED && ready < 0; i++) {
         driver->polled[i].revents = 0;
     }
     return ready >= 0 || errno == EINTR;
+}
+
+/* A connection that cannot be taken stays where it is, and is tried again later. */
+static void accept_client(struct driver *driver)
+{
+    const int socket = accept4(driver->start.listening, NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC);
+    if (socket >= 0) {
+        base_clients_add(&driver->clients, socket, cli_now_ms());
+    } else if (errno != EAGAIN && errno != EINTR && errno != ECONNABORTED) {
+        driver->accept_ms = cli_now_ms() + ACCEPT_MS;
+        base_log(&driver->log, LOG_WARN, "cannot take a client: %s; allow more (ulimit -n)", strerror(errno));
+    }
 }
 
 static void serve(struct driver *driver)
@@ -142,10 +165,7 @@ static void serve(struct driver *driver)
         base_robot_read(&driver->robot, base_clients_limit(&driver->clients), cli_now_ms());
     }
     if (driver->polled[LISTENING].revents) {
-        const int socket = accept4(driver->start.listening, NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC);
-        if (socket >= 0) {
-            base_clients_add(&driver->clients, socket);
-        }
+        accept_client(driver);
     }
     base_clients_serve(&driver->clients, &driver->polled[CLIENTS], cli_now_ms());
     if (driver->told_port != driver->robot.port) {

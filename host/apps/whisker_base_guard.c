@@ -18,6 +18,7 @@
 #include "daemon_notify.h"
 #include "heartbeat.h"
 #include "whisker_base_driver.h"
+#include "whisker_base_log.h"
 
 #define BACKLOG 16
 /* A driver that dies so young is not started again at once. */
@@ -35,6 +36,7 @@ struct guard {
     bool stuck;
     struct heartbeat heartbeat; /* of the supervisor */
     bool orphaned;              /* the supervisor has ended */
+    struct base_log_limit log_hang, log_death;
 };
 
 /* ---------------------------------------------------------------------------------------------------------- the wheels
@@ -148,7 +150,7 @@ static void watch_driver(struct guard *guard)
     if (!guard->stuck) {
         guard->stuck = true;
         stop_wheels(guard);
-        daemon_log(LOG_WARN, "the driver hangs; wheels stopped");
+        base_log(&guard->log_hang, LOG_WARN, "the driver hangs; wheels stopped");
     }
     if (silent_ms >= BASE_DEAD_MS) {
         kill(guard->child, SIGKILL);
@@ -238,7 +240,8 @@ static int keep_driver(struct guard *guard)
             return WIFEXITED(status) ? WEXITSTATUS(status) : CLI_OK;
         }
         guard->restarts++;
-        daemon_log(LOG_ERROR, "the driver has died (signal %d); wheels stopped, starting it again", WTERMSIG(status));
+        base_log(&guard->log_death, LOG_ERROR, "the driver has died (signal %d); wheels stopped, starting it again",
+                 WTERMSIG(status));
         pause_after(guard, begun_ms);
     }
     daemon_log(LOG_ERROR, "cannot start the driver: %s", strerror(errno));

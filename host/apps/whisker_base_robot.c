@@ -5,7 +5,6 @@
 #include <unistd.h>
 
 #include "create/port.h"
-#include "daemon_log.h"
 
 #define READ_BYTES 256
 #define COMMANDER_FRAMES (BASE_COMMANDER_MS / CREATE_OI_PERIOD_MS)
@@ -39,7 +38,7 @@ static size_t packet_count(const struct base_robot *robot)
 
 static void lose(struct base_robot *robot, const char *doing)
 {
-    daemon_log(LOG_WARN, "%s: %s: %s; plug it in again", robot->options->port, doing, strerror(errno));
+    base_log(&robot->log.line, LOG_WARN, "%s: %s: %s; plug it in again", robot->options->port, doing, strerror(errno));
     close(robot->port);
     robot->port = -1;
     robot->sent = 0;
@@ -158,6 +157,11 @@ bool base_robot_open(struct base_robot *robot, int port, int64_t now_ms)
     return start_base(robot, true, now_ms);
 }
 
+uint64_t base_robot_frames(const struct base_robot *robot)
+{
+    return robot->past.frames + robot->stream.counts.frames + robot->missed;
+}
+
 uint64_t base_robot_taken(const struct base_robot *robot)
 {
     return robot->stream.counts.bytes;
@@ -169,7 +173,7 @@ uint64_t base_robot_taken(const struct base_robot *robot)
 static void stop_commander(struct base_robot *robot, int64_t now_ms)
 {
     robot->commander_stops++;
-    daemon_log(LOG_WARN, "the commander is silent; wheels stopped");
+    base_log(&robot->log.commander, LOG_WARN, "the commander is silent; wheels stopped");
     base_robot_stop(robot, now_ms);
 }
 
@@ -193,6 +197,14 @@ static uint32_t frames_since_change(const struct base_robot *robot, int64_t now_
     return robot->changed_ms <= robot->frame_ms ? 0 : since < robot->frame.missed ? since : robot->frame.missed;
 }
 
+static void log_back(struct base_robot *robot)
+{
+    if (robot->told_ms > 0) {
+        robot->told_ms = 0;
+        base_log(&robot->log.back, LOG_NOTE, "%s: frames come again", robot->options->port);
+    }
+}
+
 static void take_frame(struct base_robot *robot, int64_t now_ms)
 {
     const uint32_t gap = frames_of_gap(robot, now_ms);
@@ -201,6 +213,7 @@ static void take_frame(struct base_robot *robot, int64_t now_ms)
     robot->missed += robot->frame.missed;
     robot->frame_ms = now_ms;
     robot->silent = false;
+    log_back(robot);
     const struct create_step step = create_odometry_take(&robot->odometry, &robot->frame);
     base_robot_heed(robot);
     robot->on_step(robot->context, &step, base_robot_bits(robot));
@@ -251,16 +264,16 @@ bool base_robot_kept(const struct base_robot *robot)
     return robot->port < 0 || robot->silent || robot->held != 0;
 }
 
-static void log_hold(enum base_hold reason, bool on)
+static void log_hold(struct base_robot *robot, enum base_hold reason, bool on)
 {
     const bool heartbeat = reason == BASE_HOLD_HEARTBEAT;
     if (on) {
-        daemon_log(heartbeat ? LOG_ERROR : LOG_NOTE, "%s; wheels stopped",
-                   heartbeat ? "no heartbeat: the guard or the supervisor hangs"
-                             : "the machine is about to sleep or to be shut down");
+        base_log(&robot->log.hold, heartbeat ? LOG_ERROR : LOG_NOTE, "%s; wheels stopped",
+                 heartbeat ? "no heartbeat: the guard or the supervisor hangs"
+                           : "the machine is about to sleep or to be shut down");
     } else {
-        daemon_log(LOG_NOTE, "%s; the commander may drive again",
-                   heartbeat ? "the heartbeat is back" : "the machine is awake");
+        base_log(&robot->log.hold, LOG_NOTE, "%s; the commander may drive again",
+                 heartbeat ? "the heartbeat is back" : "the machine is awake");
     }
 }
 
@@ -273,12 +286,24 @@ void base_robot_hold(struct base_robot *robot, enum base_hold reason, bool on, i
     if (on) {
         base_robot_stop(robot, now_ms);
     }
-    log_hold(reason, on);
+    log_hold(robot, reason, on);
 }
 
 bool base_robot_mode(struct base_robot *robot, enum create_oi_mode mode, int64_t now_ms)
 {
     return base_robot_stop(robot, now_ms) && ask_mode(robot, mode);
+}
+
+/* A line that stays silent is told of once, and then every hour. */
+static void log_silence(struct base_robot *robot, int64_t now_ms)
+{
+    if (robot->told_ms == 0 || now_ms - robot->told_ms >= BASE_TELL_MS) {
+        robot->told_ms = now_ms;
+        base_log(&robot->log.silence, LOG_WARN,
+                 "%s: no frame for %d ms; wheels stopped, stream asked for again every %d ms; check cable, --baud and "
+                 "battery",
+                 robot->options->port, BASE_SILENCE_MS, BASE_SILENCE_MS);
+    }
 }
 
 /* Bytes have stopped: stopped wheels are all that can be had without seeing. The mode is entered again only if the base
@@ -288,10 +313,7 @@ static void restart_stream(struct base_robot *robot, int64_t now_ms)
     robot->silences++;
     robot->silent = robot->stream.counts.frames > 0;
     robot->opened_ms = now_ms;
-    daemon_log(LOG_WARN,
-               "%s: no frame for %d ms; wheels stopped, stream asked for again; if it stays silent check cable, "
-               "--baud and battery",
-               robot->options->port, BASE_SILENCE_MS);
+    log_silence(robot, now_ms);
     start_base(robot, robot->entered || robot->stream.counts.frames == 0, now_ms);
 }
 

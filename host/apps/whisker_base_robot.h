@@ -10,12 +10,15 @@
 #include "create/command.h"
 #include "create/odometry.h"
 #include "create/stream.h"
+#include "whisker_base_log.h"
 #include "whisker_base_options.h"
 
 /* A commander silent for so long is taken for gone; without a frame for so long the stream is restarted. */
 #define BASE_COMMANDER_MS 300
 #define BASE_SILENCE_MS 500
 #define BASE_REOPEN_MS 250
+/* A base that stays silent is told of so often. */
+#define BASE_TELL_MS 3600000
 
 /* Why the wheels are kept stopped, whatever the commander says: bits. */
 enum base_hold {
@@ -54,10 +57,14 @@ struct base_robot {
     bool silent;        /* it was heard, and then no more: until a frame comes the wheels stay stopped */
     unsigned held;      /* bits of enum base_hold: while one is set the wheels stay stopped */
     int64_t drive_ms, frame_ms, opened_ms;
+    int64_t told_ms;    /* when the log was told of a silence that still lasts; 0: none does */
     int64_t changed_ms; /* when other speeds than before were ordered */
     uint32_t frames_since_drive;
     int error; /* why the port could not be opened, as last told */
     uint64_t reconnects, silences, commander_stops, mode_losses, missed;
+    struct {
+        struct base_log_limit line, silence, back, commander, hold, mode;
+    } log;
 };
 
 void base_robot_begin(struct base_robot *robot, const struct base_options *options, base_on_step *on_step,
@@ -69,6 +76,9 @@ bool base_robot_open(struct base_robot *robot, int port, int64_t now_ms);
 
 /* Reads what has come, up to byte `limit` of this connection. False: the line is gone, and closed. */
 bool base_robot_read(struct base_robot *robot, uint64_t limit, int64_t now_ms);
+
+/* Frames since the driver began, those that never came among them: the stream's clock. */
+uint64_t base_robot_frames(const struct base_robot *robot);
 
 /* Bytes of this connection taken in. */
 uint64_t base_robot_taken(const struct base_robot *robot);

@@ -52,8 +52,8 @@ static void watch_mode(struct base_robot *robot)
     if (robot->entered && !in_force) {
         robot->mode_losses++;
         robot->speeds = (struct create_speeds){0};
-        daemon_log(LOG_WARN, "%s: the base has left its mode: %s, then send `mode safe`", robot->options->port,
-                   mode_reason(robot));
+        base_log(&robot->log.mode, LOG_WARN, "%s: the base has left its mode: %s, then send `mode safe`",
+                 robot->options->port, mode_reason(robot));
     }
     robot->entered = in_force;
 }

@@ -17,7 +17,7 @@
 #include "daemon_log.h"
 #include "whisker_base_clients.h"
 
-#define CLIENTS 3
+#define CLIENTS 20 /* more than there are places for */
 #define LINE_BYTES 4096
 #define ANSWER_BYTES 1100
 #define COUNT(array) (sizeof(array) / sizeof(array)[0])
@@ -115,12 +115,28 @@ static void check_line(void)
     }
 }
 
+static int served(void)
+{
+    int count = 0;
+    for (int i = 0; i < BASE_CLIENTS; i++) {
+        count += clients.client[i].socket >= 0;
+    }
+    return count;
+}
+
 static void check_answers(void)
 {
     char text[ANSWER_BYTES];
     for (int i = 0; i < CLIENTS; i++) {
         ssize_t got;
-        while (far.client[i] >= 0 && (got = recv(far.client[i], text, sizeof text - 1, 0)) > 0) {
+        while (far.client[i] >= 0 && (got = recv(far.client[i], text, sizeof text - 1, 0)) >= 0) {
+            if (got == 0) { /* its place was needed, or there was none */
+                demand(served() >= BASE_CLIENTS - 1 || far.owed[i] == 0);
+                close(far.client[i]);
+                far.client[i] = -1;
+                far.owed[i] = 0;
+                break;
+            }
             text[got] = '\0';
             demand(strlen(text) == (size_t)got && far.owed[i]-- > 0);
             demand(!strncmp(text, "sent ", 5) || !strncmp(text, "error ", 6) || !strncmp(text, "odometry ", 9) ||
@@ -134,7 +150,7 @@ static void check_wheels(void)
     const struct base_client *commander = clients.commander;
     demand(!commander || commander->socket >= 0);
     demand(commander || (robot.speeds.left_mm_s == 0 && robot.speeds.right_mm_s == 0));
-    demand(robot.port >= 0 || robot.speeds.left_mm_s == 0);
+    demand((robot.port >= 0 && !robot.held) || (robot.speeds.left_mm_s == 0 && robot.speeds.right_mm_s == 0));
 }
 
 /* ----------------------------------------------------------------------------------------------------------- the steps
@@ -145,8 +161,7 @@ static void connect_client(int i)
     if (far.client[i] >= 0) {
         close(far.client[i]);
     }
-    demand(base_clients_add(&clients, pair(SOCK_SEQPACKET, &far.client[i])));
-    far.owed[i] = 0;
+    far.owed[i] = base_clients_add(&clients, pair(SOCK_SEQPACKET, &far.client[i]), now_ms) ? 0 : 1; /* why not */
 }
 
 static void say(int i, const char *bytes, size_t count)
@@ -225,10 +240,16 @@ static void handle_cable(void)
     }
 }
 
+/* The heartbeat is lost, or the machine goes to sleep; or that is over. */
+static void hold(unsigned what)
+{
+    base_robot_hold(&robot, what & 32 ? BASE_HOLD_SLEEP : BASE_HOLD_HEARTBEAT, what & 64, now_ms);
+}
+
 static void act(struct input *input)
 {
     const unsigned what = take(input);
-    const int i = (int)(what >> 4) % CLIENTS;
+    const int i = (int)(take(input) % CLIENTS);
     switch (what & 7) {
     case 0:
         say_anything(input, i);
@@ -244,7 +265,7 @@ static void act(struct input *input)
         tell_frame(input);
         break;
     case 4:
-        what & 8 ? handle_cable() : tell_anything(input);
+        what & 8 ? handle_cable() : what & 16 ? hold(what) : tell_anything(input);
         break;
     default:
         say_phrase(input, i);
@@ -277,8 +298,10 @@ static void begin(unsigned kind)
     demand(base_robot_open(&robot, pair(SOCK_STREAM, &far.line), now_ms));
     for (int i = 0; i < CLIENTS; i++) {
         far.client[i] = -1;
-        connect_client(i);
+        far.owed[i] = 0;
     }
+    connect_client(0);
+    connect_client(1);
 }
 
 static int owed(void)
@@ -314,7 +337,9 @@ static void end(void)
         }
     }
     for (int i = 0; i < CLIENTS; i++) {
-        close(far.client[i]);
+        if (far.client[i] >= 0) {
+            close(far.client[i]);
+        }
     }
 }
 

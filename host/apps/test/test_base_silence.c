@@ -1,17 +1,7 @@
 /* Orders of clients while the base is silent: how far it has driven meanwhile, when it is heard again. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
+#include "base_rig.h"
 
-#include <cmocka.h>
 #include <math.h>
-#include <signal.h>
-#include <string.h>
-#include <sys/socket.h>
-#include <unistd.h>
-
-#include "daemon_log.h"
-#include "whisker_base_clients.h"
 
 #define SPEED_MM_S 200
 #define FRAME_MM (SPEED_MM_S * CREATE_OI_PERIOD_MS / 1000)
@@ -22,17 +12,8 @@
 #define ORDERED_MS (HEARD_MS + 200)
 #define BACK_MS (HEARD_MS + 1500)
 
-static struct base_options options;
-static struct base_robot robot;
-static struct base_clients clients;
-static int line, commander, other; /* the far ends */
+static int commander, other; /* the far ends */
 static double driven_m;
-
-void daemon_log(enum daemon_priority priority, const char *format, ...)
-{
-    (void)priority;
-    (void)format;
-}
 
 static void on_step(void *context, const struct create_step *step, unsigned bits)
 {
@@ -40,66 +21,13 @@ static void on_step(void *context, const struct create_step *step, unsigned bits
     driven_m += step->distance;
 }
 
-static int pair(int type, int *theirs)
-{
-    int ends[2];
-    assert_int_equal(socketpair(AF_UNIX, type | SOCK_NONBLOCK | SOCK_CLOEXEC, 0, ends), 0);
-    *theirs = ends[1];
-    return ends[0];
-}
-
-static void serve(int64_t now_ms)
-{
-    struct pollfd polled[BASE_CLIENTS];
-    base_clients_poll(&clients, polled);
-    assert_true(poll(polled, BASE_CLIENTS, 0) >= 0);
-    base_clients_serve(&clients, polled, now_ms);
-}
-
-static void say(int client, const char *message, int64_t now_ms)
-{
-    assert_int_equal(send(client, message, strlen(message), 0), strlen(message));
-    serve(now_ms);
-}
-
-/* One frame of a base in safe mode that was asked for this speed, and in it moved so far. */
-static void tell_frame(int asked_mm_s, int moved_mm, int64_t now_ms)
-{
-    uint8_t frame[CREATE_STREAM_BYTES], sum = 0;
-    int32_t value[CREATE_OI_PACKET_MAX + 1] = {[CREATE_OI_MODE] = CREATE_OI_MODE_SAFE,
-                                               [CREATE_OI_DISTANCE] = moved_mm,
-                                               [CREATE_OI_REQUESTED_LEFT] = asked_mm_s,
-                                               [CREATE_OI_REQUESTED_RIGHT] = asked_mm_s};
-    const struct create_stream *stream = &robot.stream;
-    memcpy(frame, stream->expected, stream->length);
-    for (size_t at = 2; at + 1 < stream->length;) { /* behind header and length: id, data, id, data */
-        const unsigned id = frame[at++];
-        for (size_t left = create_packet_bytes(id); left > 0; left--) {
-            frame[at++] = (uint8_t)((uint32_t)value[id] >> 8 * (left - 1));
-        }
-    }
-    for (size_t i = 0; i + 1 < stream->length; i++) {
-        sum = (uint8_t)(sum + frame[i]);
-    }
-    frame[stream->length - 1] = (uint8_t)-sum;
-    assert_int_equal(send(line, frame, stream->length, 0), stream->length);
-    assert_true(base_robot_read(&robot, UINT64_MAX, now_ms));
-}
-
 /* Driving, and then not heard any more. */
 static int begin(void **state)
 {
-    static const uint64_t restarts = 0;
     (void)state;
-    signal(SIGPIPE, SIG_IGN); /* a terminal that is gone gives an error; so shall the socket that stands for it */
-    options = (struct base_options){.port = "port"};
-    create_odometry_defaults(&options.odometry, CREATE_1);
-    options.odometry.policy = CREATE_REPORTED;
-    base_robot_begin(&robot, &options, on_step, &clients);
-    base_clients_begin(&clients, &robot, &restarts);
-    assert_true(base_robot_open(&robot, pair(SOCK_STREAM, &line), OPENED_MS));
-    assert_true(base_clients_add(&clients, pair(SOCK_SEQPACKET, &commander)));
-    assert_true(base_clients_add(&clients, pair(SOCK_SEQPACKET, &other)));
+    begin_rig(false, on_step, OPENED_MS);
+    assert_true(base_clients_add(&clients, pair(SOCK_SEQPACKET, &commander), OPENED_MS));
+    assert_true(base_clients_add(&clients, pair(SOCK_SEQPACKET, &other), OPENED_MS));
     say(commander, "drive 0.2 0", OPENED_MS);
     for (int64_t now_ms = OPENED_MS; now_ms < HEARD_MS; now_ms += CREATE_OI_PERIOD_MS) {
         tell_frame(SPEED_MM_S, FRAME_MM, now_ms + CREATE_OI_PERIOD_MS);
@@ -111,13 +39,7 @@ static int begin(void **state)
 static int end(void **state)
 {
     (void)state;
-    for (int i = 0; i < BASE_CLIENTS; i++) {
-        if (clients.client[i].socket >= 0) {
-            close(clients.client[i].socket);
-        }
-    }
-    close(robot.port);
-    close(line);
+    end_rig();
     close(commander);
     close(other);
     return 0;

@@ -5,10 +5,12 @@ No test waits by the clock: each waits for bytes on the line, for an answer, or 
 
 import math
 import os
+import resource
 import signal
 import socket
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from createpeer import FIRM_STOP, FULL, PAUSE, SAFE, START, STOP, STREAM, Driver, Heart, drive_order
@@ -451,6 +453,77 @@ def test_one_commands_and_everybody_may_stop(start):
         assert observer.health()["commander"] == "0"
         observer.drive(0.1, 0)
         driver.peer.await_order(drive_order(100, 100))
+
+
+def connections(driver, count):
+    """So many clients that say nothing."""
+    made = []
+    for _ in range(count):
+        made.append(socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET))
+        made[-1].connect(str(driver.socket))
+    return made
+
+
+def await_log(driver, text):
+    while text not in driver.log.read_text():
+        assert driver.process.poll() is None, driver.log.read_text()
+
+
+def test_too_few_descriptors_to_wait_for_end_the_driver_with_a_line(start):
+    driver = start()
+    with driver.client() as client:
+        client.drive(0.2, 0)
+        driver.peer.await_order(drive_order(200, 200))
+        resource.prlimit(int(client.health()["driver_pid"]), resource.RLIMIT_NOFILE, (8, 8))
+        driver.peer.await_order(ENDED)
+    assert driver.process.wait() == 1
+    assert "descriptors: Invalid argument; wheels stopped, ending; allow more (ulimit -n)" in driver.log.read_text()
+
+
+def sleeps(pid: int) -> int:
+    """How often a process has gone to sleep by itself: one that spins does not."""
+    status = dict(line.split(":\t", 1) for line in Path(f"/proc/{pid}/status").read_text().splitlines())
+    return int(status["voluntary_ctxt_switches"])
+
+
+def test_a_client_for_whom_there_is_no_descriptor_waits_and_costs_nothing(start):
+    driver = start("--clock", "stream")
+    with driver.client() as client:
+        pid = int(client.health()["driver_pid"])
+        resource.prlimit(pid, resource.RLIMIT_NOFILE, (20, 20))  # as many as it waits for
+        others = connections(driver, 14)
+        await_log(driver, "cannot take a client: Too many open files; allow more (ulimit -n)")
+        slept = sleeps(pid)
+        while sleeps(pid) < slept + 3:
+            assert driver.process.poll() is None
+        waiting = driver.client()
+        for other in others:
+            other.close()
+        assert waiting.health()["restarts"] == "0"
+        waiting.close()
+    assert driver.log.read_text().count("cannot take a client") <= 5
+
+
+def test_silent_clients_give_their_places_to_new_ones(start):
+    driver = start()
+    with driver.client() as commander:
+        commander.drive(0, 0)
+        silent = connections(driver, 40)
+        with driver.client() as client:
+            assert client.health()["commander"] == "1"
+        commander.drive(0, 0)
+        for one in silent:
+            one.close()
+
+
+def test_clients_that_come_and_go_fill_no_log(start):
+    driver = start("--clock", "stream")
+    for _ in range(100):
+        with driver.client() as client:
+            client.drive(0, 0)
+    with driver.client() as client:
+        client.health()
+    assert driver.log.read_text().count("the commander has gone") == 5
 
 
 def test_messages_that_are_none_are_refused(start):

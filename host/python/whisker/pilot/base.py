@@ -1,7 +1,8 @@
 """The robot's base: client of `whisker-base`, which drives an iRobot Create or its emulator.
 
 One ASCII message per packet over a Unix socket, one answer each; docs/create.md has them all. The first client that drives
-commands; any number may observe. A commander that is silent for 0.3 s, or goes, finds the wheels stopped.
+commands; any number may observe. A commander that is silent for 0.3 s, or goes, finds the wheels stopped; after 1 s another
+client may command.
 """
 
 import socket
@@ -14,7 +15,7 @@ ANSWER_BYTES = 4096
 # Bits of an odometry message: what was true at some time since the message before it.
 BUMP_RIGHT, BUMP_LEFT, DROP_RIGHT, DROP_LEFT, DROP_CASTER = (1 << n for n in range(5))
 CLIFF_LEFT, CLIFF_FRONT_LEFT, CLIFF_FRONT_RIGHT, CLIFF_RIGHT = (1 << n for n in range(5, 9))
-IDLE = 1 << 9  # wheels will not turn: the base has left its mode (see `health()`), or its port is gone
+IDLE = 1 << 9  # wheels will not turn: the base has left its mode, is silent or held (see `health()`), or its port is gone
 
 
 class BaseError(UserError):
