@@ -7,6 +7,7 @@ fails a second time, alone, so that a test that failed by chance kills nothing.
 """
 
 import argparse
+import ctypes
 import json
 import os
 import random
@@ -14,6 +15,7 @@ import re
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from contextlib import suppress
 from itertools import count as counter
@@ -29,11 +31,25 @@ ROOT = Path(__file__).resolve().parents[2]
 SHARES = {"c": 0.45, "py": 0.4, "v": 0.15}  # of the draw, by language
 PRODUCT = ("firmware/dspic", "fpga/bridge_rtl", "host")
 NOT_PRODUCT = re.compile(r"/tests?/|/examples/|/gen/|/bench|/fuzz|/model/")
-TIMEOUT_S = 1800.0  # for one command; a mutant that hangs is killed by it
+TIMEOUTS_S = (
+    300.0,
+    1800.0,
+)  # for one command of the nearest tests, and of the others; a mutant that hangs is killed by it
+PR_SET_CHILD_SUBREAPER = 36  # linux/prctl.h
 
 
 class Unbuildable(Exception):
     """A mutant that the compiler refuses."""
+
+
+def _end_children() -> None:
+    """Kill every child of this process, those too that a broken program left to it (see main)."""
+    listed = Path(f"/proc/self/task/{os.getpid()}/children")
+    while children := listed.read_text().split():
+        for pid in map(int, children):
+            with suppress(ProcessLookupError, ChildProcessError):
+                os.kill(pid, signal.SIGKILL)
+                os.waitpid(pid, 0)
 
 
 class Tree:
@@ -41,7 +57,7 @@ class Tree:
 
     def __init__(self, folder: Path, commit: str):
         """`folder` is made when it is not there, brought to `commit`, and built."""
-        self.folder = folder
+        self.folder, self._timeout_s = folder, TIMEOUTS_S[-1]
         if not folder.exists():
             subprocess.run(["git", "clone", "--quiet", ROOT, folder], check=True)
             (folder / ".venv").symlink_to(ROOT / ".venv")
@@ -54,29 +70,29 @@ class Tree:
             sys.exit("mutants: the tree does not build; run 'make build' and mend what it names")
 
     def run(self, *words: str) -> tuple[bool, str]:
-        """Whether a command ended well, and what it wrote. One that takes longer than TIMEOUT_S has failed."""
+        """Whether a command ended well, and what it wrote. One that takes too long has failed."""
         # No bytecode: what was compiled of a mutant must not stand for the file restored within the same second.
         environment = os.environ | {"WHISKER_BUILD": BUILD, "PYTHONDONTWRITEBYTECODE": "1"}
         environment["PYTHONPATH"] = str(self.folder / "host/python")
-        process = subprocess.Popen(
-            words,
-            cwd=self.folder,
-            env=environment,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            errors="replace",
-            start_new_session=True,
-        )
-        try:
-            output, _ = process.communicate(timeout=TIMEOUT_S)
-        except subprocess.TimeoutExpired:
-            output = "timeout"
-        with suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGKILL)  # what a broken program has left running
-        process.wait()
-        return process.returncode == 0, output
+        with tempfile.TemporaryFile("w+", errors="replace") as output:
+            process = subprocess.Popen(
+                words,
+                cwd=self.folder,
+                env=environment,
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=subprocess.STDOUT,
+            )
+            try:
+                good = process.wait(timeout=self._timeout_s) == 0
+            except subprocess.TimeoutExpired:
+                good = False
+                output.write("timeout")
+            process.kill()
+            process.wait()
+            _end_children()
+            output.seek(0)
+            return good, output.read()
 
     def first_red(self, step: Step) -> str:
         """The first test of a step that fails, and fails again alone; empty: none. Unbuildable: it does not compile."""
@@ -95,7 +111,7 @@ class Tree:
         return preset != "release" or targets != ("all",) or self.run("tools/build.sh", BUILD)[0]
 
     def _ctest(self, folder: str) -> str:
-        words = ["ctest", "--test-dir", folder, "--stop-on-failure", "--timeout", "300"]
+        words = ["ctest", "--test-dir", folder, "--stop-on-failure", "--timeout", "120"]
         good, output = self.run(*words, "--parallel", "2", "--exclude-regex", SLOW_PROGRAMS)
         found = re.search(r"^\s*\d+ - (\S+) \(", output, re.M)
         if good or not found:
@@ -114,7 +130,7 @@ class Tree:
             if good:
                 return ""
             if not found:
-                return "timeout" if output == "timeout" else f"pytest: {output.strip().splitlines()[-1]:.100}"
+                return "timeout" if output.endswith("timeout") else f"pytest: {output.strip().splitlines()[-1]:.100}"
             if not self.run(*words, found[1])[0]:
                 return found[1]
         return ""
@@ -127,6 +143,7 @@ class Tree:
         red, step = "", 0
         try:
             for step, tests in enumerate(steps_for(self.folder, mutant.file)[: 1 if near_only else None]):  # noqa: B007
+                self._timeout_s = TIMEOUTS_S[step > 0]
                 if red := self.first_red(tests):
                     break
             outcome = "killed" if red else "survived"
@@ -175,6 +192,7 @@ def main() -> int:
     options.out.mkdir(parents=True, exist_ok=True)
     results = options.out / f"{options.commit[:12]}-seed{options.seed}.jsonl"
     known = _read(results)
+    ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)  # orphans below this process become its children
     tree = Tree(options.out.resolve() / "tree", options.commit)
     with tqdm(total=options.count, unit="mutant", smoothing=0) as bar:
         valid = 0
