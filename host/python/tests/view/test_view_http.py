@@ -2,18 +2,22 @@
 
 import asyncio
 import base64
+import contextlib
 import hashlib
 import random
 import re
 import resource
 
 import pytest
-from viewkit import PATIENCE_S, made_frames, nothing_logged, page, ring_of, view_of
-from websockets.exceptions import InvalidStatus
+from viewkit import PATIENCE_S, Script, made_frames, nothing_logged, page, ring_of, view_of
+from websockets.asyncio.client import connect
+from websockets.exceptions import ConnectionClosed
+from websockets.frames import CloseCode
 
 from whisker.view.guard import Guard
 from whisker.view.page import Page
-from whisker.view.server import CLIENTS_MAX, CONNECTIONS_MAX
+from whisker.view.places import Places, network_of
+from whisker.view.server import PAGES_MAX
 
 UPGRADE = "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA=="
 FUZZ_INPUTS = 20_000
@@ -130,31 +134,116 @@ def test_names_that_were_allowed_are_answered_and_addresses_of_a_wide_open_serve
     assert Guard("192.0.2.7", []).refuse({"Host": "192.0.2.7:8028"}) is None
 
 
-def test_pages_and_connections_are_limited_and_places_come_free_again():
-    async def scenario():
-        async with view_of() as port:
-            pages = [page(port) for _ in range(CLIENTS_MAX)]
-            for p in pages:
-                await (await p.__aenter__()).next("hello")
-            with pytest.raises(InvalidStatus) as refusal:
-                await page(port).__aenter__()
-            assert refusal.value.response.status_code == 503
-            await pages[0].__aexit__(None, None, None)
-            while True:  # until the server has noticed
-                try:
-                    async with page(port) as p:
-                        await p.next("hello")
-                    break
-                except InvalidStatus:
-                    continue
-            silent = [await asyncio.open_connection("127.0.0.1", port) for _ in range(CONNECTIONS_MAX)]
-            assert await silent[-1][0].read() == b"", "one connection too many must be closed"
-            for _, writer in silent:
-                writer.close()
-            for p in pages[1:]:
-                await p.__aexit__(None, None, None)
+async def watching(port: int) -> Script:
+    """A page that looks at something."""
+    script = Script(await connect(f"ws://127.0.0.1:{port}/ws"))
+    await script.ask(type="subscribe", topic="rings")
+    await script.next("rings")
+    return script
 
-    asyncio.run(scenario())
+
+def with_all_pages_taken(scenario) -> None:
+    async def run():
+        async with view_of() as port:
+            pages = await asyncio.gather(*(watching(port) for _ in range(PAGES_MAX)))
+            await scenario(port, pages)
+            for script in pages:
+                await script.socket.close()
+
+    asyncio.run(asyncio.wait_for(run(), PATIENCE_S))
+
+
+def test_pages_are_limited_and_places_come_free_again(monkeypatch):
+    monkeypatch.setattr("whisker.view.client.IDLE_S", PATIENCE_S)
+
+    async def scenario(port, pages):
+        with pytest.raises(ConnectionClosed) as refusal:
+            await watching(port)
+        assert refusal.value.rcvd.code == CloseCode.TRY_AGAIN_LATER and "close one" in refusal.value.rcvd.reason
+        await pages.pop().socket.close()
+        while len(pages) < PAGES_MAX:  # until the server has noticed
+            with contextlib.suppress(ConnectionClosed):
+                pages.append(await watching(port))
+
+    with_all_pages_taken(scenario)
+
+
+def test_a_page_that_is_silent_makes_way_for_a_new_one(monkeypatch):
+    monkeypatch.setattr("whisker.view.client.IDLE_S", 0.0)
+
+    async def scenario(port, pages):
+        pages.append(await watching(port))
+        ended = [asyncio.create_task(script.socket.wait_closed()) for script in pages]
+        await asyncio.wait(ended, return_when=asyncio.FIRST_COMPLETED)
+        assert not ended[-1].done() and sum(task.done() for task in ended) == 1
+
+    with_all_pages_taken(scenario)
+
+
+async def held(port: int, request: bytes) -> asyncio.StreamReader:
+    """A connection that has sent so much and waits; of a WebSocket, until it is open."""
+    reader, writer = await asyncio.open_connection("127.0.0.1", port)
+    KEPT.append(writer)
+    writer.write(request)
+    if request.endswith(b"\r\n\r\n"):
+        await reader.readuntil(b"\r\n\r\n")
+    return reader
+
+
+KEPT = []  # writers of connections that are held
+
+
+@pytest.mark.parametrize("request_", [b"", b"GET / HTTP/1.1\r\nHost: loc", get("/ws", "Host: localhost", UPGRADE)])
+def test_connections_that_ask_for_nothing_are_limited_and_make_way(monkeypatch, request_):
+    """When all places are taken, the oldest ends and honest clients are served."""
+    monkeypatch.setattr("whisker.view.server.OPEN_S", 2 * PATIENCE_S)
+    monkeypatch.setattr("whisker.view.server.WAITING_MAX", places := 40)
+
+    async def scenario():
+        async with view_of() as port, page(port) as steady:
+            await steady.ask(type="subscribe", topic="rings")
+            await steady.next("rings")
+            waiting = [await held(port, request_) for _ in range(places + 1)]
+            await waiting[0].read()  # to its end
+            assert (await ask(port, get("/", "Host: localhost"))).startswith(b"HTTP/1.1 200 ")
+            async with page(port) as late:
+                await late.ask(type="subscribe", topic="rings")
+                await late.next("rings")
+            assert not waiting[-1].at_eof()
+            await steady.ask(type="subscribe", topic="scene")
+            await steady.next("scene")
+            for writer in KEPT:
+                writer.transport.abort()
+            KEPT.clear()
+
+    asyncio.run(asyncio.wait_for(scenario(), PATIENCE_S))
+
+
+def holders(places: Places) -> list[str]:
+    return sorted(places._network_of)
+
+
+def test_places_go_first_from_who_has_most_and_has_been_idle_longest():
+    idle = {"a1": None, "a2": 7.0, "a3": 5.0, "b1": 1.0, "b2": None, "c1": None}
+    places = Places(4, idle.get)
+    assert [places.enter(name, name[0]) for name in ("a1", "a2", "a3", "b1")] == [None] * 4
+    assert places.enter("b2", "b") == "a3"  # not b1, idle for longer: a has three places
+    assert holders(places) == ["a1", "a2", "b1", "b2"]
+    assert places.enter("c1", "c") == "a2"
+    assert places.enter("a3", "a") == "a3", "a has as many as b, and none of its own is idle"
+    assert holders(places) == ["a1", "b1", "b2", "c1"]
+    places.leave("c1")
+    assert places.enter("a3", "a") is None
+    assert places.enter("c1", "c") == "a3"
+    idle["b1"] = None
+    assert places.enter("d1", "d") == "b1", "none is idle, but its network has most"
+
+
+def test_a_network_is_an_address_or_the_part_of_one_that_a_host_can_choose_from():
+    assert network_of(("192.0.2.7", 1)) == "192.0.2.7"
+    assert network_of(("2001:db8::1", 1, 0, 0)) == network_of(("2001:db8::ffff:2", 9, 0, 0)) == "2001:db8::/64"
+    assert network_of(("fe80::1%eth0", 1, 0, 2)) == "fe80::/64"
+    assert network_of(None) == ""
 
 
 SEEDS = [

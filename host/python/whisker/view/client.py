@@ -3,6 +3,7 @@
 import asyncio
 import json
 import time
+from collections.abc import Callable
 
 from websockets.asyncio.server import ServerConnection
 from websockets.exceptions import ConnectionClosed
@@ -16,6 +17,7 @@ from .topics import TOPICS
 PROTOCOL = 1  # of docs/view.md
 WINDOW = 4  # messages under way: a page that has not dealt with them gets no more
 REQUESTS_PER_S = 200  # more is no page
+IDLE_S = 5.0  # a page that has not sent anything for so long looks at nothing: each message is acknowledged
 ERRORS_MAX = 16  # a page that asks nonsense so often is cut off
 REST_COUNT = 0x8000  # protocol/whisker.toml, field alpha
 DEGREES_PER_COUNT = 180 / 65536
@@ -41,15 +43,28 @@ def hello(hub: Hub) -> dict:
     }
 
 
-class Client:
-    """`run` it until the page goes. Holds no message but the one being sent."""
+class NoRoomError(Exception):
+    """There are as many pages as can be served."""
 
-    def __init__(self, hub: Hub, socket: ServerConnection):
-        self._hub, self._socket = hub, socket
+
+class Client:
+    """`run` it until the page goes. Holds no message but the one being sent.
+
+    `enter` is asked once, before the first subscription, whether there is room for one more page."""
+
+    def __init__(self, hub: Hub, socket: ServerConnection, enter: Callable[[], bool]):
+        self._hub, self._socket, self._enter = hub, socket, enter
         self._feeds = {}
         self._sent = self._dealt_with = self._errors = 0
         self._may_send = asyncio.Event()
         self._second, self._requests = 0, 0
+        self._is_page = False
+        self._heard = time.monotonic()
+
+    def idle_since(self) -> float | None:
+        """When it last sent anything, s; None: it is not idle."""
+        silent = time.monotonic() - self._heard > IDLE_S
+        return self._heard if silent or not self._feeds else None
 
     async def run(self) -> None:
         try:
@@ -59,6 +74,8 @@ class Client:
                 sender.cancel()
         except* ConnectionClosed:
             pass
+        except* NoRoomError:
+            await self._socket.close(CloseCode.TRY_AGAIN_LATER, "too many pages are connected; close one")
         finally:
             for feed in self._feeds.values():
                 feed.close()
@@ -89,6 +106,7 @@ class Client:
         await self._socket.send(message)
 
     async def _answer(self, message: str | bytes) -> None:
+        self._heard = time.monotonic()
         try:
             self._count_request()
             self._do(parse(message))
@@ -113,6 +131,7 @@ class Client:
                 self._acknowledge(request.get("count"))
             case "subscribe":
                 name = self._topic(request)
+                self._become_page()
                 feed = TOPICS[name].feed(self._hub, request)
                 self._leave(name)
                 self._feeds[name] = feed
@@ -120,6 +139,11 @@ class Client:
                 self._leave(self._topic(request))
             case _:
                 raise RequestError("type: not ack, subscribe or unsubscribe")
+
+    def _become_page(self) -> None:
+        if not self._is_page and not self._enter():
+            raise NoRoomError
+        self._is_page = True
 
     def _acknowledge(self, count: object) -> None:
         if type(count) is not int or not self._dealt_with <= count <= self._sent:

@@ -6,6 +6,7 @@ import logging
 import os
 import socket
 from contextlib import asynccontextmanager
+from functools import partial
 from http import HTTPStatus
 
 from websockets.asyncio.server import Server, ServerConnection, serve
@@ -17,11 +18,14 @@ from .client import Client
 from .guard import Guard
 from .hub import Hub
 from .page import HEADERS, Page
+from .places import Places, network_of
 
 PAGE_PATH, LIVE_PATH = "/", "/ws"
 MESSAGE_BYTES = 4096  # the longest request of a page; a longer one ends the connection
-CLIENTS_MAX = 32
-CONNECTIONS_MAX = 128  # with those that have not said yet what they want
+PAGES_MAX = 32
+WAITING_MAX = 512  # connections that look at nothing: no request yet, an answer under way, nothing subscribed to
+OPEN_S = 5  # for a request to come and its answer to go
+BACKLOG = 128  # connections that are accepted at a time: fewer than wait, or a burst ends those before it unheard
 SEND_BYTES = 1 << 17  # kernel's buffer per page: a slow one must be late by little
 LOG = logging.getLogger(__name__)
 
@@ -33,22 +37,50 @@ class ViewError(UserError):
 
 
 class Connection(ServerConnection):
-    """One connection too many is closed before it is heard."""
+    """A connection that the view knows of from its first moment to its last."""
+
+    def __init__(self, view: "ViewServer", *arguments, **options):
+        super().__init__(*arguments, **options)
+        self._view = view
+        self.client: Client | None = None  # once it is open
+        self.network = ""
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         super().connection_made(transport)
-        if len(self.server.handler_tasks) > CONNECTIONS_MAX:
-            transport.abort()
+        self.network = network_of(transport.get_extra_info("peername"))
+        self._view.come(self)
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        super().connection_lost(exc)
+        self._view.gone(self)
 
 
 class ViewServer:
-    """Answers requests; `connection` is what websockets calls its handler."""
+    """Answers requests; `connection` is what websockets calls its handler.
+
+    A connection is a page once it has subscribed to something. Of those that have not, the oldest makes way for a new one
+    when there are too many; of pages, the one that has been silent for longest. A slow or idle one shuts nobody out.
+    """
 
     def __init__(self, hub: Hub, guard: Guard):
         self._hub, self._guard, self._page = hub, guard, Page()
-        self._clients = 0
+        self._waiting = Places(WAITING_MAX, lambda connection: 0)
+        self._pages = Places(PAGES_MAX, lambda connection: connection.client.idle_since())
 
-    async def answer(self, connection: ServerConnection, request: Request) -> Response | None:
+    def come(self, connection: Connection) -> None:
+        """A new connection, whose request is still to come."""
+        self._shut_out(self._waiting.enter(connection, connection.network))
+
+    def gone(self, connection: Connection) -> None:
+        self._waiting.leave(connection)
+        self._pages.leave(connection)
+
+    @staticmethod
+    def _shut_out(connection: Connection | None) -> None:
+        if connection is not None:
+            connection.transport.abort()
+
+    async def answer(self, connection: Connection, request: Request) -> Response | None:
         """The response to a plain request; None: it is a page's live connection, go on."""
         if connection.protocol.eof_sent:  # garbage came after the request and was answered with the end of the stream
             connection.transport.abort()
@@ -61,18 +93,22 @@ class ViewServer:
             return _response(HTTPStatus.OK, self._page.headers(request.headers["Host"]), self._page.body)
         if path != LIVE_PATH:
             return _text(HTTPStatus.NOT_FOUND, "there is only the page, at /")
-        if self._clients >= CLIENTS_MAX:
-            return _text(HTTPStatus.SERVICE_UNAVAILABLE, f"{CLIENTS_MAX} pages are connected; close one")
         return None
 
-    async def connection(self, connection: ServerConnection) -> None:
-        self._clients += 1
+    async def connection(self, connection: Connection) -> None:
         plug = connection.transport.get_extra_info("socket")
         plug.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BYTES)
-        try:
-            await Client(self._hub, connection).run()
-        finally:
-            self._clients -= 1
+        connection.client = Client(self._hub, connection, lambda: self._becomes_page(connection))
+        await connection.client.run()
+
+    def _becomes_page(self, connection: Connection) -> bool:
+        """A connection subscribes for the first time; False: there is no place for one more page."""
+        leaving = self._pages.enter(connection, connection.network)
+        if leaving is connection:
+            return False
+        self._waiting.leave(connection)
+        self._shut_out(leaving)
+        return True
 
 
 def _text(status: HTTPStatus, text: str) -> Response:
@@ -94,12 +130,13 @@ async def serving(hub: Hub, address: str, port: int, allowed: list[str]):
             address,
             port,
             process_request=view.answer,
-            create_connection=Connection,
+            create_connection=partial(Connection, view),
             compression=None,
             server_header=None,
             max_size=MESSAGE_BYTES,
-            open_timeout=5,
+            open_timeout=OPEN_S,
             close_timeout=2,
+            backlog=BACKLOG,
             logger=LOG,
         )
     except OSError as error:
