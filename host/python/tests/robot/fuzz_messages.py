@@ -35,7 +35,7 @@ def use(kind: type, data: bytes, topic: str):
         message = m.decode(kind, data, topic)
     except m.MessageError as error:
         text = str(error)
-        assert text.startswith(f"{topic}: ") and text.endswith("on both sides") and "\n" not in text, text
+        assert text.startswith(f"{topic}: ") and text.endswith(m.REMEDIES) and "\n" not in text, text
         return None
     again = m.encode(message)
     assert len(again) == len(data) and m.encode(m.decode(kind, again, topic)) == again

@@ -16,8 +16,10 @@ def examples() -> dict[str, object]:
     """By topic, with every field away from its default."""
     rng = np.random.default_rng(5)
     at = m.Header.at(12_345_678_901, "some frame")
-    pose = m.PoseWithCovariance.planar((1.0, -2.0, 3.0), rng.random((3, 3)))
-    twist = m.TwistWithCovariance(m.Twist(m.Vector3(0.1, 0.2, 0.3), m.Vector3(0.4, 0.5, 0.6)), rng.random(36))
+    planar, full = rng.random((3, 3)), rng.random((6, 6))
+    pose = m.PoseWithCovariance.planar((1.0, -2.0, 3.0), planar @ planar.T)
+    velocity = m.Twist(m.Vector3(0.1, 0.2, 0.3), m.Vector3(0.4, 0.5, 0.6))
+    twist = m.TwistWithCovariance(velocity, (full @ full.T).ravel())
     bumps = [rng.random(7).astype("f4") for _ in range(6)]
     return {
         "observation": m.Observation(

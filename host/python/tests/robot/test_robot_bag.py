@@ -171,6 +171,13 @@ def test_log_times_follow_the_bridge_and_outlive_it():
     assert clock.other(501 * second) == clock.latest  # an answer to a row of the bridge before
 
 
+def test_log_times_stay_what_a_file_can_hold_whatever_rows_are_stamped():
+    clock, began = BagClock(10**18), 10**18
+    for n in range(200):
+        clock.row(n % 2 * (10**9 - 1) * 10**9)
+    assert began < clock.latest <= began + 200 * 10**8
+
+
 def test_an_existing_bag_is_kept(tmp_path, capsys):
     (tmp_path / "a.mcap").write_text("dear")
     code, _, err = run(capsys, "bag", tmp_path / "a.mcap", "--connect", "none")

@@ -1,13 +1,17 @@
 """Streams over zenoh: typed, numbered, found again after every loss, and honest about what was lost."""
 
+import time
+
 import pytest
 from linkkit import free_endpoint, sample
 from robotkit import Cable, examples, take_until
 
+from whisker.robot import inbox as inbox_module
 from whisker.robot import messages as m
-from whisker.robot.inbox import Inbox, encoding_of
+from whisker.robot.inbox import TOPICS_MOST, Inbox, encoding_of
 from whisker.robot.link import MESSAGE_MOST, Link, LinkError, is_loopback
-from whisker.robot.streams import ENVELOPE, Envelope, EnvelopeError, Tally, envelopes
+from whisker.robot.sources import STREAMS_MOST, Sources, Verdict
+from whisker.robot.streams import ENVELOPE, Envelope, EnvelopeError, Tally, envelopes, new_stream
 
 PATIENCE_S = 30.0
 
@@ -19,6 +23,19 @@ def row(seq: int) -> m.Observation:
 
 def seqs(got) -> list[int]:
     return [received.message.seq for received in got if not received.over]
+
+
+class Forger:
+    """Messages of a session that are not made by a Publisher, in an announced stream of their own."""
+
+    def __init__(self, link: Link, topic: str = "observation"):
+        self._session, stream = link._session, new_stream()
+        self.key, self._envelopes = f"whisker/robot/{topic}", envelopes(stream)
+        self._token = self._session.liveliness().declare_token(f"whisker/robot/stream/{stream:08x}/{topic}")
+
+    def put(self, payload: bytes, key: str = "", encoding: str = encoding_of(m.Observation), attachment=None) -> None:
+        attachment = next(self._envelopes).pack() if attachment is None else attachment
+        self._session.put(key or self.key, payload, encoding=encoding, attachment=attachment)
 
 
 class Pair:
@@ -84,6 +101,7 @@ def test_every_topic_has_its_type():
         view.announce()
         assert pilot.wait_for(["view"], PATIENCE_S)
         sent = examples()
+        sent["observation"].seq = 0
         for topic, message in sent.items():
             pilot.publish(topic).send(message)
         got = take_until(inbox, lambda got: len(got) == len(sent))
@@ -165,31 +183,158 @@ def test_a_cut_cable_is_survived_and_the_gap_is_told():
 
 def test_what_is_no_message_is_counted_and_said_and_the_rest_goes_on():
     with Pair() as pair:
-        key, good = "whisker/robot/observation", m.encode(row(0))
-        stream, cdr = envelopes(), encoding_of(m.Observation)
-        session = pair.pilot._session
-        session.put(key, good[:-1], encoding=cdr, attachment=next(stream).pack())
-        session.put(key, good, encoding=cdr)
-        session.put(key, good, encoding="text/plain", attachment=next(stream).pack())
-        session.put(key, good, encoding=cdr, attachment=ENVELOPE.pack(2, 0, 1, 1, 0))
-        session.put("whisker/robot/health/a/b/c", good, encoding=cdr, attachment=next(stream).pack())
-        session.put(key, good, encoding=cdr, attachment=next(stream).pack())
-        pair.come(0)
-        assert (pair.tally.refused, pair.inbox.refused, pair.tally.missed) == (4, 4, 1)
+        good, forger = m.encode(row(0)), Forger(pair.pilot)
+        forger.put(good[:-1])
+        forger.put(good, attachment=b"")
+        forger.put(good, encoding="text/plain")
+        forger.put(good, attachment=ENVELOPE.pack(2, 0, 1, 1, 0))
+        forger.put(good, attachment=ENVELOPE.pack(1, 0, 1, 2**63, 0))
+        forger.put(m.encode(row(2)))
+        pair.come(2)
+        assert (pair.tally.refused, pair.inbox.refused, pair.tally.missed) == (5, 5, 0)
         assert pair.inbox.last_error == (
-            "observation: field envelope: version 2 of the stream, this release has 1; "
+            "observation: field envelope: number 9223372036854775808, sent at 0 ns: neither can be; "
             "install one release of whisker on both sides"
         )
 
 
+def test_a_row_counts_as_its_stream_does():
+    """Sequence numbers are checked against the stream's: a row that leaps is refused, and those behind it are taken."""
+    with Pair() as pair:
+        forger = Forger(pair.pilot)
+        for seq in (0, 7, 2**31, 3):
+            forger.put(m.encode(row(0) if seq == 2**31 else row(seq)))
+        pair.come(0, 3)
+        assert (pair.tally.refused, pair.tally.missed) == (2, 0)
+        assert pair.inbox.last_error == "observation: field seq: 0 in message 2; stop what sends it"
+
+
 def test_a_message_too_large_does_not_come_and_is_missed():
     with Pair() as pair:
-        key, stream, cdr = "whisker/robot/observation", envelopes(), encoding_of(m.Observation)
-        good = m.encode(row(0))
-        for payload in (good, bytes(MESSAGE_MOST), good):
-            pair.pilot._session.put(key, payload, encoding=cdr, attachment=next(stream).pack())
-        pair.come(0, 0)
+        forger = Forger(pair.pilot)
+        for payload in (m.encode(row(0)), bytes(MESSAGE_MOST), m.encode(row(2))):
+            forger.put(payload)
+        pair.come(0, 2)
         assert (pair.tally.missed, pair.tally.refused) == (1, 0)
+
+
+def take_until_refused(inbox: Inbox, count: int) -> list:
+    """What is taken until so many are refused."""
+    got, until = [], time.monotonic() + PATIENCE_S
+    while inbox.refused < count and time.monotonic() < until:
+        got += inbox.take(0.05)
+    assert inbox.refused == count
+    return got
+
+
+def test_rows_of_a_source_that_nobody_announced_are_refused(monkeypatch):
+    """As of a program of another release: they wait for a token, then they are counted."""
+    monkeypatch.setattr(inbox_module, "HOLD_S", 1.0)
+    stream = envelopes()
+    with Pair() as pair:
+        for seq in range(3):
+            attachment = next(stream).pack()
+            pair.pilot._session.put(
+                "whisker/robot/observation",
+                m.encode(row(seq)),
+                encoding=encoding_of(m.Observation),
+                attachment=attachment,
+            )
+        assert take_until_refused(pair.inbox, 3) == []
+        pair.send(0)
+        pair.come(0)
+    assert pair.tally.received == 1 and pair.inbox.last_error.startswith(
+        "observation: field stream: of a source that has not been announced; "
+    )
+
+
+def test_rows_that_come_before_their_token_are_taken_when_it_comes():
+    sources = Sources()
+    inbox, stream = Inbox("", 10, sources), new_stream()
+    sent = envelopes(stream)
+    for seq in range(3):
+        inbox.put(sample("observation", row(seq), next(sent)))
+    assert inbox.take(0.0) == [] and inbox.refused == 0
+    inbox.put(sample("observation", row(3), next(sent)))
+    sources.note("observation", stream, alive=True)
+    inbox.look_again()
+    assert seqs(inbox.take(PATIENCE_S)) == [0, 1, 2, 3] and (inbox.refused, inbox.missed) == (0, 0)
+
+
+def test_of_two_announced_sources_the_first_is_taken_until_it_is_gone():
+    ends = free_endpoint(), free_endpoint()
+    one, two = (Link("pilot", listen=[end], lock_step=True) for end in ends)
+    with one, two, Link("navigator", connect=ends, lock_step=True) as navigator:
+        inbox, first, second = (
+            navigator.subscribe("observation"),
+            one.publish("observation"),
+            two.publish("observation"),
+        )
+        navigator.announce()
+        assert all(link.wait_for(["navigator"], PATIENCE_S) for link in (one, two))
+        first.send(row(0))
+        assert seqs(take_until(inbox, lambda got: len(got) == 1)) == [0]
+        second.send(row(0))
+        assert take_until_refused(inbox, 1) == []
+        assert inbox.last_error == (
+            "observation: field stream: of a second source; end one of the two, or give it another --robot"
+        )
+        first.send(row(1))
+        assert seqs(take_until(inbox, lambda got: len(got) == 1)) == [1]
+        one.close()
+        sending = (second.send(row(seq)) or inbox.take(0.05) for seq in range(1, 10_000))
+        assert next(got for got in sending if got)[0].topic == "observation"
+        assert inbox.tallies["observation"].restarts == 1
+
+
+def test_a_source_that_ended_makes_room_for_the_next():
+    with Pair() as pair:
+        pair.send(0)
+        pair.rows.end(0)
+        pair.rows = pair.pilot.publish("observation")
+        pair.send(0)
+        got = take_until(pair.inbox, lambda got: len(got) == 3)
+    assert [r.over for r in got] == [False, True, False] and pair.tally.restarts == 1
+
+
+def test_sources_are_bounded_and_forget_the_gone_first():
+    sources = Sources()
+    for stream in range(STREAMS_MOST + 5):
+        sources.note("observation", stream, alive=True)
+    assert sources.judge("observation", None, STREAMS_MOST + 4) is Verdict.UNKNOWN
+    sources.note("observation", 3, alive=False)
+    sources.note("observation", 1000, alive=True)
+    assert sources.judge("observation", None, 1000) is Verdict.TAKEN
+    assert sources.judge("observation", None, 3) is Verdict.UNKNOWN
+    assert sources.judge("observation", 0, 1000) is Verdict.SECOND
+    for n in range(1000):
+        sources.note(f"health/x{n}", n, alive=True)
+    assert sources.judge("health/x999", None, 999) is Verdict.UNKNOWN
+
+
+def test_topics_that_are_made_up_take_no_room():
+    """2000 processes of which nobody has heard, and 2000 topics of no release: counted, and what is ours comes."""
+    inbox, told = Inbox("", None), examples()["health/pilot"]
+    for n in range(2000):
+        inbox.put(sample(f"health/p{n}", told, next(envelopes())))
+        inbox.put(sample(f"invented/{n}", told, next(envelopes())))
+    inbox.put(sample("observation", row(0), next(envelopes())))
+    got = inbox.take(0.0)
+    assert len(inbox.tallies) == len(got) == TOPICS_MOST + 1 and got[-1].topic == "observation"
+    assert inbox.refused == 4000 - TOPICS_MOST and "more than" not in inbox.last_error
+
+
+def test_what_is_refused_leaves_the_count_as_it_was():
+    inbox, sent = Inbox("", None), envelopes()
+    for seq in range(4):
+        inbox.put(sample("observation", row(seq), next(sent), data=b"" if seq in (1, 2) else None))
+    ahead = Envelope(next(sent).stream, 2**40, 0)
+    inbox.put(sample("observation", row(4), ahead))
+    inbox.put(sample("observation", row(5), Envelope(ahead.stream, 5, 0)))
+    assert seqs(inbox.take(0.0)) == [0, 3, 5]
+    tally = inbox.tallies["observation"]
+    assert (tally.refused, tally.missed, tally.received) == (3, 0, 3)
+    assert "field envelope: number 1099511627776 after 3: so many cannot have been sent" in inbox.last_error
 
 
 def test_a_topic_of_another_release_is_refused():

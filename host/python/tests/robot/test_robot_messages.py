@@ -1,18 +1,21 @@
 """The robot's messages: as other readers of CDR understand them, and refused in one line when they are not whole."""
 
 import math
+import re
 import struct
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 from fuzz_messages import fuzz
+from hostile import variants
 from robotkit import examples, flat
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from whisker.recording.messages import definition
 from whisker.robot import messages as m
-from whisker.robot.schema import fields_of
+from whisker.robot.ranges import RANGES
+from whisker.robot.schema import MANY, PRIMITIVES, TEXT, fields_of
 
 
 @pytest.mark.parametrize("schema", m.TYPES)
@@ -52,7 +55,7 @@ def test_a_message_cut_anywhere_is_refused_by_name(topic, message):
         with pytest.raises(m.MessageError) as refused:
             m.decode(type(message), data[:length], topic)
         text = str(refused.value)
-        assert text.startswith(f"{topic}: ") and "install one release" in text and "\n" not in text
+        assert text.startswith(f"{topic}: ") and text.endswith(m.REMEDIES) and "\n" not in text
     with pytest.raises(m.MessageError, match="1 bytes too many"):
         m.decode(type(message), data + b"\x00", topic)
 
@@ -105,7 +108,7 @@ def test_rows_whose_sequences_differ_are_refused():
         m.decode(m.Belief, m.encode(belief))
     row = examples()["observation"]
     row.cells = [0, 1, 3]
-    with pytest.raises(m.MessageError, match="a value that Observation.msg does not name"):
+    with pytest.raises(m.MessageError, match="field cells: 3 is not within 0 and 2; stop what sends it"):
         m.decode(m.Observation, m.encode(row))
 
 
@@ -115,7 +118,7 @@ def test_a_truth_value_is_0_or_1():
     place = data.index(b"front\x00") + 6
     assert data[place] == 1
     data[place] = 2
-    with pytest.raises(m.MessageError, match="field touching: a truth value"):
+    with pytest.raises(m.MessageError, match="field touching: 2 is not within 0 and 1"):
         m.decode(m.Contact, bytes(data))
 
 
@@ -135,3 +138,59 @@ def test_poses_in_the_plane():
     assert m.Time.of(-1).ns == -1 and struct.pack("<iI", -1, 999_999_999) in m.encode(
         m.PoseStamped(m.Header.at(-1), m.Pose())
     )
+
+
+def test_every_field_has_a_range_and_every_range_a_field():
+    """Of each number, text and sequence of every class the table says what it may be: none is let through unseen."""
+    fields_there = {f"{schema}:{field.name}": field for schema in m.TYPES for field in fields_of(schema)}
+    assert fields_there.keys() == RANGES.keys()
+    for place, field in fields_there.items():
+        limits = RANGES[place]
+        if field.kind == TEXT:
+            assert 0 < limits.high <= 4096, place
+        elif field.kind in PRIMITIVES and place != "whisker_msgs/msg/Observation:values":
+            assert np.isfinite(limits.low).all() and np.isfinite(limits.high).all(), place
+        assert (limits.count > 0) == (field.count == MANY), place
+
+
+@pytest.mark.parametrize("topic", examples())
+def test_what_cannot_be_is_refused_by_topic_and_field(topic):
+    """Each number of each message just beyond its range and far beyond, each text and sequence too long."""
+    tried = 0
+    for message, place in variants(examples()[topic]):
+        with pytest.raises(m.MessageError) as refused:
+            m.decode(type(message), m.encode(message), topic)
+        assert str(refused.value).startswith(f"{topic}: field {place}"), (str(refused.value), place)
+        tried += 1
+    assert tried > 10
+
+
+def changed(topic: str, **fields_new):
+    return replace(examples()[topic], **fields_new)
+
+
+@pytest.mark.parametrize(
+    ("message", "why"),
+    [
+        (changed("observation", motion=[1.001, 0.0, 0.0]), "field motion: 1.001 is not within -1 and 1; stop what"),
+        (changed("observation", motion=[0.0, 0.0, -3.15]), "field motion: -3.15 is not within -3.14159"),
+        (changed("observation", motion=[0.0, 1e308, 0.0]), "field motion"),
+        (changed("observation", seq=2**63), "field seq"),
+        (changed("observation", pose=[9.0, 9.0, 0.0]), "field pose: more than 8 rows can add up to"),
+        (changed("observation", pose=[0.0, 0.0, 26.0]), "field pose: more than 8 rows can add up to"),
+        (changed("observation", names=["a", "b", "a"]), "field names: a name that is there twice"),
+        (changed("observation", names=["a", "b", "c" * 129]), "field names: 129 characters, 128 are the most"),
+        (changed("belief", x=np.zeros(2001, "f4")), "field x: 2001 elements, 2000 are the most"),
+        (changed("joints", position=[0.0] * 3), "field position: 3 elements, 2 names"),
+        (changed("truth", header=m.Header(m.Time(1, 10**9))), "field header.stamp.nanosec"),
+        (changed("localisation", pose=m.PoseWithCovariance.planar((0, 0, 0), -np.eye(3))), "no covariance"),
+        (
+            changed("pose", pose=m.PoseWithCovariance.planar((0, 0, 0), np.ones((3, 3)) + np.eye(3)[::-1])),
+            "no covariance",
+        ),
+        (changed("health/pilot", counters=[m.KeyValue("a", "b")] * 257), "field counters: 257 elements"),
+    ],
+)
+def test_limits_that_matter(message, why):
+    with pytest.raises(m.MessageError, match=re.escape(why)):
+        m.decode(type(message), m.encode(message))

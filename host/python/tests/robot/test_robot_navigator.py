@@ -2,8 +2,10 @@
 
 import contextlib
 import json
+import re
 import subprocess
 import threading
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -22,8 +24,8 @@ from whisker.robot import messages as m
 from whisker.robot.inbox import encoding_of
 from whisker.robot.link import Link
 from whisker.robot.navigator import Navigator, Settings
+from whisker.robot.ranges import BUMPS_MOST
 from whisker.robot.rows import RowPublisher, to_message
-from whisker.robot.streams import envelopes
 
 PATIENCE_S = 60.0
 ROWS = 60
@@ -102,7 +104,7 @@ def test_in_lock_step_the_process_gives_what_localise_gives(made, tmp_path):
     assert {b.filter for b in beliefs} == set(filters) and [b.observation_seq for b in beliefs][::2] == list(
         range(0, ROWS, 5)
     )
-    assert all(0.998 < b.mass < 1.001 and len(b.x) <= m.BUMPS_MOST for b in beliefs)
+    assert all(0.998 < b.mass < 1.001 and len(b.x) <= BUMPS_MOST for b in beliefs)
     assert {r.message.reason for r in got if r.over} == {"enough"}
     report = json.loads((tmp_path / "report.json").read_text())
     assert (report["weighed"], report["skipped"], report["missed"], report["bad_cells"]) == (ROWS, 0, 0, 0)
@@ -256,11 +258,11 @@ def test_rows_that_come_late_are_weighed_as_far_as_there_is_time(made, took_s, s
 def test_nonsense_is_counted_and_the_rest_goes_on(made):
     _, scene, rows = made
     with Inside(scene, "localisation", lock_step=True) as inside:
-        session, stream = inside.pilot._session, envelopes()
         bad = m.encode(to_message(rows[0], m.EXPLORING, 0, np.zeros(3)))[:-4]
-        session.put(
-            "whisker/robot/observation", bad, encoding=encoding_of(m.Observation), attachment=next(stream).pack()
+        inside.rows._stream._publisher.put(
+            bad, encoding=encoding_of(m.Observation), attachment=next(inside.rows._stream._envelopes).pack()
         )
+        inside.rows.sent = 1
         for row in rows[:3]:
             inside.rows.send(row, m.EXPLORING)
         inside.rows.end()
@@ -268,12 +270,90 @@ def test_nonsense_is_counted_and_the_rest_goes_on(made):
     assert (inside.counters["refused"], inside.counters["weighed"], inside.counters["missed"]) == (1, 3, 0)
 
 
-def test_rows_of_another_robot_are_one_line(made):
+def spoiled(rows, n: int) -> list[m.Observation]:
+    """In place of row n, each well-formed and impossible."""
+    pose = np.zeros(3)
+    for k in range(n):
+        pose = to_message(rows[k], m.EXPLORING, k, pose).pose
+    good = to_message(rows[n], m.EXPLORING, n, pose)
+    short = [name for name in good.names if not name.endswith("_mm")]
+    far, sums = np.array([1000.0, 0.0, 0.0]), np.array([0.0, 1e5, 0.0])
+    return [
+        replace(good, names=short, cells=good.cells[: len(short)], values=good.values[: len(short)]),
+        replace(good, names=["x" + name for name in good.names]),
+        replace(good, motion=np.array([1e308, 0.0, 0.0])),
+        replace(good, pose=np.array([0.0, 0.0, 1e308])),
+        replace(good, motion=far, pose=good.pose + far),
+        replace(good, pose=sums),
+        replace(good, pose=good.pose + [0.9, 0.0, 0.0]),
+        replace(good, motion=good.motion + [0.5, 0.0, 0.0], pose=good.pose + [0.5, 0.0, 0.0]),
+        replace(good, seq=2**63),
+        replace(good, seq=n + 1000),
+        replace(good, header=m.Header(m.Time(2**31 - 1, 0))),
+        replace(good, header=m.Header(m.Time(-1, 0))),
+    ]
+
+
+@pytest.mark.parametrize("kind", range(12))
+def test_a_row_that_cannot_be_is_refused_and_the_pose_is_as_without_it(made, kind):
+    """It comes in the pilot's own stream, where a row should be; those after it bring its motion, as of one missed."""
     _, scene, rows = made
-    with Inside(scene, lock_step=True) as inside:
-        inside.rows.send({k: v for k, v in rows[0].items() if not k.endswith("_mm")}, m.EXPLORING)
+    place, told = 20, []
+    for hostile in (True, False):
+        with Inside(scene, "localisation", "health/navigator", lock_step=True) as inside:
+            stream = inside.rows._stream
+            for n, row in enumerate(rows):
+                if n != place:
+                    inside.rows.send(row, m.EXPLORING)
+                    continue
+                sound = to_message(row, m.EXPLORING, n, inside.rows.pose)
+                if hostile:
+                    stream.send(spoiled(rows, place)[kind])
+                else:
+                    next(stream._envelopes)  # lost on the way
+                inside.rows.pose, inside.rows.sent = sound.pose, n + 1
+            inside.rows.end()
+            inside.run()
+            got = take_until(inside.inbox, _all_over, PATIENCE_S)
+        told.append([r.message.pose.pose.xytheta for r in got if r.topic == "localisation" and not r.over])
+        health_told = [r.message for r in got if r.topic == "health/navigator" and not r.over][-1]
+        assert (inside.counters["refused"], inside.counters["weighed"]) == (hostile, ROWS - 1)
+        assert inside.counters["missed"] == 1 and inside.error is None
+        assert (
+            health_told.last_error.startswith("observation: field ") == hostile and "\n" not in health_told.last_error
+        )
+        assert health_told.counts["refused"] == str(int(hostile))
+    assert told[0] == told[1]
+
+
+def test_rows_of_another_robot_are_refused_by_name_and_the_navigator_stays(made):
+    _, scene, rows = made
+    with Inside(scene, "health/navigator", lock_step=True) as inside:
+        for row in rows[:3]:
+            inside.rows.send({k: v for k, v in row.items() if not k.endswith("_mm")}, m.EXPLORING)
+        inside.rows.end()
         inside.run()
-    assert "_mm is missing; give the navigator the scene of this robot" in inside.error
+        got = take_until(inside.inbox, lambda got: got and got[-1].message.state == health.ENDED, PATIENCE_S)
+    assert inside.error is None and inside.counters["refused"] == 3 and inside.counters["weighed"] == 0
+    assert re.fullmatch(
+        r"observation: field names: cell \w+_mm is missing; give both sides the scene of this robot",
+        got[-1].message.last_error,
+    )
+
+
+def test_a_second_pilot_is_refused_and_told(made):
+    _, scene, rows = made
+    with Inside(scene, "health/navigator", lock_step=True) as inside:
+        inside.rows.send(rows[0], m.EXPLORING)
+        second = RowPublisher(inside.pilot)
+        for row in rows[:5]:
+            second.send(row, m.EXPLORING)
+        inside.rows.send(rows[1], m.EXPLORING)
+        inside.rows.end()
+        inside.run()
+        got = take_until(inside.inbox, lambda got: got and got[-1].message.state == health.ENDED, PATIENCE_S)
+    assert (inside.counters["refused"], inside.counters["weighed"], inside.counters["restarts"]) == (5, 2, 0)
+    assert "of a second source; end one of the two" in got[-1].message.last_error
 
 
 def test_a_navigator_that_stays_goes_on_with_the_next_run(made):
@@ -299,7 +379,7 @@ def test_condensed_beliefs_keep_mass_place_and_width():
     bumps["sigma_m"], bumps["sigma_rad"], bumps["mass"] = 0.01, 0.02, rng.random(len(bumps))
     bumps["mass"] /= bumps["mass"].sum()
     few = belief.condense(bumps)
-    assert 100 < len(few) <= m.BUMPS_MOST and np.all(np.diff(few["mass"]) <= 0.0)
+    assert 100 < len(few) <= BUMPS_MOST and np.all(np.diff(few["mass"]) <= 0.0)
     assert few["mass"].sum() == pytest.approx(1.0, abs=belief.NEGLECTED)
     for one in (bumps, few):
         weight = one["mass"] / one["mass"].sum()
@@ -339,7 +419,7 @@ def test_two_hypotheses_stay_two():
     bumps["mass"] = 1.0 / len(bumps)
     few = belief.condense(bumps)
     near = np.abs(np.sin(few["pose"][:, 2] / 2.0)) < 0.5
-    assert few["mass"][near].sum() == pytest.approx(0.5, abs=1e-3) and len(few) <= m.BUMPS_MOST
+    assert few["mass"][near].sum() == pytest.approx(0.5, abs=1e-3) and len(few) <= BUMPS_MOST
 
 
 def test_health_is_told_at_once_when_the_state_is_new(monkeypatch):

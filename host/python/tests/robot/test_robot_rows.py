@@ -13,7 +13,8 @@ from whisker.nav.observations import cell
 from whisker.pilot.pilot import compose
 from whisker.robot import messages as m
 from whisker.robot.inbox import Received
-from whisker.robot.rows import Follower, RowPublisher, Step, between, to_message, to_row
+from whisker.robot.row_checks import RowChecks
+from whisker.robot.rows import PIECES_MOST, Follower, RowPublisher, Step, between, to_message, to_row
 from whisker.robot.streams import Envelope
 
 
@@ -214,3 +215,92 @@ def test_rows_that_are_missing_make_a_filter_no_surer_nor_much_less_sure(made, n
     missed = fed(name, made.scene, Follower().take(received([*rows[:60], rows[110]])))
     width, other = (np.sqrt(np.trace(e.covariance[:2, :2])) for e in (told, missed))
     assert 0.5 * width < other < 1.5 * width
+
+
+@pytest.mark.parametrize("motion", [(1e5, 0.0, 0.0), (0.0, -1e300, 0.0), (0.0, 0.0, 1e7), (3e4, 0.0, -2.5e6)])
+@pytest.mark.parametrize("within_ns", [0, 10**8, 2**62])
+def test_the_pieces_of_any_motion_are_bounded(motion, within_ns):
+    row = messages_of(motions(1))[0]
+    step = Step(row, np.array(motion), 10**10, 1, received([row])[0].envelope, within_ns)
+    assert len(step.lead()) < PIECES_MOST
+    angles = sum(r[localise.ODOMETRY[2]] for r in (*step.lead(), step.cells()))
+    assert math.cos(angles) == pytest.approx(math.cos(motion[2]), abs=1e-6)
+
+
+def test_a_clock_that_leaps_has_begun_anew():
+    rows = messages_of(motions(4))
+    rows[2].header.stamp = m.Time(10**9 - 1)
+    steps = Follower().take(received(rows))
+    assert [step.t_ns // 10**8 for step in steps] == [1, 2, 3, 4]
+
+
+def slow_rows(count: int) -> list[m.Observation]:
+    """At 0.15 m/s and 0.7 rad/s."""
+    cells = {"l_VINYL": -1.0, "r_mm": None}
+    return messages_of(
+        {"t_s": round(0.1 * (n + 1), 4)} | dict(zip(localise.ODOMETRY, (0.015, 0.0, 0.07), strict=True)) | cells
+        for n in range(count)
+    )
+
+
+def fault_after(rows, row) -> str:
+    checks = RowChecks()
+    assert len(checks.passed(received(rows))) == len(rows)
+    return checks.fault(Received("observation", row, received(rows)[-1].envelope))
+
+
+@pytest.mark.parametrize(
+    ("seconds", "motion", "why"),
+    [
+        (0.1, (0.099, 0.0, 0.0), ""),
+        (0.1, (0.101, 0.0, 0.0), "field pose: 0.101 m and 0 rad in 0.1 s"),
+        (0.1, (0.0, 0.0, 0.52), ""),
+        (0.1, (0.0, 0.0, 0.54), "field pose: 0 m and 0.54 rad in 0.1 s"),
+        (1.0, (0.5, 0.0, 0.0), ""),
+        (-5.0, (0.101, 0.0, 0.0), "field pose"),
+        (1e6, (0.101, 0.0, 0.0), "field pose"),
+    ],
+)
+def test_a_robot_moves_no_more_than_it_can_in_its_time(seconds, motion, why):
+    rows = slow_rows(10)
+    stamp_ns = rows[-1].header.stamp.ns + round(seconds * 1e9)
+    row = replace(rows[-1], seq=10, header=m.Header.at(stamp_ns), motion=np.array(motion))
+    told = fault_after(rows, replace(row, pose=compose(rows[-1].pose, motion)))
+    assert told.startswith(why) and bool(told) == bool(why)
+
+
+def test_motion_that_a_whisk_held_back_is_none_too_much():
+    rows = slow_rows(10)
+    for n in range(10, 30):
+        still = replace(rows[9], seq=n, kind=m.WHISK, header=m.Header.at((n + 1) * 10**8), motion=np.zeros(3))
+        rows.append(still)
+    motion = np.array([0.3, 0.0, 1.0])
+    row = replace(rows[9], seq=30, kind=m.RELEASE, header=m.Header.at(31 * 10**8), motion=motion)
+    assert fault_after(rows, replace(row, pose=compose(rows[9].pose, motion))) == ""
+
+
+def test_motion_and_its_sum_must_agree():
+    rows = slow_rows(10)
+    row = replace(rows[-1], seq=10, header=m.Header.at(11 * 10**8))
+    assert fault_after(rows, replace(row, pose=rows[-1].pose)).startswith("field motion: not what leads from")
+    assert fault_after(rows, replace(row, seq=9)).startswith("field seq: 9 after 9")
+
+
+def test_after_rows_that_were_refused_the_next_good_one_is_taken():
+    rows, checks = slow_rows(60), RowChecks()
+    bad = [replace(row, pose=row.pose + [5.0, 0.0, 0.0]) for row in rows[10:40]]
+    assert len(checks.passed(received([*rows[:10], *bad, *rows[40:]]))) == 30
+    assert checks.refused == 30 and checks.last_error.startswith("observation: field ")
+
+
+def test_rows_of_a_scene_have_its_cells(made):
+    rows = messages_of(to_rows(made.observations, made.scene))
+    checks = RowChecks(made.scene)
+    assert len(checks.passed(received(rows))) == len(rows)
+    whisker = made.scene.robot.whiskers[0].name
+    more = replace(rows[0], names=[*rows[0].names, f"{whisker}_ASPHALT"])
+    assert "cell" in checks.fault(received([replace(rows[0], names=rows[0].names[1:])])[0])
+    assert checks._names_fault(more.names) == ""
+    assert checks._names_fault([*rows[0].names, "tail_mm"]) == (
+        "field names: no whisker has the cell tail_mm; give both sides the scene of this robot"
+    )

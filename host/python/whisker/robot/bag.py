@@ -14,7 +14,7 @@ from .health import ENDED, RUNNING, Health
 from .inbox import Inbox, Received
 from .link import Link
 from .messages import HEALTH, SCHEMAS, encode
-from .rows import ROW_NS
+from .rows import ROW_NS, leaps
 
 RECORD, FORMAT = "whisker_robot", "1"  # name of the metadata record, and of what it promises
 SCENE_FILES = (ARENA, ROBOT, PRIOR)
@@ -36,7 +36,7 @@ class BagClock:
         """The log time of a row."""
         if self._offset is None:
             self._offset = self.latest - stamp_ns
-        elif stamp_ns < self._row_ns:
+        elif leaps(self._row_ns, stamp_ns):
             self._offset = self.latest + ROW_NS - stamp_ns
         self._row_ns, self.latest = stamp_ns, stamp_ns + self._offset
         return self.latest

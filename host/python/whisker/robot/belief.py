@@ -3,7 +3,8 @@
 import numpy as np
 
 from ..nav.filters import COMPONENT
-from .messages import BUMPS_MOST, Belief, Header
+from .messages import Belief, Header
+from .ranges import BUMPS_MOST
 
 NEGLECTED = 1e-3  # share of the belief that its lightest bumps may hold together; they are left out
 FINEST = (0.02, np.radians(2.5))  # m, rad: cells to merge bumps in; doubled until few enough are left

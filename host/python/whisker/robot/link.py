@@ -22,8 +22,9 @@ import zenoh
 
 from ..errors import UserError
 from .inbox import Inbox, encoding_of
-from .messages import HEALTH, End, Header, encode, type_of
-from .streams import Envelope, envelopes
+from .messages import HEALTH, NAME, End, Header, encode, type_of
+from .sources import Sources
+from .streams import Envelope, envelopes, new_stream
 
 ROBOT = "robot"
 PILOT_ENDPOINT, NAVIGATOR_ENDPOINT = "tcp/127.0.0.1:7448", "tcp/127.0.0.1:7449"
@@ -36,7 +37,8 @@ MESSAGE_MOST = 1 << 18  # bytes: four beliefs of the most poses; zenoh drops wha
 QUEUE_BATCHES = 16  # of 64 KiB, zenoh's most: a live sender's burst finds room while the machine is busy elsewhere
 RETRY = {"period_init_ms": 100, "period_max_ms": 1000, "period_increase_factor": 2}
 ENDPOINT = re.compile(r"tcp/(\[[0-9a-fA-F:]+\]|[\w.-]+):(\d{1,5})")
-NAME = re.compile(r"[A-Za-z0-9_-]+")
+ALIVE, STREAM = "alive", "stream"  # keys of liveliness tokens: alive/<process>, stream/<number>/<topic>
+TOKEN = re.compile(r"([0-9a-f]{8})/(.+)")
 LOOPBACK = re.compile(r"tcp/(127\.[\d.]+|\[::1\]|localhost):\d+")
 
 
@@ -53,18 +55,20 @@ class NamingError(LinkError):
 
 
 class Publisher:
-    """One stream. `send` numbers and sends; `end` says that no more will come."""
+    """One stream, announced while it lasts. `send` numbers and sends; `end` says that no more will come."""
 
-    def __init__(self, session: zenoh.Session, key: str, topic: str, lock_step: bool):
+    def __init__(self, session: zenoh.Session, prefix: str, topic: str, lock_step: bool):
         newest_only = topic.partition("/")[0] in NEWEST_ONLY
         blocking = lock_step and not newest_only
         self._publisher = session.declare_publisher(
-            key,
+            prefix + topic,
             congestion_control=zenoh.CongestionControl.BLOCK if blocking else zenoh.CongestionControl.DROP,
             priority=zenoh.Priority.DATA_LOW if newest_only else zenoh.Priority.DATA,
             reliability=zenoh.Reliability.BEST_EFFORT if newest_only else zenoh.Reliability.RELIABLE,
         )
-        self._kind, self._envelopes = type_of(topic), envelopes()
+        self._kind, stream = type_of(topic), new_stream()
+        self._envelopes = envelopes(stream)
+        self._token = session.liveliness().declare_token(f"{prefix}{STREAM}/{stream:08x}/{topic}")
         self.sent, self.ended = 0, False
 
     def send(self, message) -> None:
@@ -78,6 +82,7 @@ class Publisher:
         if not self.ended:
             self.ended = True
             self._put(End(Header.at(stamp_ns), self.sent, reason))
+            self._token.undeclare()
 
     def _put(self, message) -> None:
         envelope = next(self._envelopes)
@@ -110,14 +115,15 @@ class Link:
                 raise NamingError(f"'{name}': not a name; use letters, digits, dash and underscore")
         self.process, self.lock_step = process, lock_step
         self._prefix = f"whisker/{robot}/"
+        self._inboxes: list[Inbox] = []
         config = _config(list(listen), list(connect), lock_step, scout)
         try:
             self._session = zenoh.open(config)
         except zenoh.ZError as error:
             text = f"{', '.join(listen)}: cannot be listened on ({_reason(error)})"
             raise LinkError(f"{text}; end what holds the port, or choose another with --listen") from None
-        self._inboxes: list[Inbox] = []
         self._kept: list = []  # what zenoh undeclares when it is no longer held
+        self._sources = Sources()
         self.peers: set[str] = set()
         self._peers_changed = threading.Condition()
         self._watch_peers()
@@ -130,18 +136,18 @@ class Link:
 
     def publish(self, topic: str) -> Publisher:
         """A new stream on a topic of messages.TOPICS, or health/<process>."""
-        return Publisher(self._session, self._prefix + topic, topic, self.lock_step)
+        return Publisher(self._session, self._prefix, topic, self.lock_step)
 
     def subscribe(self, *topics: str) -> Inbox:
         """One inbox for these topics; "**" is all of them, "health/*" the health of every process."""
-        inbox = Inbox(self._prefix, None if self.lock_step else INBOX_MOST)
+        inbox = Inbox(self._prefix, None if self.lock_step else INBOX_MOST, self._sources)
         self._kept += [self._session.declare_subscriber(self._prefix + topic, inbox.put) for topic in topics]
         self._inboxes.append(inbox)
         return inbox
 
     def announce(self) -> None:
         """Tell the others that this process is there and has subscribed to what it wants."""
-        self._kept.append(self._session.liveliness().declare_token(f"{self._prefix}alive/{self.process}"))
+        self._kept.append(self._session.liveliness().declare_token(f"{self._prefix}{ALIVE}/{self.process}"))
 
     def wait_for(self, processes: Iterable[str], timeout_s: float | None = None) -> bool:
         """Until all these have announced themselves; False when some have not within `timeout_s`."""
@@ -163,13 +169,22 @@ class Link:
 
     def _watch_peers(self) -> None:
         token = self._session.liveliness()
-        self._kept.append(token.declare_subscriber(f"{self._prefix}alive/*", self._note_peer, history=True))
+        for tokens, note in ((f"{ALIVE}/*", self._note_peer), (f"{STREAM}/**", self._note_stream)):
+            self._kept.append(token.declare_subscriber(self._prefix + tokens, note, history=True))
 
     def _note_peer(self, sample: zenoh.Sample) -> None:
         name = str(sample.key_expr).rpartition("/")[2]
         with self._peers_changed:
             (self.peers.add if sample.kind == zenoh.SampleKind.PUT else self.peers.discard)(name)
             self._peers_changed.notify_all()
+
+    def _note_stream(self, sample: zenoh.Sample) -> None:
+        """A token of a publisher has come or gone."""
+        found = TOKEN.fullmatch(str(sample.key_expr).removeprefix(f"{self._prefix}{STREAM}/"))
+        if found:
+            self._sources.note(found[2], int(found[1], 16), sample.kind == zenoh.SampleKind.PUT)
+        for inbox in self._inboxes:
+            inbox.look_again()
 
 
 def is_loopback(endpoint: str) -> bool:

@@ -4,12 +4,15 @@ Units, meanings and constants are those of the .msg files; what ROS 2 itself def
 clock, 0 at its start.
 """
 
+import math
+import re
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from ..errors import UserError
 from ..recording.cdr import Malformed
+from .ranges import RANGES, ROW
 from .ros import (
     Header,
     JointState,
@@ -26,14 +29,13 @@ from .ros import (
     TwistWithCovariance,
     Vector3,
 )
-from .schema import Codec
+from .schema import Codec, OutOfRange
 from .schema import encode as encode_as
 
 EXPLORING, WHISK, RELEASE = range(3)  # Observation.kind
 EMPTY, NOT_READ, VALUE = range(3)  # Observation.cells
 UNKNOWN, TIP, SHAFT = range(3)  # Contact.part
 FACE, CORNER = 1, 2  # Contact.shape; or UNKNOWN
-BUMPS_MOST = 2000  # of a Belief
 
 
 class MessageError(UserError, ValueError):
@@ -147,9 +149,9 @@ PACKAGES = {
 }
 TYPES = {f"{package}/msg/{kind.__name__}": kind for package, kinds in PACKAGES.items() for kind in kinds}
 SCHEMAS = {kind: schema for schema, kind in TYPES.items()}
-# A joint whose sample is bad has no angle; a cell of a row is judged by the filter, which counts those it refuses.
-MAY_BE_NAN = frozenset({"sensor_msgs/msg/JointState:position", "whisker_msgs/msg/Observation:values"})
-CODEC = Codec(TYPES, MAY_BE_NAN)
+CODEC = Codec(TYPES, RANGES)
+ROUNDING = 1e-6  # relative, of sums
+REMEDIES = ("install one release of whisker on both sides", "stop what sends it")  # not readable; not possible
 
 # topic: the class of its messages. Health has a topic for each process, below "health/".
 TOPICS = {
@@ -164,11 +166,13 @@ TOPICS = {
     "truth": PoseStamped,
 }
 HEALTH = "health"
+NAME = re.compile(r"[A-Za-z0-9_-]{1,64}")  # of a process or a robot
 
 
 def type_of(topic: str) -> type:
     """The class of a topic's messages; KeyError when there is no such topic."""
-    return ProcessHealth if topic.startswith(f"{HEALTH}/") else TOPICS[topic]
+    kind, _, process = topic.partition("/")
+    return ProcessHealth if kind == HEALTH and NAME.fullmatch(process) else TOPICS[topic]
 
 
 def encode(message) -> bytes:
@@ -180,25 +184,64 @@ def decode(kind: type, data: bytes, topic: str = ""):
     """A message of class `kind`; MessageError names `topic`, field and remedy."""
     try:
         message = CODEC.decode(data, SCHEMAS[kind])
-        if isinstance(message, Observation):
-            _check_observation(message)
-        elif isinstance(message, Belief):
-            _check_belief(message)
+        CHECKS.get(kind, _check_nothing)(message)
     except Malformed as error:
-        name = topic or SCHEMAS[kind]
-        raise MessageError(f"{name}: {error}; install one release of whisker on both sides") from None
+        remedy = REMEDIES[isinstance(error, OutOfRange)]
+        raise MessageError(f"{topic or SCHEMAS[kind]}: {error}; {remedy}") from None
     return message
 
 
+def _check_nothing(message) -> None:
+    """What the table of ranges says is all there is to say."""
+
+
 def _check_observation(row: Observation) -> None:
+    """A row's fields fit each other: it cannot have moved more than its rows could."""
     if not len(row.names) == len(row.cells) == len(row.values):
         raise Malformed(f"field cells: {len(row.names)} names, {len(row.cells)} cells, {len(row.values)} values")
-    if row.kind > RELEASE or (row.cells > VALUE).any():
-        raise Malformed("field kind or cells: a value that Observation.msg does not name")
+    if len(set(row.names)) != len(row.names):
+        raise OutOfRange("field names: a name that is there twice")
+    rows = (row.seq + 1) * (1.0 + ROUNDING)
+    if np.hypot(*row.pose[:2]) > rows * math.hypot(*ROW[:2]) or abs(row.pose[2]) > rows * ROW[2]:
+        raise OutOfRange(f"field pose: more than {row.seq + 1} rows can add up to")
+
+
+def _check_joints(joints: JointState) -> None:
+    for name in ("position", "velocity", "effort"):
+        if len(getattr(joints, name)) > len(joints.name):
+            raise Malformed(f"field {name}: {len(getattr(joints, name))} elements, {len(joints.name)} names")
 
 
 def _check_belief(belief: Belief) -> None:
-    columns = ("x", "y", "theta", "weight", "sigma_m", "sigma_rad")
-    for name in columns:
-        if len(getattr(belief, name)) != len(belief.x) or len(belief.x) > BUMPS_MOST:
+    for name in ("y", "theta", "weight", "sigma_m", "sigma_rad"):
+        if len(getattr(belief, name)) != len(belief.x):
             raise Malformed(f"field {name}: {len(getattr(belief, name))} elements")
+
+
+def _check_covariance(name: str, values: np.ndarray) -> None:
+    """No variance is negative, and none is smaller than what it shares with another."""
+    matrix = np.reshape(values, (6, 6))
+    variances = np.diagonal(matrix)
+    shared = np.sqrt(np.outer(np.maximum(variances, 0.0), np.maximum(variances, 0.0)))
+    if (variances < 0.0).any() or (np.abs(matrix) > shared * (1.0 + ROUNDING) + ROUNDING).any():
+        raise OutOfRange(f"field {name}.covariance: no covariance")
+
+
+def _check_odometry(odometry: Odometry) -> None:
+    _check_covariance("pose", odometry.pose.covariance)
+    _check_covariance("twist", odometry.twist.covariance)
+
+
+def _check_pose(message: Localisation | PoseWithCovarianceStamped) -> None:
+    _check_covariance("pose", message.pose.covariance)
+
+
+# What a message must be besides the ranges of its fields, by its class.
+CHECKS = {
+    Observation: _check_observation,
+    Belief: _check_belief,
+    JointState: _check_joints,
+    Odometry: _check_odometry,
+    Localisation: _check_pose,
+    PoseWithCovarianceStamped: _check_pose,
+}

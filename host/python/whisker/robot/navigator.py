@@ -16,7 +16,6 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import UserError
 from ..nav.localise import Estimate
 from ..scene import Prior, Scene
 from . import belief
@@ -26,6 +25,7 @@ from .link import Link
 from .memory import Memory
 from .messages import Header, Localisation, PoseWithCovariance, PoseWithCovarianceStamped
 from .ros import ARENA_FRAME
+from .row_checks import RowChecks
 from .rows import Follower, Step
 from .track import Track
 
@@ -35,12 +35,6 @@ CATCH_UP_S = 0.1  # of the navigator's time for rows that came late together: no
 LOOK_S = 0.5  # between two words of health while nothing comes
 SCENE_PRIOR, UNIFORM, CHECKPOINT = "scene", "uniform", "checkpoint"
 WAITING = "waiting for rows"
-
-
-class NavigatorError(UserError):
-    """Rows that this scene does not fit; one line."""
-
-    exit_code = 1
 
 
 @dataclass
@@ -63,9 +57,8 @@ class Navigator:
 
     def __init__(self, link: Link, scene: Scene, settings: Settings):
         self._link, self._scene, self._settings = link, scene, settings
-        self._wanted = _columns(scene)
         self._inbox = link.subscribe("observation")
-        self._follower = Follower()
+        self._checks, self._follower = RowChecks(scene), Follower()
         self._memory = Memory(settings.checkpoint, scene, settings.filters)
         self._beliefs_before: dict[str, np.ndarray] = {}
         self._tracks: list[Track] = []
@@ -79,18 +72,22 @@ class Navigator:
         """What has been counted so far; rows unless said otherwise."""
         follower, inbox = self._follower, self._inbox
         told = {name: getattr(follower, name) for name in ("weighed", "skipped", "missed", "restarts")}
-        told |= {"first": follower.first_seq, "refused": inbox.refused, "overflown": inbox.overflown}
+        told |= {
+            "first": follower.first_seq,
+            "refused": inbox.refused + self._checks.refused,
+            "overflown": inbox.overflown,
+        }
         if self._tracks:
             told |= {name: getattr(self._tracks[0].filter, name) for name in ("bad_cells", "bad_rows")}
         return told | {"prior": self._prior, "step_us": round(self._step_s * 1e6)}
 
     def run(self, stop: threading.Event) -> dict[str, object]:
-        """Returns the counters. NavigatorError when a row lacks what the scene's whiskers tell."""
+        """Returns the counters."""
         self._link.announce()
         reason = "stopped"
         with ExitStack() as stack:
             while not stop.is_set():
-                received = self._inbox.take(LOOK_S)
+                received = self._checks.passed(self._inbox.take(LOOK_S))
                 if not self._tracks:
                     self._recall(received)
                 for step in self._follower.take(received, self._affordable()):
@@ -111,7 +108,7 @@ class Navigator:
         return max(1, CATCH_UP_S // self._weigh_s) if self._weigh_s else 1
 
     def _last_error(self) -> str:
-        return self._inbox.last_error or self._memory.note
+        return self._checks.last_error or self._inbox.last_error or self._memory.note
 
     def _recall(self, received: list[Received]) -> None:
         """With the first row: go on from where another navigator was, if it left word."""
@@ -122,9 +119,6 @@ class Navigator:
 
     def _take(self, step: Step, stack: ExitStack) -> None:
         began = time.monotonic()
-        if missing := self._wanted - set(step.row.names):
-            text = f"observation: cell {min(missing)} is missing; give the navigator the scene of this robot"
-            raise NavigatorError(text)
         if not self._tracks:
             self._begin(stack)
         self._now_ns = step.row.header.stamp.ns
@@ -168,12 +162,6 @@ class Navigator:
         follower, seq = self._follower, step.row.seq
         counts = (step.rows, follower.skipped, follower.missed, follower.first_seq)
         self._answers.send(Localisation(header, track.name, pose, estimate.confidence, seq, *counts, self._prior))
-
-
-def _columns(scene: Scene) -> set[str]:
-    """Cells that a row of this scene must have."""
-    textures = {f"{w.name}_{t}" for w in scene.robot.of_role("texture") for t in scene.arena.textures}
-    return textures | {f"{w.name}_mm" for w in scene.robot.of_role("object")}
 
 
 def write_report(path: Path, counters: dict[str, object]) -> None:

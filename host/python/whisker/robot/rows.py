@@ -17,9 +17,10 @@ ROW_NS = 10**8  # the paper's 0.1 s
 # A filter takes up to 1 m and half a turn in one row (host/nav/filters/intake.c); longer motions come in such pieces.
 MOST_M, MOST_RAD = 0.5, math.pi / 2.0
 PIECE_NS = 10**6  # between two pieces of a motion of which nobody knows how long it took
-PIECES_MOST = (
-    600  # a minute of rows, some 40 ms of a filter's time; before a longer gap's last minute a filter assumes the worst
-)
+# A minute of rows, some 40 ms of a filter's time; before a longer gap's last minute a filter assumes the worst. It refuses
+# pieces that are too long, of a motion of more than 600 m, and takes them for motion that is lost.
+PIECES_MOST = 600
+LEAP_NS = 24 * 3600 * 10**9  # a clock that goes on by more than a day has begun anew, like one that goes back
 
 
 def between(start, end) -> np.ndarray:
@@ -27,6 +28,11 @@ def between(start, end) -> np.ndarray:
     c, s = math.cos(start[2]), math.sin(start[2])
     dx, dy = end[0] - start[0], end[1] - start[1]
     return np.array([c * dx + s * dy, -s * dx + c * dy, end[2] - start[2]])
+
+
+def leaps(before_ns: int, stamp_ns: int) -> bool:
+    """Whether a clock that read `before_ns` has begun anew to read `stamp_ns`."""
+    return not 0 < stamp_ns - before_ns <= LEAP_NS
 
 
 class RowPublisher:
@@ -108,15 +114,20 @@ class Step:
         return rows
 
     def _count(self) -> int:
-        """Of the pieces: one a row, and none that a filter refuses."""
-        x, y, turn = self.motion
+        """Of the pieces: one a row, and none that a filter refuses as long as there are not too many."""
+        x, y, turn = self._way()
         fitting = max(math.ceil(math.hypot(x, y) / MOST_M), math.ceil(abs(turn) / MOST_RAD))
-        return max(1, min(round(self.within_ns / ROW_NS), PIECES_MOST), fitting)
+        return max(1, min(max(round(self.within_ns / ROW_NS), fitting), PIECES_MOST))
+
+    def _way(self) -> np.ndarray:
+        """The motion; of more turns than a minute's rows can have, only what is left beside whole ones."""
+        x, y, turn = self.motion
+        return self.motion if abs(turn) <= PIECES_MOST * MOST_RAD else np.array([x, y, math.remainder(turn, math.tau)])
 
     def _piece(self, n: int) -> np.ndarray:
         """The n-th, from 1, of a way straight to where the motion ends, turning evenly."""
-        count = self._count()
-        return self.motion if count == 1 else between((n - 1) / count * self.motion, n / count * self.motion)
+        count, way = self._count(), self._way()
+        return way if count == 1 else between((n - 1) / count * way, n / count * way)
 
 
 @dataclass(frozen=True)
@@ -193,7 +204,7 @@ class Follower:
         return Step(row, np.asarray(motion), t_ns, rows, received.envelope, within_ns)
 
     def _time(self, stamp_ns: int) -> int:
-        if self._last_ns is not None and stamp_ns + self._ahead_ns <= self._last_ns:
+        if self._last_ns is not None and leaps(self._last_ns, stamp_ns + self._ahead_ns):
             self._ahead_ns = self._last_ns + ROW_NS - stamp_ns
         self._last_ns = stamp_ns + self._ahead_ns
         return self._last_ns

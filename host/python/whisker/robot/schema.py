@@ -7,6 +7,7 @@ import numpy as np
 
 from ..recording.cdr import Decoder, Encoder, Malformed
 from ..recording.messages import SEPARATOR, definition
+from .ranges import Range
 
 PRIMITIVES = {
     "bool": "u1",
@@ -69,17 +70,21 @@ def _write_values(out: Encoder, field: Field, values) -> None:
             out.text(value) if field.kind == TEXT else write(out, field.kind, value)
 
 
+class OutOfRange(Malformed):
+    """A value that is read well and cannot be."""
+
+
 @dataclass(frozen=True)
 class Codec:
-    """Makes objects of bytes. types: class by schema; may_be_nan: paths (schema:field.field) of what need not be finite."""
+    """Makes objects of bytes. types: class by schema; ranges: what is allowed, by "schema:field"."""
 
     types: dict[str, type]
-    may_be_nan: frozenset[str] = frozenset()
+    ranges: dict[str, Range]
 
     def decode(self, data: bytes, schema: str):
         """The message; Malformed names the field that is wrong."""
         decoder = Decoder(data)
-        message = self._read(decoder, schema, f"{schema}:")
+        message = self._read(decoder, schema, "")
         decoder.done()
         return message
 
@@ -88,29 +93,43 @@ class Codec:
         for field in fields_of(schema):
             place = f"{path}{field.name}"
             try:
-                values[field.name] = self._values(data, field, place)
+                values[field.name] = self._values(data, field, self.ranges[f"{schema}:{field.name}"], place)
             except Malformed as error:
                 told = str(error)
-                raise (
-                    error if told.startswith("field ") else Malformed(f"field {place.split(':')[1]}: {told}")
-                ) from None
+                raise error if told.startswith("field ") else type(error)(f"field {place}: {told}") from None
         return self.types[schema](**values)
 
-    def _values(self, data: Decoder, field: Field, place: str):
+    def _values(self, data: Decoder, field: Field, limits: Range, place: str):
         """Numbers of a sequence or array come as a NumPy array, other elements as a list."""
         count = int(data.number("I")) if field.count == MANY else abs(field.count)
+        if field.count == MANY and count > limits.count:
+            raise OutOfRange(f"{count} elements, {limits.count} are the most")
         if field.kind in PRIMITIVES:
             values = data.array(PRIMITIVES[field.kind], count)
-            self._check(field, values, place)
+            _check_numbers(values, limits)
             return _plain(field.kind, values[0]) if field.count == ONE else values
-        inner = [data.text() if field.kind == TEXT else self._read(data, field.kind, f"{place}.") for _ in range(count)]
+        inner = [self._element(data, field, limits, place) for _ in range(count)]
         return inner[0] if field.count == ONE else inner
 
-    def _check(self, field: Field, values: np.ndarray, place: str) -> None:
-        if field.kind.startswith("float") and place not in self.may_be_nan and not np.isfinite(values).all():
-            raise Malformed("a number that is not finite")
-        if field.kind == "bool" and (values > 1).any():
-            raise Malformed("a truth value that is neither 0 nor 1")
+    def _element(self, data: Decoder, field: Field, limits: Range, place: str):
+        if field.kind != TEXT:
+            return self._read(data, field.kind, f"{place}.")
+        text = data.text()
+        if len(text) > limits.high:
+            raise OutOfRange(f"{len(text)} characters, {limits.high} are the most")
+        return text
+
+
+def _check_numbers(values: np.ndarray, limits: Range) -> None:
+    """OutOfRange for the first number that is not allowed."""
+    finite = np.isfinite(values)
+    if limits.finite and not finite.all():
+        raise OutOfRange("a number that is not finite")
+    bad = finite & ((values < limits.low) | (values > limits.high))
+    if bad.any():
+        at = np.flatnonzero(bad)[0]
+        low, high = (np.broadcast_to(limit, values.shape)[at] for limit in (limits.low, limits.high))
+        raise OutOfRange(f"{values[at]:.6g} is not within {low:.6g} and {high:.6g}")
 
 
 def encode(schema: str, message) -> bytes:

@@ -13,6 +13,8 @@ from dataclasses import dataclass
 VERSION = 1
 LAST = 1  # flag: an End, no more of this stream
 ENVELOPE = struct.Struct("<HHIQq")  # version, flags, stream, number, sent
+STEP_MOST = 2**31  # from one message of a stream to the next: years, at any pace of this robot
+NUMBER_MOST, SENT_MOST = 2**53, 2**62
 
 
 class EnvelopeError(ValueError):
@@ -39,12 +41,19 @@ class Envelope:
         version, flags, stream, number, sent_ns = ENVELOPE.unpack(data)
         if version != VERSION:
             raise EnvelopeError(f"version {version} of the stream, this release has {VERSION}")
+        if number > NUMBER_MOST or not 0 <= sent_ns <= SENT_MOST:
+            raise EnvelopeError(f"number {number}, sent at {sent_ns} ns: neither can be")
         return cls(stream, number, sent_ns, bool(flags & LAST))
 
 
-def envelopes():
-    """Envelopes of a new stream, in order; `next(...)` when one is sent."""
-    stream = int.from_bytes(os.urandom(4), "little")
+def new_stream() -> int:
+    """A stream's number, drawn at random."""
+    return int.from_bytes(os.urandom(4), "little")
+
+
+def envelopes(stream: int | None = None):
+    """Envelopes of a stream (None: a new one), in order; `next(...)` when one is sent."""
+    stream = new_stream() if stream is None else stream
     return (Envelope(stream, number, time.time_ns()) for number in itertools.count())
 
 
@@ -54,7 +63,8 @@ class Tally:
 
     joined_at: number of the first that came: those before it were sent before this side was there;
     missed: sent since then and never come; repeated: come again and left out; restarts: new streams after the first;
-    refused: come, but not whole or of another release; ended: its sender said that it is over.
+    refused: come, but not whole, not possible, of another release or of another source; ended: its sender said that it
+    is over. What is refused leaves everything else as it was.
     """
 
     received: int = 0
@@ -66,19 +76,30 @@ class Tally:
     ended: bool = False
     stream: int | None = None
     next: int = 0
+    refused_since: int = 0  # of this stream, since the last that was taken
 
     def take(self, envelope: Envelope) -> bool:
-        """Count a message that has come; False: it came before."""
+        """Count a message that has come; False: it came before.
+
+        EnvelopeError when so many cannot have been sent since the last.
+        """
         if self.stream is None:
-            self.stream, self.next, self.joined_at = envelope.stream, envelope.number, envelope.number
+            self.stream, self.joined_at, self.next = envelope.stream, envelope.number, envelope.number
         elif envelope.stream != self.stream:
-            self.stream, self.next = envelope.stream, 0
+            self.stream, self.next, self.refused_since = envelope.stream, 0, 0
             self.restarts += 1
+        if envelope.number - self.next > STEP_MOST:
+            raise EnvelopeError(f"number {envelope.number} after {self.next - 1}: so many cannot have been sent")
         if envelope.number < self.next:
             self.repeated += 1
             return False
-        self.missed += envelope.number - self.next
-        self.next = envelope.number + 1
+        self.missed += max(0, envelope.number - self.next - self.refused_since)
+        self.next, self.refused_since = envelope.number + 1, 0
         self.received += 1
         self.ended = envelope.last
         return True
+
+    def refuse(self, stream: int | None = None) -> None:
+        """Count a message that is not taken; `stream`: where it says that it belongs."""
+        self.refused += 1
+        self.refused_since += stream is not None and stream == self.stream

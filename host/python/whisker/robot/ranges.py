@@ -1,0 +1,131 @@
+"""What each number, text and sequence of the robot's messages may be: the one table that every decoder applies.
+
+Keys are "package/msg/Type:field" of the message that holds the field itself. A field without an entry cannot be decoded.
+Limits are those of the machine, with room to spare: what is outside them is a mistake or an attack, never a measurement.
+"""
+
+import math
+from dataclasses import dataclass
+
+# What intake.c of host/nav/filters takes in one row: the Create drives at most 0.5 m/s, and a row may carry a whisk.
+ROW_MOST_M, ROW_MOST_RAD = 1.0, math.pi
+FAR_M = 1e5  # of any place, sums of the odometry included
+TURNED_RAD = 1e7  # of any angle that is summed: half a year of turning
+ROWS_MOST = 2**31  # of a stream: almost seven years
+COUNT_MOST = 2**63 - 1
+NAME_MOST, TEXT_MOST = 128, 4096  # characters
+CELLS_MOST = 512  # of a row: whiskers times textures
+COUNTERS_MOST = 256
+BUMPS_MOST = 2000  # of a Belief
+SHARE_MOST = 1.01  # of a share of a belief, with room for rounding
+
+
+@dataclass(frozen=True)
+class Range:
+    """Limits of a number, or of each element of a sequence or array; of a text: its length in characters.
+
+    low, high: one for all elements, or one for each element of a fixed array. count: elements of a sequence at most.
+    finite: False where nan and infinities are allowed as well. The numbers are both included.
+    """
+
+    low: float | tuple[float, ...] = -math.inf
+    high: float | tuple[float, ...] = math.inf
+    count: int = 0
+    finite: bool = True
+
+
+def about(most: float, **more) -> Range:
+    """From -most to most."""
+    return Range(-most, most, **more)
+
+
+def up_to(most: float, **more) -> Range:
+    """From 0 to most."""
+    return Range(0, most, **more)
+
+
+NAME, TEXT, FLAG, COUNTER = up_to(NAME_MOST), up_to(TEXT_MOST), up_to(1), up_to(COUNT_MOST)
+INNER = Range()  # a message within a message: its own fields have the limits
+COVARIANCE = about(FAR_M**2)
+ROW, PLACE = (ROW_MOST_M, ROW_MOST_M, ROW_MOST_RAD), (FAR_M, FAR_M, TURNED_RAD)
+
+_TABLE = {
+    "builtin_interfaces/msg/Time": {"sec": up_to(10**9), "nanosec": up_to(10**9 - 1)},
+    "std_msgs/msg/Header": {"stamp": INNER, "frame_id": NAME},
+    "diagnostic_msgs/msg/KeyValue": {"key": NAME, "value": TEXT},
+    "geometry_msgs/msg/Vector3": dict.fromkeys("xyz", about(1e3)),
+    "geometry_msgs/msg/Point": dict.fromkeys("xyz", about(FAR_M)),
+    "geometry_msgs/msg/Quaternion": dict.fromkeys("xyzw", about(1.0 + 1e-6)),
+    "geometry_msgs/msg/Pose": {"position": INNER, "orientation": INNER},
+    "geometry_msgs/msg/PoseStamped": {"header": INNER, "pose": INNER},
+    "geometry_msgs/msg/PoseWithCovariance": {"pose": INNER, "covariance": COVARIANCE},
+    "geometry_msgs/msg/PoseWithCovarianceStamped": {"header": INNER, "pose": INNER},
+    "geometry_msgs/msg/Twist": {"linear": INNER, "angular": INNER},
+    "geometry_msgs/msg/TwistWithCovariance": {"twist": INNER, "covariance": COVARIANCE},
+    "nav_msgs/msg/Odometry": {"header": INNER, "child_frame_id": NAME, "pose": INNER, "twist": INNER},
+    "sensor_msgs/msg/JointState": {
+        "header": INNER,
+        "name": up_to(NAME_MOST, count=CELLS_MOST),
+        "position": about(1e3, count=CELLS_MOST, finite=False),  # a joint whose sample is bad has no angle
+        "velocity": about(1e6, count=CELLS_MOST),
+        "effort": about(1e6, count=CELLS_MOST),
+    },
+    "whisker_msgs/msg/Observation": {
+        "header": INNER,
+        "seq": up_to(ROWS_MOST),
+        "kind": up_to(2),
+        "motion": Range(tuple(-most for most in ROW), ROW),
+        "pose": Range(tuple(-most for most in PLACE), PLACE),
+        "names": up_to(NAME_MOST, count=CELLS_MOST),
+        "cells": up_to(2, count=CELLS_MOST),
+        "values": Range(count=CELLS_MOST, finite=False),  # judged by the filter, which counts those it refuses
+    },
+    "whisker_msgs/msg/Contact": {
+        "header": INNER,
+        "whisker": NAME,
+        "touching": FLAG,
+        "onset": INNER,
+        "release": INNER,
+        "measured": FLAG,
+        "radius_m": about(10.0),
+        "sigma_m": up_to(FAR_M),
+        "part": up_to(2),
+        "shape": up_to(2),
+    },
+    "whisker_msgs/msg/Behaviour": {"header": INNER, "state": NAME, "since": INNER, "reason": TEXT},
+    "whisker_msgs/msg/Localisation": {
+        "header": INNER,
+        "filter": NAME,
+        "pose": INNER,
+        "confidence": up_to(SHARE_MOST),
+        "observation_seq": COUNTER,
+        "rows_integrated": up_to(ROWS_MOST + 1),
+        "rows_skipped": COUNTER,
+        "rows_missed": COUNTER,
+        "first_seq": COUNTER,
+        "prior": NAME,
+    },
+    "whisker_msgs/msg/Belief": {
+        "header": INNER,
+        "filter": NAME,
+        "observation_seq": COUNTER,
+        "bumps": up_to(2**31),
+        "mass": up_to(SHARE_MOST),
+        "x": about(FAR_M, count=BUMPS_MOST),
+        "y": about(FAR_M, count=BUMPS_MOST),
+        "theta": about(TURNED_RAD, count=BUMPS_MOST),
+        "weight": up_to(SHARE_MOST, count=BUMPS_MOST),
+        "sigma_m": up_to(FAR_M, count=BUMPS_MOST),
+        "sigma_rad": up_to(TURNED_RAD, count=BUMPS_MOST),
+    },
+    "whisker_msgs/msg/ProcessHealth": {
+        "header": INNER,
+        "process": NAME,
+        "pid": up_to(2**31 - 1),
+        "state": TEXT,
+        "counters": Range(count=COUNTERS_MOST),
+        "last_error": TEXT,
+    },
+    "whisker_msgs/msg/End": {"header": INNER, "messages": COUNTER, "reason": TEXT},
+}
+RANGES = {f"{schema}:{name}": limits for schema, fields in _TABLE.items() for name, limits in fields.items()}

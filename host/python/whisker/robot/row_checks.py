@@ -1,0 +1,90 @@
+"""Whether a row can be: of this robot, and no more than a robot can have moved since the row before."""
+
+import math
+
+import numpy as np
+
+from ..scene import Scene
+from .inbox import Received
+from .messages import REMEDIES, Observation
+from .rows import ROW_NS, between, leaps
+
+# A Create's wheels turn at 0.5 m/s at most, 235 mm apart. The slack is for reports that come a little late.
+MOST_M_S, MOST_RAD_S = 0.5, 4.3
+SLACK_M, SLACK_RAD = 0.05, 0.1
+ROUNDING = 1e-6  # m and rad, between a row's motion and the sums on both sides
+
+
+class RowChecks:
+    """Passes rows on that can be, counts the others. One for all rows of a topic, in their order."""
+
+    def __init__(self, scene: Scene | None = None):
+        """scene: whose cells every row must have; None: of any robot."""
+        self._wanted, self._whiskers = (columns(scene), _whiskers(scene)) if scene else (frozenset(), ())
+        self._last: Received | None = None
+        self._moved_ns = 0  # stamp of the newest row with any motion
+        self.refused, self.last_error = 0, ""
+
+    def passed(self, received: list[Received]) -> list[Received]:
+        """Those that are taken, ends included."""
+        return [one for one in received if one.over or self._passes(one)]
+
+    def _passes(self, one: Received) -> bool:
+        fault = self.fault(one)
+        if fault:
+            self.refused, self.last_error = self.refused + 1, f"{one.topic}: {fault}"
+        else:
+            self.note(one)
+        return not fault
+
+    def fault(self, one: Received) -> str:
+        """What is wrong with a row and what helps, in one line; empty: nothing."""
+        names = self._names_fault(one.message.names) if self._wanted else ""
+        follows = self._last is not None and self._last.envelope.stream == one.envelope.stream
+        return names or (self._motion_fault(self._last.message, one.message) if follows else "")
+
+    def note(self, one: Received) -> None:
+        """This is the row before the next."""
+        row, known = one.message, self._last is not None and self._last.envelope.stream == one.envelope.stream
+        stamp_ns = row.header.stamp.ns
+        if np.any(row.motion) or not known or leaps(self._last.message.header.stamp.ns, stamp_ns):
+            self._moved_ns = stamp_ns
+        self._last = one
+
+    def _names_fault(self, names: list[str]) -> str:
+        if missing := self._wanted.difference(names):
+            return f"field names: cell {min(missing)} is missing; give both sides the scene of this robot"
+        unknown = (name for name in names if name not in self._wanted and not name.startswith(self._whiskers))
+        if (stranger := next(unknown, None)) is not None:
+            return f"field names: no whisker has the cell {stranger:.40}; give both sides the scene of this robot"
+        return ""
+
+    def _motion_fault(self, last: Observation, row: Observation) -> str:
+        rows, moved = row.seq - last.seq, between(last.pose, row.pose)
+        if rows < 1:
+            return f"field seq: {row.seq} after {last.seq}; {REMEDIES[1]}"
+        if rows == 1 and np.abs(moved - row.motion).max() > ROUNDING:
+            return f"field motion: not what leads from the last row's pose to this one's; {REMEDIES[1]}"
+        seconds = self._seconds(last, row)
+        far, turned = math.hypot(*moved[:2]), abs(moved[2])
+        if far > MOST_M_S * seconds + SLACK_M or turned > MOST_RAD_S * seconds + SLACK_RAD:
+            return f"field pose: {far:.3g} m and {turned:.3g} rad in {seconds:.3g} s; {REMEDIES[1]}"
+        return ""
+
+    def _seconds(self, last: Observation, row: Observation) -> float:
+        """In which the motion between two rows was: since the row before that had any, for a whisk's is held back."""
+        rows_ns, stamp_ns = (row.seq - last.seq) * ROW_NS, row.header.stamp.ns
+        if leaps(last.header.stamp.ns, stamp_ns):
+            return rows_ns / 1e9
+        return max(rows_ns, stamp_ns - self._moved_ns) / 1e9
+
+
+def columns(scene: Scene) -> frozenset[str]:
+    """Cells that a row of this scene must have."""
+    textures = {f"{w.name}_{t}" for w in scene.robot.of_role("texture") for t in scene.arena.textures}
+    return frozenset(textures | {f"{w.name}_mm" for w in scene.robot.of_role("object")})
+
+
+def _whiskers(scene: Scene) -> tuple[str, ...]:
+    """How the names of cells begin: models may know more textures than an arena has."""
+    return tuple(f"{whisker.name}_" for whisker in scene.robot.whiskers)
