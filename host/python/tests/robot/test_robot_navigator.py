@@ -343,17 +343,24 @@ def test_rows_of_another_robot_are_refused_by_name_and_the_navigator_stays(made)
 
 def test_a_second_pilot_is_refused_and_told(made):
     _, scene, rows = made
-    with Inside(scene, "health/navigator", lock_step=True) as inside:
+    with Inside(scene, "localisation", "health/navigator", lock_step=True) as inside:
+        thread = threading.Thread(target=inside.run)
+        thread.start()
         inside.rows.send(rows[0], m.EXPLORING)
+        take_until(inside.inbox, lambda got: any(r.topic == "localisation" for r in got), PATIENCE_S)
         second = RowPublisher(inside.pilot)
         for row in rows[:5]:
             second.send(row, m.EXPLORING)
+        told = take_until(
+            inside.inbox,
+            lambda got: any(r.topic != "localisation" and r.message.counts["refused"] == "5" for r in got),
+            PATIENCE_S,
+        )
         inside.rows.send(rows[1], m.EXPLORING)
         inside.rows.end()
-        inside.run()
-        got = take_until(inside.inbox, lambda got: got and got[-1].message.state == health.ENDED, PATIENCE_S)
+        thread.join()
     assert (inside.counters["refused"], inside.counters["weighed"], inside.counters["restarts"]) == (5, 2, 0)
-    assert "of a second source; end one of the two" in got[-1].message.last_error
+    assert "of a second source; end one of the two" in told[-1].message.last_error
 
 
 def test_a_navigator_that_stays_goes_on_with_the_next_run(made):
