@@ -1,7 +1,9 @@
 """whiskerd from outside: the cable pulled and put back, killed and started again, replaced; what readers learn of it."""
 
 import itertools
+import json
 import os
+import pwd
 import re
 import signal
 import socket
@@ -227,6 +229,48 @@ def test_replacement_takes_over_name_and_bridge(tmp_path, ring):
         until(lambda: reader.info.published > 100, process, reader)
         _, errors = process.communicate("go\n", timeout=END_S)
     assert "first 0" in errors and "second 0" in errors
+
+
+# A stale ring of the name, as a killed whiskerd leaves it; a service with its RuntimeDirectory; another whiskerd beside it.
+SERVICE = """
+set -e
+mount -t tmpfs none /run && mkdir /run/whiskerd
+echo stale: $(basename $(ls /dev/shm/$RING))
+RUNTIME_DIRECTORY=/run/whiskerd $D --wait 2>$LOG & service=$!
+"$PYTHON" -m whisker.cli info --json --wait 60
+echo files: $(ls /run/whiskerd)
+$D --wait || echo refused: $?
+RUNTIME_DIRECTORY=/run/other $D --wait || echo refused: $?
+kill $service; wait $service
+echo left: $(ls -A /run/whiskerd)
+"""
+
+
+def test_the_service_has_its_ring_in_its_runtime_directory(tmp_path, ring):
+    space = ["unshare", "--mount", *([] if os.geteuid() == 0 else ["--map-root-user"])]
+    if subprocess.run([*space, "mount", "-t", "tmpfs", "none", "/run"], capture_output=True).returncode != 0:
+        pytest.skip("this user may not have a mount namespace")
+    leave = f"import os; from whisker.bridge.ring import Writer; w = Writer('{ring}', 64); os._exit(0)"
+    subprocess.run([sys.executable, "-c", leave], check=True, timeout=END_S)
+    log = tmp_path / "service.log"
+    names = {"D": f"{program('whiskerd')} --ring {ring}", "RING": ring, "LOG": str(log), "PYTHON": sys.executable}
+    try:
+        done = subprocess.run(
+            [*space, "sh", "-c", SERVICE.replace("info", f"info --ring {ring}")],
+            env=os.environ | names,
+            capture_output=True,
+            text=True,
+            timeout=END_S,
+        )
+        assert Path("/dev/shm", ring).exists(), "the stale ring is not the service's business"
+    finally:
+        Path("/dev/shm", ring).unlink()
+    lines = done.stdout.splitlines()
+    assert lines[0] == f"stale: {ring}" and lines[2:] == [f"files: {ring}", "refused: 1", "refused: 1", "left:"], done
+    assert json.loads(lines[1])["ring"]["owner"] == pwd.getpwuid(os.geteuid()).pw_name
+    held = f"whiskerd: {ring}: another writer holds this ring (/run/whiskerd/{ring}, user "
+    assert [line.startswith(held) for line in done.stderr.splitlines()] == [True, True], done.stderr
+    assert "no bridge is connected" in log.read_text()
 
 
 def test_statistics_on_request(tmp_path, ring):

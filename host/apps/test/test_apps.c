@@ -7,6 +7,7 @@
 
 #include <cmocka.h>
 #include <fcntl.h>
+#include <pwd.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -172,6 +173,8 @@ static void wrong_use_is_refused_in_one_line(void **state)
     assert_refused(too_much, 2, "a word too many");
     const char *lanes[] = {WHISKER_LOG, "--ring", "x", "--lanes", "29", NULL};
     assert_refused(lanes, 2, "--lanes 29: give a whole number from 1 to 28");
+    const char *user[] = {WHISKER_LOG, "--ring", "x", "--ring-owner", "no-such-user", NULL};
+    assert_refused(user, 2, "--ring-owner no-such-user: there is no such user; give a user's name or number");
 }
 
 static void help_has_an_example(void **state)
@@ -264,6 +267,9 @@ static void log_counts_what_was_published_and_follows_the_simulation(void **stat
     }
     assert_int_equal(taken, 999);
     assert_int_equal(finish(child), 0);
+    const struct passwd *user = getpwuid(geteuid());
+    snprintf(message, sizeof message, " of user %s\n", user ? user->pw_name : "");
+    assert_non_null(strstr(content("out"), user ? message : " of user "));
     assert_string_equal(content("bad.csv"), "lane,tick,code,errors\n2,100,33,0\n5,999,0,129\n");
     assert_string_equal(content("log.json"),
                         "{\"frames_received\": 997, \"gaps\": 3, \"repeated\": 0, \"first_tick\": 0, "
@@ -311,6 +317,120 @@ static void log_says_when_the_writer_dies(void **state)
     close(ready[1]);
 }
 
+/* Writes into the header of the test's ring, where docs/ring.md says that the field lies. */
+static void forge(off_t offset, const void *value, size_t bytes)
+{
+    char path[128];
+    snprintf(path, sizeof path, WHISKER_RING_DIRECTORY "/%s", ring_name());
+    const int fd = open(path, O_RDWR);
+    assert_int_equal(pwrite(fd, value, bytes, offset), bytes);
+    close(fd);
+}
+
+static void give_ring_to(uid_t user)
+{
+    char path[128];
+    snprintf(path, sizeof path, WHISKER_RING_DIRECTORY "/%s", ring_name());
+    assert_int_equal(chown(path, user, user), 0);
+}
+
+/* A ring that lives and says that another process is its writer. */
+static pid_t name_a_bystander(struct whisker_ring **ring)
+{
+    enum { WRITER_PID = 32 };
+    const pid_t bystander = fork_tied();
+    if (bystander == 0) {
+        for (;;) {
+            pause();
+        }
+    }
+    const uint32_t pid = (uint32_t)bystander;
+    assert_int_equal(whisker_ring_create(ring_name(), 64, ring), 0);
+    forge(WRITER_PID, &pid, sizeof pid);
+    return bystander;
+}
+
+static void end_bystander(pid_t bystander)
+{
+    assert_int_equal(waitpid(bystander, NULL, WNOHANG), 0); /* it lives */
+    kill(bystander, SIGKILL);
+    assert_int_equal(waitpid(bystander, NULL, 0), bystander);
+}
+
+static void replacing_ends_no_process_that_is_not_the_writer(void **state)
+{
+    (void)state;
+    struct whisker_ring *ring;
+    const pid_t bystander = name_a_bystander(&ring);
+    const char *words[] = {WHISKERD, "--ring", ring_name(), "--replace", NULL};
+    assert_refused(words, 1, "--replace: the process that this ring names as its writer does not hold the ring (");
+    whisker_ring_close(ring);
+    end_bystander(bystander);
+}
+
+/* Root runs whiskerd, as README says, while a stranger has the name. */
+static void replacing_touches_nothing_of_a_stranger(void **state)
+{
+    enum { STRANGER = 4242 };
+    (void)state;
+    if (geteuid() != 0) {
+        print_message("skipped: only root can give a file to another user\n");
+        skip();
+    }
+    struct whisker_ring *ring;
+    const pid_t bystander = name_a_bystander(&ring);
+    give_ring_to(STRANGER);
+    const char *replace[] = {WHISKERD, "--ring", ring_name(), "--replace", NULL};
+    assert_refused(replace, 1, "is user 4242's, whom this reader was not told to trust; ");
+    const char *read[] = {WHISKER_LOG, "--ring", ring_name(), "--wait", "0", NULL};
+    assert_refused(read, 1,
+                   "is user 4242's, whom this reader was not told to trust; if it should, add --ring-owner 4242");
+    char path[128];
+    snprintf(path, sizeof path, "%s/socket", folder);
+    unlink(path);
+    const int listening = listen_at(path);
+    const char *named[] = {WHISKER_LOG, "--ring", ring_name(), "--ring-owner", "4242", "--socket", path, NULL};
+    const pid_t reading = start(named);
+    const int connection = accept(listening, NULL, NULL);
+    assert_said(connection, "follow log"); /* it has attached */
+    whisker_ring_close(ring);
+    assert_int_equal(finish(reading), 0);
+    assert_non_null(strstr(content("out"), " of user 4242\n"));
+    close(connection);
+    close(listening);
+    end_bystander(bystander);
+}
+
+/* A head that no writer counts: the reader ends and says so, where it would read for ever. */
+static void log_ends_at_a_head_that_cannot_be(void **state)
+{
+    enum { HEAD = 64, CLAIM = 128 };
+    static const struct {
+        uint64_t head, claim;
+    } forged[] = {{UINT64_MAX, 0}, {1000000, 0}, {1000000, INT64_MAX}};
+    (void)state;
+    char path[128], told[256];
+    snprintf(path, sizeof path, "%s/socket", folder);
+    snprintf(told, sizeof told, "%s: another process has changed the ring's memory; start whiskerd again", ring_name());
+    for (size_t i = 0; i < sizeof forged / sizeof forged[0]; i++) {
+        unlink(path);
+        const int listening = listen_at(path);
+        struct whisker_ring *ring;
+        assert_int_equal(whisker_ring_create(ring_name(), 64, &ring), 0);
+        const char *words[] = {WHISKER_LOG, "--ring", ring_name(), "--socket", path, NULL};
+        const pid_t child = start(words);
+        const int connection = accept(listening, NULL, NULL);
+        assert_said(connection, "follow log"); /* it has attached */
+        forge(CLAIM, &forged[i].claim, sizeof forged[i].claim);
+        forge(HEAD, &forged[i].head, sizeof forged[i].head);
+        assert_int_equal(finish(child), 1);
+        assert_non_null(strstr(content("out"), told));
+        whisker_ring_close(ring);
+        close(connection);
+        close(listening);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -323,6 +443,9 @@ int main(void)
         cmocka_unit_test(log_to_a_path_that_cannot_be_written_fails_in_one_line),
         cmocka_unit_test(log_counts_what_was_published_and_follows_the_simulation),
         cmocka_unit_test(log_says_when_the_writer_dies),
+        cmocka_unit_test(replacing_ends_no_process_that_is_not_the_writer),
+        cmocka_unit_test(replacing_touches_nothing_of_a_stranger),
+        cmocka_unit_test(log_ends_at_a_head_that_cannot_be),
     };
     return cmocka_run_group_tests_name("apps", tests, make_folder, remove_folder);
 }

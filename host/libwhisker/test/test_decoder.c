@@ -197,6 +197,50 @@ static void ticks_go_on_where_the_wire_wraps(void **state)
     }
 }
 
+static uint64_t draw(uint64_t *seed)
+{
+    *seed ^= *seed << 13;
+    *seed ^= *seed >> 7;
+    *seed ^= *seed << 17;
+    return *seed;
+}
+
+/* The host's tick after frames of these two ticks of the wire. */
+static uint64_t host_tick_after(uint32_t first, uint32_t second)
+{
+    struct result result;
+    uint8_t bytes[VECTOR_BYTES];
+    begin(&result);
+    with_tick(bytes, first);
+    feed(&result, bytes, sizeof bytes);
+    with_tick(bytes, second);
+    feed(&result, bytes, sizeof bytes);
+    assert_int_equal(result.count, 2);
+    return result.frames[1].tick;
+}
+
+/* Frames around the wrap may be lost, as many as there are: from a tick before it to one after it the host's goes on by
+ * what the wire's went on, up to half its range. A longer way back is a bridge that began anew. */
+static void the_wrap_may_fall_among_lost_frames(void **state)
+{
+    (void)state;
+    const uint64_t begun = 0x2026112200000001u;
+    const uint64_t half = 1ull << 31, range = 1ull << 32;
+    uint64_t seed = begun;
+    for (int i = 0; i < 2000; i++) {
+        const uint64_t before = draw(&seed) >> (33 + draw(&seed) % 31); /* ticks before the wrap, of all sizes */
+        const uint64_t after = draw(&seed) >> (33 + draw(&seed) % 31);  /* and after it */
+        const uint32_t first = (uint32_t)(range - 1 - before), second = (uint32_t)after;
+        const bool goes_on = second >= first || before + 1 + after <= half;
+        const uint64_t expected = goes_on && second < first ? range + second : second;
+        if (host_tick_after(first, second) != expected) {
+            fail_msg("seed %llx, draw %d: after tick %u came %u", (unsigned long long)begun, i, first, second);
+        }
+    }
+    assert_true(host_tick_after(UINT32_MAX, (uint32_t)half - 1) == range + half - 1); /* the longest way on */
+    assert_true(host_tick_after(UINT32_MAX, (uint32_t)half) == half);                 /* the shortest way back */
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -206,6 +250,7 @@ int main(void)
         cmocka_unit_test(each_cause_has_its_count),
         cmocka_unit_test(a_stream_that_ends_inside_a_frame_is_truncated),
         cmocka_unit_test(ticks_go_on_where_the_wire_wraps),
+        cmocka_unit_test(the_wrap_may_fall_among_lost_frames),
     };
     return cmocka_run_group_tests_name("decoder", tests, read_vectors, NULL);
 }
