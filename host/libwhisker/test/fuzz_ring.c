@@ -1,7 +1,8 @@
 /*
- * libFuzzer target: shared memory full of anything cannot crash a reader, nor lead it out of its own mapping, nor a
- * writer that finds it under its ring's name. Input: one byte of choices, one for the header's length (in fours),
- * the header, then what the reader does and what another process writes meanwhile, in steps of five bytes.
+ * libFuzzer target: shared memory full of anything cannot crash a reader, nor lead it out of its own mapping, nor keep
+ * it reading for ever, nor crash a writer that finds it under its ring's name. Input: one byte of choices, one for the
+ * header's length (in fours), the header, then what the reader does and what another process writes meanwhile, in steps
+ * of five bytes.
  */
 #include <fcntl.h>
 #include <stdio.h>
@@ -102,6 +103,55 @@ static void read_somehow(struct whisker_reader *reader, uint8_t how)
     }
 }
 
+/* While nobody writes, a loop over peek and advance comes to the end of what there is, or of the ring. */
+static void read_out(struct whisker_reader *reader)
+{
+    const struct whisker_frame *frames;
+    size_t count;
+    for (int looks = 0; looks < 8; looks++) {
+        int error = whisker_reader_peek(reader, &frames, &count);
+        if (!error && count == 0) {
+            return;
+        }
+        error = error ? error : whisker_reader_advance(reader, count);
+        if (error && error != WHISKER_ERROR_OVERRUN) {
+            return;
+        }
+    }
+    abort();
+}
+
+/* The ring with a hole in its frames, and, if we may, as another user's: whatever else it holds, it is not mapped. */
+static void attach_to_what_is_refused(uint8_t choices)
+{
+    const off_t hole = (off_t)bytes - sysconf(_SC_PAGESIZE);
+    struct whisker_reader *reader;
+    if (fallocate(file, FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE, hole, sysconf(_SC_PAGESIZE)) != 0) {
+        abort();
+    }
+    if (whisker_reader_attach(name, 0, &reader) == WHISKER_OK || posix_fallocate(file, 0, (off_t)bytes) != 0) {
+        abort();
+    }
+    if (geteuid() == 0) {
+        const uid_t stranger = 1000u + choices;
+        if (fchown(file, stranger, (gid_t)-1) != 0 ||
+            whisker_reader_attach(name, 0, &reader) != WHISKER_ERROR_RING_OWNER || fchown(file, 0, (gid_t)-1) != 0) {
+            abort();
+        }
+    }
+}
+
+/* What the process id in the header may do, and what is said of the file. Signal 0 is none. */
+static void ask_about(uint8_t choices)
+{
+    char line[WHISKER_RING_LINE_BYTES];
+    whisker_ring_signal_writer(name, 0);
+    whisker_ring_explain(name, -(int)(choices % 64), line, choices);
+    if (choices && strlen(line) >= choices) {
+        abort();
+    }
+}
+
 static void write_somehow(void)
 {
     struct whisker_ring *ring;
@@ -131,6 +181,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     mend_header(choices);
     if (choices >= 240) { /* seldom, for it is slow */
         write_somehow();
+        attach_to_what_is_refused(choices);
+        ask_about(choices);
     }
     struct whisker_reader *reader;
     if (whisker_reader_attach(name, 0, &reader) != WHISKER_OK) {
@@ -145,6 +197,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         }
     }
     read_somehow(reader, 7);
+    read_out(reader);
     whisker_reader_detach(reader);
     return 0;
 }
