@@ -206,7 +206,12 @@ def test_a_damaged_chunk_costs_only_itself(tmp_path):
     path.write_bytes(data)
     with read(path) as recording:
         kept = np.concatenate(list(recording.blocks()))
-        assert recording.complete and len(recording.damage) == 1 and "left out" in recording.damage[0]
+        lost = len(frames) - len(kept)
+        assert not recording.complete and "its checksum is wrong" in recording.damage[0]
+        assert any(
+            line.endswith(f"/whisker/frames: {-(-lost // 200)} of 100 messages are lost") for line in recording.damage
+        )
+        assert recording.damage[-1].endswith(f"{lost} of 20000 frames are lost")
     assert 10000 < len(kept) < 20000 and np.isin(kept["tick"], frames["tick"]).all()
 
 

@@ -1,65 +1,50 @@
 """Reads MCAP files from anywhere: cut off, damaged or hostile ones give what is whole, and never more memory than they say.
 
 The format is public (mcap.dev/spec); writing is the package mcap's work. Reading is ours because a recording that a
-crash cut off must still be of use, and because a length in a file must not be believed.
+crash cut off must still be of use, because a damaged one must say what it lost, and because a length in a file must not
+be believed.
 """
 
-import os
-import struct
-import zlib
 from collections.abc import Iterator
-from dataclasses import dataclass
+from contextlib import suppress
+from itertools import islice
 from typing import BinaryIO
 
-import lz4.frame
-import zstandard
+from .mcapmessages import NUMBERED, Channel, Message, Reading, add_channel
+from .mcaprecords import CHANNEL, DATA_END, FOOTER, FOOTER_BODY, MAGIC, METADATA, Cursor, Damaged
+from .mcapwalk import Record, RecordingError, Walk
 
-from ..errors import UserError
+__all__ = ["MAGIC", "NUMBERED", "McapFile", "Message", "RecordingError"]
 
-MAGIC = b"\x89MCAP0\r\n"
-HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, METADATA = 0x01, 0x02, 0x03, 0x04, 0x05, 0x06, 0x0C
-RECORD = struct.Struct("<BQ")  # opcode, bytes that follow
-MESSAGE_HEAD = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
-CHUNK_HEAD = struct.Struct("<QQQI")  # first time, last time, bytes unpacked, their CRC
-CHUNK_MOST = 1 << 26  # bytes unpacked; recordings have 1 MiB
-RECORD_MOST = 1 << 26  # bytes of a record that is read whole; index and attachment records are skipped unread
-DAMAGE_MOST = 100  # lines kept
-NUMBERED = "whisker_numbered"  # key of a channel's metadata: sequence numbers count its messages in the file, from 1 on
-
-
-class RecordingError(UserError, ValueError):
-    """A file that is no recording, or cannot be read or written. Its text is one line: file, what, remedy."""
-
-
-class Damaged(ValueError):
-    """A record that is not what it should be: it is left out, with a line in `damage`."""
-
-
-@dataclass(frozen=True)
-class Message:
-    topic: str
-    log_time: int
-    data: memoryview
+DAMAGE_MOST = 100  # lines of damaged places, and as many of what is lost by them
+METADATA_MOST = 1 << 22  # bytes of all metadata records together
+INDEX_DAMAGED = "the index at its end is damaged"
+SEARCHED = 1 << 24  # bytes in which a file that does not begin as MCAP does must show a record of one
 
 
 class McapFile:
     """One file, read from front to back. Use as a context manager.
 
-    damage: what was left out, a line each, filled while reading; complete: the writer came to its end.
+    damage: what was left out and how much that was, a line each, filled while reading. metadata: by the record's name;
+    records of one name together, what comes later counts.
     """
 
     def __init__(self, path):
-        """RecordingError when it cannot be opened or does not begin as MCAP does."""
+        """RecordingError when it cannot be opened, or is no MCAP file even in parts."""
         self.path = path
         self.damage: list[str] = []
-        self.topics: dict[int, str] = {}
-        self.metadata: dict[str, dict[str, str]] = {}  # records of one name together, what comes later counts
+        self.metadata: dict[str, dict[str, str]] = {}
+        self.versions: list[tuple[str, dict[str, str]]] = []  # (name, content) of each metadata record
+        self._metadata_room = METADATA_MOST
+        self._ends = self._is_index_whole = False
+        self._channels: dict[int, Channel] = {}  # of the index
         try:
             self._file: BinaryIO = open(path, "rb")  # noqa: SIM115 - closed by close()
         except OSError as error:
             text = f"{path}: cannot be read ({error.strerror}); give a recording made by 'whisker record'"
             raise RecordingError(text) from error
         try:
+            self._walk = Walk(path, self._file.fileno(), self.note)
             self._open()
         except BaseException:
             self.close()
@@ -74,145 +59,72 @@ class McapFile:
     def close(self) -> None:
         self._file.close()
 
+    @property
+    def complete(self) -> bool:
+        """The writer came to its end, and nothing is damaged as far as is known: by all of it once `messages` has ended."""
+        return self._ends and not self.damage
+
+    @property
+    def topics(self) -> set[str]:
+        """As far as they are known by now."""
+        return {channel.topic for channel in self._channels.values()}
+
     def note(self, text: str) -> None:
         """Add a line to `damage`, unless there are enough."""
         if len(self.damage) < DAMAGE_MOST:
             self.damage.append(f"{self.path}: {text}")
+        elif len(self.damage) == DAMAGE_MOST:
+            self.damage.append(f"{self.path}: more is damaged than is listed here")
 
     def messages(self) -> Iterator[Message]:
         """All messages of whole records, in the order of the file."""
         self.damage = []
-        for place, opcode, size in self._records():
-            if opcode not in (CHUNK, CHANNEL, MESSAGE):
-                continue
-            try:
-                body = self._body(size)
-                yield from self._parts(body) if opcode == CHUNK else self._part(opcode, body)
-            except Damaged as error:
-                self.note(f"byte {place}: {error}; left out")
+        reading = Reading(self._walk, self._channels, self._is_index_whole, self.note)
+        yield from reading.messages()
+        if self._ends and not self._is_index_whole:
+            self.note(INDEX_DAMAGED)
+        if not self.damage:
+            reading.check_rest()
+        self.damage += [f"{self.path}: {line}" for line in islice(reading.losses(), DAMAGE_MOST)]
 
     def _open(self) -> None:
-        try:
-            self._bytes = os.fstat(self._file.fileno()).st_size
-            if self._file.read(len(MAGIC)) != MAGIC:
-                raise RecordingError(f"{self.path}: not an MCAP file; give a recording made by 'whisker record'")
-            self.complete = False
-            for _, opcode, size in self._records():
-                self.complete |= opcode == FOOTER
-                if opcode == METADATA:
-                    self._note_metadata(size)
-        except OSError as error:
-            raise RecordingError(
-                f"{self.path}: cannot be read ({error.strerror}); copy it from its source again"
-            ) from error
+        if not self._is_mcap():
+            raise RecordingError(f"{self.path}: not an MCAP file; give a recording made by 'whisker record'")
+        summary = None
+        for record in self._walk.records(unpack=False):
+            if record.opcode == METADATA:
+                self._note_metadata(record)
+            elif record.opcode == DATA_END:
+                summary = record.end
+            elif record.opcode == CHANNEL:
+                with suppress(Damaged):  # then the index's checksum is wrong too
+                    add_channel(self._channels, self._walk.body(record))
+            elif record.opcode == FOOTER:
+                self._ends = True
+                self._check_index(summary, record)
 
-    def _note_metadata(self, size: int) -> None:
+    def _is_mcap(self) -> bool:
+        """By its first or last bytes, or by anything else that only such files have."""
+        ends = (self._walk.read(0, len(MAGIC)), self._walk.read(max(self._walk.size - len(MAGIC), 0), len(MAGIC)))
+        return MAGIC in ends or self._walk.search(0, min(self._walk.size, SEARCHED)) is not None
+
+    def _check_index(self, summary: int | None, footer: Record) -> None:
+        """Believe the index at the end if its checksum is right."""
+        start, _, crc = FOOTER_BODY.unpack(self._walk.body(footer))
+        summary = start if summary is None else summary
+        self._is_index_whole = not crc or self._walk.crc(summary, footer.end - 4) == crc
+        if not self._is_index_whole:
+            self._channels.clear()
+            self.note(INDEX_DAMAGED)
+
+    def _note_metadata(self, record: Record) -> None:
+        self._metadata_room -= record.size
+        if self._metadata_room < 0:
+            return
         try:
-            cursor = Cursor(self._body(size))
-            name = cursor.text()
-            self.metadata[name] = self.metadata.get(name, {}) | cursor.text_map()
+            cursor = Cursor(self._walk.body(record))
+            self.versions.append((cursor.text(), cursor.text_map()))
         except Damaged:
-            return  # names and counts only; the frames do not depend on them
-
-    def _records(self) -> Iterator[tuple[int, int, int]]:
-        """(offset, opcode, size) of each whole record; the file stands at its body. Ends at the footer or the cut."""
-        place = len(MAGIC)
-        while place < self._bytes:
-            self._file.seek(place)
-            head = self._file.read(RECORD.size)
-            opcode, size = RECORD.unpack(head) if len(head) == RECORD.size else (0, self._bytes)
-            if size > self._bytes - place - RECORD.size:
-                self.note(f"byte {place}: the file ends within a record; what is before it is whole")
-                return
-            yield place, opcode, size
-            if opcode == FOOTER:
-                return
-            place += RECORD.size + size
-        self.note(f"byte {place}: the file ends without its closing record; what is before it is whole")
-
-    def _body(self, size: int) -> memoryview:
-        if size > RECORD_MOST:
-            raise Damaged(f"a record of {size} bytes")
-        return memoryview(self._file.read(size))
-
-    def _part(self, opcode: int, body: memoryview) -> Iterator[Message]:
-        if opcode == CHANNEL:
-            cursor = Cursor(body)
-            number, _ = cursor.numbers("<HH")
-            self.topics[number] = cursor.text()
-        elif opcode == MESSAGE:
-            cursor = Cursor(body)
-            channel, _, log_time, _ = cursor.numbers(MESSAGE_HEAD.format)
-            if channel not in self.topics:
-                raise Damaged(f"a message on channel {channel}, which nothing describes")
-            yield Message(self.topics[channel], log_time, cursor.rest())
-
-    def _parts(self, body: memoryview) -> Iterator[Message]:
-        cursor = Cursor(unpack_chunk(body))
-        while cursor.left:
-            opcode, size = cursor.numbers(RECORD.format)
-            yield from self._part(opcode, cursor.take(size))
-
-
-class Cursor:
-    """Takes values off the front of bytes; Damaged when there are too few."""
-
-    def __init__(self, data: memoryview):
-        self._data, self._at = data, 0
-
-    @property
-    def left(self) -> int:
-        return len(self._data) - self._at
-
-    def take(self, count: int) -> memoryview:
-        if count > self.left:
-            raise Damaged(f"{count} bytes wanted where {self.left} are left")
-        self._at += count
-        return self._data[self._at - count : self._at]
-
-    def rest(self) -> memoryview:
-        return self.take(self.left)
-
-    def numbers(self, layout: str) -> tuple[int, ...]:
-        return struct.unpack(layout, self.take(struct.calcsize(layout)))
-
-    def text(self) -> str:
-        (count,) = self.numbers("<I")
-        return bytes(self.take(count)).decode("utf-8", "replace")
-
-    def text_map(self) -> dict[str, str]:
-        (count,) = self.numbers("<I")
-        inner, pairs = Cursor(self.take(count)), {}
-        while inner.left:
-            key = inner.text()
-            pairs[key] = inner.text()
-        return pairs
-
-
-def unpack_chunk(body: memoryview) -> memoryview:
-    """The records inside a chunk; Damaged when it is not what it says."""
-    cursor = Cursor(body)
-    _, _, size, crc = cursor.numbers(CHUNK_HEAD.format)
-    compression = cursor.text()
-    (count,) = cursor.numbers("<Q")
-    packed = cursor.take(count)
-    if size > CHUNK_MOST:
-        raise Damaged(f"a chunk of {size} bytes")
-    data = _unpack(compression, packed, size)
-    if len(data) != size or (crc and zlib.crc32(data) != crc):
-        raise Damaged("a chunk that is not as it was written (its checksum is wrong)")
-    return memoryview(data)
-
-
-def _unpack(compression: str, packed: memoryview, size: int) -> bytes | memoryview:
-    """At most size + 1 bytes."""
-    try:
-        if compression == "zstd":
-            return zstandard.ZstdDecompressor(max_window_size=CHUNK_MOST).stream_reader(packed).read(size + 1)
-        if compression == "lz4":
-            return lz4.frame.LZ4FrameDecompressor().decompress(packed, size + 1)
-    except (zstandard.ZstdError, RuntimeError, EOFError) as error:
-        raise Damaged(f"a chunk that cannot be unpacked ({error})") from error
-    if compression == "":
-        return packed
-    raise Damaged("a chunk packed in an unknown way")
+            return  # names and counts only; the messages do not depend on them
+        name, content = self.versions[-1]
+        self.metadata[name] = self.metadata.get(name, {}) | content

@@ -18,14 +18,15 @@ class Recording:
     """One recording. Use as a context manager.
 
     metadata: what the recorder knew (strings): format, ring, lanes, clock_hz, serial, firmware, wire_version, started.
-    complete: the recorder came to its end; a file cut off is read up to its last whole chunk.
-    damage: lines about what could not be read, known after `blocks` or `events` has come to its end.
+    complete: the recorder came to its end and nothing is damaged or lost since; a file cut off is read up to its last
+    whole chunk. damage: lines about what could not be read and how much that was. Both are known after `blocks` or
+    `events` has come to its end.
     """
 
     def __init__(self, path):
         """RecordingError when the file cannot be read, is no MCAP, or holds no frames of whiskers."""
         self._file = McapFile(path)
-        self.path, self.complete = path, self._file.complete
+        self.path = path
         self.metadata: dict[str, str] = self._file.metadata.get(METADATA, {})
         try:
             self._check()
@@ -41,6 +42,10 @@ class Recording:
 
     def close(self) -> None:
         self._file.close()
+
+    @property
+    def complete(self) -> bool:
+        return self._file.complete
 
     @property
     def damage(self) -> list[str]:
@@ -68,14 +73,20 @@ class Recording:
 
     def stamped_blocks(self) -> Iterator[tuple[int, np.ndarray]]:
         """(host time of the first frame in ns since 1970, frames)."""
-        yield from self._decoded(FRAMES_TOPIC, decode_block)
+        seen = 0
+        for stamp_ns, frames in self._decoded(FRAMES_TOPIC, decode_block):
+            seen += len(frames)
+            yield stamp_ns, frames
+        written = self.metadata.get("frames", "")
+        if written.isdecimal() and seen < int(written[:20]):
+            self._file.note(f"{int(written[:20]) - seen} of {written:.20} frames are lost")
 
     def events(self) -> Iterator[Event]:
         """Every interruption, in order."""
         yield from self._decoded(EVENTS_TOPIC, decode_event)
 
     def _decoded(self, topic: str, decode) -> Iterator:
-        for message in self._messages():
+        for message in self._file.messages():
             if message.topic == topic:
                 try:
                     decoded = decode(message.data)
@@ -84,22 +95,19 @@ class Recording:
                     continue
                 yield decoded
 
-    def _messages(self) -> Iterator:
-        try:
-            yield from self._file.messages()
-        except OSError as error:
-            raise RecordingError(f"{self.path}: cannot be read ({error.strerror}); copy it from its source") from error
-
     def _check(self) -> None:
-        told = self.metadata.get("format", FORMAT)
-        if told != FORMAT:
-            raise RecordingError(
-                f"{self.path}: format {told:.20}, this package reads {FORMAT}; install the newer release"
-            )
-        if not any(message.topic == FRAMES_TOPIC for message in self._messages()):
-            known = FRAMES_TOPIC in self._file.topics.values() or not self.complete
+        told = {content.get("format", FORMAT) for name, content in self._file.versions if name == METADATA}
+        if told and FORMAT not in told:  # a bit that is wrong in one copy is no newer release
+            text = f"format {told.pop():.20}, this package reads {FORMAT}; install the newer release"
+            raise RecordingError(f"{self.path}: {text}")
+        if not any(message.topic == FRAMES_TOPIC for message in self._file.messages()):
+            known = FRAMES_TOPIC in self._file.topics or not self.complete
             text = "holds no frames" if known else f"has no topic {FRAMES_TOPIC}"
-            raise RecordingError(f"{self.path}: {text}; give a recording made by 'whisker record'")
+            raise RecordingError(f"{self.path}: {text}{self._why()}; give a recording made by 'whisker record'")
+
+    def _why(self) -> str:
+        """The first damage, for a file of which nothing is left."""
+        return f" ({self.damage[0].removeprefix(f'{self.path}: ')})" if self.damage else ""
 
 
 def read(path) -> Recording:

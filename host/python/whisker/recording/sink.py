@@ -92,16 +92,16 @@ class Sink:
 
     def flush(self) -> None:
         """Called between records: all up to here is whole, and on its way to the disk. OSError when a sync failed."""
-        self._whole = self._place
-        if self._syncer:
+        if self._syncer and self._whole != self._place:
             self._syncer.request()
-            self._raise()
+        self._whole = self._place
+        self._raise()
 
     def settle(self) -> None:
         """Wait until all is on the disk; OSError when that failed."""
         if self._syncer:
             self._syncer.stop()
-            self._raise()
+        self._raise()
 
     def cut(self) -> None:
         """Give up what came after the last flush."""
@@ -115,5 +115,5 @@ class Sink:
         self._file.close()
 
     def _raise(self) -> None:
-        if self._syncer.error:
+        if self._syncer and self._syncer.error:
             raise self._syncer.error
