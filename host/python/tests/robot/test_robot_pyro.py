@@ -1,11 +1,20 @@
 """The Pyro facade: what the paper's server did, over the same topics as everything else."""
 
+import contextlib
+import json
+import marshal
 import math
+import socket
+import struct
 import subprocess
+import threading
+import zlib
+from dataclasses import replace
 
 import numpy as np
 import Pyro5.api
 import pytest
+import serpent
 from commandkit import END_S, command, run, signals_as_before  # noqa: F401 - a fixture
 from linkkit import free_endpoint
 from robotkit import examples, take_until
@@ -15,7 +24,8 @@ from whisker.pilot.pilot import compose
 from whisker.robot import messages as m
 from whisker.robot.inbox import Received
 from whisker.robot.link import Link
-from whisker.robot.pyro import Results
+from whisker.robot.pyro import NAMES_MOST, Results, Server
+from whisker.robot.pyro_daemon import REQUEST_MOST
 from whisker.robot.rows import to_message
 from whisker.robot.streams import Envelope
 
@@ -23,8 +33,9 @@ PATIENCE_S = 60.0
 
 
 def row(n: int) -> dict:
+    motion = (0.01, 0.001 * (n % 25), 0.1)
     cells = {"l_VINYL": -1.5, "l_ROUGH": None, "front_mm": math.nan}
-    return {"t_s": round(0.1 * (n + 1), 1)} | dict(zip(ODOMETRY, (0.01, 0.001 * n, 0.1), strict=True)) | cells
+    return {"t_s": round(0.1 * (n + 1), 1)} | dict(zip(ODOMETRY, motion, strict=True)) | cells
 
 
 def observed(first: int, last: int, pose=(0.0, 0.0, 0.0), stream: int = 1):
@@ -60,7 +71,7 @@ def test_a_client_behind_gets_all_the_motion_it_missed():
     assert results.observation(25)["motion"] == [0.0, 0.0, 0.0]
     assert results.observation(26)["motion"] is None and results.observation(-1)["motion"] is None
     assert results.observation(15)["motion"] is None  # a row that never came: only the next knows
-    assert results.counters() == {"rows": 20, "missed": 5, "restarts": 0}
+    assert results.counters() == {"rows": 20, "missed": 5, "restarts": 0, "refused": 0}
 
 
 def test_poses_odometry_and_health_are_the_newest():
@@ -119,6 +130,138 @@ def test_a_netbook_writes_and_clients_read_over_the_network():
     assert rows[-1].pose == pytest.approx(moved(range(5)))
     odometry = [r.message for r in got if r.topic == "odometry"]
     assert odometry[-1].pose.pose.xytheta == pytest.approx(tuple(moved(range(5))))
+
+
+class Sink:
+    """A link whose streams keep what is sent."""
+
+    def __init__(self):
+        self.sent = []
+
+    def publish(self, topic):
+        return self
+
+    def send(self, message):
+        self.sent.append(message)
+
+
+IMPOSSIBLE = [
+    {"odo_x_m": 1e308},
+    {"odo_x_m": 1.1},
+    {"odo_theta_rad": 10**400},
+    {"odo_theta_rad": -3.2},
+    {"odo_y_m": 0.9},
+    {"t_s": 1e300},
+    {"t_s": -1.0},
+    {"t_s": 2.0**31},
+    {"x" * 200: 1.0},
+    {"\ud800": 1.0},
+    {f"cell{n}": 1.0 for n in range(600)},
+]
+
+
+@pytest.mark.parametrize("change", IMPOSSIBLE)
+def test_a_row_that_cannot_be_is_not_written_and_the_next_is(change):
+    link = Sink()
+    results = Results(link, may_write=True)
+    assert results.write(row(0)) == 0
+    with pytest.raises(ValueError) as refused:  # noqa: PT011 - of each its own text
+        results.write(row(1) | change)
+    assert type(refused.value) is ValueError and "\n" not in str(refused.value)
+    assert results.write(row(1)) == 1
+    assert [x.seq for x in link.sent if isinstance(x, m.Observation)] == [0, 1]
+    for bad in (None, [1], "t_s"):
+        with pytest.raises(ValueError, match="row: not cells by name"):
+            results.write(bad)
+
+
+def test_rows_that_cannot_be_leave_the_answers_right():
+    results = Results(None, may_write=False)
+    rows, _ = observed(0, 9)
+    for one in rows:
+        good, told = one.message, one.envelope
+        jump = replace(good, pose=good.pose + [0.9, 0.0, 0.0])
+        back = replace(good, seq=max(0, good.seq - 3))
+        results.take([Received("observation", bad, told) for bad in (jump, back)[: good.seq]] + [one])
+    assert results.observation(0)["motion"] == pytest.approx(moved(range(10)))
+    assert results.counters()["refused"] > 8 and "field " in results.last_error
+
+
+def test_names_that_are_made_up_take_no_room():
+    results, shown = Results(None, may_write=False), examples()
+    for n in range(3000):
+        told = replace(shown["health/pilot"], process=f"p{n}"), replace(shown["localisation"], filter=f"f{n}")
+        results.take([Received("localisation", one, Envelope(1, n, 0)) for one in told])
+    assert len(results.health()) == len(results._answers) == NAMES_MOST
+
+
+@contextlib.contextmanager
+def serving(may_write: bool = False):
+    """A server within this process, with the link that it listens to."""
+    endpoint = free_endpoint()
+    with Link("pilot", listen=[endpoint], lock_step=True) as pilot, Link("pyro", connect=[endpoint]) as link:
+        server, stop = Server(link, "127.0.0.1", 0, may_write), threading.Event()
+        thread = threading.Thread(target=server.run, args=[stop])
+        thread.start()
+        try:
+            assert pilot.wait_for(["pyro"], PATIENCE_S)
+            yield server, pilot
+        finally:
+            stop.set()
+            thread.join(PATIENCE_S)
+
+
+def address(server: Server) -> tuple[str, int]:
+    host, _, port = server.uri.rpartition("@")[2].partition(":")
+    return host, int(port)
+
+
+def test_silent_connections_lock_nobody_out():
+    """200 that never say a word and 100 that greet and fall silent: those that speak are served."""
+    with serving() as (server, _), contextlib.ExitStack() as stack:
+        for _ in range(200):
+            stack.enter_context(socket.create_connection(address(server), PATIENCE_S))
+        for _ in range(100):
+            stack.enter_context(Pyro5.api.Proxy(server.uri))._pyroBind()
+        for _ in range(5):
+            with Pyro5.api.Proxy(server.uri) as client:
+                client._pyroTimeout = 5.0
+                assert client.pose() is None
+
+
+def raw(server: Server, payload: bytes, serializer: int, flags: int = 0) -> bytes:
+    """What comes back on a greeting with these bytes, until the connection is closed."""
+    head = b"PYRO" + struct.pack("!HBBHHII16sHH", 502, 1, serializer, flags, 0, len(payload), 0, bytes(16), 0, 0x4DC5)
+    with socket.create_connection(address(server), PATIENCE_S) as client:
+        client.sendall(head + payload)
+        client.shutdown(socket.SHUT_WR)
+        client.settimeout(PATIENCE_S)
+        return b"".join(iter(lambda: client.recv(65536), b""))
+
+
+def test_only_small_plain_requests_in_pyros_own_serializer_are_read(monkeypatch):
+    read = []
+    monkeypatch.setattr("marshal.loads", read.append)
+    with serving() as (server, _):
+        greeting = {"handshake": "hello", "object": "whisker.results"}
+        plain = serpent.dumps(greeting)
+        for serializer, payload in ((2, marshal.dumps(greeting)), (3, json.dumps(greeting).encode()), (4, b"\x80")):
+            assert b"whisker" not in raw(server, payload, serializer)
+        assert b"meta" not in raw(server, zlib.compress(plain), 1, flags=2)
+        assert b"meta" not in raw(server, plain + b" " * REQUEST_MOST, 1)
+        assert b"meta" in raw(server, plain, 1)
+        with Pyro5.api.Proxy(server.uri) as client:
+            assert client.pose() is None
+    assert read == [] and Pyro5.config.COMMTIMEOUT > 0
+
+
+def test_a_listener_that_fails_ends_the_server(monkeypatch):
+    """A server that no longer hears the robot does not stay with old answers."""
+    with Link("pyro") as link:
+        server = Server(link, "127.0.0.1", 0)
+        monkeypatch.setattr(server._results, "take", lambda received: 1 / 0)
+        with pytest.raises(ZeroDivisionError):
+            server.run(threading.Event())
 
 
 def test_a_port_that_is_taken_is_one_line(capsys):

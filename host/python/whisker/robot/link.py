@@ -17,6 +17,7 @@ import json
 import re
 import threading
 from collections.abc import Iterable
+from pathlib import Path
 
 import zenoh
 
@@ -36,10 +37,10 @@ BLOCK_US = 600_000_000  # a lock-step sender waits so long for a reader that sta
 MESSAGE_MOST = 1 << 18  # bytes: four beliefs of the most poses; zenoh drops what is larger
 QUEUE_BATCHES = 16  # of 64 KiB, zenoh's most: a live sender's burst finds room while the machine is busy elsewhere
 RETRY = {"period_init_ms": 100, "period_max_ms": 1000, "period_increase_factor": 2}
-ENDPOINT = re.compile(r"tcp/(\[[0-9a-fA-F:]+\]|[\w.-]+):(\d{1,5})")
+ENDPOINT = re.compile(r"(?:tcp|tls)/(\[[0-9a-fA-F:]+\]|[\w.-]+):(\d{1,5})")
 ALIVE, STREAM = "alive", "stream"  # keys of liveliness tokens: alive/<process>, stream/<number>/<topic>
 TOKEN = re.compile(r"([0-9a-f]{8})/(.+)")
-LOOPBACK = re.compile(r"tcp/(127\.[\d.]+|\[::1\]|localhost):\d+")
+LOOPBACK = re.compile(r"(?:tcp|tls)/(127\.[\d.]+|\[::1\]|localhost):\d+")
 
 
 class LinkError(UserError):
@@ -103,8 +104,9 @@ class Link:
         connect: Iterable[str] = (),
         lock_step: bool = False,
         scout: bool = False,
+        config: Path | None = None,
     ):
-        """Endpoints are tcp/HOST:PORT. Those of `connect` need not be there yet.
+        """Endpoints are tcp/HOST:PORT or tls/HOST:PORT. Those of `connect` need not be there yet.
 
         lock_step: senders wait for their readers and nothing is left out, for runs that must be alike bit for bit;
         else the newest counts and nobody waits. scout: look for others by multicast, and be found.
@@ -116,12 +118,14 @@ class Link:
         self.process, self.lock_step = process, lock_step
         self._prefix = f"whisker/{robot}/"
         self._inboxes: list[Inbox] = []
-        config = _config(list(listen), list(connect), lock_step, scout)
+        made = _config(list(listen), list(connect), lock_step, scout, config)
         try:
-            self._session = zenoh.open(config)
+            self._session = zenoh.open(made)
         except zenoh.ZError as error:
-            text = f"{', '.join(listen)}: cannot be listened on ({_reason(error)})"
-            raise LinkError(f"{text}; end what holds the port, or choose another with --listen") from None
+            what = ", ".join(listen) or config or "no endpoint"
+            remedy = f", or mend {config}" if config else ""
+            text = f"{what}: cannot be listened on ({_reason(error)})"
+            raise LinkError(f"{text}; end what holds the port, or choose another with --listen{remedy}") from None
         self._kept: list = []  # what zenoh undeclares when it is no longer held
         self._sources = Sources()
         self.peers: set[str] = set()
@@ -192,12 +196,28 @@ def is_loopback(endpoint: str) -> bool:
     return LOOPBACK.fullmatch(endpoint) is not None
 
 
-def _config(listen: list[str], connect: list[str], lock_step: bool, scout: bool) -> zenoh.Config:
+def read_config(path: Path | None) -> zenoh.Config:
+    """zenoh's own configuration; NamingError when the file is none."""
+    if path is None:
+        return zenoh.Config()
+    try:
+        return zenoh.Config.from_json5(path.read_text())
+    except (OSError, UnicodeDecodeError, zenoh.ZError) as error:
+        why = error.strerror if isinstance(error, OSError) else " ".join(str(error).split())[:200]
+        raise NamingError(f"{path}: no configuration of zenoh ({why}); give a JSON5 file, see docs/remote.md") from None
+
+
+def is_guarded(endpoint: str, config: zenoh.Config) -> bool:
+    """Whether only those with a certificate of our own authority get through an endpoint."""
+    return endpoint.startswith("tls/") and config.get_json("transport/link/tls/enable_mtls") == "true"
+
+
+def _config(listen: list[str], connect: list[str], lock_step: bool, scout: bool, file: Path | None) -> zenoh.Config:
     for endpoint in [*listen, *connect]:
         found = ENDPOINT.fullmatch(endpoint)
         if not found or int(found[2]) > 65535:
             raise NamingError(f"'{endpoint}': not an endpoint; give tcp/HOST:PORT, as {PILOT_ENDPOINT}")
-    config = zenoh.Config()
+    config = read_config(file)
     told = {
         "mode": "peer",
         "listen/endpoints": listen,

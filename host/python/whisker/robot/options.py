@@ -3,37 +3,44 @@
 import argparse
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
-from .link import NAVIGATOR_ENDPOINT, PILOT_ENDPOINT, ROBOT, Link, is_loopback
+from .link import NAVIGATOR_ENDPOINT, PILOT_ENDPOINT, ROBOT, Link, is_guarded, is_loopback, read_config
 
 NOWHERE = "none"
 
 
 def add_link(parser: argparse.ArgumentParser, listen: Sequence[str], connect: Sequence[str]) -> None:
-    """--robot, --listen, --connect, --scout and --lock-step; `listen` and `connect`: what holds when none is given."""
+    """--robot, --listen, --connect, --scout, --zenoh-config and --lock-step; `listen` and `connect`: what holds when none is given."""
     parser.add_argument("--robot", default=ROBOT, metavar="NAME", help="which robot (default: %(default)s)")
     for option, standard, what in (
         ("--listen", listen, "endpoint to be reached at"),
         ("--connect", connect, "endpoint of another process"),
     ):
         told = " ".join(standard) or NOWHERE
-        text = f"{what}, tcp/HOST:PORT; repeatable, or '{NOWHERE}' (default: {told})"
+        text = f"{what}, tcp/HOST:PORT or tls/HOST:PORT; repeatable, or '{NOWHERE}' (default: {told})"
         parser.add_argument(option, action="append", metavar="ENDPOINT", help=text)
     parser.add_argument("--scout", action="store_true", help="also find others, and be found, by multicast")
+    text = (
+        "zenoh's own configuration (JSON5): TLS and access control, see docs/remote.md; endpoints are those given here"
+    )
+    parser.add_argument("--zenoh-config", type=Path, metavar="FILE", help=text)
     parser.add_argument("--lock-step", action="store_true", help="nothing is left out and senders wait: for simulation")
     parser.set_defaults(standard={"listen": list(listen), "connect": list(connect)})
 
 
 def open_link(process: str, arguments: argparse.Namespace) -> Link:
-    """The link that these arguments ask for; a word on standard error when other machines can reach it."""
+    """The link that these arguments ask for; a line on standard error when anybody on other machines can reach it."""
     ends = {}
     for name, standard in arguments.standard.items():
         given = getattr(arguments, name)
         ends[name] = [end for end in (standard if given is None else given) if end != NOWHERE]
+    config = read_config(arguments.zenoh_config)
     for endpoint in ends["listen"]:
-        if not is_loopback(endpoint):
+        if not is_loopback(endpoint) and not is_guarded(endpoint, config):
             print(f"whisker: {endpoint}: whoever reaches this address can watch and take part", file=sys.stderr)
-    return Link(process, arguments.robot, **ends, lock_step=arguments.lock_step, scout=arguments.scout)
+    more = {"lock_step": arguments.lock_step, "scout": arguments.scout, "config": arguments.zenoh_config}
+    return Link(process, arguments.robot, **ends, **more)
 
 
 __all__ = ["NAVIGATOR_ENDPOINT", "PILOT_ENDPOINT", "add_link", "open_link"]

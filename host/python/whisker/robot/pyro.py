@@ -12,13 +12,13 @@ import threading
 from collections import deque
 
 import numpy as np
-import Pyro5
 import Pyro5.api
 
 from ..errors import UserError
 from ..nav.observations import ODOMETRY
 from ..pilot.pilot import compose
 from .health import ENDED, RUNNING, Health
+from .inbox import Received
 from .link import Link
 from .messages import (
     EXPLORING,
@@ -28,15 +28,22 @@ from .messages import (
     Observation,
     PoseWithCovariance,
     ProcessHealth,
+    decode,
+    encode,
 )
 from .messages import Odometry as OdometryMessage
+from .pyro_daemon import Daemon, configure
+from .ranges import RANGES
 from .ros import BASE_FRAME, ODOMETRY_FRAME
-from .rows import Follower, RowPublisher, between
+from .row_checks import RowChecks
+from .rows import Follower, RowPublisher, between, to_message
+from .streams import Envelope
 
 OBJECT, PORT = "whisker.results", 7450
 HISTORY_ROWS = 18_000  # 30 minutes: how far back `observation(since)` reaches
 LOOK_S = 0.5
-REQUEST_MOST = 1 << 20  # bytes
+TIME = RANGES["builtin_interfaces/msg/Time:sec"]
+NAMES_MOST = 64  # of filters, and of processes
 TOPICS = ("observation", "odometry", "localisation")
 
 
@@ -52,13 +59,14 @@ class Results:
     def __init__(self, link: Link, may_write: bool):
         self._link, self._may_write = link, may_write
         self._lock = threading.Lock()
-        self._follower, self._number, self._total = Follower(), 0, np.zeros(3)
+        self._checks, self._follower, self._number, self._total = RowChecks(), Follower(), 0, np.zeros(3)
         self._history: deque[tuple[int, np.ndarray]] = deque([(0, self._total)], maxlen=HISTORY_ROWS)
         self._row: dict | None = None
         self._odometry: OdometryMessage | None = None
         self._answers: dict[str, Localisation] = {}
         self._health: dict[str, ProcessHealth] = {}
         self._rows: RowPublisher | None = None
+        self._written = RowChecks()
         self._odometries = None
 
     @Pyro5.api.expose
@@ -109,21 +117,28 @@ class Results:
     def write(self, row: dict) -> int:
         """The netbook's part: publish a row (cells of observations.csv, `t_s` and motion included); returns its number.
 
-        PermissionError unless the server was started to be written to; ValueError when a cell is no number.
+        PermissionError unless the server was started to be written to; ValueError when a cell is no number, or when the
+        row cannot be: the same limits hold as for rows of a pilot.
         """
         if not self._may_write:
             raise PermissionError("this server only tells; start it with --write, and no pilot beside it")
+        if not isinstance(row, dict):
+            raise ValueError("row: not cells by name; give a dict")
         checked = {str(name): _number(name, value) for name, value in row.items()}
         for name in ("t_s", *ODOMETRY):
             if checked.get(name) is None or not math.isfinite(checked[name]):
                 raise ValueError(f"{name}: missing or not finite; give every row its time and motion")
+        if not 0.0 <= checked["t_s"] <= TIME.high:
+            raise ValueError(
+                f"t_s: {checked['t_s']:.6g} is not within 0 and {TIME.high:.6g}; give seconds since the start"
+            )
         with self._lock:
             return self._publish(checked)
 
     def take(self, received) -> None:
         """What came on TOPICS and health."""
         with self._lock:
-            for step in self._follower.take([r for r in received if r.topic == "observation"]):
+            for step in self._follower.take(self._checks.passed([r for r in received if r.topic == "observation"])):
                 self._number += step.rows
                 self._total = compose(self._total, step.motion)
                 self._history.append((self._number, self._total))
@@ -135,23 +150,42 @@ class Results:
         if isinstance(message, OdometryMessage):
             self._odometry = message
         elif isinstance(message, Localisation):
-            self._answers[message.filter] = message
+            _keep(self._answers, message.filter, message)
         elif isinstance(message, ProcessHealth):
-            self._health[message.process] = message
+            _keep(self._health, message.process, message)
 
     def counters(self) -> dict[str, object]:
         """What has been counted so far."""
         follower = self._follower
-        return {"rows": follower.weighed, "missed": follower.missed, "restarts": follower.restarts}
+        counted = {"rows": follower.weighed, "missed": follower.missed, "restarts": follower.restarts}
+        return counted | {"refused": self._checks.refused}
+
+    @property
+    def last_error(self) -> str:
+        """Why a row was refused; empty: none was."""
+        return self._checks.last_error
 
     def _publish(self, row: dict[str, float | None]) -> int:
         if self._rows is None:
             self._rows, self._odometries = RowPublisher(self._link), self._link.publish("odometry")
+        self._judge(to_message(row, EXPLORING, self._rows.sent, self._rows.pose))
         message: Observation = self._rows.send(row, EXPLORING)
         header = Header(message.header.stamp, ODOMETRY_FRAME)
         pose = PoseWithCovariance.planar(message.pose, np.zeros((3, 3)))
         self._odometries.send(OdometryMessage(header, pose, child_frame_id=BASE_FRAME))
         return message.seq
+
+    def _judge(self, row: Observation) -> None:
+        """As whoever receives it would, before it is sent. ValueError, which Pyro can hand to the client."""
+        one = Received("observation", row, Envelope(0, row.seq, 0))
+        try:
+            decode(Observation, encode(row), "row")
+            fault = self._written.fault(one)
+        except ValueError as error:
+            raise ValueError(str(error)) from None
+        if fault:
+            raise ValueError(f"row: {fault}")
+        self._written.note(one)
 
     def end(self) -> None:
         """Of what was written here: its readers know that no more comes."""
@@ -163,8 +197,17 @@ def _number(name, value) -> float | None:
     if value is None:
         return None
     if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise ValueError(f"{name}: {value!r:.40} is no number; give a number, nan or None")
-    return float(value)
+        raise ValueError(f"{name!s:.40}: {value!r:.40} is no number; give a number, nan or None")
+    try:
+        return float(value)
+    except OverflowError:
+        raise ValueError(f"{name!s:.40}: a number of {value.bit_length()} bits; give one of 64") from None
+
+
+def _keep(newest: dict, name: str, message) -> None:
+    """In place of what was kept by this name; of more names than a robot has, nothing."""
+    if name in newest or len(newest) < NAMES_MOST:
+        newest[name] = message
 
 
 def _seconds(message) -> float:
@@ -176,17 +219,21 @@ class Server:
 
     def __init__(self, link: Link, host: str, port: int, may_write: bool = False):
         """ServerError when the port is taken."""
-        Pyro5.config.POLLTIMEOUT = LOOK_S
-        Pyro5.config.MAX_MESSAGE_SIZE = REQUEST_MOST
+        configure(LOOK_S)
         self._link, self._results = link, Results(link, may_write)
         self._inbox = link.subscribe(*TOPICS, f"{HEALTH}/*")
         try:
-            self._daemon = Pyro5.api.Daemon(host, port)
+            self._daemon = Daemon(host, port)
         except OSError as error:
             text = f"{host}:{port}: cannot be listened on ({error.strerror}); choose another --port or --host"
             raise ServerError(text) from None
         self.uri = str(self._daemon.register(self._results, OBJECT))
-        self._health = Health(link, self._results.counters)
+        self._health = Health(link, self._counters)
+        self._error: Exception | None = None
+
+    def _counters(self) -> dict[str, object]:
+        counted = self._results.counters()
+        return counted | {"refused": counted["refused"] + self._inbox.refused}
 
     def run(self, stop: threading.Event) -> None:
         """Until `stop` is set."""
@@ -200,9 +247,16 @@ class Server:
             listener.join()
             self._daemon.close()
             self._results.end()
+        if self._error:
+            raise self._error
 
     def _listen(self, stop: threading.Event) -> None:
-        while not stop.is_set():
-            self._results.take(self._inbox.take(LOOK_S))
-            self._health.tell(0, RUNNING, self._inbox.last_error)
-        self._health.tell(0, ENDED, self._inbox.last_error)
+        """A fault of this thread is one of the server, which would tell old results for ever without it."""
+        try:
+            while not stop.is_set():
+                self._results.take(self._inbox.take(LOOK_S))
+                self._health.tell(0, RUNNING, self._results.last_error or self._inbox.last_error)
+            self._health.tell(0, ENDED, self._results.last_error or self._inbox.last_error)
+        except Exception as error:  # noqa: BLE001 - `run` raises it
+            self._error = error
+            stop.set()
