@@ -52,7 +52,27 @@ static bool keeps_place(const struct base_clients *clients, const struct base_cl
 /* Whether the one of two clients that are to lose their places does so first. */
 static bool before(const struct base_client *a, const struct base_client *b)
 {
-    return a->known != b->known ? !a->known : a->heard_ms < b->heard_ms;
+    return a->manners != b->manners ? a->manners < b->manners : a->heard_ms < b->heard_ms;
+}
+
+static bool has_spoken(const struct base_client *client)
+{
+    char byte;
+    return recv(client->socket, &byte, 1, MSG_PEEK | MSG_DONTWAIT) > 0;
+}
+
+/* Whether a client has had its time. What a new one has said may not have been read yet. */
+static bool has_had_time(const struct base_client *client, int64_t now_ms)
+{
+    const int64_t silent_ms = now_ms - client->heard_ms;
+    switch (client->manners) {
+    case BASE_NEW:
+        return silent_ms >= BASE_SPEAK_MS && !has_spoken(client);
+    case BASE_KNOWN:
+        return silent_ms >= BASE_PLACE_MS;
+    default:
+        return true;
+    }
 }
 
 /* Number of an empty place, or of the client that is first to lose its own; -1: nobody does. *speaks: there is a client
@@ -66,9 +86,9 @@ static int find_place(const struct base_clients *clients, int64_t now_ms, bool *
         if (client->socket < 0) {
             return i;
         }
-        const bool silent = now_ms - client->heard_ms >= (client->known ? BASE_PLACE_MS : BASE_SPEAK_MS);
-        *speaks |= !client->known && !silent;
-        if (silent && !keeps_place(clients, client) && (found < 0 || before(client, &clients->client[found]))) {
+        const bool over = has_had_time(client, now_ms) && !keeps_place(clients, client);
+        *speaks |= client->manners == BASE_NEW && !over;
+        if (over && (found < 0 || before(client, &clients->client[found]))) {
             found = i;
         }
     }
@@ -100,10 +120,12 @@ bool base_clients_add(struct base_clients *clients, int socket, int64_t now_ms)
     }
     struct base_client *place = &clients->client[found];
     if (place->socket >= 0) {
-        base_log(&clients->log_places, LOG_WARN, "more than %d clients; a silent one lost its place", BASE_CLIENTS);
+        base_log(&clients->log_places, LOG_WARN, "more than %d clients; one that said nothing of late lost its place",
+                 BASE_CLIENTS);
         drop(clients, place);
     }
-    *place = (struct base_client){.socket = socket, .heard_ms = now_ms, .bits = base_robot_bits(clients->robot)};
+    *place = (struct base_client){
+        .socket = socket, .manners = BASE_NEW, .heard_ms = now_ms, .bits = base_robot_bits(clients->robot)};
     return true;
 }
 
@@ -133,12 +155,19 @@ uint64_t base_clients_limit(const struct base_clients *clients)
 /* ------------------------------------------------------------------------------------------------------- the messages
  */
 
+static void note_manners(struct base_client *client, bool good, int64_t now_ms)
+{
+    if (good) {
+        client->manners = BASE_KNOWN;
+        client->heard_ms = now_ms;
+    } else if (client->manners == BASE_NEW) {
+        client->manners = BASE_NONSENSE;
+    }
+}
+
 static void answer(struct base_clients *clients, struct base_client *client, const char *text)
 {
-    if (strncmp(text, "error", 5) != 0) {
-        client->known = true;
-        client->heard_ms = clients->now_ms;
-    }
+    note_manners(client, strncmp(text, "error", 5) != 0, clients->now_ms);
     if (send(client->socket, text, strlen(text), MSG_NOSIGNAL | MSG_DONTWAIT) < 0) {
         drop(clients, client); /* gone, or it does not read */
     }

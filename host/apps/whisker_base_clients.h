@@ -3,9 +3,9 @@
  * BASE_CLIENTS. Messages: docs/create.md. Nothing here waits or allocates.
  *
  * A commander without an order for BASE_PLACE_MS loses the command to the next that drives. When all places are taken
- * a new client gets the place of one that has said nothing valid since BASE_SPEAK_MS, the first to come first; or else
- * of the one that has been silent longest, for at least BASE_PLACE_MS. The commander keeps its place, and in lock-step
- * simulation whoever leads the stream.
+ * a new client gets the place of one that has said nothing but nonsense; or else of one that has said nothing for
+ * BASE_SPEAK_MS since it came; or else of the one that has been silent longest, for at least BASE_PLACE_MS. The
+ * commander keeps its place, and in lock-step simulation whoever leads the stream.
  */
 #ifndef WHISKER_BASE_CLIENTS_H
 #define WHISKER_BASE_CLIENTS_H
@@ -15,16 +15,25 @@
 #include "create/motion.h"
 #include "whisker_base_robot.h"
 
-#define BASE_CLIENTS 16
+#ifndef BASE_CLIENTS /* the fuzzer has fewer, to have all taken */
+#define BASE_CLIENTS 64
+#endif
 #define BASE_MESSAGE 256
 #define BASE_PLACE_MS 1000
 #define BASE_PLACE_FRAMES (BASE_PLACE_MS / CREATE_OI_PERIOD_MS) /* instead, by the stream's clock */
-#define BASE_SPEAK_MS 20                                        /* for a new client to say something valid */
+#define BASE_SPEAK_MS 10                                        /* for a new client to say something valid */
+
+/* In the order in which they lose their places. */
+enum base_manners {
+    BASE_NONSENSE, /* all that was heard of it was refused */
+    BASE_NEW,      /* nothing was heard of it yet */
+    BASE_KNOWN     /* it was answered */
+};
 
 struct base_client {
-    int socket;       /* -1: nobody */
-    bool known;       /* has said something valid */
-    int64_t heard_ms; /* when it said so last, or came */
+    int socket; /* -1: nobody */
+    enum base_manners manners;
+    int64_t heard_ms; /* when it was answered last, or came */
     bool leads;       /* has said `after N`: the stream is taken in as far as it says */
     bool waits;       /* for byte `after`, with the message kept */
     uint64_t after;

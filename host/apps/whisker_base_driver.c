@@ -144,16 +144,20 @@ static bool await(struct driver *driver)
     return ready >= 0 || errno == EINTR;
 }
 
-/* A connection that cannot be taken stays where it is, and is tried again later. */
-static void accept_client(struct driver *driver)
+/* Takes a connection. False: there is none, or none can be taken; then it stays where it is, and is tried again later.
+ */
+static bool accept_client(struct driver *driver)
 {
     const int socket = accept4(driver->start.listening, NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC);
     if (socket >= 0) {
         base_clients_add(&driver->clients, socket, cli_now_ms());
-    } else if (errno != EAGAIN && errno != EINTR && errno != ECONNABORTED) {
+        return true;
+    }
+    if (errno != EAGAIN && errno != EINTR && errno != ECONNABORTED) {
         driver->accept_ms = cli_now_ms() + ACCEPT_MS;
         base_log(&driver->log, LOG_WARN, "cannot take a client: %s; allow more (ulimit -n)", strerror(errno));
     }
+    return false;
 }
 
 static void serve(struct driver *driver)
@@ -164,10 +168,11 @@ static void serve(struct driver *driver)
     if (driver->polled[PORT].revents && driver->robot.port >= 0) {
         base_robot_read(&driver->robot, base_clients_limit(&driver->clients), cli_now_ms());
     }
-    if (driver->polled[LISTENING].revents) {
-        accept_client(driver);
-    }
     base_clients_serve(&driver->clients, &driver->polled[CLIENTS], cli_now_ms());
+    if (driver->polled[LISTENING].revents) {
+        for (int i = 0; i < BASE_CLIENTS && accepts(driver) && accept_client(driver); i++) {
+        }
+    }
     if (driver->told_port != driver->robot.port) {
         tell_port(driver);
     }

@@ -20,7 +20,7 @@
 #include "whisker_base_driver.h"
 #include "whisker_base_log.h"
 
-#define BACKLOG 16
+#define BACKLOG 512 /* those who wait are served in turn; who does not fit is not */
 /* A driver that dies so young is not started again at once. */
 #define YOUNG_MS 200
 #define PAUSE_MS 500

@@ -17,7 +17,7 @@
 #include "daemon_log.h"
 #include "whisker_base_clients.h"
 
-#define CLIENTS 20 /* more than there are places for */
+#define CLIENTS (BASE_CLIENTS + 2) /* more than there are places for */
 #define LINE_BYTES 4096
 #define ANSWER_BYTES 1100
 #define COUNT(array) (sizeof(array) / sizeof(array)[0])
@@ -164,6 +164,13 @@ static void connect_client(int i)
     far.owed[i] = base_clients_add(&clients, pair(SOCK_SEQPACKET, &far.client[i]), now_ms) ? 0 : 1; /* why not */
 }
 
+static void connect_all(void)
+{
+    for (int i = 0; i < CLIENTS; i++) {
+        connect_client(i);
+    }
+}
+
 static void say(int i, const char *bytes, size_t count)
 {
     if (far.client[i] >= 0 && count > 0 && send(far.client[i], bytes, count, MSG_NOSIGNAL) > 0) {
@@ -255,7 +262,7 @@ static void act(struct input *input)
         say_anything(input, i);
         break;
     case 1:
-        connect_client(i);
+        what & 8 ? connect_all() : connect_client(i);
         break;
     case 2:
         now_ms += 4 * (int64_t)take(input);

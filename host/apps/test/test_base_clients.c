@@ -59,6 +59,12 @@ static const char *ask(int i, const char *message, int64_t now_ms)
     return told(i);
 }
 
+/* Says something that is not read yet. */
+static void say_unheard(int i, const char *message)
+{
+    assert_int_equal(send(far[i], message, strlen(message), 0), strlen(message));
+}
+
 static bool closed(int i)
 {
     const char *text = told(i);
@@ -116,11 +122,12 @@ static void by_the_streams_clock_frames_count(void **state)
  * places
  */
 
-/* Clients 0 to 15, each a millisecond after the one before; the last comes now. */
+/* A client at each place, the last of them now, the others not long ago. */
+#define CAME_MS(i) ((BASE_CLIENTS - 1 - (i)) * 8 / BASE_CLIENTS)
 static void fill_places(int64_t now_ms)
 {
     for (int i = 0; i < BASE_CLIENTS; i++) {
-        assert_true(come(i, now_ms - BASE_CLIENTS + 1 + i));
+        assert_true(come(i, now_ms - CAME_MS(i)));
     }
 }
 
@@ -129,15 +136,27 @@ static void who_has_said_nothing_loses_its_place_to_a_new_client(void **state)
     (void)state;
     fill_places(OPENED_MS);
     assert_answer(ask(0, "health", OPENED_MS), "health ");
-    assert_answer(ask(1, "rubbish", OPENED_MS), "error "); /* that is no better than nothing */
-    assert_true(base_clients_crowded(&clients, OPENED_MS));
-    const int64_t spoken_ms = OPENED_MS - BASE_CLIENTS + 2 + BASE_SPEAK_MS; /* client 1 has had its time */
-    assert_true(base_clients_crowded(&clients, spoken_ms - 1));
-    assert_false(base_clients_crowded(&clients, spoken_ms));
-    assert_true(come(BASE_CLIENTS, spoken_ms));
-    assert_true(closed(1));
+    say_unheard(1, "health");                                       /* it has not been read yet */
+    const int64_t late_ms = OPENED_MS - CAME_MS(2) + BASE_SPEAK_MS; /* client 2 has had its time */
+    assert_true(base_clients_crowded(&clients, late_ms - 1));
+    assert_false(base_clients_crowded(&clients, late_ms));
+    assert_true(come(BASE_CLIENTS, late_ms));
+    assert_true(closed(2));
     assert_null(told(0));
-    assert_null(told(2));
+    assert_null(told(1));
+}
+
+static void who_has_said_nonsense_loses_its_place_at_once(void **state)
+{
+    (void)state;
+    fill_places(OPENED_MS);
+    assert_answer(ask(7, "rubbish", OPENED_MS), "error ");
+    assert_answer(ask(9, "health", OPENED_MS), "health ");
+    assert_answer(ask(9, "rubbish", OPENED_MS), "error "); /* it has said something good too */
+    assert_false(base_clients_crowded(&clients, OPENED_MS));
+    assert_true(come(BASE_CLIENTS, OPENED_MS));
+    assert_true(closed(7));
+    assert_true(base_clients_crowded(&clients, OPENED_MS));
 }
 
 static void who_has_spoken_of_late_keeps_its_place(void **state)
@@ -149,7 +168,7 @@ static void who_has_spoken_of_late_keeps_its_place(void **state)
     }
     assert_false(base_clients_crowded(&clients, OPENED_MS + BASE_PLACE_MS - 1));
     assert_false(come(BASE_CLIENTS, OPENED_MS + BASE_PLACE_MS - 1));
-    assert_answer(told(BASE_CLIENTS), "error 16 clients are connected; end one of them first");
+    assert_answer(told(BASE_CLIENTS), "error 64 clients are connected; end one of them first");
     close(far[BASE_CLIENTS]);
     assert_true(come(BASE_CLIENTS, OPENED_MS + BASE_PLACE_MS));
     assert_true(closed(3));
@@ -287,6 +306,7 @@ int main(void)
         WALL(a_commander_that_orders_keeps_the_command),
         STREAM(by_the_streams_clock_frames_count),
         WALL(who_has_said_nothing_loses_its_place_to_a_new_client),
+        WALL(who_has_said_nonsense_loses_its_place_at_once),
         WALL(who_has_spoken_of_late_keeps_its_place),
         WALL(who_has_said_nothing_goes_before_who_has_been_silent_for_longer),
         WALL(the_commander_keeps_its_place_while_it_orders),

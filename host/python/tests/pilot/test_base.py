@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 from createpeer import FIRM_STOP, FULL, PAUSE, SAFE, START, STOP, STREAM, Driver, Heart, drive_order
+from hostile_clients import attacked, serve_honest
 
 from whisker.pilot import base
 from whisker.pilot.base import BaseError, BaseLost
@@ -490,8 +491,8 @@ def test_a_client_for_whom_there_is_no_descriptor_waits_and_costs_nothing(start)
     driver = start("--clock", "stream")
     with driver.client() as client:
         pid = int(client.health()["driver_pid"])
-        resource.prlimit(pid, resource.RLIMIT_NOFILE, (20, 20))  # as many as it waits for
-        others = connections(driver, 14)
+        resource.prlimit(pid, resource.RLIMIT_NOFILE, (68, 68))  # as many as it waits for
+        others = connections(driver, 62)
         await_log(driver, "cannot take a client: Too many open files; allow more (ulimit -n)")
         slept = sleeps(pid)
         while sleeps(pid) < slept + 3:
@@ -508,12 +509,20 @@ def test_silent_clients_give_their_places_to_new_ones(start):
     driver = start()
     with driver.client() as commander:
         commander.drive(0, 0)
-        silent = connections(driver, 40)
+        silent = connections(driver, 200)
         with driver.client() as client:
             assert client.health()["commander"] == "1"
         commander.drive(0, 0)
         for one in silent:
             one.close()
+
+
+def test_honest_clients_are_served_beside_hostile_ones(start):
+    driver = start()
+    rounds = iter(range(100))
+    with attacked(str(driver.socket), 200, seed=1):
+        orders, visits = serve_honest(str(driver.socket), lambda: next(rounds, None) is not None)
+    assert len(orders) == len(visits) == 100  # and none was turned away
 
 
 def test_clients_that_come_and_go_fill_no_log(start):
