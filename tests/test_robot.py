@@ -173,6 +173,6 @@ def test_what_is_killed_comes_back(models, tmp_path):
         until(inbox, "health/pilot", lambda health: int(health.counts["base_lost"]) > 0 and health.state == "running")
         row = until(inbox, "observation", lambda row: np.abs(row.motion).sum() > 0).message
         until(inbox, "localisation", lambda answer: answer.observation_seq >= row.seq)
-    logs = {path.stem: path.read_text() for path in (tmp_path / "out/logs").iterdir()}
+    logs = {path.stem: path.read_text() for path in (tmp_path / "out/logs").glob("*/*.log")}
     assert "stopped" in logs["base"]
     assert process.returncode == 0

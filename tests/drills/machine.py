@@ -12,6 +12,7 @@ from whisker import scene as scenes
 from whisker.pilot.base import Base, BaseError
 from whisker.robot import parts
 from whisker.robot.link import Link
+from whisker.robot.logs import run_folder
 from whisker.robot.supervisor import Supervisor
 from whisker.robot.truth import TruthWatcher
 from whisker.simulation.scenes import make_scene
@@ -97,7 +98,7 @@ class Machine:
         self.hands.start()
         with Link("supervisor", listen=self.endpoints()[:1]) as link:
             TruthWatcher(self.simulation, link, stop).start()
-            self._supervisor = Supervisor(self.table(), self.plan.out / "logs", link, parts.BRIDGE)
+            self._supervisor = Supervisor(self.table(), run_folder(self.plan.out / "logs"), link, parts.BRIDGE)
             thread = threading.Thread(target=self._supervisor.run, args=(stop,))
             thread.start()
             try:

@@ -9,6 +9,7 @@ import sys
 
 from .arguments import Parser
 from .errors import UserError
+from .stamping import stamp_output
 
 # name (its module has underscores for dashes): what it does
 COMMANDS = {
@@ -36,6 +37,7 @@ INTERRUPTED = 130  # the shell's exit code for Ctrl-C
 
 
 def main(argv: list[str] | None = None) -> int:
+    stamp_output()
     words = sys.argv[1:] if argv is None else argv
     arguments = _parser(next(iter(words), "")).parse_args(words)
     try:

@@ -9,7 +9,7 @@ from whisker.bridge.ring import SAMPLE
 from whisker.pilot.base import BaseLost, Motion
 from whisker.robot import wheels as wheels_module
 from whisker.robot.health import RUNNING
-from whisker.robot.pilot_process import LOST, SILENCE_S, LiveFlight, LiveWheels
+from whisker.robot.pilot_process import LOST, NO_HEARTBEAT, SILENCE_S, LiveFlight, LiveWheels
 from whisker.robot.wheels import RETRY_S, LiveBase, wheels_of
 
 
@@ -46,6 +46,7 @@ class MadeUpFlight:
 
     def take(self, block):
         self.took.append(block[0])
+        self.wheels.drive(block[0], 0.1, 0.0)
         self.ticks_used = block[0] + 40
 
     def interrupted(self, tick):
@@ -54,7 +55,10 @@ class MadeUpFlight:
 
 class MadeUpBase:
     def __init__(self):
-        self.trouble, self.lost, self.stops, self.closed = "", 0, 0, False
+        self.trouble, self.lost, self.stops, self.drives, self.closed = "", 0, 0, 0, False
+
+    def drive(self, tick, v_m_s, omega_rad_s):
+        self.drives += 1
 
     def stop(self):
         self.stops += 1
@@ -64,6 +68,12 @@ class MadeUpBase:
 
     def health(self):
         return {"mode": "safe"}
+
+
+class MadeUpHeartbeat:
+    """Beats, is silent, or has ended, as the test says."""
+
+    beats, ended = True, False
 
 
 class MadeUpLink:
@@ -81,7 +91,9 @@ class MadeUpLink:
 @pytest.fixture
 def live():
     clock, ring, base, link, flight = Clock(), MadeUpRing(), MadeUpBase(), MadeUpLink(), MadeUpFlight()
-    made = LiveFlight(flight, ring, LiveWheels(base), link, clock)
+    heartbeat, wheels = MadeUpHeartbeat(), LiveWheels(base)
+    flight.wheels = wheels
+    made = LiveFlight(flight, ring, wheels, link, heartbeat, clock)
 
     def steps(count=1, later=0.0):
         left = iter([False] * count)
@@ -89,7 +101,31 @@ def live():
         made.run(lambda: next(left, True))
         base.stops -= 1  # that of the end
 
-    return SimpleNamespace(clock=clock, ring=ring, base=base, link=link, flight=flight, made=made, steps=steps)
+    parts = {"clock": clock, "ring": ring, "base": base, "link": link, "flight": flight, "heartbeat": heartbeat}
+    return SimpleNamespace(**parts, made=made, steps=steps)
+
+
+def test_without_a_heartbeat_the_wheels_stand_and_blocks_are_read(live):
+    live.ring.bring(0)
+    live.steps()
+    assert live.base.drives == 1
+    live.heartbeat.beats = False
+    live.ring.bring(40)
+    live.steps()
+    live.ring.bring(80)
+    live.steps()
+    assert live.flight.took == [0, 40, 80] and (live.base.stops, live.base.drives) == (1, 1)
+    assert live.made.state == NO_HEARTBEAT
+    live.heartbeat.beats = True
+    live.ring.bring(120)
+    live.steps()
+    assert live.base.drives == 2 and live.flight.interruptions[-1] == 119 and live.made.state == RUNNING
+
+
+def test_the_end_of_the_heartbeat_is_the_pilots(live):
+    live.heartbeat.ended = True
+    live.made.run(lambda: False)
+    assert live.base.stops == 1 and live.base.closed
 
 
 def test_wheels_are_stopped_once_when_samples_stop_coming(live):
@@ -146,7 +182,7 @@ class Driver:
 
     alive = True
 
-    def __init__(self, path):
+    def __init__(self, path, timeout_s):
         self._ask(None)
 
     def _ask(self, answer):

@@ -1,15 +1,23 @@
 """The robot's supervisor: what ends is started again, later each time; all end together, and say so."""
 
+import errno
 import os
+import shutil
+import signal
+import subprocess
+import sys
 import threading
+import time
+from dataclasses import replace
 
 import pytest
 from linkkit import free_endpoint
 from robotkit import take_until
 
-from whisker.robot.children import Program
+from whisker.errors import UserError
+from whisker.robot.children import Child, Program, living
 from whisker.robot.link import Link
-from whisker.robot.supervisor import PAUSE_MOST_S, PAUSE_S, STEADY_S, Keeper, Supervisor
+from whisker.robot.supervisor import PAUSE_MOST_S, PAUSE_S, Keeper, RunError, Supervisor
 
 PATIENCE_S = 60.0
 FAILS = Program("fails", ("sh", "-c", "echo no such arena >&2; exit 3"))
@@ -54,16 +62,14 @@ def test_pauses_double_up_to_the_longest(tmp_path):
     assert kept.keeper.last_error == f"fails failed (exit code 3): no such arena; log: {tmp_path / 'fails.log'}"
 
 
-def test_who_ran_steadily_is_started_again_soon(tmp_path, monkeypatch):
-    kept = Kept(FAILS, tmp_path)
-    for _ in range(3):
-        kept.start()
-        kept.end()
-        kept.clock.now += PAUSE_MOST_S
-    monkeypatch.setattr("whisker.robot.supervisor.STEADY_S", -1.0)
+def test_who_ran_steadily_is_started_again_at_once(tmp_path):
+    kept = Kept(replace(FAILS, steady_s=0.0), tmp_path)
     kept.start()
-    kept.end()
-    assert kept.keeper.wait_s() == pytest.approx(PAUSE_S) and STEADY_S > 0
+    first = kept.keeper.pid
+    assert kept.ended.wait(PATIENCE_S)
+    kept.keeper.step()
+    assert kept.keeper.restarts == 1 and kept.keeper.pid not in (0, first)
+    kept.keeper.close()
 
 
 def test_what_a_killed_program_leaves_behind_may_finish(tmp_path):
@@ -78,6 +84,157 @@ def test_what_a_killed_program_leaves_behind_may_finish(tmp_path):
     while kept.keeper.restarts == 0:
         kept.keeper.step()
     assert done.read_text() == "stopped"
+
+
+def test_what_a_killed_program_leaves_behind_stopped_is_killed(tmp_path):
+    """A stopped driver cannot stop the wheels: another base has to come at once."""
+    kept = Kept(Program("guard", ("sh", "-c", "sleep 1000 & kill -STOP $!; kill -9 $$")), tmp_path)
+    kept.start()
+    kept.end()
+    assert await_true(lambda: kept.keeper.step() or kept.keeper.restarts == 1)
+    assert [group for group in groups(tmp_path) if living(group)] == []
+
+
+def test_a_program_that_cannot_be_started_is_tried_again(tmp_path):
+    kept = Kept(Program("none", (str(tmp_path / "no-such-program"),)), tmp_path)
+    before = len(os.listdir("/proc/self/fd"))
+    for number in range(1, 4):
+        kept.keeper.step()
+        assert kept.keeper.restarts == number and "cannot be started (No such file" in kept.keeper.last_error
+        kept.clock.now += kept.keeper.wait_s()
+    assert len(os.listdir("/proc/self/fd")) == before, "nothing stays open"
+
+
+@pytest.mark.parametrize("number", [errno.EMFILE, errno.EAGAIN, errno.ENOMEM])
+def test_want_of_files_or_processes_ends_nothing(tmp_path, monkeypatch, number):
+    def refuse(*_, **__):
+        raise OSError(number, os.strerror(number))
+
+    kept = Kept(STAYS, tmp_path)
+    with monkeypatch.context() as patched:
+        patched.setattr("subprocess.Popen", refuse)
+        kept.keeper.step()
+    assert os.strerror(number) in kept.keeper.last_error and not kept.keeper.pid
+    kept.clock.now += PAUSE_S
+    kept.keeper.step()
+    assert kept.keeper.pid
+    kept.keeper.close()
+
+
+def test_a_log_folder_that_is_removed_is_made_again(tmp_path):
+    kept = Kept(FAILS, tmp_path / "logs")
+    for number in range(1, 3):
+        kept.start()
+        shutil.rmtree(tmp_path / "logs")
+        kept.end()
+        assert kept.keeper.restarts == number and kept.keeper.last_error.startswith("fails failed (exit code 3)")
+        kept.clock.now += PAUSE_MOST_S
+
+
+def test_wrong_arguments_end_the_run_with_their_line(tmp_path):
+    wrong = Program("wrong", ("sh", "-c", "echo no such scene >&2; exit 2"))
+    with pytest.raises(UserError, match=r"wrong failed \(exit code 2\): no such scene; log: ") as told:
+        Supervisor([STAYS, wrong], tmp_path).run(threading.Event())
+    assert told.value.exit_code == 2
+
+
+def test_who_ran_steadily_has_no_wrong_arguments(tmp_path):
+    kept = Kept(Program("late", ("sh", "-c", "exit 2"), steady_s=0.0), tmp_path)
+    kept.start()
+    kept.end()
+    assert kept.keeper.restarts == 1 and not kept.keeper.refused
+    kept.keeper.close()
+
+
+def test_a_program_that_hangs_is_started_again(tmp_path):
+    """It says that it is ready, and then feeds no watchdog."""
+    says = "import os, socket, time; s = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)"
+    says += "; s.sendto(b'READY=1\\nSTATUS=up', '\\0' + os.environ['NOTIFY_SOCKET'][1:]); time.sleep(1000)"
+    stop, supervisor = threading.Event(), None
+    supervisor = Supervisor([Program("hangs", (sys.executable, "-c", says), fed=True)], tmp_path)
+    thread = threading.Thread(target=supervisor.run, args=[stop])
+    thread.start()
+    assert await_true(
+        lambda: (tmp_path / "hangs.log").exists() and "signal SIGKILL" in (tmp_path / "hangs.log").read_text()
+    )
+    stop.set()
+    thread.join(PATIENCE_S)
+
+
+def test_a_stopped_program_can_be_ended_in_order(tmp_path):
+    child = Child(
+        Program("stopped", ("sh", "-c", "trap 'exit 7' TERM; echo up; while :; do sleep 0.01; done")), tmp_path / "log"
+    )
+    assert await_true(lambda: "up" in child.log.read_text())
+    os.kill(child.process.pid, signal.SIGSTOP)
+    child.close()
+    assert child.process.returncode == 7
+
+
+SUPERVISED = """
+import sys, threading
+from pathlib import Path
+from whisker.robot.children import Program
+from whisker.robot.supervisor import Supervisor
+folder = Path(sys.argv[1])
+grandchildren = Program("grandchildren", ("sh", "-c", "sleep 1000 & sleep 1000"))
+plain = Program("plain", ("sleep", "1000"))
+mover = Program("mover", (sys.executable, "-c", sys.argv[2], str(folder)), moves=True)
+Supervisor([grandchildren, mover, plain], folder).run(threading.Event())
+"""
+MOVER = """
+import sys, time
+from pathlib import Path
+from whisker.robot.lifeline import Heartbeat
+heart, told = Heartbeat.of_environment(), ""
+while True:
+    now = "ended" if heart.ended else "beats" if heart.beats else "silent"
+    if now != told:
+        told = now
+        (Path(sys.argv[1]) / now).touch()
+    time.sleep(0.01)
+"""
+
+
+@pytest.fixture
+def supervised(tmp_path):
+    """A supervisor as a process, with its children in groups of their own."""
+    process = subprocess.Popen([sys.executable, "-c", SUPERVISED, tmp_path, MOVER])
+    assert await_true(lambda: (tmp_path / "beats").exists() and (tmp_path / "plain.log").exists())
+    yield process, tmp_path
+    process.kill()
+    process.wait()
+
+
+def groups(folder) -> list[int]:
+    """The process groups of the children, by their logs."""
+    return [int(log.read_text().split("started as process ")[1].split()[0]) for log in folder.glob("*.log")]
+
+
+def test_a_killed_supervisor_leaves_nobody_behind(supervised):
+    process, folder = supervised
+    assert await_true(lambda: len(groups(folder)) == 3) and all(map(living, groups(folder)))
+    process.kill()
+    assert await_true(lambda: not any(map(living, groups(folder))))
+
+
+def test_who_can_move_wheels_notices_a_supervisor_that_hangs(supervised):
+    process, folder = supervised
+    os.kill(process.pid, signal.SIGSTOP)
+    assert await_true((folder / "silent").exists)
+    (folder / "beats").unlink()
+    os.kill(process.pid, signal.SIGCONT)
+    assert await_true((folder / "beats").exists)
+
+
+def await_true(wanted) -> bool:
+    """Wait until `wanted()`; False: it never was."""
+    until = time.monotonic() + PATIENCE_S
+    while not wanted():
+        if time.monotonic() > until:
+            return False
+        time.sleep(0.01)
+    return True
 
 
 def test_health_tells_of_every_end_and_all_end_with_it(tmp_path):
@@ -107,3 +264,5 @@ def restarts(health) -> int:
 def test_the_end_of_the_one_that_all_need_is_the_end_of_all(tmp_path):
     ends = Program("bridge", ("true",))
     assert Supervisor([ends, STAYS], tmp_path, until="bridge").run(threading.Event()) == "bridge ended (exit code 0)"
+    with pytest.raises(RunError, match="fails failed"):
+        Supervisor([FAILS, STAYS], tmp_path, until="fails").run(threading.Event())

@@ -16,6 +16,7 @@ from ..pilot.pilot import Pilot
 from ..pilot.wheels import EXACT, Wheels
 from ..robot.blocks import LiveRing
 from ..robot.health import Health
+from ..robot.lifeline import Heartbeat
 from ..robot.link import Link
 from ..robot.models import check_nodes, load_models
 from ..robot.options import NAVIGATOR_ENDPOINT, PILOT_ENDPOINT, add_link, open_link
@@ -105,14 +106,14 @@ def _fly_in_step(arguments, stack: ExitStack) -> SimpleNamespace:
 
 
 def _fly_live(arguments, stack: ExitStack) -> SimpleNamespace:
-    stop = stop_on_signals()
+    stop, heartbeat = stop_on_signals(), Heartbeat.of_environment()
     link = stack.enter_context(open_link("pilot", arguments))
     base = LiveBase(arguments.base)
     parts = _parts(arguments, link, _known_wheels(base, link, stop), stack)
     wheels = LiveWheels(base)
     ring = stack.enter_context(closing(LiveRing(arguments.ring, len(parts.pilot.names))))
     parts.flight = Flight(parts.pilot, wheels, parts.rows, parts.traces, parts.teller)
-    live = LiveFlight(parts.flight, ring, wheels, link)
+    live = LiveFlight(parts.flight, ring, wheels, link, heartbeat)
     link.announce()
     _greet(arguments.others, link, stop)
     live.run(stop.is_set)

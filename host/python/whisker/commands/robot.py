@@ -1,13 +1,16 @@
 """`whisker robot`: starts all processes of a robot, on hardware or simulated, and starts again what ends."""
 
+import sys
 import tempfile
 from pathlib import Path
 
 from .. import scene as scenes
 from ..arguments import RING, number_above, whole_number
 from ..errors import UserError
-from ..robot import parts
+from ..robot import holders, parts
 from ..robot.link import Link
+from ..robot.logs import run_folder
+from ..robot.models import load_models
 from ..robot.supervisor import Supervisor
 from ..robot.truth import TruthWatcher
 from ..simulation.bridge import simulated_scene
@@ -54,7 +57,8 @@ def add(parser) -> None:
 
 def run(arguments) -> int:
     stop = stop_on_signals()
-    arguments.out.mkdir(parents=True, exist_ok=True)
+    _look_first(arguments)
+    logs = run_folder(arguments.out / "logs")
     with tempfile.TemporaryDirectory(prefix="whisker-") as folder:
         meeting = parts.Meeting(arguments.ring, Path(folder), arguments.listen, arguments.first_port)
         table = _table(arguments, meeting)
@@ -62,24 +66,37 @@ def run(arguments) -> int:
             if arguments.simulated:
                 TruthWatcher(meeting.simulation, link, stop).start()
             until = parts.BRIDGE if arguments.simulated else None
-            supervisor = Supervisor(table, arguments.out / "logs", link, until)
-            print(
-                f"starting {', '.join(program.name for program in table)}; logs: {arguments.out / 'logs'}", flush=True
-            )
-            ended = supervisor.run(stop)
+            print(f"starting {', '.join(program.name for program in table)}; logs: {logs}", flush=True)
+            ended = Supervisor(table, logs, link, until).run(stop)
     print(f"all ended: {ended}")
     return 0
 
 
-def _table(arguments, meeting: parts.Meeting) -> list:
+def _look_first(arguments) -> None:
+    """What would end a process over and over is said before any is started. UserError; warnings on standard error."""
     if arguments.simulated and arguments.no_daemon:
         raise UserError("robot: --simulated with --no-daemon: only a whiskerd of its own sees that bridge; give one")
+    if not arguments.simulated and not (arguments.scene and arguments.models):
+        raise UserError("robot: no SCENE or no --models; give both, or --simulated")
+    if arguments.scene:
+        scene = scenes.load(arguments.scene)
+        if arguments.models:
+            load_models(arguments.models, scene.robot)
+    for number in range(3):
+        holders.check_port(arguments.listen, arguments.first_port + number, "--first-port")
+    if arguments.desktop and not arguments.no_view and arguments.view_port:
+        holders.check_port(parts.LOOPBACK, arguments.view_port, "--view-port")
+    if not arguments.no_daemon:
+        holders.check_ring(arguments.ring)
+    if not arguments.simulated and (warning := holders.check_serial(arguments.port)):
+        print(f"whisker: warning: {warning}", file=sys.stderr)
+
+
+def _table(arguments, meeting: parts.Meeting) -> list:
     if arguments.simulated:
         body, simulated = _simulated(arguments, meeting)
         table = [parts.bridge(simulated, body, meeting)]
     else:
-        if not (arguments.scene and arguments.models):
-            raise UserError("robot: no SCENE or no --models; give both, or --simulated")
         body = parts.Body(arguments.scene, arguments.models, arguments.create, arguments.port, arguments.seed)
         table = []
     if arguments.desktop:
@@ -88,6 +105,16 @@ def _table(arguments, meeting: parts.Meeting) -> list:
     if not arguments.no_daemon:
         table.append(parts.daemon(meeting, arguments.simulated))
     return table + parts.netbook(body, meeting, arguments.desktop)
+
+
+def _learning():
+    """What learns models. UserError where it is not installed."""
+    try:
+        from ..demo.training import learn  # needs the source tree's sim/
+    except ModuleNotFoundError as error:
+        text = f"robot: --simulated learns models by the simulation of a source tree, which is not here ({error.name})"
+        raise UserError(f"{text}; run it in a source tree, or give --models DIR") from None
+    return learn
 
 
 def _simulated(arguments, meeting: parts.Meeting) -> tuple[parts.Body, parts.Simulated]:
@@ -100,8 +127,7 @@ def _simulated(arguments, meeting: parts.Meeting) -> tuple[parts.Body, parts.Sim
     (out / "scene.flat").write_text(scene.flat(start))
     models = arguments.models or out / "models"
     if arguments.models is None and not (models / "texture.json").exists():
-        from ..demo.training import learn  # needs the source tree's sim/
-
+        learn = _learning()
         print("learning textures and distances of this robot: half a minute", flush=True)
         learn(models, scene, seed, lambda: None)
     body = parts.Body(folder, models, arguments.create, meeting.serial, seed)

@@ -52,16 +52,18 @@ class Base:
     """A connection to whisker-base. Use as a context manager.
 
     `after=N` (lock-step simulation): whisker-base first takes in the base's answers up to byte N, and none beyond.
+    BaseLost when an answer takes longer than `timeout_s`; None: it is waited for, however long.
     """
 
-    def __init__(self, path: str):
+    def __init__(self, path: str, timeout_s: float | None = None):
         self._path = path
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self._socket.settimeout(timeout_s)
         try:
             self._socket.connect(path)
         except OSError as error:
             self._socket.close()
-            raise BaseLost(f"{path}: {error.strerror}; start whisker-base --socket {path} first") from error
+            raise BaseLost(f"{path}: {error.strerror or error}; start whisker-base --socket {path} first") from error
 
     def __enter__(self):
         return self
@@ -117,4 +119,4 @@ class Base:
         return rest.split()
 
     def _lost(self) -> BaseLost:
-        return BaseLost(f"{self._path}: whisker-base has gone; look at its log, connect again")
+        return BaseLost(f"{self._path}: whisker-base has gone or hangs; look at its log, connect again")

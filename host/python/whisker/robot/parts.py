@@ -11,7 +11,9 @@ FIRST_PORT = 7447  # of three: supervisor, pilot, navigator; the latter two are 
 LOOPBACK = "127.0.0.1"
 BRIDGE = "bridge"
 
-# Inside the simulated bridge's umockdev the device is seen by whoever has this environment: it is left in file $0. At the end
+BASE_STEADY_S = 1.0  # a base that is started again stops the wheels: it comes at once
+
+# Inside the simulated bridge's umockdev the device is seen by whoever has these variables: they are left in file $0. At the end
 # whoever took it ends first, for umockdev does not survive a client that is left.
 LEAVE_ENVIRONMENT = """
 end() {
@@ -20,10 +22,10 @@ end() {
     exit 0
 }
 trap end TERM
-export -p >"$0.new" && mv "$0.new" "$0"
+export -p | grep -E '^export (LD_PRELOAD|UMOCKDEV_DIR)=' >"$0.new" && mv "$0.new" "$0"
 while :; do sleep 3600 & wait $!; done
 """
-# Waits for it, and becomes the command with it.
+# Waits for them, and becomes the command with them; its other variables stay its own.
 WITH_ENVIRONMENT = 'while [ ! -e "$0" ]; do sleep 0.1; done; . "$0"; echo $$ >"$0.pid"; exec "$@"'
 
 
@@ -100,7 +102,10 @@ def netbook(body: Body, meeting: Meeting, with_desktop: bool) -> list[Program]:
     pilot = [*whisker("pilot"), body.scene, "--models", body.models, "--ring", meeting.ring, "--base", meeting.base]
     pilot += ["--seed", body.seed, "--listen", meeting.endpoint(1), "--connect", meeting.endpoint(2)]
     pilot += ["--await", "navigator"] if with_desktop else []
-    return [Program.of("base", base), Program.of("pilot", pilot, tells=True)]
+    return [
+        Program.of("base", base, moves=True, fed=True, steady_s=BASE_STEADY_S),
+        Program.of("pilot", pilot, tells=True, moves=True),
+    ]
 
 
 def desktop(body: Body, meeting: Meeting, bag: Path | None, view_port: int | None) -> list[Program]:

@@ -1,7 +1,8 @@
 """The pilot as a process of its own, the netbook's: reads the ring, drives the base, tells the others what it perceives.
 
 `fly_in_step` follows a simulation that waits for it, to the end of the ring. `LiveFlight` goes on whatever comes and
-goes: ring, whiskerd, base, navigator; each loss is told in the pilot's health, and the wheels stand while no samples come.
+goes: ring, whiskerd, base, navigator; each loss is told in the pilot's health, and the wheels stand while no samples come
+or while who watches over the pilot is silent (lifeline.Heartbeat).
 """
 
 import time
@@ -13,6 +14,7 @@ from ..pilot.pilot import Pilot
 from ..pilot.wheels import Bumps
 from .blocks import Block, LiveRing, blocks
 from .health import ENDED, RUNNING, Health
+from .lifeline import Heartbeat
 from .link import Link
 from .rowfiles import Rows, Traces
 from .telling import TICK_NS, Teller
@@ -23,6 +25,7 @@ LOOK_S = 0.05  # between looks at what else there is to do while no samples come
 LATE_BLOCKS = 10  # so far behind, a live pilot leaves out what it has not looked at
 NAVIGATOR = "navigator"
 LOST = Bumps(lost=True)
+NO_HEARTBEAT = "no heartbeat of the supervisor: wheels stopped; see whether `whisker robot` hangs"
 
 
 class Flight:
@@ -66,10 +69,13 @@ def fly_in_step(flight: Flight, reader: Reader, teller: Teller | None) -> None:
 
 
 class LiveWheels:
-    """The live base for a Flight: where it tells nothing, a row still comes, with no motion in it, and the wheels as lost."""
+    """The live base for a Flight: where it tells nothing, a row still comes, with no motion in it, and the wheels as lost.
+
+    `held`: no order is passed on.
+    """
 
     def __init__(self, base: LiveBase):
-        self.base, self.missing = base, 0
+        self.base, self.missing, self.held = base, 0, False
 
     def odometry(self, tick: int) -> Report:
         report = self.base.odometry(tick)
@@ -80,23 +86,32 @@ class LiveWheels:
         self.base.recover()
 
     def drive(self, tick: int, v_m_s: float, omega_rad_s: float) -> None:
-        self.base.drive(tick, v_m_s, omega_rad_s)
+        if not self.held:
+            self.base.drive(tick, v_m_s, omega_rad_s)
 
 
 class LiveFlight:
-    """`run` until `stop()` is true. The parts may come in any order, go, and come back."""
+    """`run` until `stop()` is true, or the heartbeat has ended. The parts may come in any order, go, and come back."""
 
-    def __init__(self, flight: Flight, ring: LiveRing, wheels: LiveWheels, link: Link, clock=time.monotonic):
+    def __init__(
+        self,
+        flight: Flight,
+        ring: LiveRing,
+        wheels: LiveWheels,
+        link: Link,
+        heartbeat: Heartbeat,
+        clock=time.monotonic,
+    ):
         self._flight, self._ring, self._wheels, self._link, self._clock = flight, ring, wheels, link, clock
-        self._health = Health(link, self.counters)
-        self._fed_s, self._halted = clock(), True
+        self._health, self._heartbeat = Health(link, self.counters), heartbeat
+        self._fed_s, self._halted, self._begin_anew = clock(), True, False
         self.blocks_left_out = self.halts = self.navigator_lost = 0
         self._navigator, self._last_error = False, ""
 
     def run(self, stop: Callable[[], bool]) -> None:
         """Block by block; ends with the wheels stopped."""
         try:
-            while not stop():
+            while not (stop() or self._heartbeat.ended):
                 self._step()
         finally:
             self._wheels.base.stop()
@@ -105,21 +120,34 @@ class LiveFlight:
 
     def _step(self) -> None:
         come = self._ring.take(LOOK_S)
+        self._obey_heartbeat()
         made = come[-LATE_BLOCKS:]
         self.blocks_left_out += len(come) - len(made)
-        if len(come) > len(made) or (made and self._halted and self.halts):
+        if len(come) > len(made) or (made and self._begin_anew):
             self._flight.interrupted(made[0][0] - 1)
+            self._begin_anew = False
         for block in made:
             self._flight.take(block)
             self._fed_s, self._halted = self._clock(), False
         if not self._halted and self._clock() - self._fed_s >= SILENCE_S:
-            self._wheels.base.stop()
-            self._halted = True
-            self.halts += 1
+            self._halted = self._begin_anew = True
+            self._halt()
         self._look_for_navigator()
         state = self.state
         self._last_error = self._last_error if state == RUNNING else state
         self._health.tell(self._stamp_ns, state, self._last_error)
+
+    def _obey_heartbeat(self) -> None:
+        """While it is silent the wheels stand and blocks are still read."""
+        held = not self._heartbeat.beats
+        if held and not self._wheels.held:
+            self._halt()
+        self._begin_anew |= self._wheels.held and not held
+        self._wheels.held = held
+
+    def _halt(self) -> None:
+        self._wheels.base.stop()
+        self.halts += 1
 
     def _look_for_navigator(self) -> None:
         here = NAVIGATOR in self._link.peers
@@ -135,7 +163,7 @@ class LiveFlight:
         """What keeps the pilot from its work, the gravest first; else RUNNING."""
         if self._halted:
             return self._ring.trouble or f"ring {self._ring.name}: no samples; see whisker top"
-        return self._wheels.base.trouble or RUNNING
+        return NO_HEARTBEAT if self._wheels.held else self._wheels.base.trouble or RUNNING
 
     def counters(self) -> dict[str, object]:
         """What has been counted since the start, and the base's own health."""

@@ -18,6 +18,7 @@ from ..simulation.link import SimLink
 
 MODE = "safe"  # the base then stops by itself at cliffs and wheel drops
 RETRY_S = 0.2  # between looks for a base that is not there
+ANSWER_S = 0.5  # a base that does not answer for so long is taken for lost
 
 
 @dataclass(frozen=True)
@@ -119,7 +120,7 @@ class LiveBase:
             return False
         self._next_try = self._clock() + RETRY_S
         try:
-            self._base, self.trouble = Base(self._path), ""
+            self._base, self.trouble = Base(self._path, ANSWER_S), ""
         except BaseError as error:
             self.trouble = str(error)
         return self._base is not None
