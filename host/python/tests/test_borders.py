@@ -13,6 +13,7 @@ from typing import NamedTuple
 import level0
 import numpy as np
 import pytest
+from models import CHANNELS, LENGTH, LIMITS, change, model, rung, settle, strange
 from rings import ring_name
 
 import whisker
@@ -27,9 +28,8 @@ from whisker.touch.radial.shape import Contact as Whisk
 from whisker.touch.radial.shape import shape_of
 from whisker.touch.texture.change import Change
 from whisker.touch.texture.model import TextureModel
-from whisker.touch.texture.rung import Rung, blocks_of, feature_count, plain_features
-from whisker.touch.texture.settle import Settle, counts
-from whisker.touch.texture.spectral import SpectralModel
+from whisker.touch.texture.rung import Rung, blocks_of, plain_features
+from whisker.touch.texture.settle import Settle
 from whisker.touch.texture.strange import Strange
 
 PACKAGE = Path(whisker.__file__).parent
@@ -47,8 +47,6 @@ OWN = {
     "signals.mechanics.drag",
 }
 ROWS = 12
-CHANNELS, LENGTH, CLASSES = 2, 64, 3
-FEATURES = feature_count(CHANNELS, LENGTH, False)
 
 
 class Case(NamedTuple):
@@ -80,32 +78,6 @@ def published(frames) -> None:
         writer.publish(frames)
 
 
-def rung() -> Rung:
-    sizes = {"centre": (FEATURES,), "weight": (FEATURES, CLASSES), "bias": (CLASSES,), "middle": (CLASSES, FEATURES)}
-    sizes |= {"axis": (1, FEATURES), "axis_weight": (CLASSES, 1)}
-    arrays = {name: np.zeros(shape) for name, shape in sizes.items()}
-    ones = {"floor": np.ones(CHANNELS), "scale": np.ones(FEATURES), "beyond": np.ones(CLASSES)}
-    return Rung(LENGTH, False, 0, 0, **arrays, **ones, span=np.full(CHANNELS, 1e4))
-
-
-def change() -> Change:
-    wide, square = np.zeros((FEATURES, CLASSES)), np.zeros((CLASSES, CLASSES))
-    return Change(LENGTH, 0.5, 1.0, np.ones(CHANNELS), wide, square, wide, np.zeros(CLASSES))
-
-
-def strange() -> Strange:
-    turn = np.tile(np.eye(FEATURES), (2, 1, 1))
-    return Strange(LENGTH, turn, np.zeros((2, CLASSES, FEATURES)), np.ones(2))
-
-
-def settle() -> Settle:
-    return Settle(LENGTH, np.ones(CHANNELS), np.ones(len(counts())))
-
-
-def model(**limits) -> SpectralModel:
-    return SpectralModel(["A", "B", "C"], 2000.0, [rung()], LIMITS | limits)
-
-
 def of_texture_model() -> Case:
     names = {"rest": np.zeros(2), "low": -np.ones(2), "high": np.ones(2)}
     return Case(lambda **changed: TextureModel(["A"], **changed), names, dict.fromkeys(names, (0,)))
@@ -113,8 +85,6 @@ def of_texture_model() -> Case:
 
 SCENE, OBSERVATIONS = level0.record(3, rows=ROWS)
 ROW = {name: getattr(OBSERVATIONS, name)[1] for name in ("odometry", "texture", "radial_m")}
-LIMITS = {"spike": [9.0, 9.0], "still": [1.0, 1.0], "low": [0.0, 0.0], "high": [65535.0, 65535.0]}
-LIMITS = {name: np.array(values) for name, values in LIMITS.items()}
 NOISE = np.random.default_rng(1).normal(0.0, 5.0, (10 * LENGTH, CHANNELS))
 BUMPS = np.zeros(2, COMPONENT)
 BUMPS["pose"], BUMPS["sigma_m"], BUMPS["sigma_rad"], BUMPS["mass"] = (0.5, 0.5, 0.0), 0.1, 0.1, 0.5

@@ -12,6 +12,7 @@ from .scene_table import SceneError, Table
 
 ARENA, ROBOT, PRIOR, OBSERVATIONS = "arena.toml", "robot.toml", "prior.toml", "observations.csv"
 TEXTURES_MOST = 250  # texture indices are one byte in host/nav, with room for its marks
+WHISKERS_MOST, OBSTACLES_MOST = 1000, 10_000
 LARGEST_M = 1000.0
 
 
@@ -145,7 +146,7 @@ def _arena(table: Table) -> Arena:
     textures = _textures(table)
     floor = _floor(table, size, tile, textures)
     boxes = []
-    for entry in table.tables("obstacle"):
+    for entry in table.tables("obstacle", OBSTACLES_MOST):
         low, high = (entry.numbers(key, 2, -LARGEST_M, LARGEST_M) for key in ("min_m", "max_m"))
         entry.done()
         if not (low[0] < high[0] and low[1] < high[1]):
@@ -189,7 +190,7 @@ def _robot(table: Table) -> Robot:
     radius = table.number("body_radius_m", 0.0, LARGEST_M)
     odometry = table.number("odometry_relative_sigma", 0.0, 10.0)
     radial = table.number("radial_sigma_m", TINY, LARGEST_M)
-    whiskers = tuple(_whisker(entry) for entry in table.tables("whisker"))
+    whiskers = tuple(_whisker(entry) for entry in table.tables("whisker", WHISKERS_MOST))
     table.done()
     names = [whisker.name for whisker in whiskers]
     for number, name in enumerate(names):

@@ -1,10 +1,12 @@
 """TOML read strictly: what a scene's files must hold, and the one line that says where one does not."""
 
 import re
-import tomllib
 from pathlib import Path
 
 from .errors import UserError
+from .files import UnreadableError, read_toml
+
+SHOWN_MOST = 60  # characters of a wrong value
 
 
 class SceneError(UserError, ValueError):
@@ -20,17 +22,14 @@ class Table:
     @classmethod
     def read(cls, path: Path) -> "Table":
         try:
-            source = path.read_text(encoding="utf-8")
-            return cls(path, source, tomllib.loads(source))
-        except OSError as error:
-            raise SceneError(f"{path}: cannot be read ({error.strerror}); a scene folder needs it") from error
-        except (UnicodeError, tomllib.TOMLDecodeError) as error:
-            raise SceneError(f"{path}: not TOML ({error}); mend that place") from error
+            return cls(path, *read_toml(path))
+        except UnreadableError as error:
+            raise SceneError(f"{path}: {error}; a scene folder needs it, mend that place") from error
 
     def fail(self, key: str, text: str) -> SceneError:
         line = self._line_of(key)
         place = f"{self.path}, line {line}" if line else f"{self.path}"
-        return SceneError(f"{place}: '{key}' {text}")
+        return SceneError(" ".join(f"{place}: '{key}' {text}".splitlines()))
 
     def take(self, key: str):
         if key not in self.content:
@@ -60,10 +59,13 @@ class Table:
             raise self.fail(key, f"must be {' or '.join(map(repr, allowed)) if allowed else 'a string'}")
         return value
 
-    def tables(self, key: str) -> list["Table"]:
+    def tables(self, key: str, most: int) -> list["Table"]:
+        """At most so many tables; none if the key is missing."""
         value = self.content.pop(key, [])
         if not isinstance(value, list) or not all(isinstance(item, dict) for item in value):
             raise self.fail(key, f"must be tables; write each as [[{key}]]")
+        if len(value) > most:
+            raise self.fail(key, f"has {len(value)} tables; {most} are the most")
         return [Table(self.path, self.source, item, key, nth) for nth, item in enumerate(value)]
 
     def done(self) -> None:
@@ -72,7 +74,7 @@ class Table:
 
     def _checked(self, key: str, value, low: float, high: float) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
-            raise self.fail(key, f"must be numbers from {low:g} to {high:g}, not {value!r}")
+            raise self.fail(key, f"must be numbers from {low:g} to {high:g}, not {_shown(value)}")
         return float(value)
 
     def _line_of(self, key: str) -> int | None:
@@ -86,3 +88,9 @@ class Table:
             lines = lines[heads[self.nth] - 1 : end - 1]
         wanted = re.compile(rf"\s*(\[+\s*)?[\"']?{re.escape(key)}[\"']?\s*[=\].]")
         return next((n for n, text in lines if wanted.match(text)), lines[0][0] if self.header else None)
+
+
+def _shown(value) -> str:
+    """A wrong value, shortened; an integer of thousands of digits cannot be printed."""
+    text = repr(value) if not isinstance(value, int) or abs(value) < 1 << 64 else "a number of many digits"
+    return text if len(text) <= SHOWN_MOST else f"{text[:SHOWN_MOST]}..."

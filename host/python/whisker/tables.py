@@ -2,11 +2,12 @@
 
 import csv
 import math
-from pathlib import Path
+from collections import Counter
 
 import numpy as np
 
 from .errors import UserError
+from .files import UnreadableError, read_text
 
 
 class TableError(UserError, ValueError):
@@ -33,15 +34,14 @@ def number(cell: str) -> float:
 def read_rows(path) -> tuple[list[str], list[list[str]]]:
     """Header and rows of a CSV file: header first, no duplicate column, no ragged row."""
     try:
-        lines = list(csv.reader(Path(path).read_text(encoding="utf-8").splitlines()))
-    except (OSError, UnicodeError, csv.Error) as error:
-        reason = error.strerror if isinstance(error, OSError) else "not a text file"
-        raise TableError(path, None, f"cannot be read ({reason}); give a readable CSV file") from error
+        lines = list(csv.reader(read_text(path).splitlines()))
+    except (UnreadableError, csv.Error) as error:
+        raise TableError(path, None, f"{error}; give a readable CSV file") from error
     if not lines or not lines[0]:
         raise TableError(path, 1, "no header line; name the columns in the first line")
-    header = [name.strip() for name in lines[0]]
-    for name in header:
-        if header.count(name) > 1:
+    header = [_name(cell) for cell in lines[0]]
+    for name, count in Counter(header).items():
+        if count > 1:
             raise TableError(path, 1, f"column '{name}' appears twice; keep one")
     for index, row in enumerate(lines[1:], start=2):
         if len(row) != len(header):
@@ -49,11 +49,16 @@ def read_rows(path) -> tuple[list[str], list[list[str]]]:
     return header, lines[1:]
 
 
+def _name(cell: str) -> str:
+    return cell.strip()
+
+
 def read_columns(path, required: list[str]) -> dict[str, list[str]]:
     """Columns as text by name; TableError when one of `required` is missing."""
     header, rows = read_rows(path)
+    known = set(header)
     for name in required:
-        if name not in header:
+        if name not in known:
             raise TableError(path, 1, f"column '{name}' is missing; add it to the header and every row")
     return {name: [row[i].strip() for row in rows] for i, name in enumerate(header)}
 

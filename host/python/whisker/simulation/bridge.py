@@ -5,11 +5,11 @@ import shutil
 import socket
 import threading
 import time
-import tomllib
 from dataclasses import replace
 from pathlib import Path
 
 from ..errors import UserError
+from ..files import UnreadableError, read_toml
 from ..pilot.behaviour import WHISK_RAD_S
 from ..protocol import LIMITS, SENSOR_ERRORS
 from ..scene import Scene, load
@@ -84,9 +84,9 @@ def _start(scene: Scene, folder: str) -> tuple[float, float, float]:
 def read_faults(path: str, ticks_per_s: int) -> str:
     """The faults of a TOML file as the simulation reads them. SimulationError: file, which fault, remedy."""
     try:
-        content = tomllib.loads(Path(path).read_text())
-    except (OSError, ValueError) as error:
-        raise SimulationError(f"{path}: cannot be read ({error}); give a TOML file of [[fault]] tables") from error
+        _, content = read_toml(path)
+    except UnreadableError as error:
+        raise SimulationError(f"{path}: {error}; give a TOML file of [[fault]] tables") from error
     entries = content.get("fault")
     if set(content) != {"fault"} or not isinstance(entries, list):
         raise SimulationError(f"{path}: give [[fault]] tables and nothing else")
@@ -101,6 +101,8 @@ def read_faults(path: str, ticks_per_s: int) -> str:
 
 def _fault(entry: dict, ticks_per_s: int) -> tuple[int, str]:
     """(tick, line) of one fault; ValueError says what is wrong with it."""
+    if not isinstance(entry, dict):
+        raise ValueError("is no table; write it as [[fault]]")
     unknown = set(entry) - {"tick", "t_s", "kind", "lane", "bit", "error"}
     if unknown:
         raise ValueError(f"'{min(unknown)}' is no key; use tick or t_s, kind, lane, bit, error")
@@ -119,8 +121,8 @@ def _argument(entry: dict) -> int:
     """The bit a flip turns, or the sensor's error word."""
     if "error" not in entry:
         return _number(entry, "bit") if "bit" in entry else 0
-    if entry["error"] not in SENSOR_ERRORS:
-        raise ValueError(f"error '{entry['error']}' is none; use one of {', '.join(SENSOR_ERRORS)}")
+    if not isinstance(entry["error"], str) or entry["error"] not in SENSOR_ERRORS:
+        raise ValueError(f"error {entry['error']!r:.40} is none; use one of {', '.join(SENSOR_ERRORS)}")
     return 1 << SENSOR_ERRORS[entry["error"]]["sensor_bit"]
 
 

@@ -2,7 +2,15 @@
 
 import numpy as np
 
+from ...fields import Fields
 from .whisk_fit import TIP_MM
+
+
+def radii_of(fields: Fields, *names: str) -> list[float]:
+    """A deviation, the lowest and the highest radius of a model, mm."""
+    sigma, low, high = (fields.number(name, 0.0, RADIUS_MOST_MM) for name in names)
+    fields.number(names[2], low, RADIUS_MOST_MM)
+    return [sigma, low, high]
 
 
 def tip_from(high_mm: float, sigma_mm: float) -> float:
@@ -10,6 +18,8 @@ def tip_from(high_mm: float, sigma_mm: float) -> float:
     return high_mm - max(sigma_mm, TIP_MM)
 
 
+RADIUS_MOST_MM = 1e5
+LEAST = 1e-12  # of what must be above 0
 GAUSS_NEWTON_STEPS = 12
 LEAST_BELOW = 0.05  # of the rational curve's denominator: no pole among the contacts
 
@@ -34,13 +44,16 @@ class CurveModel:
 
     def __init__(self, content: dict):
         """`content`: "kind" and NUMBERS by name."""
-        if content["kind"] not in self.KINDS:
-            raise ValueError(f"kind is '{content['kind']}'")
         self.kind = content["kind"]
         values = [float(content[name]) for name in self.NUMBERS]
-        if not np.isfinite(values).all() or values[4] <= 0:
-            raise ValueError("a number is not finite, or scale not above 0")
         self.c0, self.c1, self.c2, self.d, self.scale, self.sigma_mm, self.low_mm, self.high_mm = values
+
+    @classmethod
+    def of(cls, fields: Fields) -> "CurveModel":
+        """From what `content` gave; ValueError names the field that is wrong."""
+        numbers = {name: fields.number(name) for name in cls.NUMBERS[:4]} | {"scale": fields.number("scale", LEAST)}
+        radii = zip(cls.NUMBERS[5:], radii_of(fields, *cls.NUMBERS[5:]), strict=True)
+        return cls({"kind": fields.text("kind", *cls.KINDS)} | numbers | dict(radii))
 
     @property
     def content(self) -> dict:

@@ -8,9 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...fields import Fields
+from ...files import read_json
 from ...native import as_doubles, doubles, ffi, lib
 from ...tables import TableError, numbers, read_columns
-from .curve import CurveModel, tip_from
+from .curve import CurveModel, radii_of, tip_from
 from .shape import Contact, shape_of
 from .whisk import WhiskModel
 from .whisk_fit import TIP_MM
@@ -21,6 +23,7 @@ REST_SHARE = 0.05  # the first samples of a recorded whisk, before it touches, g
 REST_LEAST = 3  # samples: slow recordings have few before the touch
 WHISK_FORMAT, CURVE_FORMAT = "whisker radial whisk model 1", "whisker radial curve model 1"
 RATE_COLUMNS = ("whisk_rad_s", "base_rad_s")  # commanded; as the base reports
+NODE_MOST = 2**32 - 1
 NODE_COLUMN = "node"  # serial number of the node whose whisker it is
 NO_CHANNEL = ("contact", "radius_mm", "t_s", NODE_COLUMN, *RATE_COLUMNS)
 MODELS = ("paper", "linear", "quadratic", "rational", "default")
@@ -85,14 +88,9 @@ class RadialModel:
         return {name: getattr(self, name) for name in FIELDS}
 
     @classmethod
-    def of(cls, content: dict) -> "RadialModel":
+    def of(cls, fields: Fields) -> "RadialModel":
         """From what `content` gave."""
-        if content["format"] != FORMAT:
-            raise ValueError(f"format is '{content['format']}'")
-        values = [float(content[name]) for name in FIELDS]
-        if not np.isfinite(values).all():
-            raise ValueError("a number is not finite")
-        return cls(*values)
+        return cls(fields.number("a1"), fields.number("a0"), *radii_of(fields, "sigma_mm", "low_mm", "high_mm"))
 
     def save(self, path) -> None:
         """As JSON, for `load`."""
@@ -225,19 +223,18 @@ def save(model, path) -> None:
 
 def load(path) -> "RadialModel | CurveModel | WhiskModel":
     """Read what `save` wrote; TableError with one line when it is something else."""
+    kinds = {FORMAT: RadialModel.of, WHISK_FORMAT: WhiskModel.of, CURVE_FORMAT: CurveModel.of}
     try:
-        content = json.loads(Path(path).read_text())
-        kinds = {WHISK_FORMAT: WhiskModel, CURVE_FORMAT: CurveModel}
-        model = kinds.get(content["format"], RadialModel.of)(content)
-        node = content.get(NODE_COLUMN)
-        model.node = None if node is None else int(node)
+        fields = Fields(read_json(path))
+        model = kinds[fields.text("format", *kinds)](fields)
+        model.node = fields.whole(NODE_COLUMN, 0, NODE_MOST) if fields.has(NODE_COLUMN) else None
         return model
-    except (OSError, ValueError, KeyError, TypeError, OverflowError, AttributeError) as error:
+    except ValueError as error:
         raise not_a_model(path, error) from error
 
 
-def not_a_model(path, error: Exception) -> TableError:
-    return TableError(path, None, f"not a radial model ({error!r}); make one with 'whisker radial fit'")
+def not_a_model(path, error: ValueError) -> TableError:
+    return TableError(path, None, f"no radial model: {error}; make one with 'whisker radial fit'")
 
 
 def estimate(model, contact: Contact, peak_counts: float | None = None) -> Estimate:

@@ -4,7 +4,9 @@ import math
 
 import numpy as np
 
-from ...native import ffi, lib
+from ...fields import Fields
+from ...native import as_doubles, ffi, lib
+from .curve import LEAST, radii_of
 from .shape import TERMS, Contact, shape_of
 from .whisk_fit import learn
 
@@ -27,24 +29,22 @@ class WhiskModel:
 
     def __init__(self, content: dict):
         """`content`: SCALARS, ARRAYS and "covariance" by name."""
-        arrays = {name: [float(v) for v in content[name]] for name in self.ARRAYS}
-        scalars = {name: float(content[name]) for name in self.SCALARS[1:]}
-        covariance = np.array(content["covariance"], np.float64).reshape(len(TERMS), len(TERMS))
-        everything = [*scalars.values(), *(v for values in arrays.values() for v in values), *covariance.flat]
-        if not np.isfinite(everything).all():
-            raise ValueError("a number is not finite")
-        lengths = {name: lib.NAV_TRACE_AXES if name == "direction" else len(TERMS) for name in self.ARRAYS}
-        if any(len(arrays[name]) != length for name, length in lengths.items()):
-            raise ValueError("a list has not as many members as it should")
-        if not (
-            1 <= int(content["axes"]) <= lib.NAV_TRACE_AXES
-            and 0 < scalars["low_mm"] < scalars["high_mm"] < scalars["cone_mm"]
-        ):
-            raise ValueError("axes or radii are impossible")
-        if min(scalars["spread"], scalars["kappa"], scalars["direction_sd"], scalars["log_misfit_sd"]) <= 0:
-            raise ValueError("a deviation is not above 0")
-        rest = {"axes": int(content["axes"]), "covariance": covariance.tolist()}
-        self._c = ffi.new("struct nav_whisk_model *", scalars | arrays | rest)
+        self._c = ffi.new("struct nav_whisk_model *", content)
+
+    @classmethod
+    def of(cls, fields: Fields) -> "WhiskModel":
+        """From what `content` gave; ValueError names the field that is wrong."""
+        found = {name: fields.number(name) for name in cls.SCALARS[1:]}
+        for name in ("spread", "kappa", "direction_sd", "log_misfit_sd", "low_mm"):
+            fields.number(name, LEAST)
+        _, low_mm, high_mm = radii_of(fields, "tip_mm", "low_mm", "high_mm")
+        fields.number("high_mm", math.nextafter(low_mm, math.inf))
+        fields.number("cone_mm", math.nextafter(high_mm, math.inf))
+        found |= {"axes": fields.whole("axes", 1, lib.NAV_TRACE_AXES)}
+        lengths = {name: (lib.NAV_TRACE_AXES if name == "direction" else len(TERMS),) for name in cls.ARRAYS}
+        for name, shape in (lengths | {"covariance": (len(TERMS), len(TERMS))}).items():
+            found[name] = as_doubles(fields.array(name, len(shape)), f"field '{name}'", shape).tolist()
+        return cls(found)
 
     @property
     def content(self) -> dict:

@@ -30,7 +30,7 @@ class Change:
     weight: np.ndarray  # (F, classes)
     bias: np.ndarray  # (classes,)
 
-    ARRAYS = ("floor", "steady", "apart", "weight", "bias")
+    ARRAYS = {"floor": 1, "steady": 2, "apart": 2, "weight": 2, "bias": 1}  # and their dimensions
     NUMBERS = ("length", "share", "limit")
 
     def native(self):

@@ -6,10 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
+from ...fields import Fields
+from ...files import UnreadableError, read_json
 from ...native import as_doubles, doubles, ffi, lib
 from ...tables import TableError, numbers, read_columns
 from .spectral import FORMAT as SPECTRAL_FORMAT
-from .spectral import SpectralModel
+from .spectral import SpectralModel, no_model
 
 FORMAT = "whisker texture model 1"
 BINS = 64
@@ -84,44 +86,42 @@ class TextureModel:
     @classmethod
     def load(cls, path) -> "TextureModel":
         """Read what `save` wrote; TableError with one line when it is something else."""
-        return cls.from_json(path, read_json(path))
+        return cls.from_json(path, _read(path))
 
     @classmethod
-    def from_json(cls, path, content: dict) -> "TextureModel":
+    def from_json(cls, path, content: object) -> "TextureModel":
         """What `save` wrote, parsed; TableError with one line when it is something else."""
         try:
-            if content["format"] != FORMAT:
-                raise ValueError(f"format is '{content['format']}'")
-            table = np.array(content["loglik"], dtype=np.float64)
-            edges = [np.array(content[key], dtype=np.float64) for key in ("rest", "low", "high")]
-            if table.shape[:2] != (len(content["classes"]), len(edges[1])) or len({len(e) for e in edges}) != 1:
-                raise ValueError("sizes of classes, axes and loglik differ")
-            if not all(np.isfinite(part).all() for part in (table, *edges)):
-                raise ValueError("a number is not finite")
-            return cls(content["classes"], *edges, table)
-        except (ValueError, KeyError, TypeError, IndexError) as error:
-            raise _no_model(path, error) from error
+            return cls._of(Fields(content))
+        except (ValueError, OverflowError) as error:
+            raise no_model(path, error) from error
+
+    @classmethod
+    def _of(cls, fields: Fields) -> "TextureModel":
+        fields.text("format", FORMAT)
+        classes = fields.names("classes", lib.NAV_TEXTURE_CLASSES_MAX)
+        edges = [fields.array(key, 1) for key in ("rest", "low", "high")]
+        table = fields.array("loglik", 3, high=0.0)
+        if table.ndim != 3 or table.shape[:2] != (len(classes), len(edges[1])):
+            raise ValueError("sizes of classes, axes and loglik differ")
+        return cls(classes, *edges, table)
 
     @property
     def channels(self) -> int:
         return len(self.low)
 
 
-def _no_model(path, error: Exception) -> TableError:
-    return TableError(path, None, f"not a texture model ({error!r}); make one with 'whisker texture train'")
-
-
-def read_json(path) -> dict:
+def _read(path) -> object:
     """A model file's content; TableError with one line when it is no JSON."""
     try:
-        return json.loads(Path(path).read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
-        raise _no_model(path, error) from error
+        return read_json(path)
+    except UnreadableError as error:
+        raise no_model(path, error) from error
 
 
 def load(path) -> "TextureModel | SpectralModel":
     """A model of either method, as its format says."""
-    content = read_json(path)
+    content = _read(path)
     if isinstance(content, dict) and content.get("format") == SPECTRAL_FORMAT:
         return SpectralModel.from_json(path, content)
     return TextureModel.from_json(path, content)

@@ -23,7 +23,7 @@ class Settle:
     floor: np.ndarray  # (channels,)
     limit: np.ndarray  # (NAV_TEXTURE_SETTLE_LIMITS,)
 
-    ARRAYS = ("floor", "limit")
+    ARRAYS = {"floor": 1, "limit": 1}  # and their dimensions
     NUMBERS = ("length",)
 
     def native(self):

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ...fields import Fields
 from ...native import as_doubles, doubles, ffi, lib
 from ...tables import TableError
 from .change import Change
@@ -16,6 +17,15 @@ from .strange import Strange
 FORMAT = "whisker texture model 6"
 PARTS = {"change": Change, "strange": Strange, "settle": Settle}  # of windows in a row
 LIMITS = ("spike", "still", "low", "high")
+LENGTH_MOST = 1 << 20  # samples of a window; also numbers of a projection
+RANGES = {
+    "rate_hz": (1e-3, 1e9),
+    "window_ms": (1e-3, 1e6),
+    "growth": (0.0, 2.0),
+    "together": (0.0, 1e3),
+    "doubt": (0.0, 1.0),
+    "sure": (0.0, 1.0),
+}
 
 
 @dataclass
@@ -85,40 +95,49 @@ class SpectralModel:
         Path(path).write_text(json.dumps(content) + "\n")
 
     @classmethod
-    def from_json(cls, path, content: dict) -> "SpectralModel":
+    def from_json(cls, path, content: object) -> "SpectralModel":
         """What `save` wrote; TableError with one line when it is something else."""
         try:
-            return cls._parsed(content)
-        except (ValueError, KeyError, TypeError, IndexError, AttributeError, OverflowError) as error:
-            text = f"not a texture model ({error!r}); make one with 'whisker texture train'"
-            raise TableError(path, None, text) from error
+            return cls._of(Fields(content))
+        except (ValueError, OverflowError) as error:
+            raise no_model(path, error) from error
 
     @classmethod
-    def _parsed(cls, content: dict) -> "SpectralModel":
-        rungs = []
-        for part in content["rungs"]:
-            arrays = {name: np.array(part[name], dtype=np.float64) for name in (*Rung.ARRAYS, "span")}
-            arrays["axis"] = arrays["axis"].reshape(-1, len(arrays["centre"]))
-            arrays["axis_weight"] = arrays["axis_weight"].reshape(len(arrays["bias"]), -1)
-            rungs.append(Rung(**{name: part[name] for name in Rung.NUMBERS}, **arrays))
-        limits = {name: np.array(content["limits"][name], dtype=np.float64) for name in LIMITS}
-        numbers = {
-            name: float(content[name]) for name in ("rate_hz", "window_ms", "growth", "together", "doubt", "sure")
-        }
-        model = cls([str(c) for c in content["classes"]], rungs=rungs, limits=limits, **numbers)
-        for name, kind in PARTS.items():
-            if content[name] is not None:
-                arrays = {n: np.array(content[name][n], dtype=np.float64) for n in kind.ARRAYS}
-                setattr(model, name, kind(**{n: content[name][n] for n in kind.NUMBERS}, **arrays))
-        model.figures = content.get("figures", {})
-        if not rungs or any(len(r.bias) != len(model.classes) for r in rungs):
+    def _of(cls, fields: Fields) -> "SpectralModel":
+        classes = fields.names("classes", lib.NAV_TEXTURE_CLASSES_MAX)
+        rungs = [_rung(part) for part in fields.parts("rungs", lib.NAV_TEXTURE_RUNGS_MAX)]
+        limits = {name: fields.part("limits").array(name, 1) for name in LIMITS}
+        numbers = {name: fields.number(name, *RANGES[name]) for name in RANGES}
+        parts = {name: _part(kind, fields.part(name)) for name, kind in PARTS.items() if fields.has(name)}
+        fields.part("figures")
+        model = cls(classes, rungs=rungs, limits=limits, figures=fields.take("figures"), **numbers, **parts)
+        if any(len(r.bias) != len(classes) for r in rungs):
             raise ValueError("rungs and classes differ")
         if len({len(part) for part in (*limits.values(), *(r.floor for r in rungs), *(r.span for r in rungs))}) != 1:
             raise ValueError("limits and rungs differ in channels")
-        if not all(np.isfinite(v) for v in (*numbers.values(), *(x for r in rungs for x in (r.unknown, r.border)))):
-            raise ValueError("a number is not finite")
         model.stream(2)
         return model
+
+
+def no_model(path, error: Exception) -> TableError:
+    return TableError(path, None, f"no texture model: {error}; make one with 'whisker texture train'")
+
+
+def _rung(fields: Fields) -> Rung:
+    flat = {name: fields.array(name, 1) for name in ("floor", "centre", "scale", "bias", "beyond", "span")}
+    square = {name: fields.array(name, 2) for name in ("weight", "middle", "axis", "axis_weight")}
+    square["axis"] = square["axis"].reshape(-1, len(flat["centre"]))
+    square["axis_weight"] = square["axis_weight"].reshape(len(flat["bias"]), -1)
+    whole = {name: fields.whole(name, 0, LENGTH_MOST) for name in ("length", "shorter", "hidden")}
+    numbers = {name: fields.number(name, 0.0) for name in ("temper", "unknown", "border")}
+    return Rung(levels=fields.flag("levels"), seed=fields.whole("seed", 0, 2**63), **whole, **numbers, **flat, **square)
+
+
+def _part(kind, fields: Fields):
+    """A Change, Strange or Settle."""
+    arrays = {name: fields.array(name, dimensions) for name, dimensions in kind.ARRAYS.items()}
+    numbers = {name: fields.number(name, 0.0) for name in kind.NUMBERS if name != "length"}
+    return kind(length=fields.whole("length", 1, LENGTH_MOST), **numbers, **arrays)
 
 
 class Stream:

@@ -22,7 +22,7 @@ class Strange:
     middle: np.ndarray  # (steps, classes, F)
     limit: np.ndarray  # (steps,)
 
-    ARRAYS = ("turn", "middle", "limit")
+    ARRAYS = {"turn": 3, "middle": 3, "limit": 1}  # and their dimensions
     NUMBERS = ("length",)
 
     def native(self):

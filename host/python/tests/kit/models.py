@@ -1,0 +1,40 @@
+"""Small texture models of the default method, made of nothing: sizes and numbers are possible, no surface is known."""
+
+import numpy as np
+
+from whisker.touch.texture.change import Change
+from whisker.touch.texture.rung import Rung, feature_count
+from whisker.touch.texture.settle import Settle, counts
+from whisker.touch.texture.spectral import SpectralModel
+from whisker.touch.texture.strange import Strange
+
+CHANNELS, LENGTH, CLASSES = 2, 64, 3
+FEATURES = feature_count(CHANNELS, LENGTH, False)
+LIMITS = {"spike": [9.0, 9.0], "still": [1.0, 1.0], "low": [0.0, 0.0], "high": [65535.0, 65535.0]}
+LIMITS = {name: np.array(values) for name, values in LIMITS.items()}
+
+
+def rung() -> Rung:
+    sizes = {"centre": (FEATURES,), "weight": (FEATURES, CLASSES), "bias": (CLASSES,), "middle": (CLASSES, FEATURES)}
+    sizes |= {"axis": (1, FEATURES), "axis_weight": (CLASSES, 1)}
+    arrays = {name: np.zeros(shape) for name, shape in sizes.items()}
+    ones = {"floor": np.ones(CHANNELS), "scale": np.ones(FEATURES), "beyond": np.ones(CLASSES)}
+    return Rung(LENGTH, False, 0, 0, **arrays, **ones, span=np.full(CHANNELS, 1e4))
+
+
+def change() -> Change:
+    wide, square = np.zeros((FEATURES, CLASSES)), np.zeros((CLASSES, CLASSES))
+    return Change(LENGTH, 0.5, 1.0, np.ones(CHANNELS), wide, square, wide, np.zeros(CLASSES))
+
+
+def strange() -> Strange:
+    turn = np.tile(np.eye(FEATURES), (2, 1, 1))
+    return Strange(LENGTH, turn, np.zeros((2, CLASSES, FEATURES)), np.ones(2))
+
+
+def settle() -> Settle:
+    return Settle(LENGTH, np.ones(CHANNELS), np.ones(len(counts())))
+
+
+def model(**limits) -> SpectralModel:
+    return SpectralModel(["A", "B", "C"], 2000.0, [rung()], LIMITS | limits)
