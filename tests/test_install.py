@@ -84,13 +84,44 @@ def test_library_exports_its_names_only_and_never_prints_or_ends(prefix):
     assert "SONAME               libwhisker.so.0" in run("objdump", "-p", library)
     exported = [line.split()[-1] for line in run("nm", "-D", "--defined-only", library).splitlines()]
     assert exported and all(re.fullmatch(r"whisker_[a-z0-9]+_[a-z0-9_]+", name) for name in exported), exported
-    used = {line.split()[-1].split("@")[0] for line in run("nm", "-D", "--undefined-only", library).splitlines()}
+    used = {re.sub("^__(.*)_chk$", r"\1", name) for name in undefined(library)}
     assert not used & (PRINTING | ENDING)
+
+
+def undefined(path: Path) -> set[str]:
+    """Names that a program or library takes from others."""
+    return {line.split()[-1].split("@")[0] for line in run("nm", "-D", "--undefined-only", path).splitlines()}
+
+
+HARDENED = ("bin/whiskerd", "bin/whisker-log", "bin/whisker-flash", "bin/whisker-base", "lib/libwhisker.so")
+
+
+def test_everything_installed_is_in_the_list_of_what_is_hardened(prefix):
+    found = [path for path in prefix.rglob("*") if path.is_file() and path.read_bytes()[:4] == b"\x7fELF"]
+    assert {path.resolve() for path in found} == {(prefix / name).resolve() for name in HARDENED}
+
+
+@pytest.mark.parametrize("name", HARDENED)
+def test_programs_and_libraries_are_hardened(prefix, name):
+    header = run("readelf", "-W", "--file-header", "--program-headers", "--dynamic", prefix / name)
+    assert re.search(r"Type: +DYN ", header), "not position independent"
+    assert "GNU_RELRO" in header and re.search(r"FLAGS.* (BIND_)?NOW", header), "its table of functions can be written"
+    assert re.search(r"GNU_STACK .* RW +0x", header), "its stack can be executed"
+    used = undefined(prefix / name)
+    assert "__stack_chk_fail" in used, "built without -fstack-protector-strong"
+    assert any(re.fullmatch("__.*_chk", one) for one in used), "built without _FORTIFY_SOURCE"
+
+
+def test_python_module_is_hardened():
+    for module in (ROOT / "host/python/whisker").glob("_native*.so"):
+        header = run("readelf", "-W", "--program-headers", "--dynamic", module)
+        assert "GNU_RELRO" in header and re.search(r"FLAGS.* (BIND_)?NOW", header), module
+        assert "__stack_chk_fail" in undefined(module)
 
 
 UNITS = {
     "whiskerd.service": "whiskerd --ring whisker --wait",
-    "whisker-base@.service": "whisker-base --port /dev/%I --socket ${RUNTIME_DIRECTORY}/%i.sock --wait",
+    "whisker-base@.service": "whisker-base --port /dev/%I --socket ${RUNTIME_DIRECTORY}/base.sock --wait",
 }
 
 
@@ -116,7 +147,7 @@ def test_udev_rule_names_the_bridge_and_its_unit(prefix):
         assert items["ATTR{idProduct}=="] == f"{LIMITS['usb_product_id']:04x}"
         assert f'"{items["ATTR{product}=="]}"' in (ROOT / "fpga/usb/descriptors.py").read_text()
         assert items["ENV{SYSTEMD_WANTS}+="] == "whiskerd.service"
-        assert 'TAG+="uaccess"' in rule and items["GROUP="] == "plugdev" and items["MODE="] == "0660"
+        assert 'TAG+="uaccess"' in rule and items["GROUP="] == "whisker" and items["MODE="] == "0660"
     assert len(rules) == 1
     if "verify" in subprocess.run([tool("udevadm"), "--help"], capture_output=True, text=True).stdout:
         run("udevadm", "verify", prefix / "lib/udev/rules.d/70-whisker.rules")

@@ -56,6 +56,9 @@ HEADERS = {
         for name in ("errors.h", "frame.h", "clock.h", "stats.h", "ring.h")
     ],
 }
+# As host/CMakeLists.txt builds the libraries.
+HARDENED_COMPILE = ["-fstack-protector-strong", "-U_FORTIFY_SOURCE", "-D_FORTIFY_SOURCE=3"]
+HARDENED_LINK = ["-Wl,-z,relro,-z,now,-z,noexecstack"]
 ALL_HEADERS = [header for name in LIBRARIES for header in HEADERS[name]]
 
 
@@ -97,7 +100,8 @@ def wheel_ffi() -> cffi.FFI:
         ],
         define_macros=[("_GNU_SOURCE", None)],
         libraries=[library for needed in LIBRARIES.values() for library in needed],
-        extra_compile_args=["-O3", "-std=gnu11", "-fvisibility=hidden"],
+        extra_compile_args=["-O3", "-std=gnu11", "-fvisibility=hidden", *HARDENED_COMPILE],
+        extra_link_args=HARDENED_LINK,
     )
     return ffi
 
@@ -120,9 +124,9 @@ def main(argv: list[str] | None = None) -> int:
         "_native",
         "\n".join(f'#include "{header}"' for header in ALL_HEADERS),
         include_dirs=[str(path) for path in (HOST / "libwhisker" / "include", *nav_rooms())],
-        extra_link_args=[str(archive) for archive in archives.values()],
+        extra_link_args=[*(str(archive) for archive in archives.values()), *HARDENED_LINK],
         libraries=[library for needed in LIBRARIES.values() for library in needed],
-        extra_compile_args=["-O2", "-std=gnu11"],
+        extra_compile_args=["-O2", "-std=gnu11", *HARDENED_COMPILE],
     )
     with tempfile.TemporaryDirectory() as scratch:
         made = Path(ffi.compile(tmpdir=scratch))
