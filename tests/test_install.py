@@ -135,6 +135,14 @@ def test_units_are_sound_and_hardened(prefix, name):
     assert "Overall exposure level" in verdict
 
 
+def test_services_run_as_users_that_sysusers_makes(prefix):
+    made = set(re.findall(r"^u (\S+) ", (prefix / "lib/sysusers.d/whisker.conf").read_text(), re.MULTILINE))
+    units = "".join((prefix / "lib/systemd/system" / name).read_text() for name in UNITS)
+    assert made == set(re.findall(r"^User=(\S+)$", units, re.MULTILINE)) == {"whisker", "whisker-base"}
+    rule = (prefix / "lib/udev/rules.d/70-whisker.rules").read_text()
+    assert set(re.findall(r'GROUP="(\S+)"', rule)) <= made
+
+
 def test_udev_rule_names_the_bridge_and_its_unit(prefix):
     text = (prefix / "lib/udev/rules.d/70-whisker.rules").read_text()
     rules = [line for line in text.splitlines() if line and not line.startswith("#")]

@@ -1,31 +1,21 @@
-"""Runs inside the guest: what a user's programs do with the bridge. Speaks with the host by lines on a serial port:
+"""Runs inside the guest: what a user's programs do with the bridge."""
 
-ok NAME: what, FAILED NAME: why, note WHAT, log LINE-OF-THE-KERNEL; ask WORD, answered by a line; end.
-"""
-
-import os
 import re
 import subprocess
 import sys
-import termios
-import time
-import traceback
-import tty
 from collections.abc import Callable
 from contextlib import contextmanager
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "host/python"))
+from guest_talk import PLUG_S, PROGRAM_S, CheckError, Checks, Talk, await_that, command, require  # noqa: E402
+
 from whisker.protocol import LIMITS, REPORTS, WIRE_VERSION  # noqa: E402
 
-PORT = "/dev/ttyS1"
 HOST = "10.0.2.2"  # the machine that runs the guest, in QEMU's user network
 LONG_RUN_FRAMES = 20000
 SHORT_RUN_FRAMES = 2000
-PROGRAM_S = 600  # the guest is emulated, and may have half a processor
-PLUG_S = 120
-POLL_S = 0.05
 RING = "kernel"
 PYUSB = "pyusb"  # the argument that makes this program the one that pyusb() runs
 LINK = ["--sck-divider", "6", "--word-gap", "30", "--sample-point", "5"]
@@ -39,63 +29,16 @@ COMPLAINT = re.compile(
 )
 
 
-class CheckError(Exception):
-    """Something is not as it should be; the text says what."""
-
-
-class Talk:
-    """The lines exchanged with the host."""
-
-    def __init__(self):
-        self._port = os.open(PORT, os.O_RDWR | os.O_NOCTTY)
-        tty.setraw(self._port, termios.TCSANOW)
-
-    def say(self, kind: str, text: str = "") -> None:
-        os.write(self._port, f"{kind} {text}".strip().replace("\n", "; ").encode() + b"\n")
-
-    def ask(self, word: str) -> str:
-        """The host's answer; it does what was asked for before it answers."""
-        self.say("ask", word)
-        answer = b""
-        while not answer.endswith(b"\n"):
-            answer += os.read(self._port, 1)
-        return answer.decode().strip()
-
-
-class Checks:
-    """Runs checks one by one; a failed one does not keep the next from running."""
+class BridgeChecks(Checks):
+    """Checks with the programs of a build."""
 
     def __init__(self, talk: Talk, build: Path):
-        self.talk, self.build = talk, build
-
-    def run(self, name: str, check: Callable[["Checks"], str | None]) -> None:
-        """Run one; what it returns is told beside the name."""
-        began = time.monotonic()
-        try:
-            told = check(self)
-            self.talk.say(f"ok {name}:", f"{told or 'as it should be'} ({time.monotonic() - began:.1f} s)")
-        except (CheckError, OSError, subprocess.SubprocessError) as error:
-            self.talk.say(f"FAILED {name}:", str(error))
-        except Exception:
-            self.talk.say(f"FAILED {name}:", traceback.format_exc(limit=-2))
+        super().__init__(talk)
+        self.build = build
 
     def program(self, name: str) -> str:
         """Path of a program of the build."""
         return next(str(path) for path in self.build.rglob(name) if path.is_file())
-
-
-def require(ok: bool, text: str) -> None:
-    """CheckError with this text unless it is so."""
-    if not ok:
-        raise CheckError(text)
-
-
-def command(*words: str) -> str:
-    """What a program printed; CheckError with its complaint if it did not end well."""
-    done = subprocess.run(words, capture_output=True, text=True, timeout=PROGRAM_S)
-    text = (done.stderr or done.stdout).strip().splitlines()
-    require(done.returncode == 0, f"{Path(words[0]).name}: exit code {done.returncode}: {' / '.join(text[-3:])}")
-    return done.stdout
 
 
 def kernel_log() -> list[str]:
@@ -113,13 +56,10 @@ def device() -> Path | None:
 
 def await_state(there: bool) -> None:
     """Until the bridge is there, with its hidraw node, or gone."""
-    for _ in range(int(PLUG_S / POLL_S)):
-        if there and device() and any(Path("/sys/class/hidraw").glob("*")):
-            return
-        if not there and not device():
-            return
-        time.sleep(POLL_S)
-    raise CheckError(f"the bridge is not {'there' if there else 'gone'} after {PLUG_S} s")
+    await_that(
+        lambda: bool(device()) == there and (not there or any(Path("/sys/class/hidraw").glob("*"))),
+        f"the bridge is not {'there' if there else 'gone'}",
+    )
 
 
 # ------------------------------------------------------------------------------------------------------------- checks
@@ -149,33 +89,33 @@ def lsusb(_: Checks) -> str:
     return f"{len(done.stdout.splitlines())} lines"
 
 
-def libusb_stream(checks: Checks) -> str:
+def libusb_stream(checks: BridgeChecks) -> str:
     """A libusb program streams; every frame's sequence, tick and CRCs are checked."""
     return command(checks.program("kernel_usb_probe"), "stream", str(SHORT_RUN_FRAMES)).strip()
 
 
-def libusb_stall(checks: Checks) -> str:
+def libusb_stall(checks: BridgeChecks) -> str:
     """Unknown and refused requests end with EPIPE, and the next is served."""
     return command(checks.program("kernel_usb_probe"), "stall").strip() + " after two stalls"
 
 
-def libusb_cancel(checks: Checks) -> str:
+def libusb_cancel(checks: BridgeChecks) -> str:
     """Waiting transfers can be cancelled and time out."""
     return command(checks.program("kernel_usb_probe"), "cancel").strip() + " after cancelled transfers"
 
 
-def libusb_reset(checks: Checks) -> str:
+def libusb_reset(checks: BridgeChecks) -> str:
     """A reset in the midst of a run."""
     return command(checks.program("kernel_usb_probe"), "reset").strip() + " after a reset"
 
 
-def hidapi_hidraw(checks: Checks) -> None:
+def hidapi_hidraw(checks: BridgeChecks) -> None:
     """Feature reports through the kernel's hidraw."""
     await_state(True)
     command(checks.program("kernel_hid_probe_hidraw"))
 
 
-def hidapi_libusb(checks: Checks) -> None:
+def hidapi_libusb(checks: BridgeChecks) -> None:
     """The same through libusb; the kernel's driver comes back afterwards."""
     command(checks.program("kernel_hid_probe_libusb"))
     await_state(True)
@@ -235,7 +175,7 @@ def pyusb_run(bridge) -> int:
 
 
 @contextmanager
-def daemon(checks: Checks):
+def daemon(checks: BridgeChecks):
     """whiskerd on the bridge, stopped as a service manager stops it."""
     words = [checks.program("whiskerd"), "--ring", RING, "--wait", *LINK]
     with subprocess.Popen(words, stderr=subprocess.PIPE, text=True) as process:
@@ -247,7 +187,7 @@ def daemon(checks: Checks):
     require(process.returncode == 0, f"whiskerd: exit code {process.returncode}: {told.strip().splitlines()[-1:]}")
 
 
-def read_ring(checks: Checks, frames: int, cuts: int = 0, at_first_thousand: Callable = lambda: None) -> str:
+def read_ring(checks: BridgeChecks, frames: int, cuts: int = 0, at_first_thousand: Callable = lambda: None) -> str:
     """A reader's own account of so many frames, every one in its place."""
     words = [checks.program("kernel_ring_probe"), RING, str(frames), str(cuts)]
     with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as reader:
@@ -261,19 +201,19 @@ def read_ring(checks: Checks, frames: int, cuts: int = 0, at_first_thousand: Cal
     return line.strip()
 
 
-def daemon_long(checks: Checks) -> str:
+def daemon_long(checks: BridgeChecks) -> str:
     """whiskerd and a reader of its ring for the long run."""
     with daemon(checks):
         return read_ring(checks, LONG_RUN_FRAMES)
 
 
-def daemon_short(checks: Checks) -> str:
+def daemon_short(checks: BridgeChecks) -> str:
     """The same, short."""
     with daemon(checks):
         return read_ring(checks, SHORT_RUN_FRAMES)
 
 
-def replug(checks: Checks) -> str:
+def replug(checks: BridgeChecks) -> str:
     """The cable is pulled while whiskerd runs; it goes on when the bridge is back."""
 
     def pull_and_plug() -> None:
@@ -293,7 +233,7 @@ def no_complaint(_: Checks) -> str:
     return "nothing in the kernel's log"
 
 
-def usbip_attach(checks: Checks) -> str:
+def usbip_attach(checks: BridgeChecks) -> str:
     """`usbip list` and `usbip attach`, as in the README."""
     port = checks.talk.ask("usbip")
     listed = command("usbip", "--tcp-port", port, "list", "-r", HOST)
@@ -313,7 +253,7 @@ def usbip_detach(_: Checks) -> str:
 def main() -> None:
     """All checks, first over usbredir, then over USB/IP."""
     talk = Talk()
-    checks = Checks(talk, Path(sys.argv[1]))
+    checks = BridgeChecks(talk, Path(sys.argv[1]))
     for check in (enumerates, lsusb, libusb_stream, libusb_stall, libusb_cancel, libusb_reset):
         checks.run(f"usbredir {check.__name__}", check)
     for check in (hidapi_hidraw, hidapi_libusb, pyusb, daemon_short, replug, daemon_long, no_complaint):

@@ -1,9 +1,12 @@
-"""What the guest boots: Debian's kernel, unpacked from its package, and a small initramfs with the modules it needs."""
+"""What a guest boots: Debian's kernel, unpacked from its package, a small initramfs with the modules it needs, and a
+Debian with systemd.
+"""
 
 import os
 import re
 import shutil
 import subprocess
+from collections.abc import Iterable
 from pathlib import Path
 
 KERNEL_PACKAGE = "linux-image-amd64"  # depends on the newest
@@ -18,6 +21,8 @@ MODULES = (
     "hid-generic",
     "vhci-hcd",
 )
+# polkitd: without it logind lets root alone delay the machine's sleep.
+ROOT_PACKAGES = ("systemd-sysv", "udev", "dbus", "polkitd", "python3", "libusb-1.0-0", "libhidapi-libusb0")
 # What must be there: program (or file), Debian package.
 TOOLS = {
     "qemu-system-x86_64": "qemu-system-x86",
@@ -26,6 +31,8 @@ TOOLS = {
     "usbip": "usbip",
     "lsusb": "usbutils",
     "dpkg-deb": "dpkg",
+    "mmdebstrap": "mmdebstrap",
+    "tar2sqfs": "squashfs-tools-ng",
     "/usr/lib/python3/dist-packages/usb/core.py": "python3-usb",
 }
 
@@ -67,8 +74,8 @@ def kernel(folder: Path) -> tuple[Path, Path]:
     return found[-1], folder / "root/lib/modules" / release
 
 
-def load_order(modules: Path) -> list[Path]:
-    """Files of MODULES and of what they depend on, each after what it needs."""
+def load_order(modules: Path, names: Iterable[str]) -> list[Path]:
+    """Files of these modules and of what they depend on, each after what it needs."""
     files = {path.stem.replace("-", "_"): path for path in modules.rglob("*.ko")}
     order: list[Path] = []
 
@@ -82,13 +89,13 @@ def load_order(modules: Path) -> list[Path]:
                 add(one)
         order.append(path)
 
-    for name in MODULES:
+    for name in names:
         add(name)
     return order
 
 
-def initramfs(folder: Path, modules: Path, init: Path, job: str) -> Path:
-    """Packs busybox, modules and the first process; `job` is the line it reads."""
+def initramfs(folder: Path, order: list[Path], init: Path, job: str) -> Path:
+    """Packs busybox, modules, the first process and what is in folder/layer; `job` is the line that the first process reads."""
     root, packed = folder / "initramfs", folder / "initramfs.gz"
     shutil.rmtree(root, ignore_errors=True)
     for name in ("bin", "dev", "proc", "sys", "host", "modules"):
@@ -97,9 +104,36 @@ def initramfs(folder: Path, modules: Path, init: Path, job: str) -> Path:
     shutil.copy(init, root / "init")
     (root / "init").chmod(0o755)
     (root / "job").write_text(job + "\n")
-    order = load_order(modules)
     for path in order:
         shutil.copy(path, root / "modules" / path.name)
     (root / "modules/order").write_text("".join(f"{path.name}\n" for path in order))
-    _output("sh", "-c", f"find . | cpio --quiet -o -H newc | gzip -1 >'{packed}'", cwd=root)
+    if (folder / "layer").is_dir():
+        shutil.copytree(folder / "layer", root / "layer", symlinks=True)
+    _output("sh", "-c", f"find . | cpio --quiet -o -H newc -R +0:+0 | gzip -1 >'{packed}'", cwd=root)
+    return packed
+
+
+def apt_sources() -> str:
+    """This machine's sources of Debian packages, others left out."""
+    words = ["--format", "deb $(REPO_URI) $(RELEASE) $(COMPONENT)", "Created-By: Packages", "Origin: Debian"]
+    sources = sorted(set(_output("apt-get", "indextargets", *words).splitlines()))
+    if not sources:
+        raise MissingError("apt knows no source of Debian packages; name one in /etc/apt, then run: apt-get update")
+    return "\n".join(sources) + "\n"
+
+
+def debian(folder: Path) -> Path:
+    """A Debian with systemd as a squashfs file, made in `folder` by mmdebstrap once for a list of packages."""
+    packed, made_of = folder / "debian.sqfs", folder / "debian.packages"
+    packages = ",".join(ROOT_PACKAGES)
+    if not (packed.exists() and made_of.exists() and made_of.read_text() == packages):
+        folder.mkdir(parents=True, exist_ok=True)
+        made_of.unlink(missing_ok=True)
+        (folder / "sources.list").write_text(apt_sources())
+        options = ["--variant=essential", f"--include={packages}", "--skip=output/dev"]
+        options += [
+            f"--dpkgopt=path-exclude=/usr/share/{name}/*" for name in ("doc", "locale", "man", "info", "zoneinfo")
+        ]
+        _output("mmdebstrap", "--quiet", *options, "", str(packed), str(folder / "sources.list"))
+        made_of.write_text(packages)
     return packed

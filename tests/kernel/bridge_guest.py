@@ -1,0 +1,57 @@
+"""The first guest: a stock kernel, busybox and this machine's files meet the bridge over usbredir, then over USB/IP."""
+
+import sys
+import time
+from contextlib import ExitStack
+from pathlib import Path
+
+from guest import OUT, Device, Guest, Report, converse, pull_cable, qemu, redirected
+from image import MODULES, initramfs, kernel, load_order
+
+from whisker.protocol import LANES
+from whisker.simulation.bridge import program
+
+HERE = Path(__file__).resolve().parent
+NAME = "bridge"
+PROGRAMS = ("whisker-bridge-sim", "whiskerd", "kernel_usb_probe", "kernel_ring_probe")
+PROGRAMS += ("kernel_hid_probe_hidraw", "kernel_hid_probe_libusb")
+
+
+def shared() -> list[str]:
+    """Command of the bridge over USB/IP, as a user gives it."""
+    return [sys.executable, "-m", "whisker.cli", "bridge-sim", "--lanes", str(LANES), "--usbip", "0"]
+
+
+def guest_words(vmlinuz: Path, packed: Path, port: str) -> list[str]:
+    """The guest beside its devices: a network that ends at this machine, its files read-only."""
+    words = qemu(NAME, vmlinuz, packed, port)
+    words += ["-monitor", "none", "-netdev", "user,id=net", "-device", "virtio-net-pci,netdev=net,romfile="]
+    files = "local,path=/,mount_tag=host,security_model=none,readonly=on,multidevs=remap"
+    return [*words, "-virtfs", files]
+
+
+def obey(word: str, usbip_port: str) -> str:
+    """Do what the guest asks for; what it is answered."""
+    if word == "usbip":
+        return usbip_port
+    pull_cable(OUT, word)
+    return "done"
+
+
+def run(report: Report) -> None:
+    """From fetching the kernel to the guest's end."""
+    build = Path(program("whisker-bridge-sim")).resolve().parents[2]
+    for name in PROGRAMS:
+        program(name)
+    vmlinuz, modules = kernel(OUT / "debian")
+    packed = initramfs(
+        OUT / NAME, load_order(modules, MODULES), HERE / "guest_init.sh", f"{HERE / 'guest_checks.py'} {build}"
+    )
+    with ExitStack() as stack:
+        redirect = stack.enter_context(Device("usbredir", redirected(OUT), r"serving usbredir at \S+:(\d+)"))
+        share = stack.enter_context(Device("usbip", shared(), r"port (\d+)"))
+        began = time.monotonic()
+        guest = stack.enter_context(Guest(NAME, guest_words(vmlinuz, packed, redirect.place)))
+        report.note(f"booting {vmlinuz.name} with busybox")
+        converse(NAME, guest, lambda word: obey(word, share.place), report)
+        report.note(f"{NAME} guest ended after {time.monotonic() - began:.0f} s")
