@@ -50,11 +50,14 @@ static int sleep_on_lock(sd_bus_message *message, void *context, sd_bus_error *e
     return 0;
 }
 
+/* For sleep alone: logind up to version 252 at least asks polkit for lid switches where a lock names two things, which
+ * a service may not have. A shutdown is told all the same, and ends this process by SIGTERM before anything else
+ * freezes. */
 static void sleep_ask_lock(struct base_sleep *sleep)
 {
     sleep->asked =
         sd_bus_call_method_async(sleep->bus, NULL, LOGIND, LOGIND_PATH, LOGIND_MANAGER, "Inhibit", sleep_on_lock, sleep,
-                                 "ssss", "sleep:shutdown", "whisker-base", "stops the wheels first", "delay") >= 0;
+                                 "ssss", "sleep", "whisker-base", "stops the wheels first", "delay") >= 0;
 }
 
 static void sleep_tell(struct base_sleep *sleep, bool about_to)

@@ -2,10 +2,12 @@
 
 import os
 import pwd
+import re
 import signal
 import socket
 import stat
 import subprocess
+import sys
 import time
 from collections.abc import Callable
 from contextlib import contextmanager
@@ -20,6 +22,7 @@ RING = "whisker"
 FRAMES = 2000
 PROBE = Path(__file__).with_name("kernel_ring_probe")
 NOBODY = 65534
+ASLEEP = Path("/run/asleep")
 WHEELS_M_S = 0.1
 ORDER_S = 0.1  # an order lasts 0.3 s
 STILL_M = 0.002  # what a base may still tell when it stands
@@ -366,6 +369,40 @@ def base_frozen(_: Checks) -> str:
     return f"again after {took:.1f} s"
 
 
+def base_inhibits_sleep(_: Checks) -> str:
+    """logind knows the delay lock of each base, though neither runs as root."""
+
+    def locks() -> int:
+        listed = command("systemd-inhibit", "--list", "--no-legend", "--no-pager").splitlines()
+        return sum("whisker-base" in line and "sleep" in line and "delay" in line for line in listed)
+
+    await_that(lambda: locks() == len(BASES), "no delay lock of each base at logind")
+    return f"{locks()} locks"
+
+
+def tell_asleep() -> None:
+    """In place of the kernel's suspend: writes down what the base says at that time."""
+    told = health(BASES[0])
+    ASLEEP.write_text(f"held={told['held']} v={told['v_m_s']} omega={told['omega_rad_s']}")
+
+
+def base_stands_asleep(_: Checks) -> str:
+    """Suspended under way, by a commander that goes on giving orders: the wheels stand first, and turn again afterwards."""
+    suspend = Path("/etc/systemd/system/systemd-suspend.service.d/asleep.conf")
+    suspend.parent.mkdir(parents=True)
+    suspend.write_text(f"[Service]\nExecStart=\nExecStart=/usr/bin/python3 {__file__} {ASLEEP.name}\n")
+    command("systemctl", "daemon-reload")
+    with base_client(BASES[0]) as say:
+        say("mode safe")
+        with subprocess.Popen(["systemctl", "suspend"]) as suspending:
+            await_that(lambda: say(f"drive {WHEELS_M_S} 0") and ASLEEP.exists(), "the machine does not sleep")
+        require(suspending.returncode == 0, "systemctl suspend failed")
+        told = ASLEEP.read_text()
+        require(re.fullmatch(r"held=sleep v=-?0(\.0*)? omega=-?0(\.0*)?", told) is not None, told)
+        await_that(lambda: float(say(f"drive {WHEELS_M_S} 0").split()[2]) > 0, "the wheels stay held")
+    return told
+
+
 def base_unplugged(checks: Checks) -> None:
     """Enabled for a port, a base ends when the adapter is pulled and begins when it is plugged in."""
     unit = base_unit(BASES[1])
@@ -396,7 +433,7 @@ def main() -> None:
         checks.run(f"services {check.__name__}", check)
     for check in (bases_start, base_ports, base_access, base_stops_alone, base_driver_killed, base_killed, base_frozen):
         checks.run(f"services {check.__name__}", check)
-    for check in (base_unplugged, bases_stop):
+    for check in (base_inhibits_sleep, base_stands_asleep, base_unplugged, bases_stop):
         checks.run(f"services {check.__name__}", check)
     for line in command("dmesg").splitlines():
         talk.say("log", line)
@@ -404,4 +441,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    tell_asleep() if sys.argv[1:] == [ASLEEP.name] else main()

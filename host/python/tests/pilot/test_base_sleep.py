@@ -22,7 +22,7 @@ BUS = """\
   </policy>
 </busconfig>
 """
-LOCK = "lock sleep:shutdown whisker-base delay"
+LOCK = "lock sleep whisker-base delay"
 
 
 class Spoken:
