@@ -23,7 +23,7 @@ test: build lint ## everything that fits in 15 minutes on two cores
 test-all: test ## and what is long: sanitizers over the whole tree, longer fuzzing
 	@tools/run_tests.sh --long
 
-test-kernel: build ## a stock Debian kernel in QEMU meets the simulated bridge, over usbredir and USB/IP: two minutes and more
+test-kernel: build ## a stock Debian kernel in QEMU meets the simulated bridge, and systemd the services: five minutes and more
 	@WHISKER_BUILD=$(BUILD) $(PYTHON) tests/kernel/run.py
 
 test-hil: build ## hardware in the loop: a plugged bridge, a base: BASE=port [MODEL=2] [WHEELS_UP=1] [INTERACTIVE=1]

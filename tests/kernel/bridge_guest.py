@@ -13,6 +13,7 @@ from whisker.simulation.bridge import program
 
 HERE = Path(__file__).resolve().parent
 NAME = "bridge"
+FOLDER = OUT / NAME
 PROGRAMS = ("whisker-bridge-sim", "whiskerd", "kernel_usb_probe", "kernel_ring_probe")
 PROGRAMS += ("kernel_hid_probe_hidraw", "kernel_hid_probe_libusb")
 
@@ -34,7 +35,7 @@ def obey(word: str, usbip_port: str) -> str:
     """Do what the guest asks for; what it is answered."""
     if word == "usbip":
         return usbip_port
-    pull_cable(OUT, word)
+    pull_cable(FOLDER, word)
     return "done"
 
 
@@ -45,11 +46,11 @@ def run(report: Report) -> None:
         program(name)
     vmlinuz, modules = kernel(OUT / "debian")
     packed = initramfs(
-        OUT / NAME, load_order(modules, MODULES), HERE / "guest_init.sh", f"{HERE / 'guest_checks.py'} {build}"
+        FOLDER, load_order(modules, MODULES), HERE / "guest_init.sh", f"{HERE / 'guest_checks.py'} {build}"
     )
     with ExitStack() as stack:
-        redirect = stack.enter_context(Device("usbredir", redirected(OUT), r"serving usbredir at \S+:(\d+)"))
-        share = stack.enter_context(Device("usbip", shared(), r"port (\d+)"))
+        redirect = stack.enter_context(Device("bridge-usbredir", redirected(FOLDER), r"serving usbredir at \S+:(\d+)"))
+        share = stack.enter_context(Device("bridge-usbip", shared(), r"port (\d+)"))
         began = time.monotonic()
         guest = stack.enter_context(Guest(NAME, guest_words(vmlinuz, packed, redirect.place)))
         report.note(f"booting {vmlinuz.name} with busybox")

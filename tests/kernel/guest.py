@@ -84,6 +84,7 @@ class Device:
 
 def redirected(folder: Path) -> list[str]:
     """Command of the bridge over usbredir, whose cable is pulled by its socket."""
+    folder.mkdir(parents=True, exist_ok=True)
     (folder / "scene.flat").write_text(flat_scene(None, 1)[0])
     words = [program("whisker-bridge-sim"), "--scene", folder / "scene.flat", "--seconds", SECONDS]
     words += ["--lanes-populated", LANES, "--socket", folder / "cable.sock", "--usbredir", 0]

@@ -77,7 +77,7 @@ def obey(word: str) -> str:
     """Do what the guest asks for: plug, unplug (the bridge), plug create1, unplug create1."""
     order, _, device = word.partition(" ")
     if not device:
-        pull_cable(OUT, order)
+        pull_cable(FOLDER, order)
     elif order == "plug":
         monitor(f"device_add {adapter(device)}")
     else:
@@ -99,7 +99,7 @@ def run(report: Report) -> None:
     install(build)
     packed = initramfs(FOLDER, load_order(modules, MODULES), HERE / "services_init.sh", "")
     with ExitStack() as stack:
-        words = [*redirected(OUT), "--unplugged"]
+        words = [*redirected(FOLDER), "--unplugged"]
         bridge = stack.enter_context(Device("services-bridge", words, r"serving usbredir at \S+:(\d+)"))
         for name in CREATES:
             stack.enter_context(Device(name, create(name), r" at (\S+)"))
