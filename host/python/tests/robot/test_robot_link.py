@@ -1,6 +1,9 @@
 """Streams over zenoh: typed, numbered, found again after every loss, and honest about what was lost."""
 
+import argparse
+import subprocess
 import time
+from pathlib import Path
 
 import pytest
 from linkkit import free_endpoint, sample
@@ -8,8 +11,9 @@ from robotkit import Cable, examples, take_until
 
 from whisker.robot import inbox as inbox_module
 from whisker.robot import messages as m
+from whisker.robot import options
 from whisker.robot.inbox import TOPICS_MOST, Inbox, encoding_of
-from whisker.robot.link import MESSAGE_MOST, Link, LinkError, is_loopback
+from whisker.robot.link import MESSAGE_MOST, PILOT_ENDPOINT, Link, LinkError, is_loopback
 from whisker.robot.sources import STREAMS_MOST, Sources, Verdict
 from whisker.robot.streams import ENVELOPE, Envelope, EnvelopeError, Tally, envelopes, new_stream
 
@@ -423,3 +427,113 @@ def test_a_port_that_is_taken():
 def test_loopback():
     assert all(map(is_loopback, ["tcp/127.0.0.1:1", "tcp/[::1]:1", "tcp/localhost:1", "tcp/127.9.9.9:1"]))
     assert not any(map(is_loopback, ["tcp/0.0.0.0:1", "tcp/[::]:1", "tcp/192.168.0.1:1", "tcp/127.0.0.1.example:1"]))
+
+
+def opened(monkeypatch, capsys, *words: str) -> str:
+    """What a command's link with these options says on standard error. Nothing is opened."""
+    monkeypatch.setattr(options, "Link", lambda *arguments, **named: None)
+    parser = argparse.ArgumentParser()
+    options.add_link(parser, [PILOT_ENDPOINT], [])
+    options.open_link("pilot", parser.parse_args(words))
+    return capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "endpoint", ["tcp/0.0.0.0:7448", "tcp/[::]:7448", "tcp/192.168.7.2:7448", "tls/robot.lan:7448"]
+)
+def test_a_door_that_is_open_to_the_network_is_told(monkeypatch, capsys, endpoint):
+    text = f"whisker: {endpoint}: whoever reaches this address can watch and take part\n"
+    assert opened(monkeypatch, capsys, "--listen", endpoint) == text
+    assert opened(monkeypatch, capsys, "--listen", "tcp/127.0.0.1:1", "--listen", endpoint) == text
+
+
+@pytest.mark.parametrize(
+    "words", [[], ["--listen", "none"], ["--listen", "tcp/[::1]:7448"], ["--connect", "tcp/10.0.0.1:1"]]
+)
+def test_a_door_that_only_this_machine_reaches_is_not(monkeypatch, capsys, words):
+    assert opened(monkeypatch, capsys, *words) == ""
+
+
+def test_a_door_for_certificates_alone_is_not_open(monkeypatch, capsys, tmp_path):
+    file = tmp_path / "zenoh.json5"
+    for mutual, told in ((True, False), (False, True)):
+        file.write_text(f"{{transport: {{link: {{tls: {{enable_mtls: {str(mutual).lower()}}}}}}}}}  // JSON5")
+        words = ["--zenoh-config", str(file), "--listen", "tls/0.0.0.0:7448"]
+        assert bool(opened(monkeypatch, capsys, *words)) == told
+    assert "whoever reaches" in opened(monkeypatch, capsys, "--zenoh-config", str(file), "--listen", "tcp/0.0.0.0:7448")
+
+
+@pytest.mark.parametrize("text", ["{", "{transport: 5}", "\x00", "{unheard_of: 1}"])
+def test_what_is_no_configuration_of_zenoh_is_one_line(tmp_path, text):
+    file = tmp_path / "zenoh.json5"
+    file.write_text(text)
+    for path in (file, tmp_path / "none", tmp_path):
+        with pytest.raises(LinkError, match="no configuration of zenoh .*give a JSON5 file") as refused:
+            Link("pilot", config=path)
+        assert str(refused.value).startswith(f"{path}: ") and "\n" not in str(refused.value)
+
+
+def openssl(folder: Path, *words: str) -> None:
+    subprocess.run(["openssl", *words], cwd=folder, check=True, capture_output=True)
+
+
+KEY = ("-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes")
+
+
+def certificates(folder: Path, *names: str) -> None:
+    """An authority, and a key and certificate of it for each name: the commands of docs/remote.md."""
+    openssl(folder, "req", "-x509", *KEY, "-keyout", "ca.key", "-out", "ca.pem", "-days", "2", "-subj", "/CN=robot")
+    (folder / "san").write_text("subjectAltName=DNS:localhost,IP:127.0.0.1\n")
+    for name in names:
+        openssl(folder, "req", *KEY, "-keyout", f"{name}.key", "-out", f"{name}.csr", "-subj", f"/CN={name}")
+        signed = ("-CA", "ca.pem", "-CAkey", "ca.key", "-CAcreateserial", "-days", "2", "-extfile", "san")
+        openssl(folder, "x509", "-req", "-in", f"{name}.csr", *signed, "-out", f"{name}.pem")
+
+
+def documented(folder: Path, name: str) -> Path:
+    """The configuration of docs/remote.md with this folder's certificates in place of those it names."""
+    text = (Path(__file__).parents[4] / "docs/remote.md").read_text()
+    example = text.partition("```json5\n")[2].partition("```")[0]
+    assert "access_control" in example
+    file = folder / f"{name}.json5"
+    file.write_text(example.replace("/etc/whisker/own", str(folder / name)).replace("/etc/whisker", str(folder)))
+    return file
+
+
+@pytest.fixture(scope="module")
+def keys(tmp_path_factory):
+    """Certificates of pilot, navigator and view."""
+    folder = tmp_path_factory.mktemp("keys")
+    certificates(folder, "pilot", "navigator", "view")
+    return folder
+
+
+def test_with_the_documented_configuration_only_the_pilot_gives_rows(keys):
+    """TLS lets nobody in without a certificate; access control lets each do what its certificate is for."""
+    end = free_endpoint().replace("tcp/", "tls/")
+    port = end.rpartition(":")[2]
+
+    def link(name, config, **ends):
+        return Link(name, config=config and documented(keys, config), lock_step=True, **ends)
+
+    with link("navigator", "navigator", listen=[end]) as navigator:
+        inbox = navigator.subscribe("observation")
+        navigator.announce()
+        way = [f"tls/localhost:{port}"]
+        with (
+            link("stranger", None, connect=way) as stranger,
+            link("pilot", "view", connect=way) as guest,
+            link("pilot", "pilot", connect=way) as pilot,
+        ):
+            assert guest.wait_for(["navigator"], PATIENCE_S) and pilot.wait_for(["navigator"], PATIENCE_S)
+            guest.announce()
+            forged, honest, unheard = (x.publish("observation") for x in (guest, pilot, stranger))
+            for seq in range(20):
+                forged.send(row(seq))
+                unheard.send(row(seq))
+                honest.send(row(seq))
+            assert seqs(take_until(inbox, lambda got: len(got) == 20)) == list(range(20))
+            assert (inbox.refused, inbox.tallies["observation"].restarts) == (0, 0)
+            assert "navigator" not in stranger.peers and "pilot" not in navigator.peers
+            pilot.announce()
+            assert navigator.wait_for(["pilot"], PATIENCE_S)
