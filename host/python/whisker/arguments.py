@@ -3,6 +3,7 @@
 import argparse
 import math
 import pwd
+import sys
 from collections.abc import Callable
 
 from .errors import UserError
@@ -23,6 +24,11 @@ class Parser(argparse.ArgumentParser):
     def show_example(self, command_line: str) -> None:
         """End the help with this."""
         self.epilog = f"example:\n  {command_line}"
+
+
+def warn(line: str) -> None:
+    """What a command goes on in spite of, on standard error."""
+    print(f"whisker: warning: {line}", file=sys.stderr)
 
 
 def add_action(actions, name: str, text: str, example: str, run) -> Parser:

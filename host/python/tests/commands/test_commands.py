@@ -149,6 +149,9 @@ def test_replay_warns_of_a_damaged_recording(capsys, tmp_path):
     path.write_bytes(path.read_bytes()[:-50])
     code, out, err = run(capsys, "replay", path, "--ring", name, "--speed", "max", "--lead", 0)
     assert code == 0 and "4000 frames replayed" in out and "whisker: warning: " in err and err.count("\n") == 1
+    path.write_bytes(path.read_bytes()[:1000] + bytes(4096) + path.read_bytes()[5096:])
+    code, out, err = run(capsys, "replay", path, "--ring", name, "--speed", "max", "--lead", 0)
+    assert "its checksum is wrong" in err or "cannot be unpacked" in err
 
 
 def test_top_draws_in_a_terminal_and_leaves_it_as_it_was():

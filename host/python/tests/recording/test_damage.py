@@ -200,3 +200,12 @@ def test_damage_is_listed_up_to_a_bound(tmp_path):
 def test_no_more_is_lost_than_was_hit_and_none_of_it_unsaid():
     counts = fuzz(240, seed=5)
     assert sum(counts.values()) == 240 and any("lost and counted" in what for what in counts)
+
+
+def test_metadata_that_disagree_are_told_of_a_file_that_was_cut_off(tmp_path, whole):
+    data = whole[0][: whole[1][-1][1]]
+    place = data.index(b"left,right")
+    _, damage = look(tmp_path / "a.mcap", flip(data, place, 0))
+    assert "its metadata records disagree; the later one counts" in damage
+    _, damage = look(tmp_path / "a.mcap", data)
+    assert not any("disagree" in line for line in damage)

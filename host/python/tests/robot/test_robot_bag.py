@@ -160,6 +160,26 @@ def test_bags_that_no_scene_can_be_made_from(scene, tmp_path, capsys):
     assert code == 2 and "no recording with observation rows" in err
 
 
+def test_a_damaged_bag_gives_a_scene_and_a_warning(bag, scene, tmp_path, capsys):
+    """A page of zeros at the beginning, where the magic, the metadata and the first rows are."""
+    damaged = tmp_path / "a.mcap"
+    messages, _ = sent(scene)
+    with TopicWriter(
+        damaged, RECORD, {"robot": "r2"} | {file.name: file.read_text() for file in scene[0].glob("*.toml")}
+    ) as writer:
+        take = Bag(writer, "r2")
+        for n, row in enumerate(messages):
+            take.take([Received("observation", row, Envelope(1, n, 0))])
+            writer.flush()
+        writer.finish()
+    damaged.write_bytes(bytes(4096) + damaged.read_bytes()[4096:])
+    code, out, err = run(capsys, "scene", "from", damaged, "--out", tmp_path / "b")
+    lines = err.splitlines()
+    rows = int(out.split()[-2])
+    assert code == 0 and 0 < rows < ROWS and all(line.startswith("whisker: warning: ") for line in lines)
+    assert any(f"/r2/observation: {ROWS - rows} of {ROWS} messages are lost" in line for line in lines)
+
+
 def test_log_times_follow_the_bridge_and_outlive_it():
     clock, began, second = BagClock(10**18), 10**18, 10**9
     assert clock.other(3 * second) == began

@@ -1,9 +1,8 @@
 """`whisker replay`: from a recording to a ring (whisker.recording.replay)."""
 
 import argparse
-import sys
 
-from ..arguments import RING, number_above, seconds, whole_number
+from ..arguments import RING, number_above, seconds, warn, whole_number
 from ..bridge.ring import CAPACITY, Writer
 from ..recording import read
 from ..recording.replay import Replay
@@ -37,7 +36,7 @@ def run(arguments) -> int:
         stop.wait(arguments.lead)
         replay.run(stop)
         for line in recording.damage:
-            print(f"whisker: warning: {line}", file=sys.stderr)
+            warn(line)
     print(f"ring {arguments.ring}: {replay.frames} frames replayed")
     return 0
 

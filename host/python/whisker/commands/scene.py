@@ -1,7 +1,7 @@
 """`whisker scene`: draws level-0 scenes of a family, or makes one of a recording (whisker.scenes)."""
 
 from .. import scenes
-from ..arguments import add_action
+from ..arguments import add_action, warn
 from ..nav.filters import SettingError
 from ..tables import unwritable
 
@@ -38,7 +38,7 @@ def make(arguments) -> int:
 
 
 def from_recording(arguments) -> int:
-    scene, observations = scenes.read_recording(arguments.recording)
+    scene, observations = scenes.read_recording(arguments.recording, warn)
     _write(arguments.out, scene, observations)
     print(f"{arguments.out}: from {arguments.recording}, {len(observations)} rows")
     return 0

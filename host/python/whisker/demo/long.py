@@ -18,6 +18,7 @@ import numpy as np
 from tqdm import tqdm
 
 from .. import scene as scenes
+from ..arguments import warn
 from ..nav import localise
 from ..nav.observations import cell
 from ..nav.scoring import position_errors
@@ -171,7 +172,10 @@ def contacts_told(path: Path) -> int:
     """Onsets in a bag."""
     with McapFile(path) as bag:
         told = (m for m in bag.messages() if m.topic.endswith(CONTACT_TOPIC))
-        return sum(decode(Contact, bytes(m.data), m.topic).touching for m in told)
+        onsets = sum(decode(Contact, bytes(m.data), m.topic).touching for m in told)
+        for line in bag.damage:
+            warn(line)
+        return onsets
 
 
 def tell(s: dict) -> None:

@@ -18,7 +18,6 @@ __all__ = ["MAGIC", "NUMBERED", "McapFile", "Message", "RecordingError"]
 
 DAMAGE_MOST = 100  # lines of damaged places, and as many of what is lost by them
 METADATA_MOST = 1 << 22  # bytes of all metadata records together
-INDEX_DAMAGED = "the index at its end is damaged"
 SEARCHED = 1 << 24  # bytes in which a file that does not begin as MCAP does must show a record of one
 
 
@@ -36,7 +35,7 @@ class McapFile:
         self.metadata: dict[str, dict[str, str]] = {}
         self.versions: list[tuple[str, dict[str, str]]] = []  # (name, content) of each metadata record
         self._metadata_room = METADATA_MOST
-        self._ends = self._is_index_whole = False
+        self._ends = self._is_finished = self._is_index_whole = False
         self._channels: dict[int, Channel] = {}  # of the index
         try:
             self._file: BinaryIO = open(path, "rb")  # noqa: SIM115 - closed by close()
@@ -81,8 +80,7 @@ class McapFile:
         self.damage = []
         reading = Reading(self._walk, self._channels, self._is_index_whole, self.note)
         yield from reading.messages()
-        if self._ends and not self._is_index_whole:
-            self.note(INDEX_DAMAGED)
+        self._check_end()
         if not self.damage:
             reading.check_rest()
         self.damage += [f"{self.path}: {line}" for line in islice(reading.losses(), DAMAGE_MOST)]
@@ -95,13 +93,14 @@ class McapFile:
             if record.opcode == METADATA:
                 self._note_metadata(record)
             elif record.opcode == DATA_END:
-                summary = record.end
+                summary, self._is_finished = record.end, True
             elif record.opcode == CHANNEL:
                 with suppress(Damaged):  # then the index's checksum is wrong too
                     add_channel(self._channels, self._walk.body(record))
             elif record.opcode == FOOTER:
                 self._ends = True
                 self._check_index(summary, record)
+        self._check_end()
 
     def _is_mcap(self) -> bool:
         """By its first or last bytes, or by anything else that only such files have."""
@@ -115,7 +114,15 @@ class McapFile:
         self._is_index_whole = not crc or self._walk.crc(summary, footer.end - 4) == crc
         if not self._is_index_whole:
             self._channels.clear()
-            self.note(INDEX_DAMAGED)
+
+    def _check_end(self) -> None:
+        """What is wrong with index and metadata. A finished file may know more at its end; one cut off says things twice."""
+        if self._ends and not self._is_index_whole:
+            self.note("the index at its end is damaged")
+        if not (self._ends or self._is_finished) and any(
+            content != self.metadata[name] for name, content in self.versions
+        ):
+            self.note("its metadata records disagree; the later one counts")
 
     def _note_metadata(self, record: Record) -> None:
         self._metadata_room -= record.size

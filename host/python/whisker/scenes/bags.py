@@ -1,13 +1,14 @@
 """Scenes from a robot's bag (whisker.robot.bag): the rows that came, and the truth where a simulation told it."""
 
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
 from ..errors import UserError
 from ..nav.observations import TRUTH, cell, observations_path, read_observations
-from ..recording.mcapfile import MAGIC, McapFile
+from ..recording.mcapfile import McapFile, RecordingError
 from ..robot.bag import RECORD, SCENE_FILES
 from ..robot.inbox import Received
 from ..robot.messages import MessageError, Observation, PoseStamped, decode
@@ -21,15 +22,16 @@ class BagError(UserError):
 
 
 def is_bag(path: Path) -> bool:
-    """Whether a file begins as a bag does."""
-    if not path.is_file():
+    """Whether there is anything of a bag in a file."""
+    try:
+        with McapFile(path):
+            return True
+    except RecordingError:
         return False
-    with path.open("rb") as file:
-        return file.read(len(MAGIC)) == MAGIC
 
 
-def read_bag(path: Path):
-    """(scene, rows) of a bag; BagError when it holds none."""
+def read_bag(path: Path, warn: Callable[[str], None]):
+    """(scene, rows) of a bag, each damage told to `warn`; BagError when it holds none."""
     with McapFile(path) as bag:
         told = bag.metadata.get(RECORD, {})
         robot = told.get("robot", "")
@@ -38,6 +40,8 @@ def read_bag(path: Path):
         for message in bag.messages():
             if message.topic in wanted:
                 found[message.topic] += _decoded(bag, wanted[message.topic], message)
+        for line in bag.damage:
+            warn(line)
     rows, truth = found.values()
     missing = [name for name in SCENE_FILES[:2] if name not in told]
     if missing or not rows:

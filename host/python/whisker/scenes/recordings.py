@@ -16,27 +16,31 @@ class RecordingKindError(UserError):
     """What is no recording that a scene can be made from; one line."""
 
 
-def read_recording(path) -> tuple[Scene, Observations]:
+Warn = Callable[[str], None]
+
+
+def read_recording(path, warn: Warn = lambda line: None) -> tuple[Scene, Observations]:
     """The scene a recording was made in and its rows; a start that the recording does not tell is uniform.
 
-    RecordingKindError for what no reader knows; SceneError and TableError for a recording whose files are broken.
+    `warn` takes a line for each damage that cost rows or may have. RecordingKindError for what no reader knows;
+    SceneError and TableError for a recording whose files are broken.
     """
     path = Path(path)
     for knows, read in READERS:
         if knows(path):
-            return read(path)
+            return read(path, warn)
     raise RecordingKindError(
         f"{path}: no recording with observation rows; give the folder of a run (it holds {RUN_SCENE}/), its bag, or a scene"
     )
 
 
-def _read_folder(folder: Path) -> tuple[Scene, Observations]:
+def _read_folder(folder: Path, warn: Warn) -> tuple[Scene, Observations]:
     scene = load(folder)
     return _with_prior(scene, read_observations(observations_path(folder), scene))
 
 
-def _read_bag(path: Path) -> tuple[Scene, Observations]:
-    return _with_prior(*read_bag(path))
+def _read_bag(path: Path, warn: Warn) -> tuple[Scene, Observations]:
+    return _with_prior(*read_bag(path, warn))
 
 
 def _with_prior(scene: Scene, rows: Observations) -> tuple[Scene, Observations]:
@@ -51,9 +55,9 @@ def _is_run(path: Path) -> bool:
     return _is_folder_of_rows(path / RUN_SCENE)
 
 
-def _read_run(path: Path) -> tuple[Scene, Observations]:
-    return _read_folder(path / RUN_SCENE)
+def _read_run(path: Path, warn: Warn) -> tuple[Scene, Observations]:
+    return _read_folder(path / RUN_SCENE, warn)
 
 
-Reader = tuple[Callable[[Path], bool], Callable[[Path], tuple[Scene, Observations]]]
+Reader = tuple[Callable[[Path], bool], Callable[[Path, Warn], tuple[Scene, Observations]]]
 READERS: list[Reader] = [(_is_run, _read_run), (_is_folder_of_rows, _read_folder), (is_bag, _read_bag)]
