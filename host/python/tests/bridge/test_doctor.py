@@ -10,7 +10,7 @@ from commandkit import END_S, STATS, live_ring, run, signals_as_before  # noqa: 
 from rings import make_frames, ring_name
 
 from whisker.bridge import doctor
-from whisker.bridge.ring import Reader, Writer
+from whisker.bridge.ring import FoundRing, Reader, Writer
 
 
 @pytest.fixture
@@ -124,11 +124,19 @@ def test_doctor_finds_rings_left_behind(tmp_path):
     program = f"import os; from whisker.bridge.ring import Writer; w = Writer('{name}', 64); os._exit(0)"
     subprocess.run([sys.executable, "-c", program], check=True, timeout=END_S)
     try:
-        found = doctor.stale_rings(doctor.Path("/dev/shm"), "whisker")
-        assert any(f"ring {name} was left behind" in f.text and f"rm /dev/shm/{name}" in f.remedy for f in found)
+        found = doctor.stale_rings("whisker")
+        assert any(f"ring {name} of user " in f.text and f.remedy == f"remove it: rm /dev/shm/{name}" for f in found)
         assert "died" in worst(doctor.stream(name, 0.01))[0].text
     finally:
         os.unlink(f"/dev/shm/{name}")
+
+
+def test_doctor_names_whose_ring_was_left_behind(monkeypatch):
+    left = [FoundRing("whisker", "/dev/shm/whisker", owner, "WRITER_DEAD") for owner in ("4242", "root")]
+    monkeypatch.setattr(doctor, "found_rings", lambda: left)
+    monkeypatch.setattr(os, "geteuid", lambda: 4242)
+    (found,) = doctor.stale_rings("whisker")  # its own whiskerd replaces the first
+    assert "of user root" in found.text and found.remedy == "remove it: sudo rm /dev/shm/whisker"
 
 
 def test_doctor_exits_with_what_it_found(capsys):

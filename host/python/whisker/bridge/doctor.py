@@ -12,7 +12,7 @@ import numpy as np
 
 from ..protocol import LANES, LIMITS, WIRE_VERSION
 from . import usbtree
-from .ring import DaemonStats, Reader, RingError, error_line
+from .ring import DaemonStats, Reader, RingError, error_line, found_rings, user_name
 from .status import explain
 
 OK, WARN, FAIL = "ok", "warn", "FAIL"
@@ -24,7 +24,6 @@ RULES = (
     "lib/udev/rules.d",
 )
 LIBRARIES = {"usb-1.0": "libusb-1.0-0", "hidapi-libusb": "libhidapi-libusb0"}  # as linked: as Debian calls it
-RING_MAGIC = b"WHSKRING"
 LOOK_S = 0.5  # how long frames are watched
 ROOM_BYTES = 16 << 20  # of shared memory; a ring of the default size takes 2 MiB
 
@@ -50,7 +49,7 @@ def examine(ring: str, root: Path = Path("/"), look_s: float = LOOK_S) -> list[F
     frames = stream(ring, look_s)
     if not any(finding.level == FAIL for finding in frames):
         before = [replace(finding, level=WARN) if finding.level == FAIL else finding for finding in before]
-    return [*before, *frames, *stale_rings(root / "dev/shm", ring)]
+    return [*before, *frames, *stale_rings(ring)]
 
 
 def libraries() -> list[Finding]:
@@ -122,7 +121,7 @@ def stream(ring: str, look_s: float) -> list[Finding]:
     """The ring, its daemon, and the frames in it."""
     try:
         with Reader(ring) as reader:
-            out = [Finding(OK, f"ring {ring}: written by process {reader.info.writer_pid}")]
+            out = [Finding(OK, f"ring {ring} of user {reader.owner}: written by process {reader.info.writer_pid}")]
             out += daemon(reader.stats)
             return out + samples(reader, look_s)
     except RingError as error:
@@ -185,28 +184,12 @@ def _watch(reader: Reader, look_s: float) -> np.ndarray:
     return np.concatenate(kept) if kept else reader.peek()[:0]
 
 
-def stale_rings(shared: Path, ring: str) -> list[Finding]:
-    """Rings whose writer has died; a new writer of the same name replaces them, another name leaves them lying."""
+def stale_rings(ring: str) -> list[Finding]:
+    """Rings whose writer has died; a new writer of the same name and user replaces them, others leave them lying."""
     out = []
-    for path in sorted(shared.iterdir()) if shared.is_dir() else []:
-        if path.name != ring and _is_ring(path) and _is_dead(path.name):
-            out.append(
-                Finding(WARN, f"ring {path.name} was left behind by a writer that died", f"remove it: rm {path}")
-            )
+    for found in found_rings():
+        if found.error == "WRITER_DEAD" and (found.name != ring or found.owner != user_name(os.geteuid())):
+            remove = "rm" if found.owner == user_name(os.geteuid()) else "sudo rm"
+            text = f"ring {found.name} of user {found.owner} was left behind by a writer that died"
+            out.append(Finding(WARN, text, f"remove it: {remove} {found.path}"))
     return out
-
-
-def _is_ring(path: Path) -> bool:
-    try:
-        with open(path, "rb") as file:
-            return file.read(len(RING_MAGIC)) == RING_MAGIC
-    except OSError:
-        return False
-
-
-def _is_dead(name: str) -> bool:
-    try:
-        Reader(name).close()
-    except RingError as error:
-        return error.name == "WRITER_DEAD"
-    return False
