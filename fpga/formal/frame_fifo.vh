@@ -53,11 +53,12 @@ always @(posedge clk) if (f_past && !$past(rst)) begin
     if ($past(refill && !empty && read_at == f_where)) assert ({out_last, out_data} == $past(f_what));
 end
 
-// A frame is dropped exactly when its first byte finds no room and it may be dropped; it is counted once.
+// A frame is dropped exactly when fewer bytes than it has are free at its first byte and it may be dropped; it is counted
+// once. If it may not, it waits exactly as long.
+wire f_fits = DEPTH - f_committed >= FRAME;
 always @* if (f_past && !rst) begin
-    assert (dropped == (taken && in_first && !room));
-    if (in_keep && in_valid) assert (!dropped);
-    if (in_valid && !in_first) assert (in_ready);
+    assert (dropped == (in_valid && in_first && !f_fits && !in_keep));
+    if (in_valid) assert (in_ready == (!in_first || f_fits || !in_keep));
 end
 
 always @* if (f_past) cover (out_valid && out_last && out_ready);

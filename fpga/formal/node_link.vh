@@ -74,4 +74,4 @@ always @* if (f_past) begin
     if (bit_begins) assert (bit_to_send == next_bit);
 end
 
-always @* if (f_past) cover (service_done);
+always @* if (f_past) cover (capture);

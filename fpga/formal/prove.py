@@ -22,11 +22,13 @@ TOOLS = ("yosys", "yosys-smtbmc", "yices-smt2")
 
 @dataclass(frozen=True)
 class Proof:
-    """A module with its properties. `depth` counts cycles from reset, `induction` the steps of the induction."""
+    """A module with its properties. `depth` counts cycles from reset, `induction` the steps of the induction, `cover` the
+    cycles from reset within which what the properties speak of can happen."""
 
     module: str
     depth: int
     induction: int
+    cover: int
     parameters: dict[str, int] = field(default_factory=dict)
     also: tuple[str, ...] = ()  # other modules it is made of
     mutations: tuple[tuple[str, str], ...] = ()  # text in the module, what to put in its place
@@ -40,9 +42,12 @@ PROOFS = {
             "frame_fifo",
             depth=16,
             induction=3,
+            cover=16,
             parameters={"ADDRESS_BITS": 4, "FRAME_BYTES": 4},
             mutations=(
                 ("used <= DEPTH - FRAME", "used <= DEPTH - FRAME + ONE"),
+                ("used <= DEPTH - FRAME", "used < DEPTH - FRAME"),
+                ("used <= DEPTH - FRAME", "used <= DEPTH - FRAME - FRAME"),
                 ("commit_at <= write_at + ONE", "commit_at <= write_at"),
                 ("if (!empty) read_at <= read_at + ONE", "read_at <= read_at + ONE"),
                 ("taken && !drop) memory", "taken) memory"),
@@ -51,8 +56,9 @@ PROOFS = {
         ),
         Proof(
             "framer",
-            depth=12,
+            depth=6,
             induction=2,
+            cover=45,
             parameters={"LANES": 2},
             also=("crc8",),
             mutations=(
@@ -60,12 +66,34 @@ PROOFS = {
                 ("LIMIT_LANES[4:0] - 5'd1", "LANES[4:0] - 5'd1"),
                 ("out_last  <= frame_ends", "out_last  <= at_crc"),
                 ("(!out_valid || out_ready)", "1'b1"),
+                ("record_code == CODE_OK", "record_code != CODE_OK"),
+                ("out_keep <= is_last", "out_keep <= 1'b0"),
+                ("gone[0] ? CODE_ABSENT[5:0]", "gone[0] ? CODE_LINK_CRC[5:0]"),
+                ("stale   <= tick_wrong", "stale   <= {LANES{1'b0}}"),
+                (".clear(start || (make && at_crc))", ".clear(start)"),
+                ("in_header && (at_byte == 5'd0)", "in_header"),
+            ),
+        ),
+        Proof(
+            "lane_receiver",
+            depth=10,
+            induction=2,
+            cover=70,
+            parameters={"LANES": 2},
+            mutations=(
+                ("tick_wrong <= tick_wrong | (bits ^ {LANES{tick[7]}})", "tick_wrong <= bits ^ {LANES{tick[7]}}"),
+                ("{tick[6:0], 1'b0}", "tick"),
+                ("RECORD_TICK[2:0])", "RECORD_STATUS[2:0])"),
+                ("absent & bits", "bits"),
+                ("lower ^ (feedback", "lower ^ (bits"),
+                ("if (clear) crc[i]", "if (rst) crc[i]"),
             ),
         ),
         Proof(
             "node_link",
             depth=60,
             induction=2,
+            cover=60,
             mutations=(
                 ("else if (!waited) wait_left", "else if (!waited && state != GAP) wait_left"),
                 ("word_ends) state <= GAP", "word_ends) state <= SETUP"),

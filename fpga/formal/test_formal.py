@@ -28,7 +28,7 @@ def test_proof_notices(proof, mutation, tmp_path):
     assert not holds(proof, tmp_path, mutation)
 
 
-def test_properties_can_be_met(tmp_path):
+@pytest.mark.parametrize("proof", PROOFS.values(), ids=list(PROOFS))
+def test_properties_can_be_met(proof, tmp_path):
     """The assumptions leave room: what the properties cover is reached."""
-    proof = PROOFS["frame_fifo"]
-    assert verdict(model(proof, tmp_path), "cover", "-c", "-t", proof.depth)
+    assert verdict(model(proof, tmp_path), "cover", "-c", "-t", proof.cover)
