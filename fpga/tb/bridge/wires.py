@@ -3,7 +3,7 @@
 import random
 
 import cocotb
-from bench import error_record, pulse, record
+from bench import error_record, pulse, record, wrong_tick
 from cocotb.triggers import ClockCycles, FallingEdge
 from rig import FAST, FIFO_FRAMES, answer, begin, told
 
@@ -59,7 +59,7 @@ async def every_lane_gets_every_verdict(dut):
         verdicts = [VERDICTS[(lane + tick) % len(VERDICTS)] for lane in range(LANES)]
         good = [record(tick, random.getrandbits(16), random.getrandbits(16)) for _ in range(LANES)]
         sent = {"ok": lambda r: r, "absent": lambda r: b"\xff" * 8, "link_crc": lambda r: r[:7] + bytes([r[7] ^ 1])}
-        sent["link_tick"] = lambda r, tick=tick: record(tick + 1)
+        sent["link_tick"] = lambda r, tick=tick: record(wrong_tick(tick), random.getrandbits(16))
         on_the_wire = {lane: sent[verdict](good[lane]) for lane, verdict in enumerate(verdicts)}
         _, found = await framed(rig, on_the_wire)
         assert found == [r if v == "ok" else error_record(tick, v) for r, v in zip(good, verdicts, strict=True)]

@@ -11,6 +11,7 @@ from whisker.protocol import CODES, FRAME_BYTES, FRAME_FLAGS, FRAME_HEADER, LANE
 ALL = (1 << LANES) - 1
 FIFO_FRAMES = LIMITS["fifo_bytes"] // FRAME_BYTES
 CYCLES_PER_FRAME = FRAME_BYTES + 4
+DEPTH = LIMITS["fifo_bytes"]
 
 
 class Stream:
@@ -212,6 +213,28 @@ async def overflow_drops_whole_frames_and_counts(dut, stall):
     await finished(dut)
     await drained(dut, stream)
     assert stream.frames() == sent[:FIFO_FRAMES] + [packed(f, False)]
+
+
+@cocotb.test(timeout_time=2, timeout_unit="ms")
+async def a_frame_fits_exactly_when_its_bytes_are_free(dut):
+    """Any fill, by presetting the pointers: one byte too few drops a frame, or makes the last of a run wait."""
+    await begin(dut, 0.0)
+    drops: list[int] = []
+    cocotb.start_soon(count_drops(dut, drops))
+    edges = (0, FRAME_BYTES - 1, FRAME_BYTES, FRAME_BYTES + 1, DEPTH)
+    for free in (*edges, *edges, *(random.randrange(DEPTH + 1) for _ in range(20))):
+        end, is_last = random.randrange(2 * DEPTH), random.random() < 0.5
+        for name, value in {"write_at": end, "commit_at": end, "read_at": (end + DEPTH + free) % (2 * DEPTH)}.items():
+            getattr(dut.dut_fifo, name).value = value
+        dut.dut_fifo.out_valid.value = 1
+        drops.clear()
+        await send(dut, random_frame(0), is_last)
+        for _ in range(8):
+            await RisingEdge(dut.clk)
+        fits = free >= FRAME_BYTES
+        assert (int(dut.dut_fifo.write_at.value) != end) == fits, f"{free} bytes free, last: {is_last}"
+        assert len(drops) == int(not fits and not is_last), f"{free} bytes free, last: {is_last}"
+        await pulse(dut, dut.rst)
 
 
 @cocotb.test(timeout_time=5, timeout_unit="ms")
