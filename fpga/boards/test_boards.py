@@ -1,6 +1,7 @@
 """Boards: what their files say, that synthesis is clean, that timing problems are noticed; place and route with --long."""
 
 import json
+import re
 import sys
 from pathlib import Path
 
@@ -34,6 +35,41 @@ def test_every_port_has_a_pin_of_its_own(name):
     assert 'FREQUENCY PORT "clk_60" 60 MHZ;' in lpf
     text = (HERE / f"{board.top}.v").read_text()
     assert all(f" {port}," in text or f" {port}\n" in text for port in board.pins)
+
+
+DOCS = (build.REPO / "docs" / "boards.md").read_text()
+
+
+def table(after: str) -> list[list[str]]:
+    """Cells of the first table after this text of docs/boards.md, the rule under its head left out."""
+    lines = DOCS[DOCS.index(after) :].splitlines()
+    first = next(n for n, line in enumerate(lines) if line.startswith("|"))
+    rows = [line.strip("|") for line in lines[first : lines.index("", first)]]
+    return [[cell.strip() for cell in row.split("|")] for row in rows if not set(row) <= set("|-")]
+
+
+def balls(cell: str) -> list[str]:
+    """`Pmod 0: T25, U25` or `Pmod A 1, 2 (C9, B9)`: what stands behind the socket's name."""
+    return re.findall(r"[A-Z]\d+", re.split(r"[:(]", cell)[1])
+
+
+@pytest.mark.parametrize("name", build.boards())
+def test_pins_are_those_that_the_page_tells_to_solder(name):
+    """Two writings of the same wires: a slip in one of them is a swapped lane on a bench."""
+    head, *rows = table("## Pins\n")
+    board = build.load(name)
+    column = next(n for n, title in enumerate(head) if board.title.startswith(title))
+    told = [ball for row in rows for ball in balls(row[column])]
+    assert told == [board.pins[wire] for wire in ("sync", "sck", "select_n", "mosi")] + board.pins["miso"]
+
+
+def test_the_i9s_phy_is_wired_as_the_page_tells():
+    _, *rows = table("### Wiring a USB3300 module")
+    told = {row[at]: row[at + 1] for row in rows for at in (0, 3) if re.fullmatch(r"[A-Z]\d+", row[at + 1])}
+    pins = build.load("colorlight_i9").pins
+    wires = {"CLKOUT": "clk_60", "DIR": "ulpi_dir", "NXT": "ulpi_nxt", "STP": "ulpi_stp", "RESET": "ulpi_reset"}
+    wanted = {theirs: pins[ours] for theirs, ours in wires.items()}
+    assert told == wanted | {f"D{bit}": ball for bit, ball in enumerate(pins["ulpi_data"])}
 
 
 def test_what_a_board_has_not_is_refused():

@@ -31,7 +31,13 @@ async def a_service_order_goes_out_once_and_brings_the_answers_to_the_one_before
     assert (header["pending"], header["sequence"]) == (0, 1)
     assert await rig.step() <= CYCLES_PER_TICK, "the order went out once"
     assert await rig.host.order(0)
-    rig.nodes.answers = {0: answer(3, 4, 0), 1: answer(3, 4, 1), 2: answer(wrong_tick(3), 4, 2), 3: b"\0" * 8, 13: answer(3, 4, 13)}
+    rig.nodes.answers = {
+        0: answer(3, 4, 0),
+        1: answer(3, 4, 1),
+        2: answer(wrong_tick(3), 4, 2),
+        3: b"\0" * 8,
+        13: answer(3, 4, 13),
+    }
     rig.nodes.answers |= {lane: answer(3, 4, lane) for lane in range(18, 28)}
     await rig.step()
     _, found = await rig.host.answers(stalls)

@@ -17,8 +17,8 @@ class UlpiPhy:
 
     RESET_CYCLES = 200
 
-    def __init__(self, dut, seed: int, stall: float = 0.0, late: int = 0, deaf: int = 0):
-        self.dut, self.random, self.stall, self.deaf = dut, random.Random(seed), stall, deaf
+    def __init__(self, dut, stall: float = 0.0, late: int = 0, deaf: int = 0):
+        self.dut, self.stall, self.deaf = dut, stall, deaf
         self.waiting = deque()  # (dir, nxt, data) per cycle
         self.busy = late  # cycles during which dir is high and nothing is said
         self.registers, self.writes = {OTG_CONTROL: 0x06, FUNCTION_CONTROL: 0x41}, []
@@ -45,12 +45,12 @@ class UlpiPhy:
         if not active_by_nxt:
             self.waiting.append((1, 0, status))
         for byte in packet:
-            while self.random.random() < gaps:
+            while random.random() < gaps:
                 self.waiting.append((1, 0, status))
             self.waiting.append((1, 1, byte))
         if error:
             self.waiting.append((1, 0, status | 0x20))
-        if not active_by_nxt or self.random.random() < 0.5:
+        if not active_by_nxt or random.random() < 0.5:
             self.waiting.append((1, 0, VBUS_VALID | self.line))
 
     # --- what the link says
@@ -121,20 +121,20 @@ class UlpiPhy:
         """A packet from the bus waits for the link's own unless it shall interrupt it."""
         if self.command is None:
             return True
-        return self.interrupt is not None and self.random.random() < self.interrupt
+        return self.interrupt is not None and random.random() < self.interrupt
 
     def say(self, dir_: int, nxt: int, data: int | None) -> tuple[int, int]:
         if self.command is not None:
             self.aborted.append(self.command)
             self.command = None
-        return self.drive(dir_, nxt, self.random.randrange(256) if data is None else data)
+        return self.drive(dir_, nxt, random.randrange(256) if data is None else data)
 
     def takes(self) -> bool:
         if self.command is None:
             return False
         if self.deaf and self.bytes is None:
             return False
-        return self.random.random() >= self.stall
+        return random.random() >= self.stall
 
     def drive(self, dir_: int, nxt: int, data: int) -> tuple[int, int]:
         self.dut.ulpi_dir_pin.value = self.dut.ulpi_dir.value = dir_

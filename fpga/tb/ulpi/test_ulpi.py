@@ -5,10 +5,9 @@ import random
 import bench
 import cocotb
 import pytest
-from cocotb.triggers import RisingEdge
-from phy import FUNCTION_CONTROL, OTG_CONTROL, VBUS_VALID, UlpiPhy
+from ulpi.link import CHIRP, FULL_SPEED, HIGH_SPEED, Link, packet
+from ulpi.phy import FUNCTION_CONTROL, OTG_CONTROL, VBUS_VALID, UlpiPhy
 
-FULL_SPEED, HIGH_SPEED, CHIRP = 0x45, 0x40, 0x54  # function control with suspendM high
 VENDOR = {"VENDOR_REGISTER": 0x39, "VENDOR_VALUE": 0x06}  # as Cynthion needs it
 # Cycles a high-speed link has from the end of a packet to its answer: ULPI 1.1, table of section 3.8.2.6.
 LINK_DECISION = 14
@@ -26,66 +25,8 @@ def written_anew(dut) -> list[tuple[int, int]]:
     ]
 
 
-class Link:
-    """The UTMI side: sends packets, hears packets, changes the mode."""
-
-    def __init__(self, dut, phy):
-        self.dut, self.phy = dut, phy
-        self.heard, self.gathered = [], None
-        self.errors = 0
-        self.answer = None  # to the next packet heard
-        cocotb.start_soon(self.run())
-
-    async def run(self) -> None:
-        while True:
-            await RisingEdge(self.dut.clk)
-            self.phy.edge()
-            self.hear()
-
-    def hear(self) -> None:
-        active = int(self.dut.utmi_rx_active.value)
-        if active and self.gathered is None:
-            self.gathered = bytearray()
-            assert not int(self.dut.utmi_rx_valid.value), "rx_active comes before the first byte"
-        elif active and int(self.dut.utmi_rx_valid.value):
-            self.gathered.append(int(self.dut.utmi_rx_data.value))
-        elif not active and self.gathered is not None:
-            self.heard.append(bytes(self.gathered))
-            self.gathered = None
-        self.errors += int(self.dut.utmi_rx_error.value)
-
-    async def cycles(self, count: int) -> None:
-        for _ in range(count):
-            await RisingEdge(self.dut.clk)
-
-    async def until(self, condition, limit: int = 20000) -> None:
-        for _ in range(limit):
-            if condition():
-                return
-            await RisingEdge(self.dut.clk)
-        raise AssertionError("it never happened")
-
-    def sent(self) -> bool:
-        """Nothing of a packet is left in the shim."""
-        return int(self.dut.count.value) == 0 and not int(self.dut.in_command.value)
-
-    def mode(self, value: int) -> None:
-        self.dut.utmi_xcvr_select.value = value & 3
-        self.dut.utmi_term_select.value = value >> 2 & 1
-        self.dut.utmi_op_mode.value = value >> 3 & 3
-
-    async def send(self, packet: bytes) -> None:
-        self.dut.utmi_tx_valid.value = 1
-        for byte in packet:
-            self.dut.utmi_tx_data.value = byte
-            await RisingEdge(self.dut.clk)
-            while not int(self.dut.utmi_tx_ready.value):
-                await RisingEdge(self.dut.clk)
-        self.dut.utmi_tx_valid.value = 0
-
-
 async def start(dut, ready: bool = True, **phy_settings) -> Link:
-    phy = UlpiPhy(dut, seed=1, **phy_settings)
+    phy = UlpiPhy(dut, **phy_settings)
     inputs = {"ulpi_dir_pin": 1, "ulpi_dir": 1, "ulpi_nxt": 0, "ulpi_data_in": 0, "utmi_tx_valid": 0, "utmi_tx_data": 0}
     await bench.start_clock(
         dut, **inputs, utmi_xcvr_select=1, utmi_term_select=1, utmi_op_mode=0, **({"rst": 1} if not ready else {})
@@ -95,11 +36,6 @@ async def start(dut, ready: bool = True, **phy_settings) -> Link:
         await link.until(lambda: int(dut.ready.value), 40000)
         await link.cycles(4)
     return link
-
-
-def packet(generator, size: int) -> bytes:
-    pid = generator.choice([0x1, 0x2, 0x3, 0xA, 0xB, 0xE])
-    return bytes([pid | (pid ^ 0xF) << 4]) + bytes(generator.randrange(256) for _ in range(size))
 
 
 # --- set-up
@@ -140,10 +76,9 @@ async def until_set_up_the_device_sees_no_session_and_no_packet(dut):
 async def set_up_survives_status_bytes_at_any_moment(dut):
     link = await start(dut, ready=False)
     link.phy.interrupt = 0.2
-    generator = random.Random(7)
     while not int(dut.ready.value):
-        if generator.random() < 0.02:
-            link.phy.status(VBUS_VALID | generator.randrange(3))
+        if random.random() < 0.02:
+            link.phy.status(VBUS_VALID | random.randrange(3))
         await link.cycles(1)
     assert link.phy.registers[OTG_CONTROL] == 0 and link.phy.registers[FUNCTION_CONTROL] == FULL_SPEED
 
@@ -155,13 +90,12 @@ async def set_up_survives_status_bytes_at_any_moment(dut):
 async def every_change_of_mode_reaches_the_phy_however_often_it_is_interrupted(dut):
     link = await start(dut, stall=0.5)
     link.phy.interrupt = 0.3
-    generator = random.Random(3)
     for _ in range(60):
-        wanted = generator.choice([FULL_SPEED, HIGH_SPEED, CHIRP])
+        wanted = random.choice([FULL_SPEED, HIGH_SPEED, CHIRP])
         link.mode(wanted)
-        for _ in range(generator.randrange(30)):
-            if generator.random() < 0.3:
-                link.phy.status(VBUS_VALID | generator.randrange(3))
+        for _ in range(random.randrange(30)):
+            if random.random() < 0.3:
+                link.phy.status(VBUS_VALID | random.randrange(3))
             await link.cycles(1)
         await link.until(lambda want=wanted: link.phy.registers[FUNCTION_CONTROL] == want)
     assert link.phy.aborted, "nothing was interrupted"
@@ -189,26 +123,24 @@ async def a_chirp_is_sent_without_identifier_and_after_its_mode_is_set(dut):
 @cocotb.parametrize(stall=[0.0, 0.3, 0.9])
 async def packets_of_the_device_arrive_whole_under_any_stalls(dut, stall):
     link = await start(dut, stall=stall)
-    generator = random.Random(int(stall * 10))
     sent = []
-    for size in [0, 1, 2, 3, 4, 66, *(generator.randrange(40) for _ in range(20))]:
-        sent.append(packet(generator, size))
+    for size in [0, 1, 2, 3, 4, 66, *(random.randrange(40) for _ in range(20))]:
+        sent.append(packet(size))
         await link.send(sent[-1])
         wanted = len(sent)
         await link.until(lambda n=wanted: len(link.phy.packets) == n)
-        await link.cycles(generator.randrange(6))
+        await link.cycles(random.randrange(6))
     assert link.phy.packets == [(p[0] & 0xF, p[1:]) for p in sent]
 
 
 @cocotb.test()
 async def packets_of_the_host_arrive_whole_with_status_bytes_between(dut):
     link = await start(dut)
-    generator = random.Random(5)
     sent = []
-    for size in [0, 1, 2, 515, *(generator.randrange(80) for _ in range(60))]:
-        sent.append(packet(generator, size))
-        link.phy.receive(sent[-1], gaps=generator.choice([0, 0.3, 0.9]), active_by_nxt=generator.random() < 0.5)
-        if generator.random() < 0.5:
+    for size in [0, 1, 2, 515, *(random.randrange(80) for _ in range(60))]:
+        sent.append(packet(size))
+        link.phy.receive(sent[-1], gaps=random.choice([0, 0.3, 0.9]), active_by_nxt=random.random() < 0.5)
+        if random.random() < 0.5:
             link.phy.status(VBUS_VALID | 1)
     await link.until(lambda: len(link.heard) == len(sent))
     assert link.heard == sent and link.errors == 0
@@ -218,19 +150,18 @@ async def packets_of_the_host_arrive_whole_with_status_bytes_between(dut):
 async def both_ways_at_once_lose_only_what_the_phy_interrupted(dut):
     link = await start(dut, stall=0.2)
     link.phy.interrupt = 0.2
-    generator = random.Random(11)
     to_host, from_host = [], []
     for _ in range(150):
-        to_host.append(packet(generator, generator.randrange(30)))
+        to_host.append(packet(random.randrange(30)))
         sending = cocotb.start_soon(link.send(to_host[-1]))
-        if generator.random() < 0.5:
-            await link.cycles(generator.randrange(20))
-            from_host.append(packet(generator, generator.randrange(12)))
+        if random.random() < 0.5:
+            await link.cycles(random.randrange(20))
+            from_host.append(packet(random.randrange(12)))
             link.phy.receive(from_host[-1], gaps=0.2)
         await sending
         await link.cycles(2)
         await link.until(link.sent)
-        await link.cycles(generator.randrange(60))
+        await link.cycles(random.randrange(60))
     await link.until(lambda: len(link.heard) == len(from_host))
     assert link.heard == from_host
     whole = [(p[0] & 0xF, p[1:]) for p in to_host]

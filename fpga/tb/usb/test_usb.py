@@ -64,7 +64,7 @@ class BulkHost:
 
     def __init__(self, ctx, endpoint):
         self.ctx, self.stream, self.bus = ctx, endpoint.stream, endpoint.interface
-        self.restart = endpoint.restart
+        self.endpoint, self.restart = endpoint, endpoint.restart
 
     async def feed(self, data: bytes, last: bool = False) -> None:
         for i, byte in enumerate(data):
@@ -162,6 +162,25 @@ def test_restart_begins_with_data0_and_empty_buffers(packets, waiting):
         assert await host.read() is None
         await host.feed(pattern(9, PACKET))
         assert await host.read() == (0, pattern(9, PACKET))
+
+    on_endpoint(scenario)
+
+
+@pytest.mark.parametrize("by", ["unhalt", "restart"])
+def test_a_halt_ends_with_data0_and_keeps_no_packet_from_the_host(by):
+    """USB 2.0 section 9.4.5: whatever the toggle was. A halt keeps what waits, a restart does not."""
+
+    async def scenario(host):
+        await host.feed(pattern(6, PACKET))
+        assert await host.read() == (0, pattern(6, PACKET))
+        await pulse(host.ctx, host.endpoint.halt)
+        assert host.ctx.get(host.endpoint.halted)
+        await host.feed(pattern(7, PACKET))
+        await pulse(host.ctx, getattr(host.endpoint, by))
+        assert not host.ctx.get(host.endpoint.halted)
+        if by == "restart":
+            await host.feed(pattern(8, PACKET))
+        assert await host.read() == (0, pattern(7 if by == "unhalt" else 8, PACKET))
 
     on_endpoint(scenario)
 
