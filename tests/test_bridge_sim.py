@@ -121,11 +121,9 @@ def test_wrong_use_is_one_line(capsys, build, tmp_path):
     assert (
         done.returncode == 1 and "lane 9 is not populated; give 0 to 5" in done.stderr and done.stderr.count("\n") == 1
     )
-    with pytest.raises(SystemExit):
-        main(["bridge-sim", "--lanes", "29"])
+    assert main(["bridge-sim", "--lanes", "29"]) == 2
     assert "'29' is not a whole number from 1 to 28" in capsys.readouterr().err
-    with pytest.raises(SystemExit):
-        main(["bridge-sim", "--usbip", "--usbredir"])
+    assert main(["bridge-sim", "--usbip", "--usbredir"]) == 2
     assert "not allowed with argument" in capsys.readouterr().err
 
 
@@ -147,7 +145,7 @@ def test_a_port_that_is_taken_is_one_line(build):
         ("[[fault]]\ntick = 1", "fault 1: kind is missing"),
         ("[[fault]]\ntick = 1\nkind = 'x'\ncolour = 2", "fault 1: 'colour' is no key"),
         ("[[fault]]\ntick = 1\nlane = 1\nkind = 'sensor_error'\nerror = 'tired'", "error 'tired' is none; use one of"),
-        ("not TOML", "cannot be read"),
+        ("not TOML", "not TOML ("),
     ],
 )
 def test_wrong_fault_files_are_one_line(tmp_path, text, complaint):

@@ -49,6 +49,17 @@ int cli_fail(const char *program, const char *subject, int error)
     return CLI_FAILED;
 }
 
+int cli_end(const char *program, int code)
+{
+    const bool lost = ferror(stdout) != 0; /* the error of an earlier write is not known any more */
+    if (fflush(stdout) == 0 && !lost) {
+        return code;
+    }
+    fprintf(stderr, "%s: standard output: %s; make room there, or send it elsewhere\n", program,
+            lost ? "cannot be written" : strerror(errno));
+    return code == CLI_OK ? CLI_FAILED : code;
+}
+
 int cli_fail_ring(const char *program, const char *name, int error)
 {
     char line[WHISKER_RING_LINE_BYTES];

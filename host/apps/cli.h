@@ -12,6 +12,10 @@ enum { CLI_OK = 0, CLI_FAILED = 1, CLI_USAGE = 2 };
 /* Prints "program: subject: text; remedy" for a code of the library and returns CLI_FAILED. */
 int cli_fail(const char *program, const char *subject, int error);
 
+/* The exit code of a program that ends with `code`, once all that it has printed is written: CLI_FAILED, with one line
+ * printed, if that could not be. */
+int cli_end(const char *program, int code);
+
 /* As cli_fail for the ring `name`: says also which file is meant and whose it is. */
 int cli_fail_ring(const char *program, const char *name, int error);
 

@@ -9,7 +9,7 @@ int main(int argc, char **argv)
     struct base_options options;
     const int parsed = base_options_parse(argc, argv, &options);
     if (parsed >= 0) {
-        return parsed;
+        return cli_end(DAEMON_PROGRAM, parsed);
     }
     daemon_log_begin(options.verbose);
     cli_catch_signals();

@@ -273,7 +273,7 @@ int main(int argc, char **argv)
     options.lane_mask = options.settings.lane_mask;
     int code = read_options(&options, argc, argv);
     if (code != 0) {
-        return code - 1;
+        return cli_end(PROGRAM, code - 1);
     }
     if (options.image && (code = read_image(options.image, &image)) != CLI_OK) {
         return code;
@@ -285,5 +285,5 @@ int main(int argc, char **argv)
     code = serve(device, &options, &image);
     stop(device);
     whisker_device_close(device);
-    return code;
+    return cli_end(PROGRAM, code);
 }

@@ -273,12 +273,12 @@ int main(int argc, char **argv)
     struct options options = {.lanes = WHISKER_FRAME_LANES, .wait_s = 10, .owner = WHISKER_RING_NO_OWNER};
     const int parsed = parse(argc, argv, &options);
     if (parsed >= 0) {
-        return parsed;
+        return cli_end(PROGRAM, parsed);
     }
     cli_catch_signals();
     struct session session = {.options = &options, .follower = {.fd = -1}};
     const int result = log_ring(&session);
     follower_close(&session.follower);
     whisker_reader_detach(session.reader);
-    return result;
+    return cli_end(PROGRAM, result);
 }

@@ -28,9 +28,9 @@ int main(int argc, char **argv)
     struct daemon_options options;
     const int parsed = daemon_options_parse(argc, argv, &options);
     if (parsed >= 0) {
-        return parsed;
+        return cli_end(DAEMON_PROGRAM, parsed);
     }
     daemon_log_begin(options.verbose);
     cli_catch_signals();
-    return options.list ? list_bridges() : daemon_run(&options);
+    return options.list ? cli_end(DAEMON_PROGRAM, list_bridges()) : daemon_run(&options);
 }

@@ -8,8 +8,7 @@ import importlib
 import sys
 
 from .arguments import Parser
-from .errors import UserError
-from .stamping import stamp_output
+from .ends import exit_code
 
 # name (its module has underscores for dashes): what it does
 COMMANDS = {
@@ -33,23 +32,15 @@ COMMANDS = {
     "texture": "learn and tell floor surfaces",
     "radial": "learn and tell the distance of contacts along a whisker",
 }
-INTERRUPTED = 130  # the shell's exit code for Ctrl-C
 
 
 def main(argv: list[str] | None = None) -> int:
-    stamp_output()
-    words = sys.argv[1:] if argv is None else argv
+    return exit_code("whisker", lambda: _run(sys.argv[1:] if argv is None else argv))
+
+
+def _run(words: list[str]) -> int:
     arguments = _parser(next(iter(words), "")).parse_args(words)
-    try:
-        return arguments.run(arguments)
-    except UserError as error:
-        print(f"whisker: {error}", file=sys.stderr)
-        return error.exit_code
-    except BrokenPipeError:  # the reader of our output has gone: not our trouble
-        sys.stderr.close()
-        return 0
-    except KeyboardInterrupt:
-        return INTERRUPTED
+    return arguments.run(arguments)
 
 
 def _parser(chosen: str) -> Parser:

@@ -22,11 +22,7 @@ def signals_as_before(monkeypatch):
 
 def run(capsys, *arguments):
     """Exit code, standard output, standard error."""
-    try:
-        code = main([str(a) for a in arguments])
-    except SystemExit as leaving:
-        code = leaving.code
-    return (code, *capsys.readouterr())
+    return (main([str(a) for a in arguments]), *capsys.readouterr())
 
 
 def command(*arguments):

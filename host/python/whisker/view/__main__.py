@@ -3,22 +3,22 @@
 import sys
 
 from ..arguments import Parser
-from ..errors import UserError
+from ..ends import exit_code
 from .command import EXAMPLE, add
 
 
 def main(argv: list[str] | None = None) -> int:
+    return exit_code("whisker-view", lambda: _run(argv))
+
+
+def _run(argv: list[str] | None) -> int:
     parser = Parser(
         prog="whisker-view", description="Serves a local page of a ring: traces, loss, health. Prints its address."
     )
     parser.show_example(EXAMPLE)
     add(parser)
     arguments = parser.parse_args(argv)
-    try:
-        return arguments.run(arguments)
-    except UserError as error:
-        print(f"whisker-view: {error}", file=sys.stderr)
-        return error.exit_code
+    return arguments.run(arguments)
 
 
 if __name__ == "__main__":
