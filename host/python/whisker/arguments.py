@@ -47,11 +47,16 @@ def plain(values: dict) -> dict:
 def add_ring(parser) -> None:
     """--ring, --ring-owner and --wait, for commands that read a ring."""
     parser.add_argument("--ring", default=RING, metavar="NAME", help="the ring to read (default: %(default)s)")
-    text = "accept a ring of this user, too, not only root's, your own and the service's"
-    parser.add_argument("--ring-owner", type=user, metavar="USER", help=text)
+    add_ring_owner(parser)
     parser.add_argument(
         "--wait", type=seconds, default=0.0, metavar="S", help="wait so long for the ring to come up (0)"
     )
+
+
+def add_ring_owner(parser) -> None:
+    """--ring-owner, for commands that read a ring; None: no other user's."""
+    text = "accept a ring of this user, too, not only root's, your own and the service's"
+    parser.add_argument("--ring-owner", type=user, metavar="USER", help=text)
 
 
 def user(text: str) -> int:

@@ -25,6 +25,7 @@ from whisker.view.client import WINDOW
 from whisker.view.pyramid import BINS
 from whisker.view.rings import find_rings
 from whisker.view.server import MESSAGE_BYTES
+from whisker.view.tap import Tap
 
 __all__ = ["nothing_logged"]  # a fixture that every test here uses
 
@@ -195,6 +196,26 @@ def test_only_rings_with_a_writer_are_offered():
                 path.unlink(missing_ok=True)
             folder.rmdir()
     assert writer.name not in find_rings()
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can give a file to another user")
+def test_a_ring_of_another_user_is_shown_only_if_that_user_is_named():
+    stranger = 4242
+
+    def seen(writer, owner):
+        tap = Tap(writer.name, owner=owner)
+        tap.poll()
+        told = tap.status()
+        tap.close()
+        return told
+
+    with ring_of(made_frames(0, 10)) as writer:
+        os.chown(f"/dev/shm/{writer.name}", stranger, stranger)
+        refused = seen(writer, None)
+        assert refused["state"] == "refused" and refused["trouble"]["name"] == "RING_OWNER"
+        assert f"user {stranger}'s" in refused["trouble"]["text"] and writer.name not in find_rings()
+        shown = seen(writer, stranger)
+        assert shown["frames"] == 10 and shown["reader"]["owner"] == str(stranger)
 
 
 def test_shared_memory_that_is_no_ring_is_refused_with_the_reason(tmp_path):

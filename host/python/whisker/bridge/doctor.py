@@ -40,13 +40,13 @@ class Finding:
         return f"{self.level:4}  {self.text}" + (f"; {self.remedy}" if self.remedy else "")
 
 
-def examine(ring: str, root: Path = Path("/"), look_s: float = LOOK_S) -> list[Finding]:
+def examine(ring: str, root: Path = Path("/"), look_s: float = LOOK_S, owner: int | None = None) -> list[Finding]:
     """All findings, from the cable to the samples. `root` is another only in tests.
 
     Where good frames arrive nothing can have failed before them: the bridge is simulated, say, or replayed.
     """
     before = [*libraries(), *usb(root), *rules(root), *room(root / "dev/shm")]
-    frames = stream(ring, look_s)
+    frames = stream(ring, look_s, owner)
     if not any(finding.level == FAIL for finding in frames):
         before = [replace(finding, level=WARN) if finding.level == FAIL else finding for finding in before]
     return [*before, *frames, *stale_rings(ring)]
@@ -117,10 +117,10 @@ def room(shared: Path) -> list[Finding]:
     return []
 
 
-def stream(ring: str, look_s: float) -> list[Finding]:
+def stream(ring: str, look_s: float, owner: int | None = None) -> list[Finding]:
     """The ring, its daemon, and the frames in it."""
     try:
-        with Reader(ring) as reader:
+        with Reader(ring, owner=owner) as reader:
             out = [Finding(OK, f"ring {ring} of user {reader.owner}: written by process {reader.info.writer_pid}")]
             out += daemon(reader.stats)
             return out + samples(reader, look_s)

@@ -7,7 +7,7 @@ from contextlib import ExitStack, closing
 from pathlib import Path
 from types import SimpleNamespace
 
-from ..arguments import RING, whole_number
+from ..arguments import RING, add_ring_owner, whole_number
 from ..bridge.nodes import NodeError
 from ..bridge.ring import Reader
 from ..errors import UserError
@@ -46,6 +46,7 @@ def add(parser) -> None:
     parser.add_argument("--models", type=Path, required=True, help="folder with texture.json and <whisker>.json")
     parser.add_argument("--nodes", help="what 'whisker info --nodes' printed: models of other nodes are refused")
     parser.add_argument("--ring", default=RING, metavar="NAME", help="the ring to read (default: %(default)s)")
+    add_ring_owner(parser)
     parser.add_argument("--base", metavar="SOCKET", help="of whisker-base")
     text = "of a simulation that waits for the pilot; without --base its wheels are driven directly"
     parser.add_argument("--simulation", metavar="SOCKET", help=text)
@@ -96,7 +97,7 @@ def _fly_in_step(arguments, stack: ExitStack) -> SimpleNamespace:
     if not link.wait_for(arguments.others, OTHERS_WAIT_S):
         gone = ", ".join(sorted(set(arguments.others) - link.peers))
         raise PilotError(f"pilot: {gone} did not come in {OTHERS_WAIT_S:g} s; start it, and connect it to this pilot")
-    reader = stack.enter_context(Reader(arguments.ring, wait_s=RING_WAIT_S))
+    reader = stack.enter_context(Reader(arguments.ring, RING_WAIT_S, arguments.ring_owner))
     sim = stack.enter_context(SimLink(arguments.simulation))
     wheels = SteppedBase(sim, base) if base else IdealWheels(sim)
     parts.flight = Flight(parts.pilot, wheels, parts.rows, parts.traces, parts.teller)
@@ -111,7 +112,7 @@ def _fly_live(arguments, stack: ExitStack) -> SimpleNamespace:
     base = LiveBase(arguments.base)
     parts = _parts(arguments, link, _known_wheels(base, link, stop), stack)
     wheels = LiveWheels(base)
-    ring = stack.enter_context(closing(LiveRing(arguments.ring, len(parts.pilot.names))))
+    ring = stack.enter_context(closing(LiveRing(arguments.ring, len(parts.pilot.names), owner=arguments.ring_owner)))
     parts.flight = Flight(parts.pilot, wheels, parts.rows, parts.traces, parts.teller)
     live = LiveFlight(parts.flight, ring, wheels, link, heartbeat)
     link.announce()

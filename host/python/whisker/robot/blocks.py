@@ -63,8 +63,8 @@ class LiveRing:
     They are the bridge's own until the bridge begins to count anew; from then on they go on after the time it took.
     """
 
-    def __init__(self, name: str, lanes: int, clock=time.monotonic):
-        self.name = name
+    def __init__(self, name: str, lanes: int, clock=time.monotonic, owner: int | None = None):
+        self.name, self._owner = name, owner
         self.trouble = (
             f"ring {name}: not there yet; start whiskerd --ring {name}"  # why no samples come; empty: they come
         )
@@ -98,7 +98,7 @@ class LiveRing:
             self._reader.reattach(wait_s)
             self.restarts += 1
         else:
-            self._reader = Reader(self.name, wait_s)
+            self._reader = Reader(self.name, wait_s, self._owner)
         self._reader.seek_latest(FRESH_TICKS)
         self._attached = True
 

@@ -8,6 +8,7 @@ import logging
 import sys
 import webbrowser
 
+from ..arguments import add_ring_owner
 from ..scene import load
 from ..stopping import listen
 from .hub import Hub
@@ -26,6 +27,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--ring", action="append", metavar="NAME", help=f"a ring to read from the start; repeatable (default: {RING})"
     )
+    add_ring_owner(parser)
     parser.add_argument(
         "--robot",
         nargs="?",
@@ -83,7 +85,7 @@ def run(arguments: argparse.Namespace) -> int:
     scene = None if arguments.scene is None else load(arguments.scene)
     source = _source(arguments)
     try:
-        return asyncio.run(_serve(arguments, Hub(rings, source, scene)))
+        return asyncio.run(_serve(arguments, Hub(rings, source, scene, arguments.ring_owner)))
     finally:
         source.close()
 

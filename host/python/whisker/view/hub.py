@@ -22,12 +22,20 @@ class RequestError(ValueError):
 class Hub:
     """Rings named at the start are read for good; others while somebody looks at them."""
 
-    def __init__(self, names: list[str], source: NoRobot | None = None, scene: Scene | None = None):
-        """`source`: where the robot's messages come from; `scene`: where it is and what it looks like, if known."""
-        self.names = names
+    def __init__(
+        self,
+        names: list[str],
+        source: NoRobot | None = None,
+        scene: Scene | None = None,
+        ring_owner: int | None = None,
+    ):
+        """`source`: where the robot's messages come from; `scene`: where it is and what it looks like, if known;
+        `ring_owner`: the user whose rings are read, too.
+        """
+        self.names, self._ring_owner = names, ring_owner
         self.source, self.robot = source or NoRobot(), RobotModel(scene)
         self.robot_watchers = 0
-        self._taps = {name: Tap(name) for name in names}
+        self._taps = {name: Tap(name, owner=ring_owner) for name in names}
         self._watchers = dict.fromkeys(names, 0)
         self._found: dict[str, str] = {}
         self._searched = float("-inf")
@@ -51,7 +59,7 @@ class Hub:
         if name not in self._taps:
             if len(self._taps) >= TAPS_MAX:
                 raise RequestError(f"ring: {TAPS_MAX} are being looked at; close a page")
-            self._taps[name], self._watchers[name] = Tap(name), 0
+            self._taps[name], self._watchers[name] = Tap(name, owner=self._ring_owner), 0
             self._taps[name].poll()
         self._watchers[name] += 1
         return self._taps[name]

@@ -24,8 +24,8 @@ NEVER = -(1 << 62)
 class Tap:
     """`poll` often enough that the ring does not wrap in between; then `pyramid`, `tally` and `status` are up to date."""
 
-    def __init__(self, name: str, clock=time.monotonic):
-        self.name = name
+    def __init__(self, name: str, clock=time.monotonic, owner: int | None = None):
+        self.name, self._owner = name, owner
         self.pyramid, self.tally = Pyramid(), Tally()
         self.tick_s = LIMITS["tick_period"] / LIMITS["clock_hz"]
         self._clock = clock
@@ -66,7 +66,7 @@ class Tap:
                 self._restarts += 1
                 self._say("attached to the new ring of a restarted writer")
             else:
-                self._reader, self._since = Reader(self.name), now
+                self._reader, self._since = Reader(self.name, owner=self._owner), now
                 self._say("attached to the ring")
         except RingError as error:
             self._trouble = self._trouble if self._reader else error
