@@ -9,6 +9,7 @@
 #include <sys/socket.h>
 #include <sys/un.h>
 #include <sys/wait.h>
+#include <time.h>
 #include <unistd.h>
 
 #include "cli.h"
@@ -26,6 +27,9 @@
 #define PAUSE_MS 500
 /* Between two looks at the driver, two leases for it, and two feedings of the watchdog: at most. */
 #define LOOK_MS 50
+/* For so long, and so often, another whisker-base on the same socket is looked after. */
+#define VANISH_MS 200
+#define VANISH_LOOKS 20
 
 struct guard {
     const struct base_options *options;
@@ -260,12 +264,27 @@ static bool answered(const struct sockaddr_un *address)
     return there;
 }
 
+/* A whisker-base that was killed a moment ago may still be about to vanish. Returns whether it has. */
+static bool await_vanished(const struct sockaddr_un *address)
+{
+    const struct timespec pause = {.tv_nsec = VANISH_MS * 1000000L / VANISH_LOOKS};
+    for (int i = 0; i < VANISH_LOOKS; i++) {
+        if (!answered(address)) {
+            return true;
+        }
+        nanosleep(&pause, NULL);
+    }
+    return false;
+}
+
 static bool bind_to(int socket, const struct sockaddr_un *address)
 {
     if (bind(socket, (const struct sockaddr *)address, sizeof *address) == 0) {
         return true;
     }
-    if (errno != EADDRINUSE || answered(address)) {
+    const int error = errno;
+    if (error != EADDRINUSE || !await_vanished(address)) {
+        errno = error;
         return false;
     }
     unlink(address->sun_path);

@@ -33,8 +33,9 @@ struct base_driver_start {
     struct base_lease lease;
 };
 
-/* Without a word from the driver for so long the wheels are stopped; for so long it is ended and another started. */
-#define BASE_STUCK_MS 300
+/* When guard or driver say nothing for so long, the other stops the wheels: before a watchdog of 0.3 s ends both. When
+ * the driver says nothing for BASE_DEAD_MS it is ended and another started. */
+#define BASE_STUCK_MS 200
 #define BASE_DEAD_MS 2000
 
 int base_guard_run(const struct base_options *options);

@@ -16,7 +16,7 @@
 /* A commander silent for so long is taken for gone; without a frame for so long the stream is restarted. */
 #define BASE_COMMANDER_MS 300
 #define BASE_SILENCE_MS 500
-#define BASE_REOPEN_MS 250
+#define BASE_REOPEN_MS 50
 /* A base that stays silent is told of so often. */
 #define BASE_TELL_MS 3600000
 

@@ -132,6 +132,43 @@ static void test_nothing_is_heard_meanwhile(void **state)
     assert_int_equal(sim_create_mode(robot.create), CREATE_OI_MODE_FULL);
 }
 
+/* Ticks for which the wheels still turn when a stop is sent at this tick of a drive that a script bounds to 0.2 s. */
+static unsigned ticks_after_stop_at(unsigned tick)
+{
+    ready(CREATE_OI_V2, CREATE_OI_OP_SAFE);
+    SEND(CREATE_OI_OP_SCRIPT, 12, GO, CREATE_OI_OP_WAIT_TIME, 2, STOP, CREATE_OI_OP_PLAY_SCRIPT);
+    assert_int_equal(ticks_until_driven(10), 1);
+    pass_ticks(tick);
+    SEND(STOP);
+    return ticks_until_stopped(5000);
+}
+
+/* Why no script bounds the driving (docs/create.md): as long as the wheels turn no order to stop is heard. Not bounded
+ * by a script, the same order stops them at once. */
+static void test_a_drive_that_a_script_bounds_cannot_be_stopped(void **state)
+{
+    (void)state;
+    for (unsigned tick = 0; tick < 400; tick += 40)
+        assert_in_range(ticks_after_stop_at(tick), 399 - tick, 402 - tick);
+    ready(CREATE_OI_V2, CREATE_OI_OP_SAFE);
+    SEND(GO);
+    SEND(STOP);
+    assert_speed(0, 0);
+}
+
+/* Nor can the next drive be asked for before the last has ended: the wheels stand between them. */
+static void test_scripts_that_bound_drives_do_not_join(void **state)
+{
+    (void)state;
+    ready(CREATE_OI_V2, CREATE_OI_OP_SAFE);
+    SEND(CREATE_OI_OP_SCRIPT, 12, GO, CREATE_OI_OP_WAIT_TIME, 2, STOP, CREATE_OI_OP_PLAY_SCRIPT);
+    assert_int_equal(ticks_until_driven(10), 1);
+    pass_ticks(390);
+    SEND(CREATE_OI_OP_PLAY_SCRIPT); /* lost */
+    assert_in_range(ticks_until_stopped(5000), 9, 12);
+    assert_int_equal(ticks_until_driven(1000), 1000);
+}
+
 static void test_a_script_may_play_itself_again(void **state)
 {
     (void)state;
@@ -172,6 +209,8 @@ int main(void)
         cmocka_unit_test(test_wait_for_an_event),
         cmocka_unit_test(test_wait_for_passive_mode),
         cmocka_unit_test(test_nothing_is_heard_meanwhile),
+        cmocka_unit_test(test_a_drive_that_a_script_bounds_cannot_be_stopped),
+        cmocka_unit_test(test_scripts_that_bound_drives_do_not_join),
         cmocka_unit_test(test_a_script_may_play_itself_again),
         cmocka_unit_test(test_a_script_of_itself_alone_does_not_hang),
         cmocka_unit_test(test_create_2_has_none),
