@@ -178,6 +178,7 @@ def changed(topic: str, **fields_new):
         (changed("observation", seq=2**63), "field seq"),
         (changed("observation", pose=[9.0, 9.0, 0.0]), "field pose: more than 8 rows can add up to"),
         (changed("observation", pose=[0.0, 0.0, 26.0]), "field pose: more than 8 rows can add up to"),
+        (changed("observation", seq=0), "field pose: of the first row it is its motion"),
         (changed("observation", names=["a", "b", "a"]), "field names: a name that is there twice"),
         (changed("observation", names=["a", "b", "c" * 129]), "field names: 129 characters, 128 are the most"),
         (changed("belief", x=np.zeros(2001, "f4")), "field x: 2001 elements, 2000 are the most"),

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from commandkit import END_S, command, run, signals_as_before  # noqa: F401 - a fixture
+from fuzz_rows import fuzz
 from linkkit import free_endpoint
 from robotkit import take_until, to_rows
 
@@ -461,3 +462,9 @@ def test_options_of_the_command(made, capsys):
     assert code == 1 and "whoever reaches this address can watch" in err and "cannot be listened on" in err
     code, _, err = run(capsys, "navigator", folder / "none")
     assert code == 2 and "no such folder" in err
+
+
+def test_messages_that_cannot_be_change_nothing_that_comes_of_the_others():
+    """Navigator and Pyro server, with 4000 of them among 40 rows: see fuzz_rows, which runs for long by its front."""
+    counts = fuzz(4000, seed=5)
+    assert all(count >= 2000 for count in counts.values()) and len(counts) == 2

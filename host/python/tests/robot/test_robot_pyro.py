@@ -16,16 +16,17 @@ import Pyro5.api
 import pytest
 import serpent
 from commandkit import END_S, command, run, signals_as_before  # noqa: F401 - a fixture
-from linkkit import free_endpoint
+from linkkit import free_endpoint, sample
 from robotkit import examples, take_until
 
 from whisker.nav.observations import ODOMETRY
 from whisker.pilot.pilot import compose
 from whisker.robot import messages as m
-from whisker.robot.inbox import Received
+from whisker.robot.inbox import Inbox, Received
 from whisker.robot.link import Link
 from whisker.robot.pyro import NAMES_MOST, Results, Server
 from whisker.robot.pyro_daemon import REQUEST_MOST
+from whisker.robot.row_checks import RowChecks
 from whisker.robot.rows import to_message
 from whisker.robot.streams import Envelope
 
@@ -71,7 +72,7 @@ def test_a_client_behind_gets_all_the_motion_it_missed():
     assert results.observation(25)["motion"] == [0.0, 0.0, 0.0]
     assert results.observation(26)["motion"] is None and results.observation(-1)["motion"] is None
     assert results.observation(15)["motion"] is None  # a row that never came: only the next knows
-    assert results.counters() == {"rows": 20, "missed": 5, "restarts": 0, "refused": 0}
+    assert results.counters() == {"rows": 20, "missed": 5, "restarts": 0}
 
 
 def test_poses_odometry_and_health_are_the_newest():
@@ -176,15 +177,15 @@ def test_a_row_that_cannot_be_is_not_written_and_the_next_is(change):
 
 
 def test_rows_that_cannot_be_leave_the_answers_right():
-    results = Results(None, may_write=False)
-    rows, _ = observed(0, 9)
-    for one in rows:
-        good, told = one.message, one.envelope
-        jump = replace(good, pose=good.pose + [0.9, 0.0, 0.0])
-        back = replace(good, seq=max(0, good.seq - 3))
-        results.take([Received("observation", bad, told) for bad in (jump, back)[: good.seq]] + [one])
-    assert results.observation(0)["motion"] == pytest.approx(moved(range(10)))
-    assert results.counters()["refused"] > 8 and "field " in results.last_error
+    results, inbox = Results(None, may_write=False), Inbox("", None, judge=RowChecks())
+    for one in observed(0, 9)[0]:
+        good = one.message
+        jump, huge = (replace(good, pose=good.pose + [far, 0.0, 0.0]) for far in (0.9, 1e308))
+        for row in (jump, huge, good):
+            inbox.put(sample("observation", row, one.envelope))
+        results.take(inbox.take(0.0))
+    assert results.observation(0)["motion"] == pytest.approx(moved(range(10))) and results.observation()["number"] == 10
+    assert inbox.refused == 20 and "field pose" in inbox.last_error
 
 
 def test_names_that_are_made_up_take_no_room():

@@ -4,6 +4,7 @@ import math
 import threading
 import time
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from .messages import REMEDIES, SCHEMAS, TOPICS, End, MessageError, Observation, decode, type_of
@@ -36,10 +37,20 @@ class Inbox:
     Messages of a stream that nobody has announced yet wait a little, for a token may come later than the first message.
     """
 
-    def __init__(self, prefix: str, most: int | None, sources: Sources | None = None):
-        """sources: streams that are announced; None: everything is taken, as from a file."""
+    def __init__(
+        self,
+        prefix: str,
+        most: int | None,
+        sources: Sources | None = None,
+        judge: Callable[[Received], str] = lambda received: "",
+    ):
+        """sources: streams that are announced; None: everything is taken, as from a file.
+
+        judge: what is wrong with a message, and what helps, where its bytes alone do not tell; empty: it is taken.
+        """
         self._prefix, self._condition, self._sources = prefix, threading.Condition(), sources
         self._waiting: deque = deque(maxlen=most)
+        self._judge = judge
         self._held: list[tuple] = []
         self._held_streams: set[int] = set()
         self._changes_seen = 0
@@ -123,17 +134,20 @@ class Inbox:
             verdict = self._verdict(topic, tally, envelope)
             if verdict is Verdict.UNKNOWN and self._hold(came_s, envelope, (key, encoding, payload, attachment)):
                 return None
+            self._check_source(topic, verdict)
+            if tally.is_repeated(envelope):
+                return None
             received = Received(topic, decode(kind, payload, topic), envelope)
-            self._check(received, verdict)
-            is_new = tally.take(envelope)
+            self._check(received)
         except (EnvelopeError, MessageError) as error:
             self.last_error = (
                 str(error) if isinstance(error, MessageError) else f"{topic}: field envelope: {error}; {SAME}"
             )
             self._refuse(topic, tally, envelope)
             return None
+        tally.take(envelope)
         self.tallies[topic] = tally
-        return received if is_new else None
+        return received
 
     def _verdict(self, topic: str, tally: Tally, envelope: Envelope) -> Verdict:
         if self._sources is None:
@@ -150,16 +164,21 @@ class Inbox:
         self._held_streams.add(envelope.stream)
         return True
 
-    def _check(self, received: Received, verdict: Verdict) -> None:
-        """MessageError unless the message may be taken."""
-        topic, message = received.topic, received.message
+    def _check_source(self, topic: str, verdict: Verdict) -> None:
+        """MessageError unless messages of it are taken."""
         if verdict is not Verdict.TAKEN:
             raise MessageError(f"{topic}: field stream: {verdict.value}")
         if topic not in TOPICS and topic not in self.tallies and len(self.tallies) >= TOPICS_MOST:
             raise MessageError(f"{topic}: more than {TOPICS_MOST} topics; stop what sends them")
+
+    def _check(self, received: Received) -> None:
+        """MessageError unless the message may follow those before it."""
+        topic, message = received.topic, received.message
         number = received.envelope.number  # a pilot sends rows and nothing else on this key
         if self._sources and isinstance(message, Observation) and message.seq != number:
             raise MessageError(f"{topic}: field seq: {message.seq} in message {number}; {REMEDIES[1]}")
+        if fault := self._judge(received):
+            raise MessageError(f"{topic}: {fault}")
 
     def _refuse(self, topic: str, tally: Tally, envelope: Envelope | None) -> None:
         """Count it by its topic, if that is one of ours."""

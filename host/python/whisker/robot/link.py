@@ -16,13 +16,13 @@ import contextlib
 import json
 import re
 import threading
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import zenoh
 
 from ..errors import UserError
-from .inbox import Inbox, encoding_of
+from .inbox import Inbox, Received, encoding_of
 from .messages import HEALTH, NAME, End, Header, encode, type_of
 from .sources import Sources
 from .streams import Envelope, envelopes, new_stream
@@ -142,9 +142,9 @@ class Link:
         """A new stream on a topic of messages.TOPICS, or health/<process>."""
         return Publisher(self._session, self._prefix, topic, self.lock_step)
 
-    def subscribe(self, *topics: str) -> Inbox:
-        """One inbox for these topics; "**" is all of them, "health/*" the health of every process."""
-        inbox = Inbox(self._prefix, None if self.lock_step else INBOX_MOST, self._sources)
+    def subscribe(self, *topics: str, judge: Callable[[Received], str] = lambda received: "") -> Inbox:
+        """One inbox for these topics; "**" is all of them, "health/*" the health of every process. judge: see Inbox."""
+        inbox = Inbox(self._prefix, None if self.lock_step else INBOX_MOST, self._sources, judge)
         self._kept += [self._session.declare_subscriber(self._prefix + topic, inbox.put) for topic in topics]
         self._inboxes.append(inbox)
         return inbox

@@ -201,6 +201,8 @@ def _check_observation(row: Observation) -> None:
         raise Malformed(f"field cells: {len(row.names)} names, {len(row.cells)} cells, {len(row.values)} values")
     if len(set(row.names)) != len(row.names):
         raise OutOfRange("field names: a name that is there twice")
+    if row.seq == 0 and np.abs(row.pose - row.motion).max() > ROUNDING:
+        raise OutOfRange("field pose: of the first row it is its motion")
     rows = (row.seq + 1) * (1.0 + ROUNDING)
     if np.hypot(*row.pose[:2]) > rows * math.hypot(*ROW[:2]) or abs(row.pose[2]) > rows * ROW[2]:
         raise OutOfRange(f"field pose: more than {row.seq + 1} rows can add up to")

@@ -57,8 +57,8 @@ class Navigator:
 
     def __init__(self, link: Link, scene: Scene, settings: Settings):
         self._link, self._scene, self._settings = link, scene, settings
-        self._inbox = link.subscribe("observation")
-        self._checks, self._follower = RowChecks(scene), Follower()
+        self._inbox = link.subscribe("observation", judge=RowChecks(scene))
+        self._follower = Follower()
         self._memory = Memory(settings.checkpoint, scene, settings.filters)
         self._beliefs_before: dict[str, np.ndarray] = {}
         self._tracks: list[Track] = []
@@ -74,7 +74,7 @@ class Navigator:
         told = {name: getattr(follower, name) for name in ("weighed", "skipped", "missed", "restarts")}
         told |= {
             "first": follower.first_seq,
-            "refused": inbox.refused + self._checks.refused,
+            "refused": inbox.refused,
             "overflown": inbox.overflown,
         }
         if self._tracks:
@@ -87,7 +87,7 @@ class Navigator:
         reason = "stopped"
         with ExitStack() as stack:
             while not stop.is_set():
-                received = self._checks.passed(self._inbox.take(LOOK_S))
+                received = self._inbox.take(LOOK_S)
                 if not self._tracks:
                     self._recall(received)
                 for step in self._follower.take(received, self._affordable()):
@@ -108,7 +108,7 @@ class Navigator:
         return max(1, CATCH_UP_S // self._weigh_s) if self._weigh_s else 1
 
     def _last_error(self) -> str:
-        return self._checks.last_error or self._inbox.last_error or self._memory.note
+        return self._inbox.last_error or self._memory.note
 
     def _recall(self, received: list[Received]) -> None:
         """With the first row: go on from where another navigator was, if it left word."""

@@ -59,7 +59,7 @@ class Results:
     def __init__(self, link: Link, may_write: bool):
         self._link, self._may_write = link, may_write
         self._lock = threading.Lock()
-        self._checks, self._follower, self._number, self._total = RowChecks(), Follower(), 0, np.zeros(3)
+        self._follower, self._number, self._total = Follower(), 0, np.zeros(3)
         self._history: deque[tuple[int, np.ndarray]] = deque([(0, self._total)], maxlen=HISTORY_ROWS)
         self._row: dict | None = None
         self._odometry: OdometryMessage | None = None
@@ -138,7 +138,7 @@ class Results:
     def take(self, received) -> None:
         """What came on TOPICS and health."""
         with self._lock:
-            for step in self._follower.take(self._checks.passed([r for r in received if r.topic == "observation"])):
+            for step in self._follower.take([r for r in received if r.topic == "observation"]):
                 self._number += step.rows
                 self._total = compose(self._total, step.motion)
                 self._history.append((self._number, self._total))
@@ -157,13 +157,7 @@ class Results:
     def counters(self) -> dict[str, object]:
         """What has been counted so far."""
         follower = self._follower
-        counted = {"rows": follower.weighed, "missed": follower.missed, "restarts": follower.restarts}
-        return counted | {"refused": self._checks.refused}
-
-    @property
-    def last_error(self) -> str:
-        """Why a row was refused; empty: none was."""
-        return self._checks.last_error
+        return {"rows": follower.weighed, "missed": follower.missed, "restarts": follower.restarts}
 
     def _publish(self, row: dict[str, float | None]) -> int:
         if self._rows is None:
@@ -180,12 +174,10 @@ class Results:
         one = Received("observation", row, Envelope(0, row.seq, 0))
         try:
             decode(Observation, encode(row), "row")
-            fault = self._written.fault(one)
         except ValueError as error:
             raise ValueError(str(error)) from None
-        if fault:
+        if fault := self._written(one):
             raise ValueError(f"row: {fault}")
-        self._written.note(one)
 
     def end(self) -> None:
         """Of what was written here: its readers know that no more comes."""
@@ -221,7 +213,7 @@ class Server:
         """ServerError when the port is taken."""
         configure(LOOK_S)
         self._link, self._results = link, Results(link, may_write)
-        self._inbox = link.subscribe(*TOPICS, f"{HEALTH}/*")
+        self._inbox = link.subscribe(*TOPICS, f"{HEALTH}/*", judge=RowChecks())
         try:
             self._daemon = Daemon(host, port)
         except OSError as error:
@@ -232,8 +224,7 @@ class Server:
         self._error: Exception | None = None
 
     def _counters(self) -> dict[str, object]:
-        counted = self._results.counters()
-        return counted | {"refused": counted["refused"] + self._inbox.refused}
+        return self._results.counters() | {"refused": self._inbox.refused}
 
     def run(self, stop: threading.Event) -> None:
         """Until `stop` is set."""
@@ -255,8 +246,8 @@ class Server:
         try:
             while not stop.is_set():
                 self._results.take(self._inbox.take(LOOK_S))
-                self._health.tell(0, RUNNING, self._results.last_error or self._inbox.last_error)
-            self._health.tell(0, ENDED, self._results.last_error or self._inbox.last_error)
+                self._health.tell(0, RUNNING, self._inbox.last_error)
+            self._health.tell(0, ENDED, self._inbox.last_error)
         except Exception as error:  # noqa: BLE001 - `run` raises it
             self._error = error
             stop.set()

@@ -16,35 +16,29 @@ ROUNDING = 1e-6  # m and rad, between a row's motion and the sums on both sides
 
 
 class RowChecks:
-    """Passes rows on that can be, counts the others. One for all rows of a topic, in their order."""
+    """Judges the rows of an inbox, in their order; other messages pass."""
 
     def __init__(self, scene: Scene | None = None):
         """scene: whose cells every row must have; None: of any robot."""
         self._wanted, self._whiskers = (columns(scene), _whiskers(scene)) if scene else (frozenset(), ())
         self._last: Received | None = None
         self._moved_ns = 0  # stamp of the newest row with any motion
-        self.refused, self.last_error = 0, ""
 
-    def passed(self, received: list[Received]) -> list[Received]:
-        """Those that are taken, ends included."""
-        return [one for one in received if one.over or self._passes(one)]
+    def __call__(self, one: Received) -> str:
+        """What is wrong with a row and what helps, in one line; empty: nothing, and it is the row before the next."""
+        if not isinstance(one.message, Observation):
+            return ""
+        fault = self._fault(one)
+        if not fault:
+            self._note(one)
+        return fault
 
-    def _passes(self, one: Received) -> bool:
-        fault = self.fault(one)
-        if fault:
-            self.refused, self.last_error = self.refused + 1, f"{one.topic}: {fault}"
-        else:
-            self.note(one)
-        return not fault
-
-    def fault(self, one: Received) -> str:
-        """What is wrong with a row and what helps, in one line; empty: nothing."""
+    def _fault(self, one: Received) -> str:
         names = self._names_fault(one.message.names) if self._wanted else ""
         follows = self._last is not None and self._last.envelope.stream == one.envelope.stream
         return names or (self._motion_fault(self._last.message, one.message) if follows else "")
 
-    def note(self, one: Received) -> None:
-        """This is the row before the next."""
+    def _note(self, one: Received) -> None:
         row, known = one.message, self._last is not None and self._last.envelope.stream == one.envelope.stream
         stamp_ns = row.header.stamp.ns
         if np.any(row.motion) or not known or leaps(self._last.message.header.stamp.ns, stamp_ns):

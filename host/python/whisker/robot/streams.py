@@ -78,26 +78,30 @@ class Tally:
     next: int = 0
     refused_since: int = 0  # of this stream, since the last that was taken
 
-    def take(self, envelope: Envelope) -> bool:
-        """Count a message that has come; False: it came before.
+    def is_repeated(self, envelope: Envelope) -> bool:
+        """Whether it came before; then that is counted.
 
         EnvelopeError when so many cannot have been sent since the last.
         """
-        if self.stream is None:
-            self.stream, self.joined_at, self.next = envelope.stream, envelope.number, envelope.number
-        elif envelope.stream != self.stream:
-            self.stream, self.next, self.refused_since = envelope.stream, 0, 0
-            self.restarts += 1
+        if envelope.stream != self.stream:
+            return False
         if envelope.number - self.next > STEP_MOST:
             raise EnvelopeError(f"number {envelope.number} after {self.next - 1}: so many cannot have been sent")
-        if envelope.number < self.next:
-            self.repeated += 1
-            return False
+        self.repeated += envelope.number < self.next
+        return envelope.number < self.next
+
+    def take(self, envelope: Envelope) -> None:
+        """Count a message that has come and was not repeated."""
+        if self.stream is None:
+            self.joined_at = self.next = envelope.number
+        elif envelope.stream != self.stream:
+            self.next, self.refused_since = 0, 0
+            self.restarts += 1
+        self.stream = envelope.stream
         self.missed += max(0, envelope.number - self.next - self.refused_since)
         self.next, self.refused_since = envelope.number + 1, 0
         self.received += 1
         self.ended = envelope.last
-        return True
 
     def refuse(self, stream: int | None = None) -> None:
         """Count a message that is not taken; `stream`: where it says that it belongs."""
