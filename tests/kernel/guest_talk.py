@@ -14,7 +14,7 @@ from pathlib import Path
 
 PORT = "/dev/ttyS1"
 PROGRAM_S = 600  # the guest is emulated, and may have half a processor
-PLUG_S = 120
+PLUG_S = 300
 POLL_S = 0.05
 
 
