@@ -53,7 +53,7 @@ while True:
     while child.poll() is None and time.monotonic() - fed < 0.3:
         try:
             if manager.recv(256) == b"WATCHDOG=1":
-                fed = max(fed, time.monotonic())
+                fed = time.monotonic()
         except TimeoutError:
             pass
         if time.monotonic() - beat >= 0.1:
