@@ -605,15 +605,15 @@ MUTATIONS = [
         "network: messages that never came are not counted",
         "host/python/tests/robot/test_robot_link.py",
         "host/python/whisker/robot/streams.py",
-        "self.missed += envelope.number - self.next",
+        "self.missed += max(0, envelope.number - self.next - self.refused_since)",
         "self.missed += 0",
     ),
     Mutation(
         "network: a message that comes again counts twice",
         "host/python/tests/robot/test_robot_link.py",
         "host/python/whisker/robot/streams.py",
-        "if envelope.number < self.next:",
-        "if envelope.number + 1 < self.next:",
+        "return envelope.number < self.next",
+        "return envelope.number + 1 < self.next",
     ),
     Mutation(
         "network: another release's messages are believed",

@@ -18,7 +18,10 @@ ALSO = {
     "host/apps": ("host/python/tests/pilot/test_base.py", "tests/test_daemon.py", "tests/test_flash.py"),
 }
 SLOW_PROGRAMS = "stress_ring|model"
-FPGA_TESTS = ("fpga/formal", "fpga/tb")
+PROOFS = (
+    "fpga/formal/test_formal.py::test_proof_holds"  # the other tests there look for the text of mutations of their own
+)
+BENCHES = "fpga/tb"
 
 
 @dataclass(frozen=True)
@@ -36,7 +39,7 @@ def steps_for(root: Path, file: str) -> list[Step]:
     if file.endswith(".v"):
         return [
             Step(pytest=_benches(root, file)),
-            Step(build=("all",), ctest=("sim/bridge", "fpga"), pytest=FPGA_TESTS),
+            Step(build=("all",), ctest=("sim/bridge", "fpga"), pytest=(PROOFS, BENCHES)),
         ]
     if file.endswith(".py"):
         return [Step(pytest=near) for near in [_importers(root, file)] if near] + [Step(pytest=PYTHON_TESTS)]
@@ -48,11 +51,12 @@ def steps_for(root: Path, file: str) -> list[Step]:
 
 
 def _benches(root: Path, file: str) -> tuple[str, ...]:
-    """Benches and proofs whose text names the module."""
+    """The module's own proof, and the benches whose text names it."""
     module = Path(file).stem
-    texts = [path for folder in FPGA_TESTS for path in sorted((root / folder).rglob("test_*.py"))]
-    named = [path.relative_to(root).as_posix() for path in texts if module in _bench_text(path.parent)]
-    return tuple(named) or FPGA_TESTS
+    proof = [f"{PROOFS}[{module}]"] if (root / f"fpga/formal/{module}.vh").exists() else []
+    benches = sorted((root / BENCHES).rglob("test_*.py"))
+    named = [path.relative_to(root).as_posix() for path in benches if module in _bench_text(path.parent)]
+    return (*proof, *named) or (PROOFS, BENCHES)
 
 
 @cache
