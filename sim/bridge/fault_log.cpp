@@ -36,6 +36,13 @@ void CsvFile::row(const std::string &text)
     }
 }
 
+void CsvFile::flush()
+{
+    if (file_) {
+        std::fflush(file_);
+    }
+}
+
 void CsvFile::close()
 {
     FILE *file = file_;

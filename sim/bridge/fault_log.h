@@ -21,6 +21,7 @@ class CsvFile
     CsvFile(const CsvFile &) = delete;
     CsvFile &operator=(const CsvFile &) = delete;
     void row(const std::string &text);
+    void flush(); // what has been written can be read by others
     void close();
 
   private:

@@ -27,6 +27,7 @@ void WheelLog::note(uint64_t tick, const Drive &drive)
     char text[ROW_BYTES];
     std::snprintf(text, sizeof text, "%" PRIu64 ",%.6f,%.4f,%.4f", tick, now_s, drive.v_m_s, drive.omega_rad_s);
     file_.row(text);
+    file_.flush();
 }
 
 void WheelLog::close()

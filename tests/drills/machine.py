@@ -79,12 +79,12 @@ class Machine:
         plan = self.plan
         body = parts.Body(plan.out / "scene", plan.models, plan.create, self._folder / "line", plan.seed)
         stands_in = parts.Simulated(
-            plan.out / "scene.flat", plan.level, plan.seed, plan.seconds, plan.pace, plan.out / "truth.csv"
+            plan.out / "scene.flat", plan.level, plan.seed, plan.seconds, plan.pace, plan.out / "truth.csv", self.wheels
         )
         bridge = parts.bridge(stands_in, body, self._netbook)
         none = plan.out / "no-faults"
         none.write_text("")
-        more = ("--wheels", self.wheels, "--fault-list", none, "--faults", self.spoilt)
+        more = ("--fault-list", none, "--faults", self.spoilt)
         cut = bridge.command.index("--")
         bridge = replace(bridge, command=(*bridge.command[:cut], *map(str, more), *bridge.command[cut:]))
         desktop = parts.desktop(body, self._desktop, self.bags / "robot.mcap", self.view_port)

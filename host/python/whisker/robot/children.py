@@ -32,7 +32,7 @@ class Program:
 
     serves: it goes on until it is asked to end, and is missed when it ends before; tells: it tells of itself on a health
     topic; moves: it can move wheels, and has a heartbeat; fed: it feeds a watchdog, and one that hangs is ended;
-    steady_s: who ran for so long is started again at once.
+    steady_s: who ran for so long is started again at once; orphaned: the signal it has when who started it has ended.
     """
 
     name: str
@@ -42,6 +42,7 @@ class Program:
     moves: bool = False
     fed: bool = False
     steady_s: float = 10.0
+    orphaned: int = signal.SIGTERM
 
     @classmethod
     def of(cls, name: str, command: list, **options) -> "Program":
@@ -97,7 +98,7 @@ class Child:
             pass_fds=pipes,
             env=environment,
         )
-        self._lifeline.tie(process.pid)
+        self._lifeline.tie(process.pid, self.program.orphaned)
         note(self._log, f"started as process {process.pid}")
         if self._pulse:
             self._pulse.started()

@@ -2,7 +2,7 @@
 
 Two pipes, of which the starting process alone holds the writing ends, so that the kernel closes them however it ends.
 
-Lifeline: nothing is ever written. When it closes, the kernel sends SIGTERM to the child's process group (fcntl(2),
+Lifeline: nothing is ever written. When it closes, the kernel sends a signal to the child's process group (fcntl(2),
 F_SETOWN, O_ASYNC). No code in the child is needed, and unlike with a parent-death signal grandchildren are included and
 the thread that started the child may end.
 
@@ -14,7 +14,6 @@ until bytes come again; at the pipe's end it stops the wheels and ends.
 import contextlib
 import fcntl
 import os
-import signal
 import time
 
 from ..errors import UserError
@@ -30,16 +29,16 @@ class Lifeline:
     def __init__(self):
         self.reading, self._writing = os.pipe2(os.O_CLOEXEC)
 
-    def tie(self, group: int) -> None:
-        """From now on this process group has SIGTERM when the pipe closes; the child alone holds the reading end."""
-        fcntl.fcntl(self.reading, fcntl.F_SETSIG, signal.SIGTERM)
+    def tie(self, group: int, sign: int) -> None:
+        """From now on this process group has the signal when the pipe closes; the child alone holds the reading end."""
+        fcntl.fcntl(self.reading, fcntl.F_SETSIG, sign)
         fcntl.fcntl(self.reading, fcntl.F_SETOWN, -group)
         fcntl.fcntl(self.reading, fcntl.F_SETFL, fcntl.fcntl(self.reading, fcntl.F_GETFL) | os.O_ASYNC)
         os.close(self.reading)
         self.reading = -1
 
     def close(self) -> None:
-        """Whatever of the group is still there gets SIGTERM."""
+        """Whatever of the group is still there gets the signal."""
         _close(self.reading, self._writing)
 
 

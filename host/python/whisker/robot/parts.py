@@ -1,5 +1,6 @@
 """The robot's process table: what runs on the netbook, what on the desktop, and what stands in for the hardware."""
 
+import signal
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,15 +14,18 @@ BRIDGE = "bridge"
 
 BASE_STEADY_S = 1.0  # a base that is started again stops the wheels: it comes at once
 
-# Inside the simulated bridge's umockdev the device is seen by whoever has these variables: they are left in file $0. At the end
-# whoever took it ends first, for umockdev does not survive a client that is left.
+# Inside the simulated bridge's umockdev the device is seen by whoever has these variables: they are left in file $0. At
+# the end whoever took it ends first, for umockdev does not survive a client that is left. When the supervisor has died
+# the world goes on for a second: a real one does not end with the robot's processes, and a base has to stop its wheels.
 LEAVE_ENVIRONMENT = """
 end() {
     rm -f "$0"
+    kill $! 2>/dev/null
     pid=$(cat "$0.pid" 2>/dev/null) && kill "$pid" 2>/dev/null && while kill -0 "$pid" 2>/dev/null; do sleep 0.05; done
     exit 0
 }
 trap end TERM
+trap 'sleep 1; end' URG
 export -p | grep -E '^export (LD_PRELOAD|UMOCKDEV_DIR)=' >"$0.new" && mv "$0.new" "$0"
 while :; do sleep 3600 & wait $!; done
 """
@@ -133,12 +137,23 @@ class Simulated:
     seconds: float
     pace: float  # simulated seconds per second
     truth: Path
+    wheels: Path  # what the base's wheels were told
 
 
 def bridge(simulated: Simulated, body: Body, meeting: Meeting) -> Program:
     """The simulation, at the wall's pace; whiskerd is started beside it."""
     command = [program("umockdev-wrapper"), program("whisker-bridge-sim"), "--scene", simulated.flat]
     command += ["--seconds", simulated.seconds, "--seed", simulated.seed, "--level", simulated.level]
-    command += ["--pace", simulated.pace, "--socket", meeting.simulation, "--truth", simulated.truth]
+    command += [
+        "--pace",
+        simulated.pace,
+        "--socket",
+        meeting.simulation,
+        "--truth",
+        simulated.truth,
+        "--wheels",
+        simulated.wheels,
+    ]
     command += ["--create", body.create, "--create-link", meeting.serial]
-    return Program.of(BRIDGE, [*command, "--", "sh", "-c", LEAVE_ENVIRONMENT, meeting.environment])
+    command += ["--", "sh", "-c", LEAVE_ENVIRONMENT, meeting.environment]
+    return Program.of(BRIDGE, command, orphaned=signal.SIGURG)  # the simulation takes no notice of it, its command does
