@@ -12,6 +12,7 @@ from linkkit import sample
 
 from whisker.robot import messages as m
 from whisker.robot.inbox import Inbox
+from whisker.robot.rows import between
 from whisker.robot.streams import envelopes
 from whisker.scene import Arena, Scene
 from whisker.simulation.scenes import make_robot
@@ -36,17 +37,20 @@ REST_S = 1.0
 
 
 def route(t_s: float) -> tuple[float, float, float]:
-    """The true pose: along the route and back, ever again, with a rest at each corner."""
+    """The true pose: along the route and back, ever again. At each corner the robot rests and turns."""
     way = [*ROUTE, *ROUTE[-2:0:-1], ROUTE[0]]
     legs = [(a, b, math.dist(a, b) / SPEED_M_S) for a, b in zip(way, way[1:], strict=False)]
-    left = t_s % sum(long + REST_S for _, _, long in legs)
+    headings = [math.atan2(b[1] - a[1], b[0] - a[0]) for a, b, _ in legs]
+    turns = [math.remainder(b - a, math.tau) for a, b in zip(headings, headings[1:] + headings[:1], strict=True)]
+    laps, left = divmod(t_s, sum(long + REST_S for _, _, long in legs))
     leg = 0
     while left > legs[leg][2] + REST_S:
         left -= legs[leg][2] + REST_S
         leg += 1
     a, b, long = legs[leg]
     x, y = (a[k] + (b[k] - a[k]) * min(1.0, left / long) for k in (0, 1))
-    return x, y, math.atan2(b[1] - a[1], b[0] - a[0])
+    turned = laps * sum(turns) + sum(turns[:leg]) + turns[leg] * max(0.0, left - long) / REST_S
+    return x, y, headings[0] + turned
 
 
 def estimate(t_s: float) -> tuple[float, float, float]:
@@ -134,7 +138,8 @@ class MadeUpRun:
             cells.append(m.NOT_READ if whisking else m.EMPTY if radius is None else m.VALUE)
             values.append(1e3 * (radius or 0.0))
         kind = m.WHISK if whisking else m.EXPLORING
-        motion, pose = np.array([0.012, 0.0, 0.0]), np.array(true)
+        before, pose = (between(route(0.0), route(max(0, n) / 10)) for n in (row - 1, row))
+        motion = between(before, pose)
         return m.Observation(
             m.Header.at(row * ROW_NS), row, kind, motion, pose, names, np.array(cells, np.uint8), np.array(values)
         )
