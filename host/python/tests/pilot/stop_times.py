@@ -85,12 +85,13 @@ class Tap(threading.Thread):
         self.start()
 
     def run(self) -> None:
-        while True:
-            for end in select.select([self._master, self._emulator], [], [])[0]:
-                data = os.read(end, 4096)
-                os.write(self._emulator if end == self._master else self._master, data)
-                if end == self._master:
-                    self._note(data)
+        with contextlib.suppress(OSError):  # one of the two ends has been closed: the case is over
+            while True:
+                for end in select.select([self._master, self._emulator], [], [])[0]:
+                    data = os.read(end, 4096)
+                    os.write(self._emulator if end == self._master else self._master, data)
+                    if end == self._master:
+                        self._note(data)
 
     def _note(self, data: bytes) -> None:
         self._orders += data
