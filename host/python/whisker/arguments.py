@@ -5,6 +5,7 @@ import math
 import pwd
 import sys
 from collections.abc import Callable
+from pathlib import Path
 
 from .errors import UserError
 
@@ -57,6 +58,12 @@ def add_ring_owner(parser) -> None:
     """--ring-owner, for commands that read a ring; None: no other user's."""
     text = "accept a ring of this user, too, not only root's, your own and the service's"
     parser.add_argument("--ring-owner", type=user, metavar="USER", help=text)
+
+
+def add_zenoh_config(parser, endpoints: str = "are those given here") -> None:
+    """--zenoh-config, for commands on the robot's network. `endpoints`: what becomes of theirs."""
+    text = f"zenoh's own configuration (JSON5): TLS and access control, see docs/remote.md; endpoints {endpoints}"
+    parser.add_argument("--zenoh-config", type=Path, metavar="FILE", help=text)
 
 
 def user(text: str) -> int:

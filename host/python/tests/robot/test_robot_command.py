@@ -4,17 +4,39 @@ import os
 import socket
 import sys
 import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 
 import pytest
 from commandkit import run, signals_as_before  # noqa: F401 - a fixture
+from keykit import documented, made_keys  # noqa: F401 - a fixture
 from linkkit import free_endpoint
+from robotkit import examples
 
 from whisker import scene as scenes
 from whisker.bridge.ring import Writer
+from whisker.cli import _parser, main
 from whisker.commands import robot
 from whisker.demo import training
-from whisker.robot import holders
+from whisker.robot import holders, parts
+from whisker.robot.children import Program
+from whisker.robot.link import Link
 from whisker.simulation.scenes import make_scene
+from whisker.view import command as view
+
+PATIENCE_S = 60.0
+# As the simulation does it: the true pose to whoever connects. Its argument: a socket.
+TELLS_TRUTH = """
+import socket, sys, time
+with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as server:
+    server.bind(sys.argv[1])
+    server.listen()
+    watcher, _ = server.accept()
+    while True:
+        watcher.send(b"truth 0 2.0 1.0 0.0")
+        time.sleep(0.02)
+"""
 
 
 def free_port() -> str:
@@ -22,8 +44,8 @@ def free_port() -> str:
 
 
 @pytest.fixture
-def started(monkeypatch, capsys, tmp_path):
-    """A call: the processes that the command would start with these options; none is, for it is stopped before."""
+def begun(monkeypatch, capsys, tmp_path):
+    """A call: what the command says on both outputs with these options; it starts nothing, for it is stopped before."""
     stopped = threading.Event()
     stopped.set()
     monkeypatch.setattr(robot, "stop_on_signals", lambda: stopped)
@@ -31,13 +53,40 @@ def started(monkeypatch, capsys, tmp_path):
     monkeypatch.setattr(robot, "load_models", lambda folder, robot: ({}, {}))
     scenes.write(tmp_path / "scene", make_scene(5)[0])
 
-    def names(*options) -> list[str]:
+    def said(*options) -> tuple[str, str]:
         place = ["--out", tmp_path, "--first-port", free_port(), "--ring", "whisker-test-robot-command"]
         code, out, err = run(capsys, "robot", tmp_path / "scene", "--models", tmp_path, *place, *options)
         assert code == 0, err
-        return out.removeprefix("starting ").partition(";")[0].split(", ")
+        return out, err
 
-    return names
+    return said
+
+
+@pytest.fixture
+def started(begun):
+    """A call: the processes that the command would start with these options."""
+    return lambda *options: begun(*options)[0].removeprefix("starting ").partition(";")[0].split(", ")
+
+
+@pytest.fixture
+def commands(monkeypatch, begun):
+    """A call: what each command of `whisker` in the process table is given with these options, as it understands it."""
+    tables = []
+
+    class Noted(robot.Supervisor):
+        def __init__(self, table, *more):
+            tables.append(table)
+            super().__init__(table, *more)
+
+    monkeypatch.setattr(robot, "Supervisor", Noted)
+    beginning = parts.whisker("")[:-1]
+
+    def understood(*options) -> dict:
+        begun(*options)
+        words = [program.command[len(beginning) :] for program in tables[-1] if "whisker.cli" in program.command]
+        return {line[0]: _parser(line[0]).parse_args(line) for line in words}
+
+    return understood
 
 
 def test_a_netbook_has_daemon_base_and_pilot(started):
@@ -158,3 +207,111 @@ def test_without_a_source_tree_models_have_to_be_given(refused, monkeypatch):
     monkeypatch.setitem(sys.modules, "whisker.simulation.world", None)
     code, line = refused("--simulated")
     assert code == 2 and "source tree" in line and "--models" in line
+
+
+WHISKER_COMMANDS = {"pilot", "navigator", "bag", "view"}
+
+
+def endpoints(arguments) -> list[str]:
+    return (getattr(arguments, "listen", None) or []) + arguments.connect
+
+
+def test_every_process_gets_the_configuration_of_zenoh(commands, keys):
+    file = documented(keys, "pilot")
+    given = commands("--desktop", "--zenoh-config", file)
+    assert given.keys() == WHISKER_COMMANDS
+    assert {name: arguments.zenoh_config for name, arguments in given.items()} == dict.fromkeys(given, file)
+    assert all(end.startswith("tls/127.0.0.1:") for arguments in given.values() for end in endpoints(arguments))
+
+
+def test_without_a_configuration_of_zenoh_nothing_is_encrypted(commands):
+    given = commands("--desktop")
+    assert {name: arguments.zenoh_config for name, arguments in given.items()} == dict.fromkeys(WHISKER_COMMANDS)
+    assert all(end.startswith("tcp/127.0.0.1:") for arguments in given.values() for end in endpoints(arguments))
+
+
+def test_a_robot_that_is_open_to_the_network_says_so_once(begun, keys, tmp_path):
+    line = "0.0.0.0:{}: whoever reaches this address can watch and take part\n"
+    open_to_all = begun("--listen", "0.0.0.0", "--first-port", port := free_port())[1]
+    assert f"whisker: tcp/{line.format(port)}" in open_to_all and open_to_all.count("whoever") == 1
+    guarded = documented(keys, "pilot")
+    assert "whoever" not in begun("--listen", "0.0.0.0", "--zenoh-config", guarded)[1]
+    assert "whoever" not in begun()[1]
+    one_sided = tmp_path / "one-sided.json5"
+    one_sided.write_text(guarded.read_text().replace("enable_mtls: true", "enable_mtls: false"))
+    words = ["--listen", "0.0.0.0", "--first-port", port := free_port(), "--zenoh-config", one_sided]
+    assert f"whisker: tls/{line.format(port)}" in begun(*words)[1]
+
+
+def test_what_is_no_configuration_of_zenoh_is_one_line_and_starts_nothing(refused, given, tmp_path):
+    file = tmp_path / "zenoh.json5"
+    file.write_text("{unheard_of: 1}")
+    code, line = refused(*given, "--zenoh-config", file)
+    assert code == 2 and line.startswith(f"whisker: {file}: no configuration of zenoh")
+    assert not (tmp_path / "logs").exists()
+
+
+def test_certificates_that_are_not_there_are_one_line(refused, given, tmp_path):
+    file = tmp_path / "zenoh.json5"
+    file.write_text("{}")
+    code, line = refused(*given, "--port", file, "--zenoh-config", file)
+    assert code == 1 and "tls/127.0.0.1:" in line and f"mend {file}" in line
+
+
+@pytest.fixture
+def stand_ins(monkeypatch):
+    """What the process table holds once the command has made it: in each process's place one that only waits, or tells
+    the truth."""
+    table, made = [], robot._table
+
+    def stand_in(program: Program, meeting: parts.Meeting) -> Program:
+        tells = program.name == parts.BRIDGE
+        command = [sys.executable, "-c", TELLS_TRUTH, meeting.simulation] if tells else ["sleep", "1000"]
+        return Program.of(program.name, command, tells=program.tells)
+
+    def waiting(arguments, meeting):
+        table[:] = [stand_in(program, meeting) for program in made(arguments, meeting)]
+        return table
+
+    monkeypatch.setattr(robot, "_table", waiting)
+    return table
+
+
+@pytest.fixture
+def supervised(monkeypatch, given, tmp_path, stand_ins):
+    """A supervisor of stand-ins with the options of a call, until the test is over; gives what becomes its exit code."""
+    stop = threading.Event()
+    monkeypatch.setattr(robot, "stop_on_signals", lambda: stop)
+    place = ["--simulated", "--desktop", "--view-port", 0, "--ring", "whisker-test-robot-command", "--out", tmp_path]
+    with ThreadPoolExecutor(1) as pool:
+        yield lambda *options: pool.submit(main, [str(word) for word in ("robot", *given, *place, *options)])
+        stop.set()
+
+
+def test_with_the_documented_configuration_view_hears_the_supervisor(supervised, stand_ins, keys):
+    """It believes the netbook's certificate about health and truth, and not that of another view."""
+    port, guests_end = free_port(), free_endpoint().replace("tcp/", "tls/")
+    forged = {"health/base": examples()["health/pilot"], "truth": examples()["truth"]}
+    ends = [word for end in (f"tls/127.0.0.1:{port}", guests_end) for word in ("--connect", end)]
+    file, heard = documented(keys, "view"), []
+    ended = supervised("--first-port", port, "--zenoh-config", documented(keys, "pilot"))
+    with (
+        Link("view", listen=[guests_end], config=file) as guest,
+        closing(view._source(_parser("view").parse_args(["view", *ends, "--zenoh-config", str(file)]))) as source,
+    ):
+        streams = {topic: guest.publish(topic) for topic in forged}
+        give_up_s = time.monotonic() + PATIENCE_S
+        while not stand_ins or {topic for topic, _ in heard} < expected(stand_ins) or len(heard) < 50:
+            assert time.monotonic() < give_up_s and not ended.done(), sorted({topic for topic, _ in heard})
+            for topic, message in forged.items():
+                streams[topic].send(message)
+            heard += source.poll()
+            time.sleep(0.01)
+    assert {topic for topic, _ in heard} == expected(stand_ins) and source.refused()["count"] == 0
+    assert {message.process for topic, message in heard if topic == "health/base"} == {"base"}
+    assert {message.pose.position.x for topic, message in heard if topic == "truth"} == {2.0}
+
+
+def expected(table: list[Program]) -> set[str]:
+    """The topics of a supervisor of a simulated robot."""
+    return {"truth"} | {f"health/{program.name}" for program in table if not program.tells}

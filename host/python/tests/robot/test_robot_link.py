@@ -2,11 +2,10 @@
 
 import argparse
 import re
-import subprocess
 import time
-from pathlib import Path
 
 import pytest
+from keykit import documented, made_keys  # noqa: F401 - a fixture
 from linkkit import free_endpoint, sample
 from robotkit import Cable, examples, take_until
 
@@ -478,41 +477,6 @@ def test_what_is_no_configuration_of_zenoh_is_one_line(tmp_path, text):
         with pytest.raises(LinkError, match="no configuration of zenoh .*give a JSON5 file") as refused:
             Link("pilot", config=path)
         assert str(refused.value).startswith(f"{path}: ") and "\n" not in str(refused.value)
-
-
-def openssl(folder: Path, *words: str) -> None:
-    subprocess.run(["openssl", *words], cwd=folder, check=True, capture_output=True)
-
-
-KEY = ("-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes")
-
-
-def certificates(folder: Path, *names: str) -> None:
-    """An authority, and a key and certificate of it for each name: the commands of docs/remote.md."""
-    openssl(folder, "req", "-x509", *KEY, "-keyout", "ca.key", "-out", "ca.pem", "-days", "2", "-subj", "/CN=robot")
-    (folder / "san").write_text("subjectAltName=DNS:localhost,IP:127.0.0.1\n")
-    for name in names:
-        openssl(folder, "req", *KEY, "-keyout", f"{name}.key", "-out", f"{name}.csr", "-subj", f"/CN={name}")
-        signed = ("-CA", "ca.pem", "-CAkey", "ca.key", "-CAcreateserial", "-days", "2", "-extfile", "san")
-        openssl(folder, "x509", "-req", "-in", f"{name}.csr", *signed, "-out", f"{name}.pem")
-
-
-def documented(folder: Path, name: str) -> Path:
-    """The configuration of docs/remote.md with this folder's certificates in place of those it names."""
-    text = (Path(__file__).parents[4] / "docs/remote.md").read_text()
-    example = text.partition("```json5\n")[2].partition("```")[0]
-    assert "access_control" in example
-    file = folder / f"{name}.json5"
-    file.write_text(example.replace("/etc/whisker/own", str(folder / name)).replace("/etc/whisker", str(folder)))
-    return file
-
-
-@pytest.fixture(scope="module")
-def keys(tmp_path_factory):
-    """Certificates of pilot, navigator and view."""
-    folder = tmp_path_factory.mktemp("keys")
-    certificates(folder, "pilot", "navigator", "view")
-    return folder
 
 
 def test_with_the_documented_configuration_only_the_pilot_gives_rows(keys):

@@ -329,6 +329,7 @@ def test_port_in_use_is_one_line(capfd):
         (["--host", "192.0.2.1", "--port", "0"], "not an address of this machine"),
         (["--ring", "a/b"], "not the name of a ring"),
         (["--ring", ""], "not the name of a ring"),
+        (["--zenoh-config", "/nosuch"], "/nosuch: no configuration of zenoh (No such file or directory); give a JSON5"),
     ],
 )
 def test_bad_arguments_are_one_line(capfd, arguments, complaint):

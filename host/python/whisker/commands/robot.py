@@ -5,12 +5,13 @@ import tempfile
 from pathlib import Path
 
 from .. import scene as scenes
-from ..arguments import RING, number_above, whole_number
+from ..arguments import RING, add_zenoh_config, number_above, whole_number
 from ..errors import UserError
 from ..robot import holders, parts
-from ..robot.link import Link
+from ..robot.link import read_config
 from ..robot.logs import run_folder
 from ..robot.models import load_models
+from ..robot.options import link_that_warns
 from ..robot.supervisor import Supervisor
 from ..robot.truth import TruthWatcher
 from ..simulation.bridge import simulated_scene
@@ -43,6 +44,7 @@ def add(parser) -> None:
     parser.add_argument("--listen", default=parts.LOOPBACK, metavar="ADDRESS", help=text)
     text = "of three, for supervisor, pilot and navigator (default: %(default)s)"
     parser.add_argument("--first-port", type=whole_number(1, 65533), default=parts.FIRST_PORT, metavar="N", help=text)
+    add_zenoh_config(parser, "become tls/ADDRESS:PORT")
     text = "no hardware: the scene (default: the demo's of this seed) with a simulated robot, at the wall clock's pace"
     parser.add_argument("--simulated", action="store_true", help=text)
     parser.add_argument(
@@ -60,9 +62,10 @@ def run(arguments) -> int:
     _look_first(arguments)
     logs = run_folder(arguments.out / "logs")
     with tempfile.TemporaryDirectory(prefix="whisker-") as folder:
-        meeting = parts.Meeting(arguments.ring, Path(folder), arguments.listen, arguments.first_port)
+        address = (arguments.listen, arguments.first_port, arguments.zenoh_config)
+        meeting = parts.Meeting(arguments.ring, Path(folder), *address)
         table = _table(arguments, meeting)
-        with Link("supervisor", listen=[meeting.endpoint(0)]) as link:
+        with link_that_warns("supervisor", [meeting.endpoint(0)], arguments.zenoh_config) as link:
             if arguments.simulated:
                 TruthWatcher(meeting.simulation, link, stop).start()
             until = parts.BRIDGE if arguments.simulated else None
@@ -82,6 +85,7 @@ def _look_first(arguments) -> None:
         scene = scenes.load(arguments.scene)
         if arguments.models:
             load_models(arguments.models, scene.robot)
+    read_config(arguments.zenoh_config)
     for number in range(3):
         holders.check_port(arguments.listen, arguments.first_port + number, "--first-port")
     if arguments.desktop and not arguments.no_view and arguments.view_port:

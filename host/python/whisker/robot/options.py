@@ -5,6 +5,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from ..arguments import add_zenoh_config
 from .link import NAVIGATOR_ENDPOINT, PILOT_ENDPOINT, ROBOT, Link, is_guarded, is_loopback, read_config
 
 NOWHERE = "none"
@@ -21,26 +22,28 @@ def add_link(parser: argparse.ArgumentParser, listen: Sequence[str], connect: Se
         text = f"{what}, tcp/HOST:PORT or tls/HOST:PORT; repeatable, or '{NOWHERE}' (default: {told})"
         parser.add_argument(option, action="append", metavar="ENDPOINT", help=text)
     parser.add_argument("--scout", action="store_true", help="also find others, and be found, by multicast")
-    text = (
-        "zenoh's own configuration (JSON5): TLS and access control, see docs/remote.md; endpoints are those given here"
-    )
-    parser.add_argument("--zenoh-config", type=Path, metavar="FILE", help=text)
+    add_zenoh_config(parser)
     parser.add_argument("--lock-step", action="store_true", help="nothing is left out and senders wait: for simulation")
     parser.set_defaults(standard={"listen": list(listen), "connect": list(connect)})
 
 
 def open_link(process: str, arguments: argparse.Namespace) -> Link:
-    """The link that these arguments ask for; a line on standard error when anybody on other machines can reach it."""
+    """The link that these arguments ask for, by `link_that_warns`."""
     ends = {}
     for name, standard in arguments.standard.items():
         given = getattr(arguments, name)
         ends[name] = [end for end in (standard if given is None else given) if end != NOWHERE]
-    config = read_config(arguments.zenoh_config)
-    for endpoint in ends["listen"]:
-        if not is_loopback(endpoint) and not is_guarded(endpoint, config):
+    more = {"config": arguments.zenoh_config, "lock_step": arguments.lock_step, "scout": arguments.scout}
+    return link_that_warns(process, robot=arguments.robot, **ends, **more)
+
+
+def link_that_warns(process: str, listen: Sequence[str], config: Path | None, **more) -> Link:
+    """A Link, and a line on standard error for each endpoint of `listen` that is open to other machines."""
+    settings = read_config(config)
+    for endpoint in listen:
+        if not is_loopback(endpoint) and not is_guarded(endpoint, settings):
             print(f"whisker: {endpoint}: whoever reaches this address can watch and take part", file=sys.stderr)
-    more = {"lock_step": arguments.lock_step, "scout": arguments.scout, "config": arguments.zenoh_config}
-    return Link(process, arguments.robot, **ends, **more)
+    return Link(process, listen=listen, config=config, **more)
 
 
-__all__ = ["NAVIGATOR_ENDPOINT", "PILOT_ENDPOINT", "add_link", "open_link"]
+__all__ = ["NAVIGATOR_ENDPOINT", "PILOT_ENDPOINT", "add_link", "link_that_warns", "open_link"]

@@ -70,10 +70,16 @@ class Meeting(Places):
 
     address: str = LOOPBACK
     first_port: int = FIRST_PORT
+    zenoh_config: Path | None = None  # with it they meet by TLS
 
     def endpoint(self, number: int) -> str:
         """0: the supervisor's, 1: the pilot's, 2: the navigator's."""
-        return f"tcp/{self.address}:{self.first_port + number}"
+        return f"{'tls' if self.zenoh_config else 'tcp'}/{self.address}:{self.first_port + number}"
+
+    @property
+    def options(self) -> list:
+        """What every process that meets others is given besides endpoints."""
+        return ["--zenoh-config", self.zenoh_config] if self.zenoh_config else []
 
 
 @dataclass(frozen=True)
@@ -105,6 +111,7 @@ def netbook(body: Body, meeting: Meeting, with_desktop: bool) -> list[Program]:
     base = [program("whisker-base"), "--port", body.port, "--socket", meeting.base, "--model", body.create, "--wait"]
     pilot = [*whisker("pilot"), body.scene, "--models", body.models, "--ring", meeting.ring, "--base", meeting.base]
     pilot += ["--seed", body.seed, "--listen", meeting.endpoint(1), "--connect", meeting.endpoint(2)]
+    pilot += meeting.options
     pilot += ["--await", "navigator"] if with_desktop else []
     return [
         Program.of("base", base, moves=True, fed=True, steady_s=BASE_STEADY_S),
@@ -116,8 +123,9 @@ def desktop(body: Body, meeting: Meeting, bag: Path | None, view_port: int | Non
     """Navigator, and, where they are wanted, bag and view."""
     navigator = [*whisker("navigator"), body.scene, "--stay", "--checkpoint", meeting.checkpoint]
     navigator += ["--listen", meeting.endpoint(2), "--connect", meeting.endpoint(1)]
+    navigator += meeting.options
     table = [Program.of("navigator", navigator, tells=True)]
-    everybody = [word for number in range(3) for word in ("--connect", meeting.endpoint(number))]
+    everybody = [word for number in range(3) for word in ("--connect", meeting.endpoint(number))] + meeting.options
     if bag:
         command = [*whisker("bag"), bag, "--scene", body.scene, "--stay", "--next", *everybody]
         table.append(Program.of("bag", command, tells=True))

@@ -8,7 +8,7 @@ import logging
 import sys
 import webbrowser
 
-from ..arguments import add_ring_owner
+from ..arguments import add_ring_owner, add_zenoh_config
 from ..scene import load
 from ..stopping import listen
 from .hub import Hub
@@ -43,6 +43,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         metavar="tcp/HOST:PORT",
         help="a process of the robot; repeatable (default: pilot and navigator of this machine)",
     )
+    add_zenoh_config(parser)
     parser.add_argument("--port", type=_port, default=PORT, help="0 takes a free one (default: %(default)s)")
     parser.add_argument(
         "--host",
@@ -92,8 +93,9 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _source(arguments: argparse.Namespace) -> NoRobot:
     """The robot, if any option asks for it."""
-    asked = arguments.robot or arguments.scene or arguments.connect
-    return join(arguments.robot or ROBOT, arguments.connect) if asked else NoRobot()
+    config = arguments.zenoh_config
+    asked = arguments.robot or arguments.scene or arguments.connect or config
+    return join(arguments.robot or ROBOT, arguments.connect, config) if asked else NoRobot()
 
 
 async def _serve(arguments: argparse.Namespace, hub: Hub) -> int:

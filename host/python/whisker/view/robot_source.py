@@ -1,6 +1,7 @@
 """Where the robot's messages come from: a whisker.robot.inbox, which the server's rounds empty."""
 
 from collections.abc import Callable
+from pathlib import Path
 
 from ..errors import UserError
 
@@ -46,13 +47,14 @@ class InboxSource(NoRobot):
         return [(received.topic, received.message) for received in self._inbox.take(timeout_s=0.0)]
 
 
-def join(robot: str, connect: list[str]) -> InboxSource:
+def join(robot: str, connect: list[str], config: Path | None = None) -> InboxSource:
     """Listen to a robot's streams, read-only: nothing is published or announced. `connect`: its processes' endpoints,
-    tcp/HOST:PORT, which need not be there yet; none: those of this machine. UserError: it cannot be."""
+    tcp/HOST:PORT or tls/HOST:PORT, which need not be there yet; none: those of this machine. `config`: a file of zenoh's
+    own configuration. UserError: it cannot be."""
     try:
         from ..robot.link import NAVIGATOR_ENDPOINT, PILOT_ENDPOINT, Link
     except ImportError as error:
         raise UserError(f"--robot needs {error.name}, which is not installed; make setup installs it") from error
     endpoints = connect or [PILOT_ENDPOINT, NAVIGATOR_ENDPOINT]
-    link = Link("view", robot, connect=endpoints)
+    link = Link("view", robot, connect=endpoints, config=config)
     return InboxSource(robot, link.subscribe(*WANTED), f"Listening at {', '.join(endpoints)}", link.close)
