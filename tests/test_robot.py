@@ -3,6 +3,7 @@
 import csv
 import json
 import os
+import re
 import signal
 import socket
 import subprocess
@@ -99,6 +100,37 @@ def test_under_a_pace_the_world_goes_on_without_its_bridge(tmp_path):
             told(server)
         process.terminate()
         process.wait(END_S)
+    assert not Path("/dev/shm", ring).exists()
+
+
+@pytest.mark.parametrize("level", ["bytes", "rtl"])
+def test_under_a_pace_the_world_goes_on_while_its_host_is_stopped(tmp_path, level):
+    """As on hardware: the FIFO overflows, what it has no room for is counted, and the ticks tell the gap."""
+    scene, _ = write_flat_scene(tmp_path, SEED)
+    path, ring = tmp_path / "sim.sock", f"whisker-test-stopped-{os.getpid()}"
+    command = simulation(tmp_path, scene, 3600, SEED, ring, "--socket", path, "--pace", 1, "--level", level)
+    with running(command) as process, Reader(ring, wait_s=10.0) as reader, watching(path) as server:
+        reader.wait(10.0)
+        host = reader.info.writer_pid
+        os.kill(host, signal.SIGSTOP)
+        ticks = [told(server) for _ in range(12)]
+        os.kill(host, signal.SIGCONT)
+        assert np.diff(ticks).tolist() == [200] * 11
+        frames = []
+        for view in reader.frames():
+            frames.append(view.copy())
+            if view["dropped"][-1]:
+                break
+        frames = np.concatenate(frames)
+        lost = np.diff(frames["tick"]).sum() - (len(frames) - 1)
+        assert lost == frames["dropped"][-1] > 1000
+        os.kill(host, signal.SIGSTOP)
+        for _ in range(12):
+            told(server)
+        os.kill(host, signal.SIGTERM)
+        os.kill(host, signal.SIGCONT)
+        assert process.wait(END_S) == 1
+        assert re.search(r"the run ended after \d+ of 7200000 ticks$", process.stderr.read())
     assert not Path("/dev/shm", ring).exists()
 
 

@@ -1,6 +1,7 @@
 #include "bridge_model.h"
 
 #include "Vwhisker_bridge.h"
+#include "Vwhisker_bridge___024root.h"
 
 namespace bridge_sim
 {
@@ -51,6 +52,11 @@ bool BridgeModel::link_busy() const
 bool BridgeModel::running() const
 {
     return top_->running;
+}
+
+uint32_t BridgeModel::frames_dropped() const
+{
+    return top_->rootp->whisker_bridge__DOT__dropped;
 }
 
 // Inputs settle with the clock low, outputs are read as they stand at the rising edge, then the edge comes. The node

@@ -26,8 +26,9 @@ class BridgeModel : public UtmiDevice
     // Begins a tick: one cycle of the external tick strobe.
     void start_tick();
 
-    bool link_busy() const; // SYNC and transfer on the node link in progress
-    bool running() const;   // from start until the last frame is in the FIFO
+    bool link_busy() const;          // SYNC and transfer on the node link in progress
+    bool running() const;            // from start until the last frame is in the FIFO
+    uint32_t frames_dropped() const; // since start
 
   private:
     NodeBus &bus_;

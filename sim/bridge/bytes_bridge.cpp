@@ -32,6 +32,11 @@ bool BytesBridge::running() const
     return running_;
 }
 
+uint32_t BytesBridge::frames_dropped() const
+{
+    return counters_.dropped;
+}
+
 // ------------------------------------------------------------------------------------------------------------ ticks
 
 bool BytesBridge::begin_tick()

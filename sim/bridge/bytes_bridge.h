@@ -26,7 +26,8 @@ class BytesBridge
     // A report that the host reads, whole; empty: there is none of this id.
     Bytes get_report(uint8_t id) const;
 
-    bool running() const; // from start until the last frame is in the FIFO
+    bool running() const;            // from start until the last frame is in the FIFO
+    uint32_t frames_dropped() const; // since start
 
     // A tick begins: SYNC. False: none is taken now.
     bool begin_tick();

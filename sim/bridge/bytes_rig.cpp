@@ -52,6 +52,11 @@ bool BytesRig::running() const
     return bridge_.running();
 }
 
+uint32_t BytesRig::frames_dropped() const
+{
+    return bridge_.frames_dropped();
+}
+
 void BytesRig::power_up()
 {
     device_.power_up();

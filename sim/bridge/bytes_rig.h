@@ -21,6 +21,7 @@ class BytesRig : public Rig
     const HostCounters &counters() const override;
     uint64_t cycles() const override;
     bool running() const override;
+    uint32_t frames_dropped() const override;
 
   protected:
     void power_up() override;

@@ -28,8 +28,8 @@ class DevicePort
     // The cable is pulled; every result handed over before still reaches the host.
     virtual void unplug() = 0;
 
-    // Whoever had claimed the device is gone, and nobody has claimed it since. Known for a device under umockdev only.
-    virtual bool deserted() const
+    // Does the host live by this machine's clock? One that is emulated may be slower: a paced world waits for it.
+    virtual bool host_in_real_time() const
     {
         return false;
     }

@@ -12,7 +12,8 @@ namespace
 {
 
 constexpr double TICK_S = static_cast<double>(WHISKER_LIMIT_TICK_PERIOD) / WHISKER_LIMIT_CLOCK_HZ;
-constexpr double SLIP_S = 0.05; // of lateness that is made up for
+constexpr double SLIP_S = 0.05;          // of lateness that is made up for
+constexpr double HOST_PATIENCE_S = 0.05; // more than a host needs that this machine lets run
 constexpr double MS_PER_S = 1000;
 
 double now_s()
@@ -54,6 +55,16 @@ int Pace::wait_ms(uint64_t tick, int most_ms) const
         return most_ms;
     }
     return std::clamp(static_cast<int>(-late_s(tick) * MS_PER_S), 0, most_ms);
+}
+
+bool Patience::over(bool takes)
+{
+    if (takes) {
+        since_.reset();
+        return false;
+    }
+    since_ = since_.value_or(now_s());
+    return now_s() - *since_ > HOST_PATIENCE_S;
 }
 
 } // namespace bridge_sim

@@ -29,4 +29,15 @@ class Pace
     std::optional<double> origin_s_; // wall time of tick 0, once it is known
 };
 
+// How long a paced world waits for a host that takes no frames: as long as one that is alive may take.
+class Patience
+{
+  public:
+    // The host takes frames, or does not: has it not for too long?
+    bool over(bool takes);
+
+  private:
+    std::optional<double> since_; // wall time; it takes none
+};
+
 } // namespace bridge_sim

@@ -106,20 +106,29 @@ void Rig::last_tick(const sim_field *fields, const std::function<bool()> &usb_st
 // The transfer of a run's first tick brings no records, so it makes no frame.
 void Rig::count_frame()
 {
+    waiting_ = frame_bytes_waiting();
+    dropped_ = frames_dropped();
     if (ticked_) {
         waiting_ += WHISKER_FRAME_BYTES;
     }
     ticked_ = true;
 }
 
+// The bridge counts anew from each start.
+uint64_t Rig::newly_dropped() const
+{
+    const uint32_t count = frames_dropped();
+    return count < dropped_ ? count : count - dropped_;
+}
+
 uint64_t Rig::frame_bytes_waiting() const
 {
-    return waiting_;
+    return waiting_ - std::min(newly_dropped() * WHISKER_FRAME_BYTES, waiting_);
 }
 
 bool Rig::bulk_packet_due() const
 {
-    return waiting_ >= WHISKER_LIMIT_BULK_PACKET || end_due_;
+    return frame_bytes_waiting() >= WHISKER_LIMIT_BULK_PACKET || end_due_;
 }
 
 void Rig::bulk_packet_taken(uint64_t bytes)
@@ -131,6 +140,7 @@ void Rig::bulk_packet_taken(uint64_t bytes)
 void Rig::forget_frames()
 {
     waiting_ = 0;
+    dropped_ = frames_dropped();
     ticked_ = false;
     end_due_ = false;
     forgot_ = true;

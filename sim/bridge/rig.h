@@ -42,8 +42,9 @@ class Rig
     virtual const HostCounters &counters() const = 0;
 
     NodeBus &bus();
-    virtual uint64_t cycles() const = 0; // of the bridge's clock that were simulated; 0 at level bytes
-    virtual bool running() const = 0;    // started, and the last frame not yet in the FIFO
+    virtual uint64_t cycles() const = 0;         // of the bridge's clock that were simulated; 0 at level bytes
+    virtual bool running() const = 0;            // started, and the last frame not yet in the FIFO
+    virtual uint32_t frames_dropped() const = 0; // since start: the FIFO had no room for them
 
     // Spoils the reading that the next tick starts, or the transfer that the next tick makes.
     void spoil(const LaneFault &fault);
@@ -56,9 +57,9 @@ class Rig
     // The tick after a stop: its transfer brings the last records, and the last frame is in the FIFO on return.
     void last_tick(const sim_field *fields, const std::function<bool()> &usb_step);
 
-    // Frames made since the last bus reset but not yet taken, in bytes, and whether a bulk packet is due: a full one,
-    // or the short (perhaps empty) one that ends the stream after the last frame. The caller reports each packet it
-    // took.
+    // Frames made since the last bus reset but neither dropped nor taken yet, in bytes, and whether a bulk packet is
+    // due: a full one, or the short (perhaps empty) one that ends the stream after the last frame. The caller reports
+    // each packet it took.
     uint64_t frame_bytes_waiting() const;
     bool bulk_packet_due() const;
     void bulk_packet_taken(uint64_t bytes);
@@ -77,9 +78,11 @@ class Rig
 
   private:
     void count_frame();
+    uint64_t newly_dropped() const;
 
     NodeBus bus_;
-    uint64_t waiting_ = 0;
+    uint64_t waiting_ = 0; // bytes; of frames dropped since the last tick it does not know yet
+    uint32_t dropped_ = 0; // of frames_dropped(), those that waiting_ is without
     bool ticked_ = false;  // a tick has begun since start
     bool end_due_ = false; // the packet that ends the stream has not been taken
     bool forgot_ = false;  // in the midst of this tick

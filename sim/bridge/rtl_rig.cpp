@@ -58,6 +58,11 @@ bool RtlRig::running() const
     return bridge_.running();
 }
 
+uint32_t RtlRig::frames_dropped() const
+{
+    return bridge_.frames_dropped();
+}
+
 void RtlRig::power_up()
 {
     bridge_.reset();

@@ -20,6 +20,7 @@ class RtlRig : public Rig
     const HostCounters &counters() const override;
     uint64_t cycles() const override;
     bool running() const override;
+    uint32_t frames_dropped() const override;
 
   protected:
     void power_up() override;

@@ -83,7 +83,7 @@ bool Simulation::advance()
         child_->kill();
         throw std::runtime_error("the command did not end when asked to: killed");
     }
-    if (plugged_ && rig_->running() && scheduler_.stop_seen()) {
+    if (plugged_ && rig_->running() && scheduler_.stop_seen() && runner_.may_end()) {
         produce_last_tick();
         return true;
     }
@@ -101,18 +101,35 @@ bool Simulation::advance()
 // ----------------------------------------------------------------------------------------------------------------
 // ticks
 
-bool Simulation::may_tick()
+bool Simulation::bridge_ticks() const
 {
-    return plugged_ && !over_ && rig_->running() && runner_.ready() && followers_.allows(tick_) &&
-           (!create_ || create_->has(followers_.bytes_at(tick_))) && pace_.due(tick_);
+    return plugged_ && rig_->running() && !scheduler_.stop_seen();
 }
 
-// Wall time goes on while nobody takes frames: so does the world, once it has begun, unless a pilot counts its ticks.
-// The bridge of a host that was killed runs on until the next host stops it.
+// Wall time goes on while nobody takes frames: so does the world, unless a pilot counts its ticks.
+bool Simulation::wall_leads() const
+{
+    return pace_.on() && !followers_.in_step();
+}
+
+// The bridge of a host that was stopped or killed ticks on: its FIFO overflows, until the host takes frames again or
+// the next one stops it.
+bool Simulation::host_allows()
+{
+    const bool ready = runner_.ready();
+    const bool away = patience_.over(ready);
+    return ready || (away && wall_leads() && port_->host_in_real_time());
+}
+
+bool Simulation::may_tick()
+{
+    return bridge_ticks() && !over_ && followers_.allows(tick_) &&
+           (!create_ || create_->has(followers_.bytes_at(tick_))) && pace_.due(tick_) && host_allows();
+}
+
 bool Simulation::may_pass()
 {
-    return pace_.on() && tick_ > 0 && !over_ && !(plugged_ && rig_->running() && !port_->deserted()) &&
-           !followers_.in_step() && pace_.due(tick_);
+    return wall_leads() && tick_ > 0 && !over_ && !bridge_ticks() && pace_.due(tick_);
 }
 
 void Simulation::produce_tick()

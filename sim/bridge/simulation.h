@@ -41,6 +41,9 @@ class Simulation
 
     bool ended() const;
     bool advance();
+    bool bridge_ticks() const;
+    bool wall_leads() const;
+    bool host_allows();
     bool may_tick();
     bool may_pass();
     void produce_tick();
@@ -78,6 +81,7 @@ class Simulation
     FollowerServer followers_;           // after it: who connects finds the port
     Defect defect_;
     Pace pace_;
+    Patience patience_;
     std::unique_ptr<DevicePort> port_;
     std::unique_ptr<Child> child_;
     std::array<sim_field, LANES> fields_{};

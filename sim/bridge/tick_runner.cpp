@@ -15,6 +15,8 @@ constexpr unsigned STORM_POLLS = 200;
 // 12 ms away leave 6 KiB in the bridge's 16 KiB FIFO.
 constexpr uint64_t AWAY_TICKS = 24;
 constexpr uint64_t BYTES_UNDER_WAY = 2 * WHISKER_LIMIT_BULK_PACKET;
+// With so many bytes waiting there is room for the frame on its way and the last one.
+constexpr uint64_t BYTES_WITH_ROOM = WHISKER_LIMIT_FIFO_BYTES - 2 * WHISKER_FRAME_BYTES;
 
 bool on_link(LaneFaultKind kind)
 {
@@ -39,6 +41,11 @@ TickRunner::TickRunner(Rig &rig, UrbScheduler &scheduler, std::optional<FaultPla
 bool TickRunner::ready() const
 {
     return away_ || (scheduler_.bulk_waiting() && rig_.frame_bytes_waiting() < BYTES_UNDER_WAY);
+}
+
+bool TickRunner::may_end() const
+{
+    return scheduler_.bulk_waiting() || rig_.frame_bytes_waiting() <= BYTES_WITH_ROOM;
 }
 
 void TickRunner::tick(uint64_t number, const sim_field *fields)

@@ -20,6 +20,10 @@ class TickRunner
     // may be on their way, one being framed and one being sent.
     bool ready() const;
 
+    // May the tick after a stop be produced? Its frame waits for room in the FIFO, which a host that is away does not
+    // make.
+    bool may_end() const;
+
     // Produces the tick of this number; `fields` has one entry per populated lane.
     void tick(uint64_t number, const sim_field *fields);
 

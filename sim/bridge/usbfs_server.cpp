@@ -1,6 +1,5 @@
 #include "usbfs_server.h"
 
-#include <atomic>
 #include <future>
 #include <mutex>
 #include <stdexcept>
@@ -73,7 +72,6 @@ struct UsbfsServer::State {
     std::vector<DeviceRequest> inbox;
     GMainContext *context = nullptr; // of umockdev's thread, known from the first ioctl on
     int wake = -1;
-    std::atomic<bool> claimed = false;
     UsbfsSession session{[this](DeviceRequest request) { post(std::move(request)); }};
     UMockdevTestbed *testbed = nullptr;
     UMockdevIoctlBase *handler = nullptr;
@@ -100,7 +98,6 @@ struct UsbfsServer::State {
             state->context = g_main_context_get_thread_default();
         }
         state->session.ioctl(client);
-        state->claimed = state->session.claimed();
         return TRUE;
     }
 };
@@ -183,9 +180,9 @@ UsbfsServer::~UsbfsServer()
     g_object_unref(state_->handler);
 }
 
-bool UsbfsServer::deserted() const
+bool UsbfsServer::host_in_real_time() const
 {
-    return !state_->claimed;
+    return true;
 }
 
 int UsbfsServer::wake_descriptor() const
@@ -210,7 +207,6 @@ void UsbfsServer::deliver(std::vector<Urb> completed)
     }
     post([state = state_.get(), completed = std::move(completed)]() mutable {
         state->session.completed(std::move(completed));
-        state->claimed = state->session.claimed();
     });
 }
 

@@ -26,7 +26,7 @@ class UsbfsServer : public DevicePort
     // Removes it and tells udev's listeners. Who has it open gets ENODEV once every result handed over is fetched.
     void unplug() override;
 
-    bool deserted() const override;
+    bool host_in_real_time() const override;
     int wake_descriptor() const override;
     std::vector<DeviceRequest> take_requests() override;
     void deliver(std::vector<Urb> completed) override;

@@ -154,11 +154,6 @@ void UsbfsSession::discard(UsbfsConnection &connection)
     connection.answer(found ? 0 : EINVAL);
 }
 
-bool UsbfsSession::claimed() const
-{
-    return !interfaces_.empty();
-}
-
 void UsbfsSession::completed(std::vector<Urb> urbs)
 {
     forget_closed();

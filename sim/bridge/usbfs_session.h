@@ -26,9 +26,6 @@ class UsbfsSession
     // The device has this node from now on; empty: it is unplugged. Clients of an earlier node have lost it.
     void set_node(const std::string &node);
 
-    // Has any client claimed an interface, as far as is known?
-    bool claimed() const;
-
     // Transfers the model has ended.
     void completed(std::vector<Urb> urbs);
 

@@ -38,6 +38,17 @@ void a_tick_whose_time_has_come_is_not_waited_for(void **)
     assert_int_equal(pace.wait_ms(1000, MOST_MS), 0);
 }
 
+void a_host_is_waited_for_until_patience_is_over(void **)
+{
+    Patience patience;
+    for (unsigned i = 0; i < 2; i++) {
+        assert_false(patience.over(false));
+        while (!patience.over(false)) {
+        }
+        assert_false(patience.over(true));
+    }
+}
+
 } // namespace
 
 int main()
@@ -46,6 +57,7 @@ int main()
         cmocka_unit_test(without_a_pace_nothing_waits),
         cmocka_unit_test(the_first_tick_sets_the_time_of_the_next),
         cmocka_unit_test(a_tick_whose_time_has_come_is_not_waited_for),
+        cmocka_unit_test(a_host_is_waited_for_until_patience_is_over),
     };
     return cmocka_run_group_tests(tests, nullptr, nullptr);
 }
