@@ -10,6 +10,7 @@ from drills.pairs import KILL, STOP, Campaign
 
 SEED, PATIENCE_S = 3, 600.0
 HITS = (
+    (("whiskerd", STOP),),
     (("supervisor", STOP),),
     (("guard", STOP), ("driver", STOP)),
     (("guard", KILL), ("driver", STOP)),

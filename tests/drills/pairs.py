@@ -211,11 +211,6 @@ def concerns_wheels(hits: Hits) -> bool:
     return bool(CONCERN_WHEELS & names) and "bridge" not in names
 
 
-def stands_still(hits: Hits) -> bool:
-    """Whether the simulated world waits for a whiskerd that is stopped: what was ordered meanwhile is obeyed afterwards."""
-    return ("whiskerd", STOP) in hits
-
-
 def judge_stop(trial: Trial, wheels: Wheels, since: float) -> None:
     """Wait for the wheels to stand; note when they did, and whether that was in time."""
     await_true(lambda: wheels.stopped_after(since) is not None, 10 * STOP_S)
@@ -231,15 +226,13 @@ def attempt(number: int, hits: Hits, robot: Robot) -> Trial:
     begun = time.monotonic()
     for pid, sign in targets:
         _send(pid, sign)
-    if concerns_wheels(hits) and not stands_still(hits):
+    if concerns_wheels(hits):
         judge_stop(trial, robot.wheels, begun)
     time.sleep(max(0.0, begun + HOLD_S - time.monotonic()))
     for pid, sign in targets:
         if sign == signal.SIGSTOP:
             _send(pid, signal.SIGCONT)
     held = time.monotonic()
-    if concerns_wheels(hits) and stands_still(hits):
-        judge_stop(trial, robot.wheels, held)
     if ends_run(hits):
         trial.left = robot.await_gone(GONE_S)
         if trial.left:
