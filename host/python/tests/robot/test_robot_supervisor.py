@@ -63,9 +63,10 @@ def test_pauses_double_up_to_the_longest(tmp_path):
 
 
 def test_who_ran_steadily_is_started_again_at_once(tmp_path):
-    kept = Kept(replace(FAILS, steady_s=0.0), tmp_path)
+    kept = Kept(replace(STAYS, steady_s=0.0), tmp_path)
     kept.start()
     first = kept.keeper.pid
+    os.kill(first, signal.SIGKILL)
     assert kept.ended.wait(PATIENCE_S)
     kept.keeper.step()
     assert kept.keeper.restarts == 1 and kept.keeper.pid not in (0, first)
