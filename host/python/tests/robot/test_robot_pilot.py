@@ -151,6 +151,23 @@ def test_it_goes_on_as_after_a_lost_base_when_samples_are_back(live):
     assert live.made.state == RUNNING and live.made.counters()["halts"] == 1
 
 
+def test_another_writer_of_the_ring_stops_the_wheels_however_soon_it_comes(live):
+    live.ring.bring(0)
+    live.steps()
+    live.ring.restarts = 1
+    live.steps()
+    assert (live.base.stops, live.base.drives) == (1, 1)
+    live.ring.bring(400)
+    live.steps()
+    assert live.flight.interruptions == [399] and (live.base.stops, live.base.drives) == (1, 2)
+    live.steps(later=SILENCE_S)
+    live.ring.restarts = 2
+    live.ring.bring(4000)
+    live.steps()
+    assert live.base.stops == 2, "they stood already"
+    assert live.made.counters()["halts"] == 2
+
+
 def test_what_is_too_old_is_left_out_and_counted(live):
     live.ring.bring(*range(0, 40 * 15, 40))
     live.steps()

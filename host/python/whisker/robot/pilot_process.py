@@ -1,8 +1,8 @@
 """The pilot as a process of its own, the netbook's: reads the ring, drives the base, tells the others what it perceives.
 
 `fly_in_step` follows a simulation that waits for it, to the end of the ring. `LiveFlight` goes on whatever comes and
-goes: ring, whiskerd, base, navigator; each loss is told in the pilot's health, and the wheels stand while no samples come
-or while who watches over the pilot is silent (lifeline.Heartbeat).
+goes: ring, whiskerd, base, navigator; each loss is told in the pilot's health. The wheels stop when the ring gets another
+writer. They stand while no samples come, or while who watches over the pilot is silent (lifeline.Heartbeat).
 """
 
 import time
@@ -105,6 +105,7 @@ class LiveFlight:
         self._flight, self._ring, self._wheels, self._link, self._clock = flight, ring, wheels, link, clock
         self._health, self._heartbeat = Health(link, self.counters), heartbeat
         self._fed_s, self._halted, self._begin_anew = clock(), True, False
+        self._restarts = ring.restarts
         self.blocks_left_out = self.halts = self.navigator_lost = 0
         self._navigator, self._last_error = False, ""
 
@@ -120,6 +121,7 @@ class LiveFlight:
 
     def _step(self) -> None:
         come = self._ring.take(LOOK_S)
+        self._stop_for_another_writer()
         self._obey_heartbeat()
         made = come[-LATE_BLOCKS:]
         self.blocks_left_out += len(come) - len(made)
@@ -136,6 +138,13 @@ class LiveFlight:
         state = self.state
         self._last_error = self._last_error if state == RUNNING else state
         self._health.tell(self._stamp_ns, state, self._last_error)
+
+    def _stop_for_another_writer(self) -> None:
+        """A whiskerd that died can be back before SILENCE_S; the wheels turn by samples of the one that died."""
+        if self._ring.restarts != self._restarts and not self._halted:
+            self._begin_anew = True
+            self._halt()
+        self._restarts = self._ring.restarts
 
     def _obey_heartbeat(self) -> None:
         """While it is silent the wheels stand and blocks are still read."""
