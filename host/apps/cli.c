@@ -1,5 +1,6 @@
 #include "cli.h"
 
+#include <ctype.h>
 #include <errno.h>
 #include <pwd.h>
 #include <signal.h>
@@ -87,10 +88,11 @@ bool cli_user(const char *program, const char *option, const char *text, uint32_
 
 bool cli_number(const char *program, const char *option, const char *text, uint32_t min, uint32_t max, uint32_t *value)
 {
+    const bool is_hex = text[0] == '0' && (text[1] == 'x' || text[1] == 'X');
     char *end;
     errno = 0;
-    const unsigned long long number = strtoull(text, &end, 0);
-    if (errno || end == text || *end != '\0' || text[0] == '-' || number < min || number > max) {
+    const unsigned long long number = strtoull(text, &end, is_hex ? 16 : 10);
+    if (errno || !isdigit((unsigned char)text[0]) || *end != '\0' || number < min || number > max) {
         fprintf(stderr, "%s: --%s %s: give a whole number from %u to %u\n", program, option, text, min, max);
         return false;
     }

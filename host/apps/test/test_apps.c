@@ -167,6 +167,10 @@ static void wrong_use_is_refused_in_one_line(void **state)
     assert_refused(lane_29, 2, "the lane mask 0x10000000 names more than lanes 0 to 27; use bits of 0xfffffff");
     const char *rubbish[] = {WHISKERD, "--ring", "x", "--word-gap", "3us", NULL};
     assert_refused(rubbish, 2, "--word-gap 3us: give a whole number from 0 to 255");
+    const char *behind_zero[] = {WHISKERD, "--ring", "x", "--word-gap", " -18446744073709551615", NULL};
+    assert_refused(behind_zero, 2, "-18446744073709551615: give a whole number from 0 to 255");
+    const char *octal[] = {WHISKER_LOG, "--ring", "x", "--lanes", "034", NULL}; /* 34, and 28 in C */
+    assert_refused(octal, 2, "--lanes 034: give a whole number from 1 to 28");
     const char *unknown[] = {WHISKERD, "--rong", "x", NULL};
     assert_refused(unknown, 2, "--rong");
     const char *too_much[] = {WHISKER_LOG, "--ring", "x", "y", NULL};
