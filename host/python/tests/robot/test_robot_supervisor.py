@@ -17,6 +17,7 @@ from robotkit import take_until
 from whisker.errors import UserError
 from whisker.robot.children import Child, Program, living
 from whisker.robot.link import Link
+from whisker.robot.parts import LEAVE_ENVIRONMENT
 from whisker.robot.supervisor import PAUSE_MOST_S, PAUSE_S, Keeper, RunError, Supervisor
 
 PATIENCE_S = 60.0
@@ -217,6 +218,19 @@ def test_a_killed_supervisor_leaves_nobody_behind(supervised):
     assert await_true(lambda: len(groups(folder)) == 3) and all(map(living, groups(folder)))
     process.kill()
     assert await_true(lambda: not any(map(living, groups(folder))))
+
+
+def test_a_killed_shell_of_the_simulated_bridge_leaves_nobody_behind(tmp_path):
+    """Bridge and supervisor may be killed at once: then nobody is left who could end what the shell has started."""
+    words = ["sh", "-c", LEAVE_ENVIRONMENT, tmp_path / "environment"]
+    shell = subprocess.Popen(words, env=os.environ | {"UMOCKDEV_DIR": "/nowhere"}, start_new_session=True)
+    assert await_true(lambda: (tmp_path / "environment").exists() and len(living(shell.pid)) == 2)
+    shell.kill()
+    shell.wait()
+    gone = await_true(lambda: not living(shell.pid))
+    if not gone:
+        os.killpg(shell.pid, signal.SIGKILL)
+    assert gone
 
 
 def test_who_can_move_wheels_notices_a_supervisor_that_hangs(supervised):

@@ -17,6 +17,7 @@ BASE_STEADY_S = 1.0  # a base that is started again stops the wheels: it comes a
 # Inside the simulated bridge's umockdev the device is seen by whoever has these variables: they are left in file $0. At
 # the end whoever took it ends first, for umockdev does not survive a client that is left. When the supervisor has died
 # the world goes on for a second: a real one does not end with the robot's processes, and a base has to stop its wheels.
+# Each sleep is short, because one outlives a shell that is killed.
 LEAVE_ENVIRONMENT = """
 end() {
     rm -f "$0"
@@ -27,7 +28,7 @@ end() {
 trap end TERM
 trap 'sleep 1; end' URG
 export -p | grep -E '^export (LD_PRELOAD|UMOCKDEV_DIR)=' >"$0.new" && mv "$0.new" "$0"
-while :; do sleep 3600 & wait $!; done
+while :; do sleep 1 & wait $!; done
 """
 # Waits for them, and becomes the command with them; its other variables stay its own.
 WITH_ENVIRONMENT = 'while [ ! -e "$0" ]; do sleep 0.1; done; . "$0"; echo $$ >"$0.pid"; exec "$@"'
