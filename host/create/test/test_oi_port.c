@@ -78,6 +78,22 @@ static void the_baud_is_set(void **state)
     close(base);
 }
 
+/* The base's plug carries data wires only: no carrier is ever seen on the line. */
+static void no_modem_wire_is_waited_for(void **state)
+{
+    (void)state;
+    const char *path;
+    const int base = make_line(&path), port = create_port_open(path, 57600);
+    struct termios line;
+    assert_int_equal(tcgetattr(port, &line), 0);
+    assert_true(line.c_cflag & CLOCAL);
+    assert_true(line.c_cflag & CREAD);
+    assert_false(line.c_cflag & CRTSCTS);
+    assert_false(line.c_cflag & HUPCL);
+    close(port);
+    close(base);
+}
+
 static void what_is_no_free_line_is_refused(void **state)
 {
     (void)state;
@@ -111,9 +127,8 @@ static void a_line_that_goes_is_noticed(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_byte_passes),
-        cmocka_unit_test(the_baud_is_set),
-        cmocka_unit_test(what_is_no_free_line_is_refused),
+        cmocka_unit_test(every_byte_passes),           cmocka_unit_test(the_baud_is_set),
+        cmocka_unit_test(no_modem_wire_is_waited_for), cmocka_unit_test(what_is_no_free_line_is_refused),
         cmocka_unit_test(a_line_that_goes_is_noticed),
     };
     return cmocka_run_group_tests_name("port", tests, NULL, NULL);

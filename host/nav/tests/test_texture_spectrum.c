@@ -171,6 +171,26 @@ static void stuck_railed_and_caught_channels_are_told(void **state)
     assert_int_equal(h.caught, 1);
 }
 
+static int railed(double first, double second, double third)
+{
+    const double low = 0.0, high = 100.0;
+    const struct nav_texture_limits limits = {.channels = 1, .low = &low, .high = &high};
+    double window[] = {first, second, third};
+    return nav_texture_clean(window, 3, &limits).railed;
+}
+
+static void two_samples_at_or_beyond_a_stop_are_a_rail(void **state)
+{
+    (void)state;
+    assert_int_equal(railed(50.0, 0.0, 0.0), 1);
+    assert_int_equal(railed(100.0, 100.0, 50.0), 1);
+    assert_int_equal(railed(-7.0, -5.0, 50.0), 1);
+    assert_int_equal(railed(50.0, 105.0, 107.0), 1);
+    assert_int_equal(railed(0.0, 50.0, 0.0), 0);
+    assert_int_equal(railed(50.0, 1.0, 1.0), 0);
+    assert_int_equal(railed(99.0, 99.0, 50.0), 0);
+}
+
 static bool follow(struct nav_texture_catch *c, double level, bool sudden)
 {
     double window[8];
@@ -365,6 +385,7 @@ int main(void)
         cmocka_unit_test(stretches_too_short_or_single_are_refused),
         cmocka_unit_test(a_constant_window_has_finite_features),
         cmocka_unit_test(missing_samples_and_spikes_are_bridged_and_counted),
+        cmocka_unit_test(two_samples_at_or_beyond_a_stop_are_a_rail),
         cmocka_unit_test(stuck_railed_and_caught_channels_are_told),
         cmocka_unit_test(windows_name_surfaces_borders_and_strangers),
         cmocka_unit_test(bad_windows_are_no_evidence_and_never_nan),
