@@ -9,7 +9,8 @@ from whisker import scenes
 from whisker.nav import localise
 from whisker.scene import load
 from whisker.scenes import geometry
-from whisker.scenes.readings import hold_back
+from whisker.scenes.explorer import explore
+from whisker.scenes.readings import World, hold_back, odometry
 
 FIELDS = ("t_s", "odometry", "texture", "radial_m", "truth")
 FAMILIES = [*scenes.BASES, *(f"anchor+{modifier}" for modifier in scenes.MODIFIERS)]
@@ -65,6 +66,27 @@ def test_odometry_adds_up_to_the_true_path_but_for_its_noise():
     moved = np.hypot(*np.diff(slipping.truth[:, :2], axis=0).T)
     standing = (moved == 0.0) & (slipping.odometry[1:, 0] == 0.02)
     assert 20 <= standing.sum() <= 40
+
+
+def test_heading_drifts_by_so_much_in_a_straight_metre_and_not_at_rest():
+    metres, rows, drift_rad = 400, 50, 0.02
+    path = np.zeros((metres * rows + 1, 3))
+    path[:, 0] = np.arange(len(path)) / rows
+    world = World(odometry=0.0, drift_rad=drift_rad)
+    turns = odometry(path, world, np.random.default_rng(3))[:, 2].reshape(metres, rows).sum(axis=1)
+    assert np.std(turns) == pytest.approx(drift_rad, rel=0.15)
+    assert not odometry(np.zeros((rows, 3)), world, np.random.default_rng(3)).any()
+
+
+def test_a_robot_that_explores_gets_about_and_reads_textures_only_in_steady_motion():
+    made = scenes.make("robot", 18, rows=10)
+    arena, robot, start = made.scene.arena, made.scene.robot, made.observations.truth[0]
+    explored = explore(arena, robot, start, 1200, np.random.default_rng(18))
+    assert np.ptp(explored.path[:, :2], axis=0).min() > 1.0
+    assert np.isfinite(explored.radial_m).any(axis=0).all(), "every whisker measures something in two minutes"
+    assert 0.05 < explored.held.mean() < 0.5 < explored.sweeping.mean() < 0.95
+    assert not (explored.held & explored.sweeping).any()
+    assert not (explored.sweeping[1:] & explored.held[:-1]).any(), "the windows of a whisk's end are the whisk's"
 
 
 def test_held_back_odometry_comes_all_at_once():
