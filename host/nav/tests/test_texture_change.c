@@ -4,6 +4,7 @@
 #include "texture_features.h"
 #include "texture_settle.h"
 #include "texture_strange.h"
+#include "texture_watch.h"
 
 enum { LENGTH = 16, FEATURES_MOST = 64 };
 
@@ -76,6 +77,23 @@ static void the_ratio_is_the_formula(void **state)
     nav_texture_change_free(c);
 }
 
+/* The drive falls by as much as the classes differ, but is as loud as the second class even then: what each of the 3
+ * blocks after the fall says against the first class counts half against the change. */
+static void a_side_that_does_not_sound_like_its_class_counts_against_the_change(void **state)
+{
+    (void)state;
+    struct numbers m;
+    int after;
+    double last = 0.0, first_class = 1.0 / (1.0 + exp(8.0));
+    struct nav_texture_change *c = make(&m, 5.0);
+    for (int i = 0; i < 9; i++)
+        last = weigh(c, i < 6 ? exp(4.0) : exp(2.0), &after);
+    double against = 3.0 * log((0.99 * first_class + 0.005) / (0.99 * (1.0 - first_class) + 0.005));
+    assert_int_equal(after, 3);
+    assert_near(last, 3.0 * 6.0 / 9.0 * (16.0 - 8.0) + 0.5 * against, 1e-6);
+    nav_texture_change_free(c);
+}
+
 /* A stretch twice as far off as the other class is hardly more evidence than the class itself: the formula without the
  * bound would say three times as much. */
 static void a_stray_block_claims_no_more_than_the_classes_differ(void **state)
@@ -139,6 +157,57 @@ static void means_of_windows_are_measured_from_the_nearest_class(void **state)
     nav_texture_strange_free(s);
 }
 
+/* Blocks of a watch, whose samples alternate by `amplitude`; the samples told to lie behind a change. */
+static int watch(struct nav_texture_watch *w, double amplitude, int blocks, bool held)
+{
+    int told = 0;
+    for (int i = 0; i < blocks * LENGTH; i++) {
+        double x = 500.0 + (i % 2 ? amplitude : -amplitude);
+        int behind = nav_texture_watch_take(w, &x, held);
+        told = behind ? behind : told;
+    }
+    return told;
+}
+
+static void a_watch_tells_how_many_samples_lie_behind_a_change_and_nothing_else(void **state)
+{
+    (void)state;
+    struct numbers m;
+    const struct nav_texture_limits limits = {.channels = 1};
+    struct nav_texture_watch w;
+    const struct nav_texture_rules rules = {.channels = 1, .change = make(&m, 5.0)};
+    assert_true(nav_texture_watch_make(&w, &rules, &limits));
+    assert_int_equal(watch(&w, 1.0, 20, false), 0);
+    assert_int_equal(watch(&w, exp(2.0), 1, false), 0);
+    assert_int_equal(watch(&w, exp(2.0), 1, false), 2 * LENGTH);
+    assert_int_equal(watch(&w, exp(2.0), 20, false), 0);
+    nav_texture_watch_free(&w);
+    nav_texture_change_free(rules.change);
+}
+
+/* What lies before a block that an edge caught or held, or nobody can read, is not compared with what follows. */
+static void an_edge_interrupts_the_row_of_blocks(void **state)
+{
+    (void)state;
+    const double span = 100.0;
+    const struct {
+        double amplitude;
+        bool held;
+    } edges[] = {{200.0, false}, {1.0, true}, {NAN, false}};
+    for (int e = 0; e < 3; e++) {
+        struct numbers m;
+        const struct nav_texture_limits limits = {.channels = 1, .span = &span};
+        struct nav_texture_watch w;
+        const struct nav_texture_rules rules = {.channels = 1, .change = make(&m, 5.0)};
+        assert_true(nav_texture_watch_make(&w, &rules, &limits));
+        assert_int_equal(watch(&w, 1.0, 10, false), 0);
+        assert_int_equal(watch(&w, edges[e].amplitude, 1, edges[e].held), 0);
+        assert_int_equal(watch(&w, exp(2.0), 10, false), 0);
+        nav_texture_watch_free(&w);
+        nav_texture_change_free(rules.change);
+    }
+}
+
 static struct nav_texture_settle *settling(double limit)
 {
     const double floor[] = {0.0, 0.0}, limits[] = {limit, limit, limit, limit, limit};
@@ -192,10 +261,13 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_change_is_found_where_it_is),
         cmocka_unit_test(the_ratio_is_the_formula),
+        cmocka_unit_test(a_side_that_does_not_sound_like_its_class_counts_against_the_change),
         cmocka_unit_test(a_stray_block_claims_no_more_than_the_classes_differ),
         cmocka_unit_test(what_a_drive_has_of_its_own_is_no_change),
         cmocka_unit_test(impossible_numbers_make_no_detector),
         cmocka_unit_test(means_of_windows_are_measured_from_the_nearest_class),
+        cmocka_unit_test(a_watch_tells_how_many_samples_lie_behind_a_change_and_nothing_else),
+        cmocka_unit_test(an_edge_interrupts_the_row_of_blocks),
         cmocka_unit_test(ringing_falls_steadily),
         cmocka_unit_test(what_is_steady_silent_or_growing_does_not_ring),
     };

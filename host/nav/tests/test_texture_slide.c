@@ -76,6 +76,32 @@ static void missing_samples_are_counted_and_the_sum_comes_back_to_nought(void **
     nav_texture_free(t);
 }
 
+static void after_a_reset_only_the_samples_since_count(void **state)
+{
+    (void)state;
+    static double samples[SAMPLES * WHISKERS * AXES];
+    struct nav_rng rng;
+    nav_rng_seed(&rng, 8, 0);
+    struct nav_texture *t = trained(&rng);
+    struct nav_texture_slide *s = nav_texture_slide_new(t, WHISKERS, WINDOW);
+    struct nav_texture_slide *fresh = nav_texture_slide_new(t, WHISKERS, WINDOW);
+    draw(&rng, samples);
+    nav_texture_slide_push(s, samples, SAMPLES - WINDOW / 2);
+    nav_texture_slide_reset(s);
+    for (int n = 0; n < 2 * WINDOW; n++) {
+        nav_texture_slide_push(s, samples + n * WHISKERS * AXES, 1);
+        nav_texture_slide_push(fresh, samples + n * WHISKERS * AXES, 1);
+        for (int w = 0; w < WHISKERS; w++) {
+            double again[CLASSES], first[CLASSES];
+            assert_int_equal(nav_texture_slide_loglik(s, w, again), nav_texture_slide_loglik(fresh, w, first));
+            assert_memory_equal(again, first, sizeof first);
+        }
+    }
+    nav_texture_slide_free(fresh);
+    nav_texture_slide_free(s);
+    nav_texture_free(t);
+}
+
 static void impossible_sizes_make_no_window(void **state)
 {
     (void)state;
@@ -94,6 +120,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_window_equals_equation_1_over_the_same_samples),
         cmocka_unit_test(missing_samples_are_counted_and_the_sum_comes_back_to_nought),
+        cmocka_unit_test(after_a_reset_only_the_samples_since_count),
         cmocka_unit_test(impossible_sizes_make_no_window),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -261,6 +261,52 @@ static void make_model(struct model *m)
     assert_non_null(m->rung);
 }
 
+/* Squared distance of the features z from a middle at 0, with axes along the two diagonals of the first two features:
+ * each axis by its own weight, what lies beyond both by a third. */
+static double distance_along(const double *z, int count, const double *weight, double beyond)
+{
+    double first = (z[0] + z[1]) / sqrt(2.0), second = (z[0] - z[1]) / sqrt(2.0), rest = 0.0;
+    for (int f = 2; f < count; f++)
+        rest += z[f] * z[f];
+    return (weight[0] * first * first + weight[1] * second * second + beyond * rest) / count;
+}
+
+static void the_distance_is_weighed_along_each_axis(void **state)
+{
+    (void)state;
+    const double weight[] = {3.0, 0.25}, floor = 0.0, beyond = 0.5, bias = 0.0, diagonal = 1.0 / sqrt(2.0);
+    double none[FEATURES_MOST] = {0.0}, scale[FEATURES_MOST], axis[2 * FEATURES_MOST] = {0.0}, window[16], loglik;
+    int count;
+    for (int f = 0; f < FEATURES_MOST; f++)
+        scale[f] = 1.0;
+    struct nav_texture_features *features = nav_texture_features_new(1, 16, 0, 0, &floor);
+    count = nav_texture_features_count(features);
+    nav_texture_features_free(features);
+    axis[0] = axis[1] = axis[count] = diagonal;
+    axis[count + 1] = -diagonal;
+    const struct nav_texture_rung_numbers numbers = {.classes = 1,
+                                                     .channels = 1,
+                                                     .length = 16,
+                                                     .axes = 2,
+                                                     .temper = 1.0,
+                                                     .floor = &floor,
+                                                     .centre = none,
+                                                     .scale = scale,
+                                                     .weight = none,
+                                                     .bias = &bias,
+                                                     .middle = none,
+                                                     .axis = axis,
+                                                     .axis_weight = weight,
+                                                     .beyond = &beyond};
+    struct nav_texture_rung *rung = nav_texture_rung_new(&numbers);
+    draw(window, 16, 11);
+    double distance = nav_texture_rung_judge(rung, window, &loglik);
+    const double *z = nav_texture_rung_features(rung, &count);
+    assert_true(fabs(z[0] - z[1]) > 0.1);
+    assert_near(distance, distance_along(z, count, weight, beyond), 1e-9);
+    nav_texture_rung_free(rung);
+}
+
 static struct nav_texture_stream *stream_of(const struct model *m, int step)
 {
     const struct nav_texture_rules rules = {.channels = 1,
@@ -387,6 +433,7 @@ int main(void)
         cmocka_unit_test(missing_samples_and_spikes_are_bridged_and_counted),
         cmocka_unit_test(two_samples_at_or_beyond_a_stop_are_a_rail),
         cmocka_unit_test(stuck_railed_and_caught_channels_are_told),
+        cmocka_unit_test(the_distance_is_weighed_along_each_axis),
         cmocka_unit_test(windows_name_surfaces_borders_and_strangers),
         cmocka_unit_test(bad_windows_are_no_evidence_and_never_nan),
         cmocka_unit_test(sequential_decisions_stop_when_sure_and_give_up),
