@@ -12,7 +12,7 @@ from chainrun import BUILD, END_S
 
 from whisker.bridge.ring import FRAME
 from whisker.cli import main
-from whisker.protocol import LIMITS
+from whisker.protocol import LIMITS, SENSOR_ERRORS
 from whisker.recording import read
 from whisker.simulation.bridge import SimulationError, read_faults
 
@@ -72,6 +72,18 @@ def test_more_lanes_than_the_scene_has_are_at_rest(build, tmp_path):
     assert frames.dtype == FRAME and (frames["lane_mask"] == 0xFF).all()
     assert (frames["lane"]["status"][:, :8] == 0).mean() > 0.9
     assert (np.abs(frames["lane"]["alpha"][50:-1, 7].astype(int) - 0x8000) < 2000).all()
+
+
+def test_faults_are_told_to_the_simulation_in_the_order_they_strike(tmp_path):
+    path = tmp_path / "faults.toml"
+    path.write_text(FAULTS + '[[fault]]\ntick = 0\nlane = 1\nkind = "sensor_flip"\n')
+    low = 1 << SENSOR_ERRORS["field_low"]["sensor_bit"]
+    assert read_faults(str(path), 2000).splitlines() == [
+        "lane 0 1 sensor_flip 0",  # the first bit, where none is named
+        f"lane 600 0 sensor_error {low}",
+        "usb 800 host_away",
+        "lane 1000 2 link_flip 5",
+    ]
 
 
 @contextmanager

@@ -6,6 +6,7 @@ import stat
 import threading
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,9 +14,10 @@ import pytest
 from whisker import scene as scenes
 from whisker.bridge.ring import FRAME, Reader, RingError
 from whisker.demo import summary
-from whisker.demo.__main__ import fresh_folder
-from whisker.demo.chain import ChainError, ChainRun, Link, run_chain
+from whisker.demo.__main__ import fresh_folder, guarded, parse
+from whisker.demo.chain import ChainError, ChainRun, Link, _await_end, run_chain
 from whisker.native import ffi, lib
+from whisker.protocol import LIMITS
 from whisker.robot.blocks import blocks
 from whisker.simulation.bridge import flat_scene
 from whisker.simulation.link import SimLink
@@ -195,6 +197,59 @@ def test_no_child_outlives_a_failure(tmp_path):
     while (left := running_with(marker)) and time.monotonic() < until:
         pass
     assert left == []
+
+
+def test_a_killed_whiskerds_ring_is_removed(tmp_path):
+    kept = tmp_path / "ring"
+    bridge = f"""while [ "$1" != --ring ]; do shift; done; : >"/dev/shm/$2"; echo "$2" >{kept}; exit 5\n"""
+    with pytest.raises(ChainError):
+        run_chain(chain_of(tmp_path, bridge), lambda tick: None)
+    ring = Path("/dev/shm", kept.read_text().strip())
+    left = ring.exists()
+    ring.unlink(missing_ok=True)
+    assert not left
+
+
+def test_a_failure_of_who_ends_last_is_told_too():
+    """When all have ended before anybody looks."""
+
+    def ended(failed):
+        program = SimpleNamespace(serves=False)
+        return SimpleNamespace(running=False, program=program, failed=failed, ended_s=1.0, failure=lambda: "bag failed")
+
+    with pytest.raises(ChainError, match="bag failed"):
+        _await_end([ended(False), ended(True)])
+    _await_end([ended(False), ended(False)])
+
+
+@pytest.mark.parametrize(
+    ("raised", "code", "line"),
+    [
+        (None, 0, ""),
+        (ChainError("bridge failed; see its log"), 1, "demo: bridge failed; see its log\n"),
+        (scenes.SceneError("arena.toml: mend it"), 1, "demo: arena.toml: mend it\n"),
+        (KeyboardInterrupt(), 130, "demo: interrupted\n"),
+    ],
+)
+def test_what_ends_a_demo_is_one_line_and_an_exit_code(capsys, monkeypatch, raised, code, line):
+    monkeypatch.setattr("whisker.demo.__main__.interrupt_on_signals", lambda: None)
+
+    def job(options):
+        if raised:
+            raise raised
+
+    assert guarded("demo", job, parse([])) == code
+    assert capsys.readouterr() == ("", line)
+
+
+def test_the_nodes_link_is_set_by_options_and_else_the_fastest():
+    def link(*words):
+        options = parse(list(words))
+        return options.sck_divider, options.word_gap, options.sample_point
+
+    assert link("--sck-divider", "8", "--word-gap", "40", "--sample-point", "6") == (8, 40, 6)
+    divider, gap, sample = link()
+    assert (divider, gap) == (LIMITS["sck_divider_min"], LIMITS["word_gap_min"]) and 1 <= sample <= divider
 
 
 def running_with(word):
