@@ -205,8 +205,8 @@ static int list_all(struct maker *w)
     return failed;
 }
 
-/* Free space does not depend on the heading, so one heading's phases tell which cells may ever be free. A slice's shift
- * reaches one cell to either side. */
+/* Free space does not depend on the heading, and a slice's shift reaches one cell to either side, so cells as they lie
+ * unshifted in one heading tell which may ever be free. */
 static int find_spans(const struct maker *w)
 {
     struct nav_mixture *m = w->m;
@@ -216,15 +216,12 @@ static int find_spans(const struct maker *w)
         return -1;
     for (int j = 0; j < m->ny; j++) {
         m->begin[j] = m->nx;
-        for (int layer = 0; layer < m->sub * m->sub; layer++) {
-            for (int i = 0; i < 3 * (m->nx + 2); i++) {
-                int x = i % (m->nx + 2) - 1, y = j + i / (m->nx + 2) - 1;
-                size_t row = (size_t)layer * (size_t)(m->ny + 2) + (size_t)(y + 1);
-                if (w->cell[row * (size_t)(m->nx + 2) + (size_t)(x + 1)] == 0)
-                    continue;
-                m->begin[j] = x - 1 < m->begin[j] ? x - 1 : m->begin[j];
-                m->end[j] = x + 2 > m->end[j] ? x + 2 : m->end[j];
-            }
+        for (int i = 0; i < 3 * (m->nx + 2); i++) {
+            int x = i % (m->nx + 2) - 1, y = j + i / (m->nx + 2) - 1;
+            if (w->cell[(size_t)(y + 1) * (size_t)m->pitch + (size_t)(x + 1)] == 0)
+                continue;
+            m->begin[j] = x - 1 < m->begin[j] ? x - 1 : m->begin[j];
+            m->end[j] = x + 2 > m->end[j] ? x + 2 : m->end[j];
         }
         m->begin[j] = m->begin[j] < 0 ? 0 : m->begin[j];
         m->end[j] = m->end[j] > m->nx ? m->nx : m->end[j];
