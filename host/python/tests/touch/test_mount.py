@@ -30,3 +30,4 @@ def test_outer_whisker_is_sure_only_of_its_tip():
     mount = MOUNTS[0]
     assert mount.distance(100.0, mount.corner_turn) is None
     assert mount.distance(150.0, mount.corner_turn) == pytest.approx(140.0)
+    assert mount.distance(mount.length_mm, mount.corner_turn) == mount.length_mm

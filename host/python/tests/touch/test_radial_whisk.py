@@ -6,11 +6,12 @@ import math
 import numpy as np
 import pytest
 from commandkit import run
-from whisks import TIP_MM, whisks
+from whisks import TIP_MM, whisk, whisks
 
 from whisker.tables import TableError
 from whisker.touch.radial import model as radial
 from whisker.touch.radial.model import Contact, Whisks
+from whisker.touch.radial.shape import shape_of, terms_of
 
 
 def errors(model, held: Whisks) -> np.ndarray:
@@ -44,6 +45,18 @@ def test_speed_may_vary_by_three(calibrated):
     for speed in (0.6, 1.8):
         held = whisks(rng, 8, 0.02, speed=speed)
         assert rms(errors(calibrated[0], held)) < 2.5
+
+
+def test_what_lies_long_before_a_whisk_changes_nothing():
+    made = whisk(110.0, np.random.default_rng(7))
+    quiet = np.round(32768 + np.random.default_rng(8).normal(0, 11, (6000, 2)))
+    drifted = quiet.copy()
+    drifted[1000:2000] += 0.05 * np.abs(made.samples - 32768).max()
+    found = []
+    for lead in (quiet, drifted):
+        samples = np.concatenate([lead, made.samples])
+        found.append(shape_of(Contact(np.arange(len(samples)) / 2000.0, samples, np.full(len(samples), math.pi / 24))))
+    assert found[0].peak == found[1].peak and np.array_equal(*map(terms_of, found), equal_nan=True)
 
 
 def test_it_is_as_sure_as_it_is_right(calibrated):

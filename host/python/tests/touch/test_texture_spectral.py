@@ -1,6 +1,7 @@
 """The default texture method: training, calibration, faults, borders, other rates and widths, files, command line."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from whisker.touch.texture import model as texture
 from whisker.touch.texture.fit import STRETCHES
 from whisker.touch.texture.spectral import SpectralModel
 from whisker.touch.texture.strange import fit_strange
-from whisker.touch.texture.train import train
+from whisker.touch.texture.train import SURE, _sure, train
 
 RATE_HZ = 2000.0
 WINDOW = 200
@@ -147,6 +148,9 @@ def test_windows_in_a_row_betray_a_surface_that_one_does_not():
     assert np.mean([refused(drive(6.0 * (n % 2))) for n in range(20)]) < 0.05
     few = [0, 1, 2, 10, 11, 12]
     assert fit_strange([features[n] for n in few], labels[few], folds[few], WINDOW, 0.995) is None
+    for windows, is_told in ((2, False), (3, True)):  # one mean of two windows shows no spread within its recording
+        some = [f if n % 10 < 7 else f[:windows] for n, f in enumerate(features)]
+        assert (fit_strange(some, labels, folds, WINDOW, 0.995) is not None) == is_told
 
 
 def test_a_whisker_that_rings_from_another_surface_names_none_and_says_little():
@@ -212,6 +216,24 @@ def test_sequential_decisions_take_fewer_samples_and_may_not_know(model):
         assert [(d.samples, d.label) for d in found] == [(4 * WINDOW, -1)] * 2
     finally:
         model.sure = sure
+
+
+class SureOf:
+    """Stands for twins: one recording, right from a sureness on."""
+
+    def __init__(self, needed):
+        self.needed, self.sure = needed, None
+
+    def judge(self, part, window, sequential):
+        right = self.sure >= self.needed
+        return [
+            SimpleNamespace(loglik=np.array([0.0, -1.0] if right else [-1.0, 0.0]), confidence=1.0, samples=self.sure)
+        ]
+
+
+@pytest.mark.parametrize("needed", SURE)
+def test_the_least_sureness_that_is_right_as_often_is_found(needed):
+    assert _sure([SureOf(needed)], [None], [0], [0], WINDOW, 1.0) == (needed, needed, 1.0)
 
 
 def test_block_by_block_is_as_all_at_once(model):
