@@ -126,6 +126,23 @@ def test_a_simulated_robot_learns_its_own_whiskers(capsys, monkeypatch, tmp_path
         training.flat(scenes.load(tmp_path / "out/scene" if not given else tmp_path / "given"))
 
 
+def test_a_simulated_robot_learns_once_and_nothing_where_models_are_given(capsys, monkeypatch, tmp_path):
+    learnt, stopped = [], threading.Event()
+    stopped.set()
+    monkeypatch.setattr(robot, "stop_on_signals", lambda: stopped)
+
+    def learn(models, *_):
+        learnt.append(models)
+        models.mkdir(exist_ok=True)
+        (models / "texture.json").touch()
+
+    monkeypatch.setattr("whisker.demo.training.learn", learn)
+    common = ["robot", "--simulated", "--out", tmp_path / "out", "--first-port"]
+    for options in ([], [], ["--models", tmp_path / "out/models"], ["--models", tmp_path]):
+        run(capsys, *common, free_port(), *options)
+    assert learnt == [tmp_path / "out/models"]
+
+
 @pytest.fixture
 def refused(capsys, monkeypatch, tmp_path):
     """A call: (exit code, line) of a start that is refused. Nothing is started, and nobody is waited for."""

@@ -7,10 +7,11 @@ import pytest
 
 from whisker.bridge.ring import SAMPLE
 from whisker.pilot.base import BaseLost, Motion
+from whisker.pilot.behaviour import BLOCK_TICKS, ODOMETRY_TICKS
 from whisker.robot import wheels as wheels_module
 from whisker.robot.health import RUNNING
-from whisker.robot.pilot_process import LOST, NO_HEARTBEAT, SILENCE_S, LiveFlight, LiveWheels
-from whisker.robot.wheels import RETRY_S, LiveBase, wheels_of
+from whisker.robot.pilot_process import LOST, NO_HEARTBEAT, SILENCE_S, Flight, LiveFlight, LiveWheels
+from whisker.robot.wheels import RETRY_S, LiveBase, Report, wheels_of
 
 
 class Clock:
@@ -189,6 +190,20 @@ def test_health_tells_of_navigator_and_base(live):
 def test_the_end_stops_the_wheels_and_closes_the_base(live):
     live.made.run(lambda: True)
     assert live.base.stops == 1 and live.base.closed
+
+
+def test_a_row_is_told_with_the_samples_at_its_end():
+    """As odometry is: both are of the row's own time."""
+    row, report = {"t_s": 0.1}, Report((0.01, 0.0, 0.0))
+    pilot = SimpleNamespace(block=lambda *_: (0.1, 0.0), odometry=lambda *_: row)
+    wheels = SimpleNamespace(drive=lambda *_: None, odometry=lambda tick: report)
+    told, nothing = [], SimpleNamespace(write=lambda *_: None)
+    teller = SimpleNamespace(row=lambda *what: told.append(what), block=lambda last: None)
+    samples = np.zeros((BLOCK_TICKS, 6), SAMPLE)
+    samples["alpha"] = np.arange(BLOCK_TICKS)[:, None]
+    Flight(pilot, wheels, nothing, nothing, teller).take((ODOMETRY_TICKS - BLOCK_TICKS, samples))
+    ((made, moved, last),) = told
+    assert made is row and moved is report and last["alpha"].tolist() == [BLOCK_TICKS - 1] * 6
 
 
 # ---------------------------------------------------------------------------------------------------------------------

@@ -35,6 +35,18 @@ def test_a_heartbeat_beats_falls_silent_comes_back_and_ends():
     assert heart.ended and not heart.beats
 
 
+def test_a_heartbeat_is_never_waited_for_whatever_pipe_it_comes_by():
+    reading, writing = os.pipe()
+    clock = Clock()
+    heart = Heartbeat(reading, clock)
+    assert not os.get_blocking(reading)
+    clock.now += SILENT_S
+    assert not heart.beats and not heart.ended
+    os.close(writing)
+    assert heart.ended
+    os.close(reading)
+
+
 def test_a_child_that_reads_nothing_holds_nobody_up():
     pulse = Pulse()
     for _ in range(1 << 17):
