@@ -106,6 +106,13 @@ def test_losses_before_the_ring_and_restarts_are_told(tmp_path):
     assert events(tmp_path / "a.mcap") == told
 
 
+def test_ticks_that_go_back_by_less_than_a_block_are_a_restart(tmp_path):
+    frames = make_frames(1000)
+    frames["tick"][400:] -= 150
+    tally = write(tmp_path / "a.mcap", frames)
+    assert (tally.missing, tally.restarts) == (0, 1) and events(tmp_path / "a.mcap") == [("restarted", 250, 0)]
+
+
 def test_a_recorder_overtaken_says_so(tmp_path):
     frames, name = make_frames(CAPACITY + 3000), ring_name()
     with Writer(name, CAPACITY) as ring, Reader(name) as reader:
