@@ -4,7 +4,9 @@ import os
 import subprocess
 import sys
 import threading
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from commandkit import END_S, STATS, live_ring, run, signals_as_before  # noqa: F401 - a fixture
 from rings import make_frames, ring_name
@@ -99,6 +101,18 @@ def test_doctor_names_the_process_in_the_way(host):
         0
     ].remedy
     assert any("whiskerd (process 41) holds" in f.text for f in found)
+
+
+@pytest.mark.parametrize("masks", [(0b001, 0b101), (0b101, 0b001)])
+def test_doctor_looks_at_the_lanes_that_are_in_use_now(masks):
+    frames = make_frames(100)
+    frames["lane_mask"] = np.repeat(masks, 50)
+    frames["lane"]["status"] = 0
+    frames["lane"]["status"][:, 2] = 33 << 10
+    takes = iter([frames, None])
+    reader = SimpleNamespace(seek_latest=lambda back: None, take=lambda wait_s: next(takes))
+    told = any("lane 2:" in finding.text for finding in doctor.samples(reader, END_S))
+    assert told == (masks[1] == 0b101)
 
 
 def test_doctor_asks_for_permission_and_rule(host, monkeypatch):
