@@ -57,6 +57,7 @@ def test_a_missing_ring_is_one_line(capsys, tmp_path, name):
         (["record"], "FILE.MCAP"),
         (["record", "x.mcap", "--seconds", "nan"], "'nan' is not a number above 0"),
         (["top", "--wait", "-1"], "'-1' is not a number of seconds"),
+        (["bridge-sim", "--ring", "x", "--scene", "/nowhere"], "/nowhere: no such folder"),
         (["nonsense"], "invalid choice"),
     ],
 )
