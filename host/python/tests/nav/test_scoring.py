@@ -1,9 +1,12 @@
 """Figures whose answers are known by hand."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from whisker.nav import scoring
+from whisker.nav.localise import judged_rows
 
 
 def test_lock_is_the_first_hundred_near_rows_kept_to_the_end():
@@ -27,3 +30,11 @@ def test_auc_counts_pairs_in_order_and_ties_by_half():
     assert scoring.auc(score, event) == pytest.approx(3.5 / 4)
     assert scoring.auc(-score, event) == pytest.approx(0.5 / 4)
     assert scoring.auc(score, np.ones(4, bool)) is None
+
+
+@pytest.mark.parametrize(("most", "rows"), [(0, []), (1, [2]), (2, [2, 10]), (3, [2, 6, 10]), (50, list(range(2, 11)))])
+def test_rows_to_be_judged_are_spread_evenly_over_those_whose_truth_is_known(most, rows):
+    truth = np.full((13, 3), np.nan)
+    truth[2:11] = 1.0
+    assert judged_rows(SimpleNamespace(truth=truth), most) == rows
+    assert judged_rows(SimpleNamespace(truth=None), most) == []
