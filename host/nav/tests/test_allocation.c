@@ -1,7 +1,9 @@
-/* No filter allocates after its start. */
+/* No filter allocates after its start, none is made by halves, and none leaves memory behind. */
 #include "count_allocations.h"
 #include "near.h"
+#include "rooms.h"
 #include "wander.h"
+#include "weigh.h"
 
 /* Followed, carried off, lost and found: every state that a filter has. */
 static void run(struct nav_filter *f, struct wander *w)
@@ -41,8 +43,52 @@ static void no_filter_allocates_after_its_start(void **state)
     }
 }
 
+/* Whether something was made although an allocation failed; what was made is freed, and nothing may be left. */
+static bool made_filter(const char *name, const struct nav_problem *problem)
+{
+    struct nav_filter *f = nav_filter_new(name, problem);
+    nav_filter_free(f);
+    return f;
+}
+
+static bool made_weigher(const char *name, const struct nav_problem *problem)
+{
+    (void)name;
+    struct nav_weigher *w = nav_weigher_new(problem, 0.0);
+    nav_weigher_free(w);
+    return w;
+}
+
+static void starve(bool (*made)(const char *, const struct nav_problem *), const char *name,
+                   const struct nav_problem *problem)
+{
+    bool whole = false;
+    for (long fails = 1; !whole; fails++) {
+        allocations = blocks = 0;
+        failed_allocation = fails;
+        whole = made(name, problem);
+        failed_allocation = 0;
+        assert_int_equal(whole, allocations < fails);
+        assert_int_equal(blocks, 0);
+    }
+}
+
+static void what_gets_no_memory_is_not_made_and_leaves_nothing_behind(void **state)
+{
+    (void)state;
+    static const struct nav_component bumps[] = {{{0.3, 0.4, 0.5}, 0.02, 0.05, 3.0}, {{0.5, 0.5, 0.0}, 0.1, 0.2, 1.0}};
+    struct nav_problem p = room();
+    p.prior = (struct nav_prior){.bump = bumps, .bumps = 2};
+    for (int n = 0; nav_filter_name(n); n++)
+        starve(made_filter, nav_filter_name(n), &p);
+    starve(made_weigher, NULL, &p);
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(no_filter_allocates_after_its_start)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(no_filter_allocates_after_its_start),
+        cmocka_unit_test(what_gets_no_memory_is_not_made_and_leaves_nothing_behind),
+    };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
