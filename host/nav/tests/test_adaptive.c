@@ -274,6 +274,43 @@ static void symmetries_are_seen(void **state)
     assert_int_equal(adaptive_symmetry(&arena), 1);
 }
 
+/* Even where the arena has twins: from a known start one of them holds all mass. */
+static void a_known_start_is_listed_as_its_hypotheses_and_no_others(void **state)
+{
+    (void)state;
+    struct wander w = wander_new(41);
+    w.problem.arena.floor = WANDER_TWIN_FLOOR;
+    w.problem.arena.boxes = 0;
+    struct nav_filter *f = nav_filter_new("adaptive", &w.problem);
+    struct nav_component *c = calloc(ROOM, sizeof *c);
+    long n = nav_filter_components(f, c, ROOM);
+    assert_int_equal(n, (long)w.problem.settings.adaptive_least); /* so narrow a prior asks for no more */
+    for (long i = 0; i < n; i++)
+        assert_true(c[i].mass > 0.0);
+    free(c);
+    nav_filter_free(f);
+}
+
+static double listed_width(double sigma_x, double sigma_y)
+{
+    struct wander w = wander_new(42);
+    struct nav_component first;
+    w.problem.prior.sigma[0] = sigma_x;
+    w.problem.prior.sigma[1] = sigma_y;
+    struct nav_filter *f = nav_filter_new("adaptive", &w.problem);
+    assert_true(nav_filter_components(f, &first, 1) > 1);
+    nav_filter_free(f);
+    return first.sigma_m;
+}
+
+static void hypotheses_are_listed_as_wide_along_y_as_along_x(void **state)
+{
+    (void)state;
+    double wide = listed_width(0.06, 0.01);
+    assert_true(wide > 0.01 && wide < 0.06);
+    assert_near(listed_width(0.01, 0.06) / wide, 1.0, 0.15);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -289,6 +326,8 @@ int main(void)
         cmocka_unit_test(what_is_not_read_makes_it_no_surer),
         cmocka_unit_test(a_prior_inside_a_box_starts_with_the_whole_arena),
         cmocka_unit_test(symmetries_are_seen),
+        cmocka_unit_test(a_known_start_is_listed_as_its_hypotheses_and_no_others),
+        cmocka_unit_test(hypotheses_are_listed_as_wide_along_y_as_along_x),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
