@@ -6,7 +6,8 @@ import re
 import numpy as np
 import pytest
 
-from whisker.report import write_report
+from whisker.report import figures, write_report
+from whisker.report.run import Run
 
 ROWS = 40
 TEXTURES = ["VINYL", "SMOOTH", "ROUGH"]
@@ -139,6 +140,14 @@ def test_unequal_fault_sets_are_not_called_equal(run_folder):
     (run_folder / "summary.json").write_text(json.dumps(SUMMARY | {"records_bad_match": False}))
     page = write_report(run_folder).read_text()
     assert "NOT EQUAL" in page and ">equal<" not in page
+
+
+def test_deflection_is_drawn_no_higher_than_it_was(run_folder):
+    """From the lowest to the highest of each moment: a line around that would add its own width."""
+    for axes in figures.texture(Run.load(run_folder)).axes[1::2]:
+        (band,) = axes.collections
+        heights = band.get_paths()[0].vertices[:, 1]
+        assert (heights.min(), heights.max()) == (0.1, 0.9) and not any(band.get_linewidth())
 
 
 def test_same_run_same_page(run_folder):

@@ -21,11 +21,12 @@ from whisker.bridge.ring import Clock, Writer
 from whisker.cli import main as whisker_main
 from whisker.protocol import LANES
 from whisker.view.__main__ import main
-from whisker.view.client import WINDOW
+from whisker.view.client import WINDOW, Client
 from whisker.view.pyramid import BINS
 from whisker.view.rings import find_rings
 from whisker.view.server import MESSAGE_BYTES
 from whisker.view.tap import Tap
+from whisker.view.topics import BLOCK, BLOCK_BINS
 
 __all__ = ["nothing_logged"]  # a fixture that every test here uses
 
@@ -290,6 +291,48 @@ def test_a_page_that_asks_nonsense_or_too_much_or_too_long_is_cut_off():
 
     with ring_of(made_frames(0, 10)) as writer:
         asyncio.run(scenario(writer))
+
+
+def test_a_connection_asks_for_a_pages_place_once(monkeypatch):
+    asked = []
+
+    class Counted(Client):
+        def __init__(self, hub, socket, enter):
+            super().__init__(hub, socket, lambda: asked.append(socket) or enter())
+
+    monkeypatch.setattr("whisker.view.server.Client", Counted)
+
+    async def scenario():
+        async with view_of() as port, page(port) as p:
+            await p.next("hello")
+            assert not asked
+            for _ in range(3):
+                await p.ask(type="subscribe", topic="rings")
+                await p.next("rings")
+            assert len(asked) == 1
+
+    asyncio.run(scenario())
+
+
+def test_the_kernel_holds_a_whole_block_of_all_lanes_for_a_page_and_less_than_it_may_have_under_way(monkeypatch):
+    """So the block comes at once, and a page that reads slowly is not late by many of them."""
+    sockets = []
+
+    class Seen(Client):
+        def __init__(self, hub, socket, enter):
+            super().__init__(hub, socket, enter)
+            sockets.append(socket.transport.get_extra_info("socket"))
+
+    monkeypatch.setattr("whisker.view.server.Client", Seen)
+
+    async def scenario():
+        async with view_of() as port, page(port) as p:
+            await p.next("hello")
+            (plug,) = sockets
+            block = BLOCK.size + BLOCK_BINS * LANES * (2 * 4 + 1)  # low and high of two axes, and the bad ones
+            assert block <= plug.getsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF) < WINDOW * block
+
+    asyncio.run(scenario())
 
 
 def test_leaving_a_topic_ends_it():

@@ -13,7 +13,19 @@ from viewkit import PATIENCE_S, nothing_logged, page
 from viewrobot import ARENA, ROW_NS, SCENE, MadeUpRun, Post, at, belief_message, estimate, reach, robot_view, route
 
 from whisker.robot.link import Link
-from whisker.robot.messages import Contact, End, Header, KeyValue, Pose, PoseStamped, ProcessHealth, Time, encode
+from whisker.robot.messages import (
+    Contact,
+    End,
+    Header,
+    KeyValue,
+    Localisation,
+    Pose,
+    PoseStamped,
+    PoseWithCovariance,
+    ProcessHealth,
+    Time,
+    encode,
+)
 from whisker.scene import LARGEST_M
 from whisker.view.command import ROBOT
 from whisker.view.hub import Hub
@@ -30,6 +42,7 @@ from whisker.view.robot_source import join
 from whisker.view.robot_topics import BELIEF_HEAD, BELIEF_ID, POINTS_MOST, BeliefFeed, RobotFeed
 
 FUZZ_INPUTS = 5000
+WIDE = np.array([[0.0009, 0.0003, 0.0], [0.0003, 0.0016, 0.0], [0.0, 0.0, 0.04]])  # 3 cm by 4 cm, 0.2 rad
 __all__ = ["nothing_logged"]  # a fixture that every test here uses
 
 
@@ -87,6 +100,13 @@ def test_cells_not_read_and_no_contact_are_different_things():
 def test_rows_that_never_came_are_counted():
     model = told_model(40, skip={10, 11, 30})
     assert model.rows == {"missed": 3, "unseen": 3}
+
+
+def test_a_pose_is_as_wide_as_its_spread_over_both_axes():
+    model, pose = RobotModel(), PoseWithCovariance.planar((1.0, 2.0, 0.5), WIDE)
+    model.take("localisation", Localisation(Header.at(ROW_NS, "arena"), "grid", pose, 0.5, 1))
+    assert (model.pose["sigma_m"], model.pose["sigma_rad"]) == (0.05, 0.2)
+    assert (model.pose["x"], model.pose["y"], model.pose["theta"]) == (1.0, 2.0, 0.5)
 
 
 def test_a_clock_that_began_anew_forgets_the_run_and_not_the_health():
@@ -182,7 +202,7 @@ def test_a_slow_page_gets_the_newest_belief_and_none_that_it_missed(monkeypatch)
         hub.robot.take("belief", belief_message(n * ROW_NS, [(1.0, 1.0, 2.0, 0.5, 0.0)], number=10, mass=0.75))
     message = feed.take()
     assert feed.take() is None
-    assert BELIEF_HEAD.unpack_from(message) == (BELIEF_ID, 0, 10, 10, 4.9, 0.75)
+    assert BELIEF_HEAD.unpack_from(message) == (6, 0, 10, 10, 4.9, 0.75), "not as docs/view.md has it"
     poses = np.frombuffer(message, "<f4", -1, BELIEF_HEAD.size).reshape(10, 6)
     assert np.allclose(poses[:, :2], (1.0, 2.0)) and np.allclose(poses[:, 3], 0.1)
 
