@@ -91,6 +91,16 @@ def test_prior_may_be_absent_and_a_mean_in_an_obstacle_is_a_warning(folder):
     assert scenes.load(folder).prior is None
 
 
+def test_a_body_that_leans_against_a_wall_or_a_block_is_free(folder):
+    """The simulated world lets it come so near too (move_body of sim/world/sim_world.c)."""
+    arena = scenes.load(folder).arena
+    leaning = [(0.25, 1.0), (0.75, 1.25), (0.25, 1.25), (0.75, 0.25), (0.25, 0.75)]  # walls; the block at (0.5, 0.5)
+    assert all(arena.is_free(x, y, 0.25) for x, y in leaning)
+    assert not any(arena.is_free(x, y, 0.2500001) for x, y in leaning)
+    corners = [(x, y) for x in (0.0, 1.0) for y in (0.0, 1.5)]
+    assert [arena.is_free(x, y, 0.0) for x, y in corners] == [False, True, True, True], "a block stands in the first"
+
+
 BROKEN = [
     ("arena.toml", "size_m = [1.0, 1.5]", "size_m = [0.0, 1.5]", "line 1: 'size_m' must be numbers from"),
     ("arena.toml", "size_m = [1.0, 1.5]", "size_m = [1.0]", "line 1: 'size_m' must be a list of 2"),

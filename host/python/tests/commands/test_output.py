@@ -12,6 +12,7 @@ from rings import make_frames
 from whisks import write_whisks
 
 from whisker.cli import COMMANDS, main
+from whisker.ends import exit_code
 from whisker.simulation.bridge import program
 from whisker.touch.radial.model import RadialModel
 from whisker.view.__main__ import main as view
@@ -72,6 +73,15 @@ def test_a_process_of_its_own_says_it_once():
     with open("/dev/full", "w") as full:
         done = subprocess.run(command("--help"), stdout=full, stderr=subprocess.PIPE, text=True, timeout=END_S)
     assert (done.returncode, done.stderr) == (1, f"whisker: {COMPLAINT}")
+
+
+def test_what_was_printed_before_the_work_comes_before_what_the_work_prints(monkeypatch, tmp_path):
+    with open(tmp_path / "out.txt", "w") as out:
+        monkeypatch.setattr("sys.stdout", out)
+        print("first")
+        assert exit_code("whisker", lambda: print("second") or 0) == 0
+        print("third")
+    assert (tmp_path / "out.txt").read_text() == "first\nsecond\nthird\n"
 
 
 def test_a_reader_that_goes_is_no_fault():
