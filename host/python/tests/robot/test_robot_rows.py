@@ -234,6 +234,14 @@ def test_a_clock_that_leaps_has_begun_anew():
     assert [step.t_ns // 10**8 for step in steps] == [1, 2, 3, 4]
 
 
+def test_two_rows_of_one_stamp_are_two_steps_in_time():
+    """No clock that goes on gives one twice; a filter takes no row that is not later than the one before."""
+    rows = messages_of(motions(4))
+    rows[2].header.stamp = rows[1].header.stamp
+    times = [step.t_ns // 10**8 for step in Follower().take(received(rows))]
+    assert times == [1, 2, 3, 5]
+
+
 def slow_rows(count: int) -> list[m.Observation]:
     """At 0.15 m/s and 0.7 rad/s."""
     cells = {"l_VINYL": -1.0, "r_mm": None}

@@ -9,6 +9,7 @@ import sys
 import threading
 import time
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 from linkkit import free_endpoint
@@ -16,6 +17,7 @@ from robotkit import take_until
 
 from whisker.errors import UserError
 from whisker.robot.children import Child, Program, living
+from whisker.robot.lifeline import BEAT_S
 from whisker.robot.link import Link
 from whisker.robot.parts import LEAVE_ENVIRONMENT
 from whisker.robot.supervisor import PAUSE_MOST_S, PAUSE_S, Keeper, RunError, Supervisor
@@ -250,6 +252,22 @@ def await_true(wanted) -> bool:
             return False
         time.sleep(0.01)
     return True
+
+
+def test_it_rests_between_two_looks_and_never_longer_than_heartbeats_are_apart(tmp_path, monkeypatch):
+    stop, rests, looks = threading.Event(), [], 4
+
+    def step(keeper):
+        looked.append(keeper)
+        if len(looked) == looks:
+            stop.set()
+
+    looked = []
+    monkeypatch.setattr(Keeper, "step", step)
+    supervisor = Supervisor([STAYS], tmp_path)
+    monkeypatch.setattr(supervisor, "_woken", SimpleNamespace(set=lambda: None, clear=lambda: None, wait=rests.append))
+    assert supervisor.run(stop) == "stopped"
+    assert len(rests) == looks and all(0.0 <= rest <= BEAT_S for rest in rests)
 
 
 def test_health_tells_of_every_end_and_all_end_with_it(tmp_path):

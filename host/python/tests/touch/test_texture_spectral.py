@@ -176,6 +176,14 @@ def test_a_catch_is_a_border_and_no_surface(model):
     assert all(d.border and d.label == -1 for d in caught)
 
 
+def test_how_far_a_window_may_reach_is_what_windows_at_least_as_long_did(model, monkeypatch):
+    for rung in model.rungs:
+        monkeypatch.setattr(rung, "span", np.full(2, 1.0 if rung.length == WINDOW else 1e6))
+    x = drag("SMOOTH", 1000, 61)
+    assert all(d.border and d.label == -1 for d in model.judge(x, WINDOW))
+    assert not any(d.border for d in model.judge(x, WINDOW + 1))
+
+
 @pytest.mark.parametrize("spoil", ["nan", "stuck", "railed", "silent"])
 def test_faults_are_unknown_with_no_confidence(model, spoil):
     x = drag("SMOOTH", 600, 62)
