@@ -257,6 +257,28 @@ static void weights_that_stay_low_bring_fresh_particles_where_the_row_fits(void 
     destroy(f);
 }
 
+/* Every second of a tight cloud gives way, counted from a place that the random numbers choose: here the first, where
+ * the place after the last one would be the next in turn. */
+static void fresh_particles_take_their_share_of_the_places_and_none_beyond(void **state)
+{
+    (void)state;
+    struct nav_problem p = quiet();
+    p.settings.particle_count = 300.0;
+    p.prior.sigma[0] = p.prior.sigma[1] = p.prior.sigma[2] = 0.002;
+    struct particle *f = create(&p);
+    f->rng = (struct nav_rng){{0, 5, 7, 5}}; /* its second uniform number is 0 */
+    resample(f, 0.5);
+    assert_int_equal(f->cloud.count, 300);
+    for (long i = 0; i < 300; i++) {
+        double x = (double)f->cloud.x[i], y = (double)f->cloud.y[i];
+        assert_near(hypot((double)f->cloud.c[i], (double)f->cloud.s[i]), 1.0, 1e-6);
+        assert_true(nav_arena_free(&p.arena, x, y, p.robot.body_radius));
+        if (i % 2)
+            assert_near(hypot(x - 0.5, y - 0.5), 0.0, 0.02);
+    }
+    destroy(f);
+}
+
 static void weights_never_become_more_uneven_than_allowed(void **state)
 {
     (void)state;
@@ -303,6 +325,7 @@ int main(void)
         cmocka_unit_test(two_particles_follow_a_robot_that_they_know),
         cmocka_unit_test(the_same_seed_gives_the_same_bytes),
         cmocka_unit_test(weights_that_stay_low_bring_fresh_particles_where_the_row_fits),
+        cmocka_unit_test(fresh_particles_take_their_share_of_the_places_and_none_beyond),
         cmocka_unit_test(weights_never_become_more_uneven_than_allowed),
         cmocka_unit_test(a_row_that_no_particle_can_explain_changes_no_weight),
     };
