@@ -232,6 +232,30 @@ static void a_wall_felt_ahead_puts_the_robot_before_it(void **state)
     destroy(g);
 }
 
+/* Two floor whiskers over one texture, of which the first says the other one in every second window. */
+static void a_floor_whisker_that_lies_is_found_out_whichever_way_the_robot_faces(void **state)
+{
+    (void)state;
+    static const struct nav_tip tips[] = {{0.1, 0.1}, {0.1, -0.1}};
+    static const struct nav_ray ray = {0.05, 0.0, 0.0, 0.1};
+    const double right[] = {0.0, -10.0}, wrong[] = {-10.0, 0.0}, nothing = INFINITY, weight[] = {1.0, 1.0, 1.0};
+    for (int n = 0; n < 8; n++) {
+        struct nav_problem p = room();
+        p.robot.tips = 2;
+        p.robot.tip = tips;
+        p.robot.ray = &ray;
+        p.prior.mean = (struct nav_pose){0.25, 0.25, nav_wrap((n + 0.5) * NAV_PI / 4.0)};
+        p.prior.sigma[0] = p.prior.sigma[1] = p.prior.sigma[2] = 0.03;
+        struct grid *g = create(&p);
+        for (int row = 0; row < 40; row++) {
+            const double *reading[] = {row % 2 ? wrong : right, right, &nothing};
+            update(g, &(struct nav_evidence){reading, weight});
+        }
+        assert_true(g->likelihood->trust[0].working < 0.1 && g->likelihood->trust[1].working > 0.9);
+        destroy(g);
+    }
+}
+
 /* A slice's shift and the common rotation, to the nearest sub-pose. */
 static double nearest(double value, double step)
 {
@@ -298,6 +322,7 @@ int main(void)
         cmocka_unit_test(a_belief_with_no_room_left_starts_again_everywhere),
         cmocka_unit_test(an_arena_without_a_free_place_is_survived),
         cmocka_unit_test(a_wall_felt_ahead_puts_the_robot_before_it),
+        cmocka_unit_test(a_floor_whisker_that_lies_is_found_out_whichever_way_the_robot_faces),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
