@@ -220,6 +220,36 @@ static void draws_density_and_cells_agree(void **state)
     assert_near(inside, integral, 0.01);
 }
 
+/* Whatever the cells' width in metres, a bump's mass lies where the bump is, and nothing but the doubt elsewhere. */
+static void cells_of_any_width_hold_their_share_of_a_bump(void **state)
+{
+    (void)state;
+    enum { CELLS = 20, HEADINGS = 4 };
+    static const double widths[] = {0.01, 0.3, 1.0, 3.0};
+    static float mass[CELLS * CELLS * HEADINGS];
+    const double still[HEADINGS] = {0.0};
+    for (size_t n = 0; n < sizeof widths / sizeof widths[0]; n++) {
+        double cell = widths[n], there = 0.0, all = 0.0;
+        const struct nav_component bump = {{14.0 * cell, 12.0 * cell, 1.0}, 0.2 * cell, 0.1, 1.0};
+        const struct nav_slices at = {.nx = CELLS,
+                                      .ny = CELLS,
+                                      .nh = HEADINGS,
+                                      .pitch = CELLS,
+                                      .cell = cell,
+                                      .cell_theta = NAV_PI / 2.0,
+                                      .shift_x = still,
+                                      .shift_y = still};
+        nav_bumps_fill(&(struct nav_prior){.bump = &bump, .bumps = 1}, &at, mass);
+        for (int c = 0; c < CELLS * CELLS * HEADINGS; c++) {
+            int i = c % CELLS, j = c / CELLS % CELLS, k = c / CELLS / CELLS;
+            all += (double)mass[c];
+            there += (i == 13 || i == 14) && (j == 11 || j == 12) && k == 0 ? (double)mass[c] : 0.0;
+        }
+        assert_near(all, 1.0, 1e-5);
+        assert_near(there, 1.0 - NAV_ANYWHERE, 1e-4);
+    }
+}
+
 /* Begun at a wrong place, a filter that can be lost finds the robot: the doubt kept is enough. */
 static void a_wrong_mixture_does_not_trap_who_can_recover(void **state)
 {
@@ -249,6 +279,7 @@ int main(void)
         cmocka_unit_test(what_is_no_mixture_is_refused),
         cmocka_unit_test(counts_and_sums_are_checked_too),
         cmocka_unit_test(draws_density_and_cells_agree),
+        cmocka_unit_test(cells_of_any_width_hold_their_share_of_a_bump),
         cmocka_unit_test(a_wrong_mixture_does_not_trap_who_can_recover),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
