@@ -250,6 +250,7 @@ static void a_lattice_too_large_is_refused(void **state)
     struct nav_problem p = room();
     struct nav_likelihood *l = nav_likelihood_new(&p.arena, &p.robot, &p.settings, 0.01);
     assert_null(nav_expected_new(&p.arena, &p.robot, l, 1e-6, 360, 2));
+    assert_null(nav_expected_new(&p.arena, &p.robot, l, 0.5, 1, 10000)); /* its margin counts, too */
     nav_likelihood_free(l);
 }
 
