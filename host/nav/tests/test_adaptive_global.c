@@ -1,5 +1,5 @@
 /* The adaptive filter's histogram by itself: what a job passes over and counts, the noise that it is told, and mass
- * that is neither lost nor worked out twice. */
+ * that is neither lost nor worked out twice; and what the log of rows that it reads takes. */
 #include "adaptive_global.h"
 
 #include "near.h"
@@ -169,6 +169,25 @@ static void an_impossible_likelihood_is_worked_out_once(void **state)
     end(&b);
 }
 
+static size_t log_bytes(int classes)
+{
+    struct adaptive_log log;
+    struct nav_problem problem = wander_new(0).problem;
+    problem.arena.classes = classes;
+    assert_int_equal(adaptive_log_init(&log, &problem), 0);
+    size_t bytes = adaptive_log_bytes(&log);
+    adaptive_log_free(&log);
+    return bytes;
+}
+
+static void the_log_counts_the_memory_of_all_rows_kept(void **state)
+{
+    (void)state;
+    const size_t more = ADAPTIVE_ROWS_KEPT * WANDER_TIPS * sizeof(double); /* for every class */
+    assert_int_equal(log_bytes(8) - log_bytes(3), 5 * more);
+    assert_true(log_bytes(3) > 3 * more + ADAPTIVE_ROWS_KEPT * WHISKERS * sizeof(double));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -178,6 +197,7 @@ int main(void)
         cmocka_unit_test(mass_along_the_walls_stays),
         cmocka_unit_test(what_is_scattered_is_a_share_of_the_mass),
         cmocka_unit_test(an_impossible_likelihood_is_worked_out_once),
+        cmocka_unit_test(the_log_counts_the_memory_of_all_rows_kept),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
