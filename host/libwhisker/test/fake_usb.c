@@ -257,8 +257,9 @@ static void end_oldest(const struct completion *completion)
 
 int libusb_handle_events_timeout_completed(libusb_context *context, struct timeval *timeout, int *completed)
 {
-    (void)timeout;
     (void)completed;
+    const int64_t wait_us = (int64_t)timeout->tv_sec * 1000000 + timeout->tv_usec;
+    fake.longest_wait_us = wait_us > fake.longest_wait_us ? wait_us : fake.longest_wait_us;
     if (watcher.call && watcher.due) {
         watcher.due = false;
         watcher.call(context, (libusb_device *)&bus[0], LIBUSB_HOTPLUG_EVENT_DEVICE_ARRIVED, watcher.context);

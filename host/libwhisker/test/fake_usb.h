@@ -26,7 +26,8 @@ struct fake_usb {
     int claimed;   /* number of the bridge last claimed */
     char hid_path[48];
     int in_flight;
-    void (*pump)(void); /* called before events are handled, if set: a bridge that sends of its own accord */
+    int64_t longest_wait_us; /* that events were waited for */
+    void (*pump)(void);      /* called before events are handled, if set: a bridge that sends of its own accord */
     uint8_t control[16];
     char events[64]; /* in order: S start, X stop, q transfer queued, r synchronous read */
 };

@@ -154,6 +154,45 @@ static void a_long_stall_moves_nothing(void **state)
     assert_int_equal(fit.restarts, 0);
 }
 
+/* How far all points lie above the highest line of this slope that none lies below, summed up. */
+static double sum_above(double slope)
+{
+    double least = INFINITY, sum = 0;
+    for (int i = 0; i < fit.points; i++) {
+        const double late_ns = fit.point[i].late_ns - slope * fit.point[i].x_ns;
+        least = fmin(least, late_ns);
+        sum += late_ns;
+    }
+    return sum - fit.points * least;
+}
+
+/* By trying the line through every two points. */
+static double least_sum_above(void)
+{
+    double least = INFINITY;
+    for (int b = 1; b < fit.points; b++) {
+        for (int a = 0; a < b; a++) {
+            const struct whisker_clock_point *p = &fit.point[a], *q = &fit.point[b];
+            least = fmin(least, sum_above((q->late_ns - p->late_ns) / (q->x_ns - p->x_ns)));
+        }
+    }
+    return least;
+}
+
+static void the_line_lies_closest_below_all_points(void **state)
+{
+    (void)state;
+    uint32_t random = 1;
+    for (int i = 0; i < 300; i++) { /* one in each second, up to 100 us late */
+        random = random * 1664525u + 1013904223u;
+        const double sent_ns = i * 1e9 + 5e8 * (i > 0), late_ns = (random >> 16) * (100e3 / 65536);
+        add((uint64_t)(sent_ns / NS_PER_CYCLE), (int64_t)(sent_ns * (1 + 50e-6) + late_ns));
+        assert_true(fit.points < 2 || fabs(sum_above(fit.skew) - least_sum_above()) < 1);
+    }
+    assert_int_equal(fit.points, WHISKER_CLOCK_POINTS);
+    assert_int_equal(fit.restarts, 0);
+}
+
 /* A simulated bridge has no clock of ours: the mapping must say that it does not know. */
 static void a_clock_of_another_rate_is_never_claimed_to_be_known(void **state)
 {
@@ -188,6 +227,7 @@ int main(void)
         cmocka_unit_test_setup(a_realtime_clock_that_is_set_is_told_and_followed, begin),
         cmocka_unit_test_setup(clocks_that_jump_apart_begin_a_new_fit, begin),
         cmocka_unit_test_setup(a_long_stall_moves_nothing, begin),
+        cmocka_unit_test_setup(the_line_lies_closest_below_all_points, begin),
         cmocka_unit_test_setup(a_clock_of_another_rate_is_never_claimed_to_be_known, begin),
         cmocka_unit_test(the_least_latency_follows_from_the_settings),
     };

@@ -165,7 +165,9 @@ static void arrivals_are_reported_by_event_and_by_looking(void **state)
     assert_int_equal(whisker_hotplug_wait(hotplug, 0), 0);
     assert_int_equal(whisker_hotplug_wait(hotplug, 0), WHISKER_ERROR_TIMEOUT);
     fake_plug(false);
+    fake.longest_wait_us = 0;
     assert_int_equal(whisker_hotplug_wait(hotplug, 5000), 0); /* no event came; found when looked for */
+    assert_in_range(fake.longest_wait_us, 1, 1000000);        /* it is looked every second */
     whisker_hotplug_close(hotplug);
     assert_int_equal(fake.opened, 0);
 }

@@ -113,6 +113,23 @@ static void memory_that_is_no_ring_is_refused(void **state)
     }
 }
 
+/* A quarter of a gigabyte: told of the file, not made. */
+static void the_largest_ring_is_a_ring_and_a_larger_is_none(void **state)
+{
+    (void)state;
+    for (uint32_t times = 1; times <= 2; times++) {
+        const struct ring_header header = good_header(times * RING_CAPACITY_MAX);
+        const off_t size = (off_t)ring_file_bytes(header.capacity);
+        const struct stat told = {.st_size = size, .st_blocks = size / 512 + 1};
+        const int fd = make_memory(&header, sizeof header, sizeof header);
+        uint32_t capacity;
+        assert_int_equal(ring_map_check(fd, &told, &capacity), times == 1 ? WHISKER_OK : WHISKER_ERROR_RING_LAYOUT);
+        assert_int_equal(capacity, header.capacity);
+        close(fd);
+        unlink(path());
+    }
+}
+
 static void what_has_the_name_and_is_no_file_is_refused_at_once(void **state)
 {
     (void)state;
@@ -447,7 +464,7 @@ static void other_bus_errors_go_where_they_went_before(void **state)
 
 static const struct whisker_ring_entry *entry_of_the_test(void)
 {
-    enum { ROOM = 64 };
+    enum { ROOM = 4096 }; /* the rings of other programs are listed too, and those that others left behind */
     static struct whisker_ring_entry entries[ROOM];
     const int count = whisker_ring_list(entries, ROOM);
     assert_in_range(count, 0, ROOM);
@@ -504,6 +521,7 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {
         WITH_RING(nonsense_in_the_header_cannot_lead_a_reader_astray),
         cmocka_unit_test(memory_that_is_no_ring_is_refused),
+        cmocka_unit_test(the_largest_ring_is_a_ring_and_a_larger_is_none),
         cmocka_unit_test(what_has_the_name_and_is_no_file_is_refused_at_once),
         cmocka_unit_test(link_to_a_living_ring_is_not_followed),
         cmocka_unit_test(file_with_holes_costs_its_reader_nothing),
