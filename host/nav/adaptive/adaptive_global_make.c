@@ -44,11 +44,8 @@ static void sort_signatures(struct adaptive_global *g)
     for (size_t n = 0; n < signature_rows(g); n++, out += adaptive_signature_pitch(g)) {
         int j = (int)(n % ((size_t)g->ny + 1)), phase = (int)(n / ((size_t)g->ny + 1));
         int px = phase % ADAPTIVE_SUB, py = phase / ADAPTIVE_SUB % ADAPTIVE_SUB;
-        int y = j * ADAPTIVE_SUB + py;
-        if (y >= e->ny + e->margin)
-            continue;
-        const uint32_t *row = nav_expected_row(e, phase / ADAPTIVE_SUB / ADAPTIVE_SUB, y);
-        for (int i = 0; i <= g->nx && i * ADAPTIVE_SUB + px < e->nx + e->margin; i++)
+        const uint32_t *row = nav_expected_row(e, phase / ADAPTIVE_SUB / ADAPTIVE_SUB, j * ADAPTIVE_SUB + py);
+        for (int i = 0; i <= g->nx; i++) /* the cell beyond the last lies in the lattice's margin */
             out[i] = row[i * ADAPTIVE_SUB + px];
     }
 }
