@@ -86,6 +86,30 @@ static void published_frames_are_read(void **state)
     assert_int_equal(feed.stream.counts.corrupt, 0);
 }
 
+/* Whatever the memory held: a stream of other packets, half a frame, or rubbish. */
+static void a_stream_begun_anew_knows_nothing_of_before(void **state)
+{
+    (void)state;
+    static const uint8_t first[] = {19}, anew[] = {29}, of_anew[] = {19, 3, 29, 2, 37, 166};
+    struct feed feed = {0};
+    for (int before = 0; before < 2; before++) {
+        feed.frames = 0;
+        memset(&feed.stream, 0xA5, sizeof feed.stream);
+        if (before == 1) {
+            create_stream_begin(&feed.stream, first, sizeof first);
+            push(&feed, of_anew, 2); /* the beginning of a frame of either */
+        }
+        assert_int_equal(create_stream_begin(&feed.stream, anew, sizeof anew), sizeof of_anew);
+        push(&feed, of_anew, sizeof of_anew);
+        assert_int_equal(feed.frames, 1);
+        assert_int_equal(feed.frame.value[CREATE_OI_CLIFF_FRONT_LEFT_SIGNAL], 549);
+        assert_int_equal(feed.frame.missed, 0);
+        assert_int_equal(feed.stream.counts.bytes, sizeof of_anew);
+        assert_int_equal(feed.stream.counts.frames, 1);
+        assert_int_equal(feed.stream.counts.corrupt + feed.stream.counts.skipped + feed.stream.counts.resyncs, 0);
+    }
+}
+
 static void values_have_their_signs(void **state)
 {
     (void)state;
@@ -214,6 +238,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(published_frames_are_read),
+        cmocka_unit_test(a_stream_begun_anew_knows_nothing_of_before),
         cmocka_unit_test(values_have_their_signs),
         cmocka_unit_test(what_cannot_be_asked_for_is_refused),
         cmocka_unit_test(frames_nobody_asked_for_are_corrupt),
