@@ -195,6 +195,35 @@ def test_who_holds_a_port_is_named(refused, given):
         assert code == 1 and f"process {os.getpid()} (" in line and "--view-port" in line
 
 
+def test_nobody_else_is_named_who_has_a_socket(monkeypatch, tmp_path):
+    """A table of the kernel's: a listener at the port, one at another, and a connection of the first one's client."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+        sockets = [(port, "0A"), (port + 1, "0A"), (port, "01")]
+        lines = [
+            f"{n}: 0100007F:{at:04X} 00000000:0000 {state} 0:0 0:0 0 0 0 {100 + n} 1"
+            for n, (at, state) in enumerate(sockets)
+        ]
+        (tmp_path / "net").mkdir()
+        (tmp_path / "net/tcp").write_text("\n".join(["sl local_address rem_address st", *lines]))
+        (tmp_path / "net/tcp6").write_text("sl local_address rem_address st\n")
+        for n in range(len(sockets)):
+            (tmp_path / f"{41 + n}/fd").mkdir(parents=True)
+            (tmp_path / f"{41 + n}/fd/3").symlink_to(f"socket:[{100 + n}]")
+        monkeypatch.setattr(holders, "PROC", tmp_path)
+        with pytest.raises(holders.HeldError, match=r", by process 41 \(gone\); end that"):
+            holders.check_port("127.0.0.1", port, "--first-port")
+
+
+def test_the_simulation_is_the_one_that_was_asked_for(tmp_path):
+    simulated = parts.Simulated(tmp_path / "flat", "bytes", 7, 2.5, 0.5, tmp_path / "truth", tmp_path / "wheels")
+    body = parts.Body(tmp_path, tmp_path, 2, tmp_path / "port", 7)
+    words = parts.bridge(simulated, body, parts.Meeting("ring", tmp_path)).command
+    words = words[: words.index("--")]
+    told = {"scene": tmp_path / "flat", "seconds": 2.5, "seed": 7, "level": "bytes", "pace": 0.5, "create": 2}
+    assert {name: words[words.index(f"--{name}") + 1] for name in told} == {n: str(v) for n, v in told.items()}
+
+
 def test_who_writes_the_ring_is_named(refused, given):
     with Writer("whisker-test-robot-command", 64):
         code, line = refused(*given)
