@@ -51,6 +51,7 @@ def test_a_missing_ring_is_one_line(capsys, tmp_path, name):
     [
         (["stream", "--lanes", "0,28"], "'28' is no lane"),
         (["stream", "--every", "0"], "'0' is not a whole number of 1 or more"),
+        (["stream", "--frames", "0"], "'0' is not a whole number of 1 or more"),
         (["replay", "x.mcap", "--speed", "fast"], "'fast' is not a number above 0, nor max"),
         (["replay", "x.mcap", "--ring-frames", "63"], "from 64 to"),
         (["replay", "x.mcap"], "x.mcap: cannot be read"),

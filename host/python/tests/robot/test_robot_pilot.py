@@ -1,17 +1,26 @@
 """The live pilot among parts that come and go, with made-up ones: what it does, and what its health says."""
 
+import json
+import threading
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from commandkit import run
+from linkkit import free_endpoint
+from models import model
 
+from whisker import scene as scenes
 from whisker.bridge.ring import SAMPLE
+from whisker.commands import pilot as pilot_command
 from whisker.pilot.base import BaseLost, Motion
 from whisker.pilot.behaviour import BLOCK_TICKS, ODOMETRY_TICKS
 from whisker.robot import wheels as wheels_module
 from whisker.robot.health import RUNNING
 from whisker.robot.pilot_process import LOST, NO_HEARTBEAT, SILENCE_S, Flight, LiveFlight, LiveWheels
 from whisker.robot.wheels import RETRY_S, LiveBase, Report, wheels_of
+from whisker.simulation.scenes import make_scene
+from whisker.touch.radial.model import RadialModel
 
 
 class Clock:
@@ -190,6 +199,22 @@ def test_health_tells_of_navigator_and_base(live):
 def test_the_end_stops_the_wheels_and_closes_the_base(live):
     live.made.run(lambda: True)
     assert live.base.stops == 1 and live.base.closed
+
+
+def test_the_command_ends_well_when_it_is_stopped_before_anything_came(capsys, monkeypatch, tmp_path):
+    stopped = threading.Event()
+    stopped.set()
+    monkeypatch.setattr(pilot_command, "stop_on_signals", lambda: stopped)
+    scene = make_scene(5)[0]
+    scenes.write(tmp_path, scene)
+    model().save(tmp_path / "texture.json")
+    for whisker in scene.robot.of_role("object"):
+        RadialModel(-0.011, 181.5, 2.5, 90.0, 138.0).save(tmp_path / f"{whisker.name}.json")
+    words = ["--models", tmp_path, "--ring", "whisker-test-no-such-ring", "--base", tmp_path / "base.sock"]
+    words += ["--listen", free_endpoint(), "--report", tmp_path / "report.json"]
+    code, out, err = run(capsys, "pilot", tmp_path, *words)
+    assert (code, out, err) == (0, "", "")
+    assert json.loads((tmp_path / "report.json").read_text())["ticks_used"] == 0
 
 
 def test_a_row_is_told_with_the_samples_at_its_end():
