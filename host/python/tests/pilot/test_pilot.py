@@ -97,6 +97,18 @@ def test_stays_inside_the_arena_and_off_the_blocks(flown):
         assert scene.arena.is_free(row["x_m"], row["y_m"], scene.robot.body_radius_m - 0.001)
 
 
+def test_truth_tells_how_far_a_floor_whiskers_tip_went_in_each_row(flown):
+    """At least the straight line between its two places; hardly more on the whole, for few rows have a bend in them."""
+    scene, _, _, truth, _ = flown
+    poses = [[row[key] for key in ("x_m", "y_m", "theta_rad")] for row in truth]
+    for whisker in scene.robot.of_role("texture"):
+        tips = np.array([compose(pose, (*whisker.tip_m, 0.0))[:2] for pose in poses])
+        straight_mm = 1000.0 * np.hypot(*np.diff(tips, axis=0).T)
+        moved_mm = np.array([row[f"{whisker.name}_moved_mm"] for row in truth[1:]])
+        assert (moved_mm > straight_mm - 1e-6).all() and np.ptp(moved_mm) > 1.0
+        assert np.sum(moved_mm) < 1.2 * np.sum(straight_mm)
+
+
 def test_explores_and_whisks(flown):
     _, pilot, _, truth, _ = flown
     path = sum(math.dist((a["x_m"], a["y_m"]), (b["x_m"], b["y_m"])) for a, b in zip(truth, truth[1:], strict=False))

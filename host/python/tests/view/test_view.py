@@ -3,6 +3,7 @@
 import asyncio
 import getpass
 import json
+import logging
 import os
 import signal
 import socket
@@ -362,6 +363,16 @@ def test_port_in_use_is_one_line(capfd):
     out, err = capfd.readouterr()
     assert out == "" and err.count("\n") == 1
     assert f"127.0.0.1:{port}: port in use" in err and "--port" in err
+
+
+def test_what_its_server_logs_is_not_among_its_complaints(monkeypatch, capfd):
+    """A connection that breaks in a new way is no line with a remedy; nobody at the terminal can mend it."""
+    log = logging.getLogger("whisker.view")
+    monkeypatch.setattr(log, "handlers", [])
+    monkeypatch.setattr(log, "propagate", False)  # to pytest, which would take it
+    assert main(["--ring", "a/b"]) != 0
+    logging.getLogger("whisker.view.server").error("connection handler failed")
+    assert "connection handler failed" not in capfd.readouterr().err
 
 
 @pytest.mark.parametrize(
