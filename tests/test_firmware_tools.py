@@ -202,6 +202,21 @@ def test_the_watchdogs_period_is_the_models():
     assert f".watchdog_ms = {period_ms:.0f}," in (ROOT / "sim/dspic/dspic.c").read_text()
 
 
+@pytest.mark.parametrize("define", ["-DSENSOR_MLX90333", "-DSENSOR_MLX90316", "-DSAMPLER_RESYNC_EVERY_FRAME"])
+@pytest.mark.parametrize("time", ["STARTUP", "T2", "T4", "T5", "T6", "T7"])
+def test_waits_too_short_for_the_sensor_do_not_compile(tmp_path, time, define):
+    """No wait has a factor of two to spare: with any of the data sheet's times doubled, one is too short."""
+    core = shutil.copytree(FIRMWARE / "core", tmp_path / "core")
+    call = ["cc", "-std=c99", "-fsyntax-only", define, f"-I{core}", f"-I{FIRMWARE}", f"-I{ROOT}/protocol/gen"]
+    assert run(*call, core / "sampler.c").returncode == 0
+    sheet = core / "mlx90333_datasheet.h"
+    doubled, count = re.subn(rf"(#define MLX90333_{time}_NS) ", r"\1 2u * ", sheet.read_text())
+    sheet.write_text(doubled)
+    done = run(*call, core / "sampler.c")
+    assert count == 1 and done.returncode != 0
+    assert "a wait is shorter than the sensor may need" in done.stderr
+
+
 def stand_in_compiler(folder: Path) -> dict[str, str]:
     """xc16-gcc and its kin as scripts that write down their arguments, and a linker script in the older style."""
     folder.mkdir(exist_ok=True)
@@ -295,6 +310,16 @@ def test_both_tables_of_vectors_name_the_same_interrupts():
     assert set(interrupts) == set(
         re.findall(r"HANDLER\((\w+)\)\(void\)", (FIRMWARE / "port_dspic/chip/main.c").read_text())
     )
+
+
+def test_each_interrupt_runs_the_ports_body_for_it():
+    source, header = (FIRMWARE / "port_dspic" / name for name in ("chip/main.c", "port.h"))
+    handlers = re.findall(r"HANDLER\((\w+)\)\(void\)\n{\n    (\w+)\(&board\);\n}", source.read_text())
+    for name, body in handlers:
+        served = name.endswith("Interrupt")
+        short = name.removesuffix("Interrupt").replace("Err", "_error").lower()
+        assert body == (f"port_on_{short}" if served else "port_on_trap")
+    assert {body for _, body in handlers} == set(re.findall(r"void (port_on_\w+)\(", header.read_text()))
 
 
 def test_a_library_call_and_a_lost_flag_in_the_sample_path_are_found():
