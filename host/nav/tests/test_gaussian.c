@@ -31,6 +31,40 @@ static void moving_turns_heading_error_into_sideways_error(void **state)
     assert_near(g.covariance[8], 0.09 + 0.002, 1e-12);
 }
 
+/* Against J P J' with J = [1 0 a; 0 1 b; 0 0 1], where the end point lies (b, -a) from the start. */
+static void moving_carries_what_is_known_of_position_and_heading_together(void **state)
+{
+    (void)state;
+    const double c[9] = {0.04, 0.01, 0.012, 0.01, 0.09, -0.02, 0.012, -0.02, 0.05};
+    const double a = -0.4, b = 0.3, jacobian[9] = {1.0, 0.0, a, 0.0, 1.0, b, 0.0, 0.0, 1.0};
+    struct nav_gaussian g = {.mean = {1.0, 2.0, 0.0}};
+    for (int i = 0; i < 9; i++)
+        g.covariance[i] = c[i];
+    nav_gaussian_move(&g, (struct nav_pose){b, -a, 0.2}, &NO_NOISE);
+    for (int i = 0; i < 9; i++) {
+        double sum = 0.0;
+        for (int n = 0; n < 9; n++)
+            sum += jacobian[i / 3 * 3 + n / 3] * c[n] * jacobian[i % 3 * 3 + n % 3];
+        assert_near(g.covariance[i], sum, 1e-12);
+    }
+}
+
+/* Variance of a uniform distribution: width^2 / 12. */
+static void a_robot_that_may_be_anywhere_is_in_the_middle_give_or_take_the_arena(void **state)
+{
+    (void)state;
+    struct nav_problem p = room();
+    p.arena.size_x = 3.0;
+    p.arena.size_y = 1.2;
+    p.prior.uniform = true;
+    struct nav_gaussian g = nav_gaussian_prior(&p);
+    const double variances[9] = {9.0 / 12.0, 0, 0, 0, 1.44 / 12.0, 0, 0, 0, 4.0 * NAV_PI * NAV_PI / 12.0};
+    assert_near(g.mean.x, 1.5, 1e-12);
+    assert_near(g.mean.y, 0.6, 1e-12);
+    for (int i = 0; i < 9; i++)
+        assert_near(g.covariance[i], variances[i], 1e-12);
+}
+
 static void a_motion_put_off_is_as_good_as_done(void **state)
 {
     (void)state;
@@ -107,6 +141,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_step_is_taken_in_the_frame_it_starts_in),
         cmocka_unit_test(moving_turns_heading_error_into_sideways_error),
+        cmocka_unit_test(moving_carries_what_is_known_of_position_and_heading_together),
+        cmocka_unit_test(a_robot_that_may_be_anywhere_is_in_the_middle_give_or_take_the_arena),
         cmocka_unit_test(a_motion_put_off_is_as_good_as_done),
         cmocka_unit_test(a_circle_walked_in_steps_closes),
         cmocka_unit_test(an_inverse_undoes_and_a_flat_covariance_has_none),
