@@ -55,6 +55,26 @@ static void a_long_thin_gaussian_leaves_no_gaps(void **state)
     }
 }
 
+/* Side by side along the longer axis: neither gaps, nor a belief made wider by bumps that overlap. */
+static void bumps_of_a_gaussian_are_as_wide_as_they_lie_apart(void **state)
+{
+    (void)state;
+    static struct nav_component c[10000];
+    static const double sigmas[][2] = {{0.2, 0.2}, {0.2, 0.05}, {0.05, 0.2}};
+    for (int k = 0; k < 3; k++) {
+        const double sx = sigmas[k][0], sy = sigmas[k][1];
+        const struct nav_gaussian g = {{1.0, 1.0, 0.0}, {sx * sx, 0, 0, 0, sy * sy, 0, 0, 0, 0.01}};
+        long n = nav_gaussian_components(&g, c, 10000);
+        double apart = 1.0;
+        for (long i = 0; i < n; i++) {
+            double along = sx >= sy ? c[i].pose.x - c[0].pose.x : c[i].pose.y - c[0].pose.y;
+            apart = along > 1e-9 ? fmin(along, apart) : apart;
+        }
+        for (long i = 0; i < n; i++)
+            assert_near(c[i].sigma_m * sqrt(12.0), apart, 1e-9);
+    }
+}
+
 static void a_region_may_have_two_parts(void **state)
 {
     (void)state;
@@ -120,9 +140,13 @@ static void bins_keep_what_is_outside_and_all_headings(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(levels_and_area_of_a_normal),  cmocka_unit_test(a_long_thin_gaussian_leaves_no_gaps),
-        cmocka_unit_test(a_region_may_have_two_parts),  cmocka_unit_test(a_point_mass_and_no_mass),
-        cmocka_unit_test(bins_share_a_bump_by_overlap), cmocka_unit_test(bins_keep_what_is_outside_and_all_headings),
+        cmocka_unit_test(levels_and_area_of_a_normal),
+        cmocka_unit_test(a_long_thin_gaussian_leaves_no_gaps),
+        cmocka_unit_test(bumps_of_a_gaussian_are_as_wide_as_they_lie_apart),
+        cmocka_unit_test(a_region_may_have_two_parts),
+        cmocka_unit_test(a_point_mass_and_no_mass),
+        cmocka_unit_test(bins_share_a_bump_by_overlap),
+        cmocka_unit_test(bins_keep_what_is_outside_and_all_headings),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
