@@ -290,7 +290,14 @@ static void components_are_the_belief(void **state)
         assert_near(x, 0.0, 0.01);
         assert_near(sqrt(xx), sqrt(e.covariance[0]), 0.005);
         assert_near(sqrt(tt), sqrt(e.covariance[8]), 0.01);
+        /* Without room for all of them it lists the first ones and touches nothing beyond. */
+        const struct nav_component untouched = {{7.0, 7.0, 7.0}, 7.0, 7.0, 7.0};
+        for (long i = 0; i < ROOM; i++)
+            bump[i] = untouched;
         assert_int_equal(nav_filter_components(f, bump, 1), count);
+        assert_memory_not_equal(&bump[0], &untouched, sizeof untouched);
+        for (long i = 1; i < ROOM; i++)
+            assert_memory_equal(&bump[i], &untouched, sizeof untouched);
         nav_filter_free(f);
     }
 }
