@@ -39,6 +39,30 @@ static void two_heaps_split_and_one_does_not(void **state)
     assert_true(fabs(sum - 0.25) < 1e-9 || fabs(sum - 0.75) < 1e-9);
 }
 
+/* Two heaps 1 m apart along any line in the plane, or 3 rad apart in heading. */
+static void heaps_are_told_apart_along_any_direction(void **state)
+{
+    (void)state;
+    enum { POINTS = 100, LINES = 12 };
+    double offset[3 * POINTS], weight[POINTS], half[POINTS];
+    struct nav_rng rng;
+    nav_rng_seed(&rng, 2, 0);
+    const struct multi_points points = {offset, weight, POINTS};
+    for (int line = 0; line <= LINES; line++) {
+        double angle = NAV_PI * line / LINES;
+        const double apart[3] = {cos(angle), sin(angle), 0.0}, turned[3] = {0.0, 0.0, 3.0};
+        for (int n = 0; n < POINTS; n++) {
+            weight[n] = 1.0 / POINTS;
+            for (int i = 0; i < 3; i++)
+                offset[3 * n + i] =
+                    0.02 * nav_rng_normal(&rng) + (n % 4 ? 0.5 : -0.5) * (line < LINES ? apart : turned)[i];
+        }
+        assert_true(multi_split(&points, 0.75, half));
+        for (int n = 0; n < POINTS; n++)
+            assert_int_equal(half[n] > 0.0, (half[0] > 0.0) == (n % 4 == 0));
+    }
+}
+
 static void merged_modes_keep_their_moments(void **state)
 {
     (void)state;
@@ -87,11 +111,9 @@ static void a_robot_is_tracked(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(points_give_their_mean_and_covariance),
-        cmocka_unit_test(two_heaps_split_and_one_does_not),
-        cmocka_unit_test(merged_modes_keep_their_moments),
-        cmocka_unit_test(all_modes_merged_weigh_no_more_than_one),
-        cmocka_unit_test(a_robot_is_tracked),
+        cmocka_unit_test(points_give_their_mean_and_covariance),    cmocka_unit_test(two_heaps_split_and_one_does_not),
+        cmocka_unit_test(heaps_are_told_apart_along_any_direction), cmocka_unit_test(merged_modes_keep_their_moments),
+        cmocka_unit_test(all_modes_merged_weigh_no_more_than_one),  cmocka_unit_test(a_robot_is_tracked),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
