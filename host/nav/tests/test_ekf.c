@@ -87,6 +87,43 @@ static void a_border_crossed_puts_the_tip_on_the_line(void **state)
     nav_kalman_destroy(k);
 }
 
+/* Aslant towards the corner of four tiles: a border lies 0.01 m ahead, one of the same two textures 0.1 m to the left.
+ * A belief that knows the place better than the crossing tells it takes the near one. */
+static void of_two_borders_that_were_it_the_likelier_is_taken(void **state)
+{
+    (void)state;
+    const double c = sqrt(0.5), way = 0.09 + 0.1; /* the tip's, half way between steps 4 and 5 */
+    struct nav_problem p = behind_the_border();
+    p.prior.mean = (struct nav_pose){0.49 - way * c, 0.40 - way * c, NAV_PI / 4.0};
+    p.prior.sigma[0] = p.prior.sigma[1] = 0.005;
+    struct nav_kalman *k = create(&p);
+    cross(k);
+    /* The crossing's place is known to hypot(0.01, 0.01) along the way, which meets the border at 45 degrees. */
+    double prior = 0.000025, gain = prior / (prior + 0.0001);
+    assert_near(k->belief.mean.x, p.prior.mean.x + 0.16 * c + gain * 0.01, 1e-6);
+    assert_near(k->belief.mean.y, p.prior.mean.y + 0.16 * c, 1e-6);
+    nav_kalman_destroy(k);
+}
+
+/* A surface once sure, a window that speaks for two others: it is the likelier that the whisker crossed into. */
+static void of_two_textures_that_were_it_the_likelier_is_taken(void **state)
+{
+    (void)state;
+    struct nav_problem p = room();
+    struct nav_borders b;
+    struct nav_crossing crossing;
+    p.arena.classes = 3;
+    const float before[] = {0.0f, -20.0f, -20.0f}, after[][3] = {{-20.0f, -14.0f, -10.0f}, {-20.0f, -10.0f, -14.0f}};
+    for (int n = 0; n < 2; n++) {
+        assert_int_equal(nav_borders_init(&b, &p.arena, &p.robot), 0);
+        assert_false(nav_borders_read(&b, 0, before, &crossing));
+        assert_true(nav_borders_read(&b, 0, after[n], &crossing));
+        assert_int_equal(crossing.from, 0);
+        assert_int_equal(crossing.to, 2 - n);
+        nav_borders_free(&b);
+    }
+}
+
 static void a_texture_without_a_border_says_nothing(void **state)
 {
     (void)state;
@@ -122,6 +159,8 @@ int main(void)
         cmocka_unit_test(what_is_too_far_off_is_not_believed),
         cmocka_unit_test(no_contact_pushes_out_of_reach_and_no_further),
         cmocka_unit_test(a_border_crossed_puts_the_tip_on_the_line),
+        cmocka_unit_test(of_two_borders_that_were_it_the_likelier_is_taken),
+        cmocka_unit_test(of_two_textures_that_were_it_the_likelier_is_taken),
         cmocka_unit_test(a_texture_without_a_border_says_nothing),
         cmocka_unit_test(a_first_window_that_was_wrong_is_no_border),
     };
