@@ -139,6 +139,25 @@ static void whiskers_add_and_those_not_read_say_nothing(void **state)
     nav_likelihood_free(l);
 }
 
+/* Expected distances are rounded to codes, of which a byte holds 256: finer than what a contact can tell. */
+static void codes_of_a_distance_are_finer_than_its_noise_and_reach_the_tip(void **state)
+{
+    (void)state;
+    static const double sigmas[] = {0.004, 0.01, 0.05}, lengths[] = {0.05, 0.2, 0.4};
+    for (int n = 0; n < 9; n++) {
+        struct nav_problem p = room();
+        struct nav_ray ray = ROOM_RAY[0];
+        ray.length = lengths[n / 3];
+        p.robot.ray = &ray;
+        p.robot.radial_sigma = sigmas[n % 3];
+        struct nav_likelihood *l = nav_likelihood_new(&p.arena, &p.robot, &p.settings, 0.0);
+        assert_true(l->model[1].step <= sigmas[n % 3] / 2.0);
+        assert_true((l->model[1].codes - 1) * l->model[1].step >= ray.length);
+        assert_in_range(l->model[1].codes, 2, 256);
+        nav_likelihood_free(l);
+    }
+}
+
 static void the_table_holds_what_each_free_pose_expects(void **state)
 {
     (void)state;
@@ -263,6 +282,7 @@ int main(void)
         cmocka_unit_test(no_contact_is_strong_evidence_deep_in_a_wall_and_weak_at_the_tip),
         cmocka_unit_test(whiskers_turn_with_the_robot),
         cmocka_unit_test(whiskers_add_and_those_not_read_say_nothing),
+        cmocka_unit_test(codes_of_a_distance_are_finer_than_its_noise_and_reach_the_tip),
         cmocka_unit_test(the_table_holds_what_each_free_pose_expects),
         cmocka_unit_test(a_signature_is_worked_out_once_relative_to_a_bound),
         cmocka_unit_test(a_robot_without_whiskers_expects_one_thing_everywhere),
