@@ -20,9 +20,10 @@ void *__wrap_calloc(size_t count, size_t size);
 void *__wrap_realloc(void *old, size_t size);
 void __wrap_free(void *old);
 
-static inline bool allocation_fails(void)
+/* Nothing is what one gets for asking for nothing: the standard allows it, and other libraries do so. */
+static inline bool allocation_fails(size_t size)
 {
-    return ++allocations == failed_allocation;
+    return ++allocations == failed_allocation || size == 0;
 }
 
 static inline void *count_block(void *made)
@@ -33,17 +34,17 @@ static inline void *count_block(void *made)
 
 void *__wrap_malloc(size_t size)
 {
-    return allocation_fails() ? NULL : count_block(__real_malloc(size));
+    return allocation_fails(size) ? NULL : count_block(__real_malloc(size));
 }
 
 void *__wrap_calloc(size_t count, size_t size)
 {
-    return allocation_fails() ? NULL : count_block(__real_calloc(count, size));
+    return allocation_fails(count * size) ? NULL : count_block(__real_calloc(count, size));
 }
 
 void *__wrap_realloc(void *old, size_t size)
 {
-    if (allocation_fails())
+    if (allocation_fails(size))
         return NULL;
     return old ? __real_realloc(old, size) : count_block(__real_realloc(old, size));
 }

@@ -84,11 +84,28 @@ static void what_gets_no_memory_is_not_made_and_leaves_nothing_behind(void **sta
     starve(made_weigher, NULL, &p);
 }
 
+/* What there is none of (whiskers, boxes, free places) is no lack of memory. */
+static void a_problem_without_whiskers_boxes_or_free_places_is_taken(void **state)
+{
+    (void)state;
+    static const struct nav_box all = {0.0, 0.0, 1.0, 1.0};
+    for (int kind = 0; kind < 3; kind++) {
+        struct nav_problem p = room();
+        p.arena.boxes = kind == 0 ? 0 : 1;
+        p.arena.box = kind == 2 ? &all : ROOM_BOX;
+        p.robot.tips = p.robot.rays = kind == 1 ? 0 : 1;
+        for (int n = 0; nav_filter_name(n); n++)
+            assert_true(made_filter(nav_filter_name(n), &p));
+        assert_true(made_weigher(NULL, &p));
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(no_filter_allocates_after_its_start),
         cmocka_unit_test(what_gets_no_memory_is_not_made_and_leaves_nothing_behind),
+        cmocka_unit_test(a_problem_without_whiskers_boxes_or_free_places_is_taken),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
