@@ -78,6 +78,14 @@ def test_doctor_names_what_is_wrong_with_the_cable(host, spoil, text, remedy):
     assert len(found) == 1 and text in found[0].text and remedy in found[0].remedy
 
 
+@pytest.mark.parametrize(("free_mib", "fits"), [(1, False), (64, True)])  # the latter is what a container is given
+def test_doctor_sees_whether_a_ring_fits_into_shared_memory(host, monkeypatch, free_mib, fits):
+    monkeypatch.setattr("shutil.disk_usage", lambda path: SimpleNamespace(free=free_mib << 20))
+    found = doctor.room(host / "dev/shm")
+    assert found == [] if fits else "1 MiB free" in found[0].text and "remove old rings" in found[0].remedy
+    assert worst(found) == found
+
+
 def test_doctor_does_not_miss_a_cable_where_frames_arrive(host):
     (host / "sys/bus/usb/devices/1-2/idVendor").write_text("dead\n")
     name, stop = ring_name(), threading.Event()
