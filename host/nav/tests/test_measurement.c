@@ -36,10 +36,13 @@ static void however_sure_a_window_is_the_floor_remains(void **state)
     struct nav_settings s = settings();
     struct nav_model m = {.fill = nav_mm_texture, .settings = &s, .values = 3, .codes = 3};
     nav_mm_texture_begin(&m);
-    const double loglik[] = {0.0, -1e6, -1e6};
-    double out[3];
-    m.fill(&m, loglik, out);
-    assert_near(out[2], 0.2, 1e-6);
+    for (int sure = 0; sure < 3; sure++) {
+        double loglik[] = {-1e6, -1e6, -1e6}, out[3];
+        loglik[sure] = 0.0;
+        m.fill(&m, loglik, out);
+        for (int k = 0; k < 3; k++)
+            assert_near(out[k], k == sure ? 3.0 * 0.8 + 0.2 : 0.2, 1e-6);
+    }
 }
 
 /* A whisker of 0.1 m in steps of 1 cm up to 0.12 m, code 12: nothing. */
