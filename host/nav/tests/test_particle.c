@@ -257,6 +257,29 @@ static void weights_that_stay_low_bring_fresh_particles_where_the_row_fits(void 
     destroy(f);
 }
 
+static void the_work_told_counts_particles_weighed_and_particles_moved(void **state)
+{
+    (void)state;
+    struct nav_problem p = quiet();
+    p.settings.particle_count = 100.0;
+    struct particle *f = create(&p);
+    struct nav_estimate e;
+    const double texture[] = {0.0, -1.0}, nothing = INFINITY, none[] = {0.0, 0.0};
+    const double *reading[] = {texture, &nothing};
+    predict(f, &(struct nav_motion){.step = {0.01, 0.0, 0.0}});
+    estimate(f, &e);
+    assert_int_equal(e.touched, 0); /* put off */
+    update(f, &(struct nav_evidence){reading, none});
+    estimate(f, &e);
+    assert_int_equal(e.evaluations, 100);
+    assert_int_equal(e.touched, 200);
+    predict(f, &(struct nav_motion){.step = {0.1, 0.0, 0.0}}); /* too far to be put off */
+    estimate(f, &e);
+    assert_int_equal(e.evaluations, 0);
+    assert_int_equal(e.touched, 100);
+    destroy(f);
+}
+
 /* Every second of a tight cloud gives way, counted from a place that the random numbers choose: here the first, where
  * the place after the last one would be the next in turn. */
 static void fresh_particles_take_their_share_of_the_places_and_none_beyond(void **state)
@@ -325,6 +348,7 @@ int main(void)
         cmocka_unit_test(two_particles_follow_a_robot_that_they_know),
         cmocka_unit_test(the_same_seed_gives_the_same_bytes),
         cmocka_unit_test(weights_that_stay_low_bring_fresh_particles_where_the_row_fits),
+        cmocka_unit_test(the_work_told_counts_particles_weighed_and_particles_moved),
         cmocka_unit_test(fresh_particles_take_their_share_of_the_places_and_none_beyond),
         cmocka_unit_test(weights_never_become_more_uneven_than_allowed),
         cmocka_unit_test(a_row_that_no_particle_can_explain_changes_no_weight),
