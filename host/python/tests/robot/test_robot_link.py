@@ -2,6 +2,7 @@
 
 import argparse
 import re
+import threading
 import time
 
 import pytest
@@ -381,6 +382,15 @@ def test_a_full_inbox_drops_the_oldest_and_counts_them():
     assert (inbox.overflown, inbox.missed) == (15, 15)
     inbox.close()
     assert inbox.take() == []
+
+
+def test_who_waits_for_a_message_is_woken_by_the_end():
+    inbox, got = Inbox("", 10, Sources()), []
+    waits = threading.Thread(target=lambda: got.append(inbox.take()), daemon=True)
+    waits.start()
+    inbox.close()
+    waits.join(PATIENCE_S)
+    assert got == [[]]
 
 
 def test_what_is_refused_does_not_end_the_wait_for_a_message():
