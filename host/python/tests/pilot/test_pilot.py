@@ -1,9 +1,11 @@
 """The pilot in closed loop with the level-1 world: where it drives, what it reports, what it ignores."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from models import model as texture_model
 
 from whisker.demo.level1 import explore
 from whisker.demo.study import study
@@ -11,6 +13,7 @@ from whisker.demo.training import learn
 from whisker.nav import localise
 from whisker.pilot.behaviour import BLOCK_TICKS, ODOMETRY_TICKS
 from whisker.pilot.pilot import Pilot, compose
+from whisker.pilot.states import Whisk
 from whisker.robot.models import load_models
 from whisker.scene import Arena, Scene
 from whisker.simulation.scenes import TEXTURES, make_robot, make_scene
@@ -199,6 +202,22 @@ def test_bad_samples_are_counted_and_their_counts_never_used(models):
         assert pilot.bad_samples == bad.sum()
         flights.append((repr(rows), pilot.drives))
     assert flights[0] == flights[1]
+
+
+@pytest.mark.parametrize(("onset", "measured"), [(838, False), (839, False), (840, True), (3000, True), (3001, False)])
+def test_only_what_was_met_in_the_turn_and_pushed_to_the_end_is_measured(monkeypatch, onset, measured):
+    """The turn follows the block that ends with tick 839; a whisker may have met something in the retreat before it."""
+    robot = make_robot()
+    texture = {whisker.name: texture_model() for whisker in robot.of_role("texture")}
+    pilot, told = Pilot(robot, texture, {}, SEED), []
+    lane = pilot.object_lanes[0]
+    monkeypatch.setattr(pilot, "_measure", told.append)
+    pilot.behaviour.whisk = Whisk(lane, 1.0, start=839, push_end=3000 + pilot.behaviour.wheels.push_ticks)
+    met = SimpleNamespace(onset=onset, release=5000, touching=False, settled=True, block=lambda *_: None)
+    monkeypatch.setitem(pilot.contacts, lane, met)
+    rest = np.full((BLOCK_TICKS, len(pilot.names)), 0x8000, np.uint16)
+    pilot.block(5000, rest, rest, np.zeros_like(rest))
+    assert (len(told) == 1) == measured
 
 
 def test_onset_and_release_are_dated_to_the_sample():
