@@ -13,7 +13,8 @@ import pytest
 from commandkit import END_S, command, live_ring, run, signals_as_before  # noqa: F401 - a fixture
 from rings import make_frames
 
-from whisker.cli import COMMANDS, main
+from whisker.cli import COMMANDS, _parser, main
+from whisker.commands import bridge_sim
 from whisker.commands.top import BARS, sparkline
 from whisker.protocol import WIRE_VERSION
 from whisker.recording import read
@@ -65,6 +66,14 @@ def test_a_missing_ring_is_one_line(capsys, tmp_path, name):
 def test_wrong_arguments_are_one_line(capsys, arguments, complaint):
     code, _, err = run(capsys, *arguments)
     assert code == 2 and complaint in err and err.count("\n") == 1
+
+
+@pytest.mark.parametrize(("lanes", "mask"), [(6, 0x3F), (8, 0xFF), (28, 0xFFFFFFF)])
+def test_the_simulated_bridge_and_its_daemon_have_the_same_lanes(monkeypatch, tmp_path, lanes, mask):
+    monkeypatch.setattr(bridge_sim, "program", lambda name: name)
+    words = bridge_sim._command(_parser("bridge-sim").parse_args(["bridge-sim", "--lanes", str(lanes)]), tmp_path)
+    told = {name: words[words.index(name) + 1] for name in ("--lanes-populated", "--lane-mask")}
+    assert told == {"--lanes-populated": str(lanes), "--lane-mask": str(mask)}
 
 
 def test_info_tells_ring_daemon_and_clock(capsys):
