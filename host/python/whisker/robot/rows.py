@@ -105,7 +105,9 @@ class Step:
 
         In one, a filter would refuse it, or take the time between for rows whose motion is lost, and assume some more.
         """
-        count, nothing = self._count(), dict.fromkeys(self.row.names, math.nan)
+        count = self._count()
+        # Of a distance None would say that there was no contact.
+        nothing = {name: math.nan if name.endswith("_mm") else None for name in self.row.names}
         apart_ns = min(self.within_ns // count, ROW_NS) or PIECE_NS
         rows = []
         for n in range(1, count):

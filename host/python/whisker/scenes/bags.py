@@ -59,19 +59,26 @@ def _decoded(bag: McapFile, kind: type, message) -> list:
 
 
 def _table(rows: list[Observation], truth: list[PoseStamped]) -> list[dict[str, str]]:
-    """observations.csv as a list of rows; motion of rows that are not in the bag is in the next that is."""
+    """observations.csv as a list of rows. Rows that are not in the bag are there with their motion, evenly in time, and
+    nothing read in them: so the navigator takes them (Step.lead)."""
     poses = {pose.header.stamp.ns: pose.pose.xytheta for pose in truth}
     follower, out, stream = Follower(), [], 0
     for n, row in enumerate(rows):
         stream += n > 0 and row.seq <= rows[n - 1].seq
         (step,) = follower.take([Received("observation", row, Envelope(stream, n, 0))])
-        row_cells = step.cells()
-        cells = {name: cell(value) for name, value in row_cells.items()} | {"t_s": time_text(row_cells)}
-        if poses:
-            pose = poses.get(row.header.stamp.ns, (np.nan,) * 3)
-            cells |= {name: repr(float(value)) for name, value in zip(TRUTH, pose, strict=True)}
-        out.append(cells)
+        *lead, last = *step.lead(), step.cells()
+        out += [_cells(missing, poses, None) for missing in lead]
+        out.append(_cells(last, poses, row.header.stamp.ns))
     return out
+
+
+def _cells(row: dict[str, float | None], poses: dict[int, tuple], stamp_ns: int | None) -> dict[str, str]:
+    """A row as text, with the true pose of this time if any is known of the run."""
+    cells = {name: cell(value) for name, value in row.items()} | {"t_s": time_text(row)}
+    if poses:
+        pose = poses.get(stamp_ns, (np.nan,) * 3)
+        cells |= {name: repr(float(value)) for name, value in zip(TRUTH, pose, strict=True)}
+    return cells
 
 
 def _as_folder(files: dict[str, str], rows: list[dict[str, str]]):
