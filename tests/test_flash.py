@@ -57,16 +57,28 @@ def nodes_listed(text: str) -> dict[int, tuple[str, str, str]]:
     return {int(lane): (serial, version, state) for lane, serial, version, state in found}
 
 
+def assert_bar_fills(text: str) -> None:
+    """The bar that a terminal shows: from little to all, as long as the share beside it says."""
+    bars = [(len(bar), int(share)) for bar, share in re.findall(r"^\[(#*) *\] +(\d+) %", text, re.M)]
+    assert len(bars) > 5 and bars == sorted(bars) and bars[0][1] < 20 and bars[-1][1] == 100, text
+    longest = bars[-1][0]
+    assert all(abs(length - longest * share / 100) < 1 for length, share in bars), text
+
+
 def test_all_nodes_at_once_but_for_those_that_cannot(image, tmp_path):
     """Lane 1 loses its supply in the middle, lane 4 is another chip; the second time lane 1 takes it too."""
-    shell = f"$FLASH $LINK {image}; echo first $?; $FLASH $LINK {image} --node 2; echo second $?; $FLASH $LINK --list"
+    terminal = f"{sys.executable} -c 'import pty, sys; sys.exit(pty.spawn(sys.argv[1:]) >> 8)'"
+    shell = f"$FLASH $LINK {image}; echo first $?; {terminal} $FLASH $LINK {image} --node 2; echo second $?;"
+    shell += "$FLASH $LINK --list"
     done = bridge_with(tmp_path, "1 cut 10\n4 chip 0x062A\n", shell)
     first, _, rest = done.stdout.partition("first 1\n")
     assert rest, done.stdout + done.stderr
     fate = dict(re.findall(r"^lane +(\d): (.*)$", first, re.M))
     assert {lane for lane, text in fate.items() if text == "updated"} == {"0", "2", "3", "5"}
     assert fate["4"] == "refused: the image is for another chip"
-    assert "second 0" in rest, rest
+    second, told, rest = rest.partition("second 0\n")
+    assert told, second + rest
+    assert_bar_fills(second)
     listed = nodes_listed(rest)
     assert {lane: version for lane, (_, version, _) in listed.items()} == {
         lane: "0.1" if lane == 4 else "2.3" for lane in range(WHISKERS)
