@@ -18,7 +18,7 @@ from whisker.pilot.behaviour import BLOCK_TICKS, ODOMETRY_TICKS
 from whisker.robot import wheels as wheels_module
 from whisker.robot.health import RUNNING
 from whisker.robot.pilot_process import LOST, NO_HEARTBEAT, SILENCE_S, Flight, LiveFlight, LiveWheels
-from whisker.robot.wheels import RETRY_S, LiveBase, Report, wheels_of
+from whisker.robot.wheels import MODE, RETRY_S, LiveBase, Report, wheels_of
 from whisker.simulation.scenes import make_scene
 from whisker.touch.radial.model import RadialModel
 
@@ -271,6 +271,25 @@ def test_a_base_that_goes_is_told_and_found_again(monkeypatch):
     assert np.diag(report.covariance).tolist() == [1.0, 2.0, 3.0] and base.trouble == ""
     monkeypatch.setattr(Driver, "alive", False)
     assert wheels.odometry(799).bumps == LOST and base.lost == 1
+
+
+def test_every_order_reaches_the_base(monkeypatch):
+    orders = []
+
+    class Noting:
+        def __init__(self, path, timeout_s):
+            orders.append(("connect", path))
+
+        def __getattr__(self, name):
+            return lambda *words: orders.append((name, *words))
+
+    monkeypatch.setattr(wheels_module, "Base", Noting)
+    base = LiveBase("base.sock")
+    base.drive(39, 0.1, -0.2)
+    base.recover()
+    base.stop()
+    base.close()
+    assert orders == [("connect", "base.sock"), ("drive", 0.1, -0.2), ("mode", MODE), ("stop",), ("close",)]
 
 
 def test_the_whisk_is_what_the_base_can_turn_at():
