@@ -9,7 +9,7 @@ from whisker.pilot.behaviour import BLOCK_TICKS
 from whisker.pilot.states import State
 from whisker.pilot.wheels import NO_BUMPS
 from whisker.robot.ros import PLANAR
-from whisker.robot.telling import Teller
+from whisker.robot.telling import TICK_NS, Teller
 from whisker.robot.wheels import Report
 
 ROW_BLOCKS = 5
@@ -60,3 +60,18 @@ def test_the_pose_is_the_sum_of_the_motions_and_pretends_no_covariance(told):
     last = told((0.0, 0.0, np.pi / 2), (0.02, 0.0, 0.0))[-1]
     assert last.pose.pose.xytheta == pytest.approx((0.0, 0.02, np.pi / 2))
     assert not last.pose.covariance.any()
+
+
+def test_a_contact_is_told_once_as_it_begins_and_once_as_it_ends():
+    contact = SimpleNamespace(onset=-1, release=-1, touching=False)
+    behaviour = SimpleNamespace(state=State.FORWARD, since=0, reason="", whisking=False)
+    pilot = SimpleNamespace(contacts={2: contact}, whisks=[], names={2: "left"}, object_lanes=[2], behaviour=behaviour)
+    link = Heard()
+    teller = Teller(link, pilot)
+    changes = {2: {"onset": 90, "touching": True}, 4: {"release": 170, "touching": False}}
+    for n in range(6):
+        vars(contact).update(changes.get(n, {}))
+        teller.block((n + 1) * BLOCK_TICKS - 1)
+    told = [(c.whisker, c.touching, c.onset.ns, c.release.ns, c.header.stamp.ns) for c in link.topics["contact"]]
+    ends = [(n + 1) * BLOCK_TICKS * TICK_NS for n in changes]
+    assert told == [("left", True, 90 * TICK_NS, 0, ends[0]), ("left", False, 90 * TICK_NS, 170 * TICK_NS, ends[1])]
