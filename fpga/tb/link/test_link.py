@@ -8,7 +8,7 @@ from cocotb.triggers import FallingEdge, RisingEdge
 from cycles import transfer as transfer_cycles
 from nodes import BITS, Nodes
 
-from whisker.protocol import COMMANDS, LANES, ORDER, RECORD, crc8
+from whisker.protocol import COMMANDS, LANES, ORDER, RECORD, SERVICE, crc8, service_window
 
 SETTINGS = [(6, 30, 3), (6, 30, 5), (16, 180, 8), (32, 30, 16), (32, 255, 32), (8, 41, 1)]  # divider, gap, sample point
 SELECT_SETUP = 9  # cycles: 150 ns
@@ -169,6 +169,31 @@ async def golden_records(dut):
         assert outcome(verdict, lane) == wanted, name
         assert outcome(verdict, (lane + 1) % LANES) == "absent", name
         assert await stored(dut, lane) == bytes.fromhex(raw), name
+
+
+async def give_service(dut, window: bytes) -> None:
+    """What service_store does: the bit that is asked for, in the same cycle."""
+    bits = [byte >> (7 - bit) & 1 for byte in window for bit in range(8)]
+    while True:
+        await FallingEdge(dut.clk)
+        dut.service_bit.value = bits[int(dut.service_index.value) % len(bits)]
+
+
+@cocotb.test(timeout_time=10, timeout_unit="ms")
+async def a_service_order_follows_with_its_tick_and_both_crcs(dut):
+    """They are the link's own: the store has none of them."""
+    nodes = await begin(dut)
+    dut.service.value = 1
+    for tick in (7, 0xC8):
+        data = random.randbytes(SERVICE.fields["data"].count)
+        wanted = service_window(tick, 4, b"\x01\x02\x03\x04\x05", data)
+        crc_at = wanted.index(data) - 1
+        stored = bytes(1) + wanted[1:crc_at] + bytes(1) + data + bytes(4)
+        giving = cocotb.start_soon(give_service(dut, stored))
+        await transfer(dut, nodes, {}, tick, tick)
+        giving.cancel()
+        assert nodes.services.pop() == wanted
+        assert nodes.orders[-1] == ORDER.pack(tick=tick, command=COMMANDS["service"])
 
 
 @cocotb.test(timeout_time=10, timeout_unit="ms")
