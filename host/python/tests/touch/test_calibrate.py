@@ -1,6 +1,7 @@
 """`whisker calibrate`: what it writes from a ring is what was in it, and the radial model learns from it."""
 
 import tomllib
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -122,6 +123,14 @@ def test_guided_it_waits_for_enter_and_forgets_what_came_before(capsys, tmp_path
     code, out, _ = run(capsys, "calibrate", "--ring", ring.name, "--out", tmp_path, *options)
     assert code == 0 and len(asked) == 3 and out.count("press Enter") == 3 and "Post at 110 mm" in out
     assert len(read_whisks(tmp_path / "lane3.csv", with_radius=True).contact) == 4
+
+
+def test_one_frame_is_enough_to_go_on_and_none_is_told():
+    takes = iter([make_frames(1), make_frames(0)])
+    feed = Feed(SimpleNamespace(name="made-up", take=lambda wait_s: next(takes)))
+    assert len(feed.next()) == 1
+    with pytest.raises(CalibrationError, match="ring made-up: no frames for .* s; see whisker doctor"):
+        feed.next()
 
 
 def test_a_bridge_started_anew_ends_it():
