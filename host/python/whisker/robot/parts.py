@@ -17,7 +17,7 @@ BASE_STEADY_S = 1.0  # a base that is started again stops the wheels: it comes a
 # Inside the simulated bridge's umockdev the device is seen by whoever has these variables: they are left in file $0. At
 # the end whoever took it ends first, for umockdev does not survive a client that is left. When the supervisor has died
 # the world goes on for a second: a real one does not end with the robot's processes, and a base has to stop its wheels.
-# Each sleep is short, because one outlives a shell that is killed.
+# Each sleep is short, because it goes on when the shell is killed.
 LEAVE_ENVIRONMENT = """
 end() {
     rm -f "$0"

@@ -140,7 +140,7 @@ class LiveFlight:
         self._health.tell(self._stamp_ns, state, self._last_error)
 
     def _stop_for_another_writer(self) -> None:
-        """A whiskerd that died can be back before SILENCE_S; the wheels turn by samples of the one that died."""
+        """A new whiskerd can be there before SILENCE_S has passed. The wheels must not turn on by samples of the old one."""
         if self._ring.restarts != self._restarts and not self._halted:
             self._begin_anew = True
             self._halt()

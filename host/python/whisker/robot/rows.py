@@ -106,7 +106,7 @@ class Step:
         In one, a filter would refuse it, or take the time between for rows whose motion is lost, and assume some more.
         """
         count = self._count()
-        # Of a distance None would say that there was no contact.
+        # A distance of None means that there was no contact; nan means that nothing was read.
         nothing = {name: math.nan if name.endswith("_mm") else None for name in self.row.names}
         apart_ns = min(self.within_ns // count, ROW_NS) or PIECE_NS
         rows = []

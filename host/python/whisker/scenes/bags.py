@@ -59,8 +59,8 @@ def _decoded(bag: McapFile, kind: type, message) -> list:
 
 
 def _table(rows: list[Observation], truth: list[PoseStamped]) -> list[dict[str, str]]:
-    """observations.csv as a list of rows. Rows that are not in the bag are there with their motion, evenly in time, and
-    nothing read in them: so the navigator takes them (Step.lead)."""
+    """observations.csv as a list of rows. Rows that are missing in the bag are included, without readings, with their
+    motion spread evenly in time, as in the navigator (Step.lead)."""
     poses = {pose.header.stamp.ns: pose.pose.xytheta for pose in truth}
     follower, out, stream = Follower(), [], 0
     for n, row in enumerate(rows):
@@ -73,7 +73,7 @@ def _table(rows: list[Observation], truth: list[PoseStamped]) -> list[dict[str, 
 
 
 def _cells(row: dict[str, float | None], poses: dict[int, tuple], stamp_ns: int | None) -> dict[str, str]:
-    """A row as text, with the true pose of this time if any is known of the run."""
+    """A row as text, with the true pose at this time; nan if that is unknown. No columns where no pose is known."""
     cells = {name: cell(value) for name, value in row.items()} | {"t_s": time_text(row)}
     if poses:
         pose = poses.get(stamp_ns, (np.nan,) * 3)
