@@ -11,6 +11,7 @@ one's own joins by NAV_PEER_<NAME>=PROGRAM, called as PROGRAM SCENE.txt EST.csv 
 import argparse
 import json
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -119,8 +120,15 @@ def python(peer: str, *options) -> Callable:
     return run
 
 
-def quietly(*command) -> bool:
-    return subprocess.run([str(word) for word in command], capture_output=True).returncode == 0
+def failure(*commands: tuple) -> str:
+    """The error of the first of these commands that fails, one line; empty: none did."""
+    for command in commands:
+        done = subprocess.run([str(word) for word in command], capture_output=True, text=True)
+        if done.returncode != 0:
+            lines = [line.strip() for line in (done.stdout + done.stderr).splitlines() if line.strip()]
+            told = next((line for line in lines if re.search(r"\berror\b", line, re.IGNORECASE)), None)
+            return told or (lines[-1] if lines else f"exit code {done.returncode}")
+    return ""
 
 
 def python_entries(most: int) -> list[Entry]:
@@ -128,11 +136,10 @@ def python_entries(most: int) -> list[Entry]:
     pip = (VENV / "bin/pip", "install", "--disable-pip-version-check", "--require-hashes")
     ready = VENV / "ready"
     if not ready.exists():
-        made = quietly(sys.executable, "-m", "venv", VENV) and quietly(*pip, "-r", PEERS / "build.lock")
-        if not made or not quietly(*pip, "--no-build-isolation", "-r", PEERS / "requirements.lock"):
-            print(
-                "nav_peers: filterpy, particles, pfilter skipped: tools/benches/nav/peers/requirements.lock cannot be installed"
-            )
+        lock = PEERS / "requirements.lock"
+        install = ((*pip, "-r", PEERS / "build.lock"), (*pip, "--no-build-isolation", "-r", lock))
+        if error := failure((sys.executable, "-m", "venv", VENV), *install):
+            print(f"nav_peers: filterpy, particles, pfilter skipped: {lock} cannot be installed: {error}")
             return []
         ready.touch()
     return [
@@ -143,10 +150,14 @@ def python_entries(most: int) -> list[Entry]:
 
 
 def mrpt_entries(build: Path, most: int) -> list[Entry]:
-    """Builds the program if MRPT is there."""
+    """Builds the program if MRPT is there; a build that fails ends the bench with its error."""
     library = next(iter(sorted(build.rglob("libnav.a"))), None)
     cmake = ("cmake", "-S", PEERS, "-B", NATIVE, f"-DNAV_LIBRARY={library}")
-    if not (quietly(*cmake) and quietly("cmake", "--build", NATIVE) and (NATIVE / "mrpt_peer").exists()):
+    if error := failure(cmake, ("cmake", "--build", NATIVE)):
+        raise SystemExit(
+            f"nav_peers: {PEERS} does not build: {error}; mend it, or look at it with cmake --build {NATIVE}"
+        )
+    if not (NATIVE / "mrpt_peer").exists():
         print(f"nav_peers: MRPT skipped: not installed; {APT}")
         return []
     peer = NATIVE / "mrpt_peer"
