@@ -18,7 +18,13 @@ def add(parser) -> None:
     p.add_argument("--list-families", action="store_true", help="print bases and modifiers and leave")
     example = "whisker scene from build/demo --out scenes/demo"
     p = add_action(actions, "from", "make a scene of a run's recording", example, from_recording)
-    p.add_argument("recording", help="folder that a run left, as build/demo, or a robot's bag")
+    p.add_argument(
+        "kind",
+        nargs="?",
+        default="",
+        help=f"of the recording: {', '.join(scenes.READERS)} (default: told by its files)",
+    )
+    p.add_argument("recording", help="folder that a run left, as build/demo, a robot's bag, or a Thymio's recording")
     p.add_argument("--out", required=True, metavar="DIR", help="folder to write")
 
 
@@ -38,7 +44,9 @@ def make(arguments) -> int:
 
 
 def from_recording(arguments) -> int:
-    scene, observations = scenes.read_recording(arguments.recording, warn)
+    if arguments.kind not in ("", *scenes.READERS):
+        raise SettingError(f"scene from: kind '{arguments.kind}' is unknown; choose one of {', '.join(scenes.READERS)}")
+    scene, observations = scenes.read_recording(arguments.recording, warn, arguments.kind)
     _write(arguments.out, scene, observations)
     print(f"{arguments.out}: from {arguments.recording}, {len(observations)} rows")
     return 0

@@ -3,11 +3,12 @@
 from .families import BASES, MODIFIERS, FamilyError, recipe
 from .files import write_scene
 from .making import Made, make
-from .recordings import RecordingKindError, read_recording
+from .recordings import READERS, RecordingKindError, read_recording
 
 __all__ = [
     "BASES",
     "MODIFIERS",
+    "READERS",
     "FamilyError",
     "Made",
     "RecordingKindError",

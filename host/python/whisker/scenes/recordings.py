@@ -8,6 +8,7 @@ from ..nav.observations import Observations, observations_path, read_observation
 from ..scene import Prior, Scene, load
 from .bags import is_bag, read_bag
 from .files import rounded
+from .thymio import is_thymio, read_thymio
 
 RUN_SCENE = "scene"  # where a run of `make demo` keeps arena, robot, prior and observation rows
 
@@ -19,18 +20,21 @@ class RecordingKindError(UserError):
 Warn = Callable[[str], None]
 
 
-def read_recording(path, warn: Warn = lambda line: None) -> tuple[Scene, Observations]:
+def read_recording(path, warn: Warn = lambda line: None, kind: str = "") -> tuple[Scene, Observations]:
     """The scene a recording was made in and its rows; a start that the recording does not tell is uniform.
 
-    `warn` takes a line for each damage that cost rows or may have. RecordingKindError for what no reader knows;
+    `kind`: the one of READERS that it must be; empty: any. `warn` takes a line for each damage that cost rows or may have. RecordingKindError for what no reader knows;
     SceneError and TableError for a recording whose files are broken.
     """
     path = Path(path)
-    for knows, read in READERS:
+    for knows, read in [READERS[kind]] if kind else READERS.values():
         if knows(path):
             return read(path, warn)
+    if kind:
+        raise RecordingKindError(f"{path}: no recording of kind {kind}; give one, or leave the kind out")
     raise RecordingKindError(
-        f"{path}: no recording with observation rows; give the folder of a run (it holds {RUN_SCENE}/), its bag, or a scene"
+        f"{path}: no recording with observation rows; give the folder of a run (it holds {RUN_SCENE}/), its bag, a scene, "
+        "or a Thymio's recording"
     )
 
 
@@ -60,4 +64,9 @@ def _read_run(path: Path, warn: Warn) -> tuple[Scene, Observations]:
 
 
 Reader = tuple[Callable[[Path], bool], Callable[[Path, Warn], tuple[Scene, Observations]]]
-READERS: list[Reader] = [(_is_run, _read_run), (_is_folder_of_rows, _read_folder), (is_bag, _read_bag)]
+READERS: dict[str, Reader] = {
+    "run": (_is_run, _read_run),
+    "scene": (_is_folder_of_rows, _read_folder),
+    "bag": (is_bag, _read_bag),
+    "thymio": (is_thymio, read_thymio),
+}
