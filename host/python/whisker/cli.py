@@ -29,6 +29,7 @@ COMMANDS = {
     "pyro": "a robot's results as a Pyro object, the paper's interface",
     "localise": "where the robot was, row by row of a scene folder",
     "scene": "make scene folders for localise",
+    "bench": "score estimates of any engine on a fixed list of scenes and logs",
     "texture": "learn and tell floor surfaces",
     "radial": "learn and tell the distance of contacts along a whisker",
 }
