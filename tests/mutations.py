@@ -394,7 +394,7 @@ MUTATIONS = [
     Mutation(
         "navigation: motion turned the wrong way",
         "nav_test_motion",
-        "host/nav/models/pose.c",
+        "host/nav/problem/pose.c",
         "sin(",
         "-sin(",
     ),

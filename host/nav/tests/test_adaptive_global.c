@@ -24,7 +24,7 @@ static void begin(struct belief *b)
     b->problem.arena.boxes = 0;
     b->problem.robot.body_radius = 0.01;
     assert_int_equal(adaptive_global_init(&b->g, &b->problem), 0);
-    assert_int_equal(adaptive_log_init(&b->log, &b->problem), 0);
+    assert_int_equal(adaptive_log_init(&b->log, &b->g.likelihood->sensors), 0);
 }
 
 static void end(struct belief *b)
@@ -174,9 +174,12 @@ static size_t log_bytes(int classes)
     struct adaptive_log log;
     struct nav_problem problem = wander_new(0).problem;
     problem.arena.classes = classes;
-    assert_int_equal(adaptive_log_init(&log, &problem), 0);
+    struct nav_sensors sensors;
+    assert_int_equal(nav_sensors_init(&sensors, &problem.arena, &problem.robot, &problem.settings, 0.0), 0);
+    assert_int_equal(adaptive_log_init(&log, &sensors), 0);
     size_t bytes = adaptive_log_bytes(&log);
     adaptive_log_free(&log);
+    nav_sensors_free(&sensors);
     return bytes;
 }
 

@@ -1,6 +1,6 @@
 /* The extended Kalman filter where it must equal a Kalman filter, and what it makes of textures; its state is looked
  * at, so its source is part of this program. */
-#include "../filters/ekf.c"
+#include "../filter/ekf.c"
 
 #include "kalman_rooms.h"
 

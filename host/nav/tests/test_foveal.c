@@ -1,5 +1,5 @@
 /* The foveal filter by hand; its state is looked at, so its source is part of this program. */
-#include "../filters/foveal.c"
+#include "../filter/foveal.c"
 
 #include <string.h>
 

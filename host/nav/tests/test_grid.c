@@ -2,7 +2,7 @@
  * source is part of this program. */
 #include <string.h>
 
-#include "../filters/grid.c"
+#include "../filter/grid.c"
 
 #include "near.h"
 #include "rooms.h"
@@ -59,7 +59,7 @@ static double likelihood(const struct nav_problem *p, struct nav_likelihood *l, 
     uint8_t codes[2];
     if (!nav_arena_free(&p->arena, pose.x, pose.y, 0.0))
         return 0.0;
-    nav_likelihood_expect(l, &p->arena, &p->robot, pose, codes);
+    nav_likelihood_expect(l, &(struct nav_place){pose.x, pose.y, cos(pose.theta), sin(pose.theta)}, codes);
     return exp((double)nav_likelihood_of(l, codes));
 }
 

@@ -30,7 +30,7 @@ static struct tables large(void)
     t.problem.arena.floor = floor;
     t.problem.arena.box = &box;
     t.likelihood = nav_likelihood_new(&t.problem.arena, &t.problem.robot, &t.problem.settings, 0.01);
-    t.expected = nav_expected_new(&t.problem.arena, &t.problem.robot, t.likelihood, CELL / SUB, HEADINGS, 3 * SUB);
+    t.expected = nav_expected_new(t.likelihood, CELL / SUB, HEADINGS, 3 * SUB);
     assert_non_null(t.expected);
     t.mixture = nav_mixture_new(t.expected, NX, NY, SUB, TURNS);
     assert_non_null(t.mixture);

@@ -1,5 +1,5 @@
 /* Particles by hand and against the grid; the filter's state is looked at, so its source is part of this program. */
-#include "../filters/particle.c"
+#include "../filter/particle.c"
 
 #include "belief.h"
 #include "near.h"
@@ -76,14 +76,13 @@ static void a_wider_belief_takes_more_particles(void **state)
     destroy(f);
 }
 
-static void the_probe_says_what_the_likelihood_says(void **state)
+static void standing_weighs_as_the_codes_do_where_the_robot_can_stand(void **state)
 {
     (void)state;
     struct nav_problem p = room();
     const struct nav_ray aslant = {0.05, 0.02, 0.6, 0.2};
     p.robot.ray = &aslant;
-    struct nav_probe probe;
-    assert_int_equal(nav_probe_init(&probe, &p, 0.0), 0);
+    struct nav_likelihood *l = nav_likelihood_new(&p.arena, &p.robot, &p.settings, 0.0);
     struct nav_rng rng;
     nav_rng_seed(&rng, 3, 0);
     const double texture[] = {0.0, -3.0}, distance = 0.12, nothing = INFINITY;
@@ -91,22 +90,23 @@ static void the_probe_says_what_the_likelihood_says(void **state)
     int blocked = 0;
     for (int n = 0; n < 4000; n++) {
         const double *reading[] = {texture, n % 4 == 3 ? &nothing : &distance};
-        nav_probe_read(&probe, &(struct nav_evidence){reading, weights[n % 4]});
+        nav_likelihood_read(l, &(struct nav_evidence){reading, weights[n % 4]});
         struct nav_pose at = {1.2 * nav_rng_uniform(&rng) - 0.1, 1.2 * nav_rng_uniform(&rng) - 0.1,
                               7.0 * nav_rng_uniform(&rng)};
-        double said = nav_probe_at(&probe, at.x, at.y, cos(at.theta), sin(at.theta));
+        const struct nav_place place = {at.x, at.y, cos(at.theta), sin(at.theta)};
+        double said = nav_likelihood_standing(l, &place);
         uint8_t codes[2];
-        nav_likelihood_expect(probe.likelihood, &p.arena, &p.robot, at, codes);
+        nav_likelihood_expect(l, &place, codes);
         if (nav_arena_free(&p.arena, at.x, at.y, p.robot.body_radius)) {
-            assert_near(said, (double)nav_likelihood_of(probe.likelihood, codes), 1e-5);
-            assert_true(said <= probe.ceiling + 1e-9);
+            assert_near(said, (double)nav_likelihood_of(l, codes), 1e-5);
+            assert_true(said <= l->ceiling + 1e-9);
         } else {
             assert_true(isinf(said) && said < 0.0);
             blocked++;
         }
     }
     assert_in_range(blocked, 500, 2500);
-    nav_probe_free(&probe);
+    nav_likelihood_free(l);
 }
 
 static void a_move_is_the_motions_and_its_noise(void **state)
@@ -342,7 +342,7 @@ int main(void)
         cmocka_unit_test(resampling_takes_each_by_its_share),
         cmocka_unit_test(the_bound_is_foxs),
         cmocka_unit_test(a_wider_belief_takes_more_particles),
-        cmocka_unit_test(the_probe_says_what_the_likelihood_says),
+        cmocka_unit_test(standing_weighs_as_the_codes_do_where_the_robot_can_stand),
         cmocka_unit_test(a_move_is_the_motions_and_its_noise),
         cmocka_unit_test(many_particles_come_to_the_exact_posterior),
         cmocka_unit_test(two_particles_follow_a_robot_that_they_know),

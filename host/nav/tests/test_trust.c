@@ -8,17 +8,19 @@
 
 static struct nav_model classifier(const struct nav_settings *s, int classes)
 {
-    struct nav_model m = {.fill = nav_mm_texture, .settings = s, .values = classes, .codes = classes};
-    nav_mm_texture_begin(&m);
+    static const struct nav_tip tip = {0.0, 0.0};
+    struct nav_model m = {.kind = &NAV_TEXTURE_MEASUREMENT, .settings = s};
+    const struct nav_arena arena = {.classes = classes};
+    const struct nav_robot robot = {.tips = 1, .tip = &tip};
+    assert_int_equal(m.kind->init(&m, &arena, &robot, 0.0), 0);
     return m;
 }
 
 static double odds_after(struct nav_model *m, double gap)
 {
-    double out[3];
+    double out[4];
     const double reading[] = {-gap, 0.0, -gap};
-    nav_mm_texture_watch(m, reading);
-    m->fill(m, reading, out);
+    m->kind->fill(m, reading, out);
     return log(out[1] / out[0]);
 }
 
@@ -90,7 +92,7 @@ static struct bench bench(void)
     p.robot.tips = 2;
     p.robot.tip = TIPS;
     struct bench b = {.likelihood = nav_likelihood_new(&p.arena, &p.robot, &p.settings, 0.0)};
-    nav_likelihood_expect(b.likelihood, &p.arena, &p.robot, (struct nav_pose){0.2, 0.25, 0.0}, b.codes);
+    nav_likelihood_expect(b.likelihood, &(struct nav_place){0.2, 0.25, 1.0, 0.0}, b.codes);
     assert_int_equal(b.codes[0], 0);
     assert_int_equal(b.codes[1], 0);
     return b;

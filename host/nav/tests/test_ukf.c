@@ -1,6 +1,6 @@
 /* The unscented Kalman filter where it must equal a Kalman filter, and where it differs from a linearisation; its state
  * is looked at, so its source is part of this program. */
-#include "../filters/ukf.c"
+#include "../filter/ukf.c"
 
 #include "kalman_rooms.h"
 

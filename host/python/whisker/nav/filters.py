@@ -1,6 +1,7 @@
 """Filters of host/nav on a scene: made, stepped, replayed over many rows, and asked for their belief."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +12,7 @@ from ..scene import Prior, Scene
 from .observations import ODOMETRY, Observations
 
 FAVOURITE, SPARE = "adaptive", "grid"
+SENSOR_UNKNOWN = 255
 SEED_MOST = 2**64 - 1
 BUMPS_MOST = int(lib.NAV_BUMPS_MOST)  # of a belief to begin from
 
@@ -79,6 +81,26 @@ def to_estimate(row: np.void) -> Estimate:
     return Estimate(*pose, row["covariance"].copy(), float(row["confidence"]), *counts)
 
 
+@dataclass(frozen=True)
+class Sensor:
+    """A sensor of the user's own: what it expects is a map of codes, what it reads the log-likelihood of each code.
+
+    `codes`: (rows, columns) of uint8, row 0 the smallest y, 0 to 254; 255, and beyond the map, not known. `cell_m`: edge
+    of a cell; the map's lower left corner is the world's origin. `at_m`: the sensor's place on the robot. A reading
+    counts in full after `spacing_m` of travel since the last one."""
+
+    codes: np.ndarray
+    cell_m: float
+    at_m: tuple[float, float] = (0.0, 0.0)
+    spacing_m: float = 0.0
+
+    @property
+    def values(self) -> int:
+        """Numbers in a reading: one more than the largest code."""
+        known = self.codes[self.codes < SENSOR_UNKNOWN]
+        return int(known.max()) + 1 if len(known) else 1
+
+
 class Filter:
     """One filter on one scene. Rows are dicts of cells as the pilot makes them: None is an empty cell, nan not read."""
 
@@ -89,8 +111,9 @@ class Filter:
         settings: dict[str, float] | None = None,
         seed: int = 0,
         bumps: np.ndarray | None = None,
+        sensors: Sequence[Sensor] = (),
     ):
-        """`bumps`: (n,) of COMPONENT, to begin from in place of the scene's prior."""
+        """`bumps`: (n,) of COMPONENT, to begin from in place of the scene's prior; `sensors`: more than the scene's."""
         if name not in filter_names():
             raise SettingError(f"filter '{name}' is unknown; choose one of {', '.join(filter_names())}")
         if not 0 <= seed <= SEED_MOST:
@@ -98,8 +121,9 @@ class Filter:
         self.scene = scene
         if bumps is not None and (fault := prior_fault(scene, bumps)):
             raise SettingError(f"filter '{name}': {fault}; give what a filter listed")
-        problem, self._keep = problem_of(scene, settings or {}, bumps)
+        problem, self._keep = problem_of(scene, settings or {}, bumps, sensors)
         problem.seed = seed
+        self._own = sum(sensor.values for sensor in sensors)
         made = lib.nav_filter_new(name.encode(), problem)
         if made == ffi.NULL:
             raise SettingError(f"filter '{name}' does not fit in memory; choose coarser cells with --set")
@@ -115,9 +139,10 @@ class Filter:
         radial = [math.inf if row[k] is None else row[k] / 1000.0 for k in self._radial_keys]
         return self.step_values(row["t_s"], [row[k] for k in ODOMETRY], texture, radial)
 
-    def step_values(self, t_s: float, odometry, texture, radial_m) -> Estimate:
+    def step_values(self, t_s: float, odometry, texture, radial_m, own=()) -> Estimate:
         """Take one row of numbers: odometry (3,): m, m, rad; texture (tips, classes), nan not read; radial_m (rays,) in m,
-        nan not read, inf no contact. ValueError when one has another shape."""
+        nan not read, inf no contact; own (values,): log-likelihoods of the user's sensors, nan not read. ValueError when
+        one has another shape."""
         rows = Observations(
             as_doubles(t_s, "t_s", ()).reshape(1),
             [],
@@ -125,6 +150,7 @@ class Filter:
             as_doubles(texture, "texture", (self._tips, self._classes))[None],
             as_doubles(radial_m, "radial_m", (self._rays,))[None],
             None,
+            as_doubles(own, "own", (self._own,))[None],
         )
         return to_estimate(self.replay(rows, 0, 1)[0][0])
 
@@ -136,6 +162,7 @@ class Filter:
         if not 0 <= first <= first + count <= held:
             raise ValueError(f"rows {first} to {first + count}: outside the {held} rows given; choose rows inside")
         table, step_us = np.zeros(count, ESTIMATE), np.zeros(count)
+        own = np.full((held, self._own), math.nan) if rows.own is None else rows.own
         packed = ffi.new(
             "struct nav_rows *",
             {
@@ -143,6 +170,8 @@ class Filter:
                 "odometry": doubles(rows.odometry, "odometry", (held, 3)),
                 "texture": doubles(rows.texture, "texture", (held, self._tips, self._classes)),
                 "radial_m": doubles(rows.radial_m, "radial_m", (held, self._rays)),
+                "own": doubles(own, "own", (held, self._own)),
+                "own_width": self._own,
                 "texture_width": self._tips * self._classes,
                 "radial_width": self._rays,
             },
@@ -150,6 +179,13 @@ class Filter:
         out = pointer(ESTIMATES, ESTIMATE, table, "table", (count,))
         lib.nav_replay(self._filter, packed, first, count, out, doubles(step_us, "step_us", (count,)))
         return table, step_us
+
+    def set_prior(self, prior: Prior) -> None:
+        """Begin again from this belief, while running. ValueError when it is none for this arena."""
+        given = ffi.new("struct nav_prior *")
+        _fill_prior(given, prior)
+        if (fault := lib.nav_filter_reset(self._filter, given)) != ffi.NULL:
+            raise ValueError(f"prior: {ffi.string(fault).decode()}; give another one")
 
     def components(self) -> np.ndarray:
         """The belief after the last row as bumps, (n,) of COMPONENT."""
@@ -195,7 +231,33 @@ def prior_fault(scene: Scene, bumps: np.ndarray) -> str:
     return f"{f'bump {which[0]}: ' if which[0] >= 0 else ''}{ffi.string(fault).decode()}"
 
 
-def problem_of(scene: Scene, settings: dict[str, float], bumps: np.ndarray | None = None):
+def _fill_prior(out, prior: Prior) -> None:
+    out.uniform = prior.kind == "uniform"
+    if prior.kind == "gaussian":
+        out.mean = dict(zip(("x", "y", "theta"), prior.mean, strict=True))
+        out.sigma = prior.sigma
+
+
+def _sensors(sensors: Sequence[Sensor]):
+    """The C sensors and what they point into."""
+    maps, keep = ffi.new("struct nav_sensor_map[]", len(sensors)), []
+    out = ffi.new("struct nav_sensor[]", len(sensors))
+    for n, sensor in enumerate(sensors):
+        codes = np.ascontiguousarray(sensor.codes)
+        rows, columns = codes.shape if codes.ndim == 2 else (0, 0)
+        if not codes.size or not sensor.cell_m > 0 or not sensor.spacing_m >= 0:
+            raise SettingError(f"sensor {n}: no map of codes with cells above 0 m; give (rows, columns) of uint8")
+        keep.append(codes)
+        code = octets(codes, f"codes of sensor {n}", (None, None))
+        maps[n] = (sensor.values, *sensor.at_m, sensor.cell_m, columns, rows, code)
+        expect, fill = (ffi.addressof(lib, name) for name in ("nav_sensor_map_expect", "nav_sensor_map_fill"))
+        out[n] = (sensor.values, sensor.values, sensor.spacing_m, expect, fill, maps + n)
+    return out, (maps, keep)
+
+
+def problem_of(
+    scene: Scene, settings: dict[str, float], bumps: np.ndarray | None = None, sensors: Sequence[Sensor] = ()
+):
     """The C problem and the arrays it points into."""
     arena, robot = scene.arena, scene.robot
     floor = np.array(arena.floor_indices(), dtype=np.uint8)
@@ -213,7 +275,9 @@ def problem_of(scene: Scene, settings: dict[str, float], bumps: np.ndarray | Non
         "classes": len(arena.textures),
         "boxes": len(boxes),
         "box": boxes,
+        "unknown": getattr(arena, "unknown", 0),
     }
+    own, own_keep = _sensors(sensors)
     problem.robot = {
         "body_radius": robot.body_radius_m,
         "odometry_relative": robot.odometry_relative_sigma,
@@ -222,18 +286,18 @@ def problem_of(scene: Scene, settings: dict[str, float], bumps: np.ndarray | Non
         "tip": tips,
         "rays": len(rays),
         "ray": rays,
+        "sensors": len(own),
+        "sensor": own,
     }
     prior = scene.prior or Prior("uniform")
-    problem.prior.uniform = prior.kind == "uniform" and bumps is None
     if bumps is not None:
         problem.prior.bump, problem.prior.bumps = _components(bumps), len(bumps)
-    if prior.kind == "gaussian":
-        problem.prior.mean = dict(zip(("x", "y", "theta"), prior.mean, strict=True))
-        problem.prior.sigma = prior.sigma
+    if bumps is None:
+        _fill_prior(ffi.addressof(problem.prior), prior)
     lib.nav_settings_default(ffi.addressof(problem.settings))
     for key, value in settings.items():
         _set(problem, key, value)
-    return problem, (floor, boxes, tips, rays, bumps)
+    return problem, (floor, boxes, tips, rays, bumps, own, own_keep)
 
 
 def _set(problem, key: str, value: float) -> None:

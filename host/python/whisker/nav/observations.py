@@ -23,6 +23,7 @@ class Observations:
     texture: np.ndarray  # (n, tips, classes), nan not read
     radial_m: np.ndarray  # (n, rays), nan not read, inf no contact
     truth: np.ndarray | None  # (n, 3)
+    own: np.ndarray | None = None  # (n, values) readings of the user's own sensors one after another, nan not read
 
     def __len__(self) -> int:
         return len(self.t_s)

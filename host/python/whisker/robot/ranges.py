@@ -7,7 +7,7 @@ Limits are those of the machine, with room to spare: what is outside them is a m
 import math
 from dataclasses import dataclass
 
-# What intake.c of host/nav/filters takes in one row: the Create drives at most 0.5 m/s, and a row may carry a whisk.
+# What intake.c of host/nav/measurement takes in one row: the Create drives at most 0.5 m/s, and a row may carry a whisk.
 ROW_MOST_M, ROW_MOST_RAD = 1.0, math.pi
 FAR_M = 1e5  # of any place, sums of the odometry included
 TURNED_RAD = 1e7  # of any angle that is summed: half a year of turning

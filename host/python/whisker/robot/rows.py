@@ -14,7 +14,7 @@ from .ros import BASE_FRAME
 from .streams import Envelope
 
 ROW_NS = 10**8  # the paper's 0.1 s
-# A filter takes up to 1 m and half a turn in one row (host/nav/filters/intake.c); longer motions come in such pieces.
+# A filter takes up to 1 m and half a turn in one row (host/nav/measurement/intake.c); longer motions come in such pieces.
 MOST_M, MOST_RAD = 0.5, math.pi / 2.0
 PIECE_NS = 10**6  # between two pieces of a motion of which nobody knows how long it took
 # A minute of rows, some 40 ms of a filter's time; before a longer gap's last minute a filter assumes the worst. It refuses

@@ -1,5 +1,5 @@
 """What whiskers meet in an arena, many poses at once. Written for the scenes alone: filters are not judged by their own
-code (host/nav/models/arena.c). Poses are (n, 3): x, y in m, theta in rad."""
+code (host/nav/problem/arena.c). Poses are (n, 3): x, y in m, theta in rad."""
 
 import math
 

@@ -1,0 +1,28 @@
+/* Judging beliefs, given as bumps (nav_filter_components): regions of highest density, and coarse bins.
+ *
+ * A bump is drawn as a square of even density with the bump's standard deviation, so that the cells of a grid tile the
+ * floor: bumps of one belief should overlap, sigma at least their spacing / sqrt(12). Allocates; not for the timed
+ * path. */
+#ifndef NAV_BELIEF_H
+#define NAV_BELIEF_H
+
+#include "problem.h"
+
+/* cffi: begin */
+struct nav_region {
+    double level;   /* mass of the smallest region of highest density in (x, y) that holds the point */
+    double area_m2; /* of the region of highest density that holds 0.9 of the mass */
+};
+
+/* Region figures of n bumps at the point (x, y), m. The point's own bin counts half. -1: no memory or no mass. */
+int nav_belief_region(const struct nav_component *, long n, double x, double y, struct nav_region *);
+
+/* nav_belief_region's level alone; 1 where there is none. The point is in the 90 % region if it is at most 0.9. */
+double nav_belief_level(const struct nav_component *, long n, double x, double y);
+
+/* Mass in bins of 25 cm x 25 cm x 30 degrees, [heading][y][x], x quickest; what lies outside 0 .. size goes to the
+ * outermost bins. Returns the number of bins; fills them if `room` suffices. */
+long nav_belief_bins(const struct nav_component *, long n, double size_x, double size_y, double *bins, long room);
+/* cffi: end */
+
+#endif

@@ -1,0 +1,129 @@
+#include "gaussian.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "bumps.h"
+#include "problem.h"
+
+enum { X, Y, T };
+
+struct nav_gaussian nav_gaussian_prior(const struct nav_problem *problem)
+{
+    const struct nav_arena *arena = &problem->arena;
+    const struct nav_prior *prior = &problem->prior;
+    if (nav_bumps_given(prior))
+        return nav_bumps_gaussian(prior);
+    struct nav_gaussian g = {.mean = prior->mean};
+    for (int i = 0; i < 3; i++)
+        g.covariance[4 * i] = prior->sigma[i] * prior->sigma[i];
+    if (!prior->uniform)
+        return g;
+    /* Variance of a uniform distribution: width^2 / 12. */
+    g.mean = (struct nav_pose){arena->size_x / 2.0, arena->size_y / 2.0, 0.0};
+    g.covariance[0] = arena->size_x * arena->size_x / 12.0;
+    g.covariance[4] = arena->size_y * arena->size_y / 12.0;
+    g.covariance[8] = NAV_PI * NAV_PI / 3.0;
+    return g;
+}
+
+void nav_gaussian_estimate(const struct nav_gaussian *g, struct nav_estimate *estimate)
+{
+    estimate->pose = g->mean;
+    memcpy(estimate->covariance, g->covariance, sizeof g->covariance);
+    estimate->confidence = nav_gaussian_mass(g, NAV_NEAR_M, NAV_NEAR_RAD);
+}
+
+void nav_gaussian_ahead(const struct nav_gaussian *g, const struct nav_pending *pending, struct nav_estimate *estimate)
+{
+    struct nav_gaussian now = *g;
+    nav_gaussian_move(&now, pending->step, &pending->noise);
+    estimate->pose = now.mean;
+    memcpy(estimate->covariance, now.covariance, sizeof now.covariance);
+}
+
+/* Lower triangle of the Cholesky factor, rows x, y, theta; what rounding has made negative counts as nothing. */
+static void factor(const double *p, double l[6])
+{
+    l[0] = sqrt(fmax(p[0], 1e-18));
+    l[1] = p[3] / l[0];
+    l[2] = sqrt(fmax(p[4] - l[1] * l[1], 1e-18));
+    l[3] = p[6] / l[0];
+    l[4] = (p[7] - l[3] * l[1]) / l[2];
+    l[5] = sqrt(fmax(p[8] - l[3] * l[3] - l[4] * l[4], 1e-18));
+}
+
+/* Mass of whitened lattice point i of `points`, which reach to 3 standard deviations. */
+static double share(int i, int points)
+{
+    double total = 0.0, half = (points - 1) / 2.0;
+    for (int k = 0; k < points; k++)
+        total += exp(-4.5 * (k - half) * (k - half) / (half * half));
+    return exp(-4.5 * (i - half) * (i - half) / (half * half)) / total;
+}
+
+long nav_gaussian_components(const struct nav_gaussian *g, struct nav_component *out, long room)
+{
+    enum { ACROSS = 25, TURNS = 7, ALL = ACROSS * ACROSS * TURNS };
+    double l[6], spacing = 6.0 / (ACROSS - 1), spacing_turn = 6.0 / (TURNS - 1);
+    factor(g->covariance, l);
+    for (int n = 0; n < ALL && n < room; n++) {
+        int i = n / TURNS / ACROSS, j = n / TURNS % ACROSS, k = n % TURNS;
+        double u = spacing * (i - ACROSS / 2), v = spacing * (j - ACROSS / 2), w = spacing_turn * (k - TURNS / 2);
+        out[n] = (struct nav_component){
+            .pose = {g->mean.x + l[0] * u, g->mean.y + l[1] * u + l[2] * v,
+                     nav_wrap(g->mean.theta + l[3] * u + l[4] * v + l[5] * w)},
+            .sigma_m = spacing / sqrt(12.0) * fmax(hypot(l[0], l[1]), l[2]), /* no gaps along the long axis */
+            .sigma_rad = spacing_turn / sqrt(12.0) * l[5],
+            .mass = share(i, ACROSS) * share(j, ACROSS) * share(k, TURNS),
+        };
+    }
+    return ALL;
+}
+
+void nav_gaussian_move(struct nav_gaussian *g, struct nav_pose step, const struct nav_noise *noise)
+{
+    struct nav_pose to = nav_compose(g->mean, step);
+    /* J = [1 0 a; 0 1 b; 0 0 1]: how an error in heading moves the end point. */
+    double a = -(to.y - g->mean.y), b = to.x - g->mean.x;
+    double *p = g->covariance;
+    double xt = p[3 * X + T], yt = p[3 * Y + T], tt = p[3 * T + T];
+    p[3 * X + X] += 2.0 * a * xt + a * a * tt + noise->position;
+    p[3 * Y + Y] += 2.0 * b * yt + b * b * tt + noise->position;
+    p[3 * X + Y] += a * yt + b * xt + a * b * tt;
+    p[3 * X + T] += a * tt;
+    p[3 * Y + T] += b * tt;
+    p[3 * T + T] += noise->heading;
+    p[3 * Y + X] = p[3 * X + Y];
+    p[3 * T + X] = p[3 * X + T];
+    p[3 * T + Y] = p[3 * Y + T];
+    g->mean = (struct nav_pose){to.x, to.y, nav_wrap(to.theta)};
+}
+
+bool nav_gaussian_invert(const double c[9], double out[9])
+{
+    double xx = c[4] * c[8] - c[5] * c[5], xy = c[2] * c[5] - c[1] * c[8], xt = c[1] * c[5] - c[2] * c[4];
+    double yy = c[0] * c[8] - c[2] * c[2], yt = c[1] * c[2] - c[0] * c[5], tt = c[0] * c[4] - c[1] * c[1];
+    double determinant = c[0] * xx + c[1] * xy + c[2] * xt;
+    if (!(c[0] > 0.0 && tt > 0.0 && determinant > 0.0 && isfinite(determinant)))
+        return false;
+    const double adjoint[9] = {xx, xy, xt, xy, yy, yt, xt, yt, tt};
+    for (int i = 0; i < 9; i++)
+        out[i] = adjoint[i] / determinant;
+    return true;
+}
+
+double nav_gaussian_mass(const struct nav_gaussian *g, double radius, double angle)
+{
+    enum { DIRECTIONS = 32 };
+    const double *p = g->covariance;
+    double lx = sqrt(fmax(p[0], 1e-18)), ly = p[1] / lx, lz = sqrt(fmax(p[4] - ly * ly, 1e-18));
+    double mass = 0.0;
+    /* A standard normal in polar coordinates: along each direction the whitened radius is Rayleigh distributed. */
+    for (int i = 0; i < DIRECTIONS; i++) {
+        double u = cos(NAV_PI * i / DIRECTIONS), v = sin(NAV_PI * i / DIRECTIONS);
+        double stretch = hypot(lx * u, ly * u + lz * v);
+        mass += -expm1(-0.5 * radius * radius / (stretch * stretch)) / DIRECTIONS;
+    }
+    return mass * erf(angle / sqrt(2.0 * fmax(p[8], 1e-18)));
+}

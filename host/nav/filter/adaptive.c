@@ -1,0 +1,274 @@
+/* The adaptive filter: as much belief as the rows leave open, and no more.
+ *
+ * Known: a cloud of hypotheses at exact poses, as many as its spread needs. In doubt: an arena-wide histogram wakes
+ * and goes over the rows from which on the robot may have been elsewhere; both beliefs are held, weighted by how well
+ * they explained those rows. Unknown: the histogram alone, until its mass sits in few enough cells for a cloud. Work
+ * per row is bounded by adaptive.budget in every state: what the histogram has not done waits for the next row.
+ * docs/navigation_adaptive.md tells more. */
+#include <math.h>
+#include <stdlib.h>
+
+#include "adaptive_answer.h"
+#include "adaptive_doubt.h"
+#include "adaptive_global.h"
+#include "adaptive_prior.h"
+#include "adaptive_symmetry.h"
+
+struct adaptive {
+    const struct nav_problem *problem;
+    struct nav_likelihood *likelihood;
+    struct adaptive_cloud cloud;
+    struct adaptive_global global;
+    struct adaptive_log log;
+    struct adaptive_doubt doubt;
+    bool local, awake; /* which of the two beliefs are held; one at least */
+    double odds;       /* logarithm, elsewhere against local, before the rows that the histogram has gone over */
+    struct nav_pending pending;     /* since the last row that was read ... */
+    bool pending_unknown;           /* ... and whether some of it was not reported */
+    bool idle;                      /* nothing was read in the row before */
+    struct adaptive_summary answer; /* after the last row that was read */
+    long evaluations, distinct, touched;
+};
+
+static void destroy(void *self)
+{
+    struct adaptive *a = self;
+    adaptive_doubt_free(&a->doubt);
+    adaptive_log_free(&a->log);
+    adaptive_global_free(&a->global);
+    adaptive_cloud_free(&a->cloud);
+    nav_likelihood_free(a->likelihood);
+    free(a);
+}
+
+/* Log-odds that the robot is not where the local belief has it. */
+static double odds(const struct adaptive *a)
+{
+    double hazard = log(a->problem->settings.adaptive_hazard);
+    if (!a->local)
+        return INFINITY;
+    if (a->awake && adaptive_global_current(&a->global, &a->log))
+        return a->odds + a->global.gained;
+    return hazard + a->doubt.ratio;
+}
+
+static double elsewhere(const struct adaptive *a)
+{
+    return 1.0 / (1.0 + exp(-odds(a)));
+}
+
+static struct nav_pose ahead(const struct adaptive *a)
+{
+    return adaptive_log_since(&a->log, a->global.next);
+}
+
+static void answer(struct adaptive *a)
+{
+    struct adaptive_held held = {.problem = a->problem,
+                                 .local = a->local ? &a->cloud : NULL,
+                                 .global = a->awake ? &a->global : NULL,
+                                 .log = &a->log,
+                                 .share = elsewhere(a)};
+    a->answer = adaptive_answer(&held, a->answer.belief.mean);
+}
+
+/* A mixture that a cloud can hold: in doubt from the start, by the share that it may be wrong. A wider one: unknown. */
+static void begin_mixture(struct adaptive *a)
+{
+    a->local = adaptive_prior_cloud(&a->cloud, a->likelihood, &a->global);
+    a->awake = true;
+    a->odds = log(NAV_ANYWHERE / (1.0 - NAV_ANYWHERE));
+    a->answer.belief = nav_gaussian_prior(a->problem);
+    answer(a);
+}
+
+static void begin(struct adaptive *a)
+{
+    if (nav_bumps_given(&a->problem->prior)) {
+        begin_mixture(a);
+        return;
+    }
+    a->local = !a->problem->prior.uniform && adaptive_cloud_prior(&a->cloud, a->likelihood);
+    a->awake = !a->local;
+    a->answer.belief = nav_gaussian_prior(a->problem);
+    answer(a);
+}
+
+static void *create(const struct nav_problem *problem)
+{
+    struct adaptive *a = calloc(1, sizeof *a);
+    struct nav_rng rng;
+    if (!a)
+        return NULL;
+    a->problem = problem;
+    nav_rng_seed(&rng, problem->seed, 1);
+    a->likelihood = nav_likelihood_new(&problem->arena, &problem->robot, &problem->settings, 0.0);
+    if (!a->likelihood || adaptive_cloud_init(&a->cloud, problem, a->likelihood->whiskers) ||
+        adaptive_global_init(&a->global, problem) || adaptive_log_init(&a->log, &a->likelihood->sensors) ||
+        adaptive_doubt_init(&a->doubt, a->likelihood, &rng)) {
+        destroy(a);
+        return NULL;
+    }
+    a->cloud.images = adaptive_symmetry(&problem->arena);
+    begin(a);
+    return a;
+}
+
+/* Wakes the histogram at the row from which on the robot may have been elsewhere. */
+static void wake(struct adaptive *a)
+{
+    uint64_t reach = adaptive_log_reach(&a->log);
+    a->awake = true;
+    adaptive_doubt_teach(&a->doubt, a->likelihood, a->global.likelihood);
+    a->odds = log(a->problem->settings.adaptive_hazard);
+    adaptive_global_restart(&a->global, a->doubt.since > reach ? a->doubt.since : reach);
+}
+
+static void sleep(struct adaptive *a)
+{
+    a->awake = false;
+    adaptive_doubt_clear(&a->doubt, a->likelihood, a->log.head);
+}
+
+/* The histogram's mass sits in few cells: hypotheses take over its share. */
+static void take_over(struct adaptive *a, double share)
+{
+    const struct nav_settings *s = &a->problem->settings;
+    double count = fmin(fmax(s->adaptive_least, a->global.crowd * s->adaptive_per_bin), (double)a->cloud.room / 2.0);
+    if (a->local)
+        adaptive_cloud_scale(&a->cloud, 1.0 - share);
+    else
+        a->cloud.count = 0;
+    adaptive_global_draw(&a->global, &a->cloud, (long)count, share, ahead(a));
+    if (a->local && share > 0.5) /* what contradicted the local belief was not the whiskers' fault */
+        adaptive_doubt_teach(&a->doubt, a->likelihood, a->likelihood);
+    a->local = true;
+    a->cloud.moved = a->cloud.count;
+    adaptive_cloud_thin(&a->cloud, true);
+    a->touched += a->cloud.moved;
+    sleep(a);
+}
+
+/* What to hold on to, once the histogram has seen all rows. */
+static void decide(struct adaptive *a)
+{
+    const struct nav_settings *s = &a->problem->settings;
+    double present = odds(a);
+    if (!a->awake) {
+        if (present > log(s->adaptive_wake))
+            wake(a);
+        return;
+    }
+    if (!adaptive_global_current(&a->global, &a->log))
+        return;
+    if (a->global.scattered < s->adaptive_scattered && present > log(s->adaptive_wake))
+        take_over(a, elsewhere(a));
+    else if (a->doubt.ratio <= 0.0 && present <= log(s->adaptive_wake))
+        sleep(a);
+    else if (present > -log(s->adaptive_wake))
+        a->local = false;
+}
+
+/* Lets the histogram work within what is left of the row's budget. */
+static void work(struct adaptive *a)
+{
+    if (!a->awake)
+        return;
+    a->global.touched = a->global.distinct = 0;
+    const struct nav_settings *s = &a->problem->settings;
+    /* As long as the robot is likelier where it seems to be, a look elsewhere must not take long. */
+    double budget = odds(a) < 0.0 ? fmin(s->adaptive_doubt_budget, s->adaptive_budget) : s->adaptive_budget;
+    /* Kept back: a cloud drawn from what is found, and that it is moved, weighed and thinned when the row comes. */
+    const long drawn = 2, taken = 3; /* poses looked at for each of the cloud's */
+    long kept = (a->idle ? drawn + taken : drawn) * a->cloud.room;
+    adaptive_global_work(&a->global, &a->log, (long)budget - kept - a->touched);
+    a->touched += a->global.touched;
+    a->evaluations += a->global.touched;
+    a->distinct += a->global.distinct;
+}
+
+/* A row in which nothing was read leaves its time to those that wait. */
+static void catch_up(struct adaptive *a)
+{
+    if (!a->idle || !a->awake || adaptive_global_current(&a->global, &a->log))
+        return;
+    work(a);
+    decide(a);
+    answer(a);
+}
+
+static void predict(void *self, const struct nav_motion *motion)
+{
+    struct adaptive *a = self;
+    a->evaluations = a->distinct = a->touched = 0;
+    catch_up(a);
+    a->idle = true;
+    struct nav_noise noise = nav_motion_noise(&a->problem->robot, &a->problem->settings, motion);
+    nav_pending_add(&a->pending, motion->step, noise);
+    a->pending_unknown = a->pending_unknown || motion->unknown_m > 0.0 || motion->unknown_rad > 0.0;
+}
+
+static void update_local(struct adaptive *a)
+{
+    a->cloud.moved = 0;
+    adaptive_cloud_move(&a->cloud, a->pending.step, &a->pending.noise, !a->pending_unknown);
+    adaptive_cloud_look(&a->cloud, a->likelihood);
+    adaptive_cloud_expect(&a->cloud, a->likelihood, 1.0 - elsewhere(a));
+    double local = adaptive_cloud_weigh(&a->cloud, a->likelihood);
+    adaptive_log_entry(&a->log, a->log.head - 1)->local = local;
+    adaptive_doubt_take(&a->doubt, a->likelihood, a->log.head - 1, adaptive_doubt_anywhere(&a->doubt, a->likelihood),
+                        local);
+    nav_trust_learn(a->likelihood);
+    a->evaluations += a->cloud.count;
+    adaptive_cloud_thin(&a->cloud, false);
+    a->touched += a->cloud.moved;
+    a->distinct += a->cloud.count;
+}
+
+static void update(void *self, const struct nav_evidence *evidence)
+{
+    struct adaptive *a = self;
+    a->idle = false;
+    nav_likelihood_read(a->likelihood, evidence);
+    adaptive_log_write(&a->log, a->pending.step, a->pending.noise, evidence);
+    a->answer.belief.mean = nav_compose(a->answer.belief.mean, a->pending.step);
+    if (a->local)
+        update_local(a);
+    work(a);
+    decide(a);
+    answer(a);
+    a->pending = (struct nav_pending){.step = {0.0, 0.0, 0.0}};
+    a->pending_unknown = false;
+}
+
+static void estimate(const void *self, struct nav_estimate *out)
+{
+    const struct adaptive *a = self;
+    nav_gaussian_ahead(&a->answer.belief, &a->pending, out);
+    out->confidence = a->answer.near;
+    out->evaluations = a->evaluations;
+    out->distinct = a->distinct;
+    out->touched = a->touched;
+    out->states = (a->local ? a->cloud.count : 0) + (a->awake ? (long)adaptive_global_cells(&a->global) : 0);
+    out->bytes = sizeof *a + nav_likelihood_bytes(a->likelihood) + adaptive_global_bytes(&a->global) +
+                 adaptive_log_bytes(&a->log) + 2 * (size_t)a->cloud.room * sizeof *a->cloud.at;
+}
+
+static long components(const void *self, struct nav_component *out, long room)
+{
+    const struct adaptive *a = self;
+    double share = a->awake ? elsewhere(a) : 0.0;
+    long count = a->local ? adaptive_cloud_list(&a->cloud, a->pending.step, 1.0 - share, out, room) : 0;
+    if (!a->awake)
+        return count;
+    long left = room > count ? room - count : 0;
+    return count + adaptive_global_list(&a->global, &a->log, a->pending.step, share, left ? out + count : NULL, left);
+}
+
+const struct nav_filter_ops nav_adaptive_filter = {.name = "adaptive",
+                                                   .create = create,
+                                                   .destroy = destroy,
+                                                   .predict = predict,
+                                                   .update = update,
+                                                   .estimate = estimate,
+                                                   .components = components};

@@ -1,0 +1,96 @@
+#include "adaptive_doubt.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+/* Poses from which the shares of codes are counted, and draws that may miss free space for each. */
+enum { POSES = 4096, TRIES = 16 };
+
+static struct nav_pose draw(const struct nav_likelihood *l, struct nav_rng *rng)
+{
+    struct nav_pose pose = {0.0, 0.0, 0.0};
+    for (int n = 0; n < TRIES; n++) {
+        pose = (struct nav_pose){l->arena->size_x * nav_rng_uniform(rng), l->arena->size_y * nav_rng_uniform(rng),
+                                 2.0 * NAV_PI * nav_rng_uniform(rng)};
+        if (nav_likelihood_clear(l, pose.x, pose.y, 0.0))
+            break;
+    }
+    return pose;
+}
+
+static void count(struct adaptive_doubt *d, struct nav_likelihood *l, struct nav_rng *rng)
+{
+    for (int n = 0; n < POSES; n++) {
+        struct nav_pose pose = draw(l, rng);
+        nav_likelihood_expect(l, &(struct nav_place){pose.x, pose.y, cos(pose.theta), sin(pose.theta)}, l->scratch);
+        for (int w = 0; w < d->whiskers; w++)
+            d->share[w][l->scratch[w]] += 1.0f / POSES;
+    }
+}
+
+int adaptive_doubt_init(struct adaptive_doubt *d, struct nav_likelihood *l, struct nav_rng *rng)
+{
+    *d = (struct adaptive_doubt){.whiskers = l->whiskers};
+    d->share = calloc((size_t)l->whiskers + 1, sizeof *d->share);
+    d->trust = calloc((size_t)l->whiskers + 1, sizeof *d->trust);
+    for (int w = 0; d->share && w < l->whiskers; w++) {
+        d->share[w] = calloc((size_t)l->model[w].codes, sizeof **d->share);
+        if (!d->share[w])
+            return -1;
+    }
+    if (!d->share || !d->trust)
+        return -1;
+    adaptive_doubt_clear(d, l, 0);
+    count(d, l, rng);
+    return 0;
+}
+
+void adaptive_doubt_free(struct adaptive_doubt *d)
+{
+    for (int w = 0; d->share && w < d->whiskers; w++)
+        free(d->share[w]);
+    free(d->share);
+    free(d->trust);
+}
+
+double adaptive_doubt_anywhere(const struct adaptive_doubt *d, const struct nav_likelihood *l)
+{
+    double sum = 0.0;
+    for (int w = 0; w < d->whiskers; w++) {
+        if (!(l->weight[w] > 0.0))
+            continue;
+        double ratio = 0.0; /* to a broken whisker */
+        for (int k = 0; k < l->model[w].codes; k++) {
+            if (d->share[w][k] > 0.0f)
+                ratio += (double)d->share[w][k] * l->ratio[w][k];
+        }
+        sum += l->weight[w] * log(d->trust[w] * ratio + 1.0 - d->trust[w]);
+    }
+    return sum;
+}
+
+void adaptive_doubt_take(struct adaptive_doubt *d, const struct nav_likelihood *l, uint64_t row, double anywhere,
+                         double local)
+{
+    d->ratio += anywhere - local;
+    if (!(d->ratio > 0.0))
+        adaptive_doubt_clear(d, l, row + 1);
+}
+
+void adaptive_doubt_clear(struct adaptive_doubt *d, const struct nav_likelihood *l, uint64_t row)
+{
+    d->ratio = 0.0;
+    d->since = row;
+    for (int w = 0; w < d->whiskers; w++)
+        d->trust[w] = l->trust[w].working;
+}
+
+void adaptive_doubt_teach(const struct adaptive_doubt *d, const struct nav_likelihood *from, struct nav_likelihood *to)
+{
+    for (int w = 0; w < d->whiskers; w++) {
+        to->trust[w].working = d->trust[w];
+        to->model[w].temper = from->model[w].temper;
+        to->model[w].gap = from->model[w].gap;
+        to->model[w].accuracy = from->model[w].accuracy;
+    }
+}

@@ -1,0 +1,41 @@
+/* Whether the robot is where the local belief has it.
+ *
+ * Two explanations of the rows are compared: the local belief's, and that of a robot anywhere in free space. While the
+ * arena-wide belief sleeps, "anywhere" is the average over the arena whisker by whisker, a table made once; the
+ * running log-ratio never falls below 0, and the row after its last 0 is when the robot would have been moved (Page's
+ * test). When it is awake its own likelihood of the rows takes over.
+ *
+ * A local belief may explain a disagreement by a broken whisker (trust.h). Elsewhere that whisker works as well as it
+ * did before: the trust of that time is kept for the other explanation. */
+#ifndef NAV_ADAPTIVE_DOUBT_H
+#define NAV_ADAPTIVE_DOUBT_H
+
+#include "likelihood.h"
+#include "rng.h"
+
+struct adaptive_doubt {
+    int whiskers;
+    float **share;  /* [whiskers][codes] of free space that expects the code */
+    double *trust;  /* [whiskers] before row `since` */
+    double ratio;   /* log of rows since `since` by "anywhere" and by the local belief; at least 0 */
+    uint64_t since; /* row of the log */
+};
+
+/* 0, or -1 without memory; adaptive_doubt_free either way. */
+int adaptive_doubt_init(struct adaptive_doubt *, struct nav_likelihood *, struct nav_rng *);
+void adaptive_doubt_free(struct adaptive_doubt *);
+
+/* Log-likelihood of the row last read for a robot anywhere. */
+double adaptive_doubt_anywhere(const struct adaptive_doubt *, const struct nav_likelihood *);
+
+/* Takes row `row`, explained by both. */
+void adaptive_doubt_take(struct adaptive_doubt *, const struct nav_likelihood *, uint64_t row, double anywhere,
+                         double local);
+
+/* Starts again at row `row`, with the trust in whiskers that there is. */
+void adaptive_doubt_clear(struct adaptive_doubt *, const struct nav_likelihood *, uint64_t row);
+
+/* Gives the trust before row `since` to another belief, and how windows of texture are to be read. */
+void adaptive_doubt_teach(const struct adaptive_doubt *, const struct nav_likelihood *from, struct nav_likelihood *to);
+
+#endif

@@ -1,0 +1,81 @@
+#include "adaptive_prior.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "adaptive_global_parts.h"
+
+enum { TRIES = 20 }; /* draws that may miss free space for each hypothesis */
+
+/* Mass, its sums and the heaviest cell of slice p. */
+static void sum_slice(struct adaptive_global *g, const struct nav_slices *slices, int p, double *squares)
+{
+    double *m = g->moment[p];
+    memset(m, 0, sizeof g->moment[p]);
+    for (size_t n = (size_t)p * (size_t)(g->ny * g->pitch); n < (size_t)(p + 1) * (size_t)(g->ny * g->pitch); n++) {
+        double held = (double)g->mass[n];
+        struct nav_pose at = nav_slices_centre(slices, n);
+        const double parts[NAV_MOMENTS] = {1.0, at.x, at.y, at.x * at.x, at.x * at.y, at.y * at.y};
+        for (int k = 0; k < NAV_MOMENTS; k++)
+            m[k] += held * parts[k];
+        *squares += held * held;
+        g->mode = g->mass[n] > g->mass[g->mode] ? n : g->mode;
+    }
+    g->total += m[0];
+}
+
+/* Writes the mixture out. Returns how many equal cells it is worth. */
+static double fill(struct adaptive_global *g)
+{
+    double squares = 0.0;
+    g->job.about = (struct nav_pose){0.0, 0.0, 0.0};
+    g->mode = 0;
+    const struct nav_slices slices = adaptive_global_slices(g);
+    nav_bumps_fill(&g->problem->prior, &slices, g->mass);
+    for (size_t n = 0; n < (size_t)g->nh * (size_t)g->ny; n++)
+        g->span[n] = (struct adaptive_span){0, g->pitch};
+    g->total = 0.0;
+    for (int p = 0; p < g->nh; p++)
+        sum_slice(g, &slices, p, &squares);
+    g->fresh = false;
+    adaptive_global_summarise(g);
+    return g->total * g->total / squares;
+}
+
+/* How a hypothesis's weight is shared among its images. */
+static void shares(const struct adaptive_cloud *cloud, struct nav_pose pose, float share[ADAPTIVE_IMAGES_MOST])
+{
+    const struct nav_problem *problem = cloud->problem;
+    double part[ADAPTIVE_IMAGES_MOST] = {1.0}, sum = 0.0;
+    for (int m = 0; m < cloud->images && cloud->images > 1; m++)
+        part[m] = nav_bumps_density(&problem->prior, adaptive_image(&problem->arena, cloud->images, m, pose));
+    for (int m = 0; m < cloud->images; m++)
+        sum += part[m];
+    memset(share, 0, ADAPTIVE_IMAGES_MOST * sizeof *share);
+    for (int m = 0; m < cloud->images; m++)
+        share[m] = sum > 0.0 ? (float)(part[m] / sum) : (m == 0);
+}
+
+static void draw(struct adaptive_cloud *cloud, const struct nav_likelihood *l)
+{
+    float share[ADAPTIVE_IMAGES_MOST];
+    cloud->count = 0;
+    for (long n = 0; n < cloud->room * TRIES && cloud->count < cloud->room; n++) {
+        struct nav_pose pose = nav_bumps_draw(&cloud->problem->prior, &cloud->rng);
+        shares(cloud, pose, share);
+        adaptive_cloud_place(cloud, l, pose, share);
+    }
+    adaptive_cloud_scale(cloud, 1.0 / fmax((double)cloud->count, 1.0));
+    adaptive_cloud_thin(cloud, true);
+}
+
+bool adaptive_prior_cloud(struct adaptive_cloud *cloud, const struct nav_likelihood *l, struct adaptive_global *g)
+{
+    if (fill(g) * cloud->problem->settings.adaptive_per_bin > (double)cloud->room)
+        return false;
+    draw(cloud, l);
+    if (cloud->count == 0)
+        return false;
+    adaptive_global_restart(g, 0);
+    return true;
+}

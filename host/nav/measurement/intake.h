@@ -1,0 +1,37 @@
+/* Rows as they come into what filters take: cleans cells, orders rows, and says how new each reading is. */
+#ifndef NAV_INTAKE_H
+#define NAV_INTAKE_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "gap.h"
+#include "likelihood.h"
+#include "motion.h"
+#include "problem.h"
+
+enum { NAV_TIMES_KEPT = 64 };
+
+struct nav_intake {
+    const struct nav_problem *problem;
+    uint64_t bad_cells, bad_rows;
+    uint64_t empty;               /* windows that call all textures equally likely */
+    double times[NAV_TIMES_KEPT]; /* of the last rows, to know a repeated one */
+    long rows;
+    double latest; /* s */
+    struct nav_gaps gaps;
+    struct nav_sensors sensors;
+    struct nav_track *track; /* [sensors] */
+    struct nav_repeat repeat;
+    double *values; /* storage of the readings */
+    const double **reading;
+    double *weight;
+};
+
+int nav_intake_init(struct nav_intake *, const struct nav_problem *);
+void nav_intake_free(struct nav_intake *);
+
+/* Fills motion and evidence (which points into the intake) from one row. Returns whether anything new was read. */
+bool nav_intake_take(struct nav_intake *, const struct nav_row *, struct nav_motion *, struct nav_evidence *);
+
+#endif

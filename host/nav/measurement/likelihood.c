@@ -1,0 +1,152 @@
+#include "likelihood.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static int likelihood_tables(struct nav_likelihood *l)
+{
+    for (int w = 0; w < l->whiskers; w++) {
+        size_t codes = (size_t)l->model[w].codes;
+        l->table[w] = calloc(codes, sizeof **l->table);
+        l->ratio[w] = calloc(codes, sizeof **l->ratio);
+        if (!l->table[w] || !l->ratio[w] || nav_trust_init(&l->trust[w], (int)codes))
+            return -1;
+    }
+    return 0;
+}
+
+struct nav_likelihood *nav_likelihood_new(const struct nav_arena *arena, const struct nav_robot *robot,
+                                          const struct nav_settings *settings, double blur_m)
+{
+    struct nav_likelihood *l = calloc(1, sizeof *l);
+    if (!l)
+        return NULL;
+    l->arena = arena;
+    l->robot = robot;
+    int failed = nav_sensors_init(&l->sensors, arena, robot, settings, blur_m);
+    size_t whiskers = (size_t)l->sensors.count + 1;
+    l->whiskers = l->sensors.count;
+    l->model = l->sensors.model;
+    l->table = calloc(whiskers, sizeof *l->table);
+    l->ratio = calloc(whiskers, sizeof *l->ratio);
+    l->weight = calloc(whiskers, sizeof *l->weight);
+    l->trust = calloc(whiskers, sizeof *l->trust);
+    l->scratch = calloc(whiskers, 1);
+    if (failed || !l->scratch || !l->table || !l->ratio || !l->weight || !l->trust || likelihood_tables(l) ||
+        nav_obstacles_init(&l->obstacles, arena, nav_sensors_reach(&l->sensors, robot))) {
+        nav_likelihood_free(l);
+        return NULL;
+    }
+    return l;
+}
+
+void nav_likelihood_free(struct nav_likelihood *l)
+{
+    if (!l)
+        return;
+    for (int w = 0; w < l->whiskers; w++) {
+        free(l->table ? l->table[w] : NULL);
+        free(l->ratio ? l->ratio[w] : NULL);
+        if (l->trust)
+            nav_trust_free(&l->trust[w]);
+    }
+    nav_sensors_free(&l->sensors);
+    nav_obstacles_free(&l->obstacles);
+    free(l->table);
+    free(l->ratio);
+    free(l->trust);
+    free(l->weight);
+    free(l->scratch);
+    free(l);
+}
+
+static void likelihood_read_one(struct nav_likelihood *l, int w, const double *reading)
+{
+    struct nav_model *model = &l->model[w];
+    double trust = l->trust[w].working, *ratio = l->ratio[w];
+    model->kind->fill(model, reading, ratio);
+    for (int k = 0; k < model->codes; k++)
+        l->table[w][k] = (float)(l->weight[w] * log(trust * ratio[k] + 1.0 - trust));
+}
+
+static double likelihood_best(const float *table, int codes)
+{
+    float best = table[0];
+    for (int k = 1; k < codes; k++)
+        best = table[k] > best ? table[k] : best;
+    return (double)best;
+}
+
+void nav_likelihood_read(struct nav_likelihood *l, const struct nav_evidence *evidence)
+{
+    l->ceiling = 0.0;
+    for (int k = 0; k < NAV_KINDS; k++) {
+        l->active[k] = false;
+        for (int w = l->sensors.first[k]; w < l->sensors.first[k + 1]; w++) {
+            l->weight[w] = evidence->weight[w];
+            if (l->weight[w] > 0.0) {
+                likelihood_read_one(l, w, evidence->reading[w]);
+                l->active[k] = true;
+                l->ceiling += likelihood_best(l->table[w], l->model[w].codes);
+            } else {
+                memset(l->table[w], 0, (size_t)l->model[w].codes * sizeof **l->table);
+            }
+        }
+    }
+}
+
+/* Codes at a place, 0 for kinds that are not wanted. */
+static void likelihood_expect(const struct nav_likelihood *l, const struct nav_place *at, const bool wanted[NAV_KINDS],
+                              uint8_t *codes)
+{
+    struct nav_arena near;
+    bool any = nav_obstacles_near(&l->obstacles, at->x, at->y, &near);
+    for (int k = 0; k < NAV_KINDS; k++) {
+        int first = l->sensors.first[k], count = l->sensors.first[k + 1] - first;
+        if (count > 0 && wanted[k])
+            NAV_MEASUREMENTS[k]->expect(l->model + first, count, l->arena, any ? &near : NULL, at, codes + first);
+        else if (count > 0)
+            memset(codes + first, 0, (size_t)count);
+    }
+}
+
+void nav_likelihood_expect(const struct nav_likelihood *l, const struct nav_place *at, uint8_t *codes)
+{
+    static const bool ALL[NAV_KINDS] = {true, true, true};
+    likelihood_expect(l, at, ALL, codes);
+}
+
+bool nav_likelihood_clear(const struct nav_likelihood *l, double x, double y, double grace)
+{
+    return nav_obstacles_clear(&l->obstacles, x, y, fmax(l->robot->body_radius - grace, 0.0));
+}
+
+float nav_likelihood_of(const struct nav_likelihood *l, const uint8_t *codes)
+{
+    float sum = 0.0f;
+    for (int w = 0; w < l->whiskers; w++)
+        sum += l->table[w][codes[w]];
+    return sum;
+}
+
+float nav_likelihood_at(const struct nav_likelihood *l, const struct nav_place *at, uint8_t *codes)
+{
+    likelihood_expect(l, at, l->active, codes);
+    return nav_likelihood_of(l, codes);
+}
+
+double nav_likelihood_standing(const struct nav_likelihood *l, const struct nav_place *at)
+{
+    if (!nav_likelihood_clear(l, at->x, at->y, 0.0))
+        return -INFINITY;
+    return (double)nav_likelihood_at(l, at, l->scratch);
+}
+
+size_t nav_likelihood_bytes(const struct nav_likelihood *l)
+{
+    size_t bytes = nav_obstacles_bytes(&l->obstacles);
+    for (int w = 0; w < l->whiskers; w++)
+        bytes += (size_t)l->model[w].codes * (sizeof **l->table + 3 * sizeof **l->ratio) + sizeof *l->model;
+    return bytes;
+}

@@ -1,0 +1,60 @@
+/* All sensors of a robot: expected codes at a pose, and the likelihood of a row of readings given codes. */
+#ifndef NAV_LIKELIHOOD_H
+#define NAV_LIKELIHOOD_H
+
+#include <stdint.h>
+
+#include "measurement.h"
+#include "obstacles.h"
+#include "trust.h"
+
+/* One row's readings, sensors in the order of struct nav_sensors. */
+struct nav_evidence {
+    const double *const *reading; /* [sensors] -> doubles, as the sensor's model reads them */
+    const double *weight;         /* [sensors] 0: not read or nothing new; up to 1 */
+};
+
+struct nav_likelihood {
+    const struct nav_arena *arena;
+    const struct nav_robot *robot;
+    struct nav_sensors sensors;
+    int whiskers;            /* how many sensors there are, and */
+    struct nav_model *model; /* [whiskers] their models: as in `sensors` */
+    struct nav_obstacles obstacles;
+    float **table;           /* [whiskers][codes] log-likelihoods of the present row, weight and trust applied */
+    double **ratio;          /* [whiskers][codes] what the models gave, see measurement.h */
+    double *weight;          /* [whiskers] of the present row */
+    bool active[NAV_KINDS];  /* whether any sensor of a kind was read */
+    double ceiling;          /* log-likelihood of the present row at the codes that suit every sensor best */
+    uint8_t *scratch;        /* [whiskers] */
+    struct nav_trust *trust; /* [whiskers], see trust.h */
+};
+
+/* blur_m: standard deviation of a contact's distance over the poses that one look-up stands for. NULL: no memory. */
+struct nav_likelihood *nav_likelihood_new(const struct nav_arena *, const struct nav_robot *,
+                                          const struct nav_settings *, double blur_m);
+void nav_likelihood_free(struct nav_likelihood *);
+
+/* Fills the tables for one row: weight * log(trust * p / p_broken + 1 - trust), 0 where nothing was read. */
+void nav_likelihood_read(struct nav_likelihood *, const struct nav_evidence *);
+
+/* What each sensor should meet at a place: codes[whiskers]. */
+void nav_likelihood_expect(const struct nav_likelihood *, const struct nav_place *, uint8_t *codes);
+
+/* Whether the robot can stand at (x, y), its body taken `grace` m smaller. */
+bool nav_likelihood_clear(const struct nav_likelihood *, double x, double y, double grace);
+
+/* Log-likelihood of the row last read: sum over sensors (conditionally independent given the pose, as in the paper).
+ */
+float nav_likelihood_of(const struct nav_likelihood *, const uint8_t *codes);
+
+/* Log-likelihood of the row last read at a place, and codes[whiskers] that it expects, 0 for kinds that were not read.
+ */
+float nav_likelihood_at(const struct nav_likelihood *, const struct nav_place *, uint8_t *codes);
+
+/* The same, but -INFINITY where the robot cannot stand. */
+double nav_likelihood_standing(const struct nav_likelihood *, const struct nav_place *);
+
+size_t nav_likelihood_bytes(const struct nav_likelihood *);
+
+#endif

@@ -1,0 +1,121 @@
+/* Measurement models: the likelihood of a sensor's reading by what the map leads one to expect.
+ *
+ * What can be expected of a sensor is one of a few codes: for a texture whisker the texture's index, for an object
+ * whisker the contact's distance in steps, then "nothing within reach"; the last code of every sensor means "not
+ * known". A model fills a table over codes once per reading, and every pose, cell or hypothesis costs a look-up. One
+ * file per kind of sensor and one line in NAV_MEASUREMENTS; nothing else asks what kind a sensor is, but the Kalman
+ * filters, which linearise. */
+#ifndef NAV_MEASUREMENT_H
+#define NAV_MEASUREMENT_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "problem.h"
+#include "repeat.h"
+
+enum { NAV_CODES_MOST = 256 };
+
+/* A pose with the cosine and sine of its heading. */
+struct nav_place {
+    double x, y, c, s;
+};
+
+struct nav_measurement;
+
+/* One sensor: where it sits, how it errs. */
+struct nav_model {
+    const struct nav_measurement *kind;
+    const struct nav_settings *settings;
+    const struct nav_sensor *sensor; /* own sensors alone */
+    int index;                       /* among those of its kind */
+    int first, values;               /* own sensors: its first cell in a row; doubles per reading */
+    int codes;                       /* at most NAV_CODES_MOST, the last one "not known" */
+    double x, y, c, s;               /* place on the robot and direction, robot frame */
+    double reach;                    /* m from there to the farthest point that it senses */
+    double spacing;                  /* m of travel after which a reading counts in full */
+    double length;                   /* object whiskers: m */
+    double step;                     /* m per code; code k stands for a contact at (k + 1/2) steps */
+    double sigma;                    /* m, of a measured distance, the spread of a pose's cell included */
+    double edge;                     /* m, of the end of reach, likewise */
+    double *noticed;                 /* object whiskers: [codes] share of contacts that are noticed */
+    double temper;                   /* texture whiskers: exponent on a window's likelihood */
+    double gap;                      /* running median of log-likelihood between best class and second, 0: none seen */
+    double accuracy;                 /* share of windows whose best class is right, as far as is known; 0: not known */
+};
+
+/* How the readings of a sensor went so far. */
+struct nav_track {
+    double moved;  /* path of the sensor since its last reading that counted, m */
+    bool touching; /* what that reading was, of an object whisker */
+};
+
+enum nav_check { NAV_READ, NAV_NOT_READ, NAV_EMPTY, NAV_BAD };
+
+/* A kind of sensor. */
+struct nav_measurement {
+    const char *name;
+    int (*count)(const struct nav_robot *);
+    /* Sets up a zeroed model but for kind, settings and index; blur_m: see nav_likelihood_new. 0, or -1 without memory.
+     */
+    int (*init)(struct nav_model *, const struct nav_arena *, const struct nav_robot *, double blur_m);
+    void (*free)(struct nav_model *); /* NULL: nothing to free */
+    /* Cells of a row that are this sensor's reading, and whether they can be used; *bad grows by the cells that cannot.
+     */
+    const double *(*cells)(const struct nav_model *, const struct nav_row *);
+    enum nav_check (*check)(const struct nav_model *, const double *cells, uint64_t *bad);
+    /* Share of a reading that is new, given how far the sensor has moved since its last one. */
+    double (*novelty)(const struct nav_model *, struct nav_track *, struct nav_repeat *, const double *reading);
+    /* Whether a reading tells places apart that are much closer than tiles are wide: it may not be read at another's.
+     */
+    bool (*sharp)(const double *reading);
+    /* What `count` sensors of the kind should meet: codes[count]. near: the arena with what is within reach; NULL:
+     * nothing solid is. */
+    void (*expect)(const struct nav_model *, int count, const struct nav_arena *, const struct nav_arena *near,
+                   const struct nav_place *, uint8_t *codes);
+    /* Fills ratio[codes] with p(reading | code) / p(reading | sensor broken). Above 1 a reading speaks for a code, and
+     * for a sensor that works; "not known" has 1. A broken whisker is taken to say any class, any distance, or for
+     * ever nothing. */
+    void (*fill)(struct nav_model *, const double *reading, double *ratio);
+};
+
+extern const struct nav_measurement NAV_TEXTURE_MEASUREMENT; /* eq. 1's log-likelihoods, tempered, outlier floor */
+extern const struct nav_measurement NAV_RANGE_MEASUREMENT;   /* Gaussian distance, misses, ghosts, null contacts */
+extern const struct nav_measurement NAV_OWN_MEASUREMENT;     /* a sensor of the user's own */
+
+enum { NAV_KINDS = 3 };
+extern const struct nav_measurement *const NAV_MEASUREMENTS[NAV_KINDS];
+
+/* All sensors of a robot, kind by kind in the table's order. */
+struct nav_sensors {
+    int count;
+    int first[NAV_KINDS + 1]; /* those of kind k are number first[k] .. first[k + 1] - 1 */
+    struct nav_model *model;  /* [count] */
+};
+
+/* 0, or -1 without memory; nav_sensors_free either way. */
+int nav_sensors_init(struct nav_sensors *, const struct nav_arena *, const struct nav_robot *,
+                     const struct nav_settings *, double blur_m);
+void nav_sensors_free(struct nav_sensors *);
+
+/* Farthest point from the robot's centre that its body or a sensor reaches, m. */
+double nav_sensors_reach(const struct nav_sensors *, const struct nav_robot *);
+
+/* Share of a reading that is new after so much path: a sensor that has hardly moved says again what it said before. */
+static inline double nav_novelty(double moved, double spacing)
+{
+    return moved >= spacing ? 1.0 : moved / spacing;
+}
+
+/* Where a point of the robot's frame is in the world. */
+static inline double nav_place_x(const struct nav_place *p, double x, double y)
+{
+    return p->x + p->c * x - p->s * y;
+}
+
+static inline double nav_place_y(const struct nav_place *p, double x, double y)
+{
+    return p->y + p->s * x + p->c * y;
+}
+
+#endif
