@@ -6,9 +6,9 @@ import numpy as np
 from tqdm import tqdm
 
 from whisker.touch.texture.model import TextureModel, posterior
-from whisker.touch.texture.train import train
+from whisker.touch.texture.train import calibration_error, train
 
-from .scores import METHODS, calibration_error, refusal_cut
+from .scores import METHODS, refusal_cut
 from .trials import borealtc, fabricslide
 
 FABRIC_HZ = 35.6

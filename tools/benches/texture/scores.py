@@ -4,7 +4,7 @@ import numpy as np
 
 from whisker.touch.texture.model import TextureModel, classify
 from whisker.touch.texture.spectral import SpectralModel
-from whisker.touch.texture.train import train
+from whisker.touch.texture.train import calibration_error, train
 
 from .trials import LOOK, TICK_S
 
@@ -45,13 +45,6 @@ def refusal_cut(right: np.ndarray, confidence: np.ndarray) -> float:
     """By how much refusing the least confident tenth cuts the wrong decisions."""
     kept = np.argsort(-confidence, kind="stable")[: round((1 - REFUSED) * len(right))]
     return float((~right).sum() / max(1, (~right)[kept].sum()))
-
-
-def calibration_error(right: np.ndarray, confidence: np.ndarray, bins: int = 10) -> float:
-    """Expected calibration error over equal bins of confidence."""
-    place = np.minimum((confidence * bins).astype(int), bins - 1)
-    each = [(place == b).mean() * abs(right[place == b].mean() - confidence[place == b].mean()) for b in set(place)]
-    return float(np.sum(each))
 
 
 def strip_score(model, strip) -> dict:

@@ -10,7 +10,7 @@ from commandkit import run, signals_as_before  # noqa: F401 - a fixture
 from whisker.native import doubles, lib
 from whisker.tables import TableError
 from whisker.touch.texture import model as texture
-from whisker.touch.texture.fit import STRETCHES
+from whisker.touch.texture.fit import STRETCHES, log_loss, temperature
 from whisker.touch.texture.spectral import SpectralModel
 from whisker.touch.texture.strange import fit_strange
 from whisker.touch.texture.train import SURE, _sure, train
@@ -241,7 +241,8 @@ class SureOf:
 
 @pytest.mark.parametrize("needed", SURE)
 def test_the_least_sureness_that_is_right_as_often_is_found(needed):
-    assert _sure([SureOf(needed)], [None], [0], [0], WINDOW, 1.0) == (needed, needed, 1.0)
+    sure, samples, (right, _) = _sure([SureOf(needed)], [None], [0], [0], WINDOW, 1.0)
+    assert (sure, samples) == (needed, needed) and right.all()
 
 
 def test_block_by_block_is_as_all_at_once(model):
@@ -313,6 +314,58 @@ def test_commands_train_and_classify_as_promised(capsys, tmp_path, method):
         lines = [json.loads(line) for line in out.splitlines()]
         assert code == 0 and all(set(d) == {"t_s", "loglik", "label", "confidence", "border"} for d in lines)
         assert set(lines[0]["loglik"]) == {"VINYL", "ROUGH"} and more or len(lines) == 5
+
+
+def test_training_tells_figures_and_what_it_could_not_learn(capsys, tmp_path, recwarn):
+    """One recording of a class, a channel that never changes, rows that are not finite, a hidden folder."""
+    for name in ("VINYL", "ROUGH"):
+        x = drag(name, 800, 0)
+        x[:, 1], x[7] = 500.0, np.nan
+        write(tmp_path / "set" / name / "0.csv", x)
+    (tmp_path / "set" / ".cache").mkdir()
+    code, out, error = run(capsys, "texture", "train", tmp_path / "set", "--out", tmp_path / "m.json")
+    assert code == 0 and "2 classes: ROUGH, VINYL" in out and "calibration error" in out and "not learned:" in out
+    warned = error.splitlines()
+    assert sum("1 of 800 rows" in line for line in warned) == sum("channel 2 never" in line for line in warned) == 2
+    assert not recwarn.list
+
+
+def test_a_folder_is_classified_at_once(capsys, tmp_path, model):
+    model.save(tmp_path / "m.json")
+    for name in ("ROUGH", "VINYL", "VELVET"):
+        write(tmp_path / "set" / name / "0.csv", drag(name if name in COLOUR else "ROUGH", 1000, 71))
+    (tmp_path / "set" / ".hidden").mkdir()
+    command = "texture", "classify", tmp_path / "m.json", tmp_path / "set"
+    code, out, _ = run(capsys, *command, "--json")
+    rows = {row["surface"]: row for row in map(json.loads, out.splitlines())}
+    assert code == 0 and {n: r["decisions"] for n, r in rows.items()} == {"ROUGH": 5, "VELVET": 5, "VINYL": 5}
+    for name in COLOUR.keys() & rows:
+        alone = run(capsys, *command[:3], tmp_path / "set" / name / "0.csv", "--json")[1].splitlines()
+        labels = [json.loads(line)["label"] for line in alone]
+        assert [rows[name][c] for c in (*COLOUR, "unknown")] == [labels.count(c) for c in (*COLOUR, "unknown")]
+    assert rows["ROUGH"]["ROUGH"] >= 3 and rows["VINYL"]["VINYL"] >= 3
+    code, out, error = run(capsys, *command)
+    assert code == 0 and len(out.splitlines()) == 4 and "folder 'VELVET' is no class" in error
+
+
+@pytest.mark.parametrize("name", ["vinyl", "VINYL "])
+def test_a_surface_spelt_twice_is_one_clear_line(capsys, tmp_path, name):
+    for folder in ("VINYL", name):
+        write(tmp_path / "set" / folder / "0.csv", drag("VINYL", 100, 0))
+    code, _, error = run(capsys, "texture", "train", tmp_path / "set", "--out", tmp_path / "m.json")
+    assert code != 0 and "name one surface twice" in error and error.count("\n") == 1
+
+
+def test_the_temperature_is_the_one_of_least_loss():
+    rng = np.random.default_rng(8)
+    label = rng.integers(0, 3, 400)
+    scores = rng.normal(size=(400, 3)) * 4.0
+    scores[np.arange(400), label] += 1.5
+    grid = np.linspace(0.0, 1.0, 2001)
+    best = grid[np.argmin([log_loss(scores * t, label) for t in grid])]
+    assert 0.05 < best < 0.95 and abs(temperature(scores, label) - best) < 2e-3
+    separable = np.where(np.arange(3) == label[:, None], 0.0, -9.0)
+    assert temperature(separable, label) > 0.99 and temperature(-separable, label) < 0.01
 
 
 def test_training_is_for_the_window_asked_for(capsys, tmp_path):

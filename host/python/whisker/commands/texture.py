@@ -1,8 +1,12 @@
 """`whisker texture`: learns surfaces from recordings and tells them apart (whisker.touch.texture)."""
 
 import json
+from collections import Counter
+from pathlib import Path
 
-from ..arguments import add_action, plain
+from tqdm import tqdm
+
+from ..arguments import add_action, plain, warn
 from ..nav.localise import SettingError
 from ..tables import TableError, unwritable
 from ..touch.texture import model as texture
@@ -22,26 +26,51 @@ def add(parser) -> None:
     example = "whisker texture classify model.json drive.csv --window-ms 100 --json"
     p = add_action(actions, "classify", "tell the surface window by window", example, classify)
     p.add_argument("model")
-    p.add_argument("recording")
+    p.add_argument("recording", help="a CSV file, or a folder as for 'train': then a confusion matrix")
     p.add_argument("--window-ms", type=float, default=100.0, help="length of a window (default: %(default)s)")
     p.add_argument("--sequential", action="store_true", help='answer as soon as sure, "unknown" after four windows')
-    p.add_argument("--json", action="store_true", help="one object per line and window")
+    p.add_argument("--json", action="store_true", help="one object per line and window; of a folder: per surface")
 
 
 def train(arguments) -> int:
     window_ms = length_of_time(arguments.window_ms)
     recordings, rate_hz = texture.read_training(arguments.folder)
+    for name, files in texture.surface_files(arguments.folder).items():
+        for file, samples in zip(files, recordings[name], strict=True):
+            for fault in texture.recording_faults(samples):
+                warn(f"{file}: {fault}")
     try:
         if arguments.method == "default":
-            texture_train.train(recordings, rate_hz, window_ms).save(arguments.out)
+            with tqdm(total=1, desc="train", bar_format="{desc} {bar} {percentage:3.0f} %", disable=None) as bar:
+                model = texture_train.train(recordings, rate_hz, window_ms, lambda done, of: advance(bar, done, of))
         else:
-            texture.TextureModel.train(recordings).save(arguments.out)
+            model = texture.TextureModel.train(recordings)
+        model.save(arguments.out)
     except ValueError as error:
         raise TableError(arguments.folder, None, str(error)) from error
     except OSError as error:
         raise unwritable(arguments.out, error) from error
     print(f"{arguments.out}: {len(recordings)} classes: {', '.join(recordings)}")
+    for line in report(model) if arguments.method == "default" else ():
+        print(line)
     return 0
+
+
+def advance(bar, done: int, of: int) -> None:
+    bar.total = of
+    bar.update(done - bar.n)
+
+
+def report(model) -> list[str]:
+    """Figures of recordings held out, and what there was too little data to learn, a line each."""
+    f, ms = model.figures, 1000.0 / model.rate_hz
+    lines = [
+        f"held out, windows of {f['window_samples'] * ms:.4g} ms: {100 * f['held_out_accuracy']:.1f} % right, "
+        f"{100 * f['refused']:.1f} % unknown, calibration error {f['calibration_error']:.3f}",
+        f"held out, as soon as sure: {100 * f['sequential_accuracy']:.1f} % right after "
+        f"{f['sequential_samples'] * ms:.4g} ms on average, calibration error {f['sequential_calibration_error']:.3f}",
+    ]
+    return lines + [f"not learned: {text}" for text in model.not_learned()]
 
 
 def length_of_time(window_ms: float) -> float:
@@ -53,14 +82,43 @@ def length_of_time(window_ms: float) -> float:
 def classify(arguments) -> int:
     window_ms = length_of_time(arguments.window_ms)
     model = texture.load(arguments.model)
-    t_s, samples = texture.read_recording(arguments.recording)
-    if samples.shape[1] != model.channels:
-        text = f"{samples.shape[1]} channels, but the model has {model.channels}; use recordings of the same sensor"
-        raise TableError(arguments.recording, 1, text)
-    for decision in texture.classify(model, t_s, samples, window_ms, arguments.sequential):
+    if Path(arguments.recording).is_dir():
+        return classify_folder(arguments, model, window_ms)
+    for decision in decisions(arguments, model, arguments.recording, window_ms):
         if arguments.json:
             print(json.dumps(plain(vars(decision))))
         else:
             border = " (border)" if decision.border else ""
             print(f"{decision.t_s:.3f} s  {decision.label}  {decision.confidence:.3f}{border}")
+    return 0
+
+
+def decisions(arguments, model, path, window_ms: float) -> list:
+    t_s, samples = texture.read_recording(path)
+    if samples.shape[1] != model.channels:
+        text = f"{samples.shape[1]} channels, but the model has {model.channels}; use recordings of the same sensor"
+        raise TableError(path, 1, text)
+    return texture.classify(model, t_s, samples, window_ms, arguments.sequential)
+
+
+def classify_folder(arguments, model, window_ms: float) -> int:
+    """A row for each surface's folder: decisions, and the share of each answer in percent."""
+    files = texture.surface_files(arguments.recording)
+    if not files:
+        raise TableError(arguments.recording, None, "no surface folder; give one folder per surface, or one CSV file")
+    answers = {}
+    for name, some in tqdm(files.items(), desc="classify", unit="surface", disable=None):
+        answers[name] = Counter(d.label for file in some for d in decisions(arguments, model, file, window_ms))
+    columns = [*model.classes, "unknown"]
+    if arguments.json:
+        for name, found in answers.items():
+            print(json.dumps({"surface": name, "decisions": found.total()} | {c: found[c] for c in columns}))
+        return 0
+    width, cell = max(map(len, [*files, "surface"])), max(8, *(len(c) + 2 for c in columns))
+    print(f"{'surface':{width}}{'windows':>9}" + "".join(f"{c:>{cell}}" for c in columns))
+    for name, found in answers.items():
+        shares = [100 * found[c] / max(1, found.total()) for c in columns]
+        print(f"{name:{width}}{found.total():9}" + "".join(f"{s:{cell - 2}.1f} %" for s in shares))
+    for name in sorted(set(files) - set(model.classes)):
+        warn(f"{arguments.recording}: folder '{name}' is no class of the model: {', '.join(model.classes)}")
     return 0

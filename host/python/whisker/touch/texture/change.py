@@ -105,6 +105,8 @@ def _share(features: list[np.ndarray], steady: np.ndarray) -> float:
     """How much less the mean of neighbouring blocks varies than one block, over what it would if they were independent."""
     one = row = 1e-12
     for f in features:
+        if len(f) < ROW:
+            continue
         scores = f[: len(f) // ROW * ROW] @ (steady - steady.mean(axis=1, keepdims=True))
         scores = scores - scores.mean(axis=0)
         one += (scores**2).sum() / ROW

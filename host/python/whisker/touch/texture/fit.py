@@ -20,7 +20,7 @@ STRETCHES_MUST_GAIN = 0.05  # ... in nats a window: they cost it a third more ti
 AXES_MOST = 16  # of the distance that tells unknown surfaces
 UNKNOWN_QUANTILE = 0.995  # of held-out windows of trained surfaces
 PRIOR_WINDOWS = 20.0  # with the variances of all classes, that a class's own are mixed with
-TEMPERS = np.geomspace(1e-3, 1.0, 91)  # scores are never sharpened: separable training data would ask for no end of it
+TEMPER_STEPS = 30  # of the search for a temperature; Newton needs about six, halving the rest
 
 
 @dataclass
@@ -46,25 +46,51 @@ class Fitted:
 
 def fit(data: Windows, floor: np.ndarray) -> Fitted:
     """Choose levels, shorter stretches, size and shrinkage by held-out log loss, then fit all the rest."""
-    chosen = _fit_features(data, floor, False, 0, HIDDEN[:1])
+    chosen = _trial(data, floor, False, 0, HIDDEN[:1])
     if chosen.loss > LEAST_GAIN:
-        levelled = _fit_features(data, floor, True, 0, HIDDEN[:1])
+        levelled = _trial(data, floor, True, 0, HIDDEN[:1])
         if _pays(levelled.loss, chosen.loss, LEVELS_MUST_GAIN):
             chosen = levelled
     if chosen.loss > LEAST_GAIN and data.windows.shape[1] >= STRETCHES * lib.NAV_TEXTURE_LENGTH_MIN:
-        beside = _fit_features(data, floor, chosen.rung.levels, STRETCHES, HIDDEN[:1])
+        beside = _trial(data, floor, chosen.blank.levels, STRETCHES, HIDDEN[:1])
         if beside.loss < chosen.loss - STRETCHES_MUST_GAIN:
             chosen = beside
     if chosen.loss > LEAST_GAIN:
-        chosen = _fit_features(data, floor, chosen.rung.levels, chosen.rung.shorter, HIDDEN)
-    return chosen
+        chosen = _trial(data, floor, chosen.blank.levels, chosen.blank.shorter, HIDDEN)
+    return _finished(chosen, data)
 
 
 def _pays(loss: float, so_far: float, must_gain: float) -> bool:
     return loss < min((1.0 - must_gain) * so_far, so_far - LEAST_GAIN)
 
 
-def _fit_features(data: Windows, floor: np.ndarray, levels: bool, shorter: int, sizes: tuple) -> Fitted:
+@dataclass
+class _Candidate:
+    """A size and shrinkage with its temperature, and the scores of windows whose fold was left out, tempered."""
+
+    loss: float
+    hidden: int
+    shrink: float
+    temper: float
+    loglik: np.ndarray
+    rules: list[tuple]  # weights and biases, of each fold left out
+
+
+@dataclass
+class _Trial:
+    """Features of one kind, and what did best on them."""
+
+    blank: Rung  # without weights
+    expanded: np.ndarray  # (m, F + hidden most)
+    sums: "_Sums"
+    best: _Candidate
+
+    @property
+    def loss(self) -> float:
+        return self.best.loss
+
+
+def _trial(data: Windows, floor: np.ndarray, levels: bool, shorter: int, sizes: tuple) -> _Trial:
     raw = plain_features(data.windows, levels, floor, shorter)
     centre, scale = raw.mean(axis=0), 1.0 / (raw.std(axis=0) + 1e-6)
     features, classes = raw.shape[1], data.classes
@@ -74,19 +100,22 @@ def _fit_features(data: Windows, floor: np.ndarray, levels: bool, shorter: int, 
         np.zeros((features + max(sizes), classes)), np.zeros(classes), np.zeros((classes, features)), nothing, np.zeros((classes, 0)),
         np.zeros(classes),
     )  # fmt: skip
-    expanded = blank.expand(data.windows)
+    expanded = blank.expand(data.windows) if max(sizes) else (raw - centre) * scale
     sums = _Sums(expanded, data)
     best = None
     for hidden in sizes:
-        tries = (_held_out(sums, expanded, data, features + hidden, s) for s in SHRINK)
-        found = min(tries, key=lambda f: f[0])
-        if best is None or _pays(found[0], best[0], HIDDEN_MUST_GAIN):
-            best = (*found, hidden)
-    loss, shrink, temper, loglik, hidden = best
-    rungs = [_finish(blank, sums, left_out, hidden, shrink, temper) for left_out in (None, *range(data.folds))]
-    _spread(rungs, expanded[:, :features], data)
-    _limit(rungs, expanded[:, :features], data)
-    return Fitted(rungs[0], rungs[1:], loglik, loss)
+        found = min(_candidates(sums, expanded, data, hidden, features + hidden), key=lambda c: c.loss)
+        if best is None or _pays(found.loss, best.loss, HIDDEN_MUST_GAIN):
+            best = found
+    return _Trial(blank, expanded, sums, best)
+
+
+def _finished(trial: _Trial, data: Windows) -> Fitted:
+    features = trial.expanded[:, : len(trial.blank.centre)]
+    rungs = [_finish(trial.blank, trial.sums, left_out, trial.best) for left_out in (None, *range(data.folds))]
+    _spread(rungs, features, data)
+    _limit(rungs, features, data)
+    return Fitted(rungs[0], rungs[1:], trial.best.loglik, trial.loss)
 
 
 class _Sums:
@@ -104,13 +133,14 @@ class _Sums:
             self.second[f] = weighted.T @ x[mine]
             np.add.at(self.weight[f], data.label[mine], self.row_weight[mine])
             np.add.at(self.first[f], data.label[mine], weighted)
+        self.total = self.second.sum(axis=0)
 
     def statistics(self, left_out: int | None, size: int) -> tuple[np.ndarray, np.ndarray]:
         """Class means (classes, size) and covariance within classes (size, size) of all folds but one."""
         use = [f for f in range(len(self.weight)) if f != left_out]
         weight, first = self.weight[use].sum(axis=0), self.first[use].sum(axis=0)[:, :size]
         means = first / np.maximum(weight, 1e-12)[:, None]
-        second = self.second[use].sum(axis=0)[:size, :size]
+        second = self.total[:size, :size] if left_out is None else (self.total - self.second[left_out])[:size, :size]
         return means, (second - means.T @ (means * weight[:, None])) / weight.sum()
 
 
@@ -121,16 +151,42 @@ def _discriminant(means: np.ndarray, within: np.ndarray, shrink: float) -> tuple
     return weight, -0.5 * np.einsum("kf,fk->k", means, weight)
 
 
-def _held_out(sums: _Sums, x: np.ndarray, data: Windows, size: int, shrink: float) -> tuple:
-    """Log loss, shrinkage, temperature and tempered log-likelihoods of windows whose fold was left out."""
-    scores = np.empty((len(x), data.classes))
-    for f in range(data.folds):
-        weight, bias = _discriminant(*sums.statistics(f, size), shrink)
-        scores[data.fold == f] = x[data.fold == f, :size] @ weight + bias
-    scores -= scores.max(axis=1, keepdims=True)
-    losses = [log_loss(scores * t, data.label, sums.row_weight) for t in TEMPERS]
-    best = int(np.argmin(losses))
-    return losses[best], shrink, float(TEMPERS[best]), scores * TEMPERS[best]
+def _candidates(sums: _Sums, x: np.ndarray, data: Windows, hidden: int, size: int) -> list[_Candidate]:
+    """Each shrinkage of discriminants on the first `size` columns of x."""
+    statistics = [sums.statistics(f, size) for f in range(data.folds)]
+    found = []
+    for shrink in SHRINK:
+        rules, scores = [_discriminant(*s, shrink) for s in statistics], np.empty((len(x), data.classes))
+        for f, (weight, bias) in enumerate(rules):
+            scores[data.fold == f] = x[data.fold == f, :size] @ weight + bias
+        scores -= scores.max(axis=1, keepdims=True)
+        temper = temperature(scores, data.label, sums.row_weight)
+        loss = log_loss(scores * temper, data.label, sums.row_weight)
+        found.append(_Candidate(loss, hidden, shrink, temper, scores * temper, rules))
+    return found
+
+
+def temperature(scores: np.ndarray, label: np.ndarray, weight: np.ndarray | None = None, most: float = 1.0) -> float:
+    """The factor in [0, most] under which scores (m, classes) cost least as log-likelihoods of `label` (m,).
+
+    The log loss is convex in the factor: Newton steps, and halving where one leaves the bracket. Scores are not
+    sharpened without bound, which separable training data would ask for.
+    """
+    low, high, factor = 0.0, most, min(0.5, most)
+    rows, weight = np.arange(len(label)), np.full(len(label), 1.0) if weight is None else weight
+    for _ in range(TEMPER_STEPS):
+        chance = np.exp(factor * scores)
+        chance /= chance.sum(axis=1, keepdims=True)
+        mean = (chance * scores).sum(axis=1)
+        slope = np.dot(weight, mean - scores[rows, label])
+        bend = np.dot(weight, (chance * (scores - mean[:, None]) ** 2).sum(axis=1))
+        low, high = (low, factor) if slope > 0.0 else (factor, high)
+        step = factor - slope / bend if bend > 0.0 else high
+        step = step if low < step < high else 0.5 * (low + high)
+        if abs(step - factor) < 1e-4 * most:
+            break
+        factor = step
+    return float(factor)
 
 
 def log_loss(loglik: np.ndarray, label: np.ndarray, weight: np.ndarray | None = None) -> float:
@@ -139,15 +195,16 @@ def log_loss(loglik: np.ndarray, label: np.ndarray, weight: np.ndarray | None = 
     return float(-np.average(chance, weights=weight))
 
 
-def _finish(blank: Rung, sums: _Sums, left_out: int | None, hidden: int, shrink: float, temper: float) -> Rung:
+def _finish(blank: Rung, sums: _Sums, left_out: int | None, chosen: _Candidate) -> Rung:
     features = len(blank.centre)
-    weight, bias = _discriminant(*sums.statistics(left_out, features + hidden), shrink)
+    whole = sums.statistics(None, features + chosen.hidden) if left_out is None else None
+    weight, bias = _discriminant(*whole, chosen.shrink) if whole else chosen.rules[left_out]
     means, within = sums.statistics(left_out, features)
     _, vectors = np.linalg.eigh(within)
     axes = min(AXES_MOST, features)
     return Rung(
-        blank.length, blank.levels, blank.shorter, hidden, blank.floor, blank.centre, blank.scale, weight, bias, means,
-        vectors[:, ::-1][:, :axes].T, np.zeros((len(means), axes)), np.zeros(len(means)), temper,
+        blank.length, blank.levels, blank.shorter, chosen.hidden, blank.floor, blank.centre, blank.scale, weight, bias,
+        means, vectors[:, ::-1][:, :axes].T, np.zeros((len(means), axes)), np.zeros(len(means)), chosen.temper,
     )  # fmt: skip
 
 

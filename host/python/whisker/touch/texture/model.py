@@ -11,7 +11,7 @@ from ...files import UnreadableError, read_json
 from ...native import as_doubles, doubles, ffi, lib
 from ...tables import TableError, numbers, read_columns
 from .spectral import FORMAT as SPECTRAL_FORMAT
-from .spectral import SpectralModel, no_model
+from .spectral import SENSOR_STOPS, SpectralModel, no_model
 
 FORMAT = "whisker texture model 1"
 BINS = 64
@@ -22,6 +22,7 @@ SURE = 0.99  # posterior at which a sequential decision of equation 1 stops ...
 LOOKS = 8  # ... looking so often in a window ...
 PATIENCE = 4  # ... and giving up after so many windows
 GAP_PERIODS = 4.0  # a longer step of the time column is a gap: no window reaches across it
+STOPPED_MOST = 0.01  # share of a channel's samples at a stop of the sensor that is worth a word
 RATES_APART = 0.1  # relative: recordings to be learnt together are sampled alike
 
 
@@ -211,12 +212,10 @@ def read_folder(path) -> dict[str, list[np.ndarray]]:
 
 def read_training(path) -> tuple[dict[str, list[np.ndarray]], float]:
     """One folder per surface, one CSV per recording -> channels by class, and the sampling rate (Hz)."""
-    surfaces = sorted(folder for folder in Path(path).iterdir() if folder.is_dir()) if Path(path).is_dir() else []
-    files = {s.name: sorted(s.glob("*.csv")) for s in surfaces}
-    empty = [name for name, some in files.items() if not some]
-    if len(files) < 2 or empty:
-        what = f"folder '{empty[0]}' holds no CSV file" if empty else f"{len(files)} surface folder(s)"
-        raise TableError(path, None, f"{what}; give at least two folders, one per surface, with CSV recordings")
+    files = surface_files(path)
+    if len(files) < 2:
+        text = f"{len(files)} surface folder(s); give at least two folders, one per surface, with CSV recordings"
+        raise TableError(path, None, text)
     read = {name: [read_recording(file) for file in some] for name, some in files.items()}
     widths = {channels.shape[1] for group in read.values() for _, channels in group}
     if len(widths) != 1:
@@ -226,6 +225,39 @@ def read_training(path) -> tuple[dict[str, list[np.ndarray]], float]:
         text = f"recordings are sampled at {1 / max(periods):.4g} to {1 / min(periods):.4g} Hz; give one rate"
         raise TableError(path, None, text)
     return {name: [channels for _, channels in group] for name, group in read.items()}, 1.0 / float(np.median(periods))
+
+
+def surface_files(path) -> dict[str, list[Path]]:
+    """The CSV recordings of each surface's folder, by its name; hidden folders and files are left out.
+
+    TableError for a folder without recordings, and for two that differ in upper and lower case only.
+    """
+    visible = [p for p in sorted(Path(path).iterdir()) if not p.name.startswith(".")] if Path(path).is_dir() else []
+    files = {s.name: [f for f in sorted(s.glob("*.csv")) if f.name[0] != "."] for s in visible if s.is_dir()}
+    spelt: dict[str, str] = {}
+    for name, some in files.items():
+        if not some:
+            text = f"folder '{name}' holds no CSV file; give each surface a folder with CSV recordings"
+            raise TableError(path, None, text)
+        other = spelt.setdefault(name.strip().casefold(), name)
+        if other != name:
+            raise TableError(path, None, f"folders '{other}' and '{name}' name one surface twice; use one name")
+    return files
+
+
+def recording_faults(samples: np.ndarray) -> list[str]:
+    """What training will not learn from: rows that are not finite, channels that never change or sit at a sensor's stop."""
+    samples = _counts(samples, "recording")
+    finite = samples[np.isfinite(samples).all(axis=1)]
+    found = [f"{len(samples) - len(finite)} of {len(samples)} rows are not finite and left out"]
+    found = found if len(finite) < len(samples) else []
+    for c, channel in enumerate(finite.T, start=1):
+        stopped = np.isin(channel, SENSOR_STOPS).mean() if len(channel) else 0.0
+        if len(channel) > 1 and (channel == channel[0]).all():
+            found.append(f"channel {c} never changes")
+        elif stopped > STOPPED_MOST:
+            found.append(f"channel {c} is at its stop in {100 * stopped:.0f} % of its samples")
+    return found
 
 
 def sample_period(t_s: np.ndarray) -> float:

@@ -16,6 +16,12 @@ from .strange import Strange
 
 FORMAT = "whisker texture model 6"
 PARTS = {"change": Change, "strange": Strange, "settle": Settle}  # of windows in a row
+SENSOR_STOPS = (0.0, 65535.0)  # of raw counts, 16 bits
+WITHOUT = {  # what a model without a part cannot do, and what it would take
+    "change": "borders block by block; longer recordings, two or more of each surface, show the rate of false ones",
+    "settle": "a whisker that rings after a rougher surface; longer recordings show how fast floors get quieter",
+    "strange": "surfaces never trained by several windows together; give eight recordings of each surface",
+}
 LIMITS = ("spike", "still", "low", "high")
 LENGTH_MOST = 1 << 20  # samples of a window; also numbers of a projection
 RANGES = {
@@ -64,6 +70,10 @@ class SpectralModel:
     @property
     def channels(self) -> int:
         return len(self.rungs[0].floor)
+
+    def not_learned(self) -> list[str]:
+        """What there was too little data to learn, a line each."""
+        return [text for name, text in WITHOUT.items() if getattr(self, name) is None]
 
     def stream(self, window: int, step: int = 0, patience: int = 0) -> "Stream":
         """Decisions in windows of so many samples, or, with a step, sequential ones within `patience` samples."""

@@ -1,11 +1,13 @@
 """Trains the default texture method from recordings; everything that is chosen is chosen on recordings held out."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from .change import fit_change
 from .fit import UNKNOWN_QUANTILE, Fitted, Windows, fit, log_loss
 from .settle import fit_settle
-from .spectral import SpectralModel
+from .spectral import SENSOR_STOPS, SpectralModel
 from .strange import fit_strange
 
 FOLDS = 5
@@ -16,22 +18,35 @@ BLOCKS = 4  # of a window, in each of which a change of surface is looked for
 SPIKE_OVER = 3.0  # times what one sample in a thousand stands out from both neighbours
 STILL_OVER, STILL_LEAST = 2.0, 16  # times the longest run of equal samples; shorter runs happen to any sensor
 SPAN_OVER = 1.5  # times the farthest that a training window reaches
-SENSOR_STOPS = (0.0, 65535.0)  # of raw counts, 16 bits
 BORDER_QUANTILE, BORDER_OVER = 0.999, 1.25  # of neighbouring held-out stretches of one surface
 REFUSE_MOST = 0.05  # share of held-out windows that "unknown" may cost ...
 REFUSE_UNTIL = 10.0  # ... unless fewer already cut wrong answers by this factor
+DOUBT_WINDOWS = 100  # fewer held-out windows do not show the quantile of their confidence: then ...
+DOUBT_PRIOR = 0.5  # ... "unknown" is what is likelier wrong than right
 SURE = (0.5, 0.6, 0.7, 0.8, 0.85, 0.9, 0.93, 0.95, 0.97, 0.98, 0.99, 0.995, 0.998, 0.999)
 
 
-def train(recordings: dict[str, list[np.ndarray]], rate_hz: float, window_ms: float = 100.0) -> SpectralModel:
-    """Learn from raw counts (n, channels) by class. ValueError when there is too little to learn from."""
+def train(
+    recordings: dict[str, list[np.ndarray]],
+    rate_hz: float,
+    window_ms: float = 100.0,
+    progress: Callable[[int, int], object] = lambda done, of: None,
+) -> SpectralModel:
+    """Learn from raw counts (n, channels) by class. `progress(done, of)` is called after each step.
+
+    ValueError when there is too little to learn from.
+    """
     parts = [_clean(np.asarray(r, dtype=np.float64)) for group in recordings.values() for r in group]
     labels = [k for k, group in enumerate(recordings.values()) for _ in group]
     parts, labels, folds = _fold(parts, labels)
     base = max(LENGTH_LEAST, round(rate_hz * window_ms / 1000.0))
     lengths = _ladder(base, min(map(len, parts)))
+    base = min(base, *(max(len(p) for p, k in zip(parts, labels, strict=True) if k == c) for c in set(labels)))
     limits, floor = _limits(parts), _floor(parts)
-    fitted = [fit(_windows(parts, labels, folds, length, len(recordings)), floor) for length in lengths]
+    fitted = []
+    for length in lengths:
+        fitted.append(fit(_windows(parts, labels, folds, length, len(recordings)), floor))
+        progress(len(fitted), len(lengths) + 1)
     for length, found in zip(lengths, fitted, strict=True):
         span = SPAN_OVER * _widest(parts, length)
         for rung in (found.rung, *found.twins):
@@ -43,6 +58,7 @@ def train(recordings: dict[str, list[np.ndarray]], rate_hz: float, window_ms: fl
     if model.change is not None:
         model.settle = fit_settle(parts, block, floor, UNKNOWN_QUANTILE)
     model.strange = _strange(model, parts, labels, folds, base)
+    progress(len(lengths) + 1, len(lengths) + 1)
     return model
 
 
@@ -148,18 +164,26 @@ def _calibrate(model: SpectralModel, fitted: list[Fitted], parts: list, labels, 
         limit = _border(twins, parts, folds, found.rung.length)
         for rung in (found.rung, *(t.rungs[index] for t in twins)):
             rung.border = limit
-    fixed = _decisions(twins, parts, folds, base)
-    right, confidence = _scores(fixed, labels)
+    right, confidence = _scores(_decisions(twins, parts, folds, base), labels)
     model.doubt = _doubt(right, confidence)
-    model.sure, samples, accuracy = _sure(twins, parts, labels, folds, base, float(right.mean()))
+    model.sure, samples, looks = _sure(twins, parts, labels, folds, base, float(right.mean()))
     model.figures = {
         "window_samples": base,
         "held_out_accuracy": round(float(right.mean()), 4),
         "refused": round(float((confidence < model.doubt).mean()), 4),
         "accuracy_of_answers": round(float(right[confidence >= model.doubt].mean()), 4),
-        "sequential_accuracy": round(accuracy, 4),
+        "calibration_error": round(calibration_error(right, confidence), 4),
+        "sequential_accuracy": round(float(looks[0].mean()), 4),
+        "sequential_calibration_error": round(calibration_error(*looks), 4),
         "sequential_samples": round(samples, 1),
     }
+
+
+def calibration_error(right: np.ndarray, confidence: np.ndarray, bins: int = 10) -> float:
+    """Expected calibration error of decisions (m,) over equal bins of confidence."""
+    place = np.minimum((confidence * bins).astype(int), bins - 1)
+    each = [(place == b).mean() * abs(right[place == b].mean() - confidence[place == b].mean()) for b in set(place)]
+    return float(np.sum(each))
 
 
 def _strange(model: SpectralModel, parts, labels, folds, base: int):
@@ -219,6 +243,8 @@ def _doubt(right: np.ndarray, confidence: np.ndarray) -> float:
     """Confidence below which "unknown" is said: as little as cuts wrong answers enough, within what it may cost."""
     if right.all():
         return 0.0
+    if len(right) < DOUBT_WINDOWS:
+        return DOUBT_PRIOR
     wrong = 1.0 - right.mean()
     for share in np.linspace(0.0, REFUSE_MOST, 26):
         limit = np.quantile(confidence, share)
@@ -228,15 +254,16 @@ def _doubt(right: np.ndarray, confidence: np.ndarray) -> float:
     return float(limit)
 
 
-def _sure(twins, parts, labels, folds, base: int, fixed: float) -> tuple[float, float, float]:
-    """The least sureness at which sequential decisions are right as often as fixed windows; samples and accuracy."""
+def _sure(twins, parts, labels, folds, base: int, fixed: float) -> tuple[float, float, tuple]:
+    """The least sureness at which sequential decisions are right as often as fixed windows; their samples and scores."""
     tried, low, high = {}, 0, len(SURE) - 1
     while SURE[low] not in tried:  # accuracy grows with sureness: halve what is left
         sure = SURE[(low + high) // 2]
         for twin in twins:
             twin.sure = sure
         decisions = _decisions(twins, parts, folds, base, sequential=True)
-        right, _ = _scores(decisions, labels)
-        tried[sure] = float(np.mean([d.samples for g in decisions for d in g])), float(right.mean())
-        low, high = (low, (low + high) // 2) if tried[sure][1] >= fixed else (min((low + high) // 2 + 1, high), high)
+        scores = _scores(decisions, labels)
+        tried[sure] = float(np.mean([d.samples for g in decisions for d in g])), scores
+        middle = (low + high) // 2
+        low, high = (low, middle) if scores[0].mean() >= fixed else (min(middle + 1, high), high)
     return SURE[low], *tried[SURE[low]]
