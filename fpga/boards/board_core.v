@@ -1,8 +1,8 @@
-// What every board has: the bridge, the shim to its ULPI PHY, and a reset of 16 cycles after configuration. The pads are
-// the board's own (usb3300_board.v, cynthion.v).
+// What every board with a ULPI PHY has: the bridge, the shim to its PHY, a watchdog on the PHY's clock, and a reset of 16
+// cycles after configuration and after the clock was lost. The pads are the board's own (usb3300_board.v, cynthion.v).
 //
 //   nodes <--> whisker_bridge <-- UTMI --> ulpi_shim <--> pads <--> PHY
-//                    ^---- rst <-- power-up counter
+//                    ^---- rst <-- power-up counter <-- phy_watch --> ulpi_reset
 
 `default_nettype none
 
@@ -12,10 +12,9 @@ module board_core #(
     parameter [7:0] VENDOR_VALUE    = 8'h00
 ) (
     input  wire             clk,            // 60 MHz, the PHY's
+    input  wire             osc,            // of the FPGA itself, see phy_watch
     input  wire [7:0]       ulpi_data_in,   // pads
     output wire [7:0]       ulpi_data_out,  // .
-    output wire             ulpi_data_oe,   // . 1: drive all eight
-    input  wire             ulpi_dir_pin,   // .
     input  wire             ulpi_dir,       // .
     input  wire             ulpi_nxt,       // .
     output wire             ulpi_stp,       // .
@@ -31,19 +30,27 @@ module board_core #(
     wire       rx_active, rx_valid, rx_error, tx_valid, tx_ready, vbus_valid, session_valid, session_end, term_select;
     wire [1:0] line_state, xcvr_select, op_mode;
     wire       ready, running, link_busy, transfer_busy, lit;
+    wire       unused = &{1'b0, ready, running, link_busy, transfer_busy};
 
     // Flip-flops begin at zero when the FPGA has been configured.
     reg  [4:0] awake;
+    reg  [1:0] lost;
+    wire       clock_lost;
     wire       rst = !awake[4];
-    initial awake = 5'd0;
-    always @(posedge clk) if (rst) awake <= awake + 5'd1;
+    initial {awake, lost} = 7'd0;
+    always @(posedge clk) begin
+        lost <= {lost[0], clock_lost};
+        if (lost[1]) awake <= 5'd0;
+        else if (rst) awake <= awake + 5'd1;
+    end
+
+    phy_watch watch (.osc(osc), .clk(clk), .lost(clock_lost), .phy_reset(ulpi_reset));
 
     ulpi_shim #(.VENDOR_REGISTER(VENDOR_REGISTER), .VENDOR_VALUE(VENDOR_VALUE)) shim (
         .clk(clk), .rst(rst), .ulpi_data_in(ulpi_data_in), .ulpi_data_out(ulpi_data_out),
-        .ulpi_data_oe(ulpi_data_oe), .ulpi_dir_pin(ulpi_dir_pin), .ulpi_dir(ulpi_dir), .ulpi_nxt(ulpi_nxt),
-        .ulpi_stp(ulpi_stp), .ulpi_reset(ulpi_reset), .ready(ready), .utmi_rx_data(rx_data), .utmi_rx_active(rx_active),
-        .utmi_rx_valid(rx_valid), .utmi_rx_error(rx_error), .utmi_tx_data(tx_data), .utmi_tx_valid(tx_valid),
-        .utmi_tx_ready(tx_ready), .utmi_line_state(line_state), .utmi_vbus_valid(vbus_valid),
+        .ulpi_dir(ulpi_dir), .ulpi_nxt(ulpi_nxt), .ulpi_stp(ulpi_stp), .ready(ready), .utmi_rx_data(rx_data),
+        .utmi_rx_active(rx_active), .utmi_rx_valid(rx_valid), .utmi_rx_error(rx_error), .utmi_tx_data(tx_data),
+        .utmi_tx_valid(tx_valid), .utmi_tx_ready(tx_ready), .utmi_line_state(line_state), .utmi_vbus_valid(vbus_valid),
         .utmi_session_valid(session_valid), .utmi_session_end(session_end), .utmi_xcvr_select(xcvr_select),
         .utmi_term_select(term_select), .utmi_op_mode(op_mode));
 

@@ -25,19 +25,21 @@ module cynthion #(
     localparam [7:0] PHY_SWAPPED  = 8'h06;
 
     wire [7:0] data_in, data_out;
-    wire       data_oe, dir_pin, dir, nxt, ulpi_reset, led;
+    wire       osc, dir, nxt, ulpi_reset, led;
 
     assign ulpi_clk     = clk_60;
     assign ulpi_reset_n = !ulpi_reset;
     assign led_n        = !led;
 
     ulpi_pads #(.HOLD_CELLS(0)) pads (
-        .ulpi_data(ulpi_data), .ulpi_dir(ulpi_dir), .ulpi_nxt(ulpi_nxt), .data_out(data_out), .data_oe(data_oe),
-        .data_in(data_in), .dir_pin(dir_pin), .dir(dir), .nxt(nxt));
+        .clk(clk_60), .ulpi_data(ulpi_data), .ulpi_dir(ulpi_dir), .ulpi_nxt(ulpi_nxt), .data_out(data_out),
+        .data_in(data_in), .dir(dir), .nxt(nxt));
+
+    (* keep *) OSCG #(.DIV(128)) oscillator (.OSC(osc));
 
     board_core #(.LANES(LANES), .VENDOR_REGISTER(PHY_POLARITY), .VENDOR_VALUE(PHY_SWAPPED)) core (
-        .clk(clk_60), .ulpi_data_in(data_in), .ulpi_data_out(data_out), .ulpi_data_oe(data_oe),
-        .ulpi_dir_pin(dir_pin), .ulpi_dir(dir), .ulpi_nxt(nxt), .ulpi_stp(ulpi_stp), .ulpi_reset(ulpi_reset),
+        .clk(clk_60), .osc(osc), .ulpi_data_in(data_in), .ulpi_data_out(data_out), .ulpi_dir(dir), .ulpi_nxt(nxt),
+        .ulpi_stp(ulpi_stp), .ulpi_reset(ulpi_reset),
         .sync(sync), .sck(sck), .select_n(select_n), .mosi(mosi), .miso(miso), .led(led));
 endmodule
 

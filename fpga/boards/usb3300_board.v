@@ -19,17 +19,19 @@ module usb3300_board #(
     output wire             led_n
 );
     wire [7:0] data_in, data_out;
-    wire       data_oe, dir_pin, dir, nxt, led;
+    wire       osc, dir, nxt, led;
 
     assign led_n = !led;
 
     ulpi_pads pads (
-        .ulpi_data(ulpi_data), .ulpi_dir(ulpi_dir), .ulpi_nxt(ulpi_nxt), .data_out(data_out), .data_oe(data_oe),
-        .data_in(data_in), .dir_pin(dir_pin), .dir(dir), .nxt(nxt));
+        .clk(clk_60), .ulpi_data(ulpi_data), .ulpi_dir(ulpi_dir), .ulpi_nxt(ulpi_nxt), .data_out(data_out),
+        .data_in(data_in), .dir(dir), .nxt(nxt));
+
+    (* keep *) OSCG #(.DIV(128)) oscillator (.OSC(osc));
 
     board_core #(.LANES(LANES)) core (
-        .clk(clk_60), .ulpi_data_in(data_in), .ulpi_data_out(data_out), .ulpi_data_oe(data_oe),
-        .ulpi_dir_pin(dir_pin), .ulpi_dir(dir), .ulpi_nxt(nxt), .ulpi_stp(ulpi_stp), .ulpi_reset(ulpi_reset),
+        .clk(clk_60), .osc(osc), .ulpi_data_in(data_in), .ulpi_data_out(data_out), .ulpi_dir(dir), .ulpi_nxt(nxt),
+        .ulpi_stp(ulpi_stp), .ulpi_reset(ulpi_reset),
         .sync(sync), .sck(sck), .select_n(select_n), .mosi(mosi), .miso(miso), .led(led));
 endmodule
 

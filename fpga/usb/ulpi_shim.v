@@ -1,8 +1,7 @@
 // UTMI on one side, a ULPI PHY's pins on the other (ULPI 1.1; the PHY gives the 60 MHz clock and keeps it running).
-// ulpi_data_out, ulpi_stp and the drive bit are flip-flops at the pads, and all inputs end in flip-flops; the only logic
-// before one is the choice that ulpi_nxt and ulpi_dir make, for the PHY wants the next byte in the very next cycle.
-// ulpi_data_oe is the drive bit less ulpi_dir_pin: the pads let go within the turnaround cycle. So it does not matter what
-// ulpi_data_out holds while dir is high, and ulpi_dir takes no part in its choice, which would be the longest way in.
+// ulpi_data_out and ulpi_stp are flip-flops at the pads, and all inputs end in flip-flops; the only logic before one is the
+// choice that ulpi_nxt and ulpi_dir make, for the PHY wants the next byte in the very next cycle. The board's pads let go of
+// the bus by themselves while dir is high and in the cycle after it.
 //
 //   dir nxt data_in --> | reg | --> rx: RXCMD or byte --> line_state, session, rx_active, rx_valid, rx_error
 //   data_out stp    <-- | reg | <-- IDLE -> COMMAND -> VALUE | BYTES -> STOP <-- set-up list, then every change of mode
@@ -27,12 +26,9 @@ module ulpi_shim #(
     input  wire       rst,                 // synchronous, power-up
     input  wire [7:0] ulpi_data_in,        // pads
     output reg  [7:0] ulpi_data_out,       // .
-    output wire       ulpi_data_oe,        // . 1: drive all eight
-    input  wire       ulpi_dir_pin,        // . straight from the pad, to let go; the others may be some ns late
     input  wire       ulpi_dir,            // .
     input  wire       ulpi_nxt,            // .
     output reg        ulpi_stp,            // .
-    output wire       ulpi_reset,          // . never active: a PHY in reset may stop the clock that would end it
     output wire       ready,               // the PHY is set up
     output reg  [7:0] utmi_rx_data,        // UTMI, as its specification names it
     output reg        utmi_rx_active,      // .
@@ -64,7 +60,6 @@ module ulpi_shim #(
     reg [2:0]  step;      // of the set-up
     reg        writing;   // the command is a register write
     reg        failed;    // it ran out of time
-    reg        drive;
     reg [7:0]  value;     // of the register write
     reg [7:0]  mode;      // function control as last written
     reg [10:0] patience;  // cycles left
@@ -89,8 +84,6 @@ module ulpi_shim #(
         if (rst) {dir_before, dir, nxt, vbus, line} <= {1'b1, 1'b1, 1'b0, 2'b11, 2'b00};
     end
 
-    assign ulpi_data_oe       = drive && !ulpi_dir_pin;
-    assign ulpi_reset         = 1'b0;
     assign ready              = step == STEP_DONE;
     assign utmi_vbus_valid    = ready && (vbus == 2'b11 || IGNORE_VBUS != 0);
     assign utmi_session_valid = ready && (vbus[1] || IGNORE_VBUS != 0);
@@ -147,7 +140,6 @@ module ulpi_shim #(
         else if (ulpi_nxt) ulpi_data_out <= following;
 
     always @(posedge clk) begin
-        drive    <= !ulpi_dir;
         ulpi_stp <= 1'b0;
         patience <= patience - 11'd1;
         case (state)
@@ -184,7 +176,7 @@ module ulpi_shim #(
             default: state <= REST;
         endcase
         if (rst) begin
-            {state, step, drive, ulpi_stp} <= {REST, STEP_RESET, 1'b0, 1'b0};
+            {state, step, ulpi_stp} <= {REST, STEP_RESET, 1'b0};
             {writing, failed, mode} <= 10'd0;
             patience <= SETTLE;
         end

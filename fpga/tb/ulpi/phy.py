@@ -24,6 +24,7 @@ class UlpiPhy:
         self.registers, self.writes = {OTG_CONTROL: 0x06, FUNCTION_CONTROL: 0x41}, []
         self.packets, self.aborted = [], []
         self.before = (1, 0)  # dir and nxt that the link saw at the edge
+        self.let_go = 1  # the pads of the link, which drive from the second cycle in which dir is low
         self.turnaround = False  # dir rose only now: what the link shows it decided before
         self.command, self.bytes = None, []
         self.interrupt = None  # a chance per cycle of an RXCMD in the midst of what the link does
@@ -58,8 +59,8 @@ class UlpiPhy:
     def edge(self) -> None:
         """One rising edge: the levels before it are what both sides sampled."""
         was_dir, was_nxt = self.before
-        drives, stp = int(self.dut.ulpi_data_oe.value), int(self.dut.ulpi_stp.value)
-        assert not (was_dir and drives), "the link drives the bus while dir is high"
+        drives, stp = not (was_dir or self.let_go), int(self.dut.ulpi_stp.value)
+        self.let_go = was_dir
         data = int(self.dut.ulpi_data_out.value) if drives else 0
         if not was_dir:
             self.listen(data, was_nxt, stp)
@@ -137,7 +138,7 @@ class UlpiPhy:
         return random.random() >= self.stall
 
     def drive(self, dir_: int, nxt: int, data: int) -> tuple[int, int]:
-        self.dut.ulpi_dir_pin.value = self.dut.ulpi_dir.value = dir_
+        self.dut.ulpi_dir.value = dir_
         self.dut.ulpi_nxt.value = nxt
         self.dut.ulpi_data_in.value = data
         return dir_, nxt

@@ -27,7 +27,7 @@ def written_anew(dut) -> list[tuple[int, int]]:
 
 async def start(dut, ready: bool = True, **phy_settings) -> Link:
     phy = UlpiPhy(dut, **phy_settings)
-    inputs = {"ulpi_dir_pin": 1, "ulpi_dir": 1, "ulpi_nxt": 0, "ulpi_data_in": 0, "utmi_tx_valid": 0, "utmi_tx_data": 0}
+    inputs = {"ulpi_dir": 1, "ulpi_nxt": 0, "ulpi_data_in": 0, "utmi_tx_valid": 0, "utmi_tx_data": 0}
     await bench.start_clock(
         dut, **inputs, utmi_xcvr_select=1, utmi_term_select=1, utmi_op_mode=0, **({"rst": 1} if not ready else {})
     )

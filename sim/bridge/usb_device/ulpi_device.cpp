@@ -1,7 +1,5 @@
 #include "ulpi_device.h"
 
-#include <stdexcept>
-
 #include "Vulpi_device.h"
 
 namespace bridge_sim
@@ -50,10 +48,10 @@ void UlpiDevice::cycle()
     top.ulpi_nxt = pins.nxt;
     top.ulpi_data_in = pins.data;
     clock(top, [&] {
-        if (pins.dir && top.ulpi_data_oe) {
-            throw std::logic_error("link and PHY drive the bus at once");
-        }
-        phy_.listen({static_cast<uint8_t>(top.ulpi_data_oe ? top.ulpi_data_out : 0), top.ulpi_stp != 0}, out);
+        // The pads let go while dir is high and in the cycle after it.
+        const bool drives = !pins.dir && !dir_before_;
+        dir_before_ = pins.dir;
+        phy_.listen({static_cast<uint8_t>(drives ? top.ulpi_data_out : 0), top.ulpi_stp != 0}, out);
         answered_after(phy_.answered_after());
     });
 }

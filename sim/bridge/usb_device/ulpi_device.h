@@ -29,6 +29,7 @@ class UlpiDevice : public StreamDevice
   private:
     std::unique_ptr<Vulpi_device> top_;
     UlpiPhy phy_;
+    bool dir_before_ = true;
 };
 
 } // namespace bridge_sim

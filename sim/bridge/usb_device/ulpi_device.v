@@ -8,7 +8,6 @@ module ulpi_device (
     input  wire       rst,
     input  wire [7:0] ulpi_data_in,
     output wire [7:0] ulpi_data_out,
-    output wire       ulpi_data_oe,
     input  wire       ulpi_dir,
     input  wire       ulpi_nxt,
     output wire       ulpi_stp,
@@ -25,8 +24,7 @@ module ulpi_device (
 
     ulpi_shim shim (
         .clk(clk), .rst(rst), .ulpi_data_in(ulpi_data_in), .ulpi_data_out(ulpi_data_out),
-        .ulpi_data_oe(ulpi_data_oe), .ulpi_dir_pin(ulpi_dir), .ulpi_dir(ulpi_dir), .ulpi_nxt(ulpi_nxt), .ulpi_stp(ulpi_stp),
-        .ulpi_reset(),
+        .ulpi_dir(ulpi_dir), .ulpi_nxt(ulpi_nxt), .ulpi_stp(ulpi_stp),
         .ready(ready), .utmi_rx_data(rx_data), .utmi_rx_active(rx_active), .utmi_rx_valid(rx_valid),
         .utmi_rx_error(rx_error), .utmi_tx_data(tx_data), .utmi_tx_valid(tx_valid), .utmi_tx_ready(tx_ready),
         .utmi_line_state(line_state), .utmi_vbus_valid(vbus_valid), .utmi_session_valid(session_valid),

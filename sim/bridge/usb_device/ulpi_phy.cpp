@@ -41,16 +41,25 @@ void UlpiPhy::tell_status(bool active)
     queue_.push_back({false, static_cast<uint8_t>(line_ | VBUS_VALID | (active ? RX_ACTIVE : 0))});
 }
 
+bool UlpiPhy::swapped() const
+{
+    return traits_.swap_register && swap_control_ != traits_.swap_value;
+}
+
+// With its lines swapped a PHY takes J for K, finds no packet, and is not understood.
 void UlpiPhy::hear_bus(const UtmiToDevice &in)
 {
-    const bool changed = line_ != in.line_state || active_ != (in.rx_active != 0);
-    packet_waits_ = packet_waits_ || (in.rx_active && !active_);
-    line_ = in.line_state;
-    active_ = in.rx_active;
+    const bool one_line = in.line_state == LINE_J || in.line_state == LINE_K;
+    const uint8_t line = swapped() && one_line ? in.line_state ^ (LINE_J | LINE_K) : in.line_state;
+    const bool active = in.rx_active && !swapped();
+    const bool changed = line_ != line || active_ != active;
+    packet_waits_ = packet_waits_ || (active && !active_);
+    line_ = line;
+    active_ = active;
     if (changed) {
         tell_status(active_);
     }
-    if (in.rx_valid) {
+    if (in.rx_valid && active) {
         queue_.push_back({true, in.rx_data});
     }
 }
@@ -120,11 +129,13 @@ void UlpiPhy::take(uint8_t data)
 
 void UlpiPhy::write(uint8_t address, uint8_t value)
 {
+    swap_control_ = traits_.swap_register && address == traits_.swap_register ? value : swap_control_;
     if (address != FUNCTION_CONTROL) {
         return;
     }
     const bool reset = (value & RESET) != 0;
     function_control_ = reset ? FUNCTION_CONTROL_DEFAULT : value;
+    swap_control_ = reset ? 0 : swap_control_;
     busy_ = reset ? RESET_CYCLES : 0;
 }
 
@@ -148,7 +159,7 @@ uint8_t UlpiPhy::transmit_byte(uint8_t data) const
 void UlpiPhy::listen(const LinkPins &link, UtmiFromDevice &out)
 {
     answers_ = false;
-    out.tx_valid = transmitting() && !pins_.dir && !link.stp;
+    out.tx_valid = transmitting() && !pins_.dir && !link.stp && !swapped();
     out.tx_data = transmit_byte(link.data);
     quiet_ = packet_ends_ ? 0 : quiet_ + 1;
     answer_due_ = answer_due_ || packet_ends_;

@@ -15,6 +15,9 @@ struct PhyTraits {
     uint64_t late = 0;  // cycles after power-up in which dir is high and nothing is said
     unsigned deaf = 0;  // commands at the beginning that get no nxt
     bool quick = false; // a packet begins by dir and nxt together, else by an RXCMD
+    // D+ and D- are swapped between PHY and socket until this register holds this value (0: they are not).
+    uint8_t swap_register = 0;
+    uint8_t swap_value = 0;
 };
 
 // What the PHY drives, and what the link does.
@@ -57,6 +60,7 @@ class UlpiPhy
     PhyPins leave_bus(bool tx_ready);
     PhyPins say();
     bool transmitting() const;
+    bool swapped() const;
     void begin(uint8_t data);
     void take(uint8_t data);
     void finish();
@@ -78,6 +82,7 @@ class UlpiPhy
     bool accepted_ = false; // the command had its nxt
     uint8_t value_ = 0;     // of a register write
     uint8_t function_control_ = 0;
+    uint8_t swap_control_ = 0; // the traits' register
     unsigned quiet_ = 0; // cycles since the end of the last packet
     uint64_t aborted_ = 0;
 };

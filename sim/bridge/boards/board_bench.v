@@ -1,0 +1,50 @@
+// Bench top: a board's top between a PHY and nodes, under names that all boards share. BOARD_CYNTHION chooses the board.
+
+`default_nettype none
+
+module board_bench (
+    input  wire        clk,         // at the FPGA's 60 MHz pin
+    input  wire        dir,
+    input  wire        nxt,
+    input  wire [7:0]  phy_data,    // while the PHY drives, that is while dir is high
+    output wire [7:0]  link_data,
+    output wire [7:0]  link_drives, // by pad
+    output wire        stp,
+    output wire        reset,       // 1: the PHY is in reset
+    output wire        sync,
+    output wire        sck,
+    output wire        select_n,
+    output wire        mosi,
+    input  wire [27:0] miso,
+    output wire        led          // 1: lit
+);
+    wire [7:0] data;
+    wire       led_n;
+
+    assign data      = dir ? phy_data : 8'hzz;
+    assign link_data = data;
+    assign led       = !led_n;
+
+`ifdef BOARD_CYNTHION
+    wire reset_n, phy_clk;
+
+    assign reset = !reset_n;
+
+    cynthion #(.LANES(28)) board (
+        .clk_60(clk), .ulpi_clk(phy_clk), .ulpi_reset_n(reset_n),
+`else
+    usb3300_board #(.LANES(28)) board (
+        .clk_60(clk), .ulpi_reset(reset),
+`endif
+        .ulpi_data(data), .ulpi_dir(dir), .ulpi_nxt(nxt), .ulpi_stp(stp), .sync(sync), .sck(sck), .select_n(select_n),
+        .mosi(mosi), .miso(miso), .led_n(led_n));
+
+    genvar i;
+    generate
+        for (i = 0; i < 8; i = i + 1) begin : line
+            assign link_drives[i] = !board.pads.line[i].pad.T;
+        end
+    endgenerate
+endmodule
+
+`default_nettype wire
