@@ -18,10 +18,12 @@ if [ "${1:-}" = --long ]; then
         echo "test: a minute of $(basename "$fuzzer")"
         "$fuzzer" -max_total_time=60 -verbosity=0 2>"build/$(basename "$fuzzer").log" || { tail -25 "build/$(basename "$fuzzer").log" >&2; exit 1; }
     done
-    for board in colorlight_i9 cynthion ecpix5; do
-        echo "test: place and route of $board with five seeds"
-        .venv/bin/python fpga/boards/build.py "$board" --seeds 5
+    .venv/bin/python fpga/boards/build.py --list | while read -r board; do
+        echo "test: place and route of $board"
+        .venv/bin/python fpga/boards/build.py "$board"
     done
+    echo "test: 40 faults of each board, and longer runs"
+    build/release/sim/bridge/boards/test_boards 40 "$(date +%j)" 300
     echo "test: larger models of the ring, and 100000 readers and writers killed"
     host/libwhisker/model/check.sh --long
     build/release/host/libwhisker/test/stress_ring 100000

@@ -49,11 +49,15 @@ def boards() -> list[str]:
 
 
 def load(name: str) -> Board:
-    """The board's file; ToolError if there is none."""
+    """The board's file, and what it lacks from the one that it is `like`; ToolError if there is none."""
     path = HERE / f"{name}.toml"
     if not path.exists():
         raise ToolError(f"no board '{name}'; boards: {', '.join(boards())}")
-    return Board(name=name, **tomllib.loads(path.read_text()))
+    said = tomllib.loads(path.read_text())
+    if "like" in said:
+        base = tomllib.loads((HERE / f"{said.pop('like')}.toml").read_text())
+        said = {**base, **said, "pins": {**base["pins"], **said["pins"]}}
+    return Board(name=name, **said)
 
 
 def sites(board: Board, lanes: int) -> dict[str, str]:
@@ -172,31 +176,37 @@ def pack(board: Board, out: Path) -> Path:
 
 
 def make(board: Board, lanes: int, out: Path, seeds: list[int], serial: str) -> Path:
-    """All steps, placed with each seed; ToolError if one misses the clock or the PHY's limits."""
+    """All steps, placed with one seed after another until one meets the clock and the PHY's limits; ToolError if none does."""
     netlist = prepare(board, lanes, out, serial)
-    problems = []
     for seed in seeds:
         placed = place(board, lanes, netlist, out, seed)
         print(summary(board, seed, placed), flush=True)
-        problems += [f"seed {seed}: {what}" for what in report.timing_problems(placed, board.speed, board.phy)]
-    if problems:
-        raise ToolError(f"{board.title}: " + "; ".join(problems))
-    return pack(board, out)
+        problems = report.timing_problems(placed, board.speed, board.phy)
+        if not problems:
+            return pack(board, out)
+        print(f"bitstream: seed {seed} misses: {'; '.join(problems)}", file=sys.stderr, flush=True)
+    raise ToolError(
+        f"{board.title} with {lanes} lanes: none of the seeds {seeds[0]} to {seeds[-1]} meets the limits; try others"
+    )
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description="Make a board's bitstream.", epilog="example: build.py colorlight_i9")
-    parser.add_argument("board", help=", ".join(boards()))
+    parser.add_argument("board", nargs="?", help=", ".join(boards()))
+    parser.add_argument("--list", action="store_true", help="the boards there are, and nothing else")
     parser.add_argument("--lanes", type=int, help="lanes with a pin (default: the board's)")
-    parser.add_argument("--seed", type=int, default=1, help="placement seed")
-    parser.add_argument("--seeds", type=int, default=1, help="place with so many seeds from there on; each must do")
+    parser.add_argument("--seed", type=int, default=1, help="first placement seed")
+    parser.add_argument("--tries", type=int, default=8, help="placements to try, until one meets the limits")
     parser.add_argument("--serial", default="0001", help="USB serial number")
     parser.add_argument("--out", type=Path, help="folder (default: build/boards/BOARD)")
     arguments = parser.parse_args()
+    if arguments.list:
+        print("\n".join(boards()))
+        return 0
     try:
-        board = load(arguments.board)
+        board = load(arguments.board or "")
         out = arguments.out or REPO / "build" / "boards" / board.name
-        seeds = [arguments.seed + n for n in range(arguments.seeds)]
+        seeds = [arguments.seed + n for n in range(arguments.tries)]
         print(make(board, arguments.lanes or board.lanes, out.resolve(), seeds, arguments.serial))
     except ToolError as error:
         print(f"bitstream: {error}", file=sys.stderr)

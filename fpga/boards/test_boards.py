@@ -75,7 +75,7 @@ def test_the_i9s_phy_is_wired_as_the_page_tells():
 def test_what_a_board_has_not_is_refused():
     with pytest.raises(ToolError, match="1 to 28 lanes, not 29"):
         build.sites(build.load("cynthion"), 29)
-    with pytest.raises(ToolError, match="boards: colorlight_i9, cynthion, ecpix5"):
+    with pytest.raises(ToolError, match="boards: colorlight_i5, colorlight_i9, cynthion, ecpix5"):
         build.load("toaster")
 
 
@@ -112,7 +112,8 @@ def test_the_bridge_synthesises_clean_with_one_clock(tmp_path):
 
 
 def test_a_second_clock_is_noticed(tmp_path):
-    cells = {f"ff{n}": {"type": "TRELLIS_FF", "connections": {"CLK": [n]}} for n in (2, 3)}
+    cells = {f"ff{n}": {"type": "TRELLIS_FF", "connections": {"CLK": [n]}} for n in (2, 3, 4)}
+    cells["own"] = {"type": "OSCG", "connections": {"OSC": [4]}}  # the FPGA's oscillator clocks the watchdog
     path = tmp_path / "netlist.json"
     path.write_text(json.dumps({"modules": {"top": {"ports": {"clk": {"bits": [2]}}, "cells": cells}}}))
     assert report.unconstrained_clocks(path, "top", "clk") == ["ff3 is clocked by another net than clk"]
@@ -120,13 +121,18 @@ def test_a_second_clock_is_noticed(tmp_path):
 
 def nextpnr_report(fmax: float, out: float, in_: float, through: float, shortest: float = 2.0) -> dict:
     """What nextpnr writes, as far as it is read. The shortest way in is hidden behind one from a flip-flop."""
-    ends = {("clk", report.ASYNC): out, (report.ASYNC, "clk"): in_, (report.ASYNC, report.ASYNC): through}
+    ends = {
+        ("posedge $glbnet$clk_60", report.ASYNC): out,
+        (report.ASYNC, "posedge $glbnet$clk_60"): in_,
+        (report.ASYNC, report.ASYNC): through,
+    }
+    ends |= {("posedge osc", report.ASYNC): 99.0, ("posedge osc", "posedge $glbnet$clk_60"): 99.0}
     paths = [{"from": a, "to": b, "path": [{"delay": ns - 1}, {"delay": 1}]} for (a, b), ns in ends.items()]
     used = {cell: {"used": 1} for cell in report.USED.values()}
     ends = [{"cell": "ff", "port": "D", "event": "clk", "delay": [ns, 9]} for ns in (0.5, shortest)]
     nets = [{"event": "clk", "endpoints": ends}, {"event": report.ASYNC, "endpoints": [{**ends[1], "delay": [3, 9]}]}]
     return {
-        "fmax": {"clk": {"achieved": fmax}},
+        "fmax": {"$glbnet$clk_60": {"achieved": fmax}, "osc": {"achieved": 1}},
         "critical_paths": paths,
         "utilization": used,
         "detailed_net_timings": nets,
@@ -154,6 +160,25 @@ def test_missed_limits_are_named(values, speed, phy, problems, tmp_path):
     path = tmp_path / "report.json"
     path.write_text(json.dumps(nextpnr_report(*values)))
     assert len(report.timing_problems(report.read(path), speed, phy)) == problems
+
+
+def test_the_build_tries_seeds_until_one_does(tmp_path, monkeypatch, capfd):
+    placed = {seed: nextpnr_report(70, 4 if seed == 3 else 5, 9, 4) for seed in (1, 2, 3, 4)}
+
+    def place(board, lanes, netlist, out, seed):
+        (out / "report.json").write_text(json.dumps(placed[seed]))
+        return report.read(out / "report.json")
+
+    monkeypatch.setattr(build, "prepare", lambda *_: None)
+    monkeypatch.setattr(build, "place", place)
+    monkeypatch.setattr(build, "pack", lambda board, out: out / "packed")
+    board = build.load("colorlight_i9")
+    assert build.make(board, 6, tmp_path, [1, 2, 3, 4], "0001") == tmp_path / "packed"
+    said = capfd.readouterr()
+    assert "seed 3: 70.0 MHz" in said.out and "seed 4" not in said.out
+    assert [line[:24] for line in said.err.splitlines()] == ["bitstream: seed 1 misses", "bitstream: seed 2 misses"]
+    with pytest.raises(ToolError, match="none of the seeds 1 to 2"):
+        build.make(board, 6, tmp_path, [1, 2], "0001")
 
 
 def test_data_behind_delay_lines_has_time_to_spare():

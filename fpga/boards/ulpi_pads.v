@@ -32,7 +32,7 @@ module ulpi_pads #(
     generate
         for (i = 0; i < 8; i = i + 1) begin : line
             (* keep *) TRELLIS_FF #(.GSR("DISABLED"), .CEMUX("1"), .REGSET("SET")) turn (
-                .CLK(clk), .LSR(1'b0), .CE(1'b1), .DI(dir), .M(1'b0), .Q(dir_before[i]));
+                .CLK(clk), .LSR(1'b0), .CE(1'b1), .DI(dir), .Q(dir_before[i]));
             (* keep *) LUT4 #(.INIT(16'hEEEE)) either (
                 .A(ulpi_dir), .B(dir_before[i]), .C(1'b0), .D(1'b0), .Z(let_go[i]));
             BB     pad (.B(ulpi_data[i]), .I(data_out[i]), .T(let_go[i]), .O(from_pad[i]));

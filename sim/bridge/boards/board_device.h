@@ -5,6 +5,7 @@
 
 #include <memory>
 
+#include "board.h"
 #include "board_fault.h"
 #include "node_bus.h"
 #include "ulpi_phy.h"
@@ -14,7 +15,6 @@ namespace bridge_sim
 
 // What of a board the bench must know beside its top.
 struct BoardTraits {
-    const char *name;
     PhyTraits phy;
     bool phy_gives_clock; // else it takes the FPGA's, from an oscillator
 };
@@ -40,7 +40,7 @@ class BoardTop
 std::unique_ptr<BoardTop> make_usb3300_board();
 std::unique_ptr<BoardTop> make_cynthion();
 
-class BoardDevice : public UtmiDevice
+class BoardDevice : public Board
 {
   public:
     // After configuration of the FPGA. The nodes must outlive the board.
@@ -53,9 +53,9 @@ class BoardDevice : public UtmiDevice
     // The PHY's clock stops until the PHY is reset.
     void hang();
 
-    bool led() const;
-    uint64_t resets() const;  // of the PHY: times its reset pin became active
-    bool bus_is_idle() const; // the nodes' lines are as they are between two ticks
+    bool led() const override;
+    uint64_t resets() const; // of the PHY: times its reset pin became active
+    bool bus_is_idle() const override;
 
   private:
     using Levels = std::array<bool, 16>; // by Wire

@@ -1,4 +1,4 @@
-// What the cells of an ECP5 do that the boards' tops use, without the time they take. An oscillator runs as the bench says.
+// What the cells of an ECP5 do that the boards' tops use, without the time they take. Oscillators and PLLs run as the bench says.
 
 `default_nettype none
 
@@ -43,7 +43,6 @@ module TRELLIS_FF #(
     input  wire LSR,
     input  wire CE,
     input  wire DI,
-    input  wire M,
     output reg  Q
 );
     initial Q = REGSET == "SET";
@@ -56,6 +55,37 @@ module OSCG #(
     output reg OSC /*verilator public_flat_rw*/  // driven by the bench
 );
     initial OSC = 1'b0;
+endmodule
+
+module EHXPLLL #(
+    parameter CLKI_DIV     = 1,
+    parameter CLKFB_DIV    = 1,
+    parameter CLKOP_DIV    = 8,
+    parameter CLKOS_DIV    = 8,
+    parameter CLKOP_CPHASE = 0,
+    parameter CLKOS_CPHASE = 0,
+    parameter CLKOP_ENABLE = "ENABLED",
+    parameter CLKOS_ENABLE = "DISABLED",
+    parameter FEEDBK_PATH  = "CLKOP"
+) (
+    input  wire CLKI,
+    input  wire CLKFB,
+    input  wire RST,
+    input  wire STDBY,
+    input  wire PHASESEL0,
+    input  wire PHASESEL1,
+    input  wire PHASEDIR,
+    input  wire PHASESTEP,
+    input  wire PHASELOADREG,
+    input  wire PLLWAKESYNC,
+    input  wire ENCLKOP,
+    input  wire ENCLKOS,
+    output reg  CLKOP /*verilator public_flat_rw*/,  // driven by the bench
+    output reg  CLKOS /*verilator public_flat_rw*/,  // .
+    output wire LOCK
+);
+    assign LOCK = 1'b1;
+    initial {CLKOP, CLKOS} = 2'b00;
 endmodule
 
 `default_nettype wire

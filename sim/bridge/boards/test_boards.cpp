@@ -1,5 +1,6 @@
 // Boards from their pins: a kernel's enumeration, a run, every lane's record in its place; a PHY whose clock hangs;
-// faults drawn at random, each of which must be noticed. `test_boards FAULTS SEED` draws more.
+// faults drawn at random, each of which must be noticed. `test_boards FAULTS SEED TICKS`: more faults, longer
+// runs, each in real time on its bus.
 #include "cmocka_cpp.h"
 
 #include <cstdlib>
@@ -8,6 +9,7 @@
 
 #include "board_device.h"
 #include "frame_check.h"
+#include "full_speed_board.h"
 #include "usb_control.h"
 
 using namespace bridge_sim;
@@ -15,26 +17,43 @@ using namespace bridge_sim;
 namespace
 {
 
-constexpr uint64_t TICKS = 4;
-constexpr uint64_t MS = 60000;                                       // cycles
-constexpr uint64_t PATIENCE = 2 * TICKS * WHISKER_LIMIT_TICK_PERIOD; // cycles of a run
+constexpr uint64_t MS = 60000;                               // cycles
+constexpr uint64_t PATIENCE = 8 * WHISKER_LIMIT_TICK_PERIOD; // cycles without a frame
 constexpr uint8_t BULK = WHISKER_LIMIT_USB_BULK_IN & 0xF;
-constexpr size_t PACKET = WHISKER_LIMIT_BULK_PACKET;
-
-struct Kind {
-    BoardTraits traits;
-    std::unique_ptr<BoardTop> (*make)();
-};
-// Register 0x39 of the USB3343: D+ and D- swapped, as Cynthion has them.
-const Kind BOARDS[] = {{{"usb3300_board", {}, true}, make_usb3300_board},
-                       {{"cynthion", {0, 0, false, 0x39, 0x06}, false}, make_cynthion}};
+constexpr size_t FULL_SPEED_PACKET = 64;
 unsigned faults = 3; // of each board
 uint64_t seed = 1;
+uint64_t ticks = 4; // of a run
+
+// Register 0x39 of the USB3343: D+ and D- swapped, as Cynthion has them.
+const BoardTraits USB3300 = {{}, true};
+const BoardTraits CYNTHION = {{0, 0, false, 0x39, 0x06}, false};
+
+struct Kind {
+    const char *name;
+    BusSpeed speed;
+    bool polarity; // its PHY needs a register written
+    std::function<std::unique_ptr<Board>(NodeBus &, const BoardFault &)> make;
+};
+const Kind BOARDS[] = {
+    {"usb3300_board", BusSpeed::HIGH, false,
+     [](NodeBus &nodes, const BoardFault &fault) {
+         return std::make_unique<BoardDevice>(make_usb3300_board(), USB3300, nodes, fault);
+     }},
+    {"cynthion", BusSpeed::HIGH, true,
+     [](NodeBus &nodes, const BoardFault &fault) {
+         return std::make_unique<BoardDevice>(make_cynthion(), CYNTHION, nodes, fault);
+     }},
+    {"ulx3s", BusSpeed::FULL, false,
+     [](NodeBus &nodes, const BoardFault &fault) {
+         return std::make_unique<FullSpeedBoard>(nodes, fault.kind == BoardFault::Kind::SWAPPED);
+     }},
+};
 
 class Trial
 {
   public:
-    Trial(const Kind &kind, const BoardFault &fault) : device_(kind.make(), kind.traits, nodes_, fault)
+    Trial(const Kind &kind, const BoardFault &fault) : speed_(kind.speed), board_(kind.make(nodes_, fault))
     {
         nodes_.power_on();
         for (size_t lane = 0; lane < LANES; lane++) {
@@ -42,9 +61,9 @@ class Trial
         }
         nodes_.set_fields(fields_.data());
     }
-    BoardDevice &device()
+    BoardDevice &with_phy()
     {
-        return device_;
+        return dynamic_cast<BoardDevice &>(*board_);
     }
     UsbHost &host()
     {
@@ -54,21 +73,25 @@ class Trial
     {
         Descriptors descriptors;
         const char *error = nullptr;
-        if (!enumerate(host_, descriptors, error)) {
+        const auto transfer = [this](const SetupRequest &request, Bytes &data) {
+            return control_transfer(host_, request, data);
+        };
+        require(host_.reset(speed_), "no device after a reset");
+        if (!configure(transfer, descriptors, error)) {
             throw std::runtime_error(error);
         }
     }
     // A run, begun and ended; throws std::runtime_error with what is wrong.
     void runs()
     {
-        require(device_.bus_is_idle(), "the nodes' lines are not idle before a run");
-        require(!device_.led(), "the LED is lit before a run");
+        require(board_->bus_is_idle(), "the nodes' lines are not idle before a run");
+        require(!board_->led(), "the LED is lit before a run");
         check_.expect_start(true);
         control(1);
-        while (check_.frames() < TICKS) {
+        while (check_.frames() < ticks) {
             read();
         }
-        require(device_.led(), "the LED is dark in a run");
+        require(board_->led(), "the LED is dark in a run");
         hears_orders();
         control(0);
         while (!check_.ended()) {
@@ -90,7 +113,7 @@ class Trial
         const auto value = static_cast<uint16_t>(0x0300 | report[0]);
         require(control_transfer(host_, {0x21, 9, value, WHISKER_LIMIT_USB_HID_INTERFACE, size}, report) == Outcome::OK,
                 "a report is not taken");
-        limit_ = device_.cycles + PATIENCE;
+        limit_ = board_->cycles + PATIENCE;
     }
     void control(uint8_t run)
     {
@@ -125,14 +148,16 @@ class Trial
     }
     void read()
     {
-        if (host_.in(BULK, PACKET, packet_) == Outcome::OK) {
+        const size_t packet = speed_ == BusSpeed::HIGH ? WHISKER_LIMIT_BULK_PACKET : FULL_SPEED_PACKET;
+        if (host_.in(BULK, packet, packet_) == Outcome::OK) {
             check_.take(packet_);
         }
-        host_.idle(PACKET);
-        require(device_.cycles < limit_, "frames do not come");
+        host_.idle(packet);
+        require(board_->cycles < limit_, "frames do not come");
     }
-    void judge(const CheckedFrame &frame) const
+    void judge(const CheckedFrame &frame)
     {
+        limit_ = board_->cycles + PATIENCE;
         for (size_t lane = 0; lane < LANES; lane++) {
             const CheckedRecord &record = frame.lane[lane];
             require(record.status == 0 && record.alpha == sim_counts(fields_[lane].alpha_deg) &&
@@ -143,8 +168,9 @@ class Trial
 
     NodeBus nodes_{LANES, 1};
     std::array<sim_field, LANES> fields_{};
-    BoardDevice device_;
-    UsbHost host_{device_};
+    BusSpeed speed_;
+    std::unique_ptr<Board> board_;
+    UsbHost host_{*board_};
     FrameCheck check_{[this](const CheckedFrame &frame) { judge(frame); }};
     Bytes packet_;
     uint64_t limit_ = 0;
@@ -176,26 +202,28 @@ void a_phy_whose_clock_hangs_is_reset(void **)
     const Kind &kind = BOARDS[0];
     Trial trial(kind, {});
     trial.enumerated();
-    assert_int_equal(trial.device().resets(), 0);
-    trial.device().hang();
-    for (uint64_t i = 0; i < 60 * MS && trial.device().resets() == 0; i++) {
-        trial.device().cycle();
+    assert_int_equal(trial.with_phy().resets(), 0);
+    trial.with_phy().hang();
+    for (uint64_t i = 0; i < 60 * MS && trial.with_phy().resets() == 0; i++) {
+        trial.with_phy().cycle();
     }
-    assert_int_equal(trial.device().resets(), 1);
+    assert_int_equal(trial.with_phy().resets(), 1);
     trial.host().idle(MS);
     trial.enumerated();
     trial.runs();
-    assert_int_equal(trial.device().resets(), 1);
+    assert_int_equal(trial.with_phy().resets(), 1);
 }
 
 void every_fault_is_noticed(void **)
 {
     std::mt19937_64 generator(seed);
     std::set<std::string> drawn;
-    for (const Kind &kind : BOARDS) {
+    const BoardFault swapped = {BoardFault::Kind::SWAPPED, Wire::DATA, Wire::DATA, 0, 1}; // D+ and D-
+    assert_string_not_equal(tried(BOARDS[2], swapped).c_str(), "");
+    for (const Kind &kind : {BOARDS[0], BOARDS[1]}) {
         for (unsigned n = 0; n < faults;) {
-            const BoardFault fault = BoardFault::draw(generator, LANES, kind.traits.phy.swap_register != 0);
-            const std::string name = std::string(kind.traits.name) + ": " + fault.name();
+            const BoardFault fault = BoardFault::draw(generator, LANES, kind.polarity);
+            const std::string name = std::string(kind.name) + ": " + fault.name();
             if (!drawn.insert(name).second) {
                 continue;
             }
@@ -211,9 +239,10 @@ void every_fault_is_noticed(void **)
 
 int main(int argc, char **argv)
 {
-    if (argc == 3) {
+    if (argc == 4) {
         faults = static_cast<unsigned>(std::strtoul(argv[1], nullptr, 10));
         seed = std::strtoull(argv[2], nullptr, 10);
+        ticks = std::strtoull(argv[3], nullptr, 10);
     }
     const CMUnitTest tests[] = {
         cmocka_unit_test(every_board_enumerates_and_runs),

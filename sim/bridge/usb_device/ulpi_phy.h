@@ -83,7 +83,7 @@ class UlpiPhy
     uint8_t value_ = 0;     // of a register write
     uint8_t function_control_ = 0;
     uint8_t swap_control_ = 0; // the traits' register
-    unsigned quiet_ = 0; // cycles since the end of the last packet
+    unsigned quiet_ = 0;       // cycles since the end of the last packet
     uint64_t aborted_ = 0;
 };
 
