@@ -10,6 +10,7 @@ void dspic_parameters_default(struct dspic_parameters *parameters)
                                             .exit_cycles = 3,
                                             .work_cycles = 60,
                                             .pll_lock_us = 1000,
+                                            .keeps_clock = true,
                                             .watchdog_ms = 128,
                                             .pins_lock_once = true,
                                             .device_id = 0x0629,

@@ -32,6 +32,8 @@ struct dspic_parameters {
     uint16_t work_cycles;   /* of an interrupt besides its register accesses */
     uint16_t pll_lock_us;   /* from the switch to LOCK */
     uint8_t pll_failures;   /* so many switches, counted from the chip's making, never end: the PLL does not lock */
+    bool keeps_clock;       /* a reset other than power-on leaves COSC, NOSC and LOCK as they are (A for sibling
+                             * families, C for this one); PLLFBD and CLKDIV go back to their reset values either way */
     uint16_t watchdog_ms;   /* FWDT's period at the nominal LPRC */
     uint8_t dma_cycles;     /* from a peripheral's request to its transfer; not documented */
     bool pins_lock_once;    /* FOSC's IOL1WAY: a pin map that was locked stays locked until reset */
@@ -56,6 +58,7 @@ struct dspic_wiring {
 /* What the firmware did that the data sheet forbids. Tests demand zero. */
 struct dspic_violations {
     uint32_t overclocked;   /* FCY, VCO or PLL input outside their limits */
+    uint32_t pll_running;   /* PLLFBD or CLKDIV written while the PLL ran the chip */
     uint32_t spi_settings;  /* SPIxCON written while the module was enabled (ignored) */
     uint32_t spi_disabled;  /* SPIxBUF written while it was disabled (ignored) */
     uint32_t spi_overwrite; /* SPIxBUF written while SPITBF was set (the older word is lost) */

@@ -152,6 +152,7 @@ unsigned pin_input_field(const struct dspic *chip, unsigned address, unsigned sh
 /* system.c */
 void system_reset(struct dspic *chip, uint16_t cause);
 void system_clock(struct dspic *chip);
+bool system_runs_on_pll(const struct dspic *chip);
 void system_pll_event(struct dspic *chip);
 void system_wake(struct dspic *chip); /* from idle, if it is */
 void watchdog_restart(struct dspic *chip);

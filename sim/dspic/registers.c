@@ -60,6 +60,8 @@ static void wrote(struct dspic *chip, unsigned address, uint16_t old)
         watchdog_restart(chip);
     else if (address == SR || within(address, INTCON1, IPC0 + 2u * (IRQ_COUNT / 4u)))
         chip->look = true;
+    else if ((address == PLLFBD || address == CLKDIV) && *sfr(chip, address) != old)
+        chip->violations.pll_running += system_runs_on_pll(chip);
     else if (address == OSCCON) { /* only byte by byte, behind the unlock sequences */
         chip->violations.unlock++;
         *sfr(chip, OSCCON) = old;

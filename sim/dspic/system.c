@@ -21,10 +21,15 @@ static double pll_hz(struct dspic *chip)
     return vco / POST[clkdiv >> CLKDIV_PLLPOST_SHIFT & 3u];
 }
 
+bool system_runs_on_pll(const struct dspic *chip)
+{
+    return ((unsigned)chip->sfr[OSCCON / 2u] >> OSCCON_COSC_SHIFT & 7u) == OSC_FRC_PLL;
+}
+
 void system_clock(struct dspic *chip)
 {
     const uint64_t old = chip->cycle_fs;
-    const bool pll = (*sfr(chip, OSCCON) >> OSCCON_COSC_SHIFT & 7u) == OSC_FRC_PLL;
+    const bool pll = system_runs_on_pll(chip);
     const double fcy = (pll ? pll_hz(chip) : frc_hz(chip)) / 2.0;
     chip->violations.overclocked += fcy > FCY_MAX_HZ;
     chip->cycle_fs = (uint64_t)(FS_PER_S / fcy + 0.5);
@@ -41,7 +46,8 @@ void system_pll_event(struct dspic *chip)
 {
     uint16_t *osccon = sfr(chip, OSCCON);
     const unsigned wanted = *osccon >> OSCCON_NOSC_SHIFT & 7u;
-    *osccon = (uint16_t)((*osccon & ~(7u << OSCCON_COSC_SHIFT | OSCCON_OSWEN)) | wanted << OSCCON_COSC_SHIFT);
+    *osccon = (uint16_t)((*osccon & ~(7u << OSCCON_COSC_SHIFT | OSCCON_OSWEN | OSCCON_LOCK)) |
+                         wanted << OSCCON_COSC_SHIFT);
     if (wanted == OSC_FRC_PLL)
         *osccon |= OSCCON_LOCK;
     system_clock(chip);
@@ -89,7 +95,10 @@ void watchdog_event(struct dspic *chip)
 /* Values after any reset; RCON keeps what it knew and adds the cause. */
 void system_reset(struct dspic *chip, uint16_t cause)
 {
+    const bool cold = cause & (RCON_POR | RCON_BOR);
     const uint16_t rcon = cause & RCON_POR ? 0 : *sfr(chip, RCON) & (uint16_t)~RCON_SWDTEN;
+    const uint16_t clock = 7u << OSCCON_COSC_SHIFT | 7u << OSCCON_NOSC_SHIFT | OSCCON_LOCK;
+    const uint16_t osccon = chip->parameters.keeps_clock && !cold ? *sfr(chip, OSCCON) & clock : 0;
     memset(chip->sfr, 0, sizeof chip->sfr);
     memset(chip->spi, 0, sizeof chip->spi);
     memset(chip->dma, 0, sizeof chip->dma);
@@ -103,6 +112,7 @@ void system_reset(struct dspic *chip, uint16_t cause)
     chip->high_key = chip->low_key = chip->flash_key = 0;
     chip->pins_were_locked = false;
     *sfr(chip, RCON) = rcon | cause;
+    *sfr(chip, OSCCON) = osccon;
     *sfr(chip, TRISB) = 0xFFFFu;
     *sfr(chip, PR1) = *sfr(chip, PR2) = *sfr(chip, PR3) = 0xFFFFu;
     *sfr(chip, CLKDIV) = 0x0040u; /* N1 2, N2 4, M 50 */

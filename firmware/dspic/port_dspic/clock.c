@@ -15,24 +15,42 @@
 #error "a fast oscillator would exceed 40 MIPS"
 #endif
 
-/* The loader may have done it for the application: the PLL must not be changed while it runs the chip. */
+#define PLL_FEEDBACK (PLL_M - 2u)
+#define PLL_DIVISORS (PLL_N1 - 2u) /* PLLPOST 0: N2 = 2 */
+
+static uint16_t source(struct board *board)
+{
+    return sfr_read(board, OSCCON) >> OSCCON_COSC_SHIFT & 7u;
+}
+
+/* The loader has done it for the application. COSC and LOCK alone do not say so: a reset other than power-on may leave
+ * them while the divisors go back to their reset values, which make 23 MHz. */
 static bool is_done(struct board *board)
 {
-    const uint16_t wanted = OSC_FRC_PLL << OSCCON_COSC_SHIFT | OSCCON_LOCK;
-    return (sfr_read(board, OSCCON) & (7u << OSCCON_COSC_SHIFT | OSCCON_LOCK)) == wanted;
+    return source(board) == OSC_FRC_PLL && sfr_read(board, OSCCON) & OSCCON_LOCK &&
+           sfr_read(board, PLLFBD) == PLL_FEEDBACK && sfr_read(board, CLKDIV) == PLL_DIVISORS;
+}
+
+static void switch_to(struct board *board, uint8_t oscillator)
+{
+    cpu_write_osccon_high(board, oscillator);
+    cpu_write_osccon_low(board, OSCCON_OSWEN);
+    while (sfr_read(board, OSCCON) & OSCCON_OSWEN || source(board) != oscillator) {
+        /* about a millisecond, once */
+    }
 }
 
 void clock_start(struct board *board)
 {
+    sfr_set(board, RCON, RCON_SWDTEN); /* a PLL that never locks would hang the node for ever: it tries again */
     if (is_done(board))
         return;
-    sfr_set(board, RCON, RCON_SWDTEN); /* a PLL that never locks would hang the node for ever: it tries again */
-    sfr_write(board, PLLFBD, PLL_M - 2u);
-    sfr_write(board, CLKDIV, PLL_N1 - 2u); /* PLLPOST 0: N2 = 2 */
-    cpu_write_osccon_high(board, OSC_FRC_PLL);
-    cpu_write_osccon_low(board, OSCCON_OSWEN);
-    while ((sfr_read(board, OSCCON) >> OSCCON_COSC_SHIFT & 7u) != OSC_FRC_PLL ||
-           !(sfr_read(board, OSCCON) & OSCCON_LOCK)) {
-        /* about a millisecond, once */
+    if (source(board) != OSC_FRC)
+        switch_to(board, OSC_FRC); /* the divisors must not change while the PLL runs the chip */
+    sfr_write(board, PLLFBD, PLL_FEEDBACK);
+    sfr_write(board, CLKDIV, PLL_DIVISORS);
+    switch_to(board, OSC_FRC_PLL);
+    while (!(sfr_read(board, OSCCON) & OSCCON_LOCK)) {
+        /* the switch waits for it */
     }
 }

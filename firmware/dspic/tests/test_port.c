@@ -147,11 +147,54 @@ static void a_pll_that_does_not_lock_is_tried_again(void **state)
     sim_node_free(node);
 }
 
+struct warm {
+    sim_node *node;
+    bool watched; /* the watchdog runs while the loader still checks the application */
+};
+
+static void look(void *context)
+{
+    struct warm *warm = context;
+    warm->watched = dspic_sfr_read(warm->node->chip, RCON) & RCON_SWDTEN;
+}
+
+static void be_warm(bool keeps_clock, uint16_t cause)
+{
+    struct sim_node_parameters parameters;
+    sim_node_parameters_default(&parameters, 1);
+    parameters.chip.keeps_clock = keeps_clock;
+    struct warm warm = {.node = sim_node_new_as(&parameters)};
+    assert_non_null(warm.node);
+    sim_node_power_on(warm.node);
+    const uint32_t fcy_hz = dspic_fcy_hz(warm.node->chip);
+    sim_node_outside(warm.node, look, &warm);
+    sim_node_plan(warm.node, sim_node_fs(warm.node) + 200u * US);
+    sim_node_disturb(warm.node, SIM_NODE_RESET, cause);
+    sim_node_until(warm.node, sim_node_fs(warm.node) + 30000u * US);
+    assert_true(node_ready(&warm.node->board.node));
+    assert_int_equal(dspic_fcy_hz(warm.node->chip), fcy_hz);
+    assert_true(warm.watched);
+    assert_int_equal(sim_node_violations(warm.node), 0);
+    sim_node_free(warm.node);
+}
+
+/* Whether the chip goes on with its PLL, whose divisors are then those of reset, or begins with the plain oscillator. */
+static void every_reset_ends_at_the_same_clock(void **state)
+{
+    (void)state;
+    static const uint16_t CAUSES[] = {RCON_EXTR, RCON_SWR, RCON_WDTO, RCON_TRAPR, RCON_IOPUWR, RCON_BOR};
+    for (unsigned i = 0; i < sizeof CAUSES / sizeof *CAUSES; i++) {
+        be_warm(true, CAUSES[i]);
+        be_warm(false, CAUSES[i]);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_slave_that_overflowed_in_a_page_erase_recovers),
         cmocka_unit_test(a_pll_that_does_not_lock_is_tried_again),
+        cmocka_unit_test(every_reset_ends_at_the_same_clock),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

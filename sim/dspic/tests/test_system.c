@@ -239,6 +239,36 @@ static void a_reset_restores_the_registers_and_adds_its_cause(void **state)
     assert_int_equal(dspic_output(bench.chip, SCK_PIN), DSPIC_FLOAT);
 }
 
+static void a_reset_leaves_the_oscillator_as_the_parameter_says_and_never_its_divisors(void **state)
+{
+    (void)state;
+    struct dspic_parameters parameters = standard();
+    for (unsigned keeps = 0; keeps < 2u; keeps++) {
+        parameters.keeps_clock = keeps;
+        power(&parameters);
+        pll();
+        pass(3u * MS);
+        dspic_disturb_reset(bench.chip, RCON_EXTR);
+        assert_int_equal(get(OSCCON) >> OSCCON_COSC_SHIFT & 7u, keeps ? OSC_FRC_PLL : OSC_FRC);
+        assert_int_equal(get(PLLFBD), 48);
+        assert_int_equal(get(CLKDIV), 0x0040);
+        assert_int_equal(dspic_fcy_hz(bench.chip), keeps ? 23031250 : FRC_HZ / 2u); /* 7.37 MHz / 2 * 50 / 4 / 2 */
+        dspic_disturb_reset(bench.chip, RCON_BOR);
+        assert_int_equal(get(OSCCON) >> OSCCON_COSC_SHIFT & 7u, OSC_FRC);
+    }
+}
+
+static void divisors_changed_while_the_pll_runs_the_chip_are_noticed(void **state)
+{
+    (void)state;
+    pll();
+    pass(3u * MS);
+    assert_int_equal(dspic_violations(bench.chip).pll_running, 0);
+    put(PLLFBD, 41);
+    put(CLKDIV, 1);
+    assert_int_equal(dspic_violations(bench.chip).pll_running, 2);
+}
+
 static void without_power_nothing_runs_and_nothing_is_driven(void **state)
 {
     (void)state;
@@ -270,6 +300,8 @@ int main(void)
         TEST(the_watchdog_resets_an_idle_cpu_that_stands_still),
         TEST(the_watchdog_resets_a_cpu_that_idles_in_an_interrupt),
         TEST(a_reset_restores_the_registers_and_adds_its_cause),
+        TEST(a_reset_leaves_the_oscillator_as_the_parameter_says_and_never_its_divisors),
+        TEST(divisors_changed_while_the_pll_runs_the_chip_are_noticed),
         TEST(without_power_nothing_runs_and_nothing_is_driven),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
