@@ -58,17 +58,23 @@ def _note(entry: dict) -> str:
     return ", ".join(filter(None, [entry.get("unit", ""), entry.get("doc", "")]))
 
 
+def _crc8_after(nibble: int) -> int:
+    """The CRC-8 register after four bits that were these, in the place of its highest."""
+    crc = nibble << 4
+    for _ in range(4):
+        crc = crc << 1 ^ (CRC["polynomial"] if crc & 0x80 else 0)
+    return crc & 0xFF
+
+
 C_FUNCTIONS = """
-/* CRC-8 of n bytes, bit by bit: the firmware has eight bytes per 500 us to check, a table would cost 256 bytes. */
+/* CRC-8 of n bytes, four bits at a time: 16 bytes of table, and a quarter of the cycles of bit by bit. */
 static inline uint8_t whisker_crc8(const uint8_t *bytes, uint16_t n)
 {
+    static const uint8_t after[16] = {@NIBBLES@};
     uint8_t crc = WHISKER_CRC8_INIT;
     for (uint16_t i = 0; i < n; i++) {
-        crc = (uint8_t)(crc ^ bytes[i]);
-        for (uint8_t bit = 0; bit < 8; bit++) {
-            const uint8_t shifted = (uint8_t)(crc << 1);
-            crc = (crc & 0x80u) ? (uint8_t)(shifted ^ WHISKER_CRC8_POLYNOMIAL) : shifted;
-        }
+        crc = (uint8_t)(crc << 4 ^ after[crc >> 4 ^ bytes[i] >> 4]);
+        crc = (uint8_t)(crc << 4 ^ after[crc >> 4 ^ (bytes[i] & 0x0Fu)]);
     }
     return (uint8_t)(crc ^ WHISKER_CRC8_XOR_OUT);
 }
@@ -142,7 +148,8 @@ def c_header() -> str:
             for n, e in p.SENSOR_ERRORS.items()
         )
     )
-    return "\n".join(lines) + "\n" + C_FUNCTIONS + "\n#endif\n"
+    nibbles = ", ".join(f"0x{_crc8_after(n):02X}" for n in range(16))
+    return "\n".join(lines) + "\n" + C_FUNCTIONS.replace("@NIBBLES@", nibbles) + "\n#endif\n"
 
 
 def verilog_header() -> str:

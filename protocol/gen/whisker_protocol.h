@@ -270,16 +270,14 @@
     X(DEADZONE_ALPHA, 8, 11, "alpha lies in its dead zone", "centre the whisker; reprogram the sensor's zero") \
     X(DEADZONE_BETA, 9, 15, "beta lies in its dead zone", "centre the whisker; reprogram the sensor's zero")
 
-/* CRC-8 of n bytes, bit by bit: the firmware has eight bytes per 500 us to check, a table would cost 256 bytes. */
+/* CRC-8 of n bytes, four bits at a time: 16 bytes of table, and a quarter of the cycles of bit by bit. */
 static inline uint8_t whisker_crc8(const uint8_t *bytes, uint16_t n)
 {
+    static const uint8_t after[16] = {0x00, 0x2F, 0x5E, 0x71, 0xBC, 0x93, 0xE2, 0xCD, 0x57, 0x78, 0x09, 0x26, 0xEB, 0xC4, 0xB5, 0x9A};
     uint8_t crc = WHISKER_CRC8_INIT;
     for (uint16_t i = 0; i < n; i++) {
-        crc = (uint8_t)(crc ^ bytes[i]);
-        for (uint8_t bit = 0; bit < 8; bit++) {
-            const uint8_t shifted = (uint8_t)(crc << 1);
-            crc = (crc & 0x80u) ? (uint8_t)(shifted ^ WHISKER_CRC8_POLYNOMIAL) : shifted;
-        }
+        crc = (uint8_t)(crc << 4 ^ after[crc >> 4 ^ bytes[i] >> 4]);
+        crc = (uint8_t)(crc << 4 ^ after[crc >> 4 ^ (bytes[i] & 0x0Fu)]);
     }
     return (uint8_t)(crc ^ WHISKER_CRC8_XOR_OUT);
 }

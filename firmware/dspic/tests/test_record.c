@@ -133,6 +133,25 @@ static void up_to_three_flipped_bits_never_pass_and_change_nothing(void **state)
     }
 }
 
+static uint8_t crc8_bit_by_bit(const uint8_t *bytes, unsigned n)
+{
+    unsigned crc = WHISKER_CRC8_INIT;
+    for (unsigned bit = 0; bit < 8u * n; bit++) {
+        const unsigned top = crc >> 7 ^ (bytes[bit / 8u] >> (7u - bit % 8u) & 1u);
+        crc = (crc << 1 & 0xFFu) ^ (top ? WHISKER_CRC8_POLYNOMIAL : 0u);
+    }
+    return (uint8_t)(crc ^ WHISKER_CRC8_XOR_OUT);
+}
+
+static void the_crc_by_nibbles_is_the_crc_bit_by_bit(void **state)
+{
+    (void)state;
+    for (unsigned n = 0; n < 65536u; n++) {
+        const uint8_t bytes[3] = {(uint8_t)(n >> 8), (uint8_t)n, (uint8_t)(n * 7u)};
+        assert_int_equal(whisker_crc8(bytes, 3), crc8_bit_by_bit(bytes, 3));
+    }
+}
+
 static void a_dead_mosi_is_no_order(void **state)
 {
     (void)state;
@@ -150,6 +169,7 @@ int main(void)
         cmocka_unit_test(the_first_byte_is_the_high_half_of_the_first_word),
         cmocka_unit_test(every_tick_is_read_from_its_order),
         cmocka_unit_test(up_to_three_flipped_bits_never_pass_and_change_nothing),
+        cmocka_unit_test(the_crc_by_nibbles_is_the_crc_bit_by_bit),
         cmocka_unit_test(a_dead_mosi_is_no_order),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
