@@ -91,11 +91,11 @@ MUTATIONS = [
         "",
     ),
     Mutation(
-        "firmware: a record's first word is not preloaded",
+        "firmware: a first word that the slave does not hold is not written again",
         "test_sim_node",
         "firmware/dspic/port_dspic/link_spi.c",
-        "    sfr_write(board, SPI2BUF, words[0]);\n",
-        "",
+        "SPI2STAT);\n    sfr_write(board, SPI2BUF, word);\n",
+        "SPI2STAT);\n",
     ),
     Mutation(
         "firmware: no resynchronisation after a bad frame",

@@ -24,22 +24,24 @@ enum dspic_trap { DSPIC_TRAP_OSCILLATOR, DSPIC_TRAP_STACK, DSPIC_TRAP_ADDRESS, D
 
 /* What is not known for sure, or differs from part to part. */
 struct dspic_parameters {
-    int32_t frc_ppm;        /* error of the internal oscillator; the data sheet allows +-20 000 to 85 degrees C */
-    uint8_t slave_prefetch; /* 1: a slave's word waits in the buffer for the first clock; 2: it moves into the shift
-                             * register at once and leaves room for another. The data sheet does not say. */
-    uint8_t entry_cycles;   /* interrupt latency: 5 (A) */
-    uint8_t exit_cycles;    /* 3 (A) */
-    uint16_t work_cycles;   /* of an interrupt besides its register accesses */
-    uint16_t pll_lock_us;   /* from the switch to LOCK */
-    uint8_t pll_failures;   /* so many switches, counted from the chip's making, never end: the PLL does not lock */
-    bool keeps_clock;       /* a reset other than power-on leaves COSC, NOSC and LOCK as they are (A for sibling
-                             * families, C for this one); PLLFBD and CLKDIV go back to their reset values either way */
-    uint16_t watchdog_ms;   /* FWDT's period at the nominal LPRC */
-    uint8_t dma_cycles;     /* from a peripheral's request to its transfer; not documented */
-    bool pins_lock_once;    /* FOSC's IOL1WAY: a pin map that was locked stays locked until reset */
-    uint16_t device_id;     /* DEVID, what the flash's owner reads at 0xFF0000 */
-    uint32_t serial;        /* FUID0 to FUID3, lowest first; all ones as it leaves the factory */
-    uint64_t seed;          /* of what a power cut leaves in the flash */
+    int32_t frc_ppm;         /* error of the internal oscillator; the data sheet allows +-20 000 to 85 degrees C */
+    uint8_t slave_prefetch;  /* 1: a slave's word waits in the buffer for the first clock; 2: it moves into the shift
+                              * register at once and leaves room for another. The data sheet does not say. */
+    uint8_t spi_deaf_cycles; /* a write to SPIxBUF so soon after SPIEN is set is ignored, as errata of the family say of
+                                one right after SPITBF is cleared (C) */
+    uint8_t entry_cycles;    /* interrupt latency: 5 (A) */
+    uint8_t exit_cycles;     /* 3 (A) */
+    uint16_t work_cycles;    /* of an interrupt besides its register accesses */
+    uint16_t pll_lock_us;    /* from the switch to LOCK */
+    uint8_t pll_failures;    /* so many switches, counted from the chip's making, never end: the PLL does not lock */
+    bool keeps_clock;        /* a reset other than power-on leaves COSC, NOSC and LOCK as they are (A for sibling
+                              * families, C for this one); PLLFBD and CLKDIV go back to their reset values either way */
+    uint16_t watchdog_ms;    /* FWDT's period at the nominal LPRC */
+    uint8_t dma_cycles;      /* from a peripheral's request to its transfer; not documented */
+    bool pins_lock_once;     /* FOSC's IOL1WAY: a pin map that was locked stays locked until reset */
+    uint16_t device_id;      /* DEVID, what the flash's owner reads at 0xFF0000 */
+    uint32_t serial;         /* FUID0 to FUID3, lowest first; all ones as it leaves the factory */
+    uint64_t seed;           /* of what a power cut leaves in the flash */
 };
 
 void dspic_parameters_default(struct dspic_parameters *parameters);

@@ -29,6 +29,7 @@ struct spi {
     uint16_t word;              /* being sent, whole */
     uint16_t out, in;           /* shift registers */
     uint64_t half_fs;           /* master: half a bit */
+    uint64_t enabled_fs;        /* when SPIEN was set */
     uint8_t bit;                /* bits done of this word */
     bool loaded;                /* `word` waits for its first clock */
     bool shifting;              /* master: a word is under way */

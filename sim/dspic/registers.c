@@ -101,6 +101,8 @@ static void osccon_high(struct dspic *chip, uint8_t value)
     *osccon = (uint16_t)((*osccon & ~(7u << OSCCON_NOSC_SHIFT)) | (value & 7u) << OSCCON_NOSC_SHIFT);
 }
 
+enum { SWITCH_CYCLES = 10 }; /* (C) */
+
 static void osccon_low(struct dspic *chip, uint8_t value)
 {
     uint16_t *osccon = sfr(chip, OSCCON);
@@ -111,7 +113,9 @@ static void osccon_low(struct dspic *chip, uint8_t value)
         *osccon |= OSCCON_IOLOCK;
     if (!(*osccon & OSCCON_OSWEN))
         return;
-    if (chip->pll_failed < chip->parameters.pll_failures)
+    if ((*osccon >> OSCCON_NOSC_SHIFT & 7u) != OSC_FRC_PLL) /* the plain oscillator runs already */
+        plan_event(chip, EVENT_PLL, chip->now_fs + SWITCH_CYCLES * chip->cycle_fs);
+    else if (chip->pll_failed < chip->parameters.pll_failures)
         chip->pll_failed++;
     else
         plan_event(chip, EVENT_PLL, chip->now_fs + chip->parameters.pll_lock_us * (DSPIC_FS_PER_NS * 1000u));

@@ -175,6 +175,8 @@ static void write_buffer(struct dspic *chip, unsigned n, uint16_t value)
         chip->violations.spi_disabled++;
         return;
     }
+    if (chip->now_fs - s->enabled_fs < chip->parameters.spi_deaf_cycles * chip->cycle_fs)
+        return;
     if (*reg(chip, n, STAT) & SPISTAT_SPITBF)
         chip->violations.spi_overwrite++;
     s->transmit = value;
@@ -199,6 +201,8 @@ static void write_status(struct dspic *chip, unsigned n, uint16_t old)
         chip->spi[n] = (struct spi){.word = chip->spi[n].word, .receive = chip->spi[n].receive};
         plan_event(chip, EVENT_SPI1 + n, NEVER);
     }
+    if (enable && !(old & SPISTAT_SPIEN))
+        chip->spi[n].enabled_fs = chip->now_fs;
     pins_of_spi(chip, n);
 }
 

@@ -46,8 +46,8 @@ void system_pll_event(struct dspic *chip)
 {
     uint16_t *osccon = sfr(chip, OSCCON);
     const unsigned wanted = *osccon >> OSCCON_NOSC_SHIFT & 7u;
-    *osccon = (uint16_t)((*osccon & ~(7u << OSCCON_COSC_SHIFT | OSCCON_OSWEN | OSCCON_LOCK)) |
-                         wanted << OSCCON_COSC_SHIFT);
+    *osccon =
+        (uint16_t)((*osccon & ~(7u << OSCCON_COSC_SHIFT | OSCCON_OSWEN | OSCCON_LOCK)) | wanted << OSCCON_COSC_SHIFT);
     if (wanted == OSC_FRC_PLL)
         *osccon |= OSCCON_LOCK;
     system_clock(chip);

@@ -34,6 +34,23 @@ void link_start(struct board *board)
     set_channel(board, IN_CHANNEL, IN_OFFSET, LINK_WORDS);
 }
 
+#define SETTLE_READS 8u
+
+/* Some of the family ignore a write that follows too soon. SPITBF does not tell that from a slave that has taken the
+ * word into its shift register: the module begins anew, so that the word cannot be there twice, and has more time. */
+static void preload(struct board *board, uint16_t word)
+{
+    sfr_write(board, SPI2STAT, SPISTAT_SPIEN);
+    sfr_write(board, SPI2BUF, word);
+    if (sfr_read(board, SPI2STAT) & SPISTAT_SPITBF)
+        return;
+    sfr_write(board, SPI2STAT, 0);
+    sfr_write(board, SPI2STAT, SPISTAT_SPIEN);
+    for (uint8_t i = 0; i < SETTLE_READS; i++)
+        (void)sfr_read(board, SPI2STAT);
+    sfr_write(board, SPI2BUF, word);
+}
+
 /* Module and DMA begin anew: whatever was clocked too much or too little is over. */
 static void arm(struct board *board, const uint16_t *words, uint16_t to_receive)
 {
@@ -47,8 +64,7 @@ static void arm(struct board *board, const uint16_t *words, uint16_t to_receive)
     sfr_write(board, DMA_REG(DMA0CNT, IN_CHANNEL), (uint16_t)(to_receive - 1u));
     sfr_write(board, DMA_REG(DMA0CON, IN_CHANNEL), IN_CON | DMACON_CHEN);
     sfr_write(board, DMA_REG(DMA0CON, OUT_CHANNEL), OUT_CON | DMACON_CHEN);
-    sfr_write(board, SPI2STAT, SPISTAT_SPIEN);
-    sfr_write(board, SPI2BUF, words[0]);
+    preload(board, words[0]);
     board->link_words = to_receive;
 }
 

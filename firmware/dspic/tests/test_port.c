@@ -83,9 +83,10 @@ static void pass(struct bus *bus, unsigned ticks)
 }
 
 /* A node without an application, its loader's bus running; `header`: of the application it has lost. */
-static void begin_without_application(struct bus *bus, uint8_t header[WHISKER_IMAGE_HEADER_BYTES])
+static void begin_without_application(struct bus *bus, const struct sim_node_parameters *parameters,
+                                      uint8_t header[WHISKER_IMAGE_HEADER_BYTES])
 {
-    *bus = (struct bus){.node = sim_node_new(1)};
+    *bus = (struct bus){.node = sim_node_new_as(parameters)};
     assert_non_null(bus->node);
     const uint32_t *word = dspic_flash(bus->node->chip) + WHISKER_LIMIT_APPLICATION_ROW * FLASH_ROW_WORDS;
     for (unsigned i = 0; i < WHISKER_IMAGE_HEADER_BYTES; i++)
@@ -115,7 +116,9 @@ static void a_slave_that_overflowed_in_a_page_erase_recovers(void **state)
     (void)state;
     struct bus bus;
     uint8_t header[WHISKER_IMAGE_HEADER_BYTES];
-    begin_without_application(&bus, header);
+    struct sim_node_parameters parameters;
+    sim_node_parameters_default(&parameters, 1);
+    begin_without_application(&bus, &parameters, header);
     const struct node *node = &bus.node->board.node;
     assert_true(bus.good >= 5u);
     assert_int_equal(node->health[WHISKER_HEALTH_LINK_OVERFLOW], 0);
@@ -128,6 +131,26 @@ static void a_slave_that_overflowed_in_a_page_erase_recovers(void **state)
     assert_true(bus.good >= 10u);
     assert_int_equal(sim_node_violations(bus.node), 0);
     sim_node_free(bus.node);
+}
+
+/* Whether a preloaded word then waits in the buffer or is taken out of it at once, which reads alike as "not taken". */
+static void a_first_word_that_the_slave_ignores_is_written_again(void **state)
+{
+    (void)state;
+    for (uint8_t prefetch = 1; prefetch <= 2u; prefetch++) {
+        struct bus bus;
+        uint8_t header[WHISKER_IMAGE_HEADER_BYTES];
+        struct sim_node_parameters parameters;
+        sim_node_parameters_default(&parameters, 1);
+        parameters.chip.slave_prefetch = prefetch;
+        parameters.chip.spi_deaf_cycles = 4;
+        begin_without_application(&bus, &parameters, header);
+        bus.worst = 0;
+        pass(&bus, 20);
+        assert_int_equal(bus.worst, 0);
+        assert_int_equal(sim_node_violations(bus.node), 0);
+        sim_node_free(bus.node);
+    }
 }
 
 static void a_pll_that_does_not_lock_is_tried_again(void **state)
@@ -178,7 +201,8 @@ static void be_warm(bool keeps_clock, uint16_t cause)
     sim_node_free(warm.node);
 }
 
-/* Whether the chip goes on with its PLL, whose divisors are then those of reset, or begins with the plain oscillator. */
+/* Whether the chip goes on with its PLL, whose divisors are then those of reset, or begins with the plain oscillator.
+ */
 static void every_reset_ends_at_the_same_clock(void **state)
 {
     (void)state;
@@ -193,6 +217,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_slave_that_overflowed_in_a_page_erase_recovers),
+        cmocka_unit_test(a_first_word_that_the_slave_ignores_is_written_again),
         cmocka_unit_test(a_pll_that_does_not_lock_is_tried_again),
         cmocka_unit_test(every_reset_ends_at_the_same_clock),
     };
