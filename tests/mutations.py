@@ -92,7 +92,7 @@ MUTATIONS = [
     ),
     Mutation(
         "firmware: a first word that the slave does not hold is not written again",
-        "test_sim_node",
+        "test_port",
         "firmware/dspic/port_dspic/link_spi.c",
         "SPI2STAT);\n    sfr_write(board, SPI2BUF, word);\n",
         "SPI2STAT);\n",
