@@ -103,6 +103,30 @@ def test_serial_numbers_address_one_node_and_duplicates_are_told(image, tmp_path
     }
 
 
+def other_image(folder, version: int, options: int):
+    path = folder / f"{version:x}_{options:x}.whex"
+    path.write_bytes(make_image.make_image(synthetic_hex(folder / "app.hex", 40), version, options))
+    return path
+
+
+def test_an_older_image_and_one_of_another_build_are_refused_unless_forced(image, tmp_path):
+    """In one line, before any node is touched; the silicon bit of the options is no other build."""
+    older, sensor, later = (other_image(tmp_path, *of) for of in ((0x0202, 0), (0x0204, 1), (0x0205, 0x8000)))
+    shell = (
+        f"$FLASH $LINK {image}; $FLASH $LINK {older}; echo older $?; $FLASH $LINK {sensor}; echo sensor $?;"
+        f"$FLASH $LINK --list; $FLASH $LINK {older} --force >/dev/null; echo forced $?; $FLASH $LINK --list | sed s/^/after/;"
+        f"$FLASH $LINK {later} --dry-run"
+    )
+    done = bridge_with(tmp_path, "", shell)
+    assert "older 1" in done.stdout and "sensor 1" in done.stdout and "forced 0" in done.stdout
+    assert {version for _, version, _ in nodes_listed(done.stdout).values()} == {"2.3"}
+    after = nodes_listed("\n".join(line[5:] for line in done.stdout.splitlines() if line.startswith("after")))
+    assert {version for _, version, _ in after.values()} == {"2.2"} and len(after) == WHISKERS
+    assert done.stdout.count("would be updated to 2.5") == WHISKERS
+    told = [line for line in done.stderr.splitlines() if "--force" in line]
+    assert len(told) == 2 and "the older 2.2" in told[0] and "build 0x0001" in told[1]
+
+
 def test_what_is_no_image_is_refused_before_the_bridge_is_touched(image, tmp_path):
     bad = tmp_path / "bad.whex"
     bad.write_bytes(image.read_bytes()[:-1] + b"\x00")

@@ -24,7 +24,7 @@ enum { NUMBER = 'n' };
 
 struct options {
     const char *image, *bridge;
-    bool list, health, dry_run, has_lane, has_serial;
+    bool list, health, dry_run, force, has_lane, has_serial;
     uint32_t lane, serial, lane_mask;
     struct whisker_settings settings;
 };
@@ -39,6 +39,7 @@ static void print_help(void)
            "  --lane N         only the node on this lane; it needs a serial number of its own\n"
            "  --node SERIAL    only the node with this serial number\n"
            "  --dry-run        say what would be done and whether the nodes would take it; change nothing\n"
+           "  --force          also an image that is older than what a node runs, or of another build (sensor)\n"
            "  --list           who the nodes are\n"
            "  --health         with --list: their fault counters that are not zero\n"
            "  --bridge TEXT    the bridge with this serial number (the first that can be opened)\n"
@@ -77,6 +78,8 @@ static bool set_word(struct options *options, int option, const char *text)
         return true;
     case 'y':
         return options->dry_run = true;
+    case 'F':
+        return options->force = true;
     case 'L':
         return options->list = true;
     case 'H':
@@ -96,6 +99,7 @@ static int read_options(struct options *options, int argc, char **argv)
                                           {"sample-point", required_argument, NULL, NUMBER},
                                           {"bridge", required_argument, NULL, 'b'},
                                           {"dry-run", no_argument, NULL, 'y'},
+                                          {"force", no_argument, NULL, 'F'},
                                           {"list", no_argument, NULL, 'L'},
                                           {"health", no_argument, NULL, 'H'},
                                           {"help", no_argument, NULL, 'h'},
@@ -188,6 +192,35 @@ static uint32_t choose(struct options *options, const struct whisker_node nodes[
     return lanes;
 }
 
+#define NOT_ON_SILICON 0x8000u /* a build option that says nothing about what the image is for */
+
+/* True, with a line for the first such lane, if the image is hardly meant for what runs there: older, or of another
+ * build. A node without a whole application takes any. */
+static bool is_doubtful(const struct whisker_node nodes[WHISKER_FRAME_LANES], uint32_t lanes,
+                        const struct whisker_image *image)
+{
+    for (int lane = 0; lane < WHISKER_FRAME_LANES; lane++) {
+        const struct whisker_node *node = &nodes[lane];
+        if (!(lanes >> lane & 1) || node->state != WHISKER_NODE_STATE_APPLICATION) {
+            continue;
+        }
+        if (image->version < node->firmware) {
+            fprintf(stderr,
+                    PROGRAM ": lane %d runs %u.%u, the image is the older %u.%u; --force loads it all the same\n", lane,
+                    node->firmware >> 8, node->firmware & 0xFFu, image->version >> 8, image->version & 0xFFu);
+            return true;
+        }
+        if (((image->options ^ node->options) & ~NOT_ON_SILICON) != 0) {
+            fprintf(stderr,
+                    PROGRAM ": lane %d runs build 0x%04x, the image is build 0x%04x (another sensor?); "
+                            "--force loads it all the same\n",
+                    lane, node->options, image->options);
+            return true;
+        }
+    }
+    return false;
+}
+
 /* Says what an update would meet; returns how many nodes would refuse the image. */
 static int foresee(const struct whisker_node nodes[WHISKER_FRAME_LANES], uint32_t lanes,
                    const struct whisker_image *image)
@@ -213,6 +246,9 @@ static int update(struct whisker_device *device, struct options *options,
     flash_print_duplicates(nodes);
     const uint32_t lanes = choose(options, nodes);
     if (lanes == 0) {
+        return CLI_FAILED;
+    }
+    if (!options->force && is_doubtful(nodes, lanes, image)) {
         return CLI_FAILED;
     }
     if (options->dry_run) {

@@ -286,6 +286,6 @@ void sim_node_fault(sim_node *node, enum sim_sensor_fault fault, unsigned argume
 uint32_t sim_node_violations(const sim_node *node)
 {
     const struct dspic_violations v = dspic_violations(node->chip);
-    return mlx90333_violations(&node->twin) + v.overclocked + v.pll_running + v.spi_settings + v.spi_disabled + v.spi_overwrite +
-           v.pins_locked + v.unlock;
+    return mlx90333_violations(&node->twin) + v.overclocked + v.pll_running + v.spi_settings + v.spi_disabled +
+           v.spi_overwrite + v.pins_locked + v.unlock;
 }

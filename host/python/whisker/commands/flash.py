@@ -14,6 +14,9 @@ def add(parser) -> None:
     which.add_argument("--serial", type=int, metavar="S", help="only the node with this serial number")
     parser.add_argument("--bridge", metavar="TEXT", help="the bridge with this serial number")
     parser.add_argument("--dry-run", action="store_true", help="say what would be done, change nothing")
+    parser.add_argument(
+        "--force", action="store_true", help="also an image that is older, or of another build (sensor)"
+    )
     parser.set_defaults(run=run)
 
 
@@ -22,4 +25,5 @@ def run(arguments) -> int:
     for option, value in (("lane", arguments.lane), ("node", arguments.serial), ("bridge", arguments.bridge)):
         words += [f"--{option}", str(value)] if value is not None else []
     words += ["--dry-run"] if arguments.dry_run else []
+    words += ["--force"] if arguments.force else []
     return os.spawnv(os.P_WAIT, words[0], words)
