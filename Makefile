@@ -6,7 +6,7 @@ BUILD := build/release
 PYTHON := .venv/bin/python
 SOURCES_C = $(shell git ls-files '*.c' '*.h' '*.cpp' | grep -v '/gen/')
 
-.PHONY: help demo demo-long test test-all test-kernel test-hil mutants bench sbom build setup gen firmware flash bitstream format lint clean
+.PHONY: help demo demo-long test test-all test-kernel test-hil mutants bench sbom build setup gen firmware firmware-images flash bitstream format lint clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
@@ -48,10 +48,13 @@ setup: ## install what is missing: Debian packages, locked Python packages
 gen: setup ## regenerate protocol/gen from protocol/whisker.toml
 	@$(PYTHON) tools/protogen.py
 
-firmware: ## build the node's firmware with XC16 or XC-DSC, where there is one
+firmware: ## build the node's firmware with XC16 or XC-DSC, or PIC30=DIR, a public build of the compiler; [SENSOR=..] [RESYNC=1]
 	@tools/firmware/build.sh
 
-flash: ## first programming of a node by wire: TOOL=ipecmd|pk2cmd|picberry SERIAL=n [HEX=file]
+firmware-images: ## make the committed images again, each build twice: PIC30=DIR
+	@tools/firmware/images.sh
+
+flash: ## first programming of a node by wire, no compiler needed: TOOL=ipecmd|pk2cmd|picberry SERIAL=n [SENSOR=..] [HEX=file]
 	@tools/firmware/flash.sh --tool "$(TOOL)" $(if $(SERIAL),--serial "$(SERIAL)") $(if $(HEX),--hex "$(HEX)")
 
 bitstream: setup ## the bridge for a board one can buy: BOARD=ecpix5|colorlight_i9|cynthion [LANES=n] [SEED=n] [SERIAL=text]

@@ -1,10 +1,13 @@
 #!/bin/sh
-# First programming of a node by wire: loader, application and serial number in one go.
-# flash.sh --tool ipecmd|pk2cmd|picberry --hex WIRE.hex [--serial N] [--dry-run]
-# `make firmware` makes WIRE.hex. Environment: IPECMD_TOOL (PPK3: a PICkit 3), PICBERRY_FAMILY (dspic33f), PICBERRY_PINS.
+# First programming of a node by wire: loader, application and serial number in one go. No compiler is needed.
+# flash.sh --tool ipecmd|pk2cmd|picberry [--hex WIRE.hex] [--serial N] [--dry-run]
+# Without --hex the committed image for SENSOR (mlx90333, mlx90316) or RESYNC=1; `make firmware` makes one of your own.
+# Environment besides: IPECMD_TOOL (PPK3: a PICkit 3), PICBERRY_FAMILY (dspic33f), PICBERRY_PINS.
 set -eu
 cd "$(dirname "$0")/../.."
-tool='' hex=build/firmware/node_wire.hex serial='' dry_run=''
+sensor=${SENSOR:-mlx90333}
+[ "${RESYNC:-0}" = 0 ] || sensor=resync
+tool='' hex=firmware/images/$sensor/node_wire.hex serial='' dry_run=''
 
 fail() {
     echo "flash: $1" >&2
@@ -42,10 +45,11 @@ for name in $places; do
 done
 [ -n "$program" ] || [ -n "$dry_run" ] || fail "$tool: not found on PATH; install $from"
 [ -n "$program" ] || program=$tool
-[ -r "$hex" ] || fail "$hex: not there; run 'make firmware' first, or name another with HEX=FILE"
+[ -r "$hex" ] || fail "$hex: not there; give SENSOR=mlx90333 or mlx90316, or RESYNC=1, or a file of make firmware with HEX=FILE"
+.venv/bin/python tools/firmware/make_image.py check "$hex" || exit 1
 
+mkdir -p build/firmware
 if [ -n "$serial" ]; then
-    mkdir -p build/firmware
     numbered=build/firmware/node_$serial.hex
     .venv/bin/python tools/firmware/make_image.py wire "$hex" "$numbered" --serial "$serial" --whole || exit 1
     hex=$numbered
@@ -56,10 +60,23 @@ fi
 case $tool in
     ipecmd) set -- "$program" -P33FJ128MC802 "-TP${IPECMD_TOOL:-PPK3}" -M "-F$hex" -OL ;;
     pk2cmd) set -- "$program" -PdsPIC33FJ128MC802 -M "-F$hex" -Y -R ;;
-    picberry) set -- "$program" -w ${PICBERRY_PINS:+-g "$PICBERRY_PINS"} -f "${PICBERRY_FAMILY:-dspic33f}" -i "$hex" ;;
+    picberry) set -- "$program" ${PICBERRY_PINS:+-g "$PICBERRY_PINS"} -f "${PICBERRY_FAMILY:-dspic33f}" ;;
 esac
+# picberry ends with 0 whatever its own comparison found, and never looks at the configuration words: the chip is read back.
+read_back=''
+[ "$tool" != picberry ] || read_back=build/firmware/read_back.hex
 if [ -n "$dry_run" ]; then
-    echo "$*"
+    echo "$*${read_back:+ -w $hex}"
     exit 0
 fi
-"$@" || fail "$tool failed; check supply (3.3 V), the wires PGC, PGD, MCLR and ground, then try again"
+trouble="$tool failed; check supply (3.3 V), the wires PGC, PGD, MCLR and ground, then try again"
+if [ -z "$read_back" ]; then
+    "$@" || fail "$trouble"
+else
+    rm -f "$read_back"
+    "$@" -w "$hex" || fail "$trouble"
+    "$@" -r "$read_back" || fail "$trouble"
+    [ -s "$read_back" ] || fail "$tool read nothing back, so the node may not be programmed; check supply, wires and free disk space"
+    .venv/bin/python tools/firmware/make_image.py verify "$hex" "$read_back" || exit 1
+    echo 'flash: read back and compared: flash, serial number and configuration words are right'
+fi

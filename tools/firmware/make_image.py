@@ -4,6 +4,8 @@
 make_image.py image APP.hex OUT.whex --version 0.2     what `whisker flash` loads through the bridge
 make_image.py wire LOADER.hex OUT.hex [--app APP.hex --version 0.2] [--serial N]
                                                        what `make flash` programs by wire: loader, application, number
+make_image.py check WIRE.hex                           is it whole, for this chip, and of a version that this host knows?
+make_image.py verify WIRE.hex READ.hex                 does what was read back from a chip hold it, configuration words included?
 
 An instruction is four bytes in the HEX file (three and a zero) at twice its address; three bytes in an image.
 """
@@ -46,7 +48,7 @@ def body(path: Path) -> bytes:
     if min(placed) < FIRST_ROW * ROW:
         where = min(placed) // 3 * 2
         raise intel_hex.HexError(
-            f"{path}: code at {where:#08x}, which is the loader's; link it with app.gld, from {FIRST_ROW * ROW // 3 * 2:#08x}"
+            f"{path}: code at {where:#08x}, which is the loader's; link it from {FIRST_ROW * ROW // 3 * 2:#08x} on, as make firmware does"
         )
     rows = max(placed) // ROW + 1 - FIRST_ROW
     return bytes(placed.get(FIRST_ROW * ROW + i, 0xFF) for i in range(rows * ROW))
@@ -72,7 +74,7 @@ def wire_memory(loader: Path, image: bytes | None, serial: int | None, whole: bo
     """The loader's HEX with image and serial number put in; whole: there is an application in it already."""
     memory = intel_hex.read(loader)
     if not whole and any(HEADER_ROW * ROW_HEX <= address < FLASH_END for address in memory):
-        raise intel_hex.HexError(f"{loader}: code in the application's rows; link it with build/firmware/loader.gld")
+        raise intel_hex.HexError(f"{loader}: code in the application's rows; give the loader.hex of make firmware")
     if image:
         head, content = image[: IMAGE_HEADER.size], image[IMAGE_HEADER.size :]
         for i, byte in enumerate(head.ljust(ROW, b"\xff") + content):
@@ -82,6 +84,49 @@ def wire_memory(loader: Path, image: bytes | None, serial: int | None, whole: bo
         for i, byte in enumerate(serial.to_bytes(4, "little")):
             memory |= {FUID0 + 4 * i: byte, FUID0 + 4 * i + 1: 0, FUID0 + 4 * i + 2: 0, FUID0 + 4 * i + 3: 0}
     return memory
+
+
+def check_wire(path: Path) -> None:
+    """HexError unless `path` has a loader and a whole application for this chip and this wire version."""
+    memory = intel_hex.read(path)
+    placed = flash_bytes(memory)
+    if not any(placed.get(i, 0xFF) != 0xFF for i in range(3)):
+        raise intel_hex.HexError(
+            f"{path}: nothing at the reset vector, so no loader; give the node_wire.hex of a build"
+        )
+    raw = bytes(placed.get(HEADER_ROW * ROW + i, 0xFF) for i in range(IMAGE_HEADER.size))
+    head = IMAGE_HEADER.unpack(raw)
+    crc_at = IMAGE_HEADER.fields["header_crc32"].offset
+    if head["magic"] != LIMITS["image_magic"] or crc32(raw[:crc_at]) != head["header_crc32"]:
+        raise intel_hex.HexError(
+            f"{path}: no application header in row {HEADER_ROW}; give the node_wire.hex of a build"
+        )
+    if head["chip"] != LIMITS["chip_id"]:
+        raise intel_hex.HexError(
+            f"{path}: for chip {head['chip']:#06x}, not {LIMITS['chip_id']:#06x}; give an image of this board"
+        )
+    if head["wire_version"] != WIRE_VERSION:
+        raise intel_hex.HexError(
+            f"{path}: wire version {head['wire_version']}, this host's is {WIRE_VERSION}; take image and host of one release"
+        )
+    content = bytes(placed.get(FIRST_ROW * ROW + i, 0xFF) for i in range(head["length"]))
+    if head["length"] > FLASH_END or crc32(content) != head["body_crc32"]:
+        raise intel_hex.HexError(
+            f"{path}: the application's CRC-32 is wrong: cut short or changed; fetch or build it again"
+        )
+
+
+def verify(wanted: Path, found: Path) -> None:
+    """HexError at the first byte of `wanted` that `found` does not hold. Erased flash reads 0xFF; of a configuration word
+    only its low byte exists."""
+    memory, chip = intel_hex.read(wanted), intel_hex.read(found)
+    for address, byte in sorted(memory.items()):
+        is_there = address % 4 == 0 if address >= CONFIG else address % 4 != 3
+        if is_there and chip.get(address, 0xFF) != byte:
+            raise intel_hex.HexError(
+                f"{found}: {chip.get(address, 0xFF):#04x} at {address // 2:#08x} of the chip, not {byte:#04x}; check supply and "
+                "wires, program it again"
+            )
 
 
 def version_number(text: str) -> int:
@@ -113,9 +158,18 @@ def main() -> int:
     wire.add_argument("--whole", action="store_true", help="the HEX has its application already")
     for kind in (image, wire):
         kind.add_argument("--options", type=lambda text: int(text, 0), default=0)
+    check = kinds.add_parser("check", usage=argparse.SUPPRESS)
+    check.add_argument("hex", type=Path)
+    compare = kinds.add_parser("verify", usage=argparse.SUPPRESS)
+    compare.add_argument("hex", type=Path)
+    compare.add_argument("found", type=Path)
     words = parser.parse_args()
     try:
-        if words.kind == "image":
+        if words.kind == "check":
+            check_wire(words.hex)
+        elif words.kind == "verify":
+            verify(words.hex, words.found)
+        elif words.kind == "image":
             words.out.write_bytes(make_image(words.hex, words.version, words.options))
         else:
             app = make_image(words.app, words.version, words.options) if words.app else None

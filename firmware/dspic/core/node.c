@@ -118,6 +118,7 @@ void node_on_transfer_end(struct node *node)
 void node_on_order(struct node *node, const uint16_t words[LINK_WORDS])
 {
     struct order order;
+    node->displaced = board_watch_exceeds(node->board, NODE_ORDER_MOST_US); /* first: parsing takes its time */
     const bool whole = order_parse(words, &order);
     if (!whole)
         count(node, WHISKER_HEALTH_ORDER_CRC);
@@ -125,7 +126,6 @@ void node_on_order(struct node *node, const uint16_t words[LINK_WORDS])
         node->tick = order.tick;
     node->numbered = true;
     node->ordered = true;
-    node->displaced = board_watch_exceeds(node->board, NODE_ORDER_MOST_US);
     publish(node);
     if (whole && order.command == WHISKER_COMMAND_SERVICE) {
         node->serving = true;

@@ -4,7 +4,7 @@
 
 #include "crc32.h"
 
-static const uint16_t BUSY[LINK_WORDS]; /* zeros are no record */
+static const uint16_t BUSY[LINK_WORDS] = {0}; /* zeros are no record */
 
 void service_start(struct service *service)
 {

@@ -1,5 +1,8 @@
-; Page 0 is the loader's and never erased. Neither table is left to the linker: it makes both or none, and the first must not
-; name this program's functions.
+; Page 0 is the loader's and never erased: where a reset goes, and both vector tables. Nothing of it is left to the linker: it
+; makes both tables or none, and the first must not name this program's functions.
+
+        .section .reset_vector, code, address(0x000000)
+        goto    __resetPRI
 
 ; The vector table: every entry leads into the application's jump table.
         .section .application_vectors, code, address(0x000004)
