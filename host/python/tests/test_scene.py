@@ -62,7 +62,7 @@ def test_what_is_written_reads_back_equal(folder, tmp_path):
 
 
 def test_floor_rows_run_from_the_largest_y(folder):
-    assert scenes.load(folder).arena.floor_indices() == [[0, 0], [1, 0], [0, 1]]
+    assert scenes.load(folder).arena.floor_indices().tolist() == [[0, 0], [1, 0], [0, 1]]
 
 
 def test_flat_text_has_one_item_a_line_and_lanes_in_the_files_order(folder):

@@ -5,15 +5,24 @@ Metres and radians. World frame: origin in the arena's lower left corner, x righ
 
 import math
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from .scene_table import SceneError, Table
+import numpy as np
+
+from .files import UnreadableError
+from .images import nearest_levels, read_grey
+from .occupancy import NOWHERE, Box, Pose, from_map, placed, read_map
+from .scene_table import LARGEST_M, SceneError, Table
+
+__all__ = ["LARGEST_M", "SceneError"]  # beside what is defined here
 
 ARENA, ROBOT, PRIOR, OBSERVATIONS = "arena.toml", "robot.toml", "prior.toml", "observations.csv"
 TEXTURES_MOST = 250  # texture indices are one byte in host/nav, with room for its marks
 WHISKERS_MOST, OBSTACLES_MOST = 1000, 10_000
-LARGEST_M = 1000.0
+TILES_MOST = 10_000_000
+NOT_KNOWN = "?"  # letter of a tile whose texture is not known
+NOT_KNOWN_INDEX = 255
 
 
 @dataclass(frozen=True)
@@ -22,12 +31,16 @@ class Arena:
     tile_m: float
     textures: tuple[str, ...]
     floor: tuple[str, ...]  # letters, the first row has the largest y
-    obstacles: tuple[tuple[float, float, float, float], ...]  # x0, y0, x1, y1
+    obstacles: tuple[Box, ...]
+    unknown: tuple[Box, ...] = ()  # nobody knows what stands there
 
-    def floor_indices(self) -> list[list[int]]:
-        """Texture index by [row][column]; row 0 has the smallest y."""
-        letters = {name[0]: index for index, name in enumerate(self.textures)}
-        return [[letters[letter] for letter in row] for row in reversed(self.floor)]
+    def floor_indices(self) -> np.ndarray:
+        """Texture index by [row, column], uint8; row 0 has the smallest y. Not known: NOT_KNOWN_INDEX."""
+        letters = np.array(["".join(self.floor[::-1])]).view(np.uint32).reshape(len(self.floor), -1)
+        out = np.full(letters.shape, NOT_KNOWN_INDEX, np.uint8)
+        for index, name in enumerate(self.textures):
+            out[letters == ord(name[0])] = index
+        return out
 
     def is_free(self, x: float, y: float, radius: float) -> bool:
         """Whether a round body of this radius centred on (x, y) touches neither wall nor obstacle."""
@@ -75,6 +88,7 @@ class Scene:
     robot: Robot
     prior: Prior | None = None
     simulated: tuple[str, ...] = field(default=(), compare=False)  # more lines of `flat`; no part of the folder
+    origin: Pose = NOWHERE  # of the arena's frame in that of the occupancy map it was made of
 
     def warnings(self) -> list[str]:
         """What is odd but allowed, one line each."""
@@ -88,6 +102,8 @@ class Scene:
     def flat(self, start_pose: tuple[float, float, float]) -> str:
         """The text sim/world reads: one item a line."""
         arena, robot = self.arena, self.robot
+        if arena.unknown or any(NOT_KNOWN in row for row in arena.floor):
+            raise SceneError(f"{ARENA}: parts of the arena are unknown; a simulated world needs to know them all")
         lines = [_line("size_m", *arena.size_m), _line("tile_m", arena.tile_m)]
         lines += [_line("texture", name) for name in arena.textures] + [_line("floor", row) for row in arena.floor]
         lines += [_line("obstacle", *box) for box in arena.obstacles] + [_line("body_radius_m", robot.body_radius_m)]
@@ -97,13 +113,42 @@ class Scene:
         return "\n".join([*lines, *self.simulated, _line("start", *start_pose)]) + "\n"
 
 
-def load(path) -> Scene:
-    """Read a scene folder; prior.toml may be absent. SceneError names file, line or key, and the remedy."""
+def load(path, map_file=None) -> Scene:
+    """Read a scene folder; prior.toml may be absent. SceneError names file, line or key, and the remedy.
+
+    map_file: YAML of an occupancy map, whose boxes take the place of arena.toml's, or of all of it where there is none;
+    then poses in prior.toml are in the map's frame, and the scene's are in that of the image's lower left corner.
+    """
     folder = Path(path)
     if not folder.is_dir():
         raise SceneError(f"{folder}: no such folder; give a scene folder with {ARENA} and {ROBOT}")
     prior = _prior(Table.read(folder / PRIOR)) if (folder / PRIOR).exists() else None
-    return Scene(_arena(Table.read(folder / ARENA)), _robot(Table.read(folder / ROBOT)), prior)
+    robot = _robot(Table.read(folder / ROBOT))
+    if map_file is None or (folder / ARENA).exists():
+        arena = _arena(Table.read(folder / ARENA))
+        return Scene(arena if map_file is None else _with_map(arena, map_file), robot, prior)
+    occupancy = read_map(map_file)
+    arena = Arena(occupancy.size_m, max(occupancy.size_m), ("NONE",), (NOT_KNOWN,), occupancy.solid, occupancy.unknown)
+    feeling = replace(robot, whiskers=tuple(robot.of_role("object")))  # no floor is known for the others
+    return Scene(arena, feeling, _moved(prior, occupancy.origin), origin=occupancy.origin)
+
+
+def _with_map(arena: Arena, map_file) -> Arena:
+    try:
+        solid, unknown = placed(read_map(map_file), arena.size_m)
+    except ValueError as error:
+        raise error if isinstance(error, SceneError) else SceneError(f"{map_file}: {error}") from error
+    return replace(arena, obstacles=solid, unknown=unknown)
+
+
+def _moved(prior: Prior | None, origin: Pose) -> Prior | None:
+    """A prior in the map's frame as one in the image's."""
+    if prior is None or prior.mean is None:
+        return prior
+    mean = tuple(map(float, from_map(np.array([prior.mean]), origin)[0]))
+    cosine, sine = math.cos(origin[2]), math.sin(origin[2])
+    x, y, theta = prior.sigma
+    return Prior(prior.kind, mean, (math.hypot(cosine * x, sine * y), math.hypot(sine * x, cosine * y), theta))
 
 
 def write(path, scene: Scene) -> None:
@@ -113,8 +158,9 @@ def write(path, scene: Scene) -> None:
     arena, robot, prior = scene.arena, scene.robot, scene.prior
     text = [_toml("size_m", arena.size_m), _toml("tile_m", arena.tile_m)]
     text += [_toml("textures", arena.textures), _toml("floor", arena.floor)]
-    for box in arena.obstacles:
-        text += ["", "[[obstacle]]", _toml("min_m", box[:2]), _toml("max_m", box[2:])]
+    for header, boxes in (("obstacle", arena.obstacles), ("unknown", arena.unknown)):
+        for box in boxes:
+            text += ["", f"[[{header}]]", _toml("min_m", box[:2]), _toml("max_m", box[2:])]
     (folder / ARENA).write_text("\n".join(text) + "\n")
     text = [_toml(key, getattr(robot, key)) for key in ("body_radius_m", "odometry_relative_sigma", "radial_sigma_m")]
     for whisker in robot.whiskers:
@@ -145,17 +191,22 @@ def _arena(table: Table) -> Arena:
     tile = table.number("tile_m", TINY, LARGEST_M)
     textures = _textures(table)
     floor = _floor(table, size, tile, textures)
+    obstacles, unknown = (_boxes(table, key, size) for key in ("obstacle", "unknown"))
+    table.done()
+    return Arena(size, tile, textures, floor, obstacles, unknown)
+
+
+def _boxes(table: Table, key: str, size: tuple[float, float]) -> tuple[Box, ...]:
     boxes = []
-    for entry in table.tables("obstacle", OBSTACLES_MOST):
-        low, high = (entry.numbers(key, 2, -LARGEST_M, LARGEST_M) for key in ("min_m", "max_m"))
+    for entry in table.tables(key, OBSTACLES_MOST):
+        low, high = (entry.numbers(corner, 2, -LARGEST_M, LARGEST_M) for corner in ("min_m", "max_m"))
         entry.done()
         if not (low[0] < high[0] and low[1] < high[1]):
             raise entry.fail("max_m", "must be larger than min_m in x and y")
         if min(low) < -TINY or high[0] > size[0] + TINY or high[1] > size[1] + TINY:
             raise entry.fail("min_m" if min(low) < -TINY else "max_m", "is outside the arena; move the obstacle inside")
         boxes.append((*low, *high))
-    table.done()
-    return Arena(size, tile, textures, floor, tuple(boxes))
+    return tuple(boxes)
 
 
 def _textures(table: Table) -> tuple[str, ...]:
@@ -172,18 +223,38 @@ def _textures(table: Table) -> tuple[str, ...]:
 
 
 def _floor(table: Table, size, tile: float, textures) -> tuple[str, ...]:
-    rows = table.strings("floor")
     columns_wanted, rows_wanted = (math.ceil(side / tile - 1e-6) for side in size)
+    if columns_wanted * rows_wanted > TILES_MOST:
+        raise table.fail(
+            "tile_m", f"asks for {columns_wanted} x {rows_wanted} tiles, {TILES_MOST} are the most; make it larger"
+        )
+    image = isinstance(table.content.get("floor"), str)
+    rows = _floor_image(table, textures) if image else table.strings("floor")
     if len(rows) != rows_wanted:
         raise table.fail("floor", f"has {len(rows)} rows; size_m and tile_m ask for {rows_wanted}")
-    letters = {name[0] for name in textures}
+    letters = {name[0] for name in textures} | {NOT_KNOWN}
     for number, row in enumerate(rows, start=1):
         if len(row) != columns_wanted:
             raise table.fail("floor", f"row {number} has {len(row)} tiles; size_m and tile_m ask for {columns_wanted}")
-        for letter in row:
-            if letter not in letters:
-                raise table.fail("floor", f"row {number} has the letter '{letter}', no texture begins with it; mend it")
+        for letter in sorted(set(row) - letters):
+            raise table.fail("floor", f"row {number} has the letter '{letter}', no texture begins with it; mend it")
     return rows
+
+
+def _floor_image(table: Table, textures) -> tuple[str, ...]:
+    """A tile for each pixel, its texture by the nearest of evenly spaced grey levels, the first texture black; a pixel
+    that can be looked through is not known."""
+    path = table.path.parent / table.string("floor")
+    try:
+        grey = read_grey(path)
+    except UnreadableError as error:
+        raise table.fail("floor", f"{path}: {error}; give letters, or an image with a pixel for each tile") from error
+    steps = max(len(textures) - 1, 1)
+    index = nearest_levels(grey.level, tuple(round(255 * n / steps) for n in range(len(textures))))
+    letters = np.array([name[0] for name in textures])[index]
+    if grey.opaque is not None:
+        letters[~grey.opaque] = NOT_KNOWN
+    return tuple("".join(row) for row in letters.tolist())
 
 
 def _robot(table: Table) -> Robot:

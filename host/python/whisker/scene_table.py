@@ -6,6 +6,7 @@ from pathlib import Path
 from .errors import UserError
 from .files import UnreadableError, read_toml
 
+LARGEST_M = 1000.0
 SHOWN_MOST = 60  # characters of a wrong value
 
 

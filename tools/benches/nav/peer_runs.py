@@ -67,7 +67,7 @@ class Entry:
 def flat(made: scenes.Made) -> str:
     """A scene and its rows as the numbers that peer.cpp reads, in its order."""
     arena, robot, rows = made.scene.arena, made.scene.robot, made.observations
-    floor = np.array(arena.floor_indices())
+    floor = arena.floor_indices()
     prior = made.scene.prior or Prior("uniform")
     gaussian = prior.kind == "gaussian"
     tips, rays = robot.of_role("texture"), robot.of_role("object")

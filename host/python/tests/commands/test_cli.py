@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from commandkit import run
 from folders import folder, recorded  # noqa: F401 - fixtures
+from PIL import Image
 from whisks import write_whisks
 
 from whisker import scene
@@ -179,3 +180,34 @@ def test_radial_learns_and_tells(capsys, tmp_path):
     contacts.write_text("contact,radius_mm,t_s,x,y\n0,90,0,1,2\n")
     code, _, err = run(capsys, "radial", "fit", contacts, "--out", model)
     assert code == 2 and "fewer than 3 usable contacts" in err and err.count("\n") == 1
+
+
+def test_an_occupancy_map_stands_beside_or_in_place_of_an_arena(folder, tmp_path, capsys):
+    arena, pixel = scene.load(folder).arena, 0.05
+    wide, high = (round(side / pixel) + 2 for side in arena.size_m)  # with walls of one pixel around
+    cells = np.zeros((high, wide), np.uint8)
+    cells[1:-1, 1:-1] = 254
+    for box in arena.obstacles:
+        x0, y0, x1, y1 = np.round(np.array(box) / pixel).astype(int) + 1
+        cells[high - y1 : high - y0, x0:x1] = 0
+    Image.fromarray(cells).save(tmp_path / "map.pgm")
+    text = "image: map.pgm\nresolution: 0.05\norigin: [{}]\noccupied_thresh: 0.65\nfree_thresh: 0.2\n"
+    (tmp_path / "map.yaml").write_text(text.format("-0.05, -0.05, 0"))
+    with_map = ("--map", tmp_path / "map.yaml")
+
+    def told(name: str, *options) -> tuple[list[float], np.ndarray]:
+        code, out, _ = run(
+            capsys, "localise", folder, "--filter", name, "--json", "--out", tmp_path / "est.csv", *options
+        )
+        assert code == 0
+        errors = [value for key, value in json.loads(out).items() if "_error_" in key]
+        return errors, np.genfromtxt(tmp_path / "est.csv", delimiter=",", skip_header=1)
+
+    grid, odometry = told("grid"), told("odometry")
+    assert np.array_equal(told("grid", *with_map)[1], grid[1]), "the same boxes, the same answers"
+    (folder / "arena.toml").unlink()
+    again = told("odometry", *with_map)  # which asks no map: prior, truth and answers are in the map's frame
+    assert np.allclose(again[1][:, 1:4], odometry[1][:, 1:4], atol=2e-6) and again[0] == pytest.approx(odometry[0])
+    mean = scene.load(folder, tmp_path / "map.yaml").prior.mean
+    (tmp_path / "map.yaml").write_text(text.format("0.15, -0.25, 0"))
+    assert scene.load(folder, tmp_path / "map.yaml").prior.mean == pytest.approx(np.subtract(mean, (0.2, -0.2, 0.0)))

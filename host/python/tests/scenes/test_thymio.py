@@ -37,7 +37,7 @@ def test_the_scene_has_the_images_cells_and_the_recordings_motion(recording, tmp
     assert (code, error) == (0, "")
     scene = load(tmp_path / "scene")
     assert scene.arena.size_m == (0.08, 0.06) and scene.arena.tile_m == 0.02 and scene.prior.kind == "uniform"
-    assert (np.array(scene.arena.floor_indices()) == CELLS.T // 255).all()
+    assert (scene.arena.floor_indices() == CELLS.T // 255).all()
     rows = localise.read_observations(localise.observations_path(tmp_path / "scene"), scene)
     assert len(rows) == 3 and np.allclose(rows.truth, PATH[1:], atol=1e-6)
     pose = PATH[0]

@@ -260,8 +260,8 @@ def problem_of(
 ):
     """The C problem and the arrays it points into."""
     arena, robot = scene.arena, scene.robot
-    floor = np.array(arena.floor_indices(), dtype=np.uint8)
-    boxes = ffi.new("struct nav_box[]", [tuple(box) for box in arena.obstacles])
+    floor = arena.floor_indices()
+    boxes = ffi.new("struct nav_box[]", [*arena.obstacles, *arena.unknown])
     tips = ffi.new("struct nav_tip[]", [w.tip_m for w in robot.of_role("texture")])
     rays = ffi.new("struct nav_ray[]", [(*w.base_m, w.yaw_rad, w.length_m) for w in robot.of_role("object")])
     problem = ffi.new("struct nav_problem *")
@@ -275,7 +275,7 @@ def problem_of(
         "classes": len(arena.textures),
         "boxes": len(boxes),
         "box": boxes,
-        "unknown": getattr(arena, "unknown", 0),
+        "unknown": len(arena.unknown),
     }
     own, own_keep = _sensors(sensors)
     problem.robot = {

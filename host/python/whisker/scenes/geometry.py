@@ -30,7 +30,7 @@ def motions(path: np.ndarray) -> np.ndarray:
 def textures(arena: Arena, poses: np.ndarray, whisker: Whisker) -> tuple[np.ndarray, np.ndarray]:
     """Texture index under a texture whisker's tip, and the tile's number: (n,) each."""
     tips = compose(poses, np.array([*whisker.tip_m, 0.0]))
-    floor = np.array(arena.floor_indices())
+    floor = arena.floor_indices()
     column, row = (np.clip(np.floor(tips[:, i] / arena.tile_m), 0, floor.shape[1 - i] - 1).astype(int) for i in (0, 1))
     return floor[row, column], row * floor.shape[1] + column
 

@@ -1,0 +1,157 @@
+"""Occupancy maps: an image and a YAML file, as ROS map servers read them. Solid and unknown cells become boxes.
+
+Frames: a map's own frame, of which `origin` is the pose of the image's lower left corner; and the image's frame, with
+that corner as origin, which is the arena's where there is no arena.toml.
+"""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import yaml
+
+from .fields import Fields
+from .files import UnreadableError, read_text
+from .images import Grey, read_grey
+from .scene_table import LARGEST_M, SceneError
+
+Box = tuple[float, float, float, float]  # x0, y0, x1, y1
+Pose = tuple[float, float, float]
+NOWHERE: Pose = (0.0, 0.0, 0.0)  # of a frame in itself
+FREE, SOLID, UNKNOWN = 0, 1, 2
+BOXES_MOST = 200_000  # of each kind, after merging
+TEXT_MOST = 1 << 16
+FINEST_M = 1e-4
+MODES = ("trinary", "scale", "raw")
+
+
+@dataclass(frozen=True)
+class Occupancy:
+    """Boxes in the image's frame; what is in none of them is free."""
+
+    size_m: tuple[float, float]
+    resolution_m: float
+    origin: Pose
+    solid: tuple[Box, ...]
+    unknown: tuple[Box, ...]
+
+
+def read_map(path) -> Occupancy:
+    """A map by its YAML file; SceneError names file, field and remedy."""
+    path = Path(path)
+    try:
+        return _read(path)
+    except (UnreadableError, ValueError) as error:
+        raise SceneError(f"{path}: {error}; give a map server's YAML file and image") from error
+
+
+def _read(path: Path) -> Occupancy:
+    fields = Fields(_parsed(path))
+    resolution = fields.number("resolution", FINEST_M, LARGEST_M)
+    origin = fields.array("origin", 1, -LARGEST_M, LARGEST_M)
+    if origin.shape != (3,):
+        raise ValueError("field 'origin' must be x, y and yaw")
+    mode = fields.text("mode", *MODES) if fields.has("mode") else MODES[0]
+    limits = [fields.number(name, 0.0, 1.0) for name in ("free_thresh", "occupied_thresh")]
+    if limits[0] > limits[1]:
+        raise ValueError("field 'free_thresh' is above occupied_thresh")
+    negate = fields.take("negate") if fields.has("negate") else 0
+    if negate not in (0, 1):
+        raise ValueError("field 'negate' is neither 0 nor 1")
+    image = path.parent / str(fields.take("image"))
+    try:
+        grey = read_grey(image)
+    except UnreadableError as error:
+        raise ValueError(f"field 'image': {image}: {error}") from error
+    rows, columns = grey.level.shape
+    size = (round(columns * resolution, 9), round(rows * resolution, 9))
+    if max(size) > LARGEST_M:
+        raise ValueError(f"field 'resolution' makes the map {max(size):g} m long, {LARGEST_M:g} m are the most")
+    kinds = cells_of(grey, mode, bool(negate), *limits)
+    solid, unknown = (_scaled(boxes_of(kinds == kind), rows, resolution) for kind in (SOLID, UNKNOWN))
+    return Occupancy(size, resolution, tuple(map(float, origin)), solid, unknown)
+
+
+def _parsed(path: Path) -> object:
+    text = read_text(path)
+    if len(text) > TEXT_MOST:
+        raise UnreadableError(f"more than {TEXT_MOST >> 10} KiB")
+    try:
+        return yaml.safe_load(text)
+    except (yaml.YAMLError, RecursionError, ValueError) as error:
+        place = getattr(error, "problem_mark", None)
+        raise UnreadableError(f"not YAML{f' (line {place.line + 1})' if place else ''}") from error
+
+
+def cells_of(grey: Grey, mode: str, negate: bool, free: float, occupied: float) -> np.ndarray:
+    """(rows, columns) NOWHERE: Pose = (0.0, 0.0, 0.0)  # of a frame in itself
+    FREE, SOLID or UNKNOWN; between the thresholds nothing is known."""
+    level = np.arange(256)
+    shade = level if negate else 255 - level
+    share = np.where(level <= 100, level / 100.0, np.nan) if mode == "raw" else shade / 255.0
+    table = np.full(256, UNKNOWN, np.uint8)
+    table[share < free], table[share > occupied] = FREE, SOLID
+    kinds = table[grey.level]
+    if mode == "scale" and grey.opaque is not None:
+        kinds[~grey.opaque] = UNKNOWN
+    return kinds
+
+
+def boxes_of(cells: np.ndarray) -> list[tuple[int, int, int, int]]:
+    """Boxes (column, row, end column, end row) that cover the true cells of (rows, columns) once each: runs of a row, and
+    equal runs of rows that follow each other as one. ValueError beyond BOXES_MOST."""
+    done, open_runs = [], {}
+    for row in range(len(cells)):
+        edges = np.flatnonzero(np.diff(cells[row], prepend=False, append=False)).tolist()
+        runs = set(zip(edges[::2], edges[1::2], strict=True))
+        done += [(a, begun, b, row) for (a, b), begun in open_runs.items() if (a, b) not in runs]
+        open_runs = {run: open_runs.get(run, row) for run in sorted(runs)}
+        if len(done) + len(open_runs) > BOXES_MOST:
+            raise ValueError(
+                f"more than {BOXES_MOST} boxes of solid or unknown cells; make the image coarser or cleaner"
+            )
+    return [*done, *((a, begun, b, len(cells)) for (a, b), begun in open_runs.items())]
+
+
+def _scaled(boxes: list[tuple[int, int, int, int]], rows: int, metres: float) -> tuple[Box, ...]:
+    """Pixels from the top as metres from the bottom."""
+    return tuple(
+        (round(a * metres, 9), round((rows - d) * metres, 9), round(c * metres, 9), round((rows - b) * metres, 9))
+        for a, b, c, d in boxes
+    )
+
+
+def placed(occupancy: Occupancy, size_m: tuple[float, float]) -> tuple[tuple[Box, ...], tuple[Box, ...]]:
+    """Solid and unknown boxes in an arena of this size, whose frame is the map's own; around the map nothing is known."""
+    x, y, yaw = occupancy.origin
+    if yaw != 0.0:
+        raise ValueError("field 'origin': the yaw must be 0 beside an arena.toml")
+    high_x, high_y = x + occupancy.size_m[0], y + occupancy.size_m[1]
+    wide, high = size_m
+    margins = [(0.0, 0.0, x, high), (high_x, 0.0, wide, high), (x, 0.0, high_x, y), (x, high_y, high_x, high)]
+    solid, unknown = (
+        [(a + x, b + y, c + x, d + y) for a, b, c, d in boxes] for boxes in (occupancy.solid, occupancy.unknown)
+    )
+    return _clipped(solid, size_m), _clipped([*unknown, *margins], size_m)
+
+
+def _clipped(boxes: list[Box], size_m: tuple[float, float]) -> tuple[Box, ...]:
+    kept = ((max(a, 0.0), max(b, 0.0), min(c, size_m[0]), min(d, size_m[1])) for a, b, c, d in boxes)
+    return tuple(box for box in kept if box[0] < box[2] and box[1] < box[3])
+
+
+def to_map(poses: np.ndarray, origin: Pose) -> np.ndarray:
+    """Poses (n, 3) of the image's frame in the map's own; headings stay in -pi .. pi."""
+    x, y, yaw = origin
+    cosine, sine = math.cos(yaw), math.sin(yaw)
+    turned = np.remainder(poses[:, 2] + yaw + math.pi, 2 * math.pi) - math.pi
+    columns = (x + cosine * poses[:, 0] - sine * poses[:, 1], y + sine * poses[:, 0] + cosine * poses[:, 1], turned)
+    return np.column_stack(columns)
+
+
+def from_map(poses: np.ndarray, origin: Pose) -> np.ndarray:
+    """The way back."""
+    x, y, yaw = origin
+    cosine, sine = math.cos(yaw), math.sin(yaw)
+    return to_map(poses, (-cosine * x - sine * y, sine * x - cosine * y, -yaw))
