@@ -20,7 +20,7 @@ from whisker import scenes
 from whisker.errors import UserError
 from whisker.nav import localise
 from whisker.nav.filters import COMPONENT
-from whisker.robot import belief, checkpoint, health
+from whisker.robot import belief, checkpoint, health, initial_pose
 from whisker.robot import messages as m
 from whisker.robot.inbox import encoding_of
 from whisker.robot.link import Link
@@ -468,3 +468,46 @@ def test_messages_that_cannot_be_change_nothing_that_comes_of_the_others():
     """Navigator and Pyro server, with 4000 of them among 40 rows: see fuzz_rows, which runs for long by its front."""
     counts = fuzz(4000, seed=5)
     assert all(count >= 2000 for count in counts.values()) and len(counts) == 2
+
+
+def _errors(got) -> list[str]:
+    return [r.message.last_error for r in got if getattr(r.message, "last_error", "")]
+
+
+def test_a_pose_that_is_told_while_running_is_gone_on_from(made):
+    folder, scene, rows = made
+    elsewhere = (scene.arena.size_m[0] - 0.4, scene.arena.size_m[1] - 0.4, -2.0)
+
+    def answers(robot, topic: str, wanted) -> list:
+        """A row at a time until a message is as wanted: the last two of them."""
+        seen = [None]
+        while not wanted(seen[-1]):
+            robot.send([next(left)])
+            seen += [r.message for r in take_until(robot.inbox, len, PATIENCE_S) if r.topic == topic]
+        return seen[-2:]
+
+    left = iter(rows)
+    with Robot("localisation", "health/navigator") as robot, robot.navigator(folder, "--filter", "adaptive"):
+        answers(robot, "localisation", lambda x: x and x.prior == "scene")
+        initial_pose.send(robot.link, elsewhere, (0.02, 0.02, 0.02))
+        before, after = answers(robot, "localisation", lambda x: x and x.prior == "told")
+        apart = [np.hypot(*np.subtract(x.pose.pose.xytheta, elsewhere)[:2]) for x in (before, after) if x]
+        assert apart[-1] < 0.1 and (before is None or apart[0] > 0.5)
+        initial_pose.send(robot.link, (-1.0, 0.0, 0.0))
+        errors = []
+        take_until(robot.inbox, lambda got: errors.extend(_errors(got)) or errors, PATIENCE_S)
+        assert errors[0] == "initial_pose: (-1, 0) is outside the arena; give a place inside"
+
+
+def test_a_told_pose_has_a_frame_and_a_width(made):
+    arena = made[1].arena
+
+    def message(frame: str, sigma: float):
+        pose = m.PoseWithCovariance.planar((1.0, 2.0, 0.5), np.diag([sigma**2] * 3))
+        return m.PoseWithCovarianceStamped(m.Header.at(0, frame), pose)
+
+    assert initial_pose.prior_of(message("", 0.0), arena).sigma == (initial_pose.FINEST,) * 3
+    prior = initial_pose.prior_of(message("arena", 0.3), arena)
+    assert prior.mean == pytest.approx((1.0, 2.0, 0.5)) and prior.sigma == pytest.approx((0.3,) * 3)
+    with pytest.raises(initial_pose.InitialPoseError, match="frame 'odom'; give a pose in frame 'arena'"):
+        initial_pose.prior_of(message("odom", 0.3), arena)

@@ -12,6 +12,7 @@ from test_view_http import mutated
 from viewkit import PATIENCE_S, nothing_logged, page
 from viewrobot import ARENA, ROW_NS, SCENE, MadeUpRun, Post, at, belief_message, estimate, reach, robot_view, route
 
+from whisker.robot import initial_pose
 from whisker.robot.link import Link
 from whisker.robot.messages import (
     Contact,
@@ -228,6 +229,30 @@ def test_a_page_that_does_not_acknowledge_holds_nothing_back():
     asyncio.run(scenario())
 
 
+@pytest.mark.parametrize(
+    "may, pose, said",
+    [
+        (True, {"x": 0.3, "y": 2, "theta": -1.5}, ""),
+        (True, {"x": 2.6, "y": 2, "theta": 0}, "set_pose: outside the arena"),
+        (True, {"x": "1", "y": 2, "theta": 0}, "set_pose: x, y and theta are not numbers"),
+        (True, {"x": True, "y": 2, "theta": 0}, "set_pose: x, y and theta are not numbers"),
+        (True, {"x": 1, "y": 2}, "set_pose: x, y and theta are not numbers"),
+        (False, {"x": 0.3, "y": 2, "theta": -1.5}, "set_pose: not allowed here"),
+    ],
+)
+def test_a_page_tells_a_pose_where_it_may(may, pose, said):
+    async def scenario():
+        post = Post()
+        async with robot_view(post, may_set_pose=may) as (port, _), page(port) as script:
+            await script.ask(type="set_pose", **pose)
+            await script.ask(type="nothing of this name")  # answered after the pose
+            errors = [(await script.next("error"))["text"] for _ in range(2 if said else 1)]
+            assert errors[0].startswith(said or "type: ")
+            assert post.poses == ([] if said else [(0.3, 2.0, -1.5)])
+
+    asyncio.run(scenario())
+
+
 def fuzz_robot(inputs: int, seed: int) -> int:
     """So many mutated messages to a view; what it then tells is still JSON. Gives how many were refused."""
     rng = random.Random(seed)
@@ -279,6 +304,9 @@ def test_over_a_real_network_a_page_sees_what_a_pilot_sends():
                     hub.robot.take(topic, message)
         assert hub.robot.rows["unseen"] == 0 and hub.robot.row["tips"]
         assert source.refused()["count"] == 0
+        told = pilot.subscribe(initial_pose.TOPIC)
+        source.set_pose((0.5, 1.5, 2.0))
+        assert initial_pose.prior_of(told.take(PATIENCE_S)[0].message, ARENA).mean == pytest.approx((0.5, 1.5, 2.0))
 
     with Link("pilot", ROBOT, listen=[endpoint]) as pilot:
         source = join(ROBOT, [endpoint])

@@ -260,3 +260,42 @@ def test_the_daemon_of_a_ring_on_this_machine_is_among_the_processes():
 
     with ring_of(made_frames(0, 640)) as writer:
         asyncio.run(scenario(writer))
+
+
+def test_a_pose_is_told_by_a_drag_on_the_plan_or_by_numbers():
+    async def scenario():
+        post = Post()
+        async with looking_at(post, rows=5) as (b, _):
+            await b.until(DRAWN)
+            await b.press("p")
+            assert await b.eval("$('pose-tool').checkVisibility()")
+            x, y, scale = await b.eval(
+                "(() => { const p = robotPart.plan, box = p.live.getBoundingClientRect(); p.live.scrollIntoView();"
+                " return [p.live.getBoundingClientRect().left + p.x(0.5) / p.ratio,"
+                " p.live.getBoundingClientRect().top + p.y(1.0) / p.ratio, p.scale / p.ratio]; })()"
+            )
+            for kind, up in (("mousePressed", 0.0), ("mouseMoved", 0.4), ("mouseReleased", 0.4)):
+                where = {"x": x, "y": y - up * scale, "button": "left", "clickCount": 1}
+                await b.call("Input.dispatchMouseEvent", type=kind, **where)
+            await b.until("$('pose-said').textContent")
+            async with asyncio.timeout(30):
+                while not post.poses:
+                    await asyncio.sleep(0.01)
+            assert post.poses[0] == pytest.approx((0.5, 1.0, 1.571), abs=0.02)
+            await b.eval(
+                "[['x', 1.25], ['y', 0.75], ['heading', -90]].forEach(([n, v]) => { $(`pose-${n}`).value = v; })"
+            )
+            await b.click("#pose-send")
+            await b.eval("$('pose-x').value = 99")
+            await b.click("#pose-send")
+            assert "outside the arena" in await b.until(
+                "!$('pose-said').textContent.startsWith('Told') && $('pose-said').textContent"
+            )
+            assert post.poses[1:] == [pytest.approx((1.25, 0.75, -1.5708), abs=1e-3)]
+            await b.press("Escape")
+            assert not await b.eval("$('pose-tool').checkVisibility()")
+        async with looking_at(Post(), may_set_pose=False) as (b, _):
+            await b.until("linked")
+            assert not await b.eval("$('set-pose').checkVisibility()")
+
+    asyncio.run(scenario())

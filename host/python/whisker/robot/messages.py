@@ -164,6 +164,7 @@ TOPICS = {
     "localisation": Localisation,
     "belief": Belief,
     "truth": PoseStamped,
+    "initial_pose": PoseWithCovarianceStamped,
 }
 HEALTH = "health"
 NAME = re.compile(r"[A-Za-z0-9_-]{1,64}")  # of a process or a robot

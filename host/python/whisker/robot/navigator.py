@@ -3,7 +3,7 @@
 When it falls behind it weighs the newest rows that a tenth of a second is enough for, and takes the motion of all
 before them (whisker.robot.rows.Follower); in lock-step it weighs every row. A navigator that begins in mid-run goes on
 from what the one before it wrote down (whisker.robot.memory); without that it knows nothing of the start any more:
-uniform prior.
+uniform prior. A pose that somebody tells (whisker.robot.initial_pose) takes the place of all that was believed.
 """
 
 import json
@@ -12,15 +12,17 @@ import threading
 import time
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
+from itertools import groupby
 from pathlib import Path
 
 import numpy as np
 
 from ..nav.localise import Estimate
 from ..scene import Prior, Scene
-from . import belief
+from . import belief, initial_pose
 from .health import ENDED, RUNNING, Health
 from .inbox import Received
+from .initial_pose import InitialPoseError
 from .link import Link
 from .memory import Memory
 from .messages import Header, Localisation, PoseWithCovariance, PoseWithCovarianceStamped
@@ -33,8 +35,9 @@ BELIEF_NS = 500_000_000  # 2 Hz of the bridge's clock
 BELIEF_SHARE = 0.1  # of the navigator's time, at most, goes into telling it
 CATCH_UP_S = 0.1  # of the navigator's time for rows that came late together: no longer than until the next row
 LOOK_S = 0.5  # between two words of health while nothing comes
-SCENE_PRIOR, UNIFORM, CHECKPOINT = "scene", "uniform", "checkpoint"
+SCENE_PRIOR, UNIFORM, CHECKPOINT, TOLD = "scene", "uniform", "checkpoint", "told"
 WAITING = "waiting for rows"
+ROWS = "observation"  # topic
 
 
 @dataclass
@@ -57,7 +60,9 @@ class Navigator:
 
     def __init__(self, link: Link, scene: Scene, settings: Settings):
         self._link, self._scene, self._settings = link, scene, settings
-        self._inbox = link.subscribe("observation", judge=RowChecks(scene))
+        self._inbox = link.subscribe(ROWS, initial_pose.TOPIC, judge=RowChecks(scene))
+        self._told: Prior | None = None
+        self._told_error = ""
         self._follower = Follower()
         self._memory = Memory(settings.checkpoint, scene, settings.filters)
         self._beliefs_before: dict[str, np.ndarray] = {}
@@ -88,12 +93,11 @@ class Navigator:
         with ExitStack() as stack:
             while not stop.is_set():
                 received = self._inbox.take(LOOK_S)
-                if not self._tracks:
-                    self._recall(received)
-                for step in self._follower.take(received, self._affordable()):
-                    self._take(step, stack)
-                if not self._settings.stay and any(r.over for r in received):
-                    reason = next(r.message.reason for r in received if r.over)
+                for topic, part in groupby(received, lambda one: one.topic):
+                    (self._take_rows if topic == ROWS else self._take_poses)(list(part), stack)
+                ends = [r.message.reason for r in received if r.over and r.topic == ROWS]
+                if ends and not self._settings.stay:
+                    reason = ends[0]
                     break
                 self._health.tell(self._now_ns, RUNNING if received else WAITING, self._last_error())
         for stream in (self._poses, self._answers, self._beliefs):
@@ -108,7 +112,37 @@ class Navigator:
         return max(1, CATCH_UP_S // self._weigh_s) if self._weigh_s else 1
 
     def _last_error(self) -> str:
-        return self._inbox.last_error or self._memory.note
+        return self._inbox.last_error or self._told_error or self._memory.note
+
+    def _take_rows(self, received: list[Received], stack: ExitStack) -> None:
+        if not self._tracks:
+            self._recall(received)
+        for step in self._follower.take(received, self._affordable()):
+            self._take(step, stack)
+
+    def _take_poses(self, received: list[Received], stack: ExitStack) -> None:
+        """The newest pose that was told counts: at once, or when the first row comes."""
+        for one in received:
+            if not one.over:
+                self._told_error = ""
+                try:
+                    self._told = initial_pose.prior_of(one.message, self._scene.arena)
+                except InitialPoseError as error:
+                    self._told_error = str(error)
+        self._begin_from_told()
+
+    def _begin_from_told(self) -> None:
+        """All filters, or none where the first refuses it: they share the arena."""
+        if not self._tracks or not self._told:
+            return
+        prior, self._told = self._told, None
+        try:
+            for track in self._tracks:
+                track.filter.set_prior(prior)
+        except ValueError as error:
+            self._told_error = f"{initial_pose.TOPIC}: {error}"
+        else:
+            self._prior = TOLD
 
     def _recall(self, received: list[Received]) -> None:
         """With the first row: go on from where another navigator was, if it left word."""
@@ -121,6 +155,7 @@ class Navigator:
         began = time.monotonic()
         if not self._tracks:
             self._begin(stack)
+            self._begin_from_told()
         self._now_ns = step.row.header.stamp.ns
         header = Header.at(self._now_ns, ARENA_FRAME)
         for track in self._tracks:

@@ -32,6 +32,7 @@ def hello(hub: Hub) -> dict:
         "topics": {name: {"id": topic.id, "about": topic.about} for name, topic in TOPICS.items()},
         "rings": hub.rings(),
         "robot": hub.source.name,
+        "may_set_pose": hub.may_set_pose,
         "window": WINDOW,
         "widths": WIDTHS,
         "bins": BINS,
@@ -137,8 +138,11 @@ class Client:
                 self._feeds[name] = feed
             case "unsubscribe":
                 self._leave(self._topic(request))
+            case "set_pose":
+                self._become_page()
+                self._hub.set_pose(request)
             case _:
-                raise RequestError("type: not ack, subscribe or unsubscribe")
+                raise RequestError("type: not ack, subscribe, unsubscribe or set_pose")
 
     def _become_page(self) -> None:
         if not self._is_page and not self._enter():

@@ -59,6 +59,8 @@ def add(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="also answer under this name, as behind a forwarded port; repeatable",
     )
+    text = "pages may tell where the robot is; on loopback they may anyway"
+    parser.add_argument("--allow-pose", action="store_true", help=text)
     parser.add_argument("--open", action="store_true", help="open the page in a browser")
     parser.set_defaults(run=run)
 
@@ -84,9 +86,10 @@ def run(arguments: argparse.Namespace) -> int:
         if not is_name(name):
             raise ViewError(f"--ring {name!r}: not the name of a ring; use letters, digits, dash and dot")
     scene = None if arguments.scene is None else load(arguments.scene)
+    may_set_pose = arguments.allow_pose or ipaddress.ip_address(arguments.host).is_loopback
     source = _source(arguments)
     try:
-        return asyncio.run(_serve(arguments, Hub(rings, source, scene, arguments.ring_owner)))
+        return asyncio.run(_serve(arguments, Hub(rings, source, scene, arguments.ring_owner, may_set_pose)))
     finally:
         source.close()
 

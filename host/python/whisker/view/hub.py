@@ -3,7 +3,7 @@
 import asyncio
 import time
 
-from ..scene import Scene
+from ..scene import LARGEST_M, Scene
 from .rings import find_rings
 from .robot import RobotModel
 from .robot_source import NoRobot
@@ -28,12 +28,14 @@ class Hub:
         source: NoRobot | None = None,
         scene: Scene | None = None,
         ring_owner: int | None = None,
+        may_set_pose: bool = False,
     ):
         """`source`: where the robot's messages come from; `scene`: where it is and what it looks like, if known;
-        `ring_owner`: the user whose rings are read, too.
+        `ring_owner`: the user whose rings are read, too; `may_set_pose`: pages may tell where the robot is.
         """
         self.names, self._ring_owner = names, ring_owner
         self.source, self.robot = source or NoRobot(), RobotModel(scene)
+        self.may_set_pose = may_set_pose and bool(self.source.name)
         self.robot_watchers = 0
         self._taps = {name: Tap(name, owner=ring_owner) for name in names}
         self._watchers = dict.fromkeys(names, 0)
@@ -69,6 +71,18 @@ class Hub:
         if self._watchers[tap.name] == 0 and tap.name not in self.names:
             self._taps.pop(tap.name).close()
             del self._watchers[tap.name]
+
+    def set_pose(self, request: dict) -> None:
+        """Tell the robot's navigator the pose that a page asks for. RequestError: it is none, or it may not."""
+        if not self.may_set_pose:
+            raise RequestError("set_pose: not allowed here; start whisker-view with --robot and --allow-pose")
+        pose = tuple(request.get(name) for name in ("x", "y", "theta"))
+        if any(type(value) not in (int, float) or not abs(value) <= LARGEST_M for value in pose):
+            raise RequestError(f"set_pose: x, y and theta are not numbers within {LARGEST_M:g}")
+        arena = self.robot.scene and self.robot.scene.arena
+        if arena and not (0.0 <= pose[0] <= arena.size_m[0] and 0.0 <= pose[1] <= arena.size_m[1]):
+            raise RequestError("set_pose: outside the arena; point at a place inside")
+        self.source.set_pose(tuple(map(float, pose)))
 
     async def next_round(self) -> None:
         """Until the rings have been read once more."""

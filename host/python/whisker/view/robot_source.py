@@ -26,15 +26,20 @@ class NoRobot:
         """(topic, message) of what has come since the last call, in order. Never waits."""
         return []
 
+    def set_pose(self, pose: tuple[float, float, float]) -> None:
+        """Tell the navigator that the robot is here: x, y in m, heading in rad."""
+        raise UserError("no robot is looked at; start whisker-view with --robot")
+
     def close(self) -> None:
         return
 
 
 class InboxSource(NoRobot):
-    """Takes what an Inbox holds; `close` ends the link it belongs to."""
+    """Takes what an Inbox holds; `close` ends the link it belongs to, `set_pose` tells a pose over it."""
 
-    def __init__(self, name: str, inbox, text: str = "", close: Callable[[], None] = lambda: None):
+    def __init__(self, name: str, inbox, text: str = "", close=lambda: None, set_pose: Callable | None = None):
         self.name, self._inbox, self._text, self.close = name, inbox, text, close
+        self.set_pose = set_pose or super().set_pose
 
     def link(self) -> dict:
         return {"state": "open", "text": self._text}
@@ -48,13 +53,15 @@ class InboxSource(NoRobot):
 
 
 def join(robot: str, connect: list[str], config: Path | None = None) -> InboxSource:
-    """Listen to a robot's streams, read-only: nothing is published or announced. `connect`: its processes' endpoints,
+    """Listen to a robot's streams; nothing is published but poses that a page tells. `connect`: its processes' endpoints,
     tcp/HOST:PORT or tls/HOST:PORT, which need not be there yet; none: those of this machine. `config`: a file of zenoh's
     own configuration. UserError: it cannot be."""
     try:
+        from ..robot import initial_pose
         from ..robot.link import NAVIGATOR_ENDPOINT, PILOT_ENDPOINT, Link
     except ImportError as error:
         raise UserError(f"--robot needs {error.name}, which is not installed; make setup installs it") from error
     endpoints = connect or [PILOT_ENDPOINT, NAVIGATOR_ENDPOINT]
     link = Link("view", robot, connect=endpoints, config=config)
-    return InboxSource(robot, link.subscribe(*WANTED), f"Listening at {', '.join(endpoints)}", link.close)
+    text = f"Listening at {', '.join(endpoints)}"
+    return InboxSource(robot, link.subscribe(*WANTED), text, link.close, lambda pose: initial_pose.send(link, pose))

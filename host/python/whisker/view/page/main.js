@@ -116,6 +116,7 @@ wire.on('hello', (hello) => {
   view.degreesPerCount = hello.degrees_per_count;
   view.rest = hello.rest_count;
   panels.hello(hello);
+  robotPart.poseTool.hello(hello);
   if (!parts.chosen) parts.choose(hello.robot ? 'robot' : 'traces', false);
   if (!traces) {
     history = new History(hello.lanes);
@@ -154,7 +155,7 @@ wire.on('traces', (block) => {
   if (history.take(block)) redraw();
 });
 
-wire.on('error', (error) => console.error(`whisker-view: ${error.text}`));
+wire.on('error', (error) => { if (!robotPart.poseTool.refused(error.text)) console.error(`whisker-view: ${error.text}`); });
 
 /* What the bin under the cursor holds; `pointed`: the strip under the pointer, if any. */
 function readOut(bin, ago, pointed) {
@@ -187,7 +188,7 @@ $('axes').addEventListener('change', (event) => { view.axes = { both: [0, 1], al
 $('plot').addEventListener('pointermove', (event) => { const box = $('plot').getBoundingClientRect(); traces?.point(event.clientX - box.left, event.clientY - box.top); });
 $('plot').addEventListener('pointerleave', () => { if (traces) { traces.point(-1, -1); $('readout').textContent = ''; } });
 
-const KEYS = { r: () => parts.choose('robot', true), w: () => parts.choose('traces', true), ' ': () => pause(!paused), '+': () => scale(-1), '=': () => scale(-1), '-': () => scale(1), a: () => $('all').click(), n: () => $('noded').click(), d: () => $('theme').click(), '?': () => $('help').click() };
+const KEYS = { r: () => parts.choose('robot', true), w: () => parts.choose('traces', true), ' ': () => pause(!paused), '+': () => scale(-1), '=': () => scale(-1), '-': () => scale(1), a: () => $('all').click(), n: () => $('noded').click(), p: () => $('set-pose').click(), d: () => $('theme').click(), '?': () => $('help').click() };
 addEventListener('keydown', (event) => {
   if (event.ctrlKey || event.metaKey || event.altKey || !traces) return;
   const inPlot = event.target === $('plot');
@@ -196,7 +197,7 @@ addEventListener('keydown', (event) => {
     if (columns) { traces.step(columns * (event.shiftKey ? 20 : 1)); event.preventDefault(); }
     return;
   }
-  const typing = event.target.matches('select') || (event.key === ' ' && event.target.matches('button, input'));
+  const typing = event.target.matches('select, input[type=number]') || (event.key === ' ' && event.target.matches('button, input'));
   if (typing || !KEYS[event.key]) return;
   event.preventDefault();
   KEYS[event.key]();

@@ -12,6 +12,7 @@ class RobotPart {
     for (const name of LAYERS) $(`layer-${name}`).addEventListener('change', (event) => { this.layers[name] = event.target.checked; this.redraw(); });
     this.forget();
     this.wire = wire;
+    this.poseTool = new PoseTool(this.plan, wire, () => this.redraw());
     wire.on('scene', (scene) => this.showScene(scene));
     wire.on('robot', (word) => this.take(word));
     wire.on('belief', (message) => this.takeBelief(message));
@@ -122,6 +123,7 @@ class RobotPart {
     requestAnimationFrame(() => {
       this.due = false;
       this.actors.draw(this.world, this.layers);
+      this.poseTool.draw();
       this.timeline.draw(this.plan, this.world.path, this.world.truth);
       this.drawn = (this.drawn ?? 0) + 1;
     });
