@@ -61,7 +61,19 @@ ROOMS = {
     "view": ["bridge", "robot"],
     "report": [],
     "demo": ["touch", "pilot", "nav", "recording", "simulation", "robot", "report"],
-    "commands": ["bridge", "touch", "pilot", "nav", "recording", "simulation", "robot", "scenes", "view", "report", "demo"],
+    "commands": [
+        "bridge",
+        "touch",
+        "pilot",
+        "nav",
+        "recording",
+        "simulation",
+        "robot",
+        "scenes",
+        "view",
+        "report",
+        "demo",
+    ],
 }
 INCLUDE = re.compile(r'^\s*[#`]include\s+["<]([^">]+)[">]', re.MULTILINE)
 IMPORT = re.compile(r"^\s*(?:from|import)\s+([a-zA-Z_][\w.]*)", re.MULTILINE)

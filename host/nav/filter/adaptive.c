@@ -175,13 +175,10 @@ static void work(struct adaptive *a)
     if (!a->awake)
         return;
     a->global.touched = a->global.distinct = 0;
-    const struct nav_settings *s = &a->problem->settings;
-    /* As long as the robot is likelier where it seems to be, a look elsewhere must not take long. */
-    double budget = odds(a) < 0.0 ? fmin(s->adaptive_doubt_budget, s->adaptive_budget) : s->adaptive_budget;
     /* Kept back: a cloud drawn from what is found, and that it is moved, weighed and thinned when the row comes. */
     const long drawn = 2, taken = 3; /* poses looked at for each of the cloud's */
     long kept = (a->idle ? drawn + taken : drawn) * a->cloud.room;
-    adaptive_global_work(&a->global, &a->log, (long)budget - kept - a->touched);
+    adaptive_global_work(&a->global, &a->log, (long)a->global.budget - kept - a->touched);
     a->touched += a->global.touched;
     a->evaluations += a->global.touched;
     a->distinct += a->global.distinct;
@@ -265,10 +262,17 @@ static long components(const void *self, struct nav_component *out, long room)
     return count + adaptive_global_list(&a->global, &a->log, a->pending.step, share, left ? out + count : NULL, left);
 }
 
+static struct nav_resolution resolution(const void *self)
+{
+    const struct adaptive_global *g = &((const struct adaptive *)self)->global;
+    return (struct nav_resolution){g->cell, g->cell_theta, g->wanted};
+}
+
 const struct nav_filter_ops nav_adaptive_filter = {.name = "adaptive",
                                                    .create = create,
                                                    .destroy = destroy,
                                                    .predict = predict,
                                                    .update = update,
                                                    .estimate = estimate,
-                                                   .components = components};
+                                                   .components = components,
+                                                   .resolution = resolution};

@@ -20,16 +20,12 @@ static inline double adaptive_wrap(double angle)
     return angle > NAV_PI ? angle - 2.0 * NAV_PI : angle < -NAV_PI ? angle + 2.0 * NAV_PI : angle;
 }
 
-/* What the wheels do, as a hypothesis has it. */
-enum adaptive_drive { ADAPTIVE_ROLLS, ADAPTIVE_SPINS, ADAPTIVE_SKIDS };
-
 struct adaptive_particle {
     struct nav_pose pose;
     double c, s;            /* cosine and sine of the heading */
     double gain, turn_gain; /* true distance and turn by the reported ones, less 1 */
     double noise;           /* standard deviation of its odometry noise by the model's */
     double weight;
-    enum adaptive_drive drive;
     float loglik;                      /* of the present row */
     float share[ADAPTIVE_IMAGES_MOST]; /* of the weight, by image; sums to 1 */
 };

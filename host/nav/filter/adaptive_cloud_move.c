@@ -5,10 +5,6 @@
 #include "adaptive_cloud.h"
 
 static const double MUTATION = 0.03, NUDGE = 0.2;
-/* Chances per row: wheels begin to spin while the robot stands, or to skid, so that odometry errs by SKIDDING times its
- * noise; both last some ten rows. So that some hypotheses always stand ready, OFTEN times as many try it, and weigh as
- * much less. */
-static const double SPIN = 0.0005, SKID = 0.0002, GRIP = 0.1, SKIDDING = 8.0, OFTEN = 4.0;
 
 double adaptive_normal(struct nav_rng *rng)
 {
@@ -19,8 +15,8 @@ double adaptive_normal(struct nav_rng *rng)
     return (sum - 131070.0) * (1.0 / 37837.22);
 }
 
-/* Fresh guesses of how good the odometry is: three in four hold it unbiased, half hold with the model's noise and half
- * with less, as the model's allows for errors that persist. */
+/* Fresh guesses of how good the odometry is: three in four hold it unbiased, half hold with the model's noise, the
+ * others with half of it, as the model's allows for errors that persist, or with twice as much. */
 static double gain_of(const struct adaptive_cloud *cloud, struct nav_rng *rng)
 {
     return nav_rng_bits(rng) >> 62 ? 0.0 : cloud->problem->settings.adaptive_gain * adaptive_normal(rng);
@@ -28,7 +24,7 @@ static double gain_of(const struct adaptive_cloud *cloud, struct nav_rng *rng)
 
 static double noise_of(struct nav_rng *rng)
 {
-    static const double LEVELS[] = {1.0, 0.5, 0.25, 1.0};
+    static const double LEVELS[] = {1.0, 0.5, 2.0, 5.0};
     return LEVELS[nav_rng_bits(rng) >> 62];
 }
 
@@ -97,29 +93,16 @@ void adaptive_cloud_add(struct adaptive_cloud *cloud, struct nav_pose pose, doub
     turn_to(p, pose.theta);
 }
 
-static void drive_on(struct adaptive_particle *p, struct nav_rng *rng)
-{
-    double chance = (double)(nav_rng_bits(rng) >> 11) * 0x1p-53;
-    if (p->drive == ADAPTIVE_ROLLS && chance < OFTEN * (SPIN + SKID)) {
-        p->drive = chance < OFTEN * SPIN ? ADAPTIVE_SPINS : ADAPTIVE_SKIDS;
-        p->weight /= OFTEN;
-    } else if (p->drive != ADAPTIVE_ROLLS && chance < GRIP) {
-        p->drive = ADAPTIVE_ROLLS;
-    }
-}
-
 void adaptive_cloud_move(struct adaptive_cloud *cloud, struct nav_pose step, const struct nav_noise *noise, bool known)
 {
     double position = sqrt(noise->position), heading = sqrt(noise->heading);
     for (long n = 0; n < cloud->count; n++) {
         struct adaptive_particle *p = &cloud->at[n];
         mutate(cloud, p, &cloud->rng);
-        drive_on(p, &cloud->rng);
-        double goes = p->drive == ADAPTIVE_SPINS ? 0.0 : 1.0;
-        double level = p->drive == ADAPTIVE_SKIDS ? SKIDDING : known ? p->noise : fmax(p->noise, 1.0);
-        double dx = goes * (1.0 + p->gain) * step.x + level * position * adaptive_normal(&cloud->rng);
-        double dy = goes * (1.0 + p->gain) * step.y + level * position * adaptive_normal(&cloud->rng);
-        double turn = goes * (1.0 + p->turn_gain) * step.theta + level * heading * adaptive_normal(&cloud->rng);
+        double level = known ? p->noise : fmax(p->noise, 1.0);
+        double dx = (1.0 + p->gain) * step.x + level * position * adaptive_normal(&cloud->rng);
+        double dy = (1.0 + p->gain) * step.y + level * position * adaptive_normal(&cloud->rng);
+        double turn = (1.0 + p->turn_gain) * step.theta + level * heading * adaptive_normal(&cloud->rng);
         p->pose.x += p->c * dx - p->s * dy;
         p->pose.y += p->s * dx + p->c * dy;
         turn_by(p, turn);

@@ -49,6 +49,8 @@ struct adaptive_global {
     struct nav_expected *expected;
     int nx, ny, nh, pitch;   /* pitch: nx in whole lanes; cells beyond nx are empty */
     double cell, cell_theta; /* m, rad */
+    double wanted;           /* m, edge of a cell that the scene's detail asks for */
+    double budget;           /* cells and hypotheses touched per row, at most */
     double rotation;         /* as in lattice.h */
     double *shift_x, *shift_y;
     float *mass, *turned;                     /* [nh][ny][pitch] the belief, and where headings are blurred to */

@@ -153,6 +153,11 @@ long nav_filter_components(const struct nav_filter *f, struct nav_component *out
     return f->ops->components(f->self, out, room);
 }
 
+struct nav_resolution nav_filter_resolution(const struct nav_filter *f)
+{
+    return f->ops->resolution ? f->ops->resolution(f->self) : (struct nav_resolution){0.0, 0.0, 0.0};
+}
+
 uint64_t nav_filter_bad_cells(const struct nav_filter *f)
 {
     return f->intake.bad_cells;

@@ -26,6 +26,13 @@ void nav_filter_step(struct nav_filter *, const struct nav_row *, struct nav_est
  * there are, which may exceed `room`. For judging and drawing, not for the timed path. */
 long nav_filter_components(const struct nav_filter *, struct nav_component *out, long room);
 
+/* How finely a filter divides the arena, and how finely what its sensors tell asks it to; 0: it has no cells. A cell
+ * above `wanted_m` is what its budget allows. */
+struct nav_resolution {
+    double m, rad, wanted_m;
+};
+struct nav_resolution nav_filter_resolution(const struct nav_filter *);
+
 uint64_t nav_filter_bad_cells(const struct nav_filter *);
 uint64_t nav_filter_bad_rows(const struct nav_filter *); /* repeated, late or reordered */
 /* Windows that call all textures equally likely: not bad, but treated as not read. */
@@ -44,6 +51,7 @@ struct nav_filter_ops {
     void (*update)(void *self, const struct nav_evidence *);   /* rows with something new to read */
     void (*estimate)(const void *self, struct nav_estimate *); /* every row; work counts: of the last update */
     long (*components)(const void *self, struct nav_component *out, long room); /* as nav_filter_components */
+    struct nav_resolution (*resolution)(const void *self);                      /* NULL: it has no cells */
 };
 
 extern const struct nav_filter_ops nav_odometry_filter; /* dead reckoning from the prior's mean */

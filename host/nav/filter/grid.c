@@ -279,10 +279,18 @@ static long components(const void *self, struct nav_component *out, long room)
     return count;
 }
 
+static struct nav_resolution resolution(const void *self)
+{
+    const struct grid *g = self;
+    double finest = nav_sensors_detail(&g->likelihood->sensors).detail;
+    return (struct nav_resolution){g->lattice.cell, g->lattice.cell_theta, fmin(g->lattice.cell, finest / 2.0)};
+}
+
 const struct nav_filter_ops nav_grid_filter = {.name = "grid",
                                                .create = create,
                                                .destroy = destroy,
                                                .predict = predict,
                                                .update = update,
                                                .estimate = estimate,
-                                               .components = components};
+                                               .components = components,
+                                               .resolution = resolution};

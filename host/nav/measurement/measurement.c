@@ -19,8 +19,11 @@ int nav_sensors_init(struct nav_sensors *s, const struct nav_arena *arena, const
     for (int k = 0; s->model && k < NAV_KINDS; k++) {
         for (; s->count < s->first[k + 1]; s->count++) {
             struct nav_model *model = &s->model[s->count];
-            *model = (struct nav_model){
-                .kind = NAV_MEASUREMENTS[k], .settings = settings, .index = s->count - s->first[k], .c = 1.0};
+            *model = (struct nav_model){.kind = NAV_MEASUREMENTS[k],
+                                        .settings = settings,
+                                        .index = s->count - s->first[k],
+                                        .c = 1.0,
+                                        .detail = INFINITY};
             if (model->kind->init(model, arena, robot, blur_m))
                 return -1;
         }
@@ -35,6 +38,20 @@ void nav_sensors_free(struct nav_sensors *s)
             s->model[w].kind->free(&s->model[w]);
     }
     free(s->model);
+}
+
+struct nav_detail nav_sensors_detail(const struct nav_sensors *s)
+{
+    struct nav_detail finest = {INFINITY, 0.0};
+    for (int w = 0; w < s->count; w++) {
+        const struct nav_model *model = &s->model[w];
+        double lever = hypot(model->x, model->y);
+        if (model->detail > finest.detail)
+            continue;
+        finest.lever = model->detail < finest.detail ? lever : fmax(lever, finest.lever);
+        finest.detail = model->detail;
+    }
+    return finest;
 }
 
 double nav_sensors_reach(const struct nav_sensors *s, const struct nav_robot *robot)

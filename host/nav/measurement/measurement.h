@@ -34,6 +34,7 @@ struct nav_model {
     double x, y, c, s;               /* place on the robot and direction, robot frame */
     double reach;                    /* m from there to the farthest point that it senses */
     double spacing;                  /* m of travel after which a reading counts in full */
+    double detail;                   /* m over which what is expected of it changes; INFINITY: not told */
     double length;                   /* object whiskers: m */
     double step;                     /* m per code; code k stands for a contact at (k + 1/2) steps */
     double sigma;                    /* m, of a measured distance, the spread of a pose's cell included */
@@ -97,6 +98,12 @@ struct nav_sensors {
 int nav_sensors_init(struct nav_sensors *, const struct nav_arena *, const struct nav_robot *,
                      const struct nav_settings *, double blur_m);
 void nav_sensors_free(struct nav_sensors *);
+
+/* Finest detail that any sensor tells, m, and the farthest sensor that tells it that fine, m from the centre. */
+struct nav_detail {
+    double detail, lever;
+};
+struct nav_detail nav_sensors_detail(const struct nav_sensors *);
 
 /* Farthest point from the robot's centre that its body or a sensor reaches, m. */
 double nav_sensors_reach(const struct nav_sensors *, const struct nav_robot *);

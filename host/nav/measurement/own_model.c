@@ -19,6 +19,7 @@ static int own_init(struct nav_model *model, const struct nav_arena *arena, cons
     model->values = model->sensor->values;
     model->codes = model->sensor->codes + 1;
     model->spacing = model->sensor->spacing_m;
+    model->detail = model->sensor->detail_m > 0.0 ? model->sensor->detail_m : (double)INFINITY;
     /* Where in a row its reading begins. */
     for (int n = 0; n < model->index; n++)
         model->first += robot->sensor[n].values;

@@ -11,6 +11,8 @@ static const double ASSUMED_ACCURACY = 0.87;
 static const double SURE_MOST = 0.98, SURE_LEAST = 0.05; /* of the softmax at the median gap, beyond chance */
 static const double GAP_LEAST = 1e-9;
 static const double LOGLIK_MOST = 1e9;
+/* Share of a tile after which a window is new, whatever the setting: on small tiles every reading is another one's. */
+static const double FRESH = 1.0 / 6.0;
 static const double GAP_STEP = 0.05; /* of the running median's logarithm, per window */
 
 /* The gap at which a softmax gives its best class the share that makes the whole model `accuracy` sure. */
@@ -35,7 +37,8 @@ static int texture_init(struct nav_model *model, const struct nav_arena *arena, 
     model->codes = arena->classes + 1;
     model->x = robot->tip[model->index].x;
     model->y = robot->tip[model->index].y;
-    model->spacing = model->settings->texture_spacing_m;
+    model->detail = arena->classes > 1 ? arena->tile : (double)INFINITY;
+    model->spacing = fmin(model->settings->texture_spacing_m, FRESH * model->detail);
     model->accuracy = ASSUMED_ACCURACY;
     model->temper = model->settings->texture_temper;
     return 0;

@@ -49,7 +49,7 @@ static const struct entry ENTRIES[] = {
     ENTRY(particle, recovery, 0.005, 0.0, 1.0),
     ENTRY(particle, recovery_fast, 0.05, 0.0, 1.0),
     ENTRY(adaptive, budget, 90000.0, 40000.0, 1000000000.0),
-    ENTRY(adaptive, doubt_budget, 90000.0, 10000.0, 1000000000.0),
+    ENTRY(adaptive, detail_budget, 2000000.0, 40000.0, 1000000000.0),
     ENTRY(adaptive, most, 2000.0, 16.0, 100000.0),
     ENTRY(adaptive, least, 350.0, 2.0, 100000.0),
     ENTRY(adaptive, per_bin, 8.0, 0.1, 1000.0),

@@ -239,7 +239,7 @@ static void an_own_sensor_weighs_poses_by_its_table(void **state)
     (void)state;
     static const uint8_t map_codes[] = {0, 1, 2, 255};
     const struct nav_sensor_map map = {3, 0.1, 0.0, 0.5, 2, 2, map_codes};
-    const struct nav_sensor sensor = {3, 3, 0.0, nav_sensor_map_expect, nav_sensor_map_fill, &map};
+    const struct nav_sensor sensor = {3, 3, 0.0, 0.0, nav_sensor_map_expect, nav_sensor_map_fill, &map};
     struct nav_problem p = room();
     p.robot.tips = p.robot.rays = 0;
     p.robot.sensors = 1;

@@ -51,6 +51,8 @@ def run(arguments) -> int:
         observations.truth = from_map(observations.truth, scene.origin)
     settings, regions = _settings(arguments.set), localise.REGION_ROWS
     result = localise.run(arguments.filter, scene, observations, settings, arguments.seed, regions)
+    for warning in localise.warnings(result):
+        print(f"whisker: warning: {warning}", file=sys.stderr)
     if arguments.out:
         localise.write_estimates(arguments.out, result, observations, scene.origin)
     summary = localise.summary(result, observations.truth)

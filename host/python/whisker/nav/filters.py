@@ -87,12 +87,14 @@ class Sensor:
 
     `codes`: (rows, columns) of uint8, row 0 the smallest y, 0 to 254; 255, and beyond the map, not known. `cell_m`: edge
     of a cell; the map's lower left corner is the world's origin. `at_m`: the sensor's place on the robot. A reading
-    counts in full after `spacing_m` of travel since the last one."""
+    counts in full after `spacing_m` of travel since the last one. `detail_m`: over which the codes change; the default
+    filter's cells are then at most half as wide; 0: not told."""
 
     codes: np.ndarray
     cell_m: float
     at_m: tuple[float, float] = (0.0, 0.0)
     spacing_m: float = 0.0
+    detail_m: float = 0.0
 
     @property
     def values(self) -> int:
@@ -208,6 +210,12 @@ class Filter:
         return out
 
     @property
+    def resolution(self) -> tuple[float, float, float] | None:
+        """Edge of a cell in m, its extent in rad, and the edge in m that the scene's detail asks for; None: no cells."""
+        told = lib.nav_filter_resolution(self._filter)
+        return (told.m, told.rad, told.wanted_m) if told.m > 0 else None
+
+    @property
     def bad_cells(self) -> int:
         return lib.nav_filter_bad_cells(self._filter)
 
@@ -251,7 +259,7 @@ def _sensors(sensors: Sequence[Sensor]):
         code = octets(codes, f"codes of sensor {n}", (None, None))
         maps[n] = (sensor.values, *sensor.at_m, sensor.cell_m, columns, rows, code)
         expect, fill = (ffi.addressof(lib, name) for name in ("nav_sensor_map_expect", "nav_sensor_map_fill"))
-        out[n] = (sensor.values, sensor.values, sensor.spacing_m, expect, fill, maps + n)
+        out[n] = (sensor.values, sensor.values, sensor.spacing_m, sensor.detail_m, expect, fill, maps + n)
     return out, (maps, keep)
 
 

@@ -29,6 +29,7 @@ __all__ = [
     "run",
     "settings_list",
     "summary",
+    "warnings",
     "write_estimates",
 ]
 
@@ -46,6 +47,7 @@ class Run:
     table: np.ndarray  # (n,) of ESTIMATE
     bad_cells: int
     bad_rows: int
+    resolution: tuple[float, float, float] | None = None  # as Filter.resolution
     levels: np.ndarray = field(default_factory=lambda: np.zeros(0))  # of the truth's region, at the judged rows
     areas_m2: np.ndarray = field(default_factory=lambda: np.zeros(0))  # of the 90 % regions there
 
@@ -79,7 +81,7 @@ def run(
     parts.append(made.replay(observations, first, len(observations) - first))
     table, step_us = (np.concatenate(column) for column in zip(*parts, strict=True))
     levels, areas = np.array(judged).reshape(-1, 2).T
-    return Run(name, setup_s, step_us, table, made.bad_cells, made.bad_rows, levels, areas)
+    return Run(name, setup_s, step_us, table, made.bad_cells, made.bad_rows, made.resolution, levels, areas)
 
 
 def judged_rows(observations: Observations, most: int) -> list[int]:
@@ -111,11 +113,24 @@ def summary(result: Run, truth: np.ndarray | None) -> dict:
         "bad_cells": result.bad_cells,
         "bad_rows": result.bad_rows,
     }
+    if result.resolution:
+        out |= dict(zip(("resolution_m", "resolution_rad", "wanted_m"), result.resolution, strict=True))
     if truth is not None and np.isfinite(truth).all(axis=1).any():
         out |= pose_errors(result.poses, truth)
     if len(result.levels):
         out |= {"coverage_90": float(np.mean(result.levels <= 0.9)), "region_90_m2": float(np.median(result.areas_m2))}
     return out
+
+
+def warnings(result: Run) -> list[str]:
+    """What a user should know of how it ran, one line each."""
+    if not result.resolution or result.resolution[0] <= 1.001 * result.resolution[2]:
+        return []
+    cell, _, wanted = result.resolution
+    remedy = "set a larger adaptive.budget" if result.name == "adaptive" else f"set {result.name}.cell_m={wanted:.3g}"
+    return [
+        f"filter '{result.name}' has cells of {cell:.3g} m where the scene's detail asks for {wanted:.3g} m; {remedy}"
+    ]
 
 
 def write_estimates(path, result: Run, observations: Observations, origin: Pose = NOWHERE) -> None:
