@@ -185,8 +185,8 @@ MUTATIONS = [
         "bridge: two lanes swapped",
         "fpga/tb/lanes",
         "fpga/bridge_rtl/lane_receiver.v",
-        "bits <= miso;",
-        "bits <= {miso[LANES-1:2], miso[0], miso[1]};",
+        "<= miso;",
+        "<= {miso[LANES-1:2], miso[0], miso[1]};",
     ),
     Mutation(
         "bridge: a sequence number dropped every 4096 frames",

@@ -27,6 +27,8 @@ MESSAGES = (
 CRC = p.DEFINITION["crc8"]
 # Numbers with a doc each: table of the definition, prefix of the constants.
 NUMBERED = {"service_commands": "SERVICE_COMMAND", "info": "INFO", "health": "HEALTH", "node_states": "NODE_STATE"}
+NUMBERED |= {"boards": "BOARD"}
+FLAGS = {"frame_flags": "FRAME_FLAG", "control_options": "CONTROL_OPTION"}  # the same of bits
 
 
 def constants() -> list[tuple[str, int, str]]:
@@ -42,7 +44,8 @@ def constants() -> list[tuple[str, int, str]]:
             if f.name != "reserved":
                 rows.append((f"{name.upper()}_{f.name.upper()}", f.offset, f"byte offset; {8 * f.size} bits"))
     rows += [(f"COMMAND_{name.upper()}", value, "") for name, value in p.COMMANDS.items()]
-    rows += [(f"FRAME_FLAG_{name.upper()}", value, "") for name, value in p.FRAME_FLAGS.items()]
+    for table, prefix in FLAGS.items():
+        rows += [(f"{prefix}_{name.upper()}", 1 << e["bit"], "") for name, e in p.DEFINITION[table].items()]
     rows += [("STATUS_CODE_SHIFT", p.STATUS_CODE_SHIFT, "the six-bit code's place in a status")]
     rows += [(f"CODE_{name.upper()}", value, p.DEFINITION["codes"][name]["cause"]) for name, value in p.CODES.items()]
     rows += [(f"ERROR_{name.upper()}", 1 << e["bit"], e["cause"]) for name, e in p.SENSOR_ERRORS.items()]
@@ -187,6 +190,9 @@ def markdown() -> str:
     out += _table("codes", "value", p.DEFINITION["codes"], "value") + _table(
         "sensor error bits", "bit", p.SENSOR_ERRORS, "bit"
     )
+    for table in FLAGS:
+        out += [f"## {table}", "", "| bit | name | meaning |", "|---|---|---|"]
+        out += [f"| {e['bit']} | {name} | {e['doc']} |" for name, e in p.DEFINITION[table].items()] + [""]
     for table in NUMBERED:
         out += [f"## {table}", "", "| value | name | meaning |", "|---|---|---|"]
         out += [f"| {e['value']} | {name} | {e['doc']} |" for name, e in p.DEFINITION[table].items()] + [""]

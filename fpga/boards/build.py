@@ -22,14 +22,15 @@ INCLUDES = (REPO / "fpga/bridge_rtl/crc8.vh", REPO / "protocol/gen/whisker_proto
 # Registers that lie in the pad's own cell: a route between them and the pad would eat the PHY's set-up time, spread the
 # nodes' lines, and behind a delay line it would not be timed.
 PAD_REGISTERS = tuple(f"*ulpi_shim*/w:{name}" for name in ("ulpi_data_out", "ulpi_stp", "data")) + (
-    "*lane_receiver*/w:bits",
+    "*lane_receiver*/w:sampled",
 )
 PAD_REGISTERS += tuple(f"node_link/w:{name}" for name in ("sync", "sck", "select_n", "mosi"))
 
 
 @dataclass(frozen=True)
 class Board:
-    """A board's file: `top` is its module, `phy` one of report.PHYS; `pins` maps a port to a site, or a vector to its sites, bit 0 first."""
+    """A board's file: `top` is its module, `phy` one of report.PHYS, `number` the protocol's for it, `milliamps` what it
+    draws from the host's socket; `pins` maps a port to a site, or a vector to its sites, bit 0 first."""
 
     name: str
     title: str
@@ -40,6 +41,9 @@ class Board:
     speed: int
     lanes: int
     phy: str
+    number: int
+    self_powered: bool
+    milliamps: int
     pins: dict[str, str | list[str]]
 
 
@@ -69,11 +73,14 @@ def sites(board: Board, lanes: int) -> dict[str, str]:
     return out | {f"{port}[{bit}]": site for port, all_ in wide.items() for bit, site in enumerate(all_)}
 
 
+PAD_OPTIONS = {"miso": " PULLMODE=UP", "tick_in": " PULLMODE=DOWN", "ulpi": " SLEWRATE=FAST"}  # by the port's beginning
+
+
 def constraints(board: Board, lanes: int) -> str:
     """The LPF file: sites, 3.3 V, pull-ups on the lanes (nobody there reads as ones), fast edges towards the PHY, clock."""
     lines = [f'FREQUENCY PORT "clk_60" {report.CLOCK_MHZ:g} MHZ;']
     for port, site in sites(board, lanes).items():
-        extra = " PULLMODE=UP" if port.startswith("miso") else " SLEWRATE=FAST" if port.startswith("ulpi") else ""
+        extra = next((more for start, more in PAD_OPTIONS.items() if port.startswith(start)), "")
         lines.append(f'LOCATE COMP "{port}" SITE "{site}";')
         lines.append(f'IOBUF PORT "{port}" IO_TYPE=LVCMOS33{extra};')
     return "\n".join(lines) + "\n"
@@ -89,10 +96,22 @@ def sources(usb: Path) -> list[Path]:
     ]
 
 
-def generate_usb(out: Path, serial: str = "0001") -> Path:
-    """The USB device as Verilog."""
+def commit() -> str:
+    """First 16 bits of the commit that the files are of, in hexadecimal; 0 if they have changes, or belong to none."""
+    changed = ["git", "status", "--porcelain", "--untracked-files=no"]
+    found, dirty = (
+        subprocess.run(command, cwd=REPO, capture_output=True, text=True)
+        for command in (["git", "rev-parse", "HEAD"], changed)
+    )
+    return found.stdout[:4] if found.returncode == 0 and not dirty.stdout else "0"
+
+
+def generate_usb(out: Path, board: Board, serial: str = "0001") -> Path:
+    """The board's USB device as Verilog."""
     path = out / "whisker_usb.v"
     command = [sys.executable, str(REPO / "fpga/usb/generate.py"), str(path), "--serial", serial]
+    command += ["--board", str(board.number), "--commit", commit(), "--milliamps", str(board.milliamps)]
+    command += [] if board.self_powered else ["--bus-powered"]
     subprocess.run(command, check=True)
     return path
 
@@ -153,7 +172,7 @@ def place(board: Board, lanes: int, netlist: Path, out: Path, seed: int = 1, spe
 def prepare(board: Board, lanes: int, out: Path, serial: str = "0001") -> Path:
     """The netlist of a whole board; ToolError if a cell has another clock than the PHY's."""
     out.mkdir(parents=True, exist_ok=True)
-    netlist = synthesise(board.top, sources(generate_usb(out, serial)), lanes, out)
+    netlist = synthesise(board.top, sources(generate_usb(out, board, serial)), lanes, out)
     problems = report.unconstrained_clocks(netlist, board.top, "clk_60")
     if problems:
         raise ToolError("; ".join(problems))

@@ -18,6 +18,8 @@ module cynthion #(
     output wire             select_n,
     output wire             mosi,
     input  wire [LANES-1:0] miso,
+    input  wire             tick_in,    // pulled down: another bridge's tick_out, a camera, a PPS
+    output wire             tick_out,   // to another bridge's tick_in
     output wire             led_n
 );
     // USB3343: polarity register, D+ and D- swapped, as the board has them
@@ -39,8 +41,8 @@ module cynthion #(
 
     board_core #(.LANES(LANES), .VENDOR_REGISTER(PHY_POLARITY), .VENDOR_VALUE(PHY_SWAPPED)) core (
         .clk(clk_60), .osc(osc), .ulpi_data_in(data_in), .ulpi_data_out(data_out), .ulpi_dir(dir), .ulpi_nxt(nxt),
-        .ulpi_stp(ulpi_stp), .ulpi_reset(ulpi_reset),
-        .sync(sync), .sck(sck), .select_n(select_n), .mosi(mosi), .miso(miso), .led(led));
+        .ulpi_stp(ulpi_stp), .ulpi_reset(ulpi_reset), .sync(sync), .sck(sck), .select_n(select_n), .mosi(mosi),
+        .miso(miso), .tick_in(tick_in), .tick_out(tick_out), .led(led));
 endmodule
 
 `default_nettype wire

@@ -102,7 +102,9 @@ def test_the_check_notices(fault, tmp_path):
 def test_the_bridge_synthesises_clean_with_one_clock(tmp_path):
     """The whole board with six lanes, USB device and all; pad registers where they belong."""
     lanes = 6
-    netlist = build.synthesise("cynthion", build.sources(build.generate_usb(tmp_path)), lanes, tmp_path)
+    netlist = build.synthesise(
+        "cynthion", build.sources(build.generate_usb(tmp_path, build.load("cynthion"))), lanes, tmp_path
+    )
     assert report.unconstrained_clocks(netlist, "cynthion", "clk_60") == []
     cells = json.loads(netlist.read_text())["modules"]["cynthion"]["cells"].values()
     assert not any("LATCH" in cell["type"].upper() for cell in cells)

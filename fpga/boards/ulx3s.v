@@ -17,6 +17,8 @@ module ulx3s #(
     output wire             select_n,
     output wire             mosi,
     input  wire [LANES-1:0] miso,
+    input  wire             tick_in,  // pulled down: another bridge's tick_out, a camera, a PPS
+    output wire             tick_out, // to another bridge's tick_in
     output reg              led
 );
     wire       clk_60, clk_48, locked, lit;
@@ -24,8 +26,8 @@ module ulx3s #(
     wire [7:0] rx_data, tx_data;
     wire       rx_active, rx_valid, rx_error, tx_valid, tx_ready, term_select;
     wire [1:0] line_state, xcvr_select, op_mode;
-    wire       running, link_busy, transfer_busy;
-    wire       unused = &{1'b0, running, link_busy, transfer_busy};
+    wire       running, link_busy, transfer_busy, configured, lost;
+    wire       unused = &{1'b0, running, link_busy, transfer_busy, configured, lost};
 
     // 25 MHz / 5 * 12 * 8 = 480 MHz, over 8 and over 10
     (* keep *) EHXPLLL #(
@@ -63,7 +65,8 @@ module ulx3s #(
         .utmi_tx_data(tx_data), .utmi_tx_valid(tx_valid), .utmi_tx_ready(tx_ready), .utmi_line_state(line_state),
         .utmi_vbus_valid(1'b1), .utmi_session_valid(1'b1), .utmi_session_end(1'b0),
         .utmi_xcvr_select(xcvr_select), .utmi_term_select(term_select), .utmi_op_mode(op_mode),
-        .serial_number(64'd0), .tick_external(1'b0), .tick_strobe(1'b0), .running(running), .link_busy(link_busy),
+        .serial_number(64'd0), .tick_external(1'b0), .tick_strobe(1'b0), .tick_in(tick_in), .tick_out(tick_out),
+        .usb_configured(configured), .frames_lost(lost), .running(running), .link_busy(link_busy),
         .transfer_busy(transfer_busy), .led(lit));
 endmodule
 

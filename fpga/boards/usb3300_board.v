@@ -16,6 +16,8 @@ module usb3300_board #(
     output wire             select_n,
     output wire             mosi,
     input  wire [LANES-1:0] miso,
+    input  wire             tick_in,    // pulled down: another bridge's tick_out, a camera, a PPS
+    output wire             tick_out,   // to another bridge's tick_in
     output wire             led_n
 );
     wire [7:0] data_in, data_out;
@@ -31,8 +33,8 @@ module usb3300_board #(
 
     board_core #(.LANES(LANES)) core (
         .clk(clk_60), .osc(osc), .ulpi_data_in(data_in), .ulpi_data_out(data_out), .ulpi_dir(dir), .ulpi_nxt(nxt),
-        .ulpi_stp(ulpi_stp), .ulpi_reset(ulpi_reset),
-        .sync(sync), .sck(sck), .select_n(select_n), .mosi(mosi), .miso(miso), .led(led));
+        .ulpi_stp(ulpi_stp), .ulpi_reset(ulpi_reset), .sync(sync), .sck(sck), .select_n(select_n), .mosi(mosi),
+        .miso(miso), .tick_in(tick_in), .tick_out(tick_out), .led(led));
 endmodule
 
 `default_nettype wire

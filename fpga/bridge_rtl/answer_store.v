@@ -1,9 +1,10 @@
 // The nodes' answers of the latest service window, kept until the next one, and read as the body of HID report `answers`:
 // alpha, beta and status of every lane. In place of a record that was not accepted stands the bridge's code, as in a
-// frame; lanes that this bridge does not have are off.
+// frame; lanes that this bridge does not have are off. A window that ends while the host reads waits until the read is
+// over: a read has several packets, all of one window.
 //
 //   bits[LANES] --> record_store --> alpha, beta, status --\
-//   verdicts ------> kept ---------> code -----------------+--> data, data, ..
+//   verdicts ------> next --> kept --> code ---------------+--> data, data, ..
 
 `default_nettype none
 
@@ -15,7 +16,11 @@ module answer_store #(
     input  wire             write,        // bits is to be stored
     input  wire [5:0]       bit_index,    // bit of the record
     input  wire [LANES-1:0] bits,         // that bit of every lane
-    input  wire             done,         // the window is over: keep the verdicts, show these records
+    input  wire             done,         // the window is over: keep the verdicts, and show these records when hold allows
+    input  wire             hold,         // a read is under way
+    output reg              waiting,      // a window is over and not shown yet: no other may begin
+    input  wire [7:0]       sequence_low, // windows; read in the cycle after done
+    output reg  [7:0]       shown,        // the same of what is shown
     input  wire [LANES-1:0] lane_mask,    // lanes in use
     input  wire [LANES-1:0] absent,       // verdicts of lane_receiver
     input  wire [LANES-1:0] crc_wrong,    // .
@@ -36,14 +41,24 @@ module answer_store #(
     localparam [2:0] FIRST_BYTE = RECORD_ALPHA[2:0], LAST_BYTE = RECORD_CRC[2:0] - 3'd1;
 
     reg [LANES-1:0] off, gone, corrupt, stale;
+    reg [LANES-1:0] next_off, next_gone, next_corrupt, next_stale;
+    wire            show = waiting && !hold;
     reg [3:0]       header_left;  // bytes
     reg [4:0]       lane;
     reg [2:0]       at_byte;      // of the record
     wire [7:0]      record_data;
 
     record_store #(.LANES(LANES)) store (
-        .clk(clk), .rst(rst), .swap(done), .write(write), .bit_index(bit_index), .bits(bits),
+        .clk(clk), .rst(rst), .swap(show), .write(write), .bit_index(bit_index), .bits(bits),
         .read_lane(lane), .read_byte(at_byte), .read_data(record_data));
+
+    always @(posedge clk)
+        if (done) begin
+            next_off     <= ~lane_mask;
+            next_gone    <= absent;
+            next_corrupt <= crc_wrong;
+            next_stale   <= tick_wrong;
+        end
 
     // Before the first window nothing is known of any lane.
     always @(posedge clk)
@@ -52,11 +67,17 @@ module answer_store #(
             gone    <= {LANES{1'b1}};
             corrupt <= {LANES{1'b0}};
             stale   <= {LANES{1'b0}};
-        end else if (done) begin
-            off     <= ~lane_mask;
-            gone    <= absent;
-            corrupt <= crc_wrong;
-            stale   <= tick_wrong;
+            waiting <= 1'b0;
+            shown   <= sequence_low;
+        end else begin
+            waiting <= done || (waiting && hold);
+            if (show) begin
+                off     <= next_off;
+                gone    <= next_gone;
+                corrupt <= next_corrupt;
+                stale   <= next_stale;
+                shown   <= sequence_low;
+            end
         end
 
     always @(posedge clk)

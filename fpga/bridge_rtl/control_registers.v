@@ -26,14 +26,15 @@ module control_registers #(
     output reg              run,           // as last written
     output reg  [5:0]       sck_divider,   // cycles of one SCK period
     output reg  [7:0]       word_gap,      // cycles between two words
+    output reg  [3:0]       options,       // bits of control_options
     output reg  [5:0]       sample_point,  // cycles from SCK edge to reading MISO
     output reg  [LANES-1:0] lane_mask,     // lanes in use
     output reg  [31:0]      tick_period    // cycles from tick to tick
 );
     `include "whisker_protocol.vh"
 
-    localparam RESERVED = REPORT_CONTROL_SAMPLE_POINT + 1;  // bytes that must be zero
-    localparam RESERVED_BITS = 8 * (REPORT_CONTROL_LANE_MASK - RESERVED);
+    localparam RESERVED = 8 * REPORT_CONTROL_OPTIONS + 4;  // bits that must be zero
+    localparam RESERVED_BITS = 8 * REPORT_CONTROL_LANE_MASK - RESERVED;
 
     reg  [8*REPORT_CONTROL_BYTES-1:0] incoming;  // first byte lowest
     reg  [6:0]                        length;    // bytes gathered
@@ -48,7 +49,7 @@ module control_registers #(
     wire ours = (length == REPORT_CONTROL_BYTES[6:0])
              && (incoming[8*REPORT_CONTROL_ID +: 8] == REPORT_ID_CONTROL[7:0])
              && (incoming[8*REPORT_CONTROL_WIRE_VERSION +: 8] == WIRE_VERSION[7:0])
-             && (incoming[8*RESERVED +: RESERVED_BITS] == {RESERVED_BITS{1'b0}});
+             && (incoming[RESERVED +: RESERVED_BITS] == {RESERVED_BITS{1'b0}});
     wire run_right     = (new_run <= 8'd1) && !(new_run[0] && stopping);
     wire divider_right = (new_divider >= LIMIT_SCK_DIVIDER_MIN[7:0]) && (new_divider <= LIMIT_SCK_DIVIDER_MAX[7:0])
                       && !new_divider[0];
@@ -79,12 +80,14 @@ module control_registers #(
             sck_divider  <= LIMIT_SCK_DIVIDER_DEFAULT[5:0];
             word_gap     <= LIMIT_WORD_GAP_DEFAULT[7:0];
             sample_point <= LIMIT_SAMPLE_POINT_DEFAULT[5:0];
+            options      <= 4'd0;
             lane_mask    <= {LANES{1'b1}};
             tick_period  <= LIMIT_TICK_PERIOD;
         end else if (apply) begin
             sck_divider  <= new_divider[5:0];
             word_gap     <= new_gap;
             sample_point <= new_sample[5:0];
+            options      <= incoming[8*REPORT_CONTROL_OPTIONS +: 4];
             lane_mask    <= new_mask[LANES-1:0];
             tick_period  <= new_period;
         end

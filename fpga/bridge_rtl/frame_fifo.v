@@ -1,6 +1,7 @@
 // The bridge's patience: frames wait here while the host does not read. Whole frames only: a frame for which there is
 // no room at its first byte is dropped to its last byte and counted, and a frame becomes visible to the reader with its
-// last byte. A frame marked `keep` (the last of a run, which ends the host's transfer) waits for room instead.
+// last byte. A frame marked `keep` (the last of a run, which ends the host's transfer) waits for room instead. If the host
+// wants `every` frame at once, each ends its transfer.
 //
 //   in --[ room for a frame? ]--> memory, 9 bits: data and end of stream --> output register --> out
 //             no: drop, count             ^write, commit         ^read
@@ -18,6 +19,7 @@ module frame_fifo #(
     input  wire       in_first,   // it is the frame's first
     input  wire       in_last,    // it is the frame's last
     input  wire       in_keep,    // this frame must not be dropped, and ends the stream: steady through the frame
+    input  wire       every,      // each frame ends the stream; read at its last byte
     output wire       in_ready,   // the byte is taken in this cycle
     output wire       dropped,    // a frame is dropped: one cycle
     output reg  [7:0] out_data,   // byte of the stream
@@ -48,7 +50,7 @@ module frame_fifo #(
     assign dropped  = taken && in_first && drop;
 
     always @(posedge clk)
-        if (taken && !drop) memory[write_at[ADDRESS_BITS-1:0]] <= {in_last && in_keep, in_data};
+        if (taken && !drop) memory[write_at[ADDRESS_BITS-1:0]] <= {in_last && (in_keep || every), in_data};
 
     always @(posedge clk)
         if (rst) begin

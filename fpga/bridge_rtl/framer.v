@@ -19,6 +19,7 @@ module framer #(
     input  wire             is_last,       // it is the last of the run
     input  wire [31:0]      tick,          // number of the frame's tick
     input  wire [63:0]      tick_time,     // cycles from start to this tick
+    input  wire [15:0]      usb_time,      // when its SYNC came, by sof_clock
     input  wire [31:0]      sequence_number,  // frames made since power-up
     input  wire [31:0]      dropped,       // frames dropped since start
     input  wire [LANES-1:0] lane_mask,     // lanes in use
@@ -65,6 +66,7 @@ module framer #(
         new_header[8*FRAME_HEADER_DROPPED +: 32] = dropped;
         new_header[8*FRAME_HEADER_LANE_MASK +: LANES] = lane_mask;
         new_header[8*FRAME_HEADER_LANES +: 8] = LIMIT_LANES[7:0];
+        new_header[8*FRAME_HEADER_USB_TIME +: 16] = usb_time;
     end
 
     wire       make        = (in_header || in_records) && (!out_valid || out_ready);

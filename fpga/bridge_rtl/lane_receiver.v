@@ -1,12 +1,15 @@
 // Reads all lanes at once and judges their records while they arrive. Everything is one bit per lane wide and updated
 // once per bit time: the sampled MISO lines, eight slices of the lanes' CRC registers, and whether a lane has sent only
 // ones or a wrong tick number. So 28 lanes cost eight vectors and no per-lane logic, and the verdicts are ready with the
-// last bit. They stay until the next clear.
+// last bit. They stay until the next clear. MISO passes two flip-flops, so that a line that changes while it is read is
+// one bit for all that read it. The second takes the pattern instead, if the host wants it.
 //
-//   miso[LANES] --capture--> bits ---+--> (record_store)
-//                                    +--> crc slice 7..0 --> crc_wrong[LANES]
-//   expected_tick, bit 7..0 ---------+--> xor -----------> tick_wrong[LANES]
-//                                    +--> and -----------> absent[LANES]
+//   miso[LANES] --capture--> sampled --[ or pattern ]
+//                                      |
+//                                     bits ---+--> (record_store)
+//                                             +--> crc slice 7..0 --> crc_wrong[LANES]
+//   expected_tick, bit 7..0 ------------------+--> xor -----------> tick_wrong[LANES]
+//                                             +--> and -----------> absent[LANES]
 
 `default_nettype none
 
@@ -20,6 +23,7 @@ module lane_receiver #(
     input  wire             capture,        // read MISO at the end of this cycle
     input  wire [5:0]       capture_index,  // bit of the record then on MISO
     input  wire [LANES-1:0] miso,           // one line per lane
+    input  wire             pattern,        // 1: records of pattern_source in their place
     output reg  [LANES-1:0] bits,           // the bit last read from each lane
     output reg              bits_valid,     // bits is new: one cycle
     output reg  [5:0]       bits_index,     // bit of the record held in bits
@@ -38,11 +42,24 @@ module lane_receiver #(
     wire [LANES-1:0] feedback = crc[7] ^ bits;
     wire             in_tick = (bits_index[5:3] == RECORD_TICK[2:0]);
 
+    reg  [LANES-1:0] sampled;       // as read; in the pads
+    reg              captured;      // sampled is new
+    reg  [5:0]       sampled_index;
+    wire [LANES-1:0] own;           // the same bit of pattern_source
+
+    pattern_source #(.LANES(LANES)) source (
+        .clk(clk), .clear(clear), .expected_tick(expected_tick), .step(captured), .index(sampled_index), .bits(own));
+
     always @(posedge clk) begin
-        bits_valid <= capture && !rst;
+        captured   <= capture && !rst;
+        bits_valid <= captured && !rst;
         if (capture) begin
-            bits <= miso;
-            bits_index <= capture_index;
+            sampled       <= miso;
+            sampled_index <= capture_index;
+        end
+        if (captured) begin
+            bits       <= pattern ? own : sampled;
+            bits_index <= sampled_index;
         end
     end
 

@@ -1,4 +1,4 @@
-// Answers the host's reads: HID reports control, counters, identity and answers. The whole report is taken at once when a
+// Answers the host's reads: HID reports control, counters, identity, answers and timing. The whole report is taken at once when a
 // read begins, so that a counter cannot change between two of its bytes, and is then shifted out; behind the header of
 // answers come the bytes of answer_store.
 //
@@ -8,7 +8,7 @@
 `default_nettype none
 
 module report_reader #(
-    parameter LANES      = 28,
+    parameter LANES      = 28,  // that have a pin
     parameter FIFO_BYTES = 16384
 ) (
     input  wire             clk,             // 60 MHz
@@ -23,6 +23,18 @@ module report_reader #(
     input  wire [5:0]       sample_point,    // .
     input  wire [LANES-1:0] lane_mask,       // .
     input  wire [31:0]      tick_period,     // .
+    input  wire [3:0]       options,         // .
+    input  wire [7:0]       board,           // identity, from the build
+    input  wire [15:0]      build,           // .
+    input  wire [31:0]      tick,            // timing
+    input  wire [15:0]      usb_time,        // .
+    input  wire [15:0]      sof_cycles,      // .
+    input  wire             tick_level,      // .
+    input  wire [31:0]      edges,           // .
+    input  wire [31:0]      early,           // .
+    input  wire [31:0]      silent,          // .
+    input  wire [31:0]      uneven,          // .
+    input  wire [31:0]      shortest,        // .
     input  wire [31:0]      ticks,           // counters
     input  wire [31:0]      frames,          // .
     input  wire [31:0]      dropped,         // .
@@ -54,6 +66,7 @@ module report_reader #(
                     report[8*REPORT_CONTROL_SCK_DIVIDER +: 6] <= sck_divider;
                     report[8*REPORT_CONTROL_WORD_GAP +: 8] <= word_gap;
                     report[8*REPORT_CONTROL_SAMPLE_POINT +: 6] <= sample_point;
+                    report[8*REPORT_CONTROL_OPTIONS +: 4] <= options;
                     report[8*REPORT_CONTROL_LANE_MASK +: LANES] <= lane_mask;
                     report[8*REPORT_CONTROL_TICK_PERIOD +: 32] <= tick_period;
                 end
@@ -73,10 +86,24 @@ module report_reader #(
                     report[8*REPORT_IDENTITY_CLOCK_HZ +: 32] <= LIMIT_CLOCK_HZ;
                     report[8*REPORT_IDENTITY_FRAME_BYTES +: 16] <= FRAME_BYTES[15:0];
                     report[8*REPORT_IDENTITY_FIFO_BYTES +: 16] <= FIFO_BYTES[15:0];
+                    report[8*REPORT_IDENTITY_BOARD +: 8] <= board;
+                    report[8*REPORT_IDENTITY_WIRED_LANES +: 8] <= LANES[7:0];
+                    report[8*REPORT_IDENTITY_BUILD +: 16] <= build;
                 end
                 REPORT_ID_ANSWERS[7:0]: begin
                     report[8*REPORT_ANSWERS_PENDING] <= pending;
                     report[8*REPORT_ANSWERS_SEQUENCE +: 8] <= sequence_low;
+                end
+                REPORT_ID_TIMING[7:0]: begin
+                    report[8*REPORT_TIMING_USB_TIME +: 16] <= usb_time;
+                    report[8*REPORT_TIMING_TICK +: 32] <= tick;
+                    report[8*REPORT_TIMING_SOF_CYCLES +: 16] <= sof_cycles;
+                    report[8*REPORT_TIMING_LEVEL] <= tick_level;
+                    report[8*REPORT_TIMING_EDGES +: 32] <= edges;
+                    report[8*REPORT_TIMING_EARLY +: 32] <= early;
+                    report[8*REPORT_TIMING_SILENT +: 32] <= silent;
+                    report[8*REPORT_TIMING_UNEVEN +: 32] <= uneven;
+                    report[8*REPORT_TIMING_SHORTEST +: 32] <= shortest;
                 end
                 default: ;
             endcase

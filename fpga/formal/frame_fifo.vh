@@ -44,7 +44,7 @@ end
 reg  [8:0]           f_what;
 wire                 f_stored = ((f_where - read_at) < used) && (used != 0);
 always @(posedge clk)
-    if (!rst && taken && !drop && write_at == f_where) f_what <= {in_last && in_keep, in_data};
+    if (!rst && taken && !drop && write_at == f_where) f_what <= {in_last && (in_keep || every), in_data};
 always @* if (f_past && f_stored) assert (memory[f_where[ADDRESS_BITS-1:0]] == f_what);
 always @(posedge clk) if (f_past && !$past(rst)) begin
     if ($past(refill && !empty)) assert (out_valid && read_at == $past(read_at) + ONE);

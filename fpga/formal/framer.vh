@@ -42,7 +42,7 @@ end
 
 // What start gave. Of the header one byte is kept, whichever one cares to choose.
 localparam [4:0] F_OWN = LANES;  // lanes of this bridge; the others are off
-wire [HEADER_BITS-1:0] f_header = {24'd0, LIMIT_LANES[7:0], {32 - LANES{1'b0}}, lane_mask, dropped, sequence_number,
+wire [HEADER_BITS-1:0] f_header = {8'd0, usb_time, LIMIT_LANES[7:0], {32 - LANES{1'b0}}, lane_mask, dropped, sequence_number,
     tick_time, tick, is_last ? FRAME_FLAG_LAST[7:0] : 8'd0, WIRE_VERSION[7:0], LIMIT_FRAME_MAGIC[15:0]};
 (* anyconst *) wire [4:0] f_where;
 reg [7:0]       f_what;

@@ -3,7 +3,7 @@
 // the CRC of the others. They stay until the next clear.
 //
 // Assumed of node_link (its part, proved there): after a clear come captures of bit 0 to bit 63, once each. A clear comes
-// neither with a capture nor a cycle after one: SYNC lies between.
+// neither with a capture nor in the two cycles after one: SYNC lies between.
 
 reg f_past = 1'b0;  // there is a cycle before
 always @(posedge clk) f_past <= 1'b1;
@@ -18,13 +18,14 @@ reg [7:0] f_byte;     // its byte under way, first bit highest
 reg [7:0] f_sum;      // CRC register of its whole bytes
 reg [7:0] f_before;   // the same before the last byte
 
-wire [6:0] f_captured = f_done + {6'd0, bits_valid};
+wire [6:0] f_reached = f_done + {6'd0, bits_valid};
+wire [6:0] f_captured = f_reached + {6'd0, captured};
 wire       f_bit = bits[f_lane];
 wire [7:0] f_byte_now = f_byte | {f_bit, 7'd0} >> f_done[2:0];
 
 always @* begin
-    if (!f_past) assume (clear && !capture && !bits_valid);
-    if (clear) assume (!capture && !bits_valid && !rst);
+    if (!f_past) assume (clear && !capture && !captured && !bits_valid);
+    if (clear) assume (!capture && !captured && !bits_valid && !rst);
     if (f_live && capture) assume (capture_index == f_captured[5:0] && !f_captured[6]);
 end
 
@@ -43,10 +44,12 @@ always @(posedge clk)
         end
     end
 
-// What a capture saw is the bit that is judged in the next cycle.
-always @(posedge clk) if (f_past && $past(capture && !rst))
-    assert (bits_valid && f_bit == $past(miso[f_lane]) && bits_index == $past(capture_index));
-always @(posedge clk) if (f_past && $past(!capture || rst)) assert (!bits_valid);
+// What a capture saw, or the pattern in its place, is the bit that is judged two cycles later.
+always @(posedge clk) if (f_past) begin
+    assert (captured == $past(capture && !rst) && bits_valid == $past(captured && !rst));
+    if (captured) assert (sampled[f_lane] == $past(miso[f_lane]) && sampled_index == $past(capture_index));
+    if (bits_valid) assert (f_bit == ($past(pattern) ? $past(own[f_lane]) : $past(sampled[f_lane])));
+end
 
 // The verdicts on a whole record.
 always @* if (f_past && f_live && f_done == 7'd64) begin
@@ -70,6 +73,7 @@ wire [7:0] f_seen = ~(8'hFF >> f_done);
 always @* if (f_past && f_live) begin
     assert (f_captured <= 7'd64);
     if (bits_valid) assert (bits_index == f_done[5:0]);
+    if (captured) assert (sampled_index == f_reached[5:0]);
     assert (absent[f_lane] == f_ones);
     assert (tick_wrong[f_lane] == |((f_first ^ f_expected) & f_seen));
     if (f_done < 7'd8) assert (tick == f_expected << f_done && f_first == f_byte);

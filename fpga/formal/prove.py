@@ -52,6 +52,7 @@ PROOFS = {
                 ("if (!empty) read_at <= read_at + ONE", "read_at <= read_at + ONE"),
                 ("taken && !drop) memory", "taken) memory"),
                 ("!(in_first && in_keep && !room)", "1'b1"),
+                ("(in_keep || every), in_data", "in_keep, in_data"),
             ),
         ),
         Proof(
@@ -77,10 +78,12 @@ PROOFS = {
         Proof(
             "lane_receiver",
             depth=10,
-            induction=2,
+            induction=3,
             cover=70,
             parameters={"LANES": 2},
+            also=("pattern_source",),
             mutations=(
+                ("bits       <= pattern ? own : sampled", "bits       <= pattern ? own : miso"),
                 ("tick_wrong <= tick_wrong | (bits ^ {LANES{tick[7]}})", "tick_wrong <= bits ^ {LANES{tick[7]}}"),
                 ("{tick[6:0], 1'b0}", "tick"),
                 ("RECORD_TICK[2:0])", "RECORD_STATUS[2:0])"),

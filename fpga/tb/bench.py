@@ -14,6 +14,7 @@ from cocotb.triggers import ClockCycles, RisingEdge  # noqa: E402
 from whisker.protocol import CODES, LANES, RECORD, STATUS_CODE_SHIFT  # noqa: E402
 
 RTL = REPO / "fpga" / "bridge_rtl"
+LINK = ("node_link", "lane_receiver", "pattern_source", "record_store")  # modules of link_bench
 CLOCK_PS = 16666  # 60 MHz, even
 SEED = int(os.environ.get("WHISKER_BENCH_SEED", "1"))  # of all that the benches draw
 

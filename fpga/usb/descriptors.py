@@ -1,6 +1,7 @@
 """What the bridge tells a USB host about itself: device, configuration, strings and the HID report descriptor."""
 
 import struct
+from dataclasses import dataclass
 
 from standard_requests import (
     BOS,
@@ -18,7 +19,7 @@ from usb_protocol.emitters import DeviceDescriptorCollection
 from usb_protocol.emitters.descriptors.standard import ConfigurationDescriptorEmitter
 from usb_protocol.types import USBTransferType
 
-from whisker.protocol import LIMITS, REPORTS
+from whisker.protocol import BOARDS, LIMITS, REPORTS
 
 HID_CLASS = 0x03
 VENDOR_CLASS = 0xFF
@@ -32,6 +33,36 @@ PLATFORM_CAPABILITY = bytes.fromhex("df60ddd88945c74c9cd2659d9e648a9f")  # Micro
 WINDOWS_8_1 = 0x06030000  # the first Windows that asks
 # Programs on Windows find the frame interface under this class of devices.
 INTERFACE_GUID = "{7E2A9C51-3C0B-4B7A-9D52-5B6E1F0C28D4}"
+
+
+SELF_POWERED = 0x40  # bit of bmAttributes
+ATTRIBUTES = 0x80  # its bit 7 is always 1
+
+
+@dataclass(frozen=True)
+class Build:
+    """What differs from board to board and from build to build; the default is the simulated bridge.
+
+    commit: first 16 bits, 0 if unknown; milliamps: drawn from the host at most, 0 to 500.
+    """
+
+    serial: str = "0001"
+    board: int = BOARDS["simulation"]
+    commit: int = 0
+    self_powered: bool = True
+    milliamps: int = 2
+
+    @property
+    def attributes(self) -> int:
+        """bmAttributes: self-powered or not; no remote wake-up."""
+        return ATTRIBUTES | (SELF_POWERED if self.self_powered else 0)
+
+    @property
+    def max_power(self) -> int:
+        """bMaxPower, in 2 mA; ValueError if no host may give so much (USB 2.0 section 7.2.1)."""
+        if not 0 <= self.milliamps <= 500:
+            raise ValueError(f"milliamps is {self.milliamps}; a USB 2.0 device draws 0 to 500")
+        return (self.milliamps + 1) // 2
 
 
 def report_descriptor() -> bytes:
@@ -75,11 +106,12 @@ def binary_object_store() -> bytes:
     return struct.pack("<BBHB", 5, BOS, 5 + len(platform), 1) + platform
 
 
-def configuration(at_full_speed: bool, kind: int = CONFIGURATION) -> bytes:
+def configuration(build: Build, at_full_speed: bool, kind: int = CONFIGURATION) -> bytes:
     """Configuration 1 as it is at that speed: interface 0 vendor bulk IN, interface 1 HID; kind 7: as other-speed
     configuration (USB 2.0 section 9.6.4)."""
     emitter = ConfigurationDescriptorEmitter()
-    emitter.bMaxPower = 250  # 500 mA for the FPGA board; the nodes have their own supply
+    emitter.bmAttributes = build.attributes
+    emitter.bMaxPower = build.max_power  # of the FPGA board; the nodes have their own supply
     with emitter.InterfaceDescriptor() as frames:
         frames.bInterfaceNumber = LIMITS["usb_bulk_interface"]
         frames.bInterfaceClass = VENDOR_CLASS
@@ -87,9 +119,11 @@ def configuration(at_full_speed: bool, kind: int = CONFIGURATION) -> bytes:
             endpoint.bEndpointAddress = LIMITS["usb_bulk_in"]
             endpoint.bmAttributes = USBTransferType.BULK
             endpoint.wMaxPacketSize = FULL_SPEED_PACKET if at_full_speed else LIMITS["bulk_packet"]
+            endpoint.bInterval = 0  # NAKs are not limited (table 9-13)
     with emitter.InterfaceDescriptor() as control:
         control.bInterfaceNumber = LIMITS["usb_hid_interface"]
         control.bInterfaceClass = HID_CLASS
+        control.bInterfaceSubclass = control.bInterfaceProtocol = 0  # no boot device (HID 1.11 sections 4.2, 4.3)
         control.add_subordinate_descriptor(hid_descriptor(len(report_descriptor())))
         with control.EndpointDescriptor() as endpoint:
             endpoint.bEndpointAddress = LIMITS["usb_hid_in"]
@@ -101,7 +135,7 @@ def configuration(at_full_speed: bool, kind: int = CONFIGURATION) -> bytes:
     return bytes(raw)
 
 
-def descriptors(serial: str) -> DeviceDescriptorCollection:
+def descriptors(build: Build) -> DeviceDescriptorCollection:
     """All descriptors, by the type under which they lie in the ROM (standard_requests.py)."""
     collection = DeviceDescriptorCollection()
     reports = report_descriptor()
@@ -112,12 +146,12 @@ def descriptors(serial: str) -> DeviceDescriptorCollection:
         device.bcdDevice = LIMITS["gateware_version"]
         device.iManufacturer = "CrunchBot"
         device.iProduct = "Whisker bridge"
-        device.iSerialNumber = serial
+        device.iSerialNumber = build.serial
         device.bNumConfigurations = 1
-    collection.add_descriptor(configuration(False), descriptor_type=CONFIGURATION)
-    collection.add_descriptor(configuration(True), descriptor_type=CONFIGURATION_AT_FULL_SPEED)
-    collection.add_descriptor(configuration(True, OTHER_SPEED), descriptor_type=OTHER_SPEED)
-    collection.add_descriptor(configuration(False, OTHER_SPEED), descriptor_type=OTHER_SPEED_AT_FULL_SPEED)
+    collection.add_descriptor(configuration(build, False), descriptor_type=CONFIGURATION)
+    collection.add_descriptor(configuration(build, True), descriptor_type=CONFIGURATION_AT_FULL_SPEED)
+    collection.add_descriptor(configuration(build, True, OTHER_SPEED), descriptor_type=OTHER_SPEED)
+    collection.add_descriptor(configuration(build, False, OTHER_SPEED), descriptor_type=OTHER_SPEED_AT_FULL_SPEED)
     collection.add_descriptor(device_qualifier(), descriptor_type=QUALIFIER)
     collection.add_descriptor(binary_object_store(), descriptor_type=BOS)
     collection.add_descriptor(windows_set(), descriptor_type=WINDOWS_SET)

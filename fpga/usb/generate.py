@@ -1,4 +1,4 @@
-"""Writes the bridge's USB device as Verilog: `generate.py OUT.v [--serial TEXT]`.
+"""Writes the bridge's USB device as Verilog: `generate.py OUT.v [--serial TEXT] [--board NUMBER] ...`.
 
 LUNA (pinned in requirements.lock) gives the device core; descriptors.py, hid_requests.py and endpoints.py make it the
 bridge's composite device. The output carries LUNA's licence notice and is a build product, never committed.
@@ -19,7 +19,7 @@ from amaranth import ClockDomain, Elaboratable, Module, Signal  # noqa: E402
 from amaranth.back import verilog  # noqa: E402
 from bus_guard import BusGuard  # noqa: E402
 from control_endpoint import ControlEndpoint  # noqa: E402
-from descriptors import SERIAL_INDEX, descriptors  # noqa: E402
+from descriptors import SELF_POWERED, SERIAL_INDEX, Build, descriptors  # noqa: E402
 from endpoints import FrameEndpoint, SilentEndpoint, strobes  # noqa: E402
 from hid_requests import HidRequests  # noqa: E402
 from luna.gateware.interface.utmi import UTMIInterface  # noqa: E402
@@ -47,19 +47,27 @@ class WhiskerUsb(Elaboratable):
     utmi_*          to the PHY
     serial_number   64 bits shown as serial number, constant; 0: the text given at generation
     stream_*        frames in
+    board, build    constants of this build, for report `identity`
+    configured      the host has set the configuration
+    sof, sof_frame  a start-of-frame packet has come: strobe, its frame number
     restart         bus reset or SET_CONFIGURATION: begin anew
     suspended       3 ms without traffic (USB 2.0 section 7.1.7.6): until the host resumes
-    write_*, read_* report registers (hid_requests.py)
+    write_*, read_* report registers (hid_requests.py); read_open: a report is being read
     """
 
-    def __init__(self, serial: str):
-        self._serial = serial
+    def __init__(self, build: Build):
+        self._build = build
         self._bus = UTMIInterface()
         self._utmi = {name: Signal(len(self._bus[name]), name=f"utmi_{name}") for name in UTMI_IN + UTMI_OUT}
         self._hid = HidRequests()
         self.serial_number = Signal(64, name="serial_number")
         self.restart = Signal(name="restart")
         self.suspended = Signal(name="suspended")
+        self.board = Signal(8, name="board")
+        self.build = Signal(16, name="build")
+        self.configured = Signal(name="configured")
+        self.sof = Signal(name="sof")
+        self.sof_frame = Signal(11, name="sof_frame")
         self.stream_data = Signal(8, name="stream_data")
         self.stream_valid = Signal(name="stream_valid")
         self.stream_last = Signal(name="stream_last")
@@ -69,9 +77,10 @@ class WhiskerUsb(Elaboratable):
         """Every port but clock and reset."""
         hid = self._hid
         reports = [hid.write_start, hid.write_valid, hid.write_index, hid.write_data, hid.write_done, hid.write_accept]
-        reports += [hid.read_start, hid.read_id, hid.read_packet, hid.read_next, hid.read_data]
+        reports += [hid.read_start, hid.read_id, hid.read_packet, hid.read_next, hid.read_data, hid.read_open]
+        told = [self.board, self.build, self.configured, self.sof, self.sof_frame]
         stream = [self.restart, self.stream_data, self.stream_valid, self.stream_last, self.stream_ready]
-        return [*self._utmi.values(), self.serial_number, self.suspended, *stream, *reports]
+        return [*self._utmi.values(), self.serial_number, self.suspended, *told, *stream, *reports]
 
     def elaborate(self, platform):
         m = Module()
@@ -90,6 +99,11 @@ class WhiskerUsb(Elaboratable):
             m.d.usb += frames_at_full_speed.eq(full_speed)
         m.d.comb += [
             device.connect.eq(1),
+            self.board.eq(self._build.board),
+            self.build.eq(self._build.commit),
+            self.configured.eq(control.interface.active_config != 0),
+            self.sof.eq(device.sof_detected),
+            self.sof_frame.eq(control.interface.tokenizer.frame),
             full_speed.eq(device.speed != USBSpeed.HIGH),
             self.suspended.eq(device.suspended),
             self.restart.eq(device.reset_detected | control.interface.config_changed),
@@ -108,8 +122,9 @@ class WhiskerUsb(Elaboratable):
         control = ControlEndpoint(self._bus)
         addresses = (LIMITS["usb_bulk_in"], LIMITS["usb_hid_in"])
         standard = StandardRequests(
-            descriptors(self._serial), SERIAL_INDEX, addresses, len(addresses), LIMITS["usb_hid_interface"]
+            descriptors(self._build), SERIAL_INDEX, addresses, len(addresses), LIMITS["usb_hid_interface"]
         )
+        m.d.comb += standard.self_powered.eq(bool(self._build.attributes & SELF_POWERED))
         for handler in (standard, self._hid):
             control.add_request_handler(handler)
         for endpoint in (control, *endpoints):
@@ -142,12 +157,12 @@ class WhiskerUsb(Elaboratable):
         ]
 
 
-def generate(serial: str) -> str:
+def generate(build: Build) -> str:
     """Verilog text of module whisker_usb."""
     top = Module()
     top.domains.usb = domain = ClockDomain("usb")
     domain.clk.name, domain.rst.name = "clk", "rst"
-    top.submodules.usb = usb = WhiskerUsb(serial)
+    top.submodules.usb = usb = WhiskerUsb(build)
     ports = [domain.clk, domain.rst, *usb.ports()]
     return NOTICE + verilog.convert(top, name="whisker_usb", ports=ports, strip_internal_attrs=True)
 
@@ -155,9 +170,19 @@ def generate(serial: str) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description="Write the bridge's USB device as Verilog.")
     parser.add_argument("out", type=Path, help="Verilog file to write")
-    parser.add_argument("--serial", default="0001", help="serial number string (default: 0001)")
-    arguments = parser.parse_args()
-    arguments.out.write_text(generate(arguments.serial))
+    default = Build()
+    parser.add_argument("--serial", default=default.serial, help="serial number string (default: %(default)s)")
+    parser.add_argument("--board", type=int, default=default.board, help="number of the board (default: %(default)s)")
+    parser.add_argument(
+        "--commit", type=lambda text: int(text, 16), default=default.commit, help="its first 16 bits, in hexadecimal"
+    )
+    parser.add_argument("--bus-powered", action="store_true", help="the board takes its power from the host")
+    parser.add_argument(
+        "--milliamps", type=int, default=default.milliamps, help="that it draws at most (default: %(default)s)"
+    )
+    given = parser.parse_args()
+    build = Build(given.serial, given.board, given.commit, not given.bus_powered, given.milliamps)
+    given.out.write_text(generate(build))
 
 
 if __name__ == "__main__":

@@ -29,6 +29,7 @@ class HidRequests(ControlRequestHandler):
                done, accept          accept is read in the cycle of done; refused: STALL
         read:  start, id, packet     a read of report `id` begins at byte 64 * packet
                next, data            data is the report's next byte from two cycles after start on
+               open                  from the first start to the status stage, or to the next SETUP
     """
 
     def __init__(self):
@@ -44,6 +45,7 @@ class HidRequests(ControlRequestHandler):
         self.read_packet = Signal(2)
         self.read_next = Signal()
         self.read_data = Signal(8)
+        self.read_open = Signal()
 
     def elaborate(self, platform):
         m = Module()
@@ -67,6 +69,10 @@ class HidRequests(ControlRequestHandler):
                 self._get_idle(m)
             with m.Elif(self._answer_wanted()):
                 m.d.comb += self.interface.handshakes_out.stall.eq(1)
+        with m.If(self.interface.status_requested | self.interface.setup.received):
+            m.d.usb += self.read_open.eq(0)
+        with m.Elif(self.read_start):
+            m.d.usb += self.read_open.eq(1)
         self._decode(m)  # last: a SETUP overrides what the request before it wants
         return m
 

@@ -38,6 +38,7 @@ class StandardRequests(ControlRequestHandler):
     hid_interface: which of them is HID.
 
         full_speed               in: the bus runs at full speed
+        self_powered             in: what GET_STATUS tells of the device
         serial                   in: serial number, shown as 16 hexadecimal digits; 0: the text among the descriptors
         address                  in: the device's, 0 in the default state
         other_token, other_address   in: strobe and address of any token on the bus, whomever it is for
@@ -49,6 +50,7 @@ class StandardRequests(ControlRequestHandler):
         super().__init__()
         self._serial_index = serial_index
         self.serial = Signal(64)
+        self.self_powered = Signal()
         self._descriptors = descriptors
         self._endpoints = in_endpoints
         self._interfaces = interfaces
@@ -145,7 +147,7 @@ class StandardRequests(ControlRequestHandler):
         with m.Case(GET_STATUS):
             known = (device & (setup.index == 0)) | interface | endpoint
             self._serve(m, self._reads() & (setup.value == 0) & known, Kind.ANSWER)
-            m.d.usb += self.answer.eq(endpoint & (chosen & self.halted).any())
+            m.d.usb += self.answer.eq((endpoint & (chosen & self.halted).any()) | (device & self.self_powered))
             m.d.usb += self.answer_bytes.eq(Mux(setup.length == 1, 1, 2))
         with m.Case(CLEAR_FEATURE):
             self._serve(m, halt, Kind.UNHALT)

@@ -28,7 +28,8 @@
 #define WHISKER_LIMIT_USB_HID_INTERFACE 1u
 #define WHISKER_LIMIT_USB_BULK_IN 129u /* frames */
 #define WHISKER_LIMIT_USB_HID_IN 130u /* HID needs one; it answers NAK */
-#define WHISKER_LIMIT_GATEWARE_VERSION 2u
+#define WHISKER_LIMIT_GATEWARE_VERSION 3u
+#define WHISKER_LIMIT_TICK_LEAD 4u /* cycle of 60 MHz, from the rise of tick_out to SYNC: as long as tick_in takes to another bridge's SYNC, but for half a cycle */
 #define WHISKER_LIMIT_SERVICE_PAUSE 2400u /* cycle of 60 MHz, from the first window of a tick to the second: 40 us for a node to read the order */
 #define WHISKER_LIMIT_SERVICE_TICK_MIN 20000u /* cycle of 60 MHz, both windows at the default bus settings take 17070 */
 #define WHISKER_LIMIT_IMAGE_MAGIC UINT32_C(1296649047)
@@ -80,6 +81,7 @@
 #define WHISKER_FRAME_HEADER_DROPPED 20u /* byte offset; 32 bits */
 #define WHISKER_FRAME_HEADER_LANE_MASK 24u /* byte offset; 32 bits */
 #define WHISKER_FRAME_HEADER_LANES 28u /* byte offset; 8 bits */
+#define WHISKER_FRAME_HEADER_USB_TIME 29u /* byte offset; 16 bits */
 #define WHISKER_FRAME_HEADER_CRC 31u /* byte offset; 8 bits */
 #define WHISKER_REPORT_CONTROL_BYTES 16u
 #define WHISKER_REPORT_ID_CONTROL 1u /* HID report id */
@@ -89,6 +91,7 @@
 #define WHISKER_REPORT_CONTROL_SCK_DIVIDER 3u /* byte offset; 8 bits */
 #define WHISKER_REPORT_CONTROL_WORD_GAP 4u /* byte offset; 8 bits */
 #define WHISKER_REPORT_CONTROL_SAMPLE_POINT 5u /* byte offset; 8 bits */
+#define WHISKER_REPORT_CONTROL_OPTIONS 6u /* byte offset; 8 bits */
 #define WHISKER_REPORT_CONTROL_LANE_MASK 8u /* byte offset; 32 bits */
 #define WHISKER_REPORT_CONTROL_TICK_PERIOD 12u /* byte offset; 32 bits */
 #define WHISKER_REPORT_COUNTERS_BYTES 32u
@@ -112,6 +115,9 @@
 #define WHISKER_REPORT_IDENTITY_CLOCK_HZ 4u /* byte offset; 32 bits */
 #define WHISKER_REPORT_IDENTITY_FRAME_BYTES 8u /* byte offset; 16 bits */
 #define WHISKER_REPORT_IDENTITY_FIFO_BYTES 10u /* byte offset; 16 bits */
+#define WHISKER_REPORT_IDENTITY_BOARD 12u /* byte offset; 8 bits */
+#define WHISKER_REPORT_IDENTITY_WIRED_LANES 13u /* byte offset; 8 bits */
+#define WHISKER_REPORT_IDENTITY_BUILD 14u /* byte offset; 16 bits */
 #define WHISKER_REPORT_SERVICE_BYTES 56u
 #define WHISKER_REPORT_ID_SERVICE 4u /* HID report id */
 #define WHISKER_REPORT_SERVICE_ID 0u /* byte offset; 8 bits */
@@ -126,9 +132,26 @@
 #define WHISKER_REPORT_ANSWERS_PENDING 2u /* byte offset; 8 bits */
 #define WHISKER_REPORT_ANSWERS_SEQUENCE 3u /* byte offset; 8 bits */
 #define WHISKER_REPORT_ANSWERS_ANSWER 8u /* byte offset; 16 bits */
+#define WHISKER_REPORT_TIMING_BYTES 32u
+#define WHISKER_REPORT_ID_TIMING 6u /* HID report id */
+#define WHISKER_REPORT_TIMING_ID 0u /* byte offset; 8 bits */
+#define WHISKER_REPORT_TIMING_WIRE_VERSION 1u /* byte offset; 8 bits */
+#define WHISKER_REPORT_TIMING_USB_TIME 2u /* byte offset; 16 bits */
+#define WHISKER_REPORT_TIMING_TICK 4u /* byte offset; 32 bits */
+#define WHISKER_REPORT_TIMING_SOF_CYCLES 8u /* byte offset; 16 bits */
+#define WHISKER_REPORT_TIMING_LEVEL 10u /* byte offset; 8 bits */
+#define WHISKER_REPORT_TIMING_EDGES 12u /* byte offset; 32 bits */
+#define WHISKER_REPORT_TIMING_EARLY 16u /* byte offset; 32 bits */
+#define WHISKER_REPORT_TIMING_SILENT 20u /* byte offset; 32 bits */
+#define WHISKER_REPORT_TIMING_UNEVEN 24u /* byte offset; 32 bits */
+#define WHISKER_REPORT_TIMING_SHORTEST 28u /* byte offset; 32 bits */
 #define WHISKER_COMMAND_SAMPLE 1u
 #define WHISKER_COMMAND_SERVICE 2u
 #define WHISKER_FRAME_FLAG_LAST 1u
+#define WHISKER_CONTROL_OPTION_TICK_IN 1u
+#define WHISKER_CONTROL_OPTION_FALLING 2u
+#define WHISKER_CONTROL_OPTION_EVERY_FRAME 4u
+#define WHISKER_CONTROL_OPTION_PATTERN 8u
 #define WHISKER_STATUS_CODE_SHIFT 10u /* the six-bit code's place in a status */
 #define WHISKER_CODE_OK 0u /* the reading is good, unless sensor error bits are set */
 #define WHISKER_CODE_STARTING 1u /* the sensor has not yet had its start-up time */
@@ -196,6 +219,14 @@
 #define WHISKER_NODE_STATE_BAD_HEADER 7u /* refused: magic, format, length, place or CRC of the header is wrong */
 #define WHISKER_NODE_STATE_BAD_IMAGE 8u /* refused: the CRC-32 of what was loaded is wrong */
 #define WHISKER_NODE_STATE_FLASH_FAILED 9u /* the flash does not hold what was written: replace the node */
+#define WHISKER_BOARD_SIMULATION 0u /* no board: the Verilog in a simulator, or its model */
+#define WHISKER_BOARD_ECPIX5 1u /* ECPIX-5 */
+#define WHISKER_BOARD_COLORLIGHT_I9 2u /* Colorlight i9 on its extension board */
+#define WHISKER_BOARD_CYNTHION 3u /* Cynthion */
+#define WHISKER_BOARD_TANG_PRIMER_20K 4u /* Tang Primer 20K on its dock */
+#define WHISKER_BOARD_ULX3S 5u /* ULX3S */
+#define WHISKER_BOARD_COLORLIGHT_I5 6u /* Colorlight i5 on its extension board */
+#define WHISKER_BOARD_ORANGECRAB 7u /* OrangeCrab */
 #define WHISKER_HEALTH_COUNT 16u
 #define WHISKER_CRC8_POLYNOMIAL 47u
 #define WHISKER_CRC8_INIT 255u

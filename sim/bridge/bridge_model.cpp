@@ -21,6 +21,7 @@ BridgeModel::BridgeModel(NodeBus &bus) : bus_(bus), top_(std::make_unique<Vwhisk
     top_->utmi_rx_error = 0;
     top_->tick_external = 1;
     top_->tick_strobe = 0;
+    top_->tick_in = 0;
     top_->miso = UINT32_MAX >> (32 - LANES);
     reset();
 }
@@ -52,6 +53,16 @@ bool BridgeModel::link_busy() const
 bool BridgeModel::running() const
 {
     return top_->running;
+}
+
+bool BridgeModel::every_frame() const
+{
+    return top_->rootp->whisker_bridge__DOT__options & WHISKER_CONTROL_OPTION_EVERY_FRAME;
+}
+
+uint32_t BridgeModel::tick_period() const
+{
+    return top_->rootp->whisker_bridge__DOT__tick_period;
 }
 
 uint32_t BridgeModel::frames_dropped() const

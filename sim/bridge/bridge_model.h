@@ -29,6 +29,8 @@ class BridgeModel : public UtmiDevice
     bool link_busy() const;          // SYNC and transfer on the node link in progress
     bool running() const;            // from start until the last frame is in the FIFO
     uint32_t frames_dropped() const; // since start
+    bool every_frame() const;        // each frame ends its packet
+    uint32_t tick_period() const;    // cycles
 
   private:
     NodeBus &bus_;

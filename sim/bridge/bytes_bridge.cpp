@@ -5,6 +5,13 @@
 namespace bridge_sim
 {
 
+namespace
+{
+
+constexpr unsigned USB_TIME_KNOWN = 0x8000;
+
+} // namespace
+
 BytesBridge::BytesBridge(NodeBus &bus) : bus_(bus)
 {
     power_up();
@@ -16,6 +23,8 @@ void BytesBridge::power_up()
     settings_ = LinkSettings();
     counters_ = Counters();
     windows_ = 0;
+    usb_known_ = false;
+    usb_time_ = usb_time_before_ = 0;
     halt();
 }
 
@@ -37,6 +46,25 @@ uint32_t BytesBridge::frames_dropped() const
     return counters_.dropped;
 }
 
+bool BytesBridge::every_frame() const
+{
+    return settings_.options & WHISKER_CONTROL_OPTION_EVERY_FRAME;
+}
+
+uint32_t BytesBridge::tick_period() const
+{
+    return settings_.tick_period;
+}
+
+// As sof_clock.v counts: a packet with the number of the one before is the next eighth.
+void BytesBridge::start_of_frame(uint64_t microframe)
+{
+    const auto frame = static_cast<uint16_t>(microframe / 8 % 2048);
+    usb_microframe_ = usb_known_ && frame == usb_frame_ ? (usb_microframe_ + 1u) % 8 : 0;
+    usb_frame_ = frame;
+    usb_known_ = true;
+}
+
 // ------------------------------------------------------------------------------------------------------------ ticks
 
 bool BytesBridge::begin_tick()
@@ -48,8 +76,11 @@ bool BytesBridge::begin_tick()
     number_ = first_ ? 0 : number_ + 1;
     before_ = time_;
     time_ = first_ ? 0 : time_ + settings_.tick_period;
+    usb_time_before_ = usb_time_;
+    usb_time_ = usb_known_ ? static_cast<uint16_t>(USB_TIME_KNOWN | usb_frame_ << 3 | usb_microframe_) : 0;
     finishing_ = stopping_;
     ticked_ = in_tick_ = true;
+    pattern_ = settings_.options & WHISKER_CONTROL_OPTION_PATTERN;
     service_ = !order_.empty() && settings_.service_fits();
     counters_.ticks++;
     link_sync(bus_);
@@ -61,7 +92,7 @@ void BytesBridge::end_tick()
     if (!in_tick_) {
         return;
     }
-    const Records records = link_window(bus_, sample_order(static_cast<uint8_t>(number_), service_));
+    const Records records = window(sample_order(static_cast<uint8_t>(number_), service_), number_ - 1);
     if (!first_) {
         make_frame(records, judge(records, number_ - 1));
     }
@@ -70,6 +101,13 @@ void BytesBridge::end_tick()
     }
     in_tick_ = false;
     settle();
+}
+
+// The nodes are clocked with the pattern, too.
+Records BytesBridge::window(const Bytes &order, uint32_t expected_tick)
+{
+    const Records records = link_window(bus_, order);
+    return pattern_ ? pattern_records(static_cast<uint8_t>(expected_tick)) : records;
 }
 
 BytesBridge::Verdicts BytesBridge::judge(const Records &records, uint32_t tick) const
@@ -84,7 +122,7 @@ BytesBridge::Verdicts BytesBridge::judge(const Records &records, uint32_t tick) 
 
 void BytesBridge::serve()
 {
-    answers_ = link_window(bus_, service_order(static_cast<uint8_t>(number_), order_));
+    answers_ = window(service_order(static_cast<uint8_t>(number_), order_), asked_tick_);
     answer_verdicts_ = judge(answers_, asked_tick_);
     asked_tick_ = static_cast<uint8_t>(number_);
     windows_++;
@@ -106,6 +144,7 @@ Bytes BytesBridge::header(bool last) const
     whisker_put_u32(&bytes[WHISKER_FRAME_HEADER_DROPPED], counters_.dropped);
     whisker_put_u32(&bytes[WHISKER_FRAME_HEADER_LANE_MASK], settings_.lane_mask);
     bytes[WHISKER_FRAME_HEADER_LANES] = WHISKER_LIMIT_LANES;
+    whisker_put_u16(&bytes[WHISKER_FRAME_HEADER_USB_TIME], usb_time_before_);
     bytes[WHISKER_FRAME_HEADER_CRC] = whisker_crc8(bytes.data(), WHISKER_FRAME_HEADER_CRC);
     return bytes;
 }
@@ -121,7 +160,7 @@ void BytesBridge::make_frame(const Records &records, const Verdicts &verdicts)
     }
     counters_.frames++;
     counters_.sequence++;
-    counters_.dropped += stream_.push(frame, finishing_) ? 0 : 1;
+    counters_.dropped += stream_.push(frame, finishing_, every_frame()) ? 0 : 1;
     if (stream_.waiting()) {
         kept_verdicts_ = verdicts; // the framer stands still at its first byte
     } else {

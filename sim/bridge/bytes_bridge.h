@@ -28,6 +28,11 @@ class BytesBridge
 
     bool running() const;            // from start until the last frame is in the FIFO
     uint32_t frames_dropped() const; // since start
+    bool every_frame() const;        // each frame ends its packet
+    uint32_t tick_period() const;    // cycles
+
+    // A start-of-frame packet comes: the host's eighths of a frame so far.
+    void start_of_frame(uint64_t microframe);
 
     // A tick begins: SYNC. False: none is taken now.
     bool begin_tick();
@@ -54,6 +59,8 @@ class BytesBridge
     Bytes control_report() const;
     Bytes counters_report() const;
     Bytes answers_report() const;
+    Bytes timing_report() const;
+    Records window(const Bytes &order, uint32_t expected_tick);
     Verdicts judge(const Records &records, uint32_t tick) const;
     void serve();
     void make_frame(const Records &records, const Verdicts &verdicts);
@@ -73,11 +80,17 @@ class BytesBridge
     bool ticked_ = false;    // since start
     bool in_tick_ = false;
 
-    bool first_ = false;   // this tick is number 0
-    uint32_t number_ = 0;  // of the latest tick
-    uint64_t time_ = 0;    // cycles from tick 0 to the latest tick
-    uint64_t before_ = 0;  // to the one before
-    bool service_ = false; // this tick has a second window
+    bool first_ = false;  // this tick is number 0
+    uint32_t number_ = 0; // of the latest tick
+    uint64_t time_ = 0;   // cycles from tick 0 to the latest tick
+    uint64_t before_ = 0; // to the one before
+    uint16_t usb_frame_ = 0;
+    uint8_t usb_microframe_ = 0;
+    bool usb_known_ = false;       // there was a start-of-frame packet
+    uint16_t usb_time_ = 0;        // of the latest tick
+    uint16_t usb_time_before_ = 0; // of the one before
+    bool service_ = false;         // this tick has a second window
+    bool pattern_ = false;         // and the bridge's own records
 
     Bytes order_; // service order that waits; empty: none
     uint8_t windows_ = 0;

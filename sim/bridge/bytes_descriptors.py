@@ -13,16 +13,14 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "fpga/usb"), str(ROOT / "host/python")]
 warnings.filterwarnings("ignore", category=DeprecationWarning)  # LUNA's, about Amaranth's
 
-from descriptors import descriptors  # noqa: E402
-
-SERIAL = "0001"  # as generate.py's default
+from descriptors import Build, descriptors  # noqa: E402
 
 
-def table(serial: str) -> str:
+def table(build: Build) -> str:
     """The text of the source file: one entry per descriptor, by type and index."""
     rows = [
         f"    {{{kind}, {index}, {{{', '.join(str(byte) for byte in bytes(raw))}}}}},\n"
-        for kind, index, raw in descriptors(serial)
+        for kind, index, raw in descriptors(build)
     ]
     head = '#include "bytes_descriptors.h"\n\nnamespace bridge_sim\n{\n\n'
     return f"{head}const std::vector<Descriptor> DESCRIPTORS = {{\n{''.join(rows)}}};\n\n}} // namespace bridge_sim\n"
@@ -31,7 +29,7 @@ def table(serial: str) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description="Write the bridge's descriptors as C++.")
     parser.add_argument("out", type=Path, help="source file to write")
-    parser.parse_args().out.write_text(table(SERIAL))
+    parser.parse_args().out.write_text(table(Build()))
 
 
 if __name__ == "__main__":

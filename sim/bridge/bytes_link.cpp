@@ -58,6 +58,19 @@ Records link_window(NodeBus &bus, const Bytes &order)
     return records;
 }
 
+Records pattern_records(uint8_t tick)
+{
+    Records records{};
+    for (size_t lane = 0; lane < LANES; lane++) {
+        Record &record = records[lane];
+        record[WHISKER_RECORD_TICK] = tick;
+        whisker_put_u16(&record[WHISKER_RECORD_ALPHA], static_cast<uint16_t>(0x8000 + 256 * lane + UINT8_MAX - tick));
+        whisker_put_u16(&record[WHISKER_RECORD_BETA], static_cast<uint16_t>(0x4000 + 256 * lane + tick));
+        record[WHISKER_RECORD_CRC] = whisker_crc8(record.data(), WHISKER_RECORD_CRC);
+    }
+    return records;
+}
+
 Bytes sample_order(uint8_t tick, bool service)
 {
     Bytes order(WHISKER_ORDER_BYTES);

@@ -28,6 +28,9 @@ Bytes service_order(uint8_t tick, const Bytes &report);
 // What lane_receiver.v says of a record that should be of this tick: WHISKER_CODE_OK or why it was not accepted.
 uint8_t link_verdict(const Record &record, uint8_t expected_tick);
 
+// What the bridge's own pattern puts in place of the records (pattern_source.v).
+Records pattern_records(uint8_t tick);
+
 // What stands in place of a record that was not accepted (framer.v).
 Record error_record(uint8_t tick, uint8_t code);
 

@@ -1,6 +1,4 @@
 // Level bytes: the HID reports, as control_registers.v, service_store.v, report_reader.v and answer_store.v have them.
-#include <algorithm>
-
 #include "bytes_bridge.h"
 
 namespace bridge_sim
@@ -31,6 +29,8 @@ Bytes identity_report()
     whisker_put_u32(&report[WHISKER_REPORT_IDENTITY_CLOCK_HZ], WHISKER_LIMIT_CLOCK_HZ);
     whisker_put_u16(&report[WHISKER_REPORT_IDENTITY_FRAME_BYTES], WHISKER_FRAME_BYTES);
     whisker_put_u16(&report[WHISKER_REPORT_IDENTITY_FIFO_BYTES], WHISKER_LIMIT_FIFO_BYTES);
+    report[WHISKER_REPORT_IDENTITY_BOARD] = WHISKER_BOARD_SIMULATION;
+    report[WHISKER_REPORT_IDENTITY_WIRED_LANES] = WHISKER_LIMIT_LANES;
     return report;
 }
 
@@ -48,8 +48,7 @@ bool BytesBridge::set_control(const Bytes &report)
     }
     const uint8_t run = report[WHISKER_REPORT_CONTROL_RUN];
     const LinkSettings settings = LinkSettings::of_report(report);
-    const bool reserved = std::any_of(report.begin() + WHISKER_REPORT_CONTROL_SAMPLE_POINT + 1,
-                                      report.begin() + WHISKER_REPORT_CONTROL_LANE_MASK, [](uint8_t b) { return b; });
+    const bool reserved = report[WHISKER_REPORT_CONTROL_OPTIONS + 1] != 0;
     if (run > 1 || (run == 1 && stopping_) || reserved || !settings.valid()) {
         return false;
     }
@@ -96,6 +95,8 @@ Bytes BytesBridge::get_report(uint8_t id) const
         return identity_report();
     case WHISKER_REPORT_ID_ANSWERS:
         return answers_report();
+    case WHISKER_REPORT_ID_TIMING:
+        return timing_report();
     default:
         return {};
     }
@@ -120,6 +121,16 @@ Bytes BytesBridge::counters_report() const
     whisker_put_u32(&report[WHISKER_REPORT_COUNTERS_RECORDS_ABSENT], counters_.absent);
     whisker_put_u32(&report[WHISKER_REPORT_COUNTERS_RECORDS_CRC], counters_.crc);
     whisker_put_u32(&report[WHISKER_REPORT_COUNTERS_RECORDS_TICK], counters_.tick);
+    return report;
+}
+
+// Ticks are the simulation's own, not the pin's, and come with their start-of-frame packet.
+Bytes BytesBridge::timing_report() const
+{
+    Bytes report = empty_report(WHISKER_REPORT_ID_TIMING, WHISKER_REPORT_TIMING_BYTES);
+    whisker_put_u16(&report[WHISKER_REPORT_TIMING_USB_TIME], usb_time_);
+    whisker_put_u32(&report[WHISKER_REPORT_TIMING_TICK], number_);
+    whisker_put_u32(&report[WHISKER_REPORT_TIMING_SHORTEST], UINT32_MAX);
     return report;
 }
 

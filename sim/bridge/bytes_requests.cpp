@@ -25,6 +25,8 @@ constexpr uint16_t INTERFACES = 2;
 // lies under a type that nobody can ask for (standard_requests.py).
 constexpr std::array<uint8_t, 6> OF_DEVICE = {1, 2, 3, 6, 7, 15};
 constexpr std::array<uint8_t, 2> OF_INTERFACE = {0x21, 0x22};
+constexpr uint8_t CONFIGURATION = 2, SELF_POWERED = 0x40;
+constexpr size_t ATTRIBUTES = 7; // place in a configuration descriptor
 constexpr uint8_t WINDOWS_SET = 10, WINDOWS_REQUEST = 0x20;
 constexpr uint16_t WINDOWS_INDEX = 7;
 
@@ -73,6 +75,14 @@ Outcome descriptor(const SetupRequest &request, Bytes &data, uint8_t type, uint8
         return Outcome::OK; // nothing is looked up for it
     }
     return found == DESCRIPTORS.end() ? Outcome::STALL : answer(request, data, found->bytes);
+}
+
+// As the configuration descriptor says (USB 2.0 table 9-10).
+bool self_powered()
+{
+    const auto found = std::find_if(DESCRIPTORS.begin(), DESCRIPTORS.end(),
+                                    [](const Descriptor &d) { return d.type == CONFIGURATION; });
+    return found->bytes[ATTRIBUTES] & SELF_POWERED;
 }
 
 Outcome get_descriptor(const SetupRequest &request, Bytes &data)
@@ -165,7 +175,8 @@ Outcome BytesDevice::status(const SetupRequest &request, Bytes &data) const
     for (size_t i = 0; i < ENDPOINTS; i++) {
         halted |= recipient(request) == ENDPOINT && request.index == ADDRESS_OF[i] && halted_[i];
     }
-    return answer(request, data, {halted, 0});
+    const uint8_t self = recipient(request) == DEVICE && self_powered();
+    return answer(request, data, {static_cast<uint8_t>(halted | self), 0});
 }
 
 Outcome BytesDevice::serve_feature(const SetupRequest &request)

@@ -52,6 +52,11 @@ bool BytesRig::running() const
     return bridge_.running();
 }
 
+bool BytesRig::every_frame() const
+{
+    return bridge_.every_frame();
+}
+
 uint32_t BytesRig::frames_dropped() const
 {
     return bridge_.frames_dropped();
@@ -64,8 +69,13 @@ void BytesRig::power_up()
 
 bool BytesRig::transfer(const std::function<bool()> &usb_step)
 {
+    const unsigned frames = microframes(bridge_.tick_period());
+    bridge_.start_of_frame(microframe_++);
     if (!bridge_.begin_tick()) {
         return false;
+    }
+    for (unsigned i = 1; i < frames; i++) {
+        bridge_.start_of_frame(microframe_++);
     }
     while (usb_step()) {
     }

@@ -22,6 +22,7 @@ class BytesRig : public Rig
     uint64_t cycles() const override;
     bool running() const override;
     uint32_t frames_dropped() const override;
+    bool every_frame() const override;
 
   protected:
     void power_up() override;
@@ -31,6 +32,7 @@ class BytesRig : public Rig
   private:
     BytesBridge bridge_;
     BytesDevice device_;
+    uint64_t microframe_ = 0; // of the host
 };
 
 } // namespace bridge_sim

@@ -11,6 +11,7 @@ struct LinkSettings {
     uint8_t sck_divider = WHISKER_LIMIT_SCK_DIVIDER_DEFAULT;   // cycles of 60 MHz
     uint8_t word_gap = WHISKER_LIMIT_WORD_GAP_DEFAULT;         // .
     uint8_t sample_point = WHISKER_LIMIT_SAMPLE_POINT_DEFAULT; // .
+    uint8_t options = 0;                                       // bits of control_options
     uint32_t lane_mask = UINT32_MAX >> (32 - WHISKER_LIMIT_LANES);
     uint32_t tick_period = WHISKER_LIMIT_TICK_PERIOD; // .
 

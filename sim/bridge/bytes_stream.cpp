@@ -32,7 +32,7 @@ bool BytesStream::room() const
     return static_cast<std::ptrdiff_t>(fifo_.size()) - REGISTER <= FIFO - FRAME;
 }
 
-bool BytesStream::push(const Bytes &frame, bool keep)
+bool BytesStream::push(const Bytes &frame, bool keep, bool ends)
 {
     if (!room()) {
         if (keep) {
@@ -40,15 +40,15 @@ bool BytesStream::push(const Bytes &frame, bool keep)
         }
         return keep;
     }
-    write(frame, keep);
+    write(frame, keep || ends);
     flow();
     return true;
 }
 
-void BytesStream::write(const Bytes &frame, bool keep)
+void BytesStream::write(const Bytes &frame, bool ends)
 {
     fifo_.insert(fifo_.end(), frame.begin(), frame.end());
-    if (keep) {
+    if (ends) {
         ends_.push_back(moved_ + fifo_.size());
     }
 }

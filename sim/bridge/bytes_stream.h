@@ -16,8 +16,9 @@ class BytesStream
     // Bus reset or SET_CONFIGURATION: nothing is left.
     void clear();
 
-    // A frame comes. False: no room, it is dropped. One to `keep` ends the stream and waits for room instead.
-    bool push(const Bytes &frame, bool keep);
+    // A frame comes. False: no room, it is dropped. One to `keep` ends the stream and waits for room instead; with
+    // `ends` any frame ends it.
+    bool push(const Bytes &frame, bool keep, bool ends);
 
     // Is there a frame that waits for room?
     bool waiting() const;
@@ -27,7 +28,7 @@ class BytesStream
     void packet_taken();
 
   private:
-    void write(const Bytes &frame, bool keep);
+    void write(const Bytes &frame, bool ends);
     bool room() const;
     void flow();
     void fill();

@@ -12,6 +12,9 @@ namespace bridge_sim
 namespace
 {
 
+constexpr uint64_t MICROFRAME_CYCLES = WHISKER_LIMIT_CLOCK_HZ / 8000;
+constexpr uint64_t MICROFRAMES_MOST = 16;
+
 LinkFault link_fault(LaneFaultKind kind)
 {
     switch (kind) {
@@ -114,6 +117,14 @@ void Rig::count_frame()
     ticked_ = true;
 }
 
+unsigned Rig::microframes(uint32_t period)
+{
+    bus_cycles_ += period;
+    const uint64_t due = std::clamp<uint64_t>(bus_cycles_ / MICROFRAME_CYCLES, 1, MICROFRAMES_MOST);
+    bus_cycles_ %= MICROFRAME_CYCLES;
+    return static_cast<unsigned>(due);
+}
+
 // The bridge counts anew from each start.
 uint64_t Rig::newly_dropped() const
 {
@@ -128,7 +139,8 @@ uint64_t Rig::frame_bytes_waiting() const
 
 bool Rig::bulk_packet_due() const
 {
-    return frame_bytes_waiting() >= WHISKER_LIMIT_BULK_PACKET || end_due_;
+    const uint64_t packet = every_frame() ? WHISKER_FRAME_BYTES : WHISKER_LIMIT_BULK_PACKET;
+    return frame_bytes_waiting() >= packet || end_due_;
 }
 
 void Rig::bulk_packet_taken(uint64_t bytes)

@@ -45,6 +45,7 @@ class Rig
     virtual uint64_t cycles() const = 0;         // of the bridge's clock that were simulated; 0 at level bytes
     virtual bool running() const = 0;            // started, and the last frame not yet in the FIFO
     virtual uint32_t frames_dropped() const = 0; // since start: the FIFO had no room for them
+    virtual bool every_frame() const = 0;        // each frame ends its packet, by the settings
 
     // Spoils the reading that the next tick starts, or the transfer that the next tick makes.
     void spoil(const LaneFault &fault);
@@ -73,6 +74,10 @@ class Rig
     // A tick's SYNC and transfers, with usb_step() meanwhile. False: no tick is taken now.
     virtual bool transfer(const std::function<bool()> &usb_step) = 0;
 
+    // How many start-of-frame packets come with a tick of this period: one every 125 us of the bridge's time, but at
+    // most 16, and at least one, so that a tick's date does not hang on the cycles that were simulated before it.
+    unsigned microframes(uint32_t period);
+
     // Until the last frame is in the FIFO.
     virtual void finish_run(const std::function<bool()> &usb_step) = 0;
 
@@ -81,11 +86,12 @@ class Rig
     uint64_t newly_dropped() const;
 
     NodeBus bus_;
-    uint64_t waiting_ = 0; // bytes; of frames dropped since the last tick it does not know yet
-    uint32_t dropped_ = 0; // of frames_dropped(), those that waiting_ is without
-    bool ticked_ = false;  // a tick has begun since start
-    bool end_due_ = false; // the packet that ends the stream has not been taken
-    bool forgot_ = false;  // in the midst of this tick
+    uint64_t bus_cycles_ = 0; // since the last start-of-frame packet
+    uint64_t waiting_ = 0;    // bytes; of frames dropped since the last tick it does not know yet
+    uint32_t dropped_ = 0;    // of frames_dropped(), those that waiting_ is without
+    bool ticked_ = false;     // a tick has begun since start
+    bool end_due_ = false;    // the packet that ends the stream has not been taken
+    bool forgot_ = false;     // in the midst of this tick
 };
 
 // Throws std::runtime_error if there is no memory for the nodes. Lanes 0 .. populated-1 have nodes (node_bus.h).

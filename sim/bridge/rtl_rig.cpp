@@ -58,6 +58,11 @@ bool RtlRig::running() const
     return bridge_.running();
 }
 
+bool RtlRig::every_frame() const
+{
+    return bridge_.every_frame();
+}
+
 uint32_t RtlRig::frames_dropped() const
 {
     return bridge_.frames_dropped();
@@ -70,11 +75,15 @@ void RtlRig::power_up()
 
 bool RtlRig::transfer(const std::function<bool()> &usb_step)
 {
+    const unsigned frames = microframes(bridge_.tick_period());
+    host_.start_of_frame();
     bridge_.start_tick();
     if (!bridge_.link_busy()) {
         return false;
     }
-    host_.start_of_frame();
+    for (unsigned i = 1; i < frames; i++) {
+        host_.start_of_frame();
+    }
     wait_while([this] { return bridge_.link_busy(); }, usb_step);
     bridge_.cycle(); // the nodes see select rise
     return true;

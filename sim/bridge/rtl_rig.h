@@ -21,6 +21,7 @@ class RtlRig : public Rig
     uint64_t cycles() const override;
     bool running() const override;
     uint32_t frames_dropped() const override;
+    bool every_frame() const override;
 
   protected:
     void power_up() override;

@@ -14,12 +14,13 @@ from whisker.protocol import FRAME_BYTES, FRAME_FLAGS, FRAME_HEADER, LIMITS, REP
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "fpga/usb"))
 warnings.filterwarnings("ignore", category=DeprecationWarning)  # LUNA's, about Amaranth's
-from descriptors import SERIAL_INDEX, descriptors  # noqa: E402
+from descriptors import SELF_POWERED, SERIAL_INDEX, Build, descriptors  # noqa: E402
 
 GET_DESCRIPTOR = 6
 FROM_DEVICE, FROM_INTERFACE, TO_INTERFACE = 0x80, 0x81, 0x21  # bmRequestType: standard, standard, class
 GET_REPORT, SET_REPORT, FEATURE, FROM_CLASS = 0x01, 0x09, 0x0300, 0xA1
 REPORT_DESCRIPTOR = 0x22  # of HID: asked of the interface
+CONFIGURATION_DESCRIPTOR = 2
 PRODUCT_INDEX = 2  # of its string
 ALL = {1: "device", 2: "configuration", 6: "device qualifier", 7: "other speed", 15: "BOS", 34: "HID report"}
 NO_SERIAL = "0000"  # strings are not compared
@@ -140,6 +141,9 @@ def opened(bridge: Bridge):
 
 
 def differing_descriptors(device: Device) -> list[str]:
-    """Names of the descriptors that differ from those the gateware was made of (fpga/usb/descriptors.py)."""
-    wanted = {(kind, index): bytes(raw) for kind, index, raw in descriptors(NO_SERIAL)}
+    """Names of the descriptors that differ from those the gateware was made of (fpga/usb/descriptors.py); what power the
+    board takes is its own affair."""
+    attributes, power = device.descriptor(CONFIGURATION_DESCRIPTOR)[7:9]
+    build = Build(NO_SERIAL, self_powered=bool(attributes & SELF_POWERED), milliamps=2 * power)
+    wanted = {(kind, index): bytes(raw) for kind, index, raw in descriptors(build)}
     return [name for kind, name in ALL.items() if device.descriptor(kind) != wanted[(kind, 0)]]

@@ -30,6 +30,9 @@ RTL = [
     "run_control",
     "node_link",
     "lane_receiver",
+    "pattern_source",
+    "tick_input",
+    "sof_clock",
     "record_store",
     "framer",
     "crc8",
@@ -167,7 +170,7 @@ class Rig:
 
 
 async def begin(dut, external: int = 1, lanes: int = LANES) -> Rig:
-    await start_clock(dut, tick_external=external, tick_strobe=0, miso=(1 << lanes) - 1)
+    await start_clock(dut, tick_external=external, tick_strobe=0, tick_in=0, miso=(1 << lanes) - 1)
     return Rig(dut, lanes)
 
 

@@ -178,8 +178,10 @@ async def settings_wait_for_the_next_tick(dut):
 @cocotb.test(timeout_time=20, timeout_unit="ms")
 async def identity_and_control_read_back(dut):
     rig = await begin(dut)
+    dut.usb.board.value, dut.usb.build.value = 0x5A, 0xC3A5
     identity = await rig.host.read("identity")
     assert (identity["lanes"], identity["clock_hz"]) == (LANES, LIMITS["clock_hz"])
+    assert (identity["board"], identity["wired_lanes"], identity["build"]) == (0x5A, LANES, 0xC3A5)
     assert (identity["frame_bytes"], identity["fifo_bytes"]) == (FRAME_BYTES, LIMITS["fifo_bytes"])
     assert (identity["wire_version"], identity["gateware"]) == (WIRE_VERSION, LIMITS["gateware_version"])
     await rig.host.control(1, sck_divider=20, word_gap=99, sample_point=13, lane_mask=0x5A5A5A5, tick_period=123456)
@@ -254,5 +256,9 @@ async def junk_reports_are_refused_and_change_nothing(dut, stalls):
 
 def test_bridge():
     run_bench(
-        "whisker_bridge", __file__, *(f"{name}.v" for name in RTL), bench=("usb_stub.v",), more=("orders", "wires")
+        "whisker_bridge",
+        __file__,
+        *(f"{name}.v" for name in RTL),
+        bench=("usb_stub.v",),
+        more=("orders", "wires", "timing"),
     )

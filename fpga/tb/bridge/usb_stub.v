@@ -21,6 +21,12 @@ module whisker_usb (
     output reg  [1:0] utmi_op_mode,
     input  wire [63:0] serial_number,
     output reg        suspended,
+    output reg        sof,
+    output reg [10:0] sof_frame,
+    output reg        configured,
+    output reg [7:0]  board,
+    output reg [15:0] build,
+    output reg        read_open,
     input  wire [7:0] stream_data,
     input  wire       stream_valid,
     input  wire       stream_last,
@@ -39,6 +45,7 @@ module whisker_usb (
     input  wire [7:0] read_data
 );
     initial read_packet = 2'd0;
+    initial {sof, configured, read_open, sof_frame, board, build} = 38'd0;
     initial {suspended, stream_ready, restart, write_start, write_valid, write_done, read_start, read_next} = 8'd0;
 
     initial {utmi_tx_data, utmi_tx_valid, utmi_xcvr_select, utmi_term_select, utmi_op_mode} = 14'd0;

@@ -87,8 +87,8 @@ async def an_order_carries_any_tick_and_its_answers_are_asked_for_by_it(dut):
 @cocotb.test(timeout_time=20, timeout_unit="ms")
 async def every_bit_of_a_setting_is_taken_and_read_back(dut):
     rig = await begin(dut)
-    ones = {"sck_divider": 32, "word_gap": 255, "sample_point": 32, "lane_mask": (1 << LANES) - 1}
-    zeros = {"sck_divider": 32, "word_gap": 64, "sample_point": 31, "lane_mask": 0}
+    ones = {"sck_divider": 32, "word_gap": 255, "sample_point": 32, "lane_mask": (1 << LANES) - 1, "options": 15}
+    zeros = {"sck_divider": 32, "word_gap": 64, "sample_point": 31, "lane_mask": 0, "options": 0}
     others = {"sck_divider": 30, "word_gap": 191, "sample_point": 1}
     steps = ((ones, 0xFFFFFFFF), (zeros, 0x00010000), (others, 0xFFFEFFFF), (ones, 0x00010000), (FAST, 0xFFFFFFFF))
     for settings, period in steps:
@@ -102,7 +102,7 @@ async def every_bit_of_a_setting_is_taken_and_read_back(dut):
 async def any_unknown_report_reads_as_its_id_and_zeros(dut):
     rig = await begin(dut)
     usb = rig.host.usb
-    for report_id in (0xFF, 0x00, 0xAA, 0x55, 0x06):
+    for report_id in (0xFF, 0x00, 0xAA, 0x55, 0x07):
         usb.read_id.value = report_id
         await pulse(dut, usb.read_start)
         out = []

@@ -6,19 +6,28 @@ import cocotb
 from bench import pulse, run_bench, start_clock
 from cocotb.triggers import ClockCycles, FallingEdge, RisingEdge
 
-from whisker.protocol import LANES, LIMITS, REPORTS, WIRE_VERSION
+from whisker.protocol import CONTROL_OPTIONS, LANES, LIMITS, REPORTS, WIRE_VERSION
 
 CONTROL = REPORTS["control"]
-SETTINGS = ("run", "sck_divider", "word_gap", "sample_point", "lane_mask", "tick_period")
+SETTINGS = ("run", "sck_divider", "word_gap", "sample_point", "options", "lane_mask", "tick_period")
 DEFAULTS = {
     "run": 0,
     "sck_divider": LIMITS["sck_divider_default"],
     "word_gap": LIMITS["word_gap_default"],
     "sample_point": LIMITS["sample_point_default"],
+    "options": 0,
     "lane_mask": (1 << LANES) - 1,
     "tick_period": LIMITS["tick_period"],
 }
-OTHER = {"run": 1, "sck_divider": 6, "word_gap": 30, "sample_point": 3, "lane_mask": 0x3F, "tick_period": 4000}
+OTHER = {
+    "run": 1,
+    "sck_divider": 6,
+    "word_gap": 30,
+    "sample_point": 3,
+    "options": 5,
+    "lane_mask": 0x3F,
+    "tick_period": 4000,
+}
 RIGHT = [
     {},
     {"run": 0},
@@ -27,6 +36,7 @@ RIGHT = [
     {"sample_point": 1},
     {"sample_point": 6},
     {"lane_mask": 0},
+    *({"options": option} for option in CONTROL_OPTIONS.values()),
     {"lane_mask": (1 << LANES) - 1},
     {"tick_period": 0xFFFFFFFF},
 ]
@@ -44,7 +54,8 @@ WRONG = [
     {"sample_point": 7},
     {"sample_point": 67},
     {"reserved": 1},
-    {"reserved": 0x8000},
+    {"reserved": 0x80},
+    *({"options": 1 << bit} for bit in range(4, 8)),
     {"lane_mask": 1 << LANES},
     {"lane_mask": 1 << 31},
     {"tick_period": LIMITS["tick_period_min"] - 1},
@@ -126,6 +137,7 @@ def legal(values: dict[str, int]) -> bool:
         and divider % 2 == 0
         and values["word_gap"] >= LIMITS["word_gap_min"]
         and 1 <= values["sample_point"] <= divider
+        and values["options"] < 1 << len(CONTROL_OPTIONS)
         and values["lane_mask"] < 1 << LANES
         and values["tick_period"] >= LIMITS["tick_period_min"]
     )
@@ -139,6 +151,7 @@ def random_values() -> dict[str, int]:
         "sck_divider": divider,
         "word_gap": random.randrange(LIMITS["word_gap_min"], 256),
         "sample_point": random.randint(1, divider),
+        "options": random.getrandbits(4),
         "lane_mask": random.getrandbits(LANES),
         "tick_period": random.randrange(LIMITS["tick_period_min"], 1 << 32),
     }

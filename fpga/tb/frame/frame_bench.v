@@ -13,6 +13,7 @@ module frame_bench #(
     input  wire                is_last,
     input  wire [31:0]         tick,
     input  wire [63:0]         tick_time,
+    input  wire [15:0]         usb_time,
     input  wire [31:0]         sequence_number,
     input  wire [31:0]         dropped_before,
     input  wire [LANES-1:0]    lane_mask,
@@ -21,6 +22,7 @@ module frame_bench #(
     input  wire [LANES-1:0]    tick_wrong,
     input  wire [64*LANES-1:0] records,
     input  wire                stall,
+    input  wire                every,
     output wire                busy,
     output wire                done,
     output wire                dropped,
@@ -40,7 +42,7 @@ module frame_bench #(
 
     framer #(.LANES(LANES)) dut_framer (
         .clk(clk), .rst(rst), .start(start), .is_last(is_last), .tick(tick), .tick_time(tick_time),
-        .sequence_number(sequence_number), .dropped(dropped_before), .lane_mask(lane_mask), .absent(absent),
+        .usb_time(usb_time), .sequence_number(sequence_number), .dropped(dropped_before), .lane_mask(lane_mask), .absent(absent),
         .crc_wrong(crc_wrong), .tick_wrong(tick_wrong), .busy(busy), .done(done), .record_ends(record_ends),
         .record_code(record_code), .read_lane(read_lane), .read_byte(read_byte),
         .read_data(records[8 * {24'd0, read_lane, read_byte} +: 8]),
@@ -49,7 +51,7 @@ module frame_bench #(
 
     frame_fifo #(.ADDRESS_BITS(ADDRESS_BITS), .FRAME_BYTES(FRAME_BYTES)) dut_fifo (
         .clk(clk), .rst(rst), .in_data(data), .in_valid(valid && !stall), .in_first(first), .in_last(last),
-        .in_keep(keep), .in_ready(ready), .dropped(dropped),
+        .in_keep(keep), .every(every), .in_ready(ready), .dropped(dropped),
         .out_data(out_data), .out_valid(out_valid), .out_last(out_last), .out_ready(out_ready));
 endmodule
 

@@ -47,7 +47,7 @@ async def stall_randomly(dut, share: float):
 
 
 async def begin(dut, rate: float, stall: float = 0.0) -> Stream:
-    await start_clock(dut, start=0, stall=0, is_last=0, out_ready=0, dropped_before=0)
+    await start_clock(dut, start=0, stall=0, is_last=0, out_ready=0, dropped_before=0, every=0)
     if stall:
         cocotb.start_soon(stall_randomly(dut, stall))
     return Stream(dut, rate)
@@ -58,6 +58,7 @@ def random_frame(number: int) -> dict[str, int]:
     bits = {name: random.getrandbits(LANES) for name in ("lane_mask", "absent", "crc_wrong", "tick_wrong")}
     records = b"".join(record(number, random.getrandbits(16), random.getrandbits(16)) for _ in range(LANES))
     rest = {"tick": random.getrandbits(32), "tick_time": random.getrandbits(64), "sequence_number": number}
+    rest["usb_time"] = random.getrandbits(16)
     return {**bits, **rest, "dropped_before": random.getrandbits(32), "records": int.from_bytes(records, "little")}
 
 
@@ -80,6 +81,7 @@ def packed(f: dict[str, int], is_last: bool) -> bytes:
         dropped=f["dropped_before"],
         lane_mask=f["lane_mask"],
         lanes=LANES,
+        usb_time=f["usb_time"],
     )
     received = f["records"].to_bytes(8 * LANES, "little")
     codes = codes_of(f)
@@ -170,6 +172,18 @@ async def last_frame_ends_the_stream(dut):
     await drained(dut, stream)
     assert stream.frames() == wanted
     assert stream.ends == [2 * FRAME_BYTES]
+
+
+@cocotb.test(timeout_time=1, timeout_unit="ms")
+async def each_frame_ends_the_stream_if_wanted(dut):
+    """From the frame on in which that is said, to the one in which it is taken back."""
+    stream = await begin(dut, 0.8)
+    for i in range(6):
+        dut.every.value = i in (1, 2, 4)
+        await send(dut, random_frame(i))
+        await finished(dut)
+    await drained(dut, stream)
+    assert stream.ends == [n * FRAME_BYTES for n in (2, 3, 5)]
 
 
 @cocotb.test(timeout_time=1, timeout_unit="ms")

@@ -14,6 +14,7 @@ module link_bench #(
     input  wire [7:0]       word_gap,
     input  wire [5:0]       sample_point,
     input  wire [LANES-1:0] miso,
+    input  wire             pattern,
     input  wire [4:0]       read_lane,
     input  wire [2:0]       read_byte,
     input  wire             service,
@@ -46,7 +47,7 @@ module link_bench #(
 
     lane_receiver #(.LANES(LANES)) receiver (
         .clk(clk), .rst(rst), .clear(start), .expected_tick(expected_tick), .capture(capture),
-        .capture_index(bit_index), .miso(miso), .bits(bits), .bits_valid(bits_valid), .bits_index(bits_index),
+        .capture_index(bit_index), .miso(miso), .pattern(pattern), .bits(bits), .bits_valid(bits_valid), .bits_index(bits_index),
         .absent(absent), .crc_wrong(crc_wrong), .tick_wrong(tick_wrong));
 
     record_store #(.LANES(LANES)) store (

@@ -3,7 +3,7 @@
 import random
 
 import cocotb
-from bench import CLOCK_PS, REPO, pulse, record, run_bench, start_clock, wrong_tick
+from bench import CLOCK_PS, LINK, REPO, pulse, record, run_bench, start_clock, wrong_tick
 from cocotb.triggers import FallingEdge, RisingEdge
 from cycles import transfer as transfer_cycles
 from nodes import BITS, Nodes
@@ -18,7 +18,7 @@ SYNC_HIGH = 6
 
 async def begin(dut, delay_ps: int = 0) -> Nodes:
     """Clock and nodes running, link idle."""
-    await start_clock(dut, start=0, read_lane=0, read_byte=0, service=0, service_bit=0)
+    await start_clock(dut, start=0, read_lane=0, read_byte=0, service=0, service_bit=0, pattern=0)
     nodes = Nodes(dut, delay_ps)
     nodes.times["sck"].clear()
     return nodes
@@ -171,6 +171,22 @@ async def golden_records(dut):
         assert await stored(dut, lane) == bytes.fromhex(raw), name
 
 
+@cocotb.test(timeout_time=10, timeout_unit="ms")
+@cocotb.parametrize(settings=SETTINGS)
+async def the_pattern_is_good_and_another_for_each_lane_and_tick(dut, settings):
+    """Whatever the lines say."""
+    nodes = await begin(dut)
+    dut.pattern.value = 1
+    for expected in (0, 255, 0x5A, *(random.randrange(256) for _ in range(3))):
+        sent = dict(enumerate(one_of_each(expected)))
+        assert await transfer(dut, nodes, sent, (expected + 1) & 0xFF, expected, settings) == (0, 0, 0)
+        for lane in range(LANES):
+            alpha, beta = 0x8000 + 256 * lane + 255 - expected, 0x4000 + 256 * lane + expected
+            assert await stored(dut, lane) == record(expected, alpha, beta)
+    dut.pattern.value = 0
+    assert await transfer(dut, nodes, {}, 1, 0) != (0, 0, 0)
+
+
 async def give_service(dut, window: bytes) -> None:
     """What service_store does: the bit that is asked for, in the same cycle."""
     bits = [byte >> (7 - bit) & 1 for byte in window for bit in range(8)]
@@ -212,4 +228,4 @@ async def reset_ends_a_transfer(dut):
 
 
 def test_link():
-    run_bench("link_bench", __file__, "node_link.v", "lane_receiver.v", "record_store.v", bench=("link_bench.v",))
+    run_bench("link_bench", __file__, *(f"{name}.v" for name in LINK), bench=("link_bench.v",))

@@ -8,7 +8,7 @@ hears what they answered, later by the loop's delay.
 import itertools
 
 import cocotb
-from bench import pulse, run_bench, start_clock
+from bench import LINK, pulse, run_bench, start_clock
 from cocotb.triggers import FallingEdge, Timer, ValueChange
 from cocotb.utils import get_sim_time
 from firmware import LOST_CLOCK, MOSI, SCK, SELECT, SYNC, Node, Parts
@@ -38,7 +38,7 @@ class Rig:
         self.edges: list[tuple[int, int, int]] = []
 
     async def start(self) -> None:
-        await start_clock(self.dut, start=0, read_lane=0, read_byte=0, miso=IDLE)
+        await start_clock(self.dut, start=0, read_lane=0, read_byte=0, miso=IDLE, pattern=0)
         for name in PINS:
             cocotb.start_soon(self._watch(name))
 
@@ -202,6 +202,4 @@ async def lost_link_clocks_cost_one_record(dut, lost):
 
 
 def test_node():
-    run_bench(
-        "link_bench", __file__, "node_link.v", "lane_receiver.v", "record_store.v", bench=("../link/link_bench.v",)
-    )
+    run_bench("link_bench", __file__, *(f"{name}.v" for name in LINK), bench=("../link/link_bench.v",))

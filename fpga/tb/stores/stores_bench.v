@@ -17,6 +17,9 @@ module stores_bench #(
     output wire [7:0]       read_data,
     input  wire             answer_write,
     input  wire             answer_done,
+    input  wire             hold,
+    output wire             waiting,
+    output wire [7:0]       shown,
     input  wire [LANES-1:0] lane_mask,
     input  wire [LANES-1:0] absent,
     input  wire [LANES-1:0] crc_wrong,
@@ -49,6 +52,7 @@ module stores_bench #(
 
     answer_store #(.LANES(LANES)) answers (
         .clk(clk), .rst(rst), .write(answer_write), .bit_index(bit_index), .bits(bits), .done(answer_done),
+        .hold(hold), .waiting(waiting), .sequence_low(sequence_low), .shown(shown),
         .lane_mask(lane_mask), .absent(absent), .crc_wrong(crc_wrong), .tick_wrong(tick_wrong),
         .read_start(read_start), .read_packet(read_packet), .read_next(read_next), .in_header(in_header),
         .data(answer_data));

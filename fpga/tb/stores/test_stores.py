@@ -13,7 +13,7 @@ ALL = (1 << LANES) - 1
 PACKET = 64  # bytes of a control endpoint's packet
 HEADER_BYTES = REPORTS["answers"].fields["answer"].offset
 IDLE = dict.fromkeys(("bit_index", "bits", "write", "swap", "read_lane", "read_byte"), 0)
-IDLE |= dict.fromkeys(("answer_write", "answer_done", "lane_mask", "absent", "crc_wrong", "tick_wrong"), 0)
+IDLE |= dict.fromkeys(("answer_write", "answer_done", "hold", "lane_mask", "absent", "crc_wrong", "tick_wrong"), 0)
 IDLE |= dict.fromkeys(("read_start", "read_packet", "read_next", "write_start", "write_valid", "write_index"), 0)
 IDLE |= dict.fromkeys(("write_data", "write_done", "service_done", "service_index"), 0)
 FAST = {"sck_divider": 6, "word_gap": 30, "tick_period": LIMITS["tick_period"]}
@@ -158,6 +158,43 @@ async def answers_are_those_of_the_latest_window(dut, stall):
         filling = cocotb.start_soon(fill(dut, random_records(), dut.answer_write, stall))
         assert await read_report(dut, stall) == expected(records, verdicts)
         await filling
+
+
+@cocotb.test(timeout_time=2, timeout_unit="ms")
+async def a_window_that_ends_during_a_read_is_shown_after_it(dut):
+    """At any byte, a packet sent again included; then at once, and the number of windows with it."""
+    await begin(dut)
+    verdicts = {"lane_mask": ALL, "absent": 0, "crc_wrong": 0, "tick_wrong": 0}
+    before = random_records()
+    for turn in range(6):
+        await fill(dut, before, dut.answer_write, 0.0)
+        drive(dut, **verdicts)
+        for strobe in (dut.answer_done, dut.service_done):
+            strobe.value = 1
+        await RisingEdge(dut.clk)
+        drive(dut, answer_done=0, service_done=0)
+        await FallingEdge(dut.clk)
+        assert int(dut.waiting.value)
+        await RisingEdge(dut.clk)
+        await FallingEdge(dut.clk)
+        assert not int(dut.waiting.value) and int(dut.shown.value) == 2 * turn + 1
+        after = inverted(before)
+        await fill(dut, after, dut.answer_write, 0.0)
+        drive(dut, hold=1)
+        reading = cocotb.start_soon(read_report(dut, 0.3))
+        for _ in range(random.randrange(500)):
+            await RisingEdge(dut.clk)
+        drive(dut, answer_done=1, service_done=1)
+        await RisingEdge(dut.clk)
+        drive(dut, answer_done=0, service_done=0, absent=ALL)
+        assert await reading == expected(before, verdicts)
+        assert int(dut.waiting.value) and int(dut.shown.value) == 2 * turn + 1
+        drive(dut, hold=0)
+        await RisingEdge(dut.clk)
+        await FallingEdge(dut.clk)
+        assert not int(dut.waiting.value) and int(dut.shown.value) == 2 * turn + 2
+        assert await read_report(dut, 0.0) == expected(after, verdicts)
+        before = after
 
 
 # --- service_store

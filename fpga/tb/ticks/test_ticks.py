@@ -6,11 +6,13 @@ import cocotb
 from bench import pulse, run_bench, start_clock
 from cocotb.triggers import FallingEdge
 
-from whisker.protocol import CODES
+from whisker.protocol import CODES, LIMITS
 
 IDLE = {"restart": 0, "enable": 0, "link_busy": 0, "external": 0, "strobe": 0, "period": 2, "pause": 0}
-IDLE |= {"start": 0, "stop": 0, "run_tick": 0, "last_done": 0}
+IDLE |= dict.fromkeys(("tick_in", "falling", "clear", "watch", "busy", "sof", "sof_frame", "stamp"), 0)
+IDLE |= {"expected": 4000, "start": 0, "stop": 0, "run_tick": 0, "last_done": 0}
 IDLE |= {"new_run": 0, "count_tick": 0, "frame": 0, "drop": 0, "record_ends": 0, "record_code": 0}
+LEAD = LIMITS["tick_lead"] - 1  # cycles from the divider's start to its first tick: tick_out goes ahead
 OF_RUN = ("ticks", "frames", "dropped")
 OF_RECORDS = {"ok": "records_good", "absent": "records_absent", "link_crc": "records_crc", "link_tick": "records_tick"}
 COUNTERS = (*OF_RUN, "sequence_number", *OF_RECORDS.values())
@@ -50,7 +52,7 @@ async def watch(dut, cycles: int, busy: float, strobe: float, pause: float):
 
 def expected(inputs, period: int, external: bool):
     """What the header promises: a tick when the source wants one and the link is free; numbers and time go on in a pause."""
-    number, due, out = -1, 0, []
+    number, due, out = -1, LEAD, []
     for cycle, now in enumerate(inputs):
         begins = not now["link_busy"] and (now["strobe"] if external else cycle >= due)
         due = cycle + period if begins else due
@@ -101,7 +103,8 @@ async def a_new_run_begins_with_number_0(dut, by):
         drive(dut, enable=0)  # after rst the divider goes on
         await FallingEdge(dut.clk)
         drive(dut, enable=1)
-        await FallingEdge(dut.clk)
+        for _ in range(LEAD + 1):
+            await FallingEdge(dut.clk)
         assert (int(dut.tick.value), int(dut.first.value), int(dut.number.value)) == (1, 1, 0)
         await FallingEdge(dut.clk)
         assert int(dut.tick.value) == 0
@@ -224,5 +227,8 @@ def test_ticks():
         "tick_generator.v",
         "run_control.v",
         "bridge_counters.v",
+        "tick_input.v",
+        "sof_clock.v",
         bench=("ticks_bench.v",),
+        more=("sources",),
     )

@@ -7,9 +7,9 @@ import pytest
 
 sys.path[:0] = [str(Path(__file__).parents[2] / "usb"), str(Path(__file__).parents[3] / "host" / "python")]
 
-from descriptors import descriptors  # noqa: E402
+from descriptors import Build, configuration, descriptors  # noqa: E402
 
-FOUND = {(int(kind), index): bytes(raw) for kind, index, raw in descriptors("S1")}
+FOUND = {(int(kind), index): bytes(raw) for kind, index, raw in descriptors(Build(serial="S1"))}
 DEVICE, FAST, FAST_OTHER, QUALIFIER, BOS = (FOUND[kind, 0] for kind in (1, 2, 9, 6, 15))
 SLOW, SLOW_OTHER, WINDOWS = (FOUND[kind, 0] for kind in (8, 7, 10))
 
@@ -95,13 +95,38 @@ def test_the_frame_interface_is_winusb_and_has_a_class_of_its_own():
 def test_configuration_at_each_speed(raw, kind, bulk, interval):
     parts = list(chain(raw))
     assert (parts[0][1], word(parts[0], 2), parts[0][4]) == (kind, len(raw), 2)
-    assert parts[0][7] & 0x60 == 0, "fed by the bus, wakes nobody"
+    assert parts[0][7:] == bytes([0xC0, 1]), "self-powered, wakes nobody, 2 mA"
     endpoints = [part for part in parts if part[1] == 5]
     assert [(e[2], e[3], word(e, 4)) for e in endpoints] == [(0x81, 2, bulk), (0x82, 3, 64)]
-    assert endpoints[1][6] == interval
+    assert [e[6] for e in endpoints] == [0, interval]
+    interfaces = [part for part in parts if part[1] == 4]
+    assert [tuple(i[5:8]) for i in interfaces] == [(0xFF, 0xFF, 0xFF), (3, 0, 0)], "HID, and no boot device"
+
+
+@pytest.mark.parametrize(
+    ("self_powered", "milliamps", "wanted"),
+    [
+        (True, 2, (0xC0, 1)),
+        (True, 100, (0xC0, 50)),
+        (False, 500, (0x80, 250)),
+        (False, 99, (0x80, 50)),
+        (True, 0, (0xC0, 0)),
+    ],
+)
+def test_power_is_the_boards_in_every_configuration(self_powered, milliamps, wanted):
+    build = Build(self_powered=self_powered, milliamps=milliamps)
+    found = {int(kind): bytes(raw) for kind, _, raw in descriptors(build)}
+    assert {tuple(found[kind][7:9]) for kind in (2, 7, 8, 9)} == {wanted}
+
+
+def test_no_board_asks_for_more_than_a_host_gives():
+    with pytest.raises(ValueError, match="milliamps is 501; a USB 2.0 device draws 0 to 500"):
+        configuration(Build(milliamps=501), False)
 
 
 def test_serial_numbers_are_what_was_asked_for():
     for serial in ("0001", "B0042"):
-        strings = [bytes(raw) for kind, index, raw in descriptors(serial) if int(kind) == 3 and index == DEVICE[16]]
+        strings = [
+            bytes(raw) for kind, index, raw in descriptors(Build(serial)) if int(kind) == 3 and index == DEVICE[16]
+        ]
         assert [s[2:].decode("utf-16-le") for s in strings] == [serial]

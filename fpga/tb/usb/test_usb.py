@@ -8,7 +8,7 @@ import pytest
 sys.path[:0] = [str(Path(__file__).parents[2] / "usb"), str(Path(__file__).parents[3] / "host" / "python")]
 
 from amaranth.sim import Simulator  # noqa: E402
-from descriptors import descriptors, report_descriptor  # noqa: E402
+from descriptors import Build, descriptors, report_descriptor  # noqa: E402
 from endpoints import FrameEndpoint, SilentEndpoint  # noqa: E402
 from hid_requests import FEATURE, GET_REPORT, READ, SET_IDLE, SET_REPORT, WRITTEN, HidRequests  # noqa: E402
 from usb_protocol.types import USBRequestRecipient, USBRequestType  # noqa: E402
@@ -37,7 +37,7 @@ async def pulse(ctx, signal) -> None:
 
 
 def test_descriptors_name_the_device_and_its_endpoints():
-    found = {(int(kind), index): bytes(raw) for kind, index, raw in descriptors("S1")}
+    found = {(int(kind), index): bytes(raw) for kind, index, raw in descriptors(Build(serial="S1"))}
     device, configuration = found[1, 0], found[2, 0]
     assert int.from_bytes(device[8:10], "little") == LIMITS["usb_vendor_id"]
     assert int.from_bytes(device[10:12], "little") == LIMITS["usb_product_id"]
@@ -293,7 +293,21 @@ def test_get_report_sends_the_report_or_what_fits_packet_by_packet(name, asked):
             packet = await host.read(acknowledge=False)
             assert packet and await host.read() == packet, "asked again when the host's ACK was lost"
             got += packet
+        assert host.ctx.get(host.handler.read_open)
         assert await host.status() == "ack"
+        assert not host.ctx.get(host.handler.read_open)
+
+    on_requests(scenario)
+
+
+def test_a_read_is_over_when_the_host_begins_another_request():
+    async def scenario(host):
+        for request, number, length, is_in in ((GET_REPORT, 5, 176, True), (SET_IDLE, 0, 0, False)):
+            await host.setup(GET_REPORT, value(5), 176, True)
+            await host.read()
+            assert host.ctx.get(host.handler.read_open)
+            await host.setup(request, value(number), length, is_in)
+            assert not host.ctx.get(host.handler.read_open)
 
     on_requests(scenario)
 
@@ -308,7 +322,7 @@ def test_each_read_begins_with_the_first_packet():
 
 
 REFUSED = [
-    (GET_REPORT, value(6), 64, True, 1),  # no such report
+    (GET_REPORT, value(7), 64, True, 1),  # no such report
     (GET_REPORT, value(4), 64, True, 1),  # write only
     (SET_REPORT, value(4), 55, False, 1),  # too short
     (SET_REPORT, value(4), 57, False, 1),  # too long

@@ -19,7 +19,7 @@ module board_bench (
     output wire        led          // 1: lit
 );
     wire [7:0] data;
-    wire       led_n;
+    wire       led_n, tick_out;
 
     assign data      = dir ? phy_data : 8'hzz;
     assign link_data = data;
@@ -37,7 +37,7 @@ module board_bench (
         .clk_60(clk), .ulpi_reset(reset),
 `endif
         .ulpi_data(data), .ulpi_dir(dir), .ulpi_nxt(nxt), .ulpi_stp(stp), .sync(sync), .sck(sck), .select_n(select_n),
-        .mosi(mosi), .miso(miso), .led_n(led_n));
+        .mosi(mosi), .miso(miso), .tick_in(1'b0), .tick_out(tick_out), .led_n(led_n));
 
     genvar i;
     generate

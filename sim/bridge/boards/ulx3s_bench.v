@@ -16,7 +16,7 @@ module ulx3s_bench (
     input  wire [27:0] miso,
     output wire        led
 );
-    wire d_p, d_n;
+    wire d_p, d_n, tick_out;
 
     assign device_drives = {!board.d_p_pad.T, !board.d_n_pad.T};
     assign d_p           = device_drives[1] ? 1'bz : host_p;
@@ -26,7 +26,7 @@ module ulx3s_bench (
 
     ulx3s #(.LANES(28)) board (
         .clk_25(1'b0), .usb_d_p(d_p), .usb_d_n(d_n), .usb_pull_up(pull_up), .sync(sync), .sck(sck), .select_n(select_n),
-        .mosi(mosi), .miso(miso), .led(led));
+        .mosi(mosi), .miso(miso), .tick_in(1'b0), .tick_out(tick_out), .led(led));
 endmodule
 
 `default_nettype wire

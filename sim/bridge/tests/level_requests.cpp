@@ -46,6 +46,7 @@ HostRequest RequestSource::control(bool run)
     report[WHISKER_REPORT_CONTROL_SCK_DIVIDER] = divider;
     report[WHISKER_REPORT_CONTROL_WORD_GAP] = static_cast<uint8_t>(30 + below(fast ? 10 : 226));
     report[WHISKER_REPORT_CONTROL_SAMPLE_POINT] = static_cast<uint8_t>(1 + below(divider));
+    report[WHISKER_REPORT_CONTROL_OPTIONS] = static_cast<uint8_t>(chance(4) ? below(16) : 0);
     const auto mask = static_cast<uint32_t>(random_()) & ALL_LANES;
     whisker_put_u32(report.data() + WHISKER_REPORT_CONTROL_LANE_MASK, chance(3) ? mask : ALL_LANES);
     const uint64_t period = fast ? WHISKER_LIMIT_TICK_PERIOD : WHISKER_LIMIT_TICK_PERIOD_MIN + below(40000);
@@ -72,7 +73,7 @@ HostRequest RequestSource::get()
 {
     HostRequest request;
     const uint16_t length = REPORT_LENGTHS[below(std::size(REPORT_LENGTHS))];
-    request.setup = {GET_TYPE, GET_REPORT, static_cast<uint16_t>(FEATURE_REPORT | below(7)),
+    request.setup = {GET_TYPE, GET_REPORT, static_cast<uint16_t>(FEATURE_REPORT | below(6)),
                      WHISKER_LIMIT_USB_HID_INTERFACE, length};
     return request;
 }

@@ -33,9 +33,9 @@ const SetupRequest READ_DEVICE = {0x80, 6, 0x0100, 0, 18};
 
 // Requests are {bmRequestType, bRequest, wValue, wIndex, wLength}.
 const Row ROWS[] = {
-    {"status of the device", {0x80, 0, 0, 0, 2}, {OK, OK, OK}, {0, 0}, 2},
-    {"status, one byte of it", {0x80, 0, 0, 0, 1}, {OK, OK, OK}, {0}, 1},
-    {"status, room for more", {0x80, 0, 0, 0, 64}, {OK, OK, OK}, {0, 0}, 2},
+    {"status of the device", {0x80, 0, 0, 0, 2}, {OK, OK, OK}, {1, 0}, 2},
+    {"status, one byte of it", {0x80, 0, 0, 0, 1}, {OK, OK, OK}, {1}, 1},
+    {"status, room for more", {0x80, 0, 0, 0, 64}, {OK, OK, OK}, {1, 0}, 2},
     {"status with a value", {0x80, 0, 1, 0, 2}, {NO, NO, NO}, {}},
     {"status of device 1", {0x80, 0, 0, 1, 2}, {NO, NO, NO}, {}},
     {"status of interface 0", {0x81, 0, 0, 0, 2}, {NO, NO, OK}, {0, 0}, 2},

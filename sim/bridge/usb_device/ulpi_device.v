@@ -37,7 +37,8 @@ module ulpi_device (
         .utmi_line_state(line_state), .utmi_vbus_valid(vbus_valid), .utmi_session_valid(session_valid),
         .utmi_session_end(session_end), .utmi_xcvr_select(xcvr_select), .utmi_term_select(term_select),
         .utmi_op_mode(op_mode), .stream_data(stream_data), .stream_valid(stream_valid), .stream_last(1'b0),
-        .stream_ready(stream_ready), .restart(restart), .suspended(suspended), .serial_number(64'd0),
+        .stream_ready(stream_ready), .restart(restart), .suspended(suspended), .board(), .build(), .configured(), .sof(), .sof_frame(), .read_open(),
+        .serial_number(64'd0),
         .write_start(), .write_valid(), .write_index(), .write_data(), .write_done(), .write_accept(1'b0),
         .read_start(), .read_id(), .read_packet(), .read_next(), .read_data(8'd0));
 endmodule
