@@ -31,8 +31,8 @@ module board_core #(
     wire [7:0] rx_data, tx_data;
     wire       rx_active, rx_valid, rx_error, tx_valid, tx_ready, vbus_valid, session_valid, session_end, term_select;
     wire [1:0] line_state, xcvr_select, op_mode;
-    wire       ready, running, link_busy, transfer_busy, configured, lost, lit;
-    wire       unused = &{1'b0, ready, running, link_busy, transfer_busy, configured, lost};
+    wire       ready, running, link_busy, transfer_busy, configured, frames_lost, lit;
+    wire       unused = &{1'b0, ready, running, link_busy, transfer_busy, configured, frames_lost};
 
     // Flip-flops begin at zero when the FPGA has been configured.
     reg  [4:0] awake;
@@ -63,7 +63,7 @@ module board_core #(
         .utmi_vbus_valid(vbus_valid), .utmi_session_valid(session_valid), .utmi_session_end(session_end),
         .utmi_xcvr_select(xcvr_select), .utmi_term_select(term_select), .utmi_op_mode(op_mode),
         .serial_number(64'd0), .tick_external(1'b0), .tick_strobe(1'b0), .tick_in(tick_in), .tick_out(tick_out),
-        .usb_configured(configured), .frames_lost(lost), .running(running), .link_busy(link_busy),
+        .usb_configured(configured), .frames_lost(frames_lost), .running(running), .link_busy(link_busy),
         .transfer_busy(transfer_busy), .led(lit));
 
     always @(posedge clk) led <= lit;

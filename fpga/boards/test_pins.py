@@ -24,6 +24,9 @@ WIRING = {
     + [("P5 first", ROW["both"]), ("P5 second", ROW["first"])],
 }
 WIRING["colorlight_i5"] = WIRING["colorlight_i9"]
+# tick_in and tick_out
+TICKS = {"ecpix5": ("pmod 0", "7 8"), "cynthion": ("mezzanine", "23 24"), "colorlight_i9": ("P2", "8 9")}
+TICKS["colorlight_i5"] = TICKS["colorlight_i9"]
 # Where the PHY is a module, its lines lie on a socket too.
 MODULE = {
     "ulpi_data": [("P4 first", "1 2 3 7 8 9 10"), ("P4 second", "3")],
@@ -46,6 +49,7 @@ def wrong(board, platform) -> list[str]:
     phy = platform.phy or {port: found if port == "ulpi_data" else found[0] for port, found in module.items()}
     lines = balls(platform, WIRING[board.name])
     expected = {**phy, **dict(zip(BUS, lines, strict=False)), "miso": lines[len(BUS) :]}
+    expected |= dict(zip(("tick_in", "tick_out"), balls(platform, [TICKS[board.name]]), strict=True))
     found = [port for port, place in expected.items() if board.pins.get(port) != place]
     leds = board.pins["led_n"]
     leds = [leds] if isinstance(leds, str) else leds
