@@ -71,6 +71,30 @@ def test_configuration_words_are_the_sources_and_have_no_bit_that_does_not_exist
         assert value & ~CONFIG_BITS[at & 0xFF] == 0, f"{at:#x}: {value:#04x} reads back otherwise"
 
 
+def words_at(memory: dict[int, int], address: int, count: int) -> list[int]:
+    """Program words from an address on, two address units each."""
+    return [sum(memory[2 * (address + 2 * n) + i] << 8 * i for i in range(3)) for n in range(count)]
+
+
+@pytest.mark.parametrize("build", OPTIONS)
+def test_no_vector_leads_to_the_start_of_a_program(build):
+    """There the processor would go on at the interrupt's priority and serve none of its own: what is not served resets."""
+    memory = intel_hex.read(IMAGES / build / "node_wire.hex")
+    start, reset = 0x040000, 0xFE0000
+    first = words_at(memory, 0x0000, 1)[0] & 0xFFFF
+    gotos = words_at(memory, 0x2080, 2 * 127)[::2]
+    assert all(word & 0xFF0000 == start for word in gotos)
+    targets = {word & 0xFFFF for word in gotos[1:]} | set(words_at(memory, 0x0104, 126))
+    assert not targets & {0, first, gotos[0] & 0xFFFF} and len(targets) == 2 * (12 + 1)
+    assert sum(words_at(memory, target, 1)[0] == reset for target in targets) == 2
+
+
+@pytest.mark.parametrize("build", OPTIONS)
+def test_no_memory_is_filled_by_the_compilers_own_code(build):
+    """GCC 4.5.1 for the chip makes of memset(.., 0xFF, ..) a row of 0xFEFF: no update would pass."""
+    assert "#0xfeff" not in (IMAGES / build / "node.lst").read_text()
+
+
 def functions_of(listing: str) -> set[str]:
     """C and assembler names at the beginnings of the code, compiler's own labels apart."""
     return {name.lstrip("_") for name in re.findall(r"^[0-9a-f]{8} <(\w+)>:$", listing, re.M)}

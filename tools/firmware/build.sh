@@ -32,7 +32,8 @@ case ${RESYNC:-0} in
     *) fail "RESYNC=$RESYNC: use 1, or leave it out" ;;
 esac
 
-cflags="-std=gnu99 -O1 -merrata=exch -Wall -Wextra -Werror -nostdinc -I$chip/libc -I$fw -I$fw/core -I$fw/port_dspic
+# -fno-builtin: what GCC 4.5.1 makes of memset(.., 0xFF, ..) by itself writes 0xFEFF.
+cflags="-std=gnu99 -O1 -merrata=exch -fno-builtin -Wall -Wextra -Werror -nostdinc -I$chip/libc -I$fw -I$fw/core -I$fw/port_dspic
     -Iprotocol/gen $defines"
 lflags='--stack=16 --check-sections --no-data-init --no-handles --no-isr --report-mem'
 if [ -n "${PIC30:-}" ]; then

@@ -1,8 +1,8 @@
 ; The application's first rows: a goto per vector, reset first, then traps and interrupts in the order of the vector table in
-; page 0, whose entries point here, four address units apart. What is not served goes to the reset vector.
+; page 0, whose entries point here, four address units apart. What is not served resets.
         .macro  unserved count
         .rept   \count
-        goto    0
+        goto    __unserved
         .endr
         .endm
 

@@ -15,3 +15,9 @@ __resetPRI:
         mov     w0, PSVPAG
         bset    CORCON, #2          ; constants are read through their window
         goto    _main               ; does not return
+
+; Where every vector leads that is not served. A jump to the start would not do: the processor would go on at the
+; interrupt's priority, and serve none of its own.
+        .global __unserved
+__unserved:
+        reset

@@ -15,7 +15,7 @@
 ; The alternate table, in the same order as the jump table: the loader's own. What it does not serve resets.
         .macro  unserved count
         .rept   \count
-        .pword  0
+        .pword  paddr(__unserved)
         .endr
         .endm
 
