@@ -2,8 +2,8 @@
 #include "near.h"
 #include "texture_change.h"
 #include "texture_features.h"
+#include "texture_novelty.h"
 #include "texture_settle.h"
-#include "texture_strange.h"
 #include "texture_watch.h"
 
 enum { LENGTH = 16, FEATURES_MOST = 64 };
@@ -127,34 +127,88 @@ static void impossible_numbers_make_no_detector(void **state)
     struct numbers m;
     assert_null(make(&m, NAN));
     nav_texture_change_free(NULL);
-    const double one[] = {1.0}, none[] = {0.0};
-    struct nav_texture_strange_numbers n = {
-        .classes = 1, .features = 1, .steps = 1, .turn = one, .middle = none, .limit = none};
-    assert_null(nav_texture_strange_new(&n));
-    n.limit = one;
-    n.steps = NAV_TEXTURE_STRANGE_STEPS_MAX + 1;
-    assert_null(nav_texture_strange_new(&n));
-    nav_texture_strange_free(NULL);
 }
 
-/* Two features, turned by [[2, 0], [0, 1]]; classes at 0 and at (10, 0); steps of 2 and 4 windows. */
-static void means_of_windows_are_measured_from_the_nearest_class(void **state)
+/* One feature, which the axis doubles; classes at 0 and 20 there, a surface never trained anywhere about 10. */
+static struct nav_texture_novelty_numbers novelty_numbers(void)
+{
+    static const double turn[] = {2.0}, mean[] = {0.0, 20.0, 10.0}, recording[] = {1.0, 3.0, 100.0}, noise[] = {4.0};
+    static const double limit[NAV_TEXTURE_NOVELTY_STEPS] = {3.0, 2.0, 1.0, 0.5, 0.25};
+    return (struct nav_texture_novelty_numbers){.classes = 2,
+                                                .features = 1,
+                                                .turn = turn,
+                                                .mean = mean,
+                                                .recording = recording,
+                                                .noise = noise,
+                                                .limit = limit,
+                                                .scale = 2.0};
+}
+
+static double log_normal(double x, double mean, double variance)
+{
+    return -0.5 * ((x - mean) * (x - mean) / variance + log(variance));
+}
+
+/* Score of windows whose turned features have this mean. */
+static double novelty_wanted(double mean, int windows, double limit)
+{
+    double noise = 4.0 / windows, one = log_normal(mean, 0.0, 1.0 + noise), two = log_normal(mean, 20.0, 3.0 + noise);
+    return 1.0 + (log_normal(mean, 10.0, 100.0 + noise) - fmax(one, two) - limit) / 2.0;
+}
+
+static void windows_in_a_row_are_weighed_by_their_mean(void **state)
 {
     (void)state;
-    const double turn[] = {2, 0, 0, 1, 2, 0, 0, 1}, middle[] = {0, 0, 20, 0, 0, 0, 20, 0}, limit[] = {2.0, 0.5};
-    const struct nav_texture_strange_numbers n = {
-        .classes = 2, .features = 2, .steps = 2, .turn = turn, .middle = middle, .limit = limit};
-    struct nav_texture_strange *s = nav_texture_strange_new(&n);
-    const double windows[][2] = {{1, 5}, {3, -1}, {3, 5}, {9, -1}, {9, 0}, {9, 0}, {9, 0}};
-    const double wanted[] = {0.0, (16.0 + 4.0) / 2 / 2.0, (36.0 + 4.0) / 2 / 2.0, (64.0 + 4.0) / 2 / 0.5};
-    for (int i = 0; i < 4; i++)
-        assert_near(nav_texture_strange_weigh(s, windows[i]), wanted[i], 1e-9);
-    nav_texture_strange_weigh(s, windows[4]);
-    nav_texture_strange_weigh(s, windows[5]);
-    assert_near(nav_texture_strange_weigh(s, windows[6]), (4.0 + 0.0625) / 2 / 0.5, 1e-9); /* nearer the second class */
-    nav_texture_strange_reset(s);
-    assert_true(nav_texture_strange_weigh(s, windows[0]) == 0.0);
-    nav_texture_strange_free(s);
+    const struct nav_texture_novelty_numbers n = novelty_numbers();
+    struct nav_texture_novelty *v = nav_texture_novelty_new(&n);
+    assert_int_equal(nav_texture_novelty_features(v), 1);
+    const double x[] = {1.0, 4.0, 2.5, 2.5, 5.0}, mean[] = {2.0, 5.0, 5.0, 5.0, 6.0};
+    for (int i = 0; i < 5; i++)
+        assert_near(nav_texture_novelty_weigh(v, x + i),
+                    novelty_wanted(mean[i], i + 1,
+                                   n.limit[i < 1   ? 0
+                                           : i < 3 ? 1
+                                                   : 2]),
+                    1e-9);
+    nav_texture_novelty_reset(v);
+    const double other = 9.0;
+    assert_near(nav_texture_novelty_weigh(v, &other), novelty_wanted(18.0, 1, 3.0), 1e-9);
+    nav_texture_novelty_free(v);
+}
+
+/* The 17th window takes a sixteenth of the mean, and so does every later one. */
+static void old_windows_fade(void **state)
+{
+    (void)state;
+    const struct nav_texture_novelty_numbers n = novelty_numbers();
+    struct nav_texture_novelty *v = nav_texture_novelty_new(&n);
+    const double before = 0.0, after = 5.0;
+    double mean = 0.0;
+    for (int i = 0; i < 40; i++)
+        nav_texture_novelty_weigh(v, &before);
+    for (int i = 0; i < 3; i++) {
+        mean += (10.0 - mean) / 16.0;
+        assert_near(nav_texture_novelty_weigh(v, &after), novelty_wanted(mean, 16, 0.25), 1e-9);
+    }
+    nav_texture_novelty_free(v);
+}
+
+static void impossible_numbers_make_no_novelty_detector(void **state)
+{
+    (void)state;
+    const double nothing = 0.0, negative[] = {1.0, -1.0, 1.0}, not_finite[] = {0.0, NAN, 0.0};
+    struct nav_texture_novelty_numbers n[6];
+    for (int i = 0; i < 6; i++)
+        n[i] = novelty_numbers();
+    n[0].noise = &nothing;
+    n[1].recording = negative;
+    n[2].mean = not_finite;
+    n[3].scale = 0.0;
+    n[4].classes = 0;
+    n[5].features = 0;
+    for (int i = 0; i < 6; i++)
+        assert_null(nav_texture_novelty_new(n + i));
+    nav_texture_novelty_free(NULL);
 }
 
 /* Blocks of a watch, whose samples alternate by `amplitude`; the samples told to lie behind a change. */
@@ -265,7 +319,9 @@ int main(void)
         cmocka_unit_test(a_stray_block_claims_no_more_than_the_classes_differ),
         cmocka_unit_test(what_a_drive_has_of_its_own_is_no_change),
         cmocka_unit_test(impossible_numbers_make_no_detector),
-        cmocka_unit_test(means_of_windows_are_measured_from_the_nearest_class),
+        cmocka_unit_test(windows_in_a_row_are_weighed_by_their_mean),
+        cmocka_unit_test(old_windows_fade),
+        cmocka_unit_test(impossible_numbers_make_no_novelty_detector),
         cmocka_unit_test(a_watch_tells_how_many_samples_lie_behind_a_change_and_nothing_else),
         cmocka_unit_test(an_edge_interrupts_the_row_of_blocks),
         cmocka_unit_test(ringing_falls_steadily),

@@ -301,7 +301,8 @@ static void the_distance_is_weighed_along_each_axis(void **state)
     struct nav_texture_rung *rung = nav_texture_rung_new(&numbers);
     draw(window, 16, 11);
     double distance = nav_texture_rung_judge(rung, window, &loglik);
-    const double *z = nav_texture_rung_features(rung, &count);
+    const double *z = nav_texture_rung_features(rung);
+    assert_int_equal(nav_texture_rung_count(rung), count);
     assert_true(fabs(z[0] - z[1]) > 0.1);
     assert_near(distance, distance_along(z, count, weight, beyond), 1e-9);
     nav_texture_rung_free(rung);
@@ -321,6 +322,7 @@ static struct nav_texture_stream *stream_of(const struct model *m, int step)
                                             .doubt = 0.6,
                                             .step = step,
                                             .sure = 0.99,
+                                            .told = 1.0,
                                             .patience = step ? 64 : 0,
                                             .limits = {.channels = 1, .spike = &m->spike}};
     struct nav_texture_stream *s = nav_texture_stream_new(&rules);

@@ -138,9 +138,13 @@ int nav_texture_rung_length(const struct nav_texture_rung *r)
     return r->n.length;
 }
 
-const double *nav_texture_rung_features(const struct nav_texture_rung *r, int *count)
+int nav_texture_rung_count(const struct nav_texture_rung *r)
 {
-    *count = r->features;
+    return r->features;
+}
+
+const double *nav_texture_rung_features(const struct nav_texture_rung *r)
+{
     return r->expanded;
 }
 

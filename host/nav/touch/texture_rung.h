@@ -43,9 +43,10 @@ void nav_texture_rung_expand(struct nav_texture_rung *, const double *window, do
 double nav_texture_rung_judge(struct nav_texture_rung *, const double *window, double *loglik);
 /* cffi: end */
 
-/* Standardised features [F] of the last window judged. */
-const double *nav_texture_rung_features(const struct nav_texture_rung *, int *count);
+/* Standardised features [nav_texture_rung_count()] of the last window judged. */
+const double *nav_texture_rung_features(const struct nav_texture_rung *);
 
+int nav_texture_rung_count(const struct nav_texture_rung *); /* of features */
 int nav_texture_rung_length(const struct nav_texture_rung *);
 
 #endif

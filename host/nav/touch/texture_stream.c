@@ -12,6 +12,7 @@
 
 #define HELD_WINDOWS 20 /* a tip held for longer, 2 s at 100 ms, has a new rest */
 #define SINCE_LONG (1 << 30)
+#define SURE 0.9     /* confidence that names a surface, for which of two windows in a row are of one */
 #define RINGING 0.05 /* share of its evidence that a window keeps while the whisker rings */
 
 struct nav_texture_stream {
@@ -26,7 +27,10 @@ struct nav_texture_stream {
     int since; /* samples since the surface changed, or SINCE_LONG */
     struct nav_texture_halves halves;
     struct nav_texture_watch watch;
-    int kind; /* likeliest class of the windows in a row that are judged together, or NAV_TEXTURE_UNKNOWN */
+    int kind;      /* likeliest class of the windows in a row that are judged together, or NAV_TEXTURE_UNKNOWN */
+    double beyond; /* novelty score of the windows in a row, 0 before the first */
+    double *apart; /* [novelty's length][channels] samples since its last window, then [classes]; unused if aligned */
+    int apart_held;
     struct nav_texture_catch edge; /* its level is the sixth row of limits */
 };
 
@@ -34,13 +38,17 @@ static bool lengths_ok(const struct nav_texture_rules *r)
 {
     if (r->rungs < 1 || r->rungs > NAV_TEXTURE_RUNGS_MAX || r->window < 2 || r->window > NAV_TEXTURE_WINDOW_MAX)
         return false;
-    if (r->step < 0 || (r->step > 0 && (r->patience < r->step || r->patience > NAV_TEXTURE_WINDOW_MAX)))
+    if (r->step < 0 ||
+        (r->step > 0 && !(r->told >= 0.0 && r->patience >= r->step && r->patience <= NAV_TEXTURE_WINDOW_MAX)))
         return false;
     for (int i = 1; i < r->rungs; i++) {
         if (nav_texture_rung_length(r->rung[i]) <= nav_texture_rung_length(r->rung[i - 1]))
             return false;
     }
     if (r->settle && (!r->change || nav_texture_settle_length(r->settle) != nav_texture_change_length(r->change)))
+        return false;
+    if (r->novelty && (r->novelty_rung < 0 || r->novelty_rung >= r->rungs ||
+                       nav_texture_novelty_features(r->novelty) != nav_texture_rung_count(r->rung[r->novelty_rung])))
         return false;
     return r->channels >= 1 && r->classes >= 1 && r->limits.channels == r->channels;
 }
@@ -50,16 +58,29 @@ static const double *own_limit(double *to, const double *from, int channels)
     return from ? memcpy(to, from, (size_t)channels * sizeof *to) : NULL;
 }
 
+/* Samples of a window that novelty is judged by; 0 without. */
+static int novelty_length(const struct nav_texture_stream *s)
+{
+    return s->rules.novelty ? nav_texture_rung_length(s->rules.rung[s->rules.novelty_rung]) : 0;
+}
+
+/* Whether decisions are of just the windows that novelty is judged by. */
+static bool aligned(const struct nav_texture_stream *s)
+{
+    return s->rules.step == 0 && s->rules.window == novelty_length(s);
+}
+
 static bool allocate(struct nav_texture_stream *s)
 {
     size_t channels = (size_t)s->rules.channels;
+    s->apart = calloc((size_t)novelty_length(s) * channels + (size_t)s->rules.classes, sizeof *s->apart);
     s->span = nav_texture_span_new(&s->rules);
     s->limits = calloc(6 * channels, sizeof *s->limits);
     s->raw = calloc((size_t)s->room * channels, sizeof *s->raw);
     s->clean = calloc((size_t)s->room * channels, sizeof *s->clean);
     bool halves = nav_texture_halves_make(&s->halves, &s->rules, s->border);
     bool watch = nav_texture_watch_make(&s->watch, &s->rules, &s->rules.limits);
-    return halves && watch && s->span && s->limits && s->raw && s->clean;
+    return halves && watch && s->apart && s->span && s->limits && s->raw && s->clean;
 }
 
 static void own_limits(struct nav_texture_stream *s)
@@ -105,6 +126,7 @@ void nav_texture_stream_free(struct nav_texture_stream *s)
         return;
     nav_texture_span_free(s->span);
     free(s->limits);
+    free(s->apart);
     free(s->raw);
     free(s->clean);
     nav_texture_watch_free(&s->watch);
@@ -116,8 +138,10 @@ void nav_texture_stream_free(struct nav_texture_stream *s)
 static void new_surface(struct nav_texture_stream *s)
 {
     s->kind = NAV_TEXTURE_UNKNOWN;
-    if (s->rules.strange)
-        nav_texture_strange_reset(s->rules.strange);
+    s->beyond = 0.0;
+    s->apart_held = 0;
+    if (s->rules.novelty)
+        nav_texture_novelty_reset(s->rules.novelty);
 }
 
 void nav_texture_stream_reset(struct nav_texture_stream *s)
@@ -153,20 +177,27 @@ static void no_evidence(struct nav_texture_stream *s, struct nav_texture_decisio
     new_surface(s);
 }
 
-/* How far beyond every trained surface this window lies, or the windows in a row that it ends: above 1 is never
- * trained. */
-static double strangeness(struct nav_texture_stream *s, double distance, int rung, int n, int kind)
+/* Judges the window that a rung has just reduced to features, together with those before it. */
+static void weigh_novelty(struct nav_texture_stream *s)
 {
-    double alone = distance / s->rules.unknown[rung];
-    struct nav_texture_strange *strange = s->rules.step > 0 ? NULL : s->rules.strange;
-    int count;
-    const double *features = nav_texture_rung_features(s->rules.rung[rung], &count);
-    if (!strange || n != nav_texture_rung_length(s->rules.rung[rung]) || count != nav_texture_strange_features(strange))
-        return alone;
-    if (kind != s->kind && s->kind != NAV_TEXTURE_UNKNOWN)
-        nav_texture_strange_reset(strange);
-    s->kind = kind;
-    return fmax(alone, nav_texture_strange_weigh(strange, features));
+    const double *features = nav_texture_rung_features(s->rules.rung[s->rules.novelty_rung]);
+    s->beyond = nav_texture_novelty_weigh(s->rules.novelty, features);
+}
+
+/* How far beyond every trained surface this stretch lies, or the windows in a row that it ends: above 1 is never
+ * trained. A surface named with confidence, where another was before, begins a new row. */
+static double novelty(struct nav_texture_stream *s, const struct nav_texture_decision *d, int rung, int n)
+{
+    double alone = d->distance / s->rules.unknown[rung];
+    if (!aligned(s) || n != s->held)
+        return fmax(alone, s->beyond);
+    bool sure = d->confidence > SURE;
+    if (sure && s->kind != NAV_TEXTURE_UNKNOWN && s->kind != d->label)
+        new_surface(s);
+    if (sure)
+        s->kind = d->label;
+    weigh_novelty(s);
+    return fmax(alone, s->beyond);
 }
 
 /* A surface that lies beyond every trained one is weak evidence for any of them: the farther, the weaker. */
@@ -200,43 +231,62 @@ static bool watched(const struct nav_texture_stream *s)
     return s->rules.step == 0 && s->rules.change;
 }
 
-/* Decides on the samples held. Returns whether a sequential decision may stop here. */
-static bool decide(struct nav_texture_stream *s, struct nav_texture_decision *d, double *loglik)
+/* Cleans the samples held. Returns whether they say anything of a surface. */
+static bool clean(struct nav_texture_stream *s, struct nav_texture_decision *d)
 {
-    memset(d, 0, sizeof *d);
-    d->samples = s->held;
     memcpy(s->clean, s->raw, (size_t)s->held * (size_t)s->rules.channels * sizeof *s->clean);
     d->health = nav_texture_clean(s->clean, s->held, &s->rules.limits);
     bool readable = !nav_texture_unreadable(&d->health, s->held);
     if (readable && d->health.railed == 0 && edge_holds(s, d->health.caught > 0))
         d->health.caught = d->health.caught > 0 ? d->health.caught : 1;
-    d->border = d->health.caught > 0 && d->health.railed == 0;
+    return readable && !d->health.caught;
+}
+
+/* Whether a sequential decision takes more samples: up to one window for a surface never trained, and to the last for
+ * one that is not named surely. */
+static bool goes_on(const struct nav_texture_stream *s, double confidence, bool untrained)
+{
+    int most = untrained ? s->rules.window : s->room;
+    return s->rules.step > 0 && s->held < most && (untrained || confidence < s->rules.sure);
+}
+
+/* Label and confidence. Samples are taken until they look sure, so a sequential decision's evidence is less than it
+ * looks: `told` of it is kept. */
+static void answer(const struct nav_texture_stream *s, struct nav_texture_decision *d, double *loglik, bool unknown,
+                   double beyond)
+{
+    int classes = s->rules.classes;
+    double least = s->rules.step > 0 ? s->rules.sure : s->rules.doubt;
+    bool unsure = best(loglik, classes, &d->label) < least;
+    for (int k = 0; k < classes && s->rules.step > 0; k++)
+        loglik[k] *= s->rules.told;
+    d->confidence = best(loglik, classes, &d->label) / fmax(beyond, 1.0);
+    if (unknown || unsure || beyond > 1.0)
+        d->label = NAV_TEXTURE_UNKNOWN;
+}
+
+/* Decides on the samples held. Returns whether a sequential decision may stop here. */
+static bool decide(struct nav_texture_stream *s, struct nav_texture_decision *d, double *loglik)
+{
+    *d = (struct nav_texture_decision){.samples = s->held};
     bool cut = s->since < s->held; /* what lies before the border says nothing of the surface now */
-    int n = cut ? s->since : s->held, rung = -1;
+    int n = cut ? s->since : s->held;
     const double *from = s->clean + (size_t)(s->held - n) * (size_t)s->rules.channels;
-    if (readable && !d->health.caught)
-        rung = nav_texture_span_judge(s->span, from, n, loglik, &d->distance);
-    d->border = d->border || cut;
+    int rung = clean(s, d) ? nav_texture_span_judge(s->span, from, n, loglik, &d->distance) : -1;
+    d->border = cut || (d->health.caught > 0 && d->health.railed == 0);
     if (rung < 0) {
         no_evidence(s, d, loglik);
         return false;
     }
     int half_rung = nav_texture_halves_judge(&s->halves, s->span, from, n, loglik);
-    best(loglik, s->rules.classes, &d->label);
-    double beyond = strangeness(s, d->distance, rung, n, d->label);
-    bool strange = never_trained(s, beyond, loglik);
     d->confidence = best(loglik, s->rules.classes, &d->label);
-    if (s->rules.step > 0 && (d->confidence < s->rules.sure || strange) && s->held < s->room)
+    double beyond = novelty(s, d, rung, n);
+    bool untrained = never_trained(s, beyond, loglik);
+    if (goes_on(s, best(loglik, s->rules.classes, &d->label), untrained))
         return false;
     bool halves = nav_texture_halves_border(&s->halves, loglik, rung, half_rung);
     d->border = cut || (halves && !watched(s));
-    bool ringing = rings(s, loglik);
-    d->confidence = best(loglik, s->rules.classes, &d->label);
-    if (strange)
-        d->confidence /= beyond;
-    bool unsure = d->confidence < (s->rules.step > 0 ? s->rules.sure : s->rules.doubt);
-    if (strange || ringing || unsure)
-        d->label = NAV_TEXTURE_UNKNOWN;
+    answer(s, d, loglik, rings(s, loglik), beyond);
     return true;
 }
 
@@ -251,6 +301,22 @@ static bool changed(struct nav_texture_stream *s, const double *sample)
     s->halves.has_before = false;
     new_surface(s);
     return true;
+}
+
+/* Windows of novelty's own, where decisions are of others. */
+static void follow_novelty(struct nav_texture_stream *s, const double *sample)
+{
+    int length = novelty_length(s), channels = s->rules.channels;
+    memcpy(s->apart + (size_t)s->apart_held++ * (size_t)channels, sample, (size_t)channels * sizeof *sample);
+    if (s->apart_held < length)
+        return;
+    s->apart_held = 0;
+    struct nav_texture_health health = nav_texture_clean(s->apart, length, &s->rules.limits);
+    if (nav_texture_unreadable(&health, length) || health.caught > 0 || s->edge.held)
+        return;
+    nav_texture_rung_judge(s->rules.rung[s->rules.novelty_rung], s->apart,
+                           s->apart + (size_t)length * (size_t)channels);
+    weigh_novelty(s);
 }
 
 /* Word of a border before the window is full. */
@@ -274,6 +340,8 @@ long nav_texture_stream_push(struct nav_texture_stream *s, const double *samples
     *decided = 0;
     for (long i = 0; i < n; i++) {
         memcpy(s->raw + (size_t)s->held++ * channels, samples + (size_t)i * channels, channels * sizeof *s->raw);
+        if (s->rules.novelty && !aligned(s))
+            follow_novelty(s, samples + (size_t)i * channels);
         bool news = changed(s, samples + (size_t)i * channels);
         if (news && !due(s)) {
             notice(s, decision, loglik);

@@ -4,9 +4,9 @@
 
 #include "texture_change.h"
 #include "texture_clean.h"
+#include "texture_novelty.h"
 #include "texture_rung.h"
 #include "texture_settle.h"
-#include "texture_strange.h"
 
 /* cffi: begin */
 struct nav_texture_stream;
@@ -27,10 +27,12 @@ struct nav_texture_rules {
     int step;                             /* 0: windows in a row. Else sequential: looks every so many samples, ... */
     double sure;                          /* ... answers at this confidence, ... */
     int patience;                         /* ... and after so many samples in any case */
+    double told;                          /* factor of the log-likelihoods of a sequential decision, >= 0 */
     struct nav_texture_limits limits;     /* channels as above */
     struct nav_texture_change *change;   /* lent to this stream alone; NULL: borders are those of the windows' halves */
-    struct nav_texture_strange *strange; /* likewise; NULL: windows are strange one by one. Unused by windows that are
-                                            not of exactly one rung */
+    struct nav_texture_novelty *novelty; /* likewise, of the features of novelty_rung; NULL: windows are judged one by
+                                            one, by `unknown` */
+    int novelty_rung;
     struct nav_texture_settle *settle; /* likewise, of blocks as long as `change`'s; NULL: ringing passes for a floor */
 };
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import level0
 import numpy as np
 import pytest
-from models import CHANNELS, LENGTH, LIMITS, change, model, rung, settle, strange
+from models import CHANNELS, FEATURES, LENGTH, LIMITS, change, model, novelty, rung, settle
 from rings import ring_name
 
 import whisker
@@ -28,9 +28,9 @@ from whisker.touch.radial.shape import Contact as Whisk
 from whisker.touch.radial.shape import shape_of
 from whisker.touch.texture.change import Change
 from whisker.touch.texture.model import TextureModel
+from whisker.touch.texture.novelty import Novelty
 from whisker.touch.texture.rung import Rung, blocks_of, plain_features
 from whisker.touch.texture.settle import Settle
-from whisker.touch.texture.strange import Strange
 
 PACKAGE = Path(whisker.__file__).parent
 HELPERS = {"doubles", "octets", "pointer"}
@@ -127,9 +127,10 @@ CASES = {
         lambda recording: TextureModel.train({"A": [recording], "B": [NOISE]}), "recording", NOISE, 1
     ),
     "touch.texture.model.TextureModel.loglik": of_one(PLAIN.loglik, "window", NOISE, 1),
-    "touch.texture.strange.Strange.native": of_part(
-        strange(), Strange.native, turn=(0, 1, 2), middle=(0, 2), limit=(0,)
+    "touch.texture.novelty.Novelty.native": of_part(
+        novelty(), Novelty.native, turn=(0, 1), mean=(1,), recording=(0, 1), noise=(0,), limit=(0,)
     ),
+    "touch.texture.novelty.Novelty.scores": of_one(novelty().scores, "features", np.zeros((3, FEATURES)), 1),
     "touch.texture.settle.Settle.native": of_part(settle(), Settle.native, floor=(), limit=(0,)),
     "touch.texture.settle.Settle.falls": of_one(settle().falls, "samples", NOISE, 1),
     "touch.texture.change.Change.native": of_part(

@@ -40,7 +40,7 @@ HEADERS = {
             "touch/texture_change.h",
             "touch/texture_clean.h",
             "touch/texture_settle.h",
-            "touch/texture_strange.h",
+            "touch/texture_novelty.h",
             "touch/texture_stream.h",
             "problem/pose.h",
             "problem/arena.h",

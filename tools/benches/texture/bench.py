@@ -1,10 +1,11 @@
 """Floor texture: errors, times and stability of the paper's classifier, the default method and peers.
 
-    make bench, or .venv/bin/python tools/benches texture [--fabricslide DIR] [--borealtc DIR]
+    make bench, or .venv/bin/python tools/benches texture [--fabricslide DIR] [--borealtc DIR] [--vulpi DIR]
 
 Simulated floors (level 1) are drawn from seeds that nothing was developed on. Real recordings are not part of this
 project: clone github.com/wngfra/FabricSlide (MIT) and github.com/norlab-ulaval/BorealTC (MIT) and give their folders
-data/fabric and data/borealtc, here or as FABRICSLIDE_DIR and BOREALTC_DIR; without them their part is skipped by name.
+data/fabric, data/borealtc and data/vulpi (in BorealTC), here or as FABRICSLIDE_DIR, BOREALTC_DIR and VULPI_DIR; without
+them their parts are skipped by name.
 Parts that are done are kept in build/bench/texture. Writes bench/results/texture.json,
 docs/texture_faults.md and docs/charts/texture_*.
 """
@@ -20,14 +21,20 @@ from .charts import draw
 from .cost import cost
 from .course import course
 from .page import page
-from .real import fabrics, terrains
-from .simulated import borders, other_robot, refusals, single_surfaces, stability
+from .real import boreal, boreal_left_out, fabrics, fabrics_left_out, vulpi_left_out, vulpi_terrains
+from .simulated import borders, floors_left_out, other_robot, refusals, single_surfaces, stability
 
 ROOT = Path(__file__).resolve().parents[3]
 PAGE = ROOT / "docs/texture_faults.md"
 RESULTS, CHARTS, CACHE = ROOT / "bench/results", ROOT / "docs/charts", ROOT / "build/bench/texture"
-PARTS = {f.__name__: f for f in (course, cost, single_surfaces, other_robot, borders, refusals, stability)}
-REAL = {"fabricslide": fabrics, "borealtc": terrains}
+PARTS = {
+    f.__name__: f for f in (course, cost, single_surfaces, other_robot, borders, refusals, floors_left_out, stability)
+}
+REAL = {  # by the folder that is given
+    "fabricslide": {"fabricslide": fabrics, "fabrics_left_out": fabrics_left_out},
+    "borealtc": {"borealtc": boreal, "boreal_left_out": boreal_left_out},
+    "vulpi": {"vulpi": vulpi_terrains, "vulpi_left_out": vulpi_left_out},
+}
 
 
 def run(build: Path, fresh: bool, **folders: str | None) -> None:
@@ -35,13 +42,13 @@ def run(build: Path, fresh: bool, **folders: str | None) -> None:
     CACHE.mkdir(parents=True, exist_ok=True)
     given = {n: folders.get(n) or os.environ.get(f"{n.upper()}_DIR") for n in REAL}
     parts = dict(PARTS)
-    for name, measure in REAL.items():
-        if given[name]:
-            parts[name] = lambda measure=measure, name=name: measure(Path(given[name]))
+    for folder, name, measure in ((f, n, m) for f, some in REAL.items() for n, m in some.items()):
+        if given[folder]:
+            parts[name] = lambda measure=measure, folder=folder: measure(Path(given[folder]))
         elif (CACHE / f"{name}.json").exists():
             parts[name] = None  # what was measured when its folder was given
         else:
-            print(f"texture: {name} skipped: give --{name} DIR or {name.upper()}_DIR (see the module's text)")
+            print(f"texture: {name} skipped: give --{folder} DIR or {folder.upper()}_DIR (see the module's text)")
     results = {}
     for name, measure in tqdm(parts.items(), desc="texture"):
         kept = CACHE / f"{name}.json"
@@ -59,3 +66,4 @@ def run(build: Path, fresh: bool, **folders: str | None) -> None:
 def options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--fabricslide", metavar="DIR", help="FabricSlide's data/fabric")
     parser.add_argument("--borealtc", metavar="DIR", help="BorealTC's data/borealtc")
+    parser.add_argument("--vulpi", metavar="DIR", help="BorealTC's data/vulpi")

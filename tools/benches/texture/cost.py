@@ -58,7 +58,8 @@ def own_time(model, windows: np.ndarray) -> float:
     return min(spent)
 
 
-def peers(arrays: dict) -> dict:
+def peers(arrays: dict, program: str = "peer.py") -> dict:
+    """What a program of the peers says of these arrays; nothing where they cannot be installed."""
     pip = [
         VENV / "bin/pip",
         "install",
@@ -77,5 +78,5 @@ def peers(arrays: dict) -> dict:
     with tempfile.TemporaryDirectory() as folder:
         np.savez(Path(folder) / "w.npz", **arrays)
         one = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-        command = [VENV / "bin/python", PEERS / "peer.py", Path(folder) / "w.npz"]
+        command = [VENV / "bin/python", PEERS / program, Path(folder) / "w.npz"]
         return json.loads(subprocess.run(command, capture_output=True, check=True, env=os.environ | one).stdout)

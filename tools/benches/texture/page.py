@@ -15,6 +15,25 @@ Simulated floors, one robot, 100 ms windows; each fault strikes recordings never
 answer is right. "Wrong" are answers given; the likeliest class may be wrong where the answer is "unknown".
 
 """
+PEERS = """
+## Beside calibrated peers
+
+Windows of 1.7 s, whole runs held out; `area` is that under the risk-coverage curve, in percent. The peers are calibrated by a sigmoid on runs held out.
+
+"""
+UNTRAINED = """
+## Surfaces never trained
+
+Each surface left out of training in turn, with a part of the others' recordings; windows from the fifth of a recording on. Share refused, in percent.
+
+"""
+TERRAINS = {"borealtc": "BorealTC", "vulpi": "Vulpi"}
+LEFT_OUT = {
+    "floors_left_out": "simulated floors, 100 ms",
+    "fabrics_left_out": "FabricSlide, 4 s",
+    "boreal_left_out": "BorealTC, 1.7 s",
+    "vulpi_left_out": "Vulpi, 1.7 s",
+}
 
 
 def page(results: dict) -> str:
@@ -24,8 +43,12 @@ def page(results: dict) -> str:
     if "single_surfaces" in results:
         of = {f"simulated, {name}": pair for name, pair in floors(results).items()}
         of |= {f"FabricSlide, a {what} left out": s for what, s in results.get("fabricslide", {}).items()}
-        of |= {"BorealTC, 1.7 s, runs left out": results["borealtc"]} if "borealtc" in results else {}
+        of |= {f"{n}, 1.7 s, runs left out": results[p] for p, n in TERRAINS.items() if p in results}
         parts += ["\n## Accuracy, refusals, confidence\n\n", recordings(of)]
+    if any(part in results for part in TERRAINS):
+        parts += [PEERS, beside_peers({n: results[p] for p, n in TERRAINS.items() if p in results})]
+    if any(part in results for part in LEFT_OUT):
+        parts += [UNTRAINED, untrained({n: results[p] for p, n in LEFT_OUT.items() if p in results})]
     return "".join(parts)
 
 
@@ -56,6 +79,25 @@ def recordings(of: dict[str, dict]) -> str:
             shares = [percent(s[key]) for key in ("accuracy", "wrong_answers", "refused", "calibration_error")]
             cells += [*shares, f"{s['cut_at_a_tenth_refused']:.1f}"]
         rows.append(cells)
+    return table(rows)
+
+
+def beside_peers(of: dict[str, dict]) -> str:
+    rows = [["recordings", "method", "right", "unknown", "error", "cut", "area"]]
+    for recording, methods in of.items():
+        for name, s in methods.items():
+            shares = [s[key] for key in ("accuracy", "refused", "calibration_error")]
+            cut, area = f"{s['cut_at_a_tenth_refused']:.1f}", f"{100 * s['area_under_risk_coverage']:.2f}"
+            rows.append([recording, name, *map(percent, shares), cut, area])
+    return table(rows)
+
+
+def untrained(of: dict[str, dict]) -> str:
+    rows = [["recordings", "left out", "it is refused", "windows", "trained ones are refused", "windows"]]
+    for recording, surfaces in of.items():
+        for name, s in surfaces.items():
+            counts = str(s["windows"]), str(s["trained_windows"])
+            rows.append([recording, name, percent(s["refused"]), counts[0], percent(s["trained_refused"]), counts[1]])
     return table(rows)
 
 

@@ -1,4 +1,4 @@
-"""Public recordings that a user gives: whole trials of fabrics, and terrains with whole runs held out."""
+"""Public recordings that a user gives: whole trials of fabrics, terrains with whole runs held out, surfaces left out."""
 
 from pathlib import Path
 
@@ -6,13 +6,17 @@ import numpy as np
 from tqdm import tqdm
 
 from whisker.touch.texture.model import TextureModel, posterior
+from whisker.touch.texture.rung import plain_features
 from whisker.touch.texture.train import calibration_error, train
 
+from .cost import peers
 from .scores import METHODS, refusal_cut
-from .trials import borealtc, fabricslide
+from .trials import borealtc, fabricslide, vulpi
 
 FABRIC_HZ = 35.6
-TERRAIN_HZ, TERRAIN_WINDOW = 100.0, 170  # samples: the unit of decision, trained for as such
+BOREAL_HZ, VULPI_HZ, TERRAIN_S = 100.0, 50.0, 1.7  # the unit of decision, trained for as such
+FOLDS = 5
+ROW = 4  # windows of a recording before those counted where a surface is left out
 
 
 def fabrics(folder: Path) -> dict:
@@ -39,22 +43,95 @@ def trial_decisions(kept: dict, held: list, window_ms: float) -> dict[str, list[
     }
 
 
-def terrains(folder: Path, folds: int = 5) -> dict:
-    """Windows of 1.7 s, whole runs held out: the runs of each terrain in turn, shuffled once."""
-    runs, found = borealtc(folder), {name: [] for name in METHODS}
+def fabrics_left_out(folder: Path) -> dict:
+    """Each fabric left out of training in turn; windows as long as the shortest trial."""
+    trials = fabricslide(folder)
+    shortest = min(len(x) for *_, x in trials)
+    fold = np.array([w["repeat"] % FOLDS for _, w, _ in trials])
+    return left_out([(n, x) for n, _, x in trials], fold, FABRIC_HZ, shortest, held=(0,))
+
+
+def boreal(folder: Path) -> dict:
+    return terrains(borealtc(folder), BOREAL_HZ)
+
+
+def boreal_left_out(folder: Path) -> dict:
+    runs = borealtc(folder)
+    return left_out(runs, folds_of(runs), BOREAL_HZ, round(TERRAIN_S * BOREAL_HZ))
+
+
+def vulpi_terrains(folder: Path) -> dict:
+    return terrains(vulpi(folder), VULPI_HZ)
+
+
+def vulpi_left_out(folder: Path) -> dict:
+    runs = vulpi(folder)
+    return left_out(runs, folds_of(runs), VULPI_HZ, round(TERRAIN_S * VULPI_HZ))
+
+
+def folds_of(runs: list) -> np.ndarray:
+    """The runs of each terrain in turn, shuffled once."""
     rng, fold = np.random.default_rng(6), np.zeros(len(runs), int)
     for name in dict.fromkeys(n for n, _ in runs):
         mine = rng.permutation([i for i, (n, _) in enumerate(runs) if n == name])
-        fold[mine] = np.arange(len(mine)) % folds
-    for f in tqdm(range(folds), desc="BorealTC, runs left out"):
-        kept = group(run for run, at in zip(runs, fold, strict=True) if at != f)
-        bayes, names = TextureModel.train(kept), list(kept)
-        spectral = train(kept, TERRAIN_HZ, 1000.0 * TERRAIN_WINDOW / TERRAIN_HZ)
-        for n, x in (run for run, at in zip(runs, fold, strict=True) if at == f):
-            found[METHODS[1]] += [decision(d, names, n) for d in spectral.judge(x, TERRAIN_WINDOW)]
-            windows = x[: len(x) // TERRAIN_WINDOW * TERRAIN_WINDOW].reshape(-1, TERRAIN_WINDOW, x.shape[1])
-            found[METHODS[0]] += [paper_decision(bayes, w, names, n) for w in windows]
+        fold[mine] = np.arange(len(mine)) % FOLDS
+    return fold
+
+
+def terrains(runs: list, hz: float) -> dict:
+    """Windows of 1.7 s and sequential decisions, whole runs held out; peers on the same windows."""
+    window, fold = round(TERRAIN_S * hz), folds_of(runs)
+    found = {name: [] for name in (*METHODS, "default, sequential")}
+    for f in tqdm(range(FOLDS), desc="runs left out"):
+        kept, held = ([r for r, at in zip(runs, fold, strict=True) if (at == f) == out] for out in (False, True))
+        bayes, names = TextureModel.train(group(kept)), list(group(kept))
+        spectral = train(group(kept), hz, 1000.0 * TERRAIN_S)
+        for n, x in held:
+            found[METHODS[1]] += [decision(d, names, n) for d in spectral.judge(x, window)]
+            found["default, sequential"] += [decision(d, names, n) for d in spectral.judge(x, window, True)]
+            found[METHODS[0]] += [paper_decision(bayes, w, names, n) for w in windows_of(x, window)]
+        for name, decisions in peer_decisions(kept, held, names, window, spectral.rungs[0].floor).items():
+            found.setdefault(name, []).extend(decisions)
     return {name: scores(decisions) for name, decisions in found.items()}
+
+
+def peer_decisions(kept: list, held: list, names: list[str], window: int, floor: np.ndarray) -> dict[str, list[tuple]]:
+    """Calibrated peers, each window's decision: they always answer."""
+    arrays = {}
+    for part, runs in (("train", kept), ("test", held)):
+        cut = [windows_of(x, window) for _, x in runs]
+        arrays[part] = np.concatenate(cut)
+        arrays[f"{part}_features"] = plain_features(arrays[part], False, floor)
+        arrays[f"{part}_label"] = np.repeat([names.index(n) for n, _ in runs], list(map(len, cut)))
+        arrays[f"{part}_run"] = np.repeat(np.arange(len(runs)), list(map(len, cut)))
+    truth = arrays["test_label"]
+    return {
+        name: [(int(np.argmax(p)) == k, True, float(np.max(p))) for p, k in zip(chances, truth, strict=True)]
+        for name, chances in peers(arrays, "risk.py").items()
+    }
+
+
+def left_out(runs: list, fold: np.ndarray, hz: float, window: int, held: tuple = (0, 2)) -> dict:
+    """Each surface left out of training in turn, and a fold of the others: shares refused from the fifth window on."""
+    out = {}
+    for surface in tqdm(sorted({n for n, _ in runs}), desc="surfaces left out"):
+        untrained, trained = [], []
+        for f in held:
+            kept = group((n, x) for (n, x), at in zip(runs, fold, strict=True) if at != f and n != surface)
+            model = train(kept, hz, 1000.0 * window / hz)
+            for (n, x), at in zip(runs, fold, strict=True):
+                if n == surface or at == f:
+                    refused = [d.label < 0 for d in model.judge(x, window)[ROW:]]
+                    (untrained if n == surface else trained).extend(refused)
+        out[surface] = {
+            "refused": np.mean(untrained), "windows": len(untrained),
+            "trained_refused": np.mean(trained), "trained_windows": len(trained),
+        }  # fmt: skip
+    return out
+
+
+def windows_of(x: np.ndarray, window: int) -> np.ndarray:
+    return x[: len(x) // window * window].reshape(-1, window, x.shape[1])
 
 
 def decision(d, names: list[str], truth: str) -> tuple[bool, bool, float]:
@@ -74,8 +151,14 @@ def scores(decisions: list[tuple]) -> dict:
     return {
         "decisions": len(right), "accuracy": right.mean(), "refused": 1.0 - told.mean(),
         "wrong_answers": (told & ~right).mean(), "calibration_error": calibration_error(right, confidence),
-        "cut_at_a_tenth_refused": refusal_cut(right, confidence),
+        "cut_at_a_tenth_refused": refusal_cut(right, confidence), "area_under_risk_coverage": area(right, confidence),
     }  # fmt: skip
+
+
+def area(right: np.ndarray, confidence: np.ndarray) -> float:
+    """Under the share of wrong decisions against the share kept, the most confident first."""
+    wrong = ~right[np.argsort(-confidence, kind="stable")]
+    return float((np.cumsum(wrong) / np.arange(1, len(wrong) + 1)).mean())
 
 
 def group(pairs) -> dict[str, list[np.ndarray]]:

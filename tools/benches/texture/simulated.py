@@ -65,6 +65,23 @@ def never_trained(tests: dict) -> dict[str, list]:
     return found
 
 
+def floors_left_out() -> dict:
+    """Each surface left out of training in turn: shares refused from the fifth window of a drive on."""
+    out = {}
+    for left_out in SURFACES:
+        model = models({k: v for k, v in drives(TRAIN_SEED, TRAIN_SEED).items() if k != left_out})[METHODS[1]]
+        refused = {
+            k: [d.number < 0 for seed in TEST_SEEDS for r in drives(seed, TRAIN_SEED)[k] for d in decide(model, r)[4:]]
+            for k in SURFACES
+        }
+        others = np.concatenate([refused[k] for k in SURFACES if k != left_out])
+        out[left_out] = {
+            "refused": np.mean(refused[left_out]), "windows": len(refused[left_out]),
+            "trained_refused": others.mean(), "trained_windows": len(others),
+        }  # fmt: skip
+    return out
+
+
 def half_and_half(tests: dict) -> list[tuple[int, np.ndarray]]:
     """300 samples of one surface, then 300 of another without a step between: the second window holds the border."""
     groups = list(tests.values())

@@ -119,7 +119,22 @@ def fabricslide(folder: Path) -> list[tuple[str, dict, np.ndarray]]:
 
 
 def borealtc(folder: Path) -> list[tuple[str, np.ndarray]]:
-    """Terrain, and the six inertial, two current and two wheel channels of every run at 100 Hz; FOLDER is data/borealtc."""
+    """Terrain and channels of every run at 100 Hz, but of terrains with one run: it cannot be held out."""
+    found = terrain_runs(folder)
+    names = [name for name, _ in found]
+    return [run for run in found if names.count(run[0]) > 1]
+
+
+def vulpi(folder: Path) -> list[tuple[str, np.ndarray]]:
+    """Terrain and channels of every run at 50 Hz; the one run of a terrain is cut in five."""
+    found = terrain_runs(folder)
+    names = [name for name, _ in found]
+    return [(n, part) for n, x in found for part in (np.array_split(x, 5) if names.count(n) == 1 else [x])]
+
+
+def terrain_runs(folder: Path) -> list[tuple[str, np.ndarray]]:
+    """Terrain, and the six inertial, two current and two wheel channels of every run; FOLDER is BorealTC's
+    data/borealtc or data/vulpi."""
     found = []
     for path in sorted(folder.glob("*/imu_*.csv")):
         slow = path.with_name(path.name.replace("imu", "pro"))
@@ -128,8 +143,7 @@ def borealtc(folder: Path) -> list[tuple[str, np.ndarray]]:
         inertial, motors = (np.loadtxt(p, delimiter=",", skiprows=1, ndmin=2) for p in (path, slow))
         resampled = [np.interp(inertial[:, 0], motors[:, 0], motors[:, c]) for c in range(1, 5)]
         found.append((path.parent.name, np.column_stack([inertial[:, 1:7], *resampled])))
-    names = [name for name, _ in found]
-    return [run for run in found if names.count(run[0]) > 1]  # a single run cannot be held out
+    return found
 
 
 def faults(recordings: dict[str, list[np.ndarray]], rng: np.random.Generator) -> dict[str, dict[str, list[np.ndarray]]]:

@@ -3,10 +3,10 @@
 import numpy as np
 
 from whisker.touch.texture.change import Change
+from whisker.touch.texture.novelty import STEPS, Novelty
 from whisker.touch.texture.rung import Rung, feature_count
 from whisker.touch.texture.settle import Settle, counts
 from whisker.touch.texture.spectral import SpectralModel
-from whisker.touch.texture.strange import Strange
 
 CHANNELS, LENGTH, CLASSES = 2, 64, 3
 FEATURES = feature_count(CHANNELS, LENGTH, False)
@@ -27,9 +27,9 @@ def change() -> Change:
     return Change(LENGTH, 0.5, 1.0, np.ones(CHANNELS), wide, square, wide, np.zeros(CLASSES))
 
 
-def strange() -> Strange:
-    turn = np.tile(np.eye(FEATURES), (2, 1, 1))
-    return Strange(LENGTH, turn, np.zeros((2, CLASSES, FEATURES)), np.ones(2))
+def novelty() -> Novelty:
+    rows = np.zeros((CLASSES + 1, FEATURES))
+    return Novelty(LENGTH, 1.0, np.eye(FEATURES), rows, rows, np.ones(FEATURES), np.ones(STEPS))
 
 
 def settle() -> Settle:

@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 from commandkit import run, signals_as_before  # noqa: F401 - a fixture
 
-from whisker.native import doubles, lib
 from whisker.tables import TableError
 from whisker.touch.texture import model as texture
 from whisker.touch.texture.fit import STRETCHES, log_loss, temperature
+from whisker.touch.texture.novelty import fit_novelty
 from whisker.touch.texture.spectral import SpectralModel
-from whisker.touch.texture.strange import fit_strange
 from whisker.touch.texture.train import SURE, _sure, train
 
 RATE_HZ = 2000.0
@@ -128,29 +127,41 @@ def test_a_border_is_told_before_its_window_is_full_and_what_lies_before_it_is_l
     assert cut.border and cut.label == 2
 
 
-def test_windows_in_a_row_betray_a_surface_that_one_does_not():
+def drive(rng, middle):
+    """Features (40, 5) of windows in a row: a surface, what the drive adds, and noise."""
+    return np.array([middle, 0, 0, 0, 0]) + rng.normal(0, 0.3, 5) + rng.normal(0, 1.5, (40, 5))
+
+
+@pytest.mark.parametrize(("classes", "drives"), [(3, 3), (2, 5)])
+def test_windows_in_a_row_betray_a_surface_that_one_does_not(classes, drives):
     rng = np.random.default_rng(5)
+    labels, folds = np.repeat(np.arange(classes), drives), np.tile(np.arange(drives), classes)
+    found = fit_novelty([drive(rng, 6.0 * k) for k in labels], labels, folds, WINDOW)
+    between = np.array([found.scores(drive(rng, 3.0)) > 1.0 for _ in range(20)])
+    known = np.array([found.scores(drive(rng, 6.0 * (n % classes))) > 1.0 for n in range(20)])
+    assert between[:, 0].mean() < 0.6 and between[:, 8:].mean() > 0.8 and known[:, 4:].mean() < 0.08
 
-    def drive(middle):
-        return np.array([middle, 0, 0, 0, 0]) + rng.normal(0, 0.3, 5) + rng.normal(0, 1.5, (40, 5))
 
-    def refused(rows):
-        judge = found.native()
-        return [
-            lib.nav_texture_strange_weigh(judge, doubles(row, "row", (5,))) > 1.0 for row in np.ascontiguousarray(rows)
-        ]
+def test_novelty_needs_two_recordings_of_a_class_with_every_fold_left_out():
+    rng = np.random.default_rng(6)
+    rows, labels, folds = [drive(rng, 6.0 * (n % 2)) for n in range(6)], np.tile([0, 1], 3), np.repeat([0, 1, 2], 2)
+    assert fit_novelty(rows, labels, folds, WINDOW) is not None
+    assert fit_novelty(rows, labels, np.zeros(6, int), WINDOW) is None
+    assert fit_novelty(rows[:4], labels[:4], folds[:4], WINDOW) is None
+    short = [r if n < 4 else r[:0] for n, r in enumerate(rows)]
+    assert fit_novelty(short, labels, folds, WINDOW) is None
 
-    labels, folds = np.repeat([0, 1], 10), np.tile(np.arange(5), 4)
-    features = [drive(6.0 * k) for k in labels]
-    found = fit_strange(features, labels, folds, WINDOW, 0.995)
-    between = np.array([refused(drive(3.0)) for _ in range(10)])
-    assert not between[:, 0].any() and between[:, 16:].mean() > 0.9
-    assert np.mean([refused(drive(6.0 * (n % 2))) for n in range(20)]) < 0.05
-    few = [0, 1, 2, 10, 11, 12]
-    assert fit_strange([features[n] for n in few], labels[few], folds[few], WINDOW, 0.995) is None
-    for windows, is_told in ((2, False), (3, True)):  # one mean of two windows shows no spread within its recording
-        some = [f if n % 10 < 7 else f[:windows] for n, f in enumerate(features)]
-        assert (fit_strange(some, labels, folds, WINDOW, 0.995) is not None) == is_told
+
+def test_a_surface_left_out_is_unknown_in_windows_of_any_length_and_sequentially():
+    few = train(recordings(("VINYL", "ROUGH"), count=4), RATE_HZ)
+    for window, sequential in ((WINDOW, False), (2 * WINDOW, False), (WINDOW, True)):
+        refused = {}
+        for name in COLOUR:
+            late = [
+                d for s in (80, 81) for d in few.judge(drag(name, 4000, s), window, sequential) if d.end > 5 * WINDOW
+            ]
+            refused[name] = np.average([d.label < 0 for d in late], weights=[d.samples for d in late])
+        assert refused["SMOOTH"] > 0.6 and max(refused["VINYL"], refused["ROUGH"]) < 0.2
 
 
 def test_a_whisker_that_rings_from_another_surface_names_none_and_says_little():
@@ -241,8 +252,8 @@ class SureOf:
 
 @pytest.mark.parametrize("needed", SURE)
 def test_the_least_sureness_that_is_right_as_often_is_found(needed):
-    sure, samples, (right, _) = _sure([SureOf(needed)], [None], [0], [0], WINDOW, 1.0)
-    assert (sure, samples) == (needed, needed) and right.all()
+    sure, samples, ((decision,),) = _sure([SureOf(needed)], [None], [0], [0], WINDOW, 1.0)
+    assert sure == samples == decision.samples == needed
 
 
 def test_block_by_block_is_as_all_at_once(model):
@@ -273,10 +284,13 @@ def test_saved_models_load_alike_and_are_small(model, tmp_path):
         lambda c: c["rungs"][0].update(length=1 << 30),
         lambda c: c["rungs"][0].update(hidden=1e9),
         lambda c: c["rungs"][0].pop("shorter"),
+        lambda c: c["novelty"].update(length=201),
+        lambda c: c["novelty"]["turn"].pop(),
+        lambda c: c["novelty"]["noise"].__setitem__(0, 0.0),
         lambda c: c["rungs"][-1].update(shorter=8),
         lambda c: c["rungs"][-1].update(shorter=-1),
         lambda c: c["rungs"][-1].update(shorter="eight"),
-        lambda c: c.update(format="whisker texture model 5"),
+        lambda c: c.update(format="whisker texture model 6"),
         lambda c: c["rungs"][0]["weight"][0].pop(),
         lambda c: c.update(rungs=c["rungs"][::-1]),
         lambda c: c["limits"].pop("spike"),

@@ -178,8 +178,8 @@ def temperature(scores: np.ndarray, label: np.ndarray, weight: np.ndarray | None
         chance = np.exp(factor * scores)
         chance /= chance.sum(axis=1, keepdims=True)
         mean = (chance * scores).sum(axis=1)
-        slope = np.dot(weight, mean - scores[rows, label])
-        bend = np.dot(weight, (chance * (scores - mean[:, None]) ** 2).sum(axis=1))
+        slope = float(np.dot(weight, mean - scores[rows, label]))
+        bend = float(np.dot(weight, (chance * (scores - mean[:, None]) ** 2).sum(axis=1)))
         low, high = (low, factor) if slope > 0.0 else (factor, high)
         step = factor - slope / bend if bend > 0.0 else high
         step = step if low < step < high else 0.5 * (low + high)

@@ -10,17 +10,17 @@ from ...fields import Fields
 from ...native import as_doubles, doubles, ffi, lib
 from ...tables import TableError
 from .change import Change
+from .novelty import Novelty
 from .rung import Rung
 from .settle import Settle
-from .strange import Strange
 
-FORMAT = "whisker texture model 6"
-PARTS = {"change": Change, "strange": Strange, "settle": Settle}  # of windows in a row
+FORMAT = "whisker texture model 7"
+PARTS = {"change": Change, "novelty": Novelty, "settle": Settle}  # of windows in a row
 SENSOR_STOPS = (0.0, 65535.0)  # of raw counts, 16 bits
 WITHOUT = {  # what a model without a part cannot do, and what it would take
     "change": "borders block by block; longer recordings, two or more of each surface, show the rate of false ones",
     "settle": "a whisker that rings after a rougher surface; longer recordings show how fast floors get quieter",
-    "strange": "surfaces never trained by several windows together; give eight recordings of each surface",
+    "novelty": "surfaces never trained, by windows in a row; give three recordings or more of each surface",
 }
 LIMITS = ("spike", "still", "low", "high")
 LENGTH_MOST = 1 << 20  # samples of a window; also numbers of a projection
@@ -31,6 +31,7 @@ RANGES = {
     "together": (0.0, 1e3),
     "doubt": (0.0, 1.0),
     "sure": (0.0, 1.0),
+    "told": (0.0, 1.0),
 }
 
 
@@ -62,8 +63,9 @@ class SpectralModel:
     together: float = 1.0
     doubt: float = 0.0
     sure: float = 0.99
+    told: float = 1.0
     change: Change | None = None
-    strange: Strange | None = None
+    novelty: Novelty | None = None
     settle: Settle | None = None
     figures: dict = field(default_factory=dict)  # of held-out recordings, for the reader
 
@@ -95,6 +97,7 @@ class SpectralModel:
             "together": self.together,
             "doubt": self.doubt,
             "sure": self.sure,
+            "told": self.told,
             "figures": self.figures,
         }
         content["limits"] = {name: _listed(self.limits[name]) for name in LIMITS}
@@ -123,6 +126,8 @@ class SpectralModel:
         model = cls(classes, rungs=rungs, limits=limits, figures=fields.take("figures"), **numbers, **parts)
         if any(len(r.bias) != len(classes) for r in rungs):
             raise ValueError("rungs and classes differ")
+        if model.novelty is not None and model.novelty.length not in {r.length for r in rungs}:
+            raise ValueError("novelty: no rung has its length")
         if len({len(part) for part in (*limits.values(), *(r.floor for r in rungs), *(r.span for r in rungs))}) != 1:
             raise ValueError("limits and rungs differ in channels")
         model.stream(2)
@@ -144,7 +149,7 @@ def _rung(fields: Fields) -> Rung:
 
 
 def _part(kind, fields: Fields):
-    """A Change, Strange or Settle."""
+    """A Change, Novelty or Settle."""
     arrays = {name: fields.array(name, dimensions) for name, dimensions in kind.ARRAYS.items()}
     numbers = {name: fields.number(name, 0.0) for name in kind.NUMBERS if name != "length"}
     return kind(length=fields.whole("length", 1, LENGTH_MOST), **numbers, **arrays)
@@ -171,12 +176,14 @@ class Stream:
             doubles(border, "border", each),
         )
         rules.growth, rules.together, rules.doubt, rules.sure = model.growth, model.together, model.doubt, model.sure
-        rules.step, rules.patience = step, patience
+        rules.step, rules.patience, rules.told = step, patience, model.told
         self._parts = {
-            name: ffi.NULL if step else _native(getattr(model, name)) for name in PARTS
+            name: ffi.NULL if step and name != "novelty" else _native(getattr(model, name)) for name in PARTS
         }  # lent to the stream
         for name, part in self._parts.items():
             setattr(rules, name, part)
+        if model.novelty is not None:
+            rules.novelty_rung = next(n for n, r in enumerate(model.rungs) if r.length == model.novelty.length)
         # The span of windows at least as long as those judged; the longest rung's if there is none.
         longest = patience if step else window
         span = next((r.span for r in model.rungs if r.length >= longest), model.rungs[-1].span)
@@ -220,11 +227,11 @@ class Stream:
         )
 
 
-def _native(part: Change | Strange | Settle | None):
+def _native(part: Change | Novelty | Settle | None):
     return ffi.NULL if part is None else part.native()
 
 
-def _fields(part: Rung | Change | Strange | Settle) -> dict:
+def _fields(part: Rung | Change | Novelty | Settle) -> dict:
     return {n: getattr(part, n) for n in part.NUMBERS} | {n: _listed(getattr(part, n)) for n in part.ARRAYS}
 
 

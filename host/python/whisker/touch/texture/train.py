@@ -5,10 +5,10 @@ from collections.abc import Callable
 import numpy as np
 
 from .change import fit_change
-from .fit import UNKNOWN_QUANTILE, Fitted, Windows, fit, log_loss
+from .fit import UNKNOWN_QUANTILE, Fitted, Windows, fit, log_loss, temperature
+from .novelty import fit_novelty
 from .settle import fit_settle
 from .spectral import SENSOR_STOPS, SpectralModel
-from .strange import fit_strange
 
 FOLDS = 5
 SHORTER, LONGER = 8, 8  # rungs from an eighth of the window to eight windows, in octaves
@@ -19,7 +19,7 @@ SPIKE_OVER = 3.0  # times what one sample in a thousand stands out from both nei
 STILL_OVER, STILL_LEAST = 2.0, 16  # times the longest run of equal samples; shorter runs happen to any sensor
 SPAN_OVER = 1.5  # times the farthest that a training window reaches
 BORDER_QUANTILE, BORDER_OVER = 0.999, 1.25  # of neighbouring held-out stretches of one surface
-REFUSE_MOST = 0.05  # share of held-out windows that "unknown" may cost ...
+REFUSE_MOST = 0.03  # share of held-out windows that want of confidence may cost ...
 REFUSE_UNTIL = 10.0  # ... unless fewer already cut wrong answers by this factor
 DOUBT_WINDOWS = 100  # fewer held-out windows do not show the quantile of their confidence: then ...
 DOUBT_PRIOR = 0.5  # ... "unknown" is what is likelier wrong than right
@@ -57,7 +57,7 @@ def train(
     model.change = fit_change(parts, labels, folds, block, floor)
     if model.change is not None:
         model.settle = fit_settle(parts, block, floor, UNKNOWN_QUANTILE)
-    model.strange = _strange(model, parts, labels, folds, base)
+    model.novelty = _novelty(model, parts, labels, folds, base)
     progress(len(lengths) + 1, len(lengths) + 1)
     return model
 
@@ -167,14 +167,18 @@ def _calibrate(model: SpectralModel, fitted: list[Fitted], parts: list, labels, 
     right, confidence = _scores(_decisions(twins, parts, folds, base), labels)
     model.doubt = _doubt(right, confidence)
     model.sure, samples, looks = _sure(twins, parts, labels, folds, base, float(right.mean()))
+    loglik, truth = _evidence(looks, labels)
+    model.told = temperature(loglik, truth)
+    told = np.exp(model.told * loglik)
+    sequential = loglik.argmax(axis=1) == truth, told.max(axis=1) / told.sum(axis=1)
     model.figures = {
         "window_samples": base,
         "held_out_accuracy": round(float(right.mean()), 4),
         "refused": round(float((confidence < model.doubt).mean()), 4),
         "accuracy_of_answers": round(float(right[confidence >= model.doubt].mean()), 4),
         "calibration_error": round(calibration_error(right, confidence), 4),
-        "sequential_accuracy": round(float(looks[0].mean()), 4),
-        "sequential_calibration_error": round(calibration_error(*looks), 4),
+        "sequential_accuracy": round(float(sequential[0].mean()), 4),
+        "sequential_calibration_error": round(calibration_error(*sequential), 4),
         "sequential_samples": round(samples, 1),
     }
 
@@ -186,14 +190,13 @@ def calibration_error(right: np.ndarray, confidence: np.ndarray, bins: int = 10)
     return float(np.sum(each))
 
 
-def _strange(model: SpectralModel, parts, labels, folds, base: int):
+def _novelty(model: SpectralModel, parts, labels, folds, base: int):
     """Of windows of the base length, the rung's features; None without such a rung."""
     rung = next((r for r in model.rungs if r.length == base), None)
     if rung is None:
         return None
     rows = [p[: len(p) // base * base].reshape(-1, base, p.shape[1]) for p in parts]
-    features = [rung.expand(r)[:, : len(rung.centre)] for r in rows]
-    return fit_strange(features, labels, folds, base, UNKNOWN_QUANTILE)
+    return fit_novelty([rung.expand(r)[:, : len(rung.centre)] for r in rows], labels, folds, base)
 
 
 def _decisions(twins: list[SpectralModel], parts, folds, window: int, sequential: bool = False) -> list[list]:
@@ -205,6 +208,12 @@ def _scores(decisions: list[list], labels) -> tuple[np.ndarray, np.ndarray]:
     pairs = [(d.loglik.argmax() == k, d.confidence) for group, k in zip(decisions, labels, strict=True) for d in group]
     right, confidence = np.array(pairs, dtype=float).reshape(-1, 2).T
     return right, confidence
+
+
+def _evidence(decisions: list[list], labels) -> tuple[np.ndarray, np.ndarray]:
+    """Log-likelihoods (m, classes) of all decisions, and their true classes (m,)."""
+    pairs = [(d.loglik, k) for group, k in zip(decisions, labels, strict=True) for d in group]
+    return np.array([p[0] for p in pairs]), np.array([p[1] for p in pairs])
 
 
 def _growth(twins, parts, labels, folds, base: int) -> float:
@@ -223,8 +232,7 @@ def _growth(twins, parts, labels, folds, base: int) -> float:
 
 def _together(twins, parts, labels, folds, base: int) -> float:
     """Factor under which the log-likelihoods of windows cost least; never above what two independent views deserve."""
-    pairs = [(d.loglik, k) for g, k in zip(_decisions(twins, parts, folds, base), labels, strict=True) for d in g]
-    loglik, truth = np.array([p[0] for p in pairs]), np.array([p[1] for p in pairs])
+    loglik, truth = _evidence(_decisions(twins, parts, folds, base), labels)
     tries = np.linspace(0.5, 2.0, 16)
     return float(tries[np.argmin([log_loss(loglik * t, truth) for t in tries])])
 
@@ -254,16 +262,16 @@ def _doubt(right: np.ndarray, confidence: np.ndarray) -> float:
     return float(limit)
 
 
-def _sure(twins, parts, labels, folds, base: int, fixed: float) -> tuple[float, float, tuple]:
-    """The least sureness at which sequential decisions are right as often as fixed windows; their samples and scores."""
+def _sure(twins, parts, labels, folds, base: int, fixed: float) -> tuple[float, float, list]:
+    """The least sureness at which sequential decisions are right as often as fixed windows; their samples, and they."""
     tried, low, high = {}, 0, len(SURE) - 1
     while SURE[low] not in tried:  # accuracy grows with sureness: halve what is left
         sure = SURE[(low + high) // 2]
         for twin in twins:
             twin.sure = sure
         decisions = _decisions(twins, parts, folds, base, sequential=True)
-        scores = _scores(decisions, labels)
-        tried[sure] = float(np.mean([d.samples for g in decisions for d in g])), scores
+        right, _ = _scores(decisions, labels)
+        tried[sure] = float(np.mean([d.samples for g in decisions for d in g])), decisions
         middle = (low + high) // 2
-        low, high = (low, middle) if scores[0].mean() >= fixed else (min(middle + 1, high), high)
+        low, high = (low, middle) if right.mean() >= fixed else (min(middle + 1, high), high)
     return SURE[low], *tried[SURE[low]]

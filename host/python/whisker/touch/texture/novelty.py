@@ -1,0 +1,153 @@
+"""Surfaces never trained: a hierarchical Gaussian model fitted here, arithmetic in C (host/nav/touch/texture_novelty.h)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...native import as_doubles, doubles, ffi, lib
+
+SHRINK = 0.3  # share of the diagonal in the covariance of windows within a recording
+RECORDINGS_PRIOR = 10.0  # recordings' worth of a spread alike in all directions, that the measured spread is mixed with
+CLASSES_PRIOR = 3.0  # classes' worth, of the spread of class means
+REFUSE_MOST = 0.08  # share of held-out windows of trained surfaces that the limits may refuse
+RATIOS_EACH = 8  # of a recording, by which it counts towards a limit
+STEPS = lib.NAV_TEXTURE_NOVELTY_STEPS
+
+
+@dataclass
+class Novelty:
+    """For windows of `length` samples; the arrays as in nav_texture_novelty_numbers."""
+
+    length: int
+    scale: float
+    turn: np.ndarray  # (F, F)
+    mean: np.ndarray  # (classes + 1, F)
+    recording: np.ndarray  # (classes + 1, F)
+    noise: np.ndarray  # (F,)
+    limit: np.ndarray  # (NAV_TEXTURE_NOVELTY_STEPS,)
+
+    ARRAYS = {"turn": 2, "mean": 2, "recording": 2, "noise": 1, "limit": 1}  # and their dimensions
+    NUMBERS = ("length", "scale")
+
+    def native(self):
+        """A detector of its own, that has seen no window; ValueError when a size or number is impossible."""
+        rows, features = as_doubles(self.mean, "novelty: mean", (None, None)).shape
+        shapes = {"turn": (features, features), "mean": (rows, features), "recording": (rows, features)}
+        shapes |= {"noise": (features,), "limit": (STEPS,)}
+        numbers, kept = ffi.new("struct nav_texture_novelty_numbers *"), []
+        numbers.classes, numbers.features, numbers.scale = rows - 1, features, self.scale
+        for name, shape in shapes.items():
+            kept.append(as_doubles(getattr(self, name), f"novelty: {name}", shape))
+            setattr(numbers, name, doubles(kept[-1], name, shape))
+        made = lib.nav_texture_novelty_new(numbers)
+        if made == ffi.NULL:
+            raise ValueError("novelty: a size or number is out of range")
+        return ffi.gc(made, lib.nav_texture_novelty_free)
+
+    def scores(self, features: np.ndarray) -> np.ndarray:
+        """Score after each of a recording's windows in a row: features (m, F) -> (m,); above 1 is never trained."""
+        detector, shape = self.native(), (len(self.noise),)
+        rows = as_doubles(features, "features", (None, *shape))
+        return np.array([lib.nav_texture_novelty_weigh(detector, doubles(row, "row", shape)) for row in rows])
+
+
+def fit_novelty(features: list[np.ndarray], labels: np.ndarray, folds: np.ndarray, length: int) -> Novelty | None:
+    """From the features (m, F) of the windows in a row of every recording, m >= 0.
+
+    Limits separate recordings held out from classes left out, and keep all but REFUSE_MOST of the former. None when
+    fewer than two recordings of a class are left where a fold is held out.
+    """
+    use = [n for n, rows in enumerate(features) if len(rows)]
+    features, labels, folds = [features[n] for n in use], np.asarray(labels)[use], np.asarray(folds)[use]
+    classes = sorted(set(labels))
+    found = _fit(features, labels, length)
+    if found is None:
+        return None
+    trained, never = [[] for _ in range(STEPS)], [[] for _ in range(STEPS)]
+    for fold in sorted(set(folds)):
+        twin = _twin(features, labels, folds != fold, classes, length)
+        for n in np.flatnonzero(folds == fold) if twin else ():
+            _spread(twin.scores(features[n]), trained)
+    for c in classes if len(classes) > 2 else ():
+        twin = _twin(features, labels, labels != c, [k for k in classes if k != c], length)
+        for n in np.flatnonzero(labels == c) if twin else ():
+            _spread(twin.scores(features[n]), never)
+    if not trained[0]:
+        return None
+    found.limit = _limits([np.array(t) for t in trained], [np.array(s) for s in never])
+    found.scale = max(1.0, float(np.mean([found.limit[s] - np.median(t) for s, t in enumerate(trained) if len(t)])))
+    return found
+
+
+def _twin(features: list, labels: np.ndarray, keep: np.ndarray, classes: list, length: int) -> Novelty | None:
+    """The same of some recordings; None when a class has none left."""
+    if set(labels[keep]) != set(classes):
+        return None
+    return _fit([f for f, k in zip(features, keep, strict=True) if k], np.searchsorted(classes, labels[keep]), length)
+
+
+def _fit(features: list[np.ndarray], labels: np.ndarray, length: int) -> Novelty | None:
+    classes = int(labels.max()) + 1
+    counts, size = np.bincount(labels, minlength=classes), features[0].shape[1]
+    freedom = len(labels) - classes
+    if freedom < 1 or classes < 2:
+        return None
+    means = np.array([f.mean(axis=0) for f in features])
+    middle = np.array([means[labels == k].mean(axis=0) for k in range(classes)])
+    apart = means - middle[labels]
+    within = _within(features, apart, freedom)
+    values, vectors = np.linalg.eigh((1.0 - SHRINK) * within + np.diag(SHRINK * np.diag(within) + 1e-6))
+    white = vectors / np.sqrt(values)
+    recordings = _mixed((apart @ white).T @ (apart @ white), freedom, RECORDINGS_PRIOR)
+    centre = middle.mean(axis=0)
+    spread = ((middle - centre) @ white).T @ ((middle - centre) @ white)
+    surfaces = _mixed(spread, classes - 1, CLASSES_PRIOR)
+    variance, axes = np.linalg.eigh(recordings)
+    turn, unknown = white @ axes, np.einsum("fa,fg,ga->a", axes, surfaces, axes)
+    recording = np.maximum(variance, 0.0) * (1.0 + 1.0 / np.append(counts, classes)[:, None])
+    recording[-1] = np.maximum(variance, 0.0) + unknown * (1.0 + 1.0 / classes)
+    noise = np.maximum(np.einsum("fa,fg,ga->a", turn, within, turn), 1e-6)
+    mean = np.vstack([middle, centre]) @ turn
+    return Novelty(length, 1.0, turn, mean, recording, noise, np.zeros(STEPS)) if size else None
+
+
+def _within(features: list[np.ndarray], apart: np.ndarray, freedom: int) -> np.ndarray:
+    """Covariance of windows within recordings; where each has one window, of recordings within classes."""
+    windows = sum(len(f) - 1 for f in features)
+    if windows == 0:
+        return apart.T @ apart / freedom
+    return sum((f - f.mean(axis=0)).T @ (f - f.mean(axis=0)) for f in features) / windows
+
+
+def _mixed(scatter: np.ndarray, freedom: int, prior: float) -> np.ndarray:
+    """A covariance from few vectors: their scatter, mixed with as much in all directions alike."""
+    alike = max(float(np.trace(scatter)) / freedom / len(scatter), 1e-3)
+    return (scatter + prior * alike * np.eye(len(scatter))) / (freedom + prior)
+
+
+def _spread(scores: np.ndarray, steps: list[list]) -> None:
+    """The ratios of one recording, to the step that judges them: a few each, for a long recording is no more than one."""
+    for step in range(STEPS):
+        last = 2 << step if step + 1 < STEPS else len(scores) + 1
+        ratios = scores[(1 << step) - 1 : last - 1] - 1.0
+        if len(ratios):
+            steps[step] += list(ratios[np.linspace(0, len(ratios) - 1, RATIOS_EACH).round().astype(int)])
+
+
+def _limits(trained: list[np.ndarray], never: list[np.ndarray]) -> np.ndarray:
+    """By step, the ratio that errs least on both, and refuses at most REFUSE_MOST of the trained ones; without
+    classes left out, 0 unless that refuses more. A step that no recording reached has the limit of the step before."""
+    limits = np.zeros(STEPS)
+    for step, (known, strangers) in enumerate(zip(trained, never, strict=True)):
+        if len(known) == 0:
+            limits[step] = limits[step - 1]
+            continue
+        least = float(np.quantile(known, 1.0 - REFUSE_MOST))
+        if len(strangers) == 0:
+            limits[step] = max(least, 0.0)
+            continue
+        tries = np.concatenate([[least], np.linspace(least, max(least, float(known.max())) + 10.0, 101)])
+        errors = [(known > t).mean() + (strangers <= t).mean() for t in tries]
+        best = tries[np.array(errors) <= min(errors) + 1e-9]
+        limits[step] = 0.5 * (best.min() + best.max())
+    return limits
