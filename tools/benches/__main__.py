@@ -33,6 +33,7 @@ TOPICS = {  # topic -> module, by room
     "ring": "host.ring",
     "robot": "robot.bench",
     "texture": "texture.bench",
+    "touch": "nav.touch",
     "usb": "bridge.usb",
     "view": "host.view",
 }

@@ -44,6 +44,7 @@ HEADERS = {
             "touch/texture_stream.h",
             "problem/pose.h",
             "problem/arena.h",
+            "problem/sensor_table.h",
             "problem/settings.h",
             "problem/problem.h",
             "filter/filter.h",

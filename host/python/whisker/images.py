@@ -4,7 +4,6 @@ import warnings
 from dataclasses import dataclass
 
 import numpy as np
-from PIL import Image
 
 from .files import UnreadableError
 
@@ -22,6 +21,8 @@ class Grey:
 
 def read_grey(path) -> Grey:
     """The grey levels of an image, colours averaged; UnreadableError says why there are none."""
+    from PIL import Image  # only who reads an image needs it
+
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # the limit here is the lower one
@@ -41,7 +42,7 @@ def read_grey(path) -> Grey:
         raise UnreadableError("no whole PNG, PGM or BMP image") from error
 
 
-def _grey(image: Image.Image) -> Grey:
+def _grey(image) -> Grey:
     if image.mode.startswith("I"):  # 16 bits a pixel
         return Grey((np.asarray(image, np.uint32) >> 8).astype(np.uint8))
     if image.mode in ("1", "L"):

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import yaml
 
 from .fields import Fields
 from .files import UnreadableError, read_text
@@ -74,6 +73,8 @@ def _read(path: Path) -> Occupancy:
 
 
 def _parsed(path: Path) -> object:
+    import yaml  # only who reads a map needs it
+
     text = read_text(path)
     if len(text) > TEXT_MOST:
         raise UnreadableError(f"more than {TEXT_MOST >> 10} KiB")

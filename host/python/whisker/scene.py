@@ -14,6 +14,7 @@ from .files import UnreadableError
 from .images import nearest_levels, read_grey
 from .occupancy import NOWHERE, Box, Pose, from_map, placed, read_map
 from .scene_table import LARGEST_M, SceneError, Table
+from .sensor_tables import SensorTable, read_sensors, write_sensor
 
 __all__ = ["LARGEST_M", "SceneError"]  # beside what is defined here
 
@@ -68,6 +69,7 @@ class Robot:
     odometry_relative_sigma: float
     radial_sigma_m: float
     whiskers: tuple[Whisker, ...]  # in the file's order: lane 0 first
+    sensors: tuple[SensorTable, ...] = ()  # of the user's own
 
     def of_role(self, role: str) -> list[Whisker]:
         return [whisker for whisker in self.whiskers if whisker.role == role]
@@ -123,11 +125,12 @@ def load(path, map_file=None) -> Scene:
     if not folder.is_dir():
         raise SceneError(f"{folder}: no such folder; give a scene folder with {ARENA} and {ROBOT}")
     prior = _prior(Table.read(folder / PRIOR)) if (folder / PRIOR).exists() else None
-    robot = _robot(Table.read(folder / ROBOT))
     if map_file is None or (folder / ARENA).exists():
         arena = _arena(Table.read(folder / ARENA))
+        robot = _robot(Table.read(folder / ROBOT), arena.size_m)
         return Scene(arena if map_file is None else _with_map(arena, map_file), robot, prior)
     occupancy = read_map(map_file)
+    robot = _robot(Table.read(folder / ROBOT), occupancy.size_m)
     arena = Arena(occupancy.size_m, max(occupancy.size_m), ("NONE",), (NOT_KNOWN,), occupancy.solid, occupancy.unknown)
     feeling = replace(robot, whiskers=tuple(robot.of_role("object")))  # no floor is known for the others
     return Scene(arena, feeling, _moved(prior, occupancy.origin), origin=occupancy.origin)
@@ -165,6 +168,8 @@ def write(path, scene: Scene) -> None:
     text = [_toml(key, getattr(robot, key)) for key in ("body_radius_m", "odometry_relative_sigma", "radial_sigma_m")]
     for whisker in robot.whiskers:
         text += ["", "[[whisker]]"] + [_toml(k, v) for k, v in vars(whisker).items() if v is not None]
+    for sensor in robot.sensors:
+        text += ["", "[[sensor]]"] + [_toml(key, value) for key, value in write_sensor(folder, sensor).items()]
     (folder / ROBOT).write_text("\n".join(text) + "\n")
     if prior is not None:
         (folder / PRIOR).write_text("\n".join(_toml(k, v) for k, v in vars(prior).items() if v is not None) + "\n")
@@ -257,23 +262,22 @@ def _floor_image(table: Table, textures) -> tuple[str, ...]:
     return tuple("".join(row) for row in letters.tolist())
 
 
-def _robot(table: Table) -> Robot:
+def _robot(table: Table, size_m: tuple[float, float]) -> Robot:
     radius = table.number("body_radius_m", 0.0, LARGEST_M)
     odometry = table.number("odometry_relative_sigma", 0.0, 10.0)
     radial = table.number("radial_sigma_m", TINY, LARGEST_M)
     whiskers = tuple(_whisker(entry) for entry in table.tables("whisker", WHISKERS_MOST))
+    sensors = read_sensors(table, size_m)
     table.done()
-    names = [whisker.name for whisker in whiskers]
+    names = [named.name for named in (*whiskers, *sensors)]
     for number, name in enumerate(names):
         if name in names[:number]:
             raise table.fail("whisker", f"has the name '{name}' twice; rename one")
-    return Robot(radius, odometry, radial, whiskers)
+    return Robot(radius, odometry, radial, whiskers, sensors)
 
 
 def _whisker(entry: Table) -> Whisker:
-    name = entry.string("name")
-    if not re.fullmatch(r"\w+", name):
-        raise entry.fail("name", f"is '{name}'; use letters, digits and underscores")
+    name = entry.name()
     role = entry.string("role", ("texture", "object"))
     if role == "texture":
         whisker = Whisker(name, role, tip_m=entry.numbers("tip_m", 2, -LARGEST_M, LARGEST_M))

@@ -60,6 +60,13 @@ class Table:
             raise self.fail(key, f"must be {' or '.join(map(repr, allowed)) if allowed else 'a string'}")
         return value
 
+    def name(self) -> str:
+        """The key `name`: letters, digits and underscores."""
+        name = self.string("name")
+        if not re.fullmatch(r"\w+", name):
+            raise self.fail("name", f"is '{name}'; use letters, digits and underscores")
+        return name
+
     def tables(self, key: str, most: int) -> list["Table"]:
         """At most so many tables; none if the key is missing."""
         value = self.content.pop(key, [])

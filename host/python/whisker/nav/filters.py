@@ -9,6 +9,7 @@ import numpy as np
 from ..errors import UserError
 from ..native import as_doubles, doubles, ffi, lib, octets, pointer
 from ..scene import Prior, Scene
+from ..sensor_tables import SensorTable
 from .observations import ODOMETRY, Observations
 
 FAVOURITE, SPARE = "adaptive", "grid"
@@ -88,19 +89,28 @@ class Sensor:
     `codes`: (rows, columns) of uint8, row 0 the smallest y, 0 to 254; 255, and beyond the map, not known. `cell_m`: edge
     of a cell; the map's lower left corner is the world's origin. `at_m`: the sensor's place on the robot. A reading
     counts in full after `spacing_m` of travel since the last one. `detail_m`: over which the codes change; the default
-    filter's cells are then at most half as wide; 0: not told."""
+    filter's cells are then at most half as wide; 0: not told. `levels`: how many codes there are; 0: one more than the
+    largest of the map. With `edges` (bins + 1,) and `likelihood` (bins, levels) what it reads is one number."""
 
     codes: np.ndarray
     cell_m: float
     at_m: tuple[float, float] = (0.0, 0.0)
     spacing_m: float = 0.0
     detail_m: float = 0.0
+    levels: int = 0
+    edges: np.ndarray | None = None
+    likelihood: np.ndarray | None = None
+
+    @property
+    def count(self) -> int:
+        """Of codes."""
+        known = self.codes[self.codes < SENSOR_UNKNOWN]
+        return self.levels or (int(known.max()) + 1 if len(known) else 1)
 
     @property
     def values(self) -> int:
-        """Numbers in a reading: one more than the largest code."""
-        known = self.codes[self.codes < SENSOR_UNKNOWN]
-        return int(known.max()) + 1 if len(known) else 1
+        """Numbers in a reading."""
+        return self.count if self.edges is None else 1
 
 
 class Filter:
@@ -123,6 +133,8 @@ class Filter:
         self.scene = scene
         if bumps is not None and (fault := prior_fault(scene, bumps)):
             raise SettingError(f"filter '{name}': {fault}; give what a filter listed")
+        self._own_keys = [sensor.name for sensor in scene.robot.sensors]
+        sensors = (*map(_of_table, scene.robot.sensors), *sensors)
         problem, self._keep = problem_of(scene, settings or {}, bumps, sensors)
         problem.seed = seed
         self._own = sum(sensor.values for sensor in sensors)
@@ -139,7 +151,9 @@ class Filter:
         """Take one row of cells."""
         texture = [[math.nan if row[k] is None else row[k] for k in keys] for keys in self._texture_keys]
         radial = [math.inf if row[k] is None else row[k] / 1000.0 for k in self._radial_keys]
-        return self.step_values(row["t_s"], [row[k] for k in ODOMETRY], texture, radial)
+        own = [math.nan if row.get(k) is None else row[k] for k in self._own_keys]
+        own += [math.nan] * (self._own - len(own))
+        return self.step_values(row["t_s"], [row[k] for k in ODOMETRY], texture, radial, own)
 
     def step_values(self, t_s: float, odometry, texture, radial_m, own=()) -> Estimate:
         """Take one row of numbers: odometry (3,): m, m, rad; texture (tips, classes), nan not read; radial_m (rays,) in m,
@@ -248,7 +262,7 @@ def _fill_prior(out, prior: Prior) -> None:
 
 def _sensors(sensors: Sequence[Sensor]):
     """The C sensors and what they point into."""
-    maps, keep = ffi.new("struct nav_sensor_map[]", len(sensors)), []
+    tables, keep = ffi.new("struct nav_sensor_table[]", len(sensors)), []
     out = ffi.new("struct nav_sensor[]", len(sensors))
     for n, sensor in enumerate(sensors):
         codes = np.ascontiguousarray(sensor.codes)
@@ -257,10 +271,24 @@ def _sensors(sensors: Sequence[Sensor]):
             raise SettingError(f"sensor {n}: no map of codes with cells above 0 m; give (rows, columns) of uint8")
         keep.append(codes)
         code = octets(codes, f"codes of sensor {n}", (None, None))
-        maps[n] = (sensor.values, *sensor.at_m, sensor.cell_m, columns, rows, code)
-        expect, fill = (ffi.addressof(lib, name) for name in ("nav_sensor_map_expect", "nav_sensor_map_fill"))
-        out[n] = (sensor.values, sensor.values, sensor.spacing_m, sensor.detail_m, expect, fill, maps + n)
-    return out, (maps, keep)
+        told = {"codes": sensor.count, "x": sensor.at_m[0], "y": sensor.at_m[1], "cell": sensor.cell_m}
+        tables[n].map = told | {"columns": columns, "rows": rows, "code": code}
+        fill = "nav_sensor_map_fill" if sensor.edges is None else "nav_sensor_table_fill"
+        if sensor.edges is not None:
+            bins, width = len(sensor.edges) - 1, sensor.count
+            edges, likelihood = (np.ascontiguousarray(a, np.float64) for a in (sensor.edges, sensor.likelihood))
+            keep += [edges, likelihood]
+            tables[n].bins, tables[n].edge = bins, doubles(edges, f"edges of sensor {n}", (bins + 1,))
+            tables[n].likelihood = doubles(likelihood, f"likelihood of sensor {n}", (bins, width))
+        expect, fill = (ffi.addressof(lib, name) for name in ("nav_sensor_map_expect", fill))
+        out[n] = (sensor.values, sensor.count, sensor.spacing_m, sensor.detail_m, expect, fill, tables + n)
+    return out, (tables, keep)
+
+
+def _of_table(sensor: SensorTable) -> Sensor:
+    levels = sensor.likelihood.shape[1]
+    place = (sensor.codes, sensor.cell_m, sensor.at_m, sensor.spacing_m, sensor.detail_m)
+    return Sensor(*place, levels, sensor.edges, sensor.likelihood)
 
 
 def problem_of(

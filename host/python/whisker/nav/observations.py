@@ -42,7 +42,8 @@ def read_observations(path, scene: Scene) -> Observations:
     """Read the file; TableError when a column of the scene's whiskers is missing or the structure is broken."""
     tips = [[f"{w.name}_{t}" for t in scene.arena.textures] for w in scene.robot.of_role("texture")]
     rays = [f"{w.name}_mm" for w in scene.robot.of_role("object")]
-    text = read_columns(path, ["t_s", *ODOMETRY, *(key for keys in tips for key in keys), *rays])
+    own = [sensor.name for sensor in scene.robot.sensors]
+    text = read_columns(path, ["t_s", *ODOMETRY, *(key for keys in tips for key in keys), *rays, *own])
     rows = len(text["t_s"])
     texture = np.array([[_column(text[key], _texture_cell) for key in keys] for keys in tips]).reshape(
         len(tips), len(scene.arena.textures), rows
@@ -56,6 +57,7 @@ def read_observations(path, scene: Scene) -> Observations:
         np.ascontiguousarray(texture.transpose(2, 0, 1)),
         np.ascontiguousarray(radial.T),
         np.column_stack([numbers(text[name]) for name in TRUTH]) if known else None,
+        np.column_stack([_column(text[name], _own_cell) for name in own]) if own else None,
     )
 
 
@@ -74,6 +76,9 @@ def _texture_cell(cell: str) -> float:
         return math.nan
     value = number(cell)
     return value if math.isfinite(value) else math.inf
+
+
+_own_cell = _texture_cell  # of a sensor of the user's own
 
 
 def _radial_cell(cell: str) -> float:

@@ -20,6 +20,7 @@ def rounded(observations: Observations) -> Observations:
         np.round(observations.texture, DECIMALS),
         np.round(observations.radial_m * 1000.0, 3) / 1000.0,
         None if truth is None else np.round(truth, DECIMALS),
+        None if observations.own is None else np.round(observations.own, DECIMALS),
     )
 
 
@@ -32,6 +33,9 @@ def write_scene(path, scene: Scene, observations: Observations) -> None:
     columns = [observations.t_text, *_numbers(observations.odometry)]
     columns += _cells(observations.texture.reshape(len(observations.t_s), -1), {"nan": "", "-inf": "inf"})
     columns += _cells(np.round(observations.radial_m * 1000.0, 3), {"inf": "", "-inf": "inf"})
+    if observations.own is not None:
+        header += [sensor.name for sensor in scene.robot.sensors]
+        columns += _cells(observations.own, {"nan": ""})
     if observations.truth is not None:
         header += TRUTH
         columns += _numbers(observations.truth)
