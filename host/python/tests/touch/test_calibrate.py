@@ -51,7 +51,7 @@ def ring(whisks):
 def test_contacts_at_known_distances(capsys, tmp_path, ring, whisks):
     options = ["--radii", ",".join(map(str, RADII)), "--repeats", REPEATS, "--rest-seconds", 0.5, "--yes", "--backlog"]
     code, out, err = run(capsys, "calibrate", "--ring", ring.name, "--out", tmp_path, "--lane", LANE, *options)
-    assert (code, err) == (0, "") and "6 contacts, standard error" in out
+    assert (code, err) == (0, "") and "6 contacts, places left out: RMS error" in out
     found = read_whisks(tmp_path / "lane3.csv", with_radius=True)
     assert found.radius_mm.tolist() == [r for r in RADII for _ in range(REPEATS)]
     true_peaks = [peak(w.counts, np.median(w.counts[: REST_SAMPLES // 4], axis=0)) for w in whisks]

@@ -27,14 +27,14 @@ def rms(values) -> float:
 def calibrated():
     """A default model of whisks with 4 % of spread, and its calibration."""
     made = whisks(np.random.default_rng(1), 5)
-    return radial.fit(made).model, made
+    return radial.fit(made, "whisk").model, made
 
 
 @pytest.mark.parametrize("split", ["time", "rate"])
 def test_the_angle_turned_is_taken_out(split):
     rng = np.random.default_rng(2)
     cal, held = (whisks(rng, n, 0.08, split) for n in (5, 25))
-    paper, whole = (rms(errors(radial.fit(cal, name).model, held)) for name in ("paper", "default"))
+    paper, whole = (rms(errors(radial.fit(cal, name).model, held)) for name in ("paper", "whisk"))
     gain_alone = 68.9 * 0.08 / math.sqrt(2)  # the bound of an oracle that knows the angle (whisker_physics section 4)
     assert paper > 1.2 * gain_alone
     assert whole < 1.1 * gain_alone
@@ -78,7 +78,7 @@ def test_tip_and_shaft(calibrated):
 def test_any_rate_and_number_of_channels(hz, channels):
     rng = np.random.default_rng(6)
     cal, held = (whisks(rng, n, hz=hz, channels=channels) for n in (5, 10))
-    assert rms(errors(radial.fit(cal).model, held)) < 2.6
+    assert rms(errors(radial.fit(cal, "whisk").model, held)) < 2.6
 
 
 @pytest.mark.parametrize("kappa", [0.3, 3.0])
@@ -162,7 +162,7 @@ def test_spoiled_model_files_are_one_clear_line(tmp_path, calibrated, change):
 def test_a_rate_may_be_known_in_calibration_only_or_later_only(calibrated):
     held = whisks(np.random.default_rng(12), 8)
     silent = [Contact(c.t_s, c.samples) for c in held.recorded]
-    without = radial.fit(Whisks(held.contact, silent, held.peak_counts, held.radius_mm, 0)).model
+    without = radial.fit(Whisks(held.contact, silent, held.peak_counts, held.radius_mm, 0), "whisk").model
     for model, contacts in ((calibrated[0], silent), (without, held.recorded)):
         held.recorded = contacts
         assert rms(errors(model, held)) < 3.0

@@ -16,7 +16,7 @@ CORNER_MM, TIP_MM = 110.0, 140.0
 
 @pytest.fixture(scope="module")
 def model():
-    return radial.fit(whisks(np.random.default_rng(1), 5)).model
+    return radial.fit(whisks(np.random.default_rng(1), 5), "whisk").model
 
 
 def shown(model, radius_mm=CORNER_MM, **options):

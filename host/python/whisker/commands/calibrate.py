@@ -146,8 +146,11 @@ def _progress(radius_mm: float, whisk: Whisk, number: int, wanted: int) -> str:
 def _verdict(path: Path) -> str:
     whisks = read_whisks(path, with_radius=True)
     try:
-        line, whole = (fit(whisks, name).error_mm for name in ("paper", "default"))
+        found = fit(whisks)
     except ValueError as error:
         return f"{path}: {len(whisks.contact)} contacts; {error}"
-    errors = f"standard error {line:.2f} mm with the paper's line, {whole:.2f} mm with whole whisks, left out in turn"
+    line = found.tried["linear"][0]
+    errors = (
+        f"places left out: RMS error {line:.2f} mm with the paper's line, {found.place_mm:.2f} mm with the best model"
+    )
     return f"{path}: {len(whisks.contact)} contacts, {errors}; next: whisker radial fit {path}"

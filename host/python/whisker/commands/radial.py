@@ -2,20 +2,24 @@
 
 import json
 
+import numpy as np
+
 from ..arguments import add_action, plain
 from ..bridge.nodes import check_node
 from ..tables import TableError, unwritable
 from ..touch.radial import model as radial
 
 EXAMPLE = "whisker radial fit contacts.csv --out model.json"
-KINDS = """paper or linear: equation 3, a line through the peaks; quadratic, rational: a curve instead; default: whole
-whisks (onset, rate, duration, creep), with an uncertainty for each contact"""
+COLUMNS = "whisk_rad_s and base_rad_s, or push_mm_s, or depth_mm; direction_deg of the touch"
+KINDS = """paper or linear: equation 3, a line through the peaks; quadratic, rational: a curve instead; whisk: whole body
+whisks by the physics of the shaft, which the pilot needs to tell a face from a corner; press: a regression at several
+depths of a push, which answers during the press; default: the one that predicts left-out places best"""
 
 
 def add(parser) -> None:
     actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
     p = add_action(actions, "fit", "fit contacts of known radius", EXAMPLE, fit)
-    p.add_argument("contacts", help="CSV: contact, radius_mm, t_s, channels, whisk_rad_s and base_rad_s where known")
+    p.add_argument("contacts", help="CSV: contact, radius_mm, t_s, channels; where known " + COLUMNS)
     p.add_argument("--out", required=True, metavar="MODEL.JSON")
     p.add_argument("--model", choices=radial.MODELS, default="default", help=KINDS)
     example = "whisker radial predict model.json contacts.csv --json"
@@ -23,30 +27,53 @@ def add(parser) -> None:
     p.add_argument("model")
     p.add_argument("contacts", help="CSV as for fit; radius_mm is not read and may be absent")
     p.add_argument("--json", action="store_true", help="one object per line and contact")
+    text = "a press model's answers as each contact grows, one line for every tenth of its samples"
+    p.add_argument("--during", action="store_true", help=text)
 
 
 def fit(arguments) -> int:
     whisks = radial.read_whisks(arguments.contacts, with_radius=True)
     try:
-        model, error_mm = radial.fit(whisks, arguments.model)
-        radial.save(model, arguments.out)
+        found = radial.fit(whisks, arguments.model)
+        radial.save(found.model, arguments.out)
     except ValueError as error:
         raise TableError(arguments.contacts, None, str(error)) from error
     except OSError as error:
         raise unwritable(arguments.out, error) from error
-    print(f"{arguments.out}: {len(whisks.contact)} contacts, standard error {error_mm:.2f} mm")
+    print("model      places left out  contacts left out  (RMS error, mm)")
+    for name, errors in found.tried.items():
+        mark = "  chosen" if errors == (found.place_mm, found.contact_mm) else ""
+        print(f"{name:<10}{errors[0]:>16.2f}{errors[1]:>19.2f}{mark}")
+    print(f"{arguments.out}: {len(whisks.contact)} contacts")
     return 0
 
 
 def predict(arguments) -> int:
     model = radial.load(arguments.model)
+    if arguments.during and not isinstance(model, radial.PressModel):
+        raise TableError(arguments.model, None, "only a press model answers during a press; fit with '--model press'")
     whisks = radial.read_whisks(arguments.contacts, with_radius=False)
     check_node(model.node, whisks.node, arguments.model)
     for contact, recorded, peak in zip(whisks.contact, whisks.recorded, whisks.peak_counts, strict=True):
-        try:
-            told = radial.estimate(model, recorded, peak)
-        except ValueError as error:
-            raise TableError(arguments.contacts, 1, f"{error}; give the channels it was fitted on") from error
-        line = f"{contact}  {told.radius_mm:.2f} +- {told.sigma_mm:.2f} mm  {told.type}  {told.confidence:.2f}"
-        print(json.dumps(plain({"contact": contact} | told._asdict())) if arguments.json else line)
+        count = len(recorded.t_s)
+        for end in (count * np.arange(1, 11) // 10) if arguments.during else (count,):
+            _predict(arguments, model, contact, recorded.until(end), None if arguments.during else peak)
     return 0
+
+
+def _predict(arguments, model, contact: str, recorded: radial.Contact, peak: float | None) -> None:
+    """One line on a contact, whole or so far."""
+    try:
+        found = radial.estimate(model, recorded, peak)
+    except ValueError as error:
+        raise TableError(arguments.contacts, 1, f"{error}; give the columns it was fitted on") from error
+    at_s = {"t_s": recorded.t_s[-1] - recorded.t_s[0]} if arguments.during else {}
+    if arguments.json:
+        members = {name: value for name, value in found._asdict().items() if value is not None}
+        print(json.dumps(plain({"contact": contact} | at_s | members)))
+        return
+    after = f"  after {at_s['t_s']:.3f} s" if at_s else ""
+    direction = "" if found.direction_deg is None else f"  {found.direction_deg:g} degrees"
+    print(
+        f"{contact}{after}  {found.radius_mm:.2f} +- {found.sigma_mm:.2f} mm  {found.type}  {found.confidence:.2f}{direction}"
+    )

@@ -62,7 +62,7 @@ class CurveModel:
 
     @classmethod
     def fit(cls, kind: str, peak_counts, radius_mm) -> "CurveModel":
-        """Least squares; sigma_mm is what is left of contacts left out. ValueError when they do not determine it."""
+        """Least squares; sigma_mm is the RMS error of places left out. ValueError when they do not determine it."""
         peaks, radii = (np.asarray(v, np.float64) for v in (peak_counts, radius_mm))
         use = np.isfinite(peaks) & np.isfinite(radii)
         peaks, radii = peaks[use], radii[use]
@@ -76,10 +76,12 @@ class CurveModel:
             {"kind": kind, "scale": scale, "low_mm": radii.min(), "high_mm": radii.max(), "sigma_mm": 0.0} | numbers
         )
         left = []
-        for n in range(len(peaks)):
-            others = np.arange(len(peaks)) != n
-            without = cls(model.content | cls._solve(kind, peaks[others] / scale, radii[others]))
-            left.append(without.predict(peaks[n])[0] - radii[n])
+        for place in np.unique(radii):
+            kept = radii != place
+            if len(np.unique(peaks[kept])) < 4:
+                kept[:] = True
+            without = cls(model.content | cls._solve(kind, peaks[kept] / scale, radii[kept]))
+            left += [without.predict(one)[0] - place for one in peaks[radii == place]]
         model.sigma_mm = float(np.sqrt(np.mean(np.square(left))))
         return model
 

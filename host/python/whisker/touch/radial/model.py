@@ -1,5 +1,5 @@
-"""Radial distance of a contact: the paper's peak and line per whisker (equations 2 and 3), curves instead of the line,
-and the model of whole whisks; calibration recordings and model files."""
+"""Radial distance of a contact: the paper's peak and line per whisker (equations 2 and 3), the choice among all models by
+the places left out; calibration recordings and model files."""
 
 import json
 from dataclasses import dataclass
@@ -13,6 +13,7 @@ from ...files import read_json
 from ...native import as_doubles, doubles, ffi, lib
 from ...tables import TableError, numbers, read_columns
 from .curve import CurveModel, radii_of, tip_from
+from .press import PressModel
 from .shape import Contact, shape_of
 from .whisk import WhiskModel
 from .whisk_fit import TIP_MM
@@ -22,20 +23,31 @@ FIELDS = ("a1", "a0", "sigma_mm", "low_mm", "high_mm")
 REST_SHARE = 0.05  # the first samples of a recorded whisk, before it touches, give its rest
 REST_LEAST = 3  # samples: slow recordings have few before the touch
 WHISK_FORMAT, CURVE_FORMAT = "whisker radial whisk model 1", "whisker radial curve model 1"
-RATE_COLUMNS = ("whisk_rad_s", "base_rad_s")  # commanded; as the base reports
+PRESS_FORMAT = "whisker radial press model 1"
+# How the base moves: turn commanded, turn as the base reports it, translation, depth. As the members of Contact.
+MOTION_COLUMNS = {
+    "whisk_rad_s": "whisk_rad_s",
+    "base_rad_s": "told_rad_s",
+    "push_mm_s": "push_mm_s",
+    "depth_mm": "depth_mm",
+}
+DIRECTION_COLUMN = "direction_deg"  # of the touch about the shaft
 NODE_MOST = 2**32 - 1
 NODE_COLUMN = "node"  # serial number of the node whose whisker it is
-NO_CHANNEL = ("contact", "radius_mm", "t_s", NODE_COLUMN, *RATE_COLUMNS)
-MODELS = ("paper", "linear", "quadratic", "rational", "default")
+NO_CHANNEL = ("contact", "radius_mm", "t_s", NODE_COLUMN, DIRECTION_COLUMN, *MOTION_COLUMNS)
+CANDIDATES = ("linear", "quadratic", "rational", "whisk", "press")
+MODELS = ("paper", *CANDIDATES, "default")
 
 
 class Estimate(NamedTuple):
-    """What a model says of one contact: mm, standard deviation, "tip" or "shaft", confidence 0..1. Never nan."""
+    """What a model says of one contact: mm, standard deviation, "tip" or "shaft", confidence 0..1; direction of the touch
+    in degrees where the model knows directions. Numbers are never nan."""
 
     radius_mm: float
     sigma_mm: float
     type: str
     confidence: float
+    direction_deg: float | None = None
 
 
 def peak(samples: np.ndarray, rest) -> float:
@@ -115,6 +127,14 @@ class Whisks:
     radius_mm: np.ndarray | None  # None when the file has no such column
     bad_rows: int  # rows with a cell that is no finite number: left out
     node: int | None = None  # serial number of the node whose whisker it is, where the file tells
+    direction_deg: np.ndarray | None = None  # of the touch about the shaft, where the file tells
+
+    def part(self, use) -> "Whisks":
+        """Only the contacts of these indices."""
+        arrays = (None if a is None else a[use] for a in (self.peak_counts, self.radius_mm))
+        directions = None if self.direction_deg is None else self.direction_deg[use]
+        named = [self.contact[n] for n in use], [self.recorded[n] for n in use]
+        return Whisks(*named, *arrays, self.bad_rows, self.node, directions)
 
     @property
     def axes(self) -> int:
@@ -129,16 +149,22 @@ def read_whisks(path, with_radius: bool) -> Whisks:
         raise TableError(path, 1, "no channel column; add at least one, as in 'contact,radius_mm,t_s,x,y'")
     samples = np.column_stack([numbers(text[name]) for name in channels])
     t_s = numbers(text["t_s"])
-    rates = [_rate(text, name) for name in RATE_COLUMNS]
+    motion = {member: _motion(text, name) for name, member in MOTION_COLUMNS.items()}
     names = list(dict.fromkeys(text["contact"]))
     ids = np.array(text["contact"])
     rows = [np.flatnonzero(ids == name) for name in names]
-    recorded = [Contact(t_s[r], samples[r], *(None if rate is None else rate[r] for rate in rates)) for r in rows]
+    recorded = [
+        Contact(t_s[r], samples[r], **{member: None if of is None else of[r] for member, of in motion.items()})
+        for r in rows
+    ]
     peaks = np.array([_peak_of(samples[r]) for r in rows])
     radius = numbers(text["radius_mm"]) if with_radius else None
     radii = None if radius is None else np.array([np.median(radius[r]) for r in rows])
     bad = int((~np.isfinite(samples)).any(axis=1).sum())
-    return Whisks(names, recorded, peaks, radii, bad, _node(path, text.get(NODE_COLUMN, [])))
+    directions = _motion(text, DIRECTION_COLUMN)
+    if directions is not None:
+        directions = np.array([directions[r][0] for r in rows])
+    return Whisks(names, recorded, peaks, radii, bad, _node(path, text.get(NODE_COLUMN, [])), directions)
 
 
 def _node(path, cells: list[str]) -> int | None:
@@ -153,10 +179,11 @@ def _node(path, cells: list[str]) -> int | None:
     return int(found[0]) if found else None
 
 
-def _rate(text: dict[str, list[str]], name: str) -> np.ndarray | None:
-    """A column of rates; None where there is none or nothing in it."""
-    rate = numbers(text[name]) if name in text else np.zeros(0)
-    return rate if np.any(np.isfinite(rate) & (rate != 0.0)) else None
+def _motion(text: dict[str, list[str]], name: str) -> np.ndarray | None:
+    """A column of motion; None where there is none or nothing in it. A direction may be 0 throughout."""
+    values = numbers(text[name]) if name in text else np.zeros(0)
+    known = np.isfinite(values) & ((values != 0.0) | (name == DIRECTION_COLUMN))
+    return values if np.any(known) else None
 
 
 def _peak_of(samples: np.ndarray) -> float:
@@ -167,63 +194,80 @@ def _peak_of(samples: np.ndarray) -> float:
 
 
 class Fitted(NamedTuple):
-    """A model, and the standard error of its calibration, mm: of the paper's line its regression's, of others what is
-    left when each contact is predicted by a model that was fitted without it."""
+    """A model with its RMS errors, mm, of contacts predicted by a model fitted without them: without their whole place, and
+    without that contact alone; nan where too few remain. tried: the same two errors of every model that was tried."""
 
-    model: "RadialModel | CurveModel | WhiskModel"
-    error_mm: float
+    model: "RadialModel | CurveModel | WhiskModel | PressModel"
+    place_mm: float
+    contact_mm: float
+    tried: dict[str, tuple[float, float]]
 
 
 def fit(whisks: Whisks, name: str = "default") -> Fitted:
     """A model of the contacts by its name (MODELS); ValueError when they do not determine one.
 
-    `default` is the model of whole whisks, or, where recordings are no whole whisks, the line or curve that predicts
-    left-out contacts best. The model belongs to the whisks' node.
+    `default` is the model that predicts the contacts at left-out places best. The model belongs to the whisks' node.
     """
-    fitted = _fit(whisks, name)
+    model = _model_of(whisks, "linear" if name == "default" else name)
     if len(set(whisks.radius_mm.tolist())) == 1:
         at = f"radial fit: every contact is at {whisks.radius_mm[0]:g} mm"
         raise ValueError(f"{at}, and one radius gives no error estimate; record contacts at more radii")
-    fitted.model.node = whisks.node
-    return fitted
-
-
-def _fit(whisks: Whisks, name: str) -> Fitted:
-    if name in ("paper", "linear"):
-        model = RadialModel.fit(whisks.peak_counts, whisks.radius_mm)
-        return Fitted(model, model.sigma_mm)
-    if name in CurveModel.KINDS:
-        model = CurveModel.fit(name, whisks.peak_counts, whisks.radius_mm)
-        return Fitted(model, model.sigma_mm)
-    try:
-        shapes = [shape_of(contact) for contact in whisks.recorded]
-        model = WhiskModel.fit(shapes, whisks.radius_mm, whisks.axes)
-        return Fitted(model, model.left_out_error(shapes, whisks.radius_mm))
-    except ValueError:
-        return _best_curve(whisks)
-
-
-def _best_curve(whisks: Whisks) -> Fitted:
-    line = _fit(whisks, "linear")  # what it says of too few contacts is what a user should read
-    found = [line]
-    for kind in CurveModel.KINDS:
+    found = {}
+    for one in CANDIDATES if name == "default" else (name,):
         try:
-            found.append(_fit(whisks, kind))
+            made = model if one == name else _model_of(whisks, one)
+            found[one] = made, *_left_out_errors(whisks, one, made)
         except ValueError:
             continue
-    return min(found, key=lambda fitted: fitted.error_mm)
+    best = min(found, key=lambda one: tuple(error if np.isfinite(error) else np.inf for error in found[one][1:]))
+    found[best][0].node = whisks.node
+    return Fitted(*found[best], {one: tuple(errors) for one, (_, *errors) in found.items()})
+
+
+def _model_of(whisks: Whisks, name: str):
+    if name in ("paper", "linear"):
+        return RadialModel.fit(whisks.peak_counts, whisks.radius_mm)
+    if name in CurveModel.KINDS:
+        return CurveModel.fit(name, whisks.peak_counts, whisks.radius_mm)
+    if name == "press":
+        return PressModel.fit(whisks.recorded, whisks.radius_mm, whisks.direction_deg)
+    return WhiskModel.fit([shape_of(contact) for contact in whisks.recorded], whisks.radius_mm, whisks.axes)
+
+
+def _left_out_errors(whisks: Whisks, name: str, model) -> tuple[float, float]:
+    """RMS errors, mm, of places left out, but for the outermost, which ask for extrapolation, and of contacts left out."""
+    if isinstance(model, PressModel):
+        return model.place_mm, model.contact_mm
+    places = [np.flatnonzero(whisks.radius_mm == place) for place in np.unique(whisks.radius_mm)[1:-1]]
+    return tuple(_left_out(whisks, name, groups) for groups in (places, np.arange(len(whisks.contact))[:, None]))
+
+
+def _left_out(whisks: Whisks, name: str, groups) -> float:
+    off = []
+    for out in groups:
+        try:
+            model = _model_of(whisks.part(np.setdiff1d(np.arange(len(whisks.contact)), out)), name)
+        except ValueError:
+            return float("nan")
+        off += [estimate(model, whisks.recorded[n], whisks.peak_counts[n]).radius_mm - whisks.radius_mm[n] for n in out]
+    return float(np.sqrt(np.mean(np.square(off)))) if off else float("nan")
 
 
 def save(model, path) -> None:
     """Write a model of any kind as JSON."""
-    formats = {RadialModel: FORMAT, WhiskModel: WHISK_FORMAT, CurveModel: CURVE_FORMAT}
+    formats = {RadialModel: FORMAT, WhiskModel: WHISK_FORMAT, CurveModel: CURVE_FORMAT, PressModel: PRESS_FORMAT}
     node = {} if model.node is None else {NODE_COLUMN: model.node}
     Path(path).write_text(json.dumps({"format": formats[type(model)]} | node | model.content, indent=1) + "\n")
 
 
-def load(path) -> "RadialModel | CurveModel | WhiskModel":
+def load(path) -> "RadialModel | CurveModel | WhiskModel | PressModel":
     """Read what `save` wrote; TableError with one line when it is something else."""
-    kinds = {FORMAT: RadialModel.of, WHISK_FORMAT: WhiskModel.of, CURVE_FORMAT: CurveModel.of}
+    kinds = {
+        FORMAT: RadialModel.of,
+        WHISK_FORMAT: WhiskModel.of,
+        CURVE_FORMAT: CurveModel.of,
+        PRESS_FORMAT: PressModel.of,
+    }
     try:
         fields = Fields(read_json(path))
         model = kinds[fields.text("format", *kinds)](fields)
@@ -239,11 +283,14 @@ def not_a_model(path, error: ValueError) -> TableError:
 
 def estimate(model, contact: Contact, peak_counts: float | None = None) -> Estimate:
     """What a model of any kind says of one contact; `peak_counts`: equation 2, where it is known already."""
+    if isinstance(model, WhiskModel | PressModel) and contact.samples.shape[1] != model.axes:
+        raise ValueError(f"{contact.samples.shape[1]} channels, but the model has {model.axes}")
     if isinstance(model, WhiskModel):
-        if contact.samples.shape[1] != model.axes:
-            raise ValueError(f"{contact.samples.shape[1]} channels, but the model has {model.axes}")
         told = model.estimate(model.shape_of(contact))
         return Estimate(told.radius_mm, told.sigma_mm, "tip" if told.tip > 0.5 else "shaft", told.confidence)
+    if isinstance(model, PressModel):
+        found = model.predict(contact)
+        return Estimate(found.radius_mm, found.sigma_mm, model.contact_type(found.radius_mm), *found[2:])
     counts = _peak_of(contact.samples) if peak_counts is None else peak_counts
     mm, sigma_mm = model.predict(float(counts))
     if not np.isfinite(mm):

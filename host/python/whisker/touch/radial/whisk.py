@@ -17,7 +17,6 @@ LOG_RATE_NONE = 1e-6  # rates were not known in calibration: seconds stand for r
 class WhiskModel:
     """`nav_whisk_model` of one whisker: made by `fit` or from what `content` gave."""
 
-    kind = "default"
     node: int | None = None  # whose whisker it is, where known
     SCALARS = ("axes", "log_gain", "kappa", "cone_mm", "spread", "low_mm", "high_mm", "tip_mm") + (
         "direction_sd",
@@ -134,17 +133,3 @@ class WhiskModel:
                 f"at least {LEAST_CONTACTS}, at 3 radii or more, are needed: record more"
             )
         return cls(learn([shapes[n] for n in use], radii) | {"axes": axes})
-
-    def left_out_error(self, shapes: list, radius_mm) -> float:
-        """RMS error, mm, of contacts each predicted by a model that was fitted without it; nan when there are too few."""
-        radii = np.asarray(radius_mm, np.float64)
-        left = [float("nan")]
-        for n in range(len(shapes)):
-            others = [k for k in range(len(shapes)) if k != n]
-            try:
-                without = WhiskModel.fit([shapes[k] for k in others], radii[others], self.axes)
-            except ValueError:
-                continue
-            left.append(without.estimate(shapes[n]).radius_mm - radii[n])
-        found = np.square(left)[np.isfinite(left)]
-        return float(np.sqrt(found.mean())) if len(found) else float("nan")
