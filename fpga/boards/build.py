@@ -21,16 +21,16 @@ from toolchain import ToolError, gather, must  # noqa: E402
 INCLUDES = (REPO / "fpga/bridge_rtl/crc8.vh", REPO / "protocol/gen/whisker_protocol.vh")
 # Registers that lie in the pad's own cell: a route between them and the pad would eat the PHY's set-up time, spread the
 # nodes' lines, and behind a delay line it would not be timed.
-PAD_REGISTERS = tuple(f"*ulpi_shim*/w:{name}" for name in ("ulpi_data_out", "ulpi_stp", "data")) + (
-    "*lane_receiver*/w:sampled",
-)
-PAD_REGISTERS += tuple(f"node_link/w:{name}" for name in ("sync", "sck", "select_n", "mosi"))
+NODE_REGISTERS = ("*lane_receiver*/w:sampled",)
+NODE_REGISTERS += tuple(f"node_link/w:{name}" for name in ("sync", "sck", "select_n", "mosi"))
+PHY_REGISTERS = tuple(f"*ulpi_shim*/w:{name}" for name in ("ulpi_data_out", "ulpi_stp", "data"))
 
 
 @dataclass(frozen=True)
 class Board:
-    """A board's file: `top` is its module, `phy` one of report.PHYS, `number` the protocol's for it, `milliamps` what it
-    draws from the host's socket; `pins` maps a port to a site, or a vector to its sites, bit 0 first."""
+    """A board's file: `top` is its module, `phy` one of report.PHYS, or `gateware`; `number` the protocol's for it, `milliamps`
+    what it draws from the host's socket; `clock` the port of its clock; `pins` maps a port to a site, or a vector to its
+    sites, bit 0 first."""
 
     name: str
     title: str
@@ -45,6 +45,8 @@ class Board:
     self_powered: bool
     milliamps: int
     pins: dict[str, str | list[str]]
+    clock: str = "clk_60"
+    clock_mhz: float = report.CLOCK_MHZ
 
 
 def boards() -> list[str]:
@@ -68,17 +70,19 @@ def sites(board: Board, lanes: int) -> dict[str, str]:
     """Site of every port bit, as nextpnr names them."""
     if not 1 <= lanes <= len(board.pins["miso"]):
         raise ToolError(f"{board.title} has pins for 1 to {len(board.pins['miso'])} lanes, not {lanes}")
-    wide = {"ulpi_data": board.pins["ulpi_data"], "miso": board.pins["miso"][:lanes]}
+    wide = {port: sites for port, sites in board.pins.items() if isinstance(sites, list)}
+    wide["miso"] = wide["miso"][:lanes]
     out = {port: site for port, site in board.pins.items() if isinstance(site, str)}
     return out | {f"{port}[{bit}]": site for port, all_ in wide.items() for bit, site in enumerate(all_)}
 
 
-PAD_OPTIONS = {"miso": " PULLMODE=UP", "tick_in": " PULLMODE=DOWN", "ulpi": " SLEWRATE=FAST"}  # by the port's beginning
+# By the port's beginning.
+PAD_OPTIONS = {"miso": " PULLMODE=UP", "tick_in": " PULLMODE=DOWN", "ulpi": " SLEWRATE=FAST", "usb_d": " PULLMODE=NONE"}
 
 
 def constraints(board: Board, lanes: int) -> str:
     """The LPF file: sites, 3.3 V, pull-ups on the lanes (nobody there reads as ones), fast edges towards the PHY, clock."""
-    lines = [f'FREQUENCY PORT "clk_60" {report.CLOCK_MHZ:g} MHZ;']
+    lines = [f'FREQUENCY PORT "{board.clock}" {board.clock_mhz:g} MHZ;']
     for port, site in sites(board, lanes).items():
         extra = next((more for start, more in PAD_OPTIONS.items() if port.startswith(start)), "")
         lines.append(f'LOCATE COMP "{port}" SITE "{site}";')
@@ -116,6 +120,13 @@ def generate_usb(out: Path, board: Board, serial: str = "0001") -> Path:
     return path
 
 
+def generate_fs_phy(out: Path) -> Path:
+    """The PHY of a board without one, as Verilog."""
+    path = out / "whisker_fs_phy.v"
+    subprocess.run([sys.executable, str(REPO / "fpga/usb/gateware_phy.py"), str(path)], check=True)
+    return path
+
+
 def front(top: str, files: list[Path], lanes: int | None, out: Path) -> list[str]:
     """Yosys commands that read a design and fail on latches, several drivers of a wire, and wires without one."""
     gather(out, *INCLUDES)
@@ -132,9 +143,8 @@ def front(top: str, files: list[Path], lanes: int | None, out: Path) -> list[str
     ]
 
 
-def synthesise(top: str, files: list[Path], lanes: int | None, out: Path, pads: bool = True) -> Path:
-    """Netlist of `top` for ECP5."""
-    registers = PAD_REGISTERS if pads else ()
+def synthesise(top: str, files: list[Path], lanes: int | None, out: Path, registers: tuple[str, ...]) -> Path:
+    """Netlist of `top` for ECP5, `registers` (patterns of Yosys) in the pads' cells."""
     marks = [f"select -assert-any {name}; setattr -set syn_useioff 1 {name}" for name in registers]
     steps = [*front(top, files, lanes, out), *marks, f"synth_ecp5 -top {top} -json netlist.json"]
     (out / "synth.ys").write_text("\n".join(steps) + "\n")
@@ -172,8 +182,11 @@ def place(board: Board, lanes: int, netlist: Path, out: Path, seed: int = 1, spe
 def prepare(board: Board, lanes: int, out: Path, serial: str = "0001") -> Path:
     """The netlist of a whole board; ToolError if a cell has another clock than the PHY's."""
     out.mkdir(parents=True, exist_ok=True)
-    netlist = synthesise(board.top, sources(generate_usb(out, board, serial)), lanes, out)
-    problems = report.unconstrained_clocks(netlist, board.top, "clk_60")
+    files, registers = sources(generate_usb(out, board, serial)), NODE_REGISTERS + PHY_REGISTERS
+    if board.phy == report.GATEWARE:
+        files, registers = [*files, generate_fs_phy(out)], NODE_REGISTERS
+    netlist = synthesise(board.top, files, lanes, out, registers)
+    problems = report.unconstrained_clocks(netlist, board.top, board.clock)
     if problems:
         raise ToolError("; ".join(problems))
     return netlist

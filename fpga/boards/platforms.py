@@ -29,6 +29,10 @@ def of_amaranth(platform, *leds: tuple[str, int, str]) -> Platform:
         names["rst"] = "ulpi_reset_n" if pins(("ulpi", 0), "rst").invert else "ulpi_reset"
         phy = {ours: pins(("ulpi", 0), theirs).names for theirs, ours in names.items()}
         phy = {port: found if port == "ulpi_data" else found[0] for port, found in phy.items()}
+    elif ("usb", 0) in platform.resources:
+        names = {"d_p": "usb_d_p", "d_n": "usb_d_n", "pullup": "usb_pull_up"}
+        phy = {ours: pins(("usb", 0), theirs).names[0] for theirs, ours in names.items()}
+        phy |= {"clk_25": pins(("clk25", 0), "").names[0]}
     return Platform(
         platform.device,
         sockets,
@@ -82,10 +86,12 @@ CYNTHION = Platform(
 def platforms() -> dict[str, Platform]:
     """By the name of our file."""
     from amaranth_boards.ecpix5 import ECPIX545Platform
+    from amaranth_boards.ulx3s import ULX3S_85F_Platform
 
     return {
         "colorlight_i5": Platform("LFE5U-25F", EXTENSION_BOARD, {}, ["U16"]),
         "colorlight_i9": Platform("LFE5U-45F", EXTENSION_BOARD, {}, ["L2"]),
         "cynthion": CYNTHION,
         "ecpix5": of_amaranth(ECPIX545Platform(), *(("rgb_led", n, "g") for n in range(4))),
+        "ulx3s": of_amaranth(ULX3S_85F_Platform(), *(("led", n, "") for n in range(8))),
     }

@@ -28,6 +28,7 @@ class Phy:
     clock_out: bool
 
 
+GATEWARE = "gateware"  # no PHY: no pins whose timing counts, for a full-speed bit takes four samples
 PHYS = {
     # USB3300 data sheet, ULPI output clock mode; Intel's AN 702, table 3, repeats it
     "USB3300": Phy(setup=5.0, hold=0.0, earliest=2.0, latest=5.0, clock_out=False),
@@ -61,7 +62,8 @@ USED = {
     "pin": "TRELLIS_IO",
 }
 ASYNC = "<async>"
-CLOCK = "clk_60"  # the port; the FPGA's own oscillator clocks what is not timed
+CLOCK = "clk_60"  # in the net's name; the others are the FPGA's own oscillator and what a PLL gives
+SOURCES = {"OSCG": ("OSC",), "EHXPLLL": ("CLKOP", "CLKOS")}  # cells that make a clock which nextpnr knows
 CLOCKED = {  # cell type: its clock inputs
     "TRELLIS_FF": ("CLK",),
     "DP16KD": ("CLKA", "CLKB"),
@@ -70,10 +72,11 @@ CLOCKED = {  # cell type: its clock inputs
 
 
 def read(path: Path) -> dict:
-    """The report's numbers: fmax_mhz, used, the longest paths that touch a pin, and the shortest from a pin to a flip-flop
+    """The report's numbers: fmax_mhz, used, `slow`: other clocks that miss what is wanted of them, the longest paths that touch a pin, and the shortest from a pin to a flip-flop
     (in ns; None: there is none)."""
     text = json.loads(path.read_text())
     (clock,) = (name for name in text["fmax"] if CLOCK in name)
+    slow = [name for name, found in text["fmax"].items() if name != clock and found["achieved"] < found["constraint"]]
     paths: dict[str, float | None] = dict.fromkeys(("out_ns", "in_ns", "through_ns"))
     for found in text["critical_paths"]:
         kind = tuple(end if end == ASYNC else clock if clock in end else "" for end in (found["from"], found["to"]))
@@ -86,6 +89,7 @@ def read(path: Path) -> dict:
         "used": used,
         **paths,
         "shortest_in_ns": shortest_in(text),
+        "slow": slow,
     }
 
 
@@ -113,6 +117,8 @@ def pin_limits(speed: int, phy: str) -> dict[str, float]:
     A PHY that takes its clock from the FPGA runs late by the clock's own way out, at most the clock-to-pin time: that is
     gained on what goes out (not counted here) and lost on what comes in.
     """
+    if phy == GATEWARE:
+        return {}
     out, phy_ = PADS[speed].clock_to_pin, PHYS[phy]
     return {
         "out_ns": PERIOD_NS - phy_.setup - out,
@@ -128,6 +134,8 @@ def late(speed: int, phy: str) -> float:
 
 def data_spare(speed: int, phy: str) -> dict[str, float]:
     """What DATA has to spare on its way in, in ns: before the edge and after it, the data sheets' figures alone."""
+    if phy == GATEWARE:
+        return {}
     before = PERIOD_NS - PHYS[phy].latest - late(speed, phy) - PADS[speed].delayed_setup
     return {"data_setup_ns": before, "data_hold_ns": PHYS[phy].earliest}
 
@@ -154,6 +162,9 @@ def timing_problems(placed: dict, speed: int, phy: str) -> list[str]:
         elif placed[name] > limit:
             problems.append(f"a path takes {placed[name]:.1f} ns ({name}), {limit:.1f} are left for it")
     problems += [f"{name}: {spare:.1f} ns" for name, spare in data_spare(speed, phy).items() if spare < 0]
+    problems += [f"{name} is too slow" for name in placed["slow"]]
+    if phy == GATEWARE:
+        return problems
     shortest, needed = placed["shortest_in_ns"], hold_needed(speed, phy)
     if shortest is None or shortest < needed:
         problems.append(f"the shortest way in takes {shortest} ns, {needed:.1f} are needed to hold")
@@ -165,7 +176,8 @@ def unconstrained_clocks(netlist: Path, top: str, clock: str) -> list[str]:
     module = json.loads(netlist.read_text())["modules"][top]
     (bit,) = module["ports"][clock]["bits"]
     constants = (["0"], ["1"], ["x"])  # the clock of a memory port that is not used
-    own = [cell["connections"]["OSC"] for cell in module["cells"].values() if cell["type"] == "OSCG"]
+    cells = module["cells"].values()
+    own = [cell["connections"][port] for cell in cells for port in SOURCES.get(cell["type"], ())]
     return [
         f"{name} is clocked by another net than {clock}"
         for name, cell in module["cells"].items()

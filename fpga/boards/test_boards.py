@@ -30,9 +30,9 @@ def test_every_port_has_a_pin_of_its_own(name):
     board = build.load(name)
     sites = build.sites(board, len(board.pins["miso"]))
     assert len(set(sites.values())) == len(sites)
-    assert len(board.pins["miso"]) == 28 >= board.lanes and len(board.pins["ulpi_data"]) == 8
+    assert len(board.pins["miso"]) == 28 >= board.lanes
     lpf = build.constraints(board, board.lanes)
-    assert 'FREQUENCY PORT "clk_60" 60 MHZ;' in lpf
+    assert f'FREQUENCY PORT "{board.clock}" {board.clock_mhz:g} MHZ;' in lpf
     text = (HERE / f"{board.top}.v").read_text()
     assert all(f" {port}," in text or f" {port}\n" in text for port in board.pins)
 
@@ -75,7 +75,7 @@ def test_the_i9s_phy_is_wired_as_the_page_tells():
 def test_what_a_board_has_not_is_refused():
     with pytest.raises(ToolError, match="1 to 28 lanes, not 29"):
         build.sites(build.load("cynthion"), 29)
-    with pytest.raises(ToolError, match="boards: colorlight_i5, colorlight_i9, cynthion, ecpix5"):
+    with pytest.raises(ToolError, match="boards: colorlight_i5, colorlight_i9, cynthion, ecpix5, ulx3s"):
         build.load("toaster")
 
 
@@ -103,7 +103,11 @@ def test_the_bridge_synthesises_clean_with_one_clock(tmp_path):
     """The whole board with six lanes, USB device and all; pad registers where they belong."""
     lanes = 6
     netlist = build.synthesise(
-        "cynthion", build.sources(build.generate_usb(tmp_path, build.load("cynthion"))), lanes, tmp_path
+        "cynthion",
+        build.sources(build.generate_usb(tmp_path, build.load("cynthion"))),
+        lanes,
+        tmp_path,
+        build.NODE_REGISTERS + build.PHY_REGISTERS,
     )
     assert report.unconstrained_clocks(netlist, "cynthion", "clk_60") == []
     cells = json.loads(netlist.read_text())["modules"]["cynthion"]["cells"].values()
@@ -134,7 +138,7 @@ def nextpnr_report(fmax: float, out: float, in_: float, through: float, shortest
     ends = [{"cell": "ff", "port": "D", "event": "clk", "delay": [ns, 9]} for ns in (0.5, shortest)]
     nets = [{"event": "clk", "endpoints": ends}, {"event": report.ASYNC, "endpoints": [{**ends[1], "delay": [3, 9]}]}]
     return {
-        "fmax": {"$glbnet$clk_60": {"achieved": fmax}, "osc": {"achieved": 1}},
+        "fmax": {"$glbnet$clk_60": {"achieved": fmax}, "osc": {"achieved": 9, "constraint": 9}},
         "critical_paths": paths,
         "utilization": used,
         "detailed_net_timings": nets,
@@ -183,11 +187,21 @@ def test_the_build_tries_seeds_until_one_does(tmp_path, monkeypatch, capfd):
         build.make(board, 6, tmp_path, [1, 2], "0001")
 
 
+def test_without_a_phy_every_clock_is_judged(tmp_path):
+    path = tmp_path / "report.json"
+    text = nextpnr_report(60.1, 9, 13, 9)
+    path.write_text(json.dumps(text))
+    assert report.timing_problems(report.read(path), 6, report.GATEWARE) == []
+    text["fmax"]["clk_48"] = {"achieved": 47.9, "constraint": 48}
+    path.write_text(json.dumps(text))
+    assert report.timing_problems(report.read(path), 6, report.GATEWARE) == ["clk_48 is too slow"]
+
+
 def test_data_behind_delay_lines_has_time_to_spare():
     """The only pins that nextpnr does not time: the data sheets' figures stand for them."""
     for name in build.boards():
         board = build.load(name)
-        assert min(report.data_spare(board.speed, board.phy).values()) > 0
+        assert all(spare > 0 for spare in report.data_spare(board.speed, board.phy).values())
     assert report.data_spare(6, "USB3300")["data_setup_ns"] == pytest.approx(1e3 / 60 - 5.0 - 1.46)
     assert report.data_spare(8, "USB3343")["data_setup_ns"] == pytest.approx(1e3 / 60 - 6.0 - 5.4 - 1.2)
 

@@ -23,6 +23,7 @@ WIRING = {
     "colorlight_i9": [("P2", "1 2 3 7"), ("P3 first", ROW["both"]), ("P3 second", ROW["both"])]
     + [("P5 first", ROW["both"]), ("P5 second", ROW["first"])],
 }
+WIRING["ulx3s"] = [("gpio 0", " ".join(f"{n}+ {n}-" for n in [*range(11), *range(18, 23)]))]
 WIRING["colorlight_i5"] = WIRING["colorlight_i9"]
 # tick_in and tick_out
 TICKS = {"ecpix5": ("pmod 0", "7 8"), "cynthion": ("mezzanine", "23 24"), "colorlight_i9": ("P2", "8 9")}
@@ -51,11 +52,12 @@ def wrong(board, platform) -> list[str]:
     expected = {**phy, **dict(zip(BUS, lines, strict=False)), "miso": lines[len(BUS) :]}
     expected |= dict(zip(("tick_in", "tick_out"), balls(platform, [TICKS[board.name]]), strict=True))
     found = [port for port, place in expected.items() if board.pins.get(port) != place]
-    leds = board.pins["led_n"]
+    lit = {"led", "led_n"}
+    (leds,) = (board.pins[port] for port in lit if port in board.pins)
     leds = [leds] if isinstance(leds, str) else leds
-    found += ["led_n"] if leds != platform.leds[: len(leds)] else []
+    found += ["LED"] if leds != platform.leds[: len(leds)] else []
     found += ["part"] if board.part != platform.part else []
-    return found + sorted(set(board.pins) - set(expected) - {"led_n"})
+    return found + sorted(set(board.pins) - set(expected) - lit)
 
 
 PLATFORMS = platforms.platforms()
