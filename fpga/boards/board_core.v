@@ -1,4 +1,4 @@
-// What every board with a ULPI PHY has: the bridge, the shim to its PHY, a watchdog on the PHY's clock, and a reset of 16
+// What every board with a ULPI PHY has: the bridge, the shim to its PHY, a watchdog on the PHY's clock, LEDs, and a reset of 16
 // cycles after configuration and after the clock was lost. The pads are the board's own (usb3300_board.v, cynthion.v).
 //
 //   nodes <--> whisker_bridge <-- UTMI --> ulpi_shim <--> pads <--> PHY
@@ -9,7 +9,8 @@
 module board_core #(
     parameter       LANES           = 28,
     parameter [5:0] VENDOR_REGISTER = 6'h00, // of the PHY, see ulpi_shim
-    parameter [7:0] VENDOR_VALUE    = 8'h00
+    parameter [7:0] VENDOR_VALUE    = 8'h00,
+    parameter       BLINK_BITS      = 21     // see status_leds
 ) (
     input  wire             clk,            // 60 MHz, the PHY's
     input  wire             osc,            // of the FPGA itself, see phy_watch
@@ -26,13 +27,14 @@ module board_core #(
     input  wire [LANES-1:0] miso,           // .
     input  wire             tick_in,        // . 0 where a board has no pin for it
     output wire             tick_out,       // .
-    output reg              led             // a run is in progress
+    output wire [3:0]       leds,           // see status_leds
+    output wire             led             // . for a board that has one
 );
     wire [7:0] rx_data, tx_data;
     wire       rx_active, rx_valid, rx_error, tx_valid, tx_ready, vbus_valid, session_valid, session_end, term_select;
     wire [1:0] line_state, xcvr_select, op_mode;
     wire       ready, running, link_busy, transfer_busy, configured, frames_lost, lit;
-    wire       unused = &{1'b0, ready, running, link_busy, transfer_busy, configured, frames_lost};
+    wire       unused = &{1'b0, link_busy, transfer_busy, lit};
 
     // Flip-flops begin at zero when the FPGA has been configured.
     reg  [4:0] awake;
@@ -47,6 +49,10 @@ module board_core #(
     end
 
     phy_watch watch (.osc(osc), .clk(clk), .lost(clock_lost), .phy_reset(ulpi_reset));
+
+    status_leds #(.BITS(BLINK_BITS)) status (
+        .osc(osc), .clock_lost(clock_lost), .ready(ready), .configured(configured), .running(running),
+        .trouble(frames_lost), .leds(leds), .one(led));
 
     ulpi_shim #(.VENDOR_REGISTER(VENDOR_REGISTER), .VENDOR_VALUE(VENDOR_VALUE)) shim (
         .clk(clk), .rst(rst), .ulpi_data_in(ulpi_data_in), .ulpi_data_out(ulpi_data_out),
@@ -65,8 +71,6 @@ module board_core #(
         .serial_number(64'd0), .tick_external(1'b0), .tick_strobe(1'b0), .tick_in(tick_in), .tick_out(tick_out),
         .usb_configured(configured), .frames_lost(frames_lost), .running(running), .link_busy(link_busy),
         .transfer_busy(transfer_busy), .led(lit));
-
-    always @(posedge clk) led <= lit;
 endmodule
 
 `default_nettype wire

@@ -127,15 +127,15 @@ def generate_fs_phy(out: Path) -> Path:
     return path
 
 
-def front(top: str, files: list[Path], lanes: int | None, out: Path) -> list[str]:
+def front(top: str, files: list[Path], parameters: dict[str, int], out: Path) -> list[str]:
     """Yosys commands that read a design and fail on latches, several drivers of a wire, and wires without one."""
     gather(out, *INCLUDES)
     names = gather(out, *files)
-    lanes_set = [f"chparam -set LANES {lanes} {top}"] if lanes else []
+    given = [f"chparam -set {name} {value} {top}" for name, value in parameters.items()]
     return [
         "read_verilog -lib -specify +/lattice/cells_sim_ecp5.v +/lattice/cells_bb_ecp5.v",
         "read_verilog " + " ".join(names),
-        *lanes_set,
+        *given,
         f"hierarchy -check -top {top}",
         "proc",
         "select -assert-none t:$dlatch t:$adlatch t:$dlatchsr t:$sr",
@@ -143,10 +143,10 @@ def front(top: str, files: list[Path], lanes: int | None, out: Path) -> list[str
     ]
 
 
-def synthesise(top: str, files: list[Path], lanes: int | None, out: Path, registers: tuple[str, ...]) -> Path:
+def synthesise(top: str, files: list[Path], parameters: dict[str, int], out: Path, registers: tuple[str, ...]) -> Path:
     """Netlist of `top` for ECP5, `registers` (patterns of Yosys) in the pads' cells."""
     marks = [f"select -assert-any {name}; setattr -set syn_useioff 1 {name}" for name in registers]
-    steps = [*front(top, files, lanes, out), *marks, f"synth_ecp5 -top {top} -json netlist.json"]
+    steps = [*front(top, files, parameters, out), *marks, f"synth_ecp5 -top {top} -json netlist.json"]
     (out / "synth.ys").write_text("\n".join(steps) + "\n")
     must("yosys", "-q", "-s", "synth.ys", log=out / "synth.log")
     agree_on_resets(out / "netlist.json", top)
@@ -185,7 +185,12 @@ def prepare(board: Board, lanes: int, out: Path, serial: str = "0001") -> Path:
     files, registers = sources(generate_usb(out, board, serial)), NODE_REGISTERS + PHY_REGISTERS
     if board.phy == report.GATEWARE:
         files, registers = [*files, generate_fs_phy(out)], NODE_REGISTERS
-    netlist = synthesise(board.top, files, lanes, out, registers)
+    leds = board.pins.get("led_n")
+    parameters = {
+        "LANES": lanes,
+        **({"LEDS": len(leds)} if board.top == "usb3300_board" and isinstance(leds, list) else {}),
+    }
+    netlist = synthesise(board.top, files, parameters, out, registers)
     problems = report.unconstrained_clocks(netlist, board.top, board.clock)
     if problems:
         raise ToolError("; ".join(problems))

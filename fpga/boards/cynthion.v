@@ -20,7 +20,7 @@ module cynthion #(
     input  wire [LANES-1:0] miso,
     input  wire             tick_in,    // pulled down: another bridge's tick_out, a camera, a PPS
     output wire             tick_out,   // to another bridge's tick_in
-    output wire             led_n
+    output wire [3:0]       led_n
 );
     // USB3343: polarity register, D+ and D- swapped, as the board has them
     localparam [5:0] PHY_POLARITY = 6'h39;
@@ -28,10 +28,12 @@ module cynthion #(
 
     wire [7:0] data_in, data_out;
     wire       osc, dir, nxt, ulpi_reset, led;
+    wire [3:0] leds;
+    wire       unused = led;
 
     assign ulpi_clk     = clk_60;
     assign ulpi_reset_n = !ulpi_reset;
-    assign led_n        = !led;
+    assign led_n        = ~leds;
 
     ulpi_pads #(.HOLD_CELLS(0)) pads (
         .clk(clk_60), .ulpi_data(ulpi_data), .ulpi_dir(ulpi_dir), .ulpi_nxt(ulpi_nxt), .data_out(data_out),
@@ -42,7 +44,7 @@ module cynthion #(
     board_core #(.LANES(LANES), .VENDOR_REGISTER(PHY_POLARITY), .VENDOR_VALUE(PHY_SWAPPED)) core (
         .clk(clk_60), .osc(osc), .ulpi_data_in(data_in), .ulpi_data_out(data_out), .ulpi_dir(dir), .ulpi_nxt(nxt),
         .ulpi_stp(ulpi_stp), .ulpi_reset(ulpi_reset), .sync(sync), .sck(sck), .select_n(select_n), .mosi(mosi),
-        .miso(miso), .tick_in(tick_in), .tick_out(tick_out), .led(led));
+        .miso(miso), .tick_in(tick_in), .tick_out(tick_out), .leds(leds), .led(led));
 endmodule
 
 `default_nettype wire

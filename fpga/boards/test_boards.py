@@ -82,7 +82,7 @@ def test_what_a_board_has_not_is_refused():
 def checked(tmp_path: Path, text: str) -> str:
     source = tmp_path / "top.v"
     source.write_text(text)
-    (tmp_path / "check.ys").write_text("\n".join(build.front("top", [source], None, tmp_path)) + "\n")
+    (tmp_path / "check.ys").write_text("\n".join(build.front("top", [source], {}, tmp_path)) + "\n")
     return must("yosys", "-q", "-s", "check.ys", log=tmp_path / "check.log")
 
 
@@ -105,7 +105,7 @@ def test_the_bridge_synthesises_clean_with_one_clock(tmp_path):
     netlist = build.synthesise(
         "cynthion",
         build.sources(build.generate_usb(tmp_path, build.load("cynthion"))),
-        lanes,
+        {"LANES": lanes},
         tmp_path,
         build.NODE_REGISTERS + build.PHY_REGISTERS,
     )

@@ -19,15 +19,15 @@ module ulx3s #(
     input  wire [LANES-1:0] miso,
     input  wire             tick_in,  // pulled down: another bridge's tick_out, a camera, a PPS
     output wire             tick_out, // to another bridge's tick_in
-    output reg              led
+    output wire [3:0]       led
 );
-    wire       clk_60, clk_48, locked, lit;
+    wire       clk_60, clk_48, locked, osc, lit, one;
     wire       d_p_in, d_p_out, d_p_oe, d_n_in, d_n_out, d_n_oe;
     wire [7:0] rx_data, tx_data;
     wire       rx_active, rx_valid, rx_error, tx_valid, tx_ready, term_select;
     wire [1:0] line_state, xcvr_select, op_mode;
-    wire       running, link_busy, transfer_busy, configured, lost;
-    wire       unused = &{1'b0, running, link_busy, transfer_busy, configured, lost};
+    wire       running, link_busy, transfer_busy, configured, frames_lost;
+    wire       unused = &{1'b0, link_busy, transfer_busy, lit, one};
 
     // 25 MHz / 5 * 12 * 8 = 480 MHz, over 8 and over 10
     (* keep *) EHXPLLL #(
@@ -41,13 +41,18 @@ module ulx3s #(
     reg  [4:0] awake;
     reg  [1:0] stable;
     wire       rst = !awake[4];
-    initial {awake, stable, led} = 8'd0;
+    initial {awake, stable} = 7'd0;
     always @(posedge clk_60) begin
         stable <= {stable[0], locked};
-        led    <= lit;
         if (!stable[1]) awake <= 5'd0;
         else if (rst) awake <= awake + 5'd1;
     end
+
+    (* keep *) OSCG #(.DIV(128)) oscillator (.OSC(osc));
+
+    status_leds status (
+        .osc(osc), .clock_lost(!locked), .ready(!rst), .configured(configured), .running(running), .trouble(frames_lost),
+        .leds(led), .one(one));
 
     BB d_p_pad (.B(usb_d_p), .I(d_p_out), .T(!d_p_oe), .O(d_p_in));
     BB d_n_pad (.B(usb_d_n), .I(d_n_out), .T(!d_n_oe), .O(d_n_in));
@@ -66,7 +71,7 @@ module ulx3s #(
         .utmi_vbus_valid(1'b1), .utmi_session_valid(1'b1), .utmi_session_end(1'b0),
         .utmi_xcvr_select(xcvr_select), .utmi_term_select(term_select), .utmi_op_mode(op_mode),
         .serial_number(64'd0), .tick_external(1'b0), .tick_strobe(1'b0), .tick_in(tick_in), .tick_out(tick_out),
-        .usb_configured(configured), .frames_lost(lost), .running(running), .link_busy(link_busy),
+        .usb_configured(configured), .frames_lost(frames_lost), .running(running), .link_busy(link_busy),
         .transfer_busy(transfer_busy), .led(lit));
 endmodule
 

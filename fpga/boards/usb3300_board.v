@@ -3,7 +3,9 @@
 `default_nettype none
 
 module usb3300_board #(
-    parameter LANES = 28
+    parameter LANES      = 28,
+    parameter LEDS       = 1,  // 1 or 4
+    parameter BLINK_BITS = 21
 ) (
     input  wire             clk_60,     // the PHY's CLKOUT
     inout  wire [7:0]       ulpi_data,
@@ -18,12 +20,14 @@ module usb3300_board #(
     input  wire [LANES-1:0] miso,
     input  wire             tick_in,    // pulled down: another bridge's tick_out, a camera, a PPS
     output wire             tick_out,   // to another bridge's tick_in
-    output wire             led_n
+    output wire [LEDS-1:0]  led_n
 );
     wire [7:0] data_in, data_out;
     wire       osc, dir, nxt, led;
+    wire [3:0] leds;
+    wire       unused = LEDS == 1 ? &leds : led;
 
-    assign led_n = !led;
+    assign led_n = LEDS == 1 ? {LEDS{!led}} : ~leds[LEDS-1:0];
 
     ulpi_pads pads (
         .clk(clk_60), .ulpi_data(ulpi_data), .ulpi_dir(ulpi_dir), .ulpi_nxt(ulpi_nxt), .data_out(data_out),
@@ -31,10 +35,10 @@ module usb3300_board #(
 
     (* keep *) OSCG #(.DIV(128)) oscillator (.OSC(osc));
 
-    board_core #(.LANES(LANES)) core (
+    board_core #(.LANES(LANES), .BLINK_BITS(BLINK_BITS)) core (
         .clk(clk_60), .osc(osc), .ulpi_data_in(data_in), .ulpi_data_out(data_out), .ulpi_dir(dir), .ulpi_nxt(nxt),
         .ulpi_stp(ulpi_stp), .ulpi_reset(ulpi_reset), .sync(sync), .sck(sck), .select_n(select_n), .mosi(mosi),
-        .miso(miso), .tick_in(tick_in), .tick_out(tick_out), .led(led));
+        .miso(miso), .tick_in(tick_in), .tick_out(tick_out), .leds(leds), .led(led));
 endmodule
 
 `default_nettype wire

@@ -16,24 +16,32 @@ module board_bench (
     output wire        select_n,
     output wire        mosi,
     input  wire [27:0] miso,
-    output wire        led          // 1: lit
+    output wire [3:0]  leds,        // 1: lit; see status_leds
+    output wire        led          // the only one of a board that has one
 );
     wire [7:0] data;
-    wire       led_n, tick_out;
+    wire       tick_out;
 
     assign data      = dir ? phy_data : 8'hzz;
     assign link_data = data;
-    assign led       = !led_n;
 
 `ifdef BOARD_CYNTHION
-    wire reset_n, phy_clk;
+    wire       reset_n, phy_clk;
+    wire [3:0] led_n;
 
     assign reset = !reset_n;
+    assign leds  = ~led_n;
+    assign led   = 1'b0;
 
     cynthion #(.LANES(28)) board (
         .clk_60(clk), .ulpi_clk(phy_clk), .ulpi_reset_n(reset_n),
 `else
-    usb3300_board #(.LANES(28)) board (
+    wire led_n;
+
+    assign leds = board.core.leds;
+    assign led  = !led_n;
+
+    usb3300_board #(.LANES(28), .BLINK_BITS(8)) board (
         .clk_60(clk), .ulpi_reset(reset),
 `endif
         .ulpi_data(data), .ulpi_dir(dir), .ulpi_nxt(nxt), .ulpi_stp(stp), .sync(sync), .sck(sck), .select_n(select_n),

@@ -42,9 +42,14 @@ void BoardDevice::hang()
     hangs_ = true;
 }
 
+uint8_t BoardDevice::leds() const
+{
+    return outputs_.leds;
+}
+
 bool BoardDevice::led() const
 {
-    return led_;
+    return outputs_.led;
 }
 
 uint64_t BoardDevice::resets() const
@@ -131,7 +136,7 @@ void BoardDevice::take(const BoardOutputs &outputs, bool dir)
         anew.late = PHY_START;
         phy_ = UlpiPhy(anew);
     }
-    led_ = outputs.led;
+    outputs_ = outputs;
 }
 
 // Inputs settle with the clock low, outputs are read as they stand at the rising edge, then the edge comes. A PHY in

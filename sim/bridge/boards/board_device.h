@@ -28,6 +28,7 @@ struct BoardInputs {
 struct BoardOutputs {
     uint8_t link_data = 0, link_drives = 0;
     bool stp = false, reset = false, sync = false, sck = false, select_n = true, mosi = false, led = false;
+    uint8_t leds = 0;
 };
 
 // The Verilated top behind one interface.
@@ -53,7 +54,8 @@ class BoardDevice : public Board
     // The PHY's clock stops until the PHY is reset.
     void hang();
 
-    bool led() const override;
+    uint8_t leds() const override;
+    bool led() const;        // of a board that has one
     uint64_t resets() const; // of the PHY: times its reset pin became active
     bool bus_is_idle() const override;
 
@@ -73,7 +75,7 @@ class BoardDevice : public Board
     UlpiPhy phy_;
     BoardInputs inputs_;
     Levels levels_{}; // of the board's outputs, as PHY and nodes see them
-    bool led_ = false;
+    BoardOutputs outputs_;
     bool hangs_ = false;
     bool busy_ = false; // select is low
     uint64_t resets_ = 0;

@@ -23,7 +23,7 @@ template <typename Model> class Verilated : public BoardTop
         model_.miso = in.miso;
         model_.eval();
         return {model_.link_data, model_.link_drives,   model_.stp != 0,  model_.reset != 0, model_.sync != 0,
-                model_.sck != 0,  model_.select_n != 0, model_.mosi != 0, model_.led != 0};
+                model_.sck != 0,  model_.select_n != 0, model_.mosi != 0, model_.led != 0,   model_.leds};
     }
 
   private:

@@ -13,6 +13,7 @@ namespace
 
 constexpr uint64_t UNITS = 4;                       // of 240 MHz in a cycle of 60 MHz
 constexpr uint64_t SAMPLING = 5, SAMPLING_HIGH = 2; // in one of 48 MHz
+constexpr uint64_t OSCILLATOR_HALF = 50;            // 2.4 MHz
 constexpr uint32_t ALL_LANES = UINT32_MAX >> (32 - LANES);
 
 } // namespace
@@ -27,9 +28,9 @@ FullSpeedBoard::FullSpeedBoard(NodeBus &nodes, bool swapped)
 
 FullSpeedBoard::~FullSpeedBoard() = default;
 
-bool FullSpeedBoard::led() const
+uint8_t FullSpeedBoard::leds() const
 {
-    return top_->led;
+    return top_->leds;
 }
 
 bool FullSpeedBoard::bus_is_idle() const
@@ -43,6 +44,7 @@ void FullSpeedBoard::edges()
     auto &root = *top_->rootp;
     for (uint64_t unit = 0; unit < UNITS; unit++, units_++) {
         root.ulx3s_bench__DOT__board__DOT__pll__DOT__CLKOP = unit < UNITS / 2;
+        root.ulx3s_bench__DOT__board__DOT__oscillator__DOT__OSC = units_ / OSCILLATOR_HALF % 2 != 0;
         root.ulx3s_bench__DOT__board__DOT__pll__DOT__CLKOS = units_ % SAMPLING < SAMPLING_HIGH;
         top_->eval();
     }

@@ -23,7 +23,7 @@ class FullSpeedBoard : public Board
 
     // Throws std::runtime_error when host and device drive the cable at once.
     void cycle() override;
-    bool led() const override;
+    uint8_t leds() const override;
     bool bus_is_idle() const override;
 
   private:

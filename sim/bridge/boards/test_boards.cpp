@@ -19,6 +19,7 @@ namespace
 
 constexpr uint64_t MS = 60000;                               // cycles
 constexpr uint64_t PATIENCE = 8 * WHISKER_LIMIT_TICK_PERIOD; // cycles without a frame
+constexpr uint64_t LED_DELAY = 200;
 constexpr uint8_t BULK = WHISKER_LIMIT_USB_BULK_IN & 0xF;
 constexpr size_t FULL_SPEED_PACKET = 64;
 unsigned faults = 3; // of each board
@@ -77,26 +78,38 @@ class Trial
             return control_transfer(host_, request, data);
         };
         require(host_.reset(speed_), "no device after a reset");
+        tells(LED_PHY);
         if (!configure(transfer, descriptors, error)) {
             throw std::runtime_error(error);
         }
+    }
+    void begin()
+    {
+        check_.expect_start(true);
+        control(1);
+    }
+    // What the LEDs show; they follow within some cycles of the oscillator.
+    void tells(uint8_t leds)
+    {
+        host_.idle(LED_DELAY);
+        require(board_->leds() == leds, "the LEDs tell something else");
     }
     // A run, begun and ended; throws std::runtime_error with what is wrong.
     void runs()
     {
         require(board_->bus_is_idle(), "the nodes' lines are not idle before a run");
-        require(!board_->led(), "the LED is lit before a run");
-        check_.expect_start(true);
-        control(1);
+        tells(LED_PHY | LED_CONFIGURED);
+        begin();
         while (check_.frames() < ticks) {
             read();
         }
-        require(board_->led(), "the LED is dark in a run");
+        tells(LED_PHY | LED_CONFIGURED | LED_RUN);
         hears_orders();
         control(0);
         while (!check_.ended()) {
             read();
         }
+        tells(LED_PHY | LED_CONFIGURED);
         require(host_.counters().unexplained == 0, "transactions went wrong");
     }
 
@@ -208,10 +221,44 @@ void a_phy_whose_clock_hangs_is_reset(void **)
         trial.with_phy().cycle();
     }
     assert_int_equal(trial.with_phy().resets(), 1);
+    assert_int_equal(trial.with_phy().leds(), LED_ERROR);
     trial.host().idle(MS);
     trial.enumerated();
     trial.runs();
     assert_int_equal(trial.with_phy().resets(), 1);
+}
+
+// Changes and lit cycles of the only LED, in a time that holds several of its slow blinks.
+std::pair<unsigned, unsigned> watched(BoardDevice &board)
+{
+    constexpr unsigned BLINKS = 4, SLOW = 256 * 25; // cycles: 2^8 of the oscillator's
+    unsigned changes = 0, lit = 0;
+    bool before = board.led();
+    for (unsigned i = 0; i < BLINKS * SLOW; i++) {
+        board.cycle();
+        changes += board.led() != before;
+        lit += board.led();
+        before = board.led();
+    }
+    return {changes, lit * 16 / (BLINKS * SLOW)};
+}
+
+// Changes in four slow blinks, and sixteenths of the time in which it is lit.
+void one_led_tells_all(void **)
+{
+    Trial trial(BOARDS[0], {});
+    BoardDevice &board = trial.with_phy();
+    trial.host().idle(MS);
+    assert_true(watched(board) == std::make_pair(8u, 1u)); // flashes: the PHY is set up
+    trial.enumerated();
+    assert_true(watched(board) == std::make_pair(8u, 8u)); // blinks: configured
+    trial.begin();
+    assert_true(watched(board) == std::make_pair(0u, 16u)); // lit: a run
+    board.hang();
+    trial.host().idle(MS);
+    const auto [changes, lit] = watched(board); // blinks fast: error
+    assert_in_range(changes, 60, 68);
+    assert_in_range(lit, 7, 8);
 }
 
 void every_fault_is_noticed(void **)
@@ -247,6 +294,7 @@ int main(int argc, char **argv)
     const CMUnitTest tests[] = {
         cmocka_unit_test(every_board_enumerates_and_runs),
         cmocka_unit_test(a_phy_whose_clock_hangs_is_reset),
+        cmocka_unit_test(one_led_tells_all),
         cmocka_unit_test(every_fault_is_noticed),
     };
     return cmocka_run_group_tests(tests, nullptr, nullptr);

@@ -14,7 +14,7 @@ module ulx3s_bench (
     output wire        select_n,
     output wire        mosi,
     input  wire [27:0] miso,
-    output wire        led
+    output wire [3:0]  leds
 );
     wire d_p, d_n, tick_out;
 
@@ -26,7 +26,7 @@ module ulx3s_bench (
 
     ulx3s #(.LANES(28)) board (
         .clk_25(1'b0), .usb_d_p(d_p), .usb_d_n(d_n), .usb_pull_up(pull_up), .sync(sync), .sck(sck), .select_n(select_n),
-        .mosi(mosi), .miso(miso), .tick_in(1'b0), .tick_out(tick_out), .led(led));
+        .mosi(mosi), .miso(miso), .tick_in(1'b0), .tick_out(tick_out), .led(leds));
 endmodule
 
 `default_nettype wire
