@@ -23,6 +23,7 @@ INCLUDES = (REPO / "fpga/bridge_rtl/crc8.vh", REPO / "protocol/gen/whisker_proto
 # nodes' lines, and behind a delay line it would not be timed.
 NODE_REGISTERS = ("*lane_receiver*/w:sampled",)
 NODE_REGISTERS += tuple(f"node_link/w:{name}" for name in ("sync", "sck", "select_n", "mosi"))
+NODE_REGISTERS += ("tick_generator/w:tick_out", "tick_input/w:pin")
 PHY_REGISTERS = tuple(f"*ulpi_shim*/w:{name}" for name in ("ulpi_data_out", "ulpi_stp", "data"))
 
 

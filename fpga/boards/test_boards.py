@@ -113,7 +113,7 @@ def test_the_bridge_synthesises_clean_with_one_clock(tmp_path):
     cells = json.loads(netlist.read_text())["modules"]["cynthion"]["cells"].values()
     assert not any("LATCH" in cell["type"].upper() for cell in cells)
     pads = [cell for cell in cells if "syn_useioff" in cell["attributes"]]
-    assert len(pads) == 8 + 8 + 1 + lanes + 4  # data out and in, stp, MISO, the nodes' bus
+    assert len(pads) == 8 + 8 + 1 + lanes + 4 + 2  # data out and in, stp, MISO, the nodes' bus, ticks
     assert {cell["parameters"]["SRMODE"] for cell in pads} == {"LSR_OVER_CE"}
 
 

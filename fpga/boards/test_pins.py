@@ -28,6 +28,7 @@ WIRING["colorlight_i5"] = WIRING["colorlight_i9"]
 # tick_in and tick_out
 TICKS = {"ecpix5": ("pmod 0", "7 8"), "cynthion": ("mezzanine", "23 24"), "colorlight_i9": ("P2", "8 9")}
 TICKS["colorlight_i5"] = TICKS["colorlight_i9"]
+TICKS["ulx3s"] = ("gpio 0", "23+ 23-")
 # Where the PHY is a module, its lines lie on a socket too.
 MODULE = {
     "ulpi_data": [("P4 first", "1 2 3 7 8 9 10"), ("P4 second", "3")],

@@ -39,11 +39,14 @@ module service_store (
 
     wire room = (sck_divider <= LIMIT_SCK_DIVIDER_DEFAULT[5:0]) && (word_gap <= LIMIT_WORD_GAP_DEFAULT[7:0])
              && (tick_period >= LIMIT_SERVICE_TICK_MIN);
+    reg  had_room;  // a cycle ago: the report takes longer, and the answer to it is the longest way there is
     wire first = (write_index == 6'd0);
     wire take  = write_valid && (first ? write_data == REPORT_ID_SERVICE[7:0] && !pending : ours);
 
-    assign write_accept = ours && version && (length == REPORT_SERVICE_BYTES[6:0]) && room && !pending;
+    assign write_accept = ours && version && (length == REPORT_SERVICE_BYTES[6:0]) && had_room && !pending;
     assign due          = pending && room;
+
+    always @(posedge clk) had_room <= room;
 
     always @(posedge clk)
         if (take) memory[write_index] <= write_data;
