@@ -31,6 +31,10 @@ static void print_help(const struct whisker_settings *defaults)
         "  --sck-divider N     cycles of 60 MHz of one SCK period (%u)\n"
         "  --word-gap N        cycles of 60 MHz between two 16-bit words (%u)\n"
         "  --sample-point N    cycles of 60 MHz from shifting to sampling (%u)\n"
+        "  --tick-in EDGE      ticks begin with the rising or the falling edges of the bridge's pin tick_in, a\n"
+        "                      tick period apart: another bridge's tick_out, a camera, a PPS\n"
+        "  --every-frame       the bridge sends each frame at once instead of two in a packet\n"
+        "  --pattern           records of the bridge's own in place of the nodes': proves FPGA, FIFO and USB\n"
         "  --verbose           tell also what goes well\n"
         "  --help              this text\n\n"
         "SIGUSR1: statistics to the log, as at the end. SIGUSR2: who the nodes are and what they counted, likewise.\n"
@@ -64,6 +68,17 @@ static bool set_number(struct daemon_options *options, const char *name, const c
     return true;
 }
 
+static bool set_tick_in(struct whisker_settings *settings, const char *edge)
+{
+    const bool falling = !strcmp(edge, "falling");
+    if (!falling && strcmp(edge, "rising") != 0) {
+        fprintf(stderr, DAEMON_PROGRAM ": --tick-in %s: give rising or falling\n", edge);
+        return false;
+    }
+    settings->options |= WHISKER_OPTION_TICK_IN | (falling ? WHISKER_OPTION_FALLING : 0);
+    return true;
+}
+
 static bool set_word(struct daemon_options *options, int option, const char *text)
 {
     switch (option) {
@@ -83,6 +98,14 @@ static bool set_word(struct daemon_options *options, int option, const char *tex
         return options->replace = true;
     case 'v':
         return options->verbose = true;
+    case 'e':
+        options->settings.options |= WHISKER_OPTION_EVERY_FRAME;
+        return true;
+    case 'p':
+        options->settings.options |= WHISKER_OPTION_PATTERN;
+        return true;
+    case 't':
+        return set_tick_in(&options->settings, text);
     default:
         return false;
     }
@@ -115,6 +138,9 @@ int daemon_options_parse(int argc, char **argv, struct daemon_options *options)
         {"word-gap", required_argument, NULL, NUMBER},
         {"sample-point", required_argument, NULL, NUMBER},
         {"batch", required_argument, NULL, NUMBER},
+        {"tick-in", required_argument, NULL, 't'},
+        {"every-frame", no_argument, NULL, 'e'},
+        {"pattern", no_argument, NULL, 'p'},
         {"list", no_argument, NULL, 'l'},
         {"wait", no_argument, NULL, 'w'},
         {"once", no_argument, NULL, 'o'},

@@ -8,6 +8,7 @@
 #include "daemon_log.h"
 #include "daemon_nodes.h"
 #include "daemon_notify.h"
+#include "whisker/errors.h"
 #include "whisker_protocol.h"
 
 /* How often readers are told clock mapping and statistics. */
@@ -49,6 +50,8 @@ void daemon_stream_begin(struct daemon_stream *stream, bool first)
     whisker_decoder_init(decoder);
     decoder->counts = counts;
     decoder->mark = first ? 0 : WHISKER_FRAME_GAP;
+    stream->ticks = (struct whisker_timing){0};
+    stream->ticks_told = 0;
     stream->last_seen = false;
 }
 
@@ -92,6 +95,25 @@ static void tell_damage(struct daemon_stream *stream)
     }
 }
 
+/* What is wrong with the pin that the ticks come from: each kind once in a run, with the counts. */
+static void tell_ticks(struct daemon_stream *stream)
+{
+    struct whisker_timing now;
+    if (!stream->device || !(stream->options->settings.options & WHISKER_OPTION_TICK_IN) ||
+        whisker_device_timing(stream->device, &now) != WHISKER_OK) {
+        return;
+    }
+    const int error = whisker_timing_judge(&stream->ticks, &now);
+    const uint32_t bit = error ? UINT32_C(1) << (WHISKER_ERROR_TICK_IN_SILENT - error) : 0;
+    stream->ticks = now;
+    if (bit & ~stream->ticks_told) {
+        stream->ticks_told |= bit;
+        daemon_log_error(LOG_WARN, "tick_in", error);
+        daemon_log(LOG_NOTE, "tick_in: %u edges taken, %u early, %u uneven, %u silences; shortest distance %u cycles",
+                   now.edges, now.early, now.uneven, now.silent, now.shortest);
+    }
+}
+
 void daemon_stream_tell(struct daemon_stream *stream)
 {
     struct whisker_clock clock;
@@ -109,6 +131,7 @@ void daemon_stream_keep_house(struct daemon_stream *stream)
     if (left_ms <= 0 || left_ms > TELL_MS) { /* more: the clock went back */
         stream->tell_at_ms = cli_now_ms() + TELL_MS;
         daemon_stream_tell(stream);
+        tell_ticks(stream);
     }
     if (report_wanted) {
         report_wanted = 0;

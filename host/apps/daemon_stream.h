@@ -18,6 +18,8 @@ struct daemon_stream {
     struct whisker_clock_fit clock;
     struct daemon_stats stats;
     int64_t tell_at_ms;
+    struct whisker_timing ticks; /* of tick_in, when last asked for */
+    uint32_t ticks_told;         /* bit n: error TICK_IN_SILENT - n of this run is in the log */
     bool last_seen;
     bool damage_told;
 };

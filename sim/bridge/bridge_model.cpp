@@ -45,6 +45,16 @@ void BridgeModel::start_tick()
     top_->tick_strobe = 0;
 }
 
+void BridgeModel::tick_by_itself()
+{
+    top_->tick_external = 0;
+}
+
+bool BridgeModel::sync() const
+{
+    return top_->sync;
+}
+
 bool BridgeModel::link_busy() const
 {
     return top_->link_busy;

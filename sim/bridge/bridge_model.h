@@ -20,12 +20,16 @@ class BridgeModel : public UtmiDevice
 
     void cycle() override;
 
+    // From now on ticks are the bridge's own, every tick_period, as on a board; else they are start_tick()'s.
+    void tick_by_itself();
+
     // As after power came: registers, FIFO and USB device begin anew.
     void reset();
 
     // Begins a tick: one cycle of the external tick strobe.
     void start_tick();
 
+    bool sync() const;               // the pin
     bool link_busy() const;          // SYNC and transfer on the node link in progress
     bool running() const;            // from start until the last frame is in the FIFO
     uint32_t frames_dropped() const; // since start

@@ -57,7 +57,8 @@ void check_records(const uint8_t *at, uint64_t number)
 
 } // namespace
 
-FrameCheck::FrameCheck(std::function<void(const CheckedFrame &)> on_frame) : on_frame_(std::move(on_frame))
+FrameCheck::FrameCheck(std::function<void(const CheckedFrame &)> on_frame, uint32_t tick_period)
+    : on_frame_(std::move(on_frame)), tick_period_(tick_period)
 {
 }
 
@@ -105,7 +106,7 @@ void FrameCheck::check_order(const CheckedFrame &frame)
     require(!ended_, frames_, "comes after the last frame of its run");
     require(frame.tick == next_tick_, frames_,
             "is tick " + std::to_string(frame.tick) + " instead of " + std::to_string(next_tick_));
-    require(frame.time == uint64_t{WHISKER_LIMIT_TICK_PERIOD} * frame.tick, frames_, "has a wrong time");
+    require(frame.time == uint64_t{tick_period_} * frame.tick, frames_, "has a wrong time");
     require(!sequence_known_ || frame.sequence == next_sequence_, frames_,
             "has sequence " + std::to_string(frame.sequence) + " instead of " + std::to_string(next_sequence_));
     require(frame.dropped == 0, frames_, "reports dropped frames");

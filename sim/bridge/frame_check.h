@@ -32,8 +32,9 @@ struct CheckedFrame {
 class FrameCheck
 {
   public:
-    // on_frame: called with every frame that passes.
-    explicit FrameCheck(std::function<void(const CheckedFrame &)> on_frame);
+    // on_frame: called with every frame that passes. tick_period: cycles from tick to tick.
+    explicit FrameCheck(std::function<void(const CheckedFrame &)> on_frame,
+                        uint32_t tick_period = WHISKER_LIMIT_TICK_PERIOD);
 
     // The next bytes of the stream. Throws std::runtime_error with one line that names the frame and what is wrong.
     void take(const Bytes &bytes);
@@ -51,6 +52,7 @@ class FrameCheck
     void check_order(const CheckedFrame &frame);
 
     std::function<void(const CheckedFrame &)> on_frame_;
+    uint32_t tick_period_;
     Bytes pending_;
     uint64_t frames_ = 0;
     uint32_t next_tick_ = 0;

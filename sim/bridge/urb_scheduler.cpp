@@ -21,7 +21,9 @@ constexpr uint64_t NAK_REST_CYCLES = 64;
 constexpr uint8_t HID_SET_REPORT_TYPE = 0x21;
 constexpr uint8_t HID_SET_REPORT = 0x09;
 constexpr uint16_t HID_FEATURE = 0x0300;
-constexpr uint8_t SET_CONFIGURATION = 9;
+constexpr uint8_t SET_CONFIGURATION = 9, CLEAR_FEATURE = 1, SET_FEATURE = 3, SET_INTERFACE = 11;
+constexpr uint8_t INTERFACE_TYPE = 0x01, ENDPOINT_TYPE = 0x02;
+constexpr uint16_t ENDPOINT_HALT = 0;
 constexpr uint8_t GET_STATUS_TYPE = 0x80;
 
 } // namespace
@@ -159,15 +161,30 @@ void UrbScheduler::run_control(Urb &urb)
     urb.status = outcome_errno(rig_.control(urb.setup, urb.data));
     if (urb.status == 0) {
         watch_run(urb);
+        watch_halt(urb.setup);
     }
     if (urb.setup.type == 0 && urb.setup.request == SET_CONFIGURATION) {
         start_afresh();
     }
 }
 
+void UrbScheduler::watch_halt(const SetupRequest &setup)
+{
+    const bool feature =
+        setup.type == ENDPOINT_TYPE && setup.value == ENDPOINT_HALT && setup.index == WHISKER_LIMIT_USB_BULK_IN;
+    const bool interface = setup.type == INTERFACE_TYPE && setup.request == SET_INTERFACE &&
+                           setup.index == WHISKER_LIMIT_USB_BULK_INTERFACE;
+    if (feature && setup.request == SET_FEATURE) {
+        halted_ = true;
+    } else if (interface || (feature && setup.request == CLEAR_FEATURE)) {
+        halted_ = false;
+    }
+}
+
 // A bus reset or a new configuration ends the bridge's run, and the kernel ends what waits on the other endpoints.
 void UrbScheduler::start_afresh()
 {
+    halted_ = false;
     rig_.forget_frames();
     end_all({&bulk_, &interrupt_}, -ESHUTDOWN);
 }
@@ -209,7 +226,7 @@ bool UrbScheduler::step_bulk()
     if (bulk_.empty() || away_) {
         return false;
     }
-    return rig_.bulk_packet_due() ? receive_packet() : futile_poll();
+    return halted_ || rig_.bulk_packet_due() ? receive_packet() : futile_poll();
 }
 
 bool UrbScheduler::receive_packet()

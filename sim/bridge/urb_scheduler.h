@@ -67,6 +67,7 @@ class UrbScheduler
     bool step_interrupt();
     void run_control(Urb &urb);
     void watch_run(const Urb &urb);
+    void watch_halt(const SetupRequest &setup);
     void bus_reset(Urb &urb);
     void complete(std::deque<Urb> &queue, int status);
     void end_all(std::initializer_list<std::deque<Urb> *> queues, int status);
@@ -84,6 +85,7 @@ class UrbScheduler
     Bytes packet_;
     unsigned bulk_naks_ = 0; // in a row while a packet was due
     unsigned storm_left_ = 0;
+    bool halted_ = false; // the bulk endpoint, by the host's own request: it answers without a frame, too
     bool interrupt_due_ = false;
     bool away_ = false;
     bool stop_seen_ = false;

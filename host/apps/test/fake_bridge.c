@@ -1,5 +1,6 @@
 /*
  * A bridge for whiskerd's tests. WHISKER_FAKE says what is the matter with it: access, busy, gone, version, lanes; or
+ * with its pin tick_in: silent, fast; or
  * with the host's clock: realtime, monotonic go back by an hour. It sends 4000 frames, ends the daemon, and sends the
  * last frame.
  */
@@ -67,5 +68,7 @@ __attribute__((constructor)) static void choose(void)
     } else if (!strcmp(what, "lanes")) {
         fake.identity[WHISKER_REPORT_IDENTITY_LANES] = WHISKER_LIMIT_LANES - 1;
     }
+    fake.timing[WHISKER_REPORT_TIMING_SILENT] = !strcmp(what, "silent");
+    fake.timing[WHISKER_REPORT_TIMING_EARLY] = !strcmp(what, "fast");
     clock_set = !strcmp(what, "realtime") ? CLOCK_REALTIME : !strcmp(what, "monotonic") ? CLOCK_MONOTONIC : -1;
 }

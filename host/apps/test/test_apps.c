@@ -156,6 +156,26 @@ static void a_host_clock_that_goes_back_is_told_and_nothing_is_lost(void **state
     }
 }
 
+static void what_is_wrong_with_tick_in_is_told_once(void **state)
+{
+    (void)state;
+    const char *words[] = {WHISKERD_FAKE, "--ring", ring_name(), "--tick-in", "rising", NULL};
+    static const char *const told[][2] = {
+        {"silent",
+         "whiskerd: tick_in: no edge comes at the bridge's pin tick_in, so there are no ticks; check the wire"},
+        {"fast", "whiskerd: tick_in: edges come at tick_in less than 7/8 of the tick period after the last: they are"}};
+    for (size_t i = 0; i < 2; i++) {
+        setenv("WHISKER_FAKE", told[i][0], 1);
+        assert_int_equal(finish(start(words)), 0);
+        const char *line = strstr(content("out"), told[i][1]);
+        assert_non_null(line);
+        assert_null(strstr(line + 1, told[i][1]));
+    }
+    words[3] = NULL; /* ticks of its own: the pin does not matter */
+    assert_int_equal(finish(start(words)), 0);
+    assert_null(strstr(content("out"), "tick_in"));
+}
+
 static void wrong_use_is_refused_in_one_line(void **state)
 {
     (void)state;
@@ -165,6 +185,8 @@ static void wrong_use_is_refused_in_one_line(void **state)
     assert_refused(odd, 2, "the SCK divider is 7; it must be even, 6 to 32");
     const char *lane_29[] = {WHISKERD, "--ring", "x", "--lane-mask", "0x10000000", NULL};
     assert_refused(lane_29, 2, "the lane mask 0x10000000 names more than lanes 0 to 27; use bits of 0xfffffff");
+    const char *edge[] = {WHISKERD, "--ring", "x", "--tick-in", "both", NULL};
+    assert_refused(edge, 2, "--tick-in both: give rising or falling");
     const char *rubbish[] = {WHISKERD, "--ring", "x", "--word-gap", "3us", NULL};
     assert_refused(rubbish, 2, "--word-gap 3us: give a whole number from 0 to 255");
     const char *behind_zero[] = {WHISKERD, "--ring", "x", "--word-gap", " -18446744073709551615", NULL};
@@ -441,6 +463,7 @@ int main(void)
         cmocka_unit_test(daemon_without_a_bridge_fails_in_one_line),
         cmocka_unit_test(bridges_that_cannot_be_used_are_told_in_one_line),
         cmocka_unit_test(a_host_clock_that_goes_back_is_told_and_nothing_is_lost),
+        cmocka_unit_test(what_is_wrong_with_tick_in_is_told_once),
         cmocka_unit_test(wrong_use_is_refused_in_one_line),
         cmocka_unit_test(help_has_an_example),
         cmocka_unit_test(log_without_a_ring_fails_in_one_line),

@@ -69,6 +69,9 @@ int control_parse_identity(const uint8_t *bytes, struct whisker_identity *identi
         .clock_hz = whisker_get_u32(bytes + WHISKER_REPORT_IDENTITY_CLOCK_HZ),
         .frame_bytes = whisker_get_u16(bytes + WHISKER_REPORT_IDENTITY_FRAME_BYTES),
         .fifo_bytes = whisker_get_u16(bytes + WHISKER_REPORT_IDENTITY_FIFO_BYTES),
+        .board = bytes[WHISKER_REPORT_IDENTITY_BOARD],
+        .wired_lanes = bytes[WHISKER_REPORT_IDENTITY_WIRED_LANES],
+        .build = whisker_get_u16(bytes + WHISKER_REPORT_IDENTITY_BUILD),
     };
     if (identity->wire_version != WHISKER_WIRE_VERSION) {
         return WHISKER_ERROR_WIRE_VERSION;
@@ -86,6 +89,7 @@ int control_run(hid_device *hid, const struct whisker_settings *settings, bool r
     bytes[WHISKER_REPORT_CONTROL_SCK_DIVIDER] = settings->sck_divider;
     bytes[WHISKER_REPORT_CONTROL_WORD_GAP] = settings->word_gap;
     bytes[WHISKER_REPORT_CONTROL_SAMPLE_POINT] = settings->sample_point;
+    bytes[WHISKER_REPORT_CONTROL_OPTIONS] = settings->options;
     whisker_put_u32(bytes + WHISKER_REPORT_CONTROL_LANE_MASK, settings->lane_mask);
     whisker_put_u32(bytes + WHISKER_REPORT_CONTROL_TICK_PERIOD, settings->tick_period);
     return hid_send_feature_report(hid, bytes, sizeof bytes) < 0 ? WHISKER_ERROR_DEVICE_REFUSED : WHISKER_OK;
@@ -128,6 +132,37 @@ int control_counters(hid_device *hid, struct whisker_counters *counters)
         control_parse_counters(bytes, counters);
     }
     return error;
+}
+
+int control_timing(hid_device *hid, struct whisker_timing *timing)
+{
+    uint8_t bytes[WHISKER_REPORT_TIMING_BYTES];
+    const int error = get_report(hid, WHISKER_REPORT_ID_TIMING, bytes, sizeof bytes);
+    if (!error) {
+        *timing = (struct whisker_timing){
+            .tick = whisker_get_u32(bytes + WHISKER_REPORT_TIMING_TICK),
+            .usb_time = whisker_get_u16(bytes + WHISKER_REPORT_TIMING_USB_TIME),
+            .sof_cycles = whisker_get_u16(bytes + WHISKER_REPORT_TIMING_SOF_CYCLES),
+            .level = bytes[WHISKER_REPORT_TIMING_LEVEL],
+            .edges = whisker_get_u32(bytes + WHISKER_REPORT_TIMING_EDGES),
+            .early = whisker_get_u32(bytes + WHISKER_REPORT_TIMING_EARLY),
+            .silent = whisker_get_u32(bytes + WHISKER_REPORT_TIMING_SILENT),
+            .uneven = whisker_get_u32(bytes + WHISKER_REPORT_TIMING_UNEVEN),
+            .shortest = whisker_get_u32(bytes + WHISKER_REPORT_TIMING_SHORTEST),
+        };
+    }
+    return error;
+}
+
+int whisker_timing_judge(const struct whisker_timing *before, const struct whisker_timing *now)
+{
+    if (now->edges == before->edges && now->early == before->early && now->silent != 0) {
+        return WHISKER_ERROR_TICK_IN_SILENT;
+    }
+    return now->early != before->early     ? WHISKER_ERROR_TICK_IN_FAST
+           : now->silent != before->silent ? WHISKER_ERROR_TICK_IN_GAP
+           : now->uneven != before->uneven ? WHISKER_ERROR_TICK_IN_UNEVEN
+                                           : WHISKER_OK;
 }
 
 int whisker_wire_version(void)

@@ -33,6 +33,9 @@ int control_service(hid_device *hid, const struct whisker_service_order *order);
 /* Reads the report `answers`: WHISKER_REPORT_ANSWERS_BYTES bytes. Returns 0 or DEVICE_CONTROL. */
 int control_answers(hid_device *hid, uint8_t *report);
 
+/* Reads the report `timing`. Returns 0 or DEVICE_CONTROL. */
+int control_timing(hid_device *hid, struct whisker_timing *timing);
+
 /* Reads the counters. Returns 0 or DEVICE_CONTROL. */
 int control_counters(hid_device *hid, struct whisker_counters *counters);
 

@@ -9,7 +9,7 @@
 #include "whisker/errors.h"
 #include "whisker_protocol.h"
 
-/* 64 KiB queued: a quarter of a second at 2 kHz, more than the gaps a loaded machine was seen to make (61 ms). */
+/* 64 KiB queued: 128 ms at 2 kHz, more than the gaps a loaded machine was seen to make (61 ms). */
 #define QUEUED_BYTES 65536
 #define BATCH_MIN 2 /* frames: one packet */
 #define TRANSFERS_MAX ((int)(QUEUED_BYTES / (BATCH_MIN * WHISKER_FRAME_BYTES)))
@@ -242,6 +242,11 @@ int whisker_device_stop(struct whisker_device *device)
 int whisker_device_counters(struct whisker_device *device, struct whisker_counters *counters)
 {
     return blame(device, control_counters(device->hid, counters));
+}
+
+int whisker_device_timing(struct whisker_device *device, struct whisker_timing *timing)
+{
+    return blame(device, control_timing(device->hid, timing));
 }
 
 int device_send_service(struct whisker_device *device, const struct whisker_service_order *order)

@@ -68,7 +68,8 @@ int frame_decode(const uint8_t *bytes, struct whisker_frame *frame, struct frame
     frame->sequence = whisker_get_u32(bytes + WHISKER_FRAME_HEADER_SEQUENCE);
     frame->dropped = whisker_get_u32(bytes + WHISKER_FRAME_HEADER_DROPPED);
     frame->lane_mask = whisker_get_u32(bytes + WHISKER_FRAME_HEADER_LANE_MASK);
-    frame->flags = bytes[WHISKER_FRAME_HEADER_FLAGS];
+    frame->flags = bytes[WHISKER_FRAME_HEADER_FLAGS] | (uint32_t)whisker_get_u16(bytes + WHISKER_FRAME_HEADER_USB_TIME)
+                                                           << WHISKER_FRAME_USB_TIME_SHIFT;
     for (size_t lane = 0; lane < WHISKER_FRAME_LANES; lane++) {
         const uint8_t *record = bytes + WHISKER_FRAME_HEADER_BYTES + lane * WHISKER_RECORD_BYTES;
         decode_record(record, (uint8_t)frame->tick, &frame->lane[lane], damage);

@@ -1,3 +1,4 @@
+#include <assert.h>
 #include <stdbool.h>
 #include <stdio.h>
 
@@ -12,6 +13,13 @@
 /* Words of a record on the node link. */
 #define WORDS 4
 #define WORD_BITS 16
+#define OPTIONS (WHISKER_OPTION_TICK_IN | WHISKER_OPTION_FALLING | WHISKER_OPTION_EVERY_FRAME | WHISKER_OPTION_PATTERN)
+
+static_assert(WHISKER_OPTION_TICK_IN == WHISKER_CONTROL_OPTION_TICK_IN &&
+                  WHISKER_OPTION_FALLING == WHISKER_CONTROL_OPTION_FALLING &&
+                  WHISKER_OPTION_EVERY_FRAME == WHISKER_CONTROL_OPTION_EVERY_FRAME &&
+                  WHISKER_OPTION_PATTERN == WHISKER_CONTROL_OPTION_PATTERN,
+              "the host's options are the wire's");
 
 void whisker_settings_default(struct whisker_settings *settings)
 {
@@ -43,6 +51,10 @@ int whisker_settings_check(const struct whisker_settings *settings, char *messag
     if (settings->lane_mask >> WHISKER_LIMIT_LANES != 0) {
         snprintf(message, n, "the lane mask 0x%x names more than lanes 0 to %d; use bits of 0x%x", settings->lane_mask,
                  WHISKER_LIMIT_LANES - 1, (1u << WHISKER_LIMIT_LANES) - 1);
+        return WHISKER_ERROR_DEVICE_REFUSED;
+    }
+    if (settings->options & ~OPTIONS) {
+        snprintf(message, n, "the options 0x%x have unknown bits; use bits of 0x%x", settings->options, OPTIONS);
         return WHISKER_ERROR_DEVICE_REFUSED;
     }
     for (size_t i = 0; i < sizeof limits / sizeof limits[0]; i++) {

@@ -324,6 +324,10 @@ int hid_get_feature_report(hid_device *device, unsigned char *bytes, size_t room
         memcpy(bytes, fake.identity, sizeof fake.identity);
         return fake.identity_bytes;
     }
+    if (bytes[0] == WHISKER_REPORT_ID_TIMING) {
+        memcpy(bytes + 1, fake.timing + 1, sizeof fake.timing - 1);
+        return (int)room;
+    }
     bytes[WHISKER_REPORT_COUNTERS_RUNNING] = fake.running;
     whisker_put_u32(bytes + WHISKER_REPORT_COUNTERS_RECORDS_TICK, 0x01020304);
     return (int)room;

@@ -18,6 +18,7 @@ struct fake_usb {
     int open_error, claim_error;
     uint8_t identity[16];
     int identity_bytes;
+    uint8_t timing[32];
     bool running;
     int stale_reads; /* bulk reads that still give data after a stop */
     /* what the library did */

@@ -287,6 +287,81 @@ static void flush_delivers_what_a_transfer_already_held(void **state)
     close_and_check();
 }
 
+static void the_identity_names_board_and_build(void **state)
+{
+    (void)state;
+    struct whisker_identity identity;
+    fake.identity[WHISKER_REPORT_IDENTITY_BOARD] = WHISKER_BOARD_CYNTHION;
+    fake.identity[WHISKER_REPORT_IDENTITY_WIRED_LANES] = 12;
+    whisker_put_u16(fake.identity + WHISKER_REPORT_IDENTITY_BUILD, 0xBEEF);
+    assert_int_equal(whisker_device_open(NULL, &device, &identity), 0);
+    assert_int_equal(identity.board, WHISKER_BOARD_CYNTHION);
+    assert_int_equal(identity.wired_lanes, 12);
+    assert_int_equal(identity.build, 0xBEEF);
+    close_and_check();
+}
+
+static void options_go_to_the_bridge_and_unknown_ones_do_not(void **state)
+{
+    (void)state;
+    struct whisker_settings settings;
+    char message[128];
+    whisker_settings_default(&settings);
+    settings.options = WHISKER_OPTION_TICK_IN | WHISKER_OPTION_EVERY_FRAME;
+    open_good();
+    assert_int_equal(whisker_device_start(device, &settings, sink, &device), 0);
+    assert_int_equal(fake.control[WHISKER_REPORT_CONTROL_OPTIONS], 5);
+    assert_int_equal(whisker_device_stop(device), 0);
+    assert_int_equal(fake.control[WHISKER_REPORT_CONTROL_OPTIONS], 5); /* another source could begin a tick */
+    settings.options = 0x10;
+    assert_int_equal(whisker_settings_check(&settings, message, sizeof message), WHISKER_ERROR_DEVICE_REFUSED);
+    assert_string_equal(message, "the options 0x10 have unknown bits; use bits of 0xf");
+    close_and_check();
+}
+
+static void the_timing_report_is_read_as_it_is(void **state)
+{
+    (void)state;
+    struct whisker_timing timing;
+    for (size_t i = 0; i < sizeof fake.timing; i++) {
+        fake.timing[i] = (uint8_t)(0x10 + i);
+    }
+    open_good();
+    assert_int_equal(whisker_device_timing(device, &timing), 0);
+    assert_int_equal(timing.usb_time, 0x1312);
+    assert_int_equal(timing.tick, 0x17161514);
+    assert_int_equal(timing.sof_cycles, 0x1918);
+    assert_int_equal(timing.level, 0x1A);
+    assert_int_equal(timing.edges, 0x1F1E1D1C);
+    assert_int_equal(timing.early, 0x23222120);
+    assert_int_equal(timing.silent, 0x27262524);
+    assert_int_equal(timing.uneven, 0x2B2A2928);
+    assert_int_equal(timing.shortest, 0x2F2E2D2C);
+    fake.gone = true;
+    assert_int_equal(whisker_device_timing(device, &timing), WHISKER_ERROR_DEVICE_GONE);
+    fake.gone = false;
+    close_and_check();
+}
+
+static void tick_in_is_judged_by_what_has_changed(void **state)
+{
+    (void)state;
+    const struct whisker_timing before = {.edges = 10, .early = 2, .silent = 1, .uneven = 3};
+    struct whisker_timing now = before;
+    now.edges = 20;
+    assert_int_equal(whisker_timing_judge(&before, &now), 0);
+    now.uneven++;
+    assert_int_equal(whisker_timing_judge(&before, &now), WHISKER_ERROR_TICK_IN_UNEVEN);
+    now.silent++;
+    assert_int_equal(whisker_timing_judge(&before, &now), WHISKER_ERROR_TICK_IN_GAP);
+    now.early++;
+    assert_int_equal(whisker_timing_judge(&before, &now), WHISKER_ERROR_TICK_IN_FAST);
+    now = before;
+    assert_int_equal(whisker_timing_judge(&before, &now), WHISKER_ERROR_TICK_IN_SILENT);
+    const struct whisker_timing begun = {0};
+    assert_int_equal(whisker_timing_judge(&begun, &begun), 0); /* no two periods have passed */
+}
+
 static void refused_settings_are_told(void **state)
 {
     (void)state;
@@ -388,6 +463,10 @@ int main(void)
         WITH_BRIDGE(refused_settings_are_told),
         WITH_BRIDGE(unplugging_and_failing_end_the_stream),
         WITH_BRIDGE(counters_are_read),
+        WITH_BRIDGE(the_identity_names_board_and_build),
+        WITH_BRIDGE(options_go_to_the_bridge_and_unknown_ones_do_not),
+        WITH_BRIDGE(the_timing_report_is_read_as_it_is),
+        cmocka_unit_test(tick_in_is_judged_by_what_has_changed),
         cmocka_unit_test(settings_outside_their_limits_are_named),
     };
     return cmocka_run_group_tests_name("device", tests, NULL, NULL);

@@ -1,6 +1,8 @@
 // A host that takes no frames: the bridge ticks on, its FIFO overflows, and the rig knows how much of it waits.
 #include "cmocka_cpp.h"
 
+#include <cerrno>
+
 #include "tick_runner.h"
 
 using namespace bridge_sim;
@@ -43,6 +45,27 @@ class Host
         scheduler_.submit(std::move(urb));
         assert_true(scheduler_.step());
         assert_int_equal(scheduler_.take_completed().at(0).status, 0);
+    }
+
+    // A request without data; what became of it.
+    int request(uint8_t type, uint8_t number, uint16_t index)
+    {
+        Urb urb;
+        urb.setup = {type, number, 0, index, 0};
+        scheduler_.submit(std::move(urb));
+        assert_true(scheduler_.step());
+        return scheduler_.take_completed().at(0).status;
+    }
+
+    // What a transfer that is offered now ends with at once; 1: it waits.
+    int outcome_of_a_read()
+    {
+        offer_transfer();
+        const bool did = scheduler_.step();
+        const std::vector<Urb> ended = scheduler_.take_completed();
+        scheduler_.discard(0);
+        scheduler_.take_completed();
+        return did && !ended.empty() ? ended[0].status : 1;
     }
 
     void ticks(uint64_t count)
@@ -169,6 +192,24 @@ template <void (*TEST)(Level)> void at_both_levels(void **)
     TEST(Level::BYTES);
 }
 
+// A host that has halted an idle endpoint is told so at its next read, not when the next frame comes.
+void a_halted_endpoint_answers_though_it_has_nothing(void **)
+{
+    constexpr uint8_t TO_ENDPOINT = 0x02, TO_INTERFACE = 0x01, CLEAR = 1, SET = 3, SET_INTERFACE = 11;
+    for (const Level level : {Level::RTL, Level::BYTES}) {
+        Host host(level);
+        assert_int_equal(host.outcome_of_a_read(), 1);
+        assert_int_equal(host.request(TO_ENDPOINT, SET, WHISKER_LIMIT_USB_BULK_IN), 0);
+        assert_int_equal(host.outcome_of_a_read(), -EPIPE);
+        assert_int_equal(host.outcome_of_a_read(), -EPIPE);
+        assert_int_equal(host.request(TO_ENDPOINT, CLEAR, WHISKER_LIMIT_USB_BULK_IN), 0);
+        assert_int_equal(host.outcome_of_a_read(), 1);
+        assert_int_equal(host.request(TO_ENDPOINT, SET, WHISKER_LIMIT_USB_BULK_IN), 0);
+        assert_int_equal(host.request(TO_INTERFACE, SET_INTERFACE, WHISKER_LIMIT_USB_BULK_INTERFACE), 0);
+        assert_int_equal(host.outcome_of_a_read(), 1);
+    }
+}
+
 } // namespace
 
 int main()
@@ -177,6 +218,7 @@ int main()
         cmocka_unit_test(at_both_levels<overflow_twice>),
         cmocka_unit_test(at_both_levels<stopped_when_full>),
         cmocka_unit_test(at_both_levels<started_again_after_an_overflow>),
+        cmocka_unit_test(a_halted_endpoint_answers_though_it_has_nothing),
     };
     return cmocka_run_group_tests(tests, nullptr, nullptr);
 }

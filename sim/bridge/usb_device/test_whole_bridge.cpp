@@ -2,7 +2,10 @@
 // orders of an update do nothing to nodes that run.
 #include "cmocka_cpp.h"
 
+#include <algorithm>
+
 #include "bridge_model.h"
+#include "free_bridge.h"
 #include "paced_bridge.h"
 #include "usb_control.h"
 #include "whisker_protocol.h"
@@ -203,6 +206,43 @@ void the_link_bounds_the_pace(void **)
     assert_false(run_paced(LINK_CYCLES - 1, TICKS, 0).sustained());
 }
 
+// As on a board: no tick comes from outside, and the host asks without a pause.
+void its_own_ticks_are_even_and_dated_by_the_host(void **)
+{
+    constexpr uint64_t TICKS = 12;
+    constexpr double LIMIT_US = 600;
+    for (const bool every : {false, true}) {
+        FreeSettings settings;
+        settings.options = every ? WHISKER_CONTROL_OPTION_EVERY_FRAME : 0;
+        const FreeRun run = run_free(settings, TICKS);
+        assert_int_equal(run.bad, 0);
+        for (size_t i = 1; i < run.syncs.size(); i++) {
+            assert_int_equal(run.syncs[i] - run.syncs[i - 1], WHISKER_LIMIT_TICK_PERIOD);
+        }
+        assert_int_equal(run.dates[0], 0); // no start-of-frame packet yet
+        for (size_t i = 1; i < run.dates.size(); i++) {
+            assert_int_equal(run.dates[i], 0x8000u | (run.host[i] - 1));
+        }
+        const uint64_t worst = *std::max_element(run.packets.begin(), run.packets.end());
+        assert_true((static_cast<double>(worst) / 60 <= LIMIT_US) == every);
+        assert_true(run.transfers(4) == run.packets || !every);
+        for (const size_t size : run.sizes) {
+            assert_int_equal(size, every ? WHISKER_FRAME_BYTES : PACKET);
+        }
+    }
+}
+
+// What control_registers takes as the shortest period, with every record good and no frame lost.
+void the_shortest_period_is_kept(void **)
+{
+    FreeSettings settings;
+    settings.options = WHISKER_CONTROL_OPTION_EVERY_FRAME;
+    settings.tick_period = WHISKER_LIMIT_TICK_PERIOD_MIN;
+    const FreeRun run = run_free(settings, 40);
+    assert_int_equal(run.bad, 0);
+    assert_int_equal(run.syncs[39] - run.syncs[0], 39 * WHISKER_LIMIT_TICK_PERIOD_MIN);
+}
+
 } // namespace
 
 int main()
@@ -213,6 +253,8 @@ int main()
         cmocka_unit_test(a_reset_wakes_and_ends_the_run),
         cmocka_unit_test(update_orders_to_running_nodes_do_nothing),
         cmocka_unit_test(the_link_bounds_the_pace),
+        cmocka_unit_test(its_own_ticks_are_even_and_dated_by_the_host),
+        cmocka_unit_test(the_shortest_period_is_kept),
     };
     return cmocka_run_group_tests(tests, nullptr, nullptr);
 }

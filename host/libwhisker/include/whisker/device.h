@@ -24,7 +24,16 @@ struct whisker_identity {
     uint32_t clock_hz;
     uint16_t frame_bytes;
     uint16_t fifo_bytes;
+    uint8_t board;       /* a number of `boards` in protocol.md */
+    uint8_t wired_lanes; /* that have a pin; 0: gateware before version 3 does not tell */
+    uint16_t build;      /* first 16 bits of the gateware's commit; 0: not known */
 };
+
+/* Bits of options; all of them need gateware of version 3. */
+#define WHISKER_OPTION_TICK_IN 1     /* ticks begin with edges of the pin tick_in, tick_period apart */
+#define WHISKER_OPTION_FALLING 2     /* with its falling edges */
+#define WHISKER_OPTION_EVERY_FRAME 4 /* each frame is sent at once; else a USB packet waits for its second frame */
+#define WHISKER_OPTION_PATTERN 8     /* records of the bridge's own, whatever the lanes say: see protocol.md */
 
 /* How the bridge is to run; unit of all but mask and batch: cycle of its 60 MHz clock. */
 struct whisker_settings {
@@ -36,9 +45,24 @@ struct whisker_settings {
     uint8_t batch;        /* frames of one USB transfer, even, 2 to 16: fewer come sooner, more cost less */
     uint8_t transfers;    /* that one whisker_device_poll() takes at most: for those who throw frames away. 0: as they
                              come, 64 KiB queued, which outlasts the pauses of a loaded machine */
+    uint8_t options;      /* WHISKER_OPTION_* */
 };
 
-/* The bridge's own counts since its start. */
+/* When the latest tick was, and what came in at tick_in since the start; meanings and units: report `timing` in
+ * protocol.md. */
+struct whisker_timing {
+    uint32_t tick;
+    uint16_t usb_time;
+    uint16_t sof_cycles;
+    uint8_t level;
+    uint32_t edges;
+    uint32_t early;
+    uint32_t silent;
+    uint32_t uneven;
+    uint32_t shortest;
+};
+
+/* The bridge's own counts since its start; 32 bits, which wrap: records_good of 28 lanes at 2 kHz after 21.3 hours. */
 struct whisker_counters {
     uint8_t running;
     uint32_t ticks;
@@ -98,7 +122,7 @@ typedef void (*whisker_sink)(void *context, const uint8_t *bytes, size_t count);
 
 /*
  * Stops a bridge that still runs for a process that is gone and throws its frames away; queues the bulk transfers
- * (64 KiB: a quarter of a second at 2 kHz); then starts the bridge. May be called again after stop and flush.
+ * (64 KiB: 128 ms at 2 kHz); then starts the bridge. May be called again after stop and flush.
  * Returns 0 or DEVICE_REFUSED, DEVICE_CONTROL, DEVICE_USB, DEVICE_GONE.
  */
 int whisker_device_start(struct whisker_device *device, const struct whisker_settings *settings, whisker_sink sink,
@@ -117,6 +141,16 @@ void whisker_device_flush(struct whisker_device *device);
 
 /* Asks for the bridge's counters; also while frames stream. 0, DEVICE_CONTROL, DEVICE_GONE. */
 int whisker_device_counters(struct whisker_device *device, struct whisker_counters *counters);
+
+/* Asks when the latest tick was and how tick_in does; also while frames stream. 0, DEVICE_CONTROL (also of gateware
+ * before version 3), DEVICE_GONE. */
+int whisker_device_timing(struct whisker_device *device, struct whisker_timing *timing);
+
+/*
+ * What is wrong with tick_in, by two reports of one run (the first may be all zeros), a few periods apart at least: 0,
+ * TICK_IN_SILENT, TICK_IN_FAST, TICK_IN_GAP, TICK_IN_UNEVEN, in this order of precedence.
+ */
+int whisker_timing_judge(const struct whisker_timing *before, const struct whisker_timing *now);
 
 struct whisker_hotplug;
 

@@ -46,6 +46,14 @@
       "install gateware and host of one release")                                                                      \
     X(DEVICE_DRAIN, -48, "the bridge did not send its last frame after a stop", "plug the bridge in again")            \
     X(DEVICE_SERIAL, -49, "no bridge of this serial number is connected", "see whiskerd --list for those there are")   \
+    X(TICK_IN_SILENT, -52, "no edge comes at the bridge's pin tick_in, so there are no ticks",                         \
+      "check the wire and that its source runs; or start without --tick-in")                                           \
+    X(TICK_IN_FAST, -53, "edges come at tick_in less than 7/8 of the tick period after the last: they are left out",   \
+      "slow the source down, or give its period with --tick-period; check the wire for noise")                         \
+    X(TICK_IN_GAP, -54, "edges were missing at tick_in for two tick periods or more",                                  \
+      "check the wire, or give the source's period with --tick-period")                                                \
+    X(TICK_IN_UNEVEN, -55, "edges at tick_in come more than 1/64 of the tick period beside their time",                \
+      "give the source's period with --tick-period, or use a steadier source")                                         \
     X(IMAGE, -51, "this is no firmware image, or it is damaged", "build it again, or fetch it again")                  \
     X(HOST_CLOCK, -50, "the host's clock was set or went backwards", "none needed; a time service avoids it")
 
