@@ -160,9 +160,9 @@ def test_firmware_uses_the_pins_of_the_page(netlists):
     on = {port[name.split("/")[-1]]: nets.net[key] for key, name in nets.name.items()
           if key[0] == "U1" and name.split("/")[-1] in port}  # fmt: skip
     for name, kind in {"SENSOR_SELECT": "/SS", "SENSOR_CLOCK": "SCLK", "SENSOR_DATA": "data"}.items():
-        assert on[name] == nets.net["U2", sensor()[kind]], name
+        assert on.get(name) == nets.net["U2", sensor()[kind]], name
     for name, signal in {"LINK_SELECT": "SELECT", "SYNC": "SYNC", "LINK_CLOCK": "SCK", "LINK_MOSI": "MOSI"}.items():
-        assert on[name] == nets.net["J1", signals[signal]], name
+        assert on.get(name) == nets.net["J1", signals[signal]], name
     assert nets.across("33", "R", on["LINK_MISO"], nets.net["J1", signals["MISO"]])
     assert nets.across("MLX90316", "JP", on["SENSOR_SEND"], on["SENSOR_DATA"])
 

@@ -13,6 +13,7 @@ import numpy as np
 BLOCKED = -1
 STRAIGHT, DIAGONAL, VIA, TURN = 10, 14, 130, 4
 BACK = 2  # the back is the ground plane: a step there costs this much more
+MOVES = [(dx, dy) for dx in (-1, 0, 1) for dy in (-1, 0, 1) if dx or dy]
 FIGHT, FOUGHT = 60, 40  # price of a cell that another net holds, and what it rises by each time
 ROUNDS = 8  # attempts per net, on average
 
@@ -73,13 +74,16 @@ class Router:
         self.maps = {name: array.copy() for name, array in self.base.items()}
 
     def cell(self, x, y):
+        """Column and row of the cell nearest to a point in mm."""
         step = self.rules.step
         return round((x - self.outline[0]) / step), round((y - self.outline[1]) / step)
 
     def point(self, ix, iy):
+        """Middle of a cell, mm."""
         return self.outline[0] + ix * self.rules.step, self.outline[1] + iy * self.rules.step
 
     def no_via(self, box):
+        """Keeps all vias out of a box and off its edge."""
         reach = self.rules.via / 2 + 0.05
         (x0, y0), (x1, y1) = self.cell(box[0] - reach, box[1] - reach), self.cell(box[2] + reach, box[3] + reach)
         self.base["via"][:, max(y0, 0) : y1 + 1, max(x0, 0) : x1 + 1] = BLOCKED
@@ -163,6 +167,7 @@ class Router:
                    for layer, a, b, half in mine for layer2, a2, b2, half2 in its)  # fmt: skip
 
     def pieces(self, task):
+        """Copper of a task: (layer, end, end, half the width), mm."""
         tracks, vias = self.done[task]
         for _, layer, corners, width in tracks:
             for a, b in zip(corners, corners[1:], strict=False):
@@ -172,6 +177,7 @@ class Router:
                 yield layer, (x, y), (x, y), self.rules.via / 2
 
     def join(self, task, force):
+        """Joins all pads of a task; whether it could be done."""
         if task.ground:
             return all(self.connect(task, [pad], None, None, force) for pad in task.pads)
         tree, todo = [task.pads[0]], list(task.pads[1:])
@@ -211,31 +217,17 @@ class Router:
         return goals.get(way[-1], True)
 
     def index(self, pad):
+        """Number of the front cell nearest to a pad's middle."""
         ix, iy = self.cell(pad.x, pad.y)
         return iy * self.nx + ix
 
     def search(self, free, via, starts, goals, extra):
-        nx, size = self.nx, self.nx * self.ny
-        boxes = [(g % size % nx, g % size // nx) for g in goals]
-        x0, x1 = (min(b[0] for b in boxes), max(b[0] for b in boxes)) if boxes else (0, 0)
-        y0, y1 = (min(b[1] for b in boxes), max(b[1] for b in boxes)) if boxes else (0, 0)
-
-        def guess(cell):
-            if not boxes:
-                return 0
-            x, y = cell % size % nx, cell % size // nx
-            dx, dy = max(x0 - x, 0, x - x1), max(y0 - y, 0, y - y1)
-            return STRAIGHT * max(dx, dy) + (DIAGONAL - STRAIGHT) * min(dx, dy)
-
-        moves = [
-            (dx + dy * nx, DIAGONAL if dx and dy else STRAIGHT, (dx, dy))
-            for dx in (-1, 0, 1)
-            for dy in (-1, 0, 1)
-            if dx or dy
-        ]
+        """Cheapest way of cells from a start to a goal, to any cell of the back if there are no goals; None if there is none.
+        free, via: whether a track, a via may stand in a cell; extra: what entering a cell costs besides, or None."""
+        guess, size = self.guess(goals), self.nx * self.ny
         best = dict.fromkeys(starts, 0)
         came: dict[int, int] = {}
-        heads: dict[int, tuple] = {}
+        heads: dict[int, tuple | None] = {}
         queue = [(guess(cell), cell) for cell in sorted(starts)]
         heapq.heapify(queue)
         done = set()
@@ -245,33 +237,45 @@ class Router:
                 continue
             done.add(cell)
             if cell in goals or (not goals and cell >= size):
-                way = [cell]
-                while way[-1] in came:
-                    way.append(came[way[-1]])
-                return way[::-1]
-            cost, head = best[cell], heads.get(cell)
-            for offset, price, new_head in moves:
-                other = cell + offset
-                if not free[other]:
-                    continue
-                total = cost + (price * BACK if cell >= size else price)
-                if head is not None and head != new_head:
-                    cosine = head[0] * new_head[0] + head[1] * new_head[1]
-                    if cosine <= 0:
-                        continue
-                    total += TURN
-                if extra:
-                    total += extra[other]
+                return traced(came, cell)
+            for other, price, head in self.steps(cell, heads.get(cell), free, via):
+                total = best[cell] + price + (extra[other] if extra else 0)
                 if total < best.get(other, 1 << 60):
-                    best[other], came[other], heads[other] = total, cell, new_head
+                    best[other], came[other], heads[other] = total, cell, head
                     heapq.heappush(queue, (total + guess(other), other))
-            other = cell - size if cell >= size else cell + size
-            total = cost + VIA + (extra[other] if extra else 0)
-            if via[cell % size] and free[other] and total < best.get(other, 1 << 60):
-                best[other], came[other] = total, cell
-                heads.pop(other, None)
-                heapq.heappush(queue, (total + guess(other), other))
         return None
+
+    def guess(self, goals):
+        """A lower bound of what it costs to get from a cell to the goals, as a function of the cell."""
+        nx, size = self.nx, self.nx * self.ny
+        if not goals:
+            return lambda cell: 0
+        columns, rows = [goal % size % nx for goal in goals], [goal % size // nx for goal in goals]
+        x0, x1, y0, y1 = min(columns), max(columns), min(rows), max(rows)
+
+        def bound(cell):
+            x, y = cell % size % nx, cell % size // nx
+            dx, dy = max(x0 - x, 0, x - x1), max(y0 - y, 0, y - y1)
+            return STRAIGHT * max(dx, dy) + (DIAGONAL - STRAIGHT) * min(dx, dy)
+
+        return bound
+
+    def steps(self, cell, head, free, via):
+        """Cells beside a cell, or under it, that may be entered from it with heading `head`: (cell, price, new heading)."""
+        size = self.nx * self.ny
+        for dx, dy in MOVES:
+            other = cell + dx + dy * self.nx
+            ahead = head[0] * dx + head[1] * dy if head else 1
+            if free[other] and ahead > 0:  # no corner of 90 degrees or sharper
+                price = DIAGONAL if dx and dy else STRAIGHT
+                yield (
+                    other,
+                    (price * BACK if cell >= size else price) + (TURN if head not in (None, (dx, dy)) else 0),
+                    (dx, dy),
+                )
+        other = cell - size if cell >= size else cell + size
+        if via[cell % size] and free[other]:
+            yield other, VIA, None
 
     def keep(self, task, way, sources, target):
         """Turns a way into tracks and vias, and marks them."""
@@ -310,6 +314,14 @@ class Router:
                     spot = self.point(ix, iy)
                     self.done[task][1].append((net, *spot))
                     self.mark(net, (0, 1), (*spot, *spot), self.rules.via / 2)
+
+
+def traced(came, cell):
+    """The way that led to a cell, from its start."""
+    way = [cell]
+    while way[-1] in came:
+        way.append(came[way[-1]])
+    return way[::-1]
 
 
 def straightened(points):
