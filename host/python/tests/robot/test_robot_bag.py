@@ -1,11 +1,14 @@
 """The robot's bag: what ROS 2 tools read of it, and the scene that comes of it again."""
 
+import re
 import subprocess
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from commandkit import END_S, command, run, signals_as_before  # noqa: F401 - a fixture
 from linkkit import free_endpoint
+from PIL import Image
 from robotkit import examples, flat, to_rows
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
@@ -18,12 +21,13 @@ from whisker.pilot.pilot import compose
 from whisker.recording.mcapfile import McapFile
 from whisker.recording.writing import TopicWriter
 from whisker.robot import messages as m
-from whisker.robot.bag import RECORD, Bag, BagClock
+from whisker.robot.bag import RECORD, Bag, BagClock, metadata
 from whisker.robot.inbox import Received
 from whisker.robot.link import Link
 from whisker.robot.rows import RowPublisher
 from whisker.robot.streams import Envelope
 from whisker.scene import load
+from whisker.sensor_tables import SensorTable
 
 PATIENCE_S = 60.0
 ROWS = 30
@@ -88,6 +92,19 @@ def test_what_it_says_of_itself(bag, scene):
         told = file.metadata[RECORD]
         assert file.complete and told["robot"] == "robot" and told["observation.received"] == str(ROWS + 1)
     assert told["arena.toml"] == (scene[0] / "arena.toml").read_text() and told["missed"] == "0"
+
+
+def test_what_lies_beside_a_scenes_files_is_in_the_bag_too(scene, tmp_path):
+    _, loaded, observations = scene
+    sensor = SensorTable(
+        "light", (0.0, 0.0), 0.0, 0.0, np.zeros((5, 5), np.uint8), 0.5, np.arange(3.0), np.ones((2, 2))
+    )
+    scenes.write_scene(tmp_path, replace(loaded, robot=replace(loaded.robot, sensors=(sensor,))), observations)
+    arena = (tmp_path / "arena.toml").read_text()
+    Image.fromarray((loaded.arena.floor_indices()[::-1] * 127).astype(np.uint8)).save(tmp_path / "floor.png")
+    (tmp_path / "arena.toml").write_text(re.sub(r"floor = .*", 'floor = "floor.png"', arena))
+    told = metadata("robot", tmp_path)
+    assert told["arena.toml"] == arena and "[[sensor]]" not in told["robot.toml"] and "floor_left" in told["robot.toml"]
 
 
 def test_a_scene_comes_of_it_again(bag, scene, tmp_path, capsys):

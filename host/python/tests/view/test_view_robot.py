@@ -4,6 +4,7 @@ import asyncio
 import json
 import random
 import struct
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -27,7 +28,8 @@ from whisker.robot.messages import (
     Time,
     encode,
 )
-from whisker.scene import LARGEST_M
+from whisker.scene import LARGEST_M, Scene
+from whisker.sensor_tables import SensorTable
 from whisker.view.command import ROBOT
 from whisker.view.hub import Hub
 from whisker.view.robot import (
@@ -40,7 +42,7 @@ from whisker.view.robot import (
     RobotModel,
 )
 from whisker.view.robot_source import join
-from whisker.view.robot_topics import BELIEF_HEAD, BELIEF_ID, POINTS_MOST, BeliefFeed, RobotFeed
+from whisker.view.robot_topics import BELIEF_HEAD, BELIEF_ID, POINTS_MOST, BeliefFeed, RobotFeed, SceneFeed
 
 FUZZ_INPUTS = 5000
 WIDE = np.array([[0.0009, 0.0003, 0.0], [0.0003, 0.0016, 0.0], [0.0, 0.0, 0.04]])  # 3 cm by 4 cm, 0.2 rad
@@ -229,6 +231,13 @@ def test_a_page_that_does_not_acknowledge_holds_nothing_back():
     asyncio.run(scenario())
 
 
+def test_a_page_is_told_of_unknown_ground_and_not_of_tables():
+    sensor = SensorTable("light", (0.0, 0.0), 0.0, 0.0, np.zeros((5, 5), np.uint8))
+    arena = replace(ARENA, unknown=((0.0, 0.0, 0.5, 0.5),))
+    told = json.loads(SceneFeed(Hub([], scene=Scene(arena, replace(SCENE.robot, sensors=(sensor,)))), {}).take())
+    assert told["arena"]["unknown"] == [[0.0, 0.0, 0.5, 0.5]] and told["robot"]["sensors"] == []
+
+
 @pytest.mark.parametrize(
     "may, pose, said",
     [
@@ -304,11 +313,11 @@ def test_over_a_real_network_a_page_sees_what_a_pilot_sends():
                     hub.robot.take(topic, message)
         assert hub.robot.rows["unseen"] == 0 and hub.robot.row["tips"]
         assert source.refused()["count"] == 0
-        told = pilot.subscribe(initial_pose.TOPIC)
         source.set_pose((0.5, 1.5, 2.0))
         assert initial_pose.prior_of(told.take(PATIENCE_S)[0].message, ARENA).mean == pytest.approx((0.5, 1.5, 2.0))
 
     with Link("pilot", ROBOT, listen=[endpoint]) as pilot:
+        told = pilot.subscribe(initial_pose.TOPIC)
         source = join(ROBOT, [endpoint])
         try:
             asyncio.run(scenario(source))

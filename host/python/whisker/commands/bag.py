@@ -6,7 +6,6 @@ from pathlib import Path
 from ..recording.writing import TopicWriter
 from ..robot.bag import RECORD, Bag, metadata
 from ..robot.options import NAVIGATOR_ENDPOINT, PILOT_ENDPOINT, add_link, open_link
-from ..scene import load
 from ..stopping import stop_on_signals
 
 EXAMPLE = "whisker bag run.mcap --scene SCENE"
@@ -30,11 +29,9 @@ def next_free(path: Path) -> Path:
 
 
 def run(arguments) -> int:
-    if arguments.scene:
-        load(arguments.scene)
+    told = metadata(arguments.robot, arguments.scene)
     stop = stop_on_signals()
     with open_link("bag", arguments) as link:
-        told = metadata(arguments.robot, arguments.scene)
         file = next_free(Path(arguments.file)) if arguments.next else arguments.file
         with TopicWriter(file, RECORD, told, arguments.overwrite) as writer:
             counted = Bag(writer, arguments.robot).run(link, stop, arguments.stay)

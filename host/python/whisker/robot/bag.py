@@ -4,12 +4,14 @@ Topics are /<robot>/<topic>. Log times follow the bridge's clock from the moment
 the bridge's own. With a scene, `whisker scene from BAG` makes a scene folder of what was observed.
 """
 
+import tempfile
 import threading
 import time
+from dataclasses import replace
 from pathlib import Path
 
 from ..recording.writing import TopicWriter
-from ..scene import ARENA, PRIOR, ROBOT
+from ..scene import ARENA, PRIOR, ROBOT, load, write
 from .health import ENDED, RUNNING, Health
 from .inbox import Inbox, Received
 from .link import Link
@@ -48,10 +50,16 @@ class BagClock:
 
 
 def metadata(robot: str, scene: Path | None) -> dict[str, str]:
-    """What a bag's first record holds: format, robot, when it began, and the scene's files as text."""
+    """What a bag's first record holds: format, robot, when it began, and the scene's files as text, floors of images as
+    letters. Sensors of the user's own are left out: rows on the network do not hold them."""
     told = {"format": FORMAT, "robot": robot, "started": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())}
-    files = [scene / name for name in SCENE_FILES] if scene else []
-    return told | {file.name: file.read_text() for file in files if file.exists()}
+    if scene is None:
+        return told
+    loaded = load(scene)
+    with tempfile.TemporaryDirectory(prefix="whisker-") as place:
+        write(place, replace(loaded, robot=replace(loaded.robot, sensors=())))
+        files = [Path(place) / name for name in SCENE_FILES]
+        return told | {file.name: file.read_text() for file in files if file.exists()}
 
 
 class Bag:

@@ -3,7 +3,7 @@
 import json
 import struct
 import time
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 from .hub import Hub
 from .robot import RobotModel
@@ -28,7 +28,7 @@ class SceneFeed:
         scene = self._model.scene
         told = {"arena": None, "robot": None, "text": "arena not known: start whisker-view with --scene SCENE"}
         if scene is not None:
-            told = {"arena": asdict(scene.arena), "robot": asdict(scene.robot), "text": ""}
+            told = {"arena": asdict(scene.arena), "robot": asdict(replace(scene.robot, sensors=())), "text": ""}
         return json.dumps({"topic": "scene"} | told, separators=(",", ":"))
 
     def close(self) -> None:

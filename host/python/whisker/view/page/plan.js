@@ -75,6 +75,7 @@ class Plan {
       this.drawTile(pen, arena, letter, column * arena.tile_m, y);
     }));
     const hatch = this.pattern(2, '--soft', 0.7);
+    for (const box of arena.unknown) this.drawUnknown(pen, box);
     for (const box of arena.obstacles) this.drawObstacle(pen, box, hatch);
   }
 
@@ -89,6 +90,14 @@ class Plan {
     pen.lineWidth = 1;
     pen.strokeRect(...place);
     this.text(pen, letter, place[0] + 5 * this.ratio, place[1] + 10 * this.ratio, '--soft', 11);
+  }
+
+  /* Ground that was never mapped: neither floor nor obstacle is known. */
+  drawUnknown(pen, [x0, y0, x1, y1]) {
+    const place = [this.x(x0), this.y(y1), (x1 - x0) * this.scale, (y1 - y0) * this.scale];
+    pen.fillStyle = this.css('--card');
+    pen.fillRect(...place);
+    this.text(pen, '?', place[0] + place[2] / 2, place[1] + place[3] / 2, '--soft', 11, 'center');
   }
 
   drawObstacle(pen, [x0, y0, x1, y1], hatch) {
