@@ -228,22 +228,19 @@ static void a_catch_lasts_until_the_level_is_back(void **state)
 
 /* One channel, windows of 16 samples; two classes told by the log of the whole power alone, about 0 and about 4. */
 struct model {
-    double floor, centre[FEATURES_MOST], scale[FEATURES_MOST], weight[2 * FEATURES_MOST], bias[2],
-        middle[2 * FEATURES_MOST];
-    double unknown, border, spike;
+    double floor, centre[FEATURES_MOST], scale[FEATURES_MOST], weight[2 * FEATURES_MOST], bias[2];
+    double border, spike;
     struct nav_texture_rung *rung;
 };
 
 static void make_model(struct model *m)
 {
-    *m = (struct model){.bias = {0.0, -8.0}, .unknown = 20.0, .border = 1.0, .spike = 1e3};
+    *m = (struct model){.bias = {0.0, -8.0}, .border = 1.0, .spike = 1e3};
     struct nav_texture_features *f = nav_texture_features_new(1, 16, 0, 0, &m->floor);
     int count = nav_texture_features_count(f), power = count - 2;
     nav_texture_features_free(f);
     m->scale[power] = 1.0;
     m->weight[2 * power + 1] = 4.0;
-    m->middle[count + power] = 4.0;
-    const double none = 0.0, beyond[2] = {(double)count, (double)count};
     const struct nav_texture_rung_numbers numbers = {.classes = 2,
                                                      .channels = 1,
                                                      .length = 16,
@@ -252,79 +249,32 @@ static void make_model(struct model *m)
                                                      .centre = m->centre,
                                                      .scale = m->scale,
                                                      .weight = m->weight,
-                                                     .bias = m->bias,
-                                                     .middle = m->middle,
-                                                     .axis = &none,
-                                                     .axis_weight = &none,
-                                                     .beyond = beyond};
+                                                     .bias = m->bias};
     m->rung = nav_texture_rung_new(&numbers);
     assert_non_null(m->rung);
 }
 
-/* Squared distance of the features z from a middle at 0, with axes along the two diagonals of the first two features:
- * each axis by its own weight, what lies beyond both by a third. */
-static double distance_along(const double *z, int count, const double *weight, double beyond)
+static struct nav_texture_rules rules_of(const struct model *m, int step)
 {
-    double first = (z[0] + z[1]) / sqrt(2.0), second = (z[0] - z[1]) / sqrt(2.0), rest = 0.0;
-    for (int f = 2; f < count; f++)
-        rest += z[f] * z[f];
-    return (weight[0] * first * first + weight[1] * second * second + beyond * rest) / count;
-}
-
-static void the_distance_is_weighed_along_each_axis(void **state)
-{
-    (void)state;
-    const double weight[] = {3.0, 0.25}, floor = 0.0, beyond = 0.5, bias = 0.0, diagonal = 1.0 / sqrt(2.0);
-    double none[FEATURES_MOST] = {0.0}, scale[FEATURES_MOST], axis[2 * FEATURES_MOST] = {0.0}, window[16], loglik;
-    int count;
-    for (int f = 0; f < FEATURES_MOST; f++)
-        scale[f] = 1.0;
-    struct nav_texture_features *features = nav_texture_features_new(1, 16, 0, 0, &floor);
-    count = nav_texture_features_count(features);
-    nav_texture_features_free(features);
-    axis[0] = axis[1] = axis[count] = diagonal;
-    axis[count + 1] = -diagonal;
-    const struct nav_texture_rung_numbers numbers = {.classes = 1,
-                                                     .channels = 1,
-                                                     .length = 16,
-                                                     .axes = 2,
-                                                     .temper = 1.0,
-                                                     .floor = &floor,
-                                                     .centre = none,
-                                                     .scale = scale,
-                                                     .weight = none,
-                                                     .bias = &bias,
-                                                     .middle = none,
-                                                     .axis = axis,
-                                                     .axis_weight = weight,
-                                                     .beyond = &beyond};
-    struct nav_texture_rung *rung = nav_texture_rung_new(&numbers);
-    draw(window, 16, 11);
-    double distance = nav_texture_rung_judge(rung, window, &loglik);
-    const double *z = nav_texture_rung_features(rung);
-    assert_int_equal(nav_texture_rung_count(rung), count);
-    assert_true(fabs(z[0] - z[1]) > 0.1);
-    assert_near(distance, distance_along(z, count, weight, beyond), 1e-9);
-    nav_texture_rung_free(rung);
+    return (struct nav_texture_rules){.channels = 1,
+                                      .classes = 2,
+                                      .window = 32,
+                                      .rungs = 1,
+                                      .rung = &m->rung,
+                                      .border = &m->border,
+                                      .growth = 0.5,
+                                      .together = 1.0,
+                                      .doubt = 0.6,
+                                      .step = step,
+                                      .sure = 0.99,
+                                      .told = 1.0,
+                                      .patience = step ? 64 : 0,
+                                      .limits = {.channels = 1, .spike = &m->spike}};
 }
 
 static struct nav_texture_stream *stream_of(const struct model *m, int step)
 {
-    const struct nav_texture_rules rules = {.channels = 1,
-                                            .classes = 2,
-                                            .window = 32,
-                                            .rungs = 1,
-                                            .rung = &m->rung,
-                                            .unknown = &m->unknown,
-                                            .border = &m->border,
-                                            .growth = 0.5,
-                                            .together = 1.0,
-                                            .doubt = 0.6,
-                                            .step = step,
-                                            .sure = 0.99,
-                                            .told = 1.0,
-                                            .patience = step ? 64 : 0,
-                                            .limits = {.channels = 1, .spike = &m->spike}};
+    const struct nav_texture_rules rules = rules_of(m, step);
     struct nav_texture_stream *s = nav_texture_stream_new(&rules);
     assert_non_null(s);
     return s;
@@ -342,7 +292,7 @@ static int drive(struct nav_texture_stream *s, double amplitude, int n, struct n
     return count;
 }
 
-static void windows_name_surfaces_borders_and_strangers(void **state)
+static void windows_name_surfaces_and_borders(void **state)
 {
     (void)state;
     struct model m;
@@ -357,10 +307,60 @@ static void windows_name_surfaces_borders_and_strangers(void **state)
     drive(s, 7.4, 16, &d, loglik);
     drive(s, 1.0, 16, &d, loglik);
     assert_true(d.label == 0 && d.border); /* a border in the middle: the later half counts */
-    drive(s, 400.0, 32, &d, loglik);
-    assert_int_equal(d.label, NAV_TEXTURE_UNKNOWN);
-    assert_true(d.distance > m.unknown);
     nav_texture_stream_free(s);
+    nav_texture_rung_free(m.rung);
+}
+
+/* Surfaces at 0 and 4 in the log of the power, about 2 with a spread of 10 those never trained. */
+static struct nav_texture_novelty *novelty_of(const struct model *m)
+{
+    enum { ROWS = 3 };
+    static double turn[FEATURES_MOST * FEATURES_MOST], mean[ROWS * FEATURES_MOST], recording[ROWS * FEATURES_MOST];
+    double noise[FEATURES_MOST], limit[NAV_TEXTURE_NOVELTY_STEPS] = {0.0};
+    int count = nav_texture_rung_count(m->rung), power = count - 2;
+    for (int f = 0; f < count; f++) {
+        turn[f * count + f] = noise[f] = 1.0;
+        for (int row = 0; row < ROWS; row++)
+            recording[row * count + f] = row == 2 && f == power ? 100.0 : 1.0;
+    }
+    mean[count + power] = 4.0;
+    mean[2 * count + power] = 2.0;
+    const struct nav_texture_novelty_numbers n = {.classes = 2,
+                                                  .features = count,
+                                                  .turn = turn,
+                                                  .mean = mean,
+                                                  .recording = recording,
+                                                  .noise = noise,
+                                                  .limit = limit,
+                                                  .scale = 1.0};
+    return nav_texture_novelty_new(&n);
+}
+
+/* Windows of 16, as novelty's own, of 32, and sequential decisions, which would be sure of the louder class at once. */
+static void a_surface_never_trained_is_unknown_in_windows_of_any_length(void **state)
+{
+    (void)state;
+    struct model m;
+    make_model(&m);
+    for (int mode = 0; mode < 3; mode++) {
+        struct nav_texture_decision d;
+        double loglik[2];
+        struct nav_texture_rules rules = rules_of(&m, mode == 2 ? 16 : 0);
+        rules.novelty = novelty_of(&m);
+        rules.window = mode == 0 ? 16 : 32;
+        struct nav_texture_stream *s = nav_texture_stream_new(&rules);
+        drive(s, 1.0, 32, &d, loglik);
+        assert_true(d.label == 0 && d.novelty < 0.0);
+        nav_texture_stream_reset(s);
+        drive(s, 400.0, 64, &d, loglik);
+        assert_true(d.label == NAV_TEXTURE_UNKNOWN && d.novelty > 1.0 && d.samples == rules.window);
+        drive(s, NAN, 64, &d, loglik); /* what nobody can read ends the row */
+        assert_true(d.novelty == 0.0);
+        drive(s, 1.0, 64, &d, loglik);
+        assert_true(d.label == 0 && d.novelty < 0.0);
+        nav_texture_stream_free(s);
+        nav_texture_novelty_free(rules.novelty);
+    }
     nav_texture_rung_free(m.rung);
 }
 
@@ -411,7 +411,6 @@ static void impossible_rules_make_no_stream(void **state)
                                       .window = 32,
                                       .rungs = 2,
                                       .rung = twice,
-                                      .unknown = limit,
                                       .border = limit,
                                       .limits = {.channels = 1}};
     assert_null(nav_texture_stream_new(&rules));
@@ -435,8 +434,8 @@ int main(void)
         cmocka_unit_test(missing_samples_and_spikes_are_bridged_and_counted),
         cmocka_unit_test(two_samples_at_or_beyond_a_stop_are_a_rail),
         cmocka_unit_test(stuck_railed_and_caught_channels_are_told),
-        cmocka_unit_test(the_distance_is_weighed_along_each_axis),
-        cmocka_unit_test(windows_name_surfaces_borders_and_strangers),
+        cmocka_unit_test(windows_name_surfaces_and_borders),
+        cmocka_unit_test(a_surface_never_trained_is_unknown_in_windows_of_any_length),
         cmocka_unit_test(bad_windows_are_no_evidence_and_never_nan),
         cmocka_unit_test(sequential_decisions_stop_when_sure_and_give_up),
         cmocka_unit_test(impossible_rules_make_no_stream),

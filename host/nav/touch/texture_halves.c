@@ -44,9 +44,8 @@ int nav_texture_halves_judge(struct nav_texture_halves *h, struct nav_texture_sp
 {
     int first = n / 2, later = n - first;
     const double *middle = from + (size_t)first * (size_t)h->channels;
-    double distance;
-    int one = nav_texture_span_judge(span, from, first, h->half[1], &distance);
-    int two = nav_texture_span_judge(span, middle, later, h->half[2], &distance);
+    int one = nav_texture_span_judge(span, from, first, h->half[1]);
+    int two = nav_texture_span_judge(span, middle, later, h->half[2]);
     if (one != two || one < 0)
         return -1;
     blend(h, loglik);

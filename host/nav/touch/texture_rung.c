@@ -13,34 +13,27 @@ struct nav_texture_rung {
     struct nav_texture_rung_numbers n; /* its arrays are the rung's own */
     int features;
     struct nav_texture_features *reduce;
-    float *projection;    /* [F][H]: a row per feature, so that the inner loop runs over neighbours; single precision
-                             is finer than any feature and twice as fast */
-    float *projected;     /* [H] */
-    double *threshold;    /* [H] */
-    double *expanded;     /* [F + H] */
-    double *turned;       /* [F][axes] */
-    double *along;        /* [axes] */
-    double *middle_along; /* [K][axes] */
+    float *projection; /* [F][H]: a row per feature, so that the inner loop runs over neighbours; single precision
+                          is finer than any feature and twice as fast */
+    float *projected;  /* [H] */
+    double *threshold; /* [H] */
+    double *expanded;  /* [F + H] */
 };
 
 static bool numbers_ok(const struct nav_texture_rung_numbers *n)
 {
     return n->classes >= 1 && n->classes <= NAV_TEXTURE_CLASSES_MAX && n->hidden >= 0 &&
-           n->hidden <= NAV_TEXTURE_HIDDEN_MAX && n->axes >= 0 && isfinite(n->temper) && n->temper >= 0.0;
+           n->hidden <= NAV_TEXTURE_HIDDEN_MAX && isfinite(n->temper) && n->temper >= 0.0;
 }
 
 static bool own_arrays(struct nav_texture_rung *r)
 {
-    size_t f = (size_t)r->features, k = (size_t)r->n.classes, h = (size_t)r->n.hidden, a = (size_t)r->n.axes;
+    size_t f = (size_t)r->features, k = (size_t)r->n.classes, h = (size_t)r->n.hidden;
     bool ok = nav_texture_own(&r->n.floor, (size_t)r->n.channels);
     ok = nav_texture_own(&r->n.centre, f) && ok;
     ok = nav_texture_own(&r->n.scale, f) && ok;
     ok = nav_texture_own(&r->n.weight, (f + h) * k) && ok;
     ok = nav_texture_own(&r->n.bias, k) && ok;
-    ok = nav_texture_own(&r->n.middle, k * f) && ok;
-    ok = nav_texture_own(&r->n.axis, a * f) && ok;
-    ok = nav_texture_own(&r->n.axis_weight, k * a) && ok;
-    ok = nav_texture_own(&r->n.beyond, k) && ok;
     return ok;
 }
 
@@ -63,40 +56,11 @@ static bool make_projections(struct nav_texture_rung *r)
     return true;
 }
 
-/* out[axis] = x along each axis; row by row of features, so that the inner loop runs over neighbours. */
-static void along_axes(const struct nav_texture_rung *r, const double *x, double *restrict out)
-{
-    int axes = r->n.axes;
-    memset(out, 0, (size_t)axes * sizeof *out);
-    for (int f = 0; f < r->features; f++) {
-        const double *row = r->turned + (size_t)f * (size_t)axes;
-        for (int a = 0; a < axes; a++)
-            out[a] += x[f] * row[a];
-    }
-}
-
-static bool make_axes(struct nav_texture_rung *r)
-{
-    size_t axes = (size_t)r->n.axes, features = (size_t)r->features;
-    r->turned = calloc(features * axes + 1, sizeof *r->turned);
-    r->along = calloc(axes + 1, sizeof *r->along);
-    r->middle_along = calloc((size_t)r->n.classes * axes + 1, sizeof *r->middle_along);
-    if (!r->turned || !r->along || !r->middle_along)
-        return false;
-    for (size_t a = 0; a < axes; a++) {
-        for (size_t f = 0; f < features; f++)
-            r->turned[f * axes + a] = r->n.axis[a * features + f];
-    }
-    for (size_t k = 0; k < (size_t)r->n.classes; k++)
-        along_axes(r, r->n.middle + k * features, r->middle_along + k * axes);
-    return true;
-}
-
 static bool make(struct nav_texture_rung *r)
 {
     bool owned = own_arrays(r);
     r->expanded = calloc((size_t)(r->features + r->n.hidden), sizeof *r->expanded);
-    return make_projections(r) && owned && r->expanded && r->n.axes <= r->features && make_axes(r);
+    return make_projections(r) && owned && r->expanded;
 }
 
 struct nav_texture_rung *nav_texture_rung_new(const struct nav_texture_rung_numbers *numbers)
@@ -122,9 +86,7 @@ void nav_texture_rung_free(struct nav_texture_rung *r)
 {
     if (!r)
         return;
-    const double *arrays[] = {r->n.floor,  r->n.centre, r->n.scale,       r->n.weight,  r->n.bias,
-                              r->n.middle, r->n.axis,   r->n.axis_weight, r->threshold, r->expanded,
-                              r->turned,   r->along,    r->middle_along,  r->n.beyond};
+    const double *arrays[] = {r->n.floor, r->n.centre, r->n.scale, r->n.weight, r->n.bias, r->threshold, r->expanded};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++)
         free((void *)arrays[i]);
     free(r->projection);
@@ -188,30 +150,8 @@ static void score(const struct nav_texture_rung *r, const double *x, double *log
         loglik[k] = (loglik[k] - best) * r->n.temper;
 }
 
-/* Squared distance from a class's middle: along each axis by the class's variance there, beyond the axes by one. */
-static double distance(const struct nav_texture_rung *r, int class_index)
-{
-    const double *middle = r->n.middle + (size_t)class_index * (size_t)r->features;
-    const double *there = r->middle_along + (size_t)class_index * (size_t)r->n.axes;
-    const double *weight = r->n.axis_weight + (size_t)class_index * (size_t)r->n.axes;
-    double rest = 0.0, sum = 0.0;
-    for (int f = 0; f < r->features; f++)
-        rest += (r->expanded[f] - middle[f]) * (r->expanded[f] - middle[f]);
-    for (int a = 0; a < r->n.axes; a++) {
-        double apart = r->along[a] - there[a];
-        sum += apart * apart * weight[a];
-        rest -= apart * apart;
-    }
-    return (sum + fmax(rest, 0.0) * r->n.beyond[class_index]) / r->features;
-}
-
-double nav_texture_rung_judge(struct nav_texture_rung *r, const double *window, double *loglik)
+void nav_texture_rung_judge(struct nav_texture_rung *r, const double *window, double *loglik)
 {
     nav_texture_rung_expand(r, window, r->expanded);
     score(r, r->expanded, loglik);
-    along_axes(r, r->expanded, r->along);
-    double nearest = INFINITY;
-    for (int k = 0; k < r->n.classes; k++)
-        nearest = fmin(nearest, distance(r, k));
-    return nearest;
 }

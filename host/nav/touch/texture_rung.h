@@ -2,8 +2,7 @@
  *
  * Features (texture_features.h), standardised; beside them `hidden` random projections cut at zero, which let a linear
  * rule bend (random features, Rahimi and Recht 2008; a seed stands for the projections in model files); then a linear
- * discriminant, whose scores are log-likelihoods up to a constant, tempered to what held-out recordings bear out. How
- * far the features lie from every class's middle says whether the surface was ever trained.
+ * discriminant, whose scores are log-likelihoods up to a constant, tempered to what held-out recordings bear out.
  */
 #ifndef NAV_TEXTURE_RUNG_H
 #define NAV_TEXTURE_RUNG_H
@@ -15,19 +14,15 @@ struct nav_texture_rung;
 
 enum { NAV_TEXTURE_CLASSES_MAX = 256, NAV_TEXTURE_HIDDEN_MAX = 4096 };
 
-/* A rung's numbers. F: features, H: hidden, K: classes, R: axes. All arrays are copied. */
+/* A rung's numbers. F: features, H: hidden, K: classes. All arrays are copied. */
 struct nav_texture_rung_numbers {
-    int classes, channels, length, levels, hidden, axes;
+    int classes, channels, length, levels, hidden;
     int shorter;                  /* as in texture_features.h */
     uint64_t seed;                /* of the projections */
     double temper;                /* >= 0; scores are multiplied by it */
     const double *floor;          /* [channels] counts squared */
     const double *centre, *scale; /* [F] feature -> (feature - centre) * scale */
     const double *weight, *bias;  /* [F + H][K], [K] */
-    const double *middle;         /* [K][F] standardised features of each class */
-    const double *axis;           /* [R][F] orthonormal, of the spread within classes */
-    const double *axis_weight;    /* [K][R] 1 / variance of each class, R at most F */
-    const double *beyond;         /* [K] the same of each feature outside the axes */
 };
 
 /* NULL when a size is out of range, a number is not finite, or memory is short. */
@@ -37,10 +32,8 @@ void nav_texture_rung_free(struct nav_texture_rung *);
 /* Standardised features and projections of a window: out[F + H]; what a trainer fits its weights to. */
 void nav_texture_rung_expand(struct nav_texture_rung *, const double *window, double *out);
 
-/* window: [length][channels], finite and within +-1e9. loglik[K]: tempered, the largest is 0. Returns the squared
- * distance to the nearest class's middle, divided by the number of features: about 1 for a trained surface. Allocates
- * nothing. */
-double nav_texture_rung_judge(struct nav_texture_rung *, const double *window, double *loglik);
+/* window: [length][channels], finite and within +-1e9. loglik[K]: tempered, the largest is 0. Allocates nothing. */
+void nav_texture_rung_judge(struct nav_texture_rung *, const double *window, double *loglik);
 /* cffi: end */
 
 /* Standardised features [nav_texture_rung_count()] of the last window judged. */

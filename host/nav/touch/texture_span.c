@@ -55,19 +55,17 @@ static void finish(const struct nav_texture_span *s, double *loglik, int windows
         loglik[k] = (loglik[k] - best) * factor;
 }
 
-int nav_texture_span_judge(struct nav_texture_span *s, const double *window, int n, double *loglik, double *distance)
+int nav_texture_span_judge(struct nav_texture_span *s, const double *window, int n, double *loglik)
 {
     int rung = longest_within(s, n);
     memset(loglik, 0, (size_t)s->classes * sizeof *loglik);
-    *distance = 0.0;
     if (rung < 0)
         return -1;
     int length = nav_texture_rung_length(s->rung[rung]);
     int windows = (n + length - 1) / length;
     for (int w = 0; w < windows; w++) {
         long start = windows > 1 ? (long)(n - length) * w / (windows - 1) : 0;
-        *distance +=
-            nav_texture_rung_judge(s->rung[rung], window + (size_t)start * (size_t)s->channels, s->part) / windows;
+        nav_texture_rung_judge(s->rung[rung], window + (size_t)start * (size_t)s->channels, s->part);
         for (int k = 0; k < s->classes; k++)
             loglik[k] += s->part[k];
     }

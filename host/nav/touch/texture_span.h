@@ -11,8 +11,8 @@ struct nav_texture_span *nav_texture_span_new(const struct nav_texture_rules *);
 void nav_texture_span_free(struct nav_texture_span *);
 
 /* window: [n][channels], finite. The longest rung that fits covers it in evenly spaced, overlapping windows, whose
- * log-likelihoods are averaged and grow with the number of whole lengths; the distance is their mean. Returns the rung,
- * or -1 (log-likelihoods 0) when the stretch is shorter than every rung. */
-int nav_texture_span_judge(struct nav_texture_span *, const double *window, int n, double *loglik, double *distance);
+ * log-likelihoods are averaged and grow with the number of whole lengths. Returns the rung, or -1 (log-likelihoods 0)
+ * when the stretch is shorter than every rung. */
+int nav_texture_span_judge(struct nav_texture_span *, const double *window, int n, double *loglik);
 
 #endif

@@ -18,7 +18,7 @@
 struct nav_texture_stream {
     struct nav_texture_rules rules; /* its pointers are the stream's own, but for what is lent */
     struct nav_texture_rung *rung[NAV_TEXTURE_RUNGS_MAX];
-    double unknown[NAV_TEXTURE_RUNGS_MAX], border[NAV_TEXTURE_RUNGS_MAX];
+    double border[NAV_TEXTURE_RUNGS_MAX];
     struct nav_texture_span *span;
     double *limits; /* [6][channels] the stream's own */
     double *raw;    /* [room][channels] samples since the last decision */
@@ -27,7 +27,9 @@ struct nav_texture_stream {
     int since; /* samples since the surface changed, or SINCE_LONG */
     struct nav_texture_halves halves;
     struct nav_texture_watch watch;
-    int kind;      /* likeliest class of the windows in a row that are judged together, or NAV_TEXTURE_UNKNOWN */
+    int kind;      /* surface of the windows in a row that are judged together, or NAV_TEXTURE_UNKNOWN */
+    int named;     /* surface last named with confidence, or NAV_TEXTURE_UNKNOWN, ... */
+    int named_for; /* ... and for how many samples in a row, counted up to where it becomes `kind` */
     double beyond; /* novelty score of the windows in a row, 0 before the first */
     double *apart; /* [novelty's length][channels] samples since its last window, then [classes]; unused if aligned */
     int apart_held;
@@ -85,11 +87,9 @@ static bool allocate(struct nav_texture_stream *s)
 
 static void own_limits(struct nav_texture_stream *s)
 {
-    memcpy(s->unknown, s->rules.unknown, (size_t)s->rules.rungs * sizeof *s->unknown);
     memcpy(s->border, s->rules.border, (size_t)s->rules.rungs * sizeof *s->border);
     memcpy(s->rung, s->rules.rung, (size_t)s->rules.rungs * sizeof *s->rung);
     s->rules.rung = s->rung;
-    s->rules.unknown = s->unknown;
     s->rules.border = s->border;
     struct nav_texture_limits *l = &s->rules.limits;
     int channels = l->channels;
@@ -137,7 +137,8 @@ void nav_texture_stream_free(struct nav_texture_stream *s)
 /* The windows to come are not judged together with those before. */
 static void new_surface(struct nav_texture_stream *s)
 {
-    s->kind = NAV_TEXTURE_UNKNOWN;
+    s->kind = s->named = NAV_TEXTURE_UNKNOWN;
+    s->named_for = 0;
     s->beyond = 0.0;
     s->apart_held = 0;
     if (s->rules.novelty)
@@ -184,28 +185,34 @@ static void weigh_novelty(struct nav_texture_stream *s)
     s->beyond = nav_texture_novelty_weigh(s->rules.novelty, features);
 }
 
-/* How far beyond every trained surface this stretch lies, or the windows in a row that it ends: above 1 is never
- * trained. A surface named with confidence, where another was before, begins a new row. */
-static double novelty(struct nav_texture_stream *s, const struct nav_texture_decision *d, int rung, int n)
+/* Novelty score of the windows in a row. Another surface, named with confidence for longer than one window, begins a
+ * new row: one that was never trained takes the names of its neighbours in turn. */
+static void follow_row(struct nav_texture_stream *s, const struct nav_texture_decision *d, int n)
 {
-    double alone = d->distance / s->rules.unknown[rung];
-    if (!aligned(s) || n != s->held)
-        return fmax(alone, s->beyond);
-    bool sure = d->confidence > SURE;
-    if (sure && s->kind != NAV_TEXTURE_UNKNOWN && s->kind != d->label)
-        new_surface(s);
-    if (sure)
-        s->kind = d->label;
-    weigh_novelty(s);
-    return fmax(alone, s->beyond);
+    if (d->confidence > SURE) {
+        int fresh = s->rules.step > 0 ? s->rules.step : s->held;
+        s->named_for = (d->label == s->named ? s->named_for : 0) + fresh;
+        s->named = d->label;
+    }
+    if (s->named == s->kind) {
+        s->named_for = 0;
+    } else if (s->named_for > novelty_length(s)) {
+        int named = s->named;
+        if (s->kind != NAV_TEXTURE_UNKNOWN)
+            new_surface(s);
+        s->kind = s->named = named;
+        s->named_for = 0;
+    }
+    if (aligned(s) && n == s->held)
+        weigh_novelty(s);
 }
 
 /* A surface that lies beyond every trained one is weak evidence for any of them: the farther, the weaker. */
-static bool never_trained(const struct nav_texture_stream *s, double beyond, double *loglik)
+static bool never_trained(const struct nav_texture_stream *s, double *loglik)
 {
-    for (int k = 0; k < s->rules.classes && beyond > 1.0; k++)
-        loglik[k] /= beyond;
-    return beyond > 1.0;
+    for (int k = 0; k < s->rules.classes && s->beyond > 1.0; k++)
+        loglik[k] /= s->beyond;
+    return s->beyond > 1.0;
 }
 
 /* A whisker that still rings from another surface says little of this one. Windows so long that the ringing is a small
@@ -252,16 +259,15 @@ static bool goes_on(const struct nav_texture_stream *s, double confidence, bool 
 
 /* Label and confidence. Samples are taken until they look sure, so a sequential decision's evidence is less than it
  * looks: `told` of it is kept. */
-static void answer(const struct nav_texture_stream *s, struct nav_texture_decision *d, double *loglik, bool unknown,
-                   double beyond)
+static void answer(const struct nav_texture_stream *s, struct nav_texture_decision *d, double *loglik, bool unknown)
 {
     int classes = s->rules.classes;
     double least = s->rules.step > 0 ? s->rules.sure : s->rules.doubt;
     bool unsure = best(loglik, classes, &d->label) < least;
     for (int k = 0; k < classes && s->rules.step > 0; k++)
         loglik[k] *= s->rules.told;
-    d->confidence = best(loglik, classes, &d->label) / fmax(beyond, 1.0);
-    if (unknown || unsure || beyond > 1.0)
+    d->confidence = best(loglik, classes, &d->label) / fmax(s->beyond, 1.0);
+    if (unknown || unsure || s->beyond > 1.0)
         d->label = NAV_TEXTURE_UNKNOWN;
 }
 
@@ -272,7 +278,7 @@ static bool decide(struct nav_texture_stream *s, struct nav_texture_decision *d,
     bool cut = s->since < s->held; /* what lies before the border says nothing of the surface now */
     int n = cut ? s->since : s->held;
     const double *from = s->clean + (size_t)(s->held - n) * (size_t)s->rules.channels;
-    int rung = clean(s, d) ? nav_texture_span_judge(s->span, from, n, loglik, &d->distance) : -1;
+    int rung = clean(s, d) ? nav_texture_span_judge(s->span, from, n, loglik) : -1;
     d->border = cut || (d->health.caught > 0 && d->health.railed == 0);
     if (rung < 0) {
         no_evidence(s, d, loglik);
@@ -280,13 +286,14 @@ static bool decide(struct nav_texture_stream *s, struct nav_texture_decision *d,
     }
     int half_rung = nav_texture_halves_judge(&s->halves, s->span, from, n, loglik);
     d->confidence = best(loglik, s->rules.classes, &d->label);
-    double beyond = novelty(s, d, rung, n);
-    bool untrained = never_trained(s, beyond, loglik);
+    follow_row(s, d, n);
+    d->novelty = s->beyond;
+    bool untrained = never_trained(s, loglik);
     if (goes_on(s, best(loglik, s->rules.classes, &d->label), untrained))
         return false;
     bool halves = nav_texture_halves_border(&s->halves, loglik, rung, half_rung);
     d->border = cut || (halves && !watched(s));
-    answer(s, d, loglik, rings(s, loglik), beyond);
+    answer(s, d, loglik, rings(s, loglik));
     return true;
 }
 

@@ -18,7 +18,6 @@ struct nav_texture_rules {
     int window;                           /* samples, from 2 to NAV_TEXTURE_WINDOW_MAX */
     int rungs;                            /* at least 1; their windows grow from rung to rung */
     struct nav_texture_rung *const *rung; /* [rungs] lent for the stream's life; not for use by two threads at a time */
-    const double *unknown;                /* [rungs] squared distance beyond which a surface was never trained */
     const double *border;                 /* [rungs] two neighbouring stretches that share a class this badly, in nats,
                                              are two surfaces */
     double growth;                        /* evidence of m rung lengths is m^growth that of one: 1 if independent */
@@ -30,8 +29,8 @@ struct nav_texture_rules {
     double told;                          /* factor of the log-likelihoods of a sequential decision, >= 0 */
     struct nav_texture_limits limits;     /* channels as above */
     struct nav_texture_change *change;   /* lent to this stream alone; NULL: borders are those of the windows' halves */
-    struct nav_texture_novelty *novelty; /* likewise, of the features of novelty_rung; NULL: windows are judged one by
-                                            one, by `unknown` */
+    struct nav_texture_novelty *novelty; /* likewise, of the features of novelty_rung; NULL: every surface is taken
+                                            for a trained one */
     int novelty_rung;
     struct nav_texture_settle *settle; /* likewise, of blocks as long as `change`'s; NULL: ringing passes for a floor */
 };
@@ -43,8 +42,9 @@ struct nav_texture_decision {
     int notice;        /* no window, but word of a border at once: no label, no evidence. The window goes on, and at its
                         * end is judged by what lies behind the border */
     double confidence; /* of the likeliest class, all being equally likely before: 0 without evidence;
-                        * less by as much as the distance exceeds its limit */
-    double distance;   /* squared, of the features from the nearest class: about 1 for a trained surface */
+                        * divided by a novelty score above 1 */
+    double novelty;    /* score of the last windows, above 1 for a surface never trained; 0 before the first,
+                        * below 0 for many a trained one */
     struct nav_texture_health health;
 };
 

@@ -145,10 +145,6 @@ CASES = {
         scale=(0,),
         weight=(0, 1),
         bias=(0,),
-        middle=(0, 1),
-        axis=(1,),
-        axis_weight=(0, 1),
-        beyond=(0,),
     ),
     "touch.texture.rung.Rung.expand": of_one(rung().expand, "windows", np.zeros((2, LENGTH, CHANNELS)), 1, 2),
     "touch.texture.rung.plain_features": Case(

@@ -15,10 +15,9 @@ LIMITS = {name: np.array(values) for name, values in LIMITS.items()}
 
 
 def rung() -> Rung:
-    sizes = {"centre": (FEATURES,), "weight": (FEATURES, CLASSES), "bias": (CLASSES,), "middle": (CLASSES, FEATURES)}
-    sizes |= {"axis": (1, FEATURES), "axis_weight": (CLASSES, 1)}
+    sizes = {"centre": (FEATURES,), "weight": (FEATURES, CLASSES), "bias": (CLASSES,)}
     arrays = {name: np.zeros(shape) for name, shape in sizes.items()}
-    ones = {"floor": np.ones(CHANNELS), "scale": np.ones(FEATURES), "beyond": np.ones(CLASSES)}
+    ones = {"floor": np.ones(CHANNELS), "scale": np.ones(FEATURES)}
     return Rung(LENGTH, False, 0, 0, **arrays, **ones, span=np.full(CHANNELS, 1e4))
 
 

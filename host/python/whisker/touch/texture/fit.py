@@ -3,7 +3,7 @@
 Sums over windows are kept by fold, so that leaving one fold out is a subtraction, not a new pass over the data.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,9 +17,6 @@ LEAST_GAIN = 0.005  # nats: a smaller fall is chance, however large a share of a
 LEVELS_MUST_GAIN = 0.5  # the same for channel means: a rest drifts, and a mean may tell the session, not the surface
 STRETCHES = 8  # of a window, end to end, judged beside the whole where they pay ...
 STRETCHES_MUST_GAIN = 0.05  # ... in nats a window: they cost it a third more time, however little there is left to gain
-AXES_MOST = 16  # of the distance that tells unknown surfaces
-UNKNOWN_QUANTILE = 0.995  # of held-out windows of trained surfaces
-PRIOR_WINDOWS = 20.0  # with the variances of all classes, that a class's own are mixed with
 TEMPER_STEPS = 30  # of the search for a temperature; Newton needs about six, halving the rest
 
 
@@ -94,12 +91,9 @@ def _trial(data: Windows, floor: np.ndarray, levels: bool, shorter: int, sizes: 
     raw = plain_features(data.windows, levels, floor, shorter)
     centre, scale = raw.mean(axis=0), 1.0 / (raw.std(axis=0) + 1e-6)
     features, classes = raw.shape[1], data.classes
-    nothing = np.zeros((0, features))
-    blank = Rung(
-        data.windows.shape[1], levels, shorter, max(sizes), floor, centre, scale,
-        np.zeros((features + max(sizes), classes)), np.zeros(classes), np.zeros((classes, features)), nothing, np.zeros((classes, 0)),
-        np.zeros(classes),
-    )  # fmt: skip
+    weight = np.zeros((features + max(sizes), classes))
+    length = data.windows.shape[1]
+    blank = Rung(length, levels, shorter, max(sizes), floor, centre, scale, weight, np.zeros(classes))
     expanded = blank.expand(data.windows) if max(sizes) else (raw - centre) * scale
     sums = _Sums(expanded, data)
     best = None
@@ -111,10 +105,7 @@ def _trial(data: Windows, floor: np.ndarray, levels: bool, shorter: int, sizes: 
 
 
 def _finished(trial: _Trial, data: Windows) -> Fitted:
-    features = trial.expanded[:, : len(trial.blank.centre)]
     rungs = [_finish(trial.blank, trial.sums, left_out, trial.best) for left_out in (None, *range(data.folds))]
-    _spread(rungs, features, data)
-    _limit(rungs, features, data)
     return Fitted(rungs[0], rungs[1:], trial.best.loglik, trial.loss)
 
 
@@ -199,51 +190,4 @@ def _finish(blank: Rung, sums: _Sums, left_out: int | None, chosen: _Candidate) 
     features = len(blank.centre)
     whole = sums.statistics(None, features + chosen.hidden) if left_out is None else None
     weight, bias = _discriminant(*whole, chosen.shrink) if whole else chosen.rules[left_out]
-    means, within = sums.statistics(left_out, features)
-    _, vectors = np.linalg.eigh(within)
-    axes = min(AXES_MOST, features)
-    return Rung(
-        blank.length, blank.levels, blank.shorter, chosen.hidden, blank.floor, blank.centre, blank.scale, weight, bias,
-        means, vectors[:, ::-1][:, :axes].T, np.zeros((len(means), axes)), np.zeros(len(means)), chosen.temper,
-    )  # fmt: skip
-
-
-def _spread(rungs: list[Rung], z: np.ndarray, data: Windows) -> None:
-    """Variances of each class along and beyond each rung's axes; few windows lean on what all classes have."""
-    for f, rung in enumerate(rungs, start=-1):
-        use = data.fold != f
-        along, rest = np.zeros((data.classes, len(rung.axis))), np.zeros(data.classes)
-        counts = np.bincount(data.label[use], minlength=data.classes)
-        outside = max(1, z.shape[1] - len(rung.axis))
-        for k in range(data.classes):
-            apart = z[use & (data.label == k)] - rung.middle[k]
-            squares = (apart @ rung.axis.T) ** 2
-            along[k] = squares.sum(axis=0)
-            rest[k] = max(0.0, (apart**2).sum() - squares.sum()) / outside
-        lean = PRIOR_WINDOWS / counts.sum()
-        along = (along + lean * along.sum(axis=0)) / (counts + PRIOR_WINDOWS)[:, None]
-        rest = (rest + lean * rest.sum()) / (counts + PRIOR_WINDOWS)
-        rung.axis_weight = 1.0 / np.maximum(along, 1e-6)
-        rung.beyond = 1.0 / np.maximum(rest, 1e-6) if z.shape[1] > len(rung.axis) else np.ones(data.classes)
-
-
-def _limit(rungs: list[Rung], z: np.ndarray, data: Windows) -> None:
-    """Scales distances so that each class keeps all but a few of its own held-out windows, and limits the nearest one's."""
-    held = np.empty((len(z), data.classes))
-    for f, twin in enumerate(rungs[1:]):
-        held[data.fold == f] = distances(twin, z[data.fold == f])
-    own = [np.quantile(held[data.label == k, k], UNKNOWN_QUANTILE) for k in range(data.classes)]
-    scale = 1.0 / np.maximum(own, 1e-12)
-    limit = float(np.quantile((held * scale).min(axis=1), UNKNOWN_QUANTILE))
-    for rung in rungs:
-        rung.axis_weight, rung.beyond = rung.axis_weight * scale[:, None], rung.beyond * scale
-        rung.unknown = limit
-
-
-def distances(rung: Rung, z: np.ndarray) -> np.ndarray:
-    """Squared distance of standardised features (m, F) from every class, per feature (m, K), as nav_texture_rung_judge."""
-    apart = z[:, None, :] - rung.middle[None]
-    along = apart @ rung.axis.T
-    inside = (along**2 * rung.axis_weight).sum(axis=2)
-    rest = np.maximum((apart**2).sum(axis=2) - (along**2).sum(axis=2), 0.0)
-    return (inside + rest * rung.beyond) / z.shape[1]
+    return replace(blank, hidden=chosen.hidden, weight=weight, bias=bias, temper=chosen.temper, _made=None)

@@ -22,19 +22,14 @@ class Rung:
     scale: np.ndarray  # (F,)
     weight: np.ndarray  # (F + hidden, classes)
     bias: np.ndarray  # (classes,)
-    middle: np.ndarray  # (classes, F)
-    axis: np.ndarray  # (axes, F)
-    axis_weight: np.ndarray  # (classes, axes)
-    beyond: np.ndarray  # (classes,)
     temper: float = 1.0
-    unknown: float = 1e9  # squared distance of a surface that was never trained
     border: float = 1e9  # nats
     span: np.ndarray | None = None  # (channels,) counts: the farthest that a window of this length may reach
     seed: int = SEED
     _made: object = field(default=None, repr=False, compare=False)
 
-    ARRAYS = ("floor", "centre", "scale", "weight", "bias", "middle", "axis", "axis_weight", "beyond")
-    NUMBERS = ("length", "levels", "shorter", "hidden", "temper", "unknown", "border", "seed")
+    ARRAYS = ("floor", "centre", "scale", "weight", "bias")
+    NUMBERS = ("length", "levels", "shorter", "hidden", "temper", "border", "seed")
 
     @property
     def native(self):
@@ -45,17 +40,15 @@ class Rung:
 
     def _make(self):
         features = feature_count(len(self.floor), self.length, self.levels, self.shorter)
-        classes, axes = len(self.bias), len(self.axis)
+        classes = len(self.bias)
         shapes = {"centre": (features,), "scale": (features,), "weight": (features + self.hidden, classes)}
-        shapes |= {"middle": (classes, features), "axis": (axes, features), "axis_weight": (classes, axes)}
-        shapes |= {"floor": (len(self.floor),), "bias": (classes,), "beyond": (classes,)}
+        shapes |= {"floor": (len(self.floor),), "bias": (classes,)}
         for name, shape in shapes.items():
             setattr(self, name, as_doubles(getattr(self, name), f"rung {self.length}: {name}", shape))
         numbers = ffi.new("struct nav_texture_rung_numbers *")
         numbers.classes, numbers.channels, numbers.length = classes, len(self.floor), self.length
         numbers.levels, numbers.shorter = int(self.levels), self.shorter
-        numbers.hidden, numbers.axes = self.hidden, axes
-        numbers.seed, numbers.temper = self.seed, self.temper
+        numbers.hidden, numbers.seed, numbers.temper = self.hidden, self.seed, self.temper
         for name in self.ARRAYS:
             setattr(numbers, name, doubles(getattr(self, name), name, shapes[name]))
         made = lib.nav_texture_rung_new(numbers)

@@ -44,7 +44,7 @@ class Judgement:
     label: int  # class, or -1
     confidence: float
     border: bool
-    distance: float
+    novelty: float  # score of the last windows, above 1 for a surface never trained; 0 before the first
     bad: int
     loglik: np.ndarray  # (classes,)
     notice: bool = False  # no window, but word of a border at once
@@ -139,13 +139,13 @@ def no_model(path, error: Exception) -> TableError:
 
 
 def _rung(fields: Fields) -> Rung:
-    flat = {name: fields.array(name, 1) for name in ("floor", "centre", "scale", "bias", "beyond", "span")}
-    square = {name: fields.array(name, 2) for name in ("weight", "middle", "axis", "axis_weight")}
-    square["axis"] = square["axis"].reshape(-1, len(flat["centre"]))
-    square["axis_weight"] = square["axis_weight"].reshape(len(flat["bias"]), -1)
+    flat = {name: fields.array(name, 1) for name in ("floor", "centre", "scale", "bias", "span")}
+    weight = fields.array("weight", 2)
     whole = {name: fields.whole(name, 0, LENGTH_MOST) for name in ("length", "shorter", "hidden")}
-    numbers = {name: fields.number(name, 0.0) for name in ("temper", "unknown", "border")}
-    return Rung(levels=fields.flag("levels"), seed=fields.whole("seed", 0, 2**63), **whole, **numbers, **flat, **square)
+    numbers = {name: fields.number(name, 0.0) for name in ("temper", "border")}
+    return Rung(
+        levels=fields.flag("levels"), seed=fields.whole("seed", 0, 2**63), weight=weight, **whole, **numbers, **flat
+    )
 
 
 def _part(kind, fields: Fields):
@@ -168,13 +168,8 @@ class Stream:
             len(model.rungs),
         )
         natives = ffi.new("struct nav_texture_rung *[]", [r.native for r in model.rungs])
-        unknown, border = (np.array([getattr(r, n) for r in model.rungs], float) for n in ("unknown", "border"))
-        each = (len(model.rungs),)
-        rules.rung, rules.unknown, rules.border = (
-            natives,
-            doubles(unknown, "unknown", each),
-            doubles(border, "border", each),
-        )
+        border = np.array([r.border for r in model.rungs], float)
+        rules.rung, rules.border = natives, doubles(border, "border", (len(model.rungs),))
         rules.growth, rules.together, rules.doubt, rules.sure = model.growth, model.together, model.doubt, model.sure
         rules.step, rules.patience, rules.told = step, patience, model.told
         self._parts = {
@@ -223,7 +218,7 @@ class Stream:
         d = self._decision
         border = bool(d.border)
         return Judgement(
-            end, d.samples, d.label, d.confidence, border, d.distance, d.health.bad, self._loglik.copy(), bool(d.notice)
+            end, d.samples, d.label, d.confidence, border, d.novelty, d.health.bad, self._loglik.copy(), bool(d.notice)
         )
 
 

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from .change import fit_change
-from .fit import UNKNOWN_QUANTILE, Fitted, Windows, fit, log_loss, temperature
+from .fit import Fitted, Windows, fit, log_loss, temperature
 from .novelty import fit_novelty
 from .settle import fit_settle
 from .spectral import SENSOR_STOPS, SpectralModel
@@ -23,6 +23,7 @@ REFUSE_MOST = 0.03  # share of held-out windows that want of confidence may cost
 REFUSE_UNTIL = 10.0  # ... unless fewer already cut wrong answers by this factor
 DOUBT_WINDOWS = 100  # fewer held-out windows do not show the quantile of their confidence: then ...
 DOUBT_PRIOR = 0.5  # ... "unknown" is what is likelier wrong than right
+RINGING_QUANTILE = 0.995  # of falls of the power in training recordings: faster is ringing
 SURE = (0.5, 0.6, 0.7, 0.8, 0.85, 0.9, 0.93, 0.95, 0.97, 0.98, 0.99, 0.995, 0.998, 0.999)
 
 
@@ -56,7 +57,7 @@ def train(
     block = max(LENGTH_LEAST, round(base / BLOCKS))
     model.change = fit_change(parts, labels, folds, block, floor)
     if model.change is not None:
-        model.settle = fit_settle(parts, block, floor, UNKNOWN_QUANTILE)
+        model.settle = fit_settle(parts, block, floor, RINGING_QUANTILE)
     model.novelty = _novelty(model, parts, labels, folds, base)
     progress(len(lengths) + 1, len(lengths) + 1)
     return model
