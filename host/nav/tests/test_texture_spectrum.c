@@ -356,7 +356,7 @@ static void a_surface_never_trained_is_unknown_in_windows_of_any_length(void **s
         assert_true(d.label == NAV_TEXTURE_UNKNOWN && d.novelty > 1.0 && d.samples == rules.window);
         drive(s, NAN, 64, &d, loglik); /* what nobody can read ends the row */
         assert_true(d.novelty == 0.0);
-        drive(s, 1.0, 64, &d, loglik);
+        drive(s, 1.0, 32, &d, loglik);
         assert_true(d.label == 0 && d.novelty < 0.0);
         nav_texture_stream_free(s);
         nav_texture_novelty_free(rules.novelty);
