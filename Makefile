@@ -6,7 +6,7 @@ BUILD := build/release
 PYTHON := .venv/bin/python
 SOURCES_C = $(shell git ls-files '*.c' '*.h' '*.cpp' | grep -v '/gen/')
 
-.PHONY: help demo demo-long test test-all test-kernel test-hil mutants bench sbom build setup gen firmware firmware-images flash bitstream format lint clean
+.PHONY: help demo demo-long test test-all test-kernel test-hil mutants bench sbom build setup gen firmware firmware-images firmware-check flash bitstream format lint clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
@@ -53,6 +53,10 @@ firmware: ## build the node's firmware with XC16 or XC-DSC, or PIC30=DIR, a publ
 
 firmware-images: ## make the committed images again, each build twice: PIC30=DIR
 	@tools/firmware/images.sh
+
+firmware-check: build ## execute the node's image against the firmware's C, at length: IMAGE=node_wire.hex, whoever built it
+	@WHISKER_BUILD=$(BUILD) WHISKER_IMAGE_LONG=1 WHISKER_IMAGE="$(abspath $(or $(IMAGE),firmware/images/mlx90333/node_wire.hex))" \
+		$(PYTHON) -m pytest --quiet sim/node_image
 
 flash: ## first programming of a node by wire, no compiler needed: TOOL=ipecmd|pk2cmd|picberry SERIAL=n [SENSOR=..] [HEX=file]
 	@tools/firmware/flash.sh --tool "$(TOOL)" $(if $(SERIAL),--serial "$(SERIAL)") $(if $(HEX),--hex "$(HEX)")

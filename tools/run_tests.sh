@@ -29,6 +29,8 @@ if [ "${1:-}" = --long ]; then
     build/release/host/libwhisker/test/stress_ring 100000
     echo "test: the bridge's two levels by more scripts"
     build/release/sim/bridge/tests/test_bridge_levels 4000 2
+    echo "test: the node's image, ten thousand ticks, each step of an update"
+    WHISKER_BUILD=build/release WHISKER_IMAGE_LONG=1 .venv/bin/python -m pytest --quiet sim/node_image
     echo "test: mutated recordings"
     .venv/bin/python host/python/tests/fuzz.py recording --inputs 300000
     echo "test: a Linux kernel and the simulated bridge"

@@ -90,7 +90,10 @@ struct dspic {
     struct dspic_violations violations;
 };
 
-/* registers.c */
+/* registers.c: one access with its side effects, and no time */
+uint16_t registers_read(struct dspic *chip, unsigned address);
+void registers_write(struct dspic *chip, unsigned address, uint16_t value);
+
 static inline uint16_t *sfr(struct dspic *chip, unsigned address)
 {
     return &chip->sfr[address / 2u];

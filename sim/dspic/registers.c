@@ -6,7 +6,7 @@ static bool within(unsigned address, unsigned first, unsigned last)
     return address >= first && address <= last;
 }
 
-static uint16_t look(struct dspic *chip, unsigned address)
+uint16_t registers_read(struct dspic *chip, unsigned address)
 {
     switch (address) {
     case SPI1BUF:
@@ -68,7 +68,7 @@ static void wrote(struct dspic *chip, unsigned address, uint16_t old)
     }
 }
 
-static void put(struct dspic *chip, unsigned address, uint16_t value)
+void registers_write(struct dspic *chip, unsigned address, uint16_t value)
 {
     const uint16_t old = *sfr(chip, address);
     const unsigned target = address == PORTB ? LATB : address;
@@ -78,20 +78,20 @@ static void put(struct dspic *chip, unsigned address, uint16_t value)
 
 uint16_t dspic_sfr_read(struct dspic *chip, uint16_t address)
 {
-    const uint16_t value = look(chip, address);
+    const uint16_t value = registers_read(chip, address);
     dspic_spend(chip, 1u);
     return value;
 }
 
 void dspic_sfr_write(struct dspic *chip, uint16_t address, uint16_t value)
 {
-    put(chip, address, value);
+    registers_write(chip, address, value);
     dspic_spend(chip, 1u);
 }
 
 void dspic_sfr_modify(struct dspic *chip, uint16_t address, uint16_t mask, uint16_t value)
 {
-    put(chip, address, (uint16_t)((*sfr(chip, address) & ~mask) | value));
+    registers_write(chip, address, (uint16_t)((*sfr(chip, address) & ~mask) | value));
     dspic_spend(chip, 1u);
 }
 

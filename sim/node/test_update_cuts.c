@@ -1,6 +1,6 @@
 /* The supply fails at each step of an update, and at any time: the node tells, what then runs is whole, and the next
  * update succeeds. WHISKER_CUTS=n: cuts at random times, 150 by default. With an argument: writes the table of the
- * steps there, as JSON. */
+ * steps there, as JSON; a second one is how many nodes of each. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -95,7 +95,7 @@ static void power_may_fail_at_each_word_of_the_header(void **state)
     assert_int_equal(seen[FATE_OLD], 0);
 }
 
-static int write_table(const char *path)
+static int write_table(const char *path, unsigned seeds)
 {
     FILE *file = fopen(path, "w");
     if (!file)
@@ -104,7 +104,7 @@ static int write_table(const char *path)
         const struct update_cut_case *row = &UPDATE_CUT_CASES[i];
         fprintf(file, "%s{\"step\": \"%s\", \"allowed\": %u, \"remark\": \"%s\", \"runs\": [", i ? ",\n " : "[",
                 row->name, row->fates, row->remark ? row->remark : "");
-        for (unsigned seed = 0; seed < SEEDS; seed++) {
+        for (unsigned seed = 0; seed < seeds; seed++) {
             const struct update_cut_outcome o = update_cut_run(row->cut, 0, seed);
             fprintf(file, "%s{\"fate\": %d, \"told\": %s, \"ticks\": %u, \"again\": %s}", seed ? ", " : "", (int)o.fate,
                     o.told ? "true" : "false", o.ticks, o.again ? "true" : "false");
@@ -122,5 +122,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(power_may_fail_at_each_word_of_the_header),
         cmocka_unit_test(power_may_fail_at_any_time),
     };
-    return argc > 1 ? write_table(argv[1]) : cmocka_run_group_tests(tests, NULL, NULL);
+    if (argc > 1)
+        return write_table(argv[1], argc > 2 ? (unsigned)strtoul(argv[2], NULL, 10) : SEEDS);
+    return cmocka_run_group_tests(tests, NULL, NULL);
 }

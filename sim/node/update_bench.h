@@ -5,8 +5,11 @@
 #include "service.h"
 #include "sim_node_lab.h"
 
+#ifndef UPDATE_ROWS
+#define UPDATE_ROWS 18 /* of the image: pages begin at rows 7 and 15 of it */
+#endif
+
 enum {
-    UPDATE_ROWS = 18, /* of the image: pages begin at rows 7 and 15 of it */
     UPDATE_BODY = UPDATE_ROWS * WHISKER_LIMIT_FLASH_ROW_BYTES,
     UPDATE_BLOCKS = UPDATE_BODY / SERVICE_BLOCK_BYTES,
     UPDATE_VERSION = 0x0203,
@@ -16,7 +19,10 @@ struct update_image {
     uint8_t bytes[WHISKER_IMAGE_HEADER_BYTES + UPDATE_BODY];
 };
 
-/* An application of some bytes; update_seal() makes its header's CRC right again after a change. */
+/* The application's rows: some bytes that differ with the version (update_body.c), or a program (sim/node_image). */
+void update_fill(uint8_t body[UPDATE_BODY], uint16_t version);
+
+/* An application of those rows; update_seal() makes its header's CRC right again after a change. */
 struct update_image update_image_of(uint16_t version);
 void update_seal(struct update_image *image);
 

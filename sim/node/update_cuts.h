@@ -25,7 +25,9 @@ struct update_cut_outcome {
 };
 
 /* At most: PLL 1.1 ms, the image compared, sensor and its wait 18.4 ms (2 % slow), then a reading and its transfer. */
-enum { UPDATE_CUT_TICKS = 43 };
+#ifndef UPDATE_CUT_TICKS
+#define UPDATE_CUT_TICKS 43u
+#endif
 
 /* Cuts the supply of node `seed` where `cut` says, or so long after the update began if that is not due. */
 struct update_cut_outcome update_cut_run(struct update_cut cut, uint64_t after_ns, uint64_t seed);

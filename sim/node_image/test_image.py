@@ -1,0 +1,116 @@
+"""The node's image, executed, against the firmware's C on the same simulated chip, sensor and link.
+
+Small runs of the committed image; `make firmware-check` makes the long ones (WHISKER_IMAGE_LONG), of any image
+(WHISKER_IMAGE: its node_wire.hex).
+"""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
+sys.path.insert(0, str(HERE))
+import translate  # noqa: E402  (finds its own neighbours)
+from translate import patches  # noqa: E402
+
+PROGRAMS = ROOT / os.environ.get("WHISKER_BUILD", "build/release") / "sim/node_image"
+IMAGE = Path(os.environ.get("WHISKER_IMAGE", ROOT / "firmware/images/mlx90333/node_wire.hex"))
+LONG = "WHISKER_IMAGE_LONG" in os.environ
+TICKS, SEEDS, BOOTS, CUT_SEEDS = (10000, (1, 2, 3), 50, 3) if LONG else (500, (1,), 5, 1)
+SERVED = {8 + irq for irq in (7, 9, 10, 14, 20, 29, 32)}
+CODES = {"trap": 10, "illegal opcode": 10, "watchdog": 9}  # whisker.toml: RESET_TRAP, RESET_WATCHDOG
+RESET_POWER = 8
+
+
+@pytest.fixture(scope="module")
+def table(tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("image") / "table"
+    path.write_bytes(translate.table_of(translate.flash_words(IMAGE)))
+    return path
+
+
+def run(program: str, *words, image: Path | None = None, costs: Path | None = None) -> subprocess.CompletedProcess:
+    names = {"NODE_IMAGE": image, "NODE_IMAGE_COSTS": costs}
+    environment = os.environ | {name: str(path) for name, path in names.items() if path}
+    command = [str(PROGRAMS / program), *map(str, words)]
+    return subprocess.run(command, env=environment, capture_output=True, text=True)
+
+
+def measured(program: str, *words, image: Path):
+    done = run(program, *words, image=image)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_every_record_is_the_one_that_the_c_makes(table, tmp_path, seed):
+    wanted = run("native_records", TICKS, seed)
+    found = run("image_records", TICKS, seed, image=table, costs=tmp_path / "costs")
+    assert found.returncode == 0, found.stderr
+    pairs = zip(wanted.stdout.splitlines(), found.stdout.splitlines(), strict=True)
+    assert [pair for pair in pairs if pair[0] != pair[1]] == []
+    assert wanted.stdout.splitlines()[-1] == "breaches 0"
+    assert wanted.stdout.count(" good") > TICKS / 2
+    costs = json.loads((tmp_path / "costs").read_text())
+    assert costs["spoiled"] == 0, "an interrupt leaves a register other than it found it"
+    assert costs["handlers"]["SYNC"]["count"] >= TICKS * 9 // 10
+
+
+@pytest.mark.parametrize("name", patches.patches())
+def test_a_fault_of_the_port_is_noticed(tmp_path, name):
+    broken = tmp_path / "broken"
+    words = translate.flash_words(ROOT / "firmware/images/mlx90333/node_wire.hex")
+    broken.write_bytes(translate.table_of(patches.apply(words, name)))
+    wanted, found = run("native_records", 500, 1), run("image_records", 500, 1, image=broken)
+    assert wanted.returncode == 0
+    assert found.returncode != 0 or found.stdout != wanted.stdout
+
+
+def test_each_vector_leads_to_its_handler_or_to_a_reset(table):
+    outcomes = measured("image_check", "vectors", image=table)
+    for program in ("application", "loader"):
+        assert {n for n, what in enumerate(outcomes[program]) if what == "returns"} == SERVED
+        assert {n for n, what in enumerate(outcomes[program]) if what not in ("returns", "restarts")} == {5, 6, 7}
+
+
+def test_a_node_starts_whatever_its_memory_holds(table):
+    boots = measured("image_check", "boots", BOOTS, image=table)
+    assert len(boots) == BOOTS
+    assert all(boot == {"good": True, "lost": 0, "breaches": 0} for boot in boots), boots
+
+
+def test_a_node_is_back_after_every_kind_of_reset_at_its_full_clock(table):
+    resets = measured("image_check", "resets", image=table)
+    assert len(resets) == 12
+    for reset in resets:
+        told = CODES.get(reset["cause"], RESET_POWER)
+        assert reset["good"] and reset["breaches"] == 0, reset
+        assert reset["told"] & 1 << told and not reset["told"] & 0x700 & ~(1 << told), reset
+        assert reset["hz"][0] == reset["hz"][1] > 38_000_000, reset
+
+
+def test_the_supply_may_fail_at_each_step_of_an_update(table, tmp_path):
+    done = run("image_cuts", tmp_path / "cuts", CUT_SEEDS, image=table)
+    assert done.returncode == 0, done.stderr
+    steps = json.loads((tmp_path / "cuts").read_text())
+    assert len(steps) == 19
+    for step in steps:
+        for one in step["runs"]:
+            assert one["fate"] & step["allowed"] and one["told"] and one["again"] and one["ticks"] <= 90, step
+
+
+@pytest.mark.skipif(not LONG, reason="long: make firmware-check")
+def test_the_supply_may_fail_at_any_time_of_an_update(table):
+    done = run("image_cuts", image=table)
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.skipif(not LONG, reason="long: make firmware-check")
+def test_a_thousand_schedules_of_random_faults(table):
+    done = run("image_storm", 0, 1, image=table)
+    assert done.returncode == 0, done.stdout
