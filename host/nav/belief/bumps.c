@@ -59,19 +59,6 @@ struct nav_pose nav_bumps_draw(const struct nav_prior *prior, struct nav_rng *rn
     return pose;
 }
 
-double nav_bumps_density(const struct nav_prior *prior, struct nav_pose pose)
-{
-    double sum = 0.0;
-    for (long n = 0; n < prior->bumps; n++) {
-        const struct nav_component *b = &prior->bump[n];
-        double x = (pose.x - b->pose.x) / b->sigma_m, y = (pose.y - b->pose.y) / b->sigma_m;
-        double turn = nav_wrap(pose.theta - b->pose.theta) / b->sigma_rad;
-        if (fabs(x) < REACH && fabs(y) < REACH && fabs(turn) < REACH)
-            sum += b->mass * exp(-0.5 * (x * x + y * y + turn * turn)) / (b->sigma_m * b->sigma_m * b->sigma_rad);
-    }
-    return sum / pow(2.0 * NAV_PI, 1.5);
-}
-
 double nav_normal_between(double low, double high, double mean, double sigma)
 {
     double root = sigma * sqrt(2.0);

@@ -19,9 +19,6 @@ struct nav_gaussian nav_bumps_gaussian(const struct nav_prior *);
 /* A pose drawn from the bumps. */
 struct nav_pose nav_bumps_draw(const struct nav_prior *, struct nav_rng *);
 
-/* Their density at a pose, per m^2 and rad. */
-double nav_bumps_density(const struct nav_prior *, struct nav_pose);
-
 /* Fills the cells of a histogram that has not moved yet: the bumps, and NAV_ANYWHERE evenly. */
 void nav_bumps_fill(const struct nav_prior *, const struct nav_slices *, float *mass);
 

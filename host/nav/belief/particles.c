@@ -60,15 +60,6 @@ void nav_particles_set(struct nav_particles *p, long i, struct nav_pose pose)
     p->s[i] = (float)sin(pose.theta);
 }
 
-/* Nearly standard normal: the sum of four uniforms of 16 bits, which ends at 3.46 standard deviations. */
-static float rough_normal(struct nav_rng *rng)
-{
-    uint64_t bits = nav_rng_bits(rng);
-    uint32_t sum = (uint32_t)(bits & 0xffff) + (uint32_t)(bits >> 16 & 0xffff) + (uint32_t)(bits >> 32 & 0xffff) +
-                   (uint32_t)(bits >> 48);
-    return ((float)sum - 131070.0f) * (1.0f / 37837.2f); /* 65536 sqrt(4 / 12) */
-}
-
 /* Turns unit vector (c, s) by an angle; a polynomial does for small ones, and the length is put right. */
 static void turn(float *c, float *s, float angle)
 {
@@ -92,11 +83,11 @@ void nav_particles_move(struct nav_particles *p, struct nav_pose step, const str
     float sigma = (float)sqrt(noise->position), sigma_turn = (float)fmin(sqrt(noise->heading), NAV_PI);
     for (long i = 0; i < p->count; i++) {
         float c = p->c[i], s = p->s[i];
-        p->x[i] += c * dx - s * dy + sigma * rough_normal(rng);
-        p->y[i] += s * dx + c * dy + sigma * rough_normal(rng);
+        p->x[i] += c * dx - s * dy + sigma * (float)nav_rng_rough(rng);
+        p->y[i] += s * dx + c * dy + sigma * (float)nav_rng_rough(rng);
         p->c[i] = c * co - s * si;
         p->s[i] = s * co + c * si;
-        turn(&p->c[i], &p->s[i], sigma_turn * rough_normal(rng));
+        turn(&p->c[i], &p->s[i], sigma_turn * (float)nav_rng_rough(rng));
     }
 }
 

@@ -2,17 +2,22 @@
  *
  * Known: a cloud of hypotheses at exact poses, as many as its spread needs. In doubt: an arena-wide histogram wakes
  * and goes over the rows from which on the robot may have been elsewhere; both beliefs are held, weighted by how well
- * they explained those rows. Unknown: the histogram alone, until its mass sits in few enough cells for a cloud. Work
- * per row is bounded by adaptive.budget in every state: what the histogram has not done waits for the next row.
+ * they explained those rows. Unknown: the histogram alone, until its mass sits in few enough cells for a cloud; as long
+ * as there are several modes it stays beside the cloud and tells what each of them weighs. Work per row is bounded by
+ * adaptive.budget in every state: what the histogram has not done waits for the next row.
  * docs/navigation_adaptive.md tells more. */
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "adaptive_answer.h"
 #include "adaptive_doubt.h"
 #include "adaptive_global.h"
 #include "adaptive_prior.h"
-#include "adaptive_symmetry.h"
+
+/* Shares of the belief: below the first one mode is not told from another; the modes of a cloud hold the second of the
+ * histogram's, or others are drawn; a mode that holds the third is the only one. */
+static const double SHARE_LEAST = 1e-9, KNOWN_LEAST = 0.9, ONE_MODE = 0.999;
 
 struct adaptive {
     const struct nav_problem *problem;
@@ -21,8 +26,11 @@ struct adaptive {
     struct adaptive_global global;
     struct adaptive_log log;
     struct adaptive_doubt doubt;
-    bool local, awake; /* which of the two beliefs are held; one at least */
-    double odds;       /* logarithm, elsewhere against local, before the rows that the histogram has gone over */
+    bool local, awake;                 /* which of the two beliefs are held; one at least */
+    bool whole;                        /* the histogram holds all belief, and the cloud the same more finely */
+    int modes;                         /* of the cloud, as last told by the histogram, 0: not told */
+    double share[ADAPTIVE_MODES_MOST]; /* what each of them weighs */
+    double odds; /* logarithm, elsewhere against local, before the rows that the histogram has gone over */
     struct nav_pending pending;     /* since the last row that was read ... */
     bool pending_unknown;           /* ... and whether some of it was not reported */
     bool idle;                      /* nothing was read in the row before */
@@ -47,7 +55,7 @@ static double odds(const struct adaptive *a)
     double hazard = log(a->problem->settings.adaptive_hazard);
     if (!a->local)
         return INFINITY;
-    if (a->awake && adaptive_global_current(&a->global, &a->log))
+    if (a->awake && !a->whole && adaptive_global_current(&a->global, &a->log))
         return a->odds + a->global.gained;
     return hazard + a->doubt.ratio;
 }
@@ -66,7 +74,7 @@ static void answer(struct adaptive *a)
 {
     struct adaptive_held held = {.problem = a->problem,
                                  .local = a->local ? &a->cloud : NULL,
-                                 .global = a->awake ? &a->global : NULL,
+                                 .global = a->awake && !(a->whole && a->local) ? &a->global : NULL,
                                  .log = &a->log,
                                  .share = elsewhere(a)};
     a->answer = adaptive_answer(&held, a->answer.belief.mean);
@@ -109,7 +117,6 @@ static void *create(const struct nav_problem *problem)
         destroy(a);
         return NULL;
     }
-    a->cloud.images = adaptive_symmetry(&problem->arena);
     begin(a);
     return a;
 }
@@ -119,6 +126,8 @@ static void wake(struct adaptive *a)
 {
     uint64_t reach = adaptive_log_reach(&a->log);
     a->awake = true;
+    a->modes = a->whole ? a->modes : 0;
+    a->whole = false;
     adaptive_doubt_teach(&a->doubt, a->likelihood, a->global.likelihood);
     a->odds = log(a->problem->settings.adaptive_hazard);
     adaptive_global_restart(&a->global, a->doubt.since > reach ? a->doubt.since : reach);
@@ -126,8 +135,20 @@ static void wake(struct adaptive *a)
 
 static void sleep(struct adaptive *a)
 {
-    a->awake = false;
+    a->awake = a->whole = false;
+    a->modes = 0;
     adaptive_doubt_clear(&a->doubt, a->likelihood, a->log.head);
+}
+
+/* The first hypotheses, which the histogram knows nothing of, go to it: it then holds all belief, not just `share`. */
+static void pour(struct adaptive *a, long count, double share)
+{
+    double added = 0.0;
+    for (long n = 0; n < count; n++) {
+        adaptive_global_add(&a->global, a->cloud.at[n].pose, a->cloud.at[n].weight / share);
+        added += a->cloud.at[n].weight / share;
+    }
+    a->global.total *= 1.0 + added;
 }
 
 /* The histogram's mass sits in few cells: hypotheses take over its share. */
@@ -135,21 +156,73 @@ static void take_over(struct adaptive *a, double share)
 {
     const struct nav_settings *s = &a->problem->settings;
     double count = fmin(fmax(s->adaptive_least, a->global.crowd * s->adaptive_per_bin), (double)a->cloud.room / 2.0);
-    if (a->local)
-        adaptive_cloud_scale(&a->cloud, 1.0 - share);
-    else
-        a->cloud.count = 0;
+    long held = a->local ? a->cloud.count : 0;
+    a->cloud.count = held;
+    adaptive_cloud_scale(&a->cloud, 1.0 - share);
     adaptive_global_draw(&a->global, &a->cloud, (long)count, share, ahead(a));
+    pour(a, held, share);
     if (a->local && share > 0.5) /* what contradicted the local belief was not the whiskers' fault */
         adaptive_doubt_teach(&a->doubt, a->likelihood, a->likelihood);
     a->local = true;
     a->cloud.moved = a->cloud.count;
     adaptive_cloud_thin(&a->cloud, true);
     a->touched += a->cloud.moved;
-    sleep(a);
+    a->whole = true;
+    a->modes = 0;
+    adaptive_doubt_clear(&a->doubt, a->likelihood, a->log.head);
 }
 
-/* What to hold on to, once the histogram has seen all rows. */
+/* Gives the modes of the cloud the shares that the histogram told last. */
+static void keep_shares(struct adaptive *a)
+{
+    double factor[ADAPTIVE_MODES_MOST], mass[ADAPTIVE_MODES_MOST];
+    adaptive_cloud_masses(&a->cloud, mass, a->modes);
+    for (int m = 0; m < a->modes; m++)
+        factor[m] = a->share[m] / fmax(mass[m], SHARE_LEAST);
+    adaptive_cloud_weigh_modes(&a->cloud, factor, a->modes, 1.0);
+}
+
+/* Nothing was found elsewhere: where there were several modes the histogram holds the cloud's again. */
+static void stay(struct adaptive *a)
+{
+    if (a->modes < 2) {
+        sleep(a);
+        return;
+    }
+    adaptive_global_clear(&a->global, a->log.head);
+    for (long n = 0; n < a->cloud.count; n++)
+        adaptive_global_add(&a->global, a->cloud.at[n].pose, a->cloud.at[n].weight);
+    a->whole = true;
+    adaptive_doubt_clear(&a->doubt, a->likelihood, a->log.head);
+}
+
+/* Hypotheses are too few to tell what several modes weigh: the histogram tells. It sleeps when one is left, draws them
+ * anew where it holds more than they do, and begins again from them where it has lost what they hold: its cells are
+ * coarse, and a robot may stand where all of them are blocked. */
+static void arbitrate(struct adaptive *a)
+{
+    struct adaptive_mode mode[ADAPTIVE_MODES_MOST];
+    double share[ADAPTIVE_MODES_MOST], known = 0.0, most = 0.0;
+    int modes = adaptive_cloud_modes(&a->cloud, mode);
+    adaptive_global_share(&a->global, mode, modes, share);
+    for (int m = 0; m < modes; m++) {
+        known += share[m];
+        most = fmax(most, share[m]);
+    }
+    if (known >= KNOWN_LEAST) {
+        a->modes = modes;
+        memcpy(a->share, share, sizeof a->share);
+        keep_shares(a);
+        if (most > ONE_MODE)
+            sleep(a);
+    } else if (a->global.scattered < a->problem->settings.adaptive_scattered) {
+        a->local = false;
+        take_over(a, 1.0);
+    } else {
+        stay(a);
+    }
+}
+
 static void decide(struct adaptive *a)
 {
     const struct nav_settings *s = &a->problem->settings;
@@ -159,12 +232,20 @@ static void decide(struct adaptive *a)
             wake(a);
         return;
     }
+    if (a->whole && a->local && present > 0.0) { /* to look elsewhere costs what is known of the modes */
+        wake(a);
+        return;
+    }
     if (!adaptive_global_current(&a->global, &a->log))
         return;
+    if (a->whole && a->local) {
+        arbitrate(a);
+        return;
+    }
     if (a->global.scattered < s->adaptive_scattered && present > log(s->adaptive_wake))
         take_over(a, elsewhere(a));
     else if (a->doubt.ratio <= 0.0 && present <= log(s->adaptive_wake))
-        sleep(a);
+        stay(a);
     else if (present > -log(s->adaptive_wake))
         a->local = false;
 }
@@ -212,6 +293,8 @@ static void update_local(struct adaptive *a)
     adaptive_cloud_look(&a->cloud, a->likelihood);
     adaptive_cloud_expect(&a->cloud, a->likelihood, 1.0 - elsewhere(a));
     double local = adaptive_cloud_weigh(&a->cloud, a->likelihood);
+    if (a->awake && a->modes > 1)
+        keep_shares(a);
     adaptive_log_entry(&a->log, a->log.head - 1)->local = local;
     adaptive_doubt_take(&a->doubt, a->likelihood, a->log.head - 1, adaptive_doubt_anywhere(&a->doubt, a->likelihood),
                         local);
@@ -254,9 +337,10 @@ static void estimate(const void *self, struct nav_estimate *out)
 static long components(const void *self, struct nav_component *out, long room)
 {
     const struct adaptive *a = self;
-    double share = a->awake ? elsewhere(a) : 0.0;
+    bool other = a->awake && !(a->whole && a->local);
+    double share = other ? elsewhere(a) : 0.0;
     long count = a->local ? adaptive_cloud_list(&a->cloud, a->pending.step, 1.0 - share, out, room) : 0;
-    if (!a->awake)
+    if (!other)
         return count;
     long left = room > count ? room - count : 0;
     return count + adaptive_global_list(&a->global, &a->log, a->pending.step, share, left ? out + count : NULL, left);

@@ -17,7 +17,7 @@ long adaptive_cloud_room(const struct nav_settings *s)
 
 int adaptive_cloud_init(struct adaptive_cloud *cloud, const struct nav_problem *problem, int whiskers)
 {
-    *cloud = (struct adaptive_cloud){.problem = problem, .images = 1, .room = adaptive_cloud_room(&problem->settings)};
+    *cloud = (struct adaptive_cloud){.problem = problem, .room = adaptive_cloud_room(&problem->settings)};
     nav_rng_seed(&cloud->rng, problem->seed, 0);
     cloud->at = calloc((size_t)cloud->room, sizeof *cloud->at);
     cloud->spare = calloc((size_t)cloud->room, sizeof *cloud->spare);
@@ -34,11 +34,10 @@ void adaptive_cloud_free(struct adaptive_cloud *cloud)
     free(cloud->stamp);
 }
 
-void adaptive_cloud_place(struct adaptive_cloud *cloud, const struct nav_likelihood *l, struct nav_pose pose,
-                          const float *share)
+void adaptive_cloud_place(struct adaptive_cloud *cloud, const struct nav_likelihood *l, struct nav_pose pose)
 {
     if (nav_likelihood_clear(l, pose.x, pose.y, GRACE_M))
-        adaptive_cloud_add(cloud, pose, 1.0, share);
+        adaptive_cloud_add(cloud, pose, 1.0);
 }
 
 /* How many hypotheses a number of occupied bins needs. */
@@ -52,7 +51,6 @@ bool adaptive_cloud_prior(struct adaptive_cloud *cloud, const struct nav_likelih
 {
     const struct nav_prior *prior = &cloud->problem->prior;
     const struct nav_settings *s = &cloud->problem->settings;
-    static const float FIRST[ADAPTIVE_IMAGES_MOST] = {1.0f};
     /* Four sigmas of each axis, in bins. */
     double bins = fmax(4.0 * prior->sigma[0] / s->adaptive_bin_m, 1.0) *
                   fmax(4.0 * prior->sigma[1] / s->adaptive_bin_m, 1.0) *
@@ -63,7 +61,7 @@ bool adaptive_cloud_prior(struct adaptive_cloud *cloud, const struct nav_likelih
         struct nav_pose pose = {prior->mean.x + prior->sigma[0] * nav_rng_normal(&cloud->rng),
                                 prior->mean.y + prior->sigma[1] * nav_rng_normal(&cloud->rng),
                                 prior->mean.theta + prior->sigma[2] * nav_rng_normal(&cloud->rng)};
-        adaptive_cloud_place(cloud, l, pose, FIRST);
+        adaptive_cloud_place(cloud, l, pose);
     }
     adaptive_cloud_scale(cloud, 1.0 / fmax((double)cloud->count, 1.0));
     return cloud->count > 0;

@@ -1,8 +1,4 @@
-/* The adaptive filter's local belief: weighted hypotheses, as many as their spread needs.
- *
- * In an arena that looks the same when turned about its centre (adaptive_symmetry.h) nothing that is sensed can tell a
- * pose from its images, so one hypothesis stands for all of them, with a share of its weight for each. Shares change
- * by no reading: modes that are alike neither drift nor die, however few the hypotheses. */
+/* The adaptive filter's local belief: weighted hypotheses, as many as their spread needs. */
 #ifndef NAV_ADAPTIVE_CLOUD_H
 #define NAV_ADAPTIVE_CLOUD_H
 
@@ -11,8 +7,6 @@
 #include "likelihood.h"
 #include "motion.h"
 #include "rng.h"
-
-enum { ADAPTIVE_IMAGES_MOST = 4 };
 
 /* nav_wrap for an angle within three half turns of 0, as of sums and differences of wrapped ones; much quicker. */
 static inline double adaptive_wrap(double angle)
@@ -26,8 +20,8 @@ struct adaptive_particle {
     double gain, turn_gain; /* true distance and turn by the reported ones, less 1 */
     double noise;           /* standard deviation of its odometry noise by the model's */
     double weight;
-    float loglik;                      /* of the present row */
-    float share[ADAPTIVE_IMAGES_MOST]; /* of the weight, by image; sums to 1 */
+    float loglik; /* of the present row */
+    int mode;     /* number among those last gathered; -1: none */
 };
 
 struct adaptive_cloud {
@@ -35,7 +29,6 @@ struct adaptive_cloud {
     struct adaptive_particle *at, *spare;
     uint8_t *codes; /* [room][whiskers] that each expects of the present row */
     long count, room;
-    int images;
     struct nav_rng rng;
     uint32_t *stamp; /* book of occupied bins */
     uint32_t visit;
@@ -58,11 +51,11 @@ void adaptive_cloud_free(struct adaptive_cloud *);
 /* Draws from a Gaussian prior within free space; false when nothing of it is free. */
 bool adaptive_cloud_prior(struct adaptive_cloud *, const struct nav_likelihood *);
 
-/* Adds a hypothesis, when there is room. share: by image. */
-void adaptive_cloud_add(struct adaptive_cloud *, struct nav_pose, double weight, const float *share);
+/* Adds a hypothesis, when there is room. */
+void adaptive_cloud_add(struct adaptive_cloud *, struct nav_pose, double weight);
 
 /* The same with weight 1, where the robot can stand. */
-void adaptive_cloud_place(struct adaptive_cloud *, const struct nav_likelihood *, struct nav_pose, const float *share);
+void adaptive_cloud_place(struct adaptive_cloud *, const struct nav_likelihood *, struct nav_pose);
 
 /* Tells the row's measurement models what the belief expects before it is weighed, `mass` of it counting (trust.h). */
 void adaptive_cloud_expect(const struct adaptive_cloud *, struct nav_likelihood *, double mass);
@@ -83,11 +76,26 @@ double adaptive_cloud_weigh(struct adaptive_cloud *, const struct nav_likelihood
 /* Draws as many as the spread needs when the weights have become uneven, or always when `force`. */
 void adaptive_cloud_thin(struct adaptive_cloud *, bool force);
 
-/* Standard normal, nearly: the sum of four uniform numbers, which has no tails beyond 3.5. */
-double adaptive_normal(struct nav_rng *);
+/* A heap of hypotheses. */
+enum { ADAPTIVE_MODES_MOST = 32 };
+struct adaptive_mode {
+    struct nav_pose mean;
+    double mass;
+};
 
-/* Pose of image m of a pose: turned m times about the arena's centre by a full turn / images. */
-struct nav_pose adaptive_image(const struct nav_arena *, int images, int m, struct nav_pose);
+/* How far a pose is from a mode's mean: squared distance and angle by NAV_NEAR_M and NAV_NEAR_RAD. What is farther than
+ * ADAPTIVE_MODE_REACH does not belong to it. */
+#define ADAPTIVE_MODE_REACH 4.0
+double adaptive_mode_distance(struct nav_pose mean, struct nav_pose);
+
+/* Gathers hypotheses into modes: their number, at most ADAPTIVE_MODES_MOST; what is left then belongs to none. */
+int adaptive_cloud_modes(struct adaptive_cloud *, struct adaptive_mode mode[ADAPTIVE_MODES_MOST]);
+
+/* What each mode last gathered weighs now: mass[modes]. */
+void adaptive_cloud_masses(const struct adaptive_cloud *, double *mass, int modes);
+
+/* Multiplies the weights of each mode last gathered by its factor, and those of no mode by `rest`; normalises. */
+void adaptive_cloud_weigh_modes(struct adaptive_cloud *, const double *factor, int modes, double rest);
 
 /* Mean, mass near it and covariance, around the mode next to `guess`, or a heavier one when little mass is there. */
 struct adaptive_summary adaptive_cloud_summary(const struct adaptive_cloud *, struct nav_pose guess);

@@ -1,25 +1,15 @@
 /* Hypotheses as they are made and as they move: each guesses for itself how good the odometry is. */
 #include <math.h>
-#include <string.h>
 
 #include "adaptive_cloud.h"
 
 static const double MUTATION = 0.03, NUDGE = 0.2;
 
-double adaptive_normal(struct nav_rng *rng)
-{
-    uint64_t bits = nav_rng_bits(rng);
-    double sum =
-        (double)(bits & 0xffff) + (double)(bits >> 16 & 0xffff) + (double)(bits >> 32 & 0xffff) + (double)(bits >> 48);
-    /* Four uniform numbers of 0 .. 65535: mean 131070, variance (65536^2 - 1) / 3. */
-    return (sum - 131070.0) * (1.0 / 37837.22);
-}
-
 /* Fresh guesses of how good the odometry is: three in four hold it unbiased, half hold with the model's noise, the
  * others with half of it, as the model's allows for errors that persist, or with twice as much. */
 static double gain_of(const struct adaptive_cloud *cloud, struct nav_rng *rng)
 {
-    return nav_rng_bits(rng) >> 62 ? 0.0 : cloud->problem->settings.adaptive_gain * adaptive_normal(rng);
+    return nav_rng_bits(rng) >> 62 ? 0.0 : cloud->problem->settings.adaptive_gain * nav_rng_rough(rng);
 }
 
 static double noise_of(struct nav_rng *rng)
@@ -44,12 +34,12 @@ static void mutate(const struct adaptive_cloud *cloud, struct adaptive_particle 
     case 2:
     case 3:
         if (p->gain != 0.0)
-            p->gain += NUDGE * cloud->problem->settings.adaptive_gain * adaptive_normal(rng);
+            p->gain += NUDGE * cloud->problem->settings.adaptive_gain * nav_rng_rough(rng);
         break;
     case 4:
     case 5:
         if (p->turn_gain != 0.0)
-            p->turn_gain += NUDGE * cloud->problem->settings.adaptive_gain * adaptive_normal(rng);
+            p->turn_gain += NUDGE * cloud->problem->settings.adaptive_gain * nav_rng_rough(rng);
         break;
     default:
         p->noise = noise_of(rng);
@@ -80,7 +70,7 @@ static void turn_to(struct adaptive_particle *p, double theta)
     p->s = sin(p->pose.theta);
 }
 
-void adaptive_cloud_add(struct adaptive_cloud *cloud, struct nav_pose pose, double weight, const float *share)
+void adaptive_cloud_add(struct adaptive_cloud *cloud, struct nav_pose pose, double weight)
 {
     if (cloud->count == cloud->room)
         return;
@@ -89,7 +79,6 @@ void adaptive_cloud_add(struct adaptive_cloud *cloud, struct nav_pose pose, doub
     p->gain = gain_of(cloud, &cloud->rng);
     p->turn_gain = gain_of(cloud, &cloud->rng);
     p->noise = noise_of(&cloud->rng);
-    memcpy(p->share, share, sizeof p->share);
     turn_to(p, pose.theta);
 }
 
@@ -100,9 +89,9 @@ void adaptive_cloud_move(struct adaptive_cloud *cloud, struct nav_pose step, con
         struct adaptive_particle *p = &cloud->at[n];
         mutate(cloud, p, &cloud->rng);
         double level = known ? p->noise : fmax(p->noise, 1.0);
-        double dx = (1.0 + p->gain) * step.x + level * position * adaptive_normal(&cloud->rng);
-        double dy = (1.0 + p->gain) * step.y + level * position * adaptive_normal(&cloud->rng);
-        double turn = (1.0 + p->turn_gain) * step.theta + level * heading * adaptive_normal(&cloud->rng);
+        double dx = (1.0 + p->gain) * step.x + level * position * nav_rng_rough(&cloud->rng);
+        double dy = (1.0 + p->gain) * step.y + level * position * nav_rng_rough(&cloud->rng);
+        double turn = (1.0 + p->turn_gain) * step.theta + level * heading * nav_rng_rough(&cloud->rng);
         p->pose.x += p->c * dx - p->s * dy;
         p->pose.y += p->s * dx + p->c * dy;
         turn_by(p, turn);

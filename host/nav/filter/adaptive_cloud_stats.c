@@ -7,18 +7,6 @@
 static const double MODE_LEAST = 0.4;
 enum { CANDIDATES = 8, ROUNDS = 2 };
 
-struct nav_pose adaptive_image(const struct nav_arena *arena, int images, int m, struct nav_pose pose)
-{
-    if (m == 0)
-        return pose;
-    double x = pose.x - arena->size_x / 2.0, y = pose.y - arena->size_y / 2.0;
-    int quarters = 4 / images * m;
-    static const int C[] = {1, 0, -1, 0}, S[] = {0, 1, 0, -1};
-    return (struct nav_pose){arena->size_x / 2.0 + C[quarters] * x - S[quarters] * y,
-                             arena->size_y / 2.0 + S[quarters] * x + C[quarters] * y,
-                             adaptive_wrap(pose.theta + quarters * (NAV_PI / 2.0))};
-}
-
 struct sums {
     double mass, x, y, theta; /* offsets from the pose, times mass */
 };
@@ -30,28 +18,24 @@ static void offset(struct nav_pose from, struct nav_pose to, double d[3])
     d[2] = adaptive_wrap(to.theta - from.theta);
 }
 
-/* Pose of a hypothesis in image m. */
-static struct nav_pose pose_of(const struct adaptive_cloud *cloud, long n, int m)
+static bool is_near(const double d[3])
 {
-    struct nav_pose pose = cloud->at[n].pose;
-    return m == 0 ? pose : adaptive_image(&cloud->problem->arena, cloud->images, m, pose);
+    return d[0] * d[0] + d[1] * d[1] <= NAV_NEAR_M * NAV_NEAR_M && fabs(d[2]) <= NAV_NEAR_RAD;
 }
 
 static struct sums near(const struct adaptive_cloud *cloud, struct nav_pose about)
 {
     struct sums s = {.mass = 0.0};
-    for (int m = 0; m < cloud->images; m++) {
-        for (long n = 0; n < cloud->count; n++) {
-            const struct adaptive_particle *p = &cloud->at[n];
-            double d[3], mass = p->weight * (double)p->share[m];
-            offset(about, pose_of(cloud, n, m), d);
-            if (d[0] * d[0] + d[1] * d[1] > NAV_NEAR_M * NAV_NEAR_M || fabs(d[2]) > NAV_NEAR_RAD)
-                continue;
-            s.mass += mass;
-            s.x += mass * d[0];
-            s.y += mass * d[1];
-            s.theta += mass * d[2];
-        }
+    for (long n = 0; n < cloud->count; n++) {
+        const struct adaptive_particle *p = &cloud->at[n];
+        double d[3];
+        offset(about, p->pose, d);
+        if (!is_near(d))
+            continue;
+        s.mass += p->weight;
+        s.x += p->weight * d[0];
+        s.y += p->weight * d[1];
+        s.theta += p->weight * d[2];
     }
     return s;
 }
@@ -69,23 +53,18 @@ static struct nav_pose settle(const struct adaptive_cloud *cloud, struct nav_pos
     return pose;
 }
 
-/* The heaviest of a few modes: hypotheses evenly spaced by weight, each in its likeliest image. */
+/* The heaviest of a few modes: hypotheses evenly spaced by weight. */
 static struct nav_pose search(const struct adaptive_cloud *cloud, struct nav_pose pose, double *mass)
 {
     double sum = 0.0;
     int taken = 0;
     for (long n = 0; n < cloud->count && taken < CANDIDATES; n++) {
-        const struct adaptive_particle *p = &cloud->at[n];
-        sum += p->weight;
+        sum += cloud->at[n].weight;
         if (sum * CANDIDATES < taken + 0.5)
             continue;
         taken++;
-        int image = 0;
-        for (int m = 1; m < cloud->images; m++)
-            image = p->share[m] > p->share[image] ? m : image;
         double found;
-        struct nav_pose other =
-            settle(cloud, adaptive_image(&cloud->problem->arena, cloud->images, image, p->pose), &found);
+        struct nav_pose other = settle(cloud, cloud->at[n].pose, &found);
         if (found > 1.01 * *mass) {
             pose = other;
             *mass = found;
@@ -94,18 +73,63 @@ static struct nav_pose search(const struct adaptive_cloud *cloud, struct nav_pos
     return pose;
 }
 
+double adaptive_mode_distance(struct nav_pose mean, struct nav_pose pose)
+{
+    double dx = pose.x - mean.x, dy = pose.y - mean.y, turn = nav_wrap(pose.theta - mean.theta);
+    return (dx * dx + dy * dy) / (NAV_NEAR_M * NAV_NEAR_M) + turn * turn / (NAV_NEAR_RAD * NAV_NEAR_RAD);
+}
+
+int adaptive_cloud_modes(struct adaptive_cloud *cloud, struct adaptive_mode mode[ADAPTIVE_MODES_MOST])
+{
+    int modes = 0;
+    for (long n = 0; n < cloud->count; n++)
+        cloud->at[n].mode = -1;
+    for (long n = 0; n < cloud->count && modes < ADAPTIVE_MODES_MOST; n++) {
+        if (cloud->at[n].mode >= 0)
+            continue;
+        struct adaptive_mode *m = &mode[modes];
+        m->mean = settle(cloud, cloud->at[n].pose, &m->mass);
+        m->mass = 0.0;
+        for (long k = 0; k < cloud->count; k++) {
+            if (cloud->at[k].mode >= 0 ||
+                (k != n && adaptive_mode_distance(m->mean, cloud->at[k].pose) > ADAPTIVE_MODE_REACH))
+                continue;
+            cloud->at[k].mode = modes;
+            m->mass += cloud->at[k].weight;
+        }
+        modes++;
+    }
+    return modes;
+}
+
+void adaptive_cloud_masses(const struct adaptive_cloud *cloud, double *mass, int modes)
+{
+    for (int m = 0; m < modes; m++)
+        mass[m] = 0.0;
+    for (long n = 0; n < cloud->count; n++) {
+        if (cloud->at[n].mode >= 0 && cloud->at[n].mode < modes)
+            mass[cloud->at[n].mode] += cloud->at[n].weight;
+    }
+}
+
+void adaptive_cloud_weigh_modes(struct adaptive_cloud *cloud, const double *factor, int modes, double rest)
+{
+    double total = 0.0;
+    for (long n = 0; n < cloud->count; n++) {
+        struct adaptive_particle *p = &cloud->at[n];
+        p->weight *= p->mode >= 0 && p->mode < modes ? factor[p->mode] : rest;
+        total += p->weight;
+    }
+    adaptive_cloud_scale(cloud, 1.0 / total);
+}
+
 static void covariance(const struct adaptive_cloud *cloud, struct nav_gaussian *g)
 {
-    for (int m = 0; m < cloud->images; m++) {
-        for (long n = 0; n < cloud->count; n++) {
-            const struct adaptive_particle *p = &cloud->at[n];
-            double d[3], mass = p->weight * (double)p->share[m];
-            if (!(mass > 0.0))
-                continue;
-            offset(g->mean, pose_of(cloud, n, m), d);
-            for (int k = 0; k < 9; k++)
-                g->covariance[k] += mass * d[k / 3] * d[k % 3];
-        }
+    for (long n = 0; n < cloud->count; n++) {
+        double d[3];
+        offset(g->mean, cloud->at[n].pose, d);
+        for (int k = 0; k < 9; k++)
+            g->covariance[k] += cloud->at[n].weight * d[k / 3] * d[k % 3];
     }
 }
 
@@ -115,7 +139,7 @@ struct adaptive_summary adaptive_cloud_summary(const struct adaptive_cloud *clou
     struct adaptive_summary out = {.near = 0.0};
     guess.theta = nav_wrap(guess.theta);
     out.belief.mean = settle(cloud, guess, &mass);
-    if (mass * cloud->images < MODE_LEAST)
+    if (mass < MODE_LEAST)
         out.belief.mean = search(cloud, out.belief.mean, &mass);
     out.near = fmin(mass, 1.0);
     covariance(cloud, &out.belief);
@@ -132,7 +156,7 @@ static struct nav_component bump(const struct adaptive_cloud *cloud)
     for (long n = 0; n < cloud->count; n++) {
         double d[3];
         offset(mean, cloud->at[n].pose, d);
-        if (d[0] * d[0] + d[1] * d[1] > NAV_NEAR_M * NAV_NEAR_M || fabs(d[2]) > NAV_NEAR_RAD)
+        if (!is_near(d))
             continue;
         sum += cloud->at[n].weight;
         xy += cloud->at[n].weight * (d[0] * d[0] + d[1] * d[1]) / 2.0;
@@ -149,17 +173,14 @@ long adaptive_cloud_list(const struct adaptive_cloud *cloud, struct nav_pose mov
 {
     struct nav_component each = bump(cloud);
     long count = 0;
-    for (int m = 0; m < cloud->images; m++) {
-        for (long n = 0; n < cloud->count; n++) {
-            const struct adaptive_particle *p = &cloud->at[n];
-            each.mass = mass * p->weight * (double)p->share[m];
-            if (!(each.mass > 0.0))
-                continue;
-            each.pose = nav_compose(adaptive_image(&cloud->problem->arena, cloud->images, m, p->pose), moved);
-            if (count < room)
-                out[count] = each;
-            count++;
-        }
+    for (long n = 0; n < cloud->count; n++) {
+        each.mass = mass * cloud->at[n].weight;
+        if (!(each.mass > 0.0))
+            continue;
+        each.pose = nav_compose(cloud->at[n].pose, moved);
+        if (count < room)
+            out[count] = each;
+        count++;
     }
     return count;
 }

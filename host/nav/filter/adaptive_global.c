@@ -12,6 +12,10 @@ static const double OWED_LEAST = 0.04, PASS_MOST = 0.5;
 /* A debt that would take more jobs than this is not paid: who may have moved that far unseen may be anywhere. */
 static const double JOBS_OWED_MOST = 16.0;
 
+/* Likelihood of standing where the map says one cannot, by that of sensors that are all broken: maps are wrong
+ * sometimes, and of a cell that is blocked at its middle a part may be free. */
+static const double BLOCKED = 1e-3;
+
 /* A job's rows read, its motion planned and its answer found take as long as passing over about so many cells. */
 enum { JOB_CELLS = 10000 };
 
@@ -131,6 +135,7 @@ static void begin(struct adaptive_global *g, struct adaptive_log *log)
     if (g->fresh) /* nothing blurs what is uniform */
         g->owed_position = g->owed_heading = 0.0;
     g->job.reference = best_codes(g);
+    g->value[0] = (float)(BLOCKED * exp(-g->job.reference));
     nav_expected_prepare(g->expected, (const float *const *)g->factor);
     g->job.side = side_of(&g->owed_position, g->cell, ADAPTIVE_PASSES_MOST, &g->job.passes);
     g->job.side_heading = side_of(&g->owed_heading, g->cell_theta, 1, &one);

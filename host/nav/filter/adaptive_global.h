@@ -87,6 +87,9 @@ void adaptive_global_free(struct adaptive_global *);
 /* Forgets everything: uniform before row `row` of the log. */
 void adaptive_global_restart(struct adaptive_global *, uint64_t row);
 
+/* Holds nothing before row `row` of the log; for adaptive_global_add. */
+void adaptive_global_clear(struct adaptive_global *, uint64_t row);
+
 /* Takes rows from the log until it has seen them all or the next slice would touch more than `budget` cells. */
 void adaptive_global_work(struct adaptive_global *, struct adaptive_log *, long budget);
 
@@ -96,6 +99,12 @@ bool adaptive_global_current(const struct adaptive_global *, const struct adapti
 /* Adds about `count` hypotheses drawn from the belief, of weight `weight` together, moved by `moved`. */
 void adaptive_global_draw(struct adaptive_global *, struct adaptive_cloud *, long count, double weight,
                           struct nav_pose moved);
+
+/* Share of the belief that belongs to each mode, between jobs: a cell belongs to the mode that it is nearest to. */
+void adaptive_global_share(const struct adaptive_global *, const struct adaptive_mode *, int modes, double *share);
+
+/* Adds to the cell that holds a pose, between jobs: `share` of what all cells hold. The total stays what it was. */
+void adaptive_global_add(struct adaptive_global *, struct nav_pose, double share);
 
 /* Lists cells as nav_filter_components does, at the end of the log and then moved by `moved`, masses times `mass`.
  * Where a job is under way, slices that it has done are read after its rows and the others before them; headings keep

@@ -95,7 +95,7 @@ static int make_tables(struct adaptive_global *g)
     g->signature = calloc(signature_rows(g) * adaptive_signature_pitch(g), sizeof *g->signature);
     if (!g->value || !g->known || !g->signature)
         return -1;
-    for (uint32_t n = 1; n < g->expected->signatures; n++) /* where the robot cannot stand the likelihood is 0 */
+    for (uint32_t n = 1; n < g->expected->signatures; n++)
         g->value[n] = -1.0f;
     sort_signatures(g);
     return 0;
@@ -145,6 +145,14 @@ void adaptive_global_restart(struct adaptive_global *g, uint64_t row)
     lost.prior.uniform = true;
     g->summary = (struct adaptive_summary){.belief = nav_gaussian_prior(&lost)};
     g->summary.near = NAV_PI * NAV_NEAR_M * NAV_NEAR_M / (arena->size_x * arena->size_y) * NAV_NEAR_RAD / NAV_PI;
+}
+
+void adaptive_global_clear(struct adaptive_global *g, uint64_t row)
+{
+    adaptive_global_restart(g, row);
+    g->fresh = false;
+    memset(g->mass, 0, adaptive_global_stored(g) * sizeof *g->mass);
+    memset(g->span, 0, (size_t)g->nh * (size_t)g->ny * sizeof *g->span);
 }
 
 int adaptive_global_init(struct adaptive_global *g, const struct nav_problem *problem)

@@ -59,27 +59,50 @@ long adaptive_global_count(struct adaptive_global *g, int p, long most)
     return cells;
 }
 
-/* Mass of the cell that holds a pose. */
-static double mass_at(const struct adaptive_global *g, struct nav_pose pose)
+/* Adds a cell's mass to the mode that it is nearest to. */
+static void share_cell(const struct adaptive_mode *mode, int modes, struct nav_pose at, double mass, double *share)
 {
-    double turns = (pose.theta - g->rotation) / (2.0 * NAV_PI);
+    double least = ADAPTIVE_MODE_REACH;
+    int nearest = -1;
+    for (int m = 0; m < modes; m++) {
+        double far = adaptive_mode_distance(mode[m].mean, at);
+        if (far > least)
+            continue;
+        least = far;
+        nearest = m;
+    }
+    if (nearest >= 0)
+        share[nearest] += mass;
+}
+
+void adaptive_global_share(const struct adaptive_global *g, const struct adaptive_mode *mode, int modes, double *share)
+{
+    memset(share, 0, (size_t)modes * sizeof *share);
+    for (int p = 0; p < g->nh; p++) {
+        const struct adaptive_span *span = adaptive_spans(g, g->span, p);
+        struct nav_pose at = {.theta = adaptive_global_heading(g, p)};
+        for (int j = 0; j < g->ny; j++) {
+            const float *cell = adaptive_global_line(g, g->mass, p, j);
+            at.y = (j + 0.5) * g->cell + g->shift_y[p];
+            for (int i = span[j].begin; i < span[j].end; i++) {
+                at.x = (i + 0.5) * g->cell + g->shift_x[p];
+                if (cell[i] > 0.0f)
+                    share_cell(mode, modes, at, (double)cell[i] / g->total, share);
+            }
+        }
+    }
+}
+
+void adaptive_global_add(struct adaptive_global *g, struct nav_pose pose, double share)
+{
+    double turns = (pose.theta - g->rotation) / (2.0 * NAV_PI), mass = share * g->total;
     int p = (int)((turns - floor(turns)) * g->nh) % g->nh;
     int i = (int)floor((pose.x - g->shift_x[p]) / g->cell), j = (int)floor((pose.y - g->shift_y[p]) / g->cell);
     if (i < 0 || j < 0 || i >= g->nx || j >= g->ny)
-        return 0.0;
-    return (double)adaptive_global_line(g, g->mass, p, j)[i];
-}
-
-/* What each image of a cell holds of their mass together. */
-static void shares(const struct adaptive_global *g, int images, struct nav_pose centre,
-                   float share[ADAPTIVE_IMAGES_MOST])
-{
-    double part[ADAPTIVE_IMAGES_MOST], sum = 0.0;
-    memset(share, 0, ADAPTIVE_IMAGES_MOST * sizeof *share);
-    for (int m = 0; m < images; m++)
-        sum += part[m] = mass_at(g, adaptive_image(&g->problem->arena, images, m, centre));
-    for (int m = 0; m < images; m++)
-        share[m] = sum > 0.0 ? (float)(part[m] / sum) : (m == 0);
+        return;
+    struct adaptive_span *span = adaptive_spans(g, g->span, p) + j;
+    adaptive_global_line(g, g->mass, p, j)[i] += (float)mass;
+    *span = adaptive_span_join(*span, adaptive_span_of(g, i, i + 1));
 }
 
 static struct nav_pose within_cell(const struct adaptive_global *g, struct nav_pose centre, struct nav_rng *rng)
@@ -94,7 +117,6 @@ void adaptive_global_draw(struct adaptive_global *g, struct adaptive_cloud *clou
 {
     double step = g->total / (double)count, mark = step * nav_rng_uniform(&cloud->rng), sum = 0.0;
     const struct nav_slices slices = adaptive_global_slices(g);
-    float share[ADAPTIVE_IMAGES_MOST];
     for (size_t n = 0; n < adaptive_global_stored(g); n++) {
         size_t line = n / (size_t)g->pitch;
         if (n % (size_t)g->pitch == 0 && g->span[line].begin == g->span[line].end) {
@@ -105,9 +127,7 @@ void adaptive_global_draw(struct adaptive_global *g, struct adaptive_cloud *clou
         if (mark >= sum)
             continue;
         struct nav_pose centre = nav_slices_centre(&slices, n);
-        shares(g, cloud->images, centre, share);
         for (; mark < sum; mark += step)
-            adaptive_cloud_add(cloud, nav_compose(within_cell(g, centre, &cloud->rng), moved), weight / (double)count,
-                               share);
+            adaptive_cloud_add(cloud, nav_compose(within_cell(g, centre, &cloud->rng), moved), weight / (double)count);
     }
 }

@@ -42,28 +42,12 @@ static double fill(struct adaptive_global *g)
     return g->total * g->total / squares;
 }
 
-/* How a hypothesis's weight is shared among its images. */
-static void shares(const struct adaptive_cloud *cloud, struct nav_pose pose, float share[ADAPTIVE_IMAGES_MOST])
-{
-    const struct nav_problem *problem = cloud->problem;
-    double part[ADAPTIVE_IMAGES_MOST] = {1.0}, sum = 0.0;
-    for (int m = 0; m < cloud->images && cloud->images > 1; m++)
-        part[m] = nav_bumps_density(&problem->prior, adaptive_image(&problem->arena, cloud->images, m, pose));
-    for (int m = 0; m < cloud->images; m++)
-        sum += part[m];
-    memset(share, 0, ADAPTIVE_IMAGES_MOST * sizeof *share);
-    for (int m = 0; m < cloud->images; m++)
-        share[m] = sum > 0.0 ? (float)(part[m] / sum) : (m == 0);
-}
-
 static void draw(struct adaptive_cloud *cloud, const struct nav_likelihood *l)
 {
-    float share[ADAPTIVE_IMAGES_MOST];
     cloud->count = 0;
     for (long n = 0; n < cloud->room * TRIES && cloud->count < cloud->room; n++) {
         struct nav_pose pose = nav_bumps_draw(&cloud->problem->prior, &cloud->rng);
-        shares(cloud, pose, share);
-        adaptive_cloud_place(cloud, l, pose, share);
+        adaptive_cloud_place(cloud, l, pose);
     }
     adaptive_cloud_scale(cloud, 1.0 / fmax((double)cloud->count, 1.0));
     adaptive_cloud_thin(cloud, true);

@@ -33,8 +33,9 @@ struct nav_likelihood *nav_likelihood_new(const struct nav_arena *arena, const s
     l->weight = calloc(whiskers, sizeof *l->weight);
     l->trust = calloc(whiskers, sizeof *l->trust);
     l->scratch = calloc(whiskers, 1);
-    if (failed || !l->scratch || !l->table || !l->ratio || !l->weight || !l->trust || likelihood_tables(l) ||
-        nav_obstacles_init(&l->obstacles, arena, nav_sensors_reach(&l->sensors, robot))) {
+    l->read = calloc(whiskers, sizeof *l->read);
+    if (failed || !l->scratch || !l->read || !l->table || !l->ratio || !l->weight || !l->trust ||
+        likelihood_tables(l) || nav_obstacles_init(&l->obstacles, arena, nav_sensors_reach(&l->sensors, robot))) {
         nav_likelihood_free(l);
         return NULL;
     }
@@ -58,6 +59,7 @@ void nav_likelihood_free(struct nav_likelihood *l)
     free(l->trust);
     free(l->weight);
     free(l->scratch);
+    free(l->read);
     free(l);
 }
 
@@ -81,6 +83,7 @@ static double likelihood_best(const float *table, int codes)
 void nav_likelihood_read(struct nav_likelihood *l, const struct nav_evidence *evidence)
 {
     l->ceiling = 0.0;
+    l->reads = 0;
     for (int k = 0; k < NAV_KINDS; k++) {
         l->active[k] = false;
         for (int w = l->sensors.first[k]; w < l->sensors.first[k + 1]; w++) {
@@ -88,6 +91,7 @@ void nav_likelihood_read(struct nav_likelihood *l, const struct nav_evidence *ev
             if (l->weight[w] > 0.0) {
                 likelihood_read_one(l, w, evidence->reading[w]);
                 l->active[k] = true;
+                l->read[l->reads++] = w;
                 l->ceiling += likelihood_best(l->table[w], l->model[w].codes);
             } else {
                 memset(l->table[w], 0, (size_t)l->model[w].codes * sizeof **l->table);
@@ -101,12 +105,15 @@ static void likelihood_expect(const struct nav_likelihood *l, const struct nav_p
                               uint8_t *codes)
 {
     struct nav_arena near;
-    bool any = nav_obstacles_near(&l->obstacles, at->x, at->y, &near);
     for (int k = 0; k < NAV_KINDS; k++) {
+        const struct nav_measurement *kind = NAV_MEASUREMENTS[k];
         int first = l->sensors.first[k], count = l->sensors.first[k + 1] - first;
-        if (count > 0 && wanted[k])
-            NAV_MEASUREMENTS[k]->expect(l->model + first, count, l->arena, any ? &near : NULL, at, codes + first);
-        else if (count > 0)
+        if (count == 0)
+            continue;
+        bool any = wanted[k] && kind->solid && nav_obstacles_near(&l->obstacles, at->x, at->y, &near);
+        if (wanted[k])
+            kind->expect(l->model + first, count, l->arena, any ? &near : NULL, at, codes + first);
+        else
             memset(codes + first, 0, (size_t)count);
     }
 }
@@ -132,8 +139,11 @@ float nav_likelihood_of(const struct nav_likelihood *l, const uint8_t *codes)
 
 float nav_likelihood_at(const struct nav_likelihood *l, const struct nav_place *at, uint8_t *codes)
 {
+    float sum = 0.0f;
     likelihood_expect(l, at, l->active, codes);
-    return nav_likelihood_of(l, codes);
+    for (int n = 0; n < l->reads; n++)
+        sum += l->table[l->read[n]][codes[l->read[n]]];
+    return sum;
 }
 
 double nav_likelihood_standing(const struct nav_likelihood *l, const struct nav_place *at)

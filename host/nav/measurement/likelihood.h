@@ -25,6 +25,7 @@ struct nav_likelihood {
     double **ratio;          /* [whiskers][codes] what the models gave, see measurement.h */
     double *weight;          /* [whiskers] of the present row */
     bool active[NAV_KINDS];  /* whether any sensor of a kind was read */
+    int reads, *read;        /* [reads] sensors that the present row read */
     double ceiling;          /* log-likelihood of the present row at the codes that suit every sensor best */
     uint8_t *scratch;        /* [whiskers] */
     struct nav_trust *trust; /* [whiskers], see trust.h */

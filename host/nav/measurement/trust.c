@@ -33,8 +33,8 @@ void nav_trust_begin(struct nav_likelihood *l)
 
 void nav_trust_add(struct nav_likelihood *l, const uint8_t *codes, double mass)
 {
-    for (int w = 0; w < l->whiskers; w++)
-        l->trust[w].predicted[codes[w]] += mass;
+    for (int n = 0; n < l->reads; n++)
+        l->trust[l->read[n]].predicted[codes[l->read[n]]] += mass;
 }
 
 /* Log of p(reading | belief) / p(reading | broken), times the reading's weight. */

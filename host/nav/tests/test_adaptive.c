@@ -1,5 +1,5 @@
 /* The adaptive filter: work within its budget, the same bytes from a seed, found and found again, twins kept. */
-#include "adaptive_symmetry.h"
+#include "filter.h"
 
 #include <stdlib.h>
 
@@ -257,23 +257,6 @@ static void a_prior_inside_a_box_starts_with_the_whole_arena(void **state)
     nav_filter_free(f);
 }
 
-static void symmetries_are_seen(void **state)
-{
-    (void)state;
-    struct wander w = wander_new(0);
-    struct nav_arena arena = w.problem.arena;
-    assert_int_equal(adaptive_symmetry(&arena), 1);
-    arena.floor = WANDER_TWIN_FLOOR;
-    assert_int_equal(adaptive_symmetry(&arena), 1); /* the box has no partner */
-    arena.boxes = 0;
-    assert_int_equal(adaptive_symmetry(&arena), 2);
-    static const uint8_t PLAIN[16] = {0};
-    arena.floor = PLAIN;
-    assert_int_equal(adaptive_symmetry(&arena), 4);
-    arena.size_x = 1.9; /* the last column of tiles is cut */
-    assert_int_equal(adaptive_symmetry(&arena), 1);
-}
-
 /* Even where the arena has twins: from a known start one of them holds all mass. */
 static void a_known_start_is_listed_as_its_hypotheses_and_no_others(void **state)
 {
@@ -325,7 +308,6 @@ int main(void)
         cmocka_unit_test(twins_neither_drift_nor_die),
         cmocka_unit_test(what_is_not_read_makes_it_no_surer),
         cmocka_unit_test(a_prior_inside_a_box_starts_with_the_whole_arena),
-        cmocka_unit_test(symmetries_are_seen),
         cmocka_unit_test(a_known_start_is_listed_as_its_hypotheses_and_no_others),
         cmocka_unit_test(hypotheses_are_listed_as_wide_along_y_as_along_x),
     };
