@@ -60,7 +60,10 @@ def test_pins_are_those_that_the_page_tells_to_solder(name):
     board = build.load(name)
     column = next(n for n, title in enumerate(head) if board.title.startswith(title))
     told = [ball for row in rows for ball in balls(row[column])]
-    assert told == [board.pins[wire] for wire in ("sync", "sck", "select_n", "mosi")] + board.pins["miso"]
+    bus, ticks = (
+        [board.pins[wire] for wire in wires.split()] for wires in ("sync sck select_n mosi", "tick_in tick_out")
+    )
+    assert told == bus + board.pins["miso"] + ticks
 
 
 def test_the_i9s_phy_is_wired_as_the_page_tells():
