@@ -431,6 +431,19 @@ static void do_special(struct image_cpu *cpu, const struct instruction *i)
     release(cpu, level);
 }
 
+static void trace(struct image_cpu *cpu)
+{
+    struct image_trace *t = cpu->trace;
+    const uint32_t at = cpu->pc;
+    t->constants[at] |= cpu->extra > 0;
+    if (cpu->next > at)
+        return;
+    t->times[at] = (uint16_t)(t->seen[at] == t->epoch ? t->times[at] + 1u : 1u);
+    t->seen[at] = t->epoch;
+    if (t->times[at] > t->most[at])
+        t->most[at] = t->times[at];
+}
+
 static void spend(struct image_cpu *cpu, const struct instruction *i)
 {
     const bool branched = cpu->next != cpu->pc + i->length;
@@ -464,6 +477,8 @@ static void step(struct image_cpu *cpu)
     if (i->special != IMAGE_PLAIN)
         do_special(cpu, i);
     watch_stack(cpu);
+    if (cpu->trace)
+        trace(cpu);
     spend(cpu, i);
     if (cpu->faulty) {
         cpu->faulty = false;

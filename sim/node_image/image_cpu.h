@@ -17,9 +17,19 @@
 
 enum { IMAGE_UNIQUES = 64, IMAGE_FLAGS = 32 };
 
+/* How the program has run, by flash word: what the worst case by path (paths.py) must know. One for all nodes. */
+struct image_trace {
+    uint32_t epoch;                 /* of the present interrupt */
+    uint32_t seen[FLASH_WORDS];     /* the epoch in which `times` counts */
+    uint16_t times[FLASH_WORDS];    /* a backward branch was taken in it */
+    uint16_t most[FLASH_WORDS];     /* at most, in any one interrupt */
+    uint8_t constants[FLASH_WORDS]; /* 1: it has read flash as data */
+};
+
 struct image_cpu {
     struct dspic *chip;
     const struct image_table *table;
+    struct image_trace *trace;    /* or NULL */
     uint32_t pc;                  /* index of a flash word */
     uint8_t core[IMAGE_CORE_END]; /* W0 to W15, SPLIM */
     uint8_t ram[DSPIC_DMA_RAM - IMAGE_RAM_START];

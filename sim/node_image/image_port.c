@@ -53,8 +53,27 @@ struct image_node {
 static struct image_table *table;
 static struct image_node nodes[NODES];
 static struct image_costs costs;
-static unsigned supplies; /* times that one came on, over all nodes */
-static unsigned starts;   /* since a supply came on, or a SYNC was served */
+static struct image_trace run_trace; /* of all nodes */
+static unsigned supplies;            /* times that one came on, over all nodes */
+static unsigned starts;              /* since a supply came on, or a SYNC was served */
+
+/* Addresses of program memory. */
+static void write_trace(FILE *file)
+{
+    const char *comma = "";
+    fprintf(file, "\"loops\": {");
+    for (unsigned i = 0; i < FLASH_WORDS; i++) {
+        if (run_trace.most[i] > 0)
+            fprintf(file, "%s\"%u\": %u", comma, 2u * i, run_trace.most[i]), comma = ", ";
+    }
+    fprintf(file, "}, \"constants\": [");
+    comma = "";
+    for (unsigned i = 0; i < FLASH_WORDS; i++) {
+        if (run_trace.constants[i])
+            fprintf(file, "%s%u", comma, 2u * i), comma = ", ";
+    }
+    fprintf(file, "], ");
+}
 
 static void write_costs(void)
 {
@@ -70,7 +89,9 @@ static void write_costs(void)
         fprintf(file, "%s\"%s\": {\"count\": %llu, \"least\": %u, \"most\": %u, \"acts\": %u, \"stack\": %u}",
                 i ? ", " : "", NAMES[i], (unsigned long long)c->count, c->least, c->most, c->acts, c->stack);
     }
-    fprintf(file, "}, \"ram\": %u, \"boots\": %llu, \"boot_cycles\": %llu, \"spoiled\": %llu}\n", costs.ram,
+    fprintf(file, "}, ");
+    write_trace(file);
+    fprintf(file, "\"ram\": %u, \"boots\": %llu, \"boot_cycles\": %llu, \"spoiled\": %llu}\n", costs.ram,
             (unsigned long long)costs.boots, (unsigned long long)costs.boot_most, (unsigned long long)costs.spoiled);
     fclose(file);
 }
@@ -193,6 +214,7 @@ static void take(struct image_node *node, unsigned number)
     const uint64_t since = cpu->acted = cpu->cycles;
     const uint16_t top = cpu->deepest = image_cpu_stack(cpu);
     node->served = true;
+    run_trace.epoch++;
     image_cpu_interrupt(cpu, vector_of(cpu->chip, number));
     if (cpu->chip->hung)
         return;
@@ -294,8 +316,8 @@ static struct image_node *attach(struct board *board)
         if (nodes[i].wiring.context == board->chip->wiring.context)
             nodes[i].wiring.context = NULL; /* of a node that is gone */
     }
-    *node =
-        (struct image_node){.cpu = {.chip = board->chip, .table = image_port_table()}, .wiring = board->chip->wiring};
+    *node = (struct image_node){.cpu = {.chip = board->chip, .table = image_port_table(), .trace = &run_trace},
+                                .wiring = board->chip->wiring};
     return node;
 }
 

@@ -15,14 +15,17 @@ import pytest
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 sys.path.insert(0, str(HERE))
-import translate  # noqa: E402  (finds its own neighbours)
+import paths  # noqa: E402
+import translate  # noqa: E402
 from translate import patches  # noqa: E402
 
 PROGRAMS = ROOT / os.environ.get("WHISKER_BUILD", "build/release") / "sim/node_image"
 IMAGE = Path(os.environ.get("WHISKER_IMAGE", ROOT / "firmware/images/mlx90333/node_wire.hex"))
 LONG = "WHISKER_IMAGE_LONG" in os.environ
 TICKS, SEEDS, BOOTS, CUT_SEEDS = (10000, (1, 2, 3), 50, 3) if LONG else (500, (1,), 5, 1)
-SERVED = {8 + irq for irq in (7, 9, 10, 14, 20, 29, 32)}
+IRQS = {"T2": 7, "SPI1 error": 9, "SPI1": 10, "DMA1": 14, "INT1": 20, "INT2": 29, "SPI2 error": 32}
+SERVED = {8 + irq for irq in IRQS.values()}
+KINDS = {"INT1": ("SYNC",), "T2": ("GAP", "READY"), "SPI1": ("BYTE", "LAST_BYTE"), "DMA1": ("ORDER",)}
 CODES = {"trap": 10, "illegal opcode": 10, "watchdog": 9}  # whisker.toml: RESET_TRAP, RESET_WATCHDOG
 RESET_POWER = 8
 
@@ -59,6 +62,16 @@ def test_every_record_is_the_one_that_the_c_makes(table, tmp_path, seed):
     costs = json.loads((tmp_path / "costs").read_text())
     assert costs["spoiled"] == 0, "an interrupt leaves a register other than it found it"
     assert costs["handlers"]["SYNC"]["count"] >= TICKS * 9 // 10
+    assert_within_the_longest_path(costs)
+
+
+def assert_within_the_longest_path(costs: dict) -> None:
+    loops = {int(at) // 2: times for at, times in costs["loops"].items()}
+    words = translate.flash_words(IMAGE)
+    program = paths.Program(words, loops, {at // 2 for at in costs["constants"]})
+    for name, entry in paths.handlers(words, IRQS).items():
+        for kind in KINDS.get(name, ()):
+            assert 0 < costs["handlers"][kind]["most"] <= program.worst(entry), kind
 
 
 @pytest.mark.parametrize("name", patches.patches())

@@ -33,7 +33,16 @@ FLAGS = ("SRL_C", "SRL_Z", "SRL_OV", "SRL_N", "SRL_RA", "SRL_IPL0", "SRL_IPL1", 
 PLAIN, IDLE, RESET, CLEAR_WATCHDOG, HOLD, RETFIE, TABLE, SKIPS, REPEATS, CALLS = range(10)
 SPACE_FLASH, SPACE_DATA = 1, 0
 # From where on an access is timed by the chip's model itself.
-SPECIAL = {"pwrsav": IDLE, "reset": RESET, "clrwdt": CLEAR_WATCHDOG, "disi": HOLD, "retfie": RETFIE}
+SPECIAL = {
+    "pwrsav": IDLE,
+    "reset": RESET,
+    "clrwdt": CLEAR_WATCHDOG,
+    "disi": HOLD,
+    "retfie": RETFIE,
+    "repeat": REPEATS,
+    "call": CALLS,
+    "rcall": CALLS,
+}
 SKIP_IF = ("btsc", "btss", "cpseq", "cpsne", "cpslt", "cpsgt")
 LONG = {"return": 3, "retfie": 3, "retlw": 3, "call": 2, "rcall": 2, "goto": 2, "mov.d": 2, "push.d": 2, "pop.d": 2}
 POINTER_OPERATIONS = ("LOAD", "STORE")
@@ -115,17 +124,9 @@ class Translator:
             return None
         listing, operations = found
         mnemonic, length = listing.mnem, listing.length // 4
-        special, argument = SPECIAL.get(mnemonic, PLAIN), 0
+        special, argument = special_of(mnemonic), 0
         if special in (HOLD, IDLE):
             argument = int(listing.body.lstrip("#"), 0)
-        elif mnemonic.startswith("tbl"):
-            special = TABLE
-        elif mnemonic.startswith(SKIP_IF):
-            special = SKIPS
-        elif mnemonic == "repeat":
-            special = REPEATS
-        elif mnemonic in ("call", "rcall"):
-            special = CALLS
         written, pointers = registers_of(operations)
         first = len(self.operations)
         if special not in (IDLE, RESET, CLEAR_WATCHDOG, HOLD):
@@ -148,6 +149,14 @@ class Translator:
             branch,
             special,
         )
+
+
+def special_of(mnemonic: str) -> int:
+    if mnemonic.startswith("tbl"):
+        return TABLE
+    if mnemonic.startswith(SKIP_IF):
+        return SKIPS
+    return SPECIAL.get(mnemonic, PLAIN)
 
 
 def cycles_of(mnemonic: str, special: int) -> int:

@@ -21,6 +21,7 @@ TOPICS = {  # topic -> module, by room
     "chain": "bridge.chain",
     "damage": "host.damage",
     "host": "host.bench",
+    "image": "node.image",
     "levels": "bridge.levels",
     "mechanics": "mechanics.bench",
     "nav": "nav.bench",

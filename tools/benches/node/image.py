@@ -1,0 +1,166 @@
+"""The node's image, executed: records against the C, cycles and stack of each interrupt, resets, power cuts.
+
+.venv/bin/python tools/benches image    bench/results/node_image.json, docs/node_image.md
+"""
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[3]
+RESULT = ROOT / "bench/results/node_image.json"
+PAGE = ROOT / "docs/node_image.md"
+IMAGE = ROOT / "firmware/images/mlx90333/node_wire.hex"
+sys.path.insert(0, str(ROOT / "sim/node_image"))
+import paths  # noqa: E402
+import translate  # noqa: E402
+
+TICKS, SEEDS = 10000, (1, 2, 3)
+TICK_CYCLES = 19346  # 0.5 ms at the nominal clock
+IRQS = {"INT1": 20, "T2": 7, "SPI1": 10, "SPI1 error": 9, "SPI2 error": 32, "DMA1": 14, "INT2": 29}
+HANDLERS = {  # as image_port.h names them: the interrupt, and what it is for
+    "SYNC": ("INT1", "SYNC: the sensor's first byte"),
+    "BYTE": ("SPI1", "a byte of the frame, and the gap after it"),
+    "LAST_BYTE": ("SPI1", "the frame's last byte: decoded, record armed"),
+    "GAP": ("T2", "the gap is over: the next byte"),
+    "RAISE": ("T2", "/SS up"),
+    "LOWER": ("T2", "/SS down"),
+    "READY": ("T2", "the sensor is ready, or has started"),
+    "ORDER": ("DMA1", "the order: checked, link armed"),
+    "SERVICE": ("DMA1", "a service order: taken"),
+    "SELECT_UP": ("INT2", "select up after a whole transfer"),
+    "SELECT_UP_BROKEN": ("INT2", "select up otherwise: link armed anew"),
+    "SENSOR_OVERRUN": ("SPI1 error", "a byte of the sensor was lost"),
+    "LINK_OVERFLOW": ("SPI2 error", "a word of the link was lost"),
+}
+
+
+class Node:
+    """Programs with the image in them; what its interrupts cost, over all runs."""
+
+    def __init__(self, build: Path, folder: Path):
+        self.programs, self.folder = build / "sim/node_image", folder
+        self.words = translate.flash_words(IMAGE)
+        (folder / "table").write_bytes(translate.table_of(self.words))
+        self.costs: list[dict] = []
+
+    def run(self, program: str, *words) -> str:
+        costs = self.folder / "costs"
+        environment = os.environ | {"NODE_IMAGE": str(self.folder / "table"), "NODE_IMAGE_COSTS": str(costs)}
+        command = [str(self.programs / program), *map(str, words)]
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+        if costs.exists():
+            self.costs.append(json.loads(costs.read_text()))
+            costs.unlink()
+        return done.stdout
+
+    def handlers(self) -> dict:
+        out = {}
+        for name in HANDLERS:
+            ran = [c["handlers"][name] for c in self.costs if c["handlers"][name]["count"]]
+            out[name] = {key: max(one[key] for one in ran) for key in ("most", "acts", "stack")}
+            out[name] |= {"least": min(one["least"] for one in ran), "count": sum(one["count"] for one in ran)}
+        return out
+
+    def by_path(self) -> dict:
+        loops: dict[int, int] = {}
+        for costs in self.costs:
+            for at, times in costs["loops"].items():
+                loops[int(at) // 2] = max(loops.get(int(at) // 2, 0), times)
+        constants = {at // 2 for costs in self.costs for at in costs["constants"]}
+        program = paths.Program(self.words, loops, constants)
+        return {name: program.worst(entry) for name, entry in paths.handlers(self.words, IRQS).items()}
+
+
+def records(node: Node) -> list[dict]:
+    out = []
+    for seed in SEEDS:
+        wanted = node.run("native_records", TICKS, seed).splitlines()
+        found = node.run("image_records", TICKS, seed).splitlines()
+        differing = sum(a != b for a, b in zip(wanted, found, strict=True))
+        good = sum(line.endswith(" good") for line in found)
+        out.append({"seed": seed, "ticks": TICKS, "good": good, "differing": differing})
+    return out
+
+
+def cuts(node: Node) -> dict:
+    path = node.folder / "cuts"
+    node.run("image_cuts", path)
+    runs = [(step, one) for step in json.loads(path.read_text()) for one in step["runs"]]
+    right = sum(one["told"] and one["again"] and bool(one["fate"] & step["allowed"]) for step, one in runs)
+    return {"runs": len(runs), "right": right, "ticks_most": max(one["ticks"] for _, one in runs)}
+
+
+def run(build: Path, _fresh: bool) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        node = Node(build, Path(folder))
+        result = {"records": records(node), "cuts": cuts(node), "resets": json.loads(node.run("image_check", "resets"))}
+        result["storm"] = [json.loads(line) for line in node.run("image_storm", 0, 2).splitlines()]
+        for line in result["storm"]:
+            for key in ("injected", "lines", "links"):
+                del line[key]
+        result |= {"handlers": node.handlers(), "by_path": node.by_path()}
+        result["ram"] = max(c["ram"] for c in node.costs)
+        result["boot_cycles"] = max(c["boot_cycles"] for c in node.costs)
+        result["spoiled"] = sum(c["spoiled"] for c in node.costs)
+    RESULT.write_text(json.dumps(result, indent=1) + "\n")
+    PAGE.write_text(page(result))
+
+
+def page(result: dict) -> str:
+    rows = []
+    for name, (irq, what) in HANDLERS.items():
+        h = result["handlers"][name]
+        cells = (irq, what, h["acts"] or "-", f"{h['least']} to {h['most']}", h["stack"], f"{h['count']:,}")
+        rows.append("| " + " | ".join(map(str, cells)) + " |")
+    by_path = [f"| {name} | {cycles} | {cycles / 38.6925:.1f} |" for name, cycles in result["by_path"].items()]
+    resets = [
+        f"| {r['cause']} | {'kept' if r['keeps_clock'] else 'reset'} | {r['hz'][1] / 1e6:.2f} | {r['lost']} |"
+        for r in result["resets"]
+    ]
+    ticks = sum(one["ticks"] for one in result["records"])
+    differing = sum(one["differing"] for one in result["records"])
+    schedules = sum(one["schedules"] for one in result["storm"])
+    unexplained = sum(one["unexplained"] + one["spurious"] + one["stuck"] for one in result["storm"])
+    return f"""# The node's image, executed
+
+Made by `tools/benches image`: `firmware/images/mlx90333` executed on Ghidra's description of the dsPIC33F in the simulated node
+(`sim/node_image`), not on silicon. `make firmware-check` runs the checks of any image.
+
+- {ticks:,} ticks under random faults of sensor and link: {differing} records differ from those of the firmware's C.
+- {schedules:,} schedules of random faults, resets and traps among them: {unexplained} records that no check explains, too many or for ever.
+- {result["cuts"]["right"]} of {result["cuts"]["runs"]} updates with a power cut end as they may, and the next one succeeds; records at most
+  {result["cuts"]["ticks_most"]} ticks after the supply's return.
+- {result["spoiled"]} interrupts left a register, flag, page or count other than they found it.
+- Data and stack take at most {result["ram"]} bytes of the memory before the DMA's. From reset to the main loop, image check included: at most
+  {result["boot_cycles"]:,} cycles.
+
+## Interrupts
+
+Cycles from the handler's first instruction, entry (five) apart. Acts: until it last wrote the register by which the outside sees it
+(SPI1BUF, SPI2BUF, T2CON, LATB). Whole: its return included. Stack: bytes, the processor's own four included. A tick has {TICK_CYCLES:,} cycles.
+
+| interrupt | what it does | acts, at most | whole | stack | seen |
+|---|---|---|---|---|---|
+{chr(10).join(rows)}
+
+## Worst case by path
+
+The longest way through a handler's instructions, seen to run or not; loops as often as they ever ran in one interrupt
+(`sim/node_image/paths.py`). It contains ways that cannot be gone, such as two faults that exclude each other.
+
+| interrupt | cycles | us |
+|---|---|---|
+{chr(10).join(by_path)}
+
+## Resets
+
+Each cause in the middle of a tick, on a chip that keeps its oscillator over a reset and on one that does not. Lost: ticks without a good record.
+
+| cause | oscillator | MHz after | lost |
+|---|---|---|---|
+{chr(10).join(resets)}
+"""
