@@ -3,7 +3,7 @@
 #include "texture_change.h"
 #include "texture_features.h"
 #include "texture_novelty.h"
-#include "texture_settle.h"
+#include "texture_ringdown.h"
 #include "texture_watch.h"
 
 enum { LENGTH = 16, FEATURES_MOST = 64 };
@@ -262,52 +262,52 @@ static void an_edge_interrupts_the_row_of_blocks(void **state)
     }
 }
 
-static struct nav_texture_settle *settling(double limit)
+static struct nav_texture_ringdown *settling(double limit)
 {
     const double floor[] = {0.0, 0.0}, limits[] = {limit, limit, limit, limit, limit};
-    const struct nav_texture_settle_numbers n = {.channels = 2, .length = LENGTH, .floor = floor, .limit = limits};
-    return nav_texture_settle_new(&n);
+    const struct nav_texture_ringdown_numbers n = {.channels = 2, .length = LENGTH, .floor = floor, .limit = limits};
+    return nav_texture_ringdown_new(&n);
 }
 
 /* Both channels alternate about a rest; the second is ten times as loud. */
-static void hear(struct nav_texture_settle *s, double amplitude)
+static void hear(struct nav_texture_ringdown *s, double amplitude)
 {
     double block[2 * LENGTH];
     for (int i = 0; i < LENGTH; i++) {
         block[2 * i] = 500.0 + (i % 2 ? amplitude : -amplitude);
         block[2 * i + 1] = 700.0 + (i % 2 ? 10.0 : -10.0) * amplitude;
     }
-    nav_texture_settle_take(s, block);
+    nav_texture_ringdown_take(s, block);
 }
 
 static void ringing_falls_steadily(void **state)
 {
     (void)state;
-    struct nav_texture_settle *s = settling(0.5);
+    struct nav_texture_ringdown *s = settling(0.5);
     for (int b = 0; b < 20; b++) { /* power e^-0.6 from block to block */
-        assert_int_equal(nav_texture_settle_rings(s), b >= NAV_TEXTURE_SETTLE_LEAST);
+        assert_int_equal(nav_texture_ringdown_rings(s), b >= NAV_TEXTURE_RINGDOWN_LEAST);
         hear(s, 50.0 * exp(-0.3 * b));
     }
-    for (int n = NAV_TEXTURE_SETTLE_LEAST; n <= NAV_TEXTURE_SETTLE_MOST; n++)
-        assert_near(nav_texture_settle_fall(s, n), 0.6, 1e-6);
-    assert_true(nav_texture_settle_fall(s, NAV_TEXTURE_SETTLE_MOST + 1) == 0.0);
-    nav_texture_settle_reset(s);
-    assert_true(!nav_texture_settle_rings(s) && nav_texture_settle_fall(s, NAV_TEXTURE_SETTLE_LEAST) == 0.0);
-    nav_texture_settle_free(s);
+    for (int n = NAV_TEXTURE_RINGDOWN_LEAST; n <= NAV_TEXTURE_RINGDOWN_MOST; n++)
+        assert_near(nav_texture_ringdown_fall(s, n), 0.6, 1e-6);
+    assert_true(nav_texture_ringdown_fall(s, NAV_TEXTURE_RINGDOWN_MOST + 1) == 0.0);
+    nav_texture_ringdown_reset(s);
+    assert_true(!nav_texture_ringdown_rings(s) && nav_texture_ringdown_fall(s, NAV_TEXTURE_RINGDOWN_LEAST) == 0.0);
+    nav_texture_ringdown_free(s);
 }
 
 static void what_is_steady_silent_or_growing_does_not_ring(void **state)
 {
     (void)state;
-    struct nav_texture_settle *s = settling(0.05);
+    struct nav_texture_ringdown *s = settling(0.05);
     for (int b = 0; b < 40; b++) {
         hear(s, b < 10 ? 0.0 : b < 20 ? 30.0 : 30.0 * exp(0.1 * (b - 20)));
-        assert_false(nav_texture_settle_rings(s));
+        assert_false(nav_texture_ringdown_rings(s));
     }
-    nav_texture_settle_free(s);
+    nav_texture_ringdown_free(s);
     assert_null(settling(0.0));
     assert_null(settling(NAN));
-    nav_texture_settle_free(NULL);
+    nav_texture_ringdown_free(NULL);
 }
 
 int main(void)

@@ -230,7 +230,7 @@ static void a_catch_lasts_until_the_level_is_back(void **state)
 struct model {
     double floor, centre[FEATURES_MOST], scale[FEATURES_MOST], weight[2 * FEATURES_MOST], bias[2];
     double border, spike;
-    struct nav_texture_rung *rung;
+    struct nav_texture_classifier *classifier;
 };
 
 static void make_model(struct model *m)
@@ -241,17 +241,17 @@ static void make_model(struct model *m)
     nav_texture_features_free(f);
     m->scale[power] = 1.0;
     m->weight[2 * power + 1] = 4.0;
-    const struct nav_texture_rung_numbers numbers = {.classes = 2,
-                                                     .channels = 1,
-                                                     .length = 16,
-                                                     .temper = 1.0,
-                                                     .floor = &m->floor,
-                                                     .centre = m->centre,
-                                                     .scale = m->scale,
-                                                     .weight = m->weight,
-                                                     .bias = m->bias};
-    m->rung = nav_texture_rung_new(&numbers);
-    assert_non_null(m->rung);
+    const struct nav_texture_classifier_numbers numbers = {.classes = 2,
+                                                           .channels = 1,
+                                                           .length = 16,
+                                                           .temper = 1.0,
+                                                           .floor = &m->floor,
+                                                           .centre = m->centre,
+                                                           .scale = m->scale,
+                                                           .weight = m->weight,
+                                                           .bias = m->bias};
+    m->classifier = nav_texture_classifier_new(&numbers);
+    assert_non_null(m->classifier);
 }
 
 static struct nav_texture_rules rules_of(const struct model *m, int step)
@@ -259,8 +259,8 @@ static struct nav_texture_rules rules_of(const struct model *m, int step)
     return (struct nav_texture_rules){.channels = 1,
                                       .classes = 2,
                                       .window = 32,
-                                      .rungs = 1,
-                                      .rung = &m->rung,
+                                      .classifiers = 1,
+                                      .classifier = &m->classifier,
                                       .border = &m->border,
                                       .growth = 0.5,
                                       .together = 1.0,
@@ -308,7 +308,7 @@ static void windows_name_surfaces_and_borders(void **state)
     drive(s, 1.0, 16, &d, loglik);
     assert_true(d.label == 0 && d.border); /* a border in the middle: the later half counts */
     nav_texture_stream_free(s);
-    nav_texture_rung_free(m.rung);
+    nav_texture_classifier_free(m.classifier);
 }
 
 /* Surfaces at 0 and 4 in the log of the power, about 2 with a spread of 10 those never trained. */
@@ -317,7 +317,7 @@ static struct nav_texture_novelty *novelty_of(const struct model *m)
     enum { ROWS = 3 };
     static double turn[FEATURES_MOST * FEATURES_MOST], mean[ROWS * FEATURES_MOST], recording[ROWS * FEATURES_MOST];
     double noise[FEATURES_MOST], limit[NAV_TEXTURE_NOVELTY_STEPS] = {0.0};
-    int count = nav_texture_rung_count(m->rung), power = count - 2;
+    int count = nav_texture_classifier_count(m->classifier), power = count - 2;
     for (int f = 0; f < count; f++) {
         turn[f * count + f] = noise[f] = 1.0;
         for (int row = 0; row < ROWS; row++)
@@ -361,7 +361,7 @@ static void a_surface_never_trained_is_unknown_in_windows_of_any_length(void **s
         nav_texture_stream_free(s);
         nav_texture_novelty_free(rules.novelty);
     }
-    nav_texture_rung_free(m.rung);
+    nav_texture_classifier_free(m.classifier);
 }
 
 static void bad_windows_are_no_evidence_and_never_nan(void **state)
@@ -377,7 +377,7 @@ static void bad_windows_are_no_evidence_and_never_nan(void **state)
     assert_int_equal(d.health.bad, 9);
     assert_true(d.label == NAV_TEXTURE_UNKNOWN && d.confidence == 0.0 && loglik[0] == 0.0 && loglik[1] == 0.0);
     nav_texture_stream_free(s);
-    nav_texture_rung_free(m.rung);
+    nav_texture_classifier_free(m.classifier);
 }
 
 static void sequential_decisions_stop_when_sure_and_give_up(void **state)
@@ -396,7 +396,7 @@ static void sequential_decisions_stop_when_sure_and_give_up(void **state)
     assert_int_equal(drive(s, between, 1, &d, loglik), 1);
     assert_true(d.label == NAV_TEXTURE_UNKNOWN && d.samples == 64);
     nav_texture_stream_free(s);
-    nav_texture_rung_free(m.rung);
+    nav_texture_classifier_free(m.classifier);
 }
 
 static void impossible_rules_make_no_stream(void **state)
@@ -404,21 +404,21 @@ static void impossible_rules_make_no_stream(void **state)
     (void)state;
     struct model m;
     make_model(&m);
-    struct nav_texture_rung *twice[] = {m.rung, m.rung};
+    struct nav_texture_classifier *twice[] = {m.classifier, m.classifier};
     const double limit[] = {1.0, 1.0};
     struct nav_texture_rules rules = {.channels = 1,
                                       .classes = 2,
                                       .window = 32,
-                                      .rungs = 2,
-                                      .rung = twice,
+                                      .classifiers = 2,
+                                      .classifier = twice,
                                       .border = limit,
                                       .limits = {.channels = 1}};
     assert_null(nav_texture_stream_new(&rules));
-    rules.rungs = 1;
+    rules.classifiers = 1;
     rules.window = 1;
     assert_null(nav_texture_stream_new(&rules));
     nav_texture_stream_free(NULL);
-    nav_texture_rung_free(m.rung);
+    nav_texture_classifier_free(m.classifier);
 }
 
 int main(void)

@@ -5,9 +5,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "texture_classifier.h"
 #include "texture_features.h"
 #include "texture_own.h"
-#include "texture_rung.h"
 
 enum {
     LEAST = NAV_TEXTURE_CHANGE_AFTER_LEAST,

@@ -52,13 +52,13 @@ int nav_texture_halves_judge(struct nav_texture_halves *h, struct nav_texture_sp
     return one;
 }
 
-/* Whether two stretches, judged at this rung, are of two surfaces: no class explains both. */
-static bool differ(const struct nav_texture_halves *h, int rung, const double *a, const double *b)
+/* Whether two stretches, judged at this classifier, are of two surfaces: no class explains both. */
+static bool differ(const struct nav_texture_halves *h, int classifier, const double *a, const double *b)
 {
     double shared = -INFINITY;
     for (int k = 0; k < h->classes; k++)
         shared = fmax(shared, a[k] + b[k]);
-    return rung >= 0 && -shared > h->border[rung];
+    return classifier >= 0 && -shared > h->border[classifier];
 }
 
 static void swap(double **a, double **b)
@@ -68,18 +68,19 @@ static void swap(double **a, double **b)
     *b = kept;
 }
 
-bool nav_texture_halves_border(struct nav_texture_halves *h, double *loglik, int rung, int half_rung)
+bool nav_texture_halves_border(struct nav_texture_halves *h, double *loglik, int classifier, int half_classifier)
 {
-    bool inside = differ(h, half_rung, h->half[1], h->half[2]);
-    bool since = h->has_before && ((h->half_rung == half_rung && differ(h, half_rung, h->half[0], h->half[1])) ||
-                                   (h->before_rung == rung && differ(h, rung, h->before, loglik)) ||
-                                   differ(h, half_rung, h->before, h->half[2]));
+    bool inside = differ(h, half_classifier, h->half[1], h->half[2]);
+    bool since = h->has_before &&
+                 ((h->half_classifier == half_classifier && differ(h, half_classifier, h->half[0], h->half[1])) ||
+                  (h->before_classifier == classifier && differ(h, classifier, h->before, loglik)) ||
+                  differ(h, half_classifier, h->before, h->half[2]));
     size_t bytes = (size_t)h->classes * sizeof *loglik;
     if (inside)
         memcpy(loglik, h->half[2], bytes);
     memcpy(h->before, loglik, bytes);
-    h->before_rung = inside ? -1 : rung;
-    h->half_rung = half_rung;
+    h->before_classifier = inside ? -1 : classifier;
+    h->half_classifier = half_classifier;
     swap(&h->half[0], &h->half[2]);
     h->has_before = true;
     return inside || since;

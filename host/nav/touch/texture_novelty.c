@@ -5,8 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "texture_classifier.h"
 #include "texture_own.h"
-#include "texture_rung.h"
 
 enum { FEATURES_MOST = 1 << 12, STEPS = NAV_TEXTURE_NOVELTY_STEPS, WINDOWS_MOST = 1 << (STEPS - 1) };
 

@@ -5,10 +5,10 @@
 #include <string.h>
 
 struct nav_texture_span {
-    int channels, classes, rungs;
-    struct nav_texture_rung *rung[NAV_TEXTURE_RUNGS_MAX];
+    int channels, classes, classifiers;
+    struct nav_texture_classifier *classifier[NAV_TEXTURE_CLASSIFIERS_MAX];
     double growth;
-    double *part; /* [classes] of one rung's window */
+    double *part; /* [classes] of one classifier's window */
 };
 
 struct nav_texture_span *nav_texture_span_new(const struct nav_texture_rules *rules)
@@ -18,9 +18,9 @@ struct nav_texture_span *nav_texture_span_new(const struct nav_texture_rules *ru
         return NULL;
     s->channels = rules->channels;
     s->classes = rules->classes;
-    s->rungs = rules->rungs;
+    s->classifiers = rules->classifiers;
     s->growth = rules->growth;
-    memcpy(s->rung, rules->rung, (size_t)rules->rungs * sizeof *s->rung);
+    memcpy(s->classifier, rules->classifier, (size_t)rules->classifiers * sizeof *s->classifier);
     s->part = calloc((size_t)s->classes, sizeof *s->part);
     if (!s->part) {
         free(s);
@@ -39,10 +39,10 @@ void nav_texture_span_free(struct nav_texture_span *s)
 
 static int longest_within(const struct nav_texture_span *s, int n)
 {
-    int rung = s->rungs - 1;
-    while (rung >= 0 && nav_texture_rung_length(s->rung[rung]) > n)
-        rung--;
-    return rung;
+    int classifier = s->classifiers - 1;
+    while (classifier >= 0 && nav_texture_classifier_length(s->classifier[classifier]) > n)
+        classifier--;
+    return classifier;
 }
 
 /* Evidence grows with length; the largest log-likelihood becomes 0. */
@@ -57,18 +57,18 @@ static void finish(const struct nav_texture_span *s, double *loglik, int windows
 
 int nav_texture_span_judge(struct nav_texture_span *s, const double *window, int n, double *loglik)
 {
-    int rung = longest_within(s, n);
+    int classifier = longest_within(s, n);
     memset(loglik, 0, (size_t)s->classes * sizeof *loglik);
-    if (rung < 0)
+    if (classifier < 0)
         return -1;
-    int length = nav_texture_rung_length(s->rung[rung]);
+    int length = nav_texture_classifier_length(s->classifier[classifier]);
     int windows = (n + length - 1) / length;
     for (int w = 0; w < windows; w++) {
         long start = windows > 1 ? (long)(n - length) * w / (windows - 1) : 0;
-        nav_texture_rung_judge(s->rung[rung], window + (size_t)start * (size_t)s->channels, s->part);
+        nav_texture_classifier_judge(s->classifier[classifier], window + (size_t)start * (size_t)s->channels, s->part);
         for (int k = 0; k < s->classes; k++)
             loglik[k] += s->part[k];
     }
     finish(s, loglik, windows, (double)n / length);
-    return rung;
+    return classifier;
 }

@@ -17,8 +17,8 @@
 
 struct nav_texture_stream {
     struct nav_texture_rules rules; /* its pointers are the stream's own, but for what is lent */
-    struct nav_texture_rung *rung[NAV_TEXTURE_RUNGS_MAX];
-    double border[NAV_TEXTURE_RUNGS_MAX];
+    struct nav_texture_classifier *classifier[NAV_TEXTURE_CLASSIFIERS_MAX];
+    double border[NAV_TEXTURE_CLASSIFIERS_MAX];
     struct nav_texture_span *span;
     double *limits; /* [6][channels] the stream's own */
     double *raw;    /* [room][channels] samples since the last decision */
@@ -38,19 +38,21 @@ struct nav_texture_stream {
 
 static bool lengths_ok(const struct nav_texture_rules *r)
 {
-    if (r->rungs < 1 || r->rungs > NAV_TEXTURE_RUNGS_MAX || r->window < 2 || r->window > NAV_TEXTURE_WINDOW_MAX)
+    if (r->classifiers < 1 || r->classifiers > NAV_TEXTURE_CLASSIFIERS_MAX || r->window < 2 ||
+        r->window > NAV_TEXTURE_WINDOW_MAX)
         return false;
     if (r->step < 0 ||
         (r->step > 0 && !(r->told >= 0.0 && r->patience >= r->step && r->patience <= NAV_TEXTURE_WINDOW_MAX)))
         return false;
-    for (int i = 1; i < r->rungs; i++) {
-        if (nav_texture_rung_length(r->rung[i]) <= nav_texture_rung_length(r->rung[i - 1]))
+    for (int i = 1; i < r->classifiers; i++) {
+        if (nav_texture_classifier_length(r->classifier[i]) <= nav_texture_classifier_length(r->classifier[i - 1]))
             return false;
     }
-    if (r->settle && (!r->change || nav_texture_settle_length(r->settle) != nav_texture_change_length(r->change)))
+    if (r->ringdown && (!r->change || nav_texture_ringdown_length(r->ringdown) != nav_texture_change_length(r->change)))
         return false;
-    if (r->novelty && (r->novelty_rung < 0 || r->novelty_rung >= r->rungs ||
-                       nav_texture_novelty_features(r->novelty) != nav_texture_rung_count(r->rung[r->novelty_rung])))
+    if (r->novelty && (r->novelty_classifier < 0 || r->novelty_classifier >= r->classifiers ||
+                       nav_texture_novelty_features(r->novelty) !=
+                           nav_texture_classifier_count(r->classifier[r->novelty_classifier])))
         return false;
     return r->channels >= 1 && r->classes >= 1 && r->limits.channels == r->channels;
 }
@@ -63,7 +65,7 @@ static const double *own_limit(double *to, const double *from, int channels)
 /* Samples of a window that novelty is judged by; 0 without. */
 static int novelty_length(const struct nav_texture_stream *s)
 {
-    return s->rules.novelty ? nav_texture_rung_length(s->rules.rung[s->rules.novelty_rung]) : 0;
+    return s->rules.novelty ? nav_texture_classifier_length(s->rules.classifier[s->rules.novelty_classifier]) : 0;
 }
 
 /* Whether decisions are of just the windows that novelty is judged by. */
@@ -87,9 +89,9 @@ static bool allocate(struct nav_texture_stream *s)
 
 static void own_limits(struct nav_texture_stream *s)
 {
-    memcpy(s->border, s->rules.border, (size_t)s->rules.rungs * sizeof *s->border);
-    memcpy(s->rung, s->rules.rung, (size_t)s->rules.rungs * sizeof *s->rung);
-    s->rules.rung = s->rung;
+    memcpy(s->border, s->rules.border, (size_t)s->rules.classifiers * sizeof *s->border);
+    memcpy(s->classifier, s->rules.classifier, (size_t)s->rules.classifiers * sizeof *s->classifier);
+    s->rules.classifier = s->classifier;
     s->rules.border = s->border;
     struct nav_texture_limits *l = &s->rules.limits;
     int channels = l->channels;
@@ -178,10 +180,10 @@ static void no_evidence(struct nav_texture_stream *s, struct nav_texture_decisio
     new_surface(s);
 }
 
-/* Judges the window that a rung has just reduced to features, together with those before it. */
+/* Judges the window that a classifier has just reduced to features, together with those before it. */
 static void weigh_novelty(struct nav_texture_stream *s)
 {
-    const double *features = nav_texture_rung_features(s->rules.rung[s->rules.novelty_rung]);
+    const double *features = nav_texture_classifier_features(s->rules.classifier[s->rules.novelty_classifier]);
     s->beyond = nav_texture_novelty_weigh(s->rules.novelty, features);
 }
 
@@ -219,9 +221,9 @@ static bool never_trained(const struct nav_texture_stream *s, double *loglik)
  * part of them are taken as they are. */
 static bool rings(const struct nav_texture_stream *s, double *loglik)
 {
-    const struct nav_texture_settle *settle = s->rules.step == 0 ? s->rules.settle : NULL;
-    bool ringing = settle && s->held <= NAV_TEXTURE_SETTLE_MOST * nav_texture_settle_length(settle) &&
-                   nav_texture_settle_rings(settle);
+    const struct nav_texture_ringdown *ringdown = s->rules.step == 0 ? s->rules.ringdown : NULL;
+    bool ringing = ringdown && s->held <= NAV_TEXTURE_RINGDOWN_MOST * nav_texture_ringdown_length(ringdown) &&
+                   nav_texture_ringdown_rings(ringdown);
     for (int k = 0; k < s->rules.classes && ringing; k++)
         loglik[k] *= RINGING;
     return ringing;
@@ -278,20 +280,20 @@ static bool decide(struct nav_texture_stream *s, struct nav_texture_decision *d,
     bool cut = s->since < s->held; /* what lies before the border says nothing of the surface now */
     int n = cut ? s->since : s->held;
     const double *from = s->clean + (size_t)(s->held - n) * (size_t)s->rules.channels;
-    int rung = clean(s, d) ? nav_texture_span_judge(s->span, from, n, loglik) : -1;
+    int classifier = clean(s, d) ? nav_texture_span_judge(s->span, from, n, loglik) : -1;
     d->border = cut || (d->health.caught > 0 && d->health.railed == 0);
-    if (rung < 0) {
+    if (classifier < 0) {
         no_evidence(s, d, loglik);
         return false;
     }
-    int half_rung = nav_texture_halves_judge(&s->halves, s->span, from, n, loglik);
+    int half_classifier = nav_texture_halves_judge(&s->halves, s->span, from, n, loglik);
     d->confidence = best(loglik, s->rules.classes, &d->label);
     follow_row(s, d, n);
     d->novelty = s->beyond;
     bool untrained = never_trained(s, loglik);
     if (goes_on(s, best(loglik, s->rules.classes, &d->label), untrained))
         return false;
-    bool halves = nav_texture_halves_border(&s->halves, loglik, rung, half_rung);
+    bool halves = nav_texture_halves_border(&s->halves, loglik, classifier, half_classifier);
     d->border = cut || (halves && !watched(s));
     answer(s, d, loglik, rings(s, loglik));
     return true;
@@ -321,8 +323,8 @@ static void follow_novelty(struct nav_texture_stream *s, const double *sample)
     struct nav_texture_health health = nav_texture_clean(s->apart, length, &s->rules.limits);
     if (nav_texture_unreadable(&health, length) || health.caught > 0 || s->edge.held)
         return;
-    nav_texture_rung_judge(s->rules.rung[s->rules.novelty_rung], s->apart,
-                           s->apart + (size_t)length * (size_t)channels);
+    nav_texture_classifier_judge(s->rules.classifier[s->rules.novelty_classifier], s->apart,
+                                 s->apart + (size_t)length * (size_t)channels);
     weigh_novelty(s);
 }
 

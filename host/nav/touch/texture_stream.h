@@ -3,36 +3,38 @@
 #define NAV_TEXTURE_STREAM_H
 
 #include "texture_change.h"
+#include "texture_classifier.h"
 #include "texture_clean.h"
 #include "texture_novelty.h"
-#include "texture_rung.h"
-#include "texture_settle.h"
+#include "texture_ringdown.h"
 
 /* cffi: begin */
 struct nav_texture_stream;
 
-enum { NAV_TEXTURE_RUNGS_MAX = 16, NAV_TEXTURE_WINDOW_MAX = 1 << 20, NAV_TEXTURE_UNKNOWN = -1 };
+enum { NAV_TEXTURE_CLASSIFIERS_MAX = 16, NAV_TEXTURE_WINDOW_MAX = 1 << 20, NAV_TEXTURE_UNKNOWN = -1 };
 
 struct nav_texture_rules {
     int channels, classes;
-    int window;                           /* samples, from 2 to NAV_TEXTURE_WINDOW_MAX */
-    int rungs;                            /* at least 1; their windows grow from rung to rung */
-    struct nav_texture_rung *const *rung; /* [rungs] lent for the stream's life; not for use by two threads at a time */
-    const double *border;                 /* [rungs] two neighbouring stretches that share a class this badly, in nats,
-                                             are two surfaces */
-    double growth;                        /* evidence of m rung lengths is m^growth that of one: 1 if independent */
-    double together;                      /* factor of the mean evidence of a window and its halves */
-    double doubt;                         /* confidence below which the answer is "unknown" */
-    int step;                             /* 0: windows in a row. Else sequential: looks every so many samples, ... */
-    double sure;                          /* ... answers at this confidence, ... */
-    int patience;                         /* ... and after so many samples in any case */
-    double told;                          /* factor of the log-likelihoods of a sequential decision, >= 0 */
-    struct nav_texture_limits limits;     /* channels as above */
+    int window;      /* samples, from 2 to NAV_TEXTURE_WINDOW_MAX */
+    int classifiers; /* at least 1; their windows grow from classifier to classifier */
+    struct nav_texture_classifier *const
+        *classifier;      /* [classifiers] lent for the stream's life; not for use by two threads at a time */
+    const double *border; /* [classifiers] two neighbouring stretches that share a class this badly, in nats,
+                             are two surfaces */
+    double growth;        /* evidence of m classifier lengths is m^growth that of one: 1 if independent */
+    double together;      /* factor of the mean evidence of a window and its halves */
+    double doubt;         /* confidence below which the answer is "unknown" */
+    int step;             /* 0: windows in a row. Else sequential: looks every so many samples, ... */
+    double sure;          /* ... answers at this confidence, ... */
+    int patience;         /* ... and after so many samples in any case */
+    double told;          /* factor of the log-likelihoods of a sequential decision, >= 0 */
+    struct nav_texture_limits limits;    /* channels as above */
     struct nav_texture_change *change;   /* lent to this stream alone; NULL: borders are those of the windows' halves */
-    struct nav_texture_novelty *novelty; /* likewise, of the features of novelty_rung; NULL: every surface is taken
-                                            for a trained one */
-    int novelty_rung;
-    struct nav_texture_settle *settle; /* likewise, of blocks as long as `change`'s; NULL: ringing passes for a floor */
+    struct nav_texture_novelty *novelty; /* likewise, of the features of novelty_classifier; NULL: every surface is
+                                            taken for a trained one */
+    int novelty_classifier;
+    struct nav_texture_ringdown
+        *ringdown; /* likewise, of blocks as long as `change`'s; NULL: ringing passes for a floor */
 };
 
 struct nav_texture_decision {

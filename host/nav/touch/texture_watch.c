@@ -9,7 +9,7 @@ bool nav_texture_watch_make(struct nav_texture_watch *w, const struct nav_textur
                             const struct nav_texture_limits *limits)
 {
     *w = (struct nav_texture_watch){
-        .channels = rules->channels, .limits = limits, .change = rules->change, .settle = rules->settle};
+        .channels = rules->channels, .limits = limits, .change = rules->change, .ringdown = rules->ringdown};
     size_t length = w->change ? (size_t)nav_texture_change_length(w->change) : 1;
     w->block = calloc(length * (size_t)w->channels, sizeof *w->block);
     return w->block;
@@ -24,8 +24,8 @@ static void interrupt(struct nav_texture_watch *w)
 {
     if (w->change)
         nav_texture_change_keep(w->change, 0);
-    if (w->settle)
-        nav_texture_settle_reset(w->settle);
+    if (w->ringdown)
+        nav_texture_ringdown_reset(w->ringdown);
 }
 
 void nav_texture_watch_reset(struct nav_texture_watch *w)
@@ -53,8 +53,8 @@ int nav_texture_watch_take(struct nav_texture_watch *w, const double *sample, bo
         interrupt(w);
         return 0;
     }
-    if (w->settle)
-        nav_texture_settle_take(w->settle, w->block);
+    if (w->ringdown)
+        nav_texture_ringdown_take(w->ringdown, w->block);
     if (!(nav_texture_change_weigh(w->change, w->block, &after) > nav_texture_change_limit(w->change)))
         return 0;
     nav_texture_change_keep(w->change, after);

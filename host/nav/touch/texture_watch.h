@@ -10,7 +10,7 @@ struct nav_texture_watch {
     int channels, blocked;
     const struct nav_texture_limits *limits; /* lent, like both below; each may be NULL */
     struct nav_texture_change *change;
-    struct nav_texture_settle *settle;
+    struct nav_texture_ringdown *ringdown;
     double *block; /* [a block's length][channels] samples since the last block */
 };
 

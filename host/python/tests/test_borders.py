@@ -13,7 +13,7 @@ from typing import NamedTuple
 import level0
 import numpy as np
 import pytest
-from models import CHANNELS, FEATURES, LENGTH, LIMITS, change, model, novelty, rung, settle
+from models import CHANNELS, FEATURES, LENGTH, LIMITS, change, classifier, model, novelty, ringdown
 from rings import ring_name
 
 import whisker
@@ -27,10 +27,10 @@ from whisker.touch.radial.model import RadialModel, peak
 from whisker.touch.radial.shape import Contact as Whisk
 from whisker.touch.radial.shape import shape_of
 from whisker.touch.texture.change import Change
+from whisker.touch.texture.classifier import Classifier, blocks_of, plain_features
 from whisker.touch.texture.model import TextureModel
 from whisker.touch.texture.novelty import Novelty
-from whisker.touch.texture.rung import Rung, blocks_of, plain_features
-from whisker.touch.texture.settle import Settle
+from whisker.touch.texture.ringdown import Ringdown
 
 PACKAGE = Path(whisker.__file__).parent
 HELPERS = {"doubles", "octets", "pointer"}
@@ -40,7 +40,7 @@ OWN = {
     "nav.filters.Filter.bins",
     "nav.filters.problem_of",
     "touch.radial.shape.terms_of",
-    "touch.texture.rung.feature_count",
+    "touch.texture.classifier.feature_count",
     "signals.world.World.run",
     "signals.mechanics._counts",
     "signals.mechanics.touch",
@@ -131,28 +131,32 @@ CASES = {
         novelty(), Novelty.native, turn=(0, 1), mean=(1,), recording=(0, 1), noise=(0,), limit=(0,)
     ),
     "touch.texture.novelty.Novelty.scores": of_one(novelty().scores, "features", np.zeros((3, FEATURES)), 1),
-    "touch.texture.settle.Settle.native": of_part(settle(), Settle.native, floor=(), limit=(0,)),
-    "touch.texture.settle.Settle.falls": of_one(settle().falls, "samples", NOISE, 1),
+    "touch.texture.ringdown.Ringdown.native": of_part(ringdown(), Ringdown.native, floor=(), limit=(0,)),
+    "touch.texture.ringdown.Ringdown.falls": of_one(ringdown().falls, "samples", NOISE, 1),
     "touch.texture.change.Change.native": of_part(
         change(), Change.native, floor=(0,), steady=(0, 1), apart=(0, 1), weight=(0, 1), bias=(0,)
     ),
     "touch.texture.change.Change.ratios": of_one(change().ratios, "samples", NOISE, 1),
-    "touch.texture.rung.Rung._make": of_part(
-        rung(),
-        Rung._make,
+    "touch.texture.classifier.Classifier._make": of_part(
+        classifier(),
+        Classifier._make,
         floor=(0,),
         centre=(0,),
         scale=(0,),
         weight=(0, 1),
         bias=(0,),
     ),
-    "touch.texture.rung.Rung.expand": of_one(rung().expand, "windows", np.zeros((2, LENGTH, CHANNELS)), 1, 2),
-    "touch.texture.rung.plain_features": Case(
+    "touch.texture.classifier.Classifier.expand": of_one(
+        classifier().expand, "windows", np.zeros((2, LENGTH, CHANNELS)), 1, 2
+    ),
+    "touch.texture.classifier.plain_features": Case(
         lambda **given: plain_features(given["windows"], False, given["floor"]),
         {"windows": np.zeros((2, LENGTH, CHANNELS)), "floor": np.ones(CHANNELS)},
         {"windows": (2,), "floor": (0,)},
     ),
-    "touch.texture.rung.blocks_of": of_one(lambda samples: blocks_of(samples, LENGTH, CHANNELS), "samples", NOISE, 1),
+    "touch.texture.classifier.blocks_of": of_one(
+        lambda samples: blocks_of(samples, LENGTH, CHANNELS), "samples", NOISE, 1
+    ),
     "touch.texture.spectral.Stream.__init__": Case(
         lambda **limits: model(**limits).stream(LENGTH), LIMITS, dict.fromkeys(LIMITS, (0,))
     ),

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
+from whisker.touch.texture.classifier import plain_features
 from whisker.touch.texture.model import TextureModel
-from whisker.touch.texture.rung import plain_features
 
 from .scores import METHODS, WINDOW, decide, summary
 from .simulated import TEST_SEEDS, TRAIN_SEED, trained
@@ -33,7 +33,7 @@ def cost() -> dict:
     for name, model in known.items():
         pairs = list(zip(label["test"], (decide(model, w)[0] for w in cut["test"]), strict=True))
         out[name] = {"error": 1.0 - summary(pairs)["accuracy"], "us": own_time(model, cut["test"])}
-    floor = known[METHODS[1]].rungs[0].floor
+    floor = known[METHODS[1]].classifiers[0].floor
     features = {f"{s}_features": plain_features(cut[s], False, floor) for s in cut}
     start = time.perf_counter_ns()
     plain_features(cut["test"], False, floor)

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
+from whisker.touch.texture.classifier import plain_features
 from whisker.touch.texture.model import TextureModel, posterior
-from whisker.touch.texture.rung import plain_features
 from whisker.touch.texture.train import calibration_error, train
 
 from .cost import peers
@@ -90,7 +90,7 @@ def terrains(runs: list, hz: float) -> dict:
             found[METHODS[1]] += [decision(d, names, n) for d in spectral.judge(x, window)]
             found["default, sequential"] += [decision(d, names, n) for d in spectral.judge(x, window, True)]
             found[METHODS[0]] += [paper_decision(bayes, w, names, n) for w in windows_of(x, window)]
-        for name, decisions in peer_decisions(kept, held, names, window, spectral.rungs[0].floor).items():
+        for name, decisions in peer_decisions(kept, held, names, window, spectral.classifiers[0].floor).items():
             found.setdefault(name, []).extend(decisions)
     return {name: scores(decisions) for name, decisions in found.items()}
 

@@ -3,9 +3,9 @@
 import numpy as np
 
 from whisker.touch.texture.change import Change
+from whisker.touch.texture.classifier import Classifier, feature_count
 from whisker.touch.texture.novelty import STEPS, Novelty
-from whisker.touch.texture.rung import Rung, feature_count
-from whisker.touch.texture.settle import Settle, counts
+from whisker.touch.texture.ringdown import Ringdown, counts
 from whisker.touch.texture.spectral import SpectralModel
 
 CHANNELS, LENGTH, CLASSES = 2, 64, 3
@@ -14,11 +14,11 @@ LIMITS = {"spike": [9.0, 9.0], "still": [1.0, 1.0], "low": [0.0, 0.0], "high": [
 LIMITS = {name: np.array(values) for name, values in LIMITS.items()}
 
 
-def rung() -> Rung:
+def classifier() -> Classifier:
     sizes = {"centre": (FEATURES,), "weight": (FEATURES, CLASSES), "bias": (CLASSES,)}
     arrays = {name: np.zeros(shape) for name, shape in sizes.items()}
     ones = {"floor": np.ones(CHANNELS), "scale": np.ones(FEATURES)}
-    return Rung(LENGTH, False, 0, 0, **arrays, **ones, span=np.full(CHANNELS, 1e4))
+    return Classifier(LENGTH, False, 0, 0, **arrays, **ones, span=np.full(CHANNELS, 1e4))
 
 
 def change() -> Change:
@@ -31,9 +31,9 @@ def novelty() -> Novelty:
     return Novelty(LENGTH, 1.0, np.eye(FEATURES), rows, rows, np.ones(FEATURES), np.ones(STEPS))
 
 
-def settle() -> Settle:
-    return Settle(LENGTH, np.ones(CHANNELS), np.ones(len(counts())))
+def ringdown() -> Ringdown:
+    return Ringdown(LENGTH, np.ones(CHANNELS), np.ones(len(counts())))
 
 
 def model(**limits) -> SpectralModel:
-    return SpectralModel(["A", "B", "C"], 2000.0, [rung()], LIMITS | limits)
+    return SpectralModel(["A", "B", "C"], 2000.0, [classifier()], LIMITS | limits)

@@ -83,7 +83,7 @@ def hiss(seed, bursts, gain=1.0, n=2000, length=25):
 
 def test_what_comes_in_bursts_is_told_by_shorter_stretches(tmp_path):
     bursty = train({f"{b}": [hiss(s, b) for s in range(6)] for b in (False, True)}, RATE_HZ)
-    assert {r.shorter for r in bursty.rungs if r.length >= WINDOW} == {STRETCHES}
+    assert {r.shorter for r in bursty.classifiers if r.length >= WINDOW} == {STRETCHES}
     right = np.mean(
         [d.loglik.argmax() == b for b in (0, 1) for s in (30, 31, 32) for d in bursty.judge(hiss(s, bool(b)), WINDOW)]
     )
@@ -98,7 +98,7 @@ def test_what_comes_in_bursts_is_told_by_shorter_stretches(tmp_path):
 def test_stretches_that_do_not_pay_are_left_out():
     """Of even noises the whole's power says as much as anything does."""
     even = train({f"{k}": [hiss(s, False, 1.0 + 0.2 * k) for s in range(6 * k, 6 * k + 6)] for k in (0, 1)}, RATE_HZ)
-    assert {r.shorter for r in even.rungs} == {0}
+    assert {r.shorter for r in even.classifiers} == {0}
 
 
 def test_a_surface_never_trained_is_unknown(model):
@@ -173,7 +173,7 @@ def test_a_whisker_that_rings_from_another_surface_names_none_and_says_little():
     model = train({f"{loud}": [hiss(loud) for _ in range(5)] for loud in (18, 60, 200)}, RATE_HZ)
     fading = hiss(18, 1400) + np.exp(-np.maximum(np.arange(1400) - 800, 0) / 200)[:, None] * (hiss(200, 1400) - 32768)
     found = {d.end: d for d in model.judge(fading, WINDOW)}
-    model.settle = None
+    model.ringdown = None
     believed = {d.end: d for d in model.judge(fading, WINDOW)}
     assert found[800].label == 2 and (found[800].loglik == believed[800].loglik).all()
     for end in (1000, 1200, 1400):
@@ -188,8 +188,8 @@ def test_a_catch_is_a_border_and_no_surface(model):
 
 
 def test_how_far_a_window_may_reach_is_what_windows_at_least_as_long_did(model, monkeypatch):
-    for rung in model.rungs:
-        monkeypatch.setattr(rung, "span", np.full(2, 1.0 if rung.length == WINDOW else 1e6))
+    for classifier in model.classifiers:
+        monkeypatch.setattr(classifier, "span", np.full(2, 1.0 if classifier.length == WINDOW else 1e6))
     x = drag("SMOOTH", 1000, 61)
     assert all(d.border and d.label == -1 for d in model.judge(x, WINDOW))
     assert not any(d.border for d in model.judge(x, WINDOW + 1))
@@ -277,22 +277,22 @@ def test_saved_models_load_alike_and_are_small(model, tmp_path):
 @pytest.mark.parametrize(
     "spoil",
     [
-        lambda c: c.pop("rungs"),
-        lambda c: c.update(rungs=[]),
-        lambda c: c["rungs"][0]["centre"].pop(),
-        lambda c: c["rungs"][0].update(temper=float("nan")),
-        lambda c: c["rungs"][0].update(length=1 << 30),
-        lambda c: c["rungs"][0].update(hidden=1e9),
-        lambda c: c["rungs"][0].pop("shorter"),
+        lambda c: c.pop("classifiers"),
+        lambda c: c.update(classifiers=[]),
+        lambda c: c["classifiers"][0]["centre"].pop(),
+        lambda c: c["classifiers"][0].update(temper=float("nan")),
+        lambda c: c["classifiers"][0].update(length=1 << 30),
+        lambda c: c["classifiers"][0].update(hidden=1e9),
+        lambda c: c["classifiers"][0].pop("shorter"),
         lambda c: c["novelty"].update(length=201),
         lambda c: c["novelty"]["turn"].pop(),
         lambda c: c["novelty"]["noise"].__setitem__(0, 0.0),
-        lambda c: c["rungs"][-1].update(shorter=8),
-        lambda c: c["rungs"][-1].update(shorter=-1),
-        lambda c: c["rungs"][-1].update(shorter="eight"),
+        lambda c: c["classifiers"][-1].update(shorter=8),
+        lambda c: c["classifiers"][-1].update(shorter=-1),
+        lambda c: c["classifiers"][-1].update(shorter="eight"),
         lambda c: c.update(format="whisker texture model 6"),
-        lambda c: c["rungs"][0]["weight"][0].pop(),
-        lambda c: c.update(rungs=c["rungs"][::-1]),
+        lambda c: c["classifiers"][0]["weight"][0].pop(),
+        lambda c: c.update(classifiers=c["classifiers"][::-1]),
         lambda c: c["limits"].pop("spike"),
         lambda c: c["limits"]["still"].pop(),
         lambda c: c.update(classes=["VINYL"]),

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...native import as_doubles, doubles, ffi, lib
-from .rung import blocks_of, plain_features
+from .classifier import blocks_of, plain_features
 
 SHRINK = 0.05  # share of the diagonal in covariances
 ROW = 4  # blocks over which their dependence is measured

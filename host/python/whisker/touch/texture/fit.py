@@ -1,4 +1,4 @@
-"""Fits one rung of a spectral texture model: discriminant, temperature and size, chosen on recordings held out.
+"""Fits the classifier for windows of one length: discriminant, temperature and size, chosen on recordings held out.
 
 Sums over windows are kept by fold, so that leaving one fold out is a subtraction, not a new pass over the data.
 """
@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...native import lib
-from .rung import Rung, plain_features
+from .classifier import Classifier, plain_features
 
 SHRINK = (1e-3, 1e-2, 1e-1)  # share of the diagonal in the covariance within classes
 HIDDEN = (0, 128, 256)  # random projections: none, few, many; what many cost keeps a 100 ms window near 20 us
@@ -33,10 +33,10 @@ class Windows:
 
 @dataclass
 class Fitted:
-    """A rung, its twins that have not seen a fold, and the held-out log-likelihoods (m, classes), tempered."""
+    """A classifier, its twins that have not seen a fold, and the held-out log-likelihoods (m, classes), tempered."""
 
-    rung: Rung
-    twins: list[Rung]
+    classifier: Classifier
+    twins: list[Classifier]
     loglik: np.ndarray
     loss: float
 
@@ -77,7 +77,7 @@ class _Candidate:
 class _Trial:
     """Features of one kind, and what did best on them."""
 
-    blank: Rung  # without weights
+    blank: Classifier  # without weights
     expanded: np.ndarray  # (m, F + hidden most)
     sums: "_Sums"
     best: _Candidate
@@ -93,7 +93,7 @@ def _trial(data: Windows, floor: np.ndarray, levels: bool, shorter: int, sizes: 
     features, classes = raw.shape[1], data.classes
     weight = np.zeros((features + max(sizes), classes))
     length = data.windows.shape[1]
-    blank = Rung(length, levels, shorter, max(sizes), floor, centre, scale, weight, np.zeros(classes))
+    blank = Classifier(length, levels, shorter, max(sizes), floor, centre, scale, weight, np.zeros(classes))
     expanded = blank.expand(data.windows) if max(sizes) else (raw - centre) * scale
     sums = _Sums(expanded, data)
     best = None
@@ -105,8 +105,8 @@ def _trial(data: Windows, floor: np.ndarray, levels: bool, shorter: int, sizes: 
 
 
 def _finished(trial: _Trial, data: Windows) -> Fitted:
-    rungs = [_finish(trial.blank, trial.sums, left_out, trial.best) for left_out in (None, *range(data.folds))]
-    return Fitted(rungs[0], rungs[1:], trial.best.loglik, trial.loss)
+    classifiers = [_finish(trial.blank, trial.sums, left_out, trial.best) for left_out in (None, *range(data.folds))]
+    return Fitted(classifiers[0], classifiers[1:], trial.best.loglik, trial.loss)
 
 
 class _Sums:
@@ -186,7 +186,7 @@ def log_loss(loglik: np.ndarray, label: np.ndarray, weight: np.ndarray | None = 
     return float(-np.average(chance, weights=weight))
 
 
-def _finish(blank: Rung, sums: _Sums, left_out: int | None, chosen: _Candidate) -> Rung:
+def _finish(blank: Classifier, sums: _Sums, left_out: int | None, chosen: _Candidate) -> Classifier:
     features = len(blank.centre)
     whole = sums.statistics(None, features + chosen.hidden) if left_out is None else None
     weight, bias = _discriminant(*whole, chosen.shrink) if whole else chosen.rules[left_out]

@@ -10,16 +10,16 @@ from ...fields import Fields
 from ...native import as_doubles, doubles, ffi, lib
 from ...tables import TableError
 from .change import Change
+from .classifier import Classifier
 from .novelty import Novelty
-from .rung import Rung
-from .settle import Settle
+from .ringdown import Ringdown
 
 FORMAT = "whisker texture model 7"
-PARTS = {"change": Change, "novelty": Novelty, "settle": Settle}  # of windows in a row
+PARTS = {"change": Change, "novelty": Novelty, "ringdown": Ringdown}  # of windows in a row
 SENSOR_STOPS = (0.0, 65535.0)  # of raw counts, 16 bits
 WITHOUT = {  # what a model without a part cannot do, and what it would take
     "change": "borders block by block; longer recordings, two or more of each surface, show the rate of false ones",
-    "settle": "a whisker that rings after a rougher surface; longer recordings show how fast floors get quieter",
+    "ringdown": "a whisker that rings after a rougher surface; longer recordings show how fast floors get quieter",
     "novelty": "surfaces never trained, by windows in a row; give three recordings or more of each surface",
 }
 LIMITS = ("spike", "still", "low", "high")
@@ -52,11 +52,11 @@ class Judgement:
 
 @dataclass
 class SpectralModel:
-    """One model for all whiskers of a kind: rungs by window length, and what the training recordings were like."""
+    """One model for all whiskers of a kind: classifiers by window length, and what the training recordings were like."""
 
     classes: list[str]
     rate_hz: float
-    rungs: list[Rung]
+    classifiers: list[Classifier]
     limits: dict[str, np.ndarray]  # spike, still, low, high: (channels,)
     window_ms: float = 100.0
     growth: float = 0.5
@@ -66,12 +66,12 @@ class SpectralModel:
     told: float = 1.0
     change: Change | None = None
     novelty: Novelty | None = None
-    settle: Settle | None = None
+    ringdown: Ringdown | None = None
     figures: dict = field(default_factory=dict)  # of held-out recordings, for the reader
 
     @property
     def channels(self) -> int:
-        return len(self.rungs[0].floor)
+        return len(self.classifiers[0].floor)
 
     def not_learned(self) -> list[str]:
         """What there was too little data to learn, a line each."""
@@ -85,8 +85,8 @@ class SpectralModel:
         self, samples: np.ndarray, window: int, sequential: bool = False, notices: bool = False
     ) -> list[Judgement]:
         """All decisions on samples (n, channels), with notices of borders between them only if asked for. Sequential: looks
-        at every shortest rung, up to four windows."""
-        step = min(self.rungs[0].length, window) if sequential else 0
+        at every shortest classifier, up to four windows."""
+        step = min(self.classifiers[0].length, window) if sequential else 0
         found = self.stream(window, step, 4 * window if sequential else 0).push(samples)
         return [d for d in found if notices or not d.notice]
 
@@ -104,7 +104,7 @@ class SpectralModel:
         for name in PARTS:
             part = getattr(self, name)
             content[name] = None if part is None else _fields(part)
-        content["rungs"] = [_fields(r) | {"span": _listed(r.span)} for r in self.rungs]
+        content["classifiers"] = [_fields(r) | {"span": _listed(r.span)} for r in self.classifiers]
         Path(path).write_text(json.dumps(content) + "\n")
 
     @classmethod
@@ -118,18 +118,26 @@ class SpectralModel:
     @classmethod
     def _of(cls, fields: Fields) -> "SpectralModel":
         classes = fields.names("classes", lib.NAV_TEXTURE_CLASSES_MAX)
-        rungs = [_rung(part) for part in fields.parts("rungs", lib.NAV_TEXTURE_RUNGS_MAX)]
+        classifiers = [_classifier(part) for part in fields.parts("classifiers", lib.NAV_TEXTURE_CLASSIFIERS_MAX)]
         limits = {name: fields.part("limits").array(name, 1) for name in LIMITS}
         numbers = {name: fields.number(name, *RANGES[name]) for name in RANGES}
         parts = {name: _part(kind, fields.part(name)) for name, kind in PARTS.items() if fields.has(name)}
         fields.part("figures")
-        model = cls(classes, rungs=rungs, limits=limits, figures=fields.take("figures"), **numbers, **parts)
-        if any(len(r.bias) != len(classes) for r in rungs):
-            raise ValueError("rungs and classes differ")
-        if model.novelty is not None and model.novelty.length not in {r.length for r in rungs}:
-            raise ValueError("novelty: no rung has its length")
-        if len({len(part) for part in (*limits.values(), *(r.floor for r in rungs), *(r.span for r in rungs))}) != 1:
-            raise ValueError("limits and rungs differ in channels")
+        model = cls(classes, classifiers=classifiers, limits=limits, figures=fields.take("figures"), **numbers, **parts)
+        if any(len(r.bias) != len(classes) for r in classifiers):
+            raise ValueError("classifiers and classes differ")
+        if model.novelty is not None and model.novelty.length not in {r.length for r in classifiers}:
+            raise ValueError("novelty: no classifier has its length")
+        if (
+            len(
+                {
+                    len(part)
+                    for part in (*limits.values(), *(r.floor for r in classifiers), *(r.span for r in classifiers))
+                }
+            )
+            != 1
+        ):
+            raise ValueError("limits and classifiers differ in channels")
         model.stream(2)
         return model
 
@@ -138,18 +146,18 @@ def no_model(path, error: Exception) -> TableError:
     return TableError(path, None, f"no texture model: {error}; make one with 'whisker texture train'")
 
 
-def _rung(fields: Fields) -> Rung:
+def _classifier(fields: Fields) -> Classifier:
     flat = {name: fields.array(name, 1) for name in ("floor", "centre", "scale", "bias", "span")}
     weight = fields.array("weight", 2)
     whole = {name: fields.whole(name, 0, LENGTH_MOST) for name in ("length", "shorter", "hidden")}
     numbers = {name: fields.number(name, 0.0) for name in ("temper", "border")}
-    return Rung(
+    return Classifier(
         levels=fields.flag("levels"), seed=fields.whole("seed", 0, 2**63), weight=weight, **whole, **numbers, **flat
     )
 
 
 def _part(kind, fields: Fields):
-    """A Change, Novelty or Settle."""
+    """A Change, Novelty or Ringdown."""
     arrays = {name: fields.array(name, dimensions) for name, dimensions in kind.ARRAYS.items()}
     numbers = {name: fields.number(name, 0.0) for name in kind.NUMBERS if name != "length"}
     return kind(length=fields.whole("length", 1, LENGTH_MOST), **numbers, **arrays)
@@ -161,15 +169,15 @@ class Stream:
     def __init__(self, model: SpectralModel, window: int, step: int, patience: int):
         self._classes, self._channels, self._taken = len(model.classes), model.channels, 0
         rules = ffi.new("struct nav_texture_rules *")
-        rules.channels, rules.classes, rules.window, rules.rungs = (
+        rules.channels, rules.classes, rules.window, rules.classifiers = (
             model.channels,
             self._classes,
             window,
-            len(model.rungs),
+            len(model.classifiers),
         )
-        natives = ffi.new("struct nav_texture_rung *[]", [r.native for r in model.rungs])
-        border = np.array([r.border for r in model.rungs], float)
-        rules.rung, rules.border = natives, doubles(border, "border", (len(model.rungs),))
+        natives = ffi.new("struct nav_texture_classifier *[]", [r.native for r in model.classifiers])
+        border = np.array([r.border for r in model.classifiers], float)
+        rules.classifier, rules.border = natives, doubles(border, "border", (len(model.classifiers),))
         rules.growth, rules.together, rules.doubt, rules.sure = model.growth, model.together, model.doubt, model.sure
         rules.step, rules.patience, rules.told = step, patience, model.told
         self._parts = {
@@ -178,10 +186,12 @@ class Stream:
         for name, part in self._parts.items():
             setattr(rules, name, part)
         if model.novelty is not None:
-            rules.novelty_rung = next(n for n, r in enumerate(model.rungs) if r.length == model.novelty.length)
-        # The span of windows at least as long as those judged; the longest rung's if there is none.
+            rules.novelty_classifier = next(
+                n for n, r in enumerate(model.classifiers) if r.length == model.novelty.length
+            )
+        # The span of windows at least as long as those judged; the longest classifier's if there is none.
         longest = patience if step else window
-        span = next((r.span for r in model.rungs if r.length >= longest), model.rungs[-1].span)
+        span = next((r.span for r in model.classifiers if r.length >= longest), model.classifiers[-1].span)
         shape = (model.channels,)
         limits = {n: as_doubles(v, n, shape) for n, v in (model.limits | {"span": span}).items()}
         rules.limits.channels = model.channels
@@ -190,7 +200,7 @@ class Stream:
         made = lib.nav_texture_stream_new(rules)
         if made == ffi.NULL:
             raise ValueError(f"texture: no stream of windows of {window} samples")
-        self._rungs = model.rungs  # lent to the stream
+        self._classifiers = model.classifiers  # lent to the stream
         self._stream = ffi.gc(made, lib.nav_texture_stream_free)
         self._decision, self._decided = ffi.new("struct nav_texture_decision *"), ffi.new("int *")
         self._loglik = np.zeros(self._classes)
@@ -222,11 +232,11 @@ class Stream:
         )
 
 
-def _native(part: Change | Novelty | Settle | None):
+def _native(part: Change | Novelty | Ringdown | None):
     return ffi.NULL if part is None else part.native()
 
 
-def _fields(part: Rung | Change | Novelty | Settle) -> dict:
+def _fields(part: Classifier | Change | Novelty | Ringdown) -> dict:
     return {n: getattr(part, n) for n in part.NUMBERS} | {n: _listed(getattr(part, n)) for n in part.ARRAYS}
 
 

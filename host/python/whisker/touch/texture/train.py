@@ -7,13 +7,13 @@ import numpy as np
 from .change import fit_change
 from .fit import Fitted, Windows, fit, log_loss, temperature
 from .novelty import fit_novelty
-from .settle import fit_settle
+from .ringdown import fit_ringdown
 from .spectral import SENSOR_STOPS, SpectralModel
 
 FOLDS = 5
-SHORTER, LONGER = 8, 8  # rungs from an eighth of the window to eight windows, in octaves
-LENGTH_LEAST, LENGTH_MOST = 4, 1024  # samples of a rung
-WINDOWS_MOST = 6000  # of one rung, over all recordings
+SHORTER, LONGER = 8, 8  # classifiers from an eighth of the window to eight windows, in octaves
+LENGTH_LEAST, LENGTH_MOST = 4, 1024  # samples of a classifier
+WINDOWS_MOST = 6000  # of one classifier, over all recordings
 BLOCKS = 4  # of a window, in each of which a change of surface is looked for
 SPIKE_OVER = 3.0  # times what one sample in a thousand stands out from both neighbours
 STILL_OVER, STILL_LEAST = 2.0, 16  # times the longest run of equal samples; shorter runs happen to any sensor
@@ -50,14 +50,14 @@ def train(
         progress(len(fitted), len(lengths) + 1)
     for length, found in zip(lengths, fitted, strict=True):
         span = SPAN_OVER * _widest(parts, length)
-        for rung in (found.rung, *found.twins):
-            rung.span = span
-    model = SpectralModel(list(recordings), rate_hz, [f.rung for f in fitted], limits, window_ms)
+        for classifier in (found.classifier, *found.twins):
+            classifier.span = span
+    model = SpectralModel(list(recordings), rate_hz, [f.classifier for f in fitted], limits, window_ms)
     _calibrate(model, fitted, parts, labels, folds, base)
     block = max(LENGTH_LEAST, round(base / BLOCKS))
     model.change = fit_change(parts, labels, folds, block, floor)
     if model.change is not None:
-        model.settle = fit_settle(parts, block, floor, RINGING_QUANTILE)
+        model.ringdown = fit_ringdown(parts, block, floor, RINGING_QUANTILE)
     model.novelty = _novelty(model, parts, labels, folds, base)
     progress(len(lengths) + 1, len(lengths) + 1)
     return model
@@ -162,9 +162,9 @@ def _calibrate(model: SpectralModel, fitted: list[Fitted], parts: list, labels, 
     for twin in twins:
         twin.together = model.together
     for index, found in enumerate(fitted):
-        limit = _border(twins, parts, folds, found.rung.length)
-        for rung in (found.rung, *(t.rungs[index] for t in twins)):
-            rung.border = limit
+        limit = _border(twins, parts, folds, found.classifier.length)
+        for classifier in (found.classifier, *(t.classifiers[index] for t in twins)):
+            classifier.border = limit
     right, confidence = _scores(_decisions(twins, parts, folds, base), labels)
     model.doubt = _doubt(right, confidence)
     model.sure, samples, looks = _sure(twins, parts, labels, folds, base, float(right.mean()))
@@ -192,12 +192,12 @@ def calibration_error(right: np.ndarray, confidence: np.ndarray, bins: int = 10)
 
 
 def _novelty(model: SpectralModel, parts, labels, folds, base: int):
-    """Of windows of the base length, the rung's features; None without such a rung."""
-    rung = next((r for r in model.rungs if r.length == base), None)
-    if rung is None:
+    """Of windows of the base length, the classifier's features; None without such a classifier."""
+    classifier = next((r for r in model.classifiers if r.length == base), None)
+    if classifier is None:
         return None
     rows = [p[: len(p) // base * base].reshape(-1, base, p.shape[1]) for p in parts]
-    return fit_novelty([rung.expand(r)[:, : len(rung.centre)] for r in rows], labels, folds, base)
+    return fit_novelty([classifier.expand(r)[:, : len(classifier.centre)] for r in rows], labels, folds, base)
 
 
 def _decisions(twins: list[SpectralModel], parts, folds, window: int, sequential: bool = False) -> list[list]:

@@ -1,4 +1,4 @@
-"""One rung of a spectral texture model: numbers in NumPy, arithmetic in C (host/nav/touch/texture_rung.h)."""
+"""The classifier for windows of one length: numbers in NumPy, arithmetic in C (host/nav/touch/texture_classifier.h)."""
 
 from dataclasses import dataclass, field
 
@@ -10,8 +10,8 @@ SEED = 2011  # of the random projections; any will do
 
 
 @dataclass
-class Rung:
-    """A classifier for windows of `length` samples; the arrays as in nav_texture_rung_numbers."""
+class Classifier:
+    """A classifier for windows of `length` samples; the arrays as in nav_texture_classifier_numbers."""
 
     length: int
     levels: bool
@@ -33,7 +33,7 @@ class Rung:
 
     @property
     def native(self):
-        """The C rung; ValueError when the sizes do not fit each other or a number is impossible."""
+        """The C classifier; ValueError when the sizes do not fit each other or a number is impossible."""
         if self._made is None:
             self._made = self._make()
         return self._made
@@ -44,17 +44,17 @@ class Rung:
         shapes = {"centre": (features,), "scale": (features,), "weight": (features + self.hidden, classes)}
         shapes |= {"floor": (len(self.floor),), "bias": (classes,)}
         for name, shape in shapes.items():
-            setattr(self, name, as_doubles(getattr(self, name), f"rung {self.length}: {name}", shape))
-        numbers = ffi.new("struct nav_texture_rung_numbers *")
+            setattr(self, name, as_doubles(getattr(self, name), f"classifier {self.length}: {name}", shape))
+        numbers = ffi.new("struct nav_texture_classifier_numbers *")
         numbers.classes, numbers.channels, numbers.length = classes, len(self.floor), self.length
         numbers.levels, numbers.shorter = int(self.levels), self.shorter
         numbers.hidden, numbers.seed, numbers.temper = self.hidden, self.seed, self.temper
         for name in self.ARRAYS:
             setattr(numbers, name, doubles(getattr(self, name), name, shapes[name]))
-        made = lib.nav_texture_rung_new(numbers)
+        made = lib.nav_texture_classifier_new(numbers)
         if made == ffi.NULL:
-            raise ValueError(f"rung {self.length}: a size or number is out of range")
-        return ffi.gc(made, lib.nav_texture_rung_free)
+            raise ValueError(f"classifier {self.length}: a size or number is out of range")
+        return ffi.gc(made, lib.nav_texture_classifier_free)
 
     def expand(self, windows: np.ndarray) -> np.ndarray:
         """Windows (m, length, channels) -> standardised features and projections (m, F + hidden)."""
@@ -62,7 +62,7 @@ class Rung:
         windows = as_doubles(windows, "windows", (None, *shape))
         out = np.empty((len(windows), width))
         for window, row in zip(windows, out, strict=True):
-            lib.nav_texture_rung_expand(
+            lib.nav_texture_classifier_expand(
                 self.native, doubles(window, "window", shape), doubles(row, "features", (width,))
             )
         return out

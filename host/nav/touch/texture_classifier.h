@@ -1,4 +1,4 @@
-/* One rung of a texture model: a classifier for windows of one length.
+/* The classifier of a texture model for windows of one length.
  *
  * Features (texture_features.h), standardised; beside them `hidden` random projections cut at zero, which let a linear
  * rule bend (random features, Rahimi and Recht 2008; a seed stands for the projections in model files); then a linear
@@ -10,12 +10,12 @@
 #include <stdint.h>
 
 /* cffi: begin */
-struct nav_texture_rung;
+struct nav_texture_classifier;
 
 enum { NAV_TEXTURE_CLASSES_MAX = 256, NAV_TEXTURE_HIDDEN_MAX = 4096 };
 
-/* A rung's numbers. F: features, H: hidden, K: classes. All arrays are copied. */
-struct nav_texture_rung_numbers {
+/* A classifier's numbers. F: features, H: hidden, K: classes. All arrays are copied. */
+struct nav_texture_classifier_numbers {
     int classes, channels, length, levels, hidden;
     int shorter;                  /* as in texture_features.h */
     uint64_t seed;                /* of the projections */
@@ -26,20 +26,20 @@ struct nav_texture_rung_numbers {
 };
 
 /* NULL when a size is out of range, a number is not finite, or memory is short. */
-struct nav_texture_rung *nav_texture_rung_new(const struct nav_texture_rung_numbers *);
-void nav_texture_rung_free(struct nav_texture_rung *);
+struct nav_texture_classifier *nav_texture_classifier_new(const struct nav_texture_classifier_numbers *);
+void nav_texture_classifier_free(struct nav_texture_classifier *);
 
 /* Standardised features and projections of a window: out[F + H]; what a trainer fits its weights to. */
-void nav_texture_rung_expand(struct nav_texture_rung *, const double *window, double *out);
+void nav_texture_classifier_expand(struct nav_texture_classifier *, const double *window, double *out);
 
 /* window: [length][channels], finite and within +-1e9. loglik[K]: tempered, the largest is 0. Allocates nothing. */
-void nav_texture_rung_judge(struct nav_texture_rung *, const double *window, double *loglik);
+void nav_texture_classifier_judge(struct nav_texture_classifier *, const double *window, double *loglik);
 /* cffi: end */
 
-/* Standardised features [nav_texture_rung_count()] of the last window judged. */
-const double *nav_texture_rung_features(const struct nav_texture_rung *);
+/* Standardised features [nav_texture_classifier_count()] of the last window judged. */
+const double *nav_texture_classifier_features(const struct nav_texture_classifier *);
 
-int nav_texture_rung_count(const struct nav_texture_rung *); /* of features */
-int nav_texture_rung_length(const struct nav_texture_rung *);
+int nav_texture_classifier_count(const struct nav_texture_classifier *); /* of features */
+int nav_texture_classifier_length(const struct nav_texture_classifier *);
 
 #endif

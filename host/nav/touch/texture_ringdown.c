@@ -1,4 +1,4 @@
-#include "texture_settle.h"
+#include "texture_ringdown.h"
 
 #include <math.h>
 #include <stdbool.h>
@@ -7,12 +7,12 @@
 
 #include "texture_features.h"
 
-enum { LEAST = NAV_TEXTURE_SETTLE_LEAST, MOST = NAV_TEXTURE_SETTLE_MOST };
+enum { LEAST = NAV_TEXTURE_RINGDOWN_LEAST, MOST = NAV_TEXTURE_RINGDOWN_MOST };
 #define TINY 1e-12 /* counts squared: what is silent has a logarithm too */
 
-struct nav_texture_settle {
+struct nav_texture_ringdown {
     int channels, length, held;
-    double floor[NAV_TEXTURE_CHANNELS_MAX], limit[NAV_TEXTURE_SETTLE_LIMITS];
+    double floor[NAV_TEXTURE_CHANNELS_MAX], limit[NAV_TEXTURE_RINGDOWN_LIMITS];
     double loud[MOST]; /* log power of the blocks held, the newest last */
 };
 
@@ -25,11 +25,11 @@ static bool all_positive(const double *value, int n)
     return true;
 }
 
-struct nav_texture_settle *nav_texture_settle_new(const struct nav_texture_settle_numbers *n)
+struct nav_texture_ringdown *nav_texture_ringdown_new(const struct nav_texture_ringdown_numbers *n)
 {
     bool ok = n->channels >= 1 && n->channels <= NAV_TEXTURE_CHANNELS_MAX && n->length >= 2 &&
-              all_positive(n->limit, NAV_TEXTURE_SETTLE_LIMITS);
-    struct nav_texture_settle *s = ok ? calloc(1, sizeof *s) : NULL;
+              all_positive(n->limit, NAV_TEXTURE_RINGDOWN_LIMITS);
+    struct nav_texture_ringdown *s = ok ? calloc(1, sizeof *s) : NULL;
     if (!s)
         return NULL;
     s->channels = n->channels;
@@ -40,22 +40,22 @@ struct nav_texture_settle *nav_texture_settle_new(const struct nav_texture_settl
     return s;
 }
 
-void nav_texture_settle_free(struct nav_texture_settle *s)
+void nav_texture_ringdown_free(struct nav_texture_ringdown *s)
 {
     free(s);
 }
 
-int nav_texture_settle_length(const struct nav_texture_settle *s)
+int nav_texture_ringdown_length(const struct nav_texture_ringdown *s)
 {
     return s->length;
 }
 
-void nav_texture_settle_reset(struct nav_texture_settle *s)
+void nav_texture_ringdown_reset(struct nav_texture_ringdown *s)
 {
     s->held = 0;
 }
 
-static double power(const struct nav_texture_settle *s, const double *block, int channel)
+static double power(const struct nav_texture_ringdown *s, const double *block, int channel)
 {
     double first = block[channel], sum = 0.0,
            squares = 0.0; /* from the first sample, so that an offset costs no digits */
@@ -67,7 +67,7 @@ static double power(const struct nav_texture_settle *s, const double *block, int
     return fmax(squares - sum * sum / s->length, 0.0) / s->length;
 }
 
-void nav_texture_settle_take(struct nav_texture_settle *s, const double *block)
+void nav_texture_ringdown_take(struct nav_texture_ringdown *s, const double *block)
 {
     double loud = 0.0;
     for (int c = 0; c < s->channels; c++)
@@ -77,7 +77,7 @@ void nav_texture_settle_take(struct nav_texture_settle *s, const double *block)
     s->loud[s->held++] = loud;
 }
 
-double nav_texture_settle_fall(const struct nav_texture_settle *s, int blocks)
+double nav_texture_ringdown_fall(const struct nav_texture_ringdown *s, int blocks)
 {
     if (blocks < LEAST || blocks > s->held)
         return 0.0;
@@ -90,7 +90,7 @@ double nav_texture_settle_fall(const struct nav_texture_settle *s, int blocks)
     return -slope / weight;
 }
 
-int nav_texture_settle_rings(const struct nav_texture_settle *s)
+int nav_texture_ringdown_rings(const struct nav_texture_ringdown *s)
 {
-    return s->held >= LEAST && nav_texture_settle_fall(s, s->held) > s->limit[s->held - LEAST];
+    return s->held >= LEAST && nav_texture_ringdown_fall(s, s->held) > s->limit[s->held - LEAST];
 }

@@ -1,4 +1,4 @@
-#include "texture_rung.h"
+#include "texture_classifier.h"
 
 #include <math.h>
 #include <stdbool.h>
@@ -9,8 +9,8 @@
 #include "texture_features.h"
 #include "texture_own.h"
 
-struct nav_texture_rung {
-    struct nav_texture_rung_numbers n; /* its arrays are the rung's own */
+struct nav_texture_classifier {
+    struct nav_texture_classifier_numbers n; /* its arrays are the classifier's own */
     int features;
     struct nav_texture_features *reduce;
     float *projection; /* [F][H]: a row per feature, so that the inner loop runs over neighbours; single precision
@@ -20,13 +20,13 @@ struct nav_texture_rung {
     double *expanded;  /* [F + H] */
 };
 
-static bool numbers_ok(const struct nav_texture_rung_numbers *n)
+static bool numbers_ok(const struct nav_texture_classifier_numbers *n)
 {
     return n->classes >= 1 && n->classes <= NAV_TEXTURE_CLASSES_MAX && n->hidden >= 0 &&
            n->hidden <= NAV_TEXTURE_HIDDEN_MAX && isfinite(n->temper) && n->temper >= 0.0;
 }
 
-static bool own_arrays(struct nav_texture_rung *r)
+static bool own_arrays(struct nav_texture_classifier *r)
 {
     size_t f = (size_t)r->features, k = (size_t)r->n.classes, h = (size_t)r->n.hidden;
     bool ok = nav_texture_own(&r->n.floor, (size_t)r->n.channels);
@@ -38,7 +38,7 @@ static bool own_arrays(struct nav_texture_rung *r)
 }
 
 /* Directions of unit mean square on standardised features; thresholds spread as the projections are. */
-static bool make_projections(struct nav_texture_rung *r)
+static bool make_projections(struct nav_texture_classifier *r)
 {
     size_t f = (size_t)r->features, h = (size_t)r->n.hidden;
     r->projection = calloc(f * h + 1, sizeof *r->projection);
@@ -56,33 +56,34 @@ static bool make_projections(struct nav_texture_rung *r)
     return true;
 }
 
-static bool make(struct nav_texture_rung *r)
+static bool make(struct nav_texture_classifier *r)
 {
     bool owned = own_arrays(r);
     r->expanded = calloc((size_t)(r->features + r->n.hidden), sizeof *r->expanded);
     return make_projections(r) && owned && r->expanded;
 }
 
-struct nav_texture_rung *nav_texture_rung_new(const struct nav_texture_rung_numbers *numbers)
+struct nav_texture_classifier *nav_texture_classifier_new(const struct nav_texture_classifier_numbers *numbers)
 {
     if (!numbers_ok(numbers))
         return NULL;
     struct nav_texture_features *reduce =
         nav_texture_features_new(numbers->channels, numbers->length, numbers->levels, numbers->shorter, numbers->floor);
-    struct nav_texture_rung *r = reduce ? calloc(1, sizeof *r) : NULL;
+    struct nav_texture_classifier *r = reduce ? calloc(1, sizeof *r) : NULL;
     if (!r) {
         nav_texture_features_free(reduce);
         return NULL;
     }
-    *r = (struct nav_texture_rung){.n = *numbers, .reduce = reduce, .features = nav_texture_features_count(reduce)};
+    *r = (struct nav_texture_classifier){
+        .n = *numbers, .reduce = reduce, .features = nav_texture_features_count(reduce)};
     if (!make(r)) {
-        nav_texture_rung_free(r);
+        nav_texture_classifier_free(r);
         return NULL;
     }
     return r;
 }
 
-void nav_texture_rung_free(struct nav_texture_rung *r)
+void nav_texture_classifier_free(struct nav_texture_classifier *r)
 {
     if (!r)
         return;
@@ -95,22 +96,22 @@ void nav_texture_rung_free(struct nav_texture_rung *r)
     free(r);
 }
 
-int nav_texture_rung_length(const struct nav_texture_rung *r)
+int nav_texture_classifier_length(const struct nav_texture_classifier *r)
 {
     return r->n.length;
 }
 
-int nav_texture_rung_count(const struct nav_texture_rung *r)
+int nav_texture_classifier_count(const struct nav_texture_classifier *r)
 {
     return r->features;
 }
 
-const double *nav_texture_rung_features(const struct nav_texture_rung *r)
+const double *nav_texture_classifier_features(const struct nav_texture_classifier *r)
 {
     return r->expanded;
 }
 
-static void project(const struct nav_texture_rung *r, const double *z, double *restrict out)
+static void project(const struct nav_texture_classifier *r, const double *z, double *restrict out)
 {
     int hidden = r->n.hidden;
     float *restrict sum = r->projected;
@@ -125,7 +126,7 @@ static void project(const struct nav_texture_rung *r, const double *z, double *r
         out[h] = r->threshold[h] + (double)sum[h] > 0.0 ? r->threshold[h] + (double)sum[h] : 0.0;
 }
 
-void nav_texture_rung_expand(struct nav_texture_rung *r, const double *window, double *out)
+void nav_texture_classifier_expand(struct nav_texture_classifier *r, const double *window, double *out)
 {
     nav_texture_features_work(r->reduce, window, out);
     for (int f = 0; f < r->features; f++)
@@ -134,7 +135,7 @@ void nav_texture_rung_expand(struct nav_texture_rung *r, const double *window, d
 }
 
 /* Scores of all classes from the expanded features, tempered; the best becomes 0. */
-static void score(const struct nav_texture_rung *r, const double *x, double *loglik)
+static void score(const struct nav_texture_classifier *r, const double *x, double *loglik)
 {
     int classes = r->n.classes;
     memcpy(loglik, r->n.bias, (size_t)classes * sizeof *loglik);
@@ -150,8 +151,8 @@ static void score(const struct nav_texture_rung *r, const double *x, double *log
         loglik[k] = (loglik[k] - best) * r->n.temper;
 }
 
-void nav_texture_rung_judge(struct nav_texture_rung *r, const double *window, double *loglik)
+void nav_texture_classifier_judge(struct nav_texture_classifier *r, const double *window, double *loglik)
 {
-    nav_texture_rung_expand(r, window, r->expanded);
+    nav_texture_classifier_expand(r, window, r->expanded);
     score(r, r->expanded, loglik);
 }
