@@ -3,6 +3,7 @@
 import math
 import re
 import runpy
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,12 @@ from whisker.nav import localise
 from whisker.nav.filters import Filter, SettingError
 from whisker.nav.observations import Observations
 from whisker.nav.own import OwnSensor
-from whisker.scene import Arena, Prior, Robot, Scene, SceneError, load
+from whisker.robot.inbox import Received
+from whisker.robot.messages import EXPLORING
+from whisker.robot.row_checks import RowChecks
+from whisker.robot.rows import to_message, to_row
+from whisker.robot.streams import Envelope
+from whisker.scene import Arena, Prior, Robot, Scene, SceneError, Whisker, load
 from whisker.sensor_tables import NOT_KNOWN, SensorTable
 from whisker.tables import TableError
 
@@ -79,6 +85,19 @@ def test_a_table_of_likelihoods_in_a_scene_folder_finds_the_robot(tmp_path, caps
     ]
     assert cells == [0, 0, 0, 1, 2]
     assert run(capsys, "localise", tmp_path, "--filter", "grid", "--json")[0] == 0
+
+
+def test_a_row_of_the_network_may_hold_a_sensors_reading():
+    lit, _ = lit_scene()
+    feeler = Whisker("feeler", "object", base_m=(0.1, 0.0), yaw_rad=0.0, length_m=0.1)
+    scene = replace(lit, robot=replace(lit.robot, whiskers=(feeler,)))
+    row = {"t_s": 0.1, "odo_x_m": 0.0, "odo_y_m": 0.0, "odo_theta_rad": 0.0, "feeler_mm": None}
+    faults = []
+    for cells in ({}, {"light": 0.5}, {"light": None}, {"dark": 0.5}):
+        message = to_message(row | cells, EXPLORING, 0, np.zeros(3))
+        faults.append(RowChecks(scene)(Received("observation", message, Envelope(1, 0, 0))))
+        assert to_row(message) == row | cells
+    assert faults[:3] == [""] * 3 and "no whisker has the cell dark" in faults[3]
 
 
 @pytest.mark.parametrize(

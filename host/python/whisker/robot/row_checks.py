@@ -80,5 +80,6 @@ def columns(scene: Scene) -> frozenset[str]:
 
 
 def _whiskers(scene: Scene) -> tuple[str, ...]:
-    """How the names of cells begin: models may know more textures than an arena has."""
-    return tuple(f"{whisker.name}_" for whisker in scene.robot.whiskers)
+    """How the names of cells begin: models may know more textures than an arena has. A sensor of the user's own need not
+    be in every row."""
+    return (*(f"{whisker.name}_" for whisker in scene.robot.whiskers), *(sensor.name for sensor in scene.robot.sensors))
