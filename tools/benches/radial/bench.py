@@ -1,13 +1,17 @@
 """Radial distance: errors, sureness, time and stability of the paper's line, curves and whole whisks.
 
-    make bench, or .venv/bin/python tools/benches radial
+    make bench, or .venv/bin/python tools/benches radial [--whisker3d DIR]
 
 Whiskers are drawn from a batch (stiffness, creep, friction, gain), calibrated with the paper's 5 whisks at 6 radii, and
-judged on others. Parts that are done are kept in build/bench/radial. Writes bench/results/radial.json and
-docs/charts/radial_*.
+judged on others. A real whisker's recordings are not part of this project: clone
+github.com/BioMorphic-Intelligence-Lab/Whisker-3D-Localization and give its folder dataset, here or as WHISKER3D_DIR;
+without it that part is skipped by name. Parts that are done are kept in build/bench/radial. Writes
+bench/results/radial.json, docs/radial_figures.md and docs/charts/radial_*.
 """
 
+import argparse
 import json
+import os
 import time
 from pathlib import Path
 
@@ -22,11 +26,12 @@ from whisker.touch.radial import model as radial
 from whisker.touch.radial.shape import shape_of
 from whisker.touch.radial.whisk import WhiskModel
 
+from .page import page
+from .real import METHODS, real_whisker
 from .trials import PAPER_MM, RADII_MM, SOURCES, SPOILS, SPREADS, Kind, Set, Whisker, recorded, spoilt
 
 ROOT = Path(__file__).resolve().parents[3]
 RESULTS, CHARTS, CACHE = ROOT / "bench/results", ROOT / "docs/charts", ROOT / "build/bench/radial"
-METHODS = ("paper", "quadratic", "rational", "default")
 SEED = 48611  # chosen after the last change to the models; nothing was developed on these whiskers
 WHISKERS, FIT, HELD = 4, 5, 6  # whiskers of each spread; whisks at each radius
 TIP_WHISKERS = 24  # of each spread: shares near 98 % ask for many whisks
@@ -42,10 +47,8 @@ def rms(values) -> float:
 
 
 def fitted(name: str, cal: Set):
-    """A model by name, the default without the errors of contacts left out, which take most of its time."""
-    if name != "default":
-        return radial.fit(cal.whisks, name).model
-    return WhiskModel.fit([shape_of(c) for c in cal.whisks.recorded], cal.whisks.radius_mm, cal.whisks.axes)
+    """A model by its name; ValueError when the contacts do not determine one."""
+    return radial.fit(cal.whisks, name).model
 
 
 def told(model, held: Set) -> list[radial.Estimate]:
@@ -155,7 +158,8 @@ def cost() -> dict:
     given = doubles(t_s, "t_s", (len(samples),)), doubles(samples, "samples", (len(samples), 2))
     rest = doubles(np.array([32768.0, 32768.0]), "rest", (2,))
     trace, shape = ffi.new("struct nav_trace *"), ffi.new("struct nav_shape *")
-    told_c, model = ffi.new("struct nav_whisk_estimate *"), fitted("default", cal)
+    told_c, model = ffi.new("struct nav_whisk_estimate *"), fitted("whisk", cal)
+    press = fitted("press", cal)
     line = ffi.new("struct nav_radial *", {"a1": -0.03, "a0": 180.0})
 
     def trace_all():
@@ -175,7 +179,11 @@ def cost() -> dict:
     return {
         "samples": len(t_s),
         "parts_us": parts,
-        "contact_us": {"paper": parts["peak"] + parts["line"], "default": whole},
+        "contact_us": {
+            "paper": parts["peak"] + parts["line"],
+            "whisk": whole,
+            "press": least_us(lambda: radial.estimate(press, contact), 5),
+        },
         "sample_us": parts["trace"] / len(t_s),
         "release_us": parts["shape"] + parts["estimate"],
     }
@@ -197,8 +205,8 @@ def fig5() -> dict:
     points, all_peaks, all_radii = [], [], []
     for k, spread in enumerate(SPREADS):
         cal = recorded(Whisker.drawn(SEED, k), Kind(spread, "duration"), FIT, rng_of(50, k))
-        model, error = radial.fit(cal.whisks, "paper")
-        points.append({"radius_mm": cal.whisks.radius_mm.tolist(), "peak": cal.whisks.peak_counts.tolist(), "a1": model.a1, "a0": model.a0, "error_mm": error})  # fmt: skip
+        model = fitted("paper", cal)
+        points.append({"radius_mm": cal.whisks.radius_mm.tolist(), "peak": cal.whisks.peak_counts.tolist(), "a1": model.a1, "a0": model.a0, "error_mm": model.sigma_mm})  # fmt: skip
         all_peaks += cal.whisks.peak_counts.tolist()
         all_radii += cal.whisks.radius_mm.tolist()
     return {"whiskers": points, "combined_mm": radial.RadialModel.fit(all_peaks, all_radii).sigma_mm}
@@ -215,7 +223,7 @@ PARTS = {
     "cost": cost,
     "fig5": fig5,
 }
-LOOKS = {"paper": "o", "quadratic": "s", "rational": "^", "default": "D"}
+LOOKS = {"paper": "o", "quadratic": "s", "rational": "^", "whisk": "D", "press": "v"}
 
 
 def draw_cost(results: dict) -> Figure:
@@ -225,14 +233,15 @@ def draw_cost(results: dict) -> Figure:
         "paper": us["paper"],
         "quadratic": us["paper"] * 1.01,
         "rational": us["paper"] * 1.02,
-        "default": us["default"],
+        "whisk": us["whisk"],
+        "press": us["press"],
     }
     figure = Figure(figsize=(10.4, 3.4), layout="constrained")
     panels = figure.subplots(1, len(SPREADS), sharey=True, sharex=True)
     for n, (axes, spread) in enumerate(zip(panels, SPREADS, strict=True)):
         scores = results["errors"]["duration"][f"{spread:g}"]
         for name, marker in LOOKS.items():
-            axes.plot(cost_of[name], scores[name], marker, color="#0b5394" if name == "default" else "#6b6b6b", mfc="none" if name in ("quadratic", "rational") else None, ms=8, label=name)  # fmt: skip
+            axes.plot(cost_of[name], scores[name], marker, color="#0b5394" if name == "whisk" else "#6b6b6b", mfc="none" if name in ("quadratic", "rational") else None, ms=8, label=name)  # fmt: skip
         axes.axhline(scores["oracle"], color="k", lw=1, ls="--", label="oracle: knows the angle")
         axes.axhline(PAPER_MM[n], color="#8a8a8a", lw=1, ls=":", label="paper, as printed")
         axes.set(xscale="log", xlabel=f"us per contact of {results['cost']['samples']} samples", ylim=(0, 7))
@@ -257,13 +266,20 @@ def draw_fig5(results: dict) -> Figure:
     return figure
 
 
-def run(build: Path, fresh: bool) -> None:
+def run(build: Path, fresh: bool, whisker3d: str | None = None) -> None:
     """Measure what is not yet measured, and redraw. `build` is not used: the C library comes with the Python module."""
     CACHE.mkdir(parents=True, exist_ok=True)
-    results = {}
-    for name, measure in tqdm(PARTS.items(), desc="radial"):
+    results, parts = {}, dict(PARTS)
+    folder = whisker3d or os.environ.get("WHISKER3D_DIR")
+    if folder:
+        parts["real_whisker"] = lambda: real_whisker(Path(folder))
+    elif (CACHE / "real_whisker.json").exists():
+        parts["real_whisker"] = None  # what was measured when the folder was given
+    else:
+        print("radial: real_whisker skipped: give --whisker3d DIR or WHISKER3D_DIR (see the module's text)")
+    for name, measure in tqdm(parts.items(), desc="radial"):
         kept = CACHE / f"{name}.json"
-        if fresh or not kept.exists():
+        if measure and (fresh or not kept.exists()):
             kept.write_text(json.dumps(measure(), indent=1, default=float) + "\n")
         results[name] = json.loads(kept.read_text())
     points = results["fig5"]["whiskers"]
@@ -271,6 +287,7 @@ def run(build: Path, fresh: bool) -> None:
         "fig5": {"combined_mm": results["fig5"]["combined_mm"], "error_mm": [w["error_mm"] for w in points]}
     }
     (RESULTS / "radial.json").write_text(json.dumps(_rounded(kept), indent=1) + "\n")
+    (ROOT / "docs/radial_figures.md").write_text(page(kept))
     with matplotlib.rc_context(SETTINGS | {"svg.hashsalt": "whisker"}):
         for name, draw in (("radial_cost", draw_cost), ("radial_fig5", draw_fig5)):
             figure = draw(results)
@@ -278,6 +295,10 @@ def run(build: Path, fresh: bool) -> None:
                 figure.savefig(
                     CHARTS / f"{name}.{ending}", dpi=120, metadata={"Date": None} if ending == "svg" else None
                 )
+
+
+def options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--whisker3d", metavar="DIR", help="Whisker-3D-Localization's dataset")
 
 
 def _rounded(values):

@@ -34,7 +34,7 @@ def whisks(rng, repeats, spread=0.04, split="time", radii=RADII, **options) -> W
             how = {"push_s": 0.6 * angle} if split == "time" else {"true_rate": angle}
             recorded.append(whisk(radius, rng, gain=gain, **how, **options))
             truth.append(radius)
-    peaks = np.array([radial._peak_of(c.samples) for c in recorded])
+    peaks = np.array([radial.peak_of(c.samples) for c in recorded])
     return Whisks([str(n) for n in range(len(truth))], recorded, peaks, np.array(truth), 0)
 
 

@@ -31,7 +31,7 @@ def press(radius, rng, onset_s=2.0, turn=0, depth_mm=DEPTH_MM, noise=0.5) -> Con
 def presses(seed=1, repeats=4, radii=RADII, turns=(0,), **options) -> Whisks:
     rng = np.random.default_rng(seed)
     found = [(r, turn, press(r, rng, turn=turn, **options)) for turn in turns for r in radii for _ in range(repeats)]
-    peaks = np.array([radial._peak_of(c.samples) for _, _, c in found])
+    peaks = np.array([radial.peak_of(c.samples) for _, _, c in found])
     directions = np.array([120.0 * turn for _, turn, _ in found]) if len(turns) > 1 else None
     names = [str(n) for n in range(len(found))]
     return Whisks(names, [c for *_, c in found], peaks, np.array([r for r, *_ in found]), 0, None, directions)
@@ -75,6 +75,12 @@ def test_directions_are_told_apart_and_each_has_its_own_regression():
     found = [model.predict(c) for c in held.recorded]
     assert [f.direction_deg for f in found] == held.direction_deg.tolist()
     assert np.abs(errors(model, held)).mean() < 1.0
+
+
+def test_a_press_unlike_those_calibrated_is_doubted(fitted):
+    contact = press(70.0, np.random.default_rng(2), turn=1)
+    found = fitted.predict(contact)
+    assert found.confidence < 0.1 and found.sigma_mm > 10.0
 
 
 def test_the_model_is_chosen_by_places_left_out_and_both_errors_are_given():

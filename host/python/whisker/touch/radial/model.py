@@ -157,7 +157,7 @@ def read_whisks(path, with_radius: bool) -> Whisks:
         Contact(t_s[r], samples[r], **{member: None if of is None else of[r] for member, of in motion.items()})
         for r in rows
     ]
-    peaks = np.array([_peak_of(samples[r]) for r in rows])
+    peaks = np.array([peak_of(samples[r]) for r in rows])
     radius = numbers(text["radius_mm"]) if with_radius else None
     radii = None if radius is None else np.array([np.median(radius[r]) for r in rows])
     bad = int((~np.isfinite(samples)).any(axis=1).sum())
@@ -186,7 +186,8 @@ def _motion(text: dict[str, list[str]], name: str) -> np.ndarray | None:
     return values if np.any(known) else None
 
 
-def _peak_of(samples: np.ndarray) -> float:
+def peak_of(samples: np.ndarray) -> float:
+    """Equation 2 of a recorded contact (n, axes) about the median of its first samples, counts; nan when none is finite."""
     finite = samples[np.isfinite(samples).all(axis=1)]
     if len(finite) == 0:
         return float("nan")
@@ -291,7 +292,7 @@ def estimate(model, contact: Contact, peak_counts: float | None = None) -> Estim
     if isinstance(model, PressModel):
         found = model.predict(contact)
         return Estimate(found.radius_mm, found.sigma_mm, model.contact_type(found.radius_mm), *found[2:])
-    counts = _peak_of(contact.samples) if peak_counts is None else peak_counts
+    counts = peak_of(contact.samples) if peak_counts is None else peak_counts
     mm, sigma_mm = model.predict(float(counts))
     if not np.isfinite(mm):
         middle, span = 0.5 * (model.low_mm + model.high_mm), model.high_mm - model.low_mm
