@@ -34,6 +34,7 @@ TOPICS = {  # topic -> module, by room
     "ring": "host.ring",
     "robot": "robot.bench",
     "texture": "texture.bench",
+    "timing": "bridge.timing",
     "touch": "nav.touch",
     "usb": "bridge.usb",
     "view": "host.view",

@@ -4,6 +4,7 @@ import csv
 import os
 import socket
 import subprocess
+import sys
 import threading
 from pathlib import Path
 
@@ -159,3 +160,20 @@ def test_a_message_out_of_turn_ends_the_run_with_one_line(tmp_path):
         _, error = simulation.communicate(timeout=TIMEOUT_S)
     assert simulation.returncode == 1
     assert error.splitlines()[-1].endswith("'drive 79 0 0', but the pilot's answer due is drive 39 V OMEGA")
+
+
+def doctor(folder: Path, *options) -> subprocess.CompletedProcess:
+    """`whisker doctor --pattern` with the simulated bridge plugged in, nobody else using it."""
+    words = [sys.executable, "-m", "whisker.cli", "doctor", "--pattern"]
+    return subprocess.run(command(folder, 3, 1, words, *options), capture_output=True, text=True, timeout=TIMEOUT_S)
+
+
+def test_doctor_proves_a_bridge_without_a_node(tmp_path):
+    """Also where nodes send something else."""
+    done = doctor(tmp_path, "--level", "bytes", "--lanes-populated", "3")
+    assert done.stdout.startswith("ok    pattern: 1000 frames of 28 lanes are right"), done.stdout + done.stderr
+
+
+def test_doctor_notices_a_bridge_that_damages_its_pattern(tmp_path):
+    done = doctor(tmp_path, "--level", "bytes", "--defect", "frame")
+    assert done.stdout.startswith("FAIL  pattern:"), done.stdout + done.stderr

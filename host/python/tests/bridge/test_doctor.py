@@ -11,8 +11,8 @@ import pytest
 from commandkit import END_S, STATS, live_ring, run, signals_as_before  # noqa: F401 - a fixture
 from rings import make_frames, ring_name
 
-from whisker.bridge import doctor
-from whisker.bridge.ring import FoundRing, Reader, Writer
+from whisker.bridge import doctor, pattern
+from whisker.bridge.ring import FRAME, FoundRing, Reader, Writer
 
 
 @pytest.fixture
@@ -164,3 +164,35 @@ def test_doctor_names_whose_ring_was_left_behind(monkeypatch):
 def test_doctor_exits_with_what_it_found(capsys):
     code, out, _ = run(capsys, "doctor", "--ring", "whisker-none")
     assert code == 1 and "FAIL  ring whisker-none" in out
+
+
+def pattern_frames(count, mask=(1 << 28) - 1):
+    frames = np.zeros(count, FRAME)
+    frames["tick"] = np.arange(250, 250 + count)
+    frames["sequence"] = np.arange(count) + (1 << 32) - 3
+    frames["lane_mask"] = mask
+    for lane in range(28):
+        frames["lane"]["alpha"][:, lane] = 0x8000 + 256 * lane + 255 - frames["tick"] % 256
+        frames["lane"]["beta"][:, lane] = 0x4000 + 256 * lane + frames["tick"] % 256
+    return frames
+
+
+def test_the_pattern_is_compared_sample_by_sample():
+    frames = pattern_frames(20)
+    assert pattern.wrong(frames) == []
+    frames["lane"]["beta"][7, 3] ^= 0x100
+    frames["lane"]["alpha"][8, 3] ^= 1
+    frames["lane"]["status"][0, 27] = 32 << 10
+    frames["sequence"][11:] += 2
+    wanted = ["lane 3: 2 of 20 samples are not the pattern", "lane 27: 1 of 20 samples are not the pattern"]
+    assert pattern.wrong(frames) == [*wanted, "2 frames were lost"]
+    frames["lane_mask"] = 0x7
+    assert pattern.wrong(frames) == ["2 frames were lost"]
+
+
+def test_a_bridge_that_cannot_be_asked_is_told_in_one_line(tmp_path):
+    whiskerd = tmp_path / "whiskerd"
+    whiskerd.write_text("#!/bin/sh\necho 'whiskerd: bridge: another process uses the bridge; stop it' >&2\nexit 1\n")
+    whiskerd.chmod(0o755)
+    (finding,) = doctor.prove(str(whiskerd))
+    assert finding.level == doctor.FAIL and "another process uses the bridge" in finding.text and finding.remedy

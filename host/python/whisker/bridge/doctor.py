@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from ..protocol import LANES, LIMITS, WIRE_VERSION
-from . import usbtree
+from . import pattern, usbtree
 from .ring import DaemonStats, Reader, RingError, error_line, found_rings, user_name
 from .status import explain
 
@@ -25,6 +25,7 @@ RULES = (
 )
 LIBRARIES = {"usb-1.0": "libusb-1.0-0", "hidapi-libusb": "libhidapi-libusb0"}  # as linked: as Debian calls it
 LOOK_S = 0.5  # how long frames are watched
+PATTERN_FRAMES = 1000  # half a second: every tick's low byte, several times
 ROOM_BYTES = 16 << 20  # of shared memory; a ring of the default size takes 2 MiB
 
 
@@ -50,6 +51,21 @@ def examine(ring: str, root: Path = Path("/"), look_s: float = LOOK_S, owner: in
     if not any(finding.level == FAIL for finding in frames):
         before = [replace(finding, level=WARN) if finding.level == FAIL else finding for finding in before]
     return [*before, *frames, *stale_rings(ring)]
+
+
+def prove(whiskerd: str, serial: str | None = None, frames: int = PATTERN_FRAMES) -> list[Finding]:
+    """What of the bridge works without a node: its FPGA, its FIFO, the USB, by its own pattern. No whiskerd may hold it."""
+    try:
+        found = pattern.record(whiskerd, serial, frames)
+    except pattern.PatternError as error:
+        return [Finding(FAIL, f"pattern: {error}", "stop the whiskerd that holds the bridge; gateware 3 and up has it")]
+    remedy = "check the USB cable; load the bitstream again"
+    if wrong := pattern.wrong(found):
+        return [Finding(FAIL, f"pattern: {text}", remedy) for text in wrong]
+    lanes = int(found["lane_mask"][-1]).bit_count()
+    return [
+        Finding(OK, f"pattern: {len(found)} frames of {lanes} lanes are right: FPGA, FIFO and USB work without a node")
+    ]
 
 
 def libraries() -> list[Finding]:

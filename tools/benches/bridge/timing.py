@@ -1,0 +1,77 @@
+"""When readings are taken and when they arrive: from SYNC to the end of the USB transfer, and between two bridges' SYNC.
+
+The bridge runs as on a board, on its own divider (sim/bridge/usb_device, bridge-free); two of them with clocks of their own
+and a cable between (fpga/tb/pair). Both are the Verilog, cycle by cycle, so the figures are the same on every machine.
+"""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[3]
+RESULT, PAGE = ROOT / "bench/results/bridge_timing.json", ROOT / "docs/timing.md"
+BEGIN, END = "<!-- tools/benches timing writes from here -->", "<!-- to here -->"
+TICKS = 200
+SENT = {False: "two frames a packet", True: "every frame at once"}
+
+
+def pair(out: Path) -> list[dict]:
+    """Skew of two bridges by cable, measured by their bench."""
+    out.unlink(missing_ok=True)
+    environment = {**os.environ, "WHISKER_PAIR_OUT": str(out)}
+    subprocess.run([sys.executable, "-m", "pytest", "-q", "fpga/tb/pair"], cwd=ROOT, env=environment, check=True)
+    return json.loads(out.read_text())
+
+
+def latency_rows(runs: list[dict]) -> list[str]:
+    rows = ["| node link | ticks | sent | SYNC to the end of its packet | of its transfer, batch 2 | batch 4 |"]
+    rows += ["|---|---|---|---|---|---|"]
+    for run in runs:
+        link = f"SCK/{run['sck_divider']}, gap {run['word_gap'] / 60:g} us"
+        rate = f"{60e6 / run['tick_period']:.0f} Hz"
+        times = (
+            f"{run[name]['median_us']:.0f}, worst {run[name]['worst_us']:.0f} us"
+            for name in ("packet", "batch_2", "batch_4")
+        )
+        rows.append(f"| {link} | {rate} | {SENT[run['every_frame']]} | {' | '.join(times)} |")
+    return rows
+
+
+def skew_rows(cables: list[dict]) -> list[str]:
+    rows = [
+        "| cable between tick_out and tick_in | buffers and pads | second bridge's SYNC after the first's |",
+        "|---|---|---|",
+    ]
+    rows += [
+        f"| {c['cable_m']:g} m | {c['beside_ns']:g} ns | {c['least_ns']:+.1f} to {c['most_ns']:+.1f} ns |"
+        for c in cables
+    ]
+    return rows
+
+
+def table(found: dict) -> str:
+    """What the page says, made of the result."""
+    fastest = max(60e6 / run["tick_period"] for run in found["latency"])
+    lines = [*latency_rows(found["latency"]), "", *skew_rows(found["skew"]), ""]
+    bad = sum(run["bad_records"] for run in found["latency"])
+    uneven = max(run["sync_longest"] - run["sync_shortest"] for run in found["latency"])
+    frames = sum(run["frames"] for run in found["latency"])
+    lines += [
+        f"Of {frames} frames {bad} held a bad record, and the longest distance of two SYNC pulses was {uneven} cycles more than"
+    ]
+    lines += [f"the shortest. Highest rate that the settings allow, and reached here with 28 lanes: {fastest:.0f} Hz."]
+    return "\n".join(lines)
+
+
+def run(build: Path, fresh: bool) -> None:
+    """A few minutes; nothing is kept between runs, so `fresh` changes nothing."""
+    told = subprocess.run(
+        [build / "sim/bridge/usb_device/bridge-free", str(TICKS)], check=True, capture_output=True, text=True
+    )
+    found = {"latency": json.loads(told.stdout), "skew": pair(build.resolve() / "pair.json")}
+    RESULT.write_text(json.dumps(found, indent=1) + "\n")
+    before, rest = PAGE.read_text().split(BEGIN)
+    PAGE.write_text(f"{before}{BEGIN}\n\n{table(found)}\n\n{END}{rest.split(END)[1]}")
+    print("bench/results/bridge_timing.json, docs/timing.md")
