@@ -3,6 +3,9 @@
 from .. import scenes
 from ..arguments import add_action, warn
 from ..nav.filters import SettingError
+from ..nav.observations import observations_path, read_observations
+from ..occupancy import from_map
+from ..scene import OBSTACLES_MOST, SceneError, load, write
 from ..tables import unwritable
 
 EXAMPLE = "whisker scene make --family anchor+kidnap --seed 7 --out scenes/7"
@@ -25,6 +28,14 @@ def add(parser) -> None:
         help=f"of the recording: {', '.join(scenes.READERS)} (default: told by its files)",
     )
     p.add_argument("recording", help="folder that a run left, as build/demo, a robot's bag, or a Thymio's recording")
+    p.add_argument("--out", required=True, metavar="DIR", help="folder to write")
+    example = "whisker scene map scenes/home home.yaml --out scenes/mapped"
+    text = "put an occupancy map into a scene folder, for all commands that take one"
+    p = add_action(actions, "map", text, example, with_map)
+    p.add_argument(
+        "scene", help="scene folder; without arena.toml the map is the arena, seen from the image's lower left corner"
+    )
+    p.add_argument("map", metavar="MAP.YAML", help="a ROS map server's YAML file")
     p.add_argument("--out", required=True, metavar="DIR", help="folder to write")
 
 
@@ -52,8 +63,27 @@ def from_recording(arguments) -> int:
     return 0
 
 
+def with_map(arguments) -> int:
+    scene = load(arguments.scene, arguments.map)
+    boxes = max(len(scene.arena.obstacles), len(scene.arena.unknown))
+    if boxes > OBSTACLES_MOST:
+        raise SceneError(
+            f"{arguments.map}: {boxes} boxes, {OBSTACLES_MOST} are the most of a folder; make the image coarser"
+        )
+    path = observations_path(arguments.scene)
+    observations = read_observations(path, scene) if path.exists() else None
+    if observations is not None and observations.truth is not None:
+        observations.truth = from_map(observations.truth, scene.origin)
+    _write(arguments.out, scene, None if observations is None else scenes.rounded(observations))
+    print(f"{arguments.out}: {arguments.scene} with {arguments.map}, {boxes} boxes")
+    return 0
+
+
 def _write(path: str, scene, observations) -> None:
     try:
-        scenes.write_scene(path, scene, observations)
+        if observations is None:
+            write(path, scene)
+        else:
+            scenes.write_scene(path, scene, observations)
     except OSError as error:
         raise unwritable(path, error) from error

@@ -1,7 +1,7 @@
 """Scenes at level 0: what whiskers would read, without the signals between. Families by name and seed, recordings."""
 
 from .families import BASES, MODIFIERS, FamilyError, recipe
-from .files import write_scene
+from .files import rounded, write_scene
 from .making import Made, make
 from .recordings import READERS, RecordingKindError, read_recording
 
@@ -15,5 +15,6 @@ __all__ = [
     "make",
     "read_recording",
     "recipe",
+    "rounded",
     "write_scene",
 ]
