@@ -2,44 +2,19 @@
 #include "Vcynthion_bench___024root.h"
 #include "Vusb3300_bench.h"
 #include "Vusb3300_bench___024root.h"
-#include "board_device.h"
+#include "verilated_top.h"
 
 namespace bridge_sim
 {
 
-namespace
-{
-
-template <typename Model> class Verilated : public BoardTop
-{
-  public:
-    BoardOutputs eval(const BoardInputs &in) override
-    {
-        model_.clk = in.clk;
-        model_.rootp->board_bench__DOT__board__DOT__oscillator__DOT__OSC = in.osc;
-        model_.dir = in.dir;
-        model_.nxt = in.nxt;
-        model_.phy_data = in.phy_data;
-        model_.miso = in.miso;
-        model_.eval();
-        return {model_.link_data, model_.link_drives,   model_.stp != 0,  model_.reset != 0, model_.sync != 0,
-                model_.sck != 0,  model_.select_n != 0, model_.mosi != 0, model_.led != 0,   model_.leds};
-    }
-
-  private:
-    Model model_;
-};
-
-} // namespace
-
 std::unique_ptr<BoardTop> make_usb3300_board()
 {
-    return std::make_unique<Verilated<Vusb3300_bench>>();
+    return std::make_unique<VerilatedTop<Vusb3300_bench>>();
 }
 
 std::unique_ptr<BoardTop> make_cynthion()
 {
-    return std::make_unique<Verilated<Vcynthion_bench>>();
+    return std::make_unique<VerilatedTop<Vcynthion_bench>>();
 }
 
 } // namespace bridge_sim
