@@ -27,6 +27,7 @@ TOPICS = {  # topic -> module, by room
     "nav": "nav.bench",
     "nav_paper": "nav.paper",
     "nav_peers": "nav.peer_runs",
+    "nav_unseen": "nav.unseen",
     "node": "node.bench",
     "radial": "radial.bench",
     "record": "host.record",

@@ -46,8 +46,16 @@ double nav_kalman_expect(struct nav_kalman *k, const struct nav_sighting *s, str
     if (s->ray < 0)
         return s->upright ? at.x : at.y;
     const struct nav_ray *ray = &k->problem->robot.ray[s->ray];
+    const struct nav_likelihood *l = k->likelihood;
+    const struct nav_arena *arena = &k->problem->arena;
+    struct nav_arena near;
+    if (s->reach <= l->model[l->sensors.first[1] + s->ray].reach) { /* else beyond what the buckets hold */
+        if (!nav_obstacles_near(&l->obstacles, pose.x, pose.y, &near))
+            return INFINITY;
+        arena = &near;
+    }
     at = nav_compose(pose, (struct nav_pose){ray->x, ray->y, ray->yaw});
-    return nav_arena_range(&k->problem->arena, at.x, at.y, at.theta, s->reach);
+    return nav_arena_range(arena, at.x, at.y, at.theta, s->reach);
 }
 
 /* Takes the gain's share of the innovation; refuses a result that is no covariance any more. */

@@ -1,16 +1,16 @@
 """Filters on families of scenes that none of them was made for: arenas, robots, rates, noise and maps of every kind.
 
-    python -m benches.nav.unseen --filter adaptive --seeds 10 [--only NAME] [--set key=value] [--json FILE]
+    tools/benches nav_unseen --filter grid --seeds 5 --only "two textures"
 
 One line a family: runs locked at the end, error after lock, share of truths within the 90 % region and its area, share of
 rows that are sure (confidence above 0.9) and wrong, and the CPU time of a row. Seeds begin where no development did.
 """
 
 import argparse
-import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from json import dumps
 from pathlib import Path
 
 import numpy as np
@@ -25,12 +25,12 @@ from whisker.scenes.making import Made, make_recipe
 from whisker.scenes.readings import World
 from whisker.scenes.walk import Pace
 
+RESULT = Path(__file__).resolve().parents[3] / "bench/results/nav_unseen.json"
 FIRST_SEED = 70_000
 ROWS = 600
 SURE, FAR_M, FAR_RAD = 0.9, 0.25, 0.5
 SETTLING_ROWS = 30  # after a kidnap, in which no filter can know
 REGIONS = 12
-NEAR_END = 100
 
 CREATE = World(odometry=0.08, odometry_memory_m=0.5, run_gain=0.05, drift_rad=0.03)
 
@@ -161,10 +161,6 @@ STARTS: dict[str, tuple[str, Callable[[Recipe], Recipe]]] = {
 }
 
 
-def scene_of(recipe: Recipe, seed: int) -> Made:
-    return make_recipe(recipe, seed)
-
-
 def judge(made: Made, run: localise.Run, folds: int) -> dict:
     """Figures of one run."""
     truth = made.observations.truth
@@ -176,7 +172,7 @@ def judge(made: Made, run: localise.Run, folds: int) -> dict:
         image = np.column_stack([size - truth[:, :2], truth[:, 2] + math.pi])
         other = position_errors(run.poses, image)
         turned = np.where(other < off, heading_errors(run.poses, image), turned)
-        off = np.minimum(off, other)
+        off = np.minimum(off, other)  # the regions are judged by the truth itself
     begun = made.kidnaps[-1] if made.kidnaps else 0
     lock = lock_row(off[begun:])
     after = begun + lock if lock is not None else len(off)
@@ -206,7 +202,7 @@ def measure(name: str, start: str, filter: str, settings: dict, seeds: range) ->
     recipe = STARTS[start][1](family.recipe)
     runs = []
     for seed in seeds:
-        made = scene_of(recipe, seed)
+        made = make_recipe(recipe, seed)
         run = localise.run(filter, made.scene, made.observations, settings, seed, REGIONS)
         runs.append(judge(made, run, family.folds))
     covered = [c for run in runs for c in run["covered"]]
@@ -236,34 +232,36 @@ def line(title: str, r: dict) -> str:
     )
 
 
-def main(argv=None) -> int:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--filter", default="adaptive")
-    parser.add_argument("--seeds", type=int, default=10)
-    parser.add_argument("--first", type=int, default=FIRST_SEED)
-    parser.add_argument("--only", action="append", default=[])
-    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")
-    parser.add_argument("--json", type=Path)
-    args = parser.parse_args(argv)
-    settings = {key: float(value) for key, value in (pair.split("=") for pair in args.set)}
+def run(
+    _build: Path,
+    _fresh: bool,
+    filter: str = "adaptive",
+    seeds: int = 20,
+    first: int = FIRST_SEED,
+    only: Sequence[str] = (),
+    set: Sequence[str] = (),
+    json: Path = RESULT,
+) -> None:
+    settings = {key: float(value) for key, value in (pair.split("=") for pair in set)}
     done = {}
     for name, family in FAMILIES.items():
-        if args.only and not any(word in name for word in args.only):
+        if only and not any(word in name for word in only):
             continue
         for start in family.starts:
             title = f"{name}, {STARTS[start][0]}"
-            done[title] = measure(name, start, args.filter, settings, range(args.first, args.first + args.seeds))
+            done[title] = measure(name, start, filter, settings, range(first, first + seeds))
             print(line(title, done[title]), flush=True)
-    total = {key: sum(r[key] for r in done.values()) for key in ("locked", "runs")}
-    print(
-        f"locked {total['locked']} of {total['runs']}, sure+wrong {np.mean([r['sure_wrong'] for r in done.values()]):.4f}"
+    locked, runs = (sum(r[key] for r in done.values()) for key in ("locked", "runs"))
+    print(f"locked {locked} of {runs}, sure and wrong {np.mean([r['sure_wrong'] for r in done.values()]):.4f}")
+    json.write_text(dumps({"filter": filter, "settings": settings, "families": done}, indent=1) + "\n")
+
+
+def options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--filter", default="adaptive")
+    parser.add_argument("--seeds", type=int, default=20, help="of each family and start (default: %(default)s)")
+    parser.add_argument("--first", type=int, default=FIRST_SEED, help="seed (default: %(default)s)")
+    parser.add_argument("--only", action="append", default=[], help="families whose names hold this; may be repeated")
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="KEY=VALUE", help="of the filter; may be repeated"
     )
-    if args.json:
-        args.json.write_text(
-            json.dumps({"filter": args.filter, "settings": settings, "families": done}, indent=1) + "\n"
-        )
-    return 0
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+    parser.add_argument("--json", type=Path, default=RESULT, help="where to write (default: %(default)s)")
