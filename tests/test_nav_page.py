@@ -146,3 +146,13 @@ def test_a_point_that_is_quicker_and_nearer_is_named(data):
 def test_peers_that_were_not_run_are_not_said_to_be_worse(data):
     del data["pareto"]["peers"]
     assert "| anchor | not run | none |" in nav_page.document(data)
+
+
+def test_the_page_of_unseen_families_is_what_was_measured():
+    from benches.nav import unseen
+
+    measured, designs = (json.loads(path.read_text()) for path in (unseen.RESULT, unseen.DESIGNS))
+    assert unseen.page(measured, designs) == unseen.PAGE.read_text()
+    family = next(iter(measured["families"].values()))
+    family["locked"] = 0
+    assert unseen.page(measured, designs) != unseen.PAGE.read_text()

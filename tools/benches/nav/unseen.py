@@ -10,7 +10,7 @@ import argparse
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from json import dumps
+from json import dumps, loads
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +25,9 @@ from whisker.scenes.making import Made, make_recipe
 from whisker.scenes.readings import World
 from whisker.scenes.walk import Pace
 
-RESULT = Path(__file__).resolve().parents[3] / "bench/results/nav_unseen.json"
+ROOT = Path(__file__).resolve().parents[3]
+RESULT, DESIGNS = (ROOT / f"bench/results/nav_{name}.json" for name in ("unseen", "designs"))
+PAGE = ROOT / "docs/results_nav_unseen.md"
 FIRST_SEED = 70_000
 ROWS = 600
 SURE, FAR_M, FAR_RAD = 0.9, 0.25, 0.5
@@ -232,6 +234,62 @@ def line(title: str, r: dict) -> str:
     )
 
 
+COLUMNS = (
+    "locked | rows to lock | error, mm | truths within the 90 % region | its area, cm2 | sure and wrong, % | us a row"
+)
+
+
+def table(title: str, families: dict[str, dict]) -> list[str]:
+    """Rows of the page for one measurement."""
+    lines = [f"| {title} | {COLUMNS} |", "|" + "---|" * (2 + COLUMNS.count("|"))]
+    for name, r in families.items():
+        covered = "-" if r["coverage_90"] is None else f"{r['coverage_90']:.2f}"
+        area = "-" if r["region_90_cm2"] is None else f"{r['region_90_cm2']:.1f}"
+        lines.append(
+            f"| {name} | {r['locked']} of {r['runs']} | {r['rows_to_lock']:.0f} | {r['error_mm']:.1f} | {covered} | {area} "
+            f"| {100 * r['sure_wrong']:.1f} | {r['us']:.0f} |"
+        )
+    return lines
+
+
+def totals(designs: dict[str, dict]) -> list[str]:
+    """Rows of the page that compare designs on the same runs."""
+    lines = [f"| design | {COLUMNS} |", "|" + "---|" * (2 + COLUMNS.count("|"))]
+    for title, measured in designs.items():
+        told = measured.values()
+        locked, runs = (sum(r[key] for r in told) for key in ("locked", "runs"))
+        means = (float(np.mean([r[key] for r in told])) for key in ("rows_to_lock", "error_mm", "coverage_90"))
+        area, wrong, us = (float(np.mean([r[key] for r in told])) for key in ("region_90_cm2", "sure_wrong", "us"))
+        rows, error, covered = means
+        lines.append(
+            f"| {title} | {locked} of {runs} | {rows:.0f} | {error:.1f} | {covered:.2f} | {area:.1f} "
+            f"| {100 * wrong:.1f} | {us:.0f} |"
+        )
+    return lines
+
+
+def page(unseen: dict, designs: dict) -> str:
+    """docs/results_nav_unseen.md."""
+    lines = [
+        "# Families that no filter was made for",
+        "",
+        f"`tools/benches nav_unseen`: the filter `{unseen['filter']}` with its defaults on scenes drawn after it was made"
+        " ([which](../tools/benches/nav/unseen.py)).",
+        "Sure and wrong: rows with a confidence above 0.9 that are off by more than 0.25 m or 0.5 rad, 30 rows after a"
+        " kidnap left out. Times: CPU time on a busy machine.",
+        "",
+        *table("family, start", unseen["families"]),
+        "",
+        "## Designs weighed",
+        "",
+        "What becomes of the arena-wide histogram once hypotheses have been drawn from it: means over the same runs of the",
+        f"families {', '.join(sorted({name.split(',')[0] for name in next(iter(designs.values()))}))}.",
+        "",
+        *totals(designs),
+    ]
+    return "\n".join(lines) + "\n"
+
+
 def run(
     _build: Path,
     _fresh: bool,
@@ -253,7 +311,10 @@ def run(
             print(line(title, done[title]), flush=True)
     locked, runs = (sum(r[key] for r in done.values()) for key in ("locked", "runs"))
     print(f"locked {locked} of {runs}, sure and wrong {np.mean([r['sure_wrong'] for r in done.values()]):.4f}")
-    json.write_text(dumps({"filter": filter, "settings": settings, "families": done}, indent=1) + "\n")
+    measured = {"filter": filter, "settings": settings, "families": done}
+    json.write_text(dumps(measured, indent=1) + "\n")
+    if json == RESULT:
+        PAGE.write_text(page(measured, loads(DESIGNS.read_text())))
 
 
 def options(parser: argparse.ArgumentParser) -> None:
