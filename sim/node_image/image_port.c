@@ -150,6 +150,7 @@ static void note(struct image_cost *cost, uint64_t cycles, uint64_t acted, uint1
         cost->acts = (uint32_t)acted;
     if (stack > cost->stack)
         cost->stack = stack;
+    cost->last = (uint32_t)cycles;
     cost->count++;
 }
 
