@@ -17,6 +17,8 @@
 
 static const uint64_t MS_FS = UINT64_C(1000000000000);
 
+enum { TRAPS = 8 }; /* vectors before the first interrupt's */
+
 /* ------------------------------------------------------------------------------------------------------------ vectors
  */
 
@@ -46,18 +48,24 @@ static const char *outcome(const struct image_costs *before, unsigned number)
     return after.returned[number] > before->returned[number] ? "returns" : "nothing";
 }
 
-static void print_vector(bool in_loader, unsigned number)
+static const char *tried(bool in_loader, unsigned number)
 {
     sim_node *node = started(in_loader);
     const struct image_costs before = image_port_costs();
-    if (number < 8u)
+    if (number < TRAPS)
         sim_node_disturb(node, SIM_NODE_TRAP, number);
     else
-        raise_interrupt(node->chip, number - 8u);
+        raise_interrupt(node->chip, number - TRAPS);
     sim_node_until(node, sim_node_fs(node) + MS_FS);
-    printf("%s\"%s\"", number ? ", " : "",
-           number < 8u && number > (unsigned)DSPIC_TRAP_DMA ? "none" : outcome(&before, number));
+    const char *found = outcome(&before, number);
     sim_node_free(node);
+    return found;
+}
+
+static void print_vector(bool in_loader, unsigned number)
+{
+    const bool none = number < TRAPS && number > (unsigned)DSPIC_TRAP_DMA;
+    printf("%s\"%s\"", number ? ", " : "", none ? "none" : tried(in_loader, number));
 }
 
 static void print_vectors(void)

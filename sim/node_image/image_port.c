@@ -131,6 +131,11 @@ static void show(struct board *board, const struct image_node *node)
     board->loader.next = image.loader.next;
 }
 
+bool node_ready(const struct node *node)
+{
+    return node->sampler.state == SAMPLER_READY;
+}
+
 /* --------------------------------------------------------------------------------------------------------- interrupts
  */
 
