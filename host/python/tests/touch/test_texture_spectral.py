@@ -344,6 +344,19 @@ def test_training_tells_figures_and_what_it_could_not_learn(capsys, tmp_path, re
     assert not recwarn.list
 
 
+def test_channels_that_are_no_counts_are_learnt_and_have_no_stops(tmp_path):
+    """Zero is a value as any other there; of raw counts it is the sensor's stop."""
+    units = {name: [(drag(name, 800, s) - 32768) / 100 for s in range(3)] for name in ("VINYL", "ROUGH")}
+    units["VINYL"][0][:80, 0] = 0.0
+    assert texture.recording_faults(units["VINYL"][0]) == []
+    counts = drag("VINYL", 800, 0)
+    counts[:80, 0] = 0.0
+    assert texture.recording_faults(counts) == ["channel 1 is at its stop in 10 % of its samples"]
+    train(units, RATE_HZ, 25.0).save(tmp_path / "m.json")
+    found = texture.load(tmp_path / "m.json").judge((drag("ROUGH", 400, 9) - 32768) / 100, 50)
+    assert np.mean([d.loglik.argmax() == 1 for d in found]) > 0.7
+
+
 def test_a_folder_is_classified_at_once(capsys, tmp_path, model):
     model.save(tmp_path / "m.json")
     for name in ("ROUGH", "VINYL", "VELVET"):

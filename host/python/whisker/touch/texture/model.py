@@ -251,8 +251,10 @@ def recording_faults(samples: np.ndarray) -> list[str]:
     finite = samples[np.isfinite(samples).all(axis=1)]
     found = [f"{len(samples) - len(finite)} of {len(samples)} rows are not finite and left out"]
     found = found if len(finite) < len(samples) else []
+    low, high = SENSOR_STOPS
+    counts = np.array_equal(finite, np.round(finite)) and bool(((finite >= low) & (finite <= high)).all())
     for c, channel in enumerate(finite.T, start=1):
-        stopped = np.isin(channel, SENSOR_STOPS).mean() if len(channel) else 0.0
+        stopped = np.isin(channel, SENSOR_STOPS).mean() if counts and len(channel) else 0.0
         if len(channel) > 1 and (channel == channel[0]).all():
             found.append(f"channel {c} never changes")
         elif stopped > STOPPED_MOST:

@@ -17,6 +17,7 @@ WINDOWS_MOST = 6000  # of one classifier, over all recordings
 BLOCKS = 4  # of a window, in each of which a change of surface is looked for
 SPIKE_OVER = 3.0  # times what one sample in a thousand stands out from both neighbours
 STILL_OVER, STILL_LEAST = 2.0, 16  # times the longest run of equal samples; shorter runs happen to any sensor
+NO_STOP = 1e12  # of channels that are no raw counts
 SPAN_OVER = 1.5  # times the farthest that a training window reaches
 BORDER_QUANTILE, BORDER_OVER = 0.999, 1.25  # of neighbouring held-out stretches of one surface
 REFUSE_MOST = 0.03  # share of held-out windows that want of confidence may cost ...
@@ -125,7 +126,7 @@ def _limits(parts: list) -> dict[str, np.ndarray]:
         found["still"].append(max(STILL_LEAST, STILL_OVER * max(map(_longest_run, channel))))
         counts = np.array_equal(everything, np.round(everything)) and everything.min() > SENSOR_STOPS[0]
         counts = counts and everything.max() < SENSOR_STOPS[1]
-        low, high = SENSOR_STOPS if counts else (-1e300, 1e300)
+        low, high = SENSOR_STOPS if counts else (-NO_STOP, NO_STOP)
         found["low"].append(low)
         found["high"].append(high)
     return {name: np.array(values, dtype=float) for name, values in found.items()}
