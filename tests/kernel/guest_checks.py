@@ -1,5 +1,8 @@
 """Runs inside the guest: what a user's programs do with the bridge."""
 
+import ctypes
+import fcntl
+import os
 import re
 import subprocess
 import sys
@@ -18,6 +21,8 @@ LONG_RUN_FRAMES = 20000
 SHORT_RUN_FRAMES = 2000
 RING = "kernel"
 PYUSB = "pyusb"  # the argument that makes this program the one that pyusb() runs
+FINIT_MODULE, DELETE_MODULE = 313, 176  # system calls of x86-64
+USBTEST_TIMES, USBTEST_QUEUED = 20, 16
 LINK = ["--sck-divider", "6", "--word-gap", "30", "--sample-point", "5"]
 IDENTITY = f"{LIMITS['usb_vendor_id']:04x}:{LIMITS['usb_product_id']:04x}"
 MICROSOFT_OS_20 = "{d8dd60df-4589-4cc7-9cd2-659d9e648a9f}"  # the platform capability by which Windows picks its driver
@@ -107,6 +112,63 @@ def libusb_cancel(checks: BridgeChecks) -> str:
 def libusb_reset(checks: BridgeChecks) -> str:
     """A reset in the midst of a run."""
     return command(checks.program("kernel_usb_probe"), "reset").strip() + " after a reset"
+
+
+def libusb_halt(checks: BridgeChecks) -> str:
+    """SET_FEATURE and CLEAR_FEATURE of the endpoint's halt, and SET_INTERFACE, in the midst of a run: no frame lost, none twice."""
+    return command(checks.program("kernel_usb_probe"), "halt").strip() + " through a halt and a SET_INTERFACE"
+
+
+class UsbTest(ctypes.Structure):
+    """struct usbtest_param_64 of the kernel's drivers/usb/misc/usbtest.c."""
+
+    _fields_ = [(name, ctypes.c_uint32) for name in ("test", "iterations", "length", "vary", "sglen")]
+    _fields_ += [("seconds", ctypes.c_int64), ("microseconds", ctypes.c_int64)]
+
+
+class UsbIoctl(ctypes.Structure):
+    """struct usbdevfs_ioctl of linux/usbdevice_fs.h."""
+
+    _fields_ = [("interface", ctypes.c_int), ("code", ctypes.c_int), ("data", ctypes.c_void_p)]
+
+
+def request_code(number: int, structure: type) -> int:
+    """_IOWR('U', number, structure), as C's int has it."""
+    return 3 << 30 | ctypes.sizeof(structure) << 16 | ord("U") << 8 | number
+
+
+def system_call(number: int, *arguments) -> None:
+    """OSError if it fails; Python has no function for those about modules."""
+    libc = ctypes.CDLL(None, use_errno=True)
+    if libc.syscall(number, *arguments) < 0:
+        raise OSError(ctypes.get_errno(), os.strerror(ctypes.get_errno()))
+
+
+@contextmanager
+def usbtest_driver():
+    """The kernel's usbtest, told to take this bridge: it binds to the frames' interface, which has no driver."""
+    release = Path("/proc/sys/kernel/osrelease").read_text().strip()
+    module = ROOT / f"build/kernel/debian/root/lib/modules/{release}/kernel/drivers/usb/misc/usbtest.ko"
+    vendor, product = (LIMITS[f"usb_{name}_id"] for name in ("vendor", "product"))
+    with module.open("rb") as file:
+        system_call(FINIT_MODULE, file.fileno(), f"vendor={vendor} product={product}".encode(), 0)
+    try:
+        yield
+    finally:
+        system_call(DELETE_MODULE, b"usbtest", 0)
+
+
+def usbtest(_: Checks) -> str:
+    """The kernel's own usbtest: case 9, chapter 9 requests, and 10, many control requests queued at once."""
+    interface = LIMITS["usb_bulk_interface"]
+    node = "/dev/bus/usb/{:03d}/{:03d}".format(*(int((device() / name).read_text()) for name in ("busnum", "devnum")))
+    with usbtest_driver(), open(node, "r+b", buffering=0) as file:
+        await_that((device() / f"{device().name}:1.{interface}/driver").exists, "usbtest did not take the interface")
+        for case in (9, 10):
+            test = UsbTest(case, USBTEST_TIMES, 0, 0, USBTEST_QUEUED)
+            job = UsbIoctl(interface, ctypes.c_int(request_code(100, UsbTest)).value, ctypes.addressof(test))
+            fcntl.ioctl(file, request_code(18, UsbIoctl), job)
+    return f"cases 9 and 10, {USBTEST_TIMES} times each"
 
 
 def hidapi_hidraw(checks: BridgeChecks) -> None:
@@ -254,13 +316,23 @@ def main() -> None:
     """All checks, first over usbredir, then over USB/IP."""
     talk = Talk()
     checks = BridgeChecks(talk, Path(sys.argv[1]))
-    for check in (enumerates, lsusb, libusb_stream, libusb_stall, libusb_cancel, libusb_reset):
+    for check in (enumerates, lsusb, usbtest, libusb_stream, libusb_stall, libusb_halt, libusb_cancel, libusb_reset):
         checks.run(f"usbredir {check.__name__}", check)
     for check in (hidapi_hidraw, hidapi_libusb, pyusb, daemon_short, replug, daemon_long, no_complaint):
         checks.run(f"usbredir {check.__name__}", check)
     talk.ask("unplug")
     await_state(False)
-    again = [libusb_stream, libusb_stall, libusb_cancel, libusb_reset, hidapi_hidraw, hidapi_libusb, pyusb]
+    again = [
+        usbtest,
+        libusb_stream,
+        libusb_stall,
+        libusb_halt,
+        libusb_cancel,
+        libusb_reset,
+        hidapi_hidraw,
+        hidapi_libusb,
+        pyusb,
+    ]
     for check in (usbip_attach, enumerates, lsusb, *again, daemon_short, usbip_detach):
         checks.run(f"usbip {check.__name__.removeprefix('usbip_')}", check)
     checks.run("usbip attach again", usbip_attach)

@@ -1,5 +1,5 @@
 /* A libusb program for the guest: streams frames and checks each, and tries what a host may do to a device besides.
- * usage: usb_probe stream FRAMES | stall | cancel | reset */
+ * usage: usb_probe stream FRAMES | stall | cancel | reset | halt */
 #include <stdbool.h>
 #include <string.h>
 
@@ -218,6 +218,49 @@ static void reset(void)
     stream(FRAMES_SOME);
 }
 
+/* So many more frames by reads one after the other. */
+static void read_on(struct stream *stream, uint64_t frames)
+{
+    const uint64_t wanted = stream->frames + frames;
+    while (stream->frames < wanted && !stream->last) {
+        uint8_t bytes[TRANSFER_BYTES];
+        int count = 0;
+        require(libusb_bulk_transfer(device, WHISKER_LIMIT_USB_BULK_IN, bytes, sizeof bytes, &count, TIMEOUT_MS),
+                "read");
+        take_bytes(stream, bytes, (size_t)count);
+    }
+}
+
+/* In the midst of a run the host halts the frames' endpoint and lets it go, then sets the interface anew: no frame is
+ * lost, none comes twice. */
+static void halt(void)
+{
+    struct stream stream = {0};
+    uint8_t bytes[TRANSFER_BYTES];
+    int count = 0;
+    whisker_decoder_init(&stream.decoder);
+    require(set_run(WHISKER_WIRE_VERSION, 1), "start");
+    read_on(&stream, FRAMES_SOME);
+    require(libusb_control_transfer(device, LIBUSB_RECIPIENT_ENDPOINT, LIBUSB_REQUEST_SET_FEATURE, 0,
+                                    WHISKER_LIMIT_USB_BULK_IN, NULL, 0, TIMEOUT_MS),
+            "SET_FEATURE(ENDPOINT_HALT)");
+    const int halted = libusb_bulk_transfer(device, WHISKER_LIMIT_USB_BULK_IN, bytes, sizeof bytes, &count, TIMEOUT_MS);
+    if (halted != LIBUSB_ERROR_PIPE || count != 0) {
+        fail("a read of a halted endpoint ends with %s, %d bytes", libusb_error_name(halted), count);
+    }
+    require(libusb_clear_halt(device, WHISKER_LIMIT_USB_BULK_IN), "CLEAR_FEATURE(ENDPOINT_HALT)");
+    read_on(&stream, FRAMES_SOME);
+    require(libusb_set_interface_alt_setting(device, WHISKER_LIMIT_USB_BULK_INTERFACE, 0), "SET_INTERFACE");
+    read_on(&stream, FRAMES_SOME);
+    require(set_run(WHISKER_WIRE_VERSION, 0), "stop");
+    while (!stream.last) {
+        read_on(&stream, 1);
+    }
+    whisker_decoder_end(&stream.decoder);
+    check_decoder(&stream.decoder.counts);
+    printf("%llu frames\n", (unsigned long long)stream.frames);
+}
+
 int main(int argc, char **argv)
 {
     const char *what = argc > 1 ? argv[1] : "";
@@ -230,8 +273,10 @@ int main(int argc, char **argv)
         cancel();
     } else if (!strcmp(what, "reset")) {
         reset();
+    } else if (!strcmp(what, "halt")) {
+        halt();
     } else {
-        fail("usage: usb_probe stream FRAMES | stall | cancel | reset");
+        fail("usage: usb_probe stream FRAMES | stall | cancel | reset | halt");
     }
     close_bridge();
     return EXIT_SUCCESS;
