@@ -17,7 +17,7 @@
 #define WHISKER_LIMIT_WORD_GAP_DEFAULT 180u /* cycle of 60 MHz, 3 us */
 #define WHISKER_LIMIT_SAMPLE_POINT_DEFAULT 8u /* cycle of 60 MHz, the falling edge at the default divider */
 #define WHISKER_LIMIT_RESYNC_TICKS 1u /* tick, samples given up after a bad sensor frame: the 300 us resynchronisation overlaps the next SYNC */
-#define WHISKER_LIMIT_SENSOR_LATCH 23300u /* ns, from SYNC until the sensor takes its angles: its frame's first byte at 345 kHz; 22.4 to 24.3 with the node's oscillator 4 % off (bench/results/node.json, on the model) */
+#define WHISKER_LIMIT_SENSOR_LATCH 24500u /* ns, from SYNC until the sensor takes its angles: its frame's first byte at 345 kHz; 23.5 to 25.5 with the node's oscillator 4 % off (bench/results/node.json, on the model) */
 #define WHISKER_LIMIT_SENSOR_AGE_MIN 0u /* ns, age of the sensor's conversion when it takes them: between this and the next, evenly spread, different for each sensor and unknown */
 #define WHISKER_LIMIT_SENSOR_AGE_MAX UINT32_C(385000) /* ns, 350 us at most in fast mode (data sheet), on an oscillator 10 % slow; measured on the model: docs/charts/node_age.svg */
 #define WHISKER_LIMIT_FIFO_BYTES 16384u /* byte, 32 ms of frames */

@@ -8,7 +8,6 @@ void dspic_parameters_default(struct dspic_parameters *parameters)
     *parameters = (struct dspic_parameters){.slave_prefetch = 2,
                                             .entry_cycles = 5,
                                             .exit_cycles = 3,
-                                            .work_cycles = 60,
                                             .pll_lock_us = 1000,
                                             .keeps_clock = true,
                                             .watchdog_ms = 128,

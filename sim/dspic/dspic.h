@@ -2,9 +2,9 @@
  *
  * Modelled: SPI1, SPI2, DMA with ping-pong, T1 to T3, INT1, INT2, pin select, ports, interrupt priorities and nesting,
  * clock switch behind its unlock sequence, watchdog, flash self-programming with power cuts, reset causes. Firmware
- * runs as native code; it takes time only where it touches the chip: each access a cycle, each interrupt its entry,
- * exit and a fixed number of cycles for the work between. Interrupts nest at accesses. Not modelled: the CPU's own
- * instructions, PSV, other peripherals; writes to their registers are kept and do nothing.
+ * runs as native code; it takes time where it touches the chip, each access a cycle, at each interrupt's entry and
+ * exit, and where dspic_compute says so. Interrupts nest at accesses. Not modelled: the CPU's own instructions, PSV,
+ * other peripherals; writes to their registers are kept and do nothing.
  *
  * A chip and what is wired to it belong to one thread. */
 #ifndef DSPIC_H
@@ -31,7 +31,6 @@ struct dspic_parameters {
                                 one right after SPITBF is cleared (C) */
     uint8_t entry_cycles;    /* interrupt latency: 5 (A) */
     uint8_t exit_cycles;     /* 3 (A) */
-    uint16_t work_cycles;    /* of an interrupt besides its register accesses */
     uint16_t pll_lock_us;    /* from the switch to LOCK */
     uint8_t pll_failures;    /* so many switches, counted from the chip's making, never end: the PLL does not lock */
     bool keeps_clock;        /* a reset other than power-on leaves COSC, NOSC and LOCK as they are (A for sibling
@@ -85,6 +84,12 @@ uint64_t dspic_next_fs(const struct dspic *chip);
 /* The supply fails at this time, also in the middle of an erase or write, which is then done in part. */
 void dspic_cut_power_at(struct dspic *chip, uint64_t at_fs);
 bool dspic_powered(const struct dspic *chip);
+
+/* The firmware computes for so many cycles, from within a callback that runs it: now, or so that its next write to the
+ * register at `address` comes no sooner than that. */
+void dspic_compute(struct dspic *chip, uint64_t cycles);
+void dspic_compute_until(struct dspic *chip, uint64_t cycles, uint16_t address);
+uint64_t dspic_cycle_fs(const struct dspic *chip);
 
 /* The outside drives pin RB0 to RB15, from `now_fs` on. Peripherals react at once, interrupts when time goes on. */
 void dspic_input(struct dspic *chip, unsigned rp, bool level, uint64_t now_fs);

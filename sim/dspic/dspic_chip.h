@@ -60,6 +60,8 @@ struct dspic {
     uint64_t due_fs[EVENTS];
     uint64_t soon_fs; /* none of them is due before */
     uint64_t busy_fs, interrupts;
+    uint64_t computed_fs; /* the next write to `computed_for` comes then */
+    uint16_t computed_for;
     bool powered;
     jmp_buf *unwind; /* to where a reset or power cut throws the running firmware */
     uint16_t cause;  /* of the reset under way; 0: power cut */

@@ -80,6 +80,22 @@ void dspic_spend(struct dspic *chip, uint64_t cycles)
     irq_take(chip);
 }
 
+void dspic_compute(struct dspic *chip, uint64_t cycles)
+{
+    dspic_spend(chip, cycles);
+}
+
+void dspic_compute_until(struct dspic *chip, uint64_t cycles, uint16_t address)
+{
+    chip->computed_fs = chip->now_fs + cycles * chip->cycle_fs;
+    chip->computed_for = address;
+}
+
+uint64_t dspic_cycle_fs(const struct dspic *chip)
+{
+    return chip->cycle_fs;
+}
+
 void dspic_outside_at(struct dspic *chip, uint64_t at_fs)
 {
     plan_event(chip, EVENT_OUTSIDE, at_fs);

@@ -50,7 +50,7 @@ static void serve(struct dspic *chip, unsigned irq, unsigned its)
     chip->interrupts++;
     dspic_spend(chip, chip->parameters.entry_cycles);
     chip->wiring.interrupt(chip->wiring.context, irq);
-    dspic_spend(chip, (uint64_t)chip->parameters.work_cycles + chip->parameters.exit_cycles);
+    dspic_spend(chip, chip->parameters.exit_cycles);
     chip->level = before;
     chip->look = true; /* what had to wait for this priority */
     if (before == 0)

@@ -83,14 +83,26 @@ uint16_t dspic_sfr_read(struct dspic *chip, uint16_t address)
     return value;
 }
 
+/* What the firmware computes before this write takes its time first. */
+static void compute_first(struct dspic *chip, uint16_t address)
+{
+    if (address != chip->computed_for)
+        return;
+    chip->computed_for = 0;
+    if (chip->computed_fs > chip->now_fs)
+        dspic_compute(chip, (chip->computed_fs - chip->now_fs) / chip->cycle_fs);
+}
+
 void dspic_sfr_write(struct dspic *chip, uint16_t address, uint16_t value)
 {
+    compute_first(chip, address);
     registers_write(chip, address, value);
     dspic_spend(chip, 1u);
 }
 
 void dspic_sfr_modify(struct dspic *chip, uint16_t address, uint16_t mask, uint16_t value)
 {
+    compute_first(chip, address);
     registers_write(chip, address, (uint16_t)((*sfr(chip, address) & ~mask) | value));
     dspic_spend(chip, 1u);
 }

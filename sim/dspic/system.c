@@ -109,6 +109,7 @@ void system_reset(struct dspic *chip, uint16_t cause)
     chip->idle = chip->hung = false;
     chip->requested = 0;
     chip->held_fs = 0;
+    chip->computed_for = 0;
     chip->high_key = chip->low_key = chip->flash_key = 0;
     chip->pins_were_locked = false;
     *sfr(chip, RCON) = rcon | cause;

@@ -1,8 +1,7 @@
-/* node_timing TICKS NODES FRC_PPM SENSOR_PERMILLE CONVERSION_NS WORK_CYCLES LEAD_CYCLES SEED: nodes whose oscillators
- * are drawn within those spreads, side by side on one SYNC; an interrupt computes so long after its register accesses
- * and before them. One line per node and tick: from SYNC to the sensor's latch, age of its conversion then, from SYNC
- * to the armed record, all ns. At the end a line "cycles": per tick in interrupts, and interrupts per tick, of the
- * first node. A FRC_PPM below 0 is no spread: all nodes are off by as much. */
+/* node_timing TICKS NODES FRC_PPM SENSOR_PERMILLE CONVERSION_NS SEED: nodes whose oscillators are drawn within those
+ * spreads, side by side on one SYNC. One line per node and tick: from SYNC to the sensor's latch, age of its conversion
+ * then, from SYNC to the armed record, all ns. At the end a line "cycles": per tick in interrupts, and interrupts per
+ * tick, of the first node. A FRC_PPM below 0 is no spread: all nodes are off by as much. */
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -68,12 +67,12 @@ static void print_cycles(const struct run *run)
 
 int main(int argc, char **argv)
 {
-    if (argc != 9) {
-        fprintf(stderr, "node_timing: wants ticks, nodes, ppm, permille, ns, cycles after and before, and a seed\n");
+    if (argc != 7) {
+        fprintf(stderr, "node_timing: wants ticks, nodes, ppm, permille, ns and a seed\n");
         return 2;
     }
     struct run run = {.ticks = (unsigned)atoi(argv[1])};
-    uint64_t random = strtoull(argv[8], NULL, 10);
+    uint64_t random = strtoull(argv[6], NULL, 10);
     const double ppm = atof(argv[3]), permille = atof(argv[4]);
     for (int n = 0; n < atoi(argv[2]); n++) {
         struct sim_node_parameters parts;
@@ -81,8 +80,6 @@ int main(int argc, char **argv)
         const double chip = spread(&random), sensor = spread(&random);
         parts.chip.frc_ppm = (int32_t)(ppm < 0.0 ? ppm : chip * ppm);
         parts.chip.slave_prefetch = (uint8_t)(1 + n % 2);
-        parts.chip.work_cycles = (uint16_t)atoi(argv[6]);
-        parts.chip.entry_cycles = (uint8_t)(parts.chip.entry_cycles + atoi(argv[7]));
         parts.sensor.slow_permille = (uint16_t)(1000.0 + sensor * permille);
         parts.sensor.conversion_ns = (uint32_t)atoi(argv[5]);
         if (!run_node(&run, &parts))

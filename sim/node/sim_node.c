@@ -2,6 +2,7 @@
 
 #include <stdlib.h>
 
+#include "node_cycles.h"
 #include "sim_node_state.h"
 
 #define OSCILLATOR_SPREAD_PERMILLE (MLX90333_OSCILLATOR_PERCENT * 10u)
@@ -70,12 +71,27 @@ static void on_pin(void *context, unsigned rp, enum dspic_drive drive, uint64_t 
         clock_sensor(node, level, now_ns);
 }
 
+static uint64_t record_of(const struct node *firmware)
+{
+    uint64_t bits = 0;
+    for (unsigned i = 0; i < LINK_WORDS; i++)
+        bits = bits << 16 | firmware->records[firmware->armed & 1u][i];
+    return bits;
+}
+
+static void note_armed(struct sim_node *node)
+{
+    node->arms++;
+    node->armed_fs = dspic_now_fs(node->chip);
+    node->record = record_of(&node->board.node);
+}
+
 static void on_start(void *context)
 {
     struct sim_node *node = context;
     node->twin.violations[MLX90333_SELECT_HIGH] = node->releases;
     port_boot(&node->board);
-    node->arms++;
+    note_armed(node);
 }
 
 static void on_loop(void *context)
@@ -113,20 +129,69 @@ static void serve(struct sim_node *node, unsigned irq)
     }
 }
 
+enum handler {
+#define NAME(name, register, acts, whole) HANDLER_##name,
+    NODE_CYCLES(NAME)
+#undef NAME
+};
+
+static enum handler handler_of_t2(const struct sampler *sampler)
+{
+    switch (sampler->state) {
+    case SAMPLER_GAP:
+        return HANDLER_GAP;
+    case SAMPLER_RELEASE:
+        return HANDLER_RAISE;
+    case SAMPLER_RESYNC_HIGH:
+        return HANDLER_LOWER;
+    default:
+        return HANDLER_READY;
+    }
+}
+
+/* What an interrupt is about to do, and so how long it takes. */
+static enum handler handler_of(const struct board *board, unsigned irq)
+{
+    const struct sampler *sampler = &board->node.sampler;
+    switch (irq) {
+    case IRQ_T2:
+        return handler_of_t2(sampler);
+    case IRQ_SPI1:
+        return sampler->count + 1u < SENSOR_FRAME_BYTES ? HANDLER_BYTE : HANDLER_LAST_BYTE;
+    case IRQ_DMA1:
+        return board->link_words == SERVICE_WORDS ? HANDLER_SERVICE : HANDLER_ORDER;
+    case IRQ_INT2:
+        return board->node.ordered ? HANDLER_SELECT_UP : HANDLER_SELECT_UP_BROKEN;
+    default:
+        return HANDLER_SYNC;
+    }
+}
+
 static void on_interrupt(void *context, unsigned irq)
 {
+    static const struct {
+        uint16_t address, acts, whole;
+    } CYCLES[] = {
+#define CYCLES_OF(name, register, acts, whole) {register, acts, whole},
+        NODE_CYCLES(CYCLES_OF)
+#undef CYCLES_OF
+    };
     struct sim_node *node = context;
     const uint8_t before = node->board.node.armed;
+    const enum handler handler = handler_of(&node->board, irq);
+    const uint64_t cycle_fs = dspic_cycle_fs(node->chip);
+    const uint64_t end_fs =
+        dspic_now_fs(node->chip) + (CYCLES[handler].whole - node->parameters.chip.exit_cycles) * cycle_fs;
     node->releases = node->twin.violations[MLX90333_SELECT_HIGH];
+    dspic_compute_until(node->chip, CYCLES[handler].acts, CYCLES[handler].address);
     serve(node, irq);
-    if (node->board.node.armed == before)
-        return;
-    node->arms++;
-    if (irq == IRQ_SPI1)
-        end_frame(node);
-    node->armed_fs = /* its instructions besides register accesses are yet to come */
-        dspic_now_fs(node->chip) +
-        node->parameters.chip.work_cycles * (UINT64_C(1000000000000000) / dspic_fcy_hz(node->chip));
+    if (node->board.node.armed != before) {
+        note_armed(node);
+        if (irq == IRQ_SPI1)
+            end_frame(node);
+    }
+    if (end_fs > dspic_now_fs(node->chip))
+        dspic_compute(node->chip, (end_fs - dspic_now_fs(node->chip)) / cycle_fs);
 }
 
 static void on_outside(void *context)

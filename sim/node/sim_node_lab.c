@@ -94,18 +94,10 @@ void sim_node_disturb(sim_node *node, enum sim_node_disturbance what, unsigned a
     }
 }
 
-static uint64_t record_of(const struct node *firmware)
-{
-    uint64_t bits = 0;
-    for (unsigned i = 0; i < LINK_WORDS; i++)
-        bits = bits << 16 | firmware->records[firmware->armed & 1u][i];
-    return bits;
-}
-
 struct sim_node_report sim_node_report(const sim_node *node)
 {
     return (struct sim_node_report){.frame = node->frame,
-                                    .record = record_of(&node->board.node),
+                                    .record = node->record,
                                     .arms = node->arms,
                                     .latch_fs = node->sensor.latch_ns * DSPIC_FS_PER_NS,
                                     .age_fs = node->sensor.age_ns * DSPIC_FS_PER_NS,

@@ -25,6 +25,7 @@ struct sim_node {
     void (*act)(void *context);
     void *act_context;
     uint64_t armed_fs; /* when the link last got a record */
+    uint64_t record;   /* that record, first bit highest */
     uint32_t arms;     /* how often it got one */
 };
 

@@ -6,7 +6,7 @@
 
 #include <cmocka.h>
 
-#include "sim_node.h"
+#include "sim_node_lab.h"
 #include "whisker_protocol.h"
 
 static const struct sim_field REST = {0.0, 0.0};
@@ -290,7 +290,10 @@ static void a_sync_too_early_is_reported_late_and_costs_a_resynchronisation(void
     sim_node_sync(*state, REST);
     transfer(*state, 1, record);
     assert_good(record, 0, REST);
-    sim_node_sync(*state, REST); /* the reading of tick 1 has only begun */
+    const uint64_t early_fs = sim_node_fs(*state) + 80000u * DSPIC_FS_PER_NS; /* the reading of tick 1 has only begun */
+    sim_node_pin(*state, SIM_NODE_SYNC, true, early_fs);
+    sim_node_pin(*state, SIM_NODE_SYNC, false, early_fs);
+    sim_node_until(*state, early_fs + 3000u * DSPIC_FS_PER_NS);
     transfer(*state, 2, record);
     assert_record(record, 1, WHISKER_CODE_LATE);
     sim_node_run(*state);

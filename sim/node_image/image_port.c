@@ -122,6 +122,9 @@ static void show(struct board *board, const struct image_node *node)
     memcpy(&image, node->cpu.ram, sizeof image);
     board->loading = image.loading != 0;
     out->sampler.state = image.sampler.state;
+    out->sampler.count = image.sampler.count;
+    out->ordered = image.ordered != 0;
+    board->link_words = image.link_words;
     out->sampler.followed = image.sampler.followed != 0;
     out->sampler.alpha = image.sampler.alpha;
     out->sampler.beta = image.sampler.beta;
@@ -327,6 +330,20 @@ static struct image_node *attach(struct board *board)
     return node;
 }
 
+/* In place of dspic_compute and dspic_compute_until: the instructions take their own time. */
+void image_port_compute(struct dspic *chip, uint64_t cycles)
+{
+    (void)chip;
+    (void)cycles;
+}
+
+void image_port_compute_until(struct dspic *chip, uint64_t cycles, uint16_t address)
+{
+    (void)chip;
+    (void)cycles;
+    (void)address;
+}
+
 static void start_supply(struct board *board)
 {
     struct dspic *chip = board->chip;
@@ -334,8 +351,7 @@ static void start_supply(struct board *board)
     if (!node || chip->wiring.interrupt != on_any) {
         node = attach(board);
         chip->wiring.interrupt = on_any;
-        chip->parameters.work_cycles = 0; /* the instructions take their own time, */
-        chip->parameters.exit_cycles = 0; /* the return from an interrupt too */
+        chip->parameters.exit_cycles = 0; /* the instructions take their own time, the return from an interrupt too */
     }
     image_cpu_scramble(&node->cpu, ++supplies);
     starts = 0;

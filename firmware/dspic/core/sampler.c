@@ -6,7 +6,7 @@
 /* Waits, in microseconds. Each exceeds the data sheet's time by the sensor's slowest oscillator and our own fastest
  * (FRC: 2 %); checked below. */
 #define STARTUP_US 18000u
-#ifdef SAMPLER_RESYNC_EVERY_FRAME /* as short as they may be: 629 us, of 667; the interrupts' work on top */
+#ifdef SAMPLER_RESYNC_EVERY_FRAME /* as short as they may be: 629 us of the tick's 700; the interrupts' work on top */
 #define RESYNC_US 337u
 #define SELECT_US 3u
 #define START_GAP_US 17u

@@ -7,8 +7,8 @@
  *
  * Frames follow each other without a resynchronisation (/SS stays low), else 2 kHz would not fit: only power-up, a bad
  * frame and a late one raise /SS for t5, which overlaps the next SYNC and so costs that tick. Should real sensors
- * refuse frames back to back, a build with -DSAMPLER_RESYNC_EVERY_FRAME raises /SS after every one; it follows 1.4 kHz,
- * and 1.5 kHz if interrupts are quick (docs/results.md).
+ * refuse frames back to back, a build with -DSAMPLER_RESYNC_EVERY_FRAME raises /SS after every one; it follows 1.43 kHz
+ * (docs/hardware.md).
  *
  * A frame that slipped by a bit passes its sum about one time in eight, for all its bytes are halved or doubled, and so
  * is their sum (docs/node_faults.md): an angle that jumps further than a whisker can move in a tick is not believed,

@@ -9,7 +9,6 @@ thousand batches of a thousand fault schedules take about six minutes of one cor
 
 import argparse
 import json
-import re
 import subprocess
 import sys
 from collections import Counter
@@ -30,9 +29,8 @@ RESULTS, CHARTS = ROOT / "bench/results", ROOT / "docs/charts"
 BATCHES, CHUNK, PROCESSES = 1000, 50, 2
 NODES, TICKS = 28, 10_000
 TICK_CYCLES = 19_300  # of 500 us at the slowest oscillator
-FCY_HZ = 38.6925e6  # 7.37 MHz x 42 / 8: firmware/dspic/port_dspic/clock.c
 CONVERSION_NS = 350_000  # the sensor's longest in fast mode
-ARMED_MOST_US = 450  # wanted, at the slowest oscillators
+ARMED_MOST_US = 430  # wanted, at the slowest oscillators
 CYCLES_PER_US = LIMITS["clock_hz"] / 1e6
 LINK_TICKS = 100
 DIVIDERS = (4, 6, 8, 12, 16, 24, 32)
@@ -116,47 +114,23 @@ def link(build: Path) -> dict:
     return {"ticks": LINK_TICKS, "gap_cycles": gaps, "period_cycles": periods}
 
 
-def timing(build: Path, spread: tuple[int, int], work=60, ticks=TICKS, nodes=NODES, lead=0):
+def timing(build: Path, spread: tuple[int, int], ticks=TICKS, nodes=NODES):
     """ns from SYNC to latch, conversion's age, ns from SYNC to armed record, as [node, tick]; cycles line."""
-    command = [build / "sim/node/node_timing", ticks, nodes, spread[0], spread[1], CONVERSION_NS, work, lead, 7]
+    command = [build / "sim/node/node_timing", ticks, nodes, spread[0], spread[1], CONVERSION_NS, 7]
     out = subprocess.run([str(word) for word in command], capture_output=True, text=True, check=True).stdout
     cycles = [line.split()[1:] for line in out.splitlines() if line.startswith("cycles")][0]
     rows = np.array([line.split() for line in out.splitlines() if not line.startswith("cycles")], float)
     return rows.reshape(nodes, -1, 3), [float(c) for c in cycles]
 
 
-def avr_figures(build: Path) -> dict[str, int]:
-    """The core's cycles and bytes by event, from simavr: a stand-in for the dsPIC, whose instructions do more."""
-    command = ["ctest", "--test-dir", str(build), "-R", "firmware_avr_cycles$", "-V"]
-    out = subprocess.run(command, capture_output=True, text=True).stdout
-    words = re.findall(r"(\w+) (\d+)", " ".join(re.findall(r"(?:cycles|bytes) .*", out)))
-    if not words:
-        sys.exit("bench_node: no cycles from simavr; install gcc-avr and simavr, build again")
-    return {name: int(number) for name, number in words}
-
-
-def armed_late(build: Path, ppm: int) -> np.ndarray:
-    """ns from SYNC to the armed record by [node, tick], everything computed before what it is computed for."""
-    avr = avr_figures(build)
-    lead = (avr["byte"] + avr["gap"]) // 2
-    rows, _ = timing(build, (ppm, 100), work=0, ticks=500, lead=lead)
-    return rows[:, :, 2] + (avr["last_byte"] - lead) * 1e9 / (FCY_HZ * (1 + ppm / 1e6))
-
-
 def load(build: Path) -> dict:
-    """Cycles: the port's register accesses from the model, the core's work from simavr."""
-    _, (accesses, interrupts) = timing(build, (0, 0), work=0, ticks=2000, nodes=1)
-    words = avr_figures(build)
-    core = words["tick"]
+    """Cycles of the interrupts of a tick, each on its longest path: sim/node/node_cycles.h."""
+    _, (cycles, interrupts) = timing(build, (0, 0), ticks=2000, nodes=1)
     return {
-        "port_cycles_per_tick": accesses,
+        "cycles_per_tick": cycles,
         "interrupts_per_tick": interrupts,
-        "core_cycles_per_tick_atmega1284p": core,
         "of_cycles_per_tick": TICK_CYCLES,
-        "margin": 1 - (accesses + core) / TICK_CYCLES,
-        "node_bytes_atmega1284p": words["node"],
-        "stack_bytes_atmega1284p": words["stack"],
-        "atmega1284p": words,
+        "margin": 1 - cycles / TICK_CYCLES,
     }
 
 
@@ -254,7 +228,7 @@ def skew(build: Path) -> dict:
     """Where the nodes' sampling instants lie, and how late their records are armed; draws them."""
     rows = {name: timing(build, spread)[0] for name, spread in tqdm(SPREADS.items(), desc="skew")}
     armed = {
-        f"clocks {'equal' if not ppm else f'{-ppm // 10_000} % slow'}": armed_late(build, ppm)
+        f"clocks {'equal' if not ppm else f'{-ppm // 10_000} % slow'}": timing(build, (ppm, 100), ticks=500)[0][:, :, 2]
         for ppm in (0, -20_000, -40_000)
     }
     draw("node_skew", skew_chart, rows)
