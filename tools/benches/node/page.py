@@ -70,7 +70,7 @@ them. {schedules} schedules, {ticks} ticks, {bad} records flagged:
 | bits hurt otherwise than the log foresees | {unforeseen} |
 | bad records without a fault | {spurious} |
 | nodes that did not come back | {stuck} |
-| breaches of a data sheet by the firmware | {violations} |
+| breaches of a data sheet by the firmware, or words displaced where the log knows of no arming | {violations} |
 
 Words of the link that its arming displaced amid a transfer at a wrong time: {overwritten}, each in a record that was re-armed (CRC or tick told).
 Displaced: SYNC is doubled and the next one lost. The node then sees one SYNC and one order per tick, as always, and no check of bytes can tell; the time
