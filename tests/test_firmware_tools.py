@@ -210,9 +210,12 @@ def test_a_serial_number_that_means_none_is_refused_in_one_line(tmp_path):
     assert done.stderr.count("\n") == 1
 
 
-def test_without_its_compiler_the_firmware_build_says_so():
-    done = run("tools/firmware/build.sh", PATH="/usr/bin:/bin")
+def test_without_its_compiler_the_firmware_build_says_so(tmp_path):
+    done = run("tools/firmware/build.sh", PATH="/usr/bin:/bin", PIC30="", OUT=str(tmp_path))
     assert done.returncode == 1 and "install MPLAB XC-DSC or XC16" in done.stderr
+    (tmp_path / "cc1").touch()
+    done = run("tools/firmware/build.sh", PIC30=str(tmp_path), OUT=str(tmp_path / "out"))
+    assert done.returncode == 1 and f"PIC30={tmp_path}: no as in it" in done.stderr and done.stderr.count("\n") == 1
 
 
 @pytest.mark.parametrize("define", ["-DNODE_APPLICATION", "-DNODE_LOADER"])
