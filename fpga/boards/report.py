@@ -62,10 +62,6 @@ USED = {
     "pin": "TRELLIS_IO",
 }
 ASYNC = "<async>"
-CLOCKS = (
-    "clk_60",
-    "bridge.clk",
-)  # the 60 MHz by its net; others are the FPGA's own oscillator and a PLL's second output
 SOURCES = {"OSCG": ("OSC",), "EHXPLLL": ("CLKOP", "CLKOS")}  # cells that make a clock which nextpnr knows
 CLOCKED = {  # cell type: its clock inputs
     "TRELLIS_FF": ("CLK",),
@@ -78,7 +74,7 @@ def read(path: Path) -> dict:
     """The report's numbers: fmax_mhz, used, `slow`: other clocks that miss what is wanted of them, the longest paths that touch a pin, and the shortest from a pin to a flip-flop
     (in ns; None: there is none)."""
     text = json.loads(path.read_text())
-    (clock,) = (name for name in text["fmax"] if any(known in name for known in CLOCKS))
+    (clock,) = (name for name, found in text["fmax"].items() if round(found["constraint"]) == CLOCK_MHZ)
     slow = [name for name, found in text["fmax"].items() if name != clock and found["achieved"] < found["constraint"]]
     paths: dict[str, float | None] = dict.fromkeys(("out_ns", "in_ns", "through_ns"))
     for found in text["critical_paths"]:

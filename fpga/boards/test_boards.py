@@ -141,7 +141,7 @@ def nextpnr_report(fmax: float, out: float, in_: float, through: float, shortest
     ends = [{"cell": "ff", "port": "D", "event": "clk", "delay": [ns, 9]} for ns in (0.5, shortest)]
     nets = [{"event": "clk", "endpoints": ends}, {"event": report.ASYNC, "endpoints": [{**ends[1], "delay": [3, 9]}]}]
     return {
-        "fmax": {"$glbnet$clk_60": {"achieved": fmax}, "osc": {"achieved": 9, "constraint": 9}},
+        "fmax": {"$glbnet$clk_60": {"achieved": fmax, "constraint": 60.0024}, "osc": {"achieved": 9, "constraint": 9}},
         "critical_paths": paths,
         "utilization": used,
         "detailed_net_timings": nets,
