@@ -19,39 +19,54 @@ size_t adaptive_global_stored(const struct adaptive_global *g)
 static const double TURN_SHARE = 2.0 / 3.0;
 static const double DEGREES_LEAST = 2.0;
 
-/* Cells half as wide as the finest detail that a sensor tells, where that is less than the setting's. */
-static int wish_cells(struct adaptive_global *g)
+/* However fine the detail: what its tables take in memory and set-up. */
+static const double CELLS_MOST = 1e6;
+
+/* Headings for cells of this edge; `lever`: of the farthest sensor that tells the detail. */
+static void choose_headings(struct adaptive_global *g, double cell, double lever)
 {
+    const struct nav_settings *s = &g->problem->settings;
+    double degrees = s->adaptive_cell_deg;
+    if (cell < s->adaptive_cell_m)
+        degrees = fmin(degrees, TURN_SHARE * cell / fmax(lever, NAV_NEAR_M / 10.0) * 180.0 / NAV_PI);
+    g->nh = (int)fmax(round(360.0 / fmax(degrees, DEGREES_LEAST)), 1.0);
+    g->nh += g->nh % 4 ? 4 - g->nh % 4 : 0; /* quarter turns map slices to slices */
+    g->cell_theta = 2.0 * NAV_PI / g->nh;
+}
+
+/* Smallest cells, but no smaller than wanted, for which a slice fits a quarter of the budget and the arena a few rows'
+ * budgets. */
+static double smallest_cell(const struct adaptive_global *g)
+{
+    const struct nav_arena *arena = &g->problem->arena;
+    double most = fmin(g->budget / (4.0 * (2.0 + ADAPTIVE_PASSES_MOST)),
+                       fmin(g->problem->settings.adaptive_rows * g->budget, CELLS_MOST) / g->nh);
+    return fmax(g->wanted, sqrt(arena->size_x * arena->size_y / most));
+}
+
+/* Cells half as wide as the finest detail that a sensor tells, where that is less than the setting's; wider ones, and
+ * fewer headings for them, where the budget asks for it. */
+static int choose_cells(struct adaptive_global *g)
+{
+    enum { ROUNDS = 8 };
     const struct nav_problem *problem = g->problem;
     const struct nav_settings *s = &problem->settings;
     struct nav_sensors sensors;
     int failed = nav_sensors_init(&sensors, &problem->arena, &problem->robot, s, 0.0);
     struct nav_detail finest = nav_sensors_detail(&sensors);
     nav_sensors_free(&sensors);
-    double degrees = s->adaptive_cell_deg;
-    g->wanted = s->adaptive_cell_m;
-    g->budget = s->adaptive_budget;
-    if (finest.detail / 2.0 < g->wanted) {
-        g->wanted = finest.detail / 2.0;
-        degrees = fmin(degrees, TURN_SHARE * g->wanted / fmax(finest.lever, NAV_NEAR_M / 10.0) * 180.0 / NAV_PI);
-        g->budget = fmax(g->budget, s->adaptive_detail_budget);
+    g->wanted = fmin(s->adaptive_cell_m, finest.detail / 2.0);
+    g->budget =
+        g->wanted < s->adaptive_cell_m ? fmax(s->adaptive_budget, s->adaptive_detail_budget) : s->adaptive_budget;
+    g->cell = g->wanted;
+    for (int n = 0; n < ROUNDS; n++) {
+        choose_headings(g, g->cell, finest.lever);
+        g->cell = smallest_cell(g);
     }
-    g->nh = (int)fmax(round(360.0 / fmax(degrees, DEGREES_LEAST)), 1.0);
-    g->nh += g->nh % 4 ? 4 - g->nh % 4 : 0; /* quarter turns map slices to slices */
-    g->cell_theta = 2.0 * NAV_PI / g->nh;
-    return failed;
-}
-
-/* Smallest cells for which a slice fits a quarter of the budget and the arena a few rows' budgets. */
-static void choose_cells(struct adaptive_global *g)
-{
-    const struct nav_arena *arena = &g->problem->arena;
-    double most =
-        fmin(g->budget / (4.0 * (2.0 + ADAPTIVE_PASSES_MOST)), g->problem->settings.adaptive_rows * g->budget / g->nh);
-    g->cell = fmax(g->wanted, sqrt(arena->size_x * arena->size_y / most));
-    g->nx = (int)ceil(arena->size_x / g->cell - 1e-6);
-    g->ny = (int)ceil(arena->size_y / g->cell - 1e-6);
+    g->nx = (int)ceil(problem->arena.size_x / g->cell - 1e-6);
+    g->ny = (int)ceil(problem->arena.size_y / g->cell - 1e-6);
     g->pitch = (g->nx + NAV_LANES - 1) / NAV_LANES * NAV_LANES;
+    return failed;
 }
 
 /* Rows of signatures, phase by phase, so that neighbouring cells of a slice have theirs side by side. */
@@ -158,9 +173,8 @@ void adaptive_global_clear(struct adaptive_global *g, uint64_t row)
 int adaptive_global_init(struct adaptive_global *g, const struct nav_problem *problem)
 {
     *g = (struct adaptive_global){.problem = problem, .room = (double)adaptive_cloud_room(&problem->settings)};
-    if (wish_cells(g))
+    if (choose_cells(g))
         return -1;
-    choose_cells(g);
     g->shift_x = calloc((size_t)g->nh, sizeof *g->shift_x);
     g->shift_y = calloc((size_t)g->nh, sizeof *g->shift_y);
     g->mass = calloc(adaptive_global_stored(g), sizeof *g->mass);

@@ -127,7 +127,11 @@ def warnings(result: Run) -> list[str]:
     if not result.resolution or result.resolution[0] <= 1.001 * result.resolution[2]:
         return []
     cell, _, wanted = result.resolution
-    remedy = "set a larger adaptive.budget" if result.name == "adaptive" else f"set {result.name}.cell_m={wanted:.3g}"
+    remedy = (
+        "set a larger adaptive.budget, for a million cells at most"
+        if result.name == "adaptive"
+        else f"set {result.name}.cell_m={wanted:.3g}"
+    )
     return [
         f"filter '{result.name}' has cells of {cell:.3g} m where the scene's detail asks for {wanted:.3g} m; {remedy}"
     ]
