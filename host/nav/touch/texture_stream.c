@@ -36,25 +36,37 @@ struct nav_texture_stream {
     struct nav_texture_catch edge; /* its level is the sixth row of limits */
 };
 
-static bool lengths_ok(const struct nav_texture_rules *r)
+static bool classifiers_ok(const struct nav_texture_rules *r)
 {
-    if (r->classifiers < 1 || r->classifiers > NAV_TEXTURE_CLASSIFIERS_MAX || r->window < 2 ||
-        r->window > NAV_TEXTURE_WINDOW_MAX)
-        return false;
-    if (r->step < 0 ||
-        (r->step > 0 && !(r->told >= 0.0 && r->patience >= r->step && r->patience <= NAV_TEXTURE_WINDOW_MAX)))
+    if (r->classifiers < 1 || r->classifiers > NAV_TEXTURE_CLASSIFIERS_MAX)
         return false;
     for (int i = 1; i < r->classifiers; i++) {
         if (nav_texture_classifier_length(r->classifier[i]) <= nav_texture_classifier_length(r->classifier[i - 1]))
             return false;
     }
+    return true;
+}
+
+static bool lengths_ok(const struct nav_texture_rules *r)
+{
+    bool sequential = r->told >= 0.0 && r->patience >= r->step && r->patience <= NAV_TEXTURE_WINDOW_MAX;
+    return r->window >= 2 && r->window <= NAV_TEXTURE_WINDOW_MAX && r->step >= 0 && (r->step == 0 || sequential);
+}
+
+static bool novelty_ok(const struct nav_texture_rules *r)
+{
+    int at = r->novelty_classifier;
+    return at >= 0 && at < r->classifiers &&
+           nav_texture_novelty_features(r->novelty) == nav_texture_classifier_count(r->classifier[at]);
+}
+
+static bool rules_ok(const struct nav_texture_rules *r)
+{
+    if (r->channels < 1 || r->classes < 1 || r->limits.channels != r->channels || !classifiers_ok(r) || !lengths_ok(r))
+        return false;
     if (r->ringdown && (!r->change || nav_texture_ringdown_length(r->ringdown) != nav_texture_change_length(r->change)))
         return false;
-    if (r->novelty && (r->novelty_classifier < 0 || r->novelty_classifier >= r->classifiers ||
-                       nav_texture_novelty_features(r->novelty) !=
-                           nav_texture_classifier_count(r->classifier[r->novelty_classifier])))
-        return false;
-    return r->channels >= 1 && r->classes >= 1 && r->limits.channels == r->channels;
+    return !r->novelty || novelty_ok(r);
 }
 
 static const double *own_limit(double *to, const double *from, int channels)
@@ -108,7 +120,7 @@ static void own_limits(struct nav_texture_stream *s)
 
 struct nav_texture_stream *nav_texture_stream_new(const struct nav_texture_rules *rules)
 {
-    struct nav_texture_stream *s = lengths_ok(rules) ? calloc(1, sizeof *s) : NULL;
+    struct nav_texture_stream *s = rules_ok(rules) ? calloc(1, sizeof *s) : NULL;
     if (!s)
         return NULL;
     s->rules = *rules;

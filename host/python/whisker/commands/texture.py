@@ -110,15 +110,25 @@ def classify_folder(arguments, model, window_ms: float) -> int:
     for name, some in tqdm(files.items(), desc="classify", unit="surface", disable=None):
         answers[name] = Counter(d.label for file in some for d in decisions(arguments, model, file, window_ms))
     columns = [*model.classes, "unknown"]
-    if arguments.json:
-        for name, found in answers.items():
-            print(json.dumps({"surface": name, "decisions": found.total()} | {c: found[c] for c in columns}))
-        return 0
-    width, cell = max(map(len, [*files, "surface"])), max(8, *(len(c) + 2 for c in columns))
-    print(f"{'surface':{width}}{'windows':>9}" + "".join(f"{c:>{cell}}" for c in columns))
-    for name, found in answers.items():
-        shares = [100 * found[c] / max(1, found.total()) for c in columns]
-        print(f"{name:{width}}{found.total():9}" + "".join(f"{s:{cell - 2}.1f} %" for s in shares))
+    for line in rows(answers, columns) if arguments.json else table(answers, columns):
+        print(line)
     for name in sorted(set(files) - set(model.classes)):
         warn(f"{arguments.recording}: folder '{name}' is no class of the model: {', '.join(model.classes)}")
     return 0
+
+
+def rows(answers: dict[str, Counter], columns: list[str]) -> list[str]:
+    """A JSON object for each surface."""
+    return [
+        json.dumps({"surface": name, "decisions": found.total()} | {c: found[c] for c in columns})
+        for name, found in answers.items()
+    ]
+
+
+def table(answers: dict[str, Counter], columns: list[str]) -> list[str]:
+    width, cell = max(map(len, [*answers, "surface"])), max(8, *(len(c) + 2 for c in columns))
+    lines = [f"{'surface':{width}}{'windows':>9}" + "".join(f"{c:>{cell}}" for c in columns)]
+    for name, found in answers.items():
+        shares = [100 * found[c] / max(1, found.total()) for c in columns]
+        lines.append(f"{name:{width}}{found.total():9}" + "".join(f"{s:{cell - 2}.1f} %" for s in shares))
+    return lines

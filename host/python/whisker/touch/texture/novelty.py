@@ -63,20 +63,24 @@ def fit_novelty(features: list[np.ndarray], labels: np.ndarray, folds: np.ndarra
     found = _fit(features, labels, length)
     if found is None:
         return None
-    trained, never = [[] for _ in range(STEPS)], [[] for _ in range(STEPS)]
-    for fold in sorted(set(folds)):
-        twin = _twin(features, labels, folds != fold, classes, length)
-        for n in np.flatnonzero(folds == fold) if twin else ():
-            _spread(twin.scores(features[n]), trained)
-    for c in classes if len(classes) > 2 else ():
-        twin = _twin(features, labels, labels != c, [k for k in classes if k != c], length)
-        for n in np.flatnonzero(labels == c) if twin else ():
-            _spread(twin.scores(features[n]), never)
+    trained = _ratios(features, labels, [(folds == fold, classes) for fold in sorted(set(folds))], length)
     if not trained[0]:
         return None
+    left_out = [(labels == c, [k for k in classes if k != c]) for c in classes] if len(classes) > 2 else []
+    never = _ratios(features, labels, left_out, length)
     found.limit = _limits([np.array(t) for t in trained], [np.array(s) for s in never])
     found.scale = max(1.0, float(np.mean([found.limit[s] - np.median(t) for s, t in enumerate(trained) if len(t)])))
     return found
+
+
+def _ratios(features: list, labels: np.ndarray, left_out: list[tuple], length: int) -> list[list]:
+    """By step, ratios of recordings left out: of each (recordings, classes that are left)."""
+    steps = [[] for _ in range(STEPS)]
+    for out, classes in left_out:
+        twin = _twin(features, labels, ~out, classes, length)
+        for n in np.flatnonzero(out) if twin else ():
+            _spread(twin.scores(features[n]), steps)
+    return steps
 
 
 def _twin(features: list, labels: np.ndarray, keep: np.ndarray, classes: list, length: int) -> Novelty | None:

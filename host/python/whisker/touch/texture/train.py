@@ -49,10 +49,7 @@ def train(
     for length in lengths:
         fitted.append(fit(_windows(parts, labels, folds, length, len(recordings)), floor))
         progress(len(fitted), len(lengths) + 1)
-    for length, found in zip(lengths, fitted, strict=True):
-        span = SPAN_OVER * _widest(parts, length)
-        for classifier in (found.classifier, *found.twins):
-            classifier.span = span
+    _give_spans(fitted, parts)
     model = SpectralModel(list(recordings), rate_hz, [f.classifier for f in fitted], limits, window_ms)
     _calibrate(model, fitted, parts, labels, folds, base)
     block = max(LENGTH_LEAST, round(base / BLOCKS))
@@ -62,6 +59,13 @@ def train(
     model.novelty = _novelty(model, parts, labels, folds, base)
     progress(len(lengths) + 1, len(lengths) + 1)
     return model
+
+
+def _give_spans(fitted: list[Fitted], parts: list) -> None:
+    for found in fitted:
+        span = SPAN_OVER * _widest(parts, found.classifier.length)
+        for classifier in (found.classifier, *found.twins):
+            classifier.span = span
 
 
 def _clean(recording: np.ndarray) -> np.ndarray:
