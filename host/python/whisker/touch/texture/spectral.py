@@ -107,6 +107,16 @@ class SpectralModel:
         content["classifiers"] = [_fields(r) | {"span": _listed(r.span)} for r in self.classifiers]
         Path(path).write_text(json.dumps(content) + "\n")
 
+    def check(self) -> None:
+        """ValueError when parts of the model differ in size."""
+        if any(len(c.bias) != len(self.classes) for c in self.classifiers):
+            raise ValueError("classifiers and classes differ")
+        if self.novelty is not None and self.novelty.length not in {c.length for c in self.classifiers}:
+            raise ValueError("novelty: no classifier has its length")
+        by_channel = [*self.limits.values(), *(part for c in self.classifiers for part in (c.floor, c.span))]
+        if len(set(map(len, by_channel))) != 1:
+            raise ValueError("limits and classifiers differ in channels")
+
     @classmethod
     def from_json(cls, path, content: object) -> "SpectralModel":
         """What `save` wrote; TableError with one line when it is something else."""
@@ -124,20 +134,7 @@ class SpectralModel:
         parts = {name: _part(kind, fields.part(name)) for name, kind in PARTS.items() if fields.has(name)}
         fields.part("figures")
         model = cls(classes, classifiers=classifiers, limits=limits, figures=fields.take("figures"), **numbers, **parts)
-        if any(len(r.bias) != len(classes) for r in classifiers):
-            raise ValueError("classifiers and classes differ")
-        if model.novelty is not None and model.novelty.length not in {r.length for r in classifiers}:
-            raise ValueError("novelty: no classifier has its length")
-        if (
-            len(
-                {
-                    len(part)
-                    for part in (*limits.values(), *(r.floor for r in classifiers), *(r.span for r in classifiers))
-                }
-            )
-            != 1
-        ):
-            raise ValueError("limits and classifiers differ in channels")
+        model.check()
         model.stream(2)
         return model
 
@@ -180,23 +177,11 @@ class Stream:
         rules.classifier, rules.border = natives, doubles(border, "border", (len(model.classifiers),))
         rules.growth, rules.together, rules.doubt, rules.sure = model.growth, model.together, model.doubt, model.sure
         rules.step, rules.patience, rules.told = step, patience, model.told
-        self._parts = {
-            name: ffi.NULL if step and name != "novelty" else _native(getattr(model, name)) for name in PARTS
-        }  # lent to the stream
-        for name, part in self._parts.items():
-            setattr(rules, name, part)
-        if model.novelty is not None:
-            rules.novelty_classifier = next(
-                n for n, r in enumerate(model.classifiers) if r.length == model.novelty.length
-            )
-        # The span of windows at least as long as those judged; the longest classifier's if there is none.
-        longest = patience if step else window
-        span = next((r.span for r in model.classifiers if r.length >= longest), model.classifiers[-1].span)
-        shape = (model.channels,)
-        limits = {n: as_doubles(v, n, shape) for n, v in (model.limits | {"span": span}).items()}
+        self._lend_parts(model, rules, step > 0)
+        limits = self._limits(model, patience if step else window)
         rules.limits.channels = model.channels
         for name, values in limits.items():
-            setattr(rules.limits, name, doubles(values, name, shape))
+            setattr(rules.limits, name, doubles(values, name, (model.channels,)))
         made = lib.nav_texture_stream_new(rules)
         if made == ffi.NULL:
             raise ValueError(f"texture: no stream of windows of {window} samples")
@@ -204,6 +189,22 @@ class Stream:
         self._stream = ffi.gc(made, lib.nav_texture_stream_free)
         self._decision, self._decided = ffi.new("struct nav_texture_decision *"), ffi.new("int *")
         self._loglik = np.zeros(self._classes)
+
+    def _lend_parts(self, model: SpectralModel, rules, sequential: bool) -> None:
+        """Sequential decisions are watched for surfaces never trained, not for borders and ringing."""
+        used = ("novelty",) if sequential else PARTS
+        self._parts = {name: _native(getattr(model, name)) for name in used}
+        for name, part in self._parts.items():
+            setattr(rules, name, part)
+        if model.novelty is not None:
+            lengths = [c.length for c in model.classifiers]
+            rules.novelty_classifier = lengths.index(model.novelty.length)
+
+    @staticmethod
+    def _limits(model: SpectralModel, longest: int) -> dict[str, np.ndarray]:
+        """With the span of windows at least as long as those judged; the longest classifier's if there is none."""
+        span = next((c.span for c in model.classifiers if c.length >= longest), model.classifiers[-1].span)
+        return {n: as_doubles(v, n, (model.channels,)) for n, v in (model.limits | {"span": span}).items()}
 
     def push(self, samples: np.ndarray) -> list[Judgement]:
         """Take samples (n, channels) of raw counts, nan where missing; the decisions that they complete."""
