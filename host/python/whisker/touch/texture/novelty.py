@@ -64,23 +64,26 @@ def fit_novelty(features: list[np.ndarray], labels: np.ndarray, folds: np.ndarra
     if found is None:
         return None
     trained = _ratios(features, labels, [(folds == fold, classes) for fold in sorted(set(folds))], length)
-    if not trained[0]:
+    if len(trained[0]) == 0:
         return None
-    left_out = [(labels == c, [k for k in classes if k != c]) for c in classes] if len(classes) > 2 else []
-    never = _ratios(features, labels, left_out, length)
-    found.limit = _limits([np.array(t) for t in trained], [np.array(s) for s in never])
+    found.limit = _limits(trained, _ratios(features, labels, _left_out(labels, classes), length))
     found.scale = max(1.0, float(np.mean([found.limit[s] - np.median(t) for s, t in enumerate(trained) if len(t)])))
     return found
 
 
-def _ratios(features: list, labels: np.ndarray, left_out: list[tuple], length: int) -> list[list]:
+def _left_out(labels: np.ndarray, classes: list) -> list[tuple]:
+    """Each class's recordings, and the classes that are left; none where only one would be left."""
+    return [(labels == c, [k for k in classes if k != c]) for c in classes] if len(classes) > 2 else []
+
+
+def _ratios(features: list, labels: np.ndarray, left_out: list[tuple], length: int) -> list[np.ndarray]:
     """By step, ratios of recordings left out: of each (recordings, classes that are left)."""
     steps = [[] for _ in range(STEPS)]
     for out, classes in left_out:
         twin = _twin(features, labels, ~out, classes, length)
         for n in np.flatnonzero(out) if twin else ():
             _spread(twin.scores(features[n]), steps)
-    return steps
+    return [np.array(step) for step in steps]
 
 
 def _twin(features: list, labels: np.ndarray, keep: np.ndarray, classes: list, length: int) -> Novelty | None:
