@@ -5,7 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from whisker.nav import scoring
+from whisker import scenes
+from whisker.nav import localise, scoring
+from whisker.nav.filters import Filter
 from whisker.nav.localise import judged_rows
 
 
@@ -38,3 +40,18 @@ def test_rows_to_be_judged_are_spread_evenly_over_those_whose_truth_is_known(mos
     truth[2:11] = 1.0
     assert judged_rows(SimpleNamespace(truth=truth), most) == rows
     assert judged_rows(SimpleNamespace(truth=None), most) == []
+
+
+def test_a_large_belief_is_judged_less_often(monkeypatch):
+    made = scenes.make("anchor+global", 3, 40)
+    often = localise.run("grid", made.scene, made.observations, {"grid.cell_m": 0.25}, regions=40)
+    filter = Filter("grid", made.scene, {"grid.cell_m": 0.25})
+    filter.replay(made.observations, 0, 40)
+    count = filter.component_count
+    assert count == len(filter.components())
+    monkeypatch.setattr(localise, "JUDGED_MOST", count // 4)
+    seldom = localise.run("grid", made.scene, made.observations, {"grid.cell_m": 0.25}, regions=40)
+    judged = np.isfinite(seldom.levels)
+    assert np.isfinite(often.levels).all() and 5 <= judged.sum() <= 20
+    assert np.array_equal(seldom.levels[judged], often.levels[judged])
+    assert "coverage_90" in localise.summary(seldom, made.observations.truth)

@@ -203,9 +203,14 @@ class Filter:
         if (fault := lib.nav_filter_reset(self._filter, given)) != ffi.NULL:
             raise ValueError(f"prior: {ffi.string(fault).decode()}; give another one")
 
+    @property
+    def component_count(self) -> int:
+        """How many bumps `components` gives."""
+        return lib.nav_filter_components(self._filter, ffi.NULL, 0)
+
     def components(self) -> np.ndarray:
         """The belief after the last row as bumps, (n,) of COMPONENT."""
-        count = lib.nav_filter_components(self._filter, ffi.NULL, 0)
+        count = self.component_count
         out = np.zeros(count, COMPONENT)
         lib.nav_filter_components(self._filter, _components(out), count)
         return out

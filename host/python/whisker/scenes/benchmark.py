@@ -81,7 +81,8 @@ def run_filter(name: str, wanted: Entry, seed: int = 0) -> Estimates:
     """One of this project's filters with its defaults, its own 90 % regions judged."""
     done = localise.run(name, wanted.scene, wanted.observations, {}, seed, localise.REGION_ROWS)
     count = len(wanted.observations)
-    inside = done.levels <= 0.9 if len(done.levels) else None
+    judged = done.levels[np.isfinite(done.levels)]
+    inside = judged <= 0.9 if len(judged) else None
     return Estimates(name, np.arange(count), done.poses, done.table["confidence"], inside, done.step_us)
 
 
