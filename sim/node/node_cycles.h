@@ -9,7 +9,7 @@
 #define NODE_CYCLES_H
 
 #define NODE_CYCLES(X)                                                                                                 \
-    X(SYNC, SPI1BUF, 45, 182)              /* INT1: the sensor's first byte */                                         \
+    X(SYNC, SPI1BUF, 45, 204)              /* INT1: the sensor's first byte */                                         \
     X(BYTE, T2CON, 54, 107)                /* SPI1, but for the frame's last byte: the gap begins */                   \
     X(LAST_BYTE, DMA0CON, 761, 837)        /* SPI1: the link is being armed */                                         \
     X(GAP, SPI1BUF, 49, 81)                /* T2: the next byte */                                                     \
@@ -19,6 +19,6 @@
     X(ORDER, DMA0CON, 632, 774)            /* DMA1: the link is being armed */                                         \
     X(SERVICE, 0, 0, 491)                  /* DMA1: a service order is taken */                                        \
     X(SELECT_UP, 0, 0, 59)                 /* INT2 after a whole transfer */                                           \
-    X(SELECT_UP_BROKEN, DMA0CON, 325, 404) /* INT2 after another: the link is armed anew */
+    X(SELECT_UP_BROKEN, DMA0CON, 337, 416) /* INT2 after another: the link is armed anew */
 
 #endif

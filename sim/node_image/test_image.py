@@ -6,6 +6,7 @@ Small runs of the committed image; `make firmware-check` makes the long ones (WH
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -63,6 +64,10 @@ def test_every_record_is_the_one_that_the_c_makes(table, tmp_path, seed):
     assert costs["spoiled"] == 0, "an interrupt leaves a register other than it found it"
     assert costs["handlers"]["SYNC"]["count"] >= TICKS * 9 // 10
     assert_within_the_longest_path(costs)
+    model = re.findall(r"X\((\w+), \w+, \d+, (\d+)\)", (ROOT / "sim/node/node_cycles.h").read_text())
+    assert len(model) == 11
+    for name, whole in model:  # what the model of the node counts for the C is what the image takes
+        assert costs["handlers"][name]["most"] <= int(whole), name
 
 
 def assert_within_the_longest_path(costs: dict) -> None:
