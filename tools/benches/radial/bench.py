@@ -5,8 +5,8 @@
 Whiskers are drawn from a batch (stiffness, creep, friction, gain), calibrated with the paper's 5 whisks at 6 radii, and
 judged on others. A real whisker's recordings are not part of this project: clone
 github.com/BioMorphic-Intelligence-Lab/Whisker-3D-Localization and give its folder dataset, here or as WHISKER3D_DIR;
-without it that part is skipped by name. Parts that are done are kept in build/bench/radial. Writes
-bench/results/radial.json, docs/radial_figures.md and docs/charts/radial_*.
+without it that part is skipped by name. Simulated parts that are done are kept in build/bench/radial. Writes
+bench/results/radial*.json, docs/radial_real.md and docs/charts/radial_*.
 """
 
 import argparse
@@ -269,17 +269,17 @@ def draw_fig5(results: dict) -> Figure:
 def run(build: Path, fresh: bool, whisker3d: str | None = None) -> None:
     """Measure what is not yet measured, and redraw. `build` is not used: the C library comes with the Python module."""
     CACHE.mkdir(parents=True, exist_ok=True)
-    results, parts = {}, dict(PARTS)
     folder = whisker3d or os.environ.get("WHISKER3D_DIR")
     if folder:
-        parts["real_whisker"] = lambda: real_whisker(Path(folder))
-    elif (CACHE / "real_whisker.json").exists():
-        parts["real_whisker"] = None  # what was measured when the folder was given
+        real = _rounded(real_whisker(Path(folder)))
+        (RESULTS / "radial_real.json").write_text(json.dumps(real, indent=1) + "\n")
+        (ROOT / "docs/radial_real.md").write_text(page(real))
     else:
-        print("radial: real_whisker skipped: give --whisker3d DIR or WHISKER3D_DIR (see the module's text)")
-    for name, measure in tqdm(parts.items(), desc="radial"):
+        print("radial: the real whisker skipped: give --whisker3d DIR or WHISKER3D_DIR (see the module's text)")
+    results = {}
+    for name, measure in tqdm(PARTS.items(), desc="radial"):
         kept = CACHE / f"{name}.json"
-        if measure and (fresh or not kept.exists()):
+        if fresh or not kept.exists():
             kept.write_text(json.dumps(measure(), indent=1, default=float) + "\n")
         results[name] = json.loads(kept.read_text())
     points = results["fig5"]["whiskers"]
@@ -287,7 +287,6 @@ def run(build: Path, fresh: bool, whisker3d: str | None = None) -> None:
         "fig5": {"combined_mm": results["fig5"]["combined_mm"], "error_mm": [w["error_mm"] for w in points]}
     }
     (RESULTS / "radial.json").write_text(json.dumps(_rounded(kept), indent=1) + "\n")
-    (ROOT / "docs/radial_figures.md").write_text(page(kept))
     with matplotlib.rc_context(SETTINGS | {"svg.hashsalt": "whisker"}):
         for name, draw in (("radial_cost", draw_cost), ("radial_fig5", draw_fig5)):
             figure = draw(results)
