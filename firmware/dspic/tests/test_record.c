@@ -137,7 +137,7 @@ static uint8_t crc8_bit_by_bit(const uint8_t *bytes, unsigned n)
 {
     unsigned crc = WHISKER_CRC8_INIT;
     for (unsigned bit = 0; bit < 8u * n; bit++) {
-        const unsigned top = crc >> 7 ^ (bytes[bit / 8u] >> (7u - bit % 8u) & 1u);
+        const unsigned top = crc >> 7 ^ ((unsigned)bytes[bit / 8u] >> (7u - bit % 8u) & 1u);
         crc = (crc << 1 & 0xFFu) ^ (top ? WHISKER_CRC8_POLYNOMIAL : 0u);
     }
     return (uint8_t)(crc ^ WHISKER_CRC8_XOR_OUT);

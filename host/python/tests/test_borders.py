@@ -19,7 +19,7 @@ from rings import ring_name
 import whisker
 from whisker.bridge.ring import FRAME, Writer
 from whisker.native import as_doubles, doubles, ffi, octets
-from whisker.nav.filters import COMPONENT, Filter, prior_fault
+from whisker.nav.filters import COMPONENT, Filter, Sensor, prior_fault
 from whisker.nav.weigher import Weigher
 from whisker.simulation.world import SIM
 from whisker.touch.contact import Contact
@@ -99,6 +99,11 @@ CASES = {
         {"odometry": (0,), "texture": (0, 1), "radial_m": (0,)},
     ),
     "nav.filters.Filter.replay": of_rows(lambda rows: Filter("odometry", SCENE).replay(rows, 0, len(rows))),
+    "nav.filters._sensors": Case(
+        lambda **table: Filter("odometry", SCENE, sensors=[Sensor(cell_m=0.1, levels=2, **table)]),
+        {"codes": np.zeros((3, 4), np.uint8), "edges": np.arange(4.0), "likelihood": np.ones((3, 2))},
+        {"codes": (), "edges": (0,), "likelihood": (0, 1)},
+    ),
     "nav.filters._components": of_one(lambda bumps: prior_fault(SCENE, bumps), "bumps", BUMPS),
     "nav.weigher.Weigher.take": Case(
         lambda **row: Weigher(SCENE).take(dataclasses.replace(OBSERVATIONS, **{n: a[None] for n, a in row.items()}), 0),
