@@ -83,7 +83,7 @@ def test_a_sound_bridge_passes_and_is_unplugged_by_whoever_is_asked(alone, tmp_p
                 cable.pull()
             if "plug it in again" in line:
                 cable.put()
-    assert states(said) == {f"bridge.{name}": "ok" for name in BRIDGE.split()}, said
+    assert states(said) == {f"bridge.{name}": "ok" for name in BRIDGE.split()}, "\n".join(said)
     assert said[-1] == f"{len(BRIDGE.split())} passed, 0 failed, 0 skipped"
 
 

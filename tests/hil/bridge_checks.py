@@ -196,11 +196,15 @@ def replug(rig: Rig) -> str:
         print("   plug it in again", flush=True)
         await_person(lambda: bool(reader.stats.connected), "the bridge did not come back")
         await_frames(reader, before + SETTLE_TICKS)
-        reader.seek_latest(reader.info.published - before)
-        stats, flags = reader.stats, reader.peek()["flags"]
-        marked = gap_marks(flags).tolist()
+        # Frames go on arriving, so the view begins some frames before the gap, and its ticks say where the gap is.
+        reader.seek_latest(reader.info.published - before + SETTLE_TICKS // 2)
+        stats, frames = reader.stats, reader.peek()
+        marked = gap_marks(frames["flags"]).tolist()
+        first = (1 + np.flatnonzero(np.diff(frames["tick"].astype(np.int64)) != 1)).tolist()
     require(stats.reconnects == 1, f"it came back {stats.reconnects} times; a loose plug?")
-    require(marked == [0], f"frames {marked} after the gap are marked as its first")
+    require(
+        len(first) == 1 and marked == first, f"frames {marked} are marked as the first after a gap, gaps end at {first}"
+    )
     return "ring and readers lived on, the gap is marked"
 
 
