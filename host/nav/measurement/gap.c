@@ -50,13 +50,13 @@ static bool covers(struct nav_pose step, struct nav_pose last, int missing)
 static struct nav_motion assume(struct nav_gaps *g, struct nav_pose before, struct nav_pose after, int missing,
                                 double from_s, double until_s)
 {
-    double strange = fmin(missing / SAME_ROWS, 1.0);
-    struct nav_pose each = scaled(between(before, after), 1.0 - strange);
+    double unusual = fmin(missing / SAME_ROWS, 1.0);
+    struct nav_pose each = scaled(between(before, after), 1.0 - unusual);
     g->kept[g->count++ % NAV_GAPS_KEPT] = (struct nav_gap){from_s, until_s, each};
     return (struct nav_motion){
         .step = scaled(each, missing),
-        .unknown_m = missing * (apart(before, after) / 2.0 + strange * g->usual_m),
-        .unknown_rad = missing * (fabs(before.theta - after.theta) / 2.0 + strange * g->usual_rad),
+        .unknown_m = missing * (apart(before, after) / 2.0 + unusual * g->usual_m),
+        .unknown_rad = missing * (fabs(before.theta - after.theta) / 2.0 + unusual * g->usual_rad),
     };
 }
 

@@ -100,13 +100,18 @@ def test_a_press_of_another_kind_of_motion_is_refused(fitted):
     assert fitted.predict(by_rate).radius_mm == pytest.approx(fitted.predict(contact).radius_mm, abs=2.0)
 
 
-@pytest.mark.parametrize("spoil", ["nan", "stuck", "empty", "short"])
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("spoil", ["nan", "stuck", "empty", "short", "huge", "one time"])
 def test_spoilt_contacts_give_a_number_and_little_confidence(fitted, spoil):
     contact = press(70.0, np.random.default_rng(2))
     if spoil == "nan":
         contact.samples[:] = np.nan
     if spoil == "stuck":
         contact.samples[:] = 100.0
+    if spoil == "huge":
+        contact.samples *= 1e200
+    if spoil == "one time":
+        contact.t_s[:] = 1.0
     found = fitted.predict(contact.until({"empty": 0, "short": 5}.get(spoil, len(contact.t_s))))
     assert np.isfinite([found.radius_mm, found.sigma_mm]).all() and found.confidence < 0.5
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...fields import Fields
+from ...fields import HUGE, Fields
 from ...native import as_doubles
 from .curve import LEAST, RADIUS_MOST_MM, tip_from
 from .shape import Contact
@@ -60,17 +60,17 @@ def press_of(contact: Contact, window: float) -> Press | None:
     """The push of a contact, whole or so far; None when the samples show none. `window`: advance on both sides of the
     onset over which lines are laid to find it."""
     advance, unit = advance_of(contact)
-    good = np.isfinite(contact.samples).all(axis=1) & np.isfinite(advance) & np.isfinite(contact.t_s)
+    columns = np.column_stack([contact.samples, advance, contact.t_s])
+    good = (np.abs(columns) < HUGE).all(axis=1)  # False for nan
     t_s, advance, samples = contact.t_s[good], advance[good], _median(contact.samples[good])
-    if len(t_s) < 4 * LINE_LEAST:
+    if len(t_s) < 4 * LINE_LEAST or not t_s[-1] > t_s[0]:
         return None
     end = push_end(advance, samples, contact.depth_mm is not None)
-    rate = _pace(t_s, advance, end)
-    width = int(window / rate / ((t_s[-1] - t_s[0]) / (len(t_s) - 1))) if rate > 0.0 else 0
-    onset = _onset(t_s[: end + 1], samples[: end + 1], max(LINE_LEAST, width))
+    width = max(LINE_LEAST, _samples_in(window, advance[: end + 1]))
+    onset = _onset(t_s[: end + 1], samples[: end + 1], width)
     if onset is None:
         return None
-    before = slice(max(0, onset - max(LINE_LEAST, width)), onset + 1)
+    before = slice(max(0, onset - width), onset + 1)
     rest = _line_end(t_s[before], samples[before])
     after = slice(onset, end + 1)
     return Press(advance[after] - advance[onset], samples[after] - rest, unit)
@@ -93,11 +93,11 @@ def push_end(advance: np.ndarray, samples: np.ndarray, known: bool) -> int:
     return int(np.argmax(np.convolve(size, np.ones(width) / width, "same")))
 
 
-def _pace(t_s: np.ndarray, advance: np.ndarray, end: int) -> float:
-    """Advance per second while the base moves."""
-    steps = np.diff(advance[: end + 1])
-    moves = steps > 0.0
-    return float(steps[moves].sum() / np.diff(t_s[: end + 1])[moves].sum()) if moves.any() else 0.0
+def _samples_in(window: float, advance: np.ndarray) -> int:
+    """Number of samples in which the base advances by `window` while it moves; at most all of them."""
+    steps = np.diff(advance)
+    steps = steps[steps > 0.0]
+    return min(len(advance), int(window * len(steps) / steps.sum())) if len(steps) else 0
 
 
 def _line_end(t_s: np.ndarray, samples: np.ndarray) -> np.ndarray:
