@@ -54,9 +54,9 @@ firmware: ## build the node's firmware with XC16 or XC-DSC, or PIC30=DIR, a publ
 firmware-images: ## make the committed images again, each build twice: PIC30=DIR
 	@tools/firmware/images.sh
 
-firmware-check: build ## execute the node's image against the firmware's C, at length: IMAGE=node_wire.hex, whoever built it
-	@WHISKER_BUILD=$(BUILD) WHISKER_IMAGE_LONG=1 WHISKER_IMAGE="$(abspath $(or $(IMAGE),firmware/images/mlx90333/node_wire.hex))" \
-		$(PYTHON) -m pytest --quiet sim/node_image
+firmware-check: build ## execute the node's images against the firmware's C, at length; or IMAGE=node_wire.hex, whoever built it, [SENSOR=..] [RESYNC=1]
+	@WHISKER_BUILD=$(BUILD) WHISKER_IMAGE_LONG=1 WHISKER_IMAGE="$(abspath $(IMAGE))" \
+		WHISKER_IMAGE_BUILD="$(if $(RESYNC),resync,$(or $(SENSOR),mlx90333))" $(PYTHON) -m pytest --quiet sim/node_image
 
 flash: ## first programming of a node by wire, no compiler needed: TOOL=ipecmd|pk2cmd|picberry SERIAL=n [SENSOR=..] [HEX=file]
 	@tools/firmware/flash.sh --tool "$(TOOL)" $(if $(SERIAL),--serial "$(SERIAL)") $(if $(HEX),--hex "$(HEX)")

@@ -5,12 +5,20 @@
 #define LANE_BENCH_H
 
 #include "sim_node_lab.h"
+#include "whisker_protocol.h"
 
 /* The link's times. Defaults: SCK divider 16, word gap 180, tick period 30000, all in cycles of 60 MHz. */
 struct lane_timing {
     uint64_t half_fs, gap_fs, setup_fs, hold_fs, period_fs;
 };
 struct lane_timing lane_timing_of(unsigned sck_divider, unsigned word_gap, unsigned tick_period);
+
+/* The shortest tick period that this build of the firmware follows, in cycles of 60 MHz. */
+#ifdef SAMPLER_RESYNC_EVERY_FRAME
+enum { LANE_TICK_PERIOD = 42000 }; /* 1.43 kHz */
+#else
+enum { LANE_TICK_PERIOD = WHISKER_LIMIT_TICK_PERIOD };
+#endif
 
 /* One tick as the world breaks it; all zero: nothing is broken. */
 struct lane_faults {

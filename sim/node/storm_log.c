@@ -223,7 +223,8 @@ static void explain(struct storm_log *log, const struct lane_verdict *v, bool li
         log->counts.unexplained++;
 }
 
-/* Arming displaces words only amid a transfer. */
+/* Arming displaces words only amid a transfer. A node that starts amid one arms words of which that transfer takes a
+ * part, and the next one displaces what is left. */
 static void log_overwritten(struct storm_log *log, const struct lane_verdict *v)
 {
     const uint32_t words = v->report.overwritten - log->overwritten;
@@ -232,7 +233,7 @@ static void log_overwritten(struct storm_log *log, const struct lane_verdict *v)
         log->counts.overwritten += words;
     else
         log->counts.violations += words;
-    log->overlapped = v->overlapped;
+    log->overlapped = (log->overlapped << 1 | v->overlapped) & 3u;
 }
 
 /* What struck may not yet show. */

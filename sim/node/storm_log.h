@@ -21,7 +21,7 @@ struct storm_log {
     bool ill;
     uint32_t frame;       /* number of the newest frame seen */
     uint64_t line;        /* and its bits */
-    bool overlapped;      /* the transfer before met the link's arming */
+    unsigned overlapped;  /* bit 0: the transfer before met the link's arming; bit 1: the one before that */
     uint32_t overwritten; /* words, so far */
 };
 

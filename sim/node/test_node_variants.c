@@ -11,9 +11,9 @@
 #include "whisker_protocol.h"
 
 #ifdef SAMPLER_RESYNC_EVERY_FRAME
-enum { PERIOD = 42000, SLOWEST_PPM = -20000 }; /* 1.43 kHz, as slow as the data sheet allows */
+enum { SLOWEST_PPM = -20000 }; /* as slow as the data sheet allows */
 #else
-enum { PERIOD = WHISKER_LIMIT_TICK_PERIOD, SLOWEST_PPM = -40000 }; /* twice as slow */
+enum { SLOWEST_PPM = -40000 }; /* twice as slow */
 #endif
 #ifdef SENSOR_MLX90316
 enum { ARMED_WITHIN_NS = 490000 };
@@ -29,20 +29,11 @@ struct run {
     uint32_t random;
 };
 
-static struct sim_field field_of(unsigned tick)
-{
-#ifdef SENSOR_MLX90316
-    return (struct sim_field){0.06 * (tick % 400u) - 20.0, 0.0}; /* it has one angle; the other is at rest */
-#else
-    return (struct sim_field){0.06 * (tick % 400u) - 20.0, 0.07 * (tick % 300u)};
-#endif
-}
-
 static bool plan(void *context, unsigned tick, struct sim_field *field, struct lane_faults *faults)
 {
     static const uint8_t FAULTS[] = {SIM_SENSOR_FLIP_BIT, SIM_SENSOR_DEAD, SIM_SENSOR_STUCK_LOW, SIM_SENSOR_ERROR_BITS};
     struct run *run = context;
-    *field = field_of(tick);
+    *field = (struct sim_field){0.06 * (tick % 400u) - 20.0, 0.07 * (tick % 300u)};
     if (run->breaks && tick % BREAK_EVERY == 0) {
         run->random = run->random * 1664525u + 1013904223u; /* Numerical Recipes */
         faults->sensor = (enum sim_sensor_fault)FAULTS[run->random >> 30];
@@ -84,7 +75,7 @@ static struct run run_parts(unsigned n, bool breaks)
     parts.chip.slave_prefetch = (uint8_t)(1u + n % 2u);
     parts.chip.frc_ppm = n & 2u ? -20000 : 20000;
     parts.sensor.slow_permille = n & 4u ? 900 : 1100;
-    return run_node(&parts, PERIOD, n, breaks);
+    return run_node(&parts, LANE_TICK_PERIOD, n, breaks);
 }
 
 static void every_sample_is_good_with_slow_and_quick_parts(void **state)
@@ -105,7 +96,7 @@ static void the_slowest_chip_is_in_time_too(void **state)
     sim_node_parameters_default(&parts, 1);
     parts.chip.frc_ppm = SLOWEST_PPM;
     parts.sensor.slow_permille = 1100;
-    const struct run run = run_node(&parts, PERIOD, 1, false);
+    const struct run run = run_node(&parts, LANE_TICK_PERIOD, 1, false);
     print_message("armed at most %u ns after SYNC\n", (unsigned)run.armed_ns);
     assert_int_equal(run.good, 2000);
     assert_true(run.armed_ns <= ARMED_WITHIN_NS);

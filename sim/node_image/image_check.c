@@ -150,7 +150,7 @@ static struct run run_with(const struct lane_faults *fault, bool keeps_clock, ui
         exit(2);
     sim_node_power_on(node);
     hz[0] = sim_node_report(node).fcy_hz;
-    lane_bench_start(&bench, node, lane_timing_of(16, 180, WHISKER_LIMIT_TICK_PERIOD));
+    lane_bench_start(&bench, node, lane_timing_of(16, 180, LANE_TICK_PERIOD));
     lane_bench_run(&bench, &(struct lane_world){&run, plan, judged});
     hz[1] = sim_node_report(node).fcy_hz;
     run.altered += sim_node_violations(node) - sim_node_report(node).overwritten;

@@ -110,7 +110,7 @@ int main(int argc, char **argv)
     if (!node)
         return 2;
     sim_node_power_on(node);
-    lane_bench_start(&bench, node, lane_timing_of(16, 180, WHISKER_LIMIT_TICK_PERIOD));
+    lane_bench_start(&bench, node, lane_timing_of(16, 180, LANE_TICK_PERIOD));
     lane_bench_run(&bench, &(struct lane_world){&run, plan, judged});
     for (unsigned i = 0; i < WHISKER_HEALTH_COUNT; i++)
         printf("%u%s", sim_node_counted(node, i), i + 1u < WHISKER_HEALTH_COUNT ? " " : "\n");

@@ -1,4 +1,4 @@
-"""The node's image, executed: records against the C, cycles and stack of each interrupt, resets, power cuts.
+"""The node's images, executed: records and power cuts of each build; of the usual one cycles, stack and resets too.
 
 .venv/bin/python tools/benches image    bench/results/node_image.json, docs/node_image.md
 """
@@ -13,7 +13,8 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[3]
 RESULT = ROOT / "bench/results/node_image.json"
 PAGE = ROOT / "docs/node_image.md"
-IMAGE = ROOT / "firmware/images/mlx90333/node_wire.hex"
+IMAGES = ROOT / "firmware/images"
+BUILDS = ("mlx90333", "mlx90316", "resync")  # of the firmware; the first is the usual one
 sys.path.insert(0, str(ROOT / "sim/node_image"))
 import paths  # noqa: E402
 import translate  # noqa: E402
@@ -39,17 +40,18 @@ HANDLERS = {  # as image_port.h names them: the interrupt, and what it is for
 
 
 class Node:
-    """Programs with the image in them; what its interrupts cost, over all runs."""
+    """Programs with one build's image in them; what its interrupts cost, over all runs."""
 
-    def __init__(self, build: Path, folder: Path):
-        self.programs, self.folder = build / "sim/node_image", folder
-        self.words = translate.flash_words(IMAGE)
-        (folder / "table").write_bytes(translate.table_of(self.words))
+    def __init__(self, name: str, build: Path, folder: Path):
+        self.name, self.programs, self.folder = name, build / "sim/node_image" / name, folder
+        self.words = translate.flash_words(IMAGES / name / "node_wire.hex")
+        self.table = folder / name
+        self.table.write_bytes(translate.table_of(self.words))
         self.costs: list[dict] = []
 
     def run(self, program: str, *words) -> str:
         costs = self.folder / "costs"
-        environment = os.environ | {"NODE_IMAGE": str(self.folder / "table"), "NODE_IMAGE_COSTS": str(costs)}
+        environment = os.environ | {"NODE_IMAGE": str(self.table), "NODE_IMAGE_COSTS": str(costs)}
         command = [str(self.programs / program), *map(str, words)]
         done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
         if costs.exists():
@@ -82,7 +84,7 @@ def records(node: Node) -> list[dict]:
         found = node.run("image_records", TICKS, seed).splitlines()
         differing = sum(a != b for a, b in zip(wanted, found, strict=True))
         good = sum(line.endswith(" good") for line in found)
-        out.append({"seed": seed, "ticks": TICKS, "good": good, "differing": differing})
+        out.append({"build": node.name, "seed": seed, "ticks": TICKS, "good": good, "differing": differing})
     return out
 
 
@@ -91,13 +93,18 @@ def cuts(node: Node) -> dict:
     node.run("image_cuts", path)
     runs = [(step, one) for step in json.loads(path.read_text()) for one in step["runs"]]
     right = sum(one["told"] and one["again"] and bool(one["fate"] & step["allowed"]) for step, one in runs)
-    return {"runs": len(runs), "right": right, "ticks_most": max(one["ticks"] for _, one in runs)}
+    return {"build": node.name, "runs": len(runs), "right": right, "ticks_most": max(one["ticks"] for _, one in runs)}
 
 
 def run(build: Path, _fresh: bool) -> None:
     with tempfile.TemporaryDirectory() as folder:
-        node = Node(build, Path(folder))
-        result = {"records": records(node), "cuts": cuts(node), "resets": json.loads(node.run("image_check", "resets"))}
+        nodes = [Node(name, build, Path(folder)) for name in BUILDS]
+        node = nodes[0]
+        result = {
+            "records": [one for each in nodes for one in records(each)],
+            "cuts": [cuts(each) for each in nodes],
+            "resets": json.loads(node.run("image_check", "resets")),
+        }
         result["storm"] = [json.loads(line) for line in node.run("image_storm", 0, 2).splitlines()]
         for line in result["storm"]:
             for key in ("injected", "lines", "links"):
@@ -105,7 +112,7 @@ def run(build: Path, _fresh: bool) -> None:
         result |= {"handlers": node.handlers(), "by_path": node.by_path()}
         result["ram"] = max(c["ram"] for c in node.costs)
         result["boot_cycles"] = max(c["boot_cycles"] for c in node.costs)
-        result["spoiled"] = sum(c["spoiled"] for c in node.costs)
+        result["spoiled"] = sum(c["spoiled"] for each in nodes for c in each.costs)
     RESULT.write_text(json.dumps(result, indent=1) + "\n")
     PAGE.write_text(page(result))
 
@@ -121,20 +128,31 @@ def page(result: dict) -> str:
         f"| {r['cause']} | {'kept' if r['keeps_clock'] else 'reset'} | {r['hz'][1] / 1e6:.2f} | {r['lost']} |"
         for r in result["resets"]
     ]
-    ticks = sum(one["ticks"] for one in result["records"])
-    differing = sum(one["differing"] for one in result["records"])
+    builds = []
+    for cut in result["cuts"]:
+        ran = [one for one in result["records"] if one["build"] == cut["build"]]
+        ticks, differing = (sum(one[key] for one in ran) for key in ("ticks", "differing"))
+        builds.append(
+            f"| `{cut['build']}` | {ticks:,} | {differing} | {cut['right']} of {cut['runs']} | {cut['ticks_most']} |"
+        )
     schedules = sum(one["schedules"] for one in result["storm"])
     unexplained = sum(one["unexplained"] + one["spurious"] + one["stuck"] for one in result["storm"])
     return f"""# The node's image, executed
 
-Made by `tools/benches image`: `firmware/images/mlx90333` executed on Ghidra's description of the dsPIC33F in the simulated node
-(`sim/node_image`), not on silicon. `make firmware-check` runs the checks of any image.
+Made by `tools/benches image`: the images of `firmware/images` executed on Ghidra's description of the dsPIC33F in the simulated node
+(`sim/node_image`), not on silicon. `make firmware-check` runs the checks of these images, or of any other.
 
-- {ticks:,} ticks under random faults of sensor and link: {differing} records differ from those of the firmware's C.
+Ticks run under random faults of sensor and link. A record differs if the firmware's C makes another one from the same faults.
+An update whose power is cut is right if it ends as it may at that step and the next update succeeds.
+
+| image | ticks | records that differ | updates right | ticks until records return, at most |
+|---|---|---|---|---|
+{chr(10).join(builds)}
+
+All that follows is of `{result["cuts"][0]["build"]}`.
+
 - {schedules:,} schedules of random faults, resets and traps among them: {unexplained} records that no check explains, too many or for ever.
-- {result["cuts"]["right"]} of {result["cuts"]["runs"]} updates with a power cut end as they may, and the next one succeeds; records at most
-  {result["cuts"]["ticks_most"]} ticks after the supply's return.
-- {result["spoiled"]} interrupts left a register, flag, page or count other than they found it.
+- {result["spoiled"]} interrupts of any image left a register, flag, page or count other than they found it.
 - Data and stack take at most {result["ram"]} bytes of the memory before the DMA's. From reset to the main loop, image check included: at most
   {result["boot_cycles"]:,} cycles.
 
