@@ -117,6 +117,7 @@ def generate_usb(out: Path, board: Board, serial: str = "0001") -> Path:
     command = [sys.executable, str(REPO / "fpga/usb/generate.py"), str(path), "--serial", serial]
     command += ["--board", str(board.number), "--commit", commit(), "--milliamps", str(board.milliamps)]
     command += [] if board.self_powered else ["--bus-powered"]
+    command += ["--full-speed"] if board.phy == report.GATEWARE else []
     subprocess.run(command, check=True)
     return path
 

@@ -43,7 +43,8 @@ ATTRIBUTES = 0x80  # its bit 7 is always 1
 class Build:
     """What differs from board to board and from build to build; the default is the simulated bridge.
 
-    commit: first 16 bits, 0 if unknown; milliamps: drawn from the host at most, 0 to 500.
+    commit: first 16 bits, 0 if unknown; milliamps: drawn from the host at most, 0 to 500; full_speed_only: the PHY has no
+    high speed, so there is no other speed to describe (USB 2.0 section 9.6.2).
     """
 
     serial: str = "0001"
@@ -51,6 +52,7 @@ class Build:
     commit: int = 0
     self_powered: bool = True
     milliamps: int = 2
+    full_speed_only: bool = False
 
     @property
     def attributes(self) -> int:
@@ -148,11 +150,12 @@ def descriptors(build: Build) -> DeviceDescriptorCollection:
         device.iProduct = "Whisker bridge"
         device.iSerialNumber = build.serial
         device.bNumConfigurations = 1
-    collection.add_descriptor(configuration(build, False), descriptor_type=CONFIGURATION)
     collection.add_descriptor(configuration(build, True), descriptor_type=CONFIGURATION_AT_FULL_SPEED)
-    collection.add_descriptor(configuration(build, True, OTHER_SPEED), descriptor_type=OTHER_SPEED)
-    collection.add_descriptor(configuration(build, False, OTHER_SPEED), descriptor_type=OTHER_SPEED_AT_FULL_SPEED)
-    collection.add_descriptor(device_qualifier(), descriptor_type=QUALIFIER)
+    if not build.full_speed_only:
+        collection.add_descriptor(configuration(build, False), descriptor_type=CONFIGURATION)
+        collection.add_descriptor(configuration(build, True, OTHER_SPEED), descriptor_type=OTHER_SPEED)
+        collection.add_descriptor(configuration(build, False, OTHER_SPEED), descriptor_type=OTHER_SPEED_AT_FULL_SPEED)
+        collection.add_descriptor(device_qualifier(), descriptor_type=QUALIFIER)
     collection.add_descriptor(binary_object_store(), descriptor_type=BOS)
     collection.add_descriptor(windows_set(), descriptor_type=WINDOWS_SET)
     collection.add_descriptor(hid_descriptor(len(reports)), descriptor_type=HID)

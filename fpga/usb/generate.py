@@ -99,6 +99,7 @@ class WhiskerUsb(Elaboratable):
             m.d.usb += frames_at_full_speed.eq(full_speed)
         m.d.comb += [
             device.connect.eq(1),
+            device.full_speed_only.eq(self._build.full_speed_only),
             self.board.eq(self._build.board),
             self.build.eq(self._build.commit),
             self.configured.eq(control.interface.active_config != 0),
@@ -180,8 +181,10 @@ def main() -> None:
     parser.add_argument(
         "--milliamps", type=int, default=default.milliamps, help="that it draws at most (default: %(default)s)"
     )
+    parser.add_argument("--full-speed", action="store_true", help="the PHY has no high speed")
     given = parser.parse_args()
-    build = Build(given.serial, given.board, given.commit, not given.bus_powered, given.milliamps)
+    powers = not given.bus_powered, given.milliamps
+    build = Build(given.serial, given.board, given.commit, *powers, given.full_speed)
     given.out.write_text(generate(build))
 
 

@@ -103,6 +103,54 @@ void one_led_tells_all(void **)
     assert_true(watched(board) == std::make_pair(64u, 8u)); // blinks fast: error
 }
 
+// With a host that does not read, a run's frames are dropped once the FIFO is full; the next run begins without an
+// error.
+void a_dropped_frame_lights_the_error_led(void **)
+{
+    constexpr uint64_t FULL = WHISKER_LIMIT_FIFO_BYTES / WHISKER_FRAME_BYTES * WHISKER_LIMIT_TICK_PERIOD_MIN;
+    constexpr uint64_t MICROFRAME = MS / 8;
+    constexpr uint8_t RUNS = LED_PHY | LED_CONFIGURED | LED_RUN;
+    Trial trial(BOARDS[1], {});
+    trial.enumerated();
+    trial.begin(WHISKER_LIMIT_TICK_PERIOD_MIN);
+    for (uint64_t passed = 0; passed < FULL + FULL / 2; passed += MICROFRAME) {
+        trial.tells(RUNS | (passed < FULL ? 0 : trial.board().leds() & LED_ERROR));
+        trial.host().start_of_frame();
+        trial.host().idle(MICROFRAME);
+    }
+    trial.tells(RUNS | LED_ERROR);
+    trial.end();
+    Bytes packet;
+    for (uint64_t n = 0; n < 2 * FULL / WHISKER_LIMIT_TICK_PERIOD_MIN && (trial.board().leds() & LED_RUN); n++) {
+        trial.host().in(BULK, WHISKER_LIMIT_BULK_PACKET, packet); // the last frame waits for room in the FIFO
+        trial.host().idle(LED_DELAY);
+    }
+    trial.tells(LED_PHY | LED_CONFIGURED | LED_ERROR);
+    trial.begin();
+    trial.tells(RUNS);
+}
+
+// A full-speed board that a host would take for one below its top speed shows a device qualifier, or is deaf for some
+// ms after a reset while it chirps.
+void a_full_speed_board_has_no_other_speed(void **)
+{
+    constexpr SetupRequest GET_QUALIFIER = {0x80, 6, 0x0600, 0, 10};
+    constexpr SetupRequest GET_OTHER_SPEED = {0x80, 6, 0x0700, 0, 9};
+    constexpr uint64_t SHORT_RESET = MS / 50;
+    Trial trial(BOARDS[2], {});
+    trial.enumerated();
+    Bytes data;
+    assert_true(control_transfer(trial.host(), GET_QUALIFIER, data) == Outcome::STALL);
+    assert_true(control_transfer(trial.host(), GET_OTHER_SPEED, data) == Outcome::STALL);
+    trial.board().in.line_state = LINE_SE0;
+    for (const uint64_t until = trial.board().cycles + SHORT_RESET; trial.board().cycles < until;) {
+        trial.board().cycle();
+    }
+    trial.host().set_address(0);
+    trial.host().idle(SHORT_RESET);
+    assert_true(control_transfer(trial.host(), {0x80, 6, 0x0100, 0, 18}, data) == Outcome::OK);
+}
+
 void every_fault_is_noticed(void **)
 {
     std::mt19937_64 generator(seed);
@@ -137,6 +185,8 @@ int main(int argc, char **argv)
         cmocka_unit_test(every_board_enumerates_and_runs),
         cmocka_unit_test(a_phy_whose_clock_hangs_is_reset),
         cmocka_unit_test(one_led_tells_all),
+        cmocka_unit_test(a_dropped_frame_lights_the_error_led),
+        cmocka_unit_test(a_full_speed_board_has_no_other_speed),
         cmocka_unit_test(every_fault_is_noticed),
     };
     return cmocka_run_group_tests(tests, nullptr, nullptr);

@@ -62,10 +62,14 @@ class Trial
             throw std::runtime_error(error);
         }
     }
-    void begin()
+    void begin(uint32_t tick_period = WHISKER_LIMIT_TICK_PERIOD)
     {
         check_.expect_start(true);
-        control(1);
+        control(1, tick_period);
+    }
+    void end()
+    {
+        control(0);
     }
     // What the LEDs show; they follow within some cycles of the oscillator.
     void tells(uint8_t leds)
@@ -84,7 +88,7 @@ class Trial
         }
         tells(LED_PHY | LED_CONFIGURED | LED_RUN);
         hears_orders();
-        control(0);
+        end();
         while (!check_.ended()) {
             read();
         }
@@ -107,12 +111,12 @@ class Trial
                 "a report is not taken");
         limit_ = board_->cycles + PATIENCE;
     }
-    void control(uint8_t run)
+    void control(uint8_t run, uint32_t tick_period = WHISKER_LIMIT_TICK_PERIOD)
     {
         Bytes report = {WHISKER_REPORT_ID_CONTROL, WHISKER_WIRE_VERSION, run, 6, 30, 3};
         report.resize(WHISKER_REPORT_CONTROL_BYTES);
         whisker_put_u32(&report[WHISKER_REPORT_CONTROL_LANE_MASK], UINT32_MAX >> (32 - LANES));
-        whisker_put_u32(&report[WHISKER_REPORT_CONTROL_TICK_PERIOD], WHISKER_LIMIT_TICK_PERIOD);
+        whisker_put_u32(&report[WHISKER_REPORT_CONTROL_TICK_PERIOD], tick_period);
         set_report(report, WHISKER_REPORT_CONTROL_BYTES);
     }
     // Each node tells its serial number, and the order reached it by MOSI alone.
