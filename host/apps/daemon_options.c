@@ -6,6 +6,7 @@
 
 #include "cli.h"
 #include "daemon_log.h"
+#include "whisker/pair.h"
 #include "whisker/ring.h"
 
 enum { NUMBER = 'n' };
@@ -20,6 +21,9 @@ static void print_help(const struct whisker_settings *defaults)
         "  --ring NAME         name of the ring; readers attach to it\n"
         "  --ring-frames N     its capacity, a power of two (%d)\n"
         "  --serial TEXT       the bridge with this serial number (the first that can be opened)\n"
+        "  --second TEXT       a second bridge, of this serial number (with --serial): its ticks begin with the first\n"
+        "                      one's tick_out, or with --tick-in both take the same source; its lanes are 28 to 55\n"
+        "  --second-lane-mask M  bit n set: lane n of the second bridge is in use (0x%x)\n"
         "  --wait              wait for a bridge instead of failing when there is none\n"
         "  --once              end when the bridge goes, instead of waiting for it\n"
         "  --replace           stop the whiskerd that has this ring, if it is yours, root's or the service's, and take "
@@ -43,8 +47,8 @@ static void print_help(const struct whisker_settings *defaults)
         "Example: whiskerd --ring whisker --lane-mask 0x3f\n"
         "Example: whiskerd --ring whisker --wait --serial 0001\n"
         "Exit code: 0 stopped as told, 1 failed, 2 wrong use.\n",
-        WHISKER_RING_FRAMES, defaults->batch, defaults->lane_mask, defaults->tick_period, defaults->sck_divider,
-        defaults->word_gap, defaults->sample_point);
+        WHISKER_RING_FRAMES, defaults->lane_mask, defaults->batch, defaults->lane_mask, defaults->tick_period,
+        defaults->sck_divider, defaults->word_gap, defaults->sample_point);
 }
 
 /* Sets one numeric option; false when its text is no number. Limits of the bridge are the library's to check. */
@@ -62,6 +66,8 @@ static bool set_number(struct daemon_options *options, const char *name, const c
         options->frames = value;
     } else if (!strcmp(name, "lane-mask")) {
         settings->lane_mask = value;
+    } else if (!strcmp(name, "second-lane-mask")) {
+        options->second_lane_mask = value;
     } else {
         settings->tick_period = value;
     }
@@ -88,6 +94,9 @@ static bool set_word(struct daemon_options *options, int option, const char *tex
     case 's':
         options->serial = text;
         return true;
+    case '2':
+        options->second = text;
+        return true;
     case 'l':
         return options->list = true;
     case 'w':
@@ -111,6 +120,23 @@ static bool set_word(struct daemon_options *options, int option, const char *tex
     }
 }
 
+/* NULL, or what is wrong with the options of two bridges. */
+static const char *check_second(const struct daemon_options *options)
+{
+    struct whisker_settings second = options->settings;
+    second.lane_mask = options->second_lane_mask;
+    if (!options->second) {
+        return NULL;
+    }
+    return !options->serial                            ? "--second: give --serial TEXT, too: which one is the first"
+           : !strcmp(options->second, options->serial) ? "--second: it is the bridge of --serial; give another one"
+           : whisker_settings_check(&second, NULL, 0)
+               ? "--second-lane-mask: it has lanes above 27; use bits of 0xfffffff"
+           : second.tick_period < WHISKER_PAIR_PERIOD_MIN
+               ? "--second: ticks of two bridges are told apart from a --tick-period of 22500 on; give 22500 or more"
+               : NULL;
+}
+
 static int check(const struct daemon_options *options, bool word_too_many)
 {
     char message[128];
@@ -123,6 +149,11 @@ static int check(const struct daemon_options *options, bool word_too_many)
         fprintf(stderr, DAEMON_PROGRAM ": %s\n", message);
         return CLI_USAGE;
     }
+    const char *wrong = check_second(options);
+    if (wrong) {
+        fprintf(stderr, DAEMON_PROGRAM ": %s\n", wrong);
+        return CLI_USAGE;
+    }
     return -1;
 }
 
@@ -131,6 +162,8 @@ int daemon_options_parse(int argc, char **argv, struct daemon_options *options)
     static const struct option known[] = {
         {"ring", required_argument, NULL, 'r'},
         {"serial", required_argument, NULL, 's'},
+        {"second", required_argument, NULL, '2'},
+        {"second-lane-mask", required_argument, NULL, NUMBER},
         {"ring-frames", required_argument, NULL, NUMBER},
         {"lane-mask", required_argument, NULL, NUMBER},
         {"tick-period", required_argument, NULL, NUMBER},
@@ -151,6 +184,7 @@ int daemon_options_parse(int argc, char **argv, struct daemon_options *options)
     };
     *options = (struct daemon_options){.frames = WHISKER_RING_FRAMES};
     whisker_settings_default(&options->settings);
+    options->second_lane_mask = options->settings.lane_mask;
     int which = 0;
     for (int option; (option = getopt_long(argc, argv, "", known, &which)) != -1;) {
         if (option == 'h') {

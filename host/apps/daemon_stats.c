@@ -15,34 +15,41 @@ static int64_t realtime_ns(void)
     return (int64_t)now.tv_sec * 1000000000 + now.tv_nsec;
 }
 
-void daemon_stats_begin(struct daemon_stats *stats, const struct whisker_settings *settings)
+void daemon_stats_begin(struct daemon_stats *stats, const struct whisker_settings *settings, int bridges,
+                        uint32_t second_lane_mask)
 {
     memset(stats, 0, sizeof *stats);
     stats->told.started_ns = realtime_ns();
     stats->told.lane_mask = settings->lane_mask;
     stats->told.tick_period = settings->tick_period;
+    stats->told.bridges = (uint8_t)bridges;
+    stats->told.second_lane_mask = second_lane_mask;
 }
 
-void daemon_stats_connected(struct daemon_stats *stats, const struct whisker_device_info *about,
-                            const struct whisker_identity *identity)
+/* Of two bridges the first one's names are told. */
+void daemon_stats_connected(struct daemon_stats *stats, struct daemon_source *source,
+                            const struct whisker_device_info *about, const struct whisker_identity *identity)
 {
     struct whisker_daemon_stats *told = &stats->told;
-    told->connected = 1;
-    told->error = WHISKER_OK;
+    told->connected++;
+    told->error = told->connected == told->bridges ? WHISKER_OK : told->error;
     told->connected_ns = realtime_ns();
+    source->dropped_before += source->dropped;
+    source->dropped = 0;
+    source->has_sequence = false;
+    if (source->is_second) {
+        return;
+    }
     told->wire_version = identity->wire_version;
     told->gateware = identity->gateware;
     memcpy(told->serial, about->serial, sizeof told->serial);
     snprintf(told->firmware, sizeof told->firmware, "gateware %u, wire %u", identity->gateware, identity->wire_version);
-    stats->dropped_before += stats->dropped;
-    stats->dropped = 0;
-    stats->has_sequence = false;
 }
 
-void daemon_stats_lost(struct daemon_stats *stats, int error)
+void daemon_stats_lost(struct daemon_stats *stats, bool was_connected, int error)
 {
-    if (stats->told.connected) {
-        stats->told.connected = 0;
+    if (was_connected) {
+        stats->told.connected--;
         stats->told.connected_ns = realtime_ns();
         stats->told.usb_errors += error != WHISKER_ERROR_DEVICE_GONE;
     }
@@ -68,13 +75,13 @@ static void count_record(struct daemon_stats *stats, unsigned status)
     }
 }
 
-static void count_frame(struct daemon_stats *stats, const struct whisker_frame *frame)
+void daemon_stats_frame(struct daemon_stats *stats, struct daemon_source *source, const struct whisker_frame *frame)
 {
-    const uint32_t missing = stats->has_sequence ? frame->sequence - stats->sequence - 1 : 0; /* modulo 2^32 */
+    const uint32_t missing = source->has_sequence ? frame->sequence - source->sequence - 1 : 0; /* modulo 2^32 */
     stats->told.frames_missing += missing < UINT32_MAX / 2 ? missing : 0;
-    stats->sequence = frame->sequence;
-    stats->has_sequence = true;
-    stats->dropped = frame->dropped;
+    source->sequence = frame->sequence;
+    source->has_sequence = true;
+    source->dropped = frame->dropped;
     for (size_t lane = 0; lane < WHISKER_FRAME_LANES; lane++) {
         const unsigned status = frame->lane[lane].status;
         if (status != 0 && (frame->lane_mask >> lane & 1u)) {
@@ -83,22 +90,26 @@ static void count_frame(struct daemon_stats *stats, const struct whisker_frame *
     }
 }
 
-void daemon_stats_frames(struct daemon_stats *stats, const struct whisker_frame *frames, size_t count)
-{
-    for (size_t i = 0; i < count; i++) {
-        count_frame(stats, &frames[i]);
-    }
-}
-
-void daemon_stats_settle(struct daemon_stats *stats, const struct whisker_decoder_counts *counts,
-                         const struct whisker_clock_fit *clock)
+void daemon_stats_settle_begin(struct daemon_stats *stats)
 {
     struct whisker_daemon_stats *told = &stats->told;
-    told->frames = counts->frames;
-    told->frames_damaged = counts->frames_damaged;
-    told->frames_dropped = stats->dropped_before + stats->dropped;
-    told->bytes_skipped = counts->bytes_skipped;
-    told->records_usb = counts->records_damaged;
+    told->frames = told->frames_damaged = told->frames_dropped = told->bytes_skipped = told->records_usb = 0;
+}
+
+void daemon_stats_settle(struct daemon_stats *stats, const struct daemon_source *source)
+{
+    struct whisker_daemon_stats *told = &stats->told;
+    const struct whisker_decoder_counts *counts = &source->decoder.counts;
+    told->frames += counts->frames;
+    told->frames_damaged += counts->frames_damaged;
+    told->frames_dropped += source->dropped_before + source->dropped;
+    told->bytes_skipped += counts->bytes_skipped;
+    told->records_usb += counts->records_damaged;
+}
+
+void daemon_stats_settle_end(struct daemon_stats *stats, const struct whisker_clock_fit *clock)
+{
+    struct whisker_daemon_stats *told = &stats->told;
     told->records_crc = stats->records_link_crc > told->records_usb ? stats->records_link_crc - told->records_usb : 0;
     told->clock_restarts = clock->restarts;
 }

@@ -7,30 +7,40 @@
 
 #include "whisker/whisker.h"
 
+/* What one bridge sends. */
+struct daemon_source {
+    struct whisker_decoder decoder;
+    uint64_t dropped_before; /* in the bridge's earlier runs */
+    uint32_t dropped;        /* in this one */
+    uint32_t sequence;       /* of the latest frame */
+    bool has_sequence;
+    bool is_second;
+};
+
 struct daemon_stats {
     struct whisker_daemon_stats told;
     uint64_t records_link_crc; /* found by bridge or host: the frame does not say which */
-    uint64_t dropped_before;   /* in the bridge's earlier runs */
-    uint32_t dropped;          /* in this one */
-    uint32_t sequence;         /* of the latest frame */
-    bool has_sequence;
 };
 
-void daemon_stats_begin(struct daemon_stats *stats, const struct whisker_settings *settings);
+/* bridges: that the daemon is started for; second_lane_mask: of the second one. */
+void daemon_stats_begin(struct daemon_stats *stats, const struct whisker_settings *settings, int bridges,
+                        uint32_t second_lane_mask);
 
 /* A bridge has been started. */
-void daemon_stats_connected(struct daemon_stats *stats, const struct whisker_device_info *about,
-                            const struct whisker_identity *identity);
+void daemon_stats_connected(struct daemon_stats *stats, struct daemon_source *source,
+                            const struct whisker_device_info *about, const struct whisker_identity *identity);
 
-/* It has gone. error: why. */
-void daemon_stats_lost(struct daemon_stats *stats, int error);
+/* A bridge has gone, or is not there. error: why. */
+void daemon_stats_lost(struct daemon_stats *stats, bool was_connected, int error);
 
-/* Counts frames just published. */
-void daemon_stats_frames(struct daemon_stats *stats, const struct whisker_frame *frames, size_t count);
+/* Counts a frame of this bridge. */
+void daemon_stats_frame(struct daemon_stats *stats, struct daemon_source *source, const struct whisker_frame *frame);
 
-/* Takes over what the decoder and the clock fit have counted; then `told` is what is to be told. */
-void daemon_stats_settle(struct daemon_stats *stats, const struct whisker_decoder_counts *counts,
-                         const struct whisker_clock_fit *clock);
+/* Takes over what the decoders and the clock fit have counted: begin, each source, end. Then `told` is what is to be
+ * told. */
+void daemon_stats_settle_begin(struct daemon_stats *stats);
+void daemon_stats_settle(struct daemon_stats *stats, const struct daemon_source *source);
+void daemon_stats_settle_end(struct daemon_stats *stats, const struct whisker_clock_fit *clock);
 
 /* Logs it as one line. */
 void daemon_stats_log(const struct whisker_daemon_stats *told);

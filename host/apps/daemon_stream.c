@@ -1,6 +1,7 @@
 #include "daemon_stream.h"
 
 #include <signal.h>
+#include <stdio.h>
 #include <string.h>
 #include <time.h>
 
@@ -36,23 +37,24 @@ void daemon_stream_catch_requests(void)
 
 void daemon_stream_init(struct daemon_stream *stream, const struct daemon_options *options, struct whisker_ring *ring)
 {
-    *stream = (struct daemon_stream){.options = options, .ring = ring};
-    whisker_decoder_init(&stream->decoder);
+    *stream = (struct daemon_stream){.options = options, .ring = ring, .bridges = options->second ? 2 : 1};
+    stream->bridge[0] =
+        (struct daemon_bridge){.name = "bridge", .serial = options->serial, .settings = options->settings};
+    stream->bridge[1] = stream->bridge[0];
+    stream->bridge[1].name = "second bridge";
+    stream->bridge[1].serial = options->second;
+    stream->bridge[1].source.is_second = true;
+    stream->bridge[1].settings.lane_mask = options->second_lane_mask;
+    stream->bridge[1].settings.options |= WHISKER_OPTION_TICK_IN;
+    whisker_pair_init(&stream->pair, options->settings.tick_period);
+    for (int i = 0; i < stream->bridges; i++) {
+        stream->inlet[i] = (struct daemon_inlet){stream, i};
+        whisker_decoder_init(&stream->bridge[i].source.decoder);
+        whisker_pair_run(&stream->pair, i, false);
+    }
     whisker_clock_begin(&stream->clock, WHISKER_LIMIT_CLOCK_HZ, whisker_settings_latency_ns(&options->settings));
-    daemon_stats_begin(&stream->stats, &options->settings);
-}
-
-void daemon_stream_begin(struct daemon_stream *stream, bool first)
-{
-    struct whisker_decoder *decoder = &stream->decoder;
-    whisker_decoder_end(decoder);
-    const struct whisker_decoder_counts counts = decoder->counts;
-    whisker_decoder_init(decoder);
-    decoder->counts = counts;
-    decoder->mark = first ? 0 : WHISKER_FRAME_GAP;
-    stream->ticks = (struct whisker_timing){0};
-    stream->ticks_told = 0;
-    stream->last_seen = false;
+    daemon_stats_begin(&stream->stats, &options->settings, stream->bridges,
+                       options->second ? options->second_lane_mask : 0);
 }
 
 static int64_t clock_ns(clockid_t clock)
@@ -62,116 +64,271 @@ static int64_t clock_ns(clockid_t clock)
     return (int64_t)now.tv_sec * 1000000000 + now.tv_nsec;
 }
 
-static void map_clock(struct daemon_stream *stream, const struct whisker_frame *newest)
+static void map_clock(struct daemon_stream *stream, uint64_t cycles)
 {
-    const int error =
-        whisker_clock_add(&stream->clock, newest->time_cycles, clock_ns(CLOCK_MONOTONIC), clock_ns(CLOCK_REALTIME));
+    const int error = whisker_clock_add(&stream->clock, cycles, clock_ns(CLOCK_MONOTONIC), clock_ns(CLOCK_REALTIME));
     if (error) {
         daemon_log_error(LOG_WARN, "clock", error);
     }
 }
 
-void daemon_stream_take(void *context, const uint8_t *bytes, size_t count)
+static void note(struct daemon_stream *stream, struct daemon_bridge *bridge, const struct whisker_frame *frame)
 {
-    struct daemon_stream *stream = context;
+    bridge->last_seen |= (frame->flags & WHISKER_FRAME_LAST) != 0;
+    daemon_stats_frame(&stream->stats, &bridge->source, frame);
+}
+
+static void publish_pairs(struct daemon_stream *stream)
+{
+    struct whisker_frame frames[DAEMON_BRIDGES];
+    for (int made; (made = whisker_pair_next(&stream->pair, frames)) > 0;) {
+        whisker_ring_publish(stream->ring, frames, (size_t)made);
+    }
+}
+
+/* The ring's time is the first bridge's, or goes on as it was while that is away. */
+static void take_one_of_two(struct daemon_stream *stream, int i, const uint8_t *bytes, size_t count)
+{
+    struct daemon_bridge *bridge = &stream->bridge[i];
+    struct whisker_frame frame;
+    bool any = false;
+    while (whisker_decoder_next(&bridge->source.decoder, &bytes, &count, &frame)) {
+        note(stream, bridge, &frame);
+        whisker_pair_add(&stream->pair, i, &frame);
+        publish_pairs(stream);
+        any = true;
+    }
+    if (any && (i == 0 || !stream->bridge[0].device)) {
+        const int64_t ahead = i * stream->pair.offset * stream->options->settings.tick_period;
+        map_clock(stream, frame.time_cycles + (uint64_t)ahead);
+    }
+}
+
+static void take(void *context, const uint8_t *bytes, size_t count)
+{
+    const struct daemon_inlet *inlet = context;
+    struct daemon_stream *stream = inlet->stream;
+    struct daemon_bridge *bridge = &stream->bridge[0];
     const struct whisker_frame *frames;
     size_t made;
-    if (whisker_ring_feed(stream->ring, &stream->decoder, bytes, count, &frames, &made) == 0 && made > 0) {
-        stream->last_seen |= (frames[made - 1].flags & WHISKER_FRAME_LAST) != 0;
-        daemon_stats_frames(&stream->stats, frames, made);
-        map_clock(stream, &frames[made - 1]);
+    if (stream->bridges > 1) {
+        take_one_of_two(stream, inlet->bridge, bytes, count);
+    } else if (whisker_ring_feed(stream->ring, &bridge->source.decoder, bytes, count, &frames, &made) == 0 &&
+               made > 0) {
+        for (size_t i = 0; i < made; i++) {
+            note(stream, bridge, &frames[i]);
+        }
+        map_clock(stream, frames[made - 1].time_cycles);
     }
 }
 
-/* USB guards every packet by a CRC of its own, so a malformed frame is a fault of the bridge: said once, and again in
- * the exit code, while the other frames go on. */
-static void tell_damage(struct daemon_stream *stream)
+static void announce(struct daemon_stream *stream, const struct daemon_bridge *bridge,
+                     const struct whisker_identity *identity)
 {
-    const struct whisker_decoder *decoder = &stream->decoder;
-    if (decoder->first_error && !stream->damage_told) {
-        daemon_log(LOG_ERROR, "bridge: after frame %llu: %s; %s", (unsigned long long)decoder->counts.frames,
-                   whisker_error_text(decoder->first_error), whisker_error_remedy(decoder->first_error));
-        stream->damage_told = true;
+    const struct whisker_device_info *about = whisker_device_about(bridge->device);
+    const bool back = bridge->lost_at_ms != 0;
+    char line[256];
+    snprintf(line, sizeof line, "%s %s (gateware %u, wire %u) at %s streams into ring %s", bridge->name, about->serial,
+             identity->gateware, identity->wire_version, about->path, stream->options->ring);
+    stream->stats.told.reconnects += back;
+    daemon_stream_tell(stream);
+    daemon_log(LOG_DETAIL, "%s", line);
+    daemon_notify_ready(line);
+    if (back) {
+        daemon_log(LOG_NOTE, "%s: %s is back after %.1f s", bridge->name, about->serial,
+                   (double)(cli_now_ms() - bridge->lost_at_ms) * 1e-3);
     }
 }
 
-/* What is wrong with the pin that the ticks come from: each kind once in a run, with the counts. */
-static void tell_ticks(struct daemon_stream *stream)
+int daemon_stream_connect(struct daemon_stream *stream, int i, struct whisker_identity *identity)
 {
-    struct whisker_timing now;
-    if (!stream->device || !(stream->options->settings.options & WHISKER_OPTION_TICK_IN) ||
-        whisker_device_timing(stream->device, &now) != WHISKER_OK) {
-        return;
+    struct daemon_bridge *bridge = &stream->bridge[i];
+    whisker_pair_run(&stream->pair, i, true);
+    const int error = daemon_bridge_connect(bridge, &stream->stats, take, &stream->inlet[i], identity);
+    if (error) {
+        whisker_pair_run(&stream->pair, i, false);
+        publish_pairs(stream);
+        daemon_stats_lost(&stream->stats, false, error);
+    } else {
+        announce(stream, bridge, identity);
     }
-    const int error = whisker_timing_judge(&stream->ticks, &now);
-    const uint32_t bit = error ? UINT32_C(1) << (WHISKER_ERROR_TICK_IN_SILENT - error) : 0;
-    stream->ticks = now;
-    if (bit & ~stream->ticks_told) {
-        stream->ticks_told |= bit;
-        daemon_log_error(LOG_WARN, "tick_in", error);
-        daemon_log(LOG_NOTE, "tick_in: %u edges taken, %u early, %u uneven, %u silences; shortest distance %u cycles",
-                   now.edges, now.early, now.uneven, now.silent, now.shortest);
+    return error;
+}
+
+static void lose(struct daemon_stream *stream, int i, int error)
+{
+    daemon_bridge_lose(&stream->bridge[i], &stream->stats, error);
+    whisker_pair_run(&stream->pair, i, false);
+    publish_pairs(stream);
+    daemon_stream_tell(stream);
+    daemon_notify_ready("the bridge has gone; waiting for it");
+}
+
+int daemon_stream_connected(const struct daemon_stream *stream)
+{
+    return (int)stream->stats.told.connected;
+}
+
+/* Receives what has come, or waits for it; error[i]: why a bridge's stream has ended. */
+static void receive(struct daemon_stream *stream, int error[DAEMON_BRIDGES])
+{
+    struct whisker_device *open[DAEMON_BRIDGES];
+    int count = 0;
+    for (int i = 0; i < stream->bridges; i++) {
+        if (stream->bridge[i].device) {
+            open[count++] = stream->bridge[i].device;
+        }
+    }
+    if (count > 1) {
+        whisker_device_wait(open, count, DAEMON_POLL_MS);
+    }
+    for (int i = 0; i < stream->bridges; i++) {
+        struct whisker_device *device = stream->bridge[i].device;
+        error[i] = device ? whisker_device_poll(device, count > 1 ? 0 : DAEMON_POLL_MS) : WHISKER_OK;
+    }
+}
+
+int daemon_stream_receive(struct daemon_stream *stream)
+{
+    int error[DAEMON_BRIDGES], last = WHISKER_OK;
+    receive(stream, error);
+    for (int i = 0; i < stream->bridges; i++) {
+        if (error[i]) {
+            lose(stream, i, error[i]);
+            last = error[i];
+        }
+    }
+    return last;
+}
+
+static void tell_pair(struct daemon_stream *stream)
+{
+    const struct whisker_pair_counts *now = &stream->pair.counts, *told = &stream->pair_told;
+    if (now->realigned != told->realigned) {
+        daemon_log(LOG_NOTE, "second bridge: its tick 0 is tick %lld of the first", (long long)stream->pair.offset);
+    }
+    if (now->apart != 0 && told->apart == 0) {
+        daemon_log(LOG_WARN,
+                   "second bridge: out of step: its ticks come more than 125 us beside the first one's, or the "
+                   "two are on two host controllers; wire its tick_in to the first one's tick_out, use one hub");
+    }
+    stream->pair_told = *now;
+}
+
+static void log_stats(const struct daemon_stream *stream)
+{
+    const struct whisker_pair_counts *pair = &stream->pair.counts;
+    daemon_stats_log(&stream->stats.told);
+    if (stream->bridges > 1) {
+        daemon_log(
+            LOG_NOTE,
+            "two bridges: %llu ticks of both, %llu of the first alone, %llu of the second alone, %llu out of step, "
+            "%llu times realigned",
+            (unsigned long long)pair->paired, (unsigned long long)pair->alone[0], (unsigned long long)pair->alone[1],
+            (unsigned long long)pair->apart, (unsigned long long)pair->realigned);
     }
 }
 
 void daemon_stream_tell(struct daemon_stream *stream)
 {
     struct whisker_clock clock;
-    daemon_stats_settle(&stream->stats, &stream->decoder.counts, &stream->clock);
+    daemon_stats_settle_begin(&stream->stats);
+    for (int i = 0; i < stream->bridges; i++) {
+        daemon_stats_settle(&stream->stats, &stream->bridge[i].source);
+    }
+    daemon_stats_settle_end(&stream->stats, &stream->clock);
     whisker_clock_get(&stream->clock, &clock);
     whisker_ring_set_clock(stream->ring, &clock);
     whisker_ring_set_stats(stream->ring, &stream->stats.told);
 }
 
-void daemon_stream_keep_house(struct daemon_stream *stream)
+static void tell_bridges(struct daemon_stream *stream, bool ticks)
 {
-    daemon_notify_alive();
-    tell_damage(stream);
-    const int64_t left_ms = stream->tell_at_ms - cli_now_ms();
-    if (left_ms <= 0 || left_ms > TELL_MS) { /* more: the clock went back */
-        stream->tell_at_ms = cli_now_ms() + TELL_MS;
-        daemon_stream_tell(stream);
-        tell_ticks(stream);
+    for (int i = 0; i < stream->bridges; i++) {
+        daemon_bridge_tell_damage(&stream->bridge[i]);
+        if (ticks) {
+            daemon_bridge_tell_ticks(&stream->bridge[i]);
+        }
     }
+}
+
+static void answer_requests(struct daemon_stream *stream)
+{
     if (report_wanted) {
         report_wanted = 0;
         daemon_stream_tell(stream);
-        daemon_stats_log(&stream->stats.told);
+        log_stats(stream);
     }
-    if (nodes_wanted && stream->device) {
-        nodes_wanted = 0;
-        daemon_nodes_log(stream->device, stream->options->settings.lane_mask);
+    for (int i = 0; nodes_wanted && i < stream->bridges; i++) {
+        if (stream->bridge[i].device) {
+            daemon_nodes_log(stream->bridge[i].device, stream->bridge[i].settings.lane_mask);
+        }
     }
+    nodes_wanted = nodes_wanted && daemon_stream_connected(stream) == 0;
 }
 
-/* Receives what the bridge still sends after a stop, up to its last frame. */
-static int drain(struct daemon_stream *stream)
+void daemon_stream_keep_house(struct daemon_stream *stream)
 {
-    const int64_t give_up_ms = cli_now_ms() + DAEMON_DRAIN_MS;
-    int error = whisker_device_stop(stream->device);
-    while (!error && !stream->last_seen && cli_now_ms() < give_up_ms) {
-        error = whisker_device_poll(stream->device, DAEMON_POLL_MS);
+    daemon_notify_alive();
+    const int64_t left_ms = stream->tell_at_ms - cli_now_ms();
+    const bool due = left_ms <= 0 || left_ms > TELL_MS; /* more: the clock went back */
+    if (due) {
+        stream->tell_at_ms = cli_now_ms() + TELL_MS;
+        daemon_stream_tell(stream);
+        tell_pair(stream);
     }
-    whisker_device_flush(stream->device);
-    return !error && !stream->last_seen ? WHISKER_ERROR_DEVICE_DRAIN : error;
+    tell_bridges(stream, due);
+    answer_requests(stream);
 }
 
-int daemon_stream_run(struct daemon_stream *stream)
+/* Receives what a bridge still sends after a stop, up to its last frame. */
+static int drain(struct daemon_stream *stream, int i)
+{
+    struct daemon_bridge *bridge = &stream->bridge[i];
+    const int64_t give_up_ms = cli_now_ms() + DAEMON_DRAIN_MS;
+    int error[DAEMON_BRIDGES];
+    error[i] = whisker_device_stop(bridge->device);
+    while (!error[i] && !bridge->last_seen && cli_now_ms() < give_up_ms) {
+        receive(stream, error);
+    }
+    return !error[i] && !bridge->last_seen ? WHISKER_ERROR_DEVICE_DRAIN : error[i];
+}
+
+/* The second first: it needs the first one's ticks for its last frame. */
+int daemon_stream_drain(struct daemon_stream *stream)
 {
     int error = WHISKER_OK;
-    while (!error && !cli_stop_wanted()) {
-        error = whisker_device_poll(stream->device, DAEMON_POLL_MS);
-        daemon_stream_keep_house(stream);
+    for (int i = stream->bridges - 1; i >= 0; i--) {
+        const int ended = stream->bridge[i].device ? drain(stream, i) : WHISKER_OK;
+        if (ended) {
+            daemon_log_error(LOG_ERROR, stream->bridge[i].name, ended);
+            error = ended;
+        }
     }
-    return error ? error : drain(stream);
+    for (int i = stream->bridges - 1; i >= 0; i--) {
+        if (stream->bridge[i].device) {
+            whisker_device_flush(stream->bridge[i].device);
+        }
+        whisker_pair_run(&stream->pair, i, false);
+    }
+    publish_pairs(stream);
+    return error;
 }
 
-void daemon_stream_end(struct daemon_stream *stream)
+bool daemon_stream_end(struct daemon_stream *stream)
 {
-    whisker_decoder_end(&stream->decoder);
-    tell_damage(stream);
+    bool whole = true;
+    for (int i = 0; i < stream->bridges; i++) {
+        struct daemon_bridge *bridge = &stream->bridge[i];
+        whisker_device_close(bridge->device);
+        bridge->device = NULL;
+        whisker_decoder_end(&bridge->source.decoder);
+        daemon_bridge_tell_damage(bridge);
+        whole &= !bridge->damage_told;
+    }
     daemon_stream_tell(stream);
     if (stream->stats.told.connected_ns != 0) {
-        daemon_stats_log(&stream->stats.told);
+        log_stats(stream);
     }
+    return whole;
 }

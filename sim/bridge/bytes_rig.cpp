@@ -67,6 +67,13 @@ void BytesRig::power_up()
     device_.power_up();
 }
 
+void BytesRig::wait_until(uint64_t microframe)
+{
+    while (microframe_ < microframe) {
+        bridge_.start_of_frame(microframe_++);
+    }
+}
+
 bool BytesRig::transfer(const std::function<bool()> &usb_step)
 {
     const unsigned frames = microframes(bridge_.tick_period());

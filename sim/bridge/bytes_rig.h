@@ -24,6 +24,9 @@ class BytesRig : public Rig
     uint32_t frames_dropped() const override;
     bool every_frame() const override;
 
+    // Start-of-frame packets up to this microframe of the host's, without a tick: it may have other devices.
+    void wait_until(uint64_t microframe);
+
   protected:
     void power_up() override;
     bool transfer(const std::function<bool()> &usb_step) override;

@@ -16,9 +16,9 @@ namespace bridge_sim
 namespace
 {
 
-constexpr char SYSFS_PATH[] = "/sys/devices/pci0000:00/0000:00:14.0/usb1/1-1";
-constexpr unsigned FIRST_NUMBER = 2; // 1 is the root hub
-constexpr unsigned LAST_NUMBER = 127;
+constexpr char BUS_PATH[] = "/devices/pci0000:00/0000:00:14.0/usb1/1-"; // and the port
+constexpr unsigned FIRST_NUMBER = 2;                                    // 1 is the root hub
+constexpr unsigned NUMBERS = 60;                                        // that the device of each port has in turn
 
 // A device's number on its bus in three digits, as in the path of its node.
 std::string three_digits(unsigned number)
@@ -44,13 +44,12 @@ std::string hexadecimal(const Bytes &bytes)
 }
 
 // The device as udev and sysfs show it, in umockdev's format. What the descriptors say is read from them.
-std::string device_record(const Descriptors &descriptors, unsigned number)
+std::string device_record(const Descriptors &descriptors, const std::string &path, unsigned number)
 {
     const Bytes &device = descriptors.device;
     const std::string hex = hexadecimal(descriptors.all());
     const std::string digits = three_digits(number);
-    return "P: " + std::string(SYSFS_PATH).substr(std::string("/sys").size()) + "\nN: bus/usb/001/" + digits + "=" +
-           hex + "\nE: DEVNAME=" + node_of(number) +
+    return "P: " + path + "\nN: bus/usb/001/" + digits + "=" + hex + "\nE: DEVNAME=" + node_of(number) +
            "\nE: DEVTYPE=usb_device\nE: SUBSYSTEM=usb\nE: MAJOR=189\nE: MINOR=" + std::to_string(number - 1) +
            "\nE: BUSNUM=001\nE: DEVNUM=" + digits + "\nA: busnum=1\\n\nA: devnum=" + std::to_string(number) +
            "\\n\nA: speed=480\\n\nA: bConfigurationValue=1\\n\nA: idVendor=" + hexadecimal({device[9], device[8]}) +
@@ -75,12 +74,19 @@ struct UsbfsServer::State {
     UsbfsSession session{[this](DeviceRequest request) { post(std::move(request)); }};
     UMockdevTestbed *testbed = nullptr;
     UMockdevIoctlBase *handler = nullptr;
-    unsigned number = FIRST_NUMBER - 1; // of the device, now or before it was unplugged
-    std::vector<std::string> nodes;     // attached; clients of a device that is gone may still hold its node open
+    unsigned port = 1;
+    unsigned plugged = 0;           // times
+    unsigned number = 0;            // of the device, now or before it was unplugged
+    std::vector<std::string> nodes; // attached; clients of a device that is gone may still hold its node open
 
     ~State()
     {
         close(wake);
+    }
+
+    std::string path() const
+    {
+        return BUS_PATH + std::to_string(port);
     }
 
     void post(DeviceRequest request)
@@ -127,10 +133,11 @@ void UsbfsServer::post(std::function<void()> job)
     g_main_context_invoke_full(state_->context, G_PRIORITY_DEFAULT, on_job, new Job(std::move(job)), free_job);
 }
 
-UsbfsServer::UsbfsServer() : state_(std::make_shared<State>())
+UsbfsServer::UsbfsServer(const UsbfsServer *beside) : state_(std::make_shared<State>())
 {
     state_->wake = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
-    state_->testbed = umockdev_testbed_new();
+    state_->port = beside ? beside->state_->port + 1 : 1;
+    state_->testbed = beside ? UMOCKDEV_TESTBED(g_object_ref(beside->state_->testbed)) : umockdev_testbed_new();
     if (!umockdev_in_mock_environment()) {
         throw std::runtime_error("the simulated device needs umockdev: run this program under umockdev-wrapper");
     }
@@ -142,16 +149,16 @@ UsbfsServer::UsbfsServer() : state_(std::make_shared<State>())
 void UsbfsServer::plug(const Descriptors &descriptors)
 {
     GError *error = nullptr;
-    state_->number = state_->number < LAST_NUMBER ? state_->number + 1 : FIRST_NUMBER;
+    state_->number = FIRST_NUMBER + (state_->port - 1) * NUMBERS + state_->plugged++ % NUMBERS;
     const std::string node = node_of(state_->number);
     require(umockdev_testbed_attach_ioctl(state_->testbed, node.c_str(), state_->handler, &error), error,
             "umockdev does not serve the device node");
     state_->nodes.push_back(node);
     post([session = &state_->session, node] { session->set_node(node); });
-    require(
-        umockdev_testbed_add_from_string(state_->testbed, device_record(descriptors, state_->number).c_str(), &error),
-        error, "umockdev does not take the device");
-    umockdev_testbed_uevent(state_->testbed, SYSFS_PATH, "add");
+    require(umockdev_testbed_add_from_string(
+                state_->testbed, device_record(descriptors, state_->path(), state_->number).c_str(), &error),
+            error, "umockdev does not take the device");
+    umockdev_testbed_uevent(state_->testbed, ("/sys" + state_->path()).c_str(), "add");
 }
 
 // Waits for umockdev's thread: after that no client of this device can hand in another request.
@@ -163,8 +170,9 @@ void UsbfsServer::unplug()
         done.set_value();
     });
     done.get_future().wait();
-    umockdev_testbed_uevent(state_->testbed, SYSFS_PATH, "remove");
-    umockdev_testbed_remove_device(state_->testbed, SYSFS_PATH);
+    const std::string path = "/sys" + state_->path();
+    umockdev_testbed_uevent(state_->testbed, path.c_str(), "remove");
+    umockdev_testbed_remove_device(state_->testbed, path.c_str());
     unlink(node_of(state_->number).c_str()); // umockdev leaves it
 }
 

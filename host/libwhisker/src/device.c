@@ -1,5 +1,6 @@
 #include "whisker/device.h"
 
+#include <poll.h>
 #include <stdbool.h>
 #include <stdlib.h>
 
@@ -17,6 +18,9 @@
 #define STALE_TIMEOUT_MS 100
 #define STALE_BYTES 4096
 #define STATUS_TIMEOUT_MS 1000
+/* Of an open device: libusb's event, its timer, the device. */
+#define DESCRIPTORS_MAX 8
+#define WAIT_MAX 2
 
 struct whisker_device {
     libusb_context *usb;
@@ -30,6 +34,8 @@ struct whisker_device {
     int turn;      /* whose it is */
     int error;     /* why the stream has ended */
     bool ending;   /* do not queue again */
+    struct pollfd descriptor[DESCRIPTORS_MAX]; /* that libusb waits on for this device */
+    int descriptors;
     struct whisker_settings settings;
     whisker_sink sink;
     void *context;
@@ -205,6 +211,20 @@ static int queue_transfers(struct whisker_device *device)
     return WHISKER_OK;
 }
 
+static int find_descriptors(struct whisker_device *device)
+{
+    const struct libusb_pollfd **list = libusb_get_pollfds(device->usb);
+    if (!list) {
+        return WHISKER_ERROR_MEMORY;
+    }
+    device->descriptors = 0;
+    for (int i = 0; list[i] && i < DESCRIPTORS_MAX; i++) {
+        device->descriptor[device->descriptors++] = (struct pollfd){.fd = list[i]->fd, .events = list[i]->events};
+    }
+    libusb_free_pollfds(list);
+    return WHISKER_OK;
+}
+
 int whisker_device_start(struct whisker_device *device, const struct whisker_settings *settings, whisker_sink sink,
                          void *context)
 {
@@ -220,7 +240,10 @@ int whisker_device_start(struct whisker_device *device, const struct whisker_set
     device->context = context;
     device->error = WHISKER_OK;
     device->ending = false;
-    error = queue_transfers(device);
+    error = find_descriptors(device);
+    if (!error) {
+        error = queue_transfers(device);
+    }
     return error ? error : blame(device, control_run(device->hid, settings, true));
 }
 
@@ -232,6 +255,18 @@ int whisker_device_poll(struct whisker_device *device, int timeout_ms)
     }
     handle_events(device, timeout_ms);
     return device->error;
+}
+
+void whisker_device_wait(struct whisker_device *const devices[], int count, int timeout_ms)
+{
+    struct pollfd all[WAIT_MAX * DESCRIPTORS_MAX];
+    nfds_t used = 0;
+    for (int i = 0; i < count && i < WAIT_MAX; i++) {
+        for (int k = 0; k < devices[i]->descriptors; k++) {
+            all[used++] = devices[i]->descriptor[k];
+        }
+    }
+    poll(all, used, timeout_ms);
 }
 
 int whisker_device_stop(struct whisker_device *device)

@@ -7,9 +7,23 @@
 #define USB_TIME_KNOWN 0x8000u
 #define MICROFRAMES 0x4000u /* after so many they count anew */
 
-void whisker_pair_init(struct whisker_pair *pair)
+void whisker_pair_init(struct whisker_pair *pair, uint32_t tick_period)
 {
     memset(pair, 0, sizeof *pair);
+    pair->tick_period = tick_period;
+    pair->running[0] = pair->running[1] = pair->searching = true;
+}
+
+void whisker_pair_run(struct whisker_pair *pair, int bridge, bool running)
+{
+    pair->running[bridge] = running;
+    pair->searching = true;
+    pair->blind = false;
+}
+
+static struct whisker_frame *held(struct whisker_pair *pair, int bridge, unsigned i)
+{
+    return &pair->held[bridge][(pair->first[bridge] + i) % WHISKER_PAIR_HELD];
 }
 
 int whisker_pair_add(struct whisker_pair *pair, int bridge, const struct whisker_frame *frame)
@@ -17,40 +31,116 @@ int whisker_pair_add(struct whisker_pair *pair, int bridge, const struct whisker
     if (bridge < 0 || bridge > 1 || pair->count[bridge] == WHISKER_PAIR_HELD) {
         return WHISKER_ERROR_ARGUMENT;
     }
-    pair->held[bridge][(pair->first[bridge] + pair->count[bridge]) % WHISKER_PAIR_HELD] = *frame;
-    pair->count[bridge]++;
+    *held(pair, bridge, pair->count[bridge]++) = *frame;
+    pair->searching |= pair->silent[bridge]; /* it may have missed edges */
+    pair->silent[bridge] = false;
     return WHISKER_OK;
 }
 
-static const struct whisker_frame *oldest(const struct whisker_pair *pair, int bridge)
+/* Of a held frame, as the first bridge counts. */
+static int64_t tick_of(struct whisker_pair *pair, int bridge, unsigned i)
 {
-    return &pair->held[bridge][pair->first[bridge]];
+    return (int64_t)held(pair, bridge, i)->tick + (bridge ? pair->offset : 0);
 }
 
 static void take(struct whisker_pair *pair, int bridge, struct whisker_frame *frame)
 {
-    *frame = *oldest(pair, bridge);
+    *frame = *held(pair, bridge, 0);
+    if (bridge) {
+        frame->tick += (uint64_t)pair->offset;
+        frame->time_cycles += (uint64_t)pair->offset * pair->tick_period;
+        frame->flags |= WHISKER_FRAME_SECOND;
+    }
     frame->sequence = (uint32_t)(2 * frame->tick) + (uint32_t)bridge;
-    frame->flags |= bridge ? WHISKER_FRAME_SECOND : 0;
     pair->first[bridge] = (pair->first[bridge] + 1) % WHISKER_PAIR_HELD;
     pair->count[bridge]--;
+}
+
+static bool usb_time_known(const struct whisker_frame *a, const struct whisker_frame *b)
+{
+    return (a->flags & b->flags) >> WHISKER_FRAME_USB_TIME_SHIFT & USB_TIME_KNOWN;
 }
 
 static bool is_apart(const struct whisker_frame *a, const struct whisker_frame *b)
 {
     const unsigned at = a->flags >> WHISKER_FRAME_USB_TIME_SHIFT, other = b->flags >> WHISKER_FRAME_USB_TIME_SHIFT;
     const unsigned later = (at - other) % MICROFRAMES;
-    return (at & other & USB_TIME_KNOWN) && later > 1 && later < MICROFRAMES - 1;
+    return usb_time_known(a, b) && later > 1 && later < MICROFRAMES - 1;
+}
+
+/* Looks for the second's oldest frame among the first's, then for the first's oldest among the second's. */
+static bool find_offset(struct whisker_pair *pair, int64_t *offset)
+{
+    for (int bridge = 0; bridge < 2; bridge++) {
+        const struct whisker_frame *wanted = held(pair, !bridge, 0);
+        for (unsigned i = 0; i < pair->count[bridge]; i++) {
+            const struct whisker_frame *frame = held(pair, bridge, i);
+            if (usb_time_known(frame, wanted) && !is_apart(frame, wanted)) {
+                const int64_t ahead = (int64_t)(frame->tick - wanted->tick);
+                *offset = bridge ? -ahead : ahead;
+                return true;
+            }
+        }
+    }
+    return false;
+}
+
+static bool full(const struct whisker_pair *pair, int bridge)
+{
+    return pair->count[bridge] == WHISKER_PAIR_HELD;
+}
+
+/* One is full, and of the other no more will be held. */
+static bool exhausted(const struct whisker_pair *pair)
+{
+    return pair->count[0] + pair->count[1] >= 2 * WHISKER_PAIR_HELD - 1;
+}
+
+static bool slipped(struct whisker_pair *pair)
+{
+    return tick_of(pair, 0, 0) == tick_of(pair, 1, 0) && is_apart(held(pair, 0, 0), held(pair, 1, 0)) && !pair->blind;
+}
+
+/* Both bridges have frames. False: which of them belong together is not known before more have come. *early: the
+ * second's oldest is of before the first's tick 0. */
+static bool align(struct whisker_pair *pair, bool *early)
+{
+    int64_t offset;
+    if (!pair->searching && !slipped(pair)) {
+        return true;
+    }
+    pair->searching = true;
+    if (find_offset(pair, &offset)) {
+        *early = (int64_t)held(pair, 1, 0)->tick + offset < 0;
+        if (*early) {
+            return false;
+        }
+        pair->counts.realigned += offset != pair->offset;
+        pair->offset = offset;
+        pair->searching = false;
+    } else if (!usb_time_known(held(pair, 0, 0), held(pair, 1, 0))) {
+        pair->searching = false;
+    } else if (exhausted(pair)) {
+        pair->blind = true;
+        pair->searching = false;
+    }
+    return !pair->searching;
+}
+
+static bool awaited(const struct whisker_pair *pair, int bridge)
+{
+    return pair->running[bridge] && !pair->silent[bridge];
 }
 
 /* The bridge whose oldest frame waits for nothing any more; -1: neither's does. */
-static int lonely(const struct whisker_pair *pair)
+static int lonely(struct whisker_pair *pair, bool aligned)
 {
-    if (pair->count[0] > 0 && pair->count[1] > 0) {
-        return oldest(pair, 1)->tick < oldest(pair, 0)->tick;
+    if (pair->count[0] > 0 && pair->count[1] > 0 && (aligned || !pair->running[0] || !pair->running[1])) {
+        return tick_of(pair, 1, 0) < tick_of(pair, 0, 0);
     }
     for (int bridge = 0; bridge < 2; bridge++) {
-        if (pair->count[bridge] == WHISKER_PAIR_HELD || (pair->ending && pair->count[bridge] > 0)) {
+        pair->silent[!bridge] |= full(pair, bridge) && pair->count[!bridge] == 0;
+        if (full(pair, bridge) || (pair->count[bridge] > 0 && !awaited(pair, !bridge))) {
             return bridge;
         }
     }
@@ -59,23 +149,20 @@ static int lonely(const struct whisker_pair *pair)
 
 int whisker_pair_next(struct whisker_pair *pair, struct whisker_frame frames[2])
 {
-    if (pair->count[0] > 0 && pair->count[1] > 0 && oldest(pair, 0)->tick == oldest(pair, 1)->tick) {
+    bool early = false;
+    const bool aligned = pair->count[0] > 0 && pair->count[1] > 0 && align(pair, &early);
+    if (aligned && tick_of(pair, 0, 0) == tick_of(pair, 1, 0)) {
         take(pair, 0, &frames[0]);
         take(pair, 1, &frames[1]);
         pair->counts.paired++;
         pair->counts.apart += is_apart(&frames[0], &frames[1]);
         return 2;
     }
-    const int bridge = lonely(pair);
+    const int bridge = early ? 1 : lonely(pair, aligned);
     if (bridge < 0) {
         return 0;
     }
     take(pair, bridge, &frames[0]);
     pair->counts.alone[bridge]++;
     return 1;
-}
-
-void whisker_pair_end(struct whisker_pair *pair)
-{
-    pair->ending = true;
 }

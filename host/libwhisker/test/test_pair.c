@@ -10,7 +10,8 @@
 #include "whisker/pair.h"
 
 #define KNOWN 0x8000u
-#define OUT 512
+#define OUT 1024
+#define PERIOD 30000u
 
 static struct whisker_pair pair;
 static struct whisker_frame out[OUT];
@@ -19,7 +20,7 @@ static size_t made;
 static int begin(void **state)
 {
     (void)state;
-    whisker_pair_init(&pair);
+    whisker_pair_init(&pair, PERIOD);
     made = 0;
     return 0;
 }
@@ -34,7 +35,8 @@ static void collect(void)
 /* A frame of a tick whose SYNC came in this microframe. */
 static void add_at(int bridge, uint64_t tick, unsigned microframe)
 {
-    struct whisker_frame frame = {.tick = tick, .sequence = 77, .lane_mask = bridge ? 2 : 1};
+    struct whisker_frame frame = {
+        .tick = tick, .time_cycles = tick * PERIOD, .sequence = 77, .lane_mask = bridge ? 2 : 1};
     frame.flags = (KNOWN | (microframe & 0x3FFFu)) << WHISKER_FRAME_USB_TIME_SHIFT;
     assert_int_equal(whisker_pair_add(&pair, bridge, &frame), 0);
     collect();
@@ -50,6 +52,7 @@ static void assert_is(size_t i, int bridge, uint64_t tick)
 {
     assert_true(i < made);
     assert_int_equal(out[i].tick, tick);
+    assert_int_equal(out[i].time_cycles, tick * PERIOD);
     assert_int_equal(out[i].lane_mask, bridge ? 2 : 1);
     assert_int_equal(out[i].flags & WHISKER_FRAME_SECOND, bridge ? WHISKER_FRAME_SECOND : 0);
     assert_int_equal(out[i].sequence, 2 * tick + (uint64_t)bridge);
@@ -101,31 +104,108 @@ static void a_silent_bridge_holds_the_other_up_for_a_while_only(void **state)
     (void)state;
     for (uint64_t tick = 0; tick < WHISKER_PAIR_HELD + 5; tick++) {
         add(1, tick);
-        assert_int_equal(made, tick + 1 < WHISKER_PAIR_HELD ? 0 : tick + 2 - WHISKER_PAIR_HELD);
+        assert_int_equal(made, tick + 1 < WHISKER_PAIR_HELD ? 0 : tick + 1);
     }
-    whisker_pair_end(&pair);
+    whisker_pair_run(&pair, 0, false);
     collect();
     assert_int_equal(made, WHISKER_PAIR_HELD + 5);
+    add(1, made);
+    assert_int_equal(made, WHISKER_PAIR_HELD + 6); /* it no longer waits */
     for (size_t i = 0; i < made; i++) {
         assert_is(i, 1, i);
     }
 }
 
-static void ticks_that_are_not_the_same_moment_are_counted(void **state)
+/* The second bridge's ticks are numbered so much lower than the first's of the same moment. */
+static void add_both(uint64_t from, uint64_t count, uint64_t lower)
+{
+    for (uint64_t tick = from; tick < from + count; tick++) {
+        add(0, tick);
+        add_at(1, tick - lower, (unsigned)(4 * tick) + tick % 2); /* at times in the next microframe */
+    }
+}
+
+static void assert_pairs(size_t at, uint64_t from, uint64_t count)
+{
+    for (uint64_t i = 0; i < 2 * count; i++) {
+        assert_is(at + i, i % 2, from + i / 2);
+    }
+}
+
+static void a_bridge_that_comes_back_takes_up_the_others_ticks(void **state)
 {
     (void)state;
-    static const unsigned later[] = {0, 1, 2, 0x3FFF, 0x3FFE, 0x2000};
-    for (uint64_t tick = 0; tick < 6; tick++) {
-        add_at(0, tick, 9);
-        add_at(1, tick, 9 + later[tick]);
+    add_both(0, 8, 0);
+    whisker_pair_run(&pair, 1, false);
+    for (uint64_t tick = 8; tick < 100; tick++) {
+        add(0, tick);
+        assert_is(made - 1, 0, tick); /* at once */
     }
-    assert_int_equal(pair.counts.apart, 3);
-    struct whisker_frame unknown = {.tick = 6}; /* no start-of-frame packet: nothing can be said */
-    add_at(0, 6, 100);
-    assert_int_equal(whisker_pair_add(&pair, 1, &unknown), 0);
-    collect();
-    assert_int_equal(pair.counts.paired, 7);
-    assert_int_equal(pair.counts.apart, 3);
+    whisker_pair_run(&pair, 1, true);
+    for (uint64_t tick = 100; tick < 103; tick++) { /* before its first frame */
+        add(0, tick);
+    }
+    add_both(103, 8, 103);
+    assert_int_equal(made, 16 + 95 + 16);
+    assert_pairs(16 + 95, 103, 8);
+    assert_int_equal(pair.counts.realigned, 1);
+    assert_int_equal(pair.counts.alone[0], 95);
+    assert_int_equal(pair.counts.alone[1] + pair.counts.apart, 0);
+}
+
+static void the_second_goes_on_when_the_first_starts_again(void **state)
+{
+    (void)state;
+    add_both(0, 8, 0);
+    whisker_pair_run(&pair, 0, false);
+    for (uint64_t tick = 8; tick < 20; tick++) { /* a common source of ticks */
+        add(1, tick);
+        assert_is(made - 1, 1, tick);
+    }
+    whisker_pair_run(&pair, 0, true);
+    add(1, 20); /* of before the first's new tick 0 */
+    for (uint64_t tick = 0; tick < 4; tick++) {
+        add_at(0, tick, (unsigned)(4 * (21 + tick)));
+        add(1, 21 + tick);
+    }
+    assert_int_equal(made, 16 + 13 + 8);
+    assert_is(28, 1, 20);
+    assert_pairs(29, 0, 4);
+}
+
+static void a_missed_edge_is_made_up_for(void **state)
+{
+    (void)state;
+    add_both(0, 8, 0);
+    add(0, 8); /* and not the second */
+    add_both(9, 70, 1);
+    assert_int_equal(made, 16 + 1 + 140);
+    assert_is(16, 0, 8);
+    assert_pairs(17, 9, 70);
+    assert_int_equal(pair.counts.realigned, 1);
+    assert_int_equal(pair.counts.apart, 0);
+}
+
+static void without_a_common_clock_ticks_are_taken_as_numbered(void **state)
+{
+    (void)state;
+    for (uint64_t tick = 0; tick < 2 * WHISKER_PAIR_HELD; tick++) { /* two controllers */
+        add(0, tick);
+        add_at(1, tick, (unsigned)(4 * tick) + 5000);
+    }
+    assert_int_equal(pair.counts.paired, 2 * WHISKER_PAIR_HELD);
+    assert_int_equal(pair.counts.apart, pair.counts.paired);
+    assert_int_equal(pair.counts.alone[0] + pair.counts.alone[1] + pair.counts.realigned, 0);
+    begin(state);
+    for (uint64_t tick = 0; tick < 3; tick++) { /* no start-of-frame packet */
+        const struct whisker_frame frame = {.tick = tick};
+        for (int bridge = 0; bridge < 2; bridge++) {
+            assert_int_equal(whisker_pair_add(&pair, bridge, &frame), 0);
+            collect();
+        }
+    }
+    assert_int_equal(pair.counts.paired, 3);
+    assert_int_equal(pair.counts.apart, 0);
 }
 
 static void wrong_use_is_refused(void **state)
@@ -146,7 +226,10 @@ int main(void)
         cmocka_unit_test_setup(frames_go_in_pairs_whichever_comes_first, begin),
         cmocka_unit_test_setup(a_lost_frame_leaves_the_other_alone, begin),
         cmocka_unit_test_setup(a_silent_bridge_holds_the_other_up_for_a_while_only, begin),
-        cmocka_unit_test_setup(ticks_that_are_not_the_same_moment_are_counted, begin),
+        cmocka_unit_test_setup(a_bridge_that_comes_back_takes_up_the_others_ticks, begin),
+        cmocka_unit_test_setup(the_second_goes_on_when_the_first_starts_again, begin),
+        cmocka_unit_test_setup(a_missed_edge_is_made_up_for, begin),
+        cmocka_unit_test_setup(without_a_common_clock_ticks_are_taken_as_numbered, begin),
         cmocka_unit_test_setup(wrong_use_is_refused, begin),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

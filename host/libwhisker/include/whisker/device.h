@@ -123,7 +123,7 @@ typedef void (*whisker_sink)(void *context, const uint8_t *bytes, size_t count);
 /*
  * Stops a bridge that still runs for a process that is gone and throws its frames away; queues the bulk transfers
  * (64 KiB: 128 ms at 2 kHz); then starts the bridge. May be called again after stop and flush.
- * Returns 0 or DEVICE_REFUSED, DEVICE_CONTROL, DEVICE_USB, DEVICE_GONE.
+ * Returns 0 or DEVICE_REFUSED, DEVICE_CONTROL, DEVICE_USB, DEVICE_GONE, MEMORY.
  */
 int whisker_device_start(struct whisker_device *device, const struct whisker_settings *settings, whisker_sink sink,
                          void *context);
@@ -131,6 +131,10 @@ int whisker_device_start(struct whisker_device *device, const struct whisker_set
 /* Handles what has come, or waits for it up to timeout_ms; a signal ends the wait. No allocation, no printing.
  * Returns 0, or DEVICE_GONE, DEVICE_USB: the stream has ended. */
 int whisker_device_poll(struct whisker_device *device, int timeout_ms);
+
+/* Waits up to timeout_ms until whisker_device_poll has something to handle for one of these devices, which all belong
+ * to this thread; a signal ends the wait. count: at most 2. */
+void whisker_device_wait(struct whisker_device *const devices[], int count, int timeout_ms);
 
 /* Tells the bridge to stop: it makes one more frame, with flag LAST. Poll on to receive it. 0, DEVICE_CONTROL,
  * DEVICE_GONE. */

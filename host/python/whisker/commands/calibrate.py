@@ -10,11 +10,12 @@ import numpy as np
 from ..arguments import add_ring, number_above, number_list, whole_number
 from ..bridge.nodes import NodeError, read_nodes
 from ..bridge.ring import Reader
-from ..protocol import LANES
+from ..bridge.wide import LANES_MAX
 from ..scene import load
 from ..tables import unwritable
 from ..touch.calibration import (
     TICKS_PER_S,
+    CalibrationError,
     ContactsFile,
     Feed,
     Rest,
@@ -35,7 +36,7 @@ def add(parser) -> None:
         "--out", required=True, type=Path, metavar="DIR", help="writes rest.toml, and <lane>.csv with --lane"
     )
     parser.add_argument(
-        "--lane", type=whole_number(0, LANES - 1), metavar="N", help="the whisker to press against the post"
+        "--lane", type=whole_number(0, LANES_MAX - 1), metavar="N", help="the whisker to press against the post"
     )
     parser.add_argument(
         "--radii", type=number_list, metavar="LIST", help="distances of the post in mm, as in 90,100,110"
@@ -61,12 +62,16 @@ def run(arguments) -> int:
     if (arguments.lane is None) != (arguments.radii is None):
         arguments.parser.error("--lane and --radii belong together: give both, or neither to measure rest alone")
     names = [whisker.name for whisker in load(arguments.scene).robot.whiskers] if arguments.scene else []
-    names += [f"lane{n}" for n in range(len(names), LANES)]
+    names += [f"lane{n}" for n in range(len(names), LANES_MAX)]
     node = _node(arguments)
     try:
         arguments.out.mkdir(parents=True, exist_ok=True)
         with Reader(arguments.ring, arguments.wait, arguments.ring_owner) as reader:
             feed = Feed(reader)
+            if (arguments.lane or 0) >= feed.lanes:
+                raise CalibrationError(
+                    f"--lane {arguments.lane}: the ring has one bridge; give a lane up to {feed.lanes - 1}"
+                )
             if not arguments.backlog:
                 feed.skip()
             return _calibrate(arguments, feed, names, node)

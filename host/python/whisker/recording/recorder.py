@@ -20,7 +20,8 @@ SECOND_NS = 10**9
 
 @dataclass
 class Tally:
-    """What was recorded, and what was not: frames, but for records_bad, which counts samples by lane."""
+    """What was recorded, and what was not: frames, but for records_bad, which counts samples by lane of
+    the first bridge."""
 
     frames: int = 0
     missing: int = 0  # never came into the ring
@@ -111,7 +112,8 @@ class Recorder:
         self._say_gaps(time_ns, block)
         self._writer.block(time_ns, block)
         self.tally.frames += len(block["tick"])
-        self.tally.records_bad += np.count_nonzero(block["lanes"]["status"], axis=1)
+        first = block["flags"] & lib.WHISKER_FRAME_SECOND == 0
+        self.tally.records_bad += np.count_nonzero(block["lanes"]["status"][:, first], axis=1)
 
     def _say_lost(self, tick: int) -> None:
         """Tell of frames overrun and of a new ring, now that a frame stands behind them."""
@@ -124,7 +126,8 @@ class Recorder:
         ticks, sequence = block["tick"], block["sequence"]
         before = self._last or (int(ticks[0]) - 1, int(sequence[0]) - 1)
         self._last = (int(ticks[-1]), int(sequence[-1]))
-        back = np.diff(ticks.astype(np.int64), prepend=np.int64(before[0])) <= 0
+        second = block["flags"] & lib.WHISKER_FRAME_SECOND != 0  # may follow a frame of its own tick
+        back = np.diff(ticks.astype(np.int64), prepend=np.int64(before[0])) < np.where(second, 0, 1)
         back |= block["flags"] & lib.WHISKER_FRAME_GAP != 0
         back[0] |= self._reattached
         steps = np.diff(sequence, prepend=np.uint32(before[1] & 0xFFFFFFFF))

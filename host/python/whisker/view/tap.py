@@ -7,6 +7,7 @@ from dataclasses import asdict
 import numpy as np
 
 from ..bridge.ring import Reader, RingError, error_line
+from ..bridge.wide import of_first
 from ..protocol import CODES, LANES, LIMITS, STATUS_CODE_SHIFT
 from .pyramid import BINS, CHUNK, WIDTHS, Pyramid
 from .tally import NAME_OF_CODE, Tally
@@ -91,7 +92,8 @@ class Tap:
                     return
                 self._say("the writer overtook this view: frames are missing here, but were in the ring")
             else:
-                self._take(frames, now)
+                if len(frames := of_first(frames)):
+                    self._take(frames, now)
 
     def _end(self, error: RingError, now: float) -> None:
         """The ring gives nothing more: its writer closed it, or died, or has made a new one."""

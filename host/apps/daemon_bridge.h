@@ -1,0 +1,41 @@
+/* One bridge of the daemon: opened, started, lost and tried again; what it sends goes to the stream. */
+#ifndef WHISKER_DAEMON_BRIDGE_H
+#define WHISKER_DAEMON_BRIDGE_H
+
+#include "daemon_stats.h"
+
+/* The daemon looks about so often. */
+#define DAEMON_POLL_MS 100
+
+struct daemon_bridge {
+    const char *name;   /* in the log */
+    const char *serial; /* NULL: any */
+    struct whisker_settings settings;
+    struct whisker_device *device; /* NULL: waiting for it */
+    struct daemon_source source;
+    struct whisker_timing ticks; /* of tick_in, when last asked for */
+    uint32_t ticks_told;         /* bit n: error TICK_IN_SILENT - n of this run is in the log */
+    int64_t lost_at_ms;
+    int told;       /* why it could not be opened, as last logged */
+    bool last_seen; /* the last frame after a stop has come */
+    bool damage_told;
+};
+
+/* Opens and starts it, with `sink` for what it sends. Returns 0, or why not; then nothing stays open. */
+int daemon_bridge_connect(struct daemon_bridge *bridge, struct daemon_stats *stats, whisker_sink sink, void *context,
+                          struct whisker_identity *identity);
+
+/* Logs why it could not be opened. */
+void daemon_bridge_log_refusal(const struct daemon_bridge *bridge, int error, const struct whisker_identity *identity);
+
+/* It has gone, for this reason; what had come is published. */
+void daemon_bridge_lose(struct daemon_bridge *bridge, struct daemon_stats *stats, int error);
+
+/* What is wrong with the pin that the ticks come from: each kind once in a run, with the counts. */
+void daemon_bridge_tell_ticks(struct daemon_bridge *bridge);
+
+/* USB guards every packet by a CRC of its own, so a malformed frame is a fault of the bridge: said once, while the
+ * other frames go on. */
+void daemon_bridge_tell_damage(struct daemon_bridge *bridge);
+
+#endif
