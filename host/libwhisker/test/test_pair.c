@@ -186,6 +186,20 @@ static void a_missed_edge_is_made_up_for(void **state)
     assert_int_equal(pair.counts.apart, 0);
 }
 
+static void a_bridge_that_was_silent_falls_into_step_again(void **state)
+{
+    (void)state;
+    add_both(0, 8, 0);
+    for (uint64_t tick = 8; tick < WHISKER_PAIR_HELD + 20; tick++) {
+        add(0, tick);
+    }
+    assert_int_equal(made, 16 + WHISKER_PAIR_HELD + 12); /* it is no longer waited for */
+    add_both(WHISKER_PAIR_HELD + 20, 8, WHISKER_PAIR_HELD + 12);
+    assert_int_equal(made, 16 + WHISKER_PAIR_HELD + 12 + 1 + 15);
+    assert_int_equal(pair.counts.paired, 8 + 7); /* of the first tick both came, the first's before it was known */
+    assert_int_equal(pair.counts.realigned, 1);
+}
+
 static void without_a_common_clock_ticks_are_taken_as_numbered(void **state)
 {
     (void)state;
@@ -229,6 +243,7 @@ int main(void)
         cmocka_unit_test_setup(a_bridge_that_comes_back_takes_up_the_others_ticks, begin),
         cmocka_unit_test_setup(the_second_goes_on_when_the_first_starts_again, begin),
         cmocka_unit_test_setup(a_missed_edge_is_made_up_for, begin),
+        cmocka_unit_test_setup(a_bridge_that_was_silent_falls_into_step_again, begin),
         cmocka_unit_test_setup(without_a_common_clock_ticks_are_taken_as_numbered, begin),
         cmocka_unit_test_setup(wrong_use_is_refused, begin),
     };

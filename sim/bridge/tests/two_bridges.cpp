@@ -30,7 +30,7 @@ namespace
 constexpr size_t NODES = 3;
 constexpr unsigned MICROFRAMES_PER_TICK = WHISKER_LIMIT_TICK_PERIOD / (WHISKER_LIMIT_CLOCK_HZ / 8000);
 constexpr int WAIT_MS = 100;
-constexpr uint8_t GET_DESCRIPTOR = 6, STRING = 3;
+constexpr uint8_t GET_DESCRIPTOR = 6, SET_REPORT = 9, STRING = 3;
 
 struct Event {
     uint64_t tick = 0;
@@ -38,7 +38,7 @@ struct Event {
     size_t bridge = 0;
 };
 
-// The string descriptor "0001" reads "0002" on the second.
+// The string descriptor "0001" reads "0002" on the second, which refuses to run on ticks of its own.
 class NumberedRig : public BytesRig
 {
   public:
@@ -48,6 +48,12 @@ class NumberedRig : public BytesRig
 
     Outcome control(const SetupRequest &request, Bytes &data) override
     {
+        const bool starts = request.request == SET_REPORT && data.size() == WHISKER_REPORT_CONTROL_BYTES &&
+                            data[WHISKER_REPORT_CONTROL_ID] == WHISKER_REPORT_ID_CONTROL &&
+                            data[WHISKER_REPORT_CONTROL_RUN] == 1;
+        if (starts && digit_ == '2' && !(data[WHISKER_REPORT_CONTROL_OPTIONS] & WHISKER_CONTROL_OPTION_TICK_IN)) {
+            return Outcome::STALL;
+        }
         static const Bytes serial = {10, STRING, '0', 0, '0', 0, '0', 0, '1', 0};
         const Outcome outcome = BytesRig::control(request, data);
         if (request.request == GET_DESCRIPTOR && data == serial) {
