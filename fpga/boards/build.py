@@ -1,6 +1,8 @@
-"""Makes a board's bitstream with open tools: `build.py BOARD`. Yosys synthesises, nextpnr places and routes, ecppack packs.
+"""Makes a board's bitstream with open tools: `build.py BOARD`. Yosys synthesises, nextpnr places and routes, ecppack packs;
+for Gowin's FPGAs see gowin.py.
 
-Every step is also a function for tests and benches. Files go to build/boards/BOARD/: netlist.json, report.json, BOARD.bit.
+Every step is also a function for tests and benches. Files go to build/boards/BOARD/: netlist.json, report.json, and the bitstream
+BOARD.bit, or BOARD.fs for Gowin's.
 """
 
 import argparse
@@ -15,9 +17,11 @@ HERE = Path(__file__).resolve().parent
 REPO = HERE.parents[1]
 sys.path[:0] = [str(HERE), str(HERE.parent), str(REPO / "host" / "python")]
 
+import gowin  # noqa: E402
 import report  # noqa: E402
 from toolchain import ToolError, gather, must  # noqa: E402
 
+LIBRARIES = "+/lattice/cells_sim_ecp5.v +/lattice/cells_bb_ecp5.v"
 INCLUDES = (REPO / "fpga/bridge_rtl/crc8.vh", REPO / "protocol/gen/whisker_protocol.vh")
 # Registers that lie in the pad's own cell: a route between them and the pad would eat the PHY's set-up time, spread the
 # nodes' lines, and behind a delay line it would not be timed.
@@ -29,9 +33,9 @@ PHY_REGISTERS = tuple(f"*ulpi_shim*/w:{name}" for name in ("ulpi_data_out", "ulp
 
 @dataclass(frozen=True)
 class Board:
-    """A board's file: `top` is its module, `phy` one of report.PHYS, or `gateware`; `number` the protocol's for it, `milliamps`
-    what it draws from the host's socket; `clock` the port of its clock; `pins` maps a port to a site, or a vector to its
-    sites, bit 0 first."""
+    """A board's file: `top` is its module, `phy` one of report.PHYS or report.UNJUDGED; `number` the protocol's for it,
+    `milliamps` what it draws from the host's socket; `clock` the port of its clock; `pins` maps a port to a site, or a vector to
+    its sites, bit 0 first."""
 
     name: str
     title: str
@@ -129,13 +133,13 @@ def generate_fs_phy(out: Path) -> Path:
     return path
 
 
-def front(top: str, files: list[Path], parameters: dict[str, int], out: Path) -> list[str]:
+def front(top: str, files: list[Path], parameters: dict[str, int], out: Path, libraries: str = LIBRARIES) -> list[str]:
     """Yosys commands that read a design and fail on latches, several drivers of a wire, and wires without one."""
     gather(out, *INCLUDES)
     names = gather(out, *files)
     given = [f"chparam -set {name} {value} {top}" for name, value in parameters.items()]
     return [
-        "read_verilog -lib -specify +/lattice/cells_sim_ecp5.v +/lattice/cells_bb_ecp5.v",
+        f"read_verilog -lib -specify {libraries}",
         "read_verilog " + " ".join(names),
         *given,
         f"hierarchy -check -top {top}",
@@ -172,6 +176,8 @@ def agree_on_resets(netlist: Path, top: str) -> None:
 
 def place(board: Board, lanes: int, netlist: Path, out: Path, seed: int = 1, speed: int | None = None) -> dict:
     """Places and routes; the report of report.read. A missed clock is no error here: the report tells."""
+    if gowin.is_gowin(board.device):
+        return report.read(gowin.place(board, sites(board, lanes), netlist, out, seed))
     (out / "pins.lpf").write_text(constraints(board, lanes))
     result = f"report_{seed}.json"
     options = ["--json", netlist.name, "--lpf", "pins.lpf", "--textcfg", f"{board.name}.config"]
@@ -192,7 +198,10 @@ def prepare(board: Board, lanes: int, out: Path, serial: str = "0001") -> Path:
         "LANES": lanes,
         **({"LEDS": len(leds)} if board.top == "usb3300_board" and isinstance(leds, list) else {}),
     }
-    netlist = synthesise(board.top, files, parameters, out, registers)
+    if gowin.is_gowin(board.device):
+        netlist = gowin.synthesise(board.top, front(board.top, files, parameters, out, gowin.LIBRARIES), out)
+    else:
+        netlist = synthesise(board.top, files, parameters, out, registers)
     problems = report.unconstrained_clocks(netlist, board.top, board.clock)
     if problems:
         raise ToolError("; ".join(problems))
@@ -204,11 +213,13 @@ def summary(board: Board, seed: int, placed: dict) -> str:
     limits = report.pin_limits(board.speed, board.phy)
     pins = ", ".join(f"{name} {placed[name] or 0:.1f} of {limit:.1f}" for name, limit in limits.items())
     used = ", ".join(f"{number} {name}" for name, number in placed["used"].items())
-    return f"{board.title}, seed {seed}: {placed['fmax_mhz']:.1f} MHz; pins: {pins}; {used}"
+    return f"{board.title}, seed {seed}: {placed['fmax_mhz']:.1f} MHz; pins: {pins or 'not judged'}; {used}"
 
 
 def pack(board: Board, out: Path) -> Path:
     """The bitstream of what was placed last."""
+    if gowin.is_gowin(board.device):
+        return gowin.pack(board, out)
     names = ["--input", f"{board.name}.config", "--bit", f"{board.name}.bit"]
     must("ecppack", "--compress", *names, log=out / "pack.log")
     return out / f"{board.name}.bit"

@@ -22,19 +22,20 @@ def of_amaranth(platform, *leds: tuple[str, int, str]) -> Platform:
         found = resource if not name else next(io for io in resource.ios if io.name == name)
         return found.ios[0]
 
+    usb = ("ulpi" if ("ulpi", 0) in platform.resources else "usb", 0)
     sockets = {f"{name} {number}": dict(c.mapping) for (name, number), c in platform.connectors.items()}
     phy = {}
-    if ("ulpi", 0) in platform.resources:
+    if any(io.name == "nxt" for io in platform.resources[usb].ios):
         names = {"data": "ulpi_data", "clk": "clk_60", "dir": "ulpi_dir", "nxt": "ulpi_nxt", "stp": "ulpi_stp"}
-        names["rst"] = "ulpi_reset_n" if pins(("ulpi", 0), "rst").invert else "ulpi_reset"
-        phy = {ours: pins(("ulpi", 0), theirs).names for theirs, ours in names.items()}
+        names["rst"] = "ulpi_reset_n" if pins(usb, "rst").invert else "ulpi_reset"
+        phy = {ours: pins(usb, theirs).names for theirs, ours in names.items()}
         phy = {port: found if port == "ulpi_data" else found[0] for port, found in phy.items()}
-    elif ("usb", 0) in platform.resources:
+    else:
         names = {"d_p": "usb_d_p", "d_n": "usb_d_n", "pullup": "usb_pull_up"}
-        phy = {ours: pins(("usb", 0), theirs).names[0] for theirs, ours in names.items()}
+        phy = {ours: pins(usb, theirs).names[0] for theirs, ours in names.items()}
         phy |= {"clk_25": pins(("clk25", 0), "").names[0]}
     return Platform(
-        platform.device,
+        getattr(platform, "part", None) or platform.device,
         sockets,
         phy,
         [pins((resource, number), part).names[0] for resource, number, part in leds],
@@ -86,6 +87,7 @@ CYNTHION = Platform(
 def platforms() -> dict[str, Platform]:
     """By the name of our file."""
     from amaranth_boards.ecpix5 import ECPIX545Platform
+    from amaranth_boards.tang_primer_20k import TangPrimer20kDockPlatform
     from amaranth_boards.ulx3s import ULX3S_85F_Platform
 
     return {
@@ -93,5 +95,6 @@ def platforms() -> dict[str, Platform]:
         "colorlight_i9": Platform("LFE5U-45F", EXTENSION_BOARD, {}, ["L2"]),
         "cynthion": CYNTHION,
         "ecpix5": of_amaranth(ECPIX545Platform(), *(("rgb_led", n, "g") for n in range(4))),
+        "tang_primer_20k": of_amaranth(TangPrimer20kDockPlatform(), *(("led", n, "") for n in range(4))),
         "ulx3s": of_amaranth(ULX3S_85F_Platform(), *(("led", n, "") for n in range(8))),
     }

@@ -28,7 +28,11 @@ class Phy:
     clock_out: bool
 
 
-GATEWARE = "gateware"  # no PHY: no pins whose timing counts, for a full-speed bit takes four samples
+GATEWARE = "gateware"  # no PHY
+UNJUDGED = {  # PHYs whose pins have no limits here, and why
+    GATEWARE: "a full-speed bit takes four samples",
+    "USB3317": "no clock-to-pin time of its FPGA is known",
+}
 PHYS = {
     # USB3300 data sheet, ULPI output clock mode; Intel's AN 702, table 3, repeats it
     "USB3300": Phy(setup=5.0, hold=0.0, earliest=2.0, latest=5.0, clock_out=False),
@@ -54,19 +58,26 @@ PADS = {
     8: Pads(clock_to_pin=5.4, hold=2.7, delayed_setup=1.2),
 }
 SPARE = {8: 1.10}  # of the clock asked for, by speed grade; 1 where it is not listed
-USED = {
-    "LUT": "TRELLIS_COMB",
-    "FF": "TRELLIS_FF",
-    "block RAM": "DP16KD",
-    "distributed RAM": "TRELLIS_RAMW",
-    "pin": "TRELLIS_IO",
+USED = {  # ECP5's and Gowin's names
+    "LUT": ("TRELLIS_COMB", "LUT4"),
+    "FF": ("TRELLIS_FF", "DFF"),
+    "block RAM": ("DP16KD", "BSRAM"),
+    "distributed RAM": ("TRELLIS_RAMW", "RAM16SDP4"),
+    "pin": ("TRELLIS_IO", "IOB"),
 }
 ASYNC = "<async>"
-SOURCES = {"OSCG": ("OSC",), "EHXPLLL": ("CLKOP", "CLKOS")}  # cells that make a clock which nextpnr knows
+SOURCES = {
+    "OSCG": ("OSC",),
+    "OSC": ("OSCOUT",),
+    "EHXPLLL": ("CLKOP", "CLKOS"),
+}  # cells that make a clock which nextpnr knows
 CLOCKED = {  # cell type: its clock inputs
     "TRELLIS_FF": ("CLK",),
     "DP16KD": ("CLKA", "CLKB"),
     "TRELLIS_DPR16X4": ("WCK",),
+    **{f"DFF{kind}{enable}": ("CLK",) for kind in ("", "S", "R", "P", "C") for enable in ("", "E")},
+    **dict.fromkeys(("RAM16SDP4", "SP", "SPX9"), ("CLK",)),
+    **dict.fromkeys(("SDPB", "SDPX9B", "DPB", "DPX9B"), ("CLKA", "CLKB")),
 }
 
 
@@ -74,7 +85,8 @@ def read(path: Path) -> dict:
     """The report's numbers: fmax_mhz, used, `slow`: other clocks that miss what is wanted of them, the longest paths that touch a pin, and the shortest from a pin to a flip-flop
     (in ns; None: there is none)."""
     text = json.loads(path.read_text())
-    (clock,) = (name for name, found in text["fmax"].items() if round(found["constraint"]) == CLOCK_MHZ)
+    ours = [name for name, found in text["fmax"].items() if round(found["constraint"]) == CLOCK_MHZ]
+    clock = min(ours, key=lambda name: text["fmax"][name]["achieved"])
     slow = [name for name, found in text["fmax"].items() if name != clock and found["achieved"] < found["constraint"]]
     paths: dict[str, float | None] = dict.fromkeys(("out_ns", "in_ns", "through_ns"))
     for found in text["critical_paths"]:
@@ -82,7 +94,8 @@ def read(path: Path) -> dict:
         name = {(clock, ASYNC): "out_ns", (ASYNC, clock): "in_ns", (ASYNC, ASYNC): "through_ns"}.get(kind)
         if name:
             paths[name] = round(sum(step["delay"] for step in found["path"]), 3)
-    used = {name: text["utilization"][cell]["used"] for name, cell in USED.items()}
+    cells = text["utilization"]
+    used = {name: next(cells[cell]["used"] for cell in kinds if cell in cells) for name, kinds in USED.items()}
     return {
         "fmax_mhz": round(text["fmax"][clock]["achieved"], 2),
         "used": used,
@@ -99,7 +112,7 @@ def shortest_in(text: dict) -> float | None:
     twice, always in the same order, first for the start that is named.
     """
     ways = []
-    for net in text["detailed_net_timings"]:
+    for net in text.get("detailed_net_timings", []):
         seen = set()
         for end in net["endpoints"]:
             place = (end["cell"], end["port"], end["event"])
@@ -116,7 +129,7 @@ def pin_limits(speed: int, phy: str) -> dict[str, float]:
     A PHY that takes its clock from the FPGA runs late by the clock's own way out, at most the clock-to-pin time: that is
     gained on what goes out (not counted here) and lost on what comes in.
     """
-    if phy == GATEWARE:
+    if phy in UNJUDGED:
         return {}
     out, phy_ = PADS[speed].clock_to_pin, PHYS[phy]
     return {
@@ -133,7 +146,7 @@ def late(speed: int, phy: str) -> float:
 
 def data_spare(speed: int, phy: str) -> dict[str, float]:
     """What DATA has to spare on its way in, in ns: before the edge and after it, the data sheets' figures alone."""
-    if phy == GATEWARE:
+    if phy in UNJUDGED:
         return {}
     before = PERIOD_NS - PHYS[phy].latest - late(speed, phy) - PADS[speed].delayed_setup
     return {"data_setup_ns": before, "data_hold_ns": PHYS[phy].earliest}
@@ -162,7 +175,7 @@ def timing_problems(placed: dict, speed: int, phy: str) -> list[str]:
             problems.append(f"a path takes {placed[name]:.1f} ns ({name}), {limit:.1f} are left for it")
     problems += [f"{name}: {spare:.1f} ns" for name, spare in data_spare(speed, phy).items() if spare < 0]
     problems += [f"{name} is too slow" for name in placed["slow"]]
-    if phy == GATEWARE:
+    if phy in UNJUDGED:
         return problems
     shortest, needed = placed["shortest_in_ns"], hold_needed(speed, phy)
     if shortest is None or shortest < needed:
@@ -174,6 +187,8 @@ def unconstrained_clocks(netlist: Path, top: str, clock: str) -> list[str]:
     """Cells of a netlist that another net than the port `clock` clocks."""
     module = json.loads(netlist.read_text())["modules"][top]
     (bit,) = module["ports"][clock]["bits"]
+    buffers = [cell["connections"] for cell in module["cells"].values() if cell["type"] == "IBUF"]
+    bit = next((pins["O"][0] for pins in buffers if pins["I"] == [bit]), bit)  # Gowin's netlists name the pads
     constants = (["0"], ["1"], ["x"])  # the clock of a memory port that is not used
     cells = module["cells"].values()
     own = [cell["connections"][port] for cell in cells for port in SOURCES.get(cell["type"], ())]

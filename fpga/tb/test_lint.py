@@ -37,7 +37,11 @@ def said(top: str, lanes: int, phy, folder) -> str:
     return done.stderr
 
 
-TOPS = [("usb3300_board", lanes) for lanes in (1, 6, 12, 14, 28)] + [("cynthion", 12), ("ulx3s", 28)]
+TOPS = [("usb3300_board", lanes) for lanes in (1, 6, 12, 14, 28)] + [
+    ("cynthion", 12),
+    ("tang_primer_20k", 28),
+    ("ulx3s", 28),
+]
 
 
 @pytest.mark.parametrize(("top", "lanes"), TOPS)

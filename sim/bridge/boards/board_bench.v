@@ -1,4 +1,5 @@
-// Bench top: a board's top between a PHY and nodes, under names that all boards share. BOARD_CYNTHION chooses the board.
+// Bench top: a board's top between a PHY and nodes, under names that all boards share. BOARD_CYNTHION or BOARD_TANG
+// chooses the board.
 
 `default_nettype none
 
@@ -35,6 +36,17 @@ module board_bench (
 
     cynthion #(.LANES(28)) board (
         .clk_60(clk), .ulpi_clk(phy_clk), .ulpi_reset_n(reset_n),
+`elsif BOARD_TANG
+    wire       reset_n;
+    wire [3:0] led_n;
+
+    assign reset    = !reset_n;
+    assign leds     = ~led_n;
+    assign led      = 1'b0;
+    assign tick_out = 1'b0;
+
+    tang_primer_20k #(.LANES(28)) board (
+        .clk_60(clk), .ulpi_reset_n(reset_n),
 `else
     wire led_n;
 
@@ -45,12 +57,19 @@ module board_bench (
         .clk_60(clk), .ulpi_reset(reset),
 `endif
         .ulpi_data(data), .ulpi_dir(dir), .ulpi_nxt(nxt), .ulpi_stp(stp), .sync(sync), .sck(sck), .select_n(select_n),
-        .mosi(mosi), .miso(miso), .tick_in(1'b0), .tick_out(tick_out), .led_n(led_n));
+`ifndef BOARD_TANG
+        .tick_in(1'b0), .tick_out(tick_out),
+`endif
+        .mosi(mosi), .miso(miso), .led_n(led_n));
 
     genvar i;
     generate
         for (i = 0; i < 8; i = i + 1) begin : line
+`ifdef BOARD_TANG
+            assign link_drives[i] = !board.line[i].pad.OEN;
+`else
             assign link_drives[i] = !board.pads.line[i].pad.T;
+`endif
         end
     endgenerate
 endmodule

@@ -40,6 +40,7 @@ class BoardTop
 };
 std::unique_ptr<BoardTop> make_usb3300_board();
 std::unique_ptr<BoardTop> make_cynthion();
+std::unique_ptr<BoardTop> make_tang();
 
 class BoardDevice : public Board
 {

@@ -1,5 +1,7 @@
 #include "Vcynthion_bench.h"
 #include "Vcynthion_bench___024root.h"
+#include "Vtang_bench.h"
+#include "Vtang_bench___024root.h"
 #include "Vusb3300_bench.h"
 #include "Vusb3300_bench___024root.h"
 #include "verilated_top.h"
@@ -15,6 +17,11 @@ std::unique_ptr<BoardTop> make_usb3300_board()
 std::unique_ptr<BoardTop> make_cynthion()
 {
     return std::make_unique<VerilatedTop<Vcynthion_bench>>();
+}
+
+std::unique_ptr<BoardTop> make_tang()
+{
+    return std::make_unique<VerilatedTop<Vtang_bench>>();
 }
 
 } // namespace bridge_sim

@@ -1,4 +1,4 @@
-// What the cells of an ECP5 do that the boards' tops use, without the time they take. Oscillators and PLLs run as the bench says.
+// What the cells of an ECP5 do that the boards' tops use, and those of a Gowin GW2A behind them, without the time they take. Oscillators and PLLs run as the bench says.
 
 `default_nettype none
 
@@ -86,6 +86,48 @@ module EHXPLLL #(
 );
     assign LOCK = 1'b1;
     initial {CLKOP, CLKOS} = 2'b00;
+endmodule
+
+module IOBUF (
+    output wire O,
+    inout  wire IO,
+    input  wire I,
+    input  wire OEN  // 1: let go
+);
+    assign IO = OEN ? 1'bz : I;
+    assign O  = IO;
+endmodule
+
+module LUT2 #(
+    parameter [3:0] INIT = 4'h0
+) (
+    input  wire I0,
+    input  wire I1,
+    output wire F
+);
+    assign F = INIT[{I1, I0}];
+endmodule
+
+module DFFS (
+    output reg  Q,
+    input  wire D,
+    input  wire CLK,
+    input  wire SET
+);
+    initial Q = 1'b1;
+    always @(posedge CLK) Q <= D || SET;
+endmodule
+
+module OSC #(
+    parameter FREQ_DIV = 100,
+    parameter DEVICE   = "GW2A-18"
+) (
+    output wire OSCOUT
+);
+    reg OSC /*verilator public_flat_rw*/;  // driven by the bench
+
+    assign OSCOUT = OSC;
+    initial OSC = 1'b0;
 endmodule
 
 `default_nettype wire

@@ -25,6 +25,7 @@ uint64_t ticks = 4; // of a run
 const BoardTraits USB3300 = {{}, true};
 const BoardTraits CYNTHION = {{0, 0, false, 0x39, 0x06}, false};
 
+enum { USB3300_BOARD, CYNTHION_BOARD, TANG, ULX3S }; // in BOARDS
 const Kind BOARDS[] = {
     {"usb3300_board", BusSpeed::HIGH, false, true,
      [](NodeBus &nodes, const BoardFault &fault) {
@@ -33,6 +34,10 @@ const Kind BOARDS[] = {
     {"cynthion", BusSpeed::HIGH, true, true,
      [](NodeBus &nodes, const BoardFault &fault) {
          return std::make_unique<BoardDevice>(make_cynthion(), CYNTHION, nodes, fault);
+     }},
+    {"tang_primer_20k", BusSpeed::HIGH, false, true,
+     [](NodeBus &nodes, const BoardFault &fault) {
+         return std::make_unique<BoardDevice>(make_tang(), USB3300, nodes, fault);
      }},
     {"ulx3s", BusSpeed::FULL, false, true,
      [](NodeBus &nodes, const BoardFault &fault) {
@@ -55,7 +60,7 @@ BoardDevice &with_phy(Trial &trial)
 // The device goes when its clock does, and comes back as after power-up.
 void a_phy_whose_clock_hangs_is_reset(void **)
 {
-    const Kind &kind = BOARDS[0];
+    const Kind &kind = BOARDS[USB3300_BOARD];
     Trial trial(kind, {});
     trial.enumerated();
     assert_int_equal(with_phy(trial).resets(), 0);
@@ -89,7 +94,7 @@ std::pair<unsigned, unsigned> watched(BoardDevice &board)
 // Changes in four slow blinks, and sixteenths of the time in which it is lit.
 void one_led_tells_all(void **)
 {
-    Trial trial(BOARDS[0], {});
+    Trial trial(BOARDS[USB3300_BOARD], {});
     BoardDevice &board = with_phy(trial);
     trial.host().idle(MS);
     assert_true(watched(board) == std::make_pair(8u, 1u)); // flashes: the PHY is set up
@@ -110,7 +115,7 @@ void a_dropped_frame_lights_the_error_led(void **)
     constexpr uint64_t FULL = WHISKER_LIMIT_FIFO_BYTES / WHISKER_FRAME_BYTES * WHISKER_LIMIT_TICK_PERIOD_MIN;
     constexpr uint64_t MICROFRAME = MS / 8;
     constexpr uint8_t RUNS = LED_PHY | LED_CONFIGURED | LED_RUN;
-    Trial trial(BOARDS[1], {});
+    Trial trial(BOARDS[CYNTHION_BOARD], {});
     trial.enumerated();
     trial.begin(WHISKER_LIMIT_TICK_PERIOD_MIN);
     for (uint64_t passed = 0; passed < FULL + FULL / 2; passed += MICROFRAME) {
@@ -137,7 +142,7 @@ void a_full_speed_board_has_no_other_speed(void **)
     constexpr SetupRequest GET_QUALIFIER = {0x80, 6, 0x0600, 0, 10};
     constexpr SetupRequest GET_OTHER_SPEED = {0x80, 6, 0x0700, 0, 9};
     constexpr uint64_t SHORT_RESET = MS / 50;
-    Trial trial(BOARDS[2], {});
+    Trial trial(BOARDS[ULX3S], {});
     trial.enumerated();
     Bytes data;
     assert_true(control_transfer(trial.host(), GET_QUALIFIER, data) == Outcome::STALL);
@@ -156,8 +161,8 @@ void every_fault_is_noticed(void **)
     std::mt19937_64 generator(seed);
     std::set<std::string> drawn;
     const BoardFault swapped = {BoardFault::Kind::SWAPPED, Wire::DATA, Wire::DATA, 0, 1}; // D+ and D-
-    assert_string_not_equal(tried(BOARDS[2], swapped, ticks).c_str(), "");
-    for (const Kind &kind : {BOARDS[0], BOARDS[1]}) {
+    assert_string_not_equal(tried(BOARDS[ULX3S], swapped, ticks).c_str(), "");
+    for (const Kind &kind : {BOARDS[USB3300_BOARD], BOARDS[CYNTHION_BOARD], BOARDS[TANG]}) {
         for (unsigned n = 0; n < faults;) {
             const BoardFault fault = BoardFault::draw(generator, LANES, kind.polarity);
             const std::string name = std::string(kind.name) + ": " + fault.name();

@@ -92,7 +92,7 @@ def facts(name: str, runs: list[dict]) -> dict:
     board = boards.load(name)
     known = {key: getattr(board, key) for key in ("title", "part", "speed", "lanes")}
     spare = report.data_spare(board.speed, board.phy)
-    least = {} if board.phy == report.GATEWARE else {"shortest_in_ns": report.hold_needed(board.speed, board.phy)}
+    least = {} if board.phy in report.UNJUDGED else {"shortest_in_ns": report.hold_needed(board.speed, board.phy)}
     limits = report.pin_limits(board.speed, board.phy)
     return {**known, "limits": limits, "least": least, **spare, "runs": sorted(runs, key=lambda run: run["lanes"])}
 
