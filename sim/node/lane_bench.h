@@ -13,12 +13,7 @@ struct lane_timing {
 };
 struct lane_timing lane_timing_of(unsigned sck_divider, unsigned word_gap, unsigned tick_period);
 
-/* The shortest tick period that this build of the firmware follows, in cycles of 60 MHz. */
-#ifdef SAMPLER_RESYNC_EVERY_FRAME
-enum { LANE_TICK_PERIOD = 42000 }; /* 1.43 kHz */
-#else
-enum { LANE_TICK_PERIOD = WHISKER_LIMIT_TICK_PERIOD };
-#endif
+enum { LANE_TICK_PERIOD = SIM_TICK_NS * (WHISKER_LIMIT_CLOCK_HZ / 1000000u) / 1000u }; /* cycles of 60 MHz */
 
 /* One tick as the world breaks it; all zero: nothing is broken. */
 struct lane_faults {
