@@ -27,7 +27,7 @@ MESSAGES = (
 CRC = p.DEFINITION["crc8"]
 # Numbers with a doc each: table of the definition, prefix of the constants.
 NUMBERED = {"service_commands": "SERVICE_COMMAND", "info": "INFO", "health": "HEALTH", "node_states": "NODE_STATE"}
-NUMBERED |= {"boards": "BOARD"}
+NUMBERED |= {"boards": "BOARD", "flash_commands": "FLASH_COMMAND"}
 FLAGS = {"frame_flags": "FRAME_FLAG", "control_options": "CONTROL_OPTION"}  # the same of bits
 
 

@@ -8,6 +8,7 @@
 
 module board_core #(
     parameter       LANES           = 28,
+    parameter [7:0] FLASH_SECTORS   = 8'd0,  // see whisker_bridge
     parameter [5:0] VENDOR_REGISTER = 6'h00, // of the PHY, see ulpi_shim
     parameter [7:0] VENDOR_VALUE    = 8'h00,
     parameter       BLINK_BITS      = 21     // see status_leds
@@ -27,6 +28,10 @@ module board_core #(
     input  wire [LANES-1:0] miso,           // .
     input  wire             tick_in,        // . 0 where a board has no pin for it
     output wire             tick_out,       // .
+    output wire             flash_cs_n,     // configuration flash
+    output wire             flash_sck,      // .
+    output wire             flash_mosi,     // .
+    input  wire             flash_miso,     // . 0 where FLASH_SECTORS is
     output wire [3:0]       leds,           // see status_leds
     output wire             led             // . for a board that has one
 );
@@ -62,7 +67,7 @@ module board_core #(
         .utmi_session_valid(session_valid), .utmi_session_end(session_end), .utmi_xcvr_select(xcvr_select),
         .utmi_term_select(term_select), .utmi_op_mode(op_mode));
 
-    whisker_bridge #(.LANES(LANES)) bridge (
+    whisker_bridge #(.LANES(LANES), .FLASH_SECTORS(FLASH_SECTORS)) bridge (
         .clk(clk), .rst(rst), .sync(sync), .sck(sck), .select_n(select_n), .mosi(mosi), .miso(miso),
         .utmi_rx_data(rx_data), .utmi_rx_active(rx_active), .utmi_rx_valid(rx_valid), .utmi_rx_error(rx_error),
         .utmi_tx_data(tx_data), .utmi_tx_valid(tx_valid), .utmi_tx_ready(tx_ready), .utmi_line_state(line_state),
@@ -70,7 +75,8 @@ module board_core #(
         .utmi_xcvr_select(xcvr_select), .utmi_term_select(term_select), .utmi_op_mode(op_mode),
         .serial_number(64'd0), .tick_external(1'b0), .tick_strobe(1'b0), .tick_in(tick_in), .tick_out(tick_out),
         .usb_configured(configured), .frames_lost(frames_lost), .running(running), .link_busy(link_busy),
-        .transfer_busy(transfer_busy), .led(lit));
+        .transfer_busy(transfer_busy), .led(lit), .flash_cs_n(flash_cs_n), .flash_sck(flash_sck),
+        .flash_mosi(flash_mosi), .flash_miso(flash_miso));
 endmodule
 
 `default_nettype wire

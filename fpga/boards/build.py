@@ -31,11 +31,16 @@ NODE_REGISTERS += ("tick_generator/w:tick_out", "tick_input/w:pin")
 PHY_REGISTERS = tuple(f"*ulpi_shim*/w:{name}" for name in ("ulpi_data_out", "ulpi_stp", "data"))
 
 
+FLASH_REGISTERS = tuple(f"*flash_control*/w:{name}" for name in ("flash_cs_n", "flash_mosi", "miso"))
+FLASH_PORTS = ("flash_cs_n", "flash_mosi", "flash_miso", "flash_high")
+
+
 @dataclass(frozen=True)
 class Board:
     """A board's file: `top` is its module, `phy` one of report.PHYS or report.UNJUDGED; `number` the protocol's for it,
     `milliamps` what it draws from the host's socket; `clock` the port of its clock; `pins` maps a port to a site, or a vector to
-    its sites, bit 0 first."""
+    its sites, bit 0 first. `flash`: what a host may write of the configuration flash, from address 0 on, in sectors of 64 KiB;
+    0: nothing; `flash_mbit` is its size in Mbit, as far as 24 bits of address reach."""
 
     name: str
     title: str
@@ -52,6 +57,8 @@ class Board:
     pins: dict[str, str | list[str]]
     clock: str = "clk_60"
     clock_mhz: float = report.CLOCK_MHZ
+    flash: int = 0
+    flash_mbit: int = 0
 
 
 def boards() -> list[str]:
@@ -133,26 +140,43 @@ def generate_fs_phy(out: Path) -> Path:
     return path
 
 
-def front(top: str, files: list[Path], parameters: dict[str, int], out: Path, libraries: str = LIBRARIES) -> list[str]:
-    """Yosys commands that read a design and fail on latches, several drivers of a wire, and wires without one."""
+def front(
+    top: str,
+    files: list[Path],
+    parameters: dict[str, int],
+    out: Path,
+    libraries: str = LIBRARIES,
+    without: tuple[str, ...] = (),
+) -> list[str]:
+    """Yosys commands that read a design and fail on latches, several drivers of a wire, and wires without one; ports
+    `without` a pin are left out."""
     gather(out, *INCLUDES)
     names = gather(out, *files)
     given = [f"chparam -set {name} {value} {top}" for name, value in parameters.items()]
+    absent = [f"delete -port {top}/w:{port}" for port in without]
     return [
         f"read_verilog -lib -specify {libraries}",
         "read_verilog " + " ".join(names),
         *given,
         f"hierarchy -check -top {top}",
+        *absent,
         "proc",
         "select -assert-none t:$dlatch t:$adlatch t:$dlatchsr t:$sr",
         "check -assert",
     ]
 
 
-def synthesise(top: str, files: list[Path], parameters: dict[str, int], out: Path, registers: tuple[str, ...]) -> Path:
-    """Netlist of `top` for ECP5, `registers` (patterns of Yosys) in the pads' cells."""
+def synthesise(
+    top: str,
+    files: list[Path],
+    parameters: dict[str, int],
+    out: Path,
+    registers: tuple[str, ...],
+    without: tuple[str, ...] = (),
+) -> Path:
+    """Netlist of `top` for ECP5, `registers` (patterns of Yosys) in the pads' cells; `without`: see front."""
     marks = [f"select -assert-any {name}; setattr -set syn_useioff 1 {name}" for name in registers]
-    steps = [*front(top, files, parameters, out), *marks, f"synth_ecp5 -top {top} -json netlist.json"]
+    steps = [*front(top, files, parameters, out, without=without), *marks, f"synth_ecp5 -top {top} -json netlist.json"]
     (out / "synth.ys").write_text("\n".join(steps) + "\n")
     must("yosys", "-q", "-s", "synth.ys", log=out / "synth.log")
     agree_on_resets(out / "netlist.json", top)
@@ -198,10 +222,14 @@ def prepare(board: Board, lanes: int, out: Path, serial: str = "0001") -> Path:
         "LANES": lanes,
         **({"LEDS": len(leds)} if board.top == "usb3300_board" and isinstance(leds, list) else {}),
     }
+    if board.flash:
+        parameters["FLASH_SECTORS"] = board.flash
+        registers += FLASH_REGISTERS
     if gowin.is_gowin(board.device):
         netlist = gowin.synthesise(board.top, front(board.top, files, parameters, out, gowin.LIBRARIES), out)
     else:
-        netlist = synthesise(board.top, files, parameters, out, registers)
+        without = tuple(port for port in FLASH_PORTS if port not in board.pins)
+        netlist = synthesise(board.top, files, parameters, out, registers, without)
     problems = report.unconstrained_clocks(netlist, board.top, board.clock)
     if problems:
         raise ToolError("; ".join(problems))

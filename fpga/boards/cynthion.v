@@ -1,5 +1,6 @@
 // Pads of Cynthion r1.4 (LFE5U-12F): its AUX port's PHY, which takes its 60 MHz from the FPGA, as the FPGA takes it from
-// an oscillator. The other ports are left alone; AUX needs no arrangement with the board's microcontroller.
+// an oscillator. The other ports are left alone; AUX needs no arrangement with the board's microcontroller,
+// which is who writes the configuration flash.
 
 `default_nettype none
 
@@ -27,9 +28,9 @@ module cynthion #(
     localparam [7:0] PHY_SWAPPED  = 8'h06;
 
     wire [7:0] data_in, data_out;
-    wire       osc, dir, nxt, ulpi_reset, led;
+    wire       osc, dir, nxt, ulpi_reset, led, flash_cs_n, flash_sck, flash_mosi;
     wire [3:0] leds;
-    wire       unused = led;
+    wire       unused = &{led, flash_cs_n, flash_sck, flash_mosi};
 
     assign ulpi_clk     = clk_60;
     assign ulpi_reset_n = !ulpi_reset;
@@ -44,7 +45,8 @@ module cynthion #(
     board_core #(.LANES(LANES), .VENDOR_REGISTER(PHY_POLARITY), .VENDOR_VALUE(PHY_SWAPPED)) core (
         .clk(clk_60), .osc(osc), .ulpi_data_in(data_in), .ulpi_data_out(data_out), .ulpi_dir(dir), .ulpi_nxt(nxt),
         .ulpi_stp(ulpi_stp), .ulpi_reset(ulpi_reset), .sync(sync), .sck(sck), .select_n(select_n), .mosi(mosi),
-        .miso(miso), .tick_in(tick_in), .tick_out(tick_out), .leds(leds), .led(led));
+        .miso(miso), .tick_in(tick_in), .tick_out(tick_out), .leds(leds), .led(led), .flash_cs_n(flash_cs_n),
+        .flash_sck(flash_sck), .flash_mosi(flash_mosi), .flash_miso(1'b0));
 endmodule
 
 `default_nettype wire

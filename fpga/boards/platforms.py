@@ -6,12 +6,14 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Platform:
-    """`part` as the maker names it, `sockets` by name (pin number: ball), `phy` by the names of our ports, `leds`: balls."""
+    """`part` as the maker names it, `sockets` by name (pin number: ball), `phy` by the names of our ports, `leds`: balls, `flash`:
+    the configuration flash by the names of our ports, WP and HOLD in `flash_high`."""
 
     part: str
     sockets: dict[str, dict[str, str]]
     phy: dict[str, str | list[str]]
     leds: list[str]
+    flash: dict[str, str | list[str]]
 
 
 def of_amaranth(platform, *leds: tuple[str, int, str]) -> Platform:
@@ -34,11 +36,16 @@ def of_amaranth(platform, *leds: tuple[str, int, str]) -> Platform:
         names = {"d_p": "usb_d_p", "d_n": "usb_d_n", "pullup": "usb_pull_up"}
         phy = {ours: pins(usb, theirs).names[0] for theirs, ours in names.items()}
         phy |= {"clk_25": pins(("clk25", 0), "").names[0]}
+    chip = next(key for key in platform.resources if key[0] in ("spi_flash", "spi_flash_1x"))
+    io = {part.name: part.ios[0].names[0] for part in platform.resources[chip].ios if part.name != "clk"}
+    flash = {"flash_cs_n": io["cs"], "flash_mosi": io["copi"], "flash_miso": io["cipo"]}
+    flash |= {"flash_high": [io["wp"], io["hold"]]} if "wp" in io else {}
     return Platform(
         getattr(platform, "part", None) or platform.device,
         sockets,
         phy,
         [pins((resource, number), part).names[0] for resource, number, part in leds],
+        flash,
     )
 
 
@@ -48,6 +55,8 @@ def table(text: str, numbers: str) -> dict[str, str]:
     return {number: ball for number, ball in named if ball != "-"}
 
 
+# colorlight_i9_v7.2.md of github.com/wuxx/Colorlight-FPGA-Projects; the i5 has the same.
+COLORLIGHT_FLASH = {"flash_cs_n": "R2", "flash_mosi": "W2", "flash_miso": "V2"}
 PMOD = "1 2 3 4 7 8 9 10"
 # github.com/wuxx/Colorlight-FPGA-Projects, doc/i5_extboard_v1.2_pinout.png: two rows of four for each half of a header. The
 # i9 has L2 where the i5 has U16, on P2; both are the LED.
@@ -81,6 +90,7 @@ CYNTHION = Platform(
         "clk_60": "A8",
     },
     ["E13", "C13", "B14", "A15", "D12", "C11"],
+    {},
 )
 
 
@@ -91,8 +101,8 @@ def platforms() -> dict[str, Platform]:
     from amaranth_boards.ulx3s import ULX3S_85F_Platform
 
     return {
-        "colorlight_i5": Platform("LFE5U-25F", EXTENSION_BOARD, {}, ["U16"]),
-        "colorlight_i9": Platform("LFE5U-45F", EXTENSION_BOARD, {}, ["L2"]),
+        "colorlight_i5": Platform("LFE5U-25F", EXTENSION_BOARD, {}, ["U16"], COLORLIGHT_FLASH),
+        "colorlight_i9": Platform("LFE5U-45F", EXTENSION_BOARD, {}, ["L2"], COLORLIGHT_FLASH),
         "cynthion": CYNTHION,
         "ecpix5": of_amaranth(ECPIX545Platform(), *(("rgb_led", n, "g") for n in range(4))),
         "tang_primer_20k": of_amaranth(TangPrimer20kDockPlatform(), *(("led", n, "") for n in range(4))),

@@ -90,7 +90,8 @@ def read(path: Path) -> dict:
     slow = [name for name, found in text["fmax"].items() if name != clock and found["achieved"] < found["constraint"]]
     paths: dict[str, float | None] = dict.fromkeys(("out_ns", "in_ns", "through_ns"))
     for found in text["critical_paths"]:
-        kind = tuple(end if end == ASYNC else clock if clock in end else "" for end in (found["from"], found["to"]))
+        ends = (found["from"], found["to"])
+        kind = tuple(end if end == ASYNC else clock if end == f"posedge {clock}" else "" for end in ends)
         name = {(clock, ASYNC): "out_ns", (ASYNC, clock): "in_ns", (ASYNC, ASYNC): "through_ns"}.get(kind)
         if name:
             paths[name] = round(sum(step["delay"] for step in found["path"]), 3)

@@ -21,9 +21,9 @@ module tang_primer_20k #(
     output wire [3:0]       led_n
 );
     wire [7:0] data_in, data_out, dir_before, let_go;
-    wire       osc, ulpi_reset, tick_out, led;
+    wire       osc, ulpi_reset, tick_out, led, flash_cs_n, flash_sck, flash_mosi;
     wire [3:0] leds;
-    wire       unused = &{1'b0, tick_out, led};
+    wire       unused = &{1'b0, tick_out, led, flash_cs_n, flash_sck, flash_mosi};
 
     assign ulpi_reset_n = !ulpi_reset;
     assign led_n        = ~leds;
@@ -43,7 +43,8 @@ module tang_primer_20k #(
     board_core #(.LANES(LANES)) core (
         .clk(clk_60), .osc(osc), .ulpi_data_in(data_in), .ulpi_data_out(data_out), .ulpi_dir(ulpi_dir),
         .ulpi_nxt(ulpi_nxt), .ulpi_stp(ulpi_stp), .ulpi_reset(ulpi_reset), .sync(sync), .sck(sck), .select_n(select_n),
-        .mosi(mosi), .miso(miso), .tick_in(1'b0), .tick_out(tick_out), .leds(leds), .led(led));
+        .mosi(mosi), .miso(miso), .tick_in(1'b0), .tick_out(tick_out), .leds(leds), .led(led), .flash_cs_n(flash_cs_n),
+        .flash_sck(flash_sck), .flash_mosi(flash_mosi), .flash_miso(1'b0));
 endmodule
 
 `default_nettype wire

@@ -1,4 +1,4 @@
-"""The boards' pin files against the boards' public platform files: PHY, LEDs, every lane in its socket. Faults drawn at random
+"""The boards' pin files against the boards' public platform files: PHY, LEDs, flash, every lane in its socket. Faults drawn at random
 are noticed. WHISKER_BENCH_SEED chooses them."""
 
 import os
@@ -52,6 +52,7 @@ def wrong(board, platform) -> list[str]:
     phy = platform.phy or {port: found if port == "ulpi_data" else found[0] for port, found in module.items()}
     lines = balls(platform, WIRING[board.name])
     expected = {**phy, **dict(zip(BUS, lines, strict=False)), "miso": lines[len(BUS) :]}
+    expected |= platform.flash if board.flash else {}
     if board.name in TICKS:
         expected |= dict(zip(("tick_in", "tick_out"), balls(platform, [TICKS[board.name]]), strict=True))
     found = [port for port, place in expected.items() if board.pins.get(port) != place]

@@ -6,7 +6,8 @@
 `default_nettype none
 
 module ulx3s #(
-    parameter LANES = 28
+    parameter       LANES         = 28,
+    parameter [7:0] FLASH_SECTORS = 8'd0  // see whisker_bridge
 ) (
     input  wire             clk_25,
     inout  wire             usb_d_p,
@@ -19,15 +20,23 @@ module ulx3s #(
     input  wire [LANES-1:0] miso,
     input  wire             tick_in,  // pulled down: another bridge's tick_out, a camera, a PPS
     output wire             tick_out, // to another bridge's tick_in
-    output wire [3:0]       led
+    output wire [3:0]       led,
+    output wire [1:0]       flash_high, // the configuration flash's WP and HOLD
+    output wire             flash_cs_n, // . its clock is no pin of ours but USRMCLK
+    output wire             flash_mosi,
+    input  wire             flash_miso
 );
     wire       clk_60, clk_48, locked, osc, lit, one;
     wire       d_p_in, d_p_out, d_p_oe, d_n_in, d_n_out, d_n_oe;
     wire [7:0] rx_data, tx_data;
     wire       rx_active, rx_valid, rx_error, tx_valid, tx_ready, term_select;
     wire [1:0] line_state, xcvr_select, op_mode;
-    wire       running, link_busy, transfer_busy, configured, frames_lost;
+    wire       running, link_busy, transfer_busy, configured, frames_lost, flash_sck;
     wire       unused = &{1'b0, link_busy, transfer_busy, lit, one};
+
+    assign flash_high = 2'b11;
+
+    (* keep *) USRMCLK flash_clock (.USRMCLKI(flash_sck), .USRMCLKTS(FLASH_SECTORS == 8'd0));
 
     // 25 MHz / 5 * 12 * 8 = 480 MHz, over 8 and over 10
     (* keep *) EHXPLLL #(
@@ -64,7 +73,7 @@ module ulx3s #(
         .utmi_tx_valid(tx_valid), .utmi_tx_ready(tx_ready), .utmi_line_state(line_state),
         .utmi_xcvr_select(xcvr_select), .utmi_term_select(term_select), .utmi_op_mode(op_mode));
 
-    whisker_bridge #(.LANES(LANES)) bridge (
+    whisker_bridge #(.LANES(LANES), .FLASH_SECTORS(FLASH_SECTORS)) bridge (
         .clk(clk_60), .rst(rst), .sync(sync), .sck(sck), .select_n(select_n), .mosi(mosi), .miso(miso),
         .utmi_rx_data(rx_data), .utmi_rx_active(rx_active), .utmi_rx_valid(rx_valid), .utmi_rx_error(rx_error),
         .utmi_tx_data(tx_data), .utmi_tx_valid(tx_valid), .utmi_tx_ready(tx_ready), .utmi_line_state(line_state),
@@ -72,7 +81,8 @@ module ulx3s #(
         .utmi_xcvr_select(xcvr_select), .utmi_term_select(term_select), .utmi_op_mode(op_mode),
         .serial_number(64'd0), .tick_external(1'b0), .tick_strobe(1'b0), .tick_in(tick_in), .tick_out(tick_out),
         .usb_configured(configured), .frames_lost(frames_lost), .running(running), .link_busy(link_busy),
-        .transfer_busy(transfer_busy), .led(lit));
+        .transfer_busy(transfer_busy), .led(lit), .flash_cs_n(flash_cs_n), .flash_sck(flash_sck),
+        .flash_mosi(flash_mosi), .flash_miso(flash_miso));
 endmodule
 
 `default_nettype wire

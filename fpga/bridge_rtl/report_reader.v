@@ -1,15 +1,17 @@
-// Answers the host's reads: HID reports control, counters, identity, answers and timing. The whole report is taken at once when a
-// read begins, so that a counter cannot change between two of its bytes, and is then shifted out; behind the header of
-// answers come the bytes of answer_store.
+// Answers the host's reads: HID reports control, counters, identity, answers, timing and flash. The whole report is taken at once
+// when a read begins, so that a counter cannot change between two of its bytes, and is then shifted out; behind the header of
+// answers come the bytes of answer_store. Those of flash_control join the header of flash as it is shifted out.
 //
 //   settings, counters, constants --[ by id ]--start--> report --next--> data, data, ..
-//                                             answer_store --------------^
+//                                     flash_control ------^              ^
+//                                     answer_store ----------------------'
 
 `default_nettype none
 
 module report_reader #(
-    parameter LANES      = 28,  // that have a pin
-    parameter FIFO_BYTES = 16384
+    parameter       LANES         = 28,  // that have a pin
+    parameter       FIFO_BYTES    = 16384,
+    parameter [7:0] FLASH_SECTORS = 8'd0  // see flash_control
 ) (
     input  wire             clk,             // 60 MHz
     input  wire             read_start,      // a read begins: data is the report's first byte from the next cycle on
@@ -44,21 +46,27 @@ module report_reader #(
     input  wire [31:0]      records_tick,    // .
     input  wire             pending,         // service order
     input  wire [7:0]       sequence_low,    // .
+    input  wire [1:0]       flash_command,   // flash_control
+    input  wire             flash_busy,      // .
+    input  wire [7:0]       flash_data,      // . byte of the report, from its address on
     input  wire             in_header,       // answer_store: the report's header is being read
     input  wire [7:0]       answer_data      // byte of the report, if not
 );
     `include "whisker_protocol.vh"
 
     localparam REPORT_BITS = 8 * REPORT_COUNTERS_BYTES;  // the longest
+    localparam JOIN = 8 * REPORT_FLASH_ADDRESS;          // where the header of flash ends
 
     reg [REPORT_BITS-1:0] report;
     reg                   answers;  // the report being read is this one
+    reg                   flash;    // .
 
     always @(posedge clk)
         if (read_start) begin
             report <= {REPORT_BITS{1'b0}};
             report[7:0] <= read_id;
             answers <= (read_id == REPORT_ID_ANSWERS[7:0]);
+            flash   <= (read_id == REPORT_ID_FLASH[7:0]);
             report[15:8] <= WIRE_VERSION[7:0];  // at the same place in every report
             case (read_id)
                 REPORT_ID_CONTROL[7:0]: begin
@@ -105,9 +113,17 @@ module report_reader #(
                     report[8*REPORT_TIMING_UNEVEN +: 32] <= uneven;
                     report[8*REPORT_TIMING_SHORTEST +: 32] <= shortest;
                 end
+                REPORT_ID_FLASH[7:0]: begin
+                    report[8*REPORT_FLASH_COMMAND +: 2] <= flash_command;
+                    report[8*REPORT_FLASH_BUSY] <= flash_busy;
+                    report[8*REPORT_FLASH_WRITABLE + 16 +: 8] <= FLASH_SECTORS;
+                end
                 default: ;
             endcase
-        end else if (read_next) report <= report >> 8;
+        end else if (read_next) begin
+            report <= report >> 8;
+            if (flash) report[JOIN-1 -: 8] <= flash_data;
+        end
 
     assign read_data = (answers && !in_header) ? answer_data : report[7:0];
 endmodule

@@ -7,8 +7,9 @@
 //        v                v                                                             |
 //   bridge_counters   lane_receiver --> record_store --> framer --> frame_fifo --> whisker_usb <--> UTMI
 //        |                '------------> answer_store --\                               |
-//        '------------------------------> report_reader --> HID reports 1, 2, 3, 5, 6 --/
-//                  node_link <-------- service_store <-- HID report 4 -----------------'
+//        '------------------------------> report_reader --> HID reports 1 to 3, 5 to 7 -/
+//                  node_link <-------- service_store <-- HID report 4 ------------------+
+//      configuration flash <---------> flash_control <-- HID report 7 -----------------'
 //
 // link_busy falls when the transfer is over: the next tick may begin, for the framer works from the other bank of the
 // record store. transfer_busy falls when the frame is in the FIFO too (about 260 cycles later).
@@ -16,7 +17,8 @@
 `default_nettype none
 
 module whisker_bridge #(
-    parameter LANES = 28
+    parameter       LANES         = 28,
+    parameter [7:0] FLASH_SECTORS = 8'd0  // see flash_control; 0: there is no flash, every order is refused
 ) (
     input  wire             clk,                  // 60 MHz, from the PHY
     input  wire             rst,                  // synchronous, power-up
@@ -49,7 +51,11 @@ module whisker_bridge #(
     output wire             transfer_busy,        // from SYNC until the frame is in the FIFO
     output wire             usb_configured,       // the host has set the configuration
     output reg              frames_lost,          // a frame of this run, or of the one before, was dropped
-    output wire             led                   // a run is in progress
+    output wire             led,                  // a run is in progress
+    output wire             flash_cs_n,           // configuration flash
+    output wire             flash_sck,            // .
+    output wire             flash_mosi,           // .
+    input  wire             flash_miso            // .
 );
     `include "whisker_protocol.vh"
 
@@ -62,7 +68,9 @@ module whisker_bridge #(
     wire [5:0] write_index;
     wire [1:0] read_packet;
     wire [7:0] write_data, read_id, read_data, stream_data;
-    wire       control_accept, service_accept;
+    wire       control_accept, service_accept, flash_accept, flash_busy;
+    wire [1:0] flash_command;
+    wire [7:0] flash_data;
     wire       stream_valid, stream_last, stream_ready;
     wire       sof, read_open;
     wire [10:0] sof_frame;
@@ -137,7 +145,22 @@ module whisker_bridge #(
         .start(start), .stop(stop), .run(run), .sck_divider(sck_divider), .word_gap(word_gap),
         .sample_point(sample_point), .options(options), .lane_mask(lane_mask), .tick_period(tick_period));
 
-    assign write_accept = control_accept || service_accept;
+    assign write_accept = control_accept || service_accept || flash_accept;
+
+    generate
+        if (FLASH_SECTORS == 8'd0) begin : no_flash
+            wire unused = flash_miso;
+            assign {flash_accept, flash_busy, flash_command, flash_data} = 12'd0;
+            assign {flash_cs_n, flash_sck, flash_mosi} = 3'b100;
+        end else begin : flash
+            flash_control #(.SECTORS(FLASH_SECTORS)) control (
+                .clk(clk), .rst(rst), .running(running), .write_start(write_start), .write_valid(write_valid),
+                .write_index(write_index), .write_data(write_data), .write_done(write_done), .write_accept(flash_accept),
+                .read_start(read_start), .read_next(read_next), .read_data(flash_data), .command(flash_command),
+                .busy(flash_busy), .flash_cs_n(flash_cs_n), .flash_sck(flash_sck), .flash_mosi(flash_mosi),
+                .flash_miso(flash_miso));
+        end
+    endgenerate
 
     service_store service (
         .clk(clk), .rst(halt), .power_up(rst), .write_start(write_start), .write_valid(write_valid), .write_index(write_index),
@@ -214,7 +237,7 @@ module whisker_bridge #(
         .records_good(records_good), .records_absent(records_absent), .records_crc(records_crc),
         .records_tick(records_tick));
 
-    report_reader #(.LANES(LANES), .FIFO_BYTES(1 << FIFO_ADDRESS_BITS)) reports (
+    report_reader #(.LANES(LANES), .FIFO_BYTES(1 << FIFO_ADDRESS_BITS), .FLASH_SECTORS(FLASH_SECTORS)) reports (
         .clk(clk), .read_start(read_start), .read_id(read_id), .read_next(read_next), .read_data(read_data),
         .running(running), .run(run), .sck_divider(sck_divider), .word_gap(word_gap), .sample_point(sample_point),
         .options(options), .board(board), .build(build), .tick(tick_number), .usb_time(usb_time), .sof_cycles(sof_cycles),
@@ -222,7 +245,8 @@ module whisker_bridge #(
         .shortest(tick_shortest), .lane_mask(lane_mask), .tick_period(tick_period), .ticks(ticks), .frames(frames), .dropped(dropped),
         .records_good(records_good), .records_absent(records_absent), .records_crc(records_crc),
         .records_tick(records_tick), .pending(service_pending || answers_wait), .sequence_low(answers_shown),
-        .in_header(answer_header), .answer_data(answer_data));
+        .flash_command(flash_command), .flash_busy(flash_busy), .flash_data(flash_data), .in_header(answer_header),
+        .answer_data(answer_data));
 
     whisker_usb usb (
         .clk(clk), .rst(rst),

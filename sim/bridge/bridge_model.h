@@ -3,6 +3,7 @@
 
 #include <memory>
 
+#include "flash/nor_flash.h"
 #include "node_bus.h"
 #include "utmi.h"
 
@@ -14,8 +15,8 @@ namespace bridge_sim
 class BridgeModel : public UtmiDevice
 {
   public:
-    // The bridge after power-on reset, its ticks taken from start_tick(). The bus must outlive the model.
-    explicit BridgeModel(NodeBus &bus);
+    // The bridge after power-on reset, its ticks taken from start_tick(). Bus and flash must outlive the model.
+    BridgeModel(NodeBus &bus, NorFlash &flash);
     ~BridgeModel() override;
 
     void cycle() override;
@@ -38,6 +39,7 @@ class BridgeModel : public UtmiDevice
 
   private:
     NodeBus &bus_;
+    FlashPins flash_;
     std::unique_ptr<Vwhisker_bridge> top_;
 };
 

@@ -12,7 +12,8 @@ constexpr unsigned USB_TIME_KNOWN = 0x8000;
 
 } // namespace
 
-BytesBridge::BytesBridge(NodeBus &bus) : bus_(bus)
+BytesBridge::BytesBridge(NodeBus &bus, NorFlash &flash)
+    : bus_(bus), flash_(flash), flash_body_(WHISKER_REPORT_FLASH_BYTES - WHISKER_REPORT_FLASH_ADDRESS)
 {
     power_up();
 }

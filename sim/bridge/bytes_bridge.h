@@ -6,6 +6,7 @@
 #include "bytes_link.h"
 #include "bytes_settings.h"
 #include "bytes_stream.h"
+#include "flash/nor_flash.h"
 
 namespace bridge_sim
 {
@@ -13,8 +14,8 @@ namespace bridge_sim
 class BytesBridge
 {
   public:
-    // As after power came. The bus must outlive the bridge.
-    explicit BytesBridge(NodeBus &bus);
+    // As after power came. Bus and flash must outlive the bridge.
+    BytesBridge(NodeBus &bus, NorFlash &flash);
     void power_up();
 
     // A USB bus reset or SET_CONFIGURATION: ends a run, empties everything.
@@ -54,12 +55,14 @@ class BytesBridge
 
     bool set_control(const Bytes &report);
     bool set_service(const Bytes &report);
+    bool set_flash(const Bytes &report);
     void start();
     void stop();
     Bytes control_report() const;
     Bytes counters_report() const;
     Bytes answers_report() const;
     Bytes timing_report() const;
+    Bytes flash_report() const;
     Records window(const Bytes &order, uint32_t expected_tick);
     Verdicts judge(const Records &records, uint32_t tick) const;
     void serve();
@@ -69,6 +72,7 @@ class BytesBridge
     void settle();
 
     NodeBus &bus_;
+    NorFlash &flash_;
     LinkSettings settings_;
     BytesStream stream_;
     Counters counters_{};
@@ -91,6 +95,9 @@ class BytesBridge
     uint16_t usb_time_before_ = 0; // of the one before
     bool service_ = false;         // this tick has a second window
     bool pattern_ = false;         // and the bridge's own records
+
+    uint8_t flash_command_ = 0; // of the latest order
+    Bytes flash_body_;          // address and data, as the report has them; they outlive a loss of power
 
     Bytes order_; // service order that waits; empty: none
     uint8_t windows_ = 0;

@@ -1,11 +1,16 @@
-// Level bytes: the HID reports, as control_registers.v, service_store.v, report_reader.v and answer_store.v have them.
+// Level bytes: the HID reports, as control_registers.v, service_store.v, flash_control.v, report_reader.v and
+// answer_store.v have them. An order to the flash is carried out at once.
 #include "bytes_bridge.h"
+
+#include <algorithm>
 
 namespace bridge_sim
 {
 
 namespace
 {
+
+constexpr size_t FLASH_UNIT = WHISKER_REPORT_FLASH_BYTES - WHISKER_REPORT_FLASH_DATA;
 
 bool is_report(const Bytes &report, uint8_t id, size_t size)
 {
@@ -38,7 +43,7 @@ Bytes identity_report()
 
 bool BytesBridge::set_report(const Bytes &report)
 {
-    return set_control(report) || set_service(report);
+    return set_control(report) || set_service(report) || set_flash(report);
 }
 
 bool BytesBridge::set_control(const Bytes &report)
@@ -84,6 +89,36 @@ bool BytesBridge::set_service(const Bytes &report)
     return right;
 }
 
+// The body is gathered before the order is judged, and stays if it is refused.
+bool BytesBridge::set_flash(const Bytes &report)
+{
+    if (report[0] != WHISKER_REPORT_ID_FLASH) {
+        return false;
+    }
+    const size_t body = std::min<size_t>(report.size(), WHISKER_REPORT_FLASH_BYTES) - WHISKER_REPORT_FLASH_ADDRESS;
+    std::copy_n(report.begin() + WHISKER_REPORT_FLASH_ADDRESS, body, flash_body_.begin());
+    const uint32_t address = whisker_get_u32(report.data() + WHISKER_REPORT_FLASH_ADDRESS);
+    const uint8_t command = report[WHISKER_REPORT_FLASH_COMMAND];
+    const bool writes = command == WHISKER_FLASH_COMMAND_ERASE || command == WHISKER_FLASH_COMMAND_PROGRAM;
+    const uint32_t end = writes ? uint32_t{NorFlash::WRITABLE_SECTORS} << 16 : 1u << 24;
+    if (!is_report(report, WHISKER_REPORT_ID_FLASH, WHISKER_REPORT_FLASH_BYTES) || running_ ||
+        command > WHISKER_FLASH_COMMAND_PROGRAM || address >= end || address % FLASH_UNIT != 0) {
+        return false;
+    }
+    flash_command_ = command;
+    const auto data = flash_body_.begin() + WHISKER_REPORT_FLASH_DATA - WHISKER_REPORT_FLASH_ADDRESS;
+    if (command == WHISKER_FLASH_COMMAND_ERASE) {
+        flash_.erase(address);
+    } else if (command == WHISKER_FLASH_COMMAND_PROGRAM) {
+        flash_.program(address, {data, flash_body_.end()});
+    } else {
+        const bool reads = command == WHISKER_FLASH_COMMAND_READ;
+        const Bytes found = reads ? flash_.read(address, FLASH_UNIT) : flash_.identify();
+        std::copy(found.begin(), found.end(), data);
+    }
+    return true;
+}
+
 Bytes BytesBridge::get_report(uint8_t id) const
 {
     switch (id) {
@@ -97,6 +132,8 @@ Bytes BytesBridge::get_report(uint8_t id) const
         return answers_report();
     case WHISKER_REPORT_ID_TIMING:
         return timing_report();
+    case WHISKER_REPORT_ID_FLASH:
+        return flash_report();
     default:
         return {};
     }
@@ -131,6 +168,15 @@ Bytes BytesBridge::timing_report() const
     whisker_put_u16(&report[WHISKER_REPORT_TIMING_USB_TIME], usb_time_);
     whisker_put_u32(&report[WHISKER_REPORT_TIMING_TICK], number_);
     whisker_put_u32(&report[WHISKER_REPORT_TIMING_SHORTEST], UINT32_MAX);
+    return report;
+}
+
+Bytes BytesBridge::flash_report() const
+{
+    Bytes report = empty_report(WHISKER_REPORT_ID_FLASH, WHISKER_REPORT_FLASH_BYTES);
+    report[WHISKER_REPORT_FLASH_COMMAND] = flash_command_;
+    report[WHISKER_REPORT_FLASH_WRITABLE + 2] = NorFlash::WRITABLE_SECTORS;
+    std::copy(flash_body_.begin(), flash_body_.end(), report.begin() + WHISKER_REPORT_FLASH_ADDRESS);
     return report;
 }
 

@@ -241,7 +241,8 @@ Outcome BytesDevice::serve_report(const SetupRequest &request, Bytes &data)
         return report.empty() ? Outcome::STALL : answer(request, data, report);
     }
     const bool known = (id == WHISKER_REPORT_ID_CONTROL && request.length == WHISKER_REPORT_CONTROL_BYTES) ||
-                       (id == WHISKER_REPORT_ID_SERVICE && request.length == WHISKER_REPORT_SERVICE_BYTES);
+                       (id == WHISKER_REPORT_ID_SERVICE && request.length == WHISKER_REPORT_SERVICE_BYTES) ||
+                       (id == WHISKER_REPORT_ID_FLASH && request.length == WHISKER_REPORT_FLASH_BYTES);
     if (request.request != SET_REPORT || request.to_host() || !known) {
         return Outcome::STALL;
     }

@@ -6,7 +6,7 @@ namespace bridge_sim
 {
 
 BytesRig::BytesRig(size_t populated, uint64_t seed, const std::vector<NodeTrait> &traits)
-    : Rig(populated, seed, traits), bridge_(bus()), device_(bridge_)
+    : Rig(populated, seed, traits), bridge_(bus(), flash_), device_(bridge_)
 {
 }
 

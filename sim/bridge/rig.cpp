@@ -66,6 +66,7 @@ bool Rig::power_on(Descriptors &descriptors, const char *&error)
 bool Rig::power_cycle(Descriptors &descriptors, const char *&error)
 {
     forget_frames();
+    flash_.power_cycle();
     power_up();
     return power_on(descriptors, error);
 }

@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "fault_plan.h"
+#include "flash/nor_flash.h"
 #include "node_bus.h"
 #include "usb_control.h"
 
@@ -80,6 +81,8 @@ class Rig
 
     // Until the last frame is in the FIFO.
     virtual void finish_run(const std::function<bool()> &usb_step) = 0;
+
+    NorFlash flash_;
 
   private:
     void count_frame();

@@ -14,7 +14,7 @@ constexpr uint64_t PATIENCE_CYCLES = 1000000;
 } // namespace
 
 RtlRig::RtlRig(size_t populated, uint64_t seed, const std::vector<NodeTrait> &traits)
-    : Rig(populated, seed, traits), bridge_(bus()), host_(bridge_)
+    : Rig(populated, seed, traits), bridge_(bus(), flash_), host_(bridge_)
 {
 }
 

@@ -322,7 +322,7 @@ def test_each_read_begins_with_the_first_packet():
 
 
 REFUSED = [
-    (GET_REPORT, value(7), 64, True, 1),  # no such report
+    (GET_REPORT, value(8), 64, True, 1),  # no such report
     (GET_REPORT, value(4), 64, True, 1),  # write only
     (SET_REPORT, value(4), 55, False, 1),  # too short
     (SET_REPORT, value(4), 57, False, 1),  # too long

@@ -77,6 +77,7 @@ NODE_STATES: dict[str, int] = {name: e["value"] for name, e in DEFINITION["node_
 FRAME_FLAGS: dict[str, int] = {name: 1 << entry["bit"] for name, entry in DEFINITION["frame_flags"].items()}
 CONTROL_OPTIONS: dict[str, int] = {name: 1 << e["bit"] for name, e in DEFINITION["control_options"].items()}
 BOARDS: dict[str, int] = {name: entry["value"] for name, entry in DEFINITION["boards"].items()}
+FLASH_COMMANDS: dict[str, int] = {name: entry["value"] for name, entry in DEFINITION["flash_commands"].items()}
 SENSOR_ERRORS: dict[str, dict] = DEFINITION["sensor_errors"]
 LANES: int = LIMITS["lanes"]
 FRAME_BYTES: int = FRAME_HEADER.size + LANES * RECORD.size

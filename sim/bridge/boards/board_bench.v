@@ -48,13 +48,15 @@ module board_bench (
     tang_primer_20k #(.LANES(28)) board (
         .clk_60(clk), .ulpi_reset_n(reset_n),
 `else
-    wire led_n;
+    wire       led_n, flash_cs_n, flash_mosi;
+    wire [1:0] flash_high;
 
     assign leds = board.core.leds;
     assign led  = !led_n;
 
     usb3300_board #(.LANES(28), .BLINK_BITS(8)) board (
         .clk_60(clk), .ulpi_reset(reset),
+        .flash_cs_n(flash_cs_n), .flash_mosi(flash_mosi), .flash_miso(1'b1), .flash_high(flash_high),
 `endif
         .ulpi_data(data), .ulpi_dir(dir), .ulpi_nxt(nxt), .ulpi_stp(stp), .sync(sync), .sck(sck), .select_n(select_n),
 `ifndef BOARD_TANG

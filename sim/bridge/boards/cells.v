@@ -49,6 +49,13 @@ module TRELLIS_FF #(
     always @(posedge CLK) Q <= DI;
 endmodule
 
+// The configuration flash's clock pin, which no port of a top is.
+module USRMCLK (
+    input wire USRMCLKI,
+    input wire USRMCLKTS  // 1: let go
+);
+endmodule
+
 module OSCG #(
     parameter DIV = 128
 ) (

@@ -16,7 +16,8 @@ module ulx3s_bench (
     input  wire [27:0] miso,
     output wire [3:0]  leds
 );
-    wire d_p, d_n, tick_out;
+    wire       d_p, d_n, tick_out, flash_cs_n, flash_mosi;
+    wire [1:0] flash_high;
 
     assign device_drives = {!board.d_p_pad.T, !board.d_n_pad.T};
     assign d_p           = device_drives[1] ? 1'bz : host_p;
@@ -26,7 +27,8 @@ module ulx3s_bench (
 
     ulx3s #(.LANES(28)) board (
         .clk_25(1'b0), .usb_d_p(d_p), .usb_d_n(d_n), .usb_pull_up(pull_up), .sync(sync), .sck(sck), .select_n(select_n),
-        .mosi(mosi), .miso(miso), .tick_in(1'b0), .tick_out(tick_out), .led(leds));
+        .mosi(mosi), .miso(miso), .tick_in(1'b0), .tick_out(tick_out), .led(leds),
+        .flash_cs_n(flash_cs_n), .flash_mosi(flash_mosi), .flash_miso(1'b1), .flash_high(flash_high));
 endmodule
 
 `default_nettype wire

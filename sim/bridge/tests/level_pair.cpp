@@ -85,6 +85,23 @@ Outcome LevelPair::control(const HostRequest &request)
     return outcome;
 }
 
+Outcome LevelPair::flash(const HostRequest &request)
+{
+    constexpr unsigned PATIENCE = 1000;
+    constexpr SetupRequest GET = {0xA1, 1, 0x0300 | WHISKER_REPORT_ID_FLASH, WHISKER_LIMIT_USB_HID_INTERFACE, 255};
+    Outcome outcome = Outcome::OK;
+    both("flash", REST_CYCLES, [&](Rig &rig) {
+        Bytes data = request.data, report;
+        outcome = rig.control(request.setup, data);
+        for (unsigned i = 0; i < PATIENCE && (report.empty() || report[WHISKER_REPORT_FLASH_BUSY]); i++) {
+            rig.control(GET, report);
+        }
+        return text_of(outcome, report);
+    });
+    stalls += outcome == Outcome::STALL ? 1 : 0;
+    return outcome;
+}
+
 Outcome LevelPair::read_packet()
 {
     return in(WHISKER_LIMIT_USB_BULK_IN & 0xFu);

@@ -24,6 +24,8 @@ class LevelPair
 
     // Each throws std::runtime_error that names the first difference.
     Outcome control(const HostRequest &request);
+    // A control transfer, and the end of the order to the flash that it gave; the report says what came of it.
+    Outcome flash(const HostRequest &request);
     Outcome read_packet();
     Outcome in(uint8_t endpoint);
     void tick(const sim_field *fields, const std::optional<HostRequest> &meanwhile);

@@ -69,12 +69,30 @@ HostRequest RequestSource::service()
     return set_report(report);
 }
 
+// Few places, so that what one order writes another finds; some at the border of what may be written, some beyond.
+HostRequest RequestSource::flash()
+{
+    static const uint32_t PLACES[] = {0, 4096, 4096 + 256 - 32, 0x3FFE0, 0x40000, 0xFFF00, 0xFFFFE0, 1u << 24, 33};
+    Bytes report(WHISKER_REPORT_FLASH_BYTES);
+    for (uint8_t &byte : report) {
+        byte = static_cast<uint8_t>(random_());
+    }
+    report[WHISKER_REPORT_FLASH_ID] = WHISKER_REPORT_ID_FLASH;
+    report[WHISKER_REPORT_FLASH_WIRE_VERSION] = chance(12) ? 0 : WHISKER_WIRE_VERSION;
+    report[WHISKER_REPORT_FLASH_COMMAND] = static_cast<uint8_t>(below(chance(8) ? 8 : 4));
+    const uint64_t places = chance(3) ? std::size(PLACES) : 4;
+    whisker_put_u32(report.data() + WHISKER_REPORT_FLASH_ADDRESS, PLACES[below(places)] + 32 * (chance(3) ? 1 : 0));
+    return set_report(report);
+}
+
 HostRequest RequestSource::get()
 {
     HostRequest request;
     const uint16_t length = REPORT_LENGTHS[below(std::size(REPORT_LENGTHS))];
-    request.setup = {GET_TYPE, GET_REPORT, static_cast<uint16_t>(FEATURE_REPORT | below(6)),
-                     WHISKER_LIMIT_USB_HID_INTERFACE, length};
+    uint64_t id = below(8);
+    id += id >= WHISKER_REPORT_ID_TIMING; // it has a clock, and so differs
+    request.setup = {GET_TYPE, GET_REPORT, static_cast<uint16_t>(FEATURE_REPORT | id), WHISKER_LIMIT_USB_HID_INTERFACE,
+                     length};
     return request;
 }
 

@@ -25,6 +25,9 @@ class RequestSource
     // A service order; most often one that nodes answer and do not act on.
     HostRequest service();
 
+    // An order to the configuration flash, most often one that is accepted while no run is in progress.
+    HostRequest flash();
+
     // A read of a report, there or not, of any length.
     HostRequest get();
 

@@ -16,15 +16,25 @@ constexpr unsigned ENDPOINT_FRAMES = 4;
 } // namespace
 
 const std::vector<LevelScript::Step> LevelScript::STEPS = {
-    {"ticks", 30, &LevelScript::some_ticks},      {"pause", 1, &LevelScript::pause},
-    {"read", 16, &LevelScript::read_some},        {"drain", 5, &LevelScript::drain},
-    {"start", 14, &LevelScript::start},           {"stop", 6, &LevelScript::stop},
-    {"settings", 4, &LevelScript::settings},      {"refused settings", 5, &LevelScript::refused_settings},
-    {"service", 12, &LevelScript::service},       {"refused service", 3, &LevelScript::refused_service},
-    {"reports", 5, &LevelScript::read_reports},   {"request", 8, &LevelScript::any_request},
-    {"halt", 3, &LevelScript::halt_endpoint},     {"configure", 2, &LevelScript::configure},
-    {"bus reset", 1, &LevelScript::bus_reset},    {"power cycle", 1, &LevelScript::power_cycle},
-    {"lane fault", 14, &LevelScript::lane_fault}, {"wire fault", 6, &LevelScript::wire_fault},
+    {"ticks", 30, &LevelScript::some_ticks},
+    {"pause", 1, &LevelScript::pause},
+    {"read", 16, &LevelScript::read_some},
+    {"drain", 5, &LevelScript::drain},
+    {"start", 14, &LevelScript::start},
+    {"stop", 6, &LevelScript::stop},
+    {"settings", 4, &LevelScript::settings},
+    {"refused settings", 5, &LevelScript::refused_settings},
+    {"service", 12, &LevelScript::service},
+    {"refused service", 3, &LevelScript::refused_service},
+    {"reports", 5, &LevelScript::read_reports},
+    {"request", 8, &LevelScript::any_request},
+    {"flash", 4, &LevelScript::flash},
+    {"halt", 3, &LevelScript::halt_endpoint},
+    {"configure", 2, &LevelScript::configure},
+    {"bus reset", 1, &LevelScript::bus_reset},
+    {"power cycle", 1, &LevelScript::power_cycle},
+    {"lane fault", 14, &LevelScript::lane_fault},
+    {"wire fault", 6, &LevelScript::wire_fault},
 };
 
 LevelScript::LevelScript(LevelPair &pair, size_t populated, uint64_t seed)
@@ -233,10 +243,18 @@ void LevelScript::refused_service()
     control(draw_.service()); // while one is pending
 }
 
+// Orders are refused while a run is in progress.
+void LevelScript::flash()
+{
+    for (uint64_t i = draw_.below(5) + 1; i > 0; i--) {
+        taken_["order to the flash carried out"] += pair_.flash(draw_.flash()) == Outcome::OK;
+    }
+}
+
 void LevelScript::read_reports()
 {
     for (const unsigned id : {WHISKER_REPORT_ID_CONTROL, WHISKER_REPORT_ID_COUNTERS, WHISKER_REPORT_ID_IDENTITY,
-                              WHISKER_REPORT_ID_ANSWERS}) {
+                              WHISKER_REPORT_ID_ANSWERS, WHISKER_REPORT_ID_FLASH}) {
         HostRequest request = draw_.get();
         request.setup.value = static_cast<uint16_t>(FEATURE_REPORT | id);
         request.setup.length = UINT8_MAX;

@@ -19,8 +19,8 @@ class LevelScript
     // Some steps and, at the end, every report read. Scripts go on from where the one before ended.
     void run();
 
-    // There are so many kinds of steps, requests within a tick included.
-    static constexpr size_t KINDS = 19;
+    // There are so many kinds of steps, requests within a tick and orders carried out included.
+    static constexpr size_t KINDS = 21;
 
     // How often each kind of step was taken, by its name.
     const std::map<std::string, uint64_t> &taken() const;
@@ -44,6 +44,7 @@ class LevelScript
     void refused_settings();
     void service();
     void refused_service();
+    void flash();
     void read_reports();
     void any_request();
     void halt_endpoint();
