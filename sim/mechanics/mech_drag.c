@@ -8,6 +8,8 @@
 #define TIP_PRELOAD_M 5e-3   /* [A] 0.35 mN on the default whisker */
 #define MOUNT_HEIGHT_M 80e-3 /* [A] */
 #define LARGEST_CHORD 0.98   /* of the length: the closed form's place of a caught tip */
+#define LARGEST_M 100.0      /* and ... */
+#define LARGEST_RATE 1e3     /* rad/s: more is no motion of a robot within a tick and no floor */
 #define LEAVE_VIBRATION 0.25 /* share of the tolerance at which a standing whisker's vibration is dropped */
 
 double mech_drag_reach(const struct mech_whisker *whisker, const struct mech_stance *stance)
@@ -19,10 +21,7 @@ double mech_drag_reach(const struct mech_whisker *whisker, const struct mech_sta
 struct mech_stance mech_stance_default(void)
 {
     struct mech_whisker whisker = mech_whisker_default();
-    struct mech_stance stance = {.preload = TIP_PRELOAD_M,
-                                 .height = MOUNT_HEIGHT_M,
-                                 .catching_step = SIM_WHISKER_TIP_DIAMETER / 2,
-                                 .face_friction = INFINITY};
+    struct mech_stance stance = {.preload = TIP_PRELOAD_M, .height = MOUNT_HEIGHT_M};
     stance.behind = mech_drag_reach(&whisker, &stance) / 2;
     return stance;
 }
@@ -30,7 +29,7 @@ struct mech_stance mech_stance_default(void)
 /* Deflection across the path that the floor under the tip asks for. */
 static double pressed(const struct mech_drag *drag, const struct sim_floor_texture *floor)
 {
-    return drag->stance.preload + drag->height + mech_profile_height(&drag->profile, floor);
+    return drag->stance.preload + drag->lie.lift * drag->height + mech_profile_height(&drag->profile, floor);
 }
 
 void mech_drag_start(struct mech_drag *drag, const struct mech_whisker *whisker, const struct mech_stance *stance,
@@ -40,7 +39,7 @@ void mech_drag_start(struct mech_drag *drag, const struct mech_whisker *whisker,
     *drag = (struct mech_drag){.whisker = *whisker, .stance = *stance, .tick_s = tick_s, .forced = MECH_AUTO};
     drag->tolerance = mech_tolerance_default().moment;
     drag->compliance = mech_whisker_compliance(whisker);
-    drag->tip_stiffness = mech_whisker_tip_stiffness(whisker);
+    drag->lie = mech_lie_of(whisker, stance->height, stance->behind);
     mech_modes_of(whisker, &modes);
     mech_basis_of(whisker, &modes, false, whisker->length, tick_s, &drag->free);
     mech_basis_of(whisker, &modes, true, whisker->length, tick_s, &drag->pinned);
@@ -123,28 +122,26 @@ static double held_deflection(const struct mech_drag *drag, double behind)
     return -moment / drag->pinned.moment_static;
 }
 
-static void catch_tip(struct mech_drag *drag)
+static void hook(struct mech_drag *drag)
 {
     if (drag->contact == MECH_SLIPS)
         stick(drag);
-    drag->contact = MECH_CAUGHT;
+    drag->contact = MECH_HOOKED;
     drag->behind = drag->caught_at = drag->stance.behind - drag->anchor;
     drag->caught_offset = drag->anchor - held_deflection(drag, drag->behind);
     drag->catches++;
 }
 
-static bool face_lets_go(const struct mech_drag *drag)
+static bool pulled_straight(const struct mech_drag *drag)
 {
-    double reach = mech_drag_reach(&drag->whisker, &drag->stance);
-    return drag->behind >= reach ||
-           (drag->behind > 0 && drag->stance.height > drag->stance.face_friction * drag->behind);
+    return drag->behind >= mech_drag_reach(&drag->whisker, &drag->stance);
 }
 
-static void caught(struct mech_drag *drag, double travel, double height)
+static void hooked(struct mech_drag *drag, double travel, double height)
 {
     drag->behind += travel;
     mech_basis_step(&drag->pinned, &drag->motion[0], held_deflection(drag, drag->behind) + drag->caught_offset);
-    if (face_lets_go(drag)) {
+    if (pulled_straight(drag)) {
         slip(drag, 1, 0);
         drag->height = height;
     } else if (drag->behind < drag->caught_at || height <= drag->height) { /* backed off */
@@ -153,14 +150,91 @@ static void caught(struct mech_drag *drag, double travel, double height)
     }
 }
 
+/* Does the floor hold the tip along this axis, so that its deflection is the input? */
+static bool is_pinned(const struct mech_drag *drag, int axis)
+{
+    return axis == 0 ? drag->contact != MECH_SLIPS : !drag->lifted;
+}
+
+static struct mech_axes axes_of(struct mech_drag *drag)
+{
+    return (struct mech_axes){&drag->free, &drag->pinned, drag->motion, drag->level & MECH_VIBRATION};
+}
+
+/* The shaft touches the corner of the edge ahead. */
+static void touch_edge(struct mech_drag *drag)
+{
+    for (int axis = 0; axis < 2; axis++) {
+        struct mech_motion *motion = &drag->motion[axis];
+        if (is_pinned(drag, axis))
+            mech_basis_change(&drag->pinned, &drag->free, motion, mech_basis_answer(&drag->pinned, motion));
+    }
+    struct mech_axes axes = axes_of(drag);
+    mech_edge_touch(&drag->edge, &axes, !drag->lifted);
+    drag->contact = MECH_EDGE;
+}
+
+/* The tip has risen over the corner: it is on the floor behind it. */
+static void pass_edge(struct mech_drag *drag, double height)
+{
+    drag->edge.ahead = false;
+    drag->height = height;
+    if (!drag->lifted)
+        return;
+    drag->ground = mech_basis_answer(&drag->free, &drag->motion[1]);
+    mech_basis_change(&drag->free, &drag->pinned, &drag->motion[1], drag->ground);
+    drag->lifted = false;
+}
+
+static void at_edge(struct mech_drag *drag, const struct mech_stroke *stroke)
+{
+    struct mech_axes axes = axes_of(drag);
+    int state = mech_edge_step(&drag->edge, &drag->lie, &axes, drag->whisker.friction, stroke->travel);
+    for (int axis = 0; axis < 2; axis++)
+        drag->moment[axis] = mech_basis_moment(&drag->free, &drag->motion[axis]);
+    drag->edge.ahead = stroke->height > drag->height; /* else the robot has backed off */
+    if (state == MECH_EDGE_TOUCHED && drag->edge.ahead)
+        return;
+    drag->contact = MECH_SLIPS;
+    drag->slip_side = 1;
+    drag->lifted = true;
+    drag->anchor = drag->edge.touched[0];
+    if (state == MECH_EDGE_PASSED) {
+        pass_edge(drag, stroke->height);
+    } else if (drag->edge.on_floor) {
+        mech_basis_change(&drag->free, &drag->pinned, &drag->motion[1], drag->ground);
+        drag->lifted = false;
+    }
+}
+
+/* A tip that has jumped off a corner: is it back, or over it? */
+static void watch_edge(struct mech_drag *drag, const struct mech_stroke *stroke)
+{
+    double at[2];
+    for (int axis = 0; axis < 2; axis++)
+        at[axis] =
+            is_pinned(drag, axis) ? drag->motion[axis].input : mech_basis_answer(&drag->free, &drag->motion[axis]);
+    int state = mech_edge_watch(&drag->edge, &drag->lie, at, stroke->travel);
+    if (stroke->height <= drag->height)
+        drag->edge.ahead = false;
+    else if (state == MECH_EDGE_TOUCHED)
+        touch_edge(drag);
+    else if (state == MECH_EDGE_PASSED)
+        pass_edge(drag, stroke->height);
+}
+
 static void vibrate(struct mech_drag *drag, const struct sim_floor_texture *floor, const struct mech_stroke *stroke)
 {
     if (stroke->base_rate != drag->base_rate)
-        mech_basis_turn(drag->contact == MECH_SLIPS ? &drag->free : &drag->pinned, &drag->motion[0],
-                        stroke->base_rate - drag->base_rate);
+        mech_basis_turn(drag->contact == MECH_SLIPS || drag->contact == MECH_EDGE ? &drag->free : &drag->pinned,
+                        &drag->motion[0], stroke->base_rate - drag->base_rate);
+    if (drag->contact == MECH_EDGE) {
+        at_edge(drag, stroke);
+        return;
+    }
     double normal = ride(drag, pressed(drag, floor));
-    if (drag->contact == MECH_CAUGHT)
-        caught(drag, stroke->travel, stroke->height);
+    if (drag->contact == MECH_HOOKED)
+        hooked(drag, stroke->travel, stroke->height);
     else if (drag->contact == MECH_STICKS)
         sticking(drag, floor, stroke->travel, normal);
     else
@@ -172,12 +246,18 @@ static void vibrate(struct mech_drag *drag, const struct sim_floor_texture *floo
 /* The level without vibration. */
 static void follow(struct mech_drag *drag, const struct sim_floor_texture *floor, const struct mech_stroke *stroke)
 {
+    if (drag->contact == MECH_EDGE) {
+        at_edge(drag, stroke);
+        drag->lifted = false;
+        drag->contact = drag->contact == MECH_EDGE ? MECH_EDGE : MECH_STICKS;
+        return;
+    }
     double input = fmax(0, pressed(drag, floor)), along;
     drag->ground = input;
-    if (drag->contact == MECH_CAUGHT) {
+    if (drag->contact == MECH_HOOKED) {
         drag->behind += stroke->travel;
         along = drag->anchor = held_deflection(drag, drag->behind) + drag->caught_offset;
-        if (face_lets_go(drag)) {
+        if (pulled_straight(drag)) {
             drag->contact = MECH_STICKS;
             drag->height = stroke->height;
             drag->anchor = 0;
@@ -201,7 +281,7 @@ static void follow(struct mech_drag *drag, const struct sim_floor_texture *floor
 /* May a standing whisker's vibration be dropped? */
 static bool faded(const struct mech_drag *drag)
 {
-    return drag->contact != MECH_SLIPS && !drag->lifted &&
+    return drag->contact != MECH_SLIPS && drag->contact != MECH_EDGE && !drag->lifted &&
            mech_basis_swing(&drag->pinned, &drag->motion[0], 0) + mech_basis_swing(&drag->pinned, &drag->motion[1], 0) <
                LEAVE_VIBRATION * drag->tolerance;
 }
@@ -213,14 +293,35 @@ static void stand(struct mech_drag *drag)
         mech_basis_settle(&drag->pinned, drag->motion[axis].input, 0, &drag->motion[axis]);
 }
 
-static void meet_border(struct mech_drag *drag, const struct mech_stroke *stroke)
+/* The floor falls away under the tip. */
+static void fall(struct mech_drag *drag)
 {
-    if (drag->contact == MECH_CAUGHT || stroke->height == drag->height)
+    if (drag->lifted || !(drag->level & MECH_VIBRATION))
         return;
-    if (stroke->height - drag->height >= drag->stance.catching_step && stroke->travel > 0)
-        catch_tip(drag);
-    else
-        drag->height = stroke->height;
+    mech_basis_change(&drag->pinned, &drag->free, &drag->motion[1], mech_basis_answer(&drag->pinned, &drag->motion[1]));
+    drag->lifted = true;
+}
+
+static void meet_border(struct mech_drag *drag, const struct sim_floor_texture *floor, const struct mech_stroke *stroke)
+{
+    double step = stroke->height - drag->height;
+    bool up = step > 0 && stroke->travel > 0;
+    if (step == 0 || drag->edge.ahead || drag->contact == MECH_HOOKED)
+        return;
+    if (up && floor->pile && step >= drag->lie.radius) {
+        hook(drag);
+        return;
+    }
+    double rise = mech_edge_rise(&drag->lie, step);
+    if (up && rise > 0) {
+        drag->edge = (struct mech_edge){.ahead = true, .ground = drag->ground, .rise = drag->ground + rise};
+        drag->catches++;
+        touch_edge(drag);
+        return;
+    }
+    if (step < 0)
+        fall(drag);
+    drag->height = stroke->height;
 }
 
 static void choose_level(struct mech_drag *drag, bool still)
@@ -236,15 +337,19 @@ static void choose_level(struct mech_drag *drag, bool still)
 void mech_drag_step(struct mech_drag *drag, const struct sim_floor_texture *floor, const struct mech_stroke *stroke)
 {
     bool still = stroke->travel == 0 && stroke->base_rate == drag->base_rate && stroke->height == drag->height;
-    if (!isfinite(stroke->travel + stroke->height + stroke->base_rate) || (still && drag->level == MECH_REST))
+    bool sound = fabs(stroke->travel) + fabs(stroke->height) < LARGEST_M && fabs(stroke->base_rate) < LARGEST_RATE;
+    if (!sound || (still && drag->level == MECH_REST))
         return;
     choose_level(drag, still);
-    meet_border(drag, stroke);
-    mech_profile_move(&drag->profile, floor, drag->contact == MECH_CAUGHT ? 0 : stroke->travel);
+    meet_border(drag, floor, stroke);
+    bool held = drag->contact == MECH_HOOKED || drag->contact == MECH_EDGE;
+    mech_profile_move(&drag->profile, floor, held ? 0 : stroke->travel);
     if (drag->level & MECH_VIBRATION)
         vibrate(drag, floor, stroke);
     else if (drag->level != MECH_REST)
         follow(drag, floor, stroke);
+    if (drag->edge.ahead && drag->contact != MECH_EDGE)
+        watch_edge(drag, stroke);
     drag->base_rate = stroke->base_rate;
     double rest = drag->pinned.moment_static * drag->stance.preload;
     drag->moment[1] -= drag->level == MECH_REST ? 0 : rest;

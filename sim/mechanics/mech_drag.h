@@ -9,26 +9,32 @@
  * has faded below the tolerance, then static; at the start, rest. Small deflections; a border catch uses the closed
  * form at the angle from the mount, held at the plug's stop.
  *
- * A step of the floor holds the tip like a hook (a pile's edge) until the whisker is pulled straight: by a mount at
- * height h, until the tip lies sqrt(length^2 - h^2) behind the mount. A step face that only rubs lets go earlier: when
- * the pull leaves its friction cone, height over distance behind above `face_friction`.
+ * A step up of the floor holds the tip at its corner until the shaft has slid up it (mech_edge.h). A step of a floor
+ * with a pile holds the tip like a hook until the whisker is pulled straight: by a mount at height h, until the tip
+ * lies sqrt(length^2 - h^2) behind the mount. Off a step down the tip falls. Steps against which the tip is pushed
+ * backwards are ridden over.
  */
 #ifndef MECH_DRAG_H
 #define MECH_DRAG_H
 
 #include <stdbool.h>
 
+#include "mech_edge.h"
 #include "mech_profile.h"
 #include "mech_shaft.h"
 
+/* cffi: begin */
+/* Of the tip: held by the floor, sliding over it or in the air, hooked by a pile, held at the corner of a step. */
+enum { MECH_STICKS, MECH_SLIPS, MECH_HOOKED, MECH_EDGE };
+
 /* How a whisker is mounted over the floor. Lengths in m. */
 struct mech_stance {
-    double preload;       /* deflection that presses the tip on the floor */
-    double height;        /* of the mount over the floor */
-    double behind;        /* of the tip at rest, behind the mount along the path; negative: ahead */
-    double catching_step; /* a step up of the floor at least this high catches the tip */
-    double face_friction; /* of the step's face; infinity: it hooks */
+    double preload; /* deflection that presses the tip on the floor */
+    double height;  /* of the mount over the floor */
+    double behind;  /* of the tip at rest, behind the mount along the path; negative: ahead; the rest of the length goes
+                       aside */
 };
+/* cffi: end */
 
 /* What happens in a tick. */
 struct mech_stroke {
@@ -37,21 +43,21 @@ struct mech_stroke {
     double base_rate; /* rate of turn of the mount in the plane of the path, rad/s */
 };
 
-enum { MECH_STICKS, MECH_SLIPS, MECH_CAUGHT };
-
 struct mech_drag {
     struct mech_whisker whisker;
     struct mech_stance stance;
+    struct mech_lie lie;
     struct mech_basis free, pinned; /* at the tip */
     struct mech_motion motion[2];
     struct mech_profile profile;
-    double tick_s, tip_stiffness, compliance;
+    double tick_s, compliance;
     double tolerance; /* N m, of vibration dropped when the whisker stands */
     int forced, level, contact;
     bool lifted;
     double ground; /* deflection across the path that the floor asked for at the last tick, m */
     double anchor; /* deflection of the tip along the path when it sticks, m */
     double base_rate;
+    struct mech_edge edge;
     double slip_side;          /* +1 or -1: the tip slips this way along the path */
     double height;             /* of the floor that the tip is on, m */
     double behind, caught_at;  /* of a caught tip behind the mount, m: now, and when it was caught */
@@ -60,8 +66,7 @@ struct mech_drag {
     double moment[2], tilt[2]; /* about the static preload; along the path, across it */
 };
 
-/* The mount of the outer whiskers: 5 mm preload, 80 mm high, tip tilted backwards by half its reach; steps catch from
- * the tip's radius on; faces hook. */
+/* The mount of the outer whiskers: 5 mm preload, 80 mm high, tip half its reach behind. */
 struct mech_stance mech_stance_default(void);
 
 /* Horizontal reach of a straight whisker, m; 0 if it does not reach the floor. */
@@ -71,7 +76,8 @@ double mech_drag_reach(const struct mech_whisker *whisker, const struct mech_sta
 void mech_drag_start(struct mech_drag *drag, const struct mech_whisker *whisker, const struct mech_stance *stance,
                      const struct sim_floor_texture *floor, struct sim_rng rng, double tick_s);
 
-/* Lets a tick pass over this floor. */
+/* Lets a tick pass over this floor. Heights and travels beyond 100 m and rates of turn beyond 1000 rad/s are taken as
+ * no tick. */
 void mech_drag_step(struct mech_drag *drag, const struct sim_floor_texture *floor, const struct mech_stroke *stroke);
 
 #endif

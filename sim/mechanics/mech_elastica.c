@@ -4,7 +4,7 @@
 
 #include "whisker_constants.h"
 
-#define LARGEST_SLOPE 2.2 /* rad: beyond every fold */
+#define LARGEST_SLOPE 2.65 /* rad: beyond every fold from 0.1 cones on */
 #define SLOPE_STEP 0.05
 
 /* Tangent angle and position, seen from the contact: angle 0 and origin there. */

@@ -5,15 +5,15 @@
 
 #include "mech_elastica.h"
 
-enum { DISTANCES = 40, SLOPES = 36, FIELDS = 3, POWERS = 3, VALUES = FIELDS * POWERS, STEPS = 48 };
+enum { DISTANCES = 40, SLOPES = 54, FIELDS = 3, POWERS = 3, VALUES = FIELDS * POWERS, STEPS = 48 };
 _Static_assert((int)VALUES == (int)MECH_VALUES, "a row holds every value");
 enum { ANGLE, MOMENT, SLIDE }; /* fields: theta/slope, moment/slope, (arc - x)/slope^2 */
 
 #define LEAST_X 0.10
 #define LARGEST_X 0.86
-#define LARGEST_SLOPE 1.75
-#define TABLE_NU 0.6      /* the quadratic in nu runs through -TABLE_NU, 0, TABLE_NU */
-#define WORST_CLOSED 0.05 /* the bound's coefficients hold up to this error */
+#define LARGEST_SLOPE 2.65 /* rad: beyond the fold at the least distance */
+#define TABLE_NU 0.6       /* the quadratic in nu runs through -TABLE_NU, 0, TABLE_NU */
+#define WORST_CLOSED 0.05  /* the bound's coefficients hold up to this error */
 #define TINY_SLOPE 1e-9
 
 static const double X_STEP = (LARGEST_X - LEAST_X) / (DISTANCES - 1);

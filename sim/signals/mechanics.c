@@ -24,32 +24,18 @@ struct sim_drag {
     struct mech_drag drag;
 };
 
-static struct mech_stance stance_of(const double stance[5])
+struct mech_stance sim_drag_stance(void)
 {
-    return (struct mech_stance){stance[0], stance[1], stance[2], stance[3], stance[4]};
+    return mech_stance_default();
 }
 
-void sim_drag_stance(double stance[5])
+sim_drag *sim_drag_new(const struct mech_whisker *whisker, const struct mech_stance *stance,
+                       const struct sim_floor_texture *floor, uint64_t seed, double tick_s, int forced)
 {
-    struct mech_stance usual = mech_stance_default();
-    stance[0] = usual.preload;
-    stance[1] = usual.height;
-    stance[2] = usual.behind;
-    stance[3] = usual.catching_step;
-    stance[4] = usual.face_friction;
-}
-
-sim_drag *sim_drag_new(const struct mech_whisker *whisker, const double stance[5], size_t floor, uint64_t seed,
-                       double tick_s, int forced)
-{
-    if (floor >= SIM_FLOOR_TEXTURE_COUNT)
-        return NULL;
     sim_drag *made = calloc(1, sizeof *made);
     if (!made)
         return NULL;
-    struct mech_stance mounted = stance_of(stance);
-    mech_drag_start(&made->drag, whisker, &mounted, &SIM_FLOOR_TEXTURES[floor], sim_rng_stream(seed, FOR_FLOOR, 0),
-                    tick_s);
+    mech_drag_start(&made->drag, whisker, stance, floor, sim_rng_stream(seed, FOR_FLOOR, 0), tick_s);
     made->drag.forced = forced;
     return made;
 }
@@ -59,13 +45,12 @@ void sim_drag_free(sim_drag *drag)
     free(drag);
 }
 
-void sim_drag_run(sim_drag *drag, size_t ticks, const double *travel, const unsigned char *floor, const double *height,
-                  double *tilt, unsigned char *event)
+void sim_drag_run(sim_drag *drag, const struct sim_floor_texture *floors, size_t ticks, const double *travel,
+                  const unsigned char *floor, const double *height, double *tilt, unsigned char *event)
 {
     for (size_t i = 0; i < ticks; i++) {
         struct mech_stroke stroke = {travel[i], height[i], 0};
-        size_t number = floor[i] < SIM_FLOOR_TEXTURE_COUNT ? floor[i] : SIM_FLOOR_TEXTURE_COUNT - 1;
-        mech_drag_step(&drag->drag, &SIM_FLOOR_TEXTURES[number], &stroke);
+        mech_drag_step(&drag->drag, &floors[floor[i]], &stroke);
         tilt[2 * i] = drag->drag.tilt[0];
         tilt[2 * i + 1] = drag->drag.tilt[1];
         event[i] = (unsigned char)(drag->drag.contact + (drag->drag.lifted ? 4 : 0));
@@ -92,9 +77,9 @@ void sim_mechanics_counts(const struct mech_whisker *whisker, size_t ticks, doub
         read_sensor(whisker, &noise, (double)i * tick_s, tilt + 2 * i, counts + 2 * i);
 }
 
-const char *sim_mechanics_floor(size_t floor)
+const struct sim_floor_texture *sim_mechanics_floor(size_t floor)
 {
-    return floor < SIM_FLOOR_TEXTURE_COUNT ? SIM_FLOOR_TEXTURES[floor].name : NULL;
+    return floor < SIM_FLOOR_TEXTURE_COUNT ? &SIM_FLOOR_TEXTURES[floor] : NULL;
 }
 
 enum { SHAFTS = 4, DRAGS = 8, IDLE = 16, WHISKERS = SHAFTS + DRAGS + IDLE };
@@ -106,6 +91,8 @@ enum { SHAFTS = 4, DRAGS = 8, IDLE = 16, WHISKERS = SHAFTS + DRAGS + IDLE };
 #define THETA_SWING 0.05
 #define WHISK_RATE (SIM_PI / 24)
 #define DRAG_M_S 0.1
+#define TILE_M 0.3    /* every other tile ... */
+#define STEP_M 0.3e-3 /* ... is higher by this */
 
 struct sim_mechanics_scene {
     struct sim_mechanics_setting setting;
@@ -177,7 +164,8 @@ static double step_shafts(sim_mechanics_scene *scene, double time_s)
 static double step_drags(sim_mechanics_scene *scene)
 {
     double sum = 0;
-    struct mech_stroke stroke = {DRAG_M_S * scene->setting.tick_s, 0, 0};
+    double travel = DRAG_M_S * scene->setting.tick_s, tile = floor(travel * (double)scene->ticks / TILE_M);
+    struct mech_stroke stroke = {travel, fmod(tile, 2) * STEP_M, 0};
     for (size_t i = 0; i < DRAGS; i++) {
         mech_drag_step(&scene->drag[i], &SIM_FLOOR_TEXTURES[i % SIM_FLOOR_TEXTURE_COUNT], &stroke);
         sum += scene->drag[i].tilt[0] + scene->drag[i].tilt[1];

@@ -26,26 +26,25 @@ struct sim_mechanics_setting {
 void sim_mechanics_touch(struct mech_shaft *shaft, size_t ticks, const double *radius, const double *theta,
                          const double *base_rate, double *tilt, unsigned char *level);
 
-/* A whisker standing on floor number `floor` of floor_textures.h; NULL if memory is short or there is no such floor. */
-sim_drag *sim_drag_new(const struct mech_whisker *whisker, const double stance[5], size_t floor, uint64_t seed,
-                       double tick_s, int forced);
+/* A whisker standing on a floor; NULL if memory is short. */
+sim_drag *sim_drag_new(const struct mech_whisker *whisker, const struct mech_stance *stance,
+                       const struct sim_floor_texture *floor, uint64_t seed, double tick_s, int forced);
 void sim_drag_free(sim_drag *drag);
 
-/* The default of its stance: preload, height, behind, catching_step, face_friction (struct mech_stance). */
-void sim_drag_stance(double stance[5]);
+struct mech_stance sim_drag_stance(void); /* the default */
 
-/* Lets ticks pass over floors: travel[i] m, number of the floor and its height (m). Writes tilt[tick][2] (rad; along
- * the path, across it) and what the tip did: 0 sticks, 1 slips, 2 is caught; 4 is added if it has lifted off. A floor
- * number out of range is taken as the last floor. */
-void sim_drag_run(sim_drag *drag, size_t ticks, const double *travel, const unsigned char *floor, const double *height,
-                  double *tilt, unsigned char *event);
+/* Lets ticks pass over floors: travel[i] m, number of the floor within `floors` and its height (m). Writes
+ * tilt[tick][2] (rad; along the path, across it) and what the tip did: 0 sticks, 1 slips, 2 is hooked, 3 is at the
+ * corner of a step; 4 is added if it has lifted off. */
+void sim_drag_run(sim_drag *drag, const struct sim_floor_texture *floors, size_t ticks, const double *travel,
+                  const unsigned char *floor, const double *height, double *tilt, unsigned char *event);
 
 /* What the sensor of this whisker reads of tilt[tick][2]: counts[tick][2], with the sensor's noise of this seed. */
 void sim_mechanics_counts(const struct mech_whisker *whisker, size_t ticks, double tick_s, const double *tilt,
                           uint64_t seed, uint16_t *counts);
 
-/* Name of a floor, or NULL beyond the last. */
-const char *sim_mechanics_floor(size_t floor);
+/* A floor of floor_textures.h, or NULL beyond the last. */
+const struct sim_floor_texture *sim_mechanics_floor(size_t floor);
 
 /* A scene, or NULL if memory is short; whiskers differ by the seed. */
 sim_mechanics_scene *sim_mechanics_scene_new(const struct sim_mechanics_setting *setting, uint64_t seed);

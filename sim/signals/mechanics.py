@@ -8,7 +8,9 @@
 Levels: see sim/mechanics/mech_shaft.h. Equal arguments give equal counts.
 """
 
+import itertools
 import math
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -17,8 +19,7 @@ from .border import ffi, lib, pointer
 from .world import TICK_S
 
 AUTO, CLOSED, LARGE, VIBRATION = lib.MECH_AUTO, lib.MECH_CLOSED, lib.MECH_LARGE, lib.MECH_VIBRATION
-FLOORS = tuple(ffi.string(lib.sim_mechanics_floor(i)).decode() for i in range(16) if lib.sim_mechanics_floor(i))
-STICKS, SLIPS, CAUGHT, LIFTED = 0, 1, 2, 4
+STICKS, SLIPS, HOOKED, EDGE, LIFTED = lib.MECH_STICKS, lib.MECH_SLIPS, lib.MECH_HOOKED, lib.MECH_EDGE, 4
 LEAD_S, TAIL_S = 0.1, 0.4  # free before and after a contact
 _table = None
 
@@ -30,6 +31,18 @@ def _shared_table():
         if not _table:
             raise MemoryError("no memory for the table of large deflections")
     return _table
+
+
+def _listed() -> Iterator:
+    for i in itertools.count():
+        floor = lib.sim_mechanics_floor(i)
+        if not floor:
+            return
+        yield floor[0]
+
+
+_TEXTURES = ffi.new("struct sim_floor_texture[]", list(_listed()))
+FLOORS = tuple(ffi.string(floor.name).decode() for floor in _TEXTURES)
 
 
 class Unknown(NamedTuple):
@@ -152,26 +165,26 @@ def drag(
     seed: int,
     level: int = AUTO,
     tick_s: float = TICK_S,
+    textures=_TEXTURES,
     **stance: float,
 ) -> Series:
     """A prescribed sweep: for every tick the mount's travel, number of the floor under the tip and its height.
 
-    Keywords preload, height, behind, catching_step, face_friction say how the whisker stands (struct mech_stance).
-    `what` is STICKS, SLIPS or CAUGHT, LIFTED added.
+    Keywords preload, height, behind say how the whisker stands (struct mech_stance); `textures` are the floors that
+    the numbers mean (struct sim_floor_texture[]), if not FLOORS. `what` is STICKS, SLIPS, HOOKED or EDGE, LIFTED added.
     """
     travel, floors, height = np.broadcast_arrays(travel_m, floor, height_m)
     if travel.ndim != 1 or not len(travel):
         raise ValueError(f"travel has shape {travel.shape}; give one value a tick, at least one")
-    if floors.min() < 0 or floors.max() >= len(FLOORS):
-        raise ValueError(f"floors are numbered 0..{len(FLOORS) - 1}")
-    values = ffi.new("double[5]")
-    lib.sim_drag_stance(values)
-    names = ("preload", "height", "behind", "catching_step", "face_friction")
+    if floors.min() < 0 or floors.max() >= len(textures):
+        raise ValueError(f"floors are numbered 0..{len(textures) - 1}")
+    stands = ffi.new("struct mech_stance *", lib.sim_drag_stance())
     for name, value in stance.items():
-        if name not in names:
-            raise ValueError(f"a stance has no {name!r}; it has {', '.join(names)}")
-        values[names.index(name)] = value
-    whiskers = ffi.gc(lib.sim_drag_new(whisker.c, values, int(floors[0]), seed, tick_s, level), lib.sim_drag_free)
+        if not hasattr(stands, name):
+            raise ValueError(f"a stance has no {name!r}; it has {', '.join(sorted(dir(stands)))}")
+        setattr(stands, name, value)
+    start = textures + int(floors[0])
+    whiskers = ffi.gc(lib.sim_drag_new(whisker.c, stands, start, seed, tick_s, level), lib.sim_drag_free)
     if not whiskers:
         raise MemoryError("no memory for a dragged whisker")
     travel, height = (np.ascontiguousarray(a, np.float64) for a in (travel, height))
@@ -180,6 +193,7 @@ def drag(
     tilt, event = np.empty((len(travel), 2)), np.empty(each, np.uint8)
     lib.sim_drag_run(
         whiskers,
+        textures,
         len(travel),
         pointer("double[]", travel, "travel_m", each),
         pointer("unsigned char[]", numbers, "floor", each),

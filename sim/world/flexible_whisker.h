@@ -4,8 +4,7 @@
  * The level of detail is chosen for each whisker and tick from what touches it, within the bounds of mech_shaft.h and
  * mech_drag.h, or forced by the scene (enum sim_mechanics). An object whisker's contact is a peg at the radial distance
  * of its onset, or, for a tip on a face, a place that it cannot slip past; a robot that turns draws the shaft over an
- * edge, which is left out. A floor whisker is dragged with a stance of its own; tiles lie at different heights, and an
- * edge holds the tip as a hook does.
+ * edge, which is left out. A floor whisker is dragged with a stance of its own; tiles lie at different heights.
  */
 #ifndef SIM_FLEXIBLE_WHISKER_H
 #define SIM_FLEXIBLE_WHISKER_H

@@ -252,7 +252,7 @@ struct sim_tip sim_world_tip(const sim_world *world, size_t lane)
                             sim_arena_texture(&world->scene, whisker->tip),
                             sim_arena_inside(&world->scene, whisker->tip),
                             whisker->travelled_m,
-                            !is_simple(world) && world->lane[lane].flexible.drag.contact == MECH_CAUGHT};
+                            !is_simple(world) && world->lane[lane].flexible.drag.contact >= MECH_HOOKED};
 }
 
 int sim_world_level(const sim_world *world, size_t lane)

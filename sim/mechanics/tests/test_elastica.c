@@ -132,6 +132,19 @@ static void test_slip_off_table(void **state)
     assert_true(bend.arc * w.cone > 0.140);
 }
 
+/* Near its base too a whisker lets go at the elastica's fold. */
+static void test_folds_near_the_base(void **state)
+{
+    (void)state;
+    for (double a = 20e-3; a < 95e-3; a += 10e-3) {
+        struct mech_whisker w = smooth(INFINITY);
+        struct mech_bend bend;
+        double peak, at, let_go = slip_off(&w, a, &peak, &at);
+        assert_true(mech_elastica_at_angle(a / w.cone, (let_go - 0.2) * SIM_DEGREE, 0, EXACT, &bend));
+        assert_false(mech_elastica_at_angle(a / w.cone, (let_go + 0.2) * SIM_DEGREE, 0, EXACT, &bend));
+    }
+}
+
 /* The table against the elastica it stands for: 0.3 % up to 3/4 of the slip-off angle, tapers and frictions alike. */
 static void test_table_is_the_elastica(void **state)
 {
@@ -219,13 +232,10 @@ static void test_stop(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_elastica_table),
-        cmocka_unit_test(test_friction_table),
-        cmocka_unit_test(test_slip_off_table),
-        cmocka_unit_test(test_table_is_the_elastica),
-        cmocka_unit_test(test_bound_on_the_closed_form),
-        cmocka_unit_test(test_friction_keeps_energy),
-        cmocka_unit_test(test_stop),
+        cmocka_unit_test(test_elastica_table),        cmocka_unit_test(test_friction_table),
+        cmocka_unit_test(test_slip_off_table),        cmocka_unit_test(test_folds_near_the_base),
+        cmocka_unit_test(test_table_is_the_elastica), cmocka_unit_test(test_bound_on_the_closed_form),
+        cmocka_unit_test(test_friction_keeps_energy), cmocka_unit_test(test_stop),
     };
     return cmocka_run_group_tests(tests, make_table, drop_table);
 }

@@ -12,7 +12,8 @@
 #define SMOOTH (&SIM_FLOOR_TEXTURES[1])
 #define ROUGH (&SIM_FLOOR_TEXTURES[2])
 
-static const struct sim_floor_texture FLAT = {"FLAT", 0, 1, 0, 0, 0.15};
+static const struct sim_floor_texture FLAT = {"FLAT", 0, 1, 0, 0, 0.15, false};
+static const struct sim_floor_texture PILE = {"PILE", 0.055, 5, 0, 0, 0.05, true}; /* vinyl whose edges hook */
 
 /* Whisker physics, section 7: the classes' ranges, and that the profile is what the floor says. */
 static void test_profile(void **state)
@@ -177,8 +178,8 @@ static void test_lift_off(void **state)
     assert_true(share[0] < 0.01 && share[1] > 0.1 && share[1] < 0.8);
 }
 
-/* Time that a step holds the tip: height of the mount, speed, and where it is caught. Either level. */
-static void test_catch_table(void **state)
+/* Time that the edge of a pile holds the tip: height of the mount, speed, and where it is hooked. Either level. */
+static void test_hook_table(void **state)
 {
     (void)state;
     const struct {
@@ -193,12 +194,12 @@ static void test_catch_table(void **state)
                 int held = 0;
                 stance.height = table[i].height_mm * 1e-3;
                 stance.behind = 0;
-                start(&drag, &stance, VINYL, 5);
+                start(&drag, &stance, &PILE, 5);
                 drag.forced = forced;
                 assert_near(1e3 * mech_drag_reach(&drag.whisker, &stance), table[i].reach_mm, 0.06);
                 for (int k = 0; k < 7000; k++) {
-                    advance(&drag, VINYL, speed[v], k > 300 ? 1e-3 : 0);
-                    held += drag.contact == MECH_CAUGHT;
+                    advance(&drag, &PILE, speed[v], k > 300 ? 1e-3 : 0);
+                    held += drag.contact == MECH_HOOKED;
                     assert_true(fabs(drag.tilt[0]) <= drag.whisker.stop);
                 }
                 assert_int_equal(drag.catches, 1);
@@ -209,7 +210,7 @@ static void test_catch_table(void **state)
     }
 }
 
-/* Let go by a step the whisker springs forward: the tilt, backwards until then, swings to the other side. */
+/* Let go by a pile the whisker springs forward: the tilt, backwards until then, swings to the other side. */
 static void test_release_springs_forward(void **state)
 {
     (void)state;
@@ -217,40 +218,92 @@ static void test_release_springs_forward(void **state)
     struct mech_drag drag;
     double most = 0, before = 0;
     int was = 0;
-    start(&drag, &stance, VINYL, 5);
+    start(&drag, &stance, &PILE, 5);
     for (int k = 0; k < 4000; k++) {
-        advance(&drag, VINYL, 0.1, k > 300 ? 1e-3 : 0);
-        if (drag.contact == MECH_CAUGHT)
+        advance(&drag, &PILE, 0.1, k > 300 ? 1e-3 : 0);
+        if (drag.contact == MECH_HOOKED)
             before = drag.tilt[0];
-        was |= drag.contact == MECH_CAUGHT;
-        if (was && drag.contact != MECH_CAUGHT)
+        was |= drag.contact == MECH_HOOKED;
+        if (was && drag.contact != MECH_HOOKED)
             most = fmax(most, drag.tilt[0]);
     }
     assert_true(before < -SIM_DEGREE);
     assert_true(most > -0.3 * before);
     assert_near(drag.height, 1e-3, 1e-12);
-    assert_true(drag.contact != MECH_CAUGHT);
+    assert_true(drag.contact != MECH_HOOKED);
 }
 
-/* What shortens or avoids a catch: a whisker tilted backwards, a face that only rubs, a step down, a way back. */
-static void test_catches_that_are_not(void **state)
+/* Drags a whisker of this stance over a step that comes after 15 mm, and back again from 2 mm behind it on if it turns.
+ * Returns for how long the step holds it, s. */
+static double held_by(struct mech_drag *drag, const struct mech_stance *stance, const struct sim_floor_texture *floor,
+                      double step, bool turns)
+{
+    const double speed = 0.1;
+    int held = 0;
+    start(drag, stance, floor, 5);
+    for (int k = 1; k < 3000; k++) {
+        bool back = turns && k > 340;
+        double at = speed * TICK * (back ? 680 - k : k);
+        advance(drag, floor, back ? -speed : speed, at > 15e-3 ? step : 0);
+        held += drag->contact == MECH_HOOKED || drag->contact == MECH_EDGE;
+    }
+    return held * TICK;
+}
+
+/* What a pile does not hold: a whisker tilted backwards, a step down, one lower than the tip's radius, a way back. */
+static void test_hooks_that_are_not(void **state)
 {
     (void)state;
-    for (int kind = 0; kind < 4; kind++) {
-        struct mech_stance stance = mech_stance_default();
-        struct mech_drag drag;
-        int held = 0;
-        stance.behind = kind == 0 ? 0.112 : 0.03;
-        stance.face_friction = kind == 1 ? 0.3 : INFINITY;
-        start(&drag, &stance, VINYL, 5);
-        for (int k = 0; k < 3000; k++) {
-            double height = k > 300 ? (kind == 2 ? -1e-3 : 1e-3) : 0;
-            advance(&drag, VINYL, kind == 3 && k > 320 ? -0.1 : 0.1, height);
-            held += drag.contact == MECH_CAUGHT;
-        }
-        assert_int_equal(drag.catches, kind != 2);
-        assert_true(held < 80);
+    struct mech_stance stance = mech_stance_default(), tilted = stance;
+    struct mech_drag drag;
+    tilted.behind = 0.112;
+    assert_true(held_by(&drag, &stance, &PILE, 1e-3, false) > 0.5);
+    assert_true(held_by(&drag, &tilted, &PILE, 1e-3, false) < 0.04);
+    assert_true(held_by(&drag, &stance, &PILE, -1e-3, false) == 0);
+    assert_true(held_by(&drag, &stance, &PILE, 0.14e-3, false) < 0.04);
+    assert_true(held_by(&drag, &stance, &PILE, 1e-3, true) < 0.045);
+    assert_int_equal(drag.catches, 1);
+}
+
+/* A step without a pile: the higher, the longer it holds; the round of the tip rolls over a very low one; a step down
+ * and a step met backwards hold nothing; a robot that backs off is free. Either level, and the tip ends on top. */
+static void test_steps(void **state)
+{
+    (void)state;
+    struct mech_stance stance = mech_stance_default();
+    struct mech_drag drag;
+    const double step[] = {-3e-3, 0.05e-3, 0.15e-3, 0.3e-3, 1e-3, 3e-3, 10e-3};
+    double before = 0;
+    for (size_t i = 0; i < COUNT(step); i++) {
+        double held = held_by(&drag, &stance, &FLAT, step[i], false);
+        assert_int_equal(held > 0, i > 1);
+        assert_true(held > before || i < 2);
+        before = held;
+        assert_near(drag.height, step[i], 0);
+        assert_true(fabs(drag.tilt[0]) < SIM_DEGREE);
     }
+    assert_true(before < 0.3);
+    assert_true(held_by(&drag, &stance, &FLAT, 3e-3, true) < 0.045);
+    assert_near(drag.height, 0, 0);
+    assert_true(drag.contact != MECH_EDGE);
+}
+
+/* A mount that stands while the tip is at a corner: it stays there, and what rings fades. */
+static void test_standing_at_a_step(void **state)
+{
+    (void)state;
+    struct mech_stance stance = mech_stance_default();
+    struct mech_drag drag;
+    start(&drag, &stance, &FLAT, 5);
+    for (int k = 0; k < 420; k++)
+        advance(&drag, &FLAT, 0.1, k > 300 ? 3e-3 : 0);
+    for (int k = 0; k < 4000; k++)
+        advance(&drag, &FLAT, 0, 3e-3);
+    double tilt = drag.tilt[0];
+    assert_int_equal(drag.contact, MECH_EDGE);
+    assert_true(tilt < -0.2 * SIM_DEGREE);
+    advance(&drag, &FLAT, 0, 3e-3);
+    assert_near(drag.tilt[0], tilt, 1e-6 * SIM_DEGREE);
 }
 
 /* A robot that stands: what rings fades, then nothing is done, and what comes out stays. */
@@ -301,9 +354,11 @@ int main(void)
         cmocka_unit_test(test_stick_slip_table),
         cmocka_unit_test(test_stick_slip_with_vibration),
         cmocka_unit_test(test_lift_off),
-        cmocka_unit_test(test_catch_table),
+        cmocka_unit_test(test_hook_table),
         cmocka_unit_test(test_release_springs_forward),
-        cmocka_unit_test(test_catches_that_are_not),
+        cmocka_unit_test(test_hooks_that_are_not),
+        cmocka_unit_test(test_steps),
+        cmocka_unit_test(test_standing_at_a_step),
         cmocka_unit_test(test_standing_is_rest),
         cmocka_unit_test(test_garbage),
     };

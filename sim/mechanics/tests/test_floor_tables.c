@@ -32,7 +32,7 @@ static void test_classes(void **state)
 static double independent(double correlation_mm, double speed)
 {
     enum { WINDOW = 200, WINDOWS = 6000 };
-    const struct sim_floor_texture floor = {"PLAIN", 1, correlation_mm, 0, 0, 0};
+    const struct sim_floor_texture floor = {"PLAIN", 1, correlation_mm, 0, 0, 0, false};
     struct mech_profile profile;
     double square = 0, square_of_means = 0;
     mech_profile_start(&profile, &floor, sim_rng_stream(9, 9, (uint32_t)(1000 * correlation_mm * speed)));
@@ -68,8 +68,9 @@ static void test_samples_are_not_independent(void **state)
     }
 }
 
-/* A pre-tilted whisker is let go sooner, (R - behind)/v, and one that already stands straight is not held at all. */
-static void test_pretilt_shortens_catches(void **state)
+/* A pre-tilted whisker is let go sooner by a pile, (R - behind)/v, and one that already stands straight is not held at
+ * all. */
+static void test_pretilt_shortens_hooks(void **state)
 {
     (void)state;
     const double share[] = {0, 0.25, 0.5, 0.75, 0.95};
@@ -78,7 +79,8 @@ static void test_pretilt_shortens_catches(void **state)
         struct mech_whisker w = mech_whisker_default();
         struct mech_stance stance = mech_stance_default();
         struct mech_drag drag;
-        const struct sim_floor_texture *floor = &SIM_FLOOR_TEXTURES[0];
+        struct sim_floor_texture pile = SIM_FLOOR_TEXTURES[0], *floor = &pile;
+        pile.pile = true;
         double reach = mech_drag_reach(&w, &stance);
         int held = 0;
         stance.behind = share[i] * reach;
@@ -86,7 +88,7 @@ static void test_pretilt_shortens_catches(void **state)
         for (int k = 0; k < 4000; k++) {
             struct mech_stroke stroke = {0.15 * TICK, k > 300 ? 1e-3 : 0, 0};
             mech_drag_step(&drag, floor, &stroke);
-            held += drag.contact == MECH_CAUGHT;
+            held += drag.contact == MECH_HOOKED;
         }
         assert_near(held * TICK, (1 - share[i]) * reach / 0.15, 2.5e-3 / 0.15);
         assert_true(held * TICK < before);
@@ -100,7 +102,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_classes),
         cmocka_unit_test(test_samples_are_not_independent),
-        cmocka_unit_test(test_pretilt_shortens_catches),
+        cmocka_unit_test(test_pretilt_shortens_hooks),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -7,9 +7,10 @@
 
 #include <stdlib.h>
 
+#include "mech_drag.h"
 #include "mech_table.h"
-#include "mech_vibration.h"
 #include "near.h"
+#include "reference_edges.h"
 #include "reference_table.h"
 
 static struct mech_whisker whisker_of(double tip_mm, double kappa, double friction)
@@ -64,11 +65,52 @@ static void test_frequencies(void **state)
     }
 }
 
+/* Drags the whisker of the chain over a step. Returns the time at its corner, ms; the peak is in uN m. */
+static double drag_over(double step_mm, double speed, int forced, double *peak)
+{
+    const struct sim_floor_texture flat = {"FLAT", 0, 1, 0, 0, 0, false};
+    const double lead_in = 60e-3, before = 5e-3, after = 25e-3, ramp_s = 0.02;
+    struct mech_whisker w = mech_whisker_default();
+    struct mech_stance stance = mech_stance_default();
+    struct mech_drag drag;
+    double gone = 0, held = 0;
+    mech_drag_start(&drag, &w, &stance, &flat, sim_rng_stream(1, 1, 1), TICK);
+    drag.forced = forced;
+    *peak = 0;
+    for (int i = 1; gone < lead_in + after; i++) {
+        struct mech_stroke stroke = {speed * TICK * fmin(1, i * TICK / ramp_s), 0, 0};
+        gone += stroke.travel;
+        stroke.height = gone > lead_in ? step_mm * 1e-3 : 0;
+        mech_drag_step(&drag, &flat, &stroke);
+        held += drag.contact == MECH_EDGE ? 1e3 * TICK : 0;
+        if (gone > lead_in - before)
+            *peak = fmax(*peak, 1e6 * fabs(drag.moment[0]));
+    }
+    return held;
+}
+
+/* Time at an edge within a factor of 1.5 or 10 ms, peak moment within 25 %; without vibration while the tip is slow. */
+static void test_edges(void **state)
+{
+    (void)state;
+    for (size_t i = 0; i < COUNT(CHAIN_EDGES); i++) {
+        const double *row = CHAIN_EDGES[i];
+        for (int forced = MECH_CLOSED; forced <= MECH_VIBRATION; forced += MECH_VIBRATION - MECH_CLOSED) {
+            if (forced == MECH_CLOSED && (row[0] < 0 || row[1] > 0.1))
+                continue;
+            double peak, held = drag_over(row[0], row[1], forced, &peak);
+            assert_true(fabs(held - row[2]) <= 10 || (held <= 1.5 * row[2] && row[2] <= 1.5 * held));
+            assert_share(peak, row[3], 0.25);
+        }
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_base_moment),
         cmocka_unit_test(test_frequencies),
+        cmocka_unit_test(test_edges),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -71,13 +71,21 @@ def test_sample_rate_is_a_parameter():
     assert peak(tick_s=10e-3).tilt_rad.max() == pytest.approx(fine, rel=4e-2)
 
 
-def test_border_catches_and_lets_go():
-    series = sweep(Whisker(), ["VINYL", "SMOOTH"], 0.1, 0.3, seed=2, step_m=0.001, behind=0.0)
-    caught = series.what & 3 == mechanics.CAUGHT
-    assert caught.any() and not caught[: round(0.3 / 0.1 / mechanics.TICK_S) - 1].any()
-    assert caught.sum() * mechanics.TICK_S == pytest.approx(math.sqrt(0.14**2 - 0.08**2) / 0.1, rel=0.02)
-    flat = sweep(Whisker(), ["VINYL", "SMOOTH"], 0.1, 0.3, seed=2)
-    assert not (flat.what & 3 == mechanics.CAUGHT).any()
+def test_pile_hooks_and_lets_go():
+    series = sweep(Whisker(), ["VINYL", "ROUGH"], 0.1, 0.3, seed=2, step_m=0.001, behind=0.0)
+    hooked = series.what & 3 == mechanics.HOOKED
+    assert hooked.any() and not hooked[: round(0.3 / 0.1 / mechanics.TICK_S) - 1].any()
+    assert hooked.sum() * mechanics.TICK_S == pytest.approx(math.sqrt(0.14**2 - 0.08**2) / 0.1, rel=0.02)
+    flat = sweep(Whisker(), ["VINYL", "ROUGH"], 0.1, 0.3, seed=2)
+    assert (flat.what & 3 < mechanics.HOOKED).all()
+
+
+@pytest.mark.parametrize("level", [CLOSED, VIBRATION])
+def test_step_without_a_pile_is_slid_over(level):
+    series = sweep(Whisker(), ["VINYL", "SMOOTH"], 0.1, 0.3, seed=2, step_m=0.001, level=level)
+    held = (series.what & 3 == mechanics.EDGE).sum() * mechanics.TICK_S
+    assert 47.6e-3 / 1.5 < held < 47.6e-3 * 1.5  # a chain of 20 links on a flat floor: 47.6 ms
+    assert (series.what & 3 != mechanics.HOOKED).all()
 
 
 def test_floors_differ_as_their_roughness_does():

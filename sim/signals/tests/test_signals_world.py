@@ -81,11 +81,12 @@ def test_levels_and_catches_are_told():
         world = World(rough, seed)
         assert [world.level(lane) for lane in range(6)] == [0] * 6
         world.drive(0.15, 0.0)
-        for _ in range(400):
-            world.run(40)
+        for _ in range(2000):
+            world.run(8)
             caught.append(world.tip(0).caught or world.tip(5).caught)
         assert world.level(0) & VIBRATION and not world.blocked
-    assert 0.005 < np.mean(caught) < 0.3
+    # Some 4 borders of two tips in 8 s, a third of them steps up of 0.06 to 0.4 mm that hold a tip for 2 to 20 ms.
+    assert 0.0005 < np.mean(caught) < 0.01
     world = World(rough.replace("mechanics auto", "mechanics rest"), 2)
     world.drive(0.15, 0.0)
     counts = world.run(4000).astype(int)

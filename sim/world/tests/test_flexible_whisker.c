@@ -166,6 +166,8 @@ static void test_slips_off_a_corner_not_off_a_face(void **state)
     }
 }
 
+enum { VINYL, ROUGH }; /* the scene's textures; the second has a pile */
+
 static struct sim_scene checkered(void)
 {
     struct sim_scene scene = bench(8, 0.4, 4, 0);
@@ -173,14 +175,50 @@ static struct sim_scene checkered(void)
     scene.tile_m = 0.4;
     scene.columns = scene.rows = 20;
     scene.textures = 2;
-    strcpy(scene.texture[1], "SMOOTH");
+    strcpy(scene.texture[ROUGH], "ROUGH");
     for (size_t i = 0; i < 400; i++)
         scene.tile[i] = (i + i / 20) % 2;
     return scene;
 }
 
-/* Some borders catch, never in the middle of a tile's far half, and as long as it takes to pull the whisker straight:
- * (R - behind)/v = 0.38 s at 0.15 m/s. */
+/* Ticks for which this catch held, by what held it. */
+struct catches {
+    int by_pile, by_corner, ticks_by_pile;
+};
+
+static void count_catch(struct catches *catches, int ticks, size_t texture)
+{
+    bool long_one = ticks > 0.1 * TICKS_PER_S;
+    assert_true(!long_one || texture == ROUGH);
+    catches->by_pile += long_one;
+    catches->by_corner += !long_one && texture == VINYL;
+    catches->ticks_by_pile += long_one ? ticks : 0;
+    /* Steps between tiles are at most 0.4 mm high: a chain of 20 links is held for 24.5 ms by 0.3 mm at 0.1 m/s. */
+    assert_true(long_one || ticks < 0.03 * TICKS_PER_S);
+}
+
+static void drive_over_borders(const struct sim_scene *scene, uint64_t seed, struct catches *catches)
+{
+    sim_world *world = world_of(scene, seed);
+    int length = 0;
+    size_t held_by = VINYL;
+    sim_world_drive(world, SPEED, 0);
+    for (int i = 0; i < 40 * TICKS_PER_S; i++) {
+        sim_world_step(world);
+        struct sim_tip tip = sim_world_tip(world, FLOOR_LANE);
+        if (!tip.caught && length > 0)
+            count_catch(catches, length, held_by);
+        length = tip.caught ? length + 1 : 0;
+        held_by = tip.texture;
+        struct sim_field fields[6];
+        sim_world_fields(world, fields);
+        assert_true(isfinite(fields[FLOOR_LANE].alpha_deg) && isfinite(fields[FLOOR_LANE].beta_deg));
+    }
+    sim_world_free(world);
+}
+
+/* The pile's borders hook now and then, as long as it takes to pull the whisker straight: (R - behind)/v = 0.38 s at
+ * 0.15 m/s. The other floor's hold the tip for some ms at the corner. */
 static void test_borders_catch(void **state)
 {
     (void)state;
@@ -188,30 +226,12 @@ static void test_borders_catch(void **state)
     struct mech_stance stance = mech_stance_default();
     struct mech_whisker whisker = mech_whisker_default();
     double longest = (mech_drag_reach(&whisker, &stance) - stance.behind) / SPEED;
-    int catches = 0, held = 0, borders = 0;
-    for (uint64_t seed = 1; seed <= 4; seed++) {
-        sim_world *world = world_of(&scene, seed);
-        size_t before = sim_world_tip(world, FLOOR_LANE).texture;
-        int length = 0;
-        sim_world_drive(world, SPEED, 0);
-        for (int i = 0; i < 40 * TICKS_PER_S; i++) {
-            sim_world_step(world);
-            struct sim_tip tip = sim_world_tip(world, FLOOR_LANE);
-            borders += tip.texture != before;
-            before = tip.texture;
-            length = tip.caught ? length + 1 : 0;
-            catches += length == 1;
-            held += tip.caught;
-            assert_true(length <= (longest + 0.02) * TICKS_PER_S);
-            struct sim_field fields[6];
-            sim_world_fields(world, fields);
-            assert_true(isfinite(fields[FLOOR_LANE].alpha_deg) && isfinite(fields[FLOOR_LANE].beta_deg));
-        }
-        sim_world_free(world);
-    }
-    assert_true(borders >= 60);
-    assert_true(catches >= borders / 20 && catches <= borders / 2);
-    assert_near((double)held / catches / TICKS_PER_S, longest, 0.1);
+    struct catches catches = {0};
+    for (uint64_t seed = 1; seed <= 4; seed++)
+        drive_over_borders(&scene, seed, &catches);
+    assert_true(catches.by_pile >= 3 && catches.by_pile <= 20); /* of some 60 borders, half of them onto the pile */
+    assert_true(catches.by_corner >= 5);
+    assert_near((double)catches.ticks_by_pile / catches.by_pile / TICKS_PER_S, longest, 0.1);
 }
 
 int main(void)

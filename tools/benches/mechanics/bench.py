@@ -15,6 +15,8 @@ import numpy as np
 from tqdm import tqdm
 
 from .charts import draw_moment, draw_speed
+from .edges import HEIGHTS_MM, SPEEDS, draw_edges, edge_summary, measure_edges, write_page
+from .edges import write_table as write_edge_table
 from .measure import (
     CACHE,
     LINKS,
@@ -47,6 +49,16 @@ def save(data: dict) -> None:
     print("bench/results/mechanics.json, docs/charts/mechanics_speed.svg, mechanics_moment.svg")
 
 
+def save_edges(rows: list[dict], version: str) -> None:
+    """Result, page, chart and C table of the edges."""
+    (RESULTS / "mechanics_edges.json").write_text(
+        json.dumps({"summary": edge_summary(rows), "rows": rows}, indent=1) + "\n"
+    )
+    draw_edges(rows).savefig(CHARTS / "mechanics_edges.png", dpi=120)
+    write_page(rows, version)
+    write_edge_table(rows)
+
+
 def keep(ours: Ours, links: list[dict]) -> None:
     """Marks what is before slip-off, and where the closed form is trusted at the default tolerance."""
     relative = ours.lib.mech_tolerance_default().relative
@@ -71,14 +83,17 @@ def run(build: Path, fresh: bool) -> None:
         for folder in ("chain", "speed"):
             shutil.rmtree(CACHE / folder, ignore_errors=True)
     ours = Ours()
-    with tqdm(total=len(static_cases()) + len(LINKS) + len(mode_cases()) + ROUNDS, desc="mechanics") as bar:
+    steps = len(static_cases()) + len(LINKS) + len(mode_cases()) + ROUNDS + len(HEIGHTS_MM) * len(SPEEDS)
+    with tqdm(total=steps, desc="mechanics") as bar:
         speed = measure_speed(ours, bar)
         modes = measure_modes(ours, bar)
         static = measure_static(ours, bar)
         links = measure_links(ours, bar)
+        edges = measure_edges(ours, bar)
     keep(ours, links)
     data = {"summary": summary(static, modes, speed), "speed": speed, "modes": modes, "static": static, "links": links}
     data["mujoco"] = chain("modes", spec(0.3e-3, 1.0, 20, pinned_at=0.0))["mujoco"]
     write_table(static, modes)
     save(data)
+    save_edges(edges, data["mujoco"])
     print(json.dumps(data["summary"], indent=1))

@@ -6,6 +6,7 @@ the simulator that it is compared with: the base moment is that of MuJoCo's cont
 
     chain.py static '{"links": 20, ...}'     moments, contact positions, slip-off: one line of JSON
     chain.py modes '{...}'                    frequencies
+    chain.py edge '{"height": 3e-4, ...}'     a tip dragged over an edge of the floor: time at the edge, moments
     chain.py speed '{"links": 5}'             28 whiskers, 8 on a moving floor, 4 on moving pegs
 """
 
@@ -25,6 +26,11 @@ STATIC_DAMPING_S = 4e-4  # damping over stiffness of every hinge
 SETTLE_S, AVERAGE_S, READINGS = 0.2, 0.15, 60
 FAST_DEG_S, SLOW_DEG_S = 25.0, 10.0  # the peg's speed
 FLOOR_SPEED = 0.1
+EDGE_STEP_S = 20e-6
+EDGE_DAMPING_S = 1e-5  # damping over stiffness of every hinge, beside the damping of the modes
+DAMPED_HZ = 1000.0  # modes up to here have the damping ratio that is asked for
+LOWER_S, LEAD_IN = 0.15, 20e-3  # the mount goes down to its height; then it travels this far before the edge
+COLLIDING = 0.15  # share of the length, from the tip, that can touch the floor
 
 
 class Beam:
@@ -212,6 +218,102 @@ def modes(spec: dict) -> dict:
     return {"hz": (np.sqrt(np.sort(square)[:4]) / (2 * np.pi)).tolist()}
 
 
+def edge_xml(beam: Beam, stance: dict, height: float, friction: float) -> str:
+    """A whisker whose mount travels along +x, over a floor that is `height` higher beyond x = 0."""
+    behind, above = stance["behind"], stance["height"]
+    aside = np.sqrt(beam.length**2 - behind**2 - above**2)
+    along = np.array([-behind, aside, -above]) / beam.length
+    level = np.array([aside, behind, 0]) / np.hypot(aside, behind)
+    contact = 'contype="0" conaffinity="0"'
+    axes = " ".join(f"{v}" for v in (*along, *level))
+    start = behind - LEAD_IN
+    driven = "".join(
+        f'<joint name="{name}" type="slide" axis="{axis}" armature="{MOUNT_INERTIA}"/>'
+        for name, axis in (("travel", "1 0 0"), ("lower", "0 0 1"))
+    )
+    driven += '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
+    body = f'<body pos="{start} {-aside} {above + stance["tip_radius"]}">{driven}'
+    body += (
+        whisker_xml(beam, "w", f'pos="0 0 0" xyaxes="{axes}"', EDGE_DAMPING_S, ("0 0 1", "0 1 0"), contact) + "</body>"
+    )
+    low, high = min(height, 0), max(height, 0)
+    side = 1 if height > 0 else -1
+    plate = 'type="box" contype="2" conaffinity="1"'
+    body += f'<geom name="floor" {plate} pos="0 0 {low - 0.05}" size="1 1 0.05"/>'
+    body += f'<geom name="step" {plate} pos="{side * 0.5} 0 {high - 0.05}" size="0.5 1 0.05"/>'
+    return model_xml(body, friction, EDGE_STEP_S)
+
+
+def edge_model(beam: Beam, spec: dict) -> mujoco.MjModel:
+    """Only the links next to the tip collide, with the tip's radius; contacts are as hard as the step allows."""
+    model_spec = mujoco.MjSpec.from_string(edge_xml(beam, spec["stance"], spec["height"], spec["friction"]))
+    for i in range(round(beam.links * (1 - COLLIDING)) + 1, beam.links + 1):
+        shape = model_spec.geom(f"w_{i}")
+        shape.contype, shape.conaffinity, shape.size[0] = 1, 2, spec["stance"]["tip_radius"]
+    for shape in model_spec.geoms:
+        shape.solref[0] = spec["contact_s"]
+    return model_spec.compile()
+
+
+def modal_damping(model: mujoco.MjModel, data: mujoco.MjData, ratio: float) -> np.ndarray:
+    """Torque per velocity of the whisker's hinges, about the straight whisker, beside the hinges' own damping."""
+    mass = np.zeros((model.nv, model.nv))
+    mujoco.mj_forward(model, data)
+    mujoco.mj_fullM(model, data, mass)
+    mass = mass[2:, 2:]
+    stiffness = (model.jnt_stiffness[:, 0] if model.jnt_stiffness.ndim > 1 else model.jnt_stiffness)[2:]
+    root = np.linalg.cholesky(mass)
+    inverse = np.linalg.inv(root)
+    square, shapes = np.linalg.eigh(inverse * stiffness @ inverse.T)
+    omega = np.sqrt(square)
+    missing = np.where(omega < 2 * np.pi * DAMPED_HZ, 2 * ratio * omega - EDGE_DAMPING_S * square, 0)
+    return (root @ shapes * missing) @ (root @ shapes).T
+
+
+def edge(spec: dict) -> dict:
+    """Seconds from the first touch of the edge to the last, and the base moments about that time (N m)."""
+    beam = Beam(spec)
+    model = edge_model(beam, spec)
+    data = mujoco.MjData(model)
+    plug = beam.plug * np.ones(2)
+    damping = modal_damping(model, data, spec["damping"])
+    radius = spec["stance"]["tip_radius"]
+    touched, rows = [], []
+    time_s, ramp = LOWER_S + (LEAD_IN + spec["after"]) / spec["speed"], 0.02
+    tip = model.geom(f"w_{beam.links}").id
+    half = model.geom_size[tip][1]
+    for i in range(round(time_s / EDGE_STEP_S)):
+        now = i * EDGE_STEP_S
+        data.qvel[0] = spec["speed"] * min(1, max(0, (now - LOWER_S) / ramp))
+        data.qvel[1] = -spec["stance"]["preload"] / (LOWER_S - 0.05) if now < LOWER_S - 0.05 else 0
+        data.qfrc_applied[2:] = -damping @ data.qvel[2:]
+        mujoco.mj_step(model, data)
+        at = data.geom_xpos[tip] - half * data.geom_xmat[tip].reshape(3, 3)[:, 2]
+        rows.append((now, data.qpos[0], at[0], at[2] - radius, *(plug * data.qpos[2:4])))
+        # The edge pushes against the travel; a flat floor only upwards.
+        touched.append(any(abs(contact.frame[0]) > 0.05 for contact in data.contact[: data.ncon]))
+    rows = np.array(rows)
+    return edge_answer(spec, rows, np.array(touched))
+
+
+def edge_answer(spec: dict, rows: np.ndarray, touched: np.ndarray) -> dict:
+    when, travelled = rows[:, 0], rows[:, 1]
+    at_edge = np.flatnonzero(touched)
+    held = (at_edge[-1] - at_edge[0] + 1) * EDGE_STEP_S if len(at_edge) else 0.0
+    before = (travelled > 0.5 * LEAD_IN) & (travelled < 0.75 * LEAD_IN)
+    after = travelled > 0.75 * LEAD_IN
+    every = rows[:: max(1, round(5e-4 / EDGE_STEP_S))]
+    return {
+        "held_s": held,
+        "rest": rows[when < LOWER_S][-1, 4:].tolist(),
+        "steady": rows[before, 4:].mean(axis=0).tolist(),
+        "peak": float(np.abs(rows[after, 4]).max()),
+        "trace": {name: every[:, i].tolist() for i, name in enumerate(("time", "travel", "x", "z", "along", "across"))}
+        if spec.get("trace")
+        else None,
+    }
+
+
 def scene_xml(beam: Beam) -> str:
     """28 whiskers with two hinges a link: 4 on pegs, 8 with their tips pressed on a floor, 16 free."""
     axes, body = ("0 0 1", "0 1 0"), ""
@@ -258,5 +360,5 @@ def speed(spec: dict) -> dict:
 
 
 if __name__ == "__main__":
-    job = {"static": static, "modes": modes, "speed": speed}[sys.argv[1]]
+    job = {"static": static, "modes": modes, "speed": speed, "edge": edge}[sys.argv[1]]
     print(json.dumps(job(json.loads(sys.argv[2])) | {"mujoco": mujoco.__version__}))
