@@ -139,5 +139,5 @@ double nav_texture_novelty_weigh(struct nav_texture_novelty *v, const double *fe
     for (int k = 0; k < v->n.classes; k++)
         trained = fmax(trained, log_likelihood(v, k));
     double ratio = log_likelihood(v, v->n.classes) - trained;
-    return 1.0 + (ratio - v->n.limit[step_of(v->windows)]) / v->n.scale;
+    return (ratio - v->n.limit[step_of(v->windows)]) / v->n.scale;
 }

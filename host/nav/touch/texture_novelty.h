@@ -21,16 +21,16 @@ struct nav_texture_novelty_numbers {
     const double *recording; /* [K + 1][F] variance of recordings about the mean, >= 0 */
     const double *noise;     /* [F] variance of one window within a recording, > 0 */
     const double *limit;     /* [NAV_TEXTURE_NOVELTY_STEPS] nats, of the mean of 1, 2, 4, 8 and 16 windows or more */
-    double scale;            /* nats, > 0, by which a score exceeds its limit that halves the evidence */
+    double scale;            /* nats of the ratio, > 0, that are one nat of the answer */
 };
 
 /* NULL when a size or number is out of range or memory is short. */
 struct nav_texture_novelty *nav_texture_novelty_new(const struct nav_texture_novelty_numbers *);
 void nav_texture_novelty_free(struct nav_texture_novelty *);
 
-/* Takes a window's features[F]. Returns the novelty score of the windows since the last reset, at most the last 16 or
- * so: 1 at the limit, more for a surface never trained. The log-likelihood ratio of a surface never trained against the
- * likeliest trained one is limit + scale (score - 1). Allocates nothing. */
+/* Takes a window's features[F]. Returns the log odds that the windows since the last reset, at most the last 16 or so,
+ * are of a surface never trained: its log-likelihood ratio against the likeliest trained one, less the limit, in units
+ * of `scale`. Allocates nothing. */
 double nav_texture_novelty_weigh(struct nav_texture_novelty *, const double *features);
 
 /* The next window is no continuation. */

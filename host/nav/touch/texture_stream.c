@@ -5,35 +5,39 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "texture_catch.h"
-#include "texture_halves.h"
-#include "texture_span.h"
-#include "texture_watch.h"
+#include "texture_filter.h"
 
 #define HELD_WINDOWS 20 /* a tip held for longer, 2 s at 100 ms, has a new rest */
 #define SINCE_LONG (1 << 30)
-#define SURE 0.9     /* confidence that names a surface, for which of two windows in a row are of one */
-#define RINGING 0.05 /* share of its evidence that a window keeps while the whisker rings */
+#define SURE 0.9            /* probability of another class at which windows are no longer of the same row */
+#define CHANGED 0.9         /* share of reported change points that are true */
+#define MOVED 0.5           /* chance that an edge that holds the tip is the border of another surface */
+#define LOG_ODDS_MOST 20.0  /* of a surface never trained: a confidence of 0 means no evidence at all */
+#define BAD_SHARE_MOST 0.25 /* of a window; with more, its spectrum is that of the gaps */
+
+/* How long an edge holds the tip. It begins with a bend farther than any trained floor makes within a window; while it
+ * lasts, the tip stands still on the edge and what it feels is no floor, though later windows bend no farther. */
+struct edge {
+    double *level; /* [channels] mean of the last window before */
+    bool known, held;
+    long samples; /* that it has been held for */
+};
 
 struct nav_texture_stream {
     struct nav_texture_rules rules; /* its pointers are the stream's own, but for what is lent */
     struct nav_texture_classifier *classifier[NAV_TEXTURE_CLASSIFIERS_MAX];
-    double border[NAV_TEXTURE_CLASSIFIERS_MAX];
-    struct nav_texture_span *span;
-    double *limits; /* [6][channels] the stream's own */
+    double *memory; /* all of the arrays below */
     double *raw;    /* [room][channels] samples since the last decision */
     double *clean;  /* [room][channels] */
-    int room, held;
-    int since; /* samples since the surface changed, or SINCE_LONG */
-    struct nav_texture_halves halves;
-    struct nav_texture_watch watch;
-    int kind;      /* surface of the windows in a row that are judged together, or NAV_TEXTURE_UNKNOWN */
-    int named;     /* surface last named with confidence, or NAV_TEXTURE_UNKNOWN, ... */
-    int named_for; /* ... and for how many samples in a row, counted up to where it becomes `kind` */
-    double beyond; /* novelty score of the windows in a row, 0 before the first */
-    double *apart; /* [novelty's length][channels] samples since its last window, then [classes]; unused if aligned */
-    int apart_held;
-    struct nav_texture_catch edge; /* its level is the sixth row of limits */
+    double *block;  /* [a block of `change`][channels] samples since the last block */
+    double *apart;  /* [novelty's length][channels] samples since its last window; unused if aligned */
+    double *posterior, *ahead, *part; /* [classes] at the last decision; with the samples since; of one window */
+    int room, held, blocked, apart_held;
+    int since;    /* samples since the surface changed, or SINCE_LONG */
+    bool border;  /* a change found since the last decision */
+    int kind;     /* class of the windows in a row that novelty is judged by, or NAV_TEXTURE_UNKNOWN */
+    double novel; /* probability that those are of a surface never trained */
+    struct edge edge;
 };
 
 static bool classifiers_ok(const struct nav_texture_rules *r)
@@ -47,10 +51,11 @@ static bool classifiers_ok(const struct nav_texture_rules *r)
     return true;
 }
 
-static bool lengths_ok(const struct nav_texture_rules *r)
+static bool numbers_ok(const struct nav_texture_rules *r)
 {
-    bool sequential = r->told >= 0.0 && r->patience >= r->step && r->patience <= NAV_TEXTURE_WINDOW_MAX;
-    return r->window >= 2 && r->window <= NAV_TEXTURE_WINDOW_MAX && r->step >= 0 && (r->step == 0 || sequential);
+    bool sequential = r->patience >= r->step && r->patience <= NAV_TEXTURE_WINDOW_MAX;
+    return r->window >= 2 && r->window <= NAV_TEXTURE_WINDOW_MAX && r->step >= 0 && (r->step == 0 || sequential) &&
+           r->hazard > 0.0 && r->temper >= 0.0 && isfinite(r->hazard) && isfinite(r->temper);
 }
 
 static bool novelty_ok(const struct nav_texture_rules *r)
@@ -62,16 +67,8 @@ static bool novelty_ok(const struct nav_texture_rules *r)
 
 static bool rules_ok(const struct nav_texture_rules *r)
 {
-    if (r->channels < 1 || r->classes < 1 || r->limits.channels != r->channels || !classifiers_ok(r) || !lengths_ok(r))
-        return false;
-    if (r->ringdown && (!r->change || nav_texture_ringdown_length(r->ringdown) != nav_texture_change_length(r->change)))
-        return false;
-    return !r->novelty || novelty_ok(r);
-}
-
-static const double *own_limit(double *to, const double *from, int channels)
-{
-    return from ? memcpy(to, from, (size_t)channels * sizeof *to) : NULL;
+    return r->channels >= 1 && r->classes >= 1 && r->limits.channels == r->channels && classifiers_ok(r) &&
+           numbers_ok(r) && (!r->novelty || novelty_ok(r));
 }
 
 /* Samples of a window that novelty is judged by; 0 without. */
@@ -86,36 +83,47 @@ static bool aligned(const struct nav_texture_stream *s)
     return s->rules.step == 0 && s->rules.window == novelty_length(s);
 }
 
-static bool allocate(struct nav_texture_stream *s)
+static int block_length(const struct nav_texture_stream *s)
 {
-    size_t channels = (size_t)s->rules.channels;
-    s->apart = calloc((size_t)novelty_length(s) * channels + (size_t)s->rules.classes, sizeof *s->apart);
-    s->span = nav_texture_span_new(&s->rules);
-    s->limits = calloc(6 * channels, sizeof *s->limits);
-    s->raw = calloc((size_t)s->room * channels, sizeof *s->raw);
-    s->clean = calloc((size_t)s->room * channels, sizeof *s->clean);
-    bool halves = nav_texture_halves_make(&s->halves, &s->rules, s->border);
-    bool watch = nav_texture_watch_make(&s->watch, &s->rules, &s->rules.limits);
-    return halves && watch && s->apart && s->span && s->limits && s->raw && s->clean;
+    return s->rules.change ? nav_texture_change_length(s->rules.change) : 0;
 }
 
-static void own_limits(struct nav_texture_stream *s)
+static double *cut(double **memory, size_t numbers)
 {
-    memcpy(s->border, s->rules.border, (size_t)s->rules.classifiers * sizeof *s->border);
-    memcpy(s->classifier, s->rules.classifier, (size_t)s->rules.classifiers * sizeof *s->classifier);
-    s->rules.classifier = s->classifier;
-    s->rules.border = s->border;
+    double *part = *memory;
+    *memory += numbers;
+    return part;
+}
+
+static const double *own_limit(double **memory, const double *from, size_t channels)
+{
+    double *to = cut(memory, channels);
+    return from ? memcpy(to, from, channels * sizeof *to) : NULL;
+}
+
+static bool allocate(struct nav_texture_stream *s)
+{
     struct nav_texture_limits *l = &s->rules.limits;
-    int channels = l->channels;
-    l->spike = own_limit(s->limits, l->spike, channels);
-    l->still = own_limit(s->limits + channels, l->still, channels);
-    l->low = own_limit(s->limits + 2 * channels, l->low, channels);
-    l->high = own_limit(s->limits + 3 * channels, l->high, channels);
-    l->span = own_limit(s->limits + 4 * channels, l->span, channels);
-    s->edge = (struct nav_texture_catch){.channels = channels,
-                                         .span = l->span,
-                                         .level = s->limits + 5 * channels,
-                                         .patience = (long)HELD_WINDOWS * s->rules.window};
+    size_t channels = (size_t)s->rules.channels, classes = (size_t)s->rules.classes;
+    size_t room = (size_t)s->room * channels, block = (size_t)block_length(s) * channels;
+    size_t apart = (size_t)novelty_length(s) * channels;
+    double *m = s->memory = calloc(2 * room + block + apart + 3 * classes + 6 * channels, sizeof *m);
+    if (!m)
+        return false;
+    s->raw = cut(&m, room);
+    s->clean = cut(&m, room);
+    s->block = cut(&m, block);
+    s->apart = cut(&m, apart);
+    s->posterior = cut(&m, classes);
+    s->ahead = cut(&m, classes);
+    s->part = cut(&m, classes);
+    s->edge.level = cut(&m, channels);
+    l->spike = own_limit(&m, l->spike, channels);
+    l->still = own_limit(&m, l->still, channels);
+    l->low = own_limit(&m, l->low, channels);
+    l->high = own_limit(&m, l->high, channels);
+    l->span = own_limit(&m, l->span, channels);
+    return true;
 }
 
 struct nav_texture_stream *nav_texture_stream_new(const struct nav_texture_rules *rules)
@@ -124,12 +132,13 @@ struct nav_texture_stream *nav_texture_stream_new(const struct nav_texture_rules
     if (!s)
         return NULL;
     s->rules = *rules;
+    memcpy(s->classifier, rules->classifier, (size_t)rules->classifiers * sizeof *s->classifier);
+    s->rules.classifier = s->classifier;
     s->room = rules->step > 0 ? rules->patience : rules->window;
     if (!allocate(s)) {
-        nav_texture_stream_free(s);
+        free(s);
         return NULL;
     }
-    own_limits(s);
     nav_texture_stream_reset(s);
     return s;
 }
@@ -138,118 +147,73 @@ void nav_texture_stream_free(struct nav_texture_stream *s)
 {
     if (!s)
         return;
-    nav_texture_span_free(s->span);
-    free(s->limits);
-    free(s->apart);
-    free(s->raw);
-    free(s->clean);
-    nav_texture_watch_free(&s->watch);
-    nav_texture_halves_free(&s->halves);
+    free(s->memory);
     free(s);
 }
 
 /* The windows to come are not judged together with those before. */
-static void new_surface(struct nav_texture_stream *s)
+static void new_row(struct nav_texture_stream *s)
 {
-    s->kind = s->named = NAV_TEXTURE_UNKNOWN;
-    s->named_for = 0;
-    s->beyond = 0.0;
+    s->kind = NAV_TEXTURE_UNKNOWN;
+    s->novel = 0.0;
     s->apart_held = 0;
     if (s->rules.novelty)
         nav_texture_novelty_reset(s->rules.novelty);
 }
 
+/* The blocks to come are not compared with those before. */
+static void interrupt(const struct nav_texture_stream *s)
+{
+    if (s->rules.change)
+        nav_texture_change_keep(s->rules.change, 0);
+}
+
 void nav_texture_stream_reset(struct nav_texture_stream *s)
 {
-    s->held = 0;
+    s->held = s->blocked = 0;
     s->since = SINCE_LONG;
-    s->halves.has_before = false;
-    nav_texture_watch_reset(&s->watch);
-    new_surface(s);
-    s->edge.known = s->edge.held = false;
+    s->border = s->edge.known = s->edge.held = false;
+    nav_texture_filter_start(s->posterior, s->rules.classes);
+    interrupt(s);
+    new_row(s);
 }
 
-/* Confidence of the likeliest class under equal priors, and which. */
-static double best(const double *loglik, int classes, int *label)
+static double mean_of(const struct nav_texture_stream *s, int channel)
 {
     double sum = 0.0;
-    *label = 0;
-    for (int k = 0; k < classes; k++) {
-        if (loglik[k] > loglik[*label])
-            *label = k;
+    for (int i = 0; i < s->held; i++)
+        sum += s->clean[(long)i * s->rules.channels + channel];
+    return sum / s->held;
+}
+
+static bool away(const struct nav_texture_stream *s)
+{
+    for (int c = 0; c < s->rules.channels; c++) {
+        if (fabs(mean_of(s, c) - s->edge.level[c]) > s->rules.limits.span[c])
+            return true;
     }
-    for (int k = 0; k < classes; k++)
-        sum += exp(loglik[k] - loglik[*label]);
-    return 1.0 / sum;
+    return false;
 }
 
-static void no_evidence(struct nav_texture_stream *s, struct nav_texture_decision *d, double *loglik)
-{
-    memset(loglik, 0, (size_t)s->rules.classes * sizeof *loglik);
-    d->label = NAV_TEXTURE_UNKNOWN;
-    d->confidence = 0.0;
-    s->halves.has_before = false;
-    new_surface(s);
-}
-
-/* Judges the window that a classifier has just reduced to features, together with those before it. */
-static void weigh_novelty(struct nav_texture_stream *s)
-{
-    const double *features = nav_texture_classifier_features(s->rules.classifier[s->rules.novelty_classifier]);
-    s->beyond = nav_texture_novelty_weigh(s->rules.novelty, features);
-}
-
-/* Novelty score of the windows in a row. Another surface, named with confidence for longer than one window, begins a
- * new row: one that was never trained takes the names of its neighbours in turn. */
-static void follow_row(struct nav_texture_stream *s, const struct nav_texture_decision *d, int n)
-{
-    if (d->confidence > SURE) {
-        int fresh = s->rules.step > 0 ? s->rules.step : s->held;
-        s->named_for = (d->label == s->named ? s->named_for : 0) + fresh;
-        s->named = d->label;
-    }
-    if (s->named == s->kind) {
-        s->named_for = 0;
-    } else if (s->named_for > novelty_length(s)) {
-        int named = s->named;
-        if (s->kind != NAV_TEXTURE_UNKNOWN)
-            new_surface(s);
-        s->kind = s->named = named;
-        s->named_for = 0;
-    }
-    if (aligned(s) && n == s->held)
-        weigh_novelty(s);
-}
-
-/* A surface that lies beyond every trained one is weak evidence for any of them: the farther, the weaker. */
-static bool never_trained(const struct nav_texture_stream *s, double *loglik)
-{
-    for (int k = 0; k < s->rules.classes && s->beyond > 1.0; k++)
-        loglik[k] /= s->beyond;
-    return s->beyond > 1.0;
-}
-
-/* A whisker that still rings from another surface says little of this one. Windows so long that the ringing is a small
- * part of them are taken as they are. */
-static bool rings(const struct nav_texture_stream *s, double *loglik)
-{
-    const struct nav_texture_ringdown *ringdown = s->rules.step == 0 ? s->rules.ringdown : NULL;
-    bool ringing = ringdown && s->held <= NAV_TEXTURE_RINGDOWN_MOST * nav_texture_ringdown_length(ringdown) &&
-                   nav_texture_ringdown_rings(ringdown);
-    for (int k = 0; k < s->rules.classes && ringing; k++)
-        loglik[k] *= RINGING;
-    return ringing;
-}
-
+/* Whether an edge holds the tip: since a sudden bend the mean has not come back to within a span of what it was. */
 static bool edge_holds(struct nav_texture_stream *s, bool sudden)
 {
-    return nav_texture_catch_follow(&s->edge, s->clean, s->held, s->rules.step > 0 ? s->rules.step : s->held, sudden);
+    struct edge *e = &s->edge;
+    if (!s->rules.limits.span)
+        return sudden;
+    e->samples = e->held ? e->samples + (s->rules.step > 0 ? s->rules.step : s->held) : 0;
+    bool patient = e->samples < (long)HELD_WINDOWS * s->rules.window;
+    e->held = sudden || (e->held && e->known && patient && away(s));
+    for (int c = 0; c < s->rules.channels && !e->held; c++)
+        e->level[c] = mean_of(s, c);
+    e->known = e->known || !e->held;
+    return e->held;
 }
 
-/* Whether borders are looked for block by block: then windows and halves that differ are no news. */
-static bool watched(const struct nav_texture_stream *s)
+/* Whether n samples say nothing of a floor: too many of the records bad, or a channel stuck or railed. */
+static bool unreadable(const struct nav_texture_health *h, int n)
 {
-    return s->rules.step == 0 && s->rules.change;
+    return (double)h->bad > BAD_SHARE_MOST * n || h->still > 0 || h->railed > 0;
 }
 
 /* Cleans the samples held. Returns whether they say anything of a surface. */
@@ -257,70 +221,139 @@ static bool clean(struct nav_texture_stream *s, struct nav_texture_decision *d)
 {
     memcpy(s->clean, s->raw, (size_t)s->held * (size_t)s->rules.channels * sizeof *s->clean);
     d->health = nav_texture_clean(s->clean, s->held, &s->rules.limits);
-    bool readable = !nav_texture_unreadable(&d->health, s->held);
-    if (readable && d->health.railed == 0 && edge_holds(s, d->health.caught > 0))
+    bool readable = !unreadable(&d->health, s->held);
+    if (readable && edge_holds(s, d->health.caught > 0))
         d->health.caught = d->health.caught > 0 ? d->health.caught : 1;
     return readable && !d->health.caught;
 }
 
-/* Whether a sequential decision takes more samples: up to one window for a surface never trained, and to the last for
- * one that is not named surely. */
-static bool goes_on(const struct nav_texture_stream *s, double confidence, bool untrained)
+/* What n samples say of each class, the best's 0: the longest classifier that fits covers them in evenly spaced
+ * windows, and counts by how many of its windows they would fill. False when they are shorter than every classifier. */
+static bool evidence(struct nav_texture_stream *s, const double *from, int n, double *loglik)
 {
-    int most = untrained ? s->rules.window : s->room;
-    return s->rules.step > 0 && s->held < most && (untrained || confidence < s->rules.sure);
+    int at = s->rules.classifiers - 1, classes = s->rules.classes;
+    while (at >= 0 && nav_texture_classifier_length(s->classifier[at]) > n)
+        at--;
+    memset(loglik, 0, (size_t)classes * sizeof *loglik);
+    if (at < 0)
+        return false;
+    int length = nav_texture_classifier_length(s->classifier[at]), windows = (n + length - 1) / length;
+    for (int w = 0; w < windows; w++) {
+        long start = windows > 1 ? (long)(n - length) * w / (windows - 1) : 0;
+        nav_texture_classifier_judge(s->classifier[at], from + start * s->rules.channels, s->part);
+        for (int k = 0; k < classes; k++)
+            loglik[k] += s->part[k];
+    }
+    double best = -INFINITY, share = (double)n / length / windows;
+    for (int k = 0; k < classes; k++)
+        best = fmax(best, loglik[k]);
+    for (int k = 0; k < classes; k++)
+        loglik[k] = (loglik[k] - best) * share;
+    return true;
 }
 
-/* Label and confidence. Samples are taken until they look sure, so a sequential decision's evidence is less than it
- * looks: `told` of it is kept. */
-static void answer(const struct nav_texture_stream *s, struct nav_texture_decision *d, double *loglik, bool unknown)
+static int likeliest(const double *posterior, int classes)
 {
-    int classes = s->rules.classes;
+    int best = 0;
+    for (int k = 1; k < classes; k++)
+        best = posterior[k] > posterior[best] ? k : best;
+    return best;
+}
+
+/* Judges the window that a classifier has just reduced to features, together with those before it. */
+static void weigh_novelty(struct nav_texture_stream *s)
+{
+    const double *features = nav_texture_classifier_features(s->classifier[s->rules.novelty_classifier]);
+    s->novel = 1.0 / (1.0 + exp(-fmin(nav_texture_novelty_weigh(s->rules.novelty, features), LOG_ODDS_MOST)));
+}
+
+/* Whether the row of windows is of a surface never trained. Where the filter is sure of another class, a row begins. */
+static void follow_row(struct nav_texture_stream *s, int best, int n)
+{
+    if (s->ahead[best] > SURE && best != s->kind) {
+        if (s->kind != NAV_TEXTURE_UNKNOWN)
+            new_row(s);
+        s->kind = best;
+    }
+    if (aligned(s) && n == s->held)
+        weigh_novelty(s);
+}
+
+/* Chance that the surface changed within n samples. */
+static double chance(const struct nav_texture_stream *s, int n)
+{
+    return -expm1(-s->rules.hazard * n);
+}
+
+static void no_evidence(struct nav_texture_stream *s, struct nav_texture_decision *d, double *loglik)
+{
+    memset(loglik, 0, (size_t)s->rules.classes * sizeof *loglik);
+    d->label = NAV_TEXTURE_UNKNOWN;
+    d->best = likeliest(s->ahead, s->rules.classes);
+    new_row(s);
+}
+
+static void answer(const struct nav_texture_stream *s, struct nav_texture_decision *d)
+{
     double least = s->rules.step > 0 ? s->rules.sure : s->rules.doubt;
-    bool unsure = best(loglik, classes, &d->label) < least;
-    for (int k = 0; k < classes && s->rules.step > 0; k++)
-        loglik[k] *= s->rules.told;
-    d->confidence = best(loglik, classes, &d->label) / fmax(s->beyond, 1.0);
-    if (unknown || unsure || s->beyond > 1.0)
-        d->label = NAV_TEXTURE_UNKNOWN;
+    d->novelty = s->novel;
+    d->confidence = (1.0 - s->novel) * s->ahead[d->best];
+    d->label = d->confidence >= least && s->novel < 0.5 ? d->best : NAV_TEXTURE_UNKNOWN;
 }
 
 /* Decides on the samples held. Returns whether a sequential decision may stop here. */
 static bool decide(struct nav_texture_stream *s, struct nav_texture_decision *d, double *loglik)
 {
+    int classes = s->rules.classes, n = s->since < s->held ? s->since : s->held;
     *d = (struct nav_texture_decision){.samples = s->held};
-    bool cut = s->since < s->held; /* what lies before the border says nothing of the surface now */
-    int n = cut ? s->since : s->held;
-    const double *from = s->clean + (size_t)(s->held - n) * (size_t)s->rules.channels;
-    int classifier = clean(s, d) ? nav_texture_span_judge(s->span, from, n, loglik) : -1;
-    d->border = cut || (d->health.caught > 0 && d->health.railed == 0);
-    if (classifier < 0) {
+    bool readable = clean(s, d), caught = d->health.caught > 0 && d->health.railed == 0;
+    d->border = s->border || n < s->held || caught;
+    memcpy(s->ahead, s->posterior, (size_t)classes * sizeof *s->ahead);
+    nav_texture_filter_change(s->ahead, classes, caught ? MOVED : chance(s, n));
+    if (!readable || !evidence(s, s->clean + (size_t)(s->held - n) * (size_t)s->rules.channels, n, loglik)) {
         no_evidence(s, d, loglik);
         return false;
     }
-    int half_classifier = nav_texture_halves_judge(&s->halves, s->span, from, n, loglik);
-    d->confidence = best(loglik, s->rules.classes, &d->label);
-    follow_row(s, d, n);
-    d->novelty = s->beyond;
-    bool untrained = never_trained(s, loglik);
-    if (goes_on(s, best(loglik, s->rules.classes, &d->label), untrained))
-        return false;
-    bool halves = nav_texture_halves_border(&s->halves, loglik, classifier, half_classifier);
-    d->border = cut || (halves && !watched(s));
-    answer(s, d, loglik, rings(s, loglik));
-    return true;
+    nav_texture_filter_weigh(s->ahead, classes, loglik, s->rules.temper);
+    d->best = likeliest(s->ahead, classes);
+    follow_row(s, d->best, n);
+    answer(s, d);
+    for (int k = 0; k < classes; k++)
+        loglik[k] *= 1.0 - s->novel;
+    return s->rules.step == 0 || fmax(d->confidence, s->novel) >= s->rules.sure;
+}
+
+/* How many samples lie behind a change of surface that this sample shows; 0 without. What an edge holds, or nobody can
+ * read, interrupts the row of blocks. */
+static int behind_change(struct nav_texture_stream *s, const double *sample)
+{
+    int length = block_length(s), channels = s->rules.channels, after;
+    memcpy(s->block + (size_t)s->blocked++ * (size_t)channels, sample, (size_t)channels * sizeof *sample);
+    if (s->blocked < length)
+        return 0;
+    s->blocked = 0;
+    struct nav_texture_health health = nav_texture_clean(s->block, length, &s->rules.limits);
+    if (unreadable(&health, length) || health.caught > 0 || s->edge.held) {
+        interrupt(s);
+        return 0;
+    }
+    if (!(nav_texture_change_weigh(s->rules.change, s->block, &after) > nav_texture_change_limit(s->rules.change)))
+        return 0;
+    nav_texture_change_keep(s->rules.change, after);
+    return after * length;
 }
 
 /* Whether this sample shows that the surface has changed. */
 static bool changed(struct nav_texture_stream *s, const double *sample)
 {
     s->since += s->since < SINCE_LONG;
-    int after = watched(s) ? nav_texture_watch_take(&s->watch, sample, s->edge.held) : 0;
+    int after = s->rules.change ? behind_change(s, sample) : 0;
     if (after == 0)
         return false;
     s->since = after;
-    s->halves.has_before = false;
-    new_surface(s);
+    s->border = true;
+    nav_texture_filter_change(s->posterior, s->rules.classes, CHANGED);
+    new_row(s);
     return true;
 }
 
@@ -333,20 +366,18 @@ static void follow_novelty(struct nav_texture_stream *s, const double *sample)
         return;
     s->apart_held = 0;
     struct nav_texture_health health = nav_texture_clean(s->apart, length, &s->rules.limits);
-    if (nav_texture_unreadable(&health, length) || health.caught > 0 || s->edge.held)
+    if (unreadable(&health, length) || health.caught > 0 || s->edge.held)
         return;
-    nav_texture_classifier_judge(s->rules.classifier[s->rules.novelty_classifier], s->apart,
-                                 s->apart + (size_t)length * (size_t)channels);
+    nav_texture_classifier_judge(s->classifier[s->rules.novelty_classifier], s->apart, s->part);
     weigh_novelty(s);
 }
 
 /* Word of a border before the window is full. */
 static void notice(struct nav_texture_stream *s, struct nav_texture_decision *d, double *loglik)
 {
-    memset(d, 0, sizeof *d);
+    *d = (struct nav_texture_decision){.samples = s->held, .border = 1, .notice = 1};
+    memcpy(s->ahead, s->posterior, (size_t)s->rules.classes * sizeof *s->ahead);
     no_evidence(s, d, loglik);
-    d->samples = s->held;
-    d->border = d->notice = 1;
 }
 
 static bool due(const struct nav_texture_stream *s)
@@ -354,26 +385,33 @@ static bool due(const struct nav_texture_stream *s)
     return s->held == s->room || (s->rules.step > 0 && s->held % s->rules.step == 0);
 }
 
+/* Takes one sample; whether that makes a decision. */
+static bool take(struct nav_texture_stream *s, const double *sample, struct nav_texture_decision *d, double *loglik)
+{
+    size_t channels = (size_t)s->rules.channels;
+    memcpy(s->raw + (size_t)s->held++ * channels, sample, channels * sizeof *sample);
+    if (s->rules.novelty && !aligned(s))
+        follow_novelty(s, sample);
+    bool news = changed(s, sample);
+    if (!due(s)) {
+        if (news)
+            notice(s, d, loglik);
+        return news;
+    }
+    if (!decide(s, d, loglik) && s->held < s->room)
+        return false;
+    memcpy(s->posterior, s->ahead, (size_t)s->rules.classes * sizeof *s->posterior);
+    s->held = 0;
+    s->border = false;
+    return true;
+}
+
 long nav_texture_stream_push(struct nav_texture_stream *s, const double *samples, long n, int *decided,
                              struct nav_texture_decision *decision, double *loglik)
 {
-    size_t channels = (size_t)s->rules.channels;
     *decided = 0;
     for (long i = 0; i < n; i++) {
-        memcpy(s->raw + (size_t)s->held++ * channels, samples + (size_t)i * channels, channels * sizeof *s->raw);
-        if (s->rules.novelty && !aligned(s))
-            follow_novelty(s, samples + (size_t)i * channels);
-        bool news = changed(s, samples + (size_t)i * channels);
-        if (news && !due(s)) {
-            notice(s, decision, loglik);
-            *decided = 1;
-            return i + 1;
-        }
-        if (!due(s))
-            continue;
-        bool may_stop = decide(s, decision, loglik);
-        if (may_stop || s->held == s->room) {
-            s->held = 0;
+        if (take(s, samples + (size_t)i * (size_t)s->rules.channels, decision, loglik)) {
             *decided = 1;
             return i + 1;
         }

@@ -1,4 +1,8 @@
-/* Texture of one whisker, sample by sample: windows in a row, or as few samples as it takes to be sure. */
+/* Texture of one whisker, sample by sample: windows in a row, or as few samples as it takes to be sure.
+ *
+ * One posterior (texture_filter.h) answers all: its states are the classes and a surface never trained. A change point
+ * (texture_change.h) or an edge that holds the tip is a border; what lies before it is no evidence of the surface now.
+ */
 #ifndef NAV_TEXTURE_STREAM_H
 #define NAV_TEXTURE_STREAM_H
 
@@ -6,7 +10,6 @@
 #include "texture_classifier.h"
 #include "texture_clean.h"
 #include "texture_novelty.h"
-#include "texture_ringdown.h"
 
 /* cffi: begin */
 struct nav_texture_stream;
@@ -18,35 +21,29 @@ struct nav_texture_rules {
     int window;      /* samples, from 2 to NAV_TEXTURE_WINDOW_MAX */
     int classifiers; /* at least 1; their windows grow from classifier to classifier */
     struct nav_texture_classifier *const
-        *classifier;      /* [classifiers] lent for the stream's life; not for use by two threads at a time */
-    const double *border; /* [classifiers] two neighbouring stretches that share a class this badly, in nats,
-                             are two surfaces */
-    double growth;        /* evidence of m classifier lengths is m^growth that of one: 1 if independent */
-    double together;      /* factor of the mean evidence of a window and its halves */
-    double doubt;         /* confidence below which the answer is "unknown" */
-    int step;             /* 0: windows in a row. Else sequential: looks every so many samples, ... */
-    double sure;          /* ... answers at this confidence, ... */
-    int patience;         /* ... and after so many samples in any case */
-    double told;          /* factor of the log-likelihoods of a sequential decision, >= 0 */
+        *classifier; /* [classifiers] lent for the stream's life; not for use by two threads at a time */
+    double hazard;   /* changes of surface per sample, above 0 */
+    double temper;   /* >= 0: factor of the evidence of windows in a row, which err alike */
+    double doubt;    /* probability of a class below which the answer is "unknown" */
+    int step;        /* 0: windows in a row. Else sequential: looks every so many samples, ... */
+    double sure;     /* ... answers at this probability, ... */
+    int patience;    /* ... and after so many samples in any case */
     struct nav_texture_limits limits;    /* channels as above */
-    struct nav_texture_change *change;   /* lent to this stream alone; NULL: borders are those of the windows' halves */
+    struct nav_texture_change *change;   /* lent to this stream alone; NULL: no borders but edges that hold the tip */
     struct nav_texture_novelty *novelty; /* likewise, of the features of novelty_classifier; NULL: every surface is
                                             taken for a trained one */
     int novelty_classifier;
-    struct nav_texture_ringdown
-        *ringdown; /* likewise, of blocks as long as `change`'s; NULL: ringing passes for a floor */
 };
 
 struct nav_texture_decision {
     int label;         /* class, or NAV_TEXTURE_UNKNOWN */
+    int best;          /* the likeliest class, whatever the label */
     int samples;       /* that the decision took */
     int border;        /* the surface changed within the window or since the one before it; or the whisker was caught */
     int notice;        /* no window, but word of a border at once: no label, no evidence. The window goes on, and at its
                         * end is judged by what lies behind the border */
-    double confidence; /* of the likeliest class, all being equally likely before: 0 without evidence;
-                        * divided by a novelty score above 1 */
-    double novelty;    /* score of the last windows, above 1 for a surface never trained; 0 before the first,
-                        * below 0 for many a trained one */
+    double confidence; /* probability of the likeliest class, given all since the stream began; 0 without evidence */
+    double novelty;    /* probability of a surface never trained */
     struct nav_texture_health health;
 };
 
@@ -55,7 +52,8 @@ struct nav_texture_stream *nav_texture_stream_new(const struct nav_texture_rules
 void nav_texture_stream_free(struct nav_texture_stream *);
 
 /* Takes samples[n][channels] (raw counts; nan: missing) up to the first decision, and returns how many it took: fewer
- * than n, or *decided set, when there is one. loglik[classes]: tempered log-likelihoods; all 0 without evidence. */
+ * than n, or *decided set, when there is one. loglik[classes]: what these samples alone say, as log-likelihoods whose
+ * largest is 0; all 0 without evidence, weak where a surface never trained is likely. */
 long nav_texture_stream_push(struct nav_texture_stream *, const double *samples, long n, int *decided,
                              struct nav_texture_decision *decision, double *loglik);
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import level0
 import numpy as np
 import pytest
-from models import CHANNELS, FEATURES, LENGTH, LIMITS, change, classifier, model, novelty, ringdown
+from models import CHANNELS, FEATURES, LENGTH, LIMITS, change, classifier, model, novelty
 from rings import ring_name
 
 import whisker
@@ -30,7 +30,7 @@ from whisker.touch.texture.change import Change
 from whisker.touch.texture.classifier import Classifier, blocks_of, plain_features
 from whisker.touch.texture.model import TextureModel
 from whisker.touch.texture.novelty import Novelty
-from whisker.touch.texture.ringdown import Ringdown
+from whisker.touch.texture.spectral import forward
 
 PACKAGE = Path(whisker.__file__).parent
 HELPERS = {"doubles", "octets", "pointer"}
@@ -136,8 +136,7 @@ CASES = {
         novelty(), Novelty.native, turn=(0, 1), mean=(1,), recording=(0, 1), noise=(0,), limit=(0,)
     ),
     "touch.texture.novelty.Novelty.scores": of_one(novelty().scores, "features", np.zeros((3, FEATURES)), 1),
-    "touch.texture.ringdown.Ringdown.native": of_part(ringdown(), Ringdown.native, floor=(), limit=(0,)),
-    "touch.texture.ringdown.Ringdown.falls": of_one(ringdown().falls, "samples", NOISE, 1),
+    "touch.texture.spectral.forward": of_one(lambda loglik: forward(loglik, 1.0, 0.1), "loglik", np.zeros((4, 3))),
     "touch.texture.change.Change.native": of_part(
         change(), Change.native, floor=(0,), steady=(0, 1), apart=(0, 1), weight=(0, 1), bias=(0,)
     ),

@@ -39,7 +39,7 @@ HEADERS = {
             "touch/texture_classifier.h",
             "touch/texture_change.h",
             "touch/texture_clean.h",
-            "touch/texture_ringdown.h",
+            "touch/texture_filter.h",
             "touch/texture_novelty.h",
             "touch/texture_stream.h",
             "problem/pose.h",

@@ -136,7 +136,7 @@ def windows_of(x: np.ndarray, window: int) -> np.ndarray:
 
 def decision(d, names: list[str], truth: str) -> tuple[bool, bool, float]:
     """Whether the likeliest class is right, whether it was told, and its confidence."""
-    return names[int(d.loglik.argmax())] == truth, d.label >= 0, d.confidence
+    return names[d.best] == truth, d.label >= 0, d.confidence
 
 
 def paper_decision(bayes: TextureModel, samples: np.ndarray, names: list[str], truth: str) -> tuple[bool, bool, float]:

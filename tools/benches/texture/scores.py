@@ -23,7 +23,7 @@ def decide(model, samples: np.ndarray, window: int = WINDOW, sequential: bool = 
     found = classify(model, np.arange(len(samples)) * TICK_S, samples, 1000.0 * window * TICK_S, sequential)
     for d in found:
         d.end = round(d.t_s / TICK_S) + 1
-        d.best = int(np.argmax(list(d.loglik.values())))
+        d.best = model.classes.index(d.best)
         d.number = model.classes.index(d.label) if d.label in model.classes else -1
     return found
 

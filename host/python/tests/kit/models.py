@@ -5,7 +5,6 @@ import numpy as np
 from whisker.touch.texture.change import Change
 from whisker.touch.texture.classifier import Classifier, feature_count
 from whisker.touch.texture.novelty import STEPS, Novelty
-from whisker.touch.texture.ringdown import Ringdown, counts
 from whisker.touch.texture.spectral import SpectralModel
 
 CHANNELS, LENGTH, CLASSES = 2, 64, 3
@@ -29,10 +28,6 @@ def change() -> Change:
 def novelty() -> Novelty:
     rows = np.zeros((CLASSES + 1, FEATURES))
     return Novelty(LENGTH, 1.0, np.eye(FEATURES), rows, rows, np.ones(FEATURES), np.ones(STEPS))
-
-
-def ringdown() -> Ringdown:
-    return Ringdown(LENGTH, np.ones(CHANNELS), np.ones(len(counts())))
 
 
 def model(**limits) -> SpectralModel:

@@ -11,6 +11,7 @@ from ..nav.localise import SettingError
 from ..tables import TableError, unwritable
 from ..touch.texture import model as texture
 from ..touch.texture import train as texture_train
+from ..touch.texture.spectral import HAZARD
 
 METHODS = "default: spectra, calibrated on recordings held out; naive-bayes: the paper's equation 1"
 EXAMPLE = "whisker texture train recordings --out model.json"
@@ -23,6 +24,9 @@ def add(parser) -> None:
     p.add_argument("--out", required=True, metavar="MODEL.JSON")
     p.add_argument("--method", choices=["naive-bayes", "default"], default="default", help=METHODS)
     p.add_argument("--window-ms", type=float, default=100.0, help="window to train for, of method default: %(default)s")
+    text = "of a drive, with --tile-m: how often the surface changes; default: once in fifty windows"
+    p.add_argument("--speed-m-s", type=float, help=text)
+    p.add_argument("--tile-m", type=float, help="length of one surface along a drive, with --speed-m-s")
     example = "whisker texture classify model.json drive.csv --window-ms 100 --json"
     p = add_action(actions, "classify", "tell the surface window by window", example, classify)
     p.add_argument("model")
@@ -34,6 +38,7 @@ def add(parser) -> None:
 
 def train(arguments) -> int:
     window_ms = length_of_time(arguments.window_ms)
+    hazard = changes_a_window(arguments.speed_m_s, arguments.tile_m, window_ms)
     recordings, rate_hz = texture.read_training(arguments.folder)
     for name, files in texture.surface_files(arguments.folder).items():
         for file, samples in zip(files, recordings[name], strict=True):
@@ -42,7 +47,8 @@ def train(arguments) -> int:
     try:
         if arguments.method == "default":
             with tqdm(total=1, desc="train", bar_format="{desc} {bar} {percentage:3.0f} %", disable=None) as bar:
-                model = texture_train.train(recordings, rate_hz, window_ms, lambda done, of: advance(bar, done, of))
+                progress = lambda done, of: advance(bar, done, of)  # noqa: E731
+                model = texture_train.train(recordings, rate_hz, window_ms, progress, hazard)
         else:
             model = texture.TextureModel.train(recordings)
         model.save(arguments.out)
@@ -77,6 +83,15 @@ def length_of_time(window_ms: float) -> float:
     if not 0.0 < window_ms < float("inf"):
         raise SettingError(f"--window-ms {window_ms:g}: not a length of time; use 100")
     return window_ms
+
+
+def changes_a_window(speed_m_s: float | None, tile_m: float | None, window_ms: float) -> float:
+    """Changes of surface per window."""
+    if speed_m_s is None and tile_m is None:
+        return HAZARD
+    if speed_m_s is None or tile_m is None or not (0.0 < speed_m_s < 1e3 and 1e-3 < tile_m < 1e6):
+        raise SettingError("--speed-m-s, --tile-m: give both, above 0, as in '--speed-m-s 0.1 --tile-m 0.5'")
+    return max(speed_m_s * window_ms / 1000.0 / tile_m, 1e-9)
 
 
 def classify(arguments) -> int:

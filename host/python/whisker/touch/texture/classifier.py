@@ -23,13 +23,12 @@ class Classifier:
     weight: np.ndarray  # (F + hidden, classes)
     bias: np.ndarray  # (classes,)
     temper: float = 1.0
-    border: float = 1e9  # nats
     span: np.ndarray | None = None  # (channels,) counts: the farthest that a window of this length may reach
     seed: int = SEED
     _made: object = field(default=None, repr=False, compare=False)
 
     ARRAYS = ("floor", "centre", "scale", "weight", "bias")
-    NUMBERS = ("length", "levels", "shorter", "hidden", "temper", "border", "seed")
+    NUMBERS = ("length", "levels", "shorter", "hidden", "temper", "seed")
 
     @property
     def native(self):

@@ -133,10 +133,11 @@ class Decision:
     """What one window says."""
 
     t_s: float  # end of the window
-    loglik: dict[str, float]
-    label: str  # a class, or "unknown" when no sample could be read
-    confidence: float  # tempered posterior of the label under equal priors
-    border: bool  # the two halves of the window name different classes, each with confidence
+    loglik: dict[str, float]  # of the window alone
+    label: str  # a class, or "unknown"
+    best: str  # the likeliest class, whatever the label
+    confidence: float  # its probability: by equation 1, tempered, of the window; by default given all windows so far
+    border: bool  # the surface changed within the window or since the one before it
 
 
 def posterior(loglik: np.ndarray, temper: float = TEMPER) -> np.ndarray:
@@ -169,7 +170,7 @@ def classify(model, t_s: np.ndarray, samples: np.ndarray, window_ms: float = 100
 def _told(model: SpectralModel, t_s: np.ndarray, d) -> Decision:
     label = "unknown" if d.label < 0 else model.classes[d.label]
     by_class = dict(zip(model.classes, map(float, d.loglik), strict=True))
-    return Decision(float(t_s[d.end - 1]), by_class, label, d.confidence, d.border)
+    return Decision(float(t_s[d.end - 1]), by_class, label, model.classes[d.best], d.confidence, d.border)
 
 
 def _sequential(model: TextureModel, t_s: np.ndarray, samples: np.ndarray, window: int) -> list[Decision]:
@@ -187,13 +188,13 @@ def _sequential(model: TextureModel, t_s: np.ndarray, samples: np.ndarray, windo
 def _decide(model: TextureModel, t_s: float, window: np.ndarray) -> Decision:
     loglik = model.loglik(window)
     if not np.isfinite(window).all(axis=1).any():
-        return Decision(t_s, dict.fromkeys(model.classes, 0.0), "unknown", 0.0, False)
+        return Decision(t_s, dict.fromkeys(model.classes, 0.0), "unknown", model.classes[0], 0.0, False)
     chance = posterior(loglik)
-    best = int(chance.argmax())
+    best = model.classes[int(chance.argmax())]
     halves = [posterior(model.loglik(half)) for half in np.array_split(window, 2)]
     border = halves[0].argmax() != halves[1].argmax() and min(h.max() for h in halves) > 0.9
     by_class = dict(zip(model.classes, map(float, loglik), strict=True))
-    return Decision(t_s, by_class, model.classes[best], float(chance[best]), bool(border))
+    return Decision(t_s, by_class, best, best, float(chance.max()), bool(border))
 
 
 def read_recording(path) -> tuple[np.ndarray, np.ndarray]:

@@ -10,6 +10,7 @@ SHRINK = 0.3  # share of the diagonal in the covariance of windows within a reco
 RECORDINGS_PRIOR = 10.0  # recordings' worth of a spread alike in all directions, that the measured spread is mixed with
 CLASSES_PRIOR = 3.0  # classes' worth, of the spread of class means
 REFUSE_MOST = 0.08  # share of held-out windows of trained surfaces that the limits may refuse
+TYPICAL = 10.0  # log odds against a surface never trained in the middle of held-out windows of trained ones
 RATIOS_EACH = 8  # of a recording, by which it counts towards a limit
 STEPS = lib.NAV_TEXTURE_NOVELTY_STEPS
 
@@ -45,7 +46,7 @@ class Novelty:
         return ffi.gc(made, lib.nav_texture_novelty_free)
 
     def scores(self, features: np.ndarray) -> np.ndarray:
-        """Score after each of a recording's windows in a row: features (m, F) -> (m,); above 1 is never trained."""
+        """Log odds of a surface never trained after each of a recording's windows in a row: features (m, F) -> (m,)."""
         detector, shape = self.native(), (len(self.noise),)
         rows = as_doubles(features, "features", (None, *shape))
         return np.array([lib.nav_texture_novelty_weigh(detector, doubles(row, "row", shape)) for row in rows])
@@ -67,7 +68,8 @@ def fit_novelty(features: list[np.ndarray], labels: np.ndarray, folds: np.ndarra
     if len(trained[0]) == 0:
         return None
     found.limit = _limits(trained, _ratios(features, labels, _left_out(labels, classes), length))
-    found.scale = max(1.0, float(np.mean([found.limit[s] - np.median(t) for s, t in enumerate(trained) if len(t)])))
+    typical = np.mean([found.limit[s] - np.median(t) for s, t in enumerate(trained) if len(t)])
+    found.scale = max(1.0, float(typical) / TYPICAL)
     return found
 
 
@@ -136,7 +138,7 @@ def _spread(scores: np.ndarray, steps: list[list]) -> None:
     """The ratios of one recording, to the step that judges them: a few each, for a long recording is no more than one."""
     for step in range(STEPS):
         last = 2 << step if step + 1 < STEPS else len(scores) + 1
-        ratios = scores[(1 << step) - 1 : last - 1] - 1.0
+        ratios = scores[(1 << step) - 1 : last - 1]
         if len(ratios):
             steps[step] += list(ratios[np.linspace(0, len(ratios) - 1, RATIOS_EACH).round().astype(int)])
 

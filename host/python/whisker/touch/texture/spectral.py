@@ -12,26 +12,25 @@ from ...tables import TableError
 from .change import Change
 from .classifier import Classifier
 from .novelty import Novelty
-from .ringdown import Ringdown
 
-FORMAT = "whisker texture model 7"
-PARTS = {"change": Change, "novelty": Novelty, "ringdown": Ringdown}  # of windows in a row
+FORMAT = "whisker texture model 8"
+PARTS = {"change": Change, "novelty": Novelty}  # of windows in a row
 SENSOR_STOPS = (0.0, 65535.0)  # of raw counts, 16 bits
 WITHOUT = {  # what a model without a part cannot do, and what it would take
     "change": "borders block by block; longer recordings, two or more of each surface, show the rate of false ones",
-    "ringdown": "a whisker that rings after a rougher surface; longer recordings show how fast floors get quieter",
     "novelty": "surfaces never trained, by windows in a row; give three recordings or more of each surface",
 }
 LIMITS = ("spike", "still", "low", "high")
+SURE = 0.95  # probability at which a sequential decision stops
+LOOKS = 4  # of a sequential decision in a window
+HAZARD = 0.02  # changes of surface per window: tiles of 0.5 m at 0.1 m/s, windows of 100 ms
 LENGTH_MOST = 1 << 20  # samples of a window; also numbers of a projection
 RANGES = {
     "rate_hz": (1e-3, 1e9),
     "window_ms": (1e-3, 1e6),
-    "growth": (0.0, 2.0),
-    "together": (0.0, 1e3),
+    "temper": (0.0, 1.0),
     "doubt": (0.0, 1.0),
-    "sure": (0.0, 1.0),
-    "told": (0.0, 1.0),
+    "hazard": (1e-9, 1e3),
 }
 
 
@@ -42,11 +41,12 @@ class Judgement:
     end: int  # one past its last sample
     samples: int
     label: int  # class, or -1
-    confidence: float
+    best: int  # the likeliest class, whatever the label
+    confidence: float  # its probability, given all samples since the stream began
     border: bool
-    novelty: float  # score of the last windows, above 1 for a surface never trained; 0 before the first
+    novelty: float  # probability of a surface never trained
     bad: int
-    loglik: np.ndarray  # (classes,)
+    loglik: np.ndarray  # (classes,) of these samples alone
     notice: bool = False  # no window, but word of a border at once
 
 
@@ -59,14 +59,11 @@ class SpectralModel:
     classifiers: list[Classifier]
     limits: dict[str, np.ndarray]  # spike, still, low, high: (channels,)
     window_ms: float = 100.0
-    growth: float = 0.5
-    together: float = 1.0
-    doubt: float = 0.0
-    sure: float = 0.99
-    told: float = 1.0
+    temper: float = 1.0  # of the evidence of windows in a row
+    doubt: float = 0.0  # probability of a class below which the answer is "unknown"
+    hazard: float = HAZARD  # changes of surface in window_ms
     change: Change | None = None
     novelty: Novelty | None = None
-    ringdown: Ringdown | None = None
     figures: dict = field(default_factory=dict)  # of held-out recordings, for the reader
 
     @property
@@ -85,21 +82,14 @@ class SpectralModel:
         self, samples: np.ndarray, window: int, sequential: bool = False, notices: bool = False
     ) -> list[Judgement]:
         """All decisions on samples (n, channels), with notices of borders between them only if asked for. Sequential: looks
-        at every shortest classifier, up to four windows."""
-        step = min(self.classifiers[0].length, window) if sequential else 0
+        four times a window, for up to four windows."""
+        step = min(max(self.classifiers[0].length, window // LOOKS), window) if sequential else 0
         found = self.stream(window, step, 4 * window if sequential else 0).push(samples)
         return [d for d in found if notices or not d.notice]
 
     def save(self, path) -> None:
         content = {"format": FORMAT, "classes": self.classes, "rate_hz": self.rate_hz, "window_ms": self.window_ms}
-        content |= {
-            "growth": self.growth,
-            "together": self.together,
-            "doubt": self.doubt,
-            "sure": self.sure,
-            "told": self.told,
-            "figures": self.figures,
-        }
+        content |= {name: getattr(self, name) for name in ("temper", "doubt", "hazard", "figures")}
         content["limits"] = {name: _listed(self.limits[name]) for name in LIMITS}
         for name in PARTS:
             part = getattr(self, name)
@@ -147,14 +137,12 @@ def _classifier(fields: Fields) -> Classifier:
     flat = {name: fields.array(name, 1) for name in ("floor", "centre", "scale", "bias", "span")}
     weight = fields.array("weight", 2)
     whole = {name: fields.whole(name, 0, LENGTH_MOST) for name in ("length", "shorter", "hidden")}
-    numbers = {name: fields.number(name, 0.0) for name in ("temper", "border")}
-    return Classifier(
-        levels=fields.flag("levels"), seed=fields.whole("seed", 0, 2**63), weight=weight, **whole, **numbers, **flat
-    )
+    seed, temper = fields.whole("seed", 0, 2**63), fields.number("temper", 0.0)
+    return Classifier(levels=fields.flag("levels"), seed=seed, temper=temper, weight=weight, **whole, **flat)
 
 
 def _part(kind, fields: Fields):
-    """A Change, Novelty or Ringdown."""
+    """A Change or Novelty."""
     arrays = {name: fields.array(name, dimensions) for name, dimensions in kind.ARRAYS.items()}
     numbers = {name: fields.number(name, 0.0) for name in kind.NUMBERS if name != "length"}
     return kind(length=fields.whole("length", 1, LENGTH_MOST), **numbers, **arrays)
@@ -173,11 +161,10 @@ class Stream:
             len(model.classifiers),
         )
         natives = ffi.new("struct nav_texture_classifier *[]", [r.native for r in model.classifiers])
-        border = np.array([r.border for r in model.classifiers], float)
-        rules.classifier, rules.border = natives, doubles(border, "border", (len(model.classifiers),))
-        rules.growth, rules.together, rules.doubt, rules.sure = model.growth, model.together, model.doubt, model.sure
-        rules.step, rules.patience, rules.told = step, patience, model.told
-        self._lend_parts(model, rules, step > 0)
+        rules.classifier, rules.temper, rules.doubt, rules.sure = natives, model.temper, model.doubt, SURE
+        rules.hazard = 1000.0 * model.hazard / (model.window_ms * model.rate_hz)
+        rules.step, rules.patience = step, patience
+        self._lend_parts(model, rules)
         limits = self._limits(model, patience if step else window)
         rules.limits.channels = model.channels
         for name, values in limits.items():
@@ -190,10 +177,8 @@ class Stream:
         self._decision, self._decided = ffi.new("struct nav_texture_decision *"), ffi.new("int *")
         self._loglik = np.zeros(self._classes)
 
-    def _lend_parts(self, model: SpectralModel, rules, sequential: bool) -> None:
-        """Sequential decisions are watched for surfaces never trained, not for borders and ringing."""
-        used = ("novelty",) if sequential else PARTS
-        self._parts = {name: _native(getattr(model, name)) for name in used}
+    def _lend_parts(self, model: SpectralModel, rules) -> None:
+        self._parts = {name: _native(getattr(model, name)) for name in PARTS}
         for name, part in self._parts.items():
             setattr(rules, name, part)
         if model.novelty is not None:
@@ -227,17 +212,27 @@ class Stream:
 
     def _judgement(self, end: int) -> Judgement:
         d = self._decision
-        border = bool(d.border)
-        return Judgement(
-            end, d.samples, d.label, d.confidence, border, d.novelty, d.health.bad, self._loglik.copy(), bool(d.notice)
-        )
+        border, loglik = bool(d.border), self._loglik.copy()
+        found = end, d.samples, d.label, d.best, d.confidence, border, d.novelty, d.health.bad, loglik, bool(d.notice)
+        return Judgement(*found)
 
 
-def _native(part: Change | Novelty | Ringdown | None):
+def forward(loglik: np.ndarray, temper: float, chance: float) -> np.ndarray:
+    """The posterior after each of some windows in a row: log-likelihoods (m, classes) -> (m, classes).
+
+    Before each the surface changes with this chance; evidence counts `temper` times."""
+    loglik = as_doubles(loglik, "loglik", (None, None))
+    posterior = np.empty_like(loglik)
+    given = doubles(loglik, "loglik", loglik.shape), *loglik.shape
+    lib.nav_texture_filter_run(*given, temper, chance, doubles(posterior, "posterior", loglik.shape))
+    return posterior
+
+
+def _native(part: Change | Novelty | None):
     return ffi.NULL if part is None else part.native()
 
 
-def _fields(part: Classifier | Change | Novelty | Ringdown) -> dict:
+def _fields(part: Classifier | Change | Novelty) -> dict:
     return {n: getattr(part, n) for n in part.NUMBERS} | {n: _listed(getattr(part, n)) for n in part.ARRAYS}
 
 

@@ -1,14 +1,14 @@
 """Trains the default texture method from recordings; everything that is chosen is chosen on recordings held out."""
 
 from collections.abc import Callable
+from itertools import zip_longest
 
 import numpy as np
 
 from .change import fit_change
-from .fit import Fitted, Windows, fit, log_loss, temperature
+from .fit import Fitted, Windows, fit
 from .novelty import fit_novelty
-from .ringdown import fit_ringdown
-from .spectral import SENSOR_STOPS, SpectralModel
+from .spectral import HAZARD, SENSOR_STOPS, SpectralModel, forward
 
 FOLDS = 5
 SHORTER, LONGER = 8, 8  # classifiers from an eighth of the window to eight windows, in octaves
@@ -19,13 +19,9 @@ SPIKE_OVER = 3.0  # times what one sample in a thousand stands out from both nei
 STILL_OVER, STILL_LEAST = 2.0, 16  # times the longest run of equal samples; shorter runs happen to any sensor
 NO_STOP = 1e12  # of channels that are no raw counts
 SPAN_OVER = 1.5  # times the farthest that a training window reaches
-BORDER_QUANTILE, BORDER_OVER = 0.999, 1.25  # of neighbouring held-out stretches of one surface
-REFUSE_MOST = 0.03  # share of held-out windows that want of confidence may cost ...
-REFUSE_UNTIL = 10.0  # ... unless fewer already cut wrong answers by this factor
-DOUBT_WINDOWS = 100  # fewer held-out windows do not show the quantile of their confidence: then ...
-DOUBT_PRIOR = 0.5  # ... "unknown" is what is likelier wrong than right
-RINGING_QUANTILE = 0.995  # of falls of the power in training recordings: faster is ringing
-SURE = (0.5, 0.6, 0.7, 0.8, 0.85, 0.9, 0.93, 0.95, 0.97, 0.98, 0.99, 0.995, 0.998, 0.999)
+TEMPERS = (1.0, 0.7, 0.5, 0.35, 0.25, 0.18, 0.12, 0.08)  # of windows in a row
+DOUBT = 0.9  # a class less probable is not named, ...
+REFUSE_MOST = 0.03  # ... as far as that costs no more than this share of held-out windows
 
 
 def train(
@@ -33,8 +29,10 @@ def train(
     rate_hz: float,
     window_ms: float = 100.0,
     progress: Callable[[int, int], object] = lambda done, of: None,
+    hazard: float = HAZARD,
 ) -> SpectralModel:
-    """Learn from raw counts (n, channels) by class. `progress(done, of)` is called after each step.
+    """Learn from raw counts (n, channels) by class. `progress(done, of)` is called after each step; `hazard`: changes of
+    surface in window_ms.
 
     ValueError when there is too little to learn from.
     """
@@ -50,12 +48,10 @@ def train(
         fitted.append(fit(_windows(parts, labels, folds, length, len(recordings)), floor))
         progress(len(fitted), len(lengths) + 1)
     _give_spans(fitted, parts)
-    model = SpectralModel(list(recordings), rate_hz, [f.classifier for f in fitted], limits, window_ms)
+    model = SpectralModel(list(recordings), rate_hz, [f.classifier for f in fitted], limits, window_ms, hazard=hazard)
     _calibrate(model, fitted, parts, labels, folds, base)
     block = max(LENGTH_LEAST, round(base / BLOCKS))
     model.change = fit_change(parts, labels, folds, block, floor)
-    if model.change is not None:
-        model.ringdown = fit_ringdown(parts, block, floor, RINGING_QUANTILE)
     model.novelty = _novelty(model, parts, labels, folds, base)
     progress(len(lengths) + 1, len(lengths) + 1)
     return model
@@ -155,38 +151,46 @@ def _widest(parts: list, length: int) -> np.ndarray:
 
 
 def _calibrate(model: SpectralModel, fitted: list[Fitted], parts: list, labels, folds, base: int) -> None:
-    """Growth, border, doubt and sureness, from decisions of twins on recordings that they have not seen."""
+    """Temper and doubt, from decisions of twins on recordings that they have not seen."""
     twins = [
         SpectralModel(model.classes, model.rate_hz, [f.twins[n] for f in fitted], model.limits, model.window_ms)
         for n in range(len(fitted[0].twins))
     ]
-    model.growth = _growth(twins, parts, labels, folds, base)
+    chance = -float(np.expm1(-1000.0 * model.hazard * base / (model.window_ms * model.rate_hz)))
+    course = _course(_decisions(twins, parts, folds, base), labels, round(1.0 / chance))
+    model.temper = min(TEMPERS, key=lambda temper: _filter_loss(*course, temper, chance))
     for twin in twins:
-        twin.growth = model.growth
-    model.together = _together(twins, parts, labels, folds, base)
-    for twin in twins:
-        twin.together = model.together
-    for index, found in enumerate(fitted):
-        limit = _border(twins, parts, folds, found.classifier.length)
-        for classifier in (found.classifier, *(t.classifiers[index] for t in twins)):
-            classifier.border = limit
+        twin.temper = model.temper
     right, confidence = _scores(_decisions(twins, parts, folds, base), labels)
-    model.doubt = _doubt(right, confidence)
-    model.sure, samples, looks = _sure(twins, parts, labels, folds, base, float(right.mean()))
-    loglik, truth = _evidence(looks, labels)
-    model.told = temperature(loglik, truth)
-    told = np.exp(model.told * loglik)
-    sequential = loglik.argmax(axis=1) == truth, told.max(axis=1) / told.sum(axis=1)
+    model.doubt = min(DOUBT, float(np.quantile(confidence, REFUSE_MOST)))
+    sequential = _decisions(twins, parts, folds, base, sequential=True)
+    right_sequential, sure = _scores(sequential, labels)
+    answered = right[confidence >= model.doubt]
     model.figures = {
         "window_samples": base,
         "held_out_accuracy": round(float(right.mean()), 4),
         "refused": round(float((confidence < model.doubt).mean()), 4),
-        "accuracy_of_answers": round(float(right[confidence >= model.doubt].mean()), 4),
+        "accuracy_of_answers": round(float(answered.mean()), 4),
         "calibration_error": round(calibration_error(right, confidence), 4),
-        "sequential_accuracy": round(float(sequential[0].mean()), 4),
-        "sequential_calibration_error": round(calibration_error(*sequential), 4),
-        "sequential_samples": round(samples, 1),
+        "sequential_accuracy": round(float(right_sequential.mean()), 4),
+        "sequential_calibration_error": round(calibration_error(right_sequential, sure), 4),
+        "sequential_samples": round(float(np.mean([d.samples for group in sequential for d in group])), 1),
     }
+
+
+def _course(decisions: list[list], labels, most: int) -> tuple[np.ndarray, np.ndarray]:
+    """Log-likelihoods (m, classes) and true classes (m,) of windows in a row over many surfaces, of each at most so many at a time."""
+    stretches = {k: [] for k in sorted(set(labels))}
+    for group, k in zip(decisions, labels, strict=True):
+        stretches[k] += [[(d.loglik, k) for d in group[at : at + most]] for at in range(0, len(group), most)]
+    turns = zip_longest(*stretches.values(), fillvalue=[])
+    loglik, label = zip(*(window for turn in turns for stretch in turn for window in stretch), strict=True)
+    return np.array(loglik), np.array(label)
+
+
+def _filter_loss(loglik: np.ndarray, label: np.ndarray, temper: float, chance: float) -> float:
+    """Mean of -log posterior of the right class over a course of windows, nats."""
+    return -float(np.log(forward(loglik, temper, chance)[np.arange(len(label)), label]).mean())
 
 
 def calibration_error(right: np.ndarray, confidence: np.ndarray, bins: int = 10) -> float:
@@ -211,73 +215,6 @@ def _decisions(twins: list[SpectralModel], parts, folds, window: int, sequential
 
 def _scores(decisions: list[list], labels) -> tuple[np.ndarray, np.ndarray]:
     """Whether each decision's likeliest class is right, and its confidence."""
-    pairs = [(d.loglik.argmax() == k, d.confidence) for group, k in zip(decisions, labels, strict=True) for d in group]
+    pairs = [(d.best == k, d.confidence) for group, k in zip(decisions, labels, strict=True) for d in group]
     right, confidence = np.array(pairs, dtype=float).reshape(-1, 2).T
     return right, confidence
-
-
-def _evidence(decisions: list[list], labels) -> tuple[np.ndarray, np.ndarray]:
-    """Log-likelihoods (m, classes) of all decisions, and their true classes (m,)."""
-    pairs = [(d.loglik, k) for group, k in zip(decisions, labels, strict=True) for d in group]
-    return np.array([p[0] for p in pairs]), np.array([p[1] for p in pairs])
-
-
-def _growth(twins, parts, labels, folds, base: int) -> float:
-    """How evidence grows with length: the exponent under which four windows' log-likelihoods cost least."""
-    groups, truth = [], []
-    for group, k in zip(_decisions(twins, parts, folds, base), labels, strict=True):
-        for at in range(0, len(group) - 3, 4):
-            groups.append(np.mean([d.loglik for d in group[at : at + 4]], axis=0))
-            truth.append(k)
-    if not groups:
-        return 0.5
-    mean = np.array(groups) - np.max(groups, axis=1, keepdims=True)
-    tries = np.linspace(0.0, 1.0, 11)
-    return float(tries[np.argmin([log_loss(mean * 4.0**p, np.array(truth)) for p in tries])])
-
-
-def _together(twins, parts, labels, folds, base: int) -> float:
-    """Factor under which the log-likelihoods of windows cost least; never above what two independent views deserve."""
-    loglik, truth = _evidence(_decisions(twins, parts, folds, base), labels)
-    tries = np.linspace(0.5, 2.0, 16)
-    return float(tries[np.argmin([log_loss(loglik * t, truth) for t in tries])])
-
-
-def _border(twins, parts, folds, length: int) -> float:
-    """How badly neighbouring stretches of one surface share a class, nats, at most."""
-    worst = [0.0]
-    for group in _decisions(twins, parts, folds, length):
-        loglik = np.array([d.loglik for d in group])
-        if len(loglik) > 1:
-            worst += list(-(loglik[1:] + loglik[:-1]).max(axis=1))
-    return float(BORDER_OVER * np.quantile(worst, BORDER_QUANTILE) + 1.0)
-
-
-def _doubt(right: np.ndarray, confidence: np.ndarray) -> float:
-    """Confidence below which "unknown" is said: as little as cuts wrong answers enough, within what it may cost."""
-    if right.all():
-        return 0.0
-    if len(right) < DOUBT_WINDOWS:
-        return DOUBT_PRIOR
-    wrong = 1.0 - right.mean()
-    for share in np.linspace(0.0, REFUSE_MOST, 26):
-        limit = np.quantile(confidence, share)
-        kept = right[confidence >= limit]
-        if (1.0 - kept).sum() / len(right) <= wrong / REFUSE_UNTIL:
-            break
-    return float(limit)
-
-
-def _sure(twins, parts, labels, folds, base: int, fixed: float) -> tuple[float, float, list]:
-    """The least sureness at which sequential decisions are right as often as fixed windows; their samples, and they."""
-    tried, low, high = {}, 0, len(SURE) - 1
-    while SURE[low] not in tried:  # accuracy grows with sureness: halve what is left
-        sure = SURE[(low + high) // 2]
-        for twin in twins:
-            twin.sure = sure
-        decisions = _decisions(twins, parts, folds, base, sequential=True)
-        right, _ = _scores(decisions, labels)
-        tried[sure] = float(np.mean([d.samples for g in decisions for d in g])), decisions
-        middle = (low + high) // 2
-        low, high = (low, middle) if right.mean() >= fixed else (min(middle + 1, high), high)
-    return SURE[low], *tried[SURE[low]]

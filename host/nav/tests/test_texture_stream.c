@@ -1,0 +1,388 @@
+/* One posterior over windows in a row: names, borders, edges that hold the tip, surfaces never trained, early answers.
+ */
+#include <stdbool.h>
+
+#include "near.h"
+#include "texture_features.h"
+#include "texture_filter.h"
+#include "texture_stream.h"
+
+enum { BLOCK = 16, WINDOW = 32, FEATURES_MOST = 64 };
+
+static const double LOUD = 7.38905609893065; /* amplitude whose log power is 4 */
+static const double HAZARD = 1e-3;
+
+static void the_filter_is_the_forward_recursion(void **state)
+{
+    (void)state;
+    double p[3], alone = 1.0;
+    const double loglik[] = {-1.0, 0.0, -3.0};
+    nav_texture_filter_start(p, 3);
+    nav_texture_filter_weigh(p, 3, loglik, 0.5);
+    double sum = exp(-0.5) + 1.0 + exp(-1.5);
+    assert_near(p[0], exp(-0.5) / sum, 1e-12);
+    nav_texture_filter_change(p, 3, 0.1);
+    assert_near(p[1], 0.9 / sum + 0.1 * 0.5 * (1.0 - 1.0 / sum), 1e-12);
+    assert_near(p[0] + p[1] + p[2], 1.0, 1e-12);
+    nav_texture_filter_change(&alone, 1, 0.1);
+    assert_true(alone == 1.0);
+}
+
+static void a_class_ruled_out_comes_back(void **state)
+{
+    (void)state;
+    double p[2];
+    const double one[] = {0.0, -1e6}, other[] = {-1e6, 0.0};
+    nav_texture_filter_start(p, 2);
+    nav_texture_filter_weigh(p, 2, one, 1.0);
+    assert_true(p[0] == 1.0);
+    nav_texture_filter_weigh(p, 2, other, 1.0);
+    assert_true(isfinite(p[0]) && isfinite(p[1]));
+    nav_texture_filter_change(p, 2, HAZARD);
+    nav_texture_filter_weigh(p, 2, other, 1.0);
+    assert_true(p[1] > 0.999);
+}
+
+/* One channel, blocks and classifier windows of 16 samples; two classes told by the log of the whole power alone, about
+ * 0 and about 4. */
+struct model {
+    double floor, centre[FEATURES_MOST], scale[FEATURES_MOST], weight[2 * FEATURES_MOST], bias[2], apart[4], spike;
+    struct nav_texture_classifier *classifier;
+};
+
+static void make_model(struct model *m)
+{
+    *m = (struct model){.bias = {0.0, -8.0}, .apart = {0.0, 16.0, 16.0, 0.0}, .spike = 1e3};
+    struct nav_texture_features *f = nav_texture_features_new(1, BLOCK, 0, 0, &m->floor);
+    int count = nav_texture_features_count(f), power = count - 2;
+    nav_texture_features_free(f);
+    m->scale[power] = 1.0;
+    m->weight[2 * power + 1] = 4.0;
+    const struct nav_texture_classifier_numbers numbers = {.classes = 2,
+                                                           .channels = 1,
+                                                           .length = BLOCK,
+                                                           .temper = 1.0,
+                                                           .floor = &m->floor,
+                                                           .centre = m->centre,
+                                                           .scale = m->scale,
+                                                           .weight = m->weight,
+                                                           .bias = m->bias};
+    m->classifier = nav_texture_classifier_new(&numbers);
+    assert_non_null(m->classifier);
+}
+
+static struct nav_texture_change *change_of(const struct model *m)
+{
+    const struct nav_texture_change_numbers n = {.classes = 2,
+                                                 .channels = 1,
+                                                 .length = BLOCK,
+                                                 .share = 1.0,
+                                                 .limit = 5.0,
+                                                 .floor = &m->floor,
+                                                 .steady = m->weight,
+                                                 .apart = m->apart,
+                                                 .weight = m->weight,
+                                                 .bias = m->bias};
+    return nav_texture_change_new(&n);
+}
+
+static struct nav_texture_rules rules_of(const struct model *m, int step)
+{
+    return (struct nav_texture_rules){.channels = 1,
+                                      .classes = 2,
+                                      .window = WINDOW,
+                                      .classifiers = 1,
+                                      .classifier = &m->classifier,
+                                      .hazard = HAZARD,
+                                      .temper = 0.5,
+                                      .doubt = 0.6,
+                                      .step = step,
+                                      .sure = 0.95,
+                                      .patience = step ? 2 * WINDOW : 0,
+                                      .limits = {.channels = 1, .spike = &m->spike}};
+}
+
+static struct nav_texture_stream *stream_of(const struct model *m, int step)
+{
+    const struct nav_texture_rules rules = rules_of(m, step);
+    struct nav_texture_stream *s = nav_texture_stream_new(&rules);
+    assert_non_null(s);
+    return s;
+}
+
+/* Pushes n samples alternating by +-amplitude about a level; returns the last decision and how many there were. */
+static int drive_at(struct nav_texture_stream *s, double level, double amplitude, int n, struct nav_texture_decision *d,
+                    double *loglik)
+{
+    int count = 0, decided;
+    for (int i = 0; i < n; i++) {
+        double x = level + (i % 2 ? amplitude : -amplitude);
+        assert_int_equal(nav_texture_stream_push(s, &x, 1, &decided, d, loglik), 1);
+        count += decided;
+    }
+    return count;
+}
+
+static int drive(struct nav_texture_stream *s, double amplitude, int n, struct nav_texture_decision *d, double *loglik)
+{
+    return drive_at(s, 1000.0, amplitude, n, d, loglik);
+}
+
+/* A window's evidence is its own; the confidence is that of the forward recursion. A window between the classes changes
+ * nothing, and one window of the other class does not turn what ten have said. */
+static void windows_in_a_row_are_one_posterior(void **state)
+{
+    (void)state;
+    struct model m;
+    struct nav_texture_decision d;
+    double loglik[2], p[2], soft = exp(0.9), between = exp(1.0), chance = 1.0 - exp(-HAZARD * WINDOW);
+    make_model(&m);
+    struct nav_texture_stream *s = stream_of(&m, 0);
+    nav_texture_filter_start(p, 2);
+    for (int i = 0; i < 10; i++) {
+        assert_int_equal(drive(s, soft, WINDOW, &d, loglik), 1);
+        assert_near(loglik[1], 2.0 * (4.0 * 1.8 - 8.0), 1e-6);
+        nav_texture_filter_change(p, 2, chance);
+        nav_texture_filter_weigh(p, 2, loglik, 0.5);
+        assert_near(d.confidence, p[0], 1e-9);
+        assert_true(d.best == 0 && !d.border && d.samples == WINDOW);
+    }
+    assert_true(d.label == 0 && d.confidence > 0.95);
+    drive(s, between, WINDOW, &d, loglik);
+    assert_near(loglik[1], 0.0, 1e-6);
+    assert_true(d.label == 0 && d.confidence < p[0]);
+    drive(s, exp(1.2), WINDOW, &d, loglik);
+    assert_true(loglik[0] < -1.0 && d.best == 0);
+    drive(s, LOUD, WINDOW, &d, loglik);
+    assert_true(d.label == 1);
+    nav_texture_stream_reset(s);
+    drive(s, between, WINDOW, &d, loglik);
+    assert_near(d.confidence, 0.5, 1e-6);
+    assert_int_equal(d.label, NAV_TEXTURE_UNKNOWN);
+    nav_texture_stream_free(s);
+    nav_texture_classifier_free(m.classifier);
+}
+
+/* The change is half a window late: word of it comes within the next, which is judged by what lies behind it. */
+static void a_border_is_reported_at_once_and_what_lies_before_it_is_left_out(void **state)
+{
+    (void)state;
+    for (int step = 0; step <= BLOCK; step += BLOCK) {
+        struct model m;
+        struct nav_texture_decision d;
+        double loglik[2];
+        make_model(&m);
+        struct nav_texture_rules rules = rules_of(&m, 0);
+        rules.change = change_of(&m);
+        struct nav_texture_stream *s = nav_texture_stream_new(&rules);
+        drive(s, 1.0, 10 * WINDOW + step, &d, loglik);
+        assert_true(d.label == 0 && !d.border);
+        int told = drive(s, LOUD, 2 * BLOCK, &d, loglik);
+        assert_true(d.border && d.notice == (step != 0) && told == 1 + (step != 0));
+        drive(s, LOUD, WINDOW - step, &d, loglik);
+        assert_true(d.label == 1 && d.border == (step != 0) && !d.notice && loglik[0] < -8.0);
+        assert_int_equal(drive(s, LOUD, 10 * WINDOW - step, &d, loglik), 10 - (step != 0));
+        assert_true(d.label == 1 && !d.border);
+        nav_texture_stream_free(s);
+        nav_texture_change_free(rules.change);
+        nav_texture_classifier_free(m.classifier);
+    }
+}
+
+/* What lies before samples that an edge caught, or nobody can read, is not compared with what follows. */
+static void an_edge_interrupts_the_row_of_blocks(void **state)
+{
+    (void)state;
+    const double span = 100.0, amplitudes[] = {200.0, NAN};
+    for (int e = 0; e < 2; e++) {
+        struct model m;
+        struct nav_texture_decision d;
+        double loglik[2];
+        make_model(&m);
+        struct nav_texture_rules rules = rules_of(&m, 0);
+        rules.change = change_of(&m);
+        rules.limits.span = &span;
+        struct nav_texture_stream *s = nav_texture_stream_new(&rules);
+        drive(s, 1.0, 10 * WINDOW, &d, loglik);
+        assert_int_equal(drive(s, amplitudes[e], WINDOW, &d, loglik), 1);
+        assert_true(d.label == NAV_TEXTURE_UNKNOWN && d.confidence == 0.0 && d.border == (e == 0));
+        for (int i = 0; i < 10; i++) {
+            assert_int_equal(drive(s, LOUD, WINDOW, &d, loglik), 1);
+            assert_false(d.border);
+        }
+        assert_int_equal(d.label, 1);
+        nav_texture_stream_free(s);
+        nav_texture_change_free(rules.change);
+        nav_texture_classifier_free(m.classifier);
+    }
+}
+
+/* Whether a window about this level is one that an edge holds; sudden: half of it lies elsewhere. */
+static bool held(struct nav_texture_stream *s, double level, bool sudden)
+{
+    struct nav_texture_decision d;
+    double loglik[2];
+    drive_at(s, sudden ? level + 120.0 : level, 1.0, WINDOW / 2, &d, loglik);
+    drive_at(s, sudden ? level - 120.0 : level, 1.0, WINDOW / 2, &d, loglik);
+    assert_true((d.health.caught > 0) == d.border && (!d.border || d.label == NAV_TEXTURE_UNKNOWN));
+    return d.border;
+}
+
+/* Held from the sudden bend until the mean is back, or for so long that it must be a new rest; an offset that comes
+ * between windows is none, and without a window before nothing says where back is. */
+static void an_edge_holds_until_the_level_is_back(void **state)
+{
+    (void)state;
+    struct model m;
+    const double span = 50.0;
+    make_model(&m);
+    struct nav_texture_rules rules = rules_of(&m, 0);
+    rules.limits.span = &span;
+    struct nav_texture_stream *s = nav_texture_stream_new(&rules);
+    assert_true(!held(s, 0.0, false) && !held(s, 200.0, false) && !held(s, 0.0, false));
+    assert_true(held(s, 40.0, true) && held(s, 300.0, false) && held(s, -60.0, false));
+    assert_false(held(s, -40.0, false));
+    assert_true(held(s, 40.0, true));
+    for (int i = 1; i < 20; i++)
+        assert_true(held(s, 300.0, false));
+    assert_true(!held(s, 300.0, false) && !held(s, 300.0, false));
+    nav_texture_stream_reset(s);
+    assert_true(held(s, 300.0, true) && !held(s, 300.0, false));
+    nav_texture_stream_free(s);
+    nav_texture_classifier_free(m.classifier);
+}
+
+/* Surfaces at 0 and 4 in the log of the power, about 2 with a spread of 10 those never trained. */
+static struct nav_texture_novelty *novelty_of(const struct model *m)
+{
+    enum { ROWS = 3 };
+    static double turn[FEATURES_MOST * FEATURES_MOST], mean[ROWS * FEATURES_MOST], recording[ROWS * FEATURES_MOST];
+    double noise[FEATURES_MOST], limit[NAV_TEXTURE_NOVELTY_STEPS] = {0.0};
+    int count = nav_texture_classifier_count(m->classifier), power = count - 2;
+    for (int f = 0; f < count; f++) {
+        turn[f * count + f] = noise[f] = 1.0;
+        for (int row = 0; row < ROWS; row++)
+            recording[row * count + f] = row == 2 && f == power ? 100.0 : 1.0;
+    }
+    mean[count + power] = 4.0;
+    mean[2 * count + power] = 2.0;
+    const struct nav_texture_novelty_numbers n = {.classes = 2,
+                                                  .features = count,
+                                                  .turn = turn,
+                                                  .mean = mean,
+                                                  .recording = recording,
+                                                  .noise = noise,
+                                                  .limit = limit,
+                                                  .scale = 0.25};
+    return nav_texture_novelty_new(&n);
+}
+
+/* Windows of 16, as novelty's own, of 32, and sequential decisions, which would be sure of the louder class at once. */
+static void a_surface_never_trained_is_unknown_in_windows_of_any_length(void **state)
+{
+    (void)state;
+    struct model m;
+    make_model(&m);
+    for (int mode = 0; mode < 3; mode++) {
+        struct nav_texture_decision d;
+        double loglik[2];
+        struct nav_texture_rules rules = rules_of(&m, mode == 2 ? BLOCK : 0);
+        rules.novelty = novelty_of(&m);
+        rules.window = mode == 0 ? BLOCK : WINDOW;
+        struct nav_texture_stream *s = nav_texture_stream_new(&rules);
+        drive(s, 1.0, WINDOW, &d, loglik);
+        assert_true(d.label == 0 && d.novelty < 0.05);
+        nav_texture_stream_reset(s);
+        drive(s, 400.0, 2 * WINDOW, &d, loglik);
+        assert_true(d.label == NAV_TEXTURE_UNKNOWN && d.best == 1 && d.novelty > 0.95 && d.confidence < 0.05 &&
+                    d.confidence > 0.0);
+        assert_true(loglik[0] > -1.0);         /* weak for any class */
+        drive(s, NAN, 2 * WINDOW, &d, loglik); /* what nobody can read ends the row */
+        assert_true(d.novelty == 0.0);
+        drive(s, 1.0, 2 * WINDOW, &d, loglik);
+        assert_true(d.label == 0 && d.novelty < 0.05);
+        nav_texture_stream_free(s);
+        nav_texture_novelty_free(rules.novelty);
+    }
+    nav_texture_classifier_free(m.classifier);
+}
+
+static void bad_windows_are_no_evidence_and_never_nan(void **state)
+{
+    (void)state;
+    struct model m;
+    struct nav_texture_decision d;
+    double loglik[2] = {7.0, 7.0};
+    make_model(&m);
+    struct nav_texture_stream *s = stream_of(&m, 0);
+    drive(s, 1.0, WINDOW - 9, &d, loglik);
+    drive(s, NAN, 9, &d, loglik);
+    assert_int_equal(d.health.bad, 9);
+    assert_true(d.label == NAV_TEXTURE_UNKNOWN && d.confidence == 0.0 && loglik[0] == 0.0 && loglik[1] == 0.0);
+    drive(s, 1.0, WINDOW, &d, loglik);
+    assert_true(d.label == 0 && d.health.bad == 0);
+    nav_texture_stream_free(s);
+    nav_texture_classifier_free(m.classifier);
+}
+
+/* The same posterior with and without: what is known already makes an answer early. */
+static void sequential_decisions_stop_when_sure_and_give_up(void **state)
+{
+    (void)state;
+    struct model m;
+    struct nav_texture_decision d;
+    double loglik[2], between = exp(1.0), soft = exp(0.9);
+    make_model(&m);
+    struct nav_texture_stream *s = stream_of(&m, BLOCK);
+    assert_int_equal(drive(s, 1.0, BLOCK, &d, loglik), 1);
+    assert_true(d.label == 0 && d.samples == BLOCK && d.confidence > 0.95);
+    assert_int_equal(drive(s, soft, BLOCK, &d, loglik), 1);
+    nav_texture_stream_reset(s);
+    assert_int_equal(drive(s, soft, BLOCK, &d, loglik), 0);
+    nav_texture_stream_reset(s);
+    assert_int_equal(drive(s, between, 2 * WINDOW - 1, &d, loglik), 0);
+    assert_int_equal(drive(s, between, 1, &d, loglik), 1);
+    assert_true(d.label == NAV_TEXTURE_UNKNOWN && d.samples == 2 * WINDOW);
+    nav_texture_stream_free(s);
+    nav_texture_classifier_free(m.classifier);
+}
+
+static void impossible_rules_make_no_stream(void **state)
+{
+    (void)state;
+    struct model m;
+    make_model(&m);
+    struct nav_texture_classifier *twice[] = {m.classifier, m.classifier};
+    struct nav_texture_rules rules[6];
+    for (int i = 0; i < 6; i++)
+        rules[i] = rules_of(&m, 0);
+    rules[0].classifier = twice;
+    rules[0].classifiers = 2;
+    rules[1].window = 1;
+    rules[2].hazard = 0.0;
+    rules[3].temper = NAN;
+    rules[4].limits.channels = 2;
+    rules[5].step = 8;
+    rules[5].patience = 4;
+    for (int i = 0; i < 6; i++)
+        assert_null(nav_texture_stream_new(rules + i));
+    nav_texture_stream_free(NULL);
+    nav_texture_classifier_free(m.classifier);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_filter_is_the_forward_recursion),
+        cmocka_unit_test(a_class_ruled_out_comes_back),
+        cmocka_unit_test(windows_in_a_row_are_one_posterior),
+        cmocka_unit_test(a_border_is_reported_at_once_and_what_lies_before_it_is_left_out),
+        cmocka_unit_test(an_edge_interrupts_the_row_of_blocks),
+        cmocka_unit_test(an_edge_holds_until_the_level_is_back),
+        cmocka_unit_test(a_surface_never_trained_is_unknown_in_windows_of_any_length),
+        cmocka_unit_test(bad_windows_are_no_evidence_and_never_nan),
+        cmocka_unit_test(sequential_decisions_stop_when_sure_and_give_up),
+        cmocka_unit_test(impossible_rules_make_no_stream),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
