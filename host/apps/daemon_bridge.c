@@ -15,7 +15,7 @@ static void daemon_bridge_begin(struct daemon_bridge *bridge)
     decoder->mark = bridge->lost_at_ms == 0 ? 0 : WHISKER_FRAME_GAP;
     bridge->ticks = (struct whisker_timing){0};
     bridge->ticks_told = 0;
-    bridge->last_seen = false;
+    bridge->last_seen = bridge->dated = false;
 }
 
 int daemon_bridge_connect(struct daemon_bridge *bridge, struct daemon_stats *stats, whisker_sink sink, void *context,
@@ -56,22 +56,40 @@ void daemon_bridge_lose(struct daemon_bridge *bridge, struct daemon_stats *stats
     daemon_log_error(LOG_WARN, bridge->name, error);
 }
 
-void daemon_bridge_tell_ticks(struct daemon_bridge *bridge)
+static void daemon_bridge_tell_ticks(struct daemon_bridge *bridge, const struct whisker_timing *now)
 {
-    struct whisker_timing now;
-    if (!bridge->device || !(bridge->settings.options & WHISKER_OPTION_TICK_IN) ||
-        whisker_device_timing(bridge->device, &now) != WHISKER_OK) {
-        return;
-    }
-    const int error = whisker_timing_judge(&bridge->ticks, &now);
+    const int error = whisker_timing_judge(&bridge->ticks, now);
     const uint32_t bit = error ? UINT32_C(1) << (WHISKER_ERROR_TICK_IN_SILENT - error) : 0;
-    bridge->ticks = now;
+    bridge->ticks = *now;
     if (bit & ~bridge->ticks_told) {
         bridge->ticks_told |= bit;
         daemon_log_error(LOG_WARN, "tick_in", error);
         daemon_log(LOG_NOTE,
                    "%s, tick_in: %u edges taken, %u early, %u uneven, %u silences; shortest distance %u cycles",
-                   bridge->name, now.edges, now.early, now.uneven, now.silent, now.shortest);
+                   bridge->name, now->edges, now->early, now->uneven, now->silent, now->shortest);
+    }
+}
+
+/* The report counts ticks in 32 bits. */
+static uint64_t daemon_bridge_cycles(const struct daemon_bridge *bridge, uint32_t tick)
+{
+    const uint64_t latest = bridge->source.decoder.tick;
+    return (latest + (uint64_t)(int64_t)(int32_t)(tick - (uint32_t)latest)) * bridge->settings.tick_period;
+}
+
+void daemon_bridge_look_at_ticks(struct daemon_bridge *bridge, struct whisker_clock_fit *clock)
+{
+    struct whisker_timing now;
+    const bool from_pin = bridge->settings.options & WHISKER_OPTION_TICK_IN;
+    if (!bridge->device || !(from_pin || (clock && bridge->dated)) ||
+        whisker_device_timing(bridge->device, &now) != WHISKER_OK) {
+        return;
+    }
+    if (clock && bridge->dated) {
+        whisker_clock_report(clock, daemon_bridge_cycles(bridge, now.tick), now.usb_time, now.sof_cycles);
+    }
+    if (from_pin) {
+        daemon_bridge_tell_ticks(bridge, &now);
     }
 }
 

@@ -19,6 +19,7 @@ struct daemon_bridge {
     int told;       /* why it could not be opened, as last logged */
     bool last_seen; /* the last frame after a stop has come */
     bool damage_told;
+    bool dated; /* its frames say when they were by the host's start-of-frame packets */
 };
 
 /* Opens and starts it, with `sink` for what it sends. Returns 0, or why not; then nothing stays open. */
@@ -31,8 +32,9 @@ void daemon_bridge_log_refusal(const struct daemon_bridge *bridge, int error, co
 /* It has gone, for this reason; what had come is published. */
 void daemon_bridge_lose(struct daemon_bridge *bridge, struct daemon_stats *stats, int error);
 
-/* What is wrong with the pin that the ticks come from: each kind once in a run, with the counts. */
-void daemon_bridge_tell_ticks(struct daemon_bridge *bridge);
+/* Asks for the report `timing`, if it is of use: for the clock (NULL: not that of this bridge), and for what is wrong
+ * with the pin that the ticks come from, each kind of which is logged once in a run, with the counts. */
+void daemon_bridge_look_at_ticks(struct daemon_bridge *bridge, struct whisker_clock_fit *clock);
 
 /* USB guards every packet by a CRC of its own, so a malformed frame is a fault of the bridge: said once, while the
  * other frames go on. */

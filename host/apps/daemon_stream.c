@@ -64,9 +64,11 @@ static int64_t clock_ns(clockid_t clock)
     return (int64_t)now.tv_sec * 1000000000 + now.tv_nsec;
 }
 
-static void map_clock(struct daemon_stream *stream, uint64_t cycles)
+static void map_clock(struct daemon_stream *stream, const struct whisker_frame *newest, uint64_t cycles)
 {
-    const int error = whisker_clock_add(&stream->clock, cycles, clock_ns(CLOCK_MONOTONIC), clock_ns(CLOCK_REALTIME));
+    const uint16_t usb_time = (uint16_t)(newest->flags >> WHISKER_FRAME_USB_TIME_SHIFT);
+    const int error =
+        whisker_clock_add(&stream->clock, cycles, usb_time, clock_ns(CLOCK_MONOTONIC), clock_ns(CLOCK_REALTIME));
     if (error) {
         daemon_log_error(LOG_WARN, "clock", error);
     }
@@ -75,6 +77,7 @@ static void map_clock(struct daemon_stream *stream, uint64_t cycles)
 static void note(struct daemon_stream *stream, struct daemon_bridge *bridge, const struct whisker_frame *frame)
 {
     bridge->last_seen |= (frame->flags & WHISKER_FRAME_LAST) != 0;
+    bridge->dated = frame->flags >> WHISKER_FRAME_USB_TIME_SHIFT != 0;
     daemon_stats_frame(&stream->stats, &bridge->source, frame);
 }
 
@@ -100,7 +103,7 @@ static void take_one_of_two(struct daemon_stream *stream, int i, const uint8_t *
     }
     if (any && (i == 0 || !stream->bridge[0].device)) {
         const int64_t ahead = i * stream->pair.offset * stream->options->settings.tick_period;
-        map_clock(stream, frame.time_cycles + (uint64_t)ahead);
+        map_clock(stream, &frame, frame.time_cycles + (uint64_t)ahead);
     }
 }
 
@@ -118,7 +121,7 @@ static void take(void *context, const uint8_t *bytes, size_t count)
         for (size_t i = 0; i < made; i++) {
             note(stream, bridge, &frames[i]);
         }
-        map_clock(stream, frames[made - 1].time_cycles);
+        map_clock(stream, &frames[made - 1], frames[made - 1].time_cycles);
     }
 }
 
@@ -247,7 +250,7 @@ static void tell_bridges(struct daemon_stream *stream, bool ticks)
     for (int i = 0; i < stream->bridges; i++) {
         daemon_bridge_tell_damage(&stream->bridge[i]);
         if (ticks) {
-            daemon_bridge_tell_ticks(&stream->bridge[i]);
+            daemon_bridge_look_at_ticks(&stream->bridge[i], i == 0 ? &stream->clock : NULL);
         }
     }
 }

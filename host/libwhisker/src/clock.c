@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "clock_usb.h"
 #include "whisker/errors.h"
 
 /* One point per second: at 2 kHz at least a hundred arrivals to choose the fastest from. */
@@ -29,17 +30,29 @@ void whisker_clock_begin(struct whisker_clock_fit *fit, uint32_t clock_hz, int64
     memset(fit, 0, sizeof *fit);
     fit->nominal_ns = 1e9 / clock_hz;
     fit->latency_ns = latency_ns;
+    clock_usb_begin(&fit->usb, fit->nominal_ns);
 }
 
-static void restart(struct whisker_clock_fit *fit, uint64_t cycles, int64_t arrival_ns)
+/* Where a tick is on the axis that arrivals are late behind: the controller's time, or else the bridge's. */
+static double place_of(struct whisker_clock_fit *fit, uint64_t cycles, uint16_t usb_time, int64_t arrival_ns)
+{
+    const double since_ns = ((double)(arrival_ns - fit->first_ns) - fit->late_ns) / (1 + fit->skew);
+    return clock_usb_known(usb_time) ? clock_usb_date(&fit->usb, cycles, usb_time, fit->first_x_ns + since_ns)
+                                     : (double)(cycles - fit->first_cycles) * fit->nominal_ns;
+}
+
+static void restart(struct whisker_clock_fit *fit, uint64_t cycles, uint16_t usb_time, int64_t arrival_ns)
 {
     fit->restarts += fit->begun;
     fit->begun = true;
     fit->first_cycles = cycles;
     fit->first_ns = arrival_ns;
+    clock_usb_begin(&fit->usb, fit->nominal_ns);
+    fit->first_x_ns = place_of(fit, cycles, usb_time, arrival_ns);
     fit->points = fit->late_points = 0;
-    fit->skew = fit->late_ns = fit->spread_ns = 0;
-    fit->best = (struct whisker_clock_point){0, 0};
+    fit->skew = fit->spread_ns = 0;
+    fit->late_ns = fit->usb.doubt_ns;
+    fit->best = (struct whisker_clock_point){0, fit->late_ns};
 }
 
 /* How far a point lies above the line. */
@@ -122,10 +135,12 @@ static void keep_best(struct whisker_clock_fit *fit)
     fit_line(fit);
 }
 
-static struct whisker_clock_point point_of(const struct whisker_clock_fit *fit, uint64_t cycles, int64_t arrival_ns)
+static struct whisker_clock_point point_of(struct whisker_clock_fit *fit, uint64_t cycles, uint16_t usb_time,
+                                           int64_t arrival_ns)
 {
-    const double x_ns = (double)(cycles - fit->first_cycles) * fit->nominal_ns;
-    return (struct whisker_clock_point){x_ns, (double)(arrival_ns - fit->first_ns) - x_ns};
+    const double x_ns = place_of(fit, cycles, usb_time, arrival_ns) - fit->first_x_ns;
+    const double doubt_ns = fit->usb.known ? fit->usb.doubt_ns : 0; /* a date too late must not seem a fast arrival */
+    return (struct whisker_clock_point){x_ns, (double)(arrival_ns - fit->first_ns) - x_ns + doubt_ns};
 }
 
 static void add_point(struct whisker_clock_fit *fit, struct whisker_clock_point now)
@@ -145,21 +160,37 @@ static bool jumped(const struct whisker_clock_fit *fit, struct whisker_clock_poi
     return fit->late_points >= JUMP_POINTS || (fit->points >= POINTS_KNOWN && above(fit, &now) < -JUMP_EARLY_NS);
 }
 
-int whisker_clock_add(struct whisker_clock_fit *fit, uint64_t cycles, int64_t monotonic_ns, int64_t realtime_ns)
+int whisker_clock_add(struct whisker_clock_fit *fit, uint64_t cycles, uint16_t usb_time, int64_t monotonic_ns,
+                      int64_t realtime_ns)
 {
     const int64_t arrival_ns = monotonic_ns - fit->latency_ns;
     const int64_t offset_ns = realtime_ns - monotonic_ns;
     const int64_t step_ns = offset_ns - fit->realtime_offset_ns;
     const bool back = fit->begun && arrival_ns < fit->last_ns;
     const bool set = fit->begun && (step_ns > REALTIME_STEP_NS || step_ns < -REALTIME_STEP_NS);
-    if (!fit->begun || back || cycles < fit->last_cycles || jumped(fit, point_of(fit, cycles, arrival_ns))) {
-        restart(fit, cycles, arrival_ns);
+    const bool again = cycles < fit->last_cycles;
+    const bool known = clock_usb_known(usb_time);
+    struct whisker_clock_point now = {0, 0};
+    bool anew = !fit->begun || back || known != fit->usb.known || (again && !known);
+    if (!anew) {
+        now = point_of(fit, cycles, usb_time, arrival_ns);
+        anew = jumped(fit, now) || (again && above(fit, &now) > JUMP_LATE_NS); /* no bus went on meanwhile */
+    }
+    if (anew) {
+        restart(fit, cycles, usb_time, arrival_ns);
+        now = fit->best;
     }
     fit->last_cycles = cycles;
+    fit->last_x_ns = now.x_ns;
     fit->last_ns = arrival_ns;
     fit->realtime_offset_ns = offset_ns;
-    add_point(fit, point_of(fit, cycles, arrival_ns));
+    add_point(fit, now);
     return back || set ? WHISKER_ERROR_HOST_CLOCK : WHISKER_OK;
+}
+
+void whisker_clock_report(struct whisker_clock_fit *fit, uint64_t cycles, uint16_t usb_time, uint16_t sof_cycles)
+{
+    clock_usb_report(&fit->usb, cycles, usb_time, sof_cycles);
 }
 
 /* base_ns and a distance, which a bridge's nonsense may make as large as it likes. */
@@ -174,12 +205,14 @@ void whisker_clock_get(const struct whisker_clock_fit *fit, struct whisker_clock
     if (!fit->begun) {
         return;
     }
-    const double x_ns = (double)(fit->last_cycles - fit->first_cycles) * fit->nominal_ns;
+    const double x_ns = fit->last_x_ns;
+    const double rate_ns = fit->usb.known ? fit->usb.rate_ns : fit->nominal_ns;
     clock->device_cycles = fit->last_cycles;
     clock->monotonic_ns = plus(fit->first_ns, x_ns + fit->late_ns + fit->skew * x_ns);
     clock->realtime_ns = clock->monotonic_ns + fit->realtime_offset_ns;
-    clock->ns_per_cycle = fit->nominal_ns * (1 + fit->skew);
-    clock->uncertainty_ns = FLOOR_NS + (fit->points >= POINTS_KNOWN ? 2 * fit->spread_ns : UNKNOWN_NS);
+    clock->ns_per_cycle = rate_ns * (1 + fit->skew);
+    clock->uncertainty_ns =
+        FLOOR_NS + fit->usb.doubt_ns + (fit->points >= POINTS_KNOWN ? 2 * fit->spread_ns : UNKNOWN_NS);
 }
 
 static int64_t shift(const struct whisker_clock *clock, int64_t base_ns, uint64_t cycles)

@@ -140,7 +140,8 @@ static int lonely(struct whisker_pair *pair, bool aligned)
     }
     for (int bridge = 0; bridge < 2; bridge++) {
         pair->silent[!bridge] |= full(pair, bridge) && pair->count[!bridge] == 0;
-        if (full(pair, bridge) || (pair->count[bridge] > 0 && !awaited(pair, !bridge))) {
+        const bool waits = pair->running[bridge] && awaited(pair, !bridge);
+        if (full(pair, bridge) || (pair->count[bridge] > 0 && !waits)) {
             return bridge;
         }
     }

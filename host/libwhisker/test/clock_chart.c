@@ -18,7 +18,7 @@ int main(int argc, char **argv)
     for (int i = 0; i < ARRIVALS; i++) {
         const struct clock_arrival now = clock_trace_next(&trace);
         struct whisker_clock clock;
-        whisker_clock_add(&fit, now.cycles, now.arrival_ns, now.arrival_ns);
+        whisker_clock_add(&fit, now.cycles, 0, now.arrival_ns, now.arrival_ns);
         if (i % ROW == 0) {
             whisker_clock_get(&fit, &clock);
             printf("%.3f,%.2f,%.2f,%.2f\n", (double)now.cycles / TRACE_CLOCK_HZ,

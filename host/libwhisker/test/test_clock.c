@@ -12,7 +12,9 @@
 #include "whisker/device.h"
 #include "whisker/errors.h"
 
-#define HOUR 450000 /* arrivals */
+#define HOUR 450000   /* arrivals */
+#define MINUTES 15000 /* arrivals: two */
+#define REPORT_EVERY 31
 #define SETTLED 625 /* five seconds */
 #define WANTED_NS 100e3
 #define NS_PER_CYCLE (1e9 / TRACE_CLOCK_HZ)
@@ -31,7 +33,7 @@ static int begin(void **state)
 
 static int add(uint64_t cycles, int64_t monotonic_ns)
 {
-    return whisker_clock_add(&fit, cycles, monotonic_ns, monotonic_ns + OFFSET_NS);
+    return whisker_clock_add(&fit, cycles, 0, monotonic_ns, monotonic_ns + OFFSET_NS);
 }
 
 static struct whisker_clock get(void)
@@ -89,6 +91,89 @@ static void a_mapping_goes_both_ways_in_time_and_to_both_clocks(void **state)
     assert_true(whisker_clock_to_monotonic(&clock, UINT64_MAX / 2) > 0); /* absurd, but no overflow */
 }
 
+/* Worst error, us, of the mapping at the arrivals of two minutes after the first five seconds; *covered: the share that
+ * the uncertainty holds. */
+static double worst_us(struct clock_source source, bool dated, double *covered)
+{
+    struct clock_trace trace;
+    double worst_ns = 0;
+    int within = 0;
+    begin(NULL);
+    clock_trace_begin(&trace, 3);
+    trace.source = source;
+    trace.usb_skew = 60e-6;
+    for (int i = 0; i < MINUTES; i++) {
+        const struct clock_arrival now = clock_trace_next(&trace);
+        whisker_clock_add(&fit, now.cycles, dated ? now.usb_time : 0, now.arrival_ns, now.arrival_ns);
+        if (dated && i % REPORT_EVERY == 0) {
+            whisker_clock_report(&fit, now.cycles, now.usb_time, now.sof_cycles);
+        }
+        const double error_ns = fabs((double)get().monotonic_ns - now.true_ns);
+        worst_ns = i < SETTLED ? 0 : fmax(worst_ns, error_ns);
+        within += error_ns <= get().uncertainty_ns;
+    }
+    *covered = (double)within / MINUTES;
+    return worst_ns * 1e-3;
+}
+
+static void start_of_frame_numbers_date_whatever_ticks(void **state)
+{
+    (void)state;
+    static const struct {
+        struct clock_source source;
+        double wanted_us, without_us;
+    } cases[] = {
+        {{.off = 0}, 30, 0},         {{.off = 0.003}, 30, 1000},  {{.uneven = 0.2}, 150, 1000},
+        {{.pause_s = 1}, 100, 1000}, {{.restart_s = 20}, 100, 0}, /* without: only known to 60 ms for seconds */
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        double covered;
+        assert_true(worst_us(cases[i].source, true, &covered) < cases[i].wanted_us);
+        assert_true(covered > 0.95);
+        assert_int_equal(fit.restarts, 0);
+        assert_true(worst_us(cases[i].source, false, &covered) >= cases[i].without_us);
+    }
+}
+
+static void without_reports_a_date_is_known_to_a_microframe(void **state)
+{
+    (void)state;
+    struct whisker_clock_usb *usb = &fit.usb;
+    for (uint64_t i = 0; i < 16; i++) { /* at 50 us of every fourth microframe, from frame number 2047 on */
+        const uint16_t usb_time = (uint16_t)(0x8000 | ((0x3FFC + 4 * i) & 0x3FFF));
+        whisker_clock_add(&fit, i * 30000, usb_time, (int64_t)i * 500000, 0);
+        assert_true(usb->doubt_ns ==
+                    (usb->microframes ? 62.5e3 : 500e3)); /* none: a full-speed bus, as far as is known */
+    }
+    assert_int_equal(usb->microframe, 60 - 4);
+    whisker_clock_report(&fit, 16 * 30000, 0x8000 | 60, 3000);
+    whisker_clock_report(&fit, 1016 * 30000, 0x8000 | 4060, 3000);
+    whisker_clock_report(&fit, 2016 * 30000, 0x8000 | 8060, 3000);
+    assert_true(usb->even && usb->doubt_ns == 0);
+    assert_true(fabs(usb->rate_ns - NS_PER_CYCLE) < 1e-9);
+}
+
+static void a_bus_that_falls_silent_begins_a_new_fit(void **state)
+{
+    (void)state;
+    for (uint64_t i = 0; i < 1000; i++) {
+        const uint16_t usb_time = i < 500 ? (uint16_t)(0x8000 | (64 * i & 0x3FFF)) : 0;
+        whisker_clock_add(&fit, i * STEP_CYCLES, usb_time, (int64_t)i * STEP_NS, 0);
+        assert_true(fabs((double)get().monotonic_ns - ((double)i * STEP_NS - TRACE_LATENCY_NS)) < 1.1e6);
+    }
+    assert_int_equal(fit.restarts, 1);
+}
+
+static void a_bus_whose_time_stood_still_begins_a_new_fit(void **state)
+{
+    (void)state;
+    for (uint64_t i = 0; i < 1000; i++) {
+        whisker_clock_add(&fit, i * STEP_CYCLES, (uint16_t)(0x8000 | (64 * i & 0x3FFF)), (int64_t)i * STEP_NS, 0);
+    }
+    whisker_clock_add(&fit, 0, 0x8000 | (64 * 1000 & 0x3FFF), 1000 * (int64_t)STEP_NS + 500000000, 0);
+    assert_int_equal(fit.restarts, 1);
+}
+
 static void a_bridge_that_starts_again_begins_a_new_fit(void **state)
 {
     (void)state;
@@ -117,12 +202,12 @@ static void a_realtime_clock_that_is_set_is_told_and_followed(void **state)
     uint64_t i = 1;
     add_steady(&i, 1000, 1, 0);
     const int64_t now_ns = (int64_t)i * STEP_NS;
-    assert_int_equal(whisker_clock_add(&fit, i * STEP_CYCLES, now_ns, now_ns + OFFSET_NS - hour_ns),
+    assert_int_equal(whisker_clock_add(&fit, i * STEP_CYCLES, 0, now_ns, now_ns + OFFSET_NS - hour_ns),
                      WHISKER_ERROR_HOST_CLOCK);
     assert_int_equal(get().realtime_ns - get().monotonic_ns, OFFSET_NS - hour_ns);
     assert_int_equal(fit.restarts, 0); /* the monotonic clock is not touched by it */
     assert_true(get().uncertainty_ns < 1e6);
-    assert_int_equal(whisker_clock_add(&fit, (i + 1) * STEP_CYCLES, now_ns + STEP_NS, now_ns + STEP_NS + OFFSET_NS),
+    assert_int_equal(whisker_clock_add(&fit, (i + 1) * STEP_CYCLES, 0, now_ns + STEP_NS, now_ns + STEP_NS + OFFSET_NS),
                      WHISKER_ERROR_HOST_CLOCK);
 }
 
@@ -222,6 +307,10 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(an_hour_of_drift_and_jitter_stays_within_100_us, begin),
         cmocka_unit_test_setup(a_mapping_goes_both_ways_in_time_and_to_both_clocks, begin),
+        cmocka_unit_test_setup(start_of_frame_numbers_date_whatever_ticks, begin),
+        cmocka_unit_test_setup(without_reports_a_date_is_known_to_a_microframe, begin),
+        cmocka_unit_test_setup(a_bus_that_falls_silent_begins_a_new_fit, begin),
+        cmocka_unit_test_setup(a_bus_whose_time_stood_still_begins_a_new_fit, begin),
         cmocka_unit_test_setup(a_bridge_that_starts_again_begins_a_new_fit, begin),
         cmocka_unit_test_setup(a_monotonic_clock_that_goes_back_is_told_and_survived, begin),
         cmocka_unit_test_setup(a_realtime_clock_that_is_set_is_told_and_followed, begin),

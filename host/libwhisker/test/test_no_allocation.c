@@ -36,7 +36,8 @@ static void on_bytes(void *context, const uint8_t *bytes, size_t count)
     size_t made;
     assert_int_equal(whisker_ring_feed(chain->ring, &chain->decoder, bytes, count, &frames, &made), 0);
     const int64_t now_ns = (int64_t)frames[made - 1].time_cycles * 50 / 3;
-    whisker_clock_add(&chain->clock, frames[made - 1].time_cycles, now_ns, now_ns);
+    whisker_clock_add(&chain->clock, frames[made - 1].time_cycles,
+                      (uint16_t)(frames[made - 1].flags >> WHISKER_FRAME_USB_TIME_SHIFT), now_ns, now_ns);
     whisker_clock_get(&chain->clock, &clock);
     whisker_ring_set_clock(chain->ring, &clock);
 }

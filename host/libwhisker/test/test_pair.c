@@ -10,7 +10,7 @@
 #include "whisker/pair.h"
 
 #define KNOWN 0x8000u
-#define OUT 1024
+#define OUT 2048
 #define PERIOD 30000u
 
 static struct whisker_pair pair;
@@ -156,8 +156,12 @@ static void a_bridge_that_comes_back_takes_up_the_others_ticks(void **state)
 static void the_second_goes_on_when_the_first_starts_again(void **state)
 {
     (void)state;
-    add_both(0, 8, 0);
+    add_both(0, 7, 0);
+    add(0, 7);
     whisker_pair_run(&pair, 0, false);
+    collect();
+    assert_is(14, 0, 7); /* it is not kept for a new tick 7 */
+    add(1, 7);
     for (uint64_t tick = 8; tick < 20; tick++) { /* a common source of ticks */
         add(1, tick);
         assert_is(made - 1, 1, tick);

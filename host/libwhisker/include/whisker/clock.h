@@ -1,7 +1,10 @@
 /*
- * From the bridge's clock to the host's. Frames carry the bridge's time; they arrive later by a delay that is never
- * less than a fixed latency and often much more. So the line that fits the clocks is the lower envelope of the
- * arrivals: it goes by the fastest frames and does not mind how late the others are.
+ * From the bridge's clock to the host's, in two steps. A frame's usb_time and the report `timing` say when its tick was
+ * by the start-of-frame packets of the host's USB controller: exactly, and whether the ticks are even or not. That
+ * controller's time is mapped to the host's clocks: frames arrive later than their tick by a delay that is never less
+ * than a fixed latency and often much more. So the line that fits the clocks is the lower envelope of the arrivals: it
+ * goes by the fastest frames and does not mind how late the others are. It holds on when the bridge is started again.
+ * Where there are no start-of-frame packets the bridge's own time takes the place of the controller's.
  *
  * A fit belongs to one thread at a time; a struct whisker_clock is a value. No allocation.
  */
@@ -32,11 +35,26 @@ int64_t whisker_clock_to_realtime(const struct whisker_clock *clock, uint64_t cy
 
 #define WHISKER_CLOCK_POINTS 32
 
-/* The fastest arrival of one second: cycles as ns at the nominal rate since the fit began, and its delay behind that.
- */
+/* The fastest arrival of one second: ns since the fit began by the controller's clock (by the bridge's at its nominal
+ * rate), and its delay behind that. */
 struct whisker_clock_point {
     double x_ns;
     double late_ns;
+};
+
+/* From a bridge's cycles to its USB controller's time, ns since some start of frame. */
+struct whisker_clock_usb {
+    double nominal_ns;      /* per cycle of the bridge */
+    double rate_ns;         /* likewise, as found */
+    uint64_t cycles;        /* of the latest tick, */
+    double ns;              /* its date, */
+    double doubt_ns;        /* and how far that may be off */
+    uint64_t report_cycles; /* the same of the latest report */
+    double report_ns;
+    int64_t microframe; /* of the latest tick, counted on beyond the frame number's wrap */
+    bool known, reported;
+    bool even;        /* as the latest reports say: dates between them follow from the cycles */
+    bool microframes; /* the bus has them: it runs at high speed */
 };
 
 /* A fit in progress. Owned by the caller; its fields are the library's. */
@@ -44,6 +62,9 @@ struct whisker_clock_fit {
     double nominal_ns; /* per cycle */
     int64_t latency_ns;
     uint64_t first_cycles, last_cycles;
+    double first_x_ns; /* of the controller's clock, or the bridge's */
+    double last_x_ns;  /* since then */
+    struct whisker_clock_usb usb;
     int64_t first_ns, last_ns;
     int64_t realtime_offset_ns;                             /* CLOCK_REALTIME minus CLOCK_MONOTONIC, as last seen */
     struct whisker_clock_point point[WHISKER_CLOCK_POINTS]; /* of past seconds, oldest first */
@@ -64,12 +85,18 @@ struct whisker_clock_fit {
 void whisker_clock_begin(struct whisker_clock_fit *fit, uint32_t clock_hz, int64_t latency_ns);
 
 /*
- * A frame of the bridge's time `cycles` has arrived just now, by both of the host's clocks. Of frames that come
- * together the last one tells most. When cycles go back (the bridge was started again), when the host's clock goes
- * back, or when the clocks run apart by more than a crystal can, the fit begins anew.
+ * A frame of the bridge's time `cycles` has arrived just now, by both of the host's clocks; usb_time is that of its
+ * header (0: not known). Of frames that come together the last one tells most. When the host's clock goes back, when
+ * the clocks run apart by more than a crystal can, or, without usb_time, when cycles go back (the bridge was started
+ * again), the fit begins anew.
  * Returns 0, or HOST_CLOCK: CLOCK_MONOTONIC went back, or CLOCK_REALTIME was set by more than 10 ms.
  */
-int whisker_clock_add(struct whisker_clock_fit *fit, uint64_t cycles, int64_t monotonic_ns, int64_t realtime_ns);
+int whisker_clock_add(struct whisker_clock_fit *fit, uint64_t cycles, uint16_t usb_time, int64_t monotonic_ns,
+                      int64_t realtime_ns);
+
+/* A report `timing` of the bridge, within a second of its latest frame: its tick was at the bridge's time `cycles`. A
+ * few of them a second make dates exact that frames give to a microframe (125 us) only. */
+void whisker_clock_report(struct whisker_clock_fit *fit, uint64_t cycles, uint16_t usb_time, uint16_t sof_cycles);
 
 /* The mapping at the latest arrival; ns_per_cycle 0 before the first. */
 void whisker_clock_get(const struct whisker_clock_fit *fit, struct whisker_clock *clock);
