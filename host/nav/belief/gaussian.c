@@ -8,6 +8,12 @@
 
 enum { X, Y, T };
 
+double nav_mode_distance(struct nav_pose mean, struct nav_pose pose)
+{
+    double dx = pose.x - mean.x, dy = pose.y - mean.y, turn = nav_wrap(pose.theta - mean.theta);
+    return (dx * dx + dy * dy) / (NAV_NEAR_M * NAV_NEAR_M) + turn * turn / (NAV_NEAR_RAD * NAV_NEAR_RAD);
+}
+
 struct nav_gaussian nav_gaussian_prior(const struct nav_problem *problem)
 {
     const struct nav_arena *arena = &problem->arena;

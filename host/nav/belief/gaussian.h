@@ -12,6 +12,22 @@ struct nav_gaussian {
     double covariance[9];
 };
 
+/* What a belief amounts to. near: mass within NAV_NEAR_M and NAV_NEAR_RAD of the mean. */
+struct nav_summary {
+    struct nav_gaussian belief; /* mean near a mode; covariance of the whole belief about it */
+    double near;
+};
+
+/* A mode of a belief, and how far a pose is from it: squared distance and angle by NAV_NEAR_M and NAV_NEAR_RAD. What is
+ * farther than NAV_MODE_REACH does not belong to it. */
+enum { NAV_MODES_MOST = 32 };
+#define NAV_MODE_REACH 4.0
+struct nav_mode {
+    struct nav_pose mean;
+    double mass;
+};
+double nav_mode_distance(struct nav_pose mean, struct nav_pose);
+
 struct nav_problem;
 struct nav_estimate;
 struct nav_component;

@@ -88,13 +88,47 @@ static double occupied(const struct nav_bins *b, double count, double elsewhere)
     return sum;
 }
 
-long nav_bins_needed(const struct nav_bins *b, double error, double elsewhere, long least, long most)
+long nav_bins_needed(const struct nav_bins *b, const struct nav_sample *sample, double elsewhere)
 {
     enum { ROUNDS = 6 };
-    double count = (double)most;
+    double count = (double)sample->most;
+    if (sample->least >= sample->most)
+        return sample->most;
     for (int n = 0; n < ROUNDS; n++)
-        count = fmin(nav_bins_bound(occupied(b, count, elsewhere), error), (double)most);
-    return (long)fmax(ceil(count), (double)least);
+        count = fmin(nav_bins_bound(occupied(b, count, elsewhere), sample->error), (double)sample->most);
+    return (long)fmax(ceil(count), (double)sample->least);
+}
+
+struct nav_summary nav_particles_summary(const struct nav_particles *p, struct nav_bins *b, struct nav_pose guess)
+{
+    struct nav_pose mean;
+    double mass = nav_particles_near(p, guess, &mean);
+    mass = nav_particles_near(p, mean, &mean);
+    if (mass < 0.5) {
+        nav_bins_fill(b, p);
+        nav_particles_near(p, nav_bins_mode(b), &mean);
+        mass = nav_particles_near(p, mean, &mean);
+    }
+    struct nav_summary out = {.belief = {.mean = mean}, .near = fmin(mass, 1.0)};
+    nav_particles_covariance(p, mean, out.belief.covariance);
+    return out;
+}
+
+bool nav_particles_begin(struct nav_particles *p, struct nav_bins *b, const struct nav_likelihood *l,
+                         const struct nav_prior *prior, double anywhere, struct nav_rng *rng,
+                         const struct nav_sample *sample)
+{
+    bool free = false;
+    p->count = 0;
+    while (p->count < sample->most) {
+        struct nav_pose pose;
+        free = nav_particles_draw(l, prior, anywhere, rng, &pose) || free;
+        nav_particles_add(p, pose, 1.0 / (double)sample->most, rng);
+    }
+    nav_bins_fill(b, p);
+    p->count = nav_bins_needed(b, sample, 0.0); /* drawn independently, the first few do as well as any */
+    nav_particles_scale(p, (double)sample->most / (double)p->count);
+    return free;
 }
 
 size_t nav_bins_bytes(const struct nav_bins *b)

@@ -5,6 +5,12 @@
 
 #include "particles.h"
 
+/* How many particles to draw: `least` to `most`, by `error` as in nav_bins_bound. */
+struct nav_sample {
+    double error;
+    long least, most;
+};
+
 struct nav_bins {
     double edge;         /* m */
     int turns;           /* bins per full turn */
@@ -21,6 +27,15 @@ void nav_bins_free(struct nav_bins *);
 /* Sorts a cloud's weights into bins. */
 void nav_bins_fill(struct nav_bins *, const struct nav_particles *);
 
+/* Mean, mass near it and covariance about it: at the mode next to `guess`, or at the heaviest bin when less than half
+ * of the mass is near `guess`. Fills the bins if it needs them. */
+struct nav_summary nav_particles_summary(const struct nav_particles *, struct nav_bins *, struct nav_pose guess);
+
+/* Draws particles from the prior, as many as its bins ask for; see nav_particles_draw. False when none is free: the
+ * particles are then where they were drawn. */
+bool nav_particles_begin(struct nav_particles *, struct nav_bins *, const struct nav_likelihood *,
+                         const struct nav_prior *, double anywhere, struct nav_rng *, const struct nav_sample *);
+
 /* Centre of the heaviest bin. */
 struct nav_pose nav_bins_mode(const struct nav_bins *);
 
@@ -28,9 +43,9 @@ struct nav_pose nav_bins_mode(const struct nav_bins *);
  * equation 13 of Fox, "Adapting the sample size in particle filters through KLD-sampling", with z = 2.326. */
 double nav_bins_bound(double bins, double error);
 
-/* How many of `least` .. `most` to draw from this belief when a share of them, `elsewhere`, falls anywhere: the number
- * n that its own occupied bins ask for, as systematic resampling would fill them. */
-long nav_bins_needed(const struct nav_bins *, double error, double elsewhere, long least, long most);
+/* How many particles to draw from this belief when a share of them, `elsewhere`, falls anywhere: the number that its
+ * own occupied bins ask for, as systematic resampling would fill them. */
+long nav_bins_needed(const struct nav_bins *, const struct nav_sample *, double elsewhere);
 
 size_t nav_bins_bytes(const struct nav_bins *);
 

@@ -6,31 +6,53 @@
 
 #include "bumps.h"
 
-enum { TRIES = 64 };
+enum { TRIES = 64, PLAIN = 5, WITH_ODOMETRY = 9 };
 
-int nav_particles_init(struct nav_particles *p, long room)
+/* Log-likelihood of a particle where the robot cannot stand: below that of any row, and finite, so that particles all
+ * of which are blocked keep their weights. */
+static const float BLOCKED = -1e4f;
+
+/* Chance per row that a particle draws one of its guesses anew, and how far a gain then moves by its prior's spread. */
+static const double MUTATION = 0.03, NUDGE = 0.2;
+
+static void particles_point(struct nav_particles *p)
 {
-    *p = (struct nav_particles){.room = room, .memory = calloc(5 * (size_t)room, sizeof *p->memory)};
-    if (!p->memory)
+    float **column[WITH_ODOMETRY] = {&p->x,    &p->y,         &p->c,     &p->s,   &p->weight,
+                                     &p->gain, &p->turn_gain, &p->noise, &p->mode};
+    for (int k = 0; k < p->columns; k++)
+        *column[k] = p->memory + (size_t)k * (size_t)p->room;
+}
+
+int nav_particles_init(struct nav_particles *p, long room, bool odometry, double spread)
+{
+    *p = (struct nav_particles){.room = room, .columns = odometry ? WITH_ODOMETRY : PLAIN, .spread = (float)spread};
+    p->memory = calloc((size_t)p->columns * (size_t)room, sizeof *p->memory);
+    p->spare = calloc((size_t)p->columns * (size_t)room, sizeof *p->spare);
+    p->loglik = calloc((size_t)room, sizeof *p->loglik);
+    if (!p->memory || !p->spare || !p->loglik)
         return -1;
-    p->x = p->memory;
-    p->y = p->x + room;
-    p->c = p->y + room;
-    p->s = p->c + room;
-    p->weight = p->s + room;
+    particles_point(p);
     return 0;
 }
 
 void nav_particles_free(struct nav_particles *p)
 {
     free(p->memory);
+    free(p->spare);
+    free(p->loglik);
 }
 
-static struct nav_pose draw_once(const struct nav_arena *arena, const struct nav_prior *prior, struct nav_rng *rng)
+size_t nav_particles_bytes(const struct nav_particles *p)
+{
+    return (2 * (size_t)p->columns + 1) * (size_t)p->room * sizeof *p->memory;
+}
+
+static struct nav_pose particles_draw_once(const struct nav_arena *arena, const struct nav_prior *prior,
+                                           double anywhere, struct nav_rng *rng)
 {
     struct nav_pose pose;
     bool mixture = nav_bumps_given(prior);
-    if (mixture && nav_rng_uniform(rng) >= NAV_ANYWHERE)
+    if (mixture && nav_rng_uniform(rng) >= anywhere)
         return nav_bumps_draw(prior, rng);
     if (prior->uniform || mixture) {
         pose.x = arena->size_x * nav_rng_uniform(rng);
@@ -44,12 +66,15 @@ static struct nav_pose draw_once(const struct nav_arena *arena, const struct nav
     return pose;
 }
 
-struct nav_pose nav_particles_draw(const struct nav_likelihood *l, const struct nav_prior *prior, struct nav_rng *rng)
+bool nav_particles_draw(const struct nav_likelihood *l, const struct nav_prior *prior, double anywhere,
+                        struct nav_rng *rng, struct nav_pose *pose)
 {
-    struct nav_pose pose = draw_once(l->arena, prior, rng);
-    for (int n = 1; n < TRIES && !nav_likelihood_clear(l, pose.x, pose.y, 0.0); n++)
-        pose = draw_once(l->arena, prior, rng);
-    return pose;
+    for (int n = 0; n < TRIES; n++) {
+        *pose = particles_draw_once(l->arena, prior, anywhere, rng);
+        if (nav_likelihood_clear(l, pose->x, pose->y, 0.0))
+            return true;
+    }
+    return false;
 }
 
 void nav_particles_set(struct nav_particles *p, long i, struct nav_pose pose)
@@ -60,13 +85,65 @@ void nav_particles_set(struct nav_particles *p, long i, struct nav_pose pose)
     p->s[i] = (float)sin(pose.theta);
 }
 
+struct nav_pose nav_particles_pose(const struct nav_particles *p, long i)
+{
+    return (struct nav_pose){(double)p->x[i], (double)p->y[i], (double)atan2f(p->s[i], p->c[i])};
+}
+
+/* Three in four particles hold the odometry unbiased. */
+static float particles_gain(const struct nav_particles *p, struct nav_rng *rng)
+{
+    return nav_rng_bits(rng) >> 62 ? 0.0f : p->spread * (float)nav_rng_rough(rng);
+}
+
+/* Most particles hold with the model's noise, half of it, as the model's allows for errors that persist, or twice as
+ * much; a few with much more, so that wheels that skid are followed until the weights have changed. */
+static float particles_noise(struct nav_rng *rng)
+{
+    static const float LEVELS[16] = {1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 0.5f,
+                                     0.5f, 0.5f, 0.5f, 2.0f, 2.0f, 2.0f, 2.0f, 5.0f};
+    return LEVELS[nav_rng_bits(rng) >> 60];
+}
+
+void nav_particles_add(struct nav_particles *p, struct nav_pose pose, double weight, struct nav_rng *rng)
+{
+    if (p->count == p->room)
+        return;
+    long i = p->count++;
+    nav_particles_set(p, i, pose);
+    p->weight[i] = (float)weight;
+    if (!p->gain)
+        return;
+    p->gain[i] = particles_gain(p, rng);
+    p->turn_gain[i] = particles_gain(p, rng);
+    p->noise[i] = particles_noise(rng);
+    p->mode[i] = -1.0f;
+}
+
+/* Changes one guess of one particle now and then; those whose guesses fit outlive the others. */
+static void particles_mutate(struct nav_particles *p, long i, struct nav_rng *rng)
+{
+    uint64_t bits = nav_rng_bits(rng);
+    if ((double)(bits >> 11) * 0x1p-53 >= MUTATION)
+        return;
+    if ((bits & 7) > 5) {
+        p->noise[i] = particles_noise(rng);
+        return;
+    }
+    float *gain = bits & 1 ? &p->gain[i] : &p->turn_gain[i];
+    if ((bits & 7) < 2)
+        *gain = particles_gain(p, rng);
+    else if (*gain != 0.0f)
+        *gain += (float)NUDGE * p->spread * (float)nav_rng_rough(rng);
+}
+
 /* Turns unit vector (c, s) by an angle; a polynomial does for small ones, and the length is put right. */
-static void turn(float *c, float *s, float angle)
+static void particles_turn(float *c, float *s, float angle)
 {
     float co, si, square = angle * angle;
-    if (square < 0.02f) {
-        co = 1.0f - square * (0.5f - square / 24.0f);
-        si = angle * (1.0f - square / 6.0f);
+    if (square < 0.1f) {
+        co = 1.0f - square * (0.5f - square * (1.0f / 24.0f - square / 720.0f));
+        si = angle * (1.0f - square * (1.0f / 6.0f - square / 120.0f));
     } else {
         co = cosf(angle);
         si = sinf(angle);
@@ -76,40 +153,52 @@ static void turn(float *c, float *s, float angle)
     *s = b * mend;
 }
 
-void nav_particles_move(struct nav_particles *p, struct nav_pose step, const struct nav_noise *noise,
+void nav_particles_move(struct nav_particles *p, struct nav_pose step, const struct nav_noise *noise, bool known,
                         struct nav_rng *rng)
 {
-    float dx = (float)step.x, dy = (float)step.y, co = (float)cos(step.theta), si = (float)sin(step.theta);
     float sigma = (float)sqrt(noise->position), sigma_turn = (float)fmin(sqrt(noise->heading), NAV_PI);
     for (long i = 0; i < p->count; i++) {
-        float c = p->c[i], s = p->s[i];
-        p->x[i] += c * dx - s * dy + sigma * (float)nav_rng_rough(rng);
-        p->y[i] += s * dx + c * dy + sigma * (float)nav_rng_rough(rng);
-        p->c[i] = c * co - s * si;
-        p->s[i] = s * co + c * si;
-        turn(&p->c[i], &p->s[i], sigma_turn * (float)nav_rng_rough(rng));
+        float c = p->c[i], s = p->s[i], dx = (float)step.x, dy = (float)step.y, turn = (float)step.theta, level = 1.0f;
+        if (p->gain) {
+            particles_mutate(p, i, rng);
+            dx *= 1.0f + p->gain[i];
+            dy *= 1.0f + p->gain[i];
+            turn *= 1.0f + p->turn_gain[i];
+            level = known ? p->noise[i] : fmaxf(p->noise[i], 1.0f);
+        }
+        p->x[i] += c * dx - s * dy + level * sigma * (float)nav_rng_rough(rng);
+        p->y[i] += s * dx + c * dy + level * sigma * (float)nav_rng_rough(rng);
+        particles_turn(&p->c[i], &p->s[i], turn + level * sigma_turn * (float)nav_rng_rough(rng));
     }
 }
 
-double nav_particles_weigh(struct nav_particles *p, const struct nav_likelihood *l, float *loglik)
+void nav_particles_scale(struct nav_particles *p, double factor)
 {
-    float best = -INFINITY;
+    for (long i = 0; i < p->count; i++)
+        p->weight[i] *= (float)factor;
+}
+
+double nav_particles_weigh(struct nav_particles *p, struct nav_likelihood *l, double mass)
+{
+    float best = 2.0f * BLOCKED;
+    double total = 0.0;
+    if (mass >= 0.0)
+        nav_trust_begin(l);
     for (long i = 0; i < p->count; i++) {
         const struct nav_place at = {(double)p->x[i], (double)p->y[i], (double)p->c[i], (double)p->s[i]};
-        loglik[i] = (float)nav_likelihood_standing(l, &at);
-        if (p->weight[i] > 0.0f && loglik[i] > best)
-            best = loglik[i];
+        bool clear = nav_likelihood_clear(l, at.x, at.y, 0.0);
+        p->loglik[i] = clear ? fmaxf(nav_likelihood_at(l, &at, l->scratch), BLOCKED / 2.0f) : BLOCKED;
+        if (clear && mass >= 0.0)
+            nav_trust_add(l, l->scratch, mass * (double)p->weight[i]);
+        if (p->weight[i] > 0.0f && p->loglik[i] > best)
+            best = p->loglik[i];
     }
-    if (!(best > -INFINITY))
-        return 0.0;
-    double total = 0.0;
-    for (long i = 0; i < p->count; i++)
-        total += (double)(loglik[i] = p->weight[i] * expf(loglik[i] - best));
-    if (!(total > 0.0))
-        return 0.0;
-    for (long i = 0; i < p->count; i++)
-        p->weight[i] = loglik[i] * (float)(1.0 / total);
-    return total * exp((double)best - l->ceiling);
+    for (long i = 0; i < p->count; i++) {
+        p->weight[i] *= expf(fminf(p->loglik[i] - best, 0.0f));
+        total += (double)p->weight[i];
+    }
+    nav_particles_scale(p, 1.0 / total);
+    return log(total) + (double)best;
 }
 
 double nav_particles_effective(const struct nav_particles *p)
@@ -122,87 +211,24 @@ double nav_particles_effective(const struct nav_particles *p)
     return square > 0.0 ? sum * sum / square : 0.0;
 }
 
-static void copy_one(const struct nav_particles *from, long i, struct nav_particles *to, long k)
-{
-    to->x[k] = from->x[i];
-    to->y[k] = from->y[i];
-    to->c[k] = from->c[i];
-    to->s[k] = from->s[i];
-    to->weight[k] = 1.0f / (float)to->count;
-}
-
-void nav_particles_resample(const struct nav_particles *from, struct nav_particles *to, long count, double offset)
+void nav_particles_resample(struct nav_particles *p, long count, double offset)
 {
     double total = 0.0, passed = 0.0;
-    for (long i = 0; i < from->count; i++)
-        total += (double)from->weight[i];
+    for (long i = 0; i < p->count; i++)
+        total += (double)p->weight[i];
+    float *drawn = p->spare;
     long i = 0;
-    to->count = count;
     for (long k = 0; k < count; k++) {
         double mark = ((double)k + offset) / (double)count * total;
-        while (i + 1 < from->count && passed + (double)from->weight[i] <= mark)
-            passed += (double)from->weight[i++];
-        copy_one(from, i, to, k);
+        while (i + 1 < p->count && passed + (double)p->weight[i] <= mark)
+            passed += (double)p->weight[i++];
+        for (int column = 0; column < p->columns; column++)
+            drawn[column * p->room + k] = p->memory[column * p->room + i];
     }
-}
-
-struct nav_pose nav_particles_mean(const struct nav_particles *p)
-{
-    double x = 0.0, y = 0.0, c = 0.0, s = 0.0, total = 0.0;
-    for (long i = 0; i < p->count; i++) {
-        double w = (double)p->weight[i];
-        total += w;
-        x += w * (double)p->x[i];
-        y += w * (double)p->y[i];
-        c += w * (double)p->c[i];
-        s += w * (double)p->s[i];
-    }
-    return (struct nav_pose){x / total, y / total, atan2(s, c)};
-}
-
-/* Angle from one unit vector to another; a series does for what is near. */
-static float angle_between(float c0, float s0, float c, float s)
-{
-    float across = c0 * s - s0 * c, along = c0 * c + s0 * s, square = across * across;
-    if (along > 0.9f)
-        return across * (1.0f + square * (1.0f / 6.0f + square * (3.0f / 40.0f)));
-    return atan2f(across, along);
-}
-
-double nav_particles_near(const struct nav_particles *p, struct nav_pose pose, struct nav_pose *mean)
-{
-    static const float NEAR_COSINE = 0.8775825619f; /* cos(NAV_NEAR_RAD) */
-    float c0 = (float)cos(pose.theta), s0 = (float)sin(pose.theta), x0 = (float)pose.x, y0 = (float)pose.y;
-    double mass = 0.0, x = 0.0, y = 0.0, turned = 0.0;
-    for (long i = 0; i < p->count; i++) {
-        float dx = p->x[i] - x0, dy = p->y[i] - y0;
-        if (dx * dx + dy * dy > (float)(NAV_NEAR_M * NAV_NEAR_M) || c0 * p->c[i] + s0 * p->s[i] < NEAR_COSINE)
-            continue;
-        mass += (double)p->weight[i];
-        x += (double)(p->weight[i] * dx);
-        y += (double)(p->weight[i] * dy);
-        turned += (double)(p->weight[i] * angle_between(c0, s0, p->c[i], p->s[i]));
-    }
-    *mean = pose;
-    if (mass > 0.0)
-        *mean = (struct nav_pose){pose.x + x / mass, pose.y + y / mass, nav_wrap(pose.theta + turned / mass)};
-    return mass;
-}
-
-void nav_particles_covariance(const struct nav_particles *p, struct nav_pose about, double covariance[9])
-{
-    float c0 = (float)cos(about.theta), s0 = (float)sin(about.theta);
-    double sum[6] = {0.0}; /* xx xy xt yy yt tt */
-    for (long i = 0; i < p->count; i++) {
-        double w = (double)p->weight[i], x = (double)p->x[i] - about.x, y = (double)p->y[i] - about.y;
-        double t = (double)angle_between(c0, s0, p->c[i], p->s[i]);
-        sum[0] += w * x * x;
-        sum[1] += w * x * y;
-        sum[2] += w * x * t;
-        sum[3] += w * y * y;
-        sum[4] += w * y * t;
-        sum[5] += w * t * t;
-    }
-    const double all[9] = {sum[0], sum[1], sum[2], sum[1], sum[3], sum[4], sum[2], sum[4], sum[5]};
-    memcpy(covariance, all, sizeof all);
+    p->spare = p->memory;
+    p->memory = drawn;
+    p->count = count;
+    particles_point(p);
+    for (long k = 0; k < count; k++)
+        p->weight[k] = 1.0f / (float)count;
 }

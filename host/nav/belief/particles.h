@@ -1,52 +1,85 @@
-/* A cloud of weighted poses: motion, resampling, moments. */
+/* Weighted particles: motion, likelihood, resampling, moments, modes. */
 #ifndef NAV_PARTICLES_H
 #define NAV_PARTICLES_H
 
+#include "gaussian.h"
 #include "likelihood.h"
 #include "motion.h"
 #include "rng.h"
 
-/* Headings are kept as unit vectors, so that no particle needs a sine. Weights sum to 1. */
+/* One column per quantity. Headings are kept as unit vectors, so that no particle needs a sine. Weights sum to 1. */
 struct nav_particles {
     long count, room;
     float *x, *y; /* [room] m */
     float *c, *s; /* [room] cosine and sine of the heading */
     float *weight;
-    float *memory;
+    /* Of particles that estimate the odometry's errors, NULL for others: true distance and turn by the reported ones,
+     * less 1; standard deviation of the odometry noise by the model's. */
+    float *gain, *turn_gain, *noise;
+    float *mode;   /* index among the modes last gathered, -1: none; NULL as above */
+    float *loglik; /* of the row last weighed */
+    float spread;  /* standard deviation of the prior of the gains */
+    int columns;   /* kept when particles are resampled */
+    float *memory, *spare;
 };
 
-/* 0, or -1 without memory; nav_particles_free either way. */
-int nav_particles_init(struct nav_particles *, long room);
+/* odometry: with columns for its errors, gains of standard deviation `spread`. 0, or -1 without memory;
+ * nav_particles_free either way. */
+int nav_particles_init(struct nav_particles *, long room, bool odometry, double spread);
 void nav_particles_free(struct nav_particles *);
+size_t nav_particles_bytes(const struct nav_particles *);
 
-/* A pose drawn from the prior, from its free part if that can be found in a few dozen draws. */
-struct nav_pose nav_particles_draw(const struct nav_likelihood *, const struct nav_prior *, struct nav_rng *);
+/* A pose drawn from the prior, from its free part if that can be found in a few dozen draws: false otherwise.
+ * anywhere: share of a mixture's draws that are uniform. */
+bool nav_particles_draw(const struct nav_likelihood *, const struct nav_prior *, double anywhere, struct nav_rng *,
+                        struct nav_pose *);
 
 /* Puts a particle; its weight stays. */
 void nav_particles_set(struct nav_particles *, long i, struct nav_pose);
 
-/* Moves every particle by `step` in its own frame, with noise of its own: the cloud becomes the banana. */
-void nav_particles_move(struct nav_particles *, struct nav_pose step, const struct nav_noise *, struct nav_rng *);
+/* Adds a particle when there is room, the odometry's errors drawn from their prior. */
+void nav_particles_add(struct nav_particles *, struct nav_pose, double weight, struct nav_rng *);
 
-/* Multiplies the weights by the likelihood of the row last read and normalises. Returns their mean before that,
- * relative to the likelihood that the row could have had at best; 0 when no particle stands free: weights are then
- * kept. scratch: [count]. */
-double nav_particles_weigh(struct nav_particles *, const struct nav_likelihood *, float *scratch);
+struct nav_pose nav_particles_pose(const struct nav_particles *, long i);
 
-/* 1 / sum of squared weights: how many equal particles these are worth. */
+/* Moves every particle by `step` in its own frame, with noise of its own: the cloud becomes the banana. known: all of
+ * the motion was reported; else no particle takes less than the model's noise. */
+void nav_particles_move(struct nav_particles *, struct nav_pose step, const struct nav_noise *, bool known,
+                        struct nav_rng *);
+
+/* Multiplies the weights by the likelihood of the row last read and normalises. A particle that stands where the map
+ * is not free gets no weight while another is free. Returns the log of the mean likelihood. mass: of the belief that
+ * the particles hold, with which they tell the measurement models what they expect (trust.h); below 0: they tell
+ * nothing. */
+double nav_particles_weigh(struct nav_particles *, struct nav_likelihood *, double mass);
+
+void nav_particles_scale(struct nav_particles *, double factor);
+
+/* Effective sample size: how many equal particles these are worth. */
 double nav_particles_effective(const struct nav_particles *);
 
-/* Systematic resampling: fills to[0 .. count - 1] from `from`, particle i being taken count * weight times on average,
- * never off by one or more. offset: 0 <= offset < 1, random. Weights of the result are equal. */
-void nav_particles_resample(const struct nav_particles *from, struct nav_particles *to, long count, double offset);
-
-/* Mean pose of the whole cloud. */
-struct nav_pose nav_particles_mean(const struct nav_particles *);
+/* Systematic resampling to `count` particles: particle i is taken count * weight times on average, never off by one or
+ * more. offset: 0 <= offset < 1, random. Weights are equal afterwards. */
+void nav_particles_resample(struct nav_particles *, long count, double offset);
 
 /* Mass within NAV_NEAR_M and NAV_NEAR_RAD of a pose, and the mean pose of that part. */
 double nav_particles_near(const struct nav_particles *, struct nav_pose, struct nav_pose *mean);
 
-/* Covariance of the whole cloud about a pose, row-major, m and rad. */
+/* Covariance of all particles about a pose, row-major, m and rad. */
 void nav_particles_covariance(const struct nav_particles *, struct nav_pose about, double covariance[9]);
+
+/* Gathers particles into modes: their number, at most NAV_MODES_MOST; what is left then belongs to none. */
+int nav_particles_modes(struct nav_particles *, struct nav_mode mode[NAV_MODES_MOST]);
+
+/* What each mode last gathered weighs now: mass[modes]. */
+void nav_particles_masses(const struct nav_particles *, double *mass, int modes);
+
+/* Multiplies the weights of each mode last gathered by its factor; normalises. */
+void nav_particles_weigh_modes(struct nav_particles *, const double *factor, int modes);
+
+/* The particles moved by what is pending, as nav_filter_components lists them, masses times `mass`. about: pose near
+ * which their density gives the width of each. */
+long nav_particles_components(const struct nav_particles *, struct nav_pose about, const struct nav_pending *,
+                              double mass, struct nav_component *out, long room);
 
 #endif

@@ -14,10 +14,20 @@
 #include "adaptive_doubt.h"
 #include "adaptive_global.h"
 #include "adaptive_prior.h"
+#include "particle_bins.h"
 
 /* Shares of the belief: below the first one mode is not told from another; the modes of a cloud hold the second of the
  * histogram's, or others are drawn; a mode that holds the third is the only one. */
 static const double SHARE_LEAST = 1e-9, KNOWN_LEAST = 0.9, ONE_MODE = 0.999;
+
+/* The particles and what it takes to draw them; moved: how many were moved or weighed for the last row. */
+struct adaptive_cloud {
+    struct nav_particles set;
+    struct nav_bins bins;
+    struct nav_sample sample;
+    struct nav_rng rng;
+    long moved;
+};
 
 struct adaptive {
     const struct nav_problem *problem;
@@ -26,15 +36,15 @@ struct adaptive {
     struct adaptive_global global;
     struct adaptive_log log;
     struct adaptive_doubt doubt;
-    bool local, awake;                 /* which of the two beliefs are held; one at least */
-    bool whole;                        /* the histogram holds all belief, and the cloud the same more finely */
-    int modes;                         /* of the cloud, as last told by the histogram, 0: not told */
-    double share[ADAPTIVE_MODES_MOST]; /* what each of them weighs */
+    bool local, awake;            /* which of the two beliefs are held; one at least */
+    bool whole;                   /* the histogram holds all belief, and the cloud the same more finely */
+    int modes;                    /* of the cloud, as last told by the histogram, 0: not told */
+    double share[NAV_MODES_MOST]; /* what each of them weighs */
     double odds; /* logarithm, elsewhere against local, before the rows that the histogram has gone over */
-    struct nav_pending pending;     /* since the last row that was read ... */
-    bool pending_unknown;           /* ... and whether some of it was not reported */
-    bool idle;                      /* nothing was read in the row before */
-    struct adaptive_summary answer; /* after the last row that was read */
+    struct nav_pending pending; /* since the last row that was read ... */
+    bool pending_unknown;       /* ... and whether some of it was not reported */
+    bool idle;                  /* nothing was read in the row before */
+    struct nav_summary answer;  /* after the last row that was read */
     long evaluations, distinct, touched;
 };
 
@@ -44,7 +54,8 @@ static void destroy(void *self)
     adaptive_doubt_free(&a->doubt);
     adaptive_log_free(&a->log);
     adaptive_global_free(&a->global);
-    adaptive_cloud_free(&a->cloud);
+    nav_particles_free(&a->cloud.set);
+    nav_bins_free(&a->cloud.bins);
     nav_likelihood_free(a->likelihood);
     free(a);
 }
@@ -73,17 +84,29 @@ static struct nav_pose ahead(const struct adaptive *a)
 static void answer(struct adaptive *a)
 {
     struct adaptive_held held = {.problem = a->problem,
-                                 .local = a->local ? &a->cloud : NULL,
+                                 .local = a->local ? &a->cloud.set : NULL,
+                                 .bins = &a->cloud.bins,
                                  .global = a->awake && !(a->whole && a->local) ? &a->global : NULL,
                                  .log = &a->log,
                                  .share = elsewhere(a)};
     a->answer = adaptive_answer(&held, a->answer.belief.mean);
 }
 
+/* Draws the particles from the prior; false when nothing of it is free. */
+static bool adaptive_begin_cloud(struct adaptive *a)
+{
+    struct adaptive_cloud *cloud = &a->cloud;
+    return nav_particles_begin(&cloud->set, &cloud->bins, a->likelihood, &a->problem->prior, 0.0, &cloud->rng,
+                               &cloud->sample);
+}
+
 /* A mixture that a cloud can hold: in doubt from the start, by the share that it may be wrong. A wider one: unknown. */
 static void begin_mixture(struct adaptive *a)
 {
-    a->local = adaptive_prior_cloud(&a->cloud, a->likelihood, &a->global);
+    bool few = adaptive_global_fill(&a->global) * a->problem->settings.adaptive_per_bin <= a->global.room;
+    a->local = few && adaptive_begin_cloud(a);
+    if (a->local)
+        adaptive_global_restart(&a->global, 0);
     a->awake = true;
     a->odds = log(NAV_ANYWHERE / (1.0 - NAV_ANYWHERE));
     a->answer.belief = nav_gaussian_prior(a->problem);
@@ -96,10 +119,25 @@ static void begin(struct adaptive *a)
         begin_mixture(a);
         return;
     }
-    a->local = !a->problem->prior.uniform && adaptive_cloud_prior(&a->cloud, a->likelihood);
+    a->local = !a->problem->prior.uniform && adaptive_begin_cloud(a);
     a->awake = !a->local;
     a->answer.belief = nav_gaussian_prior(a->problem);
     answer(a);
+}
+
+static int adaptive_init_cloud(struct adaptive *a)
+{
+    const struct nav_settings *s = &a->problem->settings;
+    struct adaptive_cloud *cloud = &a->cloud;
+    cloud->sample.error = 0.5 / s->adaptive_per_bin; /* many bins: twice the error by the bins, less 1 (Fox) */
+    cloud->sample.most = (long)a->global.room;
+    cloud->sample.least = (long)fmin(s->adaptive_least, a->global.room);
+    nav_rng_seed(&cloud->rng, a->problem->seed, 0);
+    return nav_particles_init(&cloud->set, cloud->sample.most, true, s->adaptive_gain) ||
+                   nav_bins_init(&cloud->bins, cloud->sample.most, s->adaptive_bin_m,
+                                 s->adaptive_bin_deg * NAV_PI / 180.0)
+               ? -1
+               : 0;
 }
 
 static void *create(const struct nav_problem *problem)
@@ -111,9 +149,8 @@ static void *create(const struct nav_problem *problem)
     a->problem = problem;
     nav_rng_seed(&rng, problem->seed, 1);
     a->likelihood = nav_likelihood_new(&problem->arena, &problem->robot, &problem->settings, 0.0);
-    if (!a->likelihood || adaptive_cloud_init(&a->cloud, problem, a->likelihood->whiskers) ||
-        adaptive_global_init(&a->global, problem) || adaptive_log_init(&a->log, &a->likelihood->sensors) ||
-        adaptive_doubt_init(&a->doubt, a->likelihood, &rng)) {
+    if (!a->likelihood || adaptive_global_init(&a->global, problem) || adaptive_init_cloud(a) ||
+        adaptive_log_init(&a->log, &a->likelihood->sensors) || adaptive_doubt_init(&a->doubt, a->likelihood, &rng)) {
         destroy(a);
         return NULL;
     }
@@ -145,27 +182,41 @@ static void pour(struct adaptive *a, long count, double share)
 {
     double added = 0.0;
     for (long n = 0; n < count; n++) {
-        adaptive_global_add(&a->global, a->cloud.at[n].pose, a->cloud.at[n].weight / share);
-        added += a->cloud.at[n].weight / share;
+        double weight = (double)a->cloud.set.weight[n] / share;
+        adaptive_global_add(&a->global, nav_particles_pose(&a->cloud.set, n), weight);
+        added += weight;
     }
     a->global.total *= 1.0 + added;
+}
+
+/* Draws as many particles as the spread needs when the weights have become uneven, or always when `force`. */
+static void adaptive_resample(struct adaptive *a, bool force)
+{
+    struct adaptive_cloud *cloud = &a->cloud;
+    if (!force && 2.0 * nav_particles_effective(&cloud->set) >= (double)cloud->set.count)
+        return;
+    nav_bins_fill(&cloud->bins, &cloud->set);
+    long count = nav_bins_needed(&cloud->bins, &cloud->sample, 0.0);
+    cloud->moved += cloud->set.count;
+    nav_particles_resample(&cloud->set, count, nav_rng_uniform(&cloud->rng));
 }
 
 /* The histogram's mass sits in few cells: hypotheses take over its share. */
 static void take_over(struct adaptive *a, double share)
 {
     const struct nav_settings *s = &a->problem->settings;
-    double count = fmin(fmax(s->adaptive_least, a->global.crowd * s->adaptive_per_bin), (double)a->cloud.room / 2.0);
-    long held = a->local ? a->cloud.count : 0;
-    a->cloud.count = held;
-    adaptive_cloud_scale(&a->cloud, 1.0 - share);
-    adaptive_global_draw(&a->global, &a->cloud, (long)count, share, ahead(a));
+    double count = fmin(fmax(s->adaptive_least, a->global.crowd * s->adaptive_per_bin), a->global.room / 2.0);
+    struct nav_particles *set = &a->cloud.set;
+    long held = a->local ? set->count : 0;
+    set->count = held;
+    nav_particles_scale(set, 1.0 - share);
+    adaptive_global_draw(&a->global, set, &a->cloud.rng, (long)count, share, ahead(a));
     pour(a, held, share);
     if (a->local && share > 0.5) /* what contradicted the local belief was not the whiskers' fault */
         adaptive_doubt_teach(&a->doubt, a->likelihood, a->likelihood);
     a->local = true;
-    a->cloud.moved = a->cloud.count;
-    adaptive_cloud_thin(&a->cloud, true);
+    a->cloud.moved = set->count;
+    adaptive_resample(a, true);
     a->touched += a->cloud.moved;
     a->whole = true;
     a->modes = 0;
@@ -175,11 +226,11 @@ static void take_over(struct adaptive *a, double share)
 /* Gives the modes of the cloud the shares that the histogram told last. */
 static void keep_shares(struct adaptive *a)
 {
-    double factor[ADAPTIVE_MODES_MOST], mass[ADAPTIVE_MODES_MOST];
-    adaptive_cloud_masses(&a->cloud, mass, a->modes);
+    double factor[NAV_MODES_MOST], mass[NAV_MODES_MOST];
+    nav_particles_masses(&a->cloud.set, mass, a->modes);
     for (int m = 0; m < a->modes; m++)
         factor[m] = a->share[m] / fmax(mass[m], SHARE_LEAST);
-    adaptive_cloud_weigh_modes(&a->cloud, factor, a->modes, 1.0);
+    nav_particles_weigh_modes(&a->cloud.set, factor, a->modes);
 }
 
 /* Nothing was found elsewhere: where there were several modes the histogram holds the cloud's again. */
@@ -190,8 +241,8 @@ static void stay(struct adaptive *a)
         return;
     }
     adaptive_global_clear(&a->global, a->log.head);
-    for (long n = 0; n < a->cloud.count; n++)
-        adaptive_global_add(&a->global, a->cloud.at[n].pose, a->cloud.at[n].weight);
+    for (long n = 0; n < a->cloud.set.count; n++)
+        adaptive_global_add(&a->global, nav_particles_pose(&a->cloud.set, n), (double)a->cloud.set.weight[n]);
     a->whole = true;
     adaptive_doubt_clear(&a->doubt, a->likelihood, a->log.head);
 }
@@ -201,9 +252,9 @@ static void stay(struct adaptive *a)
  * coarse, and a robot may stand where all of them are blocked. */
 static void arbitrate(struct adaptive *a)
 {
-    struct adaptive_mode mode[ADAPTIVE_MODES_MOST];
-    double share[ADAPTIVE_MODES_MOST], known = 0.0, most = 0.0;
-    int modes = adaptive_cloud_modes(&a->cloud, mode);
+    struct nav_mode mode[NAV_MODES_MOST];
+    double share[NAV_MODES_MOST], known = 0.0, most = 0.0;
+    int modes = nav_particles_modes(&a->cloud.set, mode);
     adaptive_global_share(&a->global, mode, modes, share);
     for (int m = 0; m < modes; m++) {
         known += share[m];
@@ -258,7 +309,7 @@ static void work(struct adaptive *a)
     a->global.touched = a->global.distinct = 0;
     /* Kept back: a cloud drawn from what is found, and that it is moved, weighed and thinned when the row comes. */
     const long drawn = 2, taken = 3; /* poses looked at for each of the cloud's */
-    long kept = (a->idle ? drawn + taken : drawn) * a->cloud.room;
+    long kept = (a->idle ? drawn + taken : drawn) * (long)a->global.room;
     adaptive_global_work(&a->global, &a->log, (long)a->global.budget - kept - a->touched);
     a->touched += a->global.touched;
     a->evaluations += a->global.touched;
@@ -288,21 +339,20 @@ static void predict(void *self, const struct nav_motion *motion)
 
 static void update_local(struct adaptive *a)
 {
-    a->cloud.moved = 0;
-    adaptive_cloud_move(&a->cloud, a->pending.step, &a->pending.noise, !a->pending_unknown);
-    adaptive_cloud_look(&a->cloud, a->likelihood);
-    adaptive_cloud_expect(&a->cloud, a->likelihood, 1.0 - elsewhere(a));
-    double local = adaptive_cloud_weigh(&a->cloud, a->likelihood);
+    struct nav_particles *set = &a->cloud.set;
+    a->cloud.moved = 2 * set->count;
+    nav_particles_move(set, a->pending.step, &a->pending.noise, !a->pending_unknown, &a->cloud.rng);
+    double local = nav_particles_weigh(set, a->likelihood, 1.0 - elsewhere(a));
     if (a->awake && a->modes > 1)
         keep_shares(a);
     adaptive_log_entry(&a->log, a->log.head - 1)->local = local;
     adaptive_doubt_take(&a->doubt, a->likelihood, a->log.head - 1, adaptive_doubt_anywhere(&a->doubt, a->likelihood),
                         local);
     nav_trust_learn(a->likelihood);
-    a->evaluations += a->cloud.count;
-    adaptive_cloud_thin(&a->cloud, false);
+    a->evaluations += set->count;
+    a->distinct += set->count;
+    adaptive_resample(a, false);
     a->touched += a->cloud.moved;
-    a->distinct += a->cloud.count;
 }
 
 static void update(void *self, const struct nav_evidence *evidence)
@@ -329,9 +379,9 @@ static void estimate(const void *self, struct nav_estimate *out)
     out->evaluations = a->evaluations;
     out->distinct = a->distinct;
     out->touched = a->touched;
-    out->states = (a->local ? a->cloud.count : 0) + (a->awake ? (long)adaptive_global_cells(&a->global) : 0);
+    out->states = (a->local ? a->cloud.set.count : 0) + (a->awake ? (long)adaptive_global_cells(&a->global) : 0);
     out->bytes = sizeof *a + nav_likelihood_bytes(a->likelihood) + adaptive_global_bytes(&a->global) +
-                 adaptive_log_bytes(&a->log) + 2 * (size_t)a->cloud.room * sizeof *a->cloud.at;
+                 adaptive_log_bytes(&a->log) + nav_particles_bytes(&a->cloud.set) + nav_bins_bytes(&a->cloud.bins);
 }
 
 static long components(const void *self, struct nav_component *out, long room)
@@ -339,7 +389,9 @@ static long components(const void *self, struct nav_component *out, long room)
     const struct adaptive *a = self;
     bool other = a->awake && !(a->whole && a->local);
     double share = other ? elsewhere(a) : 0.0;
-    long count = a->local ? adaptive_cloud_list(&a->cloud, a->pending.step, 1.0 - share, out, room) : 0;
+    long count = 0;
+    if (a->local)
+        count = nav_particles_components(&a->cloud.set, a->answer.belief.mean, &a->pending, 1.0 - share, out, room);
     if (!other)
         return count;
     long left = room > count ? room - count : 0;

@@ -21,7 +21,7 @@ static struct nav_gaussian anywhere(const struct adaptive_held *h)
     return nav_gaussian_prior(&lost);
 }
 
-static struct adaptive_summary from_local(const struct adaptive_held *h, struct adaptive_summary local)
+static struct nav_summary from_local(const struct adaptive_held *h, struct nav_summary local)
 {
     struct nav_gaussian other = h->global ? h->global->summary.belief : anywhere(h);
     mix_covariance(&local.belief, &other, h->share);
@@ -29,13 +29,13 @@ static struct adaptive_summary from_local(const struct adaptive_held *h, struct 
     return local;
 }
 
-static struct adaptive_summary from_global(const struct adaptive_held *h)
+static struct nav_summary from_global(const struct adaptive_held *h)
 {
-    struct adaptive_summary global = h->global->summary;
+    struct nav_summary global = h->global->summary;
     nav_gaussian_move(&global.belief, adaptive_log_since(h->log, h->global->next), &(struct nav_noise){0.0, 0.0});
-    struct adaptive_summary other = global;
+    struct nav_summary other = global;
     if (h->local)
-        other = adaptive_cloud_summary(h->local, global.belief.mean);
+        other = nav_particles_summary(h->local, h->bins, global.belief.mean);
     mix_covariance(&global.belief, &other.belief, 1.0 - h->share);
     global.near *= h->share;
     return global;
@@ -43,11 +43,11 @@ static struct adaptive_summary from_global(const struct adaptive_held *h)
 
 /* A belief that is likelier as a whole may hold less near any one pose: while it is spread, its heaviest place is a
  * guess. */
-struct adaptive_summary adaptive_answer(const struct adaptive_held *h, struct nav_pose guess)
+struct nav_summary adaptive_answer(const struct adaptive_held *h, struct nav_pose guess)
 {
     if (!h->local)
         return from_global(h);
-    struct adaptive_summary local = adaptive_cloud_summary(h->local, guess);
+    struct nav_summary local = nav_particles_summary(h->local, h->bins, guess);
     if (h->global && h->share > 0.5 && h->share * h->global->summary.near > (1.0 - h->share) * local.near)
         return from_global(h);
     return from_local(h, local);

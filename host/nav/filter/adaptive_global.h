@@ -7,9 +7,9 @@
 #ifndef NAV_ADAPTIVE_GLOBAL_H
 #define NAV_ADAPTIVE_GLOBAL_H
 
-#include "adaptive_cloud.h"
 #include "adaptive_log.h"
 #include "expected.h"
+#include "particles.h"
 #include "slices.h"
 
 /* Cells begin .. end - 1 of a line, whole lanes of them (lattice_rows.h); empty: both 0. */
@@ -67,17 +67,17 @@ struct adaptive_global {
     float *value;                  /* [signatures] likelihood in the present job, negative: not yet worked out */
     uint32_t *known, knowns;       /* those worked out */
     struct adaptive_job job;
-    bool fresh;                      /* uniform, and not yet written out */
-    double log_free;                 /* logarithm of the share of cells where the robot can stand */
-    uint64_t next;                   /* first row of the log that it has not seen */
-    double total;                    /* mass */
-    size_t mode;                     /* stored cell with the most mass */
-    double gained;                   /* log-likelihood of the rows seen, less the local belief's, since the restart */
-    struct adaptive_summary summary; /* at row `next` - 1 */
-    double room;                     /* hypotheses that a cloud could hold */
-    double scattered;                /* share of mass in cells worth less than one of them */
-    double crowd;                    /* cells that are worth more */
-    long touched, distinct;          /* since they were last cleared */
+    bool fresh;                 /* uniform, and not yet written out */
+    double log_free;            /* logarithm of the share of cells where the robot can stand */
+    uint64_t next;              /* first row of the log that it has not seen */
+    double total;               /* mass */
+    size_t mode;                /* stored cell with the most mass */
+    double gained;              /* log-likelihood of the rows seen, less the local belief's, since the restart */
+    struct nav_summary summary; /* at row `next` - 1 */
+    double room;                /* hypotheses that a cloud could hold */
+    double scattered;           /* share of mass in cells worth less than one of them */
+    double crowd;               /* cells that are worth more */
+    long touched, distinct;     /* since they were last cleared */
 };
 
 /* 0, or -1 without memory; adaptive_global_free either way. */
@@ -96,12 +96,12 @@ void adaptive_global_work(struct adaptive_global *, struct adaptive_log *, long 
 /* Whether every row of the log has been seen. */
 bool adaptive_global_current(const struct adaptive_global *, const struct adaptive_log *);
 
-/* Adds about `count` hypotheses drawn from the belief, of weight `weight` together, moved by `moved`. */
-void adaptive_global_draw(struct adaptive_global *, struct adaptive_cloud *, long count, double weight,
+/* Adds about `count` particles drawn from the belief, of weight `weight` together, moved by `moved`. */
+void adaptive_global_draw(struct adaptive_global *, struct nav_particles *, struct nav_rng *, long count, double weight,
                           struct nav_pose moved);
 
 /* Share of the belief that belongs to each mode, between jobs: a cell belongs to the mode that it is nearest to. */
-void adaptive_global_share(const struct adaptive_global *, const struct adaptive_mode *, int modes, double *share);
+void adaptive_global_share(const struct adaptive_global *, const struct nav_mode *, int modes, double *share);
 
 /* Adds to the cell that holds a pose, between jobs: `share` of what all cells hold. The total stays what it was. */
 void adaptive_global_add(struct adaptive_global *, struct nav_pose, double share);

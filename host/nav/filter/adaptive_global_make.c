@@ -158,7 +158,7 @@ void adaptive_global_restart(struct adaptive_global *g, uint64_t row)
     const struct nav_arena *arena = &g->problem->arena;
     struct nav_problem lost = *g->problem;
     lost.prior.uniform = true;
-    g->summary = (struct adaptive_summary){.belief = nav_gaussian_prior(&lost)};
+    g->summary = (struct nav_summary){.belief = nav_gaussian_prior(&lost)};
     g->summary.near = NAV_PI * NAV_NEAR_M * NAV_NEAR_M / (arena->size_x * arena->size_y) * NAV_NEAR_RAD / NAV_PI;
 }
 
@@ -170,9 +170,15 @@ void adaptive_global_clear(struct adaptive_global *g, uint64_t row)
     memset(g->span, 0, (size_t)g->nh * (size_t)g->ny * sizeof *g->span);
 }
 
+/* Most hypotheses: adaptive.most, and a tenth of the budget, since each may be touched up to five times per row. */
+static double adaptive_global_room(const struct nav_settings *s)
+{
+    return floor(fmax(fmin(s->adaptive_most, s->adaptive_budget / 10.0), 16.0));
+}
+
 int adaptive_global_init(struct adaptive_global *g, const struct nav_problem *problem)
 {
-    *g = (struct adaptive_global){.problem = problem, .room = (double)adaptive_cloud_room(&problem->settings)};
+    *g = (struct adaptive_global){.problem = problem, .room = adaptive_global_room(&problem->settings)};
     if (choose_cells(g))
         return -1;
     g->shift_x = calloc((size_t)g->nh, sizeof *g->shift_x);

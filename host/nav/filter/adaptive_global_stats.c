@@ -25,7 +25,7 @@ struct nav_slices adaptive_global_slices(const struct adaptive_global *g)
 void adaptive_global_summarise(struct adaptive_global *g)
 {
     const struct nav_slices slices = adaptive_global_slices(g);
-    g->summary = (struct adaptive_summary){.near = 0.0};
+    g->summary = (struct nav_summary){.near = 0.0};
     double near = nav_slices_summarise(&slices, nav_slices_centre(&slices, g->mode), &g->summary.belief);
     g->summary.near = fmin(near / g->total, 1.0);
 }
@@ -60,12 +60,12 @@ long adaptive_global_count(struct adaptive_global *g, int p, long most)
 }
 
 /* Adds a cell's mass to the mode that it is nearest to. */
-static void share_cell(const struct adaptive_mode *mode, int modes, struct nav_pose at, double mass, double *share)
+static void share_cell(const struct nav_mode *mode, int modes, struct nav_pose at, double mass, double *share)
 {
-    double least = ADAPTIVE_MODE_REACH;
+    double least = NAV_MODE_REACH;
     int nearest = -1;
     for (int m = 0; m < modes; m++) {
-        double far = adaptive_mode_distance(mode[m].mean, at);
+        double far = nav_mode_distance(mode[m].mean, at);
         if (far > least)
             continue;
         least = far;
@@ -75,7 +75,7 @@ static void share_cell(const struct adaptive_mode *mode, int modes, struct nav_p
         share[nearest] += mass;
 }
 
-void adaptive_global_share(const struct adaptive_global *g, const struct adaptive_mode *mode, int modes, double *share)
+void adaptive_global_share(const struct adaptive_global *g, const struct nav_mode *mode, int modes, double *share)
 {
     memset(share, 0, (size_t)modes * sizeof *share);
     for (int p = 0; p < g->nh; p++) {
@@ -112,10 +112,10 @@ static struct nav_pose within_cell(const struct adaptive_global *g, struct nav_p
                              centre.theta + g->cell_theta * (nav_rng_uniform(rng) - 0.5)};
 }
 
-void adaptive_global_draw(struct adaptive_global *g, struct adaptive_cloud *cloud, long count, double weight,
-                          struct nav_pose moved)
+void adaptive_global_draw(struct adaptive_global *g, struct nav_particles *to, struct nav_rng *rng, long count,
+                          double weight, struct nav_pose moved)
 {
-    double step = g->total / (double)count, mark = step * nav_rng_uniform(&cloud->rng), sum = 0.0;
+    double step = g->total / (double)count, mark = step * nav_rng_uniform(rng), sum = 0.0;
     const struct nav_slices slices = adaptive_global_slices(g);
     for (size_t n = 0; n < adaptive_global_stored(g); n++) {
         size_t line = n / (size_t)g->pitch;
@@ -128,6 +128,6 @@ void adaptive_global_draw(struct adaptive_global *g, struct adaptive_cloud *clou
             continue;
         struct nav_pose centre = nav_slices_centre(&slices, n);
         for (; mark < sum; mark += step)
-            adaptive_cloud_add(cloud, nav_compose(within_cell(g, centre, &cloud->rng), moved), weight / (double)count);
+            nav_particles_add(to, nav_compose(within_cell(g, centre, rng), moved), weight / (double)count, rng);
     }
 }

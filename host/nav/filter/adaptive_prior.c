@@ -5,8 +5,6 @@
 
 #include "adaptive_global_parts.h"
 
-enum { TRIES = 20 }; /* draws that may miss free space for each hypothesis */
-
 /* Mass, its sums and the heaviest cell of slice p. */
 static void sum_slice(struct adaptive_global *g, const struct nav_slices *slices, int p, double *squares)
 {
@@ -24,8 +22,7 @@ static void sum_slice(struct adaptive_global *g, const struct nav_slices *slices
     g->total += m[0];
 }
 
-/* Writes the mixture out. Returns how many equal cells it is worth. */
-static double fill(struct adaptive_global *g)
+double adaptive_global_fill(struct adaptive_global *g)
 {
     double squares = 0.0;
     g->job.about = (struct nav_pose){0.0, 0.0, 0.0};
@@ -40,26 +37,4 @@ static double fill(struct adaptive_global *g)
     g->fresh = false;
     adaptive_global_summarise(g);
     return g->total * g->total / squares;
-}
-
-static void draw(struct adaptive_cloud *cloud, const struct nav_likelihood *l)
-{
-    cloud->count = 0;
-    for (long n = 0; n < cloud->room * TRIES && cloud->count < cloud->room; n++) {
-        struct nav_pose pose = nav_bumps_draw(&cloud->problem->prior, &cloud->rng);
-        adaptive_cloud_place(cloud, l, pose);
-    }
-    adaptive_cloud_scale(cloud, 1.0 / fmax((double)cloud->count, 1.0));
-    adaptive_cloud_thin(cloud, true);
-}
-
-bool adaptive_prior_cloud(struct adaptive_cloud *cloud, const struct nav_likelihood *l, struct adaptive_global *g)
-{
-    if (fill(g) * cloud->problem->settings.adaptive_per_bin > (double)cloud->room)
-        return false;
-    draw(cloud, l);
-    if (cloud->count == 0)
-        return false;
-    adaptive_global_restart(g, 0);
-    return true;
 }

@@ -24,15 +24,13 @@ static const double PENDING_MOST_M = 0.05, PENDING_MOST_RAD = 0.2;
 struct particle {
     const struct nav_problem *problem;
     struct nav_likelihood *likelihood;
-    struct nav_particles cloud, spare;
+    struct nav_particles cloud;
     struct nav_bins bins;
     struct nav_rng rng;
-    float *scratch; /* [room] */
-    long least, most;
+    struct nav_sample sample;
     double slow, fast; /* averages of the mean weight; negative before the first row */
     struct nav_pending pending;
-    struct nav_gaussian summary;
-    double confidence;
+    struct nav_summary summary;
     long weighed, moved; /* for the last row */
 };
 
@@ -41,47 +39,14 @@ static void destroy(void *self)
     struct particle *f = self;
     nav_likelihood_free(f->likelihood);
     nav_particles_free(&f->cloud);
-    nav_particles_free(&f->spare);
     nav_bins_free(&f->bins);
-    free(f->scratch);
     free(f);
 }
 
-/* Mean near the heaviest part, covariance of the whole about it. */
+/* Mean near the last one or near the heaviest part; covariance of the whole about it. */
 static void summarise(struct particle *f)
 {
-    struct nav_pose centre = nav_particles_mean(&f->cloud), mean;
-    if (nav_particles_near(&f->cloud, centre, &mean) < 0.5) {
-        nav_bins_fill(&f->bins, &f->cloud);
-        centre = nav_bins_mode(&f->bins);
-        nav_particles_near(&f->cloud, centre, &mean);
-        centre = mean;
-    }
-    f->confidence = fmin(nav_particles_near(&f->cloud, centre, &mean), 1.0);
-    f->summary.mean = mean;
-    nav_particles_covariance(&f->cloud, mean, f->summary.covariance);
-}
-
-/* How many of them to keep when a share `fresh` is drawn from anywhere. */
-static long needed(struct particle *f, double fresh)
-{
-    if (f->least == f->most)
-        return f->most;
-    nav_bins_fill(&f->bins, &f->cloud);
-    return nav_bins_needed(&f->bins, f->problem->settings.particle_error, fresh, f->least, f->most);
-}
-
-static void begin(struct particle *f)
-{
-    f->cloud.count = f->most;
-    for (long i = 0; i < f->most; i++) {
-        nav_particles_set(&f->cloud, i, nav_particles_draw(f->likelihood, &f->problem->prior, &f->rng));
-        f->cloud.weight[i] = 1.0f / (float)f->most;
-    }
-    f->cloud.count = needed(f, 0.0); /* drawn independently, the first few do as well as any */
-    for (long i = 0; i < f->cloud.count; i++)
-        f->cloud.weight[i] = 1.0f / (float)f->cloud.count;
-    summarise(f);
+    f->summary = nav_particles_summary(&f->cloud, &f->bins, f->summary.belief.mean);
 }
 
 static void *create(const struct nav_problem *problem)
@@ -91,23 +56,26 @@ static void *create(const struct nav_problem *problem)
     if (!f)
         return NULL;
     *f = (struct particle){.problem = problem, .slow = -1.0, .fast = -1.0};
-    f->most = (long)fmax(s->particle_count > 0.0 ? s->particle_count : s->particle_most, 2.0);
-    f->least = s->particle_count > 0.0 ? f->most : (long)fmin(s->particle_least, s->particle_most);
+    f->sample.error = s->particle_error;
+    f->sample.most = (long)fmax(s->particle_count > 0.0 ? s->particle_count : s->particle_most, 2.0);
+    f->sample.least = s->particle_count > 0.0 ? f->sample.most : (long)fmin(s->particle_least, s->particle_most);
     nav_rng_seed(&f->rng, problem->seed, 0);
-    f->scratch = calloc((size_t)f->most, sizeof *f->scratch);
     f->likelihood = nav_likelihood_new(&problem->arena, &problem->robot, s, 0.0);
-    if (!f->likelihood || nav_particles_init(&f->cloud, f->most) || nav_particles_init(&f->spare, f->most) ||
-        nav_bins_init(&f->bins, f->most, s->particle_bin_m, s->particle_bin_deg * NAV_PI / 180.0) || !f->scratch) {
+    if (!f->likelihood || nav_particles_init(&f->cloud, f->sample.most, false, 0.0) ||
+        nav_bins_init(&f->bins, f->sample.most, s->particle_bin_m, s->particle_bin_deg * NAV_PI / 180.0)) {
         destroy(f);
         return NULL;
     }
-    begin(f);
+    nav_particles_begin(&f->cloud, &f->bins, f->likelihood, &problem->prior, NAV_ANYWHERE, &f->rng, &f->sample);
+    f->summary.belief.mean = nav_particles_pose(&f->cloud, 0);
+    summarise(f);
     return f;
 }
 
 static void catch_up(struct particle *f)
 {
-    nav_particles_move(&f->cloud, f->pending.step, &f->pending.noise, &f->rng);
+    nav_particles_move(&f->cloud, f->pending.step, &f->pending.noise, true, &f->rng);
+    f->summary.belief.mean = nav_compose(f->summary.belief.mean, f->pending.step);
     f->pending = (struct nav_pending){.step = {0.0, 0.0, 0.0}};
     f->moved += f->cloud.count;
 }
@@ -144,7 +112,7 @@ static struct nav_pose draw_fresh(struct particle *f)
     const struct nav_prior anywhere = {.uniform = true};
     struct nav_pose pose;
     for (int n = 0; n < CANDIDATES; n++) {
-        pose = nav_particles_draw(f->likelihood, &anywhere, &f->rng);
+        nav_particles_draw(f->likelihood, &anywhere, 1.0, &f->rng, &pose);
         double loglik = nav_likelihood_standing(f->likelihood,
                                                 &(struct nav_place){pose.x, pose.y, cos(pose.theta), sin(pose.theta)});
         f->weighed++;
@@ -156,11 +124,9 @@ static struct nav_pose draw_fresh(struct particle *f)
 
 static void resample(struct particle *f, double fresh)
 {
-    long count = needed(f, fresh);
-    nav_particles_resample(&f->cloud, &f->spare, count, nav_rng_uniform(&f->rng));
-    struct nav_particles drawn = f->spare;
-    f->spare = f->cloud;
-    f->cloud = drawn;
+    nav_bins_fill(&f->bins, &f->cloud);
+    long count = nav_bins_needed(&f->bins, &f->sample, fresh);
+    nav_particles_resample(&f->cloud, count, nav_rng_uniform(&f->rng));
     /* Every k-th particle gives way, so that what is drawn in order of the old cloud loses the same share throughout.
      */
     double step = fresh > 0.0 ? 1.0 / fresh : INFINITY;
@@ -176,7 +142,8 @@ static void update(void *self, const struct nav_evidence *evidence)
     catch_up(f);
     nav_likelihood_read(f->likelihood, evidence);
     f->weighed = f->cloud.count;
-    double fresh = decline(f, nav_particles_weigh(&f->cloud, f->likelihood, f->scratch));
+    double mean = exp(nav_particles_weigh(&f->cloud, f->likelihood, -1.0) - f->likelihood->ceiling);
+    double fresh = decline(f, mean);
     bool uneven = nav_particles_effective(&f->cloud) < s->particle_resample * (double)f->cloud.count;
     summarise(f);
     if (uneven || fresh > 0.0)
@@ -186,43 +153,24 @@ static void update(void *self, const struct nav_evidence *evidence)
 static void estimate(const void *self, struct nav_estimate *out)
 {
     const struct particle *f = self;
-    struct nav_gaussian now = f->summary;
+    struct nav_gaussian now = f->summary.belief;
     /* Fewer particles than dimensions have a flat covariance; nobody knows the pose better than a millimetre. */
     now.covariance[0] += 1e-6;
     now.covariance[4] += 1e-6;
     now.covariance[8] += 1e-6;
     nav_gaussian_ahead(&now, &f->pending, out);
-    out->confidence = f->confidence;
+    out->confidence = f->summary.near;
     out->evaluations = out->distinct = f->weighed;
     out->touched = f->weighed + f->moved;
     out->states = f->cloud.count;
-    out->bytes = sizeof *f + 11 * (size_t)f->most * sizeof(float) + nav_bins_bytes(&f->bins) +
-                 nav_likelihood_bytes(f->likelihood);
-}
-
-/* Width of one particle's bump: Silverman's rule, n^(-1/7) in three dimensions, for the part near the estimate. */
-static double bump(double variance, double count, double least, double most)
-{
-    return fmin(fmax(sqrt(variance) * pow(count, -1.0 / 7.0), least), most);
+    out->bytes =
+        sizeof *f + nav_particles_bytes(&f->cloud) + nav_bins_bytes(&f->bins) + nav_likelihood_bytes(f->likelihood);
 }
 
 static long components(const void *self, struct nav_component *out, long room)
 {
     const struct particle *f = self;
-    const struct nav_particles *p = &f->cloud;
-    const double *v = f->summary.covariance;
-    double count = fmax(nav_particles_effective(p), 1.0), total = 0.0;
-    double sigma_m = hypot(bump(fmin(v[0], v[4]), count, 0.003, 0.03), sqrt(f->pending.noise.position));
-    double sigma_rad = hypot(bump(v[8], count, 0.005, 0.1), sqrt(f->pending.noise.heading));
-    for (long i = 0; i < p->count; i++)
-        total += (double)p->weight[i];
-    for (long i = 0; i < p->count && i < room; i++) {
-        struct nav_pose at = {(double)p->x[i], (double)p->y[i], (double)atan2f(p->s[i], p->c[i])};
-        at = nav_compose(at, f->pending.step);
-        at.theta = nav_wrap(at.theta);
-        out[i] = (struct nav_component){at, sigma_m, sigma_rad, (double)p->weight[i] / total};
-    }
-    return p->count;
+    return nav_particles_components(&f->cloud, f->summary.belief.mean, &f->pending, 1.0, out, room);
 }
 
 const struct nav_filter_ops nav_particle_filter = {.name = "particle",

@@ -37,14 +37,14 @@ struct nav_settings {
     double particle_resample;      /* resamples when the effective share of the particles falls below this */
     double particle_recovery;      /* slow rate at which the mean weight is followed; 0: no recovery by injection */
     double particle_recovery_fast; /* fast rate */
-    double adaptive_budget;        /* most cells and hypotheses touched per row */
+    double adaptive_budget;        /* most cells and particles touched per row */
     double adaptive_detail_budget; /* the same where tiles are so small that cells below adaptive.cell_m are wanted */
-    double adaptive_most;          /* hypotheses in the cloud, at most */
+    double adaptive_most;          /* particles, at most */
     double adaptive_least;         /* and at least; between, by the bins they occupy: */
     double adaptive_per_bin;       /* so many in each */
     double adaptive_bin_m;         /* of this edge */
     double adaptive_bin_deg;       /* and this extent in heading */
-    double adaptive_gain;          /* spread of the hypotheses' odometry gains */
+    double adaptive_gain;          /* prior standard deviation of the odometry's gains */
     double adaptive_cell_m;        /* edge of the arena-wide histogram's cells; less on small tiles, more in large
                                       arenas */
     double adaptive_cell_deg;      /* and their extent in heading */

@@ -8,6 +8,7 @@ rows that are sure (confidence above 0.9) and wrong, and the CPU time of a row. 
 
 import argparse
 import math
+import textwrap
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from json import dumps, loads
@@ -26,7 +27,7 @@ from whisker.scenes.readings import World
 from whisker.scenes.walk import Pace
 
 ROOT = Path(__file__).resolve().parents[3]
-RESULT, DESIGNS = (ROOT / f"bench/results/nav_{name}.json" for name in ("unseen", "designs"))
+RESULT, DESIGNS, ABLATIONS = (ROOT / f"bench/results/nav_{name}.json" for name in ("unseen", "designs", "ablations"))
 PAGE = ROOT / "docs/results_nav_unseen.md"
 FIRST_SEED = 70_000
 ROWS = 600
@@ -254,7 +255,7 @@ def table(title: str, families: dict[str, dict]) -> list[str]:
 
 def totals(designs: dict[str, dict]) -> list[str]:
     """Rows of the page that compare designs on the same runs."""
-    lines = [f"| design | {COLUMNS} |", "|" + "---|" * (2 + COLUMNS.count("|"))]
+    lines = [f"| variant | {COLUMNS} |", "|" + "---|" * (2 + COLUMNS.count("|"))]
     for title, measured in designs.items():
         told = measured.values()
         locked, runs = (sum(r[key] for r in told) for key in ("locked", "runs"))
@@ -268,7 +269,12 @@ def totals(designs: dict[str, dict]) -> list[str]:
     return lines
 
 
-def page(unseen: dict, designs: dict) -> str:
+def names(designs: dict) -> list[str]:
+    """Lines that name the families and starts that designs were compared on."""
+    return textwrap.wrap("; ".join(sorted(next(iter(designs.values())))) + ".", 140)
+
+
+def page(unseen: dict, designs: dict, ablations: dict) -> str:
     """docs/results_nav_unseen.md."""
     lines = [
         "# Families that no filter was made for",
@@ -286,6 +292,13 @@ def page(unseen: dict, designs: dict) -> str:
         f"families {', '.join(sorted({name.split(',')[0] for name in next(iter(designs.values()))}))}.",
         "",
         *totals(designs),
+        "",
+        "## Mechanisms left out",
+        "",
+        "Each alone, in a build of its own: means over the same runs, none of which takes part in the table above, of",
+        *names(ablations),
+        "",
+        *totals(ablations),
     ]
     return "\n".join(lines) + "\n"
 
@@ -314,7 +327,7 @@ def run(
     measured = {"filter": filter, "settings": settings, "families": done}
     json.write_text(dumps(measured, indent=1) + "\n")
     if json == RESULT:
-        PAGE.write_text(page(measured, loads(DESIGNS.read_text())))
+        PAGE.write_text(page(measured, *(loads(file.read_text()) for file in (DESIGNS, ABLATIONS))))
 
 
 def options(parser: argparse.ArgumentParser) -> None:

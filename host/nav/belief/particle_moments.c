@@ -1,0 +1,133 @@
+/* What particles amount to: moments, modes, and the belief as a list. */
+#include <math.h>
+#include <string.h>
+
+#include "particles.h"
+
+static const double FINEST = 1e-3; /* m and rad, of a kernel: few particles may all be alike */
+
+/* Angle from one unit vector to another; a series does for what is near. */
+static float particles_angle(float c0, float s0, float c, float s)
+{
+    float across = c0 * s - s0 * c, along = c0 * c + s0 * s, square = across * across;
+    if (along > 0.9f)
+        return across * (1.0f + square * (1.0f / 6.0f + square * (3.0f / 40.0f)));
+    return atan2f(across, along);
+}
+
+/* Sums over particles of weight, offset from a pose and products of offsets: all of them, or those near it. */
+struct particle_sums {
+    double mass, first[3], second[6]; /* x y t; xx xy xt yy yt tt */
+};
+
+static struct particle_sums particles_sum(const struct nav_particles *p, struct nav_pose about, bool all)
+{
+    static const float NEAR_COSINE = 0.8775825619f; /* cos(NAV_NEAR_RAD) */
+    float c0 = (float)cos(about.theta), s0 = (float)sin(about.theta), x0 = (float)about.x, y0 = (float)about.y;
+    struct particle_sums sum = {.mass = 0.0};
+    for (long i = 0; i < p->count; i++) {
+        float x = p->x[i] - x0, y = p->y[i] - y0;
+        if (!all && (x * x + y * y > (float)(NAV_NEAR_M * NAV_NEAR_M) || c0 * p->c[i] + s0 * p->s[i] < NEAR_COSINE))
+            continue;
+        float t = particles_angle(c0, s0, p->c[i], p->s[i]), w = p->weight[i];
+        const float first[3] = {w * x, w * y, w * t};
+        const float second[6] = {w * x * x, w * x * y, w * x * t, w * y * y, w * y * t, w * t * t};
+        sum.mass += (double)w;
+        for (int k = 0; k < 3; k++)
+            sum.first[k] += (double)first[k];
+        for (int k = 0; k < 6; k++)
+            sum.second[k] += (double)second[k];
+    }
+    return sum;
+}
+
+double nav_particles_near(const struct nav_particles *p, struct nav_pose pose, struct nav_pose *mean)
+{
+    struct particle_sums sum = particles_sum(p, pose, false);
+    *mean = pose;
+    if (sum.mass > 0.0)
+        *mean = (struct nav_pose){pose.x + sum.first[0] / sum.mass, pose.y + sum.first[1] / sum.mass,
+                                  nav_wrap(pose.theta + sum.first[2] / sum.mass)};
+    return sum.mass;
+}
+
+void nav_particles_covariance(const struct nav_particles *p, struct nav_pose about, double covariance[9])
+{
+    static const int PLACE[9] = {0, 1, 2, 1, 3, 4, 2, 4, 5};
+    struct particle_sums sum = particles_sum(p, about, true);
+    for (int k = 0; k < 9; k++)
+        covariance[k] = sum.second[PLACE[k]];
+}
+
+int nav_particles_modes(struct nav_particles *p, struct nav_mode mode[NAV_MODES_MOST])
+{
+    int modes = 0;
+    for (long i = 0; i < p->count; i++)
+        p->mode[i] = -1.0f;
+    for (long i = 0; i < p->count && modes < NAV_MODES_MOST; i++) {
+        if (p->mode[i] >= 0.0f)
+            continue;
+        struct nav_mode *m = &mode[modes];
+        nav_particles_near(p, nav_particles_pose(p, i), &m->mean);
+        nav_particles_near(p, m->mean, &m->mean);
+        m->mass = 0.0;
+        for (long k = i; k < p->count; k++) {
+            bool within = k == i || nav_mode_distance(m->mean, nav_particles_pose(p, k)) <= NAV_MODE_REACH;
+            if (p->mode[k] >= 0.0f || !within)
+                continue;
+            p->mode[k] = (float)modes;
+            m->mass += (double)p->weight[k];
+        }
+        modes++;
+    }
+    return modes;
+}
+
+void nav_particles_masses(const struct nav_particles *p, double *mass, int modes)
+{
+    memset(mass, 0, (size_t)modes * sizeof *mass);
+    for (long i = 0; i < p->count; i++) {
+        int mode = (int)p->mode[i];
+        if (mode >= 0 && mode < modes)
+            mass[mode] += (double)p->weight[i];
+    }
+}
+
+void nav_particles_weigh_modes(struct nav_particles *p, const double *factor, int modes)
+{
+    double total = 0.0;
+    for (long i = 0; i < p->count; i++) {
+        int mode = (int)p->mode[i];
+        p->weight[i] *= mode >= 0 && mode < modes ? (float)factor[mode] : 1.0f;
+        total += (double)p->weight[i];
+    }
+    nav_particles_scale(p, 1.0 / total);
+}
+
+long nav_particles_components(const struct nav_particles *p, struct nav_pose about, const struct nav_pending *pending,
+                              double mass, struct nav_component *out, long room)
+{
+    /* Width of the kernel of one particle: the normal reference rule, on what is near. */
+    struct nav_pose mean;
+    nav_particles_near(p, about, &mean);
+    struct particle_sums sum = particles_sum(p, mean, false);
+    double shrink = pow((double)p->count, -1.0 / 6.0) / sqrt(fmax(sum.mass, 1e-12)), total = 0.0;
+    struct nav_component each = {.sigma_m = shrink * sqrt((sum.second[0] + sum.second[3]) / 2.0),
+                                 .sigma_rad = shrink * sqrt(sum.second[5])};
+    each.sigma_m = hypot(fmax(each.sigma_m, FINEST), sqrt(pending->noise.position));
+    each.sigma_rad = hypot(fmax(each.sigma_rad, FINEST), sqrt(pending->noise.heading));
+    for (long i = 0; i < p->count; i++)
+        total += (double)p->weight[i];
+    long count = 0;
+    for (long i = 0; i < p->count; i++) {
+        each.mass = mass * (double)p->weight[i] / total;
+        if (!(each.mass > 0.0))
+            continue;
+        each.pose = nav_compose(nav_particles_pose(p, i), pending->step);
+        each.pose.theta = nav_wrap(each.pose.theta);
+        if (count < room)
+            out[count] = each;
+        count++;
+    }
+    return count;
+}
