@@ -19,6 +19,7 @@ ROOT = Path(__file__).resolve().parents[2]
 TOPICS = {  # topic -> module, by room
     "bridge": "bridge.bench",
     "chain": "bridge.chain",
+    "contact": "contact.bench",
     "damage": "host.damage",
     "host": "host.bench",
     "image": "node.image",

@@ -33,6 +33,8 @@ HEADERS = {
             "touch/radial.h",
             "touch/radial_whisk.h",
             "touch/contact_surface.h",
+            "touch/contact_beam.h",
+            "touch/contact_filter.h",
             "touch/texture.h",
             "touch/texture_slide.h",
             "touch/texture_features.h",

@@ -1,0 +1,233 @@
+#include "contact_filter.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "contact_bank.h"
+
+#define STUCK_SAMPLES 40  /* equal in both axes in a row: 20 ms at 2 kHz */
+#define LEAST_SIGNAL 4.0  /* standard deviations of a block's mean from which a contact has a side */
+#define PLANE_SD 0.5      /* of the second axis' tilt over the first's, before anything is seen */
+#define PLANE_DRIFT 1e-5  /* variance a block adds: the contact moves */
+#define PLANE_SHARE 0.003 /* error of either axis, share of the tilt */
+
+void nav_contact_filter_init(struct nav_contact_filter *f, const struct nav_contact_filter_config *config,
+                             const struct nav_contact_beam *beam)
+{
+    memset(f, 0, sizeof *f);
+    f->config = *config;
+    f->beam = beam;
+    nav_contact_filter_begin(f);
+}
+
+void nav_contact_filter_begin(struct nav_contact_filter *f)
+{
+    f->parts = f->filled = f->seen = f->equal = f->updates = 0;
+    f->side = f->turned_m = f->driven_m = 0.0;
+    f->last[0] = f->last[1] = NAN;
+    f->plane = 0.0;
+    f->plane_variance = PLANE_SD * PLANE_SD;
+    memset(f->moved, 0, sizeof f->moved);
+    memset(f->ahead, 0, sizeof f->ahead);
+    memset(f->tilt, 0, sizeof f->tilt);
+}
+
+/* Whether a sample can be read; counts why not. */
+static bool filter_reads(struct nav_contact_filter *f, const double tilt[2], bool good)
+{
+    if (!good || !isfinite(tilt[0]) || !isfinite(tilt[1])) {
+        f->bad++;
+        return false;
+    }
+    if (fabs(tilt[0]) > f->config.largest_rad || fabs(tilt[1]) > f->config.largest_rad) {
+        f->saturated++;
+        return false;
+    }
+    f->equal = tilt[0] == f->last[0] && tilt[1] == f->last[1] ? f->equal + 1 : 0;
+    memcpy(f->last, tilt, sizeof f->last);
+    if (f->equal < STUCK_SAMPLES)
+        return true;
+    f->stuck++;
+    return false;
+}
+
+static void filter_plane(struct nav_contact_filter *f, const double mean[2], double variance)
+{
+    double square = mean[0] * mean[0];
+    double noise = (variance * (1.0 + f->plane * f->plane)) / square + PLANE_SHARE * PLANE_SHARE;
+    f->plane_variance += PLANE_DRIFT;
+    double gain = f->plane_variance / (f->plane_variance + noise);
+    f->plane += gain * (mean[1] / mean[0] - f->plane);
+    f->plane_variance *= 1.0 - gain;
+}
+
+/* An update by the block's mean; what was not read moves the contact all the same. */
+static void filter_block(struct nav_contact_filter *f)
+{
+    double variance = f->config.noise_rad * f->config.noise_rad / (f->seen > 0 ? f->seen : 1), mean[2];
+    for (int k = 0; k < 2; k++)
+        mean[k] = f->seen > 0 ? f->tilt[k] / f->seen : NAN;
+    if (f->parts == 0 && !(fabs(mean[0]) > LEAST_SIGNAL * sqrt(variance)))
+        return;
+    if (f->parts == 0)
+        f->side = mean[0] < 0.0 ? -1.0 : 1.0;
+    struct nav_contact_step step = {{f->moved[0], f->side * f->moved[1]},
+                                    f->side * f->moved[2],
+                                    f->config.sample_s * f->config.block,
+                                    f->side * mean[0],
+                                    variance};
+    if (f->parts == 0) {
+        nav_contact_bank_begin(f, &step);
+    } else {
+        nav_contact_bank_step(f, &step);
+        if (f->parts == 0) {
+            f->restarts++;
+            f->side = mean[0] < 0.0 ? -1.0 : 1.0;
+            step.tilt = fabs(mean[0]);
+            nav_contact_bank_begin(f, &step);
+        }
+    }
+    if (f->seen > 0 && fabs(mean[0]) > LEAST_SIGNAL * sqrt(variance))
+        filter_plane(f, mean, variance);
+}
+
+bool nav_contact_filter_update(struct nav_contact_filter *f, const double base[3], const double tilt[2], bool good)
+{
+    if (f->filled == f->config.block / 2) { /* the block's mean tilt is that of its middle */
+        memcpy(f->moved, f->ahead, sizeof f->moved);
+        memset(f->ahead, 0, sizeof f->ahead);
+    }
+    if (isfinite(base[0]) && isfinite(base[1]) && isfinite(base[2]))
+        for (int k = 0; k < 3; k++)
+            f->ahead[k] += base[k] * f->config.sample_s;
+    if (filter_reads(f, tilt, good)) {
+        f->tilt[0] += tilt[0];
+        f->tilt[1] += tilt[1];
+        f->seen++;
+    }
+    if (++f->filled < f->config.block)
+        return false;
+    filter_block(f);
+    memset(f->tilt, 0, sizeof f->tilt);
+    f->filled = f->seen = 0;
+    if (++f->updates < f->config.report)
+        return false;
+    f->updates = 0;
+    nav_contact_bank_tidy(f);
+    return true;
+}
+
+size_t nav_contact_filter_run(struct nav_contact_filter *f, const double *bases, const double *tilts,
+                              const uint8_t *good, size_t n, struct nav_contact_answer *reports, double *middles,
+                              size_t most)
+{
+    size_t made = 0;
+    for (size_t i = 0; i < n; i++) {
+        if (!nav_contact_filter_update(f, bases + 3 * i, tilts + 2 * i, good[i] != 0) || made >= most)
+            continue;
+        nav_contact_filter_answer(f, &reports[made]);
+        middles[made++] = (double)i - f->config.block + f->config.block / 2;
+    }
+    return made;
+}
+
+/* Sums over the hypotheses: mean and second moments. */
+struct mean_of {
+    double weight, mean[2], square[2][2];
+};
+
+static void filter_add(struct mean_of *m, double weight, const double value[2], double cov[2][2])
+{
+    m->weight += weight;
+    for (int i = 0; i < 2; i++) {
+        m->mean[i] += weight * value[i];
+        for (int j = 0; j < 2; j++)
+            m->square[i][j] += weight * (cov[i][j] + value[i] * value[j]);
+    }
+}
+
+static void filter_mean(const struct mean_of *m, double mean[2], double cov[2][2])
+{
+    double w = m->weight > 0.0 ? m->weight : 1.0;
+    for (int i = 0; i < 2; i++)
+        mean[i] = m->mean[i] / w;
+    for (int i = 0; i < 2; i++)
+        for (int j = 0; j < 2; j++)
+            cov[i][j] = m->square[i][j] / w - mean[i] * mean[j];
+}
+
+/* As filter_add, of two numbers that are not correlated. */
+static void filter_add_pair(struct mean_of *m, double weight, double a, double a_var, double b, double b_var)
+{
+    double value[2] = {a, b}, cov[2][2] = {{a_var, 0.0}, {0.0, b_var}};
+    filter_add(m, weight, value, cov);
+}
+
+/* Undoes the mirror of a contact on the other side. */
+static void filter_mirror(struct nav_contact_answer *a, double side)
+{
+    a->point[1] *= side;
+    a->point_cov[0][1] *= side;
+    a->point_cov[1][0] *= side;
+    a->velocity[1] *= side;
+    a->velocity_cov[0][1] *= side;
+    a->velocity_cov[1][0] *= side;
+    a->normal_rad *= side;
+}
+
+static void filter_speed(const struct mean_of *moving, struct nav_contact_answer *a)
+{
+    double mean[2], cov[2][2];
+    filter_mean(moving, mean, cov);
+    a->speed = hypot(mean[0], mean[1]);
+    double x = a->speed > 0.0 ? mean[0] / a->speed : 1.0, y = a->speed > 0.0 ? mean[1] / a->speed : 0.0;
+    a->speed_sd = sqrt(x * x * cov[0][0] + 2.0 * x * y * cov[0][1] + y * y * cov[1][1]);
+}
+
+static void filter_motion(const struct nav_contact_filter *f, struct nav_contact_answer *a)
+{
+    a->motion = f->turned_m > f->driven_m ? NAV_CONTACT_BODY_WHISK : NAV_CONTACT_DRIVE_BY;
+    if (a->sweep > 0.5)
+        a->motion = NAV_CONTACT_SWEEP;
+}
+
+void nav_contact_filter_answer(const struct nav_contact_filter *f, struct nav_contact_answer *a)
+{
+    struct mean_of point = {0}, velocity = {0}, moving = {0}, turn = {0}, grip = {0};
+    memset(a, 0, sizeof *a);
+    a->parts = f->parts;
+    if (f->parts == 0)
+        return;
+    for (int i = 0; i < f->parts; i++) {
+        const struct nav_contact_part *part = &f->part[i];
+        struct nav_contact_seen s;
+        nav_contact_bank_see(f, part, &s);
+        double w = exp(part->log_weight);
+        filter_add(&point, w, s.point, s.point_cov);
+        filter_add(&velocity, w, s.velocity, s.velocity_cov);
+        if (part->moving)
+            filter_add(&moving, w, s.velocity, s.velocity_cov);
+        filter_add_pair(&turn, w, s.normal, s.normal_var, s.arc, s.arc_var);
+        filter_add_pair(&grip, w, s.friction, s.friction_var, 0.0, 0.0);
+        a->sweep += w * part->moving;
+        a->corner += w * s.corner;
+        a->tip += w * part->tip;
+        a->slip += w * part->slips;
+    }
+    double mean[2], cov[2][2];
+    filter_mean(&point, a->point, a->point_cov);
+    filter_mean(&velocity, a->velocity, a->velocity_cov);
+    filter_mean(&turn, mean, cov);
+    a->normal_rad = mean[0];
+    a->normal_sd = sqrt(cov[0][0]);
+    a->arc_m = mean[1];
+    a->arc_sd_m = sqrt(cov[1][1]);
+    filter_mean(&grip, mean, cov);
+    a->friction = mean[0];
+    a->friction_sd = sqrt(cov[0][0]);
+    a->plane_rad = atan(f->plane);
+    a->plane_sd = sqrt(f->plane_variance) / (1.0 + f->plane * f->plane);
+    filter_speed(&moving, a);
+    filter_motion(f, a);
+    filter_mirror(a, f->side);
+}

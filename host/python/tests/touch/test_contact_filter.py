@@ -1,0 +1,76 @@
+"""The contact filter in contacts that sim/mechanics bends, vibration and all. Its parts: host/nav/tests/test_contact_filter.c."""
+
+import numpy as np
+import pytest
+
+from signals.mechanics import LARGE, VIBRATION, Whisker, touch
+from whisker.touch.contact_filter import ContactFilter
+
+TICK_S = 5e-4
+
+
+def swept(radius_m: float, ticks: int = 500, side: int = 1) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A corner passed at 0.1 m/s: motion of the base (n, 3), tilt (n, 2) with noise, place of the corner (n, 2)."""
+    bases = np.tile([0.0, -0.1 * side, 0.0], (ticks, 1))
+    y = 0.1 * TICK_S * np.arange(1, ticks + 1)
+    felt = touch(Whisker(), np.hypot(radius_m, y), side * np.arctan2(y, radius_m), seed=1, level=LARGE | VIBRATION)
+    noise = np.random.default_rng(1).normal(0.0, 2e-4, (ticks, 2))
+    return bases, felt.tilt_rad + noise, np.column_stack([np.full(ticks, radius_m), side * y])
+
+
+@pytest.mark.parametrize(("radius_m", "side"), [(0.08, 1), (0.11, -1), (0.12, 1)])
+def test_a_corner_is_placed_within_a_millimetre_while_it_is_swept(radius_m, side):
+    bases, tilts, places = swept(radius_m, side=side)
+    told = ContactFilter().run(bases, tilts)
+    late = told.sample > 200
+    off = told.point[late] - places[told.sample[late]]
+    assert np.sqrt(np.mean(np.sum(off**2, axis=1))) < 1e-3
+    far = np.einsum("ki,kij,kj->k", off, np.linalg.inv(told.point_cov[late]), off)
+    assert far.max() < 9.2  # all inside the 99 % region
+    assert set(np.array(told.motion)[late]) == {"drive-by"}
+    assert told.corner[-1] > 0.5
+    assert told.sweep[-1] < 0.05
+    assert abs(told.plane_rad[-1]) < 3 * told.plane_sd[-1]
+
+
+def test_reports_come_every_20_ms_and_lost_samples_are_counted():
+    bases, tilts, places = swept(0.1)
+    tilts[::5] = np.nan
+    held = ContactFilter()
+    told = held.run(bases, tilts, good=np.arange(len(tilts)) % 7 > 0)
+    assert set(np.diff(told.sample)) == {40}
+    assert held.not_read == {"bad": 100 + 57, "stuck": 0, "saturated": 0, "restarts": 0}
+    assert np.hypot(*(told.point[-1] - places[told.sample[-1]])) < 2e-3
+
+
+def test_a_whisker_at_rest_gives_no_report_and_a_new_contact_forgets_the_last():
+    held = ContactFilter()
+    noise = np.random.default_rng(2).normal(0.0, 2e-4, (400, 2))
+    assert len(held.run(np.zeros((400, 3)), noise).sample) == 0
+    bases, tilts, places = swept(0.12)
+    held.run(bases, tilts)
+    held.begin()
+    bases, tilts, places = swept(0.08)
+    told = held.run(bases, tilts)
+    assert np.hypot(*(told.point[-1] - places[told.sample[-1]])) < 1e-3
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"speed": 1.0}, "speed: no setting of the contact filter; use one of cone_m"),
+        ({"noise_rad": np.nan}, "noise_rad: nan; give a number above 0"),
+        ({"kappa": 0.0}, "kappa: 0.0; give a number above 0"),
+        ({"block": 0}, "block: 0; give a number of at least 1"),
+        ({"cone_m": 0.1}, "length_m 0.14, cone_m 0.1: no whisker"),
+        ({"friction": 0.9}, "friction: 0.9; give 0 to 0.5"),
+    ],
+)
+def test_a_setting_out_of_range_is_named(settings, message):
+    with pytest.raises(ValueError, match=message):
+        ContactFilter(**settings)
+
+
+def test_arrays_of_other_shapes_are_named():
+    with pytest.raises(ValueError, match=r"tilts: shape \(3, 2\); give shape \(4, 2\)"):
+        ContactFilter().run(np.zeros((4, 3)), np.zeros((3, 2)))

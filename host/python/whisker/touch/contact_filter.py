@@ -1,0 +1,152 @@
+"""A contact followed through time: where, at which normal, sliding or not, and whether the object moves (contact_filter.h)."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..native import as_doubles, doubles, ffi, lib, octets
+
+# The CrunchBot's whisker; a calibration's kappa and cone replace them.
+LENGTH_M, CONE_M, KAPPA = 0.140, 0.181739, 1.0
+SETTINGS = {
+    "cone_m": CONE_M,
+    "kappa": KAPPA,
+    "creep": 0.075,
+    "creep_s": 0.5,
+    "noise_rad": 2.0e-4,  # 0.03 degrees of field at 2.75 of field per tilt
+    "largest_rad": 0.25,
+    "gain_sd": 0.01,
+    "friction": 0.3,
+    "friction_sd": 0.05,
+    "motion_share": 0.01,
+    "ring_hz": 45.0,
+    "ring_damping": 0.1,
+    "speed_sd": 0.15,
+    "speed_drift": 0.005,
+    "moving": 0.1,
+    "sample_s": 5e-4,
+    "block": 20,
+    "report": 2,
+}
+POSITIVE = ("cone_m", "kappa", "creep_s", "noise_rad", "largest_rad", "ring_hz", "sample_s")
+LIMITS = {"friction": 0.5, "moving": 1.0}
+MOTIONS = ("body whisk", "drive-by", "sweep")
+SCALARS = ("arc_m", "arc_sd_m", "plane_rad", "plane_sd", "normal_rad", "normal_sd", "speed", "speed_sd")
+SHARES = ("sweep", "corner", "tip", "slip", "friction", "friction_sd")
+
+
+class Reports(NamedTuple):
+    """What is known in the middle of each report's last block; arrays over k reports, lengths m, angles rad, speeds m/s.
+
+    Whisker's frame: origin at the follicle's exit, x along the unbent whisker, y where axis 0 tilts.
+    """
+
+    sample: np.ndarray  # (k,) index of the sample each is of
+    point: np.ndarray  # (k, 2)
+    point_cov: np.ndarray  # (k, 2, 2)
+    velocity: np.ndarray  # (k, 2) of the object
+    velocity_cov: np.ndarray  # (k, 2, 2)
+    motion: list[str]  # of MOTIONS
+    arc_m: np.ndarray  # (k,) along the shaft
+    arc_sd_m: np.ndarray
+    plane_rad: np.ndarray  # of the bending about the whisker
+    plane_sd: np.ndarray
+    normal_rad: np.ndarray  # the surface's outward normal
+    normal_sd: np.ndarray
+    speed: np.ndarray  # of the object, if it moves
+    speed_sd: np.ndarray
+    sweep: np.ndarray  # probabilities: the object moves ...
+    corner: np.ndarray  # ... is a corner ...
+    tip: np.ndarray  # ... lies at the tip ...
+    slip: np.ndarray  # ... the contact slides
+    friction: np.ndarray
+    friction_sd: np.ndarray
+
+
+class ContactFilter:
+    """One whisker's filter. Keywords replace SETTINGS; ValueError names one that does not exist or is out of range."""
+
+    def __init__(self, length_m: float = LENGTH_M, **settings: float):
+        unknown = sorted(set(settings) - set(SETTINGS))
+        if unknown:
+            raise ValueError(f"{unknown[0]}: no setting of the contact filter; use one of {', '.join(SETTINGS)}")
+        chosen = SETTINGS | settings
+        for name, value in chosen.items():
+            _check(name, value)
+        self._config = ffi.new("struct nav_contact_filter_config *", chosen)
+        self._beam = ffi.new("struct nav_contact_beam *")
+        if not lib.nav_contact_beam_make(self._beam, length_m / chosen["cone_m"]):
+            raise ValueError(
+                f"length_m {length_m}, cone_m {chosen['cone_m']}: no whisker; its length is 0.3 to 0.85 of its cone"
+            )
+        self.state = ffi.new("struct nav_contact_filter *")
+        lib.nav_contact_filter_init(self.state, self._config, self._beam)
+
+    def begin(self) -> None:
+        """Forget the contact; the counts of bad samples stay."""
+        lib.nav_contact_filter_begin(self.state)
+
+    @property
+    def not_read(self) -> dict[str, int]:
+        """Samples that were not read, by cause, and contacts that nothing explained."""
+        return {name: getattr(self.state, name) for name in ("bad", "stuck", "saturated", "restarts")}
+
+    def run(self, bases: np.ndarray, tilts: np.ndarray, good: np.ndarray | None = None) -> Reports:
+        """Take the samples of a contact, and report.
+
+        `bases` (n, 3): velocity of the follicle's exit along and across the unbent whisker (m/s) and its rate of turn
+        (rad/s, anticlockwise); `tilts` (n, 2) of the plug about its rest, rad; `good` (n,) uint8 or bool, 0: not read.
+        nan, saturated and stuck samples are counted and not read. ValueError when shapes differ.
+        """
+        bases = as_doubles(bases, "bases", (None, 3))
+        count = len(bases)
+        tilts = as_doubles(tilts, "tilts", (count, 2))
+        good = np.ones(count, np.uint8) if good is None else np.ascontiguousarray(good, np.uint8)
+        each = self._config.block * self._config.report
+        most = count // each + 1
+        made, ends = ffi.new("struct nav_contact_answer[]", most), np.empty(most)
+        used = lib.nav_contact_filter_run(
+            self.state,
+            doubles(bases, "bases", (count, 3)),
+            doubles(tilts, "tilts", (count, 2)),
+            octets(good, "good", (count,)),
+            count,
+            made,
+            doubles(ends, "ends", (most,)),
+            most,
+        )
+        known = [k for k in range(used) if made[k].parts]
+        return _reports([made[k] for k in known], ends[known])
+
+
+def _check(name: str, value: float) -> None:
+    """ValueError names a setting that is out of range."""
+    if name in ("block", "report"):
+        sound, wanted = value >= 1 and value == int(value), "a number of at least 1"
+    elif name in POSITIVE:
+        sound, wanted = value > 0, "a number above 0"
+    elif name in LIMITS:
+        sound, wanted = 0 <= value <= LIMITS[name], f"0 to {LIMITS[name]:g}"
+    else:
+        sound, wanted = value >= 0, "a number of at least 0"
+    if not (np.isfinite(value) and sound):
+        raise ValueError(f"{name}: {value}; give {wanted}")
+
+
+def _reports(made: list, ends: np.ndarray) -> Reports:
+    def pairs(name: str) -> np.ndarray:
+        return np.array([list(getattr(a, name)) for a in made]).reshape(-1, 2)
+
+    def squares(name: str) -> np.ndarray:
+        return np.array([[list(row) for row in getattr(a, name)] for a in made]).reshape(-1, 2, 2)
+
+    numbers = {name: np.array([getattr(a, name) for a in made]) for name in (*SCALARS, *SHARES)}
+    return Reports(
+        sample=ends.astype(np.int64),
+        point=pairs("point"),
+        point_cov=squares("point_cov"),
+        velocity=pairs("velocity"),
+        velocity_cov=squares("velocity_cov"),
+        motion=[MOTIONS[a.motion] for a in made],
+        **numbers,
+    )

@@ -1,0 +1,1 @@
+"""The contact filter against simulated and chained whiskers."""

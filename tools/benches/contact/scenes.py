@@ -1,0 +1,241 @@
+"""Contacts whose truth is known: corners by sim/mechanics with vibration, surfaces by its elastica, quasi-static.
+
+A scene gives, for every tick of 0.5 ms from the first touch on: the base's motion as told, the measured tilt of the plug
+in two axes, and the truth in the whisker's frame.
+"""
+
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[3]
+sys.path.insert(0, str(ROOT / "sim"))
+
+TICK_S = 5e-4
+CONE, TIP = 0.181739, 0.140
+CREEP, CREEP_S, KAPPA = 0.075, 0.5, 1.0
+NOISE_RAD, GAIN_SD, MOTION_SD = 2e-4, 0.01, 0.01
+FRICTION, FRICTION_SD = 0.3, 0.05
+LEAD = 800  # ticks before a corner is touched
+EVERY = 10  # ticks between two solutions of the elastica
+QUARTER = np.pi / 2
+
+
+class Scene(NamedTuple):
+    """Arrays over n ticks; whisker's frame, SI."""
+
+    bases: np.ndarray  # (n, 3) as told
+    tilt: np.ndarray  # (n, 2) measured
+    point: np.ndarray  # (n, 2)
+    normal: np.ndarray  # (n,) of the surface; nan: a corner
+    velocity: np.ndarray  # (n, 2) of the object
+    centre: np.ndarray  # (n, 2) of a cylinder; nan: none
+
+
+class Draw(NamedTuple):
+    """What a contact's filter does not know: ln of the gain, friction, error of the motion told, noise."""
+
+    gain: float
+    friction: float
+    motion: float
+    rng: np.random.Generator
+
+    @classmethod
+    def of(cls, seed: int, known_friction: bool = False) -> "Draw":
+        rng = np.random.default_rng(seed)
+        friction = FRICTION if known_friction else float(np.clip(FRICTION + FRICTION_SD * rng.normal(), 0.05, 0.5))
+        return cls(GAIN_SD * rng.normal(), friction, MOTION_SD * rng.normal(), rng)
+
+    def measured(self, tilt: np.ndarray) -> np.ndarray:
+        """(n, 2) from the tilt (n,) of the bending's plane."""
+        both = np.column_stack([np.exp(self.gain) * tilt, np.zeros(len(tilt))])
+        return both + NOISE_RAD * self.rng.normal(size=both.shape)
+
+
+def seen(bases: np.ndarray, world: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Points of the world (n, 2) in the moving whisker's frame, and its direction (n,), after each tick."""
+    place, direction = np.zeros(2), 0.0
+    out, directions = np.empty_like(world), np.empty(len(world))
+    for i, base in enumerate(bases):
+        c, s = np.cos(direction), np.sin(direction)
+        place = place + TICK_S * np.array([c * base[0] - s * base[1], s * base[0] + c * base[1]])
+        direction += TICK_S * base[2]
+        x, y = world[i] - place
+        c, s = np.cos(direction), np.sin(direction)
+        out[i], directions[i] = (c * x + s * y, c * y - s * x), direction
+    return out, directions
+
+
+def turned(vectors: np.ndarray, directions: np.ndarray) -> np.ndarray:
+    c, s = np.cos(directions), np.sin(directions)
+    return np.column_stack([c * vectors[:, 0] + s * vectors[:, 1], c * vectors[:, 1] - s * vectors[:, 0]])
+
+
+class Corner(NamedTuple):
+    """What determines a corner's contact: place on the straight whisker when it is touched, motions (n, 3), (n, 2)."""
+
+    radius_m: float
+    bases: np.ndarray
+    velocity: np.ndarray
+
+    def felt(self, friction: float, ahead_m: float = 0.0, level: int | None = None):
+        """Tilt (n,) by sim/mechanics, point (n, 2) and object's velocity (n, 2) in the whisker's frame.
+
+        `ahead_m`: how far the corner stands ahead of the place at which it would touch first. Base and object have moved
+        as in the first tick for LEAD ticks before: what the start excites has decayed.
+        """
+        from signals.mechanics import LARGE, VIBRATION, Whisker, touch
+
+        whisker = Whisker(kappa=KAPPA, friction=friction, creep=CREEP, creep_s=CREEP_S)
+        bases = np.concatenate([np.tile(self.bases[0], (LEAD, 1)), self.bases])
+        velocity = np.concatenate([np.tile(self.velocity[0], (LEAD, 1)), self.velocity])
+        moved = TICK_S * np.cumsum(velocity, axis=0)
+        back, direction = seen(bases[:LEAD], np.zeros((LEAD, 2)))
+        x, y = np.array([self.radius_m, ahead_m]) - back[-1]  # in the whisker's frame at the first touch
+        c, s = np.cos(direction[-1]), np.sin(direction[-1])
+        point, directions = seen(bases, np.array([c * x - s * y, s * x + c * y]) - moved[LEAD - 1] + moved)
+        radius, theta = np.hypot(*point.T), np.arctan2(point[:, 1], point[:, 0])
+        on = (theta > 0) & (radius < TIP)
+        felt = touch(
+            whisker,
+            np.where(on, radius, 0),
+            np.where(on, theta, 0),
+            bases[:, 2],
+            seed=1,
+            level=LARGE | VIBRATION if level is None else level,
+        )
+        return felt.tilt_rad[LEAD:, 0], point[LEAD:], turned(velocity, directions)[LEAD:]
+
+    def scene(self, draw: Draw) -> Scene:
+        tilt, point, velocity = self.felt(draw.friction)
+        none = np.full(len(tilt), np.nan)
+        told = self.bases * (1 + draw.motion)
+        return Scene(told, draw.measured(tilt), point, none, velocity, np.column_stack([none, none]))
+
+    def bound(self, draw: Draw, friction_sd: float) -> np.ndarray:
+        """(n,) Cramer-Rao bound of the point's error, mm: root of the trace of its least covariance after each tick.
+
+        Unknown: place and start of the contact (free), gain, friction and error of the motion told (with the priors of
+        the filter), and of an object that moves its velocity. The whisker is quasi-static, the kind of contact known.
+        """
+        from signals.mechanics import LARGE
+
+        moves = bool(np.any(self.velocity))
+        steps = {"radius": 1e-4, "ahead": 1e-5, "motion": 1e-3, "friction": 1e-2} | (
+            {"vx": 1e-3, "vy": 1e-3} if moves else {}
+        )
+
+        def answer(radius=0.0, ahead=0.0, motion=0.0, friction=0.0, vx=0.0, vy=0.0):
+            other = Corner(self.radius_m + radius, self.bases * (1 + motion), self.velocity + np.array([vx, vy]))
+            tilt, point, _ = other.felt(draw.friction + friction, ahead, LARGE)
+            return tilt, point
+
+        tilts, points = [], []
+        for name, step in steps.items():
+            (high, high_at), (low, low_at) = answer(**{name: step}), answer(**{name: -step})
+            tilts.append((high - low) / (2 * step))
+            points.append((high_at - low_at) / (2 * step))
+        middle = answer()[0]
+        slopes = np.column_stack([*tilts, middle])  # the last: by ln of the gain
+        places = np.stack([*points, np.zeros_like(points[0])], axis=2)
+        prior = dict.fromkeys(steps, 0.0) | {"motion": MOTION_SD**-2.0, "friction": max(friction_sd, 1e-6) ** -2.0}
+        held = np.diag([*prior.values(), GAIN_SD**-2.0])
+        information = held + np.cumsum(slopes[:, :, None] * slopes[:, None, :], axis=0) / NOISE_RAD**2
+        least = np.linalg.pinv(information[EVERY:], hermitian=True)
+        traces = np.einsum("nik,nkl,nil->n", places[EVERY:], least, places[EVERY:])
+        return 1e3 * np.sqrt(np.concatenate([np.full(EVERY, np.nan), traces]))
+
+
+class Surface:
+    """A whisker that slides over a circle (a face: of 5 m), solved by the simulator's elastica."""
+
+    def __init__(self, radius_m: float, friction: float, tip: bool, first: float):
+        from signals._sim import lib
+
+        self._bend = lib.mech_elastica_bend
+        self._radius, self._friction = radius_m / CONE, friction
+        self._out = 1.0  # +1: the contact moves outwards over the surface faster than along the whisker
+        self.tip, self._unknown = tip, np.array([first, 1e-3])
+        self._last = None
+
+    def _look(self, unknown: np.ndarray, creep: float) -> tuple[np.ndarray, float, float]:
+        """Place of the contact, direction of the surface's normal, elastic tilt. Unknown: force's ratio or arc; force."""
+        first, force = unknown
+        arc, ratio = (TIP / CONE, first) if self.tip else (first, -self._out * self._friction)
+        bend = self._bend(arc, force, ratio, 48)
+        tilt = bend.moment / (3 * KAPPA)
+        angle, normal = bend.theta + tilt + creep, bend.slope + tilt + creep + QUARTER
+        if self.tip:
+            normal -= np.arctan(first) + self._out * np.arctan(self._friction)
+        return bend.x * np.array([np.cos(angle), np.sin(angle)]), normal, tilt
+
+    def _left(self, unknown: np.ndarray, creep: float, centre: np.ndarray) -> np.ndarray:
+        place, normal, _ = self._look(unknown, creep)
+        return place - self._radius * np.array([np.cos(normal), np.sin(normal)]) - centre
+
+    def _newton(self, centre: np.ndarray, creep: float) -> np.ndarray | None:
+        unknown = self._unknown
+        for _ in range(60):
+            left = self._left(unknown, creep, centre)
+            if np.abs(left).max() < 1e-8 * max(1.0, self._radius):
+                return unknown if unknown[1] > 0 else None
+            steps = np.diag(1e-6 * np.maximum(np.abs(unknown), 1e-2))
+            slopes = [(self._left(unknown + h, creep, centre) - left) / h.sum() for h in steps]
+            move = np.linalg.solve(np.array(slopes).T, left)
+            most = np.abs(move / np.array([0.1, 0.5 * abs(unknown[1])])).max()
+            unknown = unknown - move / max(1.0, most)
+            if not self.tip and not 0.05 < unknown[0] < 0.9:
+                return None
+        return None
+
+    def solve(self, centre: np.ndarray, turn: float, creep: float) -> tuple[np.ndarray, float, float] | None:
+        """For the circle's centre (cones) in the whisker's frame turned so far; None when it lets go."""
+        for _ in range(4):
+            found = self._newton(centre, creep)
+            if found is None:
+                return None
+            edge = -self._out * self._friction  # ratio at which the tip's whisker is parallel to the surface
+            fits = found[0] < edge if self.tip else found[0] <= TIP / CONE
+            if fits:
+                look = self._look(found, creep)
+                arc = TIP / CONE if self.tip else found[0]
+                now = (look[1] + turn, arc)
+                slid = 0.0 if self._last is None else -self._radius * (now[0] - self._last[0]) - (arc - self._last[1])
+                if slid * self._out >= -1e-6 * max(1.0, self._radius):
+                    self._unknown, self._last = found, now
+                    return look
+                self._out = -self._out
+            else:
+                self.tip = not self.tip
+                self._unknown = np.array([edge - 1e-3 if self.tip else TIP / CONE - 1e-4, found[1]])
+        return None
+
+
+def surface(radius_m: float, touched_m: float, normal: float, bases: np.ndarray, draw: Draw) -> Scene | None:
+    """A circle that touches the straight whisker at a place, at its tip with any normal; None when nothing is felt.
+
+    On a flat one it ends where the whisker would lie along it.
+    """
+    tip = touched_m >= TIP
+    start = np.array([touched_m, 0.0]) - radius_m * np.array([np.cos(normal), np.sin(normal)])
+    centre, directions = seen(bases, np.tile(start, (len(bases), 1)))
+    first = np.tan(QUARTER - normal - np.arctan(draw.friction)) if tip else touched_m / CONE
+    shape = Surface(radius_m, draw.friction, tip, first)
+    rows, creep = [], 0.0
+    for i in range(EVERY - 1, len(bases), EVERY):
+        look = shape.solve(centre[i] / CONE, directions[i], creep)
+        if look is None or (tip and radius_m > 1.0 and not shape.tip):
+            break
+        rows.append((*(CONE * look[0]), look[1], look[2] + creep))
+        creep += EVERY * TICK_S / CREEP_S * (CREEP * look[2] - creep)
+    if len(rows) < 10:
+        return None
+    at = np.arange(EVERY - 1, EVERY * len(rows), EVERY)
+    used = np.arange(at[0], at[-1] + 1)
+    columns = [np.interp(used, at, column) for column in np.array(rows).T]
+    point, normals = np.column_stack(columns[:2]), columns[2]
+    still = np.zeros((len(used), 2))
+    told = bases[used] * (1 + draw.motion)
+    return Scene(told, draw.measured(columns[3]), point, normals, still, centre[used])
