@@ -24,6 +24,9 @@ if [ "${1:-}" = --long ]; then
     done
     echo "test: 40 faults of each board, and longer runs"
     build/release/sim/bridge/boards/test_boards 40 "$(date +%j)" 300
+    echo "test: the netlist of a board from pin to pin"
+    cmake --build build/release --target test_netlist >build/netlist.log 2>&1 || { tail -25 build/netlist.log >&2; exit 1; }
+    build/release/sim/bridge/boards/test_netlist
     echo "test: larger models of the ring, and 100000 readers and writers killed"
     host/libwhisker/model/check.sh --long
     build/release/host/libwhisker/test/stress_ring 100000

@@ -236,6 +236,13 @@ def prepare(board: Board, lanes: int, out: Path, serial: str = "0001") -> Path:
     return netlist
 
 
+def netlist_verilog(board: Board, lanes: int, out: Path) -> Path:
+    """What synthesis makes of a board, as Verilog of the FPGA's cells, for simulation."""
+    prepare(board, lanes, out)
+    must("yosys", "-q", "-p", "read_json netlist.json; write_verilog -noattr netlist.v", log=out / "verilog.log")
+    return out / "netlist.v"
+
+
 def summary(board: Board, seed: int, placed: dict) -> str:
     """A line for the reader: speed, pins, resources."""
     limits = report.pin_limits(board.speed, board.phy)
@@ -277,6 +284,7 @@ def main() -> int:
     parser.add_argument("--tries", type=int, default=8, help="placements to try, until one meets the limits")
     parser.add_argument("--serial", default="0001", help="USB serial number")
     parser.add_argument("--out", type=Path, help="folder (default: build/boards/BOARD)")
+    parser.add_argument("--netlist", action="store_true", help="end after synthesis, with the netlist as Verilog")
     arguments = parser.parse_args()
     if arguments.list:
         print("\n".join(boards()))
@@ -284,8 +292,12 @@ def main() -> int:
     try:
         board = load(arguments.board or "")
         out = arguments.out or REPO / "build" / "boards" / board.name
+        lanes = arguments.lanes or board.lanes
+        if arguments.netlist:
+            print(netlist_verilog(board, lanes, out.resolve()))
+            return 0
         seeds = [arguments.seed + n for n in range(arguments.tries)]
-        print(make(board, arguments.lanes or board.lanes, out.resolve(), seeds, arguments.serial))
+        print(make(board, lanes, out.resolve(), seeds, arguments.serial))
     except ToolError as error:
         print(f"bitstream: {error}", file=sys.stderr)
         return 1

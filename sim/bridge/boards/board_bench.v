@@ -1,5 +1,5 @@
 // Bench top: a board's top between a PHY and nodes, under names that all boards share. BOARD_CYNTHION or BOARD_TANG
-// chooses the board.
+// chooses the board; BOARD_NETLIST: what synthesis makes of a usb3300_board.
 
 `default_nettype none
 
@@ -48,15 +48,22 @@ module board_bench (
     tang_primer_20k #(.LANES(28)) board (
         .clk_60(clk), .ulpi_reset_n(reset_n),
 `else
-    wire       led_n, flash_cs_n, flash_mosi;
+    wire led_n, flash_cs_n, flash_mosi;
+
+    assign led = !led_n;
+`ifdef BOARD_NETLIST
+    assign leds = 4'd0; // with one LED synthesis leaves the others out
+
+    usb3300_board board (
+`else
     wire [1:0] flash_high;
 
     assign leds = board.core.leds;
-    assign led  = !led_n;
 
     usb3300_board #(.LANES(28), .BLINK_BITS(8)) board (
-        .clk_60(clk), .ulpi_reset(reset),
-        .flash_cs_n(flash_cs_n), .flash_mosi(flash_mosi), .flash_miso(1'b1), .flash_high(flash_high),
+        .flash_high(flash_high),
+`endif
+        .clk_60(clk), .ulpi_reset(reset), .flash_cs_n(flash_cs_n), .flash_mosi(flash_mosi), .flash_miso(1'b1),
 `endif
         .ulpi_data(data), .ulpi_dir(dir), .ulpi_nxt(nxt), .ulpi_stp(stp), .sync(sync), .sck(sck), .select_n(select_n),
 `ifndef BOARD_TANG
@@ -69,6 +76,8 @@ module board_bench (
         for (i = 0; i < 8; i = i + 1) begin : line
 `ifdef BOARD_TANG
             assign link_drives[i] = !board.line[i].pad.OEN;
+`elsif BOARD_NETLIST
+            assign link_drives[i] = !board.\pads.let_go [i];
 `else
             assign link_drives[i] = !board.pads.line[i].pad.T;
 `endif
