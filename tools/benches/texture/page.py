@@ -21,6 +21,13 @@ PEERS = """
 Windows of 1.7 s, whole runs held out; `area` is that under the risk-coverage curve, in percent. The peers are calibrated by a sigmoid on runs held out.
 
 """
+BORDERS = """
+## Borders
+
+Strips of random tiles of 0.5 m at 0.1, 0.15 and 0.2 m/s. A border is a change of surface; `false` are events away from borders and from edges that
+hold the tip. A tip that falls from one tile to the next of the same surface is among them.
+
+"""
 UNTRAINED = """
 ## Surfaces never trained
 
@@ -45,6 +52,8 @@ def page(results: dict) -> str:
         of |= {f"FabricSlide, a {what} left out": s for what, s in results.get("fabricslide", {}).items()}
         of |= {f"{n}, 1.7 s, runs left out": results[p] for p, n in TERRAINS.items() if p in results}
         parts += ["\n## Accuracy, refusals, confidence\n\n", recordings(of)]
+    if "borders" in results:
+        parts += [BORDERS, borders(results["borders"])]
     if any(part in results for part in TERRAINS):
         parts += [PEERS, beside_peers({n: results[p] for p, n in TERRAINS.items() if p in results})]
     if any(part in results for part in LEFT_OUT):
@@ -79,6 +88,25 @@ def recordings(of: dict[str, dict]) -> str:
             shares = [percent(s[key]) for key in ("accuracy", "wrong_answers", "refused", "calibration_error")]
             cells += [*shares, f"{s['cut_at_a_tenth_refused']:.1f}"]
         rows.append(cells)
+    return table(rows)
+
+
+def borders(of: dict[str, dict]) -> str:
+    rows = [
+        [
+            "method",
+            "borders",
+            "m",
+            "reported in 150 ms",
+            "false per 10 m",
+            "wrong after 100 ms, per border",
+            "held: wrong",
+        ]
+    ]
+    for name, s in of.items():
+        cells = [name, str(s["borders_crossed"]), f"{s['metres']:.0f}", percent(s["reported_in_150_ms"])]
+        late = f"{s['wrong_later_than_100_ms_per_border']:.3f}"
+        rows.append([*cells, f"{s['false_borders_per_10_m']:.2f}", late, percent(s["wrong_while_held"])])
     return table(rows)
 
 

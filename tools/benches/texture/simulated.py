@@ -7,7 +7,7 @@ import numpy as np
 from .scores import METHODS, WINDOW, decide, models, strip_score, strip_scores, summary
 from .trials import SURFACES, closer, drives, faults, strips
 
-TRAIN_SEED, TEST_SEEDS, STRIP_SEEDS, OTHER_ROBOT = 6000, (6001, 6002), (6100, 6101, 6102), 6050
+TRAIN_SEED, TEST_SEEDS, STRIP_SEEDS, OTHER_ROBOT = 6000, (6001, 6002), range(6100, 6115), 6050
 SPEEDS_M_S = (0.1, 0.15, 0.2)  # of strips
 
 

@@ -15,6 +15,7 @@ SURFACES = ("VINYL", "SMOOTH", "ROUGH")
 SPEEDS_M_S = (0.05, 0.1, 0.15, 0.2)
 TICK_S = 5e-4
 LOOK = 20  # ticks between looks at the truth
+HELD_LOOK = 2  # ... and at whether an edge holds the tip, which a low one does for 2 ms
 TILE_M, STRIP_M, WIDTH_M = 0.5, 12.0, 2.0
 
 
@@ -91,17 +92,21 @@ def _drive_along(rows: list[list[str]], seed: int, robot: int, speed_m_s: float,
     world = World("\n".join([*scene, f"start 0.4 {WIDTH_M / 2 + 0.03} 0.0"]) + "\n", seed)
     world.drive(speed_m_s, 0.0)
     world.run(400)
-    blocks, truth = [], []
+    blocks, truth, caught = [], [], []
     for _ in range(int(metres / speed_m_s / TICK_S / LOOK)):
-        blocks.append(world.run(LOOK))
+        held = np.zeros(2, bool)
+        for _ in range(LOOK // HELD_LOOK):
+            blocks.append(world.run(HELD_LOOK))
+            held |= [world.tip(lane).caught for lane in range(2)]
         truth.append([world.tip(lane) for lane in range(2)])
+        caught.append(held)
     counts = np.concatenate(blocks).astype(float)
     return [
         Strip(
             counts[:, lane],
             np.array([SURFACES.index(t[lane].texture) for t in truth]),
             np.array([t[lane].inside_m for t in truth]),
-            np.array([t[lane].caught for t in truth]),
+            np.array([c[lane] for c in caught]),
             metres,
         )
         for lane in range(2)
