@@ -10,7 +10,7 @@ SHRINK = 0.3  # share of the diagonal in the covariance of windows within a reco
 RECORDINGS_PRIOR = 10.0  # recordings' worth of a spread alike in all directions, that the measured spread is mixed with
 CLASSES_PRIOR = 3.0  # classes' worth, of the spread of class means
 REFUSE_MOST = 0.08  # share of held-out windows of trained surfaces that the limits may refuse
-TYPICAL = 10.0  # log odds against a surface never trained in the middle of held-out windows of trained ones
+TYPICAL = 20.0  # log odds against a surface never trained in the middle of held-out windows of trained ones
 RATIOS_EACH = 8  # of a recording, by which it counts towards a limit
 STEPS = lib.NAV_TEXTURE_NOVELTY_STEPS
 
