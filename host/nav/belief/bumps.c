@@ -79,55 +79,63 @@ double nav_heading_within(double off, double half, double sigma)
 static int reached(double at, double sigma, double cell, int count, int *first)
 {
     *first = (int)fmax(floor((at - REACH * sigma) / cell), 0.0);
-    return (int)fmin(ceil((at + REACH * sigma) / cell), count);
+    return (int)fmin(floor((at + REACH * sigma) / cell) + 1.0, count);
 }
 
-/* A bump's shares of some columns, and where they begin; wide bumps take several of these. */
-struct columns {
-    int first, count;
-    float share[64];
+/* Independent normal distributions over x, y and heading. */
+struct normal {
+    struct nav_pose mean;
+    double sigma[3], mass;
 };
 
-/* Adds some columns of a bump to a slice, which has the share `heading` of it. */
-static void add_columns(const struct nav_component *b, const struct nav_slices *at, const struct columns *columns,
-                        double heading, float *slice)
+/* Adds a slice's share `heading` of one; `column` has room for a line. */
+static void add_slice(const struct normal *b, const struct nav_shape *s, double heading, float *column, float *slice)
 {
-    int first, end = reached(b->pose.y, b->sigma_m, at->cell, at->ny, &first);
-    for (int j = first; j < end; j++) {
-        double low = j * at->cell;
-        float row = (float)(heading * nav_normal_between(low, low + at->cell, b->pose.y, b->sigma_m));
-        float *cell = slice + (size_t)j * (size_t)at->pitch + columns->first;
-        for (int i = 0; i < columns->count; i++)
-            cell[i] += row * columns->share[i];
+    int left, low, right = reached(b->mean.x, b->sigma[0], s->cell, s->nx, &left);
+    int high = reached(b->mean.y, b->sigma[1], s->cell, s->ny, &low);
+    for (int i = left; i < right; i++)
+        column[i] = (float)nav_normal_between(i * s->cell, (i + 1) * s->cell, b->mean.x, b->sigma[0]);
+    for (int j = low; j < high; j++) {
+        double share = nav_normal_between(j * s->cell, (j + 1) * s->cell, b->mean.y, b->sigma[1]);
+        float *cell = slice + (size_t)j * (size_t)s->groups * NAV_LANES, row = (float)(heading * b->mass * share);
+        for (int i = left; i < right; i++)
+            cell[i] += row * column[i];
     }
 }
 
-static void add_bump(const struct nav_component *b, const struct nav_slices *at, float *mass)
+static void add_normal(const struct normal *b, const struct nav_shape *s, float *column, float *mass)
 {
-    enum { ROOM = sizeof((struct columns *)0)->share / sizeof(float) };
-    struct columns columns;
-    int end = reached(b->pose.x, b->sigma_m, at->cell, at->nx, &columns.first);
-    for (; columns.first < end; columns.first += columns.count) {
-        columns.count = end - columns.first < ROOM ? end - columns.first : ROOM;
-        for (int i = 0; i < columns.count; i++) {
-            double low = (columns.first + i) * at->cell;
-            columns.share[i] = (float)nav_normal_between(low, low + at->cell, b->pose.x, b->sigma_m);
-        }
-        for (int p = 0; p < at->nh; p++) {
-            double off = nav_slice_heading(p, at->cell_theta, at->rotation) - b->pose.theta;
-            double heading = nav_heading_within(off, at->cell_theta / 2.0, b->sigma_rad);
-            if (heading > 0.0)
-                add_columns(b, at, &columns, (1.0 - NAV_ANYWHERE) * b->mass * heading,
-                            mass + (size_t)p * (size_t)at->ny * (size_t)at->pitch);
-        }
+    for (int p = 0; p < s->nh; p++) {
+        double off = (p + 0.5) * s->cell_theta - b->mean.theta;
+        double heading = nav_heading_within(off, s->cell_theta / 2.0, b->sigma[2]);
+        if (heading > 0.0)
+            add_slice(b, s, heading, column, mass + (size_t)p * (size_t)s->ny * (size_t)s->groups * NAV_LANES);
     }
 }
 
-void nav_bumps_fill(const struct nav_prior *prior, const struct nav_slices *at, float *mass)
+static void add_everywhere(const struct nav_shape *s, float *mass)
 {
-    float everywhere = (float)(NAV_ANYWHERE / ((double)at->nh * at->ny * at->nx));
-    for (size_t n = 0; n < (size_t)at->nh * (size_t)at->ny * (size_t)at->pitch; n++)
-        mass[n] = n % (size_t)at->pitch < (size_t)at->nx ? everywhere : 0.0f;
-    for (long n = 0; n < prior->bumps; n++)
-        add_bump(&prior->bump[n], at, mass);
+    float each = (float)(NAV_ANYWHERE / ((double)s->nh * s->ny * s->nx));
+    size_t pitch = (size_t)s->groups * NAV_LANES;
+    for (size_t n = 0; n < nav_shape_cells(s); n++)
+        mass[n] = n % pitch < (size_t)s->nx ? each : 0.0f;
+}
+
+static void add_bump(const struct nav_component *c, const struct nav_shape *s, float *column, float *mass)
+{
+    const struct normal b = {c->pose, {c->sigma_m, c->sigma_m, c->sigma_rad}, (1.0 - NAV_ANYWHERE) * c->mass};
+    add_normal(&b, s, column, mass);
+}
+
+void nav_bumps_fill(const struct nav_prior *prior, struct nav_histogram *h)
+{
+    const struct normal one = {prior->mean, {prior->sigma[0], prior->sigma[1], prior->sigma[2]}, 1.0};
+    float *column, *mass = nav_histogram_write_out(h, &column);
+    if (nav_bumps_given(prior))
+        add_everywhere(&h->shape, mass);
+    else
+        add_normal(&one, &h->shape, column, mass);
+    for (long n = 0; nav_bumps_given(prior) && n < prior->bumps; n++)
+        add_bump(&prior->bump[n], &h->shape, column, mass);
+    nav_histogram_take(h);
 }

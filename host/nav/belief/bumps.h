@@ -2,10 +2,9 @@
 #ifndef NAV_BUMPS_H
 #define NAV_BUMPS_H
 
-#include "gaussian.h"
+#include "histogram.h"
 #include "problem.h"
 #include "rng.h"
-#include "slices.h"
 
 /* Whether a prior is a mixture. */
 bool nav_bumps_given(const struct nav_prior *);
@@ -19,8 +18,9 @@ struct nav_gaussian nav_bumps_gaussian(const struct nav_prior *);
 /* A pose drawn from the bumps. */
 struct nav_pose nav_bumps_draw(const struct nav_prior *, struct nav_rng *);
 
-/* Fills the cells of a histogram that has not moved yet: the bumps, and NAV_ANYWHERE evenly. */
-void nav_bumps_fill(const struct nav_prior *, const struct nav_slices *, float *mass);
+/* Fills a histogram that has not moved yet with a prior that is not uniform: one Gaussian, or the bumps and
+ * NAV_ANYWHERE evenly. Its total is not known before the next pass. */
+void nav_bumps_fill(const struct nav_prior *, struct nav_histogram *);
 
 /* Mass of a normal distribution between two values. */
 double nav_normal_between(double low, double high, double mean, double sigma);

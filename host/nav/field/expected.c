@@ -8,6 +8,9 @@
 
 static const double POSES_MOST = 268435456.0;
 
+/* Cells around the arena: a shift by one, and what may be read together with the arena's last cell. */
+enum { MARGIN = NAV_CELLS_AHEAD + 2 };
+
 static size_t pitch(const struct nav_expected *e)
 {
     return (size_t)(e->nx + 2 * e->margin);
@@ -38,6 +41,7 @@ static int survey(struct maker *m, int i, int j)
         double theta = (k + 0.5) * e->step_theta;
         nav_likelihood_expect(m->likelihood, &(struct nav_place){x, y, cos(theta), sin(theta)}, m->codes + 1);
         e->signature[at] = nav_book_number(&m->book, m->codes);
+        e->standing += 1.0 / ((double)e->nh * e->ny * e->nx);
         if (e->signature[at] == NAV_BOOK_FULL)
             return -1;
     }
@@ -96,30 +100,42 @@ static int make_factor(struct nav_expected *e, const struct nav_book *book, cons
     }
     free(packed);
     free(codes);
-    if (!failed)
-        e->value = e->factor.node[e->factor.nodes - 1].value;
     return failed;
 }
 
-struct nav_expected *nav_expected_new(const struct nav_likelihood *likelihood, double step, int headings, int margin)
+/* Values of the present row, none worked out. */
+static int make_values(struct nav_expected *e)
+{
+    e->value = calloc(e->signatures, sizeof *e->value);
+    e->known = calloc(e->signatures, sizeof *e->known);
+    for (uint32_t n = 1; e->value && n < e->signatures; n++)
+        e->value[n] = -1.0f;
+    return e->value && e->known ? 0 : -1;
+}
+
+struct nav_expected *nav_expected_new(const struct nav_likelihood *likelihood, double cell, int headings, int sub,
+                                      int turns)
 {
     const struct nav_arena *arena = likelihood->arena;
-    double nx = ceil(arena->size_x / step - 1e-6), ny = ceil(arena->size_y / step - 1e-6);
-    if (!((nx + 2 * margin) * (ny + 2 * margin) * headings <= POSES_MOST))
+    double step = cell / sub, nx = ceil(arena->size_x / step - 1e-6), ny = ceil(arena->size_y / step - 1e-6);
+    int margin = MARGIN * sub;
+    if (!((nx + 2 * margin) * (ny + 2 * margin) * headings * turns <= POSES_MOST))
         return NULL;
     struct nav_expected *e = calloc(1, sizeof *e);
     if (!e)
         return NULL;
     *e = (struct nav_expected){.nx = (int)nx,
                                .ny = (int)ny,
-                               .nh = headings,
+                               .nh = headings * turns,
                                .margin = margin,
                                .step = step,
-                               .step_theta = 2.0 * NAV_PI / headings,
+                               .step_theta = 2.0 * NAV_PI / (headings * turns),
+                               .sub = sub,
+                               .turns = turns,
                                .whiskers = likelihood->whiskers};
     struct maker m = {.e = e, .likelihood = likelihood};
     m.book.width = code_width(e->whiskers) + 1;
-    int failed = survey_all(&m) || keep_codes(e, &m.book) || make_factor(e, &m.book, likelihood);
+    int failed = survey_all(&m) || keep_codes(e, &m.book) || make_factor(e, &m.book, likelihood) || make_values(e);
     free(m.codes);
     nav_book_free(&m.book);
     if (!failed)
@@ -134,6 +150,8 @@ void nav_expected_free(struct nav_expected *e)
         return;
     free(e->signature);
     free(e->codes);
+    free(e->value);
+    free(e->known);
     nav_factor_free(&e->factor);
     free(e);
 }
@@ -163,32 +181,106 @@ static void evaluate_leaves(struct nav_expected *e, const float *const *table)
     }
 }
 
-void nav_expected_evaluate(struct nav_expected *e, const struct nav_likelihood *likelihood)
+void nav_expected_begin(struct nav_expected *e, const float *const *table, float blocked)
 {
-    evaluate_leaves(e, (const float *const *)likelihood->table);
-    nav_factor_work_out(&e->factor);
-}
-
-void nav_expected_prepare(struct nav_expected *e, const float *const *table)
-{
+    for (uint32_t n = 0; n < e->knowns; n++)
+        e->value[e->known[n]] = -1.0f;
+    e->knowns = 0;
+    e->value[0] = blocked;
     evaluate_leaves(e, table);
     nav_factor_prepare(&e->factor);
 }
 
-const uint32_t *nav_expected_row(const struct nav_expected *e, int k, int j)
+struct nav_layer nav_expected_layer(const struct nav_expected *e, double heading, double shift_x, double shift_y)
 {
-    size_t row = (size_t)k * (size_t)(e->ny + 2 * e->margin) + (size_t)(j + e->margin);
-    return e->signature + row * pitch(e) + (size_t)e->margin;
+    double turns = (heading / e->step_theta - (e->turns - 1) / 2.0) / e->nh;
+    return (struct nav_layer){.heading = (int)((turns - floor(turns)) * e->nh) % e->nh,
+                              .x = (int)floor(shift_x / e->step + 0.5),
+                              .y = (int)floor(shift_y / e->step + 0.5)};
 }
 
-void nav_expected_forget_poses(struct nav_expected *e)
+/* First of the poses of a layer's row of cells that share a heading and a y, from column 0 on. */
+static const uint32_t *expected_row(const struct nav_expected *e, const struct nav_layer *layer, int row, int turn,
+                                    int b)
 {
-    free(e->signature);
-    e->signature = NULL;
+    size_t k = (size_t)((layer->heading + turn) % e->nh);
+    size_t line = k * (size_t)(e->ny + 2 * e->margin) + (size_t)(row * e->sub + layer->y + b + e->margin);
+    return e->signature + line * pitch(e) + (ptrdiff_t)(e->margin + layer->x);
+}
+
+void nav_expected_scale(struct nav_expected *e)
+{
+    double best = 0.0;
+    for (uint32_t n = 1; n < e->signatures; n++)
+        best = fmax(best, nav_factor_one(&e->factor, n - 1));
+    for (uint32_t n = 1; n < e->signatures; n++) {
+        e->known[n - 1] = n;
+        e->value[n] = (float)(nav_factor_one(&e->factor, n - 1) / fmax(best, 1e-300));
+    }
+    e->knowns = e->signatures - 1;
+}
+
+static float expected_value(struct nav_expected *e, uint32_t n)
+{
+    if (e->value[n] < 0.0f) {
+        e->known[e->knowns++] = n;
+        e->value[n] = (float)nav_factor_one(&e->factor, n - 1);
+    }
+    return e->value[n];
+}
+
+/* Adds the values of a line of poses to cells. Which cells hold mass, and which values are known, nobody can predict:
+ * what is not known yet is negative, and is asked for only then. */
+static inline void expected_add_line(struct nav_expected *e, const uint32_t *signature, int sub, const float *mass,
+                                     float *restrict sum)
+{
+    const float *value = e->value;
+    float all[NAV_CELLS_AHEAD], least[NAV_CELLS_AHEAD];
+    for (int n = 0; n < NAV_CELLS_AHEAD; n++) {
+        all[n] = least[n] = value[signature[n * sub]];
+        for (int a = 1; a < sub; a++) {
+            float known = value[signature[n * sub + a]];
+            all[n] += known;
+            least[n] = known < least[n] ? known : least[n];
+        }
+    }
+    for (int n = 0; n < NAV_CELLS_AHEAD; n++) {
+        if (least[n] < 0.0f && mass[n] > 0.0f) {
+            all[n] = 0.0f;
+            for (int a = 0; a < sub; a++)
+                all[n] += expected_value(e, signature[n * sub + a]);
+        }
+        sum[n] += all[n];
+    }
+}
+
+void nav_expected_mean(struct nav_expected *e, const struct nav_layer *layer, int row, int first, const float *mass,
+                       float *like)
+{
+    int sub = e->sub;
+    float sum[NAV_CELLS_AHEAD] = {0.0f}, share = 1.0f / (float)(sub * sub * e->turns);
+    for (int line = 0; line < sub * e->turns; line++) {
+        const uint32_t *signature = expected_row(e, layer, row, line / sub, line % sub) + (ptrdiff_t)first * sub;
+        if (sub == 2)
+            expected_add_line(e, signature, 2, mass, sum);
+        else
+            expected_add_line(e, signature, sub, mass, sum);
+    }
+    for (int n = 0; n < NAV_CELLS_AHEAD; n++)
+        like[n] = share * sum[n];
+}
+
+const uint8_t *nav_expected_codes(const struct nav_expected *e, const struct nav_layer *layer, int row, int column,
+                                  int n)
+{
+    const uint32_t *poses = expected_row(e, layer, row, n / e->sub / e->sub, n / e->sub % e->sub);
+    uint32_t signature = poses[column * e->sub + n % e->sub];
+    return signature ? e->codes + signature * ((size_t)e->whiskers + 1) : NULL;
 }
 
 size_t nav_expected_bytes(const struct nav_expected *e)
 {
-    size_t lattice = e->signature ? poses(e) * sizeof *e->signature : 0;
-    return lattice + e->signatures * ((size_t)e->whiskers + 1) + nav_factor_bytes(&e->factor);
+    return poses(e) * sizeof *e->signature +
+           e->signatures * ((size_t)e->whiskers + 1 + sizeof *e->value + sizeof *e->known) +
+           nav_factor_bytes(&e->factor);
 }

@@ -95,12 +95,6 @@ void nav_factor_prepare(struct nav_factor *f)
         work_out_node(f, n);
 }
 
-void nav_factor_work_out(struct nav_factor *f)
-{
-    nav_factor_prepare(f);
-    work_out_node(f, f->nodes - 1);
-}
-
 size_t nav_factor_bytes(const struct nav_factor *f)
 {
     size_t bytes = (size_t)f->nodes * sizeof *f->node;

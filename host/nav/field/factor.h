@@ -31,10 +31,9 @@ struct nav_factor {
 int nav_factor_init(struct nav_factor *, const uint8_t *signatures, uint32_t count, int whiskers, const int *codes);
 void nav_factor_free(struct nav_factor *);
 
-/* Products for all signatures, from the leaves' values: fill these first. */
-void nav_factor_work_out(struct nav_factor *);
-
-/* The same in two steps: all but the last product of each signature, and that product for one. */
+/* From the leaves' values, which are filled first: all but the last product of each signature, and that product for
+ * one.
+ */
 void nav_factor_prepare(struct nav_factor *);
 static inline double nav_factor_one(const struct nav_factor *f, uint32_t signature)
 {

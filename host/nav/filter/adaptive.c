@@ -13,7 +13,7 @@
 #include "adaptive_answer.h"
 #include "adaptive_doubt.h"
 #include "adaptive_global.h"
-#include "adaptive_prior.h"
+#include "bumps.h"
 #include "particle_bins.h"
 
 /* Shares of the belief: below the first one mode is not told from another; the modes of a cloud hold the second of the
@@ -180,13 +180,9 @@ static void sleep(struct adaptive *a)
 /* The first hypotheses, which the histogram knows nothing of, go to it: it then holds all belief, not just `share`. */
 static void pour(struct adaptive *a, long count, double share)
 {
-    double added = 0.0;
-    for (long n = 0; n < count; n++) {
-        double weight = (double)a->cloud.set.weight[n] / share;
-        adaptive_global_add(&a->global, nav_particles_pose(&a->cloud.set, n), weight);
-        added += weight;
-    }
-    a->global.total *= 1.0 + added;
+    for (long n = 0; n < count; n++)
+        adaptive_global_add(&a->global, nav_particles_pose(&a->cloud.set, n), (double)a->cloud.set.weight[n] / share);
+    adaptive_global_added(&a->global);
 }
 
 /* Draws as many particles as the spread needs when the weights have become uneven, or always when `force`. */
@@ -243,6 +239,7 @@ static void stay(struct adaptive *a)
     adaptive_global_clear(&a->global, a->log.head);
     for (long n = 0; n < a->cloud.set.count; n++)
         adaptive_global_add(&a->global, nav_particles_pose(&a->cloud.set, n), (double)a->cloud.set.weight[n]);
+    adaptive_global_added(&a->global);
     a->whole = true;
     adaptive_doubt_clear(&a->doubt, a->likelihood, a->log.head);
 }
@@ -401,7 +398,8 @@ static long components(const void *self, struct nav_component *out, long room)
 static struct nav_resolution resolution(const void *self)
 {
     const struct adaptive_global *g = &((const struct adaptive *)self)->global;
-    return (struct nav_resolution){g->cell, g->cell_theta, g->wanted};
+    const struct nav_shape finest = nav_levels_shape(&g->histogram.levels, 0);
+    return (struct nav_resolution){finest.cell, finest.cell_theta, g->wanted};
 }
 
 const struct nav_filter_ops nav_adaptive_filter = {.name = "adaptive",

@@ -1,31 +1,48 @@
-/* Rows of the log on their way into the arena-wide belief, a job at a time and a job slice by slice. */
+/* Rows of the log on their way into the arena-wide belief, a job at a time. */
 #include "adaptive_global.h"
 
+#include <limits.h>
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
-#include "adaptive_global_parts.h"
+#include "bumps.h"
 
-/* Variance is saved up to this share of a squared cell edge, and paid in passes of at most so much (lattice.c). */
-static const double OWED_LEAST = 0.04, PASS_MOST = 0.5;
-
-/* A debt that would take more jobs than this is not paid: who may have moved that far unseen may be anywhere. */
+/* A debt of noise that would take more jobs than this is not paid: who may have moved that far unseen may be anywhere.
+ */
 static const double JOBS_OWED_MOST = 16.0;
 
 /* Likelihood of standing where the map says one cannot, by that of sensors that are all broken: maps are wrong
- * sometimes, and of a cell that is blocked at its middle a part may be free. */
+ * sometimes. */
 static const double BLOCKED = 1e-3;
 
-/* A job's rows read, its motion planned and its answer found take as long as passing over about so many cells. */
-enum { JOB_CELLS = 10000 };
+/* A cell with less than this share of all mass is dropped. A uniform belief has 1e-5 in each of its cells. */
+static const double SHARE_LEAST = 1e-8;
+
+/* A job's rows read, its motion planned and its answer found take as long as passing over about so many cells; what one
+ * pose expects as many as ... */
+enum { JOB_CELLS = 10000, EXPECT_CELLS = 20 };
+
+/* Poses that stand for a cell: per edge, and per heading. */
+enum { SUB = 2, TURNS = 1 };
+
+/* Cells that a belief may have after it has been refined. */
+enum { REFINED_MOST = 8192 };
+
+/* A heading's cell may move the farthest sensor by this share of a cell's edge. */
+static const double TURN_SHARE = 2.0 / 3.0;
+static const double DEGREES_LEAST = 2.0, DEGREES_MOST = 24.0;
+
+/* The table of what the first level's cells expect takes memory and set-up: cells that it may have at most. */
+static const double CELLS_MOST = 1.3e6;
 
 bool adaptive_global_current(const struct adaptive_global *g, const struct adaptive_log *log)
 {
-    return g->next == log->head && !g->job.running;
+    return g->next == log->head && g->job.phase == ADAPTIVE_IDLE;
 }
 
 /* Adds one row's tables to the factors, as logarithms, and what the local belief made of it. */
-static void read_row(struct adaptive_global *g, struct adaptive_log *log, uint64_t row)
+static void global_read_row(struct adaptive_global *g, struct adaptive_log *log, uint64_t row)
 {
     struct nav_evidence evidence = adaptive_log_replay(log, row);
     nav_likelihood_read(g->likelihood, &evidence);
@@ -37,55 +54,53 @@ static void read_row(struct adaptive_global *g, struct adaptive_log *log, uint64
 }
 
 /* Adds one row's motion, and the noise that it and the width of slices bring. */
-static void move_row(struct adaptive_global *g, const struct adaptive_entry *entry)
+static void global_move_row(struct adaptive_global *g, const struct adaptive_entry *entry)
 {
     double along_m = g->problem->settings.motion_along_m;
     g->job.step = nav_compose(g->job.step, entry->step);
-    g->owed_position += entry->noise.position + nav_slice_fan(entry->step, g->cell_theta, along_m);
-    g->owed_heading += entry->noise.heading;
+    g->histogram.owed_position += entry->noise.position + nav_histogram_fan(&g->histogram, entry->step, along_m);
+    g->histogram.owed_heading += entry->noise.heading;
 }
 
-/* How far the whiskers have gone in the job so far, m. */
-static double path(const struct adaptive_job *job)
+/* How far the whiskers have gone in a step, m. */
+static double global_path(struct nav_pose step)
 {
-    return hypot(job->step.x, job->step.y) + 0.2 * fabs(job->step.theta);
+    return hypot(step.x, step.y) + 0.2 * fabs(step.theta);
 }
 
 /* Rows between which nothing is read while the belief is too wide to keep up: the further behind, the longer the way.
  * Their motion counts (as the paper drops readings, odometry never). Returns the first row to be read. */
-static uint64_t skip(struct adaptive_global *g, struct adaptive_log *log)
+static uint64_t global_skip(struct adaptive_global *g, struct adaptive_log *log)
 {
-    double late = (double)(log->head - g->next) / ADAPTIVE_ROWS_LATE - 1.0;
+    double late = (double)(log->head - g->next) / ADAPTIVE_ROWS_LATE - 1.0, cell = g->histogram.shape.cell;
     uint64_t row = g->next, reach = adaptive_log_reach(log);
     while (row < reach ||
-           (path(&g->job) < late * g->cell && row + 1 < log->head && !adaptive_log_entry(log, row)->sharp))
-        move_row(g, adaptive_log_entry(log, row++));
+           (global_path(g->job.step) < late * cell && row + 1 < log->head && !adaptive_log_entry(log, row)->sharp))
+        global_move_row(g, adaptive_log_entry(log, row++));
     return row;
 }
 
 /* Gathers rows; a contact is too sharp to be read at another's place. */
-static void gather(struct adaptive_global *g, struct adaptive_log *log)
+static void global_gather(struct adaptive_global *g, struct adaptive_log *log)
 {
-    uint64_t row = skip(g, log);
-    move_row(g, adaptive_log_entry(log, row));
-    read_row(g, log, row);
+    uint64_t row = global_skip(g, log);
+    global_move_row(g, adaptive_log_entry(log, row));
+    global_read_row(g, log, row);
     bool sharp = adaptive_log_entry(log, row)->sharp;
-    struct nav_pose first = g->job.step;
+    struct nav_pose since = {0.0, 0.0, 0.0};
     for (row++; row < log->head && !sharp; row++) {
         const struct adaptive_entry *entry = adaptive_log_entry(log, row);
-        struct adaptive_job ahead = {.step = {g->job.step.x - first.x + entry->step.x,
-                                              g->job.step.y - first.y + entry->step.y,
-                                              g->job.step.theta - first.theta + entry->step.theta}};
-        if (entry->sharp || path(&ahead) > g->cell)
+        since = (struct nav_pose){since.x + entry->step.x, since.y + entry->step.y, since.theta + entry->step.theta};
+        if (entry->sharp || global_path(since) > g->histogram.levels.cell)
             break;
-        move_row(g, entry);
-        read_row(g, log, row);
+        global_move_row(g, entry);
+        global_read_row(g, log, row);
     }
     g->job.end = row;
 }
 
 /* Sum of the whiskers' best logarithms, which expected observations are weighed relative to. */
-static double best_codes(const struct adaptive_global *g)
+static double global_best(const struct adaptive_global *g)
 {
     double sum = 0.0;
     for (int w = 0; w < g->likelihood->whiskers; w++) {
@@ -97,108 +112,158 @@ static double best_codes(const struct adaptive_global *g)
     return sum;
 }
 
-static float side_of(double *owed, double cell, int passes_most, int *passes)
-{
-    double share = *owed / (cell * cell);
-    *passes = 0;
-    if (share < OWED_LEAST)
-        return 0.0f;
-    *passes = (int)fmin(ceil(share / PASS_MOST), passes_most);
-    double each = fmin(share / *passes, PASS_MOST);
-    *owed -= each * *passes * cell * cell;
-    return (float)(each / 2.0);
-}
-
-static bool unpayable(const struct adaptive_global *g)
-{
-    double most = JOBS_OWED_MOST * PASS_MOST;
-    return g->owed_position > ADAPTIVE_PASSES_MOST * most * g->cell * g->cell ||
-           g->owed_heading > most * g->cell_theta * g->cell_theta;
-}
-
-static void read_job(struct adaptive_global *g, struct adaptive_log *log)
+static void global_read_job(struct adaptive_global *g, struct adaptive_log *log)
 {
     for (int w = 0; w < g->likelihood->whiskers; w++)
         memset(g->factor[w], 0, (size_t)g->likelihood->model[w].codes * sizeof **g->factor);
-    g->job = (struct adaptive_job){.running = true, .scale = (float)(1.0 / g->total)};
-    gather(g, log);
+    g->job = (struct adaptive_job){.phase = ADAPTIVE_PASS};
+    global_gather(g, log);
 }
 
-static void begin(struct adaptive_global *g, struct adaptive_log *log)
+/* Likelihoods of a group of the first level's cells: from the table. */
+static long global_look_up(void *self, int p, int line, int group, const float *mass, float *like)
 {
-    int one;
-    read_job(g, log);
-    if (!g->fresh && unpayable(g)) {
-        adaptive_global_restart(g, g->next);
-        read_job(g, log);
+    struct adaptive_global *g = self;
+    const struct nav_histogram *h = &g->histogram;
+    if (g->slice != p)
+        g->layer = nav_expected_layer(g->expected, nav_histogram_heading(h, p), nav_histogram_shift_x(h, p),
+                                      nav_histogram_shift_y(h, p));
+    g->slice = p;
+    nav_expected_mean(g->expected, &g->layer, line, group * NAV_LANES, mass, like);
+    return NAV_LANES;
+}
+
+/* Likelihood of a pose, from the job's factors. */
+static double global_at(const struct adaptive_global *g, const struct nav_place *at)
+{
+    const struct nav_likelihood *l = g->likelihood;
+    double sum = 0.0;
+    if (!nav_likelihood_clear(l, at->x, at->y, g->histogram.shape.cell / (2 * SUB)))
+        return BLOCKED * exp(-g->job.reference);
+    nav_likelihood_expect(l, at, l->scratch);
+    for (int w = 0; w < l->whiskers; w++)
+        sum += (double)g->factor[w][l->scratch[w]];
+    return exp(sum - g->job.reference);
+}
+
+/* Likelihoods of a group of finer cells: worked out where there is mass. */
+static long global_work_out(void *self, int p, int line, int group, const float *mass, float *like)
+{
+    struct adaptive_global *g = self;
+    const struct nav_histogram *h = &g->histogram;
+    double cell = h->shape.cell, step = cell / SUB, turn = h->shape.cell_theta / TURNS;
+    double x0 = group * NAV_LANES * cell + nav_histogram_shift_x(h, p);
+    double y0 = line * cell + nav_histogram_shift_y(h, p), sum[NAV_LANES] = {0.0};
+    long poses = 0;
+    for (int t = 0; t < TURNS; t++) {
+        double heading = nav_histogram_heading(h, p) + (t - (TURNS - 1) / 2.0) * turn;
+        struct nav_place at = {.c = cos(heading), .s = sin(heading)};
+        for (int n = 0; n < NAV_LANES * SUB * SUB; n++) {
+            int k = n / SUB / SUB;
+            if (!(mass[k] > 0.0f))
+                continue;
+            at.x = x0 + k * cell + (n % SUB + 0.5) * step;
+            at.y = y0 + (n / SUB % SUB + 0.5) * step;
+            sum[k] += global_at(g, &at);
+            poses++;
+        }
     }
-    if (g->fresh) /* nothing blurs what is uniform */
-        g->owed_position = g->owed_heading = 0.0;
-    g->job.reference = best_codes(g);
-    g->value[0] = (float)(BLOCKED * exp(-g->job.reference));
-    nav_expected_prepare(g->expected, (const float *const *)g->factor);
-    g->job.side = side_of(&g->owed_position, g->cell, ADAPTIVE_PASSES_MOST, &g->job.passes);
-    g->job.side_heading = side_of(&g->owed_heading, g->cell_theta, 1, &one);
-    g->job.phase = g->job.side_heading > 0.0f && !g->fresh ? ADAPTIVE_TURN : ADAPTIVE_MOVE;
-    g->job.about = nav_compose(g->summary.belief.mean, g->job.step);
-    adaptive_global_forget_values(g);
+    for (int k = 0; k < NAV_LANES; k++)
+        like[k] = (float)(sum[k] / (SUB * SUB * TURNS));
+    return EXPECT_CELLS * poses;
 }
 
-/* The first stored cell that is as heavy as the heaviest. */
-static size_t mode(const struct adaptive_global *g)
+static void global_begin(struct adaptive_global *g, struct adaptive_log *log)
 {
-    size_t n = (size_t)g->job.mode_slice * (size_t)g->ny * (size_t)g->pitch;
-    while (g->mass[n] < g->job.heaviest)
-        n++;
-    return n;
+    struct nav_histogram *h = &g->histogram;
+    global_read_job(g, log);
+    if (!h->uniform && nav_histogram_debt(h) > JOBS_OWED_MOST) {
+        adaptive_global_restart(g, g->next);
+        global_read_job(g, log);
+    }
+    bool first = h->level == g->level;
+    g->slice = -1;
+    g->job.uniform = h->uniform;
+    g->job.reference = global_best(g);
+    if (first)
+        nav_expected_begin(g->expected, (const float *const *)g->factor, (float)(BLOCKED * exp(-g->job.reference)));
+    g->weigh = (struct nav_weigh){.group = first ? global_look_up : global_work_out,
+                                  .self = g,
+                                  .most = NAV_LANES * (first ? 1 : EXPECT_CELLS * SUB * SUB * TURNS),
+                                  .least = h->uniform ? 0.0 : SHARE_LEAST};
+    nav_histogram_begin(h, g->job.step, &g->weigh, nav_compose(g->summary.belief.mean, g->job.step));
 }
 
-/* Ends a job; a row that fits nowhere, or that lost all mass beyond the walls, leaves nothing to believe. `many`: its
- * cells have not been counted. */
-static void end(struct adaptive_global *g, bool many)
+/* Ends a job; a row that fits nowhere, or that lost all mass beyond the walls, leaves nothing to believe. */
+static void global_end(struct adaptive_global *g)
 {
     uint64_t next = g->job.end;
-    double gain = log(g->job.total) + g->job.reference - g->job.local - (g->fresh ? g->log_free : 0.0);
-    if (!(g->job.total > 0.0 && isfinite(gain))) {
+    g->distinct += g->expected->knowns;
+    double free = g->job.uniform ? log(fmax(g->expected->standing, 1e-9)) : 0.0;
+    double gain = log(g->histogram.total) + g->job.reference - g->job.local - free;
+    if (!(g->histogram.total > 0.0 && isfinite(gain))) {
         adaptive_global_restart(g, next);
         return;
     }
-    g->rotation = nav_wrap(g->rotation + g->job.step.theta);
-    g->fresh = g->job.running = false;
-    g->total = g->job.total;
-    g->mode = mode(g);
-    g->scattered = many ? 1.0 : g->job.light / g->total;
-    g->crowd = g->job.crowd;
+    g->job.phase = ADAPTIVE_IDLE;
     g->gained += gain;
     g->next = next;
-    adaptive_global_summarise(g);
+    g->summary = (struct nav_summary){.near = 0.0};
+    double near = nav_histogram_summarise(&g->histogram, &g->summary.belief);
+    g->summary.near = fmin(near / g->histogram.total, 1.0);
 }
 
-/* Does the job's next slice; false: that would take more than `most` cells. */
-static bool next_slice(struct adaptive_global *g, long most)
+/* Counts cells worth a hypothesis, for at most `most` cells passed over. */
+static bool global_count(struct adaptive_global *g, long most)
 {
-    static long (*const part[])(struct adaptive_global *, int, long) = {[ADAPTIVE_TURN] = adaptive_global_turn,
-                                                                        [ADAPTIVE_MOVE] = adaptive_global_move,
-                                                                        [ADAPTIVE_COUNT] = adaptive_global_count};
-    long touched = part[g->job.phase](g, g->job.slice, most);
-    g->touched += touched > 0 ? touched : 0;
-    g->job.slice += touched >= 0;
-    return touched >= 0;
+    const struct nav_histogram *h = &g->histogram;
+    float worth = (float)(h->total / g->room);
+    for (; g->job.counted < nav_histogram_groups(h); g->job.counted++, g->touched += NAV_LANES) {
+        const float *mass = h->now.mass + (size_t)g->job.counted * NAV_LANES;
+        if (g->touched + NAV_LANES > most)
+            return false;
+        for (int k = 0; k < NAV_LANES; k++) {
+            g->job.light += mass[k] < worth ? (double)mass[k] : 0.0;
+            g->job.crowd += mass[k] < worth ? 0.0 : 1.0;
+        }
+    }
+    g->scattered = g->job.light / h->total;
+    g->crowd = g->job.crowd;
+    return true;
 }
 
-/* From a phase that is done to the next. */
-static void next_phase(struct adaptive_global *g)
+/* From the pass to the count. While even the heaviest cell is worth less than several hypotheses, or cells are still to
+ * be refined, there are too many for a cloud. */
+static void global_passed(struct adaptive_global *g)
 {
-    enum adaptive_phase done = g->job.phase;
-    g->job.slice = 0;
-    if (done == ADAPTIVE_TURN)
-        adaptive_global_turned(g);
-    g->job.phase = done == ADAPTIVE_TURN ? ADAPTIVE_MOVE : ADAPTIVE_COUNT;
-    g->job.worth = g->job.total / g->room;
-    /* While even the heaviest cell is worth less than several hypotheses there are too many for a cloud. */
-    bool many = (double)g->job.heaviest < g->problem->settings.adaptive_per_bin * g->job.worth;
-    if (done == ADAPTIVE_COUNT || (done == ADAPTIVE_MOVE && (many || !(g->job.total > 0.0))))
-        end(g, many);
+    struct nav_histogram *h = &g->histogram;
+    double worth = h->total / g->room;
+    g->scattered = 1.0;
+    g->job.phase = ADAPTIVE_COUNT;
+    if (h->level > 0 && h->total > 0.0 && 8 * h->cells <= REFINED_MOST && nav_histogram_refine(h)) {
+        g->touched += h->cells;
+    } else if (h->level == 0 && (double)h->heaviest >= g->problem->settings.adaptive_per_bin * worth) {
+        return;
+    }
+    global_end(g);
+}
+
+/* Goes on with a job; false: not within `most` cells. */
+static bool global_go_on(struct adaptive_global *g, long most)
+{
+    if (g->job.phase == ADAPTIVE_PASS) {
+        /* Kept back: what it takes to refine the cells that are left. */
+        long kept = g->histogram.level > 0 ? REFINED_MOST : 0;
+        g->touched += nav_histogram_run(&g->histogram, most - kept - g->touched);
+        if (nav_histogram_running(&g->histogram))
+            return false;
+        global_passed(g);
+    } else if (global_count(g, most)) {
+        global_end(g);
+    } else {
+        return false;
+    }
+    return true;
 }
 
 void adaptive_global_work(struct adaptive_global *g, struct adaptive_log *log, long budget)
@@ -206,16 +271,240 @@ void adaptive_global_work(struct adaptive_global *g, struct adaptive_log *log, l
     long most = g->touched + budget;
     if (log->head - g->next > ADAPTIVE_ROWS_KEPT) /* rows that it has not seen are overwritten */
         adaptive_global_restart(g, adaptive_log_reach(log));
-    while (g->job.running || g->next < log->head) {
-        if (!g->job.running) {
-            if (g->touched + JOB_CELLS > most)
-                return;
-            g->touched += JOB_CELLS;
-            begin(g, log);
-        }
-        if (!next_slice(g, most - g->touched))
+    do {
+        if (g->job.phase != ADAPTIVE_IDLE)
+            continue;
+        if (g->next == log->head || g->touched + JOB_CELLS > most)
             return;
-        if (g->job.slice == g->nh)
-            next_phase(g);
+        g->touched += JOB_CELLS;
+        global_begin(g, log);
+    } while (global_go_on(g, most));
+}
+
+void adaptive_global_restart(struct adaptive_global *g, uint64_t row)
+{
+    const struct nav_arena *arena = &g->problem->arena;
+    struct nav_problem lost = *g->problem;
+    lost.prior.uniform = true;
+    nav_histogram_restart(&g->histogram, g->level);
+    g->next = row;
+    g->job.phase = ADAPTIVE_IDLE;
+    g->gained = 0.0;
+    g->scattered = 1.0;
+    g->summary = (struct nav_summary){.belief = nav_gaussian_prior(&lost)};
+    g->summary.near = NAV_PI * NAV_NEAR_M * NAV_NEAR_M / (arena->size_x * arena->size_y) * NAV_NEAR_RAD / NAV_PI;
+}
+
+void adaptive_global_clear(struct adaptive_global *g, uint64_t row)
+{
+    adaptive_global_restart(g, row);
+    nav_histogram_clear(&g->histogram, 0);
+}
+
+struct squares {
+    double sum;
+};
+
+static void global_square(void *self, struct nav_pose at, double mass)
+{
+    (void)at;
+    ((struct squares *)self)->sum += mass * mass;
+}
+
+double adaptive_global_fill(struct adaptive_global *g)
+{
+    static const struct nav_pose still = {0.0, 0.0, 0.0};
+    static const struct nav_weigh all = {.group = NULL};
+    struct nav_histogram *h = &g->histogram;
+    struct squares squares = {0.0};
+    struct nav_shape finest = nav_levels_shape(&h->levels, 0);
+    nav_bumps_fill(&g->problem->prior, h);
+    nav_histogram_begin(h, still, &all, still);
+    nav_histogram_run(h, LONG_MAX);
+    nav_histogram_each(h, global_square, &squares);
+    double near = nav_histogram_summarise(h, &g->summary.belief);
+    g->summary.near = fmin(near / h->total, 1.0);
+    double finer = (double)nav_shape_cells(&finest) / (double)nav_shape_cells(&h->shape);
+    return finer * h->total * h->total / squares.sum;
+}
+
+void adaptive_global_draw(struct adaptive_global *g, struct nav_particles *to, struct nav_rng *rng, long count,
+                          double weight, struct nav_pose moved)
+{
+    long drawn = nav_histogram_draw(&g->histogram, rng, count, g->pose, (long)g->room);
+    for (long n = 0; n < drawn; n++)
+        nav_particles_add(to, nav_compose(g->pose[n], moved), weight / (double)count, rng);
+}
+
+struct sharing {
+    const struct nav_mode *mode;
+    int modes;
+    double *share, total;
+};
+
+/* Adds a cell's mass to the mode that it is nearest to. */
+static void global_share_cell(void *self, struct nav_pose at, double mass)
+{
+    const struct sharing *s = self;
+    double least = NAV_MODE_REACH;
+    int nearest = -1;
+    for (int m = 0; m < s->modes; m++) {
+        double far = nav_mode_distance(s->mode[m].mean, at);
+        if (far > least)
+            continue;
+        least = far;
+        nearest = m;
     }
+    if (nearest >= 0)
+        s->share[nearest] += mass / s->total;
+}
+
+void adaptive_global_share(const struct adaptive_global *g, const struct nav_mode *mode, int modes, double *share)
+{
+    struct sharing sharing = {mode, modes, share, g->histogram.total};
+    memset(share, 0, (size_t)modes * sizeof *share);
+    nav_histogram_each(&g->histogram, global_share_cell, &sharing);
+}
+
+void adaptive_global_add(struct adaptive_global *g, struct nav_pose pose, double share)
+{
+    double total = g->histogram.total > 0.0 ? g->histogram.total : 1.0;
+    if (g->grains < g->room)
+        g->grain[g->grains++] = (struct nav_grain){.pose = pose, .mass = share * total};
+}
+
+void adaptive_global_added(struct adaptive_global *g)
+{
+    nav_histogram_add(&g->histogram, g->grain, g->grains);
+    g->grains = 0;
+}
+
+struct listing {
+    struct nav_component bump, *out;
+    struct nav_pose since;
+    double scale;
+    long count, room;
+};
+
+static void global_list_cell(void *self, struct nav_pose at, double mass)
+{
+    struct listing *l = self;
+    l->bump.mass = l->scale * mass;
+    l->bump.pose = nav_compose(at, l->since);
+    if (l->count < l->room)
+        l->out[l->count] = l->bump;
+    l->count++;
+}
+
+long adaptive_global_list(const struct adaptive_global *g, const struct adaptive_log *log, struct nav_pose moved,
+                          double mass, struct nav_component *out, long room)
+{
+    const struct nav_histogram *h = &g->histogram;
+    struct listing l = {.out = out, .room = room, .scale = mass / h->total};
+    l.bump.sigma_m = h->shape.cell / sqrt(12.0);
+    l.bump.sigma_rad = h->shape.cell_theta / sqrt(12.0);
+    l.since = nav_compose(adaptive_log_since(log, g->next), moved);
+    nav_histogram_each(h, global_list_cell, &l);
+    return l.count;
+}
+
+/* Cells half as wide as the finest detail that a sensor tells, where that is less than the setting's. */
+static int global_levels(struct adaptive_global *g, struct nav_levels *levels, double *detail)
+{
+    const struct nav_problem *problem = g->problem;
+    const struct nav_settings *s = &problem->settings;
+    struct nav_sensors sensors;
+    int failed = nav_sensors_init(&sensors, &problem->arena, &problem->robot, s, 0.0);
+    struct nav_detail finest = nav_sensors_detail(&sensors);
+    nav_sensors_free(&sensors);
+    *detail = finest.detail;
+    double degrees = s->adaptive_cell_deg, tip = fmax(finest.lever, NAV_NEAR_M / 10.0);
+    bool fine = finest.detail / 2.0 < s->adaptive_cell_m;
+    g->wanted = fmin(s->adaptive_cell_m, finest.detail / 2.0);
+    g->budget = fine ? fmax(s->adaptive_budget, s->adaptive_detail_budget) : s->adaptive_budget;
+    if (fine)
+        degrees = fmin(degrees, TURN_SHARE * g->wanted / tip * 180.0 / NAV_PI);
+    *levels = (struct nav_levels){problem->arena.size_x, problem->arena.size_y, g->wanted, 0, 0};
+    levels->headings = (int)fmax(round(360.0 / fmax(degrees, DEGREES_LEAST)), 1.0);
+    levels->headings += levels->headings % 4 ? 4 - levels->headings % 4 : 0;
+    levels->headings_least = (int)(360.0 / DEGREES_MOST);
+    return failed;
+}
+
+/* The coarsest level that tells the detail, or one whose cells the table and the budget have room for. */
+static int global_first_level(const struct adaptive_global *g, const struct nav_levels *levels, double detail)
+{
+    enum { LEVELS = 16 };
+    double few = g->problem->settings.adaptive_rows * g->budget;
+    for (int level = 0; level < LEVELS; level++) {
+        struct nav_shape shape = nav_levels_shape(levels, level);
+        double cells = nav_shape_inside(&shape);
+        if (cells <= fmin(few, CELLS_MOST) || (2.0 * shape.cell > detail / 2.0 && cells <= CELLS_MOST))
+            return level;
+    }
+    return LEVELS;
+}
+
+static int global_tables(struct adaptive_global *g)
+{
+    const struct nav_problem *problem = g->problem;
+    const struct nav_shape *s = &g->histogram.shape;
+    /* A look-up stands for a part of a cell: that spreads the distances it should give. */
+    double blur = hypot(s->cell / SUB, 0.2 * s->cell_theta / TURNS) / sqrt(12.0);
+    g->likelihood = nav_likelihood_new(&problem->arena, &problem->robot, &problem->settings, blur);
+    if (!g->likelihood)
+        return -1;
+    g->expected = nav_expected_new(g->likelihood, s->cell, s->nh, SUB, TURNS);
+    g->factor = calloc((size_t)g->likelihood->whiskers + 1, sizeof *g->factor);
+    for (int w = 0; g->factor && w < g->likelihood->whiskers; w++) {
+        g->factor[w] = calloc((size_t)g->likelihood->model[w].codes, sizeof **g->factor);
+        if (!g->factor[w])
+            return -1;
+    }
+    return g->expected && g->factor ? 0 : -1;
+}
+
+/* Most hypotheses: adaptive.most, and a tenth of the budget, since each may be touched up to five times per row. */
+static double global_room(const struct nav_settings *s)
+{
+    return floor(fmax(fmin(s->adaptive_most, s->adaptive_budget / 10.0), 16.0));
+}
+
+int adaptive_global_init(struct adaptive_global *g, const struct nav_problem *problem)
+{
+    struct nav_levels levels;
+    double detail;
+    *g = (struct adaptive_global){.problem = problem, .room = global_room(&problem->settings)};
+    if (global_levels(g, &levels, &detail))
+        return -1;
+    g->level = global_first_level(g, &levels, detail);
+    g->pose = calloc((size_t)g->room + 1, sizeof *g->pose);
+    g->grain = calloc((size_t)g->room + 1, sizeof *g->grain);
+    if (!g->pose || !g->grain || nav_histogram_init(&g->histogram, &levels, g->level, 8L * REFINED_MOST) ||
+        global_tables(g))
+        return -1;
+    adaptive_global_restart(g, 0);
+    return 0;
+}
+
+void adaptive_global_free(struct adaptive_global *g)
+{
+    for (int w = 0; g->factor && w < g->likelihood->whiskers; w++)
+        free(g->factor[w]);
+    free(g->factor);
+    nav_likelihood_free(g->likelihood);
+    nav_expected_free(g->expected);
+    nav_histogram_free(&g->histogram);
+    free(g->pose);
+    free(g->grain);
+}
+
+size_t adaptive_global_cells(const struct adaptive_global *g)
+{
+    return (size_t)nav_shape_inside(&g->histogram.shape);
+}
+
+size_t adaptive_global_bytes(const struct adaptive_global *g)
+{
+    return nav_histogram_bytes(&g->histogram) + nav_expected_bytes(g->expected);
 }

@@ -1,82 +1,53 @@
-/* The adaptive filter's arena-wide belief: a coarse histogram that is asleep while the robot is known.
+/* The adaptive filter's arena-wide belief: a histogram that is asleep while the robot is known.
  *
- * It takes rows from the log in jobs and each job slice by slice (one slice per heading), so that any amount of work
- * can be spread over rows and none is done where no belief is: of a line of cells only the span that holds mass. Rows
- * without contact that lie within a cell of each other make one job. As in lattice.h every slice has its own shift, so
- * motion does not smear. */
+ * It takes rows from the log in jobs, each one pass over the cells that hold mass, which may be spread over rows. Rows
+ * without contact that lie close to each other make one job. It begins with cells as coarse as the arena asks for,
+ * whose expectations are a table; whenever its mass sits in few enough of them they are refined, and what finer cells
+ * expect is worked out where they hold mass. */
 #ifndef NAV_ADAPTIVE_GLOBAL_H
 #define NAV_ADAPTIVE_GLOBAL_H
 
 #include "adaptive_log.h"
 #include "expected.h"
+#include "histogram.h"
 #include "particles.h"
-#include "slices.h"
 
-/* Cells begin .. end - 1 of a line, whole lanes of them (lattice_rows.h); empty: both 0. */
-struct adaptive_span {
-    int begin, end;
-};
-
-/* What a job does, slice by slice: blurs headings, moves and weighs, counts the cells worth a hypothesis. */
-enum adaptive_phase { ADAPTIVE_TURN, ADAPTIVE_MOVE, ADAPTIVE_COUNT };
-
-enum { ADAPTIVE_SUB = 2 }; /* poses of the table per cell edge, and per slice's width */
+/* What a job does: reads rows and passes over the cells, counts those worth a hypothesis. */
+enum adaptive_phase { ADAPTIVE_IDLE, ADAPTIVE_PASS, ADAPTIVE_COUNT };
 
 /* Some rows on their way into the belief. */
 struct adaptive_job {
-    bool running;
     enum adaptive_phase phase;
-    int slice; /* next to do */
     struct nav_pose step;
-    float side; /* weight of a neighbour in a position blur of this job, 0: none; passes of it */
-    int passes;
-    float side_heading;
-    float scale;           /* brings the mass before the job to 1 */
-    double reference;      /* log-likelihood of the best codes: factors are relative to it */
-    double total;          /* mass so far */
-    float heaviest;        /* cell so far, */
-    int mode_slice;        /* and its slice */
-    struct nav_pose about; /* moments of its slices are relative to this place */
-    double local;          /* log-likelihood of its rows by the local belief */
-    uint64_t end;          /* first row after it */
-    double worth;          /* mass of a cell that is worth one hypothesis */
-    double light, crowd;   /* mass of cells below that, and how many are not */
+    double reference;    /* log-likelihood of the best codes: factors are relative to it */
+    double local;        /* log-likelihood of its rows by the local belief */
+    uint64_t end;        /* first row after it */
+    bool uniform;        /* what it began from */
+    uint32_t counted;    /* groups of cells */
+    double light, crowd; /* mass of cells worth less than a hypothesis, and how many are worth more */
 };
 
 struct adaptive_global {
     const struct nav_problem *problem;
-    struct nav_likelihood *likelihood; /* for what a whole cell covers */
-    struct nav_expected *expected;
-    int nx, ny, nh, pitch;   /* pitch: nx in whole lanes; cells beyond nx are empty */
-    double cell, cell_theta; /* m, rad */
-    double wanted;           /* m, edge of a cell that the scene's detail asks for */
-    double budget;           /* cells and hypotheses touched per row, at most */
-    double rotation;         /* as in lattice.h */
-    double *shift_x, *shift_y;
-    float *mass, *turned;                     /* [nh][ny][pitch] the belief, and where headings are blurred to */
-    struct adaptive_span *span, *span_turned; /* [nh][ny] beyond which a line is empty */
-    struct adaptive_span *moved, *region;     /* [ny] of the slice that moves: its cells before and after blurs */
-    float *plane[2];                          /* [ny + 2][pitch + 2 lanes] empty but for the slice that moves */
-    float *coordinate;                        /* [pitch] of a line's cells in x */
-    float *like;                              /* [ny][pitch] likelihoods of a slice, */
-    int *missing;                             /* [pitch] and those of a line that are still to be worked out */
-    double owed_position, owed_heading;
-    double (*moment)[NAV_MOMENTS]; /* [nh] of each slice */
-    float **factor;                /* [whiskers][codes] log-likelihood of the present job */
-    uint32_t *signature;           /* [expected->nh][SUB][SUB][ny + 1][pitch + 1]: by phase in y and x */
-    float *value;                  /* [signatures] likelihood in the present job, negative: not yet worked out */
-    uint32_t *known, knowns;       /* those worked out */
+    struct nav_likelihood *likelihood;
+    struct nav_expected *expected; /* of the level that it begins with */
+    struct nav_histogram histogram;
+    struct nav_weigh weigh;
+    int slice;              /* whose place in the table is */
+    struct nav_layer layer; /* this */
+    int level;              /* that it begins with */
+    double wanted;          /* m, edge of a cell that the scene's detail asks for */
+    double budget;          /* cells and hypotheses touched per row, at most */
+    float **factor;         /* [whiskers][codes] log-likelihood of the present job */
     struct adaptive_job job;
-    bool fresh;                 /* uniform, and not yet written out */
-    double log_free;            /* logarithm of the share of cells where the robot can stand */
     uint64_t next;              /* first row of the log that it has not seen */
-    double total;               /* mass */
-    size_t mode;                /* stored cell with the most mass */
     double gained;              /* log-likelihood of the rows seen, less the local belief's, since the restart */
     struct nav_summary summary; /* at row `next` - 1 */
     double room;                /* hypotheses that a cloud could hold */
-    double scattered;           /* share of mass in cells worth less than one of them */
-    double crowd;               /* cells that are worth more */
+    struct nav_pose *pose;      /* [room] those drawn last */
+    struct nav_grain *grain;    /* [room] collected, */
+    int32_t grains;             /* so many */
+    double scattered, crowd;    /* share of mass in cells worth less than a hypothesis; cells that are worth more */
     long touched, distinct;     /* since they were last cleared */
 };
 
@@ -87,10 +58,14 @@ void adaptive_global_free(struct adaptive_global *);
 /* Forgets everything: uniform before row `row` of the log. */
 void adaptive_global_restart(struct adaptive_global *, uint64_t row);
 
-/* Holds nothing before row `row` of the log; for adaptive_global_add. */
+/* Holds nothing before row `row` of the log, in its finest cells; for adaptive_global_add. */
 void adaptive_global_clear(struct adaptive_global *, uint64_t row);
 
-/* Takes rows from the log until it has seen them all or the next slice would touch more than `budget` cells. */
+/* Holds the problem's mixture of bumps before the first row. Returns how many equal cells of the finest level it is
+ * worth. */
+double adaptive_global_fill(struct adaptive_global *);
+
+/* Takes rows from the log until it has seen them all or has passed over `budget` cells. */
 void adaptive_global_work(struct adaptive_global *, struct adaptive_log *, long budget);
 
 /* Whether every row of the log has been seen. */
@@ -100,27 +75,19 @@ bool adaptive_global_current(const struct adaptive_global *, const struct adapti
 void adaptive_global_draw(struct adaptive_global *, struct nav_particles *, struct nav_rng *, long count, double weight,
                           struct nav_pose moved);
 
-/* Share of the belief that belongs to each mode, between jobs: a cell belongs to the mode that it is nearest to. */
+/* Share of the belief that belongs to each mode: a cell belongs to the mode that it is nearest to. */
 void adaptive_global_share(const struct adaptive_global *, const struct nav_mode *, int modes, double *share);
 
-/* Adds to the cell that holds a pose, between jobs: `share` of what all cells hold. The total stays what it was. */
+/* Collects a pose that is to get `share` of what all cells hold; then adds those collected. Between jobs. */
 void adaptive_global_add(struct adaptive_global *, struct nav_pose, double share);
+void adaptive_global_added(struct adaptive_global *);
 
-/* Lists cells as nav_filter_components does, at the end of the log and then moved by `moved`, masses times `mass`.
- * Where a job is under way, slices that it has done are read after its rows and the others before them; headings keep
- * the shares that they had. */
+/* Lists cells as nav_filter_components does, at the end of the log and then moved by `moved`, masses times `mass`. */
 long adaptive_global_list(const struct adaptive_global *, const struct adaptive_log *, struct nav_pose moved,
                           double mass, struct nav_component *out, long room);
 
-/* First cell of a line. */
-static inline float *adaptive_global_line(const struct adaptive_global *g, float *mass, int p, int j)
-{
-    return mass + ((size_t)p * (size_t)g->ny + (size_t)j) * (size_t)g->pitch;
-}
-
-/* Cells of the arena; cells of the arrays, those beyond nx included. */
+/* Cells of the level that it is at; bytes of all. */
 size_t adaptive_global_cells(const struct adaptive_global *);
-size_t adaptive_global_stored(const struct adaptive_global *);
 size_t adaptive_global_bytes(const struct adaptive_global *);
 
 #endif

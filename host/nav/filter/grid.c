@@ -3,16 +3,17 @@
  * A cell's likelihood is the mean over its sub-poses, so that a border that cuts a cell counts by its share. Where the
  * robot cannot stand the likelihood is 0. Motion is put off until something is read: one pass then does for several
  * rows, and nothing is lost, since motions compose exactly. */
+#include <limits.h>
 #include <math.h>
 #include <stdlib.h>
 
+#include "bumps.h"
 #include "calibration.h"
 #include "expected.h"
 #include "filter.h"
 #include "gaussian.h"
-#include "lattice.h"
+#include "histogram.h"
 #include "likelihood.h"
-#include "mixture.h"
 
 static const double SURE = 0.5;   /* confidence from which a belief judges whiskers, */
 static const double LIGHT = 1e-4; /* by cells with more mass than this */
@@ -21,8 +22,8 @@ struct grid {
     const struct nav_problem *problem;
     struct nav_likelihood *likelihood;
     struct nav_expected *expected;
-    struct nav_mixture *mixture;
-    struct nav_lattice lattice;
+    struct nav_histogram histogram;
+    struct nav_weigh weigh;
     struct nav_layer *layer;     /* [slices] where each lies in the tables */
     struct nav_pending pending;  /* since the last update */
     struct nav_gaussian summary; /* of the belief at the last update: mean near the mode, covariance about it */
@@ -36,137 +37,99 @@ static void destroy(void *self)
     struct grid *g = self;
     nav_likelihood_free(g->likelihood);
     nav_expected_free(g->expected);
-    nav_mixture_free(g->mixture);
-    nav_lattice_free(&g->lattice);
+    nav_histogram_free(&g->histogram);
     free(g->layer);
     free(g);
 }
 
-/* Where a slice's sub-poses lie among those of the table, to the nearest. */
-static struct nav_layer layer(const struct grid *g, int p)
-{
-    const struct nav_lattice *l = &g->lattice;
-    const struct nav_expected *e = g->expected;
-    double turns = (p + 0.5 / g->mixture->turns) / l->nh + l->rotation / (2.0 * NAV_PI);
-    return (struct nav_layer){
-        .heading = (int)((turns - floor(turns)) * e->nh) % e->nh,
-        .x = (int)floor(l->shift_x[p] / e->step + 0.5),
-        .y = (int)floor(l->shift_y[p] / e->step + 0.5),
-    };
-}
-
 static void find_layers(struct grid *g)
 {
-    for (int p = 0; p < g->lattice.nh; p++)
-        g->layer[p] = layer(g, p);
+    const struct nav_histogram *h = &g->histogram;
+    for (int p = 0; p < h->shape.nh; p++)
+        g->layer[p] = nav_expected_layer(g->expected, nav_histogram_heading(h, p), nav_histogram_shift_x(h, p),
+                                         nav_histogram_shift_y(h, p));
 }
 
-static void likelihood_row(const void *self, int p, int j, int begin, int end, float *out)
+/* Adds what a cell near the pose expected expects, before it is weighed; light ones are left out. */
+static void expect_cell(struct grid *g, int p, int line, int column, double mass)
 {
-    const struct grid *g = self;
-    nav_mixture_look_up(g->mixture, &g->layer[p], j, begin, end, out);
-}
-
-/* Adds what one cell expects, where it will be after its slice's pending whole-cell move. */
-static void expect_cell(struct grid *g, int p, int i, int j, double mass)
-{
-    const struct nav_expected *e = g->expected;
-    const struct nav_mix *mix = nav_mixture_at(g->mixture, &g->layer[p], i, j);
-    for (uint32_t n = mix->first; n < mix->end; n++) {
-        const struct nav_part *part = &g->mixture->part[n];
-        const uint8_t *codes = e->codes + ((size_t)part->signature + 1) * ((size_t)e->whiskers + 1);
-        nav_trust_add(g->likelihood, codes, mass * (double)part->share);
-    }
-}
-
-/* The same for a slice's cells near the pose expected, light ones left out. */
-static void expect_slice(struct grid *g, int p)
-{
-    const struct nav_lattice *l = &g->lattice;
-    struct nav_pose at = g->summary.mean;
-    int reach = (int)ceil(NAV_NEAR_M / l->cell);
-    int x = (int)floor((at.x - l->shift_x[p]) / l->cell), y = (int)floor((at.y - l->shift_y[p]) / l->cell);
-    for (int j = y - reach; j <= y + reach; j++) {
-        int row = j - l->roll_y[p];
-        if (j < 0 || j >= l->ny || row < 0 || row >= l->ny)
-            continue;
-        for (int i = x - reach; i <= x + reach; i++) {
-            int column = i - l->roll_x[p];
-            if (i < 0 || i >= l->nx || column < 0 || column >= l->nx)
-                continue;
-            double mass = l->scale * (double)nav_lattice_slice(l, p)[row * l->nx + column];
-            if (mass > LIGHT)
-                expect_cell(g, p, i, j, mass);
-        }
-    }
-}
-
-/* Judges the row's readings by a belief that is fairly sure. */
-static void learn_trust(struct grid *g)
-{
-    const struct nav_lattice *l = &g->lattice;
-    if (g->confidence < SURE)
+    const struct nav_shape *s = &g->histogram.shape;
+    if (mass <= LIGHT)
         return;
-    nav_trust_begin(g->likelihood);
-    for (int p = 0; p < l->nh; p++) {
-        if (fabs(nav_wrap(nav_lattice_heading(l, p) - g->summary.mean.theta)) <= NAV_NEAR_RAD)
-            expect_slice(g, p);
+    double x = (column + 0.5) * s->cell + nav_histogram_shift_x(&g->histogram, p) - g->summary.mean.x;
+    double y = (line + 0.5) * s->cell + nav_histogram_shift_y(&g->histogram, p) - g->summary.mean.y;
+    int poses = g->expected->sub * g->expected->sub * g->expected->turns;
+    double turn = nav_histogram_heading(&g->histogram, p) - g->summary.mean.theta;
+    if (hypot(x, y) > NAV_NEAR_M || fabs(nav_wrap(turn)) > NAV_NEAR_RAD)
+        return;
+    for (int n = 0; n < poses; n++) {
+        const uint8_t *codes = nav_expected_codes(g->expected, &g->layer[p], line, column, n);
+        if (codes)
+            nav_trust_add(g->likelihood, codes, mass / poses);
     }
-    nav_trust_learn(g->likelihood);
 }
 
-/* Multiplies by the likelihood and normalises; `extra` is added to each cell first. Returns false with no mass. */
-static bool reweigh(struct grid *g, double extra)
+static long weigh_group(void *self, int p, int line, int group, const float *mass, float *like)
 {
-    struct nav_lattice *l = &g->lattice;
-    const struct nav_lattice_weigh weigh = {
-        .row = likelihood_row, .self = g, .begin = g->mixture->begin, .end = g->mixture->end, .extra = extra};
-    nav_mixture_begin(g->mixture, g->expected);
-    for (int p = 0; p < l->nh; p++)
-        nav_mixture_work_out(g->mixture, &g->layer[p]);
-    nav_lattice_pass(l, &weigh, g->summary.mean);
-    if (!(l->total > 0.0 && isfinite(l->total)))
+    struct grid *g = self;
+    nav_expected_mean(g->expected, &g->layer[p], line, group * NAV_LANES, mass, like);
+    for (int k = 0; k < NAV_LANES && g->confidence >= SURE; k++)
+        expect_cell(g, p, line, group * NAV_LANES + k, (double)mass[k]);
+    return 0;
+}
+
+/* Moves, multiplies by the likelihood and normalises; `extra` is added to each cell first. Returns false with no mass.
+ */
+static bool reweigh(struct grid *g, struct nav_pose step, double extra)
+{
+    static const struct nav_weigh noise = {.group = NULL};
+    enum { PASSES_MOST = 25 };
+    struct nav_histogram *h = &g->histogram;
+    for (int n = 0; n < PASSES_MOST && nav_histogram_debt(h) > 1.0 && h->total > 0.0; n++) {
+        nav_histogram_begin(h, step, &noise, g->summary.mean);
+        nav_histogram_run(h, LONG_MAX);
+        step = (struct nav_pose){0.0, 0.0, 0.0};
+    }
+    if (!(h->total > 0.0))
         return false;
-    l->scale = 1.0 / l->total;
-    return true;
+    g->weigh = (struct nav_weigh){.group = weigh_group, .self = g, .extra = extra};
+    nav_histogram_begin(h, step, &g->weigh, g->summary.mean);
+    find_layers(g);
+    nav_histogram_run(h, LONG_MAX);
+    return h->total > 0.0 && isfinite(h->total);
 }
 
 static void summarise(struct grid *g)
 {
-    struct nav_lattice *l = &g->lattice;
-    if (!(l->total > 0.0)) { /* no place in the arena is free: nothing can be known */
+    if (!(g->histogram.total > 0.0)) { /* no place in the arena is free: nothing can be known */
         struct nav_problem anywhere = *g->problem;
         anywhere.prior.uniform = true;
         g->summary = nav_gaussian_prior(&anywhere);
         g->confidence = 0.0;
         return;
     }
-    const struct nav_slices slices = nav_lattice_slices(l);
-    struct nav_pose mode = nav_slices_centre(&slices, nav_lattice_peak(l, l->peak_slice));
-    g->confidence = fmin(nav_slices_summarise(&slices, mode, &g->summary) * l->scale, 1.0);
-}
-
-/* Takes a prior, clipped to free space; false when that leaves nothing. */
-static bool start(struct grid *g, const struct nav_prior *prior)
-{
-    nav_lattice_fill(&g->lattice, prior);
-    nav_lattice_clip(&g->lattice, g->mixture->begin, g->mixture->end);
-    return reweigh(g, 0.0);
+    double near = nav_histogram_summarise(&g->histogram, &g->summary);
+    g->confidence = fmin(near / g->histogram.total, 1.0);
 }
 
 /* Spreads the belief over free space, by what the present row says. */
 static void forget(struct grid *g)
 {
-    start(g, &(struct nav_prior){.uniform = true});
+    g->confidence = 0.0;
+    nav_histogram_restart(&g->histogram, 0);
+    reweigh(g, (struct nav_pose){0.0, 0.0, 0.0}, 0.0);
 }
 
 /* The belief before anything is read: the tables say that all is equally likely. */
 static void begin(struct grid *g)
 {
-    g->summary.mean = g->problem->prior.mean;
-    find_layers(g);
-    nav_expected_evaluate(g->expected, g->likelihood);
-    if (!start(g, &g->problem->prior))
+    const struct nav_prior *prior = &g->problem->prior;
+    g->summary.mean = prior->mean;
+    nav_expected_begin(g->expected, (const float *const *)g->likelihood->table, 0.0f);
+    nav_expected_scale(g->expected);
+    if (!prior->uniform)
+        nav_bumps_fill(prior, &g->histogram);
+    if (!reweigh(g, (struct nav_pose){0.0, 0.0, 0.0}, 0.0))
         forget(g);
     summarise(g);
 }
@@ -175,19 +138,15 @@ static bool make_tables(struct grid *g)
 {
     const struct nav_problem *problem = g->problem;
     const struct nav_settings *s = &problem->settings;
+    const struct nav_shape *shape = &g->histogram.shape;
     int sub = (int)s->grid_sub, turns = (int)s->grid_sub_heading;
-    double step = s->grid_cell_m / sub, turn = g->lattice.cell_theta / turns;
     /* A look-up stands for poses within half a step and half a turn: that spreads the distances it should give. */
-    double blur = hypot(step, 0.2 * turn) / sqrt(12.0);
+    double blur = hypot(shape->cell / sub, 0.2 * shape->cell_theta / turns) / sqrt(12.0);
     g->likelihood = nav_likelihood_new(&problem->arena, &problem->robot, s, blur);
     if (g->likelihood)
-        g->expected = nav_expected_new(g->likelihood, step, g->lattice.nh * turns, 3 * sub);
-    if (g->expected)
-        g->mixture = nav_mixture_new(g->expected, g->lattice.nx, g->lattice.ny, sub, turns);
-    if (!g->mixture)
-        return false;
-    nav_expected_forget_poses(g->expected);
-    return true;
+        g->expected = nav_expected_new(g->likelihood, shape->cell, shape->nh, sub, turns);
+    g->layer = calloc((size_t)shape->nh, sizeof *g->layer);
+    return g->expected && g->layer;
 }
 
 static void *create(const struct nav_problem *problem)
@@ -198,11 +157,11 @@ static void *create(const struct nav_problem *problem)
         return NULL;
     g->problem = problem;
     nav_calibration_init(&g->calibration);
-    int headings = (int)fmax(round(360.0 / s->grid_cell_deg), 1.0);
-    g->layer = calloc((size_t)headings, sizeof *g->layer);
-    if (!g->layer ||
-        nav_lattice_init(&g->lattice, problem->arena.size_x, problem->arena.size_y, s->grid_cell_m, headings) ||
-        !make_tables(g)) {
+    const struct nav_levels levels = {.size_x = problem->arena.size_x,
+                                      .size_y = problem->arena.size_y,
+                                      .cell = s->grid_cell_m,
+                                      .headings = (int)fmax(round(360.0 / s->grid_cell_deg), 1.0)};
+    if (nav_histogram_init(&g->histogram, &levels, 0, 0) || !make_tables(g)) {
         destroy(g);
         return NULL;
     }
@@ -229,22 +188,27 @@ static void predict(void *self, const struct nav_motion *told)
     struct grid *g = self;
     struct nav_motion motion = calibrated(g, told);
     struct nav_noise noise = nav_motion_noise(&g->problem->robot, &g->problem->settings, &motion);
-    noise.position += nav_slice_fan(motion.step, g->lattice.cell_theta, g->problem->settings.motion_along_m);
+    noise.position += nav_histogram_fan(&g->histogram, motion.step, g->problem->settings.motion_along_m);
     nav_pending_add(&g->pending, motion.step, noise);
 }
 
 static void update(void *self, const struct nav_evidence *evidence)
 {
     struct grid *g = self;
-    nav_lattice_shift(&g->lattice, g->pending.step, &g->pending.noise);
-    g->summary.mean = nav_compose(g->summary.mean, g->pending.step);
+    struct nav_pose step = g->pending.step;
+    g->histogram.owed_position += g->pending.noise.position;
+    g->histogram.owed_heading += g->pending.noise.heading;
+    g->summary.mean = nav_compose(g->summary.mean, step);
     g->pending = (struct nav_pending){.step = {0.0, 0.0, 0.0}};
-    find_layers(g);
     nav_likelihood_read(g->likelihood, evidence);
-    learn_trust(g);
-    nav_expected_evaluate(g->expected, g->likelihood);
-    if (!reweigh(g, g->problem->settings.grid_teleport / (double)nav_lattice_cells(&g->lattice)))
+    nav_expected_begin(g->expected, (const float *const *)g->likelihood->table, 0.0f);
+    nav_expected_scale(g->expected);
+    nav_trust_begin(g->likelihood);
+    bool sure = g->confidence >= SURE; /* fairly: it judges the row's readings */
+    if (!reweigh(g, step, g->problem->settings.grid_teleport / nav_shape_inside(&g->histogram.shape)))
         forget(g);
+    if (sure)
+        nav_trust_learn(g->likelihood);
     summarise(g);
 }
 
@@ -253,37 +217,45 @@ static void estimate(const void *self, struct nav_estimate *out)
     const struct grid *g = self;
     nav_gaussian_ahead(&g->summary, &g->pending, out);
     out->confidence = g->confidence;
-    out->evaluations = (long)nav_lattice_cells(&g->lattice);
-    out->states = out->touched = out->evaluations;
-    out->distinct = (long)g->expected->signatures - 1;
-    out->bytes = sizeof *g + 2 * nav_lattice_cells(&g->lattice) * sizeof(float) + nav_expected_bytes(g->expected) +
-                 nav_mixture_bytes(g->mixture);
+    out->states = out->touched = out->evaluations = (long)nav_shape_inside(&g->histogram.shape);
+    out->distinct = (long)g->expected->knowns;
+    out->bytes = sizeof *g + nav_histogram_bytes(&g->histogram) + nav_expected_bytes(g->expected);
+}
+
+struct listing {
+    const struct grid *g;
+    struct nav_component bump, *out;
+    long count, room;
+};
+
+static void list_cell(void *self, struct nav_pose at, double mass)
+{
+    struct listing *l = self;
+    l->bump.pose = nav_compose(at, l->g->pending.step);
+    l->bump.mass = mass / l->g->histogram.total;
+    if (l->count < l->room)
+        l->out[l->count] = l->bump;
+    l->count++;
 }
 
 static long components(const void *self, struct nav_component *out, long room)
 {
     const struct grid *g = self;
-    const struct nav_lattice *l = &g->lattice;
-    const struct nav_slices slices = nav_lattice_slices(l);
-    double sigma = sqrt(l->cell * l->cell / 12.0 + l->owed_position + g->pending.noise.position);
-    double sigma_turn = sqrt(l->cell_theta * l->cell_theta / 12.0 + l->owed_heading + g->pending.noise.heading);
-    long count = 0;
-    for (size_t n = 0; n < nav_lattice_cells(l); n++) {
-        if (!(l->mass[n] > 0.0f))
-            continue;
-        if (count < room)
-            out[count] = (struct nav_component){nav_compose(nav_slices_centre(&slices, n), g->pending.step), sigma,
-                                                sigma_turn, (double)l->mass[n] * l->scale};
-        count++;
-    }
-    return count;
+    const struct nav_histogram *h = &g->histogram;
+    struct listing l = {.g = g, .out = out, .room = room};
+    double cell = h->shape.cell, turn = h->shape.cell_theta;
+    l.bump.sigma_m = sqrt(cell * cell / 12.0 + h->owed_position + g->pending.noise.position);
+    l.bump.sigma_rad = sqrt(turn * turn / 12.0 + h->owed_heading + g->pending.noise.heading);
+    nav_histogram_each(h, list_cell, &l);
+    return l.count;
 }
 
 static struct nav_resolution resolution(const void *self)
 {
     const struct grid *g = self;
     double finest = nav_sensors_detail(&g->likelihood->sensors).detail;
-    return (struct nav_resolution){g->lattice.cell, g->lattice.cell_theta, fmin(g->lattice.cell, finest / 2.0)};
+    const struct nav_shape *s = &g->histogram.shape;
+    return (struct nav_resolution){s->cell, s->cell_theta, fmin(s->cell, finest / 2.0)};
 }
 
 const struct nav_filter_ops nav_grid_filter = {.name = "grid",

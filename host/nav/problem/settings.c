@@ -58,7 +58,7 @@ static const struct entry ENTRIES[] = {
     ENTRY(adaptive, gain, 0.15, 0.0, 0.5),
     ENTRY(adaptive, cell_m, 0.05, 0.005, 1.0),
     ENTRY(adaptive, cell_deg, 10.0, 0.5, 90.0),
-    ENTRY(adaptive, rows, 4.0, 1.0, 100.0),
+    ENTRY(adaptive, rows, 2.0, 0.1, 100.0),
     ENTRY(adaptive, hazard, 0.0001, 1e-12, 0.1),
     ENTRY(adaptive, wake, 0.001, 1e-12, 0.4),
     ENTRY(adaptive, scattered, 0.01, 0.0, 1.0),

@@ -45,19 +45,18 @@ struct nav_settings {
     double adaptive_bin_m;         /* of this edge */
     double adaptive_bin_deg;       /* and this extent in heading */
     double adaptive_gain;          /* prior standard deviation of the odometry's gains */
-    double adaptive_cell_m;        /* edge of the arena-wide histogram's cells; less on small tiles, more in large
-                                      arenas */
+    double adaptive_cell_m;        /* edge of the arena-wide histogram's finest cells; less on small tiles */
     double adaptive_cell_deg;      /* and their extent in heading */
-    double adaptive_rows;          /* the arena-wide histogram has at most so many budgets of cells */
-    double adaptive_hazard;        /* probability at any row that the robot has been put elsewhere */
-    double adaptive_wake;          /* odds of being elsewhere at which the histogram wakes */
-    double adaptive_scattered;     /* share of the histogram that a cloud may leave out */
-    double multi_modes;            /* Gaussians, at most */
-    double multi_points;           /* at which each is weighed */
-    double multi_quantum_m; /* added to each posterior: standard deviation, at the robot and at a whisker's tip */
-    double multi_split;     /* a mode splits when two heaps explain this share of its longest axis's variance */
-    double multi_merge;     /* modes merge when their means are so many standard deviations apart */
-    double multi_prune;     /* share of weight at which a mode is dropped */
+    double adaptive_rows; /* it begins with at most so many budgets of cells, where these are not too wide for tiles */
+    double adaptive_hazard;    /* probability at any row that the robot has been put elsewhere */
+    double adaptive_wake;      /* odds of being elsewhere at which the histogram wakes */
+    double adaptive_scattered; /* share of the histogram that a cloud may leave out */
+    double multi_modes;        /* Gaussians, at most */
+    double multi_points;       /* at which each is weighed */
+    double multi_quantum_m;    /* added to each posterior: standard deviation, at the robot and at a whisker's tip */
+    double multi_split;        /* a mode splits when two heaps explain this share of its longest axis's variance */
+    double multi_merge;        /* modes merge when their means are so many standard deviations apart */
+    double multi_prune;        /* share of weight at which a mode is dropped */
 };
 
 /* The defaults. */

@@ -1,11 +1,11 @@
-/* The adaptive filter's histogram by itself: what a job passes over and counts, the noise that it is told, and mass
+/* The adaptive filter's histogram by itself: what a job passes over and counts, coarse cells that become finer, mass
  * that is neither lost nor worked out twice; and what the log of rows that it reads takes. */
 #include "adaptive_global.h"
 
 #include "near.h"
 #include "wander.h"
 
-enum { WHISKERS = WANDER_TIPS + WANDER_RAYS, JOB = 10000 /* for a job's beginning and end */, PLENTY = 1000000 };
+enum { WHISKERS = WANDER_TIPS + WANDER_RAYS, JOB = 10000 /* for a job's beginning and end */, PLENTY = 100000000 };
 
 static const struct nav_noise NO_NOISE = {0.0, 0.0};
 static const uint8_t PLAIN[16] = {0};
@@ -16,12 +16,15 @@ struct belief {
     struct adaptive_log log;
 };
 
-/* Uniform over an arena with one texture everywhere, for a robot so small that it can stand in every cell. */
-static void begin(struct belief *b)
+/* Uniform over an arena of so many metres with one texture everywhere, for a robot so small that it can stand in every
+ * cell. */
+static void begin(struct belief *b, double size)
 {
     b->problem = wander_new(0).problem;
     b->problem.arena.floor = PLAIN;
     b->problem.arena.boxes = 0;
+    b->problem.arena.size_x = b->problem.arena.size_y = size;
+    b->problem.arena.tile = size / 4.0;
     b->problem.robot.body_radius = 0.01;
     assert_int_equal(adaptive_global_init(&b->g, &b->problem), 0);
     assert_int_equal(adaptive_log_init(&b->log, &b->g.likelihood->sensors), 0);
@@ -31,24 +34,6 @@ static void end(struct belief *b)
 {
     adaptive_global_free(&b->g);
     adaptive_log_free(&b->log);
-}
-
-/* The belief as a list of cells: none yet. */
-static void empty(struct belief *b)
-{
-    b->g.fresh = false;
-    b->g.total = 0.0;
-}
-
-/* Puts mass into `count` cells of a line, from cell i on. */
-static void put(struct belief *b, int p, int j, int i, int count, float each)
-{
-    struct adaptive_span *span = &b->g.span[p * b->g.ny + j];
-    int last = i + count + NAV_LANES - 1;
-    *span = (struct adaptive_span){i - i % NAV_LANES, last - last % NAV_LANES};
-    for (int k = i; k < i + count; k++)
-        adaptive_global_line(&b->g, b->g.mass, p, j)[k] = each;
-    b->g.total += count * (double)each;
 }
 
 /* A row of a robot that stands. texture: what both tips say, NULL: nothing is read. */
@@ -65,90 +50,61 @@ static void work(struct belief *b, long budget)
     adaptive_global_work(&b->g, &b->log, budget);
 }
 
-static void slices_of_a_uniform_belief_are_done_as_far_as_the_budget_goes(void **state)
+/* Passed over and weighed: two for each cell of a uniform belief. */
+static void a_uniform_belief_is_passed_over_as_far_as_the_budget_goes(void **state)
 {
     (void)state;
     struct belief b;
-    begin(&b);
+    begin(&b, 2.0);
+    size_t each = nav_shape_cells(&b.g.histogram.shape) * 2;
+    long budget = JOB + (long)each / 3;
     write(&b, NO_NOISE, NULL);
-    long slice = 2L * b.g.ny * b.g.pitch, budget = JOB + 3 * slice + slice / 2;
     work(&b, budget);
-    assert_true(b.g.job.running && b.g.job.slice == 3);
-    assert_int_equal(b.g.touched, JOB + 3 * slice);
+    assert_in_range(b.g.touched, budget - 4 * NAV_LANES, budget);
+    assert_true(nav_histogram_running(&b.g.histogram) && !adaptive_global_current(&b.g, &b.log));
+    b.g.touched = 0;
+    work(&b, PLENTY);
+    assert_in_range(b.g.touched, (long)each - budget, (long)each - budget + JOB + 4 * NAV_LANES);
+    assert_true(adaptive_global_current(&b.g, &b.log));
     end(&b);
 }
 
-/* Three cells for blurred headings, two for weighing and one for counting what is worth a hypothesis: all of them in
- * the lanes that hold mass, of the slice that does and the two beside it. */
+/* A belief in few cells costs no more than these, however large the arena. */
 static void a_job_passes_over_what_holds_mass_and_nothing_else(void **state)
 {
     (void)state;
     struct belief b;
-    begin(&b);
-    empty(&b);
-    put(&b, 5, 20, 2 * NAV_LANES, NAV_LANES, 1.0f / NAV_LANES);
-    write(&b, (struct nav_noise){0.0, 0.1 * b.g.cell_theta * b.g.cell_theta}, NULL);
+    begin(&b, 2.0);
+    adaptive_global_clear(&b.g, 0);
+    adaptive_global_add(&b.g, (struct nav_pose){1.01, 1.01, 0.3}, 1.0);
+    adaptive_global_added(&b.g);
+    write(&b, (struct nav_noise){0.0, 0.1 * b.g.histogram.shape.cell_theta * b.g.histogram.shape.cell_theta}, NULL);
     work(&b, PLENTY);
     assert_true(adaptive_global_current(&b.g, &b.log));
-    assert_int_equal(b.g.touched, JOB + (3 + 2 + 1) * 3 * NAV_LANES);
+    assert_int_equal(b.g.histogram.cells, 3);
+    /* Three slices take from three groups between them each, pass over one, weigh it, and it is counted. */
+    assert_in_range(b.g.touched, JOB, JOB + (7 + 3 * 3) * NAV_LANES);
     end(&b);
 }
 
-static void a_belief_spreads_by_the_noise_that_it_is_told(void **state)
-{
-    (void)state;
-    enum { ROWS = 6 };
-    struct belief b;
-    begin(&b);
-    empty(&b);
-    put(&b, 5, 20, 20, 1, 1.0f);
-    double cell = b.g.cell * b.g.cell, width = b.g.cell_theta * b.g.cell_theta;
-    for (int k = 0; k < ROWS; k++) {
-        write(&b, (struct nav_noise){0.3 * cell, 0.1 * width}, NULL);
-        work(&b, PLENTY);
-    }
-    const double *covariance = b.g.summary.belief.covariance;
-    /* What a cell itself covers, the noise, and what little is still owed. */
-    assert_near(covariance[0] / cell, 1.0 / 12.0 + ROWS * 0.3, 0.05);
-    assert_near(covariance[4] / cell, 1.0 / 12.0 + ROWS * 0.3, 0.05);
-    assert_near(covariance[8] / width, 1.0 / 12.0 + ROWS * 0.1, 0.05);
-    end(&b);
-}
-
-static void mass_along_the_walls_stays(void **state)
-{
-    (void)state;
-    struct belief b;
-    begin(&b);
-    empty(&b);
-    int last = b.g.ny - 1;
-    put(&b, 5, 0, 20, 1, 0.5f);
-    put(&b, 5, last, 20, 1, 0.5f);
-    write(&b, NO_NOISE, NULL);
-    work(&b, PLENTY);
-    assert_near((double)adaptive_global_line(&b.g, b.g.mass, 5, 0)[20], 0.5, 1e-6);
-    assert_near((double)adaptive_global_line(&b.g, b.g.mass, 5, last)[20], 0.5, 1e-6);
-    end(&b);
-}
-
-/* Half of the mass in one cell, half in thousands; a row that fits all of them alike, badly, changes no share. */
+/* Half of the mass in one cell, half in thousands. */
 static void what_is_scattered_is_a_share_of_the_mass(void **state)
 {
     (void)state;
-    const double wrong[WANDER_CLASSES] = {log(0.075), log(0.85), log(0.075)};
+    enum { CELLS = 1900 };
     struct belief b;
-    begin(&b);
-    empty(&b);
-    for (int p = 0; p < b.g.nh; p++) {
-        for (int j = 10; j < 20; j++)
-            put(&b, p, j, 10, 20, 0.5f / (float)(b.g.nh * 10 * 20));
-    }
-    put(&b, 5, 30, 30, 1, 0.5f);
-    write(&b, NO_NOISE, wrong);
+    begin(&b, 2.0);
+    adaptive_global_clear(&b.g, 0);
+    for (int n = 0; n < CELLS; n++)
+        adaptive_global_add(&b.g, (struct nav_pose){0.5 + n % 19 * 0.05, 0.51, n / 19 * 0.06}, 0.1 / CELLS);
+    for (int n = 0; n < 90; n++)
+        adaptive_global_add(&b.g, (struct nav_pose){1.01, 1.51, 0.3}, 0.9 / 90);
+    adaptive_global_added(&b.g);
+    write(&b, NO_NOISE, NULL);
     work(&b, PLENTY);
-    assert_true(adaptive_global_current(&b.g, &b.log) && b.g.total < 0.5);
-    assert_near(b.g.scattered, 0.5, 1e-3);
-    assert_near(b.g.crowd, 1.0, 0.0);
+    assert_true(adaptive_global_current(&b.g, &b.log));
+    assert_near(b.g.scattered, 0.1, 0.02);
+    assert_in_range((long)b.g.crowd, 1, 40);
     end(&b);
 }
 
@@ -158,15 +114,65 @@ static void an_impossible_likelihood_is_worked_out_once(void **state)
     (void)state;
     const double wrong[WANDER_CLASSES] = {log(0.075), log(0.85), log(0.075)};
     struct belief b;
-    begin(&b);
-    empty(&b);
-    put(&b, 5, 20, 16, NAV_LANES, 1.0f / NAV_LANES);
+    begin(&b, 2.0);
+    nav_histogram_clear(&b.g.histogram, b.g.level);
+    adaptive_global_add(&b.g, (struct nav_pose){1.01, 1.01, 0.3}, 1.0);
+    adaptive_global_added(&b.g);
     for (int k = 0; k < ADAPTIVE_ROWS_LATE; k++)
         write(&b, NO_NOISE, wrong);
     work(&b, PLENTY);
-    assert_true(adaptive_global_current(&b.g, &b.log) && b.g.fresh); /* nothing was left to believe */
+    assert_true(adaptive_global_current(&b.g, &b.log) && b.g.histogram.uniform); /* nothing was left to believe */
     assert_int_equal(b.g.distinct, 1);
     end(&b);
+}
+
+/* An arena of 16 m begins in coarse cells; mass in a few of them is divided, and no hypothesis is drawn before. */
+static void coarse_cells_are_refined_where_mass_is(void **state)
+{
+    (void)state;
+    struct belief b;
+    begin(&b, 16.0);
+    assert_true(b.g.level > 0 && b.g.histogram.level == b.g.level);
+    assert_near(b.g.histogram.levels.cell, b.g.wanted, 0.0);
+    nav_histogram_clear(&b.g.histogram, b.g.level);
+    adaptive_global_add(&b.g, (struct nav_pose){8.01, 8.01, 0.3}, 1.0);
+    adaptive_global_added(&b.g);
+    for (int level = b.g.level; level > 0; level--) {
+        assert_near(b.g.scattered, 1.0, 0.0);
+        write(&b, NO_NOISE, NULL);
+        work(&b, PLENTY);
+        assert_int_equal(b.g.histogram.level, level - 1);
+    }
+    write(&b, NO_NOISE, NULL);
+    work(&b, PLENTY);
+    assert_near(b.g.histogram.shape.cell, b.g.wanted, 1e-12);
+    assert_true(b.g.scattered < 0.5 && b.g.summary.near > 0.5);
+    end(&b);
+}
+
+/* What finer cells expect is worked out pose by pose: the same as the table of the first level gives. */
+static void cells_without_a_table_are_weighed_as_those_with_one(void **state)
+{
+    (void)state;
+    const double texture[WANDER_CLASSES] = {log(0.85), log(0.075), log(0.075)};
+    struct belief belief[2];
+    for (int n = 0; n < 2; n++) {
+        struct belief *b = &belief[n];
+        b->problem = wander_new(0).problem;
+        assert_int_equal(adaptive_global_init(&b->g, &b->problem), 0);
+        assert_int_equal(adaptive_log_init(&b->log, &b->g.likelihood->sensors), 0);
+        b->g.level = n; /* the second takes its cells, those of level 0, for finer than the table's */
+        write(b, NO_NOISE, texture);
+        work(b, PLENTY);
+    }
+    const struct nav_histogram *with = &belief[0].g.histogram, *without = &belief[1].g.histogram;
+    assert_int_equal(nav_histogram_groups(with), nav_histogram_groups(without));
+    for (size_t n = 0; n < nav_histogram_groups(with) * (size_t)NAV_LANES; n++)
+        assert_near((double)with->now.mass[n] / (double)with->heaviest,
+                    (double)without->now.mass[n] / (double)with->heaviest, 1e-5);
+    assert_int_equal(belief[1].g.distinct, 0);
+    end(&belief[0]);
+    end(&belief[1]);
 }
 
 static size_t log_bytes(int classes)
@@ -194,12 +200,12 @@ static void the_log_counts_the_memory_of_all_rows_kept(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(slices_of_a_uniform_belief_are_done_as_far_as_the_budget_goes),
+        cmocka_unit_test(a_uniform_belief_is_passed_over_as_far_as_the_budget_goes),
         cmocka_unit_test(a_job_passes_over_what_holds_mass_and_nothing_else),
-        cmocka_unit_test(a_belief_spreads_by_the_noise_that_it_is_told),
-        cmocka_unit_test(mass_along_the_walls_stays),
         cmocka_unit_test(what_is_scattered_is_a_share_of_the_mass),
         cmocka_unit_test(an_impossible_likelihood_is_worked_out_once),
+        cmocka_unit_test(coarse_cells_are_refined_where_mass_is),
+        cmocka_unit_test(cells_without_a_table_are_weighed_as_those_with_one),
         cmocka_unit_test(the_log_counts_the_memory_of_all_rows_kept),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -215,31 +215,36 @@ static void draws_density_and_cells_agree(void **state)
     assert_near(inside, integral, 0.01);
 }
 
+struct held {
+    double x, y, cell, all, there;
+};
+
+/* Adds a cell; `there`: one of the four around (x, y), of the first heading. */
+static void hold(void *self, struct nav_pose at, double mass)
+{
+    struct held *h = self;
+    bool around = fabs(at.x - h->x) < h->cell && fabs(at.y - h->y) < h->cell;
+    h->all += mass;
+    h->there += around && at.theta > 0.0 && at.theta < NAV_PI / 2.0 ? mass : 0.0;
+}
+
 /* Whatever the cells' width in metres, a bump's mass lies where the bump is, and nothing but the doubt elsewhere. */
 static void cells_of_any_width_hold_their_share_of_a_bump(void **state)
 {
     (void)state;
     enum { CELLS = 20, HEADINGS = 4 };
     static const double widths[] = {0.01, 0.3, 1.0, 3.0};
-    static float mass[CELLS * CELLS * HEADINGS];
-    const double still[HEADINGS] = {0.0};
     for (size_t n = 0; n < sizeof widths / sizeof widths[0]; n++) {
-        double cell = widths[n], there = 0.0, all = 0.0;
+        double cell = widths[n];
         const struct nav_component bump = {{14.0 * cell, 12.0 * cell, 1.0}, 0.2 * cell, 0.1, 1.0};
-        const struct nav_slices at = {.nx = CELLS,
-                                      .ny = CELLS,
-                                      .nh = HEADINGS,
-                                      .pitch = CELLS,
-                                      .cell = cell,
-                                      .cell_theta = NAV_PI / 2.0,
-                                      .shift_x = still,
-                                      .shift_y = still};
-        nav_bumps_fill(&(struct nav_prior){.bump = &bump, .bumps = 1}, &at, mass);
-        for (int c = 0; c < CELLS * CELLS * HEADINGS; c++) {
-            int i = c % CELLS, j = c / CELLS % CELLS, k = c / CELLS / CELLS;
-            all += (double)mass[c];
-            there += (i == 13 || i == 14) && (j == 11 || j == 12) && k == 0 ? (double)mass[c] : 0.0;
-        }
+        const struct nav_levels levels = {CELLS * cell, CELLS * cell, cell, HEADINGS, 1};
+        struct held held = {.x = bump.pose.x, .y = bump.pose.y, .cell = cell};
+        struct nav_histogram h;
+        assert_int_equal(nav_histogram_init(&h, &levels, 0, 0), 0);
+        nav_bumps_fill(&(struct nav_prior){.bump = &bump, .bumps = 1}, &h);
+        nav_histogram_each(&h, hold, &held);
+        nav_histogram_free(&h);
+        double all = held.all, there = held.there;
         assert_near(all, 1.0, 1e-5);
         assert_near(there, 1.0 - NAV_ANYWHERE, 1e-4);
     }

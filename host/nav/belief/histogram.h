@@ -1,0 +1,154 @@
+/* A histogram over x, y and heading that takes memory and time where it holds mass.
+ *
+ * Each heading slice keeps its own shift in x and y and all slices share one rotation, so that motion does not smear:
+ * only whole-cell moves are left to the cells, and odometry noise is added by blurs of the variance asked for. Of every
+ * line of cells those groups of NAV_LANES are stored that hold mass, in the order of slices, lines and columns. Moves,
+ * blurs, the likelihood and the sums for normalising are one pass from one store to another (histogram_pass.c), which
+ * may be interrupted after every group.
+ *
+ * Level n has cells 2^n times as wide as level 0: a belief can begin coarse and be refined when its mass sits in few
+ * cells. */
+#ifndef NAV_HISTOGRAM_H
+#define NAV_HISTOGRAM_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "gaussian.h"
+#include "rng.h"
+
+/* Cells of a group; and the sums of a slice: its mass and that times x, y, xx, xy, yy, relative to some place. */
+enum { NAV_LANES = 8, NAV_MOMENTS = 6 };
+
+/* Division of an arena into cells. */
+struct nav_shape {
+    int nx, ny, nh;
+    int groups;              /* of a line */
+    double cell, cell_theta; /* m, rad */
+};
+
+/* Divisions by level. A level has half the headings of the one below while that leaves `headings_least`. */
+struct nav_levels {
+    double size_x, size_y, cell; /* m; level 0's cell */
+    int headings, headings_least;
+};
+
+struct nav_shape nav_levels_shape(const struct nav_levels *, int level);
+
+/* Cells of all slices and lines, those that fill up a line's last group included. */
+size_t nav_shape_cells(const struct nav_shape *);
+
+/* The same without those. */
+double nav_shape_inside(const struct nav_shape *);
+
+/* Mass, cell by cell. Cell i of line j of slice p is centred at ((i + 1/2) cell + shift_x[p], (j + 1/2) cell +
+ * shift_y[p]), its heading is (p + 1/2) cell_theta + rotation. */
+struct nav_cells {
+    double rotation;
+    double *shift_x, *shift_y; /* [nh] m, within half a cell */
+    uint32_t *first;           /* [nh * ny + 1] groups of line n: first[n] .. first[n + 1] - 1 */
+    uint16_t *at;              /* [room] a group's place in its line */
+    float *mass;               /* [room][NAV_LANES] */
+};
+
+/* What a pass does besides moving. */
+struct nav_weigh {
+    /* Likelihoods of a group's cells after the move; those of cells without mass do not count, but are finite. Returns
+     * what it took, in cells passed over. NULL: all are 1. */
+    long (*group)(void *self, int slice, int line, int group, const float *mass, float *like);
+    void *self;
+    long most;    /* that it can take */
+    double least; /* cells with a smaller share are dropped before they are weighed */
+    double extra; /* belief added to each cell before that */
+};
+
+struct nav_pass;
+
+struct nav_histogram {
+    struct nav_levels levels;
+    int level;
+    struct nav_shape shape;
+    uint32_t room; /* groups */
+    bool uniform;  /* and not written out */
+    struct nav_cells now, next;
+    struct nav_pass *pass;
+    double owed_position, owed_heading; /* variance not yet added, m^2 per axis, rad^2 */
+    /* Of the last pass: */
+    double (*moment)[NAV_MOMENTS]; /* [nh] relative to */
+    struct nav_pose about;         /* this place */
+    double total;                  /* mass of all cells, in the cells' unit; */
+    long cells;                    /* those that hold any */
+    struct nav_pose mode;          /* centre of the heaviest cell, */
+    float heaviest;                /* and what it holds */
+};
+
+/* Begins uniform at level `level`, whose cells there is room for, and `spare` more. 0, or -1 without memory or when
+ * they are too many; nav_histogram_free either way. */
+int nav_histogram_init(struct nav_histogram *, const struct nav_levels *, int level, size_t spare);
+void nav_histogram_free(struct nav_histogram *);
+size_t nav_histogram_bytes(const struct nav_histogram *);
+
+/* Uniform; without any mass. Both unmoved, at a level. */
+void nav_histogram_restart(struct nav_histogram *, int level);
+void nav_histogram_clear(struct nav_histogram *, int level);
+
+/* Room for the mass of all cells, [nh][ny][groups * NAV_LANES] and 0, of a level no finer than it began with; and for a
+ * line's. Then takes what was written there. */
+float *nav_histogram_write_out(struct nav_histogram *, float **line);
+void nav_histogram_take(struct nav_histogram *);
+
+/* A pose with mass, in the histogram's unit. */
+struct nav_grain {
+    struct nav_pose pose;
+    double mass;
+    int32_t next; /* of the same line; the histogram's */
+};
+
+/* Adds grains to the cells that hold them. */
+void nav_histogram_add(struct nav_histogram *, struct nav_grain *, int32_t count);
+
+/* Halves the cells; false when there is no room, or they are of level 0. */
+bool nav_histogram_refine(struct nav_histogram *);
+
+/* Groups that hold mass. */
+uint32_t nav_histogram_groups(const struct nav_histogram *);
+
+/* Starts a pass: `step` in the robot's frame; owed noise is added as far as one pass can, whose share of a cell that is
+ * left then is owed still. Sums will be relative to `about`. `weigh` must last as long as the pass. */
+void nav_histogram_begin(struct nav_histogram *, struct nav_pose step, const struct nav_weigh *, struct nav_pose about);
+
+/* Goes on with it for at most `most` cells passed over: how many it were. */
+long nav_histogram_run(struct nav_histogram *, long most);
+
+/* Whether a pass is under way. Until it ends the belief is that from before it. */
+bool nav_histogram_running(const struct nav_histogram *);
+void nav_histogram_stop(struct nav_histogram *);
+
+/* Variance owed that one pass cannot add, in passes. */
+double nav_histogram_debt(const struct nav_histogram *);
+
+/* Variance that a drive adds to positions because headings differ within a slice (uniform: width^2 / 12), m^2 per axis.
+ * `along_m`: as nav_settings' motion_along_m. */
+double nav_histogram_fan(const struct nav_histogram *, struct nav_pose step, double along_m);
+
+/* Heading of a slice, rad, not wrapped, and its shift, m: while a pass is under way, those after it. */
+double nav_histogram_heading(const struct nav_histogram *, int slice);
+double nav_histogram_shift_x(const struct nav_histogram *, int slice);
+double nav_histogram_shift_y(const struct nav_histogram *, int slice);
+
+/* Calls `take` for each cell that holds mass. */
+void nav_histogram_each(const struct nav_histogram *, void (*take)(void *, struct nav_pose, double mass), void *self);
+
+/* Poses drawn systematically, evenly within their cells: at most `room`, about `count`. */
+long nav_histogram_draw(const struct nav_histogram *, struct nav_rng *, long count, struct nav_pose *out, long room);
+
+/* Mass within NAV_NEAR_M and NAV_NEAR_RAD of a pose, the centres of cells deciding, in the cells' unit; and its mean
+ * pose, when not NULL and there is any. */
+double nav_histogram_near(const struct nav_histogram *, struct nav_pose, struct nav_pose *mean);
+
+/* The belief as one Gaussian: the mean near its mode and the covariance of all of it about that, the spread within a
+ * cell included. Returns the mass near the mean. Of a belief with mass. */
+double nav_histogram_summarise(const struct nav_histogram *, struct nav_gaussian *out);
+
+#endif

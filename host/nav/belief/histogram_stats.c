@@ -1,0 +1,141 @@
+/* What a histogram amounts to: the mass near a pose, its Gaussian, its cells one by one, poses drawn from it. */
+#include <math.h>
+#include <string.h>
+
+#include "histogram.h"
+#include "problem.h"
+
+static double stats_heading(const struct nav_histogram *h, int p)
+{
+    return (p + 0.5) * h->shape.cell_theta + h->now.rotation;
+}
+
+/* Cells of a slice and a line with their mass. */
+struct visit {
+    const struct nav_histogram *h;
+    void (*take)(void *, struct nav_pose, double mass);
+    void *self;
+};
+
+static void visit_line(const struct visit *v, int p, int j)
+{
+    const struct nav_histogram *h = v->h;
+    size_t line = (size_t)p * (size_t)h->shape.ny + (size_t)j;
+    double cell = h->shape.cell, each = h->total / nav_shape_inside(&h->shape);
+    struct nav_pose at = {0.0, (j + 0.5) * cell + h->now.shift_y[p], nav_wrap(stats_heading(h, p))};
+    for (int i = 0; i < h->shape.nx && h->uniform; i++) {
+        at.x = (i + 0.5) * cell + h->now.shift_x[p];
+        v->take(v->self, at, each);
+    }
+    for (uint32_t n = h->now.first[line]; n < h->now.first[line + 1] && !h->uniform; n++) {
+        for (int k = 0; k < NAV_LANES; k++) {
+            double mass = (double)h->now.mass[(size_t)n * NAV_LANES + (size_t)k];
+            at.x = (h->now.at[n] * NAV_LANES + k + 0.5) * cell + h->now.shift_x[p];
+            if (mass > 0.0)
+                v->take(v->self, at, mass);
+        }
+    }
+}
+
+void nav_histogram_each(const struct nav_histogram *h, void (*take)(void *, struct nav_pose, double), void *self)
+{
+    const struct visit v = {h, take, self};
+    for (int p = 0; p < h->shape.nh; p++) {
+        for (int j = 0; j < h->shape.ny; j++)
+            visit_line(&v, p, j);
+    }
+}
+
+/* Mass near a pose, and its offsets from that times mass. */
+struct near {
+    struct nav_pose pose;
+    double turn; /* of the slice from there */
+    double mass, x, y, theta;
+};
+
+static void near_take(void *self, struct nav_pose at, double mass)
+{
+    struct near *near = self;
+    double x = at.x - near->pose.x, y = at.y - near->pose.y;
+    if (x * x + y * y > NAV_NEAR_M * NAV_NEAR_M)
+        return;
+    near->mass += mass;
+    near->x += mass * x;
+    near->y += mass * y;
+    near->theta += mass * near->turn;
+}
+
+double nav_histogram_near(const struct nav_histogram *h, struct nav_pose pose, struct nav_pose *mean)
+{
+    struct near near = {.pose = pose};
+    const struct visit v = {h, near_take, &near};
+    for (int p = 0; p < h->shape.nh; p++) {
+        near.turn = nav_wrap(stats_heading(h, p) - pose.theta);
+        if (fabs(near.turn) > NAV_NEAR_RAD)
+            continue;
+        double at = (pose.y - h->now.shift_y[p]) / h->shape.cell, reach = NAV_NEAR_M / h->shape.cell;
+        int begin = (int)fmax(floor(at - reach), 0.0), end = (int)fmin(ceil(at + reach) + 1.0, h->shape.ny);
+        for (int j = begin; j < end; j++)
+            visit_line(&v, p, j);
+    }
+    if (mean && near.mass > 0.0)
+        *mean = (struct nav_pose){pose.x + near.x / near.mass, pose.y + near.y / near.mass,
+                                  nav_wrap(pose.theta + near.theta / near.mass)};
+    return near.mass;
+}
+
+/* Adds one slice's moments about (x, y) to sums xx, xy, yy, xt, yt, tt, its heading being off by `turn`. */
+static void add_moments(const double m[NAV_MOMENTS], double x, double y, double turn, double sums[6])
+{
+    double mx = m[1] - x * m[0], my = m[2] - y * m[0];
+    sums[0] += m[3] - 2.0 * x * m[1] + x * x * m[0];
+    sums[1] += m[4] - x * m[2] - y * m[1] + x * y * m[0];
+    sums[2] += m[5] - 2.0 * y * m[2] + y * y * m[0];
+    sums[3] += mx * turn;
+    sums[4] += my * turn;
+    sums[5] += m[0] * turn * turn;
+}
+
+double nav_histogram_summarise(const struct nav_histogram *h, struct nav_gaussian *out)
+{
+    double sums[6] = {0.0}, within = h->shape.cell * h->shape.cell / 12.0;
+    double within_theta = h->shape.cell_theta * h->shape.cell_theta / 12.0;
+    out->mean = h->mode;
+    nav_histogram_near(h, h->mode, &out->mean);
+    for (int p = 0; p < h->shape.nh; p++)
+        add_moments(h->moment[p], out->mean.x - h->about.x, out->mean.y - h->about.y,
+                    nav_wrap(stats_heading(h, p) - out->mean.theta), sums);
+    for (int k = 0; k < 6; k++)
+        sums[k] /= h->total;
+    const double all[9] = {fmax(sums[0], 0.0) + within, sums[1], sums[3], sums[1],
+                           fmax(sums[2], 0.0) + within, sums[4], sums[3], sums[4],
+                           sums[5] + within_theta};
+    memcpy(out->covariance, all, sizeof all);
+    return nav_histogram_near(h, out->mean, NULL);
+}
+
+struct draw {
+    const struct nav_histogram *h;
+    struct nav_rng *rng;
+    double mark, step, sum;
+    struct nav_pose *out;
+    long count, room;
+};
+
+static void draw_take(void *self, struct nav_pose at, double mass)
+{
+    struct draw *d = self;
+    const struct nav_shape *s = &d->h->shape;
+    for (d->sum += mass; d->mark < d->sum && d->count < d->room; d->mark += d->step) {
+        double x = nav_rng_uniform(d->rng) - 0.5, y = nav_rng_uniform(d->rng) - 0.5, t = nav_rng_uniform(d->rng) - 0.5;
+        d->out[d->count++] = (struct nav_pose){at.x + s->cell * x, at.y + s->cell * y, at.theta + s->cell_theta * t};
+    }
+}
+
+long nav_histogram_draw(const struct nav_histogram *h, struct nav_rng *rng, long count, struct nav_pose *out, long room)
+{
+    struct draw d = {.h = h, .rng = rng, .step = h->total / (double)count, .out = out, .room = room};
+    d.mark = d.step * nav_rng_uniform(rng);
+    nav_histogram_each(h, draw_take, &d);
+    return d.count;
+}
