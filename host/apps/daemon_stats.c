@@ -34,7 +34,6 @@ void daemon_stats_connected(struct daemon_stats *stats, struct daemon_source *so
     told->connected++;
     told->error = told->connected == told->bridges ? WHISKER_OK : told->error;
     told->connected_ns = realtime_ns();
-    source->dropped_before += source->dropped;
     source->dropped = 0;
     source->has_sequence = false;
     if (source->is_second) {
@@ -81,6 +80,7 @@ void daemon_stats_frame(struct daemon_stats *stats, struct daemon_source *source
     stats->told.frames_missing += missing < UINT32_MAX / 2 ? missing : 0;
     source->sequence = frame->sequence;
     source->has_sequence = true;
+    source->frames_dropped += (uint32_t)(frame->dropped - source->dropped);
     source->dropped = frame->dropped;
     for (size_t lane = 0; lane < WHISKER_FRAME_LANES; lane++) {
         const unsigned status = frame->lane[lane].status;
@@ -102,7 +102,7 @@ void daemon_stats_settle(struct daemon_stats *stats, const struct daemon_source 
     const struct whisker_decoder_counts *counts = &source->decoder.counts;
     told->frames += counts->frames;
     told->frames_damaged += counts->frames_damaged;
-    told->frames_dropped += source->dropped_before + source->dropped;
+    told->frames_dropped += source->frames_dropped;
     told->bytes_skipped += counts->bytes_skipped;
     told->records_usb += counts->records_damaged;
 }

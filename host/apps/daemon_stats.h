@@ -10,8 +10,8 @@
 /* What one bridge sends. */
 struct daemon_source {
     struct whisker_decoder decoder;
-    uint64_t dropped_before; /* in the bridge's earlier runs */
-    uint32_t dropped;        /* in this one */
+    uint64_t frames_dropped; /* by the bridge, in all runs */
+    uint32_t dropped;        /* as its latest frame says, of this run */
     uint32_t sequence;       /* of the latest frame */
     bool has_sequence;
     bool is_second;

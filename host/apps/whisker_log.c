@@ -112,6 +112,7 @@ static int parse(int argc, char **argv, struct options *options)
 
 static void log_bad_records(struct session *session, const struct whisker_frame *frame)
 {
+    const uint32_t first = frame->flags & WHISKER_FRAME_SECOND ? WHISKER_FRAME_LANES : 0;
     for (uint32_t lane = 0; lane < session->options->lanes; lane++) {
         const unsigned status = frame->lane[lane].status;
         if (status == 0) {
@@ -120,7 +121,7 @@ static void log_bad_records(struct session *session, const struct whisker_frame 
         session->tally.records_bad++;
         if (session->bad) {
             const unsigned errors = status & ((1u << WHISKER_STATUS_ERROR_BITS) - 1);
-            fprintf(session->bad, "%u,%" PRIu64 ",%u,%u\n", lane, frame->tick, status >> WHISKER_STATUS_ERROR_BITS,
+            fprintf(session->bad, "%u,%" PRIu64 ",%u,%u\n", first + lane, frame->tick, status >> WHISKER_STATUS_ERROR_BITS,
                     errors);
         }
     }

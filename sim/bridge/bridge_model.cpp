@@ -49,6 +49,17 @@ void BridgeModel::start_tick()
 void BridgeModel::tick_by_itself()
 {
     top_->tick_external = 0;
+    free_ = true;
+}
+
+// A cycle after the transfer: the nodes see select rise first.
+void BridgeModel::run_nodes()
+{
+    if (ended_) {
+        bus_.run();
+    }
+    ended_ = busy_ && !link_busy();
+    busy_ = link_busy();
 }
 
 bool BridgeModel::sync() const
@@ -103,6 +114,9 @@ void BridgeModel::cycle()
     top.clk = 1;
     top.eval();
     cycles++;
+    if (free_) {
+        run_nodes();
+    }
 }
 
 } // namespace bridge_sim

@@ -21,7 +21,8 @@ class BridgeModel : public UtmiDevice
 
     void cycle() override;
 
-    // From now on ticks are the bridge's own, every tick_period, as on a board; else they are start_tick()'s.
+    // From now on ticks are the bridge's own, every tick_period, as on a board, and the nodes read their sensors after
+    // each; else ticks are start_tick()'s, and the caller runs the nodes.
     void tick_by_itself();
 
     // As after power came: registers, FIFO and USB device begin anew.
@@ -38,9 +39,14 @@ class BridgeModel : public UtmiDevice
     uint32_t tick_period() const;    // cycles
 
   private:
+    void run_nodes();
+
     NodeBus &bus_;
     FlashPins flash_;
     std::unique_ptr<Vwhisker_bridge> top_;
+    bool free_ = false;  // ticks by itself
+    bool busy_ = false;  // the link was, a cycle ago
+    bool ended_ = false; // its transfer has
 };
 
 } // namespace bridge_sim

@@ -48,6 +48,12 @@ class Rig
     virtual uint32_t frames_dropped() const = 0; // since start: the FIFO had no room for them
     virtual bool every_frame() const = 0;        // each frame ends its packet, by the settings
 
+    // Ticks come by themselves, so packets do, too: how many bytes wait is not known, and the host asks for ever.
+    virtual bool ticks_by_itself() const
+    {
+        return false;
+    }
+
     // Spoils the reading that the next tick starts, or the transfer that the next tick makes.
     void spoil(const LaneFault &fault);
 

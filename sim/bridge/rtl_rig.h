@@ -28,11 +28,11 @@ class RtlRig : public Rig
     bool transfer(const std::function<bool()> &usb_step) override;
     void finish_run(const std::function<bool()> &usb_step) override;
 
-  private:
-    void wait_while(const std::function<bool()> &busy, const std::function<bool()> &usb_step);
-
     BridgeModel bridge_;
     UsbHost host_;
+
+  private:
+    void wait_while(const std::function<bool()> &busy, const std::function<bool()> &usb_step);
 };
 
 } // namespace bridge_sim

@@ -226,14 +226,14 @@ bool UrbScheduler::step_bulk()
     if (bulk_.empty() || away_) {
         return false;
     }
-    return halted_ || rig_.bulk_packet_due() ? receive_packet() : futile_poll();
+    return halted_ || rig_.ticks_by_itself() || rig_.bulk_packet_due() ? receive_packet() : futile_poll();
 }
 
 bool UrbScheduler::receive_packet()
 {
     const Outcome outcome = rig_.in(BULK_ENDPOINT, WHISKER_LIMIT_BULK_PACKET, packet_);
     bulk_naks_ = outcome == Outcome::NAK ? bulk_naks_ + 1 : 0;
-    if (bulk_naks_ > BULK_PATIENCE) {
+    if (bulk_naks_ > BULK_PATIENCE && !rig_.ticks_by_itself()) {
         throw std::runtime_error("the bridge holds a frame and does not give it: bulk endpoint answers NAK");
     }
     if (outcome == Outcome::NAK) {

@@ -37,6 +37,7 @@ struct whisker_device {
     struct pollfd descriptor[DESCRIPTORS_MAX]; /* that libusb waits on for this device */
     int descriptors;
     struct whisker_settings settings;
+    struct whisker_counters counted; /* when last asked for */
     whisker_sink sink;
     void *context;
     uint8_t buffer[QUEUED_BYTES];
@@ -236,6 +237,7 @@ int whisker_device_start(struct whisker_device *device, const struct whisker_set
         return error;
     }
     device->settings = *settings;
+    device->counted.ticks = device->counted.frames = device->counted.dropped = 0;
     device->sink = sink;
     device->context = context;
     device->error = WHISKER_OK;
@@ -274,9 +276,27 @@ int whisker_device_stop(struct whisker_device *device)
     return blame(device, stop(device));
 }
 
+static void widen(uint64_t *counted, uint64_t now)
+{
+    *counted += (uint32_t)(now - *counted);
+}
+
 int whisker_device_counters(struct whisker_device *device, struct whisker_counters *counters)
 {
-    return blame(device, control_counters(device->hid, counters));
+    struct whisker_counters now, *counted = &device->counted;
+    const int error = blame(device, control_counters(device->hid, &now));
+    if (!error) {
+        counted->running = now.running;
+        widen(&counted->ticks, now.ticks);
+        widen(&counted->frames, now.frames);
+        widen(&counted->dropped, now.dropped);
+        widen(&counted->records_good, now.records_good);
+        widen(&counted->records_absent, now.records_absent);
+        widen(&counted->records_crc, now.records_crc);
+        widen(&counted->records_tick, now.records_tick);
+        *counters = *counted;
+    }
+    return error;
 }
 
 int whisker_device_timing(struct whisker_device *device, struct whisker_timing *timing)

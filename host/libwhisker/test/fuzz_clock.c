@@ -39,8 +39,11 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         memcpy(&step, data + sizeof number, sizeof step);
         cycles = number & 1 ? number : cycles + (number >> 1) % 480000000;
         now_ns += (int64_t)step * NS_PER_UNIT;
-        whisker_clock_add(&fit, cycles, now_ns, now_ns * (number & 2 ? -1 : 1));
+        const uint16_t usb_time = (uint16_t)(number & 4 ? number >> 8 | 0x8000 : 0);
+        whisker_clock_add(&fit, cycles, usb_time, now_ns, now_ns * (number & 2 ? -1 : 1));
         check(&fit, number);
+        whisker_clock_report(&fit, cycles, (uint16_t)(number >> 24), (uint16_t)(number >> 40));
+        check(&fit, ~number);
     }
     return 0;
 }

@@ -19,7 +19,7 @@ constexpr uint64_t SEED = 1;
 class FreeBridge : public UtmiDevice
 {
   public:
-    explicit FreeBridge(std::vector<uint64_t> &syncs) : nodes_(LANES, SEED), bridge_(nodes_), syncs_(syncs)
+    explicit FreeBridge(std::vector<uint64_t> &syncs) : nodes_(LANES, SEED), bridge_(nodes_, flash_), syncs_(syncs)
     {
         nodes_.power_on();
         bridge_.tick_by_itself();
@@ -35,18 +35,14 @@ class FreeBridge : public UtmiDevice
             syncs_.push_back(cycles);
         }
         sync_ = bridge_.sync();
-        if (ended_) {
-            nodes_.run();
-        }
-        ended_ = busy_ && !bridge_.link_busy();
-        busy_ = bridge_.link_busy();
     }
 
   private:
     NodeBus nodes_;
+    NorFlash flash_;
     BridgeModel bridge_;
     std::vector<uint64_t> &syncs_;
-    bool sync_ = false, busy_ = false, ended_ = false;
+    bool sync_ = false;
 };
 
 class Session

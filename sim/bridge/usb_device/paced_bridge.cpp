@@ -108,7 +108,7 @@ class PacedRun
 
 } // namespace
 
-PacedBridge::PacedBridge(uint64_t seed) : nodes_(LANES, seed), bridge_(nodes_)
+PacedBridge::PacedBridge(uint64_t seed) : nodes_(LANES, seed), bridge_(nodes_, flash_)
 {
     nodes_.power_on();
 }

@@ -24,6 +24,7 @@ class PacedBridge : public UtmiDevice
 
   private:
     NodeBus nodes_;
+    NorFlash flash_;
     BridgeModel bridge_;
     uint64_t period_ = 1;
     uint64_t left_ = 0;  // ticks to ask for

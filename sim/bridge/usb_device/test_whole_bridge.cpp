@@ -23,7 +23,8 @@ constexpr uint64_t LINK_CYCLES =
 
 struct Fixture {
     NodeBus nodes{NODES, 1};
-    BridgeModel bridge{nodes};
+    NorFlash flash;
+    BridgeModel bridge{nodes, flash};
     UsbHost host{bridge};
     Bytes stream;
 

@@ -62,16 +62,18 @@ struct whisker_timing {
     uint32_t shortest;
 };
 
-/* The bridge's own counts since its start; 32 bits, which wrap: records_good of 28 lanes at 2 kHz after 21.3 hours. */
+/* The bridge's own counts: ticks, frames and dropped since its start, records since power came. The bridge has 32 bits of
+ * each, which wrap; here they go on, if they are asked for at least once in the time of a wrap: 21 hours of 28 lanes at
+ * 2 kHz. What had wrapped before the bridge was opened nobody knows. */
 struct whisker_counters {
     uint8_t running;
-    uint32_t ticks;
-    uint32_t frames;
-    uint32_t dropped;
-    uint32_t records_good;
-    uint32_t records_absent;
-    uint32_t records_crc;
-    uint32_t records_tick;
+    uint64_t ticks;
+    uint64_t frames;
+    uint64_t dropped;
+    uint64_t records_good;
+    uint64_t records_absent;
+    uint64_t records_crc;
+    uint64_t records_tick;
 };
 
 /* The hardware's defaults (all 28 lanes, 500 us), and batches of 4: frames wait 2 ms at most for their transfer. */
