@@ -33,11 +33,13 @@ module LUT4 #(
     assign Z = INIT[{D, C, B, A}];
 endmodule
 
-// As the pads use it: no enable, no reset.
 module TRELLIS_FF #(
-    parameter GSR    = "ENABLED",
-    parameter CEMUX  = "1",
-    parameter REGSET = "RESET"
+    parameter         GSR    = "ENABLED",
+    parameter [127:0] CEMUX  = "1",
+    parameter         CLKMUX = "CLK",
+    parameter         LSRMUX = "LSR",
+    parameter         SRMODE = "LSR_OVER_CE",
+    parameter         REGSET = "RESET"
 ) (
     input  wire CLK,
     input  wire LSR,
@@ -45,8 +47,14 @@ module TRELLIS_FF #(
     input  wire DI,
     output reg  Q
 );
+    wire enabled = CEMUX == "CE" ? CE : CEMUX == "INV" ? !CE : 1'b1;
+    wire clock   = CLKMUX == "INV" ? !CLK : CLK;
+
     initial Q = REGSET == "SET";
-    always @(posedge CLK) Q <= DI;
+    initial if (SRMODE == "ASYNC") $stop;  // nothing here has such a reset
+    always @(posedge clock)
+        if (LSR) Q <= REGSET == "SET";
+        else if (enabled) Q <= DI;
 endmodule
 
 // The configuration flash's clock pin, which no port of a top is.

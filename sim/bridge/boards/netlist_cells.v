@@ -1,18 +1,6 @@
-// What the cells of an ECP5 do that a board's netlist is made of, without the time they take.
+// What the cells of an ECP5 do that a board's netlist is made of, beside those of cells.v, without the time they take.
 
 `default_nettype none
-
-module LUT4 #(
-    parameter [15:0] INIT = 16'h0000
-) (
-    input  wire A,
-    input  wire B,
-    input  wire C,
-    input  wire D,
-    output wire Z
-);
-    assign Z = INIT[{D, C, B, A}];
-endmodule
 
 module PFUMX (
     input  wire ALUT,
@@ -61,29 +49,6 @@ module CCU2C #(
     assign COUT = second ? middle : INIT1[{2'd0, B1, A1}];
 endmodule
 
-module TRELLIS_FF #(
-    parameter         GSR    = "ENABLED",
-    parameter [127:0] CEMUX  = "1",
-    parameter         CLKMUX = "CLK",
-    parameter         LSRMUX = "LSR",
-    parameter         SRMODE = "LSR_OVER_CE",
-    parameter         REGSET = "RESET"
-) (
-    input  wire CLK,
-    input  wire LSR,
-    input  wire CE,
-    input  wire DI,
-    output reg  Q
-);
-    wire enabled = CEMUX == "CE" ? CE : CEMUX == "INV" ? !CE : 1'b1;
-    wire clock   = CLKMUX == "INV" ? !CLK : CLK;
-
-    initial Q = REGSET == "SET";
-    always @(posedge clock)
-        if (LSR) Q <= REGSET == "SET";
-        else if (enabled) Q <= DI;
-endmodule
-
 module TRELLIS_DPR16X4 #(
     parameter        WCKMUX  = "WCK",
     parameter        WREMUX  = "WRE",
@@ -115,30 +80,6 @@ module TRELLIS_IO #(
 );
     assign B = T ? 1'bz : I;
     assign O = B;
-endmodule
-
-module DELAYG #(
-    parameter DEL_MODE = "USER_DEFINED"
-) (
-    input  wire A,
-    output wire Z
-);
-    assign Z = A;
-endmodule
-
-// The configuration flash's clock pin.
-module USRMCLK (
-    input wire USRMCLKI,
-    input wire USRMCLKTS  // 1: let go
-);
-endmodule
-
-module OSCG #(
-    parameter DIV = 128
-) (
-    output reg OSC /*verilator public_flat_rw*/  // driven by the bench
-);
-    initial OSC = 1'b0;
 endmodule
 
 // A block RAM as synthesis uses it: one port writes and one reads, both at the edge, nine bits wide, or 36 for reading alone. A
