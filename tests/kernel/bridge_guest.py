@@ -1,4 +1,6 @@
-"""The first guest: a stock kernel, busybox and this machine's files meet the bridge over usbredir, then over USB/IP."""
+"""The first guest: a stock kernel, busybox and this machine's files meet the bridge over usbredir, then over USB/IP; there
+also the one that runs as on a board, on its own divider, with start-of-frame packets.
+"""
 
 import sys
 import time
@@ -14,7 +16,7 @@ from whisker.simulation.bridge import program
 HERE = Path(__file__).resolve().parent
 NAME = "bridge"
 FOLDER = OUT / NAME
-PROGRAMS = ("whisker-bridge-sim", "whiskerd", "kernel_usb_probe", "kernel_ring_probe")
+PROGRAMS = ("whisker-bridge-sim", "bridge-free-serve", "whiskerd", "kernel_usb_probe", "kernel_ring_probe")
 PROGRAMS += ("kernel_hid_probe_hidraw", "kernel_hid_probe_libusb")
 
 
@@ -31,10 +33,10 @@ def guest_words(vmlinuz: Path, packed: Path, port: str) -> list[str]:
     return [*words, "-virtfs", files]
 
 
-def obey(word: str, usbip_port: str) -> str:
+def obey(word: str, ports: dict[str, str]) -> str:
     """Do what the guest asks for; what it is answered."""
-    if word == "usbip":
-        return usbip_port
+    if word in ports:
+        return ports[word]
     pull_cable(FOLDER, word)
     return "done"
 
@@ -51,8 +53,12 @@ def run(report: Report) -> None:
     with ExitStack() as stack:
         redirect = stack.enter_context(Device("bridge-usbredir", redirected(FOLDER), r"serving usbredir at \S+:(\d+)"))
         share = stack.enter_context(Device("bridge-usbip", shared(), r"port (\d+)"))
+        free = stack.enter_context(
+            Device("bridge-free", [program("bridge-free-serve"), "0"], r"serving usbip at \S+:(\d+)")
+        )
+        ports = {"usbip": share.place, "free": free.place}
         began = time.monotonic()
         guest = stack.enter_context(Guest(NAME, guest_words(vmlinuz, packed, redirect.place)))
         report.note(f"booting {vmlinuz.name} with busybox")
-        converse(NAME, guest, lambda word: obey(word, share.place), report)
+        converse(NAME, guest, lambda word: obey(word, ports), report)
         report.note(f"{NAME} guest ended after {time.monotonic() - began:.0f} s")

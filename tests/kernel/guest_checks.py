@@ -2,6 +2,7 @@
 
 import ctypes
 import fcntl
+import itertools
 import os
 import re
 import subprocess
@@ -14,13 +15,15 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "host/python"))
 from guest_talk import PLUG_S, PROGRAM_S, CheckError, Checks, Talk, await_that, command, require  # noqa: E402
 
-from whisker.protocol import LIMITS, REPORTS, WIRE_VERSION  # noqa: E402
+from whisker.protocol import FRAME_BYTES, LIMITS, REPORTS, WIRE_VERSION, decode_frame  # noqa: E402
 
 HOST = "10.0.2.2"  # the machine that runs the guest, in QEMU's user network
 LONG_RUN_FRAMES = 20000
 SHORT_RUN_FRAMES = 2000
 RING = "kernel"
-PYUSB = "pyusb"  # the argument that makes this program the one that pyusb() runs
+PYUSB, FREE = "pyusb", "free"  # the argument that makes this program the one that pyusb(), or free_run(), runs
+FREE_FRAMES = 128
+MICROFRAMES, PER_TICK = 1 << 14, 4
 FINIT_MODULE, DELETE_MODULE = 313, 176  # system calls of x86-64
 USBTEST_TIMES, USBTEST_QUEUED = 20, 16
 LINK = ["--sck-divider", "6", "--word-gap", "30", "--sample-point", "5"]
@@ -193,22 +196,16 @@ def pyusb(_: Checks) -> str:
 def pyusb_session() -> str:
     """Strings, a stalled request, a time-out, and a run through pyusb."""
     import usb.core
-    import usb.util
 
     bridge = usb.core.find(idVendor=LIMITS["usb_vendor_id"], idProduct=LIMITS["usb_product_id"])
     bridge.default_timeout = PROGRAM_S * 1000  # a second, as by default, may be too short for an emulated guest
     names = f"{bridge.manufacturer}, {bridge.product}, serial number {bridge.serial_number}"
     # lsusb asks devices of USB 2.00 for it, not those of 2.01 (table 9-8 is the same for both)
     require(bytes(bridge.ctrl_transfer(0x80, 6, 0x0600, 0, 10))[:4] == bytes([10, 6, 1, 2]), "no device qualifier")
-    hid = LIMITS["usb_hid_interface"]
-    bridge.detach_kernel_driver(hid)
-    try:
+    with control_of(bridge) as run:
         expect_usb_error(usb.core.USBError, lambda: bridge.ctrl_transfer(0xC0, 0x55, 0, 0, 8))
         expect_usb_error(usb.core.USBTimeoutError, lambda: bridge.read(LIMITS["usb_bulk_in"], 512, 100))
-        frames = pyusb_run(bridge)
-    finally:
-        usb.util.dispose_resources(bridge)
-        bridge.attach_kernel_driver(hid)
+        frames = pyusb_run(bridge, run)
     return f"{names}; {frames} frames"
 
 
@@ -221,17 +218,33 @@ def expect_usb_error(kind: type, attempt: Callable) -> None:
     raise CheckError(f"no {kind.__name__} where one was due")
 
 
-def pyusb_run(bridge) -> int:
-    """Start, read, stop; the number of frames."""
-    control = REPORTS["control"]
+@contextmanager
+def control_of(bridge):
+    """A function that starts (1) and stops (0) the run; the HID interface is the kernel's again afterwards."""
+    import usb.util
+
+    control, hid = REPORTS["control"], LIMITS["usb_hid_interface"]
     settings = {"id": control.id, "wire_version": WIRE_VERSION, "lane_mask": (1 << LIMITS["lanes"]) - 1}
     settings |= {"sck_divider": 6, "word_gap": 30, "sample_point": 5, "tick_period": LIMITS["tick_period"]}
-    for run in (1, 0):
-        report = control.pack(run=run, **settings)
-        bridge.ctrl_transfer(0x21, 0x09, 0x0300 | control.id, LIMITS["usb_hid_interface"], report, PROGRAM_S * 1000)
-        data = bridge.read(LIMITS["usb_bulk_in"], 512 * 64, PROGRAM_S * 1000)
-        if run:
-            taken = len(data)
+
+    def run(on: int) -> None:
+        report = control.pack(run=on, **settings)
+        bridge.ctrl_transfer(0x21, 0x09, 0x0300 | control.id, hid, report, PROGRAM_S * 1000)
+
+    bridge.detach_kernel_driver(hid)
+    try:
+        yield run
+    finally:
+        usb.util.dispose_resources(bridge)
+        bridge.attach_kernel_driver(hid)
+
+
+def pyusb_run(bridge, run: Callable) -> int:
+    """Start, read, stop; the number of frames."""
+    run(1)
+    taken = len(bridge.read(LIMITS["usb_bulk_in"], 512 * 64, PROGRAM_S * 1000))
+    run(0)
+    data = bridge.read(LIMITS["usb_bulk_in"], 512 * 64, PROGRAM_S * 1000)
     require(data[-256 + 3] & 1, "the last frame is not marked as the last")
     return (taken + len(data)) // 256
 
@@ -295,9 +308,9 @@ def no_complaint(_: Checks) -> str:
     return "nothing in the kernel's log"
 
 
-def usbip_attach(checks: BridgeChecks) -> str:
+def usbip_attach(checks: BridgeChecks, which: str = "usbip") -> str:
     """`usbip list` and `usbip attach`, as in the README."""
-    port = checks.talk.ask("usbip")
+    port = checks.talk.ask(which)
     listed = command("usbip", "--tcp-port", port, "list", "-r", HOST)
     require(IDENTITY in listed, f"not in the list: {listed}")
     command("usbip", "--tcp-port", port, "attach", "-r", HOST, "-b", "1-1")
@@ -310,6 +323,48 @@ def usbip_detach(_: Checks) -> str:
     command("usbip", "detach", "-p", "00")
     await_state(False)
     return "detached"
+
+
+def free_attach(checks: BridgeChecks) -> str:
+    """The bridge whose ticks are its own divider's."""
+    return usbip_attach(checks, "free")
+
+
+def free_run(_: Checks) -> str:
+    """Frames of a bridge on its own divider, each dated by the host's start-of-frame packets."""
+    told = command(sys.executable, __file__, FREE).strip()
+    await_state(True)
+    return told
+
+
+def free_session() -> str:
+    """Read frames: every tick comes, and its SYNC is four microframes after the one before, give or take one."""
+    import usb.core
+
+    bridge = usb.core.find(idVendor=LIMITS["usb_vendor_id"], idProduct=LIMITS["usb_product_id"])
+    bridge.default_timeout = PROGRAM_S * 1000
+    data = b""
+    with control_of(bridge) as run:
+        run(1)
+        while len(data) < FREE_FRAMES * FRAME_BYTES:
+            data += bytes(bridge.read(LIMITS["usb_bulk_in"], 512 * 8, PROGRAM_S * 1000))
+        run(0)
+        while not data[-FRAME_BYTES + 3] & 1:
+            data += bytes(bridge.read(LIMITS["usb_bulk_in"], 512 * 8, PROGRAM_S * 1000))
+    frames = [decode_frame(data[at : at + FRAME_BYTES])[0] for at in range(0, len(data), FRAME_BYTES)]
+    require([frame["tick"] for frame in frames] == list(range(len(frames))), "a tick is missing")
+    times = [frame["usb_time"] for frame in frames]
+    require(all(time >> 15 for time in times), "a frame without the host's time")
+    steps = [(after - before) % MICROFRAMES for before, after in itertools.pairwise(times)]
+    require(all(abs(step - PER_TICK) <= 1 for step in steps), f"SYNC comes after {sorted(set(steps))} microframes")
+    require(abs(sum(steps) - PER_TICK * len(steps)) <= 1, f"{sum(steps)} microframes for {len(steps)} ticks")
+    return f"{len(frames)} frames, {PER_TICK} microframes from SYNC to SYNC"
+
+
+def free_daemon(checks: BridgeChecks) -> str:
+    """whiskerd on it, with a reader of its ring."""
+    with daemon(checks):
+        return read_ring(checks, FREE_FRAMES)
 
 
 def main() -> None:
@@ -337,6 +392,9 @@ def main() -> None:
         checks.run(f"usbip {check.__name__.removeprefix('usbip_')}", check)
     checks.run("usbip attach again", usbip_attach)
     checks.run("usbip stream again", libusb_stream)
+    checks.run("usbip detach again", usbip_detach)
+    for check in (free_attach, enumerates, free_run, free_daemon):
+        checks.run(f"free {check.__name__.removeprefix('free_')}", check)
     checks.run("usbip no_complaint", no_complaint)
     for line in kernel_log():
         talk.say("log", line)
@@ -344,7 +402,7 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    if sys.argv[1] == PYUSB:
-        print(pyusb_session())
+    if sys.argv[1] in (PYUSB, FREE):
+        print(pyusb_session() if sys.argv[1] == PYUSB else free_session())
     else:
         main()
