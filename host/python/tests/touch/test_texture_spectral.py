@@ -294,6 +294,8 @@ def test_saved_models_load_alike_and_are_small(model, tmp_path):
         lambda c: c.update(format="whisker texture model 7"),
         lambda c: c["classifiers"][0]["weight"][0].pop(),
         lambda c: c.update(classifiers=c["classifiers"][::-1]),
+        lambda c: c.pop("columns"),
+        lambda c: c.update(columns=["x", "x"]),
         lambda c: c["limits"].pop("spike"),
         lambda c: c["limits"]["still"].pop(),
         lambda c: c.update(classes=["VINYL"]),
@@ -421,6 +423,20 @@ def test_recordings_of_different_rates_are_one_clear_line(tmp_path):
     write(tmp_path / "B/1.csv", drag("ROUGH", 50, 1), rate_hz=100.0)
     with pytest.raises(TableError, match="100 to 2000 Hz; give one rate"):
         texture.read_training(tmp_path)
+
+
+def test_channels_in_another_order_are_one_clear_line(capsys, tmp_path):
+    for name in ("VINYL", "ROUGH"):
+        write(tmp_path / "set" / name / "0.csv", drag(name, 400, 0))
+    model = tmp_path / "m.json"
+    assert run(capsys, "texture", "train", tmp_path / "set", "--out", model)[0] == 0
+    swapped = tmp_path / "set" / "VINYL" / "1.csv"
+    write(swapped, drag("VINYL", 400, 1))
+    assert run(capsys, "texture", "classify", model, swapped)[0] == 0
+    swapped.write_text(swapped.read_text().replace("t_s,x,y", "t_s,y,x"))
+    for command in (("classify", model, swapped), ("train", tmp_path / "set", "--out", model)):
+        code, _, error = run(capsys, "texture", *command)
+        assert code != 0 and "1.csv, line 1: columns y, x; give x, y" in error and error.count("\n") == 1
 
 
 def test_too_little_to_learn_from_is_said():

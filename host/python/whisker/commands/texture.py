@@ -40,8 +40,9 @@ def train(arguments) -> int:
     window_ms = length_of_time(arguments.window_ms)
     hazard = changes_a_window(arguments.speed_m_s, arguments.tile_m, window_ms)
     recordings, rate_hz = texture.read_training(arguments.folder)
-    for name, files in texture.surface_files(arguments.folder).items():
-        for file, samples in zip(files, recordings[name], strict=True):
+    files = texture.surface_files(arguments.folder)
+    for name, some in files.items():
+        for file, samples in zip(some, recordings[name], strict=True):
             for fault in texture.recording_faults(samples):
                 warn(f"{file}: {fault}")
     try:
@@ -49,6 +50,7 @@ def train(arguments) -> int:
             with tqdm(total=1, desc="train", bar_format="{desc} {bar} {percentage:3.0f} %", disable=None) as bar:
                 progress = lambda done, of: advance(bar, done, of)  # noqa: E731
                 model = texture_train.train(recordings, rate_hz, window_ms, progress, hazard)
+            model.columns = texture.channel_names(next(iter(files.values()))[0])
         else:
             model = texture.TextureModel.train(recordings)
         model.save(arguments.out)
@@ -109,7 +111,7 @@ def classify(arguments) -> int:
 
 
 def decisions(arguments, model, path, window_ms: float) -> list:
-    t_s, samples = texture.read_recording(path)
+    t_s, samples = texture.read_recording(path, getattr(model, "columns", None))
     if samples.shape[1] != model.channels:
         text = f"{samples.shape[1]} channels, but the model has {model.channels}; use recordings of the same sensor"
         raise TableError(path, 1, text)

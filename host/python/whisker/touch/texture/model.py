@@ -197,12 +197,24 @@ def _decide(model: TextureModel, t_s: float, window: np.ndarray) -> Decision:
     return Decision(t_s, by_class, best, best, float(chance.max()), bool(border))
 
 
-def read_recording(path) -> tuple[np.ndarray, np.ndarray]:
-    """One CSV recording -> t_s (n,), channels (n, axes)."""
-    text = read_columns(path, required=["t_s"])
-    channels = [name for name in text if name != "t_s"]
+def channel_names(path) -> list[str]:
+    """The columns of a CSV recording beside t_s, in order; TableError without any."""
+    return _channels(path, read_columns(path, required=["t_s"]))
+
+
+def _channels(path, columns) -> list[str]:
+    channels = [name for name in columns if name != "t_s"]
     if not channels:
         raise TableError(path, 1, "no channel column beside t_s; name at least one, as in 't_s,x,y'")
+    return channels
+
+
+def read_recording(path, order: list[str] | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """One CSV recording -> t_s (n,), channels (n, axes). TableError for the channels of `order` in another order."""
+    text = read_columns(path, required=["t_s"])
+    channels = _channels(path, text)
+    if order and channels != order and sorted(channels) == sorted(order):
+        raise TableError(path, 1, f"columns {', '.join(channels)}; give {', '.join(order)}, as in training")
     return numbers(text["t_s"]), np.column_stack([numbers(text[name]) for name in channels])
 
 
@@ -217,7 +229,8 @@ def read_training(path) -> tuple[dict[str, list[np.ndarray]], float]:
     if len(files) < 2:
         text = f"{len(files)} surface folder(s); give at least two folders, one per surface, with CSV recordings"
         raise TableError(path, None, text)
-    read = {name: [read_recording(file) for file in some] for name, some in files.items()}
+    order = channel_names(next(iter(files.values()))[0])
+    read = {name: [read_recording(file, order) for file in some] for name, some in files.items()}
     widths = {channels.shape[1] for group in read.values() for _, channels in group}
     if len(widths) != 1:
         raise TableError(path, None, f"recordings have {sorted(widths)} channels; give all the same columns")

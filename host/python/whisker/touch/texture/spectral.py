@@ -64,6 +64,7 @@ class SpectralModel:
     hazard: float = HAZARD  # changes of surface in window_ms
     change: Change | None = None
     novelty: Novelty | None = None
+    columns: list[str] = field(default_factory=list)  # names of the channels; empty: not known
     figures: dict = field(default_factory=dict)  # of held-out recordings, for the reader
 
     @property
@@ -89,7 +90,7 @@ class SpectralModel:
 
     def save(self, path) -> None:
         content = {"format": FORMAT, "classes": self.classes, "rate_hz": self.rate_hz, "window_ms": self.window_ms}
-        content |= {name: getattr(self, name) for name in ("temper", "doubt", "hazard", "figures")}
+        content |= {name: getattr(self, name) for name in ("temper", "doubt", "hazard", "columns", "figures")}
         content["limits"] = {name: _listed(self.limits[name]) for name in LIMITS}
         for name in PARTS:
             part = getattr(self, name)
@@ -123,7 +124,16 @@ class SpectralModel:
         numbers = {name: fields.number(name, *RANGES[name]) for name in RANGES}
         parts = {name: _part(kind, fields.part(name)) for name, kind in PARTS.items() if fields.has(name)}
         fields.part("figures")
-        model = cls(classes, classifiers=classifiers, limits=limits, figures=fields.take("figures"), **numbers, **parts)
+        columns = fields.names("columns", lib.NAV_TEXTURE_CHANNELS_MAX) if fields.take("columns") else []
+        model = cls(
+            classes,
+            classifiers=classifiers,
+            limits=limits,
+            figures=fields.take("figures"),
+            columns=columns,
+            **numbers,
+            **parts,
+        )
         model.check()
         model.stream(2)
         return model
