@@ -79,11 +79,11 @@ static void perform(struct lane_bench *bench, const struct lane_event *e, const 
     }
 }
 
-static uint64_t order_bits(const struct lane_bench *bench)
+uint64_t lane_order(uint8_t tick)
 {
     uint8_t order[WHISKER_ORDER_BYTES] = {0};
     uint64_t bits = 0;
-    order[WHISKER_ORDER_TICK] = (uint8_t)bench->tick;
+    order[WHISKER_ORDER_TICK] = tick;
     order[WHISKER_ORDER_COMMAND] = WHISKER_COMMAND_SAMPLE;
     order[WHISKER_ORDER_CRC] = whisker_crc8(order, WHISKER_ORDER_CRC);
     for (unsigned i = 0; i < WHISKER_ORDER_BYTES; i++)
@@ -95,7 +95,7 @@ static uint64_t order_bits(const struct lane_bench *bench)
 static void plan_bit(struct lane_bench *bench, unsigned i, bool reaches_node, uint64_t at_fs)
 {
     const struct lane_faults *f = &bench->faults;
-    const bool sent = i < BITS && (order_bits(bench) ^ f->mosi_flips) >> (BITS - 1u - i) & 1u;
+    const bool sent = i < BITS && (lane_order((uint8_t)bench->tick) ^ f->mosi_flips) >> (BITS - 1u - i) & 1u;
     const bool mosi = f->mosi_stuck ? f->mosi_level : sent;
     if (reaches_node)
         add(bench, at_fs, SCK_EDGE, true, mosi);

@@ -15,6 +15,9 @@ struct lane_timing lane_timing_of(unsigned sck_divider, unsigned word_gap, unsig
 
 enum { LANE_TICK_PERIOD = SIM_TICK_NS * (WHISKER_LIMIT_CLOCK_HZ / 1000000u) / 1000u }; /* cycles of 60 MHz */
 
+/* The bits of the bridge's order of this tick, the first one highest. */
+uint64_t lane_order(uint8_t tick);
+
 /* One tick as the world breaks it; all zero: nothing is broken. */
 struct lane_faults {
     bool no_sync, no_select, select_stays;

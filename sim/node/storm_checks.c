@@ -52,6 +52,15 @@ bool checks_pass_record(uint64_t record, uint8_t tick)
     return whisker_crc8(bytes, WHISKER_RECORD_CRC) == bytes[WHISKER_RECORD_CRC] && bytes[WHISKER_RECORD_TICK] == tick;
 }
 
+bool checks_are_service(uint64_t order)
+{
+    uint8_t bytes[WHISKER_ORDER_BYTES];
+    for (unsigned i = 0; i < sizeof bytes; i++)
+        bytes[i] = (uint8_t)byte_of(order, i);
+    return whisker_crc8(bytes, WHISKER_ORDER_CRC) == bytes[WHISKER_ORDER_CRC] &&
+           bytes[WHISKER_ORDER_COMMAND] == WHISKER_COMMAND_SERVICE;
+}
+
 uint64_t checks_mask(unsigned place)
 {
     return UINT64_C(1) << (BITS - 1u - place);

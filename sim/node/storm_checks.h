@@ -16,6 +16,9 @@ bool checks_are_angles(uint64_t line, uint16_t alpha, uint16_t beta);
 /* CRC and tick. */
 bool checks_pass_record(uint64_t record, uint8_t tick);
 
+/* CRC, and a command that makes the node expect a service order. */
+bool checks_are_service(uint64_t order);
+
 /* What comes of a frame sent if so much happens to it. `held`: the line's level before the frame. */
 uint64_t checks_lost_clock(uint64_t sent, unsigned place, bool held);
 uint64_t checks_extra_clock(uint64_t sent, unsigned place);
