@@ -1,7 +1,7 @@
 """Bitstreams for Gowin's GW2A: what of `build.py` is the FPGA's own. Yosys synthesises, nextpnr's Himbaechel places and routes,
 apycula's gowin_pack packs.
 
-Pins stay unjudged: the maker states no clock-to-pin times for this family, and nextpnr knows none.
+Pins stay unjudged: nextpnr knows no clock-to-pin times of this family.
 """
 
 from pathlib import Path

@@ -1,6 +1,6 @@
 // Pads of a Tang Primer 20K on its dock (Gowin GW2A-18): the dock's USB3317 gives the 60 MHz. As in ulpi_pads.v each pad has a
-// register and a gate of its own, and lets go in the cycle in which DIR rises. There are no delay lines: the maker states no
-// hold time that they would have to make up for.
+// register and a gate of its own, and lets go in the cycle in which DIR rises. There are no delay lines: no hold time is
+// known that they would have to make up for.
 
 `default_nettype none
 
