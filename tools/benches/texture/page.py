@@ -19,6 +19,7 @@ PEERS = """
 ## Beside calibrated peers
 
 Windows of 1.7 s, whole runs held out; `area` is that under the risk-coverage curve, in percent. The peers are calibrated by a sigmoid on runs held out.
+They judge each window alone; `default` judges it given those before it in the run.
 
 """
 BORDERS = """

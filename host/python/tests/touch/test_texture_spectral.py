@@ -406,8 +406,13 @@ def test_training_is_for_the_window_asked_for(capsys, tmp_path):
     assert run(capsys, *command, "200", "--speed-m-s", "0.3", "--tile-m", "0.5")[0] == 0
     made = texture.load(tmp_path / "m.json")
     assert made.figures["window_samples"] == 400 and made.hazard == pytest.approx(0.12)
-    code, _, error = run(capsys, *command, "200", "--tile-m", "0.5")
-    assert code != 0 and "--speed-m-s, --tile-m: give both" in error and error.count("\n") == 1
+    for more, complaint in (
+        ([], "give both"),
+        (["--speed-m-s", "9"], "3.6 surfaces a window"),
+        (["--speed-m-s", "nan"], "give both"),
+    ):
+        code, _, error = run(capsys, *command, "200", "--tile-m", "0.5", *more)
+        assert code != 0 and f"--speed-m-s, --tile-m: {complaint}" in error and error.count("\n") == 1
     code, _, error = run(capsys, *command, "-1")
     assert code != 0 and "--window-ms" in error and error.count("\n") == 1
 

@@ -11,7 +11,7 @@ from ..nav.localise import SettingError
 from ..tables import TableError, unwritable
 from ..touch.texture import model as texture
 from ..touch.texture import train as texture_train
-from ..touch.texture.spectral import HAZARD
+from ..touch.texture.spectral import HAZARD, HAZARD_LEAST
 
 METHODS = "default: spectra, calibrated on recordings held out; naive-bayes: the paper's equation 1"
 EXAMPLE = "whisker texture train recordings --out model.json"
@@ -91,9 +91,12 @@ def changes_a_window(speed_m_s: float | None, tile_m: float | None, window_ms: f
     """Changes of surface per window."""
     if speed_m_s is None and tile_m is None:
         return HAZARD
-    if speed_m_s is None or tile_m is None or not (0.0 < speed_m_s < 1e3 and 1e-3 < tile_m < 1e6):
+    if speed_m_s is None or tile_m is None or not (speed_m_s > 0.0 and tile_m > 0.0):
         raise SettingError("--speed-m-s, --tile-m: give both, above 0, as in '--speed-m-s 0.1 --tile-m 0.5'")
-    return max(speed_m_s * window_ms / 1000.0 / tile_m, 1e-9)
+    changes = speed_m_s * window_ms / 1000.0 / tile_m
+    if not HAZARD_LEAST <= changes <= 1.0:
+        raise SettingError(f"--speed-m-s, --tile-m: {changes:g} surfaces a window; give {HAZARD_LEAST:g} to 1")
+    return changes
 
 
 def classify(arguments) -> int:

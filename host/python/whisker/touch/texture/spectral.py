@@ -23,14 +23,14 @@ WITHOUT = {  # what a model without a part cannot do, and what it would take
 LIMITS = ("spike", "still", "low", "high")
 SURE = 0.95  # probability at which a sequential decision stops
 LOOKS = 4  # of a sequential decision in a window
-HAZARD = 0.02  # changes of surface per window: tiles of 0.5 m at 0.1 m/s, windows of 100 ms
+HAZARD_LEAST, HAZARD = 1e-6, 0.02  # changes of surface per window: tiles of 0.5 m at 0.1 m/s, windows of 100 ms
 LENGTH_MOST = 1 << 20  # samples of a window; also numbers of a projection
 RANGES = {
     "rate_hz": (1e-3, 1e9),
     "window_ms": (1e-3, 1e6),
     "temper": (0.0, 1.0),
     "doubt": (0.0, 1.0),
-    "hazard": (1e-9, 1e3),
+    "hazard": (HAZARD_LEAST, 1.0),
 }
 
 
