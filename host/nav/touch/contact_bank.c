@@ -15,7 +15,7 @@ enum { CORNERS = 14, ROUNDS = 8, NORMALS = 5 };
 #define CORNER_M 0.005      /* a radius below is a corner's */
 #define CURVATURE_SD 10.0   /* 1/m, about 0 */
 #define LEAST_CURVATURE 0.2 /* 1/m */
-#define MODEL_SHARE 0.003   /* error of the table and of the quasi-static law, share of the tilt */
+#define MODEL_SHARE 0.005   /* error of the table and of the quasi-static law, share of the tilt */
 #define CREEP_SHARE 0.02    /* error of the creep, share of the tilt */
 #define POINT_LEAST_M 1e-4  /* errors of the tables, and of a block's middle */
 #define NORMAL_LEAST 0.003  /* rad */
@@ -97,6 +97,7 @@ void nav_contact_bank_begin(struct nav_contact_filter *f, const struct nav_conta
 {
     double corner = (f->beam->tip - LEAST_ARC) / CORNERS, round = (f->beam->tip - LEAST_ARC) / ROUNDS;
     f->parts = 0;
+    f->rate = f->ring = 0.0;
     for (int moving = 0; moving < 2; moving++) {
         double share = (moving ? f->config.moving : 1.0 - f->config.moving) / 3.0;
         for (int i = 0; i < CORNERS; i++)
@@ -158,7 +159,7 @@ static bool bank_weigh(const struct nav_contact_filter *f, const struct nav_cont
     h[SLOPE] = gain * look.tilt_by[1];
     h[FRICTION] = gain * look.tilt_by[2];
     h[GAIN] = tilt;
-    double variance = step->variance + square(MODEL_SHARE * tilt) + 0.5 * square(part->ring);
+    double variance = step->variance + square(MODEL_SHARE * tilt) + 0.5 * square(f->ring);
     for (int i = 0; i < N; i++)
         ph[i] = part->p[i][FIRST] * h[FIRST] + part->p[i][SLOPE] * h[SLOPE] + part->p[i][FRICTION] * h[FRICTION] +
                 part->p[i][GAIN] * h[GAIN];
@@ -203,32 +204,48 @@ static bool bank_regime(const struct nav_contact_filter *f, struct nav_contact_p
     return true;
 }
 
-static bool bank_one(const struct nav_contact_filter *f, const struct nav_contact_step *step,
-                     struct nav_contact_part *part)
+/* Carries a hypothesis over a block; false: no such contact is left. */
+static bool bank_predict(const struct nav_contact_filter *f, const struct nav_contact_step *step,
+                         struct nav_contact_part *part)
 {
-    const struct nav_contact_filter_config *c = &f->config;
     nav_contact_square by;
-    double rate = part->rate, before = part->ring;
     if (!nav_contact_move(f, step, part, by))
         return false;
     bank_carry(part->p, by);
     bank_noise(f, step, part, by);
-    double circle = 6.2831853 * c->ring_hz;
-    part->ring = before * exp(-c->ring_damping * circle * step->seconds) + fabs(part->rate - rate) / circle;
-    if (isfinite(step->tilt) && !bank_weigh(f, step, part))
-        return false;
-    return bank_regime(f, part);
+    return true;
+}
+
+/* Keeps one of the hypotheses, in order. */
+static void bank_keep(struct nav_contact_filter *f, int *kept, int i)
+{
+    if (*kept != i)
+        f->part[*kept] = f->part[i];
+    ++*kept;
+}
+
+/* Amplitude of the ringing that jumps of the tilt's rate may have left: the same for all, as it is one whisker. */
+static void bank_ring(struct nav_contact_filter *f, const struct nav_contact_step *step)
+{
+    double rate = 0.0, circle = 6.2831853 * f->config.ring_hz;
+    for (int i = 0; i < f->parts; i++)
+        rate += exp(f->part[i].log_weight) * f->part[i].rate;
+    f->ring = f->ring * exp(-f->config.ring_damping * circle * step->seconds) + fabs(rate - f->rate) / circle;
+    f->rate = rate;
 }
 
 void nav_contact_bank_step(struct nav_contact_filter *f, const struct nav_contact_step *step)
 {
     int kept = 0;
     for (int i = 0; i < f->parts; i++)
-        if (bank_one(f, step, &f->part[i])) {
-            if (kept != i)
-                f->part[kept] = f->part[i];
-            kept++;
-        }
+        if (bank_predict(f, step, &f->part[i]))
+            bank_keep(f, &kept, i);
+    f->parts = kept;
+    bank_ring(f, step);
+    kept = 0;
+    for (int i = 0; i < f->parts; i++)
+        if ((!isfinite(step->tilt) || bank_weigh(f, step, &f->part[i])) && bank_regime(f, &f->part[i]))
+            bank_keep(f, &kept, i);
     f->parts = kept;
     bank_normalise(f);
     f->driven_m += hypot(step->moved[0], step->moved[1]);

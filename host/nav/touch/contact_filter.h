@@ -51,7 +51,6 @@ struct nav_contact_part {
     double grip;  /* friction used, -1 to 1; positive: the contact slides towards the tip */
     double creep; /* rad */
     double rate;  /* of tilt as predicted, rad/s */
-    double ring;  /* amplitude of ringing that may be left, rad */
 };
 
 struct nav_contact_filter {
@@ -65,6 +64,7 @@ struct nav_contact_filter {
     double tilt[2];            /* sum of those read in the block */
     double last[2];
     int equal, updates;
+    double rate, ring;              /* of the tilt as predicted, rad/s; amplitude of ringing that may be left, rad */
     double plane, plane_variance;   /* tilt of axis 1 over that of axis 0 */
     double turned_m, driven_m;      /* how far the base's turn and its drive have moved the contact */
     uint64_t bad, stuck, saturated; /* samples not read */

@@ -17,7 +17,12 @@ from .scenes import TICK_S
 
 ROOT = Path(__file__).resolve().parents[3]
 RESULTS, CHARTS = ROOT / "bench/results", ROOT / "docs/charts"
-CONTACTS = 60
+CONTACTS = 30
+CASES = {
+    "known": (True, False),
+    "unknown": (False, False),
+    "chain": (False, True),
+}  # friction known; by a chain of links
 SLICES_S = np.arange(0.02, 0.36, 0.02)
 
 
@@ -81,15 +86,14 @@ def draw(results: dict) -> Figure:
 
 
 def run(build: Path, fresh: bool, each: int = CONTACTS) -> None:
-    """Measure all kinds with the friction known and not."""
+    """Measure all kinds with the friction known and not, and against a chain of links in MuJoCo."""
     results: dict = {"tick_s": TICK_S, "first_s": FIRST_S, "kinds": {}, "course": {}}
-    for known in (True, False):
+    for case, (known, links) in CASES.items():
         for kind in KINDS:
-            title = f"{kind}, friction {'known' if known else 'unknown'}"
-            made = tqdm(contacts(kind, each, known), desc=title, total=each)
-            found = [follow(scene, least, known) for scene, least in made]
-            results["kinds"].setdefault(kind, {})["known" if known else "unknown"] = summary(kind, found)
-            if not known:
+            made = tqdm(contacts(kind, each, known, links), desc=f"{case}: {kind}", total=each)
+            found = [follow(scene, least, known, links) for scene, least in made]
+            results["kinds"].setdefault(case, {})[kind] = summary(kind, found)
+            if case == "unknown":
                 results["course"][kind] = course(found)
     for folder in (RESULTS, CHARTS):
         folder.mkdir(parents=True, exist_ok=True)

@@ -7,12 +7,13 @@ import numpy as np
 
 from whisker.touch.contact_filter import ContactFilter
 
-from .scenes import FRICTION_SD, TICK_S, TIP, Corner, Draw, Scene, surface
+from .scenes import FRICTION_SD, QUARTER, REACH_M, TICK_S, TIP, Corner, Draw, Plan, Scene, chained, simulated
 
 FIRST_S = 0.1  # figures count from here on: the contact has moved by a centimetre at 0.1 m/s
 NINETY_2, NINETY_1 = 4.605, 2.706  # chi-squared, 90 %, of two and of one degree of freedom
 SPEED, WHISK = 0.1, np.pi / 24
 TURN_BACK_S = 0.15
+FLAT_M, CYLINDER_M = 5.0, 0.05  # radii
 
 
 def straight(ticks: int, speed: float, angle: float) -> np.ndarray:
@@ -20,37 +21,40 @@ def straight(ticks: int, speed: float, angle: float) -> np.ndarray:
     return np.tile([speed * np.sin(angle), -speed * np.cos(angle), 0.0], (ticks, 1))
 
 
-def corner_drive(rng, draw: Draw) -> Corner:
+def standing(ticks: int) -> np.ndarray:
+    return np.zeros((ticks, 2))
+
+
+def corner_drive(rng) -> Plan:
     bases = straight(700, SPEED, rng.uniform(-0.4, 0.4))
-    return Corner(rng.uniform(0.07, 0.125), bases, np.zeros((700, 2)))
+    return Plan(bases, standing(700), rng.uniform(0.07, 0.125))
 
 
-def corner_whisk(rng, draw: Draw) -> Corner:
-    bases = np.tile([0.0, 0.0, -WHISK], (1400, 1))
-    return Corner(rng.uniform(0.07, 0.130), bases, np.zeros((1400, 2)))
+def corner_whisk(rng) -> Plan:
+    return Plan(np.tile([0.0, 0.0, -WHISK], (1400, 1)), standing(1400), rng.uniform(0.07, 0.130))
 
 
-def face(rng, draw: Draw) -> Scene | None:
+def face(rng) -> Plan:
     normal = rng.uniform(np.radians(97), np.radians(135))
-    bases = straight(900, rng.uniform(0.05, SPEED), rng.uniform(-0.3, 0.3) + normal - np.pi / 2)
-    return surface(5.0, TIP, normal, bases, draw)
+    bases = straight(900, rng.uniform(0.05, SPEED), rng.uniform(-0.3, 0.3) + normal - QUARTER)
+    return Plan(bases, standing(900), TIP, FLAT_M, normal)
 
 
-def cylinder(rng, draw: Draw) -> Scene | None:
+def cylinder(rng) -> Plan:
     bases = straight(900, SPEED, 0.0)
     if rng.uniform() < 0.5:
-        return surface(0.05, rng.uniform(0.08, 0.13), np.pi / 2, bases, draw)
-    return surface(0.05, TIP, rng.uniform(np.radians(97), np.radians(118)), bases, draw)
+        return Plan(bases, standing(900), rng.uniform(0.08, 0.13), CYLINDER_M)
+    return Plan(bases, standing(900), TIP, CYLINDER_M, rng.uniform(np.radians(97), np.radians(118)))
 
 
-def moving(rng, draw: Draw, still: bool = False) -> Corner:
+def moving(rng, still: bool = False) -> Plan:
     """An object that moves; the base stands, then retreats from it or, `still`, goes on standing."""
     ticks, speed, angle = 700, rng.uniform(0.03, 0.1), rng.uniform(-0.4, 0.4)
     velocity = np.tile([-speed * np.sin(angle), speed * np.cos(angle)], (ticks, 1))
     bases = np.zeros((ticks, 3))
     if not still:
         bases[round(TURN_BACK_S / TICK_S) :, 1] = 0.6 * speed
-    return Corner(rng.uniform(0.07, 0.12), bases, velocity)
+    return Plan(bases, velocity, rng.uniform(0.07, 0.12))
 
 
 KINDS = {
@@ -59,20 +63,20 @@ KINDS = {
     "face, drive": face,
     "cylinder, drive": cylinder,
     "moving corner, base moves": moving,
-    "moving corner, base stands": lambda rng, draw: moving(rng, draw, still=True),
+    "moving corner, base stands": lambda rng: moving(rng, still=True),
 }
 TRUE_MOTION = dict(zip(KINDS, ("drive-by", "body whisk", "drive-by", "drive-by", "sweep", "sweep"), strict=True))
 
 
-def contacts(kind: str, count: int, known_friction: bool) -> Iterator[tuple[Scene, np.ndarray | None]]:
-    """Scenes of a kind, and of corners the bound (n,) of the point's error, mm."""
+def contacts(kind: str, count: int, known_friction: bool, links: bool) -> Iterator[tuple[Scene, np.ndarray | None]]:
+    """Scenes of a kind, by the simulator or by a chain of links, and of corners the bound (n,) of the error, mm."""
     for seed in range(count):
         draw = Draw.of(1000 * list(KINDS).index(kind) + seed, known_friction)
-        made = KINDS[kind](draw.rng, draw)
+        plan = KINDS[kind](draw.rng)
         least = None
-        if isinstance(made, Corner):
-            least = made.bound(draw, settings(known_friction)["friction_sd"])
-            made = made.scene(draw)
+        if plan.round_m == 0.0 and not links:
+            least = Corner(plan).bound(draw, settings(known_friction)["friction_sd"])
+        made = (chained if links else simulated)(plan, draw)
         if made is not None and len(made.tilt) > 1.2 * FIRST_S / TICK_S:
             yield made, least
 
@@ -81,14 +85,14 @@ def settings(known_friction: bool) -> dict[str, float]:
     return {"friction_sd": 0.0 if known_friction else FRICTION_SD}
 
 
-def follow(scene: Scene, least: np.ndarray | None, known_friction: bool) -> dict[str, np.ndarray | float]:
+def follow(scene: Scene, least: np.ndarray | None, known_friction: bool, links: bool) -> dict[str, np.ndarray | float]:
     """Errors of one contact's reports; angles degrees, lengths mm."""
-    held = ContactFilter(**settings(known_friction))
+    held = ContactFilter(**settings(known_friction), **({"creep": 0.0} if links else {}))
     start = first_touch(scene)
     bases, tilt = scene.bases[start:], scene.tilt[start:]
     told = held.run(bases, tilt)
     at = told.sample + start
-    use = np.hypot(*scene.point[at].T) < TIP
+    use = np.hypot(*scene.point[at].T) < TIP + REACH_M
     at = at[use]
     off = told.point[use] - scene.point[at]
     turn = np.degrees(told.normal_rad[use] - scene.normal[at])
@@ -101,7 +105,7 @@ def follow(scene: Scene, least: np.ndarray | None, known_friction: bool) -> dict
         "inside": np.einsum("ki,kij,kj->k", off, np.linalg.inv(told.point_cov[use]), off) < NINETY_2,
         "turn": turn,
         "turn_inside": (turn / np.degrees(told.normal_sd[use])) ** 2 < NINETY_1,
-        "contour": 1e3 * np.abs(np.hypot(*(told.point[use] - scene.centre[at]).T) - 0.05),
+        "contour": 1e3 * np.abs(np.hypot(*(told.point[use] - scene.centre[at]).T) - CYLINDER_M),
         "speed": (told.speed[use] - speed) / np.where(speed > 1e-9, speed, np.nan),
         "speed_inside": (told.speed[use] - speed) ** 2 < NINETY_1 * told.speed_sd[use] ** 2,
         "motion": np.array(told.motion)[use],

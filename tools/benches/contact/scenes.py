@@ -1,4 +1,5 @@
-"""Contacts whose truth is known: corners by sim/mechanics with vibration, surfaces by its elastica, quasi-static.
+"""Contacts whose truth is known: corners by sim/mechanics with vibration, surfaces by its elastica, quasi-static; all by
+a chain of links in MuJoCo.
 
 A scene gives, for every tick of 0.5 ms from the first touch on: the base's motion as told, the measured tilt of the plug
 in two axes, and the truth in the whisker's frame.
@@ -10,7 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..mechanics.measure import chain, spec
+
 ROOT = Path(__file__).resolve().parents[3]
+FOLLOW = Path(__file__).resolve().parent / "peers/follow.py"
 sys.path.insert(0, str(ROOT / "sim"))
 
 TICK_S = 5e-4
@@ -21,6 +25,7 @@ FRICTION, FRICTION_SD = 0.3, 0.05
 LEAD = 800  # ticks before a corner is touched
 EVERY = 10  # ticks between two solutions of the elastica
 QUARTER = np.pi / 2
+REACH_M = 1e-3  # beyond the tip: the chain ends in a cap
 
 
 class Scene(NamedTuple):
@@ -73,12 +78,25 @@ def turned(vectors: np.ndarray, directions: np.ndarray) -> np.ndarray:
     return np.column_stack([c * vectors[:, 0] + s * vectors[:, 1], c * vectors[:, 1] - s * vectors[:, 0]])
 
 
-class Corner(NamedTuple):
-    """What determines a corner's contact: place on the straight whisker when it is touched, motions (n, 3), (n, 2)."""
+class Plan(NamedTuple):
+    """What happens: an object is met at a place of the straight whisker while base (n, 3) and object (n, 2) move."""
 
-    radius_m: float
-    bases: np.ndarray
-    velocity: np.ndarray
+    bases: np.ndarray  # velocity along and across the whisker, rate of turn
+    velocity: np.ndarray  # of the object, in the world, whose axes are the whisker's at the first touch
+    touched_m: float
+    round_m: float = 0.0  # radius of the object; 0: a corner
+    normal: float = QUARTER  # of its surface there
+
+    @property
+    def centre(self) -> np.ndarray:
+        """Of the object, at the first touch."""
+        return np.array([self.touched_m, 0.0]) - self.round_m * np.array([np.cos(self.normal), np.sin(self.normal)])
+
+
+class Corner(NamedTuple):
+    """A plan whose object is a corner."""
+
+    plan: Plan
 
     def felt(self, friction: float, ahead_m: float = 0.0, level: int | None = None):
         """Tilt (n,) by sim/mechanics, point (n, 2) and object's velocity (n, 2) in the whisker's frame.
@@ -89,11 +107,11 @@ class Corner(NamedTuple):
         from signals.mechanics import LARGE, VIBRATION, Whisker, touch
 
         whisker = Whisker(kappa=KAPPA, friction=friction, creep=CREEP, creep_s=CREEP_S)
-        bases = np.concatenate([np.tile(self.bases[0], (LEAD, 1)), self.bases])
-        velocity = np.concatenate([np.tile(self.velocity[0], (LEAD, 1)), self.velocity])
+        bases = np.concatenate([np.tile(self.plan.bases[0], (LEAD, 1)), self.plan.bases])
+        velocity = np.concatenate([np.tile(self.plan.velocity[0], (LEAD, 1)), self.plan.velocity])
         moved = TICK_S * np.cumsum(velocity, axis=0)
         back, direction = seen(bases[:LEAD], np.zeros((LEAD, 2)))
-        x, y = np.array([self.radius_m, ahead_m]) - back[-1]  # in the whisker's frame at the first touch
+        x, y = np.array([self.plan.touched_m, ahead_m]) - back[-1]  # in the whisker's frame at the first touch
         c, s = np.cos(direction[-1]), np.sin(direction[-1])
         point, directions = seen(bases, np.array([c * x - s * y, s * x + c * y]) - moved[LEAD - 1] + moved)
         radius, theta = np.hypot(*point.T), np.arctan2(point[:, 1], point[:, 0])
@@ -111,7 +129,7 @@ class Corner(NamedTuple):
     def scene(self, draw: Draw) -> Scene:
         tilt, point, velocity = self.felt(draw.friction)
         none = np.full(len(tilt), np.nan)
-        told = self.bases * (1 + draw.motion)
+        told = self.plan.bases * (1 + draw.motion)
         return Scene(told, draw.measured(tilt), point, none, velocity, np.column_stack([none, none]))
 
     def bound(self, draw: Draw, friction_sd: float) -> np.ndarray:
@@ -122,13 +140,14 @@ class Corner(NamedTuple):
         """
         from signals.mechanics import LARGE
 
-        moves = bool(np.any(self.velocity))
+        moves = bool(np.any(self.plan.velocity))
         steps = {"radius": 1e-4, "ahead": 1e-5, "motion": 1e-3, "friction": 1e-2} | (
             {"vx": 1e-3, "vy": 1e-3} if moves else {}
         )
 
         def answer(radius=0.0, ahead=0.0, motion=0.0, friction=0.0, vx=0.0, vy=0.0):
-            other = Corner(self.radius_m + radius, self.bases * (1 + motion), self.velocity + np.array([vx, vy]))
+            plan = self.plan
+            other = Corner(Plan(plan.bases * (1 + motion), plan.velocity + np.array([vx, vy]), plan.touched_m + radius))
             tilt, point, _ = other.felt(draw.friction + friction, ahead, LARGE)
             return tilt, point
 
@@ -213,14 +232,11 @@ class Surface:
         return None
 
 
-def surface(radius_m: float, touched_m: float, normal: float, bases: np.ndarray, draw: Draw) -> Scene | None:
-    """A circle that touches the straight whisker at a place, at its tip with any normal; None when nothing is felt.
-
-    On a flat one it ends where the whisker would lie along it.
-    """
+def surface(plan: Plan, draw: Draw) -> Scene | None:
+    """A plan whose object is round; None when nothing is felt. A flat one's ends where the whisker would lie along it."""
+    radius_m, touched_m, normal, bases = plan.round_m, plan.touched_m, plan.normal, plan.bases
     tip = touched_m >= TIP
-    start = np.array([touched_m, 0.0]) - radius_m * np.array([np.cos(normal), np.sin(normal)])
-    centre, directions = seen(bases, np.tile(start, (len(bases), 1)))
+    centre, directions = seen(bases, np.tile(plan.centre, (len(bases), 1)))
     first = np.tan(QUARTER - normal - np.arctan(draw.friction)) if tip else touched_m / CONE
     shape = Surface(radius_m, draw.friction, tip, first)
     rows, creep = [], 0.0
@@ -239,3 +255,43 @@ def surface(radius_m: float, touched_m: float, normal: float, bases: np.ndarray,
     still = np.zeros((len(used), 2))
     told = bases[used] * (1 + draw.motion)
     return Scene(told, draw.measured(columns[3]), point, normals, still, centre[used])
+
+
+def simulated(plan: Plan, draw: Draw) -> Scene | None:
+    """The plan by the simulator's mechanics."""
+    return surface(plan, draw) if plan.round_m > 0.0 else Corner(plan).scene(draw)
+
+
+def chained(plan: Plan, draw: Draw) -> Scene | None:
+    """The plan by a chain of 20 links in MuJoCo, whose plug does not creep; None when nothing is felt."""
+    against = plan.bases - np.column_stack([plan.velocity, np.zeros(len(plan.bases))])
+    kind = "face" if plan.round_m > 1.0 else "cylinder" if plan.round_m > 0.0 else "peg"
+    job = {"beam": spec(0.3e-3, KAPPA, 20), "object": kind, "place": [plan.touched_m, 0.0], "radius": plan.round_m}
+    job |= {"normal": plan.normal, "friction": round(draw.friction, 6), "bases": against.round(6).tolist()}
+    told = chain("follow", job, FOLLOW)
+    places = told["places"]
+    touched = [i for i, place in enumerate(places) if place is not None and np.hypot(*place[:2]) < TIP + REACH_M]
+    if len(touched) < 2:
+        return None
+    used = np.arange(touched[0], touched[-1] + 1)
+    kept = [i for i in used if places[i] is not None]
+    x, y, normal = (np.interp(used, kept, column) for column in np.array([places[i] for i in kept]).T)
+    if kind == "face":
+        used, x, y, normal = (part[: lying(x)] for part in (used, x, y, normal))
+    still = np.tile([np.nan, np.nan], (len(plan.bases), 1))
+    if kind == "cylinder":
+        still, _ = seen(against, np.tile(plan.centre, (len(against), 1)))
+    return Scene(
+        plan.bases[used] * (1 + draw.motion),
+        draw.measured(np.array(told["tilt"])[used]),
+        np.column_stack([x, y]),
+        np.full(len(used), np.nan) if kind == "peg" else normal,
+        plan.velocity[used],
+        still[used],
+    )
+
+
+def lying(x: np.ndarray) -> int:
+    """Samples before the contact leaves the tip, after which the whisker lies along a face."""
+    left = np.flatnonzero(x < TIP - 0.012)
+    return int(left[0]) if len(left) else len(x)

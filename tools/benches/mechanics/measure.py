@@ -87,15 +87,15 @@ def python() -> Path:
     return found
 
 
-def chain(kind: str, job: dict) -> dict:
+def chain(kind: str, job: dict, program: Path = SOURCES / "chain.py") -> dict:
     """A result of the chain, kept once it is there."""
     text = json.dumps(job, sort_keys=True)
     kept = CACHE / "chain" / f"{kind}_{hashlib.sha256(text.encode()).hexdigest()[:16]}.json"
     if not kept.exists():
         kept.parent.mkdir(parents=True, exist_ok=True)
-        done = subprocess.run([str(python()), str(SOURCES / "chain.py"), kind, text], capture_output=True, text=True)
+        done = subprocess.run([str(python()), str(program), kind, text], capture_output=True, text=True)
         if done.returncode:
-            raise RuntimeError(f"mechanics bench: chain.py {kind} failed: {done.stderr.strip().splitlines()[-1]}")
+            raise RuntimeError(f"bench: {program.name} {kind} failed: {done.stderr.strip().splitlines()[-1]}")
         kept.write_text(done.stdout)
     return json.loads(kept.read_text())
 

@@ -1,10 +1,16 @@
 """The contact filter in contacts that sim/mechanics bends, vibration and all. Its parts: host/nav/tests/test_contact_filter.c."""
 
+import json
+
 import numpy as np
 import pytest
+from commandkit import run, signals_as_before  # noqa: F401 - a fixture
+from whisks import whisk, whisks
 
 from signals.mechanics import LARGE, VIBRATION, Whisker, touch
 from whisker.touch.contact_filter import ContactFilter
+from whisker.touch.radial import model as radial
+from whisker.touch.radial.shape import Contact
 
 TICK_S = 5e-4
 
@@ -74,3 +80,36 @@ def test_a_setting_out_of_range_is_named(settings, message):
 def test_arrays_of_other_shapes_are_named():
     with pytest.raises(ValueError, match=r"tilts: shape \(3, 2\); give shape \(4, 2\)"):
         ContactFilter().run(np.zeros((4, 3)), np.zeros((3, 2)))
+
+
+def test_a_calibration_by_whisks_is_enough_to_follow_a_whisk(tmp_path, capsys):
+    rng = np.random.default_rng(3)
+    radial.save(radial.fit(whisks(rng, 5), "whisk").model, tmp_path / "model.json")
+    pressed = whisk(115.0, rng)
+    rows = np.column_stack([pressed.t_s, pressed.samples, pressed.whisk_rad_s])
+    head = "contact,t_s,x,y,whisk_rad_s\n"
+    (tmp_path / "contacts.csv").write_text(head + "".join("a," + ",".join(map(str, row)) + "\n" for row in rows))
+    status, out, _ = run(capsys, "radial", "follow", tmp_path / "model.json", tmp_path / "contacts.csv", "--json")
+    told = [json.loads(line) for line in out.splitlines()]
+    assert status == 0
+    assert len(told) > 20
+    last = told[-1]
+    assert last["motion"] == "body whisk"
+    assert abs(np.hypot(*last["point_mm"]) - 115.0) < min(5.0, 3.0 * last["point_sd_mm"][0])
+    assert told[2]["point_sd_mm"][0] > 2.0 * last["point_sd_mm"][0]
+
+
+def test_what_cannot_be_followed_is_one_line(tmp_path, capsys):
+    rng = np.random.default_rng(3)
+    model = radial.fit(whisks(rng, 5), "whisk").model
+    pressed = whisk(115.0, rng)
+    with pytest.raises(ValueError, match="no motion of the base; give the column whisk_rad_s or push_mm_s"):
+        ContactFilter.calibrated(model, Contact(pressed.t_s, pressed.samples))
+    with pytest.raises(ValueError, match="50 samples; give at least 100"):
+        ContactFilter.calibrated(model, pressed.until(50))
+    radial.save(radial.fit(whisks(rng, 5), "linear").model, tmp_path / "line.json")
+    (tmp_path / "contacts.csv").write_text("contact,t_s,x\na,0,1\n")
+    status, _, said = run(capsys, "radial", "follow", tmp_path / "line.json", tmp_path / "contacts.csv")
+    assert status == 2
+    assert "line.json" in said
+    assert "no model of whole whisks; fit with '--model whisk'" in said

@@ -7,6 +7,7 @@ import numpy as np
 from ..arguments import add_action, plain
 from ..bridge.nodes import check_node
 from ..tables import TableError, unwritable
+from ..touch.contact_filter import ContactFilter, Reports
 from ..touch.radial import model as radial
 
 EXAMPLE = "whisker radial fit contacts.csv --out model.json"
@@ -29,6 +30,11 @@ def add(parser) -> None:
     p.add_argument("--json", action="store_true", help="one object per line and contact")
     text = "a press model's answers as each contact grows, one line for every tenth of its samples"
     p.add_argument("--during", action="store_true", help=text)
+    example = "whisker radial follow model.json contacts.csv --json"
+    p = add_action(actions, "follow", "tell where each contact is while it is pressed", example, follow)
+    p.add_argument("model", help="of whole whisks: 'whisker radial fit --model whisk'")
+    p.add_argument("contacts", help="CSV as for fit, with whisk_rad_s or push_mm_s; radius_mm is not read")
+    p.add_argument("--json", action="store_true", help="one object per line, one every 20 ms at 2 kHz")
 
 
 def fit(arguments) -> int:
@@ -76,4 +82,41 @@ def _predict(arguments, model, contact: str, recorded: radial.Contact, peak: flo
     direction = "" if found.direction_deg is None else f"  {found.direction_deg:g} degrees"
     print(
         f"{contact}{after}  {found.radius_mm:.2f} +- {found.sigma_mm:.2f} mm  {found.type}  {found.confidence:.2f}{direction}"
+    )
+
+
+def follow(arguments) -> int:
+    model = radial.load(arguments.model)
+    if not isinstance(model, radial.WhiskModel):
+        raise TableError(arguments.model, None, "it is no model of whole whisks; fit with '--model whisk'")
+    whisks = radial.read_whisks(arguments.contacts, with_radius=False)
+    check_node(model.node, whisks.node, arguments.model)
+    for contact, recorded in zip(whisks.contact, whisks.recorded, strict=True):
+        try:
+            held, bases, tilts = ContactFilter.calibrated(model, recorded)
+        except ValueError as error:
+            raise TableError(arguments.contacts, 1, f"contact {contact}: {error}") from error
+        told = held.run(bases, tilts)
+        for k in range(len(told.sample)) if arguments.json else range(len(told.sample))[-1:]:
+            _follow(arguments, contact, recorded.t_s[told.sample[k]] - recorded.t_s[0], told, k)
+        if not len(told.sample):
+            print(json.dumps({"contact": contact}) if arguments.json else f"{contact}  no contact")
+    return 0
+
+
+def _follow(arguments, contact: str, at_s: float, told: Reports, k: int) -> None:
+    """One line on a contact at a time; angles in degrees about the unbent whisker."""
+    x, y = 1e3 * told.point[k]
+    sd_x, sd_y = 1e3 * np.sqrt(np.diag(told.point_cov[k]))
+    normal, normal_sd = np.degrees([told.normal_rad[k], told.normal_sd[k]])
+    if arguments.json:
+        made = {"contact": contact, "t_s": at_s, "point_mm": [x, y], "point_sd_mm": [sd_x, sd_y]}
+        made |= {"normal_deg": normal, "normal_sd_deg": normal_sd, "motion": told.motion[k]}
+        made |= {name: getattr(told, name)[k] for name in ("sweep", "corner", "tip", "slip", "speed", "speed_sd")}
+        print(json.dumps(plain(made)))
+        return
+    kind = "tip" if told.tip[k] > 0.5 else "corner" if told.corner[k] > 0.5 else "shaft"
+    print(
+        f"{contact}  after {at_s:.3f} s  ({x:.1f} +- {sd_x:.1f}, {y:.1f} +- {sd_y:.1f}) mm  "
+        f"normal {normal:.0f} +- {normal_sd:.0f} degrees  {kind}  {told.motion[k]}"
     )

@@ -5,6 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..native import as_doubles, doubles, ffi, lib, octets
+from .radial.shape import Contact
+from .radial.whisk import WhiskModel
 
 # The CrunchBot's whisker; a calibration's kappa and cone replace them.
 LENGTH_M, CONE_M, KAPPA = 0.140, 0.181739, 1.0
@@ -19,17 +21,18 @@ SETTINGS = {
     "friction": 0.3,
     "friction_sd": 0.05,
     "motion_share": 0.01,
-    "ring_hz": 45.0,
+    "ring_hz": 40.0,
     "ring_damping": 0.1,
     "speed_sd": 0.15,
     "speed_drift": 0.005,
-    "moving": 0.1,
+    "moving": 0.02,
     "sample_s": 5e-4,
     "block": 20,
     "report": 2,
 }
 POSITIVE = ("cone_m", "kappa", "creep_s", "noise_rad", "largest_rad", "ring_hz", "sample_s")
 LIMITS = {"friction": 0.5, "moving": 1.0}
+LEAST_SAMPLES = 100
 MOTIONS = ("body whisk", "drive-by", "sweep")
 SCALARS = ("arc_m", "arc_sd_m", "plane_rad", "plane_sd", "normal_rad", "normal_sd", "speed", "speed_sd")
 SHARES = ("sweep", "corner", "tip", "slip", "friction", "friction_sd")
@@ -81,6 +84,38 @@ class ContactFilter:
             )
         self.state = ffi.new("struct nav_contact_filter *")
         lib.nav_contact_filter_init(self.state, self._config, self._beam)
+
+    @classmethod
+    def calibrated(
+        cls, model: WhiskModel, contact: Contact, **settings: float
+    ) -> "tuple[ContactFilter, np.ndarray, np.ndarray]":
+        """A filter with the plug, cone and gain of a model of whole whisks, and the push of a recorded contact for `run`:
+        its bases (n, 3) and tilts (n, 2).
+
+        The push ends at the greatest deflection. The base turns about the follicle's exit by `whisk_rad_s`, or moves across
+        the whisker by `push_mm_s`; ValueError when the contact has neither, or too few samples.
+        """
+        t_s, samples = contact.t_s, as_doubles(contact.samples, "samples", (len(contact.t_s), None))
+        if len(t_s) < LEAST_SAMPLES or not t_s[-1] > t_s[0]:
+            raise ValueError(f"{len(t_s)} samples; give at least {LEAST_SAMPLES}, with rising times")
+        turn, push = contact.whisk_rad_s, contact.push_mm_s
+        if turn is None and push is None:
+            raise ValueError("no motion of the base; give the column whisk_rad_s or push_mm_s")
+        first = samples[: max(10, len(samples) // 20)]
+        off = samples - np.nanmedian(first, axis=0)
+        noise = float(np.nanstd(model.along(first)))
+        per_rad = model.counts_per_rad(float(np.nanmedian(turn)) if turn is not None else 1.0)
+        along = model.along(off)
+        across = off[:, :2] @ model.side if samples.shape[1] > 1 else np.zeros(len(off))
+        end = int(np.nanargmax(along)) + 1
+        bases = np.zeros((end, 3))
+        if push is not None:
+            bases[:, 1] = -1e-3 * np.abs(push[:end])
+        else:
+            bases[:, 2] = -np.abs(turn[:end])
+        made = {"kappa": model.kappa, "cone_m": 1e-3 * model.cone_mm, "gain_sd": model.spread}
+        made |= {"noise_rad": max(noise, 1e-9) / per_rad, "sample_s": float(t_s[-1] - t_s[0]) / (len(t_s) - 1)}
+        return cls(**(made | settings)), bases, np.column_stack([along, across])[:end] / per_rad
 
     def begin(self) -> None:
         """Forget the contact; the counts of bad samples stay."""

@@ -101,6 +101,12 @@ class WhiskModel:
         """Deflections (n, axes), counts, as a signed length (n,) along the direction of calibration."""
         return np.asarray(deflection) @ np.array(list(self._c.direction)[: self.axes])
 
+    @property
+    def side(self) -> np.ndarray:
+        """Unit vector (2,) over the first two axes at right angles to the direction of calibration."""
+        x, y = self._c.direction[0], self._c.direction[1]
+        return np.array([-y, x]) / max(1e-9, math.hypot(x, y))
+
     def share(self, radius_mm: float) -> float:
         """h(a): tilt of the plug per angle pushed at this radius."""
         return math.exp(lib.nav_whisk_height(self._c.kappa, self._c.cone_mm, radius_mm))
