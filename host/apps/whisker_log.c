@@ -121,8 +121,8 @@ static void log_bad_records(struct session *session, const struct whisker_frame 
         session->tally.records_bad++;
         if (session->bad) {
             const unsigned errors = status & ((1u << WHISKER_STATUS_ERROR_BITS) - 1);
-            fprintf(session->bad, "%u,%" PRIu64 ",%u,%u\n", first + lane, frame->tick, status >> WHISKER_STATUS_ERROR_BITS,
-                    errors);
+            fprintf(session->bad, "%u,%" PRIu64 ",%u,%u\n", first + lane, frame->tick,
+                    status >> WHISKER_STATUS_ERROR_BITS, errors);
         }
     }
 }
