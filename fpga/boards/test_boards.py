@@ -3,6 +3,7 @@
 import json
 import re
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -16,6 +17,7 @@ import report  # noqa: E402
 from toolchain import ToolError, missing, must  # noqa: E402
 
 LACKING = missing("yosys")
+GOWIN_TOOLS = ("yosys", "nextpnr-himbaechel-gowin", "gowin_pack")
 needs_yosys = pytest.mark.skipif(bool(LACKING), reason=LACKING)
 CLEAN = "module top(input clk, input d, output reg q); always @(posedge clk) q <= d; endmodule"
 FAULTY = {
@@ -151,6 +153,26 @@ def test_a_second_clock_behind_gowins_pads_is_noticed(tmp_path):
     path.write_text(json.dumps({"modules": {"top": {"ports": {"clk": {"bits": [2]}}, "cells": cells}}}))
     problems = report.unconstrained_clocks(path, "top", "clk")
     assert problems == [f"ff{n} is clocked by another net than clk" for n in (2, 5)]
+
+
+@pytest.mark.skipif(bool(missing(*GOWIN_TOOLS)), reason=missing(*GOWIN_TOOLS))
+def test_gowins_tools_make_a_bitstream(tmp_path):
+    """A counter between pins of the board, some of which configuration uses before."""
+    board = replace(
+        build.load("tang_primer_20k"), clock="clk", pins={"clk": "T15", "d": "N9", "q": "C13", "miso": ["A11"]}
+    )
+    source = tmp_path / "top.v"
+    source.write_text(
+        "module top(input clk, input d, input miso, output q); reg [7:0] n; assign q = n[7];"
+        "always @(posedge clk) n <= n + {7'd0, d ^ miso}; endmodule"
+    )
+    front = build.front("top", [source], {}, tmp_path, libraries=gowin.LIBRARIES)
+    netlist = gowin.synthesise("top", front, tmp_path)
+    sites = {name.replace("[0]", ""): site for name, site in build.sites(board, 1).items()}
+    placed = report.read(gowin.place(board, sites, netlist, tmp_path, 1))
+    assert placed["used"]["FF"] == 8 and placed["used"]["pin"] == 4 and placed["fmax_mhz"] > 66
+    lines = gowin.pack(board, tmp_path).read_text().split()
+    assert len(lines) > 1000 and set("".join(lines)) == {"0", "1"}
 
 
 def nextpnr_report(fmax: float, out: float, in_: float, through: float, shortest: float = 2.0) -> dict:
