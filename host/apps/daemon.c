@@ -19,13 +19,13 @@ static bool connect_first(struct daemon *daemon)
     struct whisker_identity identity;
     for (int i = stream->bridges - 1; i >= 0; i--) {
         struct daemon_bridge *bridge = &stream->bridge[i];
-        bridge->told = daemon_stream_connect(stream, i, &identity);
-        if (bridge->told && !stream->options->wait) {
-            daemon_bridge_log_refusal(bridge, bridge->told, &identity);
+        bridge->logged = daemon_stream_connect(stream, i, &identity);
+        if (bridge->logged && !stream->options->wait) {
+            daemon_bridge_log_refusal(bridge, bridge->logged, &identity);
             return false;
         }
-        if (bridge->told) {
-            daemon_log_error(LOG_NOTE, bridge->name, bridge->told);
+        if (bridge->logged) {
+            daemon_log_error(LOG_NOTE, bridge->name, bridge->logged);
             daemon_notify_ready("waiting for a bridge");
         }
     }
@@ -40,11 +40,12 @@ static void connect_again(struct daemon_stream *stream)
         struct daemon_bridge *bridge = &stream->bridge[i];
         if (!bridge->device) {
             const int error = daemon_stream_connect(stream, i, &identity);
-            const bool away = error == WHISKER_ERROR_DEVICE_SERIAL && bridge->lost_at_ms != 0; /* as has been told */
-            if (error && error != bridge->told && !away) {
+            const bool away =
+                error == WHISKER_ERROR_DEVICE_SERIAL && bridge->lost_at_ms != 0; /* its loss is in the log */
+            if (error && error != bridge->logged && !away) {
                 daemon_bridge_log_refusal(bridge, error, &identity);
             }
-            bridge->told = error;
+            bridge->logged = error;
         }
     }
 }
@@ -68,7 +69,7 @@ static int await_bridge(struct daemon *daemon)
     return error;
 }
 
-/* Streams and waits. Returns 0 when told to stop, or why it cannot go on, which has been logged. */
+/* Streams and waits. Returns 0 after a wish to stop, or why it cannot go on, which has been logged. */
 static int serve(struct daemon *daemon)
 {
     struct daemon_stream *stream = &daemon->stream;

@@ -4,7 +4,7 @@
 #include "daemon_log.h"
 #include "whisker_protocol.h"
 
-/* Half a frame from before does not stay; readers are told that something is missing, but of the first start. */
+/* Half a frame from before does not stay; a mark for readers says that something is missing, but at the first start. */
 static void daemon_bridge_begin(struct daemon_bridge *bridge)
 {
     struct whisker_decoder *decoder = &bridge->source.decoder;
@@ -49,7 +49,7 @@ void daemon_bridge_log_refusal(const struct daemon_bridge *bridge, int error, co
 void daemon_bridge_lose(struct daemon_bridge *bridge, struct daemon_stats *stats, int error)
 {
     bridge->lost_at_ms = cli_now_ms();
-    bridge->told = error;
+    bridge->logged = error;
     whisker_device_close(bridge->device);
     bridge->device = NULL;
     daemon_stats_lost(stats, true, error);

@@ -16,7 +16,7 @@ struct daemon_bridge {
     struct whisker_timing ticks; /* of tick_in, when last asked for */
     uint32_t ticks_told;         /* bit n: error TICK_IN_SILENT - n of this run is in the log */
     int64_t lost_at_ms;
-    int told;       /* why it could not be opened, as last logged */
+    int logged;     /* why it could not be opened, as last logged */
     bool last_seen; /* the last frame after a stop has come */
     bool damage_told;
     bool dated; /* its frames say when they were by the host's start-of-frame packets */

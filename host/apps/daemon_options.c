@@ -133,7 +133,7 @@ static const char *check_second(const struct daemon_options *options)
            : whisker_settings_check(&second, NULL, 0)
                ? "--second-lane-mask: it has lanes above 27; use bits of 0xfffffff"
            : second.tick_period < WHISKER_PAIR_PERIOD_MIN
-               ? "--second: ticks of two bridges are told apart from a --tick-period of 22500 on; give 22500 or more"
+               ? "--second: ticks of two bridges can be matched from a --tick-period of 22500 on; give 22500 or more"
                : NULL;
 }
 

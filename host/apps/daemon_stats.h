@@ -36,8 +36,7 @@ void daemon_stats_lost(struct daemon_stats *stats, bool was_connected, int error
 /* Counts a frame of this bridge. */
 void daemon_stats_frame(struct daemon_stats *stats, struct daemon_source *source, const struct whisker_frame *frame);
 
-/* Takes over what the decoders and the clock fit have counted: begin, each source, end. Then `told` is what is to be
- * told. */
+/* Takes over what the decoders and the clock fit have counted: begin, each source, end. Then `told` is up to date. */
 void daemon_stats_settle_begin(struct daemon_stats *stats);
 void daemon_stats_settle(struct daemon_stats *stats, const struct daemon_source *source);
 void daemon_stats_settle_end(struct daemon_stats *stats, const struct whisker_clock_fit *clock);
