@@ -20,6 +20,7 @@ MESSAGES = (
     {"record": p.RECORD, "order": p.ORDER, "service": p.SERVICE}
     | {
         "image_header": p.IMAGE_HEADER,
+        "gateware_header": p.GATEWARE_HEADER,
         "frame_header": p.FRAME_HEADER,
     }
     | {f"report_{name}": message for name, message in p.REPORTS.items()}

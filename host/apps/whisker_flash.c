@@ -1,20 +1,19 @@
-/* whisker-flash: loads firmware into the nodes of a bridge, all at once; lists them. */
+/* whisker-flash: loads firmware into the nodes of a bridge, all at once; lists them; loads gateware into the bridge. */
 #include <getopt.h>
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 #include "cli.h"
+#include "flash_gateware.h"
 #include "flash_table.h"
 #include "whisker/whisker.h"
 #include "whisker_protocol.h"
 
 #define PROGRAM "whisker-flash"
-#define IMAGE_BYTES_MAX (WHISKER_IMAGE_HEADER_BYTES + WHISKER_LIMIT_FLASH_ROWS * WHISKER_LIMIT_FLASH_ROW_BYTES)
-#define BAR_WIDTH 40
-#define DRAIN_POLLS 10 /* of 10 ms */
+#define IMAGE_BYTES_MAX (16u << 20) /* a gateware image: as much as a bridge's flash can hold */
+#define DRAIN_POLLS 10              /* of 10 ms */
 /* Frames are thrown away: the fewer are taken, the less a simulated bridge runs on between two orders, for it waits
  * only for its frames to be taken. */
 #define FRAMES_BATCH 2
@@ -30,23 +29,27 @@ struct options {
 };
 
 static uint8_t image_bytes[IMAGE_BYTES_MAX + 1];
+static size_t image_count;
 
 static void print_help(void)
 {
-    printf("Usage: whisker-flash IMAGE [OPTION...]\n"
-           "       whisker-flash --list [--health]\n"
-           "Loads a firmware image (.whex) into all nodes of a bridge at once and starts it. Stop whiskerd first.\n\n"
-           "  --lane N         only the node on this lane; it needs a serial number of its own\n"
-           "  --node SERIAL    only the node with this serial number\n"
-           "  --dry-run        say what would be done and whether the nodes would take it; change nothing\n"
-           "  --force          also an image that is older than what a node runs, or of another build (sensor)\n"
-           "  --list           who the nodes are\n"
-           "  --health         with --list: their fault counters that are not zero\n"
-           "  --bridge TEXT    the bridge with this serial number (the first that can be opened)\n"
-           "  --sck-divider N --word-gap N --sample-point N   as whiskerd; at most 16 and 180\n"
-           "  --help           this text\n\n"
-           "Example: whisker-flash node-0.2.whex\n"
-           "Exit code: 0 every node has it, 1 failed for some or all, 2 wrong use.\n");
+    printf(
+        "Usage: whisker-flash IMAGE [OPTION...]\n"
+        "       whisker-flash --list [--health]\n"
+        "Loads a firmware image (.whex) into all nodes of a bridge at once and starts it. Stop whiskerd first.\n"
+        "A gateware image (.wgw) goes into the bridge itself; of the options it knows --dry-run, --force, --bridge.\n\n"
+        "  --lane N         only the node on this lane; it needs a serial number of its own\n"
+        "  --node SERIAL    only the node with this serial number\n"
+        "  --dry-run        say what would be done and whether the nodes would take it; change nothing\n"
+        "  --force          also an image that is older than what a node (or the bridge) runs, or of another build "
+        "(sensor)\n"
+        "  --list           who the nodes are\n"
+        "  --health         with --list: their fault counters that are not zero\n"
+        "  --bridge TEXT    the bridge with this serial number (the first that can be opened)\n"
+        "  --sck-divider N --word-gap N --sample-point N   as whiskerd; at most 16 and 180\n"
+        "  --help           this text\n\n"
+        "Example: whisker-flash node-0.2.whex\n"
+        "Exit code: 0 every node has it, 1 failed for some or all, 2 wrong use.\n");
 }
 
 static bool set_number(struct options *options, const char *name, const char *text)
@@ -123,32 +126,21 @@ static int read_options(struct options *options, int argc, char **argv)
     return wrong ? CLI_USAGE + 1 : 0;
 }
 
-static int read_image(const char *path, struct whisker_image *image)
+static int read_file(const char *path)
 {
     FILE *file = fopen(path, "rb");
     if (!file) {
         fprintf(stderr, PROGRAM ": %s: cannot be read; check the name, or make it: make firmware\n", path);
         return CLI_FAILED;
     }
-    const size_t count = fread(image_bytes, 1, sizeof image_bytes, file);
+    image_count = fread(image_bytes, 1, sizeof image_bytes, file);
     fclose(file);
-    const int error = whisker_image_parse(image_bytes, count, image);
-    return error ? cli_fail(PROGRAM, path, error) : CLI_OK;
+    return CLI_OK;
 }
 
 static void ignore_frames(void *context, const uint8_t *bytes, size_t count)
 {
     (void)context, (void)bytes, (void)count;
-}
-
-static void show_progress(void *context, uint32_t blocks, uint32_t total)
-{
-    (void)context;
-    const int done = (int)(blocks * BAR_WIDTH / total);
-    if (isatty(STDERR_FILENO)) {
-        fprintf(stderr, "\r[%-*.*s] %3u %%%s", BAR_WIDTH, done, "########################################",
-                (unsigned)(blocks * 100 / total), blocks == total ? "\n" : "");
-    }
 }
 
 static int print_health(struct whisker_device *device, uint32_t lanes)
@@ -254,7 +246,7 @@ static int update(struct whisker_device *device, struct options *options,
     if (options->dry_run) {
         return foresee(nodes, lanes, image) ? CLI_FAILED : CLI_OK;
     }
-    int error = whisker_nodes_update(device, lanes, options->serial, image, show_progress, NULL, updates);
+    int error = whisker_nodes_update(device, lanes, options->serial, image, flash_show_progress, NULL, updates);
     if (!error) {
         error = whisker_nodes_identify(device, lanes, nodes);
     }
@@ -311,10 +303,18 @@ int main(int argc, char **argv)
     if (code != 0) {
         return cli_end(PROGRAM, code - 1);
     }
-    if (options.image && (code = read_image(options.image, &image)) != CLI_OK) {
+    if (options.image && (code = read_file(options.image)) != CLI_OK) {
         return code;
     }
-    const int error = whisker_device_open(options.bridge, &device, &identity);
+    if (options.image && whisker_gateware_is(image_bytes, image_count)) {
+        return cli_end(PROGRAM, flash_gateware(options.image, image_bytes, (uint32_t)image_count, options.bridge,
+                                               options.force, options.dry_run));
+    }
+    int error = options.image ? whisker_image_parse(image_bytes, image_count, &image) : WHISKER_OK;
+    if (error) {
+        return cli_fail(PROGRAM, options.image, error);
+    }
+    error = whisker_device_open(options.bridge, &device, &identity);
     if (error) {
         return cli_fail(PROGRAM, "bridge", error);
     }

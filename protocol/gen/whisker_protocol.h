@@ -34,6 +34,8 @@
 #define WHISKER_LIMIT_SERVICE_TICK_MIN 20000u /* cycle of 60 MHz, both windows at the default bus settings take 17070 */
 #define WHISKER_LIMIT_IMAGE_MAGIC UINT32_C(1296649047)
 #define WHISKER_LIMIT_IMAGE_FORMAT 1u
+#define WHISKER_LIMIT_GATEWARE_MAGIC UINT32_C(1464290135)
+#define WHISKER_LIMIT_GATEWARE_FORMAT 1u
 #define WHISKER_LIMIT_CHIP_ID 1577u /* dsPIC33FJ128MC802 */
 #define WHISKER_LIMIT_FLASH_ROW_BYTES 192u /* byte, write unit: 64 instructions */
 #define WHISKER_LIMIT_FLASH_PAGE_ROWS 8u /* row, erase unit */
@@ -71,6 +73,17 @@
 #define WHISKER_IMAGE_HEADER_OPTIONS 18u /* byte offset; 16 bits */
 #define WHISKER_IMAGE_HEADER_FIRST_ROW 20u /* byte offset; 16 bits */
 #define WHISKER_IMAGE_HEADER_HEADER_CRC32 44u /* byte offset; 32 bits */
+#define WHISKER_GATEWARE_HEADER_BYTES 32u
+#define WHISKER_GATEWARE_HEADER_MAGIC 0u /* byte offset; 32 bits */
+#define WHISKER_GATEWARE_HEADER_FORMAT 4u /* byte offset; 8 bits */
+#define WHISKER_GATEWARE_HEADER_WIRE_VERSION 5u /* byte offset; 8 bits */
+#define WHISKER_GATEWARE_HEADER_BOARD 6u /* byte offset; 8 bits */
+#define WHISKER_GATEWARE_HEADER_LANES 7u /* byte offset; 8 bits */
+#define WHISKER_GATEWARE_HEADER_BUILD 8u /* byte offset; 16 bits */
+#define WHISKER_GATEWARE_HEADER_GATEWARE 10u /* byte offset; 16 bits */
+#define WHISKER_GATEWARE_HEADER_LENGTH 12u /* byte offset; 32 bits */
+#define WHISKER_GATEWARE_HEADER_BODY_CRC32 16u /* byte offset; 32 bits */
+#define WHISKER_GATEWARE_HEADER_HEADER_CRC32 28u /* byte offset; 32 bits */
 #define WHISKER_FRAME_HEADER_BYTES 32u
 #define WHISKER_FRAME_HEADER_MAGIC 0u /* byte offset; 16 bits */
 #define WHISKER_FRAME_HEADER_WIRE_VERSION 2u /* byte offset; 8 bits */

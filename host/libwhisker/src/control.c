@@ -110,6 +110,17 @@ int control_answers(hid_device *hid, uint8_t *report)
     return get_report(hid, WHISKER_REPORT_ID_ANSWERS, report, WHISKER_REPORT_ANSWERS_BYTES);
 }
 
+int control_send_flash(hid_device *hid, const uint8_t *report)
+{
+    const int sent = hid_send_feature_report(hid, report, WHISKER_REPORT_FLASH_BYTES);
+    return sent < 0 ? WHISKER_ERROR_DEVICE_REFUSED : WHISKER_OK;
+}
+
+int control_flash(hid_device *hid, uint8_t *report)
+{
+    return get_report(hid, WHISKER_REPORT_ID_FLASH, report, WHISKER_REPORT_FLASH_BYTES);
+}
+
 void control_parse_counters(const uint8_t *bytes, struct whisker_counters *counters)
 {
     *counters = (struct whisker_counters){

@@ -33,6 +33,12 @@ int control_service(hid_device *hid, const struct whisker_service_order *order);
 /* Reads the report `answers`: WHISKER_REPORT_ANSWERS_BYTES bytes. Returns 0 or DEVICE_CONTROL. */
 int control_answers(hid_device *hid, uint8_t *report);
 
+/* Hands the bridge an order to its flash, WHISKER_REPORT_FLASH_BYTES bytes. Returns 0 or DEVICE_REFUSED. */
+int control_send_flash(hid_device *hid, const uint8_t *report);
+
+/* Reads the report `flash`. Returns 0 or DEVICE_CONTROL. */
+int control_flash(hid_device *hid, uint8_t *report);
+
 /* Reads the report `timing`. Returns 0 or DEVICE_CONTROL. */
 int control_timing(hid_device *hid, struct whisker_timing *timing);
 

@@ -309,6 +309,21 @@ int device_send_service(struct whisker_device *device, const struct whisker_serv
     return blame(device, control_service(device->hid, order));
 }
 
+int device_silence(struct whisker_device *device)
+{
+    return blame(device, discard_stale(device));
+}
+
+int device_send_flash(struct whisker_device *device, const uint8_t *report)
+{
+    return blame(device, control_send_flash(device->hid, report));
+}
+
+int device_flash(struct whisker_device *device, uint8_t *report)
+{
+    return blame(device, control_flash(device->hid, report));
+}
+
 int device_answers(struct whisker_device *device, uint8_t *report)
 {
     return blame(device, control_answers(device->hid, report));

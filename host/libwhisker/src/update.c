@@ -2,6 +2,7 @@
  * them wants. */
 #include <string.h>
 
+#include "crc32.h"
 #include "whisker/errors.h"
 #include "whisker/service.h"
 #include "whisker_protocol.h"
@@ -24,18 +25,6 @@ struct loading {
     uint8_t tries[WHISKER_FRAME_LANES]; /* since it had so many */
 };
 
-static uint32_t crc32(const uint8_t *bytes, size_t count)
-{
-    uint32_t crc = WHISKER_CRC32_INIT;
-    for (size_t i = 0; i < count; i++) {
-        crc ^= (uint32_t)bytes[i] << 24;
-        for (int bit = 0; bit < 8; bit++) {
-            crc = crc << 1 ^ (crc >> 31 ? WHISKER_CRC32_POLYNOMIAL : 0);
-        }
-    }
-    return crc ^ WHISKER_CRC32_XOR_OUT;
-}
-
 int whisker_image_parse(const uint8_t *bytes, size_t count, struct whisker_image *image)
 {
     if (count < WHISKER_IMAGE_HEADER_BYTES) {
@@ -50,13 +39,13 @@ int whisker_image_parse(const uint8_t *bytes, size_t count, struct whisker_image
         .options = whisker_get_u16(bytes + WHISKER_IMAGE_HEADER_OPTIONS),
         .wire_version = bytes[WHISKER_IMAGE_HEADER_WIRE_VERSION],
     };
-    const bool sound =
-        whisker_get_u32(bytes + WHISKER_IMAGE_HEADER_MAGIC) == WHISKER_LIMIT_IMAGE_MAGIC &&
-        bytes[WHISKER_IMAGE_HEADER_FORMAT] == WHISKER_LIMIT_IMAGE_FORMAT &&
-        whisker_get_u32(bytes + WHISKER_IMAGE_HEADER_HEADER_CRC32) == crc32(bytes, WHISKER_IMAGE_HEADER_HEADER_CRC32) &&
-        image->length == count - WHISKER_IMAGE_HEADER_BYTES && image->length > 0 && image->length <= IMAGE_BYTES_MAX &&
-        image->length % WHISKER_LIMIT_FLASH_ROW_BYTES == 0 &&
-        whisker_get_u32(bytes + WHISKER_IMAGE_HEADER_BODY_CRC32) == crc32(image->body, image->length);
+    const bool sound = whisker_get_u32(bytes + WHISKER_IMAGE_HEADER_MAGIC) == WHISKER_LIMIT_IMAGE_MAGIC &&
+                       bytes[WHISKER_IMAGE_HEADER_FORMAT] == WHISKER_LIMIT_IMAGE_FORMAT &&
+                       whisker_get_u32(bytes + WHISKER_IMAGE_HEADER_HEADER_CRC32) ==
+                           crc32_of(bytes, WHISKER_IMAGE_HEADER_HEADER_CRC32) &&
+                       image->length == count - WHISKER_IMAGE_HEADER_BYTES && image->length > 0 &&
+                       image->length <= IMAGE_BYTES_MAX && image->length % WHISKER_LIMIT_FLASH_ROW_BYTES == 0 &&
+                       whisker_get_u32(bytes + WHISKER_IMAGE_HEADER_BODY_CRC32) == crc32_of(image->body, image->length);
     return sound ? WHISKER_OK : WHISKER_ERROR_IMAGE;
 }
 

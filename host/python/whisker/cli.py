@@ -18,7 +18,7 @@ COMMANDS = {
     "doctor": "find out why it does not work",
     "calibrate": "measure rest and noise, record contacts at known distances",
     "bridge-sim": "a simulated bridge to try everything with",
-    "flash": "load firmware into the nodes",
+    "flash": "load firmware into the nodes, or gateware into the bridge",
     "record": "write a ring to an MCAP file",
     "replay": "feed a ring from a recording, as the device would",
     "stream": "print frames as CSV or JSON lines",

@@ -68,6 +68,7 @@ ORDER = Message(DEFINITION["order"])
 FRAME_HEADER = Message(DEFINITION["frame_header"])
 SERVICE = Message(DEFINITION["service"])
 IMAGE_HEADER = Message(DEFINITION["image_header"])
+GATEWARE_HEADER = Message(DEFINITION["gateware_header"])
 REPORTS = {name: Message(table) for name, table in DEFINITION["reports"].items()}
 LIMITS: dict[str, int] = {name: entry["value"] for name, entry in DEFINITION["limits"].items()}
 CODES: dict[str, int] = {name: entry["value"] for name, entry in DEFINITION["codes"].items()}

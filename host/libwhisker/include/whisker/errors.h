@@ -55,6 +55,24 @@
     X(TICK_IN_UNEVEN, -55, "edges at tick_in come more than 1/64 of the tick period beside their time",                \
       "give the source's period with --tick-period, or use a steadier source")                                         \
     X(IMAGE, -51, "this is no firmware image, or it is damaged", "build it again, or fetch it again")                  \
+    X(GATEWARE_IMAGE, -60, "this is no gateware image, or it is damaged", "make it again: make bitstream BOARD=...")   \
+    X(GATEWARE_BOARD, -61, "the gateware image is for another board",                                                  \
+      "make one for this board: make bitstream BOARD=...")                                                             \
+    X(GATEWARE_LANES, -62, "the gateware image has another number of lanes than the bridge",                           \
+      "make it with LANES=... as the bridge has, or load it with the board's programmer")                              \
+    X(GATEWARE_OLDER, -63, "the gateware image is older than what the bridge runs", "--force loads it all the same")   \
+    X(GATEWARE_NO_FLASH, -64, "this bridge cannot write its own flash",                                                \
+      "load the bitstream with the board's programmer: docs/boards.md")                                                \
+    X(GATEWARE_FALLBACK, -65, "the bridge's flash holds no image to fall back to",                                     \
+      "load BOARD_flash.bin once with the board's programmer: docs/boards.md")                                         \
+    X(GATEWARE_SPACE, -66, "the gateware image is longer than its place in the bridge's flash",                        \
+      "load the bitstream with the board's programmer: docs/boards.md")                                                \
+    X(FLASH_CHIP, -67, "the bridge's flash does not say what it is, or is too small",                                  \
+      "load the bitstream with the board's programmer: docs/boards.md")                                                \
+    X(FLASH_BUSY, -68, "the bridge's flash stays busy",                                                                \
+      "take the board's power away and give it back, and begin again")                                                 \
+    X(FLASH_VERIFY, -69, "the bridge's flash does not hold what was written",                                          \
+      "begin again; if it stays so, the flash is worn out: replace the board")                                         \
     X(HOST_CLOCK, -50, "the host's clock was set or went backwards", "none needed; a time service avoids it")
 
 enum whisker_error {

@@ -6,6 +6,7 @@
 #include "whisker/device.h"
 #include "whisker/errors.h"
 #include "whisker/frame.h"
+#include "whisker/gateware.h"
 #include "whisker/pair.h"
 #include "whisker/ring.h"
 #include "whisker/service.h"

@@ -1,4 +1,4 @@
-"""`whisker flash`: loads firmware into the nodes. The work is whisker-flash's, which speaks USB."""
+"""`whisker flash`: loads firmware into the nodes, or gateware into the bridge. The work is whisker-flash's, which speaks USB."""
 
 import os
 
@@ -8,7 +8,7 @@ EXAMPLE = "whisker flash node-0.2.whex"
 
 
 def add(parser) -> None:
-    parser.add_argument("image", help="firmware image (.whex)")
+    parser.add_argument("image", help="firmware image (.whex) for the nodes, or gateware image (.wgw) for the bridge")
     which = parser.add_mutually_exclusive_group()
     which.add_argument("--lane", type=int, metavar="N", help="only the node on this lane")
     which.add_argument("--serial", type=int, metavar="S", help="only the node with this serial number")
