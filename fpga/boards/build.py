@@ -18,6 +18,7 @@ REPO = HERE.parents[1]
 sys.path[:0] = [str(HERE), str(HERE.parent), str(REPO / "host" / "python")]
 
 import gowin  # noqa: E402
+import image  # noqa: E402
 import report  # noqa: E402
 from toolchain import ToolError, gather, must  # noqa: E402
 
@@ -260,6 +261,14 @@ def pack(board: Board, out: Path) -> Path:
     return out / f"{board.name}.bit"
 
 
+def add_images(board: Board, lanes: int, bitstream: Path) -> None:
+    """Beside a bitstream: its image for `whisker flash`, and the page that leads to the image to fall back to."""
+    content = image.gateware_image(bitstream.read_bytes(), board.number, lanes, int(commit(), 16))
+    bitstream.with_suffix(".wgw").write_bytes(content)
+    jump = image.jump_page(image.fallback_address(board.flash))
+    bitstream.with_name(f"{board.name}_jump.bin").write_bytes(jump)
+
+
 def make(board: Board, lanes: int, out: Path, seeds: list[int], serial: str) -> Path:
     """All steps, placed with one seed after another until one meets the clock and the PHY's limits; ToolError if none does."""
     netlist = prepare(board, lanes, out, serial)
@@ -297,7 +306,10 @@ def main() -> int:
             print(netlist_verilog(board, lanes, out.resolve()))
             return 0
         seeds = [arguments.seed + n for n in range(arguments.tries)]
-        print(make(board, lanes, out.resolve(), seeds, arguments.serial))
+        bitstream = make(board, lanes, out.resolve(), seeds, arguments.serial)
+        if board.flash:
+            add_images(board, lanes, bitstream)
+        print(bitstream)
     except ToolError as error:
         print(f"bitstream: {error}", file=sys.stderr)
         return 1

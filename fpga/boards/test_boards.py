@@ -13,8 +13,11 @@ sys.path[:0] = [str(HERE), str(HERE.parent)]
 
 import build  # noqa: E402
 import gowin  # noqa: E402
+import image  # noqa: E402
 import report  # noqa: E402
 from toolchain import ToolError, missing, must  # noqa: E402
+
+from whisker.protocol import GATEWARE_HEADER, LIMITS, crc32  # noqa: E402
 
 LACKING = missing("yosys")
 GOWIN_TOOLS = ("yosys", "nextpnr-himbaechel-gowin", "gowin_pack")
@@ -274,3 +277,32 @@ def test_pins_that_are_not_timed_are_named(tmp_path):
     path.write_text(json.dumps(text))
     problems = report.timing_problems(report.read(path), 8, "USB3343")
     assert len(problems) == 3 and sum("not timed" in problem for problem in problems) == 2
+
+
+@pytest.mark.parametrize("name", build.boards())
+def test_both_images_and_the_jump_have_their_place_in_the_flash(name):
+    """The first begins at 0, the other behind what a host may write, the jump in the last page."""
+    board = build.load(name)
+    if board.flash:
+        other, jump = image.fallback_address(board.flash), image.jump_address(board.flash_mbit)
+        assert jump + image.PAGE == board.flash_mbit * 2**17 <= 1 << 24
+        longest = {"25k": 583_000, "45k": 1_033_000, "um5g-45k": 1_033_000, "85k": 1_948_000}[
+            board.device
+        ]  # uncompressed
+        assert longest + 4096 < other and longest < jump - other
+
+
+def test_the_jump_is_the_one_that_trellis_writes():
+    """`ecpmulti --golden` of a bitstream at 2 MiB put these 58 bytes into the last page of 64 Mbit."""
+    page = image.jump_page(0x200000)
+    written = "ff" * 18 + "bdb3" + "ff" * 4 + "2200000000000000" + "7e000000" + "03200000" + "ff" * 18
+    assert page == bytes.fromhex(written).ljust(image.PAGE, b"\xff")
+
+
+def test_an_image_says_what_it_is_for():
+    body = bytes(range(200))
+    made = image.gateware_image(body, 5, 28, 0x1234)
+    header = GATEWARE_HEADER.unpack(made)
+    wanted = {"board": 5, "lanes": 28, "build": 0x1234, "length": 200, "gateware": LIMITS["gateware_version"]}
+    assert {name: header[name] for name in wanted} == wanted and made[GATEWARE_HEADER.size :] == body
+    assert header["body_crc32"] == crc32(body) and header["header_crc32"] == crc32(made[:28])

@@ -34,6 +34,8 @@ enum Option {
     USB_FAULTS,
     FAULT_LIST,
     NODES,
+    FLASH,
+    FLASH_CUT,
     FOLLOWERS,
     LANES_POPULATED,
     SCK_DIVIDER,
@@ -61,6 +63,8 @@ const option LONG_OPTIONS[] = {{"help", no_argument, nullptr, HELP},
                                {"usb-faults", required_argument, nullptr, USB_FAULTS},
                                {"fault-list", required_argument, nullptr, FAULT_LIST},
                                {"nodes", required_argument, nullptr, NODES},
+                               {"flash", required_argument, nullptr, FLASH},
+                               {"flash-cut", required_argument, nullptr, FLASH_CUT},
                                {"followers", required_argument, nullptr, FOLLOWERS},
                                {"lanes-populated", required_argument, nullptr, LANES_POPULATED},
                                {"sck-divider", required_argument, nullptr, SCK_DIVIDER},
@@ -123,6 +127,8 @@ std::string *path_of(Options &options, int option)
         return &options.fault_list;
     case NODES:
         return &options.nodes;
+    case FLASH:
+        return &options.flash;
     case SPEED_REPORT:
         return &options.speed_report;
     default:
@@ -152,6 +158,9 @@ void set_number(Options &options, int option, const char *text)
         break;
     case SECONDS:
         options.seconds = positive_number("seconds", text, "simulated seconds", SECONDS_MAX);
+        break;
+    case FLASH_CUT:
+        options.flash_cut = whole_number("flash-cut", text, 0, UINT32_MAX);
         break;
     case PACE:
         options.pace = positive_number("pace", text, "simulated seconds per second", PACE_MAX);

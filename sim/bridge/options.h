@@ -25,7 +25,9 @@ struct Options {
     std::string wheels;
     std::string faults;
     std::string usb_faults;
-    std::string nodes; // traits of single nodes
+    std::string flash;               // the configuration flash's content
+    uint64_t flash_cut = UINT64_MAX; // writes to it until power goes
+    std::string nodes;               // traits of single nodes
     std::string fault_list;
     std::string speed_report;
     uint64_t seed = 1;

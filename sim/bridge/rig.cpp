@@ -76,6 +76,11 @@ NodeBus &Rig::bus()
     return bus_;
 }
 
+NorFlash &Rig::flash()
+{
+    return flash_;
+}
+
 void Rig::spoil(const LaneFault &fault)
 {
     const LinkFault link = link_fault(fault.kind);

@@ -43,6 +43,7 @@ class Rig
     virtual const HostCounters &counters() const = 0;
 
     NodeBus &bus();
+    NorFlash &flash();
     virtual uint64_t cycles() const = 0;         // of the bridge's clock that were simulated; 0 at level bytes
     virtual bool running() const = 0;            // started, and the last frame not yet in the FIFO
     virtual uint32_t frames_dropped() const = 0; // since start: the FIFO had no room for them

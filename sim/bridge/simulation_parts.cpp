@@ -67,7 +67,12 @@ sim_scene read_scene(const std::string &path)
 std::unique_ptr<Rig> rig_of(const Options &options, const sim_scene &scene)
 {
     const size_t lanes = populated(options, scene);
-    return make_rig(options.link.level, lanes, options.seed, read_node_list(options.nodes, lanes));
+    auto rig = make_rig(options.link.level, lanes, options.seed, read_node_list(options.nodes, lanes));
+    if (!options.flash.empty()) {
+        rig->flash().keep_in(options.flash);
+    }
+    rig->flash().cut_after(options.flash_cut);
+    return rig;
 }
 
 std::optional<FaultPlan> plan_of(const Options &options, const sim_scene &scene)

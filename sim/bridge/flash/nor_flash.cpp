@@ -1,6 +1,11 @@
 #include "nor_flash.h"
 
 #include <algorithm>
+#include <stdexcept>
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 namespace bridge_sim
 {
@@ -30,6 +35,36 @@ NorFlash::NorFlash() : content_(SIZE, 0xFF)
     }
     const Bytes jump = {JUMP_OPCODE, 0, 0, 0, 3, WRITABLE_SECTORS, 0, 0};
     std::copy(jump.begin(), jump.end(), content_.begin() + JUMP + 8);
+}
+
+NorFlash::~NorFlash()
+{
+    if (file_ >= 0) {
+        close(file_);
+    }
+}
+
+void NorFlash::keep_in(const std::string &path)
+{
+    struct stat about {
+    };
+    file_ = open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+    if (file_ < 0 || fstat(file_, &about) != 0) {
+        throw std::runtime_error("--flash '" + path + "': cannot be opened; give a file that can be written");
+    }
+    if (about.st_size == 0) {
+        save(0, SIZE);
+    } else if (about.st_size != SIZE || pread(file_, content_.data(), SIZE, 0) != static_cast<ssize_t>(SIZE)) {
+        throw std::runtime_error("--flash '" + path + "': is not " + std::to_string(SIZE) +
+                                 " bytes long; give another, or one that is not there yet");
+    }
+}
+
+void NorFlash::save(uint32_t address, uint32_t count) const
+{
+    if (file_ >= 0 && pwrite(file_, content_.data() + address, count, address) != static_cast<ssize_t>(count)) {
+        throw std::runtime_error("--flash: the file cannot be written; make room for it");
+    }
 }
 
 uint8_t NorFlash::answer(const Bytes &received)
@@ -88,15 +123,31 @@ Bytes NorFlash::read(uint32_t address, size_t count) const
 
 void NorFlash::erase(uint32_t address)
 {
-    const auto start = content_.begin() + (address % SIZE) / SECTOR * SECTOR;
-    std::fill(start, start + SECTOR, 0xFF);
+    write((address % SIZE) / SECTOR * SECTOR, Bytes(SECTOR, 0xFF));
 }
 
 void NorFlash::program(uint32_t address, const Bytes &data)
 {
     const uint32_t page = (address % SIZE) / PAGE * PAGE;
+    Bytes content = read(page, PAGE);
     for (size_t i = 0; i < data.size(); i++) {
-        content_[page + (address + i) % PAGE] &= data[i];
+        content[(address + i) % PAGE] &= data[i];
+    }
+    write(page, content);
+}
+
+void NorFlash::cut_after(uint64_t writes)
+{
+    writes_left_ = writes;
+}
+
+void NorFlash::write(uint32_t address, const Bytes &content)
+{
+    const bool cut = writes_left_-- == 0;
+    std::copy_n(content.begin(), cut ? content.size() / 2 : content.size(), content_.begin() + address);
+    save(address, static_cast<uint32_t>(content.size()));
+    if (cut) {
+        throw std::runtime_error("--flash-cut: power went while the flash was written");
     }
 }
 

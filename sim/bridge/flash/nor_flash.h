@@ -3,7 +3,7 @@
 // sector, and while it is busy it hears nothing but the question whether it is.
 #pragma once
 
-#include <array>
+#include <string>
 
 #include "usb_packet.h"
 
@@ -19,6 +19,16 @@ class NorFlash
 
     // Erased but for the image to fall back to and the jump that leads there, whose first bytes are those of any.
     NorFlash();
+    ~NorFlash();
+    NorFlash(const NorFlash &) = delete;
+    NorFlash &operator=(const NorFlash &) = delete;
+
+    // From now on the content is that of a file, which is made if there is none, and follows every change. Throws
+    // std::runtime_error with one line.
+    void keep_in(const std::string &path);
+
+    // Power goes in the midst of the write after so many: half of it is done, and std::runtime_error is thrown.
+    void cut_after(uint64_t writes);
 
     // The byte that the chip puts out after those that came so far, in this transaction.
     uint8_t answer(const Bytes &received);
@@ -36,6 +46,11 @@ class NorFlash
     void power_cycle();
 
   private:
+    void write(uint32_t address, const Bytes &content);
+    void save(uint32_t address, uint32_t count) const;
+
+    int file_ = -1;
+    uint64_t writes_left_ = UINT64_MAX;
     Bytes content_;
     bool enabled_ = false;
     unsigned busy_ = 0; // how often it will say so

@@ -64,7 +64,7 @@
     X(GATEWARE_NO_FLASH, -64, "this bridge cannot write its own flash",                                                \
       "load the bitstream with the board's programmer: docs/boards.md")                                                \
     X(GATEWARE_FALLBACK, -65, "the bridge's flash holds no image to fall back to",                                     \
-      "load BOARD_flash.bin once with the board's programmer: docs/boards.md")                                         \
+      "write one once with the board's programmer: docs/boards.md")                                                    \
     X(GATEWARE_SPACE, -66, "the gateware image is longer than its place in the bridge's flash",                        \
       "load the bitstream with the board's programmer: docs/boards.md")                                                \
     X(FLASH_CHIP, -67, "the bridge's flash does not say what it is, or is too small",                                  \
