@@ -276,6 +276,34 @@ static void bad_samples_are_counted_and_not_read(void **state)
     assert_int_equal(f.bad, 121);
 }
 
+static double uniform(uint32_t *seed)
+{
+    *seed = *seed * 1664525u + 1013904223u;
+    return *seed / 4294967296.0;
+}
+
+static void whatever_comes_the_answers_are_finite(void **state)
+{
+    (void)state;
+    uint32_t seed = 1;
+    for (int n = 0; n < 40; n++) {
+        struct nav_contact_filter f = filter();
+        for (int i = 0; i < 600; i++) {
+            double far = n % 5 == 0 ? 1e6 : 0.2, turn = n % 3 ? 1.0 : 1e5, size = n % 2 ? 0.3 : 1e-3 * i;
+            double base[3] = {(uniform(&seed) - 0.5) * far, (uniform(&seed) - 0.5) * 0.2,
+                              (uniform(&seed) - 0.5) * turn};
+            double tilt[2] = {(uniform(&seed) - 0.3) * size, uniform(&seed) < 0.02 ? INFINITY : 0.01};
+            struct nav_contact_answer a;
+            if (!nav_contact_filter_update(&f, base, tilt, true))
+                continue;
+            nav_contact_filter_answer(&f, &a);
+            double sum = a.point[0] + a.point[1] + a.arc_sd_m + a.plane_sd + a.normal_sd + a.speed_sd + a.friction_sd;
+            assert_true(isfinite(sum) && a.point_cov[0][0] >= 0.0 && a.velocity_cov[1][1] >= 0.0);
+            assert_in_range(1000.0 * (a.sweep + a.corner + a.tip + a.slip), 0, 4001);
+        }
+    }
+}
+
 static void what_only_rests_is_no_contact_and_a_new_one_begins_anew(void **state)
 {
     (void)state;
@@ -340,6 +368,7 @@ int main(void)
         cmocka_unit_test(an_object_that_moves_is_told_with_its_speed),
         cmocka_unit_test(a_face_under_the_tip_gives_its_normal),
         cmocka_unit_test(bad_samples_are_counted_and_not_read),
+        cmocka_unit_test(whatever_comes_the_answers_are_finite),
         cmocka_unit_test(what_only_rests_is_no_contact_and_a_new_one_begins_anew),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

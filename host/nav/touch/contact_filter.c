@@ -154,6 +154,8 @@ static void filter_mean(const struct mean_of *m, double mean[2], double cov[2][2
     for (int i = 0; i < 2; i++)
         for (int j = 0; j < 2; j++)
             cov[i][j] = m->square[i][j] / w - mean[i] * mean[j];
+    for (int i = 0; i < 2; i++)
+        cov[i][i] = fmax(0.0, cov[i][i]); /* a difference of what is nearly equal */
 }
 
 /* As filter_add, of two numbers that are not correlated. */
@@ -181,7 +183,7 @@ static void filter_speed(const struct mean_of *moving, struct nav_contact_answer
     filter_mean(moving, mean, cov);
     a->speed = hypot(mean[0], mean[1]);
     double x = a->speed > 0.0 ? mean[0] / a->speed : 1.0, y = a->speed > 0.0 ? mean[1] / a->speed : 0.0;
-    a->speed_sd = sqrt(x * x * cov[0][0] + 2.0 * x * y * cov[0][1] + y * y * cov[1][1]);
+    a->speed_sd = sqrt(fmax(0.0, x * x * cov[0][0] + 2.0 * x * y * cov[0][1] + y * y * cov[1][1]));
 }
 
 static void filter_motion(const struct nav_contact_filter *f, struct nav_contact_answer *a)
