@@ -8,6 +8,7 @@ import json
 import shutil
 import subprocess
 import sys
+import textwrap
 from collections.abc import Callable
 from pathlib import Path
 
@@ -160,13 +161,10 @@ def draw_lanes(found: dict) -> Figure:
 
 
 def rows(board: dict) -> list[str]:
-    """A board's lines in the table of docs/boards.md, one for each number of lanes."""
+    """A board's lines in the table of docs/boards.md, one for each number of lanes that has been placed."""
     lines = []
-    for run in board["runs"]:
+    for run in measured(board):
         name = f"{board['title']} ({board['part']}, grade {board['speed']}), {run['lanes']}"
-        if "seed" not in run:
-            lines.append(f"| {name} |" + " - |" * (PLACED.count("|") - 3) + " not placed yet |")
-            continue
         ways = [f"{run[way]:.1f} of {board['limits'][way]:.1f} ns" if board["limits"] else "-" for way in WAYS]
         least = board["least"].get("shortest_in_ns")
         ways.append("-" if least is None else f"{run['shortest_in_ns']:.1f} of {least:.1f} ns")
@@ -175,6 +173,16 @@ def rows(board: dict) -> list[str]:
         problem = "; ".join(run["problems"]) or "none"
         lines.append("| " + " | ".join([name, str(run["seed"]), clock, *ways, *used, problem]) + " |")
     return lines
+
+
+def missing(found: dict) -> str:
+    """What has not been placed yet, in a sentence; empty if nothing."""
+    boards = {
+        board["title"]: ", ".join(str(run["lanes"]) for run in board["runs"] if "seed" not in run)
+        for board in found["boards"].values()
+    }
+    names = "; ".join(f"{title} with {lanes}" for title, lanes in boards.items() if lanes)
+    return f" Not placed yet: {names} lanes." if names else ""
 
 
 def sweep_rows(found: dict) -> list[str]:
@@ -198,7 +206,12 @@ def section(found: dict) -> str:
     lines = [line for _, board in sorted(found["boards"].items()) for line in rows(board)]
     return "\n\n".join(
         (
-            "The default command at every number of lanes. LUT counts nextpnr's cells, carry chains included.",
+            textwrap.fill(
+                "The default command at every number of lanes. LUT counts nextpnr's cells, carry chains included."
+                + missing(found),
+                150,
+                break_on_hyphens=False,
+            ),
             table(PLACED, lines),
             "![Resources and clock over lanes](charts/bridge_lanes.png)",
             f"Simulation (`tools/benches chain`) at {next(iter(LINKS))}:",
