@@ -158,22 +158,22 @@ void nav_line_clear(struct nav_line *line, const struct nav_shape *s)
 
 void nav_store_begin(struct nav_histogram *h)
 {
-    h->pass->groups = h->next.first[0] = 0;
+    h->pass->at.groups = h->next.first[0] = 0;
 }
 
 void nav_store_group(struct nav_histogram *h, int group, const float mass[NAV_LANES])
 {
-    uint32_t n = h->pass->groups;
+    uint32_t n = h->pass->at.groups;
     if (n == h->room)
         return;
     h->next.at[n] = (uint16_t)group;
     memcpy(h->next.mass + (size_t)n * NAV_LANES, mass, NAV_LANES * sizeof *mass);
-    h->pass->groups++;
+    h->pass->at.groups++;
 }
 
 void nav_store_end_line(struct nav_histogram *h, size_t line)
 {
-    h->next.first[line + 1] = h->pass->groups;
+    h->next.first[line + 1] = h->pass->at.groups;
 }
 
 void nav_store_swap(struct nav_histogram *h)

@@ -85,14 +85,14 @@ static void pass_kernels(struct nav_pass *p, double side, double scale)
 {
     double kernel[NAV_BLUR_LINES + 2] = {0.0}, wider[NAV_BLUR_LINES + 2];
     kernel[1] = 1.0;
-    for (int n = 0; n < p->reach; n++) {
+    for (int n = 0; n < p->blur.reach; n++) {
         memcpy(wider, kernel, sizeof wider);
         for (int k = 1; k <= NAV_BLUR_LINES; k++)
             kernel[k] = (1.0 - 2.0 * side) * wider[k - 1] + side * (wider[k] + (k > 1 ? wider[k - 2] : 0.0));
     }
     for (int k = 0; k < NAV_BLUR_LINES; k++) {
-        p->along[k] = (float)kernel[k + 1];
-        p->across[k] = (float)(scale * kernel[k + 1]);
+        p->blur.along[k] = (float)kernel[k + 1];
+        p->blur.across[k] = (float)(scale * kernel[k + 1]);
     }
 }
 
@@ -119,9 +119,9 @@ void nav_histogram_begin(struct nav_histogram *h, struct nav_pose step, const st
     double side, side_turn;
     if (h->uniform) /* nothing blurs what is uniform */
         h->owed_position = h->owed_heading = 0.0;
-    p->reach = pass_due(&h->owed_position, h->shape.cell, NAV_BLUR_MOST, &side);
+    p->blur.reach = pass_due(&h->owed_position, h->shape.cell, NAV_BLUR_MOST, &side);
     pass_due(&h->owed_heading, h->shape.cell_theta, 1, &side_turn);
-    p->side_turn = (float)side_turn;
+    p->blur.side_turn = (float)side_turn;
     pass_kernels(p, side, 1.0 / h->total);
     pass_shift(h, step);
     p->weigh = weigh;
@@ -129,7 +129,7 @@ void nav_histogram_begin(struct nav_histogram *h, struct nav_pose step, const st
     p->total = 0.0;
     p->cells = 0;
     p->heaviest = 0.0f;
-    p->slice = 0;
+    p->at.slice = 0;
     p->running = true;
     nav_store_begin(h);
     pass_begin_slice(h);
@@ -144,8 +144,8 @@ static struct nav_line *pass_blurred(const struct nav_histogram *h, int j)
 static void pass_pour(struct nav_histogram *h, int q, int j, float weight)
 {
     struct nav_pass *pass = h->pass;
-    struct nav_line *out = pass->reach > 0 ? &pass->raw : pass_blurred(h, j);
-    int p = pass->slice, cells = h->shape.nx;
+    struct nav_line *out = pass->blur.reach > 0 ? &pass->raw : pass_blurred(h, j);
+    int p = pass->at.slice, cells = h->shape.nx;
     int dx = pass->roll_x[q] + (int)floor((h->next.shift_x[q] - h->next.shift_x[p]) / h->shape.cell + 0.5);
     int dy = pass->roll_y[q] + (int)floor((h->next.shift_y[q] - h->next.shift_y[p]) / h->shape.cell + 0.5);
     if (j - dy < 0 || j - dy >= h->shape.ny)
@@ -162,7 +162,7 @@ static void pass_pour(struct nav_histogram *h, int q, int j, float weight)
         memcpy(out->cell + i, &sum, sizeof sum);
         nav_line_note(out, &h->shape, (i + NAV_LANES) / NAV_LANES - 1);
         nav_line_note(out, &h->shape, (i + 2 * NAV_LANES - 1) / NAV_LANES - 1);
-        pass->touched += NAV_LANES;
+        pass->at.touched += NAV_LANES;
     }
 }
 
@@ -181,7 +181,7 @@ static void pass_blur(struct nav_histogram *h, struct nav_line *out)
 {
     struct nav_pass *pass = h->pass;
     const struct nav_shape *s = &h->shape;
-    int reach = pass->reach;
+    int reach = pass->blur.reach;
     for (int g = nav_line_next(&pass->raw, s, 0); g < s->groups; g = nav_line_next(&pass->raw, s, g + 1)) {
         const float *cell = pass->raw.cell + g * NAV_LANES;
         float left = 0.0f, right = 0.0f;
@@ -197,10 +197,10 @@ static void pass_blur(struct nav_histogram *h, struct nav_line *out)
         lanes sum = {0.0f}, in;
         for (int t = 0; t <= 2 * reach; t++) {
             memcpy(&in, pass->raw.cell + g * NAV_LANES + t - reach, sizeof in);
-            sum += pass->along[t] * in;
+            sum += pass->blur.along[t] * in;
         }
         memcpy(out->cell + g * NAV_LANES, &sum, sizeof sum);
-        pass->touched += NAV_LANES;
+        pass->at.touched += NAV_LANES;
     }
     pass_trim(h, out);
     nav_line_clear(&pass->raw, s);
@@ -210,21 +210,21 @@ static void pass_blur(struct nav_histogram *h, struct nav_line *out)
 static void pass_make(struct nav_histogram *h)
 {
     struct nav_pass *pass = h->pass;
-    int p = pass->slice, nh = h->shape.nh, j = pass->made++;
+    int p = pass->at.slice, nh = h->shape.nh, j = pass->at.made++;
     struct nav_line *out = pass_blurred(h, j);
     nav_line_clear(out, &h->shape);
     if (j < 0 || j >= h->shape.ny)
         return;
-    long before = pass->touched;
-    pass_pour(h, p, j, 1.0f - 2.0f * pass->side_turn);
-    if (pass->side_turn > 0.0f) {
-        pass_pour(h, (p + 1) % nh, j, pass->side_turn);
-        pass_pour(h, (p + nh - 1) % nh, j, pass->side_turn);
+    long before = pass->at.touched;
+    pass_pour(h, p, j, 1.0f - 2.0f * pass->blur.side_turn);
+    if (pass->blur.side_turn > 0.0f) {
+        pass_pour(h, (p + 1) % nh, j, pass->blur.side_turn);
+        pass_pour(h, (p + nh - 1) % nh, j, pass->blur.side_turn);
     }
-    if (pass->touched == before)
+    if (pass->at.touched == before)
         return;
-    pass_trim(h, pass->reach > 0 ? &pass->raw : out);
-    if (pass->reach > 0)
+    pass_trim(h, pass->blur.reach > 0 ? &pass->raw : out);
+    if (pass->blur.reach > 0)
         pass_blur(h, out);
 }
 
@@ -257,9 +257,9 @@ static void pass_extent(const struct nav_histogram *h, int extent[2])
     int nh = h->shape.nh;
     extent[0] = pass_everywhere(h) ? 0 : h->shape.ny;
     extent[1] = pass_everywhere(h) ? h->shape.ny : 0;
-    pass_widen(h, p->slice, p->reach, extent);
-    for (int k = -1; k <= 1 && p->side_turn > 0.0f; k += 2) /* another's shift differs by less than two cells */
-        pass_widen(h, (p->slice + nh + k) % nh, p->reach + 2, extent);
+    pass_widen(h, p->at.slice, p->blur.reach, extent);
+    for (int k = -1; k <= 1 && p->blur.side_turn > 0.0f; k += 2) /* another's shift differs by less than two cells */
+        pass_widen(h, (p->at.slice + nh + k) % nh, p->blur.reach + 2, extent);
     extent[0] = extent[0] > 0 ? extent[0] : 0;
     extent[1] = extent[1] < h->shape.ny ? extent[1] : h->shape.ny;
 }
@@ -268,23 +268,23 @@ static void pass_extent(const struct nav_histogram *h, int extent[2])
 static void pass_skip(struct nav_histogram *h, int end)
 {
     struct nav_pass *p = h->pass;
-    for (; p->line < end; p->line++)
-        nav_store_end_line(h, (size_t)p->slice * (size_t)h->shape.ny + (size_t)p->line);
+    for (; p->at.line < end; p->at.line++)
+        nav_store_end_line(h, (size_t)p->at.slice * (size_t)h->shape.ny + (size_t)p->at.line);
 }
 
 static void pass_begin_slice(struct nav_histogram *h)
 {
     struct nav_pass *p = h->pass;
     int extent[2];
-    memset(h->moment[p->slice], 0, sizeof h->moment[p->slice]);
+    memset(h->moment[p->at.slice], 0, sizeof h->moment[p->at.slice]);
     pass_extent(h, extent);
-    p->line = 0;
-    p->end = extent[1];
-    p->open = false;
+    p->at.line = 0;
+    p->at.end = extent[1];
+    p->at.open = false;
     pass_skip(h, extent[0] < extent[1] ? extent[0] : h->shape.ny);
-    for (int n = 0; n < NAV_BLUR_LINES && p->line < h->shape.ny; n++)
+    for (int n = 0; n < NAV_BLUR_LINES && p->at.line < h->shape.ny; n++)
         nav_line_clear(&p->blurred[n], &h->shape);
-    p->made = p->line - p->reach;
+    p->at.made = p->at.line - p->blur.reach;
 }
 
 /* Lists the groups of the line that may hold mass. */
@@ -294,9 +294,9 @@ static void pass_open(struct nav_histogram *h)
     memset(p->todo.mark, 0, (size_t)nav_line_words(&h->shape) * sizeof *p->todo.mark);
     memset(p->sum, 0, sizeof p->sum);
     memset(p->peak, 0, sizeof p->peak);
-    p->open = true;
-    for (int t = 0; t <= 2 * p->reach && !h->uniform; t++) {
-        const struct nav_line *from = pass_blurred(h, p->line + t - p->reach);
+    p->at.open = true;
+    for (int t = 0; t <= 2 * p->blur.reach && !h->uniform; t++) {
+        const struct nav_line *from = pass_blurred(h, p->at.line + t - p->blur.reach);
         p->row[t] = from->cell;
         for (int w = 0; w < nav_line_words(&h->shape); w++)
             p->todo.mark[w] |= from->mark[w];
@@ -311,12 +311,15 @@ static void pass_mass(const struct nav_histogram *h, int g, float *mass)
     const struct nav_pass *p = h->pass;
     float same = (float)(p->weigh->extra + (h->uniform ? 1.0 / nav_shape_inside(&h->shape) : 0.0));
     lanes sum = {0.0f}, in;
-    for (int t = 0; t <= 2 * p->reach && !h->uniform; t++) {
+    for (int t = 0; t <= 2 * p->blur.reach && !h->uniform; t++) {
         memcpy(&in, p->row[t] + g * NAV_LANES, sizeof in);
-        sum += p->across[t] * in;
+        sum += p->blur.across[t] * in;
     }
-    for (int k = 0; k < NAV_LANES && same > 0.0f; k++)
-        sum[k] += g * NAV_LANES + k < h->shape.nx ? same : 0.0f;
+    int inside = h->shape.nx - g * NAV_LANES;
+    if (inside >= NAV_LANES)
+        sum += same;
+    for (int k = 0; k < inside && inside < NAV_LANES; k++)
+        sum[k] += same;
     memcpy(mass, &sum, sizeof sum);
     float least = (float)p->weigh->least;
     for (int k = 0; k < NAV_LANES; k++)
@@ -341,7 +344,7 @@ static void pass_take(struct nav_histogram *h, int g, const float *mass)
     lanes held, sum[3];
     memcpy(&held, mass, sizeof held);
     memcpy(sum, p->sum, sizeof sum);
-    float x = (float)(g * NAV_LANES * h->shape.cell + h->next.shift_x[p->slice] - p->about.x);
+    float x = (float)(g * NAV_LANES * h->shape.cell + h->next.shift_x[p->at.slice] - p->about.x);
     lanes at = (float)h->shape.cell * STEPS + x, part = held * at;
     sum[0] += held;
     sum[1] += part;
@@ -357,11 +360,11 @@ static void pass_group(struct nav_histogram *h, int g)
     struct nav_pass *p = h->pass;
     float mass[NAV_LANES], like[NAV_LANES];
     pass_mass(h, g, mass);
-    p->touched += NAV_LANES;
+    p->at.touched += NAV_LANES;
     if (!pass_any(mass))
         return;
     if (p->weigh->group) {
-        p->touched += p->weigh->group(p->weigh->self, p->slice, p->line, g, mass, like);
+        p->at.touched += p->weigh->group(p->weigh->self, p->at.slice, p->at.line, g, mass, like);
         for (int k = 0; k < NAV_LANES; k++)
             mass[k] *= like[k];
     }
@@ -377,27 +380,27 @@ static void pass_survey(struct nav_histogram *h, uint32_t first)
     float peak = 0.0f;
     for (int k = 0; k < NAV_LANES; k++)
         peak = fmaxf(peak, p->peak[k]);
-    for (size_t n = (size_t)first * NAV_LANES; n < (size_t)p->groups * NAV_LANES; n++)
+    for (size_t n = (size_t)first * NAV_LANES; n < (size_t)p->at.groups * NAV_LANES; n++)
         p->cells += mass[n] > 0.0f;
     if (peak <= p->heaviest)
         return;
     size_t n = (size_t)first * NAV_LANES;
-    while (n + 1 < (size_t)p->groups * NAV_LANES && mass[n] < peak)
+    while (n + 1 < (size_t)p->at.groups * NAV_LANES && mass[n] < peak)
         n++;
     int i = h->next.at[n / NAV_LANES] * NAV_LANES + (int)(n % NAV_LANES);
     p->heaviest = peak;
-    p->mode = (struct nav_pose){(i + 0.5) * h->shape.cell + h->next.shift_x[p->slice],
-                                (p->line + 0.5) * h->shape.cell + h->next.shift_y[p->slice],
-                                nav_wrap(nav_histogram_heading(h, p->slice))};
+    p->mode = (struct nav_pose){(i + 0.5) * h->shape.cell + h->next.shift_x[p->at.slice],
+                                (p->at.line + 0.5) * h->shape.cell + h->next.shift_y[p->at.slice],
+                                nav_wrap(nav_histogram_heading(h, p->at.slice))};
 }
 
 /* Ends a line: its sums go to the slice's. */
 static void pass_close(struct nav_histogram *h)
 {
     struct nav_pass *p = h->pass;
-    size_t number = (size_t)p->slice * (size_t)h->shape.ny + (size_t)p->line;
-    double sum[3] = {0.0}, *m = h->moment[p->slice];
-    double y = (p->line + 0.5) * h->shape.cell + h->next.shift_y[p->slice] - p->about.y;
+    size_t number = (size_t)p->at.slice * (size_t)h->shape.ny + (size_t)p->at.line;
+    double sum[3] = {0.0}, *m = h->moment[p->at.slice];
+    double y = (p->at.line + 0.5) * h->shape.cell + h->next.shift_y[p->at.slice] - p->about.y;
     for (int k = 0; k < 3; k++) {
         for (int n = 0; n < NAV_LANES; n++)
             sum[k] += (double)p->sum[k][n];
@@ -408,8 +411,8 @@ static void pass_close(struct nav_histogram *h)
     p->total += sum[0];
     pass_survey(h, h->next.first[number]);
     nav_store_end_line(h, number);
-    p->line++;
-    p->open = false;
+    p->at.line++;
+    p->at.open = false;
 }
 
 /* Does groups of the line in work; false: the next one would take more than `most`. */
@@ -417,15 +420,15 @@ static bool pass_line(struct nav_histogram *h, long most)
 {
     struct nav_pass *p = h->pass;
     long each = NAV_LANES + p->weigh->most;
-    for (; !h->uniform && p->made <= p->line + p->reach; pass_make(h)) {
-        if (p->touched + MAKE_MOST * NAV_LANES * h->shape.groups > most)
+    for (; !h->uniform && p->at.made <= p->at.line + p->blur.reach; pass_make(h)) {
+        if (p->at.touched + MAKE_MOST * NAV_LANES * h->shape.groups > most)
             return false;
     }
-    if (!p->open)
+    if (!p->at.open)
         pass_open(h);
     for (int g = nav_line_next(&p->todo, &h->shape, 0); g < h->shape.groups;
          g = nav_line_next(&p->todo, &h->shape, g + 1)) {
-        if (p->touched + each > most)
+        if (p->at.touched + each > most)
             return false;
         p->todo.mark[g / 64] &= ~((uint64_t)1 << g % 64);
         pass_group(h, g);
@@ -449,15 +452,15 @@ static void pass_end(struct nav_histogram *h)
 long nav_histogram_run(struct nav_histogram *h, long most)
 {
     struct nav_pass *p = h->pass;
-    p->touched = 0;
-    while (p->running && (p->line == h->shape.ny || pass_line(h, most))) {
-        if (p->line < p->end)
+    p->at.touched = 0;
+    while (p->running && (p->at.line == h->shape.ny || pass_line(h, most))) {
+        if (p->at.line < p->at.end)
             continue;
         pass_skip(h, h->shape.ny);
-        if (++p->slice < h->shape.nh)
+        if (++p->at.slice < h->shape.nh)
             pass_begin_slice(h);
         else
             pass_end(h);
     }
-    return p->touched;
+    return p->at.touched;
 }

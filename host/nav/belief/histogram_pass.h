@@ -13,25 +13,35 @@ struct nav_line {
     uint64_t *mark;
 };
 
+/* Noise that a pass adds. */
+struct nav_blur {
+    int reach;                                           /* cells, of the position's */
+    float along[NAV_BLUR_LINES], across[NAV_BLUR_LINES]; /* its kernels, their middle at [reach] */
+    float side_turn;                                     /* weight of a neighbour in the headings' */
+};
+
+/* How far it is: what is stored next, of lines before `end`; those before `made` are written out. */
+struct nav_progress {
+    int slice, line, end, made;
+    bool open;       /* the line is in `todo` */
+    uint32_t groups; /* stored */
+    long touched;
+};
+
 /* A pass under way. */
 struct nav_pass {
     bool running;
     const struct nav_weigh *weigh;
-    int reach;                                           /* cells, of the position's blur */
-    float along[NAV_BLUR_LINES], across[NAV_BLUR_LINES]; /* its kernels, their middle at [reach] */
-    float side_turn;                                     /* weight of a neighbour in the blur of headings */
-    int *roll_x, *roll_y;                                /* [nh] whole cells that slices move by */
-    int slice, line, end, made; /* to be stored next, of lines before `end`; those before `made` are written out */
-    bool open;                  /* the line is in `todo` */
+    struct nav_blur blur;
+    struct nav_progress at;
+    int *roll_x, *roll_y; /* [nh] whole cells that slices move by */
     struct nav_line raw, todo, blurred[NAV_BLUR_LINES];
-    struct nav_pose about;
     const float *row[NAV_BLUR_LINES];         /* lines that this one takes from */
     float sum[3][NAV_LANES], peak[NAV_LANES]; /* of the line, by lane: mass, times x, xx; heaviest cell */
-    uint32_t groups;                          /* stored */
-    long touched;
+    struct nav_pose about;
     double total;
     long cells;
-    float heaviest; /* cell of the line's slice so far */
+    float heaviest; /* cell so far */
     struct nav_pose mode;
 };
 

@@ -11,6 +11,9 @@ static const double POSES_MOST = 268435456.0;
 /* Cells around the arena: a shift by one, and what may be read together with the arena's last cell. */
 enum { MARGIN = NAV_CELLS_AHEAD + 2 };
 
+/* Rows of poses in a cell: as the settings' ranges allow. */
+enum { ROWS_MOST = 16 * 16 };
+
 static size_t pitch(const struct nav_expected *e)
 {
     return (size_t)(e->nx + 2 * e->margin);
@@ -229,45 +232,44 @@ static float expected_value(struct nav_expected *e, uint32_t n)
     return e->value[n];
 }
 
-/* Adds the values of a line of poses to cells. Which cells hold mass, and which values are known, nobody can predict:
- * what is not known yet is negative, and is asked for only then. */
-static inline void expected_add_line(struct nav_expected *e, const uint32_t *signature, int sub, const float *mass,
-                                     float *restrict sum)
+/* Sum of the values of a cell's poses, which lie in several rows of the lattice. Which cells hold mass, and which
+ * values are known, nobody can predict: what is not known yet is negative, and is asked for only then. */
+static inline float expected_sum(struct nav_expected *e, const uint32_t *const *row, int rows, int sub, int at,
+                                 float mass)
 {
     const float *value = e->value;
-    float all[NAV_CELLS_AHEAD], least[NAV_CELLS_AHEAD];
-    for (int n = 0; n < NAV_CELLS_AHEAD; n++) {
-        all[n] = least[n] = value[signature[n * sub]];
-        for (int a = 1; a < sub; a++) {
-            float known = value[signature[n * sub + a]];
-            all[n] += known;
-            least[n] = known < least[n] ? known : least[n];
+    float sum = 0.0f, least = 0.0f;
+    for (int r = 0; r < rows; r++) {
+        for (int a = 0; a < sub; a++) {
+            float known = value[row[r][at + a]];
+            sum += known;
+            least = known < least ? known : least;
         }
     }
-    for (int n = 0; n < NAV_CELLS_AHEAD; n++) {
-        if (least[n] < 0.0f && mass[n] > 0.0f) {
-            all[n] = 0.0f;
-            for (int a = 0; a < sub; a++)
-                all[n] += expected_value(e, signature[n * sub + a]);
-        }
-        sum[n] += all[n];
-    }
+    if (least >= 0.0f || !(mass > 0.0f))
+        return sum;
+    sum = 0.0f;
+    for (int n = 0; n < rows * sub; n++)
+        sum += expected_value(e, row[n / sub][at + n % sub]);
+    return sum;
 }
 
 void nav_expected_mean(struct nav_expected *e, const struct nav_layer *layer, int row, int first, const float *mass,
                        float *like)
 {
-    int sub = e->sub;
-    float sum[NAV_CELLS_AHEAD] = {0.0f}, share = 1.0f / (float)(sub * sub * e->turns);
-    for (int line = 0; line < sub * e->turns; line++) {
-        const uint32_t *signature = expected_row(e, layer, row, line / sub, line % sub) + (ptrdiff_t)first * sub;
-        if (sub == 2)
-            expected_add_line(e, signature, 2, mass, sum);
+    int sub = e->sub, rows = sub * e->turns;
+    const uint32_t *line[ROWS_MOST];
+    float share = 1.0f / (float)(sub * rows);
+    for (int r = 0; r < rows; r++)
+        line[r] = expected_row(e, layer, row, r / sub, r % sub) + (ptrdiff_t)first * sub;
+    for (int n = 0; n < NAV_CELLS_AHEAD; n++) {
+        if (sub == 2 && rows == 2)
+            like[n] = share * expected_sum(e, line, 2, 2, 2 * n, mass[n]);
+        else if (sub == 2 && rows == 4)
+            like[n] = share * expected_sum(e, line, 4, 2, 2 * n, mass[n]);
         else
-            expected_add_line(e, signature, sub, mass, sum);
+            like[n] = share * expected_sum(e, line, rows, sub, sub * n, mass[n]);
     }
-    for (int n = 0; n < NAV_CELLS_AHEAD; n++)
-        like[n] = share * sum[n];
 }
 
 const uint8_t *nav_expected_codes(const struct nav_expected *e, const struct nav_layer *layer, int row, int column,

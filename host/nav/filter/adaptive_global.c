@@ -16,8 +16,8 @@ static const double JOBS_OWED_MOST = 16.0;
  * sometimes. */
 static const double BLOCKED = 1e-3;
 
-/* A cell with less than this share of all mass is dropped. A uniform belief has 1e-5 in each of its cells. */
-static const double SHARE_LEAST = 1e-8;
+/* A cell is dropped that holds less than this share of what a uniform belief gives each. */
+static const double SHARE_LEAST = 0.01;
 
 /* A job's rows read, its motion planned and its answer found take as long as passing over about so many cells; what one
  * pose expects as many as ... */
@@ -125,11 +125,11 @@ static long global_look_up(void *self, int p, int line, int group, const float *
 {
     struct adaptive_global *g = self;
     const struct nav_histogram *h = &g->histogram;
-    if (g->slice != p)
-        g->layer = nav_expected_layer(g->expected, nav_histogram_heading(h, p), nav_histogram_shift_x(h, p),
-                                      nav_histogram_shift_y(h, p));
-    g->slice = p;
-    nav_expected_mean(g->expected, &g->layer, line, group * NAV_LANES, mass, like);
+    if (g->first.slice != p)
+        g->first.layer = nav_expected_layer(g->expected, nav_histogram_heading(h, p), nav_histogram_shift_x(h, p),
+                                            nav_histogram_shift_y(h, p));
+    g->first.slice = p;
+    nav_expected_mean(g->expected, &g->first.layer, line, group * NAV_LANES, mass, like);
     return NAV_LANES;
 }
 
@@ -181,8 +181,8 @@ static void global_begin(struct adaptive_global *g, struct adaptive_log *log)
         adaptive_global_restart(g, g->next);
         global_read_job(g, log);
     }
-    bool first = h->level == g->level;
-    g->slice = -1;
+    bool first = h->level == g->first.level;
+    g->first.slice = -1;
     g->job.uniform = h->uniform;
     g->job.reference = global_best(g);
     if (first)
@@ -190,7 +190,7 @@ static void global_begin(struct adaptive_global *g, struct adaptive_log *log)
     g->weigh = (struct nav_weigh){.group = first ? global_look_up : global_work_out,
                                   .self = g,
                                   .most = NAV_LANES * (first ? 1 : EXPECT_CELLS * SUB * SUB * TURNS),
-                                  .least = h->uniform ? 0.0 : SHARE_LEAST};
+                                  .least = SHARE_LEAST / g->first.cells};
     nav_histogram_begin(h, g->job.step, &g->weigh, nav_compose(g->summary.belief.mean, g->job.step));
 }
 
@@ -286,7 +286,7 @@ void adaptive_global_restart(struct adaptive_global *g, uint64_t row)
     const struct nav_arena *arena = &g->problem->arena;
     struct nav_problem lost = *g->problem;
     lost.prior.uniform = true;
-    nav_histogram_restart(&g->histogram, g->level);
+    nav_histogram_restart(&g->histogram, g->first.level);
     g->next = row;
     g->job.phase = ADAPTIVE_IDLE;
     g->gained = 0.0;
@@ -331,9 +331,9 @@ double adaptive_global_fill(struct adaptive_global *g)
 void adaptive_global_draw(struct adaptive_global *g, struct nav_particles *to, struct nav_rng *rng, long count,
                           double weight, struct nav_pose moved)
 {
-    long drawn = nav_histogram_draw(&g->histogram, rng, count, g->pose, (long)g->room);
+    long drawn = nav_histogram_draw(&g->histogram, rng, count, g->poses.drawn, (long)g->room);
     for (long n = 0; n < drawn; n++)
-        nav_particles_add(to, nav_compose(g->pose[n], moved), weight / (double)count, rng);
+        nav_particles_add(to, nav_compose(g->poses.drawn[n], moved), weight / (double)count, rng);
 }
 
 struct sharing {
@@ -369,14 +369,14 @@ void adaptive_global_share(const struct adaptive_global *g, const struct nav_mod
 void adaptive_global_add(struct adaptive_global *g, struct nav_pose pose, double share)
 {
     double total = g->histogram.total > 0.0 ? g->histogram.total : 1.0;
-    if (g->grains < g->room)
-        g->grain[g->grains++] = (struct nav_grain){.pose = pose, .mass = share * total};
+    if (g->poses.grains < g->room)
+        g->poses.grain[g->poses.grains++] = (struct nav_grain){.pose = pose, .mass = share * total};
 }
 
 void adaptive_global_added(struct adaptive_global *g)
 {
-    nav_histogram_add(&g->histogram, g->grain, g->grains);
-    g->grains = 0;
+    nav_histogram_add(&g->histogram, g->poses.grain, g->poses.grains);
+    g->poses.grains = 0;
 }
 
 struct listing {
@@ -431,7 +431,8 @@ static int global_levels(struct adaptive_global *g, struct nav_levels *levels, d
     return failed;
 }
 
-/* The coarsest level that tells the detail, or one whose cells the table and the budget have room for. */
+/* The finest level whose cells are few rows' budgets; where these are too wide for the detail, one that is not, or that
+ * the table has room for. */
 static int global_first_level(const struct adaptive_global *g, const struct nav_levels *levels, double detail)
 {
     enum { LEVELS = 16 };
@@ -443,6 +444,14 @@ static int global_first_level(const struct adaptive_global *g, const struct nav_
             return level;
     }
     return LEVELS;
+}
+
+/* A row's budget grows with what there is to search, so that it is passed over in so many rows wherever it can be. */
+static double global_budget(const struct adaptive_global *g, const struct nav_levels *levels)
+{
+    const struct nav_settings *s = &g->problem->settings;
+    struct nav_shape shape = nav_levels_shape(levels, g->first.level);
+    return fmax(g->budget, fmin(nav_shape_inside(&shape) / s->adaptive_rows, s->adaptive_detail_budget));
 }
 
 static int global_tables(struct adaptive_global *g)
@@ -477,11 +486,14 @@ int adaptive_global_init(struct adaptive_global *g, const struct nav_problem *pr
     *g = (struct adaptive_global){.problem = problem, .room = global_room(&problem->settings)};
     if (global_levels(g, &levels, &detail))
         return -1;
-    g->level = global_first_level(g, &levels, detail);
-    g->pose = calloc((size_t)g->room + 1, sizeof *g->pose);
-    g->grain = calloc((size_t)g->room + 1, sizeof *g->grain);
-    if (!g->pose || !g->grain || nav_histogram_init(&g->histogram, &levels, g->level, 8L * REFINED_MOST) ||
-        global_tables(g))
+    g->first.level = global_first_level(g, &levels, detail);
+    g->budget = global_budget(g, &levels);
+    struct nav_shape first = nav_levels_shape(&levels, g->first.level);
+    g->first.cells = nav_shape_inside(&first);
+    g->poses.drawn = calloc((size_t)g->room + 1, sizeof *g->poses.drawn);
+    g->poses.grain = calloc((size_t)g->room + 1, sizeof *g->poses.grain);
+    if (!g->poses.drawn || !g->poses.grain ||
+        nav_histogram_init(&g->histogram, &levels, g->first.level, 8L * REFINED_MOST) || global_tables(g))
         return -1;
     adaptive_global_restart(g, 0);
     return 0;
@@ -495,8 +507,8 @@ void adaptive_global_free(struct adaptive_global *g)
     nav_likelihood_free(g->likelihood);
     nav_expected_free(g->expected);
     nav_histogram_free(&g->histogram);
-    free(g->pose);
-    free(g->grain);
+    free(g->poses.drawn);
+    free(g->poses.grain);
 }
 
 size_t adaptive_global_cells(const struct adaptive_global *g)

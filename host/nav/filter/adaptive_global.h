@@ -27,28 +27,39 @@ struct adaptive_job {
     double light, crowd; /* mass of cells worth less than a hypothesis, and how many are worth more */
 };
 
+/* The level that it begins with. */
+struct adaptive_first {
+    int level;
+    double cells;
+    int slice;              /* whose place in the table is */
+    struct nav_layer layer; /* this */
+};
+
+/* Poses on their way out and in. */
+struct adaptive_poses {
+    struct nav_pose *drawn;  /* [room] */
+    struct nav_grain *grain; /* [room] collected, */
+    int32_t grains;          /* so many */
+};
+
 struct adaptive_global {
     const struct nav_problem *problem;
     struct nav_likelihood *likelihood;
     struct nav_expected *expected; /* of the level that it begins with */
     struct nav_histogram histogram;
     struct nav_weigh weigh;
-    int slice;              /* whose place in the table is */
-    struct nav_layer layer; /* this */
-    int level;              /* that it begins with */
-    double wanted;          /* m, edge of a cell that the scene's detail asks for */
-    double budget;          /* cells and hypotheses touched per row, at most */
-    float **factor;         /* [whiskers][codes] log-likelihood of the present job */
+    struct adaptive_first first;
+    double wanted;  /* m, edge of a cell that the scene's detail asks for */
+    double budget;  /* cells and hypotheses touched per row, at most */
+    float **factor; /* [whiskers][codes] log-likelihood of the present job */
     struct adaptive_job job;
     uint64_t next;              /* first row of the log that it has not seen */
     double gained;              /* log-likelihood of the rows seen, less the local belief's, since the restart */
     struct nav_summary summary; /* at row `next` - 1 */
     double room;                /* hypotheses that a cloud could hold */
-    struct nav_pose *pose;      /* [room] those drawn last */
-    struct nav_grain *grain;    /* [room] collected, */
-    int32_t grains;             /* so many */
-    double scattered, crowd;    /* share of mass in cells worth less than a hypothesis; cells that are worth more */
-    long touched, distinct;     /* since they were last cleared */
+    struct adaptive_poses poses;
+    double scattered, crowd; /* share of mass in cells worth less than a hypothesis; cells that are worth more */
+    long touched, distinct;  /* since they were last cleared */
 };
 
 /* 0, or -1 without memory; adaptive_global_free either way. */

@@ -24,7 +24,6 @@ static void begin(struct belief *b, double size)
     b->problem.arena.floor = PLAIN;
     b->problem.arena.boxes = 0;
     b->problem.arena.size_x = b->problem.arena.size_y = size;
-    b->problem.arena.tile = size / 4.0;
     b->problem.robot.body_radius = 0.01;
     assert_int_equal(adaptive_global_init(&b->g, &b->problem), 0);
     assert_int_equal(adaptive_log_init(&b->log, &b->g.likelihood->sensors), 0);
@@ -115,7 +114,7 @@ static void an_impossible_likelihood_is_worked_out_once(void **state)
     const double wrong[WANDER_CLASSES] = {log(0.075), log(0.85), log(0.075)};
     struct belief b;
     begin(&b, 2.0);
-    nav_histogram_clear(&b.g.histogram, b.g.level);
+    nav_histogram_clear(&b.g.histogram, b.g.first.level);
     adaptive_global_add(&b.g, (struct nav_pose){1.01, 1.01, 0.3}, 1.0);
     adaptive_global_added(&b.g);
     for (int k = 0; k < ADAPTIVE_ROWS_LATE; k++)
@@ -132,12 +131,12 @@ static void coarse_cells_are_refined_where_mass_is(void **state)
     (void)state;
     struct belief b;
     begin(&b, 16.0);
-    assert_true(b.g.level > 0 && b.g.histogram.level == b.g.level);
+    assert_true(b.g.first.level > 0 && b.g.histogram.level == b.g.first.level);
     assert_near(b.g.histogram.levels.cell, b.g.wanted, 0.0);
-    nav_histogram_clear(&b.g.histogram, b.g.level);
+    nav_histogram_clear(&b.g.histogram, b.g.first.level);
     adaptive_global_add(&b.g, (struct nav_pose){8.01, 8.01, 0.3}, 1.0);
     adaptive_global_added(&b.g);
-    for (int level = b.g.level; level > 0; level--) {
+    for (int level = b.g.first.level; level > 0; level--) {
         assert_near(b.g.scattered, 1.0, 0.0);
         write(&b, NO_NOISE, NULL);
         work(&b, PLENTY);
@@ -147,6 +146,22 @@ static void coarse_cells_are_refined_where_mass_is(void **state)
     work(&b, PLENTY);
     assert_near(b.g.histogram.shape.cell, b.g.wanted, 1e-12);
     assert_true(b.g.scattered < 0.5 && b.g.summary.near > 0.5);
+    end(&b);
+}
+
+/* However large the arena, a uniform belief is passed over in a few rows, and its memory stays. */
+static void large_arenas_get_the_budget_that_they_need(void **state)
+{
+    (void)state;
+    struct belief b;
+    begin(&b, 2.0);
+    assert_near(b.g.budget, b.problem.settings.adaptive_budget, 0.0);
+    end(&b);
+    begin(&b, 60.0);
+    double cells = (double)adaptive_global_cells(&b.g), rows = b.problem.settings.adaptive_rows;
+    assert_true(b.g.budget > b.problem.settings.adaptive_budget);
+    assert_near(b.g.budget, cells / rows, 1.0);
+    assert_true(adaptive_global_bytes(&b.g) < 64e6);
     end(&b);
 }
 
@@ -161,7 +176,7 @@ static void cells_without_a_table_are_weighed_as_those_with_one(void **state)
         b->problem = wander_new(0).problem;
         assert_int_equal(adaptive_global_init(&b->g, &b->problem), 0);
         assert_int_equal(adaptive_log_init(&b->log, &b->g.likelihood->sensors), 0);
-        b->g.level = n; /* the second takes its cells, those of level 0, for finer than the table's */
+        b->g.first.level = n; /* the second takes its cells, those of level 0, for finer than the table's */
         write(b, NO_NOISE, texture);
         work(b, PLENTY);
     }
@@ -205,6 +220,7 @@ int main(void)
         cmocka_unit_test(what_is_scattered_is_a_share_of_the_mass),
         cmocka_unit_test(an_impossible_likelihood_is_worked_out_once),
         cmocka_unit_test(coarse_cells_are_refined_where_mass_is),
+        cmocka_unit_test(large_arenas_get_the_budget_that_they_need),
         cmocka_unit_test(cells_without_a_table_are_weighed_as_those_with_one),
         cmocka_unit_test(the_log_counts_the_memory_of_all_rows_kept),
     };
