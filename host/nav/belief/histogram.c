@@ -20,14 +20,14 @@ struct nav_shape nav_levels_shape(const struct nav_levels *l, int level)
     return s;
 }
 
-static size_t shape_lines(const struct nav_shape *s)
+static size_t histogram_shape_lines(const struct nav_shape *s)
 {
     return (size_t)s->nh * (size_t)s->ny;
 }
 
 size_t nav_shape_cells(const struct nav_shape *s)
 {
-    return shape_lines(s) * (size_t)s->groups * NAV_LANES;
+    return histogram_shape_lines(s) * (size_t)s->groups * NAV_LANES;
 }
 
 double nav_shape_inside(const struct nav_shape *s)
@@ -35,17 +35,17 @@ double nav_shape_inside(const struct nav_shape *s)
     return (double)s->nx * s->ny * s->nh;
 }
 
-static int cells_init(struct nav_cells *c, const struct nav_shape *finest, uint32_t room)
+static int histogram_cells_init(struct nav_cells *c, const struct nav_shape *finest, uint32_t room)
 {
     c->shift_x = calloc((size_t)finest->nh, sizeof *c->shift_x);
     c->shift_y = calloc((size_t)finest->nh, sizeof *c->shift_y);
-    c->first = calloc(shape_lines(finest) + 1, sizeof *c->first);
+    c->first = calloc(histogram_shape_lines(finest) + 1, sizeof *c->first);
     c->at = calloc(room, sizeof *c->at);
     c->mass = calloc((size_t)room * NAV_LANES, sizeof *c->mass);
     return c->shift_x && c->shift_y && c->first && c->at && c->mass ? 0 : -1;
 }
 
-static void cells_free(struct nav_cells *c)
+static void histogram_cells_free(struct nav_cells *c)
 {
     free(c->shift_x);
     free(c->shift_y);
@@ -54,7 +54,7 @@ static void cells_free(struct nav_cells *c)
     free(c->mass);
 }
 
-static int line_init(struct nav_line *line, const struct nav_shape *finest)
+static int histogram_line_init(struct nav_line *line, const struct nav_shape *finest)
 {
     float *cell = calloc((size_t)finest->groups * NAV_LANES + 2 * PAD, sizeof *cell);
     line->cell = cell ? cell + PAD : NULL;
@@ -62,22 +62,23 @@ static int line_init(struct nav_line *line, const struct nav_shape *finest)
     return line->cell && line->mark ? 0 : -1;
 }
 
-static void line_free(struct nav_line *line)
+static void histogram_line_free(struct nav_line *line)
 {
     free(line->cell ? line->cell - PAD : NULL);
     free(line->mark);
 }
 
-static int pass_init(struct nav_histogram *h, const struct nav_shape *finest)
+static int histogram_pass_init(struct nav_histogram *h, const struct nav_shape *finest)
 {
     struct nav_pass *p = h->pass = calloc(1, sizeof *p);
     if (!p)
         return -1;
     p->roll_x = calloc((size_t)finest->nh, sizeof *p->roll_x);
     p->roll_y = calloc((size_t)finest->nh, sizeof *p->roll_y);
-    int failed = !p->roll_x || !p->roll_y || line_init(&p->raw, finest) || line_init(&p->todo, finest);
+    int failed =
+        !p->roll_x || !p->roll_y || histogram_line_init(&p->raw, finest) || histogram_line_init(&p->todo, finest);
     for (int n = 0; n < NAV_BLUR_LINES && !failed; n++)
-        failed = line_init(&p->blurred[n], finest);
+        failed = histogram_line_init(&p->blurred[n], finest);
     return failed ? -1 : 0;
 }
 
@@ -90,8 +91,8 @@ int nav_histogram_init(struct nav_histogram *h, const struct nav_levels *levels,
         return -1;
     h->room = (uint32_t)room;
     h->moment = calloc((size_t)finest.nh, sizeof *h->moment);
-    if (!h->moment || cells_init(&h->now, &finest, h->room) || cells_init(&h->next, &finest, h->room) ||
-        pass_init(h, &finest))
+    if (!h->moment || histogram_cells_init(&h->now, &finest, h->room) ||
+        histogram_cells_init(&h->next, &finest, h->room) || histogram_pass_init(h, &finest))
         return -1;
     nav_histogram_restart(h, level);
     return 0;
@@ -102,22 +103,22 @@ void nav_histogram_free(struct nav_histogram *h)
     if (h->pass) {
         free(h->pass->roll_x);
         free(h->pass->roll_y);
-        line_free(&h->pass->raw);
-        line_free(&h->pass->todo);
+        histogram_line_free(&h->pass->raw);
+        histogram_line_free(&h->pass->todo);
         for (int n = 0; n < NAV_BLUR_LINES; n++)
-            line_free(&h->pass->blurred[n]);
+            histogram_line_free(&h->pass->blurred[n]);
     }
     free(h->pass);
     free(h->moment);
-    cells_free(&h->now);
-    cells_free(&h->next);
+    histogram_cells_free(&h->now);
+    histogram_cells_free(&h->next);
 }
 
 size_t nav_histogram_bytes(const struct nav_histogram *h)
 {
     struct nav_shape finest = nav_levels_shape(&h->levels, 0);
     return 2 * h->room * (NAV_LANES * sizeof *h->now.mass + sizeof *h->now.at) +
-           2 * shape_lines(&finest) * sizeof *h->now.first;
+           2 * histogram_shape_lines(&finest) * sizeof *h->now.first;
 }
 
 void nav_histogram_clear(struct nav_histogram *h, int level)
@@ -128,7 +129,7 @@ void nav_histogram_clear(struct nav_histogram *h, int level)
     h->owed_position = h->owed_heading = h->total = h->now.rotation = 0.0;
     memset(h->now.shift_x, 0, (size_t)h->shape.nh * sizeof *h->now.shift_x);
     memset(h->now.shift_y, 0, (size_t)h->shape.nh * sizeof *h->now.shift_y);
-    memset(h->now.first, 0, (shape_lines(&h->shape) + 1) * sizeof *h->now.first);
+    memset(h->now.first, 0, (histogram_shape_lines(&h->shape) + 1) * sizeof *h->now.first);
     memset(h->moment, 0, (size_t)h->shape.nh * sizeof *h->moment);
 }
 
@@ -186,10 +187,10 @@ void nav_store_swap(struct nav_histogram *h)
 
 uint32_t nav_histogram_groups(const struct nav_histogram *h)
 {
-    return h->now.first[shape_lines(&h->shape)];
+    return h->now.first[histogram_shape_lines(&h->shape)];
 }
 
-static void copy_place(struct nav_histogram *h)
+static void histogram_copy_place(struct nav_histogram *h)
 {
     h->next.rotation = h->now.rotation;
     memcpy(h->next.shift_x, h->now.shift_x, (size_t)h->shape.nh * sizeof *h->now.shift_x);
@@ -197,7 +198,7 @@ static void copy_place(struct nav_histogram *h)
 }
 
 /* Whether any cell of a group holds mass. */
-static bool any(const float *mass)
+static bool histogram_any(const float *mass)
 {
     float sum = 0.0f;
     for (int k = 0; k < NAV_LANES; k++)
@@ -206,10 +207,10 @@ static bool any(const float *mass)
 }
 
 /* Stores the marked groups of a line written out, and empties it. */
-static void store_line(struct nav_histogram *h, struct nav_line *line, size_t number)
+static void histogram_store_line(struct nav_histogram *h, struct nav_line *line, size_t number)
 {
     for (int g = nav_line_next(line, &h->shape, 0); g < h->shape.groups; g = nav_line_next(line, &h->shape, g + 1)) {
-        if (any(line->cell + g * NAV_LANES))
+        if (histogram_any(line->cell + g * NAV_LANES))
             nav_store_group(h, g, line->cell + g * NAV_LANES);
     }
     nav_store_end_line(h, number);
@@ -228,20 +229,20 @@ void nav_histogram_take(struct nav_histogram *h)
 {
     struct nav_line *line = &h->pass->raw;
     size_t cells = (size_t)h->shape.groups * NAV_LANES;
-    copy_place(h);
+    histogram_copy_place(h);
     nav_store_begin(h);
-    for (size_t n = 0; n < shape_lines(&h->shape); n++) {
+    for (size_t n = 0; n < histogram_shape_lines(&h->shape); n++) {
         memcpy(line->cell, h->next.mass + n * cells, cells * sizeof *line->cell);
         for (int g = 0; g < h->shape.groups; g++)
             nav_line_note(line, &h->shape, g);
-        store_line(h, line, n);
+        histogram_store_line(h, line, n);
     }
     nav_store_swap(h);
     h->total = 1.0;
 }
 
 /* Cells of a line, written out. */
-static void write_out(const struct nav_histogram *h, size_t number, struct nav_line *line)
+static void histogram_write_out(const struct nav_histogram *h, size_t number, struct nav_line *line)
 {
     for (uint32_t n = h->now.first[number]; n < h->now.first[number + 1]; n++) {
         memcpy(line->cell + h->now.at[n] * NAV_LANES, h->now.mass + (size_t)n * NAV_LANES,
@@ -251,7 +252,7 @@ static void write_out(const struct nav_histogram *h, size_t number, struct nav_l
 }
 
 /* Number of the line that holds a pose, and the cell in it; -1 outside. */
-static int64_t line_of(const struct nav_histogram *h, struct nav_pose pose, int *cell)
+static int64_t histogram_line_of(const struct nav_histogram *h, struct nav_pose pose, int *cell)
 {
     const struct nav_shape *s = &h->shape;
     double turns = (pose.theta - h->now.rotation) / (2.0 * NAV_PI);
@@ -267,13 +268,13 @@ static int64_t line_of(const struct nav_histogram *h, struct nav_pose pose, int 
 void nav_histogram_add(struct nav_histogram *h, struct nav_grain *grain, int32_t count)
 {
     struct nav_line *line = &h->pass->raw;
-    size_t lines = shape_lines(&h->shape);
+    size_t lines = histogram_shape_lines(&h->shape);
     int cell = 0;
-    copy_place(h);
+    histogram_copy_place(h);
     nav_store_begin(h);
     memset(h->next.first + 1, 0, lines * sizeof *h->next.first);
     for (int32_t n = 0; n < count; n++) {
-        int64_t at = line_of(h, grain[n].pose, &cell);
+        int64_t at = histogram_line_of(h, grain[n].pose, &cell);
         if (at < 0)
             continue;
         grain[n].next = (int32_t)h->next.first[at + 1] - 1;
@@ -281,20 +282,20 @@ void nav_histogram_add(struct nav_histogram *h, struct nav_grain *grain, int32_t
         h->total += grain[n].mass;
     }
     for (size_t number = 0; number < lines; number++) {
-        write_out(h, number, line);
+        histogram_write_out(h, number, line);
         for (int32_t n = (int32_t)h->next.first[number + 1] - 1; n >= 0; n = grain[n].next) {
-            line_of(h, grain[n].pose, &cell);
+            histogram_line_of(h, grain[n].pose, &cell);
             line->cell[cell] += (float)grain[n].mass;
             nav_line_note(line, &h->shape, cell / NAV_LANES);
         }
-        store_line(h, line, number);
+        histogram_store_line(h, line, number);
     }
     nav_store_swap(h);
 }
 
 /* Writes out the finer line that is half of a line's cells, `dx` cells to the right. */
-static void split_line(const struct nav_histogram *h, size_t number, const struct nav_shape *finer, int dx, float share,
-                       struct nav_line *line)
+static void histogram_split_line(const struct nav_histogram *h, size_t number, const struct nav_shape *finer, int dx,
+                                 float share, struct nav_line *line)
 {
     for (uint32_t n = h->now.first[number]; n < h->now.first[number + 1]; n++) {
         for (int k = 0; k < NAV_LANES; k++) {
@@ -327,10 +328,10 @@ bool nav_histogram_refine(struct nav_histogram *h)
             int from = j - dy >= 0 ? (j - dy) / 2 : -1;
             h->shape = coarse;
             if (from >= 0 && from < coarse.ny)
-                split_line(h, (size_t)p * (size_t)coarse.ny + (size_t)from, &finer, dx, 0.25f / (float)turns,
-                           &h->pass->raw);
+                histogram_split_line(h, (size_t)p * (size_t)coarse.ny + (size_t)from, &finer, dx, 0.25f / (float)turns,
+                                     &h->pass->raw);
             h->shape = finer;
-            store_line(h, &h->pass->raw, (size_t)q * (size_t)finer.ny + (size_t)j);
+            histogram_store_line(h, &h->pass->raw, (size_t)q * (size_t)finer.ny + (size_t)j);
         }
     }
     for (int q = finer.nh; q-- > 0;) {

@@ -5,7 +5,7 @@
 #include "histogram.h"
 #include "problem.h"
 
-static double stats_heading(const struct nav_histogram *h, int p)
+static double histogram_stats_heading(const struct nav_histogram *h, int p)
 {
     return (p + 0.5) * h->shape.cell_theta + h->now.rotation;
 }
@@ -17,12 +17,12 @@ struct visit {
     void *self;
 };
 
-static void visit_line(const struct visit *v, int p, int j)
+static void histogram_visit_line(const struct visit *v, int p, int j)
 {
     const struct nav_histogram *h = v->h;
     size_t line = (size_t)p * (size_t)h->shape.ny + (size_t)j;
     double cell = h->shape.cell, each = h->total / nav_shape_inside(&h->shape);
-    struct nav_pose at = {0.0, (j + 0.5) * cell + h->now.shift_y[p], nav_wrap(stats_heading(h, p))};
+    struct nav_pose at = {0.0, (j + 0.5) * cell + h->now.shift_y[p], nav_wrap(histogram_stats_heading(h, p))};
     for (int i = 0; i < h->shape.nx && h->uniform; i++) {
         at.x = (i + 0.5) * cell + h->now.shift_x[p];
         v->take(v->self, at, each);
@@ -42,7 +42,7 @@ void nav_histogram_each(const struct nav_histogram *h, void (*take)(void *, stru
     const struct visit v = {h, take, self};
     for (int p = 0; p < h->shape.nh; p++) {
         for (int j = 0; j < h->shape.ny; j++)
-            visit_line(&v, p, j);
+            histogram_visit_line(&v, p, j);
     }
 }
 
@@ -53,7 +53,7 @@ struct near {
     double mass, x, y, theta;
 };
 
-static void near_take(void *self, struct nav_pose at, double mass)
+static void histogram_near_take(void *self, struct nav_pose at, double mass)
 {
     struct near *near = self;
     double x = at.x - near->pose.x, y = at.y - near->pose.y;
@@ -68,15 +68,15 @@ static void near_take(void *self, struct nav_pose at, double mass)
 double nav_histogram_near(const struct nav_histogram *h, struct nav_pose pose, struct nav_pose *mean)
 {
     struct near near = {.pose = pose};
-    const struct visit v = {h, near_take, &near};
+    const struct visit v = {h, histogram_near_take, &near};
     for (int p = 0; p < h->shape.nh; p++) {
-        near.turn = nav_wrap(stats_heading(h, p) - pose.theta);
+        near.turn = nav_wrap(histogram_stats_heading(h, p) - pose.theta);
         if (fabs(near.turn) > NAV_NEAR_RAD)
             continue;
         double at = (pose.y - h->now.shift_y[p]) / h->shape.cell, reach = NAV_NEAR_M / h->shape.cell;
         int begin = (int)fmax(floor(at - reach), 0.0), end = (int)fmin(ceil(at + reach) + 1.0, h->shape.ny);
         for (int j = begin; j < end; j++)
-            visit_line(&v, p, j);
+            histogram_visit_line(&v, p, j);
     }
     if (mean && near.mass > 0.0)
         *mean = (struct nav_pose){pose.x + near.x / near.mass, pose.y + near.y / near.mass,
@@ -85,7 +85,7 @@ double nav_histogram_near(const struct nav_histogram *h, struct nav_pose pose, s
 }
 
 /* Adds one slice's moments about (x, y) to sums xx, xy, yy, xt, yt, tt, its heading being off by `turn`. */
-static void add_moments(const double m[NAV_MOMENTS], double x, double y, double turn, double sums[6])
+static void histogram_add_moments(const double m[NAV_MOMENTS], double x, double y, double turn, double sums[6])
 {
     double mx = m[1] - x * m[0], my = m[2] - y * m[0];
     sums[0] += m[3] - 2.0 * x * m[1] + x * x * m[0];
@@ -103,8 +103,8 @@ double nav_histogram_summarise(const struct nav_histogram *h, struct nav_gaussia
     out->mean = h->mode;
     nav_histogram_near(h, h->mode, &out->mean);
     for (int p = 0; p < h->shape.nh; p++)
-        add_moments(h->moment[p], out->mean.x - h->about.x, out->mean.y - h->about.y,
-                    nav_wrap(stats_heading(h, p) - out->mean.theta), sums);
+        histogram_add_moments(h->moment[p], out->mean.x - h->about.x, out->mean.y - h->about.y,
+                              nav_wrap(histogram_stats_heading(h, p) - out->mean.theta), sums);
     for (int k = 0; k < 6; k++)
         sums[k] /= h->total;
     const double all[9] = {fmax(sums[0], 0.0) + within, sums[1], sums[3], sums[1],
@@ -122,7 +122,7 @@ struct draw {
     long count, room;
 };
 
-static void draw_take(void *self, struct nav_pose at, double mass)
+static void histogram_draw_take(void *self, struct nav_pose at, double mass)
 {
     struct draw *d = self;
     const struct nav_shape *s = &d->h->shape;
@@ -136,6 +136,6 @@ long nav_histogram_draw(const struct nav_histogram *h, struct nav_rng *rng, long
 {
     struct draw d = {.h = h, .rng = rng, .step = h->total / (double)count, .out = out, .room = room};
     d.mark = d.step * nav_rng_uniform(rng);
-    nav_histogram_each(h, draw_take, &d);
+    nav_histogram_each(h, histogram_draw_take, &d);
     return d.count;
 }

@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static size_t hash(const uint8_t *key, size_t width)
+static size_t book_hash(const uint8_t *key, size_t width)
 {
     uint64_t h = 14695981039346656037u; /* FNV-1a */
     for (size_t i = 0; i < width; i++)
@@ -12,15 +12,15 @@ static size_t hash(const uint8_t *key, size_t width)
 }
 
 /* Open addressing: where the key is or belongs. */
-static size_t place(const struct nav_book *b, const uint8_t *key)
+static size_t book_place(const struct nav_book *b, const uint8_t *key)
 {
-    size_t i = hash(key, b->width) & (b->slots - 1);
+    size_t i = book_hash(key, b->width) & (b->slots - 1);
     while (b->slot[i] && memcmp(b->keys + (b->slot[i] - 1) * b->width, key, b->width) != 0)
         i = (i + 1) & (b->slots - 1);
     return i;
 }
 
-static int grow(struct nav_book *b)
+static int book_grow(struct nav_book *b)
 {
     uint32_t room = b->room ? 2 * b->room : 1024;
     uint8_t *keys = realloc(b->keys, (size_t)room * b->width);
@@ -36,15 +36,15 @@ static int grow(struct nav_book *b)
     b->slots = (size_t)room * 2;
     b->room = room;
     for (uint32_t n = 0; n < b->count; n++)
-        b->slot[place(b, b->keys + n * b->width)] = n + 1;
+        b->slot[book_place(b, b->keys + n * b->width)] = n + 1;
     return 0;
 }
 
 uint32_t nav_book_number(struct nav_book *b, const void *key)
 {
-    if (b->count == b->room && (b->room >= UINT32_MAX / 4 || grow(b)))
+    if (b->count == b->room && (b->room >= UINT32_MAX / 4 || book_grow(b)))
         return NAV_BOOK_FULL;
-    size_t i = place(b, key);
+    size_t i = book_place(b, key);
     if (!b->slot[i]) {
         memcpy(b->keys + b->count * b->width, key, b->width);
         b->slot[i] = ++b->count;

@@ -14,14 +14,14 @@ enum { MARGIN = NAV_CELLS_AHEAD + 2 };
 /* Rows of poses in a cell: as the settings' ranges allow. */
 enum { ROWS_MOST = 16 * 16 };
 
-static size_t pitch(const struct nav_expected *e)
+static size_t expected_pitch(const struct nav_expected *e)
 {
     return (size_t)(e->nx + 2 * e->margin);
 }
 
-static size_t poses(const struct nav_expected *e)
+static size_t expected_poses(const struct nav_expected *e)
 {
-    return (size_t)e->nh * (size_t)(e->ny + 2 * e->margin) * pitch(e);
+    return (size_t)e->nh * (size_t)(e->ny + 2 * e->margin) * expected_pitch(e);
 }
 
 struct maker {
@@ -32,15 +32,15 @@ struct maker {
 };
 
 /* All headings of one place: whether it is free does not depend on the heading. */
-static int survey(struct maker *m, int i, int j)
+static int expected_survey(struct maker *m, int i, int j)
 {
     struct nav_expected *e = m->e;
     double x = (i + 0.5) * e->step, y = (j + 0.5) * e->step;
     /* Half a step of grace: the robot may well stand against a wall, between two lattice poses. */
     if (!nav_likelihood_clear(m->likelihood, x, y, e->step / 2.0))
         return 0;
-    size_t at = (size_t)(j + e->margin) * pitch(e) + (size_t)(i + e->margin);
-    for (int k = 0; k < e->nh; k++, at += pitch(e) * (size_t)(e->ny + 2 * e->margin)) {
+    size_t at = (size_t)(j + e->margin) * expected_pitch(e) + (size_t)(i + e->margin);
+    for (int k = 0; k < e->nh; k++, at += expected_pitch(e) * (size_t)(e->ny + 2 * e->margin)) {
         double theta = (k + 0.5) * e->step_theta;
         nav_likelihood_expect(m->likelihood, &(struct nav_place){x, y, cos(theta), sin(theta)}, m->codes + 1);
         e->signature[at] = nav_book_number(&m->book, m->codes);
@@ -51,17 +51,17 @@ static int survey(struct maker *m, int i, int j)
     return 0;
 }
 
-static int survey_all(struct maker *m)
+static int expected_survey_all(struct maker *m)
 {
     struct nav_expected *e = m->e;
-    e->signature = calloc(poses(e), sizeof *e->signature);
+    e->signature = calloc(expected_poses(e), sizeof *e->signature);
     m->codes = calloc(m->book.width, 1);
     if (!e->signature || !m->codes || nav_book_number(&m->book, m->codes) != 0)
         return -1; /* number 0 is "blocked" */
     m->codes[0] = 1;
     for (int j = 0; j < e->ny; j++) {
         for (int i = 0; i < e->nx; i++) {
-            if (survey(m, i, j))
+            if (expected_survey(m, i, j))
                 return -1;
         }
     }
@@ -70,13 +70,13 @@ static int survey_all(struct maker *m)
 
 /* At least two: the root of a tree of products must be a product, whose stretches are numbered as the signatures are.
  */
-static size_t code_width(int whiskers)
+static size_t expected_code_width(int whiskers)
 {
     return whiskers > 2 ? (size_t)whiskers : 2;
 }
 
 /* Takes the signatures over from the book, whose keys begin with the byte that tells free from blocked. */
-static int keep_codes(struct nav_expected *e, const struct nav_book *book)
+static int expected_keep_codes(struct nav_expected *e, const struct nav_book *book)
 {
     size_t whiskers = (size_t)e->whiskers;
     e->signatures = book->count;
@@ -87,9 +87,10 @@ static int keep_codes(struct nav_expected *e, const struct nav_book *book)
 }
 
 /* The tree of products over the free poses' signatures. */
-static int make_factor(struct nav_expected *e, const struct nav_book *book, const struct nav_likelihood *likelihood)
+static int expected_make_factor(struct nav_expected *e, const struct nav_book *book,
+                                const struct nav_likelihood *likelihood)
 {
-    size_t width = code_width(e->whiskers), count = e->signatures - 1;
+    size_t width = expected_code_width(e->whiskers), count = e->signatures - 1;
     uint8_t *packed = calloc(count + 1, width);
     int *codes = calloc(width, sizeof *codes), failed = -1;
     if (packed && codes) {
@@ -107,7 +108,7 @@ static int make_factor(struct nav_expected *e, const struct nav_book *book, cons
 }
 
 /* Values of the present row, none worked out. */
-static int make_values(struct nav_expected *e)
+static int expected_make_values(struct nav_expected *e)
 {
     e->value = calloc(e->signatures, sizeof *e->value);
     e->known = calloc(e->signatures, sizeof *e->known);
@@ -137,8 +138,9 @@ struct nav_expected *nav_expected_new(const struct nav_likelihood *likelihood, d
                                .turns = turns,
                                .whiskers = likelihood->whiskers};
     struct maker m = {.e = e, .likelihood = likelihood};
-    m.book.width = code_width(e->whiskers) + 1;
-    int failed = survey_all(&m) || keep_codes(e, &m.book) || make_factor(e, &m.book, likelihood) || make_values(e);
+    m.book.width = expected_code_width(e->whiskers) + 1;
+    int failed = expected_survey_all(&m) || expected_keep_codes(e, &m.book) ||
+                 expected_make_factor(e, &m.book, likelihood) || expected_make_values(e);
     free(m.codes);
     nav_book_free(&m.book);
     if (!failed)
@@ -162,7 +164,7 @@ void nav_expected_free(struct nav_expected *e)
 /* A product of factors stays above 1e-304 when all their ranges together stay below this, nats. */
 static const double RANGE_MOST = 700.0;
 
-static void evaluate_leaf(const struct nav_expected *e, const struct nav_factor_node *leaf, const float *table)
+static void expected_evaluate_leaf(const struct nav_expected *e, const struct nav_factor_node *leaf, const float *table)
 {
     float best = table[0];
     for (uint32_t k = 1; k < leaf->count; k++)
@@ -171,14 +173,14 @@ static void evaluate_leaf(const struct nav_expected *e, const struct nav_factor_
         leaf->value[k] = exp(fmax((double)(table[k] - best), -RANGE_MOST / e->whiskers));
 }
 
-static void evaluate_leaves(struct nav_expected *e, const float *const *table)
+static void expected_evaluate_leaves(struct nav_expected *e, const float *const *table)
 {
     for (int n = 0; n < e->factor.nodes; n++) {
         const struct nav_factor_node *node = &e->factor.node[n];
         if (node->left >= 0)
             continue;
         if (node->whisker < e->whiskers)
-            evaluate_leaf(e, node, table[node->whisker]);
+            expected_evaluate_leaf(e, node, table[node->whisker]);
         else
             node->value[0] = 1.0;
     }
@@ -190,7 +192,7 @@ void nav_expected_begin(struct nav_expected *e, const float *const *table, float
         e->value[e->known[n]] = -1.0f;
     e->knowns = 0;
     e->value[0] = blocked;
-    evaluate_leaves(e, table);
+    expected_evaluate_leaves(e, table);
     nav_factor_prepare(&e->factor);
 }
 
@@ -208,7 +210,7 @@ static const uint32_t *expected_row(const struct nav_expected *e, const struct n
 {
     size_t k = (size_t)((layer->heading + turn) % e->nh);
     size_t line = k * (size_t)(e->ny + 2 * e->margin) + (size_t)(row * e->sub + layer->y + b + e->margin);
-    return e->signature + line * pitch(e) + (ptrdiff_t)(e->margin + layer->x);
+    return e->signature + line * expected_pitch(e) + (ptrdiff_t)(e->margin + layer->x);
 }
 
 void nav_expected_scale(struct nav_expected *e)
@@ -282,7 +284,7 @@ const uint8_t *nav_expected_codes(const struct nav_expected *e, const struct nav
 
 size_t nav_expected_bytes(const struct nav_expected *e)
 {
-    return poses(e) * sizeof *e->signature +
+    return expected_poses(e) * sizeof *e->signature +
            e->signatures * ((size_t)e->whiskers + 1 + sizeof *e->value + sizeof *e->known) +
            nav_factor_bytes(&e->factor);
 }

@@ -13,7 +13,7 @@ struct maker {
     const int *codes;
 };
 
-static int make_leaf(struct maker *m, int whisker, uint32_t *number)
+static int factor_make_leaf(struct maker *m, int whisker, uint32_t *number)
 {
     struct nav_factor *f = m->f;
     struct nav_factor_node *node = &f->node[f->nodes];
@@ -25,7 +25,7 @@ static int make_leaf(struct maker *m, int whisker, uint32_t *number)
 }
 
 /* Numbers the pairs of two children's stretches; `number` holds the left ones and takes the result. */
-static int join(struct maker *m, int left, int right, uint32_t *number, const uint32_t *other)
+static int factor_join(struct maker *m, int left, int right, uint32_t *number, const uint32_t *other)
 {
     struct nav_factor *f = m->f;
     struct nav_book book = {.width = sizeof(struct nav_pair)};
@@ -46,16 +46,16 @@ static int join(struct maker *m, int left, int right, uint32_t *number, const ui
 }
 
 /* Node over whiskers begin .. end - 1: its number, or -1. `number`: of each signature's stretch there. */
-static int make(struct maker *m, int begin, int end, uint32_t *number)
+static int factor_make(struct maker *m, int begin, int end, uint32_t *number)
 {
     if (end - begin == 1)
-        return make_leaf(m, begin, number);
+        return factor_make_leaf(m, begin, number);
     int middle = (begin + end) / 2, node = -1;
     uint32_t *other = calloc((size_t)m->count + 1, sizeof *other);
-    int left = other ? make(m, begin, middle, number) : -1;
-    int right = left >= 0 ? make(m, middle, end, other) : -1;
+    int left = other ? factor_make(m, begin, middle, number) : -1;
+    int right = left >= 0 ? factor_make(m, middle, end, other) : -1;
     if (right >= 0)
-        node = join(m, left, right, number, other);
+        node = factor_join(m, left, right, number, other);
     free(other);
     return node >= 0 && m->f->node[node].value ? node : -1;
 }
@@ -65,7 +65,7 @@ int nav_factor_init(struct nav_factor *f, const uint8_t *signatures, uint32_t co
     struct maker m = {f, signatures, count, whiskers, codes};
     uint32_t *number = calloc((size_t)count + 1, sizeof *number);
     *f = (struct nav_factor){.node = calloc((size_t)whiskers * 2, sizeof *f->node)};
-    int made = number && f->node ? make(&m, 0, whiskers, number) : -1;
+    int made = number && f->node ? factor_make(&m, 0, whiskers, number) : -1;
     free(number);
     return made >= 0 ? 0 : -1;
 }
@@ -79,7 +79,7 @@ void nav_factor_free(struct nav_factor *f)
     free(f->node);
 }
 
-static void work_out_node(struct nav_factor *f, int n)
+static void factor_work_out_node(struct nav_factor *f, int n)
 {
     struct nav_factor_node *node = &f->node[n];
     if (node->left < 0)
@@ -92,7 +92,7 @@ static void work_out_node(struct nav_factor *f, int n)
 void nav_factor_prepare(struct nav_factor *f)
 {
     for (int n = 0; n + 1 < f->nodes; n++)
-        work_out_node(f, n);
+        factor_work_out_node(f, n);
 }
 
 size_t nav_factor_bytes(const struct nav_factor *f)

@@ -32,7 +32,7 @@ struct grid {
     struct nav_motion last; /* motion of the row before, as applied */
 };
 
-static void destroy(void *self)
+static void grid_destroy(void *self)
 {
     struct grid *g = self;
     nav_likelihood_free(g->likelihood);
@@ -42,7 +42,7 @@ static void destroy(void *self)
     free(g);
 }
 
-static void find_layers(struct grid *g)
+static void grid_find_layers(struct grid *g)
 {
     const struct nav_histogram *h = &g->histogram;
     for (int p = 0; p < h->shape.nh; p++)
@@ -51,7 +51,7 @@ static void find_layers(struct grid *g)
 }
 
 /* Adds what a cell near the pose expected expects, before it is weighed; light ones are left out. */
-static void expect_cell(struct grid *g, int p, int line, int column, double mass)
+static void grid_expect_cell(struct grid *g, int p, int line, int column, double mass)
 {
     const struct nav_shape *s = &g->histogram.shape;
     if (mass <= LIGHT)
@@ -69,18 +69,18 @@ static void expect_cell(struct grid *g, int p, int line, int column, double mass
     }
 }
 
-static long weigh_group(void *self, int p, int line, int group, const float *mass, float *like)
+static long grid_weigh_group(void *self, int p, int line, int group, const float *mass, float *like)
 {
     struct grid *g = self;
     nav_expected_mean(g->expected, &g->layer[p], line, group * NAV_LANES, mass, like);
     for (int k = 0; k < NAV_LANES && g->confidence >= SURE; k++)
-        expect_cell(g, p, line, group * NAV_LANES + k, (double)mass[k]);
+        grid_expect_cell(g, p, line, group * NAV_LANES + k, (double)mass[k]);
     return 0;
 }
 
 /* Moves, multiplies by the likelihood and normalises; `extra` is added to each cell first. Returns false with no mass.
  */
-static bool reweigh(struct grid *g, struct nav_pose step, double extra)
+static bool grid_reweigh(struct grid *g, struct nav_pose step, double extra)
 {
     static const struct nav_weigh noise = {.group = NULL};
     enum { PASSES_MOST = 25 };
@@ -92,14 +92,14 @@ static bool reweigh(struct grid *g, struct nav_pose step, double extra)
     }
     if (!(h->total > 0.0))
         return false;
-    g->weigh = (struct nav_weigh){.group = weigh_group, .self = g, .extra = extra};
+    g->weigh = (struct nav_weigh){.group = grid_weigh_group, .self = g, .extra = extra};
     nav_histogram_begin(h, step, &g->weigh, g->summary.mean);
-    find_layers(g);
+    grid_find_layers(g);
     nav_histogram_run(h, LONG_MAX);
     return h->total > 0.0 && isfinite(h->total);
 }
 
-static void summarise(struct grid *g)
+static void grid_summarise(struct grid *g)
 {
     if (!(g->histogram.total > 0.0)) { /* no place in the arena is free: nothing can be known */
         struct nav_problem anywhere = *g->problem;
@@ -113,15 +113,15 @@ static void summarise(struct grid *g)
 }
 
 /* Spreads the belief over free space, by what the present row says. */
-static void forget(struct grid *g)
+static void grid_forget(struct grid *g)
 {
     g->confidence = 0.0;
     nav_histogram_restart(&g->histogram, 0);
-    reweigh(g, (struct nav_pose){0.0, 0.0, 0.0}, 0.0);
+    grid_reweigh(g, (struct nav_pose){0.0, 0.0, 0.0}, 0.0);
 }
 
 /* The belief before anything is read: the tables say that all is equally likely. */
-static void begin(struct grid *g)
+static void grid_begin(struct grid *g)
 {
     const struct nav_prior *prior = &g->problem->prior;
     g->summary.mean = prior->mean;
@@ -129,12 +129,12 @@ static void begin(struct grid *g)
     nav_expected_scale(g->expected);
     if (!prior->uniform)
         nav_bumps_fill(prior, &g->histogram);
-    if (!reweigh(g, (struct nav_pose){0.0, 0.0, 0.0}, 0.0))
-        forget(g);
-    summarise(g);
+    if (!grid_reweigh(g, (struct nav_pose){0.0, 0.0, 0.0}, 0.0))
+        grid_forget(g);
+    grid_summarise(g);
 }
 
-static bool make_tables(struct grid *g)
+static bool grid_make_tables(struct grid *g)
 {
     const struct nav_problem *problem = g->problem;
     const struct nav_settings *s = &problem->settings;
@@ -149,7 +149,7 @@ static bool make_tables(struct grid *g)
     return g->expected && g->layer;
 }
 
-static void *create(const struct nav_problem *problem)
+static void *grid_create(const struct nav_problem *problem)
 {
     const struct nav_settings *s = &problem->settings;
     struct grid *g = calloc(1, sizeof *g);
@@ -161,38 +161,38 @@ static void *create(const struct nav_problem *problem)
                                       .size_y = problem->arena.size_y,
                                       .cell = s->grid_cell_m,
                                       .headings = (int)fmax(round(360.0 / s->grid_cell_deg), 1.0)};
-    if (nav_histogram_init(&g->histogram, &levels, 0, 0) || !make_tables(g)) {
-        destroy(g);
+    if (nav_histogram_init(&g->histogram, &levels, 0, 0) || !grid_make_tables(g)) {
+        grid_destroy(g);
         return NULL;
     }
-    begin(g);
+    grid_begin(g);
     return g;
 }
 
-static void estimate(const void *self, struct nav_estimate *out);
+static void grid_estimate(const void *self, struct nav_estimate *out);
 
 /* The motion as the odometry's learned errors correct it. What is learned comes from the rows before. */
-static struct nav_motion calibrated(struct grid *g, const struct nav_motion *motion)
+static struct nav_motion grid_calibrated(struct grid *g, const struct nav_motion *motion)
 {
     if (g->problem->settings.motion_calibrate < 0.5)
         return *motion;
     struct nav_estimate now;
-    estimate(g, &now);
+    grid_estimate(g, &now);
     nav_calibration_learn(&g->calibration, &g->last, &now);
     g->last = nav_calibration_apply(&g->calibration, motion);
     return g->last;
 }
 
-static void predict(void *self, const struct nav_motion *told)
+static void grid_predict(void *self, const struct nav_motion *told)
 {
     struct grid *g = self;
-    struct nav_motion motion = calibrated(g, told);
+    struct nav_motion motion = grid_calibrated(g, told);
     struct nav_noise noise = nav_motion_noise(&g->problem->robot, &g->problem->settings, &motion);
     noise.position += nav_histogram_fan(&g->histogram, motion.step, g->problem->settings.motion_along_m);
     nav_pending_add(&g->pending, motion.step, noise);
 }
 
-static void update(void *self, const struct nav_evidence *evidence)
+static void grid_update(void *self, const struct nav_evidence *evidence)
 {
     struct grid *g = self;
     struct nav_pose step = g->pending.step;
@@ -205,14 +205,14 @@ static void update(void *self, const struct nav_evidence *evidence)
     nav_expected_scale(g->expected);
     nav_trust_begin(g->likelihood);
     bool sure = g->confidence >= SURE; /* fairly: it judges the row's readings */
-    if (!reweigh(g, step, g->problem->settings.grid_teleport / nav_shape_inside(&g->histogram.shape)))
-        forget(g);
+    if (!grid_reweigh(g, step, g->problem->settings.grid_teleport / nav_shape_inside(&g->histogram.shape)))
+        grid_forget(g);
     if (sure)
         nav_trust_learn(g->likelihood);
-    summarise(g);
+    grid_summarise(g);
 }
 
-static void estimate(const void *self, struct nav_estimate *out)
+static void grid_estimate(const void *self, struct nav_estimate *out)
 {
     const struct grid *g = self;
     nav_gaussian_ahead(&g->summary, &g->pending, out);
@@ -228,7 +228,7 @@ struct listing {
     long count, room;
 };
 
-static void list_cell(void *self, struct nav_pose at, double mass)
+static void grid_list_cell(void *self, struct nav_pose at, double mass)
 {
     struct listing *l = self;
     l->bump.pose = nav_compose(at, l->g->pending.step);
@@ -238,7 +238,7 @@ static void list_cell(void *self, struct nav_pose at, double mass)
     l->count++;
 }
 
-static long components(const void *self, struct nav_component *out, long room)
+static long grid_components(const void *self, struct nav_component *out, long room)
 {
     const struct grid *g = self;
     const struct nav_histogram *h = &g->histogram;
@@ -246,11 +246,11 @@ static long components(const void *self, struct nav_component *out, long room)
     double cell = h->shape.cell, turn = h->shape.cell_theta;
     l.bump.sigma_m = sqrt(cell * cell / 12.0 + h->owed_position + g->pending.noise.position);
     l.bump.sigma_rad = sqrt(turn * turn / 12.0 + h->owed_heading + g->pending.noise.heading);
-    nav_histogram_each(h, list_cell, &l);
+    nav_histogram_each(h, grid_list_cell, &l);
     return l.count;
 }
 
-static struct nav_resolution resolution(const void *self)
+static struct nav_resolution grid_resolution(const void *self)
 {
     const struct grid *g = self;
     double finest = nav_sensors_detail(&g->likelihood->sensors).detail;
@@ -259,10 +259,10 @@ static struct nav_resolution resolution(const void *self)
 }
 
 const struct nav_filter_ops nav_grid_filter = {.name = "grid",
-                                               .create = create,
-                                               .destroy = destroy,
-                                               .predict = predict,
-                                               .update = update,
-                                               .estimate = estimate,
-                                               .components = components,
-                                               .resolution = resolution};
+                                               .create = grid_create,
+                                               .destroy = grid_destroy,
+                                               .predict = grid_predict,
+                                               .update = grid_update,
+                                               .estimate = grid_estimate,
+                                               .components = grid_components,
+                                               .resolution = grid_resolution};

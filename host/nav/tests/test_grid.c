@@ -134,7 +134,7 @@ static void the_grid_is_equation_4(void **state)
 {
     (void)state;
     struct nav_problem p = diagonal_room();
-    struct grid *g = create(&p);
+    struct grid *g = grid_create(&p);
     static double naive[CELLS], fast[CELLS];
     by_heading(g, naive);
     const struct nav_motion motion = {.step = {CELL * sqrt(2.0), 0.0, NAV_PI / 2.0}};
@@ -147,13 +147,13 @@ static void the_grid_is_equation_4(void **state)
     const double distances[3] = {INFINITY, 0.12, 0.2}, fresh[] = {1.0, 1.0};
     for (int row = 0; row < 3; row++) {
         const double *reading[] = {windows[row], &distances[row]};
-        predict(g, &motion);
-        update(g, &(struct nav_evidence){reading, fresh});
+        grid_predict(g, &motion);
+        grid_update(g, &(struct nav_evidence){reading, fresh});
         by_heading(g, fast);
         naive_step(&p, g->likelihood, naive, share, turn);
         assert_near(total_variation(naive, fast), 0.0, 1e-6);
     }
-    destroy(g);
+    grid_destroy(g);
 }
 
 static void motion_put_off_is_kept_exactly(void **state)
@@ -161,21 +161,21 @@ static void motion_put_off_is_kept_exactly(void **state)
     (void)state;
     struct nav_problem p = room();
     p.robot.odometry_relative = 0.0;
-    struct grid *g = create(&p);
+    struct grid *g = grid_create(&p);
     struct nav_estimate before, after;
     const struct nav_motion step = {.step = {0.003, 0.0, 0.01}};
     struct nav_pose walked = g->summary.mean;
-    estimate(g, &before);
+    grid_estimate(g, &before);
     for (int i = 0; i < 30; i++) {
-        predict(g, &step);
+        grid_predict(g, &step);
         walked = nav_compose(walked, step.step);
     }
-    estimate(g, &after);
+    grid_estimate(g, &after);
     assert_near(after.pose.x, walked.x, 1e-12);
     assert_near(after.pose.theta, walked.theta, 1e-12);
     assert_true(after.covariance[0] > before.covariance[0]);
     assert_near(g->histogram.now.rotation, 0.0, 0.0);
-    destroy(g);
+    grid_destroy(g);
 }
 
 static void belief_is_clipped_to_free_space(void **state)
@@ -183,17 +183,17 @@ static void belief_is_clipped_to_free_space(void **state)
     (void)state;
     struct nav_problem p = room();
     p.prior.mean = (struct nav_pose){0.95, 0.15, 0.0}; /* inside the box */
-    struct grid *g = create(&p);
+    struct grid *g = grid_create(&p);
     double inside = 0.0, all = 0.0;
     static struct nav_component cell[40000];
-    long cells = components(g, cell, 40000);
+    long cells = grid_components(g, cell, 40000);
     for (long n = 0; n < cells; n++) {
         all += cell[n].mass;
         inside += cell[n].pose.x > 0.85 && cell[n].pose.y < 0.3 ? cell[n].mass : 0.0;
     }
     assert_near(all, 1.0, 1e-5);
     assert_near(inside, 0.0, 0.0);
-    destroy(g);
+    grid_destroy(g);
 }
 
 static void a_belief_with_no_room_left_starts_again_everywhere(void **state)
@@ -203,11 +203,11 @@ static void a_belief_with_no_room_left_starts_again_everywhere(void **state)
     p.settings.grid_teleport = 0.0;
     p.prior.sigma[0] = p.prior.sigma[1] = 0.01;
     p.prior.mean = (struct nav_pose){0.95, 0.15, 0.0};
-    struct grid *g = create(&p);
+    struct grid *g = grid_create(&p);
     struct nav_estimate out;
-    estimate(g, &out);
+    grid_estimate(g, &out);
     assert_true(out.confidence < 0.2 && isfinite(out.pose.x));
-    destroy(g);
+    grid_destroy(g);
 }
 
 static void an_arena_without_a_free_place_is_survived(void **state)
@@ -216,15 +216,15 @@ static void an_arena_without_a_free_place_is_survived(void **state)
     static const struct nav_box all = {0.0, 0.0, 1.0, 1.0};
     struct nav_problem p = room();
     p.arena.box = &all;
-    struct grid *g = create(&p);
+    struct grid *g = grid_create(&p);
     const double nothing[] = {0.0, 0.0}, distance = 0.1, weight[] = {1.0, 1.0};
     const double *reading[] = {nothing, &distance};
     struct nav_estimate out;
     for (int i = 0; i < 3; i++)
-        update(g, &(struct nav_evidence){reading, weight});
-    estimate(g, &out);
+        grid_update(g, &(struct nav_evidence){reading, weight});
+    grid_estimate(g, &out);
     assert_true(isfinite(out.pose.x) && out.covariance[0] > 0.05 && out.confidence <= 0.0);
-    destroy(g);
+    grid_destroy(g);
 }
 
 static void a_wall_felt_ahead_puts_the_robot_before_it(void **state)
@@ -233,16 +233,16 @@ static void a_wall_felt_ahead_puts_the_robot_before_it(void **state)
     struct nav_problem p = room();
     p.prior.mean = (struct nav_pose){0.7, 0.6, 0.0};
     p.prior.sigma[2] = 0.05;
-    struct grid *g = create(&p);
+    struct grid *g = grid_create(&p);
     const double nothing[] = {0.0, 0.0}, distance = 0.1, weight[] = {0.0, 1.0};
     const double *reading[] = {nothing, &distance};
-    update(g, &(struct nav_evidence){reading, weight});
+    grid_update(g, &(struct nav_evidence){reading, weight});
     struct nav_estimate out;
-    estimate(g, &out);
+    grid_estimate(g, &out);
     /* Base 0.05 ahead of the centre, contact 0.1 further on, wall at 1: x = 0.85. The prior pulls it a little back. */
     assert_near(out.pose.x, 0.85, 0.02);
     assert_near(out.pose.y, 0.6, 0.03);
-    destroy(g);
+    grid_destroy(g);
 }
 
 /* Two floor whiskers over one texture, of which the first says the other one in every second window. */
@@ -259,13 +259,13 @@ static void a_floor_whisker_that_lies_is_found_out_whichever_way_the_robot_faces
         p.robot.ray = &ray;
         p.prior.mean = (struct nav_pose){0.25, 0.25, nav_wrap((n + 0.5) * NAV_PI / 4.0)};
         p.prior.sigma[0] = p.prior.sigma[1] = p.prior.sigma[2] = 0.03;
-        struct grid *g = create(&p);
+        struct grid *g = grid_create(&p);
         for (int row = 0; row < 40; row++) {
             const double *reading[] = {row % 2 ? wrong : right, right, &nothing};
-            update(g, &(struct nav_evidence){reading, weight});
+            grid_update(g, &(struct nav_evidence){reading, weight});
         }
         assert_true(g->likelihood->trust[0].working < 0.1 && g->likelihood->trust[1].working > 0.9);
-        destroy(g);
+        grid_destroy(g);
     }
 }
 
@@ -300,7 +300,7 @@ static void a_cells_likelihood_is_the_mean_of_its_sub_poses_where_they_now_are(v
     p.robot.body_radius = 0.01; /* the table's half step of grace exceeds it: free is what is outside walls and box */
     p.settings.grid_sub = 3.0;
     p.settings.grid_sub_heading = 2.0;
-    struct grid *g = create(&p);
+    struct grid *g = grid_create(&p);
     const double texture[] = {0.0, -50.0}, distance = 0.1, weight[] = {1.0, 1.0};
     const double *reading[] = {texture, &distance};
     for (int s = 0; s < H; s++) {
@@ -309,7 +309,7 @@ static void a_cells_likelihood_is_the_mean_of_its_sub_poses_where_they_now_are(v
     }
     g->histogram.uniform = true;
     g->histogram.now.rotation = 0.3;
-    update(g, &(struct nav_evidence){reading, weight});
+    grid_update(g, &(struct nav_evidence){reading, weight});
     double all = 0.0, worst = 0.0;
     static double belief[CELLS];
     by_heading(g, belief);
@@ -324,7 +324,7 @@ static void a_cells_likelihood_is_the_mean_of_its_sub_poses_where_they_now_are(v
     }
     assert_true(all > 1.0);
     assert_near(worst, 0.0, 1e-7);
-    destroy(g);
+    grid_destroy(g);
 }
 
 int main(void)
