@@ -28,6 +28,7 @@ TOPICS = {  # topic -> module, by room
     "nav": "nav.bench",
     "nav_paper": "nav.paper",
     "nav_peers": "nav.peer_runs",
+    "nav_size": "nav.size",
     "nav_unseen": "nav.unseen",
     "node": "node.bench",
     "radial": "radial.bench",
