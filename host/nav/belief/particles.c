@@ -96,13 +96,12 @@ static float particles_gain(const struct nav_particles *p, struct nav_rng *rng)
     return nav_rng_bits(rng) >> 62 ? 0.0f : p->spread * (float)nav_rng_rough(rng);
 }
 
-/* Most particles hold with the model's noise, half of it, as the model's allows for errors that persist, or twice as
- * much; a few with much more, so that wheels that skid are followed until the weights have changed. */
+/* Half of the particles hold with the model's noise or half of it, as the model's allows for errors that persist; the
+ * others with more. */
 static float particles_noise(struct nav_rng *rng)
 {
-    static const float LEVELS[16] = {1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 0.5f,
-                                     0.5f, 0.5f, 0.5f, 2.0f, 2.0f, 2.0f, 2.0f, 5.0f};
-    return LEVELS[nav_rng_bits(rng) >> 60];
+    static const float LEVELS[] = {1.0f, 0.5f, 2.0f, 5.0f};
+    return LEVELS[nav_rng_bits(rng) >> 62];
 }
 
 void nav_particles_add(struct nav_particles *p, struct nav_pose pose, double weight, struct nav_rng *rng)
