@@ -38,7 +38,8 @@ struct nav_settings {
     double particle_recovery;      /* slow rate at which the mean weight is followed; 0: no recovery by injection */
     double particle_recovery_fast; /* fast rate */
     double adaptive_budget;        /* most cells and particles touched per row */
-    double adaptive_detail_budget; /* the same where small tiles ask for cells below adaptive.cell_m; in large arenas, at most */
+    double adaptive_detail_budget; /* the same where small tiles ask for cells below adaptive.cell_m; in large arenas,
+                                      at most */
     double adaptive_most;          /* particles, at most */
     double adaptive_least;         /* and at least; between, by the bins they occupy: */
     double adaptive_per_bin;       /* so many in each */

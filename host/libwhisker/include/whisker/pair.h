@@ -18,8 +18,8 @@
 
 #include "whisker/frame.h"
 
-/* Frames of one bridge that wait for the other's: twice what whisker_device_start queues, for a process that stood still
- * gets all that is queued of one bridge, and what came meanwhile, before the first of the other. */
+/* Frames of one bridge that wait for the other's: twice what whisker_device_start queues, for a process that stood
+ * still gets all that is queued of one bridge, and what came meanwhile, before the first of the other. */
 #define WHISKER_PAIR_HELD 512
 /* Cycles: with a shorter tick period the start-of-frame number, of 125 us, does not tell ticks apart. */
 #define WHISKER_PAIR_PERIOD_MIN 22500
