@@ -18,7 +18,7 @@ module control_registers #(
     input  wire             write_valid,   // write_data is a byte of the report
     input  wire [5:0]       write_index,   // its place; 0 begins a new report
     input  wire [7:0]       write_data,    // the byte
-    input  wire             write_done,    // the report is complete: accept it or refuse it in this cycle
+    input  wire             write_done,    // the report is complete since a cycle at least: accept or refuse it now
     output wire             write_accept,  // it is acceptable; settings change with write_done
     input  wire             stopping,      // a stop is not finished
     output reg              start,         // begin a run: one cycle
@@ -50,15 +50,19 @@ module control_registers #(
              && (incoming[8*REPORT_CONTROL_ID +: 8] == REPORT_ID_CONTROL[7:0])
              && (incoming[8*REPORT_CONTROL_WIRE_VERSION +: 8] == WIRE_VERSION[7:0])
              && (incoming[RESERVED +: RESERVED_BITS] == {RESERVED_BITS{1'b0}});
-    wire run_right     = (new_run <= 8'd1) && !(new_run[0] && stopping);
     wire divider_right = (new_divider >= LIMIT_SCK_DIVIDER_MIN[7:0]) && (new_divider <= LIMIT_SCK_DIVIDER_MAX[7:0])
                       && !new_divider[0];
     wire sample_right  = (new_sample != 8'd0) && (new_sample <= new_divider);
     wire mask_right    = (new_mask >> LIMIT_LANES == 32'd0);
     wire period_right  = (new_period >= LIMIT_TICK_PERIOD_MIN);
 
-    assign write_accept = ours && run_right && divider_right && (new_gap >= LIMIT_WORD_GAP_MIN[7:0])
-                       && sample_right && mask_right && period_right;
+    reg  in_limits;  // a cycle ago: the limits and the answer to the report together are too long a way for one cycle
+
+    always @(posedge clk)
+        in_limits <= ours && (new_run <= 8'd1) && divider_right && (new_gap >= LIMIT_WORD_GAP_MIN[7:0])
+                  && sample_right && mask_right && period_right;
+
+    assign write_accept = in_limits && !(new_run[0] && stopping);
     wire apply = write_done && write_accept;
 
     always @(posedge clk)

@@ -74,6 +74,7 @@ class Host:
                 await RisingEdge(self.dut.clk)
             self.usb.write_index.value, self.usb.write_data.value = i, byte
             await pulse(self.dut, self.usb.write_valid)
+        await RisingEdge(self.dut.clk)
         self.usb.write_done.value = 1
         await FallingEdge(self.dut.clk)
         accepted = bool(self.usb.write_accept.value)

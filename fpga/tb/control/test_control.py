@@ -81,7 +81,8 @@ async def write(dut, data: bytes, gap: float = 0.3) -> None:
 
 
 async def finish(dut) -> tuple[bool, int, int]:
-    """The end of the report: was it accepted, and did it start or stop a run."""
+    """The end of the report, a cycle after its last byte: was it accepted, and did it start or stop a run."""
+    await RisingEdge(dut.clk)
     dut.write_done.value = 1
     await FallingEdge(dut.clk)
     accepted = bool(dut.write_accept.value)
