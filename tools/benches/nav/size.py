@@ -103,7 +103,7 @@ def chart(data: dict) -> Figure:
         ax.plot(sides, [r[key] for r in data["sides"].values()], "*-", color="C3")
         if wanted:
             ax.axhline(wanted, color="0.6", linestyle=":")
-        ax.set(xscale="log", yscale="log", xlabel="side of the arena, m", title=title)
+        ax.set(xscale="log", ylim=(0, None), xlabel="side of the arena, m", title=title)
         ax.set_xticks(sides, [f"{side:g}" for side in sides], minor=False)
         ax.minorticks_off()
     return figure
