@@ -23,6 +23,7 @@ from whisker.nav.filters import COMPONENT, Filter, Sensor, prior_fault
 from whisker.nav.weigher import Weigher
 from whisker.simulation.world import SIM
 from whisker.touch.contact import Contact
+from whisker.touch.contact_filter import ContactFilter
 from whisker.touch.radial.model import RadialModel, peak
 from whisker.touch.radial.shape import Contact as Whisk
 from whisker.touch.radial.shape import shape_of
@@ -90,6 +91,7 @@ BUMPS = np.zeros(2, COMPONENT)
 BUMPS["pose"], BUMPS["sigma_m"], BUMPS["sigma_rad"], BUMPS["mass"] = (0.5, 0.5, 0.0), 0.1, 0.1, 0.5
 PLAIN = TextureModel.train({"A": [NOISE], "B": [3.0 * NOISE]})
 WHISK = {"t_s": np.arange(64.0), "samples": NOISE[:64], "whisk_rad_s": np.ones(64), "told_rad_s": np.ones(64)}
+PUSH = {"bases": np.zeros((8, 3)), "tilts": np.zeros((8, 2)), "good": np.ones(8, bool)}
 BLOCK = {"ticks": np.arange(8), "samples": NOISE[:8], "good": np.ones(8, bool)}
 
 CASES = {
@@ -113,6 +115,9 @@ CASES = {
     "nav.weigher.Weigher.weigh": of_one(Weigher(SCENE).weigh, "poses", np.zeros((4, 3)), 1),
     "touch.contact.Contact.block": Case(
         lambda **block: Contact().block(*block.values()), BLOCK, {"ticks": (0,), "samples": (0, 1), "good": (0,)}
+    ),
+    "touch.contact_filter.ContactFilter.run": Case(
+        lambda **push: ContactFilter().run(*push.values()), PUSH, {"bases": (0, 1), "tilts": (0, 1), "good": (0,)}
     ),
     "touch.radial.model.peak": Case(
         lambda **given: peak(*given.values()), {"samples": NOISE, "rest": np.zeros(2)}, {"samples": (1,), "rest": (0,)}
