@@ -117,7 +117,10 @@ async def watch_pins(dut, cycle_ps: int, wrong: list[str]) -> None:
     since = {}
     while True:
         changed = await First(*(ValueChange(pin) for pin in (dut.flash_cs_n, dut.flash_sck, dut.flash_mosi)))
-        pin, now = changed.signal._name, get_sim_time("ps") / cycle_ps
+        pin, now = (
+            changed.signal._name,
+            round(2 * get_sim_time("ps") / cycle_ps) / 2,
+        )  # pins change with an edge of the clock
         before, since[pin] = since.get((pin, int(changed.signal.value)), now - 100), now
         since[pin, int(changed.signal.value)] = now
         if pin == "flash_sck" and int(dut.flash_sck.value):
