@@ -102,7 +102,7 @@ int device_send_flash(struct whisker_device *device, const uint8_t *report)
     return chip.gone ? WHISKER_ERROR_DEVICE_GONE : WHISKER_OK;
 }
 
-/* A bitstream: text, preamble, and what nobody else has. */
+/* A bitstream: text, preamble, and bytes drawn for it alone. */
 static void make_image(uint8_t *file, uint32_t bytes, uint16_t gateware, uint8_t seed)
 {
     static const uint8_t PREAMBLE[] = {0xFF, 0xFF, 0xBD, 0xB3};
@@ -271,7 +271,7 @@ static void what_cannot_take_an_image_is_left_untouched(void **state)
     check_refused(WHISKER_ERROR_GATEWARE_FALLBACK);
     memset(chip.flash + SIZE - 256, 0xFF, 256);
     check_refused(WHISKER_ERROR_GATEWARE_FALLBACK);
-    chip.flash[SIZE - 256 + 16 + 10] ^= 2; /* leads elsewhere */
+    chip.flash[SIZE - 256 + 16 + 10] ^= 2; /* another jump address */
     check_refused(WHISKER_ERROR_GATEWARE_FALLBACK);
 }
 

@@ -206,7 +206,7 @@ static void a_border_is_reported_at_once_and_what_lies_before_it_is_left_out(voi
     nav_texture_classifier_free(m.classifier);
 }
 
-/* What lies before samples that an edge caught, or nobody can read, is not compared with what follows. */
+/* Samples that an edge caught, or that are not readable, are a limit: blocks before and after are not compared. */
 static void an_edge_interrupts_the_row_of_blocks(void **state)
 {
     (void)state;
@@ -362,7 +362,7 @@ static void a_surface_never_trained_is_unknown_in_windows_of_any_length(void **s
                     d.confidence > 0.0);
         assert_true(loglik[0] > -1.0); /* weak for any class */
         assert_true(mode < 2 || d.samples < 2 * WINDOW);
-        drive(s, NAN, 2 * WINDOW, &d, loglik); /* what nobody can read ends the row */
+        drive(s, NAN, 2 * WINDOW, &d, loglik); /* unreadable samples end the row */
         assert_true(d.novelty == 0.0);
         drive(s, 1.0, 2 * WINDOW, &d, loglik);
         assert_true(d.label == 0 && d.novelty < 0.05);

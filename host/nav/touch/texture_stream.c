@@ -323,8 +323,8 @@ static bool decide(struct nav_texture_stream *s, struct nav_texture_decision *d,
     return s->rules.step == 0 || fmax(d->confidence, s->novel) >= s->rules.sure;
 }
 
-/* How many samples lie behind a change of surface that this sample shows; 0 without. What an edge holds, or nobody can
- * read, interrupts the row of blocks. */
+/* How many samples lie behind a change of surface that this sample shows; 0 without. Samples that an edge holds, and
+ * samples that are not readable, interrupt the row of blocks. */
 static int behind_change(struct nav_texture_stream *s, const double *sample)
 {
     int length = block_length(s), channels = s->rules.channels, after;

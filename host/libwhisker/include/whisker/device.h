@@ -64,7 +64,7 @@ struct whisker_timing {
 
 /* The bridge's own counts: ticks, frames and dropped since its start, records since power came. The bridge has 32 bits
  * of each, which wrap; here they go on, if they are asked for at least once in the time of a wrap: 21 hours of 28 lanes
- * at 2 kHz. What had wrapped before the bridge was opened nobody knows. */
+ * at 2 kHz. Wraps before the bridge was opened are not counted. */
 struct whisker_counters {
     uint8_t running;
     uint64_t ticks;
