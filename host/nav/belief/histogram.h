@@ -129,7 +129,7 @@ void nav_histogram_stop(struct nav_histogram *);
 double nav_histogram_debt(const struct nav_histogram *);
 
 /* Variance that a drive adds to positions because headings differ within a slice (uniform: width^2 / 12), m^2 per axis.
- * `along_m`: as nav_settings' motion_along_m. */
+ * `along_m`: as nav_motion_settings has it. */
 double nav_histogram_fan(const struct nav_histogram *, struct nav_pose step, double along_m);
 
 /* Heading of a slice, rad, not wrapped, and its shift, m: while a pass is under way, those after it. */

@@ -63,7 +63,7 @@ static void destroy(void *self)
 /* Log-odds that the robot is not where the local belief has it. */
 static double odds(const struct adaptive *a)
 {
-    double hazard = log(a->problem->settings.adaptive_hazard);
+    double hazard = log(a->problem->settings.adaptive.hazard);
     if (!a->local)
         return INFINITY;
     if (a->awake && !a->whole && adaptive_global_current(&a->global, &a->log))
@@ -103,7 +103,7 @@ static bool adaptive_begin_cloud(struct adaptive *a)
 /* A mixture that a cloud can hold: in doubt from the start, by the share that it may be wrong. A wider one: unknown. */
 static void begin_mixture(struct adaptive *a)
 {
-    bool few = adaptive_global_fill(&a->global) * a->problem->settings.adaptive_per_bin <= a->global.room;
+    bool few = adaptive_global_fill(&a->global) * a->problem->settings.adaptive.per_bin <= a->global.room;
     a->local = few && adaptive_begin_cloud(a);
     if (a->local)
         adaptive_global_restart(&a->global, 0);
@@ -129,13 +129,13 @@ static int adaptive_init_cloud(struct adaptive *a)
 {
     const struct nav_settings *s = &a->problem->settings;
     struct adaptive_cloud *cloud = &a->cloud;
-    cloud->sample.error = 0.5 / s->adaptive_per_bin; /* many bins: twice the error by the bins, less 1 (Fox) */
+    cloud->sample.error = 0.5 / s->adaptive.per_bin; /* many bins: twice the error by the bins, less 1 (Fox) */
     cloud->sample.most = (long)a->global.room;
-    cloud->sample.least = (long)fmin(s->adaptive_least, a->global.room);
+    cloud->sample.least = (long)fmin(s->adaptive.least, a->global.room);
     nav_rng_seed(&cloud->rng, a->problem->seed, 0);
-    return nav_particles_init(&cloud->set, cloud->sample.most, true, s->adaptive_gain) ||
-                   nav_bins_init(&cloud->bins, cloud->sample.most, s->adaptive_bin_m,
-                                 s->adaptive_bin_deg * NAV_PI / 180.0)
+    return nav_particles_init(&cloud->set, cloud->sample.most, true, s->adaptive.gain) ||
+                   nav_bins_init(&cloud->bins, cloud->sample.most, s->adaptive.bin_m,
+                                 s->adaptive.bin_deg * NAV_PI / 180.0)
                ? -1
                : 0;
 }
@@ -166,7 +166,7 @@ static void wake(struct adaptive *a)
     a->modes = a->whole ? a->modes : 0;
     a->whole = false;
     adaptive_doubt_teach(&a->doubt, a->likelihood, a->global.likelihood);
-    a->odds = log(a->problem->settings.adaptive_hazard);
+    a->odds = log(a->problem->settings.adaptive.hazard);
     adaptive_global_restart(&a->global, a->doubt.since > reach ? a->doubt.since : reach);
 }
 
@@ -201,7 +201,7 @@ static void adaptive_resample(struct adaptive *a, bool force)
 static void take_over(struct adaptive *a, double share)
 {
     const struct nav_settings *s = &a->problem->settings;
-    double count = fmin(fmax(s->adaptive_least, a->global.crowd * s->adaptive_per_bin), a->global.room / 2.0);
+    double count = fmin(fmax(s->adaptive.least, a->global.crowd * s->adaptive.per_bin), a->global.room / 2.0);
     struct nav_particles *set = &a->cloud.set;
     long held = a->local ? set->count : 0;
     set->count = held;
@@ -263,7 +263,7 @@ static void arbitrate(struct adaptive *a)
         keep_shares(a);
         if (most > ONE_MODE)
             sleep(a);
-    } else if (a->global.scattered < a->problem->settings.adaptive_scattered) {
+    } else if (a->global.scattered < a->problem->settings.adaptive.scattered) {
         a->local = false;
         take_over(a, 1.0);
     } else {
@@ -276,7 +276,7 @@ static void decide(struct adaptive *a)
     const struct nav_settings *s = &a->problem->settings;
     double present = odds(a);
     if (!a->awake) {
-        if (present > log(s->adaptive_wake))
+        if (present > log(s->adaptive.wake))
             wake(a);
         return;
     }
@@ -290,11 +290,11 @@ static void decide(struct adaptive *a)
         arbitrate(a);
         return;
     }
-    if (a->global.scattered < s->adaptive_scattered && present > log(s->adaptive_wake))
+    if (a->global.scattered < s->adaptive.scattered && present > log(s->adaptive.wake))
         take_over(a, elsewhere(a));
-    else if (a->doubt.ratio <= 0.0 && present <= log(s->adaptive_wake))
+    else if (a->doubt.ratio <= 0.0 && present <= log(s->adaptive.wake))
         stay(a);
-    else if (present > -log(s->adaptive_wake))
+    else if (present > -log(s->adaptive.wake))
         a->local = false;
 }
 

@@ -56,7 +56,7 @@ static void global_read_row(struct adaptive_global *g, struct adaptive_log *log,
 /* Adds one row's motion, and the noise that it and the width of slices bring. */
 static void global_move_row(struct adaptive_global *g, const struct adaptive_entry *entry)
 {
-    double along_m = g->problem->settings.motion_along_m;
+    double along_m = g->problem->settings.motion.along_m;
     g->job.step = nav_compose(g->job.step, entry->step);
     g->histogram.owed_position += entry->noise.position + nav_histogram_fan(&g->histogram, entry->step, along_m);
     g->histogram.owed_heading += entry->noise.heading;
@@ -242,7 +242,7 @@ static void global_passed(struct adaptive_global *g)
     g->job.phase = ADAPTIVE_COUNT;
     if (h->level > 0 && h->total > 0.0 && 8 * h->cells <= REFINED_MOST && nav_histogram_refine(h)) {
         g->touched += h->cells;
-    } else if (h->level == 0 && (double)h->heaviest >= g->problem->settings.adaptive_per_bin * worth) {
+    } else if (h->level == 0 && (double)h->heaviest >= g->problem->settings.adaptive.per_bin * worth) {
         return;
     }
     global_end(g);
@@ -418,10 +418,10 @@ static int global_levels(struct adaptive_global *g, struct nav_levels *levels, d
     struct nav_detail finest = nav_sensors_detail(&sensors);
     nav_sensors_free(&sensors);
     *detail = finest.detail;
-    double degrees = s->adaptive_cell_deg, tip = fmax(finest.lever, NAV_NEAR_M / 10.0);
-    bool fine = finest.detail / 2.0 < s->adaptive_cell_m;
-    g->wanted = fmin(s->adaptive_cell_m, finest.detail / 2.0);
-    g->budget = fine ? fmax(s->adaptive_budget, s->adaptive_detail_budget) : s->adaptive_budget;
+    double degrees = s->adaptive.cell_deg, tip = fmax(finest.lever, NAV_NEAR_M / 10.0);
+    bool fine = finest.detail / 2.0 < s->adaptive.cell_m;
+    g->wanted = fmin(s->adaptive.cell_m, finest.detail / 2.0);
+    g->budget = fine ? fmax(s->adaptive.budget, s->adaptive.detail_budget) : s->adaptive.budget;
     if (fine)
         degrees = fmin(degrees, TURN_SHARE * g->wanted / tip * 180.0 / NAV_PI);
     *levels = (struct nav_levels){problem->arena.size_x, problem->arena.size_y, g->wanted, 0, 0};
@@ -436,7 +436,7 @@ static int global_levels(struct adaptive_global *g, struct nav_levels *levels, d
 static int global_first_level(const struct adaptive_global *g, const struct nav_levels *levels, double detail)
 {
     enum { LEVELS = 16 };
-    double few = g->problem->settings.adaptive_rows * g->budget;
+    double few = g->problem->settings.adaptive.rows * g->budget;
     for (int level = 0; level < LEVELS; level++) {
         struct nav_shape shape = nav_levels_shape(levels, level);
         double cells = nav_shape_inside(&shape);
@@ -451,7 +451,7 @@ static double global_budget(const struct adaptive_global *g, const struct nav_le
 {
     const struct nav_settings *s = &g->problem->settings;
     struct nav_shape shape = nav_levels_shape(levels, g->first.level);
-    return fmax(g->budget, fmin(nav_shape_inside(&shape) / s->adaptive_rows, s->adaptive_detail_budget));
+    return fmax(g->budget, fmin(nav_shape_inside(&shape) / s->adaptive.rows, s->adaptive.detail_budget));
 }
 
 static int global_tables(struct adaptive_global *g)
@@ -476,7 +476,7 @@ static int global_tables(struct adaptive_global *g)
 /* Most hypotheses: adaptive.most, and a tenth of the budget, since each may be touched up to five times per row. */
 static double global_room(const struct nav_settings *s)
 {
-    return floor(fmax(fmin(s->adaptive_most, s->adaptive_budget / 10.0), 16.0));
+    return floor(fmax(fmin(s->adaptive.most, s->adaptive.budget / 10.0), 16.0));
 }
 
 int adaptive_global_init(struct adaptive_global *g, const struct nav_problem *problem)

@@ -38,9 +38,9 @@ static void *create(const struct nav_problem *problem)
         return NULL;
     f->problem = problem;
     f->belief = nav_gaussian_prior(problem);
-    f->cells = (int)settings->foveal_cells;
-    f->spacing = settings->foveal_diameter_m / (f->cells - 1);
-    f->spacing_theta = settings->foveal_span_deg * NAV_PI / 180.0 / (f->cells - 1);
+    f->cells = (int)settings->foveal.cells;
+    f->spacing = settings->foveal.diameter_m / (f->cells - 1);
+    f->spacing_theta = settings->foveal.span_deg * NAV_PI / 180.0 / (f->cells - 1);
     f->weight = calloc(points(f), sizeof *f->weight);
     f->likelihood = nav_likelihood_new(&problem->arena, &problem->robot, settings, f->spacing / sqrt(12.0));
     if (!f->likelihood || !f->weight) {
@@ -128,9 +128,9 @@ static void inflate(const struct foveal *f, struct nav_gaussian *g)
 /* Adds the quantisation term. */
 static void add_quantum(const struct nav_settings *settings, struct nav_gaussian *g)
 {
-    double quantum_rad = settings->foveal_quantum_deg * NAV_PI / 180.0;
-    g->covariance[0] += settings->foveal_quantum_m * settings->foveal_quantum_m;
-    g->covariance[4] += settings->foveal_quantum_m * settings->foveal_quantum_m;
+    double quantum_rad = settings->foveal.quantum_deg * NAV_PI / 180.0;
+    g->covariance[0] += settings->foveal.quantum_m * settings->foveal.quantum_m;
+    g->covariance[4] += settings->foveal.quantum_m * settings->foveal.quantum_m;
     g->covariance[8] += quantum_rad * quantum_rad;
 }
 
@@ -143,11 +143,11 @@ static void fit(struct foveal *f, long mode)
     for (size_t p = 0; p < points(f); p++) {
         struct nav_pose pose = point(f, p);
         double d[3] = {pose.x - fitted.mean.x, pose.y - fitted.mean.y, nav_wrap(pose.theta - fitted.mean.theta)};
-        double weight = settings->foveal_printed > 0.0 ? 1.0 : f->weight[p];
+        double weight = settings->foveal.printed > 0.0 ? 1.0 : f->weight[p];
         for (int a = 0; a < 9; a++)
             fitted.covariance[a] += weight * d[a / 3] * d[a % 3];
     }
-    if (settings->foveal_inflate > 0.0)
+    if (settings->foveal.inflate > 0.0)
         inflate(f, &fitted);
     add_quantum(settings, &fitted);
     fitted.mean.theta = nav_wrap(fitted.mean.theta);

@@ -139,7 +139,7 @@ static bool grid_make_tables(struct grid *g)
     const struct nav_problem *problem = g->problem;
     const struct nav_settings *s = &problem->settings;
     const struct nav_shape *shape = &g->histogram.shape;
-    int sub = (int)s->grid_sub, turns = (int)s->grid_sub_heading;
+    int sub = (int)s->grid.sub, turns = (int)s->grid.sub_heading;
     /* A look-up stands for poses within half a step and half a turn: that spreads the distances it should give. */
     double blur = hypot(shape->cell / sub, 0.2 * shape->cell_theta / turns) / sqrt(12.0);
     g->likelihood = nav_likelihood_new(&problem->arena, &problem->robot, s, blur);
@@ -159,8 +159,8 @@ static void *grid_create(const struct nav_problem *problem)
     nav_calibration_init(&g->calibration);
     const struct nav_levels levels = {.size_x = problem->arena.size_x,
                                       .size_y = problem->arena.size_y,
-                                      .cell = s->grid_cell_m,
-                                      .headings = (int)fmax(round(360.0 / s->grid_cell_deg), 1.0)};
+                                      .cell = s->grid.cell_m,
+                                      .headings = (int)fmax(round(360.0 / s->grid.cell_deg), 1.0)};
     if (nav_histogram_init(&g->histogram, &levels, 0, 0) || !grid_make_tables(g)) {
         grid_destroy(g);
         return NULL;
@@ -174,7 +174,7 @@ static void grid_estimate(const void *self, struct nav_estimate *out);
 /* The motion as the odometry's learned errors correct it. What is learned comes from the rows before. */
 static struct nav_motion grid_calibrated(struct grid *g, const struct nav_motion *motion)
 {
-    if (g->problem->settings.motion_calibrate < 0.5)
+    if (g->problem->settings.motion.calibrate < 0.5)
         return *motion;
     struct nav_estimate now;
     grid_estimate(g, &now);
@@ -188,7 +188,7 @@ static void grid_predict(void *self, const struct nav_motion *told)
     struct grid *g = self;
     struct nav_motion motion = grid_calibrated(g, told);
     struct nav_noise noise = nav_motion_noise(&g->problem->robot, &g->problem->settings, &motion);
-    noise.position += nav_histogram_fan(&g->histogram, motion.step, g->problem->settings.motion_along_m);
+    noise.position += nav_histogram_fan(&g->histogram, motion.step, g->problem->settings.motion.along_m);
     nav_pending_add(&g->pending, motion.step, noise);
 }
 
@@ -205,7 +205,7 @@ static void grid_update(void *self, const struct nav_evidence *evidence)
     nav_expected_scale(g->expected);
     nav_trust_begin(g->likelihood);
     bool sure = g->confidence >= SURE; /* fairly: it judges the row's readings */
-    if (!grid_reweigh(g, step, g->problem->settings.grid_teleport / nav_shape_inside(&g->histogram.shape)))
+    if (!grid_reweigh(g, step, g->problem->settings.grid.teleport / nav_shape_inside(&g->histogram.shape)))
         grid_forget(g);
     if (sure)
         nav_trust_learn(g->likelihood);

@@ -90,7 +90,7 @@ static double pose_sigma(const struct nav_kalman *k)
 static void take_radial(struct nav_kalman *k, int r, double distance, double weight)
 {
     const struct nav_robot *robot = &k->problem->robot;
-    double length = robot->ray[r].length, edge = k->problem->settings.radial_edge_m;
+    double length = robot->ray[r].length, edge = k->problem->settings.radial.edge_m;
     bool contact = isfinite(distance);
     double sigma = contact ? robot->radial_sigma : hypot(robot->radial_sigma, edge);
     struct nav_sighting s = {.ray = r,

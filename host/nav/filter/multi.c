@@ -88,8 +88,8 @@ static void *create(const struct nav_problem *problem)
     if (!m)
         return NULL;
     m->problem = problem;
-    m->points = (int)problem->settings.multi_points / 2 * 2;
-    m->modes.room = m->spare.room = (int)problem->settings.multi_modes;
+    m->points = (int)problem->settings.multi.points / 2 * 2;
+    m->modes.room = m->spare.room = (int)problem->settings.multi.modes;
     size_t points = (size_t)m->points, room = (size_t)m->modes.room;
     m->modes.at = calloc(room, sizeof *m->modes.at);
     m->spare.at = calloc(room, sizeof *m->spare.at);
@@ -166,7 +166,7 @@ static void add(struct multi *m, struct nav_pose from, double weight)
     if (m->spare.count == m->spare.room)
         return;
     const struct multi_points points = {m->offset, m->weight, m->points};
-    double quantum = m->problem->settings.multi_quantum_m;
+    double quantum = m->problem->settings.multi.quantum_m;
     struct multi_mode mode = {multi_fit(from, &points), weight};
     mode.belief.covariance[0] += quantum * quantum;
     mode.belief.covariance[4] += quantum * quantum;
@@ -189,7 +189,7 @@ static double scale(double *weight, int count)
 static void refit(struct multi *m, struct nav_pose from, double weight)
 {
     const struct multi_points points = {m->offset, m->weight, m->points};
-    if (!multi_split(&points, m->problem->settings.multi_split, m->half)) {
+    if (!multi_split(&points, m->problem->settings.multi.split, m->half)) {
         add(m, from, weight);
         return;
     }
@@ -228,8 +228,8 @@ static void update(void *self, const struct nav_evidence *row)
     struct multi_modes old = m->modes;
     m->modes = m->spare;
     m->spare = old;
-    multi_prune(&m->modes, s->multi_prune);
-    multi_merge(&m->modes, s->multi_merge);
+    multi_prune(&m->modes, s->multi.prune);
+    multi_merge(&m->modes, s->multi.merge);
 }
 
 static const struct multi_mode *heaviest(const struct multi *m)

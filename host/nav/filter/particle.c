@@ -56,13 +56,13 @@ static void *create(const struct nav_problem *problem)
     if (!f)
         return NULL;
     *f = (struct particle){.problem = problem, .slow = -1.0, .fast = -1.0};
-    f->sample.error = s->particle_error;
-    f->sample.most = (long)fmax(s->particle_count > 0.0 ? s->particle_count : s->particle_most, 2.0);
-    f->sample.least = s->particle_count > 0.0 ? f->sample.most : (long)fmin(s->particle_least, s->particle_most);
+    f->sample.error = s->particle.error;
+    f->sample.most = (long)fmax(s->particle.count > 0.0 ? s->particle.count : s->particle.most, 2.0);
+    f->sample.least = s->particle.count > 0.0 ? f->sample.most : (long)fmin(s->particle.least, s->particle.most);
     nav_rng_seed(&f->rng, problem->seed, 0);
     f->likelihood = nav_likelihood_new(&problem->arena, &problem->robot, s, 0.0);
     if (!f->likelihood || nav_particles_init(&f->cloud, f->sample.most, false, 0.0) ||
-        nav_bins_init(&f->bins, f->sample.most, s->particle_bin_m, s->particle_bin_deg * NAV_PI / 180.0)) {
+        nav_bins_init(&f->bins, f->sample.most, s->particle.bin_m, s->particle.bin_deg * NAV_PI / 180.0)) {
         destroy(f);
         return NULL;
     }
@@ -97,12 +97,12 @@ static void predict(void *self, const struct nav_motion *motion)
 static double decline(struct particle *f, double mean_weight)
 {
     const struct nav_settings *s = &f->problem->settings;
-    if (!(s->particle_recovery > 0.0))
+    if (!(s->particle.recovery > 0.0))
         return 0.0;
     if (f->slow < 0.0)
         f->slow = f->fast = mean_weight;
-    f->slow += s->particle_recovery * (mean_weight - f->slow);
-    f->fast += s->particle_recovery_fast * (mean_weight - f->fast);
+    f->slow += s->particle.recovery * (mean_weight - f->slow);
+    f->fast += s->particle.recovery_fast * (mean_weight - f->fast);
     double share = f->slow > 0.0 ? 1.0 - MARGIN * f->fast / f->slow : 0.0;
     return fmin(fmax(share, 0.0), FRESH_MOST);
 }
@@ -144,7 +144,7 @@ static void update(void *self, const struct nav_evidence *evidence)
     f->weighed = f->cloud.count;
     double mean = exp(nav_particles_weigh(&f->cloud, f->likelihood, -1.0) - f->likelihood->ceiling);
     double fresh = decline(f, mean);
-    bool uneven = nav_particles_effective(&f->cloud) < s->particle_resample * (double)f->cloud.count;
+    bool uneven = nav_particles_effective(&f->cloud) < s->particle.resample * (double)f->cloud.count;
     summarise(f);
     if (uneven || fresh > 0.0)
         resample(f, fresh);

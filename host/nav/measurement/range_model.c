@@ -15,7 +15,7 @@ static const double FAR = 7.0; /* erfc(7) < 1e-22 */
  */
 static double range_noticed(const struct nav_model *model, double distance)
 {
-    double beyond = (distance - model->length) / (model->edge * sqrt(2.0)), most = 1.0 - model->settings->radial_miss;
+    double beyond = (distance - model->length) / (model->edge * sqrt(2.0)), most = 1.0 - model->settings->radial.miss;
     if (beyond < -FAR)
         return most;
     return beyond > FAR ? 0.0 : most * 0.5 * erfc(beyond);
@@ -49,9 +49,9 @@ static int range_init(struct nav_model *model, const struct nav_arena *arena, co
     model->c = cos(ray->yaw);
     model->s = sin(ray->yaw);
     model->length = ray->length;
-    model->spacing = model->settings->radial_spacing_m;
+    model->spacing = model->settings->radial.spacing_m;
     model->sigma = hypot(robot->radial_sigma, blur_m);
-    model->edge = hypot(model->settings->radial_edge_m, blur_m);
+    model->edge = hypot(model->settings->radial.edge_m, blur_m);
     double reach = model->length + 3.0 * model->edge;
     model->step = fmax(fmax(FINEST_STEP_M, model->sigma / 4.0), reach / (NAV_CODES_MOST - 3));
     model->codes = (int)ceil(reach / model->step) + 2;
@@ -122,7 +122,7 @@ static void range_expect(const struct nav_model *model, int count, const struct 
 
 static void range_fill(struct nav_model *model, const double *reading, double *ratio)
 {
-    double ghost = model->settings->radial_ghost;
+    double ghost = model->settings->radial.ghost;
     for (int k = 0; k <= range_nothing(model); k++) {
         double hit = model->noticed[k];
         double p = (1.0 - hit) * (1.0 - ghost);

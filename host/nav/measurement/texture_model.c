@@ -18,7 +18,7 @@ static const double GAP_STEP = 0.05; /* of the running median's logarithm, per w
 /* The gap at which a softmax gives its best class the share that makes the whole model `accuracy` sure. */
 static double texture_wanted_gap(const struct nav_model *model)
 {
-    double classes = model->values, outlier = model->settings->texture_outlier;
+    double classes = model->values, outlier = model->settings->texture.outlier;
     double sure = (model->accuracy - outlier / classes) / fmax(1.0 - outlier, 1e-6), chance = 1.0 / classes;
     sure = chance + (1.0 - chance) * fmin(fmax((sure - chance) / (1.0 - chance), SURE_LEAST), SURE_MOST);
     return log((classes - 1.0) * sure / (1.0 - sure));
@@ -38,9 +38,9 @@ static int texture_init(struct nav_model *model, const struct nav_arena *arena, 
     model->x = robot->tip[model->index].x;
     model->y = robot->tip[model->index].y;
     model->detail = arena->classes > 1 ? arena->tile : (double)INFINITY;
-    model->spacing = fmin(model->settings->texture_spacing_m, FRESH * model->detail);
+    model->spacing = fmin(model->settings->texture.spacing_m, FRESH * model->detail);
     model->accuracy = ASSUMED_ACCURACY;
-    model->temper = model->settings->texture_temper;
+    model->temper = model->settings->texture.temper;
     return 0;
 }
 
@@ -111,7 +111,7 @@ static double texture_gap(const double *reading, int classes)
 /* Notes a window's spread and sets the temper for it. A fixed temper (setting above 0) stays as it is. */
 static void texture_watch(struct nav_model *model, const double *reading)
 {
-    if (model->settings->texture_temper > 0.0 || model->values < 2)
+    if (model->settings->texture.temper > 0.0 || model->values < 2)
         return;
     double gap = texture_gap(reading, model->values);
     if (gap > GAP_LEAST && model->gap <= 0.0)
@@ -124,7 +124,7 @@ static void texture_watch(struct nav_model *model, const double *reading)
 static void texture_fill(struct nav_model *model, const double *reading, double *ratio)
 {
     texture_watch(model, reading);
-    double temper = model->temper, outlier = model->settings->texture_outlier;
+    double temper = model->temper, outlier = model->settings->texture.outlier;
     double best = reading[0], total = 0.0;
     for (int k = 1; k < model->values; k++)
         best = fmax(best, reading[k]);

@@ -74,7 +74,7 @@ static void learn_accuracy(struct nav_likelihood *l, int w)
 
 void nav_trust_learn(struct nav_likelihood *l)
 {
-    if (l->whiskers == 0 || l->model[0].settings->trust_learn < 0.5)
+    if (l->whiskers == 0 || l->model[0].settings->trust.learn < 0.5)
         return;
     double together = 0.0;
     for (int w = 0; w < l->whiskers; w++)

@@ -7,10 +7,10 @@ struct nav_noise nav_motion_noise(const struct nav_robot *robot, const struct na
 {
     double distance = hypot(motion->step.x, motion->step.y), turn = fabs(motion->step.theta);
     double relative = robot->odometry_relative * robot->odometry_relative;
-    double drift = settings->motion_drift_rad * settings->motion_drift_rad;
+    double drift = settings->motion.drift_rad * settings->motion.drift_rad;
     struct nav_noise noise = {
-        .position = relative * distance * fmax(distance, settings->motion_along_m),
-        .heading = relative * turn * fmax(turn, settings->motion_turn_rad) + drift * distance,
+        .position = relative * distance * fmax(distance, settings->motion.along_m),
+        .heading = relative * turn * fmax(turn, settings->motion.turn_rad) + drift * distance,
     };
     noise.position += motion->unknown_m * motion->unknown_m;
     noise.heading += motion->unknown_rad * motion->unknown_rad;

@@ -11,7 +11,7 @@ struct entry {
 
 #define ENTRY(section, key, standard, low, high)                                                                       \
     {                                                                                                                  \
-#section "." #key, offsetof(struct nav_settings, section##_##key), standard, low, high                         \
+#section "." #key, offsetof(struct nav_settings, section.key), standard, low, high                             \
     }
 
 static const struct entry ENTRIES[] = {
@@ -72,7 +72,7 @@ static const struct entry ENTRIES[] = {
 
 #define COUNT ((int)(sizeof ENTRIES / sizeof ENTRIES[0]))
 
-static double *field(struct nav_settings *settings, const struct entry *entry)
+static double *settings_field(struct nav_settings *settings, const struct entry *entry)
 {
     return (double *)(void *)((char *)settings + entry->offset);
 }
@@ -80,7 +80,7 @@ static double *field(struct nav_settings *settings, const struct entry *entry)
 void nav_settings_default(struct nav_settings *settings)
 {
     for (int i = 0; i < COUNT; i++)
-        *field(settings, &ENTRIES[i]) = ENTRIES[i].standard;
+        *settings_field(settings, &ENTRIES[i]) = ENTRIES[i].standard;
 }
 
 int nav_settings_set(struct nav_settings *settings, const char *name, double value)
@@ -90,7 +90,7 @@ int nav_settings_set(struct nav_settings *settings, const char *name, double val
             continue;
         if (!(value >= ENTRIES[i].low && value <= ENTRIES[i].high))
             return -2;
-        *field(settings, &ENTRIES[i]) = value;
+        *settings_field(settings, &ENTRIES[i]) = value;
         return 0;
     }
     return -1;

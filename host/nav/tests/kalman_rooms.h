@@ -57,7 +57,7 @@ static inline struct nav_problem behind_the_border(void)
     p.prior.sigma[0] = p.prior.sigma[1] = 0.05;
     p.prior.sigma[2] = 1e-5;
     p.robot.odometry_relative = 0.0;
-    p.settings.motion_drift_rad = 0.0;
+    p.settings.motion.drift_rad = 0.0;
     return p;
 }
 

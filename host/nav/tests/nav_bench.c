@@ -57,9 +57,9 @@ static struct nav_problem problem(struct nav_rng *rng, double cell_m, double cel
         .prior = {.uniform = true},
     };
     nav_settings_default(&p.settings);
-    p.settings.grid_cell_m = cell_m;
-    p.settings.grid_cell_deg = cell_deg;
-    p.settings.grid_sub = p.settings.grid_sub_heading = sub;
+    p.settings.grid.cell_m = cell_m;
+    p.settings.grid.cell_deg = cell_deg;
+    p.settings.grid.sub = p.settings.grid.sub_heading = sub;
     return p;
 }
 

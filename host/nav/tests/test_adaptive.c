@@ -27,8 +27,8 @@ static void it_finds_the_robot_from_nothing_and_stops_looking(void **state)
         struct wander w = wander_new(seed);
         w.problem.prior.uniform = true;
         struct nav_filter *f = nav_filter_new("adaptive", &w.problem);
-        struct nav_estimate first = run(f, &w, 1, w.problem.settings.adaptive_budget);
-        struct nav_estimate last = run(f, &w, ROWS, w.problem.settings.adaptive_budget);
+        struct nav_estimate first = run(f, &w, 1, w.problem.settings.adaptive.budget);
+        struct nav_estimate last = run(f, &w, ROWS, w.problem.settings.adaptive.budget);
         assert_true(first.confidence < 0.3 && last.confidence > 0.8);
         assert_true(wander_error(&w, &last) < 0.1);
         assert_true(first.states > 10000 && last.states < 3000);
@@ -41,7 +41,7 @@ static void it_notices_a_kidnap_and_finds_the_robot_again(void **state)
     (void)state;
     for (uint64_t seed = 11; seed <= 15; seed++) {
         struct wander w = wander_new(seed);
-        double budget = w.problem.settings.adaptive_budget;
+        double budget = w.problem.settings.adaptive.budget;
         struct nav_filter *f = nav_filter_new("adaptive", &w.problem);
         struct nav_estimate e = run(f, &w, 100, budget);
         assert_true(wander_error(&w, &e) < 0.1);
@@ -211,7 +211,7 @@ static void twins_neither_drift_nor_die(void **state)
     struct nav_component *c = calloc(ROOM, sizeof *c);
     int both = 0;
     for (int k = 0; k < 100; k++) {
-        run(f, &w, 20, w.problem.settings.adaptive_budget);
+        run(f, &w, 20, w.problem.settings.adaptive.budget);
         long n = nav_filter_components(f, c, ROOM);
         double here = mass_near(c, n, w.pose);
         double there = mass_near(c, n, (struct nav_pose){2.0 - w.pose.x, 2.0 - w.pose.y, w.pose.theta + NAV_PI});
@@ -267,7 +267,7 @@ static void a_known_start_is_listed_as_its_hypotheses_and_no_others(void **state
     struct nav_filter *f = nav_filter_new("adaptive", &w.problem);
     struct nav_component *c = calloc(ROOM, sizeof *c);
     long n = nav_filter_components(f, c, ROOM);
-    assert_in_range(n, w.problem.settings.adaptive_least, w.problem.settings.adaptive_most);
+    assert_in_range(n, w.problem.settings.adaptive.least, w.problem.settings.adaptive.most);
     for (long i = 0; i < n; i++) {
         const struct nav_pose *mean = &w.problem.prior.mean;
         assert_true(c[i].mass > 0.0);

@@ -155,11 +155,11 @@ static void large_arenas_get_the_budget_that_they_need(void **state)
     (void)state;
     struct belief b;
     begin(&b, 2.0);
-    assert_near(b.g.budget, b.problem.settings.adaptive_budget, 0.0);
+    assert_near(b.g.budget, b.problem.settings.adaptive.budget, 0.0);
     end(&b);
     begin(&b, 60.0);
-    double cells = (double)adaptive_global_cells(&b.g), rows = b.problem.settings.adaptive_rows;
-    assert_true(b.g.budget > b.problem.settings.adaptive_budget);
+    double cells = (double)adaptive_global_cells(&b.g), rows = b.problem.settings.adaptive.rows;
+    assert_true(b.g.budget > b.problem.settings.adaptive.budget);
     assert_near(b.g.budget, cells / rows, 1.0);
     assert_true(adaptive_global_bytes(&b.g) < 64e6);
     end(&b);

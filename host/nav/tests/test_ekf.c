@@ -63,7 +63,7 @@ static void no_contact_pushes_out_of_reach_and_no_further(void **state)
     struct nav_problem p = facing_wall();
     struct nav_kalman *k = create(&p);
     read_distance(k, INFINITY); /* the wall is expected 0.15 m along a whisker of 0.2 m: at least 0.2 */
-    double noise = 0.005 * 0.005 + p.settings.radial_edge_m * p.settings.radial_edge_m;
+    double noise = 0.005 * 0.005 + p.settings.radial.edge_m * p.settings.radial.edge_m;
     assert_near(k->belief.mean.x, 0.8 - 0.05 * 0.0009 / (0.0009 + noise), 1e-6);
     struct nav_gaussian before = k->belief;
     k->belief.mean.x = before.mean.x = 0.6; /* nothing within reach: nothing learned */

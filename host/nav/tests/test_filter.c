@@ -33,8 +33,8 @@ static void readings_count_by_how_far_the_whisker_has_moved(void **state)
 {
     (void)state;
     struct nav_problem p = room();
-    p.settings.texture_spacing_m = 0.04;
-    p.settings.radial_spacing_m = 0.02;
+    p.settings.texture.spacing_m = 0.04;
+    p.settings.radial.spacing_m = 0.02;
     struct nav_intake in;
     nav_intake_init(&in, &p);
     const double nothing = INFINITY, contact = 0.1;
@@ -61,7 +61,7 @@ static void a_repetition_counts_less_at_any_distance(void **state)
 {
     (void)state;
     struct nav_problem p = room();
-    p.settings.texture_spacing_m = 0.001;
+    p.settings.texture.spacing_m = 0.001;
     struct nav_intake in;
     nav_intake_init(&in, &p);
     const double nan = NAN;
@@ -79,7 +79,7 @@ static void turning_moves_a_whisker_by_its_lever(void **state)
 {
     (void)state;
     struct nav_problem p = room();
-    p.settings.texture_spacing_m = 0.04;
+    p.settings.texture.spacing_m = 0.04;
     struct nav_intake in;
     nav_intake_init(&in, &p);
     const double nan = NAN;
@@ -331,13 +331,13 @@ static void settings_are_set_by_name_and_within_their_range(void **state)
     (void)state;
     struct nav_settings s;
     nav_settings_default(&s);
-    assert_near(s.foveal_cells, 11.0, 0.0);
+    assert_near(s.foveal.cells, 11.0, 0.0);
     assert_int_equal(nav_settings_set(&s, "grid.cell_m", 0.1), 0);
-    assert_near(s.grid_cell_m, 0.1, 0.0);
+    assert_near(s.grid.cell_m, 0.1, 0.0);
     assert_int_equal(nav_settings_set(&s, "grid.cell_m", 0.0), -2);
     assert_int_equal(nav_settings_set(&s, "grid.cell_m", NAN), -2);
     assert_int_equal(nav_settings_set(&s, "grid.cell", 0.1), -1);
-    assert_near(s.grid_cell_m, 0.1, 0.0);
+    assert_near(s.grid.cell_m, 0.1, 0.0);
     const char *name;
     double standard, low, high;
     int count = 0;

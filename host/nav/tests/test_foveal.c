@@ -35,7 +35,7 @@ static void nothing_read_keeps_the_mode_and_fits_the_clipped_prior(void **state)
     (void)state;
     struct nav_problem p = quiet_room();
     p.prior.sigma[0] = p.prior.sigma[1] = 0.03;
-    p.settings.foveal_quantum_m = 0.01;
+    p.settings.foveal.quantum_m = 0.01;
     struct foveal *f = create(&p);
     const double none[] = {0.0, 0.0};
     update(f, &(struct nav_evidence){NULL, none});
@@ -50,8 +50,8 @@ static void a_texture_moves_the_mode_to_the_nearest_point_that_fits(void **state
 {
     (void)state;
     struct nav_problem p = quiet_room();
-    p.settings.texture_temper = 1.0;
-    p.settings.texture_outlier = 1e-6;
+    p.settings.texture.temper = 1.0;
+    p.settings.texture.outlier = 1e-6;
     p.prior.sigma[2] = 0.05;
     struct foveal *f = create(&p);
     const double right_tile[] = {-50.0, 0.0}, weight[] = {1.0, 0.0};
@@ -69,7 +69,7 @@ static void it_never_looks_outside_the_fovea(void **state)
     (void)state;
     struct nav_problem p = quiet_room();
     p.prior.mean.x = 0.2; /* the tip's border is 0.2 m ahead, outside the fovea's 0.125 */
-    p.settings.texture_temper = 1.0;
+    p.settings.texture.temper = 1.0;
     struct foveal *f = create(&p);
     const double right_tile[] = {-50.0, 0.0}, weight[] = {1.0, 0.0};
     const double *reading[] = {right_tile, NULL};
@@ -95,7 +95,7 @@ static void a_fovea_wholly_inside_a_solid_changes_nothing(void **state)
 /* The covariance after one row that says tile 0 or tile 1. */
 static void covariance_after(struct nav_problem *p, bool right, double covariance[9])
 {
-    p->settings.texture_temper = 1.0;
+    p->settings.texture.temper = 1.0;
     struct foveal *f = create(p);
     const double left_tile[] = {0.0, -50.0}, right_tile[] = {-50.0, 0.0}, weight[] = {1.0, 0.0};
     const double *reading[] = {right ? right_tile : left_tile, NULL};
@@ -108,7 +108,7 @@ static void as_printed_equation_7_does_not_depend_on_the_readings(void **state)
 {
     (void)state;
     struct nav_problem p = quiet_room();
-    p.settings.foveal_printed = 1.0;
+    p.settings.foveal.printed = 1.0;
     double left[9];
     covariance_after(&p, false, left);
     /* 1331 points about the middle: 121 times the sum of squares of -5 .. 5 spacings, and the quantisation term. */
@@ -125,7 +125,7 @@ static void inflation_puts_the_fovea_in_place_of_the_posterior(void **state)
 {
     (void)state;
     struct nav_problem p = quiet_room();
-    p.settings.foveal_inflate = 1.0;
+    p.settings.foveal.inflate = 1.0;
     double left[9], right[9];
     covariance_after(&p, false, left);
     covariance_after(&p, true, right);

@@ -14,13 +14,13 @@ static const double CELL = 0.1;
 static struct nav_problem diagonal_room(void)
 {
     struct nav_problem p = room();
-    p.settings.grid_cell_m = CELL;
-    p.settings.grid_cell_deg = 90.0;
-    p.settings.grid_sub = 1.0;
-    p.settings.grid_sub_heading = 1.0;
-    p.settings.grid_teleport = 0.0;
-    p.settings.motion_drift_rad = 1.0; /* large enough for a heading blur in every row, */
-    p.settings.motion_along_m = 0.1;   /* and for one blur in position */
+    p.settings.grid.cell_m = CELL;
+    p.settings.grid.cell_deg = 90.0;
+    p.settings.grid.sub = 1.0;
+    p.settings.grid.sub_heading = 1.0;
+    p.settings.grid.teleport = 0.0;
+    p.settings.motion.drift_rad = 1.0; /* large enough for a heading blur in every row, */
+    p.settings.motion.along_m = 0.1;   /* and for one blur in position */
     p.prior.sigma[0] = p.prior.sigma[1] = 0.2;
     p.prior.sigma[2] = 0.8;
     return p;
@@ -200,7 +200,7 @@ static void a_belief_with_no_room_left_starts_again_everywhere(void **state)
 {
     (void)state;
     struct nav_problem p = room();
-    p.settings.grid_teleport = 0.0;
+    p.settings.grid.teleport = 0.0;
     p.prior.sigma[0] = p.prior.sigma[1] = 0.01;
     p.prior.mean = (struct nav_pose){0.95, 0.15, 0.0};
     struct grid *g = grid_create(&p);
@@ -279,7 +279,7 @@ static double nearest(double value, double step)
 static double naive_cell(const struct grid *g, const struct nav_problem *p, int slice, int i, int j)
 {
     const struct nav_histogram *h = &g->histogram;
-    int sub = (int)p->settings.grid_sub, turns = (int)p->settings.grid_sub_heading;
+    int sub = (int)p->settings.grid.sub, turns = (int)p->settings.grid.sub_heading;
     double step = CELL / sub, turn = h->shape.cell_theta / turns, sum = 0.0;
     for (int n = 0; n < sub * sub * turns; n++) {
         struct nav_pose pose = {
@@ -298,8 +298,8 @@ static void a_cells_likelihood_is_the_mean_of_its_sub_poses_where_they_now_are(v
     struct nav_problem p = diagonal_room();
     p.prior.uniform = true;
     p.robot.body_radius = 0.01; /* the table's half step of grace exceeds it: free is what is outside walls and box */
-    p.settings.grid_sub = 3.0;
-    p.settings.grid_sub_heading = 2.0;
+    p.settings.grid.sub = 3.0;
+    p.settings.grid.sub_heading = 2.0;
     struct grid *g = grid_create(&p);
     const double texture[] = {0.0, -50.0}, distance = 0.1, weight[] = {1.0, 1.0};
     const double *reading[] = {texture, &distance};

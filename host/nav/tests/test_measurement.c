@@ -9,10 +9,10 @@ static struct nav_settings settings(void)
 {
     struct nav_settings s;
     nav_settings_default(&s);
-    s.texture_temper = 0.05;
-    s.texture_outlier = 0.2;
-    s.radial_miss = 0.1;
-    s.radial_ghost = 0.01;
+    s.texture.temper = 0.05;
+    s.texture.outlier = 0.2;
+    s.radial.miss = 0.1;
+    s.radial.ghost = 0.01;
     return s;
 }
 
@@ -72,7 +72,7 @@ static void a_measured_distance_is_gaussian_on_a_floor_of_ghosts(void **state)
 {
     (void)state;
     struct nav_settings s = settings();
-    s.radial_edge_m = 0.01;
+    s.radial.edge_m = 0.01;
     struct nav_model m = whisker(&s);
     const double reading = 0.045, peak = 1.0 / (0.01 * sqrt(2.0 * NAV_PI)), ghost = 0.01, length = 0.1;
     double out[15];
@@ -88,7 +88,7 @@ static void no_contact_is_strong_evidence_deep_in_a_wall_and_weak_at_the_tip(voi
 {
     (void)state;
     struct nav_settings s = settings();
-    s.radial_edge_m = 0.01;
+    s.radial.edge_m = 0.01;
     struct nav_model m = whisker(&s);
     const double nothing = (double)INFINITY;
     double out[15];
@@ -352,8 +352,8 @@ static void many_whiskers_do_not_underflow(void **state)
     p.robot.tips = WHISKERS;
     p.robot.tip = tip;
     p.robot.rays = 0;
-    p.settings.texture_outlier = 0.0;
-    p.settings.texture_temper = 1.0;
+    p.settings.texture.outlier = 0.0;
+    p.settings.texture.temper = 1.0;
     struct nav_likelihood *l = nav_likelihood_new(&p.arena, &p.robot, &p.settings, 0.01);
     struct nav_expected *e = nav_expected_new(l, 0.1, 4, 1, 1);
     for (int w = 0; w < WHISKERS; w++)

@@ -102,7 +102,7 @@ static void a_robot_is_tracked(void **state)
     struct nav_estimate e;
     for (int k = 0; k < 200; k++) {
         nav_filter_step(f, wander_on(&w), &e);
-        assert_true(e.states <= (long)w.problem.settings.multi_modes);
+        assert_true(e.states <= (long)w.problem.settings.multi.modes);
     }
     assert_true(wander_error(&w, &e) < 0.1 && e.confidence > 0.5);
     nav_filter_free(f);

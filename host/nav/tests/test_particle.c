@@ -50,7 +50,7 @@ static void the_bound_is_foxs(void **state)
 static struct nav_problem quiet(void)
 {
     struct nav_problem p = room();
-    p.settings.particle_recovery = 0.0;
+    p.settings.particle.recovery = 0.0;
     p.seed = 7;
     return p;
 }
@@ -71,7 +71,7 @@ static void a_wider_belief_takes_more_particles(void **state)
     assert_int_equal(count[0], 300);
     assert_true(count[1] > 2 * count[0] && count[1] < 5000);
     assert_true(count[2] > 10000 && count[2] <= 20000);
-    p.settings.particle_count = 1234.0;
+    p.settings.particle.count = 1234.0;
     struct particle *f = create(&p);
     assert_int_equal(f->cloud.count, 1234);
     destroy(f);
@@ -168,15 +168,15 @@ static void many_particles_come_to_the_exact_posterior(void **state)
     (void)state;
     struct nav_problem p = quiet();
     p.prior.uniform = true;
-    p.settings.particle_count = 100000.0;
-    p.settings.grid_cell_m = 0.02;
-    p.settings.grid_cell_deg = 5.0;
-    p.settings.grid_teleport = 0.0;
+    p.settings.particle.count = 100000.0;
+    p.settings.grid.cell_m = 0.02;
+    p.settings.grid.cell_deg = 5.0;
+    p.settings.grid.teleport = 0.0;
     struct nav_component *list = calloc(ROOM_FOR, sizeof *list);
     double grid[BINS], many[BINS], few[BINS], off_many = 0.0, off_few = 0.0;
     believe(&p, "grid", list, grid);
     believe(&p, "particle", list, many);
-    p.settings.particle_count = 100.0;
+    p.settings.particle.count = 100.0;
     believe(&p, "particle", list, few);
     for (int n = 0; n < BINS; n++) {
         off_many += 0.5 * fabs(many[n] - grid[n]);
@@ -191,7 +191,7 @@ static void two_particles_follow_a_robot_that_they_know(void **state)
 {
     (void)state;
     struct nav_problem p = quiet();
-    p.settings.particle_count = 2.0;
+    p.settings.particle.count = 2.0;
     p.prior.mean = (struct nav_pose){0.25, 0.25, 0.0};
     p.prior.sigma[0] = p.prior.sigma[1] = p.prior.sigma[2] = 0.001;
     p.robot.odometry_relative = 0.01;
@@ -237,7 +237,7 @@ static void weights_that_stay_low_bring_fresh_particles_where_the_row_fits(void 
 {
     (void)state;
     struct nav_problem p = room();
-    p.settings.particle_count = 2000.0;
+    p.settings.particle.count = 2000.0;
     p.prior.mean = (struct nav_pose){0.25, 0.25, 0.0}; /* texture 0, nothing within reach */
     p.prior.sigma[0] = p.prior.sigma[1] = p.prior.sigma[2] = 0.02;
     struct particle *f = create(&p);
@@ -264,7 +264,7 @@ static void the_work_told_counts_particles_weighed_and_particles_moved(void **st
 {
     (void)state;
     struct nav_problem p = quiet();
-    p.settings.particle_count = 100.0;
+    p.settings.particle.count = 100.0;
     struct particle *f = create(&p);
     struct nav_estimate e;
     const double texture[] = {0.0, -1.0}, nothing = INFINITY, none[] = {0.0, 0.0};
@@ -289,7 +289,7 @@ static void fresh_particles_take_their_share_of_the_places_and_none_beyond(void 
 {
     (void)state;
     struct nav_problem p = quiet();
-    p.settings.particle_count = 300.0;
+    p.settings.particle.count = 300.0;
     p.prior.sigma[0] = p.prior.sigma[1] = p.prior.sigma[2] = 0.002;
     struct particle *f = create(&p);
     f->rng = (struct nav_rng){{0, 5, 7, 5}}; /* its second uniform number is 0 */
@@ -326,7 +326,7 @@ static void a_row_that_no_particle_can_explain_changes_no_weight(void **state)
 {
     (void)state;
     struct nav_problem p = quiet();
-    p.settings.particle_count = 50.0;
+    p.settings.particle.count = 50.0;
     struct particle *f = create(&p);
     for (long i = 0; i < 50; i++)
         nav_particles_set(&f->cloud, i, (struct nav_pose){5.0, 5.0, 0.0});

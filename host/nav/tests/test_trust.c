@@ -59,7 +59,7 @@ static void a_temper_never_sharpens_and_a_fixed_one_stays(void **state)
     for (int i = 0; i < 100; i++)
         odds_after(&vague, 0.01);
     assert_near(vague.temper, 1.0, 0.0);
-    s.texture_temper = 0.03;
+    s.texture.temper = 0.03;
     struct nav_model fixed = classifier(&s, 3);
     odds_after(&fixed, 600.0);
     assert_near(fixed.temper, 0.03, 0.0);

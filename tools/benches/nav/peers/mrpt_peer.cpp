@@ -63,10 +63,10 @@ class Mrpt : public peer::Filter
         o.adaptiveSampleSize = most > 0.0;
         if (o.adaptiveSampleSize) {
             auto &kld = cloud_.options.KLD_params; // the bins, error and least number of `particle`
-            kld.KLD_binSize_XY = scene.problem.settings.particle_bin_m;
-            kld.KLD_binSize_PHI = scene.problem.settings.particle_bin_deg * NAV_PI / 180.0;
-            kld.KLD_epsilon = scene.problem.settings.particle_error;
-            kld.KLD_minSampleSize = static_cast<unsigned>(scene.problem.settings.particle_least);
+            kld.KLD_binSize_XY = scene.problem.settings.particle.bin_m;
+            kld.KLD_binSize_PHI = scene.problem.settings.particle.bin_deg * NAV_PI / 180.0;
+            kld.KLD_epsilon = scene.problem.settings.particle.error;
+            kld.KLD_minSampleSize = static_cast<unsigned>(scene.problem.settings.particle.least);
             kld.KLD_maxSampleSize = static_cast<unsigned>(most);
         }
     }
