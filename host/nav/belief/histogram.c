@@ -57,15 +57,13 @@ static void histogram_cells_free(struct nav_cells *c)
 static int histogram_line_init(struct nav_line *line, const struct nav_shape *finest)
 {
     float *cell = calloc((size_t)finest->groups * NAV_LANES + 2 * PAD, sizeof *cell);
-    line->cell = cell ? cell + PAD : NULL;
-    line->mark = calloc((size_t)nav_line_words(finest), sizeof *line->mark);
-    return line->cell && line->mark ? 0 : -1;
+    *line = (struct nav_line){cell ? cell + PAD : NULL, INT_MAX, 0};
+    return cell ? 0 : -1;
 }
 
 static void histogram_line_free(struct nav_line *line)
 {
     free(line->cell ? line->cell - PAD : NULL);
-    free(line->mark);
 }
 
 static int histogram_pass_init(struct nav_histogram *h, const struct nav_shape *finest)
@@ -75,8 +73,7 @@ static int histogram_pass_init(struct nav_histogram *h, const struct nav_shape *
         return -1;
     p->roll_x = calloc((size_t)finest->nh, sizeof *p->roll_x);
     p->roll_y = calloc((size_t)finest->nh, sizeof *p->roll_y);
-    int failed =
-        !p->roll_x || !p->roll_y || histogram_line_init(&p->raw, finest) || histogram_line_init(&p->todo, finest);
+    int failed = !p->roll_x || !p->roll_y || histogram_line_init(&p->raw, finest);
     for (int n = 0; n < NAV_BLUR_LINES && !failed; n++)
         failed = histogram_line_init(&p->blurred[n], finest);
     return failed ? -1 : 0;
@@ -104,7 +101,6 @@ void nav_histogram_free(struct nav_histogram *h)
         free(h->pass->roll_x);
         free(h->pass->roll_y);
         histogram_line_free(&h->pass->raw);
-        histogram_line_free(&h->pass->todo);
         for (int n = 0; n < NAV_BLUR_LINES; n++)
             histogram_line_free(&h->pass->blurred[n]);
     }
@@ -140,41 +136,9 @@ void nav_histogram_restart(struct nav_histogram *h, int level)
     h->total = 1.0;
 }
 
-int nav_line_next(const struct nav_line *line, const struct nav_shape *s, int group)
-{
-    for (int word = group / 64; word < nav_line_words(s); word++, group = 64 * word) {
-        uint64_t left = line->mark[word] >> group % 64;
-        if (left)
-            return group + __builtin_ctzll(left);
-    }
-    return s->groups;
-}
-
-void nav_line_clear(struct nav_line *line, const struct nav_shape *s)
-{
-    for (int g = nav_line_next(line, s, 0); g < s->groups; g = nav_line_next(line, s, g + 1))
-        memset(line->cell + g * NAV_LANES, 0, NAV_LANES * sizeof *line->cell);
-    memset(line->mark, 0, (size_t)nav_line_words(s) * sizeof *line->mark);
-}
-
 void nav_store_begin(struct nav_histogram *h)
 {
     h->pass->at.groups = h->next.first[0] = 0;
-}
-
-void nav_store_group(struct nav_histogram *h, int group, const float mass[NAV_LANES])
-{
-    uint32_t n = h->pass->at.groups;
-    if (n == h->room)
-        return;
-    h->next.at[n] = (uint16_t)group;
-    memcpy(h->next.mass + (size_t)n * NAV_LANES, mass, NAV_LANES * sizeof *mass);
-    h->pass->at.groups++;
-}
-
-void nav_store_end_line(struct nav_histogram *h, size_t line)
-{
-    h->next.first[line + 1] = h->pass->at.groups;
 }
 
 void nav_store_swap(struct nav_histogram *h)
@@ -197,29 +161,20 @@ static void histogram_copy_place(struct nav_histogram *h)
     memcpy(h->next.shift_y, h->now.shift_y, (size_t)h->shape.nh * sizeof *h->now.shift_y);
 }
 
-/* Whether any cell of a group holds mass. */
-static bool histogram_any(const float *mass)
-{
-    float sum = 0.0f;
-    for (int k = 0; k < NAV_LANES; k++)
-        sum += mass[k];
-    return sum > 0.0f;
-}
-
-/* Stores the marked groups of a line written out, and empties it. */
+/* Stores a line written out, and empties it. */
 static void histogram_store_line(struct nav_histogram *h, struct nav_line *line, size_t number)
 {
-    for (int g = nav_line_next(line, &h->shape, 0); g < h->shape.groups; g = nav_line_next(line, &h->shape, g + 1)) {
-        if (histogram_any(line->cell + g * NAV_LANES))
+    for (int g = line->begin; g < line->end; g++) {
+        if (nav_group_any(line->cell + g * NAV_LANES))
             nav_store_group(h, g, line->cell + g * NAV_LANES);
     }
     nav_store_end_line(h, number);
-    nav_line_clear(line, &h->shape);
+    nav_line_clear(line);
 }
 
 float *nav_histogram_write_out(struct nav_histogram *h, float **line)
 {
-    *line = h->pass->todo.cell;
+    *line = h->pass->raw.cell;
     memset(h->next.mass, 0, nav_shape_cells(&h->shape) * sizeof *h->next.mass);
     return h->next.mass;
 }
@@ -233,8 +188,7 @@ void nav_histogram_take(struct nav_histogram *h)
     nav_store_begin(h);
     for (size_t n = 0; n < histogram_shape_lines(&h->shape); n++) {
         memcpy(line->cell, h->next.mass + n * cells, cells * sizeof *line->cell);
-        for (int g = 0; g < h->shape.groups; g++)
-            nav_line_note(line, &h->shape, g);
+        nav_line_widen(line, 0, h->shape.groups);
         histogram_store_line(h, line, n);
     }
     nav_store_swap(h);
@@ -247,7 +201,7 @@ static void histogram_write_out(const struct nav_histogram *h, size_t number, st
     for (uint32_t n = h->now.first[number]; n < h->now.first[number + 1]; n++) {
         memcpy(line->cell + h->now.at[n] * NAV_LANES, h->now.mass + (size_t)n * NAV_LANES,
                NAV_LANES * sizeof *line->cell);
-        nav_line_note(line, &h->shape, h->now.at[n]);
+        nav_line_widen(line, h->now.at[n], h->now.at[n] + 1);
     }
 }
 
@@ -286,7 +240,7 @@ void nav_histogram_add(struct nav_histogram *h, struct nav_grain *grain, int32_t
         for (int32_t n = (int32_t)h->next.first[number + 1] - 1; n >= 0; n = grain[n].next) {
             histogram_line_of(h, grain[n].pose, &cell);
             line->cell[cell] += (float)grain[n].mass;
-            nav_line_note(line, &h->shape, cell / NAV_LANES);
+            nav_line_widen(line, cell / NAV_LANES, cell / NAV_LANES + 1);
         }
         histogram_store_line(h, line, number);
     }
@@ -303,7 +257,7 @@ static void histogram_split_line(const struct nav_histogram *h, size_t number, c
             int at = 2 * (h->now.at[n] * NAV_LANES + k) + dx;
             for (int i = at > 0 ? at : 0; i < at + 2 && i < finer->nx && mass > 0.0f; i++) {
                 line->cell[i] = mass;
-                nav_line_note(line, finer, i / NAV_LANES);
+                nav_line_widen(line, i / NAV_LANES, i / NAV_LANES + 1);
             }
         }
     }

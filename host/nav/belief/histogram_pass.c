@@ -3,9 +3,6 @@
 #include "histogram_pass.h"
 
 #include <math.h>
-#include <string.h>
-
-typedef float lanes __attribute__((vector_size(NAV_LANES * sizeof(float))));
 
 /* Blurring costs work, so variance is saved up to this share of a squared cell edge ... */
 static const double OWED_LEAST = 0.05;
@@ -155,13 +152,9 @@ static void pass_pour(struct nav_histogram *h, int q, int j, float weight)
         int i = h->now.at[n] * NAV_LANES + dx;
         if (i <= -NAV_LANES || i >= cells)
             continue;
-        lanes sum, in;
-        memcpy(&in, h->now.mass + (size_t)n * NAV_LANES, sizeof in);
-        memcpy(&sum, out->cell + i, sizeof sum);
-        sum += weight * in;
-        memcpy(out->cell + i, &sum, sizeof sum);
-        nav_line_note(out, &h->shape, (i + NAV_LANES) / NAV_LANES - 1);
-        nav_line_note(out, &h->shape, (i + 2 * NAV_LANES - 1) / NAV_LANES - 1);
+        *(nav_lanes *)(out->cell + i) += weight * *(const nav_lanes *)(h->now.mass + (size_t)n * NAV_LANES);
+        int group = (i + NAV_LANES) / NAV_LANES - 1, last = (i + 2 * NAV_LANES - 1) / NAV_LANES - 1;
+        nav_line_widen(out, group > 0 ? group : 0, last < h->shape.groups ? last + 1 : h->shape.groups);
         pass->at.touched += NAV_LANES;
     }
 }
@@ -180,30 +173,22 @@ static void pass_trim(const struct nav_histogram *h, struct nav_line *line)
 static void pass_blur(struct nav_histogram *h, struct nav_line *out)
 {
     struct nav_pass *pass = h->pass;
-    const struct nav_shape *s = &h->shape;
-    int reach = pass->blur.reach;
-    for (int g = nav_line_next(&pass->raw, s, 0); g < s->groups; g = nav_line_next(&pass->raw, s, g + 1)) {
-        const float *cell = pass->raw.cell + g * NAV_LANES;
-        float left = 0.0f, right = 0.0f;
-        for (int k = 0; k < reach; k++) {
-            left += cell[k];
-            right += cell[NAV_LANES - 1 - k];
-        }
-        nav_line_note(out, s, g);
-        nav_line_note(out, s, left > 0.0f ? g - 1 : g);
-        nav_line_note(out, s, right > 0.0f ? g + 1 : g);
+    struct nav_line *raw = &pass->raw;
+    int reach = pass->blur.reach, begin = raw->begin, end = raw->end;
+    for (int k = 0; k < reach; k++) { /* mass this near to the next group reaches it */
+        begin -= begin == raw->begin && begin > 0 && raw->cell[raw->begin * NAV_LANES + k] > 0.0f;
+        end += end == raw->end && end < h->shape.groups && raw->cell[raw->end * NAV_LANES - 1 - k] > 0.0f;
     }
-    for (int g = nav_line_next(out, s, 0); g < s->groups; g = nav_line_next(out, s, g + 1)) {
-        lanes sum = {0.0f}, in;
-        for (int t = 0; t <= 2 * reach; t++) {
-            memcpy(&in, pass->raw.cell + g * NAV_LANES + t - reach, sizeof in);
-            sum += pass->blur.along[t] * in;
-        }
-        memcpy(out->cell + g * NAV_LANES, &sum, sizeof sum);
+    nav_line_widen(out, begin, end);
+    for (int g = begin; g < end; g++) {
+        nav_lanes sum = {0.0f};
+        for (int t = 0; t <= 2 * reach; t++)
+            sum += pass->blur.along[t] * *(const nav_lanes *)(raw->cell + g * NAV_LANES + t - reach);
+        *(nav_lanes *)(out->cell + g * NAV_LANES) = sum;
         pass->at.touched += NAV_LANES;
     }
     pass_trim(h, out);
-    nav_line_clear(&pass->raw, s);
+    nav_line_clear(raw);
 }
 
 /* Writes out the next line of the slice, moved and blurred along x and over headings. */
@@ -212,7 +197,7 @@ static void pass_make(struct nav_histogram *h)
     struct nav_pass *pass = h->pass;
     int p = pass->at.slice, nh = h->shape.nh, j = pass->at.made++;
     struct nav_line *out = pass_blurred(h, j);
-    nav_line_clear(out, &h->shape);
+    nav_line_clear(out);
     if (j < 0 || j >= h->shape.ny)
         return;
     long before = pass->at.touched;
@@ -280,29 +265,28 @@ static void pass_begin_slice(struct nav_histogram *h)
     pass_extent(h, extent);
     p->at.line = 0;
     p->at.end = extent[1];
-    p->at.open = false;
+    p->at.group = -1;
     pass_skip(h, extent[0] < extent[1] ? extent[0] : h->shape.ny);
     for (int n = 0; n < NAV_BLUR_LINES && p->at.line < h->shape.ny; n++)
-        nav_line_clear(&p->blurred[n], &h->shape);
+        nav_line_clear(&p->blurred[n]);
     p->at.made = p->at.line - p->blur.reach;
 }
 
-/* Lists the groups of the line that may hold mass. */
+/* Finds the groups of the line that may hold mass. */
 static void pass_open(struct nav_histogram *h)
 {
     struct nav_pass *p = h->pass;
-    memset(p->todo.mark, 0, (size_t)nav_line_words(&h->shape) * sizeof *p->todo.mark);
-    memset(p->sum, 0, sizeof p->sum);
-    memset(p->peak, 0, sizeof p->peak);
-    p->at.open = true;
+    struct nav_line all = {NULL, h->shape.groups, 0};
     for (int t = 0; t <= 2 * p->blur.reach && !h->uniform; t++) {
         const struct nav_line *from = pass_blurred(h, p->at.line + t - p->blur.reach);
         p->row[t] = from->cell;
-        for (int w = 0; w < nav_line_words(&h->shape); w++)
-            p->todo.mark[w] |= from->mark[w];
+        nav_line_widen(&all, from->begin, from->end);
     }
-    for (int g = 0; g < h->shape.groups && pass_everywhere(h); g++)
-        nav_line_note(&p->todo, &h->shape, g);
+    if (pass_everywhere(h))
+        nav_line_widen(&all, 0, h->shape.groups);
+    p->sums = (struct nav_line_sums){.cells = {0}};
+    p->at.group = all.begin;
+    p->groups_end = all.end;
 }
 
 /* Mass of a group before it is weighed. */
@@ -310,48 +294,31 @@ static void pass_mass(const struct nav_histogram *h, int g, float *mass)
 {
     const struct nav_pass *p = h->pass;
     float same = (float)(p->weigh->extra + (h->uniform ? 1.0 / nav_shape_inside(&h->shape) : 0.0));
-    lanes sum = {0.0f}, in;
-    for (int t = 0; t <= 2 * p->blur.reach && !h->uniform; t++) {
-        memcpy(&in, p->row[t] + g * NAV_LANES, sizeof in);
-        sum += p->blur.across[t] * in;
-    }
+    nav_lanes sum = {0.0f};
+    for (int t = 0; t <= 2 * p->blur.reach && !h->uniform; t++)
+        sum += p->blur.across[t] * *(const nav_lanes *)(p->row[t] + g * NAV_LANES);
     int inside = h->shape.nx - g * NAV_LANES;
-    if (inside >= NAV_LANES)
-        sum += same;
-    for (int k = 0; k < inside && inside < NAV_LANES; k++)
-        sum[k] += same;
-    memcpy(mass, &sum, sizeof sum);
     float least = (float)p->weigh->least;
-    for (int k = 0; k < NAV_LANES; k++)
-        mass[k] = mass[k] >= least ? mass[k] : 0.0f;
-}
-
-/* Whether any cell of a group holds mass: none is below 0. */
-static bool pass_any(const float *mass)
-{
-    uint32_t bits[NAV_LANES], all = 0;
-    memcpy(bits, mass, sizeof bits);
-    for (int k = 0; k < NAV_LANES; k++)
-        all |= bits[k];
-    return all << 1 != 0;
+    for (int k = 0; k < NAV_LANES; k++) {
+        float all = sum[k] + (k < inside ? same : 0.0f);
+        mass[k] = all >= least ? all : 0.0f;
+    }
 }
 
 /* Adds a group to the line's sums and to the store. */
 static void pass_take(struct nav_histogram *h, int g, const float *mass)
 {
-    static const lanes STEPS = {0.5f, 1.5f, 2.5f, 3.5f, 4.5f, 5.5f, 6.5f, 7.5f};
+    static const nav_lanes STEPS = {0.5f, 1.5f, 2.5f, 3.5f, 4.5f, 5.5f, 6.5f, 7.5f};
     struct nav_pass *p = h->pass;
-    lanes held, sum[3];
-    memcpy(&held, mass, sizeof held);
-    memcpy(sum, p->sum, sizeof sum);
+    struct nav_line_sums *sums = &p->sums;
     float x = (float)(g * NAV_LANES * h->shape.cell + h->next.shift_x[p->at.slice] - p->about.x);
-    lanes at = (float)h->shape.cell * STEPS + x, part = held * at;
-    sum[0] += held;
-    sum[1] += part;
-    sum[2] += part * at;
-    memcpy(p->sum, sum, sizeof sum);
+    nav_lanes held = *(const nav_lanes *)mass, at = (float)h->shape.cell * STEPS + x;
+    sums->mass[0] += held;
+    sums->mass[1] += held * at;
+    sums->mass[2] += held * at * at;
     for (int k = 0; k < NAV_LANES; k++)
-        p->peak[k] = mass[k] > p->peak[k] ? mass[k] : p->peak[k];
+        sums->peak[k] = mass[k] > sums->peak[k] ? mass[k] : sums->peak[k];
+    sums->cells -= held > 0.0f;
     nav_store_group(h, g, mass);
 }
 
@@ -361,14 +328,14 @@ static void pass_group(struct nav_histogram *h, int g)
     float mass[NAV_LANES], like[NAV_LANES];
     pass_mass(h, g, mass);
     p->at.touched += NAV_LANES;
-    if (!pass_any(mass))
+    if (!nav_group_any(mass))
         return;
     if (p->weigh->group) {
         p->at.touched += p->weigh->group(p->weigh->self, p->at.slice, p->at.line, g, mass, like);
         for (int k = 0; k < NAV_LANES; k++)
             mass[k] *= like[k];
     }
-    if (pass_any(mass))
+    if (nav_group_any(mass))
         pass_take(h, g, mass);
 }
 
@@ -378,10 +345,10 @@ static void pass_survey(struct nav_histogram *h, uint32_t first)
     struct nav_pass *p = h->pass;
     const float *mass = h->next.mass;
     float peak = 0.0f;
-    for (int k = 0; k < NAV_LANES; k++)
-        peak = fmaxf(peak, p->peak[k]);
-    for (size_t n = (size_t)first * NAV_LANES; n < (size_t)p->at.groups * NAV_LANES; n++)
-        p->cells += mass[n] > 0.0f;
+    for (int k = 0; k < NAV_LANES; k++) {
+        peak = fmaxf(peak, p->sums.peak[k]);
+        p->cells += p->sums.cells[k];
+    }
     if (peak <= p->heaviest)
         return;
     size_t n = (size_t)first * NAV_LANES;
@@ -403,7 +370,7 @@ static void pass_close(struct nav_histogram *h)
     double y = (p->at.line + 0.5) * h->shape.cell + h->next.shift_y[p->at.slice] - p->about.y;
     for (int k = 0; k < 3; k++) {
         for (int n = 0; n < NAV_LANES; n++)
-            sum[k] += (double)p->sum[k][n];
+            sum[k] += (double)p->sums.mass[k][n];
     }
     const double parts[NAV_MOMENTS] = {sum[0], sum[1], sum[0] * y, sum[2], sum[1] * y, sum[0] * y * y};
     for (int k = 0; k < NAV_MOMENTS; k++)
@@ -412,7 +379,7 @@ static void pass_close(struct nav_histogram *h)
     pass_survey(h, h->next.first[number]);
     nav_store_end_line(h, number);
     p->at.line++;
-    p->at.open = false;
+    p->at.group = -1;
 }
 
 /* Does groups of the line in work; false: the next one would take more than `most`. */
@@ -424,14 +391,12 @@ static bool pass_line(struct nav_histogram *h, long most)
         if (p->at.touched + MAKE_MOST * NAV_LANES * h->shape.groups > most)
             return false;
     }
-    if (!p->at.open)
+    if (p->at.group < 0)
         pass_open(h);
-    for (int g = nav_line_next(&p->todo, &h->shape, 0); g < h->shape.groups;
-         g = nav_line_next(&p->todo, &h->shape, g + 1)) {
+    for (; p->at.group < p->groups_end; p->at.group++) {
         if (p->at.touched + each > most)
             return false;
-        p->todo.mark[g / 64] &= ~((uint64_t)1 << g % 64);
-        pass_group(h, g);
+        pass_group(h, p->at.group);
     }
     pass_close(h);
     return true;
