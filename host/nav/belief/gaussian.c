@@ -48,15 +48,12 @@ void nav_gaussian_ahead(const struct nav_gaussian *g, const struct nav_pending *
     memcpy(estimate->covariance, now.covariance, sizeof now.covariance);
 }
 
-/* Lower triangle of the Cholesky factor, rows x, y, theta; what rounding has made negative counts as nothing. */
-static void factor(const double *p, double l[6])
+void nav_gaussian_root(const double p[9], double root[9])
 {
-    l[0] = sqrt(fmax(p[0], 1e-18));
-    l[1] = p[3] / l[0];
-    l[2] = sqrt(fmax(p[4] - l[1] * l[1], 1e-18));
-    l[3] = p[6] / l[0];
-    l[4] = (p[7] - l[3] * l[1]) / l[2];
-    l[5] = sqrt(fmax(p[8] - l[3] * l[3] - l[4] * l[4], 1e-18));
+    double a = sqrt(fmax(p[0], 1e-18)), b = p[3] / a, d = p[6] / a;
+    double c = sqrt(fmax(p[4] - b * b, 1e-18)), e = (p[7] - d * b) / c;
+    const double out[9] = {a, 0.0, 0.0, b, c, 0.0, d, e, sqrt(fmax(p[8] - d * d - e * e, 1e-18))};
+    memcpy(root, out, sizeof out);
 }
 
 /* Mass of whitened lattice point i of `points`, which reach to 3 standard deviations. */
@@ -71,16 +68,16 @@ static double share(int i, int points)
 long nav_gaussian_components(const struct nav_gaussian *g, struct nav_component *out, long room)
 {
     enum { ACROSS = 25, TURNS = 7, ALL = ACROSS * ACROSS * TURNS };
-    double l[6], spacing = 6.0 / (ACROSS - 1), spacing_turn = 6.0 / (TURNS - 1);
-    factor(g->covariance, l);
+    double l[9], spacing = 6.0 / (ACROSS - 1), spacing_turn = 6.0 / (TURNS - 1);
+    nav_gaussian_root(g->covariance, l);
     for (int n = 0; n < ALL && n < room; n++) {
         int i = n / TURNS / ACROSS, j = n / TURNS % ACROSS, k = n % TURNS;
         double u = spacing * (i - ACROSS / 2), v = spacing * (j - ACROSS / 2), w = spacing_turn * (k - TURNS / 2);
         out[n] = (struct nav_component){
-            .pose = {g->mean.x + l[0] * u, g->mean.y + l[1] * u + l[2] * v,
-                     nav_wrap(g->mean.theta + l[3] * u + l[4] * v + l[5] * w)},
-            .sigma_m = spacing / sqrt(12.0) * fmax(hypot(l[0], l[1]), l[2]), /* no gaps along the long axis */
-            .sigma_rad = spacing_turn / sqrt(12.0) * l[5],
+            .pose = {g->mean.x + l[0] * u, g->mean.y + l[3] * u + l[4] * v,
+                     nav_wrap(g->mean.theta + l[6] * u + l[7] * v + l[8] * w)},
+            .sigma_m = spacing / sqrt(12.0) * fmax(hypot(l[0], l[3]), l[4]), /* no gaps along the long axis */
+            .sigma_rad = spacing_turn / sqrt(12.0) * l[8],
             .mass = share(i, ACROSS) * share(j, ACROSS) * share(k, TURNS),
         };
     }
@@ -122,14 +119,13 @@ bool nav_gaussian_invert(const double c[9], double out[9])
 double nav_gaussian_mass(const struct nav_gaussian *g, double radius, double angle)
 {
     enum { DIRECTIONS = 32 };
-    const double *p = g->covariance;
-    double lx = sqrt(fmax(p[0], 1e-18)), ly = p[1] / lx, lz = sqrt(fmax(p[4] - ly * ly, 1e-18));
-    double mass = 0.0;
+    double root[9], mass = 0.0;
+    nav_gaussian_root(g->covariance, root);
     /* A standard normal in polar coordinates: along each direction the whitened radius is Rayleigh distributed. */
     for (int i = 0; i < DIRECTIONS; i++) {
         double u = cos(NAV_PI * i / DIRECTIONS), v = sin(NAV_PI * i / DIRECTIONS);
-        double stretch = hypot(lx * u, ly * u + lz * v);
+        double stretch = hypot(root[0] * u, root[3] * u + root[4] * v);
         mass += -expm1(-0.5 * radius * radius / (stretch * stretch)) / DIRECTIONS;
     }
-    return mass * erf(angle / sqrt(2.0 * fmax(p[8], 1e-18)));
+    return mass * erf(angle / sqrt(2.0 * fmax(g->covariance[8], 1e-18)));
 }

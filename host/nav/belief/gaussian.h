@@ -48,6 +48,9 @@ long nav_gaussian_components(const struct nav_gaussian *, struct nav_component *
  */
 void nav_gaussian_move(struct nav_gaussian *, struct nav_pose step, const struct nav_noise *);
 
+/* Cholesky factor of a covariance, lower triangular, row-major; what rounding has made negative counts as nothing. */
+void nav_gaussian_root(const double covariance[9], double root[9]);
+
 /* Inverse of a covariance; false when it is not positive definite (out is then untouched). */
 bool nav_gaussian_invert(const double covariance[9], double out[9]);
 

@@ -1,45 +1,86 @@
-#include "kalman.h"
-
+/* Filters that hold one Gaussian and correct it by scalar sightings: an extended and an unscented Kalman filter, which
+ * differ only in how they linearise, and dead reckoning, which corrects nothing.
+ *
+ * Ranges have a derivative except at corners; textures have none, and only the borders they reveal are used (see
+ * borders.h), as landmark filters do with lines. Data association is the nearest border or surface within a gate. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "borders.h"
+#include "filter.h"
+#include "gaussian.h"
+#include "likelihood.h"
+
 static const double GATE = 9.0;        /* squared standard deviations */
 static const double ALONG_LEAST = 0.3; /* a crossing at a flatter angle than this cosine says too little */
 
-struct nav_kalman *nav_kalman_new(const struct nav_problem *problem, nav_linearise *linearise)
-{
-    struct nav_kalman *k = calloc(1, sizeof *k);
-    if (!k)
-        return NULL;
-    *k = (struct nav_kalman){.problem = problem, .belief = nav_gaussian_prior(problem), .linearise = linearise};
-    k->likelihood = nav_likelihood_new(&problem->arena, &problem->robot, &problem->settings, 0.0);
-    k->weight = k->likelihood ? calloc((size_t)k->likelihood->whiskers + 1, sizeof *k->weight) : NULL;
-    if (nav_borders_init(&k->borders, &problem->arena, &problem->robot) || !k->likelihood || !k->weight) {
-        nav_kalman_destroy(k);
-        return NULL;
-    }
-    return k;
-}
+struct kalman_sighting {
+    int ray;              /* a contact along this object whisker; -1: a border crossed */
+    struct nav_tip point; /* crossing: robot frame */
+    bool upright;         /* crossing: the border is a line x = z, else y = z */
+    double z, variance;   /* m, m^2; "no contact" is a distance of the whisker's length, looked up no further */
+    double reach;         /* contact: ranges are looked up to here, m */
+};
 
-void nav_kalman_destroy(void *self)
+/* A sighting about the belief, to first and second moments: what is expected, its variance without the sighting's own,
+ * and its covariance with x, y, theta. */
+struct kalman_linear {
+    double expected, variance, cross[3];
+};
+
+struct kalman;
+typedef void kalman_linearise(struct kalman *, const struct kalman_sighting *, struct kalman_linear *);
+
+struct kalman {
+    const struct nav_problem *problem;
+    struct nav_gaussian belief;
+    kalman_linearise *linearise;       /* NULL: nothing is corrected, and what follows is unused */
+    struct nav_likelihood *likelihood; /* for the texture models */
+    double *weight;                    /* [whiskers] of the row, object whiskers left out */
+    struct nav_borders borders;
+    long evaluations; /* expected observations worked out for the last row */
+};
+
+static void kalman_destroy(void *self)
 {
-    struct nav_kalman *k = self;
+    struct kalman *k = self;
     nav_likelihood_free(k->likelihood);
     nav_borders_free(&k->borders);
     free(k->weight);
     free(k);
 }
 
-void nav_kalman_predict(void *self, const struct nav_motion *motion)
+static int kalman_init(struct kalman *k)
 {
-    struct nav_kalman *k = self;
+    const struct nav_problem *p = k->problem;
+    k->likelihood = nav_likelihood_new(&p->arena, &p->robot, &p->settings, 0.0);
+    k->weight = k->likelihood ? calloc((size_t)k->likelihood->whiskers + 1, sizeof *k->weight) : NULL;
+    return nav_borders_init(&k->borders, &p->arena, &p->robot) || !k->weight ? -1 : 0;
+}
+
+static void *kalman_create(const struct nav_problem *problem, kalman_linearise *linearise)
+{
+    struct kalman *k = calloc(1, sizeof *k);
+    if (!k)
+        return NULL;
+    *k = (struct kalman){.problem = problem, .belief = nav_gaussian_prior(problem), .linearise = linearise};
+    if (!linearise || kalman_init(k) == 0)
+        return k;
+    kalman_destroy(k);
+    return NULL;
+}
+
+static void kalman_predict(void *self, const struct nav_motion *motion)
+{
+    struct kalman *k = self;
     struct nav_noise noise = nav_motion_noise(&k->problem->robot, &k->problem->settings, motion);
     nav_gaussian_move(&k->belief, motion->step, &noise);
     nav_borders_move(&k->borders, motion->step);
 }
 
-double nav_kalman_expect(struct nav_kalman *k, const struct nav_sighting *s, struct nav_pose pose)
+/* Expected value of a sighting at a pose; INFINITY when nothing is within reach. */
+static double kalman_expect(struct kalman *k, const struct kalman_sighting *s, struct nav_pose pose)
 {
     k->evaluations++;
     struct nav_pose at = nav_compose(pose, (struct nav_pose){s->point.x, s->point.y, 0.0});
@@ -58,136 +99,208 @@ double nav_kalman_expect(struct nav_kalman *k, const struct nav_sighting *s, str
     return nav_arena_range(arena, at.x, at.y, at.theta, s->reach);
 }
 
-/* Takes the gain's share of the innovation; refuses a result that is no covariance any more. */
-static void apply(struct nav_gaussian *belief, const struct nav_linear *l, double innovation, double variance)
+static struct nav_pose kalman_shifted(struct nav_pose pose, const double d[3])
 {
-    struct nav_gaussian next = *belief;
-    double information[9];
-    next.mean.x += l->cross[0] / variance * innovation;
-    next.mean.y += l->cross[1] / variance * innovation;
-    next.mean.theta = nav_wrap(next.mean.theta + l->cross[2] / variance * innovation);
-    for (int n = 0; n < 9; n++)
-        next.covariance[n] -= l->cross[n / 3] * l->cross[n % 3] / variance;
-    if (nav_gaussian_invert(next.covariance, information) && isfinite(next.mean.x + next.mean.y + next.mean.theta))
-        *belief = next;
+    return (struct nav_pose){pose.x + d[0], pose.y + d[1], pose.theta + d[2]};
 }
 
-void nav_kalman_correct(struct nav_kalman *k, const struct nav_sighting *s)
+/* The extended filter's: about the mean, by central differences. Not finite at a corner or an edge, where the range
+ * jumps between two points. */
+static void kalman_linearise_mean(struct kalman *k, const struct kalman_sighting *s, struct kalman_linear *out)
 {
-    struct nav_linear l;
-    if (!k->linearise(k, s, &l))
+    static const double STEP = 1e-4, STEEPEST = 50.0; /* m and rad; m per m or rad */
+    const double *p = k->belief.covariance;
+    double slope[3];
+    *out = (struct kalman_linear){.expected = kalman_expect(k, s, k->belief.mean)};
+    for (int a = 0; a < 3; a++) {
+        double d[3] = {0.0};
+        d[a] = STEP;
+        double ahead = kalman_expect(k, s, kalman_shifted(k->belief.mean, d));
+        d[a] = -STEP;
+        slope[a] = (ahead - kalman_expect(k, s, kalman_shifted(k->belief.mean, d))) / (2.0 * STEP);
+        slope[a] = fabs(slope[a]) <= STEEPEST ? slope[a] : (double)NAN;
+    }
+    for (int a = 0; a < 3; a++) {
+        out->cross[a] = p[3 * a] * slope[0] + p[3 * a + 1] * slope[1] + p[3 * a + 2] * slope[2];
+        out->variance += slope[a] * out->cross[a];
+    }
+}
+
+/* The unscented filter's (Julier and Uhlmann): moments over the six points plus and minus sqrt(3) times the columns of
+ * the covariance's root. With n = 3 and kappa = 0 the centre has no weight and all others 1/6: fourth moments fit a
+ * Gaussian, and no weight is negative. */
+static void kalman_linearise_points(struct kalman *k, const struct kalman_sighting *s, struct kalman_linear *out)
+{
+    enum { POINTS = 6 };
+    double root[9], d[POINTS][3], value[POINTS];
+    *out = (struct kalman_linear){.expected = 0.0};
+    nav_gaussian_root(k->belief.covariance, root);
+    for (int n = 0; n < POINTS; n++) {
+        for (int a = 0; a < 3; a++)
+            d[n][a] = (n % 2 ? -sqrt(3.0) : sqrt(3.0)) * root[3 * a + n / 2];
+        value[n] = kalman_expect(k, s, kalman_shifted(k->belief.mean, d[n]));
+        if (!isfinite(value[n]))
+            value[n] = s->reach; /* nothing within reach is at least that far */
+        out->expected += value[n] / POINTS;
+    }
+    for (int n = 0; n < POINTS; n++) {
+        double off = value[n] - out->expected;
+        out->variance += off * off / POINTS;
+        for (int a = 0; a < 3; a++)
+            out->cross[a] += d[n][a] * off / POINTS;
+    }
+}
+
+/* Squared standard deviations that a sighting is off by; INFINITY where it cannot be expected. */
+static double kalman_badness(struct kalman *k, const struct kalman_sighting *s, struct kalman_linear *l)
+{
+    k->linearise(k, s, l);
+    double off = s->z - l->expected, badness = off * off / (l->variance + s->variance);
+    return isfinite(l->variance) && isfinite(badness) ? badness : (double)INFINITY;
+}
+
+/* Corrects the belief by one sighting unless it is further off than three standard deviations, or the result would be
+ * no covariance any more. */
+static void kalman_correct(struct kalman *k, const struct kalman_sighting *s)
+{
+    struct kalman_linear l;
+    if (kalman_badness(k, s, &l) > GATE)
         return;
-    double innovation = s->z - l.expected, variance = l.variance + s->variance;
-    if (innovation * innovation <= GATE * variance)
-        apply(&k->belief, &l, innovation, variance);
+    struct nav_gaussian next = k->belief;
+    double gain[3], information[9], variance = l.variance + s->variance;
+    for (int a = 0; a < 3; a++)
+        gain[a] = l.cross[a] / variance * (s->z - l.expected);
+    next.mean = kalman_shifted(next.mean, gain);
+    next.mean.theta = nav_wrap(next.mean.theta);
+    for (int n = 0; n < 9; n++)
+        next.covariance[n] -= l.cross[n / 3] * l.cross[n % 3] / variance;
+    if (nav_gaussian_invert(next.covariance, information) && isfinite(next.mean.x + next.mean.y + next.mean.theta))
+        k->belief = next;
 }
 
-static double pose_sigma(const struct nav_kalman *k)
-{
-    return sqrt(k->belief.covariance[0] + k->belief.covariance[4]);
-}
-
-static void take_radial(struct nav_kalman *k, int r, double distance, double weight)
+static void kalman_read_range(struct kalman *k, int r, double distance, double weight)
 {
     const struct nav_robot *robot = &k->problem->robot;
     double length = robot->ray[r].length, edge = k->problem->settings.radial.edge_m;
     bool contact = isfinite(distance);
     double sigma = contact ? robot->radial_sigma : hypot(robot->radial_sigma, edge);
-    struct nav_sighting s = {.ray = r,
-                             .z = contact ? distance : length,
-                             .variance = sigma * sigma / weight,
-                             .reach = contact ? length + 3.0 * pose_sigma(k) : length};
-    nav_kalman_correct(k, &s);
+    double spread = sqrt(k->belief.covariance[0] + k->belief.covariance[4]);
+    struct kalman_sighting s = {.ray = r,
+                                .z = contact ? distance : length,
+                                .variance = sigma * sigma / weight,
+                                .reach = contact ? length + 3.0 * spread : length};
+    kalman_correct(k, &s);
 }
 
-/* Texture `column`, `row` of tiles, or -1 outside. */
-static int tile(const struct nav_arena *arena, int column, int row)
+/* Texture of tile `column`, `row`, or -1 outside. */
+static int kalman_tile(const struct nav_arena *arena, int column, int row)
 {
     if (column < 0 || row < 0 || column >= arena->columns || row >= arena->rows)
         return -1;
     return arena->floor[row * arena->columns + column];
 }
 
-struct search {
+struct kalman_search {
     const struct nav_crossing *crossing;
-    struct nav_pose at, toward; /* point and motion of the crossing in the world; theta unused */
-    struct nav_sighting best;
-    double badness; /* of the best, squared standard deviations */
+    struct nav_pose toward; /* motion of the crossing in the world; theta unused */
+    struct kalman_sighting best;
+    double badness; /* of the best */
 };
 
 /* Whether the line before tile (column, row) is such a border as was crossed, and the likeliest so far. */
-static void consider(struct nav_kalman *k, struct search *search, bool upright, int column, int row)
+static void kalman_consider(struct kalman *k, struct kalman_search *search, bool upright, int column, int row)
 {
     const struct nav_arena *arena = &k->problem->arena;
-    double along = upright ? search->toward.x : search->toward.y;
-    int below = tile(arena, column - upright, row - !upright), above = tile(arena, column, row);
-    if (fabs(along) < ALONG_LEAST || (along > 0.0 ? below : above) != search->crossing->from ||
-        (along > 0.0 ? above : below) != search->crossing->to)
+    const struct nav_crossing *crossing = search->crossing;
+    double along = upright ? search->toward.x : search->toward.y, sigma = crossing->sigma * fabs(along);
+    int below = kalman_tile(arena, column - upright, row - !upright), above = kalman_tile(arena, column, row);
+    if (fabs(along) < ALONG_LEAST || (along > 0.0 ? below : above) != crossing->from ||
+        (along > 0.0 ? above : below) != crossing->to)
         return;
-    double sigma = search->crossing->sigma * fabs(along);
-    struct nav_sighting s = {.ray = -1,
-                             .point = search->crossing->point,
-                             .upright = upright,
-                             .z = (upright ? column : row) * arena->tile,
-                             .variance = sigma * sigma};
-    struct nav_linear l;
-    if (!k->linearise(k, &s, &l))
+    struct kalman_sighting s = {.ray = -1,
+                                .point = crossing->point,
+                                .upright = upright,
+                                .z = (upright ? column : row) * arena->tile,
+                                .variance = sigma * sigma};
+    struct kalman_linear l;
+    double badness = kalman_badness(k, &s, &l);
+    if (badness >= search->badness)
         return;
-    double badness = (s.z - l.expected) * (s.z - l.expected) / (l.variance + s.variance);
-    if (badness < search->badness) {
-        search->best = s;
-        search->badness = badness;
-    }
+    search->best = s;
+    search->badness = badness;
 }
 
-static void take_crossing(struct nav_kalman *k, const struct nav_crossing *crossing)
+static void kalman_read_crossing(struct kalman *k, const struct nav_crossing *crossing)
 {
-    const struct nav_arena *arena = &k->problem->arena;
     struct nav_pose mean = k->belief.mean, turn = {0.0, 0.0, mean.theta};
-    struct search search = {.crossing = crossing, .badness = GATE};
-    search.at = nav_compose(mean, (struct nav_pose){crossing->point.x, crossing->point.y, 0.0});
+    struct nav_pose at = nav_compose(mean, (struct nav_pose){crossing->point.x, crossing->point.y, 0.0});
+    struct kalman_search search = {.crossing = crossing, .badness = GATE};
     search.toward = nav_compose(turn, (struct nav_pose){crossing->toward.x, crossing->toward.y, 0.0});
-    double x = search.at.x / arena->tile, y = search.at.y / arena->tile;
+    double x = at.x / k->problem->arena.tile, y = at.y / k->problem->arena.tile;
     if (!(fabs(x) < 1e6 && fabs(y) < 1e6))
         return;
     for (int near = -1; near <= 1; near++) {
-        consider(k, &search, true, (int)floor(x + 0.5) + near, (int)floor(y));
-        consider(k, &search, false, (int)floor(x), (int)floor(y + 0.5) + near);
+        kalman_consider(k, &search, true, (int)floor(x + 0.5) + near, (int)floor(y));
+        kalman_consider(k, &search, false, (int)floor(x), (int)floor(y + 0.5) + near);
     }
     if (search.badness < GATE)
-        nav_kalman_correct(k, &search.best);
+        kalman_correct(k, &search.best);
 }
 
-void nav_kalman_update(void *self, const struct nav_evidence *evidence)
+static void kalman_update(void *self, const struct nav_evidence *evidence)
 {
-    struct nav_kalman *k = self;
+    struct kalman *k = self;
     struct nav_crossing crossing;
+    if (!k->linearise)
+        return;
     k->evaluations = 0;
     const int *first = k->likelihood->sensors.first; /* texture whiskers, object whiskers; other sensors say nothing */
     memcpy(k->weight, evidence->weight, (size_t)first[1] * sizeof *k->weight);
     nav_likelihood_read(k->likelihood, &(struct nav_evidence){evidence->reading, k->weight});
     for (int t = 0; t < first[1]; t++) {
         if (evidence->weight[t] > 0.0 && nav_borders_read(&k->borders, t, k->likelihood->table[t], &crossing))
-            take_crossing(k, &crossing);
+            kalman_read_crossing(k, &crossing);
     }
     for (int w = first[1]; w < first[2]; w++) {
         if (evidence->weight[w] > 0.0)
-            take_radial(k, w - first[1], evidence->reading[w][0], evidence->weight[w]);
+            kalman_read_range(k, w - first[1], evidence->reading[w][0], evidence->weight[w]);
     }
     nav_borders_row_done(&k->borders);
 }
 
-void nav_kalman_estimate(const void *self, struct nav_estimate *out)
+static void kalman_estimate(const void *self, struct nav_estimate *out)
 {
-    const struct nav_kalman *k = self;
+    const struct kalman *k = self;
     nav_gaussian_estimate(&k->belief, out);
     out->evaluations = out->distinct = out->touched = k->evaluations;
     out->states = 1;
-    out->bytes = sizeof *k;
+    out->bytes = sizeof *k + (k->likelihood ? nav_likelihood_bytes(k->likelihood) : 0);
 }
 
-long nav_kalman_components(const void *self, struct nav_component *out, long room)
+static long kalman_components(const void *self, struct nav_component *out, long room)
 {
-    const struct nav_kalman *k = self;
-    return nav_gaussian_components(&k->belief, out, room);
+    return nav_gaussian_components(&((const struct kalman *)self)->belief, out, room);
 }
+
+static void *kalman_create_none(const struct nav_problem *problem)
+{
+    return kalman_create(problem, NULL);
+}
+
+static void *kalman_create_extended(const struct nav_problem *problem)
+{
+    return kalman_create(problem, kalman_linearise_mean);
+}
+
+static void *kalman_create_unscented(const struct nav_problem *problem)
+{
+    return kalman_create(problem, kalman_linearise_points);
+}
+
+#define KALMAN_OPS                                                                                                     \
+    .destroy = kalman_destroy, .predict = kalman_predict, .update = kalman_update, .estimate = kalman_estimate,        \
+    .components = kalman_components
+
+const struct nav_filter_ops nav_odometry_filter = {.name = "odometry", .create = kalman_create_none, KALMAN_OPS};
+const struct nav_filter_ops nav_ekf_filter = {.name = "ekf", .create = kalman_create_extended, KALMAN_OPS};
+const struct nav_filter_ops nav_ukf_filter = {.name = "ukf", .create = kalman_create_unscented, KALMAN_OPS};
