@@ -21,6 +21,8 @@ struct kalman_sighting {
     bool upright;         /* crossing: the border is a line x = z, else y = z */
     double z, variance;   /* m, m^2; "no contact" is a distance of the whisker's length, looked up no further */
     double reach;         /* contact: ranges are looked up to here, m */
+    bool normal;          /* contact: how the face lies, and not how far away it is: */
+    double told;          /* its direction as it was told, rad; z is 0, and so is reach: what is not known agrees */
 };
 
 /* A sighting about the belief, to first and second moments: what is expected, its variance without the sighting's own,
@@ -79,13 +81,29 @@ static void kalman_predict(void *self, const struct nav_motion *motion)
     nav_borders_move(&k->borders, motion->step);
 }
 
-/* Expected value of a sighting at a pose; INFINITY when nothing is within reach. */
+/* Expected direction of the face that the mean meets, less the one that was told, for a robot that is turned otherwise.
+ */
+static double kalman_turned(const struct kalman *k, const struct kalman_sighting *s, double theta)
+{
+    const struct nav_likelihood *l = k->likelihood;
+    const struct nav_pose *mean = &k->belief.mean;
+    const struct nav_place at = {mean->x, mean->y, cos(mean->theta), sin(mean->theta)};
+    struct nav_arena near;
+    if (!nav_obstacles_near(&l->obstacles, mean->x, mean->y, &near))
+        return NAN;
+    double met = nav_normal_direction(&l->model[l->sensors.first[2] + s->ray], &near, &at);
+    return nav_wrap(met - s->told) + mean->theta - theta;
+}
+
+/* Expected value of a sighting at a pose; not finite when nothing is within reach. */
 static double kalman_expect(struct kalman *k, const struct kalman_sighting *s, struct nav_pose pose)
 {
     k->evaluations++;
     struct nav_pose at = nav_compose(pose, (struct nav_pose){s->point.x, s->point.y, 0.0});
     if (s->ray < 0)
         return s->upright ? at.x : at.y;
+    if (s->normal)
+        return kalman_turned(k, s, pose.theta);
     const struct nav_ray *ray = &k->problem->robot.ray[s->ray];
     const struct nav_likelihood *l = k->likelihood;
     const struct nav_arena *arena = &k->problem->arena;
@@ -192,6 +210,13 @@ static void kalman_read_range(struct kalman *k, int r, double distance, double w
     kalman_correct(k, &s);
 }
 
+static void kalman_read_normal(struct kalman *k, int r, const double *normal, double weight)
+{
+    struct kalman_sighting s = {
+        .ray = r, .normal = true, .told = normal[0], .variance = normal[1] * normal[1] / weight};
+    kalman_correct(k, &s);
+}
+
 /* Texture of tile `column`, `row`, or -1 outside. */
 static int kalman_tile(const struct nav_arena *arena, int column, int row)
 {
@@ -254,7 +279,7 @@ static void kalman_update(void *self, const struct nav_evidence *evidence)
     if (!k->linearise)
         return;
     k->evaluations = 0;
-    const int *first = k->likelihood->sensors.first; /* texture whiskers, object whiskers; other sensors say nothing */
+    const int *first = k->likelihood->sensors.first; /* texture, distance, normal; other sensors say nothing */
     memcpy(k->weight, evidence->weight, (size_t)first[1] * sizeof *k->weight);
     nav_likelihood_read(k->likelihood, &(struct nav_evidence){evidence->reading, k->weight});
     for (int t = 0; t < first[1]; t++) {
@@ -264,6 +289,10 @@ static void kalman_update(void *self, const struct nav_evidence *evidence)
     for (int w = first[1]; w < first[2]; w++) {
         if (evidence->weight[w] > 0.0)
             kalman_read_range(k, w - first[1], evidence->reading[w][0], evidence->weight[w]);
+    }
+    for (int w = first[2]; w < first[3]; w++) {
+        if (evidence->weight[w] > 0.0)
+            kalman_read_normal(k, w - first[2], evidence->reading[w], evidence->weight[w]);
     }
     nav_borders_row_done(&k->borders);
 }

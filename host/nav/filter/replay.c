@@ -21,6 +21,7 @@ void nav_replay(struct nav_filter *filter, const struct nav_rows *rows, long fir
                               .odometry = {odometry[0], odometry[1], odometry[2]},
                               .texture = rows->texture + at * rows->texture_width,
                               .radial_m = rows->radial_m + at * rows->radial_width,
+                              .normal = rows->normal ? rows->normal + 2 * at * rows->radial_width : NULL,
                               .own = rows->own ? rows->own + at * rows->own_width : NULL};
         double begun = now_us();
         nav_filter_step(filter, &row, &out[k]);

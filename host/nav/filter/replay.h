@@ -12,6 +12,7 @@ struct nav_rows {
     const double *odometry; /* [rows][3] */
     const double *texture;  /* [rows][texture_width] */
     const double *radial_m; /* [rows][radial_width] */
+    const double *normal;   /* [rows][radial_width][2]; NULL: none was read */
     const double *own;      /* [rows][own_width] */
     long texture_width;     /* tips x classes */
     long radial_width;      /* rays */

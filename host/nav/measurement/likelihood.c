@@ -100,8 +100,8 @@ void nav_likelihood_read(struct nav_likelihood *l, const struct nav_evidence *ev
     }
 }
 
-/* Codes at a place, 0 for kinds that are not wanted. */
-static void likelihood_expect(const struct nav_likelihood *l, const struct nav_place *at, const bool wanted[NAV_KINDS],
+/* Codes at a place, 0 for kinds that are not wanted; NULL: all are. */
+static void likelihood_expect(const struct nav_likelihood *l, const struct nav_place *at, const bool *wanted,
                               uint8_t *codes)
 {
     struct nav_arena near;
@@ -110,8 +110,9 @@ static void likelihood_expect(const struct nav_likelihood *l, const struct nav_p
         int first = l->sensors.first[k], count = l->sensors.first[k + 1] - first;
         if (count == 0)
             continue;
-        bool any = wanted[k] && kind->solid && nav_obstacles_near(&l->obstacles, at->x, at->y, &near);
-        if (wanted[k])
+        bool asked = !wanted || wanted[k];
+        bool any = asked && kind->solid && nav_obstacles_near(&l->obstacles, at->x, at->y, &near);
+        if (asked)
             kind->expect(l->model + first, count, l->arena, any ? &near : NULL, at, codes + first);
         else
             memset(codes + first, 0, (size_t)count);
@@ -120,8 +121,7 @@ static void likelihood_expect(const struct nav_likelihood *l, const struct nav_p
 
 void nav_likelihood_expect(const struct nav_likelihood *l, const struct nav_place *at, uint8_t *codes)
 {
-    static const bool ALL[NAV_KINDS] = {true, true, true};
-    likelihood_expect(l, at, ALL, codes);
+    likelihood_expect(l, at, NULL, codes);
 }
 
 bool nav_likelihood_clear(const struct nav_likelihood *l, double x, double y, double grace)

@@ -6,6 +6,7 @@
 const struct nav_measurement *const NAV_MEASUREMENTS[NAV_KINDS] = {
     &NAV_TEXTURE_MEASUREMENT,
     &NAV_RANGE_MEASUREMENT,
+    &NAV_NORMAL_MEASUREMENT,
     &NAV_OWN_MEASUREMENT,
 };
 

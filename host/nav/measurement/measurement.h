@@ -1,10 +1,10 @@
 /* Measurement models: the likelihood of a sensor's reading by what the map leads one to expect.
  *
  * What can be expected of a sensor is one of a few codes: for a texture whisker the texture's index, for an object
- * whisker the contact's distance in steps, then "nothing within reach"; the last code of every sensor means "not
- * known". A model fills a table over codes once per reading, and every pose, cell or hypothesis costs a look-up. One
- * file per kind of sensor and one line in NAV_MEASUREMENTS; nothing else asks what kind a sensor is, but the Kalman
- * filters, which linearise. */
+ * whisker the contact's distance in steps, then "nothing within reach", and the direction of the face that it meets;
+ * the last code of every sensor means "not known". A model fills a table over codes once per reading, and every pose,
+ * cell or hypothesis costs a look-up. One file per kind of sensor and one line in NAV_MEASUREMENTS; nothing else asks
+ * what kind a sensor is, but the Kalman filters, which linearise. */
 #ifndef NAV_MEASUREMENT_H
 #define NAV_MEASUREMENT_H
 
@@ -83,9 +83,14 @@ struct nav_measurement {
 
 extern const struct nav_measurement NAV_TEXTURE_MEASUREMENT; /* eq. 1's log-likelihoods, tempered, outlier floor */
 extern const struct nav_measurement NAV_RANGE_MEASUREMENT;   /* Gaussian distance, misses, ghosts, null contacts */
+extern const struct nav_measurement NAV_NORMAL_MEASUREMENT;  /* wrapped Gaussian direction of a face, outliers */
 extern const struct nav_measurement NAV_OWN_MEASUREMENT;     /* a sensor of the user's own */
 
-enum { NAV_KINDS = 3 };
+/* Direction that a model of NAV_NORMAL_MEASUREMENT expects at a place, robot's frame, rad; NAN: not known. near: as
+ * `expect` has it. */
+double nav_normal_direction(const struct nav_model *, const struct nav_arena *near, const struct nav_place *);
+
+enum { NAV_KINDS = 4 };
 extern const struct nav_measurement *const NAV_MEASUREMENTS[NAV_KINDS];
 
 /* All sensors of a robot, kind by kind in the table's order. */

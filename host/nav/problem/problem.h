@@ -45,6 +45,9 @@ struct nav_row {
     double odometry[3];     /* motion since the previous row in its frame: x, y m, theta rad */
     const double *texture;  /* [tips][classes] log-likelihood of the window */
     const double *radial_m; /* [rays] distance of contact; INFINITY: read, no contact */
+    const double *normal;   /* [rays][2] of the surface that is touched, with `normals` of the robot: direction of the
+                               outward normal, robot's frame, -2 pi to 2 pi, and its standard deviation, above 0 up to
+                               pi; a direction of NaN: not read. NULL: none is */
     const double *own;      /* readings of the robot's own sensors, one after another */
 };
 

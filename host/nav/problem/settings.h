@@ -16,6 +16,10 @@ struct nav_radial_settings {
     double spacing_m; /* "no contact" counts in full after the whisker has moved so far since it last did */
 };
 
+struct nav_normal_settings {
+    double outlier; /* share of directions of surfaces that say nothing about the face */
+};
+
 struct nav_trust_settings {
     double learn; /* 1: whiskers that keep disagreeing with a sure belief count for less (trust.h); 0: never */
 };
@@ -86,6 +90,7 @@ struct nav_multi_settings {
 struct nav_settings {
     struct nav_texture_settings texture;
     struct nav_radial_settings radial;
+    struct nav_normal_settings normal;
     struct nav_trust_settings trust;
     struct nav_motion_settings motion;
     struct nav_grid_settings grid;

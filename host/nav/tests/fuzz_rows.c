@@ -47,6 +47,7 @@ static void check(const struct nav_estimate *e)
 static struct nav_filter *make(int number)
 {
     struct nav_problem p = room();
+    p.robot.normals = true;
     nav_settings_set(&p.settings, "grid.cell_m", 0.1);
     nav_settings_set(&p.settings, "grid.cell_deg", 45.0);
     nav_settings_set(&p.settings, "foveal.cells", 3.0);
@@ -66,13 +67,15 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     struct input in = {data + 1, data + size};
     struct nav_filter *f = make(data[0] % filters);
     while (f && in.at < in.end) {
-        double texture[2], radial;
-        struct nav_row row = {.t_s = cell(&in), .texture = texture, .radial_m = &radial};
+        double texture[2], radial, normal[2];
+        struct nav_row row = {.t_s = cell(&in), .texture = texture, .radial_m = &radial, .normal = normal};
         for (int i = 0; i < 3; i++)
             row.odometry[i] = cell(&in);
         texture[0] = cell(&in);
         texture[1] = cell(&in);
         radial = cell(&in);
+        normal[0] = cell(&in);
+        normal[1] = cell(&in);
         struct nav_estimate e;
         nav_filter_step(f, &row, &e);
         check(&e);

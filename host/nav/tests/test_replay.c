@@ -20,7 +20,7 @@ static void replay_gives_what_steps_give(void **state)
         memcpy(texture + 2 * k, (double[]){0.0, -1.0 * k}, 2 * sizeof *texture);
         radial[k] = k % 2 ? 0.15 : (double)INFINITY;
     }
-    const struct nav_rows rows = {t, odometry, texture, radial, NULL, 2, 1, 0};
+    const struct nav_rows rows = {t, odometry, texture, radial, NULL, NULL, 2, 1, 0};
     struct nav_filter *one = nav_filter_new("grid", &p), *other = nav_filter_new("grid", &p);
     struct nav_estimate parts[ROWS], whole[ROWS];
     nav_replay(one, &rows, 0, 2, parts, us);

@@ -3,6 +3,7 @@
 import csv
 import math
 from collections import Counter
+from collections.abc import Container
 
 import numpy as np
 
@@ -56,11 +57,15 @@ def _name(cell: str) -> str:
 def read_columns(path, required: list[str]) -> dict[str, list[str]]:
     """Columns as text by name; TableError when one of `required` is missing."""
     header, rows = read_rows(path)
-    known = set(header)
+    require_columns(path, set(header), required)
+    return {name: [row[i].strip() for row in rows] for i, name in enumerate(header)}
+
+
+def require_columns(path, known: Container[str], required: list[str]) -> None:
+    """TableError when one of `required` is not among the known columns."""
     for name in required:
         if name not in known:
             raise TableError(path, 1, f"column '{name}' is missing; add it to the header and every row")
-    return {name: [row[i].strip() for row in rows] for i, name in enumerate(header)}
 
 
 def numbers(cells: list[str]) -> np.ndarray:

@@ -31,6 +31,26 @@ def test_a_whisker_meets_walls_and_blocks_of_an_arena_longer_than_wide(pose, dis
     assert geometry.range_test(LONG, LEFTWARD)(*pose) == pytest.approx(distance_m)
 
 
+@pytest.mark.parametrize(
+    ("pose", "direction"),
+    [
+        ((2.9, 0.5, -math.pi / 2), math.pi),  # walls: right, left, upper, lower
+        ((0.1, 0.5, math.pi / 2), 0.0),
+        ((0.5, 0.9, 0.2), -math.pi / 2),
+        ((0.5, 0.1, math.pi), math.pi / 2),
+        ((1.2, 0.31, 0.0), -math.pi / 2),  # the block, from below and from its right
+        ((1.57, 0.5, math.pi / 2), 0.0),
+        ((1.015, 0.31, 0.0), math.nan),  # its corner, the room's, nothing
+        ((2.997, 0.9, 0.0), math.nan),
+        ((0.5, 0.5, 0.3), math.nan),
+    ],
+)
+def test_a_face_is_met_as_it_lies(pose, direction):
+    (told,) = geometry.directions(LONG, np.array([pose]), LEFTWARD, 0.01)
+    assert np.cos([told]) == pytest.approx([math.cos(direction)], abs=1e-9, nan_ok=True)
+    assert np.sin([told]) == pytest.approx([math.sin(direction)], abs=1e-9, nan_ok=True)
+
+
 @pytest.mark.parametrize("radius", [0.0, 0.1, 0.165])
 def test_what_is_free_for_a_scene_is_free_for_the_arena_with_some_to_spare(radius):
     free = geometry.free_test(LONG, radius)

@@ -12,12 +12,16 @@ from whisker.scenes import geometry
 from whisker.scenes.explorer import explore
 from whisker.scenes.readings import World, hold_back, odometry
 
-FIELDS = ("t_s", "odometry", "texture", "radial_m", "truth")
+FIELDS = ("t_s", "odometry", "texture", "radial_m", "truth", "normal")
 FAMILIES = [*scenes.BASES, *(f"anchor+{modifier}" for modifier in scenes.MODIFIERS)]
 
 
 def differing(one, other):
-    return [f for f in FIELDS if not np.array_equal(getattr(one, f), getattr(other, f), equal_nan=True)]
+    return [f for f in FIELDS if not _same(getattr(one, f), getattr(other, f))]
+
+
+def _same(one, other):
+    return one is other if one is None or other is None else np.array_equal(one, other, equal_nan=True)
 
 
 @pytest.mark.parametrize("family", FAMILIES)

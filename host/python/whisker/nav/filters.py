@@ -10,7 +10,7 @@ from ..errors import UserError
 from ..native import as_doubles, doubles, ffi, lib, octets, pointer
 from ..scene import Prior, Scene
 from ..sensor_tables import SensorTable
-from .observations import ODOMETRY, Observations
+from .observations import NORMAL, ODOMETRY, Observations, touch_keys
 
 FAVOURITE, SPARE = "adaptive", "grid"
 SENSOR_UNKNOWN = 255
@@ -124,8 +124,10 @@ class Filter:
         seed: int = 0,
         bumps: np.ndarray | None = None,
         sensors: Sequence[Sensor] = (),
+        normals: bool = False,
     ):
-        """`bumps`: (n,) of COMPONENT, to begin from in place of the scene's prior; `sensors`: more than the scene's."""
+        """`bumps`: (n,) of COMPONENT, to begin from in place of the scene's prior; `sensors`: more than the scene's;
+        `normals`: rows may tell directions of the surfaces that object whiskers touch."""
         if name not in filter_names():
             raise SettingError(f"filter '{name}' is unknown; choose one of {', '.join(filter_names())}")
         if not 0 <= seed <= SEED_MOST:
@@ -136,7 +138,7 @@ class Filter:
         self._own_keys = [sensor.name for sensor in scene.robot.sensors]
         sensors = (*map(_of_table, scene.robot.sensors), *sensors)
         problem, self._keep = problem_of(scene, settings or {}, bumps, sensors)
-        problem.seed = seed
+        problem.seed, problem.robot.normals = seed, normals
         self._own = sum(sensor.values for sensor in sensors)
         made = lib.nav_filter_new(name.encode(), problem)
         if made == ffi.NULL:
@@ -146,6 +148,7 @@ class Filter:
         self._texture_keys = [[f"{w.name}_{t}" for t in scene.arena.textures] for w in scene.robot.of_role("texture")]
         self._classes = len(scene.arena.textures)
         self._radial_keys = [f"{w.name}_mm" for w in scene.robot.of_role("object")]
+        self._normal_keys = [touch_keys(w, NORMAL) for w in scene.robot.of_role("object")]
 
     def step(self, row: dict[str, float | None]) -> Estimate:
         """Take one row of cells."""
@@ -153,12 +156,13 @@ class Filter:
         radial = [math.inf if row[k] is None else row[k] / 1000.0 for k in self._radial_keys]
         own = [math.nan if row.get(k) is None else row[k] for k in self._own_keys]
         own += [math.nan] * (self._own - len(own))
-        return self.step_values(row["t_s"], [row[k] for k in ODOMETRY], texture, radial, own)
+        normal = [[math.nan if row.get(k) is None else row[k] for k in keys] for keys in self._normal_keys]
+        return self.step_values(row["t_s"], [row[k] for k in ODOMETRY], texture, radial, own, normal)
 
-    def step_values(self, t_s: float, odometry, texture, radial_m, own=()) -> Estimate:
+    def step_values(self, t_s: float, odometry, texture, radial_m, own=(), normal=None) -> Estimate:
         """Take one row of numbers: odometry (3,): m, m, rad; texture (tips, classes), nan not read; radial_m (rays,) in m,
-        nan not read, inf no contact; own (values,): log-likelihoods of the user's sensors, nan not read. ValueError when
-        one has another shape."""
+        nan not read, inf no contact; own (values,): log-likelihoods of the user's sensors, nan not read; normal (rays, 2)
+        in rad with its standard deviation, nan not read. ValueError when one has another shape."""
         rows = Observations(
             as_doubles(t_s, "t_s", ()).reshape(1),
             [],
@@ -167,6 +171,7 @@ class Filter:
             as_doubles(radial_m, "radial_m", (self._rays,))[None],
             None,
             as_doubles(own, "own", (self._own,))[None],
+            None if normal is None else as_doubles(normal, "normal", (self._rays, 2))[None],
         )
         return to_estimate(self.replay(rows, 0, 1)[0][0])
 
@@ -186,6 +191,7 @@ class Filter:
                 "odometry": doubles(rows.odometry, "odometry", (held, 3)),
                 "texture": doubles(rows.texture, "texture", (held, self._tips, self._classes)),
                 "radial_m": doubles(rows.radial_m, "radial_m", (held, self._rays)),
+                "normal": ffi.NULL if rows.normal is None else doubles(rows.normal, "normal", (held, self._rays, 2)),
                 "own": doubles(own, "own", (held, self._own)),
                 "own_width": self._own,
                 "texture_width": self._tips * self._classes,

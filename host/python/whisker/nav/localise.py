@@ -74,7 +74,7 @@ def run(
 
     A belief of so many components that this would take longer than the run is judged less often: nan at the others."""
     began = time.perf_counter()
-    made = Filter(name, scene, settings, seed)
+    made = Filter(name, scene, settings, seed, normals=observations.normal is not None)
     setup_s = time.perf_counter() - began
     first, parts, judged, work = 0, [], [], 0
     for row in judged_rows(observations, regions):

@@ -1,16 +1,20 @@
 """observations.csv of a scene folder as arrays. Strict in structure, forgiving in values (design contract)."""
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from ..scene import OBSERVATIONS, Scene
-from ..tables import number, numbers, read_columns
+from ..scene import OBSERVATIONS, Scene, Whisker
+from ..tables import number, numbers, read_columns, require_columns
 
 TRUTH = ("true_x_m", "true_y_m", "true_theta_rad")
 ODOMETRY = ("odo_x_m", "odo_y_m", "odo_theta_rad")
+# Of an object whisker, after its name: what it touches, in the robot's frame at the row's end. A file may leave them out.
+NORMAL = ("normal_rad", "normal_sd_rad")
+POINT = ("point_x_m", "point_y_m", "point_sd_m")
 
 
 @dataclass
@@ -24,6 +28,8 @@ class Observations:
     radial_m: np.ndarray  # (n, rays), nan not read, inf no contact
     truth: np.ndarray | None  # (n, 3)
     own: np.ndarray | None = None  # (n, values) readings of the user's own sensors one after another, nan not read
+    normal: np.ndarray | None = None  # (n, rays, 2) as NORMAL, nan not read; None: no such columns
+    point: np.ndarray | None = None  # (n, rays, 3) as POINT, likewise
 
     def __len__(self) -> int:
         return len(self.t_s)
@@ -58,7 +64,29 @@ def read_observations(path, scene: Scene) -> Observations:
         np.ascontiguousarray(radial.T),
         np.column_stack([numbers(text[name]) for name in TRUTH]) if known else None,
         np.column_stack([_column(text[name], _own_cell) for name in own]) if own else None,
+        *(_touched(path, text, scene.robot.of_role("object"), names) for names in (NORMAL, POINT)),
     )
+
+
+def tells_normals(names: Iterable[str]) -> bool:
+    """Whether a row of these cells may hold the direction of a surface."""
+    return any(name.endswith(f"_{NORMAL[0]}") for name in names)
+
+
+def touch_keys(whisker: Whisker, names: tuple[str, ...]) -> list[str]:
+    """Columns of NORMAL or POINT."""
+    return [f"{whisker.name}_{name}" for name in names]
+
+
+def _touched(path, text: dict[str, list[str]], whiskers: list[Whisker], names: tuple[str, ...]) -> np.ndarray | None:
+    """(n, whiskers, names); None where no whisker has such columns. TableError when one has some of them only."""
+    out = np.full((len(text["t_s"]), len(whiskers), len(names)), np.nan)
+    given = [n for n, w in enumerate(whiskers) if any(key in text for key in touch_keys(w, names))]
+    for n in given:
+        keys = touch_keys(whiskers[n], names)
+        require_columns(path, text, keys)
+        out[:, n] = np.column_stack([_column(text[key], _own_cell) for key in keys])
+    return out if given else None
 
 
 def cell(value: float | None) -> str:

@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from ..nav.localise import Estimate
+from ..nav.observations import tells_normals
 from ..scene import Prior, Scene
 from . import belief, initial_pose
 from .health import ENDED, RUNNING, Health
@@ -154,7 +155,7 @@ class Navigator:
     def _take(self, step: Step, stack: ExitStack) -> None:
         began = time.monotonic()
         if not self._tracks:
-            self._begin(stack)
+            self._begin(stack, tells_normals(step.row.names))
             self._begin_from_told()
         self._now_ns = step.row.header.stamp.ns
         header = Header.at(self._now_ns, ARENA_FRAME)
@@ -182,13 +183,15 @@ class Navigator:
         now = time.monotonic()
         self._belief_rest_s = now + (now - began) / BELIEF_SHARE
 
-    def _begin(self, stack: ExitStack) -> None:
+    def _begin(self, stack: ExitStack, normals: bool) -> None:
         """The prior is of the run's start: whoever joins later cannot use it."""
         before, out = self._beliefs_before, self._settings.out
         resumed = bool(before) or self._follower.first_seq > 0
         self._prior = CHECKPOINT if before else UNIFORM if resumed else SCENE_PRIOR
         scene = replace(self._scene, prior=Prior("uniform")) if resumed else self._scene
-        self._tracks = [Track(name, scene, out, stack, resumed, before.get(name)) for name in self._settings.filters]
+        self._tracks = [
+            Track(name, scene, out, stack, resumed, before.get(name), normals) for name in self._settings.filters
+        ]
 
     def _answer(self, track: Track, step: Step, header: Header, estimate: Estimate) -> None:
         pose = PoseWithCovariance.planar(estimate.pose, estimate.covariance)

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from ..nav.observations import NORMAL
 from ..scene import Scene
 from .inbox import Received
 from .messages import REMEDIES, Observation
@@ -49,6 +50,8 @@ class RowChecks:
         if missing := self._wanted.difference(names):
             return f"field names: cell {min(missing)} is missing; give both sides the scene of this robot"
         unknown = (name for name in names if name not in self._wanted and not name.startswith(self._whiskers))
+        if alone := _alone(set(names)):
+            return f"field names: cell {alone} is missing; {REMEDIES[1]}"
         if (stranger := next(unknown, None)) is not None:
             return f"field names: no whisker has the cell {stranger:.40}; give both sides the scene of this robot"
         return ""
@@ -77,6 +80,13 @@ def columns(scene: Scene) -> frozenset[str]:
     """Cells that a row of this scene must have."""
     textures = {f"{w.name}_{t}" for w in scene.robot.of_role("texture") for t in scene.arena.textures}
     return frozenset(textures | {f"{w.name}_mm" for w in scene.robot.of_role("object")})
+
+
+def _alone(names: set[str]) -> str:
+    """The standard deviation's cell that a direction lacks; empty: none does."""
+    directions = (name for name in names if name.endswith(f"_{NORMAL[0]}"))
+    wanted = (f"{name.removesuffix(NORMAL[0])}{NORMAL[1]}" for name in directions)
+    return min((name for name in wanted if name not in names), default="")
 
 
 def _whiskers(scene: Scene) -> tuple[str, ...]:

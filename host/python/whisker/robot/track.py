@@ -24,12 +24,13 @@ class Track:
         stack: ExitStack,
         resumed: bool = False,
         bumps: np.ndarray | None = None,
+        normals: bool = False,
     ):
         """`out`: the folder of the files, which `stack` closes; None: no files. resumed: go on behind what they hold.
 
-        bumps: what is believed already, in place of the scene's prior.
+        bumps: what is believed already, in place of the scene's prior. normals: as Filter has it.
         """
-        self.name, self.filter = name, localise.Filter(name, scene, bumps=bumps)
+        self.name, self.filter = name, localise.Filter(name, scene, bumps=bumps, normals=normals)
         self._poses = self._covariances = None
         if out is not None:
             self._poses, self._covariances = (

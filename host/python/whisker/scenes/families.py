@@ -19,6 +19,7 @@ from .readings import World
 KIDNAP_LEAST_M = 0.8
 KIDNAP_ROW, KIDNAP_ROWS = 300, 1200
 SLIPS, SLIP_ROWS = 4, 10
+NORMAL_SD_DEG = 5.0
 
 
 class FamilyError(UserError):
@@ -131,6 +132,10 @@ MODIFIERS: dict[str, tuple[str, Callable[[Recipe], Recipe]]] = {
     **{f"scale-{s:g}": (f"odometry says {s:g} times the distance", _world(scale=s)) for s in (0.8, 0.9, 1.1, 1.2)},
     "turn-bias": ("odometry says 1.2 times the turn", _world(turn_scale=1.2)),
     "slip": (f"the wheels spin {SLIPS} times for {SLIP_ROWS} rows", lambda r: replace(r, slips=SLIPS)),
+    "normals": (
+        f"directions of the faces that object whiskers touch, to {NORMAL_SD_DEG:g} degrees",
+        _world(normal_sd_rad=math.radians(NORMAL_SD_DEG)),
+    ),
     "late": ("rows come late", _fault(faults.late)),
     "doubled": ("rows come twice", _fault(faults.doubled)),
     "reordered": ("rows change places", _fault(faults.reordered)),

@@ -88,7 +88,9 @@ def missed(share: float) -> Fault:
 def _taken(o: Observations, rows: np.ndarray) -> Observations:
     truth = None if o.truth is None else o.truth[rows]
     text = [o.t_text[k] for k in rows] if o.t_text else []
-    return Observations(o.t_s[rows], text, o.odometry[rows], o.texture[rows], o.radial_m[rows], truth)
+    touched = (None if a is None else a[rows] for a in (o.normal, o.point))
+    own = None if o.own is None else o.own[rows]
+    return Observations(o.t_s[rows], text, o.odometry[rows], o.texture[rows], o.radial_m[rows], truth, own, *touched)
 
 
 def late(o: Observations, scene: Scene, rng: np.random.Generator) -> Observations:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..nav.observations import ODOMETRY, TRUTH, Observations
+from ..nav.observations import NORMAL, ODOMETRY, POINT, TRUTH, Observations, touch_keys
 from ..scene import OBSERVATIONS, Scene, write
 
 DECIMALS = 6  # m, rad, nats; distances are rounded in mm to three
@@ -20,7 +20,10 @@ def rounded(observations: Observations) -> Observations:
         np.round(observations.texture, DECIMALS),
         np.round(observations.radial_m * 1000.0, 3) / 1000.0,
         None if truth is None else np.round(truth, DECIMALS),
-        None if observations.own is None else np.round(observations.own, DECIMALS),
+        *(
+            None if a is None else np.round(a, DECIMALS)
+            for a in (observations.own, observations.normal, observations.point)
+        ),
     )
 
 
@@ -36,6 +39,10 @@ def write_scene(path, scene: Scene, observations: Observations) -> None:
     if observations.own is not None:
         header += [sensor.name for sensor in scene.robot.sensors]
         columns += _cells(observations.own, {"nan": ""})
+    for names, values in ((NORMAL, observations.normal), (POINT, observations.point)):
+        if values is not None:
+            header += [key for w in rays for key in touch_keys(w, names)]
+            columns += _cells(values.reshape(len(observations.t_s), -1), {"nan": ""})
     if observations.truth is not None:
         header += TRUTH
         columns += _numbers(observations.truth)

@@ -53,6 +53,28 @@ def ranges(arena: Arena, poses: np.ndarray, whisker: Whisker) -> np.ndarray:
     return np.where(nearest <= whisker.length_m, nearest, np.inf)
 
 
+def directions(arena: Arena, poses: np.ndarray, whisker: Whisker, corner_m: float) -> np.ndarray:
+    """(n,) direction of the outward normal of the face at which an object whisker's line ends, world, rad; nan: it meets
+    none, or another face is as near as `corner_m`."""
+    base = compose(poses, np.array([*whisker.base_m, whisker.yaw_rad]))
+    reach = ranges(arena, poses, whisker)[:, None]
+    met = np.isfinite(reach[:, 0])
+    end = base[:, :2] + np.where(met[:, None], reach, 0.0) * np.column_stack([np.cos(base[:, 2]), np.sin(base[:, 2])])
+    faces = [(side, math.pi + turn) for side, turn in _sides((0.0, 0.0, *arena.size_m))]
+    faces += [face for box in arena.obstacles for face in _sides(box)]
+    off = np.array([np.hypot(*(end - np.clip(end, side[0], side[1])).T) for side, _ in faces])
+    near = np.sort(off, axis=0)
+    told = met & (near[1] > corner_m)
+    return np.where(told, np.array([turn for _, turn in faces])[off.argmin(axis=0)], np.nan)
+
+
+def _sides(box) -> list[tuple[tuple[tuple, tuple], float]]:
+    """Each side of a box as its least and greatest corner, and the direction of its outward normal."""
+    x0, y0, x1, y1 = box
+    left, right, low, high = ((x0, y0), (x0, y1)), ((x1, y0), (x1, y1)), ((x0, y0), (x1, y0)), ((x0, y1), (x1, y1))
+    return [(right, 0.0), (high, math.pi / 2), (left, math.pi), (low, -math.pi / 2)]
+
+
 def _slab(start, direction, low, high):
     """Where a ray enters and leaves the strip low .. high."""
     inside = (start >= low) & (start <= high)

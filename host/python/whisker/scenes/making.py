@@ -12,15 +12,28 @@ import numpy as np
 from ..nav.observations import Observations
 from ..scene import Arena, Prior, Robot, Scene
 from . import walk
-from .explorer import explore
+from .explorer import TIP_M, explore
 from .families import KIDNAP_LEAST_M, SLIP_ROWS, Recipe, recipe
 from .files import rounded
-from .readings import contacts, hold_back, measured, odometry, texture_windows
+from .readings import contacts, hold_back, measured, normals, odometry, texture_windows
 
 ROW_S = 0.1
 KNOWN_SIGMA = (0.02, 0.02, 0.03)  # m, m, rad
 WRONG_SIGMA = (0.1, 0.1, 0.2)
-STREAMS = ("arena", "start", "path", "odometry", "texture", "radial", "prior", "kidnap", "fault", "map", "slip")
+STREAMS = (
+    "arena",
+    "start",
+    "path",
+    "odometry",
+    "texture",
+    "radial",
+    "prior",
+    "kidnap",
+    "fault",
+    "map",
+    "slip",
+    "normal",
+)
 
 
 @dataclass(frozen=True)
@@ -57,6 +70,7 @@ def make_recipe(r: Recipe, seed: int, rows: int | None = None, path_seed: int | 
         (np.arange(rows) + 1) * ROW_S,
         [],
         *(np.concatenate([getattr(p, name) for p in parts]) for name in ("odometry", "texture", "radial_m", "truth")),
+        normal=None if r.world.normal_sd_rad is None else np.concatenate([p.normal for p in parts]),
     )
     mapped = r.map_fault(arena, rng["map"]) if r.map_fault else arena
     scene = Scene(mapped, robot, _prior(r, arena, robot, start, rng["prior"]))
@@ -74,15 +88,17 @@ def _drive(r: Recipe, arena: Arena, robot: Robot, start: np.ndarray, rows: int, 
         radial = measured(e.radial_m, robot, r.world, rng["radial"])
         texture = texture_windows(arena, robot, e.path[1:], r.world, rng["texture"])
         texture[~e.sweeping] = np.nan
-        return Observations(np.zeros(rows), [], reported, texture, radial, e.path[1:])
+        by_tip = e.radial_m > np.array([w.length_m - TIP_M for w in robot.of_role("object")])
+        normal = normals(arena, robot, e.path[1:], by_tip & np.isfinite(radial), r.world, rng["normal"])
+        return Observations(np.zeros(rows), [], reported, texture, radial, e.path[1:], normal=normal)
     path = walk.wander(arena, robot.body_radius_m, start, rows, rng["path"], r.pace)
     reported = odometry(path, r.world, rng["odometry"])
     if r.slips:
         path, reported = _slipped(path, reported, r, rng["slip"])
     texture = texture_windows(arena, robot, path[1:], r.world, rng["texture"])
-    return Observations(
-        np.zeros(rows), [], reported, texture, contacts(arena, robot, path[1:], r.world, rng["radial"]), path[1:]
-    )
+    radial = contacts(arena, robot, path[1:], r.world, rng["radial"])
+    normal = normals(arena, robot, path[1:], np.isfinite(radial), r.world, rng["normal"])
+    return Observations(np.zeros(rows), [], reported, texture, radial, path[1:], normal=normal)
 
 
 def _slipped(path: np.ndarray, reported: np.ndarray, r: Recipe, rng: np.random.Generator):

@@ -1,13 +1,15 @@
 """What a robot reports along a path: odometry, log-likelihoods of texture windows, contact distances."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..scene import Arena, Robot
-from .geometry import compose, motions, ranges, textures
+from .geometry import compose, directions, motions, ranges, textures
 
+CORNER_M = 0.005  # from the end of a face, and less: the corner is touched
+LOOSE_M = 0.005  # a whisker that lets go is still so near
 CATCH_ROWS = (1, 11)  # a caught whisker says one thing for 0.1 to 1 s
 
 
@@ -28,6 +30,8 @@ class World:
     radial_sigma_m: float = 0.005
     miss: float = 0.05  # of contacts
     ghost: float = 0.01  # of readings without contact
+    normal_sd_rad: float | None = None  # of the direction of a face that is touched; None: it is not told
+    normal_wrong: float = 0.05  # share of them that are any direction
 
 
 def odometry(path: np.ndarray, world: World, rng: np.random.Generator) -> np.ndarray:
@@ -130,3 +134,22 @@ def measured(true_m: np.ndarray, robot: Robot, world: World, rng: np.random.Gene
         invented = rng.uniform(0.0, whisker.length_m, rows)
         out[:, n] = np.where(felt, noisy, np.where(ghost, invented, np.inf))
     return np.where(np.isnan(true_m), np.nan, out)
+
+
+def normals(
+    arena: Arena, robot: Robot, poses: np.ndarray, touched: np.ndarray, world: World, rng: np.random.Generator
+) -> np.ndarray | None:
+    """(n, rays, 2) directions of faces, robot's frame, with their standard deviation, rad; nan: not told, as where not
+    `touched` (n, rays) or at a corner. None: this robot tells none."""
+    if world.normal_sd_rad is None:
+        return None
+    out = np.full((*touched.shape, 2), np.nan)
+    for n, whisker in enumerate(robot.of_role("object")):
+        longer = replace(whisker, length_m=whisker.length_m + LOOSE_M)
+        true = directions(arena, poses, longer, CORNER_M) - poses[:, 2]
+        wrong = rng.random(len(poses)) < world.normal_wrong
+        told = np.where(wrong, rng.uniform(-math.pi, math.pi, len(poses)), true)
+        told = np.where(np.isnan(true), np.nan, told + world.normal_sd_rad * rng.standard_normal(len(poses)))
+        out[:, n, 0] = np.where(touched[:, n], np.remainder(told + math.pi, 2 * math.pi) - math.pi, np.nan)
+    out[..., 1] = np.where(np.isnan(out[..., 0]), np.nan, world.normal_sd_rad)
+    return out
