@@ -1,6 +1,6 @@
 /* Figures: a corner's place within 1 mm and its regions honest while it is swept at 0.1 m/s; the motion told; bad input
  * counted. Contacts are bent by the table, which is itself tested against numbers of others. */
-#include "contact_filter.h"
+#include "contact_geometry.h"
 
 #include <string.h>
 
@@ -22,6 +22,7 @@ static struct nav_contact_filter_config settings(void)
                                               .noise_rad = NOISE,
                                               .largest_rad = 0.25,
                                               .gain_sd = 0.01,
+                                              .model_share = 0.02,
                                               .friction = 0.3,
                                               .friction_sd = 0.05,
                                               .motion_share = 0.01,
@@ -193,7 +194,7 @@ static void what_is_known_leaves_a_tenth_of_the_error(void **state)
 {
     (void)state;
     struct nav_contact_filter_config known = settings();
-    known.gain_sd = known.friction_sd = known.motion_share = 0.0;
+    known.gain_sd = known.model_share = known.friction_sd = known.motion_share = 0.0;
     struct nav_contact_filter f = filter_of(known);
     struct course c = {corner_at(0.11), {-0.02, -0.1, 0.0}, {0}, 1, 23, 0.0};
     drive(&f, &c, 480, 0);
@@ -353,6 +354,45 @@ static void a_face_under_the_tip_gives_its_normal(void **state)
     assert_near(a.arc_m, 0.14, 1e-3);
 }
 
+/* A contact at the tip whose direction lies `away` standard deviations from where it goes over to the shaft. */
+static struct nav_contact_filter at_the_tip(double away)
+{
+    struct nav_contact_filter f = filter();
+    struct nav_contact_part *part = &f.part[0];
+    const struct nav_contact_step still = {.seconds = 0.01, .tilt = NAN, .variance = 1e-9};
+    *part = (struct nav_contact_part){.tip = true, .grip = -1.0};
+    part->s[SLOPE] = 0.2;
+    part->s[FRICTION] = 0.3;
+    part->s[FIRST] = 0.2 + 90 * DEGREE - atan(0.3) + 0.01 * away;
+    part->p[FIRST][FIRST] = 1e-4;
+    part->p[SLOPE][SLOPE] = part->p[FRICTION][FRICTION] = 1e-12;
+    f.parts = 1;
+    f.side = 1.0;
+    nav_contact_bank_step(&f, &still);
+    return f;
+}
+
+static void the_part_of_a_hypothesis_beyond_the_tip_goes_over_to_the_shaft(void **state)
+{
+    (void)state;
+    struct nav_contact_filter f = at_the_tip(0.0);
+    assert_int_equal(f.parts, 2);
+    const struct nav_contact_part *stays = &f.part[0], *goes = &f.part[1];
+    assert_true(stays->tip && !goes->tip);
+    assert_near(exp(stays->log_weight), 0.5, 1e-3);
+    assert_near(exp(goes->log_weight), 0.5, 1e-3);
+    assert_near(goes->s[FIRST], beam.tip, 2e-3);
+    assert_near(stays->s[FIRST], 0.2 + 90 * DEGREE - atan(0.3) + 0.01 * 0.798, 1e-5); /* a half normal's mean ... */
+    assert_near(stays->p[FIRST][FIRST], 1e-4 * 0.363, 1e-6);                          /* ... and variance */
+    f = at_the_tip(3.0);
+    assert_true(f.parts == 1 && f.part[0].tip);
+    f = at_the_tip(-3.0);
+    assert_true(f.parts == 1 && !f.part[0].tip);
+    f = at_the_tip(1.0);
+    assert_int_equal(f.parts, 2);
+    assert_near(exp(f.part[1].log_weight), 0.1587, 1e-3);
+}
+
 int main(void)
 {
     if (!nav_contact_beam_make(&beam, 0.14 / CONE))
@@ -367,6 +407,7 @@ int main(void)
         cmocka_unit_test(a_body_whisk_is_told_from_a_drive),
         cmocka_unit_test(an_object_that_moves_is_told_with_its_speed),
         cmocka_unit_test(a_face_under_the_tip_gives_its_normal),
+        cmocka_unit_test(the_part_of_a_hypothesis_beyond_the_tip_goes_over_to_the_shaft),
         cmocka_unit_test(bad_samples_are_counted_and_not_read),
         cmocka_unit_test(whatever_comes_the_answers_are_finite),
         cmocka_unit_test(what_only_rests_is_no_contact_and_a_new_one_begins_anew),

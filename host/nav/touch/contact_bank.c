@@ -6,20 +6,20 @@
 #include "contact_geometry.h"
 
 enum { CORNERS = 14, ROUNDS = 8, NORMALS = 5 };
-#define LEAST_ARC 0.2     /* cones: nearer, the mount is touched */
-#define SPREAD 0.6        /* standard deviation of a hypothesis, share of the distance to the next */
-#define FIRST_NORMAL 1.57 /* rad: of surfaces under the tip ... */
-#define NORMAL_STEP 0.21  /* ... and between two; a whisker meets no surface with its tip that leans the other way */
-#define RADIUS_M 0.04     /* of rounded objects, mean and standard deviation */
-#define RADIUS_SD_M 0.03
-#define CORNER_M 0.005      /* a radius below is a corner's */
-#define CURVATURE_SD 10.0   /* 1/m, about 0 */
-#define LEAST_CURVATURE 0.2 /* 1/m */
-#define MODEL_SHARE 0.005   /* error of the table and of the quasi-static law, share of the tilt */
-#define CREEP_SHARE 0.02    /* error of the creep, share of the tilt */
-#define POINT_LEAST_M 1e-4  /* errors of the tables, and of a block's middle */
-#define NORMAL_LEAST 0.003  /* rad */
-#define FLAT 0.02           /* rad: what is not known of a direction when a contact goes over between tip and shaft */
+#define LEAST_ARC 0.2        /* cones: nearer, the mount is touched */
+#define SPREAD 0.6           /* standard deviation of a hypothesis, share of the distance to the next */
+#define FIRST_NORMAL 1.57    /* rad: of surfaces under the tip ... */
+#define NORMAL_STEP 0.21     /* ... and between two; a whisker meets no surface with its tip that leans the other way */
+#define SHAFT_CURVATURE 25.0 /* 1/m, of rounded objects under the shaft, mean and standard deviation */
+#define SHAFT_CURVATURE_SD 15.0
+#define TIP_CURVATURE_SD 10.0  /* under the tip, about 0 */
+#define CORNER_CURVATURE 200.0 /* beyond is a corner */
+#define POINT_LEAST_M 1e-4     /* errors of the tables, and of a block's middle */
+#define NORMAL_LEAST 0.003     /* rad */
+#define FLAT 0.02              /* rad, cones: what is not known of a contact that has gone over between tip and shaft */
+#define EDGE 1e-3
+#define LEAST_OVER 1e-2 /* probability from which on a part of a hypothesis goes over */
+#define QUARTER 1.57079632679489661923
 #define LEAST_LOG_WEIGHT -12.0
 #define TINY 1e-300
 #define SAME 0.3 /* distance in standard deviations at which two hypotheses are one */
@@ -65,7 +65,7 @@ static void bank_add(struct nav_contact_filter *f, const struct nav_contact_step
     part->grip = 1.0;
     part->s[FIRST] = first;
     part->s[FRICTION] = c->friction;
-    part->s[ROUND] = tip || corner ? 0.0 : RADIUS_M / c->cone_m;
+    part->s[ROUND] = tip || corner ? 0.0 : SHAFT_CURVATURE * c->cone_m;
     if (tip)
         part->s[FIRST] += atan(c->friction);
     if (!bank_slope(f, part, step->tilt) || !nav_contact_look(f, part, &look))
@@ -73,8 +73,8 @@ static void bank_add(struct nav_contact_filter *f, const struct nav_contact_step
     double lean = -look.tilt_by[FIRST] / look.tilt_by[SLOPE];
     part->p[FIRST][FIRST] = square(spread);
     part->p[FIRST][SLOPE] = part->p[SLOPE][FIRST] = lean * square(spread);
-    part->p[SLOPE][SLOPE] = square(lean * spread) + step->variance / square(look.tilt_by[SLOPE]);
-    part->p[ROUND][ROUND] = corner ? 0.0 : square(tip ? CURVATURE_SD * c->cone_m : RADIUS_SD_M / c->cone_m);
+    part->p[SLOPE][SLOPE] = square(lean * spread) + (step->variance + 0.5 * f->ring) / square(look.tilt_by[SLOPE]);
+    part->p[ROUND][ROUND] = corner ? 0.0 : square((tip ? TIP_CURVATURE_SD : SHAFT_CURVATURE_SD) * c->cone_m);
     part->p[SPEED_X][SPEED_X] = part->p[SPEED_Y][SPEED_Y] = moving ? square(c->speed_sd / c->cone_m) : 0.0;
     part->p[GAIN][GAIN] = square(c->gain_sd);
     part->p[FRICTION][FRICTION] = square(c->friction_sd);
@@ -93,11 +93,24 @@ static void bank_normalise(struct nav_contact_filter *f)
         f->part[i].log_weight -= most + log(sum);
 }
 
+/* Square of the amplitude of the ringing that jumps of the tilt's rate may have left, but for what is the rate's noise.
+ */
+static void bank_ring(struct nav_contact_filter *f, const struct nav_contact_step *step)
+{
+    double circle = 6.2831853 * f->config.ring_hz, rate = (step->tilt - f->before) / step->seconds;
+    f->ring *= exp(-2.0 * f->config.ring_damping * circle * step->seconds);
+    if (!isfinite(rate))
+        return;
+    f->ring += fmax(0.0, square(rate - f->rate) - 6.0 * step->variance / square(step->seconds)) / square(circle);
+    f->before = step->tilt;
+    f->rate = rate;
+}
+
 void nav_contact_bank_begin(struct nav_contact_filter *f, const struct nav_contact_step *step)
 {
     double corner = (f->beam->tip - LEAST_ARC) / CORNERS, round = (f->beam->tip - LEAST_ARC) / ROUNDS;
     f->parts = 0;
-    f->rate = f->ring = 0.0;
+    bank_ring(f, step);
     for (int moving = 0; moving < 2; moving++) {
         double share = (moving ? f->config.moving : 1.0 - f->config.moving) / 3.0;
         for (int i = 0; i < CORNERS; i++)
@@ -147,6 +160,30 @@ static void bank_noise(const struct nav_contact_filter *f, const struct nav_cont
         part->p[k][k] += square(c->speed_drift / c->cone_m) * step->seconds;
 }
 
+/* Variance of what has the derivative `by`, and its covariance with the state. */
+static double bank_variance(const struct nav_contact_part *part, const double by[N], double with[N])
+{
+    double v = 0.0;
+    for (int i = 0; i < N; i++) {
+        with[i] = 0.0;
+        for (int j = 0; j < N; j++)
+            with[i] += part->p[i][j] * by[j];
+        v += by[i] * with[i];
+    }
+    return v;
+}
+
+/* The hypothesis given that what has this variance and covariance with it is `off` more, and how much variance it
+ * loses. */
+static void bank_given(struct nav_contact_part *part, const double with[N], double v, double off, double lost)
+{
+    for (int i = 0; i < N; i++) {
+        part->s[i] += with[i] / v * off;
+        for (int j = 0; j < N; j++)
+            part->p[i][j] -= lost * with[i] * with[j] / (v * v);
+    }
+}
+
 /* The measured tilt; false: it is refuted. */
 static bool bank_weigh(const struct nav_contact_filter *f, const struct nav_contact_step *step,
                        struct nav_contact_part *part)
@@ -154,65 +191,88 @@ static bool bank_weigh(const struct nav_contact_filter *f, const struct nav_cont
     struct nav_contact_look look;
     if (!nav_contact_look(f, part, &look))
         return false;
-    double gain = exp(part->s[GAIN]), tilt = gain * (look.tilt + part->creep), h[N] = {0}, ph[N];
-    h[FIRST] = gain * look.tilt_by[0];
-    h[SLOPE] = gain * look.tilt_by[1];
-    h[FRICTION] = gain * look.tilt_by[2];
-    h[GAIN] = tilt;
-    double variance = step->variance + square(MODEL_SHARE * tilt) + 0.5 * square(f->ring);
-    for (int i = 0; i < N; i++)
-        ph[i] = part->p[i][FIRST] * h[FIRST] + part->p[i][SLOPE] * h[SLOPE] + part->p[i][FRICTION] * h[FRICTION] +
-                part->p[i][GAIN] * h[GAIN];
-    double s = variance;
-    for (int i = 0; i < N; i++)
-        s += h[i] * ph[i];
-    double off = step->tilt - tilt;
-    part->log_weight -= 0.5 * (off * off / s + log(s));
-    for (int i = 0; i < N; i++)
-        part->s[i] += ph[i] / s * off;
-    for (int i = 0; i < N; i++)
-        for (int j = 0; j < N; j++)
-            part->p[i][j] -= ph[i] * ph[j] / s;
+    double gain = exp(part->s[GAIN]), tilt = gain * (look.tilt + part->creep), by[N] = {0}, with[N];
+    by[FIRST] = gain * look.tilt_by[0];
+    by[SLOPE] = gain * look.tilt_by[1];
+    by[FRICTION] = gain * look.tilt_by[2];
+    by[GAIN] = tilt;
+    double v = bank_variance(part, by, with), off = step->tilt - tilt;
+    double share = v / (v + step->variance + 0.5 * f->ring);
+    part->log_weight -= 0.5 * (off * off * share / v + log(v / share));
+    bank_given(part, with, v, share * off, share * v);
     return part->s[SLOPE] > 0.0 && isfinite(part->log_weight);
 }
 
-/* Contacts reach the tip and come back from it. A corner does not hold beyond it. false: let go. */
-static bool bank_regime(const struct nav_contact_filter *f, struct nav_contact_part *part)
+/* Share of a Gaussian beyond so many standard deviations. */
+static double bank_beyond(double z)
 {
-    double *s = part->s, least = LEAST_CURVATURE * f->config.cone_m;
-    s[FRICTION] = fmin(fmax(s[FRICTION], 0.0), 0.5);
-    double angle = part->grip * atan(s[FRICTION]);
-    if (part->corner)
-        return s[FIRST] < f->beam->tip;
-    bool over = part->tip ? s[FIRST] - angle < s[SLOPE] + 1.5707963 : s[FIRST] > f->beam->tip;
+    return 0.5 * erfc(z / sqrt(2.0));
+}
+
+/* How far a contact is from where it goes over between shaft and tip, and the derivative by the state. */
+static double bank_margin(const struct nav_contact_filter *f, const struct nav_contact_part *part, double by[N])
+{
+    const double *s = part->s;
+    memset(by, 0, N * sizeof *by);
+    by[FIRST] = part->tip ? 1.0 : -1.0;
     if (!part->tip)
-        s[ROUND] = fmax(s[ROUND], 0.0);
-    if (!over)
-        return true;
-    double round = part->tip ? fmax(s[ROUND], least) : fmax(s[ROUND], 1.0 / (200.0 * f->config.cone_m));
-    double scale = 1.0 / square(round);
-    for (int k = 0; k < N; k++) {
+        return f->beam->tip - s[FIRST];
+    by[SLOPE] = -1.0;
+    by[FRICTION] = -part->grip / (1.0 + square(s[FRICTION]));
+    return s[FIRST] - part->grip * atan(s[FRICTION]) - s[SLOPE] - QUARTER;
+}
+
+/* A contact that has just gone over between shaft and tip. */
+static void bank_turn(const struct nav_contact_filter *f, struct nav_contact_part *part)
+{
+    double *s = part->s, sd = part->tip ? EDGE : FLAT;
+    for (int k = 0; k < N; k++)
         part->p[FIRST][k] = part->p[k][FIRST] = 0.0;
-        part->p[ROUND][k] *= -scale;
-        part->p[k][ROUND] *= -scale;
-    }
-    s[ROUND] = 1.0 / round;
     part->tip = !part->tip;
     part->grip = -part->grip; /* along the whisker it is the other way than over the surface */
-    s[FIRST] = part->tip ? s[SLOPE] + 1.5707963 - angle : f->beam->tip;
-    part->p[FIRST][FIRST] = square(part->tip ? FLAT : 1e-3);
+    s[FIRST] = part->tip ? s[SLOPE] + QUARTER + part->grip * atan(s[FRICTION]) + 0.8 * sd : f->beam->tip - 0.8 * sd;
+    part->p[FIRST][FIRST] = square(0.6 * sd);
+    if (!part->tip)
+        s[ROUND] = fmax(s[ROUND], 0.0);
+}
+
+/* Contacts reach the tip and come back from it: the part of a hypothesis that is beyond goes over, the rest is cut off
+ * there. A corner that is beyond has let go. false: nothing stays. */
+static bool bank_regime(struct nav_contact_filter *f, struct nav_contact_part *part)
+{
+    double by[N], with[N];
+    part->s[FRICTION] = fmin(fmax(part->s[FRICTION], 0.0), 0.5);
+    double margin = bank_margin(f, part, by), v = bank_variance(part, by, with) + TINY;
+    double z = margin / sqrt(v), over = bank_beyond(z);
+    if (over < LEAST_OVER)
+        return true;
+    if (!part->corner && f->parts < NAV_CONTACT_PARTS) {
+        struct nav_contact_part *beyond = &f->part[f->parts++];
+        *beyond = *part;
+        beyond->log_weight += log(over);
+        bank_given(beyond, with, v, -margin, v);
+        bank_turn(f, beyond);
+    }
+    if (over > 1.0 - LEAST_OVER)
+        return false;
+    double hazard = exp(-0.5 * z * z) / sqrt(6.2831853) / (1.0 - over);
+    bank_given(part, with, v, sqrt(v) * hazard, v * hazard * (hazard + z));
+    part->log_weight += log1p(-over);
     return true;
 }
 
-/* Carries a hypothesis over a block; false: no such contact is left. */
+/* Carries a hypothesis over a block; false: no such contact is left. What table and law of friction miss changes as the
+ * whisker bends on: the gain wanders with the slope. */
 static bool bank_predict(const struct nav_contact_filter *f, const struct nav_contact_step *step,
                          struct nav_contact_part *part)
 {
     nav_contact_square by;
+    double slope = part->s[SLOPE];
     if (!nav_contact_move(f, step, part, by))
         return false;
     bank_carry(part->p, by);
     bank_noise(f, step, part, by);
+    part->p[GAIN][GAIN] += square(f->config.model_share) * fabs(part->s[SLOPE] - slope);
     return true;
 }
 
@@ -224,29 +284,22 @@ static void bank_keep(struct nav_contact_filter *f, int *kept, int i)
     ++*kept;
 }
 
-/* Amplitude of the ringing that jumps of the tilt's rate may have left: the same for all, as it is one whisker. */
-static void bank_ring(struct nav_contact_filter *f, const struct nav_contact_step *step)
-{
-    double rate = 0.0, circle = 6.2831853 * f->config.ring_hz;
-    for (int i = 0; i < f->parts; i++)
-        rate += exp(f->part[i].log_weight) * f->part[i].rate;
-    f->ring = f->ring * exp(-f->config.ring_damping * circle * step->seconds) + fabs(rate - f->rate) / circle;
-    f->rate = rate;
-}
-
 void nav_contact_bank_step(struct nav_contact_filter *f, const struct nav_contact_step *step)
 {
     int kept = 0;
+    bank_ring(f, step);
     for (int i = 0; i < f->parts; i++)
         if (bank_predict(f, step, &f->part[i]))
             bank_keep(f, &kept, i);
     f->parts = kept;
-    bank_ring(f, step);
     kept = 0;
     for (int i = 0; i < f->parts; i++)
-        if ((!isfinite(step->tilt) || bank_weigh(f, step, &f->part[i])) && bank_regime(f, &f->part[i]))
+        if (!isfinite(step->tilt) || bank_weigh(f, step, &f->part[i]))
             bank_keep(f, &kept, i);
     f->parts = kept;
+    for (int i = kept - 1; i >= 0; i--)
+        if (!bank_regime(f, &f->part[i]))
+            f->part[i] = f->part[--f->parts];
     bank_normalise(f);
     f->driven_m += hypot(step->moved[0], step->moved[1]);
     f->turned_m += fabs(step->turned) * f->beam->tip * f->config.cone_m;
@@ -300,20 +353,12 @@ void nav_contact_bank_tidy(struct nav_contact_filter *f)
         bank_normalise(f);
 }
 
-/* Share of a Gaussian below a limit. */
-static double bank_below(double limit, double mean, double sd)
-{
-    return 0.5 * erfc((mean - limit) / (sqrt(2.0) * sd));
-}
-
-/* Probability that an object under the shaft is no rounder than a corner; radii are positive. */
+/* Probability that an object under the shaft is no rounder than a corner. */
 static double bank_corner(const struct nav_contact_part *part, double cone)
 {
     if (part->tip || part->corner)
         return part->corner;
-    double radius = cone * part->s[ROUND], sd = cone * sqrt(part->p[ROUND][ROUND]) + TINY;
-    double negative = bank_below(0.0, radius, sd), below = bank_below(CORNER_M, radius, sd) - negative;
-    return fmin(1.0, below / fmax(1.0 - negative, 1e-6));
+    return bank_beyond((CORNER_CURVATURE * cone - part->s[ROUND]) / (sqrt(part->p[ROUND][ROUND]) + TINY));
 }
 
 void nav_contact_bank_see(const struct nav_contact_filter *f, const struct nav_contact_part *part,

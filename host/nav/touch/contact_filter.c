@@ -61,33 +61,43 @@ static void filter_plane(struct nav_contact_filter *f, const double mean[2], dou
     f->plane_variance *= 1.0 - gain;
 }
 
+/* Waits for the second block in a row that is touched on one side: the first may be touched in part of it only. */
+static bool filter_touched(struct nav_contact_filter *f, double mean, bool touched)
+{
+    double side = mean < 0.0 ? -1.0 : 1.0;
+    bool again = touched && f->side * side > 0.0;
+    f->side = touched ? side : 0.0;
+    if (!again) {
+        f->before = fabs(mean);
+        f->rate = f->ring = 0.0;
+    }
+    return again;
+}
+
 /* An update by the block's mean; what was not read moves the contact all the same. */
 static void filter_block(struct nav_contact_filter *f)
 {
     double variance = f->config.noise_rad * f->config.noise_rad / (f->seen > 0 ? f->seen : 1), mean[2];
     for (int k = 0; k < 2; k++)
         mean[k] = f->seen > 0 ? f->tilt[k] / f->seen : NAN;
-    if (f->parts == 0 && !(fabs(mean[0]) > LEAST_SIGNAL * sqrt(variance)))
+    bool touched = fabs(mean[0]) > LEAST_SIGNAL * sqrt(variance);
+    if (f->parts == 0 && !filter_touched(f, mean[0], touched))
         return;
-    if (f->parts == 0)
-        f->side = mean[0] < 0.0 ? -1.0 : 1.0;
     struct nav_contact_step step = {{f->moved[0], f->side * f->moved[1]},
                                     f->side * f->moved[2],
                                     f->config.sample_s * f->config.block,
                                     f->side * mean[0],
                                     variance};
-    if (f->parts == 0) {
+    if (f->parts == 0)
         nav_contact_bank_begin(f, &step);
-    } else {
+    else
         nav_contact_bank_step(f, &step);
-        if (f->parts == 0) {
-            f->restarts++;
-            f->side = mean[0] < 0.0 ? -1.0 : 1.0;
-            step.tilt = fabs(mean[0]);
-            nav_contact_bank_begin(f, &step);
-        }
+    if (f->parts == 0) {
+        f->restarts++;
+        f->side = 0.0;
+        filter_touched(f, mean[0], touched);
     }
-    if (f->seen > 0 && fabs(mean[0]) > LEAST_SIGNAL * sqrt(variance))
+    if (touched)
         filter_plane(f, mean, variance);
 }
 

@@ -21,7 +21,7 @@
 #include "contact_beam.h"
 
 /* cffi: begin */
-enum { NAV_CONTACT_STATES = 8, NAV_CONTACT_PARTS = 56 };
+enum { NAV_CONTACT_STATES = 8, NAV_CONTACT_PARTS = 64 };
 
 enum nav_contact_motion { NAV_CONTACT_BODY_WHISK, NAV_CONTACT_DRIVE_BY, NAV_CONTACT_SWEEP };
 
@@ -32,6 +32,7 @@ struct nav_contact_filter_config {
     double noise_rad;             /* standard deviation of one sample's tilt */
     double largest_rad;           /* tilts beyond are saturated */
     double gain_sd;               /* of ln of the tilt over the model's */
+    double model_share;           /* its random walk over the slope, per root of a radian */
     double friction, friction_sd; /* coefficient, 0 to 0.5 */
     double motion_share;          /* standard deviation of the base's motion as told, share: of all; of a block */
     double ring_hz, ring_damping; /* slowest mode of the whisker in contact, damping ratio */
@@ -50,7 +51,6 @@ struct nav_contact_part {
     double p[NAV_CONTACT_STATES][NAV_CONTACT_STATES];
     double grip;  /* friction used, -1 to 1; positive: the contact slides towards the tip */
     double creep; /* rad */
-    double rate;  /* of tilt as predicted, rad/s */
 };
 
 struct nav_contact_filter {
@@ -64,7 +64,8 @@ struct nav_contact_filter {
     double tilt[2];            /* sum of those read in the block */
     double last[2];
     int equal, updates;
-    double rate, ring;              /* of the tilt as predicted, rad/s; amplitude of ringing that may be left, rad */
+    double before, rate;            /* tilt of the last block, and its rate */
+    double ring;                    /* square of the amplitude of ringing that may be left, rad^2 */
     double plane, plane_variance;   /* tilt of axis 1 over that of axis 0 */
     double turned_m, driven_m;      /* how far the base's turn and its drive have moved the contact */
     uint64_t bad, stuck, saturated; /* samples not read */

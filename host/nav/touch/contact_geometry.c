@@ -121,26 +121,7 @@ static void geometry_point(const struct carried *to, const struct nav_contact_lo
     }
 }
 
-/* The shaft slides over a circle (a corner: of radius 0): the circle's centre stays in the object. */
-static void geometry_circle(const struct carried *to, double radius, const struct nav_contact_look *old,
-                            const struct nav_contact_look *now, double arc, struct equations *e)
-{
-    double n_now[2] = {cos(now->normal), sin(now->normal)}, turned[2] = {-n_now[1], n_now[0]};
-    for (int n = 0; n < 2; n++) {
-        e->left[n] -= radius * (n_now[n] - to->n[n]);
-        e->by_old[n][ROUND] = to->n[n] - n_now[n];
-        e->by_old[n][MOTION] += radius * to->turn * to->t[n];
-        for (int k = 0; k < 3; k++) {
-            double was = radius * old->normal_by[k] * -to->t[n], is = radius * now->normal_by[k] * turned[n];
-            e->by_old[n][COLUMN[k]] += was - (k == 2 ? is : 0.0);
-            if (k < 2)
-                e->by_new[n][k] -= is;
-        }
-    }
-    e->slid = arc - radius * (to->normal - now->normal);
-}
-
-/* The tip slides over a surface of a curvature: by l along it, its normal turning by curvature l. */
+/* The contact moves over a surface of a curvature: by l along it, its normal turning by curvature l. */
 static void geometry_surface(const struct carried *to, double curvature, const struct nav_contact_look *old,
                              const struct nav_contact_look *now, double seconds, struct equations *e)
 {
@@ -161,12 +142,12 @@ static void geometry_surface(const struct carried *to, double curvature, const s
         geometry_turned(to, old->q_by[k], was);
         e->by_old[0][COLUMN[k]] = -dot(was, lean) - l * old->normal_by[k];
         e->by_old[1][COLUMN[k]] = -old->normal_by[k] - curvature * dot(was, to->t);
-        if (k == 2)
-            e->by_old[1][FRICTION] += now->normal_by[k];
-        else {
-            e->by_new[0][k] = dot(now->q_by[k], lean);
-            e->by_new[1][k] = now->normal_by[k] + curvature * dot(now->q_by[k], to->t);
-        }
+        double by_now[2] = {dot(now->q_by[k], lean), now->normal_by[k] + curvature * dot(now->q_by[k], to->t)};
+        for (int n = 0; n < 2; n++)
+            if (k == 2)
+                e->by_old[n][FRICTION] += by_now[n];
+            else
+                e->by_new[n][k] = by_now[n];
     }
     e->slid = l;
 }
@@ -185,13 +166,12 @@ static void geometry_equations(const struct problem *p, const struct nav_contact
                                const struct nav_contact_look *now, struct equations *e)
 {
     memset(e, 0, sizeof *e);
-    if (part->tip && !p->held) {
+    if (p->held || part->corner)
+        geometry_point(&p->to, p->old, now, p->step->seconds, e);
+    else
         geometry_surface(&p->to, part->s[ROUND], p->old, now, p->step->seconds, e);
-        return;
-    }
-    geometry_point(&p->to, p->old, now, p->step->seconds, e);
     if (!part->tip)
-        geometry_circle(&p->to, part->s[ROUND], p->old, now, part->s[FIRST] - p->first, e);
+        e->slid = part->s[FIRST] - p->first - e->slid;
 }
 
 /* On a shaft that is held, the friction used is the unknown, not the arc. */
@@ -212,10 +192,6 @@ static bool geometry_solve(const struct problem *p, struct nav_contact_part *par
         if (p->held && !part->tip && part->grip == 0.0)
             part->grip = 1e-6; /* its derivative is taken from what friction does */
         bool inside = nav_contact_look(p->f, part, now);
-        if (p->held && !part->tip) { /* a shaft that sticks rolls */
-            part->s[FIRST] = p->first + part->s[ROUND] * (p->to.normal - now->normal);
-            inside = nav_contact_look(p->f, part, now);
-        }
         geometry_equations(p, part, now, e);
         double m[2][2];
         memcpy(m, e->by_new, sizeof m);
@@ -309,7 +285,6 @@ bool nav_contact_move(const struct nav_contact_filter *f, const struct nav_conta
         }
     }
     tried.slips = !p.held && fabs(e.slid) > STILL;
-    tried.rate = (now.tilt - old.tilt) / step->seconds;
     geometry_derivative(&p, part, &e, by);
     double speed[2] = {part->s[SPEED_X], part->s[SPEED_Y]};
     geometry_turned(&p.to, speed, tried.s + SPEED_X);

@@ -6,7 +6,7 @@
 #include "contact_bank.h"
 
 /* A hypothesis' state. FIRST: arc length of a contact on the shaft, direction of the force on the tip about the clamped
- * axis. ROUND: radius of an object under the shaft, curvature of one under the tip.
+ * axis. ROUND: curvature of the surface; a corner has none.
  * MOTION: error of the base's motion as told, share of it. */
 enum { FIRST, SLOPE, ROUND, SPEED_X, SPEED_Y, GAIN, FRICTION, MOTION };
 

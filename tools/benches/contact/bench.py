@@ -11,18 +11,13 @@ import numpy as np
 from matplotlib.figure import Figure
 from tqdm import tqdm
 
-from .measure import FIRST_S, KINDS, TRUE_MOTION, contacts, follow
+from .measure import CASES, FIRST_S, contacts, follow, true_motion
 from .page import page
 from .scenes import TICK_S
 
 ROOT = Path(__file__).resolve().parents[3]
 RESULTS, CHARTS = ROOT / "bench/results", ROOT / "docs/charts"
 CONTACTS = 20
-CASES = {
-    "known": (True, False),
-    "unknown": (False, False),
-    "chain": (False, True),
-}  # friction known; by a chain of links
 SLICES_S = np.arange(0.02, 0.36, 0.02)
 
 
@@ -39,29 +34,39 @@ def summary(kind: str, found: list[dict]) -> dict:
     """Figures of one kind over all its contacts, from FIRST_S after the touch on."""
 
     def late(name: str) -> np.ndarray:
-        return np.concatenate([one[name][one["after_s"] >= FIRST_S] for one in found])
+        return np.concatenate([one[name][one["late"]] for one in found])
 
-    moves, shaped = TRUE_MOTION[kind] == "sweep", kind.startswith(("face", "cylinder"))
+    moves, shaped = true_motion(kind) == "sweep", kind.startswith(("face", "cylinder"))
     last = np.array([one["speed"][-1] for one in found if len(one["speed"])])
     told = {
         "contacts": len(found),
         "point_rms_mm": rms(late("off")),
         "point_median_mm": float(np.median(late("off"))),
-        "bound_rms_mm": rms(late("least")) if not moves else None,
+        "bound_rms_mm": rms(late("least")),
         "bound_median_mm": float(np.median(late("least"))) if np.isfinite(late("least")).any() else None,
         "point_held_90": float(late("inside").mean()),
-        "motion_right": float((late("motion") == TRUE_MOTION[kind]).mean()),
+        "motion_right": float((late("motion") == true_motion(kind)).mean()),
         "corner": float(late("corner").mean()),
         "cost_us": float(np.mean([one["cost_us"] for one in found])),
     }
     if shaped:
         told |= {"normal_rms_deg": rms(late("turn")), "normal_held_90": float(late("turn_inside").mean())}
-    if kind.startswith("cylinder"):
         told["contour_rms_mm"] = rms(late("contour"))
     if moves:
         told |= {"speed_median": float(np.median(np.abs(last))), "speed_within_10": float((np.abs(last) < 0.1).mean())}
         told["speed_held_90"] = float(np.mean([one["speed_inside"][-1] for one in found]))
+    known = np.isfinite(late("slides"))
+    if known.any():
+        told |= slip_figures(late("slip")[known], late("slides")[known])
     return told
+
+
+def slip_figures(slip: np.ndarray, slides: np.ndarray) -> dict[str, float]:
+    """Stick or slip: share that sticks, share told right, expected calibration error over five bins."""
+    bins = np.minimum((5 * slip).astype(int), 4)
+    gaps = [abs(np.sum(slip[bins == n] - slides[bins == n])) for n in range(5)]
+    right = float(np.mean((slip > 0.5) == (slides > 0.5)))
+    return {"sticks": float(1 - slides.mean()), "slip_right": right, "slip_ece": float(np.sum(gaps) / len(slip))}
 
 
 def course(found: list[dict]) -> list[float | None]:
@@ -88,12 +93,12 @@ def draw(results: dict) -> Figure:
 def run(build: Path, fresh: bool, each: int = CONTACTS) -> None:
     """Measure all kinds with the friction known and not, and against a chain of links in MuJoCo."""
     results: dict = {"tick_s": TICK_S, "first_s": FIRST_S, "kinds": {}, "course": {}}
-    for case, (known, links) in CASES.items():
-        for kind in [k for k in KINDS if not links or TRUE_MOTION[k] != "sweep"]:  # chains are slow
-            made = tqdm(contacts(kind, each, known, links), desc=f"{case}: {kind}", total=each)
-            found = [follow(scene, least, known, links) for scene, least in made]
-            results["kinds"].setdefault(case, {})[kind] = summary(kind, found)
-            if case == "unknown":
+    for name, case in CASES.items():
+        for kind in case.kinds:
+            made = tqdm(contacts(case, kind, each), desc=f"{name}: {kind}", total=each)
+            found = [follow(case, kind, scene, least) for scene, least in made]
+            results["kinds"].setdefault(name, {})[kind] = summary(kind, found)
+            if name == "unknown":
                 results["course"][kind] = course(found)
     for folder in (RESULTS, CHARTS):
         folder.mkdir(parents=True, exist_ok=True)

@@ -1,19 +1,23 @@
 """What the contact filter says in scenes of each kind, beside the truth and the Cramer-Rao bound."""
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
 
 import numpy as np
 
 from whisker.touch.contact_filter import ContactFilter
 
-from .scenes import FRICTION_SD, QUARTER, REACH_M, TICK_S, TIP, Corner, Draw, Plan, Scene, chained, simulated
+from .scenes import FRICTION_SD, QUARTER, REACH_M, TICK_S, TIP, Corner, Draw, Plan, Scene, chained, lying, simulated
 
 FIRST_S = 0.1  # figures count from here on: the contact has moved by a centimetre at 0.1 m/s
 NINETY_2, NINETY_1 = 4.605, 2.706  # chi-squared, 90 %, of two and of one degree of freedom
 SPEED, WHISK = 0.1, np.pi / 24
 TURN_BACK_S = 0.15
 FLAT_M, CYLINDER_M = 5.0, 0.05  # radii
+BLOCK = 20  # samples of the filter's
+EDGE = 0.9  # share of the friction cone from which a contact slides
+LIES_TICKS = 100  # that a whisker lies along a face before figures count
 
 
 def straight(ticks: int, speed: float, angle: float) -> np.ndarray:
@@ -47,6 +51,44 @@ def cylinder(rng) -> Plan:
     return Plan(bases, standing(900), TIP, CYLINDER_M, rng.uniform(np.radians(97), np.radians(118)))
 
 
+def there_and_back(rng) -> Plan:
+    """The tip pushed into a face and drawn back along the same way: it slides, sticks and slides back."""
+    normal, times = rng.uniform(np.radians(105), np.radians(135)), np.arange(900) * TICK_S
+    share = np.interp(times, [0.2, 0.3], [1.0, -1.0])
+    bases = straight(900, rng.uniform(0.05, SPEED), rng.uniform(-0.3, 0.3) + normal - QUARTER)
+    return Plan(bases * share[:, None], standing(900), TIP, FLAT_M, normal)
+
+
+def head_on(rng) -> Plan:
+    normal = rng.uniform(np.radians(145), np.radians(178))
+    return Plan(straight(600, rng.uniform(0.05, SPEED), normal - QUARTER), standing(600), TIP, FLAT_M, normal)
+
+
+def any_speed(rng) -> tuple[float, int]:
+    """A speed from 0.03 to 0.2 m/s and the ticks in which 50 mm are driven."""
+    speed = 0.03 * (0.2 / 0.03) ** rng.uniform()
+    return speed, int(np.clip(0.05 / speed / TICK_S, 500, 2000))
+
+
+def any_face(rng) -> Plan:
+    normal, (speed, ticks) = rng.uniform(np.radians(97), np.radians(135)), any_speed(rng)
+    bases = straight(ticks, speed, rng.uniform(-0.3, 0.3) + normal - QUARTER)
+    return Plan(bases, standing(ticks), TIP, FLAT_M, normal)
+
+
+def any_cylinder(rng) -> Plan:
+    (speed, ticks), radius_m = any_speed(rng), rng.uniform(0.03, 0.15)
+    bases = straight(ticks, speed, 0.0)
+    if rng.uniform() < 0.5:
+        return Plan(bases, standing(ticks), rng.uniform(0.08, 0.13), radius_m)
+    return Plan(bases, standing(ticks), TIP, radius_m, rng.uniform(np.radians(97), np.radians(118)))
+
+
+def any_corner(rng) -> Plan:
+    speed, ticks = any_speed(rng)
+    return Plan(straight(ticks, speed, rng.uniform(-0.4, 0.4)), standing(ticks), rng.uniform(0.07, 0.125))
+
+
 def moving(rng, still: bool = False) -> Plan:
     """An object that moves; the base stands, then retreats from it or, `still`, goes on standing."""
     ticks, speed, angle = 700, rng.uniform(0.03, 0.1), rng.uniform(-0.4, 0.4)
@@ -64,30 +106,67 @@ KINDS = {
     "cylinder, drive": cylinder,
     "moving corner, base moves": moving,
     "moving corner, base stands": lambda rng: moving(rng, still=True),
+    "face, there and back": there_and_back,
+    "face, then lying along it": lambda rng: face(rng)._replace(lies=True),
+    "face, head-on": head_on,
 }
-TRUE_MOTION = dict(zip(KINDS, ("drive-by", "body whisk", "drive-by", "drive-by", "sweep", "sweep"), strict=True))
+ANY = {"corner, drive": any_corner, "face, drive": any_face, "cylinder, drive": any_cylinder}
+CHAINED = [kind for kind in KINDS if not kind.startswith("moving")]
+ANY_FIRST = 100_000  # seeds
 
 
-def contacts(kind: str, count: int, known_friction: bool, links: bool) -> Iterator[tuple[Scene, np.ndarray | None]]:
+class Case(NamedTuple):
+    """What is told to the filter and by what the whisker is bent."""
+
+    kinds: dict[str, Callable]
+    friction_known: bool = False
+    links: bool = False
+    frictions: tuple[float, float] | None = None  # drawn between them; None: about the mean
+
+    @property
+    def settings(self) -> dict[str, float]:
+        """Of the filter."""
+        spread = (self.frictions[1] - self.frictions[0]) / np.sqrt(12) if self.frictions else FRICTION_SD
+        return {"friction_sd": 0.0 if self.friction_known else spread} | ({"creep": 0.0} if self.links else {})
+
+    def drawn(self, kind: str, seed: int) -> tuple[Plan, Draw]:
+        number = 1000 * list(KINDS).index(kind) + seed
+        if self.frictions is None:
+            draw = Draw.of(number, self.friction_known)
+            return self.kinds[kind](draw.rng), draw
+        draw = Draw.of(ANY_FIRST + number)
+        draw = draw._replace(friction=draw.rng.uniform(*self.frictions))
+        return self.kinds[kind](draw.rng), draw
+
+
+SIMULATED = {kind: plan for kind, plan in KINDS.items() if not kind.startswith("face,") or kind == "face, drive"}
+CASES = {
+    "known": Case(SIMULATED, friction_known=True),
+    "unknown": Case(SIMULATED),
+    "chain": Case({kind: KINDS[kind] for kind in CHAINED}, links=True),
+    "any": Case(ANY, links=True, frictions=(0.1, 0.5)),
+}
+
+
+def true_motion(kind: str) -> str:
+    return "sweep" if kind.startswith("moving") else "body whisk" if kind.endswith("whisk") else "drive-by"
+
+
+def contacts(case: Case, kind: str, count: int) -> Iterator[tuple[Scene, np.ndarray | None]]:
     """Scenes of a kind, by the simulator or by a chain of links, and of corners the bound (n,) of the error, mm."""
     for seed in range(count):
-        draw = Draw.of(1000 * list(KINDS).index(kind) + seed, known_friction)
-        plan = KINDS[kind](draw.rng)
+        plan, draw = case.drawn(kind, seed)
         least = None
-        if plan.round_m == 0.0 and not links:
-            least = Corner(plan).bound(draw, settings(known_friction)["friction_sd"])
-        made = (chained if links else simulated)(plan, draw)
+        if plan.round_m == 0.0 and not case.links:
+            least = Corner(plan).bound(draw, case.settings["friction_sd"])
+        made = (chained if case.links else simulated)(plan, draw)
         if made is not None and len(made.tilt) > 1.2 * FIRST_S / TICK_S:
             yield made, least
 
 
-def settings(known_friction: bool) -> dict[str, float]:
-    return {"friction_sd": 0.0 if known_friction else FRICTION_SD}
-
-
-def follow(scene: Scene, least: np.ndarray | None, known_friction: bool, links: bool) -> dict[str, np.ndarray | float]:
-    """Errors of one contact's reports; angles degrees, lengths mm."""
-    held = ContactFilter(**settings(known_friction), **({"creep": 0.0} if links else {}))
+def follow(case: Case, kind: str, scene: Scene, least: np.ndarray | None) -> dict[str, np.ndarray | float]:
+    """Errors of one contact's reports; angles degrees, lengths mm. `late`: those that count."""
+    held = ContactFilter(**case.settings)
     start = first_touch(scene)
     bases, tilt = scene.bases[start:], scene.tilt[start:]
     told = held.run(bases, tilt)
@@ -97,19 +176,31 @@ def follow(scene: Scene, least: np.ndarray | None, known_friction: bool, links: 
     off = told.point[use] - scene.point[at]
     turn = np.degrees(told.normal_rad[use] - scene.normal[at])
     speed = np.hypot(*scene.velocity[at].T)
+    after_s = told.sample[use] * TICK_S
+    first_s = TICK_S * (lying(scene.point[start:, 0]) + LIES_TICKS) if "lying" in kind else FIRST_S
+    across = np.column_stack([np.cos(scene.normal[at]), np.sin(scene.normal[at])])
+    round_m = np.hypot(*(scene.point[at] - scene.centre[at]).T)
+    contour = (
+        np.hypot(*(told.point[use] - scene.centre[at]).T) - round_m
+        if "cylinder" in kind
+        else (off * across).sum(axis=1)
+    )
     return {
-        "after_s": told.sample[use] * TICK_S,
+        "after_s": after_s,
+        "late": after_s >= max(FIRST_S, first_s),
         "off": 1e3 * np.hypot(*off.T),
         "stated": 1e3 * np.sqrt(np.trace(told.point_cov[use], axis1=1, axis2=2)),
         "least": least[at] if least is not None else np.full(len(at), np.nan),
         "inside": np.einsum("ki,kij,kj->k", off, np.linalg.inv(told.point_cov[use]), off) < NINETY_2,
         "turn": turn,
         "turn_inside": (turn / np.degrees(told.normal_sd[use])) ** 2 < NINETY_1,
-        "contour": 1e3 * np.abs(np.hypot(*(told.point[use] - scene.centre[at]).T) - CYLINDER_M),
+        "contour": 1e3 * np.abs(contour),
         "speed": (told.speed[use] - speed) / np.where(speed > 1e-9, speed, np.nan),
         "speed_inside": (told.speed[use] - speed) ** 2 < NINETY_1 * told.speed_sd[use] ** 2,
         "motion": np.array(told.motion)[use],
         "corner": told.corner[use],
+        "slip": told.slip[use],
+        "slides": slides(scene, at),
         "cost_us": cost_us(held, bases, tilt),
     }
 
@@ -125,6 +216,12 @@ def cost_us(held: ContactFilter, bases: np.ndarray, tilt: np.ndarray) -> float:
     began = time.process_time()
     lib.nav_contact_filter_run(held.state, *columns, count, made, doubles(middles, "middles", (count,)), count)
     return 1e6 * (time.process_time() - began) / count
+
+
+def slides(scene: Scene, at: np.ndarray) -> np.ndarray:
+    """1 where the force lies on the edge of the friction cone over a block, 0 where inside (n,); nan: not known."""
+    grip = np.convolve(scene.grip, np.ones(BLOCK) / BLOCK, "same")[at]
+    return np.where(np.isfinite(grip), grip > EDGE, np.nan)
 
 
 def first_touch(scene: Scene) -> int:

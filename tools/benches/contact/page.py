@@ -25,10 +25,11 @@ def page(results: dict) -> str:
         "known": "Friction known",
         "unknown": "Friction not known",
         "chain": "Friction not known, whiskers as chains of 20 links in MuJoCo",
+        "any": "Chains: friction 0.1 to 0.5, radii 30 to 150 mm, 0.03 to 0.2 m/s",
     }
     for name, title in titles.items():
         found = results["kinds"][name]
-        parts += [f"## {title}\n\n", _places(found), _shapes(found), _speeds(found)]
+        parts += [f"## {title}\n\n", _places(found), _shapes(found), _speeds(found), _slips(found)]
     return "".join(parts).rstrip() + "\n"
 
 
@@ -73,7 +74,9 @@ def _shapes(found: dict) -> str:
         for kind, one in found.items()
         if "normal_rms_deg" in one
     ]
-    return _table(["surface", "normal RMS degrees", "held 90 %", "contour RMS mm", "probability of a surface"], rows)
+    return _table(
+        ["surface", "normal RMS degrees", "held 90 %", "off the surface RMS mm", "probability of a surface"], rows
+    )
 
 
 def _speeds(found: dict) -> str:
@@ -85,6 +88,16 @@ def _speeds(found: dict) -> str:
     return (
         "" if not rows else _table(["object that moves", "median error of its speed", "within 10 %", "held 90 %"], rows)
     )
+
+
+def _slips(found: dict) -> str:
+    rows = [
+        [kind, _percent(one["sticks"]), _percent(one["slip_right"]), f"{one['slip_ece']:.3f}"]
+        for kind, one in found.items()
+        if "slip_right" in one
+    ]
+    head = ["contact", "sticks", "stick or slip told right", "expected calibration error"]
+    return _table(head, rows) if rows else ""
 
 
 def _number(value: float | None) -> str:

@@ -22,10 +22,12 @@ CONE, TIP = 0.181739, 0.140
 CREEP, CREEP_S, KAPPA = 0.075, 0.5, 1.0
 NOISE_RAD, GAIN_SD, MOTION_SD = 2e-4, 0.01, 0.01
 FRICTION, FRICTION_SD = 0.3, 0.05
+RADIUS_SD_M, SPEED_SD = 0.03, 0.15  # of a place anywhere from 36 to 140 mm; of each component of an object's velocity
 LEAD = 800  # ticks before a corner is touched
 EVERY = 10  # ticks between two solutions of the elastica
 QUARTER = np.pi / 2
 REACH_M = 1e-3  # beyond the tip: the chain ends in a cap
+LEAST_M, LARGEST_RAD = 0.036, 0.25  # nearer, the mount is touched; the plug's stop
 
 
 class Scene(NamedTuple):
@@ -37,6 +39,7 @@ class Scene(NamedTuple):
     normal: np.ndarray  # (n,) of the surface; nan: a corner
     velocity: np.ndarray  # (n, 2) of the object
     centre: np.ndarray  # (n, 2) of a cylinder; nan: none
+    grip: np.ndarray  # (n,) share of the friction cone that the force uses; nan: not known
 
 
 class Draw(NamedTuple):
@@ -86,6 +89,7 @@ class Plan(NamedTuple):
     touched_m: float
     round_m: float = 0.0  # radius of the object; 0: a corner
     normal: float = QUARTER  # of its surface there
+    lies: bool = False  # the contact goes on when the whisker lies along the surface
 
     @property
     def centre(self) -> np.ndarray:
@@ -130,13 +134,13 @@ class Corner(NamedTuple):
         tilt, point, velocity = self.felt(draw.friction)
         none = np.full(len(tilt), np.nan)
         told = self.plan.bases * (1 + draw.motion)
-        return Scene(told, draw.measured(tilt), point, none, velocity, np.column_stack([none, none]))
+        return Scene(told, draw.measured(tilt), point, none, velocity, np.column_stack([none, none]), none)
 
     def bound(self, draw: Draw, friction_sd: float) -> np.ndarray:
         """(n,) Cramer-Rao bound of the point's error, mm: root of the trace of its least covariance after each tick.
 
-        Unknown: place and start of the contact (free), gain, friction and error of the motion told (with the priors of
-        the filter), and of an object that moves its velocity. The whisker is quasi-static, the kind of contact known.
+        Unknown: start of the contact (free), place, gain, friction, error of the motion told, and of an object that moves
+        its velocity, with the priors of the filter. The whisker is quasi-static, the kind of contact known.
         """
         from signals.mechanics import LARGE
 
@@ -159,7 +163,10 @@ class Corner(NamedTuple):
         middle = answer()[0]
         slopes = np.column_stack([*tilts, middle])  # the last: by ln of the gain
         places = np.stack([*points, np.zeros_like(points[0])], axis=2)
-        prior = dict.fromkeys(steps, 0.0) | {"motion": MOTION_SD**-2.0, "friction": max(friction_sd, 1e-6) ** -2.0}
+        prior = dict.fromkeys(steps, 0.0) | {"radius": RADIUS_SD_M**-2.0, "motion": MOTION_SD**-2.0}
+        prior |= {"friction": max(friction_sd, 1e-6) ** -2.0} | (
+            {"vx": SPEED_SD**-2.0, "vy": SPEED_SD**-2.0} if moves else {}
+        )
         held = np.diag([*prior.values(), GAIN_SD**-2.0])
         information = held + np.cumsum(slopes[:, :, None] * slopes[:, None, :], axis=0) / NOISE_RAD**2
         least = np.linalg.pinv(information[EVERY:], hermitian=True)
@@ -254,7 +261,8 @@ def surface(plan: Plan, draw: Draw) -> Scene | None:
     point, normals = np.column_stack(columns[:2]), columns[2]
     still = np.zeros((len(used), 2))
     told = bases[used] * (1 + draw.motion)
-    return Scene(told, draw.measured(columns[3]), point, normals, still, centre[used])
+    none = np.full(len(used), np.nan)
+    return Scene(told, draw.measured(columns[3]), point, normals, still, centre[used], none)
 
 
 def simulated(plan: Plan, draw: Draw) -> Scene | None:
@@ -268,26 +276,30 @@ def chained(plan: Plan, draw: Draw) -> Scene | None:
     kind = "face" if plan.round_m > 1.0 else "cylinder" if plan.round_m > 0.0 else "peg"
     job = {"beam": spec(0.3e-3, KAPPA, 20), "object": kind, "place": [plan.touched_m, 0.0], "radius": plan.round_m}
     job |= {"normal": plan.normal, "friction": round(draw.friction, 6), "bases": against.round(6).tolist()}
-    told = chain("follow", job, FOLLOW)
+    told = chain("grip", job, FOLLOW)
     places = told["places"]
     touched = [i for i, place in enumerate(places) if place is not None and np.hypot(*place[:2]) < TIP + REACH_M]
     if len(touched) < 2:
         return None
     used = np.arange(touched[0], touched[-1] + 1)
     kept = [i for i in used if places[i] is not None]
-    x, y, normal = (np.interp(used, kept, column) for column in np.array([places[i] for i in kept]).T)
-    if kind == "face":
-        used, x, y, normal = (part[: lying(x)] for part in (used, x, y, normal))
+    x, y, normal, grip = (np.interp(used, kept, column) for column in np.array([places[i] for i in kept]).T)
+    tilt = np.array(told["tilt"])[used]
+    ends = [len(used), *np.flatnonzero((np.abs(tilt) > LARGEST_RAD) | (np.hypot(x, y) < LEAST_M))[:1]]
+    if kind == "face" and not plan.lies:
+        ends.append(lying(x))
+    used, x, y, normal, grip, tilt = (part[: min(ends)] for part in (used, x, y, normal, grip, tilt))
     still = np.tile([np.nan, np.nan], (len(plan.bases), 1))
     if kind == "cylinder":
         still, _ = seen(against, np.tile(plan.centre, (len(against), 1)))
     return Scene(
         plan.bases[used] * (1 + draw.motion),
-        draw.measured(np.array(told["tilt"])[used]),
+        draw.measured(tilt),
         np.column_stack([x, y]),
         np.full(len(used), np.nan) if kind == "peg" else normal,
         plan.velocity[used],
         still[used],
+        grip,
     )
 
 

@@ -18,6 +18,7 @@ SETTINGS = {
     "noise_rad": 2.0e-4,  # 0.03 degrees of field at 2.75 of field per tilt
     "largest_rad": 0.25,
     "gain_sd": 0.01,
+    "model_share": 0.02,
     "friction": 0.3,
     "friction_sd": 0.05,
     "motion_share": 0.01,

@@ -1,10 +1,11 @@
 """A contact of a chain of 20 links in MuJoCo, told sample by sample. Run by ../scenes.py.
 
-    follow.py follow '{"beam": {...}, "object": "peg", "place": [x, y], "radius": 0, "normal": 0, "friction": 0.3, "bases": [[...]]}'
+    follow.py grip '{"beam": {...}, "object": "peg", "place": [x, y], "radius": 0, "normal": 0, "friction": 0.3, "bases": [[...]]}'
 
 The mount is driven along the bases (velocity along and across the unbent whisker, rate of turn; one row a tick). The
 object stands still: only the motion between the two matters. One line of JSON: tilt of the plug's hinge, place of the
-contact on the axis and the direction of its normal in the mount's frame, each tick; null where nothing touches.
+contact on the axis, the direction of its normal in the mount's frame and the share of the friction cone that the force
+uses, each tick; null where nothing touches.
 """
 
 import json
@@ -62,9 +63,9 @@ class Contact:
             mujoco.mj_step(self.model, self.data)
             pose += STEP_S * rates
 
-    def reading(self, pose: np.ndarray) -> tuple[float, float, float] | None:
-        """Place on the axis and direction of the normal, in the mount's frame, by the contacts' forces."""
-        wrench, total, place, normal = np.zeros(6), 0.0, np.zeros(2), np.zeros(2)
+    def reading(self, pose: np.ndarray) -> tuple[float, float, float, float] | None:
+        """Place on the axis, direction of the normal, in the mount's frame, and friction used, by the contacts' forces."""
+        wrench, total, place, normal, used = np.zeros(6), 0.0, np.zeros(2), np.zeros(2), 0.0
         for i in range(self.data.ncon):
             contact = self.data.contact[i]
             mujoco.mj_contactForce(self.model, self.data, i, wrench)
@@ -74,12 +75,13 @@ class Contact:
             touched = middle + along * ((contact.pos - middle) @ along)
             place += wrench[0] * touched[:2]
             normal += wrench[0] * out[:2]
+            used += float(np.hypot(wrench[1], wrench[2])) / contact.friction[0]
             total += wrench[0]
         if total <= 0.0:
             return None
         x, y = place / total - pose[:2]
         c, s = np.cos(pose[2]), np.sin(pose[2])
-        return c * x + s * y, c * y - s * x, float(np.arctan2(normal[1], normal[0]) - pose[2])
+        return c * x + s * y, c * y - s * x, float(np.arctan2(normal[1], normal[0]) - pose[2]), used / total
 
 
 def follow(spec: dict) -> dict:
