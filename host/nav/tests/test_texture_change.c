@@ -1,4 +1,6 @@
 /* A change of surface within a drive, and a surface never trained that no window by itself gives away. */
+#include <stdbool.h>
+
 #include "near.h"
 #include "texture_change.h"
 #include "texture_features.h"
@@ -8,7 +10,7 @@ enum { LENGTH = 16, FEATURES_MOST = 64 };
 
 /* One channel; two classes whose log power is 0 and 4, with unit variance within a drive. */
 struct numbers {
-    double floor, steady[2 * FEATURES_MOST], apart[4], weight[2 * FEATURES_MOST], bias[2];
+    double floor, steady[2 * FEATURES_MOST], edge[2 * FEATURES_MOST], apart[4], weight[2 * FEATURES_MOST], bias[2];
 };
 
 static struct nav_texture_change *make(struct numbers *m, double limit)
@@ -18,16 +20,15 @@ static struct nav_texture_change *make(struct numbers *m, double limit)
     int power = nav_texture_features_count(f) - 2;
     nav_texture_features_free(f);
     m->steady[2 * power + 1] = m->weight[2 * power + 1] = 4.0;
+    m->edge[2 * (power - 1) + 1] = 4.0; /* the highest band alone */
     const struct nav_texture_change_numbers n = {.classes = 2,
                                                  .channels = 1,
                                                  .length = LENGTH,
                                                  .share = 1.0,
                                                  .limit = limit,
                                                  .floor = &m->floor,
-                                                 .steady = m->steady,
-                                                 .apart = m->apart,
-                                                 .weight = m->weight,
-                                                 .bias = m->bias};
+                                                 .inside = {m->steady, m->apart, m->weight, m->bias},
+                                                 .edge = {m->edge, m->apart, m->edge, m->bias}};
     return nav_texture_change_new(&n);
 }
 
@@ -44,18 +45,22 @@ static void a_change_is_found_where_it_is(void **state)
     (void)state;
     struct numbers m;
     int after;
-    struct nav_texture_change *c = make(&m, 5.0);
+    struct nav_texture_change *c = make(&m, 1e3);
     for (int i = 0; i < 3; i++)
         assert_true(weigh(c, 1.0, &after) < -1e8);
     for (int i = 0; i < 40; i++)
         assert_true(weigh(c, 1.0, &after) < 0.0);
-    assert_true(weigh(c, exp(2.0), &after) < 5.0);
-    for (int i = 2; i <= NAV_TEXTURE_CHANGE_AFTER_MOST; i++) {
-        assert_true(weigh(c, exp(2.0), &after) > 5.0);
-        assert_int_equal(after, i);
+    for (int i = 1; i <= NAV_TEXTURE_CHANGE_AFTER_MOST; i++) {
+        double found = weigh(c, exp(2.0), &after);
+        assert_true(i < 2 ? found < 5.0 : found > 5.0 && after == i);
     }
-    nav_texture_change_keep(c, 2);
-    assert_true(weigh(c, exp(2.0), &after) < -1e8); /* three blocks leave no two before two */
+    nav_texture_change_free(c);
+    c = make(&m, 5.0);
+    for (int i = 0; i < 10; i++)
+        weigh(c, 1.0, &after);
+    assert_true(weigh(c, exp(2.0), &after) < 5.0 && weigh(c, exp(2.0), &after) > 5.0);
+    assert_true(weigh(c, exp(2.0), &after) <
+                -1e8); /* what lay before is forgotten, and three leave no two before two */
     assert_true(weigh(c, exp(2.0), &after) < 0.0);
     nav_texture_change_free(c);
 }
@@ -67,7 +72,7 @@ static void the_ratio_is_the_formula(void **state)
     struct numbers m;
     int after;
     double last = 0.0;
-    struct nav_texture_change *c = make(&m, 5.0);
+    struct nav_texture_change *c = make(&m, 1e3);
     for (int i = 0; i < 9; i++)
         last = weigh(c, i < 6 ? 1.0 : exp(2.0), &after);
     assert_int_equal(after, 3);
@@ -83,7 +88,7 @@ static void a_side_that_does_not_sound_like_its_class_counts_against_the_change(
     struct numbers m;
     int after;
     double last = 0.0, first_class = 1.0 / (1.0 + exp(8.0));
-    struct nav_texture_change *c = make(&m, 5.0);
+    struct nav_texture_change *c = make(&m, 1e3);
     for (int i = 0; i < 9; i++)
         last = weigh(c, i < 6 ? exp(4.0) : exp(2.0), &after);
     double against = 3.0 * log((0.99 * first_class + 0.005) / (0.99 * (1.0 - first_class) + 0.005));
@@ -100,7 +105,7 @@ static void a_stray_block_claims_no_more_than_the_classes_differ(void **state)
     struct numbers m;
     int after;
     double last = 0.0;
-    struct nav_texture_change *c = make(&m, 5.0);
+    struct nav_texture_change *c = make(&m, 1e3);
     for (int i = 0; i < 9; i++)
         last = weigh(c, i < 6 ? 1.0 : exp(4.0), &after);
     assert_true(last > 15.0 && last < 20.0);
@@ -116,6 +121,60 @@ static void what_a_drive_has_of_its_own_is_no_change(void **state)
     struct nav_texture_change *c = make(&m, 5.0);
     for (int i = 0; i < 30; i++)
         assert_true(weigh(c, exp(1.0), &after) < 0.0);
+    nav_texture_change_free(c);
+}
+
+/* A block of +-amplitude, and a slow swing of the whisker below it. */
+static double ring(struct nav_texture_change *c, double amplitude, double swing, int *after)
+{
+    double block[LENGTH];
+    for (int i = 0; i < LENGTH; i++)
+        block[i] = (i % 2 ? amplitude : -amplitude) + swing * cos(2.0 * acos(-1.0) * i / LENGTH);
+    return nav_texture_change_weigh(c, block, after);
+}
+
+/* Whether a change is found among six blocks after ten of the first class, and after how many of them. */
+static int found_after(bool edge, double amplitude, double swing)
+{
+    struct numbers m;
+    int after, found = 0;
+    struct nav_texture_change *c = make(&m, 5.0);
+    for (int i = 0; i < 10; i++)
+        weigh(c, 1.0, &after);
+    if (edge)
+        nav_texture_change_edge(c);
+    for (int i = 1; i <= NAV_TEXTURE_CHANGE_AFTER_MOST && !found; i++)
+        found = ring(c, amplitude, swing, &after) > 5.0 ? i : 0;
+    nav_texture_change_free(c);
+    return found;
+}
+
+/* The whisker rings in its own low bands behind an edge: there the others alone tell whether the surface is another.
+ * The first block behind it is left out. */
+static void an_edge_is_a_border_only_where_the_surface_is_another(void **state)
+{
+    (void)state;
+    assert_int_equal(found_after(false, 1.0, 10.0), 2);
+    assert_int_equal(found_after(true, 1.0, 10.0), 0);
+    assert_int_equal(found_after(true, exp(2.0), 10.0), 3);
+}
+
+/* Once the blocks that may ring are over, changes are looked for anywhere again, and not across the edge. */
+static void behind_the_ringing_a_row_begins_anew(void **state)
+{
+    (void)state;
+    struct numbers m;
+    int after;
+    struct nav_texture_change *c = make(&m, 5.0);
+    for (int i = 0; i < 10; i++)
+        weigh(c, 1.0, &after);
+    nav_texture_change_edge(c);
+    for (int i = 0; i <= NAV_TEXTURE_CHANGE_AFTER_MOST; i++)
+        assert_true(ring(c, 1.0, 10.0, &after) < 5.0);
+    for (int i = 0; i < 10; i++)
+        assert_true(weigh(c, 1.0, &after) < (i < 3 ? -1e8 : 5.0));
+    weigh(c, exp(2.0), &after);
+    assert_true(weigh(c, exp(2.0), &after) > 5.0 && after == 2);
     nav_texture_change_free(c);
 }
 
@@ -217,6 +276,8 @@ int main(void)
         cmocka_unit_test(a_side_that_does_not_sound_like_its_class_counts_against_the_change),
         cmocka_unit_test(a_stray_block_claims_no_more_than_the_classes_differ),
         cmocka_unit_test(what_a_drive_has_of_its_own_is_no_change),
+        cmocka_unit_test(an_edge_is_a_border_only_where_the_surface_is_another),
+        cmocka_unit_test(behind_the_ringing_a_row_begins_anew),
         cmocka_unit_test(impossible_numbers_make_no_detector),
         cmocka_unit_test(windows_in_a_row_are_weighed_by_their_mean),
         cmocka_unit_test(old_windows_fade),

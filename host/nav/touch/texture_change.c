@@ -15,6 +15,8 @@ enum {
     HELD_MOST = NAV_TEXTURE_CHANGE_AFTER_MOST + NAV_TEXTURE_CHANGE_BEFORE_MOST
 };
 #define NO_RATIO (-1e9)
+#define NO_EDGE (1 << 20)
+#define AT_EDGE 2.2     /* nats: nine to one for a change at an edge, where the surface is as likely to change as not */
 #define STRAY 0.01      /* share of blocks that say nothing of their class: bounds what one block can claim */
 #define NAMED 0.5       /* weight of what both sides say of their class by themselves, beside the difference */
 #define NAMED_MOST 20.0 /* nats: no side is more sure than that which class it is not */
@@ -22,23 +24,30 @@ enum {
 struct nav_texture_change {
     struct nav_texture_change_numbers n; /* its arrays are the detector's own */
     int features, held;                  /* blocks held, the newest last */
+    int behind;                          /* blocks since an edge, -1 until one is left out, or NO_EDGE */
     struct nav_texture_features *reduce;
     double *feature; /* [F] */
-    double *block;   /* [HELD_MOST][2][K] scores within a drive, log posteriors */
-    double *sum;     /* [4][2][K] sums before and behind the change, then both finished */
+    double *block;   /* [HELD_MOST][2][2][K] by rule: scores within a drive, log posteriors */
+    double *sum;     /* [4][2][2][K] sums before and behind the change, then both finished */
 };
+
+static bool own(struct nav_texture_change_rule *r, size_t f, size_t k)
+{
+    bool ok = nav_texture_own(&r->steady, f * k);
+    ok = nav_texture_own(&r->apart, k * k) && ok;
+    ok = nav_texture_own(&r->weight, f * k) && ok;
+    return nav_texture_own(&r->bias, k) && ok;
+}
 
 static bool make(struct nav_texture_change *c)
 {
     size_t f = (size_t)c->features, k = (size_t)c->n.classes;
     bool ok = nav_texture_own(&c->n.floor, (size_t)c->n.channels);
-    ok = nav_texture_own(&c->n.steady, f * k) && ok;
-    ok = nav_texture_own(&c->n.apart, k * k) && ok;
-    ok = nav_texture_own(&c->n.weight, f * k) && ok;
-    ok = nav_texture_own(&c->n.bias, k) && ok;
+    ok = own(&c->n.inside, f, k) && ok;
+    ok = own(&c->n.edge, f, k) && ok;
     c->feature = calloc(f, sizeof *c->feature);
-    c->block = calloc(2 * HELD_MOST * k, sizeof *c->block);
-    c->sum = calloc(8 * k, sizeof *c->sum);
+    c->block = calloc(4 * HELD_MOST * k, sizeof *c->block);
+    c->sum = calloc(16 * k, sizeof *c->sum);
     return ok && c->feature && c->block && c->sum;
 }
 
@@ -59,7 +68,8 @@ struct nav_texture_change *nav_texture_change_new(const struct nav_texture_chang
         nav_texture_features_free(reduce);
         return NULL;
     }
-    *c = (struct nav_texture_change){.n = *numbers, .reduce = reduce, .features = nav_texture_features_count(reduce)};
+    *c = (struct nav_texture_change){
+        .n = *numbers, .reduce = reduce, .features = nav_texture_features_count(reduce), .behind = NO_EDGE};
     if (!make(c)) {
         nav_texture_change_free(c);
         return NULL;
@@ -71,8 +81,9 @@ void nav_texture_change_free(struct nav_texture_change *c)
 {
     if (!c)
         return;
-    const double *arrays[] = {c->n.floor, c->n.steady, c->n.apart, c->n.weight,
-                              c->n.bias,  c->feature,  c->block,   c->sum};
+    const struct nav_texture_change_rule *in = &c->n.inside, *at = &c->n.edge;
+    const double *arrays[] = {c->n.floor, in->steady, in->apart, in->weight, in->bias, at->steady,
+                              at->apart,  at->weight, at->bias,  c->feature, c->block, c->sum};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++)
         free((void *)arrays[i]);
     nav_texture_features_free(c->reduce);
@@ -89,13 +100,25 @@ double nav_texture_change_limit(const struct nav_texture_change *c)
     return c->n.limit;
 }
 
-void nav_texture_change_keep(struct nav_texture_change *c, int keep)
+/* Forgets all blocks but the last `keep`. */
+static void keep_last(struct nav_texture_change *c, int keep)
 {
-    size_t row = 2 * (size_t)c->n.classes;
+    size_t row = 4 * (size_t)c->n.classes;
     if (keep >= c->held)
         return;
     memmove(c->block, c->block + (size_t)(c->held - keep) * row, (size_t)keep * row * sizeof *c->block);
     c->held = keep;
+}
+
+void nav_texture_change_reset(struct nav_texture_change *c)
+{
+    c->held = 0;
+    c->behind = NO_EDGE;
+}
+
+void nav_texture_change_edge(struct nav_texture_change *c)
+{
+    c->behind = -1;
 }
 
 /* Log-likelihoods to log posteriors under equal priors, when a block says nothing of its class now and then. */
@@ -110,25 +133,33 @@ static void normalise(double *log_of, int classes)
         log_of[k] = log((1.0 - STRAY) * log_of[k] / sum + STRAY / classes);
 }
 
-static void take(struct nav_texture_change *c, const double *block)
+/* out[2][K]: a block's scores by a rule, and its log posteriors. */
+static void score(const struct nav_texture_change *c, const struct nav_texture_change_rule *r, double *restrict out)
 {
     int classes = c->n.classes;
-    nav_texture_change_keep(c, HELD_MOST - 1);
-    double *scores = c->block + 2 * (size_t)classes * (size_t)c->held++, *named = scores + classes;
-    nav_texture_features_work(c->reduce, block, c->feature);
-    memset(scores, 0, (size_t)classes * sizeof *scores);
-    memcpy(named, c->n.bias, (size_t)classes * sizeof *named);
+    double *named = out + classes;
+    memset(out, 0, (size_t)classes * sizeof *out);
+    memcpy(named, r->bias, (size_t)classes * sizeof *named);
     for (int f = 0; f < c->features; f++) {
-        const double *steady = c->n.steady + (size_t)f * (size_t)classes;
-        const double *weight = c->n.weight + (size_t)f * (size_t)classes;
+        const double *steady = r->steady + (size_t)f * (size_t)classes;
+        const double *weight = r->weight + (size_t)f * (size_t)classes;
         for (int k = 0; k < classes; k++) {
-            scores[k] += c->feature[f] * steady[k];
+            out[k] += c->feature[f] * steady[k];
             named[k] += c->feature[f] * weight[k];
         }
     }
     for (int k = 0; k < classes; k++)
         named[k] *= c->n.share;
     normalise(named, classes);
+}
+
+static void take(struct nav_texture_change *c, const double *block)
+{
+    keep_last(c, HELD_MOST - 1);
+    double *scores = c->block + 4 * (size_t)c->n.classes * (size_t)c->held++;
+    nav_texture_features_work(c->reduce, block, c->feature);
+    score(c, &c->n.inside, scores);
+    score(c, &c->n.edge, scores + 2 * (size_t)c->n.classes);
 }
 
 /* out[K]: scores' mean over so many blocks; out[K + k]: log-likelihood of class k in all of them, the best's 0. */
@@ -144,15 +175,19 @@ static void finish(const double *sum, int classes, int blocks, double *restrict 
     }
 }
 
-/* Ratio of the likeliest pair of classes for a change with `after` of the blocks behind it, given both sides' finished
- * sums. A difference beyond the classes' own is no more evidence than that. */
-static double ratio(const struct nav_texture_change *c, const double *early, const double *late, int after)
+/* Ratio of the likeliest pair of classes for a change with `after` of the blocks behind it, by a rule, given both
+ * sides' sums. A difference beyond the classes' own is no more evidence than that. */
+static double ratio(struct nav_texture_change *c, bool edge, int after)
 {
-    int classes = c->n.classes, before = c->held - after;
+    int classes = c->n.classes, before = c->held - after, width = 4 * classes, at = edge ? 2 * classes : 0;
     double blocks = c->n.share * after * before / (after + before), best = NO_RATIO;
+    double *early = c->sum + 2 * width, *late = early + width;
+    const double *apart_of = edge ? c->n.edge.apart : c->n.inside.apart;
+    finish(c->sum + at, classes, before, early);
+    finish(c->sum + width + at, classes, after, late);
     for (int k = 0; k < classes; k++) {
         for (int j = 0; j < classes; j++) {
-            double apart = c->n.apart[k * classes + j], moved = late[j] - late[k] - early[j] + early[k];
+            double apart = apart_of[k * classes + j], moved = late[j] - late[k] - early[j] + early[k];
             double named = NAMED * (early[classes + k] + late[classes + j]);
             double here = blocks * ((moved < apart ? moved : apart) - 0.5 * apart) + named;
             if (j != k && here > best)
@@ -165,7 +200,7 @@ static double ratio(const struct nav_texture_change *c, const double *early, con
 /* Moves a block from one side of the change to the other. */
 static void move(const struct nav_texture_change *c, int block, double *restrict early, double *restrict late)
 {
-    int width = 2 * c->n.classes;
+    int width = 4 * c->n.classes;
     const double *row = c->block + (size_t)width * (size_t)block;
     for (int k = 0; k < width; k++) {
         early[k] -= row[k];
@@ -173,26 +208,40 @@ static void move(const struct nav_texture_change *c, int block, double *restrict
     }
 }
 
-double nav_texture_change_weigh(struct nav_texture_change *c, const double *block, int *after)
+/* The likeliest change among the blocks held: at the edge, if there is one, else anywhere. Returns its ratio, and how
+ * many blocks lie behind it. */
+static double likeliest(struct nav_texture_change *c, int *after)
 {
-    int classes = c->n.classes;
-    double *early = c->sum, *late = early + 2 * (size_t)classes, *side = late + 2 * (size_t)classes, best = NO_RATIO;
-    *after = 0;
-    take(c, block);
-    memset(c->sum, 0, 8 * (size_t)classes * sizeof *c->sum);
+    double *early = c->sum, *late = early + 4 * (size_t)c->n.classes, *none = late + 4 * (size_t)c->n.classes;
+    double best = NO_RATIO;
+    bool edge = c->behind != NO_EDGE;
+    memset(c->sum, 0, 16 * (size_t)c->n.classes * sizeof *c->sum);
     for (int b = 0; b < c->held; b++) /* all blocks into `early`: what leaves the other side comes to this one */
-        move(c, b, side, early);
+        move(c, b, none, early);
     for (int a = 1; a <= MOST && 2 * a <= c->held; a++) {
         move(c, c->held - a, early, late);
-        if (a < LEAST)
+        if (a < LEAST || (edge && a != c->behind))
             continue;
-        finish(early, classes, c->held - a, side);
-        finish(late, classes, a, side + 2 * (size_t)classes);
-        double here = ratio(c, side, side + 2 * (size_t)classes, a);
+        double here = ratio(c, edge, a) + (edge ? c->n.limit - AT_EDGE : 0.0);
         if (here > best) {
             best = here;
             *after = a;
         }
     }
+    return best;
+}
+
+double nav_texture_change_weigh(struct nav_texture_change *c, const double *block, int *after)
+{
+    bool edge = c->behind != NO_EDGE;
+    *after = 0;
+    if (edge && c->behind++ < 0)
+        return NO_RATIO;
+    take(c, block);
+    double best = likeliest(c, after);
+    if (best > c->n.limit)
+        keep_last(c, edge ? 0 : *after);
+    if (c->behind == MOST)
+        nav_texture_change_reset(c);
     return best;
 }

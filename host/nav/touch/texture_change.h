@@ -13,15 +13,20 @@ struct nav_texture_change;
 
 enum { NAV_TEXTURE_CHANGE_AFTER_LEAST = 2, NAV_TEXTURE_CHANGE_AFTER_MOST = 6, NAV_TEXTURE_CHANGE_BEFORE_MOST = 16 };
 
+/* What tells classes apart in a block. All arrays are copied. */
+struct nav_texture_change_rule {
+    const double *steady;        /* [F][K] inverse covariance within a drive times each class's middle */
+    const double *apart;         /* [K][K] squared distance of the middles by that covariance */
+    const double *weight, *bias; /* [F][K], [K] log-likelihoods of a block by the covariance within classes */
+};
+
 /* F: features of a block (texture_features.h, neither levels nor shorter), K: classes. All arrays are copied. */
 struct nav_texture_change_numbers {
-    int classes, channels, length; /* samples of a block */
-    double share;                  /* of its independent evidence that a block in a row holds, 0 to 1 */
-    double limit;                  /* nats: a ratio above it is a change */
-    const double *floor;           /* [channels] counts squared */
-    const double *steady;          /* [F][K] inverse covariance within a drive times each class's middle */
-    const double *apart;           /* [K][K] squared distance of the middles by that covariance */
-    const double *weight, *bias;   /* [F][K], [K] log-likelihoods of a block by the covariance within classes */
+    int classes, channels, length;               /* samples of a block */
+    double share;                                /* of its independent evidence that a block in a row holds, 0 to 1 */
+    double limit;                                /* nats: a ratio above it is a change */
+    const double *floor;                         /* [channels] counts squared */
+    struct nav_texture_change_rule inside, edge; /* the latter where an edge lies between: of what no ringing fills */
 };
 
 /* NULL when a size is out of range, a number is not finite, or memory is short. */
@@ -29,12 +34,17 @@ struct nav_texture_change *nav_texture_change_new(const struct nav_texture_chang
 void nav_texture_change_free(struct nav_texture_change *);
 
 /* Takes a block [length][channels], finite and within +-1e9. Returns the ratio, nats, of the likeliest change among the
- * blocks held, and in *after how many blocks lie
- * behind it; -1e9 while there are too few. Allocates nothing. */
+ * blocks held, and in *after how many blocks lie behind it; -1e9 and 0 while there are too few. Above the limit it is a
+ * change, and what lies before is forgotten. Allocates nothing. */
 double nav_texture_change_weigh(struct nav_texture_change *, const double *block, int *after);
 
-/* Forgets all blocks but the last `keep`. */
-void nav_texture_change_keep(struct nav_texture_change *, int keep);
+/* An edge lies between the last block and the next, which is left out: the surface is as likely to change there as not.
+ * For CHANGE_AFTER_MOST blocks a change is looked for at the edge alone, of what the whisker's ringing does not fill.
+ */
+void nav_texture_change_edge(struct nav_texture_change *);
+
+/* Forgets all blocks. */
+void nav_texture_change_reset(struct nav_texture_change *);
 /* cffi: end */
 
 int nav_texture_change_length(const struct nav_texture_change *);

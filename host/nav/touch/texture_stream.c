@@ -7,21 +7,12 @@
 
 #include "texture_filter.h"
 
-#define HELD_WINDOWS 20 /* a tip held for longer, 2 s at 100 ms, has a new rest */
 #define SINCE_LONG (1 << 30)
 #define SURE 0.9            /* probability of another class at which windows are no longer of the same row */
 #define CHANGED 0.9         /* share of reported change points that are true */
 #define MOVED 0.5           /* chance that an edge that holds the tip is the border of another surface */
 #define LOG_ODDS_MOST 20.0  /* of a surface never trained: a confidence of 0 means no evidence at all */
 #define BAD_SHARE_MOST 0.25 /* of a window; with more, its spectrum is that of the gaps */
-
-/* How long an edge holds the tip. It begins with a bend farther than any trained floor makes within a window; while it
- * lasts, the tip stands still on the edge and what it feels is no floor, though later windows bend no farther. */
-struct edge {
-    double *level; /* [channels] mean of the last window before */
-    bool known, held;
-    long samples; /* that it has been held for */
-};
 
 struct nav_texture_stream {
     struct nav_texture_rules rules; /* its pointers are the stream's own, but for what is lent */
@@ -37,7 +28,6 @@ struct nav_texture_stream {
     bool border;  /* a change found since the last decision */
     int kind;     /* class of the windows in a row that novelty is judged by, or NAV_TEXTURE_UNKNOWN */
     double novel; /* probability that those are of a surface never trained */
-    struct edge edge;
 };
 
 static bool classifiers_ok(const struct nav_texture_rules *r)
@@ -107,7 +97,7 @@ static bool allocate(struct nav_texture_stream *s)
     size_t channels = (size_t)s->rules.channels, classes = (size_t)s->rules.classes;
     size_t room = (size_t)s->room * channels, block = (size_t)block_length(s) * channels;
     size_t apart = (size_t)novelty_length(s) * channels;
-    double *m = s->memory = calloc(2 * room + block + apart + 3 * classes + 6 * channels, sizeof *m);
+    double *m = s->memory = calloc(2 * room + block + apart + 3 * classes + 5 * channels, sizeof *m);
     if (!m)
         return false;
     s->raw = cut(&m, room);
@@ -117,7 +107,6 @@ static bool allocate(struct nav_texture_stream *s)
     s->posterior = cut(&m, classes);
     s->ahead = cut(&m, classes);
     s->part = cut(&m, classes);
-    s->edge.level = cut(&m, channels);
     l->spike = own_limit(&m, l->spike, channels);
     l->still = own_limit(&m, l->still, channels);
     l->low = own_limit(&m, l->low, channels);
@@ -161,53 +150,15 @@ static void new_row(struct nav_texture_stream *s)
         nav_texture_novelty_reset(s->rules.novelty);
 }
 
-/* The blocks to come are not compared with those before. */
-static void interrupt(const struct nav_texture_stream *s)
-{
-    if (s->rules.change)
-        nav_texture_change_keep(s->rules.change, 0);
-}
-
 void nav_texture_stream_reset(struct nav_texture_stream *s)
 {
     s->held = s->blocked = 0;
     s->since = SINCE_LONG;
-    s->border = s->edge.known = s->edge.held = false;
+    s->border = false;
     nav_texture_filter_start(s->posterior, s->rules.classes);
-    interrupt(s);
+    if (s->rules.change)
+        nav_texture_change_reset(s->rules.change);
     new_row(s);
-}
-
-static double mean_of(const struct nav_texture_stream *s, int channel)
-{
-    double sum = 0.0;
-    for (int i = 0; i < s->held; i++)
-        sum += s->clean[(long)i * s->rules.channels + channel];
-    return sum / s->held;
-}
-
-static bool away(const struct nav_texture_stream *s)
-{
-    for (int c = 0; c < s->rules.channels; c++) {
-        if (fabs(mean_of(s, c) - s->edge.level[c]) > s->rules.limits.span[c])
-            return true;
-    }
-    return false;
-}
-
-/* Whether an edge holds the tip: since a sudden bend the mean has not come back to within a span of what it was. */
-static bool edge_holds(struct nav_texture_stream *s, bool sudden)
-{
-    struct edge *e = &s->edge;
-    if (!s->rules.limits.span)
-        return sudden;
-    e->samples = e->held ? e->samples + (s->rules.step > 0 ? s->rules.step : s->held) : 0;
-    bool patient = e->samples < (long)HELD_WINDOWS * s->rules.window;
-    e->held = sudden || (e->held && e->known && patient && away(s));
-    for (int c = 0; c < s->rules.channels && !e->held; c++)
-        e->level[c] = mean_of(s, c);
-    e->known = e->known || !e->held;
-    return e->held;
 }
 
 /* Whether n samples say nothing of a floor: too many of the records bad, or a channel stuck or railed. */
@@ -221,10 +172,7 @@ static bool clean(struct nav_texture_stream *s, struct nav_texture_decision *d)
 {
     memcpy(s->clean, s->raw, (size_t)s->held * (size_t)s->rules.channels * sizeof *s->clean);
     d->health = nav_texture_clean(s->clean, s->held, &s->rules.limits);
-    bool readable = !unreadable(&d->health, s->held);
-    if (readable && edge_holds(s, d->health.caught > 0))
-        d->health.caught = d->health.caught > 0 ? d->health.caught : 1;
-    return readable && !d->health.caught;
+    return !unreadable(&d->health, s->held) && d->health.caught == 0;
 }
 
 /* What n samples say of each class, the best's 0: the longest classifier that fits covers them in evenly spaced
@@ -307,7 +255,7 @@ static bool decide(struct nav_texture_stream *s, struct nav_texture_decision *d,
     int classes = s->rules.classes, n = s->since < s->held ? s->since : s->held;
     *d = (struct nav_texture_decision){.samples = s->held};
     bool readable = clean(s, d), caught = d->health.caught > 0 && d->health.railed == 0;
-    d->border = s->border || n < s->held || caught;
+    d->border = s->border || n < s->held;
     memcpy(s->ahead, s->posterior, (size_t)classes * sizeof *s->ahead);
     nav_texture_filter_change(s->ahead, classes, caught ? MOVED : chance(s, n));
     if (!readable || !evidence(s, s->clean + (size_t)(s->held - n) * (size_t)s->rules.channels, n, loglik)) {
@@ -323,8 +271,8 @@ static bool decide(struct nav_texture_stream *s, struct nav_texture_decision *d,
     return s->rules.step == 0 || fmax(d->confidence, s->novel) >= s->rules.sure;
 }
 
-/* How many samples lie behind a change of surface that this sample shows; 0 without. Samples that an edge holds, and
- * samples that are not readable, interrupt the row of blocks. */
+/* How many samples lie behind a change of surface that this sample shows; 0 without. Samples that are not readable
+ * interrupt the row of blocks; an edge that holds the tip, or lets it fall, does not. */
 static int behind_change(struct nav_texture_stream *s, const double *sample)
 {
     int length = block_length(s), channels = s->rules.channels, after;
@@ -333,14 +281,13 @@ static int behind_change(struct nav_texture_stream *s, const double *sample)
         return 0;
     s->blocked = 0;
     struct nav_texture_health health = nav_texture_clean(s->block, length, &s->rules.limits);
-    if (unreadable(&health, length) || health.caught > 0 || s->edge.held) {
-        interrupt(s);
-        return 0;
-    }
-    if (!(nav_texture_change_weigh(s->rules.change, s->block, &after) > nav_texture_change_limit(s->rules.change)))
-        return 0;
-    nav_texture_change_keep(s->rules.change, after);
-    return after * length;
+    if (unreadable(&health, length))
+        nav_texture_change_reset(s->rules.change);
+    else if (health.caught > 0)
+        nav_texture_change_edge(s->rules.change);
+    else if (nav_texture_change_weigh(s->rules.change, s->block, &after) > nav_texture_change_limit(s->rules.change))
+        return after * length;
+    return 0;
 }
 
 /* Whether this sample shows that the surface has changed. */
@@ -366,7 +313,7 @@ static void follow_novelty(struct nav_texture_stream *s, const double *sample)
         return;
     s->apart_held = 0;
     struct nav_texture_health health = nav_texture_clean(s->apart, length, &s->rules.limits);
-    if (unreadable(&health, length) || health.caught > 0 || s->edge.held)
+    if (unreadable(&health, length) || health.caught > 0)
         return;
     nav_texture_classifier_judge(s->classifier[s->rules.novelty_classifier], s->apart, s->part);
     weigh_novelty(s);

@@ -10,16 +10,18 @@ from .classifier import blocks_of, plain_features
 SHRINK = 0.05  # share of the diagonal in covariances
 ROW = 4  # blocks over which their dependence is measured
 GROUP = 24  # blocks of which the largest ratio counts: while the blocks around one event are held, it shows in all
-FALSE_EVERY = (
-    2000  # blocks of one surface with one false change: five hundred windows of four, 5 m at 0.1 m/s and 100 ms
-)
+FALSE_EVERY = 1000  # blocks of one surface with one false change: 250 windows of four, 2.5 m at 0.1 m/s and 100 ms
 TAIL = 0.2  # share of the groups that the tail is fitted to
 NEVER = 1e9  # nats
+BANDS = 9  # of a channel, the upper three octaves by thirds: a whisker rings below, at 23, 70 and 155 Hz
+
+
+RULE = {"steady": 2, "apart": 2, "weight": 2, "bias": 1}
 
 
 @dataclass
 class Change:
-    """A detector for blocks of `length` samples; the arrays as in nav_texture_change_numbers."""
+    """A detector for blocks of `length` samples; the arrays as in nav_texture_change_numbers, `edge_` those at an edge."""
 
     length: int
     share: float
@@ -29,22 +31,36 @@ class Change:
     apart: np.ndarray  # (classes, classes)
     weight: np.ndarray  # (F, classes)
     bias: np.ndarray  # (classes,)
+    edge_steady: np.ndarray
+    edge_apart: np.ndarray
+    edge_weight: np.ndarray
+    edge_bias: np.ndarray
 
-    ARRAYS = {"floor": 1, "steady": 2, "apart": 2, "weight": 2, "bias": 1}  # and their dimensions
+    ARRAYS = {"floor": 1} | {f"{at}{n}": d for at in ("", "edge_") for n, d in RULE.items()}  # and their dimensions
     NUMBERS = ("length", "share", "limit")
 
     def native(self):
         """A detector of its own, with nothing held; ValueError when a size or number is impossible."""
         features = len(plain_features(np.zeros((1, self.length, len(self.floor))), False, self.floor)[0])
         classes = len(self.bias)
-        shapes = {"floor": (len(self.floor),), "bias": (classes,), "steady": (features, classes)}
-        shapes |= {"apart": (classes, classes), "weight": (features, classes)}
+        shapes = {
+            "bias": (classes,),
+            "steady": (features, classes),
+            "apart": (classes, classes),
+            "weight": (features, classes),
+        }
         numbers, kept = ffi.new("struct nav_texture_change_numbers *"), []
         numbers.classes, numbers.channels = classes, len(self.floor)
         numbers.length, numbers.share, numbers.limit = self.length, self.share, self.limit
-        for name in self.ARRAYS:
-            kept.append(as_doubles(getattr(self, name), f"change: {name}", shapes[name]))
-            setattr(numbers, name, doubles(kept[-1], name, shapes[name]))
+
+        def lend(to, field: str, name: str, shape: tuple) -> None:
+            kept.append(as_doubles(getattr(self, name), f"change: {name}", shape))
+            setattr(to, field, doubles(kept[-1], name, shape))
+
+        lend(numbers, "floor", "floor", (len(self.floor),))
+        for name, shape in shapes.items():
+            lend(numbers.inside, name, name, shape)
+            lend(numbers.edge, name, f"edge_{name}", shape)
         made = lib.nav_texture_change_new(numbers)
         if made == ffi.NULL:
             raise ValueError("change: a size or number is out of range")
@@ -81,7 +97,22 @@ def fit_change(
     return found if found.limit < NEVER else None
 
 
+def _above(features: np.ndarray, channels: int) -> np.ndarray:
+    """The features (m, F) with 0 for all but bands of the upper octaves and the steps: below, a whisker rings after an edge."""
+    each = (features.shape[1] - channels * (channels - 1) // 2) // channels
+    keep = [c * each + i for c in range(channels) for i in (*range(max(0, each - 2 - BANDS), each - 2), each - 1)]
+    out = np.zeros_like(features)
+    out[:, keep] = features[:, keep]
+    return out
+
+
 def _fit(features: list[np.ndarray], labels: np.ndarray, length: int, floor: np.ndarray) -> Change:
+    inside, edge = (_rule(f, labels) for f in (features, [_above(f, len(floor)) for f in features]))
+    share = _share(features, inside["steady"])
+    return Change(length, share, NEVER, floor, **inside, **{f"edge_{name}": a for name, a in edge.items()})
+
+
+def _rule(features: list[np.ndarray], labels: np.ndarray) -> dict[str, np.ndarray]:
     classes = int(labels.max()) + 1
     mine = [[f for f, label in zip(features, labels, strict=True) if label == k] for k in range(classes)]
     middle = np.array([np.concatenate(group).mean(axis=0) for group in mine])
@@ -93,8 +124,7 @@ def _fit(features: list[np.ndarray], labels: np.ndarray, length: int, floor: np.
     steady, weight = (np.linalg.solve(_shrunk(cov), middle.T) for cov in (drive_cov, class_cov))
     gram = middle @ steady
     apart = np.diag(gram)[:, None] + np.diag(gram) - 2.0 * gram
-    bias = -0.5 * np.einsum("kf,fk->k", middle, weight)
-    return Change(length, _share(features, steady), NEVER, floor, steady, apart, weight, bias)
+    return {"steady": steady, "apart": apart, "weight": weight, "bias": -0.5 * np.einsum("kf,fk->k", middle, weight)}
 
 
 def _shrunk(cov: np.ndarray) -> np.ndarray:

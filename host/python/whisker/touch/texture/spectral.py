@@ -13,7 +13,7 @@ from .change import Change
 from .classifier import Classifier
 from .novelty import Novelty
 
-FORMAT = "whisker texture model 8"
+FORMAT = "whisker texture model 9"
 PARTS = {"change": Change, "novelty": Novelty}  # of windows in a row
 SENSOR_STOPS = (0.0, 65535.0)  # of raw counts, 16 bits
 WITHOUT = {  # what a model without a part cannot do, and what it would take
