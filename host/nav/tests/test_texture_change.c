@@ -16,7 +16,7 @@ struct numbers {
 static struct nav_texture_change *make(struct numbers *m, double limit)
 {
     *m = (struct numbers){.apart = {0.0, 16.0, 16.0, 0.0}, .bias = {0.0, -8.0}};
-    struct nav_texture_features *f = nav_texture_features_new(1, LENGTH, 0, 0, &m->floor);
+    struct nav_texture_features *f = nav_texture_features_new(1, LENGTH, 0, 0, &m->floor, NULL);
     int power = nav_texture_features_count(f) - 2;
     nav_texture_features_free(f);
     m->steady[2 * power + 1] = m->weight[2 * power + 1] = 4.0;

@@ -3,6 +3,7 @@
 #include "texture_clean.h"
 #include "texture_features.h"
 #include "texture_fft.h"
+#include "texture_shape.h"
 
 enum { FEATURES_MOST = 64 };
 
@@ -45,7 +46,7 @@ static void an_offset_changes_no_feature_and_a_gain_moves_all_powers_alike(void 
     (void)state;
     double window[2 * 50], moved[2 * 50], a[FEATURES_MOST], b[FEATURES_MOST];
     const double floor[] = {0.0, 0.0};
-    struct nav_texture_features *f = nav_texture_features_new(2, 50, 0, 0, floor);
+    struct nav_texture_features *f = nav_texture_features_new(2, 50, 0, 0, floor, NULL);
     draw(window, 100, 3);
     for (int i = 0; i < 100; i++)
         moved[i] = 3.0 * window[i] + 500.0 * (i % 2);
@@ -62,10 +63,10 @@ static void an_offset_changes_no_feature_and_a_gain_moves_all_powers_alike(void 
 static void reduce(const double *window, int length, int shorter, double *out, int *whole, int *count)
 {
     const double floor = 0.0;
-    struct nav_texture_features *f = nav_texture_features_new(1, length, 0, 0, &floor);
+    struct nav_texture_features *f = nav_texture_features_new(1, length, 0, 0, &floor, NULL);
     *whole = nav_texture_features_count(f);
     nav_texture_features_free(f);
-    f = nav_texture_features_new(1, length, 0, shorter, &floor);
+    f = nav_texture_features_new(1, length, 0, shorter, &floor, NULL);
     *count = nav_texture_features_count(f);
     assert_true(*count <= FEATURES_MOST);
     nav_texture_features_work(f, window, out);
@@ -119,8 +120,8 @@ static void stretches_too_short_or_single_are_refused(void **state)
     const double floor[] = {0.0, 0.0};
     const int refused[] = {-1, 1, 9};
     for (int i = 0; i < 3; i++)
-        assert_null(nav_texture_features_new(2, 8 * NAV_TEXTURE_LENGTH_MIN, 0, refused[i], floor));
-    nav_texture_features_free(nav_texture_features_new(2, 8 * NAV_TEXTURE_LENGTH_MIN, 0, 8, floor));
+        assert_null(nav_texture_features_new(2, 8 * NAV_TEXTURE_LENGTH_MIN, 0, refused[i], floor, NULL));
+    nav_texture_features_free(nav_texture_features_new(2, 8 * NAV_TEXTURE_LENGTH_MIN, 0, 8, floor, NULL));
 }
 
 static void a_constant_window_has_finite_features(void **state)
@@ -128,14 +129,14 @@ static void a_constant_window_has_finite_features(void **state)
     (void)state;
     double window[3 * 8] = {0.0}, out[FEATURES_MOST];
     const double floor[] = {0.0, 0.0, 0.0}, negative[] = {0.0, -1.0, 0.0};
-    struct nav_texture_features *f = nav_texture_features_new(3, 8, 1, 2, floor);
+    struct nav_texture_features *f = nav_texture_features_new(3, 8, 1, 2, floor, NULL);
     nav_texture_features_work(f, window, out);
     for (int i = 0; i < nav_texture_features_count(f); i++)
         assert_true(isfinite(out[i]));
     nav_texture_features_free(f);
-    assert_null(nav_texture_features_new(3, 7, 0, 0, negative));
-    assert_null(nav_texture_features_new(3, NAV_TEXTURE_LENGTH_MIN - 1, 0, 0, floor));
-    assert_null(nav_texture_features_new(0, 7, 0, 0, floor));
+    assert_null(nav_texture_features_new(3, 7, 0, 0, negative, NULL));
+    assert_null(nav_texture_features_new(3, NAV_TEXTURE_LENGTH_MIN - 1, 0, 0, floor, NULL));
+    assert_null(nav_texture_features_new(0, 7, 0, 0, floor, NULL));
 }
 
 static void missing_samples_and_spikes_are_bridged_and_counted(void **state)
@@ -189,9 +190,60 @@ static void two_samples_at_or_beyond_a_stop_are_a_rail(void **state)
     assert_int_equal(railed(99.0, 99.0, 50.0), 0);
 }
 
+/* 84 kernels on one channel of 9 samples, each in one place: above a threshold or not, as the sum written out. */
+static void shapes_are_shares_of_places_above_a_threshold(void **state)
+{
+    (void)state;
+    enum { TAPS = 9, KERNELS = 84 };
+    const double x[TAPS] = {3.0, -1.0, 4.0, -1.0, -5.0, 9.0, -2.0, -6.0, -1.0};
+    double threshold[KERNELS], out[KERNELS];
+    assert_int_equal(nav_texture_shape_count(TAPS - 1), 0);
+    assert_int_equal(nav_texture_shape_count(TAPS), KERNELS);
+    assert_int_equal(nav_texture_shape_count(2 * TAPS), 2 * KERNELS);
+    for (int k = 0; k < KERNELS; k++)
+        threshold[k] = k % 5 * 6.0 - 12.1;
+    struct nav_texture_shape *s = nav_texture_shape_new(1, TAPS, threshold);
+    nav_texture_shape_work(s, x, out);
+    int kernel = 0;
+    for (int a = 0; a < TAPS; a++) {
+        for (int b = a + 1; b < TAPS; b++) {
+            for (int c = b + 1; c < TAPS; c++, kernel++) {
+                double sum = 0.0;
+                for (int i = 0; i < TAPS; i++)
+                    sum += x[i] * (i == a || i == b || i == c ? 2.0 : -1.0);
+                assert_true(out[kernel] == (sum > threshold[kernel] ? 1.0 : 0.0));
+            }
+        }
+    }
+    nav_texture_shape_free(s);
+    threshold[3] = NAN;
+    assert_null(nav_texture_shape_new(1, TAPS, threshold));
+    assert_null(nav_texture_shape_new(1, TAPS - 1, threshold));
+}
+
+/* Of two channels each kernel looks at one, in turn: changing a channel changes every other number of a spread. */
+static void kernels_take_the_channels_in_turn(void **state)
+{
+    (void)state;
+    enum { LENGTH = 18, KERNELS = 84 };
+    double x[2 * LENGTH], threshold[2 * KERNELS] = {0.0}, one[2 * KERNELS], other[2 * KERNELS];
+    for (int i = 0; i < 2 * LENGTH; i++)
+        x[i] = sin(1.0 + 2.3 * i * i);
+    struct nav_texture_shape *s = nav_texture_shape_new(2, LENGTH, threshold);
+    nav_texture_shape_work(s, x, one);
+    for (int i = 0; i < LENGTH; i++)
+        x[i] = -x[i]; /* a share above 0 becomes one below it */
+    nav_texture_shape_work(s, x, other);
+    for (int k = 0; k < 2 * KERNELS; k++)
+        assert_near(other[k], (k % KERNELS + k / KERNELS) % 2 == 0 ? 1.0 - one[k] : one[k], 1e-12);
+    nav_texture_shape_free(s);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(shapes_are_shares_of_places_above_a_threshold),
+        cmocka_unit_test(kernels_take_the_channels_in_turn),
         cmocka_unit_test(power_is_that_of_the_transform_written_out),
         cmocka_unit_test(an_offset_changes_no_feature_and_a_gain_moves_all_powers_alike),
         cmocka_unit_test(shorter_stretches_are_the_windows_that_they_would_be_alone),

@@ -53,7 +53,7 @@ struct model {
 static void make_model(struct model *m)
 {
     *m = (struct model){.bias = {0.0, -8.0}, .apart = {0.0, 16.0, 16.0, 0.0}, .spike = 1e3};
-    struct nav_texture_features *f = nav_texture_features_new(1, BLOCK, 0, 0, &m->floor);
+    struct nav_texture_features *f = nav_texture_features_new(1, BLOCK, 0, 0, &m->floor, NULL);
     int count = nav_texture_features_count(f), power = count - 2;
     nav_texture_features_free(f);
     m->scale[power] = 1.0;

@@ -62,7 +62,7 @@ struct nav_texture_change *nav_texture_change_new(const struct nav_texture_chang
     if (!numbers_ok(numbers))
         return NULL;
     struct nav_texture_features *reduce =
-        nav_texture_features_new(numbers->channels, numbers->length, 0, 0, numbers->floor);
+        nav_texture_features_new(numbers->channels, numbers->length, 0, 0, numbers->floor, NULL);
     struct nav_texture_change *c = reduce ? calloc(1, sizeof *c) : NULL;
     if (!c) {
         nav_texture_features_free(reduce);

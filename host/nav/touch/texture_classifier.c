@@ -67,8 +67,8 @@ struct nav_texture_classifier *nav_texture_classifier_new(const struct nav_textu
 {
     if (!numbers_ok(numbers))
         return NULL;
-    struct nav_texture_features *reduce =
-        nav_texture_features_new(numbers->channels, numbers->length, numbers->levels, numbers->shorter, numbers->floor);
+    struct nav_texture_features *reduce = nav_texture_features_new(numbers->channels, numbers->length, numbers->levels,
+                                                                   numbers->shorter, numbers->floor, numbers->shape);
     struct nav_texture_classifier *r = reduce ? calloc(1, sizeof *r) : NULL;
     if (!r) {
         nav_texture_features_free(reduce);
@@ -76,6 +76,7 @@ struct nav_texture_classifier *nav_texture_classifier_new(const struct nav_textu
     }
     *r = (struct nav_texture_classifier){
         .n = *numbers, .reduce = reduce, .features = nav_texture_features_count(reduce)};
+    r->n.shape = NULL; /* the features have their own */
     if (!make(r)) {
         nav_texture_classifier_free(r);
         return NULL;

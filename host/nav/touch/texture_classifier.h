@@ -21,6 +21,7 @@ struct nav_texture_classifier_numbers {
     uint64_t seed;                /* of the projections */
     double temper;                /* >= 0; scores are multiplied by it */
     const double *floor;          /* [channels] counts squared */
+    const double *shape;          /* NULL, or thresholds as in texture_features.h */
     const double *centre, *scale; /* [F] feature -> (feature - centre) * scale */
     const double *weight, *bias;  /* [F + H][K], [K] */
 };

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 
 #include "texture_bands.h"
+#include "texture_shape.h"
 #include "texture_shorter.h"
 
 #define CORRELATION_MOST 0.99 /* beyond it Fisher's z says more about quantisation than about the floor */
@@ -16,9 +17,10 @@ struct nav_texture_features {
     double *squares; /* [channels] sum of squares */
     struct nav_texture_bands *whole;
     struct nav_texture_shorter *shorter; /* NULL: the whole alone */
+    struct nav_texture_shape *shape;     /* NULL: without */
 };
 
-static bool allocate(struct nav_texture_features *f, int shorter)
+static bool allocate(struct nav_texture_features *f, int shorter, const double *shape)
 {
     size_t channels = (size_t)f->channels, length = (size_t)f->length;
     f->floor = calloc(channels, sizeof *f->floor);
@@ -26,7 +28,8 @@ static bool allocate(struct nav_texture_features *f, int shorter)
     f->squares = calloc(channels, sizeof *f->squares);
     f->whole = nav_texture_bands_new(f->length);
     f->shorter = shorter > 0 ? nav_texture_shorter_new(f->length, shorter) : NULL;
-    return f->floor && f->centred && f->squares && f->whole && (f->shorter || shorter == 0);
+    f->shape = shape ? nav_texture_shape_new(f->channels, f->length, shape) : NULL;
+    return f->floor && f->centred && f->squares && f->whole && (f->shorter || shorter == 0) && (f->shape || !shape);
 }
 
 static bool sizes_ok(int channels, int length, int shorter, const double *floor)
@@ -43,7 +46,7 @@ static bool sizes_ok(int channels, int length, int shorter, const double *floor)
 }
 
 struct nav_texture_features *nav_texture_features_new(int channels, int length, int levels, int shorter,
-                                                      const double *floor)
+                                                      const double *floor, const double *shape)
 {
     if (!sizes_ok(channels, length, shorter, floor))
         return NULL;
@@ -51,7 +54,7 @@ struct nav_texture_features *nav_texture_features_new(int channels, int length, 
     if (!f)
         return NULL;
     *f = (struct nav_texture_features){.channels = channels, .length = length, .levels = levels != 0};
-    if (!allocate(f, shorter)) {
+    if (!allocate(f, shorter, shape)) {
         nav_texture_features_free(f);
         return NULL;
     }
@@ -69,6 +72,7 @@ void nav_texture_features_free(struct nav_texture_features *f)
     free(f->squares);
     nav_texture_bands_free(f->whole);
     nav_texture_shorter_free(f->shorter);
+    nav_texture_shape_free(f->shape);
     free(f);
 }
 
@@ -76,7 +80,7 @@ int nav_texture_features_count(const struct nav_texture_features *f)
 {
     int shorter = f->shorter ? nav_texture_shorter_count(f->shorter) : 0;
     return f->channels * (nav_texture_bands_count(f->whole) + f->levels + shorter) +
-           f->channels * (f->channels - 1) / 2;
+           f->channels * (f->channels - 1) / 2 + (f->shape ? nav_texture_shape_count(f->length) : 0);
 }
 
 static double correlation(const struct nav_texture_features *f, int a, int b)
@@ -105,4 +109,6 @@ void nav_texture_features_work(struct nav_texture_features *f, const double *win
         for (int b = 0; b < a; b++)
             *out++ = correlation(f, a, b);
     }
+    if (f->shape)
+        nav_texture_shape_work(f->shape, f->centred, out);
 }

@@ -52,7 +52,7 @@ static bool novelty_ok(const struct nav_texture_rules *r)
 {
     int at = r->novelty_classifier;
     return at >= 0 && at < r->classifiers &&
-           nav_texture_novelty_features(r->novelty) == nav_texture_classifier_count(r->classifier[at]);
+           nav_texture_novelty_features(r->novelty) <= nav_texture_classifier_count(r->classifier[at]);
 }
 
 static bool rules_ok(const struct nav_texture_rules *r)

@@ -30,8 +30,8 @@ struct nav_texture_rules {
     int patience;    /* ... and after so many samples in any case */
     struct nav_texture_limits limits;    /* channels as above */
     struct nav_texture_change *change;   /* lent to this stream alone; NULL: no borders but edges that hold the tip */
-    struct nav_texture_novelty *novelty; /* likewise, of the features of novelty_classifier; NULL: every surface is
-                                            taken for a trained one */
+    struct nav_texture_novelty *novelty; /* likewise, of the first features of novelty_classifier; NULL: every surface
+                                            is taken for a trained one */
     int novelty_classifier;
 };
 

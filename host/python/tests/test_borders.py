@@ -18,7 +18,7 @@ from rings import ring_name
 
 import whisker
 from whisker.bridge.ring import FRAME, Writer
-from whisker.native import as_doubles, doubles, ffi, octets
+from whisker.native import as_doubles, doubles, ffi, lib, octets
 from whisker.nav.filters import COMPONENT, Filter, Sensor, prior_fault
 from whisker.nav.weigher import Weigher
 from whisker.simulation.world import SIM
@@ -41,13 +41,13 @@ OWN = {
     "nav.filters.Filter.bins",
     "nav.filters.problem_of",
     "touch.radial.shape.terms_of",
-    "touch.texture.classifier.feature_count",
     "signals.world.World.run",
     "signals.mechanics._counts",
     "signals.mechanics.touch",
     "signals.mechanics.drag",
 }
-ROWS = 12
+ROWS, SHAPES = 12, lib.nav_texture_shape_count(LENGTH)
+CHANGE_RULE = {"steady": (0, 1), "apart": (0, 1), "weight": (0, 1), "bias": (0,)}
 
 
 class Case(NamedTuple):
@@ -143,7 +143,10 @@ CASES = {
     "touch.texture.novelty.Novelty.scores": of_one(novelty().scores, "features", np.zeros((3, FEATURES)), 1),
     "touch.texture.spectral.forward": of_one(lambda loglik: forward(loglik, 1.0, 0.1), "loglik", np.zeros((4, 3))),
     "touch.texture.change.Change.native": of_part(
-        change(), Change.native, floor=(0,), steady=(0, 1), apart=(0, 1), weight=(0, 1), bias=(0,)
+        change(),
+        Change.native,
+        floor=(0,),
+        **{f"{at}{n}": axes for at in ("", "edge_") for n, axes in CHANGE_RULE.items()},
     ),
     "touch.texture.change.Change.ratios": of_one(change().ratios, "samples", NOISE, 1),
     "touch.texture.classifier.Classifier._make": of_part(
@@ -159,9 +162,9 @@ CASES = {
         classifier().expand, "windows", np.zeros((2, LENGTH, CHANNELS)), 1, 2
     ),
     "touch.texture.classifier.plain_features": Case(
-        lambda **given: plain_features(given["windows"], False, given["floor"]),
-        {"windows": np.zeros((2, LENGTH, CHANNELS)), "floor": np.ones(CHANNELS)},
-        {"windows": (2,), "floor": (0,)},
+        lambda **given: plain_features(given["windows"], False, given["floor"], 0, given["shape"]),
+        {"windows": np.zeros((2, LENGTH, CHANNELS)), "floor": np.ones(CHANNELS), "shape": np.zeros(SHAPES)},
+        {"windows": (2,), "floor": (0,), "shape": (0,)},
     ),
     "touch.texture.classifier.blocks_of": of_one(
         lambda samples: blocks_of(samples, LENGTH, CHANNELS), "samples", NOISE, 1
@@ -172,6 +175,7 @@ CASES = {
     "touch.texture.spectral.Stream.push": of_one(model().stream(LENGTH).push, "samples", NOISE, 1),
     "bridge.ring.Writer.publish": of_one(published, "frames", np.zeros(3, FRAME)),
 }
+CASES["touch.texture.classifier._reducer"] = CASES["touch.texture.classifier.plain_features"]
 CASES["touch.radial.shape._column"] = CASES["touch.radial.shape.shape_of"]
 
 

@@ -38,6 +38,7 @@ HEADERS = {
             "touch/texture.h",
             "touch/texture_slide.h",
             "touch/texture_features.h",
+            "touch/texture_shape.h",
             "touch/texture_classifier.h",
             "touch/texture_change.h",
             "touch/texture_clean.h",

@@ -8,13 +8,13 @@ from whisker.touch.texture.novelty import STEPS, Novelty
 from whisker.touch.texture.spectral import SpectralModel
 
 CHANNELS, LENGTH, CLASSES = 2, 64, 3
-FEATURES = feature_count(CHANNELS, LENGTH, False)
+FEATURES = feature_count(np.ones(CHANNELS), LENGTH, False)
 LIMITS = {"spike": [9.0, 9.0], "still": [1.0, 1.0], "low": [0.0, 0.0], "high": [65535.0, 65535.0]}
 LIMITS = {name: np.array(values) for name, values in LIMITS.items()}
 
 
 def classifier() -> Classifier:
-    sizes = {"centre": (FEATURES,), "weight": (FEATURES, CLASSES), "bias": (CLASSES,)}
+    sizes = {"shape": (0,), "centre": (FEATURES,), "weight": (FEATURES, CLASSES), "bias": (CLASSES,)}
     arrays = {name: np.zeros(shape) for name, shape in sizes.items()}
     ones = {"floor": np.ones(CHANNELS), "scale": np.ones(FEATURES)}
     return Classifier(LENGTH, False, 0, 0, **arrays, **ones, span=np.full(CHANNELS, 1e4))
@@ -22,7 +22,8 @@ def classifier() -> Classifier:
 
 def change() -> Change:
     wide, square = np.zeros((FEATURES, CLASSES)), np.zeros((CLASSES, CLASSES))
-    return Change(LENGTH, 0.5, 1.0, np.ones(CHANNELS), wide, square, wide, np.zeros(CLASSES))
+    rule = wide, square, wide, np.zeros(CLASSES)
+    return Change(LENGTH, 0.5, 1.0, np.ones(CHANNELS), *rule, *rule)
 
 
 def novelty() -> Novelty:

@@ -7,6 +7,9 @@ import numpy as np
 from ...native import as_doubles, doubles, ffi, lib
 
 SEED = 2011  # of the random projections; any will do
+NONE = np.zeros(0)
+GOLDEN = (5**0.5 - 1) / 2  # multiples of it are spread evenly over 0 to 1, however many are taken
+SHAPE_WINDOWS, HALVINGS = 64, 24  # that thresholds are taken from; of the range in which they are looked for
 
 
 @dataclass
@@ -18,6 +21,7 @@ class Classifier:
     shorter: int
     hidden: int
     floor: np.ndarray  # (channels,)
+    shape: np.ndarray  # (shape_count(length),) thresholds, or (0,): without
     centre: np.ndarray  # (F,)
     scale: np.ndarray  # (F,)
     weight: np.ndarray  # (F + hidden, classes)
@@ -27,7 +31,8 @@ class Classifier:
     seed: int = SEED
     _made: object = field(default=None, repr=False, compare=False)
 
-    ARRAYS = ("floor", "centre", "scale", "weight", "bias")
+    ARRAYS = ("floor", "shape", "centre", "scale", "weight", "bias")
+    PLAIN = tuple(name for name in ARRAYS if name != "shape")
     NUMBERS = ("length", "levels", "shorter", "hidden", "temper", "seed")
 
     @property
@@ -38,17 +43,17 @@ class Classifier:
         return self._made
 
     def _make(self):
-        features = feature_count(len(self.floor), self.length, self.levels, self.shorter)
+        features = feature_count(self.floor, self.length, self.levels, self.shorter, self.shape)
         classes = len(self.bias)
         shapes = {"centre": (features,), "scale": (features,), "weight": (features + self.hidden, classes)}
-        shapes |= {"floor": (len(self.floor),), "bias": (classes,)}
+        shapes |= {"floor": (len(self.floor),), "bias": (classes,), "shape": (len(self.shape),)}
         for name, shape in shapes.items():
             setattr(self, name, as_doubles(getattr(self, name), f"classifier {self.length}: {name}", shape))
         numbers = ffi.new("struct nav_texture_classifier_numbers *")
         numbers.classes, numbers.channels, numbers.length = classes, len(self.floor), self.length
         numbers.levels, numbers.shorter = int(self.levels), self.shorter
         numbers.hidden, numbers.seed, numbers.temper = self.hidden, self.seed, self.temper
-        for name in self.ARRAYS:
+        for name in self.ARRAYS if len(self.shape) else self.PLAIN:
             setattr(numbers, name, doubles(getattr(self, name), name, shapes[name]))
         made = lib.nav_texture_classifier_new(numbers)
         if made == ffi.NULL:
@@ -67,28 +72,52 @@ class Classifier:
         return out
 
 
-def feature_count(channels: int, length: int, levels: bool, shorter: int = 0) -> int:
-    """Numbers that a window is reduced to; ValueError for a size out of range."""
-    floor = doubles(np.zeros(channels), "floor", (channels,))
-    made = lib.nav_texture_features_new(channels, length, int(levels), shorter, floor)
+def _reducer(floor: np.ndarray, length: int, levels: bool, shorter: int, shape: np.ndarray):
+    """The C features of a window; ValueError for a size out of range."""
+    channels, floor = len(floor), as_doubles(floor, "floor", (len(floor),))
+    if len(shape) not in (0, lib.nav_texture_shape_count(length)):
+        raise ValueError(f"texture: {len(shape)} thresholds of shape for windows of {length} samples")
+    thresholds = doubles(as_doubles(shape, "shape", shape.shape), "shape", shape.shape) if len(shape) else ffi.NULL
+    made = lib.nav_texture_features_new(
+        channels, length, int(levels), shorter, doubles(floor, "floor", floor.shape), thresholds
+    )
     if made == ffi.NULL:
         raise ValueError(f"texture: {channels} channels in windows of {length} samples are out of range")
-    return lib.nav_texture_features_count(ffi.gc(made, lib.nav_texture_features_free))
+    return ffi.gc(made, lib.nav_texture_features_free)
 
 
-def plain_features(windows: np.ndarray, levels: bool, floor: np.ndarray, shorter: int = 0) -> np.ndarray:
-    """Windows (m, length, channels) -> features (m, F), not standardised; `shorter` as in nav_texture_features_new."""
-    windows = as_doubles(windows, "windows", (None, None, None))
-    _, length, channels = windows.shape
-    floor = doubles(as_doubles(floor, "floor", (channels,)), "floor", (channels,))
-    width = feature_count(channels, length, levels, shorter)
-    out = np.empty((len(windows), width))
-    made = lib.nav_texture_features_new(channels, length, int(levels), shorter, floor)
-    made = ffi.gc(made, lib.nav_texture_features_free)
+def feature_count(floor: np.ndarray, length: int, levels: bool, shorter: int = 0, shape: np.ndarray = NONE) -> int:
+    """Numbers that a window is reduced to; ValueError for a size out of range."""
+    return lib.nav_texture_features_count(_reducer(floor, length, levels, shorter, shape))
+
+
+def plain_features(
+    windows: np.ndarray, levels: bool, floor: np.ndarray, shorter: int = 0, shape: np.ndarray = NONE
+) -> np.ndarray:
+    """Windows (m, length, channels) -> features (m, F), not standardised; as in nav_texture_features_new."""
+    windows = as_doubles(windows, "windows", (None, None, len(floor)))
+    made = _reducer(floor, windows.shape[1], levels, shorter, shape)
+    out = np.empty((len(windows), lib.nav_texture_features_count(made)))
     for window, row in zip(windows, out, strict=True):
-        given = doubles(window, "window", (length, channels)), doubles(row, "features", (width,))
-        lib.nav_texture_features_work(made, *given)
+        lib.nav_texture_features_work(
+            made, doubles(window, "window", windows.shape[1:]), doubles(row, "features", out.shape[1:])
+        )
     return out
+
+
+def shape_thresholds(windows: np.ndarray, floor: np.ndarray) -> np.ndarray:
+    """For windows (m, length, channels): each kernel's output is above its threshold in a share of places that goes
+    through all shares from kernel to kernel. (0,) where the windows are too short."""
+    count = lib.nav_texture_shape_count(windows.shape[1])
+    some = windows[np.unique(np.linspace(0, len(windows) - 1, SHAPE_WINDOWS).astype(int))]
+    wanted = (np.arange(count) * GOLDEN) % 1.0
+    low = np.full(count, -27.0 * float(np.ptp(some, axis=1).max()) - 1.0)
+    high = -low
+    for _ in range(HALVINGS if count else 0):
+        middle = 0.5 * (low + high)
+        more = plain_features(some, False, floor, 0, middle)[:, -count:].mean(axis=0) > wanted
+        low, high = np.where(more, middle, low), np.where(more, high, middle)
+    return high
 
 
 def blocks_of(samples: np.ndarray, length: int, channels: int) -> np.ndarray:

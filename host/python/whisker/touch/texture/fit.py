@@ -3,20 +3,24 @@
 Sums over windows are kept by fold, so that leaving one fold out is a subtraction, not a new pass over the data.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from ...native import lib
-from .classifier import Classifier, plain_features
+from .classifier import NONE, Classifier, plain_features, shape_thresholds
 
-SHRINK = (1e-3, 1e-2, 1e-1)  # share of the diagonal in the covariance within classes
+SHRINK = (1e-3, 1e-2, 1e-1, 0.3)  # share of the diagonal in the covariance within classes
 HIDDEN = (0, 128, 256)  # random projections: none, few, many; what many cost keeps a 100 ms window near 20 us
 HIDDEN_MUST_GAIN = 0.02  # relative fall of the log loss that pays for the next size: it costs time in every window
+ERRORS_MUST_GAIN = 2.0  # standard errors of the fall over windows
 LEAST_GAIN = 0.005  # nats: a smaller fall is chance, however large a share of a small loss
 LEVELS_MUST_GAIN = 0.5  # the same for channel means: a rest drifts, and a mean may tell the session, not the surface
-STRETCHES = 8  # of a window, end to end, judged beside the whole where they pay ...
-STRETCHES_MUST_GAIN = 0.05  # ... in nats a window: they cost it a third more time, however little there is left to gain
+STRETCHES = 8  # of a window, end to end, judged beside the whole where they pay
+SHAPE_MOST = 1000  # windows: shapes of waveforms are for few of them, and bands know as much where there are more
+BESIDE_MUST_GAIN = (
+    0.05  # nats a window, of either: they cost it a third more time and more, however little is left to gain
+)
 TEMPER_STEPS = 30  # of the search for a temperature; Newton needs about six, halving the rest
 
 
@@ -42,23 +46,31 @@ class Fitted:
 
 
 def fit(data: Windows, floor: np.ndarray) -> Fitted:
-    """Choose levels, shorter stretches, size and shrinkage by held-out log loss, then fit all the rest."""
-    chosen = _trial(data, floor, False, 0, HIDDEN[:1])
+    """Choose levels, shorter stretches, shapes, size and shrinkage by held-out log loss, then fit all the rest."""
+    chosen, length = _trial(data, _Kind(floor), HIDDEN[:1]), data.windows.shape[1]
     if chosen.loss > LEAST_GAIN:
-        levelled = _trial(data, floor, True, 0, HIDDEN[:1])
-        if _pays(levelled.loss, chosen.loss, LEVELS_MUST_GAIN):
-            chosen = levelled
-    if chosen.loss > LEAST_GAIN and data.windows.shape[1] >= STRETCHES * lib.NAV_TEXTURE_LENGTH_MIN:
-        beside = _trial(data, floor, chosen.blank.levels, STRETCHES, HIDDEN[:1])
-        if beside.loss < chosen.loss - STRETCHES_MUST_GAIN:
-            chosen = beside
+        chosen = _better(data, replace(chosen.kind, levels=True), chosen, LEVELS_MUST_GAIN * chosen.loss)
+    if chosen.loss > LEAST_GAIN and length >= STRETCHES * lib.NAV_TEXTURE_LENGTH_MIN:
+        chosen = _better(data, replace(chosen.kind, shorter=STRETCHES), chosen, BESIDE_MUST_GAIN)
+    if chosen.loss > LEAST_GAIN and len(data.windows) <= SHAPE_MOST and lib.nav_texture_shape_count(length):
+        shape = shape_thresholds(data.windows, floor)
+        chosen = _better(data, replace(chosen.kind, shape=shape), chosen, BESIDE_MUST_GAIN)
     if chosen.loss > LEAST_GAIN:
-        chosen = _trial(data, floor, chosen.blank.levels, chosen.blank.shorter, HIDDEN)
+        chosen = _trial(data, chosen.kind, tuple(h for h in HIDDEN if h <= len(data.windows)))
     return _finished(chosen, data)
 
 
-def _pays(loss: float, so_far: float, must_gain: float) -> bool:
-    return loss < min((1.0 - must_gain) * so_far, so_far - LEAST_GAIN)
+def _better(data: Windows, kind: "_Kind", so_far: "_Trial", must_gain: float) -> "_Trial":
+    found = _trial(data, kind, HIDDEN[:1])
+    return found if _pays(found.best, so_far.best, so_far.sums.row_weight, must_gain) else so_far
+
+
+def _pays(found: "_Candidate", so_far: "_Candidate", weight: np.ndarray, must_gain: float) -> bool:
+    """Whether the held-out loss falls by more, and by more than chance: what few windows say is not sure."""
+    each = found.right - so_far.right
+    gain = float(np.average(each, weights=weight))
+    error = float(np.sqrt((weight**2 * (each - gain) ** 2).sum())) / weight.sum()
+    return gain > max(must_gain, LEAST_GAIN, ERRORS_MUST_GAIN * error)
 
 
 @dataclass
@@ -70,13 +82,25 @@ class _Candidate:
     shrink: float
     temper: float
     loglik: np.ndarray
+    right: np.ndarray  # (m,) log posterior of the right class
     rules: list[tuple]  # weights and biases, of each fold left out
+
+
+@dataclass
+class _Kind:
+    """Which features: as in nav_texture_features_new."""
+
+    floor: np.ndarray
+    levels: bool = False
+    shorter: int = 0
+    shape: np.ndarray = field(default_factory=lambda: NONE)
 
 
 @dataclass
 class _Trial:
     """Features of one kind, and what did best on them."""
 
+    kind: _Kind
     blank: Classifier  # without weights
     expanded: np.ndarray  # (m, F + hidden most)
     sums: "_Sums"
@@ -87,21 +111,22 @@ class _Trial:
         return self.best.loss
 
 
-def _trial(data: Windows, floor: np.ndarray, levels: bool, shorter: int, sizes: tuple) -> _Trial:
-    raw = plain_features(data.windows, levels, floor, shorter)
+def _trial(data: Windows, kind: _Kind, sizes: tuple) -> _Trial:
+    raw = plain_features(data.windows, kind.levels, kind.floor, kind.shorter, kind.shape)
     centre, scale = raw.mean(axis=0), 1.0 / (raw.std(axis=0) + 1e-6)
     features, classes = raw.shape[1], data.classes
     weight = np.zeros((features + max(sizes), classes))
     length = data.windows.shape[1]
-    blank = Classifier(length, levels, shorter, max(sizes), floor, centre, scale, weight, np.zeros(classes))
+    of = length, kind.levels, kind.shorter, max(sizes), kind.floor, kind.shape
+    blank = Classifier(*of, centre, scale, weight, np.zeros(classes))
     expanded = blank.expand(data.windows) if max(sizes) else (raw - centre) * scale
     sums = _Sums(expanded, data)
     best = None
     for hidden in sizes:
         found = min(_candidates(sums, expanded, data, hidden, features + hidden), key=lambda c: c.loss)
-        if best is None or _pays(found.loss, best.loss, HIDDEN_MUST_GAIN):
+        if best is None or _pays(found, best, sums.row_weight, HIDDEN_MUST_GAIN * best.loss):
             best = found
-    return _Trial(blank, expanded, sums, best)
+    return _Trial(kind, blank, expanded, sums, best)
 
 
 def _finished(trial: _Trial, data: Windows) -> Fitted:
@@ -152,8 +177,9 @@ def _candidates(sums: _Sums, x: np.ndarray, data: Windows, hidden: int, size: in
             scores[data.fold == f] = x[data.fold == f, :size] @ weight + bias
         scores -= scores.max(axis=1, keepdims=True)
         temper = temperature(scores, data.label, sums.row_weight)
-        loss = log_loss(scores * temper, data.label, sums.row_weight)
-        found.append(_Candidate(loss, hidden, shrink, temper, scores * temper, rules))
+        right = log_posterior(scores * temper, data.label)
+        loss = -float(np.average(right, weights=sums.row_weight))
+        found.append(_Candidate(loss, hidden, shrink, temper, scores * temper, right, rules))
     return found
 
 
@@ -180,10 +206,9 @@ def temperature(scores: np.ndarray, label: np.ndarray, weight: np.ndarray | None
     return float(factor)
 
 
-def log_loss(loglik: np.ndarray, label: np.ndarray, weight: np.ndarray | None = None) -> float:
-    """Mean of -log posterior of the right class under equal priors, nats; log-likelihoods (m, classes), best 0."""
-    chance = loglik[np.arange(len(label)), label] - np.log(np.exp(loglik).sum(axis=1))
-    return float(-np.average(chance, weights=weight))
+def log_posterior(loglik: np.ndarray, label: np.ndarray) -> np.ndarray:
+    """Of the right class under equal priors, nats; log-likelihoods (m, classes), best 0 -> (m,)."""
+    return loglik[np.arange(len(label)), label] - np.log(np.exp(loglik).sum(axis=1))
 
 
 def _finish(blank: Classifier, sums: _Sums, left_out: int | None, chosen: _Candidate) -> Classifier:

@@ -144,7 +144,7 @@ def no_model(path, error: Exception) -> TableError:
 
 
 def _classifier(fields: Fields) -> Classifier:
-    flat = {name: fields.array(name, 1) for name in ("floor", "centre", "scale", "bias", "span")}
+    flat = {name: fields.array(name, 1) for name in ("floor", "shape", "centre", "scale", "bias", "span")}
     weight = fields.array("weight", 2)
     whole = {name: fields.whole(name, 0, LENGTH_MOST) for name in ("length", "shorter", "hidden")}
     seed, temper = fields.whole("seed", 0, 2**63), fields.number("temper", 0.0)

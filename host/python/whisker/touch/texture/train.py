@@ -172,9 +172,9 @@ def _calibrate(model: SpectralModel, fitted: list[Fitted], parts: list, labels, 
         "refused": round(float((confidence < model.doubt).mean()), 4),
         "accuracy_of_answers": round(float(answered.mean()), 4),
         "calibration_error": round(calibration_error(right, confidence), 4),
-        "sequential_accuracy": round(float(right_sequential.mean()), 4),
+        "sequential_accuracy": round(float(right_sequential.mean()), 4) if len(sure) else 0.0,
         "sequential_calibration_error": round(calibration_error(right_sequential, sure), 4),
-        "sequential_samples": round(float(np.mean([d.samples for group in sequential for d in group])), 1),
+        "sequential_samples": round(sum(d.samples for group in sequential for d in group) / max(1, len(sure)), 1),
     }
 
 
@@ -206,7 +206,9 @@ def _novelty(model: SpectralModel, parts, labels, folds, base: int):
     if classifier is None:
         return None
     rows = [p[: len(p) // base * base].reshape(-1, base, p.shape[1]) for p in parts]
-    return fit_novelty([classifier.expand(r)[:, : len(classifier.centre)] for r in rows], labels, folds, base)
+    return fit_novelty(
+        [classifier.expand(r)[:, : len(classifier.centre) - len(classifier.shape)] for r in rows], labels, folds, base
+    )
 
 
 def _decisions(twins: list[SpectralModel], parts, folds, window: int, sequential: bool = False) -> list[list]:
