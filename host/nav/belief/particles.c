@@ -6,6 +6,9 @@
 
 #include "bumps.h"
 
+/* Poses that tell which places of the map a row is about. */
+enum { MAP_POSES = 8 };
+
 enum { TRIES = 64, PLAIN = 5, WITH_ODOMETRY = 9 };
 
 /* Log-likelihood of a particle where the robot cannot stand: below that of any row, and finite, so that particles all
@@ -180,15 +183,19 @@ void nav_particles_scale(struct nav_particles *p, double factor)
 double nav_particles_weigh(struct nav_particles *p, struct nav_likelihood *l, double mass)
 {
     float best = 2.0f * BLOCKED;
-    double total = 0.0;
-    if (mass >= 0.0)
+    double total = 0.0, passed = 0.0, mark = 0.5 / MAP_POSES;
+    if (mass >= 0.0) {
         nav_trust_begin(l);
+        nav_map_begin(l);
+    }
     for (long i = 0; i < p->count; i++) {
         const struct nav_place at = {(double)p->x[i], (double)p->y[i], (double)p->c[i], (double)p->s[i]};
         bool clear = nav_likelihood_clear(l, at.x, at.y, 0.0);
         p->loglik[i] = clear ? fmaxf(nav_likelihood_at(l, &at, l->scratch), BLOCKED / 2.0f) : BLOCKED;
         if (clear && mass >= 0.0)
             nav_trust_add(l, l->scratch, mass * (double)p->weight[i]);
+        for (passed += (double)p->weight[i]; clear && mass >= 0.0 && passed > mark; mark += 1.0 / MAP_POSES)
+            nav_map_add(l, &at, l->scratch, 1.0 / MAP_POSES);
         if (p->weight[i] > 0.0f && p->loglik[i] > best)
             best = p->loglik[i];
     }

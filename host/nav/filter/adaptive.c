@@ -208,8 +208,10 @@ static void take_over(struct adaptive *a, double share)
     nav_particles_scale(set, 1.0 - share);
     adaptive_global_draw(&a->global, set, &a->cloud.rng, (long)count, share, ahead(a));
     pour(a, held, share);
-    if (a->local && share > 0.5) /* what contradicted the local belief was not the whiskers' fault */
+    if (a->local && share > 0.5) { /* what contradicted the local belief was not the whiskers' fault, nor the map's */
         adaptive_doubt_teach(&a->doubt, a->likelihood, a->likelihood);
+        nav_map_forget(a->likelihood);
+    }
     a->local = true;
     a->cloud.moved = set->count;
     adaptive_resample(a, true);
@@ -271,6 +273,13 @@ static void arbitrate(struct adaptive *a)
     }
 }
 
+/* The robot is not where the cloud has it, and never was where that learned of the map. */
+static void leave(struct adaptive *a)
+{
+    a->local = false;
+    nav_map_forget(a->likelihood);
+}
+
 static void decide(struct adaptive *a)
 {
     const struct nav_settings *s = &a->problem->settings;
@@ -295,7 +304,7 @@ static void decide(struct adaptive *a)
     else if (a->doubt.ratio <= 0.0 && present <= log(s->adaptive.wake))
         stay(a);
     else if (present > -log(s->adaptive.wake))
-        a->local = false;
+        leave(a);
 }
 
 /* Lets the histogram work within what is left of the row's budget. */
@@ -345,6 +354,8 @@ static void update_local(struct adaptive *a)
     adaptive_log_entry(&a->log, a->log.head - 1)->local = local;
     adaptive_doubt_take(&a->doubt, a->likelihood, a->log.head - 1, adaptive_doubt_anywhere(&a->doubt, a->likelihood),
                         local);
+    if (!a->whole && a->problem->settings.map.learn >= 0.5)
+        nav_map_learn(a->likelihood);
     nav_trust_learn(a->likelihood);
     a->evaluations += set->count;
     a->distinct += set->count;

@@ -34,6 +34,7 @@ struct nav_likelihood *nav_likelihood_new(const struct nav_arena *arena, const s
     l->trust = calloc(whiskers, sizeof *l->trust);
     l->scratch = calloc(whiskers, 1);
     l->read = calloc(whiskers, sizeof *l->read);
+    failed = nav_map_init(&l->map, arena, whiskers) || failed;
     if (failed || !l->scratch || !l->read || !l->table || !l->ratio || !l->weight || !l->trust ||
         likelihood_tables(l) || nav_obstacles_init(&l->obstacles, arena, nav_sensors_reach(&l->sensors, robot))) {
         nav_likelihood_free(l);
@@ -54,6 +55,7 @@ void nav_likelihood_free(struct nav_likelihood *l)
     }
     nav_sensors_free(&l->sensors);
     nav_obstacles_free(&l->obstacles);
+    nav_map_free(&l->map);
     free(l->table);
     free(l->ratio);
     free(l->trust);
@@ -84,6 +86,7 @@ void nav_likelihood_read(struct nav_likelihood *l, const struct nav_evidence *ev
 {
     l->ceiling = 0.0;
     l->reads = 0;
+    l->reading = evidence->reading;
     for (int k = 0; k < NAV_KINDS; k++) {
         l->active[k] = false;
         for (int w = l->sensors.first[k]; w < l->sensors.first[k + 1]; w++) {
@@ -113,7 +116,7 @@ static void likelihood_expect(const struct nav_likelihood *l, const struct nav_p
         bool asked = !wanted || wanted[k];
         bool any = asked && kind->solid && nav_obstacles_near(&l->obstacles, at->x, at->y, &near);
         if (asked)
-            kind->expect(l->model + first, count, l->arena, any ? &near : NULL, at, codes + first);
+            kind->expect(l->model + first, count, &l->map.arena, any ? &near : NULL, at, codes + first);
         else
             memset(codes + first, 0, (size_t)count);
     }
@@ -141,6 +144,8 @@ float nav_likelihood_at(const struct nav_likelihood *l, const struct nav_place *
 {
     float sum = 0.0f;
     likelihood_expect(l, at, l->active, codes);
+    if (l->map.things > 0)
+        nav_map_excuse(l, at, codes);
     for (int n = 0; n < l->reads; n++)
         sum += l->table[l->read[n]][codes[l->read[n]]];
     return sum;
@@ -155,7 +160,7 @@ double nav_likelihood_standing(const struct nav_likelihood *l, const struct nav_
 
 size_t nav_likelihood_bytes(const struct nav_likelihood *l)
 {
-    size_t bytes = nav_obstacles_bytes(&l->obstacles);
+    size_t bytes = nav_obstacles_bytes(&l->obstacles) + nav_map_bytes(&l->map);
     for (int w = 0; w < l->whiskers; w++)
         bytes += (size_t)l->model[w].codes * (sizeof **l->table + 3 * sizeof **l->ratio) + sizeof *l->model;
     return bytes;

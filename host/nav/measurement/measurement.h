@@ -56,7 +56,9 @@ enum nav_check { NAV_READ, NAV_NOT_READ, NAV_EMPTY, NAV_BAD };
 /* A kind of sensor. */
 struct nav_measurement {
     const char *name;
-    bool solid; /* whether it meets what is solid: `expect` is then given what is near */
+    bool floor;    /* whether its codes are the textures of the floor at its place */
+    bool distance; /* whether they are distances in steps along its line, and its reading one */
+    bool solid;    /* whether it meets what is solid: `expect` is then given what is near */
     int (*count)(const struct nav_robot *);
     /* Sets up a zeroed model but for kind, settings and index; blur_m: see nav_likelihood_new. 0, or -1 without memory.
      */

@@ -134,6 +134,7 @@ static void range_fill(struct nav_model *model, const double *reading, double *r
 }
 
 const struct nav_measurement NAV_RANGE_MEASUREMENT = {.name = "range",
+                                                      .distance = true,
                                                       .solid = true,
                                                       .count = range_count,
                                                       .init = range_init,

@@ -139,6 +139,7 @@ static void texture_fill(struct nav_model *model, const double *reading, double 
 }
 
 const struct nav_measurement NAV_TEXTURE_MEASUREMENT = {.name = "texture",
+                                                        .floor = true,
                                                         .count = texture_count,
                                                         .init = texture_init,
                                                         .cells = texture_cells,

@@ -25,6 +25,11 @@ void nav_trust_free(struct nav_trust *t)
     free(t->predicted);
 }
 
+void nav_trust_restore(struct nav_trust *t)
+{
+    t->working = WORKING_MOST;
+}
+
 void nav_trust_begin(struct nav_likelihood *l)
 {
     for (int w = 0; w < l->whiskers; w++)

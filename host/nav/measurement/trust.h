@@ -23,6 +23,9 @@ struct nav_trust {
 int nav_trust_init(struct nav_trust *, int codes);
 void nav_trust_free(struct nav_trust *);
 
+/* The whisker is trusted as at the start. */
+void nav_trust_restore(struct nav_trust *);
+
 /* Starts a row's expectation. */
 void nav_trust_begin(struct nav_likelihood *);
 

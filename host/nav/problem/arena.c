@@ -10,10 +10,14 @@ static int tile_index(double position, double tile, int count)
     return index < count ? (int)index : count - 1;
 }
 
+int nav_arena_tile(const struct nav_arena *arena, double x, double y)
+{
+    return tile_index(y, arena->tile, arena->rows) * arena->columns + tile_index(x, arena->tile, arena->columns);
+}
+
 int nav_arena_texture(const struct nav_arena *arena, double x, double y)
 {
-    int column = tile_index(x, arena->tile, arena->columns), row = tile_index(y, arena->tile, arena->rows);
-    return arena->floor[row * arena->columns + column];
+    return arena->floor[nav_arena_tile(arena, x, y)];
 }
 
 /* fmin and fmax are calls, for the sake of NaN; here there is none. */

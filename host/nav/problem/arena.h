@@ -78,6 +78,9 @@ struct nav_robot {
     const struct nav_sensor *sensor;
 };
 
+/* Number of the tile under (x, y), of the nearest beyond a wall. */
+int nav_arena_tile(const struct nav_arena *, double x, double y);
+
 /* Texture index under (x, y); beyond a wall that of the nearest tile, over an obstacle that of the tile beneath. */
 int nav_arena_texture(const struct nav_arena *, double x, double y);
 

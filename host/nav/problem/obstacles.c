@@ -31,40 +31,66 @@ static bool obstacles_touch(const struct nav_obstacles *o, int column, int row, 
     return dx * dx + dy * dy <= o->reach * o->reach;
 }
 
-/* Visits the squares within reach of a box: counts them in first[n + 1], or, with `fill`, copies the box to where
- * first[n + 1] points and moves that on. */
-static void obstacles_visit(struct nav_obstacles *o, const struct nav_box *box, bool unknown, bool fill)
+/* What is done at a square within reach of box number `which`. */
+typedef void obstacles_take(struct nav_obstacles *, size_t square, int which);
+
+static void obstacles_count(struct nav_obstacles *o, size_t square, int which)
 {
+    o->unknown[square] += which >= o->arena->boxes - o->arena->unknown;
+    o->first[square + 1]++;
+}
+
+static void obstacles_copy(struct nav_obstacles *o, size_t square, int which)
+{
+    uint32_t at = o->first[square + 1]++;
+    o->box[at] = o->arena->box[which];
+    o->which[at] = which;
+}
+
+static struct nav_box *obstacles_copy_of(struct nav_obstacles *o, size_t square, int which)
+{
+    uint32_t at = o->first[square];
+    while (o->which[at] != which)
+        at++;
+    return &o->box[at];
+}
+
+static void obstacles_remove(struct nav_obstacles *o, size_t square, int which)
+{
+    *obstacles_copy_of(o, square, which) = (struct nav_box){INFINITY, INFINITY, -INFINITY, -INFINITY};
+}
+
+static void obstacles_restore(struct nav_obstacles *o, size_t square, int which)
+{
+    *obstacles_copy_of(o, square, which) = o->arena->box[which];
+}
+
+static void obstacles_visit(struct nav_obstacles *o, int which, obstacles_take *take)
+{
+    const struct nav_box *box = &o->arena->box[which];
     int i0 = obstacles_index((box->x0 - o->reach) * o->per_m, o->columns);
     int i1 = obstacles_index((box->x1 + o->reach) * o->per_m, o->columns);
     int j0 = obstacles_index((box->y0 - o->reach) * o->per_m, o->rows);
     int j1 = obstacles_index((box->y1 + o->reach) * o->per_m, o->rows);
     for (int j = j0; j <= j1; j++) {
         for (int i = i0; i <= i1; i++) {
-            size_t n = (size_t)j * (size_t)o->columns + (size_t)i;
-            if (!obstacles_touch(o, i, j, box))
-                continue;
-            if (fill)
-                o->box[o->first[n + 1]] = *box;
-            else
-                o->unknown[n] += unknown;
-            o->first[n + 1]++;
+            if (obstacles_touch(o, i, j, box))
+                take(o, (size_t)j * (size_t)o->columns + (size_t)i, which);
         }
     }
 }
 
-static void obstacles_visit_all(struct nav_obstacles *o, bool fill)
+static void obstacles_visit_all(struct nav_obstacles *o, obstacles_take *take)
 {
-    const struct nav_arena *arena = o->arena;
-    for (int b = 0; b < arena->boxes; b++)
-        obstacles_visit(o, &arena->box[b], b >= arena->boxes - arena->unknown, fill);
+    for (int b = 0; b < o->arena->boxes; b++)
+        obstacles_visit(o, b, take);
 }
 
 /* Counts become places: first[n + 1] where square n begins, which filling turns into where it ends. */
 static int obstacles_fill(struct nav_obstacles *o)
 {
     size_t squares = obstacles_squares(o), sum = 0;
-    obstacles_visit_all(o, false);
+    obstacles_visit_all(o, obstacles_count);
     for (size_t n = 0; n < squares; n++) {
         uint32_t count = o->first[n + 1];
         o->first[n + 1] = (uint32_t)sum;
@@ -73,9 +99,10 @@ static int obstacles_fill(struct nav_obstacles *o)
             return -1;
     }
     o->box = calloc(sum + 1, sizeof *o->box);
-    if (!o->box)
+    o->which = calloc(sum + 1, sizeof *o->which);
+    if (!o->box || !o->which)
         return -1;
-    obstacles_visit_all(o, true);
+    obstacles_visit_all(o, obstacles_copy);
     return 0;
 }
 
@@ -109,6 +136,7 @@ void nav_obstacles_free(struct nav_obstacles *o)
     free(o->first);
     free(o->unknown);
     free(o->box);
+    free(o->which);
     free(o->wall);
 }
 
@@ -131,8 +159,24 @@ bool nav_obstacles_clear(const struct nav_obstacles *o, double x, double y, doub
     return !nav_obstacles_near(o, x, y, &near) || nav_arena_free(&near, x, y, radius);
 }
 
+int nav_obstacles_at(const struct nav_obstacles *o, double x, double y)
+{
+    size_t square = obstacles_square(o, x, y);
+    for (uint32_t n = o->first[square]; n < o->first[square + 1]; n++) {
+        const struct nav_box *box = &o->box[n];
+        if (x >= box->x0 && x <= box->x1 && y >= box->y0 && y <= box->y1)
+            return o->which[n];
+    }
+    return -1;
+}
+
+void nav_obstacles_hide(struct nav_obstacles *o, int which, bool hidden)
+{
+    obstacles_visit(o, which, hidden ? obstacles_remove : obstacles_restore);
+}
+
 size_t nav_obstacles_bytes(const struct nav_obstacles *o)
 {
     size_t squares = obstacles_squares(o);
-    return squares * (2 * sizeof *o->first + 1) + o->first[squares] * sizeof *o->box;
+    return squares * (2 * sizeof *o->first + 1) + o->first[squares] * (sizeof *o->box + sizeof *o->which);
 }

@@ -16,6 +16,7 @@ struct nav_obstacles {
     uint32_t *first;     /* [rows * columns + 1] a square's boxes are number first[n] .. first[n + 1] - 1 */
     uint32_t *unknown;   /* [rows * columns] how many of them, the last, were never mapped */
     struct nav_box *box; /* square by square */
+    int *which;          /* of the arena's boxes each is */
     uint8_t *wall;       /* [rows * columns] whether a wall is within reach */
 };
 
@@ -30,6 +31,12 @@ bool nav_obstacles_near(const struct nav_obstacles *, double x, double y, struct
 
 /* As nav_arena_free, for radii up to the reach. */
 bool nav_obstacles_clear(const struct nav_obstacles *, double x, double y, double radius);
+
+/* Number of the arena's box that holds a point within reach of the robot, -1: none. */
+int nav_obstacles_at(const struct nav_obstacles *, double x, double y);
+
+/* Takes one of the arena's boxes away, or puts it back. */
+void nav_obstacles_hide(struct nav_obstacles *, int which, bool hidden);
 
 size_t nav_obstacles_bytes(const struct nav_obstacles *);
 

@@ -24,6 +24,7 @@ static const struct entry ENTRIES[] = {
     ENTRY(radial, spacing_m, 0.02, 0.0, 1.0),
     ENTRY(normal, outlier, 0.1, 0.0, 1.0),
     ENTRY(trust, learn, 1.0, 0.0, 1.0),
+    ENTRY(map, learn, 1.0, 0.0, 1.0),
     ENTRY(motion, along_m, 0.3, 0.0, 10.0),
     ENTRY(motion, turn_rad, 0.5, 0.0, 10.0),
     ENTRY(motion, drift_rad, 0.03, 0.0, 1.0),

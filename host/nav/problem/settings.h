@@ -24,6 +24,11 @@ struct nav_trust_settings {
     double learn; /* 1: whiskers that keep disagreeing with a sure belief count for less (trust.h); 0: never */
 };
 
+struct nav_map_settings {
+    double
+        learn; /* 1: places where the map keeps being wrong are no longer expected as told (map_belief.h); 0: never */
+};
+
 struct nav_motion_settings {
     double along_m;   /* the relative odometry error keeps its value over about this distance ... */
     double turn_rad;  /* ... and this angle */
@@ -92,6 +97,7 @@ struct nav_settings {
     struct nav_radial_settings radial;
     struct nav_normal_settings normal;
     struct nav_trust_settings trust;
+    struct nav_map_settings map;
     struct nav_motion_settings motion;
     struct nav_grid_settings grid;
     struct nav_foveal_settings foveal;
