@@ -19,6 +19,9 @@ from .sensor_tables import SensorTable, read_sensors, write_sensor
 __all__ = ["LARGEST_M", "SceneError"]  # beside what is defined here
 
 ARENA, ROBOT, PRIOR, OBSERVATIONS = "arena.toml", "robot.toml", "prior.toml", "observations.csv"
+# Columns of OBSERVATIONS of an object whisker, after its name: what it touches, in the robot's frame at the row's end. A file may leave them out.
+NORMAL = ("normal_rad", "normal_sd_rad")
+POINT = ("point_x_m", "point_y_m", "point_sd_m")
 TEXTURES_MOST = 250  # texture indices are one byte in host/nav, with room for its marks
 WHISKERS_MOST, OBSTACLES_MOST = 1000, 10_000
 TILES_MOST = 10_000_000

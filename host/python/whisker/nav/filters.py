@@ -8,9 +8,9 @@ import numpy as np
 
 from ..errors import UserError
 from ..native import as_doubles, doubles, ffi, lib, octets, pointer
-from ..scene import Prior, Scene
+from ..scene import NORMAL, Prior, Scene
 from ..sensor_tables import SensorTable
-from .observations import NORMAL, ODOMETRY, Observations, touch_keys
+from .observations import ODOMETRY, Observations, touch_keys
 
 FAVOURITE, SPARE = "adaptive", "grid"
 SENSOR_UNKNOWN = 255

@@ -7,14 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from ..scene import OBSERVATIONS, Scene, Whisker
+from ..scene import NORMAL, OBSERVATIONS, POINT, Scene, Whisker
 from ..tables import number, numbers, read_columns, require_columns
 
 TRUTH = ("true_x_m", "true_y_m", "true_theta_rad")
 ODOMETRY = ("odo_x_m", "odo_y_m", "odo_theta_rad")
-# Of an object whisker, after its name: what it touches, in the robot's frame at the row's end. A file may leave them out.
-NORMAL = ("normal_rad", "normal_sd_rad")
-POINT = ("point_x_m", "point_y_m", "point_sd_m")
 
 
 @dataclass

@@ -6,6 +6,9 @@ The row of every 0.1 s is one of four kinds:
     body whisk        zero odometry, texture empty, radial cells nan
     release in it     odometry since the last row that carried any, and the distance of each whisker measured
     first after it    odometry since the release
+
+Where an object whisker's model is one of whole whisks, a row that carries motion also tells how the surface lies that is
+touched or was just let go, and where.
 """
 
 import math
@@ -13,12 +16,14 @@ from collections import deque
 
 import numpy as np
 
+from ..scene import NORMAL, POINT
 from ..touch.contact import Contact
 from ..touch.floor import WINDOW_LEAST_GOOD, WINDOW_SAMPLES, floor_whisker
 from ..touch.mount import Mount, retreat
 from ..touch.radial.model import Contact as Recorded
 from ..touch.radial.model import WhiskModel, estimate, peak
 from .behaviour import BLOCK_TICKS, EXPLORE_M_S, TICK_S, TURN_RAD_S, Behaviour, Habits, Whisk
+from .feel import Drives, Feeler, Felt
 from .states import FULL
 from .tip import contact_type, move_for_tip
 from .wheels import EXACT, NO_BUMPS, Bumps, Wheels
@@ -48,6 +53,12 @@ class Pilot:
         self.radial_models = radial_models
         self.contacts = {lane: Contact() for lane in self.object_lanes}
         self.mounts = {lane: Mount.of(robot.whiskers[lane]) for lane in self.object_lanes}
+        self.feelers = {
+            lane: Feeler(robot.whiskers[lane], self.mounts[lane].calibrated_turn, model, wheels.whisk_rad_s)
+            for lane in self.object_lanes
+            if isinstance(model := radial_models.get(self.names[lane]), WhiskModel)
+        }
+        self._drives = Drives()
         first_turn = {lane: mount.corner_turn for lane, mount in self.mounts.items()}
         sides = {lane: -mount.face_turn for lane, mount in self.mounts.items()}
         rng = np.random.default_rng(seed)
@@ -80,8 +91,12 @@ class Pilot:
         if any(self.behaviour.drive):
             for lane, whisker in self.floor.items():
                 whisker.follow(samples[good[:, lane], lane])
+        for lane, feeler in self.feelers.items():
+            feeler.block(ticks, samples[:, lane], good[:, lane], self.contacts[lane], self._drives)
         self._follow_whisk(ticks, samples, good)
-        return self.behaviour.decide(int(ticks[-1]))
+        drive = self.behaviour.decide(int(ticks[-1]))
+        self._drives.order(self.behaviour.drive_since, drive)
+        return drive
 
     def odometry(
         self, tick: int, dx: float, dy: float, dtheta: float, bumps: Bumps = NO_BUMPS
@@ -104,6 +119,9 @@ class Pilot:
             row |= self._texture_cells(lane, tick, held_back=whisking or self._was_whisking)
         for lane in self.object_lanes:
             row[f"{self.names[lane]}_mm"] = self._radial_cell(lane, released, whisking)
+        for lane in self.feelers:
+            felt = None if held_back else self._felt(lane, tick, released)
+            row |= self._felt_cells(lane, felt)
         for lane in released:
             del self._measured[lane]
         self._was_whisking = whisking
@@ -198,6 +216,20 @@ class Pilot:
         v, omega = self.behaviour.drive
         steady = self.behaviour.drive_since + SETTLE_TICKS <= tick + 1 - WINDOW_SAMPLES
         return steady and (v == EXPLORE_M_S or abs(omega) == TURN_RAD_S)
+
+    def _felt(self, lane: int, tick: int, released: dict) -> Felt | None:
+        """What a whisker touches, or has just let go, from where the robot is at `tick`."""
+        felt = self.feelers[lane].felt
+        if felt is None or not (lane in released or self.contacts[lane].touching):
+            return None
+        return felt.after(self._drives.since(felt.tick, tick), tick)
+
+    def _felt_cells(self, lane: int, felt: Felt | None) -> dict[str, float | None]:
+        names = [f"{self.names[lane]}_{name}" for name in (*NORMAL, *POINT)]
+        if felt is None:
+            return dict.fromkeys(names)
+        normal = (None, None) if math.isnan(felt.normal) else (felt.normal, felt.normal_sd)
+        return dict(zip(names, (*normal, *felt.point, felt.point_sd), strict=True))
 
     def _radial_cell(self, lane: int, released: dict, whisking: bool) -> float | None:
         if lane in released:

@@ -4,8 +4,7 @@ import math
 
 import numpy as np
 
-from ..nav.observations import NORMAL
-from ..scene import Scene
+from ..scene import NORMAL, Scene
 from .inbox import Received
 from .messages import REMEDIES, Observation
 from .rows import ROW_NS, between, leaps

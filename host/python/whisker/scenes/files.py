@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..nav.observations import NORMAL, ODOMETRY, POINT, TRUTH, Observations, touch_keys
-from ..scene import OBSERVATIONS, Scene, write
+from ..nav.observations import ODOMETRY, TRUTH, Observations, touch_keys
+from ..scene import NORMAL, OBSERVATIONS, POINT, Scene, write
 
 DECIMALS = 6  # m, rad, nats; distances are rounded in mm to three
 

@@ -28,6 +28,7 @@ class Mount:
     """An object whisker's signs of turn (+1 anticlockwise) and length."""
 
     corner_turn: float  # presses a corner that the shaft met while driving forward
+    calibrated_turn: float  # presses the post of calibration, which stands on the side away from the robot's centre
     face_turn: float  # presses a face ahead that the tip met
     length_mm: float
     base_m: tuple[float, float]
@@ -39,7 +40,9 @@ class Mount:
         tip_y = whisker.base_m[1] + whisker.length_m * math.sin(whisker.yaw_rad)
         corner_turn = math.copysign(1.0, -math.sin(whisker.yaw_rad))
         face_turn = math.copysign(1.0, -tip_y)
-        return cls(corner_turn, face_turn, 1000.0 * whisker.length_m, whisker.base_m, whisker.yaw_rad)
+        aside = whisker.base_m[1] * math.cos(whisker.yaw_rad) - whisker.base_m[0] * math.sin(whisker.yaw_rad)
+        calibrated_turn = math.copysign(1.0, aside)
+        return cls(corner_turn, calibrated_turn, face_turn, 1000.0 * whisker.length_m, whisker.base_m, whisker.yaw_rad)
 
     def distance(self, line_mm: float, turn: float) -> float | None:
         """Distance of a contact pressed by this turn whose peak equation 3 places at `line_mm`; None when unsure."""
