@@ -14,14 +14,14 @@ struct slab {
     double low, high;
 };
 
-static struct slab slab_of(double centre, double sigma)
+static struct slab belief_slab(double centre, double sigma)
 {
     double half = sigma * sqrt(3.0);
     return (struct slab){centre - half, centre + half};
 }
 
 /* Share of a slab that lies in low .. high. */
-static double overlap(struct slab s, double low, double high)
+static double belief_overlap(struct slab s, double low, double high)
 {
     if (!(s.high > s.low))
         return s.low >= low && s.low < high ? 1.0 : 0.0;
@@ -34,7 +34,7 @@ struct raster {
     double *mass;
 };
 
-static int index_of(double offset, double pitch, int count)
+static int belief_index(double offset, double pitch, int count)
 {
     double index = floor(offset / pitch);
     if (!(index > 0.0))
@@ -47,13 +47,13 @@ struct extent {
     double sigma; /* of the narrowest bump */
 };
 
-static struct extent extent_of(const struct nav_component *c, long n, double total)
+static struct extent belief_extent(const struct nav_component *c, long n, double total)
 {
     struct extent e = {{INFINITY, -INFINITY}, {INFINITY, -INFINITY}, INFINITY};
     for (long i = 0; i < n; i++) {
         if (!(c[i].mass > MASS_LEAST * total))
             continue;
-        struct slab x = slab_of(c[i].pose.x, c[i].sigma_m), y = slab_of(c[i].pose.y, c[i].sigma_m);
+        struct slab x = belief_slab(c[i].pose.x, c[i].sigma_m), y = belief_slab(c[i].pose.y, c[i].sigma_m);
         e.x = (struct slab){fmin(e.x.low, x.low), fmax(e.x.high, x.high)};
         e.y = (struct slab){fmin(e.y.low, y.low), fmax(e.y.high, y.high)};
         e.sigma = fmin(e.sigma, c[i].sigma_m);
@@ -62,7 +62,7 @@ static struct extent extent_of(const struct nav_component *c, long n, double tot
 }
 
 /* Bins a quarter as wide as the narrowest bump, as far as that gives no more than RASTER_MOST a side. */
-static int raster_init(struct raster *r, const struct extent *e)
+static int belief_raster_init(struct raster *r, const struct extent *e)
 {
     double width = e->x.high - e->x.low, height = e->y.high - e->y.low;
     double pitch = fmax(fmax(e->sigma * sqrt(3.0) / 2.0, fmax(width, height) / (RASTER_MOST - 2)), 1e-6);
@@ -75,44 +75,39 @@ static int raster_init(struct raster *r, const struct extent *e)
     return r->mass ? 0 : -1;
 }
 
-static void draw(struct raster *r, const struct nav_component *c)
+/* Share of a slab in bin i of `count`; the outermost bins reach out to infinity. */
+static double belief_share(struct slab s, int i, double pitch, int count)
 {
-    struct slab x = slab_of(c->pose.x - r->x0, c->sigma_m), y = slab_of(c->pose.y - r->y0, c->sigma_m);
-    int first = index_of(x.low, r->pitch, r->nx), last = index_of(x.high, r->pitch, r->nx);
-    for (int j = index_of(y.low, r->pitch, r->ny); j <= index_of(y.high, r->pitch, r->ny); j++) {
-        double row = c->mass * overlap(y, j * r->pitch, (j + 1) * r->pitch);
+    double low = i == 0 ? (double)-INFINITY : i * pitch, high = i == count - 1 ? (double)INFINITY : (i + 1) * pitch;
+    return belief_overlap(s, low, high);
+}
+
+static void belief_draw(struct raster *r, const struct nav_component *c, double mass)
+{
+    struct slab x = belief_slab(c->pose.x - r->x0, c->sigma_m), y = belief_slab(c->pose.y - r->y0, c->sigma_m);
+    int first = belief_index(x.low, r->pitch, r->nx), last = belief_index(x.high, r->pitch, r->nx);
+    for (int j = belief_index(y.low, r->pitch, r->ny); j <= belief_index(y.high, r->pitch, r->ny); j++) {
+        double row = mass * belief_share(y, j, r->pitch, r->ny);
         for (int i = first; i <= last; i++)
-            r->mass[(size_t)j * (size_t)r->nx + (size_t)i] += row * overlap(x, i * r->pitch, (i + 1) * r->pitch);
+            r->mass[(size_t)j * (size_t)r->nx + (size_t)i] += row * belief_share(x, i, r->pitch, r->nx);
     }
 }
 
-static int raster_of(struct raster *r, const struct nav_component *c, long n, double total)
-{
-    struct extent e = extent_of(c, n, total);
-    if (raster_init(r, &e))
-        return -1;
-    for (long i = 0; i < n; i++) {
-        if (c[i].mass > 0.0)
-            draw(r, &c[i]);
-    }
-    return 0;
-}
-
-static int descending(const void *a, const void *b)
+static int belief_descending(const void *a, const void *b)
 {
     double x = *(const double *)a, y = *(const double *)b;
     return (x < y) - (x > y);
 }
 
 /* Sorts the raster's masses: the point's bin is looked up before. */
-static double area_of(struct raster *r, double total)
+static double belief_area(struct raster *r, double total)
 {
     size_t count = 0, all = (size_t)r->nx * (size_t)r->ny;
     for (size_t i = 0; i < all; i++) {
         if (r->mass[i] > 0.0)
             r->mass[count++] = r->mass[i];
     }
-    qsort(r->mass, count, sizeof *r->mass, descending);
+    qsort(r->mass, count, sizeof *r->mass, belief_descending);
     double held = 0.0, bins = 0.0;
     for (size_t i = 0; i < count && held < SHARE * total; i++) {
         bins += fmin(1.0, (SHARE * total - held) / r->mass[i]);
@@ -121,7 +116,7 @@ static double area_of(struct raster *r, double total)
     return bins * r->pitch * r->pitch;
 }
 
-static double level_of(const struct raster *r, double x, double y, double total)
+static double belief_level(const struct raster *r, double x, double y, double total)
 {
     double i = floor((x - r->x0) / r->pitch), j = floor((y - r->y0) / r->pitch);
     if (!(i >= 0.0 && i < r->nx && j >= 0.0 && j < r->ny))
@@ -134,64 +129,34 @@ static double level_of(const struct raster *r, double x, double y, double total)
     return fmin(denser / total, 1.0);
 }
 
-static double total_of(const struct nav_component *c, long n)
+int nav_belief_region(const struct nav_component *c, long n, double x, double y, struct nav_region *out)
 {
     double total = 0.0;
     for (long i = 0; i < n; i++)
         total += fmax(c[i].mass, 0.0);
-    return total;
-}
-
-int nav_belief_region(const struct nav_component *c, long n, double x, double y, struct nav_region *out)
-{
-    double total = total_of(c, n);
     struct raster r = {.mass = NULL};
+    struct extent e = belief_extent(c, n, total);
     *out = (struct nav_region){.level = 1.0};
-    if (!(total > 0.0 && isfinite(total)) || raster_of(&r, c, n, total))
+    if (!(total > 0.0 && isfinite(total)) || belief_raster_init(&r, &e))
         return -1;
-    out->level = level_of(&r, x, y, total);
-    out->area_m2 = area_of(&r, total);
+    for (long i = 0; i < n; i++) {
+        if (c[i].mass > 0.0)
+            belief_draw(&r, &c[i], c[i].mass);
+    }
+    out->level = belief_level(&r, x, y, total);
+    out->area_m2 = belief_area(&r, total);
     free(r.mass);
     return 0;
 }
 
-double nav_belief_level(const struct nav_component *c, long n, double x, double y)
-{
-    struct nav_region region;
-    (void)nav_belief_region(c, n, x, y, &region);
-    return region.level;
-}
-
-/* Share of a slab in bin i of `count`; the outermost bins reach out to infinity. */
-static double bin_share(struct slab s, int i, int count)
-{
-    return overlap(s, i == 0 ? -INFINITY : i * BIN_M, i == count - 1 ? INFINITY : (i + 1) * BIN_M);
-}
-
-static double heading_share(const struct nav_component *c, int k)
+static double belief_heading_share(const struct nav_component *c, int k)
 {
     double width = 2.0 * NAV_PI / BIN_HEADINGS, off = nav_wrap(c->pose.theta - (k + 0.5) * width), sum = 0.0;
     if (c->sigma_rad * sqrt(3.0) >= NAV_PI)
         return 1.0 / BIN_HEADINGS;
     for (int turn = -1; turn <= 1; turn++)
-        sum += overlap(slab_of(off + 2.0 * NAV_PI * turn, c->sigma_rad), -width / 2.0, width / 2.0);
+        sum += belief_overlap(belief_slab(off + 2.0 * NAV_PI * turn, c->sigma_rad), -width / 2.0, width / 2.0);
     return sum;
-}
-
-static void add_bins(const struct nav_component *c, int nx, int ny, double *bins)
-{
-    struct slab x = slab_of(c->pose.x, c->sigma_m), y = slab_of(c->pose.y, c->sigma_m);
-    int first = index_of(x.low, BIN_M, nx), last = index_of(x.high, BIN_M, nx);
-    for (int k = 0; k < BIN_HEADINGS; k++) {
-        double turned = c->mass * heading_share(c, k);
-        if (!(turned > 0.0))
-            continue;
-        for (int j = index_of(y.low, BIN_M, ny); j <= index_of(y.high, BIN_M, ny); j++) {
-            double row = turned * bin_share(y, j, ny);
-            for (int i = first; i <= last; i++)
-                bins[((long)k * ny + j) * nx + i] += row * bin_share(x, i, nx);
-        }
-    }
 }
 
 long nav_belief_bins(const struct nav_component *c, long n, double size_x, double size_y, double *bins, long room)
@@ -201,9 +166,13 @@ long nav_belief_bins(const struct nav_component *c, long n, double size_x, doubl
     if (count > room)
         return count;
     memset(bins, 0, (size_t)count * sizeof *bins);
-    for (long i = 0; i < n; i++) {
-        if (c[i].mass > 0.0)
-            add_bins(&c[i], nx, ny, bins);
+    for (long i = 0; i < n * BIN_HEADINGS; i++) {
+        const struct nav_component *one = &c[i / BIN_HEADINGS];
+        int k = (int)(i % BIN_HEADINGS);
+        struct raster slice = {0.0, 0.0, BIN_M, nx, ny, bins + (size_t)k * (size_t)nx * (size_t)ny};
+        double mass = one->mass > 0.0 ? one->mass * belief_heading_share(one, k) : 0.0;
+        if (mass > 0.0)
+            belief_draw(&slice, one, mass);
     }
     return count;
 }

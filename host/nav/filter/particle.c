@@ -1,5 +1,6 @@
 /* Monte-Carlo localisation: systematic resampling, a fixed or KLD-adapted number of particles, and recovery by
- * injection.
+ * injection; and `multi`, which draws each mode anew from a Gaussian when it resamples (the Gaussian sum particle
+ * filter of Kotecha and Djuric): the belief is a mixture of Gaussians, and fewer particles do.
  *
  * Injection follows Thrun, Burgard and Fox (augmented MCL): the share of fresh particles is how far a fast average of
  * the mean weight lies below a slow one. Both take the weights before they are normalised (afterwards their mean is 1/N
@@ -23,6 +24,7 @@ static const double PENDING_MOST_M = 0.05, PENDING_MOST_RAD = 0.2;
 
 struct particle {
     const struct nav_problem *problem;
+    bool mixture; /* of Gaussians */
     struct nav_likelihood *likelihood;
     struct nav_particles cloud;
     struct nav_bins bins;
@@ -34,7 +36,7 @@ struct particle {
     long weighed, moved; /* for the last row */
 };
 
-static void destroy(void *self)
+static void particle_destroy(void *self)
 {
     struct particle *f = self;
     nav_likelihood_free(f->likelihood);
@@ -44,35 +46,46 @@ static void destroy(void *self)
 }
 
 /* Mean near the last one or near the heaviest part; covariance of the whole about it. */
-static void summarise(struct particle *f)
+static void particle_summarise(struct particle *f)
 {
     f->summary = nav_particles_summary(&f->cloud, &f->bins, f->summary.belief.mean);
 }
 
-static void *create(const struct nav_problem *problem)
+static void *particle_create_as(const struct nav_problem *problem, bool mixture)
 {
     const struct nav_settings *s = &problem->settings;
     struct particle *f = calloc(1, sizeof *f);
     if (!f)
         return NULL;
-    *f = (struct particle){.problem = problem, .slow = -1.0, .fast = -1.0};
-    f->sample.error = s->particle.error;
-    f->sample.most = (long)fmax(s->particle.count > 0.0 ? s->particle.count : s->particle.most, 2.0);
-    f->sample.least = s->particle.count > 0.0 ? f->sample.most : (long)fmin(s->particle.least, s->particle.most);
+    *f = (struct particle){.problem = problem, .mixture = mixture, .slow = -1.0, .fast = -1.0};
+    double least = mixture ? s->multi.least : s->particle.least, most = mixture ? s->multi.most : s->particle.most;
+    if (!mixture && s->particle.count > 0.0)
+        least = most = fmax(s->particle.count, 2.0);
+    f->sample = (struct nav_sample){s->particle.error, (long)fmin(least, most), (long)most};
     nav_rng_seed(&f->rng, problem->seed, 0);
     f->likelihood = nav_likelihood_new(&problem->arena, &problem->robot, s, 0.0);
-    if (!f->likelihood || nav_particles_init(&f->cloud, f->sample.most, false, 0.0) ||
+    if (!f->likelihood || nav_particles_init(&f->cloud, f->sample.most, mixture, 0.0) ||
         nav_bins_init(&f->bins, f->sample.most, s->particle.bin_m, s->particle.bin_deg * NAV_PI / 180.0)) {
-        destroy(f);
+        particle_destroy(f);
         return NULL;
     }
     nav_particles_begin(&f->cloud, &f->bins, f->likelihood, &problem->prior, NAV_ANYWHERE, &f->rng, &f->sample);
     f->summary.belief.mean = nav_particles_pose(&f->cloud, 0);
-    summarise(f);
+    particle_summarise(f);
     return f;
 }
 
-static void catch_up(struct particle *f)
+static void *particle_create(const struct nav_problem *problem)
+{
+    return particle_create_as(problem, false);
+}
+
+static void *particle_create_multi(const struct nav_problem *problem)
+{
+    return particle_create_as(problem, true);
+}
+
+static void particle_catch_up(struct particle *f)
 {
     nav_particles_move(&f->cloud, f->pending.step, &f->pending.noise, true, &f->rng);
     f->summary.belief.mean = nav_compose(f->summary.belief.mean, f->pending.step);
@@ -80,7 +93,7 @@ static void catch_up(struct particle *f)
     f->moved += f->cloud.count;
 }
 
-static void predict(void *self, const struct nav_motion *motion)
+static void particle_predict(void *self, const struct nav_motion *motion)
 {
     struct particle *f = self;
     struct nav_noise noise = nav_motion_noise(&f->problem->robot, &f->problem->settings, motion);
@@ -88,13 +101,13 @@ static void predict(void *self, const struct nav_motion *motion)
     nav_pending_add(&f->pending, motion->step, noise);
     if (hypot(f->pending.step.x, f->pending.step.y) > PENDING_MOST_M ||
         fabs(f->pending.step.theta) > PENDING_MOST_RAD) {
-        catch_up(f);
-        summarise(f);
+        particle_catch_up(f);
+        particle_summarise(f);
     }
 }
 
 /* Share of fresh particles that the weights' decline asks for. */
-static double decline(struct particle *f, double mean_weight)
+static double particle_decline(struct particle *f, double mean_weight)
 {
     const struct nav_settings *s = &f->problem->settings;
     if (!(s->particle.recovery > 0.0))
@@ -107,7 +120,7 @@ static double decline(struct particle *f, double mean_weight)
     return fmin(fmax(share, 0.0), FRESH_MOST);
 }
 
-static struct nav_pose draw_fresh(struct particle *f)
+static struct nav_pose particle_draw_fresh(struct particle *f)
 {
     const struct nav_prior anywhere = {.uniform = true};
     struct nav_pose pose;
@@ -122,35 +135,81 @@ static struct nav_pose draw_fresh(struct particle *f)
     return pose;
 }
 
-static void resample(struct particle *f, double fresh)
+/* Mean and covariance of a mode's particles, which weigh the same. */
+static struct nav_gaussian particle_fit(const struct nav_particles *p, const struct nav_mode *mode, int number)
+{
+    struct nav_gaussian g = {.mean = mode->mean};
+    double n = 0.0, sum[3] = {0.0};
+    for (long i = 0; i < p->count; i++) {
+        if ((int)p->mode[i] != number)
+            continue;
+        struct nav_pose at = nav_particles_pose(p, i);
+        const double d[3] = {at.x - mode->mean.x, at.y - mode->mean.y, nav_wrap(at.theta - mode->mean.theta)};
+        n += 1.0;
+        for (int k = 0; k < 9; k++)
+            g.covariance[k] += d[k / 3] * d[k % 3];
+        for (int k = 0; k < 3; k++)
+            sum[k] += d[k];
+    }
+    for (int k = 0; k < 9; k++)
+        g.covariance[k] = g.covariance[k] / n - sum[k / 3] * sum[k % 3] / (n * n);
+    g.mean = (struct nav_pose){g.mean.x + sum[0] / n, g.mean.y + sum[1] / n, nav_wrap(g.mean.theta + sum[2] / n)};
+    return g;
+}
+
+/* Draws the particles of each mode anew from its Gaussian; who would stand where the robot cannot stays. More modes
+ * than can be told apart are not modes yet. */
+static void particle_redraw(struct nav_particles *p, const struct nav_likelihood *l, struct nav_rng *rng)
+{
+    struct nav_mode mode[NAV_MODES_MOST];
+    int modes = nav_particles_modes(p, mode);
+    for (int m = 0; m < modes && modes < NAV_MODES_MOST; m++) {
+        struct nav_gaussian g = particle_fit(p, &mode[m], m);
+        double root[9];
+        nav_gaussian_root(g.covariance, root);
+        for (long i = 0; i < p->count; i++) {
+            if ((int)p->mode[i] != m)
+                continue;
+            const double z[3] = {nav_rng_rough(rng), nav_rng_rough(rng), nav_rng_rough(rng)};
+            struct nav_pose to = {g.mean.x + root[0] * z[0], g.mean.y + root[3] * z[0] + root[4] * z[1],
+                                  g.mean.theta + root[6] * z[0] + root[7] * z[1] + root[8] * z[2]};
+            if (nav_likelihood_clear(l, to.x, to.y, 0.0))
+                nav_particles_set(p, i, to);
+        }
+    }
+}
+
+static void particle_resample(struct particle *f, double fresh)
 {
     nav_bins_fill(&f->bins, &f->cloud);
     long count = nav_bins_needed(&f->bins, &f->sample, fresh);
     nav_particles_resample(&f->cloud, count, nav_rng_uniform(&f->rng));
+    if (f->mixture)
+        particle_redraw(&f->cloud, f->likelihood, &f->rng);
     /* Every k-th particle gives way, so that what is drawn in order of the old cloud loses the same share throughout.
      */
     double step = fresh > 0.0 ? 1.0 / fresh : INFINITY;
     for (double at = step * nav_rng_uniform(&f->rng); at < (double)count; at += step)
-        nav_particles_set(&f->cloud, (long)at, draw_fresh(f));
+        nav_particles_set(&f->cloud, (long)at, particle_draw_fresh(f));
     f->moved += count;
 }
 
-static void update(void *self, const struct nav_evidence *evidence)
+static void particle_update(void *self, const struct nav_evidence *evidence)
 {
     struct particle *f = self;
     const struct nav_settings *s = &f->problem->settings;
-    catch_up(f);
+    particle_catch_up(f);
     nav_likelihood_read(f->likelihood, evidence);
     f->weighed = f->cloud.count;
     double mean = exp(nav_particles_weigh(&f->cloud, f->likelihood, -1.0) - f->likelihood->ceiling);
-    double fresh = decline(f, mean);
+    double fresh = particle_decline(f, mean);
     bool uneven = nav_particles_effective(&f->cloud) < s->particle.resample * (double)f->cloud.count;
-    summarise(f);
+    particle_summarise(f);
     if (uneven || fresh > 0.0)
-        resample(f, fresh);
+        particle_resample(f, fresh);
 }
 
-static void estimate(const void *self, struct nav_estimate *out)
+static void particle_estimate(const void *self, struct nav_estimate *out)
 {
     const struct particle *f = self;
     struct nav_gaussian now = f->summary.belief;
@@ -167,16 +226,15 @@ static void estimate(const void *self, struct nav_estimate *out)
         sizeof *f + nav_particles_bytes(&f->cloud) + nav_bins_bytes(&f->bins) + nav_likelihood_bytes(f->likelihood);
 }
 
-static long components(const void *self, struct nav_component *out, long room)
+static long particle_components(const void *self, struct nav_component *out, long room)
 {
     const struct particle *f = self;
     return nav_particles_components(&f->cloud, f->summary.belief.mean, &f->pending, 1.0, out, room);
 }
 
-const struct nav_filter_ops nav_particle_filter = {.name = "particle",
-                                                   .create = create,
-                                                   .destroy = destroy,
-                                                   .predict = predict,
-                                                   .update = update,
-                                                   .estimate = estimate,
-                                                   .components = components};
+#define PARTICLE_OPS                                                                                                   \
+    .destroy = particle_destroy, .predict = particle_predict, .update = particle_update,                               \
+    .estimate = particle_estimate, .components = particle_components
+
+const struct nav_filter_ops nav_particle_filter = {.name = "particle", .create = particle_create, PARTICLE_OPS};
+const struct nav_filter_ops nav_multi_filter = {.name = "multi", .create = particle_create_multi, PARTICLE_OPS};

@@ -64,12 +64,8 @@ static const struct entry ENTRIES[] = {
     ENTRY(adaptive, hazard, 0.0001, 1e-12, 0.1),
     ENTRY(adaptive, wake, 0.001, 1e-12, 0.4),
     ENTRY(adaptive, scattered, 0.01, 0.0, 1.0),
-    ENTRY(multi, modes, 64.0, 1.0, 10000.0),
-    ENTRY(multi, points, 100.0, 8.0, 10000.0),
-    ENTRY(multi, quantum_m, 0.002, 0.0, 1.0),
-    ENTRY(multi, split, 0.75, 0.0, 1.0),
-    ENTRY(multi, merge, 0.5, 0.0, 10.0),
-    ENTRY(multi, prune, 1e-05, 0.0, 0.5),
+    ENTRY(multi, least, 100.0, 2.0, 1e6),
+    ENTRY(multi, most, 6000.0, 2.0, 1e6),
 };
 
 #define COUNT ((int)(sizeof ENTRIES / sizeof ENTRIES[0]))

@@ -84,12 +84,8 @@ struct nav_adaptive_settings {
 };
 
 struct nav_multi_settings {
-    double modes;     /* Gaussians, at most */
-    double points;    /* at which each is weighed */
-    double quantum_m; /* added to each posterior: standard deviation, at the robot and at a whisker's tip */
-    double split;     /* a mode splits when two heaps explain this share of its longest axis's variance */
-    double merge;     /* modes merge when their means are so many standard deviations apart */
-    double prune;     /* share of weight at which a mode is dropped */
+    double least; /* fewest particles; else as `particle` */
+    double most;  /* most particles */
 };
 
 struct nav_settings {

@@ -4,6 +4,7 @@
 #include "belief.h"
 #include "near.h"
 #include "rooms.h"
+#include "wander.h"
 
 static const double BOTH[] = {1.0, 1.0};
 
@@ -64,17 +65,17 @@ static void a_wider_belief_takes_more_particles(void **state)
         p.prior.sigma[0] = p.prior.sigma[1] = n == 0 ? 0.002 : 0.05;
         p.prior.sigma[2] = n == 0 ? 0.002 : 0.2;
         p.prior.uniform = n == 2;
-        struct particle *f = create(&p);
+        struct particle *f = particle_create(&p);
         count[n] = f->cloud.count;
-        destroy(f);
+        particle_destroy(f);
     }
     assert_int_equal(count[0], 300);
     assert_true(count[1] > 2 * count[0] && count[1] < 5000);
     assert_true(count[2] > 10000 && count[2] <= 20000);
     p.settings.particle.count = 1234.0;
-    struct particle *f = create(&p);
+    struct particle *f = particle_create(&p);
     assert_int_equal(f->cloud.count, 1234);
-    destroy(f);
+    particle_destroy(f);
 }
 
 static void standing_weighs_as_the_codes_do_where_the_robot_can_stand(void **state)
@@ -229,8 +230,8 @@ static void contradict(struct particle *f, double distance)
 {
     const double texture[] = {-50.0, 0.0};
     const double *reading[] = {texture, &distance};
-    predict(f, &(struct nav_motion){.unknown_m = 0.0});
-    update(f, &(struct nav_evidence){reading, BOTH});
+    particle_predict(f, &(struct nav_motion){.unknown_m = 0.0});
+    particle_update(f, &(struct nav_evidence){reading, BOTH});
 }
 
 static void weights_that_stay_low_bring_fresh_particles_where_the_row_fits(void **state)
@@ -240,12 +241,12 @@ static void weights_that_stay_low_bring_fresh_particles_where_the_row_fits(void 
     p.settings.particle.count = 2000.0;
     p.prior.mean = (struct nav_pose){0.25, 0.25, 0.0}; /* texture 0, nothing within reach */
     p.prior.sigma[0] = p.prior.sigma[1] = p.prior.sigma[2] = 0.02;
-    struct particle *f = create(&p);
+    struct particle *f = particle_create(&p);
     const double texture[] = {0.0, -50.0}, nothing = INFINITY;
     const double *fits[] = {texture, &nothing};
     for (int n = 0; n < 50; n++) {
-        predict(f, &(struct nav_motion){.unknown_m = 0.0});
-        update(f, &(struct nav_evidence){fits, BOTH});
+        particle_predict(f, &(struct nav_motion){.unknown_m = 0.0});
+        particle_update(f, &(struct nav_evidence){fits, BOTH});
         assert_int_equal(f->weighed, 2000); /* none injected */
     }
     double before = f->slow;
@@ -257,7 +258,7 @@ static void weights_that_stay_low_bring_fresh_particles_where_the_row_fits(void 
     for (long i = 0; i < f->cloud.count; i++)
         elsewhere += hypot((double)f->cloud.x[i] - 0.25, (double)f->cloud.y[i] - 0.25) > 0.2;
     assert_true(elsewhere > 1800);
-    destroy(f);
+    particle_destroy(f);
 }
 
 static void the_work_told_counts_particles_weighed_and_particles_moved(void **state)
@@ -265,22 +266,22 @@ static void the_work_told_counts_particles_weighed_and_particles_moved(void **st
     (void)state;
     struct nav_problem p = quiet();
     p.settings.particle.count = 100.0;
-    struct particle *f = create(&p);
+    struct particle *f = particle_create(&p);
     struct nav_estimate e;
     const double texture[] = {0.0, -1.0}, nothing = INFINITY, none[] = {0.0, 0.0};
     const double *reading[] = {texture, &nothing};
-    predict(f, &(struct nav_motion){.step = {0.01, 0.0, 0.0}});
-    estimate(f, &e);
+    particle_predict(f, &(struct nav_motion){.step = {0.01, 0.0, 0.0}});
+    particle_estimate(f, &e);
     assert_int_equal(e.touched, 0); /* put off */
-    update(f, &(struct nav_evidence){reading, none});
-    estimate(f, &e);
+    particle_update(f, &(struct nav_evidence){reading, none});
+    particle_estimate(f, &e);
     assert_int_equal(e.evaluations, 100);
     assert_int_equal(e.touched, 200);
-    predict(f, &(struct nav_motion){.step = {0.1, 0.0, 0.0}}); /* too far to be put off */
-    estimate(f, &e);
+    particle_predict(f, &(struct nav_motion){.step = {0.1, 0.0, 0.0}}); /* too far to be put off */
+    particle_estimate(f, &e);
     assert_int_equal(e.evaluations, 0);
     assert_int_equal(e.touched, 100);
-    destroy(f);
+    particle_destroy(f);
 }
 
 /* Every second of a tight cloud gives way, counted from a place that the random numbers choose: here the first, where
@@ -291,9 +292,9 @@ static void fresh_particles_take_their_share_of_the_places_and_none_beyond(void 
     struct nav_problem p = quiet();
     p.settings.particle.count = 300.0;
     p.prior.sigma[0] = p.prior.sigma[1] = p.prior.sigma[2] = 0.002;
-    struct particle *f = create(&p);
+    struct particle *f = particle_create(&p);
     f->rng = (struct nav_rng){{0, 5, 7, 5}}; /* its second uniform number is 0 */
-    resample(f, 0.5);
+    particle_resample(f, 0.5);
     assert_int_equal(f->cloud.count, 300);
     for (long i = 0; i < 300; i++) {
         double x = (double)f->cloud.x[i], y = (double)f->cloud.y[i];
@@ -302,7 +303,7 @@ static void fresh_particles_take_their_share_of_the_places_and_none_beyond(void 
         if (i % 2)
             assert_near(hypot(x - 0.5, y - 0.5), 0.0, 0.02);
     }
-    destroy(f);
+    particle_destroy(f);
 }
 
 static void weights_never_become_more_uneven_than_allowed(void **state)
@@ -310,16 +311,16 @@ static void weights_never_become_more_uneven_than_allowed(void **state)
     (void)state;
     struct nav_problem p = quiet();
     p.prior.uniform = true;
-    struct particle *f = create(&p);
+    struct particle *f = particle_create(&p);
     const double texture[] = {0.0, -50.0}, nothing = INFINITY;
     const double *reading[] = {texture, &nothing};
     for (int n = 0; n < 30; n++) {
-        predict(f, &(struct nav_motion){.step = {0.02, 0.0, 0.1}});
-        update(f, &(struct nav_evidence){reading, BOTH});
+        particle_predict(f, &(struct nav_motion){.step = {0.02, 0.0, 0.1}});
+        particle_update(f, &(struct nav_evidence){reading, BOTH});
         assert_true(nav_particles_effective(&f->cloud) >= 0.5 * (double)f->cloud.count);
     }
     assert_true(f->cloud.count < 10000); /* half the room has been ruled out: fewer are needed */
-    destroy(f);
+    particle_destroy(f);
 }
 
 static void a_row_that_no_particle_can_explain_changes_no_weight(void **state)
@@ -327,7 +328,7 @@ static void a_row_that_no_particle_can_explain_changes_no_weight(void **state)
     (void)state;
     struct nav_problem p = quiet();
     p.settings.particle.count = 50.0;
-    struct particle *f = create(&p);
+    struct particle *f = particle_create(&p);
     for (long i = 0; i < 50; i++)
         nav_particles_set(&f->cloud, i, (struct nav_pose){5.0, 5.0, 0.0});
     contradict(f, 0.1);
@@ -336,7 +337,59 @@ static void a_row_that_no_particle_can_explain_changes_no_weight(void **state)
         total += (double)f->cloud.weight[i];
     assert_near(total, 1.0, 1e-5);
     assert_int_equal(f->cloud.count, 50);
-    destroy(f);
+    particle_destroy(f);
+}
+
+/* Two modes of 100 particles each, 0.6 m apart, of 3 cm by 1 cm: drawn anew they keep their places and shapes, whoever
+ * belongs to them, and every particle but what the body's place forbids is a new one. */
+static void modes_are_drawn_anew_from_their_gaussians(void **state)
+{
+    (void)state;
+    enum { EACH = 400 };
+    struct nav_problem p = room();
+    struct nav_likelihood *l = nav_likelihood_new(&p.arena, &p.robot, &p.settings, 0.0);
+    struct nav_particles set;
+    struct nav_rng rng;
+    nav_rng_seed(&rng, 5, 0);
+    assert_int_equal(nav_particles_init(&set, 2 * EACH, true, 0.0), 0);
+    for (int i = 0; i < 2 * EACH; i++) {
+        double x = 0.03 * nav_rng_normal(&rng), y = 0.01 * nav_rng_normal(&rng);
+        struct nav_pose at = {(i % 2 ? 0.8 : 0.2) + x, 0.6 + y + x / 2.0, 3.1 + 0.1 * nav_rng_normal(&rng)};
+        nav_particles_add(&set, at, 0.5 / EACH, &rng);
+    }
+    const struct nav_mode mode[2] = {{.mean = {0.2, 0.6, 3.1}}, {.mean = {0.8, 0.6, 3.1}}};
+    struct nav_mode found[NAV_MODES_MOST];
+    assert_int_equal(nav_particles_modes(&set, found), 2);
+    float before = set.x[0];
+    particle_redraw(&set, l, &rng);
+    assert_true(set.x[0] != before); /* bits */
+    for (int m = 0; m < 2; m++) {
+        struct nav_gaussian g = particle_fit(&set, &mode[m], m);
+        assert_near(g.mean.x, mode[m].mean.x, 0.006);
+        assert_near(g.mean.y, 0.6, 0.004);
+        assert_near(nav_wrap(g.mean.theta - 3.1), 0.0, 0.02);
+        assert_near(sqrt(g.covariance[0]), 0.03, 0.004);
+        assert_near(g.covariance[1], 0.03 * 0.03 / 2.0, 1.2e-4);
+        assert_near(g.covariance[4], 0.01 * 0.01 + 0.03 * 0.03 / 4.0, 8e-5);
+        assert_near(sqrt(g.covariance[8]), 0.1, 0.012);
+    }
+    nav_particles_free(&set);
+    nav_likelihood_free(l);
+}
+
+static void a_mixture_of_gaussians_tracks_with_few_particles(void **state)
+{
+    (void)state;
+    struct wander w = wander_new(3);
+    struct nav_filter *f = nav_filter_new("multi", &w.problem);
+    struct nav_estimate e;
+    for (int k = 0; k < 200; k++) {
+        nav_filter_step(f, wander_on(&w), &e);
+        assert_in_range(e.states, 100, 6000);
+    }
+    assert_true(wander_error(&w, &e) < 0.1 && e.confidence > 0.5);
+    assert_true(e.states < 300);
+    nav_filter_free(f);
 }
 
 int main(void)
@@ -355,6 +408,8 @@ int main(void)
         cmocka_unit_test(fresh_particles_take_their_share_of_the_places_and_none_beyond),
         cmocka_unit_test(weights_never_become_more_uneven_than_allowed),
         cmocka_unit_test(a_row_that_no_particle_can_explain_changes_no_weight),
+        cmocka_unit_test(modes_are_drawn_anew_from_their_gaussians),
+        cmocka_unit_test(a_mixture_of_gaussians_tracks_with_few_particles),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
