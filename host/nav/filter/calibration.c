@@ -25,7 +25,7 @@ struct nav_motion nav_calibration_apply(const struct nav_calibration *c, const s
 }
 
 /* Takes a measured factor by which the present value is still off. */
-static void follow(struct nav_ratio *r, double factor, double variance)
+static void calibration_follow(struct nav_ratio *r, double factor, double variance)
 {
     if (!(fabs(factor - 1.0) < JUMP) || !isfinite(variance))
         return;
@@ -35,7 +35,7 @@ static void follow(struct nav_ratio *r, double factor, double variance)
     r->variance *= 1.0 - gain;
 }
 
-static void begin(struct nav_calibration *c, const struct nav_estimate *now)
+static void calibration_begin(struct nav_calibration *c, const struct nav_estimate *now)
 {
     c->sure = now->confidence >= SURE;
     c->from = now->pose;
@@ -44,20 +44,21 @@ static void begin(struct nav_calibration *c, const struct nav_estimate *now)
 }
 
 /* Length of the stretch by the filter over that by the wheels, along the wheels' direction. */
-static void compare_distance(struct nav_calibration *c, const struct nav_estimate *now)
+static void calibration_compare_distance(struct nav_calibration *c, const struct nav_estimate *now)
 {
     double told = hypot(c->told.x, c->told.y), cos0 = cos(c->from.theta), sin0 = sin(c->from.theta);
     double dx = now->pose.x - c->from.x, dy = now->pose.y - c->from.y;
     double along = ((cos0 * dx + sin0 * dy) * c->told.x + (cos0 * dy - sin0 * dx) * c->told.y) / told;
     const double *a = c->from_covariance, *b = now->covariance;
     double variance = (a[0] + a[4] + b[0] + b[4]) / 2.0;
-    follow(&c->distance, along / told, TOLD_AGAIN * variance / (told * told));
+    calibration_follow(&c->distance, along / told, TOLD_AGAIN * variance / (told * told));
 }
 
-static void compare_turn(struct nav_calibration *c, const struct nav_estimate *now)
+static void calibration_compare_turn(struct nav_calibration *c, const struct nav_estimate *now)
 {
     double told = c->told.theta, off = nav_wrap(now->pose.theta - c->from.theta - told);
-    follow(&c->turn, 1.0 + off / told, TOLD_AGAIN * (c->from_covariance[8] + now->covariance[8]) / (told * told));
+    calibration_follow(&c->turn, 1.0 + off / told,
+                       TOLD_AGAIN * (c->from_covariance[8] + now->covariance[8]) / (told * told));
 }
 
 void nav_calibration_learn(struct nav_calibration *c, const struct nav_motion *applied, const struct nav_estimate *now)
@@ -65,14 +66,14 @@ void nav_calibration_learn(struct nav_calibration *c, const struct nav_motion *a
     bool known = applied->unknown_m <= 0.0 && applied->unknown_rad <= 0.0;
     c->told = nav_compose(c->told, applied->step);
     if (!c->sure || !known || now->confidence < SURE) {
-        begin(c, now);
+        calibration_begin(c, now);
         return;
     }
     bool far = hypot(c->told.x, c->told.y) >= NAV_STRETCH_M, round = fabs(c->told.theta) >= NAV_STRETCH_RAD;
     if (far && !round)
-        compare_distance(c, now);
+        calibration_compare_distance(c, now);
     if (round)
-        compare_turn(c, now);
+        calibration_compare_turn(c, now);
     if (far || round)
-        begin(c, now);
+        calibration_begin(c, now);
 }

@@ -25,7 +25,7 @@ const char *nav_filter_name(int index)
     return index >= 0 && index < COUNT ? FILTERS[index]->name : NULL;
 }
 
-static const struct nav_filter_ops *find(const char *name)
+static const struct nav_filter_ops *filter_find(const char *name)
 {
     for (int i = 0; i < COUNT; i++) {
         if (strcmp(FILTERS[i]->name, name) == 0)
@@ -34,7 +34,7 @@ static const struct nav_filter_ops *find(const char *name)
     return NULL;
 }
 
-static void *copy(const void *from, int count, size_t size)
+static void *filter_copy(const void *from, int count, size_t size)
 {
     void *to = calloc((size_t)count + 1, size);
     if (to && count > 0)
@@ -43,7 +43,7 @@ static void *copy(const void *from, int count, size_t size)
 }
 
 /* Mean and deviations become the mixture's, for whoever wants one place. */
-static int own_prior(struct nav_prior *prior)
+static int filter_own_prior(struct nav_prior *prior)
 {
     if (!nav_bumps_given(prior)) {
         prior->bump = NULL;
@@ -63,22 +63,22 @@ static int own_prior(struct nav_prior *prior)
     return 0;
 }
 
-static int own(struct nav_problem *p)
+static int filter_own(struct nav_problem *p)
 {
-    int prior = own_prior(&p->prior);
+    int prior = filter_own_prior(&p->prior);
     if (prior)
         p->prior.bump = NULL;
-    p->arena.floor = copy(p->arena.floor, p->arena.rows * p->arena.columns, sizeof *p->arena.floor);
-    p->arena.box = copy(p->arena.box, p->arena.boxes, sizeof *p->arena.box);
-    p->robot.tip = copy(p->robot.tip, p->robot.tips, sizeof *p->robot.tip);
-    p->robot.ray = copy(p->robot.ray, p->robot.rays, sizeof *p->robot.ray);
-    p->robot.sensor = copy(p->robot.sensor, p->robot.sensors, sizeof *p->robot.sensor);
+    p->arena.floor = filter_copy(p->arena.floor, p->arena.rows * p->arena.columns, sizeof *p->arena.floor);
+    p->arena.box = filter_copy(p->arena.box, p->arena.boxes, sizeof *p->arena.box);
+    p->robot.tip = filter_copy(p->robot.tip, p->robot.tips, sizeof *p->robot.tip);
+    p->robot.ray = filter_copy(p->robot.ray, p->robot.rays, sizeof *p->robot.ray);
+    p->robot.sensor = filter_copy(p->robot.sensor, p->robot.sensors, sizeof *p->robot.sensor);
     return !prior && p->arena.floor && p->arena.box && p->robot.tip && p->robot.ray && p->robot.sensor ? 0 : -1;
 }
 
 struct nav_filter *nav_filter_new(const char *name, const struct nav_problem *problem)
 {
-    const struct nav_filter_ops *ops = find(name);
+    const struct nav_filter_ops *ops = filter_find(name);
     long which;
     if (!ops || nav_prior_fault(&problem->arena, &problem->prior, &which))
         return NULL;
@@ -92,7 +92,7 @@ struct nav_filter *nav_filter_new(const char *name, const struct nav_problem *pr
         return NULL;
     }
     *f->problem = *problem;
-    if (own(f->problem) || nav_intake_init(&f->intake, f->problem) || !(f->self = ops->create(f->problem))) {
+    if (filter_own(f->problem) || nav_intake_init(&f->intake, f->problem) || !(f->self = ops->create(f->problem))) {
         nav_filter_free(f);
         return NULL;
     }
@@ -166,9 +166,4 @@ uint64_t nav_filter_bad_cells(const struct nav_filter *f)
 uint64_t nav_filter_bad_rows(const struct nav_filter *f)
 {
     return f->intake.bad_rows;
-}
-
-uint64_t nav_filter_empty_windows(const struct nav_filter *f)
-{
-    return f->intake.empty;
 }

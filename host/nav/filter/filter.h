@@ -35,8 +35,6 @@ struct nav_resolution nav_filter_resolution(const struct nav_filter *);
 
 uint64_t nav_filter_bad_cells(const struct nav_filter *);
 uint64_t nav_filter_bad_rows(const struct nav_filter *); /* repeated, late or reordered */
-/* Windows that call all textures equally likely: not bad, but treated as not read. */
-uint64_t nav_filter_empty_windows(const struct nav_filter *);
 /* cffi: end */
 
 struct nav_evidence;

@@ -4,7 +4,7 @@
 
 #include <time.h>
 
-static double now_us(void)
+static double replay_now_us(void)
 {
     struct timespec t = {0, 0};
     (void)clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
@@ -23,8 +23,8 @@ void nav_replay(struct nav_filter *filter, const struct nav_rows *rows, long fir
                               .radial_m = rows->radial_m + at * rows->radial_width,
                               .normal = rows->normal ? rows->normal + 2 * at * rows->radial_width : NULL,
                               .own = rows->own ? rows->own + at * rows->own_width : NULL};
-        double begun = now_us();
+        double begun = replay_now_us();
         nav_filter_step(filter, &row, &out[k]);
-        step_us[k] = now_us() - begun;
+        step_us[k] = replay_now_us() - begun;
     }
 }

@@ -19,15 +19,15 @@ static void the_fovea_is_eleven_cubed_over_a_quarter_metre_and_ninety_degrees(vo
 {
     (void)state;
     struct nav_problem p = quiet_room();
-    struct foveal *f = create(&p);
-    assert_int_equal(points(f), 1331);
+    struct foveal *f = foveal_create(&p);
+    assert_int_equal(foveal_points(f), 1331);
     f->belief.mean.theta = NAV_PI / 2.0; /* egocentric: ahead is up */
-    struct nav_pose first = point(f, 0), last = point(f, 1330);
+    struct nav_pose first = foveal_point(f, 0), last = foveal_point(f, 1330);
     assert_near(last.y - first.y, 0.25, 1e-12);
     assert_near(first.x - last.x, 0.25, 1e-12);
     assert_near(last.theta - first.theta, NAV_PI / 2.0, 1e-12);
-    assert_near(point(f, 665).x, 0.36, 1e-12);
-    destroy(f);
+    assert_near(foveal_point(f, 665).x, 0.36, 1e-12);
+    foveal_destroy(f);
 }
 
 static void nothing_read_keeps_the_mode_and_fits_the_clipped_prior(void **state)
@@ -36,14 +36,14 @@ static void nothing_read_keeps_the_mode_and_fits_the_clipped_prior(void **state)
     struct nav_problem p = quiet_room();
     p.prior.sigma[0] = p.prior.sigma[1] = 0.03;
     p.settings.foveal.quantum_m = 0.01;
-    struct foveal *f = create(&p);
+    struct foveal *f = foveal_create(&p);
     const double none[] = {0.0, 0.0};
-    update(f, &(struct nav_evidence){NULL, none});
+    foveal_update(f, &(struct nav_evidence){NULL, none});
     assert_near(f->belief.mean.x, 0.36, 1e-12);
     /* A Gaussian of 0.03 m sampled every 0.025 m keeps its variance; the quantisation term is added (equation 7). */
     assert_near(f->belief.covariance[0], 0.0009 + 0.0001, 2e-5);
     assert_near(f->belief.covariance[1], 0.0, 1e-9);
-    destroy(f);
+    foveal_destroy(f);
 }
 
 static void a_texture_moves_the_mode_to_the_nearest_point_that_fits(void **state)
@@ -53,15 +53,15 @@ static void a_texture_moves_the_mode_to_the_nearest_point_that_fits(void **state
     p.settings.texture.temper = 1.0;
     p.settings.texture.outlier = 1e-6;
     p.prior.sigma[2] = 0.05;
-    struct foveal *f = create(&p);
+    struct foveal *f = foveal_create(&p);
     const double right_tile[] = {-50.0, 0.0}, weight[] = {1.0, 0.0};
     const double *reading[] = {right_tile, NULL};
-    update(f, &(struct nav_evidence){reading, weight});
+    foveal_update(f, &(struct nav_evidence){reading, weight});
     /* Tip 0.1 ahead, border at 0.5: the centre is at 0.4 or beyond; points lie at 0.36, 0.385, 0.41. */
     assert_near(f->belief.mean.x, 0.41, 1e-12);
     assert_near(f->belief.mean.y, 0.25, 1e-12);
     assert_near(f->belief.mean.theta, 0.0, 1e-12);
-    destroy(f);
+    foveal_destroy(f);
 }
 
 static void it_never_looks_outside_the_fovea(void **state)
@@ -70,12 +70,12 @@ static void it_never_looks_outside_the_fovea(void **state)
     struct nav_problem p = quiet_room();
     p.prior.mean.x = 0.2; /* the tip's border is 0.2 m ahead, outside the fovea's 0.125 */
     p.settings.texture.temper = 1.0;
-    struct foveal *f = create(&p);
+    struct foveal *f = foveal_create(&p);
     const double right_tile[] = {-50.0, 0.0}, weight[] = {1.0, 0.0};
     const double *reading[] = {right_tile, NULL};
-    update(f, &(struct nav_evidence){reading, weight});
+    foveal_update(f, &(struct nav_evidence){reading, weight});
     assert_near(f->belief.mean.x, 0.2, 0.126);
-    destroy(f);
+    foveal_destroy(f);
 }
 
 static void a_fovea_wholly_inside_a_solid_changes_nothing(void **state)
@@ -83,25 +83,25 @@ static void a_fovea_wholly_inside_a_solid_changes_nothing(void **state)
     (void)state;
     struct nav_problem p = quiet_room();
     p.prior.mean = (struct nav_pose){5.0, 5.0, 0.0};
-    struct foveal *f = create(&p);
+    struct foveal *f = foveal_create(&p);
     const double right_tile[] = {-50.0, 0.0}, weight[] = {1.0, 0.0};
     const double *reading[] = {right_tile, NULL};
-    update(f, &(struct nav_evidence){reading, weight});
+    foveal_update(f, &(struct nav_evidence){reading, weight});
     assert_near(f->belief.mean.x, 5.0, 0.0);
     assert_near(f->belief.covariance[0], 0.01, 1e-12);
-    destroy(f);
+    foveal_destroy(f);
 }
 
 /* The covariance after one row that says tile 0 or tile 1. */
 static void covariance_after(struct nav_problem *p, bool right, double covariance[9])
 {
     p->settings.texture.temper = 1.0;
-    struct foveal *f = create(p);
+    struct foveal *f = foveal_create(p);
     const double left_tile[] = {0.0, -50.0}, right_tile[] = {-50.0, 0.0}, weight[] = {1.0, 0.0};
     const double *reading[] = {right ? right_tile : left_tile, NULL};
-    update(f, &(struct nav_evidence){reading, weight});
+    foveal_update(f, &(struct nav_evidence){reading, weight});
     memcpy(covariance, f->belief.covariance, sizeof f->belief.covariance);
-    destroy(f);
+    foveal_destroy(f);
 }
 
 static void as_printed_equation_7_does_not_depend_on_the_readings(void **state)
