@@ -410,7 +410,7 @@ static struct nav_resolution resolution(const void *self)
 {
     const struct adaptive_global *g = &((const struct adaptive *)self)->global;
     const struct nav_shape finest = nav_levels_shape(&g->histogram.levels, 0);
-    return (struct nav_resolution){finest.cell, finest.cell_theta, g->wanted};
+    return (struct nav_resolution){finest.cell, finest.cell_theta, g->wanted, g->first.too_wide};
 }
 
 const struct nav_filter_ops nav_adaptive_filter = {.name = "adaptive",

@@ -490,6 +490,7 @@ int adaptive_global_init(struct adaptive_global *g, const struct nav_problem *pr
     g->budget = global_budget(g, &levels);
     struct nav_shape first = nav_levels_shape(&levels, g->first.level);
     g->first.cells = nav_shape_inside(&first);
+    g->first.too_wide = 2.0 * first.cell > detail ? first.cell : 0.0;
     g->poses.drawn = calloc((size_t)g->room + 1, sizeof *g->poses.drawn);
     g->poses.grain = calloc((size_t)g->room + 1, sizeof *g->poses.grain);
     if (!g->poses.drawn || !g->poses.grain ||

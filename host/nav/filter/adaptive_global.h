@@ -31,6 +31,7 @@ struct adaptive_job {
 struct adaptive_first {
     int level;
     double cells;
+    double too_wide;        /* m, edge of its cells where the scene's detail asks for smaller ones, else 0 */
     int slice;              /* whose place in the table is */
     struct nav_layer layer; /* this */
 };

@@ -155,7 +155,7 @@ long nav_filter_components(const struct nav_filter *f, struct nav_component *out
 
 struct nav_resolution nav_filter_resolution(const struct nav_filter *f)
 {
-    return f->ops->resolution ? f->ops->resolution(f->self) : (struct nav_resolution){0.0, 0.0, 0.0};
+    return f->ops->resolution ? f->ops->resolution(f->self) : (struct nav_resolution){.m = 0.0};
 }
 
 uint64_t nav_filter_bad_cells(const struct nav_filter *f)

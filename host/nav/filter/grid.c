@@ -255,7 +255,7 @@ static struct nav_resolution grid_resolution(const void *self)
     const struct grid *g = self;
     double finest = nav_sensors_detail(&g->likelihood->sensors).detail;
     const struct nav_shape *s = &g->histogram.shape;
-    return (struct nav_resolution){s->cell, s->cell_theta, fmin(s->cell, finest / 2.0)};
+    return (struct nav_resolution){s->cell, s->cell_theta, fmin(s->cell, finest / 2.0), 0.0};
 }
 
 const struct nav_filter_ops nav_grid_filter = {.name = "grid",

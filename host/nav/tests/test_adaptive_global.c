@@ -156,12 +156,15 @@ static void large_arenas_get_the_budget_that_they_need(void **state)
     struct belief b;
     begin(&b, 2.0);
     assert_near(b.g.budget, b.problem.settings.adaptive.budget, 0.0);
+    assert_near(b.g.first.too_wide, 0.0, 0.0);
     end(&b);
     begin(&b, 60.0);
     double cells = (double)adaptive_global_cells(&b.g), rows = b.problem.settings.adaptive.rows;
     assert_true(b.g.budget > b.problem.settings.adaptive.budget);
     assert_near(b.g.budget, cells / rows, 1.0);
     assert_true(adaptive_global_bytes(&b.g) < 64e6);
+    assert_near(b.g.first.too_wide, b.g.histogram.shape.cell, 0.0); /* above half a tile: it says so */
+    assert_true(b.g.first.too_wide > 0.25);
     end(&b);
 }
 

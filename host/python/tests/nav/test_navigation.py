@@ -95,6 +95,16 @@ def test_any_number_of_whiskers_and_any_arena_size(name, whiskers):
     assert made.bad_cells == made.bad_rows == 0
 
 
+def test_who_searches_in_cells_too_wide_for_the_scene_says_so():
+    scene, observations = level0.record(123, rows=2)
+    small = localise.run("adaptive", scene, observations)
+    assert localise.warnings(small) == [] and localise.summary(small)["start_m"] == 0
+    vast = dataclasses.replace(scene.arena, size_m=(80.0, 80.0))
+    large = localise.run("adaptive", dataclasses.replace(scene, arena=vast), observations)
+    (line,) = localise.warnings(large)
+    assert f"in cells of {localise.summary(large)['start_m']:.3g} m where" in line and "known pose" in line
+
+
 def test_a_grid_that_cannot_fit_says_so():
     scene, _ = level0.record(123, rows=1)
     vast = dataclasses.replace(scene.arena, size_m=(900.0, 900.0), tile_m=180.0)

@@ -235,10 +235,11 @@ class Filter:
         return out
 
     @property
-    def resolution(self) -> tuple[float, float, float] | None:
-        """Edge of a cell in m, its extent in rad, and the edge in m that the scene's detail asks for; None: no cells."""
+    def resolution(self) -> tuple[float, float, float, float] | None:
+        """Edge of a cell in m, its extent in rad, the edge in m that the scene's detail asks for, and that of the cells in
+        which an unknown place is looked for where they are too wide for the detail, else 0; None: no cells."""
         told = lib.nav_filter_resolution(self._filter)
-        return (told.m, told.rad, told.wanted_m) if told.m > 0 else None
+        return (told.m, told.rad, told.wanted_m, told.start_m) if told.m > 0 else None
 
     @property
     def bad_cells(self) -> int:

@@ -48,7 +48,7 @@ class Run:
     table: np.ndarray  # (n,) of ESTIMATE
     bad_cells: int
     bad_rows: int
-    resolution: tuple[float, float, float] | None = None  # as Filter.resolution
+    resolution: tuple[float, float, float, float] | None = None  # as Filter.resolution
     levels: np.ndarray = field(default_factory=lambda: np.zeros(0))  # of the truth's region, at the judged rows
     areas_m2: np.ndarray = field(default_factory=lambda: np.zeros(0))  # of the 90 % regions there
 
@@ -121,7 +121,7 @@ def summary(result: Run, truth: np.ndarray | None) -> dict:
         "bad_rows": result.bad_rows,
     }
     if result.resolution:
-        out |= dict(zip(("resolution_m", "resolution_rad", "wanted_m"), result.resolution, strict=True))
+        out |= dict(zip(("resolution_m", "resolution_rad", "wanted_m", "start_m"), result.resolution, strict=True))
     if truth is not None and np.isfinite(truth).all(axis=1).any():
         out |= pose_errors(result.poses, truth)
     judged = np.isfinite(result.levels)
@@ -133,17 +133,16 @@ def summary(result: Run, truth: np.ndarray | None) -> dict:
 
 def warnings(result: Run) -> list[str]:
     """What a user should know of how it ran, one line each."""
-    if not result.resolution or result.resolution[0] <= 1.001 * result.resolution[2]:
-        return []
-    cell, _, wanted = result.resolution
-    remedy = (
-        "set a larger adaptive.budget, for a million cells at most"
-        if result.name == "adaptive"
-        else f"set {result.name}.cell_m={wanted:.3g}"
-    )
-    return [
-        f"filter '{result.name}' has cells of {cell:.3g} m where the scene's detail asks for {wanted:.3g} m; {remedy}"
-    ]
+    cell, _, wanted, start = result.resolution or (0.0, 0.0, 0.0, 0.0)
+    name, asked = result.name, f"where the scene's detail asks for {wanted:.3g} m"
+    out = []
+    if cell > 1.001 * wanted:
+        out += [f"filter '{name}' has cells of {cell:.3g} m {asked}; set {name}.cell_m={wanted:.3g}"]
+    if start > 0.0:
+        out += [
+            f"filter '{name}' looks for an unknown place in cells of {start:.3g} m {asked}; begin from a known pose"
+        ]
+    return out
 
 
 def write_estimates(path, result: Run, observations: Observations, origin: Pose = NOWHERE) -> None:
