@@ -98,11 +98,11 @@ def test_any_number_of_whiskers_and_any_arena_size(name, whiskers):
 def test_who_searches_in_cells_too_wide_for_the_scene_says_so():
     scene, observations = level0.record(123, rows=2)
     small = localise.run("adaptive", scene, observations)
-    assert localise.warnings(small) == [] and localise.summary(small)["start_m"] == 0
+    assert localise.warnings(small) == [] and localise.summary(small, None)["start_m"] == 0
     vast = dataclasses.replace(scene.arena, size_m=(80.0, 80.0))
     large = localise.run("adaptive", dataclasses.replace(scene, arena=vast), observations)
     (line,) = localise.warnings(large)
-    assert f"in cells of {localise.summary(large)['start_m']:.3g} m where" in line and "known pose" in line
+    assert f"in cells of {localise.summary(large, None)['start_m']:.3g} m where" in line and "known pose" in line
 
 
 def test_a_grid_that_cannot_fit_says_so():
