@@ -14,22 +14,26 @@ double nav_mode_distance(struct nav_pose mean, struct nav_pose pose)
     return (dx * dx + dy * dy) / (NAV_NEAR_M * NAV_NEAR_M) + turn * turn / (NAV_NEAR_RAD * NAV_NEAR_RAD);
 }
 
-struct nav_gaussian nav_gaussian_prior(const struct nav_problem *problem)
+struct nav_gaussian nav_gaussian_uniform(const struct nav_arena *arena)
 {
-    const struct nav_arena *arena = &problem->arena;
-    const struct nav_prior *prior = &problem->prior;
-    if (nav_bumps_given(prior))
-        return nav_bumps_gaussian(prior);
-    struct nav_gaussian g = {.mean = prior->mean};
-    for (int i = 0; i < 3; i++)
-        g.covariance[4 * i] = prior->sigma[i] * prior->sigma[i];
-    if (!prior->uniform)
-        return g;
     /* Variance of a uniform distribution: width^2 / 12. */
-    g.mean = (struct nav_pose){arena->size_x / 2.0, arena->size_y / 2.0, 0.0};
+    struct nav_gaussian g = {.mean = {arena->size_x / 2.0, arena->size_y / 2.0, 0.0}};
     g.covariance[0] = arena->size_x * arena->size_x / 12.0;
     g.covariance[4] = arena->size_y * arena->size_y / 12.0;
     g.covariance[8] = NAV_PI * NAV_PI / 3.0;
+    return g;
+}
+
+struct nav_gaussian nav_gaussian_prior(const struct nav_problem *problem)
+{
+    const struct nav_prior *prior = &problem->prior;
+    if (nav_bumps_given(prior))
+        return nav_bumps_gaussian(prior);
+    if (prior->uniform)
+        return nav_gaussian_uniform(&problem->arena);
+    struct nav_gaussian g = {.mean = prior->mean};
+    for (int i = 0; i < 3; i++)
+        g.covariance[4 * i] = prior->sigma[i] * prior->sigma[i];
     return g;
 }
 
@@ -57,7 +61,7 @@ void nav_gaussian_root(const double p[9], double root[9])
 }
 
 /* Mass of whitened lattice point i of `points`, which reach to 3 standard deviations. */
-static double share(int i, int points)
+static double gaussian_share(int i, int points)
 {
     double total = 0.0, half = (points - 1) / 2.0;
     for (int k = 0; k < points; k++)
@@ -78,7 +82,7 @@ long nav_gaussian_components(const struct nav_gaussian *g, struct nav_component 
                      nav_wrap(g->mean.theta + l[6] * u + l[7] * v + l[8] * w)},
             .sigma_m = spacing / sqrt(12.0) * fmax(hypot(l[0], l[3]), l[4]), /* no gaps along the long axis */
             .sigma_rad = spacing_turn / sqrt(12.0) * l[8],
-            .mass = share(i, ACROSS) * share(j, ACROSS) * share(k, TURNS),
+            .mass = gaussian_share(i, ACROSS) * gaussian_share(j, ACROSS) * gaussian_share(k, TURNS),
         };
     }
     return ALL;

@@ -32,7 +32,10 @@ struct nav_problem;
 struct nav_estimate;
 struct nav_component;
 
-/* The prior as a Gaussian; a uniform one becomes the arena's centre with the arena's own spread. */
+/* A uniform belief as a Gaussian: the arena's centre with the arena's own spread. */
+struct nav_gaussian nav_gaussian_uniform(const struct nav_arena *);
+
+/* The prior as a Gaussian. */
 struct nav_gaussian nav_gaussian_prior(const struct nav_problem *);
 
 /* Pose, covariance and confidence of a Gaussian belief. */

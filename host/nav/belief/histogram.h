@@ -123,7 +123,6 @@ long nav_histogram_run(struct nav_histogram *, long most);
 
 /* Whether a pass is under way. Until it ends the belief is that from before it. */
 bool nav_histogram_running(const struct nav_histogram *);
-void nav_histogram_stop(struct nav_histogram *);
 
 /* Variance owed that one pass cannot add, in passes. */
 double nav_histogram_debt(const struct nav_histogram *);
@@ -139,6 +138,10 @@ double nav_histogram_shift_y(const struct nav_histogram *, int slice);
 
 /* Calls `take` for each cell that holds mass. */
 void nav_histogram_each(const struct nav_histogram *, void (*take)(void *, struct nav_pose, double mass), void *self);
+
+/* The cells moved by what is pending, as nav_filter_components lists them, masses times `mass`. */
+long nav_histogram_components(const struct nav_histogram *, const struct nav_pending *, double mass,
+                              struct nav_component *out, long room);
 
 /* Poses drawn systematically, evenly within their cells: at most `room`, about `count`. */
 long nav_histogram_draw(const struct nav_histogram *, struct nav_rng *, long count, struct nav_pose *out, long room);

@@ -51,11 +51,6 @@ bool nav_histogram_running(const struct nav_histogram *h)
     return h->pass->running;
 }
 
-void nav_histogram_stop(struct nav_histogram *h)
-{
-    h->pass->running = false;
-}
-
 double nav_histogram_debt(const struct nav_histogram *h)
 {
     double cell = h->shape.cell, turn = h->shape.cell_theta;

@@ -46,6 +46,34 @@ void nav_histogram_each(const struct nav_histogram *h, void (*take)(void *, stru
     }
 }
 
+struct listing {
+    struct nav_component each, *out;
+    struct nav_pose step;
+    double scale;
+    long count, room;
+};
+
+static void histogram_list_take(void *self, struct nav_pose at, double mass)
+{
+    struct listing *l = self;
+    l->each.pose = nav_compose(at, l->step);
+    l->each.mass = l->scale * mass;
+    if (l->count < l->room)
+        l->out[l->count] = l->each;
+    l->count++;
+}
+
+long nav_histogram_components(const struct nav_histogram *h, const struct nav_pending *pending, double mass,
+                              struct nav_component *out, long room)
+{
+    struct listing l = {.out = out, .step = pending->step, .scale = mass / h->total, .room = room};
+    double cell = h->shape.cell, turn = h->shape.cell_theta;
+    l.each.sigma_m = sqrt(cell * cell / 12.0 + h->owed_position + pending->noise.position);
+    l.each.sigma_rad = sqrt(turn * turn / 12.0 + h->owed_heading + pending->noise.heading);
+    nav_histogram_each(h, histogram_list_take, &l);
+    return l.count;
+}
+
 /* Mass near a pose, and its offsets from that times mass. */
 struct near {
     struct nav_pose pose;

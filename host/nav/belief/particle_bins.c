@@ -25,12 +25,12 @@ void nav_bins_free(struct nav_bins *b)
     free(b->filled);
 }
 
-static int32_t index_of(double position, double edge)
+static int32_t bins_index_of(double position, double edge)
 {
     return (int32_t)fmax(fmin(floor(position / edge), 1e9), -1e9);
 }
 
-static struct nav_bin *place(struct nav_bins *b, int32_t x, int32_t y, int32_t turn)
+static struct nav_bin *bins_place(struct nav_bins *b, int32_t x, int32_t y, int32_t turn)
 {
     uint64_t h = (uint64_t)(uint32_t)x * 0x9e3779b97f4a7c15u ^ (uint64_t)(uint32_t)y * 0xc2b2ae3d27d4eb4fu ^
                  (uint64_t)(uint32_t)turn * 0x165667b19e3779f9u;
@@ -53,8 +53,9 @@ void nav_bins_fill(struct nav_bins *b, const struct nav_particles *p)
         if (!(p->weight[i] > 0.0f))
             continue;
         double turn = (double)atan2f(p->s[i], p->c[i]) / (2.0 * NAV_PI) + 0.5;
-        struct nav_bin *bin = place(b, index_of((double)p->x[i], b->edge), index_of((double)p->y[i], b->edge),
-                                    (int32_t)(turn * b->turns) % b->turns);
+        struct nav_bin *bin =
+            bins_place(b, bins_index_of((double)p->x[i], b->edge), bins_index_of((double)p->y[i], b->edge),
+                       (int32_t)(turn * b->turns) % b->turns);
         bin->weight += (double)p->weight[i];
     }
 }
@@ -80,7 +81,7 @@ double nav_bins_bound(double bins, double error)
 }
 
 /* Bins that `count` draws occupy: a bin with less than a draw's worth of weight counts as its chance of one. */
-static double occupied(const struct nav_bins *b, double count, double elsewhere)
+static double bins_occupied(const struct nav_bins *b, double count, double elsewhere)
 {
     double sum = count * elsewhere;
     for (long n = 0; n < b->count; n++)
@@ -95,7 +96,7 @@ long nav_bins_needed(const struct nav_bins *b, const struct nav_sample *sample, 
     if (sample->least >= sample->most)
         return sample->most;
     for (int n = 0; n < ROUNDS; n++)
-        count = fmin(nav_bins_bound(occupied(b, count, elsewhere), sample->error), (double)sample->most);
+        count = fmin(nav_bins_bound(bins_occupied(b, count, elsewhere), sample->error), (double)sample->most);
     return (long)fmax(ceil(count), (double)sample->least);
 }
 

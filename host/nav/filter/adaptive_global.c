@@ -284,14 +284,12 @@ void adaptive_global_work(struct adaptive_global *g, struct adaptive_log *log, l
 void adaptive_global_restart(struct adaptive_global *g, uint64_t row)
 {
     const struct nav_arena *arena = &g->problem->arena;
-    struct nav_problem lost = *g->problem;
-    lost.prior.uniform = true;
     nav_histogram_restart(&g->histogram, g->first.level);
     g->next = row;
     g->job.phase = ADAPTIVE_IDLE;
     g->gained = 0.0;
     g->scattered = 1.0;
-    g->summary = (struct nav_summary){.belief = nav_gaussian_prior(&lost)};
+    g->summary = (struct nav_summary){.belief = nav_gaussian_uniform(arena)};
     g->summary.near = NAV_PI * NAV_NEAR_M * NAV_NEAR_M / (arena->size_x * arena->size_y) * NAV_NEAR_RAD / NAV_PI;
 }
 
@@ -379,33 +377,11 @@ void adaptive_global_added(struct adaptive_global *g)
     g->poses.grains = 0;
 }
 
-struct listing {
-    struct nav_component bump, *out;
-    struct nav_pose since;
-    double scale;
-    long count, room;
-};
-
-static void global_list_cell(void *self, struct nav_pose at, double mass)
-{
-    struct listing *l = self;
-    l->bump.mass = l->scale * mass;
-    l->bump.pose = nav_compose(at, l->since);
-    if (l->count < l->room)
-        l->out[l->count] = l->bump;
-    l->count++;
-}
-
 long adaptive_global_list(const struct adaptive_global *g, const struct adaptive_log *log, struct nav_pose moved,
                           double mass, struct nav_component *out, long room)
 {
-    const struct nav_histogram *h = &g->histogram;
-    struct listing l = {.out = out, .room = room, .scale = mass / h->total};
-    l.bump.sigma_m = h->shape.cell / sqrt(12.0);
-    l.bump.sigma_rad = h->shape.cell_theta / sqrt(12.0);
-    l.since = nav_compose(adaptive_log_since(log, g->next), moved);
-    nav_histogram_each(h, global_list_cell, &l);
-    return l.count;
+    const struct nav_pending since = {.step = nav_compose(adaptive_log_since(log, g->next), moved)};
+    return nav_histogram_components(&g->histogram, &since, mass, out, room);
 }
 
 /* Cells half as wide as the finest detail that a sensor tells, where that is less than the setting's. */

@@ -102,9 +102,7 @@ static bool grid_reweigh(struct grid *g, struct nav_pose step, double extra)
 static void grid_summarise(struct grid *g)
 {
     if (!(g->histogram.total > 0.0)) { /* no place in the arena is free: nothing can be known */
-        struct nav_problem anywhere = *g->problem;
-        anywhere.prior.uniform = true;
-        g->summary = nav_gaussian_prior(&anywhere);
+        g->summary = nav_gaussian_uniform(&g->problem->arena);
         g->confidence = 0.0;
         return;
     }
@@ -222,32 +220,10 @@ static void grid_estimate(const void *self, struct nav_estimate *out)
     out->bytes = sizeof *g + nav_histogram_bytes(&g->histogram) + nav_expected_bytes(g->expected);
 }
 
-struct listing {
-    const struct grid *g;
-    struct nav_component bump, *out;
-    long count, room;
-};
-
-static void grid_list_cell(void *self, struct nav_pose at, double mass)
-{
-    struct listing *l = self;
-    l->bump.pose = nav_compose(at, l->g->pending.step);
-    l->bump.mass = mass / l->g->histogram.total;
-    if (l->count < l->room)
-        l->out[l->count] = l->bump;
-    l->count++;
-}
-
 static long grid_components(const void *self, struct nav_component *out, long room)
 {
     const struct grid *g = self;
-    const struct nav_histogram *h = &g->histogram;
-    struct listing l = {.g = g, .out = out, .room = room};
-    double cell = h->shape.cell, turn = h->shape.cell_theta;
-    l.bump.sigma_m = sqrt(cell * cell / 12.0 + h->owed_position + g->pending.noise.position);
-    l.bump.sigma_rad = sqrt(turn * turn / 12.0 + h->owed_heading + g->pending.noise.heading);
-    nav_histogram_each(h, grid_list_cell, &l);
-    return l.count;
+    return nav_histogram_components(&g->histogram, &g->pending, 1.0, out, room);
 }
 
 static struct nav_resolution grid_resolution(const void *self)

@@ -41,38 +41,38 @@ void nav_borders_row_done(struct nav_borders *b)
 }
 
 /* A point fixed in the world that was at `tip` in the robot's frame before the motion, in its frame after. */
-static struct nav_tip left_behind(struct nav_pose motion, struct nav_tip tip)
+static struct nav_tip borders_left_behind(struct nav_pose motion, struct nav_tip tip)
 {
     double c = cos(motion.theta), s = sin(motion.theta), dx = tip.x - motion.x, dy = tip.y - motion.y;
     return (struct nav_tip){c * dx + s * dy, c * dy - s * dx};
 }
 
 /* Between the last two readings, on average half way: where a change that begins to show now has taken place. */
-static struct nav_pose half(struct nav_pose motion)
+static struct nav_pose borders_half(struct nav_pose motion)
 {
     return (struct nav_pose){motion.x / 2.0, motion.y / 2.0, motion.theta / 2.0};
 }
 
-static void describe(const struct nav_borders *b, int tip, int to, struct nav_crossing *out)
+static void borders_describe(const struct nav_borders *b, int tip, int to, struct nav_crossing *out)
 {
-    struct nav_tip end = b->tip[tip], start = left_behind(b->last, end);
+    struct nav_tip end = b->tip[tip], start = borders_left_behind(b->last, end);
     double dx = end.x - start.x, dy = end.y - start.y, path = hypot(dx, dy);
     *out = (struct nav_crossing){.from = b->surface[tip],
                                  .to = to,
-                                 .point = left_behind(b->since[tip * b->classes + to], b->tip[tip]),
+                                 .point = borders_left_behind(b->since[tip * b->classes + to], b->tip[tip]),
                                  .sigma = hypot(WINDOW_M, path / 2.0)};
     if (path > 0.0)
         out->toward = (struct nav_tip){dx / path, dy / path};
 }
 
-static void settle(struct nav_borders *b, int tip, int surface)
+static void borders_settle(struct nav_borders *b, int tip, int surface)
 {
     b->surface[tip] = surface;
     for (int k = 0; k < b->classes; k++)
         b->score[tip * b->classes + k] = 0.0;
 }
 
-static int best_of(const float *loglik, int classes)
+static int borders_best_of(const float *loglik, int classes)
 {
     int best = 0;
     for (int k = 1; k < classes; k++)
@@ -84,7 +84,7 @@ bool nav_borders_read(struct nav_borders *b, int tip, const float *loglik, struc
 {
     double *score = b->score + tip * b->classes, against = -INFINITY;
     if (b->surface[tip] < 0)
-        settle(b, tip, best_of(loglik, b->classes));
+        borders_settle(b, tip, borders_best_of(loglik, b->classes));
     int now = b->surface[tip], to = now;
     for (int k = 0; k < b->classes; k++) {
         if (k == now)
@@ -92,7 +92,7 @@ bool nav_borders_read(struct nav_borders *b, int tip, const float *loglik, struc
         double ratio = (double)(loglik[k] - loglik[now]);
         against = fmax(against, ratio);
         if (!(score[k] > 0.0))
-            b->since[tip * b->classes + k] = half(b->last);
+            b->since[tip * b->classes + k] = borders_half(b->last);
         score[k] = fmax(score[k] + ratio, 0.0);
         if (score[k] > SURE && (to == now || score[k] > score[to]))
             to = k;
@@ -103,8 +103,8 @@ bool nav_borders_read(struct nav_borders *b, int tip, const float *loglik, struc
             b->held[tip] = fmin(fmax(b->held[tip] - against, 0.0), HELD_MOST);
         return false;
     }
-    describe(b, tip, to, out);
+    borders_describe(b, tip, to, out);
     b->held[tip] = fmax(b->held[tip], score[to]);
-    settle(b, tip, to);
+    borders_settle(b, tip, to);
     return settled;
 }

@@ -17,14 +17,6 @@ struct nav_noise nav_motion_noise(const struct nav_robot *robot, const struct na
     return noise;
 }
 
-struct nav_pose nav_motion_sample(struct nav_pose step, const struct nav_noise *noise, struct nav_rng *rng)
-{
-    double spread = sqrt(noise->position), turn = sqrt(noise->heading) * nav_rng_normal(rng);
-    double c = cos(turn / 2.0), s = sin(turn / 2.0);
-    return (struct nav_pose){c * step.x - s * step.y + spread * nav_rng_normal(rng),
-                             s * step.x + c * step.y + spread * nav_rng_normal(rng), step.theta + turn};
-}
-
 void nav_pending_add(struct nav_pending *pending, struct nav_pose step, struct nav_noise noise)
 {
     pending->step = nav_compose(pending->step, step);

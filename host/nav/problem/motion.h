@@ -4,7 +4,6 @@
 
 #include "arena.h"
 #include "pose.h"
-#include "rng.h"
 #include "settings.h"
 
 /* Motion since the last row, in the robot's frame then. */
@@ -31,9 +30,5 @@ void nav_pending_add(struct nav_pending *, struct nav_pose step, struct nav_nois
 /* Noise of one row's motion. The robot's relative error keeps its value over a correlation length, so variance grows
  * with distance times that length, not with each row's own square; rows may be short or long. */
 struct nav_noise nav_motion_noise(const struct nav_robot *, const struct nav_settings *, const struct nav_motion *);
-
-/* One draw of a motion with its noise: half of the heading's error bends the way, all of it the heading. Composed with
- * poses that differ in heading, draws make the banana that nav_gaussian_move approximates. */
-struct nav_pose nav_motion_sample(struct nav_pose step, const struct nav_noise *, struct nav_rng *);
 
 #endif

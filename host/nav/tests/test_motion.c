@@ -1,45 +1,8 @@
-/* Odometry: its noise, draws from it, and its constant errors learned. */
+/* Odometry: its noise, and its constant errors learned. */
 #include "calibration.h"
 #include "near.h"
 #include "rng.h"
 #include "rooms.h"
-
-static void draws_have_the_noise_asked_for(void **state)
-{
-    (void)state;
-    enum { DRAWS = 50000 };
-    const struct nav_noise noise = {.position = 1e-4, .heading = 0.01};
-    struct nav_rng rng;
-    nav_rng_seed(&rng, 11, 0);
-    double y = 0.0, yy = 0.0, tt = 0.0, yt = 0.0;
-    for (int i = 0; i < DRAWS; i++) {
-        struct nav_pose p = nav_motion_sample((struct nav_pose){0.2, 0.0, 0.3}, &noise, &rng);
-        y += p.y / DRAWS;
-        yy += p.y * p.y / DRAWS;
-        tt += (p.theta - 0.3) * (p.theta - 0.3) / DRAWS;
-        yt += p.y * (p.theta - 0.3) / DRAWS;
-    }
-    /* Sideways: the position's own and 0.2 m times half the heading's error. */
-    assert_near(y, 0.0, 5.0 * sqrt(2e-4 / DRAWS));
-    assert_near(yy, 1e-4 + 0.01 * 0.01, 5e-6);
-    assert_near(tt, 0.01, 4e-4);
-    assert_near(yt, 0.2 * 0.5 * 0.01, 5e-5);
-}
-
-static void draws_make_a_banana(void **state)
-{
-    (void)state;
-    enum { DRAWS = 50000 };
-    const struct nav_noise noise = {.position = 1e-8, .heading = 1e-8};
-    struct nav_rng rng;
-    nav_rng_seed(&rng, 12, 0);
-    double x = 0.0;
-    for (int i = 0; i < DRAWS; i++) {
-        struct nav_pose from = {0.0, 0.0, 0.5 * nav_rng_normal(&rng)};
-        x += nav_compose(from, nav_motion_sample((struct nav_pose){1.0, 0.0, 0.0}, &noise, &rng)).x / DRAWS;
-    }
-    assert_near(x, exp(-0.125), 0.005); /* the mean of cos: short of the Gaussian approximation's 1 */
-}
 
 static void noise_does_not_depend_on_how_rows_cut_a_drive(void **state)
 {
@@ -118,8 +81,6 @@ static void a_jump_is_not_the_wheels_fault(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(draws_have_the_noise_asked_for),
-        cmocka_unit_test(draws_make_a_banana),
         cmocka_unit_test(noise_does_not_depend_on_how_rows_cut_a_drive),
         cmocka_unit_test(a_constant_scale_and_turn_are_learned),
         cmocka_unit_test(an_unsure_filter_teaches_nothing),
