@@ -32,7 +32,7 @@ ALLOWED = {
     "sim/dspic": ["firmware/dspic"],  # addresses and bits, and what the accessors call
     "sim/node": ["sim/mlx90333", "sim/dspic", "firmware/dspic"],
     "sim/node_image": ["sim/node", "sim/mlx90333", "sim/dspic", "firmware/dspic", "host/python"],  # the image's header
-    "sim/mechanics": [],
+    "sim/mechanics": ["host/nav/problem"],  # interpolation
     "sim/world": ["sim/mechanics", "sim/node"],
     "sim/signals": ["sim/world", "sim/mechanics", "sim/mlx90333", "sim/node"],
     "sim/create": ["sim/world", "sim/mechanics"],

@@ -2,15 +2,11 @@
 
 #include <math.h>
 
-#include "mech_static.h"
-#include "whisker_constants.h"
-
 #define TIP_PRELOAD_M 5e-3   /* [A] 0.35 mN on the default whisker */
 #define MOUNT_HEIGHT_M 80e-3 /* [A] */
 #define LARGEST_CHORD 0.98   /* of the length: the closed form's place of a caught tip */
 #define LARGEST_M 100.0      /* and ... */
 #define LARGEST_RATE 1e3     /* rad/s: more is no motion of a robot within a tick and no floor */
-#define LEAVE_VIBRATION 0.25 /* share of the tolerance at which a standing whisker's vibration is dropped */
 
 double mech_drag_reach(const struct mech_whisker *whisker, const struct mech_stance *stance)
 {
@@ -29,21 +25,21 @@ struct mech_stance mech_stance_default(void)
 /* Deflection across the path that the floor under the tip asks for. */
 static double pressed(const struct mech_drag *drag, const struct sim_floor_texture *floor)
 {
-    return drag->stance.preload + drag->lie.lift * drag->height + mech_profile_height(&drag->profile, floor);
+    return drag->stance.preload + drag->lie.lift * drag->height + mech_floor_height(&drag->profile, floor);
 }
 
 void mech_drag_start(struct mech_drag *drag, const struct mech_whisker *whisker, const struct mech_stance *stance,
-                     const struct sim_floor_texture *floor, struct sim_rng rng, double tick_s)
+                     const struct sim_floor_texture *floor, struct sim_rng rng, int level, double tick_s)
 {
     struct mech_modes modes;
-    *drag = (struct mech_drag){.whisker = *whisker, .stance = *stance, .tick_s = tick_s, .forced = MECH_AUTO};
-    drag->tolerance = mech_tolerance_default().moment;
+    *drag =
+        (struct mech_drag){.whisker = *whisker, .stance = *stance, .vibrate = level & MECH_VIBRATION, .resting = true};
     drag->compliance = mech_whisker_compliance(whisker);
     drag->lie = mech_lie_of(whisker, stance->height, stance->behind);
     mech_modes_of(whisker, &modes);
     mech_basis_of(whisker, &modes, false, whisker->length, tick_s, &drag->free);
     mech_basis_of(whisker, &modes, true, whisker->length, tick_s, &drag->pinned);
-    mech_profile_start(&drag->profile, floor, rng);
+    mech_floor_start(&drag->profile, floor, rng);
     drag->ground = pressed(drag, floor);
     mech_basis_settle(&drag->pinned, drag->ground, 0, &drag->motion[1]);
     drag->moment[1] = drag->pinned.moment_static * (drag->motion[1].input - stance->preload);
@@ -115,7 +111,7 @@ static double held_deflection(const struct mech_drag *drag, double behind)
     const struct mech_stance *stance = &drag->stance;
     double angle = atan2(behind, stance->height) - atan2(stance->behind, stance->height);
     double chord = fmin(hypot(behind, stance->height), LARGEST_CHORD * drag->whisker.length);
-    double moment = mech_static_moment(&drag->whisker, chord, angle);
+    double moment = mech_whisker_moment(&drag->whisker, chord, angle);
     double soft = drag->compliance;
     if (soft * fabs(moment) > drag->whisker.stop)
         moment = copysign(drag->whisker.stop / soft, moment);
@@ -137,6 +133,11 @@ static bool pulled_straight(const struct mech_drag *drag)
     return drag->behind >= mech_drag_reach(&drag->whisker, &drag->stance);
 }
 
+static bool backed_off(const struct mech_drag *drag, double height)
+{
+    return drag->behind < drag->caught_at || height <= drag->height;
+}
+
 static void hooked(struct mech_drag *drag, double travel, double height)
 {
     drag->behind += travel;
@@ -144,7 +145,7 @@ static void hooked(struct mech_drag *drag, double travel, double height)
     if (pulled_straight(drag)) {
         slip(drag, 1, 0);
         drag->height = height;
-    } else if (drag->behind < drag->caught_at || height <= drag->height) { /* backed off */
+    } else if (backed_off(drag, height)) {
         drag->contact = MECH_STICKS;
         drag->anchor = drag->motion[0].input;
     }
@@ -158,7 +159,7 @@ static bool is_pinned(const struct mech_drag *drag, int axis)
 
 static struct mech_axes axes_of(struct mech_drag *drag)
 {
-    return (struct mech_axes){&drag->free, &drag->pinned, drag->motion, drag->level & MECH_VIBRATION};
+    return (struct mech_axes){&drag->free, &drag->pinned, drag->motion, drag->vibrate};
 }
 
 /* The shaft touches the corner of the edge ahead. */
@@ -261,6 +262,8 @@ static void follow(struct mech_drag *drag, const struct sim_floor_texture *floor
             drag->contact = MECH_STICKS;
             drag->height = stroke->height;
             drag->anchor = 0;
+        } else if (backed_off(drag, stroke->height)) {
+            drag->contact = MECH_STICKS;
         }
     } else {
         double most = (drag->whisker.friction + floor->friction_drop) * input;
@@ -278,25 +281,23 @@ static void follow(struct mech_drag *drag, const struct sim_floor_texture *floor
     drag->moment[1] = drag->pinned.moment_static * input;
 }
 
-/* May a standing whisker's vibration be dropped? */
-static bool faded(const struct mech_drag *drag)
-{
-    return drag->contact != MECH_SLIPS && drag->contact != MECH_EDGE && !drag->lifted &&
-           mech_basis_swing(&drag->pinned, &drag->motion[0], 0) + mech_basis_swing(&drag->pinned, &drag->motion[1], 0) <
-               LEAVE_VIBRATION * drag->tolerance;
-}
-
+/* A whisker that stands still comes to rest once its swing has faded. */
 static void stand(struct mech_drag *drag)
 {
-    drag->level = MECH_REST;
+    if (drag->contact == MECH_SLIPS || drag->contact == MECH_EDGE || drag->lifted)
+        return;
+    if (mech_basis_swing(&drag->pinned, &drag->motion[0]) + mech_basis_swing(&drag->pinned, &drag->motion[1]) >
+        MECH_FADED)
+        return;
     for (int axis = 0; axis < 2; axis++)
         mech_basis_settle(&drag->pinned, drag->motion[axis].input, 0, &drag->motion[axis]);
+    drag->resting = true;
 }
 
 /* The floor falls away under the tip. */
 static void fall(struct mech_drag *drag)
 {
-    if (drag->lifted || !(drag->level & MECH_VIBRATION))
+    if (drag->lifted || !drag->vibrate)
         return;
     mech_basis_change(&drag->pinned, &drag->free, &drag->motion[1], mech_basis_answer(&drag->pinned, &drag->motion[1]));
     drag->lifted = true;
@@ -324,35 +325,26 @@ static void meet_border(struct mech_drag *drag, const struct sim_floor_texture *
     drag->height = stroke->height;
 }
 
-static void choose_level(struct mech_drag *drag, bool still)
-{
-    if (drag->forced != MECH_AUTO)
-        drag->level = MECH_CLOSED | (drag->forced & MECH_VIBRATION);
-    else if (!still)
-        drag->level = MECH_CLOSED | MECH_VIBRATION;
-    else if (faded(drag))
-        stand(drag);
-}
-
 void mech_drag_step(struct mech_drag *drag, const struct sim_floor_texture *floor, const struct mech_stroke *stroke)
 {
     bool still = stroke->travel == 0 && stroke->base_rate == drag->base_rate && stroke->height == drag->height;
     bool sound = fabs(stroke->travel) + fabs(stroke->height) < LARGEST_M && fabs(stroke->base_rate) < LARGEST_RATE;
-    if (!sound || (still && drag->level == MECH_REST))
+    if (!sound || (still && drag->resting))
         return;
-    choose_level(drag, still);
+    drag->resting = false;
     meet_border(drag, floor, stroke);
     bool held = drag->contact == MECH_HOOKED || drag->contact == MECH_EDGE;
-    mech_profile_move(&drag->profile, floor, held ? 0 : stroke->travel);
-    if (drag->level & MECH_VIBRATION)
+    mech_floor_move(&drag->profile, floor, held ? 0 : stroke->travel);
+    if (drag->vibrate)
         vibrate(drag, floor, stroke);
-    else if (drag->level != MECH_REST)
+    else
         follow(drag, floor, stroke);
     if (drag->edge.ahead && drag->contact != MECH_EDGE)
         watch_edge(drag, stroke);
     drag->base_rate = stroke->base_rate;
-    double rest = drag->pinned.moment_static * drag->stance.preload;
-    drag->moment[1] -= drag->level == MECH_REST ? 0 : rest;
+    drag->moment[1] -= drag->pinned.moment_static * drag->stance.preload;
     for (int axis = 0; axis < 2; axis++)
         drag->tilt[axis] = mech_whisker_stopped(&drag->whisker, drag->compliance * drag->moment[axis]);
+    if (still)
+        stand(drag);
 }

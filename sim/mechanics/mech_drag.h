@@ -4,10 +4,8 @@
  * With vibration: the tip sticks while friction holds it (the tip is pinned to the floor), slips under kinetic friction
  * until it moves with the floor again, and lifts off where the floor falls away faster than it follows. Normal force is
  * preload plus what the height makes of it, vibration included. Without: the height one to one and a sawtooth whose
- * jump is J = 2 (mu_s - mu_k) N/k_tip. A slip is an event as large as what it follows, so no bound on the vibration
- * left out exists while the tip moves: the level is vibration from the first motion until what is left after the last
- * has faded below the tolerance, then static; at the start, rest. Small deflections; a border catch uses the closed
- * form at the angle from the mount, held at the plug's stop.
+ * jump is J = 2 (mu_s - mu_k) N/k_tip. A whisker that stands still and whose swing has faded rests: its ticks cost
+ * nothing. Small deflections; a hook uses the closed form at the angle from the mount, held at the plug's stop.
  *
  * A step up of the floor holds the tip at its corner until the shaft has slid up it (mech_edge.h). A step of a floor
  * with a pile holds the tip like a hook until the whisker is pulled straight: by a mount at height h, until the tip
@@ -20,8 +18,7 @@
 #include <stdbool.h>
 
 #include "mech_edge.h"
-#include "mech_profile.h"
-#include "mech_shaft.h"
+#include "mech_floor.h"
 
 /* cffi: begin */
 /* Of the tip: held by the floor, sliding over it or in the air, hooked by a pile, held at the corner of a step. */
@@ -49,10 +46,10 @@ struct mech_drag {
     struct mech_lie lie;
     struct mech_basis free, pinned; /* at the tip */
     struct mech_motion motion[2];
-    struct mech_profile profile;
-    double tick_s, compliance;
-    double tolerance; /* N m, of vibration dropped when the whisker stands */
-    int forced, level, contact;
+    struct mech_floor profile;
+    double compliance;
+    bool vibrate, resting;
+    int contact;
     bool lifted;
     double ground; /* deflection across the path that the floor asked for at the last tick, m */
     double anchor; /* deflection of the tip along the path when it sticks, m */
@@ -72,9 +69,9 @@ struct mech_stance mech_stance_default(void);
 /* Horizontal reach of a straight whisker, m; 0 if it does not reach the floor. */
 double mech_drag_reach(const struct mech_whisker *whisker, const struct mech_stance *stance);
 
-/* A whisker standing on a floor. */
+/* A whisker standing on a floor. Of the level only MECH_VIBRATION counts: a dragged tip has no large deflection. */
 void mech_drag_start(struct mech_drag *drag, const struct mech_whisker *whisker, const struct mech_stance *stance,
-                     const struct sim_floor_texture *floor, struct sim_rng rng, double tick_s);
+                     const struct sim_floor_texture *floor, struct sim_rng rng, int level, double tick_s);
 
 /* Lets a tick pass over this floor. Heights and travels beyond 100 m and rates of turn beyond 1000 rad/s are taken as
  * no tick. */

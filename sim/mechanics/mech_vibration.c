@@ -3,7 +3,131 @@
 #include <math.h>
 #include <string.h>
 
-enum { SWEEPS = 12 }; /* Jacobi's method on so small a matrix converges in half as many */
+#include "whisker_constants.h"
+
+enum {
+    BLOCK = MECH_MODES + 3, /* a few vectors more than wanted make the wanted ones converge */
+    ROUNDS = 60,
+    SWEEPS = 12 /* Jacobi's method on so small a matrix converges in half as many */
+};
+
+/* Nodes and weights of Gauss-Legendre quadrature on 0..1: Newton's method on Legendre's polynomial. */
+static void gauss_legendre(double node[MECH_NODES], double weight[MECH_NODES])
+{
+    for (int i = 0; i < MECH_NODES; i++) {
+        double z = cos(SIM_PI * (i + 0.75) / (MECH_NODES + 0.5)), slope = 1;
+        for (int round = 0; round < 20; round++) {
+            double p = 1, before = 0;
+            for (int n = 1; n <= MECH_NODES; n++) {
+                double next = ((2 * n - 1) * z * p - (n - 1) * before) / n;
+                before = p;
+                p = next;
+            }
+            slope = MECH_NODES * (z * p - before) / (z * z - 1);
+            z -= p / slope;
+        }
+        node[i] = (1 - z) / 2;
+        weight[i] = 1 / ((1 - z * z) * slope * slope);
+    }
+}
+
+/* Integral of (v - a)(v - b)/v^4 from a to 1: bending of a cone by a force, v = 1 - s/cone. */
+static double cone_integral(double a, double b)
+{
+    return (-1 + (a + b) / 2 - a * b / 3) - (-1 / a + (a + b) / (2 * a * a) - b / (3 * a * a));
+}
+
+double mech_modes_compliance(const struct mech_whisker *whisker, double s, double t)
+{
+    double near = fmin(s, t) / whisker->cone, far = fmax(s, t) / whisker->cone;
+    double unit = whisker->cone * whisker->cone * whisker->cone / mech_whisker_bending(whisker);
+    return unit * cone_integral(1 - near, 1 - far) + s * t * mech_whisker_compliance(whisker);
+}
+
+typedef double matrix[MECH_NODES][MECH_NODES];
+
+/* Symmetric form of the integral equation: its eigenvalues are 1/omega^2. */
+static void symmetric_form(const struct mech_whisker *whisker, const struct mech_modes *modes, matrix form)
+{
+    for (int i = 0; i < MECH_NODES; i++)
+        for (int j = 0; j < MECH_NODES; j++)
+            form[i][j] =
+                sqrt(modes->mass[i] * modes->mass[j]) * mech_modes_compliance(whisker, modes->node[i], modes->node[j]);
+}
+
+static double node_dot(const double *a, const double *b)
+{
+    double sum = 0;
+    for (int i = 0; i < MECH_NODES; i++)
+        sum += a[i] * b[i];
+    return sum;
+}
+
+/* Gram and Schmidt; the squared length before is the last round's stretch. */
+static void orthonormalise(double block[BLOCK][MECH_NODES], double stretch[BLOCK])
+{
+    for (int k = 0; k < BLOCK; k++) {
+        for (int j = 0; j < k; j++) {
+            double share = node_dot(block[k], block[j]);
+            for (int i = 0; i < MECH_NODES; i++)
+                block[k][i] -= share * block[j][i];
+        }
+        stretch[k] = sqrt(node_dot(block[k], block[k]));
+        for (int i = 0; i < MECH_NODES; i++)
+            block[k][i] /= stretch[k];
+    }
+}
+
+static void lay_mass(const struct mech_whisker *whisker, struct mech_modes *modes)
+{
+    double weight[MECH_NODES];
+    gauss_legendre(modes->node, weight);
+    modes->mass_total = 0;
+    for (int i = 0; i < MECH_NODES; i++) {
+        modes->node[i] *= whisker->length;
+        double d = whisker->exit_diameter * (1 - modes->node[i] / whisker->cone);
+        modes->mass[i] = whisker->density * SIM_PI / 4 * d * d * weight[i] * whisker->length;
+        modes->mass_total += modes->mass[i];
+    }
+}
+
+void mech_modes_of(const struct mech_whisker *whisker, struct mech_modes *modes)
+{
+    matrix form;
+    double block[BLOCK][MECH_NODES], next[BLOCK][MECH_NODES], stretch[BLOCK];
+    lay_mass(whisker, modes);
+    symmetric_form(whisker, modes, form);
+    for (int k = 0; k < BLOCK; k++)
+        for (int i = 0; i < MECH_NODES; i++)
+            block[k][i] = cos(SIM_PI * k * (i + 0.5) / MECH_NODES);
+    for (int round = 0; round < ROUNDS; round++) {
+        for (int k = 0; k < BLOCK; k++)
+            for (int i = 0; i < MECH_NODES; i++)
+                next[k][i] = node_dot(form[i], block[k]);
+        memcpy(block, next, sizeof block);
+        orthonormalise(block, stretch);
+    }
+    for (int k = 0; k < MECH_MODES; k++) {
+        double first = 0;
+        modes->omega[k] = 1 / sqrt(stretch[k]);
+        for (int i = 0; i < MECH_NODES; i++) {
+            modes->shape[k][i] = block[k][i] / sqrt(modes->mass[i]);
+            first += modes->node[i] * modes->mass[i] * modes->shape[k][i];
+        }
+        modes->turn[k] = first;
+        modes->moment[k] = modes->omega[k] * modes->omega[k] * first;
+    }
+}
+
+void mech_modes_at(const struct mech_whisker *whisker, const struct mech_modes *modes, double s,
+                   double shape[MECH_MODES])
+{
+    double bend[MECH_NODES];
+    for (int i = 0; i < MECH_NODES; i++)
+        bend[i] = mech_modes_compliance(whisker, s, modes->node[i]) * modes->mass[i];
+    for (int k = 0; k < MECH_MODES; k++)
+        shape[k] = modes->omega[k] * modes->omega[k] * node_dot(bend, modes->shape[k]);
+}
 
 typedef double square[MECH_MODES][MECH_MODES];
 
@@ -15,11 +139,11 @@ static double dot(const double a[MECH_MODES], const double b[MECH_MODES])
     return sum;
 }
 
-/* Turns rows and columns p and q of a symmetric matrix so that their common element vanishes. */
-static void rotate(square a, square vectors, int p, int q)
+/* Turns rows and columns p and q of a symmetric matrix so that their common element vanishes. false: it did. */
+static bool rotate(square a, square vectors, int p, int q)
 {
-    if (fabs(a[p][q]) <= 1e-15 * sqrt(fabs(a[p][p] * a[q][q])))
-        return;
+    if (a[p][q] * a[p][q] <= 1e-30 * fabs(a[p][p] * a[q][q]))
+        return false;
     double ratio = (a[q][q] - a[p][p]) / (2 * a[p][q]);
     double t = copysign(1, ratio) / (fabs(ratio) + sqrt(1 + ratio * ratio));
     double c = 1 / sqrt(1 + t * t), s = t * c;
@@ -37,6 +161,7 @@ static void rotate(square a, square vectors, int p, int q)
         vectors[p][k] = c * x - s * y;
         vectors[q][k] = s * x + c * y;
     }
+    return true;
 }
 
 /* Eigenvalues and eigenvectors (rows) of a symmetric matrix, by Jacobi's rotations; a is used up. */
@@ -45,10 +170,13 @@ static void eigen(square a, square vectors, double values[MECH_MODES])
     memset(vectors, 0, sizeof(square));
     for (int k = 0; k < MECH_MODES; k++)
         vectors[k][k] = 1;
-    for (int sweep = 0; sweep < SWEEPS; sweep++)
+    bool turned = true;
+    for (int sweep = 0; turned && sweep < SWEEPS; sweep++) {
+        turned = false;
         for (int p = 0; p < MECH_MODES; p++)
             for (int q = p + 1; q < MECH_MODES; q++)
-                rotate(a, vectors, p, q);
+                turned = rotate(a, vectors, p, q) || turned;
+    }
     for (int k = 0; k < MECH_MODES; k++)
         values[k] = a[k][k];
 }
@@ -106,38 +234,19 @@ static void set_steps(struct mech_basis *basis, double damping, double tick_s)
 {
     basis->tick_s = tick_s;
     basis->damping = damping;
-    basis->slack = 1 / (1 - damping);
-    basis->decay = 0;
     for (int k = 0; k < MECH_MODES; k++) {
         double step[4];
         step_of(basis->omega[k], damping, tick_s, step);
         for (int i = 0; i < 4; i++)
             basis->step[i][k] = step[i];
-        basis->lag[k] = basis->settle[k] * 2 * damping / basis->omega[k];
-        basis->decay = fmax(basis->decay, exp(-damping * basis->omega[k] * tick_s));
     }
 }
 
-static void set_bounds(struct mech_basis *basis, double damping)
+/* What the place says of both: what a touch there couples to, and what follows. */
+static void set_place(const struct mech_whisker *whisker, const struct mech_modes *modes, double s, bool pinned,
+                      const double z[MECH_MODES], struct mech_basis *basis)
 {
-    double shrink = sqrt(1 - damping * damping);
-    basis->ring_input = basis->ring_turn = basis->lag_moment = 0;
-    basis->moment_static = basis->moment_input + dot(basis->moment, basis->settle);
-    basis->answer_static = basis->answer_input + dot(basis->answer, basis->settle);
-    for (int k = 0; k < MECH_MODES; k++) {
-        double moment = fabs(basis->moment[k]), turns = basis->omega[k] * shrink;
-        basis->ring_input += moment * fabs(basis->settle[k]) / turns;
-        basis->ring_turn += moment * fabs(basis->turn[k]) / turns;
-        basis->lag_moment += moment * fabs(basis->lag[k]);
-    }
-}
-
-void mech_basis_of(const struct mech_whisker *whisker, const struct mech_modes *modes, bool pinned, double s,
-                   double tick_s, struct mech_basis *basis)
-{
-    double z[MECH_MODES], left_compliance = mech_modes_compliance(whisker, s, s), whole = left_compliance;
-    double left_moment = s;
-    mech_modes_at(whisker, modes, s, z);
+    double left_compliance = mech_modes_compliance(whisker, s, s), whole = left_compliance, left_moment = s;
     for (int k = 0; k < MECH_MODES; k++) {
         double square_omega = modes->omega[k] * modes->omega[k];
         left_compliance -= z[k] * z[k] / square_omega;
@@ -147,8 +256,29 @@ void mech_basis_of(const struct mech_whisker *whisker, const struct mech_modes *
     basis->pinned = pinned;
     basis->s = s;
     (pinned ? set_pinned : set_free)(basis, modes, z, left_compliance, left_moment);
+    for (int k = 0; k < MECH_MODES; k++)
+        basis->lag[k] = basis->settle[k] * 2 * whisker->damping / basis->omega[k];
+    basis->moment_static = basis->moment_input + dot(basis->moment, basis->settle);
+    basis->answer_static = basis->answer_input + dot(basis->answer, basis->settle);
+}
+
+void mech_basis_of(const struct mech_whisker *whisker, const struct mech_modes *modes, bool pinned, double s,
+                   double tick_s, struct mech_basis *basis)
+{
+    double z[MECH_MODES];
+    mech_modes_at(whisker, modes, s, z);
+    set_place(whisker, modes, s, pinned, z, basis);
     set_steps(basis, whisker->damping, tick_s);
-    set_bounds(basis, whisker->damping);
+}
+
+void mech_basis_move(const struct mech_whisker *whisker, const struct mech_modes *modes, double s,
+                     struct mech_basis *free, struct mech_basis *pinned)
+{
+    double z[MECH_MODES];
+    mech_modes_at(whisker, modes, s, z);
+    set_place(whisker, modes, s, false, z, free);
+    set_place(whisker, modes, s, true, z, pinned);
+    set_steps(pinned, whisker->damping, pinned->tick_s);
 }
 
 /* One mode over a time: about the solution that follows the input, settle input - lag rate. */
@@ -237,13 +367,12 @@ double mech_basis_answer(const struct mech_basis *basis, const struct mech_motio
     return dot(basis->answer, motion->at) + basis->answer_input * motion->input;
 }
 
-double mech_basis_swing(const struct mech_basis *basis, const struct mech_motion *motion, double rate)
+double mech_basis_swing(const struct mech_basis *basis, const struct mech_motion *motion)
 {
     double sum = 0;
     for (int k = 0; k < MECH_MODES; k++) {
-        double at = motion->at[k] - basis->settle[k] * motion->input + basis->lag[k] * rate;
-        double speed = motion->speed[k] - basis->settle[k] * rate;
-        sum += fabs(basis->moment[k]) * (fabs(at) + fabs(speed) / basis->omega[k]) * basis->slack;
+        double at = motion->at[k] - basis->settle[k] * motion->input;
+        sum += fabs(basis->moment[k]) * (fabs(at) + fabs(motion->speed[k]) / basis->omega[k]);
     }
-    return sum;
+    return sum / (1 - basis->damping);
 }

@@ -81,9 +81,24 @@ double mech_whisker_compliance(const struct mech_whisker *whisker)
 
 double mech_whisker_tip_stiffness(const struct mech_whisker *whisker)
 {
-    double a = whisker->length, rest = 1 - a / whisker->cone;
-    double bending = a * a * a / (3 * mech_whisker_bending(whisker) * rest);
-    return 1 / (bending + a * a * mech_whisker_compliance(whisker));
+    double a = whisker->length;
+    return 1 / (1 / mech_whisker_stiffness(whisker, a) + a * a * mech_whisker_compliance(whisker));
+}
+
+double mech_whisker_moment(const struct mech_whisker *whisker, double a, double theta)
+{
+    double bending = a * whisker->cone / (3 * mech_whisker_bending(whisker) * (whisker->cone - a));
+    return theta / (mech_whisker_compliance(whisker) + bending);
+}
+
+double mech_whisker_tilt(const struct mech_whisker *whisker, double a, double theta)
+{
+    return mech_whisker_compliance(whisker) * mech_whisker_moment(whisker, a, theta);
+}
+
+double mech_whisker_stiffness(const struct mech_whisker *whisker, double a)
+{
+    return 3 * mech_whisker_bending(whisker) * (1 - a / whisker->cone) / (a * a * a);
 }
 
 /* Field angle of a dipole that hangs `pivot` below its pivot and turns with it, seen `gap` below the magnet's rest

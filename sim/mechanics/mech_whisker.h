@@ -28,6 +28,10 @@ struct mech_whisker {
     double gain;          /* factor on the field angle: 1 but for the spread between sensors */
 };
 
+/* Levels of detail of whatever bends a whisker: a static law, closed form or large deflection, MECH_VIBRATION added or
+ * not. */
+enum { MECH_CLOSED = 0, MECH_LARGE = 1, MECH_VIBRATION = 2 };
+
 /* A parameter that no source fixes: what is assumed and between which values a study should vary it. */
 struct mech_unknown {
     const char *name;
@@ -47,6 +51,19 @@ double mech_whisker_bending(const struct mech_whisker *whisker);       /* E I0, 
 double mech_whisker_compliance(const struct mech_whisker *whisker);    /* of the plug, 1/k, rad/(N m); 0 if clamped */
 double mech_whisker_tip_stiffness(const struct mech_whisker *whisker); /* against a normal force at the tip, N/m */
 double mech_whisker_field(const struct mech_whisker *whisker, double tilt); /* field angle of a tilt, same sign */
+
+/* Small deflections, closed form: the conical-beam model of Birdwell et al. 2007 (J Neurophysiol 98:2439), plug in
+ * series. A fixed point at radial distance a from the follicle's exit pushes the whisker by the angle theta. 0 < a <
+ * cone. */
+
+/* Base moment, N m: theta / (1/k + a cone/(3 E I0 (cone - a))). */
+double mech_whisker_moment(const struct mech_whisker *whisker, double a, double theta);
+
+/* Tilt of the plug: theta (1 - x)/(1 - x + kappa x), x = a/cone; not held at the stop. 0 for a clamped whisker. */
+double mech_whisker_tilt(const struct mech_whisker *whisker, double a, double theta);
+
+/* Stiffness against a normal force at a, base clamped, N/m: 3 E I0 (1 - a/cone)/a^3. */
+double mech_whisker_stiffness(const struct mech_whisker *whisker, double a);
 
 /* Field angles of a tilt in two planes at once: the magnet turns in the plane of the two. */
 void mech_whisker_fields(const struct mech_whisker *whisker, const double tilt[2], double field[2]);

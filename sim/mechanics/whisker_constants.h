@@ -47,10 +47,6 @@
 
 #define SIM_TURN_LAG_S 0.05 /* [A] a base's rate of turn follows its command with this lag, for its whiskers' swing */
 
-/* Tip on the floor. */
-#define SIM_TIP_NORMAL_FORCE 0.35e-3   /* [A] N: preload of 5 mm */
-#define SIM_TIP_STIFFNESS 0.0691       /* [D] N/m, at kappa = 1 */
-#define SIM_TIP_TILT_DEG_PER_MM 0.0940 /* [D] tilt of the magnet per displacement of the tip, at kappa = 1 */
-#define SIM_TIP_JITTER 0.10            /* [A] of the length of a weave's period and of a slip's jump */
+#define SIM_TIP_JITTER 0.10 /* [A] of the length of a weave's period */
 
 #endif

@@ -18,12 +18,11 @@ SIM = HERE.parent
 BLOCK = re.compile(r"/\* cffi: begin \*/\n(.*?)/\* cffi: end \*/", re.DOTALL)
 
 # Headers that others build on come first: cffi wants a struct before its use.
-MECHANICS = ("whisker", "static", "elastica", "table", "modes", "vibration", "shaft", "drag")
+MECHANICS = ("floor", "whisker", "elastica", "vibration", "shaft", "drag")
 HEADERS = [
     SIM / "world" / "sim_scene.h",
     SIM / "world" / "sim_world.h",
     HERE / "signals.h",
-    SIM / "mechanics" / "floor_textures.h",
     *(SIM / "mechanics" / f"mech_{name}.h" for name in MECHANICS),
     HERE / "mechanics.h",
 ]

@@ -10,13 +10,13 @@
 enum purpose { FOR_SENSOR = 0x7369676e, FOR_FLOOR };
 
 void sim_mechanics_touch(struct mech_shaft *shaft, size_t ticks, const double *radius, const double *theta,
-                         const double *base_rate, double *tilt, unsigned char *level)
+                         const double *base_rate, double *tilt, unsigned char *touches)
 {
     for (size_t i = 0; i < ticks; i++) {
         struct mech_touch touch = {radius[i] > 0, radius[i], theta[i], base_rate[i], false};
         mech_shaft_step(shaft, &touch);
         tilt[i] = shaft->tilt;
-        level[i] = (unsigned char)shaft->level;
+        touches[i] = shaft->engaged;
     }
 }
 
@@ -30,13 +30,12 @@ struct mech_stance sim_drag_stance(void)
 }
 
 sim_drag *sim_drag_new(const struct mech_whisker *whisker, const struct mech_stance *stance,
-                       const struct sim_floor_texture *floor, uint64_t seed, double tick_s, int forced)
+                       const struct sim_floor_texture *floor, uint64_t seed, int level, double tick_s)
 {
     sim_drag *made = calloc(1, sizeof *made);
     if (!made)
         return NULL;
-    mech_drag_start(&made->drag, whisker, stance, floor, sim_rng_stream(seed, FOR_FLOOR, 0), tick_s);
-    made->drag.forced = forced;
+    mech_drag_start(&made->drag, whisker, stance, floor, sim_rng_stream(seed, FOR_FLOOR, 0), level, tick_s);
     return made;
 }
 
@@ -100,7 +99,7 @@ struct sim_mechanics_scene {
     struct mech_shaft shaft[SHAFTS + IDLE];
     struct mech_drag drag[DRAGS];
     struct sim_sensor_noise noise[WHISKERS];
-    size_t ticks, large, vibrating;
+    size_t ticks;
 };
 
 sim_mechanics_scene *sim_mechanics_scene_new(const struct sim_mechanics_setting *setting, uint64_t seed)
@@ -119,13 +118,11 @@ sim_mechanics_scene *sim_mechanics_scene_new(const struct sim_mechanics_setting 
         struct mech_whisker whisker = mech_whisker_draw(seed, i);
         sim_sensor_noise_start(&scene->noise[i], sim_rng_stream(seed, FOR_SENSOR, i));
         if (i < SHAFTS + IDLE) {
-            mech_shaft_start(&scene->shaft[i], &whisker, table, setting->tick_s);
-            scene->shaft[i].forced = i < SHAFTS ? setting->shaft_level : MECH_AUTO;
+            mech_shaft_start(&scene->shaft[i], &whisker, table, setting->level, setting->tick_s);
         } else {
-            struct mech_drag *drag = &scene->drag[i - SHAFTS - IDLE];
-            mech_drag_start(drag, &whisker, &stance, &SIM_FLOOR_TEXTURES[i % SIM_FLOOR_TEXTURE_COUNT],
-                            sim_rng_stream(seed, FOR_FLOOR, i), setting->tick_s);
-            drag->forced = setting->drag_level;
+            mech_drag_start(&scene->drag[i - SHAFTS - IDLE], &whisker, &stance,
+                            &SIM_FLOOR_TEXTURES[i % SIM_FLOOR_TEXTURE_COUNT], sim_rng_stream(seed, FOR_FLOOR, i),
+                            setting->level, setting->tick_s);
         }
     }
     return scene;
@@ -153,10 +150,6 @@ static double step_shafts(sim_mechanics_scene *scene, double time_s)
         struct mech_touch touch = {i < SHAFTS, CONTACT_M + slide, theta, 0, false};
         mech_shaft_step(&scene->shaft[i], &touch);
         sum += scene->shaft[i].tilt;
-    }
-    for (int i = 0; i < SHAFTS; i++) {
-        scene->large += (scene->shaft[i].level & MECH_LARGE) != 0;
-        scene->vibrating += (scene->shaft[i].level & MECH_VIBRATION) != 0;
     }
     return sum;
 }
@@ -199,11 +192,4 @@ double sim_mechanics_scene_run(sim_mechanics_scene *scene, size_t ticks)
             sum += read_all(scene, time_s);
     }
     return sum;
-}
-
-void sim_mechanics_scene_levels(const sim_mechanics_scene *scene, double share[2])
-{
-    double all = fmax(1, (double)(SHAFTS * scene->ticks));
-    share[0] = (double)scene->large / all;
-    share[1] = (double)scene->vibrating / all;
 }

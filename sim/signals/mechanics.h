@@ -15,20 +15,20 @@ typedef struct sim_mechanics_scene sim_mechanics_scene;
 
 /* What a scene of 28 whiskers does: 4 against objects all the time, 8 dragged over floors, 16 touching nothing. */
 struct sim_mechanics_setting {
-    int shaft_level, drag_level; /* MECH_AUTO or forced ones */
-    bool sliding;                /* the contacts also slide along the shaft, at 10 mm/s */
-    bool counts;                 /* sensor noise and counts too */
+    int level;    /* of mech_whisker.h */
+    bool sliding; /* the contacts also slide along the shaft, at 10 mm/s */
+    bool counts;  /* sensor noise and counts too */
     double tick_s;
 };
 
 /* Lets ticks pass for a whisker against objects. radius[i] 0: no touch; else as struct mech_touch. Writes the tilt in
- * the plane of bending (rad) and the level of each tick. */
+ * the plane of bending (rad) and whether the contact holds. */
 void sim_mechanics_touch(struct mech_shaft *shaft, size_t ticks, const double *radius, const double *theta,
-                         const double *base_rate, double *tilt, unsigned char *level);
+                         const double *base_rate, double *tilt, unsigned char *touches);
 
 /* A whisker standing on a floor; NULL if memory is short. */
 sim_drag *sim_drag_new(const struct mech_whisker *whisker, const struct mech_stance *stance,
-                       const struct sim_floor_texture *floor, uint64_t seed, double tick_s, int forced);
+                       const struct sim_floor_texture *floor, uint64_t seed, int level, double tick_s);
 void sim_drag_free(sim_drag *drag);
 
 struct mech_stance sim_drag_stance(void); /* the default */
@@ -43,7 +43,7 @@ void sim_drag_run(sim_drag *drag, const struct sim_floor_texture *floors, size_t
 void sim_mechanics_counts(const struct mech_whisker *whisker, size_t ticks, double tick_s, const double *tilt,
                           uint64_t seed, uint16_t *counts);
 
-/* A floor of floor_textures.h, or NULL beyond the last. */
+/* A floor of mech_floor.h, or NULL beyond the last. */
 const struct sim_floor_texture *sim_mechanics_floor(size_t floor);
 
 /* A scene, or NULL if memory is short; whiskers differ by the seed. */
@@ -52,9 +52,6 @@ void sim_mechanics_scene_free(sim_mechanics_scene *scene);
 
 /* Lets ticks pass. Returns a sum over all that came out, so that nothing is left out as unused. */
 double sim_mechanics_scene_run(sim_mechanics_scene *scene, size_t ticks);
-
-/* Share of contact ticks so far with large deflection [0] and with vibration [1], of the whiskers against objects. */
-void sim_mechanics_scene_levels(const sim_mechanics_scene *scene, double share[2]);
 /* cffi: end */
 
 #endif

@@ -2,10 +2,10 @@
 
     whisker = Whisker.drawn(seed=1, number=3)
     whisk = contact(whisker, radius_m=0.11, speed_rad_s=pi / 24, angle_rad=0.15, seed=7)
-    whisk.counts, whisk.tilt_rad, whisk.level          # arrays over ticks
+    whisk.counts, whisk.tilt_rad, whisk.what           # arrays over ticks
     drag = sweep(whisker, ["VINYL", "ROUGH"], speed_m_s=0.1, length_m=1.0, step_m=0.001, seed=7)
 
-Levels: see sim/mechanics/mech_shaft.h. Equal arguments give equal counts.
+Levels: see sim/mechanics/mech_whisker.h. Equal arguments give equal counts.
 """
 
 import itertools
@@ -18,7 +18,8 @@ import numpy as np
 from .border import ffi, lib, pointer
 from .world import TICK_S
 
-AUTO, CLOSED, LARGE, VIBRATION = lib.MECH_AUTO, lib.MECH_CLOSED, lib.MECH_LARGE, lib.MECH_VIBRATION
+CLOSED, LARGE, VIBRATION = lib.MECH_CLOSED, lib.MECH_LARGE, lib.MECH_VIBRATION
+WHOLE = LARGE | VIBRATION
 STICKS, SLIPS, HOOKED, EDGE, LIFTED = lib.MECH_STICKS, lib.MECH_SLIPS, lib.MECH_HOOKED, lib.MECH_EDGE, 4
 LEAD_S, TAIL_S = 0.1, 0.4  # free before and after a contact
 _table = None
@@ -94,13 +95,9 @@ class Whisker:
             raise AttributeError(name)
         return getattr(self.c, name)
 
-    def limit(self, radius_m: float) -> float:
-        """Bend angle (rad) at which it slips off a frictionless edge, or its moment has its peak."""
-        return lib.mech_table_trust(_shared_table(), self.c, radius_m).limit
-
 
 class Series(NamedTuple):
-    """What a whisker does, tick by tick: counts (n, 2) uint16; tilt of the plug (n, 2) rad; level or event (n,)."""
+    """What a whisker does, tick by tick: counts (n, 2) uint16; tilt of the plug (n, 2) rad; touch or event (n,)."""
 
     counts: np.ndarray
     tilt_rad: np.ndarray
@@ -116,7 +113,7 @@ def _counts(whisker: Whisker, tilt: np.ndarray, tick_s: float, seed: int) -> np.
 
 
 def touch(
-    whisker: Whisker, radius_m, theta_rad, base_rate_rad_s=0.0, *, seed: int, level: int = AUTO, tick_s: float = TICK_S
+    whisker: Whisker, radius_m, theta_rad, base_rate_rad_s=0.0, *, seed: int, level: int = WHOLE, tick_s: float = TICK_S
 ) -> Series:
     """A prescribed contact: for every tick the radius (0: none), imposed angle and the mount's rate of turn."""
     given = np.broadcast_arrays(radius_m, theta_rad, base_rate_rad_s)
@@ -124,15 +121,14 @@ def touch(
         raise ValueError(f"angles have shape {given[1].shape}; give one value a tick")
     radius, theta, rate = (np.ascontiguousarray(values, np.float64) for values in given)
     shaft = ffi.new("struct mech_shaft *")
-    lib.mech_shaft_start(shaft, whisker.c, _shared_table(), tick_s)
-    shaft.forced = level
+    lib.mech_shaft_start(shaft, whisker.c, _shared_table(), level, tick_s)
     each = theta.shape
-    tilt, levels, bent = np.zeros((len(theta), 2)), np.empty(each, np.uint8), np.empty(each)
+    tilt, touches, bent = np.zeros((len(theta), 2)), np.empty(each, np.uint8), np.empty(each)
     columns = {"radius_m": radius, "theta_rad": theta, "base_rate_rad_s": rate, "bent": bent}
     given = [pointer("double[]", column, name, each) for name, column in columns.items()]
-    lib.sim_mechanics_touch(shaft, len(theta), *given, pointer("unsigned char[]", levels, "levels", each))
+    lib.sim_mechanics_touch(shaft, len(theta), *given, pointer("unsigned char[]", touches, "touches", each))
     tilt[:, 0] = bent
-    return Series(_counts(whisker, tilt, tick_s, seed), tilt, levels)
+    return Series(_counts(whisker, tilt, tick_s, seed), tilt, touches)
 
 
 def contact(
@@ -143,7 +139,7 @@ def contact(
     *,
     seed: int,
     hold_s: float = 0.0,
-    level: int = AUTO,
+    level: int = WHOLE,
     tick_s: float = TICK_S,
 ) -> Series:
     """A whisk against an edge: the mount turns at a speed until the whisker is pushed by an angle, waits, turns back."""
@@ -163,7 +159,7 @@ def drag(
     height_m=0.0,
     *,
     seed: int,
-    level: int = AUTO,
+    level: int = WHOLE,
     tick_s: float = TICK_S,
     textures=_TEXTURES,
     **stance: float,
@@ -184,7 +180,7 @@ def drag(
             raise ValueError(f"a stance has no {name!r}; it has {', '.join(sorted(dir(stands)))}")
         setattr(stands, name, value)
     start = textures + int(floors[0])
-    whiskers = ffi.gc(lib.sim_drag_new(whisker.c, stands, start, seed, tick_s, level), lib.sim_drag_free)
+    whiskers = ffi.gc(lib.sim_drag_new(whisker.c, stands, start, seed, level, tick_s), lib.sim_drag_free)
     if not whiskers:
         raise MemoryError("no memory for a dragged whisker")
     travel, height = (np.ascontiguousarray(a, np.float64) for a in (travel, height))
@@ -212,7 +208,7 @@ def sweep(
     *,
     seed: int,
     step_m: float = 0.0,
-    level: int = AUTO,
+    level: int = WHOLE,
     tick_s: float = TICK_S,
     **stance: float,
 ) -> Series:

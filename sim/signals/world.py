@@ -80,10 +80,6 @@ class World:
         """Relative spread of an object whisker's amplitude from whisk to whisk."""
         return lib.sim_world_spread(self._world, lane)
 
-    def level(self, lane: int) -> int:
-        """Level of detail of a lane at the last tick: 0 rest, else as in `signals.mechanics` (CLOSED, LARGE, VIBRATION)."""
-        return lib.sim_world_level(self._world, lane)
-
     def tip(self, lane: int) -> Tip:
         """Truth about a texture whisker."""
         tip = lib.sim_world_tip(self._world, lane)

@@ -1,8 +1,8 @@
 #include "object_whisker.h"
 
 #include <math.h>
+#include <pthread.h>
 
-#include "beam.h"
 #include "whisker_constants.h"
 
 /* A face met at a glancing angle would turn any motion into an endless angle: its sine is not taken below this. */
@@ -43,11 +43,27 @@ static struct sim_point point_at(struct segment segment, double radius)
     return (struct sim_point){segment.base.x + radius * segment.along.x, segment.base.y + radius * segment.along.y};
 }
 
-void sim_object_whisker_start(struct sim_object_whisker *whisker, const struct sim_whisker *mount, size_t number,
-                              struct sim_rng rng)
+static const mech_table *shared_table;
+
+static void make_table(void)
 {
+    shared_table = mech_table_new(); /* kept for the life of the process: every world reads it */
+}
+
+bool sim_object_whisker_start(struct sim_object_whisker *whisker, const struct sim_scene *scene, uint32_t lane,
+                              size_t number, struct sim_rng rng)
+{
+    static pthread_once_t once = PTHREAD_ONCE_INIT;
+    pthread_once(&once, make_table);
+    if (!shared_table)
+        return false;
     size_t known = sizeof SPREADS / sizeof SPREADS[0];
-    *whisker = (struct sim_object_whisker){.mount = *mount, .spread = SPREADS[number % known], .rng = rng};
+    *whisker =
+        (struct sim_object_whisker){.mount = scene->whisker[lane], .spread = SPREADS[number % known], .rng = rng};
+    struct mech_whisker made = mech_whisker_draw(scene->batch, lane);
+    made.length = whisker->mount.length_m;
+    mech_shaft_start(&whisker->shaft, &made, shared_table, (int)scene->mechanics, SIM_TICK_S);
+    return true;
 }
 
 /* Has the shaft swept over this corner? Then radius tells where along the shaft, side on which side the corner was. */
@@ -132,13 +148,12 @@ void sim_object_whisker_move(struct sim_object_whisker *whisker, const struct si
     whisker->contact.theta_rad = whisker->side * fmax(0, angle);
 }
 
-double sim_object_whisker_tilt(const struct sim_object_whisker *whisker)
+void sim_object_whisker_bend(struct sim_object_whisker *whisker, double turn_rate)
 {
     const struct sim_contact *contact = &whisker->contact;
-    if (!contact->touching)
-        return 0;
-    double tilt = contact->amplitude_gain * sim_beam_tilt(contact->radius_m, contact->theta_rad, SIM_PLUG_KAPPA);
-    return fmax(-SIM_PLUG_STOP, fmin(SIM_PLUG_STOP, tilt));
+    struct mech_touch touch = {contact->touching, contact->radius_m, contact->amplitude_gain * contact->theta_rad,
+                               turn_rate, !contact->corner};
+    mech_shaft_step(&whisker->shaft, &touch);
 }
 
 double sim_object_whisker_reach(const struct sim_whisker *mount)

@@ -7,8 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "mech_floor.h"
 #include "scene_text.h"
-#include "texture_whisker.h"
 #include "whisker_constants.h"
 
 struct reader {
@@ -64,8 +64,8 @@ static int read_texture(struct reader *reader)
     const char *name = reader->text.word[1];
     if (scene->textures == SIM_TEXTURES_MAX)
         return full(&reader->text, SIM_TEXTURES_MAX);
-    if (!sim_floor_texture(name))
-        return sim_text_refuse(&reader->text, "texture: no floor is called '%s'; use a name of floor_textures.h", name);
+    if (!mech_floor_texture(name))
+        return sim_text_refuse(&reader->text, "texture: no floor is called '%s'; use a name of mech_floor.h", name);
     for (size_t i = 0; i < scene->textures; i++)
         if (scene->texture[i][0] == name[0])
             return sim_text_refuse(&reader->text, "texture: '%s' and '%s' start with the same letter; leave one out",
@@ -162,15 +162,18 @@ static int read_start(struct reader *reader)
 
 static int read_mechanics(struct reader *reader)
 {
-    static const char *const NAMES[] = {"simple", "auto", "rest", "static", "elastica", "modes"};
-    for (size_t i = 0; i < sizeof NAMES / sizeof NAMES[0]; i++) {
-        if (strcmp(reader->text.word[1], NAMES[i]) == 0) {
-            reader->scene->mechanics = (enum sim_mechanics)i;
+    static const struct {
+        const char *name;
+        enum sim_mechanics level;
+    } LEVELS[] = {
+        {"static", SIM_MECHANICS_STATIC}, {"elastica", SIM_MECHANICS_ELASTICA}, {"modes", SIM_MECHANICS_MODES}};
+    for (size_t i = 0; i < sizeof LEVELS / sizeof LEVELS[0]; i++) {
+        if (strcmp(reader->text.word[1], LEVELS[i].name) == 0) {
+            reader->scene->mechanics = LEVELS[i].level;
             return 0;
         }
     }
-    return sim_text_refuse(&reader->text, "mechanics: '%s'; use simple, auto, rest, static, elastica or modes",
-                           reader->text.word[1]);
+    return sim_text_refuse(&reader->text, "mechanics: '%s'; use static, elastica or modes", reader->text.word[1]);
 }
 
 static int read_batch(struct reader *reader)

@@ -4,14 +4,14 @@
  *
  *   size_m X Y                                arena from (0, 0) to (X, Y); walls stand on the boundary
  *   tile_m T                                  side of a square floor tile
- *   texture NAME                              repeated, one of floor_textures.h; its first letter stands for it
+ *   texture NAME                              repeated, one of mech_floor.h; its first letter stands for it
  *   floor LETTERS                             repeated: one row of tiles, rows from the largest y to the smallest
  *   obstacle X0 Y0 X1 Y1                      repeated: a box from its smallest corner to its largest
  *   body_radius_m R
  *   texture_whisker NAME X Y                  tip in the robot frame (x forward, y left)
  *   object_whisker NAME X Y YAW LENGTH        base and direction in the robot frame
  *   start X Y THETA
- *   mechanics LEVEL                           how whiskers bend (enum sim_mechanics, below); left out: simple
+ *   mechanics LEVEL                           how whiskers bend (enum sim_mechanics, below); left out: static
  *   batch N                                   which whiskers of their kind the robot has: they differ by this number
  *
  * The whiskers in the order of the file are lanes 0, 1, ... Strict checks of what a person writes (TOML) are not
@@ -34,18 +34,9 @@ enum {
 
 enum sim_role { SIM_TEXTURE_WHISKER, SIM_OBJECT_WHISKER };
 
-/* How whiskers bend. simple: this folder's own closed forms, every whisker the typical one. The others are
- * sim/mechanics, whiskers spread as a batch is, borders of tiles catch: auto chooses the level of each whisker and
- * moment within the bounds of mech_shaft.h and mech_drag.h; the rest force one: rest (nothing bends), static (closed
- * form with the plug), elastica (large deflection, friction, slip-off), modes (the same and vibration). */
-enum sim_mechanics {
-    SIM_MECHANICS_SIMPLE,
-    SIM_MECHANICS_AUTO,
-    SIM_MECHANICS_REST,
-    SIM_MECHANICS_STATIC,
-    SIM_MECHANICS_ELASTICA,
-    SIM_MECHANICS_MODES
-};
+/* How whiskers bend: levels of mech_whisker.h. static: closed form with the plug; elastica: large deflection, friction
+ * and slip-off; modes: the same and vibration. A dragged tip has no large deflection of its own. */
+enum sim_mechanics { SIM_MECHANICS_STATIC = 0, SIM_MECHANICS_ELASTICA = 1, SIM_MECHANICS_MODES = 3 };
 
 struct sim_pose {
     double x, y, theta; /* m, m, rad */

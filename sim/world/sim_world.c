@@ -5,7 +5,6 @@
 
 #include "arena.h"
 #include "base.h"
-#include "flexible_whisker.h"
 #include "object_whisker.h"
 #include "sensor_noise.h"
 #include "texture_whisker.h"
@@ -21,7 +20,6 @@ struct lane {
         struct sim_object_whisker object;
         struct sim_texture_whisker texture;
     };
-    struct sim_flexible_whisker flexible; /* unless mechanics are simple */
     struct sim_sensor_noise noise;
     struct sim_field field;
     size_t first_tile; /* of a texture whisker */
@@ -48,11 +46,6 @@ static void lay_tiles(sim_world *world, uint64_t seed)
         world->tile_height[i] = 1e-3 * SIM_TILE_LIFT_MM * (2 * sim_rng_uniform(&rng) - 1);
 }
 
-static bool is_simple(const sim_world *world)
-{
-    return world->scene.mechanics == SIM_MECHANICS_SIMPLE;
-}
-
 static const struct sim_floor_texture *floor_at(const sim_world *world, struct sim_point at)
 {
     return world->floor[sim_arena_texture(&world->scene, at)];
@@ -67,15 +60,14 @@ static bool start_lanes(sim_world *world, uint64_t seed)
         struct lane *lane = &world->lane[i];
         sim_sensor_noise_start(&lane->noise, sim_rng_stream(seed, FOR_SENSOR, i));
         if (mount->role == SIM_TEXTURE_WHISKER) {
-            sim_texture_whisker_start(&lane->texture, mount, world->pose, sim_rng_stream(seed, FOR_FLOOR, i));
-            lane->first_tile = sim_arena_tile(&world->scene, lane->texture.tip);
-            if (!is_simple(world))
-                sim_flexible_whisker_stand(&lane->flexible, &world->scene, i, floor_at(world, lane->texture.tip),
-                                           sim_rng_stream(seed, FOR_FLOOR, i));
+            struct sim_point tip = sim_texture_whisker_tip(mount, world->pose);
+            lane->first_tile = sim_arena_tile(&world->scene, tip);
+            sim_texture_whisker_start(&lane->texture, &world->scene, i, floor_at(world, tip),
+                                      sim_rng_stream(seed, FOR_FLOOR, i));
             continue;
         }
-        ok = (is_simple(world) || sim_flexible_whisker_hang(&lane->flexible, &world->scene, i)) && ok;
-        sim_object_whisker_start(&lane->object, mount, objects++, sim_rng_stream(seed, FOR_CONTACTS, i));
+        struct sim_rng rng = sim_rng_stream(seed, FOR_CONTACTS, i);
+        ok = sim_object_whisker_start(&lane->object, &world->scene, i, objects++, rng) && ok;
         world->reach = fmax(world->reach, sim_object_whisker_reach(mount));
     }
     return ok;
@@ -90,7 +82,7 @@ sim_world *sim_world_new(const struct sim_scene *scene, uint64_t seed)
     world->pose = scene->start;
     world->pose.theta = sim_wrap(world->pose.theta);
     for (size_t i = 0; i < scene->textures; i++)
-        world->floor[i] = sim_floor_texture(scene->texture[i]);
+        world->floor[i] = mech_floor_texture(scene->texture[i]);
     sim_odometer_start(&world->odometer, sim_rng_stream(seed, FOR_ODOMETRY, 0));
     lay_tiles(world, seed);
     if (!start_lanes(world, seed)) {
@@ -132,17 +124,21 @@ static double move_body(sim_world *world)
     return clearance;
 }
 
+static struct sim_field field_of(const struct mech_whisker *whisker, const double tilt[2])
+{
+    double field[2];
+    mech_whisker_fields(whisker, tilt, field);
+    return (struct sim_field){field[0] / SIM_DEGREE, field[1] / SIM_DEGREE};
+}
+
 static struct sim_field move_texture_whisker(sim_world *world, struct lane *lane)
 {
     struct sim_texture_whisker *whisker = &lane->texture;
     struct sim_point tip = sim_texture_whisker_tip(&whisker->mount, world->pose);
     size_t tile = sim_arena_tile(&world->scene, tip);
-    const struct sim_floor_texture *floor = world->floor[world->scene.tile[tile]];
-    if (!is_simple(world))
-        return sim_flexible_whisker_drag(&lane->flexible, floor, sim_texture_whisker_carry(whisker, world->pose),
-                                         world->tile_height[tile] - world->tile_height[lane->first_tile]);
-    sim_texture_whisker_move(whisker, floor, world->pose);
-    return sim_texture_whisker_field(whisker, floor);
+    sim_texture_whisker_move(whisker, world->pose, world->floor[world->scene.tile[tile]],
+                             world->tile_height[tile] - world->tile_height[lane->first_tile]);
+    return field_of(&whisker->drag.whisker, whisker->drag.tilt);
 }
 
 /* near: is anything within reach of the whiskers? Gravity's constant tilt on beta is taken out by the rest calibration
@@ -152,9 +148,8 @@ static struct sim_field move_object_whisker(sim_world *world, struct lane *lane,
     struct sim_object_whisker *whisker = &lane->object;
     if (near || whisker->contact.touching)
         sim_object_whisker_move(whisker, &world->scene, before, world->pose);
-    if (!is_simple(world))
-        return sim_flexible_whisker_touch(&lane->flexible, &whisker->contact, world->turn_rate);
-    return (struct sim_field){SIM_FIELD_GAIN * sim_object_whisker_tilt(whisker) / SIM_DEGREE, 0};
+    sim_object_whisker_bend(whisker, world->turn_rate);
+    return field_of(&whisker->shaft.whisker, (double[2]){whisker->shaft.tilt, 0});
 }
 
 static void follow_turn(sim_world *world)
@@ -231,7 +226,7 @@ struct sim_contact sim_world_contact(const sim_world *world, size_t lane)
     if (lane >= world->scene.whiskers || world->scene.whisker[lane].role != SIM_OBJECT_WHISKER)
         return (struct sim_contact){0};
     struct sim_contact contact = world->lane[lane].object.contact;
-    contact.touching = contact.touching && (is_simple(world) || !world->lane[lane].flexible.shaft.slipped);
+    contact.touching = contact.touching && !world->lane[lane].object.shaft.slipped;
     return contact;
 }
 
@@ -252,13 +247,5 @@ struct sim_tip sim_world_tip(const sim_world *world, size_t lane)
                             sim_arena_texture(&world->scene, whisker->tip),
                             sim_arena_inside(&world->scene, whisker->tip),
                             whisker->travelled_m,
-                            !is_simple(world) && world->lane[lane].flexible.drag.contact >= MECH_HOOKED};
-}
-
-int sim_world_level(const sim_world *world, size_t lane)
-{
-    if (lane >= world->scene.whiskers || is_simple(world) || world->scene.mechanics == SIM_MECHANICS_REST)
-        return MECH_REST;
-    const struct sim_flexible_whisker *whisker = &world->lane[lane].flexible;
-    return world->scene.whisker[lane].role == SIM_OBJECT_WHISKER ? whisker->shaft.level : whisker->drag.level;
+                            whisker->drag.contact >= MECH_HOOKED};
 }

@@ -32,7 +32,7 @@ struct sim_tip {
     size_t texture;     /* index in the scene's textures of the nearest tile */
     double inside_m;    /* distance to the nearest border of its tile; 0 beyond a wall */
     double travelled_m; /* length of the tip's path since the start */
-    bool caught;        /* an edge between tiles holds it back behind that place (not with simple mechanics) */
+    bool caught;        /* an edge between tiles holds it back behind that place */
 };
 
 /* A world at rest at the scene's start pose, or NULL if memory is short. */
@@ -60,10 +60,6 @@ size_t sim_world_lanes(const sim_world *world);
 struct sim_contact sim_world_contact(const sim_world *world, size_t lane); /* of an object whisker */
 double sim_world_spread(const sim_world *world, size_t lane);      /* of an object whisker's amplitudes, relative */
 struct sim_tip sim_world_tip(const sim_world *world, size_t lane); /* of a texture whisker */
-
-/* Level of detail of a lane at the last step (mech_shaft.h): 0 rest, else MECH_CLOSED or MECH_LARGE and, or not,
- * MECH_VIBRATION. 0 with simple mechanics. */
-int sim_world_level(const sim_world *world, size_t lane);
 /* cffi: end */
 
 /* What the wheels have counted since the start, with their errors: forward and anticlockwise. Reports change nothing.

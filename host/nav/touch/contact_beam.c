@@ -3,6 +3,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "nav_cubic.h"
+
 enum { STEPS = 32, POWERS = 3, FIELDS = 3 };
 enum { ACROSS, TURN, SHORT }; /* fields: y/slope, moment/slope, (arc - x)/slope^2 */
 
@@ -142,36 +144,13 @@ bool nav_contact_beam_make(struct nav_contact_beam *beam, double tip)
     return true;
 }
 
-/* Cubic Lagrange weights of four neighbours and their derivatives by the position. */
-struct cubic {
-    int first;
-    float weight[4], slope[4];
-};
-
-static struct cubic beam_cubic(double position, int nodes)
-{
-    struct cubic c;
-    int first = (int)position - 1;
-    c.first = first < 0 ? 0 : first > nodes - 4 ? nodes - 4 : first;
-    float t = (float)(position - c.first), a = t - 1, b = t - 2, d = t - 3;
-    c.weight[0] = -a * b * d / 6;
-    c.weight[1] = t * b * d / 2;
-    c.weight[2] = -t * a * d / 2;
-    c.weight[3] = t * a * b / 6;
-    c.slope[0] = -(b * d + a * d + a * b) / 6;
-    c.slope[1] = (b * d + t * d + t * b) / 2;
-    c.slope[2] = -(a * d + t * d + t * a) / 2;
-    c.slope[3] = (a * b + t * b + t * a) / 6;
-    return c;
-}
-
 /* Sums of a table's values over 16 nodes: by weights, by slopes in the first and in the second coordinate. */
 #define BEAM_SUMS(table, lanes, ci, cj, sum)                                                                           \
     for (int i = 0; i < 4; i++)                                                                                        \
         for (int j = 0; j < 4; j++) {                                                                                  \
             const float *node = (table)[(ci).first + i][(cj).first + j];                                               \
-            float w = (ci).weight[i] * (cj).weight[j], u = (ci).slope[i] * (cj).weight[j],                             \
-                  v = (ci).weight[i] * (cj).slope[j];                                                                  \
+            float w = (float)((ci).weight[i] * (cj).weight[j]), u = (float)((ci).slope[i] * (cj).weight[j]),           \
+                  v = (float)((ci).weight[i] * (cj).slope[j]);                                                         \
             for (int n = 0; n < (lanes); n++) {                                                                        \
                 (sum)[0][n] += w * node[n];                                                                            \
                 (sum)[1][n] += u * node[n];                                                                            \
@@ -209,8 +188,8 @@ bool nav_contact_beam_shaft(const struct nav_contact_beam *beam, double arc, dou
     inside = beam_hold(&slope, 0.0, LARGEST_SLOPE) && inside;
     inside = beam_hold(&nu, -TABLE_NU, TABLE_NU) && inside;
     double per_arc = (NAV_BEAM_ARCS - 1) / (beam->tip - LEAST_ARC), per_slope = (NAV_BEAM_SLOPES - 1) / LARGEST_SLOPE;
-    struct cubic ci = beam_cubic((arc - LEAST_ARC) * per_arc, NAV_BEAM_ARCS);
-    struct cubic cj = beam_cubic(slope * per_slope, NAV_BEAM_SLOPES);
+    struct nav_cubic ci = nav_cubic_at((arc - LEAST_ARC) * per_arc, NAV_BEAM_ARCS);
+    struct nav_cubic cj = nav_cubic_at(slope * per_slope, NAV_BEAM_SLOPES);
     float sum[3][NAV_BEAM_VALUES + 3] = {{0}};
     BEAM_SUMS(beam->shaft, NAV_BEAM_VALUES + 3, ci, cj, sum)
     double f[4][FIELDS];
@@ -234,8 +213,8 @@ bool nav_contact_beam_end(const struct nav_contact_beam *beam, double direction,
     inside = beam_hold(&slope, 0.0, most) && inside;
     double per_direction = (NAV_BEAM_DIRECTIONS - 1) / (LARGEST_DIRECTION - LEAST_DIRECTION);
     double per_slope = (NAV_BEAM_SLOPES - 1) / most;
-    struct cubic ci = beam_cubic((direction - LEAST_DIRECTION) * per_direction, NAV_BEAM_DIRECTIONS);
-    struct cubic cj = beam_cubic(slope * per_slope, NAV_BEAM_SLOPES);
+    struct nav_cubic ci = nav_cubic_at((direction - LEAST_DIRECTION) * per_direction, NAV_BEAM_DIRECTIONS);
+    struct nav_cubic cj = nav_cubic_at(slope * per_slope, NAV_BEAM_SLOPES);
     float sum[3][4] = {{0}};
     BEAM_SUMS(beam->end, 4, ci, cj, sum)
     double f[4][FIELDS] = {{0}};

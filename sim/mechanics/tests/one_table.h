@@ -2,7 +2,7 @@
 #ifndef ONE_TABLE_H
 #define ONE_TABLE_H
 
-#include "mech_table.h"
+#include "mech_elastica.h"
 
 static mech_table *table;
 

@@ -5,8 +5,7 @@
 
 #include <cmocka.h>
 
-#include "mech_modes.h"
-#include "mech_static.h"
+#include "mech_vibration.h"
 #include "near.h"
 
 /* Whisker physics, section 1. */
@@ -52,13 +51,13 @@ static void test_closed_form_table(void **state)
                         soft = with_kappa(0.3);
     for (size_t i = 0; i < COUNT(TABLE); i++) {
         double a = TABLE[i].a_mm * 1e-3;
-        assert_near(mech_static_moment(&clamped, a, theta) * 1e6, TABLE[i].moment_unm, 0.6e-4);
-        assert_near(mech_static_stiffness(&clamped, a) * a * theta * 1e3, TABLE[i].force_mn, 0.6e-5);
-        assert_near(mech_static_tilt(&one, a, theta) / SIM_DEGREE, TABLE[i].tilt_1, 0.6e-6);
-        assert_near(mech_static_tilt(&three, a, theta) / SIM_DEGREE, TABLE[i].tilt_3, 0.6e-6);
-        assert_near(mech_static_tilt(&soft, a, theta) / SIM_DEGREE, TABLE[i].tilt_03, 0.6e-6);
+        assert_near(mech_whisker_moment(&clamped, a, theta) * 1e6, TABLE[i].moment_unm, 0.6e-4);
+        assert_near(mech_whisker_stiffness(&clamped, a) * a * theta * 1e3, TABLE[i].force_mn, 0.6e-5);
+        assert_near(mech_whisker_tilt(&one, a, theta) / SIM_DEGREE, TABLE[i].tilt_1, 0.6e-6);
+        assert_near(mech_whisker_tilt(&three, a, theta) / SIM_DEGREE, TABLE[i].tilt_3, 0.6e-6);
+        assert_near(mech_whisker_tilt(&soft, a, theta) / SIM_DEGREE, TABLE[i].tilt_03, 0.6e-6);
     }
-    assert_near(1e-3 / mech_static_stiffness(&clamped, 0.110), 3.145821e-3, 0.6e-9);
+    assert_near(1e-3 / mech_whisker_stiffness(&clamped, 0.110), 3.145821e-3, 0.6e-9);
 }
 
 /* The compliance that the modes are made of is that of the closed form: independent derivations. */
@@ -67,8 +66,8 @@ static void test_compliance_is_the_closed_forms(void **state)
     (void)state;
     struct mech_whisker clamped = with_kappa(INFINITY), one = with_kappa(1);
     for (double a = 0.02; a < 0.141; a += 0.02) {
-        assert_share(mech_modes_compliance(&clamped, a, a), 1 / mech_static_stiffness(&clamped, a), 1e-8);
-        double with_plug = a * a / mech_static_moment(&one, a, 1);
+        assert_share(mech_modes_compliance(&clamped, a, a), 1 / mech_whisker_stiffness(&clamped, a), 1e-8);
+        double with_plug = a * a / mech_whisker_moment(&one, a, 1);
         assert_share(mech_modes_compliance(&one, a, a), with_plug, 1e-8);
     }
 }
@@ -99,7 +98,7 @@ static double rms_of_line(double kappa, double first_mm, double displacement)
     int n = 0;
     for (double mm = first_mm; mm < 141; mm += 10, n++) {
         double theta = displacement > 0 ? displacement / (mm * 1e-3) : 5 * SIM_DEGREE;
-        f[n] = mech_static_moment(&w, mm * 1e-3, theta);
+        f[n] = mech_whisker_moment(&w, mm * 1e-3, theta);
         r[n] = mm;
     }
     return line_rms(f, r, n);
@@ -152,7 +151,7 @@ static void test_tip(void **state)
     struct mech_whisker one = with_kappa(1), clamped = with_kappa(INFINITY);
     assert_near(mech_whisker_tip_stiffness(&one), 0.0691, 0.00005);
     assert_near(mech_whisker_tip_stiffness(&clamped), 0.0897, 0.00005);
-    assert_near(mech_static_tilt(&one, 0.140, 1e-3 / 0.140) / SIM_DEGREE, 0.0940, 0.00005);
+    assert_near(mech_whisker_tilt(&one, 0.140, 1e-3 / 0.140) / SIM_DEGREE, 0.0940, 0.00005);
     const double preload_mm[] = {2, 5, 10}, force_mn[] = {0.14, 0.35, 0.69};
     for (size_t i = 0; i < COUNT(force_mn); i++)
         assert_near(mech_whisker_tip_stiffness(&one) * preload_mm[i], force_mn[i], 0.006);

@@ -6,8 +6,6 @@
 #include <cmocka.h>
 
 #include "mech_elastica.h"
-#include "mech_static.h"
-#include "mech_table.h"
 #include "near.h"
 #include "one_table.h"
 
@@ -59,7 +57,7 @@ static void test_elastica_table(void **state)
         assert_near(unit * bend.moment * 1e6, TABLE[i].moment_unm, 0.6e-3);
         assert_near(bend.arc * w.cone * 1e3, TABLE[i].arc_mm, 0.6e-3);
         assert_near(unit / w.cone * bend.force * 1e3, TABLE[i].force_mn, 0.6e-5);
-        assert_near(mech_static_moment(&w, a, theta) * 1e6, TABLE[i].small_unm, 0.6e-3);
+        assert_near(mech_whisker_moment(&w, a, theta) * 1e6, TABLE[i].small_unm, 0.6e-3);
         if (TABLE[i].a_mm < 140)
             assert_share(swept_to(&w, a, theta) * 1e6, TABLE[i].moment_unm, 2e-5);
         else
@@ -154,7 +152,9 @@ static void test_table_is_the_elastica(void **state)
             for (double mu = 0; mu < 0.5; mu += 0.2) {
                 struct mech_whisker w = mech_whisker_with_tip(smooth(INFINITY), tip);
                 w.friction = mu;
-                double limit = mech_table_trust(table, &w, a).limit;
+                struct mech_whisker bare = w;
+                bare.friction = 0;
+                double peak, at = 0, let_go = SIM_DEGREE * slip_off(&bare, a, &peak, &at), limit = fmin(let_go, at);
                 for (double theta = 0.15 * limit; theta < 0.76 * limit; theta += 0.2 * limit) {
                     struct mech_bend bend;
                     assert_true(mech_elastica_at_angle(a / w.cone, theta, mu, 100, &bend));
@@ -164,35 +164,6 @@ static void test_table_is_the_elastica(void **state)
             }
         }
     }
-}
-
-/* The stated bound holds wherever it is below 5 % (within the table's own 5e-5), and is not idle: somewhere it is near.
- */
-static void test_bound_on_the_closed_form(void **state)
-{
-    (void)state;
-    double tightest = 0;
-    for (double kappa = 0.3; kappa < 40; kappa *= 10) {
-        for (double mu = 0; mu < 0.5; mu += 0.1) {
-            for (double a = 0.045; a < 0.137; a += 0.0073) {
-                struct mech_whisker w = smooth(kappa);
-                w.friction = mu;
-                struct mech_trust trust = mech_table_trust(table, &w, a);
-                for (double theta = 0.5 * SIM_DEGREE; theta < 0.5; theta += 0.7 * SIM_DEGREE) {
-                    double moment = swept_to(&w, a, theta);
-                    double bent = theta - moment * mech_whisker_compliance(&w);
-                    double bound = trust.curvature * bent * bent + trust.friction * bent;
-                    if (isnan(moment) || bound > 0.05)
-                        break;
-                    double error = fabs(mech_static_moment(&w, a, theta) / moment - 1);
-                    if (error > bound + 5e-5)
-                        fail_msg("kappa %g mu %g a %g theta %g: error %g, bound %g", kappa, mu, a, theta, error, bound);
-                    tightest = fmax(tightest, error / bound);
-                }
-            }
-        }
-    }
-    assert_true(tightest > 0.5);
 }
 
 /* Friction: what comes back is less than what went in; a contact that turns round sticks before it slides. */
@@ -232,10 +203,13 @@ static void test_stop(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_elastica_table),        cmocka_unit_test(test_friction_table),
-        cmocka_unit_test(test_slip_off_table),        cmocka_unit_test(test_folds_near_the_base),
-        cmocka_unit_test(test_table_is_the_elastica), cmocka_unit_test(test_bound_on_the_closed_form),
-        cmocka_unit_test(test_friction_keeps_energy), cmocka_unit_test(test_stop),
+        cmocka_unit_test(test_elastica_table),
+        cmocka_unit_test(test_friction_table),
+        cmocka_unit_test(test_slip_off_table),
+        cmocka_unit_test(test_folds_near_the_base),
+        cmocka_unit_test(test_table_is_the_elastica),
+        cmocka_unit_test(test_friction_keeps_energy),
+        cmocka_unit_test(test_stop),
     };
     return cmocka_run_group_tests(tests, make_table, drop_table);
 }

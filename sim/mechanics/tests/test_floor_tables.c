@@ -33,19 +33,19 @@ static double independent(double correlation_mm, double speed)
 {
     enum { WINDOW = 200, WINDOWS = 6000 };
     const struct sim_floor_texture floor = {"PLAIN", 1, correlation_mm, 0, 0, 0, false};
-    struct mech_profile profile;
+    struct mech_floor profile;
     double square = 0, square_of_means = 0;
-    mech_profile_start(&profile, &floor, sim_rng_stream(9, 9, (uint32_t)(1000 * correlation_mm * speed)));
+    mech_floor_start(&profile, &floor, sim_rng_stream(9, 9, (uint32_t)(1000 * correlation_mm * speed)));
     for (int n = 0; n < WINDOWS; n++) {
         double sum = 0;
         for (int i = 0; i < WINDOW; i++) {
-            mech_profile_move(&profile, &floor, speed * TICK);
-            double z = mech_profile_height(&profile, &floor);
+            mech_floor_move(&profile, &floor, speed * TICK);
+            double z = mech_floor_height(&profile, &floor);
             sum += z / WINDOW;
             square += z * z / WINDOW / WINDOWS;
         }
         square_of_means += sum * sum / WINDOWS;
-        mech_profile_move(&profile, &floor, 5e-3 * correlation_mm); /* the next window knows nothing of this one */
+        mech_floor_move(&profile, &floor, 5e-3 * correlation_mm); /* the next window knows nothing of this one */
     }
     return square / square_of_means;
 }
@@ -84,7 +84,7 @@ static void test_pretilt_shortens_hooks(void **state)
         double reach = mech_drag_reach(&w, &stance);
         int held = 0;
         stance.behind = share[i] * reach;
-        mech_drag_start(&drag, &w, &stance, floor, sim_rng_stream(1, 2, 3), TICK);
+        mech_drag_start(&drag, &w, &stance, floor, sim_rng_stream(1, 2, 3), MECH_VIBRATION, TICK);
         for (int k = 0; k < 4000; k++) {
             struct mech_stroke stroke = {0.15 * TICK, k > 300 ? 1e-3 : 0, 0};
             mech_drag_step(&drag, floor, &stroke);

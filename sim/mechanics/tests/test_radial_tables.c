@@ -6,7 +6,6 @@
 #include <cmocka.h>
 
 #include "mech_shaft.h"
-#include "mech_static.h"
 #include "near.h"
 #include "one_table.h"
 #include "sim_rng.h"
@@ -69,7 +68,7 @@ static void test_fits_of_the_clamped_whisker(void **state)
     for (int n = 6; n <= 7; n++) {
         for (int i = 0; i < n; i++) {
             r[i] = 140.0 - 10 * i;
-            f[i] = mech_static_moment(&w, 1e-3 * r[i], 5 * SIM_DEGREE);
+            f[i] = mech_whisker_moment(&w, 1e-3 * r[i], 5 * SIM_DEGREE);
             inverse[i] = 1 / (f[i] + 3 * mech_whisker_bending(&w) * 5 * SIM_DEGREE / w.cone);
         }
         residual(f, r, n, 2, &rms, &largest);
@@ -96,7 +95,7 @@ static void test_line_of_a_radial_whisker(void **state)
         double f[6], r[6], rms, largest;
         for (int i = 0; i < 6; i++) {
             r[i] = 90 + 10 * i;
-            f[i] = mech_static_moment(&w, 1e-3 * r[i], 5 * SIM_DEGREE * (170 + r[i]) / r[i]);
+            f[i] = mech_whisker_moment(&w, 1e-3 * r[i], 5 * SIM_DEGREE * (170 + r[i]) / r[i]);
         }
         residual(f, r, 6, 2, &rms, &largest);
         assert_near(rms, wanted[k], 0.006);
@@ -150,8 +149,7 @@ static void test_whisks_to_slip_off(void **state)
         struct mech_shaft shaft;
         double highest = 0, rate = kind ? SIM_PI / 24 : SIM_PI / 48;
         w.creep = 0;
-        mech_shaft_start(&shaft, &w, table, TICK);
-        shaft.forced = MECH_LARGE;
+        mech_shaft_start(&shaft, &w, table, MECH_LARGE, TICK);
         for (int i = 1; !shaft.slipped; i++) {
             struct mech_touch touch = {true, 0.120, rate * i * TICK, 0, false};
             assert_true(touch.theta < 1);
@@ -169,8 +167,8 @@ static void test_sensor_noise_in_millimetres(void **state)
     struct mech_whisker w = smooth(1);
     const double angle_deg[] = {5, 10}, wanted_mm[] = {0.66, 0.33};
     for (int k = 0; k < 2; k++) {
-        double low = mech_static_tilt(&w, 0.090, angle_deg[k] * SIM_DEGREE);
-        double high = mech_static_tilt(&w, 0.130, angle_deg[k] * SIM_DEGREE);
+        double low = mech_whisker_tilt(&w, 0.090, angle_deg[k] * SIM_DEGREE);
+        double high = mech_whisker_tilt(&w, 0.130, angle_deg[k] * SIM_DEGREE);
         double per_mm = (mech_whisker_field(&w, low) - mech_whisker_field(&w, high)) / SIM_DEGREE / 40;
         assert_near(0.05 / per_mm, wanted_mm[k], 0.03 * wanted_mm[k]);
     }
@@ -189,7 +187,7 @@ static void test_shared_line(void **state)
         double gain = 1 + 0.044 * sim_rng_normal(&rng);
         for (int mm = 90; mm <= 140; mm += 10, n++) {
             double amplitude = 1 + spread[whisker % 4] * sim_rng_normal(&rng);
-            double f = mech_static_tilt(&w, 1e-3 * mm, amplitude);
+            double f = mech_whisker_tilt(&w, 1e-3 * mm, amplitude);
             own += pow(1e3 * w.cone * (1 - f) - mm, 2);
             shared += pow(1e3 * w.cone * (1 - gain * f) - mm, 2);
         }

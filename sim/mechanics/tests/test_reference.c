@@ -8,7 +8,7 @@
 #include <stdlib.h>
 
 #include "mech_drag.h"
-#include "mech_table.h"
+#include "mech_elastica.h"
 #include "near.h"
 #include "reference_edges.h"
 #include "reference_table.h"
@@ -66,7 +66,7 @@ static void test_frequencies(void **state)
 }
 
 /* Drags the whisker of the chain over a step. Returns the time at its corner, ms; the peak is in uN m. */
-static double drag_over(double step_mm, double speed, int forced, double *peak)
+static double drag_over(double step_mm, double speed, int level, double *peak)
 {
     const struct sim_floor_texture flat = {"FLAT", 0, 1, 0, 0, 0, false};
     const double lead_in = 60e-3, before = 5e-3, after = 25e-3, ramp_s = 0.02;
@@ -74,8 +74,7 @@ static double drag_over(double step_mm, double speed, int forced, double *peak)
     struct mech_stance stance = mech_stance_default();
     struct mech_drag drag;
     double gone = 0, held = 0;
-    mech_drag_start(&drag, &w, &stance, &flat, sim_rng_stream(1, 1, 1), TICK);
-    drag.forced = forced;
+    mech_drag_start(&drag, &w, &stance, &flat, sim_rng_stream(1, 1, 1), level, TICK);
     *peak = 0;
     for (int i = 1; gone < lead_in + after; i++) {
         struct mech_stroke stroke = {speed * TICK * fmin(1, i * TICK / ramp_s), 0, 0};
@@ -95,10 +94,10 @@ static void test_edges(void **state)
     (void)state;
     for (size_t i = 0; i < COUNT(CHAIN_EDGES); i++) {
         const double *row = CHAIN_EDGES[i];
-        for (int forced = MECH_CLOSED; forced <= MECH_VIBRATION; forced += MECH_VIBRATION - MECH_CLOSED) {
-            if (forced == MECH_CLOSED && (row[0] < 0 || row[1] > 0.1))
+        for (int level = MECH_CLOSED; level <= MECH_VIBRATION; level += MECH_VIBRATION) {
+            if (level == MECH_CLOSED && (row[0] < 0 || row[1] > 0.1))
                 continue;
-            double peak, held = drag_over(row[0], row[1], forced, &peak);
+            double peak, held = drag_over(row[0], row[1], level, &peak);
             assert_true(fabs(held - row[2]) <= 10 || (held <= 1.5 * row[2] && row[2] <= 1.5 * held));
             assert_share(peak, row[3], 0.25);
         }

@@ -122,6 +122,31 @@ static void test_change_of_condition_loses_nothing(void **state)
     assert_share(mech_basis_answer(&pinned, &motion), force, 1e-9);
 }
 
+/* Bases that are moved are those that are made there. */
+static void test_moved_bases(void **state)
+{
+    (void)state;
+    struct mech_whisker w = with(1, 2.5e9, 0.1);
+    struct mech_modes modes;
+    struct mech_basis made[2], moved[2];
+    mech_modes_of(&w, &modes);
+    for (int pinned = 0; pinned < 2; pinned++) {
+        mech_basis_of(&w, &modes, pinned, 0.08, TICK, &moved[pinned]);
+        mech_basis_of(&w, &modes, pinned, 0.11, TICK, &made[pinned]);
+    }
+    mech_basis_move(&w, &modes, 0.11, &moved[0], &moved[1]);
+    for (int pinned = 0; pinned < 2; pinned++) {
+        struct mech_motion one, other;
+        mech_basis_settle(&made[pinned], 1e-3, 0.01, &one);
+        mech_basis_settle(&moved[pinned], 1e-3, 0.01, &other);
+        for (int i = 1; i <= 50; i++) {
+            mech_basis_step(&made[pinned], &one, 1e-5 * i);
+            mech_basis_step(&moved[pinned], &other, 1e-5 * i);
+        }
+        assert_share(mech_basis_moment(&moved[pinned], &other), mech_basis_moment(&made[pinned], &one), 1e-12);
+    }
+}
+
 /* Steps are exact: two of half a tick are one of a tick, for an input that grows linearly. */
 static void test_steps_are_exact(void **state)
 {
@@ -180,6 +205,7 @@ int main(void)
         cmocka_unit_test(test_sharp_cone),
         cmocka_unit_test(test_settles_at_the_static_solution),
         cmocka_unit_test(test_change_of_condition_loses_nothing),
+        cmocka_unit_test(test_moved_bases),
         cmocka_unit_test(test_steps_are_exact),
         cmocka_unit_test(test_release_rings),
     };

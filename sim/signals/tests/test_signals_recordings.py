@@ -1,6 +1,4 @@
-"""Recordings made with the world: formats, and the error of radial distance that their spread predicts."""
-
-import math
+"""Recordings made with the world: formats, and the spread of their peaks."""
 
 import numpy as np
 import pytest
@@ -8,9 +6,7 @@ from demo_robot import flat
 
 from signals import recordings
 
-CONE_MM = 181.739  # virtual cone length Lc of the whisker (whisker physics, section 1)
 SPREADS = {"left_outer": 0.082, "left_inner": 0.040, "right_inner": 0.026, "right_outer": 0.063}
-COUNTS_PER_RAD = 65536 / math.pi * 2.75  # of tilt
 
 
 def _peak(contact) -> float:
@@ -21,14 +17,13 @@ def _peak(contact) -> float:
 
 
 @pytest.mark.parametrize("whisker", SPREADS)
-def test_spread_of_radial_estimates_is_the_predicted_one(whisker):
-    """sigma_r = (Lc - a) rho: the whisks' repeatability, not noise or quantisation, makes the error."""
+def test_peaks_at_a_radius_spread_as_predicted(whisker):
+    """The whisks' repeatability, not noise or quantisation, makes the spread; so sigma_r = (Lc - a) rho."""
     contacts = recordings.radial_contacts(flat(), whisker, seed=3, repeats=100)
-    full = COUNTS_PER_RAD * recordings.WHISK_RAD_S * 0.6
     radius = np.array([contact.radius_mm for contact in contacts])
-    estimate = CONE_MM * (1 - np.array([_peak(contact) for contact in contacts]) / full)
-    predicted = SPREADS[whisker] * np.sqrt(np.mean((CONE_MM - radius) ** 2))
-    assert np.sqrt(np.mean((estimate - radius) ** 2)) == pytest.approx(predicted, rel=0.1)
+    peak = np.array([_peak(contact) for contact in contacts])
+    relative = np.concatenate([peak[radius == r] / peak[radius == r].mean() for r in np.unique(radius)])
+    assert relative.std() == pytest.approx(SPREADS[whisker], rel=0.1)
 
 
 def test_a_contact_is_rest_push_back_rest():

@@ -55,7 +55,7 @@ static void test_mechanics_and_batch(void **state)
 {
     (void)state;
     assert_int_equal(parse(GOOD), 0);
-    assert_int_equal(scene.mechanics, SIM_MECHANICS_SIMPLE);
+    assert_int_equal(scene.mechanics, SIM_MECHANICS_STATIC);
     assert_int_equal(parse(GOOD "mechanics modes\nbatch 7\n"), 0);
     assert_int_equal(scene.mechanics, SIM_MECHANICS_MODES);
     assert_int_equal(scene.batch, 7);
@@ -72,7 +72,7 @@ static const struct {
     const char *before, *after, *says;
 } BAD[] = {
     {"", "wall 1 2\n", "test.scene:13: unknown item 'wall'"},
-    {"", "mechanics soft\n", "mechanics: 'soft'; use simple, auto"},
+    {"", "mechanics soft\n", "mechanics: 'soft'; use static, elastica or modes"},
     {"", "batch -1\n", "batch: -1; give a whole number"},
     {"", "batch 1.5\n", "batch: 1.5; give a whole number"},
     {"", "tile_m\n", "test.scene:13: tile_m: 0 values; must be 1"},

@@ -108,7 +108,7 @@ class Corner(NamedTuple):
         `ahead_m`: how far the corner stands ahead of the place at which it would touch first. Base and object have moved
         as in the first tick for LEAD ticks before: what the start excites has decayed.
         """
-        from signals.mechanics import LARGE, VIBRATION, Whisker, touch
+        from signals.mechanics import WHOLE, Whisker, touch
 
         whisker = Whisker(kappa=KAPPA, friction=friction, creep=CREEP, creep_s=CREEP_S)
         bases = np.concatenate([np.tile(self.plan.bases[0], (LEAD, 1)), self.plan.bases])
@@ -126,7 +126,7 @@ class Corner(NamedTuple):
             np.where(on, theta, 0),
             bases[:, 2],
             seed=1,
-            level=LARGE | VIBRATION if level is None else level,
+            level=WHOLE if level is None else level,
         )
         return felt.tilt_rad[LEAD:, 0], point[LEAD:], turned(velocity, directions)[LEAD:]
 

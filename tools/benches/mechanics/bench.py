@@ -11,7 +11,6 @@ import shutil
 from pathlib import Path
 
 import matplotlib
-import numpy as np
 from tqdm import tqdm
 
 from .charts import draw_moment, draw_speed
@@ -60,19 +59,12 @@ def save_edges(rows: list[dict], version: str) -> None:
 
 
 def keep(ours: Ours, links: list[dict]) -> None:
-    """Marks what is before slip-off, and where the closed form is trusted at the default tolerance."""
-    relative = ours.lib.mech_tolerance_default().relative
+    """Marks what is before slip-off."""
     for row in links:
         row["kept"] = []
         for p in row["points"]:
             whisker = whisker_of({"tip": 0.3e-3, "kappa": 1.0})
-            a, theta = p["a"] * 1e-3, np.radians(p["theta_deg"])
-            trust = ours.lib.mech_table_trust(ours.table, whisker.c, a)
-            bent = theta - ours.lib.mech_static_tilt(whisker.c, a, theta)
-            p["trusted"] = bool(
-                (trust.curvature * bent + trust.friction) * bent <= relative and bent <= 0.5 * trust.limit
-            )
-            if p["theta_deg"] <= 0.95 * ours.slip_deg(whisker, a):
+            if p["theta_deg"] <= 0.95 * ours.slip_deg(whisker, p["a"] * 1e-3):
                 row["kept"].append(p)
 
 

@@ -9,16 +9,13 @@ from .summary import worst
 STYLES = {
     "closed": {"color": "#6b6b6b", "marker": "s"},
     "large": {"color": "#0b5394", "marker": "o"},
-    "closed_vibration": {"color": "#6b6b6b", "marker": "D"},
-    "large_vibration": {"color": "#0b5394", "marker": "v"},
-    "auto": {"color": "#38761d", "marker": "*"},
+    "modes": {"color": "#38761d", "marker": "*"},
 }
 CHAINS = {
     5: {"color": "#c25700", "marker": "^"},
     10: {"color": "#c25700", "marker": "<"},
     20: {"color": "#c25700", "marker": ">"},
 }
-STATIC_OF = {"closed": "closed", "closed_vibration": "closed"}  # the others: large
 
 
 def draw_speed(data: dict) -> Figure:
@@ -38,21 +35,14 @@ def draw_speed(data: dict) -> Figure:
                 **CHAINS[row["links"]],
             )
         for level, style in STYLES.items():
-            error = (
-                auto_error(data, largest)
-                if level == "auto"
-                else worst(data["links"][-1]["kept"], STATIC_OF.get(level, "large"), largest)
-            )
-            size = 13 if level == "auto" else 8
-            hollow = {} if "vibration" in level or level == "auto" else {"markerfacecolor": "none"}
+            error = worst(data["links"][-1]["kept"], "closed" if level == "closed" else "large", largest)
             axes.plot(
                 data["speed"][level]["times_real"],
                 error,
                 label=LEVELS[level][0],
-                markersize=size,
+                markersize=13 if level == "modes" else 8,
                 linestyle="",
                 **style,
-                **hollow,
             )
         axes.axvline(200, color="0.6", linewidth=0.8, linestyle="--")
         axes.axhline(5, color="0.6", linewidth=0.8, linestyle=":")
@@ -65,12 +55,6 @@ def draw_speed(data: dict) -> Figure:
         fontsize=10,
     )
     return figure
-
-
-def auto_error(data: dict, largest: float) -> float:
-    """The chosen level's error: the closed form's where its bound is below the tolerance, else the large deflection's."""
-    points = [p | {"auto": p["closed"] if p["trusted"] else p["large"]} for p in data["links"][-1]["kept"]]
-    return worst(points, "auto", largest)
 
 
 def draw_moment(data: dict) -> Figure:

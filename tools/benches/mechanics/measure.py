@@ -23,15 +23,14 @@ EXIT, LENGTH, YOUNG, DENSITY = 1.30625e-3, 0.140, 2.5e9, 1200.0
 STOP_FREE = 1e3  # no stop of the plug: MuJoCo's has none
 SMALL_DEG = 5.0
 
-# level -> title, forced level of whiskers against objects and on floors, sliding contacts, counts
+# name -> title, level (MECH_LARGE 1, MECH_VIBRATION 2), sliding contacts, counts
 LEVELS = {
-    "closed": ("closed form", 1, 1, False, False),
-    "large": ("large deflection", 2, 1, False, False),
-    "closed_vibration": ("closed form, vibration", 5, 4, False, False),
-    "large_vibration": ("large deflection, vibration", 6, 4, False, False),
-    "auto": ("as the scene needs", -1, -1, False, False),
-    "auto_sliding": ("as needed, contacts slide", -1, -1, True, False),
-    "auto_counts": ("as needed, noise and counts too", -1, -1, False, True),
+    "closed": ("closed form (static)", 0, False, False),
+    "large": ("large deflection (elastica)", 1, False, False),
+    "modes": ("large deflection, vibration (modes)", 3, False, False),
+    "large_sliding": ("elastica, contacts slide", 1, True, False),
+    "modes_sliding": ("modes, contacts slide", 3, True, False),
+    "modes_counts": ("modes, noise and counts too", 3, False, True),
 }
 
 
@@ -119,7 +118,7 @@ class Ours:
         self.ffi, self.lib, self.table = ffi, lib, _shared_table()
 
     def closed(self, whisker, a: float, theta: float) -> float:
-        return self.lib.mech_static_moment(whisker.c, a, theta)
+        return self.lib.mech_whisker_moment(whisker.c, a, theta)
 
     def large(self, whisker, a: float, theta: float) -> float:
         """NaN once slipped off."""
@@ -224,17 +223,15 @@ def measure_modes(ours: Ours, bar) -> list[dict]:
 
 
 def run_scene(ours: Ours, level: str) -> dict:
-    _, shaft, drag, sliding, counts = LEVELS[level]
-    setting = {"shaft_level": shaft, "drag_level": drag, "sliding": sliding, "counts": counts, "tick_s": 500e-6}
+    _, bits, sliding, counts = LEVELS[level]
+    setting = {"level": bits, "sliding": sliding, "counts": counts, "tick_s": 500e-6}
     scene = ours.lib.sim_mechanics_scene_new(ours.ffi.new("struct sim_mechanics_setting *", setting), 11)
     ours.lib.sim_mechanics_scene_run(scene, 4000)
     started = time.process_time()
     ours.lib.sim_mechanics_scene_run(scene, round(OURS_S / 500e-6))
     spent = time.process_time() - started
-    share = ours.ffi.new("double[2]")
-    ours.lib.sim_mechanics_scene_levels(scene, share)
     ours.lib.sim_mechanics_scene_free(scene)
-    return {"times_real": OURS_S / spent, "large": share[0], "vibrating": share[1]}
+    return {"times_real": OURS_S / spent}
 
 
 def measure_speed(ours: Ours, bar) -> dict:

@@ -45,7 +45,7 @@ def long_run(build: Path, level: str, seed: int) -> dict:
 
 def models() -> Path:
     """Of the robot that the levels are compared with."""
-    case = next(case for case in levels.CASES if case.name == levels.SIGNALS_AUTO)
+    case = next(case for case in levels.CASES if case.name == levels.DEFAULT)
     return levels.Bench(case, levels.FIRST_SEED, Path(), CACHE / "levels/models").learnt()
 
 

@@ -20,7 +20,7 @@ from tqdm import tqdm
 
 from whisker import scene as scene_files
 from whisker import scenes
-from whisker.demo.__main__ import judge
+from whisker.demo.__main__ import judge, read_dicts
 from whisker.demo.chain import ChainRun, Link, run_chain
 from whisker.demo.level1 import explore
 from whisker.demo.summary import pose_scores, texture_scores
@@ -56,10 +56,8 @@ class Case:
     create: int | None = None
 
 
-SIGNAL_CASES = tuple(
-    Case(f"signals_{name}", f"1 signals, {name}", 24 if name == MECHANICS[0] else 16, 1, name) for name in MECHANICS[:5]
-)
-SIGNALS_AUTO = SIGNAL_CASES[0].name
+SIGNAL_CASES = tuple(Case(f"signals_{name}", f"1 signals, {name}", 24, 1, name) for name in MECHANICS)
+DEFAULT, FINEST = SIGNAL_CASES[0].name, SIGNAL_CASES[-1].name
 CASES = (
     Case("drawn", "0 drawn observations", 24, 0),
     *SIGNAL_CASES,
@@ -68,19 +66,22 @@ CASES = (
     Case("rtl", "3 RTL, Create 1", 2, 3, create=1),
 )
 PAIRS = (
-    ("drawn", SIGNALS_AUTO),
-    *((case.name, SIGNALS_AUTO) for case in SIGNAL_CASES[1:]),
-    ("bytes_bare", SIGNALS_AUTO),
-    ("bytes", SIGNALS_AUTO),
+    ("drawn", DEFAULT),
+    *((case.name, FINEST) for case in SIGNAL_CASES[:-1]),
+    ("bytes_bare", DEFAULT),
+    ("bytes", DEFAULT),
     ("rtl", "bytes"),
 )
 TITLES = {case.name: case.title for case in CASES}
-SCORES = {
-    "adaptive_error_median_m": "adaptive (m)",
-    "pose_error_median_m": "grid (m)",
-    "foveal_error_median_m": "foveal (m)",
-    "odometry_error_median_m": "odometry (m)",
-    "texture_accuracy": "texture right",
+SCORES = {  # score -> title in the tables, scale, digits
+    "adaptive_error_median_m": ("adaptive, mm", 1000.0, 0),
+    "pose_error_median_m": ("grid, mm", 1000.0, 0),
+    "foveal_error_median_m": ("foveal, mm", 1000.0, 0),
+    "odometry_error_median_m": ("odometry, mm", 1000.0, 0),
+    "texture_accuracy": ("texture right, %", 100.0, 1),
+    "texture_windows_share": ("windows read, %", 100.0, 1),
+    "distances": ("distances told", 1.0, 0),
+    "distance_error_m": ("their rms error, mm", 1000.0, 1),
 }
 
 
@@ -134,7 +135,8 @@ class Bench:
         return self._scores(rows, truth, answers) | {"whisks": len(pilot.whisks), "processor_s": cost}
 
     def _scores(self, rows: list[dict], truth: list[dict], answers: dict[str, np.ndarray]) -> dict:
-        return texture_scores(rows, truth, self.scene[0]) | pose_scores(answers, poses_of(truth))
+        scene, poses = self.scene[0], poses_of(truth)
+        return texture_scores(rows, truth, scene) | pose_scores(answers, poses) | distance_scores(rows, poses, scene)
 
     def _chain(self, folder: Path) -> dict:
         scene, start = self.scene
@@ -148,8 +150,10 @@ class Bench:
             wall_s = run_chain(run, lambda tick: None)
             cost = children_s() - before
             pilot = json.loads((run.out / "pilot.json").read_text())
-            rows = localise.observations_path(run.scene).read_text()
-            scores = judge(run.out, scene)
+            path = localise.observations_path(run.scene)
+            rows, truth = path.read_text(), poses_of(read_dicts(run.out / "truth.csv"))
+            told = [{key: float(value) if value else None for key, value in row.items()} for row in read_dicts(path)]
+            scores = judge(run.out, scene) | distance_scores(told, truth, scene)
         return scores | {"whisks": len(pilot["whisks"]), "processor_s": cost, "wall_s": wall_s, "rows": rows}
 
 
@@ -162,6 +166,18 @@ def children_s() -> float:
 def poses_of(truth: list[dict]) -> np.ndarray:
     """(n, 3)"""
     return np.array([[float(row[key]) for key in POSES] for row in truth])
+
+
+def distance_scores(rows: list[dict], poses: np.ndarray, scene: Scene) -> dict:
+    """How many distances the rows tell, and their root mean square error, m; of what the whisker did not meet nothing is said."""
+    errors = []
+    for whisker in scene.robot.of_role("object"):
+        told = np.array([np.nan if (mm := row[f"{whisker.name}_mm"]) is None else mm / 1000 for row in rows], float)
+        true = geometry.ranges(scene.arena, poses, replace(whisker, length_m=whisker.length_m + FAR_M))
+        errors.append((told - true)[np.isfinite(told)])
+    met = np.concatenate(errors)
+    met = met[np.isfinite(met)]
+    return {"distances": len(met), "distance_error_m": float(np.sqrt(np.mean(met**2))) if len(met) else 0.0}
 
 
 def localised(scene: Scene, rows: list[dict]) -> dict[str, np.ndarray]:
@@ -310,10 +326,10 @@ def _draw_points(axes, ordered, key: str, shift: float, marker: str, colour: str
 
 
 def draw_pairs(found: dict) -> Figure:
-    """Paired differences with their intervals; without `rest`, whose are beyond any scale."""
+    """Paired differences with their intervals."""
     figure = Figure(figsize=(9.5, 4.2), layout="constrained")
     panels = figure.subplots(1, 3, sharey=True)
-    names = [name for name in found["pairs"] if not name.startswith("signals_rest")]
+    names = list(found["pairs"])
     keys = (
         ("adaptive_error_median_m", 1000.0, "adaptive: error (mm)"),
         ("pose_error_median_m", 1000.0, "grid: error (mm)"),

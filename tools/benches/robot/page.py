@@ -45,21 +45,20 @@ def _levels(found: dict) -> list[str]:
     for case in CASES:
         if case.name in made:
             level = made[case.name]
-            errors = [f"{1000 * level['quartiles'][key][1]:.0f}" for key in list(SCORES)[:4]]
-            right = f"{100 * level['quartiles']['texture_accuracy'][1]:.1f}"
-            rows.append([case.title, str(level["seeds"]), f"{level['realtime_factor']:.3g}", *errors, right])
-    header = ["level", "seeds", "times real time", "adaptive", "grid", "foveal", "odometry", "texture %"]
+            cells = [f"{scale * level['quartiles'][key][1]:.{digits}f}" for key, (_, scale, digits) in SCORES.items()]
+            rows.append([case.title, str(level["seeds"]), f"{level['realtime_factor']:.3g}", *cells])
+    header = ["level", "seeds", "times real time", *(title for title, _, _ in SCORES.values())]
     return [
         "## The same scenes at every level\n",
         f"One robot's whiskers, {LEVEL_S:g} s, the same arena, start, prior and pilot's seed at every level. Median over seeds of a run's median position error in mm.",
         "Times real time: simulated seconds per second of one processor, from the world to the poses of four filters, start of all processes included, training not.",
         "Mechanics of the object and floor whiskers are those of `sim/mechanics`; each level trains and calibrates at its own. Level 0 keeps the path and the rows that were",
-        "read of the level-1 run with mechanics `auto`, and draws the answers as `whisker scene make robot` does.\n",
+        "read of the level-1 run with mechanics `static`, and draws the answers as `whisker scene make robot` does.\n",
         _table(header, rows),
         "![Error and texture accuracy against real-time factor](charts/robot_levels.png)\n",
         "The fastest level is on top. Bars: quartiles over seeds. Dotted: real time.\n",
         "### Where a lower level changes the answer\n",
-        f"Paired by seed: mean difference, and, from {LEAST_SEEDS} seeds on, the interval that 95 % of bootstrap means fall into. Bold, and filled in the chart (without `rest`):",
+        f"Paired by seed: mean difference, and, from {LEAST_SEEDS} seeds on, the interval that 95 % of bootstrap means fall into. Bold, and filled in the chart:",
         "zero is outside.\n",
         "![Paired differences between levels](charts/robot_level_pairs.png)\n",
         _pairs_table(found["pairs"]),
@@ -72,11 +71,9 @@ def _pairs_table(pairs: dict) -> str:
     rows = []
     for name, pair in pairs.items():
         ours, theirs = name.split(" - ")
-        cells = [_interval(pair, key, 1000.0, 0) for key in list(SCORES)[:4]] + [
-            _interval(pair, "texture_accuracy", 100.0, 1)
-        ]
+        cells = [_interval(pair, key, scale, digits) for key, (_, scale, digits) in SCORES.items()]
         rows.append([f"{TITLES[ours]} less {TITLES[theirs]}", str(pair["seeds"]), *cells])
-    return _table(["pair", "seeds", "adaptive, mm", "grid, mm", "foveal, mm", "odometry, mm", "texture, points"], rows)
+    return _table(["pair", "seeds", *(title for title, _, _ in SCORES.values())], rows)
 
 
 def _interval(pair: dict, key: str, scale: float, digits: int) -> str:

@@ -24,7 +24,7 @@ def drives(seed: int, robot: int, seconds: float = 8.0, surfaces=SURFACES) -> di
     """One recording (n, 2) for each surface, speed and floor whisker, of the demo's robot of a seed on floors of another."""
     from signals.recordings import surface_drive  # sim/ is on the path since whisker.simulation.world
 
-    robot, out = flat(make_scene(robot)[0]), {}
+    robot, out = flat(make_scene(robot, "modes")[0]), {}
     for n, surface in enumerate(surfaces):
         seeds = [seed * 1000 + 50 * n + k for k in range(len(SPEEDS_M_S))]
         runs = [surface_drive(robot, surface, v, seconds, s, MOVES) for v, s in zip(SPEEDS_M_S, seeds, strict=True)]
@@ -85,7 +85,7 @@ def strip_over(tiles: list[str], seed: int, robot: int, speed_m_s: float) -> lis
 
 
 def _drive_along(rows: list[list[str]], seed: int, robot: int, speed_m_s: float, metres: float) -> list[Strip]:
-    lines = flat(make_scene(robot)[0]).splitlines()
+    lines = flat(make_scene(robot, "modes")[0]).splitlines()
     scene = [f"size_m {TILE_M * len(rows[0])} {WIDTH_M}", f"tile_m {TILE_M}", *(f"texture {s}" for s in SURFACES)]
     scene += ["floor " + "".join(name[0] for name in row) for row in rows]
     scene += [line for line in lines if re.match("body_|texture_w|mechanics|batch", line)]

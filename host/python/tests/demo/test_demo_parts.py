@@ -280,6 +280,6 @@ def test_how_whiskers_bend_is_told_to_the_world_and_is_no_part_of_the_folder(tmp
     assert {"mechanics elastica", "batch 5"} <= set(scene.flat(start).splitlines())
     scenes.write(tmp_path, scene)
     assert scenes.load(tmp_path) == scene
-    text, _ = flat_scene(str(tmp_path), 7, "rest")
-    assert {"mechanics rest", "batch 7"} <= set(text.splitlines())
-    assert "mechanics auto" in flat_scene(None, 7)[0]
+    text, _ = flat_scene(str(tmp_path), 7, "modes")
+    assert {"mechanics modes", "batch 7"} <= set(text.splitlines())
+    assert "mechanics static" in flat_scene(None, 7)[0]

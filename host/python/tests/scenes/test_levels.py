@@ -1,7 +1,5 @@
 """Level 0 tells what level 1 tells: texture confusions, distances, misses and the timing of contacts of the `robot` family
 agree with signal-level runs of the same robot in the same arenas. Tolerances are stated where they are used.
-
-What level 0 draws are the answers of the paper's classifier on the floor that knows neither friction nor edges.
 """
 
 import math
@@ -40,12 +38,19 @@ class Told:
 def signals(tmp_path_factory):
     """Signal-level runs. One robot: what it learnt once serves in every arena."""
     folder = tmp_path_factory.mktemp("models")
-    learn(folder, make_scene(SEEDS[0], "simple")[0], SEEDS[0], lambda: None, "paper")
+    scene = robot_in(SEEDS[0])[0]
+    learn(folder, scene, SEEDS[0], lambda: None)
     return [signal_run(seed, folder) for seed in SEEDS]
 
 
+def robot_in(seed):
+    """The seed's arena and start, with the whiskers of the first."""
+    scene, start = make_scene(seed)
+    return replace(scene, simulated=make_scene(SEEDS[0])[0].simulated), start
+
+
 def signal_run(seed, folder):
-    scene, start = make_scene(seed, "simple")
+    scene, start = robot_in(seed)
     pilot = Pilot(scene.robot, *load_models(folder, scene.robot), seed, habits=PLAIN)  # as level 0 behaves
     rows, truth = explore(scene, start, pilot, seed, ROWS * TICKS_PER_ROW)
     nan = math.nan
@@ -92,14 +97,13 @@ def test_texture_confusions_agree(signals, drawn):
 
 
 def test_windows_are_as_far_apart(signals, drawn):
-    """The margin of the best over the second class: median but for a factor 1.5; both levels are over-confident."""
+    """The margin of the best over the second class: median but for a factor 1.5."""
 
     def margins(runs):
         ordered = np.sort(np.concatenate([t.texture[np.isfinite(t.texture).all(axis=2)] for t in runs]), axis=1)
         return np.median(ordered[:, -1] - ordered[:, -2])
 
     assert 1 / 1.5 < margins(signals) / margins(drawn) < 1.5
-    assert min(margins(signals), margins(drawn)) > 50.0
 
 
 def distances(runs):

@@ -7,7 +7,7 @@ import pytest
 from commandkit import run, signals_as_before  # noqa: F401 - a fixture
 from whisks import whisk, whisks
 
-from signals.mechanics import LARGE, VIBRATION, Whisker, touch
+from signals.mechanics import Whisker, touch
 from whisker.touch.contact_filter import ContactFilter
 from whisker.touch.radial import model as radial
 from whisker.touch.radial.shape import Contact
@@ -19,7 +19,7 @@ def swept(radius_m: float, ticks: int = 500, side: int = 1) -> tuple[np.ndarray,
     """A corner passed at 0.1 m/s: motion of the base (n, 3), tilt (n, 2) with noise, place of the corner (n, 2)."""
     bases = np.tile([0.0, -0.1 * side, 0.0], (ticks, 1))
     y = 0.1 * TICK_S * np.arange(1, ticks + 1)
-    felt = touch(Whisker(), np.hypot(radius_m, y), side * np.arctan2(y, radius_m), seed=1, level=LARGE | VIBRATION)
+    felt = touch(Whisker(), np.hypot(radius_m, y), side * np.arctan2(y, radius_m), seed=1)
     noise = np.random.default_rng(1).normal(0.0, 2e-4, (ticks, 2))
     return bases, felt.tilt_rad + noise, np.column_stack([np.full(ticks, radius_m), side * y])
 

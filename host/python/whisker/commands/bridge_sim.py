@@ -45,7 +45,7 @@ def add(parser) -> None:
     parser.add_argument(
         "--seconds", type=number_above(0.0), default=DAY_S, metavar="S", help="simulated length (a day)"
     )
-    text = "how whiskers bend (%(default)s): the level chosen by what touches, one forced, or simple"
+    text = "how finely whiskers bend (%(default)s)"
     parser.add_argument("--mechanics", choices=MECHANICS, default=MECHANICS[0], help=text)
     parser.add_argument("--seed", type=whole_number(0, 2**32 - 1), default=1, help="of world, sensors, start (1)")
     text = "turn on the spot, stand still, or whisk: to one side and the other at a body whisk's rate (turn)"

@@ -1,6 +1,8 @@
-#include "mech_profile.h"
+#include "mech_floor.h"
 
 #include <math.h>
+#include <stddef.h>
+#include <string.h>
 
 #include "whisker_constants.h"
 
@@ -8,18 +10,26 @@
 #define LEAST_STRETCH 0.5
 enum { MOST_NODES = 64 }; /* a leap further than this meets floor that has nothing to do with the last */
 
+const struct sim_floor_texture *mech_floor_texture(const char *name)
+{
+    for (int i = 0; i < SIM_FLOOR_TEXTURE_COUNT; i++)
+        if (strcmp(SIM_FLOOR_TEXTURES[i].name, name) == 0)
+            return &SIM_FLOOR_TEXTURES[i];
+    return NULL;
+}
+
 static double stretched(struct sim_rng *rng)
 {
     return fmax(LEAST_STRETCH, 1 + SIM_TIP_JITTER * sim_rng_normal(rng));
 }
 
-static double next_node(struct mech_profile *profile, const struct sim_floor_texture *floor)
+static double next_node(struct mech_floor *profile, const struct sim_floor_texture *floor)
 {
     double keep = exp(-1e3 * LATTICE_M / floor->correlation_mm);
     return keep * profile->node[3] + sqrt(1 - keep * keep) * sim_rng_normal(&profile->rng);
 }
 
-static void shift(struct mech_profile *profile, const struct sim_floor_texture *floor)
+static void shift(struct mech_floor *profile, const struct sim_floor_texture *floor)
 {
     double next = next_node(profile, floor);
     for (int i = 0; i < 3; i++)
@@ -27,9 +37,9 @@ static void shift(struct mech_profile *profile, const struct sim_floor_texture *
     profile->node[3] = next;
 }
 
-void mech_profile_start(struct mech_profile *profile, const struct sim_floor_texture *floor, struct sim_rng rng)
+void mech_floor_start(struct mech_floor *profile, const struct sim_floor_texture *floor, struct sim_rng rng)
 {
-    *profile = (struct mech_profile){.rng = rng};
+    *profile = (struct mech_floor){.rng = rng};
     profile->node[3] = sim_rng_normal(&profile->rng);
     for (int i = 0; i < 3; i++)
         shift(profile, floor);
@@ -37,7 +47,7 @@ void mech_profile_start(struct mech_profile *profile, const struct sim_floor_tex
     profile->stretch = stretched(&profile->rng);
 }
 
-void mech_profile_move(struct mech_profile *profile, const struct sim_floor_texture *floor, double distance)
+void mech_floor_move(struct mech_floor *profile, const struct sim_floor_texture *floor, double distance)
 {
     profile->fraction += fabs(distance) / LATTICE_M;
     for (int i = 0; profile->fraction >= 1 && i < MOST_NODES; i++) {
@@ -55,7 +65,7 @@ void mech_profile_move(struct mech_profile *profile, const struct sim_floor_text
 }
 
 /* Catmull and Rom's cubic through the nodes. */
-double mech_profile_height(const struct mech_profile *profile, const struct sim_floor_texture *floor)
+double mech_floor_height(const struct mech_floor *profile, const struct sim_floor_texture *floor)
 {
     const double *n = profile->node;
     double t = profile->fraction;
