@@ -31,6 +31,7 @@ TOPICS = {  # topic -> module, by room
     "nav_size": "nav.size",
     "nav_unseen": "nav.unseen",
     "node": "node.bench",
+    "normals": "nav.normals",
     "radial": "radial.bench",
     "record": "host.record",
     "restart": "robot.restart",

@@ -21,6 +21,7 @@ from whisker.robot.messages import (
     Header,
     KeyValue,
     Localisation,
+    Observation,
     Pose,
     PoseStamped,
     PoseWithCovariance,
@@ -140,6 +141,35 @@ def test_a_contact_is_placed_where_the_whisker_meets_something():
     ended = model.contacts[(ray.name, onset * ROW_NS)]
     assert ended["release_s"] == over / 10 and ended["radius_m"] == contact["radius_m"]
     assert ended not in model.touching()
+
+
+def surface_row(seq: int, **cells: float) -> Observation:
+    names = [f"object_1_{name}" for name in cells]
+    kinds = np.full(len(names), 2, np.uint8)
+    return Observation(
+        Header.at(seq * ROW_NS), seq, 2, np.zeros(3), np.zeros(3), names, kinds, np.array([*cells.values()])
+    )
+
+
+def test_a_surface_is_placed_by_the_estimate_of_its_own_row():
+    told = {"normal_rad": np.pi, "normal_sd_rad": 0.1, "point_x_m": 0.2, "point_y_m": 0.1, "point_sd_m": 0.001}
+    model = RobotModel(SCENE)
+    model.take("observation", surface_row(4, **told))
+    for seq in (3, 4, 4):
+        pose = PoseWithCovariance.planar((1.0 + seq, 2.0, np.pi / 2), np.diag([1e-4, 1e-4, 0.01]))
+        model.take("localisation", Localisation(Header.at(seq * ROW_NS, "arena"), "grid", pose, 0.5, seq))
+    (surface,) = model.surfaces.told
+    assert (surface["x"], surface["y"]) == pytest.approx((4.9, 2.2))
+    assert surface["normal"] == pytest.approx(-np.pi / 2, abs=1e-3)
+    assert surface["normal_sd"] == 0.1
+    assert model.row["tips"] == [] and model.row["rays"] == []  # and is no texture
+
+
+def test_a_surface_without_a_direction_is_not_drawn():
+    model, pose = RobotModel(SCENE), PoseWithCovariance.planar((1.0, 2.0, 0.0), WIDE)
+    model.take("observation", surface_row(1, point_x_m=0.2, point_y_m=0.1, point_sd_m=0.001))
+    model.take("localisation", Localisation(Header.at(ROW_NS, "arena"), "grid", pose, 0.5, 1))
+    assert not model.surfaces.told
 
 
 def test_a_process_that_fell_silent_is_told_from_one_that_ended_and_one_never_heard():

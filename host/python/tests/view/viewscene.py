@@ -10,12 +10,15 @@ from whisker.nav.filters import Filter
 from whisker.pilot.pilot import compose
 from whisker.robot import messages as m
 from whisker.robot.belief import condense, to_message
+from whisker.scene import NORMAL, POINT
 from whisker.scenes import arenas
 from whisker.scenes.families import Recipe, recipe
 from whisker.scenes.making import make_recipe
 
 FILTER = "adaptive"
-ALIKE = replace(recipe("robot+global"), arena=arenas.symmetric(2))  # the demo's robot where half a turn changes nothing
+ALIKE = replace(
+    recipe("robot+global+normals"), arena=arenas.symmetric(2)
+)  # the demo's robot where half a turn changes nothing
 
 
 class SceneRun:
@@ -24,12 +27,13 @@ class SceneRun:
     def __init__(self, recipe: Recipe, seed: int, rows: int):
         made = make_recipe(recipe, seed, rows)
         self.scene, self._rows = made.scene, made.observations
-        self._filter = Filter(FILTER, self.scene, seed=seed)
+        self._filter = Filter(FILTER, self.scene, seed=seed, normals=True)
         self._pose = np.zeros(3)
         self._rays = [ray.name for ray in self.scene.robot.of_role("object")]
         tips = [tip.name for tip in self.scene.robot.of_role("texture")]
         self._names = [f"{tip}_{texture}" for tip in tips for texture in self.scene.arena.textures]
         self._names += [f"{ray}_mm" for ray in self._rays]
+        self._names += [f"{ray}_{name}" for ray in self._rays for name in (*NORMAL, *POINT)]
         self._onset: dict[int, int] = {}
 
     def messages(self, row: int) -> list[tuple[str, object]]:
@@ -57,12 +61,24 @@ class SceneRun:
         texture, radial = self._rows.texture[row].ravel(), 1e3 * self._rows.radial_m[row]
         cells = np.where(np.isnan(texture), m.EMPTY, m.VALUE)
         cells = np.append(cells, np.select([np.isnan(radial), np.isinf(radial)], [m.NOT_READ, m.EMPTY], m.VALUE))
-        values = np.where(cells == m.VALUE, np.append(texture, radial), 0.0)
+        touched = self._touched(row)
+        cells = np.append(cells, np.where(np.isnan(touched), m.EMPTY, m.VALUE))
+        values = np.where(cells == m.VALUE, np.concatenate([texture, radial, touched]), 0.0)
         motion = self._rows.odometry[row]
         self._pose = compose(self._pose, motion)
         return m.Observation(
             m.Header.at(row * ROW_NS), row, m.EXPLORING, motion, self._pose, self._names, cells.astype(np.uint8), values
         )
+
+    def _touched(self, row: int) -> np.ndarray:
+        """Cells of the directions, and the points at the whiskers' ends."""
+        told = np.full((len(self._rays), 5), np.nan)
+        told[:, :2] = self._rows.normal[row]
+        for ray, whisker in enumerate(self.scene.robot.of_role("object")):
+            if np.isfinite(told[ray, 0]):
+                out = self._rows.radial_m[row, ray] * np.array([np.cos(whisker.yaw_rad), np.sin(whisker.yaw_rad)])
+                told[ray, 2:] = *(whisker.base_m + out), 0.001
+        return told.ravel()
 
     def _contact(self, row: int, ray: int) -> list[m.Contact]:
         """A touch that begins, measured at once, or that is over."""

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..robot.messages import CORNER, FACE, HEALTH, NOT_READ, SHAFT, TIP, VALUE, End
 from ..scene import LARGEST_M, Scene
+from .surfaces import Surfaces, touch_column
 
 PATH_MOST = 3000  # points kept: 5 minutes at 10 Hz
 CONTACTS_MOST = 60
@@ -94,6 +95,7 @@ class RobotModel:
         self.pose = self.truth = self.behaviour = self.row = self.belief = None
         self.path, self.true_path = Path(), Path()
         self.contacts: dict[tuple[str, int], dict] = {}
+        self.surfaces = Surfaces()
         self.rows = {"missed": None, "unseen": 0}
         self._seq: int | None = None
 
@@ -126,7 +128,8 @@ class RobotModel:
             self.rows["unseen"] += row.seq - self._seq - 1
         self._seq = row.seq
         cells = list(zip(row.names, row.cells.tolist(), row.values.tolist(), strict=True))[:CELLS_MOST]
-        tips, rays = self._sorted(cells)
+        tips, rays = self._sorted([cell for cell in cells if touch_column(cell[0]) is None])
+        self.surfaces.take(row.seq, cells)
         self.row = {"seq": row.seq, "kind": KINDS[row.kind], "tips": tips, "rays": rays}
 
     def _sorted(self, cells: list[tuple]) -> tuple[list[dict], list[dict]]:
@@ -167,6 +170,7 @@ class RobotModel:
             "first_seq": told.first_seq,
             "prior": text(told.prior),
         }
+        self.surfaces.place(told.observation_seq, self.pose)
 
     def _take_truth(self, told) -> None:
         self.truth = placed(told.pose)

@@ -99,6 +99,7 @@ def _parts(hub: Hub) -> dict:
         "rows": model.rows,
         "touching": model.touching(),
         "contacts": list(model.contacts.values()),
+        "surfaces": list(model.surfaces.told),
         "processes": model.health(),
     }
 

@@ -1,13 +1,14 @@
 /* What moves on the plan: paths, contacts, the robot as it is estimated and, in simulation, as it is. */
 const NOSE = 1.0; // of the body's radius: length of the heading line
 const GUESSED_M = 0.08; // of a mark for a robot whose outline is not known
+const SURFACE_M = 0.14; // half of the line along a surface
 const GAP_S = 1.5; // a path is not drawn across longer silences
 const JUMP_M_S = 1.5; // nor where it was never driven: an estimate that is now of another place
 
 class Actors {
   constructor(plan) { this.plan = plan; }
 
-  /* `world`: { word, path, truth, contacts, belief }, `layers`: name -> whether it is shown. */
+  /* `world`: { word, path, truth, contacts, surfaces, belief }, `layers`: name -> whether it is shown. */
   draw(world, layers) {
     const { plan } = this;
     if (!plan.scale) return;
@@ -17,6 +18,7 @@ class Actors {
     if (layers.belief) world.belief.draw(plan, pen);
     if (layers.estimate) this.path(world.path, '--alpha', []);
     if (layers.truth) this.path(world.truth, '--beta', [7, 6]);
+    if (layers.contacts) for (const surface of world.surfaces) this.surface(surface);
     if (layers.contacts) for (const contact of world.contacts) this.contact(contact);
     if (layers.estimate && world.word?.pose) this.robot(world.word.pose, '--alpha', [], world.word, world.stale);
     if (layers.truth && world.word?.truth) this.robot(world.word.truth, '--beta', [6, 6], null);
@@ -106,6 +108,29 @@ class Actors {
     pen.lineWidth = 1.2 * plan.ratio;
     pen.stroke();
     plan.text(pen, likeliest(read)?.[0] ?? '?', x, y + 0.5 * plan.ratio, '--ink', 11, 'center', '700');
+  }
+
+  /* A line along the surface, and as far to both sides as its direction may be off by two standard deviations. */
+  surface({ x, y, normal, normal_sd: sd }) {
+    const { pen, plan } = this;
+    const end = (turn) => [plan.x(x - SURFACE_M * Math.sin(normal + turn)), plan.y(y + SURFACE_M * Math.cos(normal + turn))];
+    const wide = Math.min(2 * sd, Math.PI / 2);
+    pen.beginPath();
+    for (const side of [0, Math.PI]) {
+      pen.moveTo(plan.x(x), plan.y(y));
+      for (let n = -4; n <= 4; n += 1) pen.lineTo(...end(side + (wide * n) / 4));
+      pen.closePath();
+    }
+    pen.globalAlpha = 0.35;
+    pen.fillStyle = plan.css('--ink');
+    pen.fill();
+    pen.globalAlpha = 1;
+    pen.beginPath();
+    pen.moveTo(...end(0));
+    pen.lineTo(...end(Math.PI));
+    pen.strokeStyle = plan.css('--ink');
+    pen.lineWidth = 1.4 * plan.ratio;
+    pen.stroke();
   }
 
   contact({ x, y, part }) {

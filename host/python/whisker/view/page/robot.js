@@ -20,7 +20,7 @@ class RobotPart {
   }
 
   forget() {
-    this.world = { word: null, stale: false, path: [], truth: [], contacts: [], belief: new Belief() };
+    this.world = { word: null, stale: false, path: [], truth: [], contacts: [], surfaces: [], belief: new Belief() };
   }
 
   /* Subscribes while the part is looked at: a page of traces costs nobody a belief. */
@@ -61,6 +61,7 @@ class RobotPart {
     if (message.path) keep(world.path, message.path, POINTS_MOST);
     if (message.true_path) keep(world.truth, message.true_path, POINTS_MOST);
     world.contacts = word.contacts;
+    world.surfaces = word.surfaces;
     world.stale = (word.ages.pose ?? 0) > AGED_S;
     this.plan.fit([...world.path, ...world.truth].map((point) => [point[1], point[2]]));
     this.tell(word);

@@ -1,0 +1,48 @@
+"""How surfaces lie that whiskers touched: told in a row, placed where the estimate of the same row has the robot."""
+
+import math
+from collections import deque
+
+from ..robot.messages import VALUE
+from ..scene import NORMAL, POINT
+
+SURFACES_MOST = 60
+SENSIBLE_M = 1e5  # beyond, a number is none of a robot's
+
+
+def touch_column(name: str) -> tuple[str, str] | None:
+    """(whisker, column) of a cell that tells of a surface; None: it is another one."""
+    column = next((column for column in (*NORMAL, *POINT) if name.endswith(f"_{column}")), None)
+    return None if column is None else (name.removesuffix(f"_{column}"), column)
+
+
+class Surfaces:
+    """`told`: the newest, each with `x`, `y`, `normal` (direction in the arena), `normal_sd` and `point_sd`."""
+
+    def __init__(self):
+        self.told: deque[dict] = deque(maxlen=SURFACES_MOST)
+        self._seq, self._cells = -1, {}
+
+    def take(self, seq: int, cells: list[tuple]) -> None:
+        """(name, kind, value) of a row."""
+        self._seq, self._cells = seq, {}
+        for name, kind, value in cells:
+            if kind == VALUE and abs(value) <= SENSIBLE_M and (found := touch_column(name)):
+                self._cells.setdefault(found[0], {})[found[1]] = value
+
+    def place(self, seq: int, pose: dict) -> None:
+        """Where the robot was at the end of row `seq`: surfaces of that row are placed, once."""
+        if seq != self._seq:
+            return
+        c, s = math.cos(pose["theta"]), math.sin(pose["theta"])
+        for cells in self._cells.values():
+            if len(cells) < len(NORMAL) + len(POINT):
+                continue
+            (normal, normal_sd), (forward, left, point_sd) = (
+                [cells[name] for name in names] for names in (NORMAL, POINT)
+            )
+            at = {"x": pose["x"] + c * forward - s * left, "y": pose["y"] + s * forward + c * left}
+            at |= {"normal": math.remainder(pose["theta"] + normal, 2.0 * math.pi)}
+            at |= {"normal_sd": normal_sd, "point_sd": point_sd}
+            self.told.append({name: round(value, 4) for name, value in at.items()})
+        self._cells = {}

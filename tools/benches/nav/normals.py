@@ -1,0 +1,203 @@
+"""What the direction of a touched surface is worth to navigation: the same rows with and without it, seed by seed.
+
+    tools/benches normals --seeds 8 --flights 6
+
+Scenes at level 0 (`normals`: 5 degrees, one in twenty wrong), and the simulated robot, whose pilot runs the contact filter
+on its whiskers' signals.
+"""
+
+import argparse
+import math
+from dataclasses import replace
+from json import dumps, loads
+from pathlib import Path
+
+import numpy as np
+from tqdm import tqdm
+
+from whisker import scenes
+from whisker.demo.level1 import explore
+from whisker.demo.training import learn, read_whisks
+from whisker.nav import localise
+from whisker.nav.observations import Observations, read_observations, tells_normals
+from whisker.nav.scoring import heading_errors, lock_row, position_errors
+from whisker.pilot.pilot import Pilot
+from whisker.robot.models import load_models
+from whisker.robot.rowfiles import Rows
+from whisker.scene import Prior, Scene
+from whisker.scenes.geometry import directions
+from whisker.simulation.scenes import make_scene
+from whisker.touch.radial.model import fit
+
+ROOT = Path(__file__).resolve().parents[3]
+RESULT, PAGE = ROOT / "bench/results/nav_normals.json", ROOT / "docs/results_nav_normals.md"
+FAMILIES = ("anchor", "noisy", "one-texture+global", "one-whisker", "one-whisker+global", "robot", "robot+global")
+FILTERS = ("adaptive",)
+ROWS, FIRST_SEED = 1000, 72_000
+FLIGHT, LEARN_SEED, FLIGHT_TICKS = "simulated robot", 11, 240_000
+POSE = ("x_m", "y_m", "theta_rad")
+LOOSE_M, CORNER_M = 0.01, 0.005  # of a whisker that has let go; of the end of a face
+NINETY = 1.645
+
+
+def figures(name: str, scene: Scene, rows: Observations) -> dict:
+    run = localise.run(name, scene, rows)
+    far = position_errors(run.poses, rows.truth)
+    return {
+        "error_mm": 1e3 * float(np.median(far)),
+        "heading_deg": math.degrees(float(np.median(heading_errors(run.poses, rows.truth)))),
+        "lock": lock_row(far),
+        "us": float(run.step_us.mean()),
+    }
+
+
+def both(scene: Scene, rows: Observations) -> dict:
+    """Figures by filter, with the direction and without."""
+    plain = replace(rows, normal=None)
+    return {name: [figures(name, scene, rows), figures(name, scene, plain)] for name in FILTERS}
+
+
+def drawn(family: str, seed: int) -> dict:
+    made = scenes.make(f"{family}+normals", FIRST_SEED + seed, ROWS)
+    read = int(np.isfinite(made.observations.normal[..., 0]).sum())
+    return both(made.scene, made.observations) | {"read": read}
+
+
+def models(folder: Path, scene: Scene) -> tuple[dict, dict]:
+    """Texture models, and radial ones of whole whisks."""
+    if not (folder / "texture.json").exists():
+        learn(folder, make_scene(LEARN_SEED)[0], LEARN_SEED, lambda: None)
+    texture, radial = load_models(folder, scene.robot)
+    whisks = {name: read_whisks(folder / "radial" / f"{name}.csv", with_radius=True) for name in radial}
+    return texture, {name: fit(recorded, "whisk").model for name, recorded in whisks.items()}
+
+
+def flown(build: Path, seed: int) -> dict:
+    """A flight of the simulated robot: navigation, and errors of its directions with their stated deviations, rad."""
+    scene, start = make_scene(FIRST_SEED + seed)
+    pilot = Pilot(scene.robot, *models(build / "normals", scene), seed)
+    rows, truth = explore(scene, start, pilot, FIRST_SEED + seed, FLIGHT_TICKS)
+    path = build / "normals" / f"observations_{seed}.csv"
+    with path.open("w", newline="") as file:
+        out = Rows(file)
+        for row, true in zip(rows, truth, strict=True):
+            out.write(row | {f"true_{name}": true[name] for name in POSE})
+    assert tells_normals(rows[0])
+    told = read_observations(path, scene)
+    read = np.isfinite(told.normal[..., 0])
+    errors = [off for n in range(read.shape[1]) for off in off_truth(scene, told, n)]
+    return both(replace(scene, prior=Prior("uniform")), told) | {"read": int(read.sum()), "normals": errors}
+
+
+def off_truth(scene: Scene, told: Observations, n: int) -> list[tuple[float, float]]:
+    """Errors of the directions of whisker n and their deviations, where it truly met a face."""
+    whisker = scene.robot.of_role("object")[n]
+    longer = replace(whisker, length_m=whisker.length_m + LOOSE_M)
+    off = told.normal[:, n, 0] - directions(scene.arena, told.truth, longer, CORNER_M) + told.truth[:, 2]
+    known = np.isfinite(off)
+    return [(math.remainder(o, 2 * math.pi), s) for o, s in zip(off[known], told.normal[known, n, 1], strict=True)]
+
+
+def paired(runs: list[dict], filter: str, key: str) -> list[float]:
+    """Mean with, mean without, mean difference and its standard error."""
+    a, b = np.array([[one[filter][n][key] for one in runs] for n in (0, 1)], float)
+    return [float(a.mean()), float(b.mean()), float((a - b).mean()), float((a - b).std(ddof=1) / math.sqrt(len(a)))]
+
+
+def summed(runs: list[dict], filter: str) -> dict:
+    locks = [[one[filter][n]["lock"] for one in runs] for n in (0, 1)]
+    locked = [pair for pair in zip(*locks, strict=True) if None not in pair]
+    us = np.array([[one[filter][n]["us"] for n in (0, 1)] for one in runs])
+    return {
+        "error_mm": paired(runs, filter, "error_mm"),
+        "heading_deg": paired(runs, filter, "heading_deg"),
+        "locked": [sum(lock is not None for lock in which) for which in locks],
+        "rows_to_lock": [float(np.median(which)) for which in zip(*locked, strict=True)] if locked else None,
+        "time_ratio": float(np.median(us[:, 0] / us[:, 1])),
+    }
+
+
+def judged(runs: list[dict]) -> dict:
+    out = {"runs": len(runs), "read": float(np.mean([one["read"] for one in runs]))}
+    return out | {filter: summed(runs, filter) for filter in FILTERS}
+
+
+def of_directions(runs: list[dict]) -> dict:
+    off, sd = np.array([pair for one in runs for pair in one["normals"]]).T
+    degrees = np.degrees(np.abs(off))
+    return {
+        "n": len(off),
+        "median_deg": float(np.median(degrees)),
+        "rms_deg": float(np.sqrt(np.mean(degrees**2))),
+        "beyond_15_deg": int(np.sum(degrees > 15.0)),
+        "held_90": float(np.mean(np.abs(off) < NINETY * sd)),
+    }
+
+
+def table(data: dict) -> list[str]:
+    head = (
+        "position error, mm: with, without, difference | heading error, degrees | locked | rows to lock | time of a row"
+    )
+    lines = [f"| rows | directions a run | filter | {head} |", "|" + "---|" * 8]
+    for family, told in data["families"].items():
+        for name in FILTERS:
+            r = told[name]
+            error, heading = (
+                "{:.{p}f}, {:.{p}f}, {:+.{p}f} +- {:.{p}f}".format(*r[key], p=places)
+                for key, places in (("error_mm", 1), ("heading_deg", 2))
+            )
+            rows = "{:.0f}, {:.0f}".format(*r["rows_to_lock"]) if r["rows_to_lock"] else "-"
+            lines.append(
+                f"| {family} | {told['read']:.0f} | `{name}` | {error} | {heading} | {r['locked'][0]}, {r['locked'][1]} of "
+                f"{told['runs']} | {rows} | {r['time_ratio']:.2f} times |"
+            )
+    return lines
+
+
+def page(data: dict) -> str:
+    """docs/results_nav_normals.md."""
+    d = data["directions"]
+    lines = [
+        "# What the direction of a touched surface is worth",
+        "",
+        "Generated by `tools/benches normals` from `bench/results/nav_normals.json`. The same rows with the columns `<whisker>_normal_rad` and",
+        f"without, seed by seed; means over the runs of each run's median error, and the difference with its standard error. {ROWS} rows of a scene;",
+        "directions are good to 5 degrees and one in twenty is wrong. Rows to lock: medians over the runs that lock both ways.",
+        "",
+        f"`{FLIGHT}`: {FLIGHT_TICKS // 2000} s of its signals, start unknown. Its pilot runs the [contact filter](contact.md) in body whisks. Its {d['n']}",
+        f"directions err by {d['median_deg']:.1f} degrees in the median and {d['rms_deg']:.1f} RMS, {d['beyond_15_deg']} by more than 15;",
+        f"the stated 90 % holds {100 * d['held_90']:.0f} %.",
+        "",
+        *table(data),
+        "",
+        "## What it does not help",
+        "",
+        "- A wall has one direction all along it: the direction tells the heading up to quarter turns, and no place.",
+        "- Where distances come in many rows, two of them on one wall tell the heading better than a direction that is good to some degrees.",
+        "- Arenas that look alike after a quarter or half turn stay so. A corner, and a surface under the shaft, tell nothing.",
+        "- Maps whose slanting walls are steps of cells expect a direction that is not the wall's.",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def run(build: Path, fresh: bool, seeds: int = 8, flights: int = 6) -> None:
+    jobs = [(drawn, family, seed) for family in FAMILIES for seed in range(seeds)]
+    jobs += [(flown, build, seed) for seed in range(flights)]
+    found: dict[str, list[dict]] = {}
+    (build / "normals").mkdir(parents=True, exist_ok=True)
+    for make, what, seed in tqdm(jobs, desc="normals", unit="run"):
+        family = what if make is drawn else FLIGHT
+        kept = build / "normals" / f"{family}_{seed}.json"
+        if fresh or not kept.exists():
+            kept.write_text(dumps(make(what, seed)))
+        found.setdefault(family, []).append(loads(kept.read_text()))
+    data = {"families": {family: judged(runs) for family, runs in found.items()}}
+    data["directions"] = of_directions(found[FLIGHT])
+    RESULT.write_text(dumps(data, indent=1) + "\n")
+    PAGE.write_text(page(data))
+    print("bench/results/nav_normals.json, docs/results_nav_normals.md")
+
+
+def options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--seeds", type=int, default=8, help="of each family")
+    parser.add_argument("--flights", type=int, default=6, help="of the simulated robot, at least 2")
