@@ -7,7 +7,7 @@
 enum { RASTER_MOST = 1024, BIN_HEADINGS = 12 };
 static const double BIN_M = 0.25;
 static const double SHARE = 0.9;
-static const double MASS_LEAST = 1e-7; /* lighter bumps do not stretch the raster */
+static const double MASS_LEAST = 1e-7; /* lighter components do not stretch the raster */
 
 /* An interval of even density; an edge-less one has all its mass at one place. */
 struct slab {
@@ -44,7 +44,7 @@ static int belief_index(double offset, double pitch, int count)
 
 struct extent {
     struct slab x, y;
-    double sigma; /* of the narrowest bump */
+    double sigma; /* of the narrowest component */
 };
 
 static struct extent belief_extent(const struct nav_component *c, long n, double total)
@@ -61,12 +61,12 @@ static struct extent belief_extent(const struct nav_component *c, long n, double
     return e;
 }
 
-/* Bins a quarter as wide as the narrowest bump, as far as that gives no more than RASTER_MOST a side. */
+/* Bins a quarter as wide as the narrowest component, as far as that gives no more than RASTER_MOST a side. */
 static int belief_raster_init(struct raster *r, const struct extent *e)
 {
     double width = e->x.high - e->x.low, height = e->y.high - e->y.low;
     double pitch = fmax(fmax(e->sigma * sqrt(3.0) / 2.0, fmax(width, height) / (RASTER_MOST - 2)), 1e-6);
-    if (!(fmin(width, height) >= 0.0 && isfinite(pitch))) /* no bump lies anywhere */
+    if (!(fmin(width, height) >= 0.0 && isfinite(pitch))) /* no component lies anywhere */
         return -1;
     *r = (struct raster){.x0 = e->x.low - pitch / 2.0, .y0 = e->y.low - pitch / 2.0, .pitch = pitch};
     r->nx = (int)(width / pitch) + 2;

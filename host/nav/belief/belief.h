@@ -1,8 +1,8 @@
-/* Judging beliefs, given as bumps (nav_filter_components): regions of highest density, and coarse bins.
+/* Judging beliefs, given as components (nav_filter_components): regions of highest density, and coarse bins.
  *
- * A bump is drawn as a square of even density with the bump's standard deviation, so that the cells of a grid tile the
- * floor: bumps of one belief should overlap, sigma at least their spacing / sqrt(12). Allocates; not for the timed
- * path. */
+ * A component is drawn as a square of even density with the component's standard deviation, so that the cells of a grid
+ * tile the floor: components of one belief should overlap, sigma at least their spacing / sqrt(12). Allocates; not for
+ * the timed path. */
 #ifndef NAV_BELIEF_H
 #define NAV_BELIEF_H
 
@@ -14,7 +14,7 @@ struct nav_region {
     double area_m2; /* of the region of highest density that holds 0.9 of the mass */
 };
 
-/* Region figures of n bumps at the point (x, y), m, which lies in the 90 % region if
+/* Region figures of n components at the point (x, y), m, which lies in the 90 % region if
  * its level is at most 0.9; its own bin counts half. A level of 1 where there is none. -1: no memory or no mass. */
 int nav_belief_region(const struct nav_component *, long n, double x, double y, struct nav_region *);
 

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "bumps.h"
+#include "mixture.h"
 #include "problem.h"
 
 enum { X, Y, T };
@@ -27,8 +27,8 @@ struct nav_gaussian nav_gaussian_uniform(const struct nav_arena *arena)
 struct nav_gaussian nav_gaussian_prior(const struct nav_problem *problem)
 {
     const struct nav_prior *prior = &problem->prior;
-    if (nav_bumps_given(prior))
-        return nav_bumps_gaussian(prior);
+    if (nav_mixture_given(prior))
+        return nav_mixture_gaussian(prior);
     if (prior->uniform)
         return nav_gaussian_uniform(&problem->arena);
     struct nav_gaussian g = {.mean = prior->mean};

@@ -44,7 +44,7 @@ void nav_gaussian_estimate(const struct nav_gaussian *, struct nav_estimate *);
 /* Pose and covariance once the motion put off is done. */
 void nav_gaussian_ahead(const struct nav_gaussian *, const struct nav_pending *, struct nav_estimate *);
 
-/* The belief as a lattice of bumps, as nav_filter_components says. */
+/* The belief as a lattice of components, as nav_filter_components says. */
 long nav_gaussian_components(const struct nav_gaussian *, struct nav_component *out, long room);
 
 /* Moves a belief by `step` with noise: the paper's Gaussian approximation of the banana, to first order in the heading.

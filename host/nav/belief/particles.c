@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "bumps.h"
+#include "mixture.h"
 
 /* Poses that tell which places of the map a row is about. */
 enum { MAP_POSES = 8 };
@@ -54,9 +54,9 @@ static struct nav_pose particles_draw_once(const struct nav_arena *arena, const 
                                            double anywhere, struct nav_rng *rng)
 {
     struct nav_pose pose;
-    bool mixture = nav_bumps_given(prior);
+    bool mixture = nav_mixture_given(prior);
     if (mixture && nav_rng_uniform(rng) >= anywhere)
-        return nav_bumps_draw(prior, rng);
+        return nav_mixture_draw(prior, rng);
     if (prior->uniform || mixture) {
         pose.x = arena->size_x * nav_rng_uniform(rng);
         pose.y = arena->size_y * nav_rng_uniform(rng);

@@ -13,7 +13,7 @@
 #include "adaptive_answer.h"
 #include "adaptive_doubt.h"
 #include "adaptive_global.h"
-#include "bumps.h"
+#include "mixture.h"
 #include "particle_bins.h"
 
 /* Shares of the belief: below the first one mode is not told from another; the modes of a cloud hold the second of the
@@ -115,7 +115,7 @@ static void begin_mixture(struct adaptive *a)
 
 static void begin(struct adaptive *a)
 {
-    if (nav_bumps_given(&a->problem->prior)) {
+    if (nav_mixture_given(&a->problem->prior)) {
         begin_mixture(a);
         return;
     }

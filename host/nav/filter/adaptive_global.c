@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "bumps.h"
+#include "mixture.h"
 
 /* A debt of noise that would take more jobs than this is not paid: who may have moved that far unseen may be anywhere.
  */
@@ -316,7 +316,7 @@ double adaptive_global_fill(struct adaptive_global *g)
     struct nav_histogram *h = &g->histogram;
     struct squares squares = {0.0};
     struct nav_shape finest = nav_levels_shape(&h->levels, 0);
-    nav_bumps_fill(&g->problem->prior, h);
+    nav_mixture_fill(&g->problem->prior, h);
     nav_histogram_begin(h, still, &all, still);
     nav_histogram_run(h, LONG_MAX);
     nav_histogram_each(h, global_square, &squares);

@@ -73,7 +73,7 @@ void adaptive_global_restart(struct adaptive_global *, uint64_t row);
 /* Holds nothing before row `row` of the log, in its finest cells; for adaptive_global_add. */
 void adaptive_global_clear(struct adaptive_global *, uint64_t row);
 
-/* Holds the problem's mixture of bumps before the first row. Returns how many equal cells of the finest level it is
+/* Holds the problem's mixture before the first row. Returns how many equal cells of the finest level it is
  * worth. */
 double adaptive_global_fill(struct adaptive_global *);
 

@@ -4,8 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "bumps.h"
 #include "intake.h"
+#include "mixture.h"
 
 static const struct nav_filter_ops *const FILTERS[] = {&nav_odometry_filter, &nav_ekf_filter,     &nav_ukf_filter,
                                                        &nav_foveal_filter,   &nav_grid_filter,    &nav_particle_filter,
@@ -45,18 +45,18 @@ static void *filter_copy(const void *from, int count, size_t size)
 /* Mean and deviations become the mixture's, for whoever wants one place. */
 static int filter_own_prior(struct nav_prior *prior)
 {
-    if (!nav_bumps_given(prior)) {
-        prior->bump = NULL;
-        prior->bumps = 0;
+    if (!nav_mixture_given(prior)) {
+        prior->component = NULL;
+        prior->components = 0;
         return 0;
     }
-    struct nav_component *bump = malloc((size_t)prior->bumps * sizeof *bump);
-    if (!bump)
+    struct nav_component *component = malloc((size_t)prior->components * sizeof *component);
+    if (!component)
         return -1;
-    memcpy(bump, prior->bump, (size_t)prior->bumps * sizeof *bump);
-    nav_bumps_normalise(bump, prior->bumps);
-    prior->bump = bump;
-    struct nav_gaussian g = nav_bumps_gaussian(prior);
+    memcpy(component, prior->component, (size_t)prior->components * sizeof *component);
+    nav_mixture_normalise(component, prior->components);
+    prior->component = component;
+    struct nav_gaussian g = nav_mixture_gaussian(prior);
     prior->mean = g.mean;
     for (int i = 0; i < 3; i++)
         prior->sigma[i] = sqrt(g.covariance[4 * i]);
@@ -67,7 +67,7 @@ static int filter_own(struct nav_problem *p)
 {
     int prior = filter_own_prior(&p->prior);
     if (prior)
-        p->prior.bump = NULL;
+        p->prior.component = NULL;
     p->arena.floor = filter_copy(p->arena.floor, p->arena.rows * p->arena.columns, sizeof *p->arena.floor);
     p->arena.box = filter_copy(p->arena.box, p->arena.boxes, sizeof *p->arena.box);
     p->robot.tip = filter_copy(p->robot.tip, p->robot.tips, sizeof *p->robot.tip);
@@ -111,7 +111,7 @@ void nav_filter_free(struct nav_filter *f)
     free((void *)f->problem->robot.tip);
     free((void *)f->problem->robot.ray);
     free((void *)f->problem->robot.sensor);
-    free((void *)f->problem->prior.bump);
+    free((void *)f->problem->prior.component);
     free(f->problem);
     free(f);
 }

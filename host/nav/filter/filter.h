@@ -22,8 +22,8 @@ const char *nav_filter_reset(struct nav_filter *, const struct nav_prior *);
  * counted and treated as not read. Does not allocate. */
 void nav_filter_step(struct nav_filter *, const struct nav_row *, struct nav_estimate *);
 
-/* The belief after the last row as bumps whose masses sum to 1: the first `room` of them go to `out`. Returns how many
- * there are, which may exceed `room`. For judging and drawing, not for the timed path. */
+/* The belief after the last row as components whose masses sum to 1: the first `room` of them go to `out`. Returns how
+ * many there are, which may exceed `room`. For judging and drawing, not for the timed path. */
 long nav_filter_components(const struct nav_filter *, struct nav_component *out, long room);
 
 /* How finely a filter divides the arena, and how finely what its sensors tell asks it to; 0: it has no cells. A cell

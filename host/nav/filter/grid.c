@@ -7,13 +7,13 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "bumps.h"
 #include "calibration.h"
 #include "expected.h"
 #include "filter.h"
 #include "gaussian.h"
 #include "histogram.h"
 #include "likelihood.h"
+#include "mixture.h"
 
 static const double SURE = 0.5;   /* confidence from which a belief judges whiskers, */
 static const double LIGHT = 1e-4; /* by cells with more mass than this */
@@ -126,7 +126,7 @@ static void grid_begin(struct grid *g)
     nav_expected_begin(g->expected, (const float *const *)g->likelihood->table, 0.0f);
     nav_expected_scale(g->expected);
     if (!prior->uniform)
-        nav_bumps_fill(prior, &g->histogram);
+        nav_mixture_fill(prior, &g->histogram);
     if (!grid_reweigh(g, (struct nav_pose){0.0, 0.0, 0.0}, 0.0))
         grid_forget(g);
     grid_summarise(g);

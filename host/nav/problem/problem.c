@@ -2,7 +2,7 @@
 
 #include <math.h>
 
-static const char *problem_bump_fault(const struct nav_arena *arena, const struct nav_component *b)
+static const char *problem_component_fault(const struct nav_arena *arena, const struct nav_component *b)
 {
     if (!isfinite(b->pose.x + b->pose.y + b->pose.theta))
         return "its pose is no number";
@@ -17,17 +17,17 @@ const char *nav_prior_fault(const struct nav_arena *arena, const struct nav_prio
 {
     double total = 0.0;
     *which = -1;
-    if (prior->uniform || prior->bumps == 0)
+    if (prior->uniform || prior->components == 0)
         return NULL;
-    if (prior->bumps < 0 || prior->bumps > NAV_BUMPS_MOST || !prior->bump)
-        return "too many bumps, or less than none";
-    for (long n = 0; n < prior->bumps; n++) {
-        const char *fault = problem_bump_fault(arena, &prior->bump[n]);
+    if (prior->components < 0 || prior->components > NAV_COMPONENTS_MOST || !prior->component)
+        return "too many components, or less than none";
+    for (long n = 0; n < prior->components; n++) {
+        const char *fault = problem_component_fault(arena, &prior->component[n]);
         if (fault) {
             *which = n;
             return fault;
         }
-        total += prior->bump[n].mass;
+        total += prior->component[n].mass;
     }
-    return total > 0.0 && isfinite(total) ? NULL : "the bumps have no mass, or no end of it";
+    return total > 0.0 && isfinite(total) ? NULL : "the components have no mass, or no end of it";
 }

@@ -11,23 +11,25 @@
 #include "settings.h"
 
 /* cffi: begin */
-/* A bump of belief: normal in x and y (sigma_m each) and in heading, independent. */
+/* A component of a Gaussian mixture: normal in x and y (sigma_m each) and in heading, independent. */
 struct nav_component {
     struct nav_pose pose;
     double sigma_m, sigma_rad;
     double mass;
 };
 
-enum { NAV_BUMPS_MOST = 10000 };
+enum { NAV_COMPONENTS_MOST = 10000 };
 
-/* Belief before the first row. uniform: over free space, all else unused. bumps above 0: their mixture, as a filter
- * listed it, in place of mean and sigma, with NAV_ANYWHERE of the mass uniform. Clipped to free space each way. */
+/* Belief before the first row. uniform: over free space, all else unused. components above 0: their mixture, as a
+ * filter listed it, in place of mean and sigma, with NAV_ANYWHERE of the mass uniform. Clipped to free space each way.
+ */
 struct nav_prior {
     bool uniform;
     struct nav_pose mean;
-    double sigma[3];                  /* x, y m; theta rad; above 0 */
-    const struct nav_component *bump; /* [bumps] within the arena, widths above 0, masses of any sum above 0 */
-    long bumps;                       /* at most NAV_BUMPS_MOST */
+    double sigma[3]; /* x, y m; theta rad; above 0 */
+    /* [components] within the arena, widths above 0, masses of any sum above 0 */
+    const struct nav_component *component;
+    long components; /* at most NAV_COMPONENTS_MOST */
 };
 
 struct nav_problem {
@@ -62,7 +64,8 @@ struct nav_estimate {
     size_t bytes;         /* and in how much memory, tables included */
 };
 
-/* What is wrong with a prior, NULL when nothing is; *which: the bump that it is wrong with, -1: none of them alone. */
+/* What is wrong with a prior, NULL when nothing is; *which: the component that it is wrong with, -1: none of them
+ * alone. */
 const char *nav_prior_fault(const struct nav_arena *, const struct nav_prior *, long *which);
 /* cffi: end */
 

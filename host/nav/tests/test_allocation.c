@@ -26,8 +26,8 @@ static void no_filter_allocates_after_its_start(void **state)
     static const struct nav_component wide[] = {{{1.0, 1.0, 0.5}, 0.5, 2.0, 1.0}};
     static const struct nav_prior priors[] = {{.mean = {1.0, 1.0, 0.5}, .sigma = {0.02, 0.02, 0.03}},
                                               {.uniform = true},
-                                              {.bump = narrow, .bumps = 2},
-                                              {.bump = wide, .bumps = 1}};
+                                              {.component = narrow, .components = 2},
+                                              {.component = wide, .components = 1}};
     for (size_t kind = 0; kind < sizeof priors / sizeof priors[0]; kind++) {
         for (int n = 0; nav_filter_name(n); n++) {
             struct wander w = wander_new(5);
@@ -76,9 +76,10 @@ static void starve(bool (*made)(const char *, const struct nav_problem *), const
 static void what_gets_no_memory_is_not_made_and_leaves_nothing_behind(void **state)
 {
     (void)state;
-    static const struct nav_component bumps[] = {{{0.3, 0.4, 0.5}, 0.02, 0.05, 3.0}, {{0.5, 0.5, 0.0}, 0.1, 0.2, 1.0}};
+    static const struct nav_component components[] = {{{0.3, 0.4, 0.5}, 0.02, 0.05, 3.0},
+                                                      {{0.5, 0.5, 0.0}, 0.1, 0.2, 1.0}};
     struct nav_problem p = room();
-    p.prior = (struct nav_prior){.bump = bumps, .bumps = 2};
+    p.prior = (struct nav_prior){.component = components, .components = 2};
     for (int n = 0; nav_filter_name(n); n++)
         starve(made_filter, nav_filter_name(n), &p);
     starve(made_weigher, NULL, &p);

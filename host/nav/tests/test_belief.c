@@ -62,8 +62,8 @@ static void a_long_thin_gaussian_leaves_no_gaps(void **state)
     }
 }
 
-/* Side by side along the longer axis: neither gaps, nor a belief made wider by bumps that overlap. */
-static void bumps_of_a_gaussian_are_as_wide_as_they_lie_apart(void **state)
+/* Side by side along the longer axis: neither gaps, nor a belief made wider by components that overlap. */
+static void components_of_a_gaussian_are_as_wide_as_they_lie_apart(void **state)
 {
     (void)state;
     static struct nav_component c[10000];
@@ -118,7 +118,7 @@ static double sum(const double *v, long n)
     return total;
 }
 
-static void bins_share_a_bump_by_overlap(void **state)
+static void bins_share_a_component_by_overlap(void **state)
 {
     (void)state;
     double bins[4 * 2 * 12];
@@ -149,10 +149,10 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(levels_and_area_of_a_normal),
         cmocka_unit_test(a_long_thin_gaussian_leaves_no_gaps),
-        cmocka_unit_test(bumps_of_a_gaussian_are_as_wide_as_they_lie_apart),
+        cmocka_unit_test(components_of_a_gaussian_are_as_wide_as_they_lie_apart),
         cmocka_unit_test(a_region_may_have_two_parts),
         cmocka_unit_test(a_point_mass_and_no_mass),
-        cmocka_unit_test(bins_share_a_bump_by_overlap),
+        cmocka_unit_test(bins_share_a_component_by_overlap),
         cmocka_unit_test(bins_keep_what_is_outside_and_all_headings),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -266,7 +266,7 @@ static void components_are_the_belief(void **state)
 {
     (void)state;
     enum { ROOM = 40000 };
-    static struct nav_component bump[ROOM];
+    static struct nav_component component[ROOM];
     struct nav_problem p = room();
     p.prior.mean.theta = 3.0;
     p.robot.body_radius = 0.01;
@@ -276,15 +276,15 @@ static void components_are_the_belief(void **state)
         struct nav_row row = row_at(0.1, NOT_READ, &nan);
         struct nav_estimate e;
         nav_filter_step(f, &row, &e);
-        long count = nav_filter_components(f, bump, ROOM);
+        long count = nav_filter_components(f, component, ROOM);
         double mass = 0.0, x = 0.0, xx = 0.0, tt = 0.0;
         assert_in_range(count, 1, ROOM);
         for (long i = 0; i < count; i++) {
-            double dx = bump[i].pose.x - e.pose.x, turn = nav_wrap(bump[i].pose.theta - e.pose.theta);
-            mass += bump[i].mass;
-            x += bump[i].mass * dx;
-            xx += bump[i].mass * (dx * dx + bump[i].sigma_m * bump[i].sigma_m);
-            tt += bump[i].mass * (turn * turn + bump[i].sigma_rad * bump[i].sigma_rad);
+            double dx = component[i].pose.x - e.pose.x, turn = nav_wrap(component[i].pose.theta - e.pose.theta);
+            mass += component[i].mass;
+            x += component[i].mass * dx;
+            xx += component[i].mass * (dx * dx + component[i].sigma_m * component[i].sigma_m);
+            tt += component[i].mass * (turn * turn + component[i].sigma_rad * component[i].sigma_rad);
         }
         assert_near(mass, 1.0, 1e-4);
         assert_near(x, 0.0, 0.01);
@@ -293,11 +293,11 @@ static void components_are_the_belief(void **state)
         /* Without room for all of them it lists the first ones and touches nothing beyond. */
         const struct nav_component untouched = {{7.0, 7.0, 7.0}, 7.0, 7.0, 7.0};
         for (long i = 0; i < ROOM; i++)
-            bump[i] = untouched;
-        assert_int_equal(nav_filter_components(f, bump, 1), count);
-        assert_memory_not_equal(&bump[0], &untouched, sizeof untouched);
+            component[i] = untouched;
+        assert_int_equal(nav_filter_components(f, component, 1), count);
+        assert_memory_not_equal(&component[0], &untouched, sizeof untouched);
         for (long i = 1; i < ROOM; i++)
-            assert_memory_equal(&bump[i], &untouched, sizeof untouched);
+            assert_memory_equal(&component[i], &untouched, sizeof untouched);
         nav_filter_free(f);
     }
 }

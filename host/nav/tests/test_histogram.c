@@ -2,7 +2,7 @@
 #include <limits.h>
 #include <stdlib.h>
 
-#include "bumps.h"
+#include "mixture.h"
 #include "near.h"
 #include "problem.h"
 
@@ -372,7 +372,7 @@ static void a_prior_fills_cells_with_its_integral(void **state)
     struct nav_histogram h = empty(1.0, 0.1, 36, 0);
     struct nav_gaussian all;
     const struct nav_prior prior = {.mean = {0.5, 0.5, 3.1}, .sigma = {0.05, 0.1, 0.3}};
-    nav_bumps_fill(&prior, &h);
+    nav_mixture_fill(&prior, &h);
     assert_near(total(&h), 1.0, 1e-5);
     pass(&h, STILL, &NOTHING);
     nav_histogram_summarise(&h, &all);
@@ -382,7 +382,7 @@ static void a_prior_fills_cells_with_its_integral(void **state)
     assert_near(all.covariance[8], 0.09 + pow(NAV_PI / 18.0, 2.0) / 6.0, 1e-3);
     /* A heading so uncertain that it reaches around: no mass is lost at the seam. */
     nav_histogram_clear(&h, 0);
-    nav_bumps_fill(&(struct nav_prior){.mean = {0.5, 0.5, 3.1}, .sigma = {0.05, 0.1, 1.5}}, &h);
+    nav_mixture_fill(&(struct nav_prior){.mean = {0.5, 0.5, 3.1}, .sigma = {0.05, 0.1, 1.5}}, &h);
     assert_near(total(&h), 1.0, 1e-5);
     nav_histogram_free(&h);
 }

@@ -15,7 +15,7 @@ from .observations import ODOMETRY, Observations, touch_keys
 FAVOURITE, SPARE = "adaptive", "grid"
 SENSOR_UNKNOWN = 255
 SEED_MOST = 2**64 - 1
-BUMPS_MOST = int(lib.NAV_BUMPS_MOST)  # of a belief to begin from
+BUMPS_MOST = int(lib.NAV_COMPONENTS_MOST)  # of a belief to begin from
 
 # struct nav_estimate and struct nav_component
 ESTIMATE = np.dtype(
@@ -339,7 +339,7 @@ def problem_of(
     }
     prior = scene.prior or Prior("uniform")
     if bumps is not None:
-        problem.prior.bump, problem.prior.bumps = _components(bumps), len(bumps)
+        problem.prior.component, problem.prior.components = _components(bumps), len(bumps)
     if bumps is None:
         _fill_prior(ffi.addressof(problem.prior), prior)
     lib.nav_settings_default(ffi.addressof(problem.settings))

@@ -1,7 +1,7 @@
 /* A filter begun from a mixture holds that mixture, and what is no mixture is refused. */
 #include <string.h>
 
-#include "bumps.h"
+#include "mixture.h"
 #include "near.h"
 #include "rooms.h"
 #include "wander.h"
@@ -9,16 +9,16 @@
 enum { ROOM = 60000 };
 static struct nav_component listed[ROOM];
 
-/* Two bumps of unequal mass near each other, headings on both sides of the half turn. */
+/* Two components of unequal mass near each other, headings on both sides of the half turn. */
 static const struct nav_component PAIR[] = {
     {{0.42, 0.46, 3.1}, 0.03, 0.1, 6.0},
     {{0.50, 0.56, -3.1}, 0.04, 0.15, 2.0},
 };
 
-static struct nav_problem begun_from(const struct nav_component *bump, long count)
+static struct nav_problem begun_from(const struct nav_component *component, long count)
 {
     struct nav_problem p = room();
-    p.prior = (struct nav_prior){.bump = bump, .bumps = count};
+    p.prior = (struct nav_prior){.component = component, .components = count};
     p.robot.body_radius = 0.01;
     return p;
 }
@@ -128,10 +128,10 @@ static void a_wide_mixture_stays_as_wide_in_the_adaptive_filter(void **state)
 
 static void refused(struct nav_component bad, long at, const char *why)
 {
-    struct nav_component bumps[] = {PAIR[0], PAIR[1], PAIR[0]};
-    struct nav_problem p = begun_from(bumps, 3);
+    struct nav_component components[] = {PAIR[0], PAIR[1], PAIR[0]};
+    struct nav_problem p = begun_from(components, 3);
     long which;
-    bumps[2] = bad;
+    components[2] = bad;
     const char *fault = nav_prior_fault(&p.arena, &p.prior, &which);
     assert_non_null(fault);
     assert_non_null(strstr(fault, why));
@@ -173,20 +173,20 @@ static void what_is_no_mixture_is_refused(void **state)
 static void counts_and_sums_are_checked_too(void **state)
 {
     (void)state;
-    static struct nav_component many[NAV_BUMPS_MOST + 1];
+    static struct nav_component many[NAV_COMPONENTS_MOST + 1];
     long which;
-    for (long n = 0; n <= NAV_BUMPS_MOST; n++)
+    for (long n = 0; n <= NAV_COMPONENTS_MOST; n++)
         many[n] = PAIR[0];
-    struct nav_problem p = begun_from(many, NAV_BUMPS_MOST);
+    struct nav_problem p = begun_from(many, NAV_COMPONENTS_MOST);
     assert_null(nav_prior_fault(&p.arena, &p.prior, &which));
-    p.prior.bumps = NAV_BUMPS_MOST + 1;
+    p.prior.components = NAV_COMPONENTS_MOST + 1;
     assert_non_null(strstr(nav_prior_fault(&p.arena, &p.prior, &which), "too many"));
-    p.prior.bumps = -1;
+    p.prior.components = -1;
     assert_non_null(nav_prior_fault(&p.arena, &p.prior, &which));
-    p.prior = (struct nav_prior){.bumps = 2};
+    p.prior = (struct nav_prior){.components = 2};
     assert_non_null(nav_prior_fault(&p.arena, &p.prior, &which));
     many[0].mass = many[1].mass = 0.0;
-    p.prior = (struct nav_prior){.bump = many, .bumps = 2};
+    p.prior = (struct nav_prior){.component = many, .components = 2};
     assert_non_null(strstr(nav_prior_fault(&p.arena, &p.prior, &which), "no mass"));
     assert_int_equal(which, -1);
     assert_null(nav_filter_new("grid", &p));
@@ -204,11 +204,11 @@ static void draws_density_and_cells_agree(void **state)
     struct nav_rng rng;
     double x = 0.0, inside = 0.0, integral = 0.0;
     memcpy(own, PAIR, sizeof own);
-    nav_bumps_normalise(own, 2);
-    p.prior.bump = own;
+    nav_mixture_normalise(own, 2);
+    p.prior.component = own;
     nav_rng_seed(&rng, 4, 0);
     for (int n = 0; n < DRAWS; n++) {
-        struct nav_pose drawn = nav_bumps_draw(&p.prior, &rng);
+        struct nav_pose drawn = nav_mixture_draw(&p.prior, &rng);
         x += drawn.x / DRAWS;
         inside += (drawn.x < 0.45 && drawn.y < 0.5) / (double)DRAWS;
     }
@@ -232,20 +232,21 @@ static void hold(void *self, struct nav_pose at, double mass)
     h->there += around && at.theta > 0.0 && at.theta < NAV_PI / 2.0 ? mass : 0.0;
 }
 
-/* Whatever the cells' width in metres, a bump's mass lies where the bump is, and nothing but the doubt elsewhere. */
-static void cells_of_any_width_hold_their_share_of_a_bump(void **state)
+/* Whatever the cells' width in metres, a component's mass lies where the component is, and nothing but the doubt
+ * elsewhere. */
+static void cells_of_any_width_hold_their_share_of_a_component(void **state)
 {
     (void)state;
     enum { CELLS = 20, HEADINGS = 4 };
     static const double widths[] = {0.01, 0.3, 1.0, 3.0};
     for (size_t n = 0; n < sizeof widths / sizeof widths[0]; n++) {
         double cell = widths[n];
-        const struct nav_component bump = {{14.0 * cell, 12.0 * cell, 1.0}, 0.2 * cell, 0.1, 1.0};
+        const struct nav_component component = {{14.0 * cell, 12.0 * cell, 1.0}, 0.2 * cell, 0.1, 1.0};
         const struct nav_levels levels = {CELLS * cell, CELLS * cell, cell, HEADINGS, 1};
-        struct held held = {.x = bump.pose.x, .y = bump.pose.y, .cell = cell};
+        struct held held = {.x = component.pose.x, .y = component.pose.y, .cell = cell};
         struct nav_histogram h;
         assert_int_equal(nav_histogram_init(&h, &levels, 0, 0), 0);
-        nav_bumps_fill(&(struct nav_prior){.bump = &bump, .bumps = 1}, &h);
+        nav_mixture_fill(&(struct nav_prior){.component = &component, .components = 1}, &h);
         nav_histogram_each(&h, hold, &held);
         nav_histogram_free(&h);
         double all = held.all, there = held.there;
@@ -263,7 +264,7 @@ static void a_wrong_mixture_does_not_trap_who_can_recover(void **state)
         struct wander w = wander_new(5);
         const struct nav_component wrong = {{1.5, 0.5, -2.0}, 0.02, 0.05, 1.0};
         struct nav_estimate e = {.confidence = 0.0};
-        w.problem.prior = (struct nav_prior){.bump = &wrong, .bumps = 1};
+        w.problem.prior = (struct nav_prior){.component = &wrong, .components = 1};
         struct nav_filter *f = nav_filter_new(able[n], &w.problem);
         assert_non_null(f);
         assert_true(hypot(w.pose.x - wrong.pose.x, w.pose.y - wrong.pose.y) > 0.3);
@@ -283,7 +284,7 @@ int main(void)
         cmocka_unit_test(what_is_no_mixture_is_refused),
         cmocka_unit_test(counts_and_sums_are_checked_too),
         cmocka_unit_test(draws_density_and_cells_agree),
-        cmocka_unit_test(cells_of_any_width_hold_their_share_of_a_bump),
+        cmocka_unit_test(cells_of_any_width_hold_their_share_of_a_component),
         cmocka_unit_test(a_wrong_mixture_does_not_trap_who_can_recover),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,28 +1,28 @@
-#include "bumps.h"
+#include "mixture.h"
 
 #include <math.h>
 
-static const double REACH = 6.0; /* standard deviations beyond which a bump holds nothing */
+static const double REACH = 6.0; /* standard deviations beyond which a component holds nothing */
 
-bool nav_bumps_given(const struct nav_prior *prior)
+bool nav_mixture_given(const struct nav_prior *prior)
 {
-    return !prior->uniform && prior->bumps > 0;
+    return !prior->uniform && prior->components > 0;
 }
 
-void nav_bumps_normalise(struct nav_component *bump, long count)
+void nav_mixture_normalise(struct nav_component *component, long count)
 {
     double total = 0.0;
     for (long n = 0; n < count; n++)
-        total += bump[n].mass;
+        total += component[n].mass;
     for (long n = 0; n < count; n++)
-        bump[n].mass /= total;
+        component[n].mass /= total;
 }
 
-static struct nav_pose mean_of(const struct nav_prior *prior)
+static struct nav_pose mixture_mean_of(const struct nav_prior *prior)
 {
     double x = 0.0, y = 0.0, c = 0.0, s = 0.0;
-    for (long n = 0; n < prior->bumps; n++) {
-        const struct nav_component *b = &prior->bump[n];
+    for (long n = 0; n < prior->components; n++) {
+        const struct nav_component *b = &prior->component[n];
         x += b->mass * b->pose.x;
         y += b->mass * b->pose.y;
         c += b->mass * cos(b->pose.theta);
@@ -31,11 +31,11 @@ static struct nav_pose mean_of(const struct nav_prior *prior)
     return (struct nav_pose){x, y, atan2(s, c)};
 }
 
-struct nav_gaussian nav_bumps_gaussian(const struct nav_prior *prior)
+struct nav_gaussian nav_mixture_gaussian(const struct nav_prior *prior)
 {
-    struct nav_gaussian g = {.mean = mean_of(prior)};
-    for (long n = 0; n < prior->bumps; n++) {
-        const struct nav_component *b = &prior->bump[n];
+    struct nav_gaussian g = {.mean = mixture_mean_of(prior)};
+    for (long n = 0; n < prior->components; n++) {
+        const struct nav_component *b = &prior->component[n];
         const double d[3] = {b->pose.x - g.mean.x, b->pose.y - g.mean.y, nav_wrap(b->pose.theta - g.mean.theta)};
         for (int k = 0; k < 9; k++)
             g.covariance[k] += b->mass * d[k / 3] * d[k % 3];
@@ -46,13 +46,13 @@ struct nav_gaussian nav_bumps_gaussian(const struct nav_prior *prior)
     return g;
 }
 
-struct nav_pose nav_bumps_draw(const struct nav_prior *prior, struct nav_rng *rng)
+struct nav_pose nav_mixture_draw(const struct nav_prior *prior, struct nav_rng *rng)
 {
     double mark = nav_rng_uniform(rng);
     long n = 0;
-    while (n + 1 < prior->bumps && (mark -= prior->bump[n].mass) >= 0.0)
+    while (n + 1 < prior->components && (mark -= prior->component[n].mass) >= 0.0)
         n++;
-    const struct nav_component *b = &prior->bump[n];
+    const struct nav_component *b = &prior->component[n];
     struct nav_pose pose = {b->pose.x + b->sigma_m * nav_rng_normal(rng), b->pose.y + b->sigma_m * nav_rng_normal(rng),
                             0.0};
     pose.theta = nav_wrap(b->pose.theta + b->sigma_rad * nav_rng_normal(rng));
@@ -65,7 +65,8 @@ double nav_normal_between(double low, double high, double mean, double sigma)
     return 0.5 * (erf((high - mean) / root) - erf((low - mean) / root));
 }
 
-double nav_heading_within(double off, double half, double sigma)
+/* Share of a heading's normal distribution within `half` a width on both sides of an angle `off` from the mean. */
+static double mixture_heading_within(double off, double half, double sigma)
 {
     double sum = 0.0;
     for (int turn = -1; turn <= 1; turn++) {
@@ -75,8 +76,8 @@ double nav_heading_within(double off, double half, double sigma)
     return sum;
 }
 
-/* Cells of a line that a bump reaches: *first .. the number returned, less 1. */
-static int reached(double at, double sigma, double cell, int count, int *first)
+/* Cells of a line that a component reaches: *first .. the number returned, less 1. */
+static int mixture_reached(double at, double sigma, double cell, int count, int *first)
 {
     *first = (int)fmax(floor((at - REACH * sigma) / cell), 0.0);
     return (int)fmin(floor((at + REACH * sigma) / cell) + 1.0, count);
@@ -89,10 +90,11 @@ struct normal {
 };
 
 /* Adds a slice's share `heading` of one; `column` has room for a line. */
-static void add_slice(const struct normal *b, const struct nav_shape *s, double heading, float *column, float *slice)
+static void mixture_add_slice(const struct normal *b, const struct nav_shape *s, double heading, float *column,
+                              float *slice)
 {
-    int left, low, right = reached(b->mean.x, b->sigma[0], s->cell, s->nx, &left);
-    int high = reached(b->mean.y, b->sigma[1], s->cell, s->ny, &low);
+    int left, low, right = mixture_reached(b->mean.x, b->sigma[0], s->cell, s->nx, &left);
+    int high = mixture_reached(b->mean.y, b->sigma[1], s->cell, s->ny, &low);
     for (int i = left; i < right; i++)
         column[i] = (float)nav_normal_between(i * s->cell, (i + 1) * s->cell, b->mean.x, b->sigma[0]);
     for (int j = low; j < high; j++) {
@@ -103,17 +105,17 @@ static void add_slice(const struct normal *b, const struct nav_shape *s, double 
     }
 }
 
-static void add_normal(const struct normal *b, const struct nav_shape *s, float *column, float *mass)
+static void mixture_add_normal(const struct normal *b, const struct nav_shape *s, float *column, float *mass)
 {
     for (int p = 0; p < s->nh; p++) {
         double off = (p + 0.5) * s->cell_theta - b->mean.theta;
-        double heading = nav_heading_within(off, s->cell_theta / 2.0, b->sigma[2]);
+        double heading = mixture_heading_within(off, s->cell_theta / 2.0, b->sigma[2]);
         if (heading > 0.0)
-            add_slice(b, s, heading, column, mass + (size_t)p * (size_t)s->ny * (size_t)s->groups * NAV_LANES);
+            mixture_add_slice(b, s, heading, column, mass + (size_t)p * (size_t)s->ny * (size_t)s->groups * NAV_LANES);
     }
 }
 
-static void add_everywhere(const struct nav_shape *s, float *mass)
+static void mixture_add_everywhere(const struct nav_shape *s, float *mass)
 {
     float each = (float)(NAV_ANYWHERE / ((double)s->nh * s->ny * s->nx));
     size_t pitch = (size_t)s->groups * NAV_LANES;
@@ -121,21 +123,21 @@ static void add_everywhere(const struct nav_shape *s, float *mass)
         mass[n] = n % pitch < (size_t)s->nx ? each : 0.0f;
 }
 
-static void add_bump(const struct nav_component *c, const struct nav_shape *s, float *column, float *mass)
+static void mixture_add_component(const struct nav_component *c, const struct nav_shape *s, float *column, float *mass)
 {
     const struct normal b = {c->pose, {c->sigma_m, c->sigma_m, c->sigma_rad}, (1.0 - NAV_ANYWHERE) * c->mass};
-    add_normal(&b, s, column, mass);
+    mixture_add_normal(&b, s, column, mass);
 }
 
-void nav_bumps_fill(const struct nav_prior *prior, struct nav_histogram *h)
+void nav_mixture_fill(const struct nav_prior *prior, struct nav_histogram *h)
 {
     const struct normal one = {prior->mean, {prior->sigma[0], prior->sigma[1], prior->sigma[2]}, 1.0};
     float *column, *mass = nav_histogram_write_out(h, &column);
-    if (nav_bumps_given(prior))
-        add_everywhere(&h->shape, mass);
+    if (nav_mixture_given(prior))
+        mixture_add_everywhere(&h->shape, mass);
     else
-        add_normal(&one, &h->shape, column, mass);
-    for (long n = 0; nav_bumps_given(prior) && n < prior->bumps; n++)
-        add_bump(&prior->bump[n], &h->shape, column, mass);
+        mixture_add_normal(&one, &h->shape, column, mass);
+    for (long n = 0; nav_mixture_given(prior) && n < prior->components; n++)
+        mixture_add_component(&prior->component[n], &h->shape, column, mass);
     nav_histogram_take(h);
 }
