@@ -60,6 +60,12 @@ void nav_gaussian_root(const double p[9], double root[9])
     memcpy(root, out, sizeof out);
 }
 
+struct nav_pose nav_gaussian_at(const struct nav_gaussian *g, const double l[9], const double z[3])
+{
+    return (struct nav_pose){g->mean.x + l[0] * z[0], g->mean.y + l[3] * z[0] + l[4] * z[1],
+                             nav_wrap(g->mean.theta + l[6] * z[0] + l[7] * z[1] + l[8] * z[2])};
+}
+
 /* Mass of whitened lattice point i of `points`, which reach to 3 standard deviations. */
 static double gaussian_share(int i, int points)
 {
@@ -76,10 +82,9 @@ long nav_gaussian_components(const struct nav_gaussian *g, struct nav_component 
     nav_gaussian_root(g->covariance, l);
     for (int n = 0; n < ALL && n < room; n++) {
         int i = n / TURNS / ACROSS, j = n / TURNS % ACROSS, k = n % TURNS;
-        double u = spacing * (i - ACROSS / 2), v = spacing * (j - ACROSS / 2), w = spacing_turn * (k - TURNS / 2);
+        const double z[3] = {spacing * (i - ACROSS / 2), spacing * (j - ACROSS / 2), spacing_turn * (k - TURNS / 2)};
         out[n] = (struct nav_component){
-            .pose = {g->mean.x + l[0] * u, g->mean.y + l[3] * u + l[4] * v,
-                     nav_wrap(g->mean.theta + l[6] * u + l[7] * v + l[8] * w)},
+            .pose = nav_gaussian_at(g, l, z),
             .sigma_m = spacing / sqrt(12.0) * fmax(hypot(l[0], l[3]), l[4]), /* no gaps along the long axis */
             .sigma_rad = spacing_turn / sqrt(12.0) * l[8],
             .mass = gaussian_share(i, ACROSS) * gaussian_share(j, ACROSS) * gaussian_share(k, TURNS),
@@ -123,13 +128,16 @@ bool nav_gaussian_invert(const double c[9], double out[9])
 double nav_gaussian_mass(const struct nav_gaussian *g, double radius, double angle)
 {
     enum { DIRECTIONS = 32 };
+    const double *p = g->covariance, turned = erf(angle / sqrt(2.0 * fmax(p[8], 1e-18)));
+    if (radius * radius > 50.0 * (p[0] + p[4])) /* less than e^-25 is farther off, whatever the direction */
+        return turned;
     double root[9], mass = 0.0;
-    nav_gaussian_root(g->covariance, root);
+    nav_gaussian_root(p, root);
     /* A standard normal in polar coordinates: along each direction the whitened radius is Rayleigh distributed. */
     for (int i = 0; i < DIRECTIONS; i++) {
         double u = cos(NAV_PI * i / DIRECTIONS), v = sin(NAV_PI * i / DIRECTIONS);
         double stretch = hypot(root[0] * u, root[3] * u + root[4] * v);
         mass += -expm1(-0.5 * radius * radius / (stretch * stretch)) / DIRECTIONS;
     }
-    return mass * erf(angle / sqrt(2.0 * fmax(g->covariance[8], 1e-18)));
+    return mass * turned;
 }

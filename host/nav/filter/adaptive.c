@@ -1,17 +1,18 @@
 /* The adaptive filter: as much belief as the rows leave open, and no more.
  *
- * Known: a cloud of hypotheses at exact poses, as many as its spread needs. In doubt: an arena-wide histogram wakes
- * and goes over the rows from which on the robot may have been elsewhere; both beliefs are held, weighted by how well
- * they explained those rows. Unknown: the histogram alone, until its mass sits in few enough cells for a cloud; as long
- * as there are several modes it stays beside the cloud and tells what each of them weighs. Work per row is bounded by
- * adaptive.budget in every state: what the histogram has not done waits for the next row.
- * docs/navigation_adaptive.md tells more. */
+ * Known: a cloud of hypotheses at exact poses, as many as its spread needs, or a Gaussian where that has told as well.
+ * In doubt: an arena-wide histogram wakes and goes over the rows from which on the robot may have been elsewhere; both
+ * beliefs are held, weighted by how well they explained those rows. Unknown: the histogram alone, until its mass sits
+ * in few enough cells for a cloud; as long as there are several modes it stays beside the cloud and tells what each of
+ * them weighs. Work per row is bounded by adaptive.budget in every state: what the histogram has not done waits for the
+ * next row. docs/navigation_adaptive.md tells more. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "adaptive_answer.h"
 #include "adaptive_doubt.h"
+#include "adaptive_gaussian.h"
 #include "adaptive_global.h"
 #include "mixture.h"
 #include "particle_bins.h"
@@ -32,6 +33,7 @@ struct adaptive_cloud {
 struct adaptive {
     const struct nav_problem *problem;
     struct nav_likelihood *likelihood;
+    struct adaptive_gaussian gaussian; /* what is held locally is it while it carries, the cloud otherwise */
     struct adaptive_cloud cloud;
     struct adaptive_global global;
     struct adaptive_log log;
@@ -54,6 +56,7 @@ static void destroy(void *self)
     adaptive_doubt_free(&a->doubt);
     adaptive_log_free(&a->log);
     adaptive_global_free(&a->global);
+    adaptive_gaussian_free(&a->gaussian);
     nav_particles_free(&a->cloud.set);
     nav_bins_free(&a->cloud.bins);
     nav_likelihood_free(a->likelihood);
@@ -84,6 +87,7 @@ static struct nav_pose ahead(const struct adaptive *a)
 static void answer(struct adaptive *a)
 {
     struct adaptive_held held = {.problem = a->problem,
+                                 .gaussian = a->gaussian.carries ? &a->gaussian.kalman.belief : NULL,
                                  .local = a->local ? &a->cloud.set : NULL,
                                  .bins = &a->cloud.bins,
                                  .global = a->awake && !(a->whole && a->local) ? &a->global : NULL,
@@ -122,6 +126,8 @@ static void begin(struct adaptive *a)
     a->local = !a->problem->prior.uniform && adaptive_begin_cloud(a);
     a->awake = !a->local;
     a->answer.belief = nav_gaussian_prior(a->problem);
+    a->gaussian.compared = a->local && nav_gaussian_mass(&a->answer.belief, NAV_NEAR_M, NAV_NEAR_RAD) >=
+                                           1.0 - a->problem->settings.adaptive.scattered;
     answer(a);
 }
 
@@ -150,6 +156,7 @@ static void *create(const struct nav_problem *problem)
     nav_rng_seed(&rng, problem->seed, 1);
     a->likelihood = nav_likelihood_new(&problem->arena, &problem->robot, &problem->settings, 0.0);
     if (!a->likelihood || adaptive_global_init(&a->global, problem) || adaptive_init_cloud(a) ||
+        adaptive_gaussian_init(&a->gaussian, problem, a->likelihood) ||
         adaptive_log_init(&a->log, &a->likelihood->sensors) || adaptive_doubt_init(&a->doubt, a->likelihood, &rng)) {
         destroy(a);
         return NULL;
@@ -280,10 +287,21 @@ static void leave(struct adaptive *a)
     nav_map_forget(a->likelihood);
 }
 
+/* The Gaussian does not tell it as well any more: hypotheses are drawn from it. */
+static void adaptive_scatter(struct adaptive *a)
+{
+    a->gaussian.carries = false;
+    a->gaussian.compared = 0;
+    adaptive_gaussian_draw(&a->gaussian, &a->cloud.set, &a->cloud.rng, a->cloud.sample.least);
+    a->touched += a->cloud.set.count;
+}
+
 static void decide(struct adaptive *a)
 {
     const struct nav_settings *s = &a->problem->settings;
     double present = odds(a);
+    if (a->gaussian.carries && (present > log(s->adaptive.wake) || adaptive_gaussian_fails(&a->gaussian)))
+        adaptive_scatter(a);
     if (!a->awake) {
         if (present > log(s->adaptive.wake))
             wake(a);
@@ -343,24 +361,59 @@ static void predict(void *self, const struct nav_motion *motion)
     a->pending_unknown = a->pending_unknown || motion->unknown_m > 0.0 || motion->unknown_rad > 0.0;
 }
 
-static void update_local(struct adaptive *a)
+/* Whether a Gaussian tells it as well: both take the same rows, from where the cloud is one compact mode. */
+static void adaptive_compare(struct adaptive *a, double cloud, double gaussian)
+{
+    struct adaptive_gaussian *g = &a->gaussian;
+    if (a->awake)
+        g->compared = 0;
+    else if (g->compared > 0)
+        g->carries = adaptive_gaussian_compare(g, cloud, gaussian);
+    else if (g->compared < 0)
+        g->compared++;
+    if (a->awake || g->compared != 0)
+        return;
+    struct nav_summary now = nav_particles_summary(&a->cloud.set, &a->cloud.bins, a->answer.belief.mean);
+    adaptive_gaussian_begin(g, &now.belief);
+    g->compared = now.near >= 1.0 - a->problem->settings.adaptive.scattered;
+}
+
+/* Returns the row's log-likelihood. */
+static double adaptive_take_cloud(struct adaptive *a, double mass)
 {
     struct nav_particles *set = &a->cloud.set;
     a->cloud.moved = 2 * set->count;
     nav_particles_move(set, a->pending.step, &a->pending.noise, !a->pending_unknown, &a->cloud.rng);
-    double local = nav_particles_weigh(set, a->likelihood, 1.0 - elsewhere(a));
+    double local = nav_particles_weigh(set, a->likelihood, mass);
     if (a->awake && a->modes > 1)
         keep_shares(a);
+    return local;
+}
+
+static void update_local(struct adaptive *a, const struct nav_evidence *evidence)
+{
+    bool carries = a->gaussian.carries;
+    double mass = 1.0 - elsewhere(a);
+    double local = adaptive_gaussian_take(&a->gaussian, &a->pending, evidence, carries ? mass : -1.0);
+    long worked = a->gaussian.looked;
+    a->cloud.moved = 0;
+    if (!carries) {
+        double gaussian = local;
+        local = adaptive_take_cloud(a, mass);
+        worked += a->cloud.set.count;
+        adaptive_compare(a, local, gaussian);
+    }
     adaptive_log_entry(&a->log, a->log.head - 1)->local = local;
     adaptive_doubt_take(&a->doubt, a->likelihood, a->log.head - 1, adaptive_doubt_anywhere(&a->doubt, a->likelihood),
                         local);
     if (!a->whole && a->problem->settings.map.learn >= 0.5)
         nav_map_learn(a->likelihood);
     nav_trust_learn(a->likelihood);
-    a->evaluations += set->count;
-    a->distinct += set->count;
-    adaptive_resample(a, false);
-    a->touched += a->cloud.moved;
+    a->evaluations += worked;
+    a->distinct += worked;
+    if (!a->gaussian.carries)
+        adaptive_resample(a, false);
+    a->touched += a->gaussian.looked + a->cloud.moved;
 }
 
 static void update(void *self, const struct nav_evidence *evidence)
@@ -371,7 +424,7 @@ static void update(void *self, const struct nav_evidence *evidence)
     adaptive_log_write(&a->log, a->pending.step, a->pending.noise, evidence);
     a->answer.belief.mean = nav_compose(a->answer.belief.mean, a->pending.step);
     if (a->local)
-        update_local(a);
+        update_local(a, evidence);
     work(a);
     decide(a);
     answer(a);
@@ -387,7 +440,8 @@ static void estimate(const void *self, struct nav_estimate *out)
     out->evaluations = a->evaluations;
     out->distinct = a->distinct;
     out->touched = a->touched;
-    out->states = (a->local ? a->cloud.set.count : 0) + (a->awake ? (long)adaptive_global_cells(&a->global) : 0);
+    out->states = a->gaussian.carries ? 1 : a->local ? a->cloud.set.count : 0;
+    out->states += a->awake ? (long)adaptive_global_cells(&a->global) : 0;
     out->bytes = sizeof *a + nav_likelihood_bytes(a->likelihood) + adaptive_global_bytes(&a->global) +
                  adaptive_log_bytes(&a->log) + nav_particles_bytes(&a->cloud.set) + nav_bins_bytes(&a->cloud.bins);
 }
@@ -398,6 +452,11 @@ static long components(const void *self, struct nav_component *out, long room)
     bool other = a->awake && !(a->whole && a->local);
     double share = other ? elsewhere(a) : 0.0;
     long count = 0;
+    if (a->gaussian.carries) {
+        struct nav_gaussian now = a->gaussian.kalman.belief;
+        nav_gaussian_move(&now, a->pending.step, &a->pending.noise);
+        return nav_gaussian_components(&now, out, room);
+    }
     if (a->local)
         count = nav_particles_components(&a->cloud.set, a->answer.belief.mean, &a->pending, 1.0 - share, out, room);
     if (!other)

@@ -45,6 +45,10 @@ static struct nav_summary from_global(const struct adaptive_held *h)
  * guess. */
 struct nav_summary adaptive_answer(const struct adaptive_held *h, struct nav_pose guess)
 {
+    if (h->gaussian) {
+        double near = nav_gaussian_mass(h->gaussian, NAV_NEAR_M, NAV_NEAR_RAD);
+        return from_local(h, (struct nav_summary){.belief = *h->gaussian, .near = near});
+    }
     if (!h->local)
         return from_global(h);
     struct nav_summary local = nav_particles_summary(h->local, h->bins, guess);

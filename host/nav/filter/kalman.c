@@ -7,15 +7,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "borders.h"
-#include "filter.h"
-#include "gaussian.h"
-#include "likelihood.h"
+#include "kalman.h"
 
 static const double GATE = 9.0;        /* squared standard deviations */
 static const double ALONG_LEAST = 0.3; /* a crossing at a flatter angle than this cosine says too little */
 
-struct kalman_sighting {
+struct nav_kalman_sighting {
     int ray;              /* a contact along this object whisker; -1: a border crossed */
     struct nav_tip point; /* crossing: robot frame */
     bool upright;         /* crossing: the border is a line x = z, else y = z */
@@ -27,63 +24,52 @@ struct kalman_sighting {
 
 /* A sighting about the belief, to first and second moments: what is expected, its variance without the sighting's own,
  * and its covariance with x, y, theta. */
-struct kalman_linear {
+struct nav_kalman_linear {
     double expected, variance, cross[3];
 };
 
-struct kalman;
-typedef void kalman_linearise(struct kalman *, const struct kalman_sighting *, struct kalman_linear *);
-
-struct kalman {
-    const struct nav_problem *problem;
-    struct nav_gaussian belief;
-    kalman_linearise *linearise;       /* NULL: nothing is corrected, and what follows is unused */
-    struct nav_likelihood *likelihood; /* for the texture models */
-    double *weight;                    /* [whiskers] of the row, object whiskers left out */
-    struct nav_borders borders;
-    long evaluations; /* expected observations worked out for the last row */
-};
-
+struct nav_kalman;
 static void kalman_destroy(void *self)
 {
-    struct kalman *k = self;
+    struct nav_kalman *k = self;
     nav_likelihood_free(k->likelihood);
     nav_borders_free(&k->borders);
     free(k->weight);
     free(k);
 }
 
-static int kalman_init(struct kalman *k)
+static void *kalman_create(const struct nav_problem *problem, nav_kalman_linearise *linearise)
 {
-    const struct nav_problem *p = k->problem;
-    k->likelihood = nav_likelihood_new(&p->arena, &p->robot, &p->settings, 0.0);
-    k->weight = k->likelihood ? calloc((size_t)k->likelihood->whiskers + 1, sizeof *k->weight) : NULL;
-    return nav_borders_init(&k->borders, &p->arena, &p->robot) || !k->weight ? -1 : 0;
-}
-
-static void *kalman_create(const struct nav_problem *problem, kalman_linearise *linearise)
-{
-    struct kalman *k = calloc(1, sizeof *k);
+    struct nav_kalman *k = calloc(1, sizeof *k);
     if (!k)
         return NULL;
-    *k = (struct kalman){.problem = problem, .belief = nav_gaussian_prior(problem), .linearise = linearise};
-    if (!linearise || kalman_init(k) == 0)
+    *k = (struct nav_kalman){.problem = problem, .belief = nav_gaussian_prior(problem), .linearise = linearise};
+    if (!linearise)
+        return k;
+    k->likelihood = nav_likelihood_new(&problem->arena, &problem->robot, &problem->settings, 0.0);
+    k->weight = k->likelihood ? calloc((size_t)k->likelihood->whiskers + 1, sizeof *k->weight) : NULL;
+    if (nav_borders_init(&k->borders, &problem->arena, &problem->robot) == 0 && k->weight)
         return k;
     kalman_destroy(k);
     return NULL;
 }
 
+void nav_kalman_move(struct nav_kalman *k, struct nav_pose step, const struct nav_noise *noise)
+{
+    nav_gaussian_move(&k->belief, step, noise);
+    nav_borders_move(&k->borders, step);
+}
+
 static void kalman_predict(void *self, const struct nav_motion *motion)
 {
-    struct kalman *k = self;
+    struct nav_kalman *k = self;
     struct nav_noise noise = nav_motion_noise(&k->problem->robot, &k->problem->settings, motion);
-    nav_gaussian_move(&k->belief, motion->step, &noise);
-    nav_borders_move(&k->borders, motion->step);
+    nav_kalman_move(k, motion->step, &noise);
 }
 
 /* Expected direction of the face that the mean meets, less the one that was told, for a robot that is turned otherwise.
  */
-static double kalman_turned(const struct kalman *k, const struct kalman_sighting *s, double theta)
+static double kalman_turned(const struct nav_kalman *k, const struct nav_kalman_sighting *s, double theta)
 {
     const struct nav_likelihood *l = k->likelihood;
     const struct nav_pose *mean = &k->belief.mean;
@@ -96,7 +82,7 @@ static double kalman_turned(const struct kalman *k, const struct kalman_sighting
 }
 
 /* Expected value of a sighting at a pose; not finite when nothing is within reach. */
-static double kalman_expect(struct kalman *k, const struct kalman_sighting *s, struct nav_pose pose)
+static double kalman_expect(struct nav_kalman *k, const struct nav_kalman_sighting *s, struct nav_pose pose)
 {
     k->evaluations++;
     struct nav_pose at = nav_compose(pose, (struct nav_pose){s->point.x, s->point.y, 0.0});
@@ -124,12 +110,13 @@ static struct nav_pose kalman_shifted(struct nav_pose pose, const double d[3])
 
 /* The extended filter's: about the mean, by central differences. Not finite at a corner or an edge, where the range
  * jumps between two points. */
-static void kalman_linearise_mean(struct kalman *k, const struct kalman_sighting *s, struct kalman_linear *out)
+static void kalman_linearise_mean(struct nav_kalman *k, const struct nav_kalman_sighting *s,
+                                  struct nav_kalman_linear *out)
 {
     static const double STEP = 1e-4, STEEPEST = 50.0; /* m and rad; m per m or rad */
     const double *p = k->belief.covariance;
     double slope[3];
-    *out = (struct kalman_linear){.expected = kalman_expect(k, s, k->belief.mean)};
+    *out = (struct nav_kalman_linear){.expected = kalman_expect(k, s, k->belief.mean)};
     for (int a = 0; a < 3; a++) {
         double d[3] = {0.0};
         d[a] = STEP;
@@ -147,11 +134,12 @@ static void kalman_linearise_mean(struct kalman *k, const struct kalman_sighting
 /* The unscented filter's (Julier and Uhlmann): moments over the six points plus and minus sqrt(3) times the columns of
  * the covariance's root. With n = 3 and kappa = 0 the centre has no weight and all others 1/6: fourth moments fit a
  * Gaussian, and no weight is negative. */
-static void kalman_linearise_points(struct kalman *k, const struct kalman_sighting *s, struct kalman_linear *out)
+static void kalman_linearise_points(struct nav_kalman *k, const struct nav_kalman_sighting *s,
+                                    struct nav_kalman_linear *out)
 {
     enum { POINTS = 6 };
     double root[9], d[POINTS][3], value[POINTS];
-    *out = (struct kalman_linear){.expected = 0.0};
+    *out = (struct nav_kalman_linear){.expected = 0.0};
     nav_gaussian_root(k->belief.covariance, root);
     for (int n = 0; n < POINTS; n++) {
         for (int a = 0; a < 3; a++)
@@ -170,7 +158,7 @@ static void kalman_linearise_points(struct kalman *k, const struct kalman_sighti
 }
 
 /* Squared standard deviations that a sighting is off by; INFINITY where it cannot be expected. */
-static double kalman_badness(struct kalman *k, const struct kalman_sighting *s, struct kalman_linear *l)
+static double kalman_badness(struct nav_kalman *k, const struct nav_kalman_sighting *s, struct nav_kalman_linear *l)
 {
     k->linearise(k, s, l);
     double off = s->z - l->expected, badness = off * off / (l->variance + s->variance);
@@ -179,9 +167,9 @@ static double kalman_badness(struct kalman *k, const struct kalman_sighting *s, 
 
 /* Corrects the belief by one sighting unless it is further off than three standard deviations, or the result would be
  * no covariance any more. */
-static void kalman_correct(struct kalman *k, const struct kalman_sighting *s)
+static void kalman_correct(struct nav_kalman *k, const struct nav_kalman_sighting *s)
 {
-    struct kalman_linear l;
+    struct nav_kalman_linear l;
     if (kalman_badness(k, s, &l) > GATE)
         return;
     struct nav_gaussian next = k->belief;
@@ -196,23 +184,23 @@ static void kalman_correct(struct kalman *k, const struct kalman_sighting *s)
         k->belief = next;
 }
 
-static void kalman_read_range(struct kalman *k, int r, double distance, double weight)
+static void kalman_read_range(struct nav_kalman *k, int r, double distance, double weight)
 {
     const struct nav_robot *robot = &k->problem->robot;
     double length = robot->ray[r].length, edge = k->problem->settings.radial.edge_m;
     bool contact = isfinite(distance);
     double sigma = contact ? robot->radial_sigma : hypot(robot->radial_sigma, edge);
     double spread = sqrt(k->belief.covariance[0] + k->belief.covariance[4]);
-    struct kalman_sighting s = {.ray = r,
-                                .z = contact ? distance : length,
-                                .variance = sigma * sigma / weight,
-                                .reach = contact ? length + 3.0 * spread : length};
+    struct nav_kalman_sighting s = {.ray = r,
+                                    .z = contact ? distance : length,
+                                    .variance = sigma * sigma / weight,
+                                    .reach = contact ? length + 3.0 * spread : length};
     kalman_correct(k, &s);
 }
 
-static void kalman_read_normal(struct kalman *k, int r, const double *normal, double weight)
+static void kalman_read_normal(struct nav_kalman *k, int r, const double *normal, double weight)
 {
-    struct kalman_sighting s = {
+    struct nav_kalman_sighting s = {
         .ray = r, .normal = true, .told = normal[0], .variance = normal[1] * normal[1] / weight};
     kalman_correct(k, &s);
 }
@@ -228,12 +216,12 @@ static int kalman_tile(const struct nav_arena *arena, int column, int row)
 struct kalman_search {
     const struct nav_crossing *crossing;
     struct nav_pose toward; /* motion of the crossing in the world; theta unused */
-    struct kalman_sighting best;
+    struct nav_kalman_sighting best;
     double badness; /* of the best */
 };
 
 /* Whether the line before tile (column, row) is such a border as was crossed, and the likeliest so far. */
-static void kalman_consider(struct kalman *k, struct kalman_search *search, bool upright, int column, int row)
+static void kalman_consider(struct nav_kalman *k, struct kalman_search *search, bool upright, int column, int row)
 {
     const struct nav_arena *arena = &k->problem->arena;
     const struct nav_crossing *crossing = search->crossing;
@@ -242,12 +230,12 @@ static void kalman_consider(struct kalman *k, struct kalman_search *search, bool
     if (fabs(along) < ALONG_LEAST || (along > 0.0 ? below : above) != crossing->from ||
         (along > 0.0 ? above : below) != crossing->to)
         return;
-    struct kalman_sighting s = {.ray = -1,
-                                .point = crossing->point,
-                                .upright = upright,
-                                .z = (upright ? column : row) * arena->tile,
-                                .variance = sigma * sigma};
-    struct kalman_linear l;
+    struct nav_kalman_sighting s = {.ray = -1,
+                                    .point = crossing->point,
+                                    .upright = upright,
+                                    .z = (upright ? column : row) * arena->tile,
+                                    .variance = sigma * sigma};
+    struct nav_kalman_linear l;
     double badness = kalman_badness(k, &s, &l);
     if (badness >= search->badness)
         return;
@@ -255,7 +243,7 @@ static void kalman_consider(struct kalman *k, struct kalman_search *search, bool
     search->badness = badness;
 }
 
-static void kalman_read_crossing(struct kalman *k, const struct nav_crossing *crossing)
+static void kalman_read_crossing(struct nav_kalman *k, const struct nav_crossing *crossing)
 {
     struct nav_pose mean = k->belief.mean, turn = {0.0, 0.0, mean.theta};
     struct nav_pose at = nav_compose(mean, (struct nav_pose){crossing->point.x, crossing->point.y, 0.0});
@@ -272,16 +260,20 @@ static void kalman_read_crossing(struct kalman *k, const struct nav_crossing *cr
         kalman_correct(k, &search.best);
 }
 
-static void kalman_update(void *self, const struct nav_evidence *evidence)
+int nav_kalman_init(struct nav_kalman *k, const struct nav_problem *problem, struct nav_likelihood *likelihood)
 {
-    struct kalman *k = self;
+    *k = (struct nav_kalman){.problem = problem,
+                             .belief = nav_gaussian_prior(problem),
+                             .linearise = kalman_linearise_mean,
+                             .likelihood = likelihood};
+    return nav_borders_init(&k->borders, &problem->arena, &problem->robot);
+}
+
+void nav_kalman_take(struct nav_kalman *k, const struct nav_evidence *evidence)
+{
     struct nav_crossing crossing;
-    if (!k->linearise)
-        return;
-    k->evaluations = 0;
     const int *first = k->likelihood->sensors.first; /* texture, distance, normal; other sensors say nothing */
-    memcpy(k->weight, evidence->weight, (size_t)first[1] * sizeof *k->weight);
-    nav_likelihood_read(k->likelihood, &(struct nav_evidence){evidence->reading, k->weight});
+    k->evaluations = 0;
     for (int t = 0; t < first[1]; t++) {
         if (evidence->weight[t] > 0.0 && nav_borders_read(&k->borders, t, k->likelihood->table[t], &crossing))
             kalman_read_crossing(k, &crossing);
@@ -297,9 +289,19 @@ static void kalman_update(void *self, const struct nav_evidence *evidence)
     nav_borders_row_done(&k->borders);
 }
 
+static void kalman_update(void *self, const struct nav_evidence *evidence)
+{
+    struct nav_kalman *k = self;
+    if (!k->linearise)
+        return;
+    memcpy(k->weight, evidence->weight, (size_t)k->likelihood->sensors.first[1] * sizeof *k->weight);
+    nav_likelihood_read(k->likelihood, &(struct nav_evidence){evidence->reading, k->weight});
+    nav_kalman_take(k, evidence);
+}
+
 static void kalman_estimate(const void *self, struct nav_estimate *out)
 {
-    const struct kalman *k = self;
+    const struct nav_kalman *k = self;
     nav_gaussian_estimate(&k->belief, out);
     out->evaluations = out->distinct = out->touched = k->evaluations;
     out->states = 1;
@@ -308,7 +310,7 @@ static void kalman_estimate(const void *self, struct nav_estimate *out)
 
 static long kalman_components(const void *self, struct nav_component *out, long room)
 {
-    return nav_gaussian_components(&((const struct kalman *)self)->belief, out, room);
+    return nav_gaussian_components(&((const struct nav_kalman *)self)->belief, out, room);
 }
 
 static void *kalman_create_none(const struct nav_problem *problem)

@@ -19,27 +19,27 @@ static struct nav_problem facing_wall(void)
     return p;
 }
 
-static void read_distance(struct kalman *k, double distance)
+static void read_distance(struct nav_kalman *k, double distance)
 {
     const double *reading[] = {NULL, &distance};
     kalman_update(k, &(struct nav_evidence){reading, RAY_READ});
 }
 
 /* One window that says texture `is` with certainty. */
-static void read_texture(struct kalman *k, int is)
+static void read_texture(struct nav_kalman *k, int is)
 {
     const double loglik[] = {is == 0 ? 0.0 : -50.0, is == 1 ? 0.0 : -50.0};
     const double *reading[] = {loglik, NULL};
     kalman_update(k, &(struct nav_evidence){reading, TIP_READ});
 }
 
-static void drive(struct kalman *k, double metres)
+static void drive(struct nav_kalman *k, double metres)
 {
     kalman_predict(k, &(struct nav_motion){.step = {metres, 0.0, 0.0}});
 }
 
 /* Expected 0.15, read 0.14: the gain is 0.03^2 / (0.03^2 + 0.005^2), towards the wall. */
-static void assert_contact_is_a_kalman_update(const struct kalman *k)
+static void assert_contact_is_a_kalman_update(const struct nav_kalman *k)
 {
     double prior = 0.0009, noise = 0.000025, gain = prior / (prior + noise);
     assert_near(k->belief.mean.x, 0.8 + gain * 0.01, 1e-6);
@@ -61,7 +61,7 @@ static struct nav_problem behind_the_border(void)
 }
 
 /* Drives eight steps; the tip reads tile 0 for four of them, then tile 1: it crossed between steps 4 and 5. */
-static void cross(struct kalman *k)
+static void cross(struct nav_kalman *k)
 {
     for (int i = 1; i <= 8; i++) {
         drive(k, 0.02);
@@ -73,7 +73,7 @@ static void a_contact_square_on_is_a_kalman_update(void **state)
 {
     (void)state;
     struct nav_problem p = facing_wall();
-    struct kalman *k = kalman_create_extended(&p);
+    struct nav_kalman *k = kalman_create_extended(&p);
     read_distance(k, 0.14);
     assert_contact_is_a_kalman_update(k);
     assert_int_equal(k->evaluations, 7); /* the mean and two per axis */
@@ -85,9 +85,9 @@ static void a_slanted_wall_turns_heading_into_range(void **state)
     (void)state;
     struct nav_problem p = facing_wall();
     p.prior.mean.theta = NAV_PI / 6.0;
-    struct kalman *k = kalman_create_extended(&p);
-    struct kalman_linear l;
-    const struct kalman_sighting s = {.ray = 0, .reach = 1.0};
+    struct nav_kalman *k = kalman_create_extended(&p);
+    struct nav_kalman_linear l;
+    const struct nav_kalman_sighting s = {.ray = 0, .reach = 1.0};
     kalman_linearise_mean(k, &s, &l);
     /* Range (1 - x) / cos(a) - 0.05: its slope is -1 / cos(a) in x, and (1 - x) sin(a) / cos(a)^2 in the heading. */
     double c = sqrt(0.75);
@@ -103,7 +103,7 @@ static void a_corner_has_no_derivative_and_changes_nothing(void **state)
     (void)state;
     struct nav_problem p = facing_wall();
     p.prior.mean = (struct nav_pose){0.68, 0.3, 0.0}; /* the whisker grazes the upper edge of the box */
-    struct kalman *k = kalman_create_extended(&p);
+    struct nav_kalman *k = kalman_create_extended(&p);
     read_distance(k, 0.1);
     assert_near(k->belief.mean.x, 0.68, 0.0);
     assert_near(k->belief.covariance[0], 0.0009, 0.0);
@@ -115,7 +115,7 @@ static void what_is_too_far_off_is_not_believed(void **state)
     (void)state;
     struct nav_problem p = facing_wall();
     p.prior.sigma[0] = 0.005;
-    struct kalman *k = kalman_create_extended(&p);
+    struct nav_kalman *k = kalman_create_extended(&p);
     read_distance(k, 0.10); /* 0.05 m off at 0.007 m */
     assert_near(k->belief.mean.x, 0.8, 0.0);
     assert_near(k->belief.covariance[0], 0.000025, 0.0);
@@ -126,7 +126,7 @@ static void no_contact_pushes_out_of_reach_and_no_further(void **state)
 {
     (void)state;
     struct nav_problem p = facing_wall();
-    struct kalman *k = kalman_create_extended(&p);
+    struct nav_kalman *k = kalman_create_extended(&p);
     read_distance(k, INFINITY); /* the wall is expected 0.15 m along a whisker of 0.2 m: at least 0.2 */
     double noise = 0.005 * 0.005 + p.settings.radial.edge_m * p.settings.radial.edge_m;
     assert_near(k->belief.mean.x, 0.8 - 0.05 * 0.0009 / (0.0009 + noise), 1e-6);
@@ -141,7 +141,7 @@ static void a_border_crossed_puts_the_tip_on_the_line(void **state)
 {
     (void)state;
     struct nav_problem p = behind_the_border();
-    struct kalman *k = kalman_create_extended(&p);
+    struct nav_kalman *k = kalman_create_extended(&p);
     cross(k);
     /* At steps 4 and 5 the mean had the tip at 0.48 and 0.50, between them 0.49; the border is at 0.5. Its place is
      * known to hypot(0.01, 0.01). Since then the robot has driven 0.07 m, which moves the line along with the tip. */
@@ -161,7 +161,7 @@ static void of_two_borders_that_were_it_the_likelier_is_taken(void **state)
     struct nav_problem p = behind_the_border();
     p.prior.mean = (struct nav_pose){0.49 - way * c, 0.40 - way * c, NAV_PI / 4.0};
     p.prior.sigma[0] = p.prior.sigma[1] = 0.005;
-    struct kalman *k = kalman_create_extended(&p);
+    struct nav_kalman *k = kalman_create_extended(&p);
     cross(k);
     /* The crossing's place is known to hypot(0.01, 0.01) along the way, which meets the border at 45 degrees. */
     double prior = 0.000025, gain = prior / (prior + 0.0001);
@@ -193,7 +193,7 @@ static void a_texture_without_a_border_says_nothing(void **state)
 {
     (void)state;
     struct nav_problem p = behind_the_border();
-    struct kalman *k = kalman_create_extended(&p);
+    struct nav_kalman *k = kalman_create_extended(&p);
     for (int i = 0; i < 4; i++)
         read_texture(k, 1); /* the belief's own tile is 0: it cannot tell */
     assert_near(k->belief.mean.x, 0.3, 0.0);
@@ -205,7 +205,7 @@ static void a_first_window_that_was_wrong_is_no_border(void **state)
 {
     (void)state;
     struct nav_problem p = behind_the_border();
-    struct kalman *k = kalman_create_extended(&p);
+    struct nav_kalman *k = kalman_create_extended(&p);
     for (int i = 1; i <= 8; i++) {
         drive(k, 0.02);
         read_texture(k, i > 1); /* one window of tile 0, then the surface that it has been on all the time */
@@ -219,12 +219,12 @@ static void the_points_have_the_beliefs_moments(void **state)
 {
     (void)state;
     struct nav_problem p = facing_wall();
-    struct kalman *k = kalman_create_unscented(&p);
+    struct nav_kalman *k = kalman_create_unscented(&p);
     const struct nav_gaussian g = {.covariance = {0.04, 0.01, -0.002, 0.01, 0.09, 0.003, -0.002, 0.003, 0.01}};
     k->belief = g;
     for (int upright = 0; upright < 2; upright++) { /* a border sees x or y of the robot's own place, which is linear */
-        const struct kalman_sighting s = {.ray = -1, .upright = upright};
-        struct kalman_linear l;
+        const struct nav_kalman_sighting s = {.ray = -1, .upright = upright};
+        struct nav_kalman_linear l;
         kalman_linearise_points(k, &s, &l);
         assert_near(l.expected, 0.0, 1e-12);
         assert_near(l.variance, upright ? 0.04 : 0.09, 1e-12);
@@ -238,7 +238,7 @@ static void unscented_a_contact_square_on_is_a_kalman_update(void **state)
 {
     (void)state;
     struct nav_problem p = facing_wall();
-    struct kalman *k = kalman_create_unscented(&p);
+    struct nav_kalman *k = kalman_create_unscented(&p);
     read_distance(k, 0.14);
     assert_contact_is_a_kalman_update(k);
     assert_int_equal(k->evaluations, 6);
@@ -251,9 +251,9 @@ static void a_heading_that_is_unsure_lengthens_the_expected_range(void **state)
     struct nav_problem p = facing_wall();
     p.prior.sigma[0] = p.prior.sigma[1] = 1e-5;
     p.prior.sigma[2] = 0.2;
-    struct kalman *k = kalman_create_unscented(&p);
-    struct kalman_linear l;
-    const struct kalman_sighting s = {.ray = 0, .reach = 1.0};
+    struct nav_kalman *k = kalman_create_unscented(&p);
+    struct nav_kalman_linear l;
+    const struct nav_kalman_sighting s = {.ray = 0, .reach = 1.0};
     kalman_linearise_points(k, &s, &l);
     /* Two of six points are turned by 0.2 sqrt(3): the range grows by 0.2 (1 / cos - 1) there, as a straight line of
      * derivatives would never say. */
@@ -266,7 +266,7 @@ static void unscented_a_border_crossed_puts_the_tip_on_the_line(void **state)
 {
     (void)state;
     struct nav_problem p = behind_the_border();
-    struct kalman *k = kalman_create_unscented(&p);
+    struct nav_kalman *k = kalman_create_unscented(&p);
     cross(k);
     double gain = 0.0025 / (0.0025 + 0.0002); /* as worked out above */
     assert_near(k->belief.mean.x, 0.3 + 8 * 0.02 + gain * 0.01, 1e-6);
@@ -278,7 +278,7 @@ static void nothing_read_changes_nothing(void **state)
 {
     (void)state;
     struct nav_problem p = facing_wall();
-    struct kalman *k = kalman_create_unscented(&p);
+    struct nav_kalman *k = kalman_create_unscented(&p);
     struct nav_gaussian before = k->belief;
     kalman_update(k, &(struct nav_evidence){NULL, NOTHING_READ});
     assert_memory_equal(&before, &k->belief, sizeof before);
