@@ -44,7 +44,7 @@ void nav_intake_free(struct nav_intake *in)
 
 enum arrival { ON_TIME, LATE, REPEATED };
 
-static enum arrival arrival_of(struct nav_intake *in, double t_s)
+static enum arrival intake_arrival_of(struct nav_intake *in, double t_s)
 {
     if (!isfinite(t_s)) {
         in->bad_cells++;
@@ -59,7 +59,7 @@ static enum arrival arrival_of(struct nav_intake *in, double t_s)
     return t_s < in->latest ? LATE : ON_TIME;
 }
 
-static bool odometry_ok(struct nav_intake *in, const double odometry[3])
+static bool intake_odometry_ok(struct nav_intake *in, const double odometry[3])
 {
     uint64_t before = in->bad_cells;
     for (int i = 0; i < 3; i++) {
@@ -69,10 +69,10 @@ static bool odometry_ok(struct nav_intake *in, const double odometry[3])
     return in->bad_cells == before;
 }
 
-static struct nav_motion take_odometry(struct nav_intake *in, const struct nav_row *row, enum arrival arrival)
+static struct nav_motion intake_take_odometry(struct nav_intake *in, const struct nav_row *row, enum arrival arrival)
 {
     struct nav_pose step = {row->odometry[0], row->odometry[1], row->odometry[2]};
-    bool known = odometry_ok(in, row->odometry), timed = isfinite(row->t_s) != 0;
+    bool known = intake_odometry_ok(in, row->odometry), timed = isfinite(row->t_s) != 0;
     if (arrival == LATE && known)
         return nav_gaps_fill(&in->gaps, step, row->t_s);
     if (arrival == LATE)
@@ -114,7 +114,7 @@ static double intake_read(struct nav_intake *in, int w, const struct nav_row *ro
     return weight;
 }
 
-static bool take_readings(struct nav_intake *in, const struct nav_row *row)
+static bool intake_take_readings(struct nav_intake *in, const struct nav_row *row)
 {
     bool any = false;
     for (int w = 0; w < in->sensors.count; w++) {
@@ -129,13 +129,13 @@ bool nav_intake_take(struct nav_intake *in, const struct nav_row *row, struct na
 {
     *motion = (struct nav_motion){.unknown_m = 0.0};
     *evidence = (struct nav_evidence){.reading = in->reading, .weight = in->weight};
-    enum arrival arrival = arrival_of(in, row->t_s);
+    enum arrival arrival = intake_arrival_of(in, row->t_s);
     if (arrival != ON_TIME)
         in->bad_rows++;
     if (arrival == REPEATED)
         return false;
-    *motion = take_odometry(in, row, arrival);
+    *motion = intake_take_odometry(in, row, arrival);
     intake_add_path(in, motion);
     /* A late row's motion is real, but its readings belong to a pose that is gone. */
-    return arrival == ON_TIME && take_readings(in, row);
+    return arrival == ON_TIME && intake_take_readings(in, row);
 }

@@ -26,7 +26,7 @@ void nav_repeat_free(struct nav_repeat *r)
 }
 
 /* Chance that a run of so many wrong windows goes on. */
-static double again_after(const struct nav_repeat *r, double count)
+static double repeat_again_after(const struct nav_repeat *r, double count)
 {
     double again = r->repeated[0] / r->wrong[0];
     for (int n = 1; n < NAV_REPEAT_PLACES && n < count; n++)
@@ -35,17 +35,17 @@ static double again_after(const struct nav_repeat *r, double count)
 }
 
 /* What is new in a window that says the same as `count` before it. */
-static double share_of_same(const struct nav_repeat *r, double count)
+static double repeat_share_of_same(const struct nav_repeat *r, double count)
 {
     double others = fmax(r->classes - 1.0, 1.0), all = 0.0;
     for (int n = 0; n < NAV_REPEAT_PLACES; n++)
         all += r->wrong[n];
     double wrong = fmin(fmax(all / r->windows, WRONG_LEAST), others / (others + 1.0)) / others;
-    return log(fmin(fmax(again_after(r, count), wrong), REPEAT_MOST)) / log(wrong);
+    return log(fmin(fmax(repeat_again_after(r, count), wrong), REPEAT_MOST)) / log(wrong);
 }
 
 /* Counts the middle run as wrong once the last is as long, and makes one run of all three. */
-static void judge(struct nav_repeat *r, struct nav_repeat_run run[3])
+static void repeat_judge(struct nav_repeat *r, struct nav_repeat_run run[3])
 {
     bool between = run[0].said == run[2].said && run[1].said >= 0 && run[1].path <= r->path_most;
     if (!between || run[1].count > run[0].count || run[1].count > run[2].count)
@@ -60,7 +60,7 @@ static void judge(struct nav_repeat *r, struct nav_repeat_run run[3])
     run[0].said = run[1].said = -1;
 }
 
-static void fade(struct nav_repeat *r)
+static void repeat_fade(struct nav_repeat *r)
 {
     double keep = 1.0 - 1.0 / MEMORY;
     r->windows = r->windows * keep + 1.0;
@@ -74,15 +74,15 @@ double nav_repeat_take(struct nav_repeat *r, int tip, int said, double moved)
 {
     struct nav_repeat_run *run = r->tip[tip];
     bool same = said == run[2].said;
-    fade(r);
+    repeat_fade(r);
     if (!same) {
         run[0] = run[1];
         run[1] = run[2];
         run[2] = (struct nav_repeat_run){.said = said};
     }
-    double share = same ? share_of_same(r, run[2].count) : 1.0;
+    double share = same ? repeat_share_of_same(r, run[2].count) : 1.0;
     run[2].count += 1.0;
     run[2].path += moved;
-    judge(r, run);
+    repeat_judge(r, run);
     return share;
 }

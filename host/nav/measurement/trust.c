@@ -43,7 +43,7 @@ void nav_trust_add(struct nav_likelihood *l, const uint8_t *codes, double mass)
 }
 
 /* Log of p(reading | belief) / p(reading | broken), times the reading's weight. */
-static double surprise(const struct nav_likelihood *l, int w)
+static double trust_surprise(const struct nav_likelihood *l, int w)
 {
     const struct nav_trust *t = &l->trust[w];
     double known = 0.0, ratio = 0.0;
@@ -56,7 +56,7 @@ static double surprise(const struct nav_likelihood *l, int w)
 }
 
 /* The whisker works or does not: Bayes, then the chance of a change. */
-static void judge(struct nav_trust *t, double evidence, double weight)
+static void trust_judge(struct nav_trust *t, double evidence, double weight)
 {
     double odds = t->working * exp(evidence);
     t->working = odds / (odds + 1.0 - t->working);
@@ -64,7 +64,7 @@ static void judge(struct nav_trust *t, double evidence, double weight)
     t->working = fmin(fmax(t->working, WORKING_LEAST), WORKING_MOST);
 }
 
-static void learn_accuracy(struct nav_likelihood *l, int w)
+static void trust_learn_accuracy(struct nav_likelihood *l, int w)
 {
     struct nav_model *model = &l->model[w];
     int best = 0;
@@ -88,13 +88,13 @@ void nav_trust_learn(struct nav_likelihood *l)
         struct nav_trust *t = &l->trust[w];
         if (!(l->weight[w] > 0.0))
             continue;
-        double evidence = surprise(l, w), others = together - t->agreement;
+        double evidence = trust_surprise(l, w), others = together - t->agreement;
         t->agreement = FADE * t->agreement + evidence;
         if (evidence >= 0.0 || others > 0.0)
-            judge(t, evidence, l->weight[w]);
+            trust_judge(t, evidence, l->weight[w]);
         else
             t->working += RELAX * l->weight[w] * (WORKING_MOST - t->working);
         if (l->model[w].accuracy > 0.0 && others > 0.0)
-            learn_accuracy(l, w);
+            trust_learn_accuracy(l, w);
     }
 }

@@ -2,7 +2,7 @@
 
 #include <math.h>
 
-static int tile_index(double position, double tile, int count)
+static int arena_tile_index(double position, double tile, int count)
 {
     double index = position / tile;
     if (!(index > 0.0))
@@ -12,7 +12,8 @@ static int tile_index(double position, double tile, int count)
 
 int nav_arena_tile(const struct nav_arena *arena, double x, double y)
 {
-    return tile_index(y, arena->tile, arena->rows) * arena->columns + tile_index(x, arena->tile, arena->columns);
+    return arena_tile_index(y, arena->tile, arena->rows) * arena->columns +
+           arena_tile_index(x, arena->tile, arena->columns);
 }
 
 int nav_arena_texture(const struct nav_arena *arena, double x, double y)
@@ -21,12 +22,12 @@ int nav_arena_texture(const struct nav_arena *arena, double x, double y)
 }
 
 /* fmin and fmax are calls, for the sake of NaN; here there is none. */
-static double lesser(double a, double b)
+static double arena_lesser(double a, double b)
 {
     return a < b ? a : b;
 }
 
-static double greater(double a, double b)
+static double arena_greater(double a, double b)
 {
     return a > b ? a : b;
 }
@@ -36,27 +37,27 @@ struct span {
 };
 
 /* Part of a ray between two parallel lines. */
-static struct span between(double start, double direction, double low, double high)
+static struct span arena_between(double start, double direction, double low, double high)
 {
     if (direction == 0.0)
         return start > low && start < high ? (struct span){-INFINITY, INFINITY} : (struct span){INFINITY, -INFINITY};
     double a = (low - start) / direction, b = (high - start) / direction;
-    return (struct span){lesser(a, b), greater(a, b)};
+    return (struct span){arena_lesser(a, b), arena_greater(a, b)};
 }
 
-static struct span across(const struct nav_box *box, double x, double y, double c, double s)
+static struct span arena_across(const struct nav_box *box, double x, double y, double c, double s)
 {
-    struct span h = between(x, c, box->x0, box->x1), v = between(y, s, box->y0, box->y1);
-    return (struct span){greater(h.enter, v.enter), lesser(h.leave, v.leave)};
+    struct span h = arena_between(x, c, box->x0, box->x1), v = arena_between(y, s, box->y0, box->y1);
+    return (struct span){arena_greater(h.enter, v.enter), arena_lesser(h.leave, v.leave)};
 }
 
 /* Whether the rectangle around a ray lies clear of a box: most boxes of an arena need no more. */
-static bool apart(const struct nav_box *box, const struct nav_box *around)
+static bool arena_apart(const struct nav_box *box, const struct nav_box *around)
 {
     return around->x1 < box->x0 || around->x0 > box->x1 || around->y1 < box->y0 || around->y0 > box->y1;
 }
 
-static bool inside(const struct nav_box *box, double x, double y)
+static bool arena_inside(const struct nav_box *box, double x, double y)
 {
     return x > box->x0 && x < box->x1 && y > box->y0 && y < box->y1;
 }
@@ -67,16 +68,16 @@ double nav_arena_range(const struct nav_arena *arena, double x, double y, double
 }
 
 /* Distance along a ray to the nearest of boxes first .. end - 1 that meets the rectangle around it. */
-static double nearest_of(const struct nav_arena *arena, int first, int end, const struct nav_box *around, double x,
-                         double y, double c, double s)
+static double arena_nearest_of(const struct nav_arena *arena, int first, int end, const struct nav_box *around,
+                               double x, double y, double c, double s)
 {
     double nearest = INFINITY;
     for (int i = first; i < end; i++) {
-        if (apart(&arena->box[i], around))
+        if (arena_apart(&arena->box[i], around))
             continue;
-        struct span hit = across(&arena->box[i], x, y, c, s);
+        struct span hit = arena_across(&arena->box[i], x, y, c, s);
         if (hit.enter <= hit.leave && hit.leave > 0.0)
-            nearest = lesser(nearest, greater(hit.enter, 0.0));
+            nearest = arena_lesser(nearest, arena_greater(hit.enter, 0.0));
     }
     return nearest;
 }
@@ -86,12 +87,14 @@ double nav_arena_range_along(const struct nav_arena *arena, double x, double y, 
     const struct nav_box walls = {0.0, 0.0, arena->size_x, arena->size_y};
     int solid = arena->boxes - arena->unknown;
     double ex = x + c * reach, ey = y + s * reach;
-    const struct nav_box around = {lesser(x, ex), lesser(y, ey), greater(x, ex), greater(y, ey)};
-    if (!inside(&walls, x, y))
+    const struct nav_box around = {arena_lesser(x, ex), arena_lesser(y, ey), arena_greater(x, ex),
+                                   arena_greater(y, ey)};
+    if (!arena_inside(&walls, x, y))
         return 0.0;
-    double nearest = inside(&walls, ex, ey) ? (double)INFINITY : across(&walls, x, y, c, s).leave;
-    nearest = lesser(nearest, nearest_of(arena, 0, solid, &around, x, y, c, s));
-    if (arena->unknown > 0 && nearest_of(arena, solid, arena->boxes, &around, x, y, c, s) < lesser(nearest, reach))
+    double nearest = arena_inside(&walls, ex, ey) ? (double)INFINITY : arena_across(&walls, x, y, c, s).leave;
+    nearest = arena_lesser(nearest, arena_nearest_of(arena, 0, solid, &around, x, y, c, s));
+    if (arena->unknown > 0 &&
+        arena_nearest_of(arena, solid, arena->boxes, &around, x, y, c, s) < arena_lesser(nearest, reach))
         return NAN;
     return nearest <= reach ? nearest : (double)INFINITY;
 }
@@ -102,8 +105,8 @@ bool nav_arena_free(const struct nav_arena *arena, double x, double y, double ra
         return false;
     for (int i = 0; i < arena->boxes - arena->unknown; i++) {
         const struct nav_box *box = &arena->box[i];
-        double dx = greater(greater(box->x0 - x, x - box->x1), 0.0);
-        double dy = greater(greater(box->y0 - y, y - box->y1), 0.0);
+        double dx = arena_greater(arena_greater(box->x0 - x, x - box->x1), 0.0);
+        double dy = arena_greater(arena_greater(box->y0 - y, y - box->y1), 0.0);
         if (dx * dx + dy * dy <= radius * radius)
             return false;
     }
@@ -125,7 +128,7 @@ void nav_sensor_map_fill(const void *self, const double *reading, double *likeli
     int codes = ((const struct nav_sensor_map *)self)->codes;
     double best = reading[0];
     for (int k = 1; k < codes; k++)
-        best = greater(best, reading[k]);
+        best = arena_greater(best, reading[k]);
     for (int k = 0; k < codes; k++)
         likelihood[k] = exp(reading[k] - best);
 }

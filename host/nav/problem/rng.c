@@ -2,7 +2,7 @@
 
 #include <math.h>
 
-static uint64_t splitmix(uint64_t *state)
+static uint64_t rng_splitmix(uint64_t *state)
 {
     uint64_t z = *state += 0x9e3779b97f4a7c15u;
     z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
@@ -10,7 +10,7 @@ static uint64_t splitmix(uint64_t *state)
     return z ^ (z >> 31);
 }
 
-static uint64_t rotate(uint64_t x, int by)
+static uint64_t rng_rotate(uint64_t x, int by)
 {
     return (x << by) | (x >> (64 - by));
 }
@@ -18,20 +18,20 @@ static uint64_t rotate(uint64_t x, int by)
 void nav_rng_seed(struct nav_rng *rng, uint64_t seed, uint64_t stream)
 {
     uint64_t state = stream;
-    state = splitmix(&state) ^ seed;
+    state = rng_splitmix(&state) ^ seed;
     for (int i = 0; i < 4; i++)
-        rng->state[i] = splitmix(&state);
+        rng->state[i] = rng_splitmix(&state);
 }
 
 uint64_t nav_rng_bits(struct nav_rng *rng)
 {
-    uint64_t *s = rng->state, out = rotate(s[0] + s[3], 23) + s[0], t = s[1] << 17;
+    uint64_t *s = rng->state, out = rng_rotate(s[0] + s[3], 23) + s[0], t = s[1] << 17;
     s[2] ^= s[0];
     s[3] ^= s[1];
     s[1] ^= s[2];
     s[0] ^= s[3];
     s[2] ^= t;
-    s[3] = rotate(s[3], 45);
+    s[3] = rng_rotate(s[3], 45);
     return out;
 }
 
