@@ -10,7 +10,7 @@ from whisker.touch.texture.model import TextureModel, posterior
 from whisker.touch.texture.train import calibration_error, train
 
 from .cost import peers
-from .scores import METHODS, refusal_cut
+from .scores import METHODS, detected, refusal_cut
 from .trials import borealtc, fabricslide, vulpi
 
 FABRIC_HZ = 35.6
@@ -115,7 +115,7 @@ def left_out(runs: list, fold: np.ndarray, hz: float, window: int, held: tuple =
     """Each surface left out of training in turn, and a fold of the others: shares refused from the fifth window on."""
     out = {}
     for surface in tqdm(sorted({n for n, _ in runs}), desc="surfaces left out"):
-        untrained, trained = [], []
+        untrained, trained, found = [], [], []
         for f in held:
             kept = group((n, x) for (n, x), at in zip(runs, fold, strict=True) if at != f and n != surface)
             model = train(kept, hz, 1000.0 * window / hz)
@@ -123,8 +123,13 @@ def left_out(runs: list, fold: np.ndarray, hz: float, window: int, held: tuple =
                 if n == surface or at == f:
                     refused = [d.label < 0 for d in model.judge(x, window)[ROW:]]
                     (untrained if n == surface else trained).extend(refused)
+            parts = [
+                group(r for r, at in zip(runs, fold, strict=True) if (at == f) == out and len(r[1]) >= window)
+                for out in (False, True)
+            ]
+            found.append(detected(*parts, surface, window))
         out[surface] = {
-            "refused": np.mean(untrained), "windows": len(untrained),
+            "refused": np.mean(untrained), "windows": len(untrained), "detected": np.mean(found),
             "trained_refused": np.mean(trained), "trained_windows": len(trained),
         }  # fmt: skip
     return out

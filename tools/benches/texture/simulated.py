@@ -4,7 +4,7 @@ from functools import cache
 
 import numpy as np
 
-from .scores import METHODS, WINDOW, decide, models, strip_score, strip_scores, summary
+from .scores import METHODS, WINDOW, decide, detected, models, strip_score, strip_scores, summary
 from .trials import SURFACES, closer, drives, faults, strips
 
 TRAIN_SEED, TEST_SEEDS, STRIP_SEEDS, OTHER_ROBOT = 6000, (6001, 6002), range(6100, 6115), 6050
@@ -75,8 +75,10 @@ def floors_left_out() -> dict:
             for k in SURFACES
         }
         others = np.concatenate([refused[k] for k in SURFACES if k != left_out])
+        held = {k: [r for seed in TEST_SEEDS for r in drives(seed, TRAIN_SEED)[k]] for k in SURFACES}
         out[left_out] = {
             "refused": np.mean(refused[left_out]), "windows": len(refused[left_out]),
+            "detected": detected(drives(TRAIN_SEED, TRAIN_SEED), held, left_out, WINDOW),
             "trained_refused": others.mean(), "trained_windows": len(others),
         }  # fmt: skip
     return out

@@ -10,7 +10,7 @@ import numpy as np
 from ...native import lib
 from .classifier import NONE, Classifier, plain_features, shape_thresholds
 
-SHRINK = (1e-3, 1e-2, 1e-1, 0.3)  # share of the diagonal in the covariance within classes
+SHRINK = (0.3, 1e-1, 1e-2, 1e-3)  # share of the diagonal in the covariance within classes, the first of equals
 HIDDEN = (0, 128, 256)  # random projections: none, few, many; what many cost keeps a 100 ms window near 20 us
 HIDDEN_MUST_GAIN = 0.02  # relative fall of the log loss that pays for the next size: it costs time in every window
 ERRORS_MUST_GAIN = 2.0  # standard errors of the fall over windows
@@ -21,6 +21,7 @@ SHAPE_MOST = 1000  # windows: shapes of waveforms are for few of them, and bands
 BESIDE_MUST_GAIN = (
     0.05  # nats a window, of either: they cost it a third more time and more, however little is left to gain
 )
+LEAST_SPREAD = 0.01  # of a feature: one that hardly varies in training is not made much of
 TEMPER_STEPS = 30  # of the search for a temperature; Newton needs about six, halving the rest
 
 
@@ -113,7 +114,7 @@ class _Trial:
 
 def _trial(data: Windows, kind: _Kind, sizes: tuple) -> _Trial:
     raw = plain_features(data.windows, kind.levels, kind.floor, kind.shorter, kind.shape)
-    centre, scale = raw.mean(axis=0), 1.0 / (raw.std(axis=0) + 1e-6)
+    centre, scale = raw.mean(axis=0), 1.0 / np.maximum(raw.std(axis=0), LEAST_SPREAD)
     features, classes = raw.shape[1], data.classes
     weight = np.zeros((features + max(sizes), classes))
     length = data.windows.shape[1]
@@ -123,7 +124,7 @@ def _trial(data: Windows, kind: _Kind, sizes: tuple) -> _Trial:
     sums = _Sums(expanded, data)
     best = None
     for hidden in sizes:
-        found = min(_candidates(sums, expanded, data, hidden, features + hidden), key=lambda c: c.loss)
+        found = min(_candidates(sums, expanded, data, hidden, features + hidden), key=lambda c: round(c.loss, 3))
         if best is None or _pays(found, best, sums.row_weight, HIDDEN_MUST_GAIN * best.loss):
             best = found
     return _Trial(kind, blank, expanded, sums, best)

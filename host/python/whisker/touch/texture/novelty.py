@@ -11,6 +11,7 @@ RECORDINGS_PRIOR = 10.0  # recordings' worth of a spread alike in all directions
 CLASSES_PRIOR = 3.0  # classes' worth, of the spread of class means
 REFUSE_MOST = 0.08  # share of held-out windows of trained surfaces that the limits may refuse
 TYPICAL = 20.0  # log odds against a surface never trained in the middle of held-out windows of trained ones
+FOLDS = 5  # in which recordings are left out
 RATIOS_EACH = 8  # of a recording, by which it counts towards a limit
 STEPS = lib.NAV_TEXTURE_NOVELTY_STEPS
 
@@ -55,8 +56,8 @@ class Novelty:
 def fit_novelty(features: list[np.ndarray], labels: np.ndarray, folds: np.ndarray, length: int) -> Novelty | None:
     """From the features (m, F) of the windows in a row of every recording, m >= 0.
 
-    Limits separate recordings held out from classes left out, and keep all but REFUSE_MOST of the former. None when
-    fewer than two recordings of a class are left where a fold is held out.
+    Limits separate recordings held out (fold by fold, and those that are alike together) from classes left out, and keep
+    all but REFUSE_MOST of the former. None when fewer than two recordings of a class are left where a fold is held out.
     """
     use = [n for n, rows in enumerate(features) if len(rows)]
     features, labels, folds = [features[n] for n in use], np.asarray(labels)[use], np.asarray(folds)[use]
@@ -64,13 +65,26 @@ def fit_novelty(features: list[np.ndarray], labels: np.ndarray, folds: np.ndarra
     found = _fit(features, labels, length)
     if found is None:
         return None
-    trained = _ratios(features, labels, [(folds == fold, classes) for fold in sorted(set(folds))], length)
+    held_out = [(by == fold, classes) for by in (folds, _alike(features, labels)) for fold in sorted(set(by))]
+    trained = _ratios(features, labels, held_out, length)
     if len(trained[0]) == 0:
         return None
     found.limit = _limits(trained, _ratios(features, labels, _left_out(labels, classes), length))
     typical = np.mean([found.limit[s] - np.median(t) for s, t in enumerate(trained) if len(t)])
     found.scale = max(1.0, float(typical) / TYPICAL)
     return found
+
+
+def _alike(features: list[np.ndarray], labels: np.ndarray) -> np.ndarray:
+    """A fold for each recording: of a surface, those that are most alike are left out together, as of one speed or load. What
+    is left out is then as unlike the rest as a drive of another speed or load will be."""
+    means, folds = np.array([f.mean(axis=0) for f in features]), np.zeros(len(labels), int)
+    for k in set(labels):
+        mine = np.flatnonzero(labels == k)
+        apart = means[mine] - means[mine].mean(axis=0)
+        along = np.linalg.svd(apart / (apart.std(axis=0) + 1e-9), full_matrices=False)[0][:, 0]
+        folds[mine[np.argsort(along)]] = np.arange(len(mine)) * FOLDS // len(mine)
+    return folds
 
 
 def _left_out(labels: np.ndarray, classes: list) -> list[tuple]:

@@ -206,9 +206,8 @@ def _novelty(model: SpectralModel, parts, labels, folds, base: int):
     if classifier is None:
         return None
     rows = [p[: len(p) // base * base].reshape(-1, base, p.shape[1]) for p in parts]
-    return fit_novelty(
-        [classifier.expand(r)[:, : len(classifier.centre) - len(classifier.shape)] for r in rows], labels, folds, base
-    )
+    bands = len(classifier.centre) - len(classifier.shape)
+    return fit_novelty([classifier.expand(r)[:, :bands] for r in rows], labels, folds, base)
 
 
 def _decisions(twins: list[SpectralModel], parts, folds, window: int, sequential: bool = False) -> list[list]:
