@@ -1,6 +1,7 @@
 """Filters on families of scenes that none of them was made for: arenas, robots, rates, noise and maps of every kind.
 
     tools/benches nav_unseen --filter grid --seeds 5 --only "two textures"
+    tools/benches nav_unseen --leave --first 80000      mechanisms left out by settings
 
 One line a family: runs locked at the end, error after lock, share of truths within the 90 % region and its area, share of
 rows that are sure (confidence above 0.9) and wrong, and the CPU time of a row. Seeds begin where no development did.
@@ -162,6 +163,28 @@ STARTS: dict[str, tuple[str, Callable[[Recipe], Recipe]]] = {
     "a": ("anywhere", lambda r: replace(r, uniform=True)),
     "d": ("kidnap", lambda r: replace(r, kidnap_row=200, rows=max(r.rows, 800))),
 }
+# Mechanisms that a setting leaves out, and the families and starts that they are judged on.
+LEFT_OUT = {
+    "all mechanisms": {},
+    "no map belief": {"map.learn": 0.0},
+    "no trust in whiskers": {"trust.learn": 0.0},
+    "no gains of the odometry": {"adaptive.gain": 0.0},
+}
+JUDGED_ON = (
+    ("room 2-3.5 m", "ad"),
+    ("raw windows", "k"),
+    ("real Create", "a"),
+    ("catches", "k"),
+    ("contacts only", "a"),
+    ("gap 5 s", "k"),
+    ("noise 3", "k"),
+    ("spinning wheels", "k"),
+    ("a wrong tile", "k"),
+    ("two wrong tiles", "d"),
+    ("a box moved", "kd"),
+    ("a box missing", "k"),
+    ("a box too many", "k"),
+)
 
 
 def judge(made: Made, run: localise.Run, folds: int) -> dict:
@@ -295,12 +318,28 @@ def page(unseen: dict, designs: dict, ablations: dict) -> str:
         "",
         "## Mechanisms left out",
         "",
-        "Each alone, in a build of its own: means over the same runs, none of which takes part in the table above, of",
+        "Each alone, by a setting (`--leave`) or in a build of its own; means over the same runs,",
+        "none of which takes part in the table above, of",
         *names(ablations),
         "",
         *totals(ablations),
     ]
     return "\n".join(lines) + "\n"
+
+
+def leave_out(filter: str, seeds: range, only: Sequence[str]) -> None:
+    """Measures the filter without each mechanism that a setting leaves out; what other builds left out stays."""
+    ablations = loads(ABLATIONS.read_text()) if ABLATIONS.exists() else {}
+    for title, settings in LEFT_OUT.items():
+        if only and not any(word in title for word in only):
+            continue
+        ablations[title] = {
+            f"{name}, {STARTS[start][0]}": measure(name, start, filter, settings, seeds)
+            for name, starts in JUDGED_ON
+            for start in starts
+        }
+        print(*totals({title: ablations[title]})[2:], flush=True)
+        ABLATIONS.write_text(dumps(ablations, indent=1) + "\n")
 
 
 def run(
@@ -312,7 +351,11 @@ def run(
     only: Sequence[str] = (),
     set: Sequence[str] = (),
     json: Path = RESULT,
+    leave: bool = False,
 ) -> None:
+    if leave:
+        leave_out(filter, range(first, first + seeds), only)
+        return
     settings = {key: float(value) for key, value in (pair.split("=") for pair in set)}
     done = {}
     for name, family in FAMILIES.items():
@@ -338,4 +381,5 @@ def options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--set", action="append", default=[], metavar="KEY=VALUE", help="of the filter; may be repeated"
     )
+    parser.add_argument("--leave", action="store_true", help="without each mechanism in turn (--only: some of them)")
     parser.add_argument("--json", type=Path, default=RESULT, help="where to write (default: %(default)s)")
