@@ -21,6 +21,10 @@
  * histogram's, or others are drawn; a mode that holds the third is the only one. */
 static const double SHARE_LEAST = 1e-9, KNOWN_LEAST = 0.9, ONE_MODE = 0.999;
 
+/* Nats that a cloud drawn from the histogram must have explained better than "anywhere" before it may blame the map:
+ * one that was drawn around the wrong place would explain itself. */
+static const double PROVEN = 300.0;
+
 /* The particles and what it takes to draw them; moved: how many were moved or weighed for the last row. */
 struct adaptive_cloud {
     struct nav_particles set;
@@ -125,6 +129,7 @@ static void begin(struct adaptive *a)
     }
     a->local = !a->problem->prior.uniform && adaptive_begin_cloud(a);
     a->awake = !a->local;
+    a->doubt.proven = a->local ? (double)INFINITY : 0.0; /* a start that is told */
     a->answer.belief = nav_gaussian_prior(a->problem);
     a->gaussian.compared = a->local && nav_gaussian_mass(&a->answer.belief, NAV_NEAR_M, NAV_NEAR_RAD) >=
                                            1.0 - a->problem->settings.adaptive.scattered;
@@ -219,6 +224,8 @@ static void take_over(struct adaptive *a, double share)
         adaptive_doubt_teach(&a->doubt, a->likelihood, a->likelihood);
         nav_map_forget(a->likelihood);
     }
+    if (!a->local || share > 0.5)
+        a->doubt.proven = 0.0;
     a->local = true;
     a->cloud.moved = set->count;
     adaptive_resample(a, true);
@@ -406,7 +413,7 @@ static void update_local(struct adaptive *a, const struct nav_evidence *evidence
     adaptive_log_entry(&a->log, a->log.head - 1)->local = local;
     adaptive_doubt_take(&a->doubt, a->likelihood, a->log.head - 1, adaptive_doubt_anywhere(&a->doubt, a->likelihood),
                         local);
-    if (!a->whole && a->problem->settings.map.learn >= 0.5)
+    if (!a->whole && a->doubt.proven > PROVEN && a->problem->settings.map.learn >= 0.5)
         nav_map_learn(a->likelihood);
     nav_trust_learn(a->likelihood);
     a->evaluations += worked;

@@ -73,6 +73,7 @@ void adaptive_doubt_take(struct adaptive_doubt *d, const struct nav_likelihood *
                          double local)
 {
     d->ratio += anywhere - local;
+    d->proven = fmax(d->proven + local - anywhere, 0.0);
     if (!(d->ratio > 0.0))
         adaptive_doubt_clear(d, l, row + 1);
 }

@@ -19,6 +19,7 @@ struct adaptive_doubt {
     double *trust;  /* [whiskers] before row `since` */
     double ratio;   /* log of rows since `since` by "anywhere" and by the local belief; at least 0 */
     uint64_t since; /* row of the log */
+    double proven;  /* log of rows by the local belief and by "anywhere" since it was found; at least 0 */
 };
 
 /* 0, or -1 without memory; adaptive_doubt_free either way. */

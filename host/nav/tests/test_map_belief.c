@@ -170,7 +170,7 @@ static void and_finds_a_robot_that_was_carried_in_one(void **state)
     int near = 0;
     for (int kind = 1; kind < 3; kind++) {
         for (uint64_t seed = 11; seed <= 20; seed++)
-            near += near_at_end(kind, seed, 600, 300);
+            near += near_at_end(kind, seed, 900, 600);
     }
     assert_true(near >= 19);
 }
