@@ -54,6 +54,10 @@ class Felt:
     normal_sd: float = math.nan
     face: float = 0.0
 
+    def of_shaft(self) -> "Felt":
+        """The same known to be no tip's: a corner has no normal, and where it is on the shaft the distance tells."""
+        return replace(self, normal=math.nan, normal_sd=math.nan, face=0.0)
+
     def after(self, motion: np.ndarray, tick: int) -> "Felt":
         """The same from where the robot is at `tick`, after this motion."""
         x, y = self.point[0] - motion[0], self.point[1] - motion[1]

@@ -222,6 +222,8 @@ class Pilot:
         felt = self.feelers[lane].felt
         if felt is None or not (lane in released or self.contacts[lane].touching):
             return None
+        if lane in released and contact_type(self.mounts[lane], released[lane][1]) != "tip":
+            felt = felt.of_shaft()  # the whisk that was measured knows the way back, too
         return felt.after(self._drives.since(felt.tick, tick), tick)
 
     def _felt_cells(self, lane: int, felt: Felt | None) -> dict[str, float | None]:
