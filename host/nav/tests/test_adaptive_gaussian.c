@@ -78,11 +78,12 @@ static void rows_that_only_a_wider_one_explains_speak_against_it(void **state)
 {
     (void)state;
     struct carried c;
-    carried_begin(&c, 0.06); /* the border of the next tile is within four times that, not within it */
+    carried_begin(&c, 0.004); /* the next tile is 14 mm off: reached by corners four times as far, not by its own */
     int said = (carried_class(&c) + 1) % 3, rows = 0;
     for (; rows < 100 && !adaptive_gaussian_fails(&c.g); rows++)
         carried_read(&c, said);
     assert_in_range(rows, 1, 99);
+    assert_true(c.g.wider > 3.0 && c.g.told < 3.0);
     carried_end(&c);
 }
 
