@@ -1,7 +1,7 @@
 """Filters on families of scenes that none of them was made for: arenas, robots, rates, noise and maps of every kind.
 
     tools/benches nav_unseen --filter grid --seeds 5 --only "two textures"
-    tools/benches nav_unseen --leave --first 80000      mechanisms left out by settings
+    tools/benches nav_unseen --leave --first 80000 --seeds 12      mechanisms left out by settings
 
 One line a family: runs locked at the end, error after lock, share of truths within the 90 % region and its area, share of
 rows that are sure (confidence above 0.9) and wrong, and the CPU time of a row. Seeds begin where no development did.
@@ -28,7 +28,9 @@ from whisker.scenes.readings import World
 from whisker.scenes.walk import Pace
 
 ROOT = Path(__file__).resolve().parents[3]
-RESULT, DESIGNS, ABLATIONS = (ROOT / f"bench/results/nav_{name}.json" for name in ("unseen", "designs", "ablations"))
+RESULT, DESIGNS, ABLATIONS, LEFT = (
+    ROOT / f"bench/results/nav_{name}.json" for name in ("unseen", "designs", "ablations", "left_out")
+)
 PAGE = ROOT / "docs/results_nav_unseen.md"
 FIRST_SEED = 70_000
 ROWS = 600
@@ -297,7 +299,7 @@ def names(designs: dict) -> list[str]:
     return textwrap.wrap("; ".join(sorted(next(iter(designs.values())))) + ".", 140)
 
 
-def page(unseen: dict, designs: dict, ablations: dict) -> str:
+def page(unseen: dict, designs: dict, ablations: dict, left: dict) -> str:
     """docs/results_nav_unseen.md."""
     lines = [
         "# Families that no filter was made for",
@@ -318,28 +320,33 @@ def page(unseen: dict, designs: dict, ablations: dict) -> str:
         "",
         "## Mechanisms left out",
         "",
-        "Each alone, by a setting (`--leave`) or in a build of its own; means over the same runs,",
-        "none of which takes part in the table above, of",
+        "Each alone, in a build of its own: means over the same runs, none of which takes part in the table above, of",
         *names(ablations),
         "",
         *totals(ablations),
+        "",
+        "## Left out by settings",
+        "",
+        "`tools/benches nav_unseen --leave --first 80000 --seeds 12`: the same for what a setting leaves out, later and on",
+        "other runs, of",
+        *names(left),
+        "",
+        *totals(left),
     ]
     return "\n".join(lines) + "\n"
 
 
-def leave_out(filter: str, seeds: range, only: Sequence[str]) -> None:
-    """Measures the filter without each mechanism that a setting leaves out; what other builds left out stays."""
-    ablations = loads(ABLATIONS.read_text()) if ABLATIONS.exists() else {}
+def leave_out(filter: str, seeds: range) -> None:
+    """Measures the filter without each mechanism that a setting leaves out."""
+    left = {}
     for title, settings in LEFT_OUT.items():
-        if only and not any(word in title for word in only):
-            continue
-        ablations[title] = {
+        left[title] = {
             f"{name}, {STARTS[start][0]}": measure(name, start, filter, settings, seeds)
             for name, starts in JUDGED_ON
             for start in starts
         }
-        print(*totals({title: ablations[title]})[2:], flush=True)
-        ABLATIONS.write_text(dumps(ablations, indent=1) + "\n")
+        print(*totals({title: left[title]})[2:], flush=True)
+    LEFT.write_text(dumps(left, indent=1) + "\n")
 
 
 def run(
@@ -354,7 +361,7 @@ def run(
     leave: bool = False,
 ) -> None:
     if leave:
-        leave_out(filter, range(first, first + seeds), only)
+        leave_out(filter, range(first, first + seeds))
         return
     settings = {key: float(value) for key, value in (pair.split("=") for pair in set)}
     done = {}
@@ -370,7 +377,7 @@ def run(
     measured = {"filter": filter, "settings": settings, "families": done}
     json.write_text(dumps(measured, indent=1) + "\n")
     if json == RESULT:
-        PAGE.write_text(page(measured, *(loads(file.read_text()) for file in (DESIGNS, ABLATIONS))))
+        PAGE.write_text(page(measured, *(loads(file.read_text()) for file in (DESIGNS, ABLATIONS, LEFT))))
 
 
 def options(parser: argparse.ArgumentParser) -> None:
@@ -381,5 +388,5 @@ def options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--set", action="append", default=[], metavar="KEY=VALUE", help="of the filter; may be repeated"
     )
-    parser.add_argument("--leave", action="store_true", help="without each mechanism in turn (--only: some of them)")
+    parser.add_argument("--leave", action="store_true", help="without each mechanism in turn")
     parser.add_argument("--json", type=Path, default=RESULT, help="where to write (default: %(default)s)")
