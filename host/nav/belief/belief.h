@@ -14,8 +14,8 @@ struct nav_region {
     double area_m2; /* of the region of highest density that holds 0.9 of the mass */
 };
 
-/* Region figures of n components at the point (x, y), m, which lies in the 90 % region if
- * its level is at most 0.9; its own bin counts half. A level of 1 where there is none. -1: no memory or no mass. */
+/* Region figures of n components at the point (x, y), m, which lies in the 90 % region if its level is at most 0.9; its
+ * own bin counts half. -1: no memory or no mass, and a level of 1. */
 int nav_belief_region(const struct nav_component *, long n, double x, double y, struct nav_region *);
 
 /* Mass in bins of 25 cm x 25 cm x 30 degrees, [heading][y][x], x quickest; what lies outside 0 .. size goes to the

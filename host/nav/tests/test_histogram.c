@@ -396,6 +396,25 @@ static void more_cells_than_can_be_numbered_are_refused(void **state)
     nav_histogram_free(&h);
 }
 
+static void cells_are_listed_where_they_will_be_and_as_wide(void **state)
+{
+    (void)state;
+    struct nav_histogram h = empty(3.0, 0.05, 36, 0);
+    struct nav_component one;
+    put(&h, 30, 30, 7, 2.0);
+    struct nav_pose there = centre(&h, 30, 30, 7);
+    const struct nav_pending pending = {{0.1, 0.0, 0.2}, {1e-4, 1e-3}};
+    h.owed_position = 2e-4;
+    h.owed_heading = 2e-3;
+    assert_int_equal(nav_histogram_components(&h, &pending, 0.5, &one, 1), 1);
+    assert_near(one.pose.x, there.x + 0.1 * cos(there.theta), 1e-9);
+    assert_near(one.pose.theta, there.theta + 0.2, 1e-9);
+    assert_near(one.sigma_m, sqrt(0.05 * 0.05 / 12.0 + 3e-4), 1e-9);
+    assert_near(one.sigma_rad, sqrt(h.shape.cell_theta * h.shape.cell_theta / 12.0 + 3e-3), 1e-9);
+    assert_near(one.mass, 0.5, 1e-9);
+    nav_histogram_free(&h);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -413,6 +432,7 @@ int main(void)
         cmocka_unit_test(near_counts_the_mass_around_a_pose_across_the_heading_seam),
         cmocka_unit_test(a_prior_fills_cells_with_its_integral),
         cmocka_unit_test(more_cells_than_can_be_numbered_are_refused),
+        cmocka_unit_test(cells_are_listed_where_they_will_be_and_as_wide),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -377,6 +377,24 @@ static void modes_are_drawn_anew_from_their_gaussians(void **state)
     nav_likelihood_free(l);
 }
 
+/* Half of the particles weigh nothing: resampling copies the others, a mixture draws all of them anew. */
+static void no_particle_of_a_mixture_is_a_copy(void **state)
+{
+    (void)state;
+    struct nav_problem p = quiet();
+    for (int mixture = 0; mixture < 2; mixture++) {
+        struct particle *f = mixture ? particle_create_multi(&p) : particle_create(&p);
+        for (long i = 0; i < f->cloud.count; i += 2)
+            f->cloud.weight[i] = 0.0f;
+        particle_resample(f, 0.0);
+        long copies = 0;
+        for (long i = 1; i < f->cloud.count; i++)
+            copies += f->cloud.x[i] == f->cloud.x[i - 1] && f->cloud.y[i] == f->cloud.y[i - 1];
+        assert_int_equal(copies > f->cloud.count / 20, !mixture);
+        particle_destroy(f);
+    }
+}
+
 static void a_mixture_of_gaussians_tracks_with_few_particles(void **state)
 {
     (void)state;
@@ -409,6 +427,7 @@ int main(void)
         cmocka_unit_test(weights_never_become_more_uneven_than_allowed),
         cmocka_unit_test(a_row_that_no_particle_can_explain_changes_no_weight),
         cmocka_unit_test(modes_are_drawn_anew_from_their_gaussians),
+        cmocka_unit_test(no_particle_of_a_mixture_is_a_copy),
         cmocka_unit_test(a_mixture_of_gaussians_tracks_with_few_particles),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
