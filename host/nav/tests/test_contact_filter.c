@@ -393,6 +393,35 @@ static void the_part_of_a_hypothesis_beyond_the_tip_goes_over_to_the_shaft(void 
     assert_near(exp(f.part[1].log_weight), 0.1587, 1e-3);
 }
 
+static void a_push_along_the_whisker_says_so(void **state)
+{
+    (void)state;
+    struct nav_contact_answer a;
+    struct nav_contact_filter f = at_the_tip(40.0);
+    nav_contact_filter_answer(&f, &a);
+    assert_true(a.head_on < 1e-6);
+    f.part[0].s[FIRST] = NAV_BEAM_DIRECTION; /* half of it beyond the table */
+    nav_contact_bank_step(&f, &(struct nav_contact_step){.seconds = 0.01, .tilt = NAN, .variance = 1e-9});
+    f.part[0].s[FIRST] = 2.0; /* it was so, and stays in doubt */
+    nav_contact_bank_step(&f, &(struct nav_contact_step){.seconds = 0.01, .tilt = NAN, .variance = 1e-9});
+    nav_contact_filter_answer(&f, &a);
+    assert_near(a.head_on, 0.5, 1e-3);
+}
+
+static void a_surface_tells_its_curvature(void **state)
+{
+    (void)state;
+    struct nav_contact_filter_config smooth = settings();
+    smooth.friction = smooth.friction_sd = 0.0;
+    struct nav_contact_filter f = filter_of(smooth);
+    struct course c = {{0.1, -0.05, 0.05, 0.0, 1.0}, {0.0, -0.1, 0.0}, {0}, 1, 31, 0.0};
+    drive(&f, &c, 480, 0);
+    struct nav_contact_answer a;
+    nav_contact_filter_answer(&f, &a);
+    assert_near(a.curvature, 20.0, 3.0 * a.curvature_sd);
+    assert_true(a.curvature_sd > 0.01 && a.curvature_sd < 8.0);
+}
+
 int main(void)
 {
     if (!nav_contact_beam_make(&beam, 0.14 / CONE))
@@ -408,6 +437,8 @@ int main(void)
         cmocka_unit_test(an_object_that_moves_is_told_with_its_speed),
         cmocka_unit_test(a_face_under_the_tip_gives_its_normal),
         cmocka_unit_test(the_part_of_a_hypothesis_beyond_the_tip_goes_over_to_the_shaft),
+        cmocka_unit_test(a_push_along_the_whisker_says_so),
+        cmocka_unit_test(a_surface_tells_its_curvature),
         cmocka_unit_test(bad_samples_are_counted_and_not_read),
         cmocka_unit_test(whatever_comes_the_answers_are_finite),
         cmocka_unit_test(what_only_rests_is_no_contact_and_a_new_one_begins_anew),

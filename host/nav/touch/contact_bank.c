@@ -110,6 +110,7 @@ void nav_contact_bank_begin(struct nav_contact_filter *f, const struct nav_conta
 {
     double corner = (f->beam->tip - LEAST_ARC) / CORNERS, round = (f->beam->tip - LEAST_ARC) / ROUNDS;
     f->parts = 0;
+    f->head_on = 0.0;
     bank_ring(f, step);
     for (int moving = 0; moving < 2; moving++) {
         double share = (moving ? f->config.moving : 1.0 - f->config.moving) / 3.0;
@@ -276,6 +277,12 @@ static bool bank_predict(const struct nav_contact_filter *f, const struct nav_co
     return true;
 }
 
+/* Probability that the force on the tip points further towards the base than the table goes. */
+static double bank_head_on(const struct nav_contact_part *part)
+{
+    return part->tip ? bank_beyond((NAV_BEAM_DIRECTION - part->s[FIRST]) / (sqrt(part->p[FIRST][FIRST]) + TINY)) : 0.0;
+}
+
 /* Keeps one of the hypotheses, in order. */
 static void bank_keep(struct nav_contact_filter *f, int *kept, int i)
 {
@@ -286,11 +293,16 @@ static void bank_keep(struct nav_contact_filter *f, int *kept, int i)
 
 void nav_contact_bank_step(struct nav_contact_filter *f, const struct nav_contact_step *step)
 {
+    double head_on = 0.0;
     int kept = 0;
     bank_ring(f, step);
-    for (int i = 0; i < f->parts; i++)
+    for (int i = 0; i < f->parts; i++) {
+        double beyond = bank_head_on(&f->part[i]);
         if (bank_predict(f, step, &f->part[i]))
             bank_keep(f, &kept, i);
+        head_on += beyond * exp(f->part[i].log_weight);
+    }
+    f->head_on = fmax(f->head_on, head_on);
     f->parts = kept;
     kept = 0;
     for (int i = 0; i < f->parts; i++)
@@ -353,42 +365,39 @@ void nav_contact_bank_tidy(struct nav_contact_filter *f)
         bank_normalise(f);
 }
 
-/* Probability that an object under the shaft is no rounder than a corner. */
-static double bank_corner(const struct nav_contact_part *part, double cone)
+double nav_contact_bank_corner(const struct nav_contact_filter *f, const struct nav_contact_part *part)
 {
     if (part->tip || part->corner)
         return part->corner;
-    return bank_beyond((CORNER_CURVATURE * cone - part->s[ROUND]) / (sqrt(part->p[ROUND][ROUND]) + TINY));
+    double limit = CORNER_CURVATURE * f->config.cone_m - part->s[ROUND];
+    return bank_beyond(limit / (sqrt(part->p[ROUND][ROUND]) + TINY));
 }
 
-void nav_contact_bank_see(const struct nav_contact_filter *f, const struct nav_contact_part *part,
-                          struct nav_contact_seen *s)
+void nav_contact_bank_see(const struct nav_contact_filter *f, const struct nav_contact_part *part, double mean[N],
+                          nav_contact_square cov)
 {
     static const int COLUMN[3] = {FIRST, SLOPE, FRICTION};
     struct nav_contact_look look;
     double cone = f->config.cone_m;
+    nav_contact_square by = {{0}};
     nav_contact_look(f, part, &look);
-    memset(s, 0, sizeof *s);
-    s->normal = look.normal;
-    s->normal_var = square(NORMAL_LEAST);
-    for (int n = 0; n < 2; n++) {
-        s->point[n] = cone * look.q[n];
-        s->velocity[n] = cone * part->s[SPEED_X + n];
-        s->point_cov[n][n] = square(POINT_LEAST_M);
-        for (int m = 0; m < 2; m++)
-            s->velocity_cov[n][m] = square(cone) * part->p[SPEED_X + n][SPEED_X + m];
+    for (int k = 0; k < 3; k++) {
+        by[SEEN_X][COLUMN[k]] = cone * look.q_by[k][0];
+        by[SEEN_Y][COLUMN[k]] = cone * look.q_by[k][1];
+        by[SEEN_NORMAL][COLUMN[k]] = look.normal_by[k];
     }
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) {
-            double p = part->p[COLUMN[i]][COLUMN[j]];
-            s->normal_var += look.normal_by[i] * look.normal_by[j] * p;
-            for (int n = 0; n < 2; n++)
-                for (int m = 0; m < 2; m++)
-                    s->point_cov[n][m] += square(cone) * look.q_by[i][n] * look.q_by[j][m] * p;
-        }
-    s->arc = cone * (part->tip ? f->beam->tip : part->s[FIRST]);
-    s->arc_var = part->tip ? 0.0 : square(cone) * part->p[FIRST][FIRST];
-    s->friction = part->s[FRICTION];
-    s->corner = bank_corner(part, cone);
-    s->friction_var = part->p[FRICTION][FRICTION];
+    by[SEEN_VX][SPEED_X] = by[SEEN_VY][SPEED_Y] = cone;
+    by[SEEN_ARC][FIRST] = part->tip ? 0.0 : cone;
+    by[SEEN_FRICTION][FRICTION] = 1.0;
+    by[SEEN_CURVATURE][ROUND] = 1.0 / cone;
+    memcpy(cov, part->p, sizeof(nav_contact_square));
+    bank_carry(cov, by);
+    cov[SEEN_X][SEEN_X] += square(POINT_LEAST_M);
+    cov[SEEN_Y][SEEN_Y] += square(POINT_LEAST_M);
+    cov[SEEN_NORMAL][SEEN_NORMAL] += square(NORMAL_LEAST);
+    const double *s = part->s;
+    const double seen[N] = {cone * look.q[0],  cone * look.q[1], cone * s[SPEED_X],
+                            cone * s[SPEED_Y], look.normal,      cone * (part->tip ? f->beam->tip : s[FIRST]),
+                            s[FRICTION],       s[ROUND] / cone};
+    memcpy(mean, seen, sizeof seen);
 }

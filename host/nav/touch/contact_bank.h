@@ -10,11 +10,11 @@ struct nav_contact_step {
     double moved[2], turned, seconds, tilt, variance;
 };
 
-/* One hypothesis' view; SI units. */
-struct nav_contact_seen {
-    double point[2], point_cov[2][2], velocity[2], velocity_cov[2][2];
-    double normal, normal_var, arc, arc_var, friction, friction_var, corner; /* the last: probability */
-};
+/* What a hypothesis says: place, velocity, direction of the normal, arc length, coefficient of friction, curvature; SI.
+ */
+enum { SEEN_X, SEEN_Y, SEEN_VX, SEEN_VY, SEEN_NORMAL, SEEN_ARC, SEEN_FRICTION, SEEN_CURVATURE };
+
+typedef double nav_contact_square[NAV_CONTACT_STATES][NAV_CONTACT_STATES];
 
 void nav_contact_bank_begin(struct nav_contact_filter *, const struct nav_contact_step *);
 
@@ -24,7 +24,11 @@ void nav_contact_bank_step(struct nav_contact_filter *, const struct nav_contact
 /* Drops what is improbable and joins what has become the same. */
 void nav_contact_bank_tidy(struct nav_contact_filter *);
 
+/* Mean and covariance of what a hypothesis says, by the names above. */
 void nav_contact_bank_see(const struct nav_contact_filter *, const struct nav_contact_part *,
-                          struct nav_contact_seen *);
+                          double mean[NAV_CONTACT_STATES], nav_contact_square cov);
+
+/* Probability that the object is a corner. */
+double nav_contact_bank_corner(const struct nav_contact_filter *, const struct nav_contact_part *);
 
 #endif

@@ -12,7 +12,6 @@ enum { ACROSS, TURN, SHORT }; /* fields: y/slope, moment/slope, (arc - x)/slope^
 #define LARGEST_SLOPE 1.4
 #define TABLE_NU 0.5 /* the quadratic in nu runs through -TABLE_NU, 0, TABLE_NU */
 #define LEAST_DIRECTION 0.6
-#define LARGEST_DIRECTION 2.85
 #define LEAST_LEFT 0.35 /* rad between force and whisker at the tip */
 #define LEAST_TIP 0.3
 #define LARGEST_TIP 0.85
@@ -120,7 +119,7 @@ static double beam_most(double direction)
 
 static void beam_fill_direction(struct nav_contact_beam *beam, int i)
 {
-    double direction = LEAST_DIRECTION + (LARGEST_DIRECTION - LEAST_DIRECTION) * i / (NAV_BEAM_DIRECTIONS - 1);
+    double direction = LEAST_DIRECTION + (NAV_BEAM_DIRECTION - LEAST_DIRECTION) * i / (NAV_BEAM_DIRECTIONS - 1);
     double force = FIRST_SLOPE * beam_stiffness(beam->tip);
     for (int j = 0; j < NAV_BEAM_SLOPES; j++) {
         double share = j > 0 ? (double)j / (NAV_BEAM_SLOPES - 1) : FIRST_SLOPE, field[FIELDS];
@@ -208,10 +207,10 @@ bool nav_contact_beam_shaft(const struct nav_contact_beam *beam, double arc, dou
 bool nav_contact_beam_end(const struct nav_contact_beam *beam, double direction, double slope,
                           struct nav_contact_bend *bend)
 {
-    bool inside = beam_hold(&direction, LEAST_DIRECTION, LARGEST_DIRECTION);
+    bool inside = beam_hold(&direction, LEAST_DIRECTION, NAV_BEAM_DIRECTION);
     double most = beam_most(direction), most_by = direction - LEAST_LEFT < LARGEST_SLOPE ? 1.0 : 0.0;
     inside = beam_hold(&slope, 0.0, most) && inside;
-    double per_direction = (NAV_BEAM_DIRECTIONS - 1) / (LARGEST_DIRECTION - LEAST_DIRECTION);
+    double per_direction = (NAV_BEAM_DIRECTIONS - 1) / (NAV_BEAM_DIRECTION - LEAST_DIRECTION);
     double per_slope = (NAV_BEAM_SLOPES - 1) / most;
     struct nav_cubic ci = nav_cubic_at((direction - LEAST_DIRECTION) * per_direction, NAV_BEAM_DIRECTIONS);
     struct nav_cubic cj = nav_cubic_at(slope * per_slope, NAV_BEAM_SLOPES);

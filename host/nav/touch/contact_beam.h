@@ -10,6 +10,8 @@
 
 #include <stdbool.h>
 
+#define NAV_BEAM_DIRECTION 2.85 /* rad: largest direction of a force on the tip in the table */
+
 /* cffi: begin */
 enum { NAV_BEAM_ARCS = 24, NAV_BEAM_SLOPES = 16, NAV_BEAM_DIRECTIONS = 20, NAV_BEAM_VALUES = 9 };
 

@@ -141,58 +141,54 @@ size_t nav_contact_filter_run(struct nav_contact_filter *f, const double *bases,
     return made;
 }
 
-/* Sums over the hypotheses: mean and second moments. */
-struct mean_of {
-    double weight, mean[2], square[2][2];
+enum { N = NAV_CONTACT_STATES };
+
+/* Sums over hypotheses of what they say: weights, means and second moments. */
+struct mixture {
+    double weight, mean[N];
+    nav_contact_square square;
 };
 
-static void filter_add(struct mean_of *m, double weight, const double value[2], double cov[2][2])
+static void filter_add(struct mixture *m, double weight, const double mean[N], nav_contact_square cov)
 {
     m->weight += weight;
-    for (int i = 0; i < 2; i++) {
-        m->mean[i] += weight * value[i];
-        for (int j = 0; j < 2; j++)
-            m->square[i][j] += weight * (cov[i][j] + value[i] * value[j]);
+    for (int i = 0; i < N; i++) {
+        m->mean[i] += weight * mean[i];
+        for (int j = 0; j < N; j++)
+            m->square[i][j] += weight * (cov[i][j] + mean[i] * mean[j]);
     }
 }
 
-static void filter_mean(const struct mean_of *m, double mean[2], double cov[2][2])
+/* Turns the sums into mean and covariance. */
+static void filter_finish(struct mixture *m)
 {
     double w = m->weight > 0.0 ? m->weight : 1.0;
-    for (int i = 0; i < 2; i++)
-        mean[i] = m->mean[i] / w;
-    for (int i = 0; i < 2; i++)
+    for (int i = 0; i < N; i++)
+        m->mean[i] /= w;
+    for (int i = 0; i < N; i++)
+        for (int j = 0; j < N; j++) {
+            double cov = m->square[i][j] / w - m->mean[i] * m->mean[j];
+            m->square[i][j] = i == j ? fmax(0.0, cov) : cov; /* a difference of what is nearly equal */
+        }
+}
+
+/* A pair of what is said with its covariance; the second member is mirrored with a contact on the other side. */
+static void filter_pair(const struct mixture *m, int first, double side, double pair[2], double cov[2][2])
+{
+    const double sign[2] = {1.0, side};
+    for (int i = 0; i < 2; i++) {
+        pair[i] = sign[i] * m->mean[first + i];
         for (int j = 0; j < 2; j++)
-            cov[i][j] = m->square[i][j] / w - mean[i] * mean[j];
-    for (int i = 0; i < 2; i++)
-        cov[i][i] = fmax(0.0, cov[i][i]); /* a difference of what is nearly equal */
+            cov[i][j] = sign[i] * sign[j] * m->square[first + i][first + j];
+    }
 }
 
-/* As filter_add, of two numbers that are not correlated. */
-static void filter_add_pair(struct mean_of *m, double weight, double a, double a_var, double b, double b_var)
+static void filter_speed(const struct mixture *m, struct nav_contact_answer *a)
 {
-    double value[2] = {a, b}, cov[2][2] = {{a_var, 0.0}, {0.0, b_var}};
-    filter_add(m, weight, value, cov);
-}
-
-/* Undoes the mirror of a contact on the other side. */
-static void filter_mirror(struct nav_contact_answer *a, double side)
-{
-    a->point[1] *= side;
-    a->point_cov[0][1] *= side;
-    a->point_cov[1][0] *= side;
-    a->velocity[1] *= side;
-    a->velocity_cov[0][1] *= side;
-    a->velocity_cov[1][0] *= side;
-    a->normal_rad *= side;
-}
-
-static void filter_speed(const struct mean_of *moving, struct nav_contact_answer *a)
-{
-    double mean[2], cov[2][2];
-    filter_mean(moving, mean, cov);
-    a->speed = hypot(mean[0], mean[1]);
-    double x = a->speed > 0.0 ? mean[0] / a->speed : 1.0, y = a->speed > 0.0 ? mean[1] / a->speed : 0.0;
+    double v[2], cov[2][2];
+    filter_pair(m, SEEN_VX, 1.0, v, cov);
+    a->speed = hypot(v[0], v[1]);
+    double x = a->speed > 0.0 ? v[0] / a->speed : 1.0, y = a->speed > 0.0 ? v[1] / a->speed : 0.0;
     a->speed_sd = sqrt(fmax(0.0, x * x * cov[0][0] + 2.0 * x * y * cov[0][1] + y * y * cov[1][1]));
 }
 
@@ -205,41 +201,43 @@ static void filter_motion(const struct nav_contact_filter *f, struct nav_contact
 
 void nav_contact_filter_answer(const struct nav_contact_filter *f, struct nav_contact_answer *a)
 {
-    struct mean_of point = {0}, velocity = {0}, moving = {0}, turn = {0}, grip = {0};
+    struct mixture all = {0}, moving = {0};
     memset(a, 0, sizeof *a);
     a->parts = f->parts;
     if (f->parts == 0)
         return;
     for (int i = 0; i < f->parts; i++) {
         const struct nav_contact_part *part = &f->part[i];
-        struct nav_contact_seen s;
-        nav_contact_bank_see(f, part, &s);
-        double w = exp(part->log_weight);
-        filter_add(&point, w, s.point, s.point_cov);
-        filter_add(&velocity, w, s.velocity, s.velocity_cov);
+        nav_contact_square cov;
+        double mean[N], w = exp(part->log_weight);
+        nav_contact_bank_see(f, part, mean, cov);
+        filter_add(&all, w, mean, cov);
         if (part->moving)
-            filter_add(&moving, w, s.velocity, s.velocity_cov);
-        filter_add_pair(&turn, w, s.normal, s.normal_var, s.arc, s.arc_var);
-        filter_add_pair(&grip, w, s.friction, s.friction_var, 0.0, 0.0);
+            filter_add(&moving, w, mean, cov);
         a->sweep += w * part->moving;
-        a->corner += w * s.corner;
+        a->corner += w * nav_contact_bank_corner(f, part);
         a->tip += w * part->tip;
         a->slip += w * part->slips;
     }
-    double mean[2], cov[2][2];
-    filter_mean(&point, a->point, a->point_cov);
-    filter_mean(&velocity, a->velocity, a->velocity_cov);
-    filter_mean(&turn, mean, cov);
-    a->normal_rad = mean[0];
-    a->normal_sd = sqrt(cov[0][0]);
-    a->arc_m = mean[1];
-    a->arc_sd_m = sqrt(cov[1][1]);
-    filter_mean(&grip, mean, cov);
-    a->friction = mean[0];
-    a->friction_sd = sqrt(cov[0][0]);
+    filter_finish(&all);
+    filter_finish(&moving);
+    filter_pair(&all, SEEN_X, f->side, a->point, a->point_cov);
+    filter_pair(&all, SEEN_VX, f->side, a->velocity, a->velocity_cov);
+    const struct {
+        double *value, *sd;
+        int seen;
+    } one[] = {{&a->normal_rad, &a->normal_sd, SEEN_NORMAL},
+               {&a->arc_m, &a->arc_sd_m, SEEN_ARC},
+               {&a->friction, &a->friction_sd, SEEN_FRICTION},
+               {&a->curvature, &a->curvature_sd, SEEN_CURVATURE}};
+    for (size_t k = 0; k < sizeof one / sizeof one[0]; k++) {
+        *one[k].value = all.mean[one[k].seen];
+        *one[k].sd = sqrt(all.square[one[k].seen][one[k].seen]);
+    }
+    a->normal_rad *= f->side;
     a->plane_rad = atan(f->plane);
     a->plane_sd = sqrt(f->plane_variance) / (1.0 + f->plane * f->plane);
+    a->head_on = f->head_on;
     filter_speed(&moving, a);
     filter_motion(f, a);
-    filter_mirror(a, f->side);
 }

@@ -67,6 +67,7 @@ struct nav_contact_filter {
     double before, rate;            /* tilt of the last block, and its rate */
     double ring;                    /* square of the amplitude of ringing that may be left, rad^2 */
     double plane, plane_variance;   /* tilt of axis 1 over that of axis 0 */
+    double head_on;                 /* see struct nav_contact_answer */
     double turned_m, driven_m;      /* how far the base's turn and its drive have moved the contact */
     uint64_t bad, stuck, saturated; /* samples not read */
     uint64_t restarts;              /* contacts that none of the hypotheses explained */
@@ -82,8 +83,10 @@ struct nav_contact_answer {
     double speed, speed_sd;                 /* if it moves */
     double sweep, corner, tip, slip;        /* probabilities: it moves; its radius is below 5 mm; at the tip; slides */
     double friction, friction_sd;
-    int motion; /* enum nav_contact_motion */
-    int parts;  /* hypotheses left; 0: no contact yet, and nothing above is known */
+    double curvature, curvature_sd; /* of the surface, 1/m, a corner's counted as 0 */
+    double head_on; /* largest probability so far of a push along the whisker; from 0.08 on nothing is known */
+    int motion;     /* enum nav_contact_motion */
+    int parts;      /* hypotheses left; 0: no contact yet, and nothing above is known */
 };
 
 /* The beam must outlive the filter. */

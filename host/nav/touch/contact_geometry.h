@@ -16,8 +16,6 @@ struct nav_contact_look {
     double q_by[3][2], normal_by[3], tilt_by[3];
 };
 
-typedef double nav_contact_square[NAV_CONTACT_STATES][NAV_CONTACT_STATES];
-
 /* false: outside the tables. */
 bool nav_contact_look(const struct nav_contact_filter *, const struct nav_contact_part *, struct nav_contact_look *);
 

@@ -38,8 +38,10 @@ def summary(kind: str, found: list[dict]) -> dict:
 
     moves, shaped = true_motion(kind) == "sweep", kind.startswith(("face", "cylinder"))
     last = np.array([one["speed"][-1] for one in found if len(one["speed"])])
+    refused, kept = (sum(one[name].sum() for one in found) for name in ("refused", "late"))
     told = {
         "contacts": len(found),
+        "refused": float(refused / (refused + kept)),
         "point_rms_mm": rms(late("off")),
         "point_median_mm": float(np.median(late("off"))),
         "bound_rms_mm": rms(late("least")),

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from whisker.touch.contact_filter import ContactFilter
+from whisker.touch.contact_filter import HEAD_ON, ContactFilter
 
 from .scenes import FRICTION_SD, QUARTER, REACH_M, TICK_S, TIP, Corner, Draw, Plan, Scene, chained, lying, simulated
 
@@ -187,7 +187,8 @@ def follow(case: Case, kind: str, scene: Scene, least: np.ndarray | None) -> dic
     )
     return {
         "after_s": after_s,
-        "late": after_s >= max(FIRST_S, first_s),
+        "late": (after_s >= max(FIRST_S, first_s)) & (told.head_on[use] < HEAD_ON),
+        "refused": (after_s >= max(FIRST_S, first_s)) & (told.head_on[use] >= HEAD_ON),
         "off": 1e3 * np.hypot(*off.T),
         "stated": 1e3 * np.sqrt(np.trace(told.point_cov[use], axis1=1, axis2=2)),
         "least": least[at] if least is not None else np.full(len(at), np.nan),

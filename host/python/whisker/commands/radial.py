@@ -112,7 +112,10 @@ def _follow(arguments, contact: str, at_s: float, told: Reports, k: int) -> None
     if arguments.json:
         made = {"contact": contact, "t_s": at_s, "point_mm": [x, y], "point_sd_mm": [sd_x, sd_y]}
         made |= {"normal_deg": normal, "normal_sd_deg": normal_sd, "motion": told.motion[k]}
-        made |= {name: getattr(told, name)[k] for name in ("sweep", "corner", "tip", "slip", "speed", "speed_sd")}
+        made |= {
+            name: getattr(told, name)[k]
+            for name in ("sweep", "corner", "tip", "slip", "speed", "speed_sd", "curvature", "head_on")
+        }
         print(json.dumps(plain(made)))
         return
     kind = "tip" if told.tip[k] > 0.5 else "corner" if told.corner[k] > 0.5 else "shaft"

@@ -34,9 +34,10 @@ SETTINGS = {
 POSITIVE = ("cone_m", "kappa", "creep_s", "noise_rad", "largest_rad", "ring_hz", "sample_s")
 LIMITS = {"friction": 0.5, "moving": 1.0}
 LEAST_SAMPLES = 100
+HEAD_ON = 0.08
 MOTIONS = ("body whisk", "drive-by", "sweep")
 SCALARS = ("arc_m", "arc_sd_m", "plane_rad", "plane_sd", "normal_rad", "normal_sd", "speed", "speed_sd")
-SHARES = ("sweep", "corner", "tip", "slip", "friction", "friction_sd")
+SHARES = ("sweep", "corner", "tip", "slip", "friction", "friction_sd", "curvature", "curvature_sd", "head_on")
 
 
 class Reports(NamedTuple):
@@ -65,6 +66,9 @@ class Reports(NamedTuple):
     slip: np.ndarray  # ... the contact slides
     friction: np.ndarray
     friction_sd: np.ndarray
+    curvature: np.ndarray  # of the surface, 1/m, a corner's counted as 0
+    curvature_sd: np.ndarray
+    head_on: np.ndarray  # largest probability so far of a push along the whisker: from HEAD_ON on nothing is known
 
 
 class ContactFilter:
