@@ -8,7 +8,7 @@ import numpy as np
 
 from ..scene import Whisker
 from ..touch.contact import Contact
-from ..touch.contact_filter import ContactFilter, Reports
+from ..touch.contact_filter import HEAD_ON, ContactFilter, Reports
 from ..touch.radial.whisk import WhiskModel
 from .states import TICK_S
 
@@ -100,7 +100,7 @@ class Feeler:
             ticks, samples, good = (np.concatenate(part) for part in zip(*self._recent, strict=True))
         told = self._filter.run(self._bases(drives.at(ticks)), self._tilts(samples - contact.rest), good)
         if len(told.sample) and ticks[max(told.sample[-1], 0)] >= contact.onset + LEAST_TICKS:
-            self.felt = self._placed(told, ticks)
+            self.felt = self._placed(told, ticks) if told.head_on[-1] < HEAD_ON else None
 
     def _bases(self, drives: np.ndarray) -> np.ndarray:
         """(n, 3) motion of the follicle's exit in the filter's frame."""
