@@ -20,7 +20,7 @@ enum { CORNERS = 14, ROUNDS = 8, NORMALS = 5 };
 #define EDGE 1e-3
 #define LEAST_OVER 1e-2 /* probability from which on a part of a hypothesis goes over */
 #define QUARTER 1.57079632679489661923
-#define LEAST_LOG_WEIGHT -12.0
+#define LEAST_LOG_WEIGHT -9.0
 #define TINY 1e-300
 #define SAME 0.3 /* distance in standard deviations at which two hypotheses are one */
 
@@ -125,24 +125,26 @@ void nav_contact_bank_begin(struct nav_contact_filter *f, const struct nav_conta
     bank_normalise(f);
 }
 
+/* out = (by m)'; most of `by` is 0. */
+static void bank_multiply(nav_contact_square by, nav_contact_square m, nav_contact_square out)
+{
+    for (int i = 0; i < N; i++) {
+        double row[N] = {0};
+        for (int k = 0; k < N; k++)
+            if (by[i][k] != 0.0)
+                for (int j = 0; j < N; j++)
+                    row[j] += by[i][k] * m[k][j];
+        for (int j = 0; j < N; j++)
+            out[j][i] = row[j];
+    }
+}
+
 /* p = by p by' */
 static void bank_carry(nav_contact_square p, nav_contact_square by)
 {
     nav_contact_square half;
-    for (int i = 0; i < N; i++)
-        for (int j = 0; j < N; j++) {
-            double sum = 0.0;
-            for (int k = 0; k < N; k++)
-                sum += by[i][k] * p[k][j];
-            half[i][j] = sum;
-        }
-    for (int i = 0; i < N; i++)
-        for (int j = 0; j <= i; j++) {
-            double sum = 0.0;
-            for (int k = 0; k < N; k++)
-                sum += half[i][k] * by[j][k];
-            p[i][j] = p[j][i] = sum;
-        }
+    bank_multiply(by, p, half);
+    bank_multiply(by, half, p);
 }
 
 /* Blocks of the base's motion differ by a share; a moving object's velocity wanders. */
