@@ -32,8 +32,8 @@ hold the tip. A border reported more than 250 ms late is among them.
 UNTRAINED = """
 ## Surfaces never trained
 
-Each surface left out of training in turn, with a part of the others' recordings; windows from the fifth of a recording on. Share refused, in percent. `detected`: the share
-found by a linear detector on the same features that was trained on the surface too, at 8 % of the others' windows: what the features tell at best.
+Each surface left out of training in turn, with a part of the others' recordings; windows from the fifth of a recording on. Share refused, in percent.
+`detected`: the share found by a linear detector on the same features that was trained on the surface too, at 8 % of the others' windows: what the features tell at best.
 
 """
 TERRAINS = {"borealtc": "BorealTC", "vulpi": "Vulpi"}
