@@ -23,10 +23,10 @@ COURSE_S, LAST_S, PUSH_S = 3.8, 2.6, 0.6  # of the simulated bridge's whisks: on
 
 
 def scene_with_post() -> scenes.Scene:
-    """The whisker just beside the corner of a post that turning to its corner side presses at RADIUS_MM."""
+    """The whisker just beside the corner of a post that turning to its side presses at RADIUS_MM."""
     robot = make_robot()
     whisker = robot.whiskers[LANE]
-    side = Mount.of(whisker).corner_turn
+    side = Mount.of(whisker).calibrated_turn
     heading = side * TOWARDS_RAD - whisker.yaw_rad
     middle, (x, y) = SIDE_M / 2, whisker.base_m
     corner = [

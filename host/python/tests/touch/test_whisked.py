@@ -26,13 +26,13 @@ def shown(model, radius_mm=CORNER_MM, **options):
 
 def per_metre_at_corner(model, mount, radius_mm):
     """Of a corner under the shaft: h(a) times the motion across the shaft over the radius, in calibration's direction."""
-    return -mount.corner_turn * model.share(radius_mm) * math.sin(mount.yaw_rad) / (1e-3 * radius_mm)
+    return -mount.calibrated_turn * model.share(radius_mm) * math.sin(mount.yaw_rad) / (1e-3 * radius_mm)
 
 
 def per_metre_at_face(model, mount, normal_rad):
     """Of a face at the tip with this normal: h(L) times the motion along the normal over the tip's lever."""
     sine = math.sin(normal_rad - mount.yaw_rad)
-    return mount.corner_turn * model.share(TIP_MM) * math.cos(normal_rad) / (sine * 1e-3 * mount.length_mm)
+    return mount.calibrated_turn * model.share(TIP_MM) * math.cos(normal_rad) / (sine * 1e-3 * mount.length_mm)
 
 
 def test_share_and_counts_are_those_of_the_whisk(model):
@@ -41,24 +41,35 @@ def test_share_and_counts_are_those_of_the_whisk(model):
     assert model.along(np.array([[80.0, -60.0]]))[0] == pytest.approx(100.0, rel=0.01)
 
 
-@pytest.mark.parametrize("mount", [OUTER, INNER])
-def test_a_corner_is_told_where_it_is_whatever_the_mount(model, mount):
-    per_metre = per_metre_at_corner(model, mount, CORNER_MM)
-    assert mount.whisked(model, shown(model), mount.corner_turn, per_metre) == pytest.approx(CORNER_MM, abs=5.0)
-    assert mount.whisked(model, shown(model), -mount.corner_turn, per_metre) == pytest.approx(TIP_MM)
+def test_a_corner_is_told_where_it_is(model):
+    per_metre = per_metre_at_corner(model, INNER, CORNER_MM)
+    assert INNER.whisked(model, shown(model), INNER.corner_turn, per_metre) == pytest.approx(CORNER_MM, abs=5.0)
+    assert INNER.whisked(model, shown(model), -INNER.corner_turn, per_metre) == pytest.approx(TIP_MM)
+
+
+def test_a_corner_on_the_side_that_was_not_calibrated_is_not_told(model):
+    """Driving forward, an outer whisker meets corners on its right; its post stood on its left."""
+    per_metre = per_metre_at_corner(model, OUTER, CORNER_MM)
+    assert per_metre < 0.0
+    assert OUTER.whisked(model, shown(model, gain=-1.0), OUTER.corner_turn, per_metre) is None
 
 
 def test_a_face_that_bends_it_like_a_corner_is_told_at_the_tip(model):
     """Driving towards them bends the whisker differently, that is what tells."""
     shape, length_m = shown(model), 1e-3 * OUTER.length_mm
     tip = np.array(OUTER.base_m) + length_m * np.array([math.cos(OUTER.yaw_rad), math.sin(OUTER.yaw_rad)])
-    normals = np.linspace(-1.5, -0.3, 1000)  # the whisker leans to the left: the sine is well above 0
+    normals = np.linspace(
+        0.5, 1.0, 1000
+    )  # beyond the whisker, which leans to the left by 0.2: it bends as in calibration
     lever = tip[0] * np.sin(normals) - tip[1] * np.cos(normals)
     bends = model.share(TIP_MM) * lever / (np.sin(normals - OUTER.yaw_rad) * length_m)
+    bends *= OUTER.calibrated_turn * OUTER.corner_turn
     nearest = np.argmin(np.abs(bends - model.share_of(shape)))
     assert bends[nearest] == pytest.approx(model.share_of(shape), abs=0.01)
     per_metre = per_metre_at_face(model, OUTER, normals[nearest])
     assert OUTER.whisked(model, shape, OUTER.corner_turn, per_metre) == pytest.approx(TIP_MM)
+    surface = OUTER.surface(model, per_metre, model.share_of(shape), OUTER.corner_turn)
+    assert surface["face"] > 0.99 and surface["normal_rad"] == pytest.approx(normals[nearest], abs=0.05)
 
 
 def test_a_tip_dragged_along_a_face_bends_little_and_is_told(model):

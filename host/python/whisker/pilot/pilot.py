@@ -166,9 +166,7 @@ class Pilot:
             per_metre = self._per_metre(whisk, model, contact.rest)
             shape = model.shape_of(recorded)
             distance = mount.whisked(model, shape, turn, per_metre)
-            surface = mount.surface(
-                model, mount.corner_turn * per_metre, mount.corner_turn * model.share_of(shape) * turn
-            )
+            surface = mount.surface(model, per_metre, model.share_of(shape), turn)
         else:
             distance = mount.distance(told.radius_mm, turn)
         kind = contact_type(mount, distance)

@@ -52,17 +52,18 @@ class Mount:
             return None
         return line_mm
 
-    def surface(self, model: WhiskModel, per_metre: float, per_radian: float) -> dict[str, float]:
+    def surface(self, model: WhiskModel, per_metre: float, share: float, turn: float) -> dict[str, float]:
         """Face or corner, and how it lies (host/nav/touch/contact_surface.h, struct nav_surface).
 
-        Tilt of the plug (rad) per metre driven forward and per radian turned anticlockwise, positive when the whisker
-        bends clockwise; face 0.5 and the widest deviations when one is nan or neither explains them.
+        Tilt of the plug (rad) per metre driven forward, and per radian pushed by this turn (`share_of`), both positive in
+        the direction of calibration; face 0.5 and the widest deviations when one is nan or neither explains them.
         """
         mount = {"base_m": list(self.base_m), "yaw_rad": self.yaw_rad, "length_m": 1e-3 * self.length_mm}
         mount |= {name: getattr(model, name) for name in ("kappa", "cone_mm", "spread")}
         mount |= {"corner_low_mm": model.low_mm, "corner_high_mm": model.tip_mm}
         out = ffi.new("struct nav_surface *")
-        seen = {"per_metre": per_metre, "per_radian": per_radian}
+        # There positive is clockwise, as in calibration where that turned the robot anticlockwise.
+        seen = {"per_metre": self.calibrated_turn * per_metre, "per_radian": self.calibrated_turn * share * turn}
         lib.nav_surface_of(
             ffi.new("struct nav_surface_mount *", mount), ffi.new("struct nav_surface_seen *", seen), out
         )
@@ -71,17 +72,16 @@ class Mount:
     def whisked(self, model: WhiskModel, shape, turn: float, per_metre: float) -> float | None:
         """Distance of a contact pressed by this turn, mm, from its whole whisk; None when unsure.
 
-        `model` is calibrated against a corner that `corner_turn` presses; `per_metre` is the tilt of the plug per metre
-        driven towards the contact (`retreat`), positive in the direction of calibration. A tip on a face bends by
-        anything up to what the innermost corner would, always to that side; what bends more or to the other side is
-        caught somewhere.
+        `per_metre` is the tilt of the plug per metre driven towards the contact (`retreat`), positive in the direction of
+        calibration. A tip on a face bends by anything up to what the innermost corner would, to that side; what bends
+        more is caught somewhere, and what bends to the other side is caught or a corner that was not calibrated.
         """
         share = model.share_of(shape)
         if not 0.0 < share <= model.share(model.low_mm):
             return None
         if turn != self.corner_turn:
             return self.length_mm
-        face = self.surface(model, self.corner_turn * per_metre, self.corner_turn * share * turn)["face"]
+        face = self.surface(model, per_metre, share, turn)["face"]
         told = model.estimate(shape)
         if max(face, 1.0 - face) < SURE:
             face = float(share < model.share(model.tip_mm))
