@@ -151,10 +151,10 @@ def test_peers_that_were_not_run_are_not_said_to_be_worse(data):
 def test_the_page_of_unseen_families_is_what_was_measured():
     from benches.nav import unseen
 
-    measured, designs, ablations = (
-        json.loads(path.read_text()) for path in (unseen.RESULT, unseen.DESIGNS, unseen.ABLATIONS)
+    measured, *others = (
+        json.loads(path.read_text()) for path in (unseen.RESULT, unseen.DESIGNS, unseen.ABLATIONS, unseen.LEFT)
     )
-    assert unseen.page(measured, designs, ablations) == unseen.PAGE.read_text()
+    assert unseen.page(measured, *others) == unseen.PAGE.read_text()
     family = next(iter(measured["families"].values()))
     family["locked"] = 0
-    assert unseen.page(measured, designs, ablations) != unseen.PAGE.read_text()
+    assert unseen.page(measured, *others) != unseen.PAGE.read_text()
