@@ -22,7 +22,9 @@ def is_gowin(device: str) -> bool:
 def constraints(sites: dict[str, str]) -> str:
     """The CST file: sites, 3.3 V, pull-ups on the lanes."""
     lines = []
-    for port, site in sites.items():
+    for bit, site in sites.items():
+        # nextpnr names the only wire of a port by the port; ECP5's knows both names.
+        port = bit if bit.replace("[0]", "[1]") in sites else bit.removesuffix("[0]")
         pull = next((pull for start, pull in PULLS.items() if port.startswith(start)), "NONE")
         lines.append(f'IO_LOC "{port}" {site};')
         lines.append(f'IO_PORT "{port}" IO_TYPE=LVCMOS33 PULL_MODE={pull};')

@@ -60,14 +60,13 @@ def balls(cell: str) -> list[str]:
     return re.findall(r"[A-Z]\d+", re.split(r"[:(]", cell)[1])
 
 
-def test_gowins_file_pulls_up_the_lanes_alone():
-    lines = gowin.constraints({"miso[0]": "A11", "sync": "B11"}).splitlines()
-    assert lines == [
-        'IO_LOC "miso[0]" A11;',
-        'IO_PORT "miso[0]" IO_TYPE=LVCMOS33 PULL_MODE=UP;',
-        'IO_LOC "sync" B11;',
-        'IO_PORT "sync" IO_TYPE=LVCMOS33 PULL_MODE=NONE;',
-    ]
+@pytest.mark.parametrize(("given", "named"), [(["miso[0]"], ["miso"]), (["miso[0]", "miso[1]"],) * 2])
+def test_gowins_file_pulls_up_the_lanes_alone(given, named):
+    lines = gowin.constraints({**dict.fromkeys(given, "A11"), "sync": "B11"}).splitlines()
+    lanes = [f'IO_PORT "{port}" IO_TYPE=LVCMOS33 PULL_MODE=UP;' for port in named]
+    sync = ['IO_LOC "sync" B11;', 'IO_PORT "sync" IO_TYPE=LVCMOS33 PULL_MODE=NONE;']
+    assert lines[1:-2:2] == lanes and lines[-2:] == sync
+    assert lines[:-2:2] == [f'IO_LOC "{port}" A11;' for port in named]
 
 
 @pytest.mark.parametrize("name", build.boards())
