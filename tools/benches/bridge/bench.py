@@ -141,7 +141,7 @@ def measured(board: dict) -> list[dict]:
 
 def draw_lanes(found: dict) -> Figure:
     """Resources of the swept board and every board's clock over lanes."""
-    figure = Figure(figsize=(7, 3.6), layout="constrained")
+    figure = Figure(figsize=(7, 4), layout="constrained")
     left, right = figure.subplots(1, 2)
     points = measured(found["boards"][SWEPT])
     counts = [point["lanes"] for point in points]
@@ -154,9 +154,12 @@ def draw_lanes(found: dict) -> Figure:
         label = f"{board['title']}, grade {board['speed']}"
         right.plot([r["lanes"] for r in runs], [r["fmax_mhz"] for r in runs], f"{marker}-", color="0.3", label=label)
     right.axhline(report.CLOCK_MHZ, color="0.5", linewidth=1, linestyle="--")
-    right.annotate(f"{report.CLOCK_MHZ:g} MHz wanted", (1, report.CLOCK_MHZ), xytext=(0, 4), textcoords="offset points")
+    right.annotate(
+        f"{report.CLOCK_MHZ:g} MHz wanted", (1, report.CLOCK_MHZ), xytext=(0, -12), textcoords="offset points"
+    )
     right.set(xlabel="lanes", ylabel="clock, MHz (nextpnr)", ylim=(50, None), xticks=sorted(COUNTS))
-    right.legend(frameon=False, fontsize=7)
+    boards = right.get_legend_handles_labels()
+    figure.legend(*boards, loc="outside lower right", ncols=3, frameon=False, fontsize=8)
     return figure
 
 
