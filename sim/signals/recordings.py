@@ -23,6 +23,12 @@ WHISK_RAD_S = math.pi / 24  # the body whisk
 RADII_MM = (90.0, 100.0, 110.0, 120.0, 130.0, 138.0)
 REST_S = 0.2
 GAP_RAD = 0.002  # between whisker and post at rest
+# Sweeps along a wall: the pilot's speeds, what it needs to notice a contact, and how often it decides.
+APPROACH_M_S, RETREAT_M_S, PUSH_S, NOTICED_S, BLOCK_TICKS = 0.15, 0.03, 0.6, 0.06, 40
+TIP_FIRST_RAD = math.radians(30.0)  # at most, between the wall's normal and the tip's direction from the centre
+ASLANT_RAD = math.radians(60.0)  # at most, between the wall's normal and the way
+BESIDE_M = 0.4  # from the wall at first
+SWEEPS = 12
 POST_M = 0.03  # side of the square post
 TOWARDS_RAD = math.radians(10.0)  # between the whisker at first contact and the post's face that runs along it
 ROBOT_LINES = r"(body_|texture_|object_|mechanics |batch )"  # of a scene's flat text
@@ -69,6 +75,50 @@ def write_surface_drives(
         place.mkdir(parents=True, exist_ok=True)
         for k, speed in enumerate(speeds):
             for whisker, counts in surface_drive(flat, surface, speed, seconds, _derive(seed, n, k), moves).items():
+                _write_csv(place / f"{whisker}_{k + 1}.csv", "t_s,x,y", [], counts)
+
+
+def surface_sweep(flat: str, whisker: str, surface: str, seed: int, whisk: bool) -> np.ndarray:
+    """Counts (n, 2) of one object whisker while its tip slides along a wall of this surface.
+
+    The robot drives into the wall at an angle drawn from the seed, its tip first. Then it backs off, or turns into the wall
+    and back by a body whisk. What is kept begins there and ends where the tip lets go.
+    """
+    x, y, yaw, length = next(place for name, place in _places(flat, "object_whisker") if name == whisker)
+    tip = math.atan2(y + length * math.sin(yaw), x + length * math.cos(yaw))
+    aside = np.random.default_rng(seed).uniform(-TIP_FIRST_RAD, TIP_FIRST_RAD)
+    heading = float(np.clip(aside - tip, -ASLANT_RAD, ASLANT_RAD))
+    start = (BENCH_M - BESIDE_M, BENCH_M / 2, heading)
+    world = World(_bench(flat, BENCH_M, "VINYL", start) + f"wall {surface}\n", seed)
+    lane = world.lanes.index(whisker)
+    world.drive(APPROACH_M_S, 0.0)
+    while not world.contact(lane).touching:
+        if world.blocked:
+            raise ValueError(f"{whisker}: the body meets a wall before the tip; is the whisker mounted to touch first?")
+        world.run(BLOCK_TICKS)
+    world.run(round(NOTICED_S / TICK_S))
+    parts = []
+    if whisk:
+        into = math.copysign(WHISK_RAD_S, -math.sin(heading + tip))
+        world.drive(0.0, into)
+        parts.append(world.run(round(PUSH_S / TICK_S))[:, lane])
+        world.drive(0.0, -into)
+    else:
+        world.drive(-RETREAT_M_S, 0.0)
+    while world.contact(lane).touching:
+        parts.append(world.run(BLOCK_TICKS)[:, lane])
+    return np.concatenate(parts)
+
+
+def write_surface_sweeps(folder: Path, flat: str, surfaces: Iterable[str], seed: int, count: int = SWEEPS) -> None:
+    """Write FOLDER/SURFACE/WHISKER_N.csv: `count` sweeps of each object whisker along a wall of each surface, every second
+    by a body whisk."""
+    for n, surface in enumerate(surfaces):
+        place = folder / surface
+        place.mkdir(parents=True, exist_ok=True)
+        for lane, whisker in enumerate(_names(flat, "object_whisker")):
+            for k in range(count):
+                counts = surface_sweep(flat, whisker, surface, _derive(seed, n, lane, k), bool(k % 2))
                 _write_csv(place / f"{whisker}_{k + 1}.csv", "t_s,x,y", [], counts)
 
 

@@ -64,7 +64,7 @@ static bool ray_box(const struct sim_box *box, struct sim_point from, struct sim
         normal = (struct sim_point){copysign(1, along.x), 0};
     if (clip(from.y, along.y, box->y0, box->y1, &enter, &leave))
         normal = (struct sim_point){0, copysign(1, along.y)};
-    *hit = (struct sim_hit){enter, normal};
+    *hit = (struct sim_hit){enter, normal, box->surface};
     return enter <= leave;
 }
 
@@ -83,9 +83,9 @@ static bool ray_wall(const struct sim_scene *scene, struct sim_point from, struc
     double x = leaves(from.x, along.x, scene->size_x);
     double y = leaves(from.y, along.y, scene->size_y);
     if (x <= y)
-        *hit = (struct sim_hit){x, {from.x + along.x * x > scene->size_x / 2 ? 1 : -1, 0}};
+        *hit = (struct sim_hit){x, {from.x + along.x * x > scene->size_x / 2 ? 1 : -1, 0}, scene->wall};
     else
-        *hit = (struct sim_hit){y, {0, from.y + along.y * y > scene->size_y / 2 ? 1 : -1}};
+        *hit = (struct sim_hit){y, {0, from.y + along.y * y > scene->size_y / 2 ? 1 : -1}, scene->wall};
     return hit->fraction <= 1;
 }
 

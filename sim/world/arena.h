@@ -13,8 +13,9 @@ struct sim_point {
 
 /* Where a straight path first meets a box or a wall. */
 struct sim_hit {
-    double fraction;         /* of the path, 0..1 */
-    struct sim_point normal; /* unit vector into the box or wall */
+    double fraction;                         /* of the path, 0..1 */
+    struct sim_point normal;                 /* unit vector into the box or wall */
+    const struct sim_floor_texture *surface; /* of the face, as in sim_box */
 };
 
 /* Index of the tile under a point in scene->tile; beyond a wall of the nearest tile, over a box of the tile beneath. */

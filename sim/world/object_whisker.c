@@ -51,7 +51,7 @@ static void make_table(void)
 }
 
 bool sim_object_whisker_start(struct sim_object_whisker *whisker, const struct sim_scene *scene, uint32_t lane,
-                              size_t number, struct sim_rng rng)
+                              size_t number, struct sim_rng rng, struct sim_rng surface)
 {
     static pthread_once_t once = PTHREAD_ONCE_INIT;
     pthread_once(&once, make_table);
@@ -60,6 +60,7 @@ bool sim_object_whisker_start(struct sim_object_whisker *whisker, const struct s
     size_t known = sizeof SPREADS / sizeof SPREADS[0];
     *whisker =
         (struct sim_object_whisker){.mount = scene->whisker[lane], .spread = SPREADS[number % known], .rng = rng};
+    whisker->profile.rng = surface;
     struct mech_whisker made = mech_whisker_draw(scene->batch, lane);
     made.length = whisker->mount.length_m;
     mech_shaft_start(&whisker->shaft, &made, shared_table, (int)scene->mechanics, SIM_TICK_S);
@@ -97,11 +98,22 @@ static bool find_corner(struct sim_object_whisker *whisker, const struct sim_sce
     return found;
 }
 
+static void meet_face(struct sim_object_whisker *whisker, const struct sim_hit *hit)
+{
+    whisker->normal = hit->normal;
+    whisker->surface = hit->surface;
+    if (!whisker->surface)
+        return;
+    mech_floor_start(&whisker->profile, whisker->surface, whisker->profile.rng);
+    whisker->onset_height = mech_floor_height(&whisker->profile, whisker->surface);
+}
+
 static void begin(struct sim_object_whisker *whisker, const struct sim_scene *scene, struct segment from,
                   struct segment to, struct sim_hit shaft)
 {
     whisker->contact.touching = true;
-    whisker->contact.theta_rad = 0;
+    whisker->contact.theta_rad = whisker->lift = 0;
+    whisker->surface = NULL;
     whisker->contact.amplitude_gain = 1 + whisker->spread * sim_rng_normal(&whisker->rng);
     if (find_corner(whisker, scene, from, to))
         return;
@@ -111,20 +123,25 @@ static void begin(struct sim_object_whisker *whisker, const struct sim_scene *sc
     double length = whisker->mount.length_m;
     if (!sim_arena_ray(scene, point_at(from, length), point_at(to, length), &hit) || hit.fraction <= 0)
         hit = shaft;
-    whisker->normal = hit.normal;
+    meet_face(whisker, &hit);
     whisker->side = dot(left_of(to.along), hit.normal) < 0 ? -1 : 1;
 }
 
-/* Angle by which this motion pushes the whisker further (positive) or lets it come back. */
-static double pushed(const struct sim_object_whisker *whisker, struct segment from, struct segment to,
-                     struct sim_point normal)
+/* Angle by which a way of the material point, m along this direction, pushes the whisker further (positive) or lets it
+ * come back; left: of the shaft. */
+static double pushed(const struct sim_object_whisker *whisker, struct sim_point left, double way)
 {
-    double radius = whisker->contact.radius_m;
-    struct sim_point motion = difference(point_at(to, radius), point_at(from, radius));
-    if (whisker->contact.corner)
-        return whisker->side * dot(motion, normal) / radius;
-    double sine = fabs(dot(normal, whisker->normal));
-    return dot(motion, whisker->normal) / fmax(sine, LEAST_SINE) / radius;
+    double sine = whisker->contact.corner ? 1 : fabs(dot(left, whisker->normal));
+    return way / fmax(sine, LEAST_SINE) / whisker->contact.radius_m;
+}
+
+/* Lets the tip slide along a face that has a texture: by the motion that does not bend the shaft by `angle`. */
+static void slide(struct sim_object_whisker *whisker, struct sim_point left, struct sim_point motion, double angle)
+{
+    double bent = whisker->side * angle * whisker->contact.radius_m;
+    mech_floor_move(&whisker->profile, whisker->surface, hypot(motion.x - bent * left.x, motion.y - bent * left.y));
+    double height = mech_floor_height(&whisker->profile, whisker->surface) - whisker->onset_height;
+    whisker->lift = pushed(whisker, left, height);
 }
 
 void sim_object_whisker_move(struct sim_object_whisker *whisker, const struct sim_scene *scene, struct sim_pose from,
@@ -143,16 +160,24 @@ void sim_object_whisker_move(struct sim_object_whisker *whisker, const struct si
     /* The normal halfway through the motion makes a motion and its reverse cancel exactly. */
     struct sim_point along = {before.along.x + now.along.x, before.along.y + now.along.y};
     double norm = hypot(along.x, along.y);
-    struct sim_point normal = left_of((struct sim_point){along.x / norm, along.y / norm});
-    double angle = whisker->side * whisker->contact.theta_rad + pushed(whisker, before, now, normal);
-    whisker->contact.theta_rad = whisker->side * fmax(0, angle);
+    struct sim_point left = left_of((struct sim_point){along.x / norm, along.y / norm});
+    double radius = whisker->contact.radius_m;
+    struct sim_point motion = difference(point_at(now, radius), point_at(before, radius));
+    double way = whisker->contact.corner ? whisker->side * dot(motion, left) : dot(motion, whisker->normal);
+    double angle = pushed(whisker, left, way);
+    if (whisker->surface)
+        slide(whisker, left, motion, angle);
+    whisker->contact.theta_rad = whisker->side * fmax(0, whisker->side * whisker->contact.theta_rad + angle);
 }
 
 void sim_object_whisker_bend(struct sim_object_whisker *whisker, double turn_rate)
 {
     const struct sim_contact *contact = &whisker->contact;
-    struct mech_touch touch = {contact->touching, contact->radius_m, contact->amplitude_gain * contact->theta_rad,
-                               turn_rate, !contact->corner};
+    double theta = contact->theta_rad;
+    if (whisker->surface)
+        theta = whisker->side * fmax(0, whisker->side * theta + whisker->lift);
+    struct mech_touch touch = {contact->touching, contact->radius_m, contact->amplitude_gain * theta, turn_rate,
+                               !contact->corner};
     mech_shaft_step(&whisker->shaft, &touch);
 }
 

@@ -89,6 +89,20 @@ static int read_floor(struct reader *reader)
     return 0;
 }
 
+/* The texture of faces that this word names. Returns 0, or -1 if refused. */
+static int read_surface(struct reader *reader, const char *name, const struct sim_floor_texture **surface)
+{
+    *surface = mech_floor_texture(name);
+    return *surface ? 0
+                    : sim_text_refuse(&reader->text, "%s: no texture is called '%s'; use a name of mech_floor.h",
+                                      reader->text.word[0], name);
+}
+
+static int read_wall(struct reader *reader)
+{
+    return read_surface(reader, reader->text.word[1], &reader->scene->wall);
+}
+
 static int read_obstacle(struct reader *reader)
 {
     struct sim_scene *scene = reader->scene;
@@ -99,8 +113,9 @@ static int read_obstacle(struct reader *reader)
         return -1;
     if (v[0] >= v[2] || v[1] >= v[3])
         return sim_text_refuse(&reader->text, "obstacle: give its smallest corner first, then its largest");
-    scene->obstacle[scene->obstacles++] = (struct sim_box){v[0], v[1], v[2], v[3]};
-    return 0;
+    struct sim_box *box = &scene->obstacle[scene->obstacles++];
+    *box = (struct sim_box){v[0], v[1], v[2], v[3], NULL};
+    return reader->text.words == 6 ? read_surface(reader, reader->text.word[5], &box->surface) : 0;
 }
 
 static int read_radius(struct reader *reader)
@@ -189,20 +204,21 @@ static int read_batch(struct reader *reader)
 
 static const struct item {
     const char *key;
-    int values;
+    int values, optional;
     int (*read)(struct reader *);
 } ITEMS[] = {
-    {"size_m", 2, read_size},
-    {"tile_m", 1, read_tile},
-    {"texture", 1, read_texture},
-    {"floor", 1, read_floor},
-    {"obstacle", 4, read_obstacle},
-    {"body_radius_m", 1, read_radius},
-    {"texture_whisker", 3, read_texture_whisker},
-    {"object_whisker", 5, read_object_whisker},
-    {"start", 3, read_start},
-    {"mechanics", 1, read_mechanics},
-    {"batch", 1, read_batch},
+    {"size_m", 2, 0, read_size},
+    {"tile_m", 1, 0, read_tile},
+    {"texture", 1, 0, read_texture},
+    {"floor", 1, 0, read_floor},
+    {"wall", 1, 0, read_wall},
+    {"obstacle", 4, 1, read_obstacle},
+    {"body_radius_m", 1, 0, read_radius},
+    {"texture_whisker", 3, 0, read_texture_whisker},
+    {"object_whisker", 5, 0, read_object_whisker},
+    {"start", 3, 0, read_start},
+    {"mechanics", 1, 0, read_mechanics},
+    {"batch", 1, 0, read_batch},
 };
 
 static int read_item(struct reader *reader)
@@ -211,8 +227,9 @@ static int read_item(struct reader *reader)
     for (size_t i = 0; i < sizeof ITEMS / sizeof ITEMS[0]; i++) {
         if (strcmp(text->word[0], ITEMS[i].key) != 0)
             continue;
-        if (text->words - 1 != ITEMS[i].values)
-            return sim_text_refuse(text, "%s: %d values; must be %d", ITEMS[i].key, text->words - 1, ITEMS[i].values);
+        int values = text->words - 1;
+        if (values < ITEMS[i].values || values > ITEMS[i].values + ITEMS[i].optional)
+            return sim_text_refuse(text, "%s: %d values; must be %d", ITEMS[i].key, values, ITEMS[i].values);
         return ITEMS[i].read(reader);
     }
     return sim_text_refuse(text, "unknown item '%s'; remove it or correct its spelling", text->word[0]);

@@ -6,7 +6,9 @@
  *   tile_m T                                  side of a square floor tile
  *   texture NAME                              repeated, one of mech_floor.h; its first letter stands for it
  *   floor LETTERS                             repeated: one row of tiles, rows from the largest y to the smallest
- *   obstacle X0 Y0 X1 Y1                      repeated: a box from its smallest corner to its largest
+ *   wall NAME                                 texture of the walls' faces, one of mech_floor.h; left out: none, smooth
+ *   obstacle X0 Y0 X1 Y1 [NAME]               repeated: a box from its smallest corner to its largest, and the texture
+ *                                             of its faces as of walls
  *   body_radius_m R
  *   texture_whisker NAME X Y                  tip in the robot frame (x forward, y left)
  *   object_whisker NAME X Y YAW LENGTH        base and direction in the robot frame
@@ -42,8 +44,11 @@ struct sim_pose {
     double x, y, theta; /* m, m, rad */
 };
 
+struct sim_floor_texture; /* mech_floor.h */
+
 struct sim_box {
-    double x0, y0, x1, y1; /* m */
+    double x0, y0, x1, y1;                   /* m */
+    const struct sim_floor_texture *surface; /* of its faces; NULL: smooth */
 };
 
 struct sim_whisker {
@@ -60,6 +65,7 @@ struct sim_scene {
     char texture[SIM_TEXTURES_MAX][SIM_NAME_SIZE];
     size_t columns, rows;
     unsigned char tile[SIM_TILES_MAX]; /* texture index of tile (column, row) at row * columns + column; row 0: y = 0 */
+    const struct sim_floor_texture *wall; /* surface of the walls; NULL: smooth */
     size_t obstacles;
     struct sim_box obstacle[SIM_OBSTACLES_MAX];
     double body_radius;

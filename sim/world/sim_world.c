@@ -67,7 +67,9 @@ static bool start_lanes(sim_world *world, uint64_t seed)
             continue;
         }
         struct sim_rng rng = sim_rng_stream(seed, FOR_CONTACTS, i);
-        ok = sim_object_whisker_start(&lane->object, &world->scene, i, objects++, rng) && ok;
+        ok = sim_object_whisker_start(&lane->object, &world->scene, i, objects++, rng,
+                                      sim_rng_stream(seed, FOR_FLOOR, i)) &&
+             ok;
         world->reach = fmax(world->reach, sim_object_whisker_reach(mount));
     }
     return ok;

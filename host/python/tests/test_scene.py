@@ -61,6 +61,17 @@ def test_what_is_written_reads_back_equal(folder, tmp_path):
     assert scenes.load(tmp_path / "uniform") == uniform
 
 
+def test_faces_may_have_textures(folder, tmp_path):
+    text = ARENA_TOML.replace("max_m = [0.7, 1.0]", 'max_m = [0.7, 1.0]\nsurface = "ROUGH"')
+    (folder / "arena.toml").write_text(text.replace("[[obstacle]]", 'wall = "SMOOTH"\n\n[[obstacle]]', 1))
+    scene = scenes.load(folder)
+    assert (scene.arena.wall, scene.arena.surfaces) == ("SMOOTH", (((0.5, 0.5, 0.7, 1.0), "ROUGH"),))
+    scenes.write(tmp_path / "again", scene)
+    assert scenes.load(tmp_path / "again") == scene
+    flat = scene.flat((0.5, 1.2, 0.1)).splitlines()
+    assert "wall SMOOTH" in flat and "obstacle 0.5 0.5 0.7 1.0 ROUGH" in flat and "obstacle 0.0 0.0 0.2 0.3" in flat
+
+
 def test_floor_rows_run_from_the_largest_y(folder):
     assert scenes.load(folder).arena.floor_indices().tolist() == [[0, 0], [1, 0], [0, 1]]
 
@@ -115,6 +126,13 @@ BROKEN = [
     ("arena.toml", '"SV"', '"S"', "line 4: 'floor' row 2 has 1 tiles"),
     ("arena.toml", '"SV"', '"SX"', "line 4: 'floor' row 2 has the letter 'X'"),
     ("arena.toml", '"SV", ', "", "line 4: 'floor' has 2 rows"),
+    (
+        "arena.toml",
+        "max_m = [0.7, 1.0]",
+        'max_m = [0.7, 1.0]\nsurface = "a b"',
+        "'surface' has the name 'a b'; use letters",
+    ),
+    ("arena.toml", "[[obstacle]]", "wall = 3\n[[obstacle]]", "'wall'"),
     ("arena.toml", "[0.7, 1.0]", "[0.7, 1.6]", "line 12: 'max_m' is outside the arena"),
     ("arena.toml", "[0.7, 1.0]", "[0.4, 1.0]", "line 12: 'max_m' must be larger than min_m"),
     ("arena.toml", "max_m = [0.7", "most_m = [0.7", "'max_m' is missing in [[obstacle]] number 2"),

@@ -22,6 +22,7 @@ ARENA, ROBOT, PRIOR, OBSERVATIONS = "arena.toml", "robot.toml", "prior.toml", "o
 # Columns of OBSERVATIONS of an object whisker, after its name: what it touches, in the robot's frame at the row's end. A file may leave them out.
 NORMAL = ("normal_rad", "normal_sd_rad")
 POINT = ("point_x_m", "point_y_m", "point_sd_m")
+SURFACE = "surface_"  # before a texture: its log-likelihood for the face that the whisker sweeps along
 TEXTURES_MOST = 250  # texture indices are one byte in host/nav, with room for its marks
 WHISKERS_MOST, OBSTACLES_MOST = 1000, 10_000
 TILES_MOST = 10_000_000
@@ -37,6 +38,8 @@ class Arena:
     floor: tuple[str, ...]  # letters, the first row has the largest y
     obstacles: tuple[Box, ...]
     unknown: tuple[Box, ...] = ()  # nobody knows what stands there
+    wall: str = ""  # texture of the walls' faces; empty: smooth, or not known
+    surfaces: tuple[tuple[Box, str], ...] = ()  # the same of obstacles' faces
 
     def floor_indices(self) -> np.ndarray:
         """Texture index by [row, column], uint8; row 0 has the smallest y. Not known: NOT_KNOWN_INDEX."""
@@ -111,7 +114,10 @@ class Scene:
             raise SceneError(f"{ARENA}: parts of the arena are unknown; a simulated world needs to know them all")
         lines = [_line("size_m", *arena.size_m), _line("tile_m", arena.tile_m)]
         lines += [_line("texture", name) for name in arena.textures] + [_line("floor", row) for row in arena.floor]
-        lines += [_line("obstacle", *box) for box in arena.obstacles] + [_line("body_radius_m", robot.body_radius_m)]
+        lines += [_line("wall", arena.wall)] if arena.wall else []
+        surface = dict(arena.surfaces)
+        lines += [_line("obstacle", *box, *filter(None, [surface.get(box)])) for box in arena.obstacles]
+        lines.append(_line("body_radius_m", robot.body_radius_m))
         for w in robot.whiskers:
             place = w.tip_m if w.role == "texture" else (*w.base_m, w.yaw_rad, w.length_m)
             lines.append(_line(f"{w.role}_whisker", w.name, *place))
@@ -164,9 +170,12 @@ def write(path, scene: Scene) -> None:
     arena, robot, prior = scene.arena, scene.robot, scene.prior
     text = [_toml("size_m", arena.size_m), _toml("tile_m", arena.tile_m)]
     text += [_toml("textures", arena.textures), _toml("floor", arena.floor)]
+    text += [_toml("wall", arena.wall)] if arena.wall else []
+    surface = dict(arena.surfaces)
     for header, boxes in (("obstacle", arena.obstacles), ("unknown", arena.unknown)):
         for box in boxes:
             text += ["", f"[[{header}]]", _toml("min_m", box[:2]), _toml("max_m", box[2:])]
+            text += [_toml("surface", surface[box])] if box in surface and header == "obstacle" else []
     (folder / ARENA).write_text("\n".join(text) + "\n")
     text = [_toml(key, getattr(robot, key)) for key in ("body_radius_m", "odometry_relative_sigma", "radial_sigma_m")]
     for whisker in robot.whiskers:
@@ -199,21 +208,34 @@ def _arena(table: Table) -> Arena:
     tile = table.number("tile_m", TINY, LARGEST_M)
     textures = _textures(table)
     floor = _floor(table, size, tile, textures)
-    obstacles, unknown = (_boxes(table, key, size) for key in ("obstacle", "unknown"))
+    wall = _surface(table, "wall")
+    surfaces: list[tuple[Box, str]] = []
+    obstacles, unknown = (_boxes(table, key, size, surfaces) for key in ("obstacle", "unknown"))
     table.done()
-    return Arena(size, tile, textures, floor, obstacles, unknown)
+    return Arena(size, tile, textures, floor, obstacles, unknown, wall, tuple(surfaces))
 
 
-def _boxes(table: Table, key: str, size: tuple[float, float]) -> tuple[Box, ...]:
+def _surface(table: Table, key: str) -> str:
+    """The texture of a face that this key names; empty without the key."""
+    name = table.string(key) if key in table.content else ""
+    if name and not re.fullmatch(r"\w+", name):
+        raise table.fail(key, f"has the name '{name}'; use letters, digits and underscores")
+    return name
+
+
+def _boxes(table: Table, key: str, size: tuple[float, float], surfaces: list[tuple[Box, str]]) -> tuple[Box, ...]:
+    """The boxes of this key; the textures of their faces are added to `surfaces`."""
     boxes = []
     for entry in table.tables(key, OBSTACLES_MOST):
         low, high = (entry.numbers(corner, 2, -LARGEST_M, LARGEST_M) for corner in ("min_m", "max_m"))
+        surface = _surface(entry, "surface") if key == "obstacle" else ""
         entry.done()
         if not (low[0] < high[0] and low[1] < high[1]):
             raise entry.fail("max_m", "must be larger than min_m in x and y")
         if min(low) < -TINY or high[0] > size[0] + TINY or high[1] > size[1] + TINY:
             raise entry.fail("min_m" if min(low) < -TINY else "max_m", "is outside the arena; move the obstacle inside")
         boxes.append((*low, *high))
+        surfaces += [(boxes[-1], surface)] if surface else []
     return tuple(boxes)
 
 

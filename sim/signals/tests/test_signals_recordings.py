@@ -82,3 +82,18 @@ def test_drives_are_long_as_asked_and_repeat():
     assert one["left_floor"].shape == (19000, 2)
     assert np.array_equal(one["right_floor"], again["right_floor"])
     assert not np.array_equal(one["right_floor"], one["left_floor"])
+
+
+def test_sweeps_differ_by_the_wall_and_repeat(tmp_path):
+    """The rougher the wall, the more a sliding tip shakes; only the tip's own wall counts."""
+    shaken = {}
+    for surface in ("VINYL", "ROUGH"):
+        for whisk in (False, True):
+            counts = recordings.surface_sweep(flat(), "left_outer", surface, 5, whisk).astype(float)
+            shaken[surface, whisk] = np.diff(counts[:, 0].reshape(-1, 20).mean(axis=1), 2).std()
+            assert len(counts) >= 200
+    assert all(shaken["ROUGH", whisk] > 2 * shaken["VINYL", whisk] for whisk in (False, True)), shaken
+    recordings.write_surface_sweeps(tmp_path, flat(), ["VINYL"], seed=2, count=2)
+    assert sorted(f.name for f in (tmp_path / "VINYL").iterdir()) == sorted(
+        f"{w}_{k}.csv" for w in SPREADS for k in (1, 2)
+    )

@@ -17,7 +17,7 @@ static struct sim_scene scene(void)
     scene.columns = scene.rows = 2;
     memcpy(scene.tile, (unsigned char[]){0, 1, 2, 3}, 4);
     scene.obstacles = 1;
-    scene.obstacle[0] = (struct sim_box){0.6, 0.7, 0.8, 0.9};
+    scene.obstacle[0] = (struct sim_box){0.6, 0.7, 0.8, 0.9, NULL};
     return scene;
 }
 

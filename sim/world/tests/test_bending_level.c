@@ -54,7 +54,7 @@ static void test_levels(void **state)
         struct sim_scene scene = bench(4, 2, 2, 0);
         scene.mechanics = levels[i];
         scene.obstacles = 1;
-        scene.obstacle[0] = (struct sim_box){2.17, 2.11, 2.25, 2.2}; /* where left_inner will turn to */
+        scene.obstacle[0] = (struct sim_box){2.17, 2.11, 2.25, 2.2, NULL}; /* where left_inner will turn to */
         sim_world *world = world_of(&scene, 7);
         run(world, 0, SIM_PI / 24, 2.2);
         struct sim_field fields[6];
@@ -82,7 +82,8 @@ static void test_static_level(void **state)
     struct mech_whisker made = mech_whisker_draw(scene.batch, LANE);
     for (int beyond = 0; beyond < 2; beyond++) {
         struct sim_object_whisker whisker;
-        assert_true(sim_object_whisker_start(&whisker, &scene, LANE, 0, sim_rng_stream(1, 1, 1)));
+        assert_true(
+            sim_object_whisker_start(&whisker, &scene, LANE, 0, sim_rng_stream(1, 1, 1), sim_rng_stream(1, 2, 1)));
         whisker.contact = (struct sim_contact){true, true, 0.1, beyond ? -1.2 : -0.05, 1.04};
         double tilt = beyond ? -made.stop : mech_whisker_tilt(&made, 0.1, -0.05 * 1.04);
         sim_object_whisker_bend(&whisker, 0);
@@ -114,7 +115,8 @@ static void test_slips_off_a_corner_not_off_a_face(void **state)
     scene.mechanics = SIM_MECHANICS_MODES;
     for (int corner = 0; corner < 2; corner++) {
         struct sim_object_whisker whisker;
-        assert_true(sim_object_whisker_start(&whisker, &scene, LANE, 0, sim_rng_stream(1, 1, 1)));
+        assert_true(
+            sim_object_whisker_start(&whisker, &scene, LANE, 0, sim_rng_stream(1, 1, 1), sim_rng_stream(1, 2, 1)));
         whisker.contact = (struct sim_contact){true, corner, corner ? 0.130 : 0.140, 0, 1};
         double largest = 0, last = 0;
         for (int i = 0; i < 4 * TICKS_PER_S; i++) {

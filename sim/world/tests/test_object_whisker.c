@@ -32,7 +32,7 @@ static struct sim_scene post_at(const struct sim_whisker *mount, double radius)
     double y = CENTRE + s * mount->x + c * mount->y + radius * sin(towards);
     scene.obstacles = 1;
     scene.obstacle[0] =
-        side > 0 ? (struct sim_box){x - size, y, x, y + size} : (struct sim_box){x - size, y - size, x, y};
+        side > 0 ? (struct sim_box){x - size, y, x, y + size, NULL} : (struct sim_box){x - size, y - size, x, y, NULL};
     return scene;
 }
 
@@ -76,8 +76,8 @@ static struct sim_pose shift(struct sim_object_whisker *whisker, const struct si
 static struct sim_object_whisker start(const struct sim_scene *scene, size_t lane, uint64_t seed)
 {
     struct sim_object_whisker whisker;
-    assert_true(
-        sim_object_whisker_start(&whisker, scene, (uint32_t)lane, lane, sim_rng_stream(seed, 2, (uint32_t)lane)));
+    assert_true(sim_object_whisker_start(&whisker, scene, (uint32_t)lane, lane, sim_rng_stream(seed, 2, (uint32_t)lane),
+                                         sim_rng_stream(seed, 3, (uint32_t)lane)));
     return whisker;
 }
 
@@ -143,6 +143,46 @@ static void test_tip_on_a_wall(void **state)
     assert_false(whisker.contact.touching);
 }
 
+/* Largest difference between the tilts of two whiskers that are pushed into their walls and then driven along them. */
+static double apart_along(struct sim_scene scene, const struct sim_floor_texture *one,
+                          const struct sim_floor_texture *two)
+{
+    const struct sim_floor_texture *wall[2] = {one, two};
+    double tilt[2][1000], apart = 0;
+    for (int n = 0; n < 2; n++) {
+        scene.wall = wall[n];
+        struct sim_object_whisker whisker = start(&scene, 1, 1);
+        struct sim_pose pose = scene.start;
+        pose.x = 4 - whisker.mount.x - whisker.mount.length_m * cos(whisker.mount.yaw) - 1e-5;
+        pose = shift(&whisker, &scene, pose, 0.01, 0, 1000);
+        for (int i = 0; i < 1000; i++) {
+            pose = shift(&whisker, &scene, pose, 0, 5e-5, 1);
+            sim_object_whisker_bend(&whisker, 0);
+            tilt[n][i] = whisker.shaft.tilt;
+        }
+        assert_true(whisker.contact.touching && !whisker.contact.corner);
+    }
+    for (int i = 0; i < 1000; i++)
+        apart = fmax(apart, fabs(tilt[0][i] - tilt[1][i]));
+    return apart;
+}
+
+/* A tip that slides along a face follows the heights of its texture; a shaft on a corner knows nothing of it. */
+static void test_a_face_has_a_texture(void **state)
+{
+    (void)state;
+    struct sim_scene scene = bench(4, 2, 2, 0);
+    const struct sim_floor_texture *vinyl = mech_floor_texture("VINYL"), *rough = mech_floor_texture("ROUGH");
+    assert_near(apart_along(scene, NULL, NULL), 0, 0);
+    double little = apart_along(scene, NULL, vinyl), much = apart_along(scene, NULL, rough);
+    assert_true(little > 1e-5 && much > 4 * little && much < 0.02);
+    struct sim_scene post = post_at(&scene.whisker[1], 0.11);
+    post.obstacle[0].surface = rough;
+    struct sim_object_whisker whisker = start(&post, 1, 1);
+    turn(&whisker, &post, post.start, GAP + 1 * SIM_DEGREE);
+    assert_true(whisker.contact.corner && whisker.surface == NULL);
+}
+
 /* Pushed almost along its own axis the whisker would have to turn without end: the sine is limited. */
 static void test_axial_push_is_limited(void **state)
 {
@@ -170,7 +210,7 @@ static void test_tip_on_a_face_near_its_corner(void **state)
     struct sim_object_whisker whisker = start(&scene, 1, 1);
     struct sim_point tip = on_segment(&scene, &whisker.mount, 0.14);
     scene.obstacles = 1;
-    scene.obstacle[0] = (struct sim_box){tip.x + 0.001, tip.y - 0.005, tip.x + 0.5, tip.y + 0.5};
+    scene.obstacle[0] = (struct sim_box){tip.x + 0.001, tip.y - 0.005, tip.x + 0.5, tip.y + 0.5, NULL};
     shift(&whisker, &scene, scene.start, 0.005, 0, 50);
     assert_true(whisker.contact.touching && !whisker.contact.corner);
     assert_near(whisker.normal.x, 1, 0);
@@ -184,7 +224,7 @@ static void test_shaft_on_a_corner_near_its_tip(void **state)
     struct sim_point under = on_segment(&scene, &whisker.mount, 0.135);
     double x = -sin(whisker.mount.yaw), y = cos(whisker.mount.yaw); /* the whisker's left */
     scene.obstacles = 1;
-    scene.obstacle[0] = (struct sim_box){under.x + 1e-4 * x, under.y + 1e-4 * y, under.x + 0.5, under.y + 0.5};
+    scene.obstacle[0] = (struct sim_box){under.x + 1e-4 * x, under.y + 1e-4 * y, under.x + 0.5, under.y + 0.5, NULL};
     shift(&whisker, &scene, scene.start, 0.002 * x, 0.002 * y, 20);
     assert_true(whisker.contact.touching && whisker.contact.corner);
     assert_near(whisker.contact.radius_m, 0.135, 1e-9);
@@ -302,6 +342,7 @@ int main(void)
         cmocka_unit_test(test_theta_is_the_angle_turned),
         cmocka_unit_test(test_turning_there_and_back_is_reversible),
         cmocka_unit_test(test_tip_on_a_wall),
+        cmocka_unit_test(test_a_face_has_a_texture),
         cmocka_unit_test(test_axial_push_is_limited),
         cmocka_unit_test(test_tip_on_a_face_near_its_corner),
         cmocka_unit_test(test_shaft_on_a_corner_near_its_tip),

@@ -10,6 +10,7 @@
 #include <stdlib.h>
 #include <unistd.h>
 
+#include "mech_floor.h"
 #include "robot.h"
 
 #define GOOD                                                                                                           \
@@ -61,6 +62,18 @@ static void test_mechanics_and_batch(void **state)
     assert_int_equal(scene.batch, 7);
 }
 
+static void test_faces_may_have_textures(void **state)
+{
+    (void)state;
+    assert_int_equal(parse(GOOD), 0);
+    assert_null(scene.wall);
+    assert_null(scene.obstacle[0].surface);
+    assert_int_equal(parse(GOOD "wall SMOOTH\nobstacle 0 0.5 0.1 0.6 ROUGH\n"), 0);
+    assert_string_equal(scene.wall->name, "SMOOTH");
+    assert_null(scene.obstacle[0].surface);
+    assert_string_equal(scene.obstacle[1].surface->name, "ROUGH");
+}
+
 static void test_blanks_do_not_matter(void **state)
 {
     (void)state;
@@ -71,7 +84,11 @@ static void test_blanks_do_not_matter(void **state)
 static const struct {
     const char *before, *after, *says;
 } BAD[] = {
-    {"", "wall 1 2\n", "test.scene:13: unknown item 'wall'"},
+    {"", "wallpaper 1 2\n", "test.scene:13: unknown item 'wallpaper'"},
+    {"", "wall GRASS\n", "wall: no texture is called 'GRASS'"},
+    {"", "wall VINYL ROUGH\n", "wall: 2 values; must be 1"},
+    {"", "obstacle 0 0 1 1 GRASS\n", "obstacle: no texture is called 'GRASS'"},
+    {"", "obstacle 0 0 1 1 VINYL 1\n", "obstacle: 6 values; must be 4"},
     {"", "mechanics soft\n", "mechanics: 'soft'; use static, elastica or modes"},
     {"", "batch -1\n", "batch: -1; give a whole number"},
     {"", "batch 1.5\n", "batch: 1.5; give a whole number"},
@@ -170,6 +187,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_good_scene),
         cmocka_unit_test(test_mechanics_and_batch),
+        cmocka_unit_test(test_faces_may_have_textures),
         cmocka_unit_test(test_blanks_do_not_matter),
         cmocka_unit_test(test_malformed_scenes_are_refused),
         cmocka_unit_test(test_missing_items_are_named),

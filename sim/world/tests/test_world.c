@@ -20,7 +20,7 @@ static struct sim_scene arena(void)
     for (size_t i = 0; i < 25; i++)
         scene.tile[i] = i % 2;
     scene.obstacles = 1;
-    scene.obstacle[0] = (struct sim_box){1.0, 1.0, 1.5, 1.5};
+    scene.obstacle[0] = (struct sim_box){1.0, 1.0, 1.5, 1.5, NULL};
     return scene;
 }
 
@@ -235,7 +235,7 @@ static void test_lanes_do_not_disturb_each_other(void **state)
     (void)state;
     struct sim_scene open = bench(4, 2, 2, 0), post = open;
     post.obstacles = 1;
-    post.obstacle[0] = (struct sim_box){2.17, 2.11, 2.25, 2.2}; /* where left_inner will turn to */
+    post.obstacle[0] = (struct sim_box){2.17, 2.11, 2.25, 2.2, NULL}; /* where left_inner will turn to */
     sim_world *one = sim_world_new(&open, 7), *other = sim_world_new(&post, 7);
     run(one, 0, 0.1, 2);
     run(other, 0, 0.1, 2);
@@ -303,7 +303,7 @@ static void test_gap_to_what_is_nearest(void **state)
     sim_world_free(world);
     scene = bench(4, 2, 2, SIM_PI / 2);
     scene.obstacles = 1;
-    scene.obstacle[0] = (struct sim_box){1, 1, 2 - 0.3, 2 - 0.4}; /* its corner lies to the left and behind */
+    scene.obstacle[0] = (struct sim_box){1, 1, 2 - 0.3, 2 - 0.4, NULL}; /* its corner lies to the left and behind */
     world = sim_world_new(&scene, 1);
     assert_near(sim_world_gap(world, &bearing), 0.5 - 0.165, 1e-9);
     assert_near(bearing, SIM_PI / 2 + atan2(0.4, 0.3), 1e-5);

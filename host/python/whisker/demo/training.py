@@ -9,7 +9,7 @@ import numpy as np
 
 from ..pilot.behaviour import EXPLORE_M_S, PUSH_TICKS, TURN_RAD_S
 from ..scene import Scene
-from ..simulation.world import World, radial_contacts, write_radial_contacts, write_surface_drives
+from ..simulation.world import World, radial_contacts, write_radial_contacts, write_surface_drives, write_surface_sweeps
 from ..touch.contact import REST_SAMPLES, Contact
 from ..touch.floor import centred
 from ..touch.radial.model import RadialModel, peak, read_whisks
@@ -40,6 +40,8 @@ def learn(
     """
     folder.mkdir(parents=True, exist_ok=True)
     train_texture(folder, scene, seed, method)
+    if scene.arena.wall or scene.arena.surfaces:
+        train_surfaces(folder, scene, seed)
     progress()
     models, contacts = {}, {}
     for whisker in scene.robot.of_role("object"):
@@ -58,6 +60,17 @@ def train_texture(folder: Path, scene: Scene, seed: int, method: str = METHODS[0
     known = {name: found[name] for name in scene.arena.textures}
     model = fit_texture(known, seed) if method == "paper" else train(known, rate_hz)
     model.save(folder / "texture.json")
+    return model
+
+
+def train_surfaces(folder: Path, scene: Scene, seed: int) -> SpectralModel:
+    """Sweep along walls of each texture that the scene has, record, and learn one model for all object whiskers."""
+    arena, recordings = scene.arena, folder / "surface"
+    names = dict.fromkeys([*arena.textures, *filter(None, [arena.wall]), *dict(arena.surfaces).values()])
+    write_surface_sweeps(recordings, flat(scene), names, seed)
+    found, rate_hz = read_training(recordings)
+    model = train({name: found[name] for name in names}, rate_hz)
+    model.save(folder / "surface.json")
     return model
 
 

@@ -8,7 +8,8 @@ The row of every 0.1 s is one of four kinds:
     first after it    odometry since the release
 
 Where an object whisker's model is one of whole whisks, a row that carries motion also tells how the surface lies that is
-touched or was just let go, and where.
+touched or was just let go, and where. Where it has a texture model, rows tell the texture of the face that its tip swept
+along in the last 200 samples.
 """
 
 import math
@@ -16,14 +17,14 @@ from collections import deque
 
 import numpy as np
 
-from ..scene import NORMAL, POINT
+from ..scene import NORMAL, POINT, SURFACE
 from ..touch.contact import Contact
 from ..touch.floor import WINDOW_LEAST_GOOD, WINDOW_SAMPLES, floor_whisker
 from ..touch.mount import Mount, retreat
 from ..touch.radial.model import Contact as Recorded
 from ..touch.radial.model import WhiskModel, estimate, peak
 from .behaviour import BLOCK_TICKS, EXPLORE_M_S, TICK_S, TURN_RAD_S, Behaviour, Habits, Whisk
-from .feel import Drives, Feeler, Felt
+from .feel import SURE, Drives, Feeler, Felt
 from .states import FULL
 from .tip import contact_type, move_for_tip
 from .wheels import EXACT, NO_BUMPS, Bumps, Wheels
@@ -44,8 +45,8 @@ class Pilot:
         wheels: Wheels = EXACT,
         habits: Habits = FULL,
     ):
-        """`robot.whiskers` in lane order; models by whisker name, radial ones of any kind, calibrated at the rate of whisking
-        of `wheels`; `seed` of the random turns."""
+        """`robot.whiskers` in lane order; models by whisker name: texture models of the floor, and of faces for any object
+        whisker; radial ones of any kind, calibrated at the rate of whisking of `wheels`; `seed` of the random turns."""
         self.names = {lane: whisker.name for lane, whisker in enumerate(robot.whiskers)}
         self.texture_lanes = [n for n, w in enumerate(robot.whiskers) if w.role == "texture"]
         self.floor_sides = {lane: math.copysign(1.0, robot.whiskers[lane].tip_m[1]) for lane in self.texture_lanes}
@@ -63,9 +64,10 @@ class Pilot:
         sides = {lane: -mount.face_turn for lane, mount in self.mounts.items()}
         rng = np.random.default_rng(seed)
         self.behaviour = Behaviour(self.contacts, first_turn, rng, sides, wheels, habits)
-        self.floor = {
+        self.face_lanes = [lane for lane in self.object_lanes if self.names[lane] in texture_models]
+        self.surfaces = {
             lane: floor_whisker(texture_models[self.names[lane]], np.random.default_rng([seed, lane]))
-            for lane in self.texture_lanes
+            for lane in (*self.texture_lanes, *self.face_lanes)
         }
         self.bad_samples = 0
         self.whisks: list[dict] = []  # every whisk that was pushed to its end: see `_measure`
@@ -89,8 +91,8 @@ class Pilot:
         for lane, contact in self.contacts.items():
             contact.block(ticks, samples[:, lane], good[:, lane])
         if any(self.behaviour.drive):
-            for lane, whisker in self.floor.items():
-                whisker.follow(samples[good[:, lane], lane])
+            for lane in self.texture_lanes:
+                self.surfaces[lane].follow(samples[good[:, lane], lane])
         for lane, feeler in self.feelers.items():
             feeler.block(ticks, samples[:, lane], good[:, lane], self.contacts[lane], self._drives)
         self._follow_whisk(ticks, samples, good)
@@ -117,6 +119,8 @@ class Pilot:
         row |= dict(zip(("odo_x_m", "odo_y_m", "odo_theta_rad"), map(float, moved), strict=True))
         for lane in self.texture_lanes:
             row |= self._texture_cells(lane, tick, held_back=whisking or self._was_whisking)
+        for lane in self.face_lanes:
+            row |= self._surface_cells(lane, tick)
         for lane in self.object_lanes:
             row[f"{self.names[lane]}_mm"] = self._radial_cell(lane, released, whisking)
         for lane in self.feelers:
@@ -190,16 +194,37 @@ class Pilot:
         return retreat(since[gone] * TICK_S * wheels.back_off_m_s, tilt)
 
     def _texture_cells(self, lane: int, tick: int, held_back: bool) -> dict[str, float | None]:
-        whisker = self.floor[lane]
+        whisker = self.surfaces[lane]
         cells = {f"{self.names[lane]}_{name}": None for name in whisker.model.classes}
         if held_back or not self._sweeping(tick):
             whisker.pause()
             self._silent[lane] = 0
             return cells
-        window = np.concatenate([np.where(good[:, lane, None], s[:, lane], np.nan) for s, good in self._recent])
+        window = self._window(lane)
         loglik = whisker.look(window)
         self._notice_catch(lane, window, loglik)
         return cells if loglik is None else dict(zip(cells, map(float, loglik), strict=True))
+
+    def _window(self, lane: int) -> np.ndarray:
+        """(n, 2) samples of the last 0.1 s, nan where one is bad."""
+        return np.concatenate([np.where(good[:, lane, None], s[:, lane], np.nan) for s, good in self._recent])
+
+    def _surface_cells(self, lane: int, tick: int) -> dict[str, float | None]:
+        """What the window says of the face that an object whisker's tip sweeps along."""
+        whisker = self.surfaces[lane]
+        cells = dict.fromkeys(f"{self.names[lane]}_{SURFACE}{name}" for name in whisker.model.classes)
+        if not self._along_face(lane, tick):
+            whisker.pause()
+            return cells
+        loglik = whisker.look(self._window(lane))
+        return cells if loglik is None else dict(zip(cells, map(float, loglik), strict=True))
+
+    def _along_face(self, lane: int, tick: int) -> bool:
+        """Whether the whisker touched during the whole window, the wheels at one speed; not the shaft, where that is known."""
+        since = max(self.contacts[lane].onset, self.behaviour.drive_since + SETTLE_TICKS)
+        steady = any(self.behaviour.drive) and since <= tick + 1 - WINDOW_SAMPLES
+        felt = self.feelers[lane].felt if lane in self.feelers else None
+        return steady and self.contacts[lane].touching and (felt is None or felt.face >= SURE)
 
     def _notice_catch(self, lane: int, window: np.ndarray, loglik: np.ndarray | None) -> None:
         """A catch leaves good samples without evidence, window after window."""

@@ -9,10 +9,15 @@ from ..touch.texture.model import load
 
 
 def load_models(folder: Path, robot: Robot) -> tuple[dict, dict]:
-    """Texture and radial models by whisker name: texture.json, and <whisker>.json of every object whisker."""
+    """Texture and radial models by whisker name: texture.json, and <whisker>.json of every object whisker.
+
+    surface.json, if it is there, is the texture model of the faces that object whiskers sweep along.
+    """
     texture = load(folder / "texture.json")
+    surface = load(folder / "surface.json") if (folder / "surface.json").exists() else None
     radial = {w.name: load_radial(folder / f"{w.name}.json") for w in robot.of_role("object")}
-    return {w.name: texture for w in robot.of_role("texture")}, radial
+    models = {"texture": texture, "object": surface}
+    return {w.name: models[w.role] for w in robot.whiskers if models[w.role] is not None}, radial
 
 
 def check_nodes(path: str, robot: Robot, radial: dict) -> None:

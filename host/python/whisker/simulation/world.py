@@ -12,6 +12,7 @@ from signals.recordings import (  # noqa: E402
     radial_contacts,
     write_radial_contacts,
     write_surface_drives,
+    write_surface_sweeps,
 )
 
-__all__ = ["World", "radial_contacts", "write_radial_contacts", "write_surface_drives"]
+__all__ = ["World", "radial_contacts", "write_radial_contacts", "write_surface_drives", "write_surface_sweeps"]
