@@ -1,37 +1,11 @@
+#include <string.h>
+
 #include "near.h"
 #include "rng.h"
 #include "texture_clean.h"
 #include "texture_features.h"
-#include "texture_fft.h"
-#include "texture_shape.h"
 
 enum { FEATURES_MOST = 64 };
-
-static void power_is_that_of_the_transform_written_out(void **state)
-{
-    (void)state;
-    const int sizes[] = {4, 8, 64}, given[] = {3, 8, 50};
-    struct nav_rng rng;
-    nav_rng_seed(&rng, 1, 0);
-    for (int s = 0; s < 3; s++) {
-        double x[64], power[33];
-        struct nav_fft *f = nav_fft_new(sizes[s]);
-        for (int i = 0; i < given[s]; i++)
-            x[i] = nav_rng_normal(&rng);
-        nav_fft_power(f, x, given[s], power);
-        for (int k = 0; k <= sizes[s] / 2; k++) {
-            double re = 0.0, im = 0.0, turn = 2.0 * acos(-1.0) * k / sizes[s];
-            for (int i = 0; i < given[s]; i++) {
-                re += x[i] * cos(turn * i);
-                im -= x[i] * sin(turn * i);
-            }
-            assert_near(power[k], re * re + im * im, 1e-9);
-        }
-        nav_fft_free(f);
-    }
-    assert_null(nav_fft_new(2));
-    assert_null(nav_fft_new(100));
-}
 
 static void draw(double *window, int n, uint64_t seed)
 {
@@ -39,6 +13,46 @@ static void draw(double *window, int n, uint64_t seed)
     nav_rng_seed(&rng, seed, 0);
     for (int i = 0; i < n; i++)
         window[i] = 20.0 * nav_rng_normal(&rng);
+}
+
+/* A log power of a band or more of the transform of n samples, as the sum written out: bins from `low` to before `high`
+ * of `size`, under a Hann taper. */
+static double log_power(const double *x, int n, int size, int low, int high)
+{
+    double mean = 0.0, taper_power = 0.0, sum = 0.0, circle = 2.0 * acos(-1.0);
+    for (int i = 0; i < n; i++)
+        mean += x[i] / n;
+    for (int k = low; k < high; k++) {
+        double re = 0.0, im = 0.0;
+        taper_power = 0.0;
+        for (int i = 0; i < n; i++) {
+            double taper = 0.5 - 0.5 * cos(circle * (i + 1) / (n + 1)), turn = circle * k * i / size;
+            taper_power += taper * taper;
+            re += taper * (x[i] - mean) * cos(turn);
+            im -= taper * (x[i] - mean) * sin(turn);
+        }
+        sum += re * re + im * im;
+    }
+    return log(sum / taper_power / (high - low));
+}
+
+static void bands_are_the_transform_written_out(void **state)
+{
+    (void)state;
+    const int length[] = {4, 8, 50}, size[] = {4, 8, 64}, bands[] = {1, 3, 12};
+    const int edges[3][13] = {{1, 3}, {1, 2, 3, 5}, {1, 2, 3, 4, 5, 6, 8, 10, 13, 16, 20, 25, 33}};
+    for (int s = 0; s < 3; s++) {
+        const double floor = 0.0;
+        double x[50], out[FEATURES_MOST];
+        struct nav_texture_features *f = nav_texture_features_new(1, length[s], 0, 0, &floor, NULL);
+        draw(x, length[s], (uint64_t)s);
+        nav_texture_features_work(f, x, out);
+        int logs = nav_texture_features_count(f) - 2;
+        nav_texture_features_free(f);
+        assert_int_equal(logs, bands[s]);
+        for (int band = 0; band < logs; band++)
+            assert_near(out[band], log_power(x, length[s], size[s], edges[s][band], edges[s][band + 1]), 1e-9);
+    }
 }
 
 static void an_offset_changes_no_feature_and_a_gain_moves_all_powers_alike(void **state)
@@ -190,6 +204,18 @@ static void two_samples_at_or_beyond_a_stop_are_a_rail(void **state)
     assert_int_equal(railed(99.0, 99.0, 50.0), 0);
 }
 
+/* The shares of kernels of a window, which are its last features. */
+static void shares(int channels, int length, const double *window, const double *threshold, double *out)
+{
+    const double floor[] = {0.0, 0.0};
+    double all[4 * FEATURES_MOST];
+    struct nav_texture_features *f = nav_texture_features_new(channels, length, 0, 0, floor, threshold);
+    int count = nav_texture_shape_count(length), before = nav_texture_features_count(f) - count;
+    nav_texture_features_work(f, window, all);
+    memcpy(out, all + before, (size_t)count * sizeof *out);
+    nav_texture_features_free(f);
+}
+
 /* 84 kernels on one channel of 9 samples, each in one place: above a threshold or not, as the sum written out. */
 static void shapes_are_shares_of_places_above_a_threshold(void **state)
 {
@@ -202,8 +228,7 @@ static void shapes_are_shares_of_places_above_a_threshold(void **state)
     assert_int_equal(nav_texture_shape_count(2 * TAPS), 2 * KERNELS);
     for (int k = 0; k < KERNELS; k++)
         threshold[k] = k % 5 * 6.0 - 12.1;
-    struct nav_texture_shape *s = nav_texture_shape_new(1, TAPS, threshold);
-    nav_texture_shape_work(s, x, out);
+    shares(1, TAPS, x, threshold, out);
     int kernel = 0;
     for (int a = 0; a < TAPS; a++) {
         for (int b = a + 1; b < TAPS; b++) {
@@ -215,10 +240,10 @@ static void shapes_are_shares_of_places_above_a_threshold(void **state)
             }
         }
     }
-    nav_texture_shape_free(s);
+    const double floor = 0.0;
+    assert_null(nav_texture_features_new(1, TAPS - 1, 0, 0, &floor, threshold));
     threshold[3] = NAN;
-    assert_null(nav_texture_shape_new(1, TAPS, threshold));
-    assert_null(nav_texture_shape_new(1, TAPS - 1, threshold));
+    assert_null(nav_texture_features_new(1, TAPS, 0, 0, &floor, threshold));
 }
 
 /* Of two channels each kernel looks at one, in turn: changing a channel changes every other number of a spread. */
@@ -229,14 +254,12 @@ static void kernels_take_the_channels_in_turn(void **state)
     double x[2 * LENGTH], threshold[2 * KERNELS] = {0.0}, one[2 * KERNELS], other[2 * KERNELS];
     for (int i = 0; i < 2 * LENGTH; i++)
         x[i] = sin(1.0 + 2.3 * i * i);
-    struct nav_texture_shape *s = nav_texture_shape_new(2, LENGTH, threshold);
-    nav_texture_shape_work(s, x, one);
+    shares(2, LENGTH, x, threshold, one);
     for (int i = 0; i < LENGTH; i++)
-        x[i] = -x[i]; /* a share above 0 becomes one below it */
-    nav_texture_shape_work(s, x, other);
+        x[2 * i] = -x[2 * i]; /* a share above 0 becomes one below it */
+    shares(2, LENGTH, x, threshold, other);
     for (int k = 0; k < 2 * KERNELS; k++)
         assert_near(other[k], (k % KERNELS + k / KERNELS) % 2 == 0 ? 1.0 - one[k] : one[k], 1e-12);
-    nav_texture_shape_free(s);
 }
 
 int main(void)
@@ -244,7 +267,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(shapes_are_shares_of_places_above_a_threshold),
         cmocka_unit_test(kernels_take_the_channels_in_turn),
-        cmocka_unit_test(power_is_that_of_the_transform_written_out),
+        cmocka_unit_test(bands_are_the_transform_written_out),
         cmocka_unit_test(an_offset_changes_no_feature_and_a_gain_moves_all_powers_alike),
         cmocka_unit_test(shorter_stretches_are_the_windows_that_they_would_be_alone),
         cmocka_unit_test(a_knock_moves_the_stretches_less_than_the_whole),

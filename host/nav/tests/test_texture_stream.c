@@ -4,7 +4,6 @@
 
 #include "near.h"
 #include "texture_features.h"
-#include "texture_filter.h"
 #include "texture_stream.h"
 
 enum { BLOCK = 16, WINDOW = 32, FEATURES_MOST = 64 };

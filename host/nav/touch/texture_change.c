@@ -1,13 +1,8 @@
 #include "texture_change.h"
 
-#include <math.h>
-#include <stdbool.h>
-#include <stdlib.h>
-#include <string.h>
-
 #include "texture_classifier.h"
 #include "texture_features.h"
-#include "texture_own.h"
+#include "texture_slab.h"
 
 enum {
     LEAST = NAV_TEXTURE_CHANGE_AFTER_LEAST,
@@ -31,62 +26,46 @@ struct nav_texture_change {
     double *sum;     /* [4][2][2][K] sums before and behind the change, then both finished */
 };
 
-static bool own(struct nav_texture_change_rule *r, size_t f, size_t k)
+static void change_place_rule(struct nav_texture_change_rule *r, struct nav_texture_slab *m, size_t f, size_t k)
 {
-    bool ok = nav_texture_own(&r->steady, f * k);
-    ok = nav_texture_own(&r->apart, k * k) && ok;
-    ok = nav_texture_own(&r->weight, f * k) && ok;
-    return nav_texture_own(&r->bias, k) && ok;
+    nav_texture_slab_copy(m, &r->steady, f * k);
+    nav_texture_slab_copy(m, &r->apart, k * k);
+    nav_texture_slab_copy(m, &r->weight, f * k);
+    nav_texture_slab_copy(m, &r->bias, k);
 }
 
-static bool make(struct nav_texture_change *c)
+static void change_place(void *of, struct nav_texture_slab *m)
 {
+    struct nav_texture_change *c = of;
     size_t f = (size_t)c->features, k = (size_t)c->n.classes;
-    bool ok = nav_texture_own(&c->n.floor, (size_t)c->n.channels);
-    ok = own(&c->n.inside, f, k) && ok;
-    ok = own(&c->n.edge, f, k) && ok;
-    c->feature = calloc(f, sizeof *c->feature);
-    c->block = calloc(4 * HELD_MOST * k, sizeof *c->block);
-    c->sum = calloc(16 * k, sizeof *c->sum);
-    return ok && c->feature && c->block && c->sum;
+    change_place_rule(&c->n.inside, m, f, k);
+    change_place_rule(&c->n.edge, m, f, k);
+    c->feature = nav_texture_slab_cut(m, f);
+    c->block = nav_texture_slab_cut(m, 4 * HELD_MOST * k);
+    c->sum = nav_texture_slab_cut(m, 16 * k);
 }
 
-static bool numbers_ok(const struct nav_texture_change_numbers *n)
+struct nav_texture_change *nav_texture_change_new(const struct nav_texture_change_numbers *n)
 {
-    return n->classes >= 1 && n->classes <= NAV_TEXTURE_CLASSES_MAX && isfinite(n->limit) && n->share >= 0.0 &&
-           n->share <= 1.0;
-}
-
-struct nav_texture_change *nav_texture_change_new(const struct nav_texture_change_numbers *numbers)
-{
-    if (!numbers_ok(numbers))
-        return NULL;
+    bool ok = n->classes >= 1 && n->classes <= NAV_TEXTURE_CLASSES_MAX && isfinite(n->limit) && n->share >= 0.0 &&
+              n->share <= 1.0;
     struct nav_texture_features *reduce =
-        nav_texture_features_new(numbers->channels, numbers->length, 0, 0, numbers->floor, NULL);
-    struct nav_texture_change *c = reduce ? calloc(1, sizeof *c) : NULL;
-    if (!c) {
+        ok ? nav_texture_features_new(n->channels, n->length, 0, 0, n->floor, NULL) : NULL;
+    if (!reduce)
+        return NULL;
+    struct nav_texture_change like = {
+        .n = *n, .reduce = reduce, .features = nav_texture_features_count(reduce), .behind = NO_EDGE};
+    like.n.floor = NULL; /* the features have their own */
+    struct nav_texture_change *c = nav_texture_slab_new(&like, sizeof like, change_place);
+    if (!c)
         nav_texture_features_free(reduce);
-        return NULL;
-    }
-    *c = (struct nav_texture_change){
-        .n = *numbers, .reduce = reduce, .features = nav_texture_features_count(reduce), .behind = NO_EDGE};
-    if (!make(c)) {
-        nav_texture_change_free(c);
-        return NULL;
-    }
     return c;
 }
 
 void nav_texture_change_free(struct nav_texture_change *c)
 {
-    if (!c)
-        return;
-    const struct nav_texture_change_rule *in = &c->n.inside, *at = &c->n.edge;
-    const double *arrays[] = {c->n.floor, in->steady, in->apart, in->weight, in->bias, at->steady,
-                              at->apart,  at->weight, at->bias,  c->feature, c->block, c->sum};
-    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++)
-        free((void *)arrays[i]);
-    nav_texture_features_free(c->reduce);
+    if (c)
+        nav_texture_features_free(c->reduce);
     free(c);
 }
 
@@ -101,7 +80,7 @@ double nav_texture_change_limit(const struct nav_texture_change *c)
 }
 
 /* Forgets all blocks but the last `keep`. */
-static void keep_last(struct nav_texture_change *c, int keep)
+static void change_keep_last(struct nav_texture_change *c, int keep)
 {
     size_t row = 4 * (size_t)c->n.classes;
     if (keep >= c->held)
@@ -122,7 +101,7 @@ void nav_texture_change_edge(struct nav_texture_change *c)
 }
 
 /* Log-likelihoods to log posteriors under equal priors, when a block says nothing of its class now and then. */
-static void normalise(double *log_of, int classes)
+static void change_normalise(double *log_of, int classes)
 {
     double best = log_of[0], sum = 0.0;
     for (int k = 1; k < classes; k++)
@@ -134,7 +113,8 @@ static void normalise(double *log_of, int classes)
 }
 
 /* out[2][K]: a block's scores by a rule, and its log posteriors. */
-static void score(const struct nav_texture_change *c, const struct nav_texture_change_rule *r, double *restrict out)
+static void change_score(const struct nav_texture_change *c, const struct nav_texture_change_rule *r,
+                         double *restrict out)
 {
     int classes = c->n.classes;
     double *named = out + classes;
@@ -150,20 +130,20 @@ static void score(const struct nav_texture_change *c, const struct nav_texture_c
     }
     for (int k = 0; k < classes; k++)
         named[k] *= c->n.share;
-    normalise(named, classes);
+    change_normalise(named, classes);
 }
 
-static void take(struct nav_texture_change *c, const double *block)
+static void change_take(struct nav_texture_change *c, const double *block)
 {
-    keep_last(c, HELD_MOST - 1);
+    change_keep_last(c, HELD_MOST - 1);
     double *scores = c->block + 4 * (size_t)c->n.classes * (size_t)c->held++;
     nav_texture_features_work(c->reduce, block, c->feature);
-    score(c, &c->n.inside, scores);
-    score(c, &c->n.edge, scores + 2 * (size_t)c->n.classes);
+    change_score(c, &c->n.inside, scores);
+    change_score(c, &c->n.edge, scores + 2 * (size_t)c->n.classes);
 }
 
 /* out[K]: scores' mean over so many blocks; out[K + k]: log-likelihood of class k in all of them, the best's 0. */
-static void finish(const double *sum, int classes, int blocks, double *restrict out)
+static void change_finish(const double *sum, int classes, int blocks, double *restrict out)
 {
     double best = sum[classes];
     for (int k = 1; k < classes; k++)
@@ -177,14 +157,14 @@ static void finish(const double *sum, int classes, int blocks, double *restrict 
 
 /* Ratio of the likeliest pair of classes for a change with `after` of the blocks behind it, by a rule, given both
  * sides' sums. A difference beyond the classes' own is no more evidence than that. */
-static double ratio(struct nav_texture_change *c, bool edge, int after)
+static double change_ratio(struct nav_texture_change *c, bool edge, int after)
 {
     int classes = c->n.classes, before = c->held - after, width = 4 * classes, at = edge ? 2 * classes : 0;
     double blocks = c->n.share * after * before / (after + before), best = NO_RATIO;
     double *early = c->sum + 2 * width, *late = early + width;
     const double *apart_of = edge ? c->n.edge.apart : c->n.inside.apart;
-    finish(c->sum + at, classes, before, early);
-    finish(c->sum + width + at, classes, after, late);
+    change_finish(c->sum + at, classes, before, early);
+    change_finish(c->sum + width + at, classes, after, late);
     for (int k = 0; k < classes; k++) {
         for (int j = 0; j < classes; j++) {
             double apart = apart_of[k * classes + j], moved = late[j] - late[k] - early[j] + early[k];
@@ -198,7 +178,7 @@ static double ratio(struct nav_texture_change *c, bool edge, int after)
 }
 
 /* Moves a block from one side of the change to the other. */
-static void move(const struct nav_texture_change *c, int block, double *restrict early, double *restrict late)
+static void change_move(const struct nav_texture_change *c, int block, double *restrict early, double *restrict late)
 {
     int width = 4 * c->n.classes;
     const double *row = c->block + (size_t)width * (size_t)block;
@@ -210,19 +190,19 @@ static void move(const struct nav_texture_change *c, int block, double *restrict
 
 /* The likeliest change among the blocks held: at the edge, if there is one, else anywhere. Returns its ratio, and how
  * many blocks lie behind it. */
-static double likeliest(struct nav_texture_change *c, int *after)
+static double change_likeliest(struct nav_texture_change *c, int *after)
 {
     double *early = c->sum, *late = early + 4 * (size_t)c->n.classes, *none = late + 4 * (size_t)c->n.classes;
     double best = NO_RATIO;
     bool edge = c->behind != NO_EDGE;
     memset(c->sum, 0, 16 * (size_t)c->n.classes * sizeof *c->sum);
     for (int b = 0; b < c->held; b++) /* all blocks into `early`: what leaves the other side comes to this one */
-        move(c, b, none, early);
+        change_move(c, b, none, early);
     for (int a = 1; a <= MOST && 2 * a <= c->held; a++) {
-        move(c, c->held - a, early, late);
+        change_move(c, c->held - a, early, late);
         if (a < LEAST || (edge && a != c->behind))
             continue;
-        double here = ratio(c, edge, a) + (edge ? c->n.limit - AT_EDGE : 0.0);
+        double here = change_ratio(c, edge, a) + (edge ? c->n.limit - AT_EDGE : 0.0);
         if (here > best) {
             best = here;
             *after = a;
@@ -237,10 +217,10 @@ double nav_texture_change_weigh(struct nav_texture_change *c, const double *bloc
     *after = 0;
     if (edge && c->behind++ < 0)
         return NO_RATIO;
-    take(c, block);
-    double best = likeliest(c, after);
+    change_take(c, block);
+    double best = change_likeliest(c, after);
     if (best > c->n.limit)
-        keep_last(c, edge ? 0 : *after);
+        change_keep_last(c, edge ? 0 : *after);
     if (c->behind == MOST)
         nav_texture_change_reset(c);
     return best;

@@ -1,13 +1,8 @@
 #include "texture_classifier.h"
 
-#include <math.h>
-#include <stdbool.h>
-#include <stdlib.h>
-#include <string.h>
-
 #include "rng.h"
 #include "texture_features.h"
-#include "texture_own.h"
+#include "texture_slab.h"
 
 struct nav_texture_classifier {
     struct nav_texture_classifier_numbers n; /* its arrays are the classifier's own */
@@ -20,32 +15,10 @@ struct nav_texture_classifier {
     double *expanded;  /* [F + H] */
 };
 
-static bool numbers_ok(const struct nav_texture_classifier_numbers *n)
-{
-    return n->classes >= 1 && n->classes <= NAV_TEXTURE_CLASSES_MAX && n->hidden >= 0 &&
-           n->hidden <= NAV_TEXTURE_HIDDEN_MAX && isfinite(n->temper) && n->temper >= 0.0;
-}
-
-static bool own_arrays(struct nav_texture_classifier *r)
-{
-    size_t f = (size_t)r->features, k = (size_t)r->n.classes, h = (size_t)r->n.hidden;
-    bool ok = nav_texture_own(&r->n.floor, (size_t)r->n.channels);
-    ok = nav_texture_own(&r->n.centre, f) && ok;
-    ok = nav_texture_own(&r->n.scale, f) && ok;
-    ok = nav_texture_own(&r->n.weight, (f + h) * k) && ok;
-    ok = nav_texture_own(&r->n.bias, k) && ok;
-    return ok;
-}
-
 /* Directions of unit mean square on standardised features; thresholds spread as the projections are. */
-static bool make_projections(struct nav_texture_classifier *r)
+static void classifier_project_at_random(struct nav_texture_classifier *r)
 {
     size_t f = (size_t)r->features, h = (size_t)r->n.hidden;
-    r->projection = calloc(f * h + 1, sizeof *r->projection);
-    r->projected = calloc(h + 1, sizeof *r->projected);
-    r->threshold = calloc(h + 1, sizeof *r->threshold);
-    if (!r->projection || !r->projected || !r->threshold)
-        return false;
     struct nav_rng rng;
     nav_rng_seed(&rng, r->n.seed, 0);
     for (size_t i = 0; i < h; i++) { /* unit by unit: fewer units are the first of more */
@@ -53,47 +26,50 @@ static bool make_projections(struct nav_texture_classifier *r)
         for (size_t j = 0; j < f; j++)
             r->projection[j * h + i] = (float)(nav_rng_normal(&rng) / sqrt((double)f));
     }
-    return true;
 }
 
-static bool make(struct nav_texture_classifier *r)
+static void classifier_place(void *of, struct nav_texture_slab *m)
 {
-    bool owned = own_arrays(r);
-    r->expanded = calloc((size_t)(r->features + r->n.hidden), sizeof *r->expanded);
-    return make_projections(r) && owned && r->expanded;
+    struct nav_texture_classifier *r = of;
+    size_t f = (size_t)r->features, k = (size_t)r->n.classes, h = (size_t)r->n.hidden;
+    nav_texture_slab_copy(m, &r->n.centre, f);
+    nav_texture_slab_copy(m, &r->n.scale, f);
+    nav_texture_slab_copy(m, &r->n.weight, (f + h) * k);
+    nav_texture_slab_copy(m, &r->n.bias, k);
+    r->expanded = nav_texture_slab_cut(m, f + h);
+    r->threshold = nav_texture_slab_cut(m, h);
+    r->projected = (float *)nav_texture_slab_cut(m, h);
+    r->projection = (float *)nav_texture_slab_cut(m, f * h);
+    if (m->at)
+        classifier_project_at_random(r);
 }
 
-struct nav_texture_classifier *nav_texture_classifier_new(const struct nav_texture_classifier_numbers *numbers)
+static bool classifier_sizes_ok(const struct nav_texture_classifier_numbers *n)
 {
-    if (!numbers_ok(numbers))
+    return n->classes >= 1 && n->classes <= NAV_TEXTURE_CLASSES_MAX && n->hidden >= 0 &&
+           n->hidden <= NAV_TEXTURE_HIDDEN_MAX && isfinite(n->temper) && n->temper >= 0.0;
+}
+
+struct nav_texture_classifier *nav_texture_classifier_new(const struct nav_texture_classifier_numbers *n)
+{
+    if (!classifier_sizes_ok(n))
         return NULL;
-    struct nav_texture_features *reduce = nav_texture_features_new(numbers->channels, numbers->length, numbers->levels,
-                                                                   numbers->shorter, numbers->floor, numbers->shape);
-    struct nav_texture_classifier *r = reduce ? calloc(1, sizeof *r) : NULL;
-    if (!r) {
+    struct nav_texture_features *reduce =
+        nav_texture_features_new(n->channels, n->length, n->levels, n->shorter, n->floor, n->shape);
+    if (!reduce)
+        return NULL;
+    struct nav_texture_classifier like = {.n = *n, .reduce = reduce, .features = nav_texture_features_count(reduce)};
+    like.n.floor = like.n.shape = NULL; /* the features have their own */
+    struct nav_texture_classifier *r = nav_texture_slab_new(&like, sizeof like, classifier_place);
+    if (!r)
         nav_texture_features_free(reduce);
-        return NULL;
-    }
-    *r = (struct nav_texture_classifier){
-        .n = *numbers, .reduce = reduce, .features = nav_texture_features_count(reduce)};
-    r->n.shape = NULL; /* the features have their own */
-    if (!make(r)) {
-        nav_texture_classifier_free(r);
-        return NULL;
-    }
     return r;
 }
 
 void nav_texture_classifier_free(struct nav_texture_classifier *r)
 {
-    if (!r)
-        return;
-    const double *arrays[] = {r->n.floor, r->n.centre, r->n.scale, r->n.weight, r->n.bias, r->threshold, r->expanded};
-    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++)
-        free((void *)arrays[i]);
-    free(r->projection);
-    free(r->projected);
-    nav_texture_features_free(r->reduce);
+    if (r)
+        nav_texture_features_free(r->reduce);
     free(r);
 }
 
@@ -112,7 +88,7 @@ const double *nav_texture_classifier_features(const struct nav_texture_classifie
     return r->expanded;
 }
 
-static void project(const struct nav_texture_classifier *r, const double *z, double *restrict out)
+static void classifier_project(const struct nav_texture_classifier *r, const double *z, double *restrict out)
 {
     int hidden = r->n.hidden;
     float *restrict sum = r->projected;
@@ -132,11 +108,11 @@ void nav_texture_classifier_expand(struct nav_texture_classifier *r, const doubl
     nav_texture_features_work(r->reduce, window, out);
     for (int f = 0; f < r->features; f++)
         out[f] = (out[f] - r->n.centre[f]) * r->n.scale[f];
-    project(r, out, out + r->features);
+    classifier_project(r, out, out + r->features);
 }
 
 /* Scores of all classes from the expanded features, tempered; the best becomes 0. */
-static void score(const struct nav_texture_classifier *r, const double *x, double *loglik)
+static void classifier_score(const struct nav_texture_classifier *r, const double *x, double *loglik)
 {
     int classes = r->n.classes;
     memcpy(loglik, r->n.bias, (size_t)classes * sizeof *loglik);
@@ -155,5 +131,5 @@ static void score(const struct nav_texture_classifier *r, const double *x, doubl
 void nav_texture_classifier_judge(struct nav_texture_classifier *r, const double *window, double *loglik)
 {
     nav_texture_classifier_expand(r, window, r->expanded);
-    score(r, r->expanded, loglik);
+    classifier_score(r, r->expanded, loglik);
 }

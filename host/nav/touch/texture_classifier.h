@@ -4,8 +4,8 @@
  * rule bend (random features, Rahimi and Recht 2008; a seed stands for the projections in model files); then a linear
  * discriminant, whose scores are log-likelihoods up to a constant, tempered to what held-out recordings bear out.
  */
-#ifndef NAV_TEXTURE_RUNG_H
-#define NAV_TEXTURE_RUNG_H
+#ifndef NAV_TEXTURE_CLASSIFIER_H
+#define NAV_TEXTURE_CLASSIFIER_H
 
 #include <stdint.h>
 

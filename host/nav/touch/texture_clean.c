@@ -6,142 +6,98 @@
 
 #define VALUE_MOST 1e9 /* counts; squares and sums of longest windows stay far below the largest double */
 
-struct view {
-    double *at; /* first sample of the channel */
-    int step, n;
-};
-
-static double *sample(struct view v, int i)
+/* Stands out to the same side of both neighbours by more than the limit; x lies within the window. */
+static bool clean_spike(const double *x, ptrdiff_t step, double limit)
 {
-    return v.at + (size_t)i * (size_t)v.step;
-}
-
-static bool good(double x)
-{
-    return isfinite(x) && fabs(x) <= VALUE_MOST;
-}
-
-/* Stands out to the same side of both neighbours by more than the limit. */
-static bool spike(struct view v, int i, double limit)
-{
-    if (i == 0 || i == v.n - 1)
-        return false;
-    double before = *sample(v, i) - *sample(v, i - 1), after = *sample(v, i) - *sample(v, i + 1);
+    double before = x[0] - x[-step], after = x[0] - x[step];
     return before * after > 0.0 && fabs(before) > limit && fabs(after) > limit;
 }
 
-/* Marks samples to leave out by nan. A spike is marked only once its neighbours have been judged: they need its value.
- */
-static long mark(struct view v, const double *limit)
+/* Marks samples of a channel to leave out by nan, and counts them. A spike is marked only once its neighbours have been
+ * judged: they need its value. */
+static long clean_mark(double *x, ptrdiff_t step, int n, double limit)
 {
     long bad = 0;
-    bool last = false; /* whether sample i - 1 is a spike */
-    for (int i = 0; i < v.n; i++) {
-        double x = *sample(v, i);
-        bool now = good(x) && limit && !last && spike(v, i, *limit);
+    bool last = false; /* whether the sample before is a spike */
+    for (int i = 0; i < n; i++, x += step) {
+        bool good = fabs(*x) <= VALUE_MOST;
+        bool now = good && !last && i > 0 && i < n - 1 && clean_spike(x, step, limit);
         if (last)
-            *sample(v, i - 1) = NAN;
-        if (!good(x))
-            *sample(v, i) = NAN;
-        bad += now || !good(x);
+            x[-step] = NAN;
+        if (!good)
+            *x = NAN;
+        bad += now || !good;
         last = now;
     }
     return bad;
 }
 
-/* Whether `mark` would find anything; no branch within, so it is quick where all is well. */
-static bool suspect(struct view v, double limit)
+/* Draws a straight line through each run of marked samples. */
+static void clean_fill(double *x, ptrdiff_t step, int n)
+{
+    for (int i = 0; i < n; i++) {
+        int from = i;
+        while (i < n && isnan(x[i * step]))
+            i++;
+        double left = from > 0 ? x[(from - 1) * step] : (i < n ? x[i * step] : 0.0), right = i < n ? x[i * step] : left;
+        for (int k = from; k < i; k++)
+            x[k * step] = left + (right - left) * (k - from + 1) / (i - from + 1);
+    }
+}
+
+/* Whether clean_mark would find anything; no branch within, so it is quick where all is well. */
+static bool clean_suspect(const double *x, ptrdiff_t step, int n, double limit)
 {
     int bad = 0;
-    for (int i = 0; i < v.n; i++)
-        bad |= !(fabs(*sample(v, i)) <= VALUE_MOST);
-    for (int i = 1; i < v.n - 1; i++) {
-        double before = *sample(v, i) - *sample(v, i - 1), after = *sample(v, i) - *sample(v, i + 1);
+    for (int i = 0; i < n; i++)
+        bad |= !(fabs(x[i * step]) <= VALUE_MOST);
+    for (int i = 1; i < n - 1; i++) {
+        double before = x[i * step] - x[(i - 1) * step], after = x[i * step] - x[(i + 1) * step];
         bad |= (before * after > 0.0) & (fabs(before) > limit) & (fabs(after) > limit);
     }
     return bad != 0;
-}
-
-static void bridge(struct view v, int from, int to)
-{
-    double left = from > 0 ? *sample(v, from - 1) : (to < v.n ? *sample(v, to) : 0.0);
-    double right = to < v.n ? *sample(v, to) : left;
-    for (int i = from; i < to; i++)
-        *sample(v, i) = left + (right - left) * (i - from + 1) / (to - from + 1);
-}
-
-static void fill(struct view v)
-{
-    for (int i = 0; i < v.n; i++) {
-        int from = i;
-        while (i < v.n && isnan(*sample(v, i)))
-            i++;
-        if (i > from)
-            bridge(v, from, i);
-    }
-}
-
-static int longest_run(struct view v)
-{
-    int longest = 1, run = 1;
-    for (int i = 1; i < v.n; i++) {
-        run = *sample(v, i) == *sample(v, i - 1) ? run + 1 : 1;
-        longest = run > longest ? run : longest;
-    }
-    return longest;
-}
-
-/* Whether more than `limit` samples in a row are equal. Such a run holds every limit-th sample and one beside it. */
-static bool still(struct view v, double limit)
-{
-    int apart = limit >= 1.0 && limit < v.n ? (int)limit : v.n;
-    bool perhaps = limit < 1.0;
-    for (int i = 0; i < v.n - 1; i += apart)
-        perhaps |= *sample(v, i) == *sample(v, i + 1) || (i > 0 && *sample(v, i) == *sample(v, i - 1));
-    return perhaps && longest_run(v) > limit;
 }
 
 struct range {
     double least, most;
 };
 
-static struct range range(struct view v)
+static struct range clean_range(const double *x, ptrdiff_t step, int n)
 {
     struct range r = {INFINITY, -INFINITY};
-    for (int i = 0; i < v.n; i++) {
-        double x = *sample(v, i);
-        r.least = x < r.least ? x : r.least;
-        r.most = x > r.most ? x : r.most;
+    for (int i = 0; i < n; i++) {
+        r.least = x[i * step] < r.least ? x[i * step] : r.least;
+        r.most = x[i * step] > r.most ? x[i * step] : r.most;
     }
     return r;
 }
 
-/* Whether a sample at or beyond a stop follows another. */
-static bool railed(struct view v, struct range r, double low, double high)
+/* The longest run of equal samples, or of samples at or beyond a stop. */
+static int clean_run(const double *x, ptrdiff_t step, int n, bool stops, double low, double high)
 {
-    bool was = false, found = false;
-    for (int i = 0; i < v.n && (r.least <= low || r.most >= high); i++) {
-        bool now = *sample(v, i) <= low || *sample(v, i) >= high;
-        found |= now && was;
-        was = now;
+    int longest = 0;
+    for (int i = 0, run = 0; i < n; i++, x += step) {
+        bool on = stops ? *x <= low || *x >= high : i > 0 && *x == x[-step];
+        run = on ? run + 1 : !stops;
+        longest = run > longest ? run : longest;
     }
-    return found;
+    return longest;
 }
 
 struct nav_texture_health nav_texture_clean(double *window, int n, const struct nav_texture_limits *limits)
 {
     struct nav_texture_health health = {0};
+    ptrdiff_t step = limits->channels;
     for (int c = 0; c < limits->channels; c++) {
-        struct view v = {.at = window + c, .step = limits->channels, .n = n};
-        const double *spike = limits->spike ? limits->spike + c : NULL;
-        long bad = suspect(v, spike ? *spike : INFINITY) ? mark(v, spike) : 0;
+        double spike = limits->spike ? limits->spike[c] : INFINITY;
+        long bad = clean_suspect(window + c, step, n, spike) ? clean_mark(window + c, step, n, spike) : 0;
         if (bad > 0)
-            fill(v);
+            clean_fill(window + c, step, n);
         health.bad = bad > health.bad ? bad : health.bad;
-        struct range r = range(v);
-        health.still += limits->still && still(v, limits->still[c]);
-        health.railed +=
-            railed(v, r, limits->low ? limits->low[c] : -INFINITY, limits->high ? limits->high[c] : INFINITY);
+        double low = limits->low ? limits->low[c] : -INFINITY, high = limits->high ? limits->high[c] : INFINITY;
+        struct range r = clean_range(window + c, step, n);
+        health.still += limits->still && clean_run(window + c, step, n, false, low, high) > limits->still[c];
+        health.railed += (r.least <= low || r.most >= high) && clean_run(window + c, step, n, true, low, high) > 1;
         health.caught += limits->span && r.most - r.least > limits->span[c];
     }
     return health;

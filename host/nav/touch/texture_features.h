@@ -2,11 +2,17 @@
  *
  * Of each channel: log of the power in bands of a third of an octave (fewer where the window resolves less), log of the
  * whole power and log of the power of the steps from sample to sample; with `levels` also its mean, and with `shorter`
- * the mean and the spread of the same logs over shorter stretches of the window (texture_shorter.h). Of each pair of
- * channels: Fisher's z (atanh) of their correlation. Last, with `shape`, shares of patterns of the waveform
- * (texture_shape.h). Means apart, an offset changes nothing, and a gain (load, whisker
- * stiffness) moves all the powers of a channel alike, which a linear rule can take out. Nothing depends on units of
- * time: bands count cycles per window, so any sampling rate will do.
+ * the mean and the standard deviation of the same logs over shorter stretches of the window. The log of one long
+ * window's band errs much where the band holds few bins, and one knock fills all bands; the mean over stretches errs
+ * less, and the deviation tells what comes in bursts. Of each pair of channels: Fisher's z (atanh) of their
+ * correlation. Means apart, an offset changes nothing, and a gain (load, whisker stiffness) moves all the powers of a
+ * channel alike, which a linear rule can take out. Nothing depends on units of time: bands count cycles per window, so
+ * any sampling rate will do.
+ *
+ * Last, with `shape`, the waveform: convolution kernels of nine taps, three of 2 and six of -1, in all 84 orders
+ * (Dempster et al. 2021, MiniRocket), spread over 1, 2, 4 ... samples. A number is the share of a channel's places
+ * where one kernel's output is above a threshold. Kernels take the channels in turn, so the count does not grow with
+ * them.
  */
 #ifndef NAV_TEXTURE_FEATURES_H
 #define NAV_TEXTURE_FEATURES_H
@@ -17,9 +23,10 @@ struct nav_texture_features;
 enum { NAV_TEXTURE_LENGTH_MIN = 4, NAV_TEXTURE_LENGTH_MAX = 4096, NAV_TEXTURE_CHANNELS_MAX = 64 };
 
 /* Windows of `length` samples of `channels`; shorter: 0, or how many stretches lie end to end in a window, at least 2,
- * each at least NAV_TEXTURE_LENGTH_MIN long; floor[channels] (counts squared, >= 0): power below which a band says
- * nothing, as quantisation's; shape: NULL, or thresholds [nav_texture_shape_count(length)]. NULL for a size out of
- * range, a floor that is negative or not finite, or without memory.
+ * each at least NAV_TEXTURE_LENGTH_MIN long, with as many but one between them, each half over the next;
+ * floor[channels] (counts squared, >= 0): power below which a band says nothing, as quantisation's; shape: NULL, or
+ * thresholds [nav_texture_shape_count(length)]. Arrays are copied. NULL for a size out of range, a number that is not
+ * finite, a floor below 0, or without memory.
  */
 struct nav_texture_features *nav_texture_features_new(int channels, int length, int levels, int shorter,
                                                       const double *floor, const double *shape);
@@ -27,6 +34,9 @@ void nav_texture_features_free(struct nav_texture_features *);
 
 /* Numbers that a window is reduced to. */
 int nav_texture_features_count(const struct nav_texture_features *);
+
+/* Those of them that are shares of kernels; 0 where windows of so many samples are too short for one kernel. */
+int nav_texture_shape_count(int length);
 
 /* window: [length][channels], finite; out: nav_texture_features_count() finite numbers. Allocates nothing. */
 void nav_texture_features_work(struct nav_texture_features *, const double *window, double *out);

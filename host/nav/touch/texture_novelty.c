@@ -1,12 +1,7 @@
 #include "texture_novelty.h"
 
-#include <math.h>
-#include <stdbool.h>
-#include <stdlib.h>
-#include <string.h>
-
 #include "texture_classifier.h"
-#include "texture_own.h"
+#include "texture_slab.h"
 
 enum { FEATURES_MOST = 1 << 12, STEPS = NAV_TEXTURE_NOVELTY_STEPS, WINDOWS_MOST = 1 << (STEPS - 1) };
 
@@ -18,15 +13,11 @@ struct nav_texture_novelty {
     double *normaliser;                   /* [WINDOWS_MOST + 1][K + 1] half the log determinants */
 };
 
-static bool numbers_ok(const struct nav_texture_novelty_numbers *n)
+static bool novelty_numbers_ok(const struct nav_texture_novelty_numbers *n)
 {
-    return n->classes >= 1 && n->classes <= NAV_TEXTURE_CLASSES_MAX && n->features >= 1 &&
-           n->features <= FEATURES_MOST && isfinite(n->scale) && n->scale > 0.0;
-}
-
-static bool variances_ok(const struct nav_texture_novelty_numbers *n)
-{
-    bool ok = true;
+    if (n->classes < 1 || n->classes > NAV_TEXTURE_CLASSES_MAX || n->features < 1 || n->features > FEATURES_MOST)
+        return false;
+    bool ok = isfinite(n->scale) && n->scale > 0.0;
     for (int f = 0; f < n->features; f++)
         ok = ok && n->noise[f] > 0.0;
     for (int i = 0; i < (n->classes + 1) * n->features; i++)
@@ -35,7 +26,7 @@ static bool variances_ok(const struct nav_texture_novelty_numbers *n)
 }
 
 /* The log determinants depend on the number of windows only. */
-static void normalise(struct nav_texture_novelty *v)
+static void novelty_normalise(struct nav_texture_novelty *v)
 {
     for (int w = 1; w <= WINDOWS_MOST; w++) {
         for (int k = 0; k <= v->n.classes; k++) {
@@ -48,42 +39,30 @@ static void normalise(struct nav_texture_novelty *v)
     }
 }
 
-static bool make(struct nav_texture_novelty *v)
+static void novelty_place(void *of, struct nav_texture_slab *m)
 {
+    struct nav_texture_novelty *v = of;
     size_t features = (size_t)v->n.features, rows = (size_t)v->n.classes + 1;
-    bool ok = nav_texture_own(&v->n.turn, features * features);
-    ok = nav_texture_own(&v->n.mean, rows * features) && ok;
-    ok = nav_texture_own(&v->n.recording, rows * features) && ok;
-    ok = nav_texture_own(&v->n.noise, features) && ok;
-    ok = nav_texture_own(&v->n.limit, STEPS) && ok;
-    v->sum = calloc(features, sizeof *v->sum);
-    v->window = calloc(features, sizeof *v->window);
-    v->normaliser = calloc((WINDOWS_MOST + 1) * rows, sizeof *v->normaliser);
-    return ok && v->sum && v->window && v->normaliser && variances_ok(&v->n);
+    nav_texture_slab_copy(m, &v->n.turn, features * features);
+    nav_texture_slab_copy(m, &v->n.mean, rows * features);
+    nav_texture_slab_copy(m, &v->n.recording, rows * features);
+    nav_texture_slab_copy(m, &v->n.noise, features);
+    nav_texture_slab_copy(m, &v->n.limit, STEPS);
+    v->sum = nav_texture_slab_cut(m, features);
+    v->window = nav_texture_slab_cut(m, features);
+    v->normaliser = nav_texture_slab_cut(m, (WINDOWS_MOST + 1) * rows);
+    if (m->at)
+        novelty_normalise(v);
 }
 
 struct nav_texture_novelty *nav_texture_novelty_new(const struct nav_texture_novelty_numbers *numbers)
 {
-    struct nav_texture_novelty *v = numbers_ok(numbers) ? calloc(1, sizeof *v) : NULL;
-    if (!v)
-        return NULL;
-    v->n = *numbers;
-    if (!make(v)) {
-        nav_texture_novelty_free(v);
-        return NULL;
-    }
-    normalise(v);
-    return v;
+    struct nav_texture_novelty like = {.n = *numbers};
+    return novelty_numbers_ok(numbers) ? nav_texture_slab_new(&like, sizeof like, novelty_place) : NULL;
 }
 
 void nav_texture_novelty_free(struct nav_texture_novelty *v)
 {
-    if (!v)
-        return;
-    const double *arrays[] = {v->n.turn,  v->n.mean, v->n.recording, v->n.noise,
-                              v->n.limit, v->sum,    v->window,      v->normaliser};
-    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++)
-        free((void *)arrays[i]);
     free(v);
 }
 
@@ -98,7 +77,7 @@ void nav_texture_novelty_reset(struct nav_texture_novelty *v)
 }
 
 /* Once as many windows are held as the mean may rest on, the old ones fade. */
-static void take(struct nav_texture_novelty *v, const double *features)
+static void novelty_take(struct nav_texture_novelty *v, const double *features)
 {
     int count = v->n.features;
     memset(v->window, 0, (size_t)count * sizeof *v->window);
@@ -112,7 +91,7 @@ static void take(struct nav_texture_novelty *v, const double *features)
         v->sum[a] = v->windows == 1 ? v->window[a] : v->sum[a] + (v->window[a] - v->sum[a]) / v->windows;
 }
 
-static double log_likelihood(const struct nav_texture_novelty *v, int row)
+static double novelty_log_likelihood(const struct nav_texture_novelty *v, int row)
 {
     const double *mean = v->n.mean + (size_t)row * (size_t)v->n.features;
     const double *recording = v->n.recording + (size_t)row * (size_t)v->n.features;
@@ -124,7 +103,7 @@ static double log_likelihood(const struct nav_texture_novelty *v, int row)
     return -0.5 * sum - v->normaliser[v->windows * (v->n.classes + 1) + row];
 }
 
-static int step_of(int windows)
+static int novelty_step(int windows)
 {
     int step = 0;
     while (step + 1 < STEPS && (2 << step) <= windows)
@@ -134,10 +113,10 @@ static int step_of(int windows)
 
 double nav_texture_novelty_weigh(struct nav_texture_novelty *v, const double *features)
 {
-    take(v, features);
+    novelty_take(v, features);
     double trained = -INFINITY;
     for (int k = 0; k < v->n.classes; k++)
-        trained = fmax(trained, log_likelihood(v, k));
-    double ratio = log_likelihood(v, v->n.classes) - trained;
-    return (ratio - v->n.limit[step_of(v->windows)]) / v->n.scale;
+        trained = fmax(trained, novelty_log_likelihood(v, k));
+    double ratio = novelty_log_likelihood(v, v->n.classes) - trained;
+    return (ratio - v->n.limit[novelty_step(v->windows)]) / v->n.scale;
 }

@@ -1,27 +1,22 @@
 #include "texture_stream.h"
 
-#include <math.h>
-#include <stdbool.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include "texture_filter.h"
+#include "texture_slab.h"
 
 #define SINCE_LONG (1 << 30)
 #define SURE 0.9            /* probability of another class at which windows are no longer of the same row */
 #define CHANGED 0.9         /* share of reported change points that are true */
 #define MOVED 0.5           /* chance that an edge that holds the tip is the border of another surface */
 #define LOG_ODDS_MOST 20.0  /* of a surface never trained: a confidence of 0 means no evidence at all */
+#define TINY 1e-300         /* keeps a sum of probabilities above 0 where the likeliest class has none */
 #define BAD_SHARE_MOST 0.25 /* of a window; with more, its spectrum is that of the gaps */
 
 struct nav_texture_stream {
     struct nav_texture_rules rules; /* its pointers are the stream's own, but for what is lent */
     struct nav_texture_classifier *classifier[NAV_TEXTURE_CLASSIFIERS_MAX];
-    double *memory; /* all of the arrays below */
-    double *raw;    /* [room][channels] samples since the last decision */
-    double *clean;  /* [room][channels] */
-    double *block;  /* [a block of `change`][channels] samples since the last block */
-    double *apart;  /* [novelty's length][channels] samples since its last window; unused if aligned */
+    double *raw;   /* [room][channels] samples since the last decision */
+    double *clean; /* [room][channels] */
+    double *block; /* [a block of `change`][channels] samples since the last block */
+    double *apart; /* [novelty's length][channels] samples since its last window; unused if aligned */
     double *posterior, *ahead, *part; /* [classes] at the last decision; with the samples since; of one window */
     int room, held, blocked, apart_held;
     int since;    /* samples since the surface changed, or SINCE_LONG */
@@ -30,7 +25,41 @@ struct nav_texture_stream {
     double novel; /* probability that those are of a surface never trained */
 };
 
-static bool classifiers_ok(const struct nav_texture_rules *r)
+void nav_texture_filter_start(double *posterior, int classes)
+{
+    for (int k = 0; k < classes; k++)
+        posterior[k] = 1.0 / classes;
+}
+
+void nav_texture_filter_change(double *posterior, int classes, double chance)
+{
+    for (int k = 0; k < classes && classes > 1; k++)
+        posterior[k] = (1.0 - chance) * posterior[k] + chance * (1.0 - posterior[k]) / (classes - 1);
+}
+
+void nav_texture_filter_weigh(double *posterior, int classes, const double *loglik, double temper)
+{
+    double sum = 0.0;
+    for (int k = 0; k < classes; k++)
+        sum += posterior[k] = posterior[k] * exp(temper * loglik[k]) + TINY;
+    for (int k = 0; k < classes; k++)
+        posterior[k] /= sum;
+}
+
+void nav_texture_filter_run(const double *loglik, size_t rows, int classes, double temper, double chance,
+                            double *posterior)
+{
+    for (size_t i = 0; i < rows; i++, loglik += classes, posterior += classes) {
+        if (i == 0)
+            nav_texture_filter_start(posterior, classes);
+        else
+            memcpy(posterior, posterior - classes, (size_t)classes * sizeof *posterior);
+        nav_texture_filter_change(posterior, classes, chance);
+        nav_texture_filter_weigh(posterior, classes, loglik, temper);
+    }
+}
+
+static bool stream_classifiers_ok(const struct nav_texture_rules *r)
 {
     if (r->classifiers < 1 || r->classifiers > NAV_TEXTURE_CLASSIFIERS_MAX)
         return false;
@@ -41,107 +70,88 @@ static bool classifiers_ok(const struct nav_texture_rules *r)
     return true;
 }
 
-static bool numbers_ok(const struct nav_texture_rules *r)
+static bool stream_numbers_ok(const struct nav_texture_rules *r)
 {
     bool sequential = r->patience >= r->step && r->patience <= NAV_TEXTURE_WINDOW_MAX;
     return r->window >= 2 && r->window <= NAV_TEXTURE_WINDOW_MAX && r->step >= 0 && (r->step == 0 || sequential) &&
            r->hazard > 0.0 && r->temper >= 0.0 && isfinite(r->hazard) && isfinite(r->temper);
 }
 
-static bool novelty_ok(const struct nav_texture_rules *r)
+static bool stream_novelty_ok(const struct nav_texture_rules *r)
 {
     int at = r->novelty_classifier;
     return at >= 0 && at < r->classifiers &&
            nav_texture_novelty_features(r->novelty) <= nav_texture_classifier_count(r->classifier[at]);
 }
 
-static bool rules_ok(const struct nav_texture_rules *r)
+static bool stream_rules_ok(const struct nav_texture_rules *r)
 {
-    return r->channels >= 1 && r->classes >= 1 && r->limits.channels == r->channels && classifiers_ok(r) &&
-           numbers_ok(r) && (!r->novelty || novelty_ok(r));
+    return r->channels >= 1 && r->classes >= 1 && r->limits.channels == r->channels && stream_classifiers_ok(r) &&
+           stream_numbers_ok(r) && (!r->novelty || stream_novelty_ok(r));
 }
 
 /* Samples of a window that novelty is judged by; 0 without. */
-static int novelty_length(const struct nav_texture_stream *s)
+static int stream_novelty_length(const struct nav_texture_stream *s)
 {
     return s->rules.novelty ? nav_texture_classifier_length(s->rules.classifier[s->rules.novelty_classifier]) : 0;
 }
 
 /* Whether decisions are of just the windows that novelty is judged by. */
-static bool aligned(const struct nav_texture_stream *s)
+static bool stream_aligned(const struct nav_texture_stream *s)
 {
-    return s->rules.step == 0 && s->rules.window == novelty_length(s);
+    return s->rules.step == 0 && s->rules.window == stream_novelty_length(s);
 }
 
-static int block_length(const struct nav_texture_stream *s)
+static int stream_block_length(const struct nav_texture_stream *s)
 {
     return s->rules.change ? nav_texture_change_length(s->rules.change) : 0;
 }
 
-static double *cut(double **memory, size_t numbers)
+static void stream_copy_limit(struct nav_texture_slab *m, const double **limit, int channels)
 {
-    double *part = *memory;
-    *memory += numbers;
-    return part;
+    if (*limit)
+        nav_texture_slab_copy(m, limit, (size_t)channels);
 }
 
-static const double *own_limit(double **memory, const double *from, size_t channels)
+static void stream_place(void *of, struct nav_texture_slab *m)
 {
-    double *to = cut(memory, channels);
-    return from ? memcpy(to, from, channels * sizeof *to) : NULL;
-}
-
-static bool allocate(struct nav_texture_stream *s)
-{
+    struct nav_texture_stream *s = of;
     struct nav_texture_limits *l = &s->rules.limits;
     size_t channels = (size_t)s->rules.channels, classes = (size_t)s->rules.classes;
-    size_t room = (size_t)s->room * channels, block = (size_t)block_length(s) * channels;
-    size_t apart = (size_t)novelty_length(s) * channels;
-    double *m = s->memory = calloc(2 * room + block + apart + 3 * classes + 5 * channels, sizeof *m);
-    if (!m)
-        return false;
-    s->raw = cut(&m, room);
-    s->clean = cut(&m, room);
-    s->block = cut(&m, block);
-    s->apart = cut(&m, apart);
-    s->posterior = cut(&m, classes);
-    s->ahead = cut(&m, classes);
-    s->part = cut(&m, classes);
-    l->spike = own_limit(&m, l->spike, channels);
-    l->still = own_limit(&m, l->still, channels);
-    l->low = own_limit(&m, l->low, channels);
-    l->high = own_limit(&m, l->high, channels);
-    l->span = own_limit(&m, l->span, channels);
-    return true;
+    const double **limits[] = {&l->spike, &l->still, &l->low, &l->high, &l->span};
+    for (size_t i = 0; i < sizeof limits / sizeof *limits; i++)
+        stream_copy_limit(m, limits[i], s->rules.channels);
+    s->raw = nav_texture_slab_cut(m, (size_t)s->room * channels);
+    s->clean = nav_texture_slab_cut(m, (size_t)s->room * channels);
+    s->block = nav_texture_slab_cut(m, (size_t)stream_block_length(s) * channels);
+    s->apart = nav_texture_slab_cut(m, (size_t)stream_novelty_length(s) * channels);
+    s->posterior = nav_texture_slab_cut(m, classes);
+    s->ahead = nav_texture_slab_cut(m, classes);
+    s->part = nav_texture_slab_cut(m, classes);
 }
 
 struct nav_texture_stream *nav_texture_stream_new(const struct nav_texture_rules *rules)
 {
-    struct nav_texture_stream *s = rules_ok(rules) ? calloc(1, sizeof *s) : NULL;
+    if (!stream_rules_ok(rules))
+        return NULL;
+    struct nav_texture_stream like = {.rules = *rules, .room = rules->step > 0 ? rules->patience : rules->window};
+    memcpy(like.classifier, rules->classifier, (size_t)rules->classifiers * sizeof *like.classifier);
+    like.rules.classifier = like.classifier;
+    struct nav_texture_stream *s = nav_texture_slab_new(&like, sizeof like, stream_place);
     if (!s)
         return NULL;
-    s->rules = *rules;
-    memcpy(s->classifier, rules->classifier, (size_t)rules->classifiers * sizeof *s->classifier);
     s->rules.classifier = s->classifier;
-    s->room = rules->step > 0 ? rules->patience : rules->window;
-    if (!allocate(s)) {
-        free(s);
-        return NULL;
-    }
     nav_texture_stream_reset(s);
     return s;
 }
 
 void nav_texture_stream_free(struct nav_texture_stream *s)
 {
-    if (!s)
-        return;
-    free(s->memory);
     free(s);
 }
 
 /* The windows to come are not judged together with those before. */
-static void new_row(struct nav_texture_stream *s)
+static void stream_new_row(struct nav_texture_stream *s)
 {
     s->kind = NAV_TEXTURE_UNKNOWN;
     s->novel = 0.0;
@@ -158,26 +168,26 @@ void nav_texture_stream_reset(struct nav_texture_stream *s)
     nav_texture_filter_start(s->posterior, s->rules.classes);
     if (s->rules.change)
         nav_texture_change_reset(s->rules.change);
-    new_row(s);
+    stream_new_row(s);
 }
 
 /* Whether n samples say nothing of a floor: too many of the records bad, or a channel stuck or railed. */
-static bool unreadable(const struct nav_texture_health *h, int n)
+static bool stream_unreadable(const struct nav_texture_health *h, int n)
 {
     return (double)h->bad > BAD_SHARE_MOST * n || h->still > 0 || h->railed > 0;
 }
 
 /* Cleans the samples held. Returns whether they say anything of a surface. */
-static bool clean(struct nav_texture_stream *s, struct nav_texture_decision *d)
+static bool stream_clean(struct nav_texture_stream *s, struct nav_texture_decision *d)
 {
     memcpy(s->clean, s->raw, (size_t)s->held * (size_t)s->rules.channels * sizeof *s->clean);
     d->health = nav_texture_clean(s->clean, s->held, &s->rules.limits);
-    return !unreadable(&d->health, s->held) && d->health.caught == 0;
+    return !stream_unreadable(&d->health, s->held) && d->health.caught == 0;
 }
 
 /* What n samples say of each class, the best's 0: the longest classifier that fits covers them in evenly spaced
  * windows, and counts by how many of its windows they would fill. False when they are shorter than every classifier. */
-static bool evidence(struct nav_texture_stream *s, const double *from, int n, double *loglik)
+static bool stream_evidence(struct nav_texture_stream *s, const double *from, int n, double *loglik)
 {
     int at = s->rules.classifiers - 1, classes = s->rules.classes;
     while (at >= 0 && nav_texture_classifier_length(s->classifier[at]) > n)
@@ -200,7 +210,7 @@ static bool evidence(struct nav_texture_stream *s, const double *from, int n, do
     return true;
 }
 
-static int likeliest(const double *posterior, int classes)
+static int stream_likeliest(const double *posterior, int classes)
 {
     int best = 0;
     for (int k = 1; k < classes; k++)
@@ -209,39 +219,39 @@ static int likeliest(const double *posterior, int classes)
 }
 
 /* Judges the window that a classifier has just reduced to features, together with those before it. */
-static void weigh_novelty(struct nav_texture_stream *s)
+static void stream_weigh_novelty(struct nav_texture_stream *s)
 {
     const double *features = nav_texture_classifier_features(s->classifier[s->rules.novelty_classifier]);
     s->novel = 1.0 / (1.0 + exp(-fmin(nav_texture_novelty_weigh(s->rules.novelty, features), LOG_ODDS_MOST)));
 }
 
 /* Whether the row of windows is of a surface never trained. Where the filter is sure of another class, a row begins. */
-static void follow_row(struct nav_texture_stream *s, int best, int n)
+static void stream_follow_row(struct nav_texture_stream *s, int best, int n)
 {
     if (s->ahead[best] > SURE && best != s->kind) {
         if (s->kind != NAV_TEXTURE_UNKNOWN)
-            new_row(s);
+            stream_new_row(s);
         s->kind = best;
     }
-    if (aligned(s) && n == s->held)
-        weigh_novelty(s);
+    if (stream_aligned(s) && n == s->held)
+        stream_weigh_novelty(s);
 }
 
 /* Chance that the surface changed within n samples. */
-static double chance(const struct nav_texture_stream *s, int n)
+static double stream_chance(const struct nav_texture_stream *s, int n)
 {
     return -expm1(-s->rules.hazard * n);
 }
 
-static void no_evidence(struct nav_texture_stream *s, struct nav_texture_decision *d, double *loglik)
+static void stream_no_evidence(struct nav_texture_stream *s, struct nav_texture_decision *d, double *loglik)
 {
     memset(loglik, 0, (size_t)s->rules.classes * sizeof *loglik);
     d->label = NAV_TEXTURE_UNKNOWN;
-    d->best = likeliest(s->ahead, s->rules.classes);
-    new_row(s);
+    d->best = stream_likeliest(s->ahead, s->rules.classes);
+    stream_new_row(s);
 }
 
-static void answer(const struct nav_texture_stream *s, struct nav_texture_decision *d)
+static void stream_answer(const struct nav_texture_stream *s, struct nav_texture_decision *d)
 {
     double least = s->rules.step > 0 ? s->rules.sure : s->rules.doubt;
     d->novelty = s->novel;
@@ -250,22 +260,22 @@ static void answer(const struct nav_texture_stream *s, struct nav_texture_decisi
 }
 
 /* Decides on the samples held. Returns whether a sequential decision may stop here. */
-static bool decide(struct nav_texture_stream *s, struct nav_texture_decision *d, double *loglik)
+static bool stream_decide(struct nav_texture_stream *s, struct nav_texture_decision *d, double *loglik)
 {
     int classes = s->rules.classes, n = s->since < s->held ? s->since : s->held;
     *d = (struct nav_texture_decision){.samples = s->held};
-    bool readable = clean(s, d), caught = d->health.caught > 0 && d->health.railed == 0;
+    bool readable = stream_clean(s, d), caught = d->health.caught > 0 && d->health.railed == 0;
     d->border = s->border || n < s->held;
     memcpy(s->ahead, s->posterior, (size_t)classes * sizeof *s->ahead);
-    nav_texture_filter_change(s->ahead, classes, caught ? MOVED : chance(s, n));
-    if (!readable || !evidence(s, s->clean + (size_t)(s->held - n) * (size_t)s->rules.channels, n, loglik)) {
-        no_evidence(s, d, loglik);
+    nav_texture_filter_change(s->ahead, classes, caught ? MOVED : stream_chance(s, n));
+    if (!readable || !stream_evidence(s, s->clean + (size_t)(s->held - n) * (size_t)s->rules.channels, n, loglik)) {
+        stream_no_evidence(s, d, loglik);
         return false;
     }
     nav_texture_filter_weigh(s->ahead, classes, loglik, s->rules.temper);
-    d->best = likeliest(s->ahead, classes);
-    follow_row(s, d->best, n);
-    answer(s, d);
+    d->best = stream_likeliest(s->ahead, classes);
+    stream_follow_row(s, d->best, n);
+    stream_answer(s, d);
     for (int k = 0; k < classes; k++)
         loglik[k] *= 1.0 - s->novel;
     return s->rules.step == 0 || fmax(d->confidence, s->novel) >= s->rules.sure;
@@ -273,15 +283,15 @@ static bool decide(struct nav_texture_stream *s, struct nav_texture_decision *d,
 
 /* How many samples lie behind a change of surface that this sample shows; 0 without. Samples that are not readable
  * interrupt the row of blocks; an edge that holds the tip, or lets it fall, does not. */
-static int behind_change(struct nav_texture_stream *s, const double *sample)
+static int stream_behind_change(struct nav_texture_stream *s, const double *sample)
 {
-    int length = block_length(s), channels = s->rules.channels, after;
+    int length = stream_block_length(s), channels = s->rules.channels, after;
     memcpy(s->block + (size_t)s->blocked++ * (size_t)channels, sample, (size_t)channels * sizeof *sample);
     if (s->blocked < length)
         return 0;
     s->blocked = 0;
     struct nav_texture_health health = nav_texture_clean(s->block, length, &s->rules.limits);
-    if (unreadable(&health, length))
+    if (stream_unreadable(&health, length))
         nav_texture_change_reset(s->rules.change);
     else if (health.caught > 0)
         nav_texture_change_edge(s->rules.change);
@@ -291,61 +301,62 @@ static int behind_change(struct nav_texture_stream *s, const double *sample)
 }
 
 /* Whether this sample shows that the surface has changed. */
-static bool changed(struct nav_texture_stream *s, const double *sample)
+static bool stream_changed(struct nav_texture_stream *s, const double *sample)
 {
     s->since += s->since < SINCE_LONG;
-    int after = s->rules.change ? behind_change(s, sample) : 0;
+    int after = s->rules.change ? stream_behind_change(s, sample) : 0;
     if (after == 0)
         return false;
     s->since = after;
     s->border = true;
     nav_texture_filter_change(s->posterior, s->rules.classes, CHANGED);
-    new_row(s);
+    stream_new_row(s);
     return true;
 }
 
 /* Windows of novelty's own, where decisions are of others. */
-static void follow_novelty(struct nav_texture_stream *s, const double *sample)
+static void stream_follow_novelty(struct nav_texture_stream *s, const double *sample)
 {
-    int length = novelty_length(s), channels = s->rules.channels;
+    int length = stream_novelty_length(s), channels = s->rules.channels;
     memcpy(s->apart + (size_t)s->apart_held++ * (size_t)channels, sample, (size_t)channels * sizeof *sample);
     if (s->apart_held < length)
         return;
     s->apart_held = 0;
     struct nav_texture_health health = nav_texture_clean(s->apart, length, &s->rules.limits);
-    if (unreadable(&health, length) || health.caught > 0)
+    if (stream_unreadable(&health, length) || health.caught > 0)
         return;
     nav_texture_classifier_judge(s->classifier[s->rules.novelty_classifier], s->apart, s->part);
-    weigh_novelty(s);
+    stream_weigh_novelty(s);
 }
 
 /* Word of a border before the window is full. */
-static void notice(struct nav_texture_stream *s, struct nav_texture_decision *d, double *loglik)
+static void stream_notice(struct nav_texture_stream *s, struct nav_texture_decision *d, double *loglik)
 {
     *d = (struct nav_texture_decision){.samples = s->held, .border = 1, .notice = 1};
     memcpy(s->ahead, s->posterior, (size_t)s->rules.classes * sizeof *s->ahead);
-    no_evidence(s, d, loglik);
+    stream_no_evidence(s, d, loglik);
 }
 
-static bool due(const struct nav_texture_stream *s)
+static bool stream_due(const struct nav_texture_stream *s)
 {
     return s->held == s->room || (s->rules.step > 0 && s->held % s->rules.step == 0);
 }
 
 /* Takes one sample; whether that makes a decision. */
-static bool take(struct nav_texture_stream *s, const double *sample, struct nav_texture_decision *d, double *loglik)
+static bool stream_take(struct nav_texture_stream *s, const double *sample, struct nav_texture_decision *d,
+                        double *loglik)
 {
     size_t channels = (size_t)s->rules.channels;
     memcpy(s->raw + (size_t)s->held++ * channels, sample, channels * sizeof *sample);
-    if (s->rules.novelty && !aligned(s))
-        follow_novelty(s, sample);
-    bool news = changed(s, sample);
-    if (!due(s)) {
+    if (s->rules.novelty && !stream_aligned(s))
+        stream_follow_novelty(s, sample);
+    bool news = stream_changed(s, sample);
+    if (!stream_due(s)) {
         if (news)
-            notice(s, d, loglik);
+            stream_notice(s, d, loglik);
         return news;
     }
-    if (!decide(s, d, loglik) && s->held < s->room)
+    if (!stream_decide(s, d, loglik) && s->held < s->room)
         return false;
     memcpy(s->posterior, s->ahead, (size_t)s->rules.classes * sizeof *s->posterior);
     s->held = 0;
@@ -358,7 +369,7 @@ long nav_texture_stream_push(struct nav_texture_stream *s, const double *samples
 {
     *decided = 0;
     for (long i = 0; i < n; i++) {
-        if (take(s, samples + (size_t)i * (size_t)s->rules.channels, decision, loglik)) {
+        if (stream_take(s, samples + (size_t)i * (size_t)s->rules.channels, decision, loglik)) {
             *decided = 1;
             return i + 1;
         }

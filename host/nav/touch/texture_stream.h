@@ -1,10 +1,14 @@
 /* Texture of one whisker, sample by sample: windows in a row, or as few samples as it takes to be sure.
  *
- * One posterior (texture_filter.h) answers all: its states are the classes and a surface never trained. A change point
- * (texture_change.h) or an edge that holds the tip is a border; what lies before it is no evidence of the surface now.
+ * One posterior, of a forward filter over windows in a row, answers all: its states are the classes and a surface never
+ * trained. Between windows the surface changes with some chance, to each other class alike; a window's evidence then
+ * weighs the classes, tempered, for windows of one drive err alike. A change point (texture_change.h) or an edge that
+ * holds the tip is a border; what lies before it is no evidence of the surface now.
  */
 #ifndef NAV_TEXTURE_STREAM_H
 #define NAV_TEXTURE_STREAM_H
+
+#include <stddef.h>
 
 #include "texture_change.h"
 #include "texture_classifier.h"
@@ -59,6 +63,20 @@ long nav_texture_stream_push(struct nav_texture_stream *, const double *samples,
 
 /* Forgets what came before, as after a gap in the data. */
 void nav_texture_stream_reset(struct nav_texture_stream *);
+
+/* The filter by itself: the posteriors[rows][classes] after each of so many windows of loglik[rows][classes], each
+ * after a change of surface with this chance, from all classes alike. */
+void nav_texture_filter_run(const double *loglik, size_t rows, int classes, double temper, double chance,
+                            double *posterior);
 /* cffi: end */
+
+/* Its steps. posterior[classes]: all classes alike, as before any window. */
+void nav_texture_filter_start(double *posterior, int classes);
+
+/* The surface has changed with this chance, 0 to 1. */
+void nav_texture_filter_change(double *posterior, int classes, double chance);
+
+/* Weighs the classes by loglik[classes], whose largest is 0, times `temper`, >= 0. */
+void nav_texture_filter_weigh(double *posterior, int classes, const double *loglik, double temper);
 
 #endif

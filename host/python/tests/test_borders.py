@@ -79,11 +79,6 @@ def published(frames) -> None:
         writer.publish(frames)
 
 
-def of_texture_model() -> Case:
-    names = {"rest": np.zeros(2), "low": -np.ones(2), "high": np.ones(2)}
-    return Case(lambda **changed: TextureModel(["A"], **changed), names, dict.fromkeys(names, (0,)))
-
-
 SCENE, OBSERVATIONS = level0.record(3, rows=ROWS)
 ROW = {name: getattr(OBSERVATIONS, name)[1] for name in ("odometry", "texture", "radial_m")}
 NOISE = np.random.default_rng(1).normal(0.0, 5.0, (10 * LENGTH, CHANNELS))
@@ -132,11 +127,6 @@ CASES = {
         WHISK,
         {"t_s": (0,), "samples": (0,), "whisk_rad_s": (0,), "told_rad_s": (0,)},
     ),
-    "touch.texture.model.TextureModel.__init__": of_texture_model(),
-    "touch.texture.model.TextureModel.train": of_one(
-        lambda recording: TextureModel.train({"A": [recording], "B": [NOISE]}), "recording", NOISE, 1
-    ),
-    "touch.texture.model.TextureModel.loglik": of_one(PLAIN.loglik, "window", NOISE, 1),
     "touch.texture.novelty.Novelty.native": of_part(
         novelty(), Novelty.native, turn=(0, 1), mean=(1,), recording=(0, 1), noise=(0,), limit=(0,)
     ),
@@ -175,6 +165,7 @@ CASES = {
     "touch.texture.spectral.Stream.push": of_one(model().stream(LENGTH).push, "samples", NOISE, 1),
     "bridge.ring.Writer.publish": of_one(published, "frames", np.zeros(3, FRAME)),
 }
+CASES["touch.texture.classifier.pointers"] = CASES["touch.texture.classifier.Classifier._make"]
 CASES["touch.texture.classifier._reducer"] = CASES["touch.texture.classifier.plain_features"]
 CASES["touch.radial.shape._column"] = CASES["touch.radial.shape.shape_of"]
 

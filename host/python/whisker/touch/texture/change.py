@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...native import as_doubles, doubles, ffi, lib
-from .classifier import blocks_of, plain_features
+from ...native import doubles, ffi, lib
+from .classifier import blocks_of, feature_count, made, plain_features, pointers
 
 SHRINK = 0.05  # share of the diagonal in covariances
 ROW = 4  # blocks over which their dependence is measured
@@ -14,9 +14,8 @@ FALSE_EVERY = 1000  # blocks of one surface with one false change: 250 windows o
 TAIL = 0.2  # share of the groups that the tail is fitted to
 NEVER = 1e9  # nats
 BANDS = 9  # of a channel, the upper three octaves by thirds: a whisker rings below, at 23, 70 and 155 Hz
-
-
-RULE = {"steady": 2, "apart": 2, "weight": 2, "bias": 1}
+RULE = {"steady": 2, "apart": 2, "weight": 2, "bias": 1}  # arrays of a rule and their dimensions ...
+AT = ("", "edge_")  # ... within a tile, and at an edge
 
 
 @dataclass
@@ -36,35 +35,18 @@ class Change:
     edge_weight: np.ndarray
     edge_bias: np.ndarray
 
-    ARRAYS = {"floor": 1} | {f"{at}{n}": d for at in ("", "edge_") for n, d in RULE.items()}  # and their dimensions
+    ARRAYS = {"floor": 1} | {f"{at}{n}": d for at in ("", "edge_") for n, d in RULE.items()}
     NUMBERS = ("length", "share", "limit")
 
     def native(self):
         """A detector of its own, with nothing held; ValueError when a size or number is impossible."""
-        features = len(plain_features(np.zeros((1, self.length, len(self.floor))), False, self.floor)[0])
-        classes = len(self.bias)
-        shapes = {
-            "bias": (classes,),
-            "steady": (features, classes),
-            "apart": (classes, classes),
-            "weight": (features, classes),
-        }
-        numbers, kept = ffi.new("struct nav_texture_change_numbers *"), []
-        numbers.classes, numbers.channels = classes, len(self.floor)
-        numbers.length, numbers.share, numbers.limit = self.length, self.share, self.limit
-
-        def lend(to, field: str, name: str, shape: tuple) -> None:
-            kept.append(as_doubles(getattr(self, name), f"change: {name}", shape))
-            setattr(to, field, doubles(kept[-1], name, shape))
-
-        lend(numbers, "floor", "floor", (len(self.floor),))
-        for name, shape in shapes.items():
-            lend(numbers.inside, name, name, shape)
-            lend(numbers.edge, name, f"edge_{name}", shape)
-        made = lib.nav_texture_change_new(numbers)
-        if made == ffi.NULL:
-            raise ValueError("change: a size or number is out of range")
-        return ffi.gc(made, lib.nav_texture_change_free)
+        features, classes = feature_count(self.floor, self.length, False), len(self.bias)
+        shapes = {"steady": (features, classes), "apart": (classes, classes), "weight": (features, classes)}
+        shapes |= {"bias": (classes,)}
+        given = pointers(self, "change", {"floor": self.floor.shape} | {at + n: shapes[n] for at in AT for n in RULE})
+        inside, edge = ({name: given.pop(at + name) for name in RULE} for at in AT)
+        sizes = {"classes": classes, "channels": len(self.floor)} | {name: getattr(self, name) for name in self.NUMBERS}
+        return made("change", sizes | given | {"inside": inside, "edge": edge}, "change")
 
     def ratios(self, samples: np.ndarray) -> np.ndarray:
         """The likeliest change after every block of samples (n, channels), nats; without the first blocks, which are too few."""

@@ -32,7 +32,6 @@ class Classifier:
     _made: object = field(default=None, repr=False, compare=False)
 
     ARRAYS = ("floor", "shape", "centre", "scale", "weight", "bias")
-    PLAIN = tuple(name for name in ARRAYS if name != "shape")
     NUMBERS = ("length", "levels", "shorter", "hidden", "temper", "seed")
 
     @property
@@ -44,21 +43,12 @@ class Classifier:
 
     def _make(self):
         features = feature_count(self.floor, self.length, self.levels, self.shorter, self.shape)
-        classes = len(self.bias)
-        shapes = {"centre": (features,), "scale": (features,), "weight": (features + self.hidden, classes)}
-        shapes |= {"floor": (len(self.floor),), "bias": (classes,), "shape": (len(self.shape),)}
-        for name, shape in shapes.items():
-            setattr(self, name, as_doubles(getattr(self, name), f"classifier {self.length}: {name}", shape))
-        numbers = ffi.new("struct nav_texture_classifier_numbers *")
-        numbers.classes, numbers.channels, numbers.length = classes, len(self.floor), self.length
-        numbers.levels, numbers.shorter = int(self.levels), self.shorter
-        numbers.hidden, numbers.seed, numbers.temper = self.hidden, self.seed, self.temper
-        for name in self.ARRAYS if len(self.shape) else self.PLAIN:
-            setattr(numbers, name, doubles(getattr(self, name), name, shapes[name]))
-        made = lib.nav_texture_classifier_new(numbers)
-        if made == ffi.NULL:
-            raise ValueError(f"classifier {self.length}: a size or number is out of range")
-        return ffi.gc(made, lib.nav_texture_classifier_free)
+        shapes = {"floor": self.floor.shape, "centre": (features,), "scale": (features,), "bias": self.bias.shape}
+        shapes |= {"weight": (features + self.hidden, len(self.bias)), "shape": self.shape.shape}
+        shapes = {name: shape for name, shape in shapes.items() if name != "shape" or len(self.shape)}
+        where, sizes = f"classifier {self.length}", {"classes": len(self.bias), "channels": len(self.floor)}
+        numbers = sizes | {name: getattr(self, name) for name in self.NUMBERS}
+        return made("classifier", numbers | pointers(self, where, shapes), where)
 
     def expand(self, windows: np.ndarray) -> np.ndarray:
         """Windows (m, length, channels) -> standardised features and projections (m, F + hidden)."""
@@ -70,6 +60,20 @@ class Classifier:
                 self.native, doubles(window, "window", shape), doubles(row, "features", (width,))
             )
         return out
+
+
+def pointers(part, where: str, shapes: dict[str, tuple]) -> dict:
+    """A part's arrays for C, by name; ValueError for one of another shape."""
+    arrays = {name: as_doubles(getattr(part, name), f"{where}: {name}", shape) for name, shape in shapes.items()}
+    return {name: doubles(array, name, shapes[name]) for name, array in arrays.items()}
+
+
+def made(kind: str, numbers: dict, where: str):
+    """A nav_texture_`kind` of its numbers, which it copies; ValueError when a size or number is impossible."""
+    found = getattr(lib, f"nav_texture_{kind}_new")(ffi.new(f"struct nav_texture_{kind}_numbers *", numbers))
+    if found == ffi.NULL:
+        raise ValueError(f"{where}: a size or number is out of range")
+    return ffi.gc(found, getattr(lib, f"nav_texture_{kind}_free"))
 
 
 def _reducer(floor: np.ndarray, length: int, levels: bool, shorter: int, shape: np.ndarray):

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...fields import Fields
 from ...files import UnreadableError, read_json
-from ...native import as_doubles, doubles, ffi, lib
+from ...native import as_doubles, lib
 from ...tables import TableError, numbers, read_columns
 from .spectral import FORMAT as SPECTRAL_FORMAT
 from .spectral import SENSOR_STOPS, SpectralModel, no_model
@@ -29,22 +29,14 @@ RATES_APART = 0.1  # relative: recordings to be learnt together are sampled alik
 class TextureModel:
     """One whisker's model: class names in order, rest and bins by axis, log P(x|T) by class, axis and bin."""
 
-    def __init__(self, classes: list[str], rest, low, high, table: np.ndarray | None = None, bins: int = BINS):
+    def __init__(self, classes: list[str], rest, low, high, table: np.ndarray):
         """rest, low, high: one number per axis, counts (low and high relative to rest); table (classes, axes, bins)."""
-        self.classes = list(classes)
+        self.classes, self.table = list(classes), table
         self.rest = np.atleast_1d(np.asarray(rest, dtype=np.float64))
         self.low = as_doubles(low, "low", self.rest.shape)
         self.high = as_doubles(high, "high", self.rest.shape)
-        axes = len(self.rest)
-        shape = (len(self.classes), axes, bins if table is None else table.shape[2])
-        made = lib.nav_texture_new(*shape, doubles(self.low, "low", (axes,)), doubles(self.high, "high", (axes,)))
-        if made == ffi.NULL:
-            raise ValueError(f"texture model: impossible shape {shape} or range; every range needs low < high")
-        self._model = ffi.gc(made, lib.nav_texture_free)
-        size = 8 * int(np.prod(shape))
-        self.table = np.frombuffer(ffi.buffer(lib.nav_texture_table(made), size)).reshape(shape)
-        if table is not None:
-            self.table[:] = table
+        if not (np.isfinite(self.low) & np.isfinite(self.high) & (self.low < self.high)).all():
+            raise ValueError("texture model: every range needs low < high")
 
     @classmethod
     def train(cls, recordings: dict[str, list[np.ndarray]], rest=None, bins: int = BINS) -> "TextureModel":
@@ -53,30 +45,30 @@ class TextureModel:
         widths = {r.shape[1] for group in recordings.values() for r in group}
         if len(widths) != 1:
             raise ValueError(f"texture training: recordings of {sorted(widths)} channels; give recordings of one width")
-        everything = np.concatenate([r for group in recordings.values() for r in group])
+        by_class = [np.concatenate(group) for group in recordings.values()]
+        everything = np.concatenate(by_class)
         everything = everything[np.isfinite(everything).all(axis=1)]
         if len(everything) == 0:
             raise ValueError("texture training: no finite sample; record each surface for some seconds")
         rest = np.median(everything, axis=0) if rest is None else np.broadcast_to(rest, everything.shape[1:])
         low, high = _ranges(everything - rest, bins)
-        model = cls(list(recordings), rest, low, high, bins=bins)
-        for index, group in enumerate(recordings.values()):
-            for recording in group:
-                samples = np.ascontiguousarray(recording - rest)
-                given = doubles(samples, "recording", (len(recording), model.channels))
-                lib.nav_texture_add(model._model, index, given, len(samples))
-        lib.nav_texture_finish(model._model, PSEUDO)
+        model = cls(list(recordings), rest, low, high, np.zeros((len(recordings), everything.shape[1], bins)))
+        for rows, samples in zip(model.table, by_class, strict=True):
+            rows[:] = [np.bincount(places, minlength=bins) for places in model._bins(samples, rest).T]
+        model.table = np.log((model.table + PSEUDO) / (model.table + PSEUDO).sum(axis=2, keepdims=True))
         return model
+
+    def _bins(self, samples: np.ndarray, rest: np.ndarray) -> np.ndarray:
+        """Samples (n, axes) of raw counts -> the bins (m, axes) of those that are finite."""
+        samples = samples[np.isfinite(samples).all(axis=1)] - rest
+        bins = self.table.shape[2]
+        return np.clip(np.floor((samples - self.low) * (bins / (self.high - self.low))), 0, bins - 1).astype(int)
 
     def loglik(self, window: np.ndarray, rest=None) -> np.ndarray:
         """Equation 1: log-likelihood of the window (n, axes) of raw counts by class. `rest`: default the model's."""
-        window = _counts(window, "window", self.channels)
         rest = self.rest if rest is None else as_doubles(rest, "rest", (self.channels,))
-        samples = np.ascontiguousarray(window - rest)
-        out = np.zeros(len(self.classes))
-        given = doubles(samples, "window", (len(window), self.channels))
-        lib.nav_texture_loglik(self._model, given, len(samples), doubles(out, "out", (len(self.classes),)))
-        return out
+        bins = self._bins(_counts(window, "window", self.channels), rest)
+        return self.table[:, np.arange(self.channels), bins].sum(axis=(1, 2))
 
     def save(self, path) -> None:
         content = {"format": FORMAT, "classes": self.classes}

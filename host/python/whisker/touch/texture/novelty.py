@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...native import as_doubles, doubles, ffi, lib
+from ...native import as_doubles, doubles, lib
+from .classifier import made, pointers
 
 SHRINK = 0.3  # share of the diagonal in the covariance of windows within a recording
 RECORDINGS_PRIOR = 10.0  # recordings' worth of a spread alike in all directions, that the measured spread is mixed with
@@ -36,15 +37,8 @@ class Novelty:
         rows, features = as_doubles(self.mean, "novelty: mean", (None, None)).shape
         shapes = {"turn": (features, features), "mean": (rows, features), "recording": (rows, features)}
         shapes |= {"noise": (features,), "limit": (STEPS,)}
-        numbers, kept = ffi.new("struct nav_texture_novelty_numbers *"), []
-        numbers.classes, numbers.features, numbers.scale = rows - 1, features, self.scale
-        for name, shape in shapes.items():
-            kept.append(as_doubles(getattr(self, name), f"novelty: {name}", shape))
-            setattr(numbers, name, doubles(kept[-1], name, shape))
-        made = lib.nav_texture_novelty_new(numbers)
-        if made == ffi.NULL:
-            raise ValueError("novelty: a size or number is out of range")
-        return ffi.gc(made, lib.nav_texture_novelty_free)
+        sizes = {"classes": rows - 1, "features": features, "scale": self.scale}
+        return made("novelty", sizes | pointers(self, "novelty", shapes), "novelty")
 
     def scores(self, features: np.ndarray) -> np.ndarray:
         """Log odds of a surface never trained after each of a recording's windows in a row: features (m, F) -> (m,)."""
