@@ -485,6 +485,99 @@ def test_channels_in_another_order_are_one_clear_line(capsys, tmp_path):
         assert code != 0 and "1.csv, line 1: columns y, x; give x, y" in error and error.count("\n") == 1
 
 
+def edit(path, change):
+    """Change each row of a recording: a list of its cells."""
+    head, *rows = path.read_text().splitlines()
+    path.write_text("\n".join([head, *(",".join(change(n, row.split(","))) for n, row in enumerate(rows))]) + "\n")
+
+
+def late(n, row):
+    return [{3: "soon", 5: "0"}.get(n, row[0]), *row[1:]]
+
+
+def stuck(n, row):
+    return row if n < 100 else [*row[:2], "32768"]
+
+
+FAULTS = {  # what is done to VINYL/1.csv -> what is said of it by train and by classify; an exit code, or 0 where it goes on
+    "three rows": (
+        lambda p: p.write_text("t_s,x,y\n0,1,2\n.0005,2,3\n.001,3,4\n"),
+        2,
+        "3 rows, hardly any",
+        "no decision",
+    ),
+    "no rows": (lambda p: p.write_text("t_s,x,y\n"), 2, "0 rows, hardly any", "no decision"),
+    "no numbers": (
+        lambda p: edit(p, lambda n, r: [r[0], "", ""]),
+        2,
+        "800 rows, hardly any",
+        "800 of 800 rows are not",
+    ),
+    "no time": (lambda p: edit(p, lambda n, r: ["0", *r[1:]]), 2, *2 * ("line 1: column 't_s' never increases",)),
+    "backwards": (lambda p: edit(p, lambda n, r: [f"{-n}", *r[1:]]), 2, *2 * ("line 1: column 't_s' never increases",)),
+    "another rate": (lambda p: edit(p, lambda n, r: [f"{n / 100}", *r[1:]]), 2, "give one rate (", "sampled at 100 Hz"),
+    "a channel more": (
+        lambda p: p.write_text("t_s,x,y,z\n0,1,2,3\n1,2,3,4\n"),
+        2,
+        "3 channels; give the 2 of",
+        "3 channels, but the model has 2",
+    ),
+    "some times": (lambda p: edit(p, late), 0, *2 * ("2 of 800 times are no number or not after",)),
+    "half stuck": (lambda p: edit(p, stuck), 0, *2 * ("channel 2 keeps one value for 700 of its 800",)),
+    "saturated": (
+        lambda p: edit(p, lambda n, r: [*r[:2], r[2] if n % 9 else "65535"]),
+        0,
+        *2 * ("channel 2 is at its stop in 11 %",),
+    ),
+    "another whisker's": (
+        lambda p: p.write_text(p.read_text().replace("x,y", "a,b")),
+        0,
+        *2 * ("columns a, b taken for x, y",),
+    ),
+    "shorter than a window": (
+        lambda p: p.write_text("\n".join(p.read_text().splitlines()[:101]) + "\n"),
+        0,
+        "100 samples; no window of the model will be longer",
+        "100 samples and no decision",
+    ),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_faulty_recording_is_named_with_what_is_wrong(capsys, tmp_path, fault):
+    spoil, code, of_training, of_answer = FAULTS[fault]
+    for name in ("VINYL", "ROUGH"):
+        for n in range(2):
+            write(tmp_path / "set" / name / f"{n}.csv", drag(name, 800, n))
+    model, spoilt = tmp_path / "m.json", tmp_path / "set/VINYL/1.csv"
+    command = "texture", "train", tmp_path / "set", "--out", model
+    assert run(capsys, *command)[0] == 0
+    spoil(spoilt)
+    for words, wanted in ((("classify", model, spoilt), of_answer), (command[1:], of_training)):
+        found, _, error = run(capsys, "texture", *words)
+        (line,) = (line for line in error.splitlines() if wanted in line)
+        assert "VINYL/1.csv" in line and found == (0 if "warning" in line else 2)
+    assert found == code
+
+
+def test_surfaces_that_may_be_misspelt_or_were_recorded_once_are_told(capsys, tmp_path):
+    names = "SMOOTH", "SMOTH", "TILE1", "TILE2", "SMOOHT"
+    for name in names:
+        write(tmp_path / name / "0.csv", drag("VINYL", 200, 0))
+    lines = []
+    texture.read_training(tmp_path, lines.append)
+    told = [set(line.split("'")[1::2]) for line in lines if "differ by a letter" in line]
+    assert told == [{"SMOOHT", "SMOOTH"}, {"SMOOTH", "SMOTH"}] and len(lines) == 3
+    assert "one recording of SMOOHT, SMOOTH, SMOTH, TILE1, TILE2" in "".join(lines)
+
+
+def test_one_surface_or_no_folder_is_one_clear_line(capsys, tmp_path):
+    write(tmp_path / "set/VINYL/0.csv", drag("VINYL", 200, 0))
+    for folder, wanted in (("set", "1 surface folder(s); give at least two"), ("none", "no such folder")):
+        code, _, error = run(capsys, "texture", "train", tmp_path / folder, "--out", tmp_path / "m.json")
+        assert code == 2 and wanted in error and error.count("\n") == 1
+
+
 def test_too_little_to_learn_from_is_said():
     with pytest.raises(ValueError, match="record each surface"):
         train({"A": [np.zeros((3, 2))], "B": [np.zeros((3, 2))]}, RATE_HZ)

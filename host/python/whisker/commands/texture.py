@@ -39,12 +39,15 @@ def add(parser) -> None:
 def train(arguments) -> int:
     window_ms = length_of_time(arguments.window_ms)
     hazard = changes_a_window(arguments.speed_m_s, arguments.tile_m, window_ms)
-    recordings, rate_hz = texture.read_training(arguments.folder)
+    recordings, rate_hz = texture.read_training(arguments.folder, warn)
     files = texture.surface_files(arguments.folder)
-    for name, some in files.items():
-        for file, samples in zip(some, recordings[name], strict=True):
-            for fault in texture.recording_faults(samples):
-                warn(f"{file}: {fault}")
+    window = round(rate_hz * window_ms / 1000.0) if arguments.method == "default" else 0
+    for file, samples in ((f, r) for name in files for f, r in zip(files[name], recordings[name], strict=True)):
+        if len(samples) < window:
+            text = (
+                f"{len(samples)} samples; no window of the model will be longer, though --window-ms asks for {window}"
+            )
+            warn(f"{file}: {text}; remove it, or ask for less")
     try:
         if arguments.method == "default":
             with tqdm(total=1, desc="train", bar_format="{desc} {bar} {percentage:3.0f} %", disable=None) as bar:
@@ -114,11 +117,17 @@ def classify(arguments) -> int:
 
 
 def decisions(arguments, model, path, window_ms: float) -> list:
-    t_s, samples = texture.read_recording(path, getattr(model, "columns", None))
+    """Of one recording; its faults are warned of."""
+    t_s, samples = texture.read_recording(path, getattr(model, "columns", None), warn)
     if samples.shape[1] != model.channels:
         text = f"{samples.shape[1]} channels, but the model has {model.channels}; use recordings of the same sensor"
         raise TableError(path, 1, text)
-    return texture.classify(model, t_s, samples, window_ms, arguments.sequential)
+    for fault in texture.rate_faults(t_s, model.rate_hz) if hasattr(model, "rate_hz") else ():
+        warn(f"{path}: {fault}")
+    found = texture.classify(model, t_s, samples, window_ms, arguments.sequential)
+    if not found:
+        warn(f"{path}: {len(samples)} samples and no decision; give a longer recording, or a shorter --window-ms")
+    return found
 
 
 def classify_folder(arguments, model, window_ms: float) -> int:

@@ -1,7 +1,9 @@
 """Floor texture: the stationary naive Bayes classifier (paper, equation 1), recordings, and decisions of any model."""
 
 import json
+from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +25,16 @@ LOOKS = 8  # ... looking so often in a window ...
 PATIENCE = 4  # ... and giving up after so many windows
 GAP_PERIODS = 4.0  # a longer step of the time column is a gap: no window reaches across it
 STOPPED_MOST = 0.01  # share of a channel's samples at a stop of the sensor that is worth a word
+STUCK_LEAST, STUCK_MOST = 16, 0.25  # samples, and share of a recording, that one value may last
+NO_DIGITS = str.maketrans("", "", "0123456789")
 RATES_APART = 0.1  # relative: recordings to be learnt together are sampled alike
+
+
+Warn = Callable[[str], object]
+
+
+def ignore(line: str) -> None:
+    """A fault that nobody asked for."""
 
 
 class TextureModel:
@@ -201,13 +212,22 @@ def _channels(path, columns) -> list[str]:
     return channels
 
 
-def read_recording(path, order: list[str] | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """One CSV recording -> t_s (n,), channels (n, axes). TableError for the channels of `order` in another order."""
+def read_recording(path, order: list[str] | None = None, warn: Warn = ignore) -> tuple[np.ndarray, np.ndarray]:
+    """One CSV recording -> t_s (n,), channels (n, axes). TableError for the channels of `order` in another order.
+
+    `warn(line)` is called with each fault that does not keep it from being read."""
     text = read_columns(path, required=["t_s"])
     channels = _channels(path, text)
     if order and channels != order and sorted(channels) == sorted(order):
         raise TableError(path, 1, f"columns {', '.join(channels)}; give {', '.join(order)}, as in training")
-    return numbers(text["t_s"]), np.column_stack([numbers(text[name]) for name in channels])
+    t_s, samples = numbers(text["t_s"]), np.column_stack([numbers(text[name]) for name in channels])
+    if len(t_s) > 1 and not (np.diff(t_s[np.isfinite(t_s)]) > 0).any():
+        raise TableError(path, 1, "column 't_s' never increases; give each row its time in seconds")
+    if order and channels != order and len(channels) == len(order):
+        warn(f"{path}: columns {', '.join(channels)} taken for {', '.join(order)}")
+    for fault in recording_faults(samples, t_s):
+        warn(f"{path}: {fault}")
+    return t_s, samples
 
 
 def read_folder(path) -> dict[str, list[np.ndarray]]:
@@ -215,22 +235,47 @@ def read_folder(path) -> dict[str, list[np.ndarray]]:
     return read_training(path)[0]
 
 
-def read_training(path) -> tuple[dict[str, list[np.ndarray]], float]:
-    """One folder per surface, one CSV per recording -> channels by class, and the sampling rate (Hz)."""
+def read_training(path, warn: Warn = ignore) -> tuple[dict[str, list[np.ndarray]], float]:
+    """One folder per surface, one CSV per recording -> channels by class, and the sampling rate (Hz).
+
+    `warn(line)` is called with each fault of a recording that training goes on in spite of."""
     files = surface_files(path)
     if len(files) < 2:
         text = f"{len(files)} surface folder(s); give at least two folders, one per surface, with CSV recordings"
         raise TableError(path, None, text)
-    order = channel_names(next(iter(files.values()))[0])
-    read = {name: [read_recording(file, order) for file in some] for name, some in files.items()}
-    widths = {channels.shape[1] for group in read.values() for _, channels in group}
-    if len(widths) != 1:
-        raise TableError(path, None, f"recordings have {sorted(widths)} channels; give all the same columns")
-    periods = [sample_period(t_s) for group in read.values() for t_s, _ in group]
-    if max(periods) > (1.0 + RATES_APART) * min(periods):
-        text = f"recordings are sampled at {1 / max(periods):.4g} to {1 / min(periods):.4g} Hz; give one rate"
-        raise TableError(path, None, text)
-    return {name: [channels for _, channels in group] for name, group in read.items()}, 1.0 / float(np.median(periods))
+    order, periods, found = channel_names(next(iter(files.values()))[0]), {}, {}
+    for name, file in ((name, file) for name, some in files.items() for file in some):
+        t_s, samples = read_recording(file, order, warn)
+        if samples.shape[1] != len(order):
+            text = f"{samples.shape[1]} channels; give the {len(order)} of the first recording: {', '.join(order)}"
+            raise TableError(file, 1, text)
+        if np.isfinite(samples).all(axis=1).sum() < lib.NAV_TEXTURE_LENGTH_MIN:
+            text = f"{len(samples)} rows, hardly any with numbers in all channels; record some seconds, or remove it"
+            raise TableError(file, None, text)
+        found.setdefault(name, []).append(samples)
+        periods[file] = sample_period(t_s)
+    slow, fast = max(periods, key=periods.get), min(periods, key=periods.get)
+    if periods[slow] > (1.0 + RATES_APART) * periods[fast]:
+        text = f"recordings are sampled at {1 / periods[slow]:.4g} to {1 / periods[fast]:.4g} Hz; give one rate"
+        raise TableError(path, None, f"{text} ({slow.relative_to(path)}, {fast.relative_to(path)})")
+    few = [name for name, some in files.items() if len(some) == 1]
+    if few:
+        warn(f"{path}: one recording of {', '.join(few)}: figures held out are of parts of it; give three or more")
+    for one, other in combinations(files, 2):
+        if _a_letter_apart(one, other):
+            warn(f"{path}: folders '{one}' and '{other}' differ by a letter; if they are one surface, use one name")
+    return found, 1.0 / float(np.median(list(periods.values())))
+
+
+def _a_letter_apart(one: str, other: str) -> bool:
+    """Whether a letter is left out, added or another, or two change places; numbers tell surfaces apart."""
+    short, long = sorted((one.casefold(), other.casefold()), key=len)
+    if short.translate(NO_DIGITS) == long.translate(NO_DIGITS):
+        return False
+    if len(short) < len(long):
+        return any(long[:i] + long[i + 1 :] == short for i in range(len(long)))
+    apart = [(a, b) for a, b in zip(short, long, strict=True) if a != b]
+    return len(apart) == 1 or (len(apart) == 2 and apart[0] == apart[1][::-1])
 
 
 def surface_files(path) -> dict[str, list[Path]]:
@@ -238,7 +283,9 @@ def surface_files(path) -> dict[str, list[Path]]:
 
     TableError for a folder without recordings, and for two that differ in upper and lower case only.
     """
-    visible = [p for p in sorted(Path(path).iterdir()) if not p.name.startswith(".")] if Path(path).is_dir() else []
+    if not Path(path).is_dir():
+        raise TableError(path, None, "no such folder; give one with a folder per surface, with CSV recordings")
+    visible = [p for p in sorted(Path(path).iterdir()) if not p.name.startswith(".")]
     files = {s.name: [f for f in sorted(s.glob("*.csv")) if f.name[0] != "."] for s in visible if s.is_dir()}
     spelt: dict[str, str] = {}
     for name, some in files.items():
@@ -251,21 +298,43 @@ def surface_files(path) -> dict[str, list[Path]]:
     return files
 
 
-def recording_faults(samples: np.ndarray) -> list[str]:
-    """What training will not learn from: rows that are not finite, channels that never change or sit at a sensor's stop."""
+def recording_faults(samples: np.ndarray, t_s: np.ndarray | None = None) -> list[str]:
+    """What is wrong with a recording: rows that are not finite, times that do not increase, channels that never change,
+    keep one value for long or sit at a sensor's stop."""
     samples = _counts(samples, "recording")
     finite = samples[np.isfinite(samples).all(axis=1)]
     found = [f"{len(samples) - len(finite)} of {len(samples)} rows are not finite and left out"]
     found = found if len(finite) < len(samples) else []
+    known = np.zeros(0) if t_s is None else t_s[np.isfinite(t_s)]
+    late = 0 if t_s is None else len(t_s) - len(known) + int((np.diff(known) <= 0).sum())
+    found += [f"{late} of {len(samples)} times are no number or not after the one before"] if late else []
     low, high = SENSOR_STOPS
     counts = np.array_equal(finite, np.round(finite)) and bool(((finite >= low) & (finite <= high)).all())
-    for c, channel in enumerate(finite.T, start=1):
-        stopped = np.isin(channel, SENSOR_STOPS).mean() if counts and len(channel) else 0.0
-        if len(channel) > 1 and (channel == channel[0]).all():
+    for c, channel in enumerate(finite.T if len(finite) > 1 else (), start=1):
+        stopped = np.isin(channel, SENSOR_STOPS).mean() if counts else 0.0
+        run = longest_run(channel)
+        if run == len(channel):
             found.append(f"channel {c} never changes")
         elif stopped > STOPPED_MOST:
             found.append(f"channel {c} is at its stop in {100 * stopped:.0f} % of its samples")
+        elif run > max(STUCK_LEAST, STUCK_MOST * len(channel)):
+            found.append(f"channel {c} keeps one value for {run} of its {len(channel)} samples")
     return found
+
+
+def rate_faults(t_s: np.ndarray, trained_hz: float) -> list[str]:
+    """That a recording is sampled at another rate than those of training."""
+    rate_hz = 1.0 / sample_period(t_s)
+    apart = len(t_s) > 1 and not 1.0 - RATES_APART < rate_hz / trained_hz < 1.0 + RATES_APART
+    return (
+        [f"sampled at {rate_hz:.4g} Hz, the model's recordings at {trained_hz:.4g} Hz; give one rate"] if apart else []
+    )
+
+
+def longest_run(x: np.ndarray) -> int:
+    """Of equal samples."""
+    changes = np.flatnonzero(np.diff(x)) + 1
+    return int(np.diff(np.concatenate([[0], changes, [len(x)]])).max())
 
 
 def sample_period(t_s: np.ndarray) -> float:

@@ -7,6 +7,7 @@ import numpy as np
 
 from .change import fit_change
 from .fit import Fitted, Windows, fit
+from .model import longest_run
 from .novelty import fit_novelty
 from .spectral import HAZARD, SENSOR_STOPS, SpectralModel, forward
 
@@ -123,7 +124,7 @@ def _limits(parts: list) -> dict[str, np.ndarray]:
         everything = np.concatenate(channel)
         outstanding = np.concatenate([_outstanding(x) for x in channel])
         found["spike"].append(SPIKE_OVER * np.quantile(outstanding, 0.999) + 4 * _step(everything))
-        found["still"].append(max(STILL_LEAST, STILL_OVER * max(map(_longest_run, channel))))
+        found["still"].append(max(STILL_LEAST, STILL_OVER * max(map(longest_run, channel))))
         counts = np.array_equal(everything, np.round(everything)) and everything.min() > SENSOR_STOPS[0]
         counts = counts and everything.max() < SENSOR_STOPS[1]
         low, high = SENSOR_STOPS if counts else (-NO_STOP, NO_STOP)
@@ -136,11 +137,6 @@ def _outstanding(x: np.ndarray) -> np.ndarray:
     """How far each sample stands out to one side of both its neighbours."""
     before, after = x[1:-1] - x[:-2], x[1:-1] - x[2:]
     return np.where(before * after > 0, np.minimum(abs(before), abs(after)), 0.0)
-
-
-def _longest_run(x: np.ndarray) -> int:
-    changes = np.flatnonzero(np.diff(x)) + 1
-    return int(np.diff(np.concatenate([[0], changes, [len(x)]])).max())
 
 
 def _widest(parts: list, length: int) -> np.ndarray:
