@@ -31,9 +31,18 @@ static struct nav_contact_filter_config settings(void)
                                               .speed_sd = 0.15,
                                               .speed_drift = 0.005,
                                               .moving = 0.1,
+                                              .caught = 0.02,
+                                              .other = 0.1,
                                               .sample_s = TICK,
                                               .block = 20,
                                               .report = 2};
+}
+
+static struct nav_contact_filter_config without_friction(void)
+{
+    struct nav_contact_filter_config smooth = settings();
+    smooth.friction = smooth.friction_sd = 0.0;
+    return smooth;
 }
 
 /* Base moment in uN m of a clamped whisker, 2.5 GPa (elastica by shooting, and by a chain of 400 links). */
@@ -216,9 +225,7 @@ static void a_gain_that_is_off_is_within_the_deviation(void **state)
 static void a_cylinder_gives_its_contour_and_normal(void **state)
 {
     (void)state;
-    struct nav_contact_filter_config smooth = settings();
-    smooth.friction = smooth.friction_sd = 0.0;
-    struct nav_contact_filter f = filter_of(smooth);
+    struct nav_contact_filter f = filter_of(without_friction());
     struct course c = {{0.1, -0.05, 0.05, 0.0, 1.0}, {0.0, -0.1, 0.0}, {0}, 1, 31, 0.0};
     drive(&f, &c, 480, 0);
     struct nav_contact_answer a;
@@ -366,7 +373,8 @@ static struct nav_contact_filter at_the_tip(double away)
     part->s[FIRST] = 0.2 + 90 * DEGREE - atan(0.3) + 0.01 * away;
     part->p[FIRST][FIRST] = 1e-4;
     part->p[SLOPE][SLOPE] = part->p[FRICTION][FRICTION] = 1e-12;
-    f.parts = 1;
+    f.part[1] = (struct nav_contact_part){.other = true, .log_weight = -30.0};
+    f.parts = 2;
     f.side = 1.0;
     nav_contact_bank_step(&f, &still);
     return f;
@@ -376,8 +384,8 @@ static void the_part_of_a_hypothesis_beyond_the_tip_goes_over_to_the_shaft(void 
 {
     (void)state;
     struct nav_contact_filter f = at_the_tip(0.0);
-    assert_int_equal(f.parts, 2);
-    const struct nav_contact_part *stays = &f.part[0], *goes = &f.part[1];
+    assert_int_equal(f.parts, 3);
+    const struct nav_contact_part *stays = &f.part[0], *goes = &f.part[2];
     assert_true(stays->tip && !goes->tip);
     assert_near(exp(stays->log_weight), 0.5, 1e-3);
     assert_near(exp(goes->log_weight), 0.5, 1e-3);
@@ -385,35 +393,94 @@ static void the_part_of_a_hypothesis_beyond_the_tip_goes_over_to_the_shaft(void 
     assert_near(stays->s[FIRST], 0.2 + 90 * DEGREE - atan(0.3) + 0.01 * 0.798, 1e-5); /* a half normal's mean ... */
     assert_near(stays->p[FIRST][FIRST], 1e-4 * 0.363, 1e-6);                          /* ... and variance */
     f = at_the_tip(3.0);
-    assert_true(f.parts == 1 && f.part[0].tip);
+    assert_true(f.parts == 2 && f.part[0].tip);
     f = at_the_tip(-3.0);
-    assert_true(f.parts == 1 && !f.part[0].tip);
+    assert_true(f.parts == 2 && !f.part[0].tip && !f.part[0].other);
     f = at_the_tip(1.0);
-    assert_int_equal(f.parts, 2);
-    assert_near(exp(f.part[1].log_weight), 0.1587, 1e-3);
+    assert_int_equal(f.parts, 3);
+    assert_near(exp(f.part[2].log_weight), 0.1587, 1e-3);
 }
 
-static void a_push_along_the_whisker_says_so(void **state)
+/* Tilts of a whisker that buckles: they jump to and fro while the base moves on. */
+static void what_no_hypothesis_explains_is_none_of_them(void **state)
 {
     (void)state;
+    struct nav_contact_filter f = filter();
     struct nav_contact_answer a;
-    struct nav_contact_filter f = at_the_tip(40.0);
+    uint32_t seed = 23;
+    for (int i = 0; i < 400; i++) {
+        double t = i * TICK, tilt = 0.02 + 0.3 * t + 0.02 * sin(30.0 * t) * sin(30.0 * t);
+        const double base[3] = {0.05, -0.001, 0.0}, felt[2] = {tilt + NOISE * noise(&seed), 0.0};
+        nav_contact_filter_update(&f, base, felt, true);
+    }
     nav_contact_filter_answer(&f, &a);
-    assert_true(a.head_on < 1e-6);
-    f.part[0].s[FIRST] = NAV_BEAM_DIRECTION; /* half of it beyond the table */
-    nav_contact_bank_step(&f, &(struct nav_contact_step){.seconds = 0.01, .tilt = NAN, .variance = 1e-9});
-    f.part[0].s[FIRST] = 2.0; /* it was so, and stays in doubt */
-    nav_contact_bank_step(&f, &(struct nav_contact_step){.seconds = 0.01, .tilt = NAN, .variance = 1e-9});
+    assert_true(a.other > 0.5 && a.tip < 0.5);
+}
+
+/* A corner under the shaft is pressed, let go and pressed again 3 mm on; the gap between says nothing new of it. */
+static void an_object_is_followed_over_a_gap(void **state)
+{
+    (void)state;
+    const double place = 0.1, speed = 0.05;
+    struct nav_contact_filter f = filter_of(without_friction());
+    struct nav_contact_answer a, b;
+    uint32_t seed = 29;
+    double deep = 0.0;
+    for (int i = 0; i < 2000; i++) {
+        double way = i < 300 ? speed : i < 800 ? -speed : speed;
+        deep += way * TICK;
+        double slope = 0.0, tilt = 0.0;
+        struct nav_contact_bend bend = {0};
+        for (int n = 0; n < 30 && deep > 0.0; n++) {
+            nav_contact_beam_shaft(&beam, place / CONE, slope, 0.0, &bend);
+            tilt = bend.moment / 3.0;
+            slope += (deep / CONE - bend.y - tilt * bend.x) / (bend.by[1][1] + bend.by[1][2] / 3.0 * bend.x);
+        }
+        const double base[3] = {0.0, -way, 0.0}, felt[2] = {tilt + NOISE * noise(&seed), 0.0};
+        nav_contact_filter_update(&f, base, felt, true);
+        if (i == 300)
+            nav_contact_filter_answer(&f, &a);
+        if (i == 900)
+            assert_true(f.parts > 1);
+    }
+    nav_contact_filter_answer(&f, &b);
+    assert_int_equal(f.restarts, 0);
+    assert_true(b.tip < 0.1 && b.other < 0.1);
+    assert_near(b.arc_m, place, 4e-3);
+    assert_true(b.arc_sd_m < a.arc_sd_m);
+}
+
+/* A turn that draws the shaft along the object leaves it where it is on the shaft: it goes along. */
+static void a_corner_that_goes_along_with_the_shaft_is_caught(void **state)
+{
+    (void)state;
+    const double place = 0.1, turn = 0.13;
+    struct nav_contact_filter f = filter_of(without_friction());
+    uint32_t seed = 31;
+    for (int i = 0; i < 1200; i++) {
+        struct nav_contact_bend bend = {0};
+        double slope = 0.0, tilt = 0.0, angle = turn * (i + 1) * TICK;
+        for (int n = 0; n < 30; n++) {
+            nav_contact_beam_shaft(&beam, place / CONE, slope, 0.0, &bend);
+            tilt = bend.moment / 3.0;
+            slope += (angle - atan2(bend.y, bend.x) - tilt) * bend.x / (bend.by[1][1] + bend.by[1][2] / 3.0 * bend.x);
+        }
+        const double base[3] = {-0.02, 0.0, -turn}, felt[2] = {tilt + NOISE * noise(&seed), 0.0};
+        nav_contact_filter_update(&f, base, felt, true);
+    }
+    double caught = 0.0;
+    struct nav_contact_answer a;
+    for (int i = 0; i < f.parts; i++)
+        caught += f.part[i].caught ? exp(f.part[i].log_weight) : 0.0;
     nav_contact_filter_answer(&f, &a);
-    assert_near(a.head_on, 0.5, 1e-3);
+    assert_true(caught > 0.9 && a.sweep < 0.1);
+    assert_near(a.arc_m, place, 3e-3);
 }
 
 static void a_surface_tells_its_curvature(void **state)
 {
     (void)state;
-    struct nav_contact_filter_config smooth = settings();
-    smooth.friction = smooth.friction_sd = 0.0;
-    struct nav_contact_filter f = filter_of(smooth);
+    struct nav_contact_filter f = filter_of(without_friction());
     struct course c = {{0.1, -0.05, 0.05, 0.0, 1.0}, {0.0, -0.1, 0.0}, {0}, 1, 31, 0.0};
     drive(&f, &c, 480, 0);
     struct nav_contact_answer a;
@@ -437,7 +504,9 @@ int main(void)
         cmocka_unit_test(an_object_that_moves_is_told_with_its_speed),
         cmocka_unit_test(a_face_under_the_tip_gives_its_normal),
         cmocka_unit_test(the_part_of_a_hypothesis_beyond_the_tip_goes_over_to_the_shaft),
-        cmocka_unit_test(a_push_along_the_whisker_says_so),
+        cmocka_unit_test(what_no_hypothesis_explains_is_none_of_them),
+        cmocka_unit_test(an_object_is_followed_over_a_gap),
+        cmocka_unit_test(a_corner_that_goes_along_with_the_shaft_is_caught),
         cmocka_unit_test(a_surface_tells_its_curvature),
         cmocka_unit_test(bad_samples_are_counted_and_not_read),
         cmocka_unit_test(whatever_comes_the_answers_are_finite),

@@ -22,13 +22,24 @@ enum { CORNERS = 14, ROUNDS = 8, NORMALS = 5 };
 #define QUARTER 1.57079632679489661923
 #define LEAST_LOG_WEIGHT -9.0
 #define TINY 1e-300
+#define LEAST_TOUCH 4.0 /* standard deviations of a block's tilt from which something is felt */
+enum { TILT, RATE };    /* state of the hypothesis that none of the others holds; rad, rad per cone of the base's way */
+#define RATE_FIRST 0.4  /* mean and standard deviation of the rate, and its random walk per root of a cone */
+#define RATE_DRIFT 1.0
 #define SAME 0.3 /* distance in standard deviations at which two hypotheses are one */
 
 enum { N = NAV_CONTACT_STATES };
+static const int COLUMN[3] = {FIRST, SLOPE, FRICTION}; /* of what nav_contact_look derives by */
 
 static double square(double x)
 {
     return x * x;
+}
+
+/* Variance of a block's tilt about what a hypothesis has it. */
+static double bank_noise_of(const struct nav_contact_filter *f, const struct nav_contact_step *step)
+{
+    return step->variance + 0.5 * f->ring;
 }
 
 /* Slope at which a hypothesis' tilt is this. */
@@ -49,33 +60,32 @@ static bool bank_slope(const struct nav_contact_filter *f, struct nav_contact_pa
     return false;
 }
 
-static void bank_add(struct nav_contact_filter *f, const struct nav_contact_step *step, bool tip, bool corner,
-                     bool moving, double first, double spread, double weight)
+/* Adds a hypothesis like `kind`. */
+static void bank_add(struct nav_contact_filter *f, const struct nav_contact_step *step,
+                     const struct nav_contact_part *kind, double first, double spread, double weight)
 {
     if (f->parts >= NAV_CONTACT_PARTS || weight <= 0.0)
         return;
     const struct nav_contact_filter_config *c = &f->config;
     struct nav_contact_part *part = &f->part[f->parts];
     struct nav_contact_look look;
-    memset(part, 0, sizeof *part);
-    part->tip = tip;
-    part->corner = corner;
-    part->moving = moving;
+    *part = *kind;
     part->log_weight = log(weight);
     part->grip = 1.0;
     part->s[FIRST] = first;
     part->s[FRICTION] = c->friction;
-    part->s[ROUND] = tip || corner ? 0.0 : SHAFT_CURVATURE * c->cone_m;
-    if (tip)
+    part->s[ROUND] = part->tip || part->corner ? 0.0 : SHAFT_CURVATURE * c->cone_m;
+    if (part->tip)
         part->s[FIRST] += atan(c->friction);
     if (!bank_slope(f, part, step->tilt) || !nav_contact_look(f, part, &look))
         return;
     double lean = -look.tilt_by[FIRST] / look.tilt_by[SLOPE];
     part->p[FIRST][FIRST] = square(spread);
     part->p[FIRST][SLOPE] = part->p[SLOPE][FIRST] = lean * square(spread);
-    part->p[SLOPE][SLOPE] = square(lean * spread) + (step->variance + 0.5 * f->ring) / square(look.tilt_by[SLOPE]);
-    part->p[ROUND][ROUND] = corner ? 0.0 : square((tip ? TIP_CURVATURE_SD : SHAFT_CURVATURE_SD) * c->cone_m);
-    part->p[SPEED_X][SPEED_X] = part->p[SPEED_Y][SPEED_Y] = moving ? square(c->speed_sd / c->cone_m) : 0.0;
+    part->p[SLOPE][SLOPE] = square(lean * spread) + bank_noise_of(f, step) / square(look.tilt_by[SLOPE]);
+    part->p[ROUND][ROUND] =
+        part->corner ? 0.0 : square((part->tip ? TIP_CURVATURE_SD : SHAFT_CURVATURE_SD) * c->cone_m);
+    part->p[SPEED_X][SPEED_X] = part->p[SPEED_Y][SPEED_Y] = part->moving ? square(c->speed_sd / c->cone_m) : 0.0;
     part->p[GAIN][GAIN] = square(c->gain_sd);
     part->p[FRICTION][FRICTION] = square(c->friction_sd);
     part->p[MOTION][MOTION] = square(c->motion_share);
@@ -106,22 +116,37 @@ static void bank_ring(struct nav_contact_filter *f, const struct nav_contact_ste
     f->rate = rate;
 }
 
+/* Adds hypotheses of a kind, evenly from `low` to `high`. */
+static void bank_spread(struct nav_contact_filter *f, const struct nav_contact_step *step,
+                        const struct nav_contact_part *kind, int count, double low, double high, double share)
+{
+    double apart = (high - low) / count;
+    for (int i = 0; i < count; i++)
+        bank_add(f, step, kind, low + (i + 0.5) * apart, SPREAD * apart, share / count);
+}
+
 void nav_contact_bank_begin(struct nav_contact_filter *f, const struct nav_contact_step *step)
 {
-    double corner = (f->beam->tip - LEAST_ARC) / CORNERS, round = (f->beam->tip - LEAST_ARC) / ROUNDS;
+    const struct nav_contact_filter_config *c = &f->config;
+    double tip = f->beam->tip;
     f->parts = 0;
-    f->head_on = 0.0;
     bank_ring(f, step);
     for (int moving = 0; moving < 2; moving++) {
-        double share = (moving ? f->config.moving : 1.0 - f->config.moving) / 3.0;
-        for (int i = 0; i < CORNERS; i++)
-            bank_add(f, step, false, true, moving, LEAST_ARC + (i + 0.5) * corner, SPREAD * corner, share / CORNERS);
-        for (int i = 0; i < ROUNDS; i++)
-            bank_add(f, step, false, false, moving, LEAST_ARC + (i + 0.5) * round, SPREAD * round, share / ROUNDS);
-        for (int i = 0; i < NORMALS; i++)
-            bank_add(f, step, true, false, moving, FIRST_NORMAL + (i + 0.5) * NORMAL_STEP, SPREAD * NORMAL_STEP,
-                     share / NORMALS);
+        double share = (moving ? c->moving : 1.0 - c->moving - c->caught - c->other) / 3.0;
+        struct nav_contact_part corner = {.corner = true, .moving = moving};
+        struct nav_contact_part round = {.moving = moving}, end = {.tip = true, .moving = moving};
+        bank_spread(f, step, &corner, CORNERS, LEAST_ARC, tip, share);
+        bank_spread(f, step, &round, ROUNDS, LEAST_ARC, tip, share);
+        bank_spread(f, step, &end, NORMALS, FIRST_NORMAL, FIRST_NORMAL + NORMALS * NORMAL_STEP, share);
     }
+    struct nav_contact_part caught = {.corner = true, .caught = true};
+    bank_spread(f, step, &caught, CORNERS, LEAST_ARC, tip, c->caught);
+    struct nav_contact_part other = {.other = true, .log_weight = log(c->other), .s[TILT] = step->tilt};
+    other.s[RATE] = RATE_FIRST;
+    other.p[TILT][TILT] = bank_noise_of(f, step);
+    other.p[RATE][RATE] = square(RATE_FIRST);
+    if (c->other > 0.0)
+        f->part[f->parts++] = other;
     bank_normalise(f);
 }
 
@@ -147,13 +172,18 @@ static void bank_carry(nav_contact_square p, nav_contact_square by)
     bank_multiply(by, half, p);
 }
 
+/* How far the base moves the tip, cones. */
+static double bank_path(const struct nav_contact_filter *f, const struct nav_contact_step *step)
+{
+    return hypot(step->moved[0], step->moved[1]) / f->config.cone_m + fabs(step->turned) * f->beam->tip;
+}
+
 /* Blocks of the base's motion differ by a share; a moving object's velocity wanders. */
 static void bank_noise(const struct nav_contact_filter *f, const struct nav_contact_step *step,
                        struct nav_contact_part *part, nav_contact_square by)
 {
     const struct nav_contact_filter_config *c = &f->config;
-    double path = hypot(step->moved[0], step->moved[1]) / c->cone_m + fabs(step->turned) * f->beam->tip;
-    double variance = square(c->motion_share * path / step->seconds);
+    double variance = square(c->motion_share * bank_path(f, step) / step->seconds);
     for (int i = 0; i < 2; i++)
         for (int j = 0; j < 2; j++)
             part->p[i][j] += variance * (by[i][SPEED_X] * by[j][SPEED_X] + by[i][SPEED_Y] * by[j][SPEED_Y]);
@@ -176,34 +206,48 @@ static double bank_variance(const struct nav_contact_part *part, const double by
     return v;
 }
 
-/* The hypothesis given that what has this variance and covariance with it is `off` more, and how much variance it
- * loses. */
-static void bank_given(struct nav_contact_part *part, const double with[N], double v, double off, double lost)
+/* The hypothesis given that what has this covariance with it is `off` variances more, and how much of them it loses. */
+static void bank_given(struct nav_contact_part *part, const double with[N], double off, double lost)
 {
     for (int i = 0; i < N; i++) {
-        part->s[i] += with[i] / v * off;
+        part->s[i] += with[i] * off;
         for (int j = 0; j < N; j++)
-            part->p[i][j] -= lost * with[i] * with[j] / (v * v);
+            part->p[i][j] -= lost * with[i] * with[j];
     }
+}
+
+/* Tilt that a hypothesis has, and its derivative by the state. Where there is a gap and nothing is felt, nothing is
+ * learned. false: no such contact. */
+static bool bank_tilt(const struct nav_contact_filter *f, const struct nav_contact_step *step,
+                      const struct nav_contact_part *part, double noise, double *tilt, double by[N])
+{
+    struct nav_contact_look look;
+    by[TILT] = 1.0;
+    *tilt = part->s[TILT];
+    if (part->other)
+        return true;
+    if (!nav_contact_look(f, part, &look))
+        return false;
+    double gain = exp(part->s[GAIN]);
+    bool gap = look.tilt < 0.0 && square(step->tilt - part->creep) < square(LEAST_TOUCH) * noise;
+    *tilt = gain * ((gap ? 0.0 : look.tilt) + part->creep);
+    for (int k = 0; k < 3; k++)
+        by[COLUMN[k]] = gap ? 0.0 : gain * look.tilt_by[k];
+    by[GAIN] = *tilt;
+    return true;
 }
 
 /* The measured tilt; false: it is refuted. */
 static bool bank_weigh(const struct nav_contact_filter *f, const struct nav_contact_step *step,
                        struct nav_contact_part *part)
 {
-    struct nav_contact_look look;
-    if (!nav_contact_look(f, part, &look))
+    double noise = bank_noise_of(f, step), tilt, by[N] = {0}, with[N];
+    if (!bank_tilt(f, step, part, noise, &tilt, by))
         return false;
-    double gain = exp(part->s[GAIN]), tilt = gain * (look.tilt + part->creep), by[N] = {0}, with[N];
-    by[FIRST] = gain * look.tilt_by[0];
-    by[SLOPE] = gain * look.tilt_by[1];
-    by[FRICTION] = gain * look.tilt_by[2];
-    by[GAIN] = tilt;
-    double v = bank_variance(part, by, with), off = step->tilt - tilt;
-    double share = v / (v + step->variance + 0.5 * f->ring);
-    part->log_weight -= 0.5 * (off * off * share / v + log(v / share));
-    bank_given(part, with, v, share * off, share * v);
-    return part->s[SLOPE] > 0.0 && isfinite(part->log_weight);
+    double v = noise + bank_variance(part, by, with), off = step->tilt - tilt;
+    part->log_weight -= 0.5 * (off * off / v + log(v));
+    bank_given(part, with, off / v, 1.0 / v);
+    return isfinite(part->log_weight);
 }
 
 /* Share of a Gaussian beyond so many standard deviations. */
@@ -244,7 +288,11 @@ static void bank_turn(const struct nav_contact_filter *f, struct nav_contact_par
 static bool bank_regime(struct nav_contact_filter *f, struct nav_contact_part *part)
 {
     double by[N], with[N];
+    if (part->other)
+        return true;
     part->s[FRICTION] = fmin(fmax(part->s[FRICTION], 0.0), 0.5);
+    if (part->s[SLOPE] < 0.0)
+        return true;
     double margin = bank_margin(f, part, by), v = bank_variance(part, by, with) + TINY;
     double z = margin / sqrt(v), over = bank_beyond(z);
     if (over < LEAST_OVER)
@@ -253,13 +301,13 @@ static bool bank_regime(struct nav_contact_filter *f, struct nav_contact_part *p
         struct nav_contact_part *beyond = &f->part[f->parts++];
         *beyond = *part;
         beyond->log_weight += log(over);
-        bank_given(beyond, with, v, -margin, v);
+        bank_given(beyond, with, -margin / v, 1.0 / v);
         bank_turn(f, beyond);
     }
     if (over > 1.0 - LEAST_OVER)
         return false;
     double hazard = exp(-0.5 * z * z) / sqrt(6.2831853) / (1.0 - over);
-    bank_given(part, with, v, sqrt(v) * hazard, v * hazard * (hazard + z));
+    bank_given(part, with, hazard / sqrt(v), hazard * (hazard + z) / v);
     part->log_weight += log1p(-over);
     return true;
 }
@@ -269,20 +317,25 @@ static bool bank_regime(struct nav_contact_filter *f, struct nav_contact_part *p
 static bool bank_predict(const struct nav_contact_filter *f, const struct nav_contact_step *step,
                          struct nav_contact_part *part)
 {
-    nav_contact_square by;
+    nav_contact_square by = {{0}};
     double slope = part->s[SLOPE];
+    if (part->other) {
+        double path = bank_path(f, step);
+        by[TILT][TILT] = by[RATE][RATE] = 1.0;
+        by[TILT][RATE] = path;
+        part->s[TILT] += path * part->s[RATE];
+        bank_carry(part->p, by);
+        part->p[RATE][RATE] += square(RATE_DRIFT) * path;
+        return true;
+    }
     if (!nav_contact_move(f, step, part, by))
         return false;
     bank_carry(part->p, by);
     bank_noise(f, step, part, by);
     part->p[GAIN][GAIN] += square(f->config.model_share) * fabs(part->s[SLOPE] - slope);
+    if (slope <= 0.0 && part->s[SLOPE] > 0.0) /* from touch to touch, too */
+        part->p[GAIN][GAIN] += square(f->config.gain_sd);
     return true;
-}
-
-/* Probability that the force on the tip points further towards the base than the table goes. */
-static double bank_head_on(const struct nav_contact_part *part)
-{
-    return part->tip ? bank_beyond((NAV_BEAM_DIRECTION - part->s[FIRST]) / (sqrt(part->p[FIRST][FIRST]) + TINY)) : 0.0;
 }
 
 /* Keeps one of the hypotheses, in order. */
@@ -295,16 +348,11 @@ static void bank_keep(struct nav_contact_filter *f, int *kept, int i)
 
 void nav_contact_bank_step(struct nav_contact_filter *f, const struct nav_contact_step *step)
 {
-    double head_on = 0.0;
     int kept = 0;
     bank_ring(f, step);
-    for (int i = 0; i < f->parts; i++) {
-        double beyond = bank_head_on(&f->part[i]);
+    for (int i = 0; i < f->parts; i++)
         if (bank_predict(f, step, &f->part[i]))
             bank_keep(f, &kept, i);
-        head_on += beyond * exp(f->part[i].log_weight);
-    }
-    f->head_on = fmax(f->head_on, head_on);
     f->parts = kept;
     kept = 0;
     for (int i = 0; i < f->parts; i++)
@@ -314,6 +362,8 @@ void nav_contact_bank_step(struct nav_contact_filter *f, const struct nav_contac
     for (int i = kept - 1; i >= 0; i--)
         if (!bank_regime(f, &f->part[i]))
             f->part[i] = f->part[--f->parts];
+    if (f->parts == 1 && f->part[0].other) /* it does not end a contact: all begins anew */
+        f->parts = 0;
     bank_normalise(f);
     f->driven_m += hypot(step->moved[0], step->moved[1]);
     f->turned_m += fabs(step->turned) * f->beam->tip * f->config.cone_m;
@@ -321,7 +371,8 @@ void nav_contact_bank_step(struct nav_contact_filter *f, const struct nav_contac
 
 static bool bank_same(const struct nav_contact_part *a, const struct nav_contact_part *b)
 {
-    if (a->tip != b->tip || a->corner != b->corner || a->moving != b->moving || a->grip * b->grip < 0.0)
+    if (a->other || b->other || a->tip != b->tip || a->corner != b->corner || a->moving != b->moving ||
+        a->caught != b->caught || a->grip * b->grip < 0.0)
         return false;
     for (int k = 0; k < N; k++)
         if (!(square(a->s[k] - b->s[k]) <= square(SAME) * fmax(a->p[k][k], b->p[k][k]) + TINY))
@@ -348,7 +399,10 @@ static void bank_prune(struct nav_contact_filter *f)
 {
     double best[2] = {-INFINITY, -INFINITY};
     for (int i = 0; i < f->parts; i++)
-        best[f->part[i].moving] = fmax(best[f->part[i].moving], f->part[i].log_weight);
+        if (f->part[i].other)
+            f->part[i].log_weight = fmax(f->part[i].log_weight, LEAST_LOG_WEIGHT);
+        else
+            best[f->part[i].moving] = fmax(best[f->part[i].moving], f->part[i].log_weight);
     for (int i = f->parts - 1; i >= 0; i--)
         if (f->part[i].log_weight < fmin(LEAST_LOG_WEIGHT, best[f->part[i].moving]))
             f->part[i] = f->part[--f->parts];
@@ -378,7 +432,6 @@ double nav_contact_bank_corner(const struct nav_contact_filter *f, const struct 
 void nav_contact_bank_see(const struct nav_contact_filter *f, const struct nav_contact_part *part, double mean[N],
                           nav_contact_square cov)
 {
-    static const int COLUMN[3] = {FIRST, SLOPE, FRICTION};
     struct nav_contact_look look;
     double cone = f->config.cone_m;
     nav_contact_square by = {{0}};

@@ -184,16 +184,16 @@ bool nav_contact_beam_shaft(const struct nav_contact_beam *beam, double arc, dou
                             struct nav_contact_bend *bend)
 {
     bool inside = beam_hold(&arc, LEAST_ARC, beam->tip);
-    inside = beam_hold(&slope, 0.0, LARGEST_SLOPE) && inside;
+    inside = beam_hold(&slope, -LARGEST_SLOPE, LARGEST_SLOPE) && inside;
     inside = beam_hold(&nu, -TABLE_NU, TABLE_NU) && inside;
     double per_arc = (NAV_BEAM_ARCS - 1) / (beam->tip - LEAST_ARC), per_slope = (NAV_BEAM_SLOPES - 1) / LARGEST_SLOPE;
     struct nav_cubic ci = nav_cubic_at((arc - LEAST_ARC) * per_arc, NAV_BEAM_ARCS);
-    struct nav_cubic cj = nav_cubic_at(slope * per_slope, NAV_BEAM_SLOPES);
+    struct nav_cubic cj = nav_cubic_at(fmax(slope, 0.0) * per_slope, NAV_BEAM_SLOPES);
     float sum[3][NAV_BEAM_VALUES + 3] = {{0}};
     BEAM_SUMS(beam->shaft, NAV_BEAM_VALUES + 3, ci, cj, sum)
     double f[4][FIELDS];
     for (int n = 0; n < FIELDS; n++) {
-        const double scale[3] = {1.0, per_arc, per_slope};
+        const double scale[3] = {1.0, per_arc, slope > 0.0 ? per_slope : 0.0};
         for (int k = 0; k < 3; k++) {
             const float *c = sum[k] + n * POWERS;
             f[k][n] = scale[k] * (c[0] + nu * (c[1] + nu * c[2]));
@@ -209,9 +209,9 @@ bool nav_contact_beam_end(const struct nav_contact_beam *beam, double direction,
 {
     bool inside = beam_hold(&direction, LEAST_DIRECTION, NAV_BEAM_DIRECTION);
     double most = beam_most(direction), most_by = direction - LEAST_LEFT < LARGEST_SLOPE ? 1.0 : 0.0;
-    inside = beam_hold(&slope, 0.0, most) && inside;
+    inside = beam_hold(&slope, -LARGEST_SLOPE, most) && inside;
     double per_direction = (NAV_BEAM_DIRECTIONS - 1) / (NAV_BEAM_DIRECTION - LEAST_DIRECTION);
-    double per_slope = (NAV_BEAM_SLOPES - 1) / most;
+    double per_slope = slope > 0.0 ? (NAV_BEAM_SLOPES - 1) / most : 0.0;
     struct nav_cubic ci = nav_cubic_at((direction - LEAST_DIRECTION) * per_direction, NAV_BEAM_DIRECTIONS);
     struct nav_cubic cj = nav_cubic_at(slope * per_slope, NAV_BEAM_SLOPES);
     float sum[3][4] = {{0}};

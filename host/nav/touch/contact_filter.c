@@ -210,6 +210,10 @@ void nav_contact_filter_answer(const struct nav_contact_filter *f, struct nav_co
         const struct nav_contact_part *part = &f->part[i];
         nav_contact_square cov;
         double mean[N], w = exp(part->log_weight);
+        if (part->other) {
+            a->other = w;
+            continue;
+        }
         nav_contact_bank_see(f, part, mean, cov);
         filter_add(&all, w, mean, cov);
         if (part->moving)
@@ -237,7 +241,6 @@ void nav_contact_filter_answer(const struct nav_contact_filter *f, struct nav_co
     a->normal_rad *= f->side;
     a->plane_rad = atan(f->plane);
     a->plane_sd = sqrt(f->plane_variance) / (1.0 + f->plane * f->plane);
-    a->head_on = f->head_on;
     filter_speed(&moving, a);
     filter_motion(f, a);
 }

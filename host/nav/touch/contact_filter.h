@@ -6,7 +6,8 @@
  * curvature, its velocity, the gain of the sensor, the coefficient of friction and the error of the base's motion.
  * Prediction is geometry: the object's material moves with its velocity less the base's, and the contact follows along
  * the whisker and the surface, sticking while the force lies inside the friction cone and sliding on its edge
- * otherwise. What is measured is the tilt of the plug, which is the moment over the plug's stiffness.
+ * otherwise. What is measured is the tilt of the plug, which is the moment over the plug's stiffness. An object that
+ * the whisker has let go of is followed on: the slope at the contact is then negative, and nothing is bent.
  *
  * Frame of the whisker: origin at the follicle's exit, x along the unbent whisker, y the direction of positive tilt of
  * axis 0; it turns and moves with the base. Plane geometry; the second axis gives the angle of the bending's plane.
@@ -21,7 +22,7 @@
 #include "contact_beam.h"
 
 /* cffi: begin */
-enum { NAV_CONTACT_STATES = 8, NAV_CONTACT_PARTS = 64 };
+enum { NAV_CONTACT_STATES = 8, NAV_CONTACT_PARTS = 80 };
 
 enum nav_contact_motion { NAV_CONTACT_BODY_WHISK, NAV_CONTACT_DRIVE_BY, NAV_CONTACT_SWEEP };
 
@@ -38,7 +39,9 @@ struct nav_contact_filter_config {
     double ring_hz, ring_damping; /* slowest mode of the whisker in contact, damping ratio */
     double speed_sd;              /* of each component of a moving object's velocity, m/s */
     double speed_drift;           /* its random walk, m/s per root of a second */
-    double moving;                /* probability, before anything is seen, that the object moves */
+    double moving;                /* probability, before anything is seen, that the object moves ... */
+    double caught;                /* ... is a corner over which the shaft does not slide ... */
+    double other;                 /* ... or that none of the hypotheses holds */
     double sample_s;              /* interval of samples */
     int block, report;            /* samples in an update; updates in a report */
 };
@@ -46,6 +49,8 @@ struct nav_contact_filter_config {
 /* One hypothesis. */
 struct nav_contact_part {
     bool tip, corner, moving, slips;
+    bool caught; /* the object goes along with the shaft */
+    bool other;  /* none of these: the tilt alone is followed, and its rate over the base's way */
     double log_weight;
     double s[NAV_CONTACT_STATES];
     double p[NAV_CONTACT_STATES][NAV_CONTACT_STATES];
@@ -67,7 +72,6 @@ struct nav_contact_filter {
     double before, rate;            /* tilt of the last block, and its rate */
     double ring;                    /* square of the amplitude of ringing that may be left, rad^2 */
     double plane, plane_variance;   /* tilt of axis 1 over that of axis 0 */
-    double head_on;                 /* see struct nav_contact_answer */
     double turned_m, driven_m;      /* how far the base's turn and its drive have moved the contact */
     uint64_t bad, stuck, saturated; /* samples not read */
     uint64_t restarts;              /* contacts that none of the hypotheses explained */
@@ -84,9 +88,9 @@ struct nav_contact_answer {
     double sweep, corner, tip, slip;        /* probabilities: it moves; its radius is below 5 mm; at the tip; slides */
     double friction, friction_sd;
     double curvature, curvature_sd; /* of the surface, 1/m, a corner's counted as 0 */
-    double head_on; /* largest probability so far of a push along the whisker; from 0.08 on nothing is known */
-    int motion;     /* enum nav_contact_motion */
-    int parts;      /* hypotheses left; 0: no contact yet, and nothing above is known */
+    double other;                   /* probability that none of the hypotheses holds, as of a push along the whisker */
+    int motion;                     /* enum nav_contact_motion */
+    int parts;                      /* hypotheses left; 0: no contact yet, and nothing above is known */
 };
 
 /* The beam must outlive the filter. */

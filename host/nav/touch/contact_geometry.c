@@ -7,7 +7,8 @@ enum { NEWTONS = 6 };
 #define CLOSE 1e-6      /* cones, rad: what Newton's method may leave; the tables have 24 bits */
 #define LEAST_TURN 1e-9 /* of a determinant */
 #define QUARTER 1.57079632679489661923
-#define STILL 2e-6 /* cones: a slide below is none */
+#define STILL 2e-6      /* cones: a slide below is none */
+#define LARGEST_GAP 0.5 /* rad, as a slope: farther away nothing is known of the object */
 
 /* Adds the plug's tilt to a bend of the clamped whisker. */
 static void geometry_tilt(const struct nav_contact_bend *bend, double soft, double creep, struct nav_contact_look *look)
@@ -205,7 +206,7 @@ static bool geometry_solve(const struct problem *p, struct nav_contact_part *par
         double slope = (m[0][0] * e->left[1] - m[1][0] * e->left[0]) / det;
         *(p->held && !part->tip ? &part->grip : &part->s[FIRST]) -= first;
         part->s[SLOPE] -= slope;
-        if (!(part->s[SLOPE] > 0.0) || !isfinite(part->s[FIRST]) || !isfinite(part->grip))
+        if (!(part->s[SLOPE] > -LARGEST_GAP) || !isfinite(part->s[FIRST]) || !isfinite(part->grip))
             return false;
     }
     return false;
@@ -259,31 +260,39 @@ static bool geometry_slide(struct problem *p, struct nav_contact_part *part, dou
     return geometry_solve(p, part, now, e);
 }
 
+/* Sticks or slides, as friction and the motion have it; nothing rubs while there is a gap. false: no such contact. */
+static bool geometry_follow(struct problem *p, struct nav_contact_part *part, double grip, struct nav_contact_look *now,
+                            struct equations *e)
+{
+    const struct nav_contact_part before = *part;
+    if (before.s[SLOPE] <= 0.0)
+        return geometry_slide(p, part, 0.0, now, e);
+    if (grip != 0.0 && geometry_slide(p, part, grip, now, e) && e->slid * grip > -STILL)
+        return true;
+    *part = before;
+    if (geometry_stick(p, part, now, e))
+        return true;
+    bool out = grip == 0.0 ? part->grip > 0.0 : grip < 0.0;
+    *part = before;
+    return geometry_slide(p, part, out ? 1.0 : -1.0, now, e);
+}
+
 bool nav_contact_move(const struct nav_contact_filter *f, const struct nav_contact_step *step,
                       struct nav_contact_part *part, nav_contact_square by)
 {
     struct nav_contact_look old, now;
     struct equations e;
     struct nav_contact_part tried = *part;
+    struct nav_contact_step moved = *step;
     if (!nav_contact_look(f, part, &old))
         return false;
-    tried.creep += fmin(1.0, step->seconds / f->config.creep_s) * (f->config.creep * old.tilt - part->creep);
-    double creep = tried.creep;
-    struct problem p = {f, step, &old, geometry_carry(f, step, part, &old), part->s[FIRST], false};
-    double grip = fabs(part->grip) < 1.0 ? 0.0 : part->grip;
-    bool slides = grip != 0.0 && geometry_slide(&p, &tried, grip, &now, &e) && e.slid * grip > -STILL;
-    if (!slides) {
-        tried = *part;
-        tried.creep = creep;
-        bool held = geometry_stick(&p, &tried, &now, &e);
-        if (!held) {
-            grip = tried.grip > 0.0 && grip == 0.0 ? 1.0 : grip > 0.0 ? -1.0 : grip < 0.0 ? 1.0 : -1.0;
-            tried = *part;
-            tried.creep = creep;
-            if (!geometry_slide(&p, &tried, grip, &now, &e))
-                return false;
-        }
-    }
+    if (part->caught && part->s[SLOPE] > 0.0)
+        moved.moved[0] = 0.0;
+    double share = fmin(1.0, step->seconds / f->config.creep_s);
+    tried.creep += share * (f->config.creep * fmax(old.tilt, 0.0) - part->creep);
+    struct problem p = {f, &moved, &old, geometry_carry(f, &moved, part, &old), part->s[FIRST], false};
+    if (!geometry_follow(&p, &tried, fabs(part->grip) < 1.0 ? 0.0 : part->grip, &now, &e))
+        return false;
     tried.slips = !p.held && fabs(e.slid) > STILL;
     geometry_derivative(&p, part, &e, by);
     double speed[2] = {part->s[SPEED_X], part->s[SPEED_Y]};

@@ -32,7 +32,6 @@ HEADERS = {
             "touch/contact_shape.h",
             "touch/radial.h",
             "touch/radial_whisk.h",
-            "touch/contact_surface.h",
             "touch/contact_beam.h",
             "touch/contact_filter.h",
             "touch/texture_features.h",

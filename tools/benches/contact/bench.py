@@ -54,6 +54,9 @@ def summary(kind: str, found: list[dict]) -> dict:
     if shaped:
         told |= {"normal_rms_deg": rms(late("turn")), "normal_held_90": float(late("turn_inside").mean())}
         told["contour_rms_mm"] = rms(late("contour"))
+        taken = np.concatenate([one["taken"][one["late"]] for one in found])
+        told |= {"taken": float(taken.sum() / (refused + kept)), "taken_rms_deg": rms(late("turn")[taken])}
+        told["taken_within_15"] = float((np.abs(late("turn")[taken]) < 15.0).mean()) if taken.any() else None
     if moves:
         told |= {"speed_median": float(np.median(np.abs(last))), "speed_within_10": float((np.abs(last) < 0.1).mean())}
         told["speed_held_90"] = float(np.mean([one["speed_inside"][-1] for one in found]))

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from whisker.touch.contact_filter import HEAD_ON, ContactFilter
+from whisker.touch.contact_filter import ContactFilter
 
 from .scenes import FRICTION_SD, QUARTER, REACH_M, TICK_S, TIP, Corner, Draw, Plan, Scene, chained, lying, simulated
 
@@ -187,8 +187,8 @@ def follow(case: Case, kind: str, scene: Scene, least: np.ndarray | None) -> dic
     )
     return {
         "after_s": after_s,
-        "late": (after_s >= max(FIRST_S, first_s)) & (told.head_on[use] < HEAD_ON),
-        "refused": (after_s >= max(FIRST_S, first_s)) & (told.head_on[use] >= HEAD_ON),
+        "late": (after_s >= max(FIRST_S, first_s)) & (told.other[use] < 0.5),
+        "refused": (after_s >= max(FIRST_S, first_s)) & (told.other[use] >= 0.5),
         "off": 1e3 * np.hypot(*off.T),
         "stated": 1e3 * np.sqrt(np.trace(told.point_cov[use], axis1=1, axis2=2)),
         "least": least[at] if least is not None else np.full(len(at), np.nan),
@@ -200,6 +200,7 @@ def follow(case: Case, kind: str, scene: Scene, least: np.ndarray | None) -> dic
         "speed_inside": (told.speed[use] - speed) ** 2 < NINETY_1 * told.speed_sd[use] ** 2,
         "motion": np.array(told.motion)[use],
         "corner": told.corner[use],
+        "taken": (told.tip[use] >= 0.9) & (told.sweep[use] < 0.5) & (told.other[use] < 0.5),
         "slip": told.slip[use],
         "slides": slides(scene, at),
         "cost_us": cost_us(held, bases, tilt),

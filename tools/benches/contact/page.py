@@ -13,8 +13,9 @@ the rows that say otherwise; there figures count from 50 ms later on. A contact 
 Figures count from 0.1 s after the touch on. Bases drive at 0.05 to 0.1 m/s or whisk at pi/24 rad/s.
 
 `bound`: the Cramer-Rao bound of the same contact with the same priors (place 30 mm, velocity 0.15 m/s), the kind of contact known.
-`held`: share of the stated 90 % regions that hold the truth. `refused`: share of reports that say that the whisker is pushed along itself
-(`head_on` at least 0.08); they count nowhere else. A chain slides where its force uses 90 % of the friction cone or more; in a body whisk a corner moves
+`held`: share of the stated 90 % regions that hold the truth. `refused`: share of reports that say that none of the hypotheses holds (`other` at
+least 0.5); they count nowhere else. `normals told`: share of reports by which a pilot would take a direction (a tip on a surface that stands, at 90 %
+or more), with its errors. A chain slides where its force uses 90 % of the friction cone or more; in a body whisk a corner moves
 along the shaft by some 0.1 mm/s, and MuJoCo's friction lets that creep inside the cone.
 
 While a corner moves and the base stands, its speed and its place are nearly one unknown: the error's RMS is that of the first 50 ms, and near the bound's.
@@ -78,13 +79,15 @@ def _shapes(found: dict) -> str:
             _percent(one["normal_held_90"]),
             _number(one.get("contour_rms_mm")),
             _percent(1 - one["corner"]),
+            _percent(one["taken"]),
+            _number(one["taken_rms_deg"]),
+            "" if one["taken_within_15"] is None else _percent(one["taken_within_15"]),
         ]
         for kind, one in found.items()
         if "normal_rms_deg" in one
     ]
-    return _table(
-        ["surface", "normal RMS degrees", "held 90 %", "off the surface RMS mm", "probability of a surface"], rows
-    )
+    head = ["surface", "normal RMS degrees", "held 90 %", "off the surface RMS mm", "probability of a surface"]
+    return _table([*head, "normals told", "their RMS degrees", "within 15"], rows)
 
 
 def _speeds(found: dict) -> str:

@@ -17,7 +17,7 @@ from tqdm import tqdm
 
 from whisker import scenes
 from whisker.demo.level1 import explore
-from whisker.demo.training import learn, read_whisks
+from whisker.demo.training import learn
 from whisker.nav import localise
 from whisker.nav.observations import Observations, read_observations, tells_normals
 from whisker.nav.scoring import heading_errors, lock_row, position_errors
@@ -27,7 +27,6 @@ from whisker.robot.rowfiles import Rows
 from whisker.scene import Prior, Scene
 from whisker.scenes.geometry import directions
 from whisker.simulation.scenes import make_scene
-from whisker.touch.radial.model import fit
 
 ROOT = Path(__file__).resolve().parents[3]
 RESULT, PAGE = ROOT / "bench/results/nav_normals.json", ROOT / "docs/results_nav_normals.md"
@@ -64,12 +63,9 @@ def drawn(family: str, seed: int) -> dict:
 
 
 def models(folder: Path, scene: Scene) -> tuple[dict, dict]:
-    """Texture models, and radial ones of whole whisks."""
     if not (folder / "texture.json").exists():
         learn(folder, make_scene(LEARN_SEED)[0], LEARN_SEED, lambda: None)
-    texture, radial = load_models(folder, scene.robot)
-    whisks = {name: read_whisks(folder / "radial" / f"{name}.csv", with_radius=True) for name in radial}
-    return texture, {name: fit(recorded, "whisk").model for name, recorded in whisks.items()}
+    return load_models(folder, scene.robot)
 
 
 def flown(build: Path, seed: int) -> dict:

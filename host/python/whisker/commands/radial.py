@@ -114,7 +114,7 @@ def _follow(arguments, contact: str, at_s: float, told: Reports, k: int) -> None
         made |= {"normal_deg": normal, "normal_sd_deg": normal_sd, "motion": told.motion[k]}
         made |= {
             name: getattr(told, name)[k]
-            for name in ("sweep", "corner", "tip", "slip", "speed", "speed_sd", "curvature", "head_on")
+            for name in ("sweep", "corner", "tip", "slip", "speed", "speed_sd", "curvature", "other")
         }
         print(json.dumps(plain(made)))
         return

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from ..nav import localise
+from ..nav.observations import tells_normals
 from ..pilot.pilot import Pilot
 from ..report.run import FILTERS
 from ..robot.models import load_models
@@ -33,7 +34,7 @@ def study(seed: int, seconds: float, models: Path, mechanics: str = MECHANICS[0]
 
 
 def _localise(name: str, scene: Scene, rows: list[dict]) -> np.ndarray:
-    made = localise.Filter(name, scene)
+    made = localise.Filter(name, scene, normals=tells_normals(rows[0]))
     return np.array([made.step(row).pose for row in rows])
 
 

@@ -12,7 +12,7 @@ from ..scene import Scene
 from ..simulation.world import World, radial_contacts, write_radial_contacts, write_surface_drives, write_surface_sweeps
 from ..touch.contact import REST_SAMPLES, Contact
 from ..touch.floor import centred
-from ..touch.radial.model import RadialModel, peak, read_whisks
+from ..touch.radial.model import RadialModel, fit, peak, read_whisks, save
 from ..touch.texture.model import TextureModel, read_training
 from ..touch.texture.spectral import SpectralModel
 from ..touch.texture.train import train
@@ -36,7 +36,7 @@ def learn(
 ) -> tuple[dict, dict]:
     """All models of the scene's robot, saved in `folder`; `progress()` after each. `method`: texture's, of METHODS.
 
-    Returns radial models by whisker name, and their contacts as `calibrate` does.
+    Returns the paper's lines by whisker name, and their contacts, as `calibrate` does.
     """
     folder.mkdir(parents=True, exist_ok=True)
     train_texture(folder, scene, seed, method)
@@ -84,20 +84,20 @@ def fit_texture(recordings: dict[str, list[np.ndarray]], seed: int) -> TextureMo
 
 
 def calibrate(folder: Path, scene: Scene, name: str, seed: int) -> tuple[RadialModel, dict]:
-    """Whisk one whisker against a corner at known distances: the model, and its contacts, fitted and held out.
+    """Whisk one whisker against a corner at known distances: the pilot's model of whole whisks into the folder.
 
-    Contacts: {"fit", "held out"} -> (radius mm (n,), peak counts (n,)).
+    Returns the paper's line for the report, and the contacts: {"fit", "held out"} -> (radius mm (n,), peak counts (n,)).
     """
     path = folder / "radial" / f"{name}.csv"
     path.parent.mkdir(parents=True, exist_ok=True)
     write_radial_contacts(path, _contacts(scene, name, 2 * seed, FIT_CONTACTS))
-    fit = read_whisks(path, with_radius=True)
-    model = RadialModel.fit(fit.peak_counts, fit.radius_mm)
-    model.save(folder / f"{name}.json")
+    whisks = read_whisks(path, with_radius=True)
+    save(fit(whisks, "whisk").model, folder / f"{name}.json")
     tests = _contacts(scene, name, 2 * seed + 1, HELD_OUT_CONTACTS)
     radii = np.array([contact.radius_mm for contact in tests])
     peaks = np.array([peak(c.counts, np.median(c.counts[: REST_SAMPLES // 4], axis=0)) for c in tests])
-    return model, {"fit": (fit.radius_mm, fit.peak_counts), "held out": (radii, peaks)}
+    line = RadialModel.fit(whisks.peak_counts, whisks.radius_mm)
+    return line, {"fit": (whisks.radius_mm, whisks.peak_counts), "held out": (radii, peaks)}
 
 
 def radial_scores(scene: Scene, models: dict[str, RadialModel], contacts: dict[str, dict]) -> dict:

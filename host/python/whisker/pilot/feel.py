@@ -8,11 +8,12 @@ import numpy as np
 
 from ..scene import Whisker
 from ..touch.contact import Contact
-from ..touch.contact_filter import HEAD_ON, ContactFilter, Reports
+from ..touch.contact_filter import ContactFilter, Reports
 from ..touch.radial.whisk import WhiskModel
 from .states import TICK_S
 
-BLOCKS_BEFORE = 2  # the filter begins so long before the onset: it finds the first touch in the noise itself
+REST_BLOCKS = 2  # that give the rest: creep of an earlier contact may be left in the samples
+BLOCKS_BEFORE = REST_BLOCKS + 4  # the filter begins so long before the onset: it finds the touch in the noise itself
 NOISE_COUNTS = 11.0  # of one sample (whisker.touch.contact)
 LEAST_TICKS = 200  # of a contact, before which the ringing of the touch tells more than the surface
 SURE = 0.9  # probability that the tip is on a surface, from which its normal is told
@@ -54,10 +55,6 @@ class Felt:
     normal_sd: float = math.nan
     face: float = 0.0
 
-    def of_shaft(self) -> "Felt":
-        """The same known to be no tip's: a corner has no normal, and where it is on the shaft the distance tells."""
-        return replace(self, normal=math.nan, normal_sd=math.nan, face=0.0)
-
     def after(self, motion: np.ndarray, tick: int) -> "Felt":
         """The same from where the robot is at `tick`, after this motion."""
         x, y = self.point[0] - motion[0], self.point[1] - motion[1]
@@ -67,7 +64,8 @@ class Felt:
 
 
 class Feeler:
-    """Follows the contacts of one whisker. `felt`: of the present or the last contact; None: nothing is known of it."""
+    """Follows the contacts of one whisker. Of the present or the last one: `felt`, None where nothing is known; `face`, the
+    probability that the tip is on a surface, as it was when the whisker was bent most (nan: not known)."""
 
     def __init__(self, whisker: Whisker, calibrated_turn: float, model: WhiskModel, whisk_rad_s: float):
         """`calibrated_turn`: sign of the turn that pressed it in calibration; `whisk_rad_s`: of calibration."""
@@ -83,24 +81,47 @@ class Feeler:
         )
         self._recent: deque[tuple[np.ndarray, np.ndarray, np.ndarray]] = deque(maxlen=BLOCKS_BEFORE + 1)
         self._onset = -1
+        self._rest: np.ndarray | None = None  # None: no object is followed
         self.felt: Felt | None = None
+        self.face, self._most = math.nan, 0.0
 
     @property
     def not_read(self) -> dict[str, int]:
         return self._filter.not_read
 
-    def block(self, ticks: np.ndarray, samples: np.ndarray, good: np.ndarray, contact: Contact, drives: Drives) -> None:
-        """Take ticks (n,), samples (n, 2) in counts and good (n,), of which `contact` knows already."""
+    def block(
+        self,
+        ticks: np.ndarray,
+        samples: np.ndarray,
+        good: np.ndarray,
+        contact: Contact,
+        drives: Drives,
+        same: bool = False,
+    ) -> None:
+        """Take ticks (n,), samples (n, 2) in counts and good (n,), of which `contact` knows already.
+
+        `same`: what is touched is what was touched before, as in a body whisk; the filter then follows it over the gap.
+        """
         self._recent.append((ticks, samples, good))
-        if not contact.touching:
+        new = contact.touching and contact.onset != self._onset
+        if not contact.touching and not (same and self._rest is not None):
+            self._rest = None
             return
-        if contact.onset != self._onset:
-            self._onset, self.felt = contact.onset, None
+        if new:
+            self._onset, self.felt, self.face, self._most = contact.onset, None, math.nan, 0.0
+        if self._rest is None or (new and not same):
             self._filter.begin()
+            self._rest = _rest(list(self._recent)[:REST_BLOCKS], contact.rest)
             ticks, samples, good = (np.concatenate(part) for part in zip(*self._recent, strict=True))
-        told = self._filter.run(self._bases(drives.at(ticks)), self._tilts(samples - contact.rest), good)
-        if len(told.sample) and ticks[max(told.sample[-1], 0)] >= contact.onset + LEAST_TICKS:
-            self.felt = self._placed(told, ticks) if told.head_on[-1] < HEAD_ON else None
+        tilts = self._tilts(samples - self._rest)
+        told = self._filter.run(self._bases(drives.at(ticks)), tilts, good)
+        if not contact.touching or not len(told.sample) or ticks[max(told.sample[-1], 0)] < contact.onset + LEAST_TICKS:
+            return
+        known = told.other[-1] < 0.5
+        self.felt = self._placed(told, ticks) if known else None
+        bent = abs(float(np.median(tilts[:, 0])))
+        if bent >= self._most:
+            self._most, self.face = bent, float(told.tip[-1]) if known else math.nan
 
     def _bases(self, drives: np.ndarray) -> np.ndarray:
         """(n, 3) motion of the follicle's exit in the filter's frame."""
@@ -119,7 +140,13 @@ class Feeler:
         point = self._base[0] + c * x - s * y, self._base[1] + s * x + c * y
         felt = Felt(int(ticks[max(told.sample[-1], 0)]), point, math.sqrt(np.trace(told.point_cov[-1]) / 2.0))
         face, sd = float(told.tip[-1]), math.hypot(told.normal_sd[-1], MODEL_RAD)
-        if face < SURE or sd > math.pi:
+        if face < SURE or told.sweep[-1] > 0.5:
             return replace(felt, face=face)
         normal = math.remainder(self._yaw + self._out * told.normal_rad[-1], 2.0 * math.pi)
         return replace(felt, normal=normal, normal_sd=sd, face=face)
+
+
+def _rest(blocks: list[tuple[np.ndarray, np.ndarray, np.ndarray]], otherwise: np.ndarray) -> np.ndarray:
+    """Mean (2,) of the good samples of blocks, counts."""
+    samples = np.concatenate([samples[good] for _, samples, good in blocks])
+    return samples.mean(axis=0) if len(samples) else otherwise

@@ -20,7 +20,7 @@ import numpy as np
 from ..scene import NORMAL, POINT, SURFACE
 from ..touch.contact import Contact
 from ..touch.floor import WINDOW_LEAST_GOOD, WINDOW_SAMPLES, floor_whisker
-from ..touch.mount import Mount, retreat
+from ..touch.mount import Mount
 from ..touch.radial.model import Contact as Recorded
 from ..touch.radial.model import WhiskModel, estimate, peak
 from .behaviour import BLOCK_TICKS, EXPLORE_M_S, TICK_S, TURN_RAD_S, Behaviour, Habits, Whisk
@@ -72,9 +72,9 @@ class Pilot:
         self.bad_samples = 0
         self.whisks: list[dict] = []  # every whisk that was pushed to its end: see `_measure`
         self._recent = deque(maxlen=WINDOW_SAMPLES // BLOCK_TICKS)  # of the last 0.1 s: (samples, good) of all lanes
-        # Ticks and samples of the whisker that began the whisk: while backing off, from then on.
-        self._retreat_samples: list[tuple[np.ndarray, np.ndarray]] = []
-        self._whisk_samples: list[tuple[np.ndarray, np.ndarray]] = []
+        self._whisk_samples: list[
+            tuple[np.ndarray, np.ndarray]
+        ] = []  # ticks and samples of the whisker that began the whisk
         self._whisk: Whisk | None = None  # whose they are
         self._silent = dict.fromkeys(self.texture_lanes, 0)  # windows in a row without evidence
         self._measured: dict[int, tuple[int, float]] = {}  # lane: release tick, mm
@@ -94,7 +94,8 @@ class Pilot:
             for lane in self.texture_lanes:
                 self.surfaces[lane].follow(samples[good[:, lane], lane])
         for lane, feeler in self.feelers.items():
-            feeler.block(ticks, samples[:, lane], good[:, lane], self.contacts[lane], self._drives)
+            same = self.behaviour.whisk is not None and self.behaviour.whisk.lane == lane
+            feeler.block(ticks, samples[:, lane], good[:, lane], self.contacts[lane], self._drives, same)
         self._follow_whisk(ticks, samples, good)
         drive = self.behaviour.decide(int(ticks[-1]))
         self._drives.order(self.behaviour.drive_since, drive)
@@ -137,14 +138,10 @@ class Pilot:
         if whisk is not self._whisk:
             self._whisk = whisk
             self._whisk_samples.clear()
-            self._retreat_samples.clear()
-        if whisk is None:
+        if whisk is None or whisk.start < 0:
             return
         use = good[:, whisk.lane]
-        kept = self._retreat_samples if whisk.start < 0 else self._whisk_samples
-        kept.append((ticks[use], samples[use, whisk.lane]))
-        if whisk.start < 0:
-            return
+        self._whisk_samples.append((ticks[use], samples[use, whisk.lane]))
         contact = self.contacts[whisk.lane]
         pushed = whisk.start < contact.onset <= whisk.push_end - self.behaviour.wheels.push_ticks
         if pushed and contact.release > contact.onset and not whisk.measured:
@@ -155,8 +152,8 @@ class Pilot:
         """Tell the distance and what kind of contact it was; after one of the shaft, how the tip gets there.
 
         Of a whisk: whisker, onset and release (ticks), turn, peak_counts, line_mm (the model's own answer), sigma_mm,
-        distance_mm and type ("tip" or "shaft"; None: unsure), tries (whisks before it at the same object), surface (of a
-        tip with a model of whole whisks: `Mount.surface`).
+        distance_mm and type ("tip" or "shaft"; None: unsure), tries (whisks before it at the same object), face (probability
+        that the tip is on a surface, by the contact filter; nan: not known).
         """
         lane, turn = whisk.lane, whisk.direction
         contact, mount, model = self.contacts[lane], self.mounts[lane], self.radial_models[self.names[lane]]
@@ -165,12 +162,10 @@ class Pilot:
         counts = peak(samples[push], contact.rest)
         recorded = Recorded(ticks * TICK_S, samples, np.full(len(ticks), self.behaviour.wheels.whisk_rad_s))
         told = estimate(model, recorded, counts)
-        surface = None
+        face = math.nan
         if isinstance(model, WhiskModel):
-            per_metre = self._per_metre(whisk, model, contact.rest)
-            shape = model.shape_of(recorded)
-            distance = mount.whisked(model, shape, turn, per_metre)
-            surface = mount.surface(model, per_metre, model.share_of(shape), turn)
+            face = self.feelers[lane].face
+            distance = mount.whisked(model, model.shape_of(recorded), turn, face)
         else:
             distance = mount.distance(told.radius_mm, turn)
         kind = contact_type(mount, distance)
@@ -180,18 +175,7 @@ class Pilot:
             self.behaviour.aim(move)
         made = {"whisker": self.names[lane], "onset": contact.onset, "release": contact.release, "turn": turn}
         made |= {"peak_counts": counts, "line_mm": told.radius_mm, "sigma_mm": told.sigma_mm, "distance_mm": distance}
-        self.whisks.append(made | {"type": kind, "tries": whisk.tries, "surface": surface if kind == "tip" else None})
-
-    def _per_metre(self, whisk: Whisk, model: WhiskModel, rest: np.ndarray) -> float:
-        """Tilt per metre as the robot backed off, rad; nan when that is not known, as when it retreated for the tip."""
-        if whisk.tries:
-            return math.nan
-        wheels = self.behaviour.wheels
-        ticks, samples = joined(self._retreat_samples)
-        since = ticks - ticks[:1] - (wheels.effect_ticks - 1)  # the first block answers the decision
-        gone = since >= 0
-        tilt = model.along(samples[gone] - rest) / model.counts_per_rad(wheels.whisk_rad_s)
-        return retreat(since[gone] * TICK_S * wheels.back_off_m_s, tilt)
+        self.whisks.append(made | {"type": kind, "tries": whisk.tries, "face": face})
 
     def _texture_cells(self, lane: int, tick: int, held_back: bool) -> dict[str, float | None]:
         whisker = self.surfaces[lane]
@@ -245,8 +229,6 @@ class Pilot:
         felt = self.feelers[lane].felt
         if felt is None or not (lane in released or self.contacts[lane].touching):
             return None
-        if lane in released and contact_type(self.mounts[lane], released[lane][1]) != "tip":
-            felt = felt.of_shaft()  # the whisk that was measured knows the way back, too
         return felt.after(self._drives.since(felt.tick, tick), tick)
 
     def _felt_cells(self, lane: int, felt: Felt | None) -> dict[str, float | None]:

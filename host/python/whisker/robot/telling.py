@@ -1,5 +1,7 @@
 """What the pilot tells the others over zenoh: observation rows, odometry, joints, contacts, behaviour."""
 
+import math
+
 import numpy as np
 
 from ..pilot.behaviour import TICK_S
@@ -89,7 +91,7 @@ class Teller:
         if told.measured:
             told.radius_m, told.sigma_m = 1e-3 * whisk["distance_mm"], 1e-3 * whisk["sigma_mm"]
         told.part = PARTS[whisk["type"]]
-        told.shape = _shape(whisk["surface"])
+        told.shape = _shape(whisk["face"])
         self._send("contact", told)
 
     def _contact(self, name: str, touching: bool, onset: int, release: int) -> messages.Contact:
@@ -109,8 +111,8 @@ class Teller:
         self._streams[topic].send(message)
 
 
-def _shape(surface: dict[str, float] | None) -> int:
-    """What a tip met, by `Mount.surface`; its 0.5 is: either."""
-    if surface is None or surface["face"] == 0.5:
+def _shape(face: float) -> int:
+    """What was met, by its probability of a tip on a surface; nan: not known."""
+    if math.isnan(face):
         return messages.UNKNOWN
-    return messages.FACE if surface["face"] > 0.5 else messages.CORNER
+    return messages.FACE if face > 0.5 else messages.CORNER

@@ -27,17 +27,19 @@ SETTINGS = {
     "speed_sd": 0.15,
     "speed_drift": 0.005,
     "moving": 0.02,
+    "caught": 0.02,
+    "other": 0.1,
     "sample_s": 5e-4,
     "block": 20,
     "report": 2,
 }
 POSITIVE = ("cone_m", "kappa", "creep_s", "noise_rad", "largest_rad", "ring_hz", "sample_s")
-LIMITS = {"friction": 0.5, "moving": 1.0}
+LIMITS = {"friction": 0.5, "moving": 0.5, "caught": 0.3, "other": 0.1}
 LEAST_SAMPLES = 100
-HEAD_ON = 0.08
+
 MOTIONS = ("body whisk", "drive-by", "sweep")
 SCALARS = ("arc_m", "arc_sd_m", "plane_rad", "plane_sd", "normal_rad", "normal_sd", "speed", "speed_sd")
-SHARES = ("sweep", "corner", "tip", "slip", "friction", "friction_sd", "curvature", "curvature_sd", "head_on")
+SHARES = ("sweep", "corner", "tip", "slip", "friction", "friction_sd", "curvature", "curvature_sd", "other")
 
 
 class Reports(NamedTuple):
@@ -68,7 +70,7 @@ class Reports(NamedTuple):
     friction_sd: np.ndarray
     curvature: np.ndarray  # of the surface, 1/m, a corner's counted as 0
     curvature_sd: np.ndarray
-    head_on: np.ndarray  # largest probability so far of a push along the whisker: from HEAD_ON on nothing is known
+    other: np.ndarray  # probability that none of the hypotheses holds, as of a push along the whisker
 
 
 class ContactFilter:
