@@ -423,10 +423,30 @@ static void update_local(struct adaptive *a, const struct nav_evidence *evidence
     a->touched += a->gaussian.looked + a->cloud.moved;
 }
 
+/* After a motion that was not reported more poses are possible than the cloud has room for: the histogram holds them.
+ */
+static void adaptive_hand_over(struct adaptive *a)
+{
+    const struct nav_settings *s = &a->problem->settings;
+    double across = 1.0 + 4.0 * sqrt(a->pending.noise.position) / s->adaptive.bin_m; /* bins in 4 deviations */
+    double turned = 1.0 + 4.0 * sqrt(a->pending.noise.heading) * 180.0 / NAV_PI / s->adaptive.bin_deg;
+    if (!a->pending_unknown || !a->local || (a->awake && !a->whole) ||
+        across * across * turned * s->adaptive.per_bin <= a->global.room)
+        return;
+    if (a->gaussian.carries)
+        adaptive_scatter(a);
+    adaptive_global_clear(&a->global, a->log.head);
+    pour(a, a->cloud.set.count, 1.0);
+    a->local = a->whole = false;
+    a->awake = true;
+    a->modes = 0;
+}
+
 static void update(void *self, const struct nav_evidence *evidence)
 {
     struct adaptive *a = self;
     a->idle = false;
+    adaptive_hand_over(a);
     nav_likelihood_read(a->likelihood, evidence);
     adaptive_log_write(&a->log, a->pending.step, a->pending.noise, evidence);
     a->answer.belief.mean = nav_compose(a->answer.belief.mean, a->pending.step);

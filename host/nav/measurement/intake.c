@@ -78,7 +78,8 @@ static struct nav_motion intake_take_odometry(struct nav_intake *in, const struc
     if (arrival == LATE)
         return (struct nav_motion){.unknown_m = 0.0}; /* assumed when it did not come */
     double before = in->latest;
-    int missing = timed ? nav_gaps_missing(&in->gaps, before, row->t_s) : 0;
+    bool bridged = timed && in->problem->settings.motion.gaps >= 0.5;
+    int missing = bridged ? nav_gaps_missing(&in->gaps, before, row->t_s) : 0;
     if (timed)
         in->latest = row->t_s;
     return nav_gaps_bridge(&in->gaps, known ? &step : NULL, missing, before, row->t_s);

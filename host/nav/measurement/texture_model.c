@@ -76,9 +76,11 @@ static double texture_novelty(const struct nav_model *model, struct nav_track *t
 {
     double weight = nav_novelty(track->moved, model->spacing);
     int best = 0;
+    if (!(weight > 0.0) || model->settings->texture.repeat < 0.5)
+        return weight;
     for (int k = 1; k < model->values; k++)
         best = loglik[k] > loglik[best] ? k : best;
-    return weight > 0.0 ? fmin(weight, nav_repeat_take(repeat, model->index, best, track->moved)) : weight;
+    return fmin(weight, nav_repeat_take(repeat, model->index, best, track->moved));
 }
 
 static bool texture_sharp(const double *reading)

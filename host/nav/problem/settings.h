@@ -7,6 +7,7 @@ struct nav_texture_settings {
     double temper;    /* exponent on a window's likelihood; 0: estimated from the windows (texture_model.c) */
     double outlier;   /* share of windows that say nothing about the tile (borders, catches) */
     double spacing_m; /* a window counts in full after the tip has moved so far since the last one */
+    double repeat;    /* 1: learns how errors of windows repeat, and counts repetitions for less (repeat.h); 0: never */
 };
 
 struct nav_radial_settings {
@@ -34,6 +35,7 @@ struct nav_motion_settings {
     double turn_rad;  /* ... and this angle */
     double drift_rad; /* heading error of a straight metre, standard deviation */
     double calibrate; /* 1: learns constant errors of the odometry (calibration.h), where the filter can */
+    double gaps;      /* 1: estimates the motion of rows that never came (gap.h); 0: takes it as none */
 };
 
 struct nav_grid_settings {

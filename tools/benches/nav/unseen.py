@@ -158,6 +158,10 @@ FAMILIES: dict[str, Family] = {
     "a box moved": Family(replace(BASE, map_fault=moved_box), "k"),
     "a box missing": Family(replace(BASE, map_fault=faults.lost_obstacle), "k"),
     "a box too many": Family(replace(BASE, map_fault=new_box), "k"),
+    "dead whisker": Family(replace(BASE, faults=(faults.dead,)), "k"),
+    "swapped whiskers": Family(replace(BASE, faults=(faults.swapped,)), "k"),
+    "dropped rows": Family(replace(BASE, faults=(faults.dropped,)), "k"),
+    "wheels 10 % off": Family(replace(BASE, world=world(run_gain=0.1)), "k"),
     "anchor": Family(replace(families.recipe("anchor"), rows=ROWS), "kad"),
 }
 STARTS: dict[str, tuple[str, Callable[[Recipe], Recipe]]] = {
@@ -170,6 +174,8 @@ LEFT_OUT = {
     "all mechanisms": {},
     "no map belief": {"map.learn": 0.0},
     "no trust in whiskers": {"trust.learn": 0.0},
+    "no repetition of readings": {"texture.repeat": 0.0},
+    "no bridging of gaps": {"motion.gaps": 0.0},
     "no gains of the odometry": {"adaptive.gain": 0.0},
 }
 JUDGED_ON = (
@@ -186,6 +192,10 @@ JUDGED_ON = (
     ("a box moved", "kd"),
     ("a box missing", "k"),
     ("a box too many", "k"),
+    ("dead whisker", "k"),
+    ("swapped whiskers", "k"),
+    ("dropped rows", "k"),
+    ("wheels 10 % off", "k"),
 )
 
 

@@ -80,3 +80,18 @@ def test_gaps_of_many_seconds_do_not_lose_it_for_good():
         rows = rows_of("adaptive", made.scene, observations)
         assert errors(rows, observations)[-100:].max() < NEAR_M, seed
         assert rows[-100:, 3].min() > 0.8, seed
+
+
+def test_after_a_gap_it_is_not_sure_of_a_wrong_place():
+    """The robot drives on for 5 s whose odometry is lost with their rows: nobody can know where it is at first."""
+    k = np.arange(500)
+    lost = (k >= 200) & (k < 250)
+    wrong = []
+    for seed in SEEDS:
+        made = make("anchor", seed, rows=len(k))
+        observations = without(made.observations, lost)
+        rows = rows_of("adaptive", made.scene, observations)
+        error = errors(rows, observations)[200:]
+        assert error.max() > NEAR_M and error[-100:].max() < NEAR_M, seed
+        wrong.append(np.mean((rows[200:, 3] > 0.9) & (error > 0.25)))
+    assert np.mean(wrong) < 0.01, wrong
