@@ -56,14 +56,15 @@ def fit_novelty(features: list[np.ndarray], labels: np.ndarray, folds: np.ndarra
     use = [n for n, rows in enumerate(features) if len(rows)]
     features, labels, folds = [features[n] for n in use], np.asarray(labels)[use], np.asarray(folds)[use]
     classes = sorted(set(labels))
-    found = _fit(features, labels, length)
+    spreads = [_Spread(f) for f in features]
+    found = _fit(spreads, labels, length)
     if found is None:
         return None
     held_out = [(by == fold, classes) for by in (folds, _alike(features, labels)) for fold in sorted(set(by))]
-    trained = _ratios(features, labels, held_out, length)
+    trained = _ratios(features, spreads, labels, held_out, length)
     if len(trained[0]) == 0:
         return None
-    found.limit = _limits(trained, _ratios(features, labels, _left_out(labels, classes), length))
+    found.limit = _limits(trained, _ratios(features, spreads, labels, _left_out(labels, classes), length))
     typical = np.mean([found.limit[s] - np.median(t) for s, t in enumerate(trained) if len(t)])
     found.scale = max(1.0, float(typical) / TYPICAL)
     return found
@@ -86,33 +87,37 @@ def _left_out(labels: np.ndarray, classes: list) -> list[tuple]:
     return [(labels == c, [k for k in classes if k != c]) for c in classes] if len(classes) > 2 else []
 
 
-def _ratios(features: list, labels: np.ndarray, left_out: list[tuple], length: int) -> list[np.ndarray]:
+class _Spread:
+    """Of a recording's windows: how many, their mean, and the scatter about it; worked out once for all that is left out."""
+
+    def __init__(self, features: np.ndarray):
+        self.windows, self.mean = len(features), features.mean(axis=0)
+        self.scatter = (features - self.mean).T @ (features - self.mean)
+
+
+def _ratios(features: list, spreads: list, labels: np.ndarray, left_out: list[tuple], length: int) -> list[np.ndarray]:
     """By step, ratios of recordings left out: of each (recordings, classes that are left)."""
     steps = [[] for _ in range(STEPS)]
     for out, classes in left_out:
-        twin = _twin(features, labels, ~out, classes, length)
+        kept = np.flatnonzero(~out)
+        if set(labels[kept]) != set(classes):
+            continue
+        twin = _fit([spreads[n] for n in kept], np.searchsorted(classes, labels[kept]), length)
         for n in np.flatnonzero(out) if twin else ():
             _spread(twin.scores(features[n]), steps)
     return [np.array(step) for step in steps]
 
 
-def _twin(features: list, labels: np.ndarray, keep: np.ndarray, classes: list, length: int) -> Novelty | None:
-    """The same of some recordings; None when a class has none left."""
-    if set(labels[keep]) != set(classes):
-        return None
-    return _fit([f for f, k in zip(features, keep, strict=True) if k], np.searchsorted(classes, labels[keep]), length)
-
-
-def _fit(features: list[np.ndarray], labels: np.ndarray, length: int) -> Novelty | None:
+def _fit(spreads: list[_Spread], labels: np.ndarray, length: int) -> Novelty | None:
     classes = int(labels.max()) + 1
-    counts, size = np.bincount(labels, minlength=classes), features[0].shape[1]
-    freedom = len(labels) - classes
+    counts, freedom = np.bincount(labels, minlength=classes), len(labels) - classes
     if freedom < 1 or classes < 2:
         return None
-    means = np.array([f.mean(axis=0) for f in features])
+    means = np.array([s.mean for s in spreads])
     middle = np.array([means[labels == k].mean(axis=0) for k in range(classes)])
-    apart = means - middle[labels]
-    within = _within(features, apart, freedom)
+    apart, windows = means - middle[labels], sum(s.windows - 1 for s in spreads)
+    # Where each recording has one window, that of recordings within classes stands for that of windows within them.
+    within = sum(s.scatter for s in spreads) / windows if windows else apart.T @ apart / freedom
     values, vectors = np.linalg.eigh((1.0 - SHRINK) * within + np.diag(SHRINK * np.diag(within) + 1e-6))
     white = vectors / np.sqrt(values)
     recordings = _mixed((apart @ white).T @ (apart @ white), freedom, RECORDINGS_PRIOR)
@@ -120,20 +125,11 @@ def _fit(features: list[np.ndarray], labels: np.ndarray, length: int) -> Novelty
     spread = ((middle - centre) @ white).T @ ((middle - centre) @ white)
     surfaces = _mixed(spread, classes - 1, CLASSES_PRIOR)
     variance, axes = np.linalg.eigh(recordings)
-    turn, unknown = white @ axes, np.einsum("fa,fg,ga->a", axes, surfaces, axes)
+    turn, unknown = white @ axes, (axes * (surfaces @ axes)).sum(axis=0)
     recording = np.maximum(variance, 0.0) * (1.0 + 1.0 / np.append(counts, classes)[:, None])
     recording[-1] = np.maximum(variance, 0.0) + unknown * (1.0 + 1.0 / classes)
-    noise = np.maximum(np.einsum("fa,fg,ga->a", turn, within, turn), 1e-6)
-    mean = np.vstack([middle, centre]) @ turn
-    return Novelty(length, 1.0, turn, mean, recording, noise, np.zeros(STEPS)) if size else None
-
-
-def _within(features: list[np.ndarray], apart: np.ndarray, freedom: int) -> np.ndarray:
-    """Covariance of windows within recordings; where each has one window, of recordings within classes."""
-    windows = sum(len(f) - 1 for f in features)
-    if windows == 0:
-        return apart.T @ apart / freedom
-    return sum((f - f.mean(axis=0)).T @ (f - f.mean(axis=0)) for f in features) / windows
+    noise = np.maximum((turn * (within @ turn)).sum(axis=0), 1e-6)
+    return Novelty(length, 1.0, turn, np.vstack([middle, centre]) @ turn, recording, noise, np.zeros(STEPS))
 
 
 def _mixed(scatter: np.ndarray, freedom: int, prior: float) -> np.ndarray:
