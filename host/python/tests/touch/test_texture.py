@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from whisker.tables import TableError
-from whisker.touch.texture.model import TextureModel, classify, read_folder, read_recording
+from whisker.touch.texture.model import TextureModel, classify, load, read_recording, read_training
 
 RNG = np.random.default_rng(11)
 SPREAD = {"VINYL": 15.0, "SMOOTH": 40.0, "ROUGH": 90.0}
@@ -44,7 +44,7 @@ def test_each_surface_is_recognised_and_a_moved_rest_changes_nothing(model):
 def test_saved_models_load_alike(model, tmp_path):
     model.save(tmp_path / "m.json")
     window = drag("ROUGH", 200)
-    again = TextureModel.load(tmp_path / "m.json")
+    again = load(tmp_path / "m.json")
     assert again.classes == list(SPREAD)
     assert np.allclose(again.loglik(window), model.loglik(window), atol=1e-3)
 
@@ -85,7 +85,7 @@ def test_spoiled_model_files_are_one_clear_line(model, tmp_path, spoil):
     spoil(content)
     path.write_text(json.dumps(content))
     with pytest.raises(TableError, match="whisker texture train") as error:
-        TextureModel.load(path)
+        load(path)
     assert str(path) in str(error.value) and "\n" not in str(error.value)
 
 
@@ -117,7 +117,7 @@ def test_a_folder_needs_two_surfaces_with_recordings(tmp_path):
         (tmp_path / name).mkdir()
     (tmp_path / "A" / "1.csv").write_text("t_s,x\n0,1\n")
     with pytest.raises(TableError, match="folder 'B' holds no CSV"):
-        read_folder(tmp_path)
+        read_training(tmp_path)
     (tmp_path / "B" / "1.csv").write_text("t_s,x,y\n0,1,2\n")
     with pytest.raises(TableError, match="channels"):
-        read_folder(tmp_path)
+        read_training(tmp_path)

@@ -3,7 +3,7 @@
 Sums over windows are kept by fold, so that leaving one fold out is a subtraction, not a new pass over the data.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -48,21 +48,23 @@ class Fitted:
 
 def fit(data: Windows, floor: np.ndarray) -> Fitted:
     """Choose levels, shorter stretches, shapes, size and shrinkage by held-out log loss, then fit all the rest."""
-    chosen, length = _trial(data, _Kind(floor), HIDDEN[:1]), data.windows.shape[1]
-    if chosen.loss > LEAST_GAIN:
-        chosen = _better(data, replace(chosen.kind, levels=True), chosen, LEVELS_MUST_GAIN * chosen.loss)
-    if chosen.loss > LEAST_GAIN and length >= STRETCHES * lib.NAV_TEXTURE_LENGTH_MIN:
-        chosen = _better(data, replace(chosen.kind, shorter=STRETCHES), chosen, BESIDE_MUST_GAIN)
-    if chosen.loss > LEAST_GAIN and len(data.windows) <= SHAPE_MOST and lib.nav_texture_shape_count(length):
-        shape = shape_thresholds(data.windows, floor)
-        chosen = _better(data, replace(chosen.kind, shape=shape), chosen, BESIDE_MUST_GAIN)
-    if chosen.loss > LEAST_GAIN:
-        chosen = _trial(data, chosen.kind, tuple(h for h in HIDDEN if h <= len(data.windows)))
-    return _finished(chosen, data)
+    length, few = data.windows.shape[1], len(data.windows) <= SHAPE_MOST
+    chosen = _Trial(data, {"floor": floor, "levels": False, "shorter": 0, "shape": NONE}, HIDDEN[:1])
+    chosen = _better(chosen, {"levels": True}, LEVELS_MUST_GAIN * chosen.best.loss)
+    if length >= STRETCHES * lib.NAV_TEXTURE_LENGTH_MIN:
+        chosen = _better(chosen, {"shorter": STRETCHES}, BESIDE_MUST_GAIN)
+    if few and lib.nav_texture_shape_count(length) and chosen.best.loss > LEAST_GAIN:
+        chosen = _better(chosen, {"shape": shape_thresholds(data.windows, floor)}, BESIDE_MUST_GAIN)
+    if chosen.best.loss > LEAST_GAIN:
+        chosen = _Trial(data, chosen.kind, tuple(h for h in HIDDEN if h <= len(data.windows)))
+    return chosen.finished()
 
 
-def _better(data: Windows, kind: "_Kind", so_far: "_Trial", must_gain: float) -> "_Trial":
-    found = _trial(data, kind, HIDDEN[:1])
+def _better(so_far: "_Trial", change: dict, must_gain: float) -> "_Trial":
+    """With features of another kind, where there is something to gain and they pay."""
+    if so_far.best.loss <= LEAST_GAIN:
+        return so_far
+    found = _Trial(so_far.data, so_far.kind | change, HIDDEN[:1])
     return found if _pays(found.best, so_far.best, so_far.sums.row_weight, must_gain) else so_far
 
 
@@ -87,52 +89,33 @@ class _Candidate:
     rules: list[tuple]  # weights and biases, of each fold left out
 
 
-@dataclass
-class _Kind:
-    """Which features: as in nav_texture_features_new."""
-
-    floor: np.ndarray
-    levels: bool = False
-    shorter: int = 0
-    shape: np.ndarray = field(default_factory=lambda: NONE)
-
-
-@dataclass
 class _Trial:
-    """Features of one kind, and what did best on them."""
+    """Features of one kind, as in nav_texture_features_new, and the size and shrinkage that did best on them."""
 
-    kind: _Kind
-    blank: Classifier  # without weights
-    expanded: np.ndarray  # (m, F + hidden most)
-    sums: "_Sums"
-    best: _Candidate
+    def __init__(self, data: Windows, kind: dict, sizes: tuple):
+        self.data, self.kind = data, kind
+        raw = plain_features(data.windows, **kind)
+        centre, scale = raw.mean(axis=0), 1.0 / np.maximum(raw.std(axis=0), LEAST_SPREAD)
+        self.features, most = raw.shape[1], max(sizes)
+        rule = {"weight": np.zeros((self.features + most, data.classes)), "bias": np.zeros(data.classes)}
+        self.blank = Classifier(data.windows.shape[1], hidden=most, centre=centre, scale=scale, **kind, **rule)
+        expanded = self.blank.expand(data.windows) if most else (raw - centre) * scale
+        self.sums, best = _Sums(expanded, data), None
+        for hidden in sizes:
+            of_size = _candidates(self.sums, expanded, data, hidden, self.features + hidden)
+            found = min(of_size, key=lambda c: round(c.loss, 3))
+            if best is None or _pays(found, best, self.sums.row_weight, HIDDEN_MUST_GAIN * best.loss):
+                best = found
+        self.best = best
 
-    @property
-    def loss(self) -> float:
-        return self.best.loss
-
-
-def _trial(data: Windows, kind: _Kind, sizes: tuple) -> _Trial:
-    raw = plain_features(data.windows, kind.levels, kind.floor, kind.shorter, kind.shape)
-    centre, scale = raw.mean(axis=0), 1.0 / np.maximum(raw.std(axis=0), LEAST_SPREAD)
-    features, classes = raw.shape[1], data.classes
-    weight = np.zeros((features + max(sizes), classes))
-    length = data.windows.shape[1]
-    of = length, kind.levels, kind.shorter, max(sizes), kind.floor, kind.shape
-    blank = Classifier(*of, centre, scale, weight, np.zeros(classes))
-    expanded = blank.expand(data.windows) if max(sizes) else (raw - centre) * scale
-    sums = _Sums(expanded, data)
-    best = None
-    for hidden in sizes:
-        found = min(_candidates(sums, expanded, data, hidden, features + hidden), key=lambda c: round(c.loss, 3))
-        if best is None or _pays(found, best, sums.row_weight, HIDDEN_MUST_GAIN * best.loss):
-            best = found
-    return _Trial(kind, blank, expanded, sums, best)
-
-
-def _finished(trial: _Trial, data: Windows) -> Fitted:
-    classifiers = [_finish(trial.blank, trial.sums, left_out, trial.best) for left_out in (None, *range(data.folds))]
-    return Fitted(classifiers[0], classifiers[1:], trial.best.loglik, trial.loss)
+    def finished(self) -> Fitted:
+        best = self.best
+        whole = _discriminant(*self.sums.statistics(None, self.features + best.hidden), best.shrink)
+        made = [
+            replace(self.blank, hidden=best.hidden, weight=weight, bias=bias, temper=best.temper, _made=None)
+            for weight, bias in (whole, *best.rules)
+        ]
+        return Fitted(made[0], made[1:], best.loglik, best.loss)
 
 
 class _Sums:
@@ -210,10 +193,3 @@ def temperature(scores: np.ndarray, label: np.ndarray, weight: np.ndarray | None
 def log_posterior(loglik: np.ndarray, label: np.ndarray) -> np.ndarray:
     """Of the right class under equal priors, nats; log-likelihoods (m, classes), best 0 -> (m,)."""
     return loglik[np.arange(len(label)), label] - np.log(np.exp(loglik).sum(axis=1))
-
-
-def _finish(blank: Classifier, sums: _Sums, left_out: int | None, chosen: _Candidate) -> Classifier:
-    features = len(blank.centre)
-    whole = sums.statistics(None, features + chosen.hidden) if left_out is None else None
-    weight, bias = _discriminant(*whole, chosen.shrink) if whole else chosen.rules[left_out]
-    return replace(blank, hidden=chosen.hidden, weight=weight, bias=bias, temper=chosen.temper, _made=None)

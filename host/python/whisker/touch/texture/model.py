@@ -88,11 +88,6 @@ class TextureModel:
         Path(path).write_text(json.dumps(content) + "\n")
 
     @classmethod
-    def load(cls, path) -> "TextureModel":
-        """Read what `save` wrote; TableError with one line when it is something else."""
-        return cls.from_json(path, _read(path))
-
-    @classmethod
     def from_json(cls, path, content: object) -> "TextureModel":
         """What `save` wrote, parsed; TableError with one line when it is something else."""
         try:
@@ -115,17 +110,12 @@ class TextureModel:
         return len(self.low)
 
 
-def _read(path) -> object:
-    """A model file's content; TableError with one line when it is no JSON."""
-    try:
-        return read_json(path)
-    except UnreadableError as error:
-        raise no_model(path, error) from error
-
-
 def load(path) -> "TextureModel | SpectralModel":
     """A model of either method, as its format says."""
-    content = _read(path)
+    try:
+        content = read_json(path)
+    except UnreadableError as error:
+        raise no_model(path, error) from error
     if isinstance(content, dict) and content.get("format") == SPECTRAL_FORMAT:
         return SpectralModel.from_json(path, content)
     return TextureModel.from_json(path, content)
@@ -228,11 +218,6 @@ def read_recording(path, order: list[str] | None = None, warn: Warn = ignore) ->
     for fault in recording_faults(samples, t_s):
         warn(f"{path}: {fault}")
     return t_s, samples
-
-
-def read_folder(path) -> dict[str, list[np.ndarray]]:
-    """One folder per surface, one CSV per recording -> channels by class."""
-    return read_training(path)[0]
 
 
 def read_training(path, warn: Warn = ignore) -> tuple[dict[str, list[np.ndarray]], float]:

@@ -163,37 +163,31 @@ class Stream:
 
     def __init__(self, model: SpectralModel, window: int, step: int, patience: int):
         self._classes, self._channels, self._taken = len(model.classes), model.channels, 0
-        rules = ffi.new("struct nav_texture_rules *")
-        rules.channels, rules.classes, rules.window, rules.classifiers = (
-            model.channels,
-            self._classes,
-            window,
-            len(model.classifiers),
-        )
-        natives = ffi.new("struct nav_texture_classifier *[]", [r.native for r in model.classifiers])
-        rules.classifier, rules.temper, rules.doubt, rules.sure = natives, model.temper, model.doubt, SURE
-        rules.hazard = 1000.0 * model.hazard / (model.window_ms * model.rate_hz)
-        rules.step, rules.patience = step, patience
-        self._lend_parts(model, rules)
+        self._parts = {
+            name: _native(getattr(model, name)) for name in PARTS
+        }  # lent to the stream, as are the classifiers
+        self._classifiers = model.classifiers
+        natives = ffi.new("struct nav_texture_classifier *[]", [c.native for c in model.classifiers])
+        rules = {
+            "channels": self._channels,
+            "classes": self._classes,
+            "classifiers": len(natives),
+            "classifier": natives,
+        }
+        rules |= {"window": window, "step": step, "patience": patience, "sure": SURE} | self._parts
+        rules |= {name: getattr(model, name) for name in ("temper", "doubt")}
+        rules["hazard"] = 1000.0 * model.hazard / (model.window_ms * model.rate_hz)
+        if model.novelty is not None:
+            rules["novelty_classifier"] = [c.length for c in model.classifiers].index(model.novelty.length)
         limits = self._limits(model, patience if step else window)
-        rules.limits.channels = model.channels
-        for name, values in limits.items():
-            setattr(rules.limits, name, doubles(values, name, (model.channels,)))
-        made = lib.nav_texture_stream_new(rules)
+        given = {name: doubles(values, name, (model.channels,)) for name, values in limits.items()}
+        rules["limits"] = {"channels": model.channels} | given
+        made = lib.nav_texture_stream_new(ffi.new("struct nav_texture_rules *", rules))
         if made == ffi.NULL:
             raise ValueError(f"texture: no stream of windows of {window} samples")
-        self._classifiers = model.classifiers  # lent to the stream
         self._stream = ffi.gc(made, lib.nav_texture_stream_free)
         self._decision, self._decided = ffi.new("struct nav_texture_decision *"), ffi.new("int *")
         self._loglik = np.zeros(self._classes)
-
-    def _lend_parts(self, model: SpectralModel, rules) -> None:
-        self._parts = {name: _native(getattr(model, name)) for name in PARTS}
-        for name, part in self._parts.items():
-            setattr(rules, name, part)
-        if model.novelty is not None:
-            lengths = [c.length for c in model.classifiers]
-            rules.novelty_classifier = lengths.index(model.novelty.length)
 
     @staticmethod
     def _limits(model: SpectralModel, longest: int) -> dict[str, np.ndarray]:
@@ -222,9 +216,8 @@ class Stream:
 
     def _judgement(self, end: int) -> Judgement:
         d = self._decision
-        border, loglik = bool(d.border), self._loglik.copy()
-        found = end, d.samples, d.label, d.best, d.confidence, border, d.novelty, d.health.bad, loglik, bool(d.notice)
-        return Judgement(*found)
+        told = d.confidence, bool(d.border), d.novelty, d.health.bad
+        return Judgement(end, d.samples, d.label, d.best, *told, self._loglik.copy(), bool(d.notice))
 
 
 def forward(loglik: np.ndarray, temper: float, chance: float) -> np.ndarray:
