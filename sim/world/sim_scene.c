@@ -180,15 +180,14 @@ static int read_mechanics(struct reader *reader)
     static const struct {
         const char *name;
         enum sim_mechanics level;
-    } LEVELS[] = {
-        {"static", SIM_MECHANICS_STATIC}, {"elastica", SIM_MECHANICS_ELASTICA}, {"modes", SIM_MECHANICS_MODES}};
+    } LEVELS[] = {{"static", SIM_MECHANICS_STATIC}, {"modes", SIM_MECHANICS_MODES}};
     for (size_t i = 0; i < sizeof LEVELS / sizeof LEVELS[0]; i++) {
         if (strcmp(reader->text.word[1], LEVELS[i].name) == 0) {
             reader->scene->mechanics = LEVELS[i].level;
             return 0;
         }
     }
-    return sim_text_refuse(&reader->text, "mechanics: '%s'; use static, elastica or modes", reader->text.word[1]);
+    return sim_text_refuse(&reader->text, "mechanics: '%s'; use static or modes", reader->text.word[1]);
 }
 
 static int read_batch(struct reader *reader)

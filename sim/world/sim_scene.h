@@ -36,9 +36,9 @@ enum {
 
 enum sim_role { SIM_TEXTURE_WHISKER, SIM_OBJECT_WHISKER };
 
-/* How whiskers bend: levels of mech_whisker.h. static: closed form with the plug; elastica: large deflection, friction
- * and slip-off; modes: the same and vibration. A dragged tip has no large deflection of its own. */
-enum sim_mechanics { SIM_MECHANICS_STATIC = 0, SIM_MECHANICS_ELASTICA = 1, SIM_MECHANICS_MODES = 3 };
+/* How whiskers bend: levels of mech_whisker.h. static: closed form with the plug; modes: large deflection, friction,
+ * slip-off and vibration. A dragged tip has no large deflection of its own. */
+enum sim_mechanics { SIM_MECHANICS_STATIC = 0, SIM_MECHANICS_MODES = 3 };
 
 struct sim_pose {
     double x, y, theta; /* m, m, rad */

@@ -48,9 +48,9 @@ static double alpha_of(const sim_world *world, size_t lane)
 static void test_levels(void **state)
 {
     (void)state;
-    const enum sim_mechanics levels[] = {SIM_MECHANICS_STATIC, SIM_MECHANICS_ELASTICA, SIM_MECHANICS_MODES};
-    double object[3], floor[3];
-    for (size_t i = 0; i < 3; i++) {
+    const enum sim_mechanics levels[] = {SIM_MECHANICS_STATIC, SIM_MECHANICS_MODES};
+    double object[2], floor[2];
+    for (size_t i = 0; i < 2; i++) {
         struct sim_scene scene = bench(4, 2, 2, 0);
         scene.mechanics = levels[i];
         scene.obstacles = 1;
@@ -65,12 +65,9 @@ static void test_levels(void **state)
         sim_world_free(world);
     }
     /* The same noise in all: what is left is the mechanics'. */
-    assert_true(fabs(object[2]) > 5);
-    for (int i = 0; i < 2; i++) {
-        assert_true(object[i] != object[i + 1]);
-        assert_near(object[i], object[i + 1], 0.05 * fabs(object[i + 1]));
-    }
-    assert_true(floor[0] == floor[1] && floor[1] != floor[2]);
+    assert_true(fabs(object[1]) > 5);
+    assert_true(object[0] != object[1] && floor[0] != floor[1]);
+    assert_near(object[0], object[1], 0.05 * fabs(object[1]));
 }
 
 /* The static level is the closed form of the batch's whisker, pushed with this contact's amplitude up to the plug's

@@ -89,7 +89,7 @@ static const struct {
     {"", "wall VINYL ROUGH\n", "wall: 2 values; must be 1"},
     {"", "obstacle 0 0 1 1 GRASS\n", "obstacle: no texture is called 'GRASS'"},
     {"", "obstacle 0 0 1 1 VINYL 1\n", "obstacle: 6 values; must be 4"},
-    {"", "mechanics soft\n", "mechanics: 'soft'; use static, elastica or modes"},
+    {"", "mechanics soft\n", "mechanics: 'soft'; use static or modes"},
     {"", "batch -1\n", "batch: -1; give a whole number"},
     {"", "batch 1.5\n", "batch: 1.5; give a whole number"},
     {"", "tile_m\n", "test.scene:13: tile_m: 0 values; must be 1"},

@@ -276,8 +276,8 @@ def test_foreign_folder_is_never_removed(tmp_path):
 
 
 def test_how_whiskers_bend_is_told_to_the_world_and_is_no_part_of_the_folder(tmp_path):
-    scene, start = make_scene(5, "elastica")
-    assert {"mechanics elastica", "batch 5"} <= set(scene.flat(start).splitlines())
+    scene, start = make_scene(5, "modes")
+    assert {"mechanics modes", "batch 5"} <= set(scene.flat(start).splitlines())
     scenes.write(tmp_path, scene)
     assert scenes.load(tmp_path) == scene
     text, _ = flat_scene(str(tmp_path), 7, "modes")

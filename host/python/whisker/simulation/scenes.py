@@ -23,7 +23,7 @@ ODOMETRY_RELATIVE_SIGMA = 0.03
 RADIAL_SIGMA_M = 0.005
 
 # Of sim/world (sim_scene.h); the first is the default.
-MECHANICS = ("static", "elastica", "modes")
+MECHANICS = ("static", "modes")
 
 PRIOR_OFF_M = 0.2
 PRIOR_OFF_RAD = math.radians(10)
