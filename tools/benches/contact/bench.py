@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from tqdm import tqdm
 
-from .measure import CASES, FIRST_S, contacts, follow, true_motion
+from .measure import CASES, FIRST_S, WHISKED, contacts, decided, follow, true_motion
 from .page import page
 from .scenes import TICK_S
 
@@ -66,6 +66,18 @@ def summary(kind: str, found: list[dict]) -> dict:
     return told
 
 
+def verdicts(kind: str, found: list[dict]) -> dict[str, float]:
+    """Corner or face: shares told right and wrong with 90 %, and of these the errors of place and of a face's normal."""
+    tip, other = (np.array([one[name] for one in found]) for name in ("tip", "other"))
+    shaft = 1.0 - tip - other
+    right, wrong = (shaft, tip) if kind == "corner" else (tip, shaft)
+    made = {"contacts": len(found), "right": float((right >= 0.9).mean()), "wrong": float((wrong >= 0.9).mean())}
+    off, turn = (
+        np.array([one[name] for one in found])[np.maximum(right, wrong) >= 0.9] for name in ("off_mm", "turn_deg")
+    )
+    return made | {"point_rms_mm": rms(off), "normal_rms_deg": rms(turn)}
+
+
 def slip_figures(slip: np.ndarray, slides: np.ndarray) -> dict[str, float]:
     """Stick or slip: share that sticks, share told right, expected calibration error over five bins."""
     bins = np.minimum((5 * slip).astype(int), 4)
@@ -97,7 +109,7 @@ def draw(results: dict) -> Figure:
 
 def run(build: Path, fresh: bool, each: int = CONTACTS) -> None:
     """Measure all kinds with the friction known and not, and against a chain of links in MuJoCo."""
-    results: dict = {"tick_s": TICK_S, "first_s": FIRST_S, "kinds": {}, "course": {}}
+    results: dict = {"tick_s": TICK_S, "first_s": FIRST_S, "kinds": {}, "course": {}, "whisked": {}}
     for name, case in CASES.items():
         for kind in case.kinds:
             made = tqdm(contacts(case, kind, each), desc=f"{name}: {kind}", total=each)
@@ -105,6 +117,8 @@ def run(build: Path, fresh: bool, each: int = CONTACTS) -> None:
             results["kinds"].setdefault(name, {})[kind] = summary(kind, found)
             if name == "unknown":
                 results["course"][kind] = course(found)
+    for kind in WHISKED:
+        results["whisked"][kind] = verdicts(kind, list(tqdm(decided(kind, each), desc=f"whisked: {kind}", total=each)))
     for folder in (RESULTS, CHARTS):
         folder.mkdir(parents=True, exist_ok=True)
     (RESULTS / "contact.json").write_text(json.dumps(rounded(results), indent=1) + "\n")
