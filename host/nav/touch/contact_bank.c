@@ -29,7 +29,6 @@ enum { TILT, RATE };    /* state of the hypothesis that none of the others holds
 #define SAME 0.3 /* distance in standard deviations at which two hypotheses are one */
 
 enum { N = NAV_CONTACT_STATES };
-static const int COLUMN[3] = {FIRST, SLOPE, FRICTION}; /* of what nav_contact_look derives by */
 
 static double square(double x)
 {

@@ -100,8 +100,6 @@ static void geometry_turned(const struct carried *to, const double by[2], double
     out[1] = to->turn_s * by[0] + to->turn_c * by[1];
 }
 
-static const int COLUMN[3] = {FIRST, SLOPE, FRICTION};
-
 /* A contact of no radius: it stays where it is on the object. */
 static void geometry_point(const struct carried *to, const struct nav_contact_look *old,
                            const struct nav_contact_look *now, double seconds, struct equations *e)

@@ -10,7 +10,9 @@
  * MOTION: error of the base's motion as told, share of it. */
 enum { FIRST, SLOPE, ROUND, SPEED_X, SPEED_Y, GAIN, FRICTION, MOTION };
 
-/* Place, normal's direction and elastic tilt, and their derivatives by FIRST, SLOPE and FRICTION. */
+/* Place, normal's direction and elastic tilt, and their derivatives by the states COLUMN. */
+static const int COLUMN[3] = {FIRST, SLOPE, FRICTION};
+
 struct nav_contact_look {
     double q[2], normal, tilt;
     double q_by[3][2], normal_by[3], tilt_by[3];
