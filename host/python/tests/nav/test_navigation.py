@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from whisker.nav import localise
+from whisker.scenes import make
 
 SEEDS = range(100, 106)
 
@@ -110,3 +111,19 @@ def test_a_grid_that_cannot_fit_says_so():
     vast = dataclasses.replace(scene.arena, size_m=(900.0, 900.0), tile_m=180.0)
     with pytest.raises(localise.SettingError, match="choose coarser cells"):
         localise.Filter("grid", dataclasses.replace(scene, arena=vast))
+
+
+@pytest.mark.parametrize("name", ["adaptive", "grid", "particle", "ekf"])
+def test_tiny_tiles_and_boxes_within_boxes_cost_neither_the_robot_nor_the_memory(name):
+    made = make("anchor", 1, rows=60)
+    arena, tiles = made.scene.arena, 2500  # of 1 mm
+    letters = [texture[0] for texture in arena.textures]
+    floor = tuple("".join(row) for row in np.random.default_rng(0).choice(letters, (tiles, tiles)))
+    x0, y0, x1, y1 = box = arena.obstacles[0]
+    inner = (0.7 * x0 + 0.3 * x1, 0.7 * y0 + 0.3 * y1, 0.3 * x0 + 0.7 * x1, 0.3 * y0 + 0.7 * y1)
+    for changed in ({"tile_m": 0.001, "floor": floor}, {"obstacles": (*arena.obstacles, inner, box)}):
+        scene = dataclasses.replace(made.scene, arena=dataclasses.replace(arena, **changed))
+        run = localise.run(name, scene, made.observations, {}, 1)
+        assert np.isfinite(run.poses).all() and run.table["bytes"].max() < 200e6
+        off = np.hypot(*(run.poses[-20:, :2] - made.observations.truth[-20:, :2]).T)
+        assert off.max() < 0.25
