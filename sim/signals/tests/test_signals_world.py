@@ -85,3 +85,23 @@ def test_catches_are_told():
         assert not world.blocked
     # Some 4 borders of two tips in 8 s, a third of them steps up of 0.06 to 0.4 mm that hold a tip for 2 to 20 ms.
     assert 0.0005 < np.mean(caught) < 0.01
+
+
+def test_textures_of_faces_change_nothing_but_a_tip_that_slides_along_one():
+    """Bit for bit: before the touch all counts are those of smooth faces, and after it those of the other whiskers."""
+    start = (1.9, 1.25, 0.0)
+    faces = "obstacle 0.1 0.1 0.2 0.2"
+    smooth = World(flat(start) + f"{faces}\n", 1)
+    rough = World(flat(start) + f"wall ROUGH\n{faces} ROUGH\n", 1)
+    lane = smooth.lanes.index("right_inner")
+    for world in (smooth, rough):
+        world.drive(0.1, 0.05)
+    while not smooth.contact(lane).touching:
+        assert np.array_equal(smooth.run(1), rough.run(1))
+    apart = np.zeros(6, bool)
+    for _ in range(25):
+        one, other = smooth.run(40), rough.run(40)
+        assert smooth.pose == rough.pose and smooth.odometry() == rough.odometry()
+        apart |= np.any(one != other, axis=(0, 2))
+    touching = np.array([smooth.contact(n).touching for n in range(1, 5)])
+    assert apart[lane] and not touching.all() and not apart[1:5][~touching].any() and not apart[[0, 5]].any()

@@ -45,7 +45,8 @@ class Drives:
 @dataclass(frozen=True)
 class Felt:
     """What was touched, in the robot's frame at the end of `tick`: the point and its deviation, m, the direction of the
-    surface's outward normal and its deviation, rad (nan: a corner, or not known), the probability that the tip is on it.
+    surface's outward normal and its deviation, rad (nan: a corner, or not known), the probabilities that the tip is on it and
+    that it slides.
     """
 
     tick: int
@@ -54,6 +55,7 @@ class Felt:
     normal: float = math.nan
     normal_sd: float = math.nan
     face: float = 0.0
+    slip: float = 0.0
 
     def after(self, motion: np.ndarray, tick: int) -> "Felt":
         """The same from where the robot is at `tick`, after this motion."""
@@ -138,7 +140,8 @@ class Feeler:
         c, s = math.cos(self._yaw), math.sin(self._yaw)
         y *= self._out
         point = self._base[0] + c * x - s * y, self._base[1] + s * x + c * y
-        felt = Felt(int(ticks[max(told.sample[-1], 0)]), point, math.sqrt(np.trace(told.point_cov[-1]) / 2.0))
+        point_sd, slip = math.sqrt(np.trace(told.point_cov[-1]) / 2.0), float(told.slip[-1])
+        felt = Felt(int(ticks[max(told.sample[-1], 0)]), point, point_sd, slip=slip)
         face, sd = float(told.tip[-1]), math.hypot(told.normal_sd[-1], MODEL_RAD)
         if face < SURE or told.sweep[-1] > 0.5:
             return replace(felt, face=face)

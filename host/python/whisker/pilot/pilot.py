@@ -204,11 +204,12 @@ class Pilot:
         return cells if loglik is None else dict(zip(cells, map(float, loglik), strict=True))
 
     def _along_face(self, lane: int, tick: int) -> bool:
-        """Whether the whisker touched during the whole window, the wheels at one speed; not the shaft, where that is known."""
+        """Whether the whisker touched during the whole window, the wheels at one speed; and by its tip, which slides, where that
+        is known."""
         since = max(self.contacts[lane].onset, self.behaviour.drive_since + SETTLE_TICKS)
         steady = any(self.behaviour.drive) and since <= tick + 1 - WINDOW_SAMPLES
         felt = self.feelers[lane].felt if lane in self.feelers else None
-        return steady and self.contacts[lane].touching and (felt is None or felt.face >= SURE)
+        return steady and self.contacts[lane].touching and (felt is None or min(felt.face, felt.slip) >= SURE)
 
     def _notice_catch(self, lane: int, window: np.ndarray, loglik: np.ndarray | None) -> None:
         """A catch leaves good samples without evidence, window after window."""
