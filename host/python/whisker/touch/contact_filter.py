@@ -36,10 +36,7 @@ SETTINGS = {
 POSITIVE = ("cone_m", "kappa", "creep_s", "noise_rad", "largest_rad", "ring_hz", "sample_s")
 LIMITS = {"friction": 0.5, "moving": 0.5, "caught": 0.3, "other": 0.1}
 LEAST_SAMPLES = 100
-
 MOTIONS = ("body whisk", "drive-by", "sweep")
-SCALARS = ("arc_m", "arc_sd_m", "plane_rad", "plane_sd", "normal_rad", "normal_sd", "speed", "speed_sd")
-SHARES = ("sweep", "corner", "tip", "slip", "friction", "friction_sd", "curvature", "curvature_sd", "other")
 
 
 class Reports(NamedTuple):
@@ -182,13 +179,7 @@ def _reports(made: list, ends: np.ndarray) -> Reports:
     def squares(name: str) -> np.ndarray:
         return np.array([[list(row) for row in getattr(a, name)] for a in made]).reshape(-1, 2, 2)
 
-    numbers = {name: np.array([getattr(a, name) for a in made]) for name in (*SCALARS, *SHARES)}
-    return Reports(
-        sample=ends.astype(np.int64),
-        point=pairs("point"),
-        point_cov=squares("point_cov"),
-        velocity=pairs("velocity"),
-        velocity_cov=squares("velocity_cov"),
-        motion=[MOTIONS[a.motion] for a in made],
-        **numbers,
-    )
+    told = {"sample": ends.astype(np.int64), "motion": [MOTIONS[a.motion] for a in made]}
+    told |= {name: pairs(name) for name in ("point", "velocity")}
+    told |= {name: squares(name) for name in ("point_cov", "velocity_cov")}
+    return Reports(**{n: np.array([getattr(a, n) for a in made]) for n in Reports._fields if n not in told}, **told)
