@@ -48,7 +48,7 @@ def draw_cost(scores: dict) -> Figure:
         axes.plot(s["us"], 100 * s["error"] + 0.01, marker, color="#0b5394" if name in METHODS else "#6b6b6b", ms=8, label=name)  # fmt: skip
     axes.set(xscale="log", yscale="log", xlabel="time per decision (us)", ylabel="wrong decisions (%, + 0.01)")
     axes.set_title("100 ms windows of two axes at 2 kHz, one core", fontsize=10)
-    axes.legend(fontsize=8)
+    figure.legend(fontsize=8, loc="outside right upper")
     return figure
 
 

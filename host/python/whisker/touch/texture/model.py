@@ -65,21 +65,22 @@ class TextureModel:
         low, high = _ranges(everything - rest, bins)
         model = cls(list(recordings), rest, low, high, np.zeros((len(recordings), everything.shape[1], bins)))
         for rows, samples in zip(model.table, by_class, strict=True):
-            rows[:] = [np.bincount(places, minlength=bins) for places in model._bins(samples, rest).T]
+            rows[:] = model._histogram(samples, rest)
         model.table = np.log((model.table + PSEUDO) / (model.table + PSEUDO).sum(axis=2, keepdims=True))
         return model
 
-    def _bins(self, samples: np.ndarray, rest: np.ndarray) -> np.ndarray:
-        """Samples (n, axes) of raw counts -> the bins (m, axes) of those that are finite."""
+    def _histogram(self, samples: np.ndarray, rest: np.ndarray) -> np.ndarray:
+        """Samples (n, axes) of raw counts -> how many of those that are finite lie in each bin, (axes, bins)."""
         samples = samples[np.isfinite(samples).all(axis=1)] - rest
         bins = self.table.shape[2]
-        return np.clip(np.floor((samples - self.low) * (bins / (self.high - self.low))), 0, bins - 1).astype(int)
+        places = np.clip((samples - self.low) * (bins / (self.high - self.low)), 0, bins - 1).astype(int)
+        return np.array([np.bincount(axis, minlength=bins) for axis in places.T])
 
     def loglik(self, window: np.ndarray, rest=None) -> np.ndarray:
         """Equation 1: log-likelihood of the window (n, axes) of raw counts by class. `rest`: default the model's."""
         rest = self.rest if rest is None else as_doubles(rest, "rest", (self.channels,))
-        bins = self._bins(_counts(window, "window", self.channels), rest)
-        return self.table[:, np.arange(self.channels), bins].sum(axis=(1, 2))
+        histogram = self._histogram(_counts(window, "window", self.channels), rest)
+        return self.table.reshape(len(self.classes), -1) @ histogram.ravel()
 
     def save(self, path) -> None:
         content = {"format": FORMAT, "classes": self.classes}
