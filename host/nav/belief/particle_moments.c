@@ -7,7 +7,7 @@
 static const double FINEST = 1e-3; /* m and rad, of a kernel: few particles may all be alike */
 
 /* Angle from one unit vector to another; a series does for what is near. */
-static float particles_angle(float c0, float s0, float c, float s)
+static float moments_angle(float c0, float s0, float c, float s)
 {
     float across = c0 * s - s0 * c, along = c0 * c + s0 * s, square = across * across;
     if (along > 0.9f)
@@ -20,7 +20,7 @@ struct particle_sums {
     double mass, first[3], second[6]; /* x y t; xx xy xt yy yt tt */
 };
 
-static struct particle_sums particles_sum(const struct nav_particles *p, struct nav_pose about, bool all)
+static struct particle_sums moments_sum(const struct nav_particles *p, struct nav_pose about, bool all)
 {
     static const float NEAR_COSINE = 0.8775825619f; /* cos(NAV_NEAR_RAD) */
     float c0 = (float)cos(about.theta), s0 = (float)sin(about.theta), x0 = (float)about.x, y0 = (float)about.y;
@@ -29,7 +29,7 @@ static struct particle_sums particles_sum(const struct nav_particles *p, struct 
         float x = p->x[i] - x0, y = p->y[i] - y0;
         if (!all && (x * x + y * y > (float)(NAV_NEAR_M * NAV_NEAR_M) || c0 * p->c[i] + s0 * p->s[i] < NEAR_COSINE))
             continue;
-        float t = particles_angle(c0, s0, p->c[i], p->s[i]), w = p->weight[i];
+        float t = moments_angle(c0, s0, p->c[i], p->s[i]), w = p->weight[i];
         const float first[3] = {w * x, w * y, w * t};
         const float second[6] = {w * x * x, w * x * y, w * x * t, w * y * y, w * y * t, w * t * t};
         sum.mass += (double)w;
@@ -43,7 +43,7 @@ static struct particle_sums particles_sum(const struct nav_particles *p, struct 
 
 double nav_particles_near(const struct nav_particles *p, struct nav_pose pose, struct nav_pose *mean)
 {
-    struct particle_sums sum = particles_sum(p, pose, false);
+    struct particle_sums sum = moments_sum(p, pose, false);
     *mean = pose;
     if (sum.mass > 0.0)
         *mean = (struct nav_pose){pose.x + sum.first[0] / sum.mass, pose.y + sum.first[1] / sum.mass,
@@ -54,7 +54,7 @@ double nav_particles_near(const struct nav_particles *p, struct nav_pose pose, s
 void nav_particles_covariance(const struct nav_particles *p, struct nav_pose about, double covariance[9])
 {
     static const int PLACE[9] = {0, 1, 2, 1, 3, 4, 2, 4, 5};
-    struct particle_sums sum = particles_sum(p, about, true);
+    struct particle_sums sum = moments_sum(p, about, true);
     for (int k = 0; k < 9; k++)
         covariance[k] = sum.second[PLACE[k]];
 }
@@ -110,7 +110,7 @@ long nav_particles_components(const struct nav_particles *p, struct nav_pose abo
     /* Width of the kernel of one particle: the normal reference rule, on what is near. */
     struct nav_pose mean;
     nav_particles_near(p, about, &mean);
-    struct particle_sums sum = particles_sum(p, mean, false);
+    struct particle_sums sum = moments_sum(p, mean, false);
     double shrink = pow((double)p->count, -1.0 / 6.0) / sqrt(fmax(sum.mass, 1e-12)), total = 0.0;
     struct nav_component each = {.sigma_m = shrink * sqrt((sum.second[0] + sum.second[3]) / 2.0),
                                  .sigma_rad = shrink * sqrt(sum.second[5])};

@@ -11,9 +11,9 @@
 #include <string.h>
 
 #include "adaptive_answer.h"
-#include "adaptive_doubt.h"
 #include "adaptive_gaussian.h"
 #include "adaptive_global.h"
+#include "adaptive_kidnap.h"
 #include "mixture.h"
 #include "particle_bins.h"
 
@@ -41,7 +41,7 @@ struct adaptive {
     struct adaptive_cloud cloud;
     struct adaptive_global global;
     struct adaptive_log log;
-    struct adaptive_doubt doubt;
+    struct adaptive_kidnap kidnap;
     bool local, awake;            /* which of the two beliefs are held; one at least */
     bool whole;                   /* the histogram holds all belief, and the cloud the same more finely */
     int modes;                    /* of the cloud, as last told by the histogram, 0: not told */
@@ -54,10 +54,10 @@ struct adaptive {
     long evaluations, distinct, touched;
 };
 
-static void destroy(void *self)
+static void adaptive_destroy(void *self)
 {
     struct adaptive *a = self;
-    adaptive_doubt_free(&a->doubt);
+    adaptive_kidnap_free(&a->kidnap);
     adaptive_log_free(&a->log);
     adaptive_global_free(&a->global);
     adaptive_gaussian_free(&a->gaussian);
@@ -68,27 +68,27 @@ static void destroy(void *self)
 }
 
 /* Log-odds that the robot is not where the local belief has it. */
-static double odds(const struct adaptive *a)
+static double adaptive_log_odds(const struct adaptive *a)
 {
     double hazard = log(a->problem->settings.adaptive.hazard);
     if (!a->local)
         return INFINITY;
     if (a->awake && !a->whole && adaptive_global_current(&a->global, &a->log))
         return a->odds + a->global.gained;
-    return hazard + a->doubt.ratio;
+    return hazard + a->kidnap.ratio;
 }
 
-static double elsewhere(const struct adaptive *a)
+static double adaptive_kidnap_probability(const struct adaptive *a)
 {
-    return 1.0 / (1.0 + exp(-odds(a)));
+    return 1.0 / (1.0 + exp(-adaptive_log_odds(a)));
 }
 
-static struct nav_pose ahead(const struct adaptive *a)
+static struct nav_pose adaptive_ahead(const struct adaptive *a)
 {
     return adaptive_log_since(&a->log, a->global.next);
 }
 
-static void answer(struct adaptive *a)
+static void adaptive_sum_up(struct adaptive *a)
 {
     struct adaptive_held held = {.problem = a->problem,
                                  .gaussian = a->gaussian.carries ? &a->gaussian.kalman.belief : NULL,
@@ -96,7 +96,7 @@ static void answer(struct adaptive *a)
                                  .bins = &a->cloud.bins,
                                  .global = a->awake && !(a->whole && a->local) ? &a->global : NULL,
                                  .log = &a->log,
-                                 .share = elsewhere(a)};
+                                 .share = adaptive_kidnap_probability(a)};
     a->answer = adaptive_answer(&held, a->answer.belief.mean);
 }
 
@@ -109,7 +109,7 @@ static bool adaptive_begin_cloud(struct adaptive *a)
 }
 
 /* A mixture that a cloud can hold: in doubt from the start, by the share that it may be wrong. A wider one: unknown. */
-static void begin_mixture(struct adaptive *a)
+static void adaptive_begin_mixture(struct adaptive *a)
 {
     bool few = adaptive_global_fill(&a->global) * a->problem->settings.adaptive.per_bin <= a->global.room;
     a->local = few && adaptive_begin_cloud(a);
@@ -118,22 +118,22 @@ static void begin_mixture(struct adaptive *a)
     a->awake = true;
     a->odds = log(NAV_ANYWHERE / (1.0 - NAV_ANYWHERE));
     a->answer.belief = nav_gaussian_prior(a->problem);
-    answer(a);
+    adaptive_sum_up(a);
 }
 
-static void begin(struct adaptive *a)
+static void adaptive_begin(struct adaptive *a)
 {
     if (nav_mixture_given(&a->problem->prior)) {
-        begin_mixture(a);
+        adaptive_begin_mixture(a);
         return;
     }
     a->local = !a->problem->prior.uniform && adaptive_begin_cloud(a);
     a->awake = !a->local;
-    a->doubt.proven = a->local ? (double)INFINITY : 0.0; /* a start that is told */
+    a->kidnap.proven = a->local ? (double)INFINITY : 0.0; /* a start that is told */
     a->answer.belief = nav_gaussian_prior(a->problem);
     a->gaussian.compared = a->local && nav_gaussian_mass(&a->answer.belief, NAV_NEAR_M, NAV_NEAR_RAD) >=
                                            1.0 - a->problem->settings.adaptive.scattered;
-    answer(a);
+    adaptive_sum_up(a);
 }
 
 static int adaptive_init_cloud(struct adaptive *a)
@@ -151,7 +151,7 @@ static int adaptive_init_cloud(struct adaptive *a)
                : 0;
 }
 
-static void *create(const struct nav_problem *problem)
+static void *adaptive_create(const struct nav_problem *problem)
 {
     struct adaptive *a = calloc(1, sizeof *a);
     struct nav_rng rng;
@@ -162,35 +162,35 @@ static void *create(const struct nav_problem *problem)
     a->likelihood = nav_likelihood_new(&problem->arena, &problem->robot, &problem->settings, 0.0);
     if (!a->likelihood || adaptive_global_init(&a->global, problem) || adaptive_init_cloud(a) ||
         adaptive_gaussian_init(&a->gaussian, problem, a->likelihood) ||
-        adaptive_log_init(&a->log, &a->likelihood->sensors) || adaptive_doubt_init(&a->doubt, a->likelihood, &rng)) {
-        destroy(a);
+        adaptive_log_init(&a->log, &a->likelihood->sensors) || adaptive_kidnap_init(&a->kidnap, a->likelihood, &rng)) {
+        adaptive_destroy(a);
         return NULL;
     }
-    begin(a);
+    adaptive_begin(a);
     return a;
 }
 
 /* Wakes the histogram at the row from which on the robot may have been elsewhere. */
-static void wake(struct adaptive *a)
+static void adaptive_start_search(struct adaptive *a)
 {
     uint64_t reach = adaptive_log_reach(&a->log);
     a->awake = true;
     a->modes = a->whole ? a->modes : 0;
     a->whole = false;
-    adaptive_doubt_teach(&a->doubt, a->likelihood, a->global.likelihood);
+    adaptive_kidnap_teach(&a->kidnap, a->likelihood, a->global.likelihood);
     a->odds = log(a->problem->settings.adaptive.hazard);
-    adaptive_global_restart(&a->global, a->doubt.since > reach ? a->doubt.since : reach);
+    adaptive_global_restart(&a->global, a->kidnap.since > reach ? a->kidnap.since : reach);
 }
 
-static void sleep(struct adaptive *a)
+static void adaptive_stop_search(struct adaptive *a)
 {
     a->awake = a->whole = false;
     a->modes = 0;
-    adaptive_doubt_clear(&a->doubt, a->likelihood, a->log.head);
+    adaptive_kidnap_clear(&a->kidnap, a->likelihood, a->log.head);
 }
 
 /* The first hypotheses, which the histogram knows nothing of, go to it: it then holds all belief, not just `share`. */
-static void pour(struct adaptive *a, long count, double share)
+static void adaptive_give_particles(struct adaptive *a, long count, double share)
 {
     for (long n = 0; n < count; n++)
         adaptive_global_add(&a->global, nav_particles_pose(&a->cloud.set, n), (double)a->cloud.set.weight[n] / share);
@@ -210,7 +210,7 @@ static void adaptive_resample(struct adaptive *a, bool force)
 }
 
 /* The histogram's mass sits in few cells: hypotheses take over its share. */
-static void take_over(struct adaptive *a, double share)
+static void adaptive_draw_particles(struct adaptive *a, double share)
 {
     const struct nav_settings *s = &a->problem->settings;
     double count = fmin(fmax(s->adaptive.least, a->global.crowd * s->adaptive.per_bin), a->global.room / 2.0);
@@ -218,25 +218,25 @@ static void take_over(struct adaptive *a, double share)
     long held = a->local ? set->count : 0;
     set->count = held;
     nav_particles_scale(set, 1.0 - share);
-    adaptive_global_draw(&a->global, set, &a->cloud.rng, (long)count, share, ahead(a));
-    pour(a, held, share);
+    adaptive_global_draw(&a->global, set, &a->cloud.rng, (long)count, share, adaptive_ahead(a));
+    adaptive_give_particles(a, held, share);
     if (a->local && share > 0.5) { /* what contradicted the local belief was not the whiskers' fault, nor the map's */
-        adaptive_doubt_teach(&a->doubt, a->likelihood, a->likelihood);
+        adaptive_kidnap_teach(&a->kidnap, a->likelihood, a->likelihood);
         nav_map_forget(a->likelihood);
     }
     if (!a->local || share > 0.5)
-        a->doubt.proven = 0.0;
+        a->kidnap.proven = 0.0;
     a->local = true;
     a->cloud.moved = set->count;
     adaptive_resample(a, true);
     a->touched += a->cloud.moved;
     a->whole = true;
     a->modes = 0;
-    adaptive_doubt_clear(&a->doubt, a->likelihood, a->log.head);
+    adaptive_kidnap_clear(&a->kidnap, a->likelihood, a->log.head);
 }
 
 /* Gives the modes of the cloud the shares that the histogram told last. */
-static void keep_shares(struct adaptive *a)
+static void adaptive_keep_shares(struct adaptive *a)
 {
     double factor[NAV_MODES_MOST], mass[NAV_MODES_MOST];
     nav_particles_masses(&a->cloud.set, mass, a->modes);
@@ -246,10 +246,10 @@ static void keep_shares(struct adaptive *a)
 }
 
 /* Nothing was found elsewhere: where there were several modes the histogram holds the cloud's again. */
-static void stay(struct adaptive *a)
+static void adaptive_keep_particles(struct adaptive *a)
 {
     if (a->modes < 2) {
-        sleep(a);
+        adaptive_stop_search(a);
         return;
     }
     adaptive_global_clear(&a->global, a->log.head);
@@ -257,13 +257,13 @@ static void stay(struct adaptive *a)
         adaptive_global_add(&a->global, nav_particles_pose(&a->cloud.set, n), (double)a->cloud.set.weight[n]);
     adaptive_global_added(&a->global);
     a->whole = true;
-    adaptive_doubt_clear(&a->doubt, a->likelihood, a->log.head);
+    adaptive_kidnap_clear(&a->kidnap, a->likelihood, a->log.head);
 }
 
 /* Hypotheses are too few to tell what several modes weigh: the histogram tells. It sleeps when one is left, draws them
  * anew where it holds more than they do, and begins again from them where it has lost what they hold: its cells are
  * coarse, and a robot may stand where all of them are blocked. */
-static void arbitrate(struct adaptive *a)
+static void adaptive_weigh_modes(struct adaptive *a)
 {
     struct nav_mode mode[NAV_MODES_MOST];
     double share[NAV_MODES_MOST], known = 0.0, most = 0.0;
@@ -276,19 +276,19 @@ static void arbitrate(struct adaptive *a)
     if (known >= KNOWN_LEAST) {
         a->modes = modes;
         memcpy(a->share, share, sizeof a->share);
-        keep_shares(a);
+        adaptive_keep_shares(a);
         if (most > ONE_MODE)
-            sleep(a);
+            adaptive_stop_search(a);
     } else if (a->global.scattered < a->problem->settings.adaptive.scattered) {
         a->local = false;
-        take_over(a, 1.0);
+        adaptive_draw_particles(a, 1.0);
     } else {
-        stay(a);
+        adaptive_keep_particles(a);
     }
 }
 
 /* The robot is not where the cloud has it, and never was where that learned of the map. */
-static void leave(struct adaptive *a)
+static void adaptive_drop_particles(struct adaptive *a)
 {
     a->local = false;
     nav_map_forget(a->likelihood);
@@ -303,37 +303,37 @@ static void adaptive_scatter(struct adaptive *a)
     a->touched += a->cloud.set.count;
 }
 
-static void decide(struct adaptive *a)
+static void adaptive_decide(struct adaptive *a)
 {
     const struct nav_settings *s = &a->problem->settings;
-    double present = odds(a);
+    double present = adaptive_log_odds(a);
     if (a->gaussian.carries && (present > log(s->adaptive.wake) || adaptive_gaussian_fails(&a->gaussian)))
         adaptive_scatter(a);
     if (!a->awake) {
         if (present > log(s->adaptive.wake))
-            wake(a);
+            adaptive_start_search(a);
         return;
     }
     if (a->whole && a->local && present > 0.0) { /* to look elsewhere costs what is known of the modes */
-        wake(a);
+        adaptive_start_search(a);
         return;
     }
     if (!adaptive_global_current(&a->global, &a->log))
         return;
     if (a->whole && a->local) {
-        arbitrate(a);
+        adaptive_weigh_modes(a);
         return;
     }
     if (a->global.scattered < s->adaptive.scattered && present > log(s->adaptive.wake))
-        take_over(a, elsewhere(a));
-    else if (a->doubt.ratio <= 0.0 && present <= log(s->adaptive.wake))
-        stay(a);
+        adaptive_draw_particles(a, adaptive_kidnap_probability(a));
+    else if (a->kidnap.ratio <= 0.0 && present <= log(s->adaptive.wake))
+        adaptive_keep_particles(a);
     else if (present > -log(s->adaptive.wake))
-        leave(a);
+        adaptive_drop_particles(a);
 }
 
 /* Lets the histogram work within what is left of the row's budget. */
-static void work(struct adaptive *a)
+static void adaptive_search(struct adaptive *a)
 {
     if (!a->awake)
         return;
@@ -348,20 +348,20 @@ static void work(struct adaptive *a)
 }
 
 /* A row in which nothing was read leaves its time to those that wait. */
-static void catch_up(struct adaptive *a)
+static void adaptive_catch_up(struct adaptive *a)
 {
     if (!a->idle || !a->awake || adaptive_global_current(&a->global, &a->log))
         return;
-    work(a);
-    decide(a);
-    answer(a);
+    adaptive_search(a);
+    adaptive_decide(a);
+    adaptive_sum_up(a);
 }
 
-static void predict(void *self, const struct nav_motion *motion)
+static void adaptive_predict(void *self, const struct nav_motion *motion)
 {
     struct adaptive *a = self;
     a->evaluations = a->distinct = a->touched = 0;
-    catch_up(a);
+    adaptive_catch_up(a);
     a->idle = true;
     struct nav_noise noise = nav_motion_noise(&a->problem->robot, &a->problem->settings, motion);
     nav_pending_add(&a->pending, motion->step, noise);
@@ -393,14 +393,14 @@ static double adaptive_take_cloud(struct adaptive *a, double mass)
     nav_particles_move(set, a->pending.step, &a->pending.noise, !a->pending_unknown, &a->cloud.rng);
     double local = nav_particles_weigh(set, a->likelihood, mass);
     if (a->awake && a->modes > 1)
-        keep_shares(a);
+        adaptive_keep_shares(a);
     return local;
 }
 
-static void update_local(struct adaptive *a, const struct nav_evidence *evidence)
+static void adaptive_update_local(struct adaptive *a, const struct nav_evidence *evidence)
 {
     bool carries = a->gaussian.carries;
-    double mass = 1.0 - elsewhere(a);
+    double mass = 1.0 - adaptive_kidnap_probability(a);
     double local = adaptive_gaussian_take(&a->gaussian, &a->pending, evidence, carries ? mass : -1.0);
     long worked = a->gaussian.looked;
     a->cloud.moved = 0;
@@ -411,9 +411,9 @@ static void update_local(struct adaptive *a, const struct nav_evidence *evidence
         adaptive_compare(a, local, gaussian);
     }
     adaptive_log_entry(&a->log, a->log.head - 1)->local = local;
-    adaptive_doubt_take(&a->doubt, a->likelihood, a->log.head - 1, adaptive_doubt_anywhere(&a->doubt, a->likelihood),
-                        local);
-    if (!a->whole && a->doubt.proven > PROVEN && a->problem->settings.map.learn >= 0.5)
+    adaptive_kidnap_take(&a->kidnap, a->likelihood, a->log.head - 1,
+                         adaptive_kidnap_anywhere(&a->kidnap, a->likelihood), local);
+    if (!a->whole && a->kidnap.proven > PROVEN && a->problem->settings.map.learn >= 0.5)
         nav_map_learn(a->likelihood);
     nav_trust_learn(a->likelihood);
     a->evaluations += worked;
@@ -436,13 +436,13 @@ static void adaptive_hand_over(struct adaptive *a)
     if (a->gaussian.carries)
         adaptive_scatter(a);
     adaptive_global_clear(&a->global, a->log.head);
-    pour(a, a->cloud.set.count, 1.0);
+    adaptive_give_particles(a, a->cloud.set.count, 1.0);
     a->local = a->whole = false;
     a->awake = true;
     a->modes = 0;
 }
 
-static void update(void *self, const struct nav_evidence *evidence)
+static void adaptive_update(void *self, const struct nav_evidence *evidence)
 {
     struct adaptive *a = self;
     a->idle = false;
@@ -451,15 +451,15 @@ static void update(void *self, const struct nav_evidence *evidence)
     adaptive_log_write(&a->log, a->pending.step, a->pending.noise, evidence);
     a->answer.belief.mean = nav_compose(a->answer.belief.mean, a->pending.step);
     if (a->local)
-        update_local(a, evidence);
-    work(a);
-    decide(a);
-    answer(a);
+        adaptive_update_local(a, evidence);
+    adaptive_search(a);
+    adaptive_decide(a);
+    adaptive_sum_up(a);
     a->pending = (struct nav_pending){.step = {0.0, 0.0, 0.0}};
     a->pending_unknown = false;
 }
 
-static void estimate(const void *self, struct nav_estimate *out)
+static void adaptive_estimate(const void *self, struct nav_estimate *out)
 {
     const struct adaptive *a = self;
     nav_gaussian_ahead(&a->answer.belief, &a->pending, out);
@@ -473,11 +473,11 @@ static void estimate(const void *self, struct nav_estimate *out)
                  adaptive_log_bytes(&a->log) + nav_particles_bytes(&a->cloud.set) + nav_bins_bytes(&a->cloud.bins);
 }
 
-static long components(const void *self, struct nav_component *out, long room)
+static long adaptive_components(const void *self, struct nav_component *out, long room)
 {
     const struct adaptive *a = self;
     bool other = a->awake && !(a->whole && a->local);
-    double share = other ? elsewhere(a) : 0.0;
+    double share = other ? adaptive_kidnap_probability(a) : 0.0;
     long count = 0;
     if (a->gaussian.carries) {
         struct nav_gaussian now = a->gaussian.kalman.belief;
@@ -492,7 +492,7 @@ static long components(const void *self, struct nav_component *out, long room)
     return count + adaptive_global_list(&a->global, &a->log, a->pending.step, share, left ? out + count : NULL, left);
 }
 
-static struct nav_resolution resolution(const void *self)
+static struct nav_resolution adaptive_resolution(const void *self)
 {
     const struct adaptive_global *g = &((const struct adaptive *)self)->global;
     const struct nav_shape finest = nav_levels_shape(&g->histogram.levels, 0);
@@ -500,10 +500,10 @@ static struct nav_resolution resolution(const void *self)
 }
 
 const struct nav_filter_ops nav_adaptive_filter = {.name = "adaptive",
-                                                   .create = create,
-                                                   .destroy = destroy,
-                                                   .predict = predict,
-                                                   .update = update,
-                                                   .estimate = estimate,
-                                                   .components = components,
-                                                   .resolution = resolution};
+                                                   .create = adaptive_create,
+                                                   .destroy = adaptive_destroy,
+                                                   .predict = adaptive_predict,
+                                                   .update = adaptive_update,
+                                                   .estimate = adaptive_estimate,
+                                                   .components = adaptive_components,
+                                                   .resolution = adaptive_resolution};

@@ -2,7 +2,7 @@
  *
  * It is corrected as by the extended Kalman filter. Beside that the full likelihood of every row is looked up at a few
  * points of the Gaussian, which tells three things: how well it explained the row, for the test of elsewhere
- * (adaptive_doubt.h) and for a comparison with the particles; how much the row tells beyond what was known, where a
+ * (adaptive_kidnap.h) and for a comparison with the particles; how much the row tells beyond what was known, where a
  * product of many weak factors stays normal and one of few strong ones does not; and whether a wider Gaussian would
  * have explained the rows better. */
 #ifndef NAV_ADAPTIVE_GAUSSIAN_H

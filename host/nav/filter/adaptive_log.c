@@ -25,7 +25,7 @@ void adaptive_log_free(struct adaptive_log *log)
     free(log->reading);
 }
 
-static size_t place(uint64_t row)
+static size_t log_place(uint64_t row)
 {
     return (size_t)(row % ADAPTIVE_ROWS_KEPT);
 }
@@ -33,7 +33,7 @@ static size_t place(uint64_t row)
 void adaptive_log_write(struct adaptive_log *log, struct nav_pose step, struct nav_noise noise,
                         const struct nav_evidence *evidence)
 {
-    size_t n = place(log->head++);
+    size_t n = log_place(log->head++);
     struct adaptive_entry *entry = &log->entry[n];
     *entry = (struct adaptive_entry){.step = step, .noise = noise};
     for (size_t w = 0; w < log->whiskers; w++) {
@@ -54,21 +54,21 @@ uint64_t adaptive_log_reach(const struct adaptive_log *log)
 
 struct adaptive_entry *adaptive_log_entry(struct adaptive_log *log, uint64_t row)
 {
-    return &log->entry[place(row)];
+    return &log->entry[log_place(row)];
 }
 
 struct nav_evidence adaptive_log_replay(struct adaptive_log *log, uint64_t row)
 {
     for (size_t w = 0; w < log->whiskers; w++)
-        log->reading[w] = log->value + place(row) * log->width + log->offset[w];
-    return (struct nav_evidence){.reading = log->reading, .weight = log->weight + place(row) * log->whiskers};
+        log->reading[w] = log->value + log_place(row) * log->width + log->offset[w];
+    return (struct nav_evidence){.reading = log->reading, .weight = log->weight + log_place(row) * log->whiskers};
 }
 
 struct nav_pose adaptive_log_since(const struct adaptive_log *log, uint64_t from)
 {
     struct nav_pose moved = {0.0, 0.0, 0.0};
     for (uint64_t row = from; row < log->head; row++)
-        moved = nav_compose(moved, log->entry[place(row)].step);
+        moved = nav_compose(moved, log->entry[log_place(row)].step);
     return moved;
 }
 

@@ -24,39 +24,38 @@ int nav_gaps_missing(struct nav_gaps *g, double from_s, double until_s)
     return (int)fmin(fmax(missing, 0.0), MISSING_MOST);
 }
 
-static double gaps_apart(struct nav_pose a, struct nav_pose b)
+static double gap_apart(struct nav_pose a, struct nav_pose b)
 {
     return hypot(a.x - b.x, a.y - b.y);
 }
 
-static struct nav_pose gaps_scaled(struct nav_pose step, double by)
+static struct nav_pose gap_scaled(struct nav_pose step, double by)
 {
     return (struct nav_pose){by * step.x, by * step.y, by * step.theta};
 }
 
-static struct nav_pose gaps_between(struct nav_pose a, struct nav_pose b)
+static struct nav_pose gap_between(struct nav_pose a, struct nav_pose b)
 {
     return (struct nav_pose){(a.x + b.x) / 2.0, (a.y + b.y) / 2.0, (a.theta + b.theta) / 2.0};
 }
 
 /* Whether a row's odometry looks like that of all rows since the last one. */
-static bool gaps_covers(struct nav_pose step, struct nav_pose last, int missing)
+static bool gap_covers(struct nav_pose step, struct nav_pose last, int missing)
 {
-    struct nav_pose all = gaps_scaled(last, missing + 1.0);
-    return gaps_apart(step, all) + fabs(step.theta - all.theta) <
-           gaps_apart(step, last) + fabs(step.theta - last.theta);
+    struct nav_pose all = gap_scaled(last, missing + 1.0);
+    return gap_apart(step, all) + fabs(step.theta - all.theta) < gap_apart(step, last) + fabs(step.theta - last.theta);
 }
 
 /* Motion of `missing` rows between two that moved so. */
-static struct nav_motion gaps_assume(struct nav_gaps *g, struct nav_pose before, struct nav_pose after, int missing,
-                                     double from_s, double until_s)
+static struct nav_motion gap_assume(struct nav_gaps *g, struct nav_pose before, struct nav_pose after, int missing,
+                                    double from_s, double until_s)
 {
     double unusual = fmin(missing / SAME_ROWS, 1.0);
-    struct nav_pose each = gaps_scaled(gaps_between(before, after), 1.0 - unusual);
+    struct nav_pose each = gap_scaled(gap_between(before, after), 1.0 - unusual);
     g->kept[g->count++ % NAV_GAPS_KEPT] = (struct nav_gap){from_s, until_s, each};
     return (struct nav_motion){
-        .step = gaps_scaled(each, missing),
-        .unknown_m = missing * (gaps_apart(before, after) / 2.0 + unusual * g->usual_m),
+        .step = gap_scaled(each, missing),
+        .unknown_m = missing * (gap_apart(before, after) / 2.0 + unusual * g->usual_m),
         .unknown_rad = missing * (fabs(before.theta - after.theta) / 2.0 + unusual * g->usual_rad),
     };
 }
@@ -70,12 +69,12 @@ struct nav_motion nav_gaps_bridge(struct nav_gaps *g, const struct nav_pose *ste
         motion.unknown_rad = (missing + 1) * g->usual_rad;
         return motion;
     }
-    bool lost = missing > 0 && !gaps_covers(*step, g->last, missing);
+    bool lost = missing > 0 && !gap_covers(*step, g->last, missing);
     if (lost)
-        motion = gaps_assume(g, g->last, *step, missing, from_s, until_s);
+        motion = gap_assume(g, g->last, *step, missing, from_s, until_s);
     motion.step = nav_compose(motion.step, *step);
     double rows = lost ? 1.0 : 1.0 + missing;
-    g->last = gaps_scaled(*step, 1.0 / rows);
+    g->last = gap_scaled(*step, 1.0 / rows);
     g->usual_m += (hypot(step->x, step->y) / rows - g->usual_m) / USUAL_ROWS;
     g->usual_rad += (fabs(step->theta) / rows - g->usual_rad) / USUAL_ROWS;
     return motion;

@@ -145,7 +145,7 @@ float nav_likelihood_at(const struct nav_likelihood *l, const struct nav_place *
     float sum = 0.0f;
     likelihood_expect(l, at, l->active, codes);
     if (l->map.things > 0)
-        nav_map_excuse(l, at, codes);
+        nav_map_apply(l, at, codes);
     for (int n = 0; n < l->reads; n++)
         sum += l->table[l->read[n]][codes[l->read[n]]];
     return sum;

@@ -22,8 +22,8 @@ int nav_map_init(struct nav_map_belief *m, const struct nav_arena *told, size_t 
     m->floor = malloc(tiles + 1);
     m->tile = calloc(tiles + 1, sizeof *m->tile);
     m->gone = calloc((size_t)told->boxes + 1, sizeof *m->gone);
-    m->doubt = calloc(sensors + 1, sizeof *m->doubt);
-    if (!m->floor || !m->tile || !m->gone || !m->doubt)
+    m->suspect = calloc(sensors + 1, sizeof *m->suspect);
+    if (!m->floor || !m->tile || !m->gone || !m->suspect)
         return -1;
     memcpy(m->floor, told->floor, tiles);
     m->arena.floor = m->floor;
@@ -35,7 +35,7 @@ void nav_map_free(struct nav_map_belief *m)
     free(m->floor);
     free(m->tile);
     free(m->gone);
-    free(m->doubt);
+    free(m->suspect);
 }
 
 size_t nav_map_bytes(const struct nav_map_belief *m)
@@ -85,24 +85,25 @@ static struct nav_map_thing *map_room(struct nav_map_belief *m)
 void nav_map_begin(struct nav_likelihood *l)
 {
     for (int n = 0; n < l->reads; n++)
-        l->map.doubt[l->read[n]].mass = 0.0;
+        l->map.suspect[l->read[n]].mass = 0.0;
     l->map.mass = 0.0;
 }
 
 /* Place whose being wrong would explain a reading of an object whisker: where it felt something before what was told,
  * or the box that it should have felt. */
-static struct nav_map_doubt map_doubt_ray(const struct nav_likelihood *l, int w, const struct nav_place *at, int code)
+static struct nav_map_suspect map_suspect_ray(const struct nav_likelihood *l, int w, const struct nav_place *at,
+                                              int code)
 {
     const struct nav_model *ray = &l->model[w];
     double felt = l->reading[w][0], told = (code + 1.5) * ray->step;
     bool nothing = code >= ray->codes - 2, before = isfinite(felt) && (nothing || felt < told - NEAR_M);
     double far = before ? felt : told;
-    struct nav_map_doubt doubt = {.kind = before ? NAV_MAP_THING : NAV_MAP_BOX,
-                                  .x = nav_place_x(at, ray->x + far * ray->c, ray->y + far * ray->s),
-                                  .y = nav_place_y(at, ray->x + far * ray->c, ray->y + far * ray->s)};
+    struct nav_map_suspect suspect = {.kind = before ? NAV_MAP_THING : NAV_MAP_BOX,
+                                      .x = nav_place_x(at, ray->x + far * ray->c, ray->y + far * ray->s),
+                                      .y = nav_place_y(at, ray->x + far * ray->c, ray->y + far * ray->s)};
     if (!before) /* of things `which` is 0 */
-        doubt.which = nothing ? -1 : nav_obstacles_at(&l->obstacles, doubt.x, doubt.y);
-    return doubt;
+        suspect.which = nothing ? -1 : nav_obstacles_at(&l->obstacles, suspect.x, suspect.y);
+    return suspect;
 }
 
 /* Likelihood of a sensor's reading by that of a broken one, weight aside. */
@@ -125,19 +126,19 @@ static void map_pass(struct nav_likelihood *l, int w, const struct nav_place *at
     }
 }
 
-static struct nav_map_doubt map_doubt(const struct nav_likelihood *l, int w, const struct nav_place *at, int code)
+static struct nav_map_suspect map_suspect(const struct nav_likelihood *l, int w, const struct nav_place *at, int code)
 {
     const struct nav_model *model = &l->model[w];
-    struct nav_map_doubt doubt = {.which = -1};
+    struct nav_map_suspect suspect = {.which = -1};
     if (model->kind->distance)
-        doubt = map_doubt_ray(l, w, at, code);
+        suspect = map_suspect_ray(l, w, at, code);
     else if (model->kind->floor && l->map.told->classes > 1)
-        doubt.which =
+        suspect.which =
             nav_arena_tile(l->map.told, nav_place_x(at, model->x, model->y), nav_place_y(at, model->x, model->y));
-    return doubt;
+    return suspect;
 }
 
-static bool map_same(const struct nav_map_doubt *a, const struct nav_map_doubt *b)
+static bool map_same(const struct nav_map_suspect *a, const struct nav_map_suspect *b)
 {
     bool near = hypot(a->x - b->x, a->y - b->y) < THING_M;
     return a->kind == b->kind && (a->kind == NAV_MAP_THING ? near : a->which == b->which);
@@ -147,12 +148,12 @@ void nav_map_add(struct nav_likelihood *l, const struct nav_place *at, const uin
 {
     for (int n = 0; n < l->reads; n++) {
         int w = l->read[n];
-        struct nav_map_doubt *doubt = &l->map.doubt[w], now = map_doubt(l, w, at, codes[w]);
+        struct nav_map_suspect *suspect = &l->map.suspect[w], now = map_suspect(l, w, at, codes[w]);
         if (l->map.mass == 0.0 && l->model[w].kind->distance && isinf(l->reading[w][0]))
             map_pass(l, w, at);
-        if (doubt->mass == 0.0)
-            *doubt = now;
-        doubt->mass += now.which >= 0 && map_same(doubt, &now) ? mass : 0.0;
+        if (suspect->mass == 0.0)
+            *suspect = now;
+        suspect->mass += now.which >= 0 && map_same(suspect, &now) ? mass : 0.0;
     }
     l->map.mass += mass;
 }
@@ -162,7 +163,7 @@ void nav_map_add(struct nav_likelihood *l, const struct nav_place *at, const uin
 static double map_evidence(const struct nav_likelihood *l, int w, double ratio)
 {
     const struct nav_trust *t = &l->trust[w];
-    double told = 0.0, known = 0.0, share = l->map.doubt[w].mass / l->map.mass;
+    double told = 0.0, known = 0.0, share = l->map.suspect[w].mass / l->map.mass;
     for (int k = 0; k < t->codes; k++) {
         known += t->predicted[k];
         told += t->predicted[k] > 0.0 ? t->predicted[k] * map_ratio(l, w, k) : 0.0;
@@ -222,14 +223,14 @@ void nav_map_learn(struct nav_likelihood *l)
 {
     for (int n = 0; n < l->reads; n++) {
         int w = l->read[n];
-        const struct nav_map_doubt *doubt = &l->map.doubt[w];
+        const struct nav_map_suspect *suspect = &l->map.suspect[w];
         bool wrong = false;
-        if (doubt->mass > 0.0 && doubt->kind == NAV_MAP_THING)
-            wrong = map_learn_thing(l, w, doubt->x, doubt->y);
-        else if (doubt->mass > 0.0 && doubt->kind == NAV_MAP_BOX)
-            wrong = map_learn_box(l, w, doubt->which);
-        else if (doubt->mass > 0.0)
-            wrong = map_learn_tile(l, w, doubt->which);
+        if (suspect->mass > 0.0 && suspect->kind == NAV_MAP_THING)
+            wrong = map_learn_thing(l, w, suspect->x, suspect->y);
+        else if (suspect->mass > 0.0 && suspect->kind == NAV_MAP_BOX)
+            wrong = map_learn_box(l, w, suspect->which);
+        else if (suspect->mass > 0.0)
+            wrong = map_learn_tile(l, w, suspect->which);
         if (wrong) /* what contradicted the belief was not the sensor's fault */
             nav_trust_restore(&l->trust[w]);
     }
@@ -252,7 +253,7 @@ void nav_map_forget(struct nav_likelihood *l)
     m->things = 0;
 }
 
-void nav_map_excuse(const struct nav_likelihood *l, const struct nav_place *at, uint8_t *codes)
+void nav_map_apply(const struct nav_likelihood *l, const struct nav_place *at, uint8_t *codes)
 {
     for (int n = 0; n < l->reads; n++) {
         int w = l->read[n];

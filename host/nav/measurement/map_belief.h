@@ -31,7 +31,7 @@ struct nav_map_thing {
 enum nav_map_kind { NAV_MAP_TILE, NAV_MAP_BOX, NAV_MAP_THING };
 
 /* The place that a sensor's reading tells of, and how much of the belief has it tell of that. */
-struct nav_map_doubt {
+struct nav_map_suspect {
     enum nav_map_kind kind;
     int which; /* tile or box; -1: none */
     double x, y, mass;
@@ -44,9 +44,9 @@ struct nav_map_belief {
     struct nav_map_tile *tile;
     float *gone; /* [boxes] nats for its absence, less those of the prior */
     struct nav_map_thing thing[NAV_MAP_THINGS];
-    int things;                  /* kept */
-    struct nav_map_doubt *doubt; /* [sensors] of the present row */
-    double mass;                 /* of the poses added */
+    int things;                      /* kept */
+    struct nav_map_suspect *suspect; /* [sensors] of the present row */
+    double mass;                     /* of the poses added */
 };
 
 /* 0, or -1 without memory; nav_map_free either way. */
@@ -67,6 +67,6 @@ void nav_map_learn(struct nav_likelihood *);
 void nav_map_forget(struct nav_likelihood *);
 
 /* Contacts of the row last read that nothing told explains, but something else may: their codes become "not known". */
-void nav_map_excuse(const struct nav_likelihood *, const struct nav_place *, uint8_t *codes);
+void nav_map_apply(const struct nav_likelihood *, const struct nav_place *, uint8_t *codes);
 
 #endif

@@ -7,13 +7,13 @@
  *
  * A local belief may explain a disagreement by a broken whisker (trust.h). Elsewhere that whisker works as well as it
  * did before: the trust of that time is kept for the other explanation. */
-#ifndef NAV_ADAPTIVE_DOUBT_H
-#define NAV_ADAPTIVE_DOUBT_H
+#ifndef NAV_ADAPTIVE_KIDNAP_H
+#define NAV_ADAPTIVE_KIDNAP_H
 
 #include "likelihood.h"
 #include "rng.h"
 
-struct adaptive_doubt {
+struct adaptive_kidnap {
     int whiskers;
     float **share;  /* [whiskers][codes] of free space that expects the code */
     double *trust;  /* [whiskers] before row `since` */
@@ -22,21 +22,22 @@ struct adaptive_doubt {
     double proven;  /* log of rows by the local belief and by "anywhere" since it was found; at least 0 */
 };
 
-/* 0, or -1 without memory; adaptive_doubt_free either way. */
-int adaptive_doubt_init(struct adaptive_doubt *, struct nav_likelihood *, struct nav_rng *);
-void adaptive_doubt_free(struct adaptive_doubt *);
+/* 0, or -1 without memory; adaptive_kidnap_free either way. */
+int adaptive_kidnap_init(struct adaptive_kidnap *, struct nav_likelihood *, struct nav_rng *);
+void adaptive_kidnap_free(struct adaptive_kidnap *);
 
 /* Log-likelihood of the row last read for a robot anywhere. */
-double adaptive_doubt_anywhere(const struct adaptive_doubt *, const struct nav_likelihood *);
+double adaptive_kidnap_anywhere(const struct adaptive_kidnap *, const struct nav_likelihood *);
 
 /* Takes row `row`, explained by both. */
-void adaptive_doubt_take(struct adaptive_doubt *, const struct nav_likelihood *, uint64_t row, double anywhere,
-                         double local);
+void adaptive_kidnap_take(struct adaptive_kidnap *, const struct nav_likelihood *, uint64_t row, double anywhere,
+                          double local);
 
 /* Starts again at row `row`, with the trust in whiskers that there is. */
-void adaptive_doubt_clear(struct adaptive_doubt *, const struct nav_likelihood *, uint64_t row);
+void adaptive_kidnap_clear(struct adaptive_kidnap *, const struct nav_likelihood *, uint64_t row);
 
 /* Gives the trust before row `since` to another belief, and how windows of texture are to be read. */
-void adaptive_doubt_teach(const struct adaptive_doubt *, const struct nav_likelihood *from, struct nav_likelihood *to);
+void adaptive_kidnap_teach(const struct adaptive_kidnap *, const struct nav_likelihood *from,
+                           struct nav_likelihood *to);
 
 #endif

@@ -1,4 +1,4 @@
-#include "adaptive_doubt.h"
+#include "adaptive_kidnap.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -6,7 +6,7 @@
 /* Poses from which the shares of codes are counted, and draws that may miss free space for each. */
 enum { POSES = 4096, TRIES = 16 };
 
-static struct nav_pose draw(const struct nav_likelihood *l, struct nav_rng *rng)
+static struct nav_pose kidnap_draw(const struct nav_likelihood *l, struct nav_rng *rng)
 {
     struct nav_pose pose = {0.0, 0.0, 0.0};
     for (int n = 0; n < TRIES; n++) {
@@ -18,19 +18,19 @@ static struct nav_pose draw(const struct nav_likelihood *l, struct nav_rng *rng)
     return pose;
 }
 
-static void count(struct adaptive_doubt *d, struct nav_likelihood *l, struct nav_rng *rng)
+static void kidnap_count(struct adaptive_kidnap *d, struct nav_likelihood *l, struct nav_rng *rng)
 {
     for (int n = 0; n < POSES; n++) {
-        struct nav_pose pose = draw(l, rng);
+        struct nav_pose pose = kidnap_draw(l, rng);
         nav_likelihood_expect(l, &(struct nav_place){pose.x, pose.y, cos(pose.theta), sin(pose.theta)}, l->scratch);
         for (int w = 0; w < d->whiskers; w++)
             d->share[w][l->scratch[w]] += 1.0f / POSES;
     }
 }
 
-int adaptive_doubt_init(struct adaptive_doubt *d, struct nav_likelihood *l, struct nav_rng *rng)
+int adaptive_kidnap_init(struct adaptive_kidnap *d, struct nav_likelihood *l, struct nav_rng *rng)
 {
-    *d = (struct adaptive_doubt){.whiskers = l->whiskers};
+    *d = (struct adaptive_kidnap){.whiskers = l->whiskers};
     d->share = calloc((size_t)l->whiskers + 1, sizeof *d->share);
     d->trust = calloc((size_t)l->whiskers + 1, sizeof *d->trust);
     for (int w = 0; d->share && w < l->whiskers; w++) {
@@ -40,12 +40,12 @@ int adaptive_doubt_init(struct adaptive_doubt *d, struct nav_likelihood *l, stru
     }
     if (!d->share || !d->trust)
         return -1;
-    adaptive_doubt_clear(d, l, 0);
-    count(d, l, rng);
+    adaptive_kidnap_clear(d, l, 0);
+    kidnap_count(d, l, rng);
     return 0;
 }
 
-void adaptive_doubt_free(struct adaptive_doubt *d)
+void adaptive_kidnap_free(struct adaptive_kidnap *d)
 {
     for (int w = 0; d->share && w < d->whiskers; w++)
         free(d->share[w]);
@@ -53,7 +53,7 @@ void adaptive_doubt_free(struct adaptive_doubt *d)
     free(d->trust);
 }
 
-double adaptive_doubt_anywhere(const struct adaptive_doubt *d, const struct nav_likelihood *l)
+double adaptive_kidnap_anywhere(const struct adaptive_kidnap *d, const struct nav_likelihood *l)
 {
     double sum = 0.0;
     for (int w = 0; w < d->whiskers; w++) {
@@ -69,16 +69,16 @@ double adaptive_doubt_anywhere(const struct adaptive_doubt *d, const struct nav_
     return sum;
 }
 
-void adaptive_doubt_take(struct adaptive_doubt *d, const struct nav_likelihood *l, uint64_t row, double anywhere,
-                         double local)
+void adaptive_kidnap_take(struct adaptive_kidnap *d, const struct nav_likelihood *l, uint64_t row, double anywhere,
+                          double local)
 {
     d->ratio += anywhere - local;
     d->proven = fmax(d->proven + local - anywhere, 0.0);
     if (!(d->ratio > 0.0))
-        adaptive_doubt_clear(d, l, row + 1);
+        adaptive_kidnap_clear(d, l, row + 1);
 }
 
-void adaptive_doubt_clear(struct adaptive_doubt *d, const struct nav_likelihood *l, uint64_t row)
+void adaptive_kidnap_clear(struct adaptive_kidnap *d, const struct nav_likelihood *l, uint64_t row)
 {
     d->ratio = 0.0;
     d->since = row;
@@ -86,7 +86,8 @@ void adaptive_doubt_clear(struct adaptive_doubt *d, const struct nav_likelihood 
         d->trust[w] = l->trust[w].working;
 }
 
-void adaptive_doubt_teach(const struct adaptive_doubt *d, const struct nav_likelihood *from, struct nav_likelihood *to)
+void adaptive_kidnap_teach(const struct adaptive_kidnap *d, const struct nav_likelihood *from,
+                           struct nav_likelihood *to)
 {
     for (int w = 0; w < d->whiskers; w++) {
         to->trust[w].working = d->trust[w];
