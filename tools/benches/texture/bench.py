@@ -23,13 +23,13 @@ from .course import course
 from .page import page
 from .real import boreal, boreal_left_out, fabrics, fabrics_left_out, vulpi_left_out, vulpi_terrains
 from .simulated import borders, floors_left_out, other_robot, refusals, single_surfaces, stability
+from .surfaces import faces, faces_contact
 
 ROOT = Path(__file__).resolve().parents[3]
 PAGE = ROOT / "docs/texture_faults.md"
 RESULTS, CHARTS, CACHE = ROOT / "bench/results", ROOT / "docs/charts", ROOT / "build/bench/texture"
-PARTS = {
-    f.__name__: f for f in (course, cost, single_surfaces, other_robot, borders, refusals, floors_left_out, stability)
-}
+FLOORS = (course, cost, single_surfaces, other_robot, borders, refusals, floors_left_out, stability)
+PARTS = {f.__name__: f for f in (*FLOORS, faces, faces_contact)}
 REAL = {  # by the folder that is given
     "fabricslide": {"fabricslide": fabrics, "fabrics_left_out": fabrics_left_out},
     "borealtc": {"borealtc": boreal, "boreal_left_out": boreal_left_out},

@@ -36,6 +36,20 @@ Each surface left out of training in turn, with a part of the others' recordings
 `detected`: the share found by a linear detector on the same features that was trained on the surface too, at 8 % of the others' windows: what the features tell at best.
 
 """
+FACES = """
+## Faces of walls
+
+An object whisker's tip slides along a wall that is not trained; windows of 100 ms, `default`. In a drive-by an outer whisker slides along a wall beside the
+robot, and one model knows all speeds. Backing off and body whisks are the pilot's own motions, with the model that the demo trains.
+Another robot's whiskers are read by the models of this one.
+
+"""
+FACES_CONTACT = """
+The [contact filter](contact.md) along the same walls, by their texture and in the same motions (drive-bys at 100 mm/s): share of its reports in which it
+knows what is touched, and a normal; the median error of the normal, and how often its 90 % holds; the median error of the place across the wall. The filter
+knows no texture.
+
+"""
 TERRAINS = {"borealtc": "BorealTC", "vulpi": "Vulpi"}
 LEFT_OUT = {
     "floors_left_out": "simulated floors, 100 ms",
@@ -60,6 +74,10 @@ def page(results: dict) -> str:
         parts += [PEERS, beside_peers({n: results[p] for p, n in TERRAINS.items() if p in results})]
     if any(part in results for part in LEFT_OUT):
         parts += [UNTRAINED, untrained({n: results[p] for p, n in LEFT_OUT.items() if p in results})]
+    if "faces" in results:
+        parts += [FACES, faces(results["faces"])]
+    if "faces_contact" in results:
+        parts += [FACES_CONTACT, faces_contact(results["faces_contact"])]
     return "".join(parts)
 
 
@@ -129,6 +147,25 @@ def untrained(of: dict[str, dict]) -> str:
             counts = str(s["windows"]), str(s["trained_windows"])
             shares = [percent(s[key]) for key in ("refused", "detected", "trained_refused")]
             rows.append([recording, name, *shares[:2], counts[0], shares[2], counts[1]])
+    return table(rows)
+
+
+def faces(of: dict[str, dict]) -> str:
+    robots = list(dict.fromkeys(key.split("|")[1] for key in of))
+    columns = ("right", "wrong", "unknown", "error")
+    rows = [["motion", *(f"{robot}: {c}" for robot in robots for c in columns), "windows"]]
+    for motion in dict.fromkeys(key.split("|")[0] for key in of):
+        scores = [of[f"{motion}|{robot}"] for robot in robots]
+        shares = [s[key] for s in scores for key in ("accuracy", "wrong_answers", "refused", "calibration_error")]
+        rows.append([motion, *map(percent, shares), str(scores[0]["windows"])])
+    return table(rows)
+
+
+def faces_contact(of: dict[str, dict]) -> str:
+    rows = [["motion", "wall", "known", "normals", "error, degrees", "90 % holds", "place, mm", "reports"]]
+    for key, s in of.items():
+        figures = [f"{s['normal_deg']:.1f}", percent(s["held_90"]), f"{s['place_mm']:.2f}"]
+        rows.append([*key.split("|"), percent(s["known"]), percent(s["normals"]), *figures, str(s["reports"])])
     return table(rows)
 
 
