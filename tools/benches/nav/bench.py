@@ -92,7 +92,6 @@ class Scale:
     """How much is measured."""
 
     seeds: int = 100
-    slow_share: float = 1.0  # of the seeds that SIZES grants
     reference_seeds: int = 20
     budget_runs: int = 10
     budget_rows: int = 10_000
@@ -102,8 +101,12 @@ class Scale:
     soak_rows: int = 1_000_000
 
 
-FULL = Scale()
-QUICK = Scale(4, 0.04, 2, 2, 1000, 2, 500, 1, 20_000)
+def scale(seeds: int) -> Scale:
+    """The full one with so many seeds; what is slow has its share of them (`Bench.sizes`)."""
+    return Scale(seeds, min(seeds, 20))
+
+
+QUICK = Scale(4, 2, 2, 1000, 2, 500, 1, 20_000)
 
 
 class Bench:
@@ -308,10 +311,10 @@ def measure(bench: Bench, parts: list[str]) -> None:
     bench.document.write_text(page.document(data))
 
 
-def full(workers=None, backend: str = "processes", build: Path = BUILD) -> Bench:
+def full(workers=None, backend: str = "processes", build: Path = BUILD, seeds: int = 100) -> Bench:
     cache = ROOT / "build/bench/nav"
     places = (cache, ROOT / "bench/results", ROOT / "docs/charts", ROOT / "docs/results_nav.md")
-    return Bench(FULL, *places, workers, backend, build)
+    return Bench(scale(seeds), *places, workers, backend, build)
 
 
 def small(workers=None, backend: str = "processes", build: Path = BUILD) -> Bench:
@@ -327,9 +330,10 @@ def run(
     page: bool = False,
     workers: int | None = None,
     backend: str = "processes",
+    seeds: int = 100,
 ) -> None:
     """The filters are those of the Python module; `build` holds nav_bench."""
-    bench = (small if quick else full)(workers, backend, build)
+    bench = small(workers, backend, build) if quick else full(workers, backend, build, seeds)
     if fresh:
         shutil.rmtree(bench.jobs, ignore_errors=True)
     measure(bench, [] if page else only)
@@ -338,6 +342,7 @@ def run(
 
 def options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--quick", action="store_true", help="few seeds, results into build/bench/nav-quick")
+    parser.add_argument("--seeds", type=int, default=100, help="at most, of each family (default: %(default)s)")
     parser.add_argument("--only", nargs="+", choices=PARTS, default=list(PARTS), metavar="PART")
     parser.add_argument("--workers", type=int, help="processes (default: all cores)")
     parser.add_argument("--backend", choices=BACKENDS, default="processes")
