@@ -23,7 +23,7 @@ struct mech_stance mech_stance_default(void)
 }
 
 /* Deflection across the path that the floor under the tip asks for. */
-static double pressed(const struct mech_drag *drag, const struct sim_floor_texture *floor)
+static double mech_drag_pressed(const struct mech_drag *drag, const struct sim_floor_texture *floor)
 {
     return drag->stance.preload + drag->lie.lift * drag->height + mech_floor_height(&drag->profile, floor);
 }
@@ -32,81 +32,83 @@ void mech_drag_start(struct mech_drag *drag, const struct mech_whisker *whisker,
                      const struct sim_floor_texture *floor, struct sim_rng rng, int level, double tick_s)
 {
     struct mech_modes modes;
-    *drag =
-        (struct mech_drag){.whisker = *whisker, .stance = *stance, .vibrate = level & MECH_VIBRATION, .resting = true};
+    *drag = (struct mech_drag){.whisker = *whisker, .stance = *stance, .resting = true};
+    drag->axes.vibrate = level & MECH_VIBRATION;
     drag->compliance = mech_whisker_compliance(whisker);
     drag->lie = mech_lie_of(whisker, stance->height, stance->behind);
     mech_modes_of(whisker, &modes);
-    mech_basis_of(whisker, &modes, false, whisker->length, tick_s, &drag->free);
-    mech_basis_of(whisker, &modes, true, whisker->length, tick_s, &drag->pinned);
+    mech_basis_of(whisker, &modes, false, whisker->length, tick_s, &drag->axes.free);
+    mech_basis_of(whisker, &modes, true, whisker->length, tick_s, &drag->axes.pinned);
     mech_floor_start(&drag->profile, floor, rng);
-    drag->ground = pressed(drag, floor);
-    mech_basis_settle(&drag->pinned, drag->ground, 0, &drag->motion[1]);
-    drag->moment[1] = drag->pinned.moment_static * (drag->motion[1].input - stance->preload);
+    drag->ground = mech_drag_pressed(drag, floor);
+    mech_basis_settle(&drag->axes.pinned, drag->ground, 0, &drag->axes.motion[1]);
+    drag->moment[1] = drag->axes.pinned.moment_static * (drag->axes.motion[1].input - stance->preload);
     drag->tilt[1] = drag->moment[1] * drag->compliance;
 }
 
 /* Axis 1 with vibration. Returns the normal force, N. */
-static double ride(struct mech_drag *drag, double input)
+static double mech_drag_ride(struct mech_drag *drag, double input)
 {
-    struct mech_motion *motion = &drag->motion[1], before = *motion;
+    struct mech_motion *motion = &drag->axes.motion[1], before = *motion;
     double from = drag->ground;
     drag->ground = input;
-    mech_basis_step(drag->lifted ? &drag->free : &drag->pinned, motion, drag->lifted ? 0 : input);
+    mech_basis_step(drag->lifted ? &drag->axes.free : &drag->axes.pinned, motion, drag->lifted ? 0 : input);
     if (drag->lifted) {
-        if (input <= mech_basis_answer(&drag->free, motion))
+        if (input <= mech_basis_answer(&drag->axes.free, motion))
             return 0;
         *motion = before;
-        mech_basis_land(&drag->free, &drag->pinned, motion, from, input);
+        mech_basis_land(&drag->axes.free, &drag->axes.pinned, motion, from, input);
         drag->lifted = false;
     }
-    double force = mech_basis_answer(&drag->pinned, motion);
+    double force = mech_basis_answer(&drag->axes.pinned, motion);
     if (force >= 0)
         return force;
-    mech_basis_change(&drag->pinned, &drag->free, motion, 0);
+    mech_basis_change(&drag->axes.pinned, &drag->axes.free, motion, 0);
     drag->lifted = true;
     return 0;
 }
 
-static void stick(struct mech_drag *drag)
+static void mech_drag_stick(struct mech_drag *drag)
 {
     drag->contact = MECH_STICKS;
-    drag->anchor = mech_basis_answer(&drag->free, &drag->motion[0]);
-    mech_basis_change(&drag->free, &drag->pinned, &drag->motion[0], drag->anchor);
+    drag->anchor = mech_basis_answer(&drag->axes.free, &drag->axes.motion[0]);
+    mech_basis_change(&drag->axes.free, &drag->axes.pinned, &drag->axes.motion[0], drag->anchor);
 }
 
 /* The tip comes off where it was held: it slips to this side under friction. */
-static void slip(struct mech_drag *drag, double side, double friction)
+static void mech_drag_slip(struct mech_drag *drag, double side, double friction)
 {
     drag->contact = MECH_SLIPS;
     drag->slip_side = side;
-    mech_basis_change(&drag->pinned, &drag->free, &drag->motion[0], -side * friction);
+    mech_basis_change(&drag->axes.pinned, &drag->axes.free, &drag->axes.motion[0], -side * friction);
 }
 
-static void sticking(struct mech_drag *drag, const struct sim_floor_texture *floor, double travel, double normal)
+static void mech_drag_sticking(struct mech_drag *drag, const struct sim_floor_texture *floor, double travel,
+                               double normal)
 {
     drag->anchor -= travel;
-    mech_basis_step(&drag->pinned, &drag->motion[0], drag->anchor);
-    double force = mech_basis_answer(&drag->pinned, &drag->motion[0]);
+    mech_basis_step(&drag->axes.pinned, &drag->axes.motion[0], drag->anchor);
+    double force = mech_basis_answer(&drag->axes.pinned, &drag->axes.motion[0]);
     if (fabs(force) <= (drag->whisker.friction + floor->friction_drop) * normal)
         return;
-    slip(drag, force > 0 ? -1 : 1, drag->whisker.friction * normal);
+    mech_drag_slip(drag, force > 0 ? -1 : 1, drag->whisker.friction * normal);
     drag->slips++;
 }
 
-static void slipping(struct mech_drag *drag, double travel, double normal)
+static void mech_drag_slipping(struct mech_drag *drag, double travel, double normal)
 {
-    double before = mech_basis_answer(&drag->free, &drag->motion[0]);
-    mech_basis_step(&drag->free, &drag->motion[0], -drag->slip_side * drag->whisker.friction * normal);
-    double relative = mech_basis_answer(&drag->free, &drag->motion[0]) - before + travel; /* tip against floor */
+    double before = mech_basis_answer(&drag->axes.free, &drag->axes.motion[0]);
+    mech_basis_step(&drag->axes.free, &drag->axes.motion[0], -drag->slip_side * drag->whisker.friction * normal);
+    double relative =
+        mech_basis_answer(&drag->axes.free, &drag->axes.motion[0]) - before + travel; /* tip against floor */
     if (normal > 0 && relative * drag->slip_side <= 0)
-        stick(drag);
+        mech_drag_stick(drag);
     else if (normal <= 0)
         drag->slip_side = relative < 0 ? -1 : 1;
 }
 
 /* Deflection along the path, as the modes know it, of a tip held this far behind the mount. */
-static double held_deflection(const struct mech_drag *drag, double behind)
+static double mech_drag_held_deflection(const struct mech_drag *drag, double behind)
 {
     const struct mech_stance *stance = &drag->stance;
     double angle = atan2(behind, stance->height) - atan2(stance->behind, stance->height);
@@ -115,84 +117,79 @@ static double held_deflection(const struct mech_drag *drag, double behind)
     double soft = drag->compliance;
     if (soft * fabs(moment) > drag->whisker.stop)
         moment = copysign(drag->whisker.stop / soft, moment);
-    return -moment / drag->pinned.moment_static;
+    return -moment / drag->axes.pinned.moment_static;
 }
 
-static void hook(struct mech_drag *drag)
+static void mech_drag_hook(struct mech_drag *drag)
 {
     if (drag->contact == MECH_SLIPS)
-        stick(drag);
+        mech_drag_stick(drag);
     drag->contact = MECH_HOOKED;
-    drag->behind = drag->caught_at = drag->stance.behind - drag->anchor;
-    drag->caught_offset = drag->anchor - held_deflection(drag, drag->behind);
+    drag->hook.behind = drag->hook.caught_at = drag->stance.behind - drag->anchor;
+    drag->hook.offset = drag->anchor - mech_drag_held_deflection(drag, drag->hook.behind);
     drag->catches++;
 }
 
-static bool pulled_straight(const struct mech_drag *drag)
+static bool mech_drag_pulled_straight(const struct mech_drag *drag)
 {
-    return drag->behind >= mech_drag_reach(&drag->whisker, &drag->stance);
+    return drag->hook.behind >= mech_drag_reach(&drag->whisker, &drag->stance);
 }
 
-static bool backed_off(const struct mech_drag *drag, double height)
+static bool mech_drag_backed_off(const struct mech_drag *drag, double height)
 {
-    return drag->behind < drag->caught_at || height <= drag->height;
+    return drag->hook.behind < drag->hook.caught_at || height <= drag->height;
 }
 
-static void hooked(struct mech_drag *drag, double travel, double height)
+static void mech_drag_hooked(struct mech_drag *drag, double travel, double height)
 {
-    drag->behind += travel;
-    mech_basis_step(&drag->pinned, &drag->motion[0], held_deflection(drag, drag->behind) + drag->caught_offset);
-    if (pulled_straight(drag)) {
-        slip(drag, 1, 0);
+    drag->hook.behind += travel;
+    mech_basis_step(&drag->axes.pinned, &drag->axes.motion[0],
+                    mech_drag_held_deflection(drag, drag->hook.behind) + drag->hook.offset);
+    if (mech_drag_pulled_straight(drag)) {
+        mech_drag_slip(drag, 1, 0);
         drag->height = height;
-    } else if (backed_off(drag, height)) {
+    } else if (mech_drag_backed_off(drag, height)) {
         drag->contact = MECH_STICKS;
-        drag->anchor = drag->motion[0].input;
+        drag->anchor = drag->axes.motion[0].input;
     }
 }
 
 /* Does the floor hold the tip along this axis, so that its deflection is the input? */
-static bool is_pinned(const struct mech_drag *drag, int axis)
+static bool mech_drag_is_pinned(const struct mech_drag *drag, int axis)
 {
     return axis == 0 ? drag->contact != MECH_SLIPS : !drag->lifted;
 }
 
-static struct mech_axes axes_of(struct mech_drag *drag)
-{
-    return (struct mech_axes){&drag->free, &drag->pinned, drag->motion, drag->vibrate};
-}
-
 /* The shaft touches the corner of the edge ahead. */
-static void touch_edge(struct mech_drag *drag)
+static void mech_drag_touch_edge(struct mech_drag *drag)
 {
     for (int axis = 0; axis < 2; axis++) {
-        struct mech_motion *motion = &drag->motion[axis];
-        if (is_pinned(drag, axis))
-            mech_basis_change(&drag->pinned, &drag->free, motion, mech_basis_answer(&drag->pinned, motion));
+        struct mech_motion *motion = &drag->axes.motion[axis];
+        if (mech_drag_is_pinned(drag, axis))
+            mech_basis_change(&drag->axes.pinned, &drag->axes.free, motion,
+                              mech_basis_answer(&drag->axes.pinned, motion));
     }
-    struct mech_axes axes = axes_of(drag);
-    mech_edge_touch(&drag->edge, &axes, !drag->lifted);
+    mech_edge_touch(&drag->edge, &drag->axes, !drag->lifted);
     drag->contact = MECH_EDGE;
 }
 
 /* The tip has risen over the corner: it is on the floor behind it. */
-static void pass_edge(struct mech_drag *drag, double height)
+static void mech_drag_pass_edge(struct mech_drag *drag, double height)
 {
     drag->edge.ahead = false;
     drag->height = height;
     if (!drag->lifted)
         return;
-    drag->ground = mech_basis_answer(&drag->free, &drag->motion[1]);
-    mech_basis_change(&drag->free, &drag->pinned, &drag->motion[1], drag->ground);
+    drag->ground = mech_basis_answer(&drag->axes.free, &drag->axes.motion[1]);
+    mech_basis_change(&drag->axes.free, &drag->axes.pinned, &drag->axes.motion[1], drag->ground);
     drag->lifted = false;
 }
 
-static void at_edge(struct mech_drag *drag, const struct mech_stroke *stroke)
+static void mech_drag_at_edge(struct mech_drag *drag, const struct mech_stroke *stroke)
 {
-    struct mech_axes axes = axes_of(drag);
-    int state = mech_edge_step(&drag->edge, &drag->lie, &axes, drag->whisker.friction, stroke->travel);
+    int state = mech_edge_step(&drag->edge, &drag->lie, &drag->axes, drag->whisker.friction, stroke->travel);
     for (int axis = 0; axis < 2; axis++)
-        drag->moment[axis] = mech_basis_moment(&drag->free, &drag->motion[axis]);
+        drag->moment[axis] = mech_basis_moment(&drag->axes.free, &drag->axes.motion[axis]);
     drag->edge.ahead = stroke->height > drag->height; /* else the robot has backed off */
     if (state == MECH_EDGE_TOUCHED && drag->edge.ahead)
         return;
@@ -201,68 +198,72 @@ static void at_edge(struct mech_drag *drag, const struct mech_stroke *stroke)
     drag->lifted = true;
     drag->anchor = drag->edge.touched[0];
     if (state == MECH_EDGE_PASSED) {
-        pass_edge(drag, stroke->height);
+        mech_drag_pass_edge(drag, stroke->height);
     } else if (drag->edge.on_floor) {
-        mech_basis_change(&drag->free, &drag->pinned, &drag->motion[1], drag->ground);
+        mech_basis_change(&drag->axes.free, &drag->axes.pinned, &drag->axes.motion[1], drag->ground);
         drag->lifted = false;
     }
 }
 
 /* A tip that has jumped off a corner: is it back, or over it? */
-static void watch_edge(struct mech_drag *drag, const struct mech_stroke *stroke)
+static void mech_drag_watch_edge(struct mech_drag *drag, const struct mech_stroke *stroke)
 {
     double at[2];
     for (int axis = 0; axis < 2; axis++)
-        at[axis] =
-            is_pinned(drag, axis) ? drag->motion[axis].input : mech_basis_answer(&drag->free, &drag->motion[axis]);
+        at[axis] = mech_drag_is_pinned(drag, axis) ? drag->axes.motion[axis].input
+                                                   : mech_basis_answer(&drag->axes.free, &drag->axes.motion[axis]);
     int state = mech_edge_watch(&drag->edge, &drag->lie, at, stroke->travel);
     if (stroke->height <= drag->height)
         drag->edge.ahead = false;
     else if (state == MECH_EDGE_TOUCHED)
-        touch_edge(drag);
+        mech_drag_touch_edge(drag);
     else if (state == MECH_EDGE_PASSED)
-        pass_edge(drag, stroke->height);
+        mech_drag_pass_edge(drag, stroke->height);
 }
 
-static void vibrate(struct mech_drag *drag, const struct sim_floor_texture *floor, const struct mech_stroke *stroke)
+static void mech_drag_vibrate(struct mech_drag *drag, const struct sim_floor_texture *floor,
+                              const struct mech_stroke *stroke)
 {
     if (stroke->base_rate != drag->base_rate)
-        mech_basis_turn(drag->contact == MECH_SLIPS || drag->contact == MECH_EDGE ? &drag->free : &drag->pinned,
-                        &drag->motion[0], stroke->base_rate - drag->base_rate);
+        mech_basis_turn(drag->contact == MECH_SLIPS || drag->contact == MECH_EDGE ? &drag->axes.free
+                                                                                  : &drag->axes.pinned,
+                        &drag->axes.motion[0], stroke->base_rate - drag->base_rate);
     if (drag->contact == MECH_EDGE) {
-        at_edge(drag, stroke);
+        mech_drag_at_edge(drag, stroke);
         return;
     }
-    double normal = ride(drag, pressed(drag, floor));
+    double normal = mech_drag_ride(drag, mech_drag_pressed(drag, floor));
     if (drag->contact == MECH_HOOKED)
-        hooked(drag, stroke->travel, stroke->height);
+        mech_drag_hooked(drag, stroke->travel, stroke->height);
     else if (drag->contact == MECH_STICKS)
-        sticking(drag, floor, stroke->travel, normal);
+        mech_drag_sticking(drag, floor, stroke->travel, normal);
     else
-        slipping(drag, stroke->travel, normal);
-    drag->moment[0] = mech_basis_moment(drag->contact == MECH_SLIPS ? &drag->free : &drag->pinned, &drag->motion[0]);
-    drag->moment[1] = mech_basis_moment(drag->lifted ? &drag->free : &drag->pinned, &drag->motion[1]);
+        mech_drag_slipping(drag, stroke->travel, normal);
+    drag->moment[0] =
+        mech_basis_moment(drag->contact == MECH_SLIPS ? &drag->axes.free : &drag->axes.pinned, &drag->axes.motion[0]);
+    drag->moment[1] = mech_basis_moment(drag->lifted ? &drag->axes.free : &drag->axes.pinned, &drag->axes.motion[1]);
 }
 
 /* The level without vibration. */
-static void follow(struct mech_drag *drag, const struct sim_floor_texture *floor, const struct mech_stroke *stroke)
+static void mech_drag_follow(struct mech_drag *drag, const struct sim_floor_texture *floor,
+                             const struct mech_stroke *stroke)
 {
     if (drag->contact == MECH_EDGE) {
-        at_edge(drag, stroke);
+        mech_drag_at_edge(drag, stroke);
         drag->lifted = false;
         drag->contact = drag->contact == MECH_EDGE ? MECH_EDGE : MECH_STICKS;
         return;
     }
-    double input = fmax(0, pressed(drag, floor)), along;
+    double input = fmax(0, mech_drag_pressed(drag, floor)), along;
     drag->ground = input;
     if (drag->contact == MECH_HOOKED) {
-        drag->behind += stroke->travel;
-        along = drag->anchor = held_deflection(drag, drag->behind) + drag->caught_offset;
-        if (pulled_straight(drag)) {
+        drag->hook.behind += stroke->travel;
+        along = drag->anchor = mech_drag_held_deflection(drag, drag->hook.behind) + drag->hook.offset;
+        if (mech_drag_pulled_straight(drag)) {
             drag->contact = MECH_STICKS;
             drag->height = stroke->height;
             drag->anchor = 0;
-        } else if (backed_off(drag, stroke->height)) {
+        } else if (mech_drag_backed_off(drag, stroke->height)) {
             drag->contact = MECH_STICKS;
         }
     } else {
@@ -275,53 +276,56 @@ static void follow(struct mech_drag *drag, const struct sim_floor_texture *floor
             drag->slips++;
         }
     }
-    mech_basis_settle(&drag->pinned, along, 0, &drag->motion[0]);
-    mech_basis_settle(&drag->pinned, input, 0, &drag->motion[1]);
-    drag->moment[0] = drag->pinned.moment_static * along;
-    drag->moment[1] = drag->pinned.moment_static * input;
+    mech_basis_settle(&drag->axes.pinned, along, 0, &drag->axes.motion[0]);
+    mech_basis_settle(&drag->axes.pinned, input, 0, &drag->axes.motion[1]);
+    drag->moment[0] = drag->axes.pinned.moment_static * along;
+    drag->moment[1] = drag->axes.pinned.moment_static * input;
 }
 
 /* A whisker that stands still comes to rest once its swing has faded. */
-static void stand(struct mech_drag *drag)
+static void mech_drag_stand(struct mech_drag *drag)
 {
     if (drag->contact == MECH_SLIPS || drag->contact == MECH_EDGE || drag->lifted)
         return;
-    if (mech_basis_swing(&drag->pinned, &drag->motion[0]) + mech_basis_swing(&drag->pinned, &drag->motion[1]) >
+    if (mech_basis_swing(&drag->axes.pinned, &drag->axes.motion[0]) +
+            mech_basis_swing(&drag->axes.pinned, &drag->axes.motion[1]) >
         MECH_FADED)
         return;
     for (int axis = 0; axis < 2; axis++)
-        mech_basis_settle(&drag->pinned, drag->motion[axis].input, 0, &drag->motion[axis]);
+        mech_basis_settle(&drag->axes.pinned, drag->axes.motion[axis].input, 0, &drag->axes.motion[axis]);
     drag->resting = true;
 }
 
 /* The floor falls away under the tip. */
-static void fall(struct mech_drag *drag)
+static void mech_drag_fall(struct mech_drag *drag)
 {
-    if (drag->lifted || !drag->vibrate)
+    if (drag->lifted || !drag->axes.vibrate)
         return;
-    mech_basis_change(&drag->pinned, &drag->free, &drag->motion[1], mech_basis_answer(&drag->pinned, &drag->motion[1]));
+    mech_basis_change(&drag->axes.pinned, &drag->axes.free, &drag->axes.motion[1],
+                      mech_basis_answer(&drag->axes.pinned, &drag->axes.motion[1]));
     drag->lifted = true;
 }
 
-static void meet_border(struct mech_drag *drag, const struct sim_floor_texture *floor, const struct mech_stroke *stroke)
+static void mech_drag_meet_border(struct mech_drag *drag, const struct sim_floor_texture *floor,
+                                  const struct mech_stroke *stroke)
 {
     double step = stroke->height - drag->height;
     bool up = step > 0 && stroke->travel > 0;
     if (step == 0 || drag->edge.ahead || drag->contact == MECH_HOOKED)
         return;
     if (up && floor->pile && step >= drag->lie.radius) {
-        hook(drag);
+        mech_drag_hook(drag);
         return;
     }
     double rise = mech_edge_rise(&drag->lie, step);
     if (up && rise > 0) {
         drag->edge = (struct mech_edge){.ahead = true, .ground = drag->ground, .rise = drag->ground + rise};
         drag->catches++;
-        touch_edge(drag);
+        mech_drag_touch_edge(drag);
         return;
     }
     if (step < 0)
-        fall(drag);
+        mech_drag_fall(drag);
     drag->height = stroke->height;
 }
 
@@ -332,19 +336,19 @@ void mech_drag_step(struct mech_drag *drag, const struct sim_floor_texture *floo
     if (!sound || (still && drag->resting))
         return;
     drag->resting = false;
-    meet_border(drag, floor, stroke);
+    mech_drag_meet_border(drag, floor, stroke);
     bool held = drag->contact == MECH_HOOKED || drag->contact == MECH_EDGE;
     mech_floor_move(&drag->profile, floor, held ? 0 : stroke->travel);
-    if (drag->vibrate)
-        vibrate(drag, floor, stroke);
+    if (drag->axes.vibrate)
+        mech_drag_vibrate(drag, floor, stroke);
     else
-        follow(drag, floor, stroke);
+        mech_drag_follow(drag, floor, stroke);
     if (drag->edge.ahead && drag->contact != MECH_EDGE)
-        watch_edge(drag, stroke);
+        mech_drag_watch_edge(drag, stroke);
     drag->base_rate = stroke->base_rate;
-    drag->moment[1] -= drag->pinned.moment_static * drag->stance.preload;
+    drag->moment[1] -= drag->axes.pinned.moment_static * drag->stance.preload;
     for (int axis = 0; axis < 2; axis++)
         drag->tilt[axis] = mech_whisker_stopped(&drag->whisker, drag->compliance * drag->moment[axis]);
     if (still)
-        stand(drag);
+        mech_drag_stand(drag);
 }

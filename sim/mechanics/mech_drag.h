@@ -40,25 +40,29 @@ struct mech_stroke {
     double base_rate; /* rate of turn of the mount in the plane of the path, rad/s */
 };
 
+/* A tip that a pile holds. Lengths in m. */
+struct mech_hook {
+    double behind, caught_at; /* of the tip behind the mount: now, and when it was caught */
+    double offset;            /* deflection when it was caught over what the angle accounts for */
+};
+
 struct mech_drag {
     struct mech_whisker whisker;
     struct mech_stance stance;
     struct mech_lie lie;
-    struct mech_basis free, pinned; /* at the tip */
-    struct mech_motion motion[2];
+    struct mech_axes axes;
     struct mech_floor profile;
     double compliance;
-    bool vibrate, resting;
+    bool resting;
     int contact;
     bool lifted;
     double ground; /* deflection across the path that the floor asked for at the last tick, m */
     double anchor; /* deflection of the tip along the path when it sticks, m */
     double base_rate;
     struct mech_edge edge;
+    struct mech_hook hook;
     double slip_side;          /* +1 or -1: the tip slips this way along the path */
     double height;             /* of the floor that the tip is on, m */
-    double behind, caught_at;  /* of a caught tip behind the mount, m: now, and when it was caught */
-    double caught_offset;      /* deflection when it was caught over what the angle accounts for, m */
     long slips, catches;       /* how many so far */
     double moment[2], tilt[2]; /* about the static preload; along the path, across it */
 };

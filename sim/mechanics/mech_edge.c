@@ -6,7 +6,7 @@
 #define SMALL_STEP 1e-6 /* of the length: for a slope by differences */
 enum { HALVINGS = 40 };
 
-static double dot(const double a[3], const double b[3])
+static double mech_edge_dot(const double a[3], const double b[3])
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
@@ -45,26 +45,27 @@ struct corner {
         across[2]; /* slip up the shaft and along the corner, per deflection along the normal and beside it */
 };
 
-static struct corner corner_at(const struct mech_lie *lie, const double at[2])
+static struct corner mech_edge_corner_at(const struct mech_lie *lie, const double at[2])
 {
     double tangent[3];
     for (int i = 0; i < 3; i++)
         tangent[i] = lie->shaft[i] + lie->turn * (at[0] * lie->axis[0][i] + at[1] * lie->axis[1][i]);
     double size = hypot(tangent[0], tangent[2]);
     const double normal[3] = {tangent[2] / size, 0, -tangent[0] / size}, along[3] = {normal[2], 0, -normal[0]};
-    double n[2] = {dot(normal, lie->axis[0]), dot(normal, lie->axis[1])}, push = hypot(n[0], n[1]);
+    double n[2] = {mech_edge_dot(normal, lie->axis[0]), mech_edge_dot(normal, lie->axis[1])}, push = hypot(n[0], n[1]);
     struct corner corner = {.normal = {n[0] / push, n[1] / push}, .push = push, .drive = -normal[0] / push};
     double towards[2][2] = {{corner.normal[0], corner.normal[1]}, {corner.normal[1], -corner.normal[0]}};
     corner.along_drive = along[0];
     for (int k = 0; k < 2; k++) {
-        corner.along[k] = towards[k][0] * dot(along, lie->axis[0]) + towards[k][1] * dot(along, lie->axis[1]);
+        corner.along[k] =
+            towards[k][0] * mech_edge_dot(along, lie->axis[0]) + towards[k][1] * mech_edge_dot(along, lie->axis[1]);
         corner.across[k] = towards[k][0] * lie->axis[0][1] + towards[k][1] * lie->axis[1][1];
     }
     return corner;
 }
 
-static void advance(const struct mech_axes *axes, const struct mech_basis *basis, struct mech_motion *motion,
-                    double input)
+static void mech_edge_advance(const struct mech_axes *axes, const struct mech_basis *basis, struct mech_motion *motion,
+                              double input)
 {
     if (axes->vibrate)
         mech_basis_step(basis, motion, input);
@@ -73,17 +74,17 @@ static void advance(const struct mech_axes *axes, const struct mech_basis *basis
 }
 
 /* Leads a free axis to a deflection within the tick. Returns the force that this takes, N. */
-static double lead(const struct mech_axes *axes, struct mech_motion *motion, double to)
+static double mech_edge_lead(const struct mech_axes *axes, struct mech_motion *motion, double to)
 {
-    mech_basis_change(axes->free, axes->pinned, motion, mech_basis_answer(axes->free, motion));
-    advance(axes, axes->pinned, motion, to);
-    double force = mech_basis_answer(axes->pinned, motion);
-    mech_basis_change(axes->pinned, axes->free, motion, force);
+    mech_basis_change(&axes->free, &axes->pinned, motion, mech_basis_answer(&axes->free, motion));
+    mech_edge_advance(axes, &axes->pinned, motion, to);
+    double force = mech_basis_answer(&axes->pinned, motion);
+    mech_basis_change(&axes->pinned, &axes->free, motion, force);
     return force;
 }
 
 /* Changes the two axes into those along the normal and beside it, and back. */
-static void mirror(struct mech_motion motion[2], const double normal[2])
+static void mech_edge_mirror(struct mech_motion motion[2], const double normal[2])
 {
     struct mech_motion was[2] = {motion[0], motion[1]};
     for (int k = 0; k < MECH_MODES; k++) {
@@ -99,15 +100,15 @@ static void mirror(struct mech_motion motion[2], const double normal[2])
 /* A tick of the axis beside the normal under Coulomb friction of this most. `travel` of the mount and `led`, deflection
  * along the normal, are the slip's other parts. The force acts within the tick, so it is solved for: the slip falls
  * with it on a straight line, and it falls with the slip. */
-static void rub(const struct mech_axes *axes, struct mech_motion *motion, const struct corner *corner, double most,
-                double travel, double led)
+static void mech_edge_rub(const struct mech_axes *axes, struct mech_motion *motion, const struct corner *corner,
+                          double most, double travel, double led)
 {
-    double before = mech_basis_answer(axes->free, motion), held = motion->input, low = -most, high = most;
+    double before = mech_basis_answer(&axes->free, motion), held = motion->input, low = -most, high = most;
     struct mech_motion trial = *motion, unit = {{0}, {0}, 0};
-    advance(axes, axes->free, &trial, held);
-    advance(axes, axes->free, &unit, 1);
-    double yields = mech_basis_answer(axes->free, &unit);
-    double rest = mech_basis_answer(axes->free, &trial) - before - yields * held;
+    mech_edge_advance(axes, &axes->free, &trial, held);
+    mech_edge_advance(axes, &axes->free, &unit, 1);
+    double yields = mech_basis_answer(&axes->free, &unit);
+    double rest = mech_basis_answer(&axes->free, &trial) - before - yields * held;
     for (int i = 0; i < HALVINGS; i++) {
         double force = (low + high) / 2, beside = rest + yields * force;
         double along = corner->along_drive * travel + corner->along[0] * led + corner->along[1] * beside;
@@ -115,30 +116,30 @@ static void rub(const struct mech_axes *axes, struct mech_motion *motion, const 
         double share = slip > 0 ? (along * corner->along[1] + across * corner->across[1]) / slip : 0;
         *(force + most * share > 0 ? &high : &low) = force;
     }
-    advance(axes, axes->free, motion, (low + high) / 2);
+    mech_edge_advance(axes, &axes->free, motion, (low + high) / 2);
 }
 
-static void read_deflection(const struct mech_axes *axes, double at[2])
+static void mech_edge_read_deflection(const struct mech_axes *axes, double at[2])
 {
     for (int i = 0; i < 2; i++)
-        at[i] = mech_basis_answer(axes->free, &axes->motion[i]);
+        at[i] = mech_basis_answer(&axes->free, &axes->motion[i]);
 }
 
 void mech_edge_touch(struct mech_edge *edge, const struct mech_axes *axes, bool on_floor)
 {
     edge->on_floor = on_floor;
     edge->travel = 0;
-    read_deflection(axes, edge->touched);
+    mech_edge_read_deflection(axes, edge->touched);
 }
 
 /* Floor and corner hold the tip: it moves along the corner only. */
-static int hold(struct mech_edge *edge, const struct mech_lie *lie, const struct mech_axes *axes,
-                const struct corner *corner, double friction, double travel)
+static int mech_edge_hold(struct mech_edge *edge, const struct mech_lie *lie, struct mech_axes *axes,
+                          const struct corner *corner, double friction, double travel)
 {
     const double *n = corner->normal;
     double along = n[0] * edge->touched[0] + n[1] * edge->touched[1] + corner->drive * travel;
-    double force0 = lead(axes, &axes->motion[0], (along - n[1] * edge->ground) / n[0]);
-    double force1 = lead(axes, &axes->motion[1], edge->ground);
+    double force0 = mech_edge_lead(axes, &axes->motion[0], (along - n[1] * edge->ground) / n[0]);
+    double force1 = mech_edge_lead(axes, &axes->motion[1], edge->ground);
     /* What of it the corner gives and what the floor, friction along the corner included. */
     double rub0 = copysign(friction, travel) * lie->axis[0][1], rub1 = copysign(friction, travel) * lie->axis[1][1];
     double up = 1 / lie->lift, c0 = corner->push * n[0] + rub0, c1 = corner->push * n[1] + rub1;
@@ -149,47 +150,47 @@ static int hold(struct mech_edge *edge, const struct mech_lie *lie, const struct
 }
 
 /* The shaft slides along the corner. */
-static int slide(struct mech_edge *edge, const struct mech_axes *axes, const struct corner *corner, double friction,
-                 double travel)
+static int mech_edge_slide(struct mech_edge *edge, struct mech_axes *axes, const struct corner *corner, double friction,
+                           double travel)
 {
     const double *n = corner->normal;
-    mirror(axes->motion, n);
-    double from = mech_basis_answer(axes->free, &axes->motion[0]);
+    mech_edge_mirror(axes->motion, n);
+    double from = mech_basis_answer(&axes->free, &axes->motion[0]);
     double to = n[0] * edge->touched[0] + n[1] * edge->touched[1] + corner->drive * travel;
-    double push = lead(axes, &axes->motion[0], to) / corner->push;
-    rub(axes, &axes->motion[1], corner, friction * fmax(0, push), travel, to - from);
-    mirror(axes->motion, n);
-    edge->on_floor = mech_basis_answer(axes->free, &axes->motion[1]) < edge->ground;
+    double push = mech_edge_lead(axes, &axes->motion[0], to) / corner->push;
+    mech_edge_rub(axes, &axes->motion[1], corner, friction * fmax(0, push), travel, to - from);
+    mech_edge_mirror(axes->motion, n);
+    edge->on_floor = mech_basis_answer(&axes->free, &axes->motion[1]) < edge->ground;
     return push > 0 ? MECH_EDGE_TOUCHED : MECH_EDGE_LEFT;
 }
 
-static int tick(struct mech_edge *edge, const struct mech_lie *lie, const struct mech_axes *axes,
-                const struct corner *corner, double friction, double travel)
+static int mech_edge_tick(struct mech_edge *edge, const struct mech_lie *lie, struct mech_axes *axes,
+                          const struct corner *corner, double friction, double travel)
 {
-    return edge->on_floor ? hold(edge, lie, axes, corner, friction, travel)
-                          : slide(edge, axes, corner, friction, travel);
+    return edge->on_floor ? mech_edge_hold(edge, lie, axes, corner, friction, travel)
+                          : mech_edge_slide(edge, axes, corner, friction, travel);
 }
 
 /* No whisker bends by more than its length, and no robot goes so far in a tick. */
-static bool beyond_reach(const struct mech_lie *lie, const double at[2], double travel)
+static bool mech_edge_beyond_reach(const struct mech_lie *lie, const double at[2], double travel)
 {
     return !(hypot(at[0], at[1]) < lie->length && fabs(travel) < lie->length);
 }
 
-int mech_edge_step(struct mech_edge *edge, const struct mech_lie *lie, const struct mech_axes *axes, double friction,
+int mech_edge_step(struct mech_edge *edge, const struct mech_lie *lie, struct mech_axes *axes, double friction,
                    double travel)
 {
-    if (beyond_reach(lie, edge->touched, travel))
+    if (mech_edge_beyond_reach(lie, edge->touched, travel))
         return MECH_EDGE_PASSED;
-    struct corner corner = corner_at(lie, edge->touched);
+    struct corner corner = mech_edge_corner_at(lie, edge->touched);
     struct mech_motion before[2] = {axes->motion[0], axes->motion[1]};
     bool was = edge->on_floor;
-    int state = tick(edge, lie, axes, &corner, friction, travel);
+    int state = mech_edge_tick(edge, lie, axes, &corner, friction, travel);
     if (edge->on_floor != was) { /* what holds at the tick's end holds in it: else the tip goes below the floor */
         memcpy(axes->motion, before, sizeof before);
-        state = tick(edge, lie, axes, &corner, friction, travel);
+        state = mech_edge_tick(edge, lie, axes, &corner, friction, travel);
     }
-    read_deflection(axes, edge->touched);
+    mech_edge_read_deflection(axes, edge->touched);
     edge->travel = 0;
     return edge->touched[1] >= edge->rise ? MECH_EDGE_PASSED : state;
 }
@@ -197,9 +198,9 @@ int mech_edge_step(struct mech_edge *edge, const struct mech_lie *lie, const str
 int mech_edge_watch(struct mech_edge *edge, const struct mech_lie *lie, const double at[2], double travel)
 {
     edge->travel += travel;
-    if (at[1] >= edge->rise || beyond_reach(lie, at, edge->travel))
+    if (at[1] >= edge->rise || mech_edge_beyond_reach(lie, at, edge->travel))
         return MECH_EDGE_PASSED;
-    struct corner corner = corner_at(lie, at);
+    struct corner corner = mech_edge_corner_at(lie, at);
     double beyond = corner.normal[0] * (at[0] - edge->touched[0]) + corner.normal[1] * (at[1] - edge->touched[1]);
     return beyond < corner.drive * edge->travel ? MECH_EDGE_TOUCHED : MECH_EDGE_LEFT;
 }

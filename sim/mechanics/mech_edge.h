@@ -36,11 +36,13 @@ struct mech_edge {
     double travel;        /* of the mount since then, m */
     bool ahead, on_floor; /* there is one; the tip touches the floor too */
 };
-/* What an edge moves: a whisker's axes, both as free whiskers with the force at the tip as input. */
+
+/* A whisker's two axes, in the bases of a tip that is free and of one that is pinned. An edge moves both axes as free
+ * whiskers with the force at the tip as input. */
 struct mech_axes {
-    const struct mech_basis *free, *pinned;
-    struct mech_motion *motion; /* two */
-    bool vibrate;               /* false: each tick at rest */
+    struct mech_basis free, pinned;
+    struct mech_motion motion[2];
+    bool vibrate; /* false: each tick at rest */
 };
 
 /* The lie of a whisker whose mount is `height` above the floor and whose tip is `behind` it along the path. */
@@ -54,7 +56,7 @@ double mech_edge_rise(const struct mech_lie *lie, double height);
 void mech_edge_touch(struct mech_edge *edge, const struct mech_axes *axes, bool on_floor);
 
 /* A tick at the corner, in which the mount travels on. Says whether the tip touches it still. */
-int mech_edge_step(struct mech_edge *edge, const struct mech_lie *lie, const struct mech_axes *axes, double friction,
+int mech_edge_step(struct mech_edge *edge, const struct mech_lie *lie, struct mech_axes *axes, double friction,
                    double travel);
 
 /* A tick off the corner that it has left: is it back? Deflections as they are now. */

@@ -149,14 +149,15 @@ static void test_stick_slip_with_vibration(void **state)
         start(&drag, &stance, &FLAT, 1);
         for (int i = 0; i < 40000; i++) {
             advance(&drag, &FLAT, k ? 0.4 : 0.01, 0);
-            double normal = drag.pinned.answer_static * stance.preload;
+            double normal = drag.axes.pinned.answer_static * stance.preload;
             if (drag.contact == MECH_STICKS)
-                assert_true(fabs(mech_basis_answer(&drag.pinned, &drag.motion[0])) <=
+                assert_true(fabs(mech_basis_answer(&drag.axes.pinned, &drag.axes.motion[0])) <=
                             (drag.whisker.friction + FLAT.friction_drop) * normal * 1.01);
         }
         slips[k] = drag.slips;
         if (k) /* sliding: kinetic friction, against the travel */
-            assert_share(drag.moment[0], -drag.whisker.friction * stance.preload * drag.pinned.moment_static, 0.02);
+            assert_share(drag.moment[0], -drag.whisker.friction * stance.preload * drag.axes.pinned.moment_static,
+                         0.02);
     }
     assert_true(slips[0] > 20);
     assert_true(slips[1] < 5);
