@@ -18,7 +18,7 @@ void nav_contact_rest(struct nav_contact *c, double alpha, double beta)
     c->settled = c->config.settle_samples;
 }
 
-static void settle(struct nav_contact *c, double alpha, double beta)
+static void contact_settle(struct nav_contact *c, double alpha, double beta)
 {
     c->settled++;
     c->rest[0] += (alpha - c->rest[0]) / c->settled;
@@ -26,7 +26,7 @@ static void settle(struct nav_contact *c, double alpha, double beta)
 }
 
 /* Only samples below the release threshold move the rest: what presses softly must not become the new rest at once. */
-static void follow_drift(struct nav_contact *c, double alpha, double beta)
+static void contact_follow_drift(struct nav_contact *c, double alpha, double beta)
 {
     double share = c->config.rest_samples > 1.0 ? 1.0 / c->config.rest_samples : 0.0;
     c->rest[0] += share * (alpha - c->rest[0]);
@@ -35,7 +35,7 @@ static void follow_drift(struct nav_contact *c, double alpha, double beta)
 
 /* Counts the samples between the thresholds, downwards below them: noise takes single samples across. true: so many
  * that it is drift. Contacts cross in milliseconds; drift faster than the rest follows stays. */
-static bool lingers(struct nav_contact *c, double deflection)
+static bool contact_lingers(struct nav_contact *c, double deflection)
 {
     double longest = fmax(LINGER * c->config.rest_samples, RINGING * c->config.release_samples);
     bool between = deflection >= c->config.release_counts && deflection <= c->config.onset_counts;
@@ -49,14 +49,14 @@ static bool lingers(struct nav_contact *c, double deflection)
 /* Draws the rest after the sample until it is deflected by no more than the release threshold. That takes a
  * soft press for drift by the difference of the thresholds at most; it is below the release threshold, so that nothing
  * is felt when the press ends, and the rest comes back. */
-static void draw_after(struct nav_contact *c, double alpha, double beta, double deflection)
+static void contact_draw_after(struct nav_contact *c, double alpha, double beta, double deflection)
 {
     double share = 1.0 - c->config.release_counts / deflection;
     c->rest[0] += share * (alpha - c->rest[0]);
     c->rest[1] += share * (beta - c->rest[1]);
 }
 
-static enum nav_contact_event begin_or_wait(struct nav_contact *c, double deflection)
+static enum nav_contact_event contact_begin_or_wait(struct nav_contact *c, double deflection)
 {
     if (!(deflection > c->config.onset_counts)) {
         c->run = 0;
@@ -73,10 +73,10 @@ static enum nav_contact_event begin_or_wait(struct nav_contact *c, double deflec
 }
 
 /* A contact also ends when what is left of it lingers: the rest has drifted meanwhile. */
-static enum nav_contact_event end_or_stay(struct nav_contact *c, double deflection)
+static enum nav_contact_event contact_end_or_stay(struct nav_contact *c, double deflection)
 {
     c->peak = fmax(c->peak, deflection);
-    bool drifted = lingers(c, deflection);
+    bool drifted = contact_lingers(c, deflection);
     c->run = deflection < c->config.release_counts ? c->run + 1 : 0;
     if (!drifted && c->run < c->config.release_samples)
         return NAV_CONTACT_NONE;
@@ -92,17 +92,17 @@ enum nav_contact_event nav_contact_update(struct nav_contact *c, double alpha, d
         return NAV_CONTACT_NONE;
     }
     if (c->settled < c->config.settle_samples) {
-        settle(c, alpha, beta);
+        contact_settle(c, alpha, beta);
         return NAV_CONTACT_NONE;
     }
     double deflection = hypot(alpha - c->rest[0], beta - c->rest[1]);
     if (c->touching)
-        return end_or_stay(c, deflection);
-    if (lingers(c, deflection))
-        draw_after(c, alpha, beta, deflection);
+        return contact_end_or_stay(c, deflection);
+    if (contact_lingers(c, deflection))
+        contact_draw_after(c, alpha, beta, deflection);
     else if (deflection < c->config.release_counts)
-        follow_drift(c, alpha, beta);
-    return begin_or_wait(c, deflection);
+        contact_follow_drift(c, alpha, beta);
+    return contact_begin_or_wait(c, deflection);
 }
 
 void nav_contact_run(struct nav_contact *c, const double *samples, const uint8_t *good, size_t n, uint8_t *events,

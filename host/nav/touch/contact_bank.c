@@ -30,7 +30,7 @@ enum { TILT, RATE };    /* state of the hypothesis that none of the others holds
 
 enum { N = NAV_CONTACT_STATES };
 
-static double square(double x)
+static double bank_square(double x)
 {
     return x * x;
 }
@@ -79,15 +79,15 @@ static void bank_add(struct nav_contact_filter *f, const struct nav_contact_step
     if (!bank_slope(f, part, step->tilt) || !nav_contact_look(f, part, &look))
         return;
     double lean = -look.tilt_by[FIRST] / look.tilt_by[SLOPE];
-    part->p[FIRST][FIRST] = square(spread);
-    part->p[FIRST][SLOPE] = part->p[SLOPE][FIRST] = lean * square(spread);
-    part->p[SLOPE][SLOPE] = square(lean * spread) + bank_noise_of(f, step) / square(look.tilt_by[SLOPE]);
+    part->p[FIRST][FIRST] = bank_square(spread);
+    part->p[FIRST][SLOPE] = part->p[SLOPE][FIRST] = lean * bank_square(spread);
+    part->p[SLOPE][SLOPE] = bank_square(lean * spread) + bank_noise_of(f, step) / bank_square(look.tilt_by[SLOPE]);
     part->p[ROUND][ROUND] =
-        part->corner ? 0.0 : square((part->tip ? TIP_CURVATURE_SD : SHAFT_CURVATURE_SD) * c->cone_m);
-    part->p[SPEED_X][SPEED_X] = part->p[SPEED_Y][SPEED_Y] = part->moving ? square(c->speed_sd / c->cone_m) : 0.0;
-    part->p[GAIN][GAIN] = square(c->gain_sd);
-    part->p[FRICTION][FRICTION] = square(c->friction_sd);
-    part->p[MOTION][MOTION] = square(c->motion_share);
+        part->corner ? 0.0 : bank_square((part->tip ? TIP_CURVATURE_SD : SHAFT_CURVATURE_SD) * c->cone_m);
+    part->p[SPEED_X][SPEED_X] = part->p[SPEED_Y][SPEED_Y] = part->moving ? bank_square(c->speed_sd / c->cone_m) : 0.0;
+    part->p[GAIN][GAIN] = bank_square(c->gain_sd);
+    part->p[FRICTION][FRICTION] = bank_square(c->friction_sd);
+    part->p[MOTION][MOTION] = bank_square(c->motion_share);
     f->parts++;
 }
 
@@ -110,7 +110,8 @@ static void bank_ring(struct nav_contact_filter *f, const struct nav_contact_ste
     f->ring *= exp(-2.0 * f->config.ring_damping * circle * step->seconds);
     if (!isfinite(rate))
         return;
-    f->ring += fmax(0.0, square(rate - f->rate) - 6.0 * step->variance / square(step->seconds)) / square(circle);
+    f->ring += fmax(0.0, bank_square(rate - f->rate) - 6.0 * step->variance / bank_square(step->seconds)) /
+               bank_square(circle);
     f->before = step->tilt;
     f->rate = rate;
 }
@@ -143,7 +144,7 @@ void nav_contact_bank_begin(struct nav_contact_filter *f, const struct nav_conta
     struct nav_contact_part other = {.other = true, .log_weight = log(c->other), .s[TILT] = step->tilt};
     other.s[RATE] = RATE_FIRST;
     other.p[TILT][TILT] = bank_noise_of(f, step);
-    other.p[RATE][RATE] = square(RATE_FIRST);
+    other.p[RATE][RATE] = bank_square(RATE_FIRST);
     if (c->other > 0.0)
         f->part[f->parts++] = other;
     bank_normalise(f);
@@ -182,14 +183,14 @@ static void bank_noise(const struct nav_contact_filter *f, const struct nav_cont
                        struct nav_contact_part *part, nav_contact_square by)
 {
     const struct nav_contact_filter_config *c = &f->config;
-    double variance = square(c->motion_share * bank_path(f, step) / step->seconds);
+    double variance = bank_square(c->motion_share * bank_path(f, step) / step->seconds);
     for (int i = 0; i < 2; i++)
         for (int j = 0; j < 2; j++)
             part->p[i][j] += variance * (by[i][SPEED_X] * by[j][SPEED_X] + by[i][SPEED_Y] * by[j][SPEED_Y]);
     if (!part->moving)
         return;
     for (int k = SPEED_X; k <= SPEED_Y; k++)
-        part->p[k][k] += square(c->speed_drift / c->cone_m) * step->seconds;
+        part->p[k][k] += bank_square(c->speed_drift / c->cone_m) * step->seconds;
 }
 
 /* Variance of what has the derivative `by`, and its covariance with the state. */
@@ -228,7 +229,7 @@ static bool bank_tilt(const struct nav_contact_filter *f, const struct nav_conta
     if (!nav_contact_look(f, part, &look))
         return false;
     double gain = exp(part->s[GAIN]);
-    bool gap = look.tilt < 0.0 && square(step->tilt - part->creep) < square(LEAST_TOUCH) * noise;
+    bool gap = look.tilt < 0.0 && bank_square(step->tilt - part->creep) < bank_square(LEAST_TOUCH) * noise;
     *tilt = gain * ((gap ? 0.0 : look.tilt) + part->creep);
     for (int k = 0; k < 3; k++)
         by[COLUMN[k]] = gap ? 0.0 : gain * look.tilt_by[k];
@@ -264,7 +265,7 @@ static double bank_margin(const struct nav_contact_filter *f, const struct nav_c
     if (!part->tip)
         return f->beam->tip - s[FIRST];
     by[SLOPE] = -1.0;
-    by[FRICTION] = -part->grip / (1.0 + square(s[FRICTION]));
+    by[FRICTION] = -part->grip / (1.0 + bank_square(s[FRICTION]));
     return s[FIRST] - part->grip * atan(s[FRICTION]) - s[SLOPE] - QUARTER;
 }
 
@@ -277,7 +278,7 @@ static void bank_turn(const struct nav_contact_filter *f, struct nav_contact_par
     part->tip = !part->tip;
     part->grip = -part->grip; /* along the whisker it is the other way than over the surface */
     s[FIRST] = part->tip ? s[SLOPE] + QUARTER + part->grip * atan(s[FRICTION]) + 0.8 * sd : f->beam->tip - 0.8 * sd;
-    part->p[FIRST][FIRST] = square(0.6 * sd);
+    part->p[FIRST][FIRST] = bank_square(0.6 * sd);
     if (!part->tip)
         s[ROUND] = fmax(s[ROUND], 0.0);
 }
@@ -324,16 +325,16 @@ static bool bank_predict(const struct nav_contact_filter *f, const struct nav_co
         by[TILT][RATE] = path;
         part->s[TILT] += path * part->s[RATE];
         bank_carry(part->p, by);
-        part->p[RATE][RATE] += square(RATE_DRIFT) * path;
+        part->p[RATE][RATE] += bank_square(RATE_DRIFT) * path;
         return true;
     }
     if (!nav_contact_move(f, step, part, by))
         return false;
     bank_carry(part->p, by);
     bank_noise(f, step, part, by);
-    part->p[GAIN][GAIN] += square(f->config.model_share) * fabs(part->s[SLOPE] - slope);
+    part->p[GAIN][GAIN] += bank_square(f->config.model_share) * fabs(part->s[SLOPE] - slope);
     if (slope <= 0.0 && part->s[SLOPE] > 0.0) /* from touch to touch, too */
-        part->p[GAIN][GAIN] += square(f->config.gain_sd);
+        part->p[GAIN][GAIN] += bank_square(f->config.gain_sd);
     return true;
 }
 
@@ -374,7 +375,7 @@ static bool bank_same(const struct nav_contact_part *a, const struct nav_contact
         a->caught != b->caught || a->grip * b->grip < 0.0)
         return false;
     for (int k = 0; k < N; k++)
-        if (!(square(a->s[k] - b->s[k]) <= square(SAME) * fmax(a->p[k][k], b->p[k][k]) + TINY))
+        if (!(bank_square(a->s[k] - b->s[k]) <= bank_square(SAME) * fmax(a->p[k][k], b->p[k][k]) + TINY))
             return false;
     return true;
 }
@@ -446,9 +447,9 @@ void nav_contact_bank_see(const struct nav_contact_filter *f, const struct nav_c
     by[SEEN_CURVATURE][ROUND] = 1.0 / cone;
     memcpy(cov, part->p, sizeof(nav_contact_square));
     bank_carry(cov, by);
-    cov[SEEN_X][SEEN_X] += square(POINT_LEAST_M);
-    cov[SEEN_Y][SEEN_Y] += square(POINT_LEAST_M);
-    cov[SEEN_NORMAL][SEEN_NORMAL] += square(NORMAL_LEAST);
+    cov[SEEN_X][SEEN_X] += bank_square(POINT_LEAST_M);
+    cov[SEEN_Y][SEEN_Y] += bank_square(POINT_LEAST_M);
+    cov[SEEN_NORMAL][SEEN_NORMAL] += bank_square(NORMAL_LEAST);
     const double *s = part->s;
     const double seen[N] = {cone * look.q[0],  cone * look.q[1], cone * s[SPEED_X],
                             cone * s[SPEED_Y], look.normal,      cone * (part->tip ? f->beam->tip : s[FIRST]),

@@ -88,7 +88,7 @@ struct equations {
     double slid; /* over the surface and along the whisker, towards the tip */
 };
 
-static double dot(const double a[2], const double b[2])
+static double geometry_dot(const double a[2], const double b[2])
 {
     return a[0] * b[0] + a[1] * b[1];
 }
@@ -124,14 +124,14 @@ static void geometry_point(const struct carried *to, const struct nav_contact_lo
 static void geometry_surface(const struct carried *to, double curvature, const struct nav_contact_look *old,
                              const struct nav_contact_look *now, double seconds, struct equations *e)
 {
-    double off[2] = {now->q[0] - to->q[0], now->q[1] - to->q[1]}, l = dot(off, to->t), bent = curvature * l;
+    double off[2] = {now->q[0] - to->q[0], now->q[1] - to->q[1]}, l = geometry_dot(off, to->t), bent = curvature * l;
     double lean[2] = {to->n[0] + bent * to->t[0], to->n[1] + bent * to->t[1]};
-    e->left[0] = dot(off, to->n) + 0.5 * bent * l;
+    e->left[0] = geometry_dot(off, to->n) + 0.5 * bent * l;
     e->left[1] = now->normal - to->normal + bent;
     e->by_old[0][ROUND] = 0.5 * l * l;
     e->by_old[1][ROUND] = l;
-    e->by_old[0][MOTION] = l * to->turn - dot(to->by_motion, lean);
-    e->by_old[1][MOTION] = to->turn - curvature * dot(to->by_motion, to->t);
+    e->by_old[0][MOTION] = l * to->turn - geometry_dot(to->by_motion, lean);
+    e->by_old[1][MOTION] = to->turn - curvature * geometry_dot(to->by_motion, to->t);
     for (int n = 0; n < 2; n++) {
         e->by_old[0][SPEED_X + n] = -seconds * lean[n];
         e->by_old[1][SPEED_X + n] = -seconds * curvature * to->t[n];
@@ -139,9 +139,10 @@ static void geometry_surface(const struct carried *to, double curvature, const s
     for (int k = 0; k < 3; k++) {
         double was[2];
         geometry_turned(to, old->q_by[k], was);
-        e->by_old[0][COLUMN[k]] = -dot(was, lean) - l * old->normal_by[k];
-        e->by_old[1][COLUMN[k]] = -old->normal_by[k] - curvature * dot(was, to->t);
-        double by_now[2] = {dot(now->q_by[k], lean), now->normal_by[k] + curvature * dot(now->q_by[k], to->t)};
+        e->by_old[0][COLUMN[k]] = -geometry_dot(was, lean) - l * old->normal_by[k];
+        e->by_old[1][COLUMN[k]] = -old->normal_by[k] - curvature * geometry_dot(was, to->t);
+        double by_now[2] = {geometry_dot(now->q_by[k], lean),
+                            now->normal_by[k] + curvature * geometry_dot(now->q_by[k], to->t)};
         for (int n = 0; n < 2; n++)
             if (k == 2)
                 e->by_old[n][FRICTION] += by_now[n];

@@ -27,7 +27,7 @@ struct line {
     int n;
 };
 
-static struct line line_through(const double *t, const double *p, int from, int to)
+static struct line shape_line_through(const double *t, const double *p, int from, int to)
 {
     struct line fit = {.n = to - from + 1};
     for (int i = from; i <= to; i++) {
@@ -45,14 +45,14 @@ static struct line line_through(const double *t, const double *p, int from, int 
     return fit;
 }
 
-static double line_at(const struct line *line, double t)
+static double shape_line_at(const struct line *line, double t)
 {
     return line->p + line->slope * (t - line->t);
 }
 
 /* Deflection of each bin, about the mean of the first ones, along the main direction: that of the sum of all
  * deflections, each weighted by its square. */
-static void lay_out(const struct nav_trace *trace, struct course *c, double *direction)
+static void shape_lay_out(const struct nav_trace *trace, struct course *c, double *direction)
 {
     double rest[NAV_TRACE_AXES] = {0}, sum[NAV_TRACE_AXES] = {0}, norm = 0.0;
     for (int i = 0; i < REST_BINS; i++)
@@ -83,7 +83,7 @@ static void lay_out(const struct nav_trace *trace, struct course *c, double *dir
     }
 }
 
-static void find_top(struct course *c)
+static void shape_find_top(struct course *c)
 {
     c->top = 0.0;
     for (int i = 0; i < c->n; i++)
@@ -91,7 +91,7 @@ static void find_top(struct course *c)
 }
 
 /* The push: the bins on the way up to the first that is near the top. */
-static void find_push(struct course *c)
+static void shape_find_push(struct course *c)
 {
     c->to = 0;
     while (c->to < c->n - 1 && c->p[c->to] < PUSH_TO * c->top)
@@ -105,7 +105,7 @@ static void find_push(struct course *c)
 }
 
 /* Noise of a bin from second differences, to which a steady push adds nothing. */
-static double jitter(const struct course *c)
+static double shape_jitter(const struct course *c)
 {
     double sum = 0.0;
     for (int i = 1; i < c->n - 1; i++)
@@ -114,12 +114,12 @@ static double jitter(const struct course *c)
 }
 
 /* Takes the mean before the push for the rest. Returns the RMS about it. */
-static double settle_rest(struct course *c)
+static double shape_settle_rest(struct course *c)
 {
     /* What the push takes to get that far is left out, and the bin in which the touch may be. */
     int last = c->before - 1 - (int)((c->to - c->from + 1) * PUSH_FROM / (PUSH_TO - PUSH_FROM));
     if (last < 2)
-        return jitter(c);
+        return shape_jitter(c);
     double mean = 0.0, square = 0.0;
     for (int i = 0; i <= last; i++)
         mean += c->p[i];
@@ -132,7 +132,7 @@ static double settle_rest(struct course *c)
     return sqrt(square / last);
 }
 
-static int first_above(const struct course *c, double share)
+static int shape_first_above(const struct course *c, double share)
 {
     int i = c->from;
     while (i < c->to && c->p[i] < share * c->top)
@@ -141,16 +141,16 @@ static int first_above(const struct course *c, double share)
 }
 
 /* Least-squares parabola over the push: its change of slope over its length as a share of the slope; RMS left over. */
-static double bow_of(const struct course *c, double *left_over)
+static double shape_bow_of(const struct course *c, double *left_over)
 {
-    struct line line = line_through(c->t, c->p, c->from, c->to);
+    struct line line = shape_line_through(c->t, c->p, c->from, c->to);
     double half = (c->t[c->to] - c->t[c->from]) / 2.0, scale = 1.0 / half;
     double square_mean = 0.0, qq = 0.0, qp = 0.0, pp = 0.0;
     for (int i = c->from; i <= c->to; i++)
         square_mean += (c->t[i] - line.t) * (c->t[i] - line.t);
     square_mean *= scale * scale / line.n;
     for (int i = c->from; i <= c->to; i++) {
-        double x = (c->t[i] - line.t) * scale, q = x * x - square_mean, p = c->p[i] - line_at(&line, c->t[i]);
+        double x = (c->t[i] - line.t) * scale, q = x * x - square_mean, p = c->p[i] - shape_line_at(&line, c->t[i]);
         qq += q * q;
         qp += q * p;
         pp += p * p;
@@ -161,17 +161,17 @@ static double bow_of(const struct course *c, double *left_over)
 }
 
 /* Last bin that still lies on the push's line. */
-static int last_on(const struct course *c, const struct line *late, double noise)
+static int shape_last_on(const struct course *c, const struct line *late, double noise)
 {
     double slack = fmax(DEPART * c->top, 5.0 * noise);
     int i = c->to;
-    while (i < c->n - 1 && c->p[i + 1] >= line_at(late, c->t[i + 1]) - slack)
+    while (i < c->n - 1 && c->p[i + 1] >= shape_line_at(late, c->t[i + 1]) - slack)
         i++;
     return i;
 }
 
 /* When the push stopped: where its line meets the line of what follows; the trace's end where nothing does. */
-static double stop_of(const struct course *c, const struct line *late, int last, double end_s)
+static double shape_stop_of(const struct course *c, const struct line *late, int last, double end_s)
 {
     if (last >= c->n - 2)
         return last == c->n - 1 ? end_s : c->t[last];
@@ -180,7 +180,7 @@ static double stop_of(const struct course *c, const struct line *late, int last,
         to++;
     if (to - from < 1)
         return c->t[last];
-    struct line after = line_through(c->t, c->p, from, to);
+    struct line after = shape_line_through(c->t, c->p, from, to);
     double corner = c->t[last];
     if (late->slope - after.slope > 0.3 * late->slope)
         corner = (after.p - after.slope * after.t - late->p + late->slope * late->t) / (late->slope - after.slope);
@@ -188,7 +188,7 @@ static double stop_of(const struct course *c, const struct line *late, int last,
 }
 
 /* When the deflection is back at rest: where the line of its last way down meets zero. */
-static double release_of(const struct course *c, int last)
+static double shape_release_of(const struct course *c, int last)
 {
     int low = last;
     while (low < c->n && c->p[low] > PUSH_FROM * c->top)
@@ -198,12 +198,12 @@ static double release_of(const struct course *c, int last)
         high--;
     if (low >= c->n || low - 1 - high < 1)
         return (double)NAN;
-    struct line line = line_through(c->t, c->p, high, low - 1);
+    struct line line = shape_line_through(c->t, c->p, high, low - 1);
     return line.slope < 0.0 ? line.t - line.p / line.slope : (double)NAN;
 }
 
 /* Value at a time, on straight lines between bins and beyond the ends. */
-static double value_at(const struct course *c, const double *values, double t)
+static double shape_value_at(const struct course *c, const double *values, double t)
 {
     int i = 0;
     while (i < c->n - 2 && c->t[i + 1] < t)
@@ -212,7 +212,7 @@ static double value_at(const struct course *c, const double *values, double t)
 }
 
 /* Longest run of equal samples in a channel that bends, as a share of all samples. */
-static double frozen_of(const struct nav_trace *trace, const double *direction)
+static double shape_frozen_of(const struct nav_trace *trace, const double *direction)
 {
     int longest = 0;
     for (int a = 0; a < trace->axes; a++)
@@ -221,30 +221,30 @@ static double frozen_of(const struct nav_trace *trace, const double *direction)
     return (double)longest / (double)trace->good;
 }
 
-static void measure(const struct nav_trace *trace, const struct course *c, double noise, struct nav_shape *shape)
+static void shape_measure(const struct nav_trace *trace, const struct course *c, double noise, struct nav_shape *shape)
 {
-    struct line early = line_through(c->t, c->p, c->from, first_above(c, ONSET_TO));
-    struct line late = line_through(c->t, c->p, first_above(c, LATE_FROM), c->to);
-    int last = last_on(c, &late, noise);
+    struct line early = shape_line_through(c->t, c->p, c->from, shape_first_above(c, ONSET_TO));
+    struct line late = shape_line_through(c->t, c->p, shape_first_above(c, LATE_FROM), c->to);
+    int last = shape_last_on(c, &late, noise);
     double left_over = 0.0;
     if (!(early.slope > 0.0) || !(late.slope > 0.0))
         return;
     double onset = early.t - early.p / early.slope;
-    double stop = stop_of(c, &late, last, trace->last.t_s);
-    double release = release_of(c, last);
+    double stop = shape_stop_of(c, &late, last, trace->last.t_s);
+    double release = shape_release_of(c, last);
     if (!(stop > onset))
         return;
-    shape->bow = bow_of(c, &left_over);
-    shape->peak = line_at(&late, stop);
+    shape->bow = shape_bow_of(c, &left_over);
+    shape->peak = shape_line_at(&late, stop);
     shape->slope = early.slope;
-    shape->turn = value_at(c, c->turn, stop) - value_at(c, c->turn, onset);
-    shape->told = value_at(c, c->told, stop) - value_at(c, c->told, onset);
+    shape->turn = shape_value_at(c, c->turn, stop) - shape_value_at(c, c->turn, onset);
+    shape->told = shape_value_at(c, c->told, stop) - shape_value_at(c, c->told, onset);
     shape->misfit = left_over / shape->peak;
     shape->back = release > stop ? log((release - stop) / (stop - onset)) : (double)NAN;
     shape->onset_s = trace->start_s + onset;
     shape->stop_s = trace->start_s + stop;
     shape->release_s = trace->start_s + release;
-    shape->frozen = frozen_of(trace, shape->direction) * trace->last.t_s / (stop - onset);
+    shape->frozen = shape_frozen_of(trace, shape->direction) * trace->last.t_s / (stop - onset);
     shape->quality = NAV_SHAPE_WHOLE;
 }
 
@@ -256,15 +256,15 @@ void nav_shape_of(const struct nav_trace *trace, struct nav_shape *shape)
     struct course c = {.n = trace->used};
     if (c.n < REST_BINS)
         return;
-    lay_out(trace, &c, shape->direction);
-    find_top(&c);
-    find_push(&c);
-    double noise = settle_rest(&c);
+    shape_lay_out(trace, &c, shape->direction);
+    shape_find_top(&c);
+    shape_find_push(&c);
+    double noise = shape_settle_rest(&c);
     if (!(c.top > STANDS_OUT * noise) || !(c.top > 0.0))
         return;
     shape->quality = NAV_SHAPE_PEAK;
     shape->raw_peak = shape->peak = c.top;
     shape->noise = noise / c.top;
     if (c.to - c.from >= 2)
-        measure(trace, &c, noise, shape);
+        shape_measure(trace, &c, noise, shape);
 }

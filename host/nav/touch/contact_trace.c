@@ -14,7 +14,7 @@ void nav_trace_begin(struct nav_trace *trace, int axes)
     trace->last = (struct nav_trace_point){0};
 }
 
-static void order(double *a, double *b)
+static void trace_order(double *a, double *b)
 {
     double low = *a < *b ? *a : *b;
     *b = *a < *b ? *b : *a;
@@ -22,19 +22,19 @@ static void order(double *a, double *b)
 }
 
 /* Median of five, by the comparisons that it takes. */
-static double median(double a, double b, double c, double d, double e)
+static double trace_median(double a, double b, double c, double d, double e)
 {
-    order(&a, &b);
-    order(&d, &e);
-    order(&a, &d);
-    order(&b, &e);
-    order(&b, &c);
-    order(&c, &d);
-    order(&b, &c);
+    trace_order(&a, &b);
+    trace_order(&d, &e);
+    trace_order(&a, &d);
+    trace_order(&b, &e);
+    trace_order(&b, &c);
+    trace_order(&c, &d);
+    trace_order(&b, &c);
     return c;
 }
 
-static void add_point(struct nav_trace_point *sum, const struct nav_trace_point *point, int axes)
+static void trace_add_point(struct nav_trace_point *sum, const struct nav_trace_point *point, int axes)
 {
     sum->t_s += point->t_s;
     sum->turn += point->turn;
@@ -43,11 +43,11 @@ static void add_point(struct nav_trace_point *sum, const struct nav_trace_point 
         sum->at[a] += point->at[a];
 }
 
-static void join_neighbours(struct nav_trace *trace)
+static void trace_join_neighbours(struct nav_trace *trace)
 {
     for (int i = 0; i < NAV_TRACE_BINS / 2; i++) {
         struct nav_trace_point joined = trace->sum[2 * i];
-        add_point(&joined, &trace->sum[2 * i + 1], trace->axes);
+        trace_add_point(&joined, &trace->sum[2 * i + 1], trace->axes);
         trace->sum[i] = joined;
     }
     trace->used = NAV_TRACE_BINS / 2;
@@ -55,29 +55,29 @@ static void join_neighbours(struct nav_trace *trace)
     trace->filled = trace->width;
 }
 
-static void bin_point(struct nav_trace *trace, const struct nav_trace_point *point)
+static void trace_bin_point(struct nav_trace *trace, const struct nav_trace_point *point)
 {
     if (trace->used == 0 || trace->filled == trace->width) {
         if (trace->used == NAV_TRACE_BINS)
-            join_neighbours(trace);
+            trace_join_neighbours(trace);
         trace->sum[trace->used++] = (struct nav_trace_point){0};
         trace->filled = 0;
     }
     trace->filled++;
-    add_point(&trace->sum[trace->used - 1], point, trace->axes);
+    trace_add_point(&trace->sum[trace->used - 1], point, trace->axes);
 }
 
 /* The middle one of the last five samples, its channels the medians. */
-static struct nav_trace_point middle(const struct nav_trace *trace)
+static struct nav_trace_point trace_middle(const struct nav_trace *trace)
 {
     const struct nav_trace_point *r = trace->recent;
     struct nav_trace_point point = r[(trace->good - 3) % NAV_TRACE_MEDIAN];
     for (int a = 0; a < trace->axes; a++)
-        point.at[a] = median(r[0].at[a], r[1].at[a], r[2].at[a], r[3].at[a], r[4].at[a]);
+        point.at[a] = trace_median(r[0].at[a], r[1].at[a], r[2].at[a], r[3].at[a], r[4].at[a]);
     return point;
 }
 
-static bool usable(const struct nav_trace *trace, double t_s, const double *sample)
+static bool trace_usable(const struct nav_trace *trace, double t_s, const double *sample)
 {
     bool fine = isfinite(t_s) && (trace->good == 0 || t_s - trace->start_s > trace->last.t_s);
     for (int a = 0; a < trace->axes; a++)
@@ -85,7 +85,7 @@ static bool usable(const struct nav_trace *trace, double t_s, const double *samp
     return fine;
 }
 
-static void count_equal(struct nav_trace *trace, const struct nav_trace_point *now)
+static void trace_count_equal(struct nav_trace *trace, const struct nav_trace_point *now)
 {
     for (int a = 0; a < trace->axes; a++) {
         bool same = trace->good > 0 && !(now->at[a] < trace->last.at[a]) && !(now->at[a] > trace->last.at[a]);
@@ -94,14 +94,14 @@ static void count_equal(struct nav_trace *trace, const struct nav_trace_point *n
     }
 }
 
-static double turned(double rate, double seconds)
+static double trace_turned(double rate, double seconds)
 {
     return isfinite(rate) ? fabs(rate) * seconds : seconds;
 }
 
 void nav_trace_add(struct nav_trace *trace, double t_s, const double *sample, double whisk_rad_s, double told_rad_s)
 {
-    if (!usable(trace, t_s, sample)) {
+    if (!trace_usable(trace, t_s, sample)) {
         trace->bad++;
         return;
     }
@@ -109,17 +109,17 @@ void nav_trace_add(struct nav_trace *trace, double t_s, const double *sample, do
         trace->start_s = t_s;
     double since = t_s - trace->start_s - trace->last.t_s;
     struct nav_trace_point now = {.t_s = t_s - trace->start_s,
-                                  .turn = trace->last.turn + turned(whisk_rad_s, since),
-                                  .told = trace->last.told + turned(told_rad_s, since)};
+                                  .turn = trace->last.turn + trace_turned(whisk_rad_s, since),
+                                  .told = trace->last.told + trace_turned(told_rad_s, since)};
     for (int a = 0; a < trace->axes; a++)
         now.at[a] = sample[a];
-    count_equal(trace, &now);
+    trace_count_equal(trace, &now);
     trace->last = now;
     trace->recent[trace->good % NAV_TRACE_MEDIAN] = now;
     trace->good++;
     if (trace->good >= NAV_TRACE_MEDIAN) {
-        struct nav_trace_point point = middle(trace);
-        bin_point(trace, &point);
+        struct nav_trace_point point = trace_middle(trace);
+        trace_bin_point(trace, &point);
     }
 }
 
