@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..arguments import add_ring, number_above, number_list, whole_number
+from ..arguments import add_ring, number_above, number_list, warn, whole_number
 from ..bridge.nodes import NodeError, read_nodes
 from ..bridge.ring import Reader
 from ..bridge.wide import LANES_MAX
@@ -149,7 +149,7 @@ def _progress(radius_mm: float, whisk: Whisk, number: int, wanted: int) -> str:
 
 
 def _verdict(path: Path) -> str:
-    whisks = read_whisks(path, with_radius=True)
+    whisks = read_whisks(path, with_radius=True, warn=warn)
     try:
         found = fit(whisks)
     except ValueError as error:

@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 
-from ..arguments import add_action, plain
+from ..arguments import add_action, plain, warn
 from ..bridge.nodes import check_node
 from ..tables import TableError, unwritable
 from ..touch.contact_filter import ContactFilter, Reports
@@ -12,6 +12,7 @@ from ..touch.radial import model as radial
 
 EXAMPLE = "whisker radial fit contacts.csv --out model.json"
 COLUMNS = "whisk_rad_s and base_rad_s, or push_mm_s, or depth_mm; direction_deg of the touch"
+DOUBTED = 0.5  # confidence
 KINDS = """paper or linear: equation 3, a line through the peaks; quadratic, rational: a curve instead; whisk: whole body
 whisks by the physics of the shaft, which the pilot needs to tell a face from a corner; press: a regression at several
 depths of a push, which answers during the press; default: the one that predicts left-out places best"""
@@ -38,7 +39,7 @@ def add(parser) -> None:
 
 
 def fit(arguments) -> int:
-    whisks = radial.read_whisks(arguments.contacts, with_radius=True)
+    whisks = radial.read_whisks(arguments.contacts, with_radius=True, warn=warn)
     try:
         found = radial.fit(whisks, arguments.model)
         radial.save(found.model, arguments.out)
@@ -58,17 +59,22 @@ def predict(arguments) -> int:
     model = radial.load(arguments.model)
     if arguments.during and not isinstance(model, radial.PressModel):
         raise TableError(arguments.model, None, "only a press model answers during a press; fit with '--model press'")
-    whisks = radial.read_whisks(arguments.contacts, with_radius=False)
+    whisks = radial.read_whisks(arguments.contacts, with_radius=False, warn=warn)
     check_node(model.node, whisks.node, arguments.model)
+    doubted = 0
     for contact, recorded, peak in zip(whisks.contact, whisks.recorded, whisks.peak_counts, strict=True):
         count = len(recorded.t_s)
         for end in (count * np.arange(1, 11) // 10) if arguments.during else (count,):
-            _predict(arguments, model, contact, recorded.until(end), None if arguments.during else peak)
+            sure = _predict(arguments, model, contact, recorded.until(end), None if arguments.during else peak)
+        doubted += sure < DOUBTED
+    if 2 * doubted > len(whisks.contact):
+        text = f"{doubted} of {len(whisks.contact)} contacts are unlike those of calibration"
+        warn(f"{arguments.contacts}: {text}; if whisker, sensor or channels have changed, record and fit anew")
     return 0
 
 
-def _predict(arguments, model, contact: str, recorded: radial.Contact, peak: float | None) -> None:
-    """One line on a contact, whole or so far."""
+def _predict(arguments, model, contact: str, recorded: radial.Contact, peak: float | None) -> float:
+    """One line on a contact, whole or so far; its confidence."""
     try:
         found = radial.estimate(model, recorded, peak)
     except ValueError as error:
@@ -77,19 +83,20 @@ def _predict(arguments, model, contact: str, recorded: radial.Contact, peak: flo
     if arguments.json:
         members = {name: value for name, value in found._asdict().items() if value is not None}
         print(json.dumps(plain({"contact": contact} | at_s | members)))
-        return
+        return found.confidence
     after = f"  after {at_s['t_s']:.3f} s" if at_s else ""
     direction = "" if found.direction_deg is None else f"  {found.direction_deg:g} degrees"
     print(
         f"{contact}{after}  {found.radius_mm:.2f} +- {found.sigma_mm:.2f} mm  {found.type}  {found.confidence:.2f}{direction}"
     )
+    return found.confidence
 
 
 def follow(arguments) -> int:
     model = radial.load(arguments.model)
     if not isinstance(model, radial.WhiskModel):
         raise TableError(arguments.model, None, "it is no model of whole whisks; fit with '--model whisk'")
-    whisks = radial.read_whisks(arguments.contacts, with_radius=False)
+    whisks = radial.read_whisks(arguments.contacts, with_radius=False, warn=warn)
     check_node(model.node, whisks.node, arguments.model)
     for contact, recorded in zip(whisks.contact, whisks.recorded, strict=True):
         try:

@@ -12,6 +12,7 @@ from ..bridge.wide import LANES_MAX, wide
 from ..errors import UserError
 from ..protocol import LANES, LIMITS
 from .contact import ONSET_COUNTS, Contact
+from .texture.spectral import SENSOR_STOPS
 
 TICKS_PER_S = LIMITS["clock_hz"] / LIMITS["tick_period"]
 BEFORE_TICKS = 500  # of a contact's recording that are before the touch: its rest is taken from them
@@ -42,6 +43,10 @@ class Rest:
         """What speaks against using it, with remedy; empty: nothing."""
         if self.bad > self.good:
             return "most samples are bad; see whisker doctor"
+        if np.isin(np.round(self.mean), SENSOR_STOPS).any():
+            return "an axis is at its stop; check how magnet and sensor stand to each other"
+        if (self.noise == 0.0).any():
+            return "an axis never changes; see whisker doctor"
         if self.noise.max() > ONSET_COUNTS:
             return "it moves; leave it untouched and measure again"
         return ""

@@ -11,8 +11,9 @@ import numpy as np
 from ...fields import Fields
 from ...files import read_json
 from ...native import as_doubles, doubles, ffi, lib
-from ...tables import TableError, numbers, read_columns
+from ...tables import TableError, Warn, ignore, numbers, read_columns
 from .curve import CurveModel, radii_of, tip_from
+from .faults import faulty, radii_of_contacts
 from .press import PressModel
 from .shape import Contact, shape_of
 from .whisk import WhiskModel
@@ -141,8 +142,9 @@ class Whisks:
         return self.recorded[0].samples.shape[1] if self.recorded else 0
 
 
-def read_whisks(path, with_radius: bool) -> Whisks:
-    """Contacts of a calibration CSV; `with_radius`: the column radius_mm is required, else not even read."""
+def read_whisks(path, with_radius: bool, warn: Warn = ignore) -> Whisks:
+    """Contacts of a calibration CSV; `with_radius`: the column radius_mm is required, else not even read, and contacts that
+    cannot be learned from are left out. `warn(line)` is called with each fault that does not keep it from being read."""
     text = read_columns(path, ["contact", "t_s"] + (["radius_mm"] if with_radius else []))
     channels = [name for name in text if name not in NO_CHANNEL]
     if not channels:
@@ -157,14 +159,17 @@ def read_whisks(path, with_radius: bool) -> Whisks:
         Contact(t_s[r], samples[r], **{member: None if of is None else of[r] for member, of in motion.items()})
         for r in rows
     ]
+    if not names:
+        raise TableError(path, 2, "no rows; record contacts first")
     peaks = np.array([peak_of(samples[r]) for r in rows])
-    radius = numbers(text["radius_mm"]) if with_radius else None
-    radii = None if radius is None else np.array([np.median(radius[r]) for r in rows])
+    radii = radii_of_contacts(path, names, numbers(text["radius_mm"]), rows) if with_radius else None
     bad = int((~np.isfinite(samples)).any(axis=1).sum())
     directions = _motion(text, DIRECTION_COLUMN)
     if directions is not None:
         directions = np.array([directions[r][0] for r in rows])
-    return Whisks(names, recorded, peaks, radii, bad, _node(path, text.get(NODE_COLUMN, [])), directions)
+    whisks = Whisks(names, recorded, peaks, radii, bad, _node(path, text.get(NODE_COLUMN, [])), directions)
+    unfit = faulty(path, channels, names, recorded, directions, warn)
+    return whisks.part(np.flatnonzero(~unfit)) if with_radius else whisks
 
 
 def _node(path, cells: list[str]) -> int | None:

@@ -1,7 +1,6 @@
 """Floor texture: the stationary naive Bayes classifier (paper, equation 1), recordings, and decisions of any model."""
 
 import json
-from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
@@ -11,7 +10,7 @@ import numpy as np
 from ...fields import Fields
 from ...files import UnreadableError, read_json
 from ...native import as_doubles, lib
-from ...tables import TableError, numbers, read_columns
+from ...tables import TableError, Warn, ignore, numbers, read_columns
 from .spectral import FORMAT as SPECTRAL_FORMAT
 from .spectral import SENSOR_STOPS, SpectralModel, no_model
 
@@ -28,13 +27,6 @@ STOPPED_MOST = 0.01  # share of a channel's samples at a stop of the sensor that
 STUCK_LEAST, STUCK_MOST = 16, 0.25  # samples, and share of a recording, that one value may last
 NO_DIGITS = str.maketrans("", "", "0123456789")
 RATES_APART = 0.1  # relative: recordings to be learnt together are sampled alike
-
-
-Warn = Callable[[str], object]
-
-
-def ignore(line: str) -> None:
-    """A fault that nobody asked for."""
 
 
 class TextureModel:
