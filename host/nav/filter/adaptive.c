@@ -303,33 +303,33 @@ static void adaptive_scatter(struct adaptive *a)
     a->touched += a->cloud.set.count;
 }
 
+/* Ends a search that has gone over all rows: what it found is drawn, or there was nothing elsewhere, or the cloud is
+ * wrong. */
+static void adaptive_end_search(struct adaptive *a, double present)
+{
+    const struct nav_adaptive_settings *s = &a->problem->settings.adaptive;
+    if (a->global.scattered < s->scattered && present > log(s->wake))
+        adaptive_draw_particles(a, adaptive_kidnap_probability(a));
+    else if (a->kidnap.ratio <= 0.0 && present <= log(s->wake))
+        adaptive_keep_particles(a);
+    else if (present > -log(s->wake))
+        adaptive_drop_particles(a);
+}
+
 static void adaptive_decide(struct adaptive *a)
 {
-    const struct nav_settings *s = &a->problem->settings;
     double present = adaptive_log_odds(a);
-    if (a->gaussian.carries && (present > log(s->adaptive.wake) || adaptive_gaussian_fails(&a->gaussian)))
+    bool kidnapped = present > log(a->problem->settings.adaptive.wake), shared = a->whole && a->local;
+    if (a->gaussian.carries && (kidnapped || adaptive_gaussian_fails(&a->gaussian)))
         adaptive_scatter(a);
-    if (!a->awake) {
-        if (present > log(s->adaptive.wake))
-            adaptive_start_search(a);
-        return;
-    }
-    if (a->whole && a->local && present > 0.0) { /* to look elsewhere costs what is known of the modes */
+    if (!a->awake ? kidnapped : shared && present > 0.0) /* to look elsewhere costs what is known of the modes */
         adaptive_start_search(a);
+    else if (!a->awake || !adaptive_global_current(&a->global, &a->log))
         return;
-    }
-    if (!adaptive_global_current(&a->global, &a->log))
-        return;
-    if (a->whole && a->local) {
+    else if (shared)
         adaptive_weigh_modes(a);
-        return;
-    }
-    if (a->global.scattered < s->adaptive.scattered && present > log(s->adaptive.wake))
-        adaptive_draw_particles(a, adaptive_kidnap_probability(a));
-    else if (a->kidnap.ratio <= 0.0 && present <= log(s->adaptive.wake))
-        adaptive_keep_particles(a);
-    else if (present > -log(s->adaptive.wake))
-        adaptive_drop_particles(a);
+    else
+        adaptive_end_search(a, present);
 }
 
 /* Lets the histogram work within what is left of the row's budget. */

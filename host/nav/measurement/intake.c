@@ -88,7 +88,7 @@ static struct nav_motion intake_take_odometry(struct nav_intake *in, const struc
 /* Distance from the robot's centre to the end of a sensor. */
 static double intake_lever(const struct nav_model *model)
 {
-    return hypot(model->x + model->length * model->c, model->y + model->length * model->s);
+    return hypot(model->place.x + model->length * model->place.c, model->place.y + model->length * model->place.s);
 }
 
 static void intake_add_path(struct nav_intake *in, const struct nav_motion *motion)

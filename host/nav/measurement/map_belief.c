@@ -98,9 +98,10 @@ static struct nav_map_suspect map_suspect_ray(const struct nav_likelihood *l, in
     double felt = l->reading[w][0], told = (code + 1.5) * ray->step;
     bool nothing = code >= ray->codes - 2, before = isfinite(felt) && (nothing || felt < told - NEAR_M);
     double far = before ? felt : told;
-    struct nav_map_suspect suspect = {.kind = before ? NAV_MAP_THING : NAV_MAP_BOX,
-                                      .x = nav_place_x(at, ray->x + far * ray->c, ray->y + far * ray->s),
-                                      .y = nav_place_y(at, ray->x + far * ray->c, ray->y + far * ray->s)};
+    struct nav_map_suspect suspect = {
+        .kind = before ? NAV_MAP_THING : NAV_MAP_BOX,
+        .x = nav_place_x(at, ray->place.x + far * ray->place.c, ray->place.y + far * ray->place.s),
+        .y = nav_place_y(at, ray->place.x + far * ray->place.c, ray->place.y + far * ray->place.s)};
     if (!before) /* of things `which` is 0 */
         suspect.which = nothing ? -1 : nav_obstacles_at(&l->obstacles, suspect.x, suspect.y);
     return suspect;
@@ -116,8 +117,8 @@ static double map_ratio(const struct nav_likelihood *l, int w, int code)
 static void map_pass(struct nav_likelihood *l, int w, const struct nav_place *at)
 {
     const struct nav_model *ray = &l->model[w];
-    double c = at->c * ray->c - at->s * ray->s, s = at->s * ray->c + at->c * ray->s;
-    double x0 = nav_place_x(at, ray->x, ray->y), y0 = nav_place_y(at, ray->x, ray->y);
+    double c = at->c * ray->place.c - at->s * ray->place.s, s = at->s * ray->place.c + at->c * ray->place.s;
+    double x0 = nav_place_x(at, ray->place.x, ray->place.y), y0 = nav_place_y(at, ray->place.x, ray->place.y);
     for (int n = 0; n < l->map.things; n++) {
         struct nav_map_thing *thing = &l->map.thing[n];
         double along = c * (thing->x - x0) + s * (thing->y - y0), across = c * (thing->y - y0) - s * (thing->x - x0);
@@ -133,8 +134,8 @@ static struct nav_map_suspect map_suspect(const struct nav_likelihood *l, int w,
     if (model->kind->distance)
         suspect = map_suspect_ray(l, w, at, code);
     else if (model->kind->floor && l->map.told->classes > 1)
-        suspect.which =
-            nav_arena_tile(l->map.told, nav_place_x(at, model->x, model->y), nav_place_y(at, model->x, model->y));
+        suspect.which = nav_arena_tile(l->map.told, nav_place_x(at, model->place.x, model->place.y),
+                                       nav_place_y(at, model->place.x, model->place.y));
     return suspect;
 }
 
@@ -261,8 +262,8 @@ void nav_map_apply(const struct nav_likelihood *l, const struct nav_place *at, u
         if (!ray->kind->distance || !isfinite(l->reading[w][0]) || !(l->table[w][codes[w]] < 0.0f))
             continue;
         double felt = l->reading[w][0];
-        double x = nav_place_x(at, ray->x + felt * ray->c, ray->y + felt * ray->s);
-        double y = nav_place_y(at, ray->x + felt * ray->c, ray->y + felt * ray->s);
+        double x = nav_place_x(at, ray->place.x + felt * ray->place.c, ray->place.y + felt * ray->place.s);
+        double y = nav_place_y(at, ray->place.x + felt * ray->place.c, ray->place.y + felt * ray->place.s);
         if (map_nearest(&l->map, x, y, THING_REACH_M, THING))
             codes[w] = (uint8_t)(ray->codes - 1);
     }

@@ -23,7 +23,7 @@ int nav_sensors_init(struct nav_sensors *s, const struct nav_arena *arena, const
             *model = (struct nav_model){.kind = NAV_MEASUREMENTS[k],
                                         .settings = settings,
                                         .index = s->count - s->first[k],
-                                        .c = 1.0,
+                                        .place.c = 1.0,
                                         .detail = INFINITY};
             if (model->kind->init(model, arena, robot, blur_m))
                 return -1;
@@ -46,7 +46,7 @@ struct nav_detail nav_sensors_detail(const struct nav_sensors *s)
     struct nav_detail finest = {INFINITY, 0.0};
     for (int w = 0; w < s->count; w++) {
         const struct nav_model *model = &s->model[w];
-        double lever = hypot(model->x, model->y);
+        double lever = hypot(model->place.x, model->place.y);
         if (model->detail > finest.detail)
             continue;
         finest.lever = model->detail < finest.detail ? lever : fmax(lever, finest.lever);
@@ -60,6 +60,6 @@ double nav_sensors_reach(const struct nav_sensors *s, const struct nav_robot *ro
     double reach = robot->body_radius;
     for (int w = 0; w < s->count; w++)
         if (s->model[w].reach > 0.0)
-            reach = fmax(reach, hypot(s->model[w].x, s->model[w].y) + s->model[w].reach);
+            reach = fmax(reach, hypot(s->model[w].place.x, s->model[w].place.y) + s->model[w].reach);
     return reach;
 }

@@ -31,7 +31,7 @@ struct nav_model {
     int index;                       /* among those of its kind */
     int first, values;               /* own sensors: its first cell in a row; doubles per reading */
     int codes;                       /* at most NAV_CODES_MOST, the last one "not known" */
-    double x, y, c, s;               /* place on the robot and direction, robot frame */
+    struct nav_place place;          /* on the robot, in its frame */
     double reach;                    /* m from there to the farthest point that it senses */
     double spacing;                  /* m of travel after which a reading counts in full */
     double detail;                   /* m over which what is expected of it changes; INFINITY: not told */

@@ -30,10 +30,10 @@ static int normal_init(struct nav_model *model, const struct nav_arena *arena, c
     const struct nav_ray *ray = &robot->ray[model->index];
     model->values = 2;
     model->codes = NORMAL_CODES + 1;
-    model->x = ray->x;
-    model->y = ray->y;
-    model->c = cos(ray->yaw);
-    model->s = sin(ray->yaw);
+    model->place.x = ray->x;
+    model->place.y = ray->y;
+    model->place.c = cos(ray->yaw);
+    model->place.s = sin(ray->yaw);
     model->length = ray->length;
     model->spacing = model->settings->radial.spacing_m;
     model->sigma = hypot(robot->radial_sigma, blur_m);
@@ -103,8 +103,8 @@ static struct normal_face normal_face_at(const struct nav_arena *near, double x,
 
 double nav_normal_direction(const struct nav_model *model, const struct nav_arena *near, const struct nav_place *at)
 {
-    double x = nav_place_x(at, model->x, model->y), y = nav_place_y(at, model->x, model->y);
-    double c = at->c * model->c - at->s * model->s, s = at->s * model->c + at->c * model->s;
+    double x = nav_place_x(at, model->place.x, model->place.y), y = nav_place_y(at, model->place.x, model->place.y);
+    double c = at->c * model->place.c - at->s * model->place.s, s = at->s * model->place.c + at->c * model->place.s;
     double range = nav_arena_range_along(near, x, y, c, s, model->reach);
     if (!(range > 0.0 && isfinite(range)))
         return NAN;

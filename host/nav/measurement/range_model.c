@@ -44,10 +44,10 @@ static int range_init(struct nav_model *model, const struct nav_arena *arena, co
     (void)arena;
     const struct nav_ray *ray = &robot->ray[model->index];
     model->values = 1;
-    model->x = ray->x;
-    model->y = ray->y;
-    model->c = cos(ray->yaw);
-    model->s = sin(ray->yaw);
+    model->place.x = ray->x;
+    model->place.y = ray->y;
+    model->place.c = cos(ray->yaw);
+    model->place.s = sin(ray->yaw);
     model->length = ray->length;
     model->spacing = model->settings->radial.spacing_m;
     model->sigma = hypot(robot->radial_sigma, blur_m);
@@ -113,10 +113,10 @@ static void range_expect(const struct nav_model *model, int count, const struct 
         const struct nav_model *ray = &model[r];
         codes[r] = (uint8_t)range_nothing(ray);
         if (near)
-            codes[r] =
-                range_code(ray, nav_arena_range_along(near, nav_place_x(at, ray->x, ray->y),
-                                                      nav_place_y(at, ray->x, ray->y), at->c * ray->c - at->s * ray->s,
-                                                      at->s * ray->c + at->c * ray->s, ray->reach));
+            codes[r] = range_code(ray, nav_arena_range_along(near, nav_place_x(at, ray->place.x, ray->place.y),
+                                                             nav_place_y(at, ray->place.x, ray->place.y),
+                                                             at->c * ray->place.c - at->s * ray->place.s,
+                                                             at->s * ray->place.c + at->c * ray->place.s, ray->reach));
     }
 }
 

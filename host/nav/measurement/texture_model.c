@@ -35,8 +35,8 @@ static int texture_init(struct nav_model *model, const struct nav_arena *arena, 
     (void)blur_m;
     model->values = arena->classes;
     model->codes = arena->classes + 1;
-    model->x = robot->tip[model->index].x;
-    model->y = robot->tip[model->index].y;
+    model->place.x = robot->tip[model->index].x;
+    model->place.y = robot->tip[model->index].y;
     model->detail = arena->classes > 1 ? arena->tile : (double)INFINITY;
     model->spacing = fmin(model->settings->texture.spacing_m, FRESH * model->detail);
     model->accuracy = ASSUMED_ACCURACY;
@@ -95,7 +95,8 @@ static void texture_expect(const struct nav_model *model, int count, const struc
     (void)near;
     for (int t = 0; t < count; t++) {
         const struct nav_model *tip = &model[t];
-        int texture = nav_arena_texture(arena, nav_place_x(at, tip->x, tip->y), nav_place_y(at, tip->x, tip->y));
+        int texture = nav_arena_texture(arena, nav_place_x(at, tip->place.x, tip->place.y),
+                                        nav_place_y(at, tip->place.x, tip->place.y));
         codes[t] = (uint8_t)(texture < tip->values ? texture : tip->values);
     }
 }
