@@ -13,33 +13,34 @@ def radii_of(fields: Fields, *names: str) -> list[float]:
     return [sigma, low, high]
 
 
-def tip_from(high_mm: float, sigma_mm: float) -> float:
-    """Radius from which a contact is the tip: near the outermost fitted one, by one sigma, at least TIP_MM."""
-    return high_mm - max(sigma_mm, TIP_MM)
+class Known:
+    """What models of known radii share. high_mm: the outermost of them; sigma_mm: error of a prediction."""
+
+    node: int | None = None  # whose whisker it is, where known
+    high_mm: float
+    sigma_mm: float
+
+    def contact_type(self, radius_mm: float) -> str:
+        """'tip' near the outermost fitted radius (one sigma, at least TIP_MM) or beyond it, else 'shaft'."""
+        return "tip" if radius_mm > self.high_mm - max(self.sigma_mm, TIP_MM) else "shaft"
 
 
 RADIUS_MOST_MM = 1e5
 LEAST = 1e-12  # of what must be above 0
-GAUSS_NEWTON_STEPS = 12
-LEAST_BELOW = 0.05  # of the rational curve's denominator: no pole among the contacts
+LEAST_BELOW, BELOW_MOST = (
+    0.05,
+    50.0,
+)  # of the rational curve's denominator at the largest peak: no pole among the contacts
+GRID, ZOOMS = 21, 7
 
 
-def _left(numbers: np.ndarray, f: np.ndarray, radii: np.ndarray) -> float:
-    """Sum of squares that a rational curve leaves; infinite with a pole."""
-    below = 1.0 + numbers[2] * f
-    if below.min() < LEAST_BELOW:
-        return float("inf")
-    return float(np.sum((radii - (numbers[0] + numbers[1] * f) / below) ** 2))
-
-
-class CurveModel:
+class CurveModel(Known):
     """r = (c0 + c1 f + c2 f^2)/(1 + d f), f = peak/scale: `quadratic` has d = 0, `rational` c2 = 0.
 
     The rational one is exact for a conical whisker in a plug of any stiffness (whisker_physics section 4).
     """
 
     KINDS = ("quadratic", "rational")
-    node: int | None = None  # whose whisker it is, where known
     NUMBERS = ("c0", "c1", "c2", "d", "scale", "sigma_mm", "low_mm", "high_mm")
 
     def __init__(self, content: dict):
@@ -87,22 +88,20 @@ class CurveModel:
 
     @staticmethod
     def _solve(kind: str, f: np.ndarray, radii: np.ndarray) -> dict:
-        """Least squares of the radii; the rational curve by Gauss-Newton from the line, each step halved until it helps."""
+        """Least squares of the radii; given d, the rational curve is linear, and d is searched on ever finer grids."""
         if kind == "quadratic":
             c0, c1, c2 = np.linalg.lstsq(np.column_stack([np.ones(len(f)), f, f**2]), radii, rcond=None)[0]
             return {"c0": c0, "c1": c1, "c2": c2, "d": 0.0}
-        now = np.append(np.linalg.lstsq(np.column_stack([np.ones(len(f)), f]), radii, rcond=None)[0], 0.0)
-        for _ in range(GAUSS_NEWTON_STEPS):
-            below = 1.0 + now[2] * f
-            top = now[0] + now[1] * f
-            slopes = np.column_stack([1.0 / below, f / below, -top * f / below**2])
-            step = np.linalg.lstsq(slopes, radii - top / below, rcond=None)[0]
-            for _ in range(GAUSS_NEWTON_STEPS):
-                if _left(now + step, f, radii) < _left(now, f, radii):
-                    now = now + step
-                    break
-                step = step / 2.0
-        return {"c0": now[0], "c1": now[1], "c2": 0.0, "d": now[2]}
+        low, high = np.log([LEAST_BELOW, BELOW_MOST])
+        for _ in range(ZOOMS):
+            tried = np.linspace(low, high, GRID)
+            columns = np.stack([np.ones(len(f)), f], axis=1) / (1.0 + np.expm1(tried)[:, None, None] * f[:, None])
+            found = np.linalg.pinv(columns) @ radii
+            left = np.sum((np.einsum("gnk,gk->gn", columns, found) - radii) ** 2, axis=1)
+            best = int(np.argmin(left))
+            low, high = tried[max(0, best - 1)], tried[min(GRID - 1, best + 1)]
+        c0, c1 = found[best]
+        return {"c0": c0, "c1": c1, "c2": 0.0, "d": np.expm1(tried[best])}
 
     def predict(self, peak_counts: float) -> tuple[float, float]:
         """(radius mm, sigma mm) of one contact; the radius is held where the curve is known, and 10 % beyond."""
@@ -113,7 +112,3 @@ class CurveModel:
         slack = 0.1 * self.high_mm
         mm = (self.c0 + self.c1 * f + self.c2 * f * f) / below
         return float(np.clip(mm, self.low_mm - slack, self.high_mm + slack)), self.sigma_mm
-
-    def contact_type(self, radius_mm: float) -> str:
-        """As RadialModel.contact_type."""
-        return "tip" if radius_mm > tip_from(self.high_mm, self.sigma_mm) else "shaft"

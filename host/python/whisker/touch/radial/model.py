@@ -12,7 +12,7 @@ from ...fields import Fields
 from ...files import read_json
 from ...native import as_doubles, doubles, ffi, lib
 from ...tables import TableError, Warn, ignore, numbers, read_columns
-from .curve import CurveModel, radii_of, tip_from
+from .curve import CurveModel, Known, radii_of
 from .faults import faulty, radii_of_contacts
 from .press import PressModel
 from .shape import Contact, shape_of
@@ -59,10 +59,8 @@ def peak(samples: np.ndarray, rest) -> float:
     return lib.nav_radial_peak(doubles(samples, "samples", (count, axes)), count, axes, doubles(rest, "rest", (axes,)))
 
 
-class RadialModel:
+class RadialModel(Known):
     """r = a1 f1 + a0 (equation 3), its standard error, and the radii it was fitted on."""
-
-    node: int | None = None  # whose whisker it is, where known
 
     def __init__(self, a1: float, a0: float, sigma_mm: float, low_mm: float, high_mm: float):
         self._line = ffi.new("struct nav_radial *", dict(zip(FIELDS, (a1, a0, sigma_mm, low_mm, high_mm), strict=True)))
@@ -90,10 +88,6 @@ class RadialModel:
     def predict(self, peak_counts: float) -> tuple[float, float]:
         """(radius mm, sigma mm) of one contact."""
         return lib.nav_radial_predict(self._line, peak_counts), self._line.sigma_mm
-
-    def contact_type(self, radius_mm: float) -> str:
-        """'tip' near the outermost fitted radius (one sigma, at least TIP_MM) or beyond it, else 'shaft'."""
-        return "tip" if radius_mm > tip_from(self.high_mm, self.sigma_mm) else "shaft"
 
     @property
     def content(self) -> dict:

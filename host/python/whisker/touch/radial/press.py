@@ -15,7 +15,7 @@ import numpy as np
 
 from ...fields import HUGE, Fields
 from ...native import as_doubles
-from .curve import LEAST, RADIUS_MOST_MM, tip_from
+from .curve import LEAST, RADIUS_MOST_MM, Known
 from .shape import Contact
 
 STAGES = 16  # depths at which there is a regression, denser at the start
@@ -240,10 +240,9 @@ class Estimate(NamedTuple):
     direction_deg: float | None
 
 
-class PressModel:
+class PressModel(Known):
     """Stages by direction of the touch: one direction, None, where calibration names none."""
 
-    node: int | None = None  # whose whisker it is, where known
     NUMBERS = ("window", "low_mm", "high_mm", "place_mm", "contact_mm")
 
     def __init__(self, unit: str, axes: int, numbers: dict[str, float], stages: dict[float | None, list[Stage]]):
@@ -251,6 +250,7 @@ class PressModel:
         depth of contacts predicted without their place, and without themselves; low_mm, high_mm: radii calibrated."""
         self.unit, self.axes, self.stages = unit, axes, stages
         self.window, self.low_mm, self.high_mm, self.place_mm, self.contact_mm = (numbers[n] for n in self.NUMBERS)
+        self.sigma_mm = self.place_mm
 
     @classmethod
     def fit(cls, contacts: list[Contact], radius_mm, direction_deg=None) -> "PressModel":
@@ -298,10 +298,6 @@ class PressModel:
         anywhere = (1.0 - confidence) * (self.high_mm - self.low_mm) ** 2 / 12.0
         sigma_mm = math.sqrt(float(share @ ((mm * sigma) ** 2 + (mm - mean) ** 2)) + anywhere)
         return Estimate(mean, sigma_mm, confidence, list(self.stages)[best])
-
-    def contact_type(self, radius_mm: float) -> str:
-        """'tip' near the outermost fitted radius or beyond it, else 'shaft'."""
-        return "tip" if radius_mm > tip_from(self.high_mm, self.place_mm) else "shaft"
 
     @property
     def content(self) -> dict:

@@ -52,34 +52,12 @@ class WhiskModel:
         arrays = {name: list(getattr(self._c, name)) for name in self.ARRAYS}
         return scalars | arrays | {"covariance": [list(row) for row in self._c.covariance]}
 
-    @property
-    def axes(self) -> int:
-        return self._c.axes
-
-    @property
-    def low_mm(self) -> float:
-        return self._c.low_mm
-
-    @property
-    def high_mm(self) -> float:
-        return self._c.high_mm
-
-    @property
-    def tip_mm(self) -> float:
-        return self._c.tip_mm
-
-    @property
-    def kappa(self) -> float:
-        return self._c.kappa
-
-    @property
-    def cone_mm(self) -> float:
-        return self._c.cone_mm
-
-    @property
-    def spread(self) -> float:
-        """Relative standard deviation from whisk to whisk that is left."""
-        return self._c.spread
+    def __getattr__(self, name: str):
+        """A scalar member of `nav_whisk_model`, as kappa or low_mm; `spread`: relative standard deviation from whisk to
+        whisk that is left."""
+        if name in self.SCALARS:
+            return getattr(self._c, name)
+        raise AttributeError(name)
 
     def shape_of(self, contact: Contact):
         """struct nav_shape of a contact, its commanded rate as in calibration where it is not known with this one."""
