@@ -59,7 +59,9 @@ def test_what_models_tell_finds_no_room(into_full, tmp_path):
     model().save(tmp_path / "t.json")
     RadialModel(-0.011, 181.5, 2.5, 90.0, 138.0).save(tmp_path / "r.json")
     write_whisks(tmp_path / "w.csv", [500.0, 400.0], [90, 100])
-    (tmp_path / "d.csv").write_text("t_s,x,y\n" + "".join(f"{n / 2000},{n % 7},{n % 5}\n" for n in range(1000)))
+    (tmp_path / "d.csv").write_text(
+        "t_s,x,y\n" + "".join(f"{n / 2000},{100 + n % 7},{100 + n % 5}\n" for n in range(1000))
+    )
     for words in (["texture", "classify", tmp_path / "t.json", tmp_path / "d.csv"],):
         assert into_full(main, *words) == (1, f"whisker: {COMPLAINT}")
     assert into_full(main, "radial", "predict", tmp_path / "r.json", tmp_path / "w.csv") == (1, f"whisker: {COMPLAINT}")
