@@ -5,7 +5,7 @@ import pytest
 from whisks import write_whisks
 
 from whisker.tables import TableError
-from whisker.touch.radial.model import RadialModel, peak, read_whisks
+from whisker.touch.radial.model import RadialModel, _best, peak, read_whisks
 
 
 def test_peak_is_the_largest_length_about_rest():
@@ -88,3 +88,11 @@ def test_saved_models_load_alike(tmp_path):
     model = RadialModel(-0.011, 181.5, 2.5, 90.0, 138.0)
     model.save(tmp_path / "m.json")
     assert RadialModel.load(tmp_path / "m.json").predict(4000.0) == model.predict(4000.0)
+
+
+def test_models_whose_errors_at_left_out_places_are_alike_are_told_apart_by_left_out_contacts():
+    errors = {"far": (2.5, 1.0), "near": (2.0, 1.9), "nearly": (2.2, 1.6), "none": (np.inf, np.inf)}
+    errors = {name: np.array(pair) for name, pair in errors.items()}
+    assert _best(errors, 30) == "nearly"  # 2.0 is known to 13 %
+    assert _best(errors, 1000) == "near"
+    assert _best(errors, 5) == "far"

@@ -206,7 +206,8 @@ class Fitted(NamedTuple):
 def fit(whisks: Whisks, name: str = "default") -> Fitted:
     """A model of the contacts by its name (MODELS); ValueError when they do not determine one.
 
-    `default` is the model that predicts the contacts at left-out places best. The model belongs to the whisks' node.
+    `default` is the model that predicts the contacts at left-out places best; of those whose error there is within a
+    standard error of the best one's, the model that predicts left-out contacts best. The model belongs to the whisks' node.
     """
     model = _model_of(whisks, "linear" if name == "default" else name)
     if len(set(whisks.radius_mm.tolist())) == 1:
@@ -219,9 +220,15 @@ def fit(whisks: Whisks, name: str = "default") -> Fitted:
             found[one] = made, *_left_out_errors(whisks, one, made)
         except ValueError:
             continue
-    best = min(found, key=lambda one: tuple(error if np.isfinite(error) else np.inf for error in found[one][1:]))
+    best = _best({one: np.nan_to_num(errors, nan=np.inf) for one, (_, *errors) in found.items()}, len(whisks.contact))
     found[best][0].node = whisks.node
     return Fitted(*found[best], {one: tuple(errors) for one, (_, *errors) in found.items()})
+
+
+def _best(errors: dict[str, np.ndarray], contacts: int) -> str:
+    """By RMS errors of places and of contacts left out. The RMS of n errors has a relative standard error of (2 n)^-1/2."""
+    least = min(place for place, _ in errors.values()) * (1.0 + 1.0 / np.sqrt(2.0 * contacts))
+    return min((one for one in errors if errors[one][0] <= least), key=lambda one: tuple(errors[one][::-1]))
 
 
 def _model_of(whisks: Whisks, name: str):
