@@ -26,14 +26,16 @@ static inline double *nav_texture_slab_cut(struct nav_texture_slab *m, size_t n)
     return part;
 }
 
-/* Replaces the caller's array by a copy; all of its numbers must be finite. */
+/* Replaces the caller's array by a copy; all of its numbers must be finite. An array of length 0 may be NULL. */
 static inline void nav_texture_slab_copy(struct nav_texture_slab *m, const double **array, size_t n)
 {
     double *part = nav_texture_slab_cut(m, n);
     for (size_t i = 0; i < n; i++)
         m->refused |= !isfinite((*array)[i]);
+    if (part && n > 0)
+        memcpy(part, *array, n * sizeof *part);
     if (part)
-        *array = memcpy(part, *array, n * sizeof *part);
+        *array = part;
 }
 
 /* A new object like the one given, of so many bytes, with its arrays. NULL without memory or for an array to be copied
