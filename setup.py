@@ -9,6 +9,6 @@ from setuptools import setup
 
 editable = "editable_wheel" in sys.argv
 setup(
-    cffi_modules=[] if editable else ["host/python/whisker/build_ffi.py:wheel_ffi"],
+    cffi_modules=[] if editable else ["host/python/crunchbot/build_ffi.py:wheel_ffi"],
     options={"build": {"build_base": "build/wheel"}},
 )

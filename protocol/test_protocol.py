@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from whisker import protocol as p
+from crunchbot import protocol as p
 
 HERE = Path(__file__).parent
 

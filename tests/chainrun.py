@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from whisker.bridge.ring import FRAME, Reader
-from whisker.protocol import FRAME_FLAGS
-from whisker.simulation.scenes import make_scene
+from crunchbot.bridge.ring import FRAME, Reader
+from crunchbot.protocol import FRAME_FLAGS
+from crunchbot.simulation.scenes import make_scene
 
 ROOT = Path(__file__).resolve().parent.parent
 BUILD = ROOT / os.environ.get("WHISKER_BUILD", "build/release")

@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
-from whisker.demo.training import MOVES, fit_texture, flat
-from whisker.simulation.scenes import make_scene
-from whisker.simulation.world import write_surface_drives
-from whisker.touch.radial.model import RadialModel
-from whisker.touch.texture.model import read_training
+from crunchbot.demo.training import MOVES, fit_texture, flat
+from crunchbot.simulation.scenes import make_scene
+from crunchbot.simulation.world import write_surface_drives
+from crunchbot.touch.radial.model import RadialModel
+from crunchbot.touch.texture.model import read_training
 
 LINE = (-0.036, 181.0, 5.0, 90.0, 140.0)  # of a radial model
 

@@ -42,8 +42,8 @@ def test_a_forbidden_arrow_is_seen(tmp_path, monkeypatch):
     [
         "from ..pilot.base import Base",
         "from .. import pilot",
-        "from whisker.pilot import base",
-        "import whisker.pilot.base",
+        "from crunchbot.pilot import base",
+        "import crunchbot.pilot.base",
     ],
 )
 def test_a_room_that_reaches_back_is_seen(tmp_path, monkeypatch, line):

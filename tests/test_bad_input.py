@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 from chainrun import END_S, FAST_LINK, program, running, simulation, write_flat_scene
 
-from whisker.bridge.ring import Reader
-from whisker.protocol import WIRE_VERSION
-from whisker.scene import write
-from whisker.simulation.scenes import make_scene
+from crunchbot.bridge.ring import Reader
+from crunchbot.protocol import WIRE_VERSION
+from crunchbot.scene import write
+from crunchbot.simulation.scenes import make_scene
 
 RING = f"whisker-bad-{os.getpid()}"  # no other test's, which may run beside this one
 
@@ -104,7 +104,7 @@ def test_scene_with_an_unknown_key(tmp_path):
     write(tmp_path, scene)
     arena = tmp_path / "arena.toml"
     arena.write_text("colour = 'red'\n" + arena.read_text())
-    command = [sys.executable, "-m", "whisker.cli", "localise", tmp_path, "--filter", "grid"]
+    command = [sys.executable, "-m", "crunchbot.cli", "localise", tmp_path, "--filter", "grid"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=END_S)
     assert done.returncode == 2
     line = only_line(done.stderr, "whisker")

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from chainrun import BLOCK_TICKS, END_S, FAST_LINK, TICKS_PER_S, program, running, simulation
 
-from whisker.pilot.base import Base
-from whisker.simulation.link import SimLink
+from crunchbot.pilot.base import Base
+from crunchbot.simulation.link import SimLink
 
 SECONDS = 1.6
 X_M, Y_M = 1.5, 1.5

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from chainrun import BUILD, END_S
 
-from whisker.bridge.ring import FRAME
-from whisker.cli import main
-from whisker.protocol import LIMITS, SENSOR_ERRORS
-from whisker.recording import read
-from whisker.simulation.bridge import SimulationError, read_faults
+from crunchbot.bridge.ring import FRAME
+from crunchbot.cli import main
+from crunchbot.protocol import LIMITS, SENSOR_ERRORS
+from crunchbot.recording import read
+from crunchbot.simulation.bridge import SimulationError, read_faults
 
 SIX = 0x3F
 FAULTS = """
@@ -35,7 +35,7 @@ kind = "host_away"
 
 
 def command(*arguments):
-    return [sys.executable, "-m", "whisker.cli", *map(str, arguments)]
+    return [sys.executable, "-m", "crunchbot.cli", *map(str, arguments)]
 
 
 @pytest.fixture

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from chainrun import BUILD, END_S
 
-from whisker import scene as scenes
-from whisker.pilot.behaviour import WHISK_RAD_S
-from whisker.simulation.scenes import make_robot
-from whisker.simulation.world import radial_contacts
-from whisker.touch.mount import Mount
-from whisker.touch.radial.model import read_whisks, shape_of
+from crunchbot import scene as scenes
+from crunchbot.pilot.behaviour import WHISK_RAD_S
+from crunchbot.simulation.scenes import make_robot
+from crunchbot.simulation.world import radial_contacts
+from crunchbot.touch.mount import Mount
+from crunchbot.touch.radial.model import read_whisks, shape_of
 
 LANE, RADIUS_MM, WHISKS = 3, 110.0, 2  # object_2
 SEED = 3
@@ -40,7 +40,7 @@ def scene_with_post() -> scenes.Scene:
 
 
 def command(*arguments):
-    return [sys.executable, "-m", "whisker.cli", *map(str, arguments)]
+    return [sys.executable, "-m", "crunchbot.cli", *map(str, arguments)]
 
 
 def calibrate(ring, folder, out) -> list[str]:

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from chainrun import BLOCK_TICKS, BUILD, DECISION_TICKS, ROOT, TICKS_PER_S, is_last, record, write_flat_scene
 
-from whisker.nav import localise
-from whisker.protocol import CODES, LANES, STATUS_CODE_SHIFT
-from whisker.report.run import FILTERS
-from whisker.scene import load
+from crunchbot.nav import localise
+from crunchbot.protocol import CODES, LANES, STATUS_CODE_SHIFT
+from crunchbot.report.run import FILTERS
+from crunchbot.scene import load
 
 sys.path.insert(0, str(ROOT / "sim"))
 from signals import World  # noqa: E402
@@ -89,7 +89,19 @@ def test_usb_faults_change_no_byte_and_lane_faults_only_their_records(clean, tmp
 
 
 def demo(out, seed: int) -> dict:
-    command = [sys.executable, "-m", "whisker.demo", "--out", out, "--build-dir", BUILD, "--seed", seed, "--seconds", 4]
+    command = [
+        sys.executable,
+        "-m",
+        "crunchbot.demo",
+        "--out",
+        out,
+        "--build-dir",
+        BUILD,
+        "--seed",
+        seed,
+        "--seconds",
+        4,
+    ]
     done = subprocess.run([str(word) for word in command], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     lines = done.stdout.splitlines()

@@ -17,8 +17,8 @@ import numpy as np
 import pytest
 from chainrun import END_S, FAST_LINK, Cable, program, running, simulation, write_flat_scene
 
-from whisker.bridge.ring import Reader, RingError
-from whisker.protocol import LIMITS, WIRE_VERSION
+from crunchbot.bridge.ring import Reader, RingError
+from crunchbot.protocol import LIMITS, WIRE_VERSION
 
 LONG_S = 600
 LOOK_S = 0.05
@@ -237,7 +237,7 @@ set -e
 mount -t tmpfs none /run && mkdir /run/whiskerd
 echo stale: $(basename $(ls /dev/shm/$RING))
 RUNTIME_DIRECTORY=/run/whiskerd $D --wait 2>$LOG & service=$!
-"$PYTHON" -m whisker.cli info --json --wait 60
+"$PYTHON" -m crunchbot.cli info --json --wait 60
 echo files: $(ls /run/whiskerd)
 $D --wait || echo refused: $?
 RUNTIME_DIRECTORY=/run/other $D --wait || echo refused: $?
@@ -250,7 +250,7 @@ def test_the_service_has_its_ring_in_its_runtime_directory(tmp_path, ring):
     space = ["unshare", "--mount", *([] if os.geteuid() == 0 else ["--map-root-user"])]
     if subprocess.run([*space, "mount", "-t", "tmpfs", "none", "/run"], capture_output=True).returncode != 0:
         pytest.skip("this user may not have a mount namespace")
-    leave = f"import os; from whisker.bridge.ring import Writer; w = Writer('{ring}', 64); os._exit(0)"
+    leave = f"import os; from crunchbot.bridge.ring import Writer; w = Writer('{ring}', 64); os._exit(0)"
     subprocess.run([sys.executable, "-c", leave], check=True, timeout=END_S)
     log = tmp_path / "service.log"
     names = {"D": f"{program('whiskerd')} --ring {ring}", "RING": ring, "LOG": str(log), "PYTHON": sys.executable}
@@ -305,7 +305,7 @@ def test_nodes_on_request_while_frames_go_on(tmp_path, ring):
     with bridge(tmp_path, ring) as (process, _), Reader(ring, wait_s=10.0) as reader:
         until(lambda: reader.info.published > 100, process, reader)
         asked = subprocess.run(
-            [sys.executable, "-m", "whisker.cli", "info", "--nodes", "--ring", ring], capture_output=True, text=True
+            [sys.executable, "-m", "crunchbot.cli", "info", "--nodes", "--ring", ring], capture_output=True, text=True
         )
         lines = [process.stderr.readline()]
         lines += [process.stderr.readline() for _ in range(int(lines[0].split()[1]))]

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from chainrun import END_S, FAST_LINK, ROOT, program, simulation, write_flat_scene
 
-from whisker.bridge.ring import Reader
-from whisker.protocol import CODES, STATUS_CODE_SHIFT
+from crunchbot.bridge.ring import Reader
+from crunchbot.protocol import CODES, STATUS_CODE_SHIFT
 
 sys.path.insert(0, str(ROOT / "tools/firmware"))
 import intel_hex  # noqa: E402

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from chainrun import BUILD, END_S, Cable, program, running, simulation, write_flat_scene
 
-from whisker.bridge.ring import FRAME, Clock
-from whisker.protocol import CODES, LIMITS, STATUS_CODE_SHIFT
+from crunchbot.bridge.ring import FRAME, Clock
+from crunchbot.protocol import CODES, LIMITS, STATUS_CODE_SHIFT
 
 HIL = Path(__file__).parent / "hil"
 sys.path.insert(0, str(HIL))

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from chainrun import BUILD, END_S, ROOT, running, simulation, write_flat_scene
 
-from whisker.protocol import LIMITS
+from crunchbot.protocol import LIMITS
 
 EXAMPLES = ROOT / "host/libwhisker/examples"
 PRINTING = {"printf", "puts", "putchar", "fwrite", "fputs", "fputc", "fprintf", "vfprintf", "perror", "syslog"}
@@ -113,7 +113,7 @@ def test_programs_and_libraries_are_hardened(prefix, name):
 
 
 def test_python_module_is_hardened():
-    for module in (ROOT / "host/python/whisker").glob("_native*.so"):
+    for module in (ROOT / "host/python/crunchbot").glob("_native*.so"):
         header = run("readelf", "-W", "--program-headers", "--dynamic", module)
         assert "GNU_RELRO" in header and re.search(r"FLAGS.* (BIND_)?NOW", header), module
         assert "__stack_chk_fail" in undefined(module)

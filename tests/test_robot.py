@@ -17,13 +17,13 @@ from chainrun import BUILD, END_S, running, simulation, write_flat_scene
 from drills.relays import free_ports
 from quickmodels import quick_models
 
-from whisker import scene as scenes
-from whisker.bridge.ring import Reader
-from whisker.demo.chain import ChainRun, Link, run_chain
-from whisker.report.run import FILTERS
-from whisker.robot import link as links
-from whisker.robot import parts
-from whisker.simulation.scenes import make_scene
+from crunchbot import scene as scenes
+from crunchbot.bridge.ring import Reader
+from crunchbot.demo.chain import ChainRun, Link, run_chain
+from crunchbot.report.run import FILTERS
+from crunchbot.robot import link as links
+from crunchbot.robot import parts
+from crunchbot.simulation.scenes import make_scene
 
 SEED, SECONDS = 3, 5.0
 
@@ -168,7 +168,7 @@ def robot(folder, models):
         folder / "out",
     ]
     words += ["--ring", meeting.ring, "--first-port", meeting.first_port]
-    command = [sys.executable, "-m", "whisker.cli", *map(str, words)]
+    command = [sys.executable, "-m", "crunchbot.cli", *map(str, words)]
     process = subprocess.Popen(
         command, env=os.environ | {"WHISKER_BUILD": str(BUILD)}, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
     )

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from chainrun import END_S, FAST_LINK, program, running
 
-from whisker.bridge.ring import FRAME, Reader, Writer
-from whisker.bridge.wide import SECOND, wide
-from whisker.cli import main
-from whisker.protocol import LANES
+from crunchbot.bridge.ring import FRAME, Reader, Writer
+from crunchbot.bridge.wide import SECOND, wide
+from crunchbot.cli import main
+from crunchbot.protocol import LANES
 
 RING = f"whisker-two-{os.getpid()}"
 MICROFRAMES = 1 << 14

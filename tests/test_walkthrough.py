@@ -8,9 +8,9 @@ import pytest
 from chainrun import BUILD, ROOT, program
 
 TEXT = (ROOT / "docs/walkthrough.md").read_text()
-WHISKER = (sys.executable, "-m", "whisker.cli")
+WHISKER = (sys.executable, "-m", "crunchbot.cli")
 PROGRAMS = ("whiskerd", "whisker-base")
-VIEW = (sys.executable, "-m", "whisker.view")
+VIEW = (sys.executable, "-m", "crunchbot.view")
 ACTIONS = ("scene", "radial", "texture")  # commands whose second word is an action
 VARIABLES = ("BOARD", "SERIAL", "SEED", "TOOL", "BASE", "MODEL", "WHEELS_UP", "INTERACTIVE")
 

@@ -22,11 +22,11 @@ NEEDED = (
 )
 BUILT = shutil.ignore_patterns("*.so", "*.egg-info", "__pycache__", "tests")
 ROUND_TRIP = """
-import sys, numpy as np, whisker
-from whisker.bridge.ring import FRAME, Reader, Writer
-from whisker.nav.localise import filter_names
-from whisker.recording.messages import definition
-assert sys.argv[1] in whisker.__file__, whisker.__file__
+import sys, numpy as np, crunchbot
+from crunchbot.bridge.ring import FRAME, Reader, Writer
+from crunchbot.nav.localise import filter_names
+from crunchbot.recording.messages import definition
+assert sys.argv[1] in crunchbot.__file__, crunchbot.__file__
 frames = np.zeros(100, FRAME)
 frames["sequence"] = np.arange(100)
 with Writer("whisker-test-wheel", 256) as writer, Reader("whisker-test-wheel") as reader:
@@ -54,7 +54,7 @@ def venv(tmp_path_factory) -> Path:
     run(sys.executable, "-m", "pip", "wheel", *options, "--wheel-dir", place, place / "source")
     run(sys.executable, "-m", "venv", "--without-pip", place / "venv")
     site = Path(sysconfig.get_path("purelib", vars={"base": str(place / "venv")}))
-    wheel = next(place.glob("whisker-*.whl"))
+    wheel = next(place.glob("crunchbot-*.whl"))
     run(sys.executable, "-m", "pip", "--python", place / "venv/bin/python", "install", *options, wheel)
     (site / "lent.pth").write_text(sysconfig.get_path("purelib") + "\n")
     return place / "venv"

@@ -10,8 +10,8 @@ import sys
 from pathlib import Path
 from xml.sax.saxutils import escape
 
-from whisker.pilot.rules import RULES, Rule
-from whisker.pilot.states import WHISKING, State
+from crunchbot.pilot.rules import RULES, Rule
+from crunchbot.pilot.states import WHISKING, State
 
 OUT = Path(__file__).resolve().parents[1] / "docs" / "pictures" / "behaviour.svg"
 BOX = (132, 34)

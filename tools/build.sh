@@ -24,5 +24,5 @@ if ! cmake --build "$build"; then
     echo "build: compiling failed; the lines above name the file" >&2
     exit 1
 fi
-step "Python module for the library and the filters" .venv/bin/python host/python/whisker/build_ffi.py --build-dir "$build"
+step "Python module for the library and the filters" .venv/bin/python host/python/crunchbot/build_ffi.py --build-dir "$build"
 step "Python module for the simulated world" .venv/bin/python sim/signals/build_signals_ffi.py --build-dir "$build"

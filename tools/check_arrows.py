@@ -48,7 +48,7 @@ ALLOWED = {
 }
 # Room of the Python package -> rooms it may use besides its own and the modules that lie in no room, which use none.
 # A room stands below all it uses: nothing reaches back.
-PACKAGE = "host/python/whisker"
+PACKAGE = "host/python/crunchbot"
 ROOMS = {
     "": [],
     "bridge": [],

@@ -29,7 +29,7 @@ void daemon_log_begin(int verbose)
     with_times = getenv("WHISKER_LOG_TIMES") != NULL;
 }
 
-/* The local time to the millisecond and a space, as whisker.stamping writes it; empty: it is not asked for. */
+/* The local time to the millisecond and a space, as crunchbot.stamping writes it; empty: it is not asked for. */
 static const char *daemon_log_time(char *text, size_t room)
 {
     struct timespec now;

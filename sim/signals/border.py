@@ -1,4 +1,4 @@
-"""NumPy arrays as C pointers, as in whisker.native: with the shape that C will assume."""
+"""NumPy arrays as C pointers, as in crunchbot.native: with the shape that C will assume."""
 
 import numpy as np
 

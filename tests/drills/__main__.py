@@ -5,9 +5,9 @@ import json
 import sys
 from pathlib import Path
 
-from whisker.demo.training import learn
-from whisker.simulation.scenes import make_scene
-from whisker.stopping import interrupt_on_signals
+from crunchbot.demo.training import learn
+from crunchbot.simulation.scenes import make_scene
+from crunchbot.stopping import interrupt_on_signals
 
 from .course import FAULTS, Course, as_json
 from .machine import Plan

@@ -6,8 +6,8 @@ import time
 from bisect import bisect_left
 from dataclasses import asdict, dataclass, field, replace
 
-from whisker.robot.link import Link
-from whisker.simulation.scenes import make_robot
+from crunchbot.robot.link import Link
+from crunchbot.simulation.scenes import make_robot
 
 from .faults import FAULTS, WHISKER, Fault
 from .gaps import GAPS, Count, Gap, slipped

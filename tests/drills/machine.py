@@ -8,14 +8,14 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from whisker import scene as scenes
-from whisker.pilot.base import Base, BaseError
-from whisker.robot import parts
-from whisker.robot.link import Link
-from whisker.robot.logs import run_folder
-from whisker.robot.supervisor import Supervisor
-from whisker.robot.truth import TruthWatcher
-from whisker.simulation.scenes import make_scene
+from crunchbot import scene as scenes
+from crunchbot.pilot.base import Base, BaseError
+from crunchbot.robot import parts
+from crunchbot.robot.link import Link
+from crunchbot.robot.logs import run_folder
+from crunchbot.robot.supervisor import Supervisor
+from crunchbot.robot.truth import TruthWatcher
+from crunchbot.simulation.scenes import make_scene
 
 from .relays import Hands, Line, Network, free_ports
 

@@ -23,7 +23,7 @@ from pathlib import Path
 
 from quickmodels import quick_models
 
-from whisker.robot.children import DEAD
+from crunchbot.robot.children import DEAD
 
 from .relays import free_ports
 
@@ -45,10 +45,10 @@ WORDS = {
     "bridge": "whisker-bridge-sim",
     "whiskerd": "whiskerd",
     "guard": "whisker-base",
-    "pilot": "whisker.cli\0pilot",
-    "navigator": "whisker.cli\0navigator",
-    "bag": "whisker.cli\0bag",
-    "view": "whisker.cli\0view",
+    "pilot": "crunchbot.cli\0pilot",
+    "navigator": "crunchbot.cli\0navigator",
+    "bag": "crunchbot.cli\0bag",
+    "view": "crunchbot.cli\0view",
 }
 
 Hits = tuple[tuple[str, str], ...]  # (process, kill or stop), at once
@@ -141,7 +141,7 @@ class Robot:
         words += ["--out", out, "--ring", f"whisker-pairs-{mark[:8]}", "--first-port", port, "--view-port", port + 3]
         with (out / "output").open("w") as output:
             self.process = subprocess.Popen(
-                [sys.executable, "-m", "whisker.cli", *map(str, words)],
+                [sys.executable, "-m", "crunchbot.cli", *map(str, words)],
                 stdout=output,
                 stderr=output,
                 env=os.environ | {MARK: mark},

@@ -24,10 +24,10 @@ from pathlib import Path
 import numpy as np
 from quickmodels import quick_models
 
-from whisker import cli, stopping
-from whisker import scene as scenes
-from whisker.bridge.ring import FRAME, Writer
-from whisker.simulation.scenes import make_scene
+from crunchbot import cli, stopping
+from crunchbot import scene as scenes
+from crunchbot.bridge.ring import FRAME, Writer
+from crunchbot.simulation.scenes import make_scene
 
 from .relays import free_ports
 
@@ -244,7 +244,7 @@ def main() -> int:
     parser.add_argument("--out", type=Path, default=Path("build/drills/signals"))
     arguments = parser.parse_args()
     for name in cli.COMMANDS:
-        importlib.import_module(f"whisker.commands.{name.replace('-', '_')}")
+        importlib.import_module(f"crunchbot.commands.{name.replace('-', '_')}")
     campaign = Campaign(arguments.out, arguments.seed)
     campaign.fill(SHARED, arguments.pairs, BATCH, at_stop_code)
     made = prepare(arguments.out.resolve())

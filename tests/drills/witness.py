@@ -12,9 +12,9 @@ from bisect import bisect_right
 
 import numpy as np
 
-from whisker.bridge.ring import Reader, RingError
-from whisker.protocol import CODES, STATUS_CODE_SHIFT
-from whisker.robot.link import Link
+from crunchbot.bridge.ring import Reader, RingError
+from crunchbot.protocol import CODES, STATUS_CODE_SHIFT
+from crunchbot.robot.link import Link
 
 from .machine import Machine
 

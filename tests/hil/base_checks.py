@@ -9,8 +9,8 @@ from pathlib import Path
 
 from checks import SkipError, require, until
 
-from whisker.pilot.base import Base, BaseLost
-from whisker.simulation.bridge import program
+from crunchbot.pilot.base import Base, BaseLost
+from crunchbot.simulation.bridge import program
 
 START_S = 20.0  # for whisker-base and the first frame
 SILENCE_S = 10.0  # without a frame of the stream

@@ -9,13 +9,13 @@ from bridge_rig import NO_NODES, SETTLE_TICKS, Rig, await_frames, daemon
 from checks import CheckError, SkipError, require, until
 from usbdevice import differing_descriptors, opened
 
-from whisker.bridge import usbtree
-from whisker.bridge.ring import Clock
-from whisker.bridge.status import explain
-from whisker.native import lib
-from whisker.protocol import FRAME_BYTES, LANES, LIMITS, WIRE_VERSION
-from whisker.simulation.bridge import program
-from whisker.touch.calibration import measure_rest
+from crunchbot.bridge import usbtree
+from crunchbot.bridge.ring import Clock
+from crunchbot.bridge.status import explain
+from crunchbot.native import lib
+from crunchbot.protocol import FRAME_BYTES, LANES, LIMITS, WIRE_VERSION
+from crunchbot.simulation.bridge import program
+from crunchbot.touch.calibration import measure_rest
 
 REPLUG_FRAMES = 8192  # 4 s: from the return to the look at it
 PERSON_S = 300.0  # to reach for a plug

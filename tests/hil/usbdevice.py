@@ -9,8 +9,8 @@ import usb.core
 import usb.util
 from checks import CheckError, require
 
-from whisker.bridge.usbtree import Bridge
-from whisker.protocol import FRAME_BYTES, FRAME_FLAGS, FRAME_HEADER, LIMITS, REPORTS, WIRE_VERSION
+from crunchbot.bridge.usbtree import Bridge
+from crunchbot.protocol import FRAME_BYTES, FRAME_FLAGS, FRAME_HEADER, LIMITS, REPORTS, WIRE_VERSION
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "fpga/usb"))
 warnings.filterwarnings("ignore", category=DeprecationWarning)  # LUNA's, about Amaranth's

@@ -10,8 +10,8 @@ from pathlib import Path
 from guest import OUT, Device, Guest, Report, converse, pull_cable, qemu, redirected
 from image import MODULES, initramfs, kernel, load_order
 
-from whisker.protocol import LANES
-from whisker.simulation.bridge import program
+from crunchbot.protocol import LANES
+from crunchbot.simulation.bridge import program
 
 HERE = Path(__file__).resolve().parent
 NAME = "bridge"
@@ -22,7 +22,7 @@ PROGRAMS += ("kernel_hid_probe_hidraw", "kernel_hid_probe_libusb")
 
 def shared() -> list[str]:
     """Command of the bridge over USB/IP, as a user gives it."""
-    return [sys.executable, "-m", "whisker.cli", "bridge-sim", "--lanes", str(LANES), "--usbip", "0"]
+    return [sys.executable, "-m", "crunchbot.cli", "bridge-sim", "--lanes", str(LANES), "--usbip", "0"]
 
 
 def guest_words(vmlinuz: Path, packed: Path, port: str) -> list[str]:

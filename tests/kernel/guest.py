@@ -11,8 +11,8 @@ from pathlib import Path
 
 from image import MissingError
 
-from whisker.protocol import LANES
-from whisker.simulation.bridge import flat_scene, program
+from crunchbot.protocol import LANES
+from crunchbot.simulation.bridge import flat_scene, program
 
 ROOT = Path(__file__).resolve().parents[2]
 OUT = ROOT / "build/kernel"

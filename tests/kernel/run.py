@@ -17,7 +17,7 @@ import services_guest
 from guest import OUT, Report
 from image import MissingError, check_tools
 
-from whisker.simulation.bridge import SimulationError
+from crunchbot.simulation.bridge import SimulationError
 
 GUESTS = {"bridge": bridge_guest.run, "services": services_guest.run}
 

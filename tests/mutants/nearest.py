@@ -84,7 +84,7 @@ def _imports(root: Path, folders: tuple[str, ...]) -> dict[str, frozenset[str]]:
 
 @cache
 def _product(root: Path) -> dict[str, frozenset[str]]:
-    paths = sorted((root / PACKAGE / "whisker").rglob("*.py"))
+    paths = sorted((root / PACKAGE / "crunchbot").rglob("*.py"))
     modules = {path: _module(path.relative_to(root / PACKAGE)) for path in paths}
     return {path.relative_to(root).as_posix(): _names(path, name) for path, name in modules.items()}
 

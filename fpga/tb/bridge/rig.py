@@ -8,7 +8,7 @@ from bench import error_record, pulse, record, start_clock
 from cocotb.triggers import ClockCycles, FallingEdge, RisingEdge
 from nodes import Nodes
 
-from whisker.protocol import (
+from crunchbot.protocol import (
     CODES,
     FRAME_BYTES,
     FRAME_FLAGS,

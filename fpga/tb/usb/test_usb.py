@@ -13,7 +13,7 @@ from endpoints import FrameEndpoint, SilentEndpoint  # noqa: E402
 from hid_requests import FEATURE, GET_REPORT, READ, SET_IDLE, SET_REPORT, WRITTEN, HidRequests  # noqa: E402
 from usb_protocol.types import USBRequestRecipient, USBRequestType  # noqa: E402
 
-from whisker.protocol import LIMITS, REPORTS  # noqa: E402
+from crunchbot.protocol import LIMITS, REPORTS  # noqa: E402
 
 PACKET = LIMITS["bulk_packet"]
 CONTROL = REPORTS["control"]

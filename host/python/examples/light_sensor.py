@@ -8,9 +8,9 @@ import math
 
 import numpy as np
 
-from whisker.nav.filters import Filter
-from whisker.nav.own import OwnSensor
-from whisker.scene import Arena, Prior, Robot, Scene
+from crunchbot.nav.filters import Filter
+from crunchbot.nav.own import OwnSensor
+from crunchbot.scene import Arena, Prior, Robot, Scene
 
 SIZE_M = (2.0, 2.0)
 NOISE = 0.05

@@ -16,24 +16,24 @@ import pytest
 from models import CHANNELS, FEATURES, LENGTH, LIMITS, change, classifier, model, novelty
 from rings import ring_name
 
-import whisker
-from whisker.bridge.ring import FRAME, Writer
-from whisker.native import as_doubles, doubles, ffi, lib, octets
-from whisker.nav.filters import COMPONENT, Filter, Sensor, prior_fault
-from whisker.nav.weigher import Weigher
-from whisker.simulation.world import SIM
-from whisker.touch.contact import Contact
-from whisker.touch.contact_filter import ContactFilter
-from whisker.touch.radial.model import RadialModel, peak
-from whisker.touch.radial.shape import Contact as Whisk
-from whisker.touch.radial.shape import shape_of
-from whisker.touch.texture.change import Change
-from whisker.touch.texture.classifier import Classifier, blocks_of, plain_features
-from whisker.touch.texture.model import TextureModel
-from whisker.touch.texture.novelty import Novelty
-from whisker.touch.texture.spectral import forward
+import crunchbot
+from crunchbot.bridge.ring import FRAME, Writer
+from crunchbot.native import as_doubles, doubles, ffi, lib, octets
+from crunchbot.nav.filters import COMPONENT, Filter, Sensor, prior_fault
+from crunchbot.nav.weigher import Weigher
+from crunchbot.simulation.world import SIM
+from crunchbot.touch.contact import Contact
+from crunchbot.touch.contact_filter import ContactFilter
+from crunchbot.touch.radial.model import RadialModel, peak
+from crunchbot.touch.radial.shape import Contact as Whisk
+from crunchbot.touch.radial.shape import shape_of
+from crunchbot.touch.texture.change import Change
+from crunchbot.touch.texture.classifier import Classifier, blocks_of, plain_features
+from crunchbot.touch.texture.model import TextureModel
+from crunchbot.touch.texture.novelty import Novelty
+from crunchbot.touch.texture.spectral import forward
 
-PACKAGE = Path(whisker.__file__).parent
+PACKAGE = Path(crunchbot.__file__).parent
 HELPERS = {"doubles", "octets", "pointer"}
 AROUND = {"cast", "from_buffer", "ctypes"}  # ways around the helpers
 # Functions that hand over only arrays of their own making.

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from whisker import images, occupancy, scene
-from whisker.images import Grey, read_grey
-from whisker.occupancy import FREE, SOLID, UNKNOWN, boxes_of, cells_of, from_map, placed, read_map, to_map
-from whisker.scene_table import SceneError
+from crunchbot import images, occupancy, scene
+from crunchbot.images import Grey, read_grey
+from crunchbot.occupancy import FREE, SOLID, UNKNOWN, boxes_of, cells_of, from_map, placed, read_map, to_map
+from crunchbot.scene_table import SceneError
 
 YAML = (
     "image: {image}\nresolution: 0.1\norigin: [-1.0, 0.5, 0.0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"

@@ -11,13 +11,13 @@ from commandkit import run
 from folders import folder, recorded  # noqa: F401 - fixtures
 from models import model
 
-from whisker.fields import Fields
-from whisker.nav import localise
-from whisker.scene import OBSTACLES_MOST, WHISKERS_MOST, SceneError, load
-from whisker.simulation.bridge import SimulationError, read_faults
-from whisker.tables import TableError, read_columns
-from whisker.touch.radial import model as radial
-from whisker.touch.texture import model as texture
+from crunchbot.fields import Fields
+from crunchbot.nav import localise
+from crunchbot.scene import OBSTACLES_MOST, WHISKERS_MOST, SceneError, load
+from crunchbot.simulation.bridge import SimulationError, read_faults
+from crunchbot.tables import TableError, read_columns
+from crunchbot.touch.radial import model as radial
+from crunchbot.touch.texture import model as texture
 
 DEEP = 100_000
 BOM = b"\xef\xbb\xbf"
@@ -109,7 +109,7 @@ class Counted(str):
 def test_a_header_of_many_columns_is_looked_at_once_each(tmp_path, monkeypatch):
     columns = 40_000
     (tmp_path / "t.csv").write_text(",".join(f"c{n}" for n in range(columns)) + "\n")
-    monkeypatch.setattr("whisker.tables._name", lambda cell: Counted(cell.strip()))
+    monkeypatch.setattr("crunchbot.tables._name", lambda cell: Counted(cell.strip()))
     assert len(read_columns(tmp_path / "t.csv", ["c7", "c39999"])) == columns
     assert Counted.compared < 4 * columns
     (tmp_path / "t.csv").write_text(",".join(["x", *(f"c{n}" for n in range(columns)), "x"]) + "\n")
@@ -222,7 +222,7 @@ def test_a_wrong_value_is_shown_short():
 
 
 def test_a_file_larger_than_any_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr("whisker.files.BYTES_MOST", 1 << 20)
+    monkeypatch.setattr("crunchbot.files.BYTES_MOST", 1 << 20)
     (tmp_path / "m.json").write_text(" " * (1 << 20) + " ")
     with pytest.raises(TableError) as error:
         radial.load(tmp_path / "m.json")

@@ -4,7 +4,7 @@ import dataclasses
 
 import pytest
 
-from whisker import scene as scenes
+from crunchbot import scene as scenes
 
 ARENA_TOML = """\
 size_m = [1.0, 1.5]

@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from whisker.stamping import VARIABLE, Stamped, stamp_output
+from crunchbot.stamping import VARIABLE, Stamped, stamp_output
 
 TIME = r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d\.\d{3} "
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from whisker import protocol
+from crunchbot import protocol
 
 SIMULATION = os.environ.get("WHISKER_BRIDGE_SIM", "")
 CLIENT = os.environ.get("WHISKER_STREAM_CLIENT", "")
@@ -164,7 +164,7 @@ def test_a_message_out_of_turn_ends_the_run_with_one_line(tmp_path):
 
 def doctor(folder: Path, *options) -> subprocess.CompletedProcess:
     """`whisker doctor --pattern` with the simulated bridge plugged in, nobody else using it."""
-    words = [sys.executable, "-m", "whisker.cli", "doctor", "--pattern"]
+    words = [sys.executable, "-m", "crunchbot.cli", "doctor", "--pattern"]
     return subprocess.run(command(folder, 3, 1, words, *options), capture_output=True, text=True, timeout=TIMEOUT_S)
 
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from whisker.touch.contact_filter import ContactFilter
+from crunchbot.touch.contact_filter import ContactFilter
 
 from .scenes import FRICTION_SD, QUARTER, REACH_M, TICK_S, TIP, Corner, Draw, Plan, Scene, chained, lying, simulated
 
@@ -229,7 +229,7 @@ def follow(case: Case, kind: str, scene: Scene, least: np.ndarray | None) -> dic
 
 def cost_us(held: ContactFilter, bases: np.ndarray, tilt: np.ndarray) -> float:
     """CPU time of a sample in C, from a new contact on."""
-    from whisker.native import doubles, ffi, lib, octets
+    from crunchbot.native import doubles, ffi, lib, octets
 
     held.begin()
     count = len(tilt)

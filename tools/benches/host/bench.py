@@ -30,10 +30,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from tqdm import tqdm
 
-from whisker.bridge.ring import Reader
-from whisker.protocol import LANES, LIMITS
-from whisker.report import figures
-from whisker.simulation.scenes import make_scene
+from crunchbot.bridge.ring import Reader
+from crunchbot.protocol import LANES, LIMITS
+from crunchbot.report import figures
+from crunchbot.simulation.scenes import make_scene
 
 ROOT = Path(__file__).resolve().parents[3]
 RESULTS, CHARTS, CACHE = ROOT / "bench/results", ROOT / "docs/charts", ROOT / "build/bench/host"

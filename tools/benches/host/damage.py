@@ -21,7 +21,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 from tqdm import tqdm
 
-from whisker.recording.mcapfile import McapFile
+from crunchbot.recording.mcapfile import McapFile
 
 ROOT = Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host/python/tests" / room) for room in ("kit", "recording")]

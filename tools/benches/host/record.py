@@ -22,14 +22,14 @@ import numpy as np
 from matplotlib.figure import Figure
 from tqdm import tqdm
 
-from whisker.bridge.ring import FRAME, Reader, Writer
-from whisker.protocol import LANES, LIMITS
-from whisker.recording import read
-from whisker.recording.recorder import Recorder
-from whisker.recording.writing import RecordingWriter
-from whisker.report import figures
-from whisker.simulation.scenes import make_scene
-from whisker.simulation.world import World
+from crunchbot.bridge.ring import FRAME, Reader, Writer
+from crunchbot.protocol import LANES, LIMITS
+from crunchbot.recording import read
+from crunchbot.recording.recorder import Recorder
+from crunchbot.recording.writing import RecordingWriter
+from crunchbot.report import figures
+from crunchbot.simulation.scenes import make_scene
+from crunchbot.simulation.world import World
 
 ROOT = Path(__file__).resolve().parents[3]
 RESULTS, CHARTS = ROOT / "bench/results", ROOT / "docs/charts"
@@ -130,7 +130,7 @@ def instructions_per_frame(period: np.ndarray) -> float:
                 ring.publish(number(period[:count], 0))
                 out, log = Path(folder) / "callgrind", Path(folder) / "log"
                 command = ["valgrind", "--tool=callgrind", f"--callgrind-out-file={out}", f"--log-file={log}"]
-                command += [sys.executable, "-m", "whisker.cli", "record", f"{folder}/{count}.mcap", "--ring", name]
+                command += [sys.executable, "-m", "crunchbot.cli", "record", f"{folder}/{count}.mcap", "--ring", name]
                 environment = os.environ | {"PYTHONMALLOC": "pymalloc", "OPENBLAS_NUM_THREADS": "1"}
                 subprocess.run(
                     [*command, "--frames", str(count)], check=True, stdout=subprocess.DEVNULL, env=environment

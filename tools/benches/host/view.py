@@ -25,11 +25,11 @@ from matplotlib.figure import Figure
 from tqdm import tqdm
 from websockets.asyncio.client import connect
 
-from whisker.bridge.ring import FRAME, Writer
-from whisker.protocol import LANES, LIMITS
-from whisker.report import figures
-from whisker.robot.link import Link
-from whisker.robot.messages import (
+from crunchbot.bridge.ring import FRAME, Writer
+from crunchbot.protocol import LANES, LIMITS
+from crunchbot.report import figures
+from crunchbot.robot.link import Link
+from crunchbot.robot.messages import (
     BUMPS_MOST,
     TOPICS,
     VALUE,
@@ -171,7 +171,7 @@ def free_endpoint() -> str:
 def measure(part: str, pages: int) -> dict:
     """One run with so many pages that look at this part."""
     ring, over, results = f"whisker-bench-{os.getpid()}", multiprocessing.Event(), multiprocessing.Queue()
-    command = [sys.executable, "-m", "whisker.view", "--ring", ring, "--port", "0"]
+    command = [sys.executable, "-m", "crunchbot.view", "--ring", ring, "--port", "0"]
     target, place = write_ring, ring
     if part == "robot":
         target, place = tell_robot, free_endpoint()

@@ -21,9 +21,9 @@ from pathlib import Path
 
 import matplotlib
 
-from whisker.nav import localise
-from whisker.scenes import trials
-from whisker.scenes.sweep import BACKENDS, sweep
+from crunchbot.nav import localise
+from crunchbot.scenes import trials
+from crunchbot.scenes.sweep import BACKENDS, sweep
 
 from . import charts, figures, page, work
 

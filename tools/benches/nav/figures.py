@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from whisker.nav.scoring import auc
+from crunchbot.nav.scoring import auc
 
 LOST_M = 0.25
 BOOTSTRAP = 2000

@@ -15,18 +15,18 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
-from whisker import scenes
-from whisker.demo.level1 import explore
-from whisker.demo.training import learn
-from whisker.nav import localise
-from whisker.nav.observations import Observations, read_observations, tells_normals
-from whisker.nav.scoring import heading_errors, lock_row, position_errors
-from whisker.pilot.pilot import Pilot
-from whisker.robot.models import load_models
-from whisker.robot.rowfiles import Rows
-from whisker.scene import Prior, Scene
-from whisker.scenes.geometry import directions
-from whisker.simulation.scenes import make_scene
+from crunchbot import scenes
+from crunchbot.demo.level1 import explore
+from crunchbot.demo.training import learn
+from crunchbot.nav import localise
+from crunchbot.nav.observations import Observations, read_observations, tells_normals
+from crunchbot.nav.scoring import heading_errors, lock_row, position_errors
+from crunchbot.pilot.pilot import Pilot
+from crunchbot.robot.models import load_models
+from crunchbot.robot.rowfiles import Rows
+from crunchbot.scene import Prior, Scene
+from crunchbot.scenes.geometry import directions
+from crunchbot.simulation.scenes import make_scene
 
 ROOT = Path(__file__).resolve().parents[3]
 RESULT, PAGE = ROOT / "bench/results/nav_normals.json", ROOT / "docs/results_nav_normals.md"

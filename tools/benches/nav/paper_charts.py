@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse, Polygon, Rectangle
 
-from whisker.scene import Arena
+from crunchbot.scene import Arena
 
 SHADES = ("#ffffff", "#dcdcdc", "#b4b4b4")
 STYLES = (("-", "o"), ("--", "s"), (":", "^"), ("-.", "D"), ((0, (1, 1, 4, 1)), "v"))

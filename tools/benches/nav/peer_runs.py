@@ -24,11 +24,11 @@ import numpy as np
 from matplotlib.figure import Figure
 from tqdm import tqdm
 
-import whisker
-from whisker import scenes
-from whisker.nav import localise
-from whisker.nav.scoring import lock_row, position_errors
-from whisker.scene import Prior
+import crunchbot
+from crunchbot import scenes
+from crunchbot.nav import localise
+from crunchbot.nav.scoring import lock_row, position_errors
+from crunchbot.scene import Prior
 
 ROOT = Path(__file__).resolve().parents[3]
 RESULTS, CHARTS, CACHE = ROOT / "bench/results", ROOT / "docs/charts", ROOT / "build/bench/nav_peers"
@@ -94,7 +94,7 @@ def program(command: list, folder: Path, scene: Path, seed: int) -> Steps:
     """A peer's own process; one thread, as everybody has."""
     out = folder / "est.csv"
     alone = {name: "1" for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "NUMBA_NUM_THREADS")}
-    environment = os.environ | alone | {"PYTHONPATH": str(Path(whisker.__file__).parents[1])}
+    environment = os.environ | alone | {"PYTHONPATH": str(Path(crunchbot.__file__).parents[1])}
     words = [str(word) for word in (*command[:-1], scene, out, *command[-1], "--seed", seed)]
     done = subprocess.run(words, env=environment, capture_output=True, text=True)
     if done.returncode != 0:

@@ -16,13 +16,13 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from whisker.nav import localise
-from whisker.nav.filters import Filter
-from whisker.nav.scoring import lock_row, position_errors
-from whisker.scene import Arena, Prior, Scene
-from whisker.scenes import arenas, robots
-from whisker.scenes.families import Recipe
-from whisker.scenes.making import make_recipe
+from crunchbot.nav import localise
+from crunchbot.nav.filters import Filter
+from crunchbot.nav.scoring import lock_row, position_errors
+from crunchbot.scene import Arena, Prior, Scene
+from crunchbot.scenes import arenas, robots
+from crunchbot.scenes.families import Recipe
+from crunchbot.scenes.making import make_recipe
 
 ROOT = Path(__file__).resolve().parents[3]
 RESULT, PAGE, CHARTS = ROOT / "bench/results/nav_size.json", ROOT / "docs/results_nav_size.md", ROOT / "docs/charts"

@@ -14,11 +14,11 @@ import matplotlib
 import numpy as np
 from tqdm import tqdm
 
-from whisker import scenes
-from whisker.nav import localise
-from whisker.nav.estimates import Estimates
-from whisker.nav.judging import judge
-from whisker.scenes import benchmark
+from crunchbot import scenes
+from crunchbot.nav import localise
+from crunchbot.nav.estimates import Estimates
+from crunchbot.nav.judging import judge
+from crunchbot.scenes import benchmark
 
 from . import charts
 from .peer_runs import CHARTS, RESULTS, guests, mrpt_entries, python_entries

@@ -17,15 +17,15 @@ from pathlib import Path
 
 import numpy as np
 
-from whisker.nav import localise
-from whisker.nav.observations import Observations
-from whisker.nav.scoring import LOCK_M, LOCK_ROWS, heading_errors, lock_row, position_errors
-from whisker.scene import Arena, Scene
-from whisker.scenes import arenas, families, faults, robots
-from whisker.scenes.families import Recipe
-from whisker.scenes.making import Made, make_recipe
-from whisker.scenes.readings import World
-from whisker.scenes.walk import Pace
+from crunchbot.nav import localise
+from crunchbot.nav.observations import Observations
+from crunchbot.nav.scoring import LOCK_M, LOCK_ROWS, heading_errors, lock_row, position_errors
+from crunchbot.scene import Arena, Scene
+from crunchbot.scenes import arenas, families, faults, robots
+from crunchbot.scenes.families import Recipe
+from crunchbot.scenes.making import Made, make_recipe
+from crunchbot.scenes.readings import World
+from crunchbot.scenes.walk import Pace
 
 ROOT = Path(__file__).resolve().parents[3]
 RESULT, DESIGNS, ABLATIONS, LEFT = (

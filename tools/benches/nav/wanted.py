@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from whisker.nav import localise
+from crunchbot.nav import localise
 
 OURS = localise.default_filter()
 

@@ -19,8 +19,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from tqdm import tqdm
 
-from whisker.protocol import LIMITS
-from whisker.report import figures
+from crunchbot.protocol import LIMITS
+from crunchbot.report import figures
 
 from . import odds, page
 

@@ -8,7 +8,7 @@ from math import comb, sqrt
 
 import numpy as np
 
-from whisker import protocol
+from crunchbot import protocol
 
 BITS = 64
 RECORD = protocol.RECORD

@@ -1,6 +1,6 @@
 """docs/node_faults.md: what the bench measured, and how the miss rates are derived."""
 
-from whisker.protocol import LIMITS
+from crunchbot.protocol import LIMITS
 
 FATES = {1: "the old image", 2: "the loader", 4: "the new image"}
 CLASSES = {

@@ -20,11 +20,11 @@ import numpy as np
 from matplotlib.figure import Figure
 from tqdm import tqdm
 
-from whisker.native import doubles, ffi, lib
-from whisker.report.figures import SETTINGS
-from whisker.touch.radial import model as radial
-from whisker.touch.radial.shape import shape_of
-from whisker.touch.radial.whisk import WhiskModel
+from crunchbot.native import doubles, ffi, lib
+from crunchbot.report.figures import SETTINGS
+from crunchbot.touch.radial import model as radial
+from crunchbot.touch.radial.shape import shape_of
+from crunchbot.touch.radial.whisk import WhiskModel
 
 from .page import page
 from .real import METHODS, real_whisker

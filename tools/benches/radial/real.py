@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
-from whisker.touch.radial import model as radial
-from whisker.touch.radial.model import Contact, Whisks, peak_of
-from whisker.touch.radial.press import press_of
+from crunchbot.touch.radial import model as radial
+from crunchbot.touch.radial.model import Contact, Whisks, peak_of
+from crunchbot.touch.radial.press import press_of
 
 METHODS = ("paper", "quadratic", "rational", "whisk", "press", "default")
 HZ = 116.6  # 100 mm of travel at 10 mm/s in 1166 samples

@@ -14,9 +14,9 @@ import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from whisker.report import figures, long_figures
-from whisker.report.run import Run
-from whisker.stopping import interrupt_on_signals
+from crunchbot.report import figures, long_figures
+from crunchbot.report.run import Run
+from crunchbot.stopping import interrupt_on_signals
 
 from . import instructions, latency, levels, odometry, page
 
@@ -38,7 +38,7 @@ def once(path: Path, measure: Callable[[], dict]) -> dict:
 def long_run(build: Path, level: str, seed: int) -> dict:
     """The summary of a demo-long."""
     out = CACHE / f"long_{level}_{seed}"
-    command = [sys.executable, "-m", "whisker.demo.long", "--level", level, "--seed", seed, "--out", out]
+    command = [sys.executable, "-m", "crunchbot.demo.long", "--level", level, "--seed", seed, "--out", out]
     subprocess.run([str(word) for word in [*command, "--build-dir", build]], check=True, stdout=subprocess.DEVNULL)
     return json.loads((out / "summary.json").read_text())
 

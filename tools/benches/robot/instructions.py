@@ -9,9 +9,9 @@ import subprocess
 import tempfile
 from pathlib import Path
 
-from whisker import scene as scene_files
-from whisker.demo.chain import ChainRun, Link, run_chain
-from whisker.simulation.scenes import make_scene
+from crunchbot import scene as scene_files
+from crunchbot.demo.chain import ChainRun, Link, run_chain
+from crunchbot.simulation.scenes import make_scene
 
 ATOM_HZ = 0.8e9  # instructions per second of the paper's netbook
 PROGRAMS = ("pilot", "base")

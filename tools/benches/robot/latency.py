@@ -17,18 +17,18 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from whisker import scenes
-from whisker.demo.level1 import explore
-from whisker.nav import localise
-from whisker.nav.observations import Observations
-from whisker.pilot.behaviour import BLOCK_TICKS, ODOMETRY_TICKS, TICK_S
-from whisker.pilot.pilot import Pilot
-from whisker.robot.link import Link
-from whisker.robot.messages import EXPLORING, Observation, decode, encode
-from whisker.robot.models import load_models
-from whisker.robot.rows import RowPublisher, to_message, to_row
-from whisker.simulation.scenes import make_scene
-from whisker.simulation.world import World
+from crunchbot import scenes
+from crunchbot.demo.level1 import explore
+from crunchbot.nav import localise
+from crunchbot.nav.observations import Observations
+from crunchbot.pilot.behaviour import BLOCK_TICKS, ODOMETRY_TICKS, TICK_S
+from crunchbot.pilot.pilot import Pilot
+from crunchbot.robot.link import Link
+from crunchbot.robot.messages import EXPLORING, Observation, decode, encode
+from crunchbot.robot.models import load_models
+from crunchbot.robot.rows import RowPublisher, to_message, to_row
+from crunchbot.simulation.scenes import make_scene
+from crunchbot.simulation.world import World
 
 SEEDS, SECONDS = range(8201, 8207), 60
 PORTS = (17651, 17652)
@@ -188,7 +188,7 @@ def _round(publisher: RowPublisher, poses, row: dict) -> float:
 
 @contextmanager
 def _navigator(folder: str, name: str, listen: str, connect: str):
-    command = [sys.executable, "-m", "whisker.cli", "navigator", folder, "--lock-step", "--filter", name]
+    command = [sys.executable, "-m", "crunchbot.cli", "navigator", folder, "--lock-step", "--filter", name]
     process = subprocess.Popen([*command, "--listen", listen, "--connect", connect], stdout=subprocess.DEVNULL)
     try:
         yield

@@ -18,21 +18,21 @@ import numpy as np
 from matplotlib.figure import Figure
 from tqdm import tqdm
 
-from whisker import scene as scene_files
-from whisker import scenes
-from whisker.demo.__main__ import judge, read_dicts
-from whisker.demo.chain import ChainRun, Link, run_chain
-from whisker.demo.level1 import explore
-from whisker.demo.summary import pose_scores, texture_scores
-from whisker.demo.training import learn
-from whisker.nav import localise
-from whisker.pilot.pilot import Pilot
-from whisker.report.run import FILTERS
-from whisker.robot.models import load_models
-from whisker.scene import Scene
-from whisker.scenes import geometry, readings
-from whisker.scenes.families import SIGNALS
-from whisker.simulation.scenes import MECHANICS, make_scene, simulated
+from crunchbot import scene as scene_files
+from crunchbot import scenes
+from crunchbot.demo.__main__ import judge, read_dicts
+from crunchbot.demo.chain import ChainRun, Link, run_chain
+from crunchbot.demo.level1 import explore
+from crunchbot.demo.summary import pose_scores, texture_scores
+from crunchbot.demo.training import learn
+from crunchbot.nav import localise
+from crunchbot.pilot.pilot import Pilot
+from crunchbot.report.run import FILTERS
+from crunchbot.robot.models import load_models
+from crunchbot.scene import Scene
+from crunchbot.scenes import geometry, readings
+from crunchbot.scenes.families import SIGNALS
+from crunchbot.simulation.scenes import MECHANICS, make_scene, simulated
 
 SECONDS, ROWS, TICKS = 60.0, 600, 120_000
 LANES, LINK = 6, Link(6, 30, 5)

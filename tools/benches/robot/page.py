@@ -1,6 +1,6 @@
 """docs/results_robot.md of what tools/benches robot has measured so far."""
 
-from whisker.report.figures import TITLES as FILTERS
+from crunchbot.report.figures import TITLES as FILTERS
 
 from .levels import CASES, LEAST_SEEDS, SCORES, TITLES
 from .levels import SECONDS as LEVEL_S

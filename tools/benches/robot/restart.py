@@ -21,18 +21,18 @@ from pathlib import Path
 
 import numpy as np
 
-from whisker.demo.level1 import explore
-from whisker.demo.training import learn
-from whisker.pilot.pilot import Pilot
-from whisker.robot import belief
-from whisker.robot.inbox import Received
-from whisker.robot.memory import Memory
-from whisker.robot.models import load_models
-from whisker.robot.rows import Follower, to_message
-from whisker.robot.streams import Envelope
-from whisker.robot.track import Track
-from whisker.scene import Prior
-from whisker.simulation.scenes import make_scene
+from crunchbot.demo.level1 import explore
+from crunchbot.demo.training import learn
+from crunchbot.pilot.pilot import Pilot
+from crunchbot.robot import belief
+from crunchbot.robot.inbox import Received
+from crunchbot.robot.memory import Memory
+from crunchbot.robot.models import load_models
+from crunchbot.robot.rows import Follower, to_message
+from crunchbot.robot.streams import Envelope
+from crunchbot.robot.track import Track
+from crunchbot.scene import Prior
+from crunchbot.simulation.scenes import make_scene
 
 ROOT = Path(__file__).resolve().parents[3]
 RUNS = ROOT / "build/bench/restart"
@@ -77,7 +77,7 @@ def messages(rows: list[dict], stream: int, first: int = 0, sum_from=(0.0, 0.0, 
 
 
 class Navigator:
-    """What whisker.robot.navigator does with rows, but for the network."""
+    """What crunchbot.robot.navigator does with rows, but for the network."""
 
     def __init__(self, run: Run, path: Path | None):
         self._scene, self._memory = run.scene, Memory(path, run.scene, (FILTER,))

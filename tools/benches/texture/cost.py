@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from whisker.touch.texture.classifier import plain_features
-from whisker.touch.texture.model import TextureModel
+from crunchbot.touch.texture.classifier import plain_features
+from crunchbot.touch.texture.model import TextureModel
 
 from .scores import METHODS, WINDOW, decide, summary
 from .simulated import TEST_SEEDS, TRAIN_SEED, trained

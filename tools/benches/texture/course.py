@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from whisker.touch.texture.model import TextureModel
-from whisker.touch.texture.train import train
+from crunchbot.touch.texture.model import TextureModel
+from crunchbot.touch.texture.train import train
 
 from .scores import METHODS, WINDOW, decide
 from .trials import TICK_S, drives, strip_over

@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
-from whisker.touch.texture.classifier import plain_features
-from whisker.touch.texture.model import TextureModel, posterior
-from whisker.touch.texture.train import calibration_error, train
+from crunchbot.touch.texture.classifier import plain_features
+from crunchbot.touch.texture.model import TextureModel, posterior
+from crunchbot.touch.texture.train import calibration_error, train
 
 from .cost import peers
 from .scores import METHODS, detected, refusal_cut

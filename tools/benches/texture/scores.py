@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from whisker.touch.texture.classifier import plain_features
-from whisker.touch.texture.model import TextureModel, classify
-from whisker.touch.texture.spectral import SpectralModel
-from whisker.touch.texture.train import calibration_error, train
+from crunchbot.touch.texture.classifier import plain_features
+from crunchbot.touch.texture.model import TextureModel, classify
+from crunchbot.touch.texture.spectral import SpectralModel
+from crunchbot.touch.texture.train import calibration_error, train
 
 from .trials import LOOK, TICK_S
 

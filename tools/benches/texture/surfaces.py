@@ -10,18 +10,18 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from whisker.demo.training import calibrate, flat, read_whisks
-from whisker.pilot.feel import Drives, Feeler, Felt
-from whisker.pilot.states import EXPLORE_M_S, PUSH_TICKS, TICK_S
-from whisker.pilot.wheels import EXACT
-from whisker.scene import Arena, Scene, Whisker
-from whisker.simulation.scenes import OBJECT_TIP_DEG, make_scene
-from whisker.simulation.world import World
-from whisker.touch.contact import Contact
-from whisker.touch.mount import Mount
-from whisker.touch.radial.model import fit
-from whisker.touch.radial.whisk import WhiskModel
-from whisker.touch.texture.train import train
+from crunchbot.demo.training import calibrate, flat, read_whisks
+from crunchbot.pilot.feel import Drives, Feeler, Felt
+from crunchbot.pilot.states import EXPLORE_M_S, PUSH_TICKS, TICK_S
+from crunchbot.pilot.wheels import EXACT
+from crunchbot.scene import Arena, Scene, Whisker
+from crunchbot.simulation.scenes import OBJECT_TIP_DEG, make_scene
+from crunchbot.simulation.world import World
+from crunchbot.touch.contact import Contact
+from crunchbot.touch.mount import Mount
+from crunchbot.touch.radial.model import fit
+from crunchbot.touch.radial.whisk import WhiskModel
+from crunchbot.touch.texture.train import train
 
 from signals.recordings import ASLANT_RAD, BESIDE_M, SWEEPS, TIP_FIRST_RAD, surface_sweep  # isort: skip
 

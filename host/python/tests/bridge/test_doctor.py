@@ -11,8 +11,8 @@ import pytest
 from commandkit import END_S, STATS, live_ring, run, signals_as_before  # noqa: F401 - a fixture
 from rings import make_frames, ring_name
 
-from whisker.bridge import doctor, pattern
-from whisker.bridge.ring import FRAME, FoundRing, Reader, Writer
+from crunchbot.bridge import doctor, pattern
+from crunchbot.bridge.ring import FRAME, FoundRing, Reader, Writer
 
 
 @pytest.fixture
@@ -143,7 +143,7 @@ def test_doctor_reads_the_daemons_mind(host):
 
 def test_doctor_finds_rings_left_behind(tmp_path):
     name = ring_name()
-    program = f"import os; from whisker.bridge.ring import Writer; w = Writer('{name}', 64); os._exit(0)"
+    program = f"import os; from crunchbot.bridge.ring import Writer; w = Writer('{name}', 64); os._exit(0)"
     subprocess.run([sys.executable, "-c", program], check=True, timeout=END_S)
     try:
         found = doctor.stale_rings("whisker")

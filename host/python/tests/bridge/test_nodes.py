@@ -6,13 +6,13 @@ from commandkit import run, signals_as_before  # noqa: F401 - a fixture
 from rings import make_frames, ring_name
 from whisks import whisks
 
-from whisker.bridge.nodes import NodeError, read_nodes
-from whisker.bridge.ring import Writer
-from whisker.robot.models import check_nodes
-from whisker.simulation.scenes import make_robot
-from whisker.tables import TableError
-from whisker.touch.calibration import ContactsFile, Whisk
-from whisker.touch.radial import model as radial
+from crunchbot.bridge.nodes import NodeError, read_nodes
+from crunchbot.bridge.ring import Writer
+from crunchbot.robot.models import check_nodes
+from crunchbot.simulation.scenes import make_robot
+from crunchbot.tables import TableError
+from crunchbot.touch.calibration import ContactsFile, Whisk
+from crunchbot.touch.radial import model as radial
 
 TABLE = """lane  serial      version  options  wire  chip    loader  state
    0  4711        1.2      0x0001   3     0x0629  1       runs

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from rings import make_frames, ring_name
 
-from whisker.bridge.ring import FRAME, Clock, Reader, RingError, Writer, found_rings, signal_writer
-from whisker.protocol import LIMITS
+from crunchbot.bridge.ring import FRAME, Clock, Reader, RingError, Writer, found_rings, signal_writer
+from crunchbot.protocol import LIMITS
 
 CAPACITY = 256
 STRANGER = 4242  # a user id that no machine gives away

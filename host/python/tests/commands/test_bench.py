@@ -7,9 +7,9 @@ import pytest
 from commandkit import run
 from PIL import Image
 
-from whisker.nav.observations import observations_path, read_observations
-from whisker.scene import load
-from whisker.scenes import benchmark
+from crunchbot.nav.observations import observations_path, read_observations
+from crunchbot.scene import load
+from crunchbot.scenes import benchmark
 
 ROWS = 30
 

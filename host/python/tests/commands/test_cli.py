@@ -11,8 +11,8 @@ from folders import folder, recorded  # noqa: F401 - fixtures
 from PIL import Image
 from whisks import write_whisks
 
-from whisker import scene
-from whisker.nav import localise
+from crunchbot import scene
+from crunchbot.nav import localise
 
 
 def replace_cell(path, row, column, text):

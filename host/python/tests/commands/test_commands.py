@@ -13,18 +13,18 @@ import pytest
 from commandkit import END_S, command, live_ring, run, signals_as_before  # noqa: F401 - a fixture
 from rings import make_frames
 
-from whisker.cli import COMMANDS, _parser, main
-from whisker.commands import bridge_sim
-from whisker.commands.top import BARS, sparkline
-from whisker.protocol import WIRE_VERSION
-from whisker.recording import read
-from whisker.recording.writing import RecordingWriter
+from crunchbot.cli import COMMANDS, _parser, main
+from crunchbot.commands import bridge_sim
+from crunchbot.commands.top import BARS, sparkline
+from crunchbot.protocol import WIRE_VERSION
+from crunchbot.recording import read
+from crunchbot.recording.writing import RecordingWriter
 
 
 def test_help_names_every_command_and_imports_none(capsys):
     code, out, _ = run(capsys, "--help")
     assert code == 0 and all(f"\n  {name} " in out for name in COMMANDS)
-    program = "import sys; from whisker.cli import main; main(['--help']); print(sorted(sys.modules))"
+    program = "import sys; from crunchbot.cli import main; main(['--help']); print(sorted(sys.modules))"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=END_S)
     assert "numpy" not in done.stdout and "cffi" not in done.stdout and "argparse" in done.stdout
 

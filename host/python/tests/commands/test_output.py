@@ -11,11 +11,11 @@ from models import model
 from rings import make_frames
 from whisks import write_whisks
 
-from whisker.cli import COMMANDS, main
-from whisker.ends import exit_code
-from whisker.simulation.bridge import program
-from whisker.touch.radial.model import RadialModel
-from whisker.view.__main__ import main as view
+from crunchbot.cli import COMMANDS, main
+from crunchbot.ends import exit_code
+from crunchbot.simulation.bridge import program
+from crunchbot.touch.radial.model import RadialModel
+from crunchbot.view.__main__ import main as view
 
 # ruff: noqa: F811 - fixtures are taken by their names
 

@@ -7,12 +7,12 @@ import threading
 
 import pytest
 
-from whisker.bridge.ring import RingError, await_reader
+from crunchbot.bridge.ring import RingError, await_reader
 
 END_S = 60
 TWICE = """
 import signal
-from whisker.stopping import {use}
+from crunchbot.stopping import {use}
 {before}
 try:
     signal.raise_signal(signal.{first})

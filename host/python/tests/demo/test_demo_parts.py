@@ -11,17 +11,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from whisker import scene as scenes
-from whisker.bridge.ring import FRAME, Reader, RingError
-from whisker.demo import summary
-from whisker.demo.__main__ import fresh_folder, guarded, parse
-from whisker.demo.chain import ChainError, ChainRun, Link, _await_end, run_chain
-from whisker.native import ffi, lib
-from whisker.protocol import LIMITS
-from whisker.robot.blocks import blocks
-from whisker.simulation.bridge import flat_scene
-from whisker.simulation.link import SimLink
-from whisker.simulation.scenes import BLOCKS, PRIOR_OFF_M, PRIOR_OFF_RAD, make_scene
+from crunchbot import scene as scenes
+from crunchbot.bridge.ring import FRAME, Reader, RingError
+from crunchbot.demo import summary
+from crunchbot.demo.__main__ import fresh_folder, guarded, parse
+from crunchbot.demo.chain import ChainError, ChainRun, Link, _await_end, run_chain
+from crunchbot.native import ffi, lib
+from crunchbot.protocol import LIMITS
+from crunchbot.robot.blocks import blocks
+from crunchbot.simulation.bridge import flat_scene
+from crunchbot.simulation.link import SimLink
+from crunchbot.simulation.scenes import BLOCKS, PRIOR_OFF_M, PRIOR_OFF_RAD, make_scene
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -232,7 +232,7 @@ def test_a_failure_of_who_ends_last_is_told_too():
     ],
 )
 def test_what_ends_a_demo_is_one_line_and_an_exit_code(capsys, monkeypatch, raised, code, line):
-    monkeypatch.setattr("whisker.demo.__main__.interrupt_on_signals", lambda: None)
+    monkeypatch.setattr("crunchbot.demo.__main__.interrupt_on_signals", lambda: None)
 
     def job(options):
         if raised:

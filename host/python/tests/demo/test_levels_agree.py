@@ -10,15 +10,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from whisker import scene as scenes
-from whisker.demo.chain import ChainRun, Link, run_chain
-from whisker.demo.level1 import explore
-from whisker.demo.summary import read_pairs
-from whisker.demo.training import learn
-from whisker.nav.observations import cell
-from whisker.pilot.pilot import Pilot
-from whisker.robot.models import load_models
-from whisker.simulation.scenes import make_scene
+from crunchbot import scene as scenes
+from crunchbot.demo.chain import ChainRun, Link, run_chain
+from crunchbot.demo.level1 import explore
+from crunchbot.demo.summary import read_pairs
+from crunchbot.demo.training import learn
+from crunchbot.nav.observations import cell
+from crunchbot.pilot.pilot import Pilot
+from crunchbot.robot.models import load_models
+from crunchbot.simulation.scenes import make_scene
 
 ROOT = Path(__file__).resolve().parents[4]
 SEED, SECONDS, LANES = 3, 8.0, 6

@@ -6,9 +6,9 @@ import sys
 import pytest
 from rings import ring_name
 
-from whisker.bridge.ring import Clock, Writer
-from whisker.cli import main
-from whisker.protocol import LIMITS, WIRE_VERSION
+from crunchbot.bridge.ring import Clock, Writer
+from crunchbot.cli import main
+from crunchbot.protocol import LIMITS, WIRE_VERSION
 
 END_S = 60
 STATS = {"started_ns": 1, "connected": 1, "wire_version": WIRE_VERSION, "serial": b"B0042", "lane_mask": 0b101}
@@ -17,7 +17,7 @@ STATS = {"started_ns": 1, "connected": 1, "wire_version": WIRE_VERSION, "serial"
 @pytest.fixture(autouse=True)
 def signals_as_before(monkeypatch):
     """Commands take over signals; in this process they must not."""
-    monkeypatch.setattr("whisker.stopping.listen", lambda *_: None)
+    monkeypatch.setattr("crunchbot.stopping.listen", lambda *_: None)
 
 
 def run(capsys, *arguments):
@@ -26,7 +26,7 @@ def run(capsys, *arguments):
 
 
 def command(*arguments):
-    return [sys.executable, "-m", "whisker.cli", *map(str, arguments)]
+    return [sys.executable, "-m", "crunchbot.cli", *map(str, arguments)]
 
 
 @contextlib.contextmanager

@@ -4,8 +4,8 @@ import level0
 import numpy as np
 import pytest
 
-from whisker import scene
-from whisker.nav import localise
+from crunchbot import scene
+from crunchbot.nav import localise
 
 
 def write_observations(path, made, observations):

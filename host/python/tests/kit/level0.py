@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from whisker.nav.localise import Observations
-from whisker.scene import Arena, Prior, Robot, Scene, Whisker
+from crunchbot.nav.localise import Observations
+from crunchbot.scene import Arena, Prior, Robot, Scene, Whisker
 
 TEXTURES = ("VINYL", "SMOOTH", "ROUGH")
 ROW_S, FINE_S = 0.1, 0.01

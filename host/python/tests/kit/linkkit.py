@@ -3,9 +3,9 @@
 import socket
 from types import SimpleNamespace
 
-from whisker.robot.inbox import encoding_of
-from whisker.robot.messages import encode
-from whisker.robot.streams import Envelope
+from crunchbot.robot.inbox import encoding_of
+from crunchbot.robot.messages import encode
+from crunchbot.robot.streams import Envelope
 
 
 def free_endpoint() -> str:

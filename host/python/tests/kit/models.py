@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from whisker.touch.texture.change import Change
-from whisker.touch.texture.classifier import Classifier, feature_count
-from whisker.touch.texture.novelty import STEPS, Novelty
-from whisker.touch.texture.spectral import SpectralModel
+from crunchbot.touch.texture.change import Change
+from crunchbot.touch.texture.classifier import Classifier, feature_count
+from crunchbot.touch.texture.novelty import STEPS, Novelty
+from crunchbot.touch.texture.spectral import SpectralModel
 
 CHANNELS, LENGTH, CLASSES = 2, 64, 3
 FEATURES = feature_count(np.ones(CHANNELS), LENGTH, False)

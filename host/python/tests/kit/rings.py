@@ -5,8 +5,8 @@ import os
 
 import numpy as np
 
-from whisker.bridge.ring import FRAME
-from whisker.protocol import LANES, LIMITS
+from crunchbot.bridge.ring import FRAME
+from crunchbot.protocol import LANES, LIMITS
 
 _numbers = itertools.count()
 

@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
-from whisker.touch.radial import model as radial
-from whisker.touch.radial.model import Contact, Whisks
+from crunchbot.touch.radial import model as radial
+from crunchbot.touch.radial.model import Contact, Whisks
 
 CONE_MM, TIP_MM = 181.7, 138.0
 RADII = (90.0, 100.0, 110.0, 120.0, 130.0, TIP_MM)

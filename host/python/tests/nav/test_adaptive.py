@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from whisker.nav import filters
-from whisker.scenes import make
+from crunchbot.nav import filters
+from crunchbot.scenes import make
 
 SEEDS = range(4000, 4004)
 NEAR_M = 0.15

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from whisker import scenes
-from whisker.nav import localise
+from crunchbot import scenes
+from crunchbot.nav import localise
 
 ROWS, BLIND = 200, 60
 

@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from whisker.nav.estimates import Estimates, read_estimates
-from whisker.nav.judging import bits_told, bits_wanted, carried_rows, judge, starts_of, travel_of
-from whisker.nav.observations import Observations
-from whisker.scene import Arena, Robot, Scene, Whisker
-from whisker.tables import TableError
+from crunchbot.nav.estimates import Estimates, read_estimates
+from crunchbot.nav.judging import bits_told, bits_wanted, carried_rows, judge, starts_of, travel_of
+from crunchbot.nav.observations import Observations
+from crunchbot.scene import Arena, Robot, Scene, Whisker
+from crunchbot.tables import TableError
 
 ROWS = 400
 STEP_M = 0.01

@@ -6,8 +6,8 @@ import level0
 import numpy as np
 import pytest
 
-from whisker.nav import localise
-from whisker.scenes import make
+from crunchbot.nav import localise
+from crunchbot.scenes import make
 
 SEEDS = range(100, 106)
 

@@ -6,15 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from whisker import scenes
-from whisker.nav import localise
-from whisker.nav.observations import tells_normals
-from whisker.robot.inbox import Received
-from whisker.robot.row_checks import RowChecks
-from whisker.robot.rows import to_message
-from whisker.robot.streams import Envelope
-from whisker.scenes import geometry
-from whisker.tables import TableError
+from crunchbot import scenes
+from crunchbot.nav import localise
+from crunchbot.nav.observations import tells_normals
+from crunchbot.robot.inbox import Received
+from crunchbot.robot.row_checks import RowChecks
+from crunchbot.robot.rows import to_message
+from crunchbot.robot.streams import Envelope
+from crunchbot.scenes import geometry
+from crunchbot.tables import TableError
 
 FAMILY = "anchor+normals"
 

@@ -10,19 +10,19 @@ import numpy as np
 import pytest
 from commandkit import run
 
-from whisker import scenes
-from whisker.nav import localise
-from whisker.nav.filters import Filter, SettingError
-from whisker.nav.observations import Observations
-from whisker.nav.own import OwnSensor
-from whisker.robot.inbox import Received
-from whisker.robot.messages import EXPLORING
-from whisker.robot.row_checks import RowChecks
-from whisker.robot.rows import to_message, to_row
-from whisker.robot.streams import Envelope
-from whisker.scene import Arena, Prior, Robot, Scene, SceneError, Whisker, load
-from whisker.sensor_tables import NOT_KNOWN, SensorTable
-from whisker.tables import TableError
+from crunchbot import scenes
+from crunchbot.nav import localise
+from crunchbot.nav.filters import Filter, SettingError
+from crunchbot.nav.observations import Observations
+from crunchbot.nav.own import OwnSensor
+from crunchbot.robot.inbox import Received
+from crunchbot.robot.messages import EXPLORING
+from crunchbot.robot.row_checks import RowChecks
+from crunchbot.robot.rows import to_message, to_row
+from crunchbot.robot.streams import Envelope
+from crunchbot.scene import Arena, Prior, Robot, Scene, SceneError, Whisker, load
+from crunchbot.sensor_tables import NOT_KNOWN, SensorTable
+from crunchbot.tables import TableError
 
 SIDE_M, CELL_M, LEVELS, ROWS = 2.0, 0.1, 8, 150
 ARENA = Arena((SIDE_M, SIDE_M), 1.0, ("FLOOR",), ("FF", "FF"), ())

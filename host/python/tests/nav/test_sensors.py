@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from whisker.nav.filters import Filter, Sensor, SettingError
-from whisker.scene import Arena, Prior, Robot, Scene
+from crunchbot.nav.filters import Filter, Sensor, SettingError
+from crunchbot.scene import Arena, Prior, Robot, Scene
 
 LEVELS, CELL_M, ROWS = 8, 0.1, 150
 

@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 
-from whisker import scenes
-from whisker.nav.filters import Filter
-from whisker.nav.weigher import Weigher
+from crunchbot import scenes
+from crunchbot.nav.filters import Filter
+from crunchbot.nav.weigher import Weigher
 
 
 def test_the_true_pose_weighs_more_than_any_other_place():

@@ -8,8 +8,8 @@ import threading
 import tty
 from pathlib import Path
 
-from whisker.pilot.base import Base
-from whisker.simulation.bridge import program
+from crunchbot.pilot.base import Base
+from crunchbot.simulation.bridge import program
 
 START, SAFE, FULL, DRIVE, STREAM, PAUSE = 128, 131, 132, 145, 148, 150
 PASSIVE_MODE, SAFE_MODE, FULL_MODE = 1, 2, 3

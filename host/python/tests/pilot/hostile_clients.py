@@ -17,8 +17,8 @@ import tempfile
 import time
 from pathlib import Path
 
-from whisker.pilot.base import Base, BaseError
-from whisker.simulation.bridge import program
+from crunchbot.pilot.base import Base, BaseError
+from crunchbot.simulation.bridge import program
 
 WAIT_MOST_S = 1.0
 WORDS = (

@@ -27,8 +27,8 @@ from pathlib import Path
 
 from createpeer import STOP, drive_order
 
-from whisker.pilot.base import Base, BaseError
-from whisker.simulation.bridge import program
+from crunchbot.pilot.base import Base, BaseError
+from crunchbot.simulation.bridge import program
 
 STOPPED_MOST_S = 0.5
 BEAT_S, HANGS_S = 0.1, 0.3

@@ -16,9 +16,9 @@ import pytest
 from createpeer import FIRM_STOP, FULL, PAUSE, SAFE, START, STOP, STREAM, Driver, Heart, drive_order
 from hostile_clients import attacked, serve_honest
 
-from whisker.pilot import base
-from whisker.pilot.base import BaseError, BaseLost
-from whisker.simulation.bridge import program
+from crunchbot.pilot import base
+from crunchbot.pilot.base import BaseError, BaseLost
+from crunchbot.simulation.bridge import program
 
 ENDED = STOP + bytes([PAUSE, 0, START])  # last words: stopped, silent, passive
 
@@ -129,7 +129,7 @@ def test_damaged_bytes_cost_one_frame_and_are_counted(start):
 
 COMMANDER = """
 import sys
-from whisker.pilot.base import Base
+from crunchbot.pilot.base import Base
 base = Base(sys.argv[1])
 while True:
     base.drive(0.2, 0)

@@ -8,8 +8,8 @@ import subprocess
 
 import pytest
 
-from whisker.pilot.base import BUMP_LEFT, CLIFF_FRONT_LEFT, IDLE, Base
-from whisker.simulation.bridge import program
+from crunchbot.pilot.base import BUMP_LEFT, CLIFF_FRONT_LEFT, IDLE, Base
+from crunchbot.simulation.bridge import program
 
 FRAME_BYTES = 38  # of what whisker-base asks a Create 1 for
 WHISK_RAD_S = math.pi / 24

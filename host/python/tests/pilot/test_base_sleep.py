@@ -8,8 +8,8 @@ import subprocess
 import pytest
 from createpeer import STOP, Driver, drive_order
 
-from whisker.pilot.base import IDLE
-from whisker.simulation.bridge import SimulationError, program
+from crunchbot.pilot.base import IDLE
+from crunchbot.simulation.bridge import SimulationError, program
 
 BUS = """\
 <busconfig>

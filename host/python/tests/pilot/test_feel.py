@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from whisker.pilot.feel import Drives, Felt
+from crunchbot.pilot.feel import Drives, Felt
 
 
 def test_motion_is_that_of_the_orders_in_effect():

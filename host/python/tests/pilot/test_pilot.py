@@ -8,21 +8,21 @@ import numpy as np
 import pytest
 from models import model as texture_model
 
-from whisker.demo.level1 import explore
-from whisker.demo.study import study
-from whisker.demo.training import learn, read_whisks
-from whisker.nav import localise
-from whisker.nav.observations import tells_normals
-from whisker.pilot.behaviour import BLOCK_TICKS, ODOMETRY_TICKS
-from whisker.pilot.pilot import Pilot, compose
-from whisker.pilot.states import Whisk
-from whisker.robot.models import load_models
-from whisker.scene import Arena, Scene
-from whisker.scenes.geometry import directions
-from whisker.simulation.scenes import TEXTURES, make_robot, make_scene
-from whisker.simulation.world import World
-from whisker.touch.contact import Contact
-from whisker.touch.radial.model import fit
+from crunchbot.demo.level1 import explore
+from crunchbot.demo.study import study
+from crunchbot.demo.training import learn, read_whisks
+from crunchbot.nav import localise
+from crunchbot.nav.observations import tells_normals
+from crunchbot.pilot.behaviour import BLOCK_TICKS, ODOMETRY_TICKS
+from crunchbot.pilot.pilot import Pilot, compose
+from crunchbot.pilot.states import Whisk
+from crunchbot.robot.models import load_models
+from crunchbot.scene import Arena, Scene
+from crunchbot.scenes.geometry import directions
+from crunchbot.simulation.scenes import TEXTURES, make_robot, make_scene
+from crunchbot.simulation.world import World
+from crunchbot.touch.contact import Contact
+from crunchbot.touch.radial.model import fit
 
 SEED = 11
 TICKS = 80_000

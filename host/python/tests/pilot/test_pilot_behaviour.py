@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from whisker.pilot.behaviour import (
+from crunchbot.pilot.behaviour import (
     BLOCK_TICKS,
     EFFECT_TICKS,
     EXPLORE_M_S,
@@ -16,7 +16,7 @@ from whisker.pilot.behaviour import (
     Behaviour,
     State,
 )
-from whisker.pilot.states import PLAIN
+from crunchbot.pilot.states import PLAIN
 
 LEFT, RIGHT = 2, 3
 

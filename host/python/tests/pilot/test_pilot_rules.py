@@ -7,15 +7,23 @@ from pathlib import Path
 import pytest
 from test_pilot_behaviour import LEFT, RIGHT, Bench
 
-from whisker.pilot import base
-from whisker.pilot.behaviour import BACK_OFF_M_S, BLOCK_TICKS, EFFECT_TICKS, ODOMETRY_TICKS, TICK_S, WHISK_RAD_S, State
-from whisker.pilot.rules import RULES, SPEEDS
-from whisker.pilot.states import FULL, LOST_TICKS, TIP_SLACK_RAD, TipMove
-from whisker.pilot.tip import AIM_MM, contact_type, move_for_tip
-from whisker.pilot.wheels import EXACT, NO_BUMPS, Bumps, Wheels
-from whisker.pilot.whereabouts import Whereabouts
-from whisker.simulation.scenes import make_robot
-from whisker.touch.mount import Mount
+from crunchbot.pilot import base
+from crunchbot.pilot.behaviour import (
+    BACK_OFF_M_S,
+    BLOCK_TICKS,
+    EFFECT_TICKS,
+    ODOMETRY_TICKS,
+    TICK_S,
+    WHISK_RAD_S,
+    State,
+)
+from crunchbot.pilot.rules import RULES, SPEEDS
+from crunchbot.pilot.states import FULL, LOST_TICKS, TIP_SLACK_RAD, TipMove
+from crunchbot.pilot.tip import AIM_MM, contact_type, move_for_tip
+from crunchbot.pilot.wheels import EXACT, NO_BUMPS, Bumps, Wheels
+from crunchbot.pilot.whereabouts import Whereabouts
+from crunchbot.simulation.scenes import make_robot
+from crunchbot.touch.mount import Mount
 
 ROOT = Path(__file__).resolve().parents[4]
 STEP_M_S, TRACK_M = 0.0285, 0.235  # of a base whose wheels move in steps

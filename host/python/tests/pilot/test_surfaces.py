@@ -6,18 +6,18 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from whisker.demo.level1 import explore
-from whisker.demo.training import flat, read_training, train_surfaces
-from whisker.nav import localise
-from whisker.nav.observations import read_observations
-from whisker.pilot.feel import Felt
-from whisker.pilot.pilot import Pilot
-from whisker.robot.models import load_models
-from whisker.robot.rowfiles import Rows
-from whisker.simulation.scenes import TEXTURES, make_scene
-from whisker.simulation.world import write_surface_sweeps
-from whisker.touch.radial.model import RadialModel
-from whisker.touch.texture.model import TextureModel, classify, load
+from crunchbot.demo.level1 import explore
+from crunchbot.demo.training import flat, read_training, train_surfaces
+from crunchbot.nav import localise
+from crunchbot.nav.observations import read_observations
+from crunchbot.pilot.feel import Felt
+from crunchbot.pilot.pilot import Pilot
+from crunchbot.robot.models import load_models
+from crunchbot.robot.rowfiles import Rows
+from crunchbot.simulation.scenes import TEXTURES, make_scene
+from crunchbot.simulation.world import write_surface_sweeps
+from crunchbot.touch.radial.model import RadialModel
+from crunchbot.touch.texture.model import TextureModel, classify, load
 
 TRAINED, FLOWN, TICKS = 3, 31, 120_000
 

@@ -14,12 +14,12 @@ import mcap.reader
 import numpy as np
 from rings import make_frames
 
-from whisker.recording import RecordingError, read
-from whisker.recording.mcapfile import McapFile
-from whisker.recording.messages import encode_block
-from whisker.recording.writing import RecordingWriter, TopicWriter
-from whisker.robot.bag import RECORD
-from whisker.robot.messages import SCHEMAS, Header, Pose, PoseStamped, Time, encode
+from crunchbot.recording import RecordingError, read
+from crunchbot.recording.mcapfile import McapFile
+from crunchbot.recording.messages import encode_block
+from crunchbot.recording.writing import RecordingWriter, TopicWriter
+from crunchbot.robot.bag import RECORD
+from crunchbot.robot.messages import SCHEMAS, Header, Pose, PoseStamped, Time, encode
 
 PAGE = 4096
 SECOND_NS = 10**9

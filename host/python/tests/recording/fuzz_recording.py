@@ -9,8 +9,8 @@ from mcap.writer import CompressionType, Writer
 from mutate import mutate
 from rings import make_frames
 
-from whisker.recording import RecordingError, read
-from whisker.recording.messages import (
+from crunchbot.recording import RecordingError, read
+from crunchbot.recording.messages import (
     MISSING,
     MessageError,
     decode_block,
@@ -19,7 +19,7 @@ from whisker.recording.messages import (
     encode_block,
     encode_event,
 )
-from whisker.recording.reading import EVENTS_TOPIC, FRAMES_TOPIC, METADATA
+from crunchbot.recording.reading import EVENTS_TOPIC, FRAMES_TOPIC, METADATA
 
 
 def seed_file(compression: CompressionType, crcs: bool) -> bytes:

@@ -11,8 +11,8 @@ from fuzz_damage import bag, fuzz, ring_recording
 from mcap.records import Channel, Chunk
 from mcap.writer import Writer
 
-from whisker.recording import RecordingError, mcapwalk, read
-from whisker.recording.mcapfile import McapFile
+from crunchbot.recording import RecordingError, mcapwalk, read
+from crunchbot.recording.mcapfile import McapFile
 
 SECONDS = 4
 BLOCKS = 10 * SECONDS

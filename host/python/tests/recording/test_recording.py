@@ -16,16 +16,16 @@ from rings import make_frames, ring_name
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
-from whisker.bridge.ring import Clock, Reader, RingError, Writer
-from whisker.native import lib
-from whisker.protocol import LANES, LIMITS
-from whisker.recording import RecordingError, read
-from whisker.recording.mcapfile import McapFile
-from whisker.recording.messages import MessageError, decode_block, encode_block
-from whisker.recording.recorder import Recorder, record
-from whisker.recording.replay import Replay
-from whisker.recording.timeline import Timeline
-from whisker.recording.writing import RecordingWriter
+from crunchbot.bridge.ring import Clock, Reader, RingError, Writer
+from crunchbot.native import lib
+from crunchbot.protocol import LANES, LIMITS
+from crunchbot.recording import RecordingError, read
+from crunchbot.recording.mcapfile import McapFile
+from crunchbot.recording.messages import MessageError, decode_block, encode_block
+from crunchbot.recording.recorder import Recorder, record
+from crunchbot.recording.replay import Replay
+from crunchbot.recording.timeline import Timeline
+from crunchbot.recording.writing import RecordingWriter
 
 CAPACITY = 4096
 

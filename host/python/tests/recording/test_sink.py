@@ -10,14 +10,14 @@ import pytest
 from linkkit import free_endpoint
 from rings import make_frames, ring_name
 
-from whisker.bridge.ring import Reader, Writer
-from whisker.recording import read
-from whisker.recording import writing as writing_module
-from whisker.recording.recorder import Recorder
-from whisker.recording.writing import RecordingWriter, TopicWriter, WriteError
-from whisker.robot import messages as m
-from whisker.robot.bag import RECORD, Bag
-from whisker.robot.link import Link
+from crunchbot.bridge.ring import Reader, Writer
+from crunchbot.recording import read
+from crunchbot.recording import writing as writing_module
+from crunchbot.recording.recorder import Recorder
+from crunchbot.recording.writing import RecordingWriter, TopicWriter, WriteError
+from crunchbot.robot import messages as m
+from crunchbot.robot.bag import RECORD, Bag
+from crunchbot.robot.link import Link
 
 PATIENCE_S = 30.0
 

@@ -6,8 +6,8 @@ import re
 import numpy as np
 import pytest
 
-from whisker.report import figures, write_report
-from whisker.report.run import Run
+from crunchbot.report import figures, write_report
+from crunchbot.report.run import Run
 
 ROWS = 40
 TEXTURES = ["VINYL", "SMOOTH", "ROUGH"]

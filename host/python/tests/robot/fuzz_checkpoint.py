@@ -5,8 +5,8 @@ import zlib
 import numpy as np
 from mutate import mutate
 
-from whisker.nav.filters import BUMPS_MOST, COMPONENT
-from whisker.robot.checkpoint import Checkpoint, CheckpointError, decode, encode
+from crunchbot.nav.filters import BUMPS_MOST, COMPONENT
+from crunchbot.robot.checkpoint import Checkpoint, CheckpointError, decode, encode
 
 
 def seed_file() -> bytes:

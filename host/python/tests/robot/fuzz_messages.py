@@ -8,8 +8,8 @@ from mutate import mutate
 from robotkit import examples, flat
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from whisker.recording.messages import definition
-from whisker.robot import messages as m
+from crunchbot.recording.messages import definition
+from crunchbot.robot import messages as m
 
 ROSBAGS_EVERY = 8  # of those that are read, how many the other decoder reads too: it takes some ten times as long
 

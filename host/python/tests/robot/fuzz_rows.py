@@ -14,16 +14,16 @@ from hostile import variants
 from linkkit import sample
 from robotkit import examples, to_rows
 
-from whisker import scenes
-from whisker.nav.observations import ODOMETRY
-from whisker.robot import messages as m
-from whisker.robot.inbox import Inbox, encoding_of
-from whisker.robot.navigator import Navigator, Settings
-from whisker.robot.pyro import TOPICS, Results
-from whisker.robot.row_checks import RowChecks
-from whisker.robot.rows import to_message
-from whisker.robot.sources import Sources
-from whisker.robot.streams import NUMBER_MOST, Envelope
+from crunchbot import scenes
+from crunchbot.nav.observations import ODOMETRY
+from crunchbot.robot import messages as m
+from crunchbot.robot.inbox import Inbox, encoding_of
+from crunchbot.robot.navigator import Navigator, Settings
+from crunchbot.robot.pyro import TOPICS, Results
+from crunchbot.robot.row_checks import RowChecks
+from crunchbot.robot.rows import to_message
+from crunchbot.robot.sources import Sources
+from crunchbot.robot.streams import NUMBER_MOST, Envelope
 
 ROWS = 40
 RUN_INPUTS = 20_000  # of one navigator and one server

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from whisker.robot import messages as m
-from whisker.robot.ranges import RANGES
-from whisker.robot.schema import MANY, ONE, PRIMITIVES, TEXT, Field, fields_of
+from crunchbot.robot import messages as m
+from crunchbot.robot.ranges import RANGES
+from crunchbot.robot.schema import MANY, ONE, PRIMITIVES, TEXT, Field, fields_of
 
 FLOATS = (math.nan, math.inf, -math.inf, 1e308, -1e308, 3e38, -3e38)
 

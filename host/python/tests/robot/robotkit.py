@@ -8,8 +8,8 @@ import threading
 import numpy as np
 from linkkit import free_endpoint
 
-from whisker.nav.observations import ODOMETRY
-from whisker.robot import messages as m
+from crunchbot.nav.observations import ODOMETRY
+from crunchbot.robot import messages as m
 
 
 def examples() -> dict[str, object]:

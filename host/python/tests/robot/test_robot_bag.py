@@ -13,21 +13,21 @@ from robotkit import examples, flat, to_rows
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
-from whisker import scenes
-from whisker.commands.bag import next_free
-from whisker.nav import localise
-from whisker.nav.observations import observations_path
-from whisker.pilot.pilot import compose
-from whisker.recording.mcapfile import McapFile
-from whisker.recording.writing import TopicWriter
-from whisker.robot import messages as m
-from whisker.robot.bag import RECORD, Bag, BagClock, metadata
-from whisker.robot.inbox import Received
-from whisker.robot.link import Link
-from whisker.robot.rows import RowPublisher
-from whisker.robot.streams import Envelope
-from whisker.scene import load
-from whisker.sensor_tables import SensorTable
+from crunchbot import scenes
+from crunchbot.commands.bag import next_free
+from crunchbot.nav import localise
+from crunchbot.nav.observations import observations_path
+from crunchbot.pilot.pilot import compose
+from crunchbot.recording.mcapfile import McapFile
+from crunchbot.recording.writing import TopicWriter
+from crunchbot.robot import messages as m
+from crunchbot.robot.bag import RECORD, Bag, BagClock, metadata
+from crunchbot.robot.inbox import Received
+from crunchbot.robot.link import Link
+from crunchbot.robot.rows import RowPublisher
+from crunchbot.robot.streams import Envelope
+from crunchbot.scene import load
+from crunchbot.sensor_tables import SensorTable
 
 PATIENCE_S = 60.0
 ROWS = 30

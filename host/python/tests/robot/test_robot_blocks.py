@@ -5,8 +5,8 @@ import os
 import numpy as np
 import pytest
 
-from whisker.bridge.ring import FRAME, Writer
-from whisker.robot.blocks import FRESH_TICKS, LiveRing
+from crunchbot.bridge.ring import FRAME, Writer
+from crunchbot.robot.blocks import FRESH_TICKS, LiveRing
 
 LANES, WAIT_S = 6, 5.0
 

@@ -8,17 +8,17 @@ import pytest
 from fuzz_checkpoint import fuzz, seed_file
 from robotkit import to_rows
 
-from whisker import scenes
-from whisker.nav import filters
-from whisker.nav.filters import COMPONENT, Filter, SettingError
-from whisker.pilot.pilot import compose
-from whisker.robot import belief, checkpoint, parts
-from whisker.robot import messages as m
-from whisker.robot.checkpoint import Checkpoint, CheckpointError
-from whisker.robot.inbox import Received
-from whisker.robot.memory import AGE_MOST_S, Memory, widen
-from whisker.robot.rows import ROW_NS, Follower, Place, Step, to_message
-from whisker.robot.streams import Envelope
+from crunchbot import scenes
+from crunchbot.nav import filters
+from crunchbot.nav.filters import COMPONENT, Filter, SettingError
+from crunchbot.pilot.pilot import compose
+from crunchbot.robot import belief, checkpoint, parts
+from crunchbot.robot import messages as m
+from crunchbot.robot.checkpoint import Checkpoint, CheckpointError
+from crunchbot.robot.inbox import Received
+from crunchbot.robot.memory import AGE_MOST_S, Memory, widen
+from crunchbot.robot.rows import ROW_NS, Follower, Place, Step, to_message
+from crunchbot.robot.streams import Envelope
 
 ROWS = 60
 NAMES = ("grid", "adaptive")

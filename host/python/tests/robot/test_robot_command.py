@@ -14,16 +14,16 @@ from keykit import documented, made_keys  # noqa: F401 - a fixture
 from linkkit import free_endpoint
 from robotkit import examples
 
-from whisker import scene as scenes
-from whisker.bridge.ring import Writer
-from whisker.cli import _parser, main
-from whisker.commands import robot
-from whisker.demo import training
-from whisker.robot import holders, parts
-from whisker.robot.children import Program
-from whisker.robot.link import Link
-from whisker.simulation.scenes import make_scene
-from whisker.view import command as view
+from crunchbot import scene as scenes
+from crunchbot.bridge.ring import Writer
+from crunchbot.cli import _parser, main
+from crunchbot.commands import robot
+from crunchbot.demo import training
+from crunchbot.robot import holders, parts
+from crunchbot.robot.children import Program
+from crunchbot.robot.link import Link
+from crunchbot.simulation.scenes import make_scene
+from crunchbot.view import command as view
 
 PATIENCE_S = 60.0
 # As the simulation does it: the true pose to whoever connects. Its argument: a socket.
@@ -83,7 +83,7 @@ def commands(monkeypatch, begun):
 
     def understood(*options) -> dict:
         begun(*options)
-        words = [program.command[len(beginning) :] for program in tables[-1] if "whisker.cli" in program.command]
+        words = [program.command[len(beginning) :] for program in tables[-1] if "crunchbot.cli" in program.command]
         return {line[0]: _parser(line[0]).parse_args(line) for line in words}
 
     return understood
@@ -106,7 +106,7 @@ def test_the_desktops_side_is_added(started):
 def test_a_simulated_robot_learns_its_own_whiskers(capsys, monkeypatch, tmp_path, given):
     """Models of other whiskers read floors wrong: those that learn are those of the simulation, batch and all."""
     learnt = []
-    monkeypatch.setattr("whisker.demo.training.learn", lambda models, scene, *_: learnt.append(scene))
+    monkeypatch.setattr("crunchbot.demo.training.learn", lambda models, scene, *_: learnt.append(scene))
     stopped = threading.Event()
     stopped.set()
     monkeypatch.setattr(robot, "stop_on_signals", lambda: stopped)
@@ -136,7 +136,7 @@ def test_a_simulated_robot_learns_once_and_nothing_where_models_are_given(capsys
         models.mkdir(exist_ok=True)
         (models / "texture.json").touch()
 
-    monkeypatch.setattr("whisker.demo.training.learn", learn)
+    monkeypatch.setattr("crunchbot.demo.training.learn", learn)
     common = ["robot", "--simulated", "--out", tmp_path / "out", "--first-port"]
     for options in ([], [], ["--models", tmp_path / "out/models"], ["--models", tmp_path]):
         run(capsys, *common, free_port(), *options)
@@ -248,9 +248,9 @@ def test_a_port_that_is_not_there_is_said_once(started, capsys, tmp_path):
 
 def test_without_a_source_tree_models_have_to_be_given(refused, monkeypatch):
     """As from an installed wheel, which has no simulation to learn from."""
-    monkeypatch.delitem(sys.modules, "whisker.demo.training", raising=False)
-    monkeypatch.delattr("whisker.demo.training", raising=False)
-    monkeypatch.setitem(sys.modules, "whisker.simulation.world", None)
+    monkeypatch.delitem(sys.modules, "crunchbot.demo.training", raising=False)
+    monkeypatch.delattr("crunchbot.demo.training", raising=False)
+    monkeypatch.setitem(sys.modules, "crunchbot.simulation.world", None)
     code, line = refused("--simulated")
     assert code == 2 and "source tree" in line and "--models" in line
 

@@ -10,13 +10,13 @@ from keykit import documented, made_keys  # noqa: F401 - a fixture
 from linkkit import free_endpoint, sample
 from robotkit import Cable, examples, take_until
 
-from whisker.robot import inbox as inbox_module
-from whisker.robot import messages as m
-from whisker.robot import options
-from whisker.robot.inbox import TOPICS_MOST, Inbox, encoding_of
-from whisker.robot.link import MESSAGE_MOST, PILOT_ENDPOINT, Link, LinkError, is_loopback
-from whisker.robot.sources import STREAMS_MOST, Sources, Verdict
-from whisker.robot.streams import ENVELOPE, Envelope, EnvelopeError, Tally, envelopes, new_stream
+from crunchbot.robot import inbox as inbox_module
+from crunchbot.robot import messages as m
+from crunchbot.robot import options
+from crunchbot.robot.inbox import TOPICS_MOST, Inbox, encoding_of
+from crunchbot.robot.link import MESSAGE_MOST, PILOT_ENDPOINT, Link, LinkError, is_loopback
+from crunchbot.robot.sources import STREAMS_MOST, Sources, Verdict
+from crunchbot.robot.streams import ENVELOPE, Envelope, EnvelopeError, Tally, envelopes, new_stream
 
 PATIENCE_S = 30.0
 

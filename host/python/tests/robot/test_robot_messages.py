@@ -12,10 +12,10 @@ from hostile import variants
 from robotkit import examples, flat
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from whisker.recording.messages import definition
-from whisker.robot import messages as m
-from whisker.robot.ranges import RANGES
-from whisker.robot.schema import MANY, PRIMITIVES, TEXT, fields_of
+from crunchbot.recording.messages import definition
+from crunchbot.robot import messages as m
+from crunchbot.robot.ranges import RANGES
+from crunchbot.robot.schema import MANY, PRIMITIVES, TEXT, fields_of
 
 
 @pytest.mark.parametrize("schema", m.TYPES)

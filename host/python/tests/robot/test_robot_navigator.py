@@ -15,18 +15,18 @@ from fuzz_rows import fuzz
 from linkkit import free_endpoint
 from robotkit import take_until, to_rows
 
-from whisker import scene as scene_folder
-from whisker import scenes
-from whisker.errors import UserError
-from whisker.nav import localise
-from whisker.nav.filters import COMPONENT
-from whisker.robot import belief, checkpoint, health, initial_pose
-from whisker.robot import messages as m
-from whisker.robot.inbox import encoding_of
-from whisker.robot.link import Link
-from whisker.robot.navigator import Navigator, Settings
-from whisker.robot.ranges import BUMPS_MOST
-from whisker.robot.rows import RowPublisher, to_message
+from crunchbot import scene as scene_folder
+from crunchbot import scenes
+from crunchbot.errors import UserError
+from crunchbot.nav import localise
+from crunchbot.nav.filters import COMPONENT
+from crunchbot.robot import belief, checkpoint, health, initial_pose
+from crunchbot.robot import messages as m
+from crunchbot.robot.inbox import encoding_of
+from crunchbot.robot.link import Link
+from crunchbot.robot.navigator import Navigator, Settings
+from crunchbot.robot.ranges import BUMPS_MOST
+from crunchbot.robot.rows import RowPublisher, to_message
 
 PATIENCE_S = 60.0
 ROWS = 60

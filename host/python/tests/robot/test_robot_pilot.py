@@ -10,17 +10,17 @@ from commandkit import run
 from linkkit import free_endpoint
 from models import model
 
-from whisker import scene as scenes
-from whisker.bridge.ring import SAMPLE
-from whisker.commands import pilot as pilot_command
-from whisker.pilot.base import BaseLost, Motion
-from whisker.pilot.behaviour import BLOCK_TICKS, ODOMETRY_TICKS
-from whisker.robot import wheels as wheels_module
-from whisker.robot.health import RUNNING
-from whisker.robot.pilot_process import LOST, NO_HEARTBEAT, SILENCE_S, Flight, LiveFlight, LiveWheels
-from whisker.robot.wheels import MODE, RETRY_S, LiveBase, Report, wheels_of
-from whisker.simulation.scenes import make_scene
-from whisker.touch.radial.model import RadialModel
+from crunchbot import scene as scenes
+from crunchbot.bridge.ring import SAMPLE
+from crunchbot.commands import pilot as pilot_command
+from crunchbot.pilot.base import BaseLost, Motion
+from crunchbot.pilot.behaviour import BLOCK_TICKS, ODOMETRY_TICKS
+from crunchbot.robot import wheels as wheels_module
+from crunchbot.robot.health import RUNNING
+from crunchbot.robot.pilot_process import LOST, NO_HEARTBEAT, SILENCE_S, Flight, LiveFlight, LiveWheels
+from crunchbot.robot.wheels import MODE, RETRY_S, LiveBase, Report, wheels_of
+from crunchbot.simulation.scenes import make_scene
+from crunchbot.touch.radial.model import RadialModel
 
 
 class Clock:

@@ -19,16 +19,16 @@ from commandkit import END_S, command, run, signals_as_before  # noqa: F401 - a 
 from linkkit import free_endpoint, sample
 from robotkit import examples, take_until
 
-from whisker.nav.observations import ODOMETRY
-from whisker.pilot.pilot import compose
-from whisker.robot import messages as m
-from whisker.robot.inbox import Inbox, Received
-from whisker.robot.link import Link
-from whisker.robot.pyro import NAMES_MOST, Results, Server
-from whisker.robot.pyro_daemon import REQUEST_MOST
-from whisker.robot.row_checks import RowChecks
-from whisker.robot.rows import to_message
-from whisker.robot.streams import Envelope
+from crunchbot.nav.observations import ODOMETRY
+from crunchbot.pilot.pilot import compose
+from crunchbot.robot import messages as m
+from crunchbot.robot.inbox import Inbox, Received
+from crunchbot.robot.link import Link
+from crunchbot.robot.pyro import NAMES_MOST, Results, Server
+from crunchbot.robot.pyro_daemon import REQUEST_MOST
+from crunchbot.robot.row_checks import RowChecks
+from crunchbot.robot.rows import to_message
+from crunchbot.robot.streams import Envelope
 
 PATIENCE_S = 60.0
 

@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 from robotkit import to_rows
 
-from whisker import scenes
-from whisker.nav import localise
-from whisker.nav.observations import cell
-from whisker.pilot.pilot import compose
-from whisker.robot import messages as m
-from whisker.robot.inbox import Received
-from whisker.robot.row_checks import RowChecks
-from whisker.robot.rows import PIECES_MOST, Follower, RowPublisher, Step, between, to_message, to_row
-from whisker.robot.streams import Envelope
+from crunchbot import scenes
+from crunchbot.nav import localise
+from crunchbot.nav.observations import cell
+from crunchbot.pilot.pilot import compose
+from crunchbot.robot import messages as m
+from crunchbot.robot.inbox import Received
+from crunchbot.robot.row_checks import RowChecks
+from crunchbot.robot.rows import PIECES_MOST, Follower, RowPublisher, Step, between, to_message, to_row
+from crunchbot.robot.streams import Envelope
 
 
 class Sink:

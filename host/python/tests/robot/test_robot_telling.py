@@ -5,12 +5,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from whisker.pilot.behaviour import BLOCK_TICKS
-from whisker.pilot.states import State
-from whisker.pilot.wheels import NO_BUMPS
-from whisker.robot.ros import PLANAR
-from whisker.robot.telling import TICK_NS, Teller
-from whisker.robot.wheels import Report
+from crunchbot.pilot.behaviour import BLOCK_TICKS
+from crunchbot.pilot.states import State
+from crunchbot.pilot.wheels import NO_BUMPS
+from crunchbot.robot.ros import PLANAR
+from crunchbot.robot.telling import TICK_NS, Teller
+from crunchbot.robot.wheels import Report
 
 ROW_BLOCKS = 5
 ROW = {"t_s": 0.1, "odo_x_m": 0.0, "odo_y_m": 0.0, "odo_theta_rad": 0.0}

@@ -5,10 +5,10 @@ import socket
 
 import pytest
 
-from whisker.errors import UserError
-from whisker.robot.lifeline import SILENT_S, VARIABLE, Heartbeat, Pulse
-from whisker.robot.logs import last_line, run_folder
-from whisker.robot.watchdog import LOOK_MOST_S, TIMEOUT_S, Watchdog
+from crunchbot.errors import UserError
+from crunchbot.robot.lifeline import SILENT_S, VARIABLE, Heartbeat, Pulse
+from crunchbot.robot.logs import last_line, run_folder
+from crunchbot.robot.watchdog import LOOK_MOST_S, TIMEOUT_S, Watchdog
 
 SPARSE_BYTES = 1 << 36
 

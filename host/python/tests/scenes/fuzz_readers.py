@@ -11,13 +11,13 @@ import numpy as np
 from models import LENGTH, model
 from mutate import mutate
 
-from whisker import scenes
-from whisker.errors import UserError
-from whisker.nav.observations import read_observations
-from whisker.scene import Scene, load, write
-from whisker.simulation.bridge import read_faults
-from whisker.touch.radial import model as radial
-from whisker.touch.texture import model as texture
+from crunchbot import scenes
+from crunchbot.errors import UserError
+from crunchbot.nav.observations import read_observations
+from crunchbot.scene import Scene, load, write
+from crunchbot.simulation.bridge import read_faults
+from crunchbot.touch.radial import model as radial
+from crunchbot.touch.texture import model as texture
 
 FAULTS = b'[[fault]]\nt_s = 1.5\nlane = 2\nkind = "sensor_error"\nerror = "field_low"\n\n[[fault]]\ntick = 4\nkind = "nak_storm"\n'
 NONSENSE = (

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from whisker.scene import Arena, Whisker
-from whisker.scenes import geometry
+from crunchbot.scene import Arena, Whisker
+from crunchbot.scenes import geometry
 
 LONG = Arena((3.0, 1.0), 0.5, ("VINYL",), ("VVVVVV", "VVVVVV"), ((1.01, 0.41, 1.52, 0.62),))
 LEFTWARD = Whisker("left", "object", base_m=(0.0, 0.0), yaw_rad=math.pi / 2, length_m=0.2)

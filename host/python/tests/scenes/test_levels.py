@@ -8,14 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from whisker import scenes
-from whisker.demo.level1 import explore
-from whisker.demo.training import learn
-from whisker.pilot.pilot import Pilot
-from whisker.pilot.states import PLAIN
-from whisker.robot.models import load_models
-from whisker.scenes import geometry
-from whisker.simulation.scenes import make_scene
+from crunchbot import scenes
+from crunchbot.demo.level1 import explore
+from crunchbot.demo.training import learn
+from crunchbot.pilot.pilot import Pilot
+from crunchbot.pilot.states import PLAIN
+from crunchbot.robot.models import load_models
+from crunchbot.scenes import geometry
+from crunchbot.simulation.scenes import make_scene
 
 SEEDS = (31, 32, 33, 34)
 ROWS = 1200

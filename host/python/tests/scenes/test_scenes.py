@@ -5,12 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from whisker import scenes
-from whisker.nav import localise
-from whisker.scene import load
-from whisker.scenes import geometry
-from whisker.scenes.explorer import explore
-from whisker.scenes.readings import World, hold_back, odometry
+from crunchbot import scenes
+from crunchbot.nav import localise
+from crunchbot.scene import load
+from crunchbot.scenes import geometry
+from crunchbot.scenes.explorer import explore
+from crunchbot.scenes.readings import World, hold_back, odometry
 
 FIELDS = ("t_s", "odometry", "texture", "radial_m", "truth", "normal")
 FAMILIES = [*scenes.BASES, *(f"anchor+{modifier}" for modifier in scenes.MODIFIERS)]

@@ -4,8 +4,8 @@ import json
 
 import pytest
 
-from whisker.scenes import trials
-from whisker.scenes.sweep import SweepError, sweep
+from crunchbot.scenes import trials
+from crunchbot.scenes.sweep import SweepError, sweep
 
 JOBS = {
     f"{name}-{seed}": {"family": "anchor+global", "seeds": [seed], "filter": name, "settings": {}, "rows": 120}

@@ -7,11 +7,11 @@ import pytest
 from commandkit import run
 from PIL import Image
 
-from whisker import scenes
-from whisker.nav import localise
-from whisker.scene import load
-from whisker.scenes import geometry
-from whisker.tables import TableError
+from crunchbot import scenes
+from crunchbot.nav import localise
+from crunchbot.scene import load
+from crunchbot.scenes import geometry
+from crunchbot.tables import TableError
 
 CELLS = np.array([[0, 255, 0], [255, 255, 0], [0, 0, 255], [255, 0, 255]], np.uint8)  # [x][y], cells of 2 cm
 PATH = np.array([[0.02, 0.02, 0.1], [0.03, 0.022, 0.2], [0.04, 0.03, 3.1], [0.035, 0.03, -3.1]])

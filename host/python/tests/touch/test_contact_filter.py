@@ -7,10 +7,10 @@ import pytest
 from commandkit import run, signals_as_before  # noqa: F401 - a fixture
 from whisks import whisk, whisks
 
+from crunchbot.touch.contact_filter import ContactFilter
+from crunchbot.touch.radial import model as radial
+from crunchbot.touch.radial.shape import Contact
 from signals.mechanics import Whisker, touch
-from whisker.touch.contact_filter import ContactFilter
-from whisker.touch.radial import model as radial
-from whisker.touch.radial.shape import Contact
 
 TICK_S = 5e-4
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from whisker.touch.floor import STEP_COUNTS, WINDOW_SAMPLES, FloorWhisker, centred, dithered, floor_whisker
-from whisker.touch.texture.model import TextureModel
-from whisker.touch.texture.train import train
+from crunchbot.touch.floor import STEP_COUNTS, WINDOW_SAMPLES, FloorWhisker, centred, dithered, floor_whisker
+from crunchbot.touch.texture.model import TextureModel
+from crunchbot.touch.texture.train import train
 
 SPREAD = {"VINYL": 12.0, "SMOOTH": 40.0, "ROUGH": 90.0}
 MIDDLE = np.array([32768.0, 32768.0])

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from whisks import write_whisks
 
-from whisker.tables import TableError
-from whisker.touch.radial.model import RadialModel, _best, peak, read_whisks
+from crunchbot.tables import TableError
+from crunchbot.touch.radial.model import RadialModel, _best, peak, read_whisks
 
 
 def test_peak_is_the_largest_length_about_rest():

@@ -5,11 +5,11 @@ import json
 import numpy as np
 import pytest
 
-from whisker import cli
-from whisker.tables import TableError
-from whisker.touch.radial import model as radial
-from whisker.touch.radial.model import Contact, Whisks
-from whisker.touch.radial.press import PressModel, press_of
+from crunchbot import cli
+from crunchbot.tables import TableError
+from crunchbot.touch.radial import model as radial
+from crunchbot.touch.radial.model import Contact, Whisks
+from crunchbot.touch.radial.press import PressModel, press_of
 
 RADII, DEPTH_MM, HZ, PACE = (50.0, 60.0, 70.0, 80.0, 90.0, 100.0), 40.0, 100.0, 10.0
 

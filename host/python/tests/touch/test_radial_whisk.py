@@ -8,11 +8,11 @@ import pytest
 from commandkit import run
 from whisks import TIP_MM, whisk, whisks
 
-from whisker.tables import TableError
-from whisker.touch.radial import model as radial
-from whisker.touch.radial.model import Contact, Whisks
-from whisker.touch.radial.shape import shape_of, terms_of
-from whisker.touch.radial.whisk import WhiskModel
+from crunchbot.tables import TableError
+from crunchbot.touch.radial import model as radial
+from crunchbot.touch.radial.model import Contact, Whisks
+from crunchbot.touch.radial.shape import shape_of, terms_of
+from crunchbot.touch.radial.whisk import WhiskModel
 
 
 def errors(model, held: Whisks) -> np.ndarray:

@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from whisker.tables import TableError
-from whisker.touch.texture.model import TextureModel, classify, load, read_recording, read_training
+from crunchbot.tables import TableError
+from crunchbot.touch.texture.model import TextureModel, classify, load, read_recording, read_training
 
 RNG = np.random.default_rng(11)
 SPREAD = {"VINYL": 15.0, "SMOOTH": 40.0, "ROUGH": 90.0}

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from commandkit import run, signals_as_before  # noqa: F401 - a fixture
 
-from whisker.tables import TableError
-from whisker.touch.texture import model as texture
-from whisker.touch.texture import spectral
-from whisker.touch.texture.fit import STRETCHES, log_posterior, temperature
-from whisker.touch.texture.novelty import _alike, fit_novelty
-from whisker.touch.texture.spectral import SpectralModel, forward
-from whisker.touch.texture.train import TEMPERS, _course, _filter_loss, train
+from crunchbot.tables import TableError
+from crunchbot.touch.texture import model as texture
+from crunchbot.touch.texture import spectral
+from crunchbot.touch.texture.fit import STRETCHES, log_posterior, temperature
+from crunchbot.touch.texture.novelty import _alike, fit_novelty
+from crunchbot.touch.texture.spectral import SpectralModel, forward
+from crunchbot.touch.texture.train import TEMPERS, _course, _filter_loss, train
 
 RATE_HZ = 2000.0
 WINDOW = 200

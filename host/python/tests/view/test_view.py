@@ -18,16 +18,16 @@ from rings import ring_name
 from viewkit import NODES, PATIENCE_S, Block, made_frames, nothing_logged, page, ring_of, spoil, view_of
 from websockets.exceptions import ConnectionClosed
 
-from whisker.bridge.ring import Clock, Writer
-from whisker.cli import main as whisker_main
-from whisker.protocol import LANES
-from whisker.view.__main__ import main
-from whisker.view.client import WINDOW, Client
-from whisker.view.pyramid import BINS
-from whisker.view.rings import find_rings
-from whisker.view.server import MESSAGE_BYTES
-from whisker.view.tap import Tap
-from whisker.view.topics import BLOCK, BLOCK_BINS
+from crunchbot.bridge.ring import Clock, Writer
+from crunchbot.cli import main as whisker_main
+from crunchbot.protocol import LANES
+from crunchbot.view.__main__ import main
+from crunchbot.view.client import WINDOW, Client
+from crunchbot.view.pyramid import BINS
+from crunchbot.view.rings import find_rings
+from crunchbot.view.server import MESSAGE_BYTES
+from crunchbot.view.tap import Tap
+from crunchbot.view.topics import BLOCK, BLOCK_BINS
 
 __all__ = ["nothing_logged"]  # a fixture that every test here uses
 
@@ -301,7 +301,7 @@ def test_a_connection_asks_for_a_pages_place_once(monkeypatch):
         def __init__(self, hub, socket, enter):
             super().__init__(hub, socket, lambda: asked.append(socket) or enter())
 
-    monkeypatch.setattr("whisker.view.server.Client", Counted)
+    monkeypatch.setattr("crunchbot.view.server.Client", Counted)
 
     async def scenario():
         async with view_of() as port, page(port) as p:
@@ -324,7 +324,7 @@ def test_the_kernel_holds_a_whole_block_of_all_lanes_for_a_page_and_less_than_it
             super().__init__(hub, socket, enter)
             sockets.append(socket.transport.get_extra_info("socket"))
 
-    monkeypatch.setattr("whisker.view.server.Client", Seen)
+    monkeypatch.setattr("crunchbot.view.server.Client", Seen)
 
     async def scenario():
         async with view_of() as port, page(port) as p:
@@ -367,11 +367,11 @@ def test_port_in_use_is_one_line(capfd):
 
 def test_what_its_server_logs_is_not_among_its_complaints(monkeypatch, capfd):
     """A connection that breaks in a new way is no line with a remedy; nobody at the terminal can mend it."""
-    log = logging.getLogger("whisker.view")
+    log = logging.getLogger("crunchbot.view")
     monkeypatch.setattr(log, "handlers", [])
     monkeypatch.setattr(log, "propagate", False)  # to pytest, which would take it
     assert main(["--ring", "a/b"]) != 0
-    logging.getLogger("whisker.view.server").error("connection handler failed")
+    logging.getLogger("crunchbot.view.server").error("connection handler failed")
     assert "connection handler failed" not in capfd.readouterr().err
 
 
@@ -405,7 +405,7 @@ def test_help_is_the_same_for_both_commands_and_shows_an_example(capsys):
 
 def test_the_program_serves_prints_its_address_and_ends_at_sigterm():
     with ring_of(made_frames(0, 64)) as writer:
-        command = [sys.executable, "-m", "whisker.view", "--port", "0", "--ring", writer.name]
+        command = [sys.executable, "-m", "crunchbot.view", "--port", "0", "--ring", writer.name]
         with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
             url = process.stdout.readline().strip()
             with urlopen(url) as answer:

@@ -14,10 +14,10 @@ from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed
 from websockets.frames import CloseCode
 
-from whisker.view.guard import Guard
-from whisker.view.page import Page
-from whisker.view.places import Places, network_of
-from whisker.view.server import PAGES_MAX
+from crunchbot.view.guard import Guard
+from crunchbot.view.page import Page
+from crunchbot.view.places import Places, network_of
+from crunchbot.view.server import PAGES_MAX
 
 UPGRADE = "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA=="
 FUZZ_INPUTS = 20_000
@@ -154,7 +154,7 @@ def with_all_pages_taken(scenario) -> None:
 
 
 def test_pages_are_limited_and_places_come_free_again(monkeypatch):
-    monkeypatch.setattr("whisker.view.client.IDLE_S", PATIENCE_S)
+    monkeypatch.setattr("crunchbot.view.client.IDLE_S", PATIENCE_S)
 
     async def scenario(port, pages):
         with pytest.raises(ConnectionClosed) as refusal:
@@ -169,7 +169,7 @@ def test_pages_are_limited_and_places_come_free_again(monkeypatch):
 
 
 def test_a_page_that_is_silent_makes_way_for_a_new_one(monkeypatch):
-    monkeypatch.setattr("whisker.view.client.IDLE_S", 0.0)
+    monkeypatch.setattr("crunchbot.view.client.IDLE_S", 0.0)
 
     async def scenario(port, pages):
         pages.append(await watching(port))
@@ -196,8 +196,8 @@ KEPT = []  # writers of connections that are held
 @pytest.mark.parametrize("request_", [b"", b"GET / HTTP/1.1\r\nHost: loc", get("/ws", "Host: localhost", UPGRADE)])
 def test_connections_that_ask_for_nothing_are_limited_and_make_way(monkeypatch, request_):
     """When all places are taken, the oldest ends and honest clients are served."""
-    monkeypatch.setattr("whisker.view.server.OPEN_S", 2 * PATIENCE_S)
-    monkeypatch.setattr("whisker.view.server.WAITING_MAX", places := 40)
+    monkeypatch.setattr("crunchbot.view.server.OPEN_S", 2 * PATIENCE_S)
+    monkeypatch.setattr("crunchbot.view.server.WAITING_MAX", places := 40)
 
     async def scenario():
         async with view_of() as port, page(port) as steady:

@@ -9,10 +9,10 @@ import pytest
 from rings import ring_name
 from viewkit import NODES, flowing, made_frames, ring_of, spoil, view_of
 
-from whisker.bridge.ring import Clock
-from whisker.protocol import WIRE_VERSION
-from whisker.view.hub import Hub
-from whisker.view.server import serving
+from crunchbot.bridge.ring import Clock
+from crunchbot.protocol import WIRE_VERSION
+from crunchbot.view.hub import Hub
+from crunchbot.view.server import serving
 
 pytestmark = pytest.mark.skipif(chromium.PROGRAM is None, reason="chromium is not installed (apt install chromium)")
 

@@ -14,8 +14,8 @@ from viewrobot import Post
 from viewscene import ALIKE, SceneRun
 from viewsignals import driven_frames, in_time
 
-from whisker.bridge.ring import Clock, Writer
-from whisker.protocol import WIRE_VERSION
+from crunchbot.bridge.ring import Clock, Writer
+from crunchbot.protocol import WIRE_VERSION
 
 pytestmark = pytest.mark.skipif(chromium.PROGRAM is None, reason="chromium is not installed (apt install chromium)")
 

@@ -13,9 +13,9 @@ from test_view_http import mutated
 from viewkit import PATIENCE_S, nothing_logged, page
 from viewrobot import ARENA, ROW_NS, SCENE, MadeUpRun, Post, at, belief_message, estimate, reach, robot_view, route
 
-from whisker.robot import initial_pose
-from whisker.robot.link import Link
-from whisker.robot.messages import (
+from crunchbot.robot import initial_pose
+from crunchbot.robot.link import Link
+from crunchbot.robot.messages import (
     Contact,
     End,
     Header,
@@ -29,11 +29,11 @@ from whisker.robot.messages import (
     Time,
     encode,
 )
-from whisker.scene import LARGEST_M, Scene
-from whisker.sensor_tables import SensorTable
-from whisker.view.command import ROBOT
-from whisker.view.hub import Hub
-from whisker.view.robot import (
+from crunchbot.scene import LARGEST_M, Scene
+from crunchbot.sensor_tables import SensorTable
+from crunchbot.view.command import ROBOT
+from crunchbot.view.hub import Hub
+from crunchbot.view.robot import (
     CONTACTS_MOST,
     COUNTERS_MOST,
     PATH_MOST,
@@ -42,8 +42,8 @@ from whisker.view.robot import (
     TEXT_MOST,
     RobotModel,
 )
-from whisker.view.robot_source import join
-from whisker.view.robot_topics import BELIEF_HEAD, BELIEF_ID, POINTS_MOST, BeliefFeed, RobotFeed, SceneFeed
+from crunchbot.view.robot_source import join
+from crunchbot.view.robot_topics import BELIEF_HEAD, BELIEF_ID, POINTS_MOST, BeliefFeed, RobotFeed, SceneFeed
 
 FUZZ_INPUTS = 5000
 WIDE = np.array([[0.0009, 0.0003, 0.0], [0.0003, 0.0016, 0.0], [0.0, 0.0, 0.04]])  # 3 cm by 4 cm, 0.2 rad
@@ -209,7 +209,7 @@ def test_nothing_grows_without_bound():
 
 
 def test_a_page_gets_the_whole_path_in_parts_and_then_only_what_is_new(monkeypatch):
-    monkeypatch.setattr("whisker.view.robot_topics.ROBOT_S", 0.0)
+    monkeypatch.setattr("crunchbot.view.robot_topics.ROBOT_S", 0.0)
     post = Post()
     hub = Hub([], post.source, SCENE)
     post.play(MadeUpRun(), range(POINTS_MOST + 40), hub.robot)
@@ -226,7 +226,7 @@ def test_a_page_gets_the_whole_path_in_parts_and_then_only_what_is_new(monkeypat
 
 
 def test_a_slow_page_gets_the_newest_belief_and_none_that_it_missed(monkeypatch):
-    monkeypatch.setattr("whisker.view.robot_topics.BELIEF_S", 0.0)
+    monkeypatch.setattr("crunchbot.view.robot_topics.BELIEF_S", 0.0)
     post = Post()
     hub = Hub([], post.source, SCENE)
     feed = BeliefFeed(hub, {})

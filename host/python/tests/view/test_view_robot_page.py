@@ -8,10 +8,10 @@ from viewkit import made_frames, ring_of
 from viewpage import DRAWN, looking_at
 from viewrobot import ARENA, SCENE, MadeUpRun, Post, belief_message, estimate, robot_view, route
 
-from whisker.robot.messages import Behaviour, Header, KeyValue, ProcessHealth, Time
-from whisker.view.hub import Hub
-from whisker.view.robot import SILENT_S
-from whisker.view.server import serving
+from crunchbot.robot.messages import Behaviour, Header, KeyValue, ProcessHealth, Time
+from crunchbot.view.hub import Hub
+from crunchbot.view.robot import SILENT_S
+from crunchbot.view.server import serving
 
 pytestmark = pytest.mark.skipif(chromium.PROGRAM is None, reason="chromium is not installed (apt install chromium)")
 

@@ -12,11 +12,11 @@ import pytest
 from rings import ring_name
 from websockets.asyncio.client import connect
 
-from whisker.bridge.ring import FRAME, Writer
-from whisker.protocol import CODES, LANES, LIMITS, STATUS_CODE_SHIFT
-from whisker.view.hub import Hub
-from whisker.view.server import serving
-from whisker.view.topics import BLOCK
+from crunchbot.bridge.ring import FRAME, Writer
+from crunchbot.protocol import CODES, LANES, LIMITS, STATUS_CODE_SHIFT
+from crunchbot.view.hub import Hub
+from crunchbot.view.server import serving
+from crunchbot.view.topics import BLOCK
 
 NODES = 3
 PATIENCE_S = 20.0  # for what must come; a test that fails ends

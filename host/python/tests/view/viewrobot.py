@@ -10,16 +10,16 @@ from functools import cache
 import numpy as np
 from linkkit import sample
 
-from whisker.robot import messages as m
-from whisker.robot.inbox import Inbox
-from whisker.robot.rows import between
-from whisker.robot.streams import envelopes
-from whisker.scene import Arena, Scene
-from whisker.simulation.scenes import make_robot
-from whisker.view.hub import Hub
-from whisker.view.robot import RobotModel
-from whisker.view.robot_source import InboxSource
-from whisker.view.server import serving
+from crunchbot.robot import messages as m
+from crunchbot.robot.inbox import Inbox
+from crunchbot.robot.rows import between
+from crunchbot.robot.streams import envelopes
+from crunchbot.scene import Arena, Scene
+from crunchbot.simulation.scenes import make_robot
+from crunchbot.view.hub import Hub
+from crunchbot.view.robot import RobotModel
+from crunchbot.view.robot_source import InboxSource
+from crunchbot.view.server import serving
 
 ROW_NS = 10**8
 ARENA = Arena(

@@ -6,14 +6,14 @@ from functools import partial
 import numpy as np
 from viewrobot import ROW_NS
 
-from whisker.nav.filters import Filter
-from whisker.pilot.pilot import compose
-from whisker.robot import messages as m
-from whisker.robot.belief import condense, to_message
-from whisker.scene import NORMAL, POINT
-from whisker.scenes import arenas
-from whisker.scenes.families import Recipe, recipe
-from whisker.scenes.making import make_recipe
+from crunchbot.nav.filters import Filter
+from crunchbot.pilot.pilot import compose
+from crunchbot.robot import messages as m
+from crunchbot.robot.belief import condense, to_message
+from crunchbot.scene import NORMAL, POINT
+from crunchbot.scenes import arenas
+from crunchbot.scenes.families import Recipe, recipe
+from crunchbot.scenes.making import make_recipe
 
 FILTER = "adaptive"
 ALIKE = replace(

@@ -112,7 +112,7 @@ def main() -> int:
     parser.add_argument("--hostile", type=int, default=200)
     parser.add_argument("--seconds", type=float, default=10.0)
     options = parser.parse_args()
-    command = [sys.executable, "-m", "whisker.view", "--port", "0", "--ring", "no-such-ring"]
+    command = [sys.executable, "-m", "crunchbot.view", "--port", "0", "--ring", "no-such-ring"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as view:
         port = int(view.stdout.readline().rstrip("/\n").rpartition(":")[2])
         for kind in KINDS:

@@ -7,10 +7,10 @@ from contextlib import asynccontextmanager
 import numpy as np
 from viewkit import spoil
 
-from whisker.bridge.ring import FRAME, Writer
-from whisker.protocol import CODES, LANES, LIMITS, STATUS_CODE_SHIFT
-from whisker.simulation.scenes import make_scene
-from whisker.simulation.world import World
+from crunchbot.bridge.ring import FRAME, Writer
+from crunchbot.protocol import CODES, LANES, LIMITS, STATUS_CODE_SHIFT
+from crunchbot.simulation.scenes import make_scene
+from crunchbot.simulation.world import World
 
 # m/s, rad/s, ticks; again and again
 DRIVE = ((0.15, 0.0, 4000), (0.0, 0.71, 3000), (0.15, 0.0, 5000), (0.0, -0.71, 3000), (-0.15, 0.0, 3000))

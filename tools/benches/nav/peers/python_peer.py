@@ -11,9 +11,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from whisker.nav.observations import Observations, observations_path, read_observations
-from whisker.nav.weigher import Weigher
-from whisker.scene import Prior, Scene, load
+from crunchbot.nav.observations import Observations, observations_path, read_observations
+from crunchbot.nav.weigher import Weigher
+from crunchbot.scene import Prior, Scene, load
 
 LEAST = -700.0  # log-likelihood where no robot can stand: packages differ in how they take infinities
 TRIES = 50

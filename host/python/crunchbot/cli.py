@@ -1,0 +1,67 @@
+"""The command line `whisker`: finds the subcommand, runs it, and turns what a person can mend into one line.
+
+Subcommands live in `crunchbot.commands`; only the one that is called is imported, so that help is quick.
+"""
+
+import argparse
+import importlib
+import sys
+
+from .arguments import Parser
+from .ends import exit_code
+
+# name (its module has underscores for dashes): what it does
+COMMANDS = {
+    "info": "what ring, daemon and bridge say of themselves",
+    "top": "lanes, rates and losses in the terminal",
+    "view": "traces, losses and health in a browser; the same as whisker-view",
+    "doctor": "find out why it does not work",
+    "calibrate": "measure rest and noise, record contacts at known distances",
+    "bridge-sim": "a simulated bridge to try everything with",
+    "flash": "load firmware into the nodes, or gateware into the bridge",
+    "record": "write a ring to an MCAP file",
+    "replay": "feed a ring from a recording, as the device would",
+    "stream": "print frames as CSV or JSON lines",
+    "robot": "all processes of a robot, on hardware or simulated",
+    "pilot": "the netbook's part of a robot: samples to wheel speeds and observations",
+    "navigator": "pose and belief of a robot as its rows come, over the network",
+    "bag": "record everything a robot's processes say, for ROS 2 tools",
+    "pyro": "a robot's results as a Pyro object, the paper's interface",
+    "localise": "where the robot was, row by row of a scene folder",
+    "scene": "make scene folders for localise",
+    "bench": "score estimates of any engine on a fixed list of scenes and logs",
+    "texture": "learn and tell floor surfaces",
+    "radial": "learn and tell the distance of contacts along a whisker",
+}
+
+
+def main(argv: list[str] | None = None) -> int:
+    return exit_code("whisker", lambda: _run(sys.argv[1:] if argv is None else argv))
+
+
+def _run(words: list[str]) -> int:
+    arguments = _parser(next(iter(words), "")).parse_args(words)
+    return arguments.run(arguments)
+
+
+def _parser(chosen: str) -> Parser:
+    """The parser of the whole command line, with the arguments of the chosen subcommand only."""
+    width = max(map(len, COMMANDS))
+    listed = "\n".join(f"  {name:{width}}  {text}" for name, text in COMMANDS.items())
+    purpose = "Whiskered robots: sensing, tactile perception, localisation by touch."
+    parser = Parser(prog="whisker", usage="whisker COMMAND ...", description=f"{purpose}\n\ncommands:\n{listed}")
+    parser.show_example("whisker bridge-sim &  whisker top")
+    commands = parser.add_subparsers(
+        prog="whisker", dest="command", required=True, metavar="COMMAND", help=argparse.SUPPRESS
+    )
+    for name, text in COMMANDS.items():
+        command = commands.add_parser(name, description=text)
+        if name == chosen:
+            module = importlib.import_module(f".commands.{name.replace('-', '_')}", __package__)
+            command.show_example(module.EXAMPLE)
+            module.add(command)
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,26 @@
+"""`whisker doctor`: finds out why it does not work (crunchbot.bridge.doctor)."""
+
+from ..arguments import RING, add_ring_owner
+from ..bridge import doctor
+from ..simulation.bridge import program
+
+EXAMPLE = "whisker doctor --ring whisker"
+
+
+def add(parser) -> None:
+    parser.add_argument("--ring", default=RING, metavar="NAME", help="the ring that should work (default: %(default)s)")
+    add_ring_owner(parser)
+    text = "prove FPGA, FIFO and USB of a bridge that no whiskerd holds, by its own pattern; no node is needed"
+    parser.add_argument("--pattern", action="store_true", help=text)
+    parser.add_argument("--serial", metavar="TEXT", help="with --pattern: the bridge with this serial number")
+    parser.set_defaults(run=run)
+
+
+def run(arguments) -> int:
+    """Exit code 0: nothing stands in the way; 1: something does."""
+    if arguments.pattern:
+        findings = doctor.prove(program("whiskerd"), arguments.serial)
+    else:
+        findings = doctor.examine(arguments.ring, owner=arguments.ring_owner)
+    print("\n".join(finding.line() for finding in findings))
+    return 1 if any(finding.level == doctor.FAIL for finding in findings) else 0

@@ -1,0 +1,71 @@
+"""`whisker localise`: runs a filter over a scene folder (crunchbot.nav.localise)."""
+
+import json
+import sys
+
+from ..nav import localise
+from ..nav.localise import SettingError
+from ..occupancy import from_map
+from ..scene import PRIOR, SceneError, load
+
+EXAMPLE = "whisker localise scenes/paper --filter grid --set grid.cell_m=0.1 --out est.csv --json"
+
+
+def add(parser) -> None:
+    parser.add_argument("scene", nargs="?", help="folder with arena.toml, robot.toml, prior.toml, observations.csv")
+    parser.add_argument(
+        "--filter", default=localise.default_filter(), metavar="NAME", help="see --list-filters (default: %(default)s)"
+    )
+    parser.add_argument("--seed", type=int, default=0, help="of every random draw (default: %(default)s)")
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="KEY=VALUE", help="change a setting, see --list-settings"
+    )
+    parser.add_argument("--out", metavar="EST.CSV", help="write t_s, x_m, y_m, theta_rad, confidence of every row")
+    text = "occupancy map (a ROS map server's YAML file): its boxes in place of arena.toml's, or of all of it where there is none"
+    parser.add_argument("--map", metavar="MAP.YAML", help=text)
+    parser.add_argument("--json", action="store_true", help="print the summary as one line of JSON")
+    parser.add_argument("--list-filters", action="store_true", help="print the filters' names and leave")
+    parser.add_argument(
+        "--list-settings", action="store_true", help="print the settings with defaults and ranges and leave"
+    )
+    parser.set_defaults(run=run)
+
+
+def run(arguments) -> int:
+    if arguments.list_filters:
+        print("\n".join(localise.filter_names()))
+        return 0
+    if arguments.list_settings:
+        for name, standard, low, high in localise.settings_list():
+            print(f"{name}={standard:g} ({low:g} to {high:g})")
+        return 0
+    if arguments.scene is None:
+        raise SettingError("localise: no scene folder given; name one, or use --list-filters")
+    scene = load(arguments.scene, arguments.map)
+    if scene.prior is None:
+        raise SceneError(f'{arguments.scene}/{PRIOR}: missing; write one, kind = "uniform" if nothing is known')
+    for warning in scene.warnings():
+        print(f"whisker: warning: {warning}", file=sys.stderr)
+    observations = localise.read_observations(localise.observations_path(arguments.scene), scene)
+    if observations.truth is not None:
+        observations.truth = from_map(observations.truth, scene.origin)
+    settings, regions = _settings(arguments.set), localise.REGION_ROWS
+    result = localise.run(arguments.filter, scene, observations, settings, arguments.seed, regions)
+    for warning in localise.warnings(result):
+        print(f"whisker: warning: {warning}", file=sys.stderr)
+    if arguments.out:
+        localise.write_estimates(arguments.out, result, observations, scene.origin)
+    summary = localise.summary(result, observations.truth)
+    print(json.dumps(summary) if arguments.json else "\n".join(f"{key}: {value}" for key, value in summary.items()))
+    return 0
+
+
+def _settings(pairs: list[str]) -> dict[str, float]:
+    settings = {}
+    for pair in pairs:
+        key, _, value = pair.partition("=")
+        try:
+            settings[key] = float(value)
+        except ValueError:
+            raise SettingError(f"--set {pair}: not KEY=NUMBER, as in grid.cell_m=0.05") from None
+    return settings

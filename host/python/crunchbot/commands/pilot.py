@@ -1,0 +1,144 @@
+"""`whisker pilot`: the netbook's part of a robot: samples to wheel speeds and observation rows (crunchbot.robot)."""
+
+import json
+import threading
+import time
+from contextlib import ExitStack, closing
+from pathlib import Path
+from types import SimpleNamespace
+
+from ..arguments import RING, add_ring_owner, whole_number
+from ..bridge.nodes import NodeError
+from ..bridge.ring import Reader
+from ..errors import UserError
+from ..pilot.base import Base
+from ..pilot.pilot import Pilot
+from ..pilot.wheels import EXACT, Wheels
+from ..robot.blocks import LiveRing
+from ..robot.health import Health
+from ..robot.lifeline import Heartbeat
+from ..robot.link import Link
+from ..robot.models import check_nodes, load_models
+from ..robot.options import NAVIGATOR_ENDPOINT, PILOT_ENDPOINT, add_link, open_link
+from ..robot.pilot_process import Flight, LiveFlight, LiveWheels, fly_in_step
+from ..robot.rowfiles import Rows, Traces
+from ..robot.telling import Teller
+from ..robot.wheels import RETRY_S, IdealWheels, LiveBase, SteppedBase, wheels_of
+from ..scene import load
+from ..simulation.link import SimLink
+from ..stopping import stop_on_signals
+
+EXAMPLE = "whisker pilot SCENE --models MODELS --base /run/user/1000/base"
+RING_WAIT_S = 10.0  # for the ring of a simulation that waits for us
+OTHERS_WAIT_S = 60.0
+GREETING_S = 10.0  # a live pilot goes on without them
+NOWHERE = "/dev/null"
+
+
+class PilotError(UserError):
+    """Something the pilot needs is not there; one line."""
+
+    exit_code = 1
+
+
+def add(parser) -> None:
+    parser.add_argument("scene", type=Path, metavar="SCENE", help="scene folder, of which robot.toml is read")
+    parser.add_argument("--models", type=Path, required=True, help="folder with texture.json and <whisker>.json")
+    parser.add_argument("--nodes", help="what 'whisker info --nodes' printed: models of other nodes are refused")
+    parser.add_argument("--ring", default=RING, metavar="NAME", help="the ring to read (default: %(default)s)")
+    add_ring_owner(parser)
+    parser.add_argument("--base", metavar="SOCKET", help="of whisker-base")
+    text = "of a simulation that waits for the pilot; without --base its wheels are driven directly"
+    parser.add_argument("--simulation", metavar="SOCKET", help=text)
+    parser.add_argument("--seed", type=whole_number(0), default=1, help="of the random turns (default: %(default)s)")
+    add_link(parser, [PILOT_ENDPOINT], [NAVIGATOR_ENDPOINT])
+    parser.add_argument(
+        "--await", action="append", default=[], dest="others", metavar="PROCESS", help="begin when it is there, too"
+    )
+    parser.add_argument("--out", default=NOWHERE, metavar="FILE", help="observations.csv of the contract")
+    parser.add_argument("--traces", default=NOWHERE, metavar="FILE", help="CSV of the floor whiskers' deflection")
+    parser.add_argument("--report", type=Path, metavar="FILE", help="JSON of what was used, skipped and measured")
+    parser.set_defaults(run=run)
+
+
+def run(arguments) -> int:
+    if not (arguments.base or arguments.simulation):
+        raise UserError("pilot: no wheels; give --base SOCKET, or --simulation SOCKET")
+    with ExitStack() as stack:
+        try:
+            parts = (_fly_in_step if arguments.simulation else _fly_live)(arguments, stack)
+        except NodeError:
+            raise
+        except (OSError, ValueError) as error:
+            raise error if isinstance(error, UserError) else PilotError(f"pilot: {error}") from error
+    if arguments.report:
+        _write_report(arguments.report, parts)
+    return 0
+
+
+def _parts(arguments, link: Link, wheels: Wheels, stack: ExitStack) -> SimpleNamespace:
+    robot = load(arguments.scene).robot
+    texture, radial = load_models(arguments.models, robot)
+    if arguments.nodes:
+        check_nodes(arguments.nodes, robot, radial)
+    pilot = Pilot(robot, texture, radial, arguments.seed, wheels)
+    out = stack.enter_context(open(arguments.out, "w", newline=""))  # noqa: SIM115
+    traces = stack.enter_context(open(arguments.traces, "w", newline=""))  # noqa: SIM115
+    parts = {"rows": Rows(out), "traces": Traces(traces, pilot), "teller": Teller(link, pilot)}
+    return SimpleNamespace(pilot=pilot, flight=None, base_health={}, **parts)
+
+
+def _fly_in_step(arguments, stack: ExitStack) -> SimpleNamespace:
+    """Everybody must be there before the first tick, for what is sent then must reach them."""
+    link = stack.enter_context(open_link("pilot", arguments))
+    base = stack.enter_context(Base(arguments.base)) if arguments.base else None
+    parts = _parts(arguments, link, wheels_of(base.health()) if base else EXACT, stack)
+    link.announce()
+    if not link.wait_for(arguments.others, OTHERS_WAIT_S):
+        gone = ", ".join(sorted(set(arguments.others) - link.peers))
+        raise PilotError(f"pilot: {gone} did not come in {OTHERS_WAIT_S:g} s; start it, and connect it to this pilot")
+    reader = stack.enter_context(Reader(arguments.ring, RING_WAIT_S, arguments.ring_owner))
+    sim = stack.enter_context(SimLink(arguments.simulation))
+    wheels = SteppedBase(sim, base) if base else IdealWheels(sim)
+    parts.flight = Flight(parts.pilot, wheels, parts.rows, parts.traces, parts.teller)
+    fly_in_step(parts.flight, reader, parts.teller)
+    parts.base_health = wheels.health()
+    return parts
+
+
+def _fly_live(arguments, stack: ExitStack) -> SimpleNamespace:
+    stop, heartbeat = stop_on_signals(), Heartbeat.of_environment()
+    link = stack.enter_context(open_link("pilot", arguments))
+    base = LiveBase(arguments.base)
+    parts = _parts(arguments, link, _known_wheels(base, link, stop), stack)
+    wheels = LiveWheels(base)
+    ring = stack.enter_context(closing(LiveRing(arguments.ring, len(parts.pilot.names), owner=arguments.ring_owner)))
+    parts.flight = Flight(parts.pilot, wheels, parts.rows, parts.traces, parts.teller)
+    live = LiveFlight(parts.flight, ring, wheels, link, heartbeat)
+    link.announce()
+    _greet(arguments.others, link, stop)
+    live.run(stop.is_set)
+    parts.teller.end("stopped")
+    parts.base_health = base.health()
+    return parts
+
+
+def _greet(others: list[str], link: Link, stop: threading.Event) -> None:
+    """Gives the others a while to come: a navigator that takes the first row knows where the run begins."""
+    give_up = time.monotonic() + GREETING_S
+    while not link.wait_for(others, RETRY_S) and time.monotonic() < give_up and not stop.is_set():
+        continue
+
+
+def _known_wheels(base: LiveBase, link: Link, stop: threading.Event) -> Wheels:
+    """Waits for the base to say what it can do; meanwhile the pilot's health says so."""
+    health = Health(link, dict)
+    while not (told := base.health()) and not stop.wait(RETRY_S):
+        health.tell(0, base.trouble, base.trouble)
+    return wheels_of(told) if told else EXACT
+
+
+def _write_report(path: Path, parts: SimpleNamespace) -> None:
+    pilot = parts.pilot
+    content = {"ticks_used": parts.flight.ticks_used, "rows": parts.teller.rows, "bad_samples": pilot.bad_samples}
+    path.write_text(json.dumps(content | {"whisks": pilot.whisks, "base": parts.base_health}, indent=1) + "\n")

@@ -1,0 +1,132 @@
+"""`whisker radial`: fits contacts of known radius and predicts others (crunchbot.touch.radial)."""
+
+import json
+
+import numpy as np
+
+from ..arguments import add_action, plain, warn
+from ..bridge.nodes import check_node
+from ..tables import TableError, unwritable
+from ..touch.contact_filter import ContactFilter, Reports
+from ..touch.radial import model as radial
+
+EXAMPLE = "whisker radial fit contacts.csv --out model.json"
+COLUMNS = "whisk_rad_s and base_rad_s, or push_mm_s, or depth_mm; direction_deg of the touch"
+DOUBTED, DOUBTED_LEAST = 0.5, 3  # confidence; fewer contacts say nothing of the whisker
+KINDS = """paper or linear: equation 3, a line through the peaks; quadratic, rational: a curve instead; whisk: whole body
+whisks by the physics of the shaft, which the pilot needs to tell a face from a corner; press: a regression at several
+depths of a push, which answers during the press; default: the one that predicts left-out places best"""
+
+
+def add(parser) -> None:
+    actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
+    p = add_action(actions, "fit", "fit contacts of known radius", EXAMPLE, fit)
+    p.add_argument("contacts", help="CSV: contact, radius_mm, t_s, channels; where known " + COLUMNS)
+    p.add_argument("--out", required=True, metavar="MODEL.JSON")
+    p.add_argument("--model", choices=radial.MODELS, default="default", help=KINDS)
+    example = "whisker radial predict model.json contacts.csv --json"
+    p = add_action(actions, "predict", "tell the radius of each contact", example, predict)
+    p.add_argument("model")
+    p.add_argument("contacts", help="CSV as for fit; radius_mm is not read and may be absent")
+    p.add_argument("--json", action="store_true", help="one object per line and contact")
+    text = "a press model's answers as each contact grows, one line for every tenth of its samples"
+    p.add_argument("--during", action="store_true", help=text)
+    example = "whisker radial follow model.json contacts.csv --json"
+    p = add_action(actions, "follow", "tell where each contact is while it is pressed", example, follow)
+    p.add_argument("model", help="of whole whisks: 'whisker radial fit --model whisk'")
+    p.add_argument("contacts", help="CSV as for fit, with whisk_rad_s or push_mm_s; radius_mm is not read")
+    p.add_argument("--json", action="store_true", help="one object per line, one every 20 ms at 2 kHz")
+
+
+def fit(arguments) -> int:
+    whisks = radial.read_whisks(arguments.contacts, with_radius=True, warn=warn)
+    try:
+        found = radial.fit(whisks, arguments.model)
+        radial.save(found.model, arguments.out)
+    except ValueError as error:
+        raise TableError(arguments.contacts, None, str(error)) from error
+    except OSError as error:
+        raise unwritable(arguments.out, error) from error
+    print("model      places left out  contacts left out  (RMS error, mm)")
+    for name, errors in found.tried.items():
+        mark = "  chosen" if errors == (found.place_mm, found.contact_mm) else ""
+        print(f"{name:<10}{errors[0]:>16.2f}{errors[1]:>19.2f}{mark}")
+    print(f"{arguments.out}: {len(whisks.contact)} contacts")
+    return 0
+
+
+def predict(arguments) -> int:
+    model = radial.load(arguments.model)
+    if arguments.during and not isinstance(model, radial.PressModel):
+        raise TableError(arguments.model, None, "only a press model answers during a press; fit with '--model press'")
+    whisks = radial.read_whisks(arguments.contacts, with_radius=False, warn=warn)
+    check_node(model.node, whisks.node, arguments.model)
+    doubted = 0
+    for contact, recorded, peak in zip(whisks.contact, whisks.recorded, whisks.peak_counts, strict=True):
+        count = len(recorded.t_s)
+        for end in (count * np.arange(1, 11) // 10) if arguments.during else (count,):
+            sure = _predict(arguments, model, contact, recorded.until(end), None if arguments.during else peak)
+        doubted += sure < DOUBTED
+    if doubted >= DOUBTED_LEAST and 2 * doubted > len(whisks.contact):
+        text = f"{doubted} of {len(whisks.contact)} contacts are unlike those of calibration"
+        warn(f"{arguments.contacts}: {text}; if whisker, sensor or channels have changed, record and fit anew")
+    return 0
+
+
+def _predict(arguments, model, contact: str, recorded: radial.Contact, peak: float | None) -> float:
+    """One line on a contact, whole or so far; its confidence."""
+    try:
+        found = radial.estimate(model, recorded, peak)
+    except ValueError as error:
+        raise TableError(arguments.contacts, 1, f"{error}; give the columns it was fitted on") from error
+    at_s = {"t_s": recorded.t_s[-1] - recorded.t_s[0]} if arguments.during else {}
+    if arguments.json:
+        members = {name: value for name, value in found._asdict().items() if value is not None}
+        print(json.dumps(plain({"contact": contact} | at_s | members)))
+        return found.confidence
+    after = f"  after {at_s['t_s']:.3f} s" if at_s else ""
+    direction = "" if found.direction_deg is None else f"  {found.direction_deg:g} degrees"
+    print(
+        f"{contact}{after}  {found.radius_mm:.2f} +- {found.sigma_mm:.2f} mm  {found.type}  {found.confidence:.2f}{direction}"
+    )
+    return found.confidence
+
+
+def follow(arguments) -> int:
+    model = radial.load(arguments.model)
+    if not isinstance(model, radial.WhiskModel):
+        raise TableError(arguments.model, None, "it is no model of whole whisks; fit with '--model whisk'")
+    whisks = radial.read_whisks(arguments.contacts, with_radius=False, warn=warn)
+    check_node(model.node, whisks.node, arguments.model)
+    for contact, recorded in zip(whisks.contact, whisks.recorded, strict=True):
+        try:
+            held, bases, tilts = ContactFilter.calibrated(model, recorded)
+        except ValueError as error:
+            raise TableError(arguments.contacts, 1, f"contact {contact}: {error}") from error
+        told = held.run(bases, tilts)
+        for k in range(len(told.sample)) if arguments.json else range(len(told.sample))[-1:]:
+            _follow(arguments, contact, recorded.t_s[told.sample[k]] - recorded.t_s[0], told, k)
+        if not len(told.sample):
+            print(json.dumps({"contact": contact}) if arguments.json else f"{contact}  no contact")
+    return 0
+
+
+def _follow(arguments, contact: str, at_s: float, told: Reports, k: int) -> None:
+    """One line on a contact at a time; angles in degrees about the unbent whisker."""
+    x, y = 1e3 * told.point[k]
+    sd_x, sd_y = 1e3 * np.sqrt(np.diag(told.point_cov[k]))
+    normal, normal_sd = np.degrees([told.normal_rad[k], told.normal_sd[k]])
+    if arguments.json:
+        made = {"contact": contact, "t_s": at_s, "point_mm": [x, y], "point_sd_mm": [sd_x, sd_y]}
+        made |= {"normal_deg": normal, "normal_sd_deg": normal_sd, "motion": told.motion[k]}
+        made |= {
+            name: getattr(told, name)[k]
+            for name in ("sweep", "corner", "tip", "slip", "speed", "speed_sd", "curvature", "other")
+        }
+        print(json.dumps(plain(made)))
+        return
+    kind = "tip" if told.tip[k] > 0.5 else "corner" if told.corner[k] > 0.5 else "shaft"
+    print(
+        f"{contact}  after {at_s:.3f} s  ({x:.1f} +- {sd_x:.1f}, {y:.1f} +- {sd_y:.1f}) mm  "
+        f"normal {normal:.0f} +- {normal_sd:.0f} degrees  {kind}  {told.motion[k]}"
+    )

@@ -1,0 +1,250 @@
+"""The robot's messages (crunchbot/msgs) as Python objects, one class a schema; encode and decode are CDR, as ROS 2 has it.
+
+Units, meanings and constants are those of the .msg files; what ROS 2 itself defines is in ros. Times are ns of the bridge's
+clock, 0 at its start.
+"""
+
+import math
+import re
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..errors import UserError
+from ..recording.cdr import Malformed
+from .ranges import RANGES, ROW
+from .ros import (
+    Header,
+    JointState,
+    KeyValue,
+    Odometry,
+    Point,
+    Pose,
+    PoseStamped,
+    PoseWithCovariance,
+    PoseWithCovarianceStamped,
+    Quaternion,
+    Time,
+    Twist,
+    TwistWithCovariance,
+    Vector3,
+)
+from .schema import Codec, OutOfRange
+from .schema import encode as encode_as
+
+EXPLORING, WHISK, RELEASE = range(3)  # Observation.kind
+EMPTY, NOT_READ, VALUE = range(3)  # Observation.cells
+UNKNOWN, TIP, SHAFT = range(3)  # Contact.part
+FACE, CORNER = 1, 2  # Contact.shape; or UNKNOWN
+
+
+class MessageError(UserError, ValueError):
+    """A message that is refused; one line: topic, field, what, remedy."""
+
+
+@dataclass(eq=False)
+class Observation:
+    """A row; crunchbot.robot.rows makes one of the cells of observations.csv and back."""
+
+    header: Header
+    seq: int
+    kind: int
+    motion: np.ndarray
+    pose: np.ndarray
+    names: list[str]
+    cells: np.ndarray
+    values: np.ndarray
+
+
+@dataclass(eq=False)
+class Contact:
+    header: Header
+    whisker: str
+    touching: bool
+    onset: Time
+    release: Time = field(default_factory=Time)
+    measured: bool = False
+    radius_m: float = 0.0
+    sigma_m: float = 0.0
+    part: int = UNKNOWN
+    shape: int = UNKNOWN
+
+
+@dataclass(eq=False)
+class Behaviour:
+    header: Header
+    state: str
+    since: Time
+    reason: str = ""
+
+
+@dataclass(eq=False)
+class Localisation:
+    header: Header
+    filter: str
+    pose: PoseWithCovariance
+    confidence: float
+    observation_seq: int
+    rows_integrated: int = 1
+    rows_skipped: int = 0
+    rows_missed: int = 0
+    first_seq: int = 0
+    prior: str = ""
+
+
+@dataclass(eq=False)
+class Belief:
+    header: Header
+    filter: str
+    observation_seq: int
+    bumps: int
+    mass: float
+    x: np.ndarray
+    y: np.ndarray
+    theta: np.ndarray
+    weight: np.ndarray
+    sigma_m: np.ndarray
+    sigma_rad: np.ndarray
+
+
+@dataclass(eq=False)
+class ProcessHealth:
+    header: Header
+    process: str
+    pid: int
+    state: str
+    counters: list[KeyValue] = field(default_factory=list)
+    last_error: str = ""
+
+    @property
+    def counts(self) -> dict[str, str]:
+        return {pair.key: pair.value for pair in self.counters}
+
+
+@dataclass(eq=False)
+class End:
+    header: Header
+    messages: int
+    reason: str = ""
+
+
+PACKAGES = {
+    "builtin_interfaces": (Time,),
+    "std_msgs": (Header,),
+    "diagnostic_msgs": (KeyValue,),
+    "geometry_msgs": (
+        Vector3,
+        Point,
+        Quaternion,
+        Pose,
+        PoseStamped,
+        PoseWithCovariance,
+        PoseWithCovarianceStamped,
+        Twist,
+        TwistWithCovariance,
+    ),
+    "nav_msgs": (Odometry,),
+    "sensor_msgs": (JointState,),
+    "whisker_msgs": (Observation, Contact, Behaviour, Localisation, Belief, ProcessHealth, End),
+}
+TYPES = {f"{package}/msg/{kind.__name__}": kind for package, kinds in PACKAGES.items() for kind in kinds}
+SCHEMAS = {kind: schema for schema, kind in TYPES.items()}
+CODEC = Codec(TYPES, RANGES)
+ROUNDING = 1e-6  # relative, of sums
+REMEDIES = ("install one release of whisker on both sides", "stop what sends it")  # not readable; not possible
+
+# topic: the class of its messages. Health has a topic for each process, below "health/".
+TOPICS = {
+    "observation": Observation,
+    "odometry": Odometry,
+    "joints": JointState,
+    "contact": Contact,
+    "behaviour": Behaviour,
+    "pose": PoseWithCovarianceStamped,
+    "localisation": Localisation,
+    "belief": Belief,
+    "truth": PoseStamped,
+    "initial_pose": PoseWithCovarianceStamped,
+}
+HEALTH = "health"
+NAME = re.compile(r"[A-Za-z0-9_-]{1,64}")  # of a process or a robot
+
+
+def type_of(topic: str) -> type:
+    """The class of a topic's messages; KeyError when there is no such topic."""
+    kind, _, process = topic.partition("/")
+    return ProcessHealth if kind == HEALTH and NAME.fullmatch(process) else TOPICS[topic]
+
+
+def encode(message) -> bytes:
+    """CDR of a message; ValueError when a fixed array has another length than its schema says."""
+    return encode_as(SCHEMAS[type(message)], message)
+
+
+def decode(kind: type, data: bytes, topic: str = ""):
+    """A message of class `kind`; MessageError names `topic`, field and remedy."""
+    try:
+        message = CODEC.decode(data, SCHEMAS[kind])
+        CHECKS.get(kind, _check_nothing)(message)
+    except Malformed as error:
+        remedy = REMEDIES[isinstance(error, OutOfRange)]
+        raise MessageError(f"{topic or SCHEMAS[kind]}: {error}; {remedy}") from None
+    return message
+
+
+def _check_nothing(message) -> None:
+    """What the table of ranges says is all there is to say."""
+
+
+def _check_observation(row: Observation) -> None:
+    """A row's fields fit each other: it cannot have moved more than its rows could."""
+    if not len(row.names) == len(row.cells) == len(row.values):
+        raise Malformed(f"field cells: {len(row.names)} names, {len(row.cells)} cells, {len(row.values)} values")
+    if len(set(row.names)) != len(row.names):
+        raise OutOfRange("field names: a name that is there twice")
+    if row.seq == 0 and np.abs(row.pose - row.motion).max() > ROUNDING:
+        raise OutOfRange("field pose: of the first row it is its motion")
+    rows = (row.seq + 1) * (1.0 + ROUNDING)
+    if np.hypot(*row.pose[:2]) > rows * math.hypot(*ROW[:2]) or abs(row.pose[2]) > rows * ROW[2]:
+        raise OutOfRange(f"field pose: more than {row.seq + 1} rows can add up to")
+
+
+def _check_joints(joints: JointState) -> None:
+    for name in ("position", "velocity", "effort"):
+        if len(getattr(joints, name)) > len(joints.name):
+            raise Malformed(f"field {name}: {len(getattr(joints, name))} elements, {len(joints.name)} names")
+
+
+def _check_belief(belief: Belief) -> None:
+    for name in ("y", "theta", "weight", "sigma_m", "sigma_rad"):
+        if len(getattr(belief, name)) != len(belief.x):
+            raise Malformed(f"field {name}: {len(getattr(belief, name))} elements")
+
+
+def _check_covariance(name: str, values: np.ndarray) -> None:
+    """No variance is negative, and none is smaller than what it shares with another."""
+    matrix = np.reshape(values, (6, 6))
+    variances = np.diagonal(matrix)
+    shared = np.sqrt(np.outer(np.maximum(variances, 0.0), np.maximum(variances, 0.0)))
+    if (variances < 0.0).any() or (np.abs(matrix) > shared * (1.0 + ROUNDING) + ROUNDING).any():
+        raise OutOfRange(f"field {name}.covariance: no covariance")
+
+
+def _check_odometry(odometry: Odometry) -> None:
+    _check_covariance("pose", odometry.pose.covariance)
+    _check_covariance("twist", odometry.twist.covariance)
+
+
+def _check_pose(message: Localisation | PoseWithCovarianceStamped) -> None:
+    _check_covariance("pose", message.pose.covariance)
+
+
+# What a message must be besides the ranges of its fields, by its class.
+CHECKS = {
+    Observation: _check_observation,
+    Belief: _check_belief,
+    JointState: _check_joints,
+    Odometry: _check_odometry,
+    Localisation: _check_pose,
+    PoseWithCovarianceStamped: _check_pose,
+}

@@ -1,0 +1,168 @@
+"""The robot's process table: what runs on the netbook, what on the desktop, and what stands in for the hardware."""
+
+import signal
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..simulation.bridge import program
+from .children import Program
+
+FIRST_PORT = 7447  # of three: supervisor, pilot, navigator; the latter two are those of robot.link
+LOOPBACK = "127.0.0.1"
+BRIDGE = "bridge"
+
+BASE_STEADY_S = 1.0  # a base that is started again stops the wheels: it comes at once
+
+# Inside the simulated bridge's umockdev the device is seen by whoever has these variables: they are left in file $0. At
+# the end whoever took it ends first, for umockdev does not survive a client that is left. When the supervisor has died
+# the world goes on for a second: a real one does not end with the robot's processes, and a base has to stop its wheels.
+# Each sleep is short, because it goes on when the shell is killed.
+LEAVE_ENVIRONMENT = """
+end() {
+    rm -f "$0"
+    kill $! 2>/dev/null
+    pid=$(cat "$0.pid" 2>/dev/null) && kill "$pid" 2>/dev/null && while kill -0 "$pid" 2>/dev/null; do sleep 0.05; done
+    exit 0
+}
+trap end TERM
+trap 'sleep 1; end' URG
+export -p | grep -E '^export (LD_PRELOAD|UMOCKDEV_DIR)=' >"$0.new" && mv "$0.new" "$0"
+while :; do sleep 1 & wait $!; done
+"""
+# Waits for them, and becomes the command with them; its other variables stay its own.
+WITH_ENVIRONMENT = 'while [ ! -e "$0" ]; do sleep 0.1; done; . "$0"; echo $$ >"$0.pid"; exec "$@"'
+
+
+@dataclass(frozen=True)
+class Places:
+    """Where the processes of one machine meet: a ring, and a folder of sockets."""
+
+    ring: str
+    folder: Path
+
+    @property
+    def base(self) -> Path:
+        return self.folder / "base.sock"
+
+    @property
+    def simulation(self) -> Path:
+        return self.folder / "sim.sock"
+
+    @property
+    def serial(self) -> Path:
+        """Of the simulated base."""
+        return self.folder / "create"
+
+    @property
+    def checkpoint(self) -> Path:
+        """Of the navigator; the folder's life is the run's, so none is older than that."""
+        return self.folder / "navigator.checkpoint"
+
+    @property
+    def environment(self) -> Path:
+        """Of whoever is to see the simulated bridge."""
+        return self.folder / "environment"
+
+
+@dataclass(frozen=True)
+class Meeting(Places):
+    """With those of other machines, at three ports of one address."""
+
+    address: str = LOOPBACK
+    first_port: int = FIRST_PORT
+    zenoh_config: Path | None = None  # with it they meet by TLS
+
+    def endpoint(self, number: int) -> str:
+        """0: the supervisor's, 1: the pilot's, 2: the navigator's."""
+        return f"{'tls' if self.zenoh_config else 'tcp'}/{self.address}:{self.first_port + number}"
+
+    @property
+    def options(self) -> list:
+        """What every process that meets others is given besides endpoints."""
+        return ["--zenoh-config", self.zenoh_config] if self.zenoh_config else []
+
+
+@dataclass(frozen=True)
+class Body:
+    """The robot: its scene folder, its models, and the base, Create 1 or 2, on a serial port."""
+
+    scene: Path
+    models: Path
+    create: int
+    port: Path
+    seed: int  # of the random turns
+
+
+def whisker(command: str) -> list[str]:
+    """How a command of `whisker` begins."""
+    return [sys.executable, "-m", "crunchbot.cli", command]
+
+
+def daemon(meeting: Meeting, simulated: bool) -> Program:
+    """What fills the ring."""
+    command = [program("whiskerd"), "--ring", meeting.ring, "--wait"]
+    if simulated:
+        command = ["sh", "-c", WITH_ENVIRONMENT, meeting.environment, *command]
+    return Program.of("whiskerd", command)
+
+
+def netbook(body: Body, meeting: Meeting, with_desktop: bool) -> list[Program]:
+    """Base and pilot. The pilot is the last, so that it is ended first, and stops the wheels."""
+    base = [program("whisker-base"), "--port", body.port, "--socket", meeting.base, "--model", body.create, "--wait"]
+    pilot = [*whisker("pilot"), body.scene, "--models", body.models, "--ring", meeting.ring, "--base", meeting.base]
+    pilot += ["--seed", body.seed, "--listen", meeting.endpoint(1), "--connect", meeting.endpoint(2)]
+    pilot += meeting.options
+    pilot += ["--await", "navigator"] if with_desktop else []
+    return [
+        Program.of("base", base, moves=True, fed=True, steady_s=BASE_STEADY_S),
+        Program.of("pilot", pilot, tells=True, moves=True),
+    ]
+
+
+def desktop(body: Body, meeting: Meeting, bag: Path | None, view_port: int | None) -> list[Program]:
+    """Navigator, and, where they are wanted, bag and view."""
+    navigator = [*whisker("navigator"), body.scene, "--stay", "--checkpoint", meeting.checkpoint]
+    navigator += ["--listen", meeting.endpoint(2), "--connect", meeting.endpoint(1)]
+    navigator += meeting.options
+    table = [Program.of("navigator", navigator, tells=True)]
+    everybody = [word for number in range(3) for word in ("--connect", meeting.endpoint(number))] + meeting.options
+    if bag:
+        command = [*whisker("bag"), bag, "--scene", body.scene, "--stay", "--next", *everybody]
+        table.append(Program.of("bag", command, tells=True))
+    if view_port is not None:
+        command = [*whisker("view"), "--ring", meeting.ring, "--robot", "--scene", body.scene, "--port", view_port]
+        table.append(Program.of("view", [*command, *everybody]))
+    return table
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """What stands in for arena, whiskers, bridge and base. `flat`: the scene as the simulation reads it."""
+
+    flat: Path
+    level: str  # rtl or bytes
+    seed: int
+    seconds: float
+    pace: float  # simulated seconds per second
+    truth: Path
+    wheels: Path  # what the base's wheels were told
+
+
+def bridge(simulated: Simulated, body: Body, meeting: Meeting) -> Program:
+    """The simulation, at the wall's pace; whiskerd is started beside it."""
+    command = [program("umockdev-wrapper"), program("whisker-bridge-sim"), "--scene", simulated.flat]
+    command += ["--seconds", simulated.seconds, "--seed", simulated.seed, "--level", simulated.level]
+    command += [
+        "--pace",
+        simulated.pace,
+        "--socket",
+        meeting.simulation,
+        "--truth",
+        simulated.truth,
+        "--wheels",
+        simulated.wheels,
+    ]
+    command += ["--create", body.create, "--create-link", meeting.serial]
+    command += ["--", "sh", "-c", LEAVE_ENVIRONMENT, meeting.environment]
+    return Program.of(BRIDGE, command, orphaned=signal.SIGURG)  # the simulation takes no notice of it, its command does

@@ -1,0 +1,25 @@
+"""The program whisker-view; also python -m crunchbot.view."""
+
+import sys
+
+from ..arguments import Parser
+from ..ends import exit_code
+from .command import EXAMPLE, add
+
+
+def main(argv: list[str] | None = None) -> int:
+    return exit_code("whisker-view", lambda: _run(argv))
+
+
+def _run(argv: list[str] | None) -> int:
+    parser = Parser(
+        prog="whisker-view", description="Serves a local page of a ring: traces, loss, health. Prints its address."
+    )
+    parser.show_example(EXAMPLE)
+    add(parser)
+    arguments = parser.parse_args(argv)
+    return arguments.run(arguments)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

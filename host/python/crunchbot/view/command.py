@@ -1,0 +1,122 @@
+"""Arguments of whisker-view and of `whisker view`, and what they start."""
+
+import argparse
+import asyncio
+import contextlib
+import ipaddress
+import logging
+import sys
+import webbrowser
+
+from ..arguments import add_ring_owner, add_zenoh_config
+from ..scene import load
+from ..stopping import listen
+from .hub import Hub
+from .rings import is_name
+from .robot_source import NoRobot, join
+from .server import ViewError, serving
+
+EXAMPLE = "whisker-view --ring whisker --open --robot"
+PORT = 8028
+RING = "whisker"
+ROBOT = "robot"
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments and set `run`."""
+    parser.add_argument(
+        "--ring", action="append", metavar="NAME", help=f"a ring to read from the start; repeatable (default: {RING})"
+    )
+    add_ring_owner(parser)
+    parser.add_argument(
+        "--robot",
+        nargs="?",
+        const=ROBOT,
+        metavar="NAME",
+        help=f"also show the whole robot: arena, belief, path, health (NAME: {ROBOT} if not given)",
+    )
+    parser.add_argument("--scene", metavar="SCENE", help="folder with the robot's arena.toml and robot.toml")
+    parser.add_argument(
+        "--connect",
+        action="append",
+        default=[],
+        metavar="tcp/HOST:PORT",
+        help="a process of the robot; repeatable (default: pilot and navigator of this machine)",
+    )
+    add_zenoh_config(parser)
+    parser.add_argument("--port", type=_port, default=PORT, help="0 takes a free one (default: %(default)s)")
+    parser.add_argument(
+        "--host",
+        type=_address,
+        default="127.0.0.1",
+        metavar="ADDRESS",
+        help="address to serve at (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--allow-host",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="also answer under this name, as behind a forwarded port; repeatable",
+    )
+    text = "pages may tell where the robot is; on loopback they may anyway"
+    parser.add_argument("--allow-pose", action="store_true", help=text)
+    parser.add_argument("--open", action="store_true", help="open the page in a browser")
+    parser.set_defaults(run=run)
+
+
+def _port(text: str) -> int:
+    if not text.isdecimal() or int(text) > 65535:
+        raise argparse.ArgumentTypeError(f"{text} is not a port; give a number from 0 to 65535")
+    return int(text)
+
+
+def _address(text: str) -> str:
+    try:
+        return str(ipaddress.ip_address(text))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text} is not an address; give one such as 127.0.0.1") from None
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Serve until interrupted or terminated."""
+    logging.getLogger("crunchbot.view").addHandler(logging.NullHandler())
+    rings = list(dict.fromkeys(arguments.ring or [RING]))
+    for name in rings:
+        if not is_name(name):
+            raise ViewError(f"--ring {name!r}: not the name of a ring; use letters, digits, dash and dot")
+    scene = None if arguments.scene is None else load(arguments.scene)
+    may_set_pose = arguments.allow_pose or ipaddress.ip_address(arguments.host).is_loopback
+    source = _source(arguments)
+    try:
+        return asyncio.run(_serve(arguments, Hub(rings, source, scene, arguments.ring_owner, may_set_pose)))
+    finally:
+        source.close()
+
+
+def _source(arguments: argparse.Namespace) -> NoRobot:
+    """The robot, if any option asks for it."""
+    config = arguments.zenoh_config
+    asked = arguments.robot or arguments.scene or arguments.connect or config
+    return join(arguments.robot or ROBOT, arguments.connect, config) if asked else NoRobot()
+
+
+async def _serve(arguments: argparse.Namespace, hub: Hub) -> int:
+    over, loop = asyncio.Event(), asyncio.get_running_loop()
+
+    def end() -> None:
+        with contextlib.suppress(RuntimeError):  # the loop has been closed already
+            loop.call_soon_threadsafe(over.set)
+
+    listen(end)
+    async with serving(hub, arguments.host, arguments.port, arguments.allow_host) as port:
+        address = ipaddress.ip_address(arguments.host)
+        if not address.is_loopback:
+            print(f"whisker-view: {arguments.host}: whoever reaches this address can watch", file=sys.stderr)
+        host = "127.0.0.1" if address.is_unspecified else f"[{address}]" if address.version == 6 else str(address)
+        url = f"http://{host}:{port}/"
+        print(url, flush=True)
+        if arguments.open:
+            webbrowser.open(url)
+        await over.wait()
+    return 0

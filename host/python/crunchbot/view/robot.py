@@ -1,0 +1,250 @@
+"""What is known of the robot: the newest of each topic, the paths, the contacts, and when each process last spoke.
+
+Fed with the messages of crunchbot.robot.messages as they come; gives plain values for JSON. Nothing grows without bound,
+nothing is guessed: what no message has told is None. Metres, radians, seconds of the bridge's clock.
+"""
+
+import math
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..robot.messages import CORNER, FACE, HEALTH, NOT_READ, SHAFT, TIP, VALUE, End
+from ..scene import LARGEST_M, Scene
+from .surfaces import Surfaces, touch_column
+
+PATH_MOST = 3000  # points kept: 5 minutes at 10 Hz
+CONTACTS_MOST = 60
+PROCESSES_MOST = 32
+COUNTERS_MOST = 24
+CELLS_MOST = 512
+TEXT_MOST = 200  # characters of anything told
+COUNTER_TEXT_MOST = 40  # of a counter's name, and of its value
+SILENT_S = 3.0  # a process speaks once a second
+BACK_S = 2.0  # a clock that goes back so far has begun anew
+EXPECTED = ("pilot", "navigator")  # shown as not heard, until they are
+KINDS = ("exploring", "body whisk", "after a whisk")
+PARTS = {TIP: "tip", SHAFT: "shaft"}
+SHAPES = {FACE: "face", CORNER: "corner"}
+
+
+def real(value, places: int = 3) -> float | None:
+    """A number for JSON; None: it is none."""
+    value = float(value)
+    return round(value, places) if math.isfinite(value) else None
+
+
+def text(value: str, most: int = TEXT_MOST) -> str:
+    """One line of bounded length."""
+    return " ".join(value[: 2 * most].split())[:most]
+
+
+def placed(pose) -> dict | None:
+    """x, y, theta of a Pose; None: it is of no place that an arena can have."""
+    place = pose.xytheta
+    return dict(zip(("x", "y", "theta"), map(real, place), strict=True)) if max(map(abs, place)) <= LARGEST_M else None
+
+
+class Path:
+    """The newest points of a path, numbered from the first that ever was."""
+
+    def __init__(self):
+        self.points: deque[tuple] = deque(maxlen=PATH_MOST)
+        self.end = 0
+
+    def add(self, *values) -> None:
+        self.points.append(tuple(real(value) for value in values))
+        self.end += 1
+
+    def since(self, number: int, most: int) -> tuple[int, list[tuple]]:
+        """(number of the first, points) from `number` on; later ones if those are gone."""
+        first = max(number, self.end - len(self.points))
+        at = first - (self.end - len(self.points))
+        return first, [self.points[n] for n in range(at, min(at + most, len(self.points)))]
+
+
+@dataclass
+class Process:
+    """One process as its last word had it."""
+
+    pid: int = 0
+    state: str = ""
+    counters: dict[str, str] = field(default_factory=dict)
+    error: str = ""
+    heard: float | None = None  # time.monotonic
+    restarts: int = 0
+    ended: bool = False  # by a last word of its own
+
+
+class RobotModel:
+    """`take` every message; read the rest. `clock` is replaced by tests."""
+
+    def __init__(self, scene: Scene | None = None, clock: Callable[[], float] = time.monotonic):
+        self.scene, self._clock = scene, clock
+        self.processes = {name: Process() for name in EXPECTED}
+        self.run = 0
+        self._heard: dict[str, float] = {}
+        self._forget()
+
+    def _forget(self) -> None:
+        """All but health and scene: a run has begun."""
+        self.now_s: float | None = None
+        self.pose = self.truth = self.behaviour = self.row = self.belief = None
+        self.path, self.true_path = Path(), Path()
+        self.contacts: dict[tuple[str, int], dict] = {}
+        self.surfaces = Surfaces()
+        self.rows = {"missed": None, "unseen": 0}
+        self._seq: int | None = None
+
+    def take(self, topic: str, message) -> None:
+        """A message of a topic of crunchbot.robot.messages.TOPICS, or of health; of any, an End."""
+        kind = HEALTH if topic.startswith(f"{HEALTH}/") else topic
+        if isinstance(message, End):
+            return self._take_end(topic.removeprefix(f"{HEALTH}/"), message)
+        take = getattr(self, f"_take_{kind}", None)
+        if take is None:
+            return
+        if kind in ("observation", "truth"):
+            self._tick(message.header.stamp.ns / 1e9)
+        take(message)
+        self._heard[kind] = self._clock()
+
+    def age(self, *topics: str) -> float | None:
+        """Seconds since something came of one of these topics (none: of any); None: never."""
+        heard = [at for topic, at in self._heard.items() if topic in topics or not topics]
+        return self._clock() - max(heard) if heard else None
+
+    def _tick(self, stamp_s: float) -> None:
+        if self.now_s is not None and stamp_s < self.now_s - BACK_S:
+            self._forget()
+            self.run += 1
+        self.now_s = max(stamp_s, self.now_s or 0.0)
+
+    def _take_observation(self, row) -> None:
+        if self._seq is not None and row.seq > self._seq + 1:
+            self.rows["unseen"] += row.seq - self._seq - 1
+        self._seq = row.seq
+        cells = list(zip(row.names, row.cells.tolist(), row.values.tolist(), strict=True))[:CELLS_MOST]
+        tips, rays = self._sorted([cell for cell in cells if touch_column(cell[0]) is None])
+        self.surfaces.take(row.seq, cells)
+        self.row = {"seq": row.seq, "kind": KINDS[row.kind], "tips": tips, "rays": rays}
+
+    def _sorted(self, cells: list[tuple]) -> tuple[list[dict], list[dict]]:
+        """Cells by whisker: those of texture whiskers, those of object whiskers."""
+        tips, rays = {}, []
+        for name, cell, value in cells:
+            whisker, _, what = name.rpartition("_")
+            whisker, what = self._names.get(name, (text(whisker), text(what)))
+            if what == "mm":
+                state = {VALUE: "contact", NOT_READ: "unread"}.get(cell, "none")
+                rays.append({"name": whisker, "state": state, "mm": real(value, 1) if cell == VALUE else None})
+            else:
+                tips.setdefault(whisker, []).append((what, real(value) if cell == VALUE else None))
+        return [{"name": name, "loglik": values} for name, values in tips.items()], rays
+
+    @property
+    def _names(self) -> dict[str, tuple[str, str]]:
+        """(whisker, texture) by name of a texture's cell; either may have an underscore in it."""
+        if self.scene is None:
+            return {}
+        tips = self.scene.robot.of_role("texture")
+        return {f"{tip.name}_{name}": (tip.name, name) for tip in tips for name in self.scene.arena.textures}
+
+    def _take_localisation(self, told) -> None:
+        self.rows["missed"] = told.rows_missed
+        self.pose = placed(told.pose.pose)
+        if self.pose is None:
+            return
+        self.path.add(told.header.stamp.ns / 1e9, *self.pose.values(), told.confidence)
+        covariance = told.pose.planar_covariance
+        self.pose |= {
+            "sigma_m": real(math.sqrt(max(0.0, covariance[0, 0] + covariance[1, 1]))),
+            "sigma_rad": real(math.sqrt(max(0.0, covariance[2, 2]))),
+            "confidence": real(told.confidence),
+            "filter": text(told.filter),
+            "stamp_s": real(told.header.stamp.ns / 1e9),
+            "skipped": told.rows_skipped,
+            "first_seq": told.first_seq,
+            "prior": text(told.prior),
+        }
+        self.surfaces.place(told.observation_seq, self.pose)
+
+    def _take_truth(self, told) -> None:
+        self.truth = placed(told.pose)
+        if self.truth is not None:
+            self.true_path.add(told.header.stamp.ns / 1e9, *self.truth.values())
+
+    def _take_belief(self, told) -> None:
+        self.belief = told
+
+    def _take_behaviour(self, told) -> None:
+        since = told.since.ns / 1e9
+        self.behaviour = {"state": text(told.state), "since_s": real(since), "reason": text(told.reason)}
+
+    def _take_contact(self, told) -> None:
+        key = (told.whisker, told.onset.ns)
+        contact = self.contacts.setdefault(key, {"x": None, "y": None})
+        contact |= {
+            "whisker": text(told.whisker),
+            "onset_s": real(told.onset.ns / 1e9),
+            "release_s": None if told.touching else real(told.release.ns / 1e9),
+        }
+        measured = {"radius_m": None, "sigma_m": None, "part": None, "surface": None}
+        if told.measured:
+            measured = {"radius_m": real(told.radius_m, 4), "sigma_m": real(told.sigma_m, 5)}
+            measured |= {"part": PARTS.get(told.part), "surface": SHAPES.get(told.shape)}
+            contact["x"], contact["y"] = self._place(told.whisker, told.radius_m)
+        contact |= measured if told.measured or "part" not in contact else {}
+        while len(self.contacts) > CONTACTS_MOST:
+            del self.contacts[next(iter(self.contacts))]
+
+    def _place(self, whisker: str, radius_m: float) -> tuple[float | None, float | None]:
+        """Where in the arena a contact so far out on a whisker is, if the robot is where it is estimated now."""
+        named = [w for w in self.scene.robot.of_role("object") if w.name == whisker] if self.scene else []
+        if not named or self.pose is None:
+            return None, None
+        base, yaw, theta = named[0].base_m, named[0].yaw_rad, self.pose["theta"]
+        forward, left = base[0] + radius_m * math.cos(yaw), base[1] + radius_m * math.sin(yaw)
+        x = self.pose["x"] + forward * math.cos(theta) - left * math.sin(theta)
+        return real(x), real(self.pose["y"] + forward * math.sin(theta) + left * math.cos(theta))
+
+    def _take_health(self, told) -> None:
+        name = text(told.process) or "nameless"
+        if name not in self.processes and len(self.processes) >= PROCESSES_MOST:
+            return
+        process = self.processes.setdefault(name, Process())
+        if process.heard is not None and process.pid != told.pid:
+            process.restarts += 1
+        process.pid, process.state, process.error = told.pid, text(told.state), text(told.last_error)
+        pairs = told.counters[:COUNTERS_MOST]
+        process.counters = {text(p.key, COUNTER_TEXT_MOST): text(p.value, COUNTER_TEXT_MOST) for p in pairs}
+        process.heard, process.ended = self._clock(), False
+
+    def _take_end(self, name: str, told) -> None:
+        """A process that ended in good order has a word for why; other streams end with it."""
+        if name in self.processes:
+            process = self.processes[name]
+            process.ended, process.state = True, text(f"ended: {told.reason}" if told.reason else "ended")
+
+    def health(self) -> list[dict]:
+        """Every process, by name, with its age in whole seconds."""
+        return [self._process(name, process) for name, process in sorted(self.processes.items())]
+
+    def _process(self, name: str, process: Process) -> dict:
+        age = None if process.heard is None else self._clock() - process.heard
+        told = {key: getattr(process, key) for key in ("pid", "state", "counters", "error", "restarts", "ended")}
+        silent = age is not None and age > SILENT_S and not process.ended
+        return {"name": name, "age_s": None if age is None else int(age), "silent": silent} | told
+
+    def touching(self) -> list[dict]:
+        """Contacts that have no end yet."""
+        return [contact for contact in self.contacts.values() if contact["release_s"] is None]
+
+    def belief_columns(self) -> np.ndarray:
+        """(n, 6) float32 of the newest belief: x, y, theta, weight, sigma_m, sigma_rad."""
+        told = self.belief
+        columns = (told.x, told.y, told.theta, told.weight, told.sigma_m, told.sigma_rad)
+        return np.column_stack(columns).astype("<f4")

@@ -1,0 +1,67 @@
+"""Where the robot's messages come from: a crunchbot.robot.inbox, which the server's rounds empty."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from ..errors import UserError
+
+WANTED = ("observation", "contact", "behaviour", "localisation", "belief", "truth", "health/*")
+TOLD_MOST = 200  # characters of what is wrong with a message
+
+
+class NoRobot:
+    """whisker-view was started for rings only. Also what every source answers to."""
+
+    name = ""
+
+    def link(self) -> dict:
+        """`state`: off or open; `text`: one line for a person."""
+        return {"state": "off", "text": "not asked for"}
+
+    def refused(self) -> dict:
+        """Messages that could not be read (`count`), what was wrong with the `last`, and those `missed` on the way."""
+        return {"count": 0, "last": "", "missed": 0}
+
+    def poll(self) -> list[tuple]:
+        """(topic, message) of what has come since the last call, in order. Never waits."""
+        return []
+
+    def set_pose(self, pose: tuple[float, float, float]) -> None:
+        """Tell the navigator that the robot is here: x, y in m, heading in rad."""
+        raise UserError("no robot is looked at; start whisker-view with --robot")
+
+    def close(self) -> None:
+        return
+
+
+class InboxSource(NoRobot):
+    """Takes what an Inbox holds; `close` ends the link it belongs to, `set_pose` tells a pose over it."""
+
+    def __init__(self, name: str, inbox, text: str = "", close=lambda: None, set_pose: Callable | None = None):
+        self.name, self._inbox, self._text, self.close = name, inbox, text, close
+        self.set_pose = set_pose or super().set_pose
+
+    def link(self) -> dict:
+        return {"state": "open", "text": self._text}
+
+    def refused(self) -> dict:
+        last = " ".join(self._inbox.last_error[: 2 * TOLD_MOST].split())[:TOLD_MOST]
+        return {"count": self._inbox.refused, "last": last, "missed": self._inbox.missed}
+
+    def poll(self) -> list[tuple]:
+        return [(received.topic, received.message) for received in self._inbox.take(timeout_s=0.0)]
+
+
+def join(robot: str, connect: list[str], config: Path | None = None) -> InboxSource:
+    """Listen to a robot's streams; nothing is published but poses that a page tells. `connect`: its processes' endpoints,
+    tcp/HOST:PORT or tls/HOST:PORT, which need not be there yet; none: those of this machine. `config`: a file of zenoh's
+    own configuration. UserError: it cannot be."""
+    try:
+        from ..robot import initial_pose
+        from ..robot.link import NAVIGATOR_ENDPOINT, PILOT_ENDPOINT, Link
+    except ImportError as error:
+        raise UserError(f"--robot needs {error.name}, which is not installed; make setup installs it") from error
+    endpoints = connect or [PILOT_ENDPOINT, NAVIGATOR_ENDPOINT]
+    link = Link("view", robot, connect=endpoints, config=config)
+    text = f"Listening at {', '.join(endpoints)}"
+    return InboxSource(robot, link.subscribe(*WANTED), text, link.close, lambda pose: initial_pose.send(link, pose))

@@ -1,4 +1,0 @@
-"""Netbook and desktop of one robot: typed messages over zenoh, the navigator, the Pyro5 facade, the robot's bag.
-
-Messages are those of whisker/msgs (whisker.robot.messages); docs/remote.md is the reference of topics and options.
-"""
