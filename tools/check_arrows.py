@@ -79,7 +79,7 @@ ROOMS = {
 INCLUDE = re.compile(r'^\s*[#`]include\s+["<]([^">]+)[">]', re.MULTILINE)
 IMPORT = re.compile(r"^\s*(?:from|import)\s+([a-zA-Z_][\w.]*)", re.MULTILINE)
 SUFFIXES = {".c", ".h", ".cpp", ".v", ".vh", ".py"}
-PYTHON_PACKAGES = {"whisker": "host/python", "signals": "sim/signals"}
+PYTHON_PACKAGES = {"crunchbot": "host/python", "signals": "sim/signals"}
 
 
 def room_of(path: Path) -> str | None:
