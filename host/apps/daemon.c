@@ -13,7 +13,7 @@ struct daemon {
 
 /* Tries each bridge once, the second before the first, whose ticks it counts. False: it is not worth to wait; the
  * reason has been logged. */
-static bool connect_first(struct daemon *daemon)
+static bool daemon_connect_first(struct daemon *daemon)
 {
     struct daemon_stream *stream = &daemon->stream;
     struct whisker_identity identity;
@@ -33,7 +33,7 @@ static bool connect_first(struct daemon *daemon)
 }
 
 /* Tries those that are missing; a reason is logged once, not every second. */
-static void connect_again(struct daemon_stream *stream)
+static void daemon_connect_again(struct daemon_stream *stream)
 {
     struct whisker_identity identity;
     for (int i = stream->bridges - 1; i >= 0; i--) {
@@ -51,7 +51,7 @@ static void connect_again(struct daemon_stream *stream)
 }
 
 /* While a bridge is missing: looks for it; waits for it only if there is none. Returns 0 or why it cannot even look. */
-static int await_bridge(struct daemon *daemon)
+static int daemon_await_bridge(struct daemon *daemon)
 {
     struct daemon_stream *stream = &daemon->stream;
     const int connected = daemon_stream_connected(stream);
@@ -64,13 +64,13 @@ static int await_bridge(struct daemon *daemon)
     if (error) {
         daemon_log_error(LOG_ERROR, "bridge", error);
     } else if (whisker_hotplug_wait(daemon->hotplug, connected > 0 ? 0 : DAEMON_POLL_MS) == WHISKER_OK) {
-        connect_again(stream);
+        daemon_connect_again(stream);
     }
     return error;
 }
 
 /* Streams and waits. Returns 0 after a wish to stop, or why it cannot go on, which has been logged. */
-static int serve(struct daemon *daemon)
+static int daemon_serve(struct daemon *daemon)
 {
     struct daemon_stream *stream = &daemon->stream;
     while (!cli_stop_wanted()) {
@@ -78,7 +78,7 @@ static int serve(struct daemon *daemon)
         if (gone && stream->options->once) {
             return gone;
         }
-        const int error = await_bridge(daemon);
+        const int error = daemon_await_bridge(daemon);
         if (error) {
             return error;
         }
@@ -96,7 +96,7 @@ int daemon_run(const struct daemon_options *options)
         return CLI_FAILED;
     }
     daemon_stream_init(&daemon.stream, options, ring);
-    const bool failed = !connect_first(&daemon) || serve(&daemon) != WHISKER_OK;
+    const bool failed = !daemon_connect_first(&daemon) || daemon_serve(&daemon) != WHISKER_OK;
     daemon_notify_stopping();
     whisker_hotplug_close(daemon.hotplug);
     const bool whole = daemon_stream_end(&daemon.stream);

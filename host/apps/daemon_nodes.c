@@ -14,7 +14,8 @@
 
 typedef uint16_t counts[WHISKER_HEALTH_COUNT][WHISKER_FRAME_LANES];
 
-static int ask(struct whisker_device *device, uint32_t lanes, struct whisker_node nodes[WHISKER_FRAME_LANES], counts c)
+static int daemon_nodes_ask(struct whisker_device *device, uint32_t lanes,
+                            struct whisker_node nodes[WHISKER_FRAME_LANES], counts c)
 {
     int error = whisker_nodes_identify(device, lanes, nodes);
     for (uint8_t i = 0; !error && i < WHISKER_HEALTH_COUNT; i++) {
@@ -23,7 +24,7 @@ static int ask(struct whisker_device *device, uint32_t lanes, struct whisker_nod
     return error;
 }
 
-static void log_node(int lane, const struct whisker_node *node, counts c)
+static void daemon_nodes_log_node(int lane, const struct whisker_node *node, counts c)
 {
     char serial[FLASH_SERIAL_BYTES], told[COUNTS_BYTES] = "";
     size_t used = 0;
@@ -42,7 +43,7 @@ void daemon_nodes_log(struct whisker_device *device, uint32_t lanes)
     struct whisker_node nodes[WHISKER_FRAME_LANES];
     counts c;
     memset(c, 0, sizeof c);
-    const int error = ask(device, lanes, nodes, c);
+    const int error = daemon_nodes_ask(device, lanes, nodes, c);
     if (error) {
         daemon_log_error(LOG_WARN, "nodes", error);
         return;
@@ -50,7 +51,7 @@ void daemon_nodes_log(struct whisker_device *device, uint32_t lanes)
     daemon_log(LOG_NOTE, "%d nodes answer", __builtin_popcount(flash_lanes(nodes)));
     for (int lane = 0; lane < WHISKER_FRAME_LANES; lane++) {
         if (nodes[lane].present) {
-            log_node(lane, &nodes[lane], c);
+            daemon_nodes_log_node(lane, &nodes[lane], c);
         }
     }
 }

@@ -14,7 +14,7 @@
 #include <unistd.h>
 
 /* As sd_notify(), which waits while the socket of a manager that hangs is full: a daemon must not hang with it. */
-static void notify(const char *text)
+static void daemon_notify_notify(const char *text)
 {
     const char *path = getenv("NOTIFY_SOCKET");
     struct sockaddr_un address = {.sun_family = AF_UNIX};
@@ -35,10 +35,10 @@ void daemon_notify_ready(const char *status)
 {
     char text[256];
     snprintf(text, sizeof text, "READY=1\nSTATUS=%s", status);
-    notify(text);
+    daemon_notify_notify(text);
 }
 
-static uint64_t now_us(void)
+static uint64_t daemon_notify_now_us(void)
 {
     struct timespec now;
     clock_gettime(CLOCK_MONOTONIC, &now);
@@ -54,15 +54,15 @@ void daemon_notify_alive(void)
         asked = true;
         period_us = sd_watchdog_enabled(0, &period_us) > 0 ? period_us / 4 : 0;
     }
-    if (period_us > 0 && now_us() - fed_us >= period_us) {
-        fed_us = now_us();
-        notify("WATCHDOG=1");
+    if (period_us > 0 && daemon_notify_now_us() - fed_us >= period_us) {
+        fed_us = daemon_notify_now_us();
+        daemon_notify_notify("WATCHDOG=1");
     }
 }
 
 void daemon_notify_stopping(void)
 {
-    notify("STOPPING=1");
+    daemon_notify_notify("STOPPING=1");
 }
 #else
 void daemon_notify_ready(const char *status)

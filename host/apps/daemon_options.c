@@ -11,7 +11,7 @@
 
 enum { NUMBER = 'n' };
 
-static void print_help(const struct whisker_settings *defaults)
+static void daemon_options_print_help(const struct whisker_settings *defaults)
 {
     printf(
         "Usage: whiskerd --ring NAME [OPTION...]\n"
@@ -52,7 +52,7 @@ static void print_help(const struct whisker_settings *defaults)
 }
 
 /* Sets one numeric option; false when its text is no number. Limits of the bridge are the library's to check. */
-static bool set_number(struct daemon_options *options, const char *name, const char *text)
+static bool daemon_options_set_number(struct daemon_options *options, const char *name, const char *text)
 {
     struct whisker_settings *settings = &options->settings;
     uint8_t *byte = cli_byte_setting(settings, name);
@@ -74,7 +74,7 @@ static bool set_number(struct daemon_options *options, const char *name, const c
     return true;
 }
 
-static bool set_tick_in(struct whisker_settings *settings, const char *edge)
+static bool daemon_options_set_tick_in(struct whisker_settings *settings, const char *edge)
 {
     const bool falling = !strcmp(edge, "falling");
     if (!falling && strcmp(edge, "rising") != 0) {
@@ -85,7 +85,7 @@ static bool set_tick_in(struct whisker_settings *settings, const char *edge)
     return true;
 }
 
-static bool set_word(struct daemon_options *options, int option, const char *text)
+static bool daemon_options_set_word(struct daemon_options *options, int option, const char *text)
 {
     switch (option) {
     case 'r':
@@ -114,14 +114,14 @@ static bool set_word(struct daemon_options *options, int option, const char *tex
         options->settings.options |= WHISKER_OPTION_PATTERN;
         return true;
     case 't':
-        return set_tick_in(&options->settings, text);
+        return daemon_options_set_tick_in(&options->settings, text);
     default:
         return false;
     }
 }
 
 /* NULL, or what is wrong with the options of two bridges. */
-static const char *check_second(const struct daemon_options *options)
+static const char *daemon_options_check_second(const struct daemon_options *options)
 {
     struct whisker_settings second = options->settings;
     second.lane_mask = options->second_lane_mask;
@@ -137,7 +137,7 @@ static const char *check_second(const struct daemon_options *options)
                : NULL;
 }
 
-static int check(const struct daemon_options *options, bool word_too_many)
+static int daemon_options_check(const struct daemon_options *options, bool word_too_many)
 {
     char message[128];
     if (word_too_many || (!options->ring && !options->list)) {
@@ -149,7 +149,7 @@ static int check(const struct daemon_options *options, bool word_too_many)
         fprintf(stderr, DAEMON_PROGRAM ": %s\n", message);
         return CLI_USAGE;
     }
-    const char *wrong = check_second(options);
+    const char *wrong = daemon_options_check_second(options);
     if (wrong) {
         fprintf(stderr, DAEMON_PROGRAM ": %s\n", wrong);
         return CLI_USAGE;
@@ -188,12 +188,13 @@ int daemon_options_parse(int argc, char **argv, struct daemon_options *options)
     int which = 0;
     for (int option; (option = getopt_long(argc, argv, "", known, &which)) != -1;) {
         if (option == 'h') {
-            print_help(&options->settings);
+            daemon_options_print_help(&options->settings);
             return CLI_OK;
         }
-        if (!(option == NUMBER ? set_number(options, known[which].name, optarg) : set_word(options, option, optarg))) {
+        if (!(option == NUMBER ? daemon_options_set_number(options, known[which].name, optarg)
+                               : daemon_options_set_word(options, option, optarg))) {
             return CLI_USAGE;
         }
     }
-    return check(options, optind != argc);
+    return daemon_options_check(options, optind != argc);
 }

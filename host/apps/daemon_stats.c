@@ -8,7 +8,7 @@
 #include "daemon_log.h"
 #include "whisker_protocol.h"
 
-static int64_t realtime_ns(void)
+static int64_t daemon_stats_realtime_ns(void)
 {
     struct timespec now;
     clock_gettime(CLOCK_REALTIME, &now);
@@ -19,7 +19,7 @@ void daemon_stats_begin(struct daemon_stats *stats, const struct whisker_setting
                         uint32_t second_lane_mask)
 {
     memset(stats, 0, sizeof *stats);
-    stats->told.started_ns = realtime_ns();
+    stats->told.started_ns = daemon_stats_realtime_ns();
     stats->told.lane_mask = settings->lane_mask;
     stats->told.tick_period = settings->tick_period;
     stats->told.bridges = (uint8_t)bridges;
@@ -33,7 +33,7 @@ void daemon_stats_connected(struct daemon_stats *stats, struct daemon_source *so
     struct whisker_daemon_stats *told = &stats->told;
     told->connected++;
     told->error = told->connected == told->bridges ? WHISKER_OK : told->error;
-    told->connected_ns = realtime_ns();
+    told->connected_ns = daemon_stats_realtime_ns();
     source->dropped = 0;
     source->has_sequence = false;
     if (source->is_second) {
@@ -49,13 +49,13 @@ void daemon_stats_lost(struct daemon_stats *stats, bool was_connected, int error
 {
     if (was_connected) {
         stats->told.connected--;
-        stats->told.connected_ns = realtime_ns();
+        stats->told.connected_ns = daemon_stats_realtime_ns();
         stats->told.usb_errors += error != WHISKER_ERROR_DEVICE_GONE;
     }
     stats->told.error = error;
 }
 
-static void count_record(struct daemon_stats *stats, unsigned status)
+static void daemon_stats_count_record(struct daemon_stats *stats, unsigned status)
 {
     switch (status >> WHISKER_STATUS_ERROR_BITS) {
     case WHISKER_CODE_ABSENT:
@@ -85,7 +85,7 @@ void daemon_stats_frame(struct daemon_stats *stats, struct daemon_source *source
     for (size_t lane = 0; lane < WHISKER_FRAME_LANES; lane++) {
         const unsigned status = frame->lane[lane].status;
         if (status != 0 && (frame->lane_mask >> lane & 1u)) {
-            count_record(stats, status);
+            daemon_stats_count_record(stats, status);
         }
     }
 }

@@ -17,7 +17,7 @@
 
 static volatile sig_atomic_t report_wanted, nodes_wanted;
 
-static void on_request(int number)
+static void daemon_stream_on_request(int number)
 {
     if (number == SIGUSR1) {
         report_wanted = 1;
@@ -30,7 +30,7 @@ void daemon_stream_catch_requests(void)
 {
     struct sigaction action;
     memset(&action, 0, sizeof action);
-    action.sa_handler = on_request;
+    action.sa_handler = daemon_stream_on_request;
     sigaction(SIGUSR1, &action, NULL);
     sigaction(SIGUSR2, &action, NULL);
 }
@@ -57,31 +57,32 @@ void daemon_stream_init(struct daemon_stream *stream, const struct daemon_option
                        options->second ? options->second_lane_mask : 0);
 }
 
-static int64_t clock_ns(clockid_t clock)
+static int64_t daemon_stream_clock_ns(clockid_t clock)
 {
     struct timespec now;
     clock_gettime(clock, &now);
     return (int64_t)now.tv_sec * 1000000000 + now.tv_nsec;
 }
 
-static void map_clock(struct daemon_stream *stream, const struct whisker_frame *newest, uint64_t cycles)
+static void daemon_stream_map_clock(struct daemon_stream *stream, const struct whisker_frame *newest, uint64_t cycles)
 {
     const uint16_t usb_time = (uint16_t)(newest->flags >> WHISKER_FRAME_USB_TIME_SHIFT);
-    const int error =
-        whisker_clock_add(&stream->clock, cycles, usb_time, clock_ns(CLOCK_MONOTONIC), clock_ns(CLOCK_REALTIME));
+    const int error = whisker_clock_add(&stream->clock, cycles, usb_time, daemon_stream_clock_ns(CLOCK_MONOTONIC),
+                                        daemon_stream_clock_ns(CLOCK_REALTIME));
     if (error) {
         daemon_log_error(LOG_WARN, "clock", error);
     }
 }
 
-static void note(struct daemon_stream *stream, struct daemon_bridge *bridge, const struct whisker_frame *frame)
+static void daemon_stream_note(struct daemon_stream *stream, struct daemon_bridge *bridge,
+                               const struct whisker_frame *frame)
 {
     bridge->last_seen |= (frame->flags & WHISKER_FRAME_LAST) != 0;
     bridge->dated = frame->flags >> WHISKER_FRAME_USB_TIME_SHIFT != 0;
     daemon_stats_frame(&stream->stats, &bridge->source, frame);
 }
 
-static void publish_pairs(struct daemon_stream *stream)
+static void daemon_stream_publish_pairs(struct daemon_stream *stream)
 {
     struct whisker_frame frames[DAEMON_BRIDGES];
     for (int made; (made = whisker_pair_next(&stream->pair, frames)) > 0;) {
@@ -90,24 +91,24 @@ static void publish_pairs(struct daemon_stream *stream)
 }
 
 /* The ring's time is the first bridge's, or goes on as it was while that is away. */
-static void take_one_of_two(struct daemon_stream *stream, int i, const uint8_t *bytes, size_t count)
+static void daemon_stream_take_one_of_two(struct daemon_stream *stream, int i, const uint8_t *bytes, size_t count)
 {
     struct daemon_bridge *bridge = &stream->bridge[i];
     struct whisker_frame frame;
     bool any = false;
     while (whisker_decoder_next(&bridge->source.decoder, &bytes, &count, &frame)) {
-        note(stream, bridge, &frame);
+        daemon_stream_note(stream, bridge, &frame);
         whisker_pair_add(&stream->pair, i, &frame);
-        publish_pairs(stream);
+        daemon_stream_publish_pairs(stream);
         any = true;
     }
     if (any && (i == 0 || !stream->bridge[0].device)) {
         const int64_t ahead = i * stream->pair.offset * stream->options->settings.tick_period;
-        map_clock(stream, &frame, frame.time_cycles + (uint64_t)ahead);
+        daemon_stream_map_clock(stream, &frame, frame.time_cycles + (uint64_t)ahead);
     }
 }
 
-static void take(void *context, const uint8_t *bytes, size_t count)
+static void daemon_stream_take(void *context, const uint8_t *bytes, size_t count)
 {
     const struct daemon_inlet *inlet = context;
     struct daemon_stream *stream = inlet->stream;
@@ -115,18 +116,18 @@ static void take(void *context, const uint8_t *bytes, size_t count)
     const struct whisker_frame *frames;
     size_t made;
     if (stream->bridges > 1) {
-        take_one_of_two(stream, inlet->bridge, bytes, count);
+        daemon_stream_take_one_of_two(stream, inlet->bridge, bytes, count);
     } else if (whisker_ring_feed(stream->ring, &bridge->source.decoder, bytes, count, &frames, &made) == 0 &&
                made > 0) {
         for (size_t i = 0; i < made; i++) {
-            note(stream, bridge, &frames[i]);
+            daemon_stream_note(stream, bridge, &frames[i]);
         }
-        map_clock(stream, &frames[made - 1], frames[made - 1].time_cycles);
+        daemon_stream_map_clock(stream, &frames[made - 1], frames[made - 1].time_cycles);
     }
 }
 
-static void announce(struct daemon_stream *stream, const struct daemon_bridge *bridge,
-                     const struct whisker_identity *identity)
+static void daemon_stream_announce(struct daemon_stream *stream, const struct daemon_bridge *bridge,
+                                   const struct whisker_identity *identity)
 {
     const struct whisker_device_info *about = whisker_device_about(bridge->device);
     const bool back = bridge->lost_at_ms != 0;
@@ -147,22 +148,22 @@ int daemon_stream_connect(struct daemon_stream *stream, int i, struct whisker_id
 {
     struct daemon_bridge *bridge = &stream->bridge[i];
     whisker_pair_run(&stream->pair, i, true);
-    const int error = daemon_bridge_connect(bridge, &stream->stats, take, &stream->inlet[i], identity);
+    const int error = daemon_bridge_connect(bridge, &stream->stats, daemon_stream_take, &stream->inlet[i], identity);
     if (error) {
         whisker_pair_run(&stream->pair, i, false);
-        publish_pairs(stream);
+        daemon_stream_publish_pairs(stream);
         daemon_stats_lost(&stream->stats, false, error);
     } else {
-        announce(stream, bridge, identity);
+        daemon_stream_announce(stream, bridge, identity);
     }
     return error;
 }
 
-static void lose(struct daemon_stream *stream, int i, int error)
+static void daemon_stream_lose(struct daemon_stream *stream, int i, int error)
 {
     daemon_bridge_lose(&stream->bridge[i], &stream->stats, error);
     whisker_pair_run(&stream->pair, i, false);
-    publish_pairs(stream);
+    daemon_stream_publish_pairs(stream);
     daemon_stream_tell(stream);
     daemon_notify_ready("the bridge has gone; waiting for it");
 }
@@ -173,7 +174,7 @@ int daemon_stream_connected(const struct daemon_stream *stream)
 }
 
 /* Receives what has come, or waits for it; error[i]: why a bridge's stream has ended. */
-static void receive(struct daemon_stream *stream, int error[DAEMON_BRIDGES])
+static void daemon_stream_receive_all(struct daemon_stream *stream, int error[DAEMON_BRIDGES])
 {
     struct whisker_device *open[DAEMON_BRIDGES];
     int count = 0;
@@ -194,17 +195,17 @@ static void receive(struct daemon_stream *stream, int error[DAEMON_BRIDGES])
 int daemon_stream_receive(struct daemon_stream *stream)
 {
     int error[DAEMON_BRIDGES], last = WHISKER_OK;
-    receive(stream, error);
+    daemon_stream_receive_all(stream, error);
     for (int i = 0; i < stream->bridges; i++) {
         if (error[i]) {
-            lose(stream, i, error[i]);
+            daemon_stream_lose(stream, i, error[i]);
             last = error[i];
         }
     }
     return last;
 }
 
-static void tell_pair(struct daemon_stream *stream)
+static void daemon_stream_tell_pair(struct daemon_stream *stream)
 {
     const struct whisker_pair_counts *now = &stream->pair.counts, *told = &stream->pair_told;
     if (now->realigned != told->realigned) {
@@ -218,7 +219,7 @@ static void tell_pair(struct daemon_stream *stream)
     stream->pair_told = *now;
 }
 
-static void log_stats(const struct daemon_stream *stream)
+static void daemon_stream_log_stats(const struct daemon_stream *stream)
 {
     const struct whisker_pair_counts *pair = &stream->pair.counts;
     daemon_stats_log(&stream->stats.told);
@@ -245,7 +246,7 @@ void daemon_stream_tell(struct daemon_stream *stream)
     whisker_ring_set_stats(stream->ring, &stream->stats.told);
 }
 
-static void tell_bridges(struct daemon_stream *stream, bool ticks)
+static void daemon_stream_tell_bridges(struct daemon_stream *stream, bool ticks)
 {
     for (int i = 0; i < stream->bridges; i++) {
         daemon_bridge_tell_damage(&stream->bridge[i]);
@@ -255,12 +256,12 @@ static void tell_bridges(struct daemon_stream *stream, bool ticks)
     }
 }
 
-static void answer_requests(struct daemon_stream *stream)
+static void daemon_stream_answer_requests(struct daemon_stream *stream)
 {
     if (report_wanted) {
         report_wanted = 0;
         daemon_stream_tell(stream);
-        log_stats(stream);
+        daemon_stream_log_stats(stream);
     }
     for (int i = 0; nodes_wanted && i < stream->bridges; i++) {
         if (stream->bridge[i].device) {
@@ -278,21 +279,21 @@ void daemon_stream_keep_house(struct daemon_stream *stream)
     if (due) {
         stream->tell_at_ms = cli_now_ms() + TELL_MS;
         daemon_stream_tell(stream);
-        tell_pair(stream);
+        daemon_stream_tell_pair(stream);
     }
-    tell_bridges(stream, due);
-    answer_requests(stream);
+    daemon_stream_tell_bridges(stream, due);
+    daemon_stream_answer_requests(stream);
 }
 
 /* Receives what a bridge still sends after a stop, up to its last frame. */
-static int drain(struct daemon_stream *stream, int i)
+static int daemon_stream_drain_bridge(struct daemon_stream *stream, int i)
 {
     struct daemon_bridge *bridge = &stream->bridge[i];
     const int64_t give_up_ms = cli_now_ms() + DAEMON_DRAIN_MS;
     int error[DAEMON_BRIDGES];
     error[i] = whisker_device_stop(bridge->device);
     while (!error[i] && !bridge->last_seen && cli_now_ms() < give_up_ms) {
-        receive(stream, error);
+        daemon_stream_receive_all(stream, error);
     }
     return !error[i] && !bridge->last_seen ? WHISKER_ERROR_DEVICE_DRAIN : error[i];
 }
@@ -302,7 +303,7 @@ int daemon_stream_drain(struct daemon_stream *stream)
 {
     int error = WHISKER_OK;
     for (int i = stream->bridges - 1; i >= 0; i--) {
-        const int ended = stream->bridge[i].device ? drain(stream, i) : WHISKER_OK;
+        const int ended = stream->bridge[i].device ? daemon_stream_drain_bridge(stream, i) : WHISKER_OK;
         if (ended) {
             daemon_log_error(LOG_ERROR, stream->bridge[i].name, ended);
             error = ended;
@@ -314,7 +315,7 @@ int daemon_stream_drain(struct daemon_stream *stream)
         }
         whisker_pair_run(&stream->pair, i, false);
     }
-    publish_pairs(stream);
+    daemon_stream_publish_pairs(stream);
     return error;
 }
 
@@ -331,7 +332,7 @@ bool daemon_stream_end(struct daemon_stream *stream)
     }
     daemon_stream_tell(stream);
     if (stream->stats.told.connected_ns != 0) {
-        log_stats(stream);
+        daemon_stream_log_stats(stream);
     }
     return whole;
 }

@@ -19,7 +19,7 @@ void flash_show_progress(void *context, uint32_t done, uint32_t total)
     }
 }
 
-static int load(struct whisker_device *device, const struct whisker_gateware *image, bool dry_run)
+static int flash_gateware_load(struct whisker_device *device, const struct whisker_gateware *image, bool dry_run)
 {
     if (dry_run) {
         const int error = whisker_gateware_check(device, image);
@@ -52,7 +52,7 @@ int flash_gateware(const char *path, const uint8_t *bytes, uint32_t count, const
     }
     error = whisker_gateware_fits(&image, &identity, force);
     if (!error) {
-        error = load(device, &image, dry_run);
+        error = flash_gateware_load(device, &image, dry_run);
     }
     whisker_device_close(device);
     return error ? cli_fail(PROGRAM, path, error) : CLI_OK;

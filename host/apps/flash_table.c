@@ -51,7 +51,8 @@ void flash_print_nodes(const struct whisker_node nodes[WHISKER_FRAME_LANES])
     }
 }
 
-static const char *outcome(const struct whisker_update *update, const struct whisker_node *node, uint16_t version)
+static const char *flash_table_outcome(const struct whisker_update *update, const struct whisker_node *node,
+                                       uint16_t version)
 {
     if (update->silent) {
         return "stopped answering: check its supply and cable, then flash again";
@@ -77,7 +78,7 @@ int flash_print_result(const struct whisker_update updates[WHISKER_FRAME_LANES],
     int failed = 0;
     for (int lane = 0; lane < WHISKER_FRAME_LANES; lane++) {
         if (updates[lane].wanted) {
-            const char *trouble = outcome(&updates[lane], &nodes[lane], version);
+            const char *trouble = flash_table_outcome(&updates[lane], &nodes[lane], version);
             printf("lane %2d: %s\n", lane, trouble ? trouble : "updated");
             failed += trouble != NULL;
         }

@@ -7,7 +7,7 @@
 #include <sys/un.h>
 #include <unistd.h>
 
-static int say(const struct follower *follower, const char *message)
+static int follower_say(const struct follower *follower, const char *message)
 {
     return send(follower->fd, message, strlen(message), MSG_NOSIGNAL) < 0 ? -1 : 0;
 }
@@ -26,7 +26,7 @@ int follower_open(struct follower *follower, const char *path, const char *name)
     }
     char message[64];
     snprintf(message, sizeof message, "follow %s", name);
-    return say(follower, message);
+    return follower_say(follower, message);
 }
 
 void follower_taken(struct follower *follower, uint64_t tick)
@@ -34,7 +34,7 @@ void follower_taken(struct follower *follower, uint64_t tick)
     if (follower->fd >= 0) {
         char message[64];
         snprintf(message, sizeof message, "taken %" PRIu64, tick);
-        say(follower, message);
+        follower_say(follower, message);
     }
 }
 

@@ -20,7 +20,7 @@ void base_clients_begin(struct base_clients *clients, struct base_robot *robot, 
 }
 
 /* A commander that goes leaves standing wheels behind. */
-static void drop(struct base_clients *clients, struct base_client *client)
+static void whisker_base_clients_drop(struct base_clients *clients, struct base_client *client)
 {
     close(client->socket);
     *client = (struct base_client){.socket = -1};
@@ -35,7 +35,7 @@ static void drop(struct base_clients *clients, struct base_client *client)
  */
 
 /* Whether there is a commander that has ordered something of late. */
-static bool commanded(const struct base_clients *clients)
+static bool whisker_base_clients_commanded(const struct base_clients *clients)
 {
     const bool silent = clients->robot->options->stream_clock
                             ? base_robot_frames(clients->robot) - clients->ordered_frame >= BASE_PLACE_FRAMES
@@ -43,31 +43,31 @@ static bool commanded(const struct base_clients *clients)
     return clients->commander && !silent;
 }
 
-static bool keeps_place(const struct base_clients *clients, const struct base_client *client)
+static bool whisker_base_clients_keeps_place(const struct base_clients *clients, const struct base_client *client)
 {
-    return (client == clients->commander && commanded(clients)) ||
+    return (client == clients->commander && whisker_base_clients_commanded(clients)) ||
            (client->leads && clients->robot->options->stream_clock);
 }
 
 /* Whether the one of two clients that are to lose their places does so first. */
-static bool before(const struct base_client *a, const struct base_client *b)
+static bool whisker_base_clients_before(const struct base_client *a, const struct base_client *b)
 {
     return a->manners != b->manners ? a->manners < b->manners : a->heard_ms < b->heard_ms;
 }
 
-static bool has_spoken(const struct base_client *client)
+static bool whisker_base_clients_has_spoken(const struct base_client *client)
 {
     char byte;
     return recv(client->socket, &byte, 1, MSG_PEEK | MSG_DONTWAIT) > 0;
 }
 
 /* Whether a client has had its time. What a new one has said may not have been read yet. */
-static bool has_had_time(const struct base_client *client, int64_t now_ms)
+static bool whisker_base_clients_has_had_time(const struct base_client *client, int64_t now_ms)
 {
     const int64_t silent_ms = now_ms - client->heard_ms;
     switch (client->manners) {
     case BASE_NEW:
-        return silent_ms >= BASE_SPEAK_MS && !has_spoken(client);
+        return silent_ms >= BASE_SPEAK_MS && !whisker_base_clients_has_spoken(client);
     case BASE_KNOWN:
         return silent_ms >= BASE_PLACE_MS;
     default:
@@ -77,7 +77,7 @@ static bool has_had_time(const struct base_client *client, int64_t now_ms)
 
 /* Number of an empty place, or of the client that is first to lose its own; -1: nobody does. *speaks: there is a client
  * that has said nothing yet, and still has time to. */
-static int find_place(const struct base_clients *clients, int64_t now_ms, bool *speaks)
+static int whisker_base_clients_find_place(const struct base_clients *clients, int64_t now_ms, bool *speaks)
 {
     int found = -1;
     *speaks = false;
@@ -86,9 +86,10 @@ static int find_place(const struct base_clients *clients, int64_t now_ms, bool *
         if (client->socket < 0) {
             return i;
         }
-        const bool over = has_had_time(client, now_ms) && !keeps_place(clients, client);
+        const bool over =
+            whisker_base_clients_has_had_time(client, now_ms) && !whisker_base_clients_keeps_place(clients, client);
         *speaks |= client->manners == BASE_NEW && !over;
-        if (over && (found < 0 || before(client, &clients->client[found]))) {
+        if (over && (found < 0 || whisker_base_clients_before(client, &clients->client[found]))) {
             found = i;
         }
     }
@@ -98,10 +99,10 @@ static int find_place(const struct base_clients *clients, int64_t now_ms, bool *
 bool base_clients_crowded(const struct base_clients *clients, int64_t now_ms)
 {
     bool speaks;
-    return find_place(clients, now_ms, &speaks) < 0 && speaks;
+    return whisker_base_clients_find_place(clients, now_ms, &speaks) < 0 && speaks;
 }
 
-static void turn_away(struct base_clients *clients, int socket)
+static void whisker_base_clients_turn_away(struct base_clients *clients, int socket)
 {
     char text[80];
     snprintf(text, sizeof text, "error %d clients are connected; end one of them first", BASE_CLIENTS);
@@ -113,16 +114,16 @@ static void turn_away(struct base_clients *clients, int socket)
 bool base_clients_add(struct base_clients *clients, int socket, int64_t now_ms)
 {
     bool speaks;
-    const int found = find_place(clients, now_ms, &speaks);
+    const int found = whisker_base_clients_find_place(clients, now_ms, &speaks);
     if (found < 0) {
-        turn_away(clients, socket);
+        whisker_base_clients_turn_away(clients, socket);
         return false;
     }
     struct base_client *place = &clients->client[found];
     if (place->socket >= 0) {
         base_log(&clients->log_places, LOG_WARN, "more than %d clients; one that said nothing of late lost its place",
                  BASE_CLIENTS);
-        drop(clients, place);
+        whisker_base_clients_drop(clients, place);
     }
     *place = (struct base_client){
         .socket = socket, .manners = BASE_NEW, .heard_ms = now_ms, .bits = base_robot_bits(clients->robot)};
@@ -155,7 +156,7 @@ uint64_t base_clients_limit(const struct base_clients *clients)
 /* ------------------------------------------------------------------------------------------------------- the messages
  */
 
-static void note_manners(struct base_client *client, bool good, int64_t now_ms)
+static void whisker_base_clients_note_manners(struct base_client *client, bool good, int64_t now_ms)
 {
     if (good) {
         client->manners = BASE_KNOWN;
@@ -165,44 +166,44 @@ static void note_manners(struct base_client *client, bool good, int64_t now_ms)
     }
 }
 
-static void answer(struct base_clients *clients, struct base_client *client, const char *text)
+static void whisker_base_clients_answer(struct base_clients *clients, struct base_client *client, const char *text)
 {
-    note_manners(client, strncmp(text, "error", 5) != 0, clients->now_ms);
+    whisker_base_clients_note_manners(client, strncmp(text, "error", 5) != 0, clients->now_ms);
     if (send(client->socket, text, strlen(text), MSG_NOSIGNAL | MSG_DONTWAIT) < 0) {
-        drop(clients, client); /* gone, or it does not read */
+        whisker_base_clients_drop(clients, client); /* gone, or it does not read */
     }
 }
 
-static void answer_sent(struct base_clients *clients, struct base_client *client)
+static void whisker_base_clients_answer_sent(struct base_clients *clients, struct base_client *client)
 {
     char text[ANSWER];
     const struct base_robot *robot = clients->robot;
     snprintf(text, sizeof text, "sent %llu %.9g %.9g", (unsigned long long)robot->sent, robot->speeds.v_m_s,
              robot->speeds.omega_rad_s);
-    answer(clients, client, text);
+    whisker_base_clients_answer(clients, client, text);
 }
 
-static void note_order(struct base_clients *clients)
+static void whisker_base_clients_note_order(struct base_clients *clients)
 {
     clients->ordered_ms = clients->now_ms;
     clients->ordered_frame = base_robot_frames(clients->robot);
 }
 
-static bool may_command(struct base_clients *clients, struct base_client *client)
+static bool whisker_base_clients_may_command(struct base_clients *clients, struct base_client *client)
 {
-    if (!commanded(clients)) {
+    if (!whisker_base_clients_commanded(clients)) {
         clients->commander = client;
     }
     if (clients->commander != client) {
-        answer(clients, client, "error another client commands; end that one first");
+        whisker_base_clients_answer(clients, client, "error another client commands; end that one first");
         return false;
     }
-    note_order(clients);
+    whisker_base_clients_note_order(clients);
     return true;
 }
 
 /* Reads the number at *text and goes on behind it. */
-static bool read_number(const char **text, double *value)
+static bool whisker_base_clients_read_number(const char **text, double *value)
 {
     char *end;
     *value = strtod(*text, &end);
@@ -211,43 +212,44 @@ static bool read_number(const char **text, double *value)
     return read;
 }
 
-static void on_drive(struct base_clients *clients, struct base_client *client, const char *text)
+static void whisker_base_clients_on_drive(struct base_clients *clients, struct base_client *client, const char *text)
 {
     double v, omega;
-    if (!read_number(&text, &v) || !read_number(&text, &omega) || *text != '\0') {
-        answer(clients, client, "error say: drive V OMEGA, in m/s and rad/s");
-    } else if (may_command(clients, client)) {
+    if (!whisker_base_clients_read_number(&text, &v) || !whisker_base_clients_read_number(&text, &omega) ||
+        *text != '\0') {
+        whisker_base_clients_answer(clients, client, "error say: drive V OMEGA, in m/s and rad/s");
+    } else if (whisker_base_clients_may_command(clients, client)) {
         base_robot_drive(clients->robot, v, omega, clients->now_ms);
-        answer_sent(clients, client);
+        whisker_base_clients_answer_sent(clients, client);
     }
 }
 
 /* Anybody may. */
-static void on_stop(struct base_clients *clients, struct base_client *client)
+static void whisker_base_clients_on_stop(struct base_clients *clients, struct base_client *client)
 {
     if (client == clients->commander) {
-        note_order(clients);
+        whisker_base_clients_note_order(clients);
     }
     base_robot_stop(clients->robot, clients->now_ms);
-    answer_sent(clients, client);
+    whisker_base_clients_answer_sent(clients, client);
 }
 
-static void on_mode(struct base_clients *clients, struct base_client *client, const char *text)
+static void whisker_base_clients_on_mode(struct base_clients *clients, struct base_client *client, const char *text)
 {
     static const char *const names[] = {" passive", " safe", " full"};
     for (int i = 0; i < 3; i++) {
         if (!strcmp(text, names[i])) {
-            if (may_command(clients, client)) {
+            if (whisker_base_clients_may_command(clients, client)) {
                 base_robot_mode(clients->robot, (enum create_oi_mode)(CREATE_OI_MODE_PASSIVE + i), clients->now_ms);
-                answer_sent(clients, client);
+                whisker_base_clients_answer_sent(clients, client);
             }
             return;
         }
     }
-    answer(clients, client, "error say: mode passive, mode safe or mode full");
+    whisker_base_clients_answer(clients, client, "error say: mode passive, mode safe or mode full");
 }
 
-static void on_odometry(struct base_clients *clients, struct base_client *client)
+static void whisker_base_clients_on_odometry(struct base_clients *clients, struct base_client *client)
 {
     char text[ANSWER];
     double c[3][3];
@@ -258,39 +260,39 @@ static void on_odometry(struct base_clients *clients, struct base_client *client
              client->bits | (base_robot_kept(clients->robot) ? BASE_IDLE : 0u));
     client->motion = (struct create_motion){0};
     client->bits = base_robot_bits(clients->robot);
-    answer(clients, client, text);
+    whisker_base_clients_answer(clients, client, text);
 }
 
-static void on_health(struct base_clients *clients, struct base_client *client)
+static void whisker_base_clients_on_health(struct base_clients *clients, struct base_client *client)
 {
     char text[ANSWER];
     int at = snprintf(text, sizeof text, "health driver_pid=%d guard_pid=%d restarts=%llu commander=%d ", (int)getpid(),
-                      (int)getppid(), (unsigned long long)*clients->restarts, commanded(clients));
+                      (int)getppid(), (unsigned long long)*clients->restarts, whisker_base_clients_commanded(clients));
     base_robot_health(clients->robot, text + at, sizeof text - (size_t)at);
-    answer(clients, client, text);
+    whisker_base_clients_answer(clients, client, text);
 }
 
-static void obey(struct base_clients *clients, struct base_client *client)
+static void whisker_base_clients_obey(struct base_clients *clients, struct base_client *client)
 {
     const char *text = client->message;
     client->waits = false;
     if (!strncmp(text, "drive ", 6)) {
-        on_drive(clients, client, text + 6);
+        whisker_base_clients_on_drive(clients, client, text + 6);
     } else if (!strncmp(text, "mode", 4)) {
-        on_mode(clients, client, text + 4);
+        whisker_base_clients_on_mode(clients, client, text + 4);
     } else if (!strcmp(text, "odometry")) {
-        on_odometry(clients, client);
+        whisker_base_clients_on_odometry(clients, client);
     } else if (!strcmp(text, "stop")) {
-        on_stop(clients, client);
+        whisker_base_clients_on_stop(clients, client);
     } else if (!strcmp(text, "health")) {
-        on_health(clients, client);
+        whisker_base_clients_on_health(clients, client);
     } else {
-        answer(clients, client, "error say: drive V OMEGA, stop, odometry, mode NAME or health");
+        whisker_base_clients_answer(clients, client, "error say: drive V OMEGA, stop, odometry, mode NAME or health");
     }
 }
 
 /* Cuts " after N" off a message; false: there is none. */
-static bool cut_after(char *text, uint64_t *after)
+static bool whisker_base_clients_cut_after(char *text, uint64_t *after)
 {
     char *word = strstr(text, " after "), *end;
     if (!word) {
@@ -306,7 +308,7 @@ static bool cut_after(char *text, uint64_t *after)
 }
 
 /* Receives a message, ended by a zero. Returns its whole length, also of what has no room; 0 or -1 as recv() does. */
-static ssize_t receive(struct base_client *client)
+static ssize_t whisker_base_clients_receive(struct base_client *client)
 {
     const size_t room = sizeof client->message - 1;
     const ssize_t got = recv(client->socket, client->message, room, MSG_DONTWAIT | MSG_TRUNC);
@@ -314,23 +316,23 @@ static ssize_t receive(struct base_client *client)
     return got;
 }
 
-static void take_message(struct base_clients *clients, struct base_client *client)
+static void whisker_base_clients_take_message(struct base_clients *clients, struct base_client *client)
 {
-    const ssize_t got = receive(client);
+    const ssize_t got = whisker_base_clients_receive(client);
     if (got <= 0) {
         if (got == 0 || (errno != EAGAIN && errno != EINTR)) {
-            drop(clients, client);
+            whisker_base_clients_drop(clients, client);
         }
         return;
     }
     if ((size_t)got >= sizeof client->message) { /* its beginning may say something else */
-        answer(clients, client, "error message too long; 255 letters are the most");
+        whisker_base_clients_answer(clients, client, "error message too long; 255 letters are the most");
     } else if (strlen(client->message) != (size_t)got) {
-        answer(clients, client, "error message with a zero byte; say letters only");
-    } else if (cut_after(client->message, &client->after)) {
+        whisker_base_clients_answer(clients, client, "error message with a zero byte; say letters only");
+    } else if (whisker_base_clients_cut_after(client->message, &client->after)) {
         client->leads = client->waits = true;
     } else {
-        obey(clients, client);
+        whisker_base_clients_obey(clients, client);
     }
 }
 
@@ -351,12 +353,12 @@ void base_clients_serve(struct base_clients *clients, const struct pollfd *polle
             continue;
         }
         if (client->waits && polled[i].revents & (POLLHUP | POLLERR)) {
-            drop(clients, client);
+            whisker_base_clients_drop(clients, client);
         } else if (!client->waits && polled[i].revents) {
-            take_message(clients, client);
+            whisker_base_clients_take_message(clients, client);
         }
         if (client->waits && (clients->robot->port < 0 || base_robot_taken(clients->robot) >= client->after)) {
-            obey(clients, client);
+            whisker_base_clients_obey(clients, client);
         }
     }
 }

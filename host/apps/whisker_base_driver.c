@@ -30,7 +30,7 @@ struct driver {
 };
 
 /* Tells the guard one thing, with the port's descriptor where it is not negative. */
-static void tell(const struct driver *driver, enum base_tell what, int port)
+static void whisker_base_driver_tell(const struct driver *driver, enum base_tell what, int port)
 {
     char byte = (char)what;
     union {
@@ -51,22 +51,22 @@ static void tell(const struct driver *driver, enum base_tell what, int port)
     sendmsg(driver->start.guard, &message, MSG_NOSIGNAL | (what == BASE_ALIVE ? MSG_DONTWAIT : 0));
 }
 
-static void tell_port(struct driver *driver)
+static void whisker_base_driver_tell_port(struct driver *driver)
 {
     driver->told_port = driver->robot.port;
-    tell(driver, driver->told_port < 0 ? BASE_NO_PORT : BASE_PORT, driver->told_port);
+    whisker_base_driver_tell(driver, driver->told_port < 0 ? BASE_NO_PORT : BASE_PORT, driver->told_port);
 }
 
-static void tell_alive(struct driver *driver)
+static void whisker_base_driver_tell_alive(struct driver *driver)
 {
     if (!driver->start.options->stream_clock && cli_now_ms() - driver->alive_ms >= ALIVE_MS) {
         driver->alive_ms = cli_now_ms();
-        tell(driver, BASE_ALIVE, -1);
+        whisker_base_driver_tell(driver, BASE_ALIVE, -1);
     }
 }
 
 /* The port again, when there is none. */
-static void reopen(struct driver *driver)
+static void whisker_base_driver_reopen(struct driver *driver)
 {
     struct base_robot *robot = &driver->robot;
     if (robot->port >= 0 || cli_now_ms() - driver->tried_ms < BASE_REOPEN_MS) {
@@ -82,31 +82,32 @@ static void reopen(struct driver *driver)
     }
 }
 
-static int64_t least(int64_t a, int64_t b)
+static int64_t whisker_base_driver_least(int64_t a, int64_t b)
 {
     return a < b ? a : b;
 }
 
 /* Whether connections are taken at the moment. */
-static bool accepts(const struct driver *driver)
+static bool whisker_base_driver_accepts(const struct driver *driver)
 {
     return cli_now_ms() >= driver->accept_ms && !base_clients_crowded(&driver->clients, cli_now_ms());
 }
 
 /* What is waited for. Returns for how many ms at most. */
-static int64_t fill(struct driver *driver)
+static int64_t whisker_base_driver_fill(struct driver *driver)
 {
     const bool wanted = base_robot_taken(&driver->robot) < base_clients_limit(&driver->clients);
     driver->polled[GUARD] = (struct pollfd){.fd = driver->start.guard, .events = POLLIN};
-    driver->polled[LISTENING] = (struct pollfd){.fd = driver->start.listening, .events = accepts(driver) ? POLLIN : 0};
+    driver->polled[LISTENING] =
+        (struct pollfd){.fd = driver->start.listening, .events = whisker_base_driver_accepts(driver) ? POLLIN : 0};
     driver->polled[PORT] = (struct pollfd){.fd = driver->robot.port, .events = wanted ? POLLIN : 0};
     base_clients_poll(&driver->clients, &driver->polled[CLIENTS]);
     const int64_t sleep_ms = base_sleep_poll(&driver->sleep, &driver->polled[BUS], cli_now_ms());
-    return accepts(driver) ? sleep_ms : BASE_SPEAK_MS;
+    return whisker_base_driver_accepts(driver) ? sleep_ms : BASE_SPEAK_MS;
 }
 
 /* Takes the guard's newest lease. False: the guard has died. */
-static bool take_lease(struct driver *driver)
+static bool whisker_base_driver_take_lease(struct driver *driver)
 {
     struct base_lease lease;
     ssize_t got;
@@ -117,7 +118,7 @@ static bool take_lease(struct driver *driver)
 }
 
 /* Without a lease the wheels stand. Returns ms until the one that there is runs out. */
-static int64_t watch_lease(struct driver *driver)
+static int64_t whisker_base_driver_watch_lease(struct driver *driver)
 {
     if (driver->start.options->stream_clock) {
         return ALIVE_MS;
@@ -128,14 +129,16 @@ static int64_t watch_lease(struct driver *driver)
 }
 
 /* Sleeps until something comes or is due; signals end it. False: it cannot sleep so. */
-static bool await(struct driver *driver)
+static bool whisker_base_driver_await(struct driver *driver)
 {
     sigset_t none;
     sigemptyset(&none);
-    const int64_t watched_ms = least(base_robot_watch(&driver->robot, cli_now_ms()), watch_lease(driver));
-    const int64_t due = least(watched_ms, fill(driver));
-    const bool untimed = driver->start.options->stream_clock && driver->robot.port >= 0 && accepts(driver);
-    const int64_t sleep_ms = least(due, ALIVE_MS);
+    const int64_t watched_ms = whisker_base_driver_least(base_robot_watch(&driver->robot, cli_now_ms()),
+                                                         whisker_base_driver_watch_lease(driver));
+    const int64_t due = whisker_base_driver_least(watched_ms, whisker_base_driver_fill(driver));
+    const bool untimed =
+        driver->start.options->stream_clock && driver->robot.port >= 0 && whisker_base_driver_accepts(driver);
+    const int64_t sleep_ms = whisker_base_driver_least(due, ALIVE_MS);
     const struct timespec timeout = {.tv_nsec = sleep_ms * 1000000};
     const int ready = ppoll(driver->polled, POLLED, untimed ? NULL : &timeout, &none);
     for (int i = 0; i < POLLED && ready < 0; i++) {
@@ -146,7 +149,7 @@ static bool await(struct driver *driver)
 
 /* Takes a connection. False: there is none, or none can be taken; then it stays where it is, and is tried again later.
  */
-static bool accept_client(struct driver *driver)
+static bool whisker_base_driver_accept_client(struct driver *driver)
 {
     const int socket = accept4(driver->start.listening, NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC);
     if (socket >= 0) {
@@ -160,7 +163,7 @@ static bool accept_client(struct driver *driver)
     return false;
 }
 
-static void serve(struct driver *driver)
+static void whisker_base_driver_serve(struct driver *driver)
 {
     if (!driver->start.options->stream_clock) {
         base_sleep_serve(&driver->sleep, cli_now_ms());
@@ -170,22 +173,24 @@ static void serve(struct driver *driver)
     }
     base_clients_serve(&driver->clients, &driver->polled[CLIENTS], cli_now_ms());
     if (driver->polled[LISTENING].revents) {
-        for (int i = 0; i < BASE_CLIENTS && accepts(driver) && accept_client(driver); i++) {
+        for (int i = 0;
+             i < BASE_CLIENTS && whisker_base_driver_accepts(driver) && whisker_base_driver_accept_client(driver);
+             i++) {
         }
     }
     if (driver->told_port != driver->robot.port) {
-        tell_port(driver);
+        whisker_base_driver_tell_port(driver);
     }
-    tell_alive(driver);
+    whisker_base_driver_tell_alive(driver);
 }
 
-static void on_sleep(void *context, bool about_to)
+static void whisker_base_driver_on_sleep(void *context, bool about_to)
 {
     struct driver *driver = context;
     base_robot_hold(&driver->robot, BASE_HOLD_SLEEP, about_to, cli_now_ms());
 }
 
-static bool open_first(struct driver *driver)
+static bool whisker_base_driver_open_first(struct driver *driver)
 {
     const struct base_driver_start *start = &driver->start;
     driver->tried_ms = cli_now_ms();
@@ -193,26 +198,26 @@ static bool open_first(struct driver *driver)
     if (!driver->opened && !start->options->wait && start->restarts == 0) {
         return false;
     }
-    tell_port(driver);
+    whisker_base_driver_tell_port(driver);
     return true;
 }
 
 /* Until it is told to end, or has nothing to go on with. Returns the exit code. */
-static int run(struct driver *driver)
+static int whisker_base_driver_run(struct driver *driver)
 {
     while (!cli_stop_wanted()) {
-        reopen(driver);
-        if (!await(driver)) {
+        whisker_base_driver_reopen(driver);
+        if (!whisker_base_driver_await(driver)) {
             daemon_log(LOG_ERROR, "cannot wait for %d descriptors: %s; wheels stopped, ending; allow more (ulimit -n)",
                        POLLED, strerror(errno));
             return CLI_FAILED;
         }
-        if (driver->polled[GUARD].revents && !take_lease(driver)) {
+        if (driver->polled[GUARD].revents && !whisker_base_driver_take_lease(driver)) {
             daemon_log(LOG_ERROR, "the guard has died; wheels stopped, ending");
             return CLI_FAILED;
         }
-        watch_lease(driver); /* before a commander is obeyed */
-        serve(driver);
+        whisker_base_driver_watch_lease(driver); /* before a commander is obeyed */
+        whisker_base_driver_serve(driver);
     }
     return CLI_OK;
 }
@@ -223,13 +228,13 @@ int base_driver_run(const struct base_driver_start *start)
     driver.start = *start;
     base_robot_begin(&driver.robot, start->options, base_clients_step, &driver.clients);
     base_clients_begin(&driver.clients, &driver.robot, &driver.start.restarts);
-    if (!open_first(&driver)) {
+    if (!whisker_base_driver_open_first(&driver)) {
         return CLI_FAILED;
     }
     if (!start->options->stream_clock) { /* a simulation does not sleep */
-        base_sleep_begin(&driver.sleep, on_sleep, &driver, cli_now_ms());
+        base_sleep_begin(&driver.sleep, whisker_base_driver_on_sleep, &driver, cli_now_ms());
     }
-    const int code = run(&driver);
+    const int code = whisker_base_driver_run(&driver);
     base_robot_end(&driver.robot, cli_now_ms());
     base_sleep_end(&driver.sleep);
     return code;

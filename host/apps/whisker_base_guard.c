@@ -46,7 +46,7 @@ struct guard {
 /* ---------------------------------------------------------------------------------------------------------- the wheels
  */
 
-static void stop_wheels(struct guard *guard)
+static void whisker_base_guard_stop_wheels(struct guard *guard)
 {
     uint8_t bytes[CREATE_COMMAND_BYTES];
     if (guard->port >= 0) {
@@ -54,7 +54,7 @@ static void stop_wheels(struct guard *guard)
     }
 }
 
-static void hold_port(struct guard *guard, int port)
+static void whisker_base_guard_hold_port(struct guard *guard, int port)
 {
     if (guard->port >= 0) {
         close(guard->port);
@@ -66,7 +66,7 @@ static void hold_port(struct guard *guard, int port)
  */
 
 /* The descriptor that came with a message; -1: none. */
-static int descriptor_of(struct msghdr *message)
+static int whisker_base_guard_descriptor_of(struct msghdr *message)
 {
     int port = -1;
     struct cmsghdr *header = CMSG_FIRSTHDR(message);
@@ -77,7 +77,7 @@ static int descriptor_of(struct msghdr *message)
 }
 
 /* One message of the driver; false: it has died. */
-static bool hear(struct guard *guard)
+static bool whisker_base_guard_hear(struct guard *guard)
 {
     char byte;
     union {
@@ -94,31 +94,31 @@ static bool hear(struct guard *guard)
     guard->heard_ms = cli_now_ms();
     guard->stuck = false;
     if (byte == BASE_PORT || byte == BASE_NO_PORT) {
-        hold_port(guard, descriptor_of(&message));
+        whisker_base_guard_hold_port(guard, whisker_base_guard_descriptor_of(&message));
         daemon_notify_ready(byte == BASE_PORT ? "drives the base" : "waiting for the port");
     }
     return true;
 }
 
-static struct base_lease lease_of(const struct guard *guard)
+static struct base_lease whisker_base_guard_lease_of(const struct guard *guard)
 {
     const int64_t own_ms = cli_now_ms() + BASE_STUCK_MS, supervisor_ms = heartbeat_until_ms(&guard->heartbeat);
     return (struct base_lease){own_ms < supervisor_ms ? own_ms : supervisor_ms};
 }
 
 /* In lock-step simulation time stands still between messages: there the wheels go by their frames alone. */
-static void send_lease(const struct guard *guard)
+static void whisker_base_guard_send_lease(const struct guard *guard)
 {
-    const struct base_lease lease = lease_of(guard);
+    const struct base_lease lease = whisker_base_guard_lease_of(guard);
     if (!guard->options->stream_clock) {
         send(guard->driver, &lease, sizeof lease, MSG_NOSIGNAL | MSG_DONTWAIT);
     }
 }
 
-static void be_driver(const struct guard *guard, int socket)
+static void whisker_base_guard_be_driver(const struct guard *guard, int socket)
 {
     const struct base_driver_start start = {.options = guard->options,
-                                            .lease = lease_of(guard),
+                                            .lease = whisker_base_guard_lease_of(guard),
                                             .guard = socket,
                                             .listening = guard->listening,
                                             .port = guard->port,
@@ -126,7 +126,7 @@ static void be_driver(const struct guard *guard, int socket)
     _exit(base_driver_run(&start));
 }
 
-static bool start_driver(struct guard *guard)
+static bool whisker_base_guard_start_driver(struct guard *guard)
 {
     int ends[2];
     if (socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends) != 0) {
@@ -137,7 +137,7 @@ static bool start_driver(struct guard *guard)
     if (guard->child == 0) {
         close(ends[0]);
         close(guard->heartbeat.fd);
-        be_driver(guard, ends[1]);
+        whisker_base_guard_be_driver(guard, ends[1]);
     }
     close(ends[1]);
     guard->driver = ends[0];
@@ -145,7 +145,7 @@ static bool start_driver(struct guard *guard)
 }
 
 /* A driver that hangs cannot stop the wheels: it is done for it, and in the end it is ended. */
-static void watch_driver(struct guard *guard)
+static void whisker_base_guard_watch_driver(struct guard *guard)
 {
     const int64_t silent_ms = cli_now_ms() - guard->heard_ms;
     if (silent_ms < BASE_STUCK_MS) {
@@ -153,7 +153,7 @@ static void watch_driver(struct guard *guard)
     }
     if (!guard->stuck) {
         guard->stuck = true;
-        stop_wheels(guard);
+        whisker_base_guard_stop_wheels(guard);
         base_log(&guard->log_hang, LOG_WARN, "the driver hangs; wheels stopped");
     }
     if (silent_ms >= BASE_DEAD_MS) {
@@ -162,7 +162,7 @@ static void watch_driver(struct guard *guard)
 }
 
 /* Passes on the wish to stop; from now on the driver has to end, also one that had not to tell that it lives. */
-static void end_driver(struct guard *guard)
+static void whisker_base_guard_end_driver(struct guard *guard)
 {
     daemon_notify_stopping();
     guard->heard_ms = guard->options->stream_clock ? cli_now_ms() : guard->heard_ms;
@@ -170,7 +170,7 @@ static void end_driver(struct guard *guard)
 }
 
 /* What the supervisor's pipe has for us. */
-static void hear_supervisor(struct guard *guard)
+static void whisker_base_guard_hear_supervisor(struct guard *guard)
 {
     if (!heartbeat_read(&guard->heartbeat, cli_now_ms())) {
         guard->orphaned = true;
@@ -180,7 +180,7 @@ static void hear_supervisor(struct guard *guard)
 
 /* Sleeps until the driver or the supervisor says something, something is due, or a signal has come; false: the driver
  * has died, or cannot be watched any more. */
-static bool look(struct guard *guard, bool timed)
+static bool whisker_base_guard_look(struct guard *guard, bool timed)
 {
     enum { DRIVER, SUPERVISOR, POLLED };
     sigset_t none;
@@ -194,37 +194,37 @@ static bool look(struct guard *guard, bool timed)
         return false;
     }
     if (ready > 0 && polled[SUPERVISOR].revents) {
-        hear_supervisor(guard);
+        whisker_base_guard_hear_supervisor(guard);
     }
-    const bool lives = ready <= 0 || !polled[DRIVER].revents || hear(guard);
+    const bool lives = ready <= 0 || !polled[DRIVER].revents || whisker_base_guard_hear(guard);
     if (timed && lives) {
-        watch_driver(guard);
+        whisker_base_guard_watch_driver(guard);
     }
-    send_lease(guard);
+    whisker_base_guard_send_lease(guard);
     daemon_notify_alive();
     return lives;
 }
 
 /* Waits for the driver's end. Returns its status as of waitpid(). */
-static int attend(struct guard *guard)
+static int whisker_base_guard_attend(struct guard *guard)
 {
     bool told = false;
     int status = 0;
     do {
         if ((cli_stop_wanted() || guard->orphaned) && !told) {
             told = true;
-            end_driver(guard);
+            whisker_base_guard_end_driver(guard);
         }
-    } while (look(guard, told || !guard->options->stream_clock));
+    } while (whisker_base_guard_look(guard, told || !guard->options->stream_clock));
     close(guard->driver);
     waitpid(guard->child, &status, 0);
     if (!WIFEXITED(status)) {
-        stop_wheels(guard);
+        whisker_base_guard_stop_wheels(guard);
     }
     return status;
 }
 
-static void pause_after(const struct guard *guard, int64_t begun_ms)
+static void whisker_base_guard_pause_after(const struct guard *guard, int64_t begun_ms)
 {
     sigset_t none;
     sigemptyset(&none);
@@ -235,18 +235,18 @@ static void pause_after(const struct guard *guard, int64_t begun_ms)
 }
 
 /* Drivers one after the other, until one ends by itself. */
-static int keep_driver(struct guard *guard)
+static int whisker_base_guard_keep_driver(struct guard *guard)
 {
-    while (start_driver(guard)) {
+    while (whisker_base_guard_start_driver(guard)) {
         const int64_t begun_ms = cli_now_ms();
-        const int status = attend(guard);
+        const int status = whisker_base_guard_attend(guard);
         if (WIFEXITED(status) || cli_stop_wanted() || guard->orphaned) {
             return WIFEXITED(status) ? WEXITSTATUS(status) : CLI_OK;
         }
         guard->restarts++;
         base_log(&guard->log_death, LOG_ERROR, "the driver has died (signal %d); wheels stopped, starting it again",
                  WTERMSIG(status));
-        pause_after(guard, begun_ms);
+        whisker_base_guard_pause_after(guard, begun_ms);
     }
     daemon_log(LOG_ERROR, "cannot start the driver: %s", strerror(errno));
     return CLI_FAILED;
@@ -256,7 +256,7 @@ static int keep_driver(struct guard *guard)
  */
 
 /* Whether somebody answers at the address; a socket file of a process that was killed answers nobody. */
-static bool answered(const struct sockaddr_un *address)
+static bool whisker_base_guard_answered(const struct sockaddr_un *address)
 {
     const int probe = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0);
     const bool there = connect(probe, (const struct sockaddr *)address, sizeof *address) == 0;
@@ -265,11 +265,11 @@ static bool answered(const struct sockaddr_un *address)
 }
 
 /* A whisker-base that was killed a moment ago may still be about to vanish. Returns whether it has. */
-static bool await_vanished(const struct sockaddr_un *address)
+static bool whisker_base_guard_await_vanished(const struct sockaddr_un *address)
 {
     const struct timespec pause = {.tv_nsec = VANISH_MS * 1000000L / VANISH_LOOKS};
     for (int i = 0; i < VANISH_LOOKS; i++) {
-        if (!answered(address)) {
+        if (!whisker_base_guard_answered(address)) {
             return true;
         }
         nanosleep(&pause, NULL);
@@ -277,13 +277,13 @@ static bool await_vanished(const struct sockaddr_un *address)
     return false;
 }
 
-static bool bind_to(int socket, const struct sockaddr_un *address)
+static bool whisker_base_guard_bind_to(int socket, const struct sockaddr_un *address)
 {
     if (bind(socket, (const struct sockaddr *)address, sizeof *address) == 0) {
         return true;
     }
     const int error = errno;
-    if (error != EADDRINUSE || !await_vanished(address)) {
+    if (error != EADDRINUSE || !whisker_base_guard_await_vanished(address)) {
         errno = error;
         return false;
     }
@@ -291,7 +291,7 @@ static bool bind_to(int socket, const struct sockaddr_un *address)
     return bind(socket, (const struct sockaddr *)address, sizeof *address) == 0;
 }
 
-static bool open_socket(struct guard *guard)
+static bool whisker_base_guard_open_socket(struct guard *guard)
 {
     const char *path = guard->options->socket;
     struct sockaddr_un address = {.sun_family = AF_UNIX};
@@ -302,7 +302,8 @@ static bool open_socket(struct guard *guard)
     }
     strcpy(address.sun_path, path);
     guard->listening = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-    if (guard->listening < 0 || !bind_to(guard->listening, &address) || listen(guard->listening, BACKLOG) != 0) {
+    if (guard->listening < 0 || !whisker_base_guard_bind_to(guard->listening, &address) ||
+        listen(guard->listening, BACKLOG) != 0) {
         daemon_log(LOG_ERROR, "%s: %s; %s", path, strerror(errno),
                    errno == EADDRINUSE ? "stop the whisker-base that has it" : "choose a path that can be written");
         return false;
@@ -311,7 +312,7 @@ static bool open_socket(struct guard *guard)
 }
 
 /* Signals are taken only where a process waits, so that none slips between looking and waiting. */
-static void block_signals(void)
+static void whisker_base_guard_block_signals(void)
 {
     sigset_t signals;
     sigemptyset(&signals);
@@ -324,7 +325,7 @@ static void block_signals(void)
 int base_guard_run(const struct base_options *options)
 {
     struct guard guard = {.options = options, .listening = -1, .port = -1, .driver = -1};
-    block_signals();
+    whisker_base_guard_block_signals();
     if (!heartbeat_begin(&guard.heartbeat, cli_now_ms())) {
         daemon_log(LOG_ERROR,
                    HEARTBEAT_VARIABLE "=%s: no open descriptor; give it the read end of the supervisor's pipe, "
@@ -332,11 +333,11 @@ int base_guard_run(const struct base_options *options)
                    getenv(HEARTBEAT_VARIABLE));
         return CLI_USAGE;
     }
-    if (!open_socket(&guard)) {
+    if (!whisker_base_guard_open_socket(&guard)) {
         return CLI_FAILED;
     }
-    const int code = keep_driver(&guard);
-    hold_port(&guard, -1);
+    const int code = whisker_base_guard_keep_driver(&guard);
+    whisker_base_guard_hold_port(&guard, -1);
     close(guard.listening);
     unlink(options->socket);
     return code;

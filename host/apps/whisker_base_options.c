@@ -10,7 +10,7 @@
 #include "create/port.h"
 #include "daemon_log.h"
 
-static void print_help(void)
+static void whisker_base_options_print_help(void)
 {
     printf(
         "Usage: " DAEMON_PROGRAM " --port PATH --socket PATH [OPTION...]\n"
@@ -41,32 +41,33 @@ static void print_help(void)
         create_model_facts(CREATE_1)->wheel_base_m, create_model_facts(CREATE_2)->wheel_base_m);
 }
 
-static bool refuse(const char *option, const char *text, const char *remedy)
+static bool whisker_base_options_refuse(const char *option, const char *text, const char *remedy)
 {
     fprintf(stderr, DAEMON_PROGRAM ": --%s %s: %s\n", option, text, remedy);
     return false;
 }
 
 /* Reads an option that is one of two words. */
-static bool set_choice(const char *option, const char *text, const char *no, const char *yes, bool *value)
+static bool whisker_base_options_set_choice(const char *option, const char *text, const char *no, const char *yes,
+                                            bool *value)
 {
     *value = !strcmp(text, yes);
     char remedy[64];
     snprintf(remedy, sizeof remedy, "give %s or %s", no, yes);
-    return *value || !strcmp(text, no) || refuse(option, text, remedy);
+    return *value || !strcmp(text, no) || whisker_base_options_refuse(option, text, remedy);
 }
 
-static bool set_policy(const char *text, enum create_source *policy)
+static bool whisker_base_options_set_policy(const char *text, enum create_source *policy)
 {
     for (*policy = CREATE_REPORTED; *policy < CREATE_AUTO && strcmp(text, create_source_name(*policy)) != 0;) {
         *policy = (enum create_source)(*policy + 1);
     }
     return !strcmp(text, create_source_name(*policy)) ||
-           refuse("odometry", text, "give auto, reported, requested or encoders");
+           whisker_base_options_refuse("odometry", text, "give auto, reported, requested or encoders");
 }
 
 /* Number options, by name. A model's own values are filled in when the command line has been read. */
-static double *number_named(struct create_odometry_settings *settings, const char *name)
+static double *whisker_base_options_number_named(struct create_odometry_settings *settings, const char *name)
 {
     return !strcmp(name, "wheel-base")        ? &settings->wheel_base_m
            : !strcmp(name, "distance-scale")  ? &settings->distance_scale
@@ -76,17 +77,17 @@ static double *number_named(struct create_odometry_settings *settings, const cha
                                               : &settings->drift_rad_per_m;
 }
 
-static bool set_number(struct base_options *options, const char *name, const char *text)
+static bool whisker_base_options_set_number(struct base_options *options, const char *name, const char *text)
 {
-    double *value = number_named(&options->odometry, name);
+    double *value = whisker_base_options_number_named(&options->odometry, name);
     char *end;
     errno = 0;
     *value = strtod(text, &end);
     struct create_odometry_settings probe;
     create_odometry_defaults(&probe, CREATE_1);
-    *number_named(&probe, name) = *value;
+    *whisker_base_options_number_named(&probe, name) = *value;
     return (end != text && *end == '\0' && errno == 0 && create_odometry_check(&probe)) ||
-           refuse(name, text, "give a positive number");
+           whisker_base_options_refuse(name, text, "give a positive number");
 }
 
 enum { MODEL = 'm', BAUD = 'b', MODE = 'o', CLOCK = 'c', POLICY = 'y', NUMBER = 'n' };
@@ -111,22 +112,22 @@ static const struct option known[] = {
     {NULL, 0, NULL, 0},
 };
 
-static bool set_baud(struct base_options *options, const char *text)
+static bool whisker_base_options_set_baud(struct base_options *options, const char *text)
 {
     return cli_number(DAEMON_PROGRAM, "baud", text, 1, UINT32_MAX, &options->baud) &&
            (create_port_knows(options->baud) ||
-            refuse("baud", text, "give 57600, 115200 or another speed of a Create"));
+            whisker_base_options_refuse("baud", text, "give 57600, 115200 or another speed of a Create"));
 }
 
-static bool set_model(struct base_options *options, const char *text)
+static bool whisker_base_options_set_model(struct base_options *options, const char *text)
 {
     bool second;
-    const bool right = set_choice("model", text, "1", "2", &second);
+    const bool right = whisker_base_options_set_choice("model", text, "1", "2", &second);
     options->odometry.model = second ? CREATE_2 : CREATE_1;
     return right;
 }
 
-static bool set_word(struct base_options *options, int option, const char *text)
+static bool whisker_base_options_set_word(struct base_options *options, int option, const char *text)
 {
     switch (option) {
     case 'p':
@@ -140,21 +141,21 @@ static bool set_word(struct base_options *options, int option, const char *text)
     case 'v':
         return options->verbose = true;
     case MODEL:
-        return set_model(options, text);
+        return whisker_base_options_set_model(options, text);
     case BAUD:
-        return set_baud(options, text);
+        return whisker_base_options_set_baud(options, text);
     case MODE:
-        return set_choice("mode", text, "safe", "full", &options->full);
+        return whisker_base_options_set_choice("mode", text, "safe", "full", &options->full);
     case CLOCK:
-        return set_choice("clock", text, "wall", "stream", &options->stream_clock);
+        return whisker_base_options_set_choice("clock", text, "wall", "stream", &options->stream_clock);
     case POLICY:
-        return set_policy(text, &options->odometry.policy);
+        return whisker_base_options_set_policy(text, &options->odometry.policy);
     default:
         return false;
     }
 }
 
-static int check(struct base_options *options, bool word_too_many)
+static int whisker_base_options_check(struct base_options *options, bool word_too_many)
 {
     const struct create_model_facts *facts = create_model_facts(options->odometry.model);
     options->odometry.wheel_base_m =
@@ -181,12 +182,13 @@ int base_options_parse(int argc, char **argv, struct base_options *options)
     int which = 0;
     for (int option; (option = getopt_long(argc, argv, "", known, &which)) != -1;) {
         if (option == 'h') {
-            print_help();
+            whisker_base_options_print_help();
             return CLI_OK;
         }
-        if (!(option == NUMBER ? set_number(options, known[which].name, optarg) : set_word(options, option, optarg))) {
+        if (!(option == NUMBER ? whisker_base_options_set_number(options, known[which].name, optarg)
+                               : whisker_base_options_set_word(options, option, optarg))) {
             return CLI_USAGE;
         }
     }
-    return check(options, optind != argc);
+    return whisker_base_options_check(options, optind != argc);
 }

@@ -28,7 +28,7 @@ static const uint8_t packets[] = {
 };
 enum { ENCODERS = 2 }; /* the last two: Create 2 only */
 
-static size_t packet_count(const struct base_robot *robot)
+static size_t whisker_base_robot_packet_count(const struct base_robot *robot)
 {
     return sizeof packets - (robot->options->odometry.model == CREATE_2 ? 0 : ENCODERS);
 }
@@ -36,7 +36,7 @@ static size_t packet_count(const struct base_robot *robot)
 /* ---------------------------------------------------------------------------------------------------------- the line
  */
 
-static void lose(struct base_robot *robot, const char *doing)
+static void whisker_base_robot_lose(struct base_robot *robot, const char *doing)
 {
     base_log(&robot->log.line, LOG_WARN, "%s: %s: %s; plug it in again", robot->options->port, doing, strerror(errno));
     close(robot->port);
@@ -45,41 +45,42 @@ static void lose(struct base_robot *robot, const char *doing)
     robot->speeds = (struct create_speeds){0};
 }
 
-static bool order(struct base_robot *robot, const uint8_t *bytes, size_t count)
+static bool whisker_base_robot_order(struct base_robot *robot, const uint8_t *bytes, size_t count)
 {
     if (robot->port < 0) {
         return false;
     }
     if (!create_port_write(robot->port, bytes, count)) {
-        lose(robot, "cannot write");
+        whisker_base_robot_lose(robot, "cannot write");
         return false;
     }
     robot->sent += count;
     return true;
 }
 
-static bool order_opcode(struct base_robot *robot, enum create_oi_opcode opcode)
+static bool whisker_base_robot_order_opcode(struct base_robot *robot, enum create_oi_opcode opcode)
 {
     uint8_t bytes[CREATE_COMMAND_BYTES];
-    return order(robot, bytes, create_put_opcode(bytes, opcode));
+    return whisker_base_robot_order(robot, bytes, create_put_opcode(bytes, opcode));
 }
 
-static bool ask_mode(struct base_robot *robot, enum create_oi_mode mode)
+static bool whisker_base_robot_ask_mode(struct base_robot *robot, enum create_oi_mode mode)
 {
     robot->entered = false;
     robot->frames_since_mode = 0;
     robot->wanted = mode;
     return mode == CREATE_OI_MODE_PASSIVE
-               ? order_opcode(robot, CREATE_OI_OP_START)
-               : order_opcode(robot, mode == CREATE_OI_MODE_FULL ? CREATE_OI_OP_FULL : CREATE_OI_OP_SAFE);
+               ? whisker_base_robot_order_opcode(robot, CREATE_OI_OP_START)
+               : whisker_base_robot_order_opcode(robot,
+                                                 mode == CREATE_OI_MODE_FULL ? CREATE_OI_OP_FULL : CREATE_OI_OP_SAFE);
 }
 
 /* Orders the wheels, by a command of so many bytes. A base that is not heard goes by its new speeds from now on. */
-static bool order_wheels(struct base_robot *robot, const uint8_t *bytes, size_t count, struct create_speeds speeds,
-                         int64_t now_ms)
+static bool whisker_base_robot_order_wheels(struct base_robot *robot, const uint8_t *bytes, size_t count,
+                                            struct create_speeds speeds, int64_t now_ms)
 {
     const struct create_speeds before = robot->speeds;
-    const bool ordered = order(robot, bytes, count);
+    const bool ordered = whisker_base_robot_order(robot, bytes, count);
     if (ordered && (speeds.left_mm_s != before.left_mm_s || speeds.right_mm_s != before.right_mm_s)) {
         robot->changed_ms = now_ms;
     }
@@ -87,23 +88,25 @@ static bool order_wheels(struct base_robot *robot, const uint8_t *bytes, size_t 
     return ordered;
 }
 
-static bool order_speeds(struct base_robot *robot, struct create_speeds speeds, int64_t now_ms)
+static bool whisker_base_robot_order_speeds(struct base_robot *robot, struct create_speeds speeds, int64_t now_ms)
 {
     uint8_t bytes[CREATE_COMMAND_BYTES];
-    return order_wheels(robot, bytes, create_put_drive_direct(bytes, speeds.right_mm_s, speeds.left_mm_s), speeds,
-                        now_ms);
+    return whisker_base_robot_order_wheels(
+        robot, bytes, create_put_drive_direct(bytes, speeds.right_mm_s, speeds.left_mm_s), speeds, now_ms);
 }
 
 /* Wheels first, then who commands, then what is told. arm: enter the wanted mode. */
-static bool start_base(struct base_robot *robot, bool arm, int64_t now_ms)
+static bool whisker_base_robot_start_base(struct base_robot *robot, bool arm, int64_t now_ms)
 {
     uint8_t bytes[CREATE_COMMAND_BYTES];
-    return order_wheels(robot, bytes, create_put_stop(bytes), (struct create_speeds){0}, now_ms) &&
-           order_opcode(robot, CREATE_OI_OP_START) && (!arm || ask_mode(robot, robot->wanted)) &&
-           order(robot, bytes, create_put_stream(bytes, packets, packet_count(robot)));
+    return whisker_base_robot_order_wheels(robot, bytes, create_put_stop(bytes), (struct create_speeds){0}, now_ms) &&
+           whisker_base_robot_order_opcode(robot, CREATE_OI_OP_START) &&
+           (!arm || whisker_base_robot_ask_mode(robot, robot->wanted)) &&
+           whisker_base_robot_order(robot, bytes,
+                                    create_put_stream(bytes, packets, whisker_base_robot_packet_count(robot)));
 }
 
-static void add_counts(struct create_stream_counts *sum, const struct create_stream_counts *counts)
+static void whisker_base_robot_add_counts(struct create_stream_counts *sum, const struct create_stream_counts *counts)
 {
     sum->bytes += counts->bytes;
     sum->frames += counts->frames;
@@ -112,7 +115,7 @@ static void add_counts(struct create_stream_counts *sum, const struct create_str
     sum->resyncs += counts->resyncs;
 }
 
-static const char *remedy(int error)
+static const char *whisker_base_robot_remedy(int error)
 {
     switch (error) {
     case ENOENT:
@@ -142,7 +145,7 @@ bool base_robot_open(struct base_robot *robot, int port, int64_t now_ms)
     if (robot->port < 0) {
         if (errno != robot->error) {
             robot->error = errno;
-            daemon_log(LOG_ERROR, "%s: %s", robot->options->port, remedy(errno));
+            daemon_log(LOG_ERROR, "%s: %s", robot->options->port, whisker_base_robot_remedy(errno));
         }
         return false;
     }
@@ -150,11 +153,11 @@ bool base_robot_open(struct base_robot *robot, int port, int64_t now_ms)
     robot->sent = 0;
     robot->silent = false;
     robot->opened_ms = now_ms;
-    add_counts(&robot->past, &robot->stream.counts);
-    create_stream_begin(&robot->stream, packets, packet_count(robot));
+    whisker_base_robot_add_counts(&robot->past, &robot->stream.counts);
+    create_stream_begin(&robot->stream, packets, whisker_base_robot_packet_count(robot));
     daemon_log(LOG_DETAIL, "%s: open, %s at %u baud", robot->options->port,
                create_model_facts(robot->options->odometry.model)->name, robot->options->baud);
-    return start_base(robot, true, now_ms);
+    return whisker_base_robot_start_base(robot, true, now_ms);
 }
 
 uint64_t base_robot_frames(const struct base_robot *robot)
@@ -170,20 +173,20 @@ uint64_t base_robot_taken(const struct base_robot *robot)
 /* --------------------------------------------------------------------------------------------------------- the frames
  */
 
-static void stop_commander(struct base_robot *robot, int64_t now_ms)
+static void whisker_base_robot_stop_commander(struct base_robot *robot, int64_t now_ms)
 {
     robot->commander_stops++;
     base_log(&robot->log.commander, LOG_WARN, "the commander is silent; wheels stopped");
     base_robot_stop(robot, now_ms);
 }
 
-static bool moving(const struct base_robot *robot)
+static bool whisker_base_robot_moving(const struct base_robot *robot)
 {
     return robot->speeds.left_mm_s != 0 || robot->speeds.right_mm_s != 0;
 }
 
 /* Frames that time says are missing, beside those the bytes tell of: the line was gone or silent. */
-static uint32_t frames_of_gap(const struct base_robot *robot, int64_t now_ms)
+static uint32_t whisker_base_robot_frames_of_gap(const struct base_robot *robot, int64_t now_ms)
 {
     const int64_t gap_ms = now_ms - robot->frame_ms;
     const bool gap = !robot->options->stream_clock && robot->frame_ms > 0 && gap_ms >= BASE_SILENCE_MS;
@@ -191,13 +194,13 @@ static uint32_t frames_of_gap(const struct base_robot *robot, int64_t now_ms)
 }
 
 /* Of the frames missed, those since other speeds were ordered. */
-static uint32_t frames_since_change(const struct base_robot *robot, int64_t now_ms)
+static uint32_t whisker_base_robot_frames_since_change(const struct base_robot *robot, int64_t now_ms)
 {
     const uint32_t since = (uint32_t)((now_ms - robot->changed_ms) / CREATE_OI_PERIOD_MS);
     return robot->changed_ms <= robot->frame_ms ? 0 : since < robot->frame.missed ? since : robot->frame.missed;
 }
 
-static void log_back(struct base_robot *robot)
+static void whisker_base_robot_log_back(struct base_robot *robot)
 {
     if (robot->told_ms > 0) {
         robot->told_ms = 0;
@@ -205,21 +208,22 @@ static void log_back(struct base_robot *robot)
     }
 }
 
-static void take_frame(struct base_robot *robot, int64_t now_ms)
+static void whisker_base_robot_take_frame(struct base_robot *robot, int64_t now_ms)
 {
-    const uint32_t gap = frames_of_gap(robot, now_ms);
+    const uint32_t gap = whisker_base_robot_frames_of_gap(robot, now_ms);
     robot->frame.missed = gap > robot->frame.missed ? gap : robot->frame.missed;
-    robot->frame.ordered = gap > 0 ? frames_since_change(robot, now_ms) : 0;
+    robot->frame.ordered = gap > 0 ? whisker_base_robot_frames_since_change(robot, now_ms) : 0;
     robot->missed += robot->frame.missed;
     robot->frame_ms = now_ms;
     robot->silent = false;
-    log_back(robot);
+    whisker_base_robot_log_back(robot);
     const struct create_step step = create_odometry_take(&robot->odometry, &robot->frame);
     base_robot_heed(robot);
     robot->on_step(robot->context, &step, base_robot_bits(robot));
     robot->frames_since_drive += 1 + robot->frame.missed;
-    if (robot->options->stream_clock && moving(robot) && robot->frames_since_drive >= COMMANDER_FRAMES) {
-        stop_commander(robot, now_ms);
+    if (robot->options->stream_clock && whisker_base_robot_moving(robot) &&
+        robot->frames_since_drive >= COMMANDER_FRAMES) {
+        whisker_base_robot_stop_commander(robot, now_ms);
     }
 }
 
@@ -229,12 +233,12 @@ bool base_robot_read(struct base_robot *robot, uint64_t limit, int64_t now_ms)
     const uint64_t left = limit - base_robot_taken(robot);
     const int got = create_port_read(robot->port, bytes, left < sizeof bytes ? (size_t)left : sizeof bytes);
     if (got < 0) {
-        lose(robot, "the line is gone");
+        whisker_base_robot_lose(robot, "the line is gone");
         return false;
     }
     for (int i = 0; i < got; i++) {
         if (create_stream_push(&robot->stream, bytes[i], &robot->frame)) {
-            take_frame(robot, now_ms);
+            whisker_base_robot_take_frame(robot, now_ms);
         }
     }
     return robot->port >= 0;
@@ -251,12 +255,12 @@ bool base_robot_drive(struct base_robot *robot, double v_m_s, double omega_rad_s
     const struct create_speeds wanted =
         base_robot_kept(robot) ? (struct create_speeds){0}
                                : create_choose_speeds(settings->model, settings->wheel_base_m, v_m_s, omega_rad_s);
-    return order_speeds(robot, wanted, now_ms);
+    return whisker_base_robot_order_speeds(robot, wanted, now_ms);
 }
 
 bool base_robot_stop(struct base_robot *robot, int64_t now_ms)
 {
-    return order_speeds(robot, (struct create_speeds){0}, now_ms);
+    return whisker_base_robot_order_speeds(robot, (struct create_speeds){0}, now_ms);
 }
 
 bool base_robot_kept(const struct base_robot *robot)
@@ -264,7 +268,7 @@ bool base_robot_kept(const struct base_robot *robot)
     return robot->port < 0 || robot->silent || robot->held != 0;
 }
 
-static void log_hold(struct base_robot *robot, enum base_hold reason, bool on)
+static void whisker_base_robot_log_hold(struct base_robot *robot, enum base_hold reason, bool on)
 {
     const bool heartbeat = reason == BASE_HOLD_HEARTBEAT;
     if (on) {
@@ -286,16 +290,16 @@ void base_robot_hold(struct base_robot *robot, enum base_hold reason, bool on, i
     if (on) {
         base_robot_stop(robot, now_ms);
     }
-    log_hold(robot, reason, on);
+    whisker_base_robot_log_hold(robot, reason, on);
 }
 
 bool base_robot_mode(struct base_robot *robot, enum create_oi_mode mode, int64_t now_ms)
 {
-    return base_robot_stop(robot, now_ms) && ask_mode(robot, mode);
+    return base_robot_stop(robot, now_ms) && whisker_base_robot_ask_mode(robot, mode);
 }
 
 /* A line that stays silent is told of once, and then every hour. */
-static void log_silence(struct base_robot *robot, int64_t now_ms)
+static void whisker_base_robot_log_silence(struct base_robot *robot, int64_t now_ms)
 {
     if (robot->told_ms == 0 || now_ms - robot->told_ms >= BASE_TELL_MS) {
         robot->told_ms = now_ms;
@@ -308,13 +312,13 @@ static void log_silence(struct base_robot *robot, int64_t now_ms)
 
 /* Bytes have stopped: stopped wheels are all that can be had without seeing. The mode is entered again only if the base
  * was in it: a base that left it by itself waits for the commander. */
-static void restart_stream(struct base_robot *robot, int64_t now_ms)
+static void whisker_base_robot_restart_stream(struct base_robot *robot, int64_t now_ms)
 {
     robot->silences++;
     robot->silent = robot->stream.counts.frames > 0;
     robot->opened_ms = now_ms;
-    log_silence(robot, now_ms);
-    start_base(robot, robot->entered || robot->stream.counts.frames == 0, now_ms);
+    whisker_base_robot_log_silence(robot, now_ms);
+    whisker_base_robot_start_base(robot, robot->entered || robot->stream.counts.frames == 0, now_ms);
 }
 
 int base_robot_watch(struct base_robot *robot, int64_t now_ms)
@@ -322,24 +326,25 @@ int base_robot_watch(struct base_robot *robot, int64_t now_ms)
     if (robot->options->stream_clock || robot->port < 0) {
         return BASE_REOPEN_MS;
     }
-    if (moving(robot) && now_ms - robot->drive_ms >= BASE_COMMANDER_MS) {
-        stop_commander(robot, now_ms);
+    if (whisker_base_robot_moving(robot) && now_ms - robot->drive_ms >= BASE_COMMANDER_MS) {
+        whisker_base_robot_stop_commander(robot, now_ms);
     }
     const int64_t heard_ms = robot->frame_ms > robot->opened_ms ? robot->frame_ms : robot->opened_ms;
     if (now_ms - heard_ms >= BASE_SILENCE_MS) {
-        restart_stream(robot, now_ms);
+        whisker_base_robot_restart_stream(robot, now_ms);
         return BASE_SILENCE_MS;
     }
     const int64_t silence_ms = heard_ms + BASE_SILENCE_MS - now_ms;
-    const int64_t commander_ms = moving(robot) ? robot->drive_ms + BASE_COMMANDER_MS - now_ms : silence_ms;
+    const int64_t commander_ms =
+        whisker_base_robot_moving(robot) ? robot->drive_ms + BASE_COMMANDER_MS - now_ms : silence_ms;
     return (int)(commander_ms < silence_ms ? commander_ms : silence_ms);
 }
 
 void base_robot_end(struct base_robot *robot, int64_t now_ms)
 {
     uint8_t bytes[CREATE_COMMAND_BYTES];
-    if (base_robot_stop(robot, now_ms) && order(robot, bytes, create_put_pause(bytes)) &&
-        order_opcode(robot, CREATE_OI_OP_START)) {
+    if (base_robot_stop(robot, now_ms) && whisker_base_robot_order(robot, bytes, create_put_pause(bytes)) &&
+        whisker_base_robot_order_opcode(robot, CREATE_OI_OP_START)) {
         close(robot->port);
     }
     robot->port = -1;

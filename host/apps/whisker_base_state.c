@@ -23,7 +23,7 @@ unsigned base_robot_bits(const struct base_robot *robot)
            (value[CREATE_OI_CLIFF_RIGHT] ? BASE_CLIFF_RIGHT : 0u) | (idle ? BASE_IDLE : 0u);
 }
 
-static const char *mode_reason(const struct base_robot *robot)
+static const char *whisker_base_state_mode_reason(const struct base_robot *robot)
 {
     const unsigned bits = base_robot_bits(robot);
     return bits & (CREATE_OI_DROP_LEFT | CREATE_OI_DROP_RIGHT | CREATE_OI_DROP_CASTER) ? "a wheel dropped; set it down"
@@ -34,7 +34,7 @@ static const char *mode_reason(const struct base_robot *robot)
 }
 
 /* Nobody has asked for a higher mode than the wanted: a base that tells one for long counts them differently. */
-static void watch_mode_offset(struct base_robot *robot)
+static void whisker_base_state_watch_mode_offset(struct base_robot *robot)
 {
     robot->frames_since_mode++;
     if (!robot->entered && robot->frames_since_mode >= MODE_FRAMES && robot->wanted >= CREATE_OI_MODE_SAFE &&
@@ -45,20 +45,20 @@ static void watch_mode_offset(struct base_robot *robot)
 }
 
 /* A base that leaves its mode has stopped its wheels; it goes back only when the commander says so. */
-static void watch_mode(struct base_robot *robot)
+static void whisker_base_state_watch_mode(struct base_robot *robot)
 {
-    watch_mode_offset(robot);
+    whisker_base_state_watch_mode_offset(robot);
     const bool in_force = base_robot_mode_told(robot) == (int32_t)robot->wanted;
     if (robot->entered && !in_force) {
         robot->mode_losses++;
         robot->speeds = (struct create_speeds){0};
         base_log(&robot->log.mode, LOG_WARN, "%s: the base has left its mode: %s, then send `mode safe`",
-                 robot->options->port, mode_reason(robot));
+                 robot->options->port, whisker_base_state_mode_reason(robot));
     }
     robot->entered = in_force;
 }
 
-static void watch_battery(struct base_robot *robot)
+static void whisker_base_state_watch_battery(struct base_robot *robot)
 {
     const int32_t *value = robot->frame.value;
     robot->low = value[CREATE_OI_VOLTAGE] < LOW_MV || value[CREATE_OI_CHARGE] * LOW_CHARGE < value[CREATE_OI_CAPACITY];
@@ -71,6 +71,6 @@ static void watch_battery(struct base_robot *robot)
 
 void base_robot_heed(struct base_robot *robot)
 {
-    watch_mode(robot);
-    watch_battery(robot);
+    whisker_base_state_watch_mode(robot);
+    whisker_base_state_watch_battery(robot);
 }

@@ -31,7 +31,7 @@ struct options {
 static uint8_t image_bytes[IMAGE_BYTES_MAX + 1];
 static size_t image_count;
 
-static void print_help(void)
+static void whisker_flash_print_help(void)
 {
     printf(
         "Usage: whisker-flash IMAGE [OPTION...]\n"
@@ -52,7 +52,7 @@ static void print_help(void)
         "Exit code: 0 every node has it, 1 failed for some or all, 2 wrong use.\n");
 }
 
-static bool set_number(struct options *options, const char *name, const char *text)
+static bool whisker_flash_set_number(struct options *options, const char *name, const char *text)
 {
     uint8_t *byte = cli_byte_setting(&options->settings, name);
     const bool is_lane = !strcmp(name, "lane"), is_node = !strcmp(name, "node");
@@ -73,7 +73,7 @@ static bool set_number(struct options *options, const char *name, const char *te
     return true;
 }
 
-static bool set_word(struct options *options, int option, const char *text)
+static bool whisker_flash_set_word(struct options *options, int option, const char *text)
 {
     switch (option) {
     case 'b':
@@ -93,7 +93,7 @@ static bool set_word(struct options *options, int option, const char *text)
 }
 
 /* Returns 0 to go on, or an exit code plus one. */
-static int read_options(struct options *options, int argc, char **argv)
+static int whisker_flash_read_options(struct options *options, int argc, char **argv)
 {
     static const struct option known[] = {{"lane", required_argument, NULL, NUMBER},
                                           {"node", required_argument, NULL, NUMBER},
@@ -110,10 +110,11 @@ static int read_options(struct options *options, int argc, char **argv)
     int which = 0;
     for (int option; (option = getopt_long(argc, argv, "", known, &which)) != -1;) {
         if (option == 'h') {
-            print_help();
+            whisker_flash_print_help();
             return CLI_OK + 1;
         }
-        if (!(option == NUMBER ? set_number(options, known[which].name, optarg) : set_word(options, option, optarg))) {
+        if (!(option == NUMBER ? whisker_flash_set_number(options, known[which].name, optarg)
+                               : whisker_flash_set_word(options, option, optarg))) {
             return CLI_USAGE + 1;
         }
     }
@@ -126,7 +127,7 @@ static int read_options(struct options *options, int argc, char **argv)
     return wrong ? CLI_USAGE + 1 : 0;
 }
 
-static int read_file(const char *path)
+static int whisker_flash_read_file(const char *path)
 {
     FILE *file = fopen(path, "rb");
     if (!file) {
@@ -138,12 +139,12 @@ static int read_file(const char *path)
     return CLI_OK;
 }
 
-static void ignore_frames(void *context, const uint8_t *bytes, size_t count)
+static void whisker_flash_ignore_frames(void *context, const uint8_t *bytes, size_t count)
 {
     (void)context, (void)bytes, (void)count;
 }
 
-static int print_health(struct whisker_device *device, uint32_t lanes)
+static int whisker_flash_print_health(struct whisker_device *device, uint32_t lanes)
 {
     int error = WHISKER_OK;
     for (uint8_t i = 0; !error && i < WHISKER_HEALTH_COUNT; i++) {
@@ -159,7 +160,7 @@ static int print_health(struct whisker_device *device, uint32_t lanes)
 }
 
 /* The lanes that are meant; 0, with one line printed, if that cannot be told. */
-static uint32_t choose(struct options *options, const struct whisker_node nodes[WHISKER_FRAME_LANES])
+static uint32_t whisker_flash_choose(struct options *options, const struct whisker_node nodes[WHISKER_FRAME_LANES])
 {
     if (!options->has_lane && !options->has_serial) {
         options->serial = 0;
@@ -188,8 +189,8 @@ static uint32_t choose(struct options *options, const struct whisker_node nodes[
 
 /* True, with a line for the first such lane, if the image is hardly meant for what runs there: older, or of another
  * build. A node without a whole application takes any. */
-static bool is_doubtful(const struct whisker_node nodes[WHISKER_FRAME_LANES], uint32_t lanes,
-                        const struct whisker_image *image)
+static bool whisker_flash_is_doubtful(const struct whisker_node nodes[WHISKER_FRAME_LANES], uint32_t lanes,
+                                      const struct whisker_image *image)
 {
     for (int lane = 0; lane < WHISKER_FRAME_LANES; lane++) {
         const struct whisker_node *node = &nodes[lane];
@@ -214,8 +215,8 @@ static bool is_doubtful(const struct whisker_node nodes[WHISKER_FRAME_LANES], ui
 }
 
 /* Says what an update would meet; returns how many nodes would refuse the image. */
-static int foresee(const struct whisker_node nodes[WHISKER_FRAME_LANES], uint32_t lanes,
-                   const struct whisker_image *image)
+static int whisker_flash_foresee(const struct whisker_node nodes[WHISKER_FRAME_LANES], uint32_t lanes,
+                                 const struct whisker_image *image)
 {
     int refusals = 0;
     for (int lane = 0; lane < WHISKER_FRAME_LANES; lane++) {
@@ -231,20 +232,20 @@ static int foresee(const struct whisker_node nodes[WHISKER_FRAME_LANES], uint32_
     return refusals;
 }
 
-static int update(struct whisker_device *device, struct options *options,
-                  struct whisker_node nodes[WHISKER_FRAME_LANES], const struct whisker_image *image)
+static int whisker_flash_update(struct whisker_device *device, struct options *options,
+                                struct whisker_node nodes[WHISKER_FRAME_LANES], const struct whisker_image *image)
 {
     struct whisker_update updates[WHISKER_FRAME_LANES];
     flash_print_duplicates(nodes);
-    const uint32_t lanes = choose(options, nodes);
+    const uint32_t lanes = whisker_flash_choose(options, nodes);
     if (lanes == 0) {
         return CLI_FAILED;
     }
-    if (!options->force && is_doubtful(nodes, lanes, image)) {
+    if (!options->force && whisker_flash_is_doubtful(nodes, lanes, image)) {
         return CLI_FAILED;
     }
     if (options->dry_run) {
-        return foresee(nodes, lanes, image) ? CLI_FAILED : CLI_OK;
+        return whisker_flash_foresee(nodes, lanes, image) ? CLI_FAILED : CLI_OK;
     }
     int error = whisker_nodes_update(device, lanes, options->serial, image, flash_show_progress, NULL, updates);
     if (!error) {
@@ -256,10 +257,11 @@ static int update(struct whisker_device *device, struct options *options,
     return flash_print_result(updates, nodes, image->version) ? CLI_FAILED : CLI_OK;
 }
 
-static int serve(struct whisker_device *device, struct options *options, const struct whisker_image *image)
+static int whisker_flash_serve(struct whisker_device *device, struct options *options,
+                               const struct whisker_image *image)
 {
     struct whisker_node nodes[WHISKER_FRAME_LANES];
-    int error = whisker_device_start(device, &options->settings, ignore_frames, NULL);
+    int error = whisker_device_start(device, &options->settings, whisker_flash_ignore_frames, NULL);
     if (!error) {
         error = whisker_nodes_identify(device, options->lane_mask, nodes);
     }
@@ -271,16 +273,16 @@ static int serve(struct whisker_device *device, struct options *options, const s
         return CLI_FAILED;
     }
     if (!options->list) {
-        return update(device, options, nodes, image);
+        return whisker_flash_update(device, options, nodes, image);
     }
     flash_print_nodes(nodes);
     flash_print_duplicates(nodes);
-    error = options->health ? print_health(device, flash_lanes(nodes)) : WHISKER_OK;
+    error = options->health ? whisker_flash_print_health(device, flash_lanes(nodes)) : WHISKER_OK;
     return error ? cli_fail(PROGRAM, "health", error) : CLI_OK;
 }
 
 /* Leaves the bridge as it was found: stopped, with nothing in its FIFO. */
-static void stop(struct whisker_device *device)
+static void whisker_flash_stop(struct whisker_device *device)
 {
     int error = whisker_device_stop(device);
     for (int i = 0; !error && i < DRAIN_POLLS; i++) {
@@ -299,11 +301,11 @@ int main(int argc, char **argv)
     options.settings.batch = FRAMES_BATCH;
     options.settings.transfers = TRANSFERS;
     options.lane_mask = options.settings.lane_mask;
-    int code = read_options(&options, argc, argv);
+    int code = whisker_flash_read_options(&options, argc, argv);
     if (code != 0) {
         return cli_end(PROGRAM, code - 1);
     }
-    if (options.image && (code = read_file(options.image)) != CLI_OK) {
+    if (options.image && (code = whisker_flash_read_file(options.image)) != CLI_OK) {
         return code;
     }
     if (options.image && whisker_gateware_is(image_bytes, image_count)) {
@@ -318,8 +320,8 @@ int main(int argc, char **argv)
     if (error) {
         return cli_fail(PROGRAM, "bridge", error);
     }
-    code = serve(device, &options, &image);
-    stop(device);
+    code = whisker_flash_serve(device, &options, &image);
+    whisker_flash_stop(device);
     whisker_device_close(device);
     return cli_end(PROGRAM, code);
 }

@@ -36,7 +36,7 @@ struct session {
     uint64_t taken; /* ticks told to the simulation */
 };
 
-static void print_help(void)
+static void whisker_log_print_help(void)
 {
     printf("Usage: whisker-log --ring NAME [OPTION...]\n"
            "Reads a ring until its writer closes it; counts frames and logs the records flagged bad.\n\n"
@@ -53,7 +53,7 @@ static void print_help(void)
            WHISKER_FRAME_LANES);
 }
 
-static bool set_option(struct options *options, int option, const char *text)
+static bool whisker_log_set_option(struct options *options, int option, const char *text)
 {
     switch (option) {
     case 'r':
@@ -80,7 +80,7 @@ static bool set_option(struct options *options, int option, const char *text)
 }
 
 /* Returns -1 to go on, or the exit code. */
-static int parse(int argc, char **argv, struct options *options)
+static int whisker_log_parse(int argc, char **argv, struct options *options)
 {
     static const struct option known[] = {
         {"ring", required_argument, NULL, 'r'},
@@ -95,10 +95,10 @@ static int parse(int argc, char **argv, struct options *options)
     };
     for (int option; (option = getopt_long(argc, argv, "", known, NULL)) != -1;) {
         if (option == 'h') {
-            print_help();
+            whisker_log_print_help();
             return CLI_OK;
         }
-        if (!set_option(options, option, optarg)) {
+        if (!whisker_log_set_option(options, option, optarg)) {
             return CLI_USAGE;
         }
     }
@@ -127,7 +127,7 @@ static void log_bad_records(struct session *session, const struct whisker_frame 
     }
 }
 
-static void count_frame(struct session *session, const struct whisker_frame *frame)
+static void whisker_log_count_frame(struct session *session, const struct whisker_frame *frame)
 {
     struct tally *tally = &session->tally;
     const bool begins = tally->received == 0 || (frame->flags & WHISKER_FRAME_GAP) != 0;
@@ -146,7 +146,7 @@ static void count_frame(struct session *session, const struct whisker_frame *fra
     log_bad_records(session, frame);
 }
 
-static void tell_simulation(struct session *session)
+static void whisker_log_tell_simulation(struct session *session)
 {
     const struct tally *tally = &session->tally;
     if (tally->received > 0 && tally->last_tick + 1 - session->taken >= TAKEN_TICKS) {
@@ -157,7 +157,7 @@ static void tell_simulation(struct session *session)
 
 /* Takes a batch out of the ring. It is copied, so that only frames known to be whole are counted. Returns 0, or why the
  * ring gives nothing more. */
-static int read_batch(struct session *session)
+static int whisker_log_read_batch(struct session *session)
 {
     static struct whisker_frame batch[BATCH];
     const struct whisker_frame *frames;
@@ -173,18 +173,18 @@ static int read_batch(struct session *session)
         return error == WHISKER_ERROR_OVERRUN ? WHISKER_OK : error;
     }
     for (size_t i = 0; i < count; i++) {
-        count_frame(session, &batch[i]);
+        whisker_log_count_frame(session, &batch[i]);
     }
-    tell_simulation(session);
+    whisker_log_tell_simulation(session);
     return WHISKER_OK;
 }
 
 /* Reads to the end of the stream and returns how it ended. */
-static int read_stream(struct session *session)
+static int whisker_log_read_stream(struct session *session)
 {
     while (!cli_stop_wanted()) {
         int error = whisker_reader_wait(session->reader, WAIT_MS);
-        error = error ? error : read_batch(session);
+        error = error ? error : whisker_log_read_batch(session);
         if (error && error != WHISKER_ERROR_TIMEOUT) {
             return error;
         }
@@ -192,7 +192,7 @@ static int read_stream(struct session *session)
     return WHISKER_OK;
 }
 
-static bool write_summary(const char *path, const struct tally *tally)
+static bool whisker_log_write_summary(const char *path, const struct tally *tally)
 {
     FILE *file = path ? fopen(path, "w") : NULL;
     if (!file) {
@@ -208,13 +208,13 @@ static bool write_summary(const char *path, const struct tally *tally)
     return fclose(file) == 0 && written;
 }
 
-static int fail_file(const char *path)
+static int whisker_log_fail_file(const char *path)
 {
     fprintf(stderr, PROGRAM ": %s: %s; choose a path that can be written\n", path, strerror(errno));
     return CLI_FAILED;
 }
 
-static void print_ring(const struct whisker_reader *reader, const char *name)
+static void whisker_log_print_ring(const struct whisker_reader *reader, const char *name)
 {
     struct whisker_reader_info info;
     whisker_reader_info(reader, &info);
@@ -227,7 +227,7 @@ static void print_ring(const struct whisker_reader *reader, const char *name)
     fflush(stdout);
 }
 
-static int follow(struct session *session)
+static int whisker_log_follow(struct session *session)
 {
     const struct options *options = session->options;
     const int error =
@@ -235,13 +235,13 @@ static int follow(struct session *session)
     if (error) {
         return cli_fail_ring(PROGRAM, options->ring, error);
     }
-    print_ring(session->reader, options->ring);
+    whisker_log_print_ring(session->reader, options->ring);
     if (follower_open(&session->follower, options->socket, "log") != 0) {
         fprintf(stderr, PROGRAM ": %s: %s; start the simulation with this --socket\n", options->socket,
                 strerror(errno));
         return CLI_FAILED;
     }
-    const int end = read_stream(session);
+    const int end = whisker_log_read_stream(session);
     if (session->tally.received > 0) {
         follower_taken(&session->follower, session->tally.last_tick);
     }
@@ -255,16 +255,16 @@ static int log_ring(struct session *session)
     if (options->bad) {
         session->bad = fopen(options->bad, "w");
         if (!session->bad) {
-            return fail_file(options->bad);
+            return whisker_log_fail_file(options->bad);
         }
         fputs("lane,tick,code,errors\n", session->bad);
     }
-    int result = follow(session);
+    int result = whisker_log_follow(session);
     if (session->bad && (ferror(session->bad) | fclose(session->bad)) != 0) {
-        result = fail_file(options->bad);
+        result = whisker_log_fail_file(options->bad);
     }
-    if (!write_summary(options->summary, &session->tally)) {
-        result = fail_file(options->summary);
+    if (!whisker_log_write_summary(options->summary, &session->tally)) {
+        result = whisker_log_fail_file(options->summary);
     }
     return result;
 }
@@ -272,7 +272,7 @@ static int log_ring(struct session *session)
 int main(int argc, char **argv)
 {
     struct options options = {.lanes = WHISKER_FRAME_LANES, .wait_s = 10, .owner = WHISKER_RING_NO_OWNER};
-    const int parsed = parse(argc, argv, &options);
+    const int parsed = whisker_log_parse(argc, argv, &options);
     if (parsed >= 0) {
         return cli_end(PROGRAM, parsed);
     }

@@ -9,7 +9,7 @@
 #define LIST_MAX 32
 
 /* One line per bridge: serial number, place, state. */
-static int list_bridges(void)
+static int whiskerd_list_bridges(void)
 {
     struct whisker_device_info list[LIST_MAX];
     const int count = whisker_device_list(list, LIST_MAX);
@@ -32,5 +32,5 @@ int main(int argc, char **argv)
     }
     daemon_log_begin(options.verbose);
     cli_catch_signals();
-    return options.list ? cli_end(DAEMON_PROGRAM, list_bridges()) : daemon_run(&options);
+    return options.list ? cli_end(DAEMON_PROGRAM, whiskerd_list_bridges()) : daemon_run(&options);
 }

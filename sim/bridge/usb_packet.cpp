@@ -10,7 +10,7 @@ namespace
 
 constexpr size_t DATA_OVERHEAD = 3; // identifier and CRC-16
 
-std::array<uint16_t, 256> make_crc16_table()
+std::array<uint16_t, 256> usb_packet_make_crc16_table()
 {
     std::array<uint16_t, 256> table{};
     for (unsigned i = 0; i < table.size(); i++) {
@@ -37,7 +37,7 @@ uint8_t usb_crc5(uint16_t eleven_bits)
 
 uint16_t usb_crc16(const uint8_t *bytes, size_t count)
 {
-    static const std::array<uint16_t, 256> table = make_crc16_table();
+    static const std::array<uint16_t, 256> table = usb_packet_make_crc16_table();
     unsigned crc = 0xFFFF;
     for (size_t i = 0; i < count; i++) {
         crc = (crc >> 8) ^ table[(crc ^ bytes[i]) & 0xFFu];

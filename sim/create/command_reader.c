@@ -13,7 +13,7 @@ static const struct opcode {
 #undef OPCODE
 };
 
-static const struct opcode *find(int version, uint8_t code)
+static const struct opcode *command_reader_find(int version, uint8_t code)
 {
     for (size_t i = 0; i < sizeof OPCODES / sizeof OPCODES[0]; i++)
         if (OPCODES[i].code == code && OPCODES[i].versions & version)
@@ -22,7 +22,7 @@ static const struct opcode *find(int version, uint8_t code)
 }
 
 /* Bytes of the command, as far as the bytes there are tell. */
-static size_t length(const struct opcode *opcode, const struct create_reader *reader)
+static size_t command_reader_length(const struct opcode *opcode, const struct create_reader *reader)
 {
     switch (opcode->arguments) {
     case CREATE_OI_COUNTED:
@@ -37,11 +37,11 @@ static size_t length(const struct opcode *opcode, const struct create_reader *re
 void create_read_byte(sim_create *create, uint8_t byte)
 {
     struct create_reader *reader = &create->reader;
-    const struct opcode *opcode = find(create->model->version, reader->count ? reader->byte[0] : byte);
+    const struct opcode *opcode = command_reader_find(create->model->version, reader->count ? reader->byte[0] : byte);
     if (!opcode)
         return;
     reader->byte[reader->count++] = byte;
-    if (reader->count < length(opcode, reader))
+    if (reader->count < command_reader_length(opcode, reader))
         return;
     uint8_t command[COMMAND_MAX];
     size_t count = reader->count;

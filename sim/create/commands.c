@@ -1,7 +1,7 @@
 /* What each command does, and from which mode on. */
 #include "create_state.h"
 
-static enum create_oi_mode least_mode(uint8_t opcode)
+static enum create_oi_mode commands_least_mode(uint8_t opcode)
 {
     switch (opcode) {
     case CREATE_OI_OP_RESET:
@@ -22,7 +22,7 @@ static enum create_oi_mode least_mode(uint8_t opcode)
     }
 }
 
-static void obey_mode(sim_create *create, uint8_t opcode)
+static void commands_obey_mode(sim_create *create, uint8_t opcode)
 {
     switch (opcode) {
     case CREATE_OI_OP_RESET:
@@ -44,7 +44,7 @@ static void obey_mode(sim_create *create, uint8_t opcode)
     }
 }
 
-static void obey_drive(sim_create *create, uint8_t opcode, const uint8_t *argument)
+static void commands_obey_drive(sim_create *create, uint8_t opcode, const uint8_t *argument)
 {
     int16_t first = create_int16(argument), second = create_int16(argument + 2);
     if (opcode == CREATE_OI_OP_DRIVE)
@@ -55,7 +55,7 @@ static void obey_drive(sim_create *create, uint8_t opcode, const uint8_t *argume
         create_drive_pwm(create, first, second);
 }
 
-static void obey_script(sim_create *create, uint8_t opcode, const uint8_t *argument)
+static void commands_obey_script(sim_create *create, uint8_t opcode, const uint8_t *argument)
 {
     switch (opcode) {
     case CREATE_OI_OP_SCRIPT:
@@ -81,7 +81,7 @@ static void obey_script(sim_create *create, uint8_t opcode, const uint8_t *argum
     }
 }
 
-static void obey_sensors(sim_create *create, uint8_t opcode, const uint8_t *argument)
+static void commands_obey_sensors(sim_create *create, uint8_t opcode, const uint8_t *argument)
 {
     switch (opcode) {
     case CREATE_OI_OP_SENSORS:
@@ -99,7 +99,7 @@ static void obey_sensors(sim_create *create, uint8_t opcode, const uint8_t *argu
 }
 
 /* Lights, outputs, clocks: taken, and nothing comes of them. */
-static void obey_other(sim_create *create, uint8_t opcode, const uint8_t *argument)
+static void commands_obey_other(sim_create *create, uint8_t opcode, const uint8_t *argument)
 {
     if (opcode == CREATE_OI_OP_BAUD)
         create_line_change_baud(create, argument[0]);
@@ -113,16 +113,16 @@ void create_obey(sim_create *create, const uint8_t *command, size_t count)
 {
     uint8_t opcode = command[0];
     const uint8_t *argument = command + 1;
-    if (create->mode < least_mode(opcode) || (opcode == CREATE_OI_OP_START && create->charge_mah <= 0))
+    if (create->mode < commands_least_mode(opcode) || (opcode == CREATE_OI_OP_START && create->charge_mah <= 0))
         return;
     if (opcode == CREATE_OI_OP_DRIVE || opcode == CREATE_OI_OP_DRIVE_DIRECT || opcode == CREATE_OI_OP_DRIVE_PWM)
-        obey_drive(create, opcode, argument);
+        commands_obey_drive(create, opcode, argument);
     else if (opcode == CREATE_OI_OP_SENSORS || (opcode >= CREATE_OI_OP_STREAM && opcode <= CREATE_OI_OP_STREAM_STATE))
-        obey_sensors(create, opcode, argument);
+        commands_obey_sensors(create, opcode, argument);
     else if (opcode >= CREATE_OI_OP_SCRIPT && opcode <= CREATE_OI_OP_WAIT_EVENT)
-        obey_script(create, opcode, argument);
+        commands_obey_script(create, opcode, argument);
     else if (count == 1 || opcode == CREATE_OI_OP_DEMO)
-        obey_mode(create, opcode);
+        commands_obey_mode(create, opcode);
     else
-        obey_other(create, opcode, argument);
+        commands_obey_other(create, opcode, argument);
 }

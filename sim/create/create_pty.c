@@ -10,13 +10,13 @@
 #include <termios.h>
 #include <unistd.h>
 
-static int refuse(char *error, size_t size, const char *what, const char *remedy)
+static int create_pty_refuse(char *error, size_t size, const char *what, const char *remedy)
 {
     snprintf(error, size, "%s: %s; %s", what, strerror(errno), remedy);
     return -1;
 }
 
-static int open_both(struct create_pty *pty)
+static int create_pty_open_both(struct create_pty *pty)
 {
     struct termios settings;
     pty->master = posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
@@ -30,17 +30,17 @@ static int open_both(struct create_pty *pty)
     return tcsetattr(pty->slave, TCSANOW, &settings);
 }
 
-static int make_link(struct create_pty *pty, const char *link, char *error, size_t size)
+static int create_pty_make_link(struct create_pty *pty, const char *link, char *error, size_t size)
 {
     struct stat there;
     if (strlen(link) >= sizeof pty->link) {
         errno = ENAMETOOLONG;
-        return refuse(error, size, link, "use a shorter path");
+        return create_pty_refuse(error, size, link, "use a shorter path");
     }
     if (lstat(link, &there) == 0 && S_ISLNK(there.st_mode))
         unlink(link);
     if (symlink(pty->path, link))
-        return refuse(error, size, link, "give a path where a link can be made");
+        return create_pty_refuse(error, size, link, "give a path where a link can be made");
     strcpy(pty->link, link);
     return 0;
 }
@@ -48,16 +48,17 @@ static int make_link(struct create_pty *pty, const char *link, char *error, size
 int create_pty_open(struct create_pty *pty, const char *link, char *error, size_t size)
 {
     *pty = (struct create_pty){.master = -1, .slave = -1};
-    int result = open_both(pty) ? refuse(error, size, "no pseudo-terminal can be opened", "is /dev/pts mounted?")
-                 : link         ? make_link(pty, link, error, size)
-                                : 0;
+    int result = create_pty_open_both(pty)
+                     ? create_pty_refuse(error, size, "no pseudo-terminal can be opened", "is /dev/pts mounted?")
+                 : link ? create_pty_make_link(pty, link, error, size)
+                        : 0;
     if (result)
         create_pty_close(pty);
     return result;
 }
 
 /* A link that somebody else has made anew since then stays. */
-static void remove_link(const struct create_pty *pty)
+static void create_pty_remove_link(const struct create_pty *pty)
 {
     char target[sizeof pty->path];
     ssize_t length = readlink(pty->link, target, sizeof target - 1);
@@ -71,7 +72,7 @@ static void remove_link(const struct create_pty *pty)
 void create_pty_close(struct create_pty *pty)
 {
     if (pty->link[0])
-        remove_link(pty);
+        create_pty_remove_link(pty);
     if (pty->slave >= 0)
         close(pty->slave);
     if (pty->master >= 0)

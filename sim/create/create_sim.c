@@ -52,7 +52,7 @@ struct emulator {
     uint64_t ticks;
 };
 
-static void print_help(void)
+static void create_sim_print_help(void)
 {
     const char *name, *value, *help;
     printf("Usage: " PROGRAM " [OPTION...]\n"
@@ -74,14 +74,14 @@ static void print_help(void)
            "Exit code: 0 stopped as told, 1 failed, 2 wrong use.\n");
 }
 
-static int complain(int code, const char *text)
+static int create_sim_complain(int code, const char *text)
 {
     fprintf(stderr, PROGRAM ": %s\n", text);
     return code;
 }
 
 /* Adds the robot's own options to the program's. */
-static void list_options(struct option *options)
+static void create_sim_list_options(struct option *options)
 {
     const char *name, *value, *help;
     memcpy(options, OWN, sizeof OWN);
@@ -89,43 +89,43 @@ static void list_options(struct option *options)
         options[OWN_COUNT + i] = (struct option){name, value ? required_argument : no_argument, NULL, ROBOT};
 }
 
-static int set_seed(struct settings *settings, const char *text)
+static int create_sim_set_seed(struct settings *settings, const char *text)
 {
     char *end;
     errno = 0;
     settings->robot.seed = strtoull(text, &end, 10);
     if (errno || end == text || *end || text[0] == '-')
-        return complain(WRONG_USE, "--seed: give a whole number from 0 on");
+        return create_sim_complain(WRONG_USE, "--seed: give a whole number from 0 on");
     return 0;
 }
 
-static int set_model(struct settings *settings, const char *text)
+static int create_sim_set_model(struct settings *settings, const char *text)
 {
     if (strcmp(text, "1") && strcmp(text, "2"))
-        return complain(WRONG_USE, "--model: give 1 or 2");
+        return create_sim_complain(WRONG_USE, "--model: give 1 or 2");
     settings->robot.version = text[0] == '1' ? CREATE_OI_V2 : CREATE_OI_V3;
     return 0;
 }
 
-static int set_robot(struct settings *settings, const char *name, const char *value)
+static int create_sim_set_robot(struct settings *settings, const char *name, const char *value)
 {
     char error[LINE_SIZE] = "--";
     if (sim_create_set(&settings->robot, name, value, error + 2, sizeof error - 2))
-        return complain(WRONG_USE, error);
+        return create_sim_complain(WRONG_USE, error);
     return 0;
 }
 
 /* Returns 0, an exit code, or -1 when all is done. */
-static int set_option(struct settings *settings, int option, const char *name)
+static int create_sim_set_option(struct settings *settings, int option, const char *name)
 {
     switch (option) {
     case HELP:
-        print_help();
+        create_sim_print_help();
         return -1;
     case MODEL:
-        return set_model(settings, optarg);
+        return create_sim_set_model(settings, optarg);
     case SEED:
-        return set_seed(settings, optarg);
+        return create_sim_set_seed(settings, optarg);
     case LINK:
         settings->link = optarg;
         return 0;
@@ -133,26 +133,26 @@ static int set_option(struct settings *settings, int option, const char *name)
         settings->arena = optarg;
         return 0;
     case ROBOT:
-        return set_robot(settings, name, optarg);
+        return create_sim_set_robot(settings, name, optarg);
     default:
-        return complain(WRONG_USE, "no such option, or its value is missing; see --help");
+        return create_sim_complain(WRONG_USE, "no such option, or its value is missing; see --help");
     }
 }
 
-static int read_options(int argc, char **argv, struct settings *settings)
+static int create_sim_read_options(int argc, char **argv, struct settings *settings)
 {
     struct option options[OPTIONS_MAX] = {{0}};
     int option, index = 0, result = 0;
-    list_options(options);
+    create_sim_list_options(options);
     opterr = 0;
     while (!result && (option = getopt_long(argc, argv, "", options, &index)) != -1)
-        result = set_option(settings, option, options[index].name);
+        result = create_sim_set_option(settings, option, options[index].name);
     if (!result && optind < argc)
-        return complain(WRONG_USE, "takes options only; see --help");
+        return create_sim_complain(WRONG_USE, "takes options only; see --help");
     return result;
 }
 
-static sim_world *make_world(const struct settings *settings, char *error, size_t size)
+static sim_world *create_sim_make_world(const struct settings *settings, char *error, size_t size)
 {
     static const char OPEN_FLOOR[] = "size_m 1000 1000\ntile_m 1000\ntexture SMOOTH\nfloor S\n"
                                      "body_radius_m 0.165\nstart 500 500 0\n";
@@ -167,7 +167,7 @@ static sim_world *make_world(const struct settings *settings, char *error, size_
     return world;
 }
 
-static int open_signals(void)
+static int create_sim_open_signals(void)
 {
     sigset_t set;
     sigemptyset(&set);
@@ -177,7 +177,7 @@ static int open_signals(void)
     return signalfd(-1, &set, SFD_CLOEXEC);
 }
 
-static int open_timer(void)
+static int create_sim_open_timer(void)
 {
     const struct itimerspec every = {{0, WAKE_NS}, {0, WAKE_NS}};
     int timer = timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC);
@@ -186,7 +186,7 @@ static int open_timer(void)
     return timer;
 }
 
-static void report_mode(struct emulator *emulator)
+static void create_sim_report_mode(struct emulator *emulator)
 {
     static const char *const NAMES[] = {"off", "passive", "safe", "full"};
     enum create_oi_mode mode = sim_create_mode(emulator->create);
@@ -198,22 +198,22 @@ static void report_mode(struct emulator *emulator)
 }
 
 /* Bytes in, one tick, bytes out. */
-static void step(struct emulator *emulator)
+static void create_sim_step(struct emulator *emulator)
 {
     uint8_t bytes[LINE_SIZE];
     size_t count = create_pty_read(&emulator->pty, bytes, sizeof bytes);
     sim_create_receive(emulator->create, bytes, count);
-    report_mode(emulator);
+    create_sim_report_mode(emulator);
     create_ground_drive(emulator->create, emulator->world);
     sim_world_step(emulator->world);
     create_ground_tick(emulator->create, emulator->world);
     emulator->ticks++;
-    report_mode(emulator);
+    create_sim_report_mode(emulator);
     while ((count = sim_create_take(emulator->create, bytes, sizeof bytes)) > 0)
         create_pty_write(&emulator->pty, bytes, count);
 }
 
-static void run(struct emulator *emulator)
+static void create_sim_run(struct emulator *emulator)
 {
     struct pollfd wake[] = {{emulator->timer, POLLIN, 0}, {emulator->signals, POLLIN, 0}};
     while (poll(wake, 2, -1) > 0 && !wake[1].revents) {
@@ -222,27 +222,27 @@ static void run(struct emulator *emulator)
             continue;
         uint64_t due = wakes * WAKE_NS / (1000000000u / TICKS_PER_S);
         for (uint64_t i = 0; i < due && i < BEHIND_MAX; i++)
-            step(emulator);
+            create_sim_step(emulator);
     }
 }
 
-static int emulate(const struct settings *settings)
+static int create_sim_emulate(const struct settings *settings)
 {
     char error[LINE_SIZE] = "no memory for a robot; free some";
-    struct emulator emulator = {.world = make_world(settings, error, sizeof error)};
+    struct emulator emulator = {.world = create_sim_make_world(settings, error, sizeof error)};
     int result = FAILED;
     emulator.create = emulator.world ? sim_create_new(&settings->robot) : NULL;
     if (emulator.create && !create_pty_open(&emulator.pty, settings->link, error, sizeof error)) {
-        emulator.signals = open_signals();
-        emulator.timer = open_timer();
+        emulator.signals = create_sim_open_signals();
+        emulator.timer = create_sim_open_timer();
         printf("Create %d at %s\n", settings->robot.version == CREATE_OI_V2 ? 1 : 2,
                settings->link ? settings->link : emulator.pty.path);
         fflush(stdout);
-        run(&emulator);
+        create_sim_run(&emulator);
         create_pty_close(&emulator.pty);
         result = 0;
     } else {
-        complain(FAILED, error);
+        create_sim_complain(FAILED, error);
     }
     sim_create_free(emulator.create);
     sim_world_free(emulator.world);
@@ -252,6 +252,6 @@ static int emulate(const struct settings *settings)
 int main(int argc, char **argv)
 {
     struct settings settings = {.robot = sim_create_defaults(CREATE_OI_V2)};
-    int result = read_options(argc, argv, &settings);
-    return result ? (result < 0 ? 0 : result) : emulate(&settings);
+    int result = create_sim_read_options(argc, argv, &settings);
+    return result ? (result < 0 ? 0 : result) : create_sim_emulate(&settings);
 }

@@ -15,7 +15,7 @@ void create_set_mode(sim_create *create, enum create_oi_mode mode)
 }
 
 /* Forward, or backward on a radius of less than the robot's own: then its front may go over the edge. */
-static bool toward_cliff(const sim_create *create)
+static bool modes_toward_cliff(const sim_create *create)
 {
     double forward = (create->wheels.right + create->wheels.left) / 2;
     double turn = fabs(create->wheels.right - create->wheels.left);
@@ -24,7 +24,7 @@ static bool toward_cliff(const sim_create *create)
 
 void create_stay_safe(sim_create *create)
 {
-    bool at_cliff = create->stimuli & CLIFFS && toward_cliff(create);
+    bool at_cliff = create->stimuli & CLIFFS && modes_toward_cliff(create);
     if (create->mode == CREATE_OI_MODE_SAFE && (at_cliff || create->stimuli & (DROPS | SIM_CREATE_CHARGER)))
         create_set_mode(create, CREATE_OI_MODE_PASSIVE);
 }

@@ -33,7 +33,7 @@ struct refusal {
     size_t size;
 };
 
-static int refuse(struct refusal refusal, const char *name, const char *value, const char *remedy)
+static int options_refuse(struct refusal refusal, const char *name, const char *value, const char *remedy)
 {
     snprintf(refusal.text, refusal.size, "%s '%s': %s", name, value, remedy);
     return -1;
@@ -45,7 +45,7 @@ struct sim_create_options sim_create_defaults(int version)
 }
 
 /* Reads a number from low to high that ends at one of the characters; returns where, or NULL. */
-static const char *read_number(const char *text, double low, double high, const char *ends, double *number)
+static const char *options_read_number(const char *text, double low, double high, const char *ends, double *number)
 {
     char *end;
     *number = strtod(text, &end);
@@ -53,26 +53,26 @@ static const char *read_number(const char *text, double low, double high, const 
     return sound && (*end == '\0' || strchr(ends, *end)) ? end : NULL;
 }
 
-static int set_share(double *share, const char *name, const char *value, struct refusal refusal)
+static int options_set_share(double *share, const char *name, const char *value, struct refusal refusal)
 {
     double number;
-    const char *end = read_number(value, 0, 1, "", &number);
+    const char *end = options_read_number(value, 0, 1, "", &number);
     if (!end)
-        return refuse(refusal, name, value, "give a share of the bytes, from 0 to 1");
+        return options_refuse(refusal, name, value, "give a share of the bytes, from 0 to 1");
     *share = number;
     return 0;
 }
 
-static int set_factor(double *factor, const char *name, const char *value, struct refusal refusal)
+static int options_set_factor(double *factor, const char *name, const char *value, struct refusal refusal)
 {
     double number;
-    if (!read_number(value, 1e-3, 1e3, "", &number))
-        return refuse(refusal, name, value, "give a factor from 0.001 to 1000");
+    if (!options_read_number(value, 1e-3, 1e3, "", &number))
+        return options_refuse(refusal, name, value, "give a factor from 0.001 to 1000");
     *factor = number;
     return 0;
 }
 
-static uint32_t find_stimulus(const char *text, size_t length)
+static uint32_t options_find_stimulus(const char *text, size_t length)
 {
     for (size_t i = 0; i < sizeof STIMULI / sizeof STIMULI[0]; i++)
         if (strlen(STIMULI[i].name) == length && strncmp(STIMULI[i].name, text, length) == 0)
@@ -81,31 +81,34 @@ static uint32_t find_stimulus(const char *text, size_t length)
 }
 
 /* START[s][+LENGTH[s]] after the '@'. */
-static bool read_times(const char *text, struct sim_create_event *event)
+static bool options_read_times(const char *text, struct sim_create_event *event)
 {
-    const char *end = read_number(text, 0, LATEST_S, "s+", &event->start_s);
+    const char *end = options_read_number(text, 0, LATEST_S, "s+", &event->start_s);
     event->length_s = EVENT_LENGTH_S;
     if (end && *end == 's')
         end++;
     if (end && *end == '+')
-        end = read_number(end + 1, 0, LATEST_S, "s", &event->length_s);
+        end = options_read_number(end + 1, 0, LATEST_S, "s", &event->length_s);
     if (end && *end == 's')
         end++;
     return end && *end == '\0';
 }
 
-static int add_event(struct sim_create_options *options, const char *name, const char *value, struct refusal refusal)
+static int options_add_event(struct sim_create_options *options, const char *name, const char *value,
+                             struct refusal refusal)
 {
     size_t length = strcspn(value, "@");
-    struct sim_create_event event = {.stimuli = find_stimulus(value, length)};
+    struct sim_create_event event = {.stimuli = options_find_stimulus(value, length)};
     if (options->events == SIM_CREATE_EVENTS_MAX)
-        return refuse(refusal, name, value, "too many events; at most 16 fit");
+        return options_refuse(refusal, name, value, "too many events; at most 16 fit");
     if (!event.stimuli)
-        return refuse(refusal, name, value,
-                      "give bump, bump-left, bump-right, drop-left, drop-right, drop-caster, cliff-left, "
-                      "cliff-front-left, cliff-front-right, cliff-right, virtual-wall, charger or silent, then @START");
-    if (value[length] != '@' || !read_times(value + length + 1, &event))
-        return refuse(refusal, name, value, "give seconds after the start, as in bump-left@3s or silent@10+2.5");
+        return options_refuse(
+            refusal, name, value,
+            "give bump, bump-left, bump-right, drop-left, drop-right, drop-caster, cliff-left, "
+            "cliff-front-left, cliff-front-right, cliff-right, virtual-wall, charger or silent, then @START");
+    if (value[length] != '@' || !options_read_times(value + length + 1, &event))
+        return options_refuse(refusal, name, value,
+                              "give seconds after the start, as in bump-left@3s or silent@10+2.5");
     options->event[options->events++] = event;
     return 0;
 }
@@ -152,7 +155,7 @@ bool sim_create_describe(size_t number, const char **name, const char **value, c
     return true;
 }
 
-static int set_flag(struct sim_create_options *options, enum option option)
+static int options_set_flag(struct sim_create_options *options, enum option option)
 {
     if (option == DROP_REMAINDER)
         options->drop_remainder = true;
@@ -165,22 +168,23 @@ static int set_flag(struct sim_create_options *options, enum option option)
     return 0;
 }
 
-static int set_value(struct sim_create_options *options, enum option option, const char *value, struct refusal refusal)
+static int options_set_value(struct sim_create_options *options, enum option option, const char *value,
+                             struct refusal refusal)
 {
     const char *name = DESCRIPTIONS[option].name;
     switch (option) {
     case OLD_DISTANCE:
-        return set_factor(&options->distance_factor, name, value, refusal);
+        return options_set_factor(&options->distance_factor, name, value, refusal);
     case LOSE_BYTES:
-        return set_share(&options->lose, name, value, refusal);
+        return options_set_share(&options->lose, name, value, refusal);
     case FLIP_BYTES:
-        return set_share(&options->flip, name, value, refusal);
+        return options_set_share(&options->flip, name, value, refusal);
     case EXTRA_BYTES:
-        return set_share(&options->extra, name, value, refusal);
+        return options_set_share(&options->extra, name, value, refusal);
     case LOSE_ORDERS:
-        return set_share(&options->lose_orders, name, value, refusal);
+        return options_set_share(&options->lose_orders, name, value, refusal);
     default:
-        return add_event(options, name, value, refusal);
+        return options_add_event(options, name, value, refusal);
     }
 }
 
@@ -191,8 +195,8 @@ int sim_create_set(struct sim_create_options *options, const char *name, const c
     while (option < OPTIONS && strcmp(DESCRIPTIONS[option].name, name) != 0)
         option++;
     if (option == OPTIONS)
-        return refuse(refusal, name, value ? value : "", "no such option");
+        return options_refuse(refusal, name, value ? value : "", "no such option");
     if ((DESCRIPTIONS[option].value != NULL) != (value != NULL))
-        return refuse(refusal, name, value ? value : "", value ? "takes no value" : "needs a value");
-    return value ? set_value(options, option, value, refusal) : set_flag(options, option);
+        return options_refuse(refusal, name, value ? value : "", value ? "takes no value" : "needs a value");
+    return value ? options_set_value(options, option, value, refusal) : options_set_flag(options, option);
 }

@@ -40,7 +40,7 @@ void create_script_wait(sim_create *create, enum create_wait wait, int target)
 }
 
 /* The events of opcode 158, from 1: what each looks for. A wall, buttons and digital inputs never come. */
-static bool event_is(const sim_create *create, int number)
+static bool script_event_is(const sim_create *create, int number)
 {
     enum {
         DROPS = SIM_CREATE_DROP_LEFT | SIM_CREATE_DROP_RIGHT | SIM_CREATE_DROP_CASTER,
@@ -71,30 +71,30 @@ static bool event_is(const sim_create *create, int number)
 }
 
 /* Has the way since the wait began come to the target, in the target's direction? */
-static bool reached(double way, int target)
+static bool script_reached(double way, int target)
 {
     return target >= 0 ? way >= target : way <= target;
 }
 
-static bool waited(const sim_create *create)
+static bool script_waited(const sim_create *create)
 {
     const struct create_script *script = &create->script;
     switch (script->wait) {
     case WAIT_TIME:
         return create->ticks - script->begun >= (uint64_t)script->target;
     case WAIT_DISTANCE:
-        return reached(create->distance_mm - script->from_mm, script->target);
+        return script_reached(create->distance_mm - script->from_mm, script->target);
     case WAIT_ANGLE:
-        return reached(create->angle_deg - script->from_deg, script->target);
+        return script_reached(create->angle_deg - script->from_deg, script->target);
     case WAIT_EVENT:
-        return script->target < 0 ? !event_is(create, -script->target) : event_is(create, script->target);
+        return script->target < 0 ? !script_event_is(create, -script->target) : script_event_is(create, script->target);
     default:
         return true;
     }
 }
 
 /* Reads on until the script waits, ends, or plays itself again. */
-static void read_on(sim_create *create)
+static void script_read_on(sim_create *create)
 {
     struct create_script *script = &create->script;
     script->restarted = false;
@@ -107,9 +107,9 @@ static void read_on(sim_create *create)
 void create_script_tick(sim_create *create)
 {
     struct create_script *script = &create->script;
-    if (!waited(create))
+    if (!script_waited(create))
         return;
     script->wait = WAIT_NOTHING;
     if (script->running)
-        read_on(create);
+        script_read_on(create);
 }

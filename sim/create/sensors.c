@@ -26,7 +26,7 @@ static const struct group {
 #undef GROUP
 };
 
-static void renew_surroundings(sim_create *create)
+static void sensors_renew_surroundings(sim_create *create)
 {
     uint32_t stimuli = create->stimuli;
     if (create->model->version == CREATE_OI_V3)
@@ -42,7 +42,7 @@ static void renew_surroundings(sim_create *create)
     create->sensor[CREATE_OI_INFRARED] = wall ? VIRTUAL_WALL_CODE : create->model->no_infrared;
 }
 
-static void renew_battery(sim_create *create)
+static void sensors_renew_battery(sim_create *create)
 {
     bool charger = create->stimuli & SIM_CREATE_CHARGER;
     create->sensor[CREATE_OI_CHARGING_STATE] = charger ? CHARGING_FULLY : 0;
@@ -54,7 +54,7 @@ static void renew_battery(sim_create *create)
     create->sensor[CREATE_OI_CAPACITY] = create_battery_capacity();
 }
 
-static void renew_orders(sim_create *create)
+static void sensors_renew_orders(sim_create *create)
 {
     create->sensor[CREATE_OI_MODE] = (int32_t)create->mode + create->options.mode_plus_one;
     create->sensor[CREATE_OI_SONG_NUMBER] = create->songs.number;
@@ -67,7 +67,7 @@ static void renew_orders(sim_create *create)
 }
 
 /* The counters have 16 bits and wrap; how the number is sent sees to it. */
-static void renew_encoders(sim_create *create)
+static void sensors_renew_encoders(sim_create *create)
 {
     double counts_per_mm = CREATE_OI_ENCODER_COUNTS_PER_TURN / (SIM_PI * CREATE_OI_V3_WHEEL_DIAMETER_MM);
     double centre = create->distance_mm - create->encoder_mm;
@@ -80,30 +80,30 @@ void create_renew(sim_create *create)
 {
     create->renewed_mm = create->distance_mm;
     create->renewed_deg = create->angle_deg;
-    renew_surroundings(create);
-    renew_battery(create);
-    renew_orders(create);
-    renew_encoders(create);
+    sensors_renew_surroundings(create);
+    sensors_renew_battery(create);
+    sensors_renew_orders(create);
+    sensors_renew_encoders(create);
 }
 
 /* Whole units from where the last reading ended to now. The rest is kept for the next reading, or forgotten. */
-static int32_t count_since(const sim_create *create, double *read, double now, double factor)
+static int32_t sensors_count_since(const sim_create *create, double *read, double now, double factor)
 {
     double whole = trunc((now - *read) * factor);
     *read = create->options.drop_remainder ? now : *read + whole / factor;
     return (int32_t)fmax(INT16_MIN, fmin(INT16_MAX, whole));
 }
 
-static int32_t value(sim_create *create, uint8_t id)
+static int32_t sensors_value(sim_create *create, uint8_t id)
 {
     if (id == CREATE_OI_DISTANCE)
-        return count_since(create, &create->read_mm, create->renewed_mm, create->options.distance_factor);
+        return sensors_count_since(create, &create->read_mm, create->renewed_mm, create->options.distance_factor);
     if (id == CREATE_OI_ANGLE)
-        return count_since(create, &create->read_deg, create->renewed_deg, create->options.angle_factor);
+        return sensors_count_since(create, &create->read_deg, create->renewed_deg, create->options.angle_factor);
     return create->sensor[id];
 }
 
-static size_t tell_run(sim_create *create, uint8_t first, uint8_t last, uint8_t *to, size_t room)
+static size_t sensors_tell_run(sim_create *create, uint8_t first, uint8_t last, uint8_t *to, size_t room)
 {
     size_t count = 0;
     for (uint8_t id = first; id <= last; id++)
@@ -111,7 +111,7 @@ static size_t tell_run(sim_create *create, uint8_t first, uint8_t last, uint8_t 
     if (count > room)
         return 0;
     for (uint8_t id = first; id <= last; id++) {
-        uint32_t bits = (uint32_t)value(create, id);
+        uint32_t bits = (uint32_t)sensors_value(create, id);
         if (PACKETS[id].bytes == 2)
             *to++ = (uint8_t)(bits >> 8);
         *to++ = (uint8_t)bits;
@@ -123,9 +123,9 @@ size_t create_tell(sim_create *create, uint8_t id, uint8_t *to, size_t room)
 {
     int version = create->model->version;
     if (id <= CREATE_OI_PACKET_MAX && PACKETS[id].versions & version)
-        return tell_run(create, id, id, to, room);
+        return sensors_tell_run(create, id, id, to, room);
     for (size_t i = 0; i < sizeof GROUPS / sizeof GROUPS[0]; i++)
         if (GROUPS[i].id == id && GROUPS[i].versions & version)
-            return tell_run(create, GROUPS[i].first, GROUPS[i].last, to, room);
+            return sensors_tell_run(create, GROUPS[i].first, GROUPS[i].last, to, room);
     return 0;
 }

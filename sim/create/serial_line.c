@@ -33,28 +33,28 @@ void create_line_change_baud(sim_create *create, uint8_t code)
     create->line.change_at = create->ticks + CREATE_OI_BAUD_WAIT_MS * TICKS_PER_S / 1000;
 }
 
-static bool happens(struct sim_rng *rng, double share)
+static bool serial_line_happens(struct sim_rng *rng, double share)
 {
     return share > 0 && sim_rng_uniform(rng) < share;
 }
 
-static void leave(struct create_line *line, uint8_t byte)
+static void serial_line_leave(struct create_line *line, uint8_t byte)
 {
     if (line->left_count < sizeof line->left)
         line->left[line->left_count++] = byte;
 }
 
-static void pass(sim_create *create, uint8_t byte)
+static void serial_line_pass(sim_create *create, uint8_t byte)
 {
     const struct sim_create_options *options = &create->options;
     struct sim_rng *rng = &create->line.out_rng;
-    if (create->stimuli & SIM_CREATE_SILENT || happens(rng, options->lose))
+    if (create->stimuli & SIM_CREATE_SILENT || serial_line_happens(rng, options->lose))
         return;
-    if (happens(rng, options->flip))
+    if (serial_line_happens(rng, options->flip))
         byte = (uint8_t)(byte ^ 1u << (sim_rng_next(rng) >> 61));
-    leave(&create->line, byte);
-    if (happens(rng, options->extra))
-        leave(&create->line, (uint8_t)(sim_rng_next(rng) >> 56));
+    serial_line_leave(&create->line, byte);
+    if (serial_line_happens(rng, options->extra))
+        serial_line_leave(&create->line, (uint8_t)(sim_rng_next(rng) >> 56));
 }
 
 void create_line_tick(sim_create *create)
@@ -67,7 +67,7 @@ void create_line_tick(sim_create *create)
         line->change_at = 0;
     }
     for (line->credit += line->baud; sent < line->count && line->credit >= byte_costs; line->credit -= byte_costs)
-        pass(create, line->waiting[sent++]);
+        serial_line_pass(create, line->waiting[sent++]);
     line->count -= sent;
     line->frame -= sent < line->frame ? sent : line->frame;
     memmove(line->waiting, line->waiting + sent, line->count);
@@ -77,5 +77,6 @@ void create_line_tick(sim_create *create)
 
 bool create_line_arrives(sim_create *create)
 {
-    return !(create->stimuli & SIM_CREATE_SILENT) && !happens(&create->line.in_rng, create->options.lose_orders);
+    return !(create->stimuli & SIM_CREATE_SILENT) &&
+           !serial_line_happens(&create->line.in_rng, create->options.lose_orders);
 }

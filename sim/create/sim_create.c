@@ -61,7 +61,7 @@ void sim_create_receive(sim_create *create, const uint8_t *bytes, size_t count)
             create_read_byte(create, bytes[i]);
 }
 
-static uint32_t stimuli_now(const sim_create *create, uint32_t stimuli)
+static uint32_t sim_create_stimuli_now(const sim_create *create, uint32_t stimuli)
 {
     double now_s = (double)create->ticks / TICKS_PER_S;
     for (size_t i = 0; i < create->options.events; i++) {
@@ -75,7 +75,7 @@ static uint32_t stimuli_now(const sim_create *create, uint32_t stimuli)
 void sim_create_tick(sim_create *create, const struct sim_create_motion *motion)
 {
     create->ticks++;
-    create->stimuli = stimuli_now(create, motion->stimuli);
+    create->stimuli = sim_create_stimuli_now(create, motion->stimuli);
     create->distance_mm = motion->distance_m * MM_PER_M;
     create->angle_deg = motion->angle_rad / SIM_DEGREE;
     create_battery_tick(create);

@@ -38,7 +38,7 @@ void dspic_free(struct dspic *chip)
     free(chip);
 }
 
-void chip_throw_out(struct dspic *chip, uint16_t cause)
+void dspic_chip_throw_out(struct dspic *chip, uint16_t cause)
 {
     chip->cause = cause;
     longjmp(*chip->unwind, 1);
@@ -46,19 +46,19 @@ void chip_throw_out(struct dspic *chip, uint16_t cause)
 
 void dspic_reset(struct dspic *chip, uint16_t cause)
 {
-    chip_throw_out(chip, cause);
+    dspic_chip_throw_out(chip, cause);
 }
 
-static void boot(struct dspic *chip)
+static void dspic_boot(struct dspic *chip)
 {
     system_reset(chip, chip->cause);
     chip->in_start = true;
     chip->wiring.start(chip->wiring.context);
     chip->in_start = false;
-    irq_take(chip);
+    dspic_irq_take(chip);
 }
 
-static void lose_power(struct dspic *chip)
+static void dspic_lose_power(struct dspic *chip)
 {
     chip->powered = false;
     for (unsigned e = 0; e < EVENT_OUTSIDE; e++)
@@ -67,7 +67,7 @@ static void lose_power(struct dspic *chip)
         chip->drive[rp] = DSPIC_FLOAT;
 }
 
-void chip_enter(struct dspic *chip, chip_step *first, chip_step *again, uint64_t argument)
+void dspic_chip_enter(struct dspic *chip, chip_step *first, chip_step *again, uint64_t argument)
 {
     jmp_buf here;
     jmp_buf *outer = chip->unwind;
@@ -75,10 +75,10 @@ void chip_enter(struct dspic *chip, chip_step *first, chip_step *again, uint64_t
     chip->unwind = &here;
     if (setjmp(here) != 0) {
         if (chip->cause == 0) {
-            lose_power(chip);
+            dspic_lose_power(chip);
             next = NULL;
         } else {
-            boot(chip);
+            dspic_boot(chip);
             next = again;
         }
     }
@@ -87,21 +87,21 @@ void chip_enter(struct dspic *chip, chip_step *first, chip_step *again, uint64_t
     chip->unwind = outer;
 }
 
-static void run(struct dspic *chip, uint64_t until_fs)
+static void dspic_run(struct dspic *chip, uint64_t until_fs)
 {
-    irq_take(chip);
+    dspic_irq_take(chip);
     while (chip->soon_fs <= until_fs) {
         events_pass(chip, chip->soon_fs);
-        irq_take(chip);
+        dspic_irq_take(chip);
     }
     if (until_fs > chip->now_fs)
         chip->now_fs = until_fs;
 }
 
-static void run_boot(struct dspic *chip, uint64_t argument)
+static void dspic_run_boot(struct dspic *chip, uint64_t argument)
 {
     (void)argument;
-    boot(chip);
+    dspic_boot(chip);
 }
 
 void dspic_power_on(struct dspic *chip, uint64_t now_fs)
@@ -110,18 +110,18 @@ void dspic_power_on(struct dspic *chip, uint64_t now_fs)
         chip->now_fs = now_fs;
     chip->powered = true;
     chip->cause = RCON_POR | RCON_BOR;
-    chip_enter(chip, run_boot, run_boot, 0);
+    dspic_chip_enter(chip, dspic_run_boot, dspic_run_boot, 0);
 }
 
 void dspic_power_off(struct dspic *chip, uint64_t now_fs)
 {
     if (chip->unwind)
-        chip_throw_out(chip, 0);
+        dspic_chip_throw_out(chip, 0);
     dspic_run_until(chip, now_fs);
-    lose_power(chip);
+    dspic_lose_power(chip);
 }
 
-static void run_dark(struct dspic *chip, uint64_t until_fs)
+static void dspic_run_dark(struct dspic *chip, uint64_t until_fs)
 {
     while (!chip->powered && chip->due_fs[EVENT_OUTSIDE] <= until_fs) {
         if (chip->due_fs[EVENT_OUTSIDE] > chip->now_fs)
@@ -133,9 +133,9 @@ static void run_dark(struct dspic *chip, uint64_t until_fs)
 void dspic_run_until(struct dspic *chip, uint64_t until_fs)
 {
     do {
-        run_dark(chip, until_fs);
+        dspic_run_dark(chip, until_fs);
         if (chip->powered)
-            chip_enter(chip, run, run, until_fs);
+            dspic_chip_enter(chip, dspic_run, dspic_run, until_fs);
     } while (!chip->powered && chip->due_fs[EVENT_OUTSIDE] <= until_fs);
     if (until_fs > chip->now_fs)
         chip->now_fs = until_fs;
@@ -156,11 +156,11 @@ void dspic_input(struct dspic *chip, unsigned rp, bool level, uint64_t now_fs)
     if (!chip->powered)
         return;
     spi_input(chip, rp, level);
-    const uint16_t edges = *sfr(chip, INTCON2);
+    const uint16_t edges = *dspic_chip_sfr(chip, INTCON2);
     if (pin_input_field(chip, RPINR0, 8u) == rp && level != (bool)(edges & INTCON2_INT1EP))
-        irq_raise(chip, IRQ_INT1);
+        dspic_irq_raise(chip, IRQ_INT1);
     if (pin_input_field(chip, RPINR1, 0) == rp && level != (bool)(edges & INTCON2_INT2EP))
-        irq_raise(chip, IRQ_INT2);
+        dspic_irq_raise(chip, IRQ_INT2);
 }
 
 uint64_t dspic_busy_fs(const struct dspic *chip)

@@ -96,13 +96,13 @@ struct dspic {
 uint16_t registers_read(struct dspic *chip, unsigned address);
 void registers_write(struct dspic *chip, unsigned address, uint16_t value);
 
-static inline uint16_t *sfr(struct dspic *chip, unsigned address)
+static inline uint16_t *dspic_chip_sfr(struct dspic *chip, unsigned address)
 {
     return &chip->sfr[address / 2u];
 }
 
 /* True if at most so many cycles have passed since the latest step of an unlock sequence; notes this one. */
-static inline bool key_in_time(struct dspic *chip, unsigned cycles)
+static inline bool dspic_chip_key_in_time(struct dspic *chip, unsigned cycles)
 {
     const bool in_time = chip->now_fs - chip->key_fs <= cycles * chip->cycle_fs;
     chip->key_fs = chip->now_fs;
@@ -112,12 +112,12 @@ static inline bool key_in_time(struct dspic *chip, unsigned cycles)
 /* dspic.c */
 typedef void chip_step(struct dspic *chip, uint64_t argument);
 /* Runs a step that may run firmware; a reset within it boots the chip and goes on in `again`. */
-void chip_enter(struct dspic *chip, chip_step *first, chip_step *again, uint64_t argument);
+void dspic_chip_enter(struct dspic *chip, chip_step *first, chip_step *again, uint64_t argument);
 /* Leaves the running firmware, wherever it is: a reset (cause RCON_*) or the end of the supply (0). */
-void chip_throw_out(struct dspic *chip, uint16_t cause);
+void dspic_chip_throw_out(struct dspic *chip, uint16_t cause);
 
 /* events.c */
-void plan_event(struct dspic *chip, enum event event, uint64_t at_fs);
+void dspic_plan_event(struct dspic *chip, enum event event, uint64_t at_fs);
 void event_handle(struct dspic *chip, enum event event);
 /* Lets everything happen that is due up to `until_fs`, interrupts apart. */
 void events_pass(struct dspic *chip, uint64_t until_fs);
@@ -127,8 +127,8 @@ void dspic_spend(struct dspic *chip, uint64_t cycles);
 void dspic_stall(struct dspic *chip, uint64_t until_fs);
 
 /* interrupts.c */
-void irq_raise(struct dspic *chip, unsigned irq); /* sets its flag and starts its DMA */
-void irq_take(struct dspic *chip);                /* takes all that may be taken now */
+void dspic_irq_raise(struct dspic *chip, unsigned irq); /* sets its flag and starts its DMA */
+void dspic_irq_take(struct dspic *chip);                /* takes all that may be taken now */
 
 /* spi.c */
 void spi_wrote(struct dspic *chip, unsigned n, unsigned address, uint16_t old);
@@ -161,8 +161,8 @@ void system_clock(struct dspic *chip);
 bool system_runs_on_pll(const struct dspic *chip);
 void system_pll_event(struct dspic *chip);
 void system_wake(struct dspic *chip); /* from idle, if it is */
-void watchdog_restart(struct dspic *chip);
-void watchdog_event(struct dspic *chip);
+void dspic_watchdog_restart(struct dspic *chip);
+void dspic_watchdog_event(struct dspic *chip);
 
 /* flash.c */
 void flash_wrote(struct dspic *chip, unsigned address, uint16_t old);

@@ -1,14 +1,14 @@
 /* Events and time: what happens by itself, in its order. */
 #include "dspic_chip.h"
 
-void plan_event(struct dspic *chip, enum event event, uint64_t at_fs)
+void dspic_plan_event(struct dspic *chip, enum event event, uint64_t at_fs)
 {
     chip->due_fs[event] = at_fs;
     if (at_fs < chip->soon_fs)
         chip->soon_fs = at_fs;
 }
 
-static enum event next_event(const struct dspic *chip)
+static enum event dspic_events_next_event(const struct dspic *chip)
 {
     enum event next = EVENT_SPI1;
     for (enum event e = EVENT_SPI1; e < EVENTS; e++) {
@@ -41,10 +41,10 @@ void event_handle(struct dspic *chip, enum event event)
         chip->look = true;
         break;
     case EVENT_WATCHDOG:
-        watchdog_event(chip);
+        dspic_watchdog_event(chip);
         break;
     case EVENT_POWER:
-        chip_throw_out(chip, 0);
+        dspic_chip_throw_out(chip, 0);
         break;
     case EVENT_OUTSIDE:
         chip->wiring.outside(chip->wiring.context);
@@ -57,7 +57,7 @@ void event_handle(struct dspic *chip, enum event event)
 void events_pass(struct dspic *chip, uint64_t until_fs)
 {
     while (chip->soon_fs <= until_fs) {
-        const enum event e = next_event(chip);
+        const enum event e = dspic_events_next_event(chip);
         chip->soon_fs = chip->due_fs[e];
         if (chip->soon_fs > until_fs)
             break;
@@ -77,7 +77,7 @@ void dspic_stall(struct dspic *chip, uint64_t until_fs)
 void dspic_spend(struct dspic *chip, uint64_t cycles)
 {
     events_pass(chip, chip->now_fs + cycles * chip->cycle_fs);
-    irq_take(chip);
+    dspic_irq_take(chip);
 }
 
 void dspic_compute(struct dspic *chip, uint64_t cycles)
@@ -98,7 +98,7 @@ uint64_t dspic_cycle_fs(const struct dspic *chip)
 
 void dspic_outside_at(struct dspic *chip, uint64_t at_fs)
 {
-    plan_event(chip, EVENT_OUTSIDE, at_fs);
+    dspic_plan_event(chip, EVENT_OUTSIDE, at_fs);
 }
 
 uint64_t dspic_now_fs(const struct dspic *chip)
@@ -108,10 +108,10 @@ uint64_t dspic_now_fs(const struct dspic *chip)
 
 uint64_t dspic_next_fs(const struct dspic *chip)
 {
-    return chip->due_fs[next_event(chip)];
+    return chip->due_fs[dspic_events_next_event(chip)];
 }
 
 void dspic_cut_power_at(struct dspic *chip, uint64_t at_fs)
 {
-    plan_event(chip, EVENT_POWER, at_fs);
+    dspic_plan_event(chip, EVENT_POWER, at_fs);
 }

@@ -1,13 +1,13 @@
 /* Interrupt controller: flags, enables, priorities, nesting. */
 #include "dspic_chip.h"
 
-static unsigned priority(const struct dspic *chip, unsigned irq)
+static unsigned dspic_interrupts_priority(const struct dspic *chip, unsigned irq)
 {
     return (unsigned)chip->sfr[(IPC0 / 2u) + irq / 4u] >> (4u * (irq % 4u)) & 7u;
 }
 
 /* The flagged and enabled interrupt of the highest priority, the lowest number among equals; IRQ_COUNT: none. */
-static unsigned best(const struct dspic *chip, unsigned *its_priority)
+static unsigned dspic_interrupts_best(const struct dspic *chip, unsigned *its_priority)
 {
     unsigned found = IRQ_COUNT;
     *its_priority = 0;
@@ -15,8 +15,8 @@ static unsigned best(const struct dspic *chip, unsigned *its_priority)
         unsigned ready = (unsigned)chip->sfr[IFS0 / 2u + word] & chip->sfr[IEC0 / 2u + word];
         for (unsigned bit = 0; ready != 0; bit++, ready >>= 1) {
             const unsigned irq = 16u * word + bit;
-            if ((ready & 1u) && priority(chip, irq) > *its_priority) {
-                *its_priority = priority(chip, irq);
+            if ((ready & 1u) && dspic_interrupts_priority(chip, irq) > *its_priority) {
+                *its_priority = dspic_interrupts_priority(chip, irq);
                 found = irq;
             }
         }
@@ -24,7 +24,7 @@ static unsigned best(const struct dspic *chip, unsigned *its_priority)
     return found;
 }
 
-static unsigned threshold(const struct dspic *chip)
+static unsigned dspic_interrupts_threshold(const struct dspic *chip)
 {
     const unsigned masked = (unsigned)chip->sfr[SR / 2u] >> SR_IPL_SHIFT & 7u;
     const bool nests = !(chip->sfr[INTCON1 / 2u] & INTCON1_NSTDIS);
@@ -34,14 +34,14 @@ static unsigned threshold(const struct dspic *chip)
     return chip->level > masked ? (chip->level > held ? chip->level : held) : masked > held ? masked : held;
 }
 
-void irq_raise(struct dspic *chip, unsigned irq)
+void dspic_irq_raise(struct dspic *chip, unsigned irq)
 {
-    *sfr(chip, IFS0 + 2u * (irq / 16u)) |= (uint16_t)(1u << irq % 16u);
+    *dspic_chip_sfr(chip, IFS0 + 2u * (irq / 16u)) |= (uint16_t)(1u << irq % 16u);
     chip->look = true;
     dma_request(chip, irq);
 }
 
-static void serve(struct dspic *chip, unsigned irq, unsigned its)
+static void dspic_interrupts_serve(struct dspic *chip, unsigned irq, unsigned its)
 {
     const unsigned before = chip->level;
     const uint64_t since = chip->now_fs;
@@ -57,15 +57,16 @@ static void serve(struct dspic *chip, unsigned irq, unsigned its)
         chip->busy_fs += chip->now_fs - since;
 }
 
-void irq_take(struct dspic *chip)
+void dspic_irq_take(struct dspic *chip)
 {
     unsigned its;
     bool woke = false;
     if (!chip->look || chip->hung)
         return;
     chip->look = false;
-    for (unsigned irq = best(chip, &its); irq < IRQ_COUNT && its > threshold(chip); irq = best(chip, &its)) {
-        serve(chip, irq, its);
+    for (unsigned irq = dspic_interrupts_best(chip, &its); irq < IRQ_COUNT && its > dspic_interrupts_threshold(chip);
+         irq = dspic_interrupts_best(chip, &its)) {
+        dspic_interrupts_serve(chip, irq, its);
         woke = true;
     }
     if (chip->idle && its > 0) { /* not above the CPU's priority: it wakes and goes on, the interrupt waits (A) */
@@ -80,5 +81,5 @@ void dspic_hold_interrupts(struct dspic *chip, uint16_t cycles)
 {
     dspic_spend(chip, 1u);
     chip->held_fs = chip->now_fs + cycles * chip->cycle_fs;
-    plan_event(chip, EVENT_DISI, chip->held_fs);
+    dspic_plan_event(chip, EVENT_DISI, chip->held_fs);
 }

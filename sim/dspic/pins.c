@@ -13,14 +13,14 @@ bool pin_level(const struct dspic *chip, unsigned field)
     return field < 16u && (chip->inputs >> field & 1u);
 }
 
-static unsigned function_of(const struct dspic *chip, unsigned rp)
+static unsigned dspic_pins_function_of(const struct dspic *chip, unsigned rp)
 {
     return (unsigned)chip->sfr[RPOR0 / 2u + rp / 2u] >> (8u * (rp % 2u)) & 31u;
 }
 
-static enum dspic_drive drive_of(const struct dspic *chip, unsigned rp)
+static enum dspic_drive dspic_pins_drive_of(const struct dspic *chip, unsigned rp)
 {
-    const unsigned function = function_of(chip, rp), mask = 1u << rp;
+    const unsigned function = dspic_pins_function_of(chip, rp), mask = 1u << rp;
     bool level = chip->sfr[LATB / 2u] & mask, driven = !(chip->sfr[TRISB / 2u] & mask);
     if (function == RP_SDO1 || function == RP_SCK1 || function == RP_SDO2)
         spi_drives(chip, function, &driven, &level);
@@ -29,9 +29,9 @@ static enum dspic_drive drive_of(const struct dspic *chip, unsigned rp)
     return level ? DSPIC_HIGH : DSPIC_LOW;
 }
 
-static void refresh(struct dspic *chip, unsigned rp)
+static void dspic_pins_refresh(struct dspic *chip, unsigned rp)
 {
-    const enum dspic_drive now = drive_of(chip, rp);
+    const enum dspic_drive now = dspic_pins_drive_of(chip, rp);
     if (now == chip->drive[rp])
         return;
     chip->drive[rp] = (uint8_t)now;
@@ -43,12 +43,12 @@ void pins_refresh(struct dspic *chip)
 {
     memset(chip->spi_pin, 16, sizeof chip->spi_pin);
     for (unsigned rp = 0; rp < 16u; rp++) {
-        const unsigned function = function_of(chip, rp);
+        const unsigned function = dspic_pins_function_of(chip, rp);
         if (function == RP_SCK1)
             chip->spi_pin[0][0] = (uint8_t)rp;
         else if (function == RP_SDO1 || function == RP_SDO2)
             chip->spi_pin[function == RP_SDO2][1] = (uint8_t)rp;
-        refresh(chip, rp);
+        dspic_pins_refresh(chip, rp);
     }
 }
 
@@ -57,7 +57,7 @@ void pins_of_spi(struct dspic *chip, unsigned n)
 {
     for (unsigned i = 2; i-- > 0;) {
         if (chip->spi_pin[n][i] < 16u)
-            refresh(chip, chip->spi_pin[n][i]);
+            dspic_pins_refresh(chip, chip->spi_pin[n][i]);
     }
 }
 

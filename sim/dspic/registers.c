@@ -1,7 +1,7 @@
 /* The register file: every access takes a cycle, some have side effects. */
 #include "dspic_chip.h"
 
-static bool within(unsigned address, unsigned first, unsigned last)
+static bool dspic_registers_within(unsigned address, unsigned first, unsigned last)
 {
     return address >= first && address <= last;
 }
@@ -27,53 +27,53 @@ uint16_t registers_read(struct dspic *chip, unsigned address)
         return pins;
     }
     default:
-        return *sfr(chip, address);
+        return *dspic_chip_sfr(chip, address);
     }
 }
 
-static void keep_pin_map(struct dspic *chip, unsigned address, uint16_t old)
+static void dspic_registers_keep_pin_map(struct dspic *chip, unsigned address, uint16_t old)
 {
-    if (*sfr(chip, OSCCON) & OSCCON_IOLOCK) {
+    if (*dspic_chip_sfr(chip, OSCCON) & OSCCON_IOLOCK) {
         chip->violations.pins_locked++;
-        *sfr(chip, address) = old;
+        *dspic_chip_sfr(chip, address) = old;
     }
     pins_refresh(chip);
 }
 
-static void wrote(struct dspic *chip, unsigned address, uint16_t old)
+static void dspic_registers_wrote(struct dspic *chip, unsigned address, uint16_t old)
 {
-    if (within(address, SPI1STAT, SPI1BUF))
+    if (dspic_registers_within(address, SPI1STAT, SPI1BUF))
         spi_wrote(chip, 0, address, old);
-    else if (within(address, SPI2STAT, SPI2BUF))
+    else if (dspic_registers_within(address, SPI2STAT, SPI2BUF))
         spi_wrote(chip, 1, address, old);
-    else if (within(address, DMA0CON, DMACS0 - 2u))
+    else if (dspic_registers_within(address, DMA0CON, DMACS0 - 2u))
         dma_wrote(chip, address, old);
-    else if (within(address, TMR1, T3CON))
+    else if (dspic_registers_within(address, TMR1, T3CON))
         timer_wrote(chip, address, old);
-    else if (within(address, RPINR0, RPOR0 + 14u))
-        keep_pin_map(chip, address, old);
-    else if (within(address, TRISB, ODCB))
+    else if (dspic_registers_within(address, RPINR0, RPOR0 + 14u))
+        dspic_registers_keep_pin_map(chip, address, old);
+    else if (dspic_registers_within(address, TRISB, ODCB))
         pins_refresh(chip);
     else if (address == NVMCON || address == NVMKEY)
         flash_wrote(chip, address, old);
-    else if (address == RCON && (*sfr(chip, RCON) ^ old) & RCON_SWDTEN)
-        watchdog_restart(chip);
-    else if (address == SR || within(address, INTCON1, IPC0 + 2u * (IRQ_COUNT / 4u)))
+    else if (address == RCON && (*dspic_chip_sfr(chip, RCON) ^ old) & RCON_SWDTEN)
+        dspic_watchdog_restart(chip);
+    else if (address == SR || dspic_registers_within(address, INTCON1, IPC0 + 2u * (IRQ_COUNT / 4u)))
         chip->look = true;
-    else if ((address == PLLFBD || address == CLKDIV) && *sfr(chip, address) != old)
+    else if ((address == PLLFBD || address == CLKDIV) && *dspic_chip_sfr(chip, address) != old)
         chip->violations.pll_running += system_runs_on_pll(chip);
     else if (address == OSCCON) { /* only byte by byte, behind the unlock sequences */
         chip->violations.unlock++;
-        *sfr(chip, OSCCON) = old;
+        *dspic_chip_sfr(chip, OSCCON) = old;
     }
 }
 
 void registers_write(struct dspic *chip, unsigned address, uint16_t value)
 {
-    const uint16_t old = *sfr(chip, address);
+    const uint16_t old = *dspic_chip_sfr(chip, address);
     const unsigned target = address == PORTB ? LATB : address;
-    *sfr(chip, target) = value;
-    wrote(chip, target, old);
+    *dspic_chip_sfr(chip, target) = value;
+    dspic_registers_wrote(chip, target, old);
 }
 
 uint16_t dspic_sfr_read(struct dspic *chip, uint16_t address)
@@ -84,7 +84,7 @@ uint16_t dspic_sfr_read(struct dspic *chip, uint16_t address)
 }
 
 /* What the firmware computes before this write takes its time first. */
-static void compute_first(struct dspic *chip, uint16_t address)
+static void dspic_registers_compute_first(struct dspic *chip, uint16_t address)
 {
     if (address != chip->computed_for)
         return;
@@ -95,29 +95,29 @@ static void compute_first(struct dspic *chip, uint16_t address)
 
 void dspic_sfr_write(struct dspic *chip, uint16_t address, uint16_t value)
 {
-    compute_first(chip, address);
+    dspic_registers_compute_first(chip, address);
     registers_write(chip, address, value);
     dspic_spend(chip, 1u);
 }
 
 void dspic_sfr_modify(struct dspic *chip, uint16_t address, uint16_t mask, uint16_t value)
 {
-    compute_first(chip, address);
-    registers_write(chip, address, (uint16_t)((*sfr(chip, address) & ~mask) | value));
+    dspic_registers_compute_first(chip, address);
+    registers_write(chip, address, (uint16_t)((*dspic_chip_sfr(chip, address) & ~mask) | value));
     dspic_spend(chip, 1u);
 }
 
-static void osccon_high(struct dspic *chip, uint8_t value)
+static void dspic_registers_osccon_high(struct dspic *chip, uint8_t value)
 {
-    uint16_t *osccon = sfr(chip, OSCCON);
+    uint16_t *osccon = dspic_chip_sfr(chip, OSCCON);
     *osccon = (uint16_t)((*osccon & ~(7u << OSCCON_NOSC_SHIFT)) | (value & 7u) << OSCCON_NOSC_SHIFT);
 }
 
 enum { SWITCH_CYCLES = 10 }; /* (C) */
 
-static void osccon_low(struct dspic *chip, uint8_t value)
+static void dspic_registers_osccon_low(struct dspic *chip, uint8_t value)
 {
-    uint16_t *osccon = sfr(chip, OSCCON);
+    uint16_t *osccon = dspic_chip_sfr(chip, OSCCON);
     const bool was_locked = *osccon & OSCCON_IOLOCK;
     chip->pins_were_locked |= was_locked;
     *osccon = (uint16_t)((*osccon & ~(OSCCON_OSWEN | OSCCON_IOLOCK)) | (value & (OSCCON_OSWEN | OSCCON_IOLOCK)));
@@ -126,18 +126,18 @@ static void osccon_low(struct dspic *chip, uint8_t value)
     if (!(*osccon & OSCCON_OSWEN))
         return;
     if ((*osccon >> OSCCON_NOSC_SHIFT & 7u) != OSC_FRC_PLL) /* the plain oscillator runs already */
-        plan_event(chip, EVENT_PLL, chip->now_fs + SWITCH_CYCLES * chip->cycle_fs);
+        dspic_plan_event(chip, EVENT_PLL, chip->now_fs + SWITCH_CYCLES * chip->cycle_fs);
     else if (chip->pll_failed < chip->parameters.pll_failures)
         chip->pll_failed++;
     else
-        plan_event(chip, EVENT_PLL, chip->now_fs + chip->parameters.pll_lock_us * (DSPIC_FS_PER_NS * 1000u));
+        dspic_plan_event(chip, EVENT_PLL, chip->now_fs + chip->parameters.pll_lock_us * (DSPIC_FS_PER_NS * 1000u));
 }
 
 /* One step of an unlock sequence: two keys, then the value, to the same byte in back-to-back instructions (A). True
  * when this is the value. */
-static bool unlock(struct dspic *chip, uint8_t *step, uint8_t value, uint8_t key1, uint8_t key2)
+static bool dspic_registers_unlock(struct dspic *chip, uint8_t *step, uint8_t value, uint8_t key1, uint8_t key2)
 {
-    const uint8_t before = key_in_time(chip, 1u) ? *step : 0u;
+    const uint8_t before = dspic_chip_key_in_time(chip, 1u) ? *step : 0u;
     const bool second = before == 1u && value == key2, first = before < 2u && value == key1;
     *step = second ? 2u : first ? 1u : 0u;
     return before == 2u;
@@ -145,10 +145,11 @@ static bool unlock(struct dspic *chip, uint8_t *step, uint8_t value, uint8_t key
 
 void dspic_byte_write(struct dspic *chip, uint16_t address, uint8_t value)
 {
-    if (address == OSCCON + 1u && unlock(chip, &chip->high_key, value, OSCCON_HIGH_KEY1, OSCCON_HIGH_KEY2))
-        osccon_high(chip, value);
-    else if (address == OSCCON && unlock(chip, &chip->low_key, value, OSCCON_LOW_KEY1, OSCCON_LOW_KEY2))
-        osccon_low(chip, value);
+    if (address == OSCCON + 1u &&
+        dspic_registers_unlock(chip, &chip->high_key, value, OSCCON_HIGH_KEY1, OSCCON_HIGH_KEY2))
+        dspic_registers_osccon_high(chip, value);
+    else if (address == OSCCON && dspic_registers_unlock(chip, &chip->low_key, value, OSCCON_LOW_KEY1, OSCCON_LOW_KEY2))
+        dspic_registers_osccon_low(chip, value);
     dspic_spend(chip, 1u);
 }
 

@@ -5,27 +5,27 @@ enum { STAT = SPI1STAT, CON1 = SPI1CON1, BUF = SPI1BUF, OFFSET = SPI2STAT - SPI1
 
 static const uint8_t DONE_IRQ[] = {IRQ_SPI1, IRQ_SPI2}, ERROR_IRQ[] = {IRQ_SPI1_ERROR, IRQ_SPI2_ERROR};
 
-static uint16_t *reg(struct dspic *chip, unsigned n, unsigned address)
+static uint16_t *dspic_spi_reg(struct dspic *chip, unsigned n, unsigned address)
 {
-    return sfr(chip, address + n * OFFSET);
+    return dspic_chip_sfr(chip, address + n * OFFSET);
 }
 
-static uint16_t con1(const struct dspic *chip, unsigned n)
+static uint16_t dspic_spi_con1(const struct dspic *chip, unsigned n)
 {
     return chip->sfr[(CON1 + n * OFFSET) / 2u];
 }
 
-static bool enabled(const struct dspic *chip, unsigned n)
+static bool dspic_spi_enabled(const struct dspic *chip, unsigned n)
 {
     return chip->sfr[(STAT + n * OFFSET) / 2u] & SPISTAT_SPIEN;
 }
 
-static unsigned width(const struct dspic *chip, unsigned n)
+static unsigned dspic_spi_width(const struct dspic *chip, unsigned n)
 {
-    return con1(chip, n) & SPICON1_MODE16 ? 16u : 8u;
+    return dspic_spi_con1(chip, n) & SPICON1_MODE16 ? 16u : 8u;
 }
 
-static unsigned divider(uint16_t control)
+static unsigned dspic_spi_divider(uint16_t control)
 {
     static const unsigned PRIMARY[] = {64, 16, 4, 1};
     const unsigned secondary = 8u - ((unsigned)control >> SPICON1_SPRE_SHIFT & 7u);
@@ -33,61 +33,61 @@ static unsigned divider(uint16_t control)
 }
 
 /* Where a slave's /SS comes in; SPI1's is not used as one here. */
-static bool selected(const struct dspic *chip, unsigned n)
+static bool dspic_spi_selected(const struct dspic *chip, unsigned n)
 {
-    if (!(con1(chip, n) & SPICON1_SSEN))
+    if (!(dspic_spi_con1(chip, n) & SPICON1_SSEN))
         return true;
     return n == 1u && !pin_level(chip, pin_input_field(chip, RPINR23, 0));
 }
 
-static void load(struct dspic *chip, unsigned n)
+static void dspic_spi_load(struct dspic *chip, unsigned n)
 {
     struct spi *s = &chip->spi[n];
-    if (*reg(chip, n, STAT) & SPISTAT_SPITBF)
+    if (*dspic_spi_reg(chip, n, STAT) & SPISTAT_SPITBF)
         s->word = s->transmit; /* else the old contents go out again */
-    *reg(chip, n, STAT) &= (uint16_t)~SPISTAT_SPITBF;
-    s->out = (uint16_t)(s->word << (16u - width(chip, n)));
+    *dspic_spi_reg(chip, n, STAT) &= (uint16_t)~SPISTAT_SPITBF;
+    s->out = (uint16_t)(s->word << (16u - dspic_spi_width(chip, n)));
     s->in = 0;
     s->bit = 0;
     s->loaded = true;
 }
 
-static void begin(struct dspic *chip, unsigned n)
+static void dspic_spi_begin(struct dspic *chip, unsigned n)
 {
     struct spi *s = &chip->spi[n];
-    load(chip, n);
-    s->half_fs = divider(con1(chip, n)) * chip->cycle_fs / 2u;
+    dspic_spi_load(chip, n);
+    s->half_fs = dspic_spi_divider(dspic_spi_con1(chip, n)) * chip->cycle_fs / 2u;
     s->shifting = true;
     s->high = false;
-    plan_event(chip, EVENT_SPI1 + n, chip->now_fs + s->half_fs);
+    dspic_plan_event(chip, EVENT_SPI1 + n, chip->now_fs + s->half_fs);
 }
 
-static void shift_out(struct dspic *chip, unsigned n)
+static void dspic_spi_shift_out(struct dspic *chip, unsigned n)
 {
     struct spi *s = &chip->spi[n];
     s->sdo = s->out >> 15 & 1u;
     s->out = (uint16_t)(s->out << 1);
 }
 
-static void end_word(struct dspic *chip, unsigned n)
+static void dspic_spi_end_word(struct dspic *chip, unsigned n)
 {
     struct spi *s = &chip->spi[n];
-    uint16_t *stat = reg(chip, n, STAT);
+    uint16_t *stat = dspic_spi_reg(chip, n, STAT);
     s->loaded = false;
     s->bit = 0;
     if (*stat & (SPISTAT_SPIRBF | SPISTAT_SPIROV)) { /* the word is lost, and all later ones until SPIROV is cleared */
         if (!(*stat & SPISTAT_SPIROV)) {
             *stat |= SPISTAT_SPIROV;
-            irq_raise(chip, ERROR_IRQ[n]);
+            dspic_irq_raise(chip, ERROR_IRQ[n]);
         }
     } else {
         s->receive = s->in;
         *stat |= SPISTAT_SPIRBF;
     }
-    irq_raise(chip, DONE_IRQ[n]);
+    dspic_irq_raise(chip, DONE_IRQ[n]);
 }
 
-static void sample(struct dspic *chip, unsigned n)
+static void dspic_spi_sample(struct dspic *chip, unsigned n)
 {
     struct spi *s = &chip->spi[n];
     const unsigned field = pin_input_field(chip, n == 0 ? RPINR20 : RPINR22, 0);
@@ -101,47 +101,47 @@ void spi_event(struct dspic *chip, unsigned n)
     struct spi *s = &chip->spi[n];
     s->high = !s->high;
     if (s->high)
-        shift_out(chip, n);
+        dspic_spi_shift_out(chip, n);
     pins_of_spi(chip, n);
     if (!s->high)
-        sample(chip, n);
-    if (s->bit < width(chip, n) || s->high) {
-        plan_event(chip, EVENT_SPI1 + n, chip->now_fs + s->half_fs);
+        dspic_spi_sample(chip, n);
+    if (s->bit < dspic_spi_width(chip, n) || s->high) {
+        dspic_plan_event(chip, EVENT_SPI1 + n, chip->now_fs + s->half_fs);
         return;
     }
     s->shifting = false;
-    end_word(chip, n);
-    if (*reg(chip, n, STAT) & SPISTAT_SPITBF && !s->shifting)
-        begin(chip, n);
+    dspic_spi_end_word(chip, n);
+    if (*dspic_spi_reg(chip, n, STAT) & SPISTAT_SPITBF && !s->shifting)
+        dspic_spi_begin(chip, n);
 }
 
-static void slave_edge(struct dspic *chip, unsigned n, bool level)
+static void dspic_spi_slave_edge(struct dspic *chip, unsigned n, bool level)
 {
     struct spi *s = &chip->spi[n];
-    if (level == s->high || !selected(chip, n))
+    if (level == s->high || !dspic_spi_selected(chip, n))
         return;
     s->high = level;
     if (level) {
         if (!s->loaded)
-            load(chip, n);
-        shift_out(chip, n);
+            dspic_spi_load(chip, n);
+        dspic_spi_shift_out(chip, n);
         pins_of_spi(chip, n);
         return;
     }
-    sample(chip, n);
-    if (s->bit < width(chip, n))
+    dspic_spi_sample(chip, n);
+    if (s->bit < dspic_spi_width(chip, n))
         return;
-    end_word(chip, n);
-    if (chip->parameters.slave_prefetch > 1u && *reg(chip, n, STAT) & SPISTAT_SPITBF && !s->loaded)
-        load(chip, n);
+    dspic_spi_end_word(chip, n);
+    if (chip->parameters.slave_prefetch > 1u && *dspic_spi_reg(chip, n, STAT) & SPISTAT_SPITBF && !s->loaded)
+        dspic_spi_load(chip, n);
 }
 
 /* /SS: a word cut short begins again at its first bit. */
-static void select_edge(struct dspic *chip, unsigned n)
+static void dspic_spi_select_edge(struct dspic *chip, unsigned n)
 {
     struct spi *s = &chip->spi[n];
     if (s->loaded && s->bit > 0) {
-        s->out = (uint16_t)(s->word << (16u - width(chip, n)));
+        s->out = (uint16_t)(s->word << (16u - dspic_spi_width(chip, n)));
         s->in = 0;
         s->bit = 0;
     }
@@ -153,53 +153,53 @@ static void select_edge(struct dspic *chip, unsigned n)
 void spi_input(struct dspic *chip, unsigned rp, bool level)
 {
     for (unsigned n = 0; n < 2u; n++) {
-        if (!enabled(chip, n) || con1(chip, n) & SPICON1_MSTEN)
+        if (!dspic_spi_enabled(chip, n) || dspic_spi_con1(chip, n) & SPICON1_MSTEN)
             continue;
-        if (n == 1u && con1(chip, n) & SPICON1_SSEN && pin_input_field(chip, RPINR23, 0) == rp)
-            select_edge(chip, n);
+        if (n == 1u && dspic_spi_con1(chip, n) & SPICON1_SSEN && pin_input_field(chip, RPINR23, 0) == rp)
+            dspic_spi_select_edge(chip, n);
         if (pin_input_field(chip, n == 0 ? RPINR20 : RPINR22, 8u) == rp)
-            slave_edge(chip, n, level);
+            dspic_spi_slave_edge(chip, n, level);
     }
 }
 
 uint16_t spi_read_buffer(struct dspic *chip, unsigned n)
 {
-    *reg(chip, n, STAT) &= (uint16_t)~SPISTAT_SPIRBF;
+    *dspic_spi_reg(chip, n, STAT) &= (uint16_t)~SPISTAT_SPIRBF;
     return chip->spi[n].receive;
 }
 
-static void write_buffer(struct dspic *chip, unsigned n, uint16_t value)
+static void dspic_spi_write_buffer(struct dspic *chip, unsigned n, uint16_t value)
 {
     struct spi *s = &chip->spi[n];
-    if (!enabled(chip, n)) {
+    if (!dspic_spi_enabled(chip, n)) {
         chip->violations.spi_disabled++;
         return;
     }
     if (chip->now_fs - s->enabled_fs < chip->parameters.spi_deaf_cycles * chip->cycle_fs)
         return;
-    if (*reg(chip, n, STAT) & SPISTAT_SPITBF)
+    if (*dspic_spi_reg(chip, n, STAT) & SPISTAT_SPITBF)
         chip->violations.spi_overwrite++;
     s->transmit = value;
-    *reg(chip, n, STAT) |= SPISTAT_SPITBF;
-    if (con1(chip, n) & SPICON1_MSTEN) {
+    *dspic_spi_reg(chip, n, STAT) |= SPISTAT_SPITBF;
+    if (dspic_spi_con1(chip, n) & SPICON1_MSTEN) {
         if (!s->shifting)
-            begin(chip, n);
+            dspic_spi_begin(chip, n);
     } else if (chip->parameters.slave_prefetch > 1u && !s->loaded) {
-        load(chip, n);
+        dspic_spi_load(chip, n);
     }
 }
 
 /* Only SPIROV (cleared) and SPIEN may be written; switching off ends what is under way and empties the buffers. */
-static void write_status(struct dspic *chip, unsigned n, uint16_t old)
+static void dspic_spi_write_status(struct dspic *chip, unsigned n, uint16_t old)
 {
-    uint16_t *stat = reg(chip, n, STAT);
+    uint16_t *stat = dspic_spi_reg(chip, n, STAT);
     const uint16_t keep = old & (SPISTAT_SPIRBF | SPISTAT_SPITBF);
     const uint16_t overflow = *stat & old & SPISTAT_SPIROV;
     const uint16_t enable = *stat & SPISTAT_SPIEN;
     *stat = (uint16_t)(enable | overflow | (enable ? keep : 0u));
     if (!enable) {
         chip->spi[n] = (struct spi){.word = chip->spi[n].word, .receive = chip->spi[n].receive};
-        plan_event(chip, EVENT_SPI1 + n, NEVER);
+        dspic_plan_event(chip, EVENT_SPI1 + n, NEVER);
     }
     if (enable && !(old & SPISTAT_SPIEN))
         chip->spi[n].enabled_fs = chip->now_fs;
@@ -210,12 +210,12 @@ void spi_wrote(struct dspic *chip, unsigned n, unsigned address, uint16_t old)
 {
     const unsigned at = address - n * OFFSET;
     if (at == BUF) {
-        write_buffer(chip, n, *sfr(chip, address));
+        dspic_spi_write_buffer(chip, n, *dspic_chip_sfr(chip, address));
     } else if (at == STAT) {
-        write_status(chip, n, old);
-    } else if (enabled(chip, n)) {
-        chip->violations.spi_settings += *sfr(chip, address) != old;
-        *sfr(chip, address) = old;
+        dspic_spi_write_status(chip, n, old);
+    } else if (dspic_spi_enabled(chip, n)) {
+        chip->violations.spi_settings += *dspic_chip_sfr(chip, address) != old;
+        *dspic_chip_sfr(chip, address) = old;
     }
 }
 
@@ -223,9 +223,9 @@ void spi_drives(const struct dspic *chip, unsigned function, bool *driven, bool 
 {
     const unsigned n = function == RP_SDO2;
     const struct spi *s = &chip->spi[n];
-    const bool master = con1(chip, n) & SPICON1_MSTEN;
-    if (!enabled(chip, n) || (function != RP_SCK1 && con1(chip, n) & SPICON1_DISSDO))
+    const bool master = dspic_spi_con1(chip, n) & SPICON1_MSTEN;
+    if (!dspic_spi_enabled(chip, n) || (function != RP_SCK1 && dspic_spi_con1(chip, n) & SPICON1_DISSDO))
         return;
     *level = function == RP_SCK1 ? s->high : s->sdo;
-    *driven = function == RP_SCK1 ? master : master || selected(chip, n);
+    *driven = function == RP_SCK1 ? master : master || dspic_spi_selected(chip, n);
 }

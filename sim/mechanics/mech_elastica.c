@@ -23,13 +23,13 @@ struct point {
 
 /* Derivative along q = -log(1 - s), which spreads steps by the local diameter: ds = (1 - s) dq. The force on the beam
  * at the origin is force (nu, 1). */
-static struct point derivative(struct point at, double left, double force, double nu)
+static struct point mech_elastica_derivative(struct point at, double left, double force, double nu)
 {
     double moment = force * (nu * at.y - at.x);
     return (struct point){moment / (left * left * left), left * cos(at.angle), left * sin(at.angle)};
 }
 
-static struct point add(struct point a, struct point b, double scale)
+static struct point mech_elastica_add(struct point a, struct point b, double scale)
 {
     return (struct point){a.angle + scale * b.angle, a.x + scale * b.x, a.y + scale * b.y};
 }
@@ -40,12 +40,13 @@ struct mech_bend mech_elastica_bend(double arc, double force, double nu, int ste
     double h = log(1 - arc) / steps; /* negative: from the contact to the base */
     double left = 1 - arc, half = exp(-h / 2);
     for (int i = 0; i < steps; i++) {
-        struct point k1 = derivative(at, left, force, nu);
-        struct point k2 = derivative(add(at, k1, h / 2), left * half, force, nu);
-        struct point k3 = derivative(add(at, k2, h / 2), left * half, force, nu);
+        struct point k1 = mech_elastica_derivative(at, left, force, nu);
+        struct point k2 = mech_elastica_derivative(mech_elastica_add(at, k1, h / 2), left * half, force, nu);
+        struct point k3 = mech_elastica_derivative(mech_elastica_add(at, k2, h / 2), left * half, force, nu);
         left *= half * half;
-        struct point k4 = derivative(add(at, k3, h), left, force, nu);
-        at = add(add(add(add(at, k1, h / 6), k2, h / 3), k3, h / 3), k4, h / 6);
+        struct point k4 = mech_elastica_derivative(mech_elastica_add(at, k3, h), left, force, nu);
+        at = mech_elastica_add(
+            mech_elastica_add(mech_elastica_add(mech_elastica_add(at, k1, h / 6), k2, h / 3), k3, h / 3), k4, h / 6);
     }
     /* Seen from the base: turned by the slope. */
     double slope = -at.angle, c = cos(slope), s = sin(slope);
@@ -54,7 +55,7 @@ struct mech_bend mech_elastica_bend(double arc, double force, double nu, int ste
 }
 
 /* Small deflections: slope at the contact per force. */
-static double softness(double arc)
+static double mech_elastica_softness(double arc)
 {
     double left = 1 - arc;
     return -0.5 + left / 3 + 1 / (6 * left * left);
@@ -64,7 +65,7 @@ bool mech_elastica_at_slope(double x, double slope, double nu, int steps, const 
                             struct mech_bend *bend)
 {
     double arc = from && from->arc > 0 ? from->arc : x;
-    double force = from && from->arc > 0 ? from->force : slope / softness(x);
+    double force = from && from->arc > 0 ? from->force : slope / mech_elastica_softness(x);
     for (int i = 0; i < 40; i++) {
         *bend = mech_elastica_bend(arc, force, nu, steps);
         double ex = x - bend->x, es = slope - bend->slope;
@@ -117,7 +118,7 @@ struct mech_table {
     double node[DISTANCES][SLOPES][VALUES];
 };
 
-static double held(double value, double low, double high)
+static double mech_elastica_held(double value, double low, double high)
 {
     return fmin(fmax(value, low), high);
 }
@@ -130,7 +131,7 @@ struct branch {
 };
 
 /* The table's rows at a distance for four slopes; kept in the hold while they serve. */
-static void fetch(const struct mech_table *table, double x, int first, struct mech_hold *hold)
+static void mech_elastica_fetch(const struct mech_table *table, double x, int first, struct mech_hold *hold)
 {
     if (hold->x == x && hold->first == first)
         return;
@@ -145,11 +146,11 @@ static void fetch(const struct mech_table *table, double x, int first, struct me
                               c.weight[3] * table->node[c.first + 3][first + j][v];
 }
 
-static void interpolate(const struct mech_table *table, double x, double slope, struct mech_hold *hold,
-                        double value[VALUES], double change[VALUES])
+static void mech_elastica_interpolate(const struct mech_table *table, double x, double slope, struct mech_hold *hold,
+                                      double value[VALUES], double change[VALUES])
 {
     struct nav_cubic c = nav_cubic_at(slope / SLOPE_STEP, SLOPES);
-    fetch(table, x, c.first, hold);
+    mech_elastica_fetch(table, x, c.first, hold);
     for (int v = 0; v < VALUES; v++) {
         value[v] = c.weight[0] * hold->row[0][v] + c.weight[1] * hold->row[1][v] + c.weight[2] * hold->row[2][v] +
                    c.weight[3] * hold->row[3][v];
@@ -159,11 +160,11 @@ static void interpolate(const struct mech_table *table, double x, double slope, 
     }
 }
 
-static struct branch branch_at(const struct mech_table *table, double x, double slope, double nu,
-                               struct mech_hold *hold)
+static struct branch mech_elastica_branch_at(const struct mech_table *table, double x, double slope, double nu,
+                                             struct mech_hold *hold)
 {
     double value[VALUES], change[VALUES], f[FIELDS], f_slope[FIELDS], f_nu[FIELDS];
-    interpolate(table, x, slope, hold, value, change);
+    mech_elastica_interpolate(table, x, slope, hold, value, change);
     for (int i = 0; i < FIELDS; i++) {
         const double *c = value + i * POWERS, *d = change + i * POWERS;
         f[i] = c[0] + nu * (c[1] + nu * c[2]);
@@ -184,14 +185,14 @@ static struct branch branch_at(const struct mech_table *table, double x, double 
 }
 
 /* Turns samples at -TABLE_NU, 0, TABLE_NU into coefficients. */
-static void set_node(double *coefficient, const double sample[3])
+static void mech_elastica_set_node(double *coefficient, const double sample[3])
 {
     coefficient[0] = sample[1];
     coefficient[1] = (sample[2] - sample[0]) / (2 * TABLE_NU);
     coefficient[2] = ((sample[2] + sample[0]) / 2 - sample[1]) / (TABLE_NU * TABLE_NU);
 }
 
-static void fill_distance(struct mech_table *table, int i)
+static void mech_elastica_fill_distance(struct mech_table *table, int i)
 {
     double x = LEAST_X + i * X_STEP;
     struct mech_bend near[3] = {{0}};
@@ -209,7 +210,7 @@ static void fill_distance(struct mech_table *table, int i)
             sample[SLIDE][n] = (bend.arc - bend.x) / (bend.slope * bend.slope);
         }
         for (int f = 0; f < FIELDS; f++)
-            set_node(&table->node[i][j][f * POWERS], sample[f]);
+            mech_elastica_set_node(&table->node[i][j][f * POWERS], sample[f]);
     }
 }
 
@@ -217,7 +218,7 @@ mech_table *mech_table_new(void)
 {
     struct mech_table *table = calloc(1, sizeof *table);
     for (int i = 0; table && i < DISTANCES; i++)
-        fill_distance(table, i);
+        mech_elastica_fill_distance(table, i);
     return table;
 }
 
@@ -231,7 +232,7 @@ struct imposed {
     double theta, by_slope, by_nu;
 };
 
-static struct imposed imposed_by(const struct branch *at, const struct mech_whisker *whisker)
+static struct imposed mech_elastica_imposed_by(const struct branch *at, const struct mech_whisker *whisker)
 {
     double soft = 1 / (3 * whisker->kappa), tilt = soft * at->moment;
     if (tilt > whisker->stop)
@@ -240,34 +241,35 @@ static struct imposed imposed_by(const struct branch *at, const struct mech_whis
                             at->theta_nu + soft * at->moment_nu};
 }
 
-static bool slid_off(const struct branch *at, const struct mech_whisker *whisker)
+static bool mech_elastica_slid_off(const struct branch *at, const struct mech_whisker *whisker)
 {
     return at->arc > whisker->length / whisker->cone;
 }
 
 /* Newton's method for the slope at fixed nu. false beyond the fold. */
-static bool solve_slope(const mech_table *table, const struct mech_whisker *whisker, double x, double theta, double nu,
-                        struct mech_hold *hold, struct branch *at)
+static bool mech_elastica_solve_slope(const mech_table *table, const struct mech_whisker *whisker, double x,
+                                      double theta, double nu, struct mech_hold *hold, struct branch *at)
 {
     for (int i = 0; i < 30; i++) {
-        *at = branch_at(table, x, hold->slope, nu, hold);
-        struct imposed imposed = imposed_by(at, whisker);
+        *at = mech_elastica_branch_at(table, x, hold->slope, nu, hold);
+        struct imposed imposed = mech_elastica_imposed_by(at, whisker);
         if (imposed.by_slope <= 0 || hold->slope > LARGEST_SLOPE)
             return false;
         double error = theta - imposed.theta;
         if (fabs(error) < 1e-10)
             return true;
         double move = error / imposed.by_slope;
-        hold->slope = fmax(TINY_SLOPE, hold->slope + held(move, -0.2, 0.2));
+        hold->slope = fmax(TINY_SLOPE, hold->slope + mech_elastica_held(move, -0.2, 0.2));
     }
     return false;
 }
 
 /* The friction ratio at which the contact would stay where it is on the beam, to first order about this state, with the
  * slope following so that theta stays. */
-static double sticking_nu(const struct branch *at, const struct mech_whisker *whisker, double nu, double arc)
+static double mech_elastica_sticking_nu(const struct branch *at, const struct mech_whisker *whisker, double nu,
+                                        double arc)
 {
-    struct imposed imposed = imposed_by(at, whisker);
+    struct imposed imposed = mech_elastica_imposed_by(at, whisker);
     double by_nu = at->arc_nu - at->arc_slope * imposed.by_nu / imposed.by_slope;
     double slid = at->arc - arc;
     if (fabs(by_nu) > 1e-12 && isfinite(by_nu))
@@ -278,31 +280,32 @@ static double sticking_nu(const struct branch *at, const struct mech_whisker *wh
 bool mech_table_moment(const mech_table *table, const struct mech_whisker *whisker, double a, double theta,
                        struct mech_hold *hold, double *moment)
 {
-    double x = held(a / whisker->cone, LEAST_X, LARGEST_X), most = fmin(whisker->friction, TABLE_NU);
+    double x = mech_elastica_held(a / whisker->cone, LEAST_X, LARGEST_X), most = fmin(whisker->friction, TABLE_NU);
     double unit = mech_whisker_bending(whisker) / whisker->cone;
     bool fresh = hold->slope <= 0;
     struct mech_hold now = *hold;
     struct branch at;
     now.slope = fmax(TINY_SLOPE, fresh ? theta : now.slope);
-    now.nu = fresh ? most : held(now.nu, -most, most); /* a fresh contact slides towards the tip */
-    if (!solve_slope(table, whisker, x, theta, now.nu, &now, &at)) {
+    now.nu = fresh ? most : mech_elastica_held(now.nu, -most, most); /* a fresh contact slides towards the tip */
+    if (!mech_elastica_solve_slope(table, whisker, x, theta, now.nu, &now, &at)) {
         now.slope = hold->slope; /* friction towards the tip holds the whisker longest */
         now.nu = most;
-        if (!solve_slope(table, whisker, x, theta, most, &now, &at))
+        if (!mech_elastica_solve_slope(table, whisker, x, theta, most, &now, &at))
             return false;
     }
     /* Sticking is tried first; what friction cannot hold slides at its limit. */
-    double wanted = fresh ? most : held(sticking_nu(&at, whisker, now.nu, hold->arc), -most, most);
+    double wanted =
+        fresh ? most : mech_elastica_held(mech_elastica_sticking_nu(&at, whisker, now.nu, hold->arc), -most, most);
     if (fabs(wanted - now.nu) > 1e-9) {
         struct mech_hold slid = now;
         slid.nu = wanted;
-        if (solve_slope(table, whisker, x, theta, wanted, &slid, &at))
+        if (mech_elastica_solve_slope(table, whisker, x, theta, wanted, &slid, &at))
             now = slid;
-        else if (!solve_slope(table, whisker, x, theta, now.nu, &now, &at))
+        else if (!mech_elastica_solve_slope(table, whisker, x, theta, now.nu, &now, &at))
             return false;
     }
     now.arc = at.arc;
-    if (slid_off(&at, whisker))
+    if (mech_elastica_slid_off(&at, whisker))
         return false;
     *hold = now;
     *moment = unit * at.moment;

@@ -18,20 +18,20 @@ const struct sim_floor_texture *mech_floor_texture(const char *name)
     return NULL;
 }
 
-static double stretched(struct sim_rng *rng)
+static double mech_floor_stretched(struct sim_rng *rng)
 {
     return fmax(LEAST_STRETCH, 1 + SIM_TIP_JITTER * sim_rng_normal(rng));
 }
 
-static double next_node(struct mech_floor *profile, const struct sim_floor_texture *floor)
+static double mech_floor_next_node(struct mech_floor *profile, const struct sim_floor_texture *floor)
 {
     double keep = exp(-1e3 * LATTICE_M / floor->correlation_mm);
     return keep * profile->node[3] + sqrt(1 - keep * keep) * sim_rng_normal(&profile->rng);
 }
 
-static void shift(struct mech_floor *profile, const struct sim_floor_texture *floor)
+static void mech_floor_shift(struct mech_floor *profile, const struct sim_floor_texture *floor)
 {
-    double next = next_node(profile, floor);
+    double next = mech_floor_next_node(profile, floor);
     for (int i = 0; i < 3; i++)
         profile->node[i] = profile->node[i + 1];
     profile->node[3] = next;
@@ -42,9 +42,9 @@ void mech_floor_start(struct mech_floor *profile, const struct sim_floor_texture
     *profile = (struct mech_floor){.rng = rng};
     profile->node[3] = sim_rng_normal(&profile->rng);
     for (int i = 0; i < 3; i++)
-        shift(profile, floor);
+        mech_floor_shift(profile, floor);
     profile->phase = 2 * SIM_PI * sim_rng_uniform(&profile->rng);
-    profile->stretch = stretched(&profile->rng);
+    profile->stretch = mech_floor_stretched(&profile->rng);
 }
 
 void mech_floor_move(struct mech_floor *profile, const struct sim_floor_texture *floor, double distance)
@@ -52,7 +52,7 @@ void mech_floor_move(struct mech_floor *profile, const struct sim_floor_texture 
     profile->fraction += fabs(distance) / LATTICE_M;
     for (int i = 0; profile->fraction >= 1 && i < MOST_NODES; i++) {
         profile->fraction -= 1;
-        shift(profile, floor);
+        mech_floor_shift(profile, floor);
     }
     profile->fraction = fmod(profile->fraction, 1);
     if (floor->weave_wavelength_mm <= 0)
@@ -60,7 +60,7 @@ void mech_floor_move(struct mech_floor *profile, const struct sim_floor_texture 
     profile->phase += 2 * SIM_PI * fabs(distance) * 1e3 / (floor->weave_wavelength_mm * profile->stretch);
     if (profile->phase >= 2 * SIM_PI) {
         profile->phase = fmod(profile->phase, 2 * SIM_PI);
-        profile->stretch = stretched(&profile->rng);
+        profile->stretch = mech_floor_stretched(&profile->rng);
     }
 }
 

@@ -19,13 +19,13 @@ void mech_shaft_start(struct mech_shaft *shaft, const struct mech_whisker *whisk
     mech_basis_of(whisker, &shaft->modes, true, whisker->length, tick_s, &shaft->pinned);
 }
 
-static const struct mech_basis *basis_now(const struct mech_shaft *shaft)
+static const struct mech_basis *mech_shaft_basis_now(const struct mech_shaft *shaft)
 {
     return shaft->at_pin ? &shaft->pinned : &shaft->free;
 }
 
 /* Works the modes out at a place of the shaft and carries what moves over. */
-static void place(struct mech_shaft *shaft, double radius)
+static void mech_shaft_place(struct mech_shaft *shaft, double radius)
 {
     struct mech_basis before = shaft->pinned;
     double moment = before.moment_static * shaft->motion.input;
@@ -35,17 +35,18 @@ static void place(struct mech_shaft *shaft, double radius)
         mech_basis_change(&before, &shaft->pinned, &shaft->motion, moment / shaft->pinned.moment_static);
 }
 
-static void engage(struct mech_shaft *shaft, const struct mech_touch *touch)
+static void mech_shaft_engage(struct mech_shaft *shaft, const struct mech_touch *touch)
 {
     shaft->engaged = true;
     shaft->side = touch->theta < 0 ? -1 : 1;
     shaft->hold = (struct mech_hold){0};
     shaft->input = 0;
-    place(shaft, touch->radius);
+    mech_shaft_place(shaft, touch->radius);
 }
 
 /* Base moment of the static law, not signed; false if the whisker has slipped off. */
-static bool static_moment(struct mech_shaft *shaft, const struct mech_touch *touch, double theta, double *moment)
+static bool mech_shaft_static_moment(struct mech_shaft *shaft, const struct mech_touch *touch, double theta,
+                                     double *moment)
 {
     *moment = 0;
     if (theta <= 0)
@@ -58,7 +59,7 @@ static bool static_moment(struct mech_shaft *shaft, const struct mech_touch *tou
     return true;
 }
 
-static void let_go(struct mech_shaft *shaft)
+static void mech_shaft_let_go(struct mech_shaft *shaft)
 {
     if (shaft->at_pin)
         mech_basis_change(&shaft->pinned, &shaft->free, &shaft->motion, 0);
@@ -68,13 +69,13 @@ static void let_go(struct mech_shaft *shaft)
 
 /* A tick of the modes. The contact pushes only: a pinned whisker that pulls comes free, a free one that reaches the peg
  * is pinned. */
-static void swing(struct mech_shaft *shaft, double input)
+static void mech_shaft_swing(struct mech_shaft *shaft, double input)
 {
     struct mech_motion before = shaft->motion;
-    mech_basis_step(basis_now(shaft), &shaft->motion, shaft->at_pin ? input : 0);
+    mech_basis_step(mech_shaft_basis_now(shaft), &shaft->motion, shaft->at_pin ? input : 0);
     if (!shaft->engaged)
         return;
-    double answer = mech_basis_answer(basis_now(shaft), &shaft->motion);
+    double answer = mech_basis_answer(mech_shaft_basis_now(shaft), &shaft->motion);
     if (shaft->at_pin && shaft->side * answer < 0) {
         mech_basis_change(&shaft->pinned, &shaft->free, &shaft->motion, 0);
         shaft->at_pin = false;
@@ -85,19 +86,19 @@ static void swing(struct mech_shaft *shaft, double input)
     }
 }
 
-static void vibrate(struct mech_shaft *shaft, double input, double turn)
+static void mech_shaft_vibrate(struct mech_shaft *shaft, double input, double turn)
 {
     if (turn != 0)
-        mech_basis_turn(basis_now(shaft), &shaft->motion, turn);
-    swing(shaft, input);
-    shaft->moment = mech_basis_moment(basis_now(shaft), &shaft->motion);
+        mech_basis_turn(mech_shaft_basis_now(shaft), &shaft->motion, turn);
+    mech_shaft_swing(shaft, input);
+    shaft->moment = mech_basis_moment(mech_shaft_basis_now(shaft), &shaft->motion);
     if (shaft->engaged || mech_basis_swing(&shaft->free, &shaft->motion) > MECH_FADED)
         return;
     shaft->motion = (struct mech_motion){{0}, {0}, 0};
     shaft->moment = 0;
 }
 
-static void creep(struct mech_shaft *shaft)
+static void mech_shaft_creep(struct mech_shaft *shaft)
 {
     double elastic = mech_whisker_stopped(&shaft->whisker, shaft->moment * shaft->compliance);
     double share = shaft->tick_s / shaft->whisker.creep_s; /* first order is exact enough for ticks this short */
@@ -106,40 +107,40 @@ static void creep(struct mech_shaft *shaft)
 }
 
 /* The static law's input to the modes; a whisker that slips off lets go. */
-static double push(struct mech_shaft *shaft, const struct mech_touch *touch)
+static double mech_shaft_push(struct mech_shaft *shaft, const struct mech_touch *touch)
 {
     double moment;
-    if (static_moment(shaft, touch, shaft->side * (touch->theta - shaft->creep), &moment))
+    if (mech_shaft_static_moment(shaft, touch, shaft->side * (touch->theta - shaft->creep), &moment))
         return shaft->side * moment / shaft->pinned.moment_static;
     shaft->slipped = true;
-    let_go(shaft);
+    mech_shaft_let_go(shaft);
     return 0;
 }
 
-static bool sound(const struct mech_shaft *shaft, const struct mech_touch *touch)
+static bool mech_shaft_sound(const struct mech_shaft *shaft, const struct mech_touch *touch)
 {
     return touch->touching && touch->radius >= LEAST_RADIUS && touch->radius <= shaft->whisker.length &&
            fabs(touch->theta) <= LARGEST_THETA;
 }
 
 /* Begins, follows and ends contacts; returns the static law's input. */
-static double follow(struct mech_shaft *shaft, const struct mech_touch *touch)
+static double mech_shaft_follow(struct mech_shaft *shaft, const struct mech_touch *touch)
 {
     /* Until the first angle that is not 0 nothing says from which side. */
-    bool touching = sound(shaft, touch) && (shaft->engaged || touch->theta != 0);
+    bool touching = mech_shaft_sound(shaft, touch) && (shaft->engaged || touch->theta != 0);
     if (!touching) {
         shaft->slipped = false;
         if (shaft->engaged)
-            let_go(shaft);
+            mech_shaft_let_go(shaft);
         return 0;
     }
     if (shaft->slipped)
         return 0;
     if (!shaft->engaged)
-        engage(shaft, touch);
+        mech_shaft_engage(shaft, touch);
     else if (fabs(touch->radius - shaft->pinned.s) > PLACE_STEP)
-        place(shaft, touch->radius);
-    return push(shaft, touch);
+        mech_shaft_place(shaft, touch->radius);
+    return mech_shaft_push(shaft, touch);
 }
 
 void mech_shaft_step(struct mech_shaft *shaft, const struct mech_touch *touch)
@@ -147,14 +148,14 @@ void mech_shaft_step(struct mech_shaft *shaft, const struct mech_touch *touch)
     if (shaft->resting && !touch->touching && touch->base_rate == shaft->base_rate)
         return;
     double base_rate = fabs(touch->base_rate) <= LARGEST_RATE ? touch->base_rate : shaft->base_rate;
-    double input = follow(shaft, touch);
+    double input = mech_shaft_follow(shaft, touch);
     if (shaft->level & MECH_VIBRATION)
-        vibrate(shaft, input, base_rate - shaft->base_rate);
+        mech_shaft_vibrate(shaft, input, base_rate - shaft->base_rate);
     else
         shaft->moment = input * shaft->pinned.moment_static;
     shaft->input = input;
     shaft->base_rate = base_rate;
-    creep(shaft);
+    mech_shaft_creep(shaft);
     shaft->resting = !shaft->engaged && !shaft->slipped && shaft->moment == 0 && fabs(shaft->creep) < CREEP_OVER;
     if (shaft->resting)
         shaft->creep = shaft->tilt = 0;

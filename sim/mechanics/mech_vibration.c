@@ -12,7 +12,7 @@ enum {
 };
 
 /* Nodes and weights of Gauss-Legendre quadrature on 0..1: Newton's method on Legendre's polynomial. */
-static void gauss_legendre(double node[MECH_NODES], double weight[MECH_NODES])
+static void mech_vibration_gauss_legendre(double node[MECH_NODES], double weight[MECH_NODES])
 {
     for (int i = 0; i < MECH_NODES; i++) {
         double z = cos(SIM_PI * (i + 0.75) / (MECH_NODES + 0.5)), slope = 1;
@@ -32,7 +32,7 @@ static void gauss_legendre(double node[MECH_NODES], double weight[MECH_NODES])
 }
 
 /* Integral of (v - a)(v - b)/v^4 from a to 1: bending of a cone by a force, v = 1 - s/cone. */
-static double cone_integral(double a, double b)
+static double mech_vibration_cone_integral(double a, double b)
 {
     return (-1 + (a + b) / 2 - a * b / 3) - (-1 / a + (a + b) / (2 * a * a) - b / (3 * a * a));
 }
@@ -41,13 +41,14 @@ double mech_modes_compliance(const struct mech_whisker *whisker, double s, doubl
 {
     double near = fmin(s, t) / whisker->cone, far = fmax(s, t) / whisker->cone;
     double unit = whisker->cone * whisker->cone * whisker->cone / mech_whisker_bending(whisker);
-    return unit * cone_integral(1 - near, 1 - far) + s * t * mech_whisker_compliance(whisker);
+    return unit * mech_vibration_cone_integral(1 - near, 1 - far) + s * t * mech_whisker_compliance(whisker);
 }
 
 typedef double matrix[MECH_NODES][MECH_NODES];
 
 /* Symmetric form of the integral equation: its eigenvalues are 1/omega^2. */
-static void symmetric_form(const struct mech_whisker *whisker, const struct mech_modes *modes, matrix form)
+static void mech_vibration_symmetric_form(const struct mech_whisker *whisker, const struct mech_modes *modes,
+                                          matrix form)
 {
     for (int i = 0; i < MECH_NODES; i++)
         for (int j = 0; j < MECH_NODES; j++)
@@ -55,7 +56,7 @@ static void symmetric_form(const struct mech_whisker *whisker, const struct mech
                 sqrt(modes->mass[i] * modes->mass[j]) * mech_modes_compliance(whisker, modes->node[i], modes->node[j]);
 }
 
-static double node_dot(const double *a, const double *b)
+static double mech_vibration_node_dot(const double *a, const double *b)
 {
     double sum = 0;
     for (int i = 0; i < MECH_NODES; i++)
@@ -64,24 +65,24 @@ static double node_dot(const double *a, const double *b)
 }
 
 /* Gram and Schmidt; the squared length before is the last round's stretch. */
-static void orthonormalise(double block[BLOCK][MECH_NODES], double stretch[BLOCK])
+static void mech_vibration_orthonormalise(double block[BLOCK][MECH_NODES], double stretch[BLOCK])
 {
     for (int k = 0; k < BLOCK; k++) {
         for (int j = 0; j < k; j++) {
-            double share = node_dot(block[k], block[j]);
+            double share = mech_vibration_node_dot(block[k], block[j]);
             for (int i = 0; i < MECH_NODES; i++)
                 block[k][i] -= share * block[j][i];
         }
-        stretch[k] = sqrt(node_dot(block[k], block[k]));
+        stretch[k] = sqrt(mech_vibration_node_dot(block[k], block[k]));
         for (int i = 0; i < MECH_NODES; i++)
             block[k][i] /= stretch[k];
     }
 }
 
-static void lay_mass(const struct mech_whisker *whisker, struct mech_modes *modes)
+static void mech_vibration_lay_mass(const struct mech_whisker *whisker, struct mech_modes *modes)
 {
     double weight[MECH_NODES];
-    gauss_legendre(modes->node, weight);
+    mech_vibration_gauss_legendre(modes->node, weight);
     modes->mass_total = 0;
     for (int i = 0; i < MECH_NODES; i++) {
         modes->node[i] *= whisker->length;
@@ -95,17 +96,17 @@ void mech_modes_of(const struct mech_whisker *whisker, struct mech_modes *modes)
 {
     matrix form;
     double block[BLOCK][MECH_NODES], next[BLOCK][MECH_NODES], stretch[BLOCK];
-    lay_mass(whisker, modes);
-    symmetric_form(whisker, modes, form);
+    mech_vibration_lay_mass(whisker, modes);
+    mech_vibration_symmetric_form(whisker, modes, form);
     for (int k = 0; k < BLOCK; k++)
         for (int i = 0; i < MECH_NODES; i++)
             block[k][i] = cos(SIM_PI * k * (i + 0.5) / MECH_NODES);
     for (int round = 0; round < ROUNDS; round++) {
         for (int k = 0; k < BLOCK; k++)
             for (int i = 0; i < MECH_NODES; i++)
-                next[k][i] = node_dot(form[i], block[k]);
+                next[k][i] = mech_vibration_node_dot(form[i], block[k]);
         memcpy(block, next, sizeof block);
-        orthonormalise(block, stretch);
+        mech_vibration_orthonormalise(block, stretch);
     }
     for (int k = 0; k < MECH_MODES; k++) {
         double first = 0;
@@ -126,12 +127,12 @@ void mech_modes_at(const struct mech_whisker *whisker, const struct mech_modes *
     for (int i = 0; i < MECH_NODES; i++)
         bend[i] = mech_modes_compliance(whisker, s, modes->node[i]) * modes->mass[i];
     for (int k = 0; k < MECH_MODES; k++)
-        shape[k] = modes->omega[k] * modes->omega[k] * node_dot(bend, modes->shape[k]);
+        shape[k] = modes->omega[k] * modes->omega[k] * mech_vibration_node_dot(bend, modes->shape[k]);
 }
 
 typedef double square[MECH_MODES][MECH_MODES];
 
-static double dot(const double a[MECH_MODES], const double b[MECH_MODES])
+static double mech_vibration_dot(const double a[MECH_MODES], const double b[MECH_MODES])
 {
     double sum = 0;
     for (int k = 0; k < MECH_MODES; k++)
@@ -140,7 +141,7 @@ static double dot(const double a[MECH_MODES], const double b[MECH_MODES])
 }
 
 /* Turns rows and columns p and q of a symmetric matrix so that their common element vanishes. false: it did. */
-static bool rotate(square a, square vectors, int p, int q)
+static bool mech_vibration_rotate(square a, square vectors, int p, int q)
 {
     if (a[p][q] * a[p][q] <= 1e-30 * fabs(a[p][p] * a[q][q]))
         return false;
@@ -165,7 +166,7 @@ static bool rotate(square a, square vectors, int p, int q)
 }
 
 /* Eigenvalues and eigenvectors (rows) of a symmetric matrix, by Jacobi's rotations; a is used up. */
-static void eigen(square a, square vectors, double values[MECH_MODES])
+static void mech_vibration_eigen(square a, square vectors, double values[MECH_MODES])
 {
     memset(vectors, 0, sizeof(square));
     for (int k = 0; k < MECH_MODES; k++)
@@ -175,15 +176,15 @@ static void eigen(square a, square vectors, double values[MECH_MODES])
         turned = false;
         for (int p = 0; p < MECH_MODES; p++)
             for (int q = p + 1; q < MECH_MODES; q++)
-                turned = rotate(a, vectors, p, q) || turned;
+                turned = mech_vibration_rotate(a, vectors, p, q) || turned;
     }
     for (int k = 0; k < MECH_MODES; k++)
         values[k] = a[k][k];
 }
 
 /* Free or pinned modes and what they couple to; residual: static compliance and moment the modes leave out. */
-static void set_free(struct mech_basis *basis, const struct mech_modes *modes, const double z[MECH_MODES],
-                     double left_compliance, double left_moment)
+static void mech_vibration_set_free(struct mech_basis *basis, const struct mech_modes *modes,
+                                    const double z[MECH_MODES], double left_compliance, double left_moment)
 {
     memset(basis->mode, 0, sizeof basis->mode);
     for (int k = 0; k < MECH_MODES; k++) {
@@ -198,29 +199,29 @@ static void set_free(struct mech_basis *basis, const struct mech_modes *modes, c
     basis->answer_input = left_compliance;
 }
 
-static void set_pinned(struct mech_basis *basis, const struct mech_modes *modes, const double z[MECH_MODES],
-                       double left_compliance, double left_moment)
+static void mech_vibration_set_pinned(struct mech_basis *basis, const struct mech_modes *modes,
+                                      const double z[MECH_MODES], double left_compliance, double left_moment)
 {
     square stiffness;
     double values[MECH_MODES];
     for (int i = 0; i < MECH_MODES; i++)
         for (int j = 0; j < MECH_MODES; j++)
             stiffness[i][j] = z[i] * z[j] / left_compliance + (i == j ? modes->omega[i] * modes->omega[i] : 0);
-    eigen(stiffness, basis->mode, values);
+    mech_vibration_eigen(stiffness, basis->mode, values);
     for (int k = 0; k < MECH_MODES; k++) {
-        double zk = dot(basis->mode[k], z);
+        double zk = mech_vibration_dot(basis->mode[k], z);
         basis->omega[k] = sqrt(values[k]);
         basis->settle[k] = zk / left_compliance / values[k];
-        basis->moment[k] = dot(basis->mode[k], modes->moment) - left_moment * zk / left_compliance;
+        basis->moment[k] = mech_vibration_dot(basis->mode[k], modes->moment) - left_moment * zk / left_compliance;
         basis->answer[k] = -zk / left_compliance;
-        basis->turn[k] = -dot(basis->mode[k], modes->turn);
+        basis->turn[k] = -mech_vibration_dot(basis->mode[k], modes->turn);
     }
     basis->moment_input = left_moment / left_compliance;
     basis->answer_input = 1 / left_compliance;
 }
 
 /* Damped free motion: x'' + 2 damping omega x' + omega^2 x = 0 over a time. */
-static void step_of(double omega, double damping, double time_s, double step[4])
+static void mech_vibration_step_of(double omega, double damping, double time_s, double step[4])
 {
     double shrink = sqrt(1 - damping * damping), turns = omega * shrink;
     double fade = exp(-damping * omega * time_s), c = fade * cos(turns * time_s), s = fade * sin(turns * time_s);
@@ -230,21 +231,21 @@ static void step_of(double omega, double damping, double time_s, double step[4])
     step[3] = c - damping / shrink * s;
 }
 
-static void set_steps(struct mech_basis *basis, double damping, double tick_s)
+static void mech_vibration_set_steps(struct mech_basis *basis, double damping, double tick_s)
 {
     basis->tick_s = tick_s;
     basis->damping = damping;
     for (int k = 0; k < MECH_MODES; k++) {
         double step[4];
-        step_of(basis->omega[k], damping, tick_s, step);
+        mech_vibration_step_of(basis->omega[k], damping, tick_s, step);
         for (int i = 0; i < 4; i++)
             basis->step[i][k] = step[i];
     }
 }
 
 /* What the place says of both: what a touch there couples to, and what follows. */
-static void set_place(const struct mech_whisker *whisker, const struct mech_modes *modes, double s, bool pinned,
-                      const double z[MECH_MODES], struct mech_basis *basis)
+static void mech_vibration_set_place(const struct mech_whisker *whisker, const struct mech_modes *modes, double s,
+                                     bool pinned, const double z[MECH_MODES], struct mech_basis *basis)
 {
     double left_compliance = mech_modes_compliance(whisker, s, s), whole = left_compliance, left_moment = s;
     for (int k = 0; k < MECH_MODES; k++) {
@@ -255,11 +256,11 @@ static void set_place(const struct mech_whisker *whisker, const struct mech_mode
     left_compliance = fmax(left_compliance, 1e-9 * whole);
     basis->pinned = pinned;
     basis->s = s;
-    (pinned ? set_pinned : set_free)(basis, modes, z, left_compliance, left_moment);
+    (pinned ? mech_vibration_set_pinned : mech_vibration_set_free)(basis, modes, z, left_compliance, left_moment);
     for (int k = 0; k < MECH_MODES; k++)
         basis->lag[k] = basis->settle[k] * 2 * whisker->damping / basis->omega[k];
-    basis->moment_static = basis->moment_input + dot(basis->moment, basis->settle);
-    basis->answer_static = basis->answer_input + dot(basis->answer, basis->settle);
+    basis->moment_static = basis->moment_input + mech_vibration_dot(basis->moment, basis->settle);
+    basis->answer_static = basis->answer_input + mech_vibration_dot(basis->answer, basis->settle);
 }
 
 void mech_basis_of(const struct mech_whisker *whisker, const struct mech_modes *modes, bool pinned, double s,
@@ -267,8 +268,8 @@ void mech_basis_of(const struct mech_whisker *whisker, const struct mech_modes *
 {
     double z[MECH_MODES];
     mech_modes_at(whisker, modes, s, z);
-    set_place(whisker, modes, s, pinned, z, basis);
-    set_steps(basis, whisker->damping, tick_s);
+    mech_vibration_set_place(whisker, modes, s, pinned, z, basis);
+    mech_vibration_set_steps(basis, whisker->damping, tick_s);
 }
 
 void mech_basis_move(const struct mech_whisker *whisker, const struct mech_modes *modes, double s,
@@ -276,14 +277,14 @@ void mech_basis_move(const struct mech_whisker *whisker, const struct mech_modes
 {
     double z[MECH_MODES];
     mech_modes_at(whisker, modes, s, z);
-    set_place(whisker, modes, s, false, z, free);
-    set_place(whisker, modes, s, true, z, pinned);
-    set_steps(pinned, whisker->damping, pinned->tick_s);
+    mech_vibration_set_place(whisker, modes, s, false, z, free);
+    mech_vibration_set_place(whisker, modes, s, true, z, pinned);
+    mech_vibration_set_steps(pinned, whisker->damping, pinned->tick_s);
 }
 
 /* One mode over a time: about the solution that follows the input, settle input - lag rate. */
-static void step_mode(const struct mech_basis *basis, struct mech_motion *motion, int k, const double step[4],
-                      double rate, double input)
+static void mech_vibration_step_mode(const struct mech_basis *basis, struct mech_motion *motion, int k,
+                                     const double step[4], double rate, double input)
 {
     double behind = basis->lag[k] * rate, follow = basis->settle[k] * rate;
     double at = motion->at[k] - basis->settle[k] * motion->input + behind, speed = motion->speed[k] - follow;
@@ -296,7 +297,7 @@ void mech_basis_step(const struct mech_basis *basis, struct mech_motion *motion,
     double rate = (input - motion->input) / basis->tick_s;
     for (int k = 0; k < MECH_MODES; k++) {
         const double step[4] = {basis->step[0][k], basis->step[1][k], basis->step[2][k], basis->step[3][k]};
-        step_mode(basis, motion, k, step, rate, input);
+        mech_vibration_step_mode(basis, motion, k, step, rate, input);
     }
     motion->input = input;
 }
@@ -306,8 +307,8 @@ void mech_basis_step_part(const struct mech_basis *basis, struct mech_motion *mo
     double rate = time_s > 0 ? (input - motion->input) / time_s : 0;
     for (int k = 0; k < MECH_MODES; k++) {
         double step[4];
-        step_of(basis->omega[k], basis->damping, time_s, step);
-        step_mode(basis, motion, k, step, rate, input);
+        mech_vibration_step_of(basis->omega[k], basis->damping, time_s, step);
+        mech_vibration_step_mode(basis, motion, k, step, rate, input);
     }
     motion->input = input;
 }
@@ -324,21 +325,22 @@ void mech_basis_land(const struct mech_basis *free, const struct mech_basis *pin
     mech_basis_step_part(pinned, before, to, (1 - share) * free->tick_s);
 }
 
-static void turn_over(const struct mech_basis *from, const struct mech_basis *to, double value[MECH_MODES])
+static void mech_vibration_turn_over(const struct mech_basis *from, const struct mech_basis *to,
+                                     double value[MECH_MODES])
 {
     double free[MECH_MODES] = {0};
     for (int k = 0; k < MECH_MODES; k++)
         for (int j = 0; j < MECH_MODES; j++)
             free[j] += from->mode[k][j] * value[k];
     for (int k = 0; k < MECH_MODES; k++)
-        value[k] = dot(to->mode[k], free);
+        value[k] = mech_vibration_dot(to->mode[k], free);
 }
 
 void mech_basis_change(const struct mech_basis *from, const struct mech_basis *to, struct mech_motion *motion,
                        double input)
 {
-    turn_over(from, to, motion->at);
-    turn_over(from, to, motion->speed);
+    mech_vibration_turn_over(from, to, motion->at);
+    mech_vibration_turn_over(from, to, motion->speed);
     motion->input = input;
 }
 
@@ -359,12 +361,12 @@ void mech_basis_turn(const struct mech_basis *basis, struct mech_motion *motion,
 
 double mech_basis_moment(const struct mech_basis *basis, const struct mech_motion *motion)
 {
-    return dot(basis->moment, motion->at) + basis->moment_input * motion->input;
+    return mech_vibration_dot(basis->moment, motion->at) + basis->moment_input * motion->input;
 }
 
 double mech_basis_answer(const struct mech_basis *basis, const struct mech_motion *motion)
 {
-    return dot(basis->answer, motion->at) + basis->answer_input * motion->input;
+    return mech_vibration_dot(basis->answer, motion->at) + basis->answer_input * motion->input;
 }
 
 double mech_basis_swing(const struct mech_basis *basis, const struct mech_motion *motion)

@@ -20,7 +20,7 @@ static const struct mech_unknown LIST[UNKNOWNS] = {
     [GAIN] = {"gain", 1.0, 0.95, 1.05},
 };
 
-#define SMALL_TILT 0.03 /* rad: below it the series of dipole_ratio() is good to 0.01 % */
+#define SMALL_TILT 0.03 /* rad: below it the series of mech_whisker_dipole_ratio() is good to 0.01 % */
 
 enum { FOR_BATCH = 0x6d656368 }; /* purpose of the batch's stream of random numbers */
 
@@ -50,7 +50,7 @@ struct mech_whisker mech_whisker_default(void)
     };
 }
 
-static double draw(struct sim_rng *rng, const struct mech_unknown *unknown)
+static double mech_whisker_uniform(struct sim_rng *rng, const struct mech_unknown *unknown)
 {
     return unknown->low + (unknown->high - unknown->low) * sim_rng_uniform(rng);
 }
@@ -59,10 +59,10 @@ struct mech_whisker mech_whisker_draw(uint64_t seed, uint32_t number)
 {
     struct sim_rng rng = sim_rng_stream(seed, FOR_BATCH, number);
     struct mech_whisker whisker = mech_whisker_default();
-    whisker.kappa = draw(&rng, &LIST[KAPPA]);
-    whisker.damping = draw(&rng, &LIST[DAMPING]);
-    whisker.friction = draw(&rng, &LIST[FRICTION]);
-    whisker.creep = draw(&rng, &LIST[CREEP]);
+    whisker.kappa = mech_whisker_uniform(&rng, &LIST[KAPPA]);
+    whisker.damping = mech_whisker_uniform(&rng, &LIST[DAMPING]);
+    whisker.friction = mech_whisker_uniform(&rng, &LIST[FRICTION]);
+    whisker.creep = mech_whisker_uniform(&rng, &LIST[CREEP]);
     double half_range = (LIST[GAIN].high - LIST[GAIN].low) / 2;
     whisker.gain = LIST[GAIN].typical + 0.5 * half_range * sim_rng_normal(&rng);
     return whisker;
@@ -104,7 +104,7 @@ double mech_whisker_stiffness(const struct mech_whisker *whisker, double a)
 /* Field angle of a dipole that hangs `pivot` below its pivot and turns with it, seen `gap` below the magnet's rest
  * (Jackson, Classical Electrodynamics, eq. 5.56, in the plane); about -tilt (1 + 3 pivot/gap)/2 for a small tilt. The
  * sign is dropped: which way the chip counts is a matter of mounting. */
-static double dipole_angle(const struct mech_whisker *whisker, double tilt)
+static double mech_whisker_dipole_angle(const struct mech_whisker *whisker, double tilt)
 {
     double s = sin(tilt), c = cos(tilt);
     double rx = -whisker->pivot * s, ry = whisker->pivot * c - (whisker->pivot + whisker->gap);
@@ -115,11 +115,11 @@ static double dipole_angle(const struct mech_whisker *whisker, double tilt)
 
 double mech_whisker_field(const struct mech_whisker *whisker, double tilt)
 {
-    return whisker->gain * dipole_angle(whisker, tilt);
+    return whisker->gain * mech_whisker_dipole_angle(whisker, tilt);
 }
 
-/* dipole_angle() per tilt, of a tilt whose square is small: its series to the third order. */
-static double dipole_ratio(const struct mech_whisker *whisker, double square)
+/* mech_whisker_dipole_angle() per tilt, of a tilt whose square is small: its series to the third order. */
+static double mech_whisker_dipole_ratio(const struct mech_whisker *whisker, double square)
 {
     double q = whisker->pivot / whisker->gap, first = (1 + 3 * q) / 2;
     double bent = (1 + q) * (1 + 2 * q) / 2, across = 3 * bent - 1.5 * q - 0.5, along = q / 2 + 3 * q * bent + 1.0 / 6;
@@ -131,7 +131,7 @@ void mech_whisker_fields(const struct mech_whisker *whisker, const double tilt[2
 {
     double square = tilt[0] * tilt[0] + tilt[1] * tilt[1], ratio = 0; /* at rest: most whiskers, most of the time */
     if (square > 0 && square < SMALL_TILT * SMALL_TILT) {
-        ratio = dipole_ratio(whisker, square);
+        ratio = mech_whisker_dipole_ratio(whisker, square);
     } else if (square > 0) {
         double whole = sqrt(square);
         ratio = mech_whisker_field(whisker, whole) / whole;

@@ -10,7 +10,7 @@ enum { LAYERS = 256 };
 
 static double edge[LAYERS + 1], height[LAYERS + 1]; /* right edges of the layers, outside in; exp(-x^2/2) there */
 
-static void build_ziggurat(void)
+static void sim_rng_build_ziggurat(void)
 {
     edge[0] = LAYER_AREA / exp(-0.5 * TAIL_FROM * TAIL_FROM);
     edge[1] = TAIL_FROM;
@@ -22,7 +22,7 @@ static void build_ziggurat(void)
 }
 
 /* splitmix64: spreads a seed over the state, as the authors of xoshiro advise. */
-static uint64_t spread(uint64_t *state)
+static uint64_t sim_rng_spread(uint64_t *state)
 {
     *state += 0x9E3779B97F4A7C15u;
     uint64_t z = *state;
@@ -35,16 +35,16 @@ struct sim_rng sim_rng_stream(uint64_t seed, uint32_t purpose, uint32_t index)
 {
     struct sim_rng rng;
     static pthread_once_t once = PTHREAD_ONCE_INIT;
-    pthread_once(&once, build_ziggurat);
+    pthread_once(&once, sim_rng_build_ziggurat);
     uint64_t name = (uint64_t)purpose << 32 | index;
     uint64_t state = seed;
-    state = spread(&state) ^ spread(&name);
+    state = sim_rng_spread(&state) ^ sim_rng_spread(&name);
     for (int i = 0; i < 4; i++)
-        rng.state[i] = spread(&state);
+        rng.state[i] = sim_rng_spread(&state);
     return rng;
 }
 
-static uint64_t rotate(uint64_t x, int by)
+static uint64_t sim_rng_rotate(uint64_t x, int by)
 {
     return x << by | x >> (64 - by);
 }
@@ -52,14 +52,14 @@ static uint64_t rotate(uint64_t x, int by)
 uint64_t sim_rng_next(struct sim_rng *rng)
 {
     uint64_t *s = rng->state;
-    uint64_t result = rotate(s[1] * 5, 7) * 9;
+    uint64_t result = sim_rng_rotate(s[1] * 5, 7) * 9;
     uint64_t t = s[1] << 17;
     s[2] ^= s[0];
     s[3] ^= s[1];
     s[1] ^= s[2];
     s[0] ^= s[3];
     s[2] ^= t;
-    s[3] = rotate(s[3], 45);
+    s[3] = sim_rng_rotate(s[3], 45);
     return result;
 }
 
@@ -69,7 +69,7 @@ double sim_rng_uniform(struct sim_rng *rng)
 }
 
 /* Beyond TAIL_FROM, by Marsaglia's method. */
-static double tail(struct sim_rng *rng)
+static double sim_rng_tail(struct sim_rng *rng)
 {
     double beyond, along;
     do {
@@ -88,7 +88,7 @@ double sim_rng_normal(struct sim_rng *rng)
         if (fabs(x) < edge[layer + 1])
             return x;
         if (layer == 0)
-            return copysign(tail(rng), x);
+            return copysign(sim_rng_tail(rng), x);
         if (height[layer] + sim_rng_uniform(rng) * (height[layer + 1] - height[layer]) < exp(-0.5 * x * x))
             return x;
     }

@@ -5,12 +5,12 @@
 #include "whisker_protocol.h" // whisker_put_u16
 
 /* Slow mode: 7 MHz for 20, but times are the data sheet's own (C): three times the gaps, five times t5. */
-static uint32_t stretched(const struct mlx90333_parameters *p, uint32_t ns, uint32_t slow_mode_factor)
+static uint32_t mlx90333_model_stretched(const struct mlx90333_parameters *p, uint32_t ns, uint32_t slow_mode_factor)
 {
     return (uint32_t)((uint64_t)ns * (p->slow_mode ? slow_mode_factor : 1u) * p->slow_permille / 1000u);
 }
 
-static void start(struct mlx90333 *sensor, uint64_t now_ns)
+static void mlx90333_model_start(struct mlx90333 *sensor, uint64_t now_ns)
 {
     sensor->awake_ns = now_ns + (uint64_t)sensor->parameters.startup_ns * sensor->parameters.slow_permille / 1000u;
     sensor->reset_due = false;
@@ -25,22 +25,22 @@ void mlx90333_power_on(struct mlx90333 *sensor, uint64_t now_ns, const struct ml
     memset(sensor, 0, sizeof *sensor);
     sensor->parameters = *parameters;
     const struct mlx90333_parameters *p = &sensor->parameters;
-    sensor->t1 = stretched(p, MLX90333_T1_NS, 3);
-    sensor->t2 = stretched(p, MLX90333_T2_NS, 3);
-    sensor->t4 = stretched(p, MLX90333_T4_NS, 3);
-    sensor->t5 = stretched(p, MLX90333_T5_NS, 5);
-    sensor->t6 = stretched(p, MLX90333_T6_NS, 3);
-    sensor->t7 = stretched(p, MLX90333_T7_NS, 3);
+    sensor->t1 = mlx90333_model_stretched(p, MLX90333_T1_NS, 3);
+    sensor->t2 = mlx90333_model_stretched(p, MLX90333_T2_NS, 3);
+    sensor->t4 = mlx90333_model_stretched(p, MLX90333_T4_NS, 3);
+    sensor->t5 = mlx90333_model_stretched(p, MLX90333_T5_NS, 5);
+    sensor->t6 = mlx90333_model_stretched(p, MLX90333_T6_NS, 3);
+    sensor->t7 = mlx90333_model_stretched(p, MLX90333_T7_NS, 3);
     sensor->frame_bytes = p->mlx90316 ? MLX90316_FRAME_BYTES : MLX90333_FRAME_BYTES;
     sensor->select_ns = now_ns;
     sensor->random = p->seed;
     sensor->select = true;
-    start(sensor, now_ns);
+    mlx90333_model_start(sensor, now_ns);
 }
 
 void mlx90333_supply(struct mlx90333 *sensor, uint64_t now_ns, bool on)
 {
-    start(sensor, now_ns);
+    mlx90333_model_start(sensor, now_ns);
     sensor->restarting = true;
     sensor->slipped = false;
     sensor->dark = !on;
@@ -60,19 +60,19 @@ void mlx90333_set_fault(struct mlx90333 *sensor, enum sim_sensor_fault fault, un
 }
 
 /* Knuth's MMIX generator, top bits: a handful of draws per run need no better one. */
-static uint32_t draw(struct mlx90333 *sensor)
+static uint32_t mlx90333_model_draw(struct mlx90333 *sensor)
 {
     sensor->random = sensor->random * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
     return (uint32_t)(sensor->random >> 32);
 }
 
-static void require(struct mlx90333 *sensor, bool kept, enum mlx90333_violation violation)
+static void mlx90333_model_require(struct mlx90333 *sensor, bool kept, enum mlx90333_violation violation)
 {
     if (!kept && !sensor->slipped)
         sensor->violations[violation]++;
 }
 
-static void resynchronise(struct mlx90333 *sensor)
+static void mlx90333_model_resynchronise(struct mlx90333 *sensor)
 {
     sensor->enabled = true;
     sensor->slipped = false;
@@ -81,12 +81,12 @@ static void resynchronise(struct mlx90333 *sensor)
     sensor->bit = 0;
 }
 
-static void select_fell(struct mlx90333 *sensor, uint64_t now_ns)
+static void mlx90333_model_select_fell(struct mlx90333 *sensor, uint64_t now_ns)
 {
     const uint64_t since = sensor->select_ns > sensor->awake_ns ? sensor->select_ns : sensor->awake_ns;
     const uint64_t high_ns = now_ns > since ? now_ns - since : 0;
-    if (draw(sensor) % sensor->t5 < high_ns) /* always from t5 on, never at 0 */
-        resynchronise(sensor);
+    if (mlx90333_model_draw(sensor) % sensor->t5 < high_ns) /* always from t5 on, never at 0 */
+        mlx90333_model_resynchronise(sensor);
     sensor->fresh = true;
 }
 
@@ -95,15 +95,15 @@ void mlx90333_select(struct mlx90333 *sensor, uint64_t now_ns, bool level)
     if (level == sensor->select)
         return;
     if (!level)
-        select_fell(sensor, now_ns);
+        mlx90333_model_select_fell(sensor, now_ns);
     else if (!sensor->fresh)
-        require(sensor, now_ns - sensor->fall_ns >= sensor->t4, MLX90333_SELECT_HIGH);
+        mlx90333_model_require(sensor, now_ns - sensor->fall_ns >= sensor->t4, MLX90333_SELECT_HIGH);
     sensor->select = level;
     sensor->select_ns = now_ns;
     sensor->level = true; /* t9: high impedance within 1 us; ones either way until the next clock */
 }
 
-static void make_90316_frame(struct mlx90333 *sensor, uint16_t angle, uint16_t errors)
+static void mlx90333_model_make_90316_frame(struct mlx90333 *sensor, uint16_t angle, uint16_t errors)
 {
     const uint16_t data = errors ? (uint16_t)(errors | MLX90316_KIND_ERROR)
                                  : (uint16_t)((angle & MLX90316_ANGLE_MASK) | MLX90316_KIND_ANGLE);
@@ -115,7 +115,7 @@ static void make_90316_frame(struct mlx90333 *sensor, uint16_t angle, uint16_t e
     }
 }
 
-static void make_frame(struct mlx90333 *sensor, const uint16_t words[3], uint16_t errors)
+static void mlx90333_model_make_frame(struct mlx90333 *sensor, const uint16_t words[3], uint16_t errors)
 {
     uint8_t *frame = sensor->frame;
     const unsigned end = sensor->parameters.sum_without_errors ? MLX90333_FRAME_ERRORS : MLX90333_FRAME_SUM;
@@ -130,7 +130,7 @@ static void make_frame(struct mlx90333 *sensor, const uint16_t words[3], uint16_
 }
 
 /* The angle is latched at the last clock before the first data byte. */
-static void latch(struct mlx90333 *sensor, uint64_t now_ns)
+static void mlx90333_model_latch(struct mlx90333 *sensor, uint64_t now_ns)
 {
     uint16_t words[3], errors;
     sensor->latch_ns = now_ns;
@@ -138,67 +138,67 @@ static void latch(struct mlx90333 *sensor, uint64_t now_ns)
     if (sensor->fault == SIM_SENSOR_ERROR_BITS)
         errors |= sensor->argument;
     if (sensor->parameters.mlx90316)
-        make_90316_frame(sensor, words[0], errors);
+        mlx90333_model_make_90316_frame(sensor, words[0], errors);
     else
-        make_frame(sensor, words, errors);
+        mlx90333_model_make_frame(sensor, words, errors);
     if (errors && sensor->parameters.resets_after_error)
         sensor->reset_due = true; /* once this frame has been sent */
 }
 
 /* True if the byte before was over long enough ago. */
-static bool check_byte_start(struct mlx90333 *sensor, uint64_t now_ns)
+static bool mlx90333_model_check_byte_start(struct mlx90333 *sensor, uint64_t now_ns)
 {
     const uint64_t gap = now_ns - (sensor->fresh ? sensor->select_ns : sensor->fall_ns);
     const uint32_t least = sensor->fresh ? sensor->t6 : sensor->byte == 1 ? sensor->t7 : sensor->t2;
     const bool kept = gap >= least || (sensor->byte == 0 && !sensor->fresh); /* a frame may follow at any time (A) */
-    require(sensor, kept,
-            sensor->fresh       ? MLX90333_SELECT_LOW
-            : sensor->byte == 1 ? MLX90333_START_GAP
-                                : MLX90333_BYTE_GAP);
+    mlx90333_model_require(sensor, kept,
+                           sensor->fresh       ? MLX90333_SELECT_LOW
+                           : sensor->byte == 1 ? MLX90333_START_GAP
+                                               : MLX90333_BYTE_GAP);
     sensor->fresh = false;
     return kept;
 }
 
 /* A rising edge shifts the next bit out. */
-static void clock_rose(struct mlx90333 *sensor, uint64_t now_ns)
+static void mlx90333_model_clock_rose(struct mlx90333 *sensor, uint64_t now_ns)
 {
     if (sensor->bit == 0) {
-        const bool loaded = check_byte_start(sensor, now_ns) || !sensor->parameters.early_byte_is_ones;
+        const bool loaded = mlx90333_model_check_byte_start(sensor, now_ns) || !sensor->parameters.early_byte_is_ones;
         sensor->sending = sensor->answering && sensor->byte > 0 && loaded ? sensor->frame[sensor->byte] : 0xFFu;
     } else {
-        require(sensor, now_ns - sensor->rise_ns >= sensor->t1, MLX90333_CLOCK_PERIOD);
+        mlx90333_model_require(sensor, now_ns - sensor->rise_ns >= sensor->t1, MLX90333_CLOCK_PERIOD);
     }
     sensor->level = (sensor->sending & 0x80u) != 0;
     sensor->sending = (uint8_t)(sensor->sending << 1);
     sensor->rise_ns = now_ns;
 }
 
-static void end_byte(struct mlx90333 *sensor, uint64_t now_ns)
+static void mlx90333_model_end_byte(struct mlx90333 *sensor, uint64_t now_ns)
 {
     const uint8_t wanted = sensor->parameters.mlx90316 ? MLX90316_MASTER_START : MLX90333_MASTER_BYTE;
     if (sensor->byte == MLX90333_FRAME_START) {
         sensor->answering = sensor->received == wanted;
-        latch(sensor, now_ns);
+        mlx90333_model_latch(sensor, now_ns);
     }
     sensor->byte = (uint8_t)((sensor->byte + 1u) % sensor->frame_bytes);
     sensor->bit = 0;
     if (sensor->byte == 0 && sensor->reset_due) { /* soft reset: start-up time again, then a resynchronisation */
-        start(sensor, now_ns);
+        mlx90333_model_start(sensor, now_ns);
         sensor->restarting = true;
     }
 }
 
 /* A falling edge samples the line. */
-static void clock_fell(struct mlx90333 *sensor, uint64_t now_ns, bool master)
+static void mlx90333_model_clock_fell(struct mlx90333 *sensor, uint64_t now_ns, bool master)
 {
     const bool may_be_zero = sensor->parameters.mlx90316 && sensor->byte == 0;
-    require(sensor, master || may_be_zero, MLX90333_ZERO_SENT);
+    mlx90333_model_require(sensor, master || may_be_zero, MLX90333_ZERO_SENT);
     sensor->received = (uint8_t)(sensor->received << 1 | (master && sensor->level));
     sensor->fall_ns = now_ns;
 }
 
 /* The line as the master sees it, `position` bits into the frame. */
-static bool line(struct mlx90333 *sensor, unsigned position, bool master)
+static bool mlx90333_model_line(struct mlx90333 *sensor, unsigned position, bool master)
 {
     switch (sensor->fault) {
     case SIM_SENSOR_DEAD:
@@ -206,9 +206,9 @@ static bool line(struct mlx90333 *sensor, unsigned position, bool master)
     case SIM_SENSOR_STUCK_LOW:
         return false;
     case SIM_SENSOR_FLOATING:
-        return draw(sensor) & 1u;
+        return mlx90333_model_draw(sensor) & 1u;
     case SIM_SENSOR_NOISY:
-        return (master && sensor->level) != ((draw(sensor) & 0xFFFFu) < sensor->argument);
+        return (master && sensor->level) != ((mlx90333_model_draw(sensor) & 0xFFFFu) < sensor->argument);
     case SIM_SENSOR_FLIP_BIT:
         return (master && sensor->level) != (position == sensor->argument);
     case SIM_SENSOR_FLIP_TWO:
@@ -220,7 +220,7 @@ static bool line(struct mlx90333 *sensor, unsigned position, bool master)
 }
 
 /* True for both edges of the clock that the fault keeps from the sensor. */
-static bool lost(struct mlx90333 *sensor, unsigned position, bool level)
+static bool mlx90333_model_lost(struct mlx90333 *sensor, unsigned position, bool level)
 {
     if (level)
         sensor->dropping = sensor->fault == SIM_SENSOR_LOST_CLOCK && position == sensor->argument;
@@ -234,19 +234,19 @@ static bool lost(struct mlx90333 *sensor, unsigned position, bool level)
     return true;
 }
 
-static void edge(struct mlx90333 *sensor, uint64_t now_ns, bool level, bool master)
+static void mlx90333_model_edge(struct mlx90333 *sensor, uint64_t now_ns, bool level, bool master)
 {
     if (level) {
-        clock_rose(sensor, now_ns);
+        mlx90333_model_clock_rose(sensor, now_ns);
         return;
     }
-    clock_fell(sensor, now_ns, master);
+    mlx90333_model_clock_fell(sensor, now_ns, master);
     if (++sensor->bit == 8u)
-        end_byte(sensor, now_ns);
+        mlx90333_model_end_byte(sensor, now_ns);
 }
 
 /* A falling edge that is followed by a clock of the disturbance's own, once. */
-static bool doubled(struct mlx90333 *sensor, unsigned position, bool level)
+static bool mlx90333_model_doubled(struct mlx90333 *sensor, unsigned position, bool level)
 {
     const bool now = !level && sensor->fault == SIM_SENSOR_EXTRA_CLOCK && position == sensor->argument;
     if (now)
@@ -254,27 +254,27 @@ static bool doubled(struct mlx90333 *sensor, unsigned position, bool level)
     return now;
 }
 
-static void glitch(struct mlx90333 *sensor, uint64_t now_ns, bool master)
+static void mlx90333_model_glitch(struct mlx90333 *sensor, uint64_t now_ns, bool master)
 {
     sensor->slipped = true;
-    edge(sensor, now_ns, true, master);
-    edge(sensor, now_ns, false, master);
+    mlx90333_model_edge(sensor, now_ns, true, master);
+    mlx90333_model_edge(sensor, now_ns, false, master);
 }
 
 bool mlx90333_clock(struct mlx90333 *sensor, uint64_t now_ns, bool level, bool master)
 {
     const unsigned position = sensor->byte * 8u + sensor->bit;
     const bool told = sensor->select || sensor->restarting; /* nobody told the master of a soft reset */
-    require(sensor, told || now_ns >= sensor->awake_ns, MLX90333_CLOCK_IN_STARTUP);
+    mlx90333_model_require(sensor, told || now_ns >= sensor->awake_ns, MLX90333_CLOCK_IN_STARTUP);
     if (sensor->select || !sensor->enabled || sensor->dark || now_ns < sensor->awake_ns)
-        return line(sensor, 64u, master);
-    if (lost(sensor, position, level))
-        return line(sensor, position, master);
-    const bool glitches = doubled(sensor, position, level);
-    edge(sensor, now_ns, level, master);
-    const bool seen = line(sensor, position, master);
+        return mlx90333_model_line(sensor, 64u, master);
+    if (mlx90333_model_lost(sensor, position, level))
+        return mlx90333_model_line(sensor, position, master);
+    const bool glitches = mlx90333_model_doubled(sensor, position, level);
+    mlx90333_model_edge(sensor, now_ns, level, master);
+    const bool seen = mlx90333_model_line(sensor, position, master);
     if (glitches)
-        glitch(sensor, now_ns, master);
+        mlx90333_model_glitch(sensor, now_ns, master);
     return seen;
 }
 

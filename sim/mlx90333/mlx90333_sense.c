@@ -27,16 +27,16 @@ void mlx90333_parameters_default(struct mlx90333_parameters *parameters)
 }
 
 /* Knuth's MMIX generator, top bits. */
-static double uniform(struct mlx90333_sense *sense)
+static double mlx90333_sense_uniform(struct mlx90333_sense *sense)
 {
     sense->random = sense->random * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
     return ((double)(sense->random >> 11) + 0.5) / 9007199254740992.0;
 }
 
-static double normal(struct mlx90333_sense *sense)
+static double mlx90333_sense_normal(struct mlx90333_sense *sense)
 {
-    const double r = sqrt(-2.0 * log(uniform(sense)));
-    return r * cos(2.0 * 4.0 * atan(1.0) * uniform(sense));
+    const double r = sqrt(-2.0 * log(mlx90333_sense_uniform(sense)));
+    return r * cos(2.0 * 4.0 * atan(1.0) * mlx90333_sense_uniform(sense));
 }
 
 void mlx90333_sense_start(struct mlx90333_sense *sense, const struct mlx90333_parameters *parameters, uint64_t now_ns)
@@ -47,7 +47,7 @@ void mlx90333_sense_start(struct mlx90333_sense *sense, const struct mlx90333_pa
     sense->field = field;
     sense->random = parameters->seed;
     sense->period_ns = (uint64_t)parameters->conversion_ns * parameters->slow_permille / 1000u;
-    sense->next_ns = now_ns + (uint64_t)(uniform(sense) * (double)sense->period_ns);
+    sense->next_ns = now_ns + (uint64_t)(mlx90333_sense_uniform(sense) * (double)sense->period_ns);
 }
 
 void mlx90333_angles(const struct mlx90333_parameters *p, const double b[3], double angles_deg[2])
@@ -56,7 +56,7 @@ void mlx90333_angles(const struct mlx90333_parameters *p, const double b[3], dou
     angles_deg[1] = atan2(hypot(p->k_beta * b[2], p->k_t * b[0]), b[1]) * DEG - 90.0;
 }
 
-static void angles_at(const struct mlx90333_sense *sense, uint64_t at_ns, double angles[2])
+static void mlx90333_sense_angles_at(const struct mlx90333_sense *sense, uint64_t at_ns, double angles[2])
 {
     const struct mlx90333_field *f = &sense->field;
     const double since_s = ((double)at_ns - (double)f->since_ns) * 1e-9;
@@ -68,7 +68,7 @@ static void angles_at(const struct mlx90333_sense *sense, uint64_t at_ns, double
     angles[1] = f->beta_deg + f->beta_deg_s * since_s;
 }
 
-static uint16_t errors_of(const struct mlx90333_sense *sense)
+static uint16_t mlx90333_sense_errors_of(const struct mlx90333_sense *sense)
 {
     const double *b = sense->field.vector_mt;
     const double norm = sqrt(b[0] * b[0] + b[1] * b[1] + b[2] * b[2]);
@@ -78,26 +78,26 @@ static uint16_t errors_of(const struct mlx90333_sense *sense)
                       (norm > sense->parameters->field_high_mt ? ERROR_FIELD_HIGH : 0u));
 }
 
-static void convert(struct mlx90333_sense *sense, uint64_t at_ns)
+static void mlx90333_sense_convert(struct mlx90333_sense *sense, uint64_t at_ns)
 {
     memmove(sense->taps[1], sense->taps[0], sizeof sense->taps - sizeof sense->taps[0]);
-    angles_at(sense, at_ns, sense->taps[0]);
+    mlx90333_sense_angles_at(sense, at_ns, sense->taps[0]);
     for (int i = 0; i < 2 && sense->parameters->noise_deg > 0.0; i++)
-        sense->taps[0][i] += sense->parameters->noise_deg * normal(sense);
-    sense->errors = errors_of(sense);
+        sense->taps[0][i] += sense->parameters->noise_deg * mlx90333_sense_normal(sense);
+    sense->errors = mlx90333_sense_errors_of(sense);
     sense->last_ns = at_ns;
 }
 
-static void convert_until(struct mlx90333_sense *sense, uint64_t now_ns)
+static void mlx90333_sense_convert_until(struct mlx90333_sense *sense, uint64_t now_ns)
 {
     for (; sense->period_ns > 0 && sense->next_ns <= now_ns; sense->next_ns += sense->period_ns)
-        convert(sense, sense->next_ns);
+        mlx90333_sense_convert(sense, sense->next_ns);
 }
 
 void mlx90333_sense_field(struct mlx90333_sense *sense, const struct mlx90333_field *field)
 {
     if (field->since_ns > 0)
-        convert_until(sense, field->since_ns - 1u);
+        mlx90333_sense_convert_until(sense, field->since_ns - 1u);
     sense->field = *field;
 }
 
@@ -109,7 +109,7 @@ uint16_t mlx90333_counts(const struct mlx90333_parameters *p, double angle_deg)
     return (uint16_t)(isfinite(angle_deg) ? fmin(fmax(whole, p->clamp_low), p->clamp_high) : p->clamp_low);
 }
 
-static double filtered(const struct mlx90333_sense *sense, int axis)
+static double mlx90333_sense_filtered(const struct mlx90333_sense *sense, int axis)
 {
     const uint8_t *weights = TAPS[sense->parameters->filter];
     double sum = 0.0, weight = 0.0;
@@ -120,7 +120,7 @@ static double filtered(const struct mlx90333_sense *sense, int axis)
     return sum / weight;
 }
 
-static uint16_t field_word(double mt)
+static uint16_t mlx90333_sense_field_word(double mt)
 {
     return (uint16_t)(int16_t)fmin(fmax(mt / FULL_SCALE_MT * 32767.0, -32767.0), 32767.0);
 }
@@ -128,13 +128,13 @@ static uint16_t field_word(double mt)
 uint64_t mlx90333_sense_latch(struct mlx90333_sense *sense, uint64_t now_ns, uint16_t words[3], uint16_t *errors)
 {
     if (sense->period_ns == 0)
-        convert(sense, now_ns);
+        mlx90333_sense_convert(sense, now_ns);
     else
-        convert_until(sense, now_ns);
+        mlx90333_sense_convert_until(sense, now_ns);
     *errors = sense->errors;
     for (int i = 0; i < 3; i++)
-        words[i] = sense->parameters->field_mode ? field_word(sense->field.vector_mt[i])
-                   : i < 2                       ? mlx90333_counts(sense->parameters, filtered(sense, i))
+        words[i] = sense->parameters->field_mode ? mlx90333_sense_field_word(sense->field.vector_mt[i])
+                   : i < 2                       ? mlx90333_counts(sense->parameters, mlx90333_sense_filtered(sense, i))
                                                  : 0;
     return now_ns - sense->last_ns;
 }

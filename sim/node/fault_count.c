@@ -21,7 +21,7 @@ static const struct {
 };
 enum { COUNTER_COUNT = sizeof COUNTERS / sizeof *COUNTERS };
 
-static void append(char text[FAULT_TEXT], char letter, unsigned number)
+static void fault_count_append(char text[FAULT_TEXT], char letter, unsigned number)
 {
     const size_t at = strlen(text);
     if (number > 0)
@@ -32,7 +32,7 @@ void fault_counted(const sim_node *node, char text[FAULT_TEXT])
 {
     text[0] = '\0';
     for (unsigned i = 0; i < COUNTER_COUNT; i++)
-        append(text, COUNTERS[i].letter, sim_node_counted(node, COUNTERS[i].counter));
+        fault_count_append(text, COUNTERS[i].letter, sim_node_counted(node, COUNTERS[i].counter));
 }
 
 void fault_told(const char *letters, char text[FAULT_TEXT])
@@ -42,6 +42,6 @@ void fault_told(const char *letters, char text[FAULT_TEXT])
         unsigned number = 0;
         for (const char *c = letters; *c; c++)
             number += *c == COUNTERS[i].letter;
-        append(text, COUNTERS[i].letter, COUNTERS[i].once && number > 0 ? 1u : number);
+        fault_count_append(text, COUNTERS[i].letter, COUNTERS[i].once && number > 0 ? 1u : number);
     }
 }

@@ -3,31 +3,31 @@
 #include "mlx90333_datasheet.h"
 #include "whisker_protocol.h"
 
-static void slow_mode(struct sim_node_parameters *p)
+static void fault_matrix_slow_mode(struct sim_node_parameters *p)
 {
     p->sensor.slow_mode = true;
     p->sensor.early_byte_is_ones = true;
 }
 
-static void soft_reset(struct sim_node_parameters *p)
+static void fault_matrix_soft_reset(struct sim_node_parameters *p)
 {
     p->sensor.resets_after_error = true;
 }
 
-static void jump(unsigned tick, struct sim_field *field)
+static void fault_matrix_jump(unsigned tick, struct sim_field *field)
 {
     if (tick == FAULT_FIRST_TICK)
         field->alpha_deg = 60.0;
 }
 
-static void no_sync(unsigned nth, struct lane_faults *faults)
+static void fault_matrix_no_sync(unsigned nth, struct lane_faults *faults)
 {
     faults->no_sync = nth == 1u;
 }
 
 /* After a bad frame: a stray SYNC meets the resynchronisation and is counted, the next order does not set the count
  * right, and then SYNC is lost: the old reading has the right number. */
-static void count_ahead(unsigned nth, struct lane_faults *faults)
+static void fault_matrix_count_ahead(unsigned nth, struct lane_faults *faults)
 {
     faults->second_sync_ns = nth == 1u ? 100000u : 0u;
     faults->mosi_flips = nth == 2u;
@@ -52,7 +52,7 @@ static void count_ahead(unsigned nth, struct lane_faults *faults)
 const struct fault_case FAULT_CASES[] = {
     WHISKER_SENSOR_ERRORS(ERROR_ROW){.name = "sensor error bit, then its soft reset",
                                      .faults = SENSOR(ERROR_BITS, 4),
-                                     .part = soft_reset,
+                                     .part = fault_matrix_soft_reset,
                                      .expected = "^\\.e(aR){12,20}$",
                                      .most = 41,
                                      .remark = "start-up of the sensor: 10 to 16 ms, +-10 %"},
@@ -101,7 +101,7 @@ const struct fault_case FAULT_CASES[] = {
      .most = 42,
      .remark = "1 tick and the sensor's start-up"},
     {.name = "field jumps further than a whisker can",
-     .field = jump,
+     .field = fault_matrix_jump,
      .expected = "^\\.jR$",
      .most = 2,
      .remark = "taken for a slipped frame"},
@@ -192,13 +192,13 @@ const struct fault_case FAULT_CASES[] = {
      .remark = "the tick's own sample is safe; the next SYNC finds a reading under way"},
     {.name = "SYNC alone 100 us early",
      .faults = {.second_sync_ns = 400000},
-     .then = no_sync,
+     .then = fault_matrix_no_sync,
      .expected = "^\\.\\.L$",
      .most = 1,
      .remark = "a stray pulse in the tick before, then none: told by the time from SYNC to order"},
     {.name = "SYNC alone 30 us early",
      .faults = {.second_sync_ns = 470000},
-     .then = no_sync,
+     .then = fault_matrix_no_sync,
      .expected = "^$",
      .remark = "the slowest link's order may come as late: the sample is 30 us early",
      .undetectable = true},
@@ -216,7 +216,7 @@ const struct fault_case FAULT_CASES[] = {
      .remark = "its reading ends amid the next transfer"},
     {.name = "count one ahead, then SYNC missing",
      .faults = SENSOR(FLIP_BIT, 20),
-     .then = count_ahead,
+     .then = fault_matrix_count_ahead,
      .expected = "^\\.xRtL$",
      .counted = "^C=1 M=1 R=2 L=1 x=1$",
      .most = 4,
@@ -312,7 +312,7 @@ const struct fault_case FAULT_CASES[] = {
      .most = 42,
      .remark = "armed anew after each"},
     {.name = "slow-mode sensor",
-     .part = slow_mode,
+     .part = fault_matrix_slow_mode,
      .for_ever = true,
      .expected = "^R?(aR)+a?$",
      .counted = "^R=[67] a=[67]$",

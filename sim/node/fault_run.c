@@ -9,7 +9,7 @@
 
 enum { LONGEST = 1000 };
 
-static char letter(const struct lane_verdict *v)
+static char fault_run_letter(const struct lane_verdict *v)
 {
     static const char CODES[] = ".SRLx0ajPWT??O";
     switch (v->code) {
@@ -37,7 +37,7 @@ struct sim_node_parameters fault_parts(unsigned n)
     return parts;
 }
 
-static struct sim_field field_of(const struct fault_case *row, unsigned tick)
+static struct sim_field fault_run_field_of(const struct fault_case *row, unsigned tick)
 {
     struct sim_field field = {0.5 * (tick % 40u), -12.0 + 0.25 * (tick % 60u)};
     if (row->field)
@@ -45,7 +45,7 @@ static struct sim_field field_of(const struct fault_case *row, unsigned tick)
     return field;
 }
 
-static void append(char text[FAULT_TEXT], char c, unsigned run)
+static void fault_run_append(char text[FAULT_TEXT], char c, unsigned run)
 {
     const size_t at = strlen(text);
     if (run > 9u) {
@@ -57,7 +57,7 @@ static void append(char text[FAULT_TEXT], char c, unsigned run)
 }
 
 /* `letters[0]` is the verdict on the record that the broken tick brought. */
-static void summarise(struct fault_outcome *out, const char *letters, unsigned last)
+static void fault_run_summarise(struct fault_outcome *out, const char *letters, unsigned last)
 {
     unsigned run = 0;
     for (unsigned i = 0; i < last; i++) {
@@ -67,13 +67,13 @@ static void summarise(struct fault_outcome *out, const char *letters, unsigned l
             out->detected_after = (int)i;
         run++;
         if (i + 1u == last || letters[i + 1u] != c) {
-            append(out->verdicts, c, run);
+            fault_run_append(out->verdicts, c, run);
             run = 0;
         }
     }
 }
 
-static bool matches(const char *expected, const char *text)
+static bool fault_run_matches(const char *expected, const char *text)
 {
     regex_t pattern;
     if (regcomp(&pattern, expected, REG_EXTENDED | REG_NOSUB) != 0)
@@ -83,13 +83,14 @@ static bool matches(const char *expected, const char *text)
     return yes;
 }
 
-static void compare_counters(struct fault_outcome *out, const struct fault_case *row, const sim_node *node,
-                             const char *letters)
+static void fault_run_compare_counters(struct fault_outcome *out, const struct fault_case *row, const sim_node *node,
+                                       const char *letters)
 {
     char told[FAULT_TEXT];
     fault_counted(node, out->counted);
     fault_told(letters, told);
-    out->counted_as_expected = row->counted ? matches(row->counted, out->counted) : strcmp(told, out->counted) == 0;
+    out->counted_as_expected =
+        row->counted ? fault_run_matches(row->counted, out->counted) : strcmp(told, out->counted) == 0;
 }
 
 struct run {
@@ -99,13 +100,13 @@ struct run {
     unsigned good, last;
 };
 
-static bool plan(void *context, unsigned tick, struct sim_field *field, struct lane_faults *faults)
+static bool fault_run_plan(void *context, unsigned tick, struct sim_field *field, struct lane_faults *faults)
 {
     const struct run *run = context;
     const struct fault_case *row = run->row;
     const unsigned end = FAULT_FIRST_TICK + (row->ticks > 0 ? row->ticks : 1u);
     const unsigned most = row->for_ever ? end + FAULT_GOOD_RUN : LONGEST;
-    *field = field_of(row, tick);
+    *field = fault_run_field_of(row, tick);
     if (tick >= FAULT_FIRST_TICK && tick < end)
         *faults = row->faults;
     if (row->then && tick >= end)
@@ -116,14 +117,14 @@ static bool plan(void *context, unsigned tick, struct sim_field *field, struct l
 }
 
 /* The transfer of the first broken tick brings the record of the tick before. */
-static void judged(void *context, unsigned tick, const struct lane_verdict *v)
+static void fault_run_judged(void *context, unsigned tick, const struct lane_verdict *v)
 {
     struct run *run = context;
     run->good = v->good ? run->good + 1u : 0u;
     run->out->altered += v->altered && tick > 0;
     if (tick < FAULT_FIRST_TICK)
         return;
-    run->letters[tick - FAULT_FIRST_TICK] = letter(v);
+    run->letters[tick - FAULT_FIRST_TICK] = fault_run_letter(v);
     if (!v->good)
         run->last = tick - FAULT_FIRST_TICK + 1u;
 }
@@ -139,11 +140,11 @@ struct fault_outcome fault_run(const struct fault_case *row, const struct sim_no
     sim_node *node = sim_node_new_as(&own);
     sim_node_power_on(node);
     lane_bench_start(&bench, node, lane_timing_of(16, 180, WHISKER_LIMIT_TICK_PERIOD));
-    lane_bench_run(&bench, &(struct lane_world){&run, plan, judged});
-    summarise(&out, run.letters, run.last);
+    lane_bench_run(&bench, &(struct lane_world){&run, fault_run_plan, fault_run_judged});
+    fault_run_summarise(&out, run.letters, run.last);
     run.letters[run.last] = '\0'; /* not shortened as the verdicts are */
-    out.as_expected = matches(row->expected, run.letters);
-    compare_counters(&out, row, node, run.letters);
+    out.as_expected = fault_run_matches(row->expected, run.letters);
+    fault_run_compare_counters(&out, row, node, run.letters);
     out.violations = sim_node_violations(node);
     sim_node_free(node);
     return out;

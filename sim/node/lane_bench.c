@@ -20,7 +20,7 @@ struct lane_timing lane_timing_of(unsigned sck_divider, unsigned word_gap, unsig
 
 enum { SYNC_EDGE, SELECT_EDGE, SCK_EDGE, START, READ, BREAK, BEGIN, END };
 
-static void add(struct lane_bench *bench, uint64_t at_fs, unsigned what, bool level, bool mosi)
+static void lane_bench_add(struct lane_bench *bench, uint64_t at_fs, unsigned what, bool level, bool mosi)
 {
     unsigned i = bench->planned;
     if (i == LANE_EVENTS)
@@ -31,14 +31,14 @@ static void add(struct lane_bench *bench, uint64_t at_fs, unsigned what, bool le
     bench->planned++;
 }
 
-static void start_transfer(struct lane_bench *bench)
+static void lane_bench_start_transfer(struct lane_bench *bench)
 {
     const bool overlapped = bench->arms_at_end != bench->first.arms;
     bench->first = sim_node_report(bench->node);
     bench->stale = overlapped && bench->first.arms == bench->arms_at_end;
 }
 
-static void read_bit(struct lane_bench *bench)
+static void lane_bench_read_bit(struct lane_bench *bench)
 {
     bench->read++;
     bench->record = bench->record << 1 | sim_node_miso(bench->node);
@@ -47,7 +47,7 @@ static void read_bit(struct lane_bench *bench)
 }
 
 /* A disturbance may not return: whatever comes after it must be planned by now. */
-static void perform(struct lane_bench *bench, const struct lane_event *e, const struct lane_faults *f)
+static void lane_bench_perform(struct lane_bench *bench, const struct lane_event *e, const struct lane_faults *f)
 {
     switch (e->what) {
     case BEGIN:
@@ -66,10 +66,10 @@ static void perform(struct lane_bench *bench, const struct lane_event *e, const 
         sim_node_pin(bench->node, SIM_NODE_SCK, e->level, e->at_fs);
         break;
     case START:
-        start_transfer(bench);
+        lane_bench_start_transfer(bench);
         break;
     case READ:
-        read_bit(bench);
+        lane_bench_read_bit(bench);
         break;
     case BREAK:
         sim_node_disturb(bench->node, f->disturbance, f->disturbance_argument);
@@ -92,70 +92,70 @@ uint64_t lane_order(uint8_t tick)
 }
 
 /* The bridge reads MISO just before the falling edge. */
-static void plan_bit(struct lane_bench *bench, unsigned i, bool reaches_node, uint64_t at_fs)
+static void lane_bench_plan_bit(struct lane_bench *bench, unsigned i, bool reaches_node, uint64_t at_fs)
 {
     const struct lane_faults *f = &bench->faults;
     const bool sent = i < BITS && (lane_order((uint8_t)bench->tick) ^ f->mosi_flips) >> (BITS - 1u - i) & 1u;
     const bool mosi = f->mosi_stuck ? f->mosi_level : sent;
     if (reaches_node)
-        add(bench, at_fs, SCK_EDGE, true, mosi);
+        lane_bench_add(bench, at_fs, SCK_EDGE, true, mosi);
     if (i < BITS)
-        add(bench, at_fs + bench->timing.half_fs, READ, false, false);
+        lane_bench_add(bench, at_fs + bench->timing.half_fs, READ, false, false);
     if (reaches_node)
-        add(bench, at_fs + bench->timing.half_fs, SCK_EDGE, false, mosi);
+        lane_bench_add(bench, at_fs + bench->timing.half_fs, SCK_EDGE, false, mosi);
 }
 
-static void plan_transfer(struct lane_bench *bench, uint64_t select_fs)
+static void lane_bench_plan_transfer(struct lane_bench *bench, uint64_t select_fs)
 {
     const struct lane_timing *t = &bench->timing;
     const struct lane_faults *f = &bench->faults;
     const unsigned clocks = (unsigned)((int32_t)BITS + f->extra_clocks);
     uint64_t at = select_fs + t->setup_fs;
-    add(bench, select_fs, START, false, false);
+    lane_bench_add(bench, select_fs, START, false, false);
     if (!f->no_select)
-        add(bench, select_fs, SELECT_EDGE, false, false);
+        lane_bench_add(bench, select_fs, SELECT_EDGE, false, false);
     for (unsigned i = 0; i < clocks || i < BITS; i++) {
         if (i > 0 && i == f->glitch_bit) {
-            add(bench, at - GLITCH_FS, SELECT_EDGE, true, false);
-            add(bench, at - GLITCH_FS / 2u, SELECT_EDGE, false, false);
+            lane_bench_add(bench, at - GLITCH_FS, SELECT_EDGE, true, false);
+            lane_bench_add(bench, at - GLITCH_FS / 2u, SELECT_EDGE, false, false);
         }
-        plan_bit(bench, i, i < clocks, at);
+        lane_bench_plan_bit(bench, i, i < clocks, at);
         at += 2u * t->half_fs + (i % 16u == 15u ? t->gap_fs : 0u);
     }
     if (!f->select_stays)
-        add(bench, at + t->hold_fs, SELECT_EDGE, true, false);
-    add(bench, at + t->hold_fs, END, false, false);
+        lane_bench_add(bench, at + t->hold_fs, SELECT_EDGE, true, false);
+    lane_bench_add(bench, at + t->hold_fs, END, false, false);
 }
 
-static void plan_sync(struct lane_bench *bench, uint64_t at_fs)
+static void lane_bench_plan_sync(struct lane_bench *bench, uint64_t at_fs)
 {
-    add(bench, at_fs, SYNC_EDGE, true, false);
-    add(bench, at_fs + bench->timing.gap_fs, SYNC_EDGE, false, false);
+    lane_bench_add(bench, at_fs, SYNC_EDGE, true, false);
+    lane_bench_add(bench, at_fs + bench->timing.gap_fs, SYNC_EDGE, false, false);
 }
 
-static void plan_tick(struct lane_bench *bench, uint64_t sync_fs)
+static void lane_bench_plan_tick(struct lane_bench *bench, uint64_t sync_fs)
 {
     const struct lane_faults *f = &bench->faults;
     bench->planned = bench->done = 0;
     bench->record = 0;
     bench->read = 0;
-    add(bench, sync_fs, BEGIN, false, false);
+    lane_bench_add(bench, sync_fs, BEGIN, false, false);
     if (!f->no_sync)
-        plan_sync(bench, sync_fs);
-    plan_transfer(bench, sync_fs + bench->timing.gap_fs);
+        lane_bench_plan_sync(bench, sync_fs);
+    lane_bench_plan_transfer(bench, sync_fs + bench->timing.gap_fs);
     if (f->second_sync_ns > 0)
-        plan_sync(bench, sync_fs + f->second_sync_ns * DSPIC_FS_PER_NS);
+        lane_bench_plan_sync(bench, sync_fs + f->second_sync_ns * DSPIC_FS_PER_NS);
     if (f->disturbance != SIM_NODE_NOTHING)
-        add(bench, sync_fs + f->disturbance_ns * DSPIC_FS_PER_NS, BREAK, false, false);
+        lane_bench_add(bench, sync_fs + f->disturbance_ns * DSPIC_FS_PER_NS, BREAK, false, false);
 }
 
-static uint64_t as_read(const struct lane_bench *bench)
+static uint64_t lane_bench_as_read(const struct lane_bench *bench)
 {
     const struct lane_faults *f = &bench->faults;
     return f->miso_stuck ? (f->miso_level ? ~UINT64_C(0) : 0u) : bench->record ^ f->miso_flips;
 }
 
-static bool is_field(const struct lane_verdict *v, struct sim_field field)
+static bool lane_bench_is_field(const struct lane_verdict *v, struct sim_field field)
 {
 #ifdef SENSOR_MLX90316
     field.beta_deg = 0.0; /* It has one angle; the other is at rest. */
@@ -164,7 +164,7 @@ static bool is_field(const struct lane_verdict *v, struct sim_field field)
 }
 
 /* `expected`: number of the tick that the record should be of. */
-static struct lane_verdict judge(const struct lane_bench *bench, uint64_t bits, uint8_t expected)
+static struct lane_verdict lane_bench_judge(const struct lane_bench *bench, uint64_t bits, uint8_t expected)
 {
     uint8_t record[WHISKER_RECORD_BYTES];
     struct lane_verdict v = {.sync_fs = bench->next_fs - bench->timing.period_fs,
@@ -187,37 +187,37 @@ static struct lane_verdict judge(const struct lane_bench *bench, uint64_t bits, 
         v.alpha = whisker_get_u16(record + WHISKER_RECORD_ALPHA);
         v.beta = whisker_get_u16(record + WHISKER_RECORD_BETA);
         v.good = v.status == 0;
-        v.altered = v.good && !is_field(&v, bench->fields[expected & 1u]);
+        v.altered = v.good && !lane_bench_is_field(&v, bench->fields[expected & 1u]);
     }
     return v;
 }
 
-static void judge_tick(struct lane_bench *bench)
+static void lane_bench_judge_tick(struct lane_bench *bench)
 {
-    const struct lane_verdict verdict = judge(bench, as_read(bench), (uint8_t)(bench->tick - 1u));
+    const struct lane_verdict verdict = lane_bench_judge(bench, lane_bench_as_read(bench), (uint8_t)(bench->tick - 1u));
     bench->world.judged(bench->world.context, bench->tick, &verdict);
     bench->tick++;
     bench->next_fs += bench->timing.period_fs;
 }
 
 /* A tick begins when the one before is over, however early its SYNC would come. */
-static uint64_t begins_at(const struct lane_bench *bench)
+static uint64_t lane_bench_begins_at(const struct lane_bench *bench)
 {
     const uint64_t now = sim_node_fs(bench->node);
     const uint64_t at = bench->next_fs + (uint64_t)((int64_t)bench->faults.shift_ns * (int64_t)DSPIC_FS_PER_NS);
     return at > now ? at : now;
 }
 
-static void begin_tick(struct lane_bench *bench)
+static void lane_bench_begin_tick(struct lane_bench *bench)
 {
     bench->faults = (struct lane_faults){0};
     bench->ended =
         !bench->world.plan(bench->world.context, bench->tick, &bench->fields[bench->tick & 1u], &bench->faults);
     if (!bench->ended)
-        plan_tick(bench, begins_at(bench));
+        lane_bench_plan_tick(bench, lane_bench_begins_at(bench));
 }
 
-static void act(void *context)
+static void lane_bench_act(void *context)
 {
     struct lane_bench *bench = context;
     while (!bench->ended && bench->events[bench->done].at_fs <= sim_node_fs(bench->node)) {
@@ -226,12 +226,12 @@ static void act(void *context)
         if (e.what == END)
             bench->arms_at_end = sim_node_report(bench->node).arms;
         if (bench->done == bench->planned) {
-            judge_tick(bench);
-            begin_tick(bench);
+            lane_bench_judge_tick(bench);
+            lane_bench_begin_tick(bench);
         }
         if (!bench->ended)
             sim_node_plan(bench->node, bench->events[bench->done].at_fs);
-        perform(bench, &e, &f);
+        lane_bench_perform(bench, &e, &f);
     }
 }
 
@@ -241,13 +241,13 @@ void lane_bench_start(struct lane_bench *bench, sim_node *node, struct lane_timi
     bench->node = node;
     bench->timing = timing;
     bench->next_fs = sim_node_fs(node) + timing.period_fs / 4u;
-    sim_node_outside(node, act, bench);
+    sim_node_outside(node, lane_bench_act, bench);
 }
 
 void lane_bench_run(struct lane_bench *bench, const struct lane_world *world)
 {
     bench->world = *world;
-    begin_tick(bench);
+    lane_bench_begin_tick(bench);
     while (!bench->ended) {
         sim_node_plan(bench->node, bench->events[bench->done].at_fs);
         sim_node_until(bench->node, bench->next_fs + bench->timing.period_fs);

@@ -13,20 +13,20 @@ struct run {
     unsigned ticks, lost;
 };
 
-static bool plan(void *context, unsigned tick, struct sim_field *field, struct lane_faults *faults)
+static bool node_link_plan(void *context, unsigned tick, struct sim_field *field, struct lane_faults *faults)
 {
     (void)faults;
     *field = (struct sim_field){0.1 * (tick % 300u), -0.1 * (tick % 200u)};
     return tick < ((const struct run *)context)->ticks + FIRST;
 }
 
-static void judged(void *context, unsigned tick, const struct lane_verdict *v)
+static void node_link_judged(void *context, unsigned tick, const struct lane_verdict *v)
 {
     struct run *run = context;
     run->lost += tick >= FIRST && (!v->good || v->altered);
 }
 
-static struct sim_node_parameters parts_of(unsigned n)
+static struct sim_node_parameters node_link_parts_of(unsigned n)
 {
     struct sim_node_parameters parts;
     sim_node_parameters_default(&parts, n);
@@ -37,17 +37,17 @@ static struct sim_node_parameters parts_of(unsigned n)
     return parts;
 }
 
-static unsigned lost_with(unsigned n, unsigned ticks, struct lane_timing timing)
+static unsigned node_link_lost_with(unsigned n, unsigned ticks, struct lane_timing timing)
 {
     struct run run = {.ticks = ticks};
     struct lane_bench bench;
-    const struct sim_node_parameters parts = parts_of(n);
+    const struct sim_node_parameters parts = node_link_parts_of(n);
     sim_node *node = sim_node_new_as(&parts);
     if (!node)
         return ticks;
     sim_node_power_on(node);
     lane_bench_start(&bench, node, timing);
-    lane_bench_run(&bench, &(struct lane_world){&run, plan, judged});
+    lane_bench_run(&bench, &(struct lane_world){&run, node_link_plan, node_link_judged});
     sim_node_free(node);
     return run.lost;
 }
@@ -62,7 +62,7 @@ int main(int argc, char **argv)
     for (int i = 0; i < 4; i++)
         settings[i] = (unsigned)strtoul(argv[1 + i], NULL, 10);
     for (unsigned n = 0; n < PARTS; n++) {
-        const unsigned one = lost_with(n, settings[0], lane_timing_of(settings[1], settings[2], settings[3]));
+        const unsigned one = node_link_lost_with(n, settings[0], lane_timing_of(settings[1], settings[2], settings[3]));
         lost += one;
         worst = one > worst ? one : worst;
     }

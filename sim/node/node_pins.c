@@ -13,21 +13,21 @@ struct node_pins {
     uint8_t *miso;
 };
 
-static uint64_t time_of(const struct node_pins *pins, unsigned edge)
+static uint64_t node_pins_time_of(const struct node_pins *pins, unsigned edge)
 {
     return pins->origin_fs + pins->at_ps[edge] * FS_PER_PS;
 }
 
-static void act(void *context)
+static void node_pins_act(void *context)
 {
     struct node_pins *pins = context;
-    while (pins->done < pins->count && time_of(pins, pins->done) <= sim_node_fs(pins->node)) {
+    while (pins->done < pins->count && node_pins_time_of(pins, pins->done) <= sim_node_fs(pins->node)) {
         const unsigned i = pins->done++;
-        sim_node_pin(pins->node, (enum sim_node_pin)pins->pin[i], pins->level[i] != 0, time_of(pins, i));
+        sim_node_pin(pins->node, (enum sim_node_pin)pins->pin[i], pins->level[i] != 0, node_pins_time_of(pins, i));
         pins->miso[i] = sim_node_miso(pins->node);
     }
     if (pins->done < pins->count)
-        sim_node_plan(pins->node, time_of(pins, pins->done));
+        sim_node_plan(pins->node, node_pins_time_of(pins, pins->done));
 }
 
 struct node_pins *node_pins_new(uint64_t seed, int32_t frc_ppm, unsigned prefetch, unsigned dma_cycles,
@@ -48,7 +48,7 @@ struct node_pins *node_pins_new(uint64_t seed, int32_t frc_ppm, unsigned prefetc
         return NULL;
     }
     sim_node_power_on(pins->node);
-    sim_node_outside(pins->node, act, pins);
+    sim_node_outside(pins->node, node_pins_act, pins);
     pins->origin_fs = sim_node_fs(pins->node);
     return pins;
 }
@@ -81,8 +81,8 @@ void node_pins_play(struct node_pins *pins, unsigned count, const uint64_t *at_p
     pins->pin = pin;
     pins->level = level;
     pins->miso = miso;
-    sim_node_plan(pins->node, time_of(pins, 0));
-    sim_node_until(pins->node, time_of(pins, count - 1u));
+    sim_node_plan(pins->node, node_pins_time_of(pins, 0));
+    sim_node_until(pins->node, node_pins_time_of(pins, count - 1u));
 }
 
 uint32_t node_pins_violations(const struct node_pins *pins)

@@ -7,19 +7,19 @@
 
 #include "storm.h"
 
-static bool is_sound(const struct storm_counts *c)
+static bool node_storm_is_sound(const struct storm_counts *c)
 {
     return c->schedules == STORM_SCHEDULES && c->unexplained == 0 && c->unforeseen == 0 && c->spurious == 0 &&
            c->stuck == 0 && c->violations == 0;
 }
 
-static void write_class(bool first, const char *name, const struct storm_class *c)
+static void node_storm_write_class(bool first, const char *name, const struct storm_class *c)
 {
     printf("%s\"%s\": [%" PRIu64 ", %" PRIu64 ", %" PRIu64 ", %.9g, %.9g]", first ? "" : ", ", name, c->events,
            c->passed, c->good, c->expected_passed, c->expected_good);
 }
 
-static void write_line(unsigned long long batch, const struct storm_counts *c)
+static void node_storm_write_line(unsigned long long batch, const struct storm_counts *c)
 {
 #define FIELD(name) printf("\"" #name "\": %" PRIu64 ", ", c->name);
     printf("{\"batch\": %llu, ", batch);
@@ -41,10 +41,10 @@ static void write_line(unsigned long long batch, const struct storm_counts *c)
         printf("%s\"%s\": %" PRIu64, k ? ", " : "", storm_kind_name((enum storm_kind)k), c->injected[k]);
     printf("}, \"lines\": {");
     for (unsigned k = 0; k < STORM_LINE_COUNT; k++)
-        write_class(k == 0, storm_line_name((enum storm_line)k), &c->lines[k]);
+        node_storm_write_class(k == 0, storm_line_name((enum storm_line)k), &c->lines[k]);
     printf("}, \"links\": {");
     for (unsigned k = 0; k < STORM_LINK_COUNT; k++)
-        write_class(k == 0, storm_link_name((enum storm_link)k), &c->links[k]);
+        node_storm_write_class(k == 0, storm_link_name((enum storm_link)k), &c->links[k]);
     printf("}}\n");
     fflush(stdout);
 }
@@ -59,8 +59,8 @@ int main(int argc, char **argv)
     const unsigned long long first = strtoull(argv[1], NULL, 10), count = strtoull(argv[2], NULL, 10);
     for (unsigned long long batch = first; batch < first + count; batch++) {
         const struct storm_counts counts = storm_batch(batch);
-        write_line(batch, &counts);
-        result |= !is_sound(&counts);
+        node_storm_write_line(batch, &counts);
+        result |= !node_storm_is_sound(&counts);
     }
     return result;
 }

@@ -13,31 +13,31 @@ struct run {
     struct sim_node_report first, last;
 };
 
-static bool plan(void *context, unsigned tick, struct sim_field *field, struct lane_faults *faults)
+static bool node_timing_plan(void *context, unsigned tick, struct sim_field *field, struct lane_faults *faults)
 {
     (void)faults;
     *field = (struct sim_field){0.01 * (tick % 1000u), 0.0};
     return tick <= ((const struct run *)context)->ticks + 1u;
 }
 
-static double ns_since(uint64_t fs, uint64_t since_fs)
+static double node_timing_ns_since(uint64_t fs, uint64_t since_fs)
 {
     return ((double)fs - (double)since_fs) * 1e-6;
 }
 
-static void judged(void *context, unsigned tick, const struct lane_verdict *v)
+static void node_timing_judged(void *context, unsigned tick, const struct lane_verdict *v)
 {
     struct run *run = context;
     if (tick == 1)
         run->first = v->report;
     run->last = v->report;
     if (tick > 1)
-        printf("%.1f %.1f %.1f\n", ns_since(v->report.latch_fs, v->sync_fs), (double)v->report.age_fs * 1e-6,
-               ns_since(v->report.armed_fs, v->sync_fs));
+        printf("%.1f %.1f %.1f\n", node_timing_ns_since(v->report.latch_fs, v->sync_fs),
+               (double)v->report.age_fs * 1e-6, node_timing_ns_since(v->report.armed_fs, v->sync_fs));
 }
 
 /* splitmix64 (Steele, Lea, Flood 2014), as a number from -1 to 1. */
-static double spread(uint64_t *random)
+static double node_timing_spread(uint64_t *random)
 {
     uint64_t z = *random += UINT64_C(0x9E3779B97F4A7C15);
     z = (z ^ z >> 30) * UINT64_C(0xBF58476D1CE4E5B9);
@@ -45,7 +45,7 @@ static double spread(uint64_t *random)
     return (double)((z ^ z >> 31) >> 11) / 4503599627370496.0 - 1.0;
 }
 
-static bool run_node(struct run *run, const struct sim_node_parameters *parts)
+static bool node_timing_run_node(struct run *run, const struct sim_node_parameters *parts)
 {
     struct lane_bench bench;
     sim_node *node = sim_node_new_as(parts);
@@ -53,12 +53,12 @@ static bool run_node(struct run *run, const struct sim_node_parameters *parts)
         return false;
     sim_node_power_on(node);
     lane_bench_start(&bench, node, lane_timing_of(16, 180, WHISKER_LIMIT_TICK_PERIOD));
-    lane_bench_run(&bench, &(struct lane_world){run, plan, judged});
+    lane_bench_run(&bench, &(struct lane_world){run, node_timing_plan, node_timing_judged});
     sim_node_free(node);
     return true;
 }
 
-static void print_cycles(const struct run *run)
+static void node_timing_print_cycles(const struct run *run)
 {
     const double busy_s = (double)(run->last.busy_fs - run->first.busy_fs) * 1e-15;
     const double interrupts = (double)(run->last.interrupts - run->first.interrupts);
@@ -77,15 +77,15 @@ int main(int argc, char **argv)
     for (int n = 0; n < atoi(argv[2]); n++) {
         struct sim_node_parameters parts;
         sim_node_parameters_default(&parts, (uint64_t)n + 1u);
-        const double chip = spread(&random), sensor = spread(&random);
+        const double chip = node_timing_spread(&random), sensor = node_timing_spread(&random);
         parts.chip.frc_ppm = (int32_t)(ppm < 0.0 ? ppm : chip * ppm);
         parts.chip.slave_prefetch = (uint8_t)(1 + n % 2);
         parts.sensor.slow_permille = (uint16_t)(1000.0 + sensor * permille);
         parts.sensor.conversion_ns = (uint32_t)atoi(argv[5]);
-        if (!run_node(&run, &parts))
+        if (!node_timing_run_node(&run, &parts))
             return 1;
         if (n == 0)
-            print_cycles(&run);
+            node_timing_print_cycles(&run);
     }
     return 0;
 }

@@ -16,23 +16,23 @@
 /* A chip so far ahead of a tick's SYNC stands still: what comes in this tick passes it by. */
 #define STALLED_FS (20000u * DSPIC_FS_PER_NS)
 
-static unsigned position(const struct mlx90333 *sensor)
+static unsigned sim_node_position(const struct mlx90333 *sensor)
 {
     return sensor->byte * 8u + sensor->bit;
 }
 
-static void begin_frame(struct sim_node *node, uint64_t now_ns)
+static void sim_node_begin_frame(struct sim_node *node, uint64_t now_ns)
 {
     const struct sampler *sampler = &node->board.node.sampler;
     node->begun = (struct sim_node_frame){.number = node->frame.number + 1u,
                                           .begun_fs = now_ns * DSPIC_FS_PER_NS,
-                                          .slip = (uint8_t)(position(&node->sensor) % 64u),
+                                          .slip = (uint8_t)(sim_node_position(&node->sensor) % 64u),
                                           .followed = sampler->followed,
                                           .alpha_before = sampler->alpha,
                                           .beta_before = sampler->beta};
 }
 
-static void end_frame(struct sim_node *node)
+static void sim_node_end_frame(struct sim_node *node)
 {
     node->frame = node->begun;
     node->frame.line = node->line;
@@ -40,11 +40,11 @@ static void end_frame(struct sim_node *node)
 }
 
 /* The master sends ones but for the MLX90316's start byte, on a pin of its own beside its input. */
-static void clock_sensor(struct sim_node *node, bool level, uint64_t now_ns)
+static void sim_node_clock_sensor(struct sim_node *node, bool level, uint64_t now_ns)
 {
     const bool sent = dspic_output(node->chip, PIN_SENSOR_SEND) != DSPIC_LOW;
-    if (level && position(&node->twin) == 0)
-        begin_frame(node, now_ns);
+    if (level && sim_node_position(&node->twin) == 0)
+        sim_node_begin_frame(node, now_ns);
     const bool seen = mlx90333_clock(&node->sensor, now_ns, level, sent);
     const bool clean = mlx90333_clock(&node->twin, now_ns, level, sent);
     dspic_wire(node->chip, PIN_SENSOR_DATA, seen);
@@ -54,24 +54,24 @@ static void clock_sensor(struct sim_node *node, bool level, uint64_t now_ns)
     node->clean = node->clean << 1 | clean;
 }
 
-static void select_sensor(struct sim_node *node, bool level, uint64_t now_ns)
+static void sim_node_select_sensor(struct sim_node *node, bool level, uint64_t now_ns)
 {
     mlx90333_select(&node->sensor, now_ns, level);
     mlx90333_select(&node->twin, now_ns, level);
 }
 
-static void on_pin(void *context, unsigned rp, enum dspic_drive drive, uint64_t now_fs)
+static void sim_node_on_pin(void *context, unsigned rp, enum dspic_drive drive, uint64_t now_fs)
 {
     struct sim_node *node = context;
     const bool level = drive != DSPIC_LOW; /* pulled up */
     const uint64_t now_ns = now_fs / DSPIC_FS_PER_NS;
     if (rp == PIN_SENSOR_SELECT)
-        select_sensor(node, level, now_ns);
+        sim_node_select_sensor(node, level, now_ns);
     else if (rp == PIN_SENSOR_CLOCK)
-        clock_sensor(node, level, now_ns);
+        sim_node_clock_sensor(node, level, now_ns);
 }
 
-static uint64_t record_of(const struct node *firmware)
+static uint64_t sim_node_record_of(const struct node *firmware)
 {
     uint64_t bits = 0;
     for (unsigned i = 0; i < LINK_WORDS; i++)
@@ -79,28 +79,28 @@ static uint64_t record_of(const struct node *firmware)
     return bits;
 }
 
-static void note_armed(struct sim_node *node)
+static void sim_node_note_armed(struct sim_node *node)
 {
     node->arms++;
     node->armed_fs = dspic_now_fs(node->chip);
-    node->record = record_of(&node->board.node);
+    node->record = sim_node_record_of(&node->board.node);
 }
 
-static void on_start(void *context)
+static void sim_node_on_start(void *context)
 {
     struct sim_node *node = context;
     node->twin.violations[MLX90333_SELECT_HIGH] = node->releases;
     port_boot(&node->board);
-    note_armed(node);
+    sim_node_note_armed(node);
 }
 
-static void on_loop(void *context)
+static void sim_node_on_loop(void *context)
 {
     struct sim_node *node = context;
     port_loop(&node->board);
 }
 
-static void serve(struct sim_node *node, unsigned irq)
+static void sim_node_serve(struct sim_node *node, unsigned irq)
 {
     switch (irq) {
     case IRQ_INT1:
@@ -135,7 +135,7 @@ enum handler {
 #undef NAME
 };
 
-static enum handler handler_of_t2(const struct sampler *sampler)
+static enum handler sim_node_handler_of_t2(const struct sampler *sampler)
 {
     switch (sampler->state) {
     case SAMPLER_GAP:
@@ -150,12 +150,12 @@ static enum handler handler_of_t2(const struct sampler *sampler)
 }
 
 /* What an interrupt is about to do, and so how long it takes. */
-static enum handler handler_of(const struct board *board, unsigned irq)
+static enum handler sim_node_handler_of(const struct board *board, unsigned irq)
 {
     const struct sampler *sampler = &board->node.sampler;
     switch (irq) {
     case IRQ_T2:
-        return handler_of_t2(sampler);
+        return sim_node_handler_of_t2(sampler);
     case IRQ_SPI1:
         return sampler->count + 1u < SENSOR_FRAME_BYTES ? HANDLER_BYTE : HANDLER_LAST_BYTE;
     case IRQ_DMA1:
@@ -167,7 +167,7 @@ static enum handler handler_of(const struct board *board, unsigned irq)
     }
 }
 
-static void on_interrupt(void *context, unsigned irq)
+static void sim_node_on_interrupt(void *context, unsigned irq)
 {
     static const struct {
         uint16_t address, acts, whole;
@@ -178,36 +178,36 @@ static void on_interrupt(void *context, unsigned irq)
     };
     struct sim_node *node = context;
     const uint8_t before = node->board.node.armed;
-    const enum handler handler = handler_of(&node->board, irq);
+    const enum handler handler = sim_node_handler_of(&node->board, irq);
     const uint64_t cycle_fs = dspic_cycle_fs(node->chip);
     const uint64_t end_fs =
         dspic_now_fs(node->chip) + (CYCLES[handler].whole - node->parameters.chip.exit_cycles) * cycle_fs;
     node->releases = node->twin.violations[MLX90333_SELECT_HIGH];
     dspic_compute_until(node->chip, CYCLES[handler].acts, CYCLES[handler].address);
-    serve(node, irq);
+    sim_node_serve(node, irq);
     if (node->board.node.armed != before) {
-        note_armed(node);
+        sim_node_note_armed(node);
         if (irq == IRQ_SPI1)
-            end_frame(node);
+            sim_node_end_frame(node);
     }
     if (end_fs > dspic_now_fs(node->chip))
         dspic_compute(node->chip, (end_fs - dspic_now_fs(node->chip)) / cycle_fs);
 }
 
-static void on_outside(void *context)
+static void sim_node_on_outside(void *context)
 {
     struct sim_node *node = context;
     node->act(node->act_context);
 }
 
-static void on_trap(void *context, enum dspic_trap trap)
+static void sim_node_on_trap(void *context, enum dspic_trap trap)
 {
     struct sim_node *node = context;
     (void)trap;
     port_on_trap(&node->board);
 }
 
-static uint16_t oscillator_permille(uint64_t seed)
+static uint16_t sim_node_oscillator_permille(uint64_t seed)
 {
     const uint64_t mixed = (seed * UINT64_C(0x9E3779B97F4A7C15)) >> 32;
     return (uint16_t)(1000u - OSCILLATOR_SPREAD_PERMILLE + mixed % (2u * OSCILLATOR_SPREAD_PERMILLE + 1u));
@@ -218,7 +218,7 @@ void sim_node_parameters_default(struct sim_node_parameters *parameters, uint64_
     dspic_parameters_default(&parameters->chip);
     mlx90333_parameters_default(&parameters->sensor);
     parameters->chip.seed = parameters->sensor.seed = seed;
-    parameters->sensor.slow_permille = oscillator_permille(seed);
+    parameters->sensor.slow_permille = sim_node_oscillator_permille(seed);
 #ifdef SENSOR_MLX90316
     parameters->sensor.mlx90316 = true;
 #endif
@@ -231,7 +231,8 @@ sim_node *sim_node_new_as(const struct sim_node_parameters *parameters)
         return NULL;
     node->parameters = *parameters;
     node->chip = dspic_new(&parameters->chip,
-                           &(struct dspic_wiring){node, on_pin, on_start, on_loop, on_interrupt, on_trap, on_outside});
+                           &(struct dspic_wiring){node, sim_node_on_pin, sim_node_on_start, sim_node_on_loop,
+                                                  sim_node_on_interrupt, sim_node_on_trap, sim_node_on_outside});
     node->board.chip = node->chip;
     if (node->chip) {
         sim_node_program_default(node);

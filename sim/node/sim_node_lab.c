@@ -47,7 +47,7 @@ void sim_node_sensor_fault(sim_node *node, enum sim_sensor_fault fault, unsigned
 }
 
 /* The chip last: it may not return from this. */
-static void supply(sim_node *node, bool on)
+static void sim_node_lab_supply(sim_node *node, bool on)
 {
     const uint64_t now = sim_node_fs(node);
     struct mlx90333 *const sensors[] = {&node->sensor, &node->twin};
@@ -83,7 +83,7 @@ void sim_node_disturb(sim_node *node, enum sim_node_disturbance what, unsigned a
         break;
     case SIM_NODE_DARK:
     case SIM_NODE_LIGHT:
-        supply(node, what == SIM_NODE_LIGHT);
+        sim_node_lab_supply(node, what == SIM_NODE_LIGHT);
         break;
     case SIM_NODE_SENSOR_OFF:
     case SIM_NODE_SENSOR_ON:

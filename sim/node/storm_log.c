@@ -11,12 +11,12 @@ enum { NOW, BEFORE, EARLIER };
 #define EARLY_MOST_FS (((NODE_ORDER_MOST_US + 4u) * 26u / 25u + 2u - 29u) * 1000u * DSPIC_FS_PER_NS)
 
 /* After these neither the node's state nor the sensor's is known until a good record. */
-static bool makes_ill(const struct lane_faults *f)
+static bool storm_log_makes_ill(const struct lane_faults *f)
 {
     return f->disturbance != SIM_NODE_NOTHING && f->disturbance != SIM_NODE_UNREAD;
 }
 
-static bool loses_order(const struct lane_faults *f)
+static bool storm_log_loses_order(const struct lane_faults *f)
 {
     return f->mosi_flips != 0 || f->mosi_stuck || f->no_select || f->extra_clocks < 0 || f->glitch_bit > 0;
 }
@@ -25,18 +25,18 @@ void storm_log_deed(struct storm_log *log, bool any, enum storm_kind kind, const
 {
     log->deeds[EARLIER] = log->deeds[BEFORE];
     log->deeds[BEFORE] = log->deeds[NOW];
-    log->ill |= makes_ill(faults);
+    log->ill |= storm_log_makes_ill(faults);
     log->deeds[NOW] = (struct storm_deed){
         .any = any,
         .kind = kind,
         .faults = *faults,
-        .stray = faults->second_sync_ns > 0 || (log->deeds[BEFORE].stray && loses_order(faults)),
+        .stray = faults->second_sync_ns > 0 || (log->deeds[BEFORE].stray && storm_log_loses_order(faults)),
         .ill = log->ill,
     };
     log->counts.injected[kind] += any;
 }
 
-static bool breaks_line(const struct storm_deed *deed)
+static bool storm_log_breaks_line(const struct storm_deed *deed)
 {
     return deed->any && deed->kind <= STORM_EXTRA_CLOCK;
 }
@@ -44,13 +44,13 @@ static bool breaks_line(const struct storm_deed *deed)
 /* ------------------------------------------------------------------------------------------------- the sensor's line
  */
 
-static enum storm_line line_of(const struct storm_deed *deed, const struct sim_node_frame *frame)
+static enum storm_line storm_log_line_of(const struct storm_deed *deed, const struct sim_node_frame *frame)
 {
-    if (deed->ill || (frame->slip != 0 && breaks_line(deed)))
+    if (deed->ill || (frame->slip != 0 && storm_log_breaks_line(deed)))
         return STORM_LINE_OTHER;
     switch (frame->slip) {
     case 0:
-        return breaks_line(deed) ? (enum storm_line)deed->kind : STORM_LINE_OTHER;
+        return storm_log_breaks_line(deed) ? (enum storm_line)deed->kind : STORM_LINE_OTHER;
     case 1:
         return STORM_LINE_AHEAD;
     case 63:
@@ -61,7 +61,8 @@ static enum storm_line line_of(const struct storm_deed *deed, const struct sim_n
 }
 
 /* Is the line what the log says that this made of it? `last`: the bit before the frame. */
-static bool is_foreseen(enum storm_line line, const struct lane_faults *faults, const struct sim_node_frame *frame)
+static bool storm_log_is_foreseen(enum storm_line line, const struct lane_faults *faults,
+                                  const struct sim_node_frame *frame)
 {
     const unsigned argument = faults->sensor_argument;
     const uint64_t sent = frame->sent;
@@ -89,8 +90,8 @@ static bool is_foreseen(enum storm_line line, const struct lane_faults *faults, 
     }
 }
 
-static struct checks_odds odds_of(enum storm_line line, const struct lane_faults *faults,
-                                  const struct sim_node_frame *frame, bool held)
+static struct checks_odds storm_log_odds_of(enum storm_line line, const struct lane_faults *faults,
+                                            const struct sim_node_frame *frame, bool held)
 {
     switch (line) {
     case STORM_LINE_FLIP_TWO:
@@ -106,7 +107,7 @@ static struct checks_odds odds_of(enum storm_line line, const struct lane_faults
     }
 }
 
-static void count(struct storm_class *class, bool passed, bool good, struct checks_odds odds)
+static void storm_log_count(struct storm_class *class, bool passed, bool good, struct checks_odds odds)
 {
     class->events++;
     class->passed += passed;
@@ -116,7 +117,7 @@ static void count(struct storm_class *class, bool passed, bool good, struct chec
 }
 
 /* That of the tick in which the frame began. */
-static const struct storm_deed *deed_of(const struct storm_log *log, const struct lane_verdict *v)
+static const struct storm_deed *storm_log_deed_of(const struct storm_log *log, const struct lane_verdict *v)
 {
     const int64_t shift_fs = log->deeds[BEFORE].faults.shift_ns * (int64_t)DSPIC_FS_PER_NS;
     return &log->deeds[(int64_t)v->report.frame.begun_fs < (int64_t)v->sync_fs + shift_fs ? EARLIER : BEFORE];
@@ -126,53 +127,54 @@ static const struct storm_deed *deed_of(const struct storm_log *log, const struc
 static bool log_frame(struct storm_log *log, const struct lane_verdict *v)
 {
     const struct sim_node_frame *frame = &v->report.frame;
-    const struct storm_deed *deed = deed_of(log, v);
+    const struct storm_deed *deed = storm_log_deed_of(log, v);
     const bool hurt = frame->line != frame->sent, passed = hurt && checks_pass_line(frame->line);
-    const bool struck = breaks_line(deed) || frame->slip != 0, held = !frame->followed || (log->line & 1u) != 0;
-    const enum storm_line line = line_of(deed, frame);
+    const bool struck = storm_log_breaks_line(deed) || frame->slip != 0,
+               held = !frame->followed || (log->line & 1u) != 0;
+    const enum storm_line line = storm_log_line_of(deed, frame);
     log->line = frame->line;
     if (!struck && !deed->ill)
         log->counts.unforeseen += hurt;
     if (!struck && !hurt)
         return false;
-    log->counts.unforeseen += !is_foreseen(line, &deed->faults, frame);
-    count(&log->counts.lines[line], passed, passed && checks_pass_step(frame, frame->line),
-          odds_of(line, &deed->faults, frame, held));
+    log->counts.unforeseen += !storm_log_is_foreseen(line, &deed->faults, frame);
+    storm_log_count(&log->counts.lines[line], passed, passed && checks_pass_step(frame, frame->line),
+                    storm_log_odds_of(line, &deed->faults, frame, held));
     return hurt;
 }
 
 /* ---------------------------------------------------------------------------------------------------------- the link
  */
 
-static bool breaks_link(const struct lane_faults *f)
+static bool storm_log_breaks_link(const struct lane_faults *f)
 {
     return f->miso_flips != 0 || f->glitch_bit > 0 || f->extra_clocks < 0 || f->no_select || f->miso_stuck;
 }
 
 /* Select may have stayed low since the tick before: then nothing of it is missed. */
-static bool is_selected(const struct storm_log *log)
+static bool storm_log_is_selected(const struct storm_log *log)
 {
     return !log->deeds[NOW].faults.no_select || log->deeds[BEFORE].faults.select_stays;
 }
 
 /* Words of the link were taken otherwise in the tick before: its order, hurt, passed for one that announces a service
  * order; or its transfer ended early while select hid the end of the transfer before, by which the node notices. */
-static bool is_misaligned(const struct storm_log *log, uint8_t before)
+static bool storm_log_is_misaligned(const struct storm_log *log, uint8_t before)
 {
     const struct lane_faults *f = &log->deeds[BEFORE].faults;
     return (f->mosi_flips != 0 && checks_are_service(lane_order(before) ^ f->mosi_flips)) ||
            (f->extra_clocks < 0 && log->deeds[EARLIER].faults.select_stays);
 }
 
-static bool link_is_foreseen(const struct storm_log *log, const struct lane_verdict *v, uint8_t before)
+static bool storm_log_link_is_foreseen(const struct storm_log *log, const struct lane_verdict *v, uint8_t before)
 {
     const struct storm_deed *deed = &log->deeds[NOW];
     const struct lane_faults *f = &deed->faults;
-    if (deed->ill || v->rearmed || f->glitch_bit > 0 || is_misaligned(log, before))
+    if (deed->ill || v->rearmed || f->glitch_bit > 0 || storm_log_is_misaligned(log, before))
         return true;
     if (f->miso_stuck)
         return v->read == (f->miso_level ? ~UINT64_C(0) : 0u);
-    if (!is_selected(log))
+    if (!storm_log_is_selected(log))
         return v->read == ~UINT64_C(0);
     return v->read ==
            (f->extra_clocks < 0 ? checks_cut(v->armed, (unsigned)-f->extra_clocks) : v->armed ^ f->miso_flips);
@@ -186,8 +188,8 @@ static void log_transfer(struct storm_log *log, const struct lane_verdict *v, ui
     const bool passed = v->read != v->armed && v->read != ~UINT64_C(0) && checks_pass_record(v->read, expected);
     struct checks_odds odds = {0};
     enum storm_link link;
-    log->counts.unforeseen += !link_is_foreseen(log, v, expected);
-    if (deed->ill || !whole || !(breaks_link(f) || v->rearmed) || f->no_select || f->miso_stuck)
+    log->counts.unforeseen += !storm_log_link_is_foreseen(log, v, expected);
+    if (deed->ill || !whole || !(storm_log_breaks_link(f) || v->rearmed) || f->no_select || f->miso_stuck)
         return;
     if (f->glitch_bit > 0)
         link = STORM_LINK_GLITCH;
@@ -199,14 +201,14 @@ static void log_transfer(struct storm_log *log, const struct lane_verdict *v, ui
         link = (enum storm_link)(STORM_LINK_FLIPS_1 + __builtin_popcountll(f->miso_flips) - 1);
     if (link == STORM_LINK_CUT)
         odds = checks_odds_cut(v->armed);
-    count(&log->counts.links[link], passed, passed && v->good, odds);
+    storm_log_count(&log->counts.links[link], passed, passed && v->good, odds);
 }
 
 /* ----------------------------------------------------------------------------------------------------- good records */
 
 /* This tick's own SYNC was kept from the node, which took a stray one for it; so little before that its order did not
  * come too long after. */
-static bool is_displaced(const struct storm_log *log, const struct lane_verdict *v)
+static bool storm_log_is_displaced(const struct storm_log *log, const struct lane_verdict *v)
 {
     const struct sim_node_frame *frame = &v->report.frame;
     return log->deeds[BEFORE].faults.no_sync && log->deeds[EARLIER].stray &&
@@ -216,17 +218,17 @@ static bool is_displaced(const struct storm_log *log, const struct lane_verdict 
 
 /* A good record whose bits were hurt, or whose angles are not those of its tick: which check let it pass, and had to?
  */
-static void explain(struct storm_log *log, const struct lane_verdict *v, bool line_hurt, uint8_t expected)
+static void storm_log_explain(struct storm_log *log, const struct lane_verdict *v, bool line_hurt, uint8_t expected)
 {
     const struct sim_node_frame *frame = &v->report.frame;
     const bool link_hurt = v->read != v->armed;
-    if (link_hurt && (breaks_link(&log->deeds[NOW].faults) || v->rearmed || log->ill) &&
+    if (link_hurt && (storm_log_breaks_link(&log->deeds[NOW].faults) || v->rearmed || log->ill) &&
         checks_pass_record(v->read, expected))
         log->counts.missed_link++;
     else if (!link_hurt && line_hurt && checks_pass_line(frame->line) && checks_pass_step(frame, frame->line) &&
              checks_are_angles(frame->line, v->alpha, v->beta))
         log->counts.missed_line++;
-    else if (!link_hurt && !line_hurt && is_displaced(log, v))
+    else if (!link_hurt && !line_hurt && storm_log_is_displaced(log, v))
         log->counts.displaced++;
     else
         log->counts.unexplained++;
@@ -246,10 +248,10 @@ static void log_overwritten(struct storm_log *log, const struct lane_verdict *v)
 }
 
 /* What struck may not yet show. */
-static bool is_struck(const struct storm_log *log)
+static bool storm_log_is_struck(const struct storm_log *log)
 {
-    return makes_ill(&log->deeds[NOW].faults) || makes_ill(&log->deeds[BEFORE].faults) ||
-           makes_ill(&log->deeds[EARLIER].faults);
+    return storm_log_makes_ill(&log->deeds[NOW].faults) || storm_log_makes_ill(&log->deeds[BEFORE].faults) ||
+           storm_log_makes_ill(&log->deeds[EARLIER].faults);
 }
 
 bool storm_log_verdict(struct storm_log *log, unsigned tick, const struct lane_verdict *v)
@@ -264,7 +266,7 @@ bool storm_log_verdict(struct storm_log *log, unsigned tick, const struct lane_v
     log->counts.bad += !v->good;
     const bool sound = v->good && !v->altered && !line_hurt && v->read == v->armed;
     if (v->good && !sound)
-        explain(log, v, line_hurt, expected);
-    log->ill &= !sound || is_struck(log);
+        storm_log_explain(log, v, line_hurt, expected);
+    log->ill &= !sound || storm_log_is_struck(log);
     return sound;
 }

@@ -37,7 +37,8 @@ struct update_image update_image_of(uint16_t version)
 
 /* ---------------------------------------------------------------------------------------------------------- the bus */
 
-static void window(struct update_bench *b, const uint8_t *out, unsigned bytes, uint8_t in[WHISKER_RECORD_BYTES])
+static void update_bench_window(struct update_bench *b, const uint8_t *out, unsigned bytes,
+                                uint8_t in[WHISKER_RECORD_BYTES])
 {
     sim_node_select(b->node, true);
     memset(in, 0, WHISKER_RECORD_BYTES);
@@ -51,7 +52,7 @@ static void window(struct update_bench *b, const uint8_t *out, unsigned bytes, u
     sim_node_select(b->node, false);
 }
 
-static bool cuts_now(struct update_bench *b, int command, const uint8_t *argument)
+static bool update_bench_cuts_now(struct update_bench *b, int command, const uint8_t *argument)
 {
     const bool now = b->cut.due && command == b->cut.command &&
                      (command != (int)WHISKER_SERVICE_COMMAND_BLOCK || whisker_get_u16(argument) == b->cut.block);
@@ -65,10 +66,10 @@ void update_tick(struct update_bench *b, int command, const uint8_t *argument, c
     bytes[WHISKER_ORDER_COMMAND] = command < 0 ? WHISKER_COMMAND_SAMPLE : WHISKER_COMMAND_SERVICE;
     bytes[WHISKER_ORDER_CRC] = whisker_crc8(bytes, WHISKER_ORDER_CRC);
     b->ticks++;
-    if (cuts_now(b, command, argument))
+    if (update_bench_cuts_now(b, command, argument))
         sim_node_cut(b->node, b->cut.after_ns);
     sim_node_sync(b->node, (struct sim_field){0});
-    window(b, bytes, WHISKER_ORDER_BYTES, b->record);
+    update_bench_window(b, bytes, WHISKER_ORDER_BYTES, b->record);
     b->answered = false;
     if (command >= 0) {
         bytes[WHISKER_SERVICE_COMMAND] = (uint8_t)command;
@@ -78,7 +79,7 @@ void update_tick(struct update_bench *b, int command, const uint8_t *argument, c
         const uint32_t crc = crc32_of(WHISKER_CRC32_INIT, bytes, WHISKER_SERVICE_CRC32) ^ WHISKER_CRC32_XOR_OUT;
         for (unsigned i = 0; i < 4u; i++)
             bytes[WHISKER_SERVICE_CRC32 + i] = (uint8_t)(crc >> (24u - 8u * i) & 0xFFu);
-        window(b, bytes, WHISKER_SERVICE_BYTES, b->answer);
+        update_bench_window(b, bytes, WHISKER_SERVICE_BYTES, b->answer);
         b->answered = whisker_crc8(b->answer, WHISKER_RECORD_CRC) == b->answer[WHISKER_RECORD_CRC] &&
                       b->answer[WHISKER_RECORD_TICK] == b->asked &&
                       b->answer[WHISKER_RECORD_STATUS + 1u] >> 2 == WHISKER_CODE_ANSWER;
@@ -88,8 +89,8 @@ void update_tick(struct update_bench *b, int command, const uint8_t *argument, c
 }
 
 /* Asks, again and again if need be, until there is an answer; false if none comes. */
-static bool ask(struct update_bench *b, uint8_t command, const uint8_t *argument, const uint8_t *data, uint16_t *alpha,
-                uint16_t *beta)
+static bool update_bench_ask(struct update_bench *b, uint8_t command, const uint8_t *argument, const uint8_t *data,
+                             uint16_t *alpha, uint16_t *beta)
 {
     for (int i = 0; i < PATIENCE; i++) {
         if (i % 4 == 0)
@@ -110,7 +111,7 @@ bool update_info(struct update_bench *b, uint8_t item, uint32_t *value)
 {
     const uint8_t argument[5] = {item};
     uint16_t alpha = 0, beta = 0;
-    const bool answered = ask(b, WHISKER_SERVICE_COMMAND_INFO, argument, UPDATE_NOTHING, &alpha, &beta);
+    const bool answered = update_bench_ask(b, WHISKER_SERVICE_COMMAND_INFO, argument, UPDATE_NOTHING, &alpha, &beta);
     *value = alpha | (uint32_t)beta << 16;
     return answered;
 }
@@ -124,7 +125,7 @@ int update_run(struct update_bench *b, const struct update_image *image, uint32_
     whisker_put_u32(argument, serial);
     update_tick(b, WHISKER_SERVICE_COMMAND_ENTER, argument, UPDATE_NOTHING);
     for (int i = 0; i < PATIENCE && state != WHISKER_NODE_STATE_LOADING; i++) {
-        if (!ask(b, WHISKER_SERVICE_COMMAND_BEGIN, argument, image->bytes, &next, &state))
+        if (!update_bench_ask(b, WHISKER_SERVICE_COMMAND_BEGIN, argument, image->bytes, &next, &state))
             return -1;
         if (state > WHISKER_NODE_STATE_COMPLETE)
             return state;
@@ -134,10 +135,10 @@ int update_run(struct update_bench *b, const struct update_image *image, uint32_
     while (next < UPDATE_BLOCKS && state == WHISKER_NODE_STATE_LOADING) {
         uint8_t number[5] = {(uint8_t)(next & 0xFFu), (uint8_t)(next >> 8)};
         const uint8_t *block = image->bytes + WHISKER_IMAGE_HEADER_BYTES + next * SERVICE_BLOCK_BYTES;
-        if (!ask(b, WHISKER_SERVICE_COMMAND_BLOCK, number, block, &next, &state))
+        if (!update_bench_ask(b, WHISKER_SERVICE_COMMAND_BLOCK, number, block, &next, &state))
             return -1;
     }
-    if (!ask(b, WHISKER_SERVICE_COMMAND_FINISH, UPDATE_NOTHING, UPDATE_NOTHING, &next, &state))
+    if (!update_bench_ask(b, WHISKER_SERVICE_COMMAND_FINISH, UPDATE_NOTHING, UPDATE_NOTHING, &next, &state))
         return -1;
     update_tick(b, WHISKER_SERVICE_COMMAND_RUN, argument, UPDATE_NOTHING);
     return state;

@@ -45,7 +45,7 @@ const struct update_cut_case UPDATE_CUT_CASES[] = {
 };
 const unsigned UPDATE_CUT_CASE_COUNT = sizeof UPDATE_CUT_CASES / sizeof *UPDATE_CUT_CASES;
 
-static bool is_absent(const struct update_bench *b)
+static bool update_cuts_is_absent(const struct update_bench *b)
 {
     uint8_t common = 0xFFu;
     for (unsigned i = 0; i < WHISKER_RECORD_BYTES; i++)
@@ -53,23 +53,23 @@ static bool is_absent(const struct update_bench *b)
     return common == 0xFFu;
 }
 
-static bool speaks(const struct update_bench *b)
+static bool update_cuts_speaks(const struct update_bench *b)
 {
     const int code = update_code(b);
     return code == (int)WHISKER_CODE_OK || code == (int)WHISKER_CODE_LOADER;
 }
 
-static unsigned ticks_until_it_speaks(struct update_bench *b)
+static unsigned update_cuts_ticks_until_it_speaks(struct update_bench *b)
 {
     unsigned ticks = 0;
     do {
         update_ticks(b, 1);
         ticks++;
-    } while (!speaks(b) && ticks < LONGEST);
+    } while (!update_cuts_speaks(b) && ticks < LONGEST);
     return ticks;
 }
 
-static enum update_fate fate_of(const struct update_bench *b)
+static enum update_fate update_cuts_fate_of(const struct update_bench *b)
 {
     switch (sim_node_version(b->node)) {
     case 0:
@@ -82,7 +82,7 @@ static enum update_fate fate_of(const struct update_bench *b)
 }
 
 /* The code fits what runs, five times in a row. */
-static bool is_steady(struct update_bench *b)
+static bool update_cuts_is_steady(struct update_bench *b)
 {
     const int wanted = sim_node_version(b->node) == 0 ? (int)WHISKER_CODE_LOADER : (int)WHISKER_CODE_OK;
     bool yes = true;
@@ -93,7 +93,7 @@ static bool is_steady(struct update_bench *b)
     return yes;
 }
 
-static void wait_for_the_cut(struct update_bench *b)
+static void update_cuts_wait_for_the_cut(struct update_bench *b)
 {
     for (unsigned i = 0; i < LONGEST && !sim_node_dark(b->node); i++)
         update_ticks(b, 1);
@@ -111,17 +111,17 @@ struct update_cut_outcome update_cut_run(struct update_cut cut, uint64_t after_n
     if (!cut.due)
         sim_node_cut(b.node, after_ns);
     update_run(&b, &image, 0);
-    wait_for_the_cut(&b);
+    update_cuts_wait_for_the_cut(&b);
     const bool cuts = sim_node_dark(b.node);
     update_ticks(&b, 1);
-    out.told = cuts && is_absent(&b);
+    out.told = cuts && update_cuts_is_absent(&b);
     update_ticks(&b, DARK_TICKS - 1);
     sim_node_restore(b.node);
-    out.ticks = ticks_until_it_speaks(&b);
-    out.fate = is_steady(&b) ? fate_of(&b) : 0;
+    out.ticks = update_cuts_ticks_until_it_speaks(&b);
+    out.fate = update_cuts_is_steady(&b) ? update_cuts_fate_of(&b) : 0;
     out.again = update_run(&b, &image, 0) == (int)WHISKER_NODE_STATE_COMPLETE;
     update_ticks(&b, UPDATE_CUT_TICKS + 10);
-    out.again = out.again && is_steady(&b) && fate_of(&b) == FATE_NEW;
+    out.again = out.again && update_cuts_is_steady(&b) && update_cuts_fate_of(&b) == FATE_NEW;
     sim_node_free(b.node);
     return out;
 }

@@ -37,7 +37,7 @@ static void raise_interrupt(struct dspic *chip, unsigned irq)
 {
     registers_write(chip, IEC0 + 2u * (irq / 16u),
                     (uint16_t)(registers_read(chip, IEC0 + 2u * (irq / 16u)) | 1u << irq % 16u));
-    irq_raise(chip, irq);
+    dspic_irq_raise(chip, irq);
 }
 
 static const char *outcome(const struct image_costs *before, unsigned number)

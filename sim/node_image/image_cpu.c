@@ -11,14 +11,14 @@ enum { RAM_END = 0x4800, STACK_FRAME = 4 };
 /* SR's low byte, lowest bit first. */
 static const uint8_t STATUS[] = {FLAG_C, FLAG_Z, FLAG_OV, FLAG_N, FLAG_RA, FLAG_IPL0, FLAG_IPL1, FLAG_IPL2};
 
-static uint32_t core_get(const struct image_cpu *cpu, uint32_t at, unsigned size)
+static uint32_t image_cpu_core_get(const struct image_cpu *cpu, uint32_t at, unsigned size)
 {
     uint32_t value = 0;
     memcpy(&value, cpu->core + at, size);
     return value;
 }
 
-static void core_set(struct image_cpu *cpu, uint32_t at, unsigned size, uint32_t value)
+static void image_cpu_core_set(struct image_cpu *cpu, uint32_t at, unsigned size, uint32_t value)
 {
     memcpy(cpu->core + at, &value, size);
     if (size == 1u && at < SPLIM)
@@ -35,7 +35,7 @@ uint16_t image_cpu_status(const struct image_cpu *cpu)
     return (uint16_t)value;
 }
 
-static void set_status(struct image_cpu *cpu, uint16_t value)
+static void image_cpu_set_status(struct image_cpu *cpu, uint16_t value)
 {
     for (unsigned i = 0; i < sizeof STATUS; i++)
         cpu->flags[STATUS[i]] = (unsigned)value >> i & 1u;
@@ -44,14 +44,14 @@ static void set_status(struct image_cpu *cpu, uint16_t value)
 }
 
 /* The model counts the cycles of some accesses itself. Interrupts wait meanwhile: they come between instructions. */
-static unsigned hold(struct image_cpu *cpu)
+static unsigned image_cpu_hold(struct image_cpu *cpu)
 {
     const unsigned level = cpu->chip->level;
     cpu->chip->level = 7;
     return level;
 }
 
-static void release(struct image_cpu *cpu, unsigned level)
+static void image_cpu_release(struct image_cpu *cpu, unsigned level)
 {
     cpu->chip->level = level;
     cpu->chip->look = true;
@@ -60,74 +60,74 @@ static void release(struct image_cpu *cpu, unsigned level)
 /* ------------------------------------------------------------------------------------------------------------- memory
  */
 
-static void trap(struct image_cpu *cpu, enum dspic_trap which)
+static void image_cpu_trap(struct image_cpu *cpu, enum dspic_trap which)
 {
     cpu->faulty = true;
     cpu->fault = which;
 }
 
-static uint8_t *ram_at(struct image_cpu *cpu, uint32_t at)
+static uint8_t *image_cpu_ram_at(struct image_cpu *cpu, uint32_t at)
 {
     if (at < DSPIC_DMA_RAM)
         return cpu->ram + (at - IMAGE_RAM_START);
     return (uint8_t *)dspic_dma_ram(cpu->chip) + (at - DSPIC_DMA_RAM);
 }
 
-static uint16_t constant(struct image_cpu *cpu, uint32_t at)
+static uint16_t image_cpu_constant(struct image_cpu *cpu, uint32_t at)
 {
     const uint32_t index = (((uint32_t)registers_read(cpu->chip, PSVPAG) & 0xFFu) << 15 | (at & 0x7FFFu)) / 2u;
     return (uint16_t)(index < FLASH_WORDS ? cpu->chip->flash[index] : 0u);
 }
 
 /* A 16-bit word, or the half of one that an odd address means. */
-static uint16_t read_word(struct image_cpu *cpu, uint32_t at)
+static uint16_t image_cpu_read_word(struct image_cpu *cpu, uint32_t at)
 {
     if (at < IMAGE_CORE_END)
-        return (uint16_t)core_get(cpu, at, 2);
+        return (uint16_t)image_cpu_core_get(cpu, at, 2);
     if (at == SR)
         return image_cpu_status(cpu);
     if (at < DSPIC_SFR_END)
         return registers_read(cpu->chip, (uint16_t)at);
     if (at < RAM_END) {
         uint16_t value;
-        memcpy(&value, ram_at(cpu, at), 2);
+        memcpy(&value, image_cpu_ram_at(cpu, at), 2);
         return value;
     }
     if (at >= 0x8000u && registers_read(cpu->chip, CORCON) & CORCON_PSV)
-        return constant(cpu, at);
-    trap(cpu, DSPIC_TRAP_ADDRESS);
+        return image_cpu_constant(cpu, at);
+    image_cpu_trap(cpu, DSPIC_TRAP_ADDRESS);
     return 0;
 }
 
-static uint32_t data_get(struct image_cpu *cpu, uint32_t at, unsigned size)
+static uint32_t image_cpu_data_get(struct image_cpu *cpu, uint32_t at, unsigned size)
 {
     at &= 0xFFFFu;
     if (at >= 0x8000u)
         cpu->extra++;
     if (at + size <= IMAGE_CORE_END)
-        return core_get(cpu, at, size);
+        return image_cpu_core_get(cpu, at, size);
     if (size == 1u)
-        return (uint32_t)read_word(cpu, at & ~1u) >> 8u * (at & 1u) & 0xFFu;
+        return (uint32_t)image_cpu_read_word(cpu, at & ~1u) >> 8u * (at & 1u) & 0xFFu;
     if (at & 1u)
-        trap(cpu, DSPIC_TRAP_ADDRESS);
-    uint32_t value = read_word(cpu, at & ~1u);
+        image_cpu_trap(cpu, DSPIC_TRAP_ADDRESS);
+    uint32_t value = image_cpu_read_word(cpu, at & ~1u);
     if (size > 2u)
-        value |= (uint32_t)read_word(cpu, (at & ~1u) + 2u) << 16;
+        value |= (uint32_t)image_cpu_read_word(cpu, (at & ~1u) + 2u) << 16;
     return value;
 }
 
-static bool seen_outside(uint32_t at)
+static bool image_cpu_seen_outside(uint32_t at)
 {
     return at == SPI1BUF || at == SPI2BUF || at == T2CON || at == LATB;
 }
 
 /* Half of a register is written by reading the whole: only OSCCON knows its halves apart. */
-static void write_half(struct image_cpu *cpu, uint32_t at, uint8_t value)
+static void image_cpu_write_half(struct image_cpu *cpu, uint32_t at, uint8_t value)
 {
     if (at == OSCCON || at == OSCCON + 1u) {
-        const unsigned level = hold(cpu);
+        const unsigned level = image_cpu_hold(cpu);
         dspic_byte_write(cpu->chip, (uint16_t)at, value);
-        release(cpu, level);
+        image_cpu_release(cpu, level);
         cpu->cycles++;
         cpu->extra--;
         return;
@@ -137,118 +137,118 @@ static void write_half(struct image_cpu *cpu, uint32_t at, uint8_t value)
     registers_write(cpu->chip, (uint16_t)(at & ~1u), (uint16_t)((word & ~(0xFFu << shift)) | (unsigned)value << shift));
 }
 
-static void write_register(struct image_cpu *cpu, uint32_t at, unsigned size, uint16_t value)
+static void image_cpu_write_register(struct image_cpu *cpu, uint32_t at, unsigned size, uint16_t value)
 {
     if (at == SR)
-        set_status(cpu, value);
+        image_cpu_set_status(cpu, value);
     else if (size == 1u)
-        write_half(cpu, at, (uint8_t)value);
+        image_cpu_write_half(cpu, at, (uint8_t)value);
     else
         registers_write(cpu->chip, (uint16_t)at, value);
-    if (seen_outside(at & ~1u))
+    if (image_cpu_seen_outside(at & ~1u))
         cpu->acted = cpu->cycles;
 }
 
-static void write_word(struct image_cpu *cpu, uint32_t at, unsigned size, uint16_t value)
+static void image_cpu_write_word(struct image_cpu *cpu, uint32_t at, unsigned size, uint16_t value)
 {
     if (at < DSPIC_SFR_END)
-        write_register(cpu, at, size, value);
+        image_cpu_write_register(cpu, at, size, value);
     else if (at < RAM_END)
-        memcpy(ram_at(cpu, at), &value, size);
+        memcpy(image_cpu_ram_at(cpu, at), &value, size);
     else
-        trap(cpu, DSPIC_TRAP_ADDRESS);
+        image_cpu_trap(cpu, DSPIC_TRAP_ADDRESS);
 }
 
-static void data_set(struct image_cpu *cpu, uint32_t at, unsigned size, uint32_t value)
+static void image_cpu_data_set(struct image_cpu *cpu, uint32_t at, unsigned size, uint32_t value)
 {
     at &= 0xFFFFu;
     if (at + size <= IMAGE_CORE_END) {
-        core_set(cpu, at, size, value);
+        image_cpu_core_set(cpu, at, size, value);
         return;
     }
     if (size > 1u && at & 1u)
-        trap(cpu, DSPIC_TRAP_ADDRESS);
+        image_cpu_trap(cpu, DSPIC_TRAP_ADDRESS);
     else if (size == 1u)
-        write_word(cpu, at, 1u, (uint16_t)value);
+        image_cpu_write_word(cpu, at, 1u, (uint16_t)value);
     else {
-        write_word(cpu, at, 2u, (uint16_t)value);
+        image_cpu_write_word(cpu, at, 2u, (uint16_t)value);
         if (size > 2u)
-            write_word(cpu, at + 2u, 2u, (uint16_t)(value >> 16));
+            image_cpu_write_word(cpu, at + 2u, 2u, (uint16_t)(value >> 16));
     }
 }
 
 /* The table instructions: an odd place means the word's high byte. */
-static uint32_t load(struct image_cpu *cpu, const struct operation *o, uint32_t at)
+static uint32_t image_cpu_load(struct image_cpu *cpu, const struct operation *o, uint32_t at)
 {
     if (o->b.value == 0)
-        return data_get(cpu, at, o->result.size);
-    const unsigned level = hold(cpu);
+        return image_cpu_data_get(cpu, at, o->result.size);
+    const unsigned level = image_cpu_hold(cpu);
     const uint16_t value = dspic_table_read(cpu->chip, (uint16_t)(at & 0xFFFEu), at & 1u);
-    release(cpu, level);
+    image_cpu_release(cpu, level);
     return value;
 }
 
-static void store(struct image_cpu *cpu, const struct operation *o, uint32_t at, uint32_t value)
+static void image_cpu_store(struct image_cpu *cpu, const struct operation *o, uint32_t at, uint32_t value)
 {
     if (o->result.value == 0) {
-        data_set(cpu, at, o->b.size, value);
+        image_cpu_data_set(cpu, at, o->b.size, value);
         return;
     }
-    const unsigned level = hold(cpu);
+    const unsigned level = image_cpu_hold(cpu);
     dspic_table_write(cpu->chip, (uint16_t)(at & 0xFFFEu), at & 1u, (uint16_t)value);
-    release(cpu, level);
+    image_cpu_release(cpu, level);
 }
 
 /* -------------------------------------------------------------------------------------------------------- operations
  */
 
-static uint32_t mask_of(unsigned size)
+static uint32_t image_cpu_mask_of(unsigned size)
 {
     return size >= 4u ? UINT32_MAX : (UINT32_C(1) << 8u * size) - 1u;
 }
 
-static uint32_t value_of(struct image_cpu *cpu, const struct operand *o)
+static uint32_t image_cpu_value_of(struct image_cpu *cpu, const struct operand *o)
 {
     switch (o->kind) {
     case OPERAND_CONSTANT:
-        return o->value & mask_of(o->size);
+        return o->value & image_cpu_mask_of(o->size);
     case OPERAND_UNIQUE:
         return cpu->uniques[o->value];
     case OPERAND_FLAG:
         return cpu->flags[o->value];
     case OPERAND_DATA:
-        return data_get(cpu, o->value, o->size);
+        return image_cpu_data_get(cpu, o->value, o->size);
     default:
         return 0;
     }
 }
 
-static void set_value(struct image_cpu *cpu, const struct operand *o, uint32_t value)
+static void image_cpu_set_value(struct image_cpu *cpu, const struct operand *o, uint32_t value)
 {
-    value &= mask_of(o->size);
+    value &= image_cpu_mask_of(o->size);
     if (o->kind == OPERAND_UNIQUE)
         cpu->uniques[o->value] = value;
     else if (o->kind == OPERAND_FLAG)
         cpu->flags[o->value] = value;
     else if (o->kind == OPERAND_DATA)
-        data_set(cpu, o->value, o->size, value);
+        image_cpu_data_set(cpu, o->value, o->size, value);
 }
 
-static int64_t extended(uint32_t value, unsigned size)
+static int64_t image_cpu_extended(uint32_t value, unsigned size)
 {
     const uint32_t sign = UINT32_C(1) << (8u * size - 1u);
-    return (int64_t)(value & mask_of(size)) - (value & sign ? (int64_t)mask_of(size) + 1 : 0);
+    return (int64_t)(value & image_cpu_mask_of(size)) - (value & sign ? (int64_t)image_cpu_mask_of(size) + 1 : 0);
 }
 
-static bool overflows(int64_t value, unsigned size)
+static bool image_cpu_overflows(int64_t value, unsigned size)
 {
-    const int64_t most = (int64_t)(mask_of(size) >> 1);
+    const int64_t most = (int64_t)(image_cpu_mask_of(size) >> 1);
     return value > most || value < -most - 1;
 }
 
-static uint32_t compare(uint8_t code, const struct operation *o, uint32_t a, uint32_t b)
+static uint32_t image_cpu_compare(uint8_t code, const struct operation *o, uint32_t a, uint32_t b)
 {
-    const int64_t as = extended(a, o->a.size), bs = extended(b, o->a.size);
+    const int64_t as = image_cpu_extended(a, o->a.size), bs = image_cpu_extended(b, o->a.size);
     switch (code) {
     case PCODE_EQUAL:
         return a == b;
@@ -263,22 +263,22 @@ static uint32_t compare(uint8_t code, const struct operation *o, uint32_t a, uin
     case PCODE_LESS_EQUAL:
         return a <= b;
     case PCODE_CARRY:
-        return (uint64_t)a + b > mask_of(o->a.size);
+        return (uint64_t)a + b > image_cpu_mask_of(o->a.size);
     case PCODE_SIGNED_CARRY:
-        return overflows(as + bs, o->a.size);
+        return image_cpu_overflows(as + bs, o->a.size);
     default: /* PCODE_SIGNED_BORROW */
-        return overflows(as - bs, o->a.size);
+        return image_cpu_overflows(as - bs, o->a.size);
     }
 }
 
-static uint32_t shifted(uint8_t code, const struct operation *o, uint32_t a, uint32_t b)
+static uint32_t image_cpu_shifted(uint8_t code, const struct operation *o, uint32_t a, uint32_t b)
 {
     if (code == PCODE_SIGNED_RIGHT)
-        return (uint32_t)(extended(a, o->a.size) >> (b > 31u ? 31u : b));
+        return (uint32_t)(image_cpu_extended(a, o->a.size) >> (b > 31u ? 31u : b));
     return b > 31u ? 0u : code == PCODE_LEFT ? a << b : a >> b;
 }
 
-static uint32_t logic(uint8_t code, uint32_t a, uint32_t b)
+static uint32_t image_cpu_logic(uint8_t code, uint32_t a, uint32_t b)
 {
     switch (code) {
     case PCODE_XOR:
@@ -292,20 +292,20 @@ static uint32_t logic(uint8_t code, uint32_t a, uint32_t b)
     }
 }
 
-static void unknown(const struct image_cpu *cpu, const char *what, unsigned number)
+static void image_cpu_unknown(const struct image_cpu *cpu, const char *what, unsigned number)
 {
     fprintf(stderr, "image: %s %#x at %#06x\n", what, number, 2u * (unsigned)cpu->pc);
     abort();
 }
 
-static uint32_t compute(struct image_cpu *cpu, const struct operation *o, uint32_t a, uint32_t b)
+static uint32_t image_cpu_compute(struct image_cpu *cpu, const struct operation *o, uint32_t a, uint32_t b)
 {
     switch (o->code) {
     case PCODE_COPY:
     case PCODE_ZERO_EXTEND:
         return a;
     case PCODE_SIGN_EXTEND:
-        return (uint32_t)extended(a, o->a.size);
+        return (uint32_t)image_cpu_extended(a, o->a.size);
     case PCODE_ADD:
         return a + b;
     case PCODE_SUBTRACT:
@@ -325,34 +325,34 @@ static uint32_t compute(struct image_cpu *cpu, const struct operation *o, uint32
     case PCODE_LEFT:
     case PCODE_RIGHT:
     case PCODE_SIGNED_RIGHT:
-        return shifted(o->code, o, a, b);
+        return image_cpu_shifted(o->code, o, a, b);
     default:
         if (o->code >= PCODE_EQUAL && o->code <= PCODE_SIGNED_BORROW)
-            return compare(o->code, o, a, b);
+            return image_cpu_compare(o->code, o, a, b);
         if (o->code >= PCODE_XOR && o->code <= PCODE_BOOL_OR)
-            return logic(o->code, a, b);
-        unknown(cpu, "operation", o->code);
+            return image_cpu_logic(o->code, a, b);
+        image_cpu_unknown(cpu, "operation", o->code);
         return 0;
     }
 }
 
 /* Does one operation; returns how many to go on by. */
-static int32_t operate(struct image_cpu *cpu, const struct operation *o)
+static int32_t image_cpu_operate(struct image_cpu *cpu, const struct operation *o)
 {
-    const uint32_t a = value_of(cpu, &o->a);
+    const uint32_t a = image_cpu_value_of(cpu, &o->a);
     switch (o->code) {
     case PCODE_LOAD:
-        set_value(cpu, &o->result, load(cpu, o, a));
+        image_cpu_set_value(cpu, &o->result, image_cpu_load(cpu, o, a));
         return 1;
     case PCODE_STORE:
-        store(cpu, o, a, value_of(cpu, &o->b));
+        image_cpu_store(cpu, o, a, image_cpu_value_of(cpu, &o->b));
         return 1;
     case PCODE_BRANCH | PCODE_RELATIVE:
         return (int32_t)a;
     case PCODE_CBRANCH | PCODE_RELATIVE:
-        return value_of(cpu, &o->b) ? (int32_t)a : 1;
+        return image_cpu_value_of(cpu, &o->b) ? (int32_t)a : 1;
     case PCODE_CBRANCH:
-        if (!value_of(cpu, &o->b))
+        if (!image_cpu_value_of(cpu, &o->b))
             return 1;
         cpu->next = a;
         return INT16_MAX;
@@ -366,7 +366,7 @@ static int32_t operate(struct image_cpu *cpu, const struct operation *o)
         cpu->next = (a & 0x7FFFFFu) / 2u;
         return INT16_MAX;
     default:
-        set_value(cpu, &o->result, compute(cpu, o, a, value_of(cpu, &o->b)));
+        image_cpu_set_value(cpu, &o->result, image_cpu_compute(cpu, o, a, image_cpu_value_of(cpu, &o->b)));
         return 1;
     }
 }
@@ -374,32 +374,32 @@ static int32_t operate(struct image_cpu *cpu, const struct operation *o)
 /* ------------------------------------------------------------------------------------------------------ instructions
  */
 
-static const struct instruction *fetch(struct image_cpu *cpu)
+static const struct instruction *image_cpu_fetch(struct image_cpu *cpu)
 {
     static const struct instruction ERASED = {.word = 0xFFFFFFu, .length = 1, .cycles = 1};
     if (cpu->pc >= FLASH_WORDS)
-        unknown(cpu, "no flash", 0);
+        image_cpu_unknown(cpu, "no flash", 0);
     const uint32_t word = cpu->chip->flash[cpu->pc], known = cpu->table->at[cpu->pc];
     const struct instruction *i = known ? &cpu->table->instructions[known - 1u] : &ERASED;
     if (i->word != word && word == ERASED.word)
         i = &ERASED;
     if (i->word != word || (i->length == 2u && cpu->chip->flash[cpu->pc + 1u] != i->second))
-        unknown(cpu, "no translation of", word);
+        image_cpu_unknown(cpu, "no translation of", word);
     return i;
 }
 
-static void watch_stack(struct image_cpu *cpu)
+static void image_cpu_watch_stack(struct image_cpu *cpu)
 {
-    const uint32_t top = core_get(cpu, W15, 2), limit = core_get(cpu, SPLIM, 2);
+    const uint32_t top = image_cpu_core_get(cpu, W15, 2), limit = image_cpu_core_get(cpu, SPLIM, 2);
     if (top > cpu->deepest)
         cpu->deepest = (uint16_t)top;
     if (top < IMAGE_RAM_START || (limit != 0 && top > limit))
-        trap(cpu, DSPIC_TRAP_STACK);
+        image_cpu_trap(cpu, DSPIC_TRAP_STACK);
 }
 
-static void do_special(struct image_cpu *cpu, const struct instruction *i)
+static void image_cpu_do_special(struct image_cpu *cpu, const struct instruction *i)
 {
-    const unsigned level = hold(cpu);
+    const unsigned level = image_cpu_hold(cpu);
     switch (i->special) {
     case IMAGE_IDLE:
         dspic_idle(cpu->chip);
@@ -428,10 +428,10 @@ static void do_special(struct image_cpu *cpu, const struct instruction *i)
     default:
         break;
     }
-    release(cpu, level);
+    image_cpu_release(cpu, level);
 }
 
-static void trace(struct image_cpu *cpu)
+static void image_cpu_trace(struct image_cpu *cpu)
 {
     struct image_trace *t = cpu->trace;
     const uint32_t at = cpu->pc;
@@ -444,7 +444,7 @@ static void trace(struct image_cpu *cpu)
         t->most[at] = t->times[at];
 }
 
-static void spend(struct image_cpu *cpu, const struct instruction *i)
+static void image_cpu_spend(struct image_cpu *cpu, const struct instruction *i)
 {
     const bool branched = cpu->next != cpu->pc + i->length;
     const bool repeats = cpu->next == cpu->pc && i->special == IMAGE_PLAIN;
@@ -466,20 +466,20 @@ static void spend(struct image_cpu *cpu, const struct instruction *i)
     dspic_spend(cpu->chip, (uint64_t)cycles);
 }
 
-static void step(struct image_cpu *cpu)
+static void image_cpu_step(struct image_cpu *cpu)
 {
-    const struct instruction *i = fetch(cpu);
+    const struct instruction *i = image_cpu_fetch(cpu);
     const struct operation *o = cpu->table->operations + i->first;
     cpu->extra = 0;
     cpu->next = cpu->pc + i->length;
     for (int32_t n = 0; n < i->count;)
-        n += operate(cpu, &o[n]);
+        n += image_cpu_operate(cpu, &o[n]);
     if (i->special != IMAGE_PLAIN)
-        do_special(cpu, i);
-    watch_stack(cpu);
+        image_cpu_do_special(cpu, i);
+    image_cpu_watch_stack(cpu);
     if (cpu->trace)
-        trace(cpu);
-    spend(cpu, i);
+        image_cpu_trace(cpu);
+    image_cpu_spend(cpu, i);
     if (cpu->faulty) {
         cpu->faulty = false;
         dspic_disturb_trap(cpu->chip, cpu->fault);
@@ -490,18 +490,18 @@ void image_cpu_reset(struct image_cpu *cpu)
 {
     cpu->pc = 0;
     memset(cpu->flags, 0, sizeof cpu->flags);
-    core_set(cpu, W15, 2, IMAGE_RAM_START);
-    core_set(cpu, SPLIM, 2, 0);
+    image_cpu_core_set(cpu, W15, 2, IMAGE_RAM_START);
+    image_cpu_core_set(cpu, SPLIM, 2, 0);
     cpu->repeated = cpu->returned = cpu->idles = cpu->faulty = false;
     cpu->late = 0;
 }
 
 uint16_t image_cpu_stack(const struct image_cpu *cpu)
 {
-    return (uint16_t)core_get(cpu, W15, 2);
+    return (uint16_t)image_cpu_core_get(cpu, W15, 2);
 }
 
-static uint8_t random_byte(uint64_t *state)
+static uint8_t image_cpu_random_byte(uint64_t *state)
 {
     *state ^= *state << 13;
     *state ^= *state >> 7;
@@ -513,32 +513,32 @@ void image_cpu_scramble(struct image_cpu *cpu, uint64_t seed)
 {
     uint64_t state = seed * UINT64_C(0x9E3779B97F4A7C15) + 1u;
     for (unsigned i = 0; i < sizeof cpu->ram; i++)
-        cpu->ram[i] = random_byte(&state);
+        cpu->ram[i] = image_cpu_random_byte(&state);
     for (unsigned i = 0; i < sizeof cpu->core; i++)
-        cpu->core[i] = random_byte(&state);
+        cpu->core[i] = image_cpu_random_byte(&state);
     for (unsigned i = 0; i < DSPIC_DMA_RAM_WORDS; i++)
-        dspic_dma_ram(cpu->chip)[i] = (uint16_t)(random_byte(&state) | random_byte(&state) << 8);
+        dspic_dma_ram(cpu->chip)[i] = (uint16_t)(image_cpu_random_byte(&state) | image_cpu_random_byte(&state) << 8);
 }
 
 void image_cpu_run(struct image_cpu *cpu)
 {
     cpu->idles = false;
     while (!cpu->idles && !cpu->chip->hung)
-        step(cpu);
+        image_cpu_step(cpu);
 }
 
 void image_cpu_interrupt(struct image_cpu *cpu, uint32_t vector)
 {
-    const uint32_t skip = cpu->flags[FLAG_SKIP], top = core_get(cpu, W15, 2);
+    const uint32_t skip = cpu->flags[FLAG_SKIP], top = image_cpu_core_get(cpu, W15, 2);
     const uint16_t late = cpu->late;
     const bool repeated = cpu->repeated, idles = cpu->idles;
-    data_set(cpu, top, STACK_FRAME, (uint32_t)(image_cpu_status(cpu) & 0xFFu) << 24 | 2u * cpu->pc);
-    core_set(cpu, W15, 2, top + STACK_FRAME);
+    image_cpu_data_set(cpu, top, STACK_FRAME, (uint32_t)(image_cpu_status(cpu) & 0xFFu) << 24 | 2u * cpu->pc);
+    image_cpu_core_set(cpu, W15, 2, top + STACK_FRAME);
     cpu->pc = cpu->chip->flash[vector / 2u] / 2u;
     cpu->repeated = false;
     cpu->late = 0;
     for (cpu->returned = false; !cpu->returned && !cpu->chip->hung;)
-        step(cpu);
+        image_cpu_step(cpu);
     if (!cpu->returned)
         return;
     cpu->returned = false;

@@ -58,7 +58,7 @@ static unsigned supplies;            /* times that one came on, over all nodes *
 static unsigned starts;              /* since a supply came on, or a SYNC was served */
 
 /* Addresses of program memory. */
-static void write_trace(FILE *file)
+static void image_port_write_trace(FILE *file)
 {
     const char *comma = "";
     fprintf(file, "\"loops\": {");
@@ -75,7 +75,7 @@ static void write_trace(FILE *file)
     fprintf(file, "], ");
 }
 
-static void write_costs(void)
+static void image_port_write_costs(void)
 {
 #define NAME(name) #name,
     static const char *const NAMES[] = {IMAGE_HANDLERS(NAME)};
@@ -90,7 +90,7 @@ static void write_costs(void)
                 i ? ", " : "", NAMES[i], (unsigned long long)c->count, c->least, c->most, c->acts, c->stack);
     }
     fprintf(file, "}, ");
-    write_trace(file);
+    image_port_write_trace(file);
     fprintf(file, "\"ram\": %u, \"boots\": %llu, \"boot_cycles\": %llu, \"spoiled\": %llu}\n", costs.ram,
             (unsigned long long)costs.boots, (unsigned long long)costs.boot_most, (unsigned long long)costs.spoiled);
     fclose(file);
@@ -102,7 +102,7 @@ const struct image_table *image_port_table(void)
         const char *path = getenv("NODE_IMAGE");
         table = image_table_read(path ? path : "NODE_IMAGE");
         if (getenv("NODE_IMAGE_COSTS"))
-            atexit(write_costs);
+            atexit(image_port_write_costs);
     }
     if (!table)
         exit(2);
@@ -115,7 +115,7 @@ struct image_costs image_port_costs(void)
 }
 
 /* What the benches look into: the node as the image's memory has it. */
-static void show(struct board *board, const struct image_node *node)
+static void image_port_show(struct board *board, const struct image_node *node)
 {
     struct image_board image;
     struct node *out = &board->node;
@@ -142,13 +142,13 @@ bool node_ready(const struct node *node)
 /* --------------------------------------------------------------------------------------------------------- interrupts
  */
 
-static uint32_t vector_of(const struct dspic *chip, unsigned number)
+static uint32_t image_port_vector_of(const struct dspic *chip, unsigned number)
 {
     const bool alternate = chip->sfr[INTCON2 / 2u] & INTCON2_ALTIVT;
     return (alternate ? (uint32_t)ALTERNATE_TABLE : (uint32_t)VECTOR_TABLE) + 2u * number;
 }
 
-static void note(struct image_cost *cost, uint64_t cycles, uint64_t acted, uint16_t stack)
+static void image_port_note(struct image_cost *cost, uint64_t cycles, uint64_t acted, uint16_t stack)
 {
     if (cost->count == 0 || cycles < cost->least)
         cost->least = (uint32_t)cycles;
@@ -162,12 +162,12 @@ static void note(struct image_cost *cost, uint64_t cycles, uint64_t acted, uint1
     cost->count++;
 }
 
-static const struct image_board *memory_of(const struct image_node *node)
+static const struct image_board *image_port_memory_of(const struct image_node *node)
 {
     return (const struct image_board *)(const void *)node->cpu.ram;
 }
 
-static enum image_handler handler_of_t2(const struct image_board *image)
+static enum image_handler image_port_handler_of_t2(const struct image_board *image)
 {
     switch (image->sampler.state) {
     case SAMPLER_GAP:
@@ -181,13 +181,13 @@ static enum image_handler handler_of_t2(const struct image_board *image)
     }
 }
 
-static enum image_handler handler_of(const struct image_board *image, unsigned irq)
+static enum image_handler image_port_handler_of(const struct image_board *image, unsigned irq)
 {
     switch (irq) {
     case IRQ_INT1:
         return IMAGE_SYNC;
     case IRQ_T2:
-        return handler_of_t2(image);
+        return image_port_handler_of_t2(image);
     case IRQ_SPI1:
         return image->sampler.count + 1u < SENSOR_FRAME_BYTES ? IMAGE_BYTE : IMAGE_LAST_BYTE;
     case IRQ_SPI1_ERROR:
@@ -204,16 +204,17 @@ static enum image_handler handler_of(const struct image_board *image, unsigned i
 }
 
 /* What a handler must leave as it was, the page of constants and the count of repetitions beside these. */
-static bool is_the_same(const struct image_cpu *before, const struct image_cpu *cpu)
+static bool image_port_is_the_same(const struct image_cpu *before, const struct image_cpu *cpu)
 {
     return memcmp(before->core, cpu->core, sizeof cpu->core) == 0 && before->pc == cpu->pc &&
            ((image_cpu_status(before) ^ image_cpu_status(cpu)) & 0xFFu) == 0;
 }
 
-static void take(struct image_node *node, unsigned number)
+static void image_port_take(struct image_node *node, unsigned number)
 {
     struct image_cpu *cpu = &node->cpu;
-    const enum image_handler handler = number < TRAPS ? IMAGE_OTHER : handler_of(memory_of(node), number - TRAPS);
+    const enum image_handler handler =
+        number < TRAPS ? IMAGE_OTHER : image_port_handler_of(image_port_memory_of(node), number - TRAPS);
     const uint16_t deepest = cpu->deepest, page = registers_read(cpu->chip, PSVPAG);
     const uint16_t repetitions = registers_read(cpu->chip, RCOUNT);
     struct image_cpu before;
@@ -224,12 +225,12 @@ static void take(struct image_node *node, unsigned number)
     const uint16_t top = cpu->deepest = image_cpu_stack(cpu);
     node->served = true;
     run_trace.epoch++;
-    image_cpu_interrupt(cpu, vector_of(cpu->chip, number));
+    image_cpu_interrupt(cpu, image_port_vector_of(cpu->chip, number));
     if (cpu->chip->hung)
         return;
-    note(&costs.handlers[handler], cpu->cycles - since, cpu->acted - since, (uint16_t)(cpu->deepest - top));
+    image_port_note(&costs.handlers[handler], cpu->cycles - since, cpu->acted - since, (uint16_t)(cpu->deepest - top));
     costs.returned[number]++;
-    costs.spoiled += !is_the_same(&before, cpu) || page != registers_read(cpu->chip, PSVPAG) ||
+    costs.spoiled += !image_port_is_the_same(&before, cpu) || page != registers_read(cpu->chip, PSVPAG) ||
                      repetitions != registers_read(cpu->chip, RCOUNT);
     if (cpu->deepest < deepest)
         cpu->deepest = deepest;
@@ -244,47 +245,47 @@ static struct image_node *node_of(const struct board *board)
     return NULL;
 }
 
-static void on_interrupt(struct board *board, unsigned irq)
+static void image_port_on_interrupt(struct board *board, unsigned irq)
 {
     struct image_node *node = node_of(board);
-    take(node, TRAPS + irq);
-    show(board, node);
+    image_port_take(node, TRAPS + irq);
+    image_port_show(board, node);
 }
 
 void port_on_int1(struct board *board)
 {
     starts = 0;
-    on_interrupt(board, IRQ_INT1);
+    image_port_on_interrupt(board, IRQ_INT1);
 }
 
 void port_on_t2(struct board *board)
 {
-    on_interrupt(board, IRQ_T2);
+    image_port_on_interrupt(board, IRQ_T2);
 }
 
 void port_on_spi1(struct board *board)
 {
-    on_interrupt(board, IRQ_SPI1);
+    image_port_on_interrupt(board, IRQ_SPI1);
 }
 
 void port_on_spi1_error(struct board *board)
 {
-    on_interrupt(board, IRQ_SPI1_ERROR);
+    image_port_on_interrupt(board, IRQ_SPI1_ERROR);
 }
 
 void port_on_spi2_error(struct board *board)
 {
-    on_interrupt(board, IRQ_SPI2_ERROR);
+    image_port_on_interrupt(board, IRQ_SPI2_ERROR);
 }
 
 void port_on_dma1(struct board *board)
 {
-    on_interrupt(board, IRQ_DMA1);
+    image_port_on_interrupt(board, IRQ_DMA1);
 }
 
 void port_on_int2(struct board *board)
 {
-    on_interrupt(board, IRQ_INT2);
+    image_port_on_interrupt(board, IRQ_INT2);
 }
 
 void port_on_trap(struct board *board)
@@ -294,12 +295,12 @@ void port_on_trap(struct board *board)
     struct image_node *node = node_of(board);
     for (unsigned number = 1; number < sizeof FLAG / sizeof *FLAG; number++) {
         if (board->chip->sfr[INTCON1 / 2u] & FLAG[number])
-            take(node, number); /* does not come back, or another trap follows */
+            image_port_take(node, number); /* does not come back, or another trap follows */
     }
 }
 
 /* An interrupt that the firmware does not serve, and sim_node does not know, leads through its vector as well. */
-static void on_any(void *context, unsigned irq)
+static void image_port_on_any(void *context, unsigned irq)
 {
     for (unsigned i = 0; i < NODES; i++) {
         if (nodes[i].wiring.context != context)
@@ -307,7 +308,7 @@ static void on_any(void *context, unsigned irq)
         nodes[i].served = false;
         nodes[i].wiring.interrupt(context, irq);
         if (!nodes[i].served)
-            take(&nodes[i], TRAPS + irq);
+            image_port_take(&nodes[i], TRAPS + irq);
         return;
     }
 }
@@ -315,7 +316,7 @@ static void on_any(void *context, unsigned irq)
 /* -------------------------------------------------------------------------------------------------------- main program
  */
 
-static struct image_node *attach(struct board *board)
+static struct image_node *image_port_attach(struct board *board)
 {
     static unsigned newest;
     struct image_node *node = node_of(board);
@@ -344,20 +345,20 @@ void image_port_compute_until(struct dspic *chip, uint64_t cycles, uint16_t addr
     (void)address;
 }
 
-static void start_supply(struct board *board)
+static void image_port_start_supply(struct board *board)
 {
     struct dspic *chip = board->chip;
     struct image_node *node = node_of(board);
-    if (!node || chip->wiring.interrupt != on_any) {
-        node = attach(board);
-        chip->wiring.interrupt = on_any;
+    if (!node || chip->wiring.interrupt != image_port_on_any) {
+        node = image_port_attach(board);
+        chip->wiring.interrupt = image_port_on_any;
         chip->parameters.exit_cycles = 0; /* the instructions take their own time, the return from an interrupt too */
     }
     image_cpu_scramble(&node->cpu, ++supplies);
     starts = 0;
 }
 
-static void run(struct board *board, struct image_node *node)
+static void image_port_run(struct board *board, struct image_node *node)
 {
     node->looping = true;
     image_cpu_run(&node->cpu);
@@ -365,13 +366,13 @@ static void run(struct board *board, struct image_node *node)
     const uint16_t ram = (uint16_t)(node->cpu.deepest - IMAGE_RAM_START);
     if (ram > costs.ram)
         costs.ram = ram;
-    show(board, node);
+    image_port_show(board, node);
 }
 
 void port_boot(struct board *board)
 {
     if (board->chip->cause & RCON_POR)
-        start_supply(board);
+        image_port_start_supply(board);
     if (++starts > STARTS_MOST) {
         fprintf(stderr, "image: %d starts in a row, and no SYNC was served\n", STARTS_MOST);
         exit(3);
@@ -379,7 +380,7 @@ void port_boot(struct board *board)
     struct image_node *node = node_of(board);
     const uint64_t since = node->cpu.cycles;
     image_cpu_reset(&node->cpu);
-    run(board, node);
+    image_port_run(board, node);
     costs.boots++;
     if (node->cpu.cycles - since > costs.boot_most)
         costs.boot_most = node->cpu.cycles - since;
@@ -390,5 +391,5 @@ void port_loop(struct board *board)
 {
     struct image_node *node = node_of(board);
     if (!node->looping)
-        run(board, node);
+        image_port_run(board, node);
 }

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static bool read_words(struct image_table *table, FILE *file)
+static bool image_table_read_words(struct image_table *table, FILE *file)
 {
     uint32_t pair[2];
     for (uint32_t i = 0; i < FLASH_WORDS; i++)
@@ -17,7 +17,7 @@ static bool read_words(struct image_table *table, FILE *file)
     return true;
 }
 
-static bool read_code(struct image_table *table, FILE *file, uint32_t instructions, uint32_t operations)
+static bool image_table_read_code(struct image_table *table, FILE *file, uint32_t instructions, uint32_t operations)
 {
     table->instructions = calloc(instructions + 1u, sizeof *table->instructions);
     table->operations = calloc(operations + 1u, sizeof *table->operations);
@@ -45,7 +45,7 @@ struct image_table *image_table_read(const char *path)
                  fread(counts, sizeof counts, 1, file) == 1;
     if (whole) {
         table->words = counts[0];
-        whole = read_words(table, file) && read_code(table, file, counts[1], counts[2]);
+        whole = image_table_read_words(table, file) && image_table_read_code(table, file, counts[1], counts[2]);
     }
     if (file)
         fclose(file);

@@ -17,7 +17,7 @@ struct run {
 };
 
 /* splitmix64 (Steele, Lea, Flood 2014). */
-static uint64_t draw(uint64_t *random)
+static uint64_t node_records_draw(uint64_t *random)
 {
     uint64_t z = *random += UINT64_C(0x9E3779B97F4A7C15);
     z = (z ^ z >> 30) * UINT64_C(0xBF58476D1CE4E5B9);
@@ -25,40 +25,40 @@ static uint64_t draw(uint64_t *random)
     return z ^ z >> 31;
 }
 
-static uint32_t below(struct run *run, uint32_t n)
+static uint32_t node_records_below(struct run *run, uint32_t n)
 {
-    return (uint32_t)((draw(&run->random) >> 32) * n >> 32);
+    return (uint32_t)((node_records_draw(&run->random) >> 32) * n >> 32);
 }
 
-static double walk(struct run *run, double angle_deg)
+static double node_records_walk(struct run *run, double angle_deg)
 {
-    const double by = 16.0 * (double)below(run, 1u << 20) / (1u << 20) - 8.0;
+    const double by = 16.0 * (double)node_records_below(run, 1u << 20) / (1u << 20) - 8.0;
     return angle_deg + by > 60.0 || angle_deg + by < -60.0 ? angle_deg - by : angle_deg + by;
 }
 
-static void break_sensor(struct run *run, struct lane_faults *f)
+static void node_records_break_sensor(struct run *run, struct lane_faults *f)
 {
-    f->sensor = (enum sim_sensor_fault)(SIM_SENSOR_FLIP_BIT + below(run, SIM_SENSOR_EXTRA_CLOCK));
-    f->sensor_argument = below(run, 64);
+    f->sensor = (enum sim_sensor_fault)(SIM_SENSOR_FLIP_BIT + node_records_below(run, SIM_SENSOR_EXTRA_CLOCK));
+    f->sensor_argument = node_records_below(run, 64);
     if (f->sensor == SIM_SENSOR_ERROR_BITS)
-        f->sensor_argument = below(run, 1u << 16);
+        f->sensor_argument = node_records_below(run, 1u << 16);
     else if (f->sensor == SIM_SENSOR_FLIP_TWO)
-        f->sensor_argument += 256u * below(run, 64);
+        f->sensor_argument += 256u * node_records_below(run, 64);
     else if (f->sensor == SIM_SENSOR_NOISY)
         f->sensor_argument = 1000u;
 }
 
-static void break_link(struct run *run, struct lane_faults *f)
+static void node_records_break_link(struct run *run, struct lane_faults *f)
 {
-    switch (below(run, 5)) {
+    switch (node_records_below(run, 5)) {
     case 0:
-        f->mosi_flips = draw(&run->random);
+        f->mosi_flips = node_records_draw(&run->random);
         break;
     case 1:
-        f->mosi_flips = UINT64_C(1) << below(run, 64);
+        f->mosi_flips = UINT64_C(1) << node_records_below(run, 64);
         break;
     case 2:
-        f->extra_clocks = -1 - (int32_t)below(run, 40);
+        f->extra_clocks = -1 - (int32_t)node_records_below(run, 40);
         break;
     case 3:
         f->no_sync = true;
@@ -69,17 +69,18 @@ static void break_link(struct run *run, struct lane_faults *f)
     }
 }
 
-static bool plan(void *context, unsigned tick, struct sim_field *field, struct lane_faults *faults)
+static bool node_records_plan(void *context, unsigned tick, struct sim_field *field, struct lane_faults *faults)
 {
     struct run *run = context;
-    run->field = (struct sim_field){walk(run, run->field.alpha_deg), walk(run, run->field.beta_deg)};
+    run->field =
+        (struct sim_field){node_records_walk(run, run->field.alpha_deg), node_records_walk(run, run->field.beta_deg)};
     *field = run->field;
-    switch (below(run, 24)) {
+    switch (node_records_below(run, 24)) {
     case 0:
-        break_sensor(run, faults);
+        node_records_break_sensor(run, faults);
         break;
     case 1:
-        break_link(run, faults);
+        node_records_break_link(run, faults);
         break;
     default:
         break;
@@ -87,7 +88,7 @@ static bool plan(void *context, unsigned tick, struct sim_field *field, struct l
     return tick < run->ticks;
 }
 
-static void judged(void *context, unsigned tick, const struct lane_verdict *v)
+static void node_records_judged(void *context, unsigned tick, const struct lane_verdict *v)
 {
     (void)context;
     printf("%u %016" PRIx64 " %u%s%s\n", tick, v->read, v->code, v->good ? " good" : "", v->altered ? " altered" : "");
@@ -102,16 +103,16 @@ int main(int argc, char **argv)
     struct run run = {.ticks = (unsigned)strtoul(argv[1], NULL, 10), .random = strtoull(argv[2], NULL, 10)};
     struct sim_node_parameters parts;
     static struct lane_bench bench;
-    sim_node_parameters_default(&parts, draw(&run.random));
-    parts.chip.slave_prefetch = (uint8_t)(1u + below(&run, 2));
-    parts.chip.dma_cycles = (uint8_t)below(&run, 13);
-    parts.chip.frc_ppm = (int32_t)below(&run, 40001) - 20000;
+    sim_node_parameters_default(&parts, node_records_draw(&run.random));
+    parts.chip.slave_prefetch = (uint8_t)(1u + node_records_below(&run, 2));
+    parts.chip.dma_cycles = (uint8_t)node_records_below(&run, 13);
+    parts.chip.frc_ppm = (int32_t)node_records_below(&run, 40001) - 20000;
     sim_node *node = sim_node_new_as(&parts);
     if (!node)
         return 2;
     sim_node_power_on(node);
     lane_bench_start(&bench, node, lane_timing_of(16, 180, LANE_TICK_PERIOD));
-    lane_bench_run(&bench, &(struct lane_world){&run, plan, judged});
+    lane_bench_run(&bench, &(struct lane_world){&run, node_records_plan, node_records_judged});
     for (unsigned i = 0; i < WHISKER_HEALTH_COUNT; i++)
         printf("%u%s", sim_node_counted(node, i), i + 1u < WHISKER_HEALTH_COUNT ? " " : "\n");
     printf("breaches %u\n", sim_node_violations(node));

@@ -56,8 +56,8 @@ void sim_drag_run(sim_drag *drag, const struct sim_floor_texture *floors, size_t
     }
 }
 
-static void read_sensor(const struct mech_whisker *whisker, struct sim_sensor_noise *noise, double time_s,
-                        const double tilt[2], uint16_t counts[2])
+static void mechanics_read_sensor(const struct mech_whisker *whisker, struct sim_sensor_noise *noise, double time_s,
+                                  const double tilt[2], uint16_t counts[2])
 {
     double field[2];
     mech_whisker_fields(whisker, tilt, field);
@@ -73,7 +73,7 @@ void sim_mechanics_counts(const struct mech_whisker *whisker, size_t ticks, doub
     struct sim_sensor_noise noise;
     sim_sensor_noise_start(&noise, sim_rng_stream(seed, FOR_SENSOR, 0));
     for (size_t i = 0; i < ticks; i++)
-        read_sensor(whisker, &noise, (double)i * tick_s, tilt + 2 * i, counts + 2 * i);
+        mechanics_read_sensor(whisker, &noise, (double)i * tick_s, tilt + 2 * i, counts + 2 * i);
 }
 
 const struct sim_floor_texture *sim_mechanics_floor(size_t floor)
@@ -136,16 +136,16 @@ void sim_mechanics_scene_free(sim_mechanics_scene *scene)
 }
 
 /* There and back between -1 and 1 at constant speed, once per period. */
-static double triangle(double time_s, double period_s)
+static double mechanics_triangle(double time_s, double period_s)
 {
     return 4 * fabs(time_s / period_s - floor(time_s / period_s + 0.5)) - 1;
 }
 
-static double step_shafts(sim_mechanics_scene *scene, double time_s)
+static double mechanics_step_shafts(sim_mechanics_scene *scene, double time_s)
 {
     double sum = 0;
-    double theta = THETA_MEAN + THETA_SWING * triangle(time_s, 4 * THETA_SWING / WHISK_RATE);
-    double slide = scene->setting.sliding ? SLIDE_M / 2 * triangle(time_s, SLIDE_S) : 0;
+    double theta = THETA_MEAN + THETA_SWING * mechanics_triangle(time_s, 4 * THETA_SWING / WHISK_RATE);
+    double slide = scene->setting.sliding ? SLIDE_M / 2 * mechanics_triangle(time_s, SLIDE_S) : 0;
     for (int i = 0; i < SHAFTS + IDLE; i++) {
         struct mech_touch touch = {i < SHAFTS, CONTACT_M + slide, theta, 0, false};
         mech_shaft_step(&scene->shaft[i], &touch);
@@ -154,7 +154,7 @@ static double step_shafts(sim_mechanics_scene *scene, double time_s)
     return sum;
 }
 
-static double step_drags(sim_mechanics_scene *scene)
+static double mechanics_step_drags(sim_mechanics_scene *scene)
 {
     double sum = 0;
     double travel = DRAG_M_S * scene->setting.tick_s, tile = floor(travel * (double)scene->ticks / TILE_M);
@@ -166,7 +166,7 @@ static double step_drags(sim_mechanics_scene *scene)
     return sum;
 }
 
-static double read_all(sim_mechanics_scene *scene, double time_s)
+static double mechanics_read_all(sim_mechanics_scene *scene, double time_s)
 {
     uint16_t counts[2];
     double sum = 0;
@@ -176,7 +176,8 @@ static double read_all(sim_mechanics_scene *scene, double time_s)
         const struct mech_whisker *whisker = shaft ? &scene->shaft[i].whisker : &scene->drag[i - SHAFTS - IDLE].whisker;
         if (shaft)
             along[0] = scene->shaft[i].tilt;
-        read_sensor(whisker, &scene->noise[i], time_s, shaft ? along : scene->drag[i - SHAFTS - IDLE].tilt, counts);
+        mechanics_read_sensor(whisker, &scene->noise[i], time_s, shaft ? along : scene->drag[i - SHAFTS - IDLE].tilt,
+                              counts);
         sum += counts[0] + counts[1];
     }
     return sum;
@@ -187,9 +188,9 @@ double sim_mechanics_scene_run(sim_mechanics_scene *scene, size_t ticks)
     double sum = 0;
     for (size_t i = 0; i < ticks; i++) {
         double time_s = (double)scene->ticks++ * scene->setting.tick_s;
-        sum += step_shafts(scene, time_s) + step_drags(scene);
+        sum += mechanics_step_shafts(scene, time_s) + mechanics_step_drags(scene);
         if (scene->setting.counts)
-            sum += read_all(scene, time_s);
+            sum += mechanics_read_all(scene, time_s);
     }
     return sum;
 }

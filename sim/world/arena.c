@@ -2,7 +2,7 @@
 
 #include <math.h>
 
-static size_t tile_index(double coordinate, double tile, size_t count)
+static size_t arena_tile_index(double coordinate, double tile, size_t count)
 {
     double index = floor(coordinate / tile);
     return (size_t)fmax(0, fmin((double)(count - 1), index));
@@ -10,8 +10,8 @@ static size_t tile_index(double coordinate, double tile, size_t count)
 
 size_t sim_arena_tile(const struct sim_scene *scene, struct sim_point at)
 {
-    size_t column = tile_index(at.x, scene->tile_m, scene->columns);
-    return tile_index(at.y, scene->tile_m, scene->rows) * scene->columns + column;
+    size_t column = arena_tile_index(at.x, scene->tile_m, scene->columns);
+    return arena_tile_index(at.y, scene->tile_m, scene->rows) * scene->columns + column;
 }
 
 size_t sim_arena_texture(const struct sim_scene *scene, struct sim_point at)
@@ -20,22 +20,22 @@ size_t sim_arena_texture(const struct sim_scene *scene, struct sim_point at)
 }
 
 /* Distance to the borders of the tile's interval along one axis; the last tile may be cut short by the wall. */
-static double inside_interval(double coordinate, double tile, size_t count, double size)
+static double arena_inside_interval(double coordinate, double tile, size_t count, double size)
 {
-    double low = (double)tile_index(coordinate, tile, count) * tile;
+    double low = (double)arena_tile_index(coordinate, tile, count) * tile;
     return fmin(coordinate - low, fmin(low + tile, size) - coordinate);
 }
 
 double sim_arena_inside(const struct sim_scene *scene, struct sim_point at)
 {
-    double x = inside_interval(at.x, scene->tile_m, scene->columns, scene->size_x);
-    double y = inside_interval(at.y, scene->tile_m, scene->rows, scene->size_y);
+    double x = arena_inside_interval(at.x, scene->tile_m, scene->columns, scene->size_x);
+    double y = arena_inside_interval(at.y, scene->tile_m, scene->rows, scene->size_y);
     return fmax(0, fmin(x, y));
 }
 
 /* Narrows the part [*enter, *leave] of a path to where it is between low and high along one axis. Returns true if the
  * path enters through this axis, that is, later than *enter was before. */
-static bool clip(double from, double along, double low, double high, double *enter, double *leave)
+static bool arena_clip(double from, double along, double low, double high, double *enter, double *leave)
 {
     if (fabs(along) < 1e-15) {
         if (from < low || from > high)
@@ -56,20 +56,20 @@ static bool clip(double from, double along, double low, double high, double *ent
     return later;
 }
 
-static bool ray_box(const struct sim_box *box, struct sim_point from, struct sim_point along, struct sim_hit *hit)
+static bool arena_ray_box(const struct sim_box *box, struct sim_point from, struct sim_point along, struct sim_hit *hit)
 {
     double enter = 0, leave = 1;
     struct sim_point normal = {0, 0};
-    if (clip(from.x, along.x, box->x0, box->x1, &enter, &leave))
+    if (arena_clip(from.x, along.x, box->x0, box->x1, &enter, &leave))
         normal = (struct sim_point){copysign(1, along.x), 0};
-    if (clip(from.y, along.y, box->y0, box->y1, &enter, &leave))
+    if (arena_clip(from.y, along.y, box->y0, box->y1, &enter, &leave))
         normal = (struct sim_point){0, copysign(1, along.y)};
     *hit = (struct sim_hit){enter, normal, box->surface};
     return enter <= leave;
 }
 
 /* Fraction of a path at which its coordinate along one axis leaves [0, size]; above 1 if it does not. */
-static double leaves(double from, double along, double size)
+static double arena_leaves(double from, double along, double size)
 {
     if (from < 0 || from > size)
         return 0;
@@ -78,10 +78,11 @@ static double leaves(double from, double along, double size)
     return from + along > size ? (size - from) / along : 2;
 }
 
-static bool ray_wall(const struct sim_scene *scene, struct sim_point from, struct sim_point along, struct sim_hit *hit)
+static bool arena_ray_wall(const struct sim_scene *scene, struct sim_point from, struct sim_point along,
+                           struct sim_hit *hit)
 {
-    double x = leaves(from.x, along.x, scene->size_x);
-    double y = leaves(from.y, along.y, scene->size_y);
+    double x = arena_leaves(from.x, along.x, scene->size_x);
+    double y = arena_leaves(from.y, along.y, scene->size_y);
     if (x <= y)
         *hit = (struct sim_hit){x, {from.x + along.x * x > scene->size_x / 2 ? 1 : -1, 0}, scene->wall};
     else
@@ -92,10 +93,10 @@ static bool ray_wall(const struct sim_scene *scene, struct sim_point from, struc
 bool sim_arena_ray(const struct sim_scene *scene, struct sim_point from, struct sim_point to, struct sim_hit *hit)
 {
     struct sim_point along = {to.x - from.x, to.y - from.y};
-    bool any = ray_wall(scene, from, along, hit);
+    bool any = arena_ray_wall(scene, from, along, hit);
     for (size_t i = 0; i < scene->obstacles; i++) {
         struct sim_hit nearer;
-        if (ray_box(&scene->obstacle[i], from, along, &nearer) && (!any || nearer.fraction < hit->fraction)) {
+        if (arena_ray_box(&scene->obstacle[i], from, along, &nearer) && (!any || nearer.fraction < hit->fraction)) {
             *hit = nearer;
             any = true;
         }
@@ -103,7 +104,7 @@ bool sim_arena_ray(const struct sim_scene *scene, struct sim_point from, struct 
     return any;
 }
 
-static double distance_to_box(const struct sim_box *box, struct sim_point at)
+static double arena_distance_to_box(const struct sim_box *box, struct sim_point at)
 {
     double x = fmax(box->x0 - at.x, at.x - box->x1);
     double y = fmax(box->y0 - at.y, at.y - box->y1);
@@ -116,6 +117,6 @@ double sim_arena_clearance(const struct sim_scene *scene, struct sim_point at)
 {
     double nearest = fmin(fmin(at.x, scene->size_x - at.x), fmin(at.y, scene->size_y - at.y));
     for (size_t i = 0; i < scene->obstacles; i++)
-        nearest = fmin(nearest, distance_to_box(&scene->obstacle[i], at));
+        nearest = fmin(nearest, arena_distance_to_box(&scene->obstacle[i], at));
     return nearest;
 }

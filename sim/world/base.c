@@ -27,15 +27,15 @@ int sim_base_drive(struct sim_base *base, double v, double omega)
     return is_new;
 }
 
-static double sinc(double x)
+static double base_sinc(double x)
 {
     return fabs(x) < 1e-9 ? 1 : sin(x) / x;
 }
 
 /* End of an arc of this length and angle that starts along from.theta. */
-static struct sim_pose along_arc(struct sim_pose from, double length, double angle)
+static struct sim_pose base_along_arc(struct sim_pose from, double length, double angle)
 {
-    double chord = length * sinc(angle / 2);
+    double chord = length * base_sinc(angle / 2);
     double heading = from.theta + angle / 2;
     return (struct sim_pose){from.x + chord * cos(heading), from.y + chord * sin(heading),
                              sim_wrap(from.theta + angle)};
@@ -43,10 +43,10 @@ static struct sim_pose along_arc(struct sim_pose from, double length, double ang
 
 struct sim_pose sim_base_advance(const struct sim_base *base, struct sim_pose from, double dt)
 {
-    return along_arc(from, base->v * dt, base->omega * dt);
+    return base_along_arc(from, base->v * dt, base->omega * dt);
 }
 
-static double move_gain(struct sim_rng *rng)
+static double base_move_gain(struct sim_rng *rng)
 {
     return 1 + fmax(-MOVE_LIMIT, fmin(MOVE_LIMIT, MOVE_SPREAD * sim_rng_normal(rng)));
 }
@@ -61,8 +61,8 @@ void sim_odometer_start(struct sim_odometer *odometer, struct sim_rng rng)
 
 void sim_odometer_new_move(struct sim_odometer *odometer)
 {
-    odometer->gain_distance = move_gain(&odometer->rng);
-    odometer->gain_angle = move_gain(&odometer->rng);
+    odometer->gain_distance = base_move_gain(&odometer->rng);
+    odometer->gain_angle = base_move_gain(&odometer->rng);
 }
 
 void sim_odometer_count(struct sim_odometer *odometer, double distance_m, double angle_rad)
@@ -81,5 +81,5 @@ struct sim_pose sim_odometer_report(struct sim_odometer *odometer)
     double degrees = trunc(odometer->angle_deg);
     odometer->distance_mm -= millimetres;
     odometer->angle_deg -= degrees;
-    return along_arc((struct sim_pose){0, 0, 0}, millimetres * 1e-3, degrees * SIM_DEGREE);
+    return base_along_arc((struct sim_pose){0, 0, 0}, millimetres * 1e-3, degrees * SIM_DEGREE);
 }

@@ -15,22 +15,22 @@ struct segment {
     struct sim_point base, along; /* along: unit vector from base to tip */
 };
 
-static double dot(struct sim_point a, struct sim_point b)
+static double object_whisker_dot(struct sim_point a, struct sim_point b)
 {
     return a.x * b.x + a.y * b.y;
 }
 
-static struct sim_point left_of(struct sim_point a)
+static struct sim_point object_whisker_left_of(struct sim_point a)
 {
     return (struct sim_point){-a.y, a.x};
 }
 
-static struct sim_point difference(struct sim_point a, struct sim_point b)
+static struct sim_point object_whisker_difference(struct sim_point a, struct sim_point b)
 {
     return (struct sim_point){a.x - b.x, a.y - b.y};
 }
 
-static struct segment place(const struct sim_whisker *mount, struct sim_pose pose)
+static struct segment object_whisker_place(const struct sim_whisker *mount, struct sim_pose pose)
 {
     double c = cos(pose.theta), s = sin(pose.theta);
     double yaw = pose.theta + mount->yaw;
@@ -38,14 +38,14 @@ static struct segment place(const struct sim_whisker *mount, struct sim_pose pos
                             {cos(yaw), sin(yaw)}};
 }
 
-static struct sim_point point_at(struct segment segment, double radius)
+static struct sim_point object_whisker_point_at(struct segment segment, double radius)
 {
     return (struct sim_point){segment.base.x + radius * segment.along.x, segment.base.y + radius * segment.along.y};
 }
 
 static const mech_table *shared_table;
 
-static void make_table(void)
+static void object_whisker_make_table(void)
 {
     shared_table = mech_table_new(); /* kept for the life of the process: every world reads it */
 }
@@ -54,7 +54,7 @@ bool sim_object_whisker_start(struct sim_object_whisker *whisker, const struct s
                               size_t number, struct sim_rng rng, struct sim_rng surface)
 {
     static pthread_once_t once = PTHREAD_ONCE_INIT;
-    pthread_once(&once, make_table);
+    pthread_once(&once, object_whisker_make_table);
     if (!shared_table)
         return false;
     size_t known = sizeof SPREADS / sizeof SPREADS[0];
@@ -68,18 +68,20 @@ bool sim_object_whisker_start(struct sim_object_whisker *whisker, const struct s
 }
 
 /* Has the shaft swept over this corner? Then radius tells where along the shaft, side on which side the corner was. */
-static bool swept(struct segment from, struct segment to, struct sim_point corner, double *radius, double *side)
+static bool object_whisker_swept(struct segment from, struct segment to, struct sim_point corner, double *radius,
+                                 double *side)
 {
-    double before = dot(left_of(from.along), difference(corner, from.base));
-    double after = dot(left_of(to.along), difference(corner, to.base));
-    *radius = dot(to.along, difference(corner, to.base));
+    double before =
+        object_whisker_dot(object_whisker_left_of(from.along), object_whisker_difference(corner, from.base));
+    double after = object_whisker_dot(object_whisker_left_of(to.along), object_whisker_difference(corner, to.base));
+    *radius = object_whisker_dot(to.along, object_whisker_difference(corner, to.base));
     *side = before < 0 ? -1 : 1;
     return (before < 0) != (after < 0) && *radius > 0;
 }
 
 /* The swept corner nearest to the base, if any within the whisker's length. */
-static bool find_corner(struct sim_object_whisker *whisker, const struct sim_scene *scene, struct segment from,
-                        struct segment to)
+static bool object_whisker_find_corner(struct sim_object_whisker *whisker, const struct sim_scene *scene,
+                                       struct segment from, struct segment to)
 {
     double nearest = whisker->mount.length_m;
     bool found = false;
@@ -87,7 +89,7 @@ static bool find_corner(struct sim_object_whisker *whisker, const struct sim_sce
         const struct sim_box *box = &scene->obstacle[i / 4];
         struct sim_point corner = {i & 1 ? box->x1 : box->x0, i & 2 ? box->y1 : box->y0};
         double radius, side;
-        if (!swept(from, to, corner, &radius, &side) || radius > nearest)
+        if (!object_whisker_swept(from, to, corner, &radius, &side) || radius > nearest)
             continue;
         nearest = radius;
         whisker->side = side;
@@ -98,7 +100,7 @@ static bool find_corner(struct sim_object_whisker *whisker, const struct sim_sce
     return found;
 }
 
-static void meet_face(struct sim_object_whisker *whisker, const struct sim_hit *hit)
+static void object_whisker_meet_face(struct sim_object_whisker *whisker, const struct sim_hit *hit)
 {
     whisker->normal = hit->normal;
     whisker->surface = hit->surface;
@@ -108,65 +110,70 @@ static void meet_face(struct sim_object_whisker *whisker, const struct sim_hit *
     whisker->onset_height = mech_floor_height(&whisker->profile, whisker->surface);
 }
 
-static void begin(struct sim_object_whisker *whisker, const struct sim_scene *scene, struct segment from,
-                  struct segment to, struct sim_hit shaft)
+static void object_whisker_begin(struct sim_object_whisker *whisker, const struct sim_scene *scene, struct segment from,
+                                 struct segment to, struct sim_hit shaft)
 {
     whisker->contact.touching = true;
     whisker->contact.theta_rad = whisker->lift = 0;
     whisker->surface = NULL;
     whisker->contact.amplitude_gain = 1 + whisker->spread * sim_rng_normal(&whisker->rng);
-    if (find_corner(whisker, scene, from, to))
+    if (object_whisker_find_corner(whisker, scene, from, to))
         return;
     /* No corner: the tip has run into a face, the one that its path crossed. A whisker that touches from the start has
      * no path: then the face that the shaft enters. */
     struct sim_hit hit;
     double length = whisker->mount.length_m;
-    if (!sim_arena_ray(scene, point_at(from, length), point_at(to, length), &hit) || hit.fraction <= 0)
+    if (!sim_arena_ray(scene, object_whisker_point_at(from, length), object_whisker_point_at(to, length), &hit) ||
+        hit.fraction <= 0)
         hit = shaft;
-    meet_face(whisker, &hit);
-    whisker->side = dot(left_of(to.along), hit.normal) < 0 ? -1 : 1;
+    object_whisker_meet_face(whisker, &hit);
+    whisker->side = object_whisker_dot(object_whisker_left_of(to.along), hit.normal) < 0 ? -1 : 1;
 }
 
 /* Angle by which a way of the material point, m along this direction, pushes the whisker further (positive) or lets it
  * come back; left: of the shaft. */
-static double pushed(const struct sim_object_whisker *whisker, struct sim_point left, double way)
+static double object_whisker_pushed(const struct sim_object_whisker *whisker, struct sim_point left, double way)
 {
-    double sine = whisker->contact.corner ? 1 : fabs(dot(left, whisker->normal));
+    double sine = whisker->contact.corner ? 1 : fabs(object_whisker_dot(left, whisker->normal));
     return way / fmax(sine, LEAST_SINE) / whisker->contact.radius_m;
 }
 
 /* Lets the tip slide along a face that has a texture: by the motion that does not bend the shaft by `angle`. */
-static void slide(struct sim_object_whisker *whisker, struct sim_point left, struct sim_point motion, double angle)
+static void object_whisker_slide(struct sim_object_whisker *whisker, struct sim_point left, struct sim_point motion,
+                                 double angle)
 {
     double bent = whisker->side * angle * whisker->contact.radius_m;
     mech_floor_move(&whisker->profile, whisker->surface, hypot(motion.x - bent * left.x, motion.y - bent * left.y));
     double height = mech_floor_height(&whisker->profile, whisker->surface) - whisker->onset_height;
-    whisker->lift = pushed(whisker, left, height);
+    whisker->lift = object_whisker_pushed(whisker, left, height);
 }
 
 void sim_object_whisker_move(struct sim_object_whisker *whisker, const struct sim_scene *scene, struct sim_pose from,
                              struct sim_pose to)
 {
-    struct segment before = place(&whisker->mount, from), now = place(&whisker->mount, to);
+    struct segment before = object_whisker_place(&whisker->mount, from),
+                   now = object_whisker_place(&whisker->mount, to);
     struct sim_hit hit;
-    if (!sim_arena_ray(scene, now.base, point_at(now, whisker->mount.length_m), &hit)) {
+    if (!sim_arena_ray(scene, now.base, object_whisker_point_at(now, whisker->mount.length_m), &hit)) {
         whisker->contact = (struct sim_contact){0};
         return;
     }
     if (!whisker->contact.touching) {
-        begin(whisker, scene, before, now, hit);
+        object_whisker_begin(whisker, scene, before, now, hit);
         return;
     }
     /* The normal halfway through the motion makes a motion and its reverse cancel exactly. */
     struct sim_point along = {before.along.x + now.along.x, before.along.y + now.along.y};
     double norm = hypot(along.x, along.y);
-    struct sim_point left = left_of((struct sim_point){along.x / norm, along.y / norm});
+    struct sim_point left = object_whisker_left_of((struct sim_point){along.x / norm, along.y / norm});
     double radius = whisker->contact.radius_m;
-    struct sim_point motion = difference(point_at(now, radius), point_at(before, radius));
-    double way = whisker->contact.corner ? whisker->side * dot(motion, left) : dot(motion, whisker->normal);
-    double angle = pushed(whisker, left, way);
+    struct sim_point motion =
+        object_whisker_difference(object_whisker_point_at(now, radius), object_whisker_point_at(before, radius));
+    double way = whisker->contact.corner ? whisker->side * object_whisker_dot(motion, left)
+                                         : object_whisker_dot(motion, whisker->normal);
+    double angle = object_whisker_pushed(whisker, left, way);
     if (whisker->surface)
-        slide(whisker, left, motion, angle);
+        object_whisker_slide(whisker, left, motion, angle);
     whisker->contact.theta_rad = whisker->side * fmax(0, whisker->side * whisker->contact.theta_rad + angle);
 }
 

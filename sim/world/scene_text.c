@@ -34,7 +34,7 @@ int sim_text_numbers(struct sim_text *text, int first, int count, double *values
     return 0;
 }
 
-static int split(struct sim_text *text)
+static int scene_text_split(struct sim_text *text)
 {
     text->words = 0;
     text->buffer[strcspn(text->buffer, "#")] = '\0';
@@ -59,7 +59,7 @@ int sim_text_next(struct sim_text *text)
         memcpy(text->buffer, text->rest, length);
         text->buffer[length] = '\0';
         text->rest += length + (text->rest[length] == '\n');
-        if (split(text))
+        if (scene_text_split(text))
             return -1;
         if (text->words > 0)
             return 1;
@@ -68,7 +68,7 @@ int sim_text_next(struct sim_text *text)
 }
 
 /* Everything the file holds, terminated; NULL if memory is short or reading fails. */
-static char *load(FILE *file)
+static char *scene_text_load(FILE *file)
 {
     char *text = NULL;
     size_t size = 0, capacity = 0;
@@ -93,7 +93,7 @@ char *sim_text_load(const char *path)
     FILE *file = fopen(path, "rb");
     if (!file)
         return NULL;
-    char *text = load(file);
+    char *text = scene_text_load(file);
     int reason = errno;
     fclose(file);
     errno = reason;

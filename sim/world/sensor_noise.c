@@ -16,7 +16,7 @@ void sim_sensor_noise_start(struct sim_sensor_noise *noise, struct sim_rng rng)
     }
 }
 
-static void drift_on(struct sim_sensor_noise *noise, double time_s)
+static void sensor_noise_drift_on(struct sim_sensor_noise *noise, double time_s)
 {
     for (int axis = 0; axis < 2; axis++)
         noise->drift[axis] =
@@ -27,7 +27,7 @@ static void drift_on(struct sim_sensor_noise *noise, double time_s)
 struct sim_field sim_sensor_noise_add(struct sim_sensor_noise *noise, double time_s, struct sim_field field)
 {
     if (time_s >= noise->until_s)
-        drift_on(noise, time_s);
+        sensor_noise_drift_on(noise, time_s);
     field.alpha_deg += noise->drift[0] + SIM_FIELD_NOISE_DEG * sim_rng_normal(&noise->rng);
     field.beta_deg += noise->drift[1] + SIM_FIELD_NOISE_DEG * sim_rng_normal(&noise->rng);
     return field;

@@ -19,7 +19,7 @@ struct reader {
     bool has_start;
 };
 
-static int positive(struct sim_text *text, int count, double *values)
+static int sim_scene_positive(struct sim_text *text, int count, double *values)
 {
     if (sim_text_numbers(text, 1, count, values))
         return -1;
@@ -29,7 +29,7 @@ static int positive(struct sim_text *text, int count, double *values)
     return 0;
 }
 
-static int copy_name(struct sim_text *text, char *to)
+static int sim_scene_copy_name(struct sim_text *text, char *to)
 {
     if (strlen(text->word[1]) >= SIM_NAME_SIZE)
         return sim_text_refuse(text, "%s: name '%s' is too long; use at most %d characters", text->word[0],
@@ -38,42 +38,42 @@ static int copy_name(struct sim_text *text, char *to)
     return 0;
 }
 
-static int full(struct sim_text *text, int limit)
+static int sim_scene_full(struct sim_text *text, int limit)
 {
     return sim_text_refuse(text, "%s: too many; at most %d fit", text->word[0], limit);
 }
 
-static int read_size(struct reader *reader)
+static int sim_scene_read_size(struct reader *reader)
 {
     double size[2] = {0};
-    if (positive(&reader->text, 2, size))
+    if (sim_scene_positive(&reader->text, 2, size))
         return -1;
     reader->scene->size_x = size[0];
     reader->scene->size_y = size[1];
     return 0;
 }
 
-static int read_tile(struct reader *reader)
+static int sim_scene_read_tile(struct reader *reader)
 {
-    return positive(&reader->text, 1, &reader->scene->tile_m);
+    return sim_scene_positive(&reader->text, 1, &reader->scene->tile_m);
 }
 
-static int read_texture(struct reader *reader)
+static int sim_scene_read_texture(struct reader *reader)
 {
     struct sim_scene *scene = reader->scene;
     const char *name = reader->text.word[1];
     if (scene->textures == SIM_TEXTURES_MAX)
-        return full(&reader->text, SIM_TEXTURES_MAX);
+        return sim_scene_full(&reader->text, SIM_TEXTURES_MAX);
     if (!mech_floor_texture(name))
         return sim_text_refuse(&reader->text, "texture: no floor is called '%s'; use a name of mech_floor.h", name);
     for (size_t i = 0; i < scene->textures; i++)
         if (scene->texture[i][0] == name[0])
             return sim_text_refuse(&reader->text, "texture: '%s' and '%s' start with the same letter; leave one out",
                                    scene->texture[i], name);
-    return copy_name(&reader->text, scene->texture[scene->textures++]);
+    return sim_scene_copy_name(&reader->text, scene->texture[scene->textures++]);
 }
 
-static int read_floor(struct reader *reader)
+static int sim_scene_read_floor(struct reader *reader)
 {
     struct sim_scene *scene = reader->scene;
     const char *row = reader->text.word[1];
@@ -84,13 +84,13 @@ static int read_floor(struct reader *reader)
         return sim_text_refuse(&reader->text, "floor: a row of %zu tiles after rows of %zu; make them equal", length,
                                scene->columns);
     if ((reader->floor_rows + 1) * length > SIM_TILES_MAX)
-        return full(&reader->text, SIM_TILES_MAX);
+        return sim_scene_full(&reader->text, SIM_TILES_MAX);
     memcpy(reader->floor + reader->floor_rows++ * length, row, length);
     return 0;
 }
 
 /* The texture of faces that this word names. Returns 0, or -1 if refused. */
-static int read_surface(struct reader *reader, const char *name, const struct sim_floor_texture **surface)
+static int sim_scene_read_surface(struct reader *reader, const char *name, const struct sim_floor_texture **surface)
 {
     *surface = mech_floor_texture(name);
     return *surface ? 0
@@ -98,62 +98,62 @@ static int read_surface(struct reader *reader, const char *name, const struct si
                                       reader->text.word[0], name);
 }
 
-static int read_wall(struct reader *reader)
+static int sim_scene_read_wall(struct reader *reader)
 {
-    return read_surface(reader, reader->text.word[1], &reader->scene->wall);
+    return sim_scene_read_surface(reader, reader->text.word[1], &reader->scene->wall);
 }
 
-static int read_obstacle(struct reader *reader)
+static int sim_scene_read_obstacle(struct reader *reader)
 {
     struct sim_scene *scene = reader->scene;
     double v[4] = {0};
     if (scene->obstacles == SIM_OBSTACLES_MAX)
-        return full(&reader->text, SIM_OBSTACLES_MAX);
+        return sim_scene_full(&reader->text, SIM_OBSTACLES_MAX);
     if (sim_text_numbers(&reader->text, 1, 4, v))
         return -1;
     if (v[0] >= v[2] || v[1] >= v[3])
         return sim_text_refuse(&reader->text, "obstacle: give its smallest corner first, then its largest");
     struct sim_box *box = &scene->obstacle[scene->obstacles++];
     *box = (struct sim_box){v[0], v[1], v[2], v[3], NULL};
-    return reader->text.words == 6 ? read_surface(reader, reader->text.word[5], &box->surface) : 0;
+    return reader->text.words == 6 ? sim_scene_read_surface(reader, reader->text.word[5], &box->surface) : 0;
 }
 
-static int read_radius(struct reader *reader)
+static int sim_scene_read_radius(struct reader *reader)
 {
-    return positive(&reader->text, 1, &reader->scene->body_radius);
+    return sim_scene_positive(&reader->text, 1, &reader->scene->body_radius);
 }
 
 /* Adds a whisker with its name and role, or refuses. */
-static int add_whisker(struct reader *reader, enum sim_role role, struct sim_whisker **whisker)
+static int sim_scene_add_whisker(struct reader *reader, enum sim_role role, struct sim_whisker **whisker)
 {
     struct sim_scene *scene = reader->scene;
     struct sim_text *text = &reader->text;
     if (scene->whiskers == SIM_WHISKERS_MAX)
-        return full(text, SIM_WHISKERS_MAX);
+        return sim_scene_full(text, SIM_WHISKERS_MAX);
     for (size_t i = 0; i < scene->whiskers; i++)
         if (strcmp(scene->whisker[i].name, text->word[1]) == 0)
             return sim_text_refuse(text, "%s: a second whisker called '%s'; rename one", text->word[0], text->word[1]);
     *whisker = &scene->whisker[scene->whiskers++];
     (*whisker)->role = role;
-    return copy_name(text, (*whisker)->name);
+    return sim_scene_copy_name(text, (*whisker)->name);
 }
 
-static int read_texture_whisker(struct reader *reader)
+static int sim_scene_read_texture_whisker(struct reader *reader)
 {
     double v[2] = {0};
     struct sim_whisker *whisker;
-    if (add_whisker(reader, SIM_TEXTURE_WHISKER, &whisker) || sim_text_numbers(&reader->text, 2, 2, v))
+    if (sim_scene_add_whisker(reader, SIM_TEXTURE_WHISKER, &whisker) || sim_text_numbers(&reader->text, 2, 2, v))
         return -1;
     whisker->x = v[0];
     whisker->y = v[1];
     return 0;
 }
 
-static int read_object_whisker(struct reader *reader)
+static int sim_scene_read_object_whisker(struct reader *reader)
 {
     double v[4] = {0};
     struct sim_whisker *whisker;
-    if (add_whisker(reader, SIM_OBJECT_WHISKER, &whisker) || sim_text_numbers(&reader->text, 2, 4, v))
+    if (sim_scene_add_whisker(reader, SIM_OBJECT_WHISKER, &whisker) || sim_text_numbers(&reader->text, 2, 4, v))
         return -1;
     if (v[3] <= 0 || v[3] > SIM_WHISKER_OUTSIDE_M + 1e-9)
         return sim_text_refuse(&reader->text, "object_whisker: length %g m; must be above 0 and at most %g", v[3],
@@ -165,7 +165,7 @@ static int read_object_whisker(struct reader *reader)
     return 0;
 }
 
-static int read_start(struct reader *reader)
+static int sim_scene_read_start(struct reader *reader)
 {
     double v[3] = {0};
     if (sim_text_numbers(&reader->text, 1, 3, v))
@@ -175,7 +175,7 @@ static int read_start(struct reader *reader)
     return 0;
 }
 
-static int read_mechanics(struct reader *reader)
+static int sim_scene_read_mechanics(struct reader *reader)
 {
     static const struct {
         const char *name;
@@ -190,7 +190,7 @@ static int read_mechanics(struct reader *reader)
     return sim_text_refuse(&reader->text, "mechanics: '%s'; use static or modes", reader->text.word[1]);
 }
 
-static int read_batch(struct reader *reader)
+static int sim_scene_read_batch(struct reader *reader)
 {
     double number = 0;
     if (sim_text_numbers(&reader->text, 1, 1, &number))
@@ -206,21 +206,21 @@ static const struct item {
     int values, optional;
     int (*read)(struct reader *);
 } ITEMS[] = {
-    {"size_m", 2, 0, read_size},
-    {"tile_m", 1, 0, read_tile},
-    {"texture", 1, 0, read_texture},
-    {"floor", 1, 0, read_floor},
-    {"wall", 1, 0, read_wall},
-    {"obstacle", 4, 1, read_obstacle},
-    {"body_radius_m", 1, 0, read_radius},
-    {"texture_whisker", 3, 0, read_texture_whisker},
-    {"object_whisker", 5, 0, read_object_whisker},
-    {"start", 3, 0, read_start},
-    {"mechanics", 1, 0, read_mechanics},
-    {"batch", 1, 0, read_batch},
+    {"size_m", 2, 0, sim_scene_read_size},
+    {"tile_m", 1, 0, sim_scene_read_tile},
+    {"texture", 1, 0, sim_scene_read_texture},
+    {"floor", 1, 0, sim_scene_read_floor},
+    {"wall", 1, 0, sim_scene_read_wall},
+    {"obstacle", 4, 1, sim_scene_read_obstacle},
+    {"body_radius_m", 1, 0, sim_scene_read_radius},
+    {"texture_whisker", 3, 0, sim_scene_read_texture_whisker},
+    {"object_whisker", 5, 0, sim_scene_read_object_whisker},
+    {"start", 3, 0, sim_scene_read_start},
+    {"mechanics", 1, 0, sim_scene_read_mechanics},
+    {"batch", 1, 0, sim_scene_read_batch},
 };
 
-static int read_item(struct reader *reader)
+static int sim_scene_read_item(struct reader *reader)
 {
     struct sim_text *text = &reader->text;
     for (size_t i = 0; i < sizeof ITEMS / sizeof ITEMS[0]; i++) {
@@ -235,7 +235,7 @@ static int read_item(struct reader *reader)
 }
 
 /* Turns the rows of letters, largest y first, into texture indices, y = 0 first. */
-static int lay_floor(struct reader *reader)
+static int sim_scene_lay_floor(struct reader *reader)
 {
     struct sim_scene *scene = reader->scene;
     scene->rows = reader->floor_rows;
@@ -253,12 +253,12 @@ static int lay_floor(struct reader *reader)
     return 0;
 }
 
-static bool covers(double size, double tile, size_t count)
+static bool sim_scene_covers(double size, double tile, size_t count)
 {
     return fabs(ceil(size / tile - 1e-9) - (double)count) < 0.5;
 }
 
-static int missing(struct reader *reader)
+static int sim_scene_missing(struct reader *reader)
 {
     const struct sim_scene *scene = reader->scene;
     const char *key = scene->size_x <= 0        ? "size_m"
@@ -269,20 +269,20 @@ static int missing(struct reader *reader)
     return key ? sim_text_refuse(&reader->text, "%s is missing; add it", key) : 0;
 }
 
-static int finish(struct reader *reader)
+static int sim_scene_finish(struct reader *reader)
 {
     const struct sim_scene *scene = reader->scene;
     const struct sim_pose *start = &scene->start;
     reader->text.line = 0;
-    if (missing(reader))
+    if (sim_scene_missing(reader))
         return -1;
-    if (!covers(scene->size_x, scene->tile_m, scene->columns) ||
-        !covers(scene->size_y, scene->tile_m, reader->floor_rows))
+    if (!sim_scene_covers(scene->size_x, scene->tile_m, scene->columns) ||
+        !sim_scene_covers(scene->size_y, scene->tile_m, reader->floor_rows))
         return sim_text_refuse(&reader->text, "floor: %zu rows of %zu tiles of %g m do not cover %g m x %g m",
                                reader->floor_rows, scene->columns, scene->tile_m, scene->size_x, scene->size_y);
     if (start->x < 0 || start->x > scene->size_x || start->y < 0 || start->y > scene->size_y)
         return sim_text_refuse(&reader->text, "start: (%g, %g) is outside the walls; move it", start->x, start->y);
-    return lay_floor(reader);
+    return sim_scene_lay_floor(reader);
 }
 
 int sim_scene_parse(const char *text, const char *source, struct sim_scene *scene, char *error, size_t error_size)
@@ -294,9 +294,9 @@ int sim_scene_parse(const char *text, const char *source, struct sim_scene *scen
     *scene = (struct sim_scene){0};
     int more;
     while ((more = sim_text_next(&reader.text)) > 0)
-        if (read_item(&reader))
+        if (sim_scene_read_item(&reader))
             return -1;
-    return more < 0 ? -1 : finish(&reader);
+    return more < 0 ? -1 : sim_scene_finish(&reader);
 }
 
 int sim_scene_read(const char *path, struct sim_scene *scene, char *error, size_t error_size)

@@ -39,19 +39,19 @@ struct sim_world {
     struct lane lane[SIM_WHISKERS_MAX];
 };
 
-static void lay_tiles(sim_world *world, uint64_t seed)
+static void sim_world_lay_tiles(sim_world *world, uint64_t seed)
 {
     struct sim_rng rng = sim_rng_stream(seed, FOR_TILES, 0);
     for (size_t i = 0; i < world->scene.rows * world->scene.columns; i++)
         world->tile_height[i] = 1e-3 * SIM_TILE_LIFT_MM * (2 * sim_rng_uniform(&rng) - 1);
 }
 
-static const struct sim_floor_texture *floor_at(const sim_world *world, struct sim_point at)
+static const struct sim_floor_texture *sim_world_floor_at(const sim_world *world, struct sim_point at)
 {
     return world->floor[sim_arena_texture(&world->scene, at)];
 }
 
-static bool start_lanes(sim_world *world, uint64_t seed)
+static bool sim_world_start_lanes(sim_world *world, uint64_t seed)
 {
     size_t objects = 0;
     bool ok = true;
@@ -62,7 +62,7 @@ static bool start_lanes(sim_world *world, uint64_t seed)
         if (mount->role == SIM_TEXTURE_WHISKER) {
             struct sim_point tip = sim_texture_whisker_tip(mount, world->pose);
             lane->first_tile = sim_arena_tile(&world->scene, tip);
-            sim_texture_whisker_start(&lane->texture, &world->scene, i, floor_at(world, tip),
+            sim_texture_whisker_start(&lane->texture, &world->scene, i, sim_world_floor_at(world, tip),
                                       sim_rng_stream(seed, FOR_FLOOR, i));
             continue;
         }
@@ -86,8 +86,8 @@ sim_world *sim_world_new(const struct sim_scene *scene, uint64_t seed)
     for (size_t i = 0; i < scene->textures; i++)
         world->floor[i] = mech_floor_texture(scene->texture[i]);
     sim_odometer_start(&world->odometer, sim_rng_stream(seed, FOR_ODOMETRY, 0));
-    lay_tiles(world, seed);
-    if (!start_lanes(world, seed)) {
+    sim_world_lay_tiles(world, seed);
+    if (!sim_world_start_lanes(world, seed)) {
         sim_world_free(world);
         return NULL;
     }
@@ -107,7 +107,7 @@ void sim_world_drive(sim_world *world, double v_m_s, double omega_rad_s)
 
 /* Moves the body. Where a wall or a box is in the way the wheels stall and only turning is left; getting out of a place
  * too tight is always allowed. Returns the distance from the centre to the nearest wall or box. */
-static double move_body(sim_world *world)
+static double sim_world_move_body(sim_world *world)
 {
     struct sim_pose next = sim_base_advance(&world->base, world->pose, SIM_TICK_S);
     double clearance = sim_arena_clearance(&world->scene, (struct sim_point){next.x, next.y});
@@ -126,35 +126,36 @@ static double move_body(sim_world *world)
     return clearance;
 }
 
-static struct sim_field field_of(const struct mech_whisker *whisker, const double tilt[2])
+static struct sim_field sim_world_field_of(const struct mech_whisker *whisker, const double tilt[2])
 {
     double field[2];
     mech_whisker_fields(whisker, tilt, field);
     return (struct sim_field){field[0] / SIM_DEGREE, field[1] / SIM_DEGREE};
 }
 
-static struct sim_field move_texture_whisker(sim_world *world, struct lane *lane)
+static struct sim_field sim_world_move_texture_whisker(sim_world *world, struct lane *lane)
 {
     struct sim_texture_whisker *whisker = &lane->texture;
     struct sim_point tip = sim_texture_whisker_tip(&whisker->mount, world->pose);
     size_t tile = sim_arena_tile(&world->scene, tip);
     sim_texture_whisker_move(whisker, world->pose, world->floor[world->scene.tile[tile]],
                              world->tile_height[tile] - world->tile_height[lane->first_tile]);
-    return field_of(&whisker->drag.whisker, whisker->drag.tilt);
+    return sim_world_field_of(&whisker->drag.whisker, whisker->drag.tilt);
 }
 
 /* near: is anything within reach of the whiskers? Gravity's constant tilt on beta is taken out by the rest calibration
  * and so is left out here. */
-static struct sim_field move_object_whisker(sim_world *world, struct lane *lane, struct sim_pose before, bool near)
+static struct sim_field sim_world_move_object_whisker(sim_world *world, struct lane *lane, struct sim_pose before,
+                                                      bool near)
 {
     struct sim_object_whisker *whisker = &lane->object;
     if (near || whisker->contact.touching)
         sim_object_whisker_move(whisker, &world->scene, before, world->pose);
     sim_object_whisker_bend(whisker, world->turn_rate);
-    return field_of(&whisker->shaft.whisker, (double[2]){whisker->shaft.tilt, 0});
+    return sim_world_field_of(&whisker->shaft.whisker, (double[2]){whisker->shaft.tilt, 0});
 }
 
-static void follow_turn(sim_world *world)
+static void sim_world_follow_turn(sim_world *world)
 {
     double behind = world->base.omega - world->turn_rate;
     world->turn_rate =
@@ -164,14 +165,14 @@ static void follow_turn(sim_world *world)
 void sim_world_step(sim_world *world)
 {
     struct sim_pose before = world->pose;
-    bool near = move_body(world) < world->reach + SIM_BASE_WHEEL_LIMIT * SIM_TICK_S;
+    bool near = sim_world_move_body(world) < world->reach + SIM_BASE_WHEEL_LIMIT * SIM_TICK_S;
     double time_s = (double)world->ticks++ * SIM_TICK_S;
-    follow_turn(world);
+    sim_world_follow_turn(world);
     for (size_t i = 0; i < world->scene.whiskers; i++) {
         struct lane *lane = &world->lane[i];
         struct sim_field field = world->scene.whisker[i].role == SIM_TEXTURE_WHISKER
-                                     ? move_texture_whisker(world, lane)
-                                     : move_object_whisker(world, lane, before, near);
+                                     ? sim_world_move_texture_whisker(world, lane)
+                                     : sim_world_move_object_whisker(world, lane, before, near);
         lane->field = sim_sensor_noise_add(&lane->noise, time_s, field);
     }
 }

@@ -11,7 +11,7 @@
 #define PARALLEL_WEIGHT 0.25 /* of a wrong speed against a wrong direction, squared */
 #define STILL_M_S 0.0005     /* less than this is 0 in whole mm/s */
 
-static size_t put_word(uint8_t *bytes, int value)
+static size_t command_put_word(uint8_t *bytes, int value)
 {
     bytes[0] = (uint8_t)((unsigned)value >> 8);
     bytes[1] = (uint8_t)value;
@@ -24,21 +24,21 @@ size_t create_put_opcode(uint8_t *bytes, enum create_oi_opcode opcode)
     return 1;
 }
 
-static size_t put_two(uint8_t *bytes, enum create_oi_opcode opcode, int first, int second)
+static size_t command_put_two(uint8_t *bytes, enum create_oi_opcode opcode, int first, int second)
 {
     size_t count = create_put_opcode(bytes, opcode);
-    count += put_word(bytes + count, first);
-    return count + put_word(bytes + count, second);
+    count += command_put_word(bytes + count, first);
+    return count + command_put_word(bytes + count, second);
 }
 
 size_t create_put_drive_direct(uint8_t *bytes, int right_mm_s, int left_mm_s)
 {
-    return put_two(bytes, CREATE_OI_OP_DRIVE_DIRECT, right_mm_s, left_mm_s);
+    return command_put_two(bytes, CREATE_OI_OP_DRIVE_DIRECT, right_mm_s, left_mm_s);
 }
 
 size_t create_put_drive(uint8_t *bytes, int velocity_mm_s, int radius_mm)
 {
-    return put_two(bytes, CREATE_OI_OP_DRIVE, velocity_mm_s, radius_mm);
+    return command_put_two(bytes, CREATE_OI_OP_DRIVE, velocity_mm_s, radius_mm);
 }
 
 size_t create_put_stop(uint8_t *bytes)
@@ -63,7 +63,7 @@ size_t create_put_pause(uint8_t *bytes)
 }
 
 /* How badly a pair of wheel speeds stands for the wanted: error across it (another ratio) counts more than along it. */
-static double cost(double left, double right, double wanted_left, double wanted_right)
+static double command_cost(double left, double right, double wanted_left, double wanted_right)
 {
     const double size = hypot(wanted_left, wanted_right);
     const double l = wanted_left / size, r = wanted_right / size, dl = left - wanted_left, dr = right - wanted_right;
@@ -72,12 +72,12 @@ static double cost(double left, double right, double wanted_left, double wanted_
 }
 
 /* The multiples of the step nearest to the wanted wheel speeds, in steps. */
-static void nearest_steps(double left, double right, long most, long *best_left, long *best_right)
+static void command_nearest_steps(double left, double right, long most, long *best_left, long *best_right)
 {
     double best = INFINITY;
     for (long i = 0; i < STEPS_SOUGHT * STEPS_SOUGHT; i++) {
         const long l = (long)floor(left) + i % STEPS_SOUGHT, r = (long)floor(right) + i / STEPS_SOUGHT;
-        const double costs = cost((double)l, (double)r, left, right);
+        const double costs = command_cost((double)l, (double)r, left, right);
         if ((l != 0 || r != 0) && labs(l) <= most && labs(r) <= most && costs < best) {
             best = costs;
             *best_left = l;
@@ -87,7 +87,7 @@ static void nearest_steps(double left, double right, long most, long *best_left,
 }
 
 /* Steps in whole mm/s, rounded away from 0: both a base that rounds and one that cuts off drive this step then. */
-static int told(double speed_m_s)
+static int command_told(double speed_m_s)
 {
     const double mm_s = speed_m_s * 1e3;
     return (int)copysign(ceil(fabs(mm_s) - 1e-9), mm_s);
@@ -104,8 +104,10 @@ struct create_speeds create_choose_speeds(enum create_model model, double wheel_
     }
     const double slower = fmin(1, most / fastest);
     long left_steps = 0, right_steps = 0;
-    nearest_steps(left * slower / step, right * slower / step, (long)(most / step + 1e-9), &left_steps, &right_steps);
+    command_nearest_steps(left * slower / step, right * slower / step, (long)(most / step + 1e-9), &left_steps,
+                          &right_steps);
     left = (double)left_steps * step;
     right = (double)right_steps * step;
-    return (struct create_speeds){told(left), told(right), (left + right) / 2, (right - left) / wheel_base_m};
+    return (struct create_speeds){command_told(left), command_told(right), (left + right) / 2,
+                                  (right - left) / wheel_base_m};
 }

@@ -27,16 +27,17 @@ void create_odometry_defaults(struct create_odometry_settings *settings, enum cr
     };
 }
 
-static bool positive(double number)
+static bool odometry_positive(double number)
 {
     return isfinite(number) && number > 0;
 }
 
 bool create_odometry_check(const struct create_odometry_settings *settings)
 {
-    return positive(settings->wheel_base_m) && positive(settings->distance_scale) && positive(settings->angle_scale) &&
-           positive(settings->relative_sigma) && positive(settings->requested_sigma) &&
-           isfinite(settings->drift_rad_per_m) && settings->drift_rad_per_m >= 0 &&
+    return odometry_positive(settings->wheel_base_m) && odometry_positive(settings->distance_scale) &&
+           odometry_positive(settings->angle_scale) && odometry_positive(settings->relative_sigma) &&
+           odometry_positive(settings->requested_sigma) && isfinite(settings->drift_rad_per_m) &&
+           settings->drift_rad_per_m >= 0 &&
            (settings->policy != CREATE_ENCODERS || create_model_facts(settings->model)->count_m > 0);
 }
 
@@ -53,26 +54,26 @@ const char *create_source_name(enum create_source source)
     return names[source];
 }
 
-static double asked_distance(const struct create_frame *frame)
+static double odometry_asked_distance(const struct create_frame *frame)
 {
     const int32_t both = frame->value[CREATE_OI_REQUESTED_RIGHT] + frame->value[CREATE_OI_REQUESTED_LEFT];
     return both * 0.5e-3 * PERIOD_S;
 }
 
-static double asked_angle(const struct create_odometry *odometry, const struct create_frame *frame)
+static double odometry_asked_angle(const struct create_odometry *odometry, const struct create_frame *frame)
 {
     const int32_t apart = frame->value[CREATE_OI_REQUESTED_RIGHT] - frame->value[CREATE_OI_REQUESTED_LEFT];
     return apart * 1e-3 / odometry->settings.wheel_base_m * PERIOD_S;
 }
 
-static bool counts_encoders(const struct create_odometry_settings *settings)
+static bool odometry_counts_encoders(const struct create_odometry_settings *settings)
 {
     return settings->policy == CREATE_ENCODERS ||
            (settings->policy == CREATE_AUTO && create_model_facts(settings->model)->count_m > 0);
 }
 
 /* The source of a part of the motion, of which so many units were asked for, where there are no encoders. */
-static enum create_source choose(const struct create_odometry *odometry, double asked)
+static enum create_source odometry_choose(const struct create_odometry *odometry, double asked)
 {
     const bool trusted = odometry->remainder == CREATE_KEPT || fabs(asked) >= WELL_ABOVE;
     const bool reported = odometry->settings.policy == CREATE_REPORTED ||
@@ -80,20 +81,20 @@ static enum create_source choose(const struct create_odometry *odometry, double 
     return reported ? CREATE_REPORTED : CREATE_REQUESTED;
 }
 
-static int32_t counted(int32_t now, int32_t before)
+static int32_t odometry_counted(int32_t now, int32_t before)
 {
     return (int16_t)(uint16_t)(now - before);
 }
 
 /* Motion of both wheels by their encoders, m. False: they have begun anew, or the frame is the first. */
-static bool count_wheels(struct create_odometry *odometry, const struct create_frame *frame, double *left,
-                         double *right)
+static bool odometry_count_wheels(struct create_odometry *odometry, const struct create_frame *frame, double *left,
+                                  double *right)
 {
     const double count_m = create_model_facts(odometry->settings.model)->count_m;
     const double most_m = (frame->missed + 1) * PERIOD_S * SPEED_MAX_M_S * PLAUSIBLE;
     const bool started = odometry->started;
-    *left = counted(frame->value[CREATE_OI_ENCODER_LEFT], odometry->left) * count_m;
-    *right = counted(frame->value[CREATE_OI_ENCODER_RIGHT], odometry->right) * count_m;
+    *left = odometry_counted(frame->value[CREATE_OI_ENCODER_LEFT], odometry->left) * count_m;
+    *right = odometry_counted(frame->value[CREATE_OI_ENCODER_RIGHT], odometry->right) * count_m;
     odometry->left = frame->value[CREATE_OI_ENCODER_LEFT];
     odometry->right = frame->value[CREATE_OI_ENCODER_RIGHT];
     odometry->started = true;
@@ -105,8 +106,8 @@ struct reading {
     double motion, sigma, grain;
 };
 
-static struct reading read_distance(const struct create_odometry *odometry, const struct create_frame *frame,
-                                    double asked)
+static struct reading odometry_read_distance(const struct create_odometry *odometry, const struct create_frame *frame,
+                                             double asked)
 {
     const struct create_odometry_settings *settings = &odometry->settings;
     if (odometry->distance == CREATE_REPORTED) {
@@ -116,7 +117,8 @@ static struct reading read_distance(const struct create_odometry *odometry, cons
     return (struct reading){asked * settings->distance_scale, settings->requested_sigma, 0};
 }
 
-static struct reading read_angle(const struct create_odometry *odometry, const struct create_frame *frame, double asked)
+static struct reading odometry_read_angle(const struct create_odometry *odometry, const struct create_frame *frame,
+                                          double asked)
 {
     const struct create_odometry_settings *settings = &odometry->settings;
     if (odometry->angle == CREATE_REPORTED) {
@@ -126,7 +128,8 @@ static struct reading read_angle(const struct create_odometry *odometry, const s
     return (struct reading){asked * settings->angle_scale, settings->requested_sigma, 0};
 }
 
-static struct create_step step_of(const struct create_odometry *odometry, struct reading distance, struct reading angle)
+static struct create_step odometry_step_of(const struct create_odometry *odometry, struct reading distance,
+                                           struct reading angle)
 {
     return (struct create_step){
         .distance = distance.motion,
@@ -142,12 +145,13 @@ static struct create_step step_of(const struct create_odometry *odometry, struct
 /* Adds what was asked for in frames that never came: until other speeds were ordered what it was before, then what it
  * is now, for then the base has heard the order or goes on as it did. A turn that is read may be wrong by a whole one:
  * both are loose. */
-static void add_estimate(struct create_odometry *odometry, struct create_step *step, const struct create_frame *frame)
+static void odometry_add_estimate(struct create_odometry *odometry, struct create_step *step,
+                                  const struct create_frame *frame)
 {
     const bool stands = odometry->standing == CREATE_STANDS;
     const double after = stands ? 0 : frame->ordered, before = stands ? 0 : frame->missed - frame->ordered;
-    const double distance = before * odometry->asked_m + after * asked_distance(frame);
-    const double angle = before * odometry->asked_rad + after * asked_angle(odometry, frame);
+    const double distance = before * odometry->asked_m + after * odometry_asked_distance(frame);
+    const double angle = before * odometry->asked_rad + after * odometry_asked_angle(odometry, frame);
     step->distance += distance;
     step->angle += angle;
     /* Of a stop ordered more than once, it may have heard only the last. */
@@ -157,19 +161,19 @@ static void add_estimate(struct create_odometry *odometry, struct create_step *s
     odometry->estimated += frame->missed;
 }
 
-static struct odometry_units units(double distance_m, double angle_rad)
+static struct odometry_units odometry_units(double distance_m, double angle_rad)
 {
     return (struct odometry_units){distance_m / DISTANCE_UNIT_M, angle_rad / ANGLE_UNIT_RAD};
 }
 
-static struct create_step step_by_encoders(struct create_odometry *odometry, const struct create_frame *frame)
+static struct create_step odometry_step_by_encoders(struct create_odometry *odometry, const struct create_frame *frame)
 {
     const struct create_odometry_settings *settings = &odometry->settings;
     const double count_m = create_model_facts(settings->model)->count_m;
     double left, right;
-    if (!count_wheels(odometry, frame, &left, &right)) {
+    if (!odometry_count_wheels(odometry, frame, &left, &right)) {
         struct create_step step = {0};
-        add_estimate(odometry, &step, frame);
+        odometry_add_estimate(odometry, &step, frame);
         return step;
     }
     /* Two wheels, each known to a count: their mean and difference are worth these units. */
@@ -177,35 +181,36 @@ static struct create_step step_by_encoders(struct create_odometry *odometry, con
                                      count_m / sqrt(2)};
     const struct reading angle = {(right - left) / settings->wheel_base_m * settings->angle_scale,
                                   settings->relative_sigma, count_m * sqrt(2) / settings->wheel_base_m};
-    return step_of(odometry, distance, angle);
+    return odometry_step_of(odometry, distance, angle);
 }
 
-static struct create_step step_by_values(struct create_odometry *odometry, const struct create_frame *frame, double d,
-                                         double a)
+static struct create_step odometry_step_by_values(struct create_odometry *odometry, const struct create_frame *frame,
+                                                  double d, double a)
 {
-    const struct odometry_units asked = units(d, a);
+    const struct odometry_units asked = odometry_units(d, a);
     const struct odometry_units told = {frame->value[CREATE_OI_DISTANCE], frame->value[CREATE_OI_ANGLE]};
     standing_watch(odometry, asked, told, odometry->remainder == CREATE_KEPT);
     remainder_watch(odometry, frame, asked);
-    odometry->distance = choose(odometry, asked.distance);
-    odometry->angle = choose(odometry, asked.angle);
-    struct create_step step = step_of(odometry, read_distance(odometry, frame, d), read_angle(odometry, frame, a));
+    odometry->distance = odometry_choose(odometry, asked.distance);
+    odometry->angle = odometry_choose(odometry, asked.angle);
+    struct create_step step =
+        odometry_step_of(odometry, odometry_read_distance(odometry, frame, d), odometry_read_angle(odometry, frame, a));
     if (frame->missed > 0) {
-        add_estimate(odometry, &step, frame);
+        odometry_add_estimate(odometry, &step, frame);
     }
     return step;
 }
 
 struct create_step create_odometry_take(struct create_odometry *odometry, const struct create_frame *frame)
 {
-    const double d = asked_distance(frame), a = asked_angle(odometry, frame);
+    const double d = odometry_asked_distance(frame), a = odometry_asked_angle(odometry, frame);
     struct create_step step;
-    if (counts_encoders(&odometry->settings)) {
+    if (odometry_counts_encoders(&odometry->settings)) {
         odometry->distance = odometry->angle = CREATE_ENCODERS;
-        step = step_by_encoders(odometry, frame);
-        standing_watch(odometry, units(d, a), units(step.distance, step.angle), true);
+        step = odometry_step_by_encoders(odometry, frame);
+        standing_watch(odometry, odometry_units(d, a), odometry_units(step.distance, step.angle), true);
     } else {
-        step = step_by_values(odometry, frame, d, a);
+        step = odometry_step_by_values(odometry, frame, d, a);
     }
     odometry->asked_m = d;
     odometry->asked_rad = a;

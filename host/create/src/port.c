@@ -12,7 +12,7 @@ static const struct {
 } speeds[] = {{300, B300},   {600, B600},     {1200, B1200},   {2400, B2400},   {4800, B4800},
               {9600, B9600}, {19200, B19200}, {38400, B38400}, {57600, B57600}, {115200, B115200}};
 
-static bool find_speed(uint32_t baud, speed_t *speed)
+static bool port_find_speed(uint32_t baud, speed_t *speed)
 {
     for (size_t i = 0; i < sizeof speeds / sizeof speeds[0]; i++) {
         if (speeds[i].baud == baud) {
@@ -26,10 +26,10 @@ static bool find_speed(uint32_t baud, speed_t *speed)
 bool create_port_knows(uint32_t baud)
 {
     speed_t speed;
-    return find_speed(baud, &speed);
+    return port_find_speed(baud, &speed);
 }
 
-static bool make_raw(int port, speed_t speed)
+static bool port_make_raw(int port, speed_t speed)
 {
     struct termios line;
     if (tcgetattr(port, &line) != 0) {
@@ -46,12 +46,12 @@ static bool make_raw(int port, speed_t speed)
 int create_port_open(const char *path, uint32_t baud)
 {
     speed_t speed;
-    if (!find_speed(baud, &speed)) {
+    if (!port_find_speed(baud, &speed)) {
         errno = EINVAL;
         return -1;
     }
     const int port = open(path, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
-    if (port >= 0 && (flock(port, LOCK_EX | LOCK_NB) != 0 || !make_raw(port, speed))) {
+    if (port >= 0 && (flock(port, LOCK_EX | LOCK_NB) != 0 || !port_make_raw(port, speed))) {
         const int error = errno;
         close(port);
         errno = error;

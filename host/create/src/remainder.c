@@ -27,7 +27,7 @@ struct chances {
     double average, best;
 };
 
-static struct chances if_kept(double least, double most, double told)
+static struct chances remainder_if_kept(double least, double most, double told)
 {
     const double away = fmax(0, fmax(told - most, least - told));
     double sum = 0;
@@ -37,7 +37,7 @@ static struct chances if_kept(double least, double most, double told)
     return (struct chances){fmax(STRAY, sum / POINTS), fmax(STRAY, 1 - away)};
 }
 
-static struct chances if_dropped(double least, double most, double told)
+static struct chances remainder_if_dropped(double least, double most, double told)
 {
     int equal = 0;
     for (int i = 0; i < POINTS; i++) {
@@ -50,25 +50,25 @@ static struct chances if_dropped(double least, double most, double told)
 /* A number told for a motion that was asked for, both in units and in the direction of that motion. What neither way
  * tells, as of a body that stands or is held back, weighs nothing. Nor does 0 against kept remainders where dropped
  * ones would tell it: a body that stands tells it too. */
-static void weigh(struct create_evidence *evidence, double asked, double told)
+static void remainder_weigh(struct create_evidence *evidence, double asked, double told)
 {
     const double least = asked * (1 - ODOMETRY_SPREAD), most = asked * (1 + ODOMETRY_SPREAD);
-    const struct chances kept = if_kept(least, most, told), dropped = if_dropped(least, most, told);
+    const struct chances kept = remainder_if_kept(least, most, told), dropped = remainder_if_dropped(least, most, told);
     if (told > 0) {
         evidence->against_kept = fmax(0, evidence->against_kept + log(dropped.average / kept.best));
     }
     evidence->against_dropped = fmax(0, evidence->against_dropped + log(kept.average / dropped.best));
 }
 
-static void weigh_part(struct create_evidence *evidence, double asked, int32_t told)
+static void remainder_weigh_part(struct create_evidence *evidence, double asked, int32_t told)
 {
     if (asked != 0) {
-        weigh(evidence, fabs(asked), asked > 0 ? told : -told);
+        remainder_weigh(evidence, fabs(asked), asked > 0 ? told : -told);
     }
 }
 
 /* Frames since the wheels were asked for other speeds, or a frame was missed. */
-static uint32_t settle(struct create_evidence *evidence, const struct create_frame *frame)
+static uint32_t remainder_settle(struct create_evidence *evidence, const struct create_frame *frame)
 {
     const int32_t left = frame->value[CREATE_OI_REQUESTED_LEFT], right = frame->value[CREATE_OI_REQUESTED_RIGHT];
     const bool same = frame->missed == 0 && left == evidence->left && right == evidence->right;
@@ -78,7 +78,7 @@ static uint32_t settle(struct create_evidence *evidence, const struct create_fra
     return evidence->settled;
 }
 
-static void decide(struct create_odometry *odometry)
+static void remainder_decide(struct create_odometry *odometry)
 {
     struct create_evidence *evidence = &odometry->evidence;
     const double enough = odometry->remainder == CREATE_UNKNOWN ? FIRST : REVISED;
@@ -90,10 +90,10 @@ static void decide(struct create_odometry *odometry)
 
 void remainder_watch(struct create_odometry *odometry, const struct create_frame *frame, struct odometry_units asked)
 {
-    if (settle(&odometry->evidence, frame) < SETTLED_FRAMES || frame->value[CREATE_OI_BUMPS_DROPS] != 0) {
+    if (remainder_settle(&odometry->evidence, frame) < SETTLED_FRAMES || frame->value[CREATE_OI_BUMPS_DROPS] != 0) {
         return;
     }
-    weigh_part(&odometry->evidence, asked.distance, frame->value[CREATE_OI_DISTANCE]);
-    weigh_part(&odometry->evidence, asked.angle, frame->value[CREATE_OI_ANGLE]);
-    decide(odometry);
+    remainder_weigh_part(&odometry->evidence, asked.distance, frame->value[CREATE_OI_DISTANCE]);
+    remainder_weigh_part(&odometry->evidence, asked.angle, frame->value[CREATE_OI_ANGLE]);
+    remainder_decide(odometry);
 }

@@ -13,14 +13,14 @@
 #define PATIENCE 3 /* frames' worth, or units if that is more */
 #define PAYS 2
 
-static double least(double asked, bool exact)
+static double standing_least(double asked, bool exact)
 {
     const double units = fabs(asked) * (1 - ODOMETRY_SPREAD);
     return exact ? units : floor(units);
 }
 
 /* Units told in the direction that was asked for. */
-static double paid(double asked, double told)
+static double standing_paid(double asked, double told)
 {
     return asked > 0 ? told : asked < 0 ? -told : 0;
 }
@@ -28,14 +28,14 @@ static double paid(double asked, double told)
 void standing_watch(struct create_odometry *odometry, struct odometry_units asked, struct odometry_units told,
                     bool exact)
 {
-    const double expected = least(asked.distance, exact) + least(asked.angle, exact);
+    const double expected = standing_least(asked.distance, exact) + standing_least(asked.angle, exact);
     const double limit = PATIENCE * fmax(1, expected);
     if (expected <= 0) {
         odometry->owed = 0;
         odometry->standing = asked.distance != 0 || asked.angle != 0 ? CREATE_CANNOT_TELL : CREATE_MOVES;
         return;
     }
-    const double got = paid(asked.distance, told.distance) + paid(asked.angle, told.angle);
+    const double got = standing_paid(asked.distance, told.distance) + standing_paid(asked.angle, told.angle);
     odometry->owed = fmin(limit, fmax(0, odometry->owed + expected - PAYS * got));
     odometry->standing = odometry->owed >= limit ? CREATE_STANDS : CREATE_MOVES;
 }

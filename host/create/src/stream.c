@@ -27,7 +27,7 @@ int32_t create_packet_value(unsigned id, const uint8_t *data)
     return packets[id].is_signed ? (int16_t)word : word;
 }
 
-static void expect(struct create_stream *stream, size_t at, size_t byte)
+static void stream_expect(struct create_stream *stream, size_t at, size_t byte)
 {
     stream->expected[at] = (uint8_t)byte;
     stream->known[at] = true;
@@ -42,16 +42,16 @@ size_t create_stream_begin(struct create_stream *stream, const uint8_t *ids, siz
         if (bytes == 0 || at + 1 + bytes >= CREATE_STREAM_BYTES) {
             return 0;
         }
-        expect(stream, at, ids[i]);
+        stream_expect(stream, at, ids[i]);
         at += 1 + bytes;
     }
-    expect(stream, AT_HEADER, CREATE_OI_STREAM_HEADER);
-    expect(stream, AT_LENGTH, at - AT_PACKETS);
+    stream_expect(stream, AT_HEADER, CREATE_OI_STREAM_HEADER);
+    stream_expect(stream, AT_LENGTH, at - AT_PACKETS);
     stream->length = at + 1;
     return stream->length;
 }
 
-static bool sum_is_right(const struct create_stream *stream)
+static bool stream_sum_is_right(const struct create_stream *stream)
 {
     uint8_t sum = 0;
     for (size_t i = 0; i < stream->length; i++) {
@@ -61,7 +61,7 @@ static bool sum_is_right(const struct create_stream *stream)
 }
 
 /* Whether the bytes from `from` on, as far as they have come, can be a frame. */
-static bool plausible(const struct create_stream *stream, size_t from)
+static bool stream_plausible(const struct create_stream *stream, size_t from)
 {
     for (size_t i = from; i < stream->count; i++) {
         if (stream->known[i - from] && stream->held[i] != stream->expected[i - from]) {
@@ -72,13 +72,13 @@ static bool plausible(const struct create_stream *stream, size_t from)
 }
 
 /* The bytes held are no frame: leaves behind those up to the next that may begin one. */
-static void skip(struct create_stream *stream)
+static void stream_skip(struct create_stream *stream)
 {
     const bool begun = stream->count > AT_PACKETS; /* the byte that did not fit came after header and length */
     stream->counts.corrupt += stream->synchronised || begun;
     stream->synchronised = false;
     size_t from = 1;
-    while (!plausible(stream, from)) {
+    while (!stream_plausible(stream, from)) {
         from++;
     }
     stream->counts.skipped += from;
@@ -86,7 +86,7 @@ static void skip(struct create_stream *stream)
     memmove(stream->held, stream->held + from, stream->count);
 }
 
-static void read_packets(const struct create_stream *stream, struct create_frame *frame)
+static void stream_read_packets(const struct create_stream *stream, struct create_frame *frame)
 {
     memset(frame, 0, sizeof *frame);
     for (size_t at = AT_PACKETS; at + 1 < stream->length; at += 1 + create_packet_bytes(stream->held[at])) {
@@ -95,10 +95,10 @@ static void read_packets(const struct create_stream *stream, struct create_frame
     }
 }
 
-static void take(struct create_stream *stream, struct create_frame *frame)
+static void stream_take(struct create_stream *stream, struct create_frame *frame)
 {
     const uint64_t lost = stream->counts.skipped - stream->skipped_before;
-    read_packets(stream, frame);
+    stream_read_packets(stream, frame);
     frame->ordered = 0;
     frame->missed = stream->seen ? (uint32_t)((lost + stream->length / 2) / stream->length) : 0;
     stream->counts.frames++;
@@ -114,16 +114,16 @@ bool create_stream_push(struct create_stream *stream, uint8_t byte, struct creat
     stream->counts.bytes++;
     stream->held[at] = byte;
     if (stream->known[at] && byte != stream->expected[at]) {
-        skip(stream);
+        stream_skip(stream);
         return false;
     }
     if (stream->count < stream->length) {
         return false;
     }
-    if (!sum_is_right(stream)) {
-        skip(stream);
+    if (!stream_sum_is_right(stream)) {
+        stream_skip(stream);
         return false;
     }
-    take(stream, frame);
+    stream_take(stream, frame);
     return true;
 }

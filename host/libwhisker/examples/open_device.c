@@ -13,14 +13,14 @@ struct stream {
     int last;
 };
 
-static int fail(const char *what, int error)
+static int open_device_fail(const char *what, int error)
 {
     fprintf(stderr, "open_device: %s: %s; %s\n", what, whisker_error_text(error), whisker_error_remedy(error));
     return 1;
 }
 
 /* Called with the bridge's bytes as they come, cut anywhere; the decoder finds the frames. */
-static void on_bytes(void *context, const uint8_t *bytes, size_t count)
+static void open_device_on_bytes(void *context, const uint8_t *bytes, size_t count)
 {
     struct stream *stream = context;
     struct whisker_frame frame;
@@ -34,11 +34,11 @@ static void on_bytes(void *context, const uint8_t *bytes, size_t count)
 }
 
 /* Streams until there are FRAMES, then stops the bridge and takes what it still sends. */
-static int run(struct whisker_device *device, struct stream *stream)
+static int open_device_run(struct whisker_device *device, struct stream *stream)
 {
     struct whisker_settings settings;
     whisker_settings_default(&settings);
-    int error = whisker_device_start(device, &settings, on_bytes, stream);
+    int error = whisker_device_start(device, &settings, open_device_on_bytes, stream);
     while (!error && stream->frames < FRAMES) {
         error = whisker_device_poll(device, 100);
     }
@@ -59,11 +59,11 @@ int main(void)
     whisker_decoder_init(&stream.decoder);
     int error = whisker_device_open(NULL, &device, &identity);
     if (error) {
-        return fail("bridge", error);
+        return open_device_fail("bridge", error);
     }
     printf("bridge %s, gateware %u\n", whisker_device_about(device)->serial, identity.gateware);
-    error = run(device, &stream);
+    error = open_device_run(device, &stream);
     whisker_device_close(device);
     printf("%lu frames, %lu good readings\n", stream.frames, stream.good);
-    return error ? fail("stream", error) : 0;
+    return error ? open_device_fail("stream", error) : 0;
 }

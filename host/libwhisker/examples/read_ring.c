@@ -8,14 +8,14 @@
 
 #define EVERY 200 /* frames: 0.1 s at 2 kHz */
 
-static int fail(const char *what, int error)
+static int read_ring_fail(const char *what, int error)
 {
     fprintf(stderr, "read_ring: %s: %s; %s\n", what, whisker_error_text(error), whisker_error_remedy(error));
     return 1;
 }
 
 /* A frame lies in shared memory: look at it, keep no pointer to it. */
-static void show(const struct whisker_reader *reader, const struct whisker_frame *frame)
+static void read_ring_show(const struct whisker_reader *reader, const struct whisker_frame *frame)
 {
     const struct whisker_sample *sample = &frame->lane[0];
     struct whisker_clock clock;
@@ -32,13 +32,13 @@ static void show(const struct whisker_reader *reader, const struct whisker_frame
 }
 
 /* Takes what is there. Counts only once advance has confirmed that the writer did not overtake us meanwhile. */
-static int take(struct whisker_reader *reader)
+static int read_ring_take(struct whisker_reader *reader)
 {
     const struct whisker_frame *frames;
     size_t count;
     int error = whisker_reader_peek(reader, &frames, &count);
     for (size_t i = 0; !error && i < count; i++) {
-        show(reader, &frames[i]);
+        read_ring_show(reader, &frames[i]);
     }
     return error ? error : whisker_reader_advance(reader, count);
 }
@@ -49,12 +49,12 @@ int main(int argc, char **argv)
     struct whisker_reader *reader;
     int error = whisker_reader_attach(name, 5000, &reader);
     if (error) {
-        return fail(name, error);
+        return read_ring_fail(name, error);
     }
     while (error == WHISKER_OK) {
         error = whisker_reader_wait(reader, -1);
         if (error == WHISKER_OK) {
-            error = take(reader);
+            error = read_ring_take(reader);
         }
         if (error == WHISKER_ERROR_OVERRUN) { /* we were too slow; the reader has skipped what is lost */
             fprintf(stderr, "read_ring: frames lost\n");
@@ -65,5 +65,5 @@ int main(int argc, char **argv)
         }
     }
     whisker_reader_detach(reader);
-    return error == WHISKER_ERROR_CLOSED ? 0 : fail(name, error);
+    return error == WHISKER_ERROR_CLOSED ? 0 : read_ring_fail(name, error);
 }

@@ -34,21 +34,21 @@ void whisker_clock_begin(struct whisker_clock_fit *fit, uint32_t clock_hz, int64
 }
 
 /* Where a tick is on the axis that arrivals are late behind: the controller's time, or else the bridge's. */
-static double place_of(struct whisker_clock_fit *fit, uint64_t cycles, uint16_t usb_time, int64_t arrival_ns)
+static double clock_place_of(struct whisker_clock_fit *fit, uint64_t cycles, uint16_t usb_time, int64_t arrival_ns)
 {
     const double since_ns = ((double)(arrival_ns - fit->first_ns) - fit->late_ns) / (1 + fit->skew);
     return clock_usb_known(usb_time) ? clock_usb_date(&fit->usb, cycles, usb_time, fit->first_x_ns + since_ns)
                                      : (double)(cycles - fit->first_cycles) * fit->nominal_ns;
 }
 
-static void restart(struct whisker_clock_fit *fit, uint64_t cycles, uint16_t usb_time, int64_t arrival_ns)
+static void clock_restart(struct whisker_clock_fit *fit, uint64_t cycles, uint16_t usb_time, int64_t arrival_ns)
 {
     fit->restarts += fit->begun;
     fit->begun = true;
     fit->first_cycles = cycles;
     fit->first_ns = arrival_ns;
     clock_usb_begin(&fit->usb, fit->nominal_ns);
-    fit->first_x_ns = place_of(fit, cycles, usb_time, arrival_ns);
+    fit->first_x_ns = clock_place_of(fit, cycles, usb_time, arrival_ns);
     fit->points = fit->late_points = 0;
     fit->skew = fit->spread_ns = 0;
     fit->late_ns = fit->usb.doubt_ns;
@@ -56,23 +56,23 @@ static void restart(struct whisker_clock_fit *fit, uint64_t cycles, uint16_t usb
 }
 
 /* How far a point lies above the line. */
-static double above(const struct whisker_clock_fit *fit, const struct whisker_clock_point *point)
+static double clock_above(const struct whisker_clock_fit *fit, const struct whisker_clock_point *point)
 {
     return point->late_ns - (fit->late_ns + fit->skew * point->x_ns);
 }
 
-static double slope(const struct whisker_clock_point *a, const struct whisker_clock_point *b)
+static double clock_slope(const struct whisker_clock_point *a, const struct whisker_clock_point *b)
 {
     return (b->late_ns - a->late_ns) / (b->x_ns - a->x_ns);
 }
 
 /* The lower convex hull of the points, left to right (Andrew's monotone chain); returns how many are on it. */
-static int lower_hull(const struct whisker_clock_point *point, int count,
-                      struct whisker_clock_point hull[WHISKER_CLOCK_POINTS])
+static int clock_lower_hull(const struct whisker_clock_point *point, int count,
+                            struct whisker_clock_point hull[WHISKER_CLOCK_POINTS])
 {
     int on = 0;
     for (int i = 0; i < count; i++) {
-        while (on >= 2 && slope(&hull[on - 2], &hull[on - 1]) >= slope(&hull[on - 1], &point[i])) {
+        while (on >= 2 && clock_slope(&hull[on - 2], &hull[on - 1]) >= clock_slope(&hull[on - 1], &point[i])) {
             on--;
         }
         hull[on++] = point[i];
@@ -84,10 +84,10 @@ static int lower_hull(const struct whisker_clock_point *point, int count,
  * Of all lines that no point lies below, the one with the least sum of distances goes along the edge of the lower hull
  * above the mean of x (Moon, Skelly, Towsley 1999: skew by linear programming).
  */
-static double envelope_skew(const struct whisker_clock_fit *fit)
+static double clock_envelope_skew(const struct whisker_clock_fit *fit)
 {
     struct whisker_clock_point hull[WHISKER_CLOCK_POINTS];
-    const int on = lower_hull(fit->point, fit->points, hull);
+    const int on = clock_lower_hull(fit->point, fit->points, hull);
     double mean = 0;
     for (int i = 0; i < fit->points; i++) {
         mean += fit->point[i].x_ns / fit->points;
@@ -96,15 +96,15 @@ static double envelope_skew(const struct whisker_clock_fit *fit)
     while (edge < on - 1 && hull[edge].x_ns < mean) {
         edge++;
     }
-    return on < 2 ? 0 : fmax(-SKEW_MAX, fmin(SKEW_MAX, slope(&hull[edge - 1], &hull[edge])));
+    return on < 2 ? 0 : fmax(-SKEW_MAX, fmin(SKEW_MAX, clock_slope(&hull[edge - 1], &hull[edge])));
 }
 
 /* How far the fastest arrivals of a second usually lie above the line: the median. */
-static double median_above(const struct whisker_clock_fit *fit)
+static double clock_median_above(const struct whisker_clock_fit *fit)
 {
     double sorted[WHISKER_CLOCK_POINTS];
     for (int i = 0; i < fit->points; i++) {
-        const double distance = above(fit, &fit->point[i]);
+        const double distance = clock_above(fit, &fit->point[i]);
         int at = i;
         for (; at > 0 && sorted[at - 1] > distance; at--) {
             sorted[at] = sorted[at - 1];
@@ -114,50 +114,50 @@ static double median_above(const struct whisker_clock_fit *fit)
     return sorted[fit->points / 2];
 }
 
-static void fit_line(struct whisker_clock_fit *fit)
+static void clock_fit_line(struct whisker_clock_fit *fit)
 {
-    fit->skew = envelope_skew(fit);
+    fit->skew = clock_envelope_skew(fit);
     fit->late_ns = INFINITY;
     for (int i = 0; i < fit->points; i++) {
         fit->late_ns = fmin(fit->late_ns, fit->point[i].late_ns - fit->skew * fit->point[i].x_ns);
     }
-    fit->spread_ns = median_above(fit);
+    fit->spread_ns = clock_median_above(fit);
 }
 
-static void keep_best(struct whisker_clock_fit *fit)
+static void clock_keep_best(struct whisker_clock_fit *fit)
 {
     if (fit->points == WHISKER_CLOCK_POINTS) {
         fit->points--;
         memmove(fit->point, fit->point + 1, (size_t)fit->points * sizeof fit->point[0]);
     }
-    fit->late_points = fit->points > 0 && above(fit, &fit->best) > JUMP_LATE_NS ? fit->late_points + 1 : 0;
+    fit->late_points = fit->points > 0 && clock_above(fit, &fit->best) > JUMP_LATE_NS ? fit->late_points + 1 : 0;
     fit->point[fit->points++] = fit->best;
-    fit_line(fit);
+    clock_fit_line(fit);
 }
 
-static struct whisker_clock_point point_of(struct whisker_clock_fit *fit, uint64_t cycles, uint16_t usb_time,
-                                           int64_t arrival_ns)
+static struct whisker_clock_point clock_point_of(struct whisker_clock_fit *fit, uint64_t cycles, uint16_t usb_time,
+                                                 int64_t arrival_ns)
 {
-    const double x_ns = place_of(fit, cycles, usb_time, arrival_ns) - fit->first_x_ns;
+    const double x_ns = clock_place_of(fit, cycles, usb_time, arrival_ns) - fit->first_x_ns;
     const double doubt_ns = fit->usb.known ? fit->usb.doubt_ns : 0; /* a date too late must not seem a fast arrival */
     return (struct whisker_clock_point){x_ns, (double)(arrival_ns - fit->first_ns) - x_ns + doubt_ns};
 }
 
-static void add_point(struct whisker_clock_fit *fit, struct whisker_clock_point now)
+static void clock_add_point(struct whisker_clock_fit *fit, struct whisker_clock_point now)
 {
     if (floor(now.x_ns / POINT_NS) > floor(fit->best.x_ns / POINT_NS)) {
-        keep_best(fit);
+        clock_keep_best(fit);
         fit->best = now;
-    } else if (above(fit, &now) < above(fit, &fit->best)) {
+    } else if (clock_above(fit, &now) < clock_above(fit, &fit->best)) {
         fit->best = now;
     }
-    fit->late_ns += fmin(0, above(fit, &now)); /* the line is never above an arrival */
+    fit->late_ns += fmin(0, clock_above(fit, &now)); /* the line is never above an arrival */
 }
 
 /* True if no delay and no crystal explains this arrival. */
-static bool jumped(const struct whisker_clock_fit *fit, struct whisker_clock_point now)
+static bool clock_jumped(const struct whisker_clock_fit *fit, struct whisker_clock_point now)
 {
-    return fit->late_points >= JUMP_POINTS || (fit->points >= POINTS_KNOWN && above(fit, &now) < -JUMP_EARLY_NS);
+    return fit->late_points >= JUMP_POINTS || (fit->points >= POINTS_KNOWN && clock_above(fit, &now) < -JUMP_EARLY_NS);
 }
 
 int whisker_clock_add(struct whisker_clock_fit *fit, uint64_t cycles, uint16_t usb_time, int64_t monotonic_ns,
@@ -173,18 +173,19 @@ int whisker_clock_add(struct whisker_clock_fit *fit, uint64_t cycles, uint16_t u
     struct whisker_clock_point now = {0, 0};
     bool anew = !fit->begun || back || known != fit->usb.known || (again && !known);
     if (!anew) {
-        now = point_of(fit, cycles, usb_time, arrival_ns);
-        anew = jumped(fit, now) || (again && above(fit, &now) > JUMP_LATE_NS); /* no bus went on meanwhile */
+        now = clock_point_of(fit, cycles, usb_time, arrival_ns);
+        anew =
+            clock_jumped(fit, now) || (again && clock_above(fit, &now) > JUMP_LATE_NS); /* no bus went on meanwhile */
     }
     if (anew) {
-        restart(fit, cycles, usb_time, arrival_ns);
+        clock_restart(fit, cycles, usb_time, arrival_ns);
         now = fit->best;
     }
     fit->last_cycles = cycles;
     fit->last_x_ns = now.x_ns;
     fit->last_ns = arrival_ns;
     fit->realtime_offset_ns = offset_ns;
-    add_point(fit, now);
+    clock_add_point(fit, now);
     return back || set ? WHISKER_ERROR_HOST_CLOCK : WHISKER_OK;
 }
 
@@ -194,7 +195,7 @@ void whisker_clock_report(struct whisker_clock_fit *fit, uint64_t cycles, uint16
 }
 
 /* base_ns and a distance, which a bridge's nonsense may make as large as it likes. */
-static int64_t plus(int64_t base_ns, double on_ns)
+static int64_t clock_plus(int64_t base_ns, double on_ns)
 {
     return base_ns + llround(fmax(-FAR_NS, fmin(FAR_NS, on_ns)));
 }
@@ -208,25 +209,25 @@ void whisker_clock_get(const struct whisker_clock_fit *fit, struct whisker_clock
     const double x_ns = fit->last_x_ns;
     const double rate_ns = fit->usb.known ? fit->usb.rate_ns : fit->nominal_ns;
     clock->device_cycles = fit->last_cycles;
-    clock->monotonic_ns = plus(fit->first_ns, x_ns + fit->late_ns + fit->skew * x_ns);
+    clock->monotonic_ns = clock_plus(fit->first_ns, x_ns + fit->late_ns + fit->skew * x_ns);
     clock->realtime_ns = clock->monotonic_ns + fit->realtime_offset_ns;
     clock->ns_per_cycle = rate_ns * (1 + fit->skew);
     clock->uncertainty_ns =
         FLOOR_NS + fit->usb.doubt_ns + (fit->points >= POINTS_KNOWN ? 2 * fit->spread_ns : UNKNOWN_NS);
 }
 
-static int64_t shift(const struct whisker_clock *clock, int64_t base_ns, uint64_t cycles)
+static int64_t clock_shift(const struct whisker_clock *clock, int64_t base_ns, uint64_t cycles)
 {
     const double on_ns = (double)(int64_t)(cycles - clock->device_cycles) * clock->ns_per_cycle;
-    return clock->ns_per_cycle > 0 ? plus(base_ns, on_ns) : 0;
+    return clock->ns_per_cycle > 0 ? clock_plus(base_ns, on_ns) : 0;
 }
 
 int64_t whisker_clock_to_monotonic(const struct whisker_clock *clock, uint64_t cycles)
 {
-    return shift(clock, clock->monotonic_ns, cycles);
+    return clock_shift(clock, clock->monotonic_ns, cycles);
 }
 
 int64_t whisker_clock_to_realtime(const struct whisker_clock *clock, uint64_t cycles)
 {
-    return shift(clock, clock->realtime_ns, cycles);
+    return clock_shift(clock, clock->realtime_ns, cycles);
 }

@@ -24,39 +24,39 @@ void clock_usb_begin(struct whisker_clock_usb *usb, double nominal_ns)
 }
 
 /* The microframe of this number that is nearest to one counted on. */
-static int64_t unwrap(uint16_t usb_time, double near)
+static int64_t clock_usb_unwrap(uint16_t usb_time, double near)
 {
     const int64_t number = usb_time & (WRAP - 1);
     const double wraps = fmax(-1e12, fmin(1e12, (near - (double)number) / WRAP));
     return number + WRAP * llround(wraps);
 }
 
-static void set_date(struct whisker_clock_usb *usb, uint64_t cycles, double ns, double doubt_ns)
+static void clock_usb_set_date(struct whisker_clock_usb *usb, uint64_t cycles, double ns, double doubt_ns)
 {
     usb->cycles = cycles;
     usb->ns = ns;
     usb->doubt_ns = doubt_ns;
 }
 
-static double predict(const struct whisker_clock_usb *usb, uint64_t cycles)
+static double clock_usb_predict(const struct whisker_clock_usb *usb, uint64_t cycles)
 {
     return usb->ns + (double)(int64_t)(cycles - usb->cycles) * usb->rate_ns;
 }
 
 double clock_usb_date(struct whisker_clock_usb *usb, uint64_t cycles, uint16_t usb_time, double near_ns)
 {
-    usb->microframe = unwrap(usb_time, usb->known ? near_ns / MICROFRAME_NS : 0);
+    usb->microframe = clock_usb_unwrap(usb_time, usb->known ? near_ns / MICROFRAME_NS : 0);
     usb->known = true;
     usb->microframes |= usb_time % PER_FRAME != 0;
     const double width_ns = usb->microframes ? MICROFRAME_NS : PER_FRAME * MICROFRAME_NS;
     const double first_ns = (double)usb->microframe * MICROFRAME_NS;
-    const double expected_ns = predict(usb, cycles);
+    const double expected_ns = clock_usb_predict(usb, cycles);
     const double within_ns = fmax(first_ns, fmin(first_ns + width_ns, expected_ns));
     usb->even &= fabs(within_ns - expected_ns) < DRIFT_NS;
     if (usb->even) {
-        set_date(usb, cycles, within_ns, 0);
+        clock_usb_set_date(usb, cycles, within_ns, 0);
     } else {
-        set_date(usb, cycles, first_ns + width_ns / 2, width_ns / 2);
+        clock_usb_set_date(usb, cycles, first_ns + width_ns / 2, width_ns / 2);
     }
     return usb->ns;
 }
@@ -66,7 +66,8 @@ void clock_usb_report(struct whisker_clock_usb *usb, uint64_t cycles, uint16_t u
     if (!usb->known || !clock_usb_known(usb_time)) {
         return;
     }
-    const double ns = (double)unwrap(usb_time, (double)usb->microframe) * MICROFRAME_NS + sof_cycles * usb->nominal_ns;
+    const double ns =
+        (double)clock_usb_unwrap(usb_time, (double)usb->microframe) * MICROFRAME_NS + sof_cycles * usb->nominal_ns;
     const double rate_ns = (ns - usb->report_ns) / (double)(int64_t)(cycles - usb->report_cycles);
     const bool possible = usb->reported && fabs(rate_ns / usb->nominal_ns - 1) < RATE_MAX;
     usb->even = possible && fabs(rate_ns / usb->rate_ns - 1) < RATE_STEP;
@@ -74,5 +75,5 @@ void clock_usb_report(struct whisker_clock_usb *usb, uint64_t cycles, uint16_t u
     usb->report_cycles = cycles;
     usb->report_ns = ns;
     usb->reported = true;
-    set_date(usb, cycles, ns, 0);
+    clock_usb_set_date(usb, cycles, ns, 0);
 }

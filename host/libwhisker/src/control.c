@@ -15,7 +15,7 @@ static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
 static int open_handles;
 
 /* Caller holds the lock. */
-static void release_hidapi(void)
+static void control_release_hidapi(void)
 {
     if (open_handles == 0) {
         hid_exit();
@@ -29,7 +29,7 @@ hid_device *control_open(const char *path)
     pthread_mutex_lock(&lock);
     hid_device *hid = hid_open_path(hid_path);
     open_handles += hid != NULL;
-    release_hidapi();
+    control_release_hidapi();
     pthread_mutex_unlock(&lock);
     return hid;
 }
@@ -40,12 +40,12 @@ void control_close(hid_device *hid)
         pthread_mutex_lock(&lock);
         hid_close(hid);
         open_handles--;
-        release_hidapi();
+        control_release_hidapi();
         pthread_mutex_unlock(&lock);
     }
 }
 
-static int get_report(hid_device *hid, uint8_t id, uint8_t *bytes, size_t count)
+static int control_get_report(hid_device *hid, uint8_t id, uint8_t *bytes, size_t count)
 {
     memset(bytes, 0, count);
     bytes[0] = id;
@@ -56,7 +56,7 @@ static int get_report(hid_device *hid, uint8_t id, uint8_t *bytes, size_t count)
 int control_identify(hid_device *hid, struct whisker_identity *identity)
 {
     uint8_t bytes[WHISKER_REPORT_IDENTITY_BYTES];
-    const int error = get_report(hid, WHISKER_REPORT_ID_IDENTITY, bytes, sizeof bytes);
+    const int error = control_get_report(hid, WHISKER_REPORT_ID_IDENTITY, bytes, sizeof bytes);
     return error ? error : control_parse_identity(bytes, identity);
 }
 
@@ -107,7 +107,7 @@ int control_service(hid_device *hid, const struct whisker_service_order *order)
 
 int control_answers(hid_device *hid, uint8_t *report)
 {
-    return get_report(hid, WHISKER_REPORT_ID_ANSWERS, report, WHISKER_REPORT_ANSWERS_BYTES);
+    return control_get_report(hid, WHISKER_REPORT_ID_ANSWERS, report, WHISKER_REPORT_ANSWERS_BYTES);
 }
 
 int control_send_flash(hid_device *hid, const uint8_t *report)
@@ -118,7 +118,7 @@ int control_send_flash(hid_device *hid, const uint8_t *report)
 
 int control_flash(hid_device *hid, uint8_t *report)
 {
-    return get_report(hid, WHISKER_REPORT_ID_FLASH, report, WHISKER_REPORT_FLASH_BYTES);
+    return control_get_report(hid, WHISKER_REPORT_ID_FLASH, report, WHISKER_REPORT_FLASH_BYTES);
 }
 
 void control_parse_counters(const uint8_t *bytes, struct whisker_counters *counters)
@@ -138,7 +138,7 @@ void control_parse_counters(const uint8_t *bytes, struct whisker_counters *count
 int control_counters(hid_device *hid, struct whisker_counters *counters)
 {
     uint8_t bytes[WHISKER_REPORT_COUNTERS_BYTES];
-    const int error = get_report(hid, WHISKER_REPORT_ID_COUNTERS, bytes, sizeof bytes);
+    const int error = control_get_report(hid, WHISKER_REPORT_ID_COUNTERS, bytes, sizeof bytes);
     if (!error) {
         control_parse_counters(bytes, counters);
     }
@@ -148,7 +148,7 @@ int control_counters(hid_device *hid, struct whisker_counters *counters)
 int control_timing(hid_device *hid, struct whisker_timing *timing)
 {
     uint8_t bytes[WHISKER_REPORT_TIMING_BYTES];
-    const int error = get_report(hid, WHISKER_REPORT_ID_TIMING, bytes, sizeof bytes);
+    const int error = control_get_report(hid, WHISKER_REPORT_ID_TIMING, bytes, sizeof bytes);
     if (!error) {
         *timing = (struct whisker_timing){
             .tick = whisker_get_u32(bytes + WHISKER_REPORT_TIMING_TICK),

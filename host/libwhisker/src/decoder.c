@@ -14,7 +14,7 @@ void whisker_decoder_init(struct whisker_decoder *decoder)
     decoder->synchronised = true;
 }
 
-static void count_error(struct whisker_decoder_counts *counts, int error)
+static void decoder_count_error(struct whisker_decoder_counts *counts, int error)
 {
     switch (error) {
     case WHISKER_ERROR_MAGIC:
@@ -35,7 +35,7 @@ static void count_error(struct whisker_decoder_counts *counts, int error)
 }
 
 /* The wire's tick wraps after 24 days. A step back of more than half the range is a wrap, any other is a new start. */
-static uint64_t extend_tick(uint64_t last, uint32_t tick)
+static uint64_t decoder_extend_tick(uint64_t last, uint32_t tick)
 {
     const uint32_t last_low = (uint32_t)last;
     if (tick >= last_low) {
@@ -45,29 +45,29 @@ static uint64_t extend_tick(uint64_t last, uint32_t tick)
 }
 
 /* Where the next frame could begin after `from`, or the end of the window. */
-static size_t next_candidate(const uint8_t *bytes, size_t from)
+static size_t decoder_next_candidate(const uint8_t *bytes, size_t from)
 {
     const uint8_t *found = memchr(bytes + from, WHISKER_LIMIT_FRAME_MAGIC & 0xFFu, WHISKER_FRAME_BYTES - from);
     return found ? (size_t)(found - bytes) : WHISKER_FRAME_BYTES;
 }
 
 /* Damaged records may also be the next frame, when this one lost bytes. A header inside it tells; 0: there is none. */
-static size_t frame_inside(const uint8_t *bytes)
+static size_t decoder_frame_inside(const uint8_t *bytes)
 {
-    size_t at = next_candidate(bytes, 1);
+    size_t at = decoder_next_candidate(bytes, 1);
     while (at <= WHISKER_FRAME_BYTES - WHISKER_FRAME_HEADER_BYTES) {
         if (frame_check_header(bytes + at) == WHISKER_OK) {
             return at;
         }
-        at = next_candidate(bytes, at + 1);
+        at = decoder_next_candidate(bytes, at + 1);
     }
     return 0;
 }
 
-static size_t skip(struct whisker_decoder *decoder, int error, size_t bytes)
+static size_t decoder_skip(struct whisker_decoder *decoder, int error, size_t bytes)
 {
     if (decoder->synchronised) {
-        count_error(&decoder->counts, error);
+        decoder_count_error(&decoder->counts, error);
         decoder->synchronised = false;
         decoder->first_error = decoder->first_error ? decoder->first_error : error;
     }
@@ -76,16 +76,17 @@ static size_t skip(struct whisker_decoder *decoder, int error, size_t bytes)
 }
 
 /* Decodes the frame at bytes and returns how many bytes to leave behind: all of it, or those up to a possible start. */
-static size_t take(struct whisker_decoder *decoder, const uint8_t *bytes, struct whisker_frame *frame, bool *made)
+static size_t decoder_take(struct whisker_decoder *decoder, const uint8_t *bytes, struct whisker_frame *frame,
+                           bool *made)
 {
     struct frame_damage damage;
     const int error = frame_decode(bytes, frame, &damage);
     if (error && error != WHISKER_ERROR_RECORD_CRC && error != WHISKER_ERROR_RECORD_TICK) {
-        return skip(decoder, error, next_candidate(bytes, 1));
+        return decoder_skip(decoder, error, decoder_next_candidate(bytes, 1));
     }
-    const size_t inside = error ? frame_inside(bytes) : 0;
+    const size_t inside = error ? decoder_frame_inside(bytes) : 0;
     if (inside) {
-        return skip(decoder, WHISKER_ERROR_TRUNCATED, inside);
+        return decoder_skip(decoder, WHISKER_ERROR_TRUNCATED, inside);
     }
     *made = true;
     decoder->synchronised = true;
@@ -95,11 +96,11 @@ static size_t take(struct whisker_decoder *decoder, const uint8_t *bytes, struct
     decoder->counts.records_slipped += damage.slipped;
     frame->flags |= decoder->mark;
     decoder->mark = 0;
-    frame->tick = decoder->tick = extend_tick(decoder->tick, (uint32_t)frame->tick);
+    frame->tick = decoder->tick = decoder_extend_tick(decoder->tick, (uint32_t)frame->tick);
     return WHISKER_FRAME_BYTES;
 }
 
-static void fill(struct whisker_decoder *decoder, const uint8_t **bytes, size_t *count)
+static void decoder_fill(struct whisker_decoder *decoder, const uint8_t **bytes, size_t *count)
 {
     const size_t room = WHISKER_FRAME_BYTES - decoder->held;
     const size_t taken = *count < room ? *count : room;
@@ -115,18 +116,18 @@ bool whisker_decoder_next(struct whisker_decoder *decoder, const uint8_t **bytes
     bool made = false;
     while (!made && decoder->held + *count >= WHISKER_FRAME_BYTES) {
         if (decoder->held == 0) { /* whole frames in the chunk are decoded where they are */
-            const size_t used = take(decoder, *bytes, frame, &made);
+            const size_t used = decoder_take(decoder, *bytes, frame, &made);
             *bytes += used;
             *count -= used;
             continue;
         }
-        fill(decoder, bytes, count);
-        const size_t used = take(decoder, decoder->bytes, frame, &made);
+        decoder_fill(decoder, bytes, count);
+        const size_t used = decoder_take(decoder, decoder->bytes, frame, &made);
         decoder->held -= used;
         memmove(decoder->bytes, decoder->bytes + used, decoder->held);
     }
     if (!made && *count > 0) {
-        fill(decoder, bytes, count);
+        decoder_fill(decoder, bytes, count);
     }
     return made;
 }

@@ -44,7 +44,7 @@ struct whisker_device {
 };
 
 /* hidapi says only that something failed. Is the bridge still there? Asks for its status (USB 2.0, 9.4.5). */
-static int blame(struct whisker_device *device, int error)
+static int device_blame(struct whisker_device *device, int error)
 {
     uint8_t status[2];
     if (error != WHISKER_ERROR_DEVICE_CONTROL && error != WHISKER_ERROR_DEVICE_REFUSED) {
@@ -55,7 +55,7 @@ static int blame(struct whisker_device *device, int error)
     return got == LIBUSB_ERROR_NO_DEVICE ? WHISKER_ERROR_DEVICE_GONE : error;
 }
 
-static void submit(struct whisker_device *device, struct libusb_transfer *transfer)
+static void device_submit(struct whisker_device *device, struct libusb_transfer *transfer)
 {
     const int error = libusb_submit_transfer(transfer);
     device->active += error == 0;
@@ -63,7 +63,7 @@ static void submit(struct whisker_device *device, struct libusb_transfer *transf
 }
 
 /* The bytes of a transfer that did not fill up are as good as any other's. */
-static void LIBUSB_CALL on_transfer(struct libusb_transfer *transfer)
+static void LIBUSB_CALL device_on_transfer(struct libusb_transfer *transfer)
 {
     struct whisker_device *device = transfer->user_data;
     device->active--;
@@ -74,7 +74,7 @@ static void LIBUSB_CALL on_transfer(struct libusb_transfer *transfer)
         if (device->settings.transfers > 0) {
             device->idle++;
         } else {
-            submit(device, transfer);
+            device_submit(device, transfer);
         }
     } else if (transfer->status == LIBUSB_TRANSFER_NO_DEVICE) {
         device->error = WHISKER_ERROR_DEVICE_GONE;
@@ -83,7 +83,7 @@ static void LIBUSB_CALL on_transfer(struct libusb_transfer *transfer)
     }
 }
 
-static int make_transfers(struct whisker_device *device)
+static int device_make_transfers(struct whisker_device *device)
 {
     for (int i = 0; i < TRANSFERS_MAX; i++) {
         device->transfer[i] = libusb_alloc_transfer(0);
@@ -94,7 +94,7 @@ static int make_transfers(struct whisker_device *device)
     return WHISKER_OK;
 }
 
-static int open_all(struct whisker_device *device, const char *serial, struct whisker_identity *identity)
+static int device_open_all(struct whisker_device *device, const char *serial, struct whisker_identity *identity)
 {
     if (libusb_init(&device->usb) != 0) {
         device->usb = NULL;
@@ -102,13 +102,13 @@ static int open_all(struct whisker_device *device, const char *serial, struct wh
     }
     int error = discovery_open(device->usb, serial, &device->handle, &device->about);
     if (!error) {
-        error = make_transfers(device);
+        error = device_make_transfers(device);
     }
     if (error) {
         return error;
     }
     device->hid = control_open(device->about.path);
-    return blame(device, device->hid ? control_identify(device->hid, identity) : WHISKER_ERROR_DEVICE_CONTROL);
+    return device_blame(device, device->hid ? control_identify(device->hid, identity) : WHISKER_ERROR_DEVICE_CONTROL);
 }
 
 int whisker_device_open(const char *serial, struct whisker_device **device, struct whisker_identity *identity)
@@ -120,7 +120,7 @@ int whisker_device_open(const char *serial, struct whisker_device **device, stru
         return WHISKER_ERROR_MEMORY;
     }
     whisker_settings_default(&opened->settings);
-    const int error = open_all(opened, serial, identity);
+    const int error = device_open_all(opened, serial, identity);
     if (error) {
         whisker_device_close(opened);
         return error;
@@ -134,7 +134,7 @@ const struct whisker_device_info *whisker_device_about(const struct whisker_devi
     return &device->about;
 }
 
-static void handle_events(struct whisker_device *device, int timeout_ms)
+static void device_handle_events(struct whisker_device *device, int timeout_ms)
 {
     struct timeval timeout = {.tv_sec = timeout_ms / 1000, .tv_usec = timeout_ms % 1000 * 1000};
     libusb_handle_events_timeout_completed(device->usb, &timeout, NULL);
@@ -148,7 +148,7 @@ void whisker_device_flush(struct whisker_device *device)
         libusb_cancel_transfer(device->transfer[i]);
     }
     while (device->active > 0) {
-        handle_events(device, STALE_TIMEOUT_MS);
+        device_handle_events(device, STALE_TIMEOUT_MS);
     }
 }
 
@@ -172,20 +172,20 @@ void whisker_device_close(struct whisker_device *device)
     free(device);
 }
 
-static int stop(struct whisker_device *device)
+static int device_stop(struct whisker_device *device)
 {
     return control_run(device->hid, &device->settings, false) ? WHISKER_ERROR_DEVICE_CONTROL : WHISKER_OK;
 }
 
 /* A process that was killed leaves the bridge running and its FIFO full. */
-static int discard_stale(struct whisker_device *device)
+static int device_discard_stale(struct whisker_device *device)
 {
     struct whisker_counters counters;
     int error = control_counters(device->hid, &counters);
     if (error || !counters.running) {
         return error;
     }
-    error = stop(device);
+    error = device_stop(device);
     int got = 1;
     while (!error && got > 0) {
         libusb_bulk_transfer(device->handle, WHISKER_LIMIT_USB_BULK_IN, device->buffer, STALE_BYTES, &got,
@@ -194,7 +194,7 @@ static int discard_stale(struct whisker_device *device)
     return error;
 }
 
-static int queue_transfers(struct whisker_device *device)
+static int device_queue_transfers(struct whisker_device *device)
 {
     const int bytes = device->settings.batch * (int)WHISKER_FRAME_BYTES;
     const int most = QUEUED_BYTES / bytes, wanted = device->settings.transfers;
@@ -202,7 +202,7 @@ static int queue_transfers(struct whisker_device *device)
     device->transfers = wanted > 0 && wanted < most ? wanted : most;
     for (int i = 0; i < device->transfers; i++) {
         libusb_fill_bulk_transfer(device->transfer[i], device->handle, WHISKER_LIMIT_USB_BULK_IN,
-                                  device->buffer + (size_t)i * (size_t)bytes, bytes, on_transfer, device, 0);
+                                  device->buffer + (size_t)i * (size_t)bytes, bytes, device_on_transfer, device, 0);
         const int error = libusb_submit_transfer(device->transfer[i]);
         if (error) {
             return usb_error(error);
@@ -212,7 +212,7 @@ static int queue_transfers(struct whisker_device *device)
     return WHISKER_OK;
 }
 
-static int find_descriptors(struct whisker_device *device)
+static int device_find_descriptors(struct whisker_device *device)
 {
     const struct libusb_pollfd **list = libusb_get_pollfds(device->usb);
     if (!list) {
@@ -231,7 +231,7 @@ int whisker_device_start(struct whisker_device *device, const struct whisker_set
 {
     int error = whisker_settings_check(settings, NULL, 0);
     if (!error) {
-        error = blame(device, discard_stale(device));
+        error = device_blame(device, device_discard_stale(device));
     }
     if (error) {
         return error;
@@ -242,20 +242,20 @@ int whisker_device_start(struct whisker_device *device, const struct whisker_set
     device->context = context;
     device->error = WHISKER_OK;
     device->ending = false;
-    error = find_descriptors(device);
+    error = device_find_descriptors(device);
     if (!error) {
-        error = queue_transfers(device);
+        error = device_queue_transfers(device);
     }
-    return error ? error : blame(device, control_run(device->hid, settings, true));
+    return error ? error : device_blame(device, control_run(device->hid, settings, true));
 }
 
 int whisker_device_poll(struct whisker_device *device, int timeout_ms)
 {
     for (; device->idle > 0 && !device->error; device->idle--) {
-        submit(device, device->transfer[device->turn]);
+        device_submit(device, device->transfer[device->turn]);
         device->turn = (device->turn + 1) % device->transfers;
     }
-    handle_events(device, timeout_ms);
+    device_handle_events(device, timeout_ms);
     return device->error;
 }
 
@@ -273,10 +273,10 @@ void whisker_device_wait(struct whisker_device *const devices[], int count, int 
 
 int whisker_device_stop(struct whisker_device *device)
 {
-    return blame(device, stop(device));
+    return device_blame(device, device_stop(device));
 }
 
-static void widen(uint64_t *counted, uint64_t now)
+static void device_widen(uint64_t *counted, uint64_t now)
 {
     *counted += (uint32_t)(now - *counted);
 }
@@ -284,16 +284,16 @@ static void widen(uint64_t *counted, uint64_t now)
 int whisker_device_counters(struct whisker_device *device, struct whisker_counters *counters)
 {
     struct whisker_counters now, *counted = &device->counted;
-    const int error = blame(device, control_counters(device->hid, &now));
+    const int error = device_blame(device, control_counters(device->hid, &now));
     if (!error) {
         counted->running = now.running;
-        widen(&counted->ticks, now.ticks);
-        widen(&counted->frames, now.frames);
-        widen(&counted->dropped, now.dropped);
-        widen(&counted->records_good, now.records_good);
-        widen(&counted->records_absent, now.records_absent);
-        widen(&counted->records_crc, now.records_crc);
-        widen(&counted->records_tick, now.records_tick);
+        device_widen(&counted->ticks, now.ticks);
+        device_widen(&counted->frames, now.frames);
+        device_widen(&counted->dropped, now.dropped);
+        device_widen(&counted->records_good, now.records_good);
+        device_widen(&counted->records_absent, now.records_absent);
+        device_widen(&counted->records_crc, now.records_crc);
+        device_widen(&counted->records_tick, now.records_tick);
         *counters = *counted;
     }
     return error;
@@ -301,30 +301,30 @@ int whisker_device_counters(struct whisker_device *device, struct whisker_counte
 
 int whisker_device_timing(struct whisker_device *device, struct whisker_timing *timing)
 {
-    return blame(device, control_timing(device->hid, timing));
+    return device_blame(device, control_timing(device->hid, timing));
 }
 
 int device_send_service(struct whisker_device *device, const struct whisker_service_order *order)
 {
-    return blame(device, control_service(device->hid, order));
+    return device_blame(device, control_service(device->hid, order));
 }
 
 int device_silence(struct whisker_device *device)
 {
-    return blame(device, discard_stale(device));
+    return device_blame(device, device_discard_stale(device));
 }
 
 int device_send_flash(struct whisker_device *device, const uint8_t *report)
 {
-    return blame(device, control_send_flash(device->hid, report));
+    return device_blame(device, control_send_flash(device->hid, report));
 }
 
 int device_flash(struct whisker_device *device, uint8_t *report)
 {
-    return blame(device, control_flash(device->hid, report));
+    return device_blame(device, control_flash(device->hid, report));
 }
 
 int device_answers(struct whisker_device *device, uint8_t *report)
 {
-    return blame(device, control_answers(device->hid, report));
+    return device_blame(device, control_answers(device->hid, report));
 }

@@ -5,7 +5,7 @@
 #include "whisker/errors.h"
 #include "whisker_protocol.h"
 
-static struct whisker_device_info describe(libusb_device *found)
+static struct whisker_device_info discovery_describe(libusb_device *found)
 {
     struct whisker_device_info about = {0};
     libusb_device_handle *handle;
@@ -21,7 +21,7 @@ static struct whisker_device_info describe(libusb_device *found)
 }
 
 /* Fills in up to `room` of the bridges that `usb` knows; returns how many it knows, or a code. */
-static int list_bridges(libusb_context *usb, struct whisker_device_info *list, int room)
+static int discovery_list_bridges(libusb_context *usb, struct whisker_device_info *list, int room)
 {
     libusb_device **all;
     const ssize_t count = libusb_get_device_list(usb, &all);
@@ -32,7 +32,7 @@ static int list_bridges(libusb_context *usb, struct whisker_device_info *list, i
     for (ssize_t i = 0; i < count; i++) {
         if (usb_is_bridge(all[i])) {
             if (bridges < room) {
-                list[bridges] = describe(all[i]);
+                list[bridges] = discovery_describe(all[i]);
             }
             bridges++;
         }
@@ -47,7 +47,7 @@ int whisker_device_list(struct whisker_device_info *list, int room)
     if (libusb_init(&usb) != 0) {
         return WHISKER_ERROR_DEVICE_USB;
     }
-    const int bridges = list_bridges(usb, list, room);
+    const int bridges = discovery_list_bridges(usb, list, room);
     libusb_exit(usb);
     return bridges;
 }
@@ -57,8 +57,8 @@ bool discovery_present(void)
     return whisker_device_list(NULL, 0) > 0;
 }
 
-static int try_open(libusb_device *found, const char *serial, libusb_device_handle **handle,
-                    struct whisker_device_info *about)
+static int discovery_try_open(libusb_device *found, const char *serial, libusb_device_handle **handle,
+                              struct whisker_device_info *about)
 {
     *about = (struct whisker_device_info){0};
     usb_path(found, about->path, sizeof about->path);
@@ -82,7 +82,7 @@ static int try_open(libusb_device *found, const char *serial, libusb_device_hand
 }
 
 /* What a person must know first: a bridge that refuses says more than another one that is not the one wanted. */
-static int more_telling(int before, int now)
+static int discovery_more_telling(int before, int now)
 {
     return before == WHISKER_ERROR_DEVICE_MISSING || before == WHISKER_ERROR_DEVICE_SERIAL ? now : before;
 }
@@ -99,7 +99,7 @@ int discovery_open(libusb_context *usb, const char *serial, libusb_device_handle
     int error = WHISKER_ERROR_DEVICE_MISSING;
     for (ssize_t i = 0; i < count && !*handle; i++) {
         if (usb_is_bridge(all[i])) {
-            error = more_telling(error, try_open(all[i], serial, handle, about));
+            error = discovery_more_telling(error, discovery_try_open(all[i], serial, handle, about));
         }
     }
     libusb_free_device_list(all, 1);

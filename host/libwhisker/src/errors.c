@@ -12,7 +12,7 @@ static const struct entry entries[] = {{WHISKER_OK, "OK", "no error", "none need
 #undef ENTRY
 static const struct entry unknown = {1, "UNKNOWN", "unknown error code", "compare the versions of library and caller"};
 
-static const struct entry *find(int error)
+static const struct entry *errors_find(int error)
 {
     for (size_t i = 0; i < sizeof entries / sizeof entries[0]; i++) {
         if (entries[i].code == error) {
@@ -24,15 +24,15 @@ static const struct entry *find(int error)
 
 const char *whisker_error_text(int error)
 {
-    return find(error)->text;
+    return errors_find(error)->text;
 }
 
 const char *whisker_error_remedy(int error)
 {
-    return find(error)->remedy;
+    return errors_find(error)->remedy;
 }
 
 const char *whisker_error_name(int error)
 {
-    return find(error)->name;
+    return errors_find(error)->name;
 }

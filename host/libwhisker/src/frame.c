@@ -30,23 +30,23 @@ int frame_check_header(const uint8_t *bytes)
     return bytes[WHISKER_FRAME_HEADER_LANES] == WHISKER_FRAME_LANES ? WHISKER_OK : WHISKER_ERROR_LANES;
 }
 
-static struct whisker_sample rejected(unsigned code)
+static struct whisker_sample frame_rejected(unsigned code)
 {
     return (struct whisker_sample){.status = (uint16_t)(code << WHISKER_STATUS_CODE_SHIFT)};
 }
 
 /* The bridge has checked the tick of what came from the node; here it is checked that the frame holds its own records.
  */
-static void decode_record(const uint8_t *record, uint8_t tick, struct whisker_sample *sample,
-                          struct frame_damage *damage)
+static void frame_decode_record(const uint8_t *record, uint8_t tick, struct whisker_sample *sample,
+                                struct frame_damage *damage)
 {
     if (crc8_table_driven(record, WHISKER_RECORD_CRC) != record[WHISKER_RECORD_CRC]) {
-        *sample = rejected(WHISKER_CODE_LINK_CRC);
+        *sample = frame_rejected(WHISKER_CODE_LINK_CRC);
         damage->damaged++;
         return;
     }
     if (record[WHISKER_RECORD_TICK] != tick) {
-        *sample = rejected(WHISKER_CODE_LINK_TICK);
+        *sample = frame_rejected(WHISKER_CODE_LINK_TICK);
         damage->slipped++;
         return;
     }
@@ -72,7 +72,7 @@ int frame_decode(const uint8_t *bytes, struct whisker_frame *frame, struct frame
                                                            << WHISKER_FRAME_USB_TIME_SHIFT;
     for (size_t lane = 0; lane < WHISKER_FRAME_LANES; lane++) {
         const uint8_t *record = bytes + WHISKER_FRAME_HEADER_BYTES + lane * WHISKER_RECORD_BYTES;
-        decode_record(record, (uint8_t)frame->tick, &frame->lane[lane], damage);
+        frame_decode_record(record, (uint8_t)frame->tick, &frame->lane[lane], damage);
     }
     return damage->damaged ? WHISKER_ERROR_RECORD_CRC : damage->slipped ? WHISKER_ERROR_RECORD_TICK : WHISKER_OK;
 }

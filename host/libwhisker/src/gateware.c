@@ -33,7 +33,7 @@ struct writing {
 };
 
 /* Gives the flash an order and waits for its end; `data`, UNIT bytes, is what it writes, or what came. */
-static int order(struct whisker_device *device, uint8_t command, uint32_t address, uint8_t *data)
+static int gateware_order(struct whisker_device *device, uint8_t command, uint32_t address, uint8_t *data)
 {
     uint8_t report[WHISKER_REPORT_FLASH_BYTES] = {WHISKER_REPORT_ID_FLASH};
     report[WHISKER_REPORT_FLASH_WIRE_VERSION] = WHISKER_WIRE_VERSION;
@@ -49,42 +49,42 @@ static int order(struct whisker_device *device, uint8_t command, uint32_t addres
     return error;
 }
 
-static int read_flash(struct whisker_device *device, uint32_t address, uint8_t *bytes, size_t count)
+static int gateware_read_flash(struct whisker_device *device, uint32_t address, uint8_t *bytes, size_t count)
 {
     int error = WHISKER_OK;
     for (size_t at = 0; !error && at < count; at += UNIT) {
-        error = order(device, WHISKER_FLASH_COMMAND_READ, address + (uint32_t)at, bytes + at);
+        error = gateware_order(device, WHISKER_FLASH_COMMAND_READ, address + (uint32_t)at, bytes + at);
     }
     return error;
 }
 
-static int erase(struct whisker_device *device, uint32_t address)
+static int gateware_erase(struct whisker_device *device, uint32_t address)
 {
     uint8_t nothing[UNIT] = {0};
-    return order(device, WHISKER_FLASH_COMMAND_ERASE, address, nothing);
+    return gateware_order(device, WHISKER_FLASH_COMMAND_ERASE, address, nothing);
 }
 
 /* Makes an erased unit hold this, and reads it back. */
-static int program(struct whisker_device *device, uint32_t address, const uint8_t *wanted)
+static int gateware_program(struct whisker_device *device, uint32_t address, const uint8_t *wanted)
 {
     uint8_t data[UNIT], erased[UNIT];
     memset(erased, ERASED, UNIT);
     memcpy(data, wanted, UNIT);
     int error = WHISKER_OK;
     if (memcmp(wanted, erased, UNIT) != 0) {
-        error = order(device, WHISKER_FLASH_COMMAND_PROGRAM, address, data);
+        error = gateware_order(device, WHISKER_FLASH_COMMAND_PROGRAM, address, data);
     }
     if (!error) {
-        error = order(device, WHISKER_FLASH_COMMAND_READ, address, data);
+        error = gateware_order(device, WHISKER_FLASH_COMMAND_READ, address, data);
     }
     return error ? error : memcmp(data, wanted, UNIT) != 0 ? WHISKER_ERROR_FLASH_VERIFY : WHISKER_OK;
 }
 
 /* A flash's third byte of identity is the exponent of its size. */
-static int find_size(struct writing *w)
+static int gateware_find_size(struct writing *w)
 {
     uint8_t identity[UNIT] = {0};
-    const int error = order(w->device, WHISKER_FLASH_COMMAND_IDENTIFY, 0, identity);
+    const int error = gateware_order(w->device, WHISKER_FLASH_COMMAND_IDENTIFY, 0, identity);
     if (error) {
         return error;
     }
@@ -94,7 +94,7 @@ static int find_size(struct writing *w)
     return w->size > w->writable ? WHISKER_OK : WHISKER_ERROR_FLASH_CHIP;
 }
 
-static const uint8_t *find_preamble(const uint8_t *bytes, size_t count)
+static const uint8_t *gateware_find_preamble(const uint8_t *bytes, size_t count)
 {
     for (size_t at = 0; at + PREAMBLE_BYTES <= count; at++) {
         if (!memcmp(bytes + at, PREAMBLE, PREAMBLE_BYTES)) {
@@ -105,9 +105,9 @@ static const uint8_t *find_preamble(const uint8_t *bytes, size_t count)
 }
 
 /* The last page sends an FPGA that found no whole image to where the other begins. */
-static bool jumps_to(const uint8_t page[PAGE], uint32_t address)
+static bool gateware_jumps_to(const uint8_t page[PAGE], uint32_t address)
 {
-    const uint8_t *at = find_preamble(page, PAGE);
+    const uint8_t *at = gateware_find_preamble(page, PAGE);
     const uint8_t wanted[] = {(uint8_t)(address >> 16), (uint8_t)(address >> 8), (uint8_t)address};
     for (; at && at + JUMP_ADDRESS + sizeof wanted <= page + PAGE; at++) {
         if (*at == JUMP_OPCODE && !memcmp(at + JUMP_ADDRESS, wanted, sizeof wanted)) {
@@ -117,21 +117,21 @@ static bool jumps_to(const uint8_t page[PAGE], uint32_t address)
     return false;
 }
 
-static int find_fallback(struct writing *w)
+static int gateware_find_fallback(struct writing *w)
 {
     uint8_t start[PREAMBLE_END], page[PAGE];
-    int error = read_flash(w->device, w->writable, start, sizeof start);
+    int error = gateware_read_flash(w->device, w->writable, start, sizeof start);
     if (!error) {
-        error = read_flash(w->device, w->size - PAGE, page, sizeof page);
+        error = gateware_read_flash(w->device, w->size - PAGE, page, sizeof page);
     }
     if (error) {
         return error;
     }
-    const bool there = find_preamble(start, sizeof start) && jumps_to(page, w->writable);
+    const bool there = gateware_find_preamble(start, sizeof start) && gateware_jumps_to(page, w->writable);
     return there ? WHISKER_OK : WHISKER_ERROR_GATEWARE_FALLBACK;
 }
 
-static int check(struct writing *w)
+static int gateware_check(struct writing *w)
 {
     uint8_t report[WHISKER_REPORT_FLASH_BYTES];
     int error = device_silence(w->device);
@@ -148,25 +148,25 @@ static int check(struct writing *w)
     if (w->image->length > w->writable - SECTOR) {
         return WHISKER_ERROR_GATEWARE_SPACE;
     }
-    error = find_size(w);
-    return error ? error : find_fallback(w);
+    error = gateware_find_size(w);
+    return error ? error : gateware_find_fallback(w);
 }
 
 int whisker_gateware_check(struct whisker_device *device, const struct whisker_gateware *image)
 {
     struct writing w = {.device = device, .image = image};
-    return check(&w);
+    return gateware_check(&w);
 }
 
 /* What a sector is to hold; behind the image's end it is erased. */
-static void wanted_sector(const struct writing *w, uint32_t address, uint8_t wanted[SECTOR])
+static void gateware_wanted_sector(const struct writing *w, uint32_t address, uint8_t wanted[SECTOR])
 {
     const uint32_t left = w->image->length - address;
     memset(wanted, ERASED, SECTOR);
     memcpy(wanted, w->image->body + address, left < SECTOR ? left : SECTOR);
 }
 
-static void tell(struct writing *w, uint32_t address)
+static void gateware_tell(struct writing *w, uint32_t address)
 {
     const uint32_t left = w->image->length - address;
     w->done += left < SECTOR ? left : SECTOR;
@@ -176,38 +176,38 @@ static void tell(struct writing *w, uint32_t address)
 }
 
 /* Before anything else is changed: without the first sector, which comes last, the FPGA starts the other image. */
-static int unmark(struct writing *w)
+static int gateware_unmark(struct writing *w)
 {
     int error = WHISKER_OK;
     if (!w->unmarked) {
-        error = erase(w->device, w->writable - SECTOR);
+        error = gateware_erase(w->device, w->writable - SECTOR);
     }
     if (!error && !w->unmarked) {
-        error = erase(w->device, 0);
+        error = gateware_erase(w->device, 0);
     }
     w->unmarked = true;
     return error;
 }
 
 /* Writes a sector from its end to its beginning, so that the bitstream's preamble comes last of all. */
-static int rewrite(struct writing *w, uint32_t address, const uint8_t wanted[SECTOR])
+static int gateware_rewrite(struct writing *w, uint32_t address, const uint8_t wanted[SECTOR])
 {
-    int error = unmark(w);
+    int error = gateware_unmark(w);
     if (!error) {
-        error = erase(w->device, address);
+        error = gateware_erase(w->device, address);
     }
     for (uint32_t at = SECTOR; !error && at > 0; at -= UNIT) {
-        error = program(w->device, address + at - UNIT, wanted + at - UNIT);
+        error = gateware_program(w->device, address + at - UNIT, wanted + at - UNIT);
     }
     return error;
 }
 
 /* 1: the flash holds this sector; 0: it does not; or an error. */
-static int has_sector(struct writing *w, uint32_t address, const uint8_t wanted[SECTOR])
+static int gateware_has_sector(struct writing *w, uint32_t address, const uint8_t wanted[SECTOR])
 {
     uint8_t found[UNIT];
     for (uint32_t at = 0; at < SECTOR; at += UNIT) {
-        const int error = read_flash(w->device, address + at, found, UNIT);
+        const int error = gateware_read_flash(w->device, address + at, found, UNIT);
         if (error || memcmp(found, wanted + at, UNIT) != 0) {
             return error;
         }
@@ -216,41 +216,41 @@ static int has_sector(struct writing *w, uint32_t address, const uint8_t wanted[
 }
 
 /* Makes a sector hold what it is to hold, unless it does. */
-static int write_sector(struct writing *w, uint32_t address)
+static int gateware_write_sector(struct writing *w, uint32_t address)
 {
     uint8_t wanted[SECTOR];
-    wanted_sector(w, address, wanted);
-    const int has = has_sector(w, address, wanted);
-    const int error = has == 0 ? rewrite(w, address, wanted) : has < 0 ? has : WHISKER_OK;
+    gateware_wanted_sector(w, address, wanted);
+    const int has = gateware_has_sector(w, address, wanted);
+    const int error = has == 0 ? gateware_rewrite(w, address, wanted) : has < 0 ? has : WHISKER_OK;
     if (!error) {
-        tell(w, address);
+        gateware_tell(w, address);
     }
     return error;
 }
 
 /* The header says that the image before it is whole. */
-static int mark(struct writing *w)
+static int gateware_mark(struct writing *w)
 {
     uint8_t found[UNIT];
     const uint32_t place = w->writable - SECTOR;
-    int error = read_flash(w->device, place, found, UNIT);
+    int error = gateware_read_flash(w->device, place, found, UNIT);
     if (error || !memcmp(found, w->image->header, UNIT)) {
         return error;
     }
-    error = erase(w->device, place);
-    return error ? error : program(w->device, place, w->image->header);
+    error = gateware_erase(w->device, place);
+    return error ? error : gateware_program(w->device, place, w->image->header);
 }
 
 int whisker_gateware_update(struct whisker_device *device, const struct whisker_gateware *image,
                             whisker_gateware_progress progress, void *context)
 {
     struct writing w = {.device = device, .image = image, .progress = progress, .context = context};
-    int error = check(&w);
+    int error = gateware_check(&w);
     for (uint32_t address = SECTOR; !error && address < image->length; address += SECTOR) {
-        error = write_sector(&w, address);
+        error = gateware_write_sector(&w, address);
     }
     if (!error) {
-        error = write_sector(&w, 0);
+        error = gateware_write_sector(&w, 0);
     }
-    return error ? error : mark(&w);
+    return error ? error : gateware_mark(&w);
 }

@@ -16,14 +16,15 @@ struct whisker_hotplug {
     int64_t look_at_ms;
 };
 
-static int64_t now_ms(void)
+static int64_t hotplug_now_ms(void)
 {
     struct timespec now;
     clock_gettime(CLOCK_MONOTONIC, &now);
     return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
 }
 
-static int LIBUSB_CALL on_arrival(libusb_context *usb, libusb_device *device, libusb_hotplug_event event, void *context)
+static int LIBUSB_CALL hotplug_on_arrival(libusb_context *usb, libusb_device *device, libusb_hotplug_event event,
+                                          void *context)
 {
     struct whisker_hotplug *hotplug = context;
     (void)usb;
@@ -44,45 +45,45 @@ int whisker_hotplug_open(struct whisker_hotplug **hotplug)
         free(made);
         return WHISKER_ERROR_DEVICE_USB;
     }
-    made->watching =
-        libusb_has_capability(LIBUSB_CAP_HAS_HOTPLUG) &&
-        libusb_hotplug_register_callback(made->usb, LIBUSB_HOTPLUG_EVENT_DEVICE_ARRIVED, LIBUSB_HOTPLUG_ENUMERATE,
-                                         WHISKER_LIMIT_USB_VENDOR_ID, WHISKER_LIMIT_USB_PRODUCT_ID,
-                                         LIBUSB_HOTPLUG_MATCH_ANY, on_arrival, made, &made->callback) == LIBUSB_SUCCESS;
+    made->watching = libusb_has_capability(LIBUSB_CAP_HAS_HOTPLUG) &&
+                     libusb_hotplug_register_callback(made->usb, LIBUSB_HOTPLUG_EVENT_DEVICE_ARRIVED,
+                                                      LIBUSB_HOTPLUG_ENUMERATE, WHISKER_LIMIT_USB_VENDOR_ID,
+                                                      WHISKER_LIMIT_USB_PRODUCT_ID, LIBUSB_HOTPLUG_MATCH_ANY,
+                                                      hotplug_on_arrival, made, &made->callback) == LIBUSB_SUCCESS;
     *hotplug = made;
     return WHISKER_OK;
 }
 
 /* Handles what libusb has to tell, or waits for it up to wait_ms. False: a signal came. */
-static bool listen(struct whisker_hotplug *hotplug, int64_t wait_ms)
+static bool hotplug_listen(struct whisker_hotplug *hotplug, int64_t wait_ms)
 {
     struct timeval timeout = {.tv_sec = wait_ms / 1000, .tv_usec = wait_ms % 1000 * 1000};
     return libusb_handle_events_timeout_completed(hotplug->usb, &timeout, NULL) != LIBUSB_ERROR_INTERRUPTED;
 }
 
 /* Whether to try now: an arrival was told, or it is time to look and one is there. */
-static bool try_now(struct whisker_hotplug *hotplug)
+static bool hotplug_try_now(struct whisker_hotplug *hotplug)
 {
     const bool arrived = hotplug->arrived;
-    if (!arrived && now_ms() < hotplug->look_at_ms) {
+    if (!arrived && hotplug_now_ms() < hotplug->look_at_ms) {
         return false;
     }
     hotplug->arrived = false;
-    hotplug->look_at_ms = now_ms() + LOOK_MS;
+    hotplug->look_at_ms = hotplug_now_ms() + LOOK_MS;
     return arrived || discovery_present();
 }
 
 int whisker_hotplug_wait(struct whisker_hotplug *hotplug, int timeout_ms)
 {
-    const int64_t end_ms = now_ms() + timeout_ms;
-    bool undisturbed = listen(hotplug, 0);
-    while (!try_now(hotplug)) {
+    const int64_t end_ms = hotplug_now_ms() + timeout_ms;
+    bool undisturbed = hotplug_listen(hotplug, 0);
+    while (!hotplug_try_now(hotplug)) {
         const int64_t until_ms = end_ms < hotplug->look_at_ms ? end_ms : hotplug->look_at_ms;
-        const int64_t left_ms = until_ms - now_ms();
-        if (!undisturbed || now_ms() >= end_ms) {
+        const int64_t left_ms = until_ms - hotplug_now_ms();
+        if (!undisturbed || hotplug_now_ms() >= end_ms) {
             return WHISKER_ERROR_TIMEOUT;
         }
-        undisturbed = listen(hotplug, left_ms > 0 ? left_ms : 0);
+        undisturbed = hotplug_listen(hotplug, left_ms > 0 ? left_ms : 0);
     }
     return WHISKER_OK;
 }

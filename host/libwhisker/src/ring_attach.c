@@ -9,7 +9,7 @@
 #define ATTACH_MS 5
 
 /* Waits for a ring to come up: one that is missing, or whose writer is dead, may be made anew at any time. */
-static int find_awaited(const char *name, uid_t named, int timeout_ms, struct ring_found *found)
+static int ring_attach_find_awaited(const char *name, uid_t named, int timeout_ms, struct ring_found *found)
 {
     const int64_t started = timeout_ms > 0 ? ring_now_ms() : 0;
     for (;;) {
@@ -26,16 +26,16 @@ static int find_awaited(const char *name, uid_t named, int timeout_ms, struct ri
 }
 
 /* The oldest frame that is still whole. A claim that was not counted is no place to begin: peek says what is wrong. */
-static uint64_t oldest(const struct ring_map *map)
+static uint64_t ring_attach_oldest(const struct ring_map *map)
 {
     const uint64_t claim = ring_load_acquire(&map->header->claim);
     return claim > map->capacity && claim <= RING_COUNT_MAX ? claim - map->capacity : 0;
 }
 
-static void start_reading(struct whisker_reader *reader)
+static void ring_attach_start_reading(struct whisker_reader *reader)
 {
     reader->generation = reader->map.header->generation;
-    reader->position = oldest(&reader->map);
+    reader->position = ring_attach_oldest(&reader->map);
     reader->peeked = 0;
     reader->waits_since_ms = 0;
     reader->has_sequence = false;
@@ -43,11 +43,11 @@ static void start_reading(struct whisker_reader *reader)
 }
 
 /* Takes what was found in place of what the reader has; on an error that stays. */
-static int attach(struct whisker_reader *reader, int timeout_ms)
+static int ring_attach_attach(struct whisker_reader *reader, int timeout_ms)
 {
     struct ring_found found;
     struct ring_map map;
-    int error = find_awaited(reader->name, reader->named, timeout_ms, &found);
+    int error = ring_attach_find_awaited(reader->name, reader->named, timeout_ms, &found);
     error = error ? error : ring_map(found.fd, found.capacity, false, &map);
     if (error) {
         return error;
@@ -55,7 +55,7 @@ static int attach(struct whisker_reader *reader, int timeout_ms)
     ring_unmap(&reader->map);
     reader->map = map;
     reader->owner = found.file.st_uid;
-    start_reading(reader);
+    ring_attach_start_reading(reader);
     return WHISKER_OK;
 }
 
@@ -73,7 +73,7 @@ int whisker_reader_attach_owned(const char *name, uint32_t owner, int timeout_ms
     }
     strcpy(made->name, name); /* ring_path has measured it */
     made->named = owner;
-    error = attach(made, timeout_ms);
+    error = ring_attach_attach(made, timeout_ms);
     if (error) {
         free(made);
         return error;
@@ -89,7 +89,7 @@ int whisker_reader_attach(const char *name, int timeout_ms, struct whisker_reade
 
 int whisker_reader_reattach(struct whisker_reader *reader, int timeout_ms)
 {
-    return attach(reader, timeout_ms);
+    return ring_attach_attach(reader, timeout_ms);
 }
 
 void whisker_reader_detach(struct whisker_reader *reader)

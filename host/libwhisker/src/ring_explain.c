@@ -12,7 +12,7 @@ struct culprit {
     uid_t owner;
 };
 
-static bool look_at(const char *path, struct culprit *culprit)
+static bool ring_explain_look_at(const char *path, struct culprit *culprit)
 {
     struct stat file;
     if (lstat(path, &file) != 0) {
@@ -25,11 +25,11 @@ static bool look_at(const char *path, struct culprit *culprit)
 }
 
 /* The first file of the name: what readers meet, and writers too. */
-static bool find_ring(const char *name, struct culprit *culprit)
+static bool ring_explain_find_ring(const char *name, struct culprit *culprit)
 {
     char path[RING_PATH_BYTES];
     for (enum ring_place place = 0; place < RING_PLACES; place++) {
-        if (ring_path(name, place, path) == WHISKER_OK && look_at(path, culprit)) {
+        if (ring_path(name, place, path) == WHISKER_OK && ring_explain_look_at(path, culprit)) {
             return true;
         }
     }
@@ -37,18 +37,18 @@ static bool find_ring(const char *name, struct culprit *culprit)
 }
 
 /* The lock of the name in the shared directory, if another user has made it: no writer of this user passes it. */
-static bool find_foreign_lock(const char *name, struct culprit *culprit)
+static bool ring_explain_find_foreign_lock(const char *name, struct culprit *culprit)
 {
     char path[RING_PATH_BYTES], lock_path[RING_PATH_BYTES];
     if (ring_path(name, RING_PLACE_SHARED, path) != WHISKER_OK) {
         return false;
     }
     ring_file_lock_path(path, lock_path);
-    return look_at(lock_path, culprit) && culprit->owner != geteuid();
+    return ring_explain_look_at(lock_path, culprit) && culprit->owner != geteuid();
 }
 
 /* A ring of another user that can be read and has no writer. */
-static bool is_stale(const struct culprit *culprit)
+static bool ring_explain_is_stale(const struct culprit *culprit)
 {
     int fd;
     struct stat file;
@@ -60,13 +60,13 @@ static bool is_stale(const struct culprit *culprit)
     return !locked;
 }
 
-static void say_access(const char *name, const struct culprit *ring, char *line, size_t room)
+static void ring_explain_say_access(const char *name, const struct culprit *ring, char *line, size_t room)
 {
     struct culprit lock;
-    if (find_foreign_lock(name, &lock)) {
+    if (ring_explain_find_foreign_lock(name, &lock)) {
         snprintf(line, room, "this ring's lock %s is user %s's; remove it: sudo rm %s; or choose another --ring",
                  lock.path, lock.user, lock.path);
-    } else if (is_stale(ring)) {
+    } else if (ring_explain_is_stale(ring)) {
         snprintf(line, room, "the ring %s is user %s's and stale: its writer died; remove it: sudo rm %s", ring->path,
                  ring->user, ring->path);
     } else {
@@ -78,9 +78,9 @@ static void say_access(const char *name, const struct culprit *ring, char *line,
 void whisker_ring_explain(const char *name, int error, char *line, size_t room)
 {
     struct culprit ring = {0};
-    const bool is_there = find_ring(name, &ring);
-    if (error == WHISKER_ERROR_RING_ACCESS && (is_there || find_foreign_lock(name, &ring))) {
-        say_access(name, &ring, line, room);
+    const bool is_there = ring_explain_find_ring(name, &ring);
+    if (error == WHISKER_ERROR_RING_ACCESS && (is_there || ring_explain_find_foreign_lock(name, &ring))) {
+        ring_explain_say_access(name, &ring, line, room);
     } else if (error == WHISKER_ERROR_RING_OWNER && is_there) {
         snprintf(line, room,
                  "the ring %s is user %s's, whom this reader was not told to trust; if it should, add --ring-owner %s; "

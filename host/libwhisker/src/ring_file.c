@@ -17,7 +17,7 @@
 #define NAMING_TRIES_MS 2000
 
 /* Why a file of the shared directory cannot be had, by errno. */
-static int refusal(void)
+static int ring_file_refusal(void)
 {
     return errno == EACCES || errno == EPERM ? WHISKER_ERROR_RING_ACCESS : WHISKER_ERROR_SYSTEM;
 }
@@ -26,7 +26,9 @@ int ring_file_open(const char *path, int *fd, struct stat *file)
 {
     *fd = open(path, O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
     if (*fd < 0) {
-        return errno == ENOENT ? WHISKER_ERROR_RING_MISSING : errno == ELOOP ? WHISKER_ERROR_RING_LAYOUT : refusal();
+        return errno == ENOENT  ? WHISKER_ERROR_RING_MISSING
+               : errno == ELOOP ? WHISKER_ERROR_RING_LAYOUT
+                                : ring_file_refusal();
     }
     if (fstat(*fd, file) != 0 || !S_ISREG(file->st_mode)) {
         close(*fd);
@@ -49,7 +51,7 @@ int ring_file_make(const char *directory, size_t bytes, int *fd)
     return WHISKER_OK;
 }
 
-static bool lock_byte(int fd, short type, enum ring_lock byte)
+static bool ring_file_lock_byte(int fd, short type, enum ring_lock byte)
 {
     struct flock lock = {.l_type = type, .l_whence = SEEK_SET, .l_start = byte, .l_len = 1};
     return fcntl(fd, F_OFD_SETLK, &lock) == 0;
@@ -57,7 +59,7 @@ static bool lock_byte(int fd, short type, enum ring_lock byte)
 
 bool ring_file_lock(int fd, enum ring_lock lock)
 {
-    return lock_byte(fd, lock == RING_LOCK_WRITER ? F_WRLCK : F_RDLCK, lock);
+    return ring_file_lock_byte(fd, lock == RING_LOCK_WRITER ? F_WRLCK : F_RDLCK, lock);
 }
 
 /* Asks for what conflicts with the lock and with nothing else: a reader that locks byte 0 is no writer. */
@@ -80,7 +82,7 @@ bool ring_file_is_named(int fd, const char *path)
 }
 
 /* Opens the lock of a name, a file that only its owner can lock: any reader could hold a lock of the ring's. */
-static int open_naming_lock(const char *lock_path)
+static int ring_file_open_naming_lock(const char *lock_path)
 {
     for (;;) { /* not O_CREAT alone: the kernel may forbid it on another user's file in a sticky directory */
         int fd = open(lock_path, O_RDWR | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
@@ -101,16 +103,16 @@ void ring_file_lock_path(const char *path, char lock_path[RING_PATH_BYTES])
 }
 
 /* Only one process at a time changes what a name stands for. */
-static int begin_naming(const char *path, int *lock)
+static int ring_file_begin_naming(const char *path, int *lock)
 {
     char lock_path[RING_PATH_BYTES];
     ring_file_lock_path(path, lock_path);
     for (int tries = 0; tries < NAMING_TRIES_MS; tries++) {
-        *lock = open_naming_lock(lock_path);
+        *lock = ring_file_open_naming_lock(lock_path);
         if (*lock < 0) {
-            return refusal();
+            return ring_file_refusal();
         }
-        if (lock_byte(*lock, F_WRLCK, 0) && ring_file_is_named(*lock, lock_path)) {
+        if (ring_file_lock_byte(*lock, F_WRLCK, 0) && ring_file_is_named(*lock, lock_path)) {
             return WHISKER_OK;
         }
         close(*lock); /* another process has it, or had it and has removed it */
@@ -119,7 +121,7 @@ static int begin_naming(const char *path, int *lock)
     return WHISKER_ERROR_RING_BUSY;
 }
 
-static void end_naming(const char *path, int lock)
+static void ring_file_end_naming(const char *path, int lock)
 {
     char lock_path[RING_PATH_BYTES];
     ring_file_lock_path(path, lock_path);
@@ -128,7 +130,7 @@ static void end_naming(const char *path, int lock)
 }
 
 /* Whether this is a ring, of whatever version, and may be removed. */
-static int check_stale(int fd)
+static int ring_file_check_stale(int fd)
 {
     uint64_t magic = 0;
     if (pread(fd, &magic, sizeof magic, 0) != sizeof magic || magic != RING_MAGIC) {
@@ -137,7 +139,7 @@ static int check_stale(int fd)
     return ring_file_is_locked(fd, RING_LOCK_WRITER) ? WHISKER_ERROR_RING_BUSY : WHISKER_OK;
 }
 
-static int remove_stale(const char *path)
+static int ring_file_remove_unlocked(const char *path)
 {
     int fd;
     struct stat file;
@@ -145,9 +147,9 @@ static int remove_stale(const char *path)
     if (error) {
         return error;
     }
-    error = check_stale(fd);
+    error = ring_file_check_stale(fd);
     if (!error && unlink(path) != 0) {
-        error = refusal();
+        error = ring_file_refusal();
     }
     close(fd);
     return error;
@@ -156,10 +158,10 @@ static int remove_stale(const char *path)
 int ring_file_remove_stale(const char *path)
 {
     int lock;
-    int error = begin_naming(path, &lock);
+    int error = ring_file_begin_naming(path, &lock);
     if (!error) {
-        error = remove_stale(path);
-        end_naming(path, lock);
+        error = ring_file_remove_unlocked(path);
+        ring_file_end_naming(path, lock);
     }
     return error;
 }
@@ -168,11 +170,11 @@ int ring_file_name(int fd, const char *path)
 {
     char unnamed[64];
     int lock;
-    int error = begin_naming(path, &lock);
+    int error = ring_file_begin_naming(path, &lock);
     if (error) {
         return error;
     }
-    error = remove_stale(path);
+    error = ring_file_remove_unlocked(path);
     if (error == WHISKER_ERROR_RING_MISSING) {
         error = WHISKER_OK;
     }
@@ -180,7 +182,7 @@ int ring_file_name(int fd, const char *path)
     if (!error && linkat(AT_FDCWD, unnamed, AT_FDCWD, path, AT_SYMLINK_FOLLOW) != 0) {
         error = WHISKER_ERROR_SYSTEM;
     }
-    end_naming(path, lock);
+    ring_file_end_naming(path, lock);
     return error;
 }
 

@@ -7,7 +7,7 @@
 
 /* What is wrong with this open file as a ring to be read; 0: nothing. Its owner comes first: what the file of another
  * user holds is not looked at. */
-static int check_found(struct ring_found *found, uid_t named)
+static int ring_find_check_found(struct ring_found *found, uid_t named)
 {
     if (!ring_owner_is_trusted(found->file.st_uid, named)) {
         return WHISKER_ERROR_RING_OWNER;
@@ -22,7 +22,7 @@ static int find_at(const char *path, uid_t named, struct ring_found *found)
     if (error) {
         return error;
     }
-    error = check_found(found, named);
+    error = ring_find_check_found(found, named);
     if (error) {
         close(found->fd);
     }

@@ -21,7 +21,7 @@ static _Atomic(struct guard *) guards;
 static struct sigaction before;
 static pthread_once_t once = PTHREAD_ONCE_INIT;
 
-static bool replace_memory_at(uintptr_t address)
+static bool ring_guard_replace_memory_at(uintptr_t address)
 {
     for (struct guard *guard = atomic_load(&guards); guard; guard = guard->next) {
         const uintptr_t base = atomic_load(&guard->base);
@@ -35,7 +35,7 @@ static bool replace_memory_at(uintptr_t address)
 
 /* What would have happened without us. A fault that is ignored would come again for ever: then, too, the process ends.
  */
-static void pass_on(int number, siginfo_t *info, void *context)
+static void ring_guard_pass_on(int number, siginfo_t *info, void *context)
 {
     if (before.sa_flags & SA_SIGINFO) {
         before.sa_sigaction(number, info, context);
@@ -47,24 +47,24 @@ static void pass_on(int number, siginfo_t *info, void *context)
     }
 }
 
-static void on_bus_error(int number, siginfo_t *info, void *context)
+static void ring_guard_on_bus_error(int number, siginfo_t *info, void *context)
 {
     const int kept = errno;
-    if (info->si_code != BUS_ADRERR || !replace_memory_at((uintptr_t)info->si_addr)) {
-        pass_on(number, info, context);
+    if (info->si_code != BUS_ADRERR || !ring_guard_replace_memory_at((uintptr_t)info->si_addr)) {
+        ring_guard_pass_on(number, info, context);
     }
     errno = kept;
 }
 
-static void install(void)
+static void ring_guard_install(void)
 {
-    struct sigaction mine = {.sa_sigaction = on_bus_error, .sa_flags = SA_SIGINFO | SA_ONSTACK};
+    struct sigaction mine = {.sa_sigaction = ring_guard_on_bus_error, .sa_flags = SA_SIGINFO | SA_ONSTACK};
     sigemptyset(&mine.sa_mask);
     sigaction(SIGBUS, &mine, &before);
 }
 
 /* An entry nobody uses, of the list or new. */
-static struct guard *take_entry(void)
+static struct guard *ring_guard_take_entry(void)
 {
     for (struct guard *guard = atomic_load(&guards); guard; guard = guard->next) {
         bool taken = false;
@@ -84,8 +84,8 @@ static struct guard *take_entry(void)
 
 bool ring_guard_add(void *base, size_t bytes, int protection)
 {
-    pthread_once(&once, install);
-    struct guard *guard = take_entry();
+    pthread_once(&once, ring_guard_install);
+    struct guard *guard = ring_guard_take_entry();
     if (!guard) {
         return false;
     }

@@ -10,7 +10,7 @@
 static_assert(WHISKER_RING_NAME_BYTES > RING_NAME_MAX && WHISKER_RING_PATH_BYTES == RING_PATH_BYTES, "a name fits");
 
 /* Why no reader can attach; 0: nothing. */
-static int trouble(int fd, const struct stat *file)
+static int ring_list_trouble(int fd, const struct stat *file)
 {
     uint32_t capacity;
     if (!ring_owner_is_trusted(file->st_uid, WHISKER_RING_NO_OWNER)) {
@@ -20,7 +20,7 @@ static int trouble(int fd, const struct stat *file)
 }
 
 /* Describes the ring in this file; false: it is none. */
-static bool describe(int fd, const struct stat *file, struct whisker_ring_entry *entry)
+static bool ring_list_describe(int fd, const struct stat *file, struct whisker_ring_entry *entry)
 {
     struct ring_header header;
     if (pread(fd, &header, sizeof header, 0) != sizeof header || header.magic != RING_MAGIC) {
@@ -29,7 +29,7 @@ static bool describe(int fd, const struct stat *file, struct whisker_ring_entry 
     entry->bytes = (uint64_t)file->st_size;
     entry->owner = file->st_uid;
     entry->version = header.version;
-    entry->error = trouble(fd, file);
+    entry->error = ring_list_trouble(fd, file);
     if (header.version != RING_LAYOUT_VERSION) { /* where the rest lies is not known */
         return true;
     }
@@ -40,7 +40,7 @@ static bool describe(int fd, const struct stat *file, struct whisker_ring_entry 
     return true;
 }
 
-static bool describe_named(const char *name, enum ring_place place, struct whisker_ring_entry *entry)
+static bool ring_list_describe_named(const char *name, enum ring_place place, struct whisker_ring_entry *entry)
 {
     int fd;
     struct stat file;
@@ -49,7 +49,7 @@ static bool describe_named(const char *name, enum ring_place place, struct whisk
         return false;
     }
     strcpy(entry->name, name); /* ring_path has measured it */
-    const bool is_ring = describe(fd, &file, entry);
+    const bool is_ring = ring_list_describe(fd, &file, entry);
     close(fd);
     return is_ring;
 }
@@ -63,7 +63,7 @@ static int list_place(enum ring_place place, struct whisker_ring_entry *entries,
     }
     struct whisker_ring_entry entry;
     for (const struct dirent *file; (file = readdir(directory));) {
-        if (describe_named(file->d_name, place, &entry)) {
+        if (ring_list_describe_named(file->d_name, place, &entry)) {
             if ((size_t)count < room) {
                 entries[count] = entry;
             }

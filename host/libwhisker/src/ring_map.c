@@ -9,17 +9,17 @@
 
 #define STAT_BLOCK_BYTES 512 /* of st_blocks, whatever the file system's are (stat(2)) */
 
-static size_t page_bytes(void)
+static size_t ring_map_page_bytes(void)
 {
     return (size_t)sysconf(_SC_PAGESIZE);
 }
 
 size_t ring_file_bytes(uint32_t capacity)
 {
-    return page_bytes() + capacity * sizeof(struct whisker_frame);
+    return ring_map_page_bytes() + capacity * sizeof(struct whisker_frame);
 }
 
-static size_t mapped_bytes(const struct ring_map *map)
+static size_t ring_map_mapped_bytes(const struct ring_map *map)
 {
     return map->header_bytes + 2 * map->capacity * sizeof(struct whisker_frame);
 }
@@ -37,15 +37,16 @@ static bool map_over(uint8_t *base, const struct ring_map *map, int protection)
 
 int ring_map(int fd, uint32_t capacity, bool writable, struct ring_map *map)
 {
-    *map = (struct ring_map){.header_bytes = page_bytes(), .capacity = capacity, .fd = fd};
+    *map = (struct ring_map){.header_bytes = ring_map_page_bytes(), .capacity = capacity, .fd = fd};
     const int protection = writable ? PROT_READ | PROT_WRITE : PROT_READ;
-    uint8_t *base = mmap(NULL, mapped_bytes(map), PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+    uint8_t *base =
+        mmap(NULL, ring_map_mapped_bytes(map), PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
     if (base == MAP_FAILED) {
         close(fd);
         return WHISKER_ERROR_MEMORY;
     }
-    if (!map_over(base, map, protection) || !ring_guard_add(base, mapped_bytes(map), protection)) {
-        munmap(base, mapped_bytes(map));
+    if (!map_over(base, map, protection) || !ring_guard_add(base, ring_map_mapped_bytes(map), protection)) {
+        munmap(base, ring_map_mapped_bytes(map));
         close(fd);
         return WHISKER_ERROR_MEMORY;
     }
@@ -58,13 +59,13 @@ void ring_unmap(struct ring_map *map)
 {
     if (map->header) {
         ring_guard_remove(map->header);
-        munmap(map->header, mapped_bytes(map));
+        munmap(map->header, ring_map_mapped_bytes(map));
         close(map->fd);
     }
     map->header = NULL;
 }
 
-static int check_header(const struct ring_header *header, const struct stat *file)
+static int ring_map_check_header(const struct ring_header *header, const struct stat *file)
 {
     const uint32_t frames = header->capacity;
     if (header->magic != RING_MAGIC) {
@@ -73,7 +74,7 @@ static int check_header(const struct ring_header *header, const struct stat *fil
     if (header->version != RING_LAYOUT_VERSION) {
         return WHISKER_ERROR_RING_VERSION;
     }
-    const bool sizes_fit = header->header_bytes == page_bytes() &&
+    const bool sizes_fit = header->header_bytes == ring_map_page_bytes() &&
                            header->frame_bytes == sizeof(struct whisker_frame) && frames >= RING_CAPACITY_MIN &&
                            frames <= RING_CAPACITY_MAX && (frames & (frames - 1)) == 0 &&
                            (uint64_t)file->st_size == ring_file_bytes(frames);
@@ -83,7 +84,7 @@ static int check_header(const struct ring_header *header, const struct stat *fil
 
 /* Mapping populates, and pages that the file lacks would be allotted for that: a small file with holes would cost its
  * readers the largest ring's memory. */
-static bool has_holes(const struct stat *file)
+static bool ring_map_has_holes(const struct stat *file)
 {
     return (uint64_t)file->st_blocks * STAT_BLOCK_BYTES < (uint64_t)file->st_size;
 }
@@ -96,6 +97,6 @@ int ring_map_check(int fd, const struct stat *file, uint32_t *capacity)
         return WHISKER_ERROR_RING_LAYOUT;
     }
     *capacity = header.capacity;
-    const int error = check_header(&header, file);
-    return !error && has_holes(file) ? WHISKER_ERROR_RING_LAYOUT : error;
+    const int error = ring_map_check_header(&header, file);
+    return !error && ring_map_has_holes(file) ? WHISKER_ERROR_RING_LAYOUT : error;
 }

@@ -28,7 +28,7 @@ int ring_path(const char *name, enum ring_place place, char path[RING_PATH_BYTES
     return written < RING_PATH_BYTES ? WHISKER_OK : WHISKER_ERROR_RING_NAME;
 }
 
-static void look_up_service(void)
+static void ring_place_look_up_service(void)
 {
     char text[USER_ENTRY_BYTES];
     struct passwd entry, *found = NULL;
@@ -39,7 +39,7 @@ static void look_up_service(void)
 
 bool ring_owner_is_trusted(uid_t owner, uid_t named)
 {
-    pthread_once(&service_once, look_up_service);
+    pthread_once(&service_once, ring_place_look_up_service);
     const bool is_service = service_owner != WHISKER_RING_NO_OWNER && owner == service_owner;
     const bool is_named = named != WHISKER_RING_NO_OWNER && owner == named;
     return owner == 0 || owner == geteuid() || is_service || is_named;

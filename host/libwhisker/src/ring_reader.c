@@ -2,14 +2,14 @@
 #include "whisker/errors.h"
 
 /* Whether the frame of this index may have been overwritten. Not believing the shared numbers costs nothing. */
-static bool is_overwritten(const struct whisker_reader *reader, uint64_t index)
+static bool ring_reader_is_overwritten(const struct whisker_reader *reader, uint64_t index)
 {
     ring_fence_after_reading();
     return ring_load(&reader->map.header->claim) - index > reader->map.capacity;
 }
 
 /* Where the frame of this index lies; up to a capacity of frames lie there in a row. */
-static const struct whisker_frame *place(const struct whisker_reader *reader, uint64_t index)
+static const struct whisker_frame *ring_reader_place(const struct whisker_reader *reader, uint64_t index)
 {
     return &reader->map.frames[index & (reader->map.capacity - 1)];
 }
@@ -17,7 +17,7 @@ static const struct whisker_frame *place(const struct whisker_reader *reader, ui
 /* Half a ring behind the writer, so that the next overrun is not at once. A writer that has overtaken this reader is
  * further than that: a head that is not, or that went back, was not counted, and nothing is to be had of such a ring.
  */
-static int skip_lost(struct whisker_reader *reader)
+static int ring_reader_skip_lost(struct whisker_reader *reader)
 {
     ring_fence_after_reading(); /* the head is not older than the claim that told of the overrun */
     const uint64_t ahead = ring_load_acquire(&reader->map.header->head) - reader->position;
@@ -36,13 +36,13 @@ static int skip_lost(struct whisker_reader *reader)
 int whisker_reader_peek(struct whisker_reader *reader, const struct whisker_frame **frames, size_t *count)
 {
     const uint64_t head = ring_load_acquire(&reader->map.header->head);
-    *frames = place(reader, reader->position);
+    *frames = ring_reader_place(reader, reader->position);
     *count = 0;
     if (!ring_is_whole(&reader->map)) {
         return WHISKER_ERROR_RING_LOST;
     }
     if (head - reader->position > reader->map.capacity) {
-        return skip_lost(reader);
+        return ring_reader_skip_lost(reader);
     }
     reader->peeked = head - reader->position;
     *count = reader->peeked;
@@ -50,7 +50,7 @@ int whisker_reader_peek(struct whisker_reader *reader, const struct whisker_fram
 }
 
 /* Differences modulo 2^32, for the sequence number wraps. Less than nothing missing is a bridge that restarted. */
-static void count_missing(struct whisker_reader *reader, uint32_t first, uint32_t last, size_t count)
+static void ring_reader_count_missing(struct whisker_reader *reader, uint32_t first, uint32_t last, size_t count)
 {
     const uint32_t before = reader->has_sequence ? reader->sequence : first - 1;
     const uint32_t missing = last - before - (uint32_t)count;
@@ -69,16 +69,16 @@ int whisker_reader_advance(struct whisker_reader *reader, size_t count)
     if (count == 0) {
         return WHISKER_OK;
     }
-    const uint32_t last = place(reader, reader->position + count - 1)->sequence;
-    const uint32_t first = place(reader, reader->position)->sequence;
-    const bool overwritten = is_overwritten(reader, reader->position);
+    const uint32_t last = ring_reader_place(reader, reader->position + count - 1)->sequence;
+    const uint32_t first = ring_reader_place(reader, reader->position)->sequence;
+    const bool overwritten = ring_reader_is_overwritten(reader, reader->position);
     if (!ring_is_whole(&reader->map)) {
         return WHISKER_ERROR_RING_LOST;
     }
     if (overwritten) {
-        return skip_lost(reader);
+        return ring_reader_skip_lost(reader);
     }
-    count_missing(reader, first, last, count);
+    ring_reader_count_missing(reader, first, last, count);
     reader->position += count;
     reader->peeked -= count;
     return WHISKER_OK;
@@ -96,13 +96,13 @@ int whisker_reader_window(struct whisker_reader *reader, size_t count, const str
     }
     const size_t given = head < count ? (size_t)head : count;
     reader->window = head - given;
-    *frames = place(reader, reader->window);
+    *frames = ring_reader_place(reader, reader->window);
     return (int)given;
 }
 
 int whisker_reader_intact(const struct whisker_reader *reader)
 {
-    const bool overwritten = is_overwritten(reader, reader->window);
+    const bool overwritten = ring_reader_is_overwritten(reader, reader->window);
     if (!ring_is_whole(&reader->map)) {
         return WHISKER_ERROR_RING_LOST;
     }

@@ -17,20 +17,20 @@
 
 /* Whether a line of /proc/PID/fdinfo/N says that the writer's lock is held through this open file (proc(5)). The lock
  * says so of itself: it belongs to an open file, so neither F_OFD_GETLK nor /proc/locks names a process. */
-static bool is_writer_lock(const char *line)
+static bool ring_signal_is_writer_lock(const char *line)
 {
     uint64_t first;
     return sscanf(line, "lock: %*d: OFDLCK %*s WRITE %*d %*[^ ] %" SCNu64, &first) == 1 && first == RING_LOCK_WRITER;
 }
 
-static bool holds_lock(uint32_t pid, const char *number)
+static bool ring_signal_holds_lock(uint32_t pid, const char *number)
 {
     char path[PROC_PATH_BYTES], line[256];
     snprintf(path, sizeof path, "/proc/%" PRIu32 "/fdinfo/%.10s", pid, number);
     FILE *info = fopen(path, "re");
     bool holds = false;
     while (info && !holds && fgets(line, sizeof line, info)) {
-        holds = is_writer_lock(line);
+        holds = ring_signal_is_writer_lock(line);
     }
     if (info) {
         fclose(info);
@@ -40,7 +40,7 @@ static bool holds_lock(uint32_t pid, const char *number)
 
 /* Whether this process has the ring's file open and its writer's lock through it. 0, RING_WRITER, or RING_ACCESS: this
  * user may not look. */
-static int check_writer(uint32_t pid, const struct stat *ring)
+static int ring_signal_check_writer(uint32_t pid, const struct stat *ring)
 {
     char path[PROC_PATH_BYTES];
     struct stat file;
@@ -53,7 +53,7 @@ static int check_writer(uint32_t pid, const struct stat *ring)
     for (const struct dirent *entry; error && (entry = readdir(directory));) {
         const bool is_ring = isdigit((unsigned char)entry->d_name[0]) &&
                              fstatat(dirfd(directory), entry->d_name, &file, 0) == 0 && ring_file_is_same(&file, ring);
-        error = is_ring && holds_lock(pid, entry->d_name) ? WHISKER_OK : WHISKER_ERROR_RING_WRITER;
+        error = is_ring && ring_signal_holds_lock(pid, entry->d_name) ? WHISKER_OK : WHISKER_ERROR_RING_WRITER;
     }
     closedir(directory);
     return error;
@@ -67,7 +67,7 @@ static int signal_process(uint32_t pid, const struct stat *ring, int number)
     if (process < 0) {
         return WHISKER_ERROR_RING_WRITER;
     }
-    int error = check_writer(pid, ring);
+    int error = ring_signal_check_writer(pid, ring);
     if (!error && syscall(SYS_pidfd_send_signal, process, number, NULL, 0) != 0) {
         error = errno == EPERM ? WHISKER_ERROR_RING_ACCESS : WHISKER_ERROR_RING_WRITER;
     }

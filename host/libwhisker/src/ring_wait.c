@@ -16,7 +16,7 @@
 
 /* 0: there is something to peek; TIMEOUT: not yet; CLOSED, RING_LOST: never again. The state is read before the head,
  * so frames published before the close are not missed. */
-static int look(const struct whisker_reader *reader)
+static int ring_wait_look(const struct whisker_reader *reader)
 {
     const uint64_t state = ring_load_acquire(&reader->map.header->state);
     const uint64_t head = ring_load_acquire(&reader->map.header->head);
@@ -30,18 +30,18 @@ static int look(const struct whisker_reader *reader)
 }
 
 /* As look, with the writer's life: when it is over, what it published last is seen by looking once more. */
-static int look_closely(const struct whisker_reader *reader)
+static int ring_wait_look_closely(const struct whisker_reader *reader)
 {
-    int seen = look(reader);
+    int seen = ring_wait_look(reader);
     if (seen == WHISKER_ERROR_TIMEOUT && !ring_file_is_locked(reader->map.fd, RING_LOCK_WRITER)) {
-        seen = look(reader);
+        seen = ring_wait_look(reader);
         seen = seen == WHISKER_ERROR_TIMEOUT ? WHISKER_ERROR_WRITER_DEAD : seen;
     }
     return seen;
 }
 
 /* An ended ring: does its name belong to a new one? */
-static int ended(const struct whisker_reader *reader, int error)
+static int ring_wait_ended(const struct whisker_reader *reader, int error)
 {
     struct ring_found other;
     struct stat mine;
@@ -54,7 +54,7 @@ static int ended(const struct whisker_reader *reader, int error)
 }
 
 /* Lets the writer know, by a lock that ends with this process, that there is someone to wake. */
-static int longest_sleep_ms(struct whisker_reader *reader)
+static int ring_wait_longest_sleep_ms(struct whisker_reader *reader)
 {
     const int64_t now = ring_now_ms();
     if (reader->waits_since_ms == 0 && ring_file_lock(reader->map.fd, RING_LOCK_WAITING)) {
@@ -66,10 +66,10 @@ static int longest_sleep_ms(struct whisker_reader *reader)
 
 /* While frames come faster than a reader can sleep between them it looks on for a moment. It is in haste as long as
  * that finds something: a reader of a slow stream never looks in vain. */
-static void look_on(struct whisker_reader *reader)
+static void ring_wait_look_on(struct whisker_reader *reader)
 {
     int looks = reader->in_haste ? LOOKS : 1;
-    while (looks > 0 && look(reader) == WHISKER_ERROR_TIMEOUT) {
+    while (looks > 0 && ring_wait_look(reader) == WHISKER_ERROR_TIMEOUT) {
         ring_pause();
         looks--;
     }
@@ -80,18 +80,18 @@ int whisker_reader_wait(struct whisker_reader *reader, int timeout_ms)
 {
     const int64_t started = timeout_ms > 0 ? ring_now_ms() : 0;
     if (timeout_ms != 0) {
-        look_on(reader);
+        ring_wait_look_on(reader);
     }
     for (;;) {
         const uint32_t signal = ring_signal_load(&reader->map.header->signal);
-        const int seen = look_closely(reader);
+        const int seen = ring_wait_look_closely(reader);
         if (seen == WHISKER_OK) {
             return WHISKER_OK;
         }
         if (seen != WHISKER_ERROR_TIMEOUT) {
-            return ended(reader, seen);
+            return ring_wait_ended(reader, seen);
         }
-        const int step = timeout_ms == 0 ? 0 : ring_sleep_ms(timeout_ms, started, longest_sleep_ms(reader));
+        const int step = timeout_ms == 0 ? 0 : ring_sleep_ms(timeout_ms, started, ring_wait_longest_sleep_ms(reader));
         if (step == 0) {
             return WHISKER_ERROR_TIMEOUT;
         }

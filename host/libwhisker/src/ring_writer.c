@@ -7,28 +7,28 @@
 #include "ring_internal.h"
 #include "whisker/errors.h"
 
-static uint64_t nanoseconds_since_boot(void)
+static uint64_t ring_writer_nanoseconds_since_boot(void)
 {
     struct timespec now;
     clock_gettime(CLOCK_BOOTTIME, &now);
     return (uint64_t)now.tv_sec * UINT64_C(1000000000) + (uint64_t)now.tv_nsec;
 }
 
-static void fill_header(const struct ring_map *map)
+static void ring_writer_fill_header(const struct ring_map *map)
 {
     struct ring_header *header = map->header;
     header->version = RING_LAYOUT_VERSION;
     header->header_bytes = (uint32_t)map->header_bytes;
     header->frame_bytes = sizeof(struct whisker_frame);
     header->capacity = map->capacity;
-    header->generation = nanoseconds_since_boot();
+    header->generation = ring_writer_nanoseconds_since_boot();
     header->writer_pid = (uint32_t)getpid();
     ring_store(&header->state, RING_OPEN);
     ring_store(&header->magic, RING_MAGIC);
 }
 
 /* The file gets its name when nothing is missing, so there is no ring half made. */
-static int make_ring(const char *path, const char *directory, uint32_t capacity, struct ring_map *map)
+static int ring_writer_make_ring(const char *path, const char *directory, uint32_t capacity, struct ring_map *map)
 {
     int fd;
     int error = ring_file_make(directory, ring_file_bytes(capacity), &fd);
@@ -39,7 +39,7 @@ static int make_ring(const char *path, const char *directory, uint32_t capacity,
     if (error) {
         return error;
     }
-    fill_header(map);
+    ring_writer_fill_header(map);
     error = ring_file_lock(fd, RING_LOCK_WRITER) ? ring_file_name(fd, path) : WHISKER_ERROR_SYSTEM;
     if (error) {
         ring_unmap(map);
@@ -48,7 +48,7 @@ static int make_ring(const char *path, const char *directory, uint32_t capacity,
 }
 
 /* The place of this directory, or RING_PLACES. */
-static enum ring_place place_of(const char *directory)
+static enum ring_place ring_writer_place_of(const char *directory)
 {
     enum ring_place place = 0;
     while (place < RING_PLACES && strcmp(directory, ring_directories[place]) != 0) {
@@ -58,7 +58,7 @@ static enum ring_place place_of(const char *directory)
 }
 
 /* Whether readers would find another ring of this name first. */
-static bool is_hidden(const char *name, enum ring_place place)
+static bool ring_writer_is_hidden(const char *name, enum ring_place place)
 {
     char path[RING_PATH_BYTES];
     bool hidden = false;
@@ -74,13 +74,14 @@ static int create_at(enum ring_place place, const char *name, uint32_t capacity,
     if (error) {
         return error;
     }
-    return is_hidden(name, place) ? WHISKER_ERROR_RING_BUSY
-                                  : make_ring(ring->path, ring_directories[place], capacity, &ring->map);
+    return ring_writer_is_hidden(name, place)
+               ? WHISKER_ERROR_RING_BUSY
+               : ring_writer_make_ring(ring->path, ring_directories[place], capacity, &ring->map);
 }
 
 int whisker_ring_create_in(const char *directory, const char *name, uint32_t capacity, struct whisker_ring **ring)
 {
-    const enum ring_place place = place_of(directory);
+    const enum ring_place place = ring_writer_place_of(directory);
     *ring = NULL;
     if (place == RING_PLACES || capacity < RING_CAPACITY_MIN || capacity > RING_CAPACITY_MAX ||
         (capacity & (capacity - 1)) != 0) {
@@ -105,7 +106,7 @@ int whisker_ring_create(const char *name, uint32_t capacity, struct whisker_ring
 }
 
 /* Where the next frames go, as one array; readers know from now on that these places change. NULL: too many. */
-static struct whisker_frame *reserve(struct whisker_ring *ring, size_t count)
+static struct whisker_frame *ring_writer_reserve(struct whisker_ring *ring, size_t count)
 {
     if (count > ring->map.capacity / 4) {
         return NULL;
@@ -121,7 +122,7 @@ static struct whisker_frame *reserve(struct whisker_ring *ring, size_t count)
 
 /* Asked of the kernel once per tick of its clock, for the answer costs a system call. A reader that has just begun to
  * wait does not rely on being woken before the next tick. */
-static bool readers_wait(struct whisker_ring *ring)
+static bool ring_writer_readers_wait(struct whisker_ring *ring)
 {
     struct timespec now;
     clock_gettime(CLOCK_MONOTONIC_COARSE, &now);
@@ -132,14 +133,14 @@ static bool readers_wait(struct whisker_ring *ring)
     return ring->readers_wait;
 }
 
-static int commit(struct whisker_ring *ring, size_t count)
+static int ring_writer_commit(struct whisker_ring *ring, size_t count)
 {
     struct ring_header *header = ring->map.header;
     if (count > 0) {
         ring->head += count;
         ring_store_release(&header->head, ring->head);
         ring_signal_raise(&header->signal);
-        if (readers_wait(ring)) {
+        if (ring_writer_readers_wait(ring)) {
             futex_wake_all(&header->signal);
         }
     }
@@ -148,19 +149,19 @@ static int commit(struct whisker_ring *ring, size_t count)
 
 int whisker_ring_publish(struct whisker_ring *ring, const struct whisker_frame *frames, size_t count)
 {
-    struct whisker_frame *place = reserve(ring, count);
+    struct whisker_frame *place = ring_writer_reserve(ring, count);
     if (!place) {
         return WHISKER_ERROR_ARGUMENT;
     }
     memcpy(place, frames, count * sizeof *frames);
-    return commit(ring, count);
+    return ring_writer_commit(ring, count);
 }
 
 int whisker_ring_feed(struct whisker_ring *ring, struct whisker_decoder *decoder, const uint8_t *bytes, size_t count,
                       const struct whisker_frame **frames, size_t *made)
 {
     /* The decoder may hold all but one byte of a frame. */
-    struct whisker_frame *place = reserve(ring, count / sizeof *place + 1);
+    struct whisker_frame *place = ring_writer_reserve(ring, count / sizeof *place + 1);
     if (!place) {
         return WHISKER_ERROR_ARGUMENT;
     }
@@ -172,7 +173,7 @@ int whisker_ring_feed(struct whisker_ring *ring, struct whisker_decoder *decoder
         *frames = place;
         *made = decoded;
     }
-    return commit(ring, decoded);
+    return ring_writer_commit(ring, decoded);
 }
 
 void whisker_ring_set_clock(struct whisker_ring *ring, const struct whisker_clock *clock)

@@ -13,7 +13,8 @@
 
 _Static_assert(WHISKER_SERVICE_DATA_BYTES == WHISKER_SERVICE_CRC32 - WHISKER_SERVICE_DATA, "size of an order's data");
 
-static void read_answers(const uint8_t *report, uint8_t command, struct whisker_answer answers[WHISKER_FRAME_LANES])
+static void service_read_answers(const uint8_t *report, uint8_t command,
+                                 struct whisker_answer answers[WHISKER_FRAME_LANES])
 {
     for (int lane = 0; lane < WHISKER_FRAME_LANES; lane++) {
         const uint8_t *at = report + WHISKER_REPORT_ANSWERS_ANSWER + 6 * lane;
@@ -29,7 +30,7 @@ static void read_answers(const uint8_t *report, uint8_t command, struct whisker_
 }
 
 /* Sends one order and waits for the end of its window; `report` then holds the answers to the order before. */
-static int exchange(struct whisker_device *device, const struct whisker_service_order *order, uint8_t *report)
+static int service_exchange(struct whisker_device *device, const struct whisker_service_order *order, uint8_t *report)
 {
     int error = device_send_service(device, order);
     for (int i = 0; !error && i < WINDOW_POLLS_MAX; i++) {
@@ -44,7 +45,7 @@ static int exchange(struct whisker_device *device, const struct whisker_service_
     return error ? error : WHISKER_ERROR_TIMEOUT;
 }
 
-static bool all_valid(const struct whisker_answer answers[WHISKER_FRAME_LANES], uint32_t lanes)
+static bool service_all_valid(const struct whisker_answer answers[WHISKER_FRAME_LANES], uint32_t lanes)
 {
     for (int lane = 0; lane < WHISKER_FRAME_LANES; lane++) {
         if (lanes >> lane & 1 && !answers[lane].valid) {
@@ -60,27 +61,27 @@ int whisker_service_ask(struct whisker_device *device, const struct whisker_serv
     static const struct whisker_service_order POLL = {.command = WHISKER_SERVICE_COMMAND_POLL};
     uint8_t report[WHISKER_REPORT_ANSWERS_BYTES];
     memset(answers, 0, WHISKER_FRAME_LANES * sizeof answers[0]);
-    for (unsigned asked = 0; asked == 0 || (asked < patience && !all_valid(answers, lanes)); asked++) {
-        int error = asked % REPEAT_ASKS == 0 ? exchange(device, order, report) : WHISKER_OK;
+    for (unsigned asked = 0; asked == 0 || (asked < patience && !service_all_valid(answers, lanes)); asked++) {
+        int error = asked % REPEAT_ASKS == 0 ? service_exchange(device, order, report) : WHISKER_OK;
         if (!error) {
-            error = exchange(device, &POLL, report);
+            error = service_exchange(device, &POLL, report);
         }
         if (error) {
             return error;
         }
-        read_answers(report, order->command, answers);
+        service_read_answers(report, order->command, answers);
     }
     return WHISKER_OK;
 }
 
-static int ask_item(struct whisker_device *device, uint32_t lanes, uint8_t item,
-                    struct whisker_answer answers[WHISKER_FRAME_LANES])
+static int service_ask_item(struct whisker_device *device, uint32_t lanes, uint8_t item,
+                            struct whisker_answer answers[WHISKER_FRAME_LANES])
 {
     const struct whisker_service_order order = {.command = WHISKER_SERVICE_COMMAND_INFO, .argument = {item}};
     return whisker_service_ask(device, &order, lanes, WHISKER_LIMIT_BUSY_TICKS_MAX, answers);
 }
 
-static void note(struct whisker_node *node, uint8_t item, const struct whisker_answer *answer)
+static void service_note(struct whisker_node *node, uint8_t item, const struct whisker_answer *answer)
 {
     switch (item) {
     case WHISKER_INFO_CHIP:
@@ -109,13 +110,13 @@ int whisker_nodes_identify(struct whisker_device *device, uint32_t lanes,
     memset(nodes, 0, WHISKER_FRAME_LANES * sizeof nodes[0]);
     for (size_t i = 0; i < sizeof ITEMS; i++) {
         struct whisker_answer answers[WHISKER_FRAME_LANES];
-        const int error = ask_item(device, left, ITEMS[i], answers);
+        const int error = service_ask_item(device, left, ITEMS[i], answers);
         if (error) {
             return error;
         }
         for (int lane = 0; lane < WHISKER_FRAME_LANES; lane++) {
             nodes[lane].present = answers[lane].valid && (i == 0 || nodes[lane].present);
-            note(&nodes[lane], ITEMS[i], &answers[lane]);
+            service_note(&nodes[lane], ITEMS[i], &answers[lane]);
             left &= nodes[lane].present ? UINT32_MAX : ~(UINT32_C(1) << lane); /* nobody waits for empty lanes twice */
         }
     }
@@ -126,7 +127,7 @@ int whisker_nodes_health(struct whisker_device *device, uint32_t lanes, uint8_t 
                          uint16_t counts[WHISKER_FRAME_LANES])
 {
     struct whisker_answer answers[WHISKER_FRAME_LANES];
-    const int error = ask_item(device, lanes, (uint8_t)(WHISKER_INFO_HEALTH + counter), answers);
+    const int error = service_ask_item(device, lanes, (uint8_t)(WHISKER_INFO_HEALTH + counter), answers);
     for (int lane = 0; !error && lane < WHISKER_FRAME_LANES; lane++) {
         counts[lane] = answers[lane].valid && answers[lane].beta == counter ? answers[lane].alpha : 0;
     }

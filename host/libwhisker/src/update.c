@@ -49,13 +49,13 @@ int whisker_image_parse(const uint8_t *bytes, size_t count, struct whisker_image
     return sound ? WHISKER_OK : WHISKER_ERROR_IMAGE;
 }
 
-static void leave(struct loading *l, int lane)
+static void update_leave(struct loading *l, int lane)
 {
     l->lanes &= ~(UINT32_C(1) << lane);
 }
 
 /* Asks those that take part; whoever does not answer is left behind. */
-static int ask(struct loading *l, struct whisker_answer answers[WHISKER_FRAME_LANES])
+static int update_ask(struct loading *l, struct whisker_answer answers[WHISKER_FRAME_LANES])
 {
     const int error =
         whisker_service_ask(l->device, &l->order, l->lanes, SILENT_ASKS * WHISKER_LIMIT_BUSY_TICKS_MAX, answers);
@@ -69,23 +69,23 @@ static int ask(struct loading *l, struct whisker_answer answers[WHISKER_FRAME_LA
             update->blocks = answers[lane].alpha;
         } else {
             update->silent = true;
-            leave(l, lane);
+            update_leave(l, lane);
         }
     }
     return error;
 }
 
-static void leave_refused(struct loading *l)
+static void update_leave_refused(struct loading *l)
 {
     for (int lane = 0; lane < WHISKER_FRAME_LANES; lane++) {
         if (l->updates[lane].state > WHISKER_NODE_STATE_COMPLETE) {
-            leave(l, lane);
+            update_leave(l, lane);
         }
     }
 }
 
 /* Leaves the application, hands over the header. A node that has just restarted may miss either. */
-static int start(struct loading *l)
+static int update_start(struct loading *l)
 {
     struct whisker_answer answers[WHISKER_FRAME_LANES];
     int error = WHISKER_OK;
@@ -96,9 +96,9 @@ static int start(struct loading *l)
         memcpy(l->order.data, l->image->header, WHISKER_IMAGE_HEADER_BYTES);
         l->order.command = WHISKER_SERVICE_COMMAND_BEGIN;
         if (!error) {
-            error = ask(l, answers);
+            error = update_ask(l, answers);
         }
-        leave_refused(l);
+        update_leave_refused(l);
         all = true;
         for (int lane = 0; lane < WHISKER_FRAME_LANES; lane++) {
             all = all && (!(l->lanes >> lane & 1) || l->updates[lane].state == WHISKER_NODE_STATE_LOADING);
@@ -108,16 +108,16 @@ static int start(struct loading *l)
 }
 
 /* A node that restarted meanwhile waits in its loader and wants to be begun anew. */
-static void leave_restarted(struct loading *l)
+static void update_leave_restarted(struct loading *l)
 {
     for (int lane = 0; lane < WHISKER_FRAME_LANES; lane++) {
         if (l->updates[lane].state != WHISKER_NODE_STATE_LOADING) {
-            leave(l, lane);
+            update_leave(l, lane);
         }
     }
 }
 
-static uint16_t lowest_wanted(const struct loading *l)
+static uint16_t update_lowest_wanted(const struct loading *l)
 {
     uint16_t lowest = UINT16_MAX;
     for (int lane = 0; lane < WHISKER_FRAME_LANES; lane++) {
@@ -129,7 +129,7 @@ static uint16_t lowest_wanted(const struct loading *l)
 }
 
 /* Leaves a node that was sent the block it wants again and again and does not take it. */
-static void leave_stuck(struct loading *l, uint16_t sent)
+static void update_leave_stuck(struct loading *l, uint16_t sent)
 {
     for (int lane = 0; lane < WHISKER_FRAME_LANES; lane++) {
         const uint16_t has = l->updates[lane].blocks;
@@ -141,26 +141,26 @@ static void leave_stuck(struct loading *l, uint16_t sent)
             l->tries[lane] = 0;
         } else if (has <= sent && ++l->tries[lane] >= STUCK_ASKS) {
             l->updates[lane].stuck = true;
-            leave(l, lane);
+            update_leave(l, lane);
         }
     }
 }
 
-static int send_blocks(struct loading *l, whisker_update_progress progress, void *context)
+static int update_send_blocks(struct loading *l, whisker_update_progress progress, void *context)
 {
     struct whisker_answer answers[WHISKER_FRAME_LANES];
     const uint32_t total = l->image->length / BLOCK_BYTES;
     int error = WHISKER_OK;
-    uint16_t block = l->lanes ? lowest_wanted(l) : UINT16_MAX;
-    leave_restarted(l);
+    uint16_t block = l->lanes ? update_lowest_wanted(l) : UINT16_MAX;
+    update_leave_restarted(l);
     while (!error && l->lanes && block < total) {
         l->order = (struct whisker_service_order){.command = WHISKER_SERVICE_COMMAND_BLOCK};
         whisker_put_u16(l->order.argument, block);
         memcpy(l->order.data, l->image->body + (size_t)block * BLOCK_BYTES, BLOCK_BYTES);
-        error = ask(l, answers);
-        leave_restarted(l);
-        leave_stuck(l, block);
-        block = l->lanes ? lowest_wanted(l) : UINT16_MAX;
+        error = update_ask(l, answers);
+        update_leave_restarted(l);
+        update_leave_stuck(l, block);
+        block = l->lanes ? update_lowest_wanted(l) : UINT16_MAX;
         if (progress && l->lanes) {
             progress(context, block, total);
         }
@@ -169,11 +169,11 @@ static int send_blocks(struct loading *l, whisker_update_progress progress, void
 }
 
 /* Is the image whole everywhere? A node that restarted meanwhile is in another state, and left behind. */
-static int finish(struct loading *l)
+static int update_finish(struct loading *l)
 {
     struct whisker_answer answers[WHISKER_FRAME_LANES];
     l->order = (struct whisker_service_order){.command = WHISKER_SERVICE_COMMAND_FINISH};
-    const int error = l->lanes ? ask(l, answers) : WHISKER_OK;
+    const int error = l->lanes ? update_ask(l, answers) : WHISKER_OK;
     for (int lane = 0; !error && lane < WHISKER_FRAME_LANES; lane++) {
         l->updates[lane].done = l->lanes >> lane & 1 && l->updates[lane].state == WHISKER_NODE_STATE_COMPLETE;
     }
@@ -191,12 +191,12 @@ int whisker_nodes_update(struct whisker_device *device, uint32_t lanes, uint32_t
         updates[lane].wanted = lanes >> lane & 1;
     }
     whisker_put_u32(l.order.argument, serial);
-    int error = start(&l);
+    int error = update_start(&l);
     if (!error) {
-        error = send_blocks(&l, progress, context);
+        error = update_send_blocks(&l, progress, context);
     }
     if (!error) {
-        error = finish(&l);
+        error = update_finish(&l);
     }
     /* Also for those that were refused: they go back to the application they have. */
     l.order = (struct whisker_service_order){.command = WHISKER_SERVICE_COMMAND_RUN};

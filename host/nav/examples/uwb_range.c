@@ -15,7 +15,7 @@ struct anchor {
 };
 
 /* The distance that a range should tell at a pose, as a code. */
-static int anchor_expect(const void *self, double x, double y, double theta)
+static int uwb_range_anchor_expect(const void *self, double x, double y, double theta)
 {
     const struct anchor *anchor = self;
     (void)theta; /* the antenna is over the robot's centre */
@@ -23,7 +23,7 @@ static int anchor_expect(const void *self, double x, double y, double theta)
 }
 
 /* Likelihood of a range by code: a normal distribution about the middle of the code's distances. */
-static void anchor_fill(const void *self, const double *reading, double *likelihood)
+static void uwb_range_anchor_fill(const void *self, const double *reading, double *likelihood)
 {
     const struct anchor *anchor = self;
     for (int code = 0; code < CODES; code++) {
@@ -36,9 +36,16 @@ int main(void)
 {
     static const uint8_t floor[] = {0};
     static const struct anchor anchor[] = {{0.0, 0.0, 0.1}, {2.0, 0.0, 0.1}};
-    const struct nav_sensor range[] = {
-        {.values = 1, .codes = CODES, .expect = anchor_expect, .fill = anchor_fill, .self = &anchor[0]},
-        {.values = 1, .codes = CODES, .expect = anchor_expect, .fill = anchor_fill, .self = &anchor[1]}};
+    const struct nav_sensor range[] = {{.values = 1,
+                                        .codes = CODES,
+                                        .expect = uwb_range_anchor_expect,
+                                        .fill = uwb_range_anchor_fill,
+                                        .self = &anchor[0]},
+                                       {.values = 1,
+                                        .codes = CODES,
+                                        .expect = uwb_range_anchor_expect,
+                                        .fill = uwb_range_anchor_fill,
+                                        .self = &anchor[1]}};
     struct nav_problem problem = {
         .arena = {.size_x = 2.0, .size_y = 2.0, .tile = 2.0, .columns = 1, .rows = 1, .floor = floor, .classes = 1},
         .robot = {.body_radius = 0.1, .odometry_relative = 0.05, .radial_sigma = 0.005, .sensors = 2, .sensor = range},

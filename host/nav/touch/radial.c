@@ -3,7 +3,7 @@
 #include <math.h>
 
 /* Squared deflection magnitude; NaN or infinite when an axis is. */
-static double squared_deflection(const double *sample, int axes, const double *rest)
+static double radial_squared_deflection(const double *sample, int axes, const double *rest)
 {
     double sum = 0.0;
     for (int a = 0; a < axes; a++)
@@ -15,7 +15,7 @@ double nav_radial_peak(const double *samples, size_t n, int axes, const double *
 {
     double best = -1.0;
     for (size_t i = 0; i < n; i++) {
-        double square = squared_deflection(samples + i * (size_t)axes, axes, rest);
+        double square = radial_squared_deflection(samples + i * (size_t)axes, axes, rest);
         if (isfinite(square) && square > best)
             best = square;
     }
@@ -28,16 +28,16 @@ struct sums {
     double low, high;
 };
 
-static int usable(double f, double r)
+static int radial_usable(double f, double r)
 {
     return isfinite(f) && isfinite(r);
 }
 
-static struct sums summarise(const double *f, const double *r, size_t n)
+static struct sums radial_summarise(const double *f, const double *r, size_t n)
 {
     struct sums s = {.low = INFINITY, .high = -INFINITY};
     for (size_t i = 0; i < n; i++) {
-        if (!usable(f[i], r[i]))
+        if (!radial_usable(f[i], r[i]))
             continue;
         s.n++;
         s.f += f[i];
@@ -48,7 +48,7 @@ static struct sums summarise(const double *f, const double *r, size_t n)
     s.f /= (double)s.n;
     s.r /= (double)s.n;
     for (size_t i = 0; i < n; i++) {
-        if (!usable(f[i], r[i]))
+        if (!radial_usable(f[i], r[i]))
             continue;
         s.ff += (f[i] - s.f) * (f[i] - s.f);
         s.fr += (f[i] - s.f) * (r[i] - s.r);
@@ -59,7 +59,7 @@ static struct sums summarise(const double *f, const double *r, size_t n)
 
 long nav_radial_fit(struct nav_radial *model, const double *peak_counts, const double *radius_mm, size_t n)
 {
-    struct sums s = summarise(peak_counts, radius_mm, n);
+    struct sums s = radial_summarise(peak_counts, radius_mm, n);
     if (s.n < 3 || !(s.ff > 0.0))
         return -1;
     double a1 = s.fr / s.ff;

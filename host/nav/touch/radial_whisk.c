@@ -42,7 +42,7 @@ void nav_whisk_terms(const struct nav_shape *shape, double *terms)
 
 /* What of a push's length lies outside those calibrated: whatever weight these gave it, there the whisker bends as far
  * as it is pushed. Takes it from *off. */
-static double take_far_turn(const struct nav_whisk_model *m, double *off)
+static double radial_whisk_take_far_turn(const struct nav_whisk_model *m, double *off)
 {
     double most = CALIBRATED * m->scatter[NAV_WHISK_TURN];
     double near = fmax(-most, fmin(most, *off)), far = *off - near;
@@ -51,7 +51,7 @@ static double take_far_turn(const struct nav_whisk_model *m, double *off)
 }
 
 /* ln h that the whisk shows, and its variance but for the spread. */
-static double seen_height(const struct nav_whisk_model *m, const struct nav_shape *shape, double *variance)
+static double radial_whisk_seen_height(const struct nav_whisk_model *m, const struct nav_shape *shape, double *variance)
 {
     double terms[NAV_WHISK_TERMS], off[NAV_WHISK_TERMS];
     double height = log(shape->peak) - m->log_gain;
@@ -61,7 +61,7 @@ static double seen_height(const struct nav_whisk_model *m, const struct nav_shap
         bool missing = !isfinite(terms[k]);
         off[k] = missing ? 0.0 : terms[k] - m->mean[k];
         if (k == NAV_WHISK_TURN)
-            height -= take_far_turn(m, &off[k]);
+            height -= radial_whisk_take_far_turn(m, &off[k]);
         height -= m->weight[k] * off[k];
         *variance += missing ? m->weight[k] * m->weight[k] * m->scatter[k] * m->scatter[k] : 0.0;
     }
@@ -72,7 +72,7 @@ static double seen_height(const struct nav_whisk_model *m, const struct nav_shap
 }
 
 /* How much likelier the whisk's looks are if it is none of those calibrated: direction, smoothness, lost samples. */
-static double strangeness(const struct nav_whisk_model *m, const struct nav_shape *shape)
+static double radial_whisk_strangeness(const struct nav_whisk_model *m, const struct nav_shape *shape)
 {
     double along = 0.0, length = 0.0, odds = 1.0;
     for (int a = 0; a < m->axes; a++) {
@@ -94,7 +94,7 @@ static double strangeness(const struct nav_whisk_model *m, const struct nav_shap
 }
 
 /* Radius at which ln h is this, held within the possible ones; how much ln h falls per mm there. */
-static double radius_of(const struct nav_whisk_model *m, double height, double *fall)
+static double radial_whisk_radius_of(const struct nav_whisk_model *m, double height, double *fall)
 {
     double h = exp(fmin(height, 0.0));
     double radius = m->cone_mm * (1.0 - h) / (1.0 - h + m->kappa * h);
@@ -109,9 +109,9 @@ struct moments {
 };
 
 /* Moments of the radius by the trapezoid rule over the part of the possible radii that counts. */
-static struct moments weigh(const struct nav_whisk_model *m, double height, double variance)
+static struct moments radial_whisk_weigh(const struct nav_whisk_model *m, double height, double variance)
 {
-    double fall, nearest = radius_of(m, height, &fall), reach = NODES_REACH * sqrt(variance) / fall;
+    double fall, nearest = radial_whisk_radius_of(m, height, &fall), reach = NODES_REACH * sqrt(variance) / fall;
     double low = fmax(m->low_mm, nearest - reach), high = fmin(m->high_mm, nearest + reach);
     double step = (high - low) / (NODES - 1), scale = 0.5 / variance;
     double least = height - nav_whisk_height(m->kappa, m->cone_mm, nearest);
@@ -138,12 +138,12 @@ void nav_whisk_estimate(const struct nav_whisk_model *m, const struct nav_shape 
     *out = prior;
     if (shape->quality == NAV_SHAPE_NONE || !(shape->peak > 0.0))
         return;
-    double variance, height = seen_height(m, shape, &variance);
+    double variance, height = radial_whisk_seen_height(m, shape, &variance);
     variance += m->spread * m->spread;
     if (!isfinite(height) || !isfinite(variance))
         return;
-    struct moments usual = weigh(m, height, variance);
-    double strange = STRANGE * STRANGE_PEAK * strangeness(m, shape);
+    struct moments usual = radial_whisk_weigh(m, height, variance);
+    double strange = STRANGE * STRANGE_PEAK * radial_whisk_strangeness(m, shape);
     double belief = (1.0 - STRANGE) * usual.mass;
     belief = belief > 0.0 ? belief / (belief + strange) : 0.0;
     double mean = belief * usual.mean + (1.0 - belief) * prior.radius_mm;

@@ -16,7 +16,7 @@ constexpr uint32_t ALL_LANES = UINT32_MAX >> (32 - LANES);
 } // namespace
 
 // The board's register value is what its top writes: another one leaves the lines swapped.
-static PhyTraits with_fault(PhyTraits phy, const BoardFault &fault)
+static PhyTraits board_device_with_fault(PhyTraits phy, const BoardFault &fault)
 {
     phy.swap_value ^= fault.wire == Wire::POLARITY && fault.kind == BoardFault::Kind::INVERTED ? 2u : 0u;
     return phy;
@@ -24,7 +24,8 @@ static PhyTraits with_fault(PhyTraits phy, const BoardFault &fault)
 
 BoardDevice::BoardDevice(std::unique_ptr<BoardTop> top, const BoardTraits &traits, NodeBus &nodes,
                          const BoardFault &fault)
-    : top_(std::move(top)), traits_(traits), nodes_(nodes), fault_(fault), phy_(with_fault(traits.phy, fault))
+    : top_(std::move(top)), traits_(traits), nodes_(nodes), fault_(fault),
+      phy_(board_device_with_fault(traits.phy, fault))
 {
     inputs_.miso = ALL_LANES;
     levels_[at(Wire::SELECT)] = true;
@@ -132,7 +133,7 @@ void BoardDevice::take(const BoardOutputs &outputs, bool dir)
     if (levels_[at(Wire::RESET)] && !was_reset) {
         resets_++;
         hangs_ = false;
-        PhyTraits anew = with_fault(traits_.phy, fault_);
+        PhyTraits anew = board_device_with_fault(traits_.phy, fault_);
         anew.late = PHY_START;
         phy_ = UlpiPhy(anew);
     }
