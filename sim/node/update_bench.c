@@ -20,7 +20,7 @@ struct update_image update_image_of(uint16_t version)
     struct update_image image;
     uint8_t *header = image.bytes;
     memset(&image, 0, sizeof image);
-    update_fill(image.bytes + WHISKER_IMAGE_HEADER_BYTES, version);
+    sim_update_body_fill(image.bytes + WHISKER_IMAGE_HEADER_BYTES, version);
     whisker_put_u32(header + WHISKER_IMAGE_HEADER_MAGIC, WHISKER_LIMIT_IMAGE_MAGIC);
     whisker_put_u16(header + WHISKER_IMAGE_HEADER_CHIP, WHISKER_LIMIT_CHIP_ID);
     header[WHISKER_IMAGE_HEADER_WIRE_VERSION] = WHISKER_WIRE_VERSION;

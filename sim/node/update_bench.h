@@ -20,7 +20,7 @@ struct update_image {
 };
 
 /* The application's rows: some bytes that differ with the version (update_body.c), or a program (sim/node_image). */
-void update_fill(uint8_t body[UPDATE_BODY], uint16_t version);
+void sim_update_body_fill(uint8_t body[UPDATE_BODY], uint16_t version);
 
 /* An application of those rows; update_seal() makes its header's CRC right again after a change. */
 struct update_image update_image_of(uint16_t version);

@@ -22,7 +22,7 @@ enum { TRAPS = 8 }; /* vectors before the first interrupt's */
 /* ------------------------------------------------------------------------------------------------------------ vectors
  */
 
-static sim_node *started(bool in_loader)
+static sim_node *image_check_started(bool in_loader)
 {
     sim_node *node = sim_node_new(1);
     if (!node)
@@ -33,14 +33,14 @@ static sim_node *started(bool in_loader)
     return node;
 }
 
-static void raise_interrupt(struct dspic *chip, unsigned irq)
+static void image_check_raise_interrupt(struct dspic *chip, unsigned irq)
 {
     registers_write(chip, IEC0 + 2u * (irq / 16u),
                     (uint16_t)(registers_read(chip, IEC0 + 2u * (irq / 16u)) | 1u << irq % 16u));
     dspic_irq_raise(chip, irq);
 }
 
-static const char *outcome(const struct image_costs *before, unsigned number)
+static const char *image_check_outcome(const struct image_costs *before, unsigned number)
 {
     const struct image_costs after = image_port_costs();
     if (after.boots > before->boots)
@@ -48,32 +48,32 @@ static const char *outcome(const struct image_costs *before, unsigned number)
     return after.returned[number] > before->returned[number] ? "returns" : "nothing";
 }
 
-static const char *tried(bool in_loader, unsigned number)
+static const char *image_check_tried(bool in_loader, unsigned number)
 {
-    sim_node *node = started(in_loader);
+    sim_node *node = image_check_started(in_loader);
     const struct image_costs before = image_port_costs();
     if (number < TRAPS)
         sim_node_disturb(node, SIM_NODE_TRAP, number);
     else
-        raise_interrupt(node->chip, number - TRAPS);
+        image_check_raise_interrupt(node->chip, number - TRAPS);
     sim_node_until(node, sim_node_fs(node) + MS_FS);
-    const char *found = outcome(&before, number);
+    const char *found = image_check_outcome(&before, number);
     sim_node_free(node);
     return found;
 }
 
-static void print_vector(bool in_loader, unsigned number)
+static void image_check_print_vector(bool in_loader, unsigned number)
 {
     const bool none = number < TRAPS && number > (unsigned)DSPIC_TRAP_DMA;
-    printf("%s\"%s\"", number ? ", " : "", none ? "none" : tried(in_loader, number));
+    printf("%s\"%s\"", number ? ", " : "", none ? "none" : image_check_tried(in_loader, number));
 }
 
-static void print_vectors(void)
+static void image_check_print_vectors(void)
 {
     for (unsigned in_loader = 0; in_loader < 2u; in_loader++) {
         printf("%s\"%s\": [", in_loader ? ", " : "{", in_loader ? "loader" : "application");
         for (unsigned number = 0; number < IMAGE_VECTORS; number++)
-            print_vector(in_loader != 0, number);
+            image_check_print_vector(in_loader != 0, number);
         printf("]");
     }
     printf("}\n");
@@ -83,7 +83,7 @@ static void print_vectors(void)
  */
 
 /* One after the other on a node that is left alone. */
-static void print_handlers(void)
+static void image_check_print_handlers(void)
 {
     static const struct {
         uint8_t irq, handler;
@@ -94,9 +94,9 @@ static void print_handlers(void)
                   {IRQ_T2, IMAGE_READY},
                   {IRQ_SPI1_ERROR, IMAGE_SENSOR_OVERRUN},
                   {IRQ_INT1, IMAGE_SYNC}};
-    sim_node *node = started(false);
+    sim_node *node = image_check_started(false);
     for (unsigned i = 0; i < sizeof RAISED / sizeof *RAISED; i++) {
-        raise_interrupt(node->chip, RAISED[i].irq);
+        image_check_raise_interrupt(node->chip, RAISED[i].irq);
         sim_node_until(node, sim_node_fs(node) + MS_FS / 50u);
         const struct image_costs costs = image_port_costs();
         printf("%s%lu", i ? ", " : "[", (unsigned long)costs.handlers[RAISED[i].handler].last);
@@ -117,7 +117,7 @@ struct run {
     unsigned altered;
 };
 
-static bool plan(void *context, unsigned tick, struct sim_field *field, struct lane_faults *faults)
+static bool image_check_plan(void *context, unsigned tick, struct sim_field *field, struct lane_faults *faults)
 {
     struct run *run = context;
     *field = (struct sim_field){0.25 * (tick % 80u), 7.0 - 0.125 * (tick % 60u)};
@@ -126,7 +126,7 @@ static bool plan(void *context, unsigned tick, struct sim_field *field, struct l
     return !run->ended && tick < LONGEST;
 }
 
-static void judged(void *context, unsigned tick, const struct lane_verdict *v)
+static void image_check_judged(void *context, unsigned tick, const struct lane_verdict *v)
 {
     struct run *run = context;
     run->good = v->good ? run->good + 1u : 0u;
@@ -138,7 +138,7 @@ static void judged(void *context, unsigned tick, const struct lane_verdict *v)
     run->ended = tick > CALM && run->good >= RUN;
 }
 
-static struct run run_with(const struct lane_faults *fault, bool keeps_clock, uint64_t seed, uint32_t hz[2])
+static struct run image_check_run_with(const struct lane_faults *fault, bool keeps_clock, uint64_t seed, uint32_t hz[2])
 {
     static struct lane_bench bench;
     struct run run = {.fault = *fault};
@@ -151,26 +151,26 @@ static struct run run_with(const struct lane_faults *fault, bool keeps_clock, ui
     sim_node_power_on(node);
     hz[0] = sim_node_report(node).fcy_hz;
     lane_bench_start(&bench, node, lane_timing_of(16, 180, LANE_TICK_PERIOD));
-    lane_bench_run(&bench, &(struct lane_world){&run, plan, judged});
+    lane_bench_run(&bench, &(struct lane_world){&run, image_check_plan, image_check_judged});
     hz[1] = sim_node_report(node).fcy_hz;
     run.altered += sim_node_violations(node) - sim_node_report(node).overwritten;
     sim_node_free(node);
     return run;
 }
 
-static void print_boots(unsigned count)
+static void image_check_print_boots(unsigned count)
 {
     printf("[");
     for (unsigned seed = 0; seed < count; seed++) {
         uint32_t hz[2];
-        const struct run run = run_with(&(struct lane_faults){0}, seed % 2u, seed, hz);
+        const struct run run = image_check_run_with(&(struct lane_faults){0}, seed % 2u, seed, hz);
         printf("%s{\"good\": %s, \"lost\": %u, \"breaches\": %u}", seed ? ", " : "", run.ended ? "true" : "false",
                run.lost, run.altered);
     }
     printf("]\n");
 }
 
-static void print_resets(void)
+static void image_check_print_resets(void)
 {
     static const struct {
         const char *name;
@@ -188,7 +188,7 @@ static void print_resets(void)
         uint32_t hz[2];
         struct lane_faults fault = CAUSES[i / 2u].fault;
         fault.disturbance_ns = 250000;
-        const struct run run = run_with(&fault, i % 2u, 1, hz);
+        const struct run run = image_check_run_with(&fault, i % 2u, 1, hz);
         printf(
             "%s{\"cause\": \"%s\", \"keeps_clock\": %s, \"good\": %s, \"lost\": %u, \"told\": %lu, \"breaches\": %u, "
             "\"hz\": [%lu, %lu]}",
@@ -201,13 +201,13 @@ static void print_resets(void)
 int main(int argc, char **argv)
 {
     if (argc == 2 && strcmp(argv[1], "vectors") == 0) {
-        print_vectors();
+        image_check_print_vectors();
     } else if (argc == 2 && strcmp(argv[1], "handlers") == 0) {
-        print_handlers();
+        image_check_print_handlers();
     } else if (argc == 3 && strcmp(argv[1], "boots") == 0) {
-        print_boots((unsigned)strtoul(argv[2], NULL, 10));
+        image_check_print_boots((unsigned)strtoul(argv[2], NULL, 10));
     } else if (argc == 2 && strcmp(argv[1], "resets") == 0) {
-        print_resets();
+        image_check_print_resets();
     } else {
         fprintf(stderr, "image_check: wants vectors, handlers, boots and how many, or resets\n");
         return 2;

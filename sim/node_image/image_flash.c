@@ -10,7 +10,7 @@ void sim_node_program_default(struct sim_node *node)
     memcpy(dspic_flash(node->chip), image_port_table()->flash, sizeof image_port_table()->flash);
 }
 
-void update_fill(uint8_t body[UPDATE_BODY], uint16_t version)
+void sim_update_body_fill(uint8_t body[UPDATE_BODY], uint16_t version)
 {
     const uint32_t *word = image_port_table()->flash + (WHISKER_LIMIT_APPLICATION_ROW + 1u) * FLASH_ROW_WORDS;
     (void)version;

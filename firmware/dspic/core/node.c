@@ -119,7 +119,7 @@ void node_on_order(struct node *node, const uint16_t words[LINK_WORDS])
 {
     struct order order;
     node->displaced = board_watch_exceeds(node->board, NODE_ORDER_MOST_US); /* first: parsing takes its time */
-    const bool whole = order_parse(words, &order);
+    const bool whole = record_parse_order(words, &order);
     if (!whole)
         node_count(node, WHISKER_HEALTH_ORDER_CRC);
     else if (!node->numbered &&

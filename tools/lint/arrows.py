@@ -1,13 +1,11 @@
-#!/usr/bin/env python3
 """Fails on a forbidden arrow: a folder that uses one it must not know. The allowed arrows are docs/architecture.md's table,
 and host/python/README.md's for the rooms of the Python package."""
 
 import ast
 import re
-import sys
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
+from .tree import ROOT
 
 # folder -> what its files may include, import or name, folders within these included. A folder may always use itself
 # and protocol/gen. A folder within another stands before it.
@@ -82,21 +80,21 @@ SUFFIXES = {".c", ".h", ".cpp", ".v", ".vh", ".py"}
 PYTHON_PACKAGES = {"crunchbot": "host/python", "signals": "sim/signals"}
 
 
-def room_of(path: Path) -> str | None:
+def room_of(path: Path, root: Path) -> str | None:
     """The folder of the table a file belongs to; tests and benches stand outside, for they may use everything, and so does
     what takes the place of the C library's headers."""
-    relative = path.relative_to(ROOT).as_posix()
+    relative = path.relative_to(root).as_posix()
     if any(part in relative for part in ("/tests/", "/fuzz/", "/test_", "/libc/")):
         return None
     return next((room for room in ALLOWED if relative.startswith(room + "/")), None)
 
 
-def owners(files: list[Path]) -> dict[str, set[str]]:
+def owners(files: list[Path], root: Path) -> dict[str, set[str]]:
     """Header name (and path tails of it) -> the rooms that hold such a file."""
     found: dict[str, set[str]] = {}
     for path in files:
-        room = room_of(path)
-        parts = path.relative_to(ROOT).parts
+        room = room_of(path, root)
+        parts = path.relative_to(root).parts
         for n in range(1, len(parts) + 1):
             found.setdefault("/".join(parts[-n:]), set()).add(room or "")
     return found
@@ -127,40 +125,34 @@ def imported(path: Path, package: Path) -> set[str]:
     return found
 
 
-def room_violations() -> list[str]:
+def room_violations(root: Path = ROOT) -> list[str]:
     """Arrows between rooms of the Python package that its table does not allow."""
-    package = ROOT / PACKAGE
+    package = root / PACKAGE
     bad = []
     for path in sorted(package.rglob("*.py")):
         room = (path.relative_to(package).parts[:-1] or ("",))[0]
         used = {name for name in imported(path, package) - {room} if (package / name).is_dir()}
         for name in sorted(used - set(ROOMS.get(room, []))):
             bad.append(
-                f"{path.relative_to(ROOT)}: {room or 'the root'} must not use {name}; move the code or turn the arrow round"
+                f"{path.relative_to(root)}: {room or 'the root'} must not use {name}; move the code or turn the arrow round"
             )
     return bad
 
 
-def violations() -> list[str]:
-    files = [p for room in ALLOWED for p in (ROOT / room).rglob("*") if p.suffix in SUFFIXES]
-    owner_of = owners(files)
+def violations(root: Path = ROOT) -> list[str]:
+    files = [p for room in ALLOWED for p in (root / room).rglob("*") if p.suffix in SUFFIXES]
+    owner_of = owners(files, root)
     bad = []
     for path in files:
-        room = room_of(path)
+        room = room_of(path, root)
         if room is None:
             continue
         for used in sorted(uses(path, owner_of, room)):
             if any(used == known or used.startswith(known + "/") for known in (room, *ALLOWED[room])):
                 continue
-            bad.append(f"{path.relative_to(ROOT)}: {room} must not use {used}; move the code or turn the arrow round")
+            bad.append(f"{path.relative_to(root)}: {room} must not use {used}; move the code or turn the arrow round")
     return bad
 
 
-def main() -> int:
-    bad = violations() + room_violations()
-    print("\n".join(bad), end="\n" if bad else "", file=sys.stderr)
-    return 1 if bad else 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+def complaints(root: Path = ROOT) -> list[str]:
+    return violations(root) + room_violations(root)

@@ -1,0 +1,139 @@
+"""The guards of `make lint` hold for this tree, and each sees what it is for."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT / "tools"))
+from lint import arrows, circles, folders, functions, pages, words  # noqa: E402
+
+GUARDS = (arrows, functions)
+
+
+def repository(place, files: dict[str, str]):
+    """A repository of its own with these tracked files."""
+    subprocess.run(["git", "init", "-q", place], check=True)
+    for name, text in files.items():
+        path = place / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    subprocess.run(["git", "-C", place, "add", "-A"], check=True)
+    return place
+
+
+@pytest.mark.parametrize("guard", GUARDS, ids=lambda guard: guard.__name__)
+def test_the_tree_passes(guard):
+    assert guard.complaints() == []
+
+
+def test_rooms_of_the_package_make_no_circle():
+    listed = list(arrows.ROOMS)
+    package = ROOT / arrows.PACKAGE
+    assert {path.parent.name for path in package.glob("*/__init__.py")} == set(listed) - {""}
+    for room, used in arrows.ROOMS.items():
+        assert set(used) <= set(listed[: listed.index(room)]), room
+
+
+def test_a_forbidden_arrow_is_found(tmp_path):
+    files = {"host/nav/a.c": '#include "whisker/ring.h"\n', "host/libwhisker/include/whisker/ring.h": ""}
+    assert arrows.complaints(repository(tmp_path, files)) == [
+        "host/nav/a.c: host/nav must not use host/libwhisker; move the code or turn the arrow round"
+    ]
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "from ..pilot.base import Base",
+        "from .. import pilot",
+        "from crunchbot.pilot import base",
+        "import crunchbot.pilot.base",
+    ],
+)
+def test_a_room_that_reaches_back_is_found(tmp_path, line):
+    files = {
+        "touch/radial/model.py": line.replace("..", "...") + "\n",
+        "touch/floor.py": line + "\n",
+        "pilot/base.py": "\n",
+    }
+    repository(tmp_path, {f"{arrows.PACKAGE}/{name}": text for name, text in files.items()})
+    assert arrows.complaints(tmp_path) == [
+        f"{arrows.PACKAGE}/{name}: touch must not use pilot; move the code or turn the arrow round"
+        for name in ("touch/floor.py", "touch/radial/model.py")
+    ]
+
+
+def test_circles_of_includes_and_imports_are_found(tmp_path):
+    files = {
+        "host/a.h": "",
+        "host/a.c": '#include "a.h"\n#include "b.h"\n',
+        "host/b.h": '#include "a.h"\n',
+        "host/b.c": '#include "b.h"\n',
+        "host/python/crunchbot/__init__.py": "",
+        "host/python/crunchbot/one.py": "from . import two\n",
+        "host/python/crunchbot/two.py": "def late():\n    from .one import x\n",
+        "host/python/crunchbot/three.py": "from .one import x\n",
+    }
+    assert circles.complaints(repository(tmp_path, files)) == [
+        "circle: host/a <-> host/b; move what both need to a third file",
+        "circle: crunchbot.one <-> crunchbot.two; move what both need to a third file",
+    ]
+
+
+def test_an_internal_header_is_part_of_its_module(tmp_path):
+    files = {"a/spi.h": "", "a/spi.c": '#include "spi_state.h"\n', "a/spi_state.h": '#include "spi.h"\n'}
+    assert circles.complaints(repository(tmp_path, files)) == []
+
+
+def test_a_crowded_folder_is_found(tmp_path):
+    place = repository(tmp_path, {f"room/{n}.c": "" for n in range(folders.MOST + 1)})
+    assert [line.split(":")[0] for line in folders.complaints(place)] == ["room"]
+    (place / "room/0.c").unlink()
+    assert folders.complaints(place) == []
+
+
+def test_a_function_without_its_module_is_found(tmp_path):
+    text = """
+static int take(int x)
+{
+    return x;
+}
+
+struct ring *ring_take(void)
+{
+    if (take(1)) {
+    }
+}
+"""
+    place = repository(tmp_path, {"host/ring.c": text, "host/tests/test_ring.c": text})
+    assert functions.complaints(place) == ["host/ring.c:2: take() does not carry its module's name; write: ring_take"]
+
+
+def test_long_lines_are_found_outside_tables_and_code(tmp_path):
+    long = "word " * 30
+    text = f"{long}\n\n| {long} |\n\n```\n{long}\n```\n"
+    assert pages.complaints(repository(tmp_path, {"page.md": text})) == [
+        "page.md:1: 150 characters, 120 at most; break the line"
+    ]
+
+
+def test_words_not_used_here_are_found(tmp_path):
+    files = {
+        "a.c": "/* Told apart. */\nint told_apart;\n",
+        "host/create/bumper.c": "/* A bump. */\n",
+        "b.md": "A bump.\n",
+    }
+    assert words.complaints(repository(tmp_path, files)) == [
+        "a.c:1: the word 'Told' is not used here; write: given, reported, published",
+        "b.md:1: 'bump' is only for the Create's bumper; write: component, contact",
+    ]
+
+
+def test_each_complaint_is_a_line_and_the_exit_code_tells_it():
+    done = subprocess.run(
+        [sys.executable, "-m", "lint", "nonsense"], cwd=ROOT / "tools", capture_output=True, text=True, timeout=60
+    )
+    assert done.returncode == 2 and done.stderr.count("\n") == 1
