@@ -68,11 +68,11 @@ format: setup ## format C, C++ and Python
 	@clang-format -i $(SOURCES_C)
 	@.venv/bin/ruff format --quiet .
 
-lint: setup ## formats, Python lint, folder arrows
+lint: setup ## formats, Python lint, and the guards of tools/lint: arrows, circles, folders, names, words, pages
 	@clang-format --dry-run --Werror $(SOURCES_C)
 	@.venv/bin/ruff format --quiet --check . || { echo "lint: Python is not formatted; run 'make format'" >&2; exit 1; }
 	@.venv/bin/ruff check --quiet .
-	@$(PYTHON) tools/check_arrows.py
+	@cd tools && ../$(PYTHON) -m lint arrows functions
 
 clean: ## remove what was built (not .venv)
 	@rm -rf build host/python/crunchbot/_native* sim/signals/_sim*
