@@ -62,7 +62,41 @@ def test_a_part_of_the_robot_measured_alone_leaves_the_others_as_published(monke
 
     monkeypatch.setattr(bench, "CACHE", tmp_path)
     before = bench.gather()
-    assert page.page(before) == (ROOT / "docs/results_robot.md").read_text()
+    assert page.page(before) == (ROOT / "docs/results/robot.md").read_text()
     (tmp_path / "instructions.json").write_text(json.dumps(before["latency"]))
     after = bench.gather()
     assert after.pop("instructions") == before["latency"] and after.items() <= before.items()
+
+
+def test_every_result_and_chart_has_its_command_and_every_result_its_origin():
+    sys.path.insert(0, str(ROOT / "tools"))
+    from benches import store
+
+    stored = {path.stem for path in store.RESULTS.glob("*.json")} - {Path(store.ORIGINS).stem}
+    assert stored <= store.COMMAND_OF_RESULT.keys()
+    assert stored == json.loads((store.RESULTS / store.ORIGINS).read_text()).keys()
+    assert {path.name for path in store.CHARTS.iterdir()} == {f"{name}.svg" for name in store.COMMAND_OF_CHART}
+    for command in store.MAKES:
+        if topic := re.match(r"tools/benches (\w+)", command):
+            assert topic[1] in TOPICS
+
+
+def test_every_chart_stands_in_a_page_and_has_something_in_it():
+    pages = [path.read_text() for path in [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]]
+    for chart in (ROOT / "docs/charts").iterdir():
+        assert chart.read_text().rstrip().endswith("</svg>"), chart.name
+        assert any(f"charts/{chart.name})" in page for page in pages), f"{chart.name}: no page shows it; delete it"
+
+
+def test_a_result_is_stored_with_commit_and_machine(monkeypatch, tmp_path):
+    monkeypatch.syspath_prepend(str(ROOT / "tools"))
+    from benches import store
+
+    monkeypatch.setattr(store, "commit", lambda: "0123456789ab")
+    monkeypatch.setattr(store, "machine", lambda: "a processor, 2 processors")
+    store.write_result("one", {"figure": 1}, tmp_path)
+    store.write_result("another", [2], tmp_path)
+    origins = json.loads((tmp_path / store.ORIGINS).read_text())
+    assert list(origins) == ["another", "one"]
+    assert origins["one"] == {"commit": "0123456789ab", "machine": "a processor, 2 processors"}
+    assert json.loads((tmp_path / "one.json").read_text()) == {"figure": 1}

@@ -1,4 +1,4 @@
-"""docs/results_nav.md: every table and chart is told, misses are told as such, figures come from the data."""
+"""docs/results/nav.md: every table and chart is told, misses are told as such, figures come from the data."""
 
 import json
 import re

@@ -1,6 +1,6 @@
 """Measures speed and accuracy, always as ratios in one run, and redraws every chart.
 
-    make bench                                        all topics: bench/results/*.json, docs/charts/*.svg and .png
+    make bench                                        all topics: bench/results/*.json, docs/charts/*.svg
     .venv/bin/python tools/benches --only ring nav    some topics, one after the other
     .venv/bin/python tools/benches nav --quick        one topic, with options of its own; `nav --help` tells them
 

@@ -15,10 +15,11 @@ from pathlib import Path
 from matplotlib.figure import Figure
 from tqdm import tqdm
 
+from .. import store
 from .chain import LANES, LINKS
 
 ROOT = Path(__file__).resolve().parents[3]
-RESULTS, CHARTS, CACHE = ROOT / "bench/results", ROOT / "docs/charts", ROOT / "build/bench/bridge"
+CACHE = ROOT / "build/bench/bridge"
 sys.path[:0] = [str(ROOT / "fpga" / folder) for folder in ("boards", "tb")]
 
 import build as boards  # noqa: E402
@@ -131,7 +132,7 @@ def rates(build: Path) -> dict:
 
 def simulation() -> dict:
     """The Verilated bridge with nodes and host over lanes, as bench_chain has measured it last."""
-    return json.loads((RESULTS / "chain_speed.json").read_text())["bridge"]
+    return store.read_result("chain_speed")["bridge"]
 
 
 def measured(board: dict) -> list[dict]:
@@ -216,7 +217,7 @@ def section(found: dict) -> str:
                 break_on_hyphens=False,
             ),
             table(PLACED, lines),
-            "![Resources and clock over lanes](charts/bridge_lanes.png)",
+            "![Resources and clock over lanes](charts/bridge_lanes.svg)",
             f"Simulation (`tools/benches chain`) at {next(iter(LINKS))}:",
             table(SWEEP, sweep_rows(found)),
         )
@@ -229,12 +230,6 @@ def write_section(found: dict) -> None:
     before, rest = path.read_text().split(BEGIN)
     after = rest.split(END)[1]
     path.write_text(f"{before}{BEGIN}\n\n{section(found)}\n\n{END}{after}")
-
-
-def save(figure: Figure, name: str) -> None:
-    CHARTS.mkdir(parents=True, exist_ok=True)
-    figure.savefig(CHARTS / f"bridge_{name}.svg", metadata={"Date": None})
-    figure.savefig(CHARTS / f"bridge_{name}.png", dpi=120)
 
 
 def options(parser) -> None:
@@ -253,6 +248,6 @@ def run(build: Path, fresh: bool, placements: int = 10**6) -> None:
     found = fabric(placements)
     found |= {"latency": {title: latency(link) for title, link in LINKS.items()}, "rates": rates(build)}
     found["simulation"] = simulation()
-    (RESULTS / "bridge.json").write_text(json.dumps(found, indent=1) + "\n")
-    save(draw_lanes(found), "lanes")
+    store.write_result("bridge", found)
+    store.write_chart("bridge_lanes", draw_lanes(found))
     write_section(found)

@@ -27,8 +27,10 @@ from crunchbot.report.run import Run
 from crunchbot.robot.models import load_models
 from crunchbot.simulation.scenes import make_scene
 
+from .. import store
+
 ROOT = Path(__file__).resolve().parents[3]
-RESULTS, CHARTS, CACHE = ROOT / "bench/results", ROOT / "docs/charts", ROOT / "build/bench/chain"
+CACHE = ROOT / "build/bench/chain"
 ROW_S = 0.1
 BENCH_SECONDS = 5
 CHAIN_SECONDS = 60
@@ -141,7 +143,7 @@ def localisation(seed: int) -> dict:
 
 
 def write_rows(path: Path, rows: list[dict], truth: list[dict]) -> None:
-    """An observations.csv of the contract, with the truth."""
+    """observations.csv (docs/formats.md), with the truth."""
     with open(path, "w", newline="") as file:
         writer = csv.writer(file)
         writer.writerow([*rows[0], *localise.TRUTH])
@@ -189,11 +191,8 @@ def draw_localisation(runs: dict) -> Figure:
 
 
 def save(name: str, data: dict, figure: Figure) -> None:
-    for folder in (RESULTS, CHARTS):
-        folder.mkdir(parents=True, exist_ok=True)
-    (RESULTS / f"{name}.json").write_text(json.dumps(data, indent=1) + "\n")
-    figure.savefig(CHARTS / f"{name}.svg", metadata={"Date": None})
-    figure.savefig(CHARTS / f"{name}.png", dpi=120)
+    store.write_result(name, data)
+    store.write_chart(name, figure)
     print(f"bench/results/{name}.json, docs/charts/{name}.svg")
 
 
@@ -201,9 +200,8 @@ def save_demo() -> None:
     """The report's figures of the six-lane run, for the documents."""
     run = Run.load(DEMO)
     for draw in (figures.arena, figures.errors, figures.texture, figures.radial):
-        (CHARTS / f"demo_{draw.__name__}.svg").write_text(figures.svg(draw, run))
-        figures.png(draw, run, CHARTS / f"demo_{draw.__name__}.png")
-    shutil.copy(DEMO / "summary.json", RESULTS / "demo.json")
+        store.write_chart(f"demo_{draw.__name__}", figures.svg(draw, run))
+    store.write_result("demo", json.loads((DEMO / "summary.json").read_text()))
 
 
 def run(build: Path, fresh: bool) -> None:

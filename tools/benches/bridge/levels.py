@@ -4,7 +4,6 @@ Both run with the internal host of `whisker-bridge-sim --bench`, which checks ev
 thread, less that of a short run (start-up), so other programs on the machine matter little; on a free core it is the wall's.
 """
 
-import json
 import resource
 import statistics
 import subprocess
@@ -13,10 +12,9 @@ from pathlib import Path
 from matplotlib.figure import Figure
 from tqdm import tqdm
 
+from .. import store
 from .chain import LINKS
 
-ROOT = Path(__file__).resolve().parents[3]
-RESULTS, CHARTS = ROOT / "bench/results", ROOT / "docs/charts"
 LANES = (1, 6, 28)
 FASTEST, HARDWARE = LINKS.values()
 # Level, link settings, simulated seconds. Without a clock the settings of the link cost nothing.
@@ -72,10 +70,6 @@ def draw(found: dict) -> Figure:
 def run(build: Path, fresh: bool) -> None:
     """Half a minute in all: nothing is kept between runs, so `fresh` changes nothing."""
     found = measure(build)
-    RESULTS.mkdir(parents=True, exist_ok=True)
-    CHARTS.mkdir(parents=True, exist_ok=True)
-    (RESULTS / "levels.json").write_text(json.dumps(found, indent=1) + "\n")
-    figure = draw(found)
-    figure.savefig(CHARTS / "levels_speed.svg", metadata={"Date": None})
-    figure.savefig(CHARTS / "levels_speed.png", dpi=120)
+    store.write_result("levels", found)
+    store.write_chart("levels_speed", draw(found))
     print("bench/results/levels.json, docs/charts/levels_speed.svg")

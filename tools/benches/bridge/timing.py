@@ -12,8 +12,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+from .. import store
+
 ROOT = Path(__file__).resolve().parents[3]
-RESULT, PAGE = ROOT / "bench/results/bridge_timing.json", ROOT / "docs/timing.md"
+PAGE = ROOT / "docs/timing.md"
 BEGIN, END = "<!-- tools/benches timing writes from here -->", "<!-- to here -->"
 TICKS = 200
 LIMIT_US, HOST_FRAMES, PRIORITY = 600, 20000, "50"
@@ -144,7 +146,7 @@ def run(build: Path, fresh: bool) -> None:
     )
     found = {"latency": json.loads(told.stdout), "skew": pair(build.resolve() / "pair.json"), "clock": clock(build)}
     found["host"] = host(build, found["latency"])
-    RESULT.write_text(json.dumps(found, indent=1) + "\n")
+    store.write_result("bridge_timing", found)
     before, rest = PAGE.read_text().split(BEGIN)
     PAGE.write_text(f"{before}{BEGIN}\n\n{table(found)}\n\n{END}{rest.split(END)[1]}")
     print("bench/results/bridge_timing.json, docs/timing.md")

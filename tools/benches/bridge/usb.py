@@ -12,9 +12,9 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-ROOT = Path(__file__).resolve().parents[3]
-RESULT = ROOT / "bench/results/usb_soak.json"
-CHARTS = ROOT / "docs/charts"
+from .. import store
+
+NAME = "usb_soak"  # of the results and the chart
 TARGET = 10_000_000  # frames
 CHUNK = 25_000  # frames of one seed: some ten seconds
 DONE = {
@@ -39,19 +39,19 @@ def soak(program: Path, frames: int, seed: int) -> dict[str, int]:
 def run(build: Path, fresh: bool, frames: int = TARGET) -> None:
     """Soaks seed after seed until `frames` frames are in the results; SystemExit names what was not clean."""
     total = {"seeds": 0, "wall_s": 0.0}
-    if RESULT.exists() and not fresh:
-        total = json.loads(RESULT.read_text())
+    if (store.RESULTS / f"{NAME}.json").exists() and not fresh:
+        total = store.read_result(NAME)
     while total.get("frames", 0) < frames:
         began = time.monotonic()
         found = soak(build / "sim/bridge/usb_device/usb-soak", min(CHUNK, frames), total["seeds"] + 1)
         total["wall_s"] = round(total["wall_s"] + time.monotonic() - began, 1)
         total["seeds"] += 1
         total |= {name: total.get(name, 0) + count for name, count in found.items()}
-        RESULT.write_text(json.dumps(total, indent=1) + "\n")
+        store.write_result(NAME, total)
         print(f"{total['frames']} frames, {total['wire_faults']} wire faults, {total['noise']} packets of noise")
         if bad := {name: found[name] for name in BAD if found[name]}:
             raise SystemExit(f"seed {total['seeds']} is not clean: {bad}")
-    chart(total)
+    store.write_chart(NAME, draw(total))
 
 
 def draw(total: dict) -> Figure:
@@ -70,13 +70,6 @@ def draw(total: dict) -> Figure:
     bad = ", ".join(f"{name} {total[name]}" for name in BAD)
     axes.set_title(f"USB device at packet level, {total['seeds']} seeds\n{bad}", fontsize=10, loc="left")
     return figure
-
-
-def chart(total: dict) -> None:
-    """Writes docs/charts/usb_soak."""
-    figure = draw(total)
-    figure.savefig(CHARTS / "usb_soak.svg", metadata={"Date": None})
-    figure.savefig(CHARTS / "usb_soak.png", dpi=120)
 
 
 def options(parser: argparse.ArgumentParser) -> None:

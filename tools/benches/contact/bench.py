@@ -1,22 +1,21 @@
 """The contact filter in simulated contacts of known truth: place, normal, contour, speed, honesty, cost.
 
-Writes bench/results/contact.json, docs/contact_results.md and docs/charts/contact_errors.
+Writes bench/results/contact.json, docs/results/contact.md and docs/charts/contact_errors.
 """
 
 import argparse
-import json
 from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
 from tqdm import tqdm
 
+from .. import store
 from .measure import CASES, FIRST_S, WHISKED, contacts, decided, follow, true_motion
 from .page import page
 from .scenes import TICK_S
 
 ROOT = Path(__file__).resolve().parents[3]
-RESULTS, CHARTS = ROOT / "bench/results", ROOT / "docs/charts"
 CONTACTS = 20
 SLICES_S = np.arange(0.02, 0.36, 0.02)
 
@@ -119,13 +118,9 @@ def run(build: Path, fresh: bool, each: int = CONTACTS) -> None:
                 results["course"][kind] = course(found)
     for kind in WHISKED:
         results["whisked"][kind] = verdicts(kind, list(tqdm(decided(kind, each), desc=f"whisked: {kind}", total=each)))
-    for folder in (RESULTS, CHARTS):
-        folder.mkdir(parents=True, exist_ok=True)
-    (RESULTS / "contact.json").write_text(json.dumps(rounded(results), indent=1) + "\n")
-    (ROOT / "docs/contact_results.md").write_text(page(results))
-    figure = draw(results)
-    figure.savefig(CHARTS / "contact_errors.svg", metadata={"Date": None})
-    figure.savefig(CHARTS / "contact_errors.png", dpi=120)
+    store.write_result("contact", rounded(results))
+    (ROOT / "docs/results/contact.md").write_text(page(results))
+    store.write_chart("contact_errors", draw(results))
 
 
 def rounded(value):

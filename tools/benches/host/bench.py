@@ -1,6 +1,6 @@
 """Measures the host's device side: cable to samples, whiskerd's instructions and memory, the clock mapping.
 
-    .venv/bin/python tools/benches host        bench/results/host.json, docs/charts/host_*.svg and .png
+    .venv/bin/python tools/benches host        bench/results/host.json, docs/charts/host_*.svg
 
 - Times: a simulated bridge (RTL, umockdev with its udev events, real libusb and hidapi) is plugged in, pulled and put
   back; watched from a reader of the ring. They hold the simulation's own work: its enumeration, and frames at its speed.
@@ -35,8 +35,10 @@ from crunchbot.protocol import LANES, LIMITS
 from crunchbot.report import figures
 from crunchbot.simulation.scenes import make_scene
 
+from .. import store
+
 ROOT = Path(__file__).resolve().parents[3]
-RESULTS, CHARTS, CACHE = ROOT / "bench/results", ROOT / "docs/charts", ROOT / "build/bench/host"
+CACHE = ROOT / "build/bench/host"
 HZ = LIMITS["clock_hz"] // LIMITS["tick_period"]
 ATOM_HZ = 0.8e9  # instructions per second of the paper's netbook
 LINK = ("--sck-divider", "6", "--word-gap", "30", "--sample-point", "5")
@@ -246,26 +248,6 @@ def draw_cable(times: dict) -> Figure:
     return figure
 
 
-def draw_instructions(counts: dict) -> Figure:
-    figure = Figure(figsize=(6.4, 3.2), layout="constrained")
-    axes = figure.subplots()
-    base = np.zeros(len(BATCHES))
-    names = {name for count in counts.values() for name in count}
-    names = sorted(names, key=lambda name: -counts[str(BATCHES[0])].get(name, 0))
-    for name, shade, hatch in zip(names, ("0.35", "0.65", "0.85", "1.0"), ("", "//", "..", "xx"), strict=False):
-        values = np.array([counts[str(batch)].get(name, 0) for batch in BATCHES])
-        axes.bar(range(len(BATCHES)), values, 0.6, base, label=name, color=shade, hatch=hatch, edgecolor="0.2")
-        base += values
-    for x, total in enumerate(base):
-        share = f"{total:.0f}\n{100 * total * HZ / ATOM_HZ:.2f} % of the Atom"
-        axes.annotate(share, (x, total), textcoords="offset points", xytext=(0, 3), ha="center", fontsize=8)
-    axes.set(xticks=range(len(BATCHES)), xticklabels=[f"{b}\n({b / HZ * 1e3:g} ms)" for b in BATCHES])
-    axes.set(xlabel="frames of one USB transfer (how long the first of them waits)", ylabel="instructions per frame")
-    axes.margins(y=0.3)
-    axes.legend(fontsize=8)
-    return figure
-
-
 def draw_clock(rows: dict) -> Figure:
     figure = Figure(figsize=(6.4, 3.4), layout="constrained")
     axes = figure.subplots()
@@ -278,11 +260,6 @@ def draw_clock(rows: dict) -> Figure:
     axes.set(yscale="log", xlabel="time (minutes)", ylabel="time (us)", xlim=(0, 60))
     axes.legend(loc="upper center", ncols=3, fontsize=8, bbox_to_anchor=(0.5, 1.15))
     return figure
-
-
-def save(name: str, draw: Callable[..., Figure], data: dict) -> None:
-    (CHARTS / f"{name}.svg").write_text(figures.svg(draw, data))
-    figures.png(draw, data, CHARTS / f"{name}.png")
 
 
 # ---------------------------------------------------------------------------------------------------------------------
@@ -298,7 +275,7 @@ def run(build: Path, fresh: bool) -> None:
         "times_s": {event: {"median": float(np.median(t)), "max": max(t), "n": len(t)} for event, t in times.items()},
         "memory": once("memory", lambda: memory(build)),
     }
-    save("host_cable", draw_cable, times)
+    store.write_chart("host_cable", figures.svg(draw_cable, times))
     if shutil.which("valgrind"):
         batches = tqdm(BATCHES, desc="instructions", unit="batch")
         counts = {str(b): once(f"instructions_{b}", lambda b=b: instructions(build, b)) for b in batches}
@@ -307,12 +284,10 @@ def run(build: Path, fresh: bool) -> None:
             batch: {**count, "total": sum(count.values()), "atom_share": sum(count.values()) * HZ / ATOM_HZ}
             for batch, count in counts.items()
         }
-        save("host_instructions", draw_instructions, counts)
     else:
         results["instructions_per_frame"] = "skipped: valgrind is not on this machine"
     clocks = {str(seed): once(f"clock_{seed}", lambda s=seed: clock(build, s)) for seed in CLOCK_SEEDS}
     results["clock"] = {seed: {k: v for k, v in c.items() if k != "rows"} for seed, c in clocks.items()}
-    save("host_clock", draw_clock, clocks[str(CLOCK_SEEDS[0])]["rows"])
-    RESULTS.mkdir(parents=True, exist_ok=True)
-    (RESULTS / "host.json").write_text(json.dumps(results, indent=1) + "\n")
-    print("bench/results/host.json, docs/charts/host_{cable,instructions,clock}.svg")
+    store.write_chart("host_clock", figures.svg(draw_clock, clocks[str(CLOCK_SEEDS[0])]["rows"]))
+    store.write_result("host", results)
+    print("bench/results/host.json, docs/charts/host_{cable,clock}.svg")

@@ -7,7 +7,6 @@ messages in chunks that were not hit, and how many of them a reader gives; and f
 different without an error or a line of damage.
 """
 
-import json
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
@@ -23,11 +22,12 @@ from tqdm import tqdm
 
 from crunchbot.recording.mcapfile import McapFile
 
+from .. import store
+
 ROOT = Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host/python/tests" / room) for room in ("kit", "recording")]
 import fuzz_damage  # noqa: E402
 
-RESULTS = ROOT / "bench/results"
 FILES, SEED = 600, 1
 
 
@@ -111,8 +111,7 @@ def measure() -> dict:
 def run(build: Path, fresh: bool) -> None:
     """Measure and write. `build` is not used, and nothing is kept from run to run."""
     rows = measure()
-    RESULTS.mkdir(parents=True, exist_ok=True)
-    (RESULTS / "damage.json").write_text(json.dumps({"seed": SEED, "files": FILES, "readers": rows}, indent=1) + "\n")
+    store.write_result("damage", {"seed": SEED, "files": FILES, "readers": rows})
     for name in READERS:
         parts = [row for key, row in rows.items() if key.startswith(f"{name}: ")]
         intact, read, unsaid = (sum(row[column] for row in parts) for column in ("intact", "read", "unsaid"))

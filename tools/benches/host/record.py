@@ -1,6 +1,6 @@
 """Records 28 lanes for an hour, accelerated: bytes per sample, frames lost, time; and counts instructions per frame.
 
-    .venv/bin/python tools/benches record        bench/results/record.json, docs/charts/record_cost.svg and .png
+    .venv/bin/python tools/benches record        bench/results/record.json, docs/charts/record_cost.svg
 
 The frames are those of simulated robots that drive (level 1: world, whiskers, sensors), five of them to fill 28 lanes,
 two minutes long and repeated: a chunk of a recording holds two seconds and is packed on its own, so that repeating saves
@@ -31,8 +31,9 @@ from crunchbot.report import figures
 from crunchbot.simulation.scenes import make_scene
 from crunchbot.simulation.world import World
 
+from .. import store
+
 ROOT = Path(__file__).resolve().parents[3]
-RESULTS, CHARTS = ROOT / "bench/results", ROOT / "docs/charts"
 HZ = LIMITS["clock_hz"] // LIMITS["tick_period"]
 HOUR_S = 3600
 PERIOD_S = 120  # of the frames that are repeated
@@ -191,8 +192,6 @@ def run(build: Path, fresh: bool) -> None:
     }
     file.unlink(missing_ok=True)
     results["atom_share"] = results["instructions_per_frame"] * HZ / ATOM_HZ
-    RESULTS.mkdir(parents=True, exist_ok=True)
-    (RESULTS / "record.json").write_text(json.dumps(results, indent=1) + "\n")
-    (CHARTS / "record_cost.svg").write_text(figures.svg(draw, results))
-    figures.png(draw, results, CHARTS / "record_cost.png")
+    store.write_result("record", results)
+    store.write_chart("record_cost", figures.svg(draw, results))
     print("bench/results/record.json, docs/charts/record_cost.svg")

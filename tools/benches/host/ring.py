@@ -20,11 +20,11 @@ import matplotlib
 import numpy as np
 from tqdm import tqdm
 
+from .. import store
 from .ring_charts import draw_latency, draw_throughput, draw_writer
-from .ring_peers import CACHE, PEERS, ROOT, SOURCES, programs
+from .ring_peers import CACHE, PEERS, SOURCES, programs
 from .ring_run import READERS, Run, quantile
 
-RESULTS, CHARTS = ROOT / "bench/results", ROOT / "docs/charts"
 ROUNDS = 3  # each setting again, in turn with the others, so that a busy minute of the machine hits all alike
 SECONDS = {"2khz": 3.0, "flat": 2.0, "free": 2.0}
 QUANTILES = {"p50": 50, "p90": 90, "p99": 99, "p99.9": 99.9}
@@ -86,8 +86,6 @@ def summary(peer: str, mode: str, pace: str, readers: int, runs: list[dict]) -> 
 
 
 def save(rows: list[dict], left_out: list[str]) -> None:
-    for folder in (RESULTS, CHARTS):
-        folder.mkdir(parents=True, exist_ok=True)
     versions = [line.strip() for line in (SOURCES / "Cargo.toml").read_text().splitlines() if "version = " in line]
     data = {
         "cores": len(os.sched_getaffinity(0)),
@@ -98,11 +96,9 @@ def save(rows: list[dict], left_out: list[str]) -> None:
         "left_out": left_out,
         "rows": rows,
     }
-    (RESULTS / "ring.json").write_text(json.dumps(data, indent=1) + "\n")
+    store.write_result("ring", data)
     for name, draw in (("latency", draw_latency), ("throughput", draw_throughput), ("writer", draw_writer)):
-        figure = draw(rows)
-        figure.savefig(CHARTS / f"ring_{name}.svg", metadata={"Date": None})
-        figure.savefig(CHARTS / f"ring_{name}.png", dpi=120)
+        store.write_chart(f"ring_{name}", draw(rows))
     print("bench/results/ring.json, docs/charts/ring_latency.svg, ring_throughput.svg, ring_writer.svg")
 
 

@@ -1,7 +1,7 @@
 """What whisker-view costs: CPU share and bytes per second, with no page, one, four and sixteen; of 28 lanes at 2 kHz, and of
 a robot whose belief has as many poses as a message may.
 
-    .venv/bin/python tools/benches view        bench/results/view.json, docs/charts/view_cost.svg and .png
+    .venv/bin/python tools/benches view        bench/results/view.json, docs/charts/view_cost.svg
 
 Three processes: a writer at the pace of the hardware (or of the robot's streams, over zenoh), whisker-view, and pages without a screen that take what comes as
 the real page does. CPU time is the server process's own, user and system, over each run; a run that is done is kept in
@@ -43,9 +43,10 @@ from crunchbot.robot.messages import (
     ProcessHealth,
 )
 
+from .. import store
+
 ROOT = Path(__file__).resolve().parents[3]
 PARTS = ("traces", "robot")  # of the page
-RESULTS, CHARTS = ROOT / "bench/results", ROOT / "docs/charts"
 HZ = LIMITS["clock_hz"] // LIMITS["tick_period"]
 PAGES = (0, 1, 4, 16)
 SETTLE_S, RUN_S = 3.0, 15.0
@@ -231,10 +232,7 @@ def run(build: Path, fresh: bool) -> None:
         if not path.exists():
             path.write_text(json.dumps(measure(part, pages)))
     runs = {part: [json.loads(paths[part, pages].read_text()) for pages in PAGES] for part in PARTS}
-    for folder in (RESULTS, CHARTS):
-        folder.mkdir(parents=True, exist_ok=True)
-    told = {"lanes": LANES, "hz": HZ, "runs": runs["traces"], "robot": {"poses": BUMPS_MOST, "runs": runs["robot"]}}
-    (RESULTS / "view.json").write_text(json.dumps(told, indent=1) + "\n")
-    (CHARTS / "view_cost.svg").write_text(figures.svg(draw, runs))
-    figures.png(draw, runs, CHARTS / "view_cost.png")
+    found = {"lanes": LANES, "hz": HZ, "runs": runs["traces"], "robot": {"poses": BUMPS_MOST, "runs": runs["robot"]}}
+    store.write_result("view", found)
+    store.write_chart("view_cost", figures.svg(draw, runs))
     print("bench/results/view.json, docs/charts/view_cost.svg")

@@ -13,13 +13,13 @@ from pathlib import Path
 import matplotlib
 from tqdm import tqdm
 
+from .. import store
 from .charts import draw_moment, draw_speed
 from .edges import HEIGHTS_MM, SPEEDS, draw_edges, edge_summary, measure_edges, write_page
 from .edges import write_table as write_edge_table
 from .measure import (
     CACHE,
     LINKS,
-    ROOT,
     ROUNDS,
     Ours,
     chain,
@@ -34,26 +34,18 @@ from .measure import (
 )
 from .summary import summary, write_table
 
-RESULTS, CHARTS = ROOT / "bench/results", ROOT / "docs/charts"
-
 
 def save(data: dict) -> None:
-    for folder in (RESULTS, CHARTS):
-        folder.mkdir(parents=True, exist_ok=True)
-    (RESULTS / "mechanics.json").write_text(json.dumps(data, indent=1) + "\n")
+    store.write_result("mechanics", data)
     for name, draw in (("speed", draw_speed), ("moment", draw_moment)):
-        figure = draw(data)
-        figure.savefig(CHARTS / f"mechanics_{name}.svg", metadata={"Date": None})
-        figure.savefig(CHARTS / f"mechanics_{name}.png", dpi=120)
+        store.write_chart(f"mechanics_{name}", draw(data))
     print("bench/results/mechanics.json, docs/charts/mechanics_speed.svg, mechanics_moment.svg")
 
 
 def save_edges(rows: list[dict], version: str) -> None:
     """Result, page, chart and C table of the edges."""
-    (RESULTS / "mechanics_edges.json").write_text(
-        json.dumps({"summary": edge_summary(rows), "rows": rows}, indent=1) + "\n"
-    )
-    draw_edges(rows).savefig(CHARTS / "mechanics_edges.png", dpi=120)
+    store.write_result("mechanics_edges", {"summary": edge_summary(rows), "rows": rows, "mujoco": version})
+    store.write_chart("mechanics_edges", draw_edges(rows))
     write_page(rows, version)
     write_edge_table(rows)
 

@@ -17,7 +17,7 @@ CHAINS = (20, 40)
 LEAD_IN, BEFORE, AFTER, RAMP_S, TICK_S = 60e-3, 5e-3, 25e-3, 0.02, 500e-6
 LEVELS = {"static": 0, "modes": 3}
 HELD_FACTOR, HELD_S, PEAK_SHARE = 1.5, 10e-3, 0.25  # what counts as agreement: the two of a time are alternatives
-PAGE = ROOT / "docs/mechanics_edges.md"
+PAGE = ROOT / "docs/results/mechanics_edges.md"
 TABLE = ROOT / "sim/mechanics/tests/reference_edges.h"
 
 
@@ -141,5 +141,5 @@ def write_page(rows: list[dict], version: str) -> None:
         )
         verdicts = " | ".join("agrees" if row[f"{name}_agrees"] else "differs" for name in LEVELS)
         lines.append(f"| {row['height_mm']:g} | {row['speed']:g} | {pairs} | {verdicts} |")
-    lines += ["", "![Time at the edge and largest moment](charts/mechanics_edges.png)"]
+    lines += ["", "![Time at the edge and largest moment](../charts/mechanics_edges.svg)"]
     PAGE.write_text("\n".join(lines) + "\n")

@@ -1,6 +1,6 @@
 """Measures the filters: speed against accuracy, locks, budgets, honesty, the stability matrix, a soak of 10^6 rows.
 
-    tools/benches nav                  everything: bench/results/nav_*.json, docs/charts/nav_*.svg, docs/results_nav.md
+    tools/benches nav                  everything: bench/results/nav_*.json, docs/charts/nav_*.svg, docs/results/nav.md
     tools/benches nav --quick          few seeds, into build/bench/nav-quick: does it run?
     tools/benches nav --only matrix    one part: pareto, cost, tracking, locks, budgets, balance, variation, matrix, soak,
                                         passes
@@ -25,6 +25,7 @@ from crunchbot.nav import localise
 from crunchbot.scenes import trials
 from crunchbot.scenes.sweep import BACKENDS, sweep
 
+from .. import store
 from . import charts, figures, page, work
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -135,12 +136,9 @@ class Bench:
         return {place: [t for name in names for t in done[name]["trials"]] for place, names in places.items()}
 
     def save(self, name: str, data: dict, *figures) -> None:
-        for folder in (self.results, self.charts):
-            folder.mkdir(parents=True, exist_ok=True)
-        (self.results / f"nav_{name}.json").write_text(json.dumps(data, indent=1) + "\n")
+        store.write_result(f"nav_{name}", data, self.results)
         for title, figure in figures:
-            figure.savefig(self.charts / f"nav_{title}.svg", metadata={"Date": None})
-            figure.savefig(self.charts / f"nav_{title}.png", dpi=120)
+            store.write_chart(f"nav_{title}", figure, self.charts)
 
     def sizes(self) -> list[tuple[str, str, dict, int]]:
         """SIZES of the filters that exist, with the seeds of this scale."""
@@ -313,13 +311,13 @@ def measure(bench: Bench, parts: list[str]) -> None:
 
 def full(workers=None, backend: str = "processes", build: Path = BUILD, seeds: int = 100) -> Bench:
     cache = ROOT / "build/bench/nav"
-    places = (cache, ROOT / "bench/results", ROOT / "docs/charts", ROOT / "docs/results_nav.md")
+    places = (cache, store.RESULTS, store.CHARTS, ROOT / "docs/results/nav.md")
     return Bench(scale(seeds), *places, workers, backend, build)
 
 
 def small(workers=None, backend: str = "processes", build: Path = BUILD) -> Bench:
     cache = ROOT / "build/bench/nav-quick"
-    return Bench(QUICK, cache, cache, cache, cache / "results_nav.md", workers, backend, build)
+    return Bench(QUICK, cache, cache, cache, cache / "nav.md", workers, backend, build)
 
 
 def run(

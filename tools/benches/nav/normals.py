@@ -28,8 +28,10 @@ from crunchbot.scene import Prior, Scene
 from crunchbot.scenes.geometry import directions
 from crunchbot.simulation.scenes import make_scene
 
+from .. import store
+
 ROOT = Path(__file__).resolve().parents[3]
-RESULT, PAGE = ROOT / "bench/results/nav_normals.json", ROOT / "docs/results_nav_normals.md"
+PAGE = ROOT / "docs/results/nav_normals.md"
 FAMILIES = ("anchor", "noisy", "one-texture+global", "one-whisker", "one-whisker+global", "robot", "robot+global")
 FILTERS = ("adaptive",)
 ROWS, FIRST_SEED = 1000, 72_000
@@ -190,7 +192,7 @@ def the_point(told: dict) -> list[str]:
 
 
 def page(data: dict) -> str:
-    """docs/results_nav_normals.md."""
+    """docs/results/nav_normals.md."""
     d = data["directions"]
     lines = [
         "# What the direction of a touched surface is worth",
@@ -199,7 +201,7 @@ def page(data: dict) -> str:
         f"without, seed by seed; means over the runs of each run's median error, and the difference with its standard error. {ROWS} rows of a scene;",
         "directions are good to 5 degrees and one in twenty is wrong. Rows to lock: medians over the runs that lock both ways.",
         "",
-        f"`{FLIGHT}`: {FLIGHT_TICKS // 2000} s of its signals, start unknown. Its pilot runs the [contact filter](contact.md) in body whisks. Its {d['n']}",
+        f"`{FLIGHT}`: {FLIGHT_TICKS // 2000} s of its signals, start unknown. Its pilot runs the [contact filter](../contact.md) in body whisks. Its {d['n']}",
         f"directions err by {d['median_deg']:.1f} degrees in the median and {d['rms_deg']:.1f} RMS, {d['beyond_15_deg']} by more than 15;",
         f"the stated 90 % holds {100 * d['held_90']:.0f} %.",
         "",
@@ -233,9 +235,9 @@ def run(build: Path, fresh: bool, seeds: int = 8, flights: int = 6) -> None:
     data = {"families": {family: judged(runs) for family, runs in found.items()}}
     data["directions"] = of_directions(found[FLIGHT])
     data["points"] = of_points(found[FLIGHT])
-    RESULT.write_text(dumps(data, indent=1) + "\n")
+    store.write_result("nav_normals", data)
     PAGE.write_text(page(data))
-    print("bench/results/nav_normals.json, docs/results_nav_normals.md")
+    print("bench/results/nav_normals.json, docs/results/nav_normals.md")
 
 
 def options(parser: argparse.ArgumentParser) -> None:

@@ -1,4 +1,4 @@
-"""docs/results_nav.md from the figures of the bench: what each table and chart shows, what was wanted, what was measured.
+"""docs/results/nav.md from the figures of the bench: what each table and chart shows, what was wanted, what was measured.
 
 Every number comes from the data, and what was wanted from wanted.py."""
 

@@ -1,4 +1,4 @@
-"""The sections of docs/results_nav.md on what filters cost: bounds, soak, speed against accuracy and size."""
+"""The sections of docs/results/nav.md on what filters cost: bounds, soak, speed against accuracy and size."""
 
 import numpy as np
 

@@ -25,10 +25,11 @@ from crunchbot.scene import Arena, Prior, Scene
 from crunchbot.scenes.making import make_recipe
 from crunchbot.scenes.readings import World
 
+from .. import store
 from . import paper_charts as charts
 
 ROOT = Path(__file__).resolve().parents[3]
-RESULTS, CHARTS, CACHE = ROOT / "bench/results", ROOT / "docs/charts", ROOT / "build/bench/nav_paper"
+CACHE = ROOT / "build/bench/nav_paper"
 CELLS, DIAMETER_M, SPAN_RAD = 11, 0.25, math.pi / 2  # the paper's fovea
 SPACING_M, SPACING_RAD = DIAMETER_M / (CELLS - 1), SPAN_RAD / (CELLS - 1)
 FIGURE_SEED = 9001
@@ -305,12 +306,9 @@ def run(_build: Path, fresh: bool) -> None:
         "nav_fig6c": lambda: charts.crossing(c, CROSS),
         "nav_banana": lambda: charts.banana(claim),
     }
-    CHARTS.mkdir(parents=True, exist_ok=True)
     with matplotlib.rc_context({"svg.hashsalt": "whisker", "svg.fonttype": "none"}):
         for name, draw in drawn.items():
-            figure = draw()
-            figure.savefig(CHARTS / f"{name}.svg", metadata={"Date": None})
-            figure.savefig(CHARTS / f"{name}.png", dpi=120)
+            store.write_chart(name, draw())
     examples = [{key: e[key] for key in ("row", "share", "peaks", "mode_moved")} for e in b["examples"]]
     result = {
         "fig6a": {"rows": a["rows"].tolist(), "jumps": a["jumps"]},
@@ -318,6 +316,5 @@ def run(_build: Path, fresh: bool) -> None:
         "fig6c": {"crossed_row": c["crossed_row"], "filters": c["summary"]},
         "banana": claim,
     }
-    RESULTS.mkdir(parents=True, exist_ok=True)
-    (RESULTS / "nav_paper.json").write_text(json.dumps(result, indent=1) + "\n")
+    store.write_result("nav_paper", result)
     print("bench/results/nav_paper.json, docs/charts/" + ", ".join(drawn))

@@ -2,7 +2,7 @@
 
     make bench, or .venv/bin/python tools/benches nav_peers [--seeds N]
 
-Every filter takes the rows of the same contract scenes through host/nav's intake and weighs poses by host/nav's
+Every filter takes the rows of the same scenes through host/nav's intake and weighs poses by host/nav's
 likelihood; what differs is the filter. Times are CPU time per row, all of it: intake, motion, weights, resampling,
 estimate. A run that is done is kept in build/bench/nav_peers. A peer that is not there is skipped by name. A program of
 one's own joins by NAV_PEER_<NAME>=PROGRAM, called as PROGRAM SCENE.txt EST.csv --particles N --seed S (peer.hpp).
@@ -19,9 +19,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-import matplotlib
 import numpy as np
-from matplotlib.figure import Figure
 from tqdm import tqdm
 
 import crunchbot
@@ -30,8 +28,10 @@ from crunchbot.nav import localise
 from crunchbot.nav.scoring import lock_row, position_errors
 from crunchbot.scene import Prior
 
+from .. import store
+
 ROOT = Path(__file__).resolve().parents[3]
-RESULTS, CHARTS, CACHE = ROOT / "bench/results", ROOT / "docs/charts", ROOT / "build/bench/nav_peers"
+CACHE = ROOT / "build/bench/nav_peers"
 PEERS = Path(__file__).resolve().parent / "peers"
 VENV, NATIVE = ROOT / "build/bench/peers-venv", ROOT / "build/bench/peers"
 APT = "apt-get install libmrpt-slam-dev"
@@ -228,57 +228,6 @@ def summed_up(entry: Entry, family: str, runs: list[dict]) -> dict:
     }
 
 
-def draw(table: list[dict]) -> Figure:
-    """Error against time while tracking; share of runs lost from a global start and after a kidnap."""
-    figure = Figure(figsize=(11.5, 4.6), layout="constrained")
-    panels = figure.subplots(1, 2, width_ratios=(3, 2))
-    names = list(dict.fromkeys(row["filter"] for row in table))
-    mine = {name for name, _ in OURS}
-    for axes, families in zip(panels, (FAMILIES[:1], FAMILIES[1:]), strict=True):
-        for n, name in enumerate(names):
-            draw_filter(
-                axes, [row for row in table if row["filter"] == name and row["family"] in families], name in mine, n
-            )
-    panels[0].set(xscale="log", yscale="log", xlabel="CPU time per row (us, median)", ylabel="position error (m)")
-    panels[0].set_title("tracking: median error, quartiles of the seeds", fontsize=10)
-    panels[1].set(xscale="log", xlabel="CPU time per row (us, median)", ylabel="share of runs not locked at the end")
-    panels[1].set_title("global start, kidnap (larger marks)", fontsize=10)
-    for axes in panels:
-        axes.grid(color="#e4e4e4", linewidth=0.6)
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside right upper", fontsize=8, frameon=False)
-    return figure
-
-
-def draw_filter(axes, rows: list[dict], mine: bool, number: int) -> None:
-    style = {"color": f"C{number % 10}", "marker": "os^vDP*X<>hdp"[number % 13]}
-    face = style["color"] if mine else "none"  # hollow: somebody else's
-    for family in dict.fromkeys(row["family"] for row in rows):
-        part = sorted((r for r in rows if r["family"] == family), key=lambda r: r["step_us_median"])
-        us = [r["step_us_median"] for r in part]
-        if family == FAMILIES[0]:
-            error = np.array([r["error_median_m"] for r in part])
-            low, high = np.array([r["error_median_quartiles_m"] for r in part]).T
-            bars = {"yerr": [error - low, high - error], "elinewidth": 0.8}
-            line = "-" if mine else "--"
-            axes.errorbar(us, error, linestyle=line, markerfacecolor=face, label=part[0]["filter"], **bars, **style)
-        else:
-            size = 9 if family.endswith("kidnap") else 5
-            lost = [r["lost_share"] for r in part]
-            axes.plot(us, lost, linestyle="none", markersize=size, markerfacecolor=face, **style)
-
-
-def save(table: list[dict]) -> None:
-    for folder in (RESULTS, CHARTS):
-        folder.mkdir(parents=True, exist_ok=True)
-    (RESULTS / "nav_peers.json").write_text(json.dumps(table, indent=1) + "\n")
-    with matplotlib.rc_context({"svg.hashsalt": "whisker", "svg.fonttype": "none"}):
-        figure = draw(table)
-        figure.savefig(CHARTS / "nav_peers.svg", metadata={"Date": None})
-        figure.savefig(CHARTS / "nav_peers.png", dpi=120)
-    print("bench/results/nav_peers.json, docs/charts/nav_peers.svg")
-
-
 def run(build: Path, fresh: bool, seeds: int = SEEDS) -> None:
     known = localise.filter_names()
     entries = [
@@ -291,7 +240,8 @@ def run(build: Path, fresh: bool, seeds: int = SEEDS) -> None:
     results = {}
     for entry, family, seed in tqdm(jobs, desc="nav_peers", unit="run"):
         results.setdefault((entry, family), []).append(measure(entry, family, seed, fresh))
-    save([summed_up(*key, runs) for key, runs in results.items()])
+    store.write_result("nav_peers", [summed_up(*key, runs) for key, runs in results.items()])
+    print("bench/results/nav_peers.json")
 
 
 def options(parser: argparse.ArgumentParser) -> None:

@@ -24,8 +24,10 @@ from crunchbot.scenes import arenas, robots
 from crunchbot.scenes.families import Recipe
 from crunchbot.scenes.making import make_recipe
 
+from .. import store
+
 ROOT = Path(__file__).resolve().parents[3]
-RESULT, PAGE, CHARTS = ROOT / "bench/results/nav_size.json", ROOT / "docs/results_nav_size.md", ROOT / "docs/charts"
+RESULT, PAGE = store.RESULTS / "nav_size.json", ROOT / "docs/results/nav_size.md"
 SIDES = (10, 25, 50, 100)
 TILE = 0.5
 PER_M2 = 0.36
@@ -110,14 +112,14 @@ def chart(data: dict) -> Figure:
 
 
 def page(data: dict) -> str:
-    """docs/results_nav_size.md."""
+    """docs/results/nav_size.md."""
     lines = [
         "# Start unknown, by the arena's size",
         "",
         f"`tools/benches nav_size`: the filter `adaptive` with its defaults in squares with tiles of {TILE} m and boxes of 10 to"
         " 30 cm,",
         f"{PER_M2} of them a square metre, the robot of the family `anchor`, {ROWS} rows. Locked, and how the error is taken: as in"
-        " [navigation](results_nav.md).",
+        " [navigation](nav.md).",
         "Times are CPU times on a busy machine.",
         "",
         "| side, m | locked | rows to lock | us a row, once locked | slowest row, us | MB | set-up, s |",
@@ -134,7 +136,7 @@ def page(data: dict) -> str:
         f"Once locked, a row's cost follows the area to the power {data['power']:.2f}. Set-up in {c['side_m']} m with"
         f" {c['boxes']} boxes: {c['setup_s']:.2f} s.",
         "",
-        "![memory, cost and rows to lock by the arena's side](charts/nav_size.svg)",
+        "![memory, cost and rows to lock by the arena's side](../charts/nav_size.svg)",
     ]
     return "\n".join(lines) + "\n"
 
@@ -149,9 +151,8 @@ def run(
     data = {"sides": sides, "power": power(sides) if len(sides) > 1 else None, "crowded": crowded()}
     json.write_text(dumps(data, indent=1) + "\n")
     if json == RESULT:
-        figure = chart(data)
-        figure.savefig(CHARTS / "nav_size.svg", metadata={"Date": None})
-        figure.savefig(CHARTS / "nav_size.png", dpi=120)
+        store.record_origin("nav_size")
+        store.write_chart("nav_size", chart(data))
         PAGE.write_text(page(data))
 
 

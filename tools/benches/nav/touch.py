@@ -20,11 +20,12 @@ from crunchbot.nav.estimates import Estimates
 from crunchbot.nav.judging import judge
 from crunchbot.scenes import benchmark
 
+from .. import store
 from . import charts
-from .peer_runs import CHARTS, RESULTS, guests, mrpt_entries, python_entries
+from .peer_runs import guests, mrpt_entries, python_entries
 
 SETTINGS = ("500", "2000", "300-20000 KLD")  # of the peers
-FILE = RESULTS / "touch.json"
+FILE = store.RESULTS / "touch.json"
 
 
 def peers(build: Path) -> list:
@@ -76,11 +77,9 @@ def run(build: Path, fresh: bool, data: str | None = None) -> None:
         if scores is not None:
             table[name] = scores
     benchmark.store(FILE, {name: table[name] for name in benchmark.NAMES if name in table})
-    CHARTS.mkdir(parents=True, exist_ok=True)
+    store.record_origin("touch")
     with matplotlib.rc_context({"svg.hashsalt": "whisker", "svg.fonttype": "none"}):
-        figure = draw(benchmark.stored(FILE))
-        figure.savefig(CHARTS / "touch.svg", metadata={"Date": None})
-        figure.savefig(CHARTS / "touch.png", dpi=120)
+        store.write_chart("touch", draw(benchmark.stored(FILE)))
     print("bench/results/touch.json, docs/charts/touch.svg")
 
 

@@ -27,11 +27,13 @@ from crunchbot.scenes.making import Made, make_recipe
 from crunchbot.scenes.readings import World
 from crunchbot.scenes.walk import Pace
 
+from .. import store
+
 ROOT = Path(__file__).resolve().parents[3]
 RESULT, DESIGNS, ABLATIONS, LEFT = (
     ROOT / f"bench/results/nav_{name}.json" for name in ("unseen", "designs", "ablations", "left_out")
 )
-PAGE = ROOT / "docs/results_nav_unseen.md"
+PAGE = ROOT / "docs/results/nav_unseen.md"
 FIRST_SEED = 70_000
 ROWS = 600
 SURE, FAR_M, FAR_RAD = 0.9, 0.25, 0.5
@@ -310,12 +312,12 @@ def names(designs: dict) -> list[str]:
 
 
 def page(unseen: dict, designs: dict, ablations: dict, left: dict) -> str:
-    """docs/results_nav_unseen.md."""
+    """docs/results/nav_unseen.md."""
     lines = [
         "# Families that no filter was made for",
         "",
         f"`tools/benches nav_unseen`: the filter `{unseen['filter']}` with its defaults on scenes drawn after it was made"
-        " ([which](../tools/benches/nav/unseen.py)).",
+        " ([which](../../tools/benches/nav/unseen.py)).",
         "Sure and wrong: rows with a confidence above 0.9 that are off by more than 0.25 m or 0.5 rad, 30 rows after a"
         " kidnap left out. Times: CPU time on a busy machine.",
         "",
@@ -356,7 +358,7 @@ def leave_out(filter: str, seeds: range) -> None:
             for start in starts
         }
         print(*totals({title: left[title]})[2:], flush=True)
-    LEFT.write_text(dumps(left, indent=1) + "\n")
+    store.write_result("nav_left_out", left)
 
 
 def run(
@@ -387,6 +389,7 @@ def run(
     measured = {"filter": filter, "settings": settings, "families": done}
     json.write_text(dumps(measured, indent=1) + "\n")
     if json == RESULT:
+        store.record_origin("nav_unseen")
         PAGE.write_text(page(measured, *(loads(file.read_text()) for file in (DESIGNS, ABLATIONS, LEFT))))
 
 

@@ -67,7 +67,7 @@ def _plain(limit: float) -> str:
 
 
 def picture(name: str, title: str, see: str) -> str:
-    return f"\n![{title}](charts/nav_{name}.svg)\n\n{see}\n"
+    return f"\n![{title}](../charts/nav_{name}.svg)\n\n{see}\n"
 
 
 def number(value: float | None, digits: int = 3) -> str:

@@ -1,7 +1,7 @@
 """Measures the whisker node: random faults, fastest link, skew between nodes, time to the armed record, processor load.
 
     .venv/bin/python tools/benches node        bench/results/node.json, node_faults.json and node_cuts.json,
-                                                docs/node_faults.md, docs/charts/node_*.svg and .png
+                                                docs/results/node_faults.md, docs/charts/node_*.svg
 
 All on the register model of the chip and the edge-by-edge model of the sensor; nothing here has run on silicon. A
 thousand batches of a thousand fault schedules take about six minutes of one core; what is done is kept in build/bench/node.
@@ -22,10 +22,10 @@ from tqdm import tqdm
 from crunchbot.protocol import LIMITS
 from crunchbot.report import figures
 
+from .. import store
 from . import odds, page
 
 ROOT = Path(__file__).resolve().parents[3]
-RESULTS, CHARTS = ROOT / "bench/results", ROOT / "docs/charts"
 BATCHES, CHUNK, PROCESSES = 1000, 50, 2
 NODES, TICKS = 28, 10_000
 TICK_CYCLES = 19_300  # of 500 us at the slowest oscillator
@@ -173,22 +173,6 @@ def age_chart(rows: dict) -> Figure:
     return figure
 
 
-def armed_chart(armed: dict) -> Figure:
-    """When the record of a tick lies ready in the link."""
-    figure = Figure(figsize=(6.0, 4.0), layout="constrained")
-    axes = figure.subplots()
-    for (name, data), style in zip(armed.items(), ("-", "--", ":"), strict=True):
-        us = np.sort(data.ravel()) / 1000
-        axes.plot(us, np.linspace(0, 1, len(us)), style, color="#0b5394", label=name)
-    axes.axvline(ARMED_MOST_US, color="black", linewidth=1)
-    axes.annotate("wanted: at most ", (ARMED_MOST_US, 0.5), ha="right")
-    axes.set_title("From SYNC to the armed record, 28 nodes", fontsize=10)
-    axes.set_xlabel("SYNC to armed record (us)")
-    axes.set_ylabel("share of records")
-    axes.legend(loc="upper right", bbox_to_anchor=(0.93, 1.0))  # between the last curve and the bound
-    return figure
-
-
 def link_chart(found: dict) -> Figure:
     """The least gap between words at each SCK."""
     figure = Figure(figsize=(6.0, 4.0), layout="constrained")
@@ -208,20 +192,19 @@ def link_chart(found: dict) -> Figure:
 
 def table(build: Path, program: str, name: str) -> list[dict]:
     """What a test program writes down of its cases, kept among the results."""
-    path = RESULTS / name
-    subprocess.run([build / "sim/node" / program, path], check=True)
-    return json.loads(path.read_text())
+    subprocess.run([build / "sim/node" / program, store.RESULTS / f"{name}.json"], check=True)
+    store.record_origin(name)
+    return store.read_result(name)
 
 
 def draw(name: str, chart, *data) -> None:
-    """docs/charts/NAME, as .svg and .png."""
+    """docs/charts/NAME.svg."""
 
     def figure(_):
         return chart(*data)
 
     figure.__name__ = name
-    (CHARTS / f"{name}.svg").write_text(figures.svg(figure, None))
-    figures.png(figure, None, CHARTS / f"{name}.png")
+    store.write_chart(name, figures.svg(figure, None))
 
 
 def skew(build: Path) -> dict:
@@ -233,7 +216,6 @@ def skew(build: Path) -> dict:
     }
     draw("node_skew", skew_chart, rows)
     draw("node_age", age_chart, rows)
-    draw("node_armed", armed_chart, armed)
     return {
         "skew": {
             name: {
@@ -253,8 +235,8 @@ def skew(build: Path) -> dict:
 
 
 def tables(build: Path) -> dict:
-    faults = table(build, "test_node_faults", "node_faults.json")
-    cuts = table(build, "test_update_cuts", "node_cuts.json")
+    faults = table(build, "test_node_faults", "node_faults")
+    cuts = table(build, "test_update_cuts", "node_cuts")
     worst = Counter({row["fault"]: max(r["lost"] for r in row["runs"]) for row in faults}).most_common(3)
     return {"fault_rows": len(faults) + len(cuts), "worst_lost": dict(worst)}
 
@@ -269,8 +251,6 @@ def run(build: Path, fresh: bool, only: str = "", batches: int = BATCHES) -> Non
     """All of it, or only one part: the others stay as they were measured before."""
     kept = build / "bench/node"
     kept.mkdir(parents=True, exist_ok=True)
-    RESULTS.mkdir(parents=True, exist_ok=True)
-    path = RESULTS / "node.json"
     parts = {
         "faults": lambda: tables(build),
         "storm": lambda: {"storm": storm(build, kept, fresh, batches)},
@@ -278,12 +258,12 @@ def run(build: Path, fresh: bool, only: str = "", batches: int = BATCHES) -> Non
         "skew": lambda: skew(build),
         "load": lambda: {"load": load(build)},
     }
-    result = json.loads(path.read_text()) if only else {}
+    result = store.read_result("node") if only else {}
     for name in [only] if only else PARTS:
         result |= parts[name]()
-    path.write_text(json.dumps(result, indent=1) + "\n")
-    faults, cuts = (json.loads((RESULTS / name).read_text()) for name in ("node_faults.json", "node_cuts.json"))
-    (ROOT / "docs/node_faults.md").write_text(page.page(result, faults, cuts))
+    store.write_result("node", result)
+    faults, cuts = (store.read_result(name) for name in ("node_faults", "node_cuts"))
+    (ROOT / "docs/results/node_faults.md").write_text(page.page(result, faults, cuts))
 
 
 def options(parser: argparse.ArgumentParser) -> None:

@@ -1,6 +1,6 @@
 """The node's images, executed: records and power cuts of each build; of the usual one cycles, stack and resets too.
 
-.venv/bin/python tools/benches image    bench/results/node_image.json, docs/node_image.md
+.venv/bin/python tools/benches image    bench/results/node_image.json, docs/results/node_image.md
 """
 
 import json
@@ -10,9 +10,10 @@ import sys
 import tempfile
 from pathlib import Path
 
+from .. import store
+
 ROOT = Path(__file__).resolve().parents[3]
-RESULT = ROOT / "bench/results/node_image.json"
-PAGE = ROOT / "docs/node_image.md"
+PAGE = ROOT / "docs/results/node_image.md"
 IMAGES = ROOT / "firmware/images"
 BUILDS = ("mlx90333", "mlx90316", "resync")  # of the firmware; the first is the usual one
 sys.path.insert(0, str(ROOT / "sim/node_image"))
@@ -113,7 +114,7 @@ def run(build: Path, _fresh: bool) -> None:
         result["ram"] = max(c["ram"] for c in node.costs)
         result["boot_cycles"] = max(c["boot_cycles"] for c in node.costs)
         result["spoiled"] = sum(c["spoiled"] for each in nodes for c in each.costs)
-    RESULT.write_text(json.dumps(result, indent=1) + "\n")
+    store.write_result("node_image", result)
     PAGE.write_text(page(result))
 
 

@@ -1,4 +1,4 @@
-"""docs/node_faults.md: what the bench measured, and how the miss rates are derived."""
+"""docs/results/node_faults.md: what the bench measured, and how the miss rates are derived."""
 
 from crunchbot.protocol import LIMITS
 
@@ -117,7 +117,9 @@ A miss needs the fault first: at one struck frame in a million, a lost clock bec
 ## Fastest link
 
 No record lost or altered in {ticks} ticks on each of 36 kinds of parts (chip -4, 0, +4 %; sensor -10, 0, +10 %; prefetch of one word or two; DMA at once or 12 cycles
-late). Cables are not in this model (see [hardware](hardware.md)). Chart: `charts/node_link.svg`.
+late). Cables are not in this model (see [hardware](../hardware.md)).
+
+![Least gap between words at each SCK](../charts/node_link.svg)
 
 | SCK divider | MHz | least word gap, cycles of 60 MHz | us | record's transfer, us |
 |---|---|---|---|---|

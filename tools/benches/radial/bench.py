@@ -6,7 +6,7 @@ Whiskers are drawn from a batch (stiffness, creep, friction, gain), calibrated w
 judged on others. A real whisker's recordings are not part of this project: clone
 github.com/BioMorphic-Intelligence-Lab/Whisker-3D-Localization and give its folder dataset, here or as WHISKER3D_DIR;
 without it that part is skipped by name. Simulated parts that are done are kept in build/bench/radial. Writes
-bench/results/radial*.json, docs/radial_real.md and docs/charts/radial_*.
+bench/results/radial*.json, docs/results/radial_real.md and docs/charts/radial_*.
 """
 
 import argparse
@@ -26,12 +26,13 @@ from crunchbot.touch.radial import model as radial
 from crunchbot.touch.radial.shape import shape_of
 from crunchbot.touch.radial.whisk import WhiskModel
 
+from .. import store
 from .page import page
 from .real import METHODS, real_whisker
 from .trials import PAPER_MM, RADII_MM, SOURCES, SPOILS, SPREADS, Kind, Set, Whisker, recorded, spoilt
 
 ROOT = Path(__file__).resolve().parents[3]
-RESULTS, CHARTS, CACHE = ROOT / "bench/results", ROOT / "docs/charts", ROOT / "build/bench/radial"
+CACHE = ROOT / "build/bench/radial"
 SEED = 48611  # chosen after the last change to the models; nothing was developed on these whiskers
 WHISKERS, FIT, HELD = 4, 5, 6  # whiskers of each spread; whisks at each radius
 TIP_WHISKERS = 24  # of each spread: shares near 98 % ask for many whisks
@@ -272,8 +273,8 @@ def run(build: Path, fresh: bool, whisker3d: str | None = None) -> None:
     folder = whisker3d or os.environ.get("WHISKER3D_DIR")
     if folder:
         real = _rounded(real_whisker(Path(folder)))
-        (RESULTS / "radial_real.json").write_text(json.dumps(real, indent=1) + "\n")
-        (ROOT / "docs/radial_real.md").write_text(page(real))
+        store.write_result("radial_real", real)
+        (ROOT / "docs/results/radial_real.md").write_text(page(real))
     else:
         print("radial: the real whisker skipped: give --whisker3d DIR or WHISKER3D_DIR (see the module's text)")
     results = {}
@@ -286,14 +287,10 @@ def run(build: Path, fresh: bool, whisker3d: str | None = None) -> None:
     kept = results | {
         "fig5": {"combined_mm": results["fig5"]["combined_mm"], "error_mm": [w["error_mm"] for w in points]}
     }
-    (RESULTS / "radial.json").write_text(json.dumps(_rounded(kept), indent=1) + "\n")
+    store.write_result("radial", _rounded(kept))
     with matplotlib.rc_context(SETTINGS | {"svg.hashsalt": "whisker"}):
         for name, draw in (("radial_cost", draw_cost), ("radial_fig5", draw_fig5)):
-            figure = draw(results)
-            for ending in ("svg", "png"):
-                figure.savefig(
-                    CHARTS / f"{name}.{ending}", dpi=120, metadata={"Date": None} if ending == "svg" else None
-                )
+            store.write_chart(name, draw(results))
 
 
 def options(parser: argparse.ArgumentParser) -> None:

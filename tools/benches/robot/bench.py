@@ -1,4 +1,4 @@
-"""The whole robot: levels of simulation, half an hour, odometry, latency, instructions; docs/results_robot.md.
+"""The whole robot: levels of simulation, half an hour, odometry, latency, instructions; docs/results/robot.md.
 
     .venv/bin/python tools/benches robot                       all of it: two hours and more, most of it the RTL level
     .venv/bin/python tools/benches robot --only levels page    some parts; --levels 0 1: of the levels only the fast ones
@@ -18,10 +18,11 @@ from crunchbot.report import figures, long_figures
 from crunchbot.report.run import Run
 from crunchbot.stopping import interrupt_on_signals
 
+from .. import store
 from . import instructions, latency, levels, odometry, page
 
 ROOT = Path(__file__).resolve().parents[3]
-RESULTS, CHARTS, CACHE = ROOT / "bench/results", ROOT / "docs/charts", ROOT / "build/bench/robot"
+RESULTS, CACHE = store.RESULTS, ROOT / "build/bench/robot"
 LONG_RUNS = (("signals", 7301), ("signals", 7302), ("signals", 7303), ("bytes", 7301))
 LEVELS = (0, 1, 2, 3)
 ALONE = ("odometry", "latency", "instructions")  # parts whose results stand in one file
@@ -82,26 +83,21 @@ def read(path: Path) -> dict | None:
     return json.loads(path.read_text()) if path.exists() else None
 
 
-def save(name: str, draw: Callable, data) -> None:
-    """A chart in both its forms."""
-    (CHARTS / f"{name}.svg").write_text(figures.svg(draw, data))
-    figures.png(draw, data, CHARTS / f"{name}.png")
-
-
 def publish() -> None:
     """Results, charts and the page, of what there is."""
     found = gather()
     drawings = {"levels": levels, "odometry": odometry, "latency": latency}
     for part, module in drawings.items():
         for name, draw in module.DRAWINGS.items() if part in found else ():
-            save(name, draw, found[part])
+            store.write_chart(name, figures.svg(draw, found[part]))
     shown = CACHE / "long_bytes_7301"
     if shown.is_dir():
-        save("robot_long", long_figures.errors, Run.load(shown))
+        store.write_chart("robot_long", figures.svg(long_figures.errors, Run.load(shown)))
     for part, data in found.items():
-        (RESULTS / f"robot_{part}.json").write_text(json.dumps(data, indent=1) + "\n")
-    (ROOT / "docs/results_robot.md").write_text(page.page(found))
-    print("bench/results/robot_*.json, docs/charts/robot_*.svg, docs/results_robot.md")
+        if read(RESULTS / f"robot_{part}.json") != data:
+            store.write_result(f"robot_{part}", data)
+    (ROOT / "docs/results/robot.md").write_text(page.page(found))
+    print("bench/results/robot_*.json, docs/charts/robot_*.svg, docs/results/robot.md")
 
 
 PARTS = ("odometry", "levels", "latency", "instructions", "long", "page")

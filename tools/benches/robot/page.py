@@ -1,4 +1,4 @@
-"""docs/results_robot.md of what tools/benches robot has measured so far."""
+"""docs/results/robot.md of what tools/benches robot has measured so far."""
 
 from crunchbot.report.figures import TITLES as FILTERS
 
@@ -60,12 +60,12 @@ def _levels(found: dict) -> list[str]:
         "read of the level-1 run with mechanics `static`, and draws the answers as `whisker scene make robot` does.\n",
         _table(header, rows),
         *([f"Not measured on these mechanics yet: {', '.join(left)}.\n"] if left else []),
-        "![Error and texture accuracy against real-time factor](charts/robot_levels.png)\n",
+        "![Error and texture accuracy against real-time factor](../charts/robot_levels.svg)\n",
         "The fastest level is on top. Bars: quartiles over seeds. Dotted: real time.\n",
         "### Where a lower level changes the answer\n",
         f"Paired by seed: mean difference, and, from {LEAST_SEEDS} seeds on, the interval that 95 % of bootstrap means fall into. Bold, and filled in the chart:",
         "zero is outside.\n",
-        "![Paired differences between levels](charts/robot_level_pairs.png)\n",
+        "![Paired differences between levels](../charts/robot_level_pairs.svg)\n",
         _pairs_table(found["pairs"]),
         _equal(found["rtl_rows_equal_bytes"]),
         WHY,
@@ -133,7 +133,9 @@ def _long(found: dict) -> list[str]:
         for name, run in found.items()
     ]
     names = ["run", "driven (m)", "tiles", "contacts", "whisks measured", "texture right", "times real time, wall"]
-    chart = "![Position error of every estimate over half an hour](charts/robot_long.png)\n\nThe run at bytes level.\n"
+    chart = (
+        "![Position error of every estimate over half an hour](../charts/robot_long.svg)\n\nThe run at bytes level.\n"
+    )
     return [*parts, _table(header, rows), _table(names, met), chart]
 
 
@@ -158,7 +160,7 @@ def _odometry(found: dict) -> list[str]:
         f"## Odometry against the paper's {100 * PAPER:g} %\n",
         f"Emulator and driver, {METRES:g} m straight and 180 degrees on the spot, {SEEDS} worlds each, from rest to rest. The worst speed of each kind, largest root mean square and largest single error:\n",
         _table(header, rows),
-        "![Odometry error against speed](charts/robot_odometry.png)\n",
+        "![Odometry error against speed](../charts/robot_odometry.svg)\n",
         "The simulated wheels run just as ordered and count wrong (1 % a run, 2 % a move): what is integrated from orders (`auto` on a Create 1, when it has not found that the",
         "firmware keeps remainders) is better here than it can be on a floor. The error that is a robot's own is that of the counters: packets 19 and 20 with the remainder kept,",
         "or encoders. A Create 1 that drops remainders tells no turn at all at the whisk's rate (0.13 rad/s), nor up to 1 rad/s; its driver must integrate orders.\n",
@@ -184,7 +186,7 @@ def _latency(found: dict) -> list[str]:
         "*Simulated* is time of the robot's clock, the same on any machine; *processor* is time of one processor of this machine; *wall* is between two processes on this machine,",
         f"one row at a time over zenoh on loopback, with other work running (load average {found['load_average']:g} on two cores at the end).\n",
         _table(["part", "kind of time", "n", "p50 (ms)", "p99 (ms)"], rows),
-        "![Latency part by part](charts/robot_latency.png)\n",
+        "![Latency part by part](../charts/robot_latency.svg)\n",
         "USB adds at most 0.5 ms (two frames a packet, 1 ms in batches of whiskerd), the ring what `ring.json` says (6 us in the middle, waiting reader). Neither shows: the waits for",
         "the block and for the paper's row of 100 ms are larger by orders. The largest simulated part is the whisker's own bending. A distance is known when the whisker lets go, seconds after the touch: that is how the paper measures.\n",
     ]

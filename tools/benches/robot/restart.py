@@ -34,6 +34,8 @@ from crunchbot.robot.track import Track
 from crunchbot.scene import Prior
 from crunchbot.simulation.scenes import make_scene
 
+from .. import store
+
 ROOT = Path(__file__).resolve().parents[3]
 RUNS = ROOT / "build/bench/restart"
 FIRST_SEED, SCENES, FILTER = 9101, 20, "adaptive"
@@ -194,9 +196,11 @@ def run(
     kills = len(entries) // (2 * len(CASES))
     told |= {"kills": kills, "right before": sum(e["right"] for e in entries) // (2 * len(CASES))}
     print(json.dumps(told, indent=1))
-    out = out or (ROOT / "bench/results/restart.json" if scenes == SCENES else None)
+    out = out or (store.RESULTS / "restart.json" if scenes == SCENES else None)
     if out:
         out.write_text(json.dumps(told, indent=1) + "\n")
+    if out == store.RESULTS / "restart.json":
+        store.record_origin("restart")
 
 
 def options(parser: argparse.ArgumentParser) -> None:

@@ -7,7 +7,7 @@ project: clone github.com/wngfra/FabricSlide (MIT) and github.com/norlab-ulaval/
 data/fabric, data/borealtc and data/vulpi (in BorealTC), here or as FABRICSLIDE_DIR, BOREALTC_DIR and VULPI_DIR; without
 them their parts are skipped by name.
 Parts that are done are kept in build/bench/texture. Writes bench/results/texture.json,
-docs/texture_faults.md and docs/charts/texture_*.
+docs/results/texture.md and docs/charts/texture_*.
 """
 
 import argparse
@@ -17,6 +17,7 @@ from pathlib import Path
 
 from tqdm import tqdm
 
+from .. import store
 from .charts import draw
 from .cost import cost
 from .course import course
@@ -26,8 +27,8 @@ from .simulated import borders, floors_left_out, other_robot, refusals, single_s
 from .surfaces import faces, faces_contact
 
 ROOT = Path(__file__).resolve().parents[3]
-PAGE = ROOT / "docs/texture_faults.md"
-RESULTS, CHARTS, CACHE = ROOT / "bench/results", ROOT / "docs/charts", ROOT / "build/bench/texture"
+PAGE = ROOT / "docs/results/texture.md"
+CACHE = ROOT / "build/bench/texture"
 FLOORS = (course, cost, single_surfaces, other_robot, borders, refusals, floors_left_out, stability)
 PARTS = {f.__name__: f for f in (*FLOORS, faces, faces_contact)}
 REAL = {  # by the folder that is given
@@ -55,12 +56,10 @@ def run(build: Path, fresh: bool, **folders: str | None) -> None:
         if measure and (fresh or not kept.exists()):
             kept.write_text(json.dumps(measure(), indent=1, default=float) + "\n")
         results[name] = json.loads(kept.read_text())
-    RESULTS.mkdir(parents=True, exist_ok=True)
-    (RESULTS / "texture.json").write_text(json.dumps(results, indent=1) + "\n")
+    store.write_result("texture", results)
     PAGE.write_text(page(results))
     for name, figure in draw(results).items():
-        for ending in ("svg", "png"):
-            figure.savefig(CHARTS / f"{name}.{ending}", dpi=120)
+        store.write_chart(name, figure)
 
 
 def options(parser: argparse.ArgumentParser) -> None:

@@ -5,7 +5,7 @@ from .scores import METHODS
 HEAD = """# Floor texture: faults and recordings, method by method
 
 Made by `tools/benches texture`. `paper` is the naive Bayes of equation 1, which always answers; `default` the spectral
-method, which may say "unknown". [What they do](texture.md). Share of decisions in percent; `error` is the expected
+method, which may say "unknown". [What they do](../texture.md). Share of decisions in percent; `error` is the expected
 calibration error; `cut` by how much the wrong decisions fall when the least confident tenth is refused (their number where none is left).
 """
 FAULTS = """
@@ -45,7 +45,7 @@ Another robot's whiskers are read by the models of this one.
 
 """
 FACES_CONTACT = """
-The [contact filter](contact.md) along the same walls, by their texture and in the same motions (drive-bys at 100 mm/s): share of its reports in which it
+The [contact filter](../contact.md) along the same walls, by their texture and in the same motions (drive-bys at 100 mm/s): share of its reports in which it
 knows what is touched, and a normal; the median error of the normal, and how often its 90 % holds; the median error of the place across the wall. The filter
 knows no texture.
 

@@ -1,4 +1,4 @@
-"""Particle filters from Python packages on one contract scene, with this project's likelihood. Runs in the peers' venv.
+"""Particle filters from Python packages on one scene, with this project's likelihood. Runs in the peers' venv.
 
 python_peer.py PEER SCENE EST.csv --particles N --seed S: writes EST.csv with the CPU time of every step. What a package
 does not bring (motion, mean) is vectorised NumPy, alike for all.
