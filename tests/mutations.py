@@ -273,14 +273,14 @@ MUTATIONS = [
         "out_keep <= 1'b0;",
     ),
     Mutation(
-        "bridge: absent told as link_crc",
+        "bridge: absent reported as link_crc",
         "fpga/tb/frame",
         "fpga/bridge_rtl/framer.v",
         "gone[0] ? CODE_ABSENT[5:0]",
         "gone[0] ? CODE_LINK_CRC[5:0]",
     ),
     Mutation(
-        "bridge: an absent lane's answer told as link_crc",
+        "bridge: an absent lane's answer reported as link_crc",
         "fpga/tb/stores",
         "fpga/bridge_rtl/answer_store.v",
         "is_gone[lane] ? CODE_ABSENT[5:0]",
@@ -437,8 +437,8 @@ MUTATIONS = [
         "base: a slow turn that tells nothing speaks against kept remainders",
         "sim_create.remainder",
         "host/create/src/remainder.c",
-        "    if (told > 0) {",
-        "    if (told >= 0) {",
+        "    if (reported > 0) {",
+        "    if (reported >= 0) {",
     ),
     Mutation(
         "base: one stray number decides",
@@ -458,8 +458,8 @@ MUTATIONS = [
         "base: a held turn is not noticed",
         "test_oi_standing",
         "host/create/src/odometry.c",
-        "told, odometry->remainder == CREATE_KEPT);",
-        "told, odometry->remainder == CREATE_DROPPED);",
+        "reported, odometry->remainder == CREATE_KEPT);",
+        "reported, odometry->remainder == CREATE_DROPPED);",
     ),
     Mutation(
         "base: orders of a body that stands are integrated",
@@ -539,7 +539,7 @@ MUTATIONS = [
         "if (header->version < RING_LAYOUT_VERSION) {",
     ),
     Mutation(
-        "recording: frames that were not read in time are not told",
+        "recording: frames that were not read in time are not reported",
         "host/python/tests/recording/test_recording.py",
         "host/python/crunchbot/recording/recorder.py",
         "self._lost += overrun - self._overrun",

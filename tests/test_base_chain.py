@@ -59,17 +59,17 @@ def driver(folder: Path, model: int):
 
 def drive(link: SimLink, base: Base, blocks: int) -> list:
     """Answers every block by the course; what the base said each time."""
-    told = []
+    reported = []
     for block in range(blocks):
         tick = (block + 1) * BLOCK_TICKS - 1
         after = link.bytes_sent(tick)
         if after is None:
             break
-        told.append((after, base.odometry(after)))
+        reported.append((after, base.odometry(after)))
         link.base(tick, base.drive(*course(block), after).byte_count)
     while link.ended_after is None:  # the last block's answer is still to be taken
         assert link._receive()
-    return told
+    return reported
 
 
 def run(folder: Path, model: int, *options) -> tuple[list, list[dict]]:
@@ -81,10 +81,10 @@ def run(folder: Path, model: int, *options) -> tuple[list, list[dict]]:
     ring = f"whisker-test-base-{os.getpid()}"
     command = simulation(folder, folder / "scene.flat", SECONDS, 3, ring, *words, link=FAST_LINK)
     with running(command) as process, connect(folder / "sock", process) as link, driver(folder, model) as base:
-        told = drive(link, base, round(SECONDS * TICKS_PER_S / BLOCK_TICKS))
+        reported = drive(link, base, round(SECONDS * TICKS_PER_S / BLOCK_TICKS))
         assert process.wait(END_S) == 0, process.stderr.read()
     with (folder / "truth.csv").open() as file:
-        return told, list(csv.DictReader(file))
+        return reported, list(csv.DictReader(file))
 
 
 @pytest.mark.parametrize("options", [(), ("--create-lose-bytes", 0.01, "--create-drop-remainder")])
@@ -94,13 +94,13 @@ def test_the_same_seed_gives_the_same_odometry_to_the_last_bit(tmp_path, options
 
 @pytest.mark.parametrize("model", [1, 2])
 def test_odometry_and_truth_differ_by_no_more_than_the_wheels_count_wrong(tmp_path, model):
-    told, truth = run(tmp_path / "run", model)
-    distance = sum(motion.x_m for _, motion in told)
-    angle = sum(motion.theta_rad for _, motion in told)
+    reported, truth = run(tmp_path / "run", model)
+    distance = sum(motion.x_m for _, motion in reported)
+    angle = sum(motion.theta_rad for _, motion in reported)
     true_distance = math.hypot(float(truth[-1]["x_m"]) - X_M, float(truth[-1]["y_m"]) - Y_M)
     true_angle = float(truth[-1]["theta_rad"])
     grain_m, grain_rad = 0.004, 0.05  # told in units, up to a frame ago
     assert distance == pytest.approx(true_distance, rel=WHEELS_ERROR, abs=grain_m)
     assert angle == pytest.approx(true_angle, rel=WHEELS_ERROR, abs=grain_rad)
-    for _, motion in told:
+    for _, motion in reported:
         assert np.linalg.eigvalsh(np.array(motion.covariance)).min() >= -1e-12

@@ -45,8 +45,8 @@ def front(*words: str) -> subprocess.CompletedProcess:
 
 def test_the_front_tells_topics_and_a_topic_tells_its_options():
     assert ", ".join(TOPICS) in " ".join(front("--help").stdout.split())
-    told = front("node", "--help").stdout
-    assert "usage: tools/benches node " in told and "--batches" in told and "--build-dir" in told
+    reported = front("node", "--help").stdout
+    assert "usage: tools/benches node " in reported and "--batches" in reported and "--build-dir" in reported
 
 
 def test_a_topic_that_is_not_there_is_named():

@@ -163,6 +163,6 @@ def test_a_port_that_is_taken_is_one_line(build):
 def test_wrong_fault_files_are_one_line(tmp_path, text, complaint):
     path = tmp_path / "faults.toml"
     path.write_text(text)
-    with pytest.raises(SimulationError) as told:
+    with pytest.raises(SimulationError) as reported:
         read_faults(str(path), 2000)
-    assert complaint in str(told.value) and str(path) in str(told.value) and "\n" not in str(told.value)
+    assert complaint in str(reported.value) and str(path) in str(reported.value) and "\n" not in str(reported.value)

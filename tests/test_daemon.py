@@ -289,9 +289,9 @@ def test_systemd_is_told_that_it_is_ready_lives_and_stops(tmp_path, ring, plugge
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listener:
         listener.bind(str(tmp_path / "notify"))
         listener.settimeout(END_S)
-        told = {"NOTIFY_SOCKET": str(tmp_path / "notify"), "WATCHDOG_USEC": str(WATCHDOG_US)}
+        reported = {"NOTIFY_SOCKET": str(tmp_path / "notify"), "WATCHDOG_USEC": str(WATCHDOG_US)}
         unplugged = [] if plugged else ["--unplugged"]
-        with bridge(tmp_path, ring, *unplugged, words=["--wait"], env=os.environ | told) as (process, _):
+        with bridge(tmp_path, ring, *unplugged, words=["--wait"], env=os.environ | reported) as (process, _):
             heard = [listener.recv(1024).decode() for _ in range(4)]
             finish(process)
             while heard[-1] != "STOPPING=1":

@@ -39,8 +39,8 @@ def test_a_short_run_at_level_1_leaves_its_summary_and_its_page(tmp_path, monkey
     summary = json.loads((out / "summary.json").read_text())
     truth = read_columns(out / "truth.csv")
     for name in FILTERS:
-        told = read_columns(out / f"est_{name}.csv")
-        error = np.hypot(told["x_m"] - truth["x_m"], told["y_m"] - truth["y_m"])
+        reported = read_columns(out / f"est_{name}.csv")
+        error = np.hypot(reported["x_m"] - truth["x_m"], reported["y_m"] - truth["y_m"])
         scores = summary["filters"][name]
         assert scores["median_m"] == pytest.approx(np.median(error), abs=1e-5)
         assert scores["lost_share"] == pytest.approx(np.mean(error > 0.25), abs=1e-6)

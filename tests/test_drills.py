@@ -36,4 +36,4 @@ def test_wheels_without_a_commander_are_stopped(events, name):
 
 @pytest.mark.parametrize("name", SHORT)
 def test_what_is_lost_is_told(events, name):
-    assert events[name].gap.told, events[name].gap
+    assert events[name].gap.reported, events[name].gap

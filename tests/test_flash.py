@@ -76,8 +76,8 @@ def test_all_nodes_at_once_but_for_those_that_cannot(image, tmp_path):
     fate = dict(re.findall(r"^lane +(\d): (.*)$", first, re.M))
     assert {lane for lane, text in fate.items() if text == "updated"} == {"0", "2", "3", "5"}
     assert fate["4"] == "refused: the image is for another chip"
-    second, told, rest = rest.partition("second 0\n")
-    assert told, second + rest
+    second, reported, rest = rest.partition("second 0\n")
+    assert reported, second + rest
     assert_bar_fills(second)
     listed = nodes_listed(rest)
     assert {lane: version for lane, (_, version, _) in listed.items()} == {
@@ -123,8 +123,8 @@ def test_an_older_image_and_one_of_another_build_are_refused_unless_forced(image
     after = nodes_listed("\n".join(line[5:] for line in done.stdout.splitlines() if line.startswith("after")))
     assert {version for _, version, _ in after.values()} == {"2.2"} and len(after) == WHISKERS
     assert done.stdout.count("would be updated to 2.5") == WHISKERS
-    told = [line for line in done.stderr.splitlines() if "--force" in line]
-    assert len(told) == 2 and "the older 2.2" in told[0] and "build 0x0001" in told[1]
+    reported = [line for line in done.stderr.splitlines() if "--force" in line]
+    assert len(reported) == 2 and "the older 2.2" in reported[0] and "build 0x0001" in reported[1]
 
 
 def test_what_is_no_image_is_refused_before_the_bridge_is_touched(image, tmp_path):

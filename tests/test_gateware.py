@@ -25,8 +25,8 @@ def bitstream(count: int = SHORT, seed: int = 1) -> bytes:
 
 def image(**changes) -> bytes:
     """An image for the simulated bridge, but for these arguments of gateware_image."""
-    told = {"bitstream": bitstream(), "board": BOARDS["simulation"], "lanes": LANES, "commit": 0xABCD}
-    return images.gateware_image(**(told | changes))
+    reported = {"bitstream": bitstream(), "board": BOARDS["simulation"], "lanes": LANES, "commit": 0xABCD}
+    return images.gateware_image(**(reported | changes))
 
 
 def of_version(version: int) -> bytes:

@@ -48,7 +48,7 @@ def lock(locked: int, ratio: float) -> dict:
 def data() -> dict:
     """Every part, small; the default filter meets every limit."""
     both = {"grid": ledger(0.02, 100.0), OURS: ledger()}
-    told = {"auc": 0.9, "calibration_error": 0.02, "bins": []}
+    reported = {"auc": 0.9, "calibration_error": 0.02, "bins": []}
     cost = [{"x": 1.0, "step_us_median": 20.0}, {"x": 6.0, "step_us_median": 30.0}]
     bound = {"rows": 100_000, "step_us_p999": 100.0, "step_us_max": 300.0, "evaluations_max": 9, "touched_max": 1000}
     block = {"faulty": 0, "error_median_m": 0.01, "step_us_median": 20.0, "step_us_max": 300.0, "touched_max": 1000}
@@ -61,8 +61,8 @@ def data() -> dict:
         "matrix": {
             "filters": list(both),
             "rows": {"known start": both, "dead whisker": both},
-            "confidence": {name: told for name in both},
-            "confidence_kidnap": {name: told for name in both},
+            "confidence": {name: reported for name in both},
+            "confidence_kidnap": {name: reported for name in both},
         },
         "tracking": {"families": {family: both | {"reference": ledger()} for family in ("anchor", "one-whisker")}},
         "locks": {"families": {"anchor+global": {OURS: lock(100, 1.1)}, "anchor+kidnap": {OURS: lock(100, 1.4)}}},

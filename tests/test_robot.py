@@ -60,9 +60,9 @@ def test_the_odometry_of_the_bases_bytes_follows_the_truth(flown):
         truth = [[float(row[key]) for key in ("x_m", "y_m")] for row in csv.DictReader(file)]
     with open(flown.scene / "observations.csv", newline="") as file:
         moved = [[float(row[key]) for key in ("odo_x_m", "odo_y_m")] for row in csv.DictReader(file)]
-    driven, told = (np.hypot(*np.diff(truth, axis=0).T).sum(), np.hypot(*np.array(moved).T).sum())
+    driven, reported = (np.hypot(*np.diff(truth, axis=0).T).sum(), np.hypot(*np.array(moved).T).sum())
     assert driven > 0.2
-    assert told == pytest.approx(driven, rel=0.1), "5 % of scale, whole millimetres, and what is on its way"
+    assert reported == pytest.approx(driven, rel=0.1), "5 % of scale, whole millimetres, and what is on its way"
 
 
 def test_nothing_is_lost_between_netbook_and_desktop(flown):
@@ -92,12 +92,12 @@ def test_under_a_pace_the_world_goes_on_without_its_bridge(tmp_path):
         server.send(b"unplug")
         while reader.stats is None or reader.stats.connected:
             assert process.poll() is None
-            told(server)
-        published, ticks = reader.info.published, [told(server) for _ in range(3)]
+            reported(server)
+        published, ticks = reader.info.published, [reported(server) for _ in range(3)]
         assert np.diff(ticks).tolist() == [200, 200] and reader.info.published == published
         server.send(b"plug")
         while reader.info.published == published:
-            told(server)
+            reported(server)
         process.terminate()
         process.wait(END_S)
     assert not Path("/dev/shm", ring).exists()
@@ -113,7 +113,7 @@ def test_under_a_pace_the_world_goes_on_while_its_host_is_stopped(tmp_path, leve
         reader.wait(10.0)
         host = reader.info.writer_pid
         os.kill(host, signal.SIGSTOP)
-        ticks = [told(server) for _ in range(12)]
+        ticks = [reported(server) for _ in range(12)]
         os.kill(host, signal.SIGCONT)
         assert np.diff(ticks).tolist() == [200] * 11
         frames = []
@@ -126,7 +126,7 @@ def test_under_a_pace_the_world_goes_on_while_its_host_is_stopped(tmp_path, leve
         assert lost == frames["dropped"][-1] > 1000
         os.kill(host, signal.SIGSTOP)
         for _ in range(12):
-            told(server)
+            reported(server)
         os.kill(host, signal.SIGTERM)
         os.kill(host, signal.SIGCONT)
         assert process.wait(END_S) == 1
@@ -144,7 +144,7 @@ def watching(path):
         yield server
 
 
-def told(server) -> int:
+def reported(server) -> int:
     """The tick of the next true pose."""
     word, tick, *pose = server.recv(256).split()
     assert word == b"truth" and len(pose) == 3

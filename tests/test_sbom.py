@@ -42,13 +42,13 @@ def test_every_locked_package_is_there_with_all_its_hashes(components):
     assert {f"pkg:pypi/{name}@{version}" for name, version in locked} == {
         purl for purl in components if purl.startswith("pkg:pypi/")
     }
-    told = [
+    reported = [
         part["content"]
         for one in components.values()
         for ref in one.get("externalReferences", [])
         for part in ref["hashes"]
     ]
-    assert sorted(told) == sorted(re.findall(r"sha256:(\w+)", lock))
+    assert sorted(reported) == sorted(re.findall(r"sha256:(\w+)", lock))
 
 
 def test_scope_tells_a_robot_from_its_tools(components):

@@ -75,21 +75,21 @@ def test_pins_are_those_that_the_page_tells_to_solder(name):
     head, *rows = table("## Pins\n")
     board = build.load(name)
     column = next(n for n, title in enumerate(head) if board.title.startswith(title))
-    told = [ball for row in rows for ball in balls(row[column])]
+    reported = [ball for row in rows for ball in balls(row[column])]
     bus, ticks = (
         [board.pins[wire] for wire in wires.split() if wire in board.pins]
         for wires in ("sync sck select_n mosi", "tick_in tick_out")
     )
-    assert told == bus + board.pins["miso"] + ticks
+    assert reported == bus + board.pins["miso"] + ticks
 
 
 def test_the_i9s_phy_is_wired_as_the_page_tells():
     _, *rows = table("### Wiring a USB3300 module")
-    told = {row[at]: row[at + 1] for row in rows for at in (0, 3) if re.fullmatch(r"[A-Z]\d+", row[at + 1])}
+    reported = {row[at]: row[at + 1] for row in rows for at in (0, 3) if re.fullmatch(r"[A-Z]\d+", row[at + 1])}
     pins = build.load("colorlight_i9").pins
     wires = {"CLKOUT": "clk_60", "DIR": "ulpi_dir", "NXT": "ulpi_nxt", "STP": "ulpi_stp", "RESET": "ulpi_reset"}
     wanted = {theirs: pins[ours] for theirs, ours in wires.items()}
-    assert told == wanted | {f"D{bit}": ball for bit, ball in enumerate(pins["ulpi_data"])}
+    assert reported == wanted | {f"D{bit}": ball for bit, ball in enumerate(pins["ulpi_data"])}
 
 
 def test_what_a_board_has_not_is_refused():

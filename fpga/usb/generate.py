@@ -78,9 +78,9 @@ class WhiskerUsb(Elaboratable):
         hid = self._hid
         reports = [hid.write_start, hid.write_valid, hid.write_index, hid.write_data, hid.write_done, hid.write_accept]
         reports += [hid.read_start, hid.read_id, hid.read_packet, hid.read_next, hid.read_data, hid.read_open]
-        told = [self.board, self.build, self.configured, self.sof, self.sof_frame]
+        reported = [self.board, self.build, self.configured, self.sof, self.sof_frame]
         stream = [self.restart, self.stream_data, self.stream_valid, self.stream_last, self.stream_ready]
-        return [*self._utmi.values(), self.serial_number, self.suspended, *told, *stream, *reports]
+        return [*self._utmi.values(), self.serial_number, self.suspended, *reported, *stream, *reports]
 
     def elaborate(self, platform):
         m = Module()

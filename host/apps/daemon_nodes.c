@@ -26,16 +26,16 @@ static int daemon_nodes_ask(struct whisker_device *device, uint32_t lanes,
 
 static void daemon_nodes_log_node(int lane, const struct whisker_node *node, counts c)
 {
-    char serial[FLASH_SERIAL_BYTES], told[COUNTS_BYTES] = "";
+    char serial[FLASH_SERIAL_BYTES], reported[COUNTS_BYTES] = "";
     size_t used = 0;
     for (uint8_t i = 0; i < WHISKER_HEALTH_COUNT; i++) {
-        if (c[i][lane] > 0 && used < sizeof told) {
-            used += (size_t)snprintf(told + used, sizeof told - used, ", %s %u", flash_health_name(i), c[i][lane]);
+        if (c[i][lane] > 0 && used < sizeof reported) {
+            used += (size_t)snprintf(reported + used, sizeof reported - used, ", %s %u", flash_health_name(i), c[i][lane]);
         }
     }
     daemon_log(LOG_NOTE, "lane %d: serial %s, version %u.%u, wire %u, %s%s", lane,
                flash_serial_text(node->serial, serial), node->firmware >> 8, node->firmware & 0xFFu, node->wire_version,
-               flash_state_text(node->state), told);
+               flash_state_text(node->state), reported);
 }
 
 void daemon_nodes_log(struct whisker_device *device, uint32_t lanes)

@@ -19,65 +19,65 @@ void daemon_stats_begin(struct daemon_stats *stats, const struct whisker_setting
                         uint32_t second_lane_mask)
 {
     memset(stats, 0, sizeof *stats);
-    stats->told.started_ns = daemon_stats_realtime_ns();
-    stats->told.lane_mask = settings->lane_mask;
-    stats->told.tick_period = settings->tick_period;
-    stats->told.bridges = (uint8_t)bridges;
-    stats->told.second_lane_mask = second_lane_mask;
+    stats->reported.started_ns = daemon_stats_realtime_ns();
+    stats->reported.lane_mask = settings->lane_mask;
+    stats->reported.tick_period = settings->tick_period;
+    stats->reported.bridges = (uint8_t)bridges;
+    stats->reported.second_lane_mask = second_lane_mask;
 }
 
 /* Of two bridges the names are the first one's. */
 void daemon_stats_connected(struct daemon_stats *stats, struct daemon_source *source,
                             const struct whisker_device_info *about, const struct whisker_identity *identity)
 {
-    struct whisker_daemon_stats *told = &stats->told;
-    told->connected++;
-    told->error = told->connected == told->bridges ? WHISKER_OK : told->error;
-    told->connected_ns = daemon_stats_realtime_ns();
+    struct whisker_daemon_stats *reported = &stats->reported;
+    reported->connected++;
+    reported->error = reported->connected == reported->bridges ? WHISKER_OK : reported->error;
+    reported->connected_ns = daemon_stats_realtime_ns();
     source->dropped = 0;
     source->has_sequence = false;
     if (source->is_second) {
         return;
     }
-    told->wire_version = identity->wire_version;
-    told->gateware = identity->gateware;
-    memcpy(told->serial, about->serial, sizeof told->serial);
-    snprintf(told->firmware, sizeof told->firmware, "gateware %u, wire %u", identity->gateware, identity->wire_version);
+    reported->wire_version = identity->wire_version;
+    reported->gateware = identity->gateware;
+    memcpy(reported->serial, about->serial, sizeof reported->serial);
+    snprintf(reported->firmware, sizeof reported->firmware, "gateware %u, wire %u", identity->gateware, identity->wire_version);
 }
 
 void daemon_stats_lost(struct daemon_stats *stats, bool was_connected, int error)
 {
     if (was_connected) {
-        stats->told.connected--;
-        stats->told.connected_ns = daemon_stats_realtime_ns();
-        stats->told.usb_errors += error != WHISKER_ERROR_DEVICE_GONE;
+        stats->reported.connected--;
+        stats->reported.connected_ns = daemon_stats_realtime_ns();
+        stats->reported.usb_errors += error != WHISKER_ERROR_DEVICE_GONE;
     }
-    stats->told.error = error;
+    stats->reported.error = error;
 }
 
 static void daemon_stats_count_record(struct daemon_stats *stats, unsigned status)
 {
     switch (status >> WHISKER_STATUS_ERROR_BITS) {
     case WHISKER_CODE_ABSENT:
-        stats->told.records_absent++;
+        stats->reported.records_absent++;
         break;
     case WHISKER_CODE_LINK_CRC:
         stats->records_link_crc++;
         break;
     case WHISKER_CODE_LINK_TICK:
-        stats->told.records_tick++;
+        stats->reported.records_tick++;
         break;
     case WHISKER_CODE_LANE_OFF:
         break;
     default:
-        stats->told.records_sensor++;
+        stats->reported.records_sensor++;
     }
 }
 
 void daemon_stats_frame(struct daemon_stats *stats, struct daemon_source *source, const struct whisker_frame *frame)
 {
     const uint32_t missing = source->has_sequence ? frame->sequence - source->sequence - 1 : 0; /* modulo 2^32 */
-    stats->told.frames_missing += missing < UINT32_MAX / 2 ? missing : 0;
+    stats->reported.frames_missing += missing < UINT32_MAX / 2 ? missing : 0;
     source->sequence = frame->sequence;
     source->has_sequence = true;
     source->frames_dropped += (uint32_t)(frame->dropped - source->dropped);
@@ -92,36 +92,36 @@ void daemon_stats_frame(struct daemon_stats *stats, struct daemon_source *source
 
 void daemon_stats_settle_begin(struct daemon_stats *stats)
 {
-    struct whisker_daemon_stats *told = &stats->told;
-    told->frames = told->frames_damaged = told->frames_dropped = told->bytes_skipped = told->records_usb = 0;
+    struct whisker_daemon_stats *reported = &stats->reported;
+    reported->frames = reported->frames_damaged = reported->frames_dropped = reported->bytes_skipped = reported->records_usb = 0;
 }
 
 void daemon_stats_settle(struct daemon_stats *stats, const struct daemon_source *source)
 {
-    struct whisker_daemon_stats *told = &stats->told;
+    struct whisker_daemon_stats *reported = &stats->reported;
     const struct whisker_decoder_counts *counts = &source->decoder.counts;
-    told->frames += counts->frames;
-    told->frames_damaged += counts->frames_damaged;
-    told->frames_dropped += source->frames_dropped;
-    told->bytes_skipped += counts->bytes_skipped;
-    told->records_usb += counts->records_damaged;
+    reported->frames += counts->frames;
+    reported->frames_damaged += counts->frames_damaged;
+    reported->frames_dropped += source->frames_dropped;
+    reported->bytes_skipped += counts->bytes_skipped;
+    reported->records_usb += counts->records_damaged;
 }
 
 void daemon_stats_settle_end(struct daemon_stats *stats, const struct whisker_clock_fit *clock)
 {
-    struct whisker_daemon_stats *told = &stats->told;
-    told->records_crc = stats->records_link_crc > told->records_usb ? stats->records_link_crc - told->records_usb : 0;
-    told->clock_restarts = clock->restarts;
+    struct whisker_daemon_stats *reported = &stats->reported;
+    reported->records_crc = stats->records_link_crc > reported->records_usb ? stats->records_link_crc - reported->records_usb : 0;
+    reported->clock_restarts = clock->restarts;
 }
 
-void daemon_stats_log(const struct whisker_daemon_stats *told)
+void daemon_stats_log(const struct whisker_daemon_stats *reported)
 {
     daemon_log(LOG_NOTE,
                "%" PRIu64 " frames published, %" PRIu64 " missing, %" PRIu64 " dropped by the bridge, %" PRIu64
                " with damaged records, %" PRIu64 " bytes skipped; records: %" PRIu64 " absent, %" PRIu64
                " crc, %" PRIu64 " tick, %" PRIu64 " sensor, %" PRIu64 " usb; %" PRIu64 " reconnects, %" PRIu64
                " usb errors",
-               told->frames, told->frames_missing, told->frames_dropped, told->frames_damaged, told->bytes_skipped,
-               told->records_absent, told->records_crc, told->records_tick, told->records_sensor, told->records_usb,
-               told->reconnects, told->usb_errors);
+               reported->frames, reported->frames_missing, reported->frames_dropped, reported->frames_damaged, reported->bytes_skipped,
+               reported->records_absent, reported->records_crc, reported->records_tick, reported->records_sensor, reported->records_usb,
+               reported->reconnects, reported->usb_errors);
 }

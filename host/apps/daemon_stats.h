@@ -18,7 +18,7 @@ struct daemon_source {
 };
 
 struct daemon_stats {
-    struct whisker_daemon_stats told;
+    struct whisker_daemon_stats reported;
     uint64_t records_link_crc; /* found by bridge or host: the frame does not say which */
 };
 
@@ -42,6 +42,6 @@ void daemon_stats_settle(struct daemon_stats *stats, const struct daemon_source 
 void daemon_stats_settle_end(struct daemon_stats *stats, const struct whisker_clock_fit *clock);
 
 /* Logs it as one line. */
-void daemon_stats_log(const struct whisker_daemon_stats *told);
+void daemon_stats_log(const struct whisker_daemon_stats *reported);
 
 #endif

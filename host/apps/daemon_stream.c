@@ -134,7 +134,7 @@ static void daemon_stream_announce(struct daemon_stream *stream, const struct da
     char line[256];
     snprintf(line, sizeof line, "%s %s (gateware %u, wire %u) at %s streams into ring %s", bridge->name, about->serial,
              identity->gateware, identity->wire_version, about->path, stream->options->ring);
-    stream->stats.told.reconnects += back;
+    stream->stats.reported.reconnects += back;
     daemon_stream_tell(stream);
     daemon_log(LOG_DETAIL, "%s", line);
     daemon_notify_ready(line);
@@ -170,7 +170,7 @@ static void daemon_stream_lose(struct daemon_stream *stream, int i, int error)
 
 int daemon_stream_connected(const struct daemon_stream *stream)
 {
-    return (int)stream->stats.told.connected;
+    return (int)stream->stats.reported.connected;
 }
 
 /* Receives what has come, or waits for it; error[i]: why a bridge's stream has ended. */
@@ -207,11 +207,11 @@ int daemon_stream_receive(struct daemon_stream *stream)
 
 static void daemon_stream_tell_pair(struct daemon_stream *stream)
 {
-    const struct whisker_pair_counts *now = &stream->pair.counts, *told = &stream->pair_told;
-    if (now->realigned != told->realigned) {
+    const struct whisker_pair_counts *now = &stream->pair.counts, *reported = &stream->pair_told;
+    if (now->realigned != reported->realigned) {
         daemon_log(LOG_NOTE, "second bridge: its tick 0 is tick %lld of the first", (long long)stream->pair.offset);
     }
-    if (now->apart != 0 && told->apart == 0) {
+    if (now->apart != 0 && reported->apart == 0) {
         daemon_log(LOG_WARN,
                    "second bridge: out of step: its ticks come more than 125 us beside the first one's, or the "
                    "two are on two host controllers; wire its tick_in to the first one's tick_out, use one hub");
@@ -222,7 +222,7 @@ static void daemon_stream_tell_pair(struct daemon_stream *stream)
 static void daemon_stream_log_stats(const struct daemon_stream *stream)
 {
     const struct whisker_pair_counts *pair = &stream->pair.counts;
-    daemon_stats_log(&stream->stats.told);
+    daemon_stats_log(&stream->stats.reported);
     if (stream->bridges > 1) {
         daemon_log(
             LOG_NOTE,
@@ -243,7 +243,7 @@ void daemon_stream_tell(struct daemon_stream *stream)
     daemon_stats_settle_end(&stream->stats, &stream->clock);
     whisker_clock_get(&stream->clock, &clock);
     whisker_ring_set_clock(stream->ring, &clock);
-    whisker_ring_set_stats(stream->ring, &stream->stats.told);
+    whisker_ring_set_stats(stream->ring, &stream->stats.reported);
 }
 
 static void daemon_stream_tell_bridges(struct daemon_stream *stream, bool ticks)
@@ -331,7 +331,7 @@ bool daemon_stream_end(struct daemon_stream *stream)
         whole &= !bridge->damage_told;
     }
     daemon_stream_tell(stream);
-    if (stream->stats.told.connected_ns != 0) {
+    if (stream->stats.reported.connected_ns != 0) {
         daemon_stream_log_stats(stream);
     }
     return whole;

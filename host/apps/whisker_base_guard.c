@@ -208,14 +208,14 @@ static bool whisker_base_guard_look(struct guard *guard, bool timed)
 /* Waits for the driver's end. Returns its status as of waitpid(). */
 static int whisker_base_guard_attend(struct guard *guard)
 {
-    bool told = false;
+    bool reported = false;
     int status = 0;
     do {
-        if ((cli_stop_wanted() || guard->orphaned) && !told) {
-            told = true;
+        if ((cli_stop_wanted() || guard->orphaned) && !reported) {
+            reported = true;
             whisker_base_guard_end_driver(guard);
         }
-    } while (whisker_base_guard_look(guard, told || !guard->options->stream_clock));
+    } while (whisker_base_guard_look(guard, reported || !guard->options->stream_clock));
     close(guard->driver);
     waitpid(guard->child, &status, 0);
     if (!WIFEXITED(status)) {

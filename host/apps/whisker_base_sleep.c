@@ -19,8 +19,8 @@
 
 static void sleep_log_missing(struct base_sleep *sleep, const char *why)
 {
-    if (!sleep->told) {
-        sleep->told = true;
+    if (!sleep->reported) {
+        sleep->reported = true;
         daemon_log(LOG_DETAIL, "no notice from logind before the machine sleeps: %s", why);
     }
 }
@@ -44,7 +44,7 @@ static int sleep_on_lock(sd_bus_message *message, void *context, sd_bus_error *e
         sleep_log_missing(sleep, refused->message ? refused->message : refused->name);
     } else if (sd_bus_message_read(message, "h", &lock) > 0 && !sleep->about_to) { /* too late for this time */
         sleep->lock = fcntl(lock, F_DUPFD_CLOEXEC, 0);
-        sleep->told = false;
+        sleep->reported = false;
         daemon_log(LOG_DETAIL, "logind gives notice before the machine sleeps");
     }
     return 0;

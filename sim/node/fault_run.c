@@ -86,11 +86,11 @@ static bool fault_run_matches(const char *expected, const char *text)
 static void fault_run_compare_counters(struct fault_outcome *out, const struct fault_case *row, const sim_node *node,
                                        const char *letters)
 {
-    char told[FAULT_TEXT];
+    char reported[FAULT_TEXT];
     fault_counted(node, out->counted);
-    fault_told(letters, told);
+    fault_told(letters, reported);
     out->counted_as_expected =
-        row->counted ? fault_run_matches(row->counted, out->counted) : strcmp(told, out->counted) == 0;
+        row->counted ? fault_run_matches(row->counted, out->counted) : strcmp(reported, out->counted) == 0;
 }
 
 struct run {

@@ -16,12 +16,12 @@ enum { SEEDS = 3, HEADER_CUTS = 128, WORD_NS = 40000 };
 
 static bool is_right(const struct update_cut_outcome *o, unsigned fates)
 {
-    return o->told && (o->fate & fates) != 0 && o->ticks <= UPDATE_CUT_TICKS && o->again;
+    return o->reported && (o->fate & fates) != 0 && o->ticks <= UPDATE_CUT_TICKS && o->again;
 }
 
 static void print_wrong(const char *name, const struct update_cut_outcome *o)
 {
-    print_error("%s: fate %d, %s, %u ticks, second update %s\n", name, (int)o->fate, o->told ? "told" : "not told",
+    print_error("%s: fate %d, %s, %u ticks, second update %s\n", name, (int)o->fate, o->reported ? "told" : "not told",
                 o->ticks, o->again ? "good" : "failed");
 }
 
@@ -107,7 +107,7 @@ static int write_table(const char *path, unsigned seeds)
         for (unsigned seed = 0; seed < seeds; seed++) {
             const struct update_cut_outcome o = update_cut_run(row->cut, 0, seed);
             fprintf(file, "%s{\"fate\": %d, \"told\": %s, \"ticks\": %u, \"again\": %s}", seed ? ", " : "", (int)o.fate,
-                    o.told ? "true" : "false", o.ticks, o.again ? "true" : "false");
+                    o.reported ? "true" : "false", o.ticks, o.again ? "true" : "false");
         }
         fprintf(file, "]}");
     }

@@ -114,7 +114,7 @@ struct update_cut_outcome update_cut_run(struct update_cut cut, uint64_t after_n
     update_cuts_wait_for_the_cut(&b);
     const bool cuts = sim_node_dark(b.node);
     update_ticks(&b, 1);
-    out.told = cuts && update_cuts_is_absent(&b);
+    out.reported = cuts && update_cuts_is_absent(&b);
     update_ticks(&b, DARK_TICKS - 1);
     sim_node_restore(b.node);
     out.ticks = update_cuts_ticks_until_it_speaks(&b);

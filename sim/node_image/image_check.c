@@ -113,7 +113,7 @@ struct run {
     unsigned good;            /* records in a row */
     unsigned lost;
     bool ended;
-    uint32_t told; /* codes, as bits */
+    uint32_t reported; /* codes, as bits */
     unsigned altered;
 };
 
@@ -134,7 +134,7 @@ static void image_check_judged(void *context, unsigned tick, const struct lane_v
     if (tick == 0)
         return;
     run->lost += !v->good;
-    run->told |= v->code < 32u ? UINT32_C(1) << v->code : 0u;
+    run->reported |= v->code < 32u ? UINT32_C(1) << v->code : 0u;
     run->ended = tick > CALM && run->good >= RUN;
 }
 
@@ -193,7 +193,7 @@ static void image_check_print_resets(void)
             "%s{\"cause\": \"%s\", \"keeps_clock\": %s, \"good\": %s, \"lost\": %u, \"told\": %lu, \"breaches\": %u, "
             "\"hz\": [%lu, %lu]}",
             i ? ",\n " : "", CAUSES[i / 2u].name, i % 2u ? "true" : "false", run.ended ? "true" : "false", run.lost,
-            (unsigned long)run.told, run.altered, (unsigned long)hz[0], (unsigned long)hz[1]);
+            (unsigned long)run.reported, run.altered, (unsigned long)hz[0], (unsigned long)hz[1]);
     }
     printf("]\n");
 }

@@ -123,9 +123,9 @@ def test_a_node_is_back_after_every_kind_of_reset_at_its_full_clock(image):
     resets = image.measured("image_check", "resets")
     assert len(resets) == 12
     for reset in resets:
-        told = CODES.get(reset["cause"], RESET_POWER)
+        reported = CODES.get(reset["cause"], RESET_POWER)
         assert reset["good"] and reset["breaches"] == 0, reset
-        assert reset["told"] & 1 << told and not reset["told"] & 0x700 & ~(1 << told), reset
+        assert reset["told"] & 1 << reported and not reset["told"] & 0x700 & ~(1 << reported), reset
         assert reset["hz"][0] == reset["hz"][1] > 38_000_000, reset
 
 
@@ -147,8 +147,8 @@ def test_the_script_for_another_simulator_times_each_interrupt_once():
     assert done.returncode == 0, done.stderr
     lines = done.stdout.splitlines()
     assert lines.count("print /d TMR1") == len(IRQS)
-    told = [int(line.split(": ")[1].split()[0]) for line in lines if line.startswith("echo")]
-    assert len(told) == len(IRQS) and all(20 < cycles < 2000 for cycles in told)
+    reported = [int(line.split(": ")[1].split()[0]) for line in lines if line.startswith("echo")]
+    assert len(reported) == len(IRQS) and all(20 < cycles < 2000 for cycles in reported)
     stops = [int(line.split("*")[1], 16) // 2 for line in lines if line.startswith("break")]
     words = translate.flash_words(wire(TRIED[0]))
     assert set(stops[::2]) == set(paths.handlers(words, IRQS).values())

@@ -37,10 +37,10 @@ def main() -> int:
     failures = [
         f"{event['fault']} at {event['at_s']:.1f} s: {wrong}" for event in events for wrong in event["failures"]
     ]
-    told = {"seed": arguments.seed, "level": arguments.level, "create": arguments.create}
-    told |= {"simulated_s": round(course.simulated_s, 1), "wall_s": round(course.wall_s, 1)}
-    told |= {"errors_m": [round(error, 3) for _, error in course.errors], "events": events}
-    (out / "drills.json").write_text(json.dumps(told) + "\n")
+    reported = {"seed": arguments.seed, "level": arguments.level, "create": arguments.create}
+    reported |= {"simulated_s": round(course.simulated_s, 1), "wall_s": round(course.wall_s, 1)}
+    reported |= {"errors_m": [round(error, 3) for _, error in course.errors], "events": events}
+    (out / "drills.json").write_text(json.dumps(reported) + "\n")
     print(
         f"{len(events)} faults in {course.simulated_s:.0f} simulated s ({course.wall_s:.0f} s); {len(failures)} failures"
     )

@@ -56,8 +56,8 @@ class Event:
             wrong.append(f"not localised within {FOUND_S:.0f} s")
         if self.sought and not self.ready:
             wrong.append(f"not localised before it, {READY_S:.0f} s after the fault before")
-        if self.gap and not self.gap.told:
-            wrong.append(f"{self.gap.real} {self.gap.unit} lost, {self.gap.reported} told")
+        if self.gap and not self.gap.agrees:
+            wrong.append(f"{self.gap.real} {self.gap.unit} lost, {self.gap.reported} reported")
         return wrong
 
 
@@ -151,10 +151,10 @@ class Course:
     def _fill_stops(self, events: list[Event], machine: Machine) -> None:
         """From the emulator's own list of what its wheels were told."""
         with machine.wheels.open(newline="") as file:
-            told = [(float(r["monotonic_s"]), r["v_m_s"], r["omega_rad_s"]) for r in csv.DictReader(file)]
+            reported = [(float(r["monotonic_s"]), r["v_m_s"], r["omega_rad_s"]) for r in csv.DictReader(file)]
         commanders = {fault.name for fault in self._faults if fault.commander}
         for event in events:
-            event.stop_s = _stopped(told, event) if event.fault in commanders else None
+            event.stop_s = _stopped(reported, event) if event.fault in commanders else None
 
     def _fill_records(self, events: list[Event], machine: Machine) -> None:
         """From the simulation's own list of what it spoilt."""
@@ -166,12 +166,14 @@ class Course:
                 event.gap = replace(event.gap, real=real)
 
 
-def _stopped(told: list[tuple[float, str, str]], event: Event) -> float | None:
+def _stopped(reported: list[tuple[float, str, str]], event: Event) -> float | None:
     """From the fault's begin to the first standing order after it; 0: they stood. None: there was none."""
-    before = [entry for entry in told if entry[0] <= event.begun]
+    before = [entry for entry in reported if entry[0] <= event.begun]
     if not before or _stands(before[-1]):
         return 0.0
-    return next((when - event.begun for when, *speeds in told if when > event.begun and _stands((when, *speeds))), None)
+    return next(
+        (when - event.begun for when, *speeds in reported if when > event.begun and _stands((when, *speeds))), None
+    )
 
 
 def _stands(entry: tuple[float, str, str]) -> bool:
@@ -179,7 +181,7 @@ def _stands(entry: tuple[float, str, str]) -> bool:
 
 
 def _line(event: Event) -> str:
-    gap = f"{event.gap.real} {event.gap.unit}, told {event.gap.reported}" if event.gap else "-"
+    gap = f"{event.gap.real} {event.gap.unit}, reported {event.gap.reported}" if event.gap else "-"
     return (
         f"{event.at_s:7.1f} s  {event.fault:32s} ready {event.ready:d}  answered {_s(event.answered_s)}"
         f"  found {_s(event.found_s)}  gap {gap}  {event.silent or ''}"

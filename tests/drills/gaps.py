@@ -31,7 +31,7 @@ class Count:
     @classmethod
     def take(cls, machine: Machine, witness: Witness) -> "Count":
         messages = witness.messages
-        told = {
+        reported = {
             name: messages.health[name][1].counts if name in messages.health else {} for name in ("pilot", "navigator")
         }
         ticks, frames, bad = witness.truth.tick, witness.frames.count, int(witness.frames.bad[WHISKER])
@@ -44,7 +44,7 @@ class Count:
             len(messages.rows),
             len(messages.answers),
             machine.base_health(),
-            **told,
+            **reported,
             bags=bags,
         )
 
@@ -59,7 +59,7 @@ class Gap:
     slack: float = 0.0
 
     @property
-    def told(self) -> bool:
+    def agrees(self) -> bool:
         return abs(self.real - self.reported) <= self.slack
 
 

@@ -29,18 +29,20 @@ def spread(values: Iterable[float | None]) -> str:
     values = list(values)
     known = [value for value in values if value is not None]
     never = f"{len(values) - len(known)} never" if len(known) < len(values) else ""
-    told = f"{median(known):.2f}, {max(known):.2f}" if known else ""
-    return "; ".join(filter(None, (never, told))) or "-"
+    reported = f"{median(known):.2f}, {max(known):.2f}" if known else ""
+    return "; ".join(filter(None, (never, reported))) or "-"
 
 
 def row(fault, events: list[dict]) -> str:
     stops = [e["stop_s"] for e in events if fault.commander and e["moving"]]
     found = [e["found_s"] for e in events if e["ready"]]
     gaps = [e["gap"] for e in events if e["gap"]]
-    lost, told = (f"{sum(g[key] for g in gaps):.0f} {gaps[0]['unit']}" if gaps else "-" for key in ("real", "reported"))
+    lost, reported = (
+        f"{sum(g[key] for g in gaps):.0f} {gaps[0]['unit']}" if gaps else "-" for key in ("real", "reported")
+    )
     failed = sum(bool(e["failures"]) for e in events)
     answered = [e["answered_s"] for e in events]
-    cells = (fault.name, len(events), spread(stops), spread(answered), spread(found), lost, told, failed)
+    cells = (fault.name, len(events), spread(stops), spread(answered), spread(found), lost, reported, failed)
     return "| " + " | ".join(map(str, cells)) + " |\n"
 
 
@@ -73,13 +75,13 @@ def table(runs: list[dict]) -> str:
 
 def summary(runs: list[dict]) -> dict:
     """For bench/results: the events as they were, errors as quantiles."""
-    told = []
+    reported = []
     for run in runs:
         errors = np.array(run["errors_m"])
         quantiles = {f"error_p{q}_m": round(float(np.percentile(errors, q)), 4) for q in (50, 90, 99)}
         kept = {key: value for key, value in run.items() if key != "errors_m"}
-        told.append(kept | quantiles | {"answers": len(errors), "answers_off": int((errors > NEAR_M).sum())})
-    return {"limits": {"stop_s": STOP_S, "answer_s": ANSWER_S, "near_s": FOUND_S, "near_m": NEAR_M}, "runs": told}
+        reported.append(kept | quantiles | {"answers": len(errors), "answers_off": int((errors > NEAR_M).sum())})
+    return {"limits": {"stop_s": STOP_S, "answer_s": ANSWER_S, "near_s": FOUND_S, "near_m": NEAR_M}, "runs": reported}
 
 
 def main(paths: list[str]) -> None:

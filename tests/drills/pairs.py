@@ -103,7 +103,7 @@ class Wheels:
     """The emulated base's list of what its wheels were told, read as it grows: (monotonic s, whether they turn)."""
 
     def __init__(self, path: Path):
-        self._path, self._at, self.told = path, 0, []
+        self._path, self._at, self.reported = path, 0, []
 
     def read(self) -> list[tuple[float, bool]]:
         if self._path.exists():
@@ -115,20 +115,20 @@ class Wheels:
             for line in whole.splitlines():
                 if not line.startswith("tick"):
                     _, when, v, omega = map(float, line.split(","))
-                    self.told.append((when, v != 0.0 or omega != 0.0))
-        return self.told
+                    self.reported.append((when, v != 0.0 or omega != 0.0))
+        return self.reported
 
     @property
     def turn(self) -> bool:
-        told = self.read()
-        return bool(told) and told[-1][1]
+        reported = self.read()
+        return bool(reported) and reported[-1][1]
 
     def stopped_after(self, begun: float) -> float | None:
         """Seconds until they stood, 0 where they stood; None: they turn on."""
         before = [turns for when, turns in self.read() if when <= begun]
         if not before or not before[-1]:
             return 0.0
-        return next((when - begun for when, turns in self.told if when > begun and not turns), None)
+        return next((when - begun for when, turns in self.reported if when > begun and not turns), None)
 
 
 class Robot:
@@ -294,9 +294,9 @@ class Campaign:
 
     def _keep(self, trial: Trial) -> None:
         self._note(asdict(trial))
-        told = ", ".join(f"{name} {kind}" for name, kind in trial.hits)
+        reported = ", ".join(f"{name} {kind}" for name, kind in trial.hits)
         numbers = f"stopped {_s(trial.stop_s)}  back {_s(trial.back_s)}"
-        self._say(f"{trial.number:4}  {told:36} {numbers}  {'; '.join(trial.wrong)}")
+        self._say(f"{trial.number:4}  {reported:36} {numbers}  {'; '.join(trial.wrong)}")
 
     def _note(self, result: dict) -> None:
         self.results.append(result)

@@ -175,12 +175,12 @@ def at_stop_code(pairs: int, rng: random.Random) -> dict:
     done = hung = 0
     while done < pairs:
         pid, woken = _waiter()
-        with os.fdopen(woken, "rb", buffering=0) as told:
+        with os.fdopen(woken, "rb", buffering=0) as reported:
             while done < pairs:
-                assert told.read(1) == b"r"
+                assert reported.read(1) == b"r"
                 send_pair(pid, rng.choice(PAIRS), rng.uniform(0.0, GAP_MOST_S))
                 done += 1
-                if not _answers(told):
+                if not _answers(reported):
                     hung += 1
                     break
         os.kill(pid, signal.SIGKILL)
@@ -204,8 +204,8 @@ def _waiter() -> tuple[int, int]:
         os.write(writing, b"d")
 
 
-def _answers(told) -> bool:
-    return bool(select.select([told], [], [], HUNG_S)[0]) and told.read(1) == b"d"
+def _answers(reported) -> bool:
+    return bool(select.select([reported], [], [], HUNG_S)[0]) and reported.read(1) == b"d"
 
 
 class Campaign:
@@ -230,8 +230,10 @@ class Campaign:
         lines = []
         for what in dict.fromkeys(result["what"] for result in self.results):
             codes = Counter(str(result["code"]) for result in self.results if result["what"] == what)
-            told = ", ".join(f"{count} times {code}" for code, count in codes.items())
-            lines.append(f"{what:12} {self.count('pairs', what):6} pairs, {self.count('hung', what)} hung; exit {told}")
+            reported = ", ".join(f"{count} times {code}" for code, count in codes.items())
+            lines.append(
+                f"{what:12} {self.count('pairs', what):6} pairs, {self.count('hung', what)} hung; exit {reported}"
+            )
         return "\n".join(lines)
 
 

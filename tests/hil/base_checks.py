@@ -129,10 +129,10 @@ def mode(rig: Rig) -> str:
     wanted = "full" if rig.wheels_up else "safe"
     with rig.base(wanted) as base:
         await_frames(base, 1)
-        told = f"it does not enter {wanted} mode; take it off its charger, put it on the floor, or on blocks with --wheels-up"
+        reported = f"it does not enter {wanted} mode; take it off its charger, put it on the floor, or on blocks with --wheels-up"
         frames = count(base, "frames") + MODE_FRAMES
         while base.health()["mode"] != wanted:
-            require(count(base, "frames") < frames, told)
+            require(count(base, "frames") < frames, reported)
             await_frames(base, 1)
     return wanted
 

@@ -50,12 +50,12 @@ def identity(rig: Rig) -> str:
     """It says the same lanes, clock, sizes and versions as this host's protocol."""
     bridge = rig.bridge
     with opened(bridge) as device:
-        told, serial = device.report("identity"), device.serial
+        reported, serial = device.report("identity"), device.serial
     wanted = {"wire_version": WIRE_VERSION, "lanes": LANES, "gateware": LIMITS["gateware_version"]}
     wanted |= {"clock_hz": LIMITS["clock_hz"], "frame_bytes": FRAME_BYTES, "fifo_bytes": LIMITS["fifo_bytes"]}
-    wrong = [f"{key} {told[key]}, not {value}" for key, value in wanted.items() if told[key] != value]
+    wrong = [f"{key} {reported[key]}, not {value}" for key, value in wanted.items() if reported[key] != value]
     require(not wrong, f"{', '.join(wrong)}; install gateware and host of one release")
-    return f"serial number {serial}, gateware {told['gateware']}, wire version {told['wire_version']}"
+    return f"serial number {serial}, gateware {reported['gateware']}, wire version {reported['wire_version']}"
 
 
 def hid_control(rig: Rig) -> str:
@@ -67,12 +67,12 @@ def hid_control(rig: Rig) -> str:
         device.control(False, **set_to)
         for key, value in refused.items():
             require(device.refuses(**{key: value}), f"takes {key} {value}, which it must refuse")
-            told = device.report("control")
-            wrong = [name for name, given in set_to.items() if told[name] != given]
+            reported = device.report("control")
+            wrong = [name for name, given in set_to.items() if reported[name] != given]
             require(not wrong, f"{', '.join(wrong)} not as set, after a refused {key}")
         counters = device.run(SWEEP_FRAMES)
-    told = f"{counters['ticks']} ticks, {counters['frames']} frames, {counters['dropped']} dropped"
-    require(counters["ticks"] - 1 == counters["frames"] >= SWEEP_FRAMES and counters["dropped"] == 0, told)
+    reported = f"{counters['ticks']} ticks, {counters['frames']} frames, {counters['dropped']} dropped"
+    require(counters["ticks"] - 1 == counters["frames"] >= SWEEP_FRAMES and counters["dropped"] == 0, reported)
     require(counters["running"] == 0, "it does not stop")
     return f"{len(set_to)} settings read back, {len(refused)} refused, started and stopped"
 
@@ -141,8 +141,8 @@ def lanes(rig: Rig) -> str:
     wrong = [f"lane {lane}: {_trouble(status[:, n], shares[n])}" for n, lane in enumerate(rig.populated)]
     bad = [text for text, share in zip(wrong, shares, strict=True) if share > BAD_SHARE]
     require(not bad, "; ".join(bad))
-    told = ", ".join(map(str, rig.populated))
-    return f"lanes {told} answer, at most {100 * shares.max():.2g} % bad samples on one"
+    reported = ", ".join(map(str, rig.populated))
+    return f"lanes {reported} answer, at most {100 * shares.max():.2g} % bad samples on one"
 
 
 def _trouble(status: np.ndarray, share: float) -> str:

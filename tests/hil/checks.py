@@ -44,7 +44,7 @@ class Checks:
         if self._wanted and not name.startswith(tuple(self._wanted)):
             return
         try:
-            told = check()
+            reported = check()
         except SkipError as reason:
             self.skipped += 1
             print(f"skip {name}: {reason}: skipped", flush=True)
@@ -53,7 +53,7 @@ class Checks:
             print(f"FAILED {name}: {error}", flush=True)
         else:
             self.passed += 1
-            print(f"ok {name}: {told}", flush=True)
+            print(f"ok {name}: {reported}", flush=True)
 
     def end(self) -> int:
         """The last line, and the exit code: 1 if anything failed."""

@@ -91,8 +91,8 @@ def lsusb(_: Checks) -> str:
     done = subprocess.run(["lsusb", "-v", "-d", IDENTITY], capture_output=True, text=True, timeout=PROGRAM_S)
     wanted = ["Whisker bridge", "CrunchBot", "bInterfaceClass 255 ", "bInterfaceClass 3 ", "HID Device Descriptor"]
     wanted += ["EP 1 IN", "EP 2 IN", "Binary Object Store Descriptor", MICROSOFT_OS_20]
-    told = re.sub(r" +", " ", done.stdout)
-    missing = [text for text in wanted if text not in told]
+    reported = re.sub(r" +", " ", done.stdout)
+    missing = [text for text in wanted if text not in reported]
     require(done.returncode == 0 and not missing, f"exit code {done.returncode}, missing: {', '.join(missing)}")
     return f"{len(done.stdout.splitlines())} lines"
 
@@ -188,9 +188,9 @@ def hidapi_libusb(checks: BridgeChecks) -> None:
 
 def pyusb(_: Checks) -> str:
     """pyusb in a process of its own: the guest has no udevd, so libusb sees what was plugged before its start only."""
-    told = command(sys.executable, __file__, PYUSB).strip()
+    reported = command(sys.executable, __file__, PYUSB).strip()
     await_state(True)
-    return told
+    return reported
 
 
 def pyusb_session() -> str:
@@ -258,8 +258,8 @@ def daemon(checks: BridgeChecks):
             yield process
         finally:
             process.terminate()
-            _, told = process.communicate(timeout=PLUG_S)
-    require(process.returncode == 0, f"whiskerd: exit code {process.returncode}: {told.strip().splitlines()[-1:]}")
+            _, reported = process.communicate(timeout=PLUG_S)
+    require(process.returncode == 0, f"whiskerd: exit code {process.returncode}: {reported.strip().splitlines()[-1:]}")
 
 
 def read_ring(checks: BridgeChecks, frames: int, cuts: int = 0, at_first_thousand: Callable = lambda: None) -> str:
@@ -332,9 +332,9 @@ def free_attach(checks: BridgeChecks) -> str:
 
 def free_run(_: Checks) -> str:
     """Frames of a bridge on its own divider, each dated by the host's start-of-frame packets."""
-    told = command(sys.executable, __file__, FREE).strip()
+    reported = command(sys.executable, __file__, FREE).strip()
     await_state(True)
-    return told
+    return reported
 
 
 def free_session() -> str:

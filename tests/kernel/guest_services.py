@@ -79,16 +79,16 @@ def as_user(uid: int, groups: list[int], attempt: Callable[[], object]) -> str:
         os.setresgid(NOBODY, NOBODY, NOBODY)
         os.setresuid(uid, uid, uid)
         try:
-            told = str(attempt())
+            reported = str(attempt())
         except OSError as error:
-            told = type(error).__name__
-        os.write(write, told.encode())
+            reported = type(error).__name__
+        os.write(write, reported.encode())
         os._exit(0)
     os.close(write)
     with os.fdopen(read) as answer:
-        told = answer.read()
+        reported = answer.read()
     os.waitpid(child, 0)
-    return told
+    return reported
 
 
 def group_of(user: str) -> int:
@@ -165,9 +165,9 @@ def ring_place(_: Checks) -> str:
     await_that(ring_files, "there is no ring")
     found = ring_files()
     require([path.parent.name for path in found] == ["whiskerd"], f"ring at {', '.join(map(str, found))}")
-    told = f"{owner_and_mode(found[0].parent)}, {owner_and_mode(found[0])}"
-    require(told == "whisker:whisker 0755, whisker:whisker 0644", told)
-    return told
+    reported = f"{owner_and_mode(found[0].parent)}, {owner_and_mode(found[0])}"
+    require(reported == "whisker:whisker 0755, whisker:whisker 0644", reported)
+    return reported
 
 
 def ring_of_another_user(_: Checks) -> str:
@@ -329,9 +329,9 @@ def bases_start(_: Checks) -> str:
 
 def base_ports(_: Checks) -> str:
     """The ports that are driven belong to the service's group."""
-    told = {owner_and_mode(Path("/dev") / port) for port in BASES}
-    require(told == {"root:whisker-base 0660"}, ", ".join(told))
-    return told.pop()
+    reported = {owner_and_mode(Path("/dev") / port) for port in BASES}
+    require(reported == {"root:whisker-base 0660"}, ", ".join(reported))
+    return reported.pop()
 
 
 def base_access(_: Checks) -> str:
@@ -394,8 +394,8 @@ def base_inhibits_sleep(_: Checks) -> str:
 
 def tell_asleep() -> None:
     """In place of the kernel's suspend: writes down what the base says at that time."""
-    told = health(BASES[0])
-    ASLEEP.write_text(f"held={told['held']} v={told['v_m_s']} omega={told['omega_rad_s']}")
+    reported = health(BASES[0])
+    ASLEEP.write_text(f"held={reported['held']} v={reported['v_m_s']} omega={reported['omega_rad_s']}")
 
 
 def base_stands_asleep(_: Checks) -> str:
@@ -409,10 +409,10 @@ def base_stands_asleep(_: Checks) -> str:
         with subprocess.Popen(["systemctl", "suspend"]) as suspending:
             await_that(lambda: say(f"drive {WHEELS_M_S} 0") and ASLEEP.exists(), "the machine does not sleep")
         require(suspending.returncode == 0, "systemctl suspend failed")
-        told = ASLEEP.read_text()
-        require(re.fullmatch(r"held=sleep v=-?0(\.0*)? omega=-?0(\.0*)?", told) is not None, told)
+        reported = ASLEEP.read_text()
+        require(re.fullmatch(r"held=sleep v=-?0(\.0*)? omega=-?0(\.0*)?", reported) is not None, reported)
         await_that(lambda: float(say(f"drive {WHEELS_M_S} 0").split()[2]) > 0, "the wheels stay held")
-    return told
+    return reported
 
 
 def base_unplugged(checks: Checks) -> None:

@@ -51,8 +51,8 @@ class Checks:
         """Run one; what it returns is told beside the name."""
         began = time.monotonic()
         try:
-            told = check(self)
-            self.talk.say(f"ok {name}:", f"{told or 'as it should be'} ({time.monotonic() - began:.1f} s)")
+            reported = check(self)
+            self.talk.say(f"ok {name}:", f"{reported or 'as it should be'} ({time.monotonic() - began:.1f} s)")
         except (CheckError, OSError, subprocess.SubprocessError) as error:
             self.talk.say(f"FAILED {name}:", str(error))
         except Exception:

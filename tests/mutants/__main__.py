@@ -164,8 +164,14 @@ class Tree:
             path.write_text(text)
         spent = round(time.monotonic() - began, 1)
         line = text.splitlines()[mutant.line - 1].strip()
-        told = {"file": mutant.file, "line": mutant.line, "text": line, "before": mutant.before, "after": mutant.after}
-        return told | {"outcome": outcome, "red": red, "step": step, "near_only": near_only, "seconds": spent}
+        reported = {
+            "file": mutant.file,
+            "line": mutant.line,
+            "text": line,
+            "before": mutant.before,
+            "after": mutant.after,
+        }
+        return reported | {"outcome": outcome, "red": red, "step": step, "near_only": near_only, "seconds": spent}
 
 
 def hash_of(commit: str) -> str:

@@ -6,7 +6,7 @@ import cocotb
 from bench import error_record, pulse, wrong_tick
 from cocotb.triggers import ClockCycles, FallingEdge
 from cycles import service
-from rig import CYCLES_PER_TICK, NODES, answer, begin, check, told
+from rig import CYCLES_PER_TICK, NODES, answer, begin, check, reported
 
 from crunchbot.protocol import COMMANDS, LANES, LIMITS, ORDER, WIRE_VERSION, service_window
 
@@ -41,10 +41,10 @@ async def a_service_order_goes_out_once_and_brings_the_answers_to_the_one_before
     rig.nodes.answers |= {lane: answer(3, 4, lane) for lane in range(18, 28)}
     await rig.step()
     _, found = await rig.host.answers(stalls)
-    wanted = [told(error_record(0, "absent"))] * LANES
+    wanted = [reported(error_record(0, "absent"))] * LANES
     for lane in (0, 1, 13, *range(18, 28)):
-        wanted[lane] = told(answer(3, 4, lane))
-    wanted[2], wanted[3] = told(error_record(0, "link_tick")), told(error_record(0, "link_crc"))
+        wanted[lane] = reported(answer(3, 4, lane))
+    wanted[2], wanted[3] = reported(error_record(0, "link_tick")), reported(error_record(0, "link_crc"))
     assert found == wanted
     await rig.host.control(0)
     await rig.step("transfer_busy")
@@ -83,7 +83,7 @@ async def a_usb_restart_forgets_a_service_order_and_the_answers(dut):
     rig = await begin(dut)
     await rig.host.control(1)
     await rig.answered_order()
-    assert (await rig.host.answers())[1][0] == told(answer(0, 1, 0))
+    assert (await rig.host.answers())[1][0] == reported(answer(0, 1, 0))
     await rig.host.order(1)
     await pulse(dut, dut.tick_strobe)
     await ClockCycles(dut.clk, 3500)
@@ -94,7 +94,7 @@ async def a_usb_restart_forgets_a_service_order_and_the_answers(dut):
     assert int(dut.select_n.value)
     header, found = await rig.host.answers()
     assert (header["pending"], header["sequence"]) == (0, 2)
-    assert found == [told(error_record(0, "absent"))] * LANES
+    assert found == [reported(error_record(0, "absent"))] * LANES
     await rig.host.control(1)
     rig.tick = 0
     assert await rig.step() <= CYCLES_PER_TICK

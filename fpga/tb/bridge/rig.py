@@ -190,5 +190,5 @@ def answer(tick: int, command: int, lane: int) -> bytes:
     return record(tick, 7 * lane, 0x1234, CODES["answer"] << STATUS_CODE_SHIFT | command)
 
 
-def told(raw: bytes) -> tuple[int, int, int]:
+def reported(raw: bytes) -> tuple[int, int, int]:
     return struct.unpack("<HHH", raw[1:7])

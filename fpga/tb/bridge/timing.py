@@ -6,7 +6,7 @@ import random
 import cocotb
 from bench import pulse
 from cocotb.triggers import ClockCycles, FallingEdge, RisingEdge, with_timeout
-from rig import FAST, NODES, answer, begin, check, reading, told
+from rig import FAST, NODES, answer, begin, check, reading, reported
 
 from crunchbot.protocol import CONTROL_OPTIONS, FRAME_BYTES, FRAME_FLAGS, LANES, LIMITS, REPORTS, decode_frame
 
@@ -173,7 +173,7 @@ async def answers_that_come_during_a_read_are_shown_after_it(dut):
     await ClockCycles(dut.clk, 3)
     header, found = await rig.host.answers()
     assert (header["pending"], header["sequence"]) == (1, before[0]["sequence"] + 1)
-    assert found == [told(answer(1, 0, lane)) for lane in range(LANES)]
+    assert found == [reported(answer(1, 0, lane)) for lane in range(LANES)]
     await rig.step()
     assert (await rig.host.answers())[0]["sequence"] == before[0]["sequence"] + 2
 

@@ -5,7 +5,7 @@ import random
 import cocotb
 from bench import error_record, pulse, record, wrong_tick
 from cocotb.triggers import ClockCycles, FallingEdge
-from rig import FAST, FIFO_FRAMES, answer, begin, told
+from rig import FAST, FIFO_FRAMES, answer, begin, reported
 
 from crunchbot.protocol import FRAME_FLAGS, LANES, REPORTS, WIRE_VERSION
 
@@ -81,7 +81,7 @@ async def an_order_carries_any_tick_and_its_answers_are_asked_for_by_it(dut):
         await rig.step()
         header, found = await rig.host.answers()
         assert header["sequence"] == (tick + 2) & 0xFF
-        assert found == [told(answer(0, 3, lane)) for lane in range(LANES)]
+        assert found == [reported(answer(0, 3, lane)) for lane in range(LANES)]
 
 
 @cocotb.test(timeout_time=20, timeout_unit="ms")

@@ -5,7 +5,7 @@ import os
 import cocotb
 import pytest
 from bench import error_record, run_bench
-from bridge.rig import RTL, Rig, answer, begin, reading, told
+from bridge.rig import RTL, Rig, answer, begin, reading, reported
 
 from crunchbot.protocol import FRAME_BYTES, LANES
 
@@ -54,8 +54,8 @@ async def answers_of_lanes_it_lacks_are_off(dut):
     await rig.host.control(1)
     await rig.answered_order()
     _, found = await rig.host.answers()
-    absent, off = told(error_record(0, "absent")), told(error_record(0, "lane_off"))
-    assert found == [told(answer(0, 1, 0))] + [absent] * (HAVE - 1) + [off] * (LANES - HAVE)
+    absent, off = reported(error_record(0, "absent")), reported(error_record(0, "lane_off"))
+    assert found == [reported(answer(0, 1, 0))] + [absent] * (HAVE - 1) + [off] * (LANES - HAVE)
 
 
 @pytest.mark.parametrize("lanes", [1, 12])

@@ -165,10 +165,10 @@ static void a_host_clock_that_goes_back_is_told_and_nothing_is_lost(void **state
     static const char *const clocks[] = {"realtime", "monotonic"};
     for (size_t i = 0; i < 2; i++) {
         assert_int_equal(finish(start(with_fake(clocks[i]))), 0);
-        const char *told = strstr(content("out"), "whiskerd: clock: the host's clock was set or went backwards; none");
-        assert_non_null(told);
-        assert_null(strstr(strchr(told, '\n'), "clock:")); /* once */
-        assert_non_null(strstr(told, "whiskerd: 4001 frames published, 0 missing"));
+        const char *reported = strstr(content("out"), "whiskerd: clock: the host's clock was set or went backwards; none");
+        assert_non_null(reported);
+        assert_null(strstr(strchr(reported, '\n'), "clock:")); /* once */
+        assert_non_null(strstr(reported, "whiskerd: 4001 frames published, 0 missing"));
     }
 }
 
@@ -176,16 +176,16 @@ static void what_is_wrong_with_tick_in_is_told_once(void **state)
 {
     (void)state;
     const char *words[] = {WHISKERD_FAKE, "--ring", ring_name(), "--tick-in", "rising", NULL};
-    static const char *const told[][2] = {
+    static const char *const reported[][2] = {
         {"silent",
          "whiskerd: tick_in: no edge comes at the bridge's pin tick_in, so there are no ticks; check the wire"},
         {"fast", "whiskerd: tick_in: edges come at tick_in less than 7/8 of the tick period after the last: they are"}};
     for (size_t i = 0; i < 2; i++) {
-        setenv("WHISKER_FAKE", told[i][0], 1);
+        setenv("WHISKER_FAKE", reported[i][0], 1);
         assert_int_equal(finish(start(words)), 0);
-        const char *line = strstr(content("out"), told[i][1]);
+        const char *line = strstr(content("out"), reported[i][1]);
         assert_non_null(line);
-        assert_null(strstr(line + 1, told[i][1]));
+        assert_null(strstr(line + 1, reported[i][1]));
     }
     words[3] = NULL; /* ticks of its own: the pin does not matter */
     assert_int_equal(finish(start(words)), 0);
@@ -329,14 +329,14 @@ static void log_says_when_the_writer_dies(void **state)
     const pid_t writer = fork_tied();
     if (writer == 0) {
         struct whisker_ring *ring;
-        const char told = whisker_ring_create(name, 1024, &ring) == 0 ? 'y' : 'n';
-        if (write(ready[1], &told, 1) == 1) {
+        const char reported = whisker_ring_create(name, 1024, &ring) == 0 ? 'y' : 'n';
+        if (write(ready[1], &reported, 1) == 1) {
             pause();
         }
         _exit(1);
     }
-    char told;
-    assert_int_equal(read(ready[0], &told, 1), 1);
+    char reported;
+    assert_int_equal(read(ready[0], &reported, 1), 1);
     char path[128];
     snprintf(path, sizeof path, "%s/socket", folder);
     unlink(path);
@@ -451,9 +451,9 @@ static void log_ends_at_a_head_that_cannot_be(void **state)
         uint64_t head, claim;
     } forged[] = {{UINT64_MAX, 0}, {1000000, 0}, {1000000, INT64_MAX}};
     (void)state;
-    char path[128], told[256];
+    char path[128], reported[256];
     snprintf(path, sizeof path, "%s/socket", folder);
-    snprintf(told, sizeof told, "%s: another process has changed the ring's memory; start whiskerd again", ring_name());
+    snprintf(reported, sizeof reported, "%s: another process has changed the ring's memory; start whiskerd again", ring_name());
     for (size_t i = 0; i < sizeof forged / sizeof forged[0]; i++) {
         unlink(path);
         const int listening = listen_at(path);
@@ -466,7 +466,7 @@ static void log_ends_at_a_head_that_cannot_be(void **state)
         forge(CLAIM, &forged[i].claim, sizeof forged[i].claim);
         forge(HEAD, &forged[i].head, sizeof forged[i].head);
         assert_int_equal(finish(child), 1);
-        assert_non_null(strstr(content("out"), told));
+        assert_non_null(strstr(content("out"), reported));
         whisker_ring_close(ring);
         close(connection);
         close(listening);

@@ -46,7 +46,7 @@ static bool come(int i, int64_t now_ms)
 }
 
 /* What client i was told; empty: its connection was closed. NULL: nothing. */
-static const char *told(int i)
+static const char *reported(int i)
 {
     const ssize_t got = recv(far[i], answer, sizeof answer - 1, 0);
     answer[got > 0 ? got : 0] = '\0';
@@ -56,7 +56,7 @@ static const char *told(int i)
 static const char *ask(int i, const char *message, int64_t now_ms)
 {
     say(far[i], message, now_ms);
-    return told(i);
+    return reported(i);
 }
 
 /* Says something that is not read yet. */
@@ -67,7 +67,7 @@ static void say_unheard(int i, const char *message)
 
 static bool closed(int i)
 {
-    const char *text = told(i);
+    const char *text = reported(i);
     return text && !*text;
 }
 
@@ -142,8 +142,8 @@ static void who_has_said_nothing_loses_its_place_to_a_new_client(void **state)
     assert_false(base_clients_crowded(&clients, late_ms));
     assert_true(come(BASE_CLIENTS, late_ms));
     assert_true(closed(2));
-    assert_null(told(0));
-    assert_null(told(1));
+    assert_null(reported(0));
+    assert_null(reported(1));
 }
 
 static void who_has_said_nonsense_loses_its_place_at_once(void **state)
@@ -168,7 +168,7 @@ static void who_has_spoken_of_late_keeps_its_place(void **state)
     }
     assert_false(base_clients_crowded(&clients, OPENED_MS + BASE_PLACE_MS - 1));
     assert_false(come(BASE_CLIENTS, OPENED_MS + BASE_PLACE_MS - 1));
-    assert_answer(told(BASE_CLIENTS), "error 64 clients are connected; end one of them first");
+    assert_answer(reported(BASE_CLIENTS), "error 64 clients are connected; end one of them first");
     close(far[BASE_CLIENTS]);
     assert_true(come(BASE_CLIENTS, OPENED_MS + BASE_PLACE_MS));
     assert_true(closed(3));
@@ -197,7 +197,7 @@ static void the_commander_keeps_its_place_while_it_orders(void **state)
     clients.client[0].heard_ms = OPENED_MS; /* silent longest, by what it has asked */
     assert_true(come(BASE_CLIENTS, OPENED_MS + BASE_PLACE_MS + 1));
     assert_true(closed(1));
-    assert_null(told(0));
+    assert_null(reported(0));
 }
 
 static void in_lock_step_whoever_leads_the_stream_keeps_its_place(void **state)
@@ -206,7 +206,7 @@ static void in_lock_step_whoever_leads_the_stream_keeps_its_place(void **state)
     fill_places(OPENED_MS);
     say(far[0], "odometry after 1000", OPENED_MS);
     assert_true(come(BASE_CLIENTS, OPENED_MS + 1000 * BASE_PLACE_MS));
-    assert_null(told(0));
+    assert_null(reported(0));
     assert_true(closed(1));
 }
 

@@ -188,8 +188,8 @@ static struct create_step odometry_step_by_values(struct create_odometry *odomet
                                                   double d, double a)
 {
     const struct odometry_units asked = odometry_units(d, a);
-    const struct odometry_units told = {frame->value[CREATE_OI_DISTANCE], frame->value[CREATE_OI_ANGLE]};
-    standing_watch(odometry, asked, told, odometry->remainder == CREATE_KEPT);
+    const struct odometry_units reported = {frame->value[CREATE_OI_DISTANCE], frame->value[CREATE_OI_ANGLE]};
+    standing_watch(odometry, asked, reported, odometry->remainder == CREATE_KEPT);
     remainder_watch(odometry, frame, asked);
     odometry->distance = odometry_choose(odometry, asked.distance);
     odometry->angle = odometry_choose(odometry, asked.angle);

@@ -14,7 +14,7 @@ struct odometry_units {
 
 /* Look at one frame: what it was asked for against what it told; exact: not in whole units, remainders dropped. */
 void remainder_watch(struct create_odometry *odometry, const struct create_frame *frame, struct odometry_units asked);
-void standing_watch(struct create_odometry *odometry, struct odometry_units asked, struct odometry_units told,
+void standing_watch(struct create_odometry *odometry, struct odometry_units asked, struct odometry_units reported,
                     bool exact);
 
 #endif

@@ -27,43 +27,43 @@ struct chances {
     double average, best;
 };
 
-static struct chances remainder_if_kept(double least, double most, double told)
+static struct chances remainder_if_kept(double least, double most, double reported)
 {
-    const double away = fmax(0, fmax(told - most, least - told));
+    const double away = fmax(0, fmax(reported - most, least - reported));
     double sum = 0;
     for (int i = 0; i < POINTS; i++) {
-        sum += fmax(0, 1 - fabs(told - (least + (most - least) * i / (POINTS - 1))));
+        sum += fmax(0, 1 - fabs(reported - (least + (most - least) * i / (POINTS - 1))));
     }
     return (struct chances){fmax(STRAY, sum / POINTS), fmax(STRAY, 1 - away)};
 }
 
-static struct chances remainder_if_dropped(double least, double most, double told)
+static struct chances remainder_if_dropped(double least, double most, double reported)
 {
     int equal = 0;
     for (int i = 0; i < POINTS; i++) {
-        equal += fabs(floor(least + (most - least) * i / (POINTS - 1)) - told) < 0.5;
+        equal += fabs(floor(least + (most - least) * i / (POINTS - 1)) - reported) < 0.5;
     }
-    const bool possible = told >= floor(least) && told <= floor(most);
+    const bool possible = reported >= floor(least) && reported <= floor(most);
     return (struct chances){fmax(STRAY, (double)equal / POINTS), possible ? 1 : STRAY};
 }
 
 /* A number told for a motion that was asked for, both in units and in the direction of that motion. What neither way
  * tells, as of a body that stands or is held back, weighs nothing. Nor does 0 against kept remainders where dropped
  * ones would tell it: a body that stands tells it too. */
-static void remainder_weigh(struct create_evidence *evidence, double asked, double told)
+static void remainder_weigh(struct create_evidence *evidence, double asked, double reported)
 {
     const double least = asked * (1 - ODOMETRY_SPREAD), most = asked * (1 + ODOMETRY_SPREAD);
-    const struct chances kept = remainder_if_kept(least, most, told), dropped = remainder_if_dropped(least, most, told);
-    if (told > 0) {
+    const struct chances kept = remainder_if_kept(least, most, reported), dropped = remainder_if_dropped(least, most, reported);
+    if (reported > 0) {
         evidence->against_kept = fmax(0, evidence->against_kept + log(dropped.average / kept.best));
     }
     evidence->against_dropped = fmax(0, evidence->against_dropped + log(kept.average / dropped.best));
 }
 
-static void remainder_weigh_part(struct create_evidence *evidence, double asked, int32_t told)
+static void remainder_weigh_part(struct create_evidence *evidence, double asked, int32_t reported)
 {
     if (asked != 0) {
-        remainder_weigh(evidence, fabs(asked), asked > 0 ? told : -told);
+        remainder_weigh(evidence, fabs(asked), asked > 0 ? reported : -reported);
     }
 }
 

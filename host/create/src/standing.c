@@ -20,12 +20,12 @@ static double standing_least(double asked, bool exact)
 }
 
 /* Units told in the direction that was asked for. */
-static double standing_paid(double asked, double told)
+static double standing_paid(double asked, double reported)
 {
-    return asked > 0 ? told : asked < 0 ? -told : 0;
+    return asked > 0 ? reported : asked < 0 ? -reported : 0;
 }
 
-void standing_watch(struct create_odometry *odometry, struct odometry_units asked, struct odometry_units told,
+void standing_watch(struct create_odometry *odometry, struct odometry_units asked, struct odometry_units reported,
                     bool exact)
 {
     const double expected = standing_least(asked.distance, exact) + standing_least(asked.angle, exact);
@@ -35,7 +35,7 @@ void standing_watch(struct create_odometry *odometry, struct odometry_units aske
         odometry->standing = asked.distance != 0 || asked.angle != 0 ? CREATE_CANNOT_TELL : CREATE_MOVES;
         return;
     }
-    const double got = standing_paid(asked.distance, told.distance) + standing_paid(asked.angle, told.angle);
+    const double got = standing_paid(asked.distance, reported.distance) + standing_paid(asked.angle, reported.angle);
     odometry->owed = fmin(limit, fmax(0, odometry->owed + expected - PAYS * got));
     odometry->standing = odometry->owed >= limit ? CREATE_STANDS : CREATE_MOVES;
 }

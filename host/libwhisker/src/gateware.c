@@ -89,8 +89,8 @@ static int gateware_find_size(struct writing *w)
         return error;
     }
     const unsigned exponent = identity[2];
-    const bool told = identity[0] != 0 && identity[0] != ERASED && exponent >= 16 && exponent < 32;
-    w->size = !told ? 0 : exponent > 24 ? ADDRESS_END : UINT32_C(1) << exponent;
+    const bool reported = identity[0] != 0 && identity[0] != ERASED && exponent >= 16 && exponent < 32;
+    w->size = !reported ? 0 : exponent > 24 ? ADDRESS_END : UINT32_C(1) << exponent;
     return w->size > w->writable ? WHISKER_OK : WHISKER_ERROR_FLASH_CHIP;
 }
 

@@ -83,8 +83,8 @@ int whisker_ring_signal_writer(const char *name, int number)
     if (error) {
         return error;
     }
-    const bool told = pread(found.fd, &header, sizeof header, 0) == sizeof header;
-    error = told ? signal_process(header.writer_pid, &found.file, number) : WHISKER_ERROR_RING_LAYOUT;
+    const bool reported = pread(found.fd, &header, sizeof header, 0) == sizeof header;
+    error = reported ? signal_process(header.writer_pid, &found.file, number) : WHISKER_ERROR_RING_LAYOUT;
     close(found.fd);
     return error;
 }

@@ -120,10 +120,10 @@ static void the_largest_ring_is_a_ring_and_a_larger_is_none(void **state)
     for (uint32_t times = 1; times <= 2; times++) {
         const struct ring_header header = good_header(times * RING_CAPACITY_MAX);
         const off_t size = (off_t)ring_file_bytes(header.capacity);
-        const struct stat told = {.st_size = size, .st_blocks = size / 512 + 1};
+        const struct stat reported = {.st_size = size, .st_blocks = size / 512 + 1};
         const int fd = make_memory(&header, sizeof header, sizeof header);
         uint32_t capacity;
-        assert_int_equal(ring_map_check(fd, &told, &capacity), times == 1 ? WHISKER_OK : WHISKER_ERROR_RING_LAYOUT);
+        assert_int_equal(ring_map_check(fd, &reported, &capacity), times == 1 ? WHISKER_OK : WHISKER_ERROR_RING_LAYOUT);
         assert_int_equal(capacity, header.capacity);
         close(fd);
         unlink(path());
@@ -306,9 +306,9 @@ static int attach_and_create_elsewhere(const char *name)
     if (geteuid() == 0 && setuid(NOBODY) != 0) {
         return EXIT_FAILURE;
     }
-    const bool told = whisker_reader_attach(name, 0, &reader) == WHISKER_ERROR_RING_ACCESS &&
+    const bool reported = whisker_reader_attach(name, 0, &reader) == WHISKER_ERROR_RING_ACCESS &&
                       whisker_ring_create(name, TEST_CAPACITY, &ring) == WHISKER_ERROR_RING_ACCESS;
-    return told ? EXIT_SUCCESS : EXIT_FAILURE;
+    return reported ? EXIT_SUCCESS : EXIT_FAILURE;
 }
 
 static void ring_of_another_user_is_told(void **state)

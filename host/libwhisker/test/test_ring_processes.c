@@ -185,10 +185,10 @@ static void compete(const char *name, int report, int hold)
     const int error = whisker_ring_create(name, TEST_CAPACITY, &ring);
     const char outcome = error == 0 ? 'w' : error == WHISKER_ERROR_RING_BUSY ? 'b' : '?';
     char byte;
-    const bool told = write(report, &outcome, 1) == 1;
+    const bool reported = write(report, &outcome, 1) == 1;
     const bool released = read(hold, &byte, 1) == 0;
     whisker_ring_close(ring);
-    _exit(told && released ? 0 : 1);
+    _exit(reported && released ? 0 : 1);
 }
 
 static void of_writers_that_start_at_once_one_wins(void **state)

@@ -84,8 +84,8 @@ static void write_until_told(const struct writer *as, int ready)
         ring->map.header->writer_pid = as->pid ? as->pid : ring->map.header->writer_pid;
         test_publish(ring, 0, 5);
     }
-    const char told = made ? 'y' : 'n';
-    if (write(ready, &told, 1) == 1 && made) {
+    const char reported = made ? 'y' : 'n';
+    if (write(ready, &reported, 1) == 1 && made) {
         pause(); /* a signal ends the child and leaves its ring behind */
     }
     _exit(1);
@@ -95,14 +95,14 @@ static void write_until_told(const struct writer *as, int ready)
 static pid_t start_writer(struct writer as)
 {
     int ready[2];
-    char told = 'n';
+    char reported = 'n';
     assert_int_equal(pipe2(ready, O_CLOEXEC), 0);
     const pid_t child = fork();
     if (child == 0) {
         write_until_told(&as, ready[1]);
     }
-    assert_int_equal(read(ready[0], &told, 1), 1);
-    assert_int_equal(told, 'y');
+    assert_int_equal(read(ready[0], &reported, 1), 1);
+    assert_int_equal(reported, 'y');
     close(ready[0]);
     close(ready[1]);
     return child;
@@ -321,7 +321,7 @@ static void reader_of_the_ring_gets_no_signal(void **state)
 {
     (void)state;
     int ready[2];
-    char told = 'n';
+    char reported = 'n';
     assert_int_equal(pipe2(ready, O_CLOEXEC), 0);
     const pid_t writer = start_writer((struct writer){geteuid(), WHISKER_RING_DIRECTORY, 0});
     const pid_t reading = fork();
@@ -334,7 +334,7 @@ static void reader_of_the_ring_gets_no_signal(void **state)
         }
         _exit(1);
     }
-    assert_int_equal(read(ready[0], &told, 1), 1);
+    assert_int_equal(read(ready[0], &reported, 1), 1);
     const int fd = open(shared_path(), O_RDWR);
     const uint32_t pid = (uint32_t)reading;
     assert_int_equal(pwrite(fd, &pid, sizeof pid, offsetof(struct ring_header, writer_pid)), sizeof pid);

@@ -62,10 +62,10 @@ int main(void)
         x += 0.03 * cos(heading);
         y += 0.03 * sin(heading);
         heading += 0.06;
-        double told[2];
+        double reported[2];
         for (int n = 0; n < 2; n++) /* the sine stands for noise that is the same every time */
-            told[n] = hypot(x - anchor[n].x, y - anchor[n].y) + 0.1 * sin((12.9898 + n) * k * k);
-        const struct nav_row row = {.t_s = 0.1 * k, .odometry = {0.03, 0.0, 0.06}, .own = told};
+            reported[n] = hypot(x - anchor[n].x, y - anchor[n].y) + 0.1 * sin((12.9898 + n) * k * k);
+        const struct nav_row row = {.t_s = 0.1 * k, .odometry = {0.03, 0.0, 0.06}, .own = reported};
         nav_filter_step(filter, &row, &found);
     }
     nav_filter_free(filter);

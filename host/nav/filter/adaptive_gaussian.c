@@ -22,7 +22,7 @@ static const double BLOCKED = -3.0;
 int adaptive_gaussian_init(struct adaptive_gaussian *g, const struct nav_problem *problem,
                            struct nav_likelihood *likelihood)
 {
-    *g = (struct adaptive_gaussian){.told = 0.0};
+    *g = (struct adaptive_gaussian){.reported = 0.0};
     return nav_kalman_init(&g->kalman, problem, likelihood);
 }
 
@@ -34,7 +34,7 @@ void adaptive_gaussian_free(struct adaptive_gaussian *g)
 void adaptive_gaussian_begin(struct adaptive_gaussian *g, const struct nav_gaussian *belief)
 {
     g->kalman.belief = *belief;
-    g->told = g->wider = g->behind = 0.0;
+    g->reported = g->wider = g->behind = 0.0;
     g->compared = 0;
 }
 
@@ -74,11 +74,11 @@ static int gaussian_look_up(const struct adaptive_gaussian *g, double scale, dou
 
 /* Log of the row's mean likelihood at those points, and what it tells of them: the divergence of their weights from
  * equal ones. */
-static double gaussian_weigh(const struct adaptive_gaussian *g, double scale, double mass, double *told)
+static double gaussian_weigh(const struct adaptive_gaussian *g, double scale, double mass, double *reported)
 {
     double loglik[POINTS], best = -INFINITY, sum = 0.0, product = 0.0;
     int free = gaussian_look_up(g, scale, mass, loglik);
-    *told = 0.0;
+    *reported = 0.0;
     if (free == 0)
         return BLOCKED;
     for (int n = 0; n < free; n++)
@@ -88,14 +88,14 @@ static double gaussian_weigh(const struct adaptive_gaussian *g, double scale, do
         sum += likelihood;
         product += likelihood * (loglik[n] - best);
     }
-    *told = fmax(product / sum + log(free / sum), 0.0);
+    *reported = fmax(product / sum + log(free / sum), 0.0);
     return best + log(sum / free);
 }
 
 double adaptive_gaussian_take(struct adaptive_gaussian *g, const struct nav_pending *pending,
                               const struct nav_evidence *evidence, double mass)
 {
-    double own = 0.0, wider, told, unused;
+    double own = 0.0, wider, reported, unused;
     g->looked = 0;
     nav_kalman_move(&g->kalman, pending->step, &pending->noise);
     if (g->carries || g->compared > 0) {
@@ -103,9 +103,9 @@ double adaptive_gaussian_take(struct adaptive_gaussian *g, const struct nav_pend
             nav_trust_begin(g->kalman.likelihood);
             nav_map_begin(g->kalman.likelihood);
         }
-        own = gaussian_weigh(g, 1.0, mass, &told);
+        own = gaussian_weigh(g, 1.0, mass, &reported);
         wider = gaussian_weigh(g, WIDER, -1.0, &unused);
-        g->told += told - g->told / KEPT;
+        g->reported += reported - g->reported / KEPT;
         g->wider = fmax(g->wider + wider - own, 0.0);
         g->looked = 2 * POINTS;
     }
@@ -116,7 +116,7 @@ double adaptive_gaussian_take(struct adaptive_gaussian *g, const struct nav_pend
 
 bool adaptive_gaussian_fails(const struct adaptive_gaussian *g)
 {
-    return g->told > (g->carries ? TOLD_MOST : SURE) || g->wider > SURE;
+    return g->reported > (g->carries ? TOLD_MOST : SURE) || g->wider > SURE;
 }
 
 bool adaptive_gaussian_compare(struct adaptive_gaussian *g, double particles, double own)

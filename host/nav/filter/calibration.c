@@ -40,36 +40,36 @@ static void calibration_begin(struct nav_calibration *c, const struct nav_estima
     c->sure = now->confidence >= SURE;
     c->from = now->pose;
     memcpy(c->from_covariance, now->covariance, sizeof c->from_covariance);
-    c->told = (struct nav_pose){0.0, 0.0, 0.0};
+    c->reported = (struct nav_pose){0.0, 0.0, 0.0};
 }
 
 /* Length of the stretch by the filter over that by the wheels, along the wheels' direction. */
 static void calibration_compare_distance(struct nav_calibration *c, const struct nav_estimate *now)
 {
-    double told = hypot(c->told.x, c->told.y), cos0 = cos(c->from.theta), sin0 = sin(c->from.theta);
+    double reported = hypot(c->reported.x, c->reported.y), cos0 = cos(c->from.theta), sin0 = sin(c->from.theta);
     double dx = now->pose.x - c->from.x, dy = now->pose.y - c->from.y;
-    double along = ((cos0 * dx + sin0 * dy) * c->told.x + (cos0 * dy - sin0 * dx) * c->told.y) / told;
+    double along = ((cos0 * dx + sin0 * dy) * c->reported.x + (cos0 * dy - sin0 * dx) * c->reported.y) / reported;
     const double *a = c->from_covariance, *b = now->covariance;
     double variance = (a[0] + a[4] + b[0] + b[4]) / 2.0;
-    calibration_follow(&c->distance, along / told, TOLD_AGAIN * variance / (told * told));
+    calibration_follow(&c->distance, along / reported, TOLD_AGAIN * variance / (reported * reported));
 }
 
 static void calibration_compare_turn(struct nav_calibration *c, const struct nav_estimate *now)
 {
-    double told = c->told.theta, off = nav_wrap(now->pose.theta - c->from.theta - told);
-    calibration_follow(&c->turn, 1.0 + off / told,
-                       TOLD_AGAIN * (c->from_covariance[8] + now->covariance[8]) / (told * told));
+    double reported = c->reported.theta, off = nav_wrap(now->pose.theta - c->from.theta - reported);
+    calibration_follow(&c->turn, 1.0 + off / reported,
+                       TOLD_AGAIN * (c->from_covariance[8] + now->covariance[8]) / (reported * reported));
 }
 
 void nav_calibration_learn(struct nav_calibration *c, const struct nav_motion *applied, const struct nav_estimate *now)
 {
     bool known = applied->unknown_m <= 0.0 && applied->unknown_rad <= 0.0;
-    c->told = nav_compose(c->told, applied->step);
+    c->reported = nav_compose(c->reported, applied->step);
     if (!c->sure || !known || now->confidence < SURE) {
         calibration_begin(c, now);
         return;
     }
-    bool far = hypot(c->told.x, c->told.y) >= NAV_STRETCH_M, round = fabs(c->told.theta) >= NAV_STRETCH_RAD;
+    bool far = hypot(c->reported.x, c->reported.y) >= NAV_STRETCH_M, round = fabs(c->reported.theta) >= NAV_STRETCH_RAD;
     if (far && !round)
         calibration_compare_distance(c, now);
     if (round)

@@ -24,7 +24,7 @@ struct nav_calibration {
     bool sure;                       /* a stretch is under way */
     struct nav_pose from;            /* its first pose ... */
     double from_covariance[9];
-    struct nav_pose told; /* ... and what the wheels, so far corrected, have said since */
+    struct nav_pose reported; /* ... and what the wheels, so far corrected, have said since */
 };
 
 void nav_calibration_init(struct nav_calibration *);

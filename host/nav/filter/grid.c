@@ -181,10 +181,10 @@ static struct nav_motion grid_calibrated(struct grid *g, const struct nav_motion
     return g->last;
 }
 
-static void grid_predict(void *self, const struct nav_motion *told)
+static void grid_predict(void *self, const struct nav_motion *reported)
 {
     struct grid *g = self;
-    struct nav_motion motion = grid_calibrated(g, told);
+    struct nav_motion motion = grid_calibrated(g, reported);
     struct nav_noise noise = nav_motion_noise(&g->problem->robot, &g->problem->settings, &motion);
     noise.position += nav_histogram_fan(&g->histogram, motion.step, g->problem->settings.motion.along_m);
     nav_pending_add(&g->pending, motion.step, noise);

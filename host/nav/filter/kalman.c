@@ -19,7 +19,7 @@ struct nav_kalman_sighting {
     double z, variance;   /* m, m^2; "no contact" is a distance of the whisker's length, looked up no further */
     double reach;         /* contact: ranges are looked up to here, m */
     bool normal;          /* contact: how the face lies, and not how far away it is: */
-    double told;          /* its direction as it was told, rad; z is 0, and so is reach: what is not known agrees */
+    double reported;          /* its direction as it was told, rad; z is 0, and so is reach: what is not known agrees */
 };
 
 /* A sighting about the belief, to first and second moments: what is expected, its variance without the sighting's own,
@@ -78,7 +78,7 @@ static double kalman_turned(const struct nav_kalman *k, const struct nav_kalman_
     if (!nav_obstacles_near(&l->obstacles, mean->x, mean->y, &near))
         return NAN;
     double met = nav_normal_direction(&l->model[l->sensors.first[2] + s->ray], &near, &at);
-    return nav_wrap(met - s->told) + mean->theta - theta;
+    return nav_wrap(met - s->reported) + mean->theta - theta;
 }
 
 /* Expected value of a sighting at a pose; not finite when nothing is within reach. */
@@ -201,7 +201,7 @@ static void kalman_read_range(struct nav_kalman *k, int r, double distance, doub
 static void kalman_read_normal(struct nav_kalman *k, int r, const double *normal, double weight)
 {
     struct nav_kalman_sighting s = {
-        .ray = r, .normal = true, .told = normal[0], .variance = normal[1] * normal[1] / weight};
+        .ray = r, .normal = true, .reported = normal[0], .variance = normal[1] * normal[1] / weight};
     kalman_correct(k, &s);
 }
 

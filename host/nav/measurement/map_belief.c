@@ -15,17 +15,17 @@ static const double THING_M = 0.1, THING_REACH_M = 0.15, PART = 3.0, PART_NATS =
 /* A contact nearer than told by more than this is with something else. */
 static const double NEAR_M = 0.03;
 
-int nav_map_init(struct nav_map_belief *m, const struct nav_arena *told, size_t sensors)
+int nav_map_init(struct nav_map_belief *m, const struct nav_arena *reported, size_t sensors)
 {
-    size_t tiles = (size_t)told->columns * (size_t)told->rows;
-    *m = (struct nav_map_belief){.told = told, .arena = *told};
+    size_t tiles = (size_t)reported->columns * (size_t)reported->rows;
+    *m = (struct nav_map_belief){.reported = reported, .arena = *reported};
     m->floor = malloc(tiles + 1);
     m->tile = calloc(tiles + 1, sizeof *m->tile);
-    m->gone = calloc((size_t)told->boxes + 1, sizeof *m->gone);
+    m->gone = calloc((size_t)reported->boxes + 1, sizeof *m->gone);
     m->suspect = calloc(sensors + 1, sizeof *m->suspect);
     if (!m->floor || !m->tile || !m->gone || !m->suspect)
         return -1;
-    memcpy(m->floor, told->floor, tiles);
+    memcpy(m->floor, reported->floor, tiles);
     m->arena.floor = m->floor;
     return 0;
 }
@@ -40,8 +40,8 @@ void nav_map_free(struct nav_map_belief *m)
 
 size_t nav_map_bytes(const struct nav_map_belief *m)
 {
-    return (size_t)m->told->columns * (size_t)m->told->rows * (sizeof *m->tile + 1) +
-           (size_t)m->told->boxes * sizeof *m->gone;
+    return (size_t)m->reported->columns * (size_t)m->reported->rows * (sizeof *m->tile + 1) +
+           (size_t)m->reported->boxes * sizeof *m->gone;
 }
 
 static float map_kept(double nats, double cost)
@@ -95,9 +95,9 @@ static struct nav_map_suspect map_suspect_ray(const struct nav_likelihood *l, in
                                               int code)
 {
     const struct nav_model *ray = &l->model[w];
-    double felt = l->reading[w][0], told = (code + 1.5) * ray->step;
-    bool nothing = code >= ray->codes - 2, before = isfinite(felt) && (nothing || felt < told - NEAR_M);
-    double far = before ? felt : told;
+    double felt = l->reading[w][0], reported = (code + 1.5) * ray->step;
+    bool nothing = code >= ray->codes - 2, before = isfinite(felt) && (nothing || felt < reported - NEAR_M);
+    double far = before ? felt : reported;
     struct nav_map_suspect suspect = {
         .kind = before ? NAV_MAP_THING : NAV_MAP_BOX,
         .x = nav_place_x(at, ray->place.x + far * ray->place.c, ray->place.y + far * ray->place.s),
@@ -133,8 +133,8 @@ static struct nav_map_suspect map_suspect(const struct nav_likelihood *l, int w,
     struct nav_map_suspect suspect = {.which = -1};
     if (model->kind->distance)
         suspect = map_suspect_ray(l, w, at, code);
-    else if (model->kind->floor && l->map.told->classes > 1)
-        suspect.which = nav_arena_tile(l->map.told, nav_place_x(at, model->place.x, model->place.y),
+    else if (model->kind->floor && l->map.reported->classes > 1)
+        suspect.which = nav_arena_tile(l->map.reported, nav_place_x(at, model->place.x, model->place.y),
                                        nav_place_y(at, model->place.x, model->place.y));
     return suspect;
 }
@@ -164,31 +164,31 @@ void nav_map_add(struct nav_likelihood *l, const struct nav_place *at, const uin
 static double map_evidence(const struct nav_likelihood *l, int w, double ratio)
 {
     const struct nav_trust *t = &l->trust[w];
-    double told = 0.0, known = 0.0, share = l->map.suspect[w].mass / l->map.mass;
+    double reported = 0.0, known = 0.0, share = l->map.suspect[w].mass / l->map.mass;
     for (int k = 0; k < t->codes; k++) {
         known += t->predicted[k];
-        told += t->predicted[k] > 0.0 ? t->predicted[k] * map_ratio(l, w, k) : 0.0;
+        reported += t->predicted[k] > 0.0 ? t->predicted[k] * map_ratio(l, w, k) : 0.0;
     }
-    return known > 0.0 ? l->weight[w] * log(share * ratio * known / told + 1.0 - share) : 0.0;
+    return known > 0.0 ? l->weight[w] * log(share * ratio * known / reported + 1.0 - share) : 0.0;
 }
 
 /* Learning functions return whether the place is taken to be wrong from now on. */
 static bool map_learn_tile(struct nav_likelihood *l, int w, int which)
 {
     struct nav_map_belief *m = &l->map;
-    int told = m->told->floor[which], best = told == 0;
+    int reported = m->reported->floor[which], best = reported == 0;
     struct nav_map_tile *tile = &m->tile[which];
-    if (told >= m->told->classes)
+    if (reported >= m->reported->classes)
         return false;
-    for (int k = 0; k < m->told->classes; k++)
-        best = k != told && l->ratio[w][k] > l->ratio[w][best] ? k : best;
+    for (int k = 0; k < m->reported->classes; k++)
+        best = k != reported && l->ratio[w][k] > l->ratio[w][best] ? k : best;
     if (tile->nats <= 0.0f)
         tile->other = (uint8_t)best;
-    bool wrong = m->floor[which] != told;
-    double nats = map_evidence(l, w, map_ratio(l, w, wrong ? told : tile->other));
+    bool wrong = m->floor[which] != reported;
+    double nats = map_evidence(l, w, map_ratio(l, w, wrong ? reported : tile->other));
     tile->nats = map_kept((double)tile->nats + (wrong ? -nats : nats), TILE);
-    m->floor[which] = map_wrong((double)tile->nats, TILE, wrong) ? tile->other : (uint8_t)told;
-    return !wrong && m->floor[which] != told;
+    m->floor[which] = map_wrong((double)tile->nats, TILE, wrong) ? tile->other : (uint8_t)reported;
+    return !wrong && m->floor[which] != reported;
 }
 
 /* A box taken to be gone stays so: what is felt there later is a new thing. */
@@ -240,13 +240,13 @@ void nav_map_learn(struct nav_likelihood *l)
 void nav_map_forget(struct nav_likelihood *l)
 {
     struct nav_map_belief *m = &l->map;
-    for (int n = 0; n < m->told->columns * m->told->rows; n++) {
+    for (int n = 0; n < m->reported->columns * m->reported->rows; n++) {
         if (m->tile[n].nats == 0.0f)
             continue;
         m->tile[n].nats = 0.0f;
-        m->floor[n] = m->told->floor[n];
+        m->floor[n] = m->reported->floor[n];
     }
-    for (int b = 0; b < m->told->boxes; b++) {
+    for (int b = 0; b < m->reported->boxes; b++) {
         if ((double)m->gone[b] > BOX)
             nav_obstacles_hide(&l->obstacles, b, false);
         m->gone[b] = 0.0f;

@@ -38,7 +38,7 @@ struct nav_map_suspect {
 };
 
 struct nav_map_belief {
-    const struct nav_arena *told;
+    const struct nav_arena *reported;
     struct nav_arena arena; /* as believed, but for boxes */
     uint8_t *floor;         /* its textures */
     struct nav_map_tile *tile;
@@ -50,7 +50,7 @@ struct nav_map_belief {
 };
 
 /* 0, or -1 without memory; nav_map_free either way. */
-int nav_map_init(struct nav_map_belief *, const struct nav_arena *told, size_t sensors);
+int nav_map_init(struct nav_map_belief *, const struct nav_arena *reported, size_t sensors);
 void nav_map_free(struct nav_map_belief *);
 size_t nav_map_bytes(const struct nav_map_belief *);
 

@@ -54,7 +54,7 @@ static void a_row_that_suits_all_of_it_tells_nothing(void **state)
     carried_begin(&c, 0.001);
     double expected = carried_read(&c, carried_class(&c)), other = carried_read(&c, (carried_class(&c) + 1) % 3);
     assert_true(expected > 0.5 && other < -0.5);
-    assert_near(c.g.told, 0.0, 1e-9);
+    assert_near(c.g.reported, 0.0, 1e-9);
     assert_false(adaptive_gaussian_fails(&c.g));
     carried_end(&c);
 }
@@ -65,12 +65,12 @@ static void rows_that_tell_its_parts_apart_are_too_much_for_it(void **state)
     struct carried c;
     carried_begin(&c, 0.15); /* some of it is on another tile */
     int rows = 0;
-    for (; rows < 200 && c.g.told <= 3.0; rows++)
+    for (; rows < 200 && c.g.reported <= 3.0; rows++)
         carried_read(&c, carried_class(&c));
     assert_in_range(rows, 2, 199);
-    double told = c.g.told;
+    double reported = c.g.reported;
     adaptive_gaussian_begin(&c.g, &c.g.kalman.belief);
-    assert_true(told > 3.0 && c.g.told == 0.0);
+    assert_true(reported > 3.0 && c.g.reported == 0.0);
     carried_end(&c);
 }
 
@@ -83,7 +83,7 @@ static void rows_that_only_a_wider_one_explains_speak_against_it(void **state)
     for (; rows < 100 && !adaptive_gaussian_fails(&c.g); rows++)
         carried_read(&c, said);
     assert_in_range(rows, 1, 99);
-    assert_true(c.g.wider > 3.0 && c.g.told < 3.0);
+    assert_true(c.g.wider > 3.0 && c.g.reported < 3.0);
     carried_end(&c);
 }
 

@@ -6,7 +6,7 @@ static void onset_stop_release_and_peak_come_from_lines(void **state)
     (void)state;
     struct drawn_whisk w = usual_whisk();
     w.rate = 0.13;
-    w.told = 0.12;
+    w.reported = 0.12;
     struct nav_shape s = shape_of_whisk(&w, 2);
     assert_int_equal(s.quality, NAV_SHAPE_WHOLE);
     assert_near(s.onset_s, 5.2, 0.003);
@@ -15,7 +15,7 @@ static void onset_stop_release_and_peak_come_from_lines(void **state)
     assert_near(s.peak, 1500.0, 10.0);
     assert_near(s.slope, 2500.0, 15.0);
     assert_near(s.turn, 0.13 * 0.6, 0.13 * 0.005);
-    assert_near(s.told, 0.12 * 0.6, 0.12 * 0.005);
+    assert_near(s.reported, 0.12 * 0.6, 0.12 * 0.005);
     assert_near(s.back, 0.0, 0.01);
     assert_near(s.bow, 0.0, 0.02);
     assert_near(s.direction[0], 0.6, 0.01);

@@ -8,7 +8,7 @@
 
 static const struct nav_place TILE = {0.2, 0.25, 1.0, 0.0}, BY_BOX = {0.6, 0.15, 1.0, 0.0}, OPEN = {0.3, 0.7, 1.0, 0.0};
 
-static struct nav_likelihood *told(void)
+static struct nav_likelihood *reported(void)
 {
     static struct nav_problem p;
     p = room();
@@ -45,7 +45,7 @@ static double teach(struct nav_likelihood *l, const struct nav_place *at, int sa
 static void a_tile_that_keeps_saying_otherwise_is_believed(void **state)
 {
     (void)state;
-    struct nav_likelihood *l = told();
+    struct nav_likelihood *l = reported();
     double before = read_at(l, &TILE, 1, NAN);
     teach(l, &TILE, 1, NAN, 2);
     assert_near(read_at(l, &TILE, 1, NAN), before, 1e-6); /* two windows may err */
@@ -59,7 +59,7 @@ static void a_tile_that_keeps_saying_otherwise_is_believed(void **state)
 static void a_tile_found_as_told_is_harder_to_change(void **state)
 {
     (void)state;
-    struct nav_likelihood *l = told();
+    struct nav_likelihood *l = reported();
     teach(l, &TILE, 0, NAN, 100);
     teach(l, &TILE, 1, NAN, 4);
     assert_true(read_at(l, &TILE, 1, NAN) < 0.0);
@@ -71,7 +71,7 @@ static void a_tile_found_as_told_is_harder_to_change(void **state)
 static void a_box_where_nothing_is_felt_is_gone(void **state)
 {
     (void)state;
-    struct nav_likelihood *l = told();
+    struct nav_likelihood *l = reported();
     double fits = read_at(l, &OPEN, -1, INFINITY);
     assert_true(teach(l, &BY_BOX, -1, INFINITY, 1) < -2.0);
     assert_false(nav_likelihood_clear(l, 0.9, 0.1, 0.0));
@@ -87,7 +87,7 @@ static void a_box_where_nothing_is_felt_is_gone(void **state)
 static void a_box_that_is_felt_stays(void **state)
 {
     (void)state;
-    struct nav_likelihood *l = told();
+    struct nav_likelihood *l = reported();
     teach(l, &BY_BOX, -1, 0.15, 5); /* its face is 0.15 m from the whisker's base */
     teach(l, &BY_BOX, -1, INFINITY, 2);
     teach(l, &BY_BOX, -1, 0.05, 20); /* what stands before it says nothing of it */
@@ -98,7 +98,7 @@ static void a_box_that_is_felt_stays(void **state)
 static void contacts_with_what_the_map_lacks_are_expected_at_last(void **state)
 {
     (void)state;
-    struct nav_likelihood *l = told();
+    struct nav_likelihood *l = reported();
     double ghost = teach(l, &OPEN, -1, 0.1, 1);
     assert_true(ghost < -4.0);
     assert_near(read_at(l, &OPEN, -1, 0.1), ghost, 1e-6); /* one may be a ghost */
@@ -113,7 +113,7 @@ static void contacts_with_what_the_map_lacks_are_expected_at_last(void **state)
 static void what_was_learned_where_the_robot_was_not_is_forgotten(void **state)
 {
     (void)state;
-    struct nav_likelihood *l = told();
+    struct nav_likelihood *l = reported();
     double before = read_at(l, &OPEN, 0, 0.1);
     teach(l, &OPEN, 0, 0.1, 20);
     assert_true(read_at(l, &OPEN, 0, 0.1) > before + 4.0);

@@ -189,14 +189,14 @@ static void the_table_holds_what_each_free_pose_expects(void **state)
         struct nav_layer layer = nav_expected_layer(e, (k + 0.5) * NAV_PI / 4.0, 0.0, 0.0);
         struct nav_pose pose = {i * 0.1 + (n % 2 + 0.5) * 0.05, j * 0.1 + (n / 2 % 2 + 0.5) * 0.05,
                                 (k + 0.5) * NAV_PI / 4.0};
-        const uint8_t *told = nav_expected_codes(e, &layer, j, i, n % 4);
+        const uint8_t *reported = nav_expected_codes(e, &layer, j, i, n % 4);
         uint8_t codes[2];
         if (!nav_arena_free(&p.arena, pose.x, pose.y, 0.035)) {
-            assert_null(told);
+            assert_null(reported);
             continue;
         }
         expect(l, pose, codes);
-        assert_memory_equal(told, codes, 2);
+        assert_memory_equal(reported, codes, 2);
         free_poses++;
     }
     /* 18 x 18 places are clear of the walls; 4 x 5 of them and 3 above touch the box, its corner is missed by 0.4 mm.
@@ -261,12 +261,12 @@ static void an_own_sensor_weighs_poses_by_its_table(void **state)
     const double one = 1.0;
     l->trust[0].working = 1.0;
     nav_likelihood_read(l, &(struct nav_evidence){reading, &one});
-    double told[4];
+    double reported[4];
     for (int k = 0; k < 4; k++)
-        told[k] = exp((double)l->table[0][k]);
-    assert_near(told[0] / told[1], 2.0 / 7.0, 1e-5);
-    assert_near((told[0] + told[1] + told[2]) / 3.0, 1.0, 1e-5);
-    assert_near(told[3], 1.0, 1e-6);
+        reported[k] = exp((double)l->table[0][k]);
+    assert_near(reported[0] / reported[1], 2.0 / 7.0, 1e-5);
+    assert_near((reported[0] + reported[1] + reported[2]) / 3.0, 1.0, 1e-5);
+    assert_near(reported[3], 1.0, 1e-6);
     uint64_t bad = 0;
     const double broken[] = {0.0, NAN, 0.0}, none[] = {NAN, 0.0, 0.0};
     assert_int_equal(l->model[0].kind->check(&l->model[0], broken, &bad), NAV_BAD);

@@ -96,7 +96,7 @@ static void bad_directions_are_counted_and_not_read(void **state)
 }
 
 /* Spread of the heading after a face was met straight ahead, told with or without its direction. */
-static double heading_spread(const char *filter, bool told)
+static double heading_spread(const char *filter, bool reported)
 {
     struct nav_problem p = telling();
     p.settings.normal.outlier = 0.05;
@@ -105,7 +105,7 @@ static double heading_spread(const char *filter, bool told)
     p.prior.sigma[2] = 0.3;
     struct nav_filter *f = nav_filter_new(filter, &p);
     const double texture[] = {NAN, NAN}, distance = 0.19, normal[] = {NAV_PI, 0.05};
-    struct nav_row row = {.t_s = 0.1, .texture = texture, .radial_m = &distance, .normal = told ? normal : NULL};
+    struct nav_row row = {.t_s = 0.1, .texture = texture, .radial_m = &distance, .normal = reported ? normal : NULL};
     struct nav_estimate e;
     nav_filter_step(f, &row, &e);
     nav_filter_free(f);

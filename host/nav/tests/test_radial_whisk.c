@@ -35,7 +35,7 @@ static struct drawn_whisk whisk_at(double radius_mm)
     return w;
 }
 
-static struct nav_whisk_estimate told(const struct nav_whisk_model *m, const struct drawn_whisk *w)
+static struct nav_whisk_estimate reported(const struct nav_whisk_model *m, const struct drawn_whisk *w)
 {
     struct nav_shape shape = shape_of_whisk(w, m->axes);
     struct nav_whisk_estimate e;
@@ -61,7 +61,7 @@ static void radius_and_its_deviation(void **state)
     struct nav_whisk_model m = model(0.03);
     for (double radius = 90.0; radius < 131.0; radius += 10.0) {
         struct drawn_whisk whisk = whisk_at(radius);
-        struct nav_whisk_estimate e = told(&m, &whisk);
+        struct nav_whisk_estimate e = reported(&m, &whisk);
         assert_near(e.radius_mm, radius, 0.7);
         assert_near(e.sigma_mm, 0.03 * (CONE - radius), 0.25);
         assert_true(e.confidence > 0.98);
@@ -75,11 +75,11 @@ static void a_longer_or_faster_push_is_no_nearer_contact(void **state)
     struct drawn_whisk w = whisk_at(110.0);
     w.push_s *= 1.3;
     w.peak *= 1.3;
-    assert_near(told(&m, &w).radius_mm, 110.0, 0.8);
+    assert_near(reported(&m, &w).radius_mm, 110.0, 0.8);
     w = whisk_at(110.0);
     w.rate *= 2.0;
     w.peak *= 2.0;
-    assert_near(told(&m, &w).radius_mm, 110.0, 0.8);
+    assert_near(reported(&m, &w).radius_mm, 110.0, 0.8);
 }
 
 static void the_tip_is_told_from_the_shaft(void **state)
@@ -87,8 +87,8 @@ static void the_tip_is_told_from_the_shaft(void **state)
     (void)state;
     struct nav_whisk_model m = model(0.02);
     struct drawn_whisk tip = whisk_at(138.5), shaft = whisk_at(131.0);
-    assert_true(told(&m, &tip).tip > 0.8);
-    assert_true(told(&m, &shaft).tip < 0.05);
+    assert_true(reported(&m, &tip).tip > 0.8);
+    assert_true(reported(&m, &shaft).tip < 0.05);
 }
 
 static void what_fits_no_calibrated_whisk_is_doubted(void **state)
@@ -102,14 +102,14 @@ static void what_fits_no_calibrated_whisk_is_doubted(void **state)
     frozen.frozen_s = 0.5;
     struct drawn_whisk strange[] = {wild, none, frozen};
     for (int i = 0; i < 3; i++) {
-        struct nav_whisk_estimate e = told(&m, &strange[i]);
+        struct nav_whisk_estimate e = reported(&m, &strange[i]);
         assert_true(e.confidence < 0.2);
         assert_true(e.sigma_mm > 12.0);
     }
     struct nav_whisk_model other = model(0.03);
     other.direction[0] = -0.6;
     other.direction[1] = 0.8;
-    assert_true(told(&other, &usual).confidence < 0.5);
+    assert_true(reported(&other, &usual).confidence < 0.5);
 }
 
 static void a_peak_alone_is_less_sure(void **state)

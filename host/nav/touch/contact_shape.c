@@ -17,7 +17,7 @@
 /* A trace as deflections along its main direction. */
 struct course {
     int n;
-    double t[NAV_TRACE_BINS], turn[NAV_TRACE_BINS], told[NAV_TRACE_BINS], p[NAV_TRACE_BINS];
+    double t[NAV_TRACE_BINS], turn[NAV_TRACE_BINS], reported[NAV_TRACE_BINS], p[NAV_TRACE_BINS];
     double top;
     int before, from, to; /* last bin below the push, first and last bin of it */
 };
@@ -76,7 +76,7 @@ static void shape_lay_out(const struct nav_trace *trace, struct course *c, doubl
         double share = nav_trace_share(trace, i);
         c->t[i] = trace->sum[i].t_s * share;
         c->turn[i] = trace->sum[i].turn * share;
-        c->told[i] = trace->sum[i].told * share;
+        c->reported[i] = trace->sum[i].reported * share;
         c->p[i] = 0.0;
         for (int a = 0; a < trace->axes; a++)
             c->p[i] += (trace->sum[i].at[a] * share - rest[a]) * direction[a];
@@ -238,7 +238,7 @@ static void shape_measure(const struct nav_trace *trace, const struct course *c,
     shape->peak = shape_line_at(&late, stop);
     shape->slope = early.slope;
     shape->turn = shape_value_at(c, c->turn, stop) - shape_value_at(c, c->turn, onset);
-    shape->told = shape_value_at(c, c->told, stop) - shape_value_at(c, c->told, onset);
+    shape->reported = shape_value_at(c, c->reported, stop) - shape_value_at(c, c->reported, onset);
     shape->misfit = left_over / shape->peak;
     shape->back = release > stop ? log((release - stop) / (stop - onset)) : (double)NAN;
     shape->onset_s = trace->start_s + onset;

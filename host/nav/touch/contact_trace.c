@@ -38,7 +38,7 @@ static void trace_add_point(struct nav_trace_point *sum, const struct nav_trace_
 {
     sum->t_s += point->t_s;
     sum->turn += point->turn;
-    sum->told += point->told;
+    sum->reported += point->reported;
     for (int a = 0; a < axes; a++)
         sum->at[a] += point->at[a];
 }
@@ -110,7 +110,7 @@ void nav_trace_add(struct nav_trace *trace, double t_s, const double *sample, do
     double since = t_s - trace->start_s - trace->last.t_s;
     struct nav_trace_point now = {.t_s = t_s - trace->start_s,
                                   .turn = trace->last.turn + trace_turned(whisk_rad_s, since),
-                                  .told = trace->last.told + trace_turned(told_rad_s, since)};
+                                  .reported = trace->last.reported + trace_turned(told_rad_s, since)};
     for (int a = 0; a < trace->axes; a++)
         now.at[a] = sample[a];
     trace_count_equal(trace, &now);

@@ -28,14 +28,14 @@ void nav_whisk_terms(const struct nav_shape *shape, double *terms)
 {
     for (int k = 0; k < NAV_WHISK_TERMS; k++)
         terms[k] = (double)NAN;
-    if (shape->quality != NAV_SHAPE_WHOLE || !(shape->turn > 0.0) || !(shape->told > 0.0))
+    if (shape->quality != NAV_SHAPE_WHOLE || !(shape->turn > 0.0) || !(shape->reported > 0.0))
         return;
     double seconds = shape->stop_s - shape->onset_s;
     terms[NAV_WHISK_TURN] = log(shape->turn);
     terms[NAV_WHISK_RATE] = log(shape->turn / seconds);
     /* Where nothing is reported the reported angle is counted in seconds. */
-    bool reported = fabs(shape->told - seconds) > 1e-6 * seconds;
-    terms[NAV_WHISK_TOLD] = reported ? log(shape->told / shape->turn) : 0.0;
+    bool reported = fabs(shape->reported - seconds) > 1e-6 * seconds;
+    terms[NAV_WHISK_REPORTED] = reported ? log(shape->reported / shape->turn) : 0.0;
     terms[NAV_WHISK_BOW] = shape->bow;
     terms[NAV_WHISK_BACK] = shape->back;
 }

@@ -43,7 +43,7 @@ def read_sensors(table: Table, size_m: tuple[float, float]) -> tuple[SensorTable
 def _read(entry: Table, size_m: tuple[float, float]) -> SensorTable:
     name = entry.name()
     at_m = entry.numbers("at_m", 2, -LARGEST_M, LARGEST_M)
-    told = [entry.number(k, 0.0, LARGEST_M) if k in entry.content else 0.0 for k in ("spacing_m", "detail_m")]
+    reported = [entry.number(k, 0.0, LARGEST_M) if k in entry.content else 0.0 for k in ("spacing_m", "detail_m")]
     folder = entry.path.parent
     edges, likelihood = _read_table(folder / entry.string("table"))
     image = folder / entry.string("map")
@@ -55,7 +55,7 @@ def _read(entry: Table, size_m: tuple[float, float]) -> SensorTable:
     cells = [side / count for side, count in zip(size_m, grey.level.shape[::-1], strict=True)]
     if abs(cells[0] - cells[1]) > SQUARE * cells[0]:
         raise SceneError(f"{image}: pixels of {cells[0]:.3g} x {cells[1]:.3g} m; give square ones over the whole arena")
-    return SensorTable(name, at_m, *told, _codes(grey, likelihood.shape[1]), cells[0], edges, likelihood)
+    return SensorTable(name, at_m, *reported, _codes(grey, likelihood.shape[1]), cells[0], edges, likelihood)
 
 
 def _codes(grey: Grey, levels: int) -> np.ndarray:

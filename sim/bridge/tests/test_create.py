@@ -153,19 +153,19 @@ def test_orders_take_effect_at_their_tick(tmp_path):
     assert rows[4]["theta_rad"] == 0
     turned = 0.1 / 0.258 * (1200 - 1040) / TICKS_PER_S
     assert rows[5]["theta_rad"] == pytest.approx(turned, abs=2e-6)
-    told = frames(robot["bytes"])
+    reported = frames(robot["bytes"])
     millimetres = 200 * ((1040 - FIRST_EFFECT) + (2400 - 1640)) / TICKS_PER_S
-    assert sum(signed(frame[5:7]) for frame in told) == pytest.approx(millimetres, rel=ODOMETRY_ERROR, abs=8)
+    assert sum(signed(frame[5:7]) for frame in reported) == pytest.approx(millimetres, rel=ODOMETRY_ERROR, abs=8)
     degrees = math.degrees((0.1 * (1640 - 1040) + 0.2 * (2400 - 1640)) / 0.258 / TICKS_PER_S)
-    assert sum(signed(frame[8:10]) for frame in told) == pytest.approx(degrees, rel=ODOMETRY_ERROR, abs=2)
+    assert sum(signed(frame[8:10]) for frame in reported) == pytest.approx(degrees, rel=ODOMETRY_ERROR, abs=2)
 
 
 def test_a_wall_is_told(tmp_path):
     orders = {39: OPENING + drive_direct(500, 500)}
     robot = drive(tmp_path / "run", 1.8, 8, orders=orders)
-    told = frames(robot["bytes"])
-    assert told[10][3] == 0
-    assert told[-1][3] == 3  # both sides of the bumper
+    reported = frames(robot["bytes"])
+    assert reported[10][3] == 0
+    assert reported[-1][3] == 3  # both sides of the bumper
     assert truth(tmp_path / "run")[-1]["x_m"] == pytest.approx(ROOM_M - 0.165, abs=1e-3)
 
 
@@ -220,10 +220,10 @@ def ended_by(folder: Path, *messages: bytes) -> str:
 
 
 def test_a_drive_message_is_out_of_turn(tmp_path):
-    told = ended_by(tmp_path, b"drive 39 0 0")
-    assert told.endswith("'drive 39 0 0', but the pilot's answer due is base 39 N")
+    reported = ended_by(tmp_path, b"drive 39 0 0")
+    assert reported.endswith("'drive 39 0 0', but the pilot's answer due is base 39 N")
 
 
 def test_bytes_that_never_come_are_not_waited_for_without_end(tmp_path):
-    told = ended_by(tmp_path, b"base 39 7")
-    assert "7 bytes written to the base's port, but only 0 have come" in told
+    reported = ended_by(tmp_path, b"base 39 7")
+    assert "7 bytes written to the base's port, but only 0 have come" in reported

@@ -46,9 +46,9 @@ def record(whiskerd: str, serial: str | None, count: int) -> np.ndarray:
         except RingError as error:
             trouble = str(error)
         daemon.terminate()
-        told = daemon.communicate(timeout=END_S)[1].strip().splitlines()
+        reported = daemon.communicate(timeout=END_S)[1].strip().splitlines()
     if frames is None or daemon.returncode != 0:
-        raise PatternError(told[-1] if told else trouble)
+        raise PatternError(reported[-1] if reported else trouble)
     return frames
 
 

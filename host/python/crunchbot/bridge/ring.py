@@ -276,8 +276,8 @@ class Reader:
         """Counters of ring and reader, as of now."""
         info = ffi.new("struct whisker_reader_info *")
         lib.whisker_reader_info(self._reader, info)
-        told = {field: getattr(info, field) for field in ReaderInfo.__dataclass_fields__}
-        return ReaderInfo(**told | {"owner": self.owner})
+        reported = {field: getattr(info, field) for field in ReaderInfo.__dataclass_fields__}
+        return ReaderInfo(**reported | {"owner": self.owner})
 
     @property
     def clock(self) -> Clock | None:

@@ -29,11 +29,11 @@ def next_free(path: Path) -> Path:
 
 
 def run(arguments) -> int:
-    told = metadata(arguments.robot, arguments.scene)
+    reported = metadata(arguments.robot, arguments.scene)
     stop = stop_on_signals()
     with open_link("bag", arguments) as link:
         file = next_free(Path(arguments.file)) if arguments.next else arguments.file
-        with TopicWriter(file, RECORD, told, arguments.overwrite) as writer:
+        with TopicWriter(file, RECORD, reported, arguments.overwrite) as writer:
             counted = Bag(writer, arguments.robot).run(link, stop, arguments.stay)
     print(f"{file}: " + ", ".join(f"{name} {value}" for name, value in counted.items()))
     return 0

@@ -75,8 +75,8 @@ def touch(arguments) -> int:
     if arguments.chart:
         _draw(arguments.chart, wanted, (mine, *wanted.beside), arguments.near)
     peers = [] if arguments.near != NEAR_M else benchmark.stored(arguments.peers).get(wanted.name, [])
-    told = [*scores, *(score for score in peers if score["engine"] != mine.name)]
-    print(json.dumps({"scene": wanted.name, "scores": told}) if arguments.json else table(wanted.name, told))
+    reported = [*scores, *(score for score in peers if score["engine"] != mine.name)]
+    print(json.dumps({"scene": wanted.name, "scores": reported}) if arguments.json else table(wanted.name, reported))
     return 0
 
 

@@ -29,15 +29,15 @@ def add(parser) -> None:
 def run(arguments) -> int:
     if arguments.nodes:
         return ask_nodes(arguments.ring)
-    told = {"host": {"wire_version": WIRE_VERSION}, "usb": [describe_usb(found) for found in usbtree.bridges()]}
+    reported = {"host": {"wire_version": WIRE_VERSION}, "usb": [describe_usb(found) for found in usbtree.bridges()]}
     try:
         with Reader(arguments.ring, arguments.wait, arguments.ring_owner) as reader:
-            told |= describe_ring(reader)
+            reported |= describe_ring(reader)
     except RingError as error:
-        if not told["usb"] or error.name != "RING_MISSING":
+        if not reported["usb"] or error.name != "RING_MISSING":
             raise
-        told["ring"] = {"name": arguments.ring, "state": str(error)}
-    print(json.dumps(told) if arguments.json else "\n".join(lines(told)))
+        reported["ring"] = {"name": arguments.ring, "state": str(error)}
+    print(json.dumps(reported) if arguments.json else "\n".join(lines(reported)))
     return 0
 
 
@@ -69,19 +69,19 @@ def describe_usb(bridge: usbtree.Bridge) -> dict:
 
 def describe_ring(reader: Reader) -> dict:
     """What a reader of the ring can know: counters, daemon and bridge, clock."""
-    told: dict = {"ring": {"name": reader.name} | dataclasses.asdict(reader.info)}
+    reported: dict = {"ring": {"name": reader.name} | dataclasses.asdict(reader.info)}
     if stats := reader.stats:
-        told["daemon"] = dataclasses.asdict(stats) | {"lanes": [n for n in range(32) if stats.lane_mask >> n & 1]}
-        told["daemon"]["up_s"] = round(time.time() - stats.started_ns / 1e9, 1)
+        reported["daemon"] = dataclasses.asdict(stats) | {"lanes": [n for n in range(32) if stats.lane_mask >> n & 1]}
+        reported["daemon"]["up_s"] = round(time.time() - stats.started_ns / 1e9, 1)
     if clock := reader.clock:
-        told["clock"] = dataclasses.asdict(clock)
-    return told
+        reported["clock"] = dataclasses.asdict(clock)
+    return reported
 
 
-def lines(told: dict) -> list[str]:
+def lines(reported: dict) -> list[str]:
     """As a person reads it: a heading per part, a line per value."""
     out = []
-    for part, values in told.items():
+    for part, values in reported.items():
         tables = values if isinstance(values, list) else [values]
         for table in tables:
             out += [part, *(f"  {key}: {value}" for key, value in table.items())]

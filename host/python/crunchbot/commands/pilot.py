@@ -133,9 +133,9 @@ def _greet(others: list[str], link: Link, stop: threading.Event) -> None:
 def _known_wheels(base: LiveBase, link: Link, stop: threading.Event) -> Wheels:
     """Waits for the base to say what it can do; meanwhile the pilot's health says so."""
     health = Health(link, dict)
-    while not (told := base.health()) and not stop.wait(RETRY_S):
+    while not (reported := base.health()) and not stop.wait(RETRY_S):
         health.tell(0, base.trouble, base.trouble)
-    return wheels_of(told) if told else EXACT
+    return wheels_of(reported) if reported else EXACT
 
 
 def _write_report(path: Path, parts: SimpleNamespace) -> None:

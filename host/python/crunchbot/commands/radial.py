@@ -103,30 +103,30 @@ def follow(arguments) -> int:
             held, bases, tilts = ContactFilter.calibrated(model, recorded)
         except ValueError as error:
             raise TableError(arguments.contacts, 1, f"contact {contact}: {error}") from error
-        told = held.run(bases, tilts)
-        for k in range(len(told.sample)) if arguments.json else range(len(told.sample))[-1:]:
-            _follow(arguments, contact, recorded.t_s[told.sample[k]] - recorded.t_s[0], told, k)
-        if not len(told.sample):
+        reported = held.run(bases, tilts)
+        for k in range(len(reported.sample)) if arguments.json else range(len(reported.sample))[-1:]:
+            _follow(arguments, contact, recorded.t_s[reported.sample[k]] - recorded.t_s[0], reported, k)
+        if not len(reported.sample):
             print(json.dumps({"contact": contact}) if arguments.json else f"{contact}  no contact")
     return 0
 
 
-def _follow(arguments, contact: str, at_s: float, told: Reports, k: int) -> None:
+def _follow(arguments, contact: str, at_s: float, reported: Reports, k: int) -> None:
     """One line on a contact at a time; angles in degrees about the unbent whisker."""
-    x, y = 1e3 * told.point[k]
-    sd_x, sd_y = 1e3 * np.sqrt(np.diag(told.point_cov[k]))
-    normal, normal_sd = np.degrees([told.normal_rad[k], told.normal_sd[k]])
+    x, y = 1e3 * reported.point[k]
+    sd_x, sd_y = 1e3 * np.sqrt(np.diag(reported.point_cov[k]))
+    normal, normal_sd = np.degrees([reported.normal_rad[k], reported.normal_sd[k]])
     if arguments.json:
         made = {"contact": contact, "t_s": at_s, "point_mm": [x, y], "point_sd_mm": [sd_x, sd_y]}
-        made |= {"normal_deg": normal, "normal_sd_deg": normal_sd, "motion": told.motion[k]}
+        made |= {"normal_deg": normal, "normal_sd_deg": normal_sd, "motion": reported.motion[k]}
         made |= {
-            name: getattr(told, name)[k]
+            name: getattr(reported, name)[k]
             for name in ("sweep", "corner", "tip", "slip", "speed", "speed_sd", "curvature", "other")
         }
         print(json.dumps(plain(made)))
         return
-    kind = "tip" if told.tip[k] > 0.5 else "corner" if told.corner[k] > 0.5 else "shaft"
+    kind = "tip" if reported.tip[k] > 0.5 else "corner" if reported.corner[k] > 0.5 else "shaft"
     print(
         f"{contact}  after {at_s:.3f} s  ({x:.1f} +- {sd_x:.1f}, {y:.1f} +- {sd_y:.1f}) mm  "
-        f"normal {normal:.0f} +- {normal_sd:.0f} degrees  {kind}  {told.motion[k]}"
+        f"normal {normal:.0f} +- {normal_sd:.0f} degrees  {kind}  {reported.motion[k]}"
     )

@@ -135,5 +135,5 @@ def _simulated(arguments, meeting: parts.Meeting) -> tuple[parts.Body, parts.Sim
         print("learning textures and distances of this robot: half a minute", flush=True)
         learn(models, scene, seed, lambda: None)
     body = parts.Body(folder, models, arguments.create, meeting.serial, seed)
-    told = (arguments.level, seed, arguments.seconds, arguments.pace, out / "truth.csv", out / "wheels.csv")
-    return body, parts.Simulated(out / "scene.flat", *told)
+    reported = (arguments.level, seed, arguments.seconds, arguments.pace, out / "truth.csv", out / "wheels.csv")
+    return body, parts.Simulated(out / "scene.flat", *reported)

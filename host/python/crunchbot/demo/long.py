@@ -171,8 +171,8 @@ def travelled(out: Path, scene: scenes.Scene) -> dict:
 def contacts_told(path: Path) -> int:
     """Onsets in a bag."""
     with McapFile(path) as bag:
-        told = (m for m in bag.messages() if m.topic.endswith(CONTACT_TOPIC))
-        onsets = sum(decode(Contact, bytes(m.data), m.topic).touching for m in told)
+        reported = (m for m in bag.messages() if m.topic.endswith(CONTACT_TOPIC))
+        onsets = sum(decode(Contact, bytes(m.data), m.topic).touching for m in reported)
         for line in bag.damage:
             warn(line)
         return onsets

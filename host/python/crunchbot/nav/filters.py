@@ -238,8 +238,8 @@ class Filter:
     def resolution(self) -> tuple[float, float, float, float] | None:
         """Edge of a cell in m, its extent in rad, the edge in m that the scene's detail asks for, and that of the cells in
         which an unknown place is looked for where they are too wide for the detail, else 0; None: no cells."""
-        told = lib.nav_filter_resolution(self._filter)
-        return (told.m, told.rad, told.wanted_m, told.start_m) if told.m > 0 else None
+        reported = lib.nav_filter_resolution(self._filter)
+        return (reported.m, reported.rad, reported.wanted_m, reported.start_m) if reported.m > 0 else None
 
     @property
     def bad_cells(self) -> int:
@@ -283,8 +283,8 @@ def _sensors(sensors: Sequence[Sensor]):
             raise SettingError(f"sensor {n}: no map of codes with cells above 0 m; give (rows, columns) of uint8")
         keep.append(codes)
         code = octets(codes, f"codes of sensor {n}", (None, None))
-        told = {"codes": sensor.count, "x": sensor.at_m[0], "y": sensor.at_m[1], "cell": sensor.cell_m}
-        tables[n].map = told | {"columns": columns, "rows": rows, "code": code}
+        reported = {"codes": sensor.count, "x": sensor.at_m[0], "y": sensor.at_m[1], "cell": sensor.cell_m}
+        tables[n].map = reported | {"columns": columns, "rows": rows, "code": code}
         fill = "nav_sensor_map_fill" if sensor.edges is None else "nav_sensor_table_fill"
         if sensor.edges is not None:
             bins, width = len(sensor.edges) - 1, sensor.count

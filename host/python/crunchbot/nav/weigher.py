@@ -48,6 +48,6 @@ class Weigher:
         """(n,) log-likelihoods of that row at poses (n, 3): x, y in m, theta in rad; -inf where no robot can stand."""
         poses = as_doubles(poses, "poses", (None, 3))
         out = np.empty(len(poses))
-        given, told = doubles(poses, "poses", (None, 3)), doubles(out, "out", (len(poses),))
-        lib.nav_weigher_weigh(self._weigher, given, len(poses), told)
+        given, reported = doubles(poses, "poses", (None, 3)), doubles(out, "out", (len(poses),))
+        lib.nav_weigher_weigh(self._weigher, given, len(poses), reported)
         return out

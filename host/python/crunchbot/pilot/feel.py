@@ -116,14 +116,18 @@ class Feeler:
             self._rest = _rest(list(self._recent)[:REST_BLOCKS], contact.rest)
             ticks, samples, good = (np.concatenate(part) for part in zip(*self._recent, strict=True))
         tilts = self._tilts(samples - self._rest)
-        told = self._filter.run(self._bases(drives.at(ticks)), tilts, good)
-        if not contact.touching or not len(told.sample) or ticks[max(told.sample[-1], 0)] < contact.onset + LEAST_TICKS:
+        reported = self._filter.run(self._bases(drives.at(ticks)), tilts, good)
+        if (
+            not contact.touching
+            or not len(reported.sample)
+            or ticks[max(reported.sample[-1], 0)] < contact.onset + LEAST_TICKS
+        ):
             return
-        known = told.other[-1] < 0.5
-        self.felt = self._placed(told, ticks) if known else None
+        known = reported.other[-1] < 0.5
+        self.felt = self._placed(reported, ticks) if known else None
         bent = abs(float(np.median(tilts[:, 0])))
         if bent >= self._most:
-            self._most, self.face = bent, float(told.tip[-1]) if known else math.nan
+            self._most, self.face = bent, float(reported.tip[-1]) if known else math.nan
 
     def _bases(self, drives: np.ndarray) -> np.ndarray:
         """(n, 3) motion of the follicle's exit in the filter's frame."""
@@ -135,17 +139,17 @@ class Feeler:
     def _tilts(self, off: np.ndarray) -> np.ndarray:
         return np.column_stack([self._model.along(off), off @ self._model.side]) / self._per_rad
 
-    def _placed(self, told: Reports, ticks: np.ndarray) -> Felt:
-        x, y = told.point[-1]
+    def _placed(self, reported: Reports, ticks: np.ndarray) -> Felt:
+        x, y = reported.point[-1]
         c, s = math.cos(self._yaw), math.sin(self._yaw)
         y *= self._out
         point = self._base[0] + c * x - s * y, self._base[1] + s * x + c * y
-        point_sd, slip = math.sqrt(np.trace(told.point_cov[-1]) / 2.0), float(told.slip[-1])
-        felt = Felt(int(ticks[max(told.sample[-1], 0)]), point, point_sd, slip=slip)
-        face, sd = float(told.tip[-1]), math.hypot(told.normal_sd[-1], MODEL_RAD)
-        if face < SURE or told.sweep[-1] > 0.5:
+        point_sd, slip = math.sqrt(np.trace(reported.point_cov[-1]) / 2.0), float(reported.slip[-1])
+        felt = Felt(int(ticks[max(reported.sample[-1], 0)]), point, point_sd, slip=slip)
+        face, sd = float(reported.tip[-1]), math.hypot(reported.normal_sd[-1], MODEL_RAD)
+        if face < SURE or reported.sweep[-1] > 0.5:
             return replace(felt, face=face)
-        normal = math.remainder(self._yaw + self._out * told.normal_rad[-1], 2.0 * math.pi)
+        normal = math.remainder(self._yaw + self._out * reported.normal_rad[-1], 2.0 * math.pi)
         return replace(felt, normal=normal, normal_sd=sd, face=face)
 
 

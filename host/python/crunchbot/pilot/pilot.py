@@ -161,20 +161,25 @@ class Pilot:
         push = (ticks >= contact.onset) & (ticks < contact.onset + self.behaviour.wheels.push_ticks)
         counts = peak(samples[push], contact.rest)
         recorded = Recorded(ticks * TICK_S, samples, np.full(len(ticks), self.behaviour.wheels.whisk_rad_s))
-        told = estimate(model, recorded, counts)
+        reported = estimate(model, recorded, counts)
         face = math.nan
         if isinstance(model, WhiskModel):
             face = self.feelers[lane].face
             distance = mount.whisked(model, model.shape_of(recorded), turn, face)
         else:
-            distance = mount.distance(told.radius_mm, turn)
+            distance = mount.distance(reported.radius_mm, turn)
         kind = contact_type(mount, distance)
         if distance is not None:
             self._measured[lane] = (contact.release, distance)
         if kind == "shaft" and (move := move_for_tip(mount, distance)):
             self.behaviour.aim(move)
         made = {"whisker": self.names[lane], "onset": contact.onset, "release": contact.release, "turn": turn}
-        made |= {"peak_counts": counts, "line_mm": told.radius_mm, "sigma_mm": told.sigma_mm, "distance_mm": distance}
+        made |= {
+            "peak_counts": counts,
+            "line_mm": reported.radius_mm,
+            "sigma_mm": reported.sigma_mm,
+            "distance_mm": distance,
+        }
         self.whisks.append(made | {"type": kind, "tries": whisk.tries, "face": face})
 
     def _texture_cells(self, lane: int, tick: int, held_back: bool) -> dict[str, float | None]:
@@ -213,8 +218,8 @@ class Pilot:
 
     def _notice_catch(self, lane: int, window: np.ndarray, loglik: np.ndarray | None) -> None:
         """A catch leaves good samples without evidence, window after window."""
-        told = loglik is not None or np.count_nonzero(np.isfinite(window).all(axis=1)) < WINDOW_LEAST_GOOD
-        self._silent[lane] = 0 if told else self._silent[lane] + 1
+        reported = loglik is not None or np.count_nonzero(np.isfinite(window).all(axis=1)) < WINDOW_LEAST_GOOD
+        self._silent[lane] = 0 if reported else self._silent[lane] + 1
         if self._silent[lane] >= CATCH_WINDOWS:
             self._silent[lane] = 0
             self.behaviour.catch(self.floor_sides[lane])

@@ -154,9 +154,9 @@ def encode_health(stamp_ns: int, frames: int, missing: int, overrun: int, bad: n
     health["frames"], health["frames_missing"], health["frames_overrun"] = frames, missing, overrun
     health["records_bad_count"], health["records_bad"] = LANES, bad
     if stats:
-        told = vars(stats) | {"records_bad": sum(getattr(stats, field) for field in RECORDS_BAD)}
+        reported = vars(stats) | {"records_bad": sum(getattr(stats, field) for field in RECORDS_BAD)}
         for field in DAEMON:
-            health[f"daemon_{field}"] = told[field]
+            health[f"daemon_{field}"] = reported[field]
     return health.tobytes()
 
 

@@ -54,8 +54,8 @@ class Recording:
     @property
     def lane_names(self) -> tuple[str, ...]:
         """Of all lanes, lane 0 first; "lane0" and so on where the recorder was told none."""
-        told = [name for name in self.metadata.get("lanes", "").split(",") if name]
-        return tuple(told[:LANES]) + tuple(f"lane{n}" for n in range(len(told), LANES))
+        reported = [name for name in self.metadata.get("lanes", "").split(",") if name]
+        return tuple(reported[:LANES]) + tuple(f"lane{n}" for n in range(len(reported), LANES))
 
     @property
     def clock_hz(self) -> float:
@@ -96,9 +96,9 @@ class Recording:
                 yield decoded
 
     def _check(self) -> None:
-        told = {content.get("format", FORMAT) for name, content in self._file.versions if name == METADATA}
-        if told and FORMAT not in told:  # a bit that is wrong in one copy is no newer release
-            text = f"format {told.pop():.20}, this package reads {FORMAT}; install the newer release"
+        reported = {content.get("format", FORMAT) for name, content in self._file.versions if name == METADATA}
+        if reported and FORMAT not in reported:  # a bit that is wrong in one copy is no newer release
+            text = f"format {reported.pop():.20}, this package reads {FORMAT}; install the newer release"
             raise RecordingError(f"{self.path}: {text}")
         if not any(message.topic == FRAMES_TOPIC for message in self._file.messages()):
             known = FRAMES_TOPIC in self._file.topics or not self.complete

@@ -173,11 +173,11 @@ def describe(reader: Reader) -> dict[str, str]:
 
 
 def _of_bridge(reader: Reader) -> dict[str, str]:
-    told = {}
+    reported = {}
     if stats := reader.stats:
-        told |= {name: str(getattr(stats, name)) for name in ("serial", "firmware", "wire_version", "lane_mask")}
-        told["tick_period"] = str(stats.tick_period)
-    return told
+        reported |= {name: str(getattr(stats, name)) for name in ("serial", "firmware", "wire_version", "lane_mask")}
+        reported["tick_period"] = str(stats.tick_period)
+    return reported
 
 
 def record(reader: Reader, writer: RecordingWriter, stop: threading.Event, frames: int | None = None) -> Tally:

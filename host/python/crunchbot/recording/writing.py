@@ -134,8 +134,8 @@ class RecordingWriter(TopicWriter):
         """`metadata`: what is known of ring and bridge; `lane_names`: without commas, lane 0 first."""
         if len(lane_names) > LANES or any("," in name for name in lane_names):
             raise RecordingError(f"{path}: lane names: give at most {LANES}, without commas")
-        told = {"format": FORMAT, "clock_hz": str(LIMITS["clock_hz"]), "lanes": ",".join(lane_names)}
-        super().__init__(path, METADATA, told | metadata, overwrite)
+        reported = {"format": FORMAT, "clock_hz": str(LIMITS["clock_hz"]), "lanes": ",".join(lane_names)}
+        super().__init__(path, METADATA, reported | metadata, overwrite)
 
     def block(self, time_ns: int, block: np.ndarray) -> None:
         """Frames as messages.encode_block gives them."""

@@ -45,21 +45,21 @@ class BagClock:
 
     def other(self, stamp_ns: int) -> int:
         """The log time of another message with the bridge's stamp: the newest row's when that makes no sense."""
-        told = self.latest if self._offset is None else stamp_ns + self._offset
-        return told if abs(told - self.latest) <= APART_NS else self.latest
+        reported = self.latest if self._offset is None else stamp_ns + self._offset
+        return reported if abs(reported - self.latest) <= APART_NS else self.latest
 
 
 def metadata(robot: str, scene: Path | None) -> dict[str, str]:
     """What a bag's first record holds: format, robot, when it began, and the scene's files as text, floors of images as
     letters. Sensors of the user's own are left out: rows on the network do not hold them."""
-    told = {"format": FORMAT, "robot": robot, "started": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())}
+    reported = {"format": FORMAT, "robot": robot, "started": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())}
     if scene is None:
-        return told
+        return reported
     loaded = load(scene)
     with tempfile.TemporaryDirectory(prefix="whisker-") as place:
         write(place, replace(loaded, robot=replace(loaded.robot, sensors=())))
         files = [Path(place) / name for name in SCENE_FILES]
-        return told | {file.name: file.read_text() for file in files if file.exists()}
+        return reported | {file.name: file.read_text() for file in files if file.exists()}
 
 
 class Bag:

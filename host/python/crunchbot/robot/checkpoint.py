@@ -48,11 +48,11 @@ def identity(scene: Scene) -> str:
     return sha256(repr((scene.arena, scene.robot)).encode()).hexdigest()
 
 
-def encode(told: Checkpoint) -> bytes:
+def encode(reported: Checkpoint) -> bytes:
     """The file's bytes."""
-    head = {name: getattr(told, name) for name in ("scene", *NUMBERS)}
-    head |= {"pose": list(map(float, told.pose)), "filters": {name: len(b) for name, b in told.beliefs.items()}}
-    rest = json.dumps(head).encode() + b"\n" + b"".join(b.tobytes() for b in told.beliefs.values())
+    head = {name: getattr(reported, name) for name in ("scene", *NUMBERS)}
+    head |= {"pose": list(map(float, reported.pose)), "filters": {name: len(b) for name, b in reported.beliefs.items()}}
+    rest = json.dumps(head).encode() + b"\n" + b"".join(b.tobytes() for b in reported.beliefs.values())
     return b"%s %d %08x\n" % (MAGIC, VERSION, zlib.crc32(rest)) + rest
 
 
@@ -103,10 +103,10 @@ def _beliefs(counts: object, data: bytes) -> dict[str, np.ndarray]:
     return dict(zip(counts, parts, strict=True))
 
 
-def save(path: Path, told: Checkpoint) -> None:
+def save(path: Path, reported: Checkpoint) -> None:
     """Put it in its place, whole or not at all. OSError when that cannot be done."""
     fresh = path.with_name(f".{path.name}.new")
-    fresh.write_bytes(encode(told))
+    fresh.write_bytes(encode(reported))
     fresh.replace(path)
 
 

@@ -218,7 +218,7 @@ def _config(listen: list[str], connect: list[str], lock_step: bool, scout: bool,
         if not found or int(found[2]) > 65535:
             raise NamingError(f"'{endpoint}': not an endpoint; give tcp/HOST:PORT, as {PILOT_ENDPOINT}")
     config = read_config(file)
-    told = {
+    reported = {
         "mode": "peer",
         "listen/endpoints": listen,
         "connect/endpoints": connect,
@@ -233,7 +233,7 @@ def _config(listen: list[str], connect: list[str], lock_step: bool, scout: bool,
         "transport/link/rx/max_message_size": MESSAGE_MOST,
         "transport/shared_memory/enabled": False,
     }
-    for key, value in told.items():
+    for key, value in reported.items():
         config.insert_json5(key, json.dumps(value))
     return config
 

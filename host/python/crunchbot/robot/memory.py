@@ -38,16 +38,16 @@ class Memory:
             return None
         self._checked = True
         try:
-            told = checkpoint.load(self._path)
-            if told is None:
+            reported = checkpoint.load(self._path)
+            if reported is None:
                 return None
-            self._check(told)
-            unknown_s = _unknown_s(told, first)
+            self._check(reported)
+            unknown_s = _unknown_s(reported, first)
         except CheckpointError as error:
             self.note = f"{self._path}: not used: {error}; it is written anew"
             return None
-        beliefs = {name: widen(told.beliefs[name], unknown_s) for name in self._names}
-        return Place(told.stream, told.seq, told.pose), beliefs
+        beliefs = {name: widen(reported.beliefs[name], unknown_s) for name in self._names}
+        return Place(reported.stream, reported.seq, reported.pose), beliefs
 
     def keep(self, step: Step, beliefs: dict[str, np.ndarray]) -> None:
         """Write down what is believed after a row: (n,) of COMPONENT by filter. What cannot be written is noted."""
@@ -58,9 +58,9 @@ class Memory:
         if not all(len(bumps) for bumps in inside.values()):
             return
         stamp = row.header.stamp.ns
-        told = Checkpoint(self._identity, sent.stream, row.seq, row.pose, stamp, sent.sent_ns, inside)
+        reported = Checkpoint(self._identity, sent.stream, row.seq, row.pose, stamp, sent.sent_ns, inside)
         try:
-            checkpoint.save(self._path, told)
+            checkpoint.save(self._path, reported)
         except OSError as error:
             self.note = f"{self._path}: cannot be written ({error.strerror}); a navigator begun anew will know nothing"
 
@@ -73,24 +73,24 @@ class Memory:
             kept[name] = np.maximum(kept[name], FINEST)
         return kept
 
-    def _check(self, told: Checkpoint) -> None:
-        if told.scene != self._identity:
+    def _check(self, reported: Checkpoint) -> None:
+        if reported.scene != self._identity:
             raise CheckpointError("field scene: of another arena or robot")
         for name in self._names:
-            if name not in told.beliefs:
+            if name not in reported.beliefs:
                 raise CheckpointError(f"field filters: nothing of {name}")
-            if fault := filters.prior_fault(self._scene, told.beliefs[name]):
+            if fault := filters.prior_fault(self._scene, reported.beliefs[name]):
                 raise CheckpointError(f"{name}: {fault}")
 
 
-def _unknown_s(told: Checkpoint, first: Received) -> float:
+def _unknown_s(reported: Checkpoint, first: Received) -> float:
     """For how long nobody counted the motion. CheckpointError when the checkpoint is too old, or from the future."""
     row, sent = first.message, first.envelope
-    same = sent.stream == told.stream
-    age_ns = max(row.header.stamp.ns - told.stamp_ns, sent.sent_ns - told.sent_ns)
-    if not same and row.header.stamp.ns < told.stamp_ns:
+    same = sent.stream == reported.stream
+    age_ns = max(row.header.stamp.ns - reported.stamp_ns, sent.sent_ns - reported.sent_ns)
+    if not same and row.header.stamp.ns < reported.stamp_ns:
         raise CheckpointError("of an earlier run: pilot and bridge have begun anew since")
-    if sent.sent_ns < told.sent_ns or (same and row.seq <= told.seq):
+    if sent.sent_ns < reported.sent_ns or (same and row.seq <= reported.seq):
         raise CheckpointError("of a later row than the first")
     if age_ns > AGE_MOST_S * 1e9:
         raise CheckpointError(f"{age_ns / 1e9:.0f} s old, {AGE_MOST_S:.0f} s are the most")

@@ -77,15 +77,15 @@ class Navigator:
     def counters(self) -> dict[str, object]:
         """What has been counted so far; rows unless said otherwise."""
         follower, inbox = self._follower, self._inbox
-        told = {name: getattr(follower, name) for name in ("weighed", "skipped", "missed", "restarts")}
-        told |= {
+        reported = {name: getattr(follower, name) for name in ("weighed", "skipped", "missed", "restarts")}
+        reported |= {
             "first": follower.first_seq,
             "refused": inbox.refused,
             "overflown": inbox.overflown,
         }
         if self._tracks:
-            told |= {name: getattr(self._tracks[0].filter, name) for name in ("bad_cells", "bad_rows")}
-        return told | {"prior": self._prior, "step_us": round(self._step_s * 1e6)}
+            reported |= {name: getattr(self._tracks[0].filter, name) for name in ("bad_cells", "bad_rows")}
+        return reported | {"prior": self._prior, "step_us": round(self._step_s * 1e6)}
 
     def run(self, stop: threading.Event) -> dict[str, object]:
         """Returns the counters."""

@@ -18,8 +18,8 @@ def add_link(parser: argparse.ArgumentParser, listen: Sequence[str], connect: Se
         ("--listen", listen, "endpoint to be reached at"),
         ("--connect", connect, "endpoint of another process"),
     ):
-        told = " ".join(standard) or NOWHERE
-        text = f"{what}, tcp/HOST:PORT or tls/HOST:PORT; repeatable, or '{NOWHERE}' (default: {told})"
+        reported = " ".join(standard) or NOWHERE
+        text = f"{what}, tcp/HOST:PORT or tls/HOST:PORT; repeatable, or '{NOWHERE}' (default: {reported})"
         parser.add_argument(option, action="append", metavar="ENDPOINT", help=text)
     parser.add_argument("--scout", action="store_true", help="also find others, and be found, by multicast")
     add_zenoh_config(parser)

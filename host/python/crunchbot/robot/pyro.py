@@ -103,15 +103,15 @@ class Results:
             return None
         counts = {name: getattr(answer, name) for name in ("observation_seq", "rows_skipped", "rows_missed", "prior")}
         covariance = answer.pose.planar_covariance.tolist()
-        told = {"t_s": _seconds(answer), "filter": answer.filter, "confidence": answer.confidence}
-        return told | {"pose": list(answer.pose.pose.xytheta), "covariance": covariance} | counts
+        reported = {"t_s": _seconds(answer), "filter": answer.filter, "confidence": answer.confidence}
+        return reported | {"pose": list(answer.pose.pose.xytheta), "covariance": covariance} | counts
 
     @Pyro5.api.expose
     def health(self) -> dict[str, dict]:
         """State, counters and last error of every process that has told any."""
         with self._lock:
-            told = self._health.items()
-            return {name: {"state": h.state, "last_error": h.last_error} | h.counts for name, h in told}
+            reported = self._health.items()
+            return {name: {"state": h.state, "last_error": h.last_error} | h.counts for name, h in reported}
 
     @Pyro5.api.expose
     def write(self, row: dict) -> int:

@@ -95,8 +95,8 @@ class Codec:
             try:
                 values[field.name] = self._values(data, field, self.ranges[f"{schema}:{field.name}"], place)
             except Malformed as error:
-                told = str(error)
-                raise error if told.startswith("field ") else type(error)(f"field {place}: {told}") from None
+                reported = str(error)
+                raise error if reported.startswith("field ") else type(error)(f"field {place}: {reported}") from None
         return self.types[schema](**values)
 
     def _values(self, data: Decoder, field: Field, limits: Range, place: str):

@@ -86,13 +86,13 @@ class Teller:
         self._send("contact", self._contact(name, contact.touching, contact.onset, release))
 
     def _tell_measured(self, whisk: dict) -> None:
-        told = self._contact(whisk["whisker"], False, whisk["onset"], whisk["release"])
-        told.measured = whisk["distance_mm"] is not None
-        if told.measured:
-            told.radius_m, told.sigma_m = 1e-3 * whisk["distance_mm"], 1e-3 * whisk["sigma_mm"]
-        told.part = PARTS[whisk["type"]]
-        told.shape = _shape(whisk["face"])
-        self._send("contact", told)
+        reported = self._contact(whisk["whisker"], False, whisk["onset"], whisk["release"])
+        reported.measured = whisk["distance_mm"] is not None
+        if reported.measured:
+            reported.radius_m, reported.sigma_m = 1e-3 * whisk["distance_mm"], 1e-3 * whisk["sigma_mm"]
+        reported.part = PARTS[whisk["type"]]
+        reported.shape = _shape(whisk["face"])
+        self._send("contact", reported)
 
     def _contact(self, name: str, touching: bool, onset: int, release: int) -> messages.Contact:
         header = messages.Header.at(self._stamp_ns, BASE_FRAME)

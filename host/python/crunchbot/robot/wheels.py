@@ -83,8 +83,8 @@ class LiveBase:
         self._base: Base | None = None
 
     def odometry(self, tick: int) -> Report | None:
-        told = self._try(lambda base: base.odometry())
-        return None if told is None else _report(told)
+        reported = self._try(lambda base: base.odometry())
+        return None if reported is None else _report(reported)
 
     def drive(self, tick: int, v_m_s: float, omega_rad_s: float) -> None:
         self._try(lambda base: base.drive(v_m_s, omega_rad_s))
@@ -126,8 +126,10 @@ class LiveBase:
         return self._base is not None
 
 
-def _report(told: Motion) -> Report:
-    return Report((told.x_m, told.y_m, told.theta_rad), np.array(told.covariance), Bumps.of_bits(told.bits))
+def _report(reported: Motion) -> Report:
+    return Report(
+        (reported.x_m, reported.y_m, reported.theta_rad), np.array(reported.covariance), Bumps.of_bits(reported.bits)
+    )
 
 
 def wheels_of(health: dict[str, str]) -> Wheels:

@@ -33,8 +33,8 @@ def is_bag(path: Path) -> bool:
 def read_bag(path: Path, warn: Callable[[str], None]):
     """(scene, rows) of a bag, each damage told to `warn`; BagError when it holds none."""
     with McapFile(path) as bag:
-        told = bag.metadata.get(RECORD, {})
-        robot = told.get("robot", "")
+        reported = bag.metadata.get(RECORD, {})
+        robot = reported.get("robot", "")
         wanted = {f"/{robot}/observation": Observation, f"/{robot}/truth": PoseStamped}
         found = {topic: [] for topic in wanted}
         for message in bag.messages():
@@ -43,11 +43,11 @@ def read_bag(path: Path, warn: Callable[[str], None]):
         for line in bag.damage:
             warn(line)
     rows, truth = found.values()
-    missing = [name for name in SCENE_FILES[:2] if name not in told]
+    missing = [name for name in SCENE_FILES[:2] if name not in reported]
     if missing or not rows:
         what = f"holds no {missing[0]}" if missing else "holds no observations"
         raise BagError(f"{path}: {what}; give a bag of a robot that 'whisker bag --scene SCENE' made")
-    return _as_folder({name: told[name] for name in SCENE_FILES if name in told}, _table(rows, truth))
+    return _as_folder({name: reported[name] for name in SCENE_FILES if name in reported}, _table(rows, truth))
 
 
 def _decoded(bag: McapFile, kind: type, message) -> list:

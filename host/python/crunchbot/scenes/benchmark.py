@@ -89,10 +89,10 @@ def run_filter(name: str, wanted: Entry, seed: int = 0) -> Estimates:
 def stored(path: Path = STORED) -> dict[str, list[dict]]:
     """Figures of other engines by scene, as `tools/benches touch` left them; none where there is no such file."""
     try:
-        told = read_json(path) if path.exists() else {}
+        reported = read_json(path) if path.exists() else {}
     except UnreadableError as error:
         raise BenchmarkError(f"{path}: {error}; make it anew with tools/benches touch") from error
-    return told if isinstance(told, dict) else {}
+    return reported if isinstance(reported, dict) else {}
 
 
 def store(path: Path, scores: dict[str, list[dict]]) -> None:

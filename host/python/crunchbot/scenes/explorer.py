@@ -88,8 +88,8 @@ class _Explorer:
         if whisk.start < feeler.onset <= whisk.push_end - PUSH_TICKS and feeler.release > feeler.onset:
             whisk.measured = True
             line_mm = 1000.0 * (feeler.range_m if feeler.range_m < feeler.length_m - TIP_M else feeler.length_m)
-            told = self.mounts[whisk.lane].distance(line_mm, whisk.direction)
-            self.measured[whisk.lane] = math.nan if told is None else told / 1000.0
+            reported = self.mounts[whisk.lane].distance(line_mm, whisk.direction)
+            self.measured[whisk.lane] = math.nan if reported is None else reported / 1000.0
 
     def radial(self) -> list[float]:
         """Cells of the row that ends now."""

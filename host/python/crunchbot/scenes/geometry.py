@@ -64,8 +64,8 @@ def directions(arena: Arena, poses: np.ndarray, whisker: Whisker, corner_m: floa
     faces += [face for box in arena.obstacles for face in _sides(box)]
     off = np.array([np.hypot(*(end - np.clip(end, side[0], side[1])).T) for side, _ in faces])
     near = np.sort(off, axis=0)
-    told = met & (near[1] > corner_m)
-    return np.where(told, np.array([turn for _, turn in faces])[off.argmin(axis=0)], np.nan)
+    reported = met & (near[1] > corner_m)
+    return np.where(reported, np.array([turn for _, turn in faces])[off.argmin(axis=0)], np.nan)
 
 
 def _sides(box) -> list[tuple[tuple[tuple, tuple], float]]:

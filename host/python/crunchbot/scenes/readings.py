@@ -148,8 +148,8 @@ def normals(
         longer = replace(whisker, length_m=whisker.length_m + LOOSE_M)
         true = directions(arena, poses, longer, CORNER_M) - poses[:, 2]
         wrong = rng.random(len(poses)) < world.normal_wrong
-        told = np.where(wrong, rng.uniform(-math.pi, math.pi, len(poses)), true)
-        told = np.where(np.isnan(true), np.nan, told + world.normal_sd_rad * rng.standard_normal(len(poses)))
-        out[:, n, 0] = np.where(touched[:, n], np.remainder(told + math.pi, 2 * math.pi) - math.pi, np.nan)
+        reported = np.where(wrong, rng.uniform(-math.pi, math.pi, len(poses)), true)
+        reported = np.where(np.isnan(true), np.nan, reported + world.normal_sd_rad * rng.standard_normal(len(poses)))
+        out[:, n, 0] = np.where(touched[:, n], np.remainder(reported + math.pi, 2 * math.pi) - math.pi, np.nan)
     out[..., 1] = np.where(np.isnan(out[..., 0]), np.nan, world.normal_sd_rad)
     return out

@@ -179,7 +179,9 @@ def _reports(made: list, ends: np.ndarray) -> Reports:
     def squares(name: str) -> np.ndarray:
         return np.array([[list(row) for row in getattr(a, name)] for a in made]).reshape(-1, 2, 2)
 
-    told = {"sample": ends.astype(np.int64), "motion": [MOTIONS[a.motion] for a in made]}
-    told |= {name: pairs(name) for name in ("point", "velocity")}
-    told |= {name: squares(name) for name in ("point_cov", "velocity_cov")}
-    return Reports(**{n: np.array([getattr(a, n) for a in made]) for n in Reports._fields if n not in told}, **told)
+    reported = {"sample": ends.astype(np.int64), "motion": [MOTIONS[a.motion] for a in made]}
+    reported |= {name: pairs(name) for name in ("point", "velocity")}
+    reported |= {name: squares(name) for name in ("point_cov", "velocity_cov")}
+    return Reports(
+        **{n: np.array([getattr(a, n) for a in made]) for n in Reports._fields if n not in reported}, **reported
+    )

@@ -64,5 +64,5 @@ class Mount:
                 return None
         if face > 0.5:
             return self.length_mm
-        told = model.estimate(shape)
-        return told.radius_mm if told.confidence >= LEAST_CONFIDENCE else None
+        reported = model.estimate(shape)
+        return reported.radius_mm if reported.confidence >= LEAST_CONFIDENCE else None

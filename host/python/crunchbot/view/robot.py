@@ -153,51 +153,51 @@ class RobotModel:
         tips = self.scene.robot.of_role("texture")
         return {f"{tip.name}_{name}": (tip.name, name) for tip in tips for name in self.scene.arena.textures}
 
-    def _take_localisation(self, told) -> None:
-        self.rows["missed"] = told.rows_missed
-        self.pose = placed(told.pose.pose)
+    def _take_localisation(self, reported) -> None:
+        self.rows["missed"] = reported.rows_missed
+        self.pose = placed(reported.pose.pose)
         if self.pose is None:
             return
-        self.path.add(told.header.stamp.ns / 1e9, *self.pose.values(), told.confidence)
-        covariance = told.pose.planar_covariance
+        self.path.add(reported.header.stamp.ns / 1e9, *self.pose.values(), reported.confidence)
+        covariance = reported.pose.planar_covariance
         self.pose |= {
             "sigma_m": real(math.sqrt(max(0.0, covariance[0, 0] + covariance[1, 1]))),
             "sigma_rad": real(math.sqrt(max(0.0, covariance[2, 2]))),
-            "confidence": real(told.confidence),
-            "filter": text(told.filter),
-            "stamp_s": real(told.header.stamp.ns / 1e9),
-            "skipped": told.rows_skipped,
-            "first_seq": told.first_seq,
-            "prior": text(told.prior),
+            "confidence": real(reported.confidence),
+            "filter": text(reported.filter),
+            "stamp_s": real(reported.header.stamp.ns / 1e9),
+            "skipped": reported.rows_skipped,
+            "first_seq": reported.first_seq,
+            "prior": text(reported.prior),
         }
-        self.surfaces.place(told.observation_seq, self.pose)
+        self.surfaces.place(reported.observation_seq, self.pose)
 
-    def _take_truth(self, told) -> None:
-        self.truth = placed(told.pose)
+    def _take_truth(self, reported) -> None:
+        self.truth = placed(reported.pose)
         if self.truth is not None:
-            self.true_path.add(told.header.stamp.ns / 1e9, *self.truth.values())
+            self.true_path.add(reported.header.stamp.ns / 1e9, *self.truth.values())
 
-    def _take_belief(self, told) -> None:
-        self.belief = told
+    def _take_belief(self, reported) -> None:
+        self.belief = reported
 
-    def _take_behaviour(self, told) -> None:
-        since = told.since.ns / 1e9
-        self.behaviour = {"state": text(told.state), "since_s": real(since), "reason": text(told.reason)}
+    def _take_behaviour(self, reported) -> None:
+        since = reported.since.ns / 1e9
+        self.behaviour = {"state": text(reported.state), "since_s": real(since), "reason": text(reported.reason)}
 
-    def _take_contact(self, told) -> None:
-        key = (told.whisker, told.onset.ns)
+    def _take_contact(self, reported) -> None:
+        key = (reported.whisker, reported.onset.ns)
         contact = self.contacts.setdefault(key, {"x": None, "y": None})
         contact |= {
-            "whisker": text(told.whisker),
-            "onset_s": real(told.onset.ns / 1e9),
-            "release_s": None if told.touching else real(told.release.ns / 1e9),
+            "whisker": text(reported.whisker),
+            "onset_s": real(reported.onset.ns / 1e9),
+            "release_s": None if reported.touching else real(reported.release.ns / 1e9),
         }
         measured = {"radius_m": None, "sigma_m": None, "part": None, "surface": None}
-        if told.measured:
-            measured = {"radius_m": real(told.radius_m, 4), "sigma_m": real(told.sigma_m, 5)}
-            measured |= {"part": PARTS.get(told.part), "surface": SHAPES.get(told.shape)}
-            contact["x"], contact["y"] = self._place(told.whisker, told.radius_m)
-        contact |= measured if told.measured or "part" not in contact else {}
+        if reported.measured:
+            measured = {"radius_m": real(reported.radius_m, 4), "sigma_m": real(reported.sigma_m, 5)}
+            measured |= {"part": PARTS.get(reported.part), "surface": SHAPES.get(reported.shape)}
+            contact["x"], contact["y"] = self._place(reported.whisker, reported.radius_m)
+        contact |= measured if reported.measured or "part" not in contact else {}
         while len(self.contacts) > CONTACTS_MOST:
             del self.contacts[next(iter(self.contacts))]
 
@@ -211,23 +211,23 @@ class RobotModel:
         x = self.pose["x"] + forward * math.cos(theta) - left * math.sin(theta)
         return real(x), real(self.pose["y"] + forward * math.sin(theta) + left * math.cos(theta))
 
-    def _take_health(self, told) -> None:
-        name = text(told.process) or "nameless"
+    def _take_health(self, reported) -> None:
+        name = text(reported.process) or "nameless"
         if name not in self.processes and len(self.processes) >= PROCESSES_MOST:
             return
         process = self.processes.setdefault(name, Process())
-        if process.heard is not None and process.pid != told.pid:
+        if process.heard is not None and process.pid != reported.pid:
             process.restarts += 1
-        process.pid, process.state, process.error = told.pid, text(told.state), text(told.last_error)
-        pairs = told.counters[:COUNTERS_MOST]
+        process.pid, process.state, process.error = reported.pid, text(reported.state), text(reported.last_error)
+        pairs = reported.counters[:COUNTERS_MOST]
         process.counters = {text(p.key, COUNTER_TEXT_MOST): text(p.value, COUNTER_TEXT_MOST) for p in pairs}
         process.heard, process.ended = self._clock(), False
 
-    def _take_end(self, name: str, told) -> None:
+    def _take_end(self, name: str, reported) -> None:
         """A process that ended in good order has a word for why; other streams end with it."""
         if name in self.processes:
             process = self.processes[name]
-            process.ended, process.state = True, text(f"ended: {told.reason}" if told.reason else "ended")
+            process.ended, process.state = True, text(f"ended: {reported.reason}" if reported.reason else "ended")
 
     def health(self) -> list[dict]:
         """Every process, by name, with its age in whole seconds."""
@@ -235,9 +235,9 @@ class RobotModel:
 
     def _process(self, name: str, process: Process) -> dict:
         age = None if process.heard is None else self._clock() - process.heard
-        told = {key: getattr(process, key) for key in ("pid", "state", "counters", "error", "restarts", "ended")}
+        reported = {key: getattr(process, key) for key in ("pid", "state", "counters", "error", "restarts", "ended")}
         silent = age is not None and age > SILENT_S and not process.ended
-        return {"name": name, "age_s": None if age is None else int(age), "silent": silent} | told
+        return {"name": name, "age_s": None if age is None else int(age), "silent": silent} | reported
 
     def touching(self) -> list[dict]:
         """Contacts that have no end yet."""
@@ -245,6 +245,6 @@ class RobotModel:
 
     def belief_columns(self) -> np.ndarray:
         """(n, 6) float32 of the newest belief: x, y, theta, weight, sigma_m, sigma_rad."""
-        told = self.belief
-        columns = (told.x, told.y, told.theta, told.weight, told.sigma_m, told.sigma_rad)
+        reported = self.belief
+        columns = (reported.x, reported.y, reported.theta, reported.weight, reported.sigma_m, reported.sigma_rad)
         return np.column_stack(columns).astype("<f4")

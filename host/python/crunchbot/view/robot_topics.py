@@ -26,10 +26,10 @@ class SceneFeed:
             return None
         self._told = True
         scene = self._model.scene
-        told = {"arena": None, "robot": None, "text": "arena not known: start whisker-view with --scene SCENE"}
+        reported = {"arena": None, "robot": None, "text": "arena not known: start whisker-view with --scene SCENE"}
         if scene is not None:
-            told = {"arena": asdict(scene.arena), "robot": asdict(replace(scene.robot, sensors=())), "text": ""}
-        return json.dumps({"topic": "scene"} | told, separators=(",", ":"))
+            reported = {"arena": asdict(scene.arena), "robot": asdict(replace(scene.robot, sensors=())), "text": ""}
+        return json.dumps({"topic": "scene"} | reported, separators=(",", ":"))
 
     def close(self) -> None:
         return
@@ -69,13 +69,13 @@ class RobotFeed:
         fresh = self._run != self._model.run
         if fresh:
             self._run, self._next = self._model.run, dict.fromkeys(self._next, 0)
-        told = {}
+        reported = {}
         for name, number in self._next.items():
             first, points = getattr(self._model, name).since(number, POINTS_MOST)
             self._next[name] = first + len(points)
             if points or fresh:
-                told[name] = json.dumps({"begin": fresh, "points": points}, separators=(",", ":"))
-        return told
+                reported[name] = json.dumps({"begin": fresh, "points": points}, separators=(",", ":"))
+        return reported
 
     def close(self) -> None:
         self._hub.robot_watchers -= 1
@@ -99,7 +99,7 @@ def _parts(hub: Hub) -> dict:
         "rows": model.rows,
         "touching": model.touching(),
         "contacts": list(model.contacts.values()),
-        "surfaces": list(model.surfaces.told),
+        "surfaces": list(model.surfaces.reported),
         "processes": model.health(),
     }
 

@@ -20,7 +20,7 @@ class Surfaces:
     """`told`: the newest, each with `x`, `y`, `normal` (direction in the arena), `normal_sd` and `point_sd`."""
 
     def __init__(self):
-        self.told: deque[dict] = deque(maxlen=SURFACES_MOST)
+        self.reported: deque[dict] = deque(maxlen=SURFACES_MOST)
         self._seq, self._cells = -1, {}
 
     def take(self, seq: int, cells: list[tuple]) -> None:
@@ -44,5 +44,5 @@ class Surfaces:
             at = {"x": pose["x"] + c * forward - s * left, "y": pose["y"] + s * forward + c * left}
             at |= {"normal": math.remainder(pose["theta"] + normal, 2.0 * math.pi)}
             at |= {"normal_sd": normal_sd, "point_sd": point_sd}
-            self.told.append({name: round(value, 4) for name, value in at.items()})
+            self.reported.append({name: round(value, 4) for name, value in at.items()})
         self._cells = {}

@@ -119,8 +119,8 @@ def test_doctor_looks_at_the_lanes_that_are_in_use_now(masks):
     frames["lane"]["status"][:, 2] = 33 << 10
     takes = iter([frames, None])
     reader = SimpleNamespace(seek_latest=lambda back: None, take=lambda wait_s: next(takes))
-    told = any("lane 2:" in finding.text for finding in doctor.samples(reader, END_S))
-    assert told == (masks[1] == 0b101)
+    reported = any("lane 2:" in finding.text for finding in doctor.samples(reader, END_S))
+    assert reported == (masks[1] == 0b101)
 
 
 def test_doctor_asks_for_permission_and_rule(host, monkeypatch):

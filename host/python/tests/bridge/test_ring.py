@@ -43,9 +43,9 @@ def test_a_window_is_one_array_wherever_it_lies(ring):
         with reader.window(CAPACITY) as window:
             assert np.array_equal(window, frames[300 - CAPACITY : 300]) and not window.flags.writeable
         assert reader.info.position == position
-        with pytest.raises(RingError, match="overtook") as told, reader.window(100):
+        with pytest.raises(RingError, match="overtook") as reported, reader.window(100):
             ring.publish(frames[300:])
-        assert told.value.name == "OVERRUN"
+        assert reported.value.name == "OVERRUN"
         with pytest.raises(RingError), reader.window(CAPACITY + 1):
             pass
 
@@ -65,9 +65,9 @@ def test_views_used_too_long_are_told(ring):
         ring.publish(frames[:10])
         view = reader.peek()
         ring.publish(frames[10:])
-        with pytest.raises(RingError) as told:
+        with pytest.raises(RingError) as reported:
             reader.advance(len(view))
-        assert told.value.name == "OVERRUN" and reader.info.overruns == 1
+        assert reported.value.name == "OVERRUN" and reader.info.overruns == 1
         assert reader.info.frames_overrun + len(reader.peek()) == len(frames)
 
 
@@ -104,9 +104,9 @@ def test_a_second_writer_and_a_missing_ring_are_one_line(ring):
     held = f"another writer holds this ring \\(/dev/shm/{ring.name}, user {getpass.getuser()}'s\\); stop"
     with pytest.raises(RingError, match=f"ring {ring.name}: {held}"):
         Writer(ring.name, CAPACITY)
-    with pytest.raises(RingError) as told:
+    with pytest.raises(RingError) as reported:
         Reader("whisker-none")
-    assert told.value.name == "RING_MISSING" and told.value.exit_code == 1 and "\n" not in str(told.value)
+    assert reported.value.name == "RING_MISSING" and reported.value.exit_code == 1 and "\n" not in str(reported.value)
     with pytest.raises(RingError, match="range"):
         Writer(ring_name(), 100)
 
@@ -124,14 +124,16 @@ def test_readers_say_whose_ring_it_is(ring):
 def test_a_ring_of_another_user_is_refused_unless_that_user_is_named(ring):
     path = f"/dev/shm/{ring.name}"
     os.chown(path, STRANGER, STRANGER)
-    with pytest.raises(RingError, match=f"the ring {path} is user {STRANGER}'s, .* --ring-owner {STRANGER}") as told:
+    with pytest.raises(
+        RingError, match=f"the ring {path} is user {STRANGER}'s, .* --ring-owner {STRANGER}"
+    ) as reported:
         Reader(ring.name)
-    assert told.value.name == "RING_OWNER" and "\n" not in str(told.value)
+    assert reported.value.name == "RING_OWNER" and "\n" not in str(reported.value)
     with pytest.raises(RingError):
         Reader(ring.name, owner=STRANGER + 1)
-    with pytest.raises(RingError) as told:
+    with pytest.raises(RingError) as reported:
         signal_writer(ring.name, signal.SIGTERM)  # this process: it would end here
-    assert told.value.name == "RING_OWNER"
+    assert reported.value.name == "RING_OWNER"
     with Reader(ring.name, owner=STRANGER) as reader:
         assert reader.owner == str(STRANGER)
     assert [entry.error for entry in found_rings() if entry.name == ring.name] == ["RING_OWNER"]

@@ -40,9 +40,9 @@ def test_a_scene_of_the_list_is_written_and_an_estimate_of_it_scored(tmp_path, c
     est.write_text("\n".join(["x_m,y_m,theta_rad,confidence", *lines]) + "\n")
     peers.write_text(json.dumps({"anchor": [{"engine": "theirs", "near_share": 0.5}]}))
     words = ("bench", "touch", "--estimate", est, "--peers", peers)
-    code, told, error = run(capsys, *words, "--scene", "anchor", "--json", "--chart", chart)
+    code, reported, error = run(capsys, *words, "--scene", "anchor", "--json", "--chart", chart)
     assert (code, error) == (0, "") and "svg" in chart.read_text()
-    mine, theirs = json.loads(told)["scores"]
+    mine, theirs = json.loads(reported)["scores"]
     assert mine["error_median_m"] == pytest.approx(0.02) and mine["brier"] == 0.25 and theirs["near_share"] == 0.5
     lines = run(capsys, *words, "--scene", "anchor")[1].splitlines()
     assert lines[1].startswith("est") and lines[2].startswith("theirs")
@@ -52,9 +52,9 @@ def test_a_scene_of_the_list_is_written_and_an_estimate_of_it_scored(tmp_path, c
 def test_a_log_is_read_from_the_users_folder_with_what_was_published(logs, capsys):
     for data in (logs, logs / "thymio"):
         words = ("bench", "touch", "--scene", "thymio/random_1", "--data", data, "--filter", "odometry", "--json")
-        code, told, error = run(capsys, *words)
+        code, reported, error = run(capsys, *words)
         assert (code, error) == (0, "")
-        mine, theirs = json.loads(told)["scores"][:2]
+        mine, theirs = json.loads(reported)["scores"][:2]
         assert mine["rows"] == ROWS - 1 and mine["coverage_90"] is not None and theirs["engine"] == "published theirs"
         assert (theirs["rows"], theirs["near_share"], theirs["step_us_mean"]) == (2, 1.0, 2.5e6)
 
@@ -71,12 +71,12 @@ def test_a_log_is_read_from_the_users_folder_with_what_was_published(logs, capsy
         (("--scene", "anchor", "--filter", "odometry", "--near", "-1"), "--near"),
     ],
 )
-def test_what_is_missing_is_one_line(capsys, words, told):
+def test_what_is_missing_is_one_line(capsys, words, reported):
     try:
         code, _, error = run(capsys, "bench", "touch", *words)
     except SystemExit as end:  # a word that is no argument
         code, error = end.code, capsys.readouterr().err
-    assert code == 2 and told in error and error.count("\n") == 1
+    assert code == 2 and reported in error and error.count("\n") == 1
 
 
 def test_stored_figures_that_are_damaged_are_told(tmp_path):

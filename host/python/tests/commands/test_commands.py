@@ -72,17 +72,17 @@ def test_wrong_arguments_are_one_line(capsys, arguments, complaint):
 def test_the_simulated_bridge_and_its_daemon_have_the_same_lanes(monkeypatch, tmp_path, lanes, mask):
     monkeypatch.setattr(bridge_sim, "program", lambda name: name)
     words = bridge_sim._command(_parser("bridge-sim").parse_args(["bridge-sim", "--lanes", str(lanes)]), tmp_path)
-    told = {name: words[words.index(name) + 1] for name in ("--lanes-populated", "--lane-mask")}
-    assert told == {"--lanes-populated": str(lanes), "--lane-mask": str(mask)}
+    reported = {name: words[words.index(name) + 1] for name in ("--lanes-populated", "--lane-mask")}
+    assert reported == {"--lanes-populated": str(lanes), "--lane-mask": str(mask)}
 
 
 def test_info_tells_ring_daemon_and_clock(capsys):
     with live_ring(make_frames(300)) as name:
         code, out, _ = run(capsys, "info", "--ring", name, "--json")
-        told = json.loads(out)
-        assert code == 0 and told["ring"]["published"] == 300 and told["ring"]["writer_pid"] == os.getpid()
-        assert told["daemon"]["serial"] == "B0042" and told["daemon"]["lanes"] == [0, 2]
-        assert told["clock"]["uncertainty_ns"] == 5000.0 and told["host"]["wire_version"] == WIRE_VERSION
+        reported = json.loads(out)
+        assert code == 0 and reported["ring"]["published"] == 300 and reported["ring"]["writer_pid"] == os.getpid()
+        assert reported["daemon"]["serial"] == "B0042" and reported["daemon"]["lanes"] == [0, 2]
+        assert reported["clock"]["uncertainty_ns"] == 5000.0 and reported["host"]["wire_version"] == WIRE_VERSION
         assert "  serial: B0042" in run(capsys, "info", "--ring", name)[1]
 
 
@@ -97,9 +97,9 @@ def test_stream_prints_chosen_lanes_and_ticks(capsys):
         sample = frames["lane"][30, 5]
         assert lines[4].split(",")[:3] == ["30", "0.0150000", "37"]
         assert lines[4].split(",")[-3:] == [str(sample[field]) for field in ("alpha", "beta", "status")]
-        told = [json.loads(line) for line in run(capsys, "stream", *options, "--json")[1].splitlines()]
-        assert [t["tick"] for t in told] == [0, 10, 20, 30] and told[3]["lanes"]["5"][0] == sample["alpha"]
-        assert len(told[0]["lanes"]) == 28
+        reported = [json.loads(line) for line in run(capsys, "stream", *options, "--json")[1].splitlines()]
+        assert [t["tick"] for t in reported] == [0, 10, 20, 30] and reported[3]["lanes"]["5"][0] == sample["alpha"]
+        assert len(reported[0]["lanes"]) == 28
 
 
 def test_stream_ends_quietly_with_its_reader():

@@ -30,18 +30,18 @@ def run(**parts) -> subprocess.CompletedProcess:
 @pytest.mark.parametrize("first", ["SIGINT", "SIGTERM", "SIGHUP"])
 @pytest.mark.parametrize("second", ["SIGINT", "SIGTERM", "SIGHUP"])
 def test_a_second_signal_breaks_no_ending(first, second):
-    told = run(
+    reported = run(
         use="stop_on_signals", before="stop = stop_on_signals()", waits="stop.wait()", first=first, second=second
     )
-    assert (told.stdout, told.stderr, told.returncode) == ("ended in order\n", "", 0)
+    assert (reported.stdout, reported.stderr, reported.returncode) == ("ended in order\n", "", 0)
 
 
 def test_who_ends_by_an_interrupt_gets_one():
-    told = run(
+    reported = run(
         use="interrupt_on_signals", before="interrupt_on_signals()", waits="pass", first="SIGTERM", second="SIGINT"
     )
-    assert told.stdout == "ended in order\n" and told.stderr.count("Traceback") == 1
-    assert told.returncode == -signal.SIGINT
+    assert reported.stdout == "ended in order\n" and reported.stderr.count("Traceback") == 1
+    assert reported.returncode == -signal.SIGINT
 
 
 def test_a_ring_is_not_waited_for_when_it_is_to_stop():

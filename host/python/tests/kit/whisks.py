@@ -21,8 +21,8 @@ def whisk(radius_mm, rng, *, push_s=0.6, gain=1.0, speed=1.0, true_rate=None, hz
     pushed = np.clip(np.minimum(t - 0.2, 0.2 + 2 * push_s - t), 0.0, None)
     along = np.array([0.8, -0.6, 0.3][:channels]) if channels > 1 else np.ones(1)
     counts = np.round(32768 + COUNTS * tilt_rate * pushed[:, None] * along + rng.normal(0, 11, (len(t), channels)))
-    told = np.full(len(t), RATE * speed * (true_rate or 1.0))
-    return Contact(t, counts, np.full(len(t), RATE * speed), told if true_rate else None)
+    reported = np.full(len(t), RATE * speed * (true_rate or 1.0))
+    return Contact(t, counts, np.full(len(t), RATE * speed), reported if true_rate else None)
 
 
 def whisks(rng, repeats, spread=0.04, split="time", radii=RADII, **options) -> Whisks:

@@ -25,8 +25,8 @@ def straight(kidnap: int | None = None) -> Observations:
     return Observations(times, [], odometry, np.empty((ROWS, 0, 0)), np.empty((ROWS, 0)), truth)
 
 
-def engine(poses: np.ndarray, **told) -> Estimates:
-    return Estimates("engine", np.arange(len(poses)), poses, **told)
+def engine(poses: np.ndarray, **reported) -> Estimates:
+    return Estimates("engine", np.arange(len(poses)), poses, **reported)
 
 
 def test_the_figures_are_those_of_the_rows():
@@ -109,8 +109,8 @@ def test_a_file_of_another_engine_is_read_by_order_or_by_time(tmp_path):
         ("t_s,x_m,y_m,theta_rad", [], "no rows"),
     ],
 )
-def test_a_file_that_cannot_be_matched_is_told_in_a_line(tmp_path, header, lines, told):
-    with pytest.raises(TableError, match=told):
+def test_a_file_that_cannot_be_matched_is_told_in_a_line(tmp_path, header, lines, reported):
+    with pytest.raises(TableError, match=reported):
         read_estimates(write(tmp_path / "est.csv", header, lines), "est", straight())
 
 
@@ -120,8 +120,8 @@ def test_the_bound_counts_each_tile_once_and_holds_for_floor_sensors_only():
     one = Scene(arena, Robot(0.0, 0.1, 0.01, (Whisker("a", "texture", tip_m=(0.0, 0.0)),)))
     two = Scene(arena, Robot(0.0, 0.1, 0.01, tuple(Whisker(n, "texture", tip_m=(0.0, 0.0)) for n in "ab")))
     blind = Scene(arena, Robot(0.0, 0.1, 0.01, (Whisker("a", "object", base_m=(0, 0), yaw_rad=0.0, length_m=0.1),)))
-    told = bits_told(one, rows)
-    assert told[0] == 1.0 and told[-1] == 14.0 and (np.diff(told) >= 0).all()
-    assert np.array_equal(told, bits_told(two, rows))
+    reported = bits_told(one, rows)
+    assert reported[0] == 1.0 and reported[-1] == 14.0 and (np.diff(reported) >= 0).all()
+    assert np.array_equal(reported, bits_told(two, rows))
     assert bits_told(blind, rows) is None
     assert bits_wanted(one, 0.06) == pytest.approx(math.log2(4.2 * 0.6 / (math.pi * 0.06**2)))

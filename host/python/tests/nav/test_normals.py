@@ -45,9 +45,9 @@ def test_directions_lie_as_the_faces_do(made):
     truth, rows = made.observations.truth, made.observations
     off = []
     for n, whisker in enumerate(made.scene.robot.of_role("object")):
-        told = np.isfinite(rows.normal[:, n, 0])
-        turned = geometry.directions(made.scene.arena, truth, replace(whisker, length_m=0.145), 0.0)[told]
-        off += np.remainder(rows.normal[told, n, 0] + truth[told, 2] - turned + math.pi, 2 * math.pi).tolist()
+        reported = np.isfinite(rows.normal[:, n, 0])
+        turned = geometry.directions(made.scene.arena, truth, replace(whisker, length_m=0.145), 0.0)[reported]
+        off += np.remainder(rows.normal[reported, n, 0] + truth[reported, 2] - turned + math.pi, 2 * math.pi).tolist()
     off = np.degrees(np.abs(np.array(off) - math.pi))
     assert len(off) > 50 and np.median(off) == pytest.approx(0.674 * 5.0, rel=0.3)
     assert np.array_equal(np.isnan(rows.normal[..., 0]), np.isnan(rows.normal[..., 1]))

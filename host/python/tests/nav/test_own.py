@@ -110,12 +110,12 @@ def test_a_row_of_the_network_may_hold_a_sensors_reading():
         ("light.csv", "0.0375,0.0375", "-1,0.0375", "line 2: a likelihood is negative"),
     ],
 )
-def test_what_is_wrong_with_a_sensors_files_is_told_in_a_line(tmp_path, name, old, new, told):
+def test_what_is_wrong_with_a_sensors_files_is_told_in_a_line(tmp_path, name, old, new, reported):
     scenes.write_scene(tmp_path, *lit_scene())
     text = (tmp_path / name).read_text()
     assert old in text
     (tmp_path / name).write_text(text.replace(old, new, 1))
-    with pytest.raises((SceneError, TableError), match=told) as caught:
+    with pytest.raises((SceneError, TableError), match=reported) as caught:
         load(tmp_path)
     assert "\n" not in str(caught.value)
 
@@ -159,7 +159,7 @@ def raising(reading, levels):
         (lambda reading, levels: "many", "raised", "ValueError: could not convert"),
     ],
 )
-def test_what_a_function_does_wrong_costs_its_readings_and_is_counted(loglik, counted, told):
+def test_what_a_function_does_wrong_costs_its_readings_and_is_counted(loglik, counted, reported):
     own = OwnSensor((SIDE_M, SIDE_M), 0.05, to_anchor, loglik, RANGES)
     filter = Filter(
         "grid", Scene(ARENA, BLIND, Prior("gaussian", (1.0, 0.5, 0.0), (0.1, 0.1, 0.1))), sensors=[own.sensor]
@@ -167,7 +167,7 @@ def test_what_a_function_does_wrong_costs_its_readings_and_is_counted(loglik, co
     found = [filter.step_values(0.1 * n, (0.0, 0.0, 0.0), np.zeros((0, 1)), [], own.read(1.0)) for n in (1, 2, 3)]
     assert getattr(own, counted) == 3 and filter.bad_cells == 0
     assert math.dist(found[-1].pose[:2], (1.0, 0.5)) < 0.02, "a reading that is left out moves nothing"
-    assert re.search(told, own.last_error) and "\n" not in own.last_error
+    assert re.search(reported, own.last_error) and "\n" not in own.last_error
 
 
 def test_a_slow_function_is_asked_as_often_as_its_budget_allows():
@@ -194,9 +194,9 @@ def test_a_slow_function_is_asked_as_often_as_its_budget_allows():
         ({"expected": lambda x, y: 1.0}, r"expected: gave shape \(\)"),
     ],
 )
-def test_a_map_that_cannot_be_is_refused_in_a_line(options, told):
+def test_a_map_that_cannot_be_is_refused_in_a_line(options, reported):
     given = {"cell_m": 0.05, "expected": to_anchor, "loglik": near, "levels": RANGES} | options
-    with pytest.raises(SettingError, match=told):
+    with pytest.raises(SettingError, match=reported):
         OwnSensor((SIDE_M, SIDE_M), **given)
 
 

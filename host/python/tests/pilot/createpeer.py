@@ -30,7 +30,7 @@ class Peer:
         self.link = link
         self.heard = b""
         self.asked: list[int] = []  # packets of the stream
-        self.told = 0  # bytes written to the driver
+        self.reported = 0  # bytes written to the driver
         self._open()
 
     def _open(self) -> None:
@@ -44,7 +44,7 @@ class Peer:
         os.close(self._slave)
         os.close(self.master)
         self.heard = b""
-        self.told = 0
+        self.reported = 0
 
     def come_back(self) -> None:
         self._open()
@@ -82,8 +82,8 @@ class Peer:
     def tell(self, data: bytes) -> int:
         """Writes to the driver; returns the bytes written in all."""
         os.write(self.master, data)
-        self.told += len(data)
-        return self.told
+        self.reported += len(data)
+        return self.reported
 
 
 class Heart:

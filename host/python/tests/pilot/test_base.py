@@ -91,7 +91,7 @@ def test_odometry_is_of_the_frames_up_to_a_byte_and_of_each_client(start):
         assert second.bits == base.BUMP_LEFT | base.CLIFF_LEFT
         assert other.odometry().x_m == pytest.approx(0.05)
         peer.tell(peer.frame(p20=90))
-        third = client.odometry(after=peer.told)
+        third = client.odometry(after=peer.reported)
         assert third.theta_rad == pytest.approx(math.pi / 2)
         assert client.health()["frames"] == "3"
 
@@ -114,7 +114,7 @@ def test_damaged_bytes_cost_one_frame_and_are_counted(start):
     with driver.client() as client:
         frame = peer.frame()
         peer.tell(frame + frame[:9] + frame[10:] + frame)
-        client.odometry(after=peer.told)
+        client.odometry(after=peer.reported)
         health = client.health()
     assert {key: health[key] for key in ("frames", "corrupt", "skipped", "resyncs", "missed")} == {
         "frames": "2",
@@ -162,14 +162,14 @@ def test_by_the_streams_clock_a_silent_commander_has_twenty_frames(start):
     with driver.client() as client:
         before = client.drive(0.2, 0)
         peer.tell(peer.frame() * 19)
-        client.odometry(after=peer.told)
+        client.odometry(after=peer.reported)
         assert client.health()["commander_stops"] == "0"
         peer.tell(peer.frame())
-        client.odometry(after=peer.told)
+        client.odometry(after=peer.reported)
         assert client.health()["commander_stops"] == "1"
         assert client.stop().byte_count == before.byte_count + 2 * len(STOP)
         peer.tell(peer.frame() * 40)  # wheels that stand are not stopped again
-        client.odometry(after=peer.told)
+        client.odometry(after=peer.reported)
         assert client.health()["commander_stops"] == "1"
 
 
@@ -357,9 +357,9 @@ def test_a_firmware_that_tells_modes_one_too_high_is_understood(start):
     peer = driver.peer
     with driver.client() as client:
         peer.tell(peer.frame(p35=3) * 19)
-        assert client.odometry(after=peer.told).bits == base.IDLE
+        assert client.odometry(after=peer.reported).bits == base.IDLE
         peer.tell(peer.frame(p35=3))
-        client.odometry(after=peer.told)
+        client.odometry(after=peer.reported)
         assert client.health()["mode"] == "safe"
         assert client.odometry().bits == 0
         await_frame(client, driver, p35=2)

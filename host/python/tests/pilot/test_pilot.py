@@ -151,11 +151,12 @@ def test_rows_tell_how_the_surface_lies_where_a_whiskers_tip_met_it(models):
             poses = np.array([[row[key] for key in ("x_m", "y_m", "theta_rad")] for row in truth])
             longer = replace(whisker, length_m=whisker.length_m + BESIDE_M)
             true = directions(scene.arena, poses, longer, BESIDE_M) - poses[:, 2]
-            told = np.array([row[f"{whisker.name}_normal_rad"] for row in rows], float)
+            reported = np.array([row[f"{whisker.name}_normal_rad"] for row in rows], float)
             assert all(
-                (row[f"{whisker.name}_normal_sd_rad"] is None) == np.isnan(t) for row, t in zip(rows, told, strict=True)
+                (row[f"{whisker.name}_normal_sd_rad"] is None) == np.isnan(t)
+                for row, t in zip(rows, reported, strict=True)
             )
-            off = told - true
+            off = reported - true
             errors += [math.degrees(math.remainder(e, 2 * math.pi)) for e in off[np.isfinite(off)]]
     assert len(errors) >= 5
     assert np.median(np.abs(errors)) < 5.0
@@ -260,15 +261,15 @@ def test_only_what_was_met_in_the_turn_and_pushed_to_the_end_is_measured(monkeyp
     """The turn follows the block that ends with tick 839; a whisker may have met something in the retreat before it."""
     robot = make_robot()
     texture = {whisker.name: texture_model() for whisker in robot.of_role("texture")}
-    pilot, told = Pilot(robot, texture, {}, SEED), []
+    pilot, reported = Pilot(robot, texture, {}, SEED), []
     lane = pilot.object_lanes[0]
-    monkeypatch.setattr(pilot, "_measure", told.append)
+    monkeypatch.setattr(pilot, "_measure", reported.append)
     pilot.behaviour.whisk = Whisk(lane, 1.0, start=839, push_end=3000 + pilot.behaviour.wheels.push_ticks)
     met = SimpleNamespace(onset=onset, release=5000, touching=False, settled=True, block=lambda *_: None)
     monkeypatch.setitem(pilot.contacts, lane, met)
     rest = np.full((BLOCK_TICKS, len(pilot.names)), 0x8000, np.uint16)
     pilot.block(5000, rest, rest, np.zeros_like(rest))
-    assert (len(told) == 1) == measured
+    assert (len(reported) == 1) == measured
 
 
 def test_onset_and_release_are_dated_to_the_sample():

@@ -214,7 +214,7 @@ def test_the_move_brings_the_corner_under_the_tip(whisker, radius_mm):
 def test_a_contact_at_the_tip_needs_no_move_and_is_told_so():
     mount = Mount.of(make_robot().of_role("object")[1])
     assert move_for_tip(mount, mount.length_mm) is None
-    kinds = [contact_type(mount, told) for told in (None, 90.0, 129.0, 131.0, 140.0)]
+    kinds = [contact_type(mount, reported) for reported in (None, 90.0, 129.0, 131.0, 140.0)]
     assert kinds == [None, "shaft", "shaft", "tip", "tip"]
 
 

@@ -151,10 +151,10 @@ def outcome(of: Original, path: Path, touched: set[int]) -> str:
     if not lost:
         return "nothing lost, and said so" if damage else "nothing lost, nothing said"
     assert damage and not is_complete, "lost without a word"
-    told = sum(int(found[1]) for line in damage if (found := LOST.search(line)))
-    assert told in (0, len(lost)), f"{len(lost)} lost, {told} said to be: {damage}"
-    assert told or not of.is_indexed or any(text in line for line in damage for text in END_DAMAGED), damage
-    return "lost and counted" if told else "lost and said"
+    reported = sum(int(found[1]) for line in damage if (found := LOST.search(line)))
+    assert reported in (0, len(lost)), f"{len(lost)} lost, {reported} said to be: {damage}"
+    assert reported or not of.is_indexed or any(text in line for line in damage for text in END_DAMAGED), damage
+    return "lost and counted" if reported else "lost and said"
 
 
 def recording_agrees(path: Path) -> None:

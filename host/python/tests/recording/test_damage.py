@@ -120,8 +120,8 @@ def test_a_chunk_that_is_not_there_is_told(tmp_path, whole, is_cut_off):
     data = data[:first] + data[last : chunks[3][1] if is_cut_off else None]
     blocks, damage = look(tmp_path / "a.mcap", data)
     assert blocks == without(2)
-    told = "at least 10 messages are lost" if is_cut_off else f"10 of {BLOCKS} messages are lost"
-    assert f"/whisker/frames: {told}" in damage
+    reported = "at least 10 messages are lost" if is_cut_off else f"10 of {BLOCKS} messages are lost"
+    assert f"/whisker/frames: {reported}" in damage
     if not is_cut_off:
         assert "the index at its end lists 4 chunks; 3 are whole, or they moved" in damage
 

@@ -102,8 +102,8 @@ def test_losses_before_the_ring_and_restarts_are_told(tmp_path):
     again["flags"][150] = lib.WHISKER_FRAME_GAP
     tally = write(tmp_path / "a.mcap", np.concatenate([frames[:100], frames[150:], again]))
     assert (tally.missing, tally.restarts) == (52, 2)
-    told = [("missing", 150, 50), ("restarted", 0, 0), ("missing", 0, 2), ("restarted", 150, 0)]
-    assert events(tmp_path / "a.mcap") == told
+    reported = [("missing", 150, 50), ("restarted", 0, 0), ("missing", 0, 2), ("restarted", 150, 0)]
+    assert events(tmp_path / "a.mcap") == reported
 
 
 def test_ticks_that_go_back_by_less_than_a_block_are_a_restart(tmp_path):
@@ -237,15 +237,15 @@ def test_a_full_disk_keeps_what_was_written(tmp_path):
     name, path = ring_name(), tmp_path / "a.mcap"
     with Writer(name, CAPACITY) as ring, Reader(name) as reader:
         recorder = Recorder(reader, writer := RecordingWriter(path, {}))
-        with files_at_most(1_000_000), pytest.raises(RecordingError) as told:
+        with files_at_most(1_000_000), pytest.raises(RecordingError) as reported:
             for start in range(0, 10 * CAPACITY, 1000):
                 ring.publish(make_frames(1000, first=start))
                 recorder.step(False)
                 writer.flush()
         writer.close()
-    text = str(told.value)
+    text = str(reported.value)
     assert (
-        told.value.exit_code == 1
+        reported.value.exit_code == 1
         and str(path) in text
         and "kept" in text
         and "free some space" in text
@@ -277,9 +277,11 @@ def test_wrong_files_are_one_line(tmp_path):
     for name, content in wrong.items():
         if content is not None:
             (tmp_path / name).write_bytes(content)
-        with pytest.raises(RecordingError) as told:
+        with pytest.raises(RecordingError) as reported:
             read(tmp_path / name)
-        assert name in str(told.value) and "whisker record" in str(told.value) and "\n" not in str(told.value)
+        assert (
+            name in str(reported.value) and "whisker record" in str(reported.value) and "\n" not in str(reported.value)
+        )
 
 
 class Clocks:

@@ -132,14 +132,16 @@ def test_a_sync_that_fails_is_one_line(disk, seconds, recorder, number):
     ring, recorder, path = recorder
     take(ring, recorder, 0)
     disk.error = OSError(number, os.strerror(number))
-    with pytest.raises(WriteError) as told:
+    with pytest.raises(WriteError) as reported:
         for second in range(1, 1000):
             seconds.now += 1.0
             take(ring, recorder, second)
             time.sleep(0.001)
-    text = str(told.value)
+    text = str(reported.value)
     assert f"{path}: cannot be written on ({os.strerror(number)}); what was recorded before is kept; " in text
-    assert ("free some space" in text) == (number == errno.ENOSPC) and told.value.exit_code == 1 and "\n" not in text
+    assert (
+        ("free some space" in text) == (number == errno.ENOSPC) and reported.value.exit_code == 1 and "\n" not in text
+    )
 
 
 def test_a_sync_that_fails_at_the_end_is_told(disk, recorder):

@@ -30,11 +30,11 @@ def fuzz(inputs: int, seed: int) -> dict[str, int]:
         data = mutate(file, rng)
         data = repaired(data) if rng.integers(4) else data
         try:
-            told = decode(data)
+            reported = decode(data)
         except CheckpointError as error:
             assert "\n" not in str(error)
             refused += 1
         else:
-            assert all(0 < len(b) <= BUMPS_MOST and b.dtype == COMPONENT for b in told.beliefs.values())
-            assert np.isfinite(told.pose).all() and encode(told)
+            assert all(0 < len(b) <= BUMPS_MOST and b.dtype == COMPONENT for b in reported.beliefs.values())
+            assert np.isfinite(reported.pose).all() and encode(reported)
     return {"refused in one line": refused}

@@ -45,11 +45,11 @@ def use(kind: type, data: bytes, topic: str):
 def fuzz(inputs: int, seed: int) -> dict[str, int]:
     rng = np.random.default_rng(seed)
     store = other_decoder()
-    told = [*examples().items(), ("end", m.End(m.Header.at(1, "x"), 12, "over"))]
-    told = [(topic, type(message), m.encode(message)) for topic, message in told]
+    reported = [*examples().items(), ("end", m.End(m.Header.at(1, "x"), 12, "over"))]
+    reported = [(topic, type(message), m.encode(message)) for topic, message in reported]
     refused = 0
     for k in range(inputs):
-        topic, kind, data = told[k % len(told)]
+        topic, kind, data = reported[k % len(reported)]
         broken = mutate(data, rng)
         message = use(kind, broken, topic)
         refused += message is None

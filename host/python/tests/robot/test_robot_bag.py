@@ -89,9 +89,9 @@ def test_ros_tools_open_it(bag, scene):
 
 def test_what_it_says_of_itself(bag, scene):
     with McapFile(bag) as file:
-        told = file.metadata[RECORD]
-        assert file.complete and told["robot"] == "robot" and told["observation.received"] == str(ROWS + 1)
-    assert told["arena.toml"] == (scene[0] / "arena.toml").read_text() and told["missed"] == "0"
+        reported = file.metadata[RECORD]
+        assert file.complete and reported["robot"] == "robot" and reported["observation.received"] == str(ROWS + 1)
+    assert reported["arena.toml"] == (scene[0] / "arena.toml").read_text() and reported["missed"] == "0"
 
 
 def test_what_lies_beside_a_scenes_files_is_in_the_bag_too(scene, tmp_path):
@@ -103,8 +103,12 @@ def test_what_lies_beside_a_scenes_files_is_in_the_bag_too(scene, tmp_path):
     arena = (tmp_path / "arena.toml").read_text()
     Image.fromarray((loaded.arena.floor_indices()[::-1] * 127).astype(np.uint8)).save(tmp_path / "floor.png")
     (tmp_path / "arena.toml").write_text(re.sub(r"floor = .*", 'floor = "floor.png"', arena))
-    told = metadata("robot", tmp_path)
-    assert told["arena.toml"] == arena and "[[sensor]]" not in told["robot.toml"] and "floor_left" in told["robot.toml"]
+    reported = metadata("robot", tmp_path)
+    assert (
+        reported["arena.toml"] == arena
+        and "[[sensor]]" not in reported["robot.toml"]
+        and "floor_left" in reported["robot.toml"]
+    )
 
 
 def test_a_scene_comes_of_it_again(bag, scene, tmp_path, capsys):

@@ -64,14 +64,14 @@ def test_what_is_kept_comes_back(made, tmp_path):
     scene, rows = made
     row = received(rows)[9]
     path = kept(tmp_path, scene, row)
-    told = checkpoint.load(path)
+    reported = checkpoint.load(path)
     assert [entry.name for entry in tmp_path.iterdir()] == [path.name]
-    assert (told.stream, told.seq, told.stamp_ns) == (7, 9, row.message.header.stamp.ns)
-    assert (told.sent_ns, told.scene) == (row.envelope.sent_ns, checkpoint.identity(scene))
-    assert list(told.pose) == list(row.message.pose) and list(told.beliefs) == list(NAMES)
-    for bumps in told.beliefs.values():
+    assert (reported.stream, reported.seq, reported.stamp_ns) == (7, 9, row.message.header.stamp.ns)
+    assert (reported.sent_ns, reported.scene) == (row.envelope.sent_ns, checkpoint.identity(scene))
+    assert list(reported.pose) == list(row.message.pose) and list(reported.beliefs) == list(NAMES)
+    for bumps in reported.beliefs.values():
         assert bumps.dtype == COMPONENT and bumps["mass"].tolist() == [1.0, 2.0, 3.0]
-    assert checkpoint.encode(told) == path.read_bytes()
+    assert checkpoint.encode(reported) == path.read_bytes()
 
 
 def test_what_no_filter_could_begin_from_is_not_kept(made, tmp_path):
@@ -145,11 +145,11 @@ def test_a_filter_begins_from_what_a_filter_listed(made):
     for name in filters.filter_names():
         before = Filter(name, scene)
         for row in rows[:20]:
-            told = before.step(row)
+            reported = before.step(row)
         after = Filter(name, scene, bumps=belief.condense(before.components()))
         listed = after.components()
         weight = listed["mass"] / listed["mass"].sum()
-        off = np.hypot(*(listed["pose"][:, :2] - told.pose[:2]).T)
+        off = np.hypot(*(listed["pose"][:, :2] - reported.pose[:2]).T)
         assert float(weight @ (off < 0.3).astype(float)) > 0.6, name
     for field, value, why in (("mass", -1.0, "bump 1: its mass"), ("sigma_m", 0.0, "bump 1: its width")):
         bad = bumps_at(0.5, 0.5)
@@ -191,9 +191,9 @@ def later(row: Received, seconds: float, stream: int | None = None, stamp_s: flo
     message = to_message(
         {**_cells(row), "t_s": stamp_s or _stamp_s(row) + seconds}, 0, row.message.seq + 1, np.zeros(3)
     )
-    told = row.envelope
-    sent_ns = told.sent_ns + round(seconds * 1e9)
-    return Received("observation", message, Envelope(stream or told.stream, told.number, sent_ns))
+    reported = row.envelope
+    sent_ns = reported.sent_ns + round(seconds * 1e9)
+    return Received("observation", message, Envelope(stream or reported.stream, reported.number, sent_ns))
 
 
 def _stamp_s(row: Received) -> float:
@@ -227,10 +227,10 @@ def test_bumps_that_are_no_prior_are_not_gone_on_from(made, tmp_path):
     scene, rows = made
     sent = received(rows)
     path = kept(tmp_path, scene, sent[9], ("grid",))
-    told = checkpoint.load(path)
-    bad = told.beliefs["grid"].copy()
+    reported = checkpoint.load(path)
+    bad = reported.beliefs["grid"].copy()
     bad["mass"][1] = np.nan
-    checkpoint.save(path, Checkpoint(**{**vars(told), "beliefs": {"grid": bad}}))
+    checkpoint.save(path, Checkpoint(**{**vars(reported), "beliefs": {"grid": bad}}))
     memory = Memory(path, scene, ("grid",))
     assert memory.recall(sent[30]) is None and "grid: bump 1: its mass" in memory.note
 

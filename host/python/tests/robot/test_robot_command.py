@@ -220,8 +220,8 @@ def test_the_simulation_is_the_one_that_was_asked_for(tmp_path):
     body = parts.Body(tmp_path, tmp_path, 2, tmp_path / "port", 7)
     words = parts.bridge(simulated, body, parts.Meeting("ring", tmp_path)).command
     words = words[: words.index("--")]
-    told = {"scene": tmp_path / "flat", "seconds": 2.5, "seed": 7, "level": "bytes", "pace": 0.5, "create": 2}
-    assert {name: words[words.index(f"--{name}") + 1] for name in told} == {n: str(v) for n, v in told.items()}
+    reported = {"scene": tmp_path / "flat", "seconds": 2.5, "seed": 7, "level": "bytes", "pace": 0.5, "create": 2}
+    assert {name: words[words.index(f"--{name}") + 1] for name in reported} == {n: str(v) for n, v in reported.items()}
 
 
 def test_who_writes_the_ring_is_named(refused, given):

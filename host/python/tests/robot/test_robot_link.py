@@ -316,10 +316,10 @@ def test_sources_are_bounded_and_forget_the_gone_first():
 
 def test_topics_that_are_made_up_take_no_room():
     """2000 processes of which nobody has heard, and 2000 topics of no release: counted, and what is ours comes."""
-    inbox, told = Inbox("", None), examples()["health/pilot"]
+    inbox, reported = Inbox("", None), examples()["health/pilot"]
     for n in range(2000):
-        inbox.put(sample(f"health/p{n}", told, next(envelopes())))
-        inbox.put(sample(f"invented/{n}", told, next(envelopes())))
+        inbox.put(sample(f"health/p{n}", reported, next(envelopes())))
+        inbox.put(sample(f"invented/{n}", reported, next(envelopes())))
     inbox.put(sample("observation", row(0), next(envelopes())))
     got = inbox.take(0.0)
     assert len(inbox.tallies) == len(got) == TOPICS_MOST + 1 and got[-1].topic == "observation"
@@ -472,10 +472,10 @@ def test_a_door_that_only_this_machine_reaches_is_not(monkeypatch, capsys, words
 
 def test_a_door_for_certificates_alone_is_not_open(monkeypatch, capsys, tmp_path):
     file = tmp_path / "zenoh.json5"
-    for mutual, told in ((True, False), (False, True)):
+    for mutual, reported in ((True, False), (False, True)):
         file.write_text(f"{{transport: {{link: {{tls: {{enable_mtls: {str(mutual).lower()}}}}}}}}}  // JSON5")
         words = ["--zenoh-config", str(file), "--listen", "tls/0.0.0.0:7448"]
-        assert bool(opened(monkeypatch, capsys, *words)) == told
+        assert bool(opened(monkeypatch, capsys, *words)) == reported
     assert "whoever reaches" in opened(monkeypatch, capsys, "--zenoh-config", str(file), "--listen", "tcp/0.0.0.0:7448")
 
 

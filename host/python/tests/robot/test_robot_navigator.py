@@ -96,11 +96,13 @@ def test_in_lock_step_the_process_gives_what_localise_gives(made, tmp_path):
         expected = [alone.step(row).line(f"{row['t_s']:.6g}") for row in sixfold]
         assert lines(tmp_path / f"est_{name}.csv")[1:] == expected
         assert len(lines(tmp_path / f"covariance_{name}.csv")) == len(observations) + 1
-    told = [r.message for r in got if r.topic == "localisation" and not r.over]
-    assert [x.filter for x in told] == [*filters] * ROWS and [x.observation_seq for x in told[::2]] == list(range(ROWS))
-    assert all((x.rows_integrated, x.rows_missed, x.first_seq, x.prior) == (1, 0, 0, "scene") for x in told)
+    reported = [r.message for r in got if r.topic == "localisation" and not r.over]
+    assert [x.filter for x in reported] == [*filters] * ROWS and [x.observation_seq for x in reported[::2]] == list(
+        range(ROWS)
+    )
+    assert all((x.rows_integrated, x.rows_missed, x.first_seq, x.prior) == (1, 0, 0, "scene") for x in reported)
     poses = [r.message for r in got if r.topic == "pose" and not r.over]
-    assert [p.pose.pose.xytheta for p in poses] == [x.pose.pose.xytheta for x in told[::2]]
+    assert [p.pose.pose.xytheta for p in poses] == [x.pose.pose.xytheta for x in reported[::2]]
     beliefs = [r.message for r in got if r.topic == "belief" and not r.over]
     assert {b.filter for b in beliefs} == set(filters) and [b.observation_seq for b in beliefs][::2] == list(
         range(0, ROWS, 5)
@@ -129,9 +131,11 @@ def test_a_killed_navigator_comes_back_knowing_that_it_knows_nothing(made, tmp_p
             robot.rows.end()
             got = take_until(robot.inbox, _all_over, PATIENCE_S)
             assert child.wait(END_S) == 0
-    told = [r.message for r in got if r.topic == "localisation" and not r.over]
-    assert {(x.first_seq, x.prior, x.rows_missed) for x in told} == {(25, "uniform", 0)} and len(told) == ROWS - 25
-    assert told[0].confidence < 0.1
+    reported = [r.message for r in got if r.topic == "localisation" and not r.over]
+    assert {(x.first_seq, x.prior, x.rows_missed) for x in reported} == {(25, "uniform", 0)} and len(
+        reported
+    ) == ROWS - 25
+    assert reported[0].confidence < 0.1
     tally = robot.inbox.tallies["localisation"]
     assert (tally.restarts, tally.missed, tally.repeated) == (1, 0, 0)
     times = [line.split(",")[0] for line in lines(tmp_path / "est_particle.csv")]
@@ -152,8 +156,8 @@ def killed_and_begun_anew(robot, folder, rows, options, spoil=lambda: None):
         robot.rows.end()
         over = take_until(robot.inbox, _all_over, PATIENCE_S)
         assert child.wait(END_S) == 0
-    told = [r.message for r in over if r.topic == "localisation" and not r.over]
-    return told, [r.message for r in over if r.topic == "health/navigator" and not r.over]
+    reported = [r.message for r in over if r.topic == "localisation" and not r.over]
+    return reported, [r.message for r in over if r.topic == "health/navigator" and not r.over]
 
 
 @pytest.mark.parametrize("name", ["adaptive", "particle", "ekf"])
@@ -161,15 +165,15 @@ def test_a_killed_navigator_goes_on_from_its_checkpoint(made, tmp_path, name):
     folder, scene, rows = made
     options = ["--filter", name, "--checkpoint", tmp_path / "file"]
     with Robot("localisation", "health/navigator") as robot:
-        told, health_told = killed_and_begun_anew(robot, folder, rows, options)
-    assert {(x.first_seq, x.prior, x.rows_missed) for x in told} == {(25, "checkpoint", 0)}
+        reported, health_told = killed_and_begun_anew(robot, folder, rows, options)
+    assert {(x.first_seq, x.prior, x.rows_missed) for x in reported} == {(25, "checkpoint", 0)}
     alone = localise.Filter(name, scene)
     never_killed = [alone.step(row) for row in rows]
-    for answer, expected in zip(told, never_killed[25:], strict=True):
+    for answer, expected in zip(reported, never_killed[25:], strict=True):
         off = np.hypot(*np.subtract(answer.pose.pose.xytheta[:2], expected.pose[:2]))
         assert off < 0.1, (answer.observation_seq, off)
     # The last checkpoint is of row 15: what came between it and the first row is one motion.
-    assert told[0].rows_integrated == 10 and told[0].confidence > 0.5 * never_killed[25].confidence
+    assert reported[0].rows_integrated == 10 and reported[0].confidence > 0.5 * never_killed[25].confidence
     assert {x.last_error for x in health_told} == {""} and health_told[-1].counts["prior"] == "checkpoint"
 
 
@@ -186,8 +190,8 @@ def test_a_bad_checkpoint_is_told_and_nothing_else_is_lost(made, tmp_path, spoil
     file = tmp_path / "file"
     with Robot("localisation", "health/navigator") as robot:
         options = ["--filter", "particle", "--checkpoint", file]
-        told, health_told = killed_and_begun_anew(robot, folder, rows, options, lambda: spoil(file))
-    assert {(x.first_seq, x.prior) for x in told} == {(25, "uniform")} and len(told) == ROWS - 25
+        reported, health_told = killed_and_begun_anew(robot, folder, rows, options, lambda: spoil(file))
+    assert {(x.first_seq, x.prior) for x in reported} == {(25, "uniform")} and len(reported) == ROWS - 25
     assert why in health_told[-1].last_error and health_told[-1].last_error.startswith(f"{file}: not used: ")
     assert checkpoint.load(file).seq >= 55  # written anew
 
@@ -231,13 +235,17 @@ def test_behind_by_many_rows_it_takes_the_newest_and_all_the_motion(made):
         take_until(watcher, lambda got: got and got[-1].over, PATIENCE_S)
         inside.run()
         got = take_until(inside.inbox, lambda got: any(r.over for r in got), PATIENCE_S)
-        told = [r.message for r in got if r.topic == "localisation" and not r.over]
+        reported = [r.message for r in got if r.topic == "localisation" and not r.over]
         states = [r.message for r in got if r.topic == "health/navigator"]
     assert inside.counters["weighed"] + inside.counters["skipped"] == ROWS and inside.counters["missed"] == 0
-    assert sum(x.rows_integrated for x in told) == ROWS and len(told) < ROWS and told[-1].observation_seq == ROWS - 1
+    assert (
+        sum(x.rows_integrated for x in reported) == ROWS
+        and len(reported) < ROWS
+        and reported[-1].observation_seq == ROWS - 1
+    )
     alone = localise.Filter("odometry", scene)
     every = [alone.step(row) for row in rows][-1]
-    assert told[-1].pose.pose.xytheta[:2] == pytest.approx(every.pose[:2], abs=2e-3)
+    assert reported[-1].pose.pose.xytheta[:2] == pytest.approx(every.pose[:2], abs=2e-3)
     assert all(state.process == "navigator" for state in states)
 
 
@@ -299,7 +307,7 @@ def spoiled(rows, n: int) -> list[m.Observation]:
 def test_a_row_that_cannot_be_is_refused_and_the_pose_is_as_without_it(made, kind):
     """It comes in the pilot's own stream, where a row should be; those after it bring its motion, as of one missed."""
     _, scene, rows = made
-    place, told = 20, []
+    place, reported = 20, []
     for hostile in (True, False):
         with Inside(scene, "localisation", "health/navigator", lock_step=True) as inside:
             stream = inside.rows._stream
@@ -316,7 +324,7 @@ def test_a_row_that_cannot_be_is_refused_and_the_pose_is_as_without_it(made, kin
             inside.rows.end()
             inside.run()
             got = take_until(inside.inbox, _all_over, PATIENCE_S)
-        told.append([r.message.pose.pose.xytheta for r in got if r.topic == "localisation" and not r.over])
+        reported.append([r.message.pose.pose.xytheta for r in got if r.topic == "localisation" and not r.over])
         health_told = [r.message for r in got if r.topic == "health/navigator" and not r.over][-1]
         assert (inside.counters["refused"], inside.counters["weighed"]) == (hostile, ROWS - 1)
         assert inside.counters["missed"] == 1 and inside.error is None
@@ -324,7 +332,7 @@ def test_a_row_that_cannot_be_is_refused_and_the_pose_is_as_without_it(made, kin
             health_told.last_error.startswith("observation: field ") == hostile and "\n" not in health_told.last_error
         )
         assert health_told.counts["refused"] == str(int(hostile))
-    assert told[0] == told[1]
+    assert reported[0] == reported[1]
 
 
 def test_rows_of_another_robot_are_refused_by_name_and_the_navigator_stays(made):
@@ -352,7 +360,7 @@ def test_a_second_pilot_is_refused_and_told(made):
         second = RowPublisher(inside.pilot)
         for row in rows[:5]:
             second.send(row, m.EXPLORING)
-        told = take_until(
+        reported = take_until(
             inside.inbox,
             lambda got: any(r.topic != "localisation" and r.message.counts["refused"] == "5" for r in got),
             PATIENCE_S,
@@ -361,7 +369,7 @@ def test_a_second_pilot_is_refused_and_told(made):
         inside.rows.end()
         thread.join()
     assert (inside.counters["refused"], inside.counters["weighed"], inside.counters["restarts"]) == (5, 2, 0)
-    assert "of a second source; end one of the two" in told[-1].message.last_error
+    assert "of a second source; end one of the two" in reported[-1].message.last_error
 
 
 def test_a_navigator_that_stays_goes_on_with_the_next_run(made):
@@ -414,8 +422,12 @@ def test_a_belief_of_everywhere_keeps_its_width():
 def test_small_beliefs_are_sent_as_they_are():
     bumps = np.zeros(3, COMPONENT)
     bumps["pose"], bumps["mass"] = [[1, 2, 3], [4, 5, 6], [7, 8, 9]], [0.2, 0.5, 0.3]
-    told = belief.to_message(m.Header(), "grid", 4, len(bumps), belief.condense(bumps))
-    assert list(told.x) == [4, 7, 1] and list(told.theta) == [6, 9, 3] and (told.bumps, told.mass) == (3, 1.0)
+    reported = belief.to_message(m.Header(), "grid", 4, len(bumps), belief.condense(bumps))
+    assert (
+        list(reported.x) == [4, 7, 1]
+        and list(reported.theta) == [6, 9, 3]
+        and (reported.bumps, reported.mass) == (3, 1.0)
+    )
     empty = belief.to_message(m.Header(), "grid", 4, 0, belief.condense(bumps[:0]))
     assert (len(empty.x), empty.bumps, empty.mass) == (0, 0, 0.0)
 
@@ -431,7 +443,7 @@ def test_two_hypotheses_stay_two():
 
 
 def test_health_is_told_at_once_when_the_state_is_new(monkeypatch):
-    told, now = [], [10.0]
+    reported, now = [], [10.0]
 
     class Sink:
         process = "pilot"
@@ -440,14 +452,14 @@ def test_health_is_told_at_once_when_the_state_is_new(monkeypatch):
             assert topic == "health/pilot"
             return self
 
-        send = told.append
+        send = reported.append
 
     monkeypatch.setattr(health.time, "monotonic", lambda: now[0])
-    speaker = health.Health(Sink(), lambda: {"rows": len(told)})
+    speaker = health.Health(Sink(), lambda: {"rows": len(reported)})
     for at, state in ((10.0, "running"), (10.5, "running"), (10.6, "waiting"), (11.5, "waiting"), (11.7, "waiting")):
         now[0] = at
         speaker.tell(5, state)
-    assert [(x.state, x.counts["rows"]) for x in told] == [("running", "0"), ("waiting", "1"), ("waiting", "2")]
+    assert [(x.state, x.counts["rows"]) for x in reported] == [("running", "0"), ("waiting", "1"), ("waiting", "2")]
 
 
 def test_options_of_the_command(made, capsys):

@@ -92,10 +92,10 @@ class MadeUpLink:
     process = "pilot"
 
     def __init__(self):
-        self.peers, self.told = {"navigator"}, []
+        self.peers, self.reported = {"navigator"}, []
 
     def publish(self, topic):
-        return SimpleNamespace(send=self.told.append, sent=0)
+        return SimpleNamespace(send=self.reported.append, sent=0)
 
 
 @pytest.fixture
@@ -192,8 +192,8 @@ def test_health_tells_of_navigator_and_base(live):
     live.steps()
     counters = live.made.counters()
     assert (counters["navigator"], counters["navigator_lost"], counters["base_mode"]) == ("gone", 1, "safe")
-    assert [health.state for health in live.link.told][-2:] == ["no base", "ended"]
-    assert live.link.told[-1].last_error == "no base"
+    assert [health.state for health in live.link.reported][-2:] == ["no base", "ended"]
+    assert live.link.reported[-1].last_error == "no base"
 
 
 def test_the_end_stops_the_wheels_and_closes_the_base(live):
@@ -222,12 +222,12 @@ def test_a_row_is_told_with_the_samples_at_its_end():
     row, report = {"t_s": 0.1}, Report((0.01, 0.0, 0.0))
     pilot = SimpleNamespace(block=lambda *_: (0.1, 0.0), odometry=lambda *_: row)
     wheels = SimpleNamespace(drive=lambda *_: None, odometry=lambda tick: report)
-    told, nothing = [], SimpleNamespace(write=lambda *_: None)
-    teller = SimpleNamespace(row=lambda *what: told.append(what), block=lambda last: None)
+    reported, nothing = [], SimpleNamespace(write=lambda *_: None)
+    teller = SimpleNamespace(row=lambda *what: reported.append(what), block=lambda last: None)
     samples = np.zeros((BLOCK_TICKS, 6), SAMPLE)
     samples["alpha"] = np.arange(BLOCK_TICKS)[:, None]
     Flight(pilot, wheels, nothing, nothing, teller).take((ODOMETRY_TICKS - BLOCK_TICKS, samples))
-    ((made, moved, last),) = told
+    ((made, moved, last),) = reported
     assert made is row and moved is report and last["alpha"].tolist() == [BLOCK_TICKS - 1] * 6
 
 

@@ -80,15 +80,15 @@ def test_poses_odometry_and_health_are_the_newest():
     results.take(
         [Received(topic, shown[topic], Envelope(1, 0, 0)) for topic in ("odometry", "localisation", "health/pilot")]
     )
-    told = results.pose()
-    assert told == results.pose("grid") and results.pose("ekf") is None
-    assert (told["filter"], told["confidence"], told["observation_seq"], told["prior"]) == (
+    reported = results.pose()
+    assert reported == results.pose("grid") and results.pose("ekf") is None
+    assert (reported["filter"], reported["confidence"], reported["observation_seq"], reported["prior"]) == (
         "grid",
         0.75,
         2**40,
         "uniform",
     )
-    assert told["pose"] == pytest.approx([1.0, -2.0, 3.0]) and np.shape(told["covariance"]) == (3, 3)
+    assert reported["pose"] == pytest.approx([1.0, -2.0, 3.0]) and np.shape(reported["covariance"]) == (3, 3)
     assert results.odometry()["absolute"] == pytest.approx([1.0, -2.0, 3.0])
     assert results.health() == {"pilot": {"state": "running", "last_error": "none yet", "rows": "7"}}
 
@@ -191,8 +191,8 @@ def test_rows_that_cannot_be_leave_the_answers_right():
 def test_names_that_are_made_up_take_no_room():
     results, shown = Results(None, may_write=False), examples()
     for n in range(3000):
-        told = replace(shown["health/pilot"], process=f"p{n}"), replace(shown["localisation"], filter=f"f{n}")
-        results.take([Received("localisation", one, Envelope(1, n, 0)) for one in told])
+        reported = replace(shown["health/pilot"], process=f"p{n}"), replace(shown["localisation"], filter=f"f{n}")
+        results.take([Received("localisation", one, Envelope(1, n, 0)) for one in reported])
     assert len(results.health()) == len(results._answers) == NAMES_MOST
 
 

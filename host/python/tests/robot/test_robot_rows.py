@@ -212,9 +212,9 @@ def test_rows_that_are_missing_make_a_filter_no_surer_nor_much_less_sure(made, n
     """Summed motion over 5 s is as good as 50 rows of odometry: no more is unknown after it than without the gap."""
     rows = messages_of(to_rows(made.observations, made.scene))
     blind = [replace(row, cells=np.full_like(row.cells, m.NOT_READ)) for row in rows[60:110]]
-    told = fed(name, made.scene, Follower().take(received([*rows[:60], *blind, rows[110]])))
+    reported = fed(name, made.scene, Follower().take(received([*rows[:60], *blind, rows[110]])))
     missed = fed(name, made.scene, Follower().take(received([*rows[:60], rows[110]])))
-    width, other = (np.sqrt(np.trace(e.covariance[:2, :2])) for e in (told, missed))
+    width, other = (np.sqrt(np.trace(e.covariance[:2, :2])) for e in (reported, missed))
     assert 0.5 * width < other < 1.5 * width
 
 
@@ -274,8 +274,8 @@ def test_a_robot_moves_no_more_than_it_can_in_its_time(seconds, motion, why):
     rows = slow_rows(10)
     stamp_ns = rows[-1].header.stamp.ns + round(seconds * 1e9)
     row = replace(rows[-1], seq=10, header=m.Header.at(stamp_ns), motion=np.array(motion))
-    told = fault_after(rows, replace(row, pose=compose(rows[-1].pose, motion)))
-    assert told.startswith(why) and bool(told) == bool(why)
+    reported = fault_after(rows, replace(row, pose=compose(rows[-1].pose, motion)))
+    assert reported.startswith(why) and bool(reported) == bool(why)
 
 
 def test_motion_that_a_whisk_held_back_is_none_too_much():
@@ -298,8 +298,10 @@ def test_motion_and_its_sum_must_agree():
 def test_after_rows_that_were_refused_the_next_good_one_is_taken():
     rows, checks = slow_rows(60), RowChecks()
     bad = [replace(row, pose=row.pose + [5.0, 0.0, 0.0]) for row in rows[10:40]]
-    told = list(map(checks, received([*rows[:10], *bad, *rows[40:]])))
-    assert [bool(fault) for fault in told] == [10 <= n < 40 for n in range(60)] and told[10].startswith("field ")
+    reported = list(map(checks, received([*rows[:10], *bad, *rows[40:]])))
+    assert [bool(fault) for fault in reported] == [10 <= n < 40 for n in range(60)] and reported[10].startswith(
+        "field "
+    )
 
 
 def test_rows_of_a_scene_have_its_cells(made):

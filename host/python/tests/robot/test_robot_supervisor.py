@@ -137,9 +137,9 @@ def test_a_log_folder_that_is_removed_is_made_again(tmp_path):
 
 def test_wrong_arguments_end_the_run_with_their_line(tmp_path):
     wrong = Program("wrong", ("sh", "-c", "echo no such scene >&2; exit 2"))
-    with pytest.raises(UserError, match=r"wrong failed \(exit code 2\): no such scene; log: ") as told:
+    with pytest.raises(UserError, match=r"wrong failed \(exit code 2\): no such scene; log: ") as reported:
         Supervisor([STAYS, wrong], tmp_path).run(threading.Event())
-    assert told.value.exit_code == 2
+    assert reported.value.exit_code == 2
 
 
 def test_who_ran_steadily_has_no_wrong_arguments(tmp_path):
@@ -277,9 +277,9 @@ def test_health_tells_of_every_end_and_all_end_with_it(tmp_path):
         supervisor = Supervisor([STAYS, FAILS], tmp_path, link)
         thread = threading.Thread(target=lambda: answer.append(supervisor.run(stop)))
         thread.start()
-        told = [r.message for r in take_until(inbox, lambda got: any(restarts(r.message) > 1 for r in got))]
-        assert any("no such arena" in health.last_error for health in told)
-        running = next(health for health in told if health.process == "stays" and health.state == "running")
+        reported = [r.message for r in take_until(inbox, lambda got: any(restarts(r.message) > 1 for r in got))]
+        assert any("no such arena" in health.last_error for health in reported)
+        running = next(health for health in reported if health.process == "stays" and health.state == "running")
         assert running.pid > 0 and restarts(running) == 0
         stop.set()
         thread.join(PATIENCE_S)

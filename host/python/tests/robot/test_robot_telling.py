@@ -28,7 +28,7 @@ class Heard:
 
 
 @pytest.fixture
-def told():
+def reported():
     """A call: the odometry messages after these motions, 0.1 s each, all of the same covariance."""
     behaviour = SimpleNamespace(state=State.FORWARD, since=0, reason="", whisking=False)
     pilot = SimpleNamespace(contacts={}, whisks=[], names={}, object_lanes=[], behaviour=behaviour)
@@ -44,20 +44,20 @@ def told():
     return after
 
 
-def test_the_twist_is_the_motion_by_its_time_with_the_bases_covariance(told):
-    last = told((0.01, 0.0, 0.0), (0.02, 0.001, -0.03))[-1]
+def test_the_twist_is_the_motion_by_its_time_with_the_bases_covariance(reported):
+    last = reported((0.01, 0.0, 0.0), (0.02, 0.001, -0.03))[-1]
     assert last.header.stamp.ns == 200_000_000
     linear, angular = last.twist.twist.linear, last.twist.twist.angular
     assert (linear.x, linear.y, angular.z) == pytest.approx((0.2, 0.01, -0.3))
     assert last.twist.covariance.reshape(6, 6)[PLANAR] == pytest.approx(COVARIANCE * 100.0)
 
 
-def test_a_pilot_that_begins_in_mid_run_moves_no_slower(told):
-    assert told((0.01, 0.0, 0.0), rows_before=500)[0].twist.twist.linear.x == pytest.approx(0.1)
+def test_a_pilot_that_begins_in_mid_run_moves_no_slower(reported):
+    assert reported((0.01, 0.0, 0.0), rows_before=500)[0].twist.twist.linear.x == pytest.approx(0.1)
 
 
-def test_the_pose_is_the_sum_of_the_motions_and_pretends_no_covariance(told):
-    last = told((0.0, 0.0, np.pi / 2), (0.02, 0.0, 0.0))[-1]
+def test_the_pose_is_the_sum_of_the_motions_and_pretends_no_covariance(reported):
+    last = reported((0.0, 0.0, np.pi / 2), (0.02, 0.0, 0.0))[-1]
     assert last.pose.pose.xytheta == pytest.approx((0.0, 0.02, np.pi / 2))
     assert not last.pose.covariance.any()
 
@@ -72,6 +72,6 @@ def test_a_contact_is_told_once_as_it_begins_and_once_as_it_ends():
     for n in range(6):
         vars(contact).update(changes.get(n, {}))
         teller.block((n + 1) * BLOCK_TICKS - 1)
-    told = [(c.whisker, c.touching, c.onset.ns, c.release.ns, c.header.stamp.ns) for c in link.topics["contact"]]
+    reported = [(c.whisker, c.touching, c.onset.ns, c.release.ns, c.header.stamp.ns) for c in link.topics["contact"]]
     ends = [(n + 1) * BLOCK_TICKS * TICK_NS for n in changes]
-    assert told == [("left", True, 90 * TICK_NS, 0, ends[0]), ("left", False, 90 * TICK_NS, 170 * TICK_NS, ends[1])]
+    assert reported == [("left", True, 90 * TICK_NS, 0, ends[0]), ("left", False, 90 * TICK_NS, 170 * TICK_NS, ends[1])]

@@ -115,8 +115,8 @@ def tell_radius(path: Path) -> None:
     found = radial.load(path)
     contact = radial.Contact(np.arange(len(SAMPLES)) / 2000.0, SAMPLES)
     with contextlib.suppress(ValueError):  # a model of other channels
-        told = radial.estimate(found, contact)
-        assert np.isfinite(told.radius_mm) and 0.0 <= told.confidence <= 1.0
+        reported = radial.estimate(found, contact)
+        assert np.isfinite(reported.radius_mm) and 0.0 <= reported.confidence <= 1.0
 
 
 def seeds(folder: Path, made: Scene) -> list[tuple]:

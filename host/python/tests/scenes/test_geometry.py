@@ -46,18 +46,18 @@ def test_a_whisker_meets_walls_and_blocks_of_an_arena_longer_than_wide(pose, dis
     ],
 )
 def test_a_face_is_met_as_it_lies(pose, direction):
-    (told,) = geometry.directions(LONG, np.array([pose]), LEFTWARD, 0.01)
-    assert np.cos([told]) == pytest.approx([math.cos(direction)], abs=1e-9, nan_ok=True)
-    assert np.sin([told]) == pytest.approx([math.sin(direction)], abs=1e-9, nan_ok=True)
+    (reported,) = geometry.directions(LONG, np.array([pose]), LEFTWARD, 0.01)
+    assert np.cos([reported]) == pytest.approx([math.cos(direction)], abs=1e-9, nan_ok=True)
+    assert np.sin([reported]) == pytest.approx([math.sin(direction)], abs=1e-9, nan_ok=True)
 
 
 @pytest.mark.parametrize("radius", [0.0, 0.1, 0.165])
 def test_what_is_free_for_a_scene_is_free_for_the_arena_with_some_to_spare(radius):
     free = geometry.free_test(LONG, radius)
     x, y = np.random.default_rng(1).uniform((0.0, 0.0), LONG.size_m, (2000, 2)).T
-    told = [free(*place) for place in zip(x, y, strict=True)]
-    assert told == [LONG.is_free(*place, radius + geometry.CLEAR_M) for place in zip(x, y, strict=True)]
-    assert 0.2 < np.mean(told) < 0.99
+    reported = [free(*place) for place in zip(x, y, strict=True)]
+    assert reported == [LONG.is_free(*place, radius + geometry.CLEAR_M) for place in zip(x, y, strict=True)]
+    assert 0.2 < np.mean(reported) < 0.99
 
 
 @pytest.mark.parametrize("radius", [0.0, geometry.LATTICE_M / 2 - geometry.CLEAR_M, 0.1, 0.165])

@@ -76,11 +76,11 @@ def drawn():
 def confusion(runs):
     """Counts by true and told texture, and lengths of runs of wrong windows."""
     counts, lengths = np.zeros((CLASSES, CLASSES)), []
-    for told in runs:
-        for n, whisker in enumerate(told.scene.robot.of_role("texture")):
-            true = geometry.textures(told.scene.arena, told.truth, whisker)[0]
-            read = np.isfinite(told.texture[:, n]).all(axis=1)
-            said = np.argmax(np.nan_to_num(told.texture[:, n], nan=-np.inf), axis=1)
+    for reported in runs:
+        for n, whisker in enumerate(reported.scene.robot.of_role("texture")):
+            true = geometry.textures(reported.scene.arena, reported.truth, whisker)[0]
+            read = np.isfinite(reported.texture[:, n]).all(axis=1)
+            said = np.argmax(np.nan_to_num(reported.texture[:, n], nan=-np.inf), axis=1)
             np.add.at(counts, (true[read], said[read]), 1)
             wrong = np.diff(np.concatenate([[0], (read & (said != true)).astype(int), [0]]))
             lengths += (np.nonzero(wrong < 0)[0] - np.nonzero(wrong > 0)[0]).tolist()
@@ -109,11 +109,13 @@ def test_windows_are_as_far_apart(signals, drawn):
 def distances(runs):
     """Errors in m of the distances told, against the true range with a little longer whisker; nan where it meets nothing."""
     errors = []
-    for told in runs:
-        for n, whisker in enumerate(told.scene.robot.of_role("object")):
-            true = geometry.ranges(told.scene.arena, told.truth, replace(whisker, length_m=whisker.length_m + 0.03))
-            contact = np.isfinite(told.radial_m[:, n])
-            errors += (told.radial_m[contact, n] - true[contact]).tolist()
+    for reported in runs:
+        for n, whisker in enumerate(reported.scene.robot.of_role("object")):
+            true = geometry.ranges(
+                reported.scene.arena, reported.truth, replace(whisker, length_m=whisker.length_m + 0.03)
+            )
+            contact = np.isfinite(reported.radial_m[:, n])
+            errors += (reported.radial_m[contact, n] - true[contact]).tolist()
     return np.array(errors)
 
 
@@ -130,11 +132,11 @@ def test_misses_agree(signals, drawn):
     """No level says "no contact" of a whisker that is pressed by more than 3 mm, but in one row of a hundred such."""
     for runs in (signals, drawn):
         pressed = missed = 0
-        for told in runs:
-            for n, whisker in enumerate(told.scene.robot.of_role("object")):
-                deep = geometry.ranges(told.scene.arena, told.truth, whisker) < whisker.length_m - 0.003
+        for reported in runs:
+            for n, whisker in enumerate(reported.scene.robot.of_role("object")):
+                deep = geometry.ranges(reported.scene.arena, reported.truth, whisker) < whisker.length_m - 0.003
                 pressed += deep.sum()
-                missed += (deep & np.isposinf(told.radial_m[:, n])).sum()
+                missed += (deep & np.isposinf(reported.radial_m[:, n])).sum()
         assert pressed > 100
         assert missed <= 0.01 * pressed
 
@@ -143,14 +145,14 @@ def test_timing_of_contacts_agrees(signals, drawn):
     """Distances told per minute but for a factor 1.5; shares of rows read, held back and unread within 0.08."""
 
     def rates(runs):
-        told = sum(np.isfinite(t.radial_m).sum() for t in runs)
+        reported = sum(np.isfinite(t.radial_m).sum() for t in runs)
         held = np.mean([np.mean(~t.odometry.any(axis=1)) for t in runs])
         windows = np.mean([np.mean(np.isfinite(t.texture).all(axis=2)) for t in runs])
         unread = np.mean([np.mean(np.isnan(t.radial_m)) for t in runs])
-        return told, np.array([held, windows, unread])
+        return reported, np.array([held, windows, unread])
 
-    (told, shares), (drawn_told, drawn_shares) = rates(signals), rates(drawn)
-    assert 1 / 1.5 < told / drawn_told < 1.5
+    (reported, shares), (drawn_told, drawn_shares) = rates(signals), rates(drawn)
+    assert 1 / 1.5 < reported / drawn_told < 1.5
     assert shares == pytest.approx(drawn_shares, abs=0.08)
 
 
@@ -159,10 +161,10 @@ def test_odometry_errors_agree(signals, drawn):
 
     def relative(runs):
         out = []
-        for told in runs:
+        for reported in runs:
             for first in range(0, ROWS - 50, 50):
-                true = np.hypot(*np.diff(told.truth[first : first + 51, :2], axis=0).T).sum()
-                said = np.hypot(*told.odometry[first + 1 : first + 51, :2].T).sum()
+                true = np.hypot(*np.diff(reported.truth[first : first + 51, :2], axis=0).T).sum()
+                said = np.hypot(*reported.odometry[first + 1 : first + 51, :2].T).sum()
                 if true > 0.5:
                     out.append(said / true - 1.0)
         return np.sqrt(np.mean(np.square(out)))

@@ -71,9 +71,9 @@ def spoil(name: str, text: str):
         ),
     ],
 )
-def test_what_is_wrong_is_one_line_with_file_and_remedy(recording, damage, told):
+def test_what_is_wrong_is_one_line_with_file_and_remedy(recording, damage, reported):
     damage(recording)
-    with pytest.raises(TableError, match=told) as caught:
+    with pytest.raises(TableError, match=reported) as caught:
         scenes.read_recording(recording, kind="thymio")
     assert "\n" not in str(caught.value) and ("give" in str(caught.value) or "put" in str(caught.value))
 
@@ -87,6 +87,6 @@ def test_a_cell_that_is_no_number_is_counted_by_the_filter(recording):
 @pytest.mark.parametrize(
     "kind, told", [("bag", "no recording of kind bag"), ("film", "choose one of run, scene, bag, thymio")]
 )
-def test_a_kind_that_is_none_is_named(recording, tmp_path, capsys, kind, told):
+def test_a_kind_that_is_none_is_named(recording, tmp_path, capsys, kind, reported):
     code, _, error = run(capsys, "scene", "from", kind, recording, "--out", tmp_path / "scene")
-    assert code == 2 and told in error and error.count("\n") == 1
+    assert code == 2 and reported in error and error.count("\n") == 1

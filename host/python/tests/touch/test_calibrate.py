@@ -64,9 +64,9 @@ def test_contacts_at_known_distances(capsys, tmp_path, ring, whisks):
 def test_one_distance_gives_no_error_estimate(capsys, tmp_path, ring):
     options = ["--radii", "90", "--repeats", 6, "--rest-seconds", 0.5, "--yes", "--backlog"]
     code, out, err = run(capsys, "calibrate", "--ring", ring.name, "--out", tmp_path, "--lane", LANE, *options)
-    told = out.splitlines()[-1]
-    assert (code, err) == (0, "") and "6 contacts; " in told and "standard error" not in out
-    assert "at 90 mm, and one radius gives no error estimate; record contacts at more radii" in told
+    reported = out.splitlines()[-1]
+    assert (code, err) == (0, "") and "6 contacts; " in reported and "standard error" not in out
+    assert "at 90 mm, and one radius gives no error estimate; record contacts at more radii" in reported
     code, _, err = run(capsys, "radial", "fit", tmp_path / "lane3.csv", "--out", tmp_path / "m.json")
     assert code == 2 and "one radius gives no error estimate" in err and err.count("\n") == 1
     assert not (tmp_path / "m.json").exists()

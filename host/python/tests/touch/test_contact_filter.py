@@ -27,26 +27,26 @@ def swept(radius_m: float, ticks: int = 500, side: int = 1) -> tuple[np.ndarray,
 @pytest.mark.parametrize(("radius_m", "side"), [(0.08, 1), (0.11, -1), (0.12, 1)])
 def test_a_corner_is_placed_within_a_millimetre_while_it_is_swept(radius_m, side):
     bases, tilts, places = swept(radius_m, side=side)
-    told = ContactFilter().run(bases, tilts)
-    late = told.sample > 200
-    off = told.point[late] - places[told.sample[late]]
+    reported = ContactFilter().run(bases, tilts)
+    late = reported.sample > 200
+    off = reported.point[late] - places[reported.sample[late]]
     assert np.sqrt(np.mean(np.sum(off**2, axis=1))) < 1e-3
-    far = np.einsum("ki,kij,kj->k", off, np.linalg.inv(told.point_cov[late]), off)
+    far = np.einsum("ki,kij,kj->k", off, np.linalg.inv(reported.point_cov[late]), off)
     assert far.max() < 9.2  # all inside the 99 % region
-    assert set(np.array(told.motion)[late]) == {"drive-by"}
-    assert told.corner[-1] > 0.5
-    assert told.sweep[-1] < 0.05
-    assert abs(told.plane_rad[-1]) < 3 * told.plane_sd[-1]
+    assert set(np.array(reported.motion)[late]) == {"drive-by"}
+    assert reported.corner[-1] > 0.5
+    assert reported.sweep[-1] < 0.05
+    assert abs(reported.plane_rad[-1]) < 3 * reported.plane_sd[-1]
 
 
 def test_reports_come_every_20_ms_and_lost_samples_are_counted():
     bases, tilts, places = swept(0.1)
     tilts[::5] = np.nan
     held = ContactFilter()
-    told = held.run(bases, tilts, good=np.arange(len(tilts)) % 7 > 0)
-    assert set(np.diff(told.sample)) == {40}
+    reported = held.run(bases, tilts, good=np.arange(len(tilts)) % 7 > 0)
+    assert set(np.diff(reported.sample)) == {40}
     assert held.not_read == {"bad": 100 + 57, "stuck": 0, "saturated": 0, "restarts": 0}
-    assert np.hypot(*(told.point[-1] - places[told.sample[-1]])) < 2e-3
+    assert np.hypot(*(reported.point[-1] - places[reported.sample[-1]])) < 2e-3
 
 
 def test_a_whisker_at_rest_gives_no_report_and_a_new_contact_forgets_the_last():
@@ -57,8 +57,8 @@ def test_a_whisker_at_rest_gives_no_report_and_a_new_contact_forgets_the_last():
     held.run(bases, tilts)
     held.begin()
     bases, tilts, places = swept(0.08)
-    told = held.run(bases, tilts)
-    assert np.hypot(*(told.point[-1] - places[told.sample[-1]])) < 1e-3
+    reported = held.run(bases, tilts)
+    assert np.hypot(*(reported.point[-1] - places[reported.sample[-1]])) < 1e-3
 
 
 @pytest.mark.parametrize(
@@ -90,13 +90,13 @@ def test_a_calibration_by_whisks_is_enough_to_follow_a_whisk(tmp_path, capsys):
     head = "contact,t_s,x,y,whisk_rad_s\n"
     (tmp_path / "contacts.csv").write_text(head + "".join("a," + ",".join(map(str, row)) + "\n" for row in rows))
     status, out, _ = run(capsys, "radial", "follow", tmp_path / "model.json", tmp_path / "contacts.csv", "--json")
-    told = [json.loads(line) for line in out.splitlines()]
+    reported = [json.loads(line) for line in out.splitlines()]
     assert status == 0
-    assert len(told) > 20
-    last = told[-1]
+    assert len(reported) > 20
+    last = reported[-1]
     assert last["motion"] == "body whisk"
     assert abs(np.hypot(*last["point_mm"]) - 115.0) < min(5.0, 3.0 * last["point_sd_mm"][0])
-    assert told[2]["point_sd_mm"][0] > 2.0 * last["point_sd_mm"][0]
+    assert reported[2]["point_sd_mm"][0] > 2.0 * last["point_sd_mm"][0]
 
 
 def test_what_cannot_be_followed_is_one_line(tmp_path, capsys):

@@ -48,10 +48,10 @@ WARNED = {
 
 @pytest.mark.parametrize("how", WARNED)
 def test_a_fault_is_told_in_a_line_and_the_rest_is_fitted(capsys, tmp_path, good, how):
-    spoil, told = WARNED[how]
+    spoil, reported = WARNED[how]
     write(tmp_path / "c.csv", spoil(good))
     code, out, err = run(capsys, "radial", "fit", tmp_path / "c.csv", "--out", tmp_path / "m.json", "--model", "whisk")
-    assert code == 0 and err.count("\n") == 1 and str(tmp_path / "c.csv") in err and told in err
+    assert code == 0 and err.count("\n") == 1 and str(tmp_path / "c.csv") in err and reported in err
     left_out = how in ("stuck", "stuck from the middle", "three samples")
     assert f"{17 if left_out else 18} contacts" in out
 
@@ -69,10 +69,10 @@ REFUSED = {
 
 @pytest.mark.parametrize("how", REFUSED)
 def test_what_cannot_be_learned_from_is_refused_in_a_line(capsys, tmp_path, good, how):
-    spoil, told = REFUSED[how]
+    spoil, reported = REFUSED[how]
     write(tmp_path / "c.csv", spoil(good))
     code, _, err = run(capsys, "radial", "fit", tmp_path / "c.csv", "--out", tmp_path / "m.json")
-    assert code == 2 and err.count("\n") == 1 and told in err and not (tmp_path / "m.json").exists()
+    assert code == 2 and err.count("\n") == 1 and reported in err and not (tmp_path / "m.json").exists()
 
 
 def test_good_recordings_are_read_without_a_word(capsys, tmp_path, good):

@@ -16,8 +16,8 @@ from crunchbot.touch.radial.whisk import WhiskModel
 
 
 def errors(model, held: Whisks) -> np.ndarray:
-    told = [radial.estimate(model, c).radius_mm for c in held.recorded]
-    return np.array(told) - held.radius_mm
+    reported = [radial.estimate(model, c).radius_mm for c in held.recorded]
+    return np.array(reported) - held.radius_mm
 
 
 def rms(values) -> float:
@@ -62,11 +62,11 @@ def test_what_lies_long_before_a_whisk_changes_nothing():
 
 def test_it_is_as_sure_as_it_is_right(calibrated):
     held = whisks(np.random.default_rng(4), 40)
-    told = [radial.estimate(calibrated[0], c) for c in held.recorded]
-    off = np.array([t.radius_mm for t in told]) - held.radius_mm
-    within = [np.mean(np.abs(off) < k * np.array([t.sigma_mm for t in told])) for k in (0.6745, 1.645)]
+    reported = [radial.estimate(calibrated[0], c) for c in held.recorded]
+    off = np.array([t.radius_mm for t in reported]) - held.radius_mm
+    within = [np.mean(np.abs(off) < k * np.array([t.sigma_mm for t in reported])) for k in (0.6745, 1.645)]
     assert 0.4 < within[0] < 0.65 and 0.82 < within[1] < 0.97
-    assert np.mean([t.confidence for t in told]) > 0.97
+    assert np.mean([t.confidence for t in reported]) > 0.97
 
 
 def test_tip_and_shaft(calibrated):
@@ -120,9 +120,9 @@ def spoil(contact: Contact, how: str, rng) -> Contact:
 @pytest.mark.parametrize("how", ["saturated", "stuck", "dead", "all nan", "flipped", "swapped axes"])
 def test_confidence_falls_when_a_whisker_is_broken(calibrated, how):
     rng = np.random.default_rng(8)
-    told = [radial.estimate(calibrated[0], spoil(c, how, rng)) for c in calibrated[1].recorded]
-    assert np.isfinite([t[:2] for t in told]).all()
-    assert np.median([t.confidence for t in told]) < 0.5
+    reported = [radial.estimate(calibrated[0], spoil(c, how, rng)) for c in calibrated[1].recorded]
+    assert np.isfinite([t[:2] for t in reported]).all()
+    assert np.median([t.confidence for t in reported]) < 0.5
 
 
 @pytest.mark.parametrize("how", ["nan", "bad records", "drift"])
@@ -181,10 +181,10 @@ def test_the_command_tells_how_sure_it_is(capsys, tmp_path, calibrated):
     write(tmp_path / "c.csv", calibrated[1])
     assert run(capsys, "radial", "fit", tmp_path / "c.csv", "--out", tmp_path / "m.json")[0] == 0
     code, out, _ = run(capsys, "radial", "predict", tmp_path / "m.json", tmp_path / "c.csv", "--json")
-    told = [json.loads(line) for line in out.splitlines()]
-    assert code == 0 and len(told) == 30
-    assert set(told[0]) == {"contact", "radius_mm", "sigma_mm", "type", "confidence"}
-    assert rms([t["radius_mm"] for t in told] - calibrated[1].radius_mm) < 2.6
+    reported = [json.loads(line) for line in out.splitlines()]
+    assert code == 0 and len(reported) == 30
+    assert set(reported[0]) == {"contact", "radius_mm", "sigma_mm", "type", "confidence"}
+    assert rms([t["radius_mm"] for t in reported] - calibrated[1].radius_mm) < 2.6
     one = whisks(np.random.default_rng(11), 1, channels=1)
     write(tmp_path / "one.csv", one, "contact,radius_mm,t_s,whisk_rad_s,x")
     code, _, err = run(capsys, "radial", "predict", tmp_path / "m.json", tmp_path / "one.csv")

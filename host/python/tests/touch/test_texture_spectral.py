@@ -175,8 +175,8 @@ def test_a_border_is_told_before_its_window_is_full_and_what_lies_before_it_is_l
     x = np.concatenate([drag("VINYL", 1010, 60), drag("ROUGH", 590, 60)])
     x[1010:] += x[1009] - x[1010]
     found = model.judge(x, WINDOW, notices=True)
-    told = next(d for d in found if d.notice)
-    assert told.border and told.label == -1 and 1010 < told.end <= 1160 and not told.loglik.any()
+    reported = next(d for d in found if d.notice)
+    assert reported.border and reported.label == -1 and 1010 < reported.end <= 1160 and not reported.loglik.any()
     (cut,) = (d for d in found if d.end == 1200 and not d.notice)
     assert cut.border and cut.label == 2
 
@@ -566,8 +566,8 @@ def test_surfaces_that_may_be_misspelt_or_were_recorded_once_are_told(capsys, tm
         write(tmp_path / name / "0.csv", drag("VINYL", 200, 0))
     lines = []
     texture.read_training(tmp_path, lines.append)
-    told = [set(line.split("'")[1::2]) for line in lines if "differ by a letter" in line]
-    assert told == [{"SMOOHT", "SMOOTH"}, {"SMOOTH", "SMOTH"}] and len(lines) == 3
+    reported = [set(line.split("'")[1::2]) for line in lines if "differ by a letter" in line]
+    assert reported == [{"SMOOHT", "SMOOTH"}, {"SMOOTH", "SMOTH"}] and len(lines) == 3
     assert "one recording of SMOOHT, SMOOTH, SMOTH, TILE1, TILE2" in "".join(lines)
 
 

@@ -48,9 +48,12 @@ class Browser:
             self._note(message)
 
     def _note(self, event: dict) -> None:
-        method, told = event["method"], event.get("params", {})
-        if method == "Runtime.exceptionThrown" or "error" in (told.get("entry", {}).get("level"), told.get("type")):
-            self.troubles.append(json.dumps(told))
+        method, reported = event["method"], event.get("params", {})
+        if method == "Runtime.exceptionThrown" or "error" in (
+            reported.get("entry", {}).get("level"),
+            reported.get("type"),
+        ):
+            self.troubles.append(json.dumps(reported))
         if event["method"] == "Network.requestWillBeSent":
             self.requests.append(event["params"]["request"]["url"])
         if event["method"] == "Network.webSocketCreated":
@@ -67,9 +70,9 @@ class Browser:
 
     async def eval(self, expression: str):
         """The value of a JavaScript expression, which may be a promise."""
-        told = await self.call("Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True)
-        assert "exceptionDetails" not in told, told
-        return told["result"].get("value")
+        reported = await self.call("Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True)
+        assert "exceptionDetails" not in reported, reported
+        return reported["result"].get("value")
 
     async def until(self, expression: str):
         """The first value of the expression that is true."""

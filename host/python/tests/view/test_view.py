@@ -93,21 +93,25 @@ def test_status_counts_what_the_ring_counts():
     async def scenario(writer):
         async with view_of(writer.name) as port, page(port) as p:
             await p.ask(type="subscribe", topic="status", ring=writer.name)
-            told = await p.status_where(lambda s: s["frames"] == len(frames))
-            assert (told["ring"], told["state"], told["trouble"]) == (writer.name, "live", None)
-            assert (told["reader"]["frames_missing"], told["dropped"], told["reader"]["overruns"]) == (7, 3, 0)
-            assert told["bad"]["link_crc"] == [0, 0, 5] + [0] * (LANES - 3)
-            assert told["lanes"]["lost"][:NODES] == [0, 0, 5]
-            assert told["lanes"]["state"] == ["good"] * NODES + ["absent"] * (LANES - NODES)
-            assert told["lanes"]["alpha"][0] == frames["lane"]["alpha"][-1, 0]
-            assert told["tick_s"] == pytest.approx(500e-6)
-            assert told["clock"] is None and told["daemon"] is None
+            reported = await p.status_where(lambda s: s["frames"] == len(frames))
+            assert (reported["ring"], reported["state"], reported["trouble"]) == (writer.name, "live", None)
+            assert (reported["reader"]["frames_missing"], reported["dropped"], reported["reader"]["overruns"]) == (
+                7,
+                3,
+                0,
+            )
+            assert reported["bad"]["link_crc"] == [0, 0, 5] + [0] * (LANES - 3)
+            assert reported["lanes"]["lost"][:NODES] == [0, 0, 5]
+            assert reported["lanes"]["state"] == ["good"] * NODES + ["absent"] * (LANES - NODES)
+            assert reported["lanes"]["alpha"][0] == frames["lane"]["alpha"][-1, 0]
+            assert reported["tick_s"] == pytest.approx(500e-6)
+            assert reported["clock"] is None and reported["daemon"] is None
             writer.set_clock(Clock(0, 1, 2, 50 / 3, 1500.0))
             writer.set_stats(frames=9, started_ns=1, reconnects=2, wire_version=1, error=-40, serial=b"CB-7")
-            told = await p.status_where(lambda s: s["daemon"])
-            assert told["clock"]["uncertainty_ns"] == 1500.0
-            assert (told["daemon"]["reconnects"], told["daemon"]["serial"]) == (2, "CB-7")
-            assert "no bridge is connected" in told["daemon"]["trouble"]
+            reported = await p.status_where(lambda s: s["daemon"])
+            assert reported["clock"]["uncertainty_ns"] == 1500.0
+            assert (reported["daemon"]["reconnects"], reported["daemon"]["serial"]) == (2, "CB-7")
+            assert "no bridge is connected" in reported["daemon"]["trouble"]
 
     with ring_of(frames) as writer:
         asyncio.run(scenario(writer))
@@ -119,24 +123,24 @@ def test_no_ring_then_one_then_its_end_then_a_new_one():
     async def scenario():
         async with view_of(name) as port, page(port) as p:
             await p.ask(type="subscribe", topic="status", ring=name)
-            told = await p.status_where(lambda s: s["state"] == "waiting")
-            assert "there is no ring of this name" in told["trouble"]["text"]
+            reported = await p.status_where(lambda s: s["state"] == "waiting")
+            assert "there is no ring of this name" in reported["trouble"]["text"]
             await p.traces(name, width=1, lanes=1)
             with ring_of(made_frames(0, 300), name):
                 await p.status_where(lambda s: s["state"] == "live")
                 await p.bins_until(300)
-            told = await p.status_where(lambda s: s["state"] == "ended")
-            assert told["trouble"]["name"] == "CLOSED"
+            reported = await p.status_where(lambda s: s["state"] == "ended")
+            assert reported["trouble"]["name"] == "CLOSED"
             with ring_of(made_frames(0, 200, seed=1), name):
-                told = await p.status_where(lambda s: s["state"] == "live" and s["frames"] == 500)
-                assert told["restarts"] == 1
+                reported = await p.status_where(lambda s: s["state"] == "live" and s["frames"] == 500)
+                assert reported["restarts"] == 1
                 again = made_frames(0, 200, seed=1)["lane"]["alpha"][:, 0].tolist()
                 lows = np.concatenate([b.low[0, 0] for b in await p.bins_until(501)])
                 while lows[-1] == 0xFFFF:  # the outage, as long as it was
                     lows = np.append(lows, Block(await p.next("traces")).low[0, 0])
                 assert lows[-200:].tolist() == again
                 assert np.all(lows[:-200] == 0xFFFF) and len(lows) > 200, "time goes on, with a gap"
-            texts = [text for _, text in told["events"]]
+            texts = [text for _, text in reported["events"]]
             assert texts[:2] == ["attached to the ring", "whiskerd closed the ring"]
 
     asyncio.run(scenario())
@@ -172,8 +176,8 @@ def test_rings_are_found_named_and_told_when_they_change():
             await p.ask(type="subscribe", topic="rings")
             assert other not in (await p.next("rings"))["rings"]
             with Writer(other) as second:
-                told = await p.next("rings")
-                assert other in told["rings"] and told["owners"][other] == getpass.getuser()
+                reported = await p.next("rings")
+                assert other in reported["rings"] and reported["owners"][other] == getpass.getuser()
                 second.publish(made_frames(0, 64))
                 await p.ask(type="subscribe", topic="status", ring=other)
                 await p.status_where(lambda s: s["ring"] == other and s["frames"] == 64)
@@ -207,9 +211,9 @@ def test_a_ring_of_another_user_is_shown_only_if_that_user_is_named():
     def seen(writer, owner):
         tap = Tap(writer.name, owner=owner)
         tap.poll()
-        told = tap.status()
+        reported = tap.status()
         tap.close()
-        return told
+        return reported
 
     with ring_of(made_frames(0, 10)) as writer:
         os.chown(f"/dev/shm/{writer.name}", stranger, stranger)
@@ -266,8 +270,8 @@ def test_a_bad_request_is_answered_with_one_line_and_changes_nothing(request_tex
     async def scenario(writer):
         async with view_of(writer.name) as port, page(port) as p:
             await p.socket.send(request_text)
-            told = await p.next("error")
-            assert complaint in told["text"] and "\n" not in told["text"]
+            reported = await p.next("error")
+            assert complaint in reported["text"] and "\n" not in reported["text"]
             await p.traces(writer.name, lanes=1)
             await p.bins_until(10)
 

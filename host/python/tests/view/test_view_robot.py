@@ -152,13 +152,13 @@ def surface_row(seq: int, **cells: float) -> Observation:
 
 
 def test_a_surface_is_placed_by_the_estimate_of_its_own_row():
-    told = {"normal_rad": np.pi, "normal_sd_rad": 0.1, "point_x_m": 0.2, "point_y_m": 0.1, "point_sd_m": 0.001}
+    reported = {"normal_rad": np.pi, "normal_sd_rad": 0.1, "point_x_m": 0.2, "point_y_m": 0.1, "point_sd_m": 0.001}
     model = RobotModel(SCENE)
-    model.take("observation", surface_row(4, **told))
+    model.take("observation", surface_row(4, **reported))
     for seq in (3, 4, 4):
         pose = PoseWithCovariance.planar((1.0 + seq, 2.0, np.pi / 2), np.diag([1e-4, 1e-4, 0.01]))
         model.take("localisation", Localisation(Header.at(seq * ROW_NS, "arena"), "grid", pose, 0.5, seq))
-    (surface,) = model.surfaces.told
+    (surface,) = model.surfaces.reported
     assert (surface["x"], surface["y"]) == pytest.approx((4.9, 2.2))
     assert surface["normal"] == pytest.approx(-np.pi / 2, abs=1e-3)
     assert surface["normal_sd"] == 0.1
@@ -169,7 +169,7 @@ def test_a_surface_without_a_direction_is_not_drawn():
     model, pose = RobotModel(SCENE), PoseWithCovariance.planar((1.0, 2.0, 0.0), WIDE)
     model.take("observation", surface_row(1, point_x_m=0.2, point_y_m=0.1, point_sd_m=0.001))
     model.take("localisation", Localisation(Header.at(ROW_NS, "arena"), "grid", pose, 0.5, 1))
-    assert not model.surfaces.told
+    assert not model.surfaces.reported
 
 
 def test_a_process_that_fell_silent_is_told_from_one_that_ended_and_one_never_heard():
@@ -179,11 +179,11 @@ def test_a_process_that_fell_silent_is_told_from_one_that_ended_and_one_never_he
         model.take(f"health/{name}", health(name, counters=[("rows", "12")], error="disk full"))
     model.take("health/bag", End(Header.at(0), 1, "told to"))
     clock.now += SILENT_S + 1.0
-    told = {process["name"]: process for process in model.health()}
-    assert told["pilot"]["silent"] and told["pilot"]["age_s"] == 4 and told["pilot"]["error"] == "disk full"
-    assert told["pilot"]["counters"] == {"rows": "12"}
-    assert not told["bag"]["silent"] and told["bag"]["ended"] and told["bag"]["state"] == "ended: told to"
-    assert told["navigator"]["age_s"] is None
+    reported = {process["name"]: process for process in model.health()}
+    assert reported["pilot"]["silent"] and reported["pilot"]["age_s"] == 4 and reported["pilot"]["error"] == "disk full"
+    assert reported["pilot"]["counters"] == {"rows": "12"}
+    assert not reported["bag"]["silent"] and reported["bag"]["ended"] and reported["bag"]["state"] == "ended: told to"
+    assert reported["navigator"]["age_s"] is None
     model.take("health/pilot", health(pid=8))
     (pilot,) = [process for process in model.health() if process["name"] == "pilot"]
     assert (pilot["silent"], pilot["restarts"], pilot["pid"], pilot["age_s"]) == (False, 1, 8, 0)
@@ -249,10 +249,10 @@ def test_a_page_that_does_not_acknowledge_holds_nothing_back():
                     await script.ask(type="subscribe", topic=topic)
             await slow.next("scene", acknowledge=False)
             assert (await quick.next("scene"))["arena"]["floor"] == list(ARENA.floor)
-            told = await quick.next("robot")
+            reported = await quick.next("robot")
             for row in range(10, 60):
                 post.play(MadeUpRun(), range(row, row + 1), hub.robot)
-            points = len(told["path"]["points"])
+            points = len(reported["path"]["points"])
             async with asyncio.timeout(PATIENCE_S):
                 while points < 60:
                     points += len((await quick.next("robot")).get("path", {"points": []})["points"])
@@ -264,8 +264,8 @@ def test_a_page_that_does_not_acknowledge_holds_nothing_back():
 def test_a_page_is_told_of_unknown_ground_and_not_of_tables():
     sensor = SensorTable("light", (0.0, 0.0), 0.0, 0.0, np.zeros((5, 5), np.uint8))
     arena = replace(ARENA, unknown=((0.0, 0.0, 0.5, 0.5),))
-    told = json.loads(SceneFeed(Hub([], scene=Scene(arena, replace(SCENE.robot, sensors=(sensor,)))), {}).take())
-    assert told["arena"]["unknown"] == [[0.0, 0.0, 0.5, 0.5]] and told["robot"]["sensors"] == []
+    reported = json.loads(SceneFeed(Hub([], scene=Scene(arena, replace(SCENE.robot, sensors=(sensor,)))), {}).take())
+    assert reported["arena"]["unknown"] == [[0.0, 0.0, 0.5, 0.5]] and reported["robot"]["sensors"] == []
 
 
 @pytest.mark.parametrize(
@@ -297,10 +297,10 @@ def fuzz_robot(inputs: int, seed: int) -> int:
     rng = random.Random(seed)
     post = Post()
     hub = Hub([], post.source, SCENE)
-    told = [pair for row in range(0, 400, 7) for pair in MadeUpRun(seed).messages(row)]
+    reported = [pair for row in range(0, 400, 7) for pair in MadeUpRun(seed).messages(row)]
     feeds = RobotFeed(hub, {}), BeliefFeed(hub, {})
     for _ in range(inputs):
-        topic, message = rng.choice(told)
+        topic, message = rng.choice(reported)
         data = encode(message)
         broken = mutated(rng, data) if rng.random() < 0.5 else poked(rng, data)
         post.put(rng.choice([topic, topic, topic, "", "health/x/y", "truth"]), message, data=broken)
@@ -344,10 +344,10 @@ def test_over_a_real_network_a_page_sees_what_a_pilot_sends():
         assert hub.robot.rows["unseen"] == 0 and hub.robot.row["tips"]
         assert source.refused()["count"] == 0
         source.set_pose((0.5, 1.5, 2.0))
-        assert initial_pose.prior_of(told.take(PATIENCE_S)[0].message, ARENA).mean == pytest.approx((0.5, 1.5, 2.0))
+        assert initial_pose.prior_of(reported.take(PATIENCE_S)[0].message, ARENA).mean == pytest.approx((0.5, 1.5, 2.0))
 
     with Link("pilot", ROBOT, listen=[endpoint]) as pilot:
-        told = pilot.subscribe(initial_pose.TOPIC)
+        reported = pilot.subscribe(initial_pose.TOPIC)
         source = join(ROBOT, [endpoint])
         try:
             asyncio.run(scenario(source))

@@ -111,16 +111,16 @@ class Script:
             self.count += 1
             if acknowledge:
                 await self.ask(type="ack", count=self.count)
-            told = message if isinstance(message, bytes) else json.loads(message)
-            self.kept["traces" if told is message else told["topic"]].append(told)
+            reported = message if isinstance(message, bytes) else json.loads(message)
+            self.kept["traces" if reported is message else reported["topic"]].append(reported)
         return self.kept[topic].popleft()
 
     async def status_where(self, condition) -> dict:
         """The first status for which the condition holds."""
         async with asyncio.timeout(PATIENCE_S):
-            while not condition(told := await self.next("status")):
+            while not condition(reported := await self.next("status")):
                 pass
-        return told
+        return reported
 
     async def bins_until(self, end: int) -> list[Block]:
         """Blocks of traces until bin `end` is there."""

@@ -106,20 +106,20 @@ class MadeUpRun:
     def messages(self, row: int) -> list[tuple[str, object]]:
         """(topic, message) in the order they are sent."""
         stamp = row * ROW_NS
-        told: list[tuple[str, object]] = []
+        reported: list[tuple[str, object]] = []
         if row not in self.skip:
-            told.append(("observation", self.observation(row)))
-        told += [("localisation", self.localisation(row))] + self.contact(row)
+            reported.append(("observation", self.observation(row)))
+        reported += [("localisation", self.localisation(row))] + self.contact(row)
         if self.simulated:
-            told.append(("truth", m.PoseStamped(m.Header.at(stamp, "arena"), m.Pose.planar(*route(stamp / 1e9)))))
+            reported.append(("truth", m.PoseStamped(m.Header.at(stamp, "arena"), m.Pose.planar(*route(stamp / 1e9)))))
         if row % 5 == 0:
-            told.append(("belief", self.belief(row)))
+            reported.append(("belief", self.belief(row)))
         if row % 10 == 0:
-            told += [(f"health/{name}", self.health(name, row)) for name in ("pilot", "navigator")]
+            reported += [(f"health/{name}", self.health(name, row)) for name in ("pilot", "navigator")]
         if row % 100 == 0:
             doing = DOINGS[row // 100 % len(DOINGS)]
-            told.append(("behaviour", m.Behaviour(m.Header.at(stamp), doing[0], m.Time.of(stamp), doing[1])))
-        return told
+            reported.append(("behaviour", m.Behaviour(m.Header.at(stamp), doing[0], m.Time.of(stamp), doing[1])))
+        return reported
 
     def observation(self, row: int) -> m.Observation:
         rng = np.random.default_rng((self.seed, row))
@@ -155,7 +155,7 @@ class MadeUpRun:
 
     def contact(self, row: int) -> list[tuple[str, m.Contact]]:
         """What each object whisker has to tell: a touch that begins, is measured a row later, or is over."""
-        return [("contact", told) for ray in SCENE.robot.of_role("object") if (told := self.touch(ray, row))]
+        return [("contact", reported) for ray in SCENE.robot.of_role("object") if (reported := self.touch(ray, row))]
 
     def touch(self, ray, row: int) -> m.Contact | None:
         began = row

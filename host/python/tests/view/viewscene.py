@@ -41,21 +41,21 @@ class SceneRun:
         estimate, _ = self._filter.replay(self._rows, row, 1)
         at = partial(m.Header.at, row * ROW_NS)
         pose = m.PoseWithCovariance.planar(estimate[0]["pose"], estimate[0]["covariance"])
-        told = [("observation", self._observation(row))]
+        reported = [("observation", self._observation(row))]
         confidence = float(estimate[0]["confidence"])
-        told.append(("localisation", m.Localisation(at("arena"), FILTER, pose, confidence, row, prior="uniform")))
-        told.append(("truth", m.PoseStamped(at("arena"), m.Pose.planar(*self._rows.truth[row]))))
-        told += [("contact", contact) for ray in range(len(self._rays)) for contact in self._contact(row, ray)]
+        reported.append(("localisation", m.Localisation(at("arena"), FILTER, pose, confidence, row, prior="uniform")))
+        reported.append(("truth", m.PoseStamped(at("arena"), m.Pose.planar(*self._rows.truth[row]))))
+        reported += [("contact", contact) for ray in range(len(self._rays)) for contact in self._contact(row, ray)]
         if row % 5 == 0:
             bumps = self._filter.components()
-            told.append(("belief", to_message(at("arena"), FILTER, row, len(bumps), condense(bumps))))
+            reported.append(("belief", to_message(at("arena"), FILTER, row, len(bumps), condense(bumps))))
         if row % 10 == 0:
             counts = [m.KeyValue("rows", str(row)), m.KeyValue("states", str(estimate[0]["states"]))]
-            told.append(("health/pilot", m.ProcessHealth(at(), "pilot", 4005, "running", counts[:1])))
-            told.append(("health/navigator", m.ProcessHealth(at(), "navigator", 4009, "running", counts)))
+            reported.append(("health/pilot", m.ProcessHealth(at(), "pilot", 4005, "running", counts[:1])))
+            reported.append(("health/navigator", m.ProcessHealth(at(), "navigator", 4009, "running", counts)))
         if row == 0:
-            told.append(("behaviour", m.Behaviour(at(), "EXPLORE", m.Time(), "replayed from a drawn scene")))
-        return told
+            reported.append(("behaviour", m.Behaviour(at(), "EXPLORE", m.Time(), "replayed from a drawn scene")))
+        return reported
 
     def _observation(self, row: int) -> m.Observation:
         texture, radial = self._rows.texture[row].ravel(), 1e3 * self._rows.radial_m[row]
@@ -72,13 +72,13 @@ class SceneRun:
 
     def _touched(self, row: int) -> np.ndarray:
         """Cells of the directions, and the points at the whiskers' ends."""
-        told = np.full((len(self._rays), 5), np.nan)
-        told[:, :2] = self._rows.normal[row]
+        reported = np.full((len(self._rays), 5), np.nan)
+        reported[:, :2] = self._rows.normal[row]
         for ray, whisker in enumerate(self.scene.robot.of_role("object")):
-            if np.isfinite(told[ray, 0]):
+            if np.isfinite(reported[ray, 0]):
                 out = self._rows.radial_m[row, ray] * np.array([np.cos(whisker.yaw_rad), np.sin(whisker.yaw_rad)])
-                told[ray, 2:] = *(whisker.base_m + out), 0.001
-        return told.ravel()
+                reported[ray, 2:] = *(whisker.base_m + out), 0.001
+        return reported.ravel()
 
     def _contact(self, row: int, ray: int) -> list[m.Contact]:
         """A touch that begins, measured at once, or that is over."""

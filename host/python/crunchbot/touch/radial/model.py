@@ -293,8 +293,10 @@ def estimate(model, contact: Contact, peak_counts: float | None = None) -> Estim
     if isinstance(model, WhiskModel | PressModel) and contact.samples.shape[1] != model.axes:
         raise ValueError(f"{contact.samples.shape[1]} channels, but the model has {model.axes}")
     if isinstance(model, WhiskModel):
-        told = model.estimate(model.shape_of(contact))
-        return Estimate(told.radius_mm, told.sigma_mm, "tip" if told.tip > 0.5 else "shaft", told.confidence)
+        reported = model.estimate(model.shape_of(contact))
+        return Estimate(
+            reported.radius_mm, reported.sigma_mm, "tip" if reported.tip > 0.5 else "shaft", reported.confidence
+        )
     if isinstance(model, PressModel):
         found = model.predict(contact)
         return Estimate(found.radius_mm, found.sigma_mm, model.contact_type(found.radius_mm), *found[2:])

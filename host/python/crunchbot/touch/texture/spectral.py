@@ -216,8 +216,8 @@ class Stream:
 
     def _judgement(self, end: int) -> Judgement:
         d = self._decision
-        told = d.confidence, bool(d.border), d.novelty, d.health.bad
-        return Judgement(end, d.samples, d.label, d.best, *told, self._loglik.copy(), bool(d.notice))
+        reported = d.confidence, bool(d.border), d.novelty, d.health.bad
+        return Judgement(end, d.samples, d.label, d.best, *reported, self._loglik.copy(), bool(d.notice))
 
 
 def forward(loglik: np.ndarray, temper: float, chance: float) -> np.ndarray:

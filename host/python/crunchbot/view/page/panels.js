@@ -103,17 +103,17 @@ class Panels {
     this.showEvents(s.events);
   }
 
-  banner(told) {
-    const key = JSON.stringify(told && [told[0], told[1].replace(/[\d.]+ (s|min|h)$/, ''), told[2], told[3]]);
+  banner(reported) {
+    const key = JSON.stringify(reported && [reported[0], reported[1].replace(/[\d.]+ (s|min|h)$/, ''), reported[2], reported[3]]);
     const [headline, line, steps] = $('banner').children;
-    if (told) headline.textContent = told[1];
-    if (key === this.told) return;
-    this.told = key;
-    $('banner').hidden = !told;
-    if (!told) return;
-    $('banner').dataset.grave = told[0] ? 'yes' : 'no';
-    line.replaceChildren(...rich(told[2] ?? ''));
-    steps.replaceChildren(...told[3].map((step) => make('li', rich(step))));
+    if (reported) headline.textContent = reported[1];
+    if (key === this.reported) return;
+    this.reported = key;
+    $('banner').hidden = !reported;
+    if (!reported) return;
+    $('banner').dataset.grave = reported[0] ? 'yes' : 'no';
+    line.replaceChildren(...rich(reported[2] ?? ''));
+    steps.replaceChildren(...reported[3].map((step) => make('li', rich(step))));
   }
 
   tile(id, value, note, loss) {
@@ -140,7 +140,7 @@ class Panels {
 
   showHealth(s) {
     const d = s.daemon;
-    const none = 'not told';
+    const none = 'not reported';
     const pairs = [
       ['Last frame', s.age_s === null ? 'none yet' : s.age_s < 0.1 ? 'less than 0.1 s ago' : `${duration(s.age_s)} ago`],
       ['Device', d ? [d.connected ? '' : 'not connected', d.serial && `serial ${d.serial}`, d.firmware].filter(Boolean).join(', ') || 'connected' : none],

@@ -103,15 +103,15 @@ class RobotPart {
     if ($('robot-state').textContent !== text) $('robot-state').textContent = text;
   }
 
-  note(told) {
+  note(reported) {
     const box = $('robot-note');
-    box.hidden = !told;
-    if (!told) return;
+    box.hidden = !reported;
+    if (!reported) return;
     const [headline, line, steps] = box.children;
-    box.dataset.grave = told[0] ? 'yes' : 'no';
-    if (headline.textContent !== told[1]) headline.textContent = told[1];
-    retell(line, told[2], () => rich(told[2]));
-    retell(steps, told[3], () => told[3].map((step) => make('li', rich(step))));
+    box.dataset.grave = reported[0] ? 'yes' : 'no';
+    if (headline.textContent !== reported[1]) headline.textContent = reported[1];
+    retell(line, reported[2], () => rich(reported[2]));
+    retell(steps, reported[3], () => reported[3].map((step) => make('li', rich(step))));
   }
 
   themed() {

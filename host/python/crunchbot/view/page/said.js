@@ -9,8 +9,8 @@ const none = (text) => make('span', text, { class: 'none' });
 /* Changes an element's children only if what is told has changed: a table that is read or selected stands still. */
 function retell(element, key, children) {
   const text = JSON.stringify(key);
-  if (element.told === text) return;
-  element.told = text;
+  if (element.reported === text) return;
+  element.reported = text;
   element.replaceChildren(...children());
 }
 
@@ -29,7 +29,7 @@ function tellPose(word, belief) {
     ['Truth', truth ? `x ${signed(truth.x, 2)} m, y ${signed(truth.y, 2)} m, ${degreesOf(truth.theta)}` : 'not known: only simulation tells it'],
     ['Error', error],
     ['Belief', belief.said()],
-    ['Filter', pose ? `${pose.filter}, from row ${count(pose.first_seq)}, prior ${pose.prior || 'not told'}` : 'not known'],
+    ['Filter', pose ? `${pose.filter}, from row ${count(pose.first_seq)}, prior ${pose.prior || 'not reported'}` : 'not known'],
     ['Pose came', ago(ages.pose)],
   ]);
 }
@@ -39,7 +39,7 @@ function tellBehaviour(word) {
   pairsOf($('behaviour'), [
     ['State', doing ? words(doing.state.toLowerCase()) : 'not known: no word has come'],
     ['For', doing && word.now_s !== null ? duration(Math.max(0, word.now_s - doing.since_s)) : 'not known'],
-    ['Because', doing ? doing.reason || 'no reason told' : 'not known'],
+    ['Because', doing ? doing.reason || 'no reason reported' : 'not known'],
   ]);
 }
 
@@ -66,8 +66,8 @@ function tipBars(tip) {
 }
 
 function rayLine(ray) {
-  const told = { contact: `${signed(ray.mm, 0)} mm from its base`, none: 'no contact' }[ray.state];
-  return make('li', [make('b', words(ray.name)), told ? make('span', ` ${told}`) : none(' not read')]);
+  const reported = { contact: `${signed(ray.mm, 0)} mm from its base`, none: 'no contact' }[ray.state];
+  return make('li', [make('b', words(ray.name)), reported ? make('span', ` ${reported}`) : none(' not read')]);
 }
 
 function tellContacts(word, contacts) {
@@ -83,8 +83,8 @@ function tellContacts(word, contacts) {
 }
 
 function tellProcesses(word, ring) {
-  const told = ring && ring.state !== 'waiting' ? [...word.processes, ringProcess(ring)] : word.processes;
-  retell($('processes'), told, () => (told.length ? told.map(processCard) : [make('li', none('no process has told of itself'))]));
+  const reported = ring && ring.state !== 'waiting' ? [...word.processes, ringProcess(ring)] : word.processes;
+  retell($('processes'), reported, () => (reported.length ? reported.map(processCard) : [make('li', none('no process has reported of itself'))]));
 }
 
 /* The daemon behind the ring that the other part shows, if that ring is on this machine, in the words of topic robot. */
@@ -95,7 +95,7 @@ function ringProcess(s) {
 
 function processCard(p) {
   const never = p.age_s === null;
-  const state = p.ended ? `■ ${p.state}` : never ? '○ never heard' : p.silent ? `▲ silent for ${duration(p.age_s)}` : `● ${p.state || 'state not told'}`;
+  const state = p.ended ? `■ ${p.state}` : never ? '○ never heard' : p.silent ? `▲ silent for ${duration(p.age_s)}` : `● ${p.state || 'state not reported'}`;
   const facts = [p.pid ? `process ${p.pid}` : '', p.restarts ? `restarted ${p.restarts} ×` : '', never ? '' : `last word ${ago(p.age_s)}`].filter(Boolean).join(', ');
   const counters = Object.entries(p.counters).map(([key, value]) => make('span', [`${words(key)} `, make('b', value)]));
   const parts = [make('div', [make('b', p.name), make('span', state, { class: 'condition' })]), make('small', facts)];
