@@ -18,8 +18,8 @@ INSTEAD = {
 }
 WORD = re.compile(rf"\b(?:{'|'.join(INSTEAD)})\b", re.IGNORECASE)
 BUMP = re.compile(r"\bbumps?\b", re.IGNORECASE)
-# The Create's bumper: the robot's firmware interface and the programs that read it.
-CREATE = ("host/create/", "sim/create/", "docs/create.md", "protocol/")
+# A bump is what the Create's bumper reports: in its interface, and in the pilot and the programs that read it.
+CREATE = re.compile(r"create|base|pilot|wheels|behaviour|bumper|protocol/|tests/mutations", re.IGNORECASE)
 OWN = ("tools/lint/words.py", "tests/test_lint.py")  # files that name the words to refuse them
 
 
@@ -33,6 +33,6 @@ def complaints(root: Path = ROOT) -> list[str]:
                 f"{path}:{number}: the word '{word}' is not used here; write: {INSTEAD[word.lower()]}"
                 for word in WORD.findall(line)
             ]
-            if BUMP.search(line) and not path.startswith(CREATE):
+            if BUMP.search(line) and not CREATE.search(path):
                 found.append(f"{path}:{number}: 'bump' is only for the Create's bumper; write: component, contact")
     return found

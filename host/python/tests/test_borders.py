@@ -82,8 +82,8 @@ def published(frames) -> None:
 SCENE, OBSERVATIONS = level0.record(3, rows=ROWS)
 ROW = {name: getattr(OBSERVATIONS, name)[1] for name in ("odometry", "texture", "radial_m")}
 NOISE = np.random.default_rng(1).normal(0.0, 5.0, (10 * LENGTH, CHANNELS))
-BUMPS = np.zeros(2, COMPONENT)
-BUMPS["pose"], BUMPS["sigma_m"], BUMPS["sigma_rad"], BUMPS["mass"] = (0.5, 0.5, 0.0), 0.1, 0.1, 0.5
+COMPONENTS = np.zeros(2, COMPONENT)
+COMPONENTS["pose"], COMPONENTS["sigma_m"], COMPONENTS["sigma_rad"], COMPONENTS["mass"] = (0.5, 0.5, 0.0), 0.1, 0.1, 0.5
 PLAIN = TextureModel.train({"A": [NOISE], "B": [3.0 * NOISE]})
 WHISK = {"t_s": np.arange(64.0), "samples": NOISE[:64], "whisk_rad_s": np.ones(64), "told_rad_s": np.ones(64)}
 PUSH = {"bases": np.zeros((8, 3)), "tilts": np.zeros((8, 2)), "good": np.ones(8, bool)}
@@ -101,7 +101,7 @@ CASES = {
         {"codes": np.zeros((3, 4), np.uint8), "edges": np.arange(4.0), "likelihood": np.ones((3, 2))},
         {"codes": (), "edges": (0,), "likelihood": (0, 1)},
     ),
-    "nav.filters._components": of_one(lambda bumps: prior_fault(SCENE, bumps), "bumps", BUMPS),
+    "nav.filters._components": of_one(lambda components: prior_fault(SCENE, components), "components", COMPONENTS),
     "nav.weigher.Weigher.take": Case(
         lambda **row: Weigher(SCENE).take(dataclasses.replace(OBSERVATIONS, **{n: a[None] for n, a in row.items()}), 0),
         ROW,

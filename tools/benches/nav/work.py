@@ -53,9 +53,9 @@ def balance(seed: int, filter: str, settings: dict, rows: int, stride: int) -> d
     running = localise.Filter(filter, made.scene, settings, seed)
     for row in range(stride - 1, rows, stride):
         running.replay(made.observations, row + 1 - stride, stride)
-        bumps, (x, y, heading) = running.components(), made.observations.truth[row]
+        components, (x, y, heading) = running.components(), made.observations.truth[row]
         image = (2 * middle[0] - x, 2 * middle[1] - y, heading + math.pi)
-        masses.append([near(bumps, (x, y, heading)), near(bumps, image)])
+        masses.append([near(components, (x, y, heading)), near(components, image)])
     both = np.array(masses)
     held = both[both.sum(axis=1) > 0.9]
     share = held[:, 0] / held.sum(axis=1) if len(held) else np.zeros(0)
@@ -68,11 +68,11 @@ def balance(seed: int, filter: str, settings: dict, rows: int, stride: int) -> d
     }
 
 
-def near(bumps: np.ndarray, pose) -> float:
+def near(components: np.ndarray, pose) -> float:
     """Mass within 0.25 m and 0.5 rad of a pose."""
-    x, y, heading = bumps["pose"].T
+    x, y, heading = components["pose"].T
     off = np.remainder(heading - pose[2] + math.pi, 2 * math.pi) - math.pi
-    return float(bumps["mass"][(np.hypot(x - pose[0], y - pose[1]) <= 0.25) & (np.abs(off) <= 0.5)].sum())
+    return float(components["mass"][(np.hypot(x - pose[0], y - pose[1]) <= 0.25) & (np.abs(off) <= 0.5)].sum())
 
 
 def variation(family: str, seed: int, runs: dict[str, list], rows: int, stride: int) -> dict:

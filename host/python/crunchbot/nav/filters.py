@@ -15,7 +15,7 @@ from .observations import ODOMETRY, Observations, touch_keys
 FAVOURITE, SPARE = "adaptive", "grid"
 SENSOR_UNKNOWN = 255
 SEED_MOST = 2**64 - 1
-BUMPS_MOST = int(lib.NAV_COMPONENTS_MOST)  # of a belief to begin from
+COMPONENTS_MOST = int(lib.NAV_COMPONENTS_MOST)  # of a belief to begin from
 
 # struct nav_estimate and struct nav_component
 ESTIMATE = np.dtype(
@@ -122,22 +122,22 @@ class Filter:
         scene: Scene,
         settings: dict[str, float] | None = None,
         seed: int = 0,
-        bumps: np.ndarray | None = None,
+        components: np.ndarray | None = None,
         sensors: Sequence[Sensor] = (),
         normals: bool = False,
     ):
-        """`bumps`: (n,) of COMPONENT, to begin from in place of the scene's prior; `sensors`: more than the scene's;
+        """`components`: (n,) of COMPONENT, to begin from in place of the scene's prior; `sensors`: more than the scene's;
         `normals`: rows may tell directions of the surfaces that object whiskers touch."""
         if name not in filter_names():
             raise SettingError(f"filter '{name}' is unknown; choose one of {', '.join(filter_names())}")
         if not 0 <= seed <= SEED_MOST:
             raise SettingError(f"--seed {seed}: outside 0 to 2^64 - 1; choose a number inside")
         self.scene = scene
-        if bumps is not None and (fault := prior_fault(scene, bumps)):
+        if components is not None and (fault := prior_fault(scene, components)):
             raise SettingError(f"filter '{name}': {fault}; give what a filter listed")
         self._own_keys = [sensor.name for sensor in scene.robot.sensors]
         sensors = (*map(_of_table, scene.robot.sensors), *sensors)
-        problem, self._keep = problem_of(scene, settings or {}, bumps, sensors)
+        problem, self._keep = problem_of(scene, settings or {}, components, sensors)
         problem.seed, problem.robot.normals = seed, normals
         self._own = sum(sensor.values for sensor in sensors)
         made = lib.nav_filter_new(name.encode(), problem)
@@ -211,11 +211,11 @@ class Filter:
 
     @property
     def component_count(self) -> int:
-        """How many bumps `components` gives."""
+        """How many components `components` gives."""
         return lib.nav_filter_components(self._filter, ffi.NULL, 0)
 
     def components(self) -> np.ndarray:
-        """The belief after the last row as bumps, (n,) of COMPONENT."""
+        """The belief after the last row as components, (n,) of COMPONENT."""
         count = self.component_count
         out = np.zeros(count, COMPONENT)
         lib.nav_filter_components(self._filter, _components(out), count)
@@ -223,15 +223,15 @@ class Filter:
 
     def region(self, x_m: float, y_m: float) -> tuple[float, float]:
         """Level of the highest-density region in (x, y) that holds this point, and the 90 % region's area in m^2."""
-        bumps, out = self.components(), ffi.new("struct nav_region *")
-        lib.nav_belief_region(_components(bumps), len(bumps), x_m, y_m, out)
+        components, out = self.components(), ffi.new("struct nav_region *")
+        lib.nav_belief_region(_components(components), len(components), x_m, y_m, out)
         return out.level, out.area_m2
 
     def bins(self) -> np.ndarray:
         """Belief mass in bins of 25 cm x 25 cm x 30 degrees, flat."""
-        bumps, size = _components(held := self.components()), self.scene.arena.size_m
-        out = np.zeros(lib.nav_belief_bins(bumps, 0, *size, ffi.NULL, 0))
-        lib.nav_belief_bins(bumps, len(held), *size, doubles(out, "bins", (len(out),)), len(out))
+        components, size = _components(held := self.components()), self.scene.arena.size_m
+        out = np.zeros(lib.nav_belief_bins(components, 0, *size, ffi.NULL, 0))
+        lib.nav_belief_bins(components, len(held), *size, doubles(out, "bins", (len(out),)), len(out))
         return out
 
     @property
@@ -251,18 +251,18 @@ class Filter:
 
 
 def _components(array: np.ndarray):
-    return pointer(COMPONENTS, COMPONENT, array, "bumps", (None,))
+    return pointer(COMPONENTS, COMPONENT, array, "components", (None,))
 
 
-def prior_fault(scene: Scene, bumps: np.ndarray) -> str:
-    """Why these bumps, (n,) of COMPONENT, are no prior; empty: they are one."""
-    problem, keep = problem_of(scene, {}, bumps)
+def prior_fault(scene: Scene, components: np.ndarray) -> str:
+    """Why these components, (n,) of COMPONENT, are no prior; empty: they are one."""
+    problem, keep = problem_of(scene, {}, components)
     which = ffi.new("long *")
     fault = lib.nav_prior_fault(ffi.addressof(problem.arena), ffi.addressof(problem.prior), which)
     del keep  # until here
     if fault == ffi.NULL:
-        return "" if len(bumps) else "no bumps"
-    return f"{f'bump {which[0]}: ' if which[0] >= 0 else ''}{ffi.string(fault).decode()}"
+        return "" if len(components) else "no components"
+    return f"{f'component {which[0]}: ' if which[0] >= 0 else ''}{ffi.string(fault).decode()}"
 
 
 def _fill_prior(out, prior: Prior) -> None:
@@ -304,7 +304,7 @@ def _of_table(sensor: SensorTable) -> Sensor:
 
 
 def problem_of(
-    scene: Scene, settings: dict[str, float], bumps: np.ndarray | None = None, sensors: Sequence[Sensor] = ()
+    scene: Scene, settings: dict[str, float], components: np.ndarray | None = None, sensors: Sequence[Sensor] = ()
 ):
     """The C problem and the arrays it points into."""
     arena, robot = scene.arena, scene.robot
@@ -338,14 +338,14 @@ def problem_of(
         "sensor": own,
     }
     prior = scene.prior or Prior("uniform")
-    if bumps is not None:
-        problem.prior.component, problem.prior.components = _components(bumps), len(bumps)
-    if bumps is None:
+    if components is not None:
+        problem.prior.component, problem.prior.components = _components(components), len(components)
+    if components is None:
         _fill_prior(ffi.addressof(problem.prior), prior)
     lib.nav_settings_default(ffi.addressof(problem.settings))
     for key, value in settings.items():
         _set(problem, key, value)
-    return problem, (floor, boxes, tips, rays, bumps, own, own_keep)
+    return problem, (floor, boxes, tips, rays, components, own, own_keep)
 
 
 def _set(problem, key: str, value: float) -> None:

@@ -1,22 +1,22 @@
-"""A filter's belief in at most so many bumps, its shape kept: every hypothesis, not one ellipse."""
+"""A filter's belief in at most so many components, its shape kept: every hypothesis, not one ellipse."""
 
 import numpy as np
 
 from ..nav.filters import COMPONENT
 from .messages import Belief, Header
-from .ranges import BUMPS_MOST
+from .ranges import COMPONENTS_MOST
 
-NEGLECTED = 1e-3  # share of the belief that its lightest bumps may hold together; they are left out
-FINEST = (0.02, np.radians(2.5))  # m, rad: cells to merge bumps in; doubled until few enough are left
+NEGLECTED = 1e-3  # share of the belief that its lightest components may hold together; they are left out
+FINEST = (0.02, np.radians(2.5))  # m, rad: cells to merge components in; doubled until few enough are left
 
 
-def condense(bumps: np.ndarray, most: int = BUMPS_MOST) -> np.ndarray:
-    """At most `most` bumps, (n,) of COMPONENT, heaviest first: the lightest left out, those of a cell become one.
+def condense(components: np.ndarray, most: int = COMPONENTS_MOST) -> np.ndarray:
+    """At most `most` components, (n,) of COMPONENT, heaviest first: the lightest left out, those of a cell become one.
 
-    A merged bump has the cell's mean pose and mass, and a width that takes in those of its parts and their distances
+    A merged component has the cell's mean pose and mass, and a width that takes in those of its parts and their distances
     (moments kept; sigma_m is that of x and y together, per axis).
     """
-    kept = bumps[np.argsort(-bumps["mass"], kind="stable")]
+    kept = components[np.argsort(-components["mass"], kind="stable")]
     held = np.cumsum(kept["mass"])
     kept = kept[: int(np.searchsorted(held, (1.0 - NEGLECTED) * held[-1])) + 1] if len(kept) else kept
     scale = 1.0
@@ -38,26 +38,26 @@ def _cells(poses: np.ndarray, scale: float) -> np.ndarray:
     return np.unique((keys[:, 0] * rows + keys[:, 1]) * turns + keys[:, 2], return_inverse=True)[1]
 
 
-def _merged(bumps: np.ndarray, cells: np.ndarray) -> np.ndarray:
-    """One bump a cell."""
-    mass, count = bumps["mass"], cells.max() + 1
+def _merged(components: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """One component a cell."""
+    mass, count = components["mass"], cells.max() + 1
 
     def mean(values):
         return np.bincount(cells, mass * values, count) / out["mass"]
 
     out = np.zeros(count, COMPONENT)
     out["mass"] = np.bincount(cells, mass, count)
-    x, y, theta = bumps["pose"].T
+    x, y, theta = components["pose"].T
     out["pose"][:, 0], out["pose"][:, 1] = mean(x), mean(y)
     out["pose"][:, 2] = np.arctan2(mean(np.sin(theta)), mean(np.cos(theta)))
-    off = bumps["pose"] - out["pose"][cells]
+    off = components["pose"] - out["pose"][cells]
     turned = np.arctan2(np.sin(off[:, 2]), np.cos(off[:, 2]))
-    out["sigma_m"] = np.sqrt(mean(bumps["sigma_m"] ** 2 + (off[:, 0] ** 2 + off[:, 1] ** 2) / 2.0))
-    out["sigma_rad"] = np.sqrt(mean(bumps["sigma_rad"] ** 2 + turned**2))
+    out["sigma_m"] = np.sqrt(mean(components["sigma_m"] ** 2 + (off[:, 0] ** 2 + off[:, 1] ** 2) / 2.0))
+    out["sigma_rad"] = np.sqrt(mean(components["sigma_rad"] ** 2 + turned**2))
     return out[np.argsort(-out["mass"], kind="stable")]
 
 
-def to_message(header: Header, name: str, seq: int, bumps: int, few: np.ndarray) -> Belief:
-    """The Belief of a filter after row `seq`: of as many bumps, condensed to `few`."""
+def to_message(header: Header, name: str, seq: int, components: int, few: np.ndarray) -> Belief:
+    """The Belief of a filter after row `seq`: of as many components, condensed to `few`."""
     columns = (*few["pose"].T, few["mass"], few["sigma_m"], few["sigma_rad"])
-    return Belief(header, name, seq, bumps, float(few["mass"].sum()), *(c.astype("f4") for c in columns))
+    return Belief(header, name, seq, components, float(few["mass"].sum()), *(c.astype("f4") for c in columns))

@@ -1,6 +1,6 @@
 """The file that a navigator leaves for the one that is begun after it: what its filters believed, and after which row.
 
-A line with name, version and CRC-32 of all that follows; a line of JSON (FIELDS); then the bumps of each filter in the
+A line with name, version and CRC-32 of all that follows; a line of JSON (FIELDS); then the components of each filter in the
 order of `filters`, as COMPONENT has them, little-endian. Written beside its place and renamed, so that whoever reads
 finds a whole one. It is not synced: it outlives a process that is killed, not a machine; after that it would be too
 old, and what a power cut leaves of it has another CRC.
@@ -15,12 +15,12 @@ from pathlib import Path
 
 import numpy as np
 
-from ..nav.filters import BUMPS_MOST, COMPONENT
+from ..nav.filters import COMPONENT, COMPONENTS_MOST
 from ..scene import Scene
 
 MAGIC, VERSION = b"whisker-checkpoint", 1
 LINE_MOST = 4096  # bytes of the JSON, which names filters and holds seven numbers
-SIZE_MOST = 8 * BUMPS_MOST * COMPONENT.itemsize  # bytes of a file: nobody runs more than eight filters
+SIZE_MOST = 8 * COMPONENTS_MOST * COMPONENT.itemsize  # bytes of a file: nobody runs more than eight filters
 # name: lowest and highest of a whole number
 NUMBERS = {"stream": (0, 2**32 - 1), "seq": (0, 2**63 - 1), "stamp_ns": (0, 2**62), "sent_ns": (0, 2**62)}
 FIELDS = {"scene", "pose", "filters", *NUMBERS}
@@ -66,9 +66,9 @@ def decode(data: bytes) -> Checkpoint:
         raise CheckpointError(f"version {words[1][:8].decode(errors='replace')}, this release has {VERSION}")
     if words[2] != b"%08x" % zlib.crc32(rest):
         raise CheckpointError("cut short or damaged (CRC)")
-    line, _, bumps = rest.partition(b"\n")
+    line, _, components = rest.partition(b"\n")
     head = _head(line)
-    beliefs = _beliefs(head["filters"], bumps)
+    beliefs = _beliefs(head["filters"], components)
     numbers = {name: head[name] for name in ("scene", *NUMBERS)}
     return Checkpoint(**numbers, pose=np.array(head["pose"], np.float64), beliefs=beliefs)
 
@@ -94,10 +94,10 @@ def _head(line: bytes) -> dict:
 def _beliefs(counts: object, data: bytes) -> dict[str, np.ndarray]:
     if not isinstance(counts, dict) or not counts:
         raise CheckpointError("field filters: no filter")
-    if not all(type(count) is int and 0 < count <= BUMPS_MOST for count in counts.values()):
-        raise CheckpointError(f"field filters: a number of bumps that is none from 1 to {BUMPS_MOST}")
+    if not all(type(count) is int and 0 < count <= COMPONENTS_MOST for count in counts.values()):
+        raise CheckpointError(f"field filters: a number of components that is none from 1 to {COMPONENTS_MOST}")
     if sum(counts.values()) * COMPONENT.itemsize != len(data):
-        raise CheckpointError(f"field filters: {len(data)} bytes of bumps do not fit their number")
+        raise CheckpointError(f"field filters: {len(data)} bytes of components do not fit their number")
     ends = np.cumsum(list(counts.values()))
     parts = np.split(np.frombuffer(data, COMPONENT), ends[:-1])
     return dict(zip(counts, parts, strict=True))

@@ -1,7 +1,7 @@
 """A navigator's memory beyond its own death: what it writes down, and what a new one may believe of it.
 
 The row that the new one begins with decides. From the same pilot the summed motion tells what the robot did meanwhile,
-as for any rows that were missed. Another pilot counts from its own start: for the time that nobody counted, each bump
+as for any rows that were missed. Another pilot counts from its own start: for the time that nobody counted, each component
 grows by what the robot could have done in it (`widen`). Of the rest of what a filter learns (odometry's gains, trust
 in whiskers) nothing is kept.
 """
@@ -33,7 +33,7 @@ class Memory:
         self.note = ""  # why there is nothing to go on from, or why nothing could be kept; one line
 
     def recall(self, first: Received) -> tuple[Place, dict[str, np.ndarray]] | None:
-        """The row to go on from, and bumps by filter; None: as if there had been no other navigator."""
+        """The row to go on from, and components by filter; None: as if there had been no other navigator."""
         if self._checked:
             return None
         self._checked = True
@@ -54,8 +54,8 @@ class Memory:
         if self._path is None:
             return
         row, sent = step.row, step.envelope
-        inside = {name: self._inside(bumps) for name, bumps in beliefs.items()}
-        if not all(len(bumps) for bumps in inside.values()):
+        inside = {name: self._inside(components) for name, components in beliefs.items()}
+        if not all(len(components) for components in inside.values()):
             return
         stamp = row.header.stamp.ns
         reported = Checkpoint(self._identity, sent.stream, row.seq, row.pose, stamp, sent.sent_ns, inside)
@@ -64,11 +64,11 @@ class Memory:
         except OSError as error:
             self.note = f"{self._path}: cannot be written ({error.strerror}); a navigator begun anew will know nothing"
 
-    def _inside(self, bumps: np.ndarray) -> np.ndarray:
+    def _inside(self, components: np.ndarray) -> np.ndarray:
         """Those within the arena, of widths that can be: all that a filter begins from."""
-        x, y = bumps["pose"][:, 0], bumps["pose"][:, 1]
+        x, y = components["pose"][:, 0], components["pose"][:, 1]
         size_x, size_y = self._scene.arena.size_m
-        kept = bumps[(x >= 0.0) & (x <= size_x) & (y >= 0.0) & (y <= size_y) & (bumps["mass"] > 0.0)]
+        kept = components[(x >= 0.0) & (x <= size_x) & (y >= 0.0) & (y <= size_y) & (components["mass"] > 0.0)]
         for name in ("sigma_m", "sigma_rad"):
             kept[name] = np.maximum(kept[name], FINEST)
         return kept
@@ -97,12 +97,12 @@ def _unknown_s(reported: Checkpoint, first: Received) -> float:
     return 0.0 if same else max(0.0, (age_ns - (row.seq + 1) * ROW_NS) / 1e9)
 
 
-def widen(bumps: np.ndarray, unknown_s: float) -> np.ndarray:
-    """Bumps after a time in which the robot did what nobody knows, at no more than the pilot's speeds.
+def widen(components: np.ndarray, unknown_s: float) -> np.ndarray:
+    """Components after a time in which the robot did what nobody knows, at no more than the pilot's speeds.
 
     Even over a disc of radius v t (variance (v t)^2 / 4 on each axis) and over w t to either side ((w t)^2 / 3).
     """
-    out = np.array(bumps, COMPONENT)
+    out = np.array(components, COMPONENT)
     out["sigma_m"] = np.hypot(out["sigma_m"], EXPLORE_M_S * unknown_s / 2.0)
     out["sigma_rad"] = np.hypot(out["sigma_rad"], min(TURN_RAD_S * unknown_s, np.pi) / np.sqrt(3.0))
     return out

@@ -97,7 +97,7 @@ class Belief:
     header: Header
     filter: str
     observation_seq: int
-    bumps: int
+    components: int
     mass: float
     x: np.ndarray
     y: np.ndarray

@@ -176,9 +176,9 @@ class Navigator:
         began, self._belief_due_ns = time.monotonic(), self._now_ns + BELIEF_NS
         few = {}
         for track in self._tracks:
-            bumps = track.filter.components()
-            few[track.name] = belief.condense(bumps)
-            self._beliefs.send(belief.to_message(header, track.name, step.row.seq, len(bumps), few[track.name]))
+            components = track.filter.components()
+            few[track.name] = belief.condense(components)
+            self._beliefs.send(belief.to_message(header, track.name, step.row.seq, len(components), few[track.name]))
         self._memory.keep(step, few)
         now = time.monotonic()
         self._belief_rest_s = now + (now - began) / BELIEF_SHARE

@@ -16,7 +16,7 @@ COUNT_MOST = 2**63 - 1
 NAME_MOST, TEXT_MOST = 128, 4096  # characters
 CELLS_MOST = 512  # of a row: whiskers times textures
 COUNTERS_MOST = 256
-BUMPS_MOST = 2000  # of a Belief
+COMPONENTS_MOST = 2000  # of a Belief
 SHARE_MOST = 1.01  # of a share of a belief, with room for rounding
 
 
@@ -109,14 +109,14 @@ _TABLE = {
         "header": INNER,
         "filter": NAME,
         "observation_seq": COUNTER,
-        "bumps": up_to(2**31),
+        "components": up_to(2**31),
         "mass": up_to(SHARE_MOST),
-        "x": about(FAR_M, count=BUMPS_MOST),
-        "y": about(FAR_M, count=BUMPS_MOST),
-        "theta": about(TURNED_RAD, count=BUMPS_MOST),
-        "weight": up_to(SHARE_MOST, count=BUMPS_MOST),
-        "sigma_m": up_to(FAR_M, count=BUMPS_MOST),
-        "sigma_rad": up_to(TURNED_RAD, count=BUMPS_MOST),
+        "x": about(FAR_M, count=COMPONENTS_MOST),
+        "y": about(FAR_M, count=COMPONENTS_MOST),
+        "theta": about(TURNED_RAD, count=COMPONENTS_MOST),
+        "weight": up_to(SHARE_MOST, count=COMPONENTS_MOST),
+        "sigma_m": up_to(FAR_M, count=COMPONENTS_MOST),
+        "sigma_rad": up_to(TURNED_RAD, count=COMPONENTS_MOST),
     },
     "whisker_msgs/msg/ProcessHealth": {
         "header": INNER,

@@ -23,14 +23,14 @@ class Track:
         out: Path | None,
         stack: ExitStack,
         resumed: bool = False,
-        bumps: np.ndarray | None = None,
+        components: np.ndarray | None = None,
         normals: bool = False,
     ):
         """`out`: the folder of the files, which `stack` closes; None: no files. resumed: go on behind what they hold.
 
-        bumps: what is believed already, in place of the scene's prior. normals: as Filter has it.
+        components: what is believed already, in place of the scene's prior. normals: as Filter has it.
         """
-        self.name, self.filter = name, localise.Filter(name, scene, bumps=bumps, normals=normals)
+        self.name, self.filter = name, localise.Filter(name, scene, components=components, normals=normals)
         self._poses = self._covariances = None
         if out is not None:
             self._poses, self._covariances = (

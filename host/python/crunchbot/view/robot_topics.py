@@ -121,7 +121,7 @@ class BeliefFeed:
             return None
         self._told, self._due = belief, now + BELIEF_S
         poses = self._model.belief_columns()
-        head = BELIEF_HEAD.pack(BELIEF_ID, 0, len(poses), belief.bumps, belief.header.stamp.ns / 1e9, belief.mass)
+        head = BELIEF_HEAD.pack(BELIEF_ID, 0, len(poses), belief.components, belief.header.stamp.ns / 1e9, belief.mass)
         return head + poses.tobytes()
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""What every registered filter owes whoever judges it: bumps whose masses sum to 1, and no certainty out of nothing."""
+"""What every registered filter owes whoever judges it: components whose masses sum to 1, and no certainty out of nothing."""
 
 import numpy as np
 import pytest
@@ -19,9 +19,9 @@ def test_masses_sum_to_one(name, made):
     running = localise.Filter(name, made.scene, seed=3)
     for first in range(0, ROWS, 20):
         running.replay(made.observations, first, 20)
-        bumps = running.components()
-        assert bumps["mass"].sum() == pytest.approx(1.0, abs=1e-3)
-        assert (bumps["mass"] >= 0.0).all() and np.isfinite(bumps["pose"]).all()
+        components = running.components()
+        assert components["mass"].sum() == pytest.approx(1.0, abs=1e-3)
+        assert (components["mass"] >= 0.0).all() and np.isfinite(components["pose"]).all()
         assert running.bins().sum() == pytest.approx(1.0, abs=1e-3)
 
 

@@ -1,19 +1,24 @@
-"""Mutated checkpoints: whatever a file holds, decoding it gives bumps of the number it says, or the one-line error."""
+"""Mutated checkpoints: whatever a file holds, decoding it gives components of the number it says, or the one-line error."""
 
 import zlib
 
 import numpy as np
 from mutate import mutate
 
-from crunchbot.nav.filters import BUMPS_MOST, COMPONENT
+from crunchbot.nav.filters import COMPONENT, COMPONENTS_MOST
 from crunchbot.robot.checkpoint import Checkpoint, CheckpointError, decode, encode
 
 
 def seed_file() -> bytes:
     """A small checkpoint of two filters."""
-    bumps = np.zeros(3, COMPONENT)
-    bumps["pose"], bumps["sigma_m"], bumps["sigma_rad"], bumps["mass"] = [1.0, 2.0, 0.5], 0.1, 0.2, 1.0
-    beliefs = {"grid": bumps, "adaptive": bumps[:2]}
+    components = np.zeros(3, COMPONENT)
+    components["pose"], components["sigma_m"], components["sigma_rad"], components["mass"] = (
+        [1.0, 2.0, 0.5],
+        0.1,
+        0.2,
+        1.0,
+    )
+    beliefs = {"grid": components, "adaptive": components[:2]}
     return encode(Checkpoint("arena", 7, 9, np.array([0.5, 0.25, 1.0]), 10**9, 10**18, beliefs))
 
 
@@ -35,6 +40,6 @@ def fuzz(inputs: int, seed: int) -> dict[str, int]:
             assert "\n" not in str(error)
             refused += 1
         else:
-            assert all(0 < len(b) <= BUMPS_MOST and b.dtype == COMPONENT for b in reported.beliefs.values())
+            assert all(0 < len(b) <= COMPONENTS_MOST and b.dtype == COMPONENT for b in reported.beliefs.values())
             assert np.isfinite(reported.pose).all() and encode(reported)
     return {"refused in one line": refused}

@@ -20,7 +20,7 @@ def examples() -> dict[str, object]:
     pose = m.PoseWithCovariance.planar((1.0, -2.0, 3.0), planar @ planar.T)
     velocity = m.Twist(m.Vector3(0.1, 0.2, 0.3), m.Vector3(0.4, 0.5, 0.6))
     twist = m.TwistWithCovariance(velocity, (full @ full.T).ravel())
-    bumps = [rng.random(7).astype("f4") for _ in range(6)]
+    components = [rng.random(7).astype("f4") for _ in range(6)]
     return {
         "observation": m.Observation(
             at, 7, m.RELEASE, rng.random(3), rng.random(3), ["l_carpet", "r_mm", "é"], [0, 1, 2], [0.0, 0.0, -3.5]
@@ -31,7 +31,7 @@ def examples() -> dict[str, object]:
         "behaviour": m.Behaviour(at, "forward", m.Time.of(10**10 + 1), "clear"),
         "pose": m.PoseWithCovarianceStamped(at, pose),
         "localisation": m.Localisation(at, "grid", pose, 0.75, 2**40, 2, 3, 4, 5, "uniform"),
-        "belief": m.Belief(at, "grid", 9, 8, 0.875, *bumps),
+        "belief": m.Belief(at, "grid", 9, 8, 0.875, *components),
         "truth": m.PoseStamped(at, m.Pose.planar(0.5, 0.25, -1.0)),
         "health/pilot": m.ProcessHealth(at, "pilot", 4321, "running", [m.KeyValue("rows", "7")], "none yet"),
     }

@@ -31,11 +31,11 @@ def made():
     return made.scene, to_rows(made.observations, made.scene)
 
 
-def bumps_at(x: float, y: float, count: int = 3) -> np.ndarray:
-    bumps = np.zeros(count, COMPONENT)
-    bumps["pose"] = [x, y, 0.5]
-    bumps["sigma_m"], bumps["sigma_rad"], bumps["mass"] = 0.02, 0.05, np.arange(1, count + 1)
-    return bumps
+def components_at(x: float, y: float, count: int = 3) -> np.ndarray:
+    components = np.zeros(count, COMPONENT)
+    components["pose"] = [x, y, 0.5]
+    components["sigma_m"], components["sigma_rad"], components["mass"] = 0.02, 0.05, np.arange(1, count + 1)
+    return components
 
 
 def received(rows, stream: int = 7, sent_from_ns: int = 10**18) -> list[Received]:
@@ -56,7 +56,7 @@ def kept(tmp_path, scene, row: Received, names=NAMES):
     """The file of a navigator that was killed after this row."""
     path = tmp_path / "navigator.checkpoint"
     x, y = np.array(scene.arena.size_m) / 2.0
-    Memory(path, scene, names).keep(step_of(row), {name: bumps_at(x, y) for name in names})
+    Memory(path, scene, names).keep(step_of(row), {name: components_at(x, y) for name in names})
     return path
 
 
@@ -69,31 +69,31 @@ def test_what_is_kept_comes_back(made, tmp_path):
     assert (reported.stream, reported.seq, reported.stamp_ns) == (7, 9, row.message.header.stamp.ns)
     assert (reported.sent_ns, reported.scene) == (row.envelope.sent_ns, checkpoint.identity(scene))
     assert list(reported.pose) == list(row.message.pose) and list(reported.beliefs) == list(NAMES)
-    for bumps in reported.beliefs.values():
-        assert bumps.dtype == COMPONENT and bumps["mass"].tolist() == [1.0, 2.0, 3.0]
+    for components in reported.beliefs.values():
+        assert components.dtype == COMPONENT and components["mass"].tolist() == [1.0, 2.0, 3.0]
     assert checkpoint.encode(reported) == path.read_bytes()
 
 
 def test_what_no_filter_could_begin_from_is_not_kept(made, tmp_path):
     scene, rows = made
-    path, bumps = tmp_path / "file", bumps_at(0.5, 0.5, 5)
-    bumps["pose"][0, 0], bumps["pose"][1, 1], bumps["mass"][2] = -0.01, scene.arena.size_m[1] + 0.01, 0.0
-    bumps["sigma_m"][3] = bumps["sigma_rad"][3] = 0.0
+    path, components = tmp_path / "file", components_at(0.5, 0.5, 5)
+    components["pose"][0, 0], components["pose"][1, 1], components["mass"][2] = -0.01, scene.arena.size_m[1] + 0.01, 0.0
+    components["sigma_m"][3] = components["sigma_rad"][3] = 0.0
     memory, row = Memory(path, scene, ("grid",)), step_of(received(rows)[0])
-    memory.keep(row, {"grid": bumps[:3]})
+    memory.keep(row, {"grid": components[:3]})
     assert not path.exists()
-    memory.keep(row, {"grid": bumps})
+    memory.keep(row, {"grid": components})
     left = checkpoint.load(path).beliefs["grid"]
     assert left["mass"].tolist() == [4.0, 5.0] and not filters.prior_fault(scene, left)
 
 
-def forged(change, bumps: bytes | None = None) -> bytes:
+def forged(change, components: bytes | None = None) -> bytes:
     """A checkpoint whose JSON `change` has had in hand, with the right CRC."""
     rest = seed_file().partition(b"\n")[2]
     line, _, body = rest.partition(b"\n")
     head = json.loads(line)
     line = change(head)
-    rest = (json.dumps(head).encode() if line is None else line) + b"\n" + (body if bumps is None else bumps)
+    rest = (json.dumps(head).encode() if line is None else line) + b"\n" + (body if components is None else components)
     return b"whisker-checkpoint 1 %08x\n" % zlib.crc32(rest) + rest
 
 
@@ -146,18 +146,18 @@ def test_a_filter_begins_from_what_a_filter_listed(made):
         before = Filter(name, scene)
         for row in rows[:20]:
             reported = before.step(row)
-        after = Filter(name, scene, bumps=belief.condense(before.components()))
+        after = Filter(name, scene, components=belief.condense(before.components()))
         listed = after.components()
         weight = listed["mass"] / listed["mass"].sum()
         off = np.hypot(*(listed["pose"][:, :2] - reported.pose[:2]).T)
         assert float(weight @ (off < 0.3).astype(float)) > 0.6, name
-    for field, value, why in (("mass", -1.0, "bump 1: its mass"), ("sigma_m", 0.0, "bump 1: its width")):
-        bad = bumps_at(0.5, 0.5)
+    for field, value, why in (("mass", -1.0, "component 1: its mass"), ("sigma_m", 0.0, "component 1: its width")):
+        bad = components_at(0.5, 0.5)
         bad[field][1] = value
         with pytest.raises(SettingError, match=why):
-            Filter("grid", scene, bumps=bad)
-    with pytest.raises(SettingError, match="no bumps"):
-        Filter("grid", scene, bumps=bumps_at(0.5, 0.5)[:0])
+            Filter("grid", scene, components=bad)
+    with pytest.raises(SettingError, match="no components"):
+        Filter("grid", scene, components=components_at(0.5, 0.5)[:0])
 
 
 def test_from_the_same_pilot_the_belief_is_taken_as_it_was(made, tmp_path):
@@ -223,7 +223,7 @@ def test_what_cannot_be_gone_on_from_is_said_in_one_line(made, tmp_path):
     assert Memory(path, scene, NAMES).recall(later(sent[9], AGE_MOST_S - 1.0))
 
 
-def test_bumps_that_are_no_prior_are_not_gone_on_from(made, tmp_path):
+def test_components_that_are_no_prior_are_not_gone_on_from(made, tmp_path):
     scene, rows = made
     sent = received(rows)
     path = kept(tmp_path, scene, sent[9], ("grid",))
@@ -232,7 +232,7 @@ def test_bumps_that_are_no_prior_are_not_gone_on_from(made, tmp_path):
     bad["mass"][1] = np.nan
     checkpoint.save(path, Checkpoint(**{**vars(reported), "beliefs": {"grid": bad}}))
     memory = Memory(path, scene, ("grid",))
-    assert memory.recall(sent[30]) is None and "grid: bump 1: its mass" in memory.note
+    assert memory.recall(sent[30]) is None and "grid: component 1: its mass" in memory.note
 
 
 def test_no_file_is_no_fault_and_no_path_no_memory(made, tmp_path):
@@ -244,7 +244,7 @@ def test_no_file_is_no_fault_and_no_path_no_memory(made, tmp_path):
     memory = Memory(tmp_path, scene, NAMES)  # a folder
     assert memory.recall(sent[3]) is None and "cannot be read" in memory.note
     memory = Memory(tmp_path / "no" / "file", scene, ("grid",))
-    memory.keep(step_of(sent[3]), {"grid": bumps_at(0.5, 0.5)})
+    memory.keep(step_of(sent[3]), {"grid": components_at(0.5, 0.5)})
     assert "cannot be written" in memory.note and "\n" not in memory.note
 
 

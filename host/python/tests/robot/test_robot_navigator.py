@@ -25,7 +25,7 @@ from crunchbot.robot import messages as m
 from crunchbot.robot.inbox import encoding_of
 from crunchbot.robot.link import Link
 from crunchbot.robot.navigator import Navigator, Settings
-from crunchbot.robot.ranges import BUMPS_MOST
+from crunchbot.robot.ranges import COMPONENTS_MOST
 from crunchbot.robot.rows import RowPublisher, to_message
 
 PATIENCE_S = 60.0
@@ -107,7 +107,7 @@ def test_in_lock_step_the_process_gives_what_localise_gives(made, tmp_path):
     assert {b.filter for b in beliefs} == set(filters) and [b.observation_seq for b in beliefs][::2] == list(
         range(0, ROWS, 5)
     )
-    assert all(0.998 < b.mass < 1.001 and len(b.x) <= BUMPS_MOST for b in beliefs)
+    assert all(0.998 < b.mass < 1.001 and len(b.x) <= COMPONENTS_MOST for b in beliefs)
     assert {r.message.reason for r in got if r.over} == {"enough"}
     report = json.loads((tmp_path / "report.json").read_text())
     assert (report["weighed"], report["skipped"], report["missed"], report["bad_cells"]) == (ROWS, 0, 0, 0)
@@ -390,14 +390,14 @@ def test_a_navigator_that_stays_goes_on_with_the_next_run(made):
 
 def test_condensed_beliefs_keep_mass_place_and_width():
     rng = np.random.default_rng(8)
-    bumps = np.zeros(30_000, COMPONENT)
-    bumps["pose"] = rng.normal([1.0, 2.0, 3.1], [0.3, 0.1, 0.2], (len(bumps), 3))
-    bumps["sigma_m"], bumps["sigma_rad"], bumps["mass"] = 0.01, 0.02, rng.random(len(bumps))
-    bumps["mass"] /= bumps["mass"].sum()
-    few = belief.condense(bumps)
-    assert 100 < len(few) <= BUMPS_MOST and np.all(np.diff(few["mass"]) <= 0.0)
+    components = np.zeros(30_000, COMPONENT)
+    components["pose"] = rng.normal([1.0, 2.0, 3.1], [0.3, 0.1, 0.2], (len(components), 3))
+    components["sigma_m"], components["sigma_rad"], components["mass"] = 0.01, 0.02, rng.random(len(components))
+    components["mass"] /= components["mass"].sum()
+    few = belief.condense(components)
+    assert 100 < len(few) <= COMPONENTS_MOST and np.all(np.diff(few["mass"]) <= 0.0)
     assert few["mass"].sum() == pytest.approx(1.0, abs=belief.NEGLECTED)
-    for one in (bumps, few):
+    for one in (components, few):
         weight = one["mass"] / one["mass"].sum()
         mean = weight @ one["pose"][:, :2]
         assert mean == pytest.approx([1.0, 2.0], abs=0.01)
@@ -408,38 +408,38 @@ def test_condensed_beliefs_keep_mass_place_and_width():
 
 
 def test_a_belief_of_everywhere_keeps_its_width():
-    bumps = np.zeros(20_000, COMPONENT)
-    bumps["pose"] = np.random.default_rng(2).uniform([0.0, 0.0, -np.pi], [6.0, 6.0, np.pi], (len(bumps), 3))
-    bumps["mass"] = 1.0 / len(bumps)
-    few = belief.condense(bumps)
+    components = np.zeros(20_000, COMPONENT)
+    components["pose"] = np.random.default_rng(2).uniform([0.0, 0.0, -np.pi], [6.0, 6.0, np.pi], (len(components), 3))
+    components["mass"] = 1.0 / len(components)
+    few = belief.condense(components)
     share = few["mass"] / few["mass"].sum()
     off = few["pose"][:, :2] - share @ few["pose"][:, :2]
     width = share @ ((off**2).sum(1) / 2.0 + few["sigma_m"] ** 2)
-    assert width == pytest.approx(bumps["pose"][:, :2].var(axis=0).mean(), rel=2e-3)
+    assert width == pytest.approx(components["pose"][:, :2].var(axis=0).mean(), rel=2e-3)
     assert 0.05 < np.median(few["sigma_m"]) < 0.4 and 0.02 < np.median(few["sigma_rad"]) < 1.0
 
 
 def test_small_beliefs_are_sent_as_they_are():
-    bumps = np.zeros(3, COMPONENT)
-    bumps["pose"], bumps["mass"] = [[1, 2, 3], [4, 5, 6], [7, 8, 9]], [0.2, 0.5, 0.3]
-    reported = belief.to_message(m.Header(), "grid", 4, len(bumps), belief.condense(bumps))
+    components = np.zeros(3, COMPONENT)
+    components["pose"], components["mass"] = [[1, 2, 3], [4, 5, 6], [7, 8, 9]], [0.2, 0.5, 0.3]
+    reported = belief.to_message(m.Header(), "grid", 4, len(components), belief.condense(components))
     assert (
         list(reported.x) == [4, 7, 1]
         and list(reported.theta) == [6, 9, 3]
-        and (reported.bumps, reported.mass) == (3, 1.0)
+        and (reported.components, reported.mass) == (3, 1.0)
     )
-    empty = belief.to_message(m.Header(), "grid", 4, 0, belief.condense(bumps[:0]))
-    assert (len(empty.x), empty.bumps, empty.mass) == (0, 0, 0.0)
+    empty = belief.to_message(m.Header(), "grid", 4, 0, belief.condense(components[:0]))
+    assert (len(empty.x), empty.components, empty.mass) == (0, 0, 0.0)
 
 
 def test_two_hypotheses_stay_two():
-    bumps = np.zeros(20_000, COMPONENT)
-    bumps["pose"] = np.random.default_rng(1).normal(0.0, 0.05, (20_000, 3))
-    bumps["pose"][::2] += [1.0, 0.0, np.pi]
-    bumps["mass"] = 1.0 / len(bumps)
-    few = belief.condense(bumps)
+    components = np.zeros(20_000, COMPONENT)
+    components["pose"] = np.random.default_rng(1).normal(0.0, 0.05, (20_000, 3))
+    components["pose"][::2] += [1.0, 0.0, np.pi]
+    components["mass"] = 1.0 / len(components)
+    few = belief.condense(components)
     near = np.abs(np.sin(few["pose"][:, 2] / 2.0)) < 0.5
-    assert few["mass"][near].sum() == pytest.approx(0.5, abs=1e-3) and len(few) <= BUMPS_MOST
+    assert few["mass"][near].sum() == pytest.approx(0.5, abs=1e-3) and len(few) <= COMPONENTS_MOST
 
 
 def test_health_is_told_at_once_when_the_state_is_new(monkeypatch):

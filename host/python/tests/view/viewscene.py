@@ -47,8 +47,8 @@ class SceneRun:
         reported.append(("truth", m.PoseStamped(at("arena"), m.Pose.planar(*self._rows.truth[row]))))
         reported += [("contact", contact) for ray in range(len(self._rays)) for contact in self._contact(row, ray)]
         if row % 5 == 0:
-            bumps = self._filter.components()
-            reported.append(("belief", to_message(at("arena"), FILTER, row, len(bumps), condense(bumps))))
+            components = self._filter.components()
+            reported.append(("belief", to_message(at("arena"), FILTER, row, len(components), condense(components))))
         if row % 10 == 0:
             counts = [m.KeyValue("rows", str(row)), m.KeyValue("states", str(estimate[0]["states"]))]
             reported.append(("health/pilot", m.ProcessHealth(at(), "pilot", 4005, "running", counts[:1])))

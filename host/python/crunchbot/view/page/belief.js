@@ -170,7 +170,7 @@ class Belief {
 const keyOf = (i, j, sector) => ((i + HALF) * 2 * HALF + (j + HALF)) * SECTORS + sector;
 const placeOf = (key) => [Math.floor(key / SECTORS / (2 * HALF)) - HALF, (Math.floor(key / SECTORS) % (2 * HALF)) - HALF, key % SECTORS];
 
-/* How a bump of this width shares out over steps around its own, at most so many to either side. */
+/* How a component of this width shares out over steps around its own, at most so many to either side. */
 const BELLS = new Map();
 function bell(sigma, step, most) {
   const tenths = Math.round((10 * sigma) / step);
