@@ -30,7 +30,8 @@ static void daemon_nodes_log_node(int lane, const struct whisker_node *node, cou
     size_t used = 0;
     for (uint8_t i = 0; i < WHISKER_HEALTH_COUNT; i++) {
         if (c[i][lane] > 0 && used < sizeof reported) {
-            used += (size_t)snprintf(reported + used, sizeof reported - used, ", %s %u", flash_health_name(i), c[i][lane]);
+            used +=
+                (size_t)snprintf(reported + used, sizeof reported - used, ", %s %u", flash_health_name(i), c[i][lane]);
         }
     }
     daemon_log(LOG_NOTE, "lane %d: serial %s, version %u.%u, wire %u, %s%s", lane,

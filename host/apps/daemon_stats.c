@@ -42,7 +42,8 @@ void daemon_stats_connected(struct daemon_stats *stats, struct daemon_source *so
     reported->wire_version = identity->wire_version;
     reported->gateware = identity->gateware;
     memcpy(reported->serial, about->serial, sizeof reported->serial);
-    snprintf(reported->firmware, sizeof reported->firmware, "gateware %u, wire %u", identity->gateware, identity->wire_version);
+    snprintf(reported->firmware, sizeof reported->firmware, "gateware %u, wire %u", identity->gateware,
+             identity->wire_version);
 }
 
 void daemon_stats_lost(struct daemon_stats *stats, bool was_connected, int error)
@@ -93,7 +94,8 @@ void daemon_stats_frame(struct daemon_stats *stats, struct daemon_source *source
 void daemon_stats_settle_begin(struct daemon_stats *stats)
 {
     struct whisker_daemon_stats *reported = &stats->reported;
-    reported->frames = reported->frames_damaged = reported->frames_dropped = reported->bytes_skipped = reported->records_usb = 0;
+    reported->frames = reported->frames_damaged = reported->frames_dropped = reported->bytes_skipped =
+        reported->records_usb = 0;
 }
 
 void daemon_stats_settle(struct daemon_stats *stats, const struct daemon_source *source)
@@ -110,7 +112,8 @@ void daemon_stats_settle(struct daemon_stats *stats, const struct daemon_source 
 void daemon_stats_settle_end(struct daemon_stats *stats, const struct whisker_clock_fit *clock)
 {
     struct whisker_daemon_stats *reported = &stats->reported;
-    reported->records_crc = stats->records_link_crc > reported->records_usb ? stats->records_link_crc - reported->records_usb : 0;
+    reported->records_crc =
+        stats->records_link_crc > reported->records_usb ? stats->records_link_crc - reported->records_usb : 0;
     reported->clock_restarts = clock->restarts;
 }
 
@@ -121,7 +124,7 @@ void daemon_stats_log(const struct whisker_daemon_stats *reported)
                " with damaged records, %" PRIu64 " bytes skipped; records: %" PRIu64 " absent, %" PRIu64
                " crc, %" PRIu64 " tick, %" PRIu64 " sensor, %" PRIu64 " usb; %" PRIu64 " reconnects, %" PRIu64
                " usb errors",
-               reported->frames, reported->frames_missing, reported->frames_dropped, reported->frames_damaged, reported->bytes_skipped,
-               reported->records_absent, reported->records_crc, reported->records_tick, reported->records_sensor, reported->records_usb,
-               reported->reconnects, reported->usb_errors);
+               reported->frames, reported->frames_missing, reported->frames_dropped, reported->frames_damaged,
+               reported->bytes_skipped, reported->records_absent, reported->records_crc, reported->records_tick,
+               reported->records_sensor, reported->records_usb, reported->reconnects, reported->usb_errors);
 }

@@ -22,7 +22,7 @@ struct base_sleep {
     int lock;           /* of logind; -1: none */
     bool asked;         /* a lock was asked for, and logind has not answered */
     bool about_to;      /* as on_sleep was told last */
-    bool reported;          /* that there is no lock */
+    bool reported;      /* that there is no lock */
     int64_t tried_ms;   /* when bus or lock were asked for last */
 };
 

@@ -19,7 +19,7 @@ extern const unsigned UPDATE_CUT_CASE_COUNT;
 
 struct update_cut_outcome {
     enum update_fate fate;
-    bool reported;      /* the first record after the cut is one that nobody drives */
+    bool reported;  /* the first record after the cut is one that nobody drives */
     unsigned ticks; /* from the supply's return to the first record that is good, or says that the loader runs */
     bool again;     /* a second update then succeeded, and its image gave good records */
 };

@@ -5,7 +5,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 TEXT = {".c", ".h", ".cpp", ".hpp", ".cc", ".py", ".v", ".vh", ".js", ".css", ".html", ".md", ".sh", ".toml", ".txt"}
-TEXT |= {".cmake", ".in", ".msg", ".rules", ".conf", ".rs", ".pml", ".yml", ".yaml", ".json"}
+TEXT |= {".cmake", ".in", ".msg", ".rules", ".conf", ".rs", ".pml", ".yml", ".yaml", ".json", "Makefile"}
 # What a tool or another program wrote: its words and layout are not ours.
 GENERATED = ("protocol/gen/", "bench/results/", "firmware/images/", "requirements.lock")
 
@@ -17,11 +17,11 @@ def tracked(root: Path = ROOT) -> list[str]:
 
 
 def written(root: Path = ROOT, suffixes: set[str] = TEXT) -> list[str]:
-    """Tracked text files with one of the suffixes that people write, and Makefile."""
+    """Tracked text files with one of the suffixes that people write."""
     return [
         path
         for path in tracked(root)
-        if (Path(path).suffix in suffixes or Path(path).name == "Makefile") and not path.startswith(GENERATED)
+        if (Path(path).suffix or Path(path).name) in suffixes and not path.startswith(GENERATED)
     ]
 
 

@@ -165,7 +165,8 @@ static void a_host_clock_that_goes_back_is_told_and_nothing_is_lost(void **state
     static const char *const clocks[] = {"realtime", "monotonic"};
     for (size_t i = 0; i < 2; i++) {
         assert_int_equal(finish(start(with_fake(clocks[i]))), 0);
-        const char *reported = strstr(content("out"), "whiskerd: clock: the host's clock was set or went backwards; none");
+        const char *reported =
+            strstr(content("out"), "whiskerd: clock: the host's clock was set or went backwards; none");
         assert_non_null(reported);
         assert_null(strstr(strchr(reported, '\n'), "clock:")); /* once */
         assert_non_null(strstr(reported, "whiskerd: 4001 frames published, 0 missing"));
@@ -453,7 +454,8 @@ static void log_ends_at_a_head_that_cannot_be(void **state)
     (void)state;
     char path[128], reported[256];
     snprintf(path, sizeof path, "%s/socket", folder);
-    snprintf(reported, sizeof reported, "%s: another process has changed the ring's memory; start whiskerd again", ring_name());
+    snprintf(reported, sizeof reported, "%s: another process has changed the ring's memory; start whiskerd again",
+             ring_name());
     for (size_t i = 0; i < sizeof forged / sizeof forged[0]; i++) {
         unlink(path);
         const int listening = listen_at(path);

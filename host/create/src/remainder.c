@@ -53,7 +53,8 @@ static struct chances remainder_if_dropped(double least, double most, double rep
 static void remainder_weigh(struct create_evidence *evidence, double asked, double reported)
 {
     const double least = asked * (1 - ODOMETRY_SPREAD), most = asked * (1 + ODOMETRY_SPREAD);
-    const struct chances kept = remainder_if_kept(least, most, reported), dropped = remainder_if_dropped(least, most, reported);
+    const struct chances kept = remainder_if_kept(least, most, reported),
+                         dropped = remainder_if_dropped(least, most, reported);
     if (reported > 0) {
         evidence->against_kept = fmax(0, evidence->against_kept + log(dropped.average / kept.best));
     }

@@ -307,7 +307,7 @@ static int attach_and_create_elsewhere(const char *name)
         return EXIT_FAILURE;
     }
     const bool reported = whisker_reader_attach(name, 0, &reader) == WHISKER_ERROR_RING_ACCESS &&
-                      whisker_ring_create(name, TEST_CAPACITY, &ring) == WHISKER_ERROR_RING_ACCESS;
+                          whisker_ring_create(name, TEST_CAPACITY, &ring) == WHISKER_ERROR_RING_ACCESS;
     return reported ? EXIT_SUCCESS : EXIT_FAILURE;
 }
 

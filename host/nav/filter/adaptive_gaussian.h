@@ -13,12 +13,12 @@
 
 struct adaptive_gaussian {
     struct nav_kalman kalman;
-    bool carries;  /* it is all that is held of the robot's place */
-    double reported;   /* nats that the last rows told, fading */
-    double wider;  /* log-ratio of rows by the wider Gaussian and by this one; at least 0 (Page's test) */
-    double behind; /* log-ratio of rows by the particles and by this one, since the comparison began */
-    int compared;  /* rows since then, below 0 until the next; 0: none is under way */
-    long looked;   /* expected observations worked out for the last row */
+    bool carries;    /* it is all that is held of the robot's place */
+    double reported; /* nats that the last rows told, fading */
+    double wider;    /* log-ratio of rows by the wider Gaussian and by this one; at least 0 (Page's test) */
+    double behind;   /* log-ratio of rows by the particles and by this one, since the comparison began */
+    int compared;    /* rows since then, below 0 until the next; 0: none is under way */
+    long looked;     /* expected observations worked out for the last row */
 };
 
 /* 0, or -1 without memory; adaptive_gaussian_free either way. The likelihood is the filter's own. */

@@ -11,7 +11,7 @@ struct drawn_whisk {
     double peak;     /* along the first two axes as 0.6, -0.8; of one axis as 1 */
     double noise;    /* amplitude of a deterministic jitter */
     double rate;     /* commanded, rad/s; 0: not known */
-    double reported;     /* reported, rad/s; 0: not known */
+    double reported; /* reported, rad/s; 0: not known */
     int bad_every;   /* every so many samples a wild one; 0: none */
     int nan_every;   /* every so many samples a NAN; 0: none */
     double frozen_s; /* from here on the sample does not change; 0: never */

@@ -22,7 +22,7 @@ struct nav_shape {
     double peak;      /* deflection at stop_s, in the unit of the channels */
     double raw_peak;  /* largest mean deflection of a bin */
     double turn;      /* commanded angle from onset to stop, rad (seconds where no rate is known) */
-    double reported;      /* the same of the rate that the base reports */
+    double reported;  /* the same of the rate that the base reports */
     double slope;     /* of the push, per second */
     double bow;       /* change of slope over the push as a share of the slope: creep, large deflection */
     double back;      /* ln of (release - stop)/(stop - onset); NAN without a release */

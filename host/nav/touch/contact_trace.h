@@ -13,7 +13,7 @@ enum { NAV_TRACE_BINS = 128, NAV_TRACE_AXES = 8, NAV_TRACE_MEDIAN = 5 };
 struct nav_trace_point {
     double t_s;
     double turn;               /* commanded angle turned since the first sample, rad; seconds where no rate is known */
-    double reported;               /* the same of the rate the base reports */
+    double reported;           /* the same of the rate the base reports */
     double at[NAV_TRACE_AXES]; /* channels, any unit */
 };
 

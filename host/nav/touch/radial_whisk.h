@@ -16,10 +16,10 @@
 
 /* cffi: begin */
 enum nav_whisk_term {
-    NAV_WHISK_TURN, /* ln of the commanded angle of the push, rad; of its seconds where no rate is known */
-    NAV_WHISK_RATE, /* ln of the commanded rate, rad/s; 0 where it is not known */
+    NAV_WHISK_TURN,     /* ln of the commanded angle of the push, rad; of its seconds where no rate is known */
+    NAV_WHISK_RATE,     /* ln of the commanded rate, rad/s; 0 where it is not known */
     NAV_WHISK_REPORTED, /* ln of reported over commanded angle; 0 where nothing is reported */
-    NAV_WHISK_BOW,  /* see struct nav_shape */
+    NAV_WHISK_BOW,      /* see struct nav_shape */
     NAV_WHISK_BACK,
     NAV_WHISK_TERMS
 };

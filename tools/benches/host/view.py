@@ -100,8 +100,13 @@ def robot_messages(row: int, rng: np.random.Generator) -> list[tuple[str, object
         ("truth", PoseStamped(header, Pose.planar(*pose))),
     ]
     if row % (ROWS_HZ // BELIEFS_HZ) == 0:
-        columns = rng.normal(1.0, 0.3, (3, COMPONENTS_MOST)), np.full((3, COMPONENTS_MOST), [[1 / COMPONENTS_MOST], [0.02], [0.05]])
-        told.append(("belief", Belief(header, "adaptive", row, COMPONENTS_MOST, 1.0, *np.concatenate(columns).astype("f4"))))
+        columns = (
+            rng.normal(1.0, 0.3, (3, COMPONENTS_MOST)),
+            np.full((3, COMPONENTS_MOST), [[1 / COMPONENTS_MOST], [0.02], [0.05]]),
+        )
+        told.append(
+            ("belief", Belief(header, "adaptive", row, COMPONENTS_MOST, 1.0, *np.concatenate(columns).astype("f4")))
+        )
     if row % ROWS_HZ == 0:
         told.append(("health/bench", ProcessHealth(header, "bench", os.getpid(), "running")))
     return told
@@ -232,7 +237,12 @@ def run(build: Path, fresh: bool) -> None:
         if not path.exists():
             path.write_text(json.dumps(measure(part, pages)))
     runs = {part: [json.loads(paths[part, pages].read_text()) for pages in PAGES] for part in PARTS}
-    found = {"lanes": LANES, "hz": HZ, "runs": runs["traces"], "robot": {"poses": COMPONENTS_MOST, "runs": runs["robot"]}}
+    found = {
+        "lanes": LANES,
+        "hz": HZ,
+        "runs": runs["traces"],
+        "robot": {"poses": COMPONENTS_MOST, "runs": runs["robot"]},
+    }
     store.write_result("view", found)
     store.write_chart("view_cost", figures.svg(draw, runs))
     print("bench/results/view.json, docs/charts/view_cost.svg")
