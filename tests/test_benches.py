@@ -35,7 +35,7 @@ def test_run_takes_a_build_and_fresh_and_all_its_options(topic):
 
 
 def test_every_module_with_a_run_is_a_topic():
-    with_run = {p for p in BENCHES.glob("*/*.py") if "run" in functions(p)}
+    with_run = {p for p in [*BENCHES.glob("*.py"), *BENCHES.glob("*/*.py")] if "run" in functions(p)}
     assert with_run == {module_of(topic) for topic in TOPICS}
 
 
@@ -58,11 +58,12 @@ def test_a_topic_that_is_not_there_is_named():
 
 def test_a_part_of_the_robot_measured_alone_leaves_the_others_as_published(monkeypatch, tmp_path):
     monkeypatch.syspath_prepend(str(ROOT / "tools"))
+    from benches.markdown import wrap
     from benches.robot import bench, page
 
     monkeypatch.setattr(bench, "CACHE", tmp_path)
     before = bench.gather()
-    assert page.page(before) == (ROOT / "docs/results/robot.md").read_text()
+    assert wrap(page.page(before)) == (ROOT / "docs/results/robot.md").read_text()
     (tmp_path / "instructions.json").write_text(json.dumps(before["latency"]))
     after = bench.gather()
     assert after.pop("instructions") == before["latency"] and after.items() <= before.items()
@@ -100,3 +101,73 @@ def test_a_result_is_stored_with_commit_and_machine(monkeypatch, tmp_path):
     assert list(origins) == ["another", "one"]
     assert origins["one"] == {"commit": "0123456789ab", "machine": "a processor, 2 processors"}
     assert json.loads((tmp_path / "one.json").read_text()) == {"figure": 1}
+
+
+def test_every_page_of_results_is_what_its_generator_makes_of_the_stored_results(monkeypatch):
+    monkeypatch.syspath_prepend(str(ROOT / "tools"))
+    from benches import pages
+    from benches.markdown import wrap
+
+    stored = {f"docs/results/{path.name}" for path in (ROOT / "docs/results").iterdir()} | {"docs/results.md"}
+    assert pages.PAGES.keys() == stored
+    for path, make in pages.PAGES.items():
+        assert wrap(make()) == (ROOT / path).read_text(), f"{path}: run '.venv/bin/python tools/benches page'"
+
+
+def test_the_page_of_results_has_at_most_twenty_figures(monkeypatch):
+    monkeypatch.syspath_prepend(str(ROOT / "tools"))
+    from benches import headlines
+
+    assert len(headlines.HEADLINES) <= headlines.MOST
+
+
+def test_a_page_follows_its_figures(monkeypatch):
+    """No page holds a figure that its generator does not read from the results."""
+    monkeypatch.syspath_prepend(str(ROOT / "tools"))
+    from benches import headlines, pages, store
+
+    def moved(value):
+        """The same data with every figure changed."""
+        if isinstance(value, dict):
+            return {key: moved(part) for key, part in value.items()}
+        if isinstance(value, list):
+            return [moved(part) for part in value]
+        return value * 1.37 if isinstance(value, float) else value
+
+    for one in headlines.HEADLINES:
+        data = store.read_result(one.result)
+        if any(isinstance(figure, float) for figure in leaves(data)) and "." in one.value(data):
+            assert one.value(moved(data)) != one.value(data), one.title
+    assert (
+        pages.studies.demo(moved(store.read_result("demo")), store.read_result("localisation"))
+        != (ROOT / "docs/results/demo.md").read_text()
+    )
+
+
+def leaves(value) -> list:
+    if isinstance(value, dict):
+        return [leaf for part in value.values() for leaf in leaves(part)]
+    return [leaf for part in value for leaf in leaves(part)] if isinstance(value, list) else [value]
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        ("short\nlines\n", "short\nlines\n"),
+        ("| " + "cell " * 40 + "|\n", "| " + "cell " * 40 + "|\n"),
+        ("word " * 30 + "\n", "word " * 23 + "word\n" + "word " * 5 + "word\n"),
+        ("- " + "word " * 30 + "\n- next\n", "- " + "word " * 22 + "word\n  " + "word " * 6 + "word\n- next\n"),
+        ("word " * 23 + "word - more " + "word\n", "word " * 23 + "word\nmore"),
+    ],
+)
+def test_lines_of_a_page_are_broken_where_markdown_allows_it(monkeypatch, before, after):
+    monkeypatch.syspath_prepend(str(ROOT / "tools"))
+    from benches.markdown import wrap
+
+    done = wrap(before)
+    assert all(len(line) <= 120 or line.startswith("|") for line in done.splitlines())
+    assert done.split() == before.split()
+    if " - " in before:
+        assert not any(line.startswith("- ") for line in done.splitlines())
+    else:
+        assert done.replace(" \n", "\n") == after

@@ -1,4 +1,4 @@
-"""docs/results/nav.md: every table and chart is told, misses are told as such, figures come from the data."""
+"""docs/results/nav.md: every table and chart has its text, misses are shown, figures come from the data."""
 
 import json
 import re
@@ -48,7 +48,7 @@ def lock(locked: int, ratio: float) -> dict:
 def data() -> dict:
     """Every part, small; the default filter meets every limit."""
     both = {"grid": ledger(0.02, 100.0), OURS: ledger()}
-    reported = {"auc": 0.9, "calibration_error": 0.02, "bins": []}
+    judged = {"auc": 0.9, "calibration_error": 0.02, "bins": []}
     cost = [{"x": 1.0, "step_us_median": 20.0}, {"x": 6.0, "step_us_median": 30.0}]
     bound = {"rows": 100_000, "step_us_p999": 100.0, "step_us_max": 300.0, "evaluations_max": 9, "touched_max": 1000}
     block = {"faulty": 0, "error_median_m": 0.01, "step_us_median": 20.0, "step_us_max": 300.0, "touched_max": 1000}
@@ -61,8 +61,8 @@ def data() -> dict:
         "matrix": {
             "filters": list(both),
             "rows": {"known start": both, "dead whisker": both},
-            "confidence": {name: reported for name in both},
-            "confidence_kidnap": {name: reported for name in both},
+            "confidence": {name: judged for name in both},
+            "confidence_kidnap": {name: judged for name in both},
         },
         "tracking": {"families": {family: both | {"reference": ledger()} for family in ("anchor", "one-whisker")}},
         "locks": {"families": {"anchor+global": {OURS: lock(100, 1.1)}, "anchor+kidnap": {OURS: lock(100, 1.4)}}},
@@ -85,7 +85,7 @@ def is_prose(part: str) -> bool:
     return not part.startswith(("|", "#", "!")) and part.endswith((".", ":")) and len(part.split()) > 5
 
 
-def test_every_table_and_chart_is_told(data):
+def test_every_table_and_chart_has_its_text(data):
     page = paragraphs(nav_page.document(data))
     assert sum(part.startswith("## ") for part in page) == len(data)
     for before, part, after in zip(page, page[1:], page[2:] + [""], strict=False):
@@ -129,7 +129,7 @@ def missed(data) -> list[str]:
         ("passes", (0, "ns_per_pose_median"), 1.21),
     ],
 )
-def test_a_miss_is_told(data, part, path, value):
+def test_a_miss_is_shown(data, part, path, value):
     data = {part: data[part]}
     place = data[part]
     for key in path[:-1]:
@@ -149,12 +149,12 @@ def test_peers_that_were_not_run_are_not_said_to_be_worse(data):
 
 
 def test_the_page_of_unseen_families_is_what_was_measured():
+    from benches import store
+    from benches.markdown import wrap
     from benches.nav import unseen
 
-    measured, *others = (
-        json.loads(path.read_text()) for path in (unseen.RESULT, unseen.DESIGNS, unseen.ABLATIONS, unseen.LEFT)
-    )
-    assert unseen.page(measured, *others) == unseen.PAGE.read_text()
+    measured, left = store.read_result("nav_unseen"), store.read_result("nav_left_out")
+    assert wrap(unseen.page(measured, left)) == unseen.PAGE.read_text()
     family = next(iter(measured["families"].values()))
     family["locked"] = 0
-    assert unseen.page(measured, *others) != unseen.PAGE.read_text()
+    assert wrap(unseen.page(measured, left)) != unseen.PAGE.read_text()

@@ -2,7 +2,7 @@
 
     make bench                                        all topics: bench/results/*.json, docs/charts/*.svg
     .venv/bin/python tools/benches --only ring nav    some topics, one after the other
-    .venv/bin/python tools/benches nav --quick        one topic, with options of its own; `nav --help` tells them
+    .venv/bin/python tools/benches nav --quick        one topic, with options of its own; `nav --help` lists them
 
 A measurement that is done is kept in build/bench: an interrupted run goes on where it stopped; `--fresh` begins again.
 """
@@ -16,7 +16,7 @@ from types import ModuleType
 import matplotlib
 
 ROOT = Path(__file__).resolve().parents[2]
-TOPICS = {  # topic -> module, by room
+TOPICS = {  # topic -> module, by room; the page is last, for it shows what the others have measured
     "bridge": "bridge.bench",
     "chain": "bridge.chain",
     "contact": "contact.bench",
@@ -42,6 +42,7 @@ TOPICS = {  # topic -> module, by room
     "touch": "nav.touch",
     "usb": "bridge.usb",
     "view": "host.view",
+    "page": "pages",
 }
 
 
@@ -80,7 +81,7 @@ def bench_of(topic: str) -> ModuleType:
 
 
 def front(name: str, description: str | None) -> argparse.ArgumentParser:
-    """What every bench is told."""
+    """The options of every bench."""
     form = argparse.RawDescriptionHelpFormatter
     parser = argparse.ArgumentParser(prog=name, description=description, formatter_class=form)
     parser.add_argument("--build-dir", type=Path, default=ROOT / "build/release")

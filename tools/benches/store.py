@@ -11,6 +11,8 @@ from pathlib import Path
 import matplotlib
 from matplotlib.figure import Figure
 
+from .markdown import wrap
+
 ROOT = Path(__file__).resolve().parents[2]
 RESULTS, CHARTS = ROOT / "bench/results", ROOT / "docs/charts"
 ORIGINS = "origins.json"  # in the folder of the results: file -> commit and machine
@@ -65,7 +67,6 @@ MAKES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "tools/fuzz.py": (("fuzz",), ()),
     "make mutants": (("mutants",), ()),
     "python -m drills": (("drills",), ()),
-    "no command today: an earlier design of the filter": (("nav_ablations", "nav_designs"), ()),
 }
 COMMAND_OF_RESULT = {name: command for command, (results, _) in MAKES.items() for name in results}
 COMMAND_OF_CHART = {name: command for command, (_, charts) in MAKES.items() for name in charts}
@@ -116,3 +117,9 @@ def write_chart(name: str, drawn: Figure | str, folder: Path = CHARTS) -> None:
     salt = matplotlib.rcParams["svg.hashsalt"] or "whisker"
     with matplotlib.rc_context({"svg.hashsalt": salt}):
         drawn.savefig(path, metadata={"Date": None})
+
+
+def write_page(path: Path, text: str) -> None:
+    """A page whose lines are short enough."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(wrap(text))

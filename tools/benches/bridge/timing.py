@@ -141,10 +141,10 @@ def table(found: dict) -> str:
 
 def run(build: Path, fresh: bool) -> None:
     """A few minutes; nothing is kept between runs, so `fresh` changes nothing."""
-    told = subprocess.run(
+    reported = subprocess.run(
         [build / "sim/bridge/usb_device/bridge-free", str(TICKS)], check=True, capture_output=True, text=True
     )
-    found = {"latency": json.loads(told.stdout), "skew": pair(build.resolve() / "pair.json"), "clock": clock(build)}
+    found = {"latency": json.loads(reported.stdout), "skew": pair(build.resolve() / "pair.json"), "clock": clock(build)}
     found["host"] = host(build, found["latency"])
     store.write_result("bridge_timing", found)
     before, rest = PAGE.read_text().split(BEGIN)

@@ -38,7 +38,7 @@ def summary(kind: str, found: list[dict]) -> dict:
     moves, shaped = true_motion(kind) == "sweep", kind.startswith(("face", "cylinder"))
     last = np.array([one["speed"][-1] for one in found if len(one["speed"])])
     refused, kept = (sum(one[name].sum() for one in found) for name in ("refused", "late"))
-    told = {
+    reported = {
         "contacts": len(found),
         "refused": float(refused / (refused + kept)),
         "point_rms_mm": rms(late("off")),
@@ -51,22 +51,25 @@ def summary(kind: str, found: list[dict]) -> dict:
         "cost_us": float(np.mean([one["cost_us"] for one in found])),
     }
     if shaped:
-        told |= {"normal_rms_deg": rms(late("turn")), "normal_held_90": float(late("turn_inside").mean())}
-        told["contour_rms_mm"] = rms(late("contour"))
+        reported |= {"normal_rms_deg": rms(late("turn")), "normal_held_90": float(late("turn_inside").mean())}
+        reported["contour_rms_mm"] = rms(late("contour"))
         taken = np.concatenate([one["taken"][one["late"]] for one in found])
-        told |= {"taken": float(taken.sum() / (refused + kept)), "taken_rms_deg": rms(late("turn")[taken])}
-        told["taken_within_15"] = float((np.abs(late("turn")[taken]) < 15.0).mean()) if taken.any() else None
+        reported |= {"taken": float(taken.sum() / (refused + kept)), "taken_rms_deg": rms(late("turn")[taken])}
+        reported["taken_within_15"] = float((np.abs(late("turn")[taken]) < 15.0).mean()) if taken.any() else None
     if moves:
-        told |= {"speed_median": float(np.median(np.abs(last))), "speed_within_10": float((np.abs(last) < 0.1).mean())}
-        told["speed_held_90"] = float(np.mean([one["speed_inside"][-1] for one in found]))
+        reported |= {
+            "speed_median": float(np.median(np.abs(last))),
+            "speed_within_10": float((np.abs(last) < 0.1).mean()),
+        }
+        reported["speed_held_90"] = float(np.mean([one["speed_inside"][-1] for one in found]))
     known = np.isfinite(late("slides"))
     if known.any():
-        told |= slip_figures(late("slip")[known], late("slides")[known])
-    return told
+        reported |= slip_figures(late("slip")[known], late("slides")[known])
+    return reported
 
 
 def verdicts(kind: str, found: list[dict]) -> dict[str, float]:
-    """Corner or face: shares told right and wrong with 90 %, and of these the errors of place and of a face's normal."""
+    """Corner or face: shares that are right and wrong with 90 %, and of these the errors of place and of a face's normal."""
     tip, other = (np.array([one[name] for one in found]) for name in ("tip", "other"))
     shaft = 1.0 - tip - other
     right, wrong = (shaft, tip) if kind == "corner" else (tip, shaft)
@@ -78,7 +81,7 @@ def verdicts(kind: str, found: list[dict]) -> dict[str, float]:
 
 
 def slip_figures(slip: np.ndarray, slides: np.ndarray) -> dict[str, float]:
-    """Stick or slip: share that sticks, share told right, expected calibration error over five bins."""
+    """Stick or slip: share that sticks, share that is right, expected calibration error over five bins."""
     bins = np.minimum((5 * slip).astype(int), 4)
     gaps = [abs(np.sum(slip[bins == n] - slides[bins == n])) for n in range(5)]
     right = float(np.mean((slip > 0.5) == (slides > 0.5)))
@@ -119,7 +122,7 @@ def run(build: Path, fresh: bool, each: int = CONTACTS) -> None:
     for kind in WHISKED:
         results["whisked"][kind] = verdicts(kind, list(tqdm(decided(kind, each), desc=f"whisked: {kind}", total=each)))
     store.write_result("contact", rounded(results))
-    (ROOT / "docs/results/contact.md").write_text(page(results))
+    store.write_page(ROOT / "docs/results/contact.md", page(results))
     store.write_chart("contact_errors", draw(results))
 
 

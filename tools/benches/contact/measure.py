@@ -136,7 +136,7 @@ ANY_FIRST, WHISKED_FIRST = 100_000, 200_000  # seeds
 
 
 class Case(NamedTuple):
-    """What is told to the filter and by what the whisker is bent."""
+    """What the filter is given, and what bends the whisker."""
 
     kinds: dict[str, Callable]
     friction_known: bool = False
@@ -189,39 +189,39 @@ def follow(case: Case, kind: str, scene: Scene, least: np.ndarray | None) -> dic
     held = ContactFilter(**case.settings)
     start = first_touch(scene)
     bases, tilt = scene.bases[start:], scene.tilt[start:]
-    told = held.run(bases, tilt)
-    at = told.sample + start
+    found = held.run(bases, tilt)
+    at = found.sample + start
     use = np.hypot(*scene.point[at].T) < TIP + REACH_M
     at = at[use]
-    off = told.point[use] - scene.point[at]
-    turn = np.degrees(told.normal_rad[use] - scene.normal[at])
+    off = found.point[use] - scene.point[at]
+    turn = np.degrees(found.normal_rad[use] - scene.normal[at])
     speed = np.hypot(*scene.velocity[at].T)
-    after_s = told.sample[use] * TICK_S
+    after_s = found.sample[use] * TICK_S
     first_s = TICK_S * (lying(scene.point[start:, 0]) + LIES_TICKS) if "lying" in kind else FIRST_S
     across = np.column_stack([np.cos(scene.normal[at]), np.sin(scene.normal[at])])
     round_m = np.hypot(*(scene.point[at] - scene.centre[at]).T)
     contour = (
-        np.hypot(*(told.point[use] - scene.centre[at]).T) - round_m
+        np.hypot(*(found.point[use] - scene.centre[at]).T) - round_m
         if "cylinder" in kind
         else (off * across).sum(axis=1)
     )
     return {
         "after_s": after_s,
-        "late": (after_s >= max(FIRST_S, first_s)) & (told.other[use] < 0.5),
-        "refused": (after_s >= max(FIRST_S, first_s)) & (told.other[use] >= 0.5),
+        "late": (after_s >= max(FIRST_S, first_s)) & (found.other[use] < 0.5),
+        "refused": (after_s >= max(FIRST_S, first_s)) & (found.other[use] >= 0.5),
         "off": 1e3 * np.hypot(*off.T),
-        "stated": 1e3 * np.sqrt(np.trace(told.point_cov[use], axis1=1, axis2=2)),
+        "stated": 1e3 * np.sqrt(np.trace(found.point_cov[use], axis1=1, axis2=2)),
         "least": least[at] if least is not None else np.full(len(at), np.nan),
-        "inside": np.einsum("ki,kij,kj->k", off, np.linalg.inv(told.point_cov[use]), off) < NINETY_2,
+        "inside": np.einsum("ki,kij,kj->k", off, np.linalg.inv(found.point_cov[use]), off) < NINETY_2,
         "turn": turn,
-        "turn_inside": (turn / np.degrees(told.normal_sd[use])) ** 2 < NINETY_1,
+        "turn_inside": (turn / np.degrees(found.normal_sd[use])) ** 2 < NINETY_1,
         "contour": 1e3 * np.abs(contour),
-        "speed": (told.speed[use] - speed) / np.where(speed > 1e-9, speed, np.nan),
-        "speed_inside": (told.speed[use] - speed) ** 2 < NINETY_1 * told.speed_sd[use] ** 2,
-        "motion": np.array(told.motion)[use],
-        "corner": told.corner[use],
-        "taken": (told.tip[use] >= 0.9) & (told.sweep[use] < 0.5) & (told.other[use] < 0.5),
-        "slip": told.slip[use],
+        "speed": (found.speed[use] - speed) / np.where(speed > 1e-9, speed, np.nan),
+        "speed_inside": (found.speed[use] - speed) ** 2 < NINETY_1 * found.speed_sd[use] ** 2,
+        "motion": np.array(found.motion)[use],
+        "corner": found.corner[use],
+        "taken": (found.tip[use] >= 0.9) & (found.sweep[use] < 0.5) & (found.other[use] < 0.5),
+        "slip": found.slip[use],
         "slides": slides(scene, at),
         "cost_us": cost_us(held, bases, tilt),
     }
@@ -257,11 +257,11 @@ def decided(kind: str, count: int) -> Iterator[dict[str, float]]:
         scene = chained(WHISKED[kind](draw.rng), draw)
         if scene is None or not np.any(scene.bases[-1][2]):
             continue  # the turn did not meet it
-        told = ContactFilter(creep=0.0).run(scene.bases, scene.tilt)
-        at = told.sample[-1]
+        found = ContactFilter(creep=0.0).run(scene.bases, scene.tilt)
+        at = found.sample[-1]
         yield {
-            "tip": told.tip[-1],
-            "other": told.other[-1],
-            "off_mm": 1e3 * float(np.hypot(*(told.point[-1] - scene.point[at]))),
-            "turn_deg": float(np.degrees(told.normal_rad[-1] - scene.normal[at])),
+            "tip": found.tip[-1],
+            "other": found.other[-1],
+            "off_mm": 1e3 * float(np.hypot(*(found.point[-1] - scene.point[at]))),
+            "turn_deg": float(np.degrees(found.normal_rad[-1] - scene.normal[at])),
         }

@@ -1,7 +1,7 @@
 """Contacts whose truth is known: corners by sim/mechanics with vibration, surfaces by its elastica, quasi-static; all by
 a chain of links in MuJoCo.
 
-A scene gives, for every tick of 0.5 ms from the first touch on: the base's motion as told, the measured tilt of the plug
+A scene gives, for every tick of 0.5 ms from the first touch on: the base's motion as reported, the measured tilt of the plug
 in two axes, and the truth in the whisker's frame.
 """
 
@@ -33,7 +33,7 @@ LEAST_M, LARGEST_RAD = 0.036, 0.25  # nearer, the mount is touched; the plug's s
 class Scene(NamedTuple):
     """Arrays over n ticks; whisker's frame, SI."""
 
-    bases: np.ndarray  # (n, 3) as told
+    bases: np.ndarray  # (n, 3) as reported
     tilt: np.ndarray  # (n, 2) measured
     point: np.ndarray  # (n, 2)
     normal: np.ndarray  # (n,) of the surface; nan: a corner
@@ -43,7 +43,7 @@ class Scene(NamedTuple):
 
 
 class Draw(NamedTuple):
-    """What a contact's filter does not know: ln of the gain, friction, error of the motion told, noise."""
+    """What a contact's filter does not know: ln of the gain, friction, error of the reported motion, noise."""
 
     gain: float
     friction: float
@@ -133,13 +133,13 @@ class Corner(NamedTuple):
     def scene(self, draw: Draw) -> Scene:
         tilt, point, velocity = self.felt(draw.friction)
         none = np.full(len(tilt), np.nan)
-        told = self.plan.bases * (1 + draw.motion)
-        return Scene(told, draw.measured(tilt), point, none, velocity, np.column_stack([none, none]), none)
+        reported = self.plan.bases * (1 + draw.motion)
+        return Scene(reported, draw.measured(tilt), point, none, velocity, np.column_stack([none, none]), none)
 
     def bound(self, draw: Draw, friction_sd: float) -> np.ndarray:
         """(n,) Cramer-Rao bound of the point's error, mm: root of the trace of its least covariance after each tick.
 
-        Unknown: start of the contact (free), place, gain, friction, error of the motion told, and of an object that moves
+        Unknown: start of the contact (free), place, gain, friction, error of the reported motion, and of an object that moves
         its velocity, with the priors of the filter. The whisker is quasi-static, the kind of contact known.
         """
         from signals.mechanics import LARGE
@@ -260,9 +260,9 @@ def surface(plan: Plan, draw: Draw) -> Scene | None:
     columns = [np.interp(used, at, column) for column in np.array(rows).T]
     point, normals = np.column_stack(columns[:2]), columns[2]
     still = np.zeros((len(used), 2))
-    told = bases[used] * (1 + draw.motion)
+    reported = bases[used] * (1 + draw.motion)
     none = np.full(len(used), np.nan)
-    return Scene(told, draw.measured(columns[3]), point, normals, still, centre[used], none)
+    return Scene(reported, draw.measured(columns[3]), point, normals, still, centre[used], none)
 
 
 def simulated(plan: Plan, draw: Draw) -> Scene | None:
@@ -276,15 +276,15 @@ def chained(plan: Plan, draw: Draw) -> Scene | None:
     kind = "face" if plan.round_m > 1.0 else "cylinder" if plan.round_m > 0.0 else "peg"
     job = {"beam": spec(0.3e-3, KAPPA, 20), "object": kind, "place": [plan.touched_m, 0.0], "radius": plan.round_m}
     job |= {"normal": plan.normal, "friction": round(draw.friction, 6), "bases": against.round(6).tolist()}
-    told = chain("grip", job, FOLLOW)
-    places = told["places"]
+    reported = chain("grip", job, FOLLOW)
+    places = reported["places"]
     touched = [i for i, place in enumerate(places) if place is not None and np.hypot(*place[:2]) < TIP + REACH_M]
     if len(touched) < 2:
         return None
     used = np.arange(touched[0], touched[-1] + 1)
     kept = [i for i in used if places[i] is not None]
     x, y, normal, grip = (np.interp(used, kept, column) for column in np.array([places[i] for i in kept]).T)
-    tilt = np.array(told["tilt"])[used]
+    tilt = np.array(reported["tilt"])[used]
     ends = [len(used), *np.flatnonzero((np.abs(tilt) > LARGEST_RAD) | (np.hypot(x, y) < LEAST_M))[:1]]
     if kind == "face" and not plan.lies:
         ends.append(lying(x))

@@ -58,7 +58,7 @@ CELLS = [f"floor_{n}_{texture}" for n in range(2) for texture in ("A", "B", "C")
 
 
 def write_ring(name: str, over) -> None:
-    """Publish noise on all lanes at 2 kHz until told to end."""
+    """Publish noise on all lanes at 2 kHz until the parent ends it."""
     frames = np.zeros(HZ, FRAME)
     noise = np.random.default_rng(1).normal(0x8000, 300.0, (2, HZ, LANES))
     frames["lane_mask"] = (1 << LANES) - 1
@@ -75,7 +75,7 @@ def write_ring(name: str, over) -> None:
 
 
 def tell_robot(endpoint: str, over) -> None:
-    """Send what pilot, navigator and simulation would, at their pace, until told to end."""
+    """Send what pilot, navigator and simulation would, at their pace, until the parent ends it."""
     rng = np.random.default_rng(1)
     with Link("bench", listen=[endpoint]) as link:
         streams = {topic: link.publish(topic) for topic in (*TOPICS, "health/bench")}
@@ -94,7 +94,7 @@ def robot_messages(row: int, rng: np.random.Generator) -> list[tuple[str, object
     cells = np.full(len(CELLS), VALUE, np.uint8)
     values = rng.normal(-3, 1, len(CELLS))
     covariance = PoseWithCovariance.planar(pose, np.eye(3) * 1e-3)
-    told = [
+    reported = [
         ("observation", Observation(header, row, 0, np.zeros(3), np.array(pose), CELLS, cells, values)),
         ("localisation", Localisation(header, "adaptive", covariance, 0.9, row)),
         ("truth", PoseStamped(header, Pose.planar(*pose))),
@@ -104,12 +104,12 @@ def robot_messages(row: int, rng: np.random.Generator) -> list[tuple[str, object
             rng.normal(1.0, 0.3, (3, COMPONENTS_MOST)),
             np.full((3, COMPONENTS_MOST), [[1 / COMPONENTS_MOST], [0.02], [0.05]]),
         )
-        told.append(
+        reported.append(
             ("belief", Belief(header, "adaptive", row, COMPONENTS_MOST, 1.0, *np.concatenate(columns).astype("f4")))
         )
     if row % ROWS_HZ == 0:
-        told.append(("health/bench", ProcessHealth(header, "bench", os.getpid(), "running")))
-    return told
+        reported.append(("health/bench", ProcessHealth(header, "bench", os.getpid(), "running")))
+    return reported
 
 
 class Page:

@@ -15,7 +15,7 @@ from tqdm import tqdm
 
 from .. import store
 from .charts import draw_moment, draw_speed
-from .edges import HEIGHTS_MM, SPEEDS, draw_edges, edge_summary, measure_edges, write_page
+from .edges import HEIGHTS_MM, SPEEDS, draw_edges, edge_summary, measure_edges, page
 from .edges import write_table as write_edge_table
 from .measure import (
     CACHE,
@@ -42,11 +42,12 @@ def save(data: dict) -> None:
     print("bench/results/mechanics.json, docs/charts/mechanics_speed.svg, mechanics_moment.svg")
 
 
-def save_edges(rows: list[dict], version: str) -> None:
+def save_edges(rows: list[dict], data: dict) -> None:
     """Result, page, chart and C table of the edges."""
-    store.write_result("mechanics_edges", {"summary": edge_summary(rows), "rows": rows, "mujoco": version})
+    edges = {"summary": edge_summary(rows), "rows": rows}
+    store.write_result("mechanics_edges", edges)
     store.write_chart("mechanics_edges", draw_edges(rows))
-    write_page(rows, version)
+    store.write_page(store.ROOT / "docs/results/mechanics.md", page(data, edges))
     write_edge_table(rows)
 
 
@@ -79,5 +80,5 @@ def run(build: Path, fresh: bool) -> None:
     data["mujoco"] = chain("modes", spec(0.3e-3, 1.0, 20, pinned_at=0.0))["mujoco"]
     write_table(static, modes)
     save(data)
-    save_edges(edges, data["mujoco"])
+    save_edges(edges, data)
     print(json.dumps(data["summary"], indent=1))

@@ -1,4 +1,4 @@
-"""What is told of the measurements: the worst errors, and the table that `make test` compares with."""
+"""The summary of the measurements: the worst errors, and the table that `make test` compares with."""
 
 import numpy as np
 

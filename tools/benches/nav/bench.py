@@ -306,7 +306,7 @@ def measure(bench: Bench, parts: list[str]) -> None:
         PARTS[part](bench)
     done = {part: bench.results / f"nav_{part}.json" for part in PARTS}
     data = {part: json.loads(path.read_text()) for part, path in done.items() if path.exists()}
-    bench.document.write_text(page.document(data))
+    store.write_page(bench.document, page.document(data))
 
 
 def full(workers=None, backend: str = "processes", build: Path = BUILD, seeds: int = 100) -> Bench:

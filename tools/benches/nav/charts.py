@@ -30,8 +30,8 @@ def panels(count: int, columns: int = 2, width: float = 4.6, height: float = 3.6
 
 def legend_above(figure, axes) -> None:
     """One legend for all panels, beside none of their lines."""
-    told = {label: handle for ax in axes for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)}
-    figure.legend(told.values(), told.keys(), loc="outside upper center", ncols=len(told), frameon=False, fontsize=7)
+    found = {label: handle for ax in axes for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)}
+    figure.legend(found.values(), found.keys(), loc="outside upper center", ncols=len(found), frameon=False, fontsize=7)
 
 
 PEERS = {"filterpy": "D", "particles": "v", "pfilter": "h", "mrpt": "d"}
@@ -194,9 +194,9 @@ def confidence(data: dict) -> Figure:
     figure = Figure(figsize=(5.2, 4.4), layout="constrained")
     ax = figure.subplots()
     ax.plot([0, 1], [0, 1], color="0.7", linewidth=0.8)
-    for name, told in data["confidence"].items():
-        area = "-" if told["auc"] is None else f"{told['auc']:.2f}"
-        bins = told["bins"]
+    for name, found in data["confidence"].items():
+        area = "-" if found["auc"] is None else f"{found['auc']:.2f}"
+        bins = found["bins"]
         ax.plot([b["confidence"] for b in bins], [b["near"] for b in bins], label=f"{name} (AUC {area})", **line(name))
     ax.set(xlabel="confidence", ylabel="share of rows within 0.25 m of the truth", xlim=(0, 1.02), ylim=(0, 1.02))
     ax.grid(True, linewidth=0.3)

@@ -82,37 +82,37 @@ def flown(build: Path, seed: int) -> dict:
         for row, true in zip(rows, truth, strict=True):
             out.write(row | {f"true_{name}": true[name] for name in POSE})
     assert tells_normals(rows[0])
-    told = read_observations(path, scene)
-    read = np.isfinite(told.normal[..., 0])
-    errors = [off for n in range(read.shape[1]) for off in off_truth(scene, told, n)]
+    reported = read_observations(path, scene)
+    read = np.isfinite(reported.normal[..., 0])
+    errors = [off for n in range(read.shape[1]) for off in off_truth(scene, reported, n)]
     anywhere = replace(scene, prior=Prior("uniform"))
     sharp = replace(anywhere, robot=replace(scene.robot, radial_sigma_m=POINT_M))
-    points, rows_told = np.isfinite(told.point[..., 0]), with_points(scene, told)
-    alone = np.isfinite(rows_told.radial_m) & ~np.isfinite(told.radial_m)
-    made = both(anywhere, told) | {"read": int(read.sum()), "normals": errors}
+    points, rows_told = np.isfinite(reported.point[..., 0]), with_points(scene, reported)
+    alone = np.isfinite(rows_told.radial_m) & ~np.isfinite(reported.radial_m)
+    made = both(anywhere, reported) | {"read": int(read.sum()), "normals": errors}
     made |= {"points": int(points.sum()), "points_alone": int(alone.sum())}
     return made | {"sharp": {name: [figures(name, sharp, rows_told), made[name][0]] for name in FILTERS}}
 
 
-def with_points(scene: Scene, told: Observations) -> Observations:
+def with_points(scene: Scene, reported: Observations) -> Observations:
     """Rows in which a point and its direction stand for the distance to the face, where there is none."""
-    radial = told.radial_m.copy()
+    radial = reported.radial_m.copy()
     for n, whisker in enumerate(scene.robot.of_role("object")):
-        normal, along = told.normal[:, n, 0], np.array([math.cos(whisker.yaw_rad), math.sin(whisker.yaw_rad)])
+        normal, along = reported.normal[:, n, 0], np.array([math.cos(whisker.yaw_rad), math.sin(whisker.yaw_rad)])
         out = np.column_stack([np.cos(normal), np.sin(normal)])
-        reach = ((told.point[:, n, :2] - whisker.base_m) * out).sum(axis=1) / (out @ along)
+        reach = ((reported.point[:, n, :2] - whisker.base_m) * out).sum(axis=1) / (out @ along)
         use = np.isnan(radial[:, n]) & (reach > 0.0) & (reach < 1.4 * whisker.length_m)
         radial[use, n] = reach[use]
-    return replace(told, radial_m=radial)
+    return replace(reported, radial_m=radial)
 
 
-def off_truth(scene: Scene, told: Observations, n: int) -> list[tuple[float, float]]:
+def off_truth(scene: Scene, reported: Observations, n: int) -> list[tuple[float, float]]:
     """Errors of the directions of whisker n and their deviations, where it truly met a face."""
     whisker = scene.robot.of_role("object")[n]
     longer = replace(whisker, length_m=whisker.length_m + LOOSE_M)
-    off = told.normal[:, n, 0] - directions(scene.arena, told.truth, longer, CORNER_M) + told.truth[:, 2]
+    off = reported.normal[:, n, 0] - directions(scene.arena, reported.truth, longer, CORNER_M) + reported.truth[:, 2]
     known = np.isfinite(off)
-    return [(math.remainder(o, 2 * math.pi), s) for o, s in zip(off[known], told.normal[known, n, 1], strict=True)]
+    return [(math.remainder(o, 2 * math.pi), s) for o, s in zip(off[known], reported.normal[known, n, 1], strict=True)]
 
 
 def paired(runs: list[dict], filter: str, key: str) -> list[float]:
@@ -165,27 +165,27 @@ def table(data: dict) -> list[str]:
         "position error, mm: with, without, difference | heading error, degrees | locked | rows to lock | time of a row"
     )
     lines = [f"| rows | directions a run | filter | {head} |", "|" + "---|" * 8]
-    for family, told in data["families"].items():
+    for family, reported in data["families"].items():
         for name in FILTERS:
-            r = told[name]
+            r = reported[name]
             error, heading = (
                 "{:.{p}f}, {:.{p}f}, {:+.{p}f} +- {:.{p}f}".format(*r[key], p=places)
                 for key, places in (("error_mm", 1), ("heading_deg", 2))
             )
             rows = "{:.0f}, {:.0f}".format(*r["rows_to_lock"]) if r["rows_to_lock"] else "-"
             lines.append(
-                f"| {family} | {told['read']:.0f} | `{name}` | {error} | {heading} | {r['locked'][0]}, {r['locked'][1]} of "
-                f"{told['runs']} | {rows} | {r['time_ratio']:.2f} times |"
+                f"| {family} | {reported['read']:.0f} | `{name}` | {error} | {heading} | {r['locked'][0]}, {r['locked'][1]} of "
+                f"{reported['runs']} | {rows} | {r['time_ratio']:.2f} times |"
             )
     return lines
 
 
-def the_point(told: dict) -> list[str]:
+def the_point(reported: dict) -> list[str]:
     """Why the point of contact has no likelihood of its own."""
-    error, heading = (told[FILTERS[0]][key] for key in ("error_mm", "heading_deg"))
+    error, heading = (reported[FILTERS[0]][key] for key in ("error_mm", "heading_deg"))
     return [
-        f"The {told['points']} points of contact have no likelihood of their own. With its direction a point tells how far off the face is along the whisker, and",
-        f"the distance in the same row tells that in all but {told['points_alone']} rows. With those filled in from the points, and all distances taken to be as good as points",
+        f"The {reported['points']} points of contact have no likelihood of their own. With its direction a point tells how far off the face is along the whisker, and",
+        f"the distance in the same row tells that in all but {reported['points_alone']} rows. With those filled in from the points, and all distances taken to be as good as points",
         f"({1e3 * POINT_M:.0f} mm instead of the robot's own deviation), the error is {error[0]:.1f} mm instead of {error[1]:.1f} ({error[2]:+.1f} +- {error[3]:.1f}) and",
         f"{heading[0]:.2f} degrees instead of {heading[1]:.2f} ({heading[2]:+.2f} +- {heading[3]:.2f}).",
     ]
@@ -197,7 +197,7 @@ def page(data: dict) -> str:
     lines = [
         "# What the direction of a touched surface is worth",
         "",
-        "Generated by `tools/benches normals` from `bench/results/nav_normals.json`. The same rows with the columns `<whisker>_normal_rad` and",
+        "Generated by `tools/benches page` from `bench/results/nav_normals.json`, measured by `tools/benches normals`. The same rows with the columns `<whisker>_normal_rad` and",
         f"without, seed by seed; means over the runs of each run's median error, and the difference with its standard error. {ROWS} rows of a scene;",
         "directions are good to 5 degrees and one in twenty is wrong. Rows to lock: medians over the runs that lock both ways.",
         "",
@@ -210,13 +210,6 @@ def page(data: dict) -> str:
         "## The point",
         "",
         *the_point(data["points"]),
-        "",
-        "## What it does not help",
-        "",
-        "- A wall has one direction all along it: the direction tells the heading up to quarter turns, and no place.",
-        "- Where distances come in many rows, two of them on one wall tell the heading better than a direction that is good to some degrees.",
-        "- Arenas that look alike after a quarter or half turn stay so. A corner, and a surface under the shaft, tell nothing.",
-        "- Maps whose slanting walls are steps of cells expect a direction that is not the wall's.",
     ]
     return "\n".join(lines) + "\n"
 
@@ -236,7 +229,7 @@ def run(build: Path, fresh: bool, seeds: int = 8, flights: int = 6) -> None:
     data["directions"] = of_directions(found[FLIGHT])
     data["points"] = of_points(found[FLIGHT])
     store.write_result("nav_normals", data)
-    PAGE.write_text(page(data))
+    store.write_page(PAGE, page(data))
     print("bench/results/nav_normals.json, docs/results/nav_normals.md")
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from .wanted import OURS, WANTED, least, listed, mm, most, number, picture, table, verdicts, work_budget, yes
+from .goals import GOALS, OURS, least, listed, mm, most, number, picture, table, verdicts, work_budget, yes
 
 
 def budgets(data: dict) -> str:
@@ -12,13 +12,13 @@ def budgets(data: dict) -> str:
         for name, c in data.items()
     ]
     head = ["filter", "rows", "p99.9 us", "slowest us", "most evaluations", "most touched"]
-    text = "## Bounds while tracking\n\nThe slowest of many rows, and the most work that any row took.\n\n"
+    text = "## Bounds while tracking\n\nThe slowest of many rows, and the most work of any row.\n\n"
     if OURS in data:
         c = data[OURS]
         text += verdicts(
             [
-                most(f"p99.9 over {c['rows']} rows", WANTED.p999_us, c["step_us_p999"], " us"),
-                most("slowest row", WANTED.slowest_us, c["step_us_max"], " us"),
+                most(f"p99.9 over {c['rows']} rows", GOALS.p999_us, c["step_us_p999"], " us"),
+                most("slowest row", GOALS.slowest_us, c["step_us_max"], " us"),
                 most(
                     "work of any row (`adaptive.budget`)",
                     work_budget(),
@@ -48,17 +48,17 @@ def soak(data: dict) -> str:
         )
         if name == OURS:
             judged = [
-                least("rows", WANTED.soak_rows, run["rows"], "", str(run["rows"])),
-                ["answers that are none", "0", str(faulty), yes(faulty == 0)],
-                most("slowest row", WANTED.slowest_us, slowest, " us"),
+                least("rows", GOALS.soak_rows, run["rows"], "", str(run["rows"])),
+                ["invalid results", "0", str(faulty), yes(faulty == 0)],
+                most("slowest row", GOALS.slowest_us, slowest, " us"),
                 most("work of any row (`adaptive.budget`)", work_budget(), touched, " cells", str(touched)),
             ]
-    head = ["filter", "rows", "answers that are none", "median error cm", "slowest us", "most touched", "last/first us"]
+    head = ["filter", "rows", "invalid results", "median error cm", "slowest us", "most touched", "last/first us"]
     return (
         "## Soak\n\nOne run of very many rows, with faults of every kind, the robot carried off every 10 000 rows.\n\n"
         + verdicts(judged)
-        + "\nThe same with its error (median of blocks of 10 000 rows) and its time per row at the end over that at the "
-        "start: above 1 it would have become slower.\n\n" + table(head, rows)
+        + "\nThe same with its error (median of blocks of 10 000 rows), and its time per row at the end over that at the start. "
+        "Above 1 it has become slower.\n\n" + table(head, rows)
     )
 
 
@@ -73,15 +73,15 @@ def pareto(data: dict) -> str:
     return (
         "## Speed against accuracy\n\n"
         "Every filter at several sizes, and filters of other projects on the same scenes and likelihood, where they were run. "
-        f"Wanted: no point of theirs is both quicker and nearer than `{OURS}`. Points of ours are told as well.\n\n"
+        f"Goal: no point of other projects is both quicker and nearer than `{OURS}`. The table lists the points that are.\n\n"
         + table(["family", "of other projects", "of our own filters"], _dominated(data))
         + picture(
             "pareto",
             "microseconds per step against position error",
-            "Down is nearer, left is quicker: the best points form the lower left edge. Bars: the middle half of the runs; "
-            "the tail to the right ends at the slowest row in a hundred. Hollow: other projects.",
+            "Down is nearer, left is quicker. Bars: the middle half of the runs; the tail to the right ends at the slowest row "
+            "in a hundred. Hollow: other projects.",
         )
-        + "\nThe points of our filters; fewer runs of what is slow.\n\n"
+        + "\nThe points of this project's filters; slow filters have fewer runs.\n\n"
         + table(head, rows)
     )
 
@@ -116,14 +116,14 @@ def cost(data: dict) -> str:
     ]
     return (
         "## Cost against size\n\n"
-        "Median time per step from the smallest to the largest that was tried. No figure was wanted; a filter that knows "
-        "where it is should not pay for the arena around it.\n\n"
+        "Median time per step from the smallest to the largest that was tried. There is no goal "
+        "for it.\n\n"
         + table(["what grows", "filter", "from, to", "us/step"], rows)
         + picture(
             "cost",
             "cost against arena size, resolution and whiskers",
-            "A level line is a filter whose cost does not depend on that. The grid passes over the whole arena, so its line "
-            "climbs with the area and with the cells per metre.",
+            "A level line is a filter whose cost does not depend on that. The grid visits every cell of the arena, so its "
+            "line climbs with the area and with the cells per metre.",
         )
     )
 
@@ -139,16 +139,16 @@ def passes(data: list[dict]) -> str:
         for r in data
     ]
     judged = []
-    for poses, limit in WANTED.grid_ns:
+    for poses, limit in GOALS.grid_ns:
         near = min(data, key=lambda r: abs(r["poses"] - poses))
-        told = f"{number(near['ns_per_pose_median'])} ns ({round(near['poses'])} poses)"
-        judged.append(most(f"full step at {poses} poses, per pose", limit, near["ns_per_pose_median"], " ns", told))
+        shown = f"{number(near['ns_per_pose_median'])} ns ({round(near['poses'])} poses)"
+        judged.append(most(f"full step at {poses} poses, per pose", limit, near["ns_per_pose_median"], " ns", shown))
     head = ["grid", "poses", "ns per pose", "p90", "reading a float", "scaling a float"]
     return (
         "## The grid's pass\n\n"
         "CPU time of the `grid` filter's full step (motion noise, likelihood, normalising) over its poses, median of many "
         "steps.\n\n"
         + verdicts(judged)
-        + "\nBeside it, in the same run, what it takes to read or to scale as many floats (ns each): memory alone.\n\n"
+        + "\nBeside it, in the same run, the time to read or to scale as many floats (ns each).\n\n"
         + table(head, rows)
     )

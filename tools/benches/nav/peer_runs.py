@@ -126,8 +126,8 @@ def failure(*commands: tuple) -> str:
         done = subprocess.run([str(word) for word in command], capture_output=True, text=True)
         if done.returncode != 0:
             lines = [line.strip() for line in (done.stdout + done.stderr).splitlines() if line.strip()]
-            told = next((line for line in lines if re.search(r"\berror\b", line, re.IGNORECASE)), None)
-            return told or (lines[-1] if lines else f"exit code {done.returncode}")
+            reported = next((line for line in lines if re.search(r"\berror\b", line, re.IGNORECASE)), None)
+            return reported or (lines[-1] if lines else f"exit code {done.returncode}")
     return ""
 
 

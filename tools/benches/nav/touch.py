@@ -48,8 +48,8 @@ def score(name: str, data: str | None, others: list) -> list[dict] | None:
         print(f"touch: {error}; its stored scores stay")
         return None
     ours = [benchmark.run_filter(filter, wanted) for filter in localise.filter_names()]
-    told = [*ours, *(run_peer(peer, wanted) for peer in others)]
-    return [judge(one, wanted.observations) for one in told]
+    found = [*ours, *(run_peer(peer, wanted) for peer in others)]
+    return [judge(one, wanted.observations) for one in found]
 
 
 def draw(table: dict[str, list[dict]]):
@@ -57,12 +57,12 @@ def draw(table: dict[str, list[dict]]):
     figure, axes = charts.panels(len(table), columns=4, width=3.2, height=2.8)
     mine = set(localise.filter_names())
     for ax, (name, scores) in zip(axes, table.items(), strict=True):
-        for told in scores:
-            engine, share = told["engine"], told["near_share_after_20cm"]
+        for found in scores:
+            engine, share = found["engine"], found["near_share_after_20cm"]
             look = charts.style(engine)
             if engine not in mine:
                 look = {"marker": charts.PEERS.get(engine.split()[0], "8"), "color": "0.4", "markerfacecolor": "none"}
-            ax.plot(told["step_us_mean"], 100 * share, linestyle="none", label=engine, **look)
+            ax.plot(found["step_us_mean"], 100 * share, linestyle="none", label=engine, **look)
         ax.set(xscale="log", ylim=(-4, 104), title=name, xlabel="us per row", ylabel="rows within 6 cm (%)")
         ax.grid(True, linewidth=0.3)
     handles = {label: handle for ax in axes for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)}

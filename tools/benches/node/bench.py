@@ -263,7 +263,7 @@ def run(build: Path, fresh: bool, only: str = "", batches: int = BATCHES) -> Non
         result |= parts[name]()
     store.write_result("node", result)
     faults, cuts = (store.read_result(name) for name in ("node_faults", "node_cuts"))
-    (ROOT / "docs/results/node_faults.md").write_text(page.page(result, faults, cuts))
+    store.write_page(ROOT / "docs/results/node_faults.md", page.page(result, faults, cuts))
 
 
 def options(parser: argparse.ArgumentParser) -> None:

@@ -52,7 +52,7 @@ def fitted(name: str, cal: Set):
     return radial.fit(cal.whisks, name).model
 
 
-def told(model, held: Set) -> list[radial.Estimate]:
+def reported(model, held: Set) -> list[radial.Estimate]:
     return [radial.estimate(model, c, f) for c, f in zip(held.whisks.recorded, held.whisks.peak_counts, strict=True)]
 
 
@@ -86,7 +86,7 @@ def errors_of(kind_of, number: int) -> dict:
             rng, whisker = rng_of(number, k, n), Whisker.drawn(SEED + k, n)
             cal, held = recorded(whisker, kind, FIT, rng), recorded(whisker, kind, HELD, rng)
             for name in METHODS:
-                answers = told(fitted(name, cal), held)
+                answers = reported(fitted(name, cal), held)
                 found[name].append(np.array([t.radius_mm for t in answers]) - held.whisks.radius_mm)
                 if name == "default":
                     inside.append(np.abs(found[name][-1]) / np.array([t.sigma_mm for t in answers]))
@@ -112,7 +112,7 @@ def tips() -> dict:
             asked = np.abs(held.whisks.radius_mm - LIMIT_MM) > NEAR_MM
             truth = held.whisks.radius_mm > LIMIT_MM
             for name in METHODS:
-                said = np.array([t.type == "tip" for t in told(fitted(name, cal), held)])
+                said = np.array([t.type == "tip" for t in reported(fitted(name, cal), held)])
                 right[name] += (said == truth)[asked].tolist()
         out[f"{spread:g}"] = {name: np.mean(r) for name, r in right.items()}
     return out
@@ -274,7 +274,7 @@ def run(build: Path, fresh: bool, whisker3d: str | None = None) -> None:
     if folder:
         real = _rounded(real_whisker(Path(folder)))
         store.write_result("radial_real", real)
-        (ROOT / "docs/results/radial_real.md").write_text(page(real))
+        store.write_page(ROOT / "docs/results/radial_real.md", page(real))
     else:
         print("radial: the real whisker skipped: give --whisker3d DIR or WHISKER3D_DIR (see the module's text)")
     results = {}

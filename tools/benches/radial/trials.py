@@ -2,7 +2,7 @@
 
 The spread of a whisk is split evenly: half its variance is in the angle turned, half in gain and creep of the plug. The
 true angle is known to the oracle only. Sources of the angle's part: `duration`, the base turns at the commanded rate but
-for a longer or shorter time; `rate`, it turns faster or slower than commanded for the same time; `rate, told`: the same,
+for a longer or shorter time; `rate`, it turns faster or slower than commanded for the same time; `rate, reported`: the same,
 and the base reports its rate with 2 % of error.
 """
 
@@ -20,7 +20,7 @@ RADII_MM = (90.0, 100.0, 110.0, 120.0, 130.0, 138.0)
 SPREADS = (0.082, 0.040, 0.026, 0.063)  # the paper's whiskers (whisker_physics section 4)
 PAPER_MM = (5.68, 2.78, 1.82, 4.37)
 WHISK_RAD_S, PUSH_S = math.pi / 24, 0.6
-SOURCES = ("duration", "rate", "rate, told")
+SOURCES = ("duration", "rate", "rate, reported")
 TOLD_ERROR = 0.02
 CREEP_SHARE = 0.25  # of the plug's variance; the rest is gain
 CREEP_SEEN = 0.42  # of creep's final value, after such a push with the typical time constant
@@ -75,8 +75,8 @@ def _whisk(whisker: Whisker, radius_mm: float, kind: Kind, rng: np.random.Genera
     step = round(1 / (kind.hz * TICK_S))
     counts = done.counts[::step].astype(np.float64)
     t_s = np.arange(len(counts)) * step * TICK_S
-    told = np.full(len(t_s), true * (1 + TOLD_ERROR * rng.normal())) if kind.source == "rate, told" else None
-    return Contact(t_s, counts, np.full(len(t_s), speed), told), pushed
+    found = np.full(len(t_s), true * (1 + TOLD_ERROR * rng.normal())) if kind.source == "rate, reported" else None
+    return Contact(t_s, counts, np.full(len(t_s), speed), found), pushed
 
 
 SPOILS = (

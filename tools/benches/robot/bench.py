@@ -96,7 +96,7 @@ def publish() -> None:
     for part, data in found.items():
         if read(RESULTS / f"robot_{part}.json") != data:
             store.write_result(f"robot_{part}", data)
-    (ROOT / "docs/results/robot.md").write_text(page.page(found))
+    store.write_page(ROOT / "docs/results/robot.md", page.page(found))
     print("bench/results/robot_*.json, docs/charts/robot_*.svg, docs/results/robot.md")
 
 

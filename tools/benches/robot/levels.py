@@ -80,7 +80,7 @@ SCORES = {  # score -> title in the tables, scale, digits
     "odometry_error_median_m": ("odometry, mm", 1000.0, 0),
     "texture_accuracy": ("texture right, %", 100.0, 1),
     "texture_windows_share": ("windows read, %", 100.0, 1),
-    "distances": ("distances told", 1.0, 0),
+    "distances": ("distances read", 1.0, 0),
     "distance_error_m": ("their rms error, mm", 1000.0, 1),
 }
 
@@ -152,8 +152,10 @@ class Bench:
             pilot = json.loads((run.out / "pilot.json").read_text())
             path = localise.observations_path(run.scene)
             rows, truth = path.read_text(), poses_of(read_dicts(run.out / "truth.csv"))
-            told = [{key: float(value) if value else None for key, value in row.items()} for row in read_dicts(path)]
-            scores = judge(run.out, scene) | distance_scores(told, truth, scene)
+            reported = [
+                {key: float(value) if value else None for key, value in row.items()} for row in read_dicts(path)
+            ]
+            scores = judge(run.out, scene) | distance_scores(reported, truth, scene)
         return scores | {"whisks": len(pilot["whisks"]), "processor_s": cost, "wall_s": wall_s, "rows": rows}
 
 
@@ -172,9 +174,9 @@ def distance_scores(rows: list[dict], poses: np.ndarray, scene: Scene) -> dict:
     """How many distances the rows tell, and their root mean square error, m; of what the whisker did not meet nothing is said."""
     errors = []
     for whisker in scene.robot.of_role("object"):
-        told = np.array([np.nan if (mm := row[f"{whisker.name}_mm"]) is None else mm / 1000 for row in rows], float)
+        reported = np.array([np.nan if (mm := row[f"{whisker.name}_mm"]) is None else mm / 1000 for row in rows], float)
         true = geometry.ranges(scene.arena, poses, replace(whisker, length_m=whisker.length_m + FAR_M))
-        errors.append((told - true)[np.isfinite(told)])
+        errors.append((reported - true)[np.isfinite(reported)])
     met = np.concatenate(errors)
     met = met[np.isfinite(met)]
     return {"distances": len(met), "distance_error_m": float(np.sqrt(np.mean(met**2))) if len(met) else 0.0}
@@ -191,8 +193,8 @@ def drawn_rows(
 ) -> list[dict]:
     """Level 0 along the same path: what was read stays read, and when; the answers are drawn from level 0's models."""
     rng, path = np.random.default_rng([seed, 0]), np.vstack([start, poses_of(truth)])
-    told = np.array([[row[key] for key in localise.ODOMETRY] for row in rows])
-    odometry = readings.hold_back(readings.odometry(path, SIGNALS, rng), ~told.any(axis=1))
+    reported = np.array([[row[key] for key in localise.ODOMETRY] for row in rows])
+    odometry = readings.hold_back(readings.odometry(path, SIGNALS, rng), ~reported.any(axis=1))
     texture = readings.texture_windows(scene.arena, scene.robot, path[1:], SIGNALS, rng)
     rays = [replace(w, length_m=w.length_m + FAR_M) for w in scene.robot.of_role("object")]
     ranges = np.array([geometry.ranges(scene.arena, path[1:], ray) for ray in rays]).T

@@ -129,8 +129,8 @@ def after(run: Run, killed: int, case: str) -> tuple[list[Received], np.ndarray]
     rows, truth = run.rows[source : source + count], run.truth[source : source + count]
     if kind == 1:
         return messages(rows, 2, begins), truth
-    told = messages(run.rows[:begins], 1)[-1].message.pose
-    return messages(rows, 1, begins, told), truth
+    found = messages(run.rows[:begins], 1)[-1].message.pose
+    return messages(rows, 1, begins, found), truth
 
 
 def trial(run: Run, killed: int, folder: Path, before: dict) -> list[dict]:
@@ -162,19 +162,19 @@ def trials(seed: int, moments: int, kept: Path) -> list[dict]:
 
 def summary(entries: list[dict]) -> dict:
     """By case and way: shares, and seconds until near again."""
-    told = {}
+    found = {}
     for case in CASES:
         for way in ("checkpoint", "uniform"):
             of = [e for e in entries if e["case"] == case and e["way"] == way]
             of = [e for e in of if e["right"]]
             again = np.array([np.inf if e["again_s"] is None else e["again_s"] for e in of])
-            told[f"{case}, {way}"] = {
+            found[f"{case}, {way}"] = {
                 "restarts": len(of),
                 "near at once": round(float(np.mean([e["first"] <= NEAR_M for e in of])), 3),
                 "near again within 60 s": round(float(np.mean(np.isfinite(again))), 3),
                 "again_s": [None if np.isinf(q) else round(float(q), 1) for q in quantiles(again)],
             }
-    return told
+    return found
 
 
 def quantiles(values: np.ndarray) -> np.ndarray:
@@ -192,13 +192,13 @@ def run(
     for seed in range(FIRST_SEED, FIRST_SEED + scenes):
         entries += trials(seed, moments, runs)
         print(f"{seed}: {sum(e['right'] for e in entries) // (2 * len(CASES))} kills of a right belief", flush=True)
-    told = {"filter": FILTER, "scenes": scenes, "moments": moments, "cases": summary(entries)}
+    found = {"filter": FILTER, "scenes": scenes, "moments": moments, "cases": summary(entries)}
     kills = len(entries) // (2 * len(CASES))
-    told |= {"kills": kills, "right before": sum(e["right"] for e in entries) // (2 * len(CASES))}
-    print(json.dumps(told, indent=1))
+    found |= {"kills": kills, "right before": sum(e["right"] for e in entries) // (2 * len(CASES))}
+    print(json.dumps(found, indent=1))
     out = out or (store.RESULTS / "restart.json" if scenes == SCENES else None)
     if out:
-        out.write_text(json.dumps(told, indent=1) + "\n")
+        out.write_text(json.dumps(found, indent=1) + "\n")
     if out == store.RESULTS / "restart.json":
         store.record_origin("restart")
 

@@ -57,7 +57,7 @@ def run(build: Path, fresh: bool, **folders: str | None) -> None:
             kept.write_text(json.dumps(measure(), indent=1, default=float) + "\n")
         results[name] = json.loads(kept.read_text())
     store.write_result("texture", results)
-    PAGE.write_text(page(results))
+    store.write_page(PAGE, page(results))
     for name, figure in draw(results).items():
         store.write_chart(name, figure)
 

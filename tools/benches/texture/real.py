@@ -140,7 +140,7 @@ def windows_of(x: np.ndarray, window: int) -> np.ndarray:
 
 
 def decision(d, names: list[str], truth: str) -> tuple[bool, bool, float]:
-    """Whether the likeliest class is right, whether it was told, and its confidence."""
+    """Whether the likeliest class is right, whether it was given as answer, and its confidence."""
     return names[d.best] == truth, d.label >= 0, d.confidence
 
 
@@ -152,10 +152,10 @@ def paper_decision(bayes: TextureModel, samples: np.ndarray, names: list[str], t
 
 def scores(decisions: list[tuple]) -> dict:
     """Accuracy, refusals, wrong answers given, calibration, and by how much the least confident tenth, refused, cuts them."""
-    right, told, confidence = (np.array(v) for v in zip(*decisions, strict=True))
+    right, reported, confidence = (np.array(v) for v in zip(*decisions, strict=True))
     return {
-        "decisions": len(right), "accuracy": right.mean(), "refused": 1.0 - told.mean(),
-        "wrong_answers": (told & ~right).mean(), "calibration_error": calibration_error(right, confidence),
+        "decisions": len(right), "accuracy": right.mean(), "refused": 1.0 - reported.mean(),
+        "wrong_answers": (reported & ~right).mean(), "calibration_error": calibration_error(right, confidence),
         "cut_at_a_tenth_refused": refusal_cut(right, confidence), "area_under_risk_coverage": area(right, confidence),
     }  # fmt: skip
 

@@ -81,8 +81,8 @@ def strip_score(model, strip) -> dict:
     the border, and 150 ms count from the first."""
     found = decide(model, strip.counts)
     met, left = strip.borders()
-    told = model.judge(strip.counts, WINDOW, notices=True) if isinstance(model, SpectralModel) else found
-    flagged = np.array([d.end for d in told if d.border], dtype=float)
+    reported = model.judge(strip.counts, WINDOW, notices=True) if isinstance(model, SpectralModel) else found
+    flagged = np.array([d.end for d in reported if d.border], dtype=float)
     within = BORDER_S / TICK_S + LOOK
     seen = [bool(((flagged > m) & (flagged <= m + within)).any()) for m in met]
     near = [*zip(met, left, strict=True), *strip.held()]

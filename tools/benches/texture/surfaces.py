@@ -160,18 +160,20 @@ def faces_contact() -> dict:
     for motion, drive, names in (("drive-by", drive_by, OUTER), (MOTIONS[1], body_whisk, ALL)):
         for surface in ("", *SURFACES):
             drives = [drive(surface, name, 1000 * TEST_SEED + k, TRAIN_SEED) for name in names for k in range(PRESSES)]
-            out[f"{motion}|{surface or 'smooth'}"] = errors([told for drive in drives for told in followed(drive)])
+            out[f"{motion}|{surface or 'smooth'}"] = errors(
+                [reported for drive in drives for reported in followed(drive)]
+            )
     return out
 
 
 def errors(seen: list[tuple[float, float, float] | None]) -> dict:
-    told = np.array([p for p in seen if p is not None]).reshape(-1, 3)
-    normal = told[np.isfinite(told[:, 0])]
+    reported = np.array([p for p in seen if p is not None]).reshape(-1, 3)
+    normal = reported[np.isfinite(reported[:, 0])]
     return {
-        "reports": len(seen), "known": len(told) / len(seen), "normals": len(normal) / len(seen),
+        "reports": len(seen), "known": len(reported) / len(seen), "normals": len(normal) / len(seen),
         "normal_deg": math.degrees(np.median(np.abs(normal[:, 0]))),
         "held_90": np.mean(np.abs(normal[:, 0]) < NINETY * normal[:, 1]),
-        "place_mm": 1e3 * np.median(np.abs(told[:, 2])),
+        "place_mm": 1e3 * np.median(np.abs(reported[:, 2])),
     }  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""A contact of a chain of 20 links in MuJoCo, told sample by sample. Run by ../scenes.py.
+"""A contact of a chain of 20 links in MuJoCo, given sample by sample. Run by ../scenes.py.
 
     follow.py grip '{"beam": {...}, "object": "peg", "place": [x, y], "radius": 0, "normal": 0, "friction": 0.3, "bases": [[...]]}'
 

@@ -1,7 +1,7 @@
 /*
- * The limit, not a transport: 256 bytes of shared memory and their index, stored last. One frame at a time, nothing
- * lost is noticed, nobody can be told anything: what is left is the way of five cache lines from one processor to
- * another, beside the harness itself.
+ * The lower bound, not a transport: 256 bytes of shared memory and their index, stored last. It holds one frame, does
+ * not detect a loss and wakes no reader. It measures the way of five cache lines from one processor to another, and the
+ * harness itself.
  */
 #define _GNU_SOURCE
 #include <fcntl.h>

@@ -1,19 +1,19 @@
-"""What was wanted of the default filter, and how a page tells it beside what was measured."""
+"""The goals of the default filter, and how a page shows them beside what was measured."""
 
 from dataclasses import dataclass
 
 from crunchbot.nav import localise
 
+from ..markdown import table
+
 OURS = localise.default_filter()
 
 
 @dataclass(frozen=True)
-class Wanted:
-    """Limits of the default filter, from the issue that asked for these filters. Lengths in m, times in us."""
+class Goals:
+    """Limits set for the default filter before it was measured. Lengths in m, times in us."""
 
     error_median_m: float = 0.0075
-    stretch_m: float = 0.006
-    one_whisker_m: float = 0.007  # the best that was published of one whisker, to be told beside ours
     error_rms_m: float = 0.013
     step_us: float = 50.0
     to_reference: float = 1.25
@@ -32,20 +32,15 @@ class Wanted:
     grid_ns: tuple[tuple[int, float], ...] = ((90_000, 1.2), (7_500_000, 2.5))  # most per pose, at so many poses
 
 
-WANTED = Wanted()
+GOALS = Goals()
 
 
 def work_budget() -> float:
     return next(standard for name, standard, *_ in localise.settings_list() if name == "adaptive.budget")
 
 
-def table(head: list[str], rows: list[list[str]]) -> str:
-    lines = [" | ".join(head), " | ".join("---" for _ in head), *(" | ".join(row) for row in rows)]
-    return "".join(f"| {line} |\n" for line in lines)
-
-
 def verdicts(rows: list[list[str]]) -> str:
-    return table(["figure", "wanted", "measured", "met"], rows)
+    return table(["figure", "goal", "measured", "met"], rows)
 
 
 def most(what: str, limit: float, value: float | None, unit: str, measured: str | None = None) -> list[str]:
@@ -57,9 +52,9 @@ def least(what: str, limit: float, value: float | None, unit: str, measured: str
     return _line(what, f"at least {_plain(limit)}{unit}", value, unit, measured, value is not None and value >= limit)
 
 
-def _line(what: str, wanted: str, value: float | None, unit: str, measured: str | None, met: bool) -> list[str]:
-    told = measured or ("-" if value is None else number(value) + unit)
-    return [what, wanted, told, "not measured" if value is None else "yes" if met else "no"]
+def _line(what: str, goal: str, value: float | None, unit: str, measured: str | None, met: bool) -> list[str]:
+    shown = measured or ("-" if value is None else number(value) + unit)
+    return [what, goal, shown, "not measured" if value is None else "yes" if met else "no"]
 
 
 def _plain(limit: float) -> str:
