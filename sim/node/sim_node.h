@@ -67,7 +67,7 @@ uint16_t sim_node_blocks(const sim_node *node);
 /* Version of the application that runs; 0: the loader does. */
 uint16_t sim_node_version(const sim_node *node);
 
-/* What the firmware did against the sensor's data sheet or the board's contract so far. Tests demand zero. */
+/* What the firmware did against the sensor's data sheet or the board's interface so far. Tests demand zero. */
 uint32_t sim_node_violations(const sim_node *node);
 
 #endif

@@ -40,8 +40,8 @@ struct nav_problem {
     uint64_t seed; /* of every random draw: same seed, same rows, same bytes out */
 };
 
-/* One row, 0.1 s (contracts: observations.csv). A NaN texture (first class), distance or first value of a sensor of the
- * user's own was not read. */
+/* One row, 0.1 s (docs/formats.md: observations.csv). A NaN texture (first class), distance or first value of a sensor
+ * of the user's own was not read. */
 struct nav_row {
     double t_s;
     double odometry[3];     /* motion since the previous row in its frame: x, y m, theta rad */

@@ -11,7 +11,7 @@ SHOWN_MOST = 60  # characters of a wrong value
 
 
 class SceneError(UserError, ValueError):
-    """A scene that breaks its contract. Its text is one line: file, line or key, what and the remedy."""
+    """A scene that is not as docs/formats.md has it. Its text is one line: file, line or key, what and the remedy."""
 
 
 class Table:

@@ -55,7 +55,7 @@ def add(parser) -> None:
     parser.add_argument(
         "--await", action="append", default=[], dest="others", metavar="PROCESS", help="begin when it is there, too"
     )
-    parser.add_argument("--out", default=NOWHERE, metavar="FILE", help="observations.csv of the contract")
+    parser.add_argument("--out", default=NOWHERE, metavar="FILE", help="observations.csv, as in docs/formats.md")
     parser.add_argument("--traces", default=NOWHERE, metavar="FILE", help="CSV of the floor whiskers' deflection")
     parser.add_argument("--report", type=Path, metavar="FILE", help="JSON of what was used, skipped and measured")
     parser.set_defaults(run=run)

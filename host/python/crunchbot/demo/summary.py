@@ -1,4 +1,4 @@
-"""summary.json: the figures of design/contracts.md, from the files a run leaves.
+"""summary.json (docs/formats.md) from the files that a run leaves.
 
 moving                  the tip's path in the 100 ms window is at least 5 mm
 texture_accuracy        of the windows that the pilot read, moving, tip at least 50 mm inside its tile at the window's end:

@@ -1,4 +1,4 @@
-"""Texture training and radial calibration: recorded at level 1 in the contract's formats, learnt from the files."""
+"""Texture training and radial calibration: recorded at level 1 in files (docs/formats.md), learnt from them."""
 
 import csv
 import json

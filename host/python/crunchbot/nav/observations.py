@@ -1,4 +1,4 @@
-"""observations.csv of a scene folder as arrays. Strict in structure, forgiving in values (design contract)."""
+"""observations.csv of a scene folder as arrays. Strict in structure, forgiving in values (docs/formats.md)."""
 
 import math
 from collections.abc import Iterable
@@ -87,7 +87,7 @@ def _touched(path, text: dict[str, list[str]], whiskers: list[Whisker], names: t
 
 
 def cell(value: float | None) -> str:
-    """A cell as the contract writes it: empty, nan, or a number."""
+    """A cell as docs/formats.md has it: empty, nan, or a number."""
     return "" if value is None else f"{value:.6g}"
 
 

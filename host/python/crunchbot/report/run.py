@@ -1,6 +1,6 @@
 """What a finished run left behind, read back from its folder.
 
-summary.json            the figures of the contract
+summary.json            figures, as in docs/formats.md
 truth.csv               tick, x_m, y_m, theta_rad, <whisker>_tile, <whisker>_inside_mm, <whisker>_moved_mm
 scene/observations.csv  what the filters read
 est_<filter>.csv        t_s, x_m, y_m, theta_rad, confidence

@@ -1,4 +1,4 @@
-"""What the pilot leaves in files: observations.csv of the contract, and the floor whiskers' traces for the report."""
+"""What the pilot leaves in files: observations.csv (docs/formats.md), and the floor whiskers' traces for the report."""
 
 import csv
 from typing import TextIO

@@ -1,4 +1,4 @@
-"""Observations as observations.csv of the contract. What is written reads back bit by bit as the same arrays."""
+"""Observations as observations.csv (docs/formats.md). What is written reads back bit by bit as the same arrays."""
 
 from pathlib import Path
 
@@ -55,5 +55,5 @@ def _numbers(values: np.ndarray) -> list[list[str]]:
 
 
 def _cells(values: np.ndarray, names: dict[str, str]) -> list[list[str]]:
-    """Columns of text, with the cells that are no numbers as the contract writes them."""
+    """Columns of text, with the cells that are no numbers as docs/formats.md has them."""
     return [[names.get(text, text) for text in column] for column in _numbers(values)]

@@ -169,7 +169,7 @@ def counts_of(samples: np.ndarray) -> np.ndarray:
 
 
 class ContactsFile:
-    """The radial calibration of the contract: contact, radius_mm, t_s, x, y, and what more is known."""
+    """A recording of radial contacts (docs/formats.md): contact, radius_mm, t_s, x, y, and what more is known."""
 
     def __init__(self, path: Path, whisk_rad_s: float | None = None, node: int | None = None):
         """`node`: serial number of the node whose whisker it is."""

@@ -1,4 +1,4 @@
-"""The command line: promises of the contract, and one line with exit code 2 for every structural mistake."""
+"""The command line: what docs/cli.md promises, and one line with exit code 2 for every structural mistake."""
 
 # ruff: noqa: F811 - fixtures are taken by their names
 

@@ -1,6 +1,6 @@
 """A small world of observations only: random arenas, a robot exploring with body whisks, and the rows it would report.
 
-Written for these tests, from the paper's description and the contract of observations.csv; it shares no code with
+Written for these tests, from the paper's description and docs/formats.md; it shares no code with
 host/nav (its own ray casting is sampled), so that the filters are not tested against themselves.
 """
 

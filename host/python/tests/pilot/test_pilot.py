@@ -180,7 +180,7 @@ def line_models(models, scene):
     return texture, {name: fit(whisks, "linear").model for name, whisks in recorded.items()}
 
 
-def test_rows_are_those_of_the_contract_where_a_model_is_the_papers_line(models):
+def test_rows_hold_no_normals_where_a_model_is_the_papers_line(models):
     scene, start = make_scene(SEED)
     pilot = Pilot(scene.robot, *line_models(models, scene), SEED)
     rows, _ = explore(scene, start, pilot, SEED, 2_000)
