@@ -12,10 +12,10 @@ help: ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
 
 demo: build ## the whole chain on simulated hardware, magnet to pose: about two minutes; SEED=n chooses the seed
-	@$(PYTHON) -m crunchbot.demo --out build/demo --build-dir $(BUILD) --seed $(SEED)
+	@$(PYTHON) -m crunchbot_lab.demo --out build/demo --build-dir $(BUILD) --seed $(SEED)
 
 demo-long: build ## 30 simulated minutes of the whole robot, with a report; SEED=n; LEVEL=bytes, or signals (a minute), or rtl
-	@$(PYTHON) -m crunchbot.demo.long --out build/demo-long --build-dir $(BUILD) --seed $(SEED) --level $(LEVEL)
+	@$(PYTHON) -m crunchbot_lab.demo.long --out build/demo-long --build-dir $(BUILD) --seed $(SEED) --level $(LEVEL)
 
 test: build lint ## everything that fits in 15 minutes on two cores
 	@tools/run_tests.sh $(BUILD)
@@ -75,4 +75,4 @@ lint: setup ## formats, Python lint, and the guards of tools/lint: arrows, circl
 	@cd tools && ../$(PYTHON) -m lint arrows functions
 
 clean: ## remove what was built (not .venv)
-	@rm -rf build host/python/crunchbot/_native* sim/signals/_sim*
+	@rm -rf build host/python/crunchbot/_native* lab/crunchbot_lab/signals/_sim*

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from crunchbot import protocol as p
+import whisker_protocol as p
 
 HERE = Path(__file__).parent
 

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from crunchbot.bridge.ring import FRAME, Reader
-from crunchbot.protocol import FRAME_FLAGS
-from crunchbot.simulation.scenes import make_scene
+from crunchbot_lab.simulation.scenes import make_scene
+from whisker_protocol import FRAME_FLAGS
 
 ROOT = Path(__file__).resolve().parent.parent
 BUILD = ROOT / os.environ.get("WHISKER_BUILD", "build/release")

@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
-from crunchbot.demo.training import MOVES, fit_texture, flat
-from crunchbot.simulation.scenes import make_scene
-from crunchbot.simulation.world import write_surface_drives
 from crunchbot.touch.radial.model import RadialModel
 from crunchbot.touch.texture.model import read_training
+from crunchbot_lab.demo.training import MOVES, fit_texture, flat
+from crunchbot_lab.signals.recordings import write_surface_drives
+from crunchbot_lab.simulation.scenes import make_scene
 
 LINE = (-0.036, 181.0, 5.0, 90.0, 140.0)  # of a radial model
 

@@ -9,9 +9,9 @@ import pytest
 from chainrun import END_S, FAST_LINK, program, running, simulation, write_flat_scene
 
 from crunchbot.bridge.ring import Reader
-from crunchbot.protocol import WIRE_VERSION
 from crunchbot.scene import write
-from crunchbot.simulation.scenes import make_scene
+from crunchbot_lab.simulation.scenes import make_scene
+from whisker_protocol import WIRE_VERSION
 
 RING = f"whisker-bad-{os.getpid()}"  # no other test's, which may run beside this one
 

@@ -12,7 +12,7 @@ import pytest
 from chainrun import BLOCK_TICKS, END_S, FAST_LINK, TICKS_PER_S, program, running, simulation
 
 from crunchbot.pilot.base import Base
-from crunchbot.simulation.link import SimLink
+from crunchbot.robot.simulation_link import SimLink
 
 SECONDS = 1.6
 X_M, Y_M = 1.5, 1.5

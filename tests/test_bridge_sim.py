@@ -12,9 +12,9 @@ from chainrun import BUILD, END_S
 
 from crunchbot.bridge.ring import FRAME
 from crunchbot.cli import main
-from crunchbot.protocol import LIMITS, SENSOR_ERRORS
 from crunchbot.recording import read
-from crunchbot.simulation.bridge import SimulationError, read_faults
+from crunchbot_lab.simulation.bridge import SimulationError, read_faults
+from whisker_protocol import LIMITS, SENSOR_ERRORS
 
 SIX = 0x3F
 FAULTS = """

@@ -11,10 +11,10 @@ from chainrun import BUILD, END_S
 
 from crunchbot import scene as scenes
 from crunchbot.pilot.behaviour import WHISK_RAD_S
-from crunchbot.simulation.scenes import make_robot
-from crunchbot.simulation.world import radial_contacts
 from crunchbot.touch.mount import Mount
 from crunchbot.touch.radial.model import read_whisks, shape_of
+from crunchbot_lab.signals.recordings import radial_contacts
+from crunchbot_lab.simulation.scenes import make_robot
 
 LANE, RADIUS_MM, WHISKS = 3, 110.0, 2  # object_2
 SEED = 3

@@ -7,15 +7,13 @@ import sys
 
 import numpy as np
 import pytest
-from chainrun import BLOCK_TICKS, BUILD, DECISION_TICKS, ROOT, TICKS_PER_S, is_last, record, write_flat_scene
+from chainrun import BLOCK_TICKS, BUILD, DECISION_TICKS, TICKS_PER_S, is_last, record, write_flat_scene
 
 from crunchbot.nav import localise
-from crunchbot.protocol import CODES, LANES, STATUS_CODE_SHIFT
-from crunchbot.report.run import FILTERS
 from crunchbot.scene import load
-
-sys.path.insert(0, str(ROOT / "sim"))
-from signals import World  # noqa: E402
+from crunchbot_lab.report.run import FILTERS
+from crunchbot_lab.signals import World  # noqa: E402
+from whisker_protocol import CODES, LANES, STATUS_CODE_SHIFT
 
 SEED = 11
 SECONDS = 2.0
@@ -92,7 +90,7 @@ def demo(out, seed: int) -> dict:
     command = [
         sys.executable,
         "-m",
-        "crunchbot.demo",
+        "crunchbot_lab.demo",
         "--out",
         out,
         "--build-dir",

@@ -18,7 +18,7 @@ import pytest
 from chainrun import END_S, FAST_LINK, Cable, program, running, simulation, write_flat_scene
 
 from crunchbot.bridge.ring import Reader, RingError
-from crunchbot.protocol import LIMITS, WIRE_VERSION
+from whisker_protocol import LIMITS, WIRE_VERSION
 
 LONG_S = 600
 LOOK_S = 0.05

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from quickmodels import quick_models
 
-from crunchbot.demo import long
-from crunchbot.report.run import FILTERS, read_columns
+from crunchbot_lab.demo import long
+from crunchbot_lab.report.run import FILTERS, read_columns
 
 NEAR, FAR = 0.1, 0.3
 

@@ -11,7 +11,7 @@ import pytest
 from chainrun import END_S, FAST_LINK, ROOT, program, simulation, write_flat_scene
 
 from crunchbot.bridge.ring import Reader
-from crunchbot.protocol import CODES, STATUS_CODE_SHIFT
+from whisker_protocol import CODES, STATUS_CODE_SHIFT
 
 sys.path.insert(0, str(ROOT / "tools/firmware"))
 import intel_hex  # noqa: E402

@@ -9,7 +9,7 @@ import sys
 import pytest
 from chainrun import END_S, FAST_LINK, ROOT, program, simulation, write_flat_scene
 
-from crunchbot.protocol import BOARDS, GATEWARE_HEADER, LANES, LIMITS
+from whisker_protocol import BOARDS, GATEWARE_HEADER, LANES, LIMITS
 
 sys.path[:0] = [str(ROOT / "fpga/boards")]
 import image as images  # noqa: E402

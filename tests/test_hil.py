@@ -12,7 +12,7 @@ import pytest
 from chainrun import BUILD, END_S, Cable, program, running, simulation, write_flat_scene
 
 from crunchbot.bridge.ring import FRAME, Clock
-from crunchbot.protocol import CODES, LIMITS, STATUS_CODE_SHIFT
+from whisker_protocol import CODES, LIMITS, STATUS_CODE_SHIFT
 
 HIL = Path(__file__).parent / "hil"
 sys.path.insert(0, str(HIL))

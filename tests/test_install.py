@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from chainrun import BUILD, END_S, ROOT, running, simulation, write_flat_scene
 
-from crunchbot.protocol import LIMITS
+from whisker_protocol import LIMITS
 
 EXAMPLES = ROOT / "host/libwhisker/examples"
 PRINTING = {"printf", "puts", "putchar", "fwrite", "fputs", "fputc", "fprintf", "vfprintf", "perror", "syslog"}

@@ -19,11 +19,11 @@ from quickmodels import quick_models
 
 from crunchbot import scene as scenes
 from crunchbot.bridge.ring import Reader
-from crunchbot.demo.chain import ChainRun, Link, run_chain
-from crunchbot.report.run import FILTERS
 from crunchbot.robot import link as links
 from crunchbot.robot import parts
-from crunchbot.simulation.scenes import make_scene
+from crunchbot_lab.demo.chain import ChainRun, Link, run_chain
+from crunchbot_lab.report.run import FILTERS
+from crunchbot_lab.simulation.scenes import make_scene
 
 SEED, SECONDS = 3, 5.0
 

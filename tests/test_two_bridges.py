@@ -11,7 +11,7 @@ from chainrun import END_S, FAST_LINK, program, running
 from crunchbot.bridge.ring import FRAME, Reader, Writer
 from crunchbot.bridge.wide import SECOND, wide
 from crunchbot.cli import main
-from crunchbot.protocol import LANES
+from whisker_protocol import LANES
 
 RING = f"whisker-two-{os.getpid()}"
 MICROFRAMES = 1 << 14

@@ -1,4 +1,5 @@
-"""`pip install .` without the build folder: a C compiler makes the wheel, and what it installs works on its own."""
+"""`pip install .` and `pip install ./lab` without the build folder: a C compiler makes the wheels, and what they install works
+on its own."""
 
 import os
 import shutil
@@ -8,9 +9,9 @@ import sysconfig
 from pathlib import Path
 
 import pytest
-from chainrun import ROOT
+from chainrun import BUILD, ROOT
 
-NEEDED = (
+PRODUCT = (
     "host/python",
     "host/libwhisker",
     "host/nav",
@@ -20,6 +21,7 @@ NEEDED = (
     "README.md",
     "LICENSE",
 )
+LAB = ("lab", "sim/signals", "sim/world", "sim/mechanics", "sim/mlx90333", "sim/node", "firmware/dspic/core")
 BUILT = shutil.ignore_patterns("*.so", "*.egg-info", "__pycache__", "tests")
 ROUND_TRIP = """
 import sys, numpy as np, crunchbot
@@ -42,31 +44,78 @@ def run(*words, **options) -> subprocess.CompletedProcess:
     return done
 
 
+def wheel(place: Path, project: Path) -> Path:
+    """The wheel of a project's folder."""
+    options = ["--quiet", "--no-deps", "--no-build-isolation", "--disable-pip-version-check"]
+    run(sys.executable, "-m", "pip", "wheel", *options, "--wheel-dir", place / project.name, project)
+    return next((place / project.name).glob("*.whl"))
+
+
 @pytest.fixture(scope="module")
-def venv(tmp_path_factory) -> Path:
-    """A fresh virtual environment with the wheel; what the package depends on is lent by this one."""
+def wheels(tmp_path_factory) -> tuple[Path, Path]:
+    """Those of the product and of the laboratory, from a copy of the sources alone."""
     place = tmp_path_factory.mktemp("wheel")
-    for name in NEEDED:
+    for name in (*PRODUCT, *LAB):
         source, copy = ROOT / name, place / "source" / name
         copy.parent.mkdir(parents=True, exist_ok=True)
         shutil.copytree(source, copy, ignore=BUILT) if source.is_dir() else shutil.copy(source, copy)
-    options = ["--quiet", "--no-deps", "--no-build-isolation", "--disable-pip-version-check"]
-    run(sys.executable, "-m", "pip", "wheel", *options, "--wheel-dir", place, place / "source")
-    run(sys.executable, "-m", "venv", "--without-pip", place / "venv")
-    site = Path(sysconfig.get_path("purelib", vars={"base": str(place / "venv")}))
-    wheel = next(place.glob("crunchbot-*.whl"))
-    run(sys.executable, "-m", "pip", "--python", place / "venv/bin/python", "install", *options, wheel)
+    return wheel(place, place / "source"), wheel(place, place / "source/lab")
+
+
+def fresh_venv(place: Path, *packages: Path) -> Path:
+    """A virtual environment with these wheels; what they depend on is lent by this one."""
+    run(sys.executable, "-m", "venv", "--without-pip", place)
+    site = Path(sysconfig.get_path("purelib", vars={"base": str(place)}))
+    options = ["--quiet", "--no-deps", "--disable-pip-version-check"]
+    run(sys.executable, "-m", "pip", "--python", place / "bin/python", "install", *options, *packages)
     (site / "lent.pth").write_text(sysconfig.get_path("purelib") + "\n")
-    return place / "venv"
+    return place
+
+
+@pytest.fixture(scope="module")
+def venv(wheels, tmp_path_factory) -> Path:
+    """With the product alone."""
+    return fresh_venv(tmp_path_factory.mktemp("product") / "venv", wheels[0])
+
+
+@pytest.fixture(scope="module")
+def lab(wheels, tmp_path_factory) -> Path:
+    """With product and laboratory."""
+    return fresh_venv(tmp_path_factory.mktemp("lab") / "venv", *wheels)
+
+
+def bare_environment(**more: str) -> dict[str, str]:
+    return {key: value for key, value in os.environ.items() if key != "PYTHONPATH"} | more
 
 
 def test_the_command_line_works(venv):
-    environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
-    said = run(venv / "bin/whisker", "--help", env=environment, cwd=venv).stdout
+    said = run(venv / "bin/whisker", "--help", env=bare_environment(), cwd=venv).stdout
     assert "  record " in said and "  localise " in said
-    assert "adaptive" in run(venv / "bin/whisker", "localise", "--list-filters", env=environment, cwd=venv).stdout
+    assert (
+        "adaptive" in run(venv / "bin/whisker", "localise", "--list-filters", env=bare_environment(), cwd=venv).stdout
+    )
+
+
+def test_the_laboratory_is_named_where_it_is_missing(venv):
+    # This environment's editable packages must not stand in for the missing one.
+    block = "import sys; sys.modules['crunchbot_lab'] = None; from crunchbot.cli import main; sys.exit(main())"
+    for words in (["scene", "make"], ["bridge-sim"], ["robot", "--simulated", "--out", "run"]):
+        done = subprocess.run(
+            [venv / "bin/python", "-c", block, *words], env=bare_environment(), cwd=venv, capture_output=True, text=True
+        )
+        assert done.returncode == 2 and done.stderr.count("\n") == 1 and "pip install crunchbot-lab" in done.stderr
+
+
+def test_a_simulated_robot_runs_where_the_wheels_are(lab):
+    """Its simulation's programs come from the build; nothing else of the source tree is used."""
+    where = "import crunchbot_lab.signals as s; print(s.__file__)"
+    assert run(lab / "bin/python", "-c", where, env=bare_environment(), cwd=lab).stdout.startswith(str(lab))
+    words = ["robot", "--simulated", "--seconds", "3", "--out", lab / "run", "--ring", "whisker-test-lab"]
+    words += ["--first-port", "7691"]
+    said = run(lab / "bin/whisker", *words, env=bare_environment(WHISKER_BUILD=str(BUILD)), cwd=lab).stdout
+    assert "all ended" in said
+    assert (lab / "run/truth.csv").stat().st_size > 0 and (lab / "run/models/texture.json").exists()
 
 
 def test_ring_filters_and_messages_are_inside(venv):
-    environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
-    run(venv / "bin/python", "-c", ROUND_TRIP, venv, env=environment, cwd=venv)
+    run(venv / "bin/python", "-c", ROUND_TRIP, venv, env=bare_environment(), cwd=venv)

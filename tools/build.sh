@@ -25,4 +25,4 @@ if ! cmake --build "$build"; then
     exit 1
 fi
 step "Python module for the library and the filters" .venv/bin/python host/python/crunchbot/build_ffi.py --build-dir "$build"
-step "Python module for the simulated world" .venv/bin/python sim/signals/build_signals_ffi.py --build-dir "$build"
+step "Python module for the simulated world" .venv/bin/python lab/crunchbot_lab/signals/build_ffi.py --build-dir "$build"

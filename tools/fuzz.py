@@ -5,7 +5,7 @@
     .venv/bin/python tools/fuzz.py --total 1e6        a short one
     .venv/bin/python tools/fuzz.py --only decoder     one target; what the results say of the others stays
 
-Targets: programs `fuzz_*` of the build (libFuzzer with AddressSanitizer and UBSan) and host/python/tests/*/fuzz_*.py. What
+Targets: programs `fuzz_*` of the build (libFuzzer with AddressSanitizer and UBSan) and host/python/tests and lab/tests, */fuzz_*.py. What
 they have found and counted is kept in build/bench/fuzz; a change of a target begins it anew.
 Writes bench/results/fuzz.json. An input that makes a target fail stays there too; then the exit code is 1.
 """
@@ -24,7 +24,7 @@ from pathlib import Path
 from tqdm import tqdm
 
 ROOT = Path(__file__).resolve().parent.parent
-TESTS = ROOT / "host/python/tests"
+TESTS = (ROOT / "host/python/tests", ROOT / "lab/tests")
 STATE, RESULTS = ROOT / "build/bench/fuzz", ROOT / "bench/results"
 TOTAL = 10**8
 SLOW_SHARE = 1 / 500  # of the inputs, to each target that takes some hundred times as long over one as the others
@@ -79,14 +79,14 @@ class Target:
 
     def command(self, inputs: int, seed: int) -> list[str]:
         if self.python:
-            return [sys.executable, str(TESTS / "fuzz.py"), self.name, "--inputs", str(inputs), "--seed", str(seed)]
+            return [sys.executable, str(TESTS[0] / "fuzz.py"), self.name, "--inputs", str(inputs), "--seed", str(seed)]
         options = [f"-runs={inputs}", f"-seed={seed}", "-verbosity=0", "-max_len=1300", "-timeout=10"]
         return [str(self.program), *options, f"-artifact_prefix={self.folder}/", str(self.folder / "corpus")]
 
 
 def find_targets(build: Path) -> list[Target]:
     programs = [path for path in build.rglob("fuzz_*") if path.is_file() and os.access(path, os.X_OK)]
-    scripts = TESTS.glob("*/fuzz_*.py")
+    scripts = (script for folder in TESTS for script in folder.glob("*/fuzz_*.py"))
     return [Target(path.stem.removeprefix("fuzz_"), path) for path in sorted([*programs, *scripts])]
 
 

@@ -70,10 +70,12 @@ if ! [ -e "$stamp" ] || ! cmp -s requirements.lock "$stamp"; then
         { echo "setup: Python packages could not be installed; check the package index or proxy, then run make again" >&2; exit 1; }
     cp requirements.lock "$stamp"
 fi
-# The editable install follows pyproject.toml: names of packages and programs stand there.
+# The editable installs follow pyproject.toml: names of packages and programs stand there.
 stamp=.venv/.installed
-if ! cmp -s pyproject.toml "$stamp"; then
-    .venv/bin/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable . ||
-        { echo "setup: the crunchbot package could not be installed into .venv; delete .venv and run make again" >&2; exit 1; }
-    cp pyproject.toml "$stamp"
+if ! cat pyproject.toml lab/pyproject.toml | cmp -s - "$stamp"; then
+    for project in . lab; do
+        .venv/bin/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable "$project" ||
+            { echo "setup: $project could not be installed into .venv; delete .venv and run make again" >&2; exit 1; }
+    done
+    cat pyproject.toml lab/pyproject.toml >"$stamp"
 fi

@@ -15,7 +15,7 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 REPO = HERE.parents[1]
-sys.path[:0] = [str(HERE), str(HERE.parent), str(REPO / "host" / "python")]
+sys.path[:0] = [str(HERE), str(HERE.parent)]
 
 import gowin  # noqa: E402
 import image  # noqa: E402

@@ -1,7 +1,7 @@
 """What a bridge's configuration flash holds beside bitstreams: images for an update over USB, and the jump to the image that
 an ECP5 falls back to."""
 
-from crunchbot.protocol import GATEWARE_HEADER, LIMITS, WIRE_VERSION, crc32
+from whisker_protocol import GATEWARE_HEADER, LIMITS, WIRE_VERSION, crc32
 
 SECTOR = 1 << 16  # bytes, unit of a board's `flash`
 PAGE = 256

@@ -10,7 +10,7 @@ import json
 from dataclasses import dataclass
 from pathlib import Path
 
-from crunchbot.protocol import LIMITS
+from whisker_protocol import LIMITS
 
 CLOCK_MHZ = LIMITS["clock_hz"] / 1e6
 PERIOD_NS = 1e3 / CLOCK_MHZ

@@ -17,7 +17,7 @@ import image  # noqa: E402
 import report  # noqa: E402
 from toolchain import ToolError, missing, must  # noqa: E402
 
-from crunchbot.protocol import GATEWARE_HEADER, LIMITS, crc32  # noqa: E402
+from whisker_protocol import GATEWARE_HEADER, LIMITS, crc32  # noqa: E402
 
 LACKING = missing("yosys")
 GOWIN_TOOLS = ("yosys", "nextpnr-himbaechel-gowin", "gowin_pack")

@@ -6,12 +6,11 @@ import sys
 from pathlib import Path
 
 REPO = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(REPO / "host" / "python"))
 
 from cocotb.clock import Clock  # noqa: E402
 from cocotb.triggers import ClockCycles, RisingEdge  # noqa: E402
 
-from crunchbot.protocol import CODES, LANES, RECORD, STATUS_CODE_SHIFT  # noqa: E402
+from whisker_protocol import CODES, LANES, RECORD, STATUS_CODE_SHIFT  # noqa: E402
 
 RTL = REPO / "fpga" / "bridge_rtl"
 LINK = ("node_link", "lane_receiver", "pattern_source", "record_store")  # modules of link_bench

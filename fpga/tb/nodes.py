@@ -6,7 +6,7 @@ from bench import CLOCK_PS
 from cocotb.triggers import FallingEdge, RisingEdge, Timer, ValueChange
 from cocotb.utils import get_sim_time
 
-from crunchbot.protocol import LANES, RECORD, SERVICE
+from whisker_protocol import LANES, RECORD, SERVICE
 
 BITS = 8 * RECORD.size
 

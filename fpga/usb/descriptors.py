@@ -19,7 +19,7 @@ from usb_protocol.emitters import DeviceDescriptorCollection
 from usb_protocol.emitters.descriptors.standard import ConfigurationDescriptorEmitter
 from usb_protocol.types import USBTransferType
 
-from crunchbot.protocol import BOARDS, LIMITS, REPORTS
+from whisker_protocol import BOARDS, LIMITS, REPORTS
 
 HID_CLASS = 0x03
 VENDOR_CLASS = 0xFF

@@ -4,7 +4,7 @@ from amaranth import Module, Mux, Signal
 from luna.gateware.usb.request.control import ControlRequestHandler
 from usb_protocol.types import USBRequestRecipient, USBRequestType
 
-from crunchbot.protocol import LIMITS, REPORTS
+from whisker_protocol import LIMITS, REPORTS
 
 GET_REPORT = 0x01
 SET_REPORT = 0x09

@@ -1,8 +1,7 @@
 """The adapter for eight nodes: four 74LVC244 with series resistors, eight cables, two Pmod headers, fused 5 V."""
 
-from schematic import Part, Sheet
-
 from node import CABLE, NOT_BUILT, R0603, R10K, capacitor
+from schematic import Part, Sheet
 
 LINES = ("SYNC", "SCK", "SELECT", "MOSI")
 INPUTS = (("2", "4", "6", "8"), ("17", "15", "13", "11"))  # 1A0 to 1A3, 2A0 to 2A3

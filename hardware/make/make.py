@@ -129,7 +129,6 @@ def make(sheet, root: Path) -> Path:
 
 def main() -> None:
     import adapter
-
     import node
 
     sheets = {sheet.name: sheet for sheet in (node.SHEET, adapter.SHEET)}

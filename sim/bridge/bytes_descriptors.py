@@ -10,7 +10,7 @@ import warnings
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT / "fpga/usb"), str(ROOT / "host/python")]
+sys.path.insert(0, str(ROOT / "fpga/usb"))
 warnings.filterwarnings("ignore", category=DeprecationWarning)  # LUNA's, about Amaranth's
 
 from descriptors import Build, descriptors  # noqa: E402

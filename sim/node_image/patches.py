@@ -5,7 +5,7 @@ from pathlib import Path
 
 from make_image import FIRST_ROW, HEADER_ROW, ROW, header
 
-from crunchbot.protocol import IMAGE_HEADER
+from whisker_protocol import IMAGE_HEADER
 
 HERE = Path(__file__).resolve().parent
 ROW_WORDS = ROW // 3

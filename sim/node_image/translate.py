@@ -20,7 +20,7 @@ from pathlib import Path
 import pypcode
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT / "tools/firmware"), str(ROOT / "host/python"), str(Path(__file__).resolve().parent)]
+sys.path[:0] = [str(ROOT / "tools/firmware"), str(Path(__file__).resolve().parent)]
 import intel_hex  # noqa: E402
 import patches  # noqa: E402
 

@@ -5,9 +5,9 @@ import json
 import sys
 from pathlib import Path
 
-from crunchbot.demo.training import learn
-from crunchbot.simulation.scenes import make_scene
 from crunchbot.stopping import interrupt_on_signals
+from crunchbot_lab.demo.training import learn
+from crunchbot_lab.simulation.scenes import make_scene
 
 from .course import FAULTS, Course, as_json
 from .machine import Plan

@@ -7,7 +7,7 @@ from bisect import bisect_left
 from dataclasses import asdict, dataclass, field, replace
 
 from crunchbot.robot.link import Link
-from crunchbot.simulation.scenes import make_robot
+from crunchbot_lab.simulation.scenes import make_robot
 
 from .faults import FAULTS, WHISKER, Fault
 from .gaps import GAPS, Count, Gap, slipped

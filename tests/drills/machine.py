@@ -15,7 +15,7 @@ from crunchbot.robot.link import Link
 from crunchbot.robot.logs import run_folder
 from crunchbot.robot.supervisor import Supervisor
 from crunchbot.robot.truth import TruthWatcher
-from crunchbot.simulation.scenes import make_scene
+from crunchbot_lab.simulation.scenes import make_scene
 
 from .relays import Hands, Line, Network, free_ports
 

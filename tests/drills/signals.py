@@ -27,7 +27,7 @@ from quickmodels import quick_models
 from crunchbot import cli, stopping
 from crunchbot import scene as scenes
 from crunchbot.bridge.ring import FRAME, Writer
-from crunchbot.simulation.scenes import make_scene
+from crunchbot_lab.simulation.scenes import make_scene
 
 from .relays import free_ports
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from checks import SkipError, require, until
 
 from crunchbot.pilot.base import Base, BaseLost
-from crunchbot.simulation.bridge import program
+from crunchbot.programs import program
 
 START_S = 20.0  # for whisker-base and the first frame
 SILENCE_S = 10.0  # without a frame of the stream

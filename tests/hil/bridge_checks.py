@@ -13,9 +13,9 @@ from crunchbot.bridge import usbtree
 from crunchbot.bridge.ring import Clock
 from crunchbot.bridge.status import explain
 from crunchbot.native import lib
-from crunchbot.protocol import FRAME_BYTES, LANES, LIMITS, WIRE_VERSION
-from crunchbot.simulation.bridge import program
+from crunchbot.programs import program
 from crunchbot.touch.calibration import measure_rest
+from whisker_protocol import FRAME_BYTES, LANES, LIMITS, WIRE_VERSION
 
 REPLUG_FRAMES = 8192  # 4 s: from the return to the look at it
 PERSON_S = 300.0  # to reach for a plug

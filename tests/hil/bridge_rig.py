@@ -11,9 +11,9 @@ from checks import CheckError, SkipError, require, skip, until
 
 from crunchbot.bridge import usbtree
 from crunchbot.bridge.ring import Clock, DaemonStats, Reader, RingError
-from crunchbot.protocol import CODES, LANES, STATUS_CODE_SHIFT
-from crunchbot.simulation.bridge import program
+from crunchbot.programs import program
 from crunchbot.touch.calibration import TICKS_PER_S
+from whisker_protocol import CODES, LANES, STATUS_CODE_SHIFT
 
 START_S = 60.0  # for whiskerd to open its bridge; a simulation may be slow
 SILENCE_S = 30.0  # without a frame

@@ -10,7 +10,7 @@ import usb.util
 from checks import CheckError, require
 
 from crunchbot.bridge.usbtree import Bridge
-from crunchbot.protocol import FRAME_BYTES, FRAME_FLAGS, FRAME_HEADER, LIMITS, REPORTS, WIRE_VERSION
+from whisker_protocol import FRAME_BYTES, FRAME_FLAGS, FRAME_HEADER, LIMITS, REPORTS, WIRE_VERSION
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "fpga/usb"))
 warnings.filterwarnings("ignore", category=DeprecationWarning)  # LUNA's, about Amaranth's

@@ -10,8 +10,8 @@ from pathlib import Path
 from guest import OUT, Device, Guest, Report, converse, pull_cable, qemu, redirected
 from image import MODULES, initramfs, kernel, load_order
 
-from crunchbot.protocol import LANES
-from crunchbot.simulation.bridge import program
+from crunchbot.programs import program
+from whisker_protocol import LANES
 
 HERE = Path(__file__).resolve().parent
 NAME = "bridge"

@@ -11,8 +11,9 @@ from pathlib import Path
 
 from image import MissingError
 
-from crunchbot.protocol import LANES
-from crunchbot.simulation.bridge import flat_scene, program
+from crunchbot.programs import program
+from crunchbot_lab.simulation.bridge import flat_scene
+from whisker_protocol import LANES
 
 ROOT = Path(__file__).resolve().parents[2]
 OUT = ROOT / "build/kernel"

@@ -12,10 +12,10 @@ from contextlib import contextmanager
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "host/python"))
+sys.path.insert(0, str(ROOT / "protocol"))
 from guest_talk import PLUG_S, PROGRAM_S, CheckError, Checks, Talk, await_that, command, require  # noqa: E402
 
-from crunchbot.protocol import FRAME_BYTES, LIMITS, REPORTS, WIRE_VERSION, decode_frame  # noqa: E402
+from whisker_protocol import FRAME_BYTES, LIMITS, REPORTS, WIRE_VERSION, decode_frame  # noqa: E402
 
 HOST = "10.0.2.2"  # the machine that runs the guest, in QEMU's user network
 LONG_RUN_FRAMES = 20000

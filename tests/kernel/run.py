@@ -17,7 +17,7 @@ import services_guest
 from guest import OUT, Report
 from image import MissingError, check_tools
 
-from crunchbot.simulation.bridge import SimulationError
+from crunchbot.errors import UserError
 
 GUESTS = {"bridge": bridge_guest.run, "services": services_guest.run}
 
@@ -36,7 +36,7 @@ def main() -> int:
         OUT.mkdir(parents=True, exist_ok=True)
         for name in chosen:
             GUESTS[name](report)
-    except (MissingError, SimulationError) as error:
+    except (MissingError, UserError) as error:
         print(f"test-kernel: {error}", file=sys.stderr)
         return 2
     return report.end()

@@ -11,7 +11,7 @@ from pathlib import Path
 from guest import OUT, Device, Guest, Report, converse, pull_cable, qemu, redirected
 from image import MissingError, debian, initramfs, kernel, load_order
 
-from crunchbot.simulation.bridge import program
+from crunchbot.programs import program
 
 HERE = Path(__file__).resolve().parent
 NAME = "services"

@@ -74,7 +74,9 @@ class Tree:
         """Whether a command ended well, and what it wrote. One that takes too long has failed."""
         # No bytecode: what was compiled of a mutant must not stand for the file restored within the same second.
         environment = os.environ | {"WHISKER_BUILD": BUILD, "PYTHONDONTWRITEBYTECODE": "1"}
-        environment["PYTHONPATH"] = str(self.folder / "host/python")
+        environment["PYTHONPATH"] = os.pathsep.join(
+            str(self.folder / place) for place in ("host/python", "lab", "protocol")
+        )
         with tempfile.TemporaryFile("w+", errors="replace") as output:
             process = subprocess.Popen(
                 words,

@@ -9,8 +9,8 @@ from functools import cache
 from pathlib import Path
 
 BUILD = "build/release"
-PACKAGE = "host/python"
-PYTHON_TESTS = ("host/python/tests", "tests", "sim/signals/tests")
+PACKAGES = {"host/python": "crunchbot", "lab": "crunchbot_lab"}  # place: package
+PYTHON_TESTS = ("host/python/tests", "tests", "lab/tests")
 C_FOLDERS = ("firmware/dspic", "host/libwhisker", "host/nav", "host/create", "host/apps")
 # What the tests of a folder's own programs do not reach: processes driven from Python, nodes on the simulated chip.
 ALSO = {
@@ -67,12 +67,12 @@ def _bench_text(folder: Path) -> str:
 
 def _importers(root: Path, file: str) -> tuple[str, ...]:
     """Test files that import this module; where there are none, those that import a module that does."""
-    module = _module(Path(file).relative_to(PACKAGE)) if file.startswith(PACKAGE) else ""
+    module = _module_at(Path(file))
     tests = _imports(root, PYTHON_TESTS)
     direct = tuple(path for path, names in tests.items() if module in names and Path(path).name.startswith("test_"))
     if direct:
         return direct
-    users = {_module(Path(path).relative_to(PACKAGE)) for path, names in _product(root).items() if module in names}
+    users = {_module_at(Path(path)) for path, names in _product(root).items() if module in names}
     return tuple(path for path, names in tests.items() if users & names and Path(path).name.startswith("test_"))
 
 
@@ -84,13 +84,17 @@ def _imports(root: Path, folders: tuple[str, ...]) -> dict[str, frozenset[str]]:
 
 @cache
 def _product(root: Path) -> dict[str, frozenset[str]]:
-    paths = sorted((root / PACKAGE / "crunchbot").rglob("*.py"))
-    modules = {path: _module(path.relative_to(root / PACKAGE)) for path in paths}
-    return {path.relative_to(root).as_posix(): _names(path, name) for path, name in modules.items()}
+    paths = [path for place, name in PACKAGES.items() for path in sorted((root / place / name).rglob("*.py"))]
+    modules = {path.relative_to(root): _module_at(path.relative_to(root)) for path in paths}
+    return {path.as_posix(): _names(root / path, name) for path, name in modules.items()}
 
 
-def _module(path: Path) -> str:
-    parts = path.with_suffix("").parts
+def _module_at(path: Path) -> str:
+    """The dotted name of a module at this path of the tree; empty for a file of no package."""
+    place = next((place for place in PACKAGES if path.is_relative_to(place)), None)
+    if place is None:
+        return ""
+    parts = path.relative_to(place).with_suffix("").parts
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 

@@ -15,10 +15,10 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT / "host/python"), str(Path(__file__).resolve().parent)]
+sys.path[:0] = [str(ROOT / "protocol"), str(Path(__file__).resolve().parent)]
 import intel_hex  # noqa: E402
 
-from crunchbot.protocol import IMAGE_HEADER, LIMITS, WIRE_VERSION, crc32  # noqa: E402
+from whisker_protocol import IMAGE_HEADER, LIMITS, WIRE_VERSION, crc32  # noqa: E402
 
 ROW = LIMITS["flash_row_bytes"]
 ROW_HEX = ROW // 3 * 4  # bytes of a row in the HEX file

@@ -12,9 +12,9 @@ from .tree import ROOT
 ALLOWED = {
     "firmware/dspic": [],
     "fpga/bridge_rtl": [],
-    "fpga/usb": ["host/python"],  # only the protocol reader, for descriptors
+    "fpga/usb": ["protocol"],  # for descriptors
     "fpga/formal": ["fpga/bridge_rtl"],
-    "fpga/boards": ["fpga/bridge_rtl", "fpga/usb", "host/python"],  # clock and limits of the protocol
+    "fpga/boards": ["fpga/bridge_rtl", "fpga/usb", "protocol"],
     "host/libwhisker": [],
     "host/nav/touch": ["host/nav/problem"],  # random numbers
     "host/nav/problem": [],
@@ -25,11 +25,12 @@ ALLOWED = {
     "host/nav": [],
     "host/create": [],
     "host/apps": ["host/libwhisker", "host/nav", "host/create"],
-    "host/python": ["host/libwhisker", "host/nav", "sim/signals"],
+    "host/python": ["host/libwhisker", "host/nav", "protocol"],
+    "lab": ["host/python", "sim/signals", "protocol"],
     "sim/mlx90333": ["sim/node", "firmware/dspic"],  # one copy of the data sheet
     "sim/dspic": ["firmware/dspic"],  # addresses and bits, and what the accessors call
     "sim/node": ["sim/mlx90333", "sim/dspic", "firmware/dspic"],
-    "sim/node_image": ["sim/node", "sim/mlx90333", "sim/dspic", "firmware/dspic", "host/python"],  # the image's header
+    "sim/node_image": ["sim/node", "sim/mlx90333", "sim/dspic", "firmware/dspic", "protocol"],  # the image's header
     "sim/mechanics": ["host/nav/problem"],  # interpolation
     "sim/world": ["sim/mechanics", "sim/node"],
     "sim/signals": ["sim/world", "sim/mechanics", "sim/mlx90333", "sim/node"],
@@ -44,40 +45,34 @@ ALLOWED = {
         "fpga/usb",
     ],
 }
-# Room of the Python package -> rooms it may use besides its own and the modules that lie in no room, which use none.
+# Of each Python package: room -> rooms it may use besides its own and the modules that lie in no room, which use none.
 # A room stands below all it uses: nothing reaches back.
-PACKAGE = "host/python/crunchbot"
 ROOMS = {
-    "": [],
-    "bridge": [],
-    "touch": ["bridge"],
-    "pilot": ["touch"],
-    "nav": [],
-    "recording": ["bridge"],
-    "simulation": ["pilot"],
-    "robot": ["bridge", "touch", "pilot", "nav", "recording", "simulation"],
-    "scenes": ["touch", "pilot", "nav", "recording", "simulation", "robot"],
-    "view": ["bridge", "robot"],
-    "report": [],
-    "demo": ["touch", "pilot", "nav", "recording", "simulation", "robot", "report"],
-    "commands": [
-        "bridge",
-        "touch",
-        "pilot",
-        "nav",
-        "recording",
-        "simulation",
-        "robot",
-        "scenes",
-        "view",
-        "report",
-        "demo",
-    ],
+    "host/python/crunchbot": {
+        "": [],
+        "bridge": [],
+        "touch": ["bridge"],
+        "pilot": ["touch"],
+        "nav": [],
+        "recording": ["bridge"],
+        "robot": ["bridge", "touch", "pilot", "nav", "recording"],
+        "view": ["bridge", "robot"],
+        "commands": ["bridge", "touch", "pilot", "nav", "recording", "robot", "view"],
+    },
+    "lab/crunchbot_lab": {
+        "": [],
+        "signals": [],
+        "simulation": [],
+        "scenes": ["simulation"],
+        "report": [],
+        "demo": ["signals", "simulation", "report"],
+        "commands": ["simulation", "scenes", "report"],
+    },
 }
 INCLUDE = re.compile(r'^\s*[#`]include\s+["<]([^">]+)[">]', re.MULTILINE)
 IMPORT = re.compile(r"^\s*(?:from|import)\s+([a-zA-Z_][\w.]*)", re.MULTILINE)
 SUFFIXES = {".c", ".h", ".cpp", ".v", ".vh", ".py"}
-PYTHON_PACKAGES = {"crunchbot": "host/python", "signals": "sim/signals"}
+PYTHON_PACKAGES = {"crunchbot": "host/python", "crunchbot_lab": "lab", "whisker_protocol": "protocol"}
 
 
 def room_of(path: Path, root: Path) -> str | None:
@@ -126,16 +121,16 @@ def imported(path: Path, package: Path) -> set[str]:
 
 
 def room_violations(root: Path = ROOT) -> list[str]:
-    """Arrows between rooms of the Python package that its table does not allow."""
-    package = root / PACKAGE
+    """Arrows between rooms of a Python package that its table does not allow."""
     bad = []
-    for path in sorted(package.rglob("*.py")):
-        room = (path.relative_to(package).parts[:-1] or ("",))[0]
-        used = {name for name in imported(path, package) - {room} if (package / name).is_dir()}
-        for name in sorted(used - set(ROOMS.get(room, []))):
-            bad.append(
-                f"{path.relative_to(root)}: {room or 'the root'} must not use {name}; move the code or turn the arrow round"
-            )
+    for place, rooms in ROOMS.items():
+        package = root / place
+        for path in sorted(package.rglob("*.py")):
+            room = (path.relative_to(package).parts[:-1] or ("",))[0]
+            used = {name for name in imported(path, package) - {room} if (package / name).is_dir()}
+            for name in sorted(used - set(rooms.get(room, []))):
+                where = f"{path.relative_to(root)}: {room or 'the root'}"
+                bad.append(f"{where} must not use {name}; move the code or turn the arrow round")
     return bad
 
 

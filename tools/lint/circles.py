@@ -8,7 +8,7 @@ from pathlib import Path
 from .tree import ROOT, read, written
 
 INCLUDE = re.compile(r'^\s*#\s*include\s+["<]([^">]+)[">]', re.MULTILINE)
-PACKAGES = {"crunchbot": "host/python", "crunchbot_lab": "sim/python"}
+PACKAGES = {"crunchbot": "host/python", "crunchbot_lab": "lab"}
 
 
 def includes(root: Path) -> dict[str, set[str]]:

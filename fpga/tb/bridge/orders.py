@@ -8,7 +8,7 @@ from cocotb.triggers import ClockCycles, FallingEdge
 from cycles import service
 from rig import CYCLES_PER_TICK, NODES, answer, begin, check, reported
 
-from crunchbot.protocol import COMMANDS, LANES, LIMITS, ORDER, WIRE_VERSION, service_window
+from whisker_protocol import COMMANDS, LANES, LIMITS, ORDER, WIRE_VERSION, service_window
 
 SERVICE_CYCLES = service(divider=6, gap=30)
 

@@ -8,7 +8,7 @@ from bench import error_record, pulse, record, start_clock
 from cocotb.triggers import ClockCycles, FallingEdge, RisingEdge
 from nodes import Nodes
 
-from crunchbot.protocol import (
+from whisker_protocol import (
     CODES,
     FRAME_BYTES,
     FRAME_FLAGS,

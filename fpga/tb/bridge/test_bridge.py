@@ -6,7 +6,7 @@ from cocotb.triggers import ClockCycles, FallingEdge, RisingEdge
 from cycles import FRAMER, transfer
 from rig import CYCLES_PER_TICK, FAST, FIFO_FRAMES, NODES, RTL, begin, check, reading
 
-from crunchbot.protocol import FRAME_BYTES, FRAME_FLAGS, LANES, LIMITS, ORDER, REPORTS, WIRE_VERSION
+from whisker_protocol import FRAME_BYTES, FRAME_FLAGS, LANES, LIMITS, ORDER, REPORTS, WIRE_VERSION
 
 
 @cocotb.test(timeout_time=20, timeout_unit="ms")

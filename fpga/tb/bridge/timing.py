@@ -8,7 +8,7 @@ from bench import pulse
 from cocotb.triggers import ClockCycles, FallingEdge, RisingEdge, with_timeout
 from rig import FAST, NODES, answer, begin, check, reading, reported
 
-from crunchbot.protocol import CONTROL_OPTIONS, FRAME_BYTES, FRAME_FLAGS, LANES, LIMITS, REPORTS, decode_frame
+from whisker_protocol import CONTROL_OPTIONS, FRAME_BYTES, FRAME_FLAGS, LANES, LIMITS, REPORTS, decode_frame
 
 PERIOD = LIMITS["tick_period_min"]
 TICK_IN, EVERY, PATTERN = (CONTROL_OPTIONS[name] for name in ("tick_in", "every_frame", "pattern"))

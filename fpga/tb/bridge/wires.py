@@ -7,7 +7,7 @@ from bench import error_record, pulse, record, wrong_tick
 from cocotb.triggers import ClockCycles, FallingEdge
 from rig import FAST, FIFO_FRAMES, answer, begin, reported
 
-from crunchbot.protocol import FRAME_FLAGS, LANES, REPORTS, WIRE_VERSION
+from whisker_protocol import FRAME_FLAGS, LANES, REPORTS, WIRE_VERSION
 
 COUNTS = ("ticks", "frames", "dropped", "sequence_number")
 RECORD_COUNTS = ("records_good", "records_absent", "records_crc", "records_tick")

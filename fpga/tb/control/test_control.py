@@ -6,7 +6,7 @@ import cocotb
 from bench import pulse, run_bench, start_clock
 from cocotb.triggers import ClockCycles, FallingEdge, RisingEdge
 
-from crunchbot.protocol import CONTROL_OPTIONS, LANES, LIMITS, REPORTS, WIRE_VERSION
+from whisker_protocol import CONTROL_OPTIONS, LANES, LIMITS, REPORTS, WIRE_VERSION
 
 CONTROL = REPORTS["control"]
 SETTINGS = ("run", "sck_divider", "word_gap", "sample_point", "options", "lane_mask", "tick_period")

@@ -6,7 +6,7 @@ import cocotb
 from bench import pulse, run_bench, start_clock
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from crunchbot.protocol import DEFINITION, crc8
+from whisker_protocol import DEFINITION, crc8
 
 
 async def checksum(dut, data: bytes, gap: float = 0.0) -> int:

@@ -7,7 +7,7 @@ from bench import CLOCK_PS, pulse, run_bench, start_clock
 from chip import ENABLE, ERASE, IDENTIFY, IDENTITY, PROGRAM, READ, SECTOR, SIZE, STATUS, Chip, watch_pins
 from cocotb.triggers import ClockCycles, FallingEdge, RisingEdge
 
-from crunchbot.protocol import FLASH_COMMANDS, REPORTS, WIRE_VERSION
+from whisker_protocol import FLASH_COMMANDS, REPORTS, WIRE_VERSION
 
 FLASH = REPORTS["flash"]
 SECTORS = 3

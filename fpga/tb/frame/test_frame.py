@@ -6,7 +6,7 @@ import cocotb
 from bench import error_record, pulse, record, run_bench, start_clock
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from crunchbot.protocol import CODES, FRAME_BYTES, FRAME_FLAGS, FRAME_HEADER, LANES, LIMITS, WIRE_VERSION, decode_frame
+from whisker_protocol import CODES, FRAME_BYTES, FRAME_FLAGS, FRAME_HEADER, LANES, LIMITS, WIRE_VERSION, decode_frame
 
 ALL = (1 << LANES) - 1
 FIFO_FRAMES = LIMITS["fifo_bytes"] // FRAME_BYTES

@@ -7,7 +7,7 @@ import pytest
 from bench import error_record, run_bench
 from bridge.rig import RTL, Rig, answer, begin, reading, reported
 
-from crunchbot.protocol import FRAME_BYTES, LANES
+from whisker_protocol import FRAME_BYTES, LANES
 
 HAVE = int(os.environ.get("WHISKER_BENCH_LANES", LANES))
 

@@ -8,7 +8,7 @@ from cocotb.triggers import FallingEdge, RisingEdge
 from cycles import transfer as transfer_cycles
 from nodes import BITS, Nodes
 
-from crunchbot.protocol import COMMANDS, LANES, ORDER, RECORD, SERVICE, crc8, service_window
+from whisker_protocol import COMMANDS, LANES, ORDER, RECORD, SERVICE, crc8, service_window
 
 SETTINGS = [(6, 30, 3), (6, 30, 5), (16, 180, 8), (32, 30, 16), (32, 255, 32), (8, 41, 1)]  # divider, gap, sample point
 SELECT_SETUP = 9  # cycles: 150 ns

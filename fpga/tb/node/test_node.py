@@ -13,7 +13,7 @@ from cocotb.triggers import FallingEdge, Timer, ValueChange
 from cocotb.utils import get_sim_time
 from firmware import LOST_CLOCK, MOSI, SCK, SELECT, SYNC, Node, Parts
 
-from crunchbot.protocol import CODES, LANES, RECORD, STATUS_CODE_SHIFT
+from whisker_protocol import CODES, LANES, RECORD, STATUS_CODE_SHIFT
 
 TICK_PS = 500_000_000
 IDLE = (1 << LANES) - 1

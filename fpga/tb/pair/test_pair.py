@@ -16,7 +16,7 @@ from cocotb.clock import Clock
 from cocotb.triggers import ClockCycles, RisingEdge, Timer, ValueChange
 from cocotb.utils import get_sim_time
 
-from crunchbot.protocol import CONTROL_OPTIONS, LIMITS
+from whisker_protocol import CONTROL_OPTIONS, LIMITS
 
 PERIOD = LIMITS["tick_period_min"]
 TICKS = 10  # two clocks 120 ppm apart drift by half a cycle in one

@@ -7,7 +7,7 @@ from bench import error_record, pulse, run_bench, start_clock
 from cocotb.triggers import FallingEdge, RisingEdge
 from nodes import BITS
 
-from crunchbot.protocol import LANES, LIMITS, RECORD, REPORTS, SERVICE, WIRE_VERSION, service_window
+from whisker_protocol import LANES, LIMITS, RECORD, REPORTS, SERVICE, WIRE_VERSION, service_window
 
 ALL = (1 << LANES) - 1
 PACKET = 64  # bytes of a control endpoint's packet

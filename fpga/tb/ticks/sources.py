@@ -7,7 +7,7 @@ from bench import pulse
 from cocotb.triggers import ClockCycles, FallingEdge, RisingEdge
 from test_ticks import begin, drive
 
-from crunchbot.protocol import LIMITS
+from whisker_protocol import LIMITS
 
 COUNTS = ("edges", "early", "silent", "uneven", "shortest")
 NEVER = 0xFFFFFFFF

@@ -6,7 +6,7 @@ import cocotb
 from bench import pulse, run_bench, start_clock
 from cocotb.triggers import FallingEdge
 
-from crunchbot.protocol import CODES, LIMITS
+from whisker_protocol import CODES, LIMITS
 
 IDLE = {"restart": 0, "enable": 0, "link_busy": 0, "external": 0, "strobe": 0, "period": 2, "pause": 0}
 IDLE |= dict.fromkeys(("tick_in", "falling", "clear", "watch", "busy", "sof", "sof_frame", "stamp"), 0)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-sys.path[:0] = [str(Path(__file__).parents[2] / "usb"), str(Path(__file__).parents[3] / "host" / "python")]
+sys.path.insert(0, str(Path(__file__).parents[2] / "usb"))
 
 from descriptors import Build, configuration, descriptors  # noqa: E402
 

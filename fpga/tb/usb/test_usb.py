@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-sys.path[:0] = [str(Path(__file__).parents[2] / "usb"), str(Path(__file__).parents[3] / "host" / "python")]
+sys.path.insert(0, str(Path(__file__).parents[2] / "usb"))
 
 from amaranth.sim import Simulator  # noqa: E402
 from descriptors import Build, descriptors, report_descriptor  # noqa: E402
@@ -13,7 +13,7 @@ from endpoints import FrameEndpoint, SilentEndpoint  # noqa: E402
 from hid_requests import FEATURE, GET_REPORT, READ, SET_IDLE, SET_REPORT, WRITTEN, HidRequests  # noqa: E402
 from usb_protocol.types import USBRequestRecipient, USBRequestType  # noqa: E402
 
-from crunchbot.protocol import LIMITS, REPORTS  # noqa: E402
+from whisker_protocol import LIMITS, REPORTS  # noqa: E402
 
 PACKET = LIMITS["bulk_packet"]
 CONTROL = REPORTS["control"]

@@ -1,14 +1,17 @@
 """The command line `whisker`: finds the subcommand, runs it, and turns what a person can mend into one line.
 
-Subcommands live in `crunchbot.commands`; only the one that is called is imported, so that help is quick.
+Subcommands live in `crunchbot.commands`, those of the laboratory in `crunchbot_lab.commands`; only the one that is called is
+imported, so that help is quick.
 """
 
 import argparse
 import importlib
 import sys
+from types import ModuleType
 
 from .arguments import Parser
 from .ends import exit_code
+from .lab import import_lab
 
 # name (its module has underscores for dashes): what it does
 COMMANDS = {
@@ -33,6 +36,7 @@ COMMANDS = {
     "texture": "learn and tell floor surfaces",
     "radial": "learn and tell the distance of contacts along a whisker",
 }
+LAB_COMMANDS = ("bridge-sim", "scene", "bench")  # of the package crunchbot_lab
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -57,10 +61,18 @@ def _parser(chosen: str) -> Parser:
     for name, text in COMMANDS.items():
         command = commands.add_parser(name, description=text)
         if name == chosen:
-            module = importlib.import_module(f".commands.{name.replace('-', '_')}", __package__)
+            module = _module(name)
             command.show_example(module.EXAMPLE)
             module.add(command)
     return parser
+
+
+def _module(name: str) -> ModuleType:
+    """The module of a subcommand. UserError for one of the laboratory where that package is not installed."""
+    path = f"commands.{name.replace('-', '_')}"
+    if name in LAB_COMMANDS:
+        return import_lab(path, f"whisker {name}")
+    return importlib.import_module(f".{path}", __package__)
 
 
 if __name__ == "__main__":

@@ -21,7 +21,6 @@ from crunchbot.bridge.ring import FRAME, Writer
 from crunchbot.native import as_doubles, doubles, ffi, lib, octets
 from crunchbot.nav.filters import COMPONENT, Filter, Sensor, prior_fault
 from crunchbot.nav.weigher import Weigher
-from crunchbot.simulation.world import SIM
 from crunchbot.touch.contact import Contact
 from crunchbot.touch.contact_filter import ContactFilter
 from crunchbot.touch.radial.model import RadialModel, peak
@@ -32,6 +31,7 @@ from crunchbot.touch.texture.classifier import Classifier, blocks_of, plain_feat
 from crunchbot.touch.texture.model import TextureModel
 from crunchbot.touch.texture.novelty import Novelty
 from crunchbot.touch.texture.spectral import forward
+from crunchbot_lab import signals
 
 PACKAGE = Path(crunchbot.__file__).parent
 HELPERS = {"doubles", "octets", "pointer"}
@@ -173,7 +173,7 @@ CASES["touch.radial.shape._column"] = CASES["touch.radial.shape.shape_of"]
 def sources() -> dict[str, Path]:
     """Python modules that may call into C, by name."""
     ours = {".".join(p.relative_to(PACKAGE).with_suffix("").parts): p for p in PACKAGE.rglob("*.py")}
-    theirs = {f"signals.{p.stem}": p for p in (SIM / "signals").glob("*.py")}
+    theirs = {f"signals.{p.stem}": p for p in Path(signals.__file__).parent.glob("*.py")}
     return {name: path for name, path in (ours | theirs).items() if name not in ("native", "signals.border")}
 
 

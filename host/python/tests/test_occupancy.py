@@ -102,7 +102,7 @@ BROKEN = {
 }
 
 
-@pytest.mark.parametrize("old, new, told", [(old, *pair) for old, pair in BROKEN.items()])
+@pytest.mark.parametrize("old, new, reported", [(old, *pair) for old, pair in BROKEN.items()])
 def test_what_is_wrong_is_one_line_with_file_and_field(tmp_path, old, new, reported):
     with pytest.raises(SceneError, match=reported) as caught:
         read_map(write(tmp_path, text=YAML.replace(old, new, 1)))

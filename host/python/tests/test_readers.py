@@ -14,10 +14,10 @@ from models import model
 from crunchbot.fields import Fields
 from crunchbot.nav import localise
 from crunchbot.scene import OBSTACLES_MOST, WHISKERS_MOST, SceneError, load
-from crunchbot.simulation.bridge import SimulationError, read_faults
 from crunchbot.tables import TableError, read_columns
 from crunchbot.touch.radial import model as radial
 from crunchbot.touch.texture import model as texture
+from crunchbot_lab.simulation.bridge import SimulationError, read_faults
 
 DEEP = 100_000
 BOM = b"\xef\xbb\xbf"

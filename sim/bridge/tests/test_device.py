@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from crunchbot import protocol
+import whisker_protocol as protocol
 
 SIMULATION = os.environ.get("WHISKER_BRIDGE_SIM", "")
 CLIENT = os.environ.get("WHISKER_STREAM_CLIENT", "")

@@ -26,7 +26,7 @@ import build as boards  # noqa: E402
 import cycles  # noqa: E402
 import report  # noqa: E402
 
-from crunchbot.protocol import FRAME_BYTES, LIMITS  # noqa: E402
+from whisker_protocol import FRAME_BYTES, LIMITS  # noqa: E402
 
 SWEPT = "colorlight_i9"  # the chart of resources over lanes
 COUNTS = (28, 12, 1, 14, 6)  # of lanes; what is asked for most often comes first

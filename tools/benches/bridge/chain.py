@@ -17,15 +17,15 @@ import numpy as np
 from matplotlib.figure import Figure
 from tqdm import tqdm
 
-from crunchbot.demo.level1 import explore
-from crunchbot.demo.training import learn
 from crunchbot.nav import localise
 from crunchbot.nav.observations import cell
 from crunchbot.pilot.pilot import Pilot
-from crunchbot.report import figures
-from crunchbot.report.run import Run
 from crunchbot.robot.models import load_models
-from crunchbot.simulation.scenes import make_scene
+from crunchbot_lab.demo.level1 import explore
+from crunchbot_lab.demo.training import learn
+from crunchbot_lab.report import figures
+from crunchbot_lab.report.run import Run
+from crunchbot_lab.simulation.scenes import make_scene
 
 from .. import store
 
@@ -77,7 +77,7 @@ def bridge_speed(build: Path, lanes: int, link: tuple[int, int, int]) -> dict:
 def chain_speed(build: Path, lanes: int) -> dict:
     """The whole chain: whiskerd under umockdev, whisker-log, pilot and navigator beside it, faults injected."""
     out = DEMO.with_name(f"demo_{lanes}") if lanes != CHAIN_LANES[0] else DEMO
-    command = [sys.executable, "-m", "crunchbot.demo", "--out", out, "--build-dir", build, "--lanes", lanes]
+    command = [sys.executable, "-m", "crunchbot_lab.demo", "--out", out, "--build-dir", build, "--lanes", lanes]
     subprocess.run(
         [str(word) for word in [*command, "--seconds", CHAIN_SECONDS]],
         check=True,

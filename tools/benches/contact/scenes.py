@@ -5,7 +5,6 @@ A scene gives, for every tick of 0.5 ms from the first touch on: the base's moti
 in two axes, and the truth in the whisker's frame.
 """
 
-import sys
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,7 +14,6 @@ from ..mechanics.measure import chain, spec
 
 ROOT = Path(__file__).resolve().parents[3]
 FOLLOW = Path(__file__).resolve().parent / "peers/follow.py"
-sys.path.insert(0, str(ROOT / "sim"))
 
 TICK_S = 5e-4
 CONE, TIP = 0.181739, 0.140
@@ -108,7 +106,7 @@ class Corner(NamedTuple):
         `ahead_m`: how far the corner stands ahead of the place at which it would touch first. Base and object have moved
         as in the first tick for LEAD ticks before: what the start excites has decayed.
         """
-        from signals.mechanics import WHOLE, Whisker, touch
+        from crunchbot_lab.signals.mechanics import WHOLE, Whisker, touch
 
         whisker = Whisker(kappa=KAPPA, friction=friction, creep=CREEP, creep_s=CREEP_S)
         bases = np.concatenate([np.tile(self.plan.bases[0], (LEAD, 1)), self.plan.bases])
@@ -142,7 +140,7 @@ class Corner(NamedTuple):
         Unknown: start of the contact (free), place, gain, friction, error of the reported motion, and of an object that moves
         its velocity, with the priors of the filter. The whisker is quasi-static, the kind of contact known.
         """
-        from signals.mechanics import LARGE
+        from crunchbot_lab.signals.mechanics import LARGE
 
         moves = bool(np.any(self.plan.velocity))
         steps = {"radius": 1e-4, "ahead": 1e-5, "motion": 1e-3, "friction": 1e-2} | (
@@ -178,7 +176,7 @@ class Surface:
     """A whisker that slides over a circle (a face: of 5 m), solved by the simulator's elastica."""
 
     def __init__(self, radius_m: float, friction: float, tip: bool, first: float):
-        from signals._sim import lib
+        from crunchbot_lab.signals._sim import lib
 
         self._bend = lib.mech_elastica_bend
         self._radius, self._friction = radius_m / CONE, friction

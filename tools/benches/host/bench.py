@@ -31,9 +31,9 @@ from matplotlib.figure import Figure
 from tqdm import tqdm
 
 from crunchbot.bridge.ring import Reader
-from crunchbot.protocol import LANES, LIMITS
-from crunchbot.report import figures
-from crunchbot.simulation.scenes import make_scene
+from crunchbot_lab.report import figures
+from crunchbot_lab.simulation.scenes import make_scene
+from whisker_protocol import LANES, LIMITS
 
 from .. import store
 

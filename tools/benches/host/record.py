@@ -23,13 +23,13 @@ from matplotlib.figure import Figure
 from tqdm import tqdm
 
 from crunchbot.bridge.ring import FRAME, Reader, Writer
-from crunchbot.protocol import LANES, LIMITS
 from crunchbot.recording import read
 from crunchbot.recording.recorder import Recorder
 from crunchbot.recording.writing import RecordingWriter
-from crunchbot.report import figures
-from crunchbot.simulation.scenes import make_scene
-from crunchbot.simulation.world import World
+from crunchbot_lab.report import figures
+from crunchbot_lab.signals import World
+from crunchbot_lab.simulation.scenes import make_scene
+from whisker_protocol import LANES, LIMITS
 
 from .. import store
 

@@ -26,8 +26,6 @@ from tqdm import tqdm
 from websockets.asyncio.client import connect
 
 from crunchbot.bridge.ring import FRAME, Writer
-from crunchbot.protocol import LANES, LIMITS
-from crunchbot.report import figures
 from crunchbot.robot.link import Link
 from crunchbot.robot.messages import (
     COMPONENTS_MOST,
@@ -42,6 +40,8 @@ from crunchbot.robot.messages import (
     PoseWithCovariance,
     ProcessHealth,
 )
+from crunchbot_lab.report import figures
+from whisker_protocol import LANES, LIMITS
 
 from .. import store
 

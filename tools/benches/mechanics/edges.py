@@ -35,8 +35,8 @@ def job(ours: Ours, links: int, height: float, speed: float) -> dict:
 
 
 def drag(ours: Ours, level: int, height: float, speed: float) -> dict:
-    from signals.mechanics import EDGE, HOOKED, Whisker
-    from signals.mechanics import drag as run
+    from crunchbot_lab.signals.mechanics import EDGE, HOOKED, Whisker
+    from crunchbot_lab.signals.mechanics import drag as run
 
     whisker = Whisker(exit_diameter=EXIT, cone=cone(TIP), kappa=KAPPA, friction=FRICTION, damping=DAMPING)
     flat = ours.ffi.new("struct sim_floor_texture[]", [{"correlation_mm": 1.0}])

@@ -12,7 +12,6 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[3]
 SOURCES = ROOT / "tools/benches/mechanics/peers"
 CACHE = ROOT / "build/bench/mechanics"
-sys.path.insert(0, str(ROOT / "sim"))
 
 LINKS = (5, 10, 20)
 FINEST = 80  # links, for frequencies
@@ -100,7 +99,7 @@ def chain(kind: str, job: dict, program: Path = SOURCES / "chain.py") -> dict:
 
 
 def whisker_of(case: dict):
-    from signals.mechanics import Whisker
+    from crunchbot_lab.signals.mechanics import Whisker
 
     kappa = np.inf if case["kappa"] is None else case["kappa"]
     parameters = {"young": YOUNG, "density": DENSITY, "kappa": kappa, "stop": STOP_FREE}
@@ -111,9 +110,9 @@ class Ours:
     """The simulator's levels by name: base moment at a peg (m, rad), swept up from the unbent whisker."""
 
     def __init__(self):
-        from signals._sim import ffi, lib
+        from crunchbot_lab.signals._sim import ffi, lib
 
-        from signals.mechanics import _shared_table
+        from crunchbot_lab.signals.mechanics import _shared_table
 
         self.ffi, self.lib, self.table = ffi, lib, _shared_table()
 

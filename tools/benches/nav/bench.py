@@ -22,8 +22,8 @@ from pathlib import Path
 import matplotlib
 
 from crunchbot.nav import localise
-from crunchbot.scenes import trials
-from crunchbot.scenes.sweep import BACKENDS, sweep
+from crunchbot_lab.scenes import trials
+from crunchbot_lab.scenes.sweep import BACKENDS, sweep
 
 from .. import store
 from . import charts, figures, page, work

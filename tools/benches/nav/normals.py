@@ -15,9 +15,6 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
-from crunchbot import scenes
-from crunchbot.demo.level1 import explore
-from crunchbot.demo.training import learn
 from crunchbot.nav import localise
 from crunchbot.nav.observations import Observations, read_observations, tells_normals
 from crunchbot.nav.scoring import heading_errors, lock_row, position_errors
@@ -25,8 +22,11 @@ from crunchbot.pilot.pilot import Pilot
 from crunchbot.robot.models import load_models
 from crunchbot.robot.rowfiles import Rows
 from crunchbot.scene import Prior, Scene
-from crunchbot.scenes.geometry import directions
-from crunchbot.simulation.scenes import make_scene
+from crunchbot_lab import scenes
+from crunchbot_lab.demo.level1 import explore
+from crunchbot_lab.demo.training import learn
+from crunchbot_lab.scenes.geometry import directions
+from crunchbot_lab.simulation.scenes import make_scene
 
 from .. import store
 

@@ -15,15 +15,15 @@ import matplotlib
 import numpy as np
 from tqdm import tqdm
 
-from crunchbot import scenes
 from crunchbot.nav import localise
 from crunchbot.nav.filters import Filter
 from crunchbot.nav.observations import Observations
 from crunchbot.nav.scoring import lock_row, position_errors
 from crunchbot.nav.weigher import Weigher
 from crunchbot.scene import Arena, Prior, Scene
-from crunchbot.scenes.making import make_recipe
-from crunchbot.scenes.readings import World
+from crunchbot_lab import scenes
+from crunchbot_lab.scenes.making import make_recipe
+from crunchbot_lab.scenes.readings import World
 
 from .. import store
 from . import paper_charts as charts

@@ -23,10 +23,10 @@ import numpy as np
 from tqdm import tqdm
 
 import crunchbot
-from crunchbot import scenes
 from crunchbot.nav import localise
 from crunchbot.nav.scoring import lock_row, position_errors
 from crunchbot.scene import Prior
+from crunchbot_lab import scenes
 
 from .. import store
 

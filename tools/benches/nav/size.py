@@ -20,9 +20,9 @@ from crunchbot.nav import localise
 from crunchbot.nav.filters import Filter
 from crunchbot.nav.scoring import lock_row, position_errors
 from crunchbot.scene import Arena, Prior, Scene
-from crunchbot.scenes import arenas, robots
-from crunchbot.scenes.families import Recipe
-from crunchbot.scenes.making import make_recipe
+from crunchbot_lab.scenes import arenas, robots
+from crunchbot_lab.scenes.families import Recipe
+from crunchbot_lab.scenes.making import make_recipe
 
 from .. import store
 

@@ -14,11 +14,11 @@ import matplotlib
 import numpy as np
 from tqdm import tqdm
 
-from crunchbot import scenes
 from crunchbot.nav import localise
 from crunchbot.nav.estimates import Estimates
 from crunchbot.nav.judging import judge
-from crunchbot.scenes import benchmark
+from crunchbot_lab import scenes
+from crunchbot_lab.scenes import benchmark
 
 from .. import store
 from . import charts

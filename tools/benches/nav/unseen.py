@@ -20,11 +20,11 @@ from crunchbot.nav import localise
 from crunchbot.nav.observations import Observations
 from crunchbot.nav.scoring import LOCK_M, LOCK_ROWS, heading_errors, lock_row, position_errors
 from crunchbot.scene import Arena, Scene
-from crunchbot.scenes import arenas, families, faults, robots
-from crunchbot.scenes.families import Recipe
-from crunchbot.scenes.making import Made, make_recipe
-from crunchbot.scenes.readings import World
-from crunchbot.scenes.walk import Pace
+from crunchbot_lab.scenes import arenas, families, faults, robots
+from crunchbot_lab.scenes.families import Recipe
+from crunchbot_lab.scenes.making import Made, make_recipe
+from crunchbot_lab.scenes.readings import World
+from crunchbot_lab.scenes.walk import Pace
 
 from .. import store
 

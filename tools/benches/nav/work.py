@@ -6,11 +6,11 @@ import resource
 
 import numpy as np
 
-from crunchbot import scenes
 from crunchbot.nav import localise
 from crunchbot.nav.observations import Observations
 from crunchbot.nav.scoring import position_errors
-from crunchbot.scenes import arenas, families, making, robots
+from crunchbot_lab import scenes
+from crunchbot_lab.scenes import arenas, families, making, robots
 
 REFERENCE = ("particle", {"particle.count": 50_000, "particle.recovery": 0.0, "particle.recovery_fast": 0.0})
 SLOWEST = 0.02  # share of the times that a budget job keeps

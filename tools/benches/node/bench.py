@@ -19,8 +19,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from tqdm import tqdm
 
-from crunchbot.protocol import LIMITS
-from crunchbot.report import figures
+from crunchbot_lab.report import figures
+from whisker_protocol import LIMITS
 
 from .. import store
 from . import odds, page

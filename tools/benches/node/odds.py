@@ -8,7 +8,7 @@ from math import comb, sqrt
 
 import numpy as np
 
-from crunchbot import protocol
+import whisker_protocol as protocol
 
 BITS = 64
 RECORD = protocol.RECORD

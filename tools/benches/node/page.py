@@ -1,6 +1,6 @@
 """docs/results/node_faults.md: what the bench measured, and how the miss rates are derived."""
 
-from crunchbot.protocol import LIMITS
+from whisker_protocol import LIMITS
 
 from ..markdown import table
 

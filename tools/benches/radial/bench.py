@@ -21,10 +21,10 @@ from matplotlib.figure import Figure
 from tqdm import tqdm
 
 from crunchbot.native import doubles, ffi, lib
-from crunchbot.report.figures import SETTINGS
 from crunchbot.touch.radial import model as radial
 from crunchbot.touch.radial.shape import shape_of
 from crunchbot.touch.radial.whisk import WhiskModel
+from crunchbot_lab.report.figures import SETTINGS
 
 from .. import store
 from .page import page

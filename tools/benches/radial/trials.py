@@ -11,10 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-import crunchbot.simulation.world  # noqa: F401 - puts sim/ on the path
 from crunchbot.touch.radial.model import Contact, Whisks, peak
-from signals.mechanics import Whisker, contact, unknowns
-from signals.world import TICK_S
+from crunchbot_lab.signals.mechanics import Whisker, contact, unknowns
+from crunchbot_lab.signals.world import TICK_S
 
 RADII_MM = (90.0, 100.0, 110.0, 120.0, 130.0, 138.0)
 SPREADS = (0.082, 0.040, 0.026, 0.063)  # the paper's whiskers (whisker_physics section 4)

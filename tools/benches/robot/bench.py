@@ -14,9 +14,9 @@ import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from crunchbot.report import figures, long_figures
-from crunchbot.report.run import Run
 from crunchbot.stopping import interrupt_on_signals
+from crunchbot_lab.report import figures, long_figures
+from crunchbot_lab.report.run import Run
 
 from .. import store
 from . import instructions, latency, levels, odometry, page
@@ -39,7 +39,7 @@ def once(path: Path, measure: Callable[[], dict]) -> dict:
 def long_run(build: Path, level: str, seed: int) -> dict:
     """The summary of a demo-long."""
     out = CACHE / f"long_{level}_{seed}"
-    command = [sys.executable, "-m", "crunchbot.demo.long", "--level", level, "--seed", seed, "--out", out]
+    command = [sys.executable, "-m", "crunchbot_lab.demo.long", "--level", level, "--seed", seed, "--out", out]
     subprocess.run([str(word) for word in [*command, "--build-dir", build]], check=True, stdout=subprocess.DEVNULL)
     return json.loads((out / "summary.json").read_text())
 

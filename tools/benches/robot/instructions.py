@@ -10,8 +10,8 @@ import tempfile
 from pathlib import Path
 
 from crunchbot import scene as scene_files
-from crunchbot.demo.chain import ChainRun, Link, run_chain
-from crunchbot.simulation.scenes import make_scene
+from crunchbot_lab.demo.chain import ChainRun, Link, run_chain
+from crunchbot_lab.simulation.scenes import make_scene
 
 ATOM_HZ = 0.8e9  # instructions per second of the paper's netbook
 PROGRAMS = ("pilot", "base")

@@ -17,8 +17,6 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from crunchbot import scenes
-from crunchbot.demo.level1 import explore
 from crunchbot.nav import localise
 from crunchbot.nav.observations import Observations
 from crunchbot.pilot.behaviour import BLOCK_TICKS, ODOMETRY_TICKS, TICK_S
@@ -27,8 +25,10 @@ from crunchbot.robot.link import Link
 from crunchbot.robot.messages import EXPLORING, Observation, decode, encode
 from crunchbot.robot.models import load_models
 from crunchbot.robot.rows import RowPublisher, to_message, to_row
-from crunchbot.simulation.scenes import make_scene
-from crunchbot.simulation.world import World
+from crunchbot_lab import scenes
+from crunchbot_lab.demo.level1 import explore
+from crunchbot_lab.signals import World
+from crunchbot_lab.simulation.scenes import make_scene
 
 SEEDS, SECONDS = range(8201, 8207), 60
 PORTS = (17651, 17652)

@@ -19,20 +19,20 @@ from matplotlib.figure import Figure
 from tqdm import tqdm
 
 from crunchbot import scene as scene_files
-from crunchbot import scenes
-from crunchbot.demo.__main__ import judge, read_dicts
-from crunchbot.demo.chain import ChainRun, Link, run_chain
-from crunchbot.demo.level1 import explore
-from crunchbot.demo.summary import pose_scores, texture_scores
-from crunchbot.demo.training import learn
 from crunchbot.nav import localise
 from crunchbot.pilot.pilot import Pilot
-from crunchbot.report.run import FILTERS
 from crunchbot.robot.models import load_models
 from crunchbot.scene import Scene
-from crunchbot.scenes import geometry, readings
-from crunchbot.scenes.families import SIGNALS
-from crunchbot.simulation.scenes import MECHANICS, make_scene, simulated
+from crunchbot_lab import scenes
+from crunchbot_lab.demo.__main__ import judge, read_dicts
+from crunchbot_lab.demo.chain import ChainRun, Link, run_chain
+from crunchbot_lab.demo.level1 import explore
+from crunchbot_lab.demo.summary import pose_scores, texture_scores
+from crunchbot_lab.demo.training import learn
+from crunchbot_lab.report.run import FILTERS
+from crunchbot_lab.scenes import geometry, readings
+from crunchbot_lab.scenes.families import SIGNALS
+from crunchbot_lab.simulation.scenes import MECHANICS, make_scene, simulated
 
 SECONDS, ROWS, TICKS = 60.0, 600, 120_000
 LANES, LINK = 6, Link(6, 30, 5)

@@ -1,6 +1,6 @@
 """docs/results/robot.md of what tools/benches robot has measured so far."""
 
-from crunchbot.report.figures import TITLES as FILTERS
+from crunchbot_lab.report.figures import TITLES as FILTERS
 
 from ..markdown import table
 from .levels import CASES, LEAST_SEEDS, SCORES, TITLES

@@ -21,8 +21,6 @@ from pathlib import Path
 
 import numpy as np
 
-from crunchbot.demo.level1 import explore
-from crunchbot.demo.training import learn
 from crunchbot.pilot.pilot import Pilot
 from crunchbot.robot import belief
 from crunchbot.robot.inbox import Received
@@ -32,7 +30,9 @@ from crunchbot.robot.rows import Follower, to_message
 from crunchbot.robot.streams import Envelope
 from crunchbot.robot.track import Track
 from crunchbot.scene import Prior
-from crunchbot.simulation.scenes import make_scene
+from crunchbot_lab.demo.level1 import explore
+from crunchbot_lab.demo.training import learn
+from crunchbot_lab.simulation.scenes import make_scene
 
 from .. import store
 

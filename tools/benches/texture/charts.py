@@ -3,7 +3,7 @@
 import matplotlib
 from matplotlib.figure import Figure
 
-from crunchbot.report.figures import SETTINGS
+from crunchbot_lab.report.figures import SETTINGS
 
 from .scores import METHODS
 

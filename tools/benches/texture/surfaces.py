@@ -10,20 +10,20 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from crunchbot.demo.training import calibrate, flat, read_whisks
 from crunchbot.pilot.feel import Drives, Feeler, Felt
 from crunchbot.pilot.states import EXPLORE_M_S, PUSH_TICKS, TICK_S
 from crunchbot.pilot.wheels import EXACT
 from crunchbot.scene import Arena, Scene, Whisker
-from crunchbot.simulation.scenes import OBJECT_TIP_DEG, make_scene
-from crunchbot.simulation.world import World
 from crunchbot.touch.contact import Contact
 from crunchbot.touch.mount import Mount
 from crunchbot.touch.radial.model import fit
 from crunchbot.touch.radial.whisk import WhiskModel
 from crunchbot.touch.texture.train import train
+from crunchbot_lab.demo.training import calibrate, flat, read_whisks
+from crunchbot_lab.signals import World
+from crunchbot_lab.simulation.scenes import OBJECT_TIP_DEG, make_scene
 
-from signals.recordings import ASLANT_RAD, BESIDE_M, SWEEPS, TIP_FIRST_RAD, surface_sweep  # isort: skip
+from crunchbot_lab.signals.recordings import ASLANT_RAD, BESIDE_M, SWEEPS, TIP_FIRST_RAD, surface_sweep  # isort: skip
 
 from .scores import HZ, decide, summary
 from .trials import SURFACES

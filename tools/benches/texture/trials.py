@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from crunchbot.demo.training import MOVES, flat
-from crunchbot.simulation.scenes import make_scene
-from crunchbot.simulation.world import World
+from crunchbot_lab.demo.training import MOVES, flat
+from crunchbot_lab.signals import World
+from crunchbot_lab.simulation.scenes import make_scene
 
 SURFACES = ("VINYL", "SMOOTH", "ROUGH")
 SPEEDS_M_S = (0.05, 0.1, 0.15, 0.2)
@@ -22,7 +22,7 @@ TILE_M, STRIP_M, WIDTH_M = 0.5, 12.0, 2.0
 @cache
 def drives(seed: int, robot: int, seconds: float = 8.0, surfaces=SURFACES) -> dict[str, list[np.ndarray]]:
     """One recording (n, 2) for each surface, speed and floor whisker, of the demo's robot of a seed on floors of another."""
-    from signals.recordings import surface_drive  # sim/ is on the path since crunchbot.simulation.world
+    from crunchbot_lab.signals.recordings import surface_drive
 
     robot, out = flat(make_scene(robot, "modes")[0]), {}
     for n, surface in enumerate(surfaces):

@@ -10,7 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..protocol import LIMITS, WIRE_VERSION
+from whisker_protocol import LIMITS, WIRE_VERSION
+
 from . import pattern, usbtree
 from .ring import DaemonStats, Reader, RingError, error_line, found_rings, user_name
 from .status import explain

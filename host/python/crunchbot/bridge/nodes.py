@@ -6,8 +6,9 @@ A calibration belongs to one whisker, and whisks do not give another of the same
 import re
 from pathlib import Path
 
+from whisker_protocol import LANES
+
 from ..errors import UserError
-from ..protocol import LANES
 
 # A row of the table (lane, serial, version) or a line of the log; a node without a number of its own has `none`.
 ROW = re.compile(r"^ *(\d+) +(\d+|none) +\d+\.\d+ |\blane (\d+): serial (\d+|none),")

@@ -6,7 +6,8 @@ import time
 
 import numpy as np
 
-from ..protocol import LANES
+from whisker_protocol import LANES
+
 from .ring import Reader, RingError
 
 START_S = 10.0  # until whiskerd has its ring, and between two frames

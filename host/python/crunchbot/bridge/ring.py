@@ -9,9 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from whisker_protocol import LANES
+
 from ..errors import UserError
 from ..native import ffi, lib, pointer
-from ..protocol import LANES
 
 SAMPLE = np.dtype([("alpha", "<u2"), ("beta", "<u2"), ("status", "<u2"), ("reserved", "<u2")])
 FRAME = np.dtype(

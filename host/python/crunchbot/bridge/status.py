@@ -1,6 +1,6 @@
 """What a sample's status means, in words: causes and remedies from the wire format's definition."""
 
-from ..protocol import DEFINITION, SENSOR_ERRORS, STATUS_CODE_SHIFT
+from whisker_protocol import DEFINITION, SENSOR_ERRORS, STATUS_CODE_SHIFT
 
 _CODES = {entry["value"]: entry for entry in DEFINITION["codes"].values()}
 _UNKNOWN = {"cause": "a code this package does not know", "remedy": "install host and bridge of one release"}

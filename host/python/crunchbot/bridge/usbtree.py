@@ -4,7 +4,7 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..protocol import LIMITS
+from whisker_protocol import LIMITS
 
 HIGH_SPEED_MBIT = 480.0
 

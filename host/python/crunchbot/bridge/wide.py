@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from whisker_protocol import CODES, LANES, STATUS_CODE_SHIFT
+
 from ..native import lib
-from ..protocol import CODES, LANES, STATUS_CODE_SHIFT
 from .ring import FRAME, SAMPLE
 
 SECOND: int = lib.WHISKER_FRAME_SECOND

@@ -2,7 +2,7 @@
 
 from ..arguments import RING, add_ring_owner
 from ..bridge import doctor
-from ..simulation.bridge import program
+from ..programs import program
 
 EXAMPLE = "whisker doctor --ring whisker"
 

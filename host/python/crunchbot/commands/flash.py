@@ -2,7 +2,7 @@
 
 import os
 
-from ..simulation.bridge import program
+from ..programs import program
 
 EXAMPLE = "whisker flash node-0.2.whex"
 

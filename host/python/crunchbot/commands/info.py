@@ -8,11 +8,12 @@ import signal
 import sys
 import time
 
+from whisker_protocol import WIRE_VERSION
+
 from ..arguments import add_ring
 from ..bridge import usbtree
 from ..bridge.ring import Reader, RingError, signal_writer
-from ..protocol import WIRE_VERSION
-from ..simulation.bridge import program
+from ..programs import program
 
 EXAMPLE = "whisker info --json"
 

@@ -22,10 +22,10 @@ from ..robot.models import check_nodes, load_models
 from ..robot.options import NAVIGATOR_ENDPOINT, PILOT_ENDPOINT, add_link, open_link
 from ..robot.pilot_process import Flight, LiveFlight, LiveWheels, fly_in_step
 from ..robot.rowfiles import Rows, Traces
+from ..robot.simulation_link import SimLink
 from ..robot.telling import Teller
 from ..robot.wheels import RETRY_S, IdealWheels, LiveBase, SteppedBase, wheels_of
 from ..scene import load
-from ..simulation.link import SimLink
 from ..stopping import stop_on_signals
 
 EXAMPLE = "whisker pilot SCENE --models MODELS --base /run/user/1000/base"

@@ -1,8 +1,9 @@
 """`whisker record`: from a ring to an MCAP file (crunchbot.recording)."""
 
+from whisker_protocol import LIMITS
+
 from ..arguments import add_ring, number_above, whole_number
 from ..bridge.ring import Reader, await_reader
-from ..protocol import LIMITS
 from ..recording.recorder import Tally, describe, record
 from ..recording.writing import RecordingWriter
 from ..scene import load

@@ -7,6 +7,7 @@ from pathlib import Path
 from .. import scene as scenes
 from ..arguments import RING, add_zenoh_config, number_above, whole_number
 from ..errors import UserError
+from ..lab import import_lab
 from ..robot import holders, parts
 from ..robot.link import read_config
 from ..robot.logs import run_folder
@@ -14,7 +15,6 @@ from ..robot.models import load_models
 from ..robot.options import link_that_warns
 from ..robot.supervisor import Supervisor
 from ..robot.truth import TruthWatcher
-from ..simulation.bridge import simulated_scene
 from ..stopping import stop_on_signals
 
 EXAMPLE = "whisker robot --simulated --desktop"
@@ -111,29 +111,20 @@ def _table(arguments, meeting: parts.Meeting) -> list:
     return table + parts.netbook(body, meeting, arguments.desktop)
 
 
-def _learning():
-    """What learns models. UserError where it is not installed."""
-    try:
-        from ..demo.training import learn  # needs the source tree's sim/
-    except ModuleNotFoundError as error:
-        text = f"robot: --simulated learns models by the simulation of a source tree, which is not here ({error.name})"
-        raise UserError(f"{text}; run it in a source tree, or give --models DIR") from None
-    return learn
-
-
 def _simulated(arguments, meeting: parts.Meeting) -> tuple[parts.Body, parts.Simulated]:
     """The simulated robot; what it needs is written below --out, its models learnt there if none are given."""
-    out, seed = arguments.out, arguments.seed
+    out, seed, user = arguments.out, arguments.seed, "robot: --simulated"
     folder = arguments.scene or out / "scene"
-    scene, start = simulated_scene(arguments.scene and str(arguments.scene), seed)
+    bridge = import_lab("simulation.bridge", user)
+    scene, start = bridge.simulated_scene(arguments.scene and str(arguments.scene), seed)
     if arguments.scene is None:
         scenes.write(folder, scene)
     (out / "scene.flat").write_text(scene.flat(start))
     models = arguments.models or out / "models"
     if arguments.models is None and not (models / "texture.json").exists():
-        learn = _learning()
+        training = import_lab("demo.training", user)
         print("learning textures and distances of this robot: half a minute", flush=True)
-        learn(models, scene, seed, lambda: None)
+        training.learn(models, scene, seed, lambda: None)
     body = parts.Body(folder, models, arguments.create, meeting.serial, seed)
     reported = (arguments.level, seed, arguments.seconds, arguments.pace, out / "truth.csv", out / "wheels.csv")
     return body, parts.Simulated(out / "scene.flat", *reported)

@@ -5,10 +5,11 @@ import sys
 
 import numpy as np
 
+from whisker_protocol import LANES, LIMITS
+
 from ..arguments import add_ring, lane_list, whole_number
 from ..bridge.ring import Reader, await_reader
 from ..bridge.wide import LANES_MAX, SECOND, wide
-from ..protocol import LANES, LIMITS
 from ..stopping import stop_on_signals
 
 EXAMPLE = "whisker stream --lanes 0-5 --every 20 --frames 100 > drive.csv"

@@ -12,11 +12,12 @@ from collections import Counter, deque
 
 import numpy as np
 
+from whisker_protocol import LIMITS
+
 from ..arguments import add_ring, number_above
 from ..bridge.ring import FRAME, Reader, RingError, await_reader
 from ..bridge.status import explain
 from ..bridge.wide import LANES_MAX, wide
-from ..protocol import LIMITS
 from ..scene import load
 from ..stopping import stop_on_signals
 

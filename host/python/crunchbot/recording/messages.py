@@ -6,8 +6,9 @@ from importlib.resources import files
 
 import numpy as np
 
+from whisker_protocol import LANES
+
 from ..bridge.ring import FRAME, SAMPLE, DaemonStats
-from ..protocol import LANES
 from .cdr import HEADER, Encoder, Layout
 
 BLOCK_FRAMES = 200  # 0.1 s: few enough messages to cost nothing, short enough to lose little

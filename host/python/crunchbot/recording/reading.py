@@ -4,7 +4,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..protocol import LANES, LIMITS
+from whisker_protocol import LANES, LIMITS
+
 from .mcapfile import McapFile, RecordingError
 from .messages import Event, MessageError, decode_block, decode_event
 

@@ -6,9 +6,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from whisker_protocol import LANES, LIMITS
+
 from ..bridge.ring import Reader, RingError
 from ..native import lib
-from ..protocol import LANES, LIMITS
 from .messages import BLOCK_FRAMES, CLOCK_SET, MISSING, OVERRUN, RESTARTED, encode_block
 from .timeline import Timeline
 from .writing import RecordingWriter

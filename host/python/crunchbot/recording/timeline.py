@@ -2,8 +2,9 @@
 
 import time
 
+from whisker_protocol import LIMITS
+
 from ..bridge.ring import Clock
-from ..protocol import LIMITS
 
 STEP_NS = 10_000_000  # the wall clock against the monotonic one: more than this, and somebody has set it
 STALE_NS = 10 * 10**9  # a mapping that puts a frame further than this from now is that of an earlier start

@@ -9,9 +9,10 @@ import numpy as np
 from mcap.well_known import MessageEncoding, Profile, SchemaEncoding
 from mcap.writer import Writer
 
+from whisker_protocol import LANES, LIMITS
+
 from .. import __version__
 from ..bridge.ring import DaemonStats
-from ..protocol import LANES, LIMITS
 from . import messages
 from .mcapfile import NUMBERED, RecordingError
 from .reading import DIAGNOSTICS_TOPIC, EVENTS_TOPIC, FORMAT, FRAMES_TOPIC, HEALTH_TOPIC, METADATA

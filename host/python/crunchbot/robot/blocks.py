@@ -5,10 +5,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from whisker_protocol import CODES, LANES, STATUS_CODE_SHIFT
+
 from ..bridge.ring import Reader, RingError
 from ..bridge.wide import of_first, wide
 from ..pilot.behaviour import BLOCK_TICKS, ODOMETRY_TICKS, TICK_S
-from ..protocol import CODES, LANES, STATUS_CODE_SHIFT
 
 LOST = CODES["absent"] << STATUS_CODE_SHIFT  # status of a tick that never came
 FRESH_TICKS = 200  # a live reader that joins, or was left behind, begins this far back

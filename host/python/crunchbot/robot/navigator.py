@@ -36,7 +36,7 @@ BELIEF_NS = 500_000_000  # 2 Hz of the bridge's clock
 BELIEF_SHARE = 0.1  # of the navigator's time, at most, goes into telling it
 CATCH_UP_S = 0.1  # of the navigator's time for rows that came late together: no longer than until the next row
 LOOK_S = 0.5  # between two words of health while nothing comes
-SCENE_PRIOR, UNIFORM, CHECKPOINT, TOLD = "scene", "uniform", "checkpoint", "told"
+SCENE_PRIOR, UNIFORM, CHECKPOINT, GIVEN = "scene", "uniform", "checkpoint", "given"
 WAITING = "waiting for rows"
 ROWS = "observation"  # topic
 
@@ -143,7 +143,7 @@ class Navigator:
         except ValueError as error:
             self._told_error = f"{initial_pose.TOPIC}: {error}"
         else:
-            self._prior = TOLD
+            self._prior = GIVEN
 
     def _recall(self, received: list[Received]) -> None:
         """With the first row: go on from where another navigator was, if it left word."""

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..pilot.base import Base, BaseError, Motion
 from ..pilot.wheels import NO_BUMPS, Bumps, Wheels
-from ..simulation.link import SimLink
+from .simulation_link import SimLink
 
 MODE = "safe"  # the base then stops by itself at cliffs and wheel drops
 RETRY_S = 0.2  # between looks for a base that is not there

@@ -7,10 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
+from whisker_protocol import LANES, LIMITS
+
 from ..bridge.ring import FRAME, Reader
 from ..bridge.wide import LANES_MAX, wide
 from ..errors import UserError
-from ..protocol import LANES, LIMITS
 from .contact import ONSET_COUNTS, Contact
 from .texture.spectral import SENSOR_STOPS
 

@@ -9,7 +9,8 @@ from websockets.asyncio.server import ServerConnection
 from websockets.exceptions import ConnectionClosed
 from websockets.frames import CloseCode
 
-from ..protocol import CODES, DEFINITION, LANES, SENSOR_ERRORS, WIRE_VERSION
+from whisker_protocol import CODES, DEFINITION, LANES, SENSOR_ERRORS, WIRE_VERSION
+
 from .hub import Hub, RequestError
 from .pyramid import BINS, WIDTHS
 from .topics import TOPICS

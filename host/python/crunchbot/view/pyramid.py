@@ -8,7 +8,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..protocol import LANES, STATUS_CODE_SHIFT
+from whisker_protocol import LANES, STATUS_CODE_SHIFT
+
 from .tally import CODE_KINDS, EMPTY
 
 AXES = ("alpha", "beta")

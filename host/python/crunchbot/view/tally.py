@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..protocol import CODES, LANES, SENSOR_ERRORS, STATUS_CODE_SHIFT
+from whisker_protocol import CODES, LANES, SENSOR_ERRORS, STATUS_CODE_SHIFT
 
 ERROR_BITS = (1 << STATUS_CODE_SHIFT) - 1
 CODE_KINDS = 64  # six bits

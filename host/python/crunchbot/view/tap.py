@@ -6,9 +6,10 @@ from dataclasses import asdict
 
 import numpy as np
 
+from whisker_protocol import CODES, LANES, LIMITS, STATUS_CODE_SHIFT
+
 from ..bridge.ring import Reader, RingError, error_line
 from ..bridge.wide import of_first
-from ..protocol import CODES, LANES, LIMITS, STATUS_CODE_SHIFT
 from .pyramid import BINS, CHUNK, WIDTHS, Pyramid
 from .tally import NAME_OF_CODE, Tally
 

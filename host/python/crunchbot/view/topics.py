@@ -12,7 +12,8 @@ from typing import Protocol
 
 import numpy as np
 
-from ..protocol import LANES
+from whisker_protocol import LANES
+
 from .hub import Hub, RequestError
 from .pyramid import BINS, WIDTHS, spans
 from .robot_topics import BELIEF_ID, BeliefFeed, RobotFeed, SceneFeed

@@ -9,10 +9,10 @@ from whisks import whisks
 from crunchbot.bridge.nodes import NodeError, read_nodes
 from crunchbot.bridge.ring import Writer
 from crunchbot.robot.models import check_nodes
-from crunchbot.simulation.scenes import make_robot
 from crunchbot.tables import TableError
 from crunchbot.touch.calibration import ContactsFile, Whisk
 from crunchbot.touch.radial import model as radial
+from crunchbot_lab.simulation.scenes import make_robot
 
 TABLE = """lane  serial      version  options  wire  chip    loader  state
    0  4711        1.2      0x0001   3     0x0629  1       runs

@@ -10,7 +10,7 @@ import pytest
 from rings import make_frames, ring_name
 
 from crunchbot.bridge.ring import FRAME, Clock, Reader, RingError, Writer, found_rings, signal_writer
-from crunchbot.protocol import LIMITS
+from whisker_protocol import LIMITS
 
 CAPACITY = 256
 STRANGER = 4242  # a user id that no machine gives away

@@ -14,11 +14,11 @@ from commandkit import END_S, command, live_ring, run, signals_as_before  # noqa
 from rings import make_frames
 
 from crunchbot.cli import COMMANDS, _parser, main
-from crunchbot.commands import bridge_sim
 from crunchbot.commands.top import BARS, sparkline
-from crunchbot.protocol import WIRE_VERSION
 from crunchbot.recording import read
 from crunchbot.recording.writing import RecordingWriter
+from crunchbot_lab.commands import bridge_sim
+from whisker_protocol import WIRE_VERSION
 
 
 def test_help_names_every_command_and_imports_none(capsys):

@@ -13,7 +13,7 @@ from whisks import write_whisks
 
 from crunchbot.cli import COMMANDS, main
 from crunchbot.ends import exit_code
-from crunchbot.simulation.bridge import program
+from crunchbot.programs import program
 from crunchbot.touch.radial.model import RadialModel
 from crunchbot.view.__main__ import main as view
 

@@ -6,7 +6,7 @@ import os
 import numpy as np
 
 from crunchbot.bridge.ring import FRAME
-from crunchbot.protocol import LANES, LIMITS
+from whisker_protocol import LANES, LIMITS
 
 _numbers = itertools.count()
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from crunchbot.nav import filters
-from crunchbot.scenes import make
+from crunchbot_lab.scenes import make
 
 SEEDS = range(4000, 4004)
 NEAR_M = 0.15

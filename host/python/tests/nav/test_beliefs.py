@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from crunchbot import scenes
 from crunchbot.nav import localise
+from crunchbot_lab import scenes
 
 ROWS, BLIND = 200, 60
 

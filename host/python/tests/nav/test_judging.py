@@ -99,7 +99,7 @@ def test_a_file_of_another_engine_is_read_by_order_or_by_time(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "header, lines, told",
+    "header, lines, reported",
     [
         ("x_m,y_m", ["1,2"], "line 1: column 'theta_rad' is missing"),
         ("x_m,y_m,theta_rad", ["1,2,3"], "1 rows, the scene has 400"),

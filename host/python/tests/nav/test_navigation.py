@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from crunchbot.nav import localise
-from crunchbot.scenes import make
+from crunchbot_lab.scenes import make
 
 SEEDS = range(100, 106)
 

@@ -6,15 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from crunchbot import scenes
 from crunchbot.nav import localise
 from crunchbot.nav.observations import tells_normals
 from crunchbot.robot.inbox import Received
 from crunchbot.robot.row_checks import RowChecks
 from crunchbot.robot.rows import to_message
 from crunchbot.robot.streams import Envelope
-from crunchbot.scenes import geometry
 from crunchbot.tables import TableError
+from crunchbot_lab import scenes
+from crunchbot_lab.scenes import geometry
 
 FAMILY = "anchor+normals"
 

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from commandkit import run
 
-from crunchbot import scenes
 from crunchbot.nav import localise
 from crunchbot.nav.filters import Filter, SettingError
 from crunchbot.nav.observations import Observations
@@ -23,6 +22,7 @@ from crunchbot.robot.streams import Envelope
 from crunchbot.scene import Arena, Prior, Robot, Scene, SceneError, Whisker, load
 from crunchbot.sensor_tables import NOT_KNOWN, SensorTable
 from crunchbot.tables import TableError
+from crunchbot_lab import scenes
 
 SIDE_M, CELL_M, LEVELS, ROWS = 2.0, 0.1, 8, 150
 ARENA = Arena((SIDE_M, SIDE_M), 1.0, ("FLOOR",), ("FF", "FF"), ())
@@ -101,7 +101,7 @@ def test_a_row_of_the_network_may_hold_a_sensors_reading():
 
 
 @pytest.mark.parametrize(
-    "name, old, new, told",
+    "name, old, new, reported",
     [
         ("robot.toml", 'map = "light.png"', 'map = "none.png"', "'map' .*none.png: cannot be read"),
         ("robot.toml", "at_m = [0.05, 0.0]", "at_m = [0.05]", "'at_m' must be a list of 2"),
@@ -150,7 +150,7 @@ def raising(reading, levels):
 
 
 @pytest.mark.parametrize(
-    "loglik, counted, told",
+    "loglik, counted, reported",
     [
         (raising, "raised", "ZeroDivisionError: no signal"),
         (lambda reading, levels: levels * np.nan, "bad", r"shape \(59,\) with 59 nan"),
@@ -184,7 +184,7 @@ def test_a_slow_function_is_asked_as_often_as_its_budget_allows():
 
 
 @pytest.mark.parametrize(
-    "options, told",
+    "options, reported",
     [
         ({"cell_m": 0.0}, "cell_m: 0 x 0 cells"),
         ({"cell_m": 1e-4}, "cell_m: 20000 x 20000 cells"),

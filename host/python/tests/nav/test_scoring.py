@@ -5,10 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from crunchbot import scenes
 from crunchbot.nav import localise, scoring
 from crunchbot.nav.filters import Filter
 from crunchbot.nav.localise import judged_rows
+from crunchbot_lab import scenes
 
 
 def test_lock_is_the_first_hundred_near_rows_kept_to_the_end():

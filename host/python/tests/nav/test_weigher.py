@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 
-from crunchbot import scenes
 from crunchbot.nav.filters import Filter
 from crunchbot.nav.weigher import Weigher
+from crunchbot_lab import scenes
 
 
 def test_the_true_pose_weighs_more_than_any_other_place():

@@ -9,7 +9,7 @@ import tty
 from pathlib import Path
 
 from crunchbot.pilot.base import Base
-from crunchbot.simulation.bridge import program
+from crunchbot.programs import program
 
 START, SAFE, FULL, DRIVE, STREAM, PAUSE = 128, 131, 132, 145, 148, 150
 PASSIVE_MODE, SAFE_MODE, FULL_MODE = 1, 2, 3

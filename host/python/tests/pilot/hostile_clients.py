@@ -18,7 +18,7 @@ import time
 from pathlib import Path
 
 from crunchbot.pilot.base import Base, BaseError
-from crunchbot.simulation.bridge import program
+from crunchbot.programs import program
 
 WAIT_MOST_S = 1.0
 WORDS = (

@@ -28,7 +28,7 @@ from pathlib import Path
 from createpeer import STOP, drive_order
 
 from crunchbot.pilot.base import Base, BaseError
-from crunchbot.simulation.bridge import program
+from crunchbot.programs import program
 
 STOPPED_MOST_S = 0.5
 BEAT_S, HANGS_S = 0.1, 0.3

@@ -18,7 +18,7 @@ from hostile_clients import attacked, serve_honest
 
 from crunchbot.pilot import base
 from crunchbot.pilot.base import BaseError, BaseLost
-from crunchbot.simulation.bridge import program
+from crunchbot.programs import program
 
 ENDED = STOP + bytes([PAUSE, 0, START])  # last words: stopped, silent, passive
 

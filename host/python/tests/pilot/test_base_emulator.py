@@ -9,7 +9,7 @@ import subprocess
 import pytest
 
 from crunchbot.pilot.base import BUMP_LEFT, CLIFF_FRONT_LEFT, IDLE, Base
-from crunchbot.simulation.bridge import program
+from crunchbot.programs import program
 
 FRAME_BYTES = 38  # of what whisker-base asks a Create 1 for
 WHISK_RAD_S = math.pi / 24

@@ -8,8 +8,9 @@ import subprocess
 import pytest
 from createpeer import STOP, Driver, drive_order
 
+from crunchbot.errors import UserError
 from crunchbot.pilot.base import IDLE
-from crunchbot.simulation.bridge import SimulationError, program
+from crunchbot.programs import program
 
 BUS = """\
 <busconfig>
@@ -83,7 +84,7 @@ def machine(tmp_path):
         pytest.skip("no dbus-daemon; run tools/setup.sh")
     try:
         program("fake_logind")
-    except SimulationError:
+    except UserError:
         pytest.skip("built without libsystemd")
     made = Machine(tmp_path)
     yield made

@@ -8,9 +8,6 @@ import numpy as np
 import pytest
 from models import model as texture_model
 
-from crunchbot.demo.level1 import explore
-from crunchbot.demo.study import study
-from crunchbot.demo.training import learn, read_whisks
 from crunchbot.nav import localise
 from crunchbot.nav.observations import tells_normals
 from crunchbot.pilot.behaviour import BLOCK_TICKS, ODOMETRY_TICKS
@@ -18,11 +15,14 @@ from crunchbot.pilot.pilot import Pilot, compose
 from crunchbot.pilot.states import Whisk
 from crunchbot.robot.models import load_models
 from crunchbot.scene import Arena, Scene
-from crunchbot.scenes.geometry import directions
-from crunchbot.simulation.scenes import TEXTURES, make_robot, make_scene
-from crunchbot.simulation.world import World
 from crunchbot.touch.contact import Contact
 from crunchbot.touch.radial.model import fit
+from crunchbot_lab.demo.level1 import explore
+from crunchbot_lab.demo.study import study
+from crunchbot_lab.demo.training import learn, read_whisks
+from crunchbot_lab.scenes.geometry import directions
+from crunchbot_lab.signals import World
+from crunchbot_lab.simulation.scenes import TEXTURES, make_robot, make_scene
 
 SEED = 11
 TICKS = 80_000

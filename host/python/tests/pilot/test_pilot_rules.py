@@ -22,8 +22,8 @@ from crunchbot.pilot.states import FULL, LOST_TICKS, TIP_SLACK_RAD, TipMove
 from crunchbot.pilot.tip import AIM_MM, contact_type, move_for_tip
 from crunchbot.pilot.wheels import EXACT, NO_BUMPS, Bumps, Wheels
 from crunchbot.pilot.whereabouts import Whereabouts
-from crunchbot.simulation.scenes import make_robot
 from crunchbot.touch.mount import Mount
+from crunchbot_lab.simulation.scenes import make_robot
 
 ROOT = Path(__file__).resolve().parents[4]
 STEP_M_S, TRACK_M = 0.0285, 0.235  # of a base whose wheels move in steps

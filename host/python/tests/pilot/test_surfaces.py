@@ -6,18 +6,18 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from crunchbot.demo.level1 import explore
-from crunchbot.demo.training import flat, read_training, train_surfaces
 from crunchbot.nav import localise
 from crunchbot.nav.observations import read_observations
 from crunchbot.pilot.feel import Felt
 from crunchbot.pilot.pilot import Pilot
 from crunchbot.robot.models import load_models
 from crunchbot.robot.rowfiles import Rows
-from crunchbot.simulation.scenes import TEXTURES, make_scene
-from crunchbot.simulation.world import write_surface_sweeps
 from crunchbot.touch.radial.model import RadialModel
 from crunchbot.touch.texture.model import TextureModel, classify, load
+from crunchbot_lab.demo.level1 import explore
+from crunchbot_lab.demo.training import flat, read_training, train_surfaces
+from crunchbot_lab.signals.recordings import write_surface_sweeps
+from crunchbot_lab.simulation.scenes import TEXTURES, make_scene
 
 TRAINED, FLOWN, TICKS = 3, 31, 120_000
 

@@ -18,7 +18,6 @@ from rosbags.typesys import Stores, get_typestore
 
 from crunchbot.bridge.ring import Clock, Reader, RingError, Writer
 from crunchbot.native import lib
-from crunchbot.protocol import LANES, LIMITS
 from crunchbot.recording import RecordingError, read
 from crunchbot.recording.mcapfile import McapFile
 from crunchbot.recording.messages import MessageError, decode_block, encode_block
@@ -26,6 +25,7 @@ from crunchbot.recording.recorder import Recorder, record
 from crunchbot.recording.replay import Replay
 from crunchbot.recording.timeline import Timeline
 from crunchbot.recording.writing import RecordingWriter
+from whisker_protocol import LANES, LIMITS
 
 CAPACITY = 4096
 

@@ -14,7 +14,6 @@ from hostile import variants
 from linkkit import sample
 from robotkit import examples, to_rows
 
-from crunchbot import scenes
 from crunchbot.nav.observations import ODOMETRY
 from crunchbot.robot import messages as m
 from crunchbot.robot.inbox import Inbox, encoding_of
@@ -24,6 +23,7 @@ from crunchbot.robot.row_checks import RowChecks
 from crunchbot.robot.rows import to_message
 from crunchbot.robot.sources import Sources
 from crunchbot.robot.streams import NUMBER_MOST, Envelope
+from crunchbot_lab import scenes
 
 ROWS = 40
 RUN_INPUTS = 20_000  # of one navigator and one server

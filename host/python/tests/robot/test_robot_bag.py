@@ -13,7 +13,6 @@ from robotkit import examples, flat, to_rows
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
-from crunchbot import scenes
 from crunchbot.commands.bag import next_free
 from crunchbot.nav import localise
 from crunchbot.nav.observations import observations_path
@@ -28,6 +27,7 @@ from crunchbot.robot.rows import RowPublisher
 from crunchbot.robot.streams import Envelope
 from crunchbot.scene import load
 from crunchbot.sensor_tables import SensorTable
+from crunchbot_lab import scenes
 
 PATIENCE_S = 60.0
 ROWS = 30

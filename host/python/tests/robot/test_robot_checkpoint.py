@@ -8,7 +8,6 @@ import pytest
 from fuzz_checkpoint import fuzz, seed_file
 from robotkit import to_rows
 
-from crunchbot import scenes
 from crunchbot.nav import filters
 from crunchbot.nav.filters import COMPONENT, Filter, SettingError
 from crunchbot.pilot.pilot import compose
@@ -19,6 +18,7 @@ from crunchbot.robot.inbox import Received
 from crunchbot.robot.memory import AGE_MOST_S, Memory, widen
 from crunchbot.robot.rows import ROW_NS, Follower, Place, Step, to_message
 from crunchbot.robot.streams import Envelope
+from crunchbot_lab import scenes
 
 ROWS = 60
 NAMES = ("grid", "adaptive")

@@ -18,12 +18,12 @@ from crunchbot import scene as scenes
 from crunchbot.bridge.ring import Writer
 from crunchbot.cli import _parser, main
 from crunchbot.commands import robot
-from crunchbot.demo import training
 from crunchbot.robot import holders, parts
 from crunchbot.robot.children import Program
 from crunchbot.robot.link import Link
-from crunchbot.simulation.scenes import make_scene
 from crunchbot.view import command as view
+from crunchbot_lab.demo import training
+from crunchbot_lab.simulation.scenes import make_scene
 
 PATIENCE_S = 60.0
 # As the simulation does it: the true pose to whoever connects. Its argument: a socket.
@@ -106,7 +106,7 @@ def test_the_desktops_side_is_added(started):
 def test_a_simulated_robot_learns_its_own_whiskers(capsys, monkeypatch, tmp_path, given):
     """Models of other whiskers read floors wrong: those that learn are those of the simulation, batch and all."""
     learnt = []
-    monkeypatch.setattr("crunchbot.demo.training.learn", lambda models, scene, *_: learnt.append(scene))
+    monkeypatch.setattr("crunchbot_lab.demo.training.learn", lambda models, scene, *_: learnt.append(scene))
     stopped = threading.Event()
     stopped.set()
     monkeypatch.setattr(robot, "stop_on_signals", lambda: stopped)
@@ -136,7 +136,7 @@ def test_a_simulated_robot_learns_once_and_nothing_where_models_are_given(capsys
         models.mkdir(exist_ok=True)
         (models / "texture.json").touch()
 
-    monkeypatch.setattr("crunchbot.demo.training.learn", learn)
+    monkeypatch.setattr("crunchbot_lab.demo.training.learn", learn)
     common = ["robot", "--simulated", "--out", tmp_path / "out", "--first-port"]
     for options in ([], [], ["--models", tmp_path / "out/models"], ["--models", tmp_path]):
         run(capsys, *common, free_port(), *options)
@@ -246,13 +246,13 @@ def test_a_port_that_is_not_there_is_said_once(started, capsys, tmp_path):
     assert started("--port", tmp_path / "none") == ["whiskerd", "base", "pilot"]
 
 
-def test_without_a_source_tree_models_have_to_be_given(refused, monkeypatch):
-    """As from an installed wheel, which has no simulation to learn from."""
-    monkeypatch.delitem(sys.modules, "crunchbot.demo.training", raising=False)
-    monkeypatch.delattr("crunchbot.demo.training", raising=False)
-    monkeypatch.setitem(sys.modules, "crunchbot.simulation.world", None)
+def test_a_simulated_robot_needs_the_laboratory(refused, monkeypatch):
+    """As where only the product is installed."""
+    for name in [name for name in sys.modules if name.partition(".")[0] == "crunchbot_lab"]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "crunchbot_lab", None)
     code, line = refused("--simulated")
-    assert code == 2 and "source tree" in line and "--models" in line
+    assert code == 2 and "robot: --simulated" in line and "pip install crunchbot-lab" in line
 
 
 WHISKER_COMMANDS = {"pilot", "navigator", "bag", "view"}

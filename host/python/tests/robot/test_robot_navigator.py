@@ -16,7 +16,6 @@ from linkkit import free_endpoint
 from robotkit import take_until, to_rows
 
 from crunchbot import scene as scene_folder
-from crunchbot import scenes
 from crunchbot.errors import UserError
 from crunchbot.nav import localise
 from crunchbot.nav.filters import COMPONENT
@@ -27,6 +26,7 @@ from crunchbot.robot.link import Link
 from crunchbot.robot.navigator import Navigator, Settings
 from crunchbot.robot.ranges import COMPONENTS_MOST
 from crunchbot.robot.rows import RowPublisher, to_message
+from crunchbot_lab import scenes
 
 PATIENCE_S = 60.0
 ROWS = 60
@@ -496,13 +496,14 @@ def test_a_pose_that_is_told_while_running_is_gone_on_from(made):
         while not wanted(seen[-1]):
             robot.send([next(left)])
             seen += [r.message for r in take_until(robot.inbox, len, PATIENCE_S) if r.topic == topic]
-        return seen[-2:]
+        first = next(n for n, message in enumerate(seen) if wanted(message))
+        return seen[first - 1], seen[first]
 
     left = iter(rows)
     with Robot("localisation", "health/navigator") as robot, robot.navigator(folder, "--filter", "adaptive"):
         answers(robot, "localisation", lambda x: x and x.prior == "scene")
         initial_pose.send(robot.link, elsewhere, (0.02, 0.02, 0.02))
-        before, after = answers(robot, "localisation", lambda x: x and x.prior == "told")
+        before, after = answers(robot, "localisation", lambda x: x and x.prior == "given")
         apart = [np.hypot(*np.subtract(x.pose.pose.xytheta, elsewhere)[:2]) for x in (before, after) if x]
         assert apart[-1] < 0.1 and (before is None or apart[0] > 0.5)
         initial_pose.send(robot.link, (-1.0, 0.0, 0.0))

@@ -19,8 +19,8 @@ from crunchbot.robot import wheels as wheels_module
 from crunchbot.robot.health import RUNNING
 from crunchbot.robot.pilot_process import LOST, NO_HEARTBEAT, SILENCE_S, Flight, LiveFlight, LiveWheels
 from crunchbot.robot.wheels import MODE, RETRY_S, LiveBase, Report, wheels_of
-from crunchbot.simulation.scenes import make_scene
 from crunchbot.touch.radial.model import RadialModel
+from crunchbot_lab.simulation.scenes import make_scene
 
 
 class Clock:

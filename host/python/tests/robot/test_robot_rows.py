@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from robotkit import to_rows
 
-from crunchbot import scenes
 from crunchbot.nav import localise
 from crunchbot.nav.observations import cell
 from crunchbot.pilot.pilot import compose
@@ -16,6 +15,7 @@ from crunchbot.robot.inbox import Received
 from crunchbot.robot.row_checks import RowChecks
 from crunchbot.robot.rows import PIECES_MOST, Follower, RowPublisher, Step, between, to_message, to_row
 from crunchbot.robot.streams import Envelope
+from crunchbot_lab import scenes
 
 
 class Sink:

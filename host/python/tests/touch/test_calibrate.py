@@ -9,11 +9,11 @@ from commandkit import run, signals_as_before  # noqa: F401 - a fixture
 from rings import make_frames, ring_name
 
 from crunchbot.bridge.ring import FRAME, Writer
-from crunchbot.simulation.scenes import make_scene
-from crunchbot.simulation.world import radial_contacts
 from crunchbot.touch.calibration import CalibrationError, Feed, WhiskFinder, measure_rest
 from crunchbot.touch.contact import REST_SAMPLES
 from crunchbot.touch.radial.model import RadialModel, peak, read_whisks
+from crunchbot_lab.signals.recordings import radial_contacts
+from crunchbot_lab.simulation.scenes import make_scene
 
 LANE = 3
 RADII = (90.0, 110.0, 130.0)

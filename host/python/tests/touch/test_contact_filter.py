@@ -10,7 +10,7 @@ from whisks import whisk, whisks
 from crunchbot.touch.contact_filter import ContactFilter
 from crunchbot.touch.radial import model as radial
 from crunchbot.touch.radial.shape import Contact
-from signals.mechanics import Whisker, touch
+from crunchbot_lab.signals.mechanics import Whisker, touch
 
 TICK_S = 5e-4
 

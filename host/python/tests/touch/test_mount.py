@@ -2,8 +2,8 @@
 
 import pytest
 
-from crunchbot.simulation.scenes import make_robot
 from crunchbot.touch.mount import NEAREST_MM, Mount
+from crunchbot_lab.simulation.scenes import make_robot
 
 MOUNTS = [Mount.of(whisker) for whisker in make_robot().of_role("object")]
 

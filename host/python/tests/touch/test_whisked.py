@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from whisks import COUNTS, RATE, whisk, whisks
 
-from crunchbot.simulation.scenes import make_robot
 from crunchbot.touch.mount import Mount
 from crunchbot.touch.radial import model as radial
+from crunchbot_lab.simulation.scenes import make_robot
 
 OUTER, INNER = (Mount.of(whisker) for whisker in make_robot().of_role("object")[:2])
 CORNER_MM, TIP_MM = 110.0, 140.0

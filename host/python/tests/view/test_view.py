@@ -20,7 +20,6 @@ from websockets.exceptions import ConnectionClosed
 
 from crunchbot.bridge.ring import Clock, Writer
 from crunchbot.cli import main as whisker_main
-from crunchbot.protocol import LANES
 from crunchbot.view.__main__ import main
 from crunchbot.view.client import WINDOW, Client
 from crunchbot.view.pyramid import BINS
@@ -28,6 +27,7 @@ from crunchbot.view.rings import find_rings
 from crunchbot.view.server import MESSAGE_BYTES
 from crunchbot.view.tap import Tap
 from crunchbot.view.topics import BLOCK, BLOCK_BINS
+from whisker_protocol import LANES
 
 __all__ = ["nothing_logged"]  # a fixture that every test here uses
 

@@ -10,9 +10,9 @@ from rings import ring_name
 from viewkit import NODES, flowing, made_frames, ring_of, spoil, view_of
 
 from crunchbot.bridge.ring import Clock
-from crunchbot.protocol import WIRE_VERSION
 from crunchbot.view.hub import Hub
 from crunchbot.view.server import serving
+from whisker_protocol import WIRE_VERSION
 
 pytestmark = pytest.mark.skipif(chromium.PROGRAM is None, reason="chromium is not installed (apt install chromium)")
 

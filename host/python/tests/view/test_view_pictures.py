@@ -15,7 +15,7 @@ from viewscene import ALIKE, SceneRun
 from viewsignals import driven_frames, in_time
 
 from crunchbot.bridge.ring import Clock, Writer
-from crunchbot.protocol import WIRE_VERSION
+from whisker_protocol import WIRE_VERSION
 
 pytestmark = pytest.mark.skipif(chromium.PROGRAM is None, reason="chromium is not installed (apt install chromium)")
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from viewkit import NODES, made_frames, spoil
 
-from crunchbot.protocol import CODES, LANES, SENSOR_ERRORS, STATUS_CODE_SHIFT
 from crunchbot.view.pyramid import BINS, CHUNK, WIDTHS, Pyramid
 from crunchbot.view.tally import Tally
+from whisker_protocol import CODES, LANES, SENSOR_ERRORS, STATUS_CODE_SHIFT
 
 
 def expected(frames, slots, width, first, end):

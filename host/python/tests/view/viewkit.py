@@ -13,10 +13,10 @@ from rings import ring_name
 from websockets.asyncio.client import connect
 
 from crunchbot.bridge.ring import FRAME, Writer
-from crunchbot.protocol import CODES, LANES, LIMITS, STATUS_CODE_SHIFT
 from crunchbot.view.hub import Hub
 from crunchbot.view.server import serving
 from crunchbot.view.topics import BLOCK
+from whisker_protocol import CODES, LANES, LIMITS, STATUS_CODE_SHIFT
 
 NODES = 3
 PATIENCE_S = 20.0  # for what must come; a test that fails ends

@@ -15,11 +15,11 @@ from crunchbot.robot.inbox import Inbox
 from crunchbot.robot.rows import between
 from crunchbot.robot.streams import envelopes
 from crunchbot.scene import Arena, Scene
-from crunchbot.simulation.scenes import make_robot
 from crunchbot.view.hub import Hub
 from crunchbot.view.robot import RobotModel
 from crunchbot.view.robot_source import InboxSource
 from crunchbot.view.server import serving
+from crunchbot_lab.simulation.scenes import make_robot
 
 ROW_NS = 10**8
 ARENA = Arena(

@@ -11,9 +11,9 @@ from crunchbot.pilot.pilot import compose
 from crunchbot.robot import messages as m
 from crunchbot.robot.belief import condense, to_message
 from crunchbot.scene import NORMAL, POINT
-from crunchbot.scenes import arenas
-from crunchbot.scenes.families import Recipe, recipe
-from crunchbot.scenes.making import make_recipe
+from crunchbot_lab.scenes import arenas
+from crunchbot_lab.scenes.families import Recipe, recipe
+from crunchbot_lab.scenes.making import make_recipe
 
 FILTER = "adaptive"
 ALIKE = replace(

@@ -8,9 +8,9 @@ import numpy as np
 from viewkit import spoil
 
 from crunchbot.bridge.ring import FRAME, Writer
-from crunchbot.protocol import CODES, LANES, LIMITS, STATUS_CODE_SHIFT
-from crunchbot.simulation.scenes import make_scene
-from crunchbot.simulation.world import World
+from crunchbot_lab.signals import World
+from crunchbot_lab.simulation.scenes import make_scene
+from whisker_protocol import CODES, LANES, LIMITS, STATUS_CODE_SHIFT
 
 # m/s, rad/s, ticks; again and again
 DRIVE = ((0.15, 0.0, 4000), (0.0, 0.71, 3000), (0.15, 0.0, 5000), (0.0, -0.71, 3000), (-0.15, 0.0, 3000))

@@ -1,0 +1,24 @@
+"""The compiled programs (whiskerd, whisker-base, whisker-bridge-sim ...): where they are."""
+
+import os
+import shutil
+from pathlib import Path
+
+from .errors import UserError
+
+SOURCE_TREE = Path(__file__).resolve().parents[3]
+
+
+def program(name: str) -> str:
+    """A program's path: from $WHISKER_BUILD, the source tree's build folder, or $PATH. UserError where there is none."""
+    places = [Path(os.environ[key]) for key in ("WHISKER_BUILD",) if key in os.environ] + [
+        SOURCE_TREE / "build/release"
+    ]
+    for place in places:
+        for path in sorted(place.rglob(name)) if place.is_dir() else []:
+            if path.is_file() and os.access(path, os.X_OK):
+                return str(path)
+    if found := shutil.which(name):
+        return found
+    remedy = "install umockdev" if name.startswith("umockdev") else "run 'make build' in a source tree"
+    raise UserError(f"{name}: not found; {remedy}, or name the folder in $WHISKER_BUILD")

@@ -1,0 +1,131 @@
+"""`whisker bench`: scores any engine's estimates on a fixed list of scenes and logs (crunchbot_lab.scenes.benchmark)."""
+
+import json
+from pathlib import Path
+
+from crunchbot.arguments import add_action
+from crunchbot.errors import UserError
+from crunchbot.nav import localise
+from crunchbot.nav.estimates import read_estimates
+from crunchbot.nav.judging import NEAR_M, bits_told, bits_wanted, judge, starts_of, travel_of
+from crunchbot.nav.scoring import position_errors
+from crunchbot.tables import TableError, unwritable
+
+from ..scenes import benchmark, write_scene
+
+EXAMPLE = "whisker bench touch --scene anchor+global --estimate est.csv"
+COLUMNS = (  # title, key of the figure, factor, format
+    ("near %", "near_share", 100, "5.1f"),
+    ("after 20 cm %", "near_share_after_20cm", 100, "5.1f"),
+    ("median mm", "error_median_m", 1000, ".1f"),
+    ("in 90 % region", "coverage_90", 100, ".0f"),
+    ("sure and wrong %", "sure_wrong_share", 100, ".1f"),
+    ("Brier", "brier", 1, ".3f"),
+    ("rows to lock", "rows_to_lock", 1, ".0f"),
+    ("us a row", "step_us_mean", 1, ".3g"),
+)
+
+
+def add(parser) -> None:
+    actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
+    p = add_action(actions, "touch", "where the robot is, by touch", EXAMPLE, touch)
+    p.add_argument("--list", action="store_true", help="print the scenes of the list and leave")
+    p.add_argument("--scene", metavar="NAME", help="a scene of the list, or a scene folder with true poses")
+    p.add_argument("--data", metavar="DIR", help="folder of the logs, as DIR/thymio/random_1")
+    p.add_argument("--estimate", metavar="EST.CSV", help="x_m, y_m, theta_rad, as in docs/formats.md, of any engine")
+    text = "run this one of whisker's filters in place of --estimate"
+    p.add_argument("--filter", metavar="NAME", choices=localise.filter_names(), help=text)
+    p.add_argument("--out", metavar="DIR", help="write the scene's folder, for an engine of your own to run on")
+    p.add_argument(
+        "--near", type=_metres, default=NEAR_M, metavar="M", help="a row is near within so much (default: %(default)s)"
+    )
+    p.add_argument("--chart", metavar="FILE.svg", help="draw error and bits over the way, as SVG or PNG")
+    p.add_argument(
+        "--peers", type=Path, default=benchmark.STORED, metavar="FILE", help="stored figures of other engines"
+    )
+    p.add_argument("--json", action="store_true", help="print the scores as one line of JSON")
+
+
+def _metres(text: str) -> float:
+    value = float(text)
+    if not 0.0 < value <= 100.0:
+        raise ValueError
+    return value
+
+
+class BenchError(UserError):
+    """What a command line lacks; one line."""
+
+
+def touch(arguments) -> int:
+    if arguments.list:
+        print("\n".join(benchmark.NAMES))
+        return 0
+    if arguments.scene is None:
+        raise BenchError("bench touch: needs --scene; see --list, or name a scene folder")
+    wanted = benchmark.entry(arguments.scene, arguments.data)
+    if arguments.out:
+        try:
+            write_scene(arguments.out, wanted.scene, wanted.observations)
+        except OSError as error:
+            raise unwritable(arguments.out, error) from error
+        print(f"{arguments.out}: {wanted.name}, {len(wanted.observations)} rows")
+        return 0
+    mine = _estimates(arguments, wanted)
+    scores = [_judged(one, wanted, arguments.near) for one in (mine, *wanted.beside)]
+    if arguments.chart:
+        _draw(arguments.chart, wanted, (mine, *wanted.beside), arguments.near)
+    peers = [] if arguments.near != NEAR_M else benchmark.stored(arguments.peers).get(wanted.name, [])
+    reported = [*scores, *(score for score in peers if score["engine"] != mine.name)]
+    print(json.dumps({"scene": wanted.name, "scores": reported}) if arguments.json else table(wanted.name, reported))
+    return 0
+
+
+def _estimates(arguments, wanted: benchmark.Entry):
+    if (arguments.estimate is None) == (arguments.filter is None):
+        raise BenchError("bench touch: needs --estimate or --filter, one of them; or --out to write the scene")
+    if arguments.filter:
+        return benchmark.run_filter(arguments.filter, wanted)
+    return read_estimates(arguments.estimate, Path(arguments.estimate).stem, wanted.observations)
+
+
+def _judged(estimates, wanted: benchmark.Entry, near_m: float) -> dict:
+    try:
+        return judge(estimates, wanted.observations, near_m)
+    except ValueError as error:
+        raise TableError(wanted.name, None, str(error)) from error
+
+
+def table(scene: str, scores: list[dict]) -> str:
+    """One line an engine; a dash for what it does not tell."""
+    width = max(len(scene), *(len(score["engine"]) for score in scores))
+    lines = [" | ".join([f"{scene:{width}}", *(title for title, *_ in COLUMNS)])]
+    for score in scores:
+        cells = [_cell(score.get(key), factor, form, len(title)) for title, key, factor, form in COLUMNS]
+        lines.append(" | ".join([f"{score['engine']:{width}}", *cells]))
+    return "\n".join(lines)
+
+
+def _cell(value: float | None, factor: float, form: str, width: int) -> str:
+    return f"{'-' if value is None else format(factor * value, form):>{width}}"
+
+
+def _draw(path: str, wanted: benchmark.Entry, engines, near_m: float) -> None:
+    from ..report import touch_chart
+
+    try:
+        touch_chart.save(path, course(wanted, engines, near_m))
+    except OSError as error:
+        raise unwritable(path, error) from error
+    except ValueError as error:
+        raise BenchError(f"--chart {path}: {error}; name a file .svg or .png") from error
+
+
+def course(wanted: benchmark.Entry, engines, near_m: float):
+    """What the chart draws of some engines' estimates of one scene."""
+    from ..report.touch_chart import Course
+
+    scene, rows = wanted.scene, wanted.observations
+    errors = {e.name: (e.rows, position_errors(e.poses, rows.truth[e.rows])) for e in engines}
+    travel, (x, y) = travel_of(rows, starts_of(rows)), scene.arena.size_m
+    return Course(wanted.name, travel, x * y, near_m, bits_wanted(scene, near_m), bits_told(scene, rows), errors)

@@ -1,0 +1,147 @@
+"""`whisker bridge-sim`: the simulated bridge, so that everything can be tried without hardware.
+
+With whiskerd on it, or, by --usbip or --usbredir, as a USB device for a Linux kernel.
+"""
+
+import re
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+from pathlib import Path
+
+from crunchbot.arguments import RING, number_above, whole_number
+from crunchbot.bridge.ring import Reader, RingError
+from crunchbot.programs import program
+from crunchbot.stopping import stop_on_signals
+from whisker_protocol import LANES, LIMITS
+
+from ..simulation.bridge import COURSES, Course, flat_scene, read_faults
+from ..simulation.scenes import MECHANICS
+
+EXAMPLE = "whisker bridge-sim --lanes 6 --seconds 60 &  whisker top"
+TICKS_PER_S = LIMITS["clock_hz"] // LIMITS["tick_period"]
+DAY_S = 86400.0
+UP_S = 60.0  # for the simulated bridge to enumerate
+USBIP_PORT = 3240  # registered for USB/IP
+USBREDIR_PORT = 4000  # QEMU's examples take it
+PORT_MAX = 65535
+LEVELS = ("rtl", "bytes")
+# What to do with the device, by the protocol that serves it.
+REMEDIES = {
+    "usbip": "sudo modprobe vhci-hcd; sudo usbip --tcp-port {port} attach -r 127.0.0.1 -b 1-1",
+    "usbredir": "qemu-system-x86_64 ... -device qemu-xhci -chardev socket,id=bridge,host=127.0.0.1,port={port} "
+    "-device usb-redir,chardev=bridge",
+}
+
+
+def add(parser) -> None:
+    parser.add_argument("--ring", default=RING, metavar="NAME", help="the ring whiskerd makes (default: %(default)s)")
+    parser.add_argument(
+        "--lanes", type=whole_number(1, LANES), metavar="N", help="populated lanes (the scene's whiskers)"
+    )
+    parser.add_argument("--scene", help="scene folder (default: the demo's of this seed)")
+    text = "TOML: [[fault]] tables with tick or t_s, kind, and, for faults of a lane, lane (and bit or error)"
+    parser.add_argument("--fault", metavar="FILE.TOML", help=text)
+    parser.add_argument(
+        "--seconds", type=number_above(0.0), default=DAY_S, metavar="S", help="simulated length (a day)"
+    )
+    text = "how finely whiskers bend (%(default)s)"
+    parser.add_argument("--mechanics", choices=MECHANICS, default=MECHANICS[0], help=text)
+    parser.add_argument("--seed", type=whole_number(0, 2**32 - 1), default=1, help="of world, sensors, start (1)")
+    text = "turn on the spot, stand still, or whisk: to one side and the other at a body whisk's rate (turn)"
+    parser.add_argument("--drive", choices=list(COURSES), default="turn", help=text)
+    text = "simulated seconds per second, at most what the machine can; 0: as fast as it can (default: 1)"
+    parser.add_argument("--pace", type=number_above(-1e-9), default=1.0, metavar="X", help=text)
+    text = "how much of the bridge is simulated (%(default)s): the gateware, cycle by cycle, or transactions: the same frames"
+    parser.add_argument("--level", choices=LEVELS, default=LEVELS[0], help=text)
+    served = parser.add_mutually_exclusive_group()
+    text = (
+        "no whiskerd: give the device to a Linux kernel by USB/IP, on this port of 127.0.0.1 (%(const)s; 0: a free one)"
+    )
+    port = whole_number(0, PORT_MAX)
+    served.add_argument("--usbip", nargs="?", type=port, const=USBIP_PORT, metavar="PORT", help=text)
+    text = "the same by usbredir, for a guest in QEMU (%(const)s; 0: a free one)"
+    served.add_argument("--usbredir", nargs="?", type=port, const=USBREDIR_PORT, metavar="PORT", help=text)
+    parser.set_defaults(run=run)
+
+
+def run(arguments) -> int:
+    stop = stop_on_signals()
+    with tempfile.TemporaryDirectory(prefix="whisker-") as folder:
+        command = _command(arguments, Path(folder))
+        pipes = {"stderr": subprocess.PIPE, "stdout": subprocess.PIPE if _protocol(arguments) else None}
+        with subprocess.Popen(command, text=True, start_new_session=True, **pipes) as process:
+            watcher = threading.Thread(target=_relay, args=(process,), daemon=True)
+            watcher.start()
+            course = Course(Path(folder) / "sim.sock", arguments.drive, arguments.pace, stop)
+            course.start()
+            if _protocol(arguments):
+                _say_where(process)
+            else:
+                _await_ring(arguments.ring, process, stop)
+            while process.poll() is None and not stop.wait(0.1):
+                continue
+            stopped = process.poll() is None
+            if stopped:
+                process.send_signal(signal.SIGTERM)
+            process.wait()
+            stop.set()
+            course.join()
+            watcher.join()
+    return 0 if stopped else process.returncode
+
+
+def _protocol(arguments) -> str | None:
+    """The protocol that serves the device; None: whiskerd has it."""
+    return next((name for name in REMEDIES if getattr(arguments, name) is not None), None)
+
+
+def _command(arguments, folder: Path) -> list[str]:
+    """The simulation under umockdev with whiskerd inside, or as a server."""
+    text, whiskers = flat_scene(arguments.scene, arguments.seed, arguments.mechanics)
+    lanes = max(arguments.lanes or whiskers, whiskers)
+    (folder / "scene.flat").write_text(text)
+    protocol = _protocol(arguments)
+    words = [] if protocol else [program("umockdev-wrapper")]
+    words += [program("whisker-bridge-sim"), "--scene", folder / "scene.flat"]
+    words += ["--seconds", arguments.seconds, "--seed", arguments.seed, "--lanes-populated", lanes]
+    words += ["--socket", folder / "sim.sock", "--followers", 1, "--level", arguments.level]
+    if arguments.fault:
+        (folder / "faults").write_text(read_faults(arguments.fault, TICKS_PER_S))
+        words += ["--fault-list", folder / "faults"]
+    mask = (1 << lanes) - 1
+    if protocol:
+        return [str(word) for word in [*words, f"--{protocol}", getattr(arguments, protocol)]]
+    words += ["--", program("whiskerd"), "--ring", arguments.ring, "--lane-mask", mask]
+    return [str(word) for word in words]
+
+
+def _await_ring(ring: str, process: subprocess.Popen, stop: threading.Event) -> None:
+    """Say when the ring is up; nothing when the simulation ended before, which says why itself."""
+    for _ in range(int(UP_S / 0.1)):
+        if process.poll() is not None or stop.is_set():
+            return
+        try:
+            with Reader(ring, 0.1) as reader:
+                reader.wait(0.1)
+        except RingError:
+            continue
+        print(f"ring {ring} is up; try: whisker top --ring {ring}", flush=True)
+        return
+
+
+def _say_where(process: subprocess.Popen) -> None:
+    """Where the device is served, and what to do with it; nothing when the simulation ended before."""
+    if found := re.match(r"serving (\w+) at \S+:(\d+)", process.stdout.readline()):
+        protocol, port = found.groups()
+        print(f"the bridge is served by {protocol} on port {port} of this machine; try: ", end="")
+        print(REMEDIES[protocol].format(port=port), flush=True)
+
+
+def _relay(process: subprocess.Popen) -> None:
+    """Pass on what simulation and whiskerd say, without the simulation's progress."""
+    for line in process.stderr:
+        if not line.startswith("progress "):
+            sys.stderr.write(line)

@@ -1,0 +1,90 @@
+"""`whisker scene`: draws level-0 scenes of a family, or makes one of a recording (crunchbot_lab.scenes)."""
+
+from crunchbot.arguments import add_action, warn
+from crunchbot.nav.filters import SettingError
+from crunchbot.nav.observations import observations_path, read_observations
+from crunchbot.occupancy import from_map
+from crunchbot.scene import OBSTACLES_MOST, SceneError, load, write
+from crunchbot.tables import unwritable
+
+from .. import scenes
+
+EXAMPLE = "whisker scene make --family anchor+kidnap --seed 7 --out scenes/7"
+
+
+def add(parser) -> None:
+    actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
+    p = add_action(actions, "make", "draw a scene of a family, observations and truth included", EXAMPLE, make)
+    p.add_argument("--family", metavar="F", help="a base and any modifiers, joined by '+'; see --list-families")
+    p.add_argument("--seed", type=int, default=0, help="draws arena, path and noise (default: %(default)s)")
+    p.add_argument("--steps", type=int, metavar="N", help="rows of 0.1 s (default: the family's)")
+    p.add_argument("--out", metavar="DIR", help="folder to write")
+    p.add_argument("--list-families", action="store_true", help="print bases and modifiers and leave")
+    example = "whisker scene from build/demo --out scenes/demo"
+    p = add_action(actions, "from", "make a scene of a run's recording", example, from_recording)
+    p.add_argument(
+        "kind",
+        nargs="?",
+        default="",
+        help=f"of the recording: {', '.join(scenes.READERS)} (default: told by its files)",
+    )
+    p.add_argument("recording", help="folder that a run left, as build/demo, a robot's bag, or a Thymio's recording")
+    p.add_argument("--out", required=True, metavar="DIR", help="folder to write")
+    example = "whisker scene map scenes/home home.yaml --out scenes/mapped"
+    text = "put an occupancy map into a scene folder, for all commands that take one"
+    p = add_action(actions, "map", text, example, with_map)
+    p.add_argument(
+        "scene", help="scene folder; without arena.toml the map is the arena, seen from the image's lower left corner"
+    )
+    p.add_argument("map", metavar="MAP.YAML", help="a ROS map server's YAML file")
+    p.add_argument("--out", required=True, metavar="DIR", help="folder to write")
+
+
+def make(arguments) -> int:
+    if arguments.list_families:
+        print("\n".join(f"{name}: {recipe.text}" for name, recipe in scenes.BASES.items()))
+        print("\n".join(f"+{name}: {text}" for name, (text, _) in scenes.MODIFIERS.items()))
+        return 0
+    if arguments.family is None or arguments.out is None:
+        raise SettingError("scene make: needs --family and --out; see --list-families")
+    if arguments.seed < 0 or (arguments.steps is not None and arguments.steps < 1):
+        raise SettingError("scene make: --seed or --steps is too small; give 0 or more, and 1 or more")
+    made = scenes.make(arguments.family, arguments.seed, arguments.steps)
+    _write(arguments.out, made.scene, made.observations)
+    print(f"{arguments.out}: {arguments.family}, seed {arguments.seed}, {len(made.observations.t_s)} rows")
+    return 0
+
+
+def from_recording(arguments) -> int:
+    if arguments.kind not in ("", *scenes.READERS):
+        raise SettingError(f"scene from: kind '{arguments.kind}' is unknown; choose one of {', '.join(scenes.READERS)}")
+    scene, observations = scenes.read_recording(arguments.recording, warn, arguments.kind)
+    _write(arguments.out, scene, observations)
+    print(f"{arguments.out}: from {arguments.recording}, {len(observations)} rows")
+    return 0
+
+
+def with_map(arguments) -> int:
+    scene = load(arguments.scene, arguments.map)
+    boxes = max(len(scene.arena.obstacles), len(scene.arena.unknown))
+    if boxes > OBSTACLES_MOST:
+        raise SceneError(
+            f"{arguments.map}: {boxes} boxes, {OBSTACLES_MOST} are the most of a folder; make the image coarser"
+        )
+    path = observations_path(arguments.scene)
+    observations = read_observations(path, scene) if path.exists() else None
+    if observations is not None and observations.truth is not None:
+        observations.truth = from_map(observations.truth, scene.origin)
+    _write(arguments.out, scene, None if observations is None else scenes.rounded(observations))
+    print(f"{arguments.out}: {arguments.scene} with {arguments.map}, {boxes} boxes")
+    return 0
+
+
+def _write(path: str, scene, observations) -> None:
+    try:
+        if observations is None:
+            write(path, scene)
+        else:
+            scenes.write_scene(path, scene, observations)
+    except OSError as error:
+        raise unwritable(path, error) from error

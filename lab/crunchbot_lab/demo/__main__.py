@@ -1,0 +1,207 @@
+"""The whole chain in one command: python -m crunchbot_lab.demo --out build/demo --build-dir build/release --seed 1."""
+
+import argparse
+import csv
+import json
+import shutil
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from tqdm import tqdm
+
+from crunchbot import scene as scenes
+from crunchbot.nav import localise
+from crunchbot.stopping import interrupt_on_signals
+from crunchbot.tables import TableError
+
+from ..report import write_report
+from ..report.run import FILTERS
+from ..simulation.scenes import MECHANICS, make_scene
+from . import summary as scores
+from .chain import ChainError, ChainRun, Link, run_chain
+from .training import METHODS, learn, radial_scores, write_radial_points
+
+TICKS_PER_S = 2000
+MARK = "demo.txt"
+
+
+def parse(argv: list[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="python -m crunchbot_lab.demo", description=__doc__)
+    add_run_options(parser, Path("build/demo"), 60.0)
+    return parser.parse_args(argv)
+
+
+def add_run_options(parser: argparse.ArgumentParser, out: Path, seconds: float) -> None:
+    """What a run is asked for, whatever its length."""
+    parser.add_argument("--out", type=Path, default=out, help="folder for everything the run leaves")
+    parser.add_argument("--build-dir", type=Path, default=Path("build/release"))
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument(
+        "--seconds", type=seconds_of_rows, default=seconds, help="simulated; a multiple of 0.1, at least 1"
+    )
+    parser.add_argument("--lanes", type=int, default=6, help="populated lanes, 6 to 28; those beyond 6 have no whisker")
+    parser.add_argument(
+        "--create", type=int, choices=(1, 2), default=1, help="the base: iRobot Create 1 or 2 (%(default)s)"
+    )
+    parser.add_argument("--mechanics", choices=MECHANICS, default=MECHANICS[0], help="how whiskers bend (%(default)s)")
+    parser.add_argument("--texture", choices=METHODS, default=METHODS[0], help="texture classifier (%(default)s)")
+    parser.add_argument("--sck-divider", type=int, default=6)
+    parser.add_argument("--word-gap", type=int, default=30)
+    parser.add_argument("--sample-point", type=int, default=5)
+
+
+def seconds_of_rows(text: str) -> float:
+    """A time that whole rows fill, as argparse wants it."""
+    seconds = float(text)
+    if seconds < 1.0 or abs(seconds * 10 - round(seconds * 10)) > 1e-9:
+        raise argparse.ArgumentTypeError(f"{seconds:g}: give a multiple of 0.1, at least 1")
+    return seconds
+
+
+def main(argv: list[str] | None = None) -> int:
+    return guarded("demo", demonstrate, parse(argv))
+
+
+def guarded(name: str, job: Callable[[argparse.Namespace], object], options: argparse.Namespace) -> int:
+    """Do a job; exit code 0, or a line about what is wrong and another code."""
+    interrupt_on_signals()
+    try:
+        job(options)
+    except (ChainError, scenes.SceneError, TableError, localise.SettingError) as error:
+        print(f"{name}: {error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print(f"{name}: interrupted", file=sys.stderr)
+        return 130
+    return 0
+
+
+def demonstrate(options: argparse.Namespace) -> None:
+    """All steps in order; leaves summary.json and report.html in the output folder."""
+    began = time.monotonic()
+    out, scene, _ = prepare(options)
+    results = {"seed": options.seed, "simulated_s": options.seconds, "lanes": options.lanes}
+    results |= learn_models(out, scene, options)
+    results |= run(out, options)
+    results |= judge(out, scene)
+    results["wall_s"] = time.monotonic() - began
+    write_summary(out, results)
+    report = write_report(out)
+    tell(results)
+    print(report)
+
+
+def prepare(options: argparse.Namespace) -> tuple[Path, scenes.Scene, tuple[float, float, float]]:
+    """The output folder with the scene in it, the scene, and the true start."""
+    out = fresh_folder(options.out.resolve())
+    scene, start = make_scene(options.seed, options.mechanics)
+    scenes.write(out / "scene", scene)
+    (out / "scene" / "scene.flat").write_text(scene.flat(start))
+    return out, scene, start
+
+
+def write_summary(out: Path, results: dict) -> None:
+    """summary.json, with six decimals."""
+    (out / "summary.json").write_text(json.dumps(scores.rounded(results), indent=1) + "\n")
+
+
+def fresh_folder(path: Path) -> Path:
+    """An empty output folder; what an earlier demo left there is removed, anything else is not."""
+    if path.exists() and not (path / MARK).exists() and any(path.iterdir()):
+        raise ChainError(f"{path}: not empty, and not left by an earlier demo; choose another --out")
+    if path.exists():
+        shutil.rmtree(path)
+    path.mkdir(parents=True)
+    (path / MARK).write_text("Written by python -m crunchbot_lab.demo, which may remove this folder.\n")
+    return path
+
+
+def learn_models(out: Path, scene: scenes.Scene, options: argparse.Namespace) -> dict:
+    """Texture and radial models, from level-1 recordings."""
+    with tqdm(total=1 + len(scene.robot.of_role("object")), desc="train and calibrate", unit="model") as bar:
+        models, contacts = learn(out / "models", scene, options.seed, bar.update, options.texture)
+    write_radial_points(out, models, contacts)
+    return radial_scores(scene, models, contacts)
+
+
+def run(out: Path, options: argparse.Namespace, level: str = "rtl") -> dict:
+    """The chain at this level (chain.ChainRun); what was sent, received, spoilt and reported."""
+    ticks = round(options.seconds * TICKS_PER_S)
+    link = Link(options.sck_divider, options.word_gap, options.sample_point)
+    chain = ChainRun(
+        out, options.build_dir.resolve(), options.seed, options.seconds, options.lanes, link, options.create, level
+    )
+    with tqdm(total=ticks, desc=f"the whole robot, {level.upper()}", unit="tick") as bar:
+        wall_s = run_chain(chain, lambda tick: bar.update(tick - bar.n))
+        bar.update(ticks - bar.n)
+    speed = json.loads((out / "speed.json").read_text())
+    log = json.loads((out / "log.json").read_text())
+    return {
+        "chain_wall_s": wall_s,
+        "frames_sent": speed["ticks"],
+        "frames_received": log["frames_received"],
+        "frames_lost": speed["ticks"] - log["frames_received"],
+        "usb_faults_injected": speed["usb_faults_injected"],
+        **scores.fault_scores(out / "faults.csv", out / "bad.csv"),
+        **scores.link_scores(*(json.loads((out / f"{name}.json").read_text()) for name in ("pilot", "navigator"))),
+    }
+
+
+def judge(out: Path, scene: scenes.Scene) -> dict:
+    """Compare what the pilot read and what the navigator thought with the truth."""
+    path = localise.observations_path(out / "scene")
+    truth = read_dicts(out / "truth.csv")
+    add_truth(path, truth)
+    observations = localise.read_observations(path, scene)
+    poses = {name: read_poses(out / f"est_{name}.csv") for name in FILTERS}
+    rows = [{key: float(value) if value else None for key, value in row.items()} for row in read_dicts(path)]
+    return scores.texture_scores(rows, truth, scene) | scores.pose_scores(poses, observations.truth)
+
+
+def read_dicts(path: Path) -> list[dict[str, str]]:
+    with open(path, newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def add_truth(path: Path, truth: list[dict[str, str]]) -> None:
+    """Put the true pose beside each row of observations.csv, for whoever scores a filter later."""
+    rows = read_dicts(path)
+    if len(rows) != len(truth):
+        raise TableError(path, None, f"{len(rows)} rows but {len(truth)} true poses; see the logs beside it")
+    names = ("x_m", "y_m", "theta_rad")
+    with open(path, "w", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow([*rows[0], *(f"true_{name}" for name in names)])
+        writer.writerows(
+            [*row.values(), *(true[name] for name in names)] for row, true in zip(rows, truth, strict=True)
+        )
+
+
+def read_poses(path: Path) -> np.ndarray:
+    """(n, 3) poses of an est.csv."""
+    return np.loadtxt(path, delimiter=",", skiprows=1, usecols=(1, 2, 3), ndmin=2)
+
+
+def tell(s: dict) -> None:
+    """Three lines a person can read."""
+    equal = "equal" if s["records_bad_match"] else "NOT EQUAL"
+    std = np.array(list(s["radial_std_mm"].values()))
+    print(
+        f"chain: {s['frames_received']} of {s['frames_sent']} frames, {s['frames_lost']} lost; {s['records_bad_injected']} bad records "
+        f"injected and {s['records_bad_reported']} reported, sets {equal}; {s['usb_faults_injected']} USB faults survived"
+    )
+    print(
+        f"touch: texture {100 * s['texture_accuracy']:.1f} % of windows right; distance along the whisker to "
+        f"{std.min():.1f}-{std.max():.1f} mm"
+    )
+    print(
+        f"pose:  grid {1000 * s['pose_error_median_m']:.0f} mm median error, adaptive {1000 * s['adaptive_error_median_m']:.0f} mm, "
+        f"foveal {1000 * s['foveal_error_median_m']:.0f} mm, odometry alone {1000 * s['odometry_error_median_m']:.0f} mm"
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,138 @@
+"""The demo's robot without its signals: the pilot's own behaviour (crunchbot.pilot.behaviour) on contacts from geometry.
+
+Rows come out as the pilot makes them: odometry, textures and distances held back during a body whisk, a distance at the
+release. What a whisk tells was taken from signal-level runs, and tests/scenes/test_levels.py holds the two against each other.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from crunchbot.pilot.behaviour import (
+    BLOCK_TICKS,
+    EXPLORE_M_S,
+    ODOMETRY_TICKS,
+    PUSH_TICKS,
+    TICK_S,
+    TURN_RAD_S,
+    Behaviour,
+)
+from crunchbot.pilot.states import PLAIN
+from crunchbot.scene import Arena, Robot
+from crunchbot.touch.mount import Mount
+
+from .geometry import free_test, range_test
+
+NOTICED_M = 0.001  # the sensor notices a contact when the whisker is pressed so far ...
+RELEASED_M = 0.0003  # ... and its end when so little is left
+TIP_M = 0.008  # a contact so near the whisker's end is the tip's, and reads as the whisker's length
+SETTLE_TICKS = 300  # of steady motion before a texture window counts
+DELAY_BLOCKS = 1  # an answer moves the wheels one block later
+BLOCK_S = BLOCK_TICKS * TICK_S
+BLOCKS_PER_ROW = ODOMETRY_TICKS // BLOCK_TICKS
+
+
+@dataclass
+class Explored:
+    """An exploration of n rows."""
+
+    path: np.ndarray  # (n + 1, 3) true poses
+    held: np.ndarray  # (n,) odometry held back
+    sweeping: np.ndarray  # (n,) texture windows are read
+    radial_m: np.ndarray  # (n, rays) true distances at releases; inf no contact, nan not read
+
+
+class _Feeler:
+    """What Behaviour asks of a contact, from a true range."""
+
+    def __init__(self, length_m: float):
+        self.length_m, self.range_m = length_m, math.inf
+        self.touching, self.settled, self.onset, self.release = False, True, -1, -1
+
+    def look(self, tick: int, range_m: float) -> None:
+        pressed = self.length_m - range_m
+        if not self.touching and pressed > NOTICED_M:
+            self.touching, self.onset = True, tick
+        elif self.touching and pressed < RELEASED_M:
+            self.touching, self.release = False, tick
+        if self.touching:
+            self.range_m = range_m
+
+
+class _Explorer:
+    def __init__(self, arena: Arena, robot: Robot, start, rng: np.random.Generator):
+        self.pose = tuple(map(float, start))
+        self.free = free_test(arena, robot.body_radius_m)
+        self.rays = robot.of_role("object")
+        self.reach = [range_test(arena, whisker) for whisker in self.rays]
+        self.feelers = {n: _Feeler(whisker.length_m) for n, whisker in enumerate(self.rays)}
+        self.mounts = {n: Mount.of(whisker) for n, whisker in enumerate(self.rays)}
+        turns = {n: mount.corner_turn for n, mount in self.mounts.items()}
+        self.behaviour = Behaviour(self.feelers, turns, rng, habits=PLAIN)
+        self.waiting = [(0.0, 0.0)] * (1 + DELAY_BLOCKS)
+        self.tick = 0
+        self.measured: dict[int, float] = {}
+
+    def block(self) -> None:
+        self._move(*self.waiting.pop(0))
+        last = self.tick + BLOCK_TICKS - 1
+        for n, feeler in self.feelers.items():
+            feeler.look(last, self.reach[n](*self.pose))
+        self._measure()
+        self.waiting.append(self.behaviour.decide(last))
+        self.tick += BLOCK_TICKS
+
+    def _move(self, v: float, omega: float) -> None:
+        x, y, heading = self.pose
+        ahead = heading + omega * BLOCK_S / 2
+        to = (x + v * BLOCK_S * math.cos(ahead), y + v * BLOCK_S * math.sin(ahead))
+        self.pose = (*(to if v and self.free(*to) else (x, y)), heading + omega * BLOCK_S)
+
+    def _measure(self) -> None:
+        whisk = self.behaviour.whisk
+        if whisk is None or whisk.start < 0 or whisk.measured:
+            return
+        feeler = self.feelers[whisk.lane]
+        if whisk.start < feeler.onset <= whisk.push_end - PUSH_TICKS and feeler.release > feeler.onset:
+            whisk.measured = True
+            line_mm = 1000.0 * (feeler.range_m if feeler.range_m < feeler.length_m - TIP_M else feeler.length_m)
+            reported = self.mounts[whisk.lane].distance(line_mm, whisk.direction)
+            self.measured[whisk.lane] = math.nan if reported is None else reported / 1000.0
+
+    def radial(self) -> list[float]:
+        """Cells of the row that ends now."""
+        whisking, released = self.behaviour.whisking, dict(self.measured)
+        self.measured.clear()
+        unread = whisking and not released
+        return [
+            released.get(n, math.nan if feeler.touching or unread else math.inf) for n, feeler in self.feelers.items()
+        ]
+
+    def sweeping(self, was_whisking: bool) -> bool:
+        v, omega = self.behaviour.drive
+        steady = self.behaviour.drive_since + SETTLE_TICKS <= self.tick
+        moving = v == EXPLORE_M_S or abs(omega) == TURN_RAD_S
+        return steady and moving and not self.behaviour.whisking and not was_whisking
+
+
+def explore(arena: Arena, robot: Robot, start, rows: int, rng: np.random.Generator) -> Explored:
+    """Let the pilot's behaviour explore for `rows` of 0.1 s."""
+    robot_in = _Explorer(arena, robot, start, rng)
+    path, held, sweeping, radial, was = [robot_in.pose], [], [], [], False
+    for _ in range(rows):
+        for _ in range(BLOCKS_PER_ROW):
+            robot_in.block()
+        (x, y, _), (to_x, to_y, _) = path[-1], robot_in.pose
+        robot_in.behaviour.moved(robot_in.tick - 1, math.hypot(to_x - x, to_y - y), 0.0, robot_in.pose[2] - path[-1][2])
+        held.append(robot_in.behaviour.whisking and not robot_in.measured)
+        sweeping.append(robot_in.sweeping(was))
+        radial.append(robot_in.radial())
+        was = robot_in.behaviour.whisking
+        path.append(robot_in.pose)
+    return Explored(
+        np.array(path),
+        np.array(held, bool),
+        np.array(sweeping, bool),
+        np.array(radial).reshape(rows, len(robot_in.rays)),
+    )
