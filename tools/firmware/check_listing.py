@@ -14,7 +14,7 @@ import sys
 from pathlib import Path
 
 SAMPLE_PATH = re.compile(
-    r"_(port_on_\w+|node_on_\w+|sampler_on_\w+|sensor_frame_\w+|record_pack|record_parse_order|board_(link|sensor|timer)_\w+"
+    r"_(port_on_\w+|node_on_\w+|sampler_on_\w+|sensor_frame_\w+|record_pack|order_parse|board_(link|sensor|timer)_\w+"
     r"|_(INT[12]|T2|SPI[12](Err)?|DMA1)Interrupt)$"
 )
 HELPER = re.compile(r"<?(_{2,3}(u?div|u?mod|mul|add|sub|float|fix|lt|gt|le|ge|eq|ne|neg|cmp)\w*(si|di|sf|df|hi)\w*)>?")
