@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 from tqdm import tqdm
 
 from .. import store
+from ..markdown import wrap
 from .chain import LANES, LINKS
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -229,7 +230,7 @@ def write_section(found: dict) -> None:
     path = ROOT / "docs/boards.md"
     before, rest = path.read_text().split(BEGIN)
     after = rest.split(END)[1]
-    path.write_text(f"{before}{BEGIN}\n\n{section(found)}\n\n{END}{after}")
+    path.write_text(f"{before}{BEGIN}\n\n{wrap(section(found))}\n\n{END}{after}")
 
 
 def options(parser) -> None:

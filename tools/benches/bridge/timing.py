@@ -13,6 +13,7 @@ import sys
 from pathlib import Path
 
 from .. import store
+from ..markdown import wrap
 
 ROOT = Path(__file__).resolve().parents[3]
 PAGE = ROOT / "docs/timing.md"
@@ -148,5 +149,5 @@ def run(build: Path, fresh: bool) -> None:
     found["host"] = host(build, found["latency"])
     store.write_result("bridge_timing", found)
     before, rest = PAGE.read_text().split(BEGIN)
-    PAGE.write_text(f"{before}{BEGIN}\n\n{table(found)}\n\n{END}{rest.split(END)[1]}")
+    PAGE.write_text(f"{before}{BEGIN}\n\n{wrap(table(found))}\n\n{END}{rest.split(END)[1]}")
     print("bench/results/bridge_timing.json, docs/timing.md")

@@ -1,0 +1,146 @@
+"""Measured figures that stand in pages which people write: they equal bench/results, and so each other.
+
+A figure that a page takes from a measurement has an entry here. What `tools/benches page` writes is compared as a whole
+(tests/test_benches.py), and so are the generated sections of other pages (below).
+"""
+
+import json
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+RESULTS = ROOT / "bench/results"
+
+
+def result(name: str):
+    return json.loads((RESULTS / f"{name}.json").read_text())
+
+
+def cm(metres: float) -> str:
+    return f"{100 * metres:.0f}"
+
+
+@dataclass(frozen=True)
+class Figure:
+    """What the groups of a pattern, found once in a page, must say."""
+
+    page: str
+    pattern: str
+    result: str
+    expected: Callable[[dict], tuple[str, ...]]
+
+
+def damaged(reader: str) -> Callable[[dict], tuple[str, ...]]:
+    def of(data: dict) -> tuple[str, ...]:
+        rows = [row for key, row in data["readers"].items() if key.startswith(f"{reader}: ")]
+        read, intact, unsaid = (sum(row[key] for row in rows) for key in ("read", "intact", "unsaid"))
+        return f"{100 * read / intact:.0f}", str(unsaid)
+
+    return of
+
+
+def restarts(case: str) -> Callable[[dict], tuple[str, ...]]:
+    def of(data: dict) -> tuple[str, ...]:
+        cells = []
+        for start in ("checkpoint", "uniform"):
+            found = data["cases"][f"{case}, {start}"]
+            cells += [f"{100 * found[key]:.0f} %" for key in ("near at once", "near again within 60 s")]
+            cells.append(", ".join(f"{seconds:.1f}" for seconds in found["again_s"]))
+        return tuple(cells)
+
+    return of
+
+
+def drill_errors(data: dict) -> tuple[str, ...]:
+    (run,) = data["runs"]
+    failed = sum(bool(event["failures"]) for event in run["events"])
+    faults = str(len(run["events"])), str(failed)
+    share = f"{100 * run['answers_off'] / run['answers']:.1f}"
+    return *faults, f"{run['error_p50_m']:.3f}", f"{run['error_p90_m']:.3f}", share
+
+
+CELLS = r" \| ([^|]+) \| ([^|]+) \| ([^|]+) \| ([^|]+) \| ([^|]+) \| ([^|]+) \|\n"
+FIGURES = (
+    Figure(
+        "README.md",
+        r"grid\s+(\d+)\s+cm.*?adaptive\s+filter\s+(\d+)\s+cm.*?foveal\s+grid\s+(\d+)\s+cm.*?alone\s+(\d+)\s+cm",
+        "demo",
+        lambda d: tuple(cm(d[f"{name}_error_median_m"]) for name in ("pose", "adaptive", "foveal", "odometry")),
+    ),
+    Figure(
+        "docs/walkthrough.md",
+        r"the\s+demo's\s+median\s+error\s+is\s+(\d+)\s+cm",
+        "demo",
+        lambda d: (cm(d["adaptive_error_median_m"]),),
+    ),
+    Figure("docs/using.md", r"`crunchbot.recording` \| (\d+) % \| (\d+) \|", "damage", damaged("whisker")),
+    Figure("docs/using.md", r"front to back \| (\d+) % \| (\d+) \|", "damage", damaged("mcap, stream")),
+    Figure("docs/using.md", r"by the index \| (\d+) % \| (\d+) \|", "damage", damaged("mcap, indexed")),
+    Figure("docs/using.md", r"rosbags [\d.]+ \| (\d+) % \| (\d+) \|", "damage", damaged("rosbags")),
+    Figure("docs/using.md", r"Of (\d+) damaged files", "damage", lambda d: (str(d["files"]),)),
+    Figure(
+        "docs/view.md",
+        r"(\d+) % of a core for one page.*?(\d+) kB/s",
+        "view",
+        lambda d: (f"{100 * d['runs'][1]['cpu_share']:.0f}", f"{d['runs'][1]['bytes_per_s_page'] / 1000:.0f}"),
+    ),
+    Figure(
+        "docs/drills.md",
+        r"(\d+)\s+faults, (\d+) with failures.*?median\s+([\d.]+) m, p90\s+([\d.]+) m,\s+([\d.]+) %",
+        "drills",
+        drill_errors,
+    ),
+    *(
+        Figure("docs/drills.md", rf"\| {title}{CELLS}", "restart", restarts(case))
+        for title, case in (
+            ("0 s", "gap 0 s"),
+            ("1 s", "gap 1 s"),
+            ("5 s", "gap 5 s"),
+            ("1 s, the pilot dead too[^|]*", "pilot too"),
+            ("1 s, the robot carried[^|]*", "carried"),
+        )
+    ),
+)
+
+
+@pytest.mark.parametrize("figure", FIGURES, ids=lambda f: f"{f.page}: {f.pattern[:30]}")
+def test_a_figure_of_a_page_is_that_of_the_result(figure):
+    found = re.findall(figure.pattern, (ROOT / figure.page).read_text(), re.DOTALL)
+    assert len(found) == 1, (
+        f"{figure.page}: {len(found)} places; adapt the pattern, or take the entry out with the text"
+    )
+    groups = found[0] if isinstance(found[0], tuple) else (found[0],)
+    assert groups == figure.expected(result(figure.result))
+
+
+@pytest.mark.parametrize("room", ["bench", "timing"])
+def test_a_generated_section_of_a_page_is_what_its_bench_makes_of_the_result(room, monkeypatch):
+    monkeypatch.syspath_prepend(str(ROOT / "tools"))
+    from benches.bridge import bench, timing
+    from benches.markdown import wrap
+
+    page, module, made = {
+        "bench": ("boards", bench, lambda: bench.section(result("bridge"))),
+        "timing": ("timing", timing, lambda: timing.table(result("bridge_timing"))),
+    }[room]
+    stands = (ROOT / f"docs/{page}.md").read_text().split(module.BEGIN)[1].split(module.END)[0]
+    assert stands.strip() == wrap(made()).strip()
+
+
+def test_no_page_says_how_fast_the_chain_runs_but_the_generated_ones():
+    """It is a figure of the machine and of the day: one page has it, from the result."""
+    for path in [ROOT / "README.md", *(ROOT / "docs").glob("*.md")]:
+        if path.name not in ("results.md", "decisions.md"):
+            assert not re.search(r"\d\.\d+ (?:x|times) real time", path.read_text()), path
+
+
+def test_an_entry_that_is_wrong_is_found(monkeypatch):
+    """The check itself: a figure that is not the result's fails."""
+    one = FIGURES[0]
+    wrong = Figure(one.page, one.pattern, one.result, lambda d: tuple(f"{text}9" for text in one.expected(d)))
+    with pytest.raises(AssertionError):
+        test_a_figure_of_a_page_is_that_of_the_result(wrong)
