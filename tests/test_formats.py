@@ -14,15 +14,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from crunchbot import occupancy, scenes
+from crunchbot import occupancy
 from crunchbot import scene as scene_files
 from crunchbot.bridge import ring
-from crunchbot.commands import bench, info, radial, stream, texture
-from crunchbot.demo import level1, training
+from crunchbot.commands import info, radial, stream, texture
 from crunchbot.nav import estimates, judging, localise, observations
 from crunchbot.robot import rowfiles, track
 from crunchbot.scene import NORMAL, POINT, SURFACE
-from crunchbot.scenes import thymio
 from crunchbot.sensor_tables import SensorTable
 from crunchbot.touch import calibration
 from crunchbot.touch.radial import model as radial_models
@@ -34,6 +32,10 @@ from crunchbot.touch.texture import spectral
 from crunchbot.touch.texture.change import Change
 from crunchbot.touch.texture.classifier import Classifier
 from crunchbot.touch.texture.novelty import Novelty
+from crunchbot_lab import scenes
+from crunchbot_lab.commands import bench
+from crunchbot_lab.demo import level1, training
+from crunchbot_lab.scenes import thymio
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = (ROOT / "docs/formats.md").read_text()

@@ -23,9 +23,11 @@ from pathlib import Path
 
 from tqdm import tqdm
 
+from benches.store import RESULTS, write_result
+
 ROOT = Path(__file__).resolve().parent.parent
 TESTS = (ROOT / "host/python/tests", ROOT / "lab/tests")
-STATE, RESULTS = ROOT / "build/bench/fuzz", ROOT / "bench/results"
+STATE = ROOT / "build/bench/fuzz"
 TOTAL = 10**8
 SLOW_SHARE = 1 / 500  # of the inputs, to each target that takes some hundred times as long over one as the others
 SLOW = {"rows"}  # every filter over a whole run; and all of Python
@@ -128,7 +130,6 @@ def shares(targets: list[Target], total: int) -> dict[str, int]:
 
 def write_results(tallies: list[Tally], targets: dict[str, dict]) -> None:
     """`targets`: entries of the results file that stay; those of `tallies` are added or take their place."""
-    RESULTS.mkdir(parents=True, exist_ok=True)
     targets = targets | {
         tally.target: {
             "inputs": tally.inputs,
@@ -142,7 +143,7 @@ def write_results(tallies: list[Tally], targets: dict[str, dict]) -> None:
         "crashes": sum(entry["crashes"] for entry in targets.values()),
         "targets": targets,
     }
-    (RESULTS / "fuzz.json").write_text(json.dumps(data, indent=1) + "\n")
+    write_result("fuzz", data)
     print(f"fuzz: {data['inputs']} inputs, {data['crashes']} crashes; bench/results/fuzz.json")
 
 

@@ -195,7 +195,7 @@ const struct fault_case FAULT_CASES[] = {
      .then = fault_matrix_no_sync,
      .expected = "^\\.\\.L$",
      .most = 1,
-     .remark = "a stray pulse in the tick before, then none: told by the time from SYNC to order"},
+     .remark = "a stray pulse in the tick before, then none: detected by the time from SYNC to order"},
     {.name = "SYNC alone 30 us early",
      .faults = {.second_sync_ns = 470000},
      .then = fault_matrix_no_sync,

@@ -106,8 +106,8 @@ static int write_table(const char *path, unsigned seeds)
                 row->name, row->fates, row->remark ? row->remark : "");
         for (unsigned seed = 0; seed < seeds; seed++) {
             const struct update_cut_outcome o = update_cut_run(row->cut, 0, seed);
-            fprintf(file, "%s{\"fate\": %d, \"told\": %s, \"ticks\": %u, \"again\": %s}", seed ? ", " : "", (int)o.fate,
-                    o.reported ? "true" : "false", o.ticks, o.again ? "true" : "false");
+            fprintf(file, "%s{\"fate\": %d, \"reported\": %s, \"ticks\": %u, \"again\": %s}", seed ? ", " : "",
+                    (int)o.fate, o.reported ? "true" : "false", o.ticks, o.again ? "true" : "false");
         }
         fprintf(file, "]}");
     }

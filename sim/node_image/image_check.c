@@ -189,11 +189,11 @@ static void image_check_print_resets(void)
         struct lane_faults fault = CAUSES[i / 2u].fault;
         fault.disturbance_ns = 250000;
         const struct run run = image_check_run_with(&fault, i % 2u, 1, hz);
-        printf(
-            "%s{\"cause\": \"%s\", \"keeps_clock\": %s, \"good\": %s, \"lost\": %u, \"told\": %lu, \"breaches\": %u, "
-            "\"hz\": [%lu, %lu]}",
-            i ? ",\n " : "", CAUSES[i / 2u].name, i % 2u ? "true" : "false", run.ended ? "true" : "false", run.lost,
-            (unsigned long)run.reported, run.altered, (unsigned long)hz[0], (unsigned long)hz[1]);
+        printf("%s{\"cause\": \"%s\", \"keeps_clock\": %s, \"good\": %s, \"lost\": %u, \"reported\": %lu, "
+               "\"breaches\": %u, "
+               "\"hz\": [%lu, %lu]}",
+               i ? ",\n " : "", CAUSES[i / 2u].name, i % 2u ? "true" : "false", run.ended ? "true" : "false", run.lost,
+               (unsigned long)run.reported, run.altered, (unsigned long)hz[0], (unsigned long)hz[1]);
     }
     printf("]\n");
 }

@@ -125,7 +125,7 @@ def test_a_node_is_back_after_every_kind_of_reset_at_its_full_clock(image):
     for reset in resets:
         reported = CODES.get(reset["cause"], RESET_POWER)
         assert reset["good"] and reset["breaches"] == 0, reset
-        assert reset["told"] & 1 << reported and not reset["told"] & 0x700 & ~(1 << reported), reset
+        assert reset["reported"] & 1 << reported and not reset["reported"] & 0x700 & ~(1 << reported), reset
         assert reset["hz"][0] == reset["hz"][1] > 38_000_000, reset
 
 
@@ -137,7 +137,7 @@ def test_the_supply_may_fail_at_each_step_of_an_update(image, tmp_path):
     assert len(steps) == 19
     for step in steps:
         for one in step["runs"]:
-            assert one["fate"] & step["allowed"] and one["told"] and one["again"] and one["ticks"] <= 90, step
+            assert one["fate"] & step["allowed"] and one["reported"] and one["again"] and one["ticks"] <= 90, step
 
 
 def test_the_script_for_another_simulator_times_each_interrupt_once():

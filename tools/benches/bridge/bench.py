@@ -36,7 +36,7 @@ PACES = (4000, 2000, 1000, 600, 530, 522, 521, 520, 519, 518, 517, 516)  # cycle
 PACED_TICKS = 2000
 BEGIN, END = "<!-- tools/benches bridge writes from here -->", "<!-- to here -->"  # in docs/boards.md
 PLACED = (
-    "| board, lanes | seed | clock reached (60 wanted) | out | in | through | shortest in, at least "
+    "| board, lanes | seed | clock reached (goal: 60) | out | in | through | shortest in, at least "
     "| LUT | FF | block RAM | distributed RAM | problem |"
 )
 WAYS, CELLS = ("out_ns", "in_ns", "through_ns"), ("LUT", "FF", "block RAM", "distributed RAM")
@@ -157,7 +157,7 @@ def draw_lanes(found: dict) -> Figure:
         right.plot([r["lanes"] for r in runs], [r["fmax_mhz"] for r in runs], f"{marker}-", color="0.3", label=label)
     right.axhline(report.CLOCK_MHZ, color="0.5", linewidth=1, linestyle="--")
     right.annotate(
-        f"{report.CLOCK_MHZ:g} MHz wanted", (1, report.CLOCK_MHZ), xytext=(0, -12), textcoords="offset points"
+        f"{report.CLOCK_MHZ:g} MHz is the goal", (1, report.CLOCK_MHZ), xytext=(0, -12), textcoords="offset points"
     )
     right.set(xlabel="lanes", ylabel="clock, MHz (nextpnr)", ylim=(50, None), xticks=sorted(COUNTS))
     boards = right.get_legend_handles_labels()

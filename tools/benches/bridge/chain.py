@@ -178,7 +178,7 @@ def draw_localisation(runs: dict) -> Figure:
         axes.plot(np.median(cost), np.median(error), marker, markersize=10, label=title)
     axes.axhline(0.08, color="0.3", linewidth=1, linestyle=":")
     axes.annotate(
-        "wanted: 0.08 m", (1.0, 0.08), xycoords=("axes fraction", "data"), ha="right", va="bottom", color="0.3"
+        "goal: 0.08 m", (1.0, 0.08), xycoords=("axes fraction", "data"), ha="right", va="bottom", color="0.3"
     )
     axes.set(
         xscale="log",

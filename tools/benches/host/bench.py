@@ -256,7 +256,7 @@ def draw_clock(rows: dict) -> Figure:
     axes.plot(minutes, np.abs(rows["error_us"]), "-", color="0.1", linewidth=1, label="error of the mapping")
     axes.plot(minutes, rows["uncertainty_us"], "--", color="0.4", linewidth=1, label="uncertainty it states")
     axes.axhline(100, color="0.3", linewidth=1, linestyle=":")
-    axes.annotate("wanted: 100 us", (60, 100), ha="right", va="bottom", color="0.3")
+    axes.annotate("goal: 100 us", (60, 100), ha="right", va="bottom", color="0.3")
     axes.set(yscale="log", xlabel="time (minutes)", ylabel="time (us)", xlim=(0, 60))
     axes.legend(loc="upper center", ncols=3, fontsize=8, bbox_to_anchor=(0.5, 1.15))
     return figure

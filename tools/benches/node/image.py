@@ -93,7 +93,7 @@ def cuts(node: Node) -> dict:
     path = node.folder / "cuts"
     node.run("image_cuts", path)
     runs = [(step, one) for step in json.loads(path.read_text()) for one in step["runs"]]
-    right = sum(one["told"] and one["again"] and bool(one["fate"] & step["allowed"]) for step, one in runs)
+    right = sum(one["reported"] and one["again"] and bool(one["fate"] & step["allowed"]) for step, one in runs)
     return {"build": node.name, "runs": len(runs), "right": right, "ticks_most": max(one["ticks"] for _, one in runs)}
 
 

@@ -156,7 +156,7 @@ def _cut(row: dict) -> str:
     runs = row["runs"]
     allowed = " or ".join(name for fate, name in FATES.items() if row["allowed"] & fate)
     ran = ", ".join(FATES[fate] for fate in sorted({run["fate"] for run in runs}))
-    reported = "yes" if all(run["told"] for run in runs) else "no"
+    reported = "yes" if all(run["reported"] for run in runs) else "no"
     return f"| {row['step']} | {allowed} | {ran} | {reported} | {_spread([r['ticks'] for r in runs])} | {row['remark']} |\n"
 
 
