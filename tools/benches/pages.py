@@ -14,7 +14,7 @@ from .nav import normals, size, unseen
 from .nav import page as nav
 from .node import image
 from .node import page as node
-from .radial import page as radial
+from .radial import real
 from .robot import page as robot
 from .store import RESULTS, ROOT, read_result, write_page
 from .texture import page as texture
@@ -48,7 +48,7 @@ PAGES: dict[str, Callable[[], str]] = {
     "docs/results/node_faults.md": of(node.page, "node", "node_faults", "node_cuts"),
     "docs/results/node_image.md": of(image.page, "node_image"),
     "docs/results/radial.md": of(studies.radial, "radial"),
-    "docs/results/radial_real.md": of(radial.page, "radial_real"),
+    "docs/results/radial_real.md": of(real.page, "radial_real"),
     "docs/results/ring.md": of(studies.ring, "ring"),
     "docs/results/robot.md": partial(parts, robot.page, "robot", ROBOT),
     "docs/results/simulation.md": of(studies.simulation, "chain_speed", "levels"),

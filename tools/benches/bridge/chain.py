@@ -177,9 +177,7 @@ def draw_localisation(runs: dict) -> Figure:
         axes.plot(cost, error, marker, color="0.7", markersize=4)
         axes.plot(np.median(cost), np.median(error), marker, markersize=10, label=title)
     axes.axhline(0.08, color="0.3", linewidth=1, linestyle=":")
-    axes.annotate(
-        "goal: 0.08 m", (1.0, 0.08), xycoords=("axes fraction", "data"), ha="right", va="bottom", color="0.3"
-    )
+    axes.annotate("goal: 0.08 m", (1.0, 0.08), xycoords=("axes fraction", "data"), ha="right", va="bottom", color="0.3")
     axes.set(
         xscale="log",
         yscale="log",

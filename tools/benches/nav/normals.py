@@ -184,8 +184,8 @@ def the_point(reported: dict) -> list[str]:
     """Why the point of contact has no likelihood of its own."""
     error, heading = (reported[FILTERS[0]][key] for key in ("error_mm", "heading_deg"))
     return [
-        f"The {reported['points']} points of contact have no likelihood of their own. With its direction a point tells how far off the face is along the whisker, and",
-        f"the distance in the same row tells that in all but {reported['points_alone']} rows. With those filled in from the points, and all distances taken to be as good as points",
+        f"The {reported['points']} points of contact have no likelihood of their own. With its direction a point gives the distance of the face along the whisker, and",
+        f"the distance in the same row gives it too, in all but {reported['points_alone']} rows. With those filled in from the points, and all distances taken to be as good as points",
         f"({1e3 * POINT_M:.0f} mm instead of the robot's own deviation), the error is {error[0]:.1f} mm instead of {error[1]:.1f} ({error[2]:+.1f} +- {error[3]:.1f}) and",
         f"{heading[0]:.2f} degrees instead of {heading[1]:.2f} ({heading[2]:+.2f} +- {heading[3]:.2f}).",
     ]

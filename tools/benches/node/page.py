@@ -79,11 +79,11 @@ them. {schedules} schedules, {ticks} ticks, {bad} records flagged:
 | bits hurt otherwise than the log foresees | {unforeseen} |
 | bad records without a fault | {spurious} |
 | nodes that did not come back | {stuck} |
-| breaches of a data sheet by the firmware, or words displaced where the log knows of no arming | {violations} |
+| breaches of a data sheet by the firmware, or words displaced where the log has no arming | {violations} |
 
 Words of the link that its arming displaced amid a transfer at a wrong time: {overwritten}, each in a record that was re-armed (CRC or tick reported).
-Displaced: SYNC is doubled and the next one lost. The node then sees one SYNC and one order per tick, as always, and no check of bytes can tell; the time
-between the two does. An order that ends more than 70 us after SYNC (by a clock up to 4 % off, read to 4 us: at most 79) is not that SYNC's, and what is
+Displaced: SYNC is doubled and the next one lost. The node then sees one SYNC and one order per tick, as always, and no check of bytes can detect it. The time
+between the two can. An order that ends more than 70 us after SYNC (by a clock up to 4 % off, read to 4 us: at most 79) is not that SYNC's, and what is
 read says `late` until an order comes in time. At the slowest settings that the bridge allows an order ends 51 us after its SYNC: no false flag at any setting and clock
 (test `node_slowest_link`). What is left: at the default settings, where it ends after 29 us, a stray pulse less than 49 us before the tick passes, and the
 sample is early by so much; the sensor's own conversion is up to 385 us old.

@@ -27,9 +27,7 @@ from crunchbot.touch.radial.whisk import WhiskModel
 from crunchbot_lab.report.figures import SETTINGS
 
 from .. import store
-from .page import page
-from .real import METHODS, real_whisker
-from .trials import PAPER_MM, RADII_MM, SOURCES, SPOILS, SPREADS, Kind, Set, Whisker, recorded, spoilt
+from .real import METHODS, page, real_whisker
 
 ROOT = Path(__file__).resolve().parents[3]
 CACHE = ROOT / "build/bench/radial"

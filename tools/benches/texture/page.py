@@ -41,14 +41,14 @@ FACES = """
 ## Faces of walls
 
 An object whisker's tip slides along a wall that is not trained; windows of 100 ms, `default`. In a drive-by an outer whisker slides along a wall beside the
-robot, and one model knows all speeds. Backing off and body whisks are the pilot's own motions, with the model that the demo trains.
+robot, and one model serves all speeds. Backing off and body whisks are the pilot's own motions, with the model that the demo trains.
 Another robot's whiskers are read by the models of this one.
 
 """
 FACES_CONTACT = """
 The [contact filter](../contact.md) along the same walls, by their texture and in the same motions (drive-bys at 100 mm/s): share of its reports in which it
-knows what is touched, and a normal; the median error of the normal, and how often its 90 % holds; the median error of the place across the wall. The filter
-knows no texture.
+names what is touched, and gives a normal; the median error of the normal, and how often its 90 % holds; the median error of the place across the wall. The filter
+has no model of textures.
 
 """
 CHARTS = {
