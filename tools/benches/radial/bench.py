@@ -28,6 +28,7 @@ from crunchbot_lab.report.figures import SETTINGS
 
 from .. import store
 from .real import METHODS, page, real_whisker
+from .trials import PAPER_MM, RADII_MM, SOURCES, SPOILS, SPREADS, Kind, Set, Whisker, recorded, spoilt
 
 ROOT = Path(__file__).resolve().parents[3]
 CACHE = ROOT / "build/bench/radial"
