@@ -153,8 +153,8 @@ def test_the_page_of_unseen_families_is_what_was_measured():
     from benches.markdown import wrap
     from benches.nav import unseen
 
-    measured, left = store.read_result("nav_unseen"), store.read_result("nav_left_out")
-    assert wrap(unseen.page(measured, left)) == unseen.PAGE.read_text()
+    measured, *others = (store.read_result(f"nav_{name}") for name in ("unseen", "designs", "ablations", "left_out"))
+    assert wrap(unseen.page(measured, *others)) == unseen.PAGE.read_text()
     family = next(iter(measured["families"].values()))
     family["locked"] = 0
-    assert wrap(unseen.page(measured, left)) != unseen.PAGE.read_text()
+    assert wrap(unseen.page(measured, *others)) != unseen.PAGE.read_text()

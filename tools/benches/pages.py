@@ -44,7 +44,7 @@ PAGES: dict[str, Callable[[], str]] = {
     "docs/results/nav_normals.md": of(normals.page, "nav_normals"),
     "docs/results/nav_paper.md": of(studies.nav_paper, "nav_paper"),
     "docs/results/nav_size.md": of(size.page, "nav_size"),
-    "docs/results/nav_unseen.md": of(unseen.page, "nav_unseen", "nav_left_out"),
+    "docs/results/nav_unseen.md": of(unseen.page, "nav_unseen", "nav_designs", "nav_ablations", "nav_left_out"),
     "docs/results/node_faults.md": of(node.page, "node", "node_faults", "node_cuts"),
     "docs/results/node_image.md": of(image.page, "node_image"),
     "docs/results/radial.md": of(studies.radial, "radial"),

@@ -65,6 +65,7 @@ MAKES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "tools/benches usb": (("usb_soak",), ("usb_soak",)),
     "tools/benches view": (("view",), ("view_cost",)),
     "tools/fuzz.py": (("fuzz",), ()),
+    "no command: builds of their own": (("nav_ablations", "nav_designs"), ()),
     "make mutants": (("mutants",), ()),
     "python -m drills": (("drills",), ()),
 }

@@ -308,7 +308,7 @@ def names(designs: dict) -> list[str]:
     return ["; ".join(sorted(next(iter(designs.values())))) + "."]
 
 
-def page(unseen: dict, left: dict) -> str:
+def page(unseen: dict, designs: dict, ablations: dict, left: dict) -> str:
     """docs/results/nav_unseen.md."""
     lines = [
         "# Families that no filter was made for",
@@ -319,6 +319,22 @@ def page(unseen: dict, left: dict) -> str:
         " kidnap left out. Times: CPU time on a busy machine.",
         "",
         *table("family, start", unseen["families"]),
+        "",
+        "## Designs weighed",
+        "",
+        "Variants of the filter, each in a build of its own; no command makes them again. What becomes of the histogram of"
+        " the whole arena once hypotheses have been drawn from it: means over the same runs of the families"
+        f" {', '.join(sorted({name.split(',')[0] for name in next(iter(designs.values()))}))}.",
+        "",
+        *totals(designs),
+        "",
+        "## Mechanisms left out",
+        "",
+        "Each alone, in a build of its own; no command makes them again. Means over the same runs, none of which is in the"
+        " table above, of",
+        *names(ablations),
+        "",
+        *totals(ablations),
         "",
         "## Left out by settings",
         "",
@@ -373,7 +389,8 @@ def run(
     json.write_text(dumps(measured, indent=1) + "\n")
     if json == RESULT:
         store.record_origin("nav_unseen")
-        store.write_page(PAGE, page(measured, store.read_result("nav_left_out")))
+        others = map(store.read_result, ("nav_designs", "nav_ablations", "nav_left_out"))
+        store.write_page(PAGE, page(measured, *others))
 
 
 def options(parser: argparse.ArgumentParser) -> None:
