@@ -16,10 +16,10 @@ import pytest
 
 from crunchbot import occupancy
 from crunchbot import scene as scene_files
-from crunchbot.bridge import ring
+from crunchbot.bridge import nodes, ring
 from crunchbot.commands import info, radial, stream, texture
 from crunchbot.nav import estimates, judging, localise, observations
-from crunchbot.robot import rowfiles, track
+from crunchbot.robot import checkpoint, rowfiles, track
 from crunchbot.scene import NORMAL, POINT, SURFACE
 from crunchbot.sensor_tables import SensorTable
 from crunchbot.touch import calibration
@@ -36,6 +36,7 @@ from crunchbot_lab import scenes
 from crunchbot_lab.commands import bench
 from crunchbot_lab.demo import level1, training
 from crunchbot_lab.scenes import thymio
+from crunchbot_lab.simulation import bridge
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = (ROOT / "docs/formats.md").read_text()
@@ -243,6 +244,32 @@ def test_fields_of_radial_models():
     assert {name: row_of("Radial models", name) for name in column("Radial models")} == fields
     stage = re.search(r"A stage of a press model has.*?\. ", PAGE, re.DOTALL)[0]
     assert names([stage]) == {"direction_deg", *press.Stage.NAMES}
+
+
+def test_keys_of_a_fault(tmp_path):
+    path = tmp_path / "faults.toml"
+    path.write_text("[[fault]]\nof_no_table = 1\n")
+    with pytest.raises(bridge.SimulationError) as refused:
+        bridge.read_faults(path, 2000)
+    known = set(re.findall(r"\w+", str(refused.value).partition("use ")[2])) - {"or"}
+    assert column("Faults of the simulated bridge") == known
+    kinds = row_of("Faults of the simulated bridge", "kind")
+    log = (ROOT / "protocol/whisker.toml").read_text() + "".join(
+        file.read_text() for file in (ROOT / "sim").rglob("*fault*.cpp")
+    )
+    assert all(kind in log for kind in kinds)
+
+
+def test_lines_of_a_list_of_nodes(tmp_path):
+    assert "`lane N: serial N,`" in PAGE
+    path = tmp_path / "nodes.txt"
+    path.write_text("  2    7  1.0 mlx90333\nlane 3: serial 8, more\n  4 none  1.0 x\nlane 3: serial 9, later\n")
+    assert nodes.read_nodes(path) == {2: 7, 3: 9}
+
+
+def test_fields_of_a_checkpoint():
+    assert column("Checkpoint of a navigator") == checkpoint.FIELDS
+    assert f"`{checkpoint.MAGIC.decode()}`" in PAGE
 
 
 def test_keys_of_localise(folder):
