@@ -1,6 +1,6 @@
 """bench/results/drills.json and the table of docs/drills.md, of one or more runs.
 
-PYTHONPATH=tests python -m drills.page build/drills/seed3/drills.json ...
+PYTHONPATH=tests:tools python -m drills.page build/drills/seed3/drills.json ...
 """
 
 import json
@@ -10,16 +10,17 @@ from pathlib import Path
 from statistics import median
 
 import numpy as np
+from benches.store import write_result
 
 from .course import ANSWER_S, FOUND_S, STOP_S
 from .faults import FAULTS
 from .witness import NEAR_M
 
 ROOT = Path(__file__).resolve().parents[2]
-RESULT, PAGE = ROOT / "bench/results/drills.json", ROOT / "docs/drills.md"
+PAGE = ROOT / "docs/drills.md"
 BEGIN, END = "<!-- table: written by tests/drills/page.py -->", "<!-- end -->"
 HEADER = (
-    "| fault | times | stop, s: median, worst | all answer, s: median, worst | near again, s: median, worst | lost | told "
+    "| fault | times | stop, s: median, worst | all answer, s: median, worst | near again, s: median, worst | lost | reported "
     "| failures |\n|---|---|---|---|---|---|---|---|\n"
 )
 
@@ -86,7 +87,7 @@ def summary(runs: list[dict]) -> dict:
 
 def main(paths: list[str]) -> None:
     runs = [json.loads(Path(path).read_text()) for path in paths]
-    RESULT.write_text(json.dumps(summary(runs), indent=1) + "\n")
+    write_result("drills", summary(runs))
     before, _, rest = PAGE.read_text().partition(BEGIN)
     PAGE.write_text(f"{before}{BEGIN}\n\n{table(runs)}\n{END}{rest.partition(END)[2]}")
 
