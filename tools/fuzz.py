@@ -21,9 +21,8 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from tqdm import tqdm
-
 from benches.store import RESULTS, write_result
+from tqdm import tqdm
 
 ROOT = Path(__file__).resolve().parent.parent
 TESTS = (ROOT / "host/python/tests", ROOT / "lab/tests")

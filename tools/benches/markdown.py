@@ -37,7 +37,11 @@ def _broken(block: list[str]) -> list[str]:
     lead = item[0] if item else ""
     words = MARK.sub("\0", " ".join(line.strip() for line in block)[len(lead.strip()) + 1 if lead else 0 :])
     lines = textwrap.wrap(
-        words, WIDTH, initial_indent=lead, subsequent_indent=" " * len(lead), break_long_words=False,
+        words,
+        WIDTH,
+        initial_indent=lead,
+        subsequent_indent=" " * len(lead),
+        break_long_words=False,
         break_on_hyphens=False,
-    )  # fmt: skip
+    )
     return [line.replace("\0", " ") for line in lines]

@@ -1,4 +1,5 @@
-"""Where the benches leave what they measure: results with their origin, charts, and the command that makes each of them.
+"""Where the benches leave what they measure: results with their origin, charts, and the command that makes each of
+them.
 
 A chart is an SVG file: it is text, the same data give the same file, and git stores it in a fifth of the size of a PNG.
 """

@@ -33,9 +33,13 @@ def head(title: str, files: str, command: str) -> str:
 def demo(run: dict, localisation: dict) -> str:
     """docs/results/demo.md."""
     errors = [
-        [name, f"{1000 * run[f'{key}_error_median_m']:.0f}", f"{1000 * run[p90]:.0f}" if (p90 := f"{key}_error_p90_m") in run else ""]
+        [
+            name,
+            f"{1000 * run[f'{key}_error_median_m']:.0f}",
+            f"{1000 * run[p90]:.0f}" if (p90 := f"{key}_error_p90_m") in run else "",
+        ]
         for key, name in FILTERS.items()
-    ]  # fmt: skip
+    ]
     lost, sent = run["frames_lost"], run["frames_sent"]
     figures = [
         ["frames sent, received, lost", f"{sent}, {run['frames_received']}, {lost}"],
@@ -54,8 +58,13 @@ def demo(run: dict, localisation: dict) -> str:
         )
     ]
     return (
-        head("The demo, from magnet to pose", "`bench/results/demo.json` and `localisation.json`", "`tools/benches chain`")
-        + f"\nOne run of {run['simulated_s']:.0f} s, seed {run['seed']}, {run['lanes']} lanes, the whole chain at RTL level "
+        head(
+            "The demo, from magnet to pose",
+            "`bench/results/demo.json` and `localisation.json`",
+            "`tools/benches chain`",
+        )
+        + f"\nOne run of {run['simulated_s']:.0f} s, seed {run['seed']}, {run['lanes']} lanes, the whole chain at RTL "
+        f"level "
         "with faults put in. The belief starts 0.2 m and 10 degrees wrong.\n\n"
         "![The arena with true and estimated paths of four estimates](../charts/demo_arena.svg)\n\n"
         "Ellipses are two sigma.\n\n"
@@ -63,7 +72,8 @@ def demo(run: dict, localisation: dict) -> str:
         + "\n![Position and heading error over time](../charts/demo_errors.svg)\n\n"
         + table(["figure", "value"], figures)
         + "\n## Floor texture\n\n"
-        "![Reported texture of both floor whiskers over the true tiles, with the deflections](../charts/demo_texture.svg)\n"
+        "![Reported texture of both floor whiskers over the true tiles, with the "
+        "deflections](../charts/demo_texture.svg)\n"
         "\n## Radial distance\n\n"
         "![Peak deflection against radial distance, with the fitted lines](../charts/demo_radial.svg)\n\n"
         "Standard deviation of the error in mm on held-out contacts. The prediction is the arm of 68.9 mm times the "
@@ -72,10 +82,11 @@ def demo(run: dict, localisation: dict) -> str:
         + table(["whisker", "measured", "predicted", "paper"], radial)
         + "\n## Accuracy against cost of the first filters\n\n"
         "![Median position error against time per row](../charts/localisation.svg)\n\n"
-        f"Explorations of 60 s at level 1, seeds {min(localisation)} to {max(localisation)}. Grey points: each of them; "
+        f"Explorations of 60 s at level 1, seeds {min(localisation)} to {max(localisation)}. Grey points: each of "
+        f"them; "
         "large points: their medians. A row must be answered in 100 000 us.\n\n"
         + table(["filter", "median error, m (worst seed)", "mean time of a row, us"], _localisation(localisation))
-    )  # fmt: skip
+    )
 
 
 def _localisation(seeds: dict) -> list[list[str]]:
@@ -120,7 +131,8 @@ def simulation(chain: dict, levels: dict) -> str:
             "`tools/benches chain` and `tools/benches levels`",
         )
         + "\n## The chain at RTL level\n\n"
-        "Simulated seconds per second of wall time. The whole chain: gateware, USB, libusb, `whiskerd`, ring, pilot and "
+        "Simulated seconds per second of wall time. The whole chain: gateware, USB, libusb, `whiskerd`, ring, pilot "
+        "and "
         "filters. What else the machine does slows it, so only figures of one run compare.\n\n"
         "![Simulated seconds per wall second against populated lanes](../charts/chain_speed.svg)\n\n"
         + table(["what runs", "lanes", "cycles per tick", "times real time"], whole + bridge)
@@ -171,16 +183,25 @@ def radial(found: dict) -> str:
     cost = found["cost"]
     return (
         head("Radial distance from whole whisks", "`bench/results/radial.json`", "`tools/benches radial`")
-        + "\n[How the models work](../radial.md); [a real whisker](radial_real.md). `whisk` is the model of whole whisks; "
+        + "\n[How the models work](../radial.md); [a real whisker](radial_real.md). `whisk` is the model of whole "
+        "whisks; "
         "`default` is the model that predicts places left out of the calibration best. The oracle is `whisk` with the "
         "true angle in place of the commanded one.\n\n"
-        "Whiskers are drawn from a batch (stiffness, creep, friction, gain). The calibration is that of the paper: 5 whisks "
+        "Whiskers are drawn from a batch (stiffness, creep, friction, gain). The calibration is that of the paper: 5 "
+        "whisks "
         "at each of 6 radii, the last 2 mm inside the tip. 4 whiskers of each spread, 36 held-out whisks each.\n\n"
-        "![Peak deflection against radial distance of four whiskers, with the paper's line](../charts/radial_fig5.svg)\n\n"
-        f"The regression as in the paper, one line for all whiskers: {found['fig5']['combined_mm']:.2f} mm (paper: 4.98).\n\n"
+        "![Peak deflection against radial distance of four whiskers, with the paper's "
+        "line](../charts/radial_fig5.svg)\n\n"
+        f"The regression as in the paper, one line for all whiskers: {found['fig5']['combined_mm']:.2f} mm (paper: "
+        f"4.98).\n\n"
         "Standard error in mm:\n\n"
         + table(
-            ["whisker (spread)", "paper, printed", "eq. 3, on its calibration", *(f"{m}, held out" for m in MODELS.values())]
+            [
+                "whisker (spread)",
+                "paper, printed",
+                "eq. 3, on its calibration",
+                *(f"{m}, held out" for m in MODELS.values()),
+            ]
             + ["default / oracle"],
             errors,
         )
@@ -189,15 +210,17 @@ def radial(found: dict) -> str:
         + table(["case", *SPREADS.values()], beside)
         + "\n"
         + table(["figure", *SPREADS.values()], [*held, tips])
-        + f"\nCost of `default`: {cost['sample_us']:.3f} us per sample and {cost['release_us']:.2f} us when a contact ends. "
+        + f"\nCost of `default`: {cost['sample_us']:.3f} us per sample and {cost['release_us']:.2f} us when a contact "
+        f"ends. "
         f"All of a whisk, {cost['samples']} samples: {cost['contact_us']['default']:.1f} us; equations 2 and 3: "
         f"{cost['contact_us']['paper']:.1f} us.\n\n"
         "## Broken samples\n\n"
-        "Spread 4 %. A cell: error in mm, stated standard deviation in mm, confidence. Answers that are NaN, of any model: "
+        "Spread 4 %. A cell: error in mm, stated standard deviation in mm, confidence. Answers that are NaN, of any "
+        "model: "
         f"{invalid}.\n\n"
         + table(["fault", "eq. 3", "rational", "default"], broken)
         + "\n`swapped`: another whisker of the same batch is in the lane.\n"
-    )  # fmt: skip
+    )
 
 
 def _answer(one: dict) -> str:
@@ -211,8 +234,10 @@ def ring(found: dict) -> str:
     counts = " / ".join(map(str, readers))
     parts = [
         head("The ring beside other transports", "`bench/results/ring.json`", "`tools/benches ring`")
-        + f"\nFrames of {found['frame_bytes']} bytes, one harness for all. The publisher has one processor, all readers the "
-        f"other ({found['cores']} processors). Latency at 2 kHz; throughput flat out with at most 256 frames under way; "
+        + f"\nFrames of {found['frame_bytes']} bytes, one harness for all. The publisher has one processor, all "
+        f"readers the "
+        f"other ({found['cores']} processors). Latency at 2 kHz; throughput flat out with at most 256 frames under "
+        f"way; "
         f"{found['rounds']} rounds in turn.\n\n"
         "![Publish to reader: p50, p99, p99.9 for polling and waiting readers](../charts/ring_latency.svg)\n\n"
         "![Throughput](../charts/ring_throughput.svg)\n"
@@ -230,15 +255,25 @@ def ring(found: dict) -> str:
         ]
         parts.append(
             f"\n## {title}\n\n"
-            + table(["transport", f"p50, us: {counts} readers", "p99, us: 1 / 2", "p99.9, us: 1 / 2"]
-                    + [f"frames a second to every reader: {counts}"], lines)
+            + table(
+                ["transport", f"p50, us: {counts} readers", "p99, us: 1 / 2", "p99.9, us: 1 / 2"]
+                + [f"frames a second to every reader: {counts}"],
+                lines,
+            )
             + "\nThe ring against the best of the others, by number of readers:\n\n"
-            + table(["readers", "p50, ring / best", "frames a second, ring / best"],
-                    [[str(n), *_against(rows, mode, n)] for n in readers])
-        )  # fmt: skip
-    alone = [[str(n), f"{rows['whisker', 'poll', '2khz', n]['publish_ns']:.0f}",
-              f"{rows['whisker', 'wait', '2khz', n]['publish_ns'] / 1000:.1f}"]
-             for n in readers]  # fmt: skip
+            + table(
+                ["readers", "p50, ring / best", "frames a second, ring / best"],
+                [[str(n), *_against(rows, mode, n)] for n in readers],
+            )
+        )
+    alone = [
+        [
+            str(n),
+            f"{rows['whisker', 'poll', '2khz', n]['publish_ns']:.0f}",
+            f"{rows['whisker', 'wait', '2khz', n]['publish_ns'] / 1000:.1f}",
+        ]
+        for n in readers
+    ]
     parts.append(
         "\n## Cost to the writer\n\nTime of one publication at 2 kHz.\n\n"
         + table(["readers", "they poll, ns", "they wait, us"], alone)
@@ -280,16 +315,25 @@ def host(host: dict, record: dict, view: dict, fuzz: dict, damage: dict, usb: di
     """docs/results/host.md."""
     times, clocks = host["times_s"], host["clock"].values()
     batches = [
-        [batch, f"{count['total']:.0f}", f"{count['libwhisker and whiskerd']:.0f}", f"{100 * count['atom_share']:.2f} %"]
+        [
+            batch,
+            f"{count['total']:.0f}",
+            f"{count['libwhisker and whiskerd']:.0f}",
+            f"{100 * count['atom_share']:.2f} %",
+        ]
         for batch, count in host["instructions_per_frame"].items()
-    ]  # fmt: skip
+    ]
     readers: dict[str, list[dict]] = {}
     for key, row in damage["readers"].items():
         readers.setdefault(key.partition(":")[0], []).append(row)
     files = [
-        [name, f"{100 * sum(r['read'] for r in rows) / sum(r['intact'] for r in rows):.1f} %", str(sum(r["unsaid"] for r in rows))]
+        [
+            name,
+            f"{100 * sum(r['read'] for r in rows) / sum(r['intact'] for r in rows):.1f} %",
+            str(sum(r["unsaid"] for r in rows)),
+        ]
         for name, rows in readers.items()
-    ]  # fmt: skip
+    ]
     bad = ("gaps", "duplicates", "wrong", "stale", "answered", "unexplained", "hangs")
     return (
         head(
@@ -310,7 +354,8 @@ def host(host: dict, record: dict, view: dict, fuzz: dict, damage: dict, usb: di
             ],
         )
         + "\n![From plug-in to first sample, unplug to error, re-plug to samples](../charts/host_cable.svg)\n\n"
-        f"## Instructions and memory of `whiskerd`\n\n{host['lanes']} lanes at {host['rate_hz']} Hz under umockdev, counted "
+        f"## Instructions and memory of `whiskerd`\n\n{host['lanes']} lanes at {host['rate_hz']} Hz under umockdev, "
+        f"counted "
         "by valgrind. Share: of the paper's netbook, 0.8e9 instructions a second.\n\n"
         + table(["frames in a transfer", "instructions a frame", "ours of these", "share of the netbook"], batches)
         + f"\nResident memory: {host['memory']['resident_bytes'] / 1e6:.1f} MB, "
@@ -319,11 +364,14 @@ def host(host: dict, record: dict, view: dict, fuzz: dict, damage: dict, usb: di
         f"One synthetic hour of drift and jitter, seeds {', '.join(host['clock'])}: at most "
         f"{max(c['error_us_max'] for c in clocks):.0f} us off.\n\n"
         "![Error of the clock mapping over an hour](../charts/host_clock.svg)\n\n"
-        f"## Recording\n\n{record['lanes']} lanes at {record['rate_hz']} Hz, an accelerated hour: {record['hour']['lost']} of "
+        f"## Recording\n\n{record['lanes']} lanes at {record['rate_hz']} Hz, an accelerated hour: "
+        f"{record['hour']['lost']} of "
         f"{record['hour']['frames']} frames lost, {record['hour']['bytes_per_sample']:.2f} bytes a sample "
-        f"({record['still']['bytes_per_sample']:.2f} of a robot that stands), {100 * record['atom_share']:.1f} % of the "
+        f"({record['still']['bytes_per_sample']:.2f} of a robot that stands), {100 * record['atom_share']:.1f} % of "
+        f"the "
         "netbook.\n\n![Bytes and instructions of a recording](../charts/record_cost.svg)\n\n"
-        f"Damaged recordings: {damage['files']} files. Read: share of the frames that were not hit. Silent losses: files "
+        f"Damaged recordings: {damage['files']} files. Read: share of the frames that were not hit. Silent losses: "
+        f"files "
         "of which something was lost without a word.\n\n"
         + table(["reader", "read", "silent losses"], files)
         + "\n## Live view\n\n"
@@ -339,13 +387,17 @@ def host(host: dict, record: dict, view: dict, fuzz: dict, damage: dict, usb: di
             + [["all", str(fuzz["inputs"]), str(fuzz["crashes"])]],
         )
         + "\n## USB device, packet by packet\n\n"
-        f"The gateware at packet level while ACKs are lost, packets damaged and the bus reset, {usb['seeds']} seeds:\n\n"
+        f"The gateware at packet level while ACKs are lost, packets damaged and the bus reset, {usb['seeds']} "
+        f"seeds:\n\n"
         + table(
             ["what", "count"],
-            [[name, str(usb[name])] for name in ("frames", "packets", "wire_faults", "noise", "restarts", "resets", *bad)],
+            [
+                [name, str(usb[name])]
+                for name in ("frames", "packets", "wire_faults", "noise", "restarts", "resets", *bad)
+            ],
         )
         + "\n![What the USB device went through in the soak and what came of it](../charts/usb_soak.svg)\n"
-    )  # fmt: skip
+    )
 
 
 def nav_paper(found: dict) -> str:
@@ -372,13 +424,16 @@ def nav_paper(found: dict) -> str:
     ]
     return (
         head("The paper's navigation figures, repeated", "`bench/results/nav_paper.json`", "`tools/benches nav_paper`")
-        + "\nLikelihoods and filters are those of `host/nav`. The arena is drawn at random (family `anchor`), since the paper "
+        + "\nLikelihoods and filters are those of `host/nav`. The arena is drawn at random (family `anchor`), since "
+        "the paper "
         "does not give its own.\n\n"
         "## Fig. 6a: likelihoods are neither smooth nor Gaussian\n\n"
         "![likelihoods at six poses](../charts/nav_fig6a.svg)\n\n"
-        "Six poses evenly spread over one exploration. Each row is the likelihood of one row of readings over the 11x11x11 "
+        "Six poses evenly spread over one exploration. Each row is the likelihood of one row of readings over the "
+        "11x11x11 "
         "fovea about the true pose: eleven slices over heading, forward is up, lighter is stronger. Straight edges and "
-        "corners come from tiles and blocks, thin lines from a distance to a wall. Share of neighbouring points (25 mm) of "
+        "corners come from tiles and blocks, thin lines from a distance to a wall. Share of neighbouring points (25 "
+        "mm) of "
         f"a slice that differ by more than a factor of two: {100 * min(jumps):.0f} to {100 * max(jumps):.0f} %.\n\n"
         "## Fig. 6b: fusing a Gaussian prior\n\n"
         "![two examples of fusion](../charts/nav_fig6b.svg)\n\n"
@@ -387,15 +442,19 @@ def nav_paper(found: dict) -> str:
         + table(["row", "share of the prior that is left", "peaks", "mode moved: m, m, degrees"], fusion)
         + "\n## Fig. 6c: one border, 0.2 m wrong\n\n"
         "![one border crossed](../charts/nav_fig6c.svg)\n\n"
-        "The belief starts 0.2 m behind the robot, so the truth is outside the fovea (radius 0.125 m). Textures are read "
+        "The belief starts 0.2 m behind the robot, so the truth is outside the fovea (radius 0.125 m). Textures are "
+        "read "
         "without error and odometry is exact.\n\n"
         + table(["filter", "error before the border", "error after", "within 0.125 m of the truth"], crossed)
-        + "\nEquation 7 as printed has no weights (`foveal.printed=1`): it depends on the readings only through the place of "
+        + "\nEquation 7 as printed has no weights (`foveal.printed=1`): it depends on the readings only through the "
+        "place of "
         "the mode. `foveal` weights it by the posterior.\n\n"
         "## Banana, Gaussian, inflation\n\n"
         "![banana, Gaussian, inflation](../charts/nav_banana.svg)\n\n"
-        'The paper found "little difference" between the exact, banana-shaped transition and blowing every covariance up to '
-        "the fovea's size. Total variation between the exact transition (samples, bins of 5 cm x 10 degrees) and the two "
+        'The paper found "little difference" between the exact, banana-shaped transition and blowing every covariance '
+        "up to "
+        "the fovea's size. Total variation between the exact transition (samples, bins of 5 cm x 10 degrees) and the "
+        "two "
         "shortcuts after a start known to 2 cm; `repeat` is the exact transition with other samples.\n\n"
         + table(["way, m", "turn, degrees", "start known to, degrees", "repeat", "Gaussian", "inflated"], motions)
         + f"\nThe same end to end, {found['banana']['seeds']} seeds:\n\n"

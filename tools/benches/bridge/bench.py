@@ -1,7 +1,9 @@
-"""The bridge in an FPGA and in simulation: every board at every number of lanes, resources, clock, cycles per tick and speed.
+"""The bridge in an FPGA and in simulation: every board at every number of lanes, resources, clock, cycles per tick and
+speed.
 
-Place and route takes minutes each, an hour in all; every one is kept in build/bench/bridge, so that an interrupted run goes on
-where it stopped; `--placements N` ends after N new ones, and the table says what is missing. Timing figures are nextpnr's own; the limits of the PHY's pins are those of fpga/boards/report.py.
+Place and route takes minutes each, an hour in all; every one is kept in build/bench/bridge, so that an interrupted run
+goes on where it stopped; `--placements N` ends after N new ones, and the table says what is missing. Timing figures are
+nextpnr's own; the limits of the PHY's pins are those of fpga/boards/report.py.
 """
 
 import json
@@ -101,7 +103,8 @@ def facts(name: str, runs: list[dict]) -> dict:
 
 
 def latency(link: tuple[int, int, int]) -> dict:
-    """From the SYNC that starts a reading to the first byte of its frame for USB, at worst: a period, then the next tick."""
+    """From the SYNC that starts a reading to the first byte of its frame for USB, at worst: a period, then the next
+    tick."""
     transfer = cycles.transfer(*link[:2])
     total = LIMITS["tick_period"] + transfer + FRAME_BYTES + cycles.FRAMER
     return {"transfer_cycles": transfer, "first_byte_us": total / LIMITS["clock_hz"] * 1e6}

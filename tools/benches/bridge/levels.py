@@ -1,7 +1,8 @@
 """The simulated bridge at its two levels: how much faster transactions are than the gateware's clock, lanes populated.
 
-Both run with the internal host of `whisker-bridge-sim --bench`, which checks every frame. Counted is processor time, in one
-thread, less that of a short run (start-up), so other programs on the machine matter little; on a free core it is the wall's.
+Both run with the internal host of `whisker-bridge-sim --bench`, which checks every frame. Counted is processor time, in
+one thread, less that of a short run (start-up), so other programs on the machine matter little; on a free core it is
+the wall's.
 """
 
 import resource

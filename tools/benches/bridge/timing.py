@@ -1,9 +1,12 @@
-"""When readings are taken and when they arrive: from SYNC to the end of the USB transfer, and between two bridges' SYNC.
+"""When readings are taken and when they arrive: from SYNC to the end of the USB transfer, and between two bridges'
+SYNC.
 
-The mapping of ticks to the host's clock is judged on synthetic traces whose every delay is known (libwhisker's clock_bench).
+The mapping of ticks to the host's clock is judged on synthetic traces whose every delay is known (libwhisker's
+clock_bench).
 
-The bridge runs as on a board, on its own divider (sim/bridge/usb_device, bridge-free); two of them with clocks of their own
-and a cable between (fpga/tb/pair). Both are the Verilog, cycle by cycle, so the figures are the same on every machine.
+The bridge runs as on a board, on its own divider (sim/bridge/usb_device, bridge-free); two of them with clocks of their
+own and a cable between (fpga/tb/pair). Both are the Verilog, cycle by cycle, so the figures are the same on every
+machine.
 """
 
 import json
@@ -102,7 +105,8 @@ def every_frame_at_2_khz(latency: list[dict]) -> list[dict]:
 def host_rows(found: dict) -> list[str]:
     worst = max(run["packet"]["worst_us"] for run in every_frame_at_2_khz(found["latency"]))
     rows = [
-        "| scheduling of the process | interrupt to ring, median | 99 % | 99.9 % | worst | SYNC to ring, median | within 600 us |"
+        "| scheduling of the process | interrupt to ring, median | 99 % | 99.9 % | worst | SYNC to ring, median | "
+        "within 600 us |"
     ]
     rows += ["|---|---|---|---|---|---|---|"]
     for run in found["host"]:
@@ -110,7 +114,8 @@ def host_rows(found: dict) -> list[str]:
         times = (f"{late[name]:.0f} us" for name in ("median_us", "p99_us", "p999_us", "worst_us"))
         name = "real time (SCHED_FIFO)" if run["fifo"] else "usual"
         rows.append(
-            f"| {name} | {' | '.join(times)} | {worst + late['median_us']:.0f} us | {100 * late['within_limit']:.2f} % |"
+            f"| {name} | {' | '.join(times)} | {worst + late['median_us']:.0f} us | {100 * late['within_limit']:.2f} "
+            f"% |"
         )
     return rows
 
@@ -123,18 +128,21 @@ def table(found: dict) -> str:
     uneven = max(run["sync_longest"] - run["sync_shortest"] for run in found["latency"])
     frames = sum(run["frames"] for run in found["latency"])
     lines += [
-        f"Of {frames} frames {bad} held a bad record, and the longest distance of two SYNC pulses was {uneven} cycles more than"
+        f"Of {frames} frames {bad} held a bad record, and the longest distance of two SYNC pulses was {uneven} cycles "
+        f"more than"
     ]
     lines += [f"the shortest. Highest rate that the settings allow, and reached here with 28 lanes: {fastest:.0f} Hz."]
     lines += ["", *host_rows(found), ""]
     run = found["host"][0]
     lines += [
-        f"{run['frames']} frames each, on a virtual machine of two processors with a load of {run['load']:.0f}; the thread itself works"
+        f"{run['frames']} frames each, on a virtual machine of two processors with a load of {run['load']:.0f}; the "
+        f"thread itself works"
     ]
     lines += [f"{run['work']['median_us']:.0f} us a frame (median)."]
     lines += ["", *clock_rows(found["clock"]), ""]
     lines += [
-        f"{TRACES} traces of {TRACE_S} s, a transfer every 8 ms, from the sixth second on; the first 20 us of each error are the host's least delay,"
+        f"{TRACES} traces of {TRACE_S} s, a transfer every 8 ms, from the sixth second on; the first 20 us of each "
+        f"error are the host's least delay,"
     ]
     lines += ["which no arrival tells and the stated uncertainty holds."]
     return "\n".join(lines)

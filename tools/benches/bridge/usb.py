@@ -1,7 +1,9 @@
-"""Soak of the USB device at packet level: frames through Verilated gateware while ACKs get lost, tokens, data and SETUPs are damaged, other devices talk,
-hosts babble, halt, configure and reset at any cycle. Target: ten million frames without a gap, a copy or a wrong byte.
+"""Soak of the USB device at packet level: frames through Verilated gateware while ACKs get lost, tokens, data and
+SETUPs are damaged, other devices talk, hosts babble, halt, configure and reset at any cycle. Target: ten million frames
+without a gap, a copy or a wrong byte.
 
-Seeds run one after the other and add up in bench/results/usb_soak.json, so a run that was cut short goes on where it stopped.
+Seeds run one after the other and add up in bench/results/usb_soak.json, so a run that was cut short goes on where it
+stopped.
 """
 
 import argparse

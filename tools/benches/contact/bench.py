@@ -69,7 +69,8 @@ def summary(kind: str, found: list[dict]) -> dict:
 
 
 def verdicts(kind: str, found: list[dict]) -> dict[str, float]:
-    """Corner or face: shares that are right and wrong with 90 %, and of these the errors of place and of a face's normal."""
+    """Corner or face: shares that are right and wrong with 90 %, and of these the errors of place and of a face's
+    normal."""
     tip, other = (np.array([one[name] for one in found]) for name in ("tip", "other"))
     shaft = 1.0 - tip - other
     right, wrong = (shaft, tip) if kind == "corner" else (tip, shaft)

@@ -1,8 +1,8 @@
-"""Contacts whose truth is known: corners by sim/mechanics with vibration, surfaces by its elastica, quasi-static; all by
-a chain of links in MuJoCo.
+"""Contacts whose truth is known: corners by sim/mechanics with vibration, surfaces by its elastica, quasi-static; all
+by a chain of links in MuJoCo.
 
-A scene gives, for every tick of 0.5 ms from the first touch on: the base's motion as reported, the measured tilt of the plug
-in two axes, and the truth in the whisker's frame.
+A scene gives, for every tick of 0.5 ms from the first touch on: the base's motion as reported, the measured tilt of the
+plug in two axes, and the truth in the whisker's frame.
 """
 
 from pathlib import Path
@@ -103,8 +103,8 @@ class Corner(NamedTuple):
     def felt(self, friction: float, ahead_m: float = 0.0, level: int | None = None):
         """Tilt (n,) by sim/mechanics, point (n, 2) and object's velocity (n, 2) in the whisker's frame.
 
-        `ahead_m`: how far the corner stands ahead of the place at which it would touch first. Base and object have moved
-        as in the first tick for LEAD ticks before: what the start excites has decayed.
+        `ahead_m`: how far the corner stands ahead of the place at which it would touch first. Base and object have
+        moved as in the first tick for LEAD ticks before: what the start excites has decayed.
         """
         from crunchbot_lab.signals.mechanics import WHOLE, Whisker, touch
 
@@ -137,8 +137,8 @@ class Corner(NamedTuple):
     def bound(self, draw: Draw, friction_sd: float) -> np.ndarray:
         """(n,) Cramer-Rao bound of the point's error, mm: root of the trace of its least covariance after each tick.
 
-        Unknown: start of the contact (free), place, gain, friction, error of the reported motion, and of an object that moves
-        its velocity, with the priors of the filter. The whisker is quasi-static, the kind of contact known.
+        Unknown: start of the contact (free), place, gain, friction, error of the reported motion, and of an object that
+        moves its velocity, with the priors of the filter. The whisker is quasi-static, the kind of contact known.
         """
         from crunchbot_lab.signals.mechanics import LARGE
 
@@ -185,7 +185,8 @@ class Surface:
         self._last = None
 
     def _look(self, unknown: np.ndarray, creep: float) -> tuple[np.ndarray, float, float]:
-        """Place of the contact, direction of the surface's normal, elastic tilt. Unknown: force's ratio or arc; force."""
+        """Place of the contact, direction of the surface's normal, elastic tilt. Unknown: force's ratio or arc;
+        force."""
         first, force = unknown
         arc, ratio = (TIP / CONE, first) if self.tip else (first, -self._out * self._friction)
         bend = self._bend(arc, force, ratio, 48)
@@ -238,7 +239,8 @@ class Surface:
 
 
 def surface(plan: Plan, draw: Draw) -> Scene | None:
-    """A plan whose object is round; None when nothing is felt. A flat one's ends where the whisker would lie along it."""
+    """A plan whose object is round; None when nothing is felt. A flat one's ends where the whisker would lie along
+    it."""
     radius_m, touched_m, normal, bases = plan.round_m, plan.touched_m, plan.normal, plan.bases
     tip = touched_m >= TIP
     centre, directions = seen(bases, np.tile(plan.centre, (len(bases), 1)))

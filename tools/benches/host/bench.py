@@ -3,10 +3,11 @@
     .venv/bin/python tools/benches host        bench/results/host.json, docs/charts/host_*.svg
 
 - Times: a simulated bridge (RTL, umockdev with its udev events, real libusb and hidapi) is plugged in, pulled and put
-  back; watched from a reader of the ring. They hold the simulation's own work: its enumeration, and frames at its speed.
+  back; watched from a reader of the ring. They hold the simulation's own work: its enumeration, and frames at its
+  speed.
 - Instructions: valgrind counts whiskerd's at 28 populated lanes, as the difference between a short and a long run, by
-  library; umockdev's are left out, what the kernel would do is not in. libusb's are an upper bound: under umockdev it is
-  woken also when there is nothing.
+  library; umockdev's are left out, what the kernel would do is not in. libusb's are an upper bound: under umockdev it
+  is woken also when there is nothing.
 - Memory: of whiskerd while it streams. Clock: an hour of the synthetic trace of the library's test.
 What is done is kept in build/bench/host.
 """

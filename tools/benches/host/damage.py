@@ -2,9 +2,9 @@
 
     .venv/bin/python tools/benches damage        bench/results/damage.json
 
-The files are those of the fuzzer `damage`: of six, four have a bit flipped, one a page zeroed, one is cut. Counted are the
-messages in chunks that were not hit, and how many of them a reader gives; and files of which messages are missing or
-different without an error or a line of damage.
+The files are those of the fuzzer `damage`: of six, four have a bit flipped, one a page zeroed, one is cut. Counted are
+the messages in chunks that were not hit, and how many of them a reader gives; and files of which messages are missing
+or different without an error or a line of damage.
 """
 
 import sys
@@ -71,7 +71,8 @@ READERS = {"whisker": whisker, "mcap, stream": mcap_stream, "mcap, indexed": mca
 
 
 def judged(of: fuzz_damage.Original, touched: set[int], read: Callable, path: Path) -> tuple[int, int, bool, bool]:
-    """(messages not hit, those of them that were read, whether something is missing or different, whether that is said)."""
+    """(messages not hit, those of them that were read, whether something is missing or different, whether that is
+    said)."""
     seen, is_said = [], False
     try:
         for message in read(path):

@@ -3,10 +3,10 @@
     .venv/bin/python tools/benches record        bench/results/record.json, docs/charts/record_cost.svg
 
 The frames are those of simulated robots that drive (level 1: world, whiskers, sensors), five of them to fill 28 lanes,
-two minutes long and repeated: a chunk of a recording holds two seconds and is packed on its own, so that repeating saves
-nothing. One process publishes a tenth of a second of frames and records it, in turn; then the file is read again and
-compared. Instructions are counted by valgrind, as the difference between a short and a long recording; they are those
-of the recorder alone. What is done is kept in build/bench/record.
+two minutes long and repeated: a chunk of a recording holds two seconds and is packed on its own, so that repeating
+saves nothing. One process publishes a tenth of a second of frames and records it, in turn; then the file is read again
+and compared. Instructions are counted by valgrind, as the difference between a short and a long recording; they are
+those of the recorder alone. What is done is kept in build/bench/record.
 """
 
 import json
@@ -174,7 +174,8 @@ def once(cache: Path, name: str, measure) -> dict | float:
 
 
 def run(build: Path, fresh: bool) -> None:
-    """Measure what is not measured yet, write results and chart. `build` is not used: the Python module is what counts."""
+    """Measure what is not measured yet, write results and chart. `build` is not used: the Python module is what
+    counts."""
     cache = ROOT / "build/bench/record"
     cache.mkdir(parents=True, exist_ok=True)
     if fresh:

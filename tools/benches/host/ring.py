@@ -1,7 +1,8 @@
-"""The ring beside transports people would pick: latency and throughput for 1 to 32 readers, and what readers cost the writer.
+"""The ring beside transports people would pick: latency and throughput for 1 to 32 readers, and what readers cost the
+writer.
 
-One program per transport (tools/benches/host/peers), one harness for all: 256-byte frames, publisher on one processor, all
-readers on another, the same wait mode in every row of a figure:
+One program per transport (tools/benches/host/peers), one harness for all: 256-byte frames, publisher on one processor,
+all readers on another, the same wait mode in every row of a figure:
 
   poll   a reader looks, and gives the processor away between looks
   wait   a reader sleeps until it is woken

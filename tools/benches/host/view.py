@@ -1,11 +1,11 @@
-"""What whisker-view costs: CPU share and bytes per second, with no page, one, four and sixteen; of 28 lanes at 2 kHz, and of
-a robot whose belief has as many poses as a message may.
+"""What whisker-view costs: CPU share and bytes per second, with no page, one, four and sixteen; of 28 lanes at 2 kHz,
+and of a robot whose belief has as many poses as a message may.
 
     .venv/bin/python tools/benches view        bench/results/view.json, docs/charts/view_cost.svg
 
-Three processes: a writer at the pace of the hardware (or of the robot's streams, over zenoh), whisker-view, and pages without a screen that take what comes as
-the real page does. CPU time is the server process's own, user and system, over each run; a run that is done is kept in
-build/bench/view.
+Three processes: a writer at the pace of the hardware (or of the robot's streams, over zenoh), whisker-view, and pages
+without a screen that take what comes as the real page does. CPU time is the server process's own, user and system, over
+each run; a run that is done is kept in build/bench/view.
 """
 
 import asyncio

@@ -1,8 +1,8 @@
 """A tip dragged over an edge of the floor: the simulator's time at the edge and largest moment beside the chain's.
 
 A flat floor with an edge across the path, up or down; the outer whiskers' stance, friction 0.3, a damping ratio of 0.1.
-The chain's floor lies where it bends the whisker's tip by the stance's preload. Time at the edge: from the first touch of
-the corner to the last. The moment is the base's along the path, its peak counted from 5 mm before the edge on.
+The chain's floor lies where it bends the whisker's tip by the stance's preload. Time at the edge: from the first touch
+of the corner to the last. The moment is the base's along the path, its peak counted from 5 mm before the edge on.
 """
 
 import numpy as np
@@ -103,7 +103,8 @@ def edge_summary(rows: list[dict]) -> dict:
 def write_table(rows: list[dict]) -> None:
     """The C table that `make test` compares with: cases in which both chains agree."""
     lines = [
-        "/* Made by tools/benches mechanics with a 20-link chain in MuJoCo; do not edit. A tip dragged over an edge: step mm,",
+        "/* Made by tools/benches mechanics with a 20-link chain in MuJoCo; do not edit. A tip dragged over an edge: "
+        "step mm,",
         " * speed m/s, time at the edge ms, largest moment along the path uN m. */",
         "/* clang-format off */",
         "static const double CHAIN_EDGES[][4] = {",
@@ -150,7 +151,8 @@ def page(mechanics: dict, edges: dict) -> str:
                 ["natural frequencies: worst", f"{whole['frequency_worst_percent']:.2f} %"],
             ],
         )
-        + "\n## Speed\n\n28 whiskers at 2 kHz on one core; 4 of them are in contact all the time and 8 are dragged over "
+        + "\n## Speed\n\n28 whiskers at 2 kHz on one core; 4 of them are in contact all the time and 8 are dragged "
+        "over "
         "floors.\n\n"
         + table(
             ["mechanics", "times real time"],
@@ -161,8 +163,10 @@ def page(mechanics: dict, edges: dict) -> str:
         f"whiskers, the friction {FRICTION:g}, the damping ratio {DAMPING:g}. Held: from the first touch of the step's "
         "corner to the last, in ms. Peak: largest base moment along the path, in uN m. Steps of a floor with a pile, "
         "which hook, are not in it.\n\n"
-        f"Two results agree if their times are within a factor of {HELD_FACTOR:g} or {1e3 * HELD_S:g} ms and their peaks "
-        f"within {100 * PEAK_SHARE:g} %. Chains of 20 and 40 links agree in {found['chains_agree']} of {found['cases']} "
+        f"Two results agree if their times are within a factor of {HELD_FACTOR:g} or {1e3 * HELD_S:g} ms and their "
+        f"peaks "
+        f"within {100 * PEAK_SHARE:g} %. Chains of 20 and 40 links agree in {found['chains_agree']} of "
+        f"{found['cases']} "
         f"cases. In these, `static` agrees with 20 links in {found['static_met']}, `modes` in {found['modes_met']}.\n\n"
         + table(
             ["step mm", "m/s", "static held, peak", "modes held, peak", "20 links held, peak", "40 links held, peak"]

@@ -37,8 +37,10 @@ def summary(static: list[dict], modes: list[dict], speed: dict) -> dict:
 def write_table(static: list[dict], modes: list[dict]) -> None:
     """The C table that `make test` compares with."""
     lines = [
-        "/* Made by tools/benches mechanics with a 20-link chain in MuJoCo; do not edit. Statics: tip diameter mm, kappa (0:",
-        " * clamped), friction, peg's distance mm and angle rad, base moment uN m, arc length of the contact mm. Modes: tip",
+        "/* Made by tools/benches mechanics with a 20-link chain in MuJoCo; do not edit. Statics: tip diameter mm, "
+        "kappa (0:",
+        " * clamped), friction, peg's distance mm and angle rad, base moment uN m, arc length of the contact mm. "
+        "Modes: tip",
         " * diameter mm, kappa, pinned at mm (0: free), three frequencies Hz. */",
         "/* clang-format off */",
         "static const double CHAIN_STATIC[][7] = {",

@@ -1,8 +1,8 @@
 """Measures the filters: speed against accuracy, locks, budgets, honesty, the stability matrix, a soak of 10^6 rows.
 
     tools/benches nav                  everything: bench/results/nav_*.json, docs/charts/nav_*.svg, docs/results/nav.md
-    tools/benches nav --quick          few seeds, into build/bench/nav-quick: does it run?
-    tools/benches nav --only matrix    one part: pareto, cost, tracking, locks, budgets, balance, variation, matrix, soak,
+    tools/benches nav --quick          few seeds, into build/bench/nav-quick: does it run? tools/benches nav --only
+    matrix    one part: pareto, cost, tracking, locks, budgets, balance, variation, matrix, soak,
                                         passes
     tools/benches nav --page           measures nothing: writes the page of what has been measured
 

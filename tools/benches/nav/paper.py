@@ -130,7 +130,8 @@ def peaks(cube: np.ndarray) -> int:
 
 
 def fig6b(made: scenes.Made) -> dict:
-    """Of 60 rows: the one whose likelihood leaves the least of the prior, and the one whose posterior has most parts."""
+    """Of 60 rows: the one whose likelihood leaves the least of the prior, and the one whose posterior has most
+    parts."""
     candidates, prior = [], prior_cube()
     for row in range(9, len(made.observations), 10):
         truth = made.observations.truth[row]

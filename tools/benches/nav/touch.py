@@ -1,9 +1,10 @@
-"""Engines on the fixed list of scenes and logs of `whisker bench touch`, scored alike: this project's filters and the peers.
+"""Engines on the fixed list of scenes and logs of `whisker bench touch`, scored alike: this project's filters and the
+peers.
 
     .venv/bin/python tools/benches touch [--data DIR]
 
-DIR holds the logs (DIR/thymio/random_1, ...): they are other people's and are not kept here. Without it the scores of logs
-stay as they were stored.
+DIR holds the logs (DIR/thymio/random_1, ...): they are other people's and are not kept here. Without it the scores of
+logs stay as they were stored.
 """
 
 import argparse

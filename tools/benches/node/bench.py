@@ -4,7 +4,8 @@
                                                 docs/results/node_faults.md, docs/charts/node_*.svg
 
 All on the register model of the chip and the edge-by-edge model of the sensor; nothing here has run on silicon. A
-thousand batches of a thousand fault schedules take about six minutes of one core; what is done is kept in build/bench/node.
+thousand batches of a thousand fault schedules take about six minutes of one core; what is done is kept in
+build/bench/node.
 """
 
 import argparse

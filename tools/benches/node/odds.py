@@ -1,7 +1,7 @@
 """How likely damage passes the checks on a whisker's sample: derivations for tools/benches node.
 
-A class of damage is a key of the storm's `lines` (the sensor's frame: start byte 0xFF, four bytes of angles, a zero error
-word, sum) or `links` (the record: tick, angles, status, CRC-8). Probabilities are per event; None: not derived.
+A class of damage is a key of the storm's `lines` (the sensor's frame: start byte 0xFF, four bytes of angles, a zero
+error word, sum) or `links` (the record: tick, angles, status, CRC-8). Probabilities are per event; None: not derived.
 """
 
 from math import comb, sqrt

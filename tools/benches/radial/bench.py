@@ -56,7 +56,8 @@ def reported(model, held: Set) -> list[radial.Estimate]:
 
 
 class Oracle:
-    """The default model given the true angle of every push: what is left is the plug's spread and the sensor's noise."""
+    """The default model given the true angle of every push: what is left is the plug's spread and the sensor's
+    noise."""
 
     def __init__(self, cal: Set):
         self.model = WhiskModel.fit(self.shapes(cal), cal.whisks.radius_mm, cal.whisks.axes)
@@ -118,7 +119,8 @@ def tips() -> dict:
 
 
 def stability() -> dict:
-    """What broken samples do to each method: RMS error, median confidence and stated sigma, answers that are no number."""
+    """What broken samples do to each method: RMS error, median confidence and stated sigma, answers that are no
+    number."""
     spread, out = SPREADS[1], {}
     for how in SPOILS:
         found = {name: [] for name in METHODS}
@@ -206,7 +208,15 @@ def fig5() -> dict:
     for k, spread in enumerate(SPREADS):
         cal = recorded(Whisker.drawn(SEED, k), Kind(spread, "duration"), FIT, rng_of(50, k))
         model = fitted("paper", cal)
-        points.append({"radius_mm": cal.whisks.radius_mm.tolist(), "peak": cal.whisks.peak_counts.tolist(), "a1": model.a1, "a0": model.a0, "error_mm": model.sigma_mm})  # fmt: skip
+        points.append(
+            {
+                "radius_mm": cal.whisks.radius_mm.tolist(),
+                "peak": cal.whisks.peak_counts.tolist(),
+                "a1": model.a1,
+                "a0": model.a0,
+                "error_mm": model.sigma_mm,
+            }
+        )
         all_peaks += cal.whisks.peak_counts.tolist()
         all_radii += cal.whisks.radius_mm.tolist()
     return {"whiskers": points, "combined_mm": radial.RadialModel.fit(all_peaks, all_radii).sigma_mm}
@@ -241,7 +251,15 @@ def draw_cost(results: dict) -> Figure:
     for n, (axes, spread) in enumerate(zip(panels, SPREADS, strict=True)):
         scores = results["errors"]["duration"][f"{spread:g}"]
         for name, marker in LOOKS.items():
-            axes.plot(cost_of[name], scores[name], marker, color="#0b5394" if name == "whisk" else "#6b6b6b", mfc="none" if name in ("quadratic", "rational") else None, ms=8, label=name)  # fmt: skip
+            axes.plot(
+                cost_of[name],
+                scores[name],
+                marker,
+                color="#0b5394" if name == "whisk" else "#6b6b6b",
+                mfc="none" if name in ("quadratic", "rational") else None,
+                ms=8,
+                label=name,
+            )
         axes.axhline(scores["oracle"], color="k", lw=1, ls="--", label="oracle: knows the angle")
         axes.axhline(PAPER_MM[n], color="#8a8a8a", lw=1, ls=":", label="paper, as printed")
         axes.set(xscale="log", xlabel=f"us per contact of {results['cost']['samples']} samples", ylim=(0, 7))

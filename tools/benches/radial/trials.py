@@ -1,9 +1,9 @@
 """Whisks with real mechanics for the radial bench: spread between angle and plug, speeds, sampling, what spoils them.
 
 The spread of a whisk is split evenly: half its variance is in the angle turned, half in gain and creep of the plug. The
-true angle is known to the oracle only. Sources of the angle's part: `duration`, the base turns at the commanded rate but
-for a longer or shorter time; `rate`, it turns faster or slower than commanded for the same time; `rate, reported`: the same,
-and the base reports its rate with 2 % of error.
+true angle is known to the oracle only. Sources of the angle's part: `duration`, the base turns at the commanded rate
+but for a longer or shorter time; `rate`, it turns faster or slower than commanded for the same time; `rate, reported`:
+the same, and the base reports its rate with 2 % of error.
 """
 
 import math

@@ -1,9 +1,11 @@
 """The whole robot: levels of simulation, half an hour, odometry, latency, instructions; docs/results/robot.md.
 
     .venv/bin/python tools/benches robot                       all of it: two hours and more, most of it the RTL level
-    .venv/bin/python tools/benches robot --only levels page    some parts; --levels 0 1: of the levels only the fast ones
+    .venv/bin/python tools/benches robot --only levels page    some parts; --levels 0 1: of the levels only the fast
+    ones
 
-What is done is kept in build/bench/robot: an interrupted run goes on where it stopped, seed by seed; `page` tells what there is so far.
+What is done is kept in build/bench/robot: an interrupted run goes on where it stopped, seed by seed; `page` tells what
+there is so far.
 """
 
 import argparse

@@ -1,7 +1,8 @@
 """Instructions per second of the robot's netbook side: whiskerd, pilot, whisker-base.
 
-`perf stat` counts user instructions of pilot and base in two lock-step runs of the whole robot, bytes level; the difference of the two
-is free of start-up. The kernel's share (sockets, serial line) is not in. whiskerd's are those of tools/benches host, with 28 lanes.
+`perf stat` counts user instructions of pilot and base in two lock-step runs of the whole robot, bytes level; the
+difference of the two is free of start-up. The kernel's share (sockets, serial line) is not in. whiskerd's are those of
+tools/benches host, with 28 lanes.
 """
 
 import json

@@ -77,7 +77,8 @@ class Stopwatch:
 
 
 def measure(models: Path) -> dict:
-    """Stages: {"simulated" | "processor" | "wall" -> {what -> {"n", "p50_ms", "p99_ms"}}}, and the load of the machine."""
+    """Stages: {"simulated" | "processor" | "wall" -> {what -> {"n", "p50_ms", "p99_ms"}}}, and the load of the
+    machine."""
     watch = Stopwatch()
     found = [_contacts(seed, models, watch) for seed in SEEDS]
     together = {name: [value for one in found for value in one[name]] for name in found[0]}

@@ -1,7 +1,8 @@
 """The same scenes at every level of simulation: pose error, texture accuracy and real-time factor.
 
-One arena, start, prior and seed of the pilot's turns per scene; one robot's whiskers, which learn anew at each mechanics.
-A level's cost is processor time of all that runs, from the world to the poses of four filters, start-up included; training is not.
+One arena, start, prior and seed of the pilot's turns per scene; one robot's whiskers, which learn anew at each
+mechanics. A level's cost is processor time of all that runs, from the world to the poses of four filters, start-up
+included; training is not.
 """
 
 import json
@@ -125,7 +126,8 @@ class Bench:
         return self._scores(rows, truth, answers) | {"whisks": len(pilot.whisks), "processor_s": cost}
 
     def _drawn(self, folder: Path) -> dict:
-        """The path of the signal-level run, with answers drawn as `whisker scene make robot` draws them; its cost is that command's."""
+        """The path of the signal-level run, with answers drawn as `whisker scene make robot` draws them; its cost is
+        that command's."""
         pilot, rows, truth = self._explored(folder)
         rows = drawn_rows(*self.scene, rows, truth, self.seed)
         began = time.process_time()
@@ -171,7 +173,8 @@ def poses_of(truth: list[dict]) -> np.ndarray:
 
 
 def distance_scores(rows: list[dict], poses: np.ndarray, scene: Scene) -> dict:
-    """How many distances the rows tell, and their root mean square error, m; of what the whisker did not meet nothing is said."""
+    """How many distances the rows tell, and their root mean square error, m; of what the whisker did not meet nothing
+    is said."""
     errors = []
     for whisker in scene.robot.of_role("object"):
         reported = np.array([np.nan if (mm := row[f"{whisker.name}_mm"]) is None else mm / 1000 for row in rows], float)
@@ -243,7 +246,8 @@ def measure(build: Path, cache: Path, levels: set[int]) -> None:
 
 
 def gather(cache: Path) -> dict:
-    """Everything measured so far: {"runs": case -> seed -> scores, "levels": summary, "pairs": differences, "equal"}."""
+    """Everything measured so far: {"runs": case -> seed -> scores, "levels": summary, "pairs": differences,
+    "equal"}."""
     runs = {
         case.name: {
             str(seed): json.loads(path.read_text())
@@ -297,7 +301,8 @@ SHOWN = (
 
 
 def draw(found: dict) -> Figure:
-    """A row for each level, the fastest last: real-time factor, errors, texture. Medians over seeds, bars between quartiles."""
+    """A row for each level, the fastest last: real-time factor, errors, texture. Medians over seeds, bars between
+    quartiles."""
     ordered = sorted(found["levels"].items(), key=lambda item: item[1]["realtime_factor"])
     figure = Figure(figsize=(11.0, 0.48 * len(ordered) + 1.6), layout="constrained")
     speed, error, texture = figure.subplots(1, 3, sharey=True, width_ratios=(2, 3, 2))

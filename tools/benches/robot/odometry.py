@@ -1,7 +1,9 @@
-"""What the base's driver tells of straight lines and turns, against the truth: both Creates, remainder kept and dropped.
+"""What the base's driver tells of straight lines and turns, against the truth: both Creates, remainder kept and
+dropped.
 
-Emulator and driver in one process, on an open floor, with the wheel errors of sim/world: a scale of 1 % for a run and 2 % for a move,
-in what the wheels count; the wheels themselves run just as ordered. Each move on worlds of their own, from rest to rest.
+Emulator and driver in one process, on an open floor, with the wheel errors of sim/world: a scale of 1 % for a run and 2
+% for a move, in what the wheels count; the wheels themselves run just as ordered. Each move on worlds of their own,
+from rest to rest.
 """
 
 import csv

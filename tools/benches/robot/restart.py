@@ -4,7 +4,8 @@
 .venv/bin/python tools/benches restart --scenes 2       a short one, printed
 
 Level 1: the world's signals through a pilot with models that it learnt, half a minute a scene; runs are kept in --runs.
-Each row is weighed. Of each run a navigator is killed at moments drawn by the seed, and the next one, of the same filter, gets the rows after a gap:
+Each row is weighed. Of each run a navigator is killed at moments drawn by the seed, and the next one, of the same
+filter, gets the rows after a gap:
 
   gap 0, 1, 5 s   from the same pilot, which went on meanwhile
   pilot too       the pilot dies as well, and is back 1 s later, its sum of motion from zero; the robot drove on
@@ -68,7 +69,8 @@ def make_run(seed: int, kept: Path) -> Run:
 
 
 def messages(rows: list[dict], stream: int, first: int = 0, sum_from=(0.0, 0.0, 0.0)) -> list[Received]:
-    """As a pilot would have sent them: stamped 0.1 s apart from row `first` of the run on, and so by the wall's clock."""
+    """As a pilot would have sent them: stamped 0.1 s apart from row `first` of the run on, and so by the wall's
+    clock."""
     pose, out = np.array(sum_from), []
     for n, row in enumerate(rows):
         number = n if stream == 2 else first + n

@@ -24,7 +24,9 @@ def draw(results: dict) -> dict[str, Figure]:
 def draw_time(scores: dict) -> Figure:
     figure = Figure(figsize=(6.4, 4.0), layout="constrained")
     axes = figure.subplots()
-    for name, style in zip(METHODS, ({"color": "#c25700", "ls": "--", "marker": "^"}, {"color": "#0b5394", "marker": "o"}), strict=True):  # fmt: skip
+    for name, style in zip(
+        METHODS, ({"color": "#c25700", "ls": "--", "marker": "^"}, {"color": "#0b5394", "marker": "o"}), strict=True
+    ):
         points = [
             (int(key.split("|")[1]), s)
             for key, s in scores.items()
@@ -34,7 +36,14 @@ def draw_time(scores: dict) -> Figure:
             [w / 2 for w, _ in points], [100 * (1 - s["accuracy"]) + 0.01 for _, s in points], label=name, **style
         )
         s = scores[f"{name}|sequential"]
-        axes.plot(s["samples"] / 2, 100 * (1 - s["accuracy"]) + 0.01, "*", color=style["color"], ms=12, label=f"{name}, sequential")  # fmt: skip
+        axes.plot(
+            s["samples"] / 2,
+            100 * (1 - s["accuracy"]) + 0.01,
+            "*",
+            color=style["color"],
+            ms=12,
+            label=f"{name}, sequential",
+        )
     axes.set(xscale="log", yscale="log", xlabel="decision time (ms)", ylabel="wrong decisions (%, + 0.01)")
     axes.set_title("Simulated floors, 0.05 to 0.2 m/s, recordings not trained on", fontsize=10)
     axes.legend()
@@ -45,7 +54,14 @@ def draw_cost(scores: dict) -> Figure:
     figure = Figure(figsize=(6.4, 4.0), layout="constrained")
     axes = figure.subplots()
     for (name, s), marker in zip(scores.items(), "^oDsvPX*", strict=False):
-        axes.plot(s["us"], 100 * s["error"] + 0.01, marker, color="#0b5394" if name in METHODS else "#6b6b6b", ms=8, label=name)  # fmt: skip
+        axes.plot(
+            s["us"],
+            100 * s["error"] + 0.01,
+            marker,
+            color="#0b5394" if name in METHODS else "#6b6b6b",
+            ms=8,
+            label=name,
+        )
     axes.set(xscale="log", yscale="log", xlabel="time per decision (us)", ylabel="wrong decisions (%, + 0.01)")
     axes.set_title("100 ms windows of two axes at 2 kHz, one core", fontsize=10)
     figure.legend(fontsize=8, loc="outside right upper")

@@ -1,4 +1,5 @@
-"""Error against time per decision: ours in C, beside scikit-learn and convolution kernels in an environment of their own."""
+"""Error against time per decision: ours in C, beside scikit-learn and convolution kernels in an environment of their
+own."""
 
 import json
 import os

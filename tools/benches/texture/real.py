@@ -1,4 +1,5 @@
-"""Public recordings that a user gives: whole trials of fabrics, terrains with whole runs held out, surfaces left out."""
+"""Public recordings that a user gives: whole trials of fabrics, terrains with whole runs held out, surfaces left
+out."""
 
 from pathlib import Path
 
@@ -129,9 +130,12 @@ def left_out(runs: list, fold: np.ndarray, hz: float, window: int, held: tuple =
             ]
             found.append(detected(*parts, surface, window))
         out[surface] = {
-            "refused": np.mean(untrained), "windows": len(untrained), "detected": np.mean(found),
-            "trained_refused": np.mean(trained), "trained_windows": len(trained),
-        }  # fmt: skip
+            "refused": np.mean(untrained),
+            "windows": len(untrained),
+            "detected": np.mean(found),
+            "trained_refused": np.mean(trained),
+            "trained_windows": len(trained),
+        }
     return out
 
 
@@ -151,13 +155,18 @@ def paper_decision(bayes: TextureModel, samples: np.ndarray, names: list[str], t
 
 
 def scores(decisions: list[tuple]) -> dict:
-    """Accuracy, refusals, wrong answers given, calibration, and by how much the least confident tenth, refused, cuts them."""
+    """Accuracy, refusals, wrong answers given, calibration, and by how much the least confident tenth, refused, cuts
+    them."""
     right, reported, confidence = (np.array(v) for v in zip(*decisions, strict=True))
     return {
-        "decisions": len(right), "accuracy": right.mean(), "refused": 1.0 - reported.mean(),
-        "wrong_answers": (reported & ~right).mean(), "calibration_error": calibration_error(right, confidence),
-        "cut_at_a_tenth_refused": refusal_cut(right, confidence), "area_under_risk_coverage": area(right, confidence),
-    }  # fmt: skip
+        "decisions": len(right),
+        "accuracy": right.mean(),
+        "refused": 1.0 - reported.mean(),
+        "wrong_answers": (reported & ~right).mean(),
+        "calibration_error": calibration_error(right, confidence),
+        "cut_at_a_tenth_refused": refusal_cut(right, confidence),
+        "area_under_risk_coverage": area(right, confidence),
+    }
 
 
 def area(right: np.ndarray, confidence: np.ndarray) -> float:

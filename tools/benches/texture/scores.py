@@ -31,8 +31,9 @@ def decide(model, samples: np.ndarray, window: int = WINDOW, sequential: bool = 
 
 
 def detected(kept: dict, held: dict, surface: str, window: int) -> float:
-    """What a detector that was trained on the surface too, by the default's features, finds of its windows from the fifth of a
-    recording on, when it takes at most REFUSED_MOST of the others' for it: a linear discriminant of the mean of windows so far.
+    """What a detector that was trained on the surface too, by the default's features, finds of its windows from the
+    fifth of a recording on, when it takes at most REFUSED_MOST of the others' for it: a linear discriminant of the mean
+    of windows so far.
     """
     floor = np.zeros(next(iter(kept.values()))[0].shape[1])
     rows = {
@@ -63,11 +64,15 @@ def summary(pairs: list[tuple[int, object]]) -> dict:
     confidence = np.array([d.confidence for _, d in pairs])
     right = best == truth
     return {
-        "windows": len(pairs), "accuracy": right.mean(), "refused": (label < 0).mean(),
-        "wrong_answers": ((label >= 0) & (label != truth)).mean(), "confidence": confidence.mean(),
-        "calibration_error": calibration_error(right, confidence), "borders": np.mean([d.border for _, d in pairs]),
+        "windows": len(pairs),
+        "accuracy": right.mean(),
+        "refused": (label < 0).mean(),
+        "wrong_answers": ((label >= 0) & (label != truth)).mean(),
+        "confidence": confidence.mean(),
+        "calibration_error": calibration_error(right, confidence),
+        "borders": np.mean([d.border for _, d in pairs]),
         "cut_at_a_tenth_refused": refusal_cut(right, confidence),
-    }  # fmt: skip
+    }
 
 
 def refusal_cut(right: np.ndarray, confidence: np.ndarray) -> float:
@@ -109,8 +114,11 @@ def strip_scores(parts: list[dict]) -> dict:
     seen = np.concatenate([p["seen"] for p in parts])
     metres, held = sum(p["metres"] for p in parts), max(1, sum(p["held"] for p in parts))
     return summary([pair for p in parts for pair in p["inside"]]) | {
-        "borders_crossed": len(seen), "reported_in_150_ms": seen.mean(), "metres": metres,
+        "borders_crossed": len(seen),
+        "reported_in_150_ms": seen.mean(),
+        "metres": metres,
         "false_borders_per_10_m": 10 * sum(p["false"] for p in parts) / metres,
         "wrong_later_than_100_ms_per_border": sum(p["late"] for p in parts) / len(seen),
-        "windows_held_by_an_edge": held, "wrong_while_held": sum(p["held_wrong"] for p in parts) / held,
-    }  # fmt: skip
+        "windows_held_by_an_edge": held,
+        "wrong_while_held": sum(p["held_wrong"] for p in parts) / held,
+    }

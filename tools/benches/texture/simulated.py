@@ -77,10 +77,12 @@ def floors_left_out() -> dict:
         others = np.concatenate([refused[k] for k in SURFACES if k != left_out])
         held = {k: [r for seed in TEST_SEEDS for r in drives(seed, TRAIN_SEED)[k]] for k in SURFACES}
         out[left_out] = {
-            "refused": np.mean(refused[left_out]), "windows": len(refused[left_out]),
+            "refused": np.mean(refused[left_out]),
+            "windows": len(refused[left_out]),
             "detected": detected(drives(TRAIN_SEED, TRAIN_SEED), held, left_out, WINDOW),
-            "trained_refused": others.mean(), "trained_windows": len(others),
-        }  # fmt: skip
+            "trained_refused": others.mean(),
+            "trained_windows": len(others),
+        }
     return out
 
 

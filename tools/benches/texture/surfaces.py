@@ -1,5 +1,5 @@
-"""Faces of walls: what a tip that slides along one tells of its texture, by speed and motion, and what the texture costs the
-contact filter."""
+"""Faces of walls: what a tip that slides along one tells of its texture, by speed and motion, and what the texture
+costs the contact filter."""
 
 import math
 from collections.abc import Callable
@@ -47,8 +47,8 @@ def walled(surface: str, robot: int) -> Scene:
 
 @dataclass
 class Drive:
-    """One whisker's contact, block by block: counts (n, BLOCK, 2), speeds ordered and the pose at the end of each, and the
-    block from which the pilot may know of the contact. The robot stands still during the first ones."""
+    """One whisker's contact, block by block: counts (n, BLOCK, 2), speeds ordered and the pose at the end of each, and
+    the block from which the pilot may know of the contact. The robot stands still during the first ones."""
 
     whisker: Whisker
     counts: np.ndarray
@@ -58,8 +58,8 @@ class Drive:
 
 
 def driven(scene: Scene, name: str, heading: float, gap_m: float, seed: int, plan: Callable) -> Drive:
-    """A drive that begins with the tip `gap_m` from the wall. `plan(n)`: speeds of block n since the contact is known; empty: it
-    is over. Before, those of block 0, forwards only."""
+    """A drive that begins with the tip `gap_m` from the wall. `plan(n)`: speeds of block n since the contact is known;
+    empty: it is over. Before, those of block 0, forwards only."""
     whisker = next(w for w in scene.robot.whiskers if w.name == name)
     tip = np.exp(1j * heading) * tip_of(whisker)
     world = World(scene.flat((SIDE_M - gap_m - tip.real, SIDE_M / 2, heading)), seed)
@@ -154,8 +154,8 @@ def faces() -> dict:
 
 
 def faces_contact() -> dict:
-    """What the contact filter knows of a wall, by its texture and by motion: errors of the normal and of the place across the
-    wall at the end of every block. The motion is the same for all textures."""
+    """What the contact filter knows of a wall, by its texture and by motion: errors of the normal and of the place
+    across the wall at the end of every block. The motion is the same for all textures."""
     out = {}
     for motion, drive, names in (("drive-by", drive_by, OUTER), (MOTIONS[1], body_whisk, ALL)):
         for surface in ("", *SURFACES):
@@ -170,15 +170,18 @@ def errors(seen: list[tuple[float, float, float] | None]) -> dict:
     reported = np.array([p for p in seen if p is not None]).reshape(-1, 3)
     normal = reported[np.isfinite(reported[:, 0])]
     return {
-        "reports": len(seen), "known": len(reported) / len(seen), "normals": len(normal) / len(seen),
+        "reports": len(seen),
+        "known": len(reported) / len(seen),
+        "normals": len(normal) / len(seen),
         "normal_deg": math.degrees(np.median(np.abs(normal[:, 0]))),
         "held_90": np.mean(np.abs(normal[:, 0]) < NINETY * normal[:, 1]),
         "place_mm": 1e3 * np.median(np.abs(reported[:, 2])),
-    }  # fmt: skip
+    }
 
 
 def followed(drive: Drive) -> list[tuple[float, float, float] | None]:
-    """At the end of every block of a contact: error of the normal and its deviation, rad, and of the place, m; None: unknown."""
+    """At the end of every block of a contact: error of the normal and its deviation, rad, and of the place, m; None:
+    unknown."""
     whisker, found = drive.whisker, []
     feeler = Feeler(whisker, Mount.of(whisker).calibrated_turn, calibrated(whisker.name), EXACT.whisk_rad_s)
     contact, drives, good = Contact(), Drives(), np.ones(BLOCK, bool)

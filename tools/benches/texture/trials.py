@@ -21,7 +21,8 @@ TILE_M, STRIP_M, WIDTH_M = 0.5, 12.0, 2.0
 
 @cache
 def drives(seed: int, robot: int, seconds: float = 8.0, surfaces=SURFACES) -> dict[str, list[np.ndarray]]:
-    """One recording (n, 2) for each surface, speed and floor whisker, of the demo's robot of a seed on floors of another."""
+    """One recording (n, 2) for each surface, speed and floor whisker, of the demo's robot of a seed on floors of
+    another."""
     from crunchbot_lab.signals.recordings import surface_drive
 
     robot, out = flat(make_scene(robot, "modes")[0]), {}
@@ -44,8 +45,8 @@ def closer(recordings: dict[str, list[np.ndarray]], rng: np.random.Generator) ->
 
 @dataclass
 class Strip:
-    """One whisker's drive over many tiles: counts (n, 2), and every LOOK ticks the surface under the tip were it free, how
-    far inside its tile that is, and whether an edge holds it."""
+    """One whisker's drive over many tiles: counts (n, 2), and every LOOK ticks the surface under the tip were it free,
+    how far inside its tile that is, and whether an edge holds it."""
 
     counts: np.ndarray
     surface: np.ndarray
@@ -184,9 +185,13 @@ def faults(recordings: dict[str, list[np.ndarray]], rng: np.random.Generator) ->
         return x
 
     changes = {
-        "as trained": lambda x: x, "saturated channel": saturated, "stuck channel": stuck,
-        "swapped channels": lambda x: x[:, ::-1].copy(), "sign-flipped channel": flipped,
-        "offset drift": lambda x: x + np.linspace(0, 200, len(x))[:, None], "catches of 0.1-1 s": catches,
+        "as trained": lambda x: x,
+        "saturated channel": saturated,
+        "stuck channel": stuck,
+        "swapped channels": lambda x: x[:, ::-1].copy(),
+        "sign-flipped channel": flipped,
+        "offset drift": lambda x: x + np.linspace(0, 200, len(x))[:, None],
+        "catches of 0.1-1 s": catches,
         "1 % random bad records": bad_records,
-    }  # fmt: skip
+    }
     return {name: each(change) for name, change in changes.items()}

@@ -1,6 +1,7 @@
 """A contact of a chain of 20 links in MuJoCo, given sample by sample. Run by ../scenes.py.
 
-    follow.py grip '{"beam": {...}, "object": "peg", "place": [x, y], "radius": 0, "normal": 0, "friction": 0.3, "bases": [[...]]}'
+    follow.py grip '{"beam": {...}, "object": "peg", "place": [x, y], "radius": 0, "normal": 0, "friction": 0.3,
+    "bases": [[...]]}'
 
 The mount is driven along the bases (velocity along and across the unbent whisker, rate of turn; one row a tick). The
 object stands still: only the motion between the two matters. One line of JSON: tilt of the plug's hinge, place of the
@@ -64,7 +65,8 @@ class Contact:
             pose += STEP_S * rates
 
     def reading(self, pose: np.ndarray) -> tuple[float, float, float, float] | None:
-        """Place on the axis, direction of the normal, in the mount's frame, and friction used, by the contacts' forces."""
+        """Place on the axis, direction of the normal, in the mount's frame, and friction used, by the contacts'
+        forces."""
         wrench, total, place, normal, used = np.zeros(6), 0.0, np.zeros(2), np.zeros(2), 0.0
         for i in range(self.data.ncon):
             contact = self.data.contact[i]

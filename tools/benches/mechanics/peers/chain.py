@@ -1,8 +1,8 @@
 """A whisker as a chain of rigid links in MuJoCo: statics at a peg, natural frequencies, speed. Run by ../bench.py.
 
 The whisker is cut into equal segments; the bending of each is a hinge with a spring, at the place and of the stiffness
-that make the segment's end turn and move as the beam's would. The plug is one more hinge at the exit. Nothing here knows
-the simulator that it is compared with: the base moment is that of MuJoCo's contact force about the exit.
+that make the segment's end turn and move as the beam's would. The plug is one more hinge at the exit. Nothing here
+knows the simulator that it is compared with: the base moment is that of MuJoCo's contact force about the exit.
 
     chain.py static '{"links": 20, ...}'     moments, contact positions, slip-off: one line of JSON
     chain.py modes '{...}'                    frequencies
@@ -80,8 +80,10 @@ def whisker_xml(
         for axis in axes:
             text += f'<joint type="hinge" axis="{axis}" stiffness="{k}" damping="{k * damping_s}"/>'
         text += (
-            f'<inertial pos="{centre - start} 0 0" mass="{mass}" diaginertia="{max(inertia / 50, 2e-15)} {inertia} {inertia}"/>'
-            f'<geom name="{name}_{i}" type="capsule" fromto="0 0 0 {end - start} 0 0" size="{LINK_RADIUS}" mass="0" {contact}/>'
+            f'<inertial pos="{centre - start} 0 0" mass="{mass}" diaginertia="{max(inertia / 50, 2e-15)} {inertia} '
+            f'{inertia}"/>'
+            f'<geom name="{name}_{i}" type="capsule" fromto="0 0 0 {end - start} 0 0" size="{LINK_RADIUS}" mass="0" '
+            f"{contact}/>"
         )
         before, close = start, close + "</body>"
     return text + close
@@ -97,7 +99,8 @@ def model_xml(body: str, friction: float, step: float) -> str:
 
 
 class Peg:
-    """A whisker whose mount turns against a peg that stands still: MuJoCo's friction knows velocities of joints only."""
+    """A whisker whose mount turns against a peg that stands still: MuJoCo's friction knows velocities of joints
+    only."""
 
     def __init__(self, beam: Beam, friction: float, a: float):
         mount = 'pos="0 0 0"'

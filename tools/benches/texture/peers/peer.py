@@ -1,8 +1,8 @@
 """Runs in the peers' own environment: peer.py WINDOWS.npz -> one JSON object, error and time per decision by method.
 
-WINDOWS.npz: train, test (m, length, channels) raw counts; train_features, test_features (m, F); train_label, test_label.
-Times are of one window at a time, as a robot asks, with what each method needs to reduce the window itself; methods that
-take host/nav's features add nothing for them: cost.py does.
+WINDOWS.npz: train, test (m, length, channels) raw counts; train_features, test_features (m, F); train_label,
+test_label. Times are of one window at a time, as a robot asks, with what each method needs to reduce the window itself;
+methods that take host/nav's features add nothing for them: cost.py does.
 """
 
 import itertools
@@ -23,7 +23,8 @@ QUANTILES = (0.25, 0.5, 0.75)
 
 
 class Kernels:
-    """Convolution kernels of the MiniRocket class: 84 kernels of 9 taps, six of -1 and three of 2, dilated; shares above bias."""
+    """Convolution kernels of the MiniRocket class: 84 kernels of 9 taps, six of -1 and three of 2, dilated; shares
+    above bias."""
 
     def __init__(self, windows):
         self.taps = np.array(

@@ -1,7 +1,7 @@
 """Runs in the peers' own environment: risk.py WINDOWS.npz -> one JSON object, probabilities (m, classes) by method.
 
-WINDOWS.npz as for peer.py, with train_run: the run of each training window. Probabilities are calibrated by a sigmoid on
-runs held out in turn.
+WINDOWS.npz as for peer.py, with train_run: the run of each training window. Probabilities are calibrated by a sigmoid
+on runs held out in turn.
 """
 
 import json
@@ -24,7 +24,10 @@ def main() -> None:
     label, run = data["train_label"], data["train_run"]
     folds = list(StratifiedGroupKFold(SPLITS, shuffle=True, random_state=0).split(label, label, run))
     kernels = Kernels(data["train"])
-    shapes = {s: np.concatenate([kernels.transform(p) for p in np.array_split(data[s], 1 + len(data[s]) // 100)]) for s in ("train", "test")}  # fmt: skip
+    shapes = {
+        s: np.concatenate([kernels.transform(p) for p in np.array_split(data[s], 1 + len(data[s]) // 100)])
+        for s in ("train", "test")
+    }
     features = {s: data[f"{s}_features"] for s in ("train", "test")}
     found = {}
     for name, model, x in (
