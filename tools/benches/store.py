@@ -94,8 +94,9 @@ def record_origin(name: str, folder: Path = RESULTS) -> None:
 
 
 def commit() -> str:
-    """The commit of this tree; says so if tracked files differ from it."""
-    words = (("rev-parse", "--short=12", "HEAD"), ("status", "--porcelain", "--untracked-files=no"))
+    """The commit of this tree; says so if tracked files differ from it, but for results and pages."""
+    changes = ("status", "--porcelain", "--untracked-files=no", "--", ".", ":!bench/results", ":!docs")
+    words = (("rev-parse", "--short=12", "HEAD"), changes)
     done = [subprocess.run(["git", "-C", ROOT, *w], capture_output=True, text=True, check=False) for w in words]
     if done[0].returncode:
         return "not recorded"
@@ -103,10 +104,11 @@ def commit() -> str:
 
 
 def machine() -> str:
-    """Model and number of the processors."""
+    """Model and number of the processors, and the load of the last five minutes."""
     lines = Path("/proc/cpuinfo").read_text().splitlines()
     models = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
-    return f"{models[0] if models else 'unknown processor'}, {len(os.sched_getaffinity(0))} processors"
+    processors, load = len(os.sched_getaffinity(0)), os.getloadavg()[1]
+    return f"{models[0] if models else 'unknown processor'}, {processors} processors, load {load:.1f}"
 
 
 def write_chart(name: str, drawn: Figure | str, folder: Path = CHARTS) -> None:

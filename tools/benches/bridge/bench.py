@@ -1,5 +1,4 @@
-"""The bridge in an FPGA and in simulation: every board at every number of lanes, resources, clock, cycles per tick and
-speed.
+"""The bridge in an FPGA: every board at every number of lanes, resources, clock, cycles per tick.
 
 Place and route takes minutes each, an hour in all; every one is kept in build/bench/bridge, so that an interrupted run
 goes on where it stopped; `--placements N` ends after N new ones, and the table says what is missing. Timing figures are
@@ -19,7 +18,7 @@ from tqdm import tqdm
 
 from .. import store
 from ..markdown import wrap
-from .chain import LANES, LINKS
+from .chain import LINKS
 
 ROOT = Path(__file__).resolve().parents[3]
 CACHE = ROOT / "build/bench/bridge"
@@ -43,7 +42,6 @@ PLACED = (
 )
 WAYS, CELLS = ("out_ns", "in_ns", "through_ns"), ("LUT", "FF", "block RAM", "distributed RAM")
 MARKERS = "os^vD*P"
-SWEEP = "| lanes | cycles per tick | USB at 2 kHz, bytes/s | simulated seconds per second |"
 
 
 def once(name: str, measure: Callable[[], dict]) -> dict:
@@ -134,11 +132,6 @@ def rates(build: Path) -> dict:
     }
 
 
-def simulation() -> dict:
-    """The Verilated bridge with nodes and host over lanes, as bench_chain has measured it last."""
-    return store.read_result("chain_speed")["bridge"]
-
-
 def measured(board: dict) -> list[dict]:
     """A board's runs that have been placed."""
     return [run for run in board["runs"] if "seed" in run]
@@ -193,17 +186,6 @@ def missing(found: dict) -> str:
     return f" Not placed yet: {names} lanes." if names else ""
 
 
-def sweep_rows(found: dict) -> list[str]:
-    """Lines of the table of simulation: bench_chain's speed of the Verilated bridge."""
-    link = next(iter(LINKS))
-    usb = f"{found['rates']['usb_bytes_per_s']['at 2 kHz']:,}".replace(",", " ")
-    points = zip(LANES, found["simulation"][link], strict=True)
-    return [
-        f"| {lanes} | {speed['cycles_per_tick']:.0f} | {usb} | {speed['realtime_factor']:.2f} |"
-        for lanes, speed in points
-    ]
-
-
 def table(head: str, rows: list[str]) -> str:
     """A table in Markdown; `head`: its first line."""
     return "\n".join([head, "|---" * (head.count("|") - 1) + "|", *rows])
@@ -222,8 +204,6 @@ def section(found: dict) -> str:
             ),
             table(PLACED, lines),
             "![Resources and clock over lanes](charts/bridge_lanes.svg)",
-            f"Simulation (`tools/benches chain`) at {next(iter(LINKS))}:",
-            table(SWEEP, sweep_rows(found)),
         )
     )
 
@@ -245,13 +225,12 @@ def options(parser) -> None:
 def run(build: Path, fresh: bool, placements: int = 10**6) -> None:
     """All figures of the bridge: bench/results/bridge.json, docs/charts/bridge_*, the table of docs/boards.md.
 
-    `build` runs the pace alone: the simulation's speed is bench_chain's.
+    `build` runs the pace alone.
     """
     if fresh:
         shutil.rmtree(CACHE, ignore_errors=True)
     found = fabric(placements)
     found |= {"latency": {title: latency(link) for title, link in LINKS.items()}, "rates": rates(build)}
-    found["simulation"] = simulation()
     store.write_result("bridge", found)
     store.write_chart("bridge_lanes", draw_lanes(found))
     write_section(found)
