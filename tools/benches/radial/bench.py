@@ -67,7 +67,7 @@ class Oracle:
         out = []
         for c, angle in zip(held.whisks.recorded, held.angle_rad, strict=True):
             shape = shape_of(radial.Contact(c.t_s, c.samples))
-            shape.turn, shape.told = angle, shape.stop_s - shape.onset_s  # the latter: nothing is reported
+            shape.turn, shape.reported = angle, shape.stop_s - shape.onset_s  # the latter: nothing is reported
             out.append(shape)
         return out
 
@@ -160,7 +160,7 @@ def cost() -> dict:
     given = doubles(t_s, "t_s", (len(samples),)), doubles(samples, "samples", (len(samples), 2))
     rest = doubles(np.array([32768.0, 32768.0]), "rest", (2,))
     trace, shape = ffi.new("struct nav_trace *"), ffi.new("struct nav_shape *")
-    told_c, model = ffi.new("struct nav_whisk_estimate *"), fitted("whisk", cal)
+    estimate_c, model = ffi.new("struct nav_whisk_estimate *"), fitted("whisk", cal)
     press = fitted("press", cal)
     line = ffi.new("struct nav_radial *", {"a1": -0.03, "a0": 180.0})
 
@@ -175,7 +175,7 @@ def cost() -> dict:
         "line": least_us(lambda: lib.nav_radial_predict(line, 1500.0), 2000),
         "trace": least_us(trace_all, 20),
         "shape": least_us(lambda: lib.nav_shape_of(trace, shape), 500),
-        "estimate": least_us(lambda: lib.nav_whisk_estimate(model._c, shape, told_c), 500),
+        "estimate": least_us(lambda: lib.nav_whisk_estimate(model._c, shape, estimate_c), 500),
     }
     whole = parts["trace"] + parts["shape"] + parts["estimate"]
     return {
