@@ -1,12 +1,10 @@
-"""The report's figures, to be drawn by `svg` or `png`. Line style and marker tell the curves apart in grey; colour only helps."""
+"""The report's figures, to be drawn by `svg`. Line style and marker tell the curves apart in grey; colour only helps."""
 
 import io
 from collections.abc import Callable
-from pathlib import Path
 
 import matplotlib
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse, Patch, Rectangle
@@ -217,12 +215,6 @@ def svg(draw: Callable[[Run], Figure], run: Run) -> str:
     with _settings(draw):
         FigureCanvasSVG(draw(run)).print_svg(text, metadata={"Date": None, "Creator": None})
     return "".join(text.getvalue().partition("<svg")[1:])
-
-
-def png(draw: Callable[[Run], Figure], run: Run, path: Path) -> None:
-    """A figure as a picture file."""
-    with _settings(draw):
-        FigureCanvasAgg(draw(run)).print_png(path)
 
 
 def _settings(draw: Callable):

@@ -31,7 +31,6 @@ BATCHES, CHUNK, PROCESSES = 1000, 50, 2
 NODES, TICKS = 28, 10_000
 TICK_CYCLES = 19_300  # of 500 us at the slowest oscillator
 CONVERSION_NS = 350_000  # the sensor's longest in fast mode
-ARMED_MOST_US = 430  # wanted, at the slowest oscillators
 CYCLES_PER_US = LIMITS["clock_hz"] / 1e6
 LINK_TICKS = 100
 DIVIDERS = (4, 6, 8, 12, 16, 24, 32)
