@@ -54,7 +54,7 @@ firmware: ## build the node's firmware with XC16 or XC-DSC, or PIC30=DIR, a publ
 firmware-images: ## make the committed images again, each build twice: PIC30=DIR
 	@tools/firmware/images.sh
 
-firmware-check: build ## execute the node's images against the firmware's C, at length; or IMAGE=node_wire.hex, whoever built it, [SENSOR=..] [RESYNC=1]
+firmware-check: build ## execute the node's images against the firmware's C, at length; or IMAGE=node_wire.hex, built by anyone, [SENSOR=..] [RESYNC=1]
 	@WHISKER_BUILD=$(BUILD) WHISKER_IMAGE_LONG=1 WHISKER_IMAGE="$(abspath $(IMAGE))" \
 		WHISKER_IMAGE_BUILD="$(if $(RESYNC),resync,$(or $(SENSOR),mlx90333))" $(PYTHON) -m pytest --quiet sim/node_image
 

@@ -511,7 +511,7 @@ MUTATIONS = [
         "return true || owner == geteuid()",
     ),
     Mutation(
-        "ring: a signal to whoever has the ring open",
+        "ring: a signal to any process that has the ring open",
         "test_ring_trust",
         "host/libwhisker/src/ring_signal.c",
         "is_ring && ring_signal_holds_lock(pid, entry->d_name)",

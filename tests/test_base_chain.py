@@ -99,7 +99,7 @@ def test_odometry_and_truth_differ_by_no_more_than_the_wheels_count_wrong(tmp_pa
     angle = sum(motion.theta_rad for _, motion in reported)
     true_distance = math.hypot(float(truth[-1]["x_m"]) - X_M, float(truth[-1]["y_m"]) - Y_M)
     true_angle = float(truth[-1]["theta_rad"])
-    grain_m, grain_rad = 0.004, 0.05  # told in units, up to a frame ago
+    grain_m, grain_rad = 0.004, 0.05  # reported in units, up to a frame ago
     assert distance == pytest.approx(true_distance, rel=WHEELS_ERROR, abs=grain_m)
     assert angle == pytest.approx(true_angle, rel=WHEELS_ERROR, abs=grain_rad)
     for _, motion in reported:

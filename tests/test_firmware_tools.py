@@ -434,8 +434,8 @@ def test_a_library_call_and_a_lost_flag_in_the_sample_path_are_found():
     for copy in ("mov.w  w0, 0x0084", "mov.w  #0x84, w1"):
         lost = flag + f" 2402: 20 00 00  {copy}\n"
         assert check_listing.findings(lost) == ["_port_on_t2 writes an interrupt flag register back as a whole"]
-    elsewhere = "00002300 <_loader_serve>:\n 2302: 02 00 00  call 0x3000 <___mulsi3>\n"
-    assert check_listing.findings(elsewhere) == []
+    outside = "00002300 <_loader_serve>:\n 2302: 02 00 00  call 0x3000 <___mulsi3>\n"
+    assert check_listing.findings(outside) == []
 
 
 def test_the_listing_tells_the_cycles_of_the_sample_path():

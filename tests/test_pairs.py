@@ -1,4 +1,4 @@
-"""Whoever of a paced robot is killed or stopped: the wheels stop, the others come back, nobody is left over.
+"""Any process of a paced robot is killed or stopped: the wheels stop, the others come back, nobody is left over.
 
 `python -m drills.pairs` does all of it; how soon the wheels stand is for it to judge.
 """

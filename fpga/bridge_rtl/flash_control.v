@@ -6,7 +6,7 @@
 //                     '--> data, data, ..  (report_reader)
 //
 // A bit takes 8 cycles, SCK high in the second four; MISO is read at their end, so its way there and back may take 90 ns. SCK leaves
-// at the clock's other edge: its way to the cell of the flash's clock pin is long, and so is told apart from the ways to the PHY.
+// at the clock's other edge: its way to the cell of the flash's clock pin is long, and so is distinguished from the ways to the PHY.
 
 `default_nettype none
 

@@ -106,7 +106,7 @@ class _Control(Elaboratable):
             itf.handshakes_out.stall.eq(stall | request.handshakes_out.stall),
         ]
         with m.FSM(domain="usb"):
-            with m.State("NOTHING"):  # no request: whoever asks has lost its way (protocol stall, section 8.5.3.4)
+            with m.State("NOTHING"):  # no request: the host's request is out of place (protocol stall, section 8.5.3.4)
                 m.d.comb += stall.eq(asked_in | data_came | pinged)
                 self._begin(m, setup)
             with m.State("DATA_IN"):

@@ -252,10 +252,10 @@ class StandardRequests(ControlRequestHandler):
         itf = self.interface
         waiting = Signal()  # the status was given; was it heard?
         is_address = ours & (self.kind == Kind.ADDRESS)
-        elsewhere = self.other_token & (self.other_address == itf.setup.value[:7])
+        of_other = self.other_token & (self.other_address == itf.setup.value[:7])
         m.d.comb += [
             itf.new_address.eq(itf.setup.value[:7]),
-            itf.address_changed.eq(waiting & (itf.handshakes_in.ack | elsewhere)),
+            itf.address_changed.eq(waiting & (itf.handshakes_in.ack | of_other)),
         ]
         with m.If(is_address & itf.status_requested):
             m.d.usb += waiting.eq(1)

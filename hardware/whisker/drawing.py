@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Draws whisker.svg: section through follicle, plug, magnet and chip with measures, the whisker, and the field at the sensor.
 
-.venv/bin/python hardware/whisker/drawing.py        # writes whisker.svg beside this file; --out FILE elsewhere
+.venv/bin/python hardware/whisker/drawing.py        # writes whisker.svg beside this file; --out FILE to another
 """
 
 import argparse

@@ -56,7 +56,7 @@ int cli_end(const char *program, int code)
     if (fflush(stdout) == 0 && !lost) {
         return code;
     }
-    fprintf(stderr, "%s: standard output: %s; make room there, or send it elsewhere\n", program,
+    fprintf(stderr, "%s: standard output: %s; make room there, or send it to another place\n", program,
             lost ? "cannot be written" : strerror(errno));
     return code == CLI_OK ? CLI_FAILED : code;
 }

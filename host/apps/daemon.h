@@ -1,4 +1,4 @@
-/* The daemon itself: bridge to ring, again and again, until it is told to stop. */
+/* The daemon itself: bridge to ring, again and again, until it is asked to stop. */
 #ifndef WHISKER_DAEMON_H
 #define WHISKER_DAEMON_H
 

@@ -1,5 +1,5 @@
 /* The daemon's log: standard error, one line per event; with priorities where systemd's journal reads it, with times
- * where whoever keeps the log asks for them (WHISKER_LOG_TIMES in the environment). */
+ * where the process that keeps the log asks for them (WHISKER_LOG_TIMES in the environment). */
 #ifndef WHISKER_DAEMON_LOG_H
 #define WHISKER_DAEMON_LOG_H
 

@@ -46,7 +46,7 @@ static void daemon_options_print_help(const struct whisker_settings *defaults)
         " the ring lies\nthere, else in " WHISKER_RING_DIRECTORY ". Readers look in both, in this order.\n\n"
         "Example: whiskerd --ring whisker --lane-mask 0x3f\n"
         "Example: whiskerd --ring whisker --wait --serial 0001\n"
-        "Exit code: 0 stopped as told, 1 failed, 2 wrong use.\n",
+        "Exit code: 0 stopped on request, 1 failed, 2 wrong use.\n",
         WHISKER_RING_FRAMES, defaults->lane_mask, defaults->batch, defaults->lane_mask, defaults->tick_period,
         defaults->sck_divider, defaults->word_gap, defaults->sample_point);
 }

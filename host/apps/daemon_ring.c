@@ -38,7 +38,7 @@ static void daemon_ring_log(const char *name, const char *what, int error)
     }
 }
 
-/* Waits until the writer that was told to stop has let the name go. */
+/* Waits until the writer that was asked to stop has let the name go. */
 static int daemon_ring_await(const struct daemon_options *options, struct whisker_ring **ring)
 {
     const int64_t give_up_ms = cli_now_ms() + REPLACE_MS;

@@ -7,7 +7,7 @@
 struct whisker_ring;
 
 /* Makes the ring that the options name: in the service's directory if RUNTIME_DIRECTORY names it. With `replace` a
- * daemon that has the name is told to stop, and waited for. Returns 0, or why there is none, which has been logged. */
+ * daemon that has the name is asked to stop, and waited for. Returns 0, or why there is none, which has been logged. */
 int daemon_ring_make(const struct daemon_options *options, struct whisker_ring **ring);
 
 #endif

@@ -1,4 +1,4 @@
-/* The daemon's statistics: counted frame by frame, told in the ring and in the log. */
+/* The daemon's statistics: counted frame by frame, published in the ring and in the log. */
 #ifndef WHISKER_DAEMON_STATS_H
 #define WHISKER_DAEMON_STATS_H
 
@@ -36,7 +36,8 @@ void daemon_stats_lost(struct daemon_stats *stats, bool was_connected, int error
 /* Counts a frame of this bridge. */
 void daemon_stats_frame(struct daemon_stats *stats, struct daemon_source *source, const struct whisker_frame *frame);
 
-/* Takes over what the decoders and the clock fit have counted: begin, each source, end. Then `told` is up to date. */
+/* Takes over what the decoders and the clock fit have counted: begin, each source, end. Then `reported` is up to date.
+ */
 void daemon_stats_settle_begin(struct daemon_stats *stats);
 void daemon_stats_settle(struct daemon_stats *stats, const struct daemon_source *source);
 void daemon_stats_settle_end(struct daemon_stats *stats, const struct whisker_clock_fit *clock);

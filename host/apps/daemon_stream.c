@@ -12,7 +12,7 @@
 #include "whisker/errors.h"
 #include "whisker_protocol.h"
 
-/* How often readers are told clock mapping and statistics. */
+/* How often clock mapping is published to readers and statistics. */
 #define TELL_MS 250
 
 static volatile sig_atomic_t report_wanted, nodes_wanted;

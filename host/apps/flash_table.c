@@ -111,7 +111,7 @@ int flash_print_duplicates(const struct whisker_node nodes[WHISKER_FRAME_LANES])
         const uint32_t same = flash_lanes_of(nodes, nodes[lane].serial);
         if (!nodes[lane].present || nodes[lane].serial == WHISKER_LIMIT_SERIAL_NONE || same >> lane == 1 ||
             (same & ((UINT32_C(1) << lane) - 1)) != 0) {
-            continue; /* alone, or told already */
+            continue; /* alone, or reported already */
         }
         printf("serial number %" PRIu32 " is on several lanes:", nodes[lane].serial);
         for (int other = 0; other < WHISKER_FRAME_LANES; other++) {

@@ -1,4 +1,4 @@
-/* whisker-base: drives an iRobot Create and serves it on a Unix socket, until it is told to stop. */
+/* whisker-base: drives an iRobot Create and serves it on a Unix socket, until it is asked to stop. */
 #include "cli.h"
 #include "daemon_log.h"
 #include "whisker_base_guard.h"

@@ -5,7 +5,7 @@
  * A commander without an order for BASE_PLACE_MS loses the command to the next that drives. When all places are taken
  * a new client gets the place of one that has said nothing but nonsense; or else of one that has said nothing for
  * BASE_SPEAK_MS since it came; or else of the one that has been silent longest, for at least BASE_PLACE_MS. The
- * commander keeps its place, and in lock-step simulation whoever leads the stream.
+ * commander keeps its place, and in lock-step simulation the client that leads the stream.
  */
 #ifndef WHISKER_BASE_CLIENTS_H
 #define WHISKER_BASE_CLIENTS_H
@@ -44,10 +44,10 @@ struct base_client {
 
 struct base_clients {
     struct base_robot *robot;
-    const uint64_t *restarts; /* of the driver, told with the health */
+    const uint64_t *restarts; /* of the driver, reported with the health */
     struct base_client client[BASE_CLIENTS];
     struct base_client *commander; /* NULL: none */
-    int64_t now_ms;                /* as base_clients_serve() was told */
+    int64_t now_ms;                /* as given to base_clients_serve() */
     int64_t ordered_ms;            /* when the commander ordered something last, */
     uint64_t ordered_frame;        /* by either clock */
     struct base_log_limit log_places, log_commander;
@@ -55,7 +55,7 @@ struct base_clients {
 
 void base_clients_begin(struct base_clients *clients, struct base_robot *robot, const uint64_t *restarts);
 
-/* Takes a connection; false: there is no place left, the connection is told so and closed. */
+/* Takes a connection; false: there is no place left, the connection gets a message and is closed. */
 bool base_clients_add(struct base_clients *clients, int socket, int64_t now_ms);
 
 /* Whether a new client had better wait: there is no place, and a client that may lose its own has still to speak. */

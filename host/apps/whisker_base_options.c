@@ -24,8 +24,8 @@ static void whisker_base_options_print_help(void)
         "  --clock wall|stream what the dead-man counts: time, or frames of 15 ms, for lock-step simulation (wall)\n"
         "  --odometry POLICY   auto, reported, requested, encoders (auto)\n"
         "  --wheel-base M      between the wheels, in m (%g for model 1, %g for model 2)\n"
-        "  --distance-scale X  true distance over told distance (1)\n"
-        "  --angle-scale X     true angle over told angle (1)\n"
+        "  --distance-scale X  true distance over reported distance (1)\n"
+        "  --angle-scale X     true angle over reported angle (1)\n"
         "  --relative-sigma X  standard deviation of these two scales (0.05)\n"
         "  --requested-sigma X the same where requested speeds are integrated (0.1)\n"
         "  --drift RAD_PER_M   standard deviation of the heading per distance (0.05)\n"
@@ -37,7 +37,7 @@ static void whisker_base_options_print_help(void)
         "watched; the wheels stop when it is silent for 0.3 s, and at its end whisker-base ends (docs/create.md).\n\n"
         "Example: " DAEMON_PROGRAM " --port /dev/ttyUSB0 --socket /run/user/1000/base\n"
         "Example: " DAEMON_PROGRAM " --port /dev/ttyUSB0 --socket base.sock --model 2 --wait --mode full\n"
-        "Exit code: 0 stopped as told, 1 failed, 2 wrong use.\n",
+        "Exit code: 0 stopped on request, 1 failed, 2 wrong use.\n",
         create_model_facts(CREATE_1)->wheel_base_m, create_model_facts(CREATE_2)->wheel_base_m);
 }
 

@@ -95,7 +95,7 @@ static bool whisker_base_robot_order_speeds(struct base_robot *robot, struct cre
         robot, bytes, create_put_drive_direct(bytes, speeds.right_mm_s, speeds.left_mm_s), speeds, now_ms);
 }
 
-/* Wheels first, then who commands, then what is told. arm: enter the wanted mode. */
+/* Wheels first, then who commands, then what is reported. arm: enter the wanted mode. */
 static bool whisker_base_robot_start_base(struct base_robot *robot, bool arm, int64_t now_ms)
 {
     uint8_t bytes[CREATE_COMMAND_BYTES];
@@ -298,7 +298,7 @@ bool base_robot_mode(struct base_robot *robot, enum create_oi_mode mode, int64_t
     return base_robot_stop(robot, now_ms) && whisker_base_robot_ask_mode(robot, mode);
 }
 
-/* A line that stays silent is told of once, and then every hour. */
+/* A line that stays silent is reported once, and then every hour. */
 static void whisker_base_robot_log_silence(struct base_robot *robot, int64_t now_ms)
 {
     if (robot->told_ms == 0 || now_ms - robot->told_ms >= BASE_TELL_MS) {

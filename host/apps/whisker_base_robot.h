@@ -17,7 +17,7 @@
 #define BASE_COMMANDER_MS 300
 #define BASE_SILENCE_MS 500
 #define BASE_REOPEN_MS 50
-/* A base that stays silent is told of so often. */
+/* A base that stays silent is reported so often. */
 #define BASE_TELL_MS 3600000
 
 /* Why the wheels are kept stopped, whatever the commander says: bits. */
@@ -26,7 +26,7 @@ enum base_hold {
     BASE_HOLD_SLEEP = 2      /* the machine goes to sleep or is shut down */
 };
 
-/* Bits told with the odometry: 0 to 4 are packet 7's (bumps, wheel drops). */
+/* Bits reported with the odometry: 0 to 4 are packet 7's (bumps, wheel drops). */
 enum {
     BASE_CLIFF_LEFT = 1 << 5,
     BASE_CLIFF_FRONT_LEFT = 1 << 6,
@@ -35,7 +35,7 @@ enum {
     BASE_IDLE = 1 << 9 /* wheels will not turn: the base has left its mode, is not connected, or is held */
 };
 
-/* Told of every frame's motion. */
+/* Receives every frame's motion. */
 typedef void base_on_step(void *context, const struct create_step *step, unsigned bits);
 
 struct base_robot {
@@ -57,10 +57,10 @@ struct base_robot {
     bool silent;        /* it was heard, and then no more: until a frame comes the wheels stay stopped */
     unsigned held;      /* bits of enum base_hold: while one is set the wheels stay stopped */
     int64_t drive_ms, frame_ms, opened_ms;
-    int64_t told_ms;    /* when the log was told of a silence that still lasts; 0: none does */
+    int64_t told_ms;    /* when a silence was logged that still lasts; 0: none does */
     int64_t changed_ms; /* when other speeds than before were ordered */
     uint32_t frames_since_drive;
-    int error; /* why the port could not be opened, as last told */
+    int error; /* why the port could not be opened, as last reported */
     uint64_t reconnects, silences, commander_stops, mode_losses, missed;
     struct {
         struct base_log_limit line, silence, back, commander, hold, mode;

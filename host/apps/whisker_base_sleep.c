@@ -51,7 +51,7 @@ static int sleep_on_lock(sd_bus_message *message, void *context, sd_bus_error *e
 }
 
 /* For sleep alone: logind up to version 252 at least asks polkit for lid switches where a lock names two things, which
- * a service may not have. A shutdown is told all the same, and ends this process by SIGTERM before anything else
+ * a service may not have. A shutdown is announced all the same, and ends this process by SIGTERM before anything else
  * freezes. */
 static void sleep_ask_lock(struct base_sleep *sleep)
 {
@@ -92,7 +92,7 @@ static int sleep_match(struct base_sleep *sleep, const char *signal)
                                      NULL, sleep);
 }
 
-/* A bus that is gone tells nothing any more, so nothing is held because of what it told. */
+/* A bus that is gone tells nothing any more, so nothing is held because of what it announced. */
 static void sleep_lose(struct base_sleep *sleep, int error)
 {
     sleep_log_missing(sleep, strerror(-error));

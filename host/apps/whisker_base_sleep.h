@@ -21,7 +21,7 @@ struct base_sleep {
     struct sd_bus *bus; /* NULL: none */
     int lock;           /* of logind; -1: none */
     bool asked;         /* a lock was asked for, and logind has not answered */
-    bool about_to;      /* as on_sleep was told last */
+    bool about_to;      /* as on_sleep was last called */
     bool reported;      /* that there is no lock */
     int64_t tried_ms;   /* when bus or lock were asked for last */
 };

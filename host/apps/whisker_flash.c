@@ -159,7 +159,7 @@ static int whisker_flash_print_health(struct whisker_device *device, uint32_t la
     return error;
 }
 
-/* The lanes that are meant; 0, with one line printed, if that cannot be told. */
+/* The lanes that are meant; 0, with one line printed, if that is not known. */
 static uint32_t whisker_flash_choose(struct options *options, const struct whisker_node nodes[WHISKER_FRAME_LANES])
 {
     if (!options->has_lane && !options->has_serial) {

@@ -33,7 +33,7 @@ struct session {
     struct follower follower;
     FILE *bad;
     struct tally tally;
-    uint64_t taken; /* ticks told to the simulation */
+    uint64_t taken; /* ticks reported to the simulation */
 };
 
 static void whisker_log_print_help(void)

@@ -1,4 +1,4 @@
-/* whiskerd: takes the frames of the bridge and publishes them in a ring, until it is told to stop. */
+/* whiskerd: takes the frames of the bridge and publishes them in a ring, until it is asked to stop. */
 #include <stdio.h>
 
 #include "cli.h"

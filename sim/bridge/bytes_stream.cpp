@@ -63,7 +63,7 @@ const Bytes *BytesStream::packet() const
     return ready_ ? &ready_->data : nullptr;
 }
 
-// A stream that ends with a full packet is told by an empty one after it.
+// A stream that ends with a full packet is ended by an empty one after it.
 void BytesStream::packet_taken()
 {
     const bool again = ready_->ended && ready_->data.size() == WHISKER_LIMIT_BULK_PACKET;

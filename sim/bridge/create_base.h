@@ -43,7 +43,7 @@ class CreateBase
     // After it: its tick. What it sends is written to the port.
     void tick(const sim_world *world);
 
-    // What its wheels are told to do.
+    // What its wheels are asked to do.
     Drive speed() const;
 
     // Bytes written to the port since the start.

@@ -11,7 +11,7 @@
 namespace bridge_sim
 {
 
-// Who gets the device: a command under umockdev, or whoever connects to a port.
+// Who gets the device: a command under umockdev, or the client that connects to a port.
 enum class Serve { COMMAND, USBIP, USBREDIR };
 
 struct Options {

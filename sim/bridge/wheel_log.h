@@ -1,4 +1,4 @@
-// What the wheels of the base were told, and when: for judging how soon they stop.
+// What the wheels of the base were ordered, and when: for judging how soon they stop.
 #pragma once
 
 #include "fault_log.h"

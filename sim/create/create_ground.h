@@ -5,7 +5,7 @@
 #include "sim_create.h"
 #include "sim_world.h"
 
-/* Before the world's step: the world's base does what the robot's wheels are told. */
+/* Before the world's step: the world's base does what the robot's wheels are ordered to do. */
 void create_ground_drive(const sim_create *create, sim_world *world);
 
 /* After it: a tick of the robot, with what the wheels counted and what the bumper touches. */

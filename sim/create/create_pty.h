@@ -7,7 +7,7 @@
 
 struct create_pty {
     int master;
-    int slave; /* kept open: else whoever closes the port would end it for the next one */
+    int slave; /* kept open: else a client that closes the port would end it for the next one */
     char path[64];
     char link[256]; /* empty: none */
 };

@@ -71,7 +71,7 @@ static void create_sim_print_help(void)
            "Example: " PROGRAM " --link /tmp/create --model 2\n"
            "Example: " PROGRAM " --link /tmp/create --drop-remainder --lose-bytes 0.001\n"
            "Example: " PROGRAM " --link /tmp/create --event bump-left@3s --event silent@10s+2s\n"
-           "Exit code: 0 stopped as told, 1 failed, 2 wrong use.\n");
+           "Exit code: 0 stopped on request, 1 failed, 2 wrong use.\n");
 }
 
 static int create_sim_complain(int code, const char *text)

@@ -90,7 +90,7 @@ struct sim_create {
     struct create_songs songs;
     int32_t sensor[CREATE_OI_PACKET_MAX + 1]; /* by packet, as last renewed; 19 and 20 are made when they are read */
     double renewed_mm, renewed_deg;           /* at that time */
-    double read_mm, read_deg;                 /* up to where packets 19 and 20 have told */
+    double read_mm, read_deg;                 /* up to where packets 19 and 20 have reported */
     double encoder_mm, encoder_deg;           /* where the encoders stood at zero */
 };
 

@@ -1,7 +1,7 @@
 /* An emulator of the iRobot Create's Open Interface, Create 1 and 2: bytes in, bytes out, no input or output of its
  * own.
  *
- * It lives in ticks of 500 us. Before each tick whoever owns it hands over the bytes that have come
+ * It lives in ticks of 500 us. Before each tick its owner hands over the bytes that have come
  * (sim_create_receive) and drives the wheels as it wants (sim_create_speed); then tells what the wheels counted
  * (sim_create_tick) and takes the bytes that have left (sim_create_take). Equal options, bytes and motion give equal
  * bytes.
@@ -88,7 +88,7 @@ void sim_create_tick(sim_create *create, const struct sim_create_motion *motion)
 /* Takes at most size of the bytes that have left; of more than SIM_CREATE_OUT_MAX left lying the newest are lost. */
 size_t sim_create_take(sim_create *create, uint8_t *bytes, size_t size);
 
-/* What the wheels are told to do: m/s forward and rad/s anticlockwise, on this model's wheel base. */
+/* What the wheels are asked to do: m/s forward and rad/s anticlockwise, on this model's wheel base. */
 void sim_create_speed(const sim_create *create, double *v_m_s, double *omega_rad_s);
 
 enum create_oi_mode sim_create_mode(const sim_create *create);

@@ -264,7 +264,7 @@ static void mlx90333_model_glitch(struct mlx90333 *sensor, uint64_t now_ns, bool
 bool mlx90333_clock(struct mlx90333 *sensor, uint64_t now_ns, bool level, bool master)
 {
     const unsigned position = sensor->byte * 8u + sensor->bit;
-    const bool reported = sensor->select || sensor->restarting; /* nobody told the master of a soft reset */
+    const bool reported = sensor->select || sensor->restarting; /* the master does not know of a soft reset */
     mlx90333_model_require(sensor, reported || now_ns >= sensor->awake_ns, MLX90333_CLOCK_IN_STARTUP);
     if (sensor->select || !sensor->enabled || sensor->dark || now_ns < sensor->awake_ns)
         return mlx90333_model_line(sensor, 64u, master);

@@ -76,8 +76,8 @@ struct mlx90333 {
 /* Supply on at `now_ns` with /SS high. */
 void mlx90333_power_on(struct mlx90333 *sensor, uint64_t now_ns, const struct mlx90333_parameters *parameters);
 
-/* The supply fails, or comes back and the start-up begins; the master is not told, so nothing that it does before the
- * sensor is awake again counts against it. */
+/* The supply fails, or comes back and the start-up begins; the master is not informed, so nothing that it does before
+ * the sensor is awake again counts against it. */
 void mlx90333_supply(struct mlx90333 *sensor, uint64_t now_ns, bool on);
 
 /* The field from `field->since_ns` on. */

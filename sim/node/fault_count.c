@@ -1,4 +1,4 @@
-/* The node's own counters beside what its records told. */
+/* The node's own counters beside what its records reported. */
 #include <stdio.h>
 #include <string.h>
 
@@ -8,7 +8,7 @@
 static const struct {
     char letter;
     uint8_t counter;
-    bool once; /* counted at the reset, told in every tick until the sensor is awake */
+    bool once; /* counted at the reset, reported in every tick until the sensor is awake */
 } COUNTERS[] = {
     {'C', WHISKER_HEALTH_ORDER_CRC, false},     {'M', WHISKER_HEALTH_ORDER_MISSING, false},
     {'V', WHISKER_HEALTH_SERVICE_CRC, false},   {'F', WHISKER_HEALTH_LINK_OVERFLOW, false},

@@ -18,7 +18,7 @@ struct fault_case {
     void (*then)(unsigned nth, struct lane_faults *); /* of each tick after the broken ones, the first is 1 */
     void (*field)(unsigned tick, struct sim_field *); /* a field that is special */
     const char *expected;                             /* the verdicts, as an extended regular expression */
-    const char *counted;                              /* the node's counters, likewise; NULL: as often as told */
+    const char *counted;                              /* the node's counters, likewise; NULL: as often as reported */
     unsigned most;                                    /* ticks without a good record, at most */
     const char *remark;
     bool for_ever;     /* it has no end; good samples are not waited for */

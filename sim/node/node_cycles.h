@@ -1,5 +1,5 @@
 /* What each interrupt of the firmware costs: cycles of its handler from its vector on, on the longest path found. The
- * one place where they are told: the model of the node and all benches take them from here.
+ * one place where they are stated: the model of the node and all benches take them from here.
  *
  * X(name, register, acts, whole): `acts` until it first writes the register by which it does what others wait for (0:
  * there is none), `whole` until its return is done. The processor's entry comes on top. Source: the images of

@@ -1,5 +1,5 @@
 /* node_storm FIRST COUNT: runs batches FIRST to FIRST + COUNT - 1 and writes one line of JSON for each.
- * Exit code 1 if something was undetected that a check should have told, or good records did not come back. */
+ * Exit code 1 if something was undetected that a check should have reported, or good records did not come back. */
 #include <inttypes.h>
 #include <stdbool.h>
 #include <stdio.h>

@@ -84,7 +84,7 @@ struct storm_counts {
         missed_line; /* good, though hurt on the sensor's line: the bytes that came pass every check by arithmetic */
     uint64_t missed_link; /* good, though hurt on the link: likewise */
     uint64_t displaced; /* sound, but read up to 49 us before its tick, at a stray SYNC; its tick's own did not come */
-    uint64_t unexplained; /* good, hurt or altered otherwise: a check should have told */
+    uint64_t unexplained; /* good, hurt or altered otherwise: a check should have reported */
     uint64_t unforeseen;  /* bits hurt otherwise than what was broken hurts them: the log itself would be wrong */
     uint64_t spurious;    /* bad without a fault */
     uint64_t stuck;       /* not good again within STORM_PATIENCE ticks: the batch ends */

@@ -1,5 +1,5 @@
-/* The checks of node and bridge once more, told apart from their own code, on bits: what passes them by arithmetic, and
- * how likely that is. Frames and records are 64 bits, the first one highest. */
+/* The checks of node and bridge once more, distinguished from their own code, on bits: what passes them by arithmetic,
+ * and how likely that is. Frames and records are 64 bits, the first one highest. */
 #ifndef STORM_CHECKS_H
 #define STORM_CHECKS_H
 

@@ -6,8 +6,8 @@
 
 enum { NOW, BEFORE, EARLIER };
 
-/* A SYNC that comes so much before its tick may pass: NODE_ORDER_MOST_US, told to 4 us, by a node's clock 4 % slow that
- * is read 2 us after the edge, less the 29 us from the tick's SYNC to its order at the storm's link settings. */
+/* A SYNC that comes so much before its tick may pass: NODE_ORDER_MOST_US, asked to 4 us, by a node's clock 4 % slow
+ * that is read 2 us after the edge, less the 29 us from the tick's SYNC to its order at the storm's link settings. */
 #define EARLY_MOST_FS (((NODE_ORDER_MOST_US + 4u) * 26u / 25u + 2u - 29u) * 1000u * DSPIC_FS_PER_NS)
 
 /* After these neither the node's state nor the sensor's is known until a good record. */

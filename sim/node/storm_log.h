@@ -1,4 +1,4 @@
-/* What the world broke, bit by bit, held against what the bridge was told. */
+/* What the world broke, bit by bit, held against what the bridge received. */
 #ifndef STORM_LOG_H
 #define STORM_LOG_H
 

@@ -1,5 +1,5 @@
-/* The fault matrix: each fault is seen in-band within a tick, told as what it is, counted once, costs no more than its
- * cause allows, and no good sample is altered. With an argument: writes the table there, as JSON. */
+/* The fault matrix: each fault is seen in-band within a tick, reported as what it is, counted once, costs no more than
+ * its cause allows, and no good sample is altered. With an argument: writes the table there, as JSON. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

@@ -68,7 +68,7 @@ static void faults_are_counted_once(void **state)
     sim_node_fault(b.node, SIM_SENSOR_DEAD, 0);
     update_ticks(&b, 5);
     sim_node_fault(b.node, SIM_SENSOR_ERROR_BITS, 0x0008);
-    update_ticks(&b, 60); /* the sensor resets itself after it has told an error */
+    update_ticks(&b, 60); /* the sensor resets itself after it has reported an error */
     assert_int_equal(info(&b, WHISKER_INFO_HEALTH + WHISKER_HEALTH_SENSOR_ERROR) & 0xFFFFu, 1);
     assert_int_equal(info(&b, WHISKER_INFO_HEALTH + WHISKER_HEALTH_ORDER_CRC) & 0xFFFFu, 0);
     const uint32_t absent = info(&b, WHISKER_INFO_HEALTH + WHISKER_HEALTH_SENSOR_ABSENT);

@@ -21,8 +21,8 @@ static bool is_right(const struct update_cut_outcome *o, unsigned fates)
 
 static void print_wrong(const char *name, const struct update_cut_outcome *o)
 {
-    print_error("%s: fate %d, %s, %u ticks, second update %s\n", name, (int)o->fate, o->reported ? "told" : "not told",
-                o->ticks, o->again ? "good" : "failed");
+    print_error("%s: fate %d, %s, %u ticks, second update %s\n", name, (int)o->fate,
+                o->reported ? "reported" : "not reported", o->ticks, o->again ? "good" : "failed");
 }
 
 static void power_may_fail_at_each_step(void **state)

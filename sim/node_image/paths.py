@@ -19,7 +19,7 @@ def leaves(operation, index: int) -> bool:
 
 
 class PathError(ValueError):
-    """One line: what of the program no path can be told of."""
+    """One line: what of the program no path is known of."""
 
 
 class Step:
@@ -132,7 +132,7 @@ class Program:
         for at, to in loops:
             around = self.longest(order, loops, to).get(at)
             if around is None:
-                raise PathError(f"{2 * at:#x}: a loop that is entered elsewhere than at its head")
+                raise PathError(f"{2 * at:#x}: a loop that is not entered at its head")
             total += self.loops.get(at, 0) * (around + 2)  # the branch taken, and a stall
         return total
 

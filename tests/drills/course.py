@@ -149,7 +149,7 @@ class Course:
             event.found_s = None if found is None else witness.truth.simulated_s(event.ended, found)
 
     def _fill_stops(self, events: list[Event], machine: Machine) -> None:
-        """From the emulator's own list of what its wheels were told."""
+        """From the emulator's own list of what its wheels were ordered."""
         with machine.wheels.open(newline="") as file:
             reported = [(float(r["monotonic_s"]), r["v_m_s"], r["omega_rad_s"]) for r in csv.DictReader(file)]
         commanders = {fault.name for fault in self._faults if fault.commander}

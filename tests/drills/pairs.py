@@ -100,7 +100,7 @@ class Processes:
 
 
 class Wheels:
-    """The emulated base's list of what its wheels were told, read as it grows: (monotonic s, whether they turn)."""
+    """The emulated base's list of what its wheels were ordered, read as it grows: (monotonic s, whether they turn)."""
 
     def __init__(self, path: Path):
         self._path, self._at, self.reported = path, 0, []

@@ -97,7 +97,7 @@ class Truth(Watch):
 
 
 class Frames(Watch):
-    """Frames that whoever reads the ring gets: how many, and how many records of each lane were marked bad."""
+    """Frames that a reader of the ring gets: how many, and how many records of each lane were marked bad."""
 
     def __init__(self, ring: str, lanes: int, stop):
         super().__init__(stop)

@@ -22,7 +22,7 @@ WAY_M, ANGLE_RAD = 0.1, 0.4
 WAY_FRAMES = 400  # 6 s: by then the wheels should long have turned so far
 COAST_FRAMES = 20  # 0.3 s to come to rest
 STILL_FRAMES = 20
-STILL_M, STILL_RAD = 0.003, 0.03  # what counters told in whole units may still say
+STILL_M, STILL_RAD = 0.003, 0.03  # what counters reported in whole units may still say
 SILENT_FRAMES = 33  # 0.5 s: wanted of a base that lost its commander
 
 
@@ -138,7 +138,7 @@ def mode(rig: Rig) -> str:
 
 
 def drive(rig: Rig) -> str:
-    """A decimetre forward and back, a turn to either side, and it stands when told to."""
+    """A decimetre forward and back, a turn to either side, and it stands when asked to."""
     rig.require_wheels_up()
     with rig.base("full") as base:
         await_frames(base, 1)

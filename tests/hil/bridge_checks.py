@@ -168,7 +168,7 @@ def clock(rig: Rig) -> str:
     require(run.half is not None and run.clock is not None, "whiskerd tells no clock")
     text, wrong = judge_clock(run.half, run.clock)
     if rig.simulated:
-        return f"{text} (simulated time: told, not judged)"
+        return f"{text} (simulated time: reported, not judged)"
     require(not wrong, f"{text}: {wrong}; free the host's processor, stop time services that jump")
     return text
 

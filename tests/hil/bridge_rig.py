@@ -37,7 +37,7 @@ class Rig:
 
     seconds: float  # of frames
     interactive: bool  # a person is there to pull the plug
-    simulated: bool  # time is not the wall clock's: told, not judged
+    simulated: bool  # time is not the wall clock's: reported, not judged
     root: Path  # of the file system; another only in tests
     unusable: str = ""  # why nothing more can be made with it
     _stream: Stream | CheckError | None = field(default=None, repr=False)

@@ -40,7 +40,7 @@ class Checks:
         self.passed = self.failed = self.skipped = 0
 
     def run(self, name: str, check: Callable[[], str]) -> None:
-        """Run one; what it returns, or what it raises, is told beside its name."""
+        """Run one; what it returns, or what it raises, is reported beside its name."""
         if self._wanted and not name.startswith(tuple(self._wanted)):
             return
         try:

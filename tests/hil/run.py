@@ -28,7 +28,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--wheels-up", action="store_true", help="the base is on blocks: its wheels may turn")
     parser.add_argument("--interactive", action="store_true", help="somebody is there to pull the bridge's plug")
     parser.add_argument("--seconds", type=float, default=10.0, metavar="S", help="of frames of each (%(default)s)")
-    text = "the parts are simulated: what hangs on the wall clock is told, not judged"
+    text = "the parts are simulated: what hangs on the wall clock is reported, not judged"
     parser.add_argument("--simulated", action="store_true", help=text)
     parser.add_argument("--root", type=Path, default=Path("/"), help=argparse.SUPPRESS)  # of the file system, in tests
     return parser.parse_args()

@@ -149,7 +149,7 @@ def system_call(number: int, *arguments) -> None:
 
 @contextmanager
 def usbtest_driver():
-    """The kernel's usbtest, told to take this bridge: it binds to the frames' interface, which has no driver."""
+    """The kernel's usbtest, asked to take this bridge: it binds to the frames' interface, which has no driver."""
     release = Path("/proc/sys/kernel/osrelease").read_text().strip()
     module = ROOT / f"build/kernel/debian/root/lib/modules/{release}/kernel/drivers/usb/misc/usbtest.ko"
     vendor, product = (LIMITS[f"usb_{name}_id"] for name in ("vendor", "product"))

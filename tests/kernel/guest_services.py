@@ -428,7 +428,7 @@ def base_unplugged(checks: Checks) -> None:
 
 
 def bases_stop(_: Checks) -> None:
-    """Both stopped as told: nothing is left."""
+    """Both stopped on request: nothing is left."""
     command("systemctl", "stop", *map(base_unit, BASES))
     left = [str(path) for path in Path("/run/whisker-base").glob("*")]
     results = {show(base_unit(port), "Result") for port in BASES}

@@ -48,7 +48,7 @@ class Checks:
         self.talk = talk
 
     def run(self, name: str, check: Callable) -> None:
-        """Run one; what it returns is told beside the name."""
+        """Run one; what it returns is reported beside the name."""
         began = time.monotonic()
         try:
             reported = check(self)

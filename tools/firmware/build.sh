@@ -61,7 +61,7 @@ else
         'No compiler is needed to program a node: make flash takes the images of firmware/images.'
     tools=${compiler%gcc}
     compiled_by=$("$compiler" --version | head -1)
-    # Newer linkers make vector tables of their own unless they are told not to.
+    # Newer linkers make vector tables of their own unless they are reported not to.
     if "${tools}ld" --help 2>&1 | grep -q -e --no-ivt; then lflags="$lflags --no-ivt"; fi
     # shellcheck disable=SC2086
     compile() { "$compiler" -mcpu=33FJ128MC802 ${MDFP:+"-mdfp=$MDFP"} -omf=elf $cflags $3 -c "$1" -o "$2"; }

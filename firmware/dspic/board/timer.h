@@ -14,7 +14,7 @@ void board_timer_start(struct board *board, uint16_t us);
 /* Lets the watch run from zero. */
 void board_watch_start(struct board *board);
 
-/* True if more than `us` (1000 at most) microseconds by the board's clock have passed since, told to 4 us; forgotten
+/* True if more than `us` (1000 at most) microseconds by the board's clock have passed since, to 4 us; forgotten
  * now and then after 100 ms. */
 bool board_watch_exceeds(struct board *board, uint16_t us);
 

@@ -57,7 +57,7 @@ void board_timer_start(struct board *board, uint16_t us)
     sfr_write(board, T2CON, 0);
     sfr_write(board, TMR2, 0);
     sfr_write(board, PR2, is_short ? SHORT_COUNTS(us) : LONG_COUNTS(us));
-    sfr_clear(board, IRQ_WORD(IFS0, IRQ_T2), IRQ_BIT(IRQ_T2)); /* an end that is waiting to be told is void */
+    sfr_clear(board, IRQ_WORD(IFS0, IRQ_T2), IRQ_BIT(IRQ_T2)); /* a pending interrupt flag is void */
     sfr_write(board, T2CON, TCON_TON | (is_short ? PRESCALE_8 : PRESCALE_64));
 }
 

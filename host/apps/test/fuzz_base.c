@@ -35,7 +35,7 @@ struct input {
 
 struct far { /* the other ends: of the clients' sockets and of the serial line */
     int client[CLIENTS], line;
-    int owed[CLIENTS]; /* answers */
+    int pending[CLIENTS]; /* answers */
 };
 
 static struct base_options options;
@@ -46,7 +46,7 @@ static int64_t now_ms;
 
 void daemon_log(enum daemon_priority priority, const char *format, ...)
 {
-    char line[512]; /* the arguments are looked at, nothing is told */
+    char line[512]; /* the arguments are looked at, nothing is reported */
     va_list arguments;
     (void)priority;
     va_start(arguments, format);
@@ -131,14 +131,14 @@ static void check_answers(void)
         ssize_t got;
         while (far.client[i] >= 0 && (got = recv(far.client[i], text, sizeof text - 1, 0)) >= 0) {
             if (got == 0) { /* its place was needed, or there was none */
-                demand(served() >= BASE_CLIENTS - 1 || far.owed[i] == 0);
+                demand(served() >= BASE_CLIENTS - 1 || far.pending[i] == 0);
                 close(far.client[i]);
                 far.client[i] = -1;
-                far.owed[i] = 0;
+                far.pending[i] = 0;
                 break;
             }
             text[got] = '\0';
-            demand(strlen(text) == (size_t)got && far.owed[i]-- > 0);
+            demand(strlen(text) == (size_t)got && far.pending[i]-- > 0);
             demand(!strncmp(text, "sent ", 5) || !strncmp(text, "error ", 6) || !strncmp(text, "odometry ", 9) ||
                    !strncmp(text, "health ", 7));
         }
@@ -161,7 +161,7 @@ static void connect_client(int i)
     if (far.client[i] >= 0) {
         close(far.client[i]);
     }
-    far.owed[i] = base_clients_add(&clients, pair(SOCK_SEQPACKET, &far.client[i]), now_ms) ? 0 : 1; /* why not */
+    far.pending[i] = base_clients_add(&clients, pair(SOCK_SEQPACKET, &far.client[i]), now_ms) ? 0 : 1; /* why not */
 }
 
 static void connect_all(void)
@@ -174,7 +174,7 @@ static void connect_all(void)
 static void say(int i, const char *bytes, size_t count)
 {
     if (far.client[i] >= 0 && count > 0 && send(far.client[i], bytes, count, MSG_NOSIGNAL) > 0) {
-        far.owed[i]++;
+        far.pending[i]++;
     }
 }
 
@@ -305,17 +305,17 @@ static void begin(unsigned kind)
     demand(base_robot_open(&robot, pair(SOCK_STREAM, &far.line), now_ms));
     for (int i = 0; i < CLIENTS; i++) {
         far.client[i] = -1;
-        far.owed[i] = 0;
+        far.pending[i] = 0;
     }
     connect_client(0);
     connect_client(1);
 }
 
-static int owed(void)
+static int pending(void)
 {
     int sum = 0;
     for (int i = 0; i < CLIENTS; i++) {
-        sum += far.owed[i];
+        sum += far.pending[i];
     }
     return sum;
 }
@@ -326,11 +326,11 @@ static void answer_all(void)
     if (far.line >= 0) {
         close(far.line);
     }
-    for (int rounds = 2 * owed() + 2; rounds > 0; rounds--) { /* one takes a message, one answers it */
+    for (int rounds = 2 * pending() + 2; rounds > 0; rounds--) { /* one takes a message, one answers it */
         serve();
         check_answers();
     }
-    demand(owed() == 0);
+    demand(pending() == 0);
 }
 
 static void end(void)

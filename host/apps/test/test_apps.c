@@ -424,10 +424,10 @@ static void replacing_touches_nothing_of_a_stranger(void **state)
     const pid_t bystander = name_a_bystander(&ring);
     give_ring_to(STRANGER);
     const char *replace[] = {WHISKERD, "--ring", ring_name(), "--replace", NULL};
-    assert_refused(replace, 1, "is user 4242's, whom this reader was not told to trust; ");
+    assert_refused(replace, 1, "is user 4242's, whom this reader is not set to trust; ");
     const char *read[] = {WHISKER_LOG, "--ring", ring_name(), "--wait", "0", NULL};
     assert_refused(read, 1,
-                   "is user 4242's, whom this reader was not told to trust; if it should, add --ring-owner 4242");
+                   "is user 4242's, whom this reader is not set to trust; if it should, add --ring-owner 4242");
     char path[128];
     snprintf(path, sizeof path, "%s/socket", folder);
     unlink(path);

@@ -45,7 +45,7 @@ static bool come(int i, int64_t now_ms)
     return base_clients_add(&clients, pair(SOCK_SEQPACKET, &far[i]), now_ms);
 }
 
-/* What client i was told; empty: its connection was closed. NULL: nothing. */
+/* What client i received; empty: its connection was closed. NULL: nothing. */
 static const char *reported(int i)
 {
     const ssize_t got = recv(far[i], answer, sizeof answer - 1, 0);

@@ -109,7 +109,7 @@ static void a_silence_that_is_noticed_ends_the_motion(void **state)
     assert_driven_until(HEARD_MS + BASE_SILENCE_MS);
 }
 
-/* The wheels stood from the first stop on, whoever says it again. */
+/* The wheels stood from the first stop on, whichever client says it again. */
 static void a_stop_said_again_changes_nothing(void **state)
 {
     (void)state;
@@ -120,7 +120,7 @@ static void a_stop_said_again_changes_nothing(void **state)
     assert_driven_until(ORDERED_MS);
 }
 
-/* The cable is out: the base goes on as it was told last, until the port is back. */
+/* The cable is out: the base goes on with its last order, until the port is back. */
 static void a_stop_that_was_not_written_was_not_heard(void **state)
 {
     (void)state;

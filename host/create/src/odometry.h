@@ -7,12 +7,12 @@
 /* What wheels do differs from what they were asked for by less than this share: the paper's 5 %, and some. */
 #define ODOMETRY_SPREAD 0.07
 
-/* What one frame was asked to drive, or told, in the units of packets 19 and 20: mm, degrees. */
+/* What one frame was asked to drive, or reported, in the units of packets 19 and 20: mm, degrees. */
 struct odometry_units {
     double distance, angle;
 };
 
-/* Look at one frame: what it was asked for against what it told; exact: not in whole units, remainders dropped. */
+/* Look at one frame: what it was asked for against what it reported; exact: not in whole units, remainders dropped. */
 void remainder_watch(struct create_odometry *odometry, const struct create_frame *frame, struct odometry_units asked);
 void standing_watch(struct create_odometry *odometry, struct odometry_units asked, struct odometry_units reported,
                     bool exact);

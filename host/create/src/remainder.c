@@ -22,7 +22,7 @@
 #define SETTLED_FRAMES 10
 #define POINTS 5 /* motions within SPREAD that an average is taken over */
 
-/* The chances of one told number: on average, and at best, over the motions that are possible. */
+/* The chances of one reported number: on average, and at best, over the motions that are possible. */
 struct chances {
     double average, best;
 };
@@ -47,8 +47,8 @@ static struct chances remainder_if_dropped(double least, double most, double rep
     return (struct chances){fmax(STRAY, (double)equal / POINTS), possible ? 1 : STRAY};
 }
 
-/* A number told for a motion that was asked for, both in units and in the direction of that motion. What neither way
- * tells, as of a body that stands or is held back, weighs nothing. Nor does 0 against kept remainders where dropped
+/* A number reported for a motion that was asked for, both in units and in the direction of that motion. What neither
+ * way tells, as of a body that stands or is held back, weighs nothing. Nor does 0 against kept remainders where dropped
  * ones would tell it: a body that stands tells it too. */
 static void remainder_weigh(struct create_evidence *evidence, double asked, double reported)
 {

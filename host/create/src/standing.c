@@ -2,9 +2,9 @@
  * A body that was asked to move and does not.
  *
  * Every frame a body that moves as asked tells at least so many units: all but the wheels' error where remainders are
- * kept, whole units of that otherwise. What is owed of this is summed up; every unit told pays for two, so that only
- * less than half of it lets the sum grow. Where the firmware drops remainders, or may, and less than a unit is asked
- * for, nothing is owed: a body that stands cannot be told from one that moves.
+ * kept, whole units of that otherwise. What is missing of this is summed up; every reported unit cancels two, so that
+ * only less than half of it lets the sum grow. Where the firmware drops remainders, or may, and less than a unit is
+ * asked for, nothing is missing: a body that stands cannot be distinguished from one that moves.
  */
 #include <math.h>
 
@@ -19,7 +19,7 @@ static double standing_least(double asked, bool exact)
     return exact ? units : floor(units);
 }
 
-/* Units told in the direction that was asked for. */
+/* Units reported in the direction that was asked for. */
 static double standing_paid(double asked, double reported)
 {
     return asked > 0 ? reported : asked < 0 ? -reported : 0;
@@ -31,11 +31,11 @@ void standing_watch(struct create_odometry *odometry, struct odometry_units aske
     const double expected = standing_least(asked.distance, exact) + standing_least(asked.angle, exact);
     const double limit = PATIENCE * fmax(1, expected);
     if (expected <= 0) {
-        odometry->owed = 0;
+        odometry->missing = 0;
         odometry->standing = asked.distance != 0 || asked.angle != 0 ? CREATE_CANNOT_TELL : CREATE_MOVES;
         return;
     }
     const double got = standing_paid(asked.distance, reported.distance) + standing_paid(asked.angle, reported.angle);
-    odometry->owed = fmin(limit, fmax(0, odometry->owed + expected - PAYS * got));
-    odometry->standing = odometry->owed >= limit ? CREATE_STANDS : CREATE_MOVES;
+    odometry->missing = fmin(limit, fmax(0, odometry->missing + expected - PAYS * got));
+    odometry->standing = odometry->missing >= limit ? CREATE_STANDS : CREATE_MOVES;
 }

@@ -27,10 +27,10 @@ struct base base_begin(enum create_model model, enum create_source policy, bool 
 }
 
 /* Whole units out of a counter. */
-static int32_t tell(double *owed, bool keeps)
+static int32_t tell(double *pending, bool keeps)
 {
-    const double whole = trunc(*owed);
-    *owed = keeps ? *owed - whole : 0;
+    const double whole = trunc(*pending);
+    *pending = keeps ? *pending - whole : 0;
     return (int32_t)whole;
 }
 

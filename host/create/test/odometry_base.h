@@ -12,7 +12,7 @@
 #define TURN_MM_S 92 /* 0.71 rad/s, the exploration's: 0.61 degrees a frame */
 #define TURN_FRAME_RAD (2 * TURN_MM_S * 1e-3 / 0.258 * PERIOD_S)
 
-/* The driver's odometry of it, and what it owes to its counters. */
+/* The driver's odometry of it, and what its counters have pending. */
 struct base {
     struct create_odometry odometry;
     struct create_motion motion;

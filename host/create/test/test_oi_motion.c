@@ -130,7 +130,7 @@ static void loose_errors_add_up_as_variance(void **state)
     assert_near(c[X][X], 0.08);
 }
 
-/* A counter of whole units owes at the beginning and at the end, not at every step between. */
+/* A counter of whole units has a remainder at the beginning and at the end, not at every step between. */
 static void what_counters_owe_does_not_grow(void **state)
 {
     (void)state;

@@ -50,7 +50,7 @@ static void a_straight_drive_tells_that_remainders_are_dropped(void **state)
     base.motion = (struct create_motion){0};
     base_drive(&base, 100, 100, 3, 1);
     assert_int_equal(base.odometry.distance, CREATE_REQUESTED);
-    assert_close(base.motion.x, 0.3, 1e-9); /* told as 0.2 */
+    assert_close(base.motion.x, 0.3, 1e-9); /* reported as 0.2 */
     base_whisk(&base, 3);
     assert_close(base.motion.theta, 3 * WHISK_RAD_S, 1e-9);
 }

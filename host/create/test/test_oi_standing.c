@@ -33,7 +33,7 @@ static void a_held_turn_is_noticed_where_remainders_are_kept(void **state)
     assert_int_equal(base.odometry.standing, CREATE_MOVES);
 }
 
-/* Before a wall, at a third of its speed: what was told is integrated, which is at least nearer. */
+/* Before a wall, at a third of its speed: what was reported is integrated, which is at least nearer. */
 static void a_body_that_is_held_back_is_believed_rather_than_its_orders(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
 /*
  * Who gets a ring's name (src/ring_file.c): rival writers, each killed at any point, over a ring whose writer is dead.
- * A writer that was told it has the name keeps it until it closes; two never have it at once; a dead writer's ring, or
+ * A writer that was given the name keeps it until it closes; two never have it at once; a dead writer's ring, or
  * a naming lock left by a process killed while it held it, holds nobody up.
  *
  * BUG 1: a naming lock is believed although its file has lost its name meanwhile
@@ -141,7 +141,7 @@ leave:
     :: else
     fi;
 out:
-    atomic { /* the kernel ends the locks of whoever is gone */
+    atomic { /* the kernel ends the locks of a process that is gone */
         writer_lives[me + 1] = false;
         if
         :: won && name == me + 1 -> winners--

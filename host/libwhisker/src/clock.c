@@ -10,7 +10,7 @@
 #define POINT_NS 1e9
 /* A crystal and a host's clock, disciplined or not, differ by less (typically 100e-6). */
 #define SKEW_MAX 500e-6
-/* Less than this cannot be told from delay; more, for so many seconds, is no delay any more. */
+/* Less than this cannot be distinguished from delay; more, for so many seconds, is no delay any more. */
 #define JUMP_EARLY_NS 5e6
 #define JUMP_LATE_NS 20e6
 #define JUMP_POINTS 3

@@ -61,7 +61,7 @@ static bool hotplug_listen(struct whisker_hotplug *hotplug, int64_t wait_ms)
     return libusb_handle_events_timeout_completed(hotplug->usb, &timeout, NULL) != LIBUSB_ERROR_INTERRUPTED;
 }
 
-/* Whether to try now: an arrival was told, or it is time to look and one is there. */
+/* Whether to try now: an arrival was reported, or it is time to look and one is there. */
 static bool hotplug_try_now(struct whisker_hotplug *hotplug)
 {
     const bool arrived = hotplug->arrived;

@@ -83,7 +83,7 @@ void whisker_ring_explain(const char *name, int error, char *line, size_t room)
         ring_explain_say_access(name, &ring, line, room);
     } else if (error == WHISKER_ERROR_RING_OWNER && is_there) {
         snprintf(line, room,
-                 "the ring %s is user %s's, whom this reader was not told to trust; if it should, add --ring-owner %s; "
+                 "the ring %s is user %s's, whom this reader is not set to trust; if it should, add --ring-owner %s; "
                  "else remove it: sudo rm %s",
                  ring.path, ring.user, ring.user, ring.path);
     } else if (is_there && (error == WHISKER_ERROR_RING_BUSY || error == WHISKER_ERROR_RING_LAYOUT ||

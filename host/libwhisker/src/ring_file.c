@@ -13,7 +13,7 @@
 #include "whisker/errors.h"
 
 #define READABLE_BY_ALL (S_IRUSR | S_IWUSR | S_IRGRP | S_IROTH)
-/* Whoever has a name's lock needs microseconds; after this many milliseconds it is stopped, not slow. */
+/* The process that has a name's lock needs microseconds; after this many milliseconds it is stopped, not slow. */
 #define NAMING_TRIES_MS 2000
 
 /* Why a file of the shared directory cannot be had, by errno. */

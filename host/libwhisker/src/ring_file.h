@@ -8,7 +8,7 @@
 
 #include "ring_place.h"
 
-/* Bytes of the file that are locked (open file description locks, which end with whoever holds them). */
+/* Bytes of the file that are locked (open file description locks, which end with the process that holds them). */
 enum ring_lock {
     RING_LOCK_WRITER = 0,  /* for writing: a writer lives */
     RING_LOCK_WAITING = 1, /* for reading: readers wait, so publications must wake them */
@@ -33,7 +33,7 @@ bool ring_file_is_named(int fd, const char *path);
 /* Whether these are one file. */
 bool ring_file_is_same(const struct stat *a, const struct stat *b);
 
-/* The path of the lock that whoever changes what this path stands for must have. */
+/* The path of the lock that a process that changes what this path stands for must have. */
 void ring_file_lock_path(const char *path, char lock_path[RING_PATH_BYTES]);
 
 /* Gives the complete file its name, in place of a ring whose writer is dead. RING_BUSY (its writer lives), RING_LAYOUT

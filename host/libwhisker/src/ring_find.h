@@ -18,7 +18,7 @@ struct ring_found {
  * RING_LAYOUT, RING_VERSION, WRITER_DEAD, SYSTEM. */
 int ring_find(const char *name, uid_t named, struct ring_found *found);
 
-/* Whether a ring of this path lives, whoever its owner is. */
+/* Whether a ring of this path lives, with any owner. */
 bool ring_lives(const char *path);
 
 #endif

@@ -29,7 +29,7 @@ struct whisker_reader {
     uint64_t overruns;
     uint64_t frames_overrun;
     uint64_t frames_missing;
-    int64_t waits_since_ms; /* when the writer was first told that this reader waits; 0: not yet */
+    int64_t waits_since_ms; /* when the writer was first informed that this reader waits; 0: not yet */
     uint32_t sequence;      /* of the last frame left behind */
     bool has_sequence;
     bool in_haste; /* the last wait had not to sleep */

@@ -19,7 +19,7 @@ static const struct whisker_frame *ring_reader_place(const struct whisker_reader
  */
 static int ring_reader_skip_lost(struct whisker_reader *reader)
 {
-    ring_fence_after_reading(); /* the head is not older than the claim that told of the overrun */
+    ring_fence_after_reading(); /* the head is not older than the claim that showed the overrun */
     const uint64_t ahead = ring_load_acquire(&reader->map.header->head) - reader->position;
     const uint64_t half = reader->map.capacity / 2;
     reader->peeked = 0;

@@ -54,7 +54,7 @@ static void update_leave(struct loading *l, int lane)
     l->lanes &= ~(UINT32_C(1) << lane);
 }
 
-/* Asks those that take part; whoever does not answer is left behind. */
+/* Asks those that take part; a node that does not answer is left behind. */
 static int update_ask(struct loading *l, struct whisker_answer answers[WHISKER_FRAME_LANES])
 {
     const int error =

@@ -39,7 +39,7 @@ extern struct fake_usb fake;
 /* A bridge as it should be, plugged in. */
 void fake_reset(void);
 
-/* A bridge is plugged in while a watcher waits: told by an event, or silently. */
+/* A bridge is plugged in while a watcher waits: announced by an event, or not. */
 void fake_plug(bool event);
 
 /* Ends the oldest transfer in flight, at the next handling of events. */

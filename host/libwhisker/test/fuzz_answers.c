@@ -1,6 +1,6 @@
 /*
  * libFuzzer target: whatever a bridge says in its report of answers, a lane counts as answered only by a record of that
- * order's, its first one is what is told, and every question ends. Input: reports, one after another, cut anywhere.
+ * order's, its first one is what is reported, and every question ends. Input: reports, one after another, cut anywhere.
  */
 #include <stdlib.h>
 #include <string.h>

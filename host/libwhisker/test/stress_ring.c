@@ -1,6 +1,6 @@
 /*
  * The ring's readers and writer killed at random instructions, again and again: no frame is ever accepted that is not
- * whole, and whoever comes next goes on at once. Usage: stress_ring [kills] [seed]
+ * whole, and the next process goes on at once. Usage: stress_ring [kills] [seed]
  */
 #include <signal.h>
 #include <stdatomic.h>

@@ -268,7 +268,7 @@ static void clock_and_statistics_are_told(void **state)
     struct whisker_daemon_stats stats;
     assert_int_equal(whisker_reader_clock(f->reader, &clock), 0);
     assert_int_equal(whisker_reader_stats(f->reader, &stats), 0);
-    assert_true(clock.ns_per_cycle == 0 && stats.frames == 0); /* not told yet */
+    assert_true(clock.ns_per_cycle == 0 && stats.frames == 0); /* not published yet */
     for (uint64_t i = 1; i <= 3; i++) {
         whisker_ring_set_clock(f->ring, &(struct whisker_clock){.device_cycles = i, .uncertainty_ns = 0.5});
         whisker_ring_set_stats(f->ring, &(struct whisker_daemon_stats){.frames = i, .firmware = "1.0", .serial = "W7"});

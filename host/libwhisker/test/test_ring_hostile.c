@@ -113,7 +113,7 @@ static void memory_that_is_no_ring_is_refused(void **state)
     }
 }
 
-/* A quarter of a gigabyte: told of the file, not made. */
+/* A quarter of a gigabyte: the file's size only, not written. */
 static void the_largest_ring_is_a_ring_and_a_larger_is_none(void **state)
 {
     (void)state;
@@ -145,7 +145,7 @@ static void what_has_the_name_and_is_no_file_is_refused_at_once(void **state)
     unlink(path());
 }
 
-/* A living ring that a link leads to: whoever makes the link would choose what a reader reads. */
+/* A living ring that a link leads to: the process that makes the link would choose what a reader reads. */
 static void link_to_a_living_ring_is_not_followed(void **state)
 {
     (void)state;
@@ -255,7 +255,7 @@ int __wrap_linkat(int from, const char *old, int to, const char *new, int flags)
     return __real_linkat(from, old, to, new, flags);
 }
 
-/* Whoever can open it can hold every writer of the name up. */
+/* A process that can open it can hold every writer of the name up. */
 static void lock_of_a_name_is_its_owners_alone(void **state)
 {
     (void)state;
@@ -295,10 +295,10 @@ static void leave_stale_ring(void)
     assert_true(test_ring_file_exists(test_ring_name()));
 }
 
-/* Whoever may read a ring may lock its file. */
+/* A process that may read a ring may lock its file. */
 #define NOBODY 65534
 
-/* As somebody who may not open the ring's file: both ends are told so. */
+/* As somebody who may not open the ring's file: both ends get an error that says so. */
 static int attach_and_create_elsewhere(const char *name)
 {
     struct whisker_reader *reader;

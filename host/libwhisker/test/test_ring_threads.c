@@ -92,7 +92,7 @@ static void publication_orders_writing_before_reading(void **state)
     whisker_ring_close(ring);
 }
 
-/* The writer waits for nobody and overtakes its readers; what they are told is whole must be whole. */
+/* The writer waits for nobody and overtakes its readers; what they receive as whole must be whole. */
 static void overtaken_readers_never_accept_a_torn_frame(void **state)
 {
     (void)state;

@@ -258,7 +258,7 @@ static void service_directory_comes_first_and_its_reader_follows(void **state)
     assert_int_equal(found, 2);
     assert_memory_equal(entries[0].path, service_directory, strlen(service_directory));
     whisker_ring_close(second);
-    /* a writer whose ring no reader would find is told so */
+    /* a writer whose ring no reader would find gets an error that says so */
     assert_int_equal(whisker_ring_create(test_ring_name(), TEST_CAPACITY, &second), WHISKER_ERROR_RING_BUSY);
     whisker_reader_seek_latest(reader, 0);
     whisker_ring_close(first);
@@ -378,7 +378,7 @@ static void writer_of_the_service_is_only_roots_to_signal(void **state)
     unlink(path);
 }
 
-/* What a person is told, as that user; printed when it is not what is expected. */
+/* The message for a person, as that user; printed when it is not what is expected. */
 static int line_wanted(int error, const char *format)
 {
     char line[WHISKER_RING_LINE_BYTES], wanted[WHISKER_RING_LINE_BYTES];
@@ -438,11 +438,10 @@ static void what_another_user_left_is_told_with_its_remedy(void **state)
     assert_int_equal(as_user(STRANGER, meet_foreign_lock), 0);
     unlink(lock_path);
     writer = start_writer((struct writer){STRANGER, WHISKER_RING_DIRECTORY, 0});
-    assert_int_equal(
-        line_wanted(attach_and_leave(WHISKER_RING_NO_OWNER),
-                    "the ring %s is user 4242's, whom this reader was not told to trust; if it should, add "
-                    "--ring-owner 4242; else remove it: sudo rm %s"),
-        0);
+    assert_int_equal(line_wanted(attach_and_leave(WHISKER_RING_NO_OWNER),
+                                 "the ring %s is user 4242's, whom this reader is not set to trust; if it should, add "
+                                 "--ring-owner 4242; else remove it: sudo rm %s"),
+                     0);
     end_writer(writer, WHISKER_RING_DIRECTORY);
     assert_int_equal(line_wanted(attach_and_leave(WHISKER_RING_NO_OWNER), "there is no ring of this name; start"), 0);
 }

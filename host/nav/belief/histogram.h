@@ -114,8 +114,8 @@ bool nav_histogram_refine(struct nav_histogram *);
 /* Groups that hold mass. */
 uint32_t nav_histogram_groups(const struct nav_histogram *);
 
-/* Starts a pass: `step` in the robot's frame; owed noise is added as far as one pass can, whose share of a cell that is
- * left then is owed still. Sums will be relative to `about`. `weigh` must last as long as the pass. */
+/* Starts a pass: `step` in the robot's frame; pending noise is added as far as one pass can, whose share of a cell that
+ * is left then stays pending. Sums will be relative to `about`. `weigh` must last as long as the pass. */
 void nav_histogram_begin(struct nav_histogram *, struct nav_pose step, const struct nav_weigh *, struct nav_pose about);
 
 /* Goes on with it for at most `most` cells passed over: how many it were. */
@@ -124,7 +124,7 @@ long nav_histogram_run(struct nav_histogram *, long most);
 /* Whether a pass is under way. Until it ends the belief is that from before it. */
 bool nav_histogram_running(const struct nav_histogram *);
 
-/* Variance owed that one pass cannot add, in passes. */
+/* Pending variance that one pass cannot add, in passes. */
 double nav_histogram_debt(const struct nav_histogram *);
 
 /* Variance that a drive adds to positions because headings differ within a slice (uniform: width^2 / 12), m^2 per axis.

@@ -60,15 +60,15 @@ double nav_histogram_debt(const struct nav_histogram *h)
 
 /* Takes what is due of a variance, as at most `most` kernels of three points: how many, and their side weight. A kernel
  * with side weight s adds 2 s cell^2. */
-static int pass_due(double *owed, double cell, int most, double *side)
+static int pass_due(double *pending, double cell, int most, double *side)
 {
-    double share = *owed / (cell * cell);
+    double share = *pending / (cell * cell);
     *side = 0.0;
     if (share < OWED_LEAST)
         return 0;
     int kernels = (int)fmin(ceil(share / KERNEL_MOST), most);
     double each = fmin(share / kernels, KERNEL_MOST);
-    *owed -= each * kernels * cell * cell;
+    *pending -= each * kernels * cell * cell;
     *side = each / 2.0;
     return kernels;
 }

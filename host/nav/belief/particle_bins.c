@@ -81,22 +81,22 @@ double nav_bins_bound(double bins, double error)
 }
 
 /* Bins that `count` draws occupy: a bin with less than a draw's worth of weight counts as its chance of one. */
-static double bins_occupied(const struct nav_bins *b, double count, double elsewhere)
+static double bins_occupied(const struct nav_bins *b, double count, double anywhere)
 {
-    double sum = count * elsewhere;
+    double sum = count * anywhere;
     for (long n = 0; n < b->count; n++)
-        sum += fmin(1.0, count * (1.0 - elsewhere) * b->bin[b->filled[n]].weight);
+        sum += fmin(1.0, count * (1.0 - anywhere) * b->bin[b->filled[n]].weight);
     return sum;
 }
 
-long nav_bins_needed(const struct nav_bins *b, const struct nav_sample *sample, double elsewhere)
+long nav_bins_needed(const struct nav_bins *b, const struct nav_sample *sample, double anywhere)
 {
     enum { ROUNDS = 6 };
     double count = (double)sample->most;
     if (sample->least >= sample->most)
         return sample->most;
     for (int n = 0; n < ROUNDS; n++)
-        count = fmin(nav_bins_bound(bins_occupied(b, count, elsewhere), sample->error), (double)sample->most);
+        count = fmin(nav_bins_bound(bins_occupied(b, count, anywhere), sample->error), (double)sample->most);
     return (long)fmax(ceil(count), (double)sample->least);
 }
 

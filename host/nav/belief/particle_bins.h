@@ -43,9 +43,9 @@ struct nav_pose nav_bins_mode(const struct nav_bins *);
  * equation 13 of Fox, "Adapting the sample size in particle filters through KLD-sampling", with z = 2.326. */
 double nav_bins_bound(double bins, double error);
 
-/* How many particles to draw from this belief when a share of them, `elsewhere`, falls anywhere: the number that its
- * own occupied bins ask for, as systematic resampling would fill them. */
-long nav_bins_needed(const struct nav_bins *, const struct nav_sample *, double elsewhere);
+/* How many particles to draw from this belief when a share of them, `anywhere`, falls anywhere in the arena: the number
+ * that its own occupied bins ask for, as systematic resampling would fill them. */
+long nav_bins_needed(const struct nav_bins *, const struct nav_sample *, double anywhere);
 
 size_t nav_bins_bytes(const struct nav_bins *);
 

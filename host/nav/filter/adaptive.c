@@ -1,11 +1,11 @@
 /* The adaptive filter: as much belief as the rows leave open, and no more.
  *
- * Known: a cloud of hypotheses at exact poses, as many as its spread needs, or a Gaussian where that has told as well.
- * In doubt: an arena-wide histogram wakes and goes over the rows from which on the robot may have been elsewhere; both
- * beliefs are held, weighted by how well they explained those rows. Unknown: the histogram alone, until its mass sits
- * in few enough cells for a cloud; as long as there are several modes it stays beside the cloud and tells what each of
- * them weighs. Work per row is bounded by adaptive.budget in every state: what the histogram has not done waits for the
- * next row. docs/navigation_adaptive.md tells more. */
+ * Known: a cloud of hypotheses at exact poses, as many as its spread needs, or a Gaussian where that has predicted as
+ * well. In doubt: an arena-wide histogram wakes and goes over the rows since which the robot may have been kidnapped;
+ * both beliefs are held, weighted by how well they explained those rows. Unknown: the histogram alone, until its mass
+ * sits in few enough cells for a cloud; as long as there are several modes it stays beside the cloud and tells what
+ * each of them weighs. Work per row is bounded by adaptive.budget in every state: what the histogram has not done waits
+ * for the next row. docs/navigation_adaptive.md tells more. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -17,8 +17,8 @@
 #include "mixture.h"
 #include "particle_bins.h"
 
-/* Shares of the belief: below the first one mode is not told from another; the modes of a cloud hold the second of the
- * histogram's, or others are drawn; a mode that holds the third is the only one. */
+/* Shares of the belief: below the first one mode is not distinguished from another; the modes of a cloud hold the
+ * second of the histogram's, or others are drawn; a mode that holds the third is the only one. */
 static const double SHARE_LEAST = 1e-9, KNOWN_LEAST = 0.9, ONE_MODE = 0.999;
 
 /* Nats that a cloud drawn from the histogram must have explained better than "anywhere" before it may blame the map:
@@ -44,9 +44,9 @@ struct adaptive {
     struct adaptive_kidnap kidnap;
     bool local, awake;            /* which of the two beliefs are held; one at least */
     bool whole;                   /* the histogram holds all belief, and the cloud the same more finely */
-    int modes;                    /* of the cloud, as last told by the histogram, 0: not told */
+    int modes;                    /* of the cloud, as last given by the histogram, 0: not known */
     double share[NAV_MODES_MOST]; /* what each of them weighs */
-    double odds; /* logarithm, elsewhere against local, before the rows that the histogram has gone over */
+    double odds; /* logarithm, kidnapped against local, before the rows that the histogram has gone over */
     struct nav_pending pending; /* since the last row that was read ... */
     bool pending_unknown;       /* ... and whether some of it was not reported */
     bool idle;                  /* nothing was read in the row before */
@@ -129,7 +129,7 @@ static void adaptive_begin(struct adaptive *a)
     }
     a->local = !a->problem->prior.uniform && adaptive_begin_cloud(a);
     a->awake = !a->local;
-    a->kidnap.proven = a->local ? (double)INFINITY : 0.0; /* a start that is told */
+    a->kidnap.proven = a->local ? (double)INFINITY : 0.0; /* a start that is given */
     a->answer.belief = nav_gaussian_prior(a->problem);
     a->gaussian.compared = a->local && nav_gaussian_mass(&a->answer.belief, NAV_NEAR_M, NAV_NEAR_RAD) >=
                                            1.0 - a->problem->settings.adaptive.scattered;
@@ -170,7 +170,7 @@ static void *adaptive_create(const struct nav_problem *problem)
     return a;
 }
 
-/* Wakes the histogram at the row from which on the robot may have been elsewhere. */
+/* Wakes the histogram at the row since which the robot may have been kidnapped. */
 static void adaptive_start_search(struct adaptive *a)
 {
     uint64_t reach = adaptive_log_reach(&a->log);
@@ -235,7 +235,7 @@ static void adaptive_draw_particles(struct adaptive *a, double share)
     adaptive_kidnap_clear(&a->kidnap, a->likelihood, a->log.head);
 }
 
-/* Gives the modes of the cloud the shares that the histogram told last. */
+/* Gives the modes of the cloud the shares that the histogram gave last. */
 static void adaptive_keep_shares(struct adaptive *a)
 {
     double factor[NAV_MODES_MOST], mass[NAV_MODES_MOST];
@@ -245,7 +245,7 @@ static void adaptive_keep_shares(struct adaptive *a)
     nav_particles_weigh_modes(&a->cloud.set, factor, a->modes);
 }
 
-/* Nothing was found elsewhere: where there were several modes the histogram holds the cloud's again. */
+/* Nothing was found in the rest of the arena: where there were several modes the histogram holds the cloud's again. */
 static void adaptive_keep_particles(struct adaptive *a)
 {
     if (a->modes < 2) {
@@ -303,8 +303,8 @@ static void adaptive_scatter(struct adaptive *a)
     a->touched += a->cloud.set.count;
 }
 
-/* Ends a search that has gone over all rows: what it found is drawn, or there was nothing elsewhere, or the cloud is
- * wrong. */
+/* Ends a search that has gone over all rows: what it found is drawn, or there was nothing in the rest of the arena, or
+ * the cloud is wrong. */
 static void adaptive_end_search(struct adaptive *a, double present)
 {
     const struct nav_adaptive_settings *s = &a->problem->settings.adaptive;
@@ -322,7 +322,8 @@ static void adaptive_decide(struct adaptive *a)
     bool kidnapped = present > log(a->problem->settings.adaptive.wake), shared = a->whole && a->local;
     if (a->gaussian.carries && (kidnapped || adaptive_gaussian_fails(&a->gaussian)))
         adaptive_scatter(a);
-    if (!a->awake ? kidnapped : shared && present > 0.0) /* to look elsewhere costs what is known of the modes */
+    if (!a->awake ? kidnapped
+                  : shared && present > 0.0) /* a search of the whole arena costs what is known of the modes */
         adaptive_start_search(a);
     else if (!a->awake || !adaptive_global_current(&a->global, &a->log))
         return;

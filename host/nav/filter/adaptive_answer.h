@@ -14,7 +14,7 @@ struct adaptive_held {
     struct nav_bins *bins;
     const struct adaptive_global *global; /* NULL: asleep */
     const struct adaptive_log *log;
-    double share; /* probability that the robot is elsewhere than `local` has it */
+    double share; /* probability that the robot is at another place than `local` has it */
 };
 
 /* Pose near which most is held, covariance of both beliefs about it and mass near it. guess: the answer before. */

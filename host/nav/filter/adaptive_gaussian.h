@@ -1,7 +1,7 @@
 /* The adaptive filter's least belief: one Gaussian, and whether it tells the robot's place as well as particles would.
  *
  * It is corrected as by the extended Kalman filter. Beside that the full likelihood of every row is looked up at a few
- * points of the Gaussian, which tells three things: how well it explained the row, for the test of elsewhere
+ * points of the Gaussian, which tells three things: how well it explained the row, for the kidnap test
  * (adaptive_kidnap.h) and for a comparison with the particles; how much the row tells beyond what was known, where a
  * product of many weak factors stays normal and one of few strong ones does not; and whether a wider Gaussian would
  * have explained the rows better. */
@@ -14,7 +14,7 @@
 struct adaptive_gaussian {
     struct nav_kalman kalman;
     bool carries;    /* it is all that is held of the robot's place */
-    double reported; /* nats that the last rows told, fading */
+    double reported; /* nats that the last rows carried, fading */
     double wider;    /* log-ratio of rows by the wider Gaussian and by this one; at least 0 (Page's test) */
     double behind;   /* log-ratio of rows by the particles and by this one, since the comparison began */
     int compared;    /* rows since then, below 0 until the next; 0: none is under way */
@@ -36,7 +36,7 @@ double adaptive_gaussian_take(struct adaptive_gaussian *, const struct nav_pendi
 /* Whether particles are to take its place. */
 bool adaptive_gaussian_fails(const struct adaptive_gaussian *);
 
-/* Takes a row's log-likelihood by the particles and by itself; true once it has told as well for long enough. */
+/* Takes a row's log-likelihood by the particles and by itself; true once it has predicted as well for long enough. */
 bool adaptive_gaussian_compare(struct adaptive_gaussian *, double particles, double own);
 
 /* Replaces the particles by draws from it: `count`, or as many times more as it is to be wider. */

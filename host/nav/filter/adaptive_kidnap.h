@@ -5,8 +5,8 @@
  * running log-ratio never falls below 0, and the row after its last 0 is when the robot would have been moved (Page's
  * test). When it is awake its own likelihood of the rows takes over.
  *
- * A local belief may explain a disagreement by a broken whisker (trust.h). Elsewhere that whisker works as well as it
- * did before: the trust of that time is kept for the other explanation. */
+ * A local belief may explain a disagreement by a broken whisker (trust.h). In another place that whisker works as well
+ * as it did before: the trust of that time is kept for the other explanation. */
 #ifndef NAV_ADAPTIVE_KIDNAP_H
 #define NAV_ADAPTIVE_KIDNAP_H
 

@@ -20,7 +20,7 @@ struct nav_ratio {
 };
 
 struct nav_calibration {
-    struct nav_ratio distance, turn; /* true by told, 0.7 .. 1.3 */
+    struct nav_ratio distance, turn; /* true by reported, 0.7 .. 1.3 */
     bool sure;                       /* a stretch is under way */
     struct nav_pose from;            /* its first pose ... */
     double from_covariance[9];

@@ -42,7 +42,7 @@ static void *filter_copy(const void *from, int count, size_t size)
     return to;
 }
 
-/* Mean and deviations become the mixture's, for whoever wants one place. */
+/* Mean and deviations become the mixture's, for callers that want one place. */
 static int filter_own_prior(struct nav_prior *prior)
 {
     if (!nav_mixture_given(prior)) {

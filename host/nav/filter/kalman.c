@@ -19,7 +19,7 @@ struct nav_kalman_sighting {
     double z, variance;   /* m, m^2; "no contact" is a distance of the whisker's length, looked up no further */
     double reach;         /* contact: ranges are looked up to here, m */
     bool normal;          /* contact: how the face lies, and not how far away it is: */
-    double reported;      /* its direction as it was told, rad; z is 0, and so is reach: what is not known agrees */
+    double reported;      /* its direction as reported, rad; z is 0, and so is reach: what is not known agrees */
 };
 
 /* A sighting about the belief, to first and second moments: what is expected, its variance without the sighting's own,
@@ -67,7 +67,7 @@ static void kalman_predict(void *self, const struct nav_motion *motion)
     nav_kalman_move(k, motion->step, &noise);
 }
 
-/* Expected direction of the face that the mean meets, less the one that was told, for a robot that is turned otherwise.
+/* Expected direction of the face that the mean meets, less the reported one, for a robot that is turned otherwise.
  */
 static double kalman_turned(const struct nav_kalman *k, const struct nav_kalman_sighting *s, double theta)
 {

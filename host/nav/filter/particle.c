@@ -158,7 +158,7 @@ static struct nav_gaussian particle_fit(const struct nav_particles *p, const str
 }
 
 /* Draws the particles of each mode anew from its Gaussian; who would stand where the robot cannot stays. More modes
- * than can be told apart are not modes yet. */
+ * than can be distinguished are not modes yet. */
 static void particle_redraw(struct nav_particles *p, const struct nav_likelihood *l, struct nav_rng *rng)
 {
     struct nav_mode mode[NAV_MODES_MOST];

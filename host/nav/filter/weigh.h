@@ -17,8 +17,8 @@ void nav_weigher_free(struct nav_weigher *);
  * the standard deviations of position (m, per axis) and heading (rad). True when something new was read. */
 bool nav_weigher_take(struct nav_weigher *, const struct nav_row *, double motion[5]);
 
-/* Log-likelihood of that row at n poses, [n][3] x, y, theta; -INFINITY where the robot cannot stand, 0 elsewhere when
- * nothing new was read. */
+/* Log-likelihood of that row at n poses, [n][3] x, y, theta; -INFINITY where the robot cannot stand, 0 at other poses
+ * when nothing new was read. */
 void nav_weigher_weigh(const struct nav_weigher *, const double *poses, long n, double *loglik);
 
 /* The most that the row's log-likelihood can be at any pose. */

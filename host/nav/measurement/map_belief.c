@@ -6,13 +6,13 @@
 
 #include "likelihood.h"
 
-/* Prior odds that a place is not as told, nats: what it costs to believe so. */
+/* Prior odds that a place differs from the map, nats: what it costs to believe so. */
 static const double TILE = 6.0, BOX = 3.0, THING = 6.0;
-/* One found as told is surer of it by as much again at most, one found otherwise by this. */
+/* One found as mapped is surer of it by as much again at most, one found otherwise by this. */
 static const double KEPT_MOST = 4.0;
 /* Contacts within this distance are with one thing; one within three of a known thing is likely part of it. */
 static const double THING_M = 0.1, THING_REACH_M = 0.15, PART = 3.0, PART_NATS = 4.0;
-/* A contact nearer than told by more than this is with something else. */
+/* A contact nearer than mapped by more than this is with something else. */
 static const double NEAR_M = 0.03;
 
 int nav_map_init(struct nav_map_belief *m, const struct nav_arena *reported, size_t sensors)
@@ -49,8 +49,8 @@ static float map_kept(double nats, double cost)
     return (float)fmin(fmax(nats, -cost), cost + KEPT_MOST);
 }
 
-/* Whether a place is taken to be not as told, given whether it was: neither is given up for the first reading against
- * it. */
+/* Whether a place is taken to differ from the map, given whether it was: neither is given up for the first reading
+ * against it. */
 static bool map_wrong(double nats, double cost, bool before)
 {
     return nats > (before ? cost - KEPT_MOST : cost);
@@ -89,7 +89,7 @@ void nav_map_begin(struct nav_likelihood *l)
     l->map.mass = 0.0;
 }
 
-/* Place whose being wrong would explain a reading of an object whisker: where it felt something before what was told,
+/* Place whose being wrong would explain a reading of an object whisker: where it felt something before what is mapped,
  * or the box that it should have felt. */
 static struct nav_map_suspect map_suspect_ray(const struct nav_likelihood *l, int w, const struct nav_place *at,
                                               int code)
@@ -159,7 +159,7 @@ void nav_map_add(struct nav_likelihood *l, const struct nav_place *at, const uin
     l->map.mass += mass;
 }
 
-/* Evidence for a place's being other than told: `share` of the belief would then give the reading `ratio`, and the
+/* Evidence for a place that differs from the map: `share` of the belief would then give the reading `ratio`, and the
  * rest what all of it gives now. */
 static double map_evidence(const struct nav_likelihood *l, int w, double ratio)
 {
@@ -201,7 +201,7 @@ static bool map_learn_box(struct nav_likelihood *l, int w, int which)
     return (double)*gone > BOX;
 }
 
-/* A contact where nothing was told. */
+/* A contact where the map shows nothing. */
 static bool map_learn_thing(struct nav_likelihood *l, int w, double x, double y)
 {
     struct nav_map_belief *m = &l->map;

@@ -1,9 +1,9 @@
 /* Where the map is wrong: tiles of another texture, boxes that are gone, things that it lacks.
  *
  * Learned online at poses of a belief (nav_map_learn, after a row was weighed), place by place, as the log-odds that a
- * place is not as told. A place that has told enough is taken to be what the readings say from then on, so that one
- * wrong place costs a belief its prior once, however often it is met; places found as told become surer of it. A belief
- * that turns out to have been wrong forgets it all (nav_map_forget). Nothing is allocated after the start. */
+ * place differs from the map. A place with enough evidence is taken to be what the readings say from then on, so that
+ * one wrong place costs a belief its prior once, however often it is met; places found as mapped become surer of it. A
+ * belief that turns out to have been wrong forgets it all (nav_map_forget). Nothing is allocated after the start. */
 #ifndef NAV_MAP_BELIEF_H
 #define NAV_MAP_BELIEF_H
 
@@ -16,7 +16,7 @@ struct nav_likelihood;
 
 enum { NAV_MAP_THINGS = 32 };
 
-/* Nats for `other` against the texture told, less those of the prior. */
+/* Nats for `other` against the mapped texture, less those of the prior. */
 struct nav_map_tile {
     float nats;
     uint8_t other;
@@ -63,10 +63,11 @@ void nav_map_add(struct nav_likelihood *, const struct nav_place *, const uint8_
 /* Learns from the row, given what the belief expects (nav_trust_add). */
 void nav_map_learn(struct nav_likelihood *);
 
-/* The map is again as told. */
+/* The map is again as given. */
 void nav_map_forget(struct nav_likelihood *);
 
-/* Contacts of the row last read that nothing told explains, but something else may: their codes become "not known". */
+/* Contacts of the row last read that nothing mapped explains, but something else may: their codes become "not known".
+ */
 void nav_map_apply(const struct nav_likelihood *, const struct nav_place *, uint8_t *codes);
 
 #endif

@@ -34,7 +34,7 @@ struct nav_model {
     struct nav_place place;          /* on the robot, in its frame */
     double reach;                    /* m from there to the farthest point that it senses */
     double spacing;                  /* m of travel after which a reading counts in full */
-    double detail;                   /* m over which what is expected of it changes; INFINITY: not told */
+    double detail;                   /* m over which what is expected of it changes; INFINITY: not given */
     double length;                   /* object whiskers: m */
     double step;                     /* m per code; code k stands for a contact at (k + 1/2) steps */
     double sigma;                    /* m, of a measured distance, the spread of a pose's cell included */

@@ -43,7 +43,7 @@ struct nav_sensor {
     int values;       /* doubles in a reading, at least 1 */
     int codes;        /* 1 .. 255 */
     double spacing_m; /* a reading counts in full after so much travel since the last one; 0: each does */
-    double detail_m;  /* over which what is expected changes; cells are half as wide. 0: not told */
+    double detail_m;  /* over which what is expected changes; cells are half as wide. 0: not given */
     /* Code expected at a pose of the robot; outside 0 .. codes - 1: nothing is known there. */
     int (*expect)(const void *self, double x, double y, double theta);
     /* likelihood[codes]: p(reading | code) in any unit. One that is not finite, or negative, or none above 0: the

@@ -27,7 +27,7 @@ struct nav_trust_settings {
 
 struct nav_map_settings {
     double
-        learn; /* 1: places where the map keeps being wrong are no longer expected as told (map_belief.h); 0: never */
+        learn; /* 1: places where the map keeps being wrong are no longer expected as mapped (map_belief.h); 0: never */
 };
 
 struct nav_motion_settings {
@@ -43,7 +43,7 @@ struct nav_grid_settings {
     double cell_deg;    /* its extent in heading; the number of slices is rounded */
     double sub;         /* likelihood: sub-poses per cell edge */
     double sub_heading; /* likelihood: sub-poses per cell heading */
-    double teleport;    /* probability per reading that the robot has been put elsewhere */
+    double teleport;    /* probability per reading that the robot has been put to another place */
 };
 
 struct nav_foveal_settings {
@@ -80,8 +80,8 @@ struct nav_adaptive_settings {
     double cell_m;        /* edge of the arena-wide histogram's finest cells; less on small tiles */
     double cell_deg;      /* their extent in heading */
     double rows;          /* it begins with at most so many budgets of cells, where these are not too wide for tiles */
-    double hazard;        /* probability at any row that the robot has been put elsewhere */
-    double wake;          /* odds of being elsewhere at which the histogram wakes */
+    double hazard;        /* probability at any row that the robot has been put to another place */
+    double wake;          /* odds of a kidnap at which the histogram wakes */
     double scattered;     /* share of the histogram that a cloud may leave out */
 };
 

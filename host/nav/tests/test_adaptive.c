@@ -82,7 +82,7 @@ static void spinning_wheels_do_not_lose_it_for_good(void **state)
         sum += wander_error(&w, &e);
         nav_filter_free(f);
     }
-    assert_true(sum / SEEDS < 0.05); /* 0.16 m were told that never were */
+    assert_true(sum / SEEDS < 0.05); /* 0.16 m were reported that never were */
 }
 
 static void no_row_takes_more_than_its_budget(void **state)
@@ -175,7 +175,8 @@ static double mass_near(const struct nav_component *c, long n, struct nav_pose p
     return sum;
 }
 
-/* While it looks elsewhere it answers with the pose near which most of the belief lies, not with the first of many. */
+/* While it searches the whole arena it answers with the pose near which most of the belief lies, not with the first of
+ * many. */
 static void it_answers_where_most_belief_is(void **state)
 {
     (void)state;
@@ -329,7 +330,7 @@ static void hypotheses_carry_where_rows_tell_more(void **state)
     }
 }
 
-/* The test of elsewhere goes on while a Gaussian carries. */
+/* The kidnap test goes on while a Gaussian carries. */
 static void a_robot_carried_off_while_a_gaussian_carries_is_found(void **state)
 {
     (void)state;

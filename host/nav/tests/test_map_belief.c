@@ -104,7 +104,7 @@ static void contacts_with_what_the_map_lacks_are_expected_at_last(void **state)
     assert_near(read_at(l, &OPEN, -1, 0.1), ghost, 1e-6); /* one may be a ghost */
     teach(l, &OPEN, -1, 0.1, 2);
     assert_near(read_at(l, &OPEN, -1, 0.1), 0.0, 1e-6);
-    assert_near(read_at(l, &TILE, -1, 0.1), ghost, 1e-6); /* not elsewhere */
+    assert_near(read_at(l, &TILE, -1, 0.1), ghost, 1e-6); /* not at other places */
     teach(l, &OPEN, -1, INFINITY, 3);                     /* nothing is felt where it was */
     assert_near(read_at(l, &OPEN, -1, 0.1), ghost, 1e-6);
     nav_likelihood_free(l);
@@ -122,7 +122,7 @@ static void what_was_learned_where_the_robot_was_not_is_forgotten(void **state)
     nav_likelihood_free(l);
 }
 
-/* Worlds that differ from the map: a tile, no box, a box elsewhere. */
+/* Worlds that differ from the map: a tile, no box, a box at another place. */
 static const uint8_t WRONG_FLOOR[] = {0, 1, 2, 2, 1, 1, 1, 2, 0, 2, 1, 0, 1, 1, 2, 0};
 static const struct nav_box MOVED[] = {{0.3, 1.0, 0.7, 1.3}};
 

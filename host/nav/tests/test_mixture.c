@@ -87,7 +87,7 @@ static void filters_of_many_places_hold_both_and_the_rest_of_the_arena(void **st
     /* Shares of a few hundred particles, or of a hundred: give or take three deviations of such a count. */
     const struct {
         const char *name;
-        double share, elsewhere;
+        double share, rest;
     } many[] = {{"grid", 0.03, 0.004},
                 {"particle", 0.03, 3.0 * sqrt(NAV_ANYWHERE / 300.0)},
                 {"multi", 3.0 * sqrt(0.7 * 0.3 / 100.0), 3.0 * sqrt(NAV_ANYWHERE / 100.0)},
@@ -97,8 +97,8 @@ static void filters_of_many_places_hold_both_and_the_rest_of_the_arena(void **st
         struct nav_filter *f = nav_filter_new(many[n].name, &p);
         assert_near(moments_of(f, apart[0].pose).mass, 0.7, many[n].share);
         assert_near(moments_of(f, apart[1].pose).mass, 0.3, many[n].share);
-        double elsewhere = 1.0 - moments_of(f, apart[0].pose).mass - moments_of(f, apart[1].pose).mass;
-        assert_near(elsewhere, 0.9 * NAV_ANYWHERE, many[n].elsewhere);
+        double rest = 1.0 - moments_of(f, apart[0].pose).mass - moments_of(f, apart[1].pose).mass;
+        assert_near(rest, 0.9 * NAV_ANYWHERE, many[n].rest);
         nav_filter_free(f);
     }
 }
@@ -233,7 +233,7 @@ static void hold(void *self, struct nav_pose at, double mass)
 }
 
 /* Whatever the cells' width in metres, a component's mass lies where the component is, and nothing but the doubt
- * elsewhere. */
+ * at other places. */
 static void cells_of_any_width_hold_their_share_of_a_component(void **state)
 {
     (void)state;

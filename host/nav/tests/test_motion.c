@@ -15,7 +15,7 @@ static void noise_does_not_depend_on_how_rows_cut_a_drive(void **state)
     assert_near(5.0 * fifth.heading, once.heading, 1e-12);
 }
 
-/* Drives and turns; the wheels tell `told` times the truth; the filter sees the truth within `spread`. */
+/* Drives and turns; the wheels report `reported` times the truth; the filter sees the truth within `spread`. */
 static struct nav_calibration drive(double reported, double told_turn, double spread, double confidence, int rows)
 {
     struct nav_calibration c;

@@ -95,7 +95,7 @@ static void bad_directions_are_counted_and_not_read(void **state)
     nav_filter_free(f);
 }
 
-/* Spread of the heading after a face was met straight ahead, told with or without its direction. */
+/* Spread of the heading after a face was met straight ahead, reported with or without its direction. */
 static double heading_spread(const char *filter, bool reported)
 {
     struct nav_problem p = telling();

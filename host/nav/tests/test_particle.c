@@ -254,10 +254,10 @@ static void weights_that_stay_low_bring_fresh_particles_where_the_row_fits(void 
     for (int n = 0; n < 40; n++)
         contradict(f, 0.1);
     assert_true(f->fast > 0.5 * before); /* those injected have taken over, and they fit */
-    long elsewhere = 0;
+    long apart = 0;
     for (long i = 0; i < f->cloud.count; i++)
-        elsewhere += hypot((double)f->cloud.x[i] - 0.25, (double)f->cloud.y[i] - 0.25) > 0.2;
-    assert_true(elsewhere > 1800);
+        apart += hypot((double)f->cloud.x[i] - 0.25, (double)f->cloud.y[i] - 0.25) > 0.2;
+    assert_true(apart > 1800);
     particle_destroy(f);
 }
 
@@ -340,8 +340,8 @@ static void a_row_that_no_particle_can_explain_changes_no_weight(void **state)
     particle_destroy(f);
 }
 
-/* Two modes of 100 particles each, 0.6 m apart, of 3 cm by 1 cm: drawn anew they keep their places and shapes, whoever
- * belongs to them, and every particle but what the body's place forbids is a new one. */
+/* Two modes of 100 particles each, 0.6 m apart, of 3 cm by 1 cm: drawn anew they keep their places and shapes,
+ * whichever belongs to them, and every particle but what the body's place forbids is a new one. */
 static void modes_are_drawn_anew_from_their_gaussians(void **state)
 {
     (void)state;

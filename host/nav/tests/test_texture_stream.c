@@ -42,8 +42,8 @@ static void a_class_ruled_out_comes_back(void **state)
     assert_true(p[1] > 0.999);
 }
 
-/* One channel, blocks and classifier windows of 16 samples; two classes told by the log of the whole power alone, about
- * 0 and about 4. */
+/* One channel, blocks and classifier windows of 16 samples; two classes distinguished by the log of the whole power
+ * alone, about 0 and about 4. */
 struct model {
     double floor, centre[FEATURES_MOST], scale[FEATURES_MOST], weight[2 * FEATURES_MOST], bias[2], apart[4], spike;
     struct nav_texture_classifier *classifier;

@@ -77,7 +77,7 @@ static void a_window_that_says_nothing_changes_nothing(void **state)
     assert_near(m.temper, before, 0.0);
 }
 
-/* Two floor whiskers and an object whisker, all told by one believed pose. */
+/* Two floor whiskers and an object whisker, all explained by one believed pose. */
 struct bench {
     struct nav_likelihood *likelihood;
     uint8_t codes[3];

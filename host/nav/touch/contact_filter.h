@@ -35,7 +35,7 @@ struct nav_contact_filter_config {
     double gain_sd;               /* of ln of the tilt over the model's */
     double model_share;           /* its random walk over the slope, per root of a radian */
     double friction, friction_sd; /* coefficient, 0 to 0.5 */
-    double motion_share;          /* standard deviation of the base's motion as told, share: of all; of a block */
+    double motion_share;          /* standard deviation of the reported motion of the base, share: of all; of a block */
     double ring_hz, ring_damping; /* slowest mode of the whisker in contact, damping ratio */
     double speed_sd;              /* of each component of a moving object's velocity, m/s */
     double speed_drift;           /* its random walk, m/s per root of a second */

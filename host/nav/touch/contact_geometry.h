@@ -7,7 +7,7 @@
 
 /* A hypothesis' state. FIRST: arc length of a contact on the shaft, direction of the force on the tip about the clamped
  * axis. ROUND: curvature of the surface; a corner has none.
- * MOTION: error of the base's motion as told, share of it. */
+ * MOTION: error of the reported motion of the base, as a share of it. */
 enum { FIRST, SLOPE, ROUND, SPEED_X, SPEED_Y, GAIN, FRICTION, MOTION };
 
 /* Place, normal's direction and elastic tilt, and their derivatives by the states COLUMN. */

@@ -32,7 +32,9 @@ class _Output(io.FileIO):
             raise
         except OSError as error:
             self.failed = True
-            raise OutputError(f"standard output: {error.strerror}; make room there, or send it elsewhere") from error
+            raise OutputError(
+                f"standard output: {error.strerror}; make room there, or send it to another place"
+            ) from error
 
 
 def exit_code(program: str, work: Callable[[], int]) -> int:

@@ -37,6 +37,6 @@ def test_output_is_stamped_for_a_log_only(monkeypatch, capsys):
     print("plain")
     monkeypatch.setenv(VARIABLE, "1")
     stamp_output()
-    print("told")
+    print("reported")
     out, err = capsys.readouterr()
-    assert re.fullmatch(f"plain\n{TIME}told\n", out) and err == ""
+    assert re.fullmatch(f"plain\n{TIME}reported\n", out) and err == ""

@@ -26,7 +26,7 @@ def add(parser) -> None:
         "kind",
         nargs="?",
         default="",
-        help=f"of the recording: {', '.join(scenes.READERS)} (default: told by its files)",
+        help=f"of the recording: {', '.join(scenes.READERS)} (default: found from its files)",
     )
     p.add_argument("recording", help="folder that a run left, as build/demo, a robot's bag, or a Thymio's recording")
     p.add_argument("--out", required=True, metavar="DIR", help="folder to write")

@@ -167,7 +167,7 @@ def read_dicts(path: Path) -> list[dict[str, str]]:
 
 
 def add_truth(path: Path, truth: list[dict[str, str]]) -> None:
-    """Put the true pose beside each row of observations.csv, for whoever scores a filter later."""
+    """Put the true pose beside each row of observations.csv, to score a filter with later."""
     rows = read_dicts(path)
     if len(rows) != len(truth):
         raise TableError(path, None, f"{len(rows)} rows but {len(truth)} true poses; see the logs beside it")

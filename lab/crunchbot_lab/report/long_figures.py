@@ -1,4 +1,4 @@
-"""Figures of a long run: where it went, how far off each estimate was and how often. Told apart in grey by line and marker."""
+"""Figures of a long run: where it went, how far off each estimate was and how often. Distinguished in grey by line and marker."""
 
 import numpy as np
 from matplotlib.figure import Figure

@@ -138,7 +138,7 @@ BASE_ROWS = (
 
 
 def base_table(run: Run) -> str:
-    """What whisker-base told of link and odometry when the run was over."""
+    """What whisker-base reported of link and odometry when the run was over."""
     base = run.pilot["base"]
     rows = [(text, base[key]) for key, text in BASE_ROWS if key in base]
     model = base.get("model")

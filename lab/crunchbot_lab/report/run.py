@@ -57,7 +57,7 @@ class Run:
     radial: dict[str, np.ndarray]
     radial_lines: dict[str, list[float]]
     traces: dict[str, np.ndarray]
-    pilot: dict  # rows, whisks, base: what whisker-base told of itself
+    pilot: dict  # rows, whisks, base: what whisker-base reported of itself
     navigator: dict  # counters
     bag: Path
 

@@ -1,4 +1,4 @@
-"""The chart of the benchmark by touch: error along the way, and in bits beside what the floor can have told."""
+"""The chart of the benchmark by touch: error along the way, and in bits beside what the floor can have given."""
 
 from dataclasses import dataclass
 
@@ -50,7 +50,7 @@ def draw(course: Course) -> Figure:
     right.axhline(course.bits_wanted, color="0.4", linewidth=0.8)
     right.annotate("wanted for a near row", (way_cm[-1], course.bits_wanted), ha="right", va="bottom", color="0.4")
     if course.bits_told is not None:
-        right.plot(way_cm, course.bits_told, color="0.2", linewidth=2.4, label="told by the floor, at most")
+        right.plot(way_cm, course.bits_told, color="0.2", linewidth=2.4, label="from the floor, at most")
     right.set(xlabel="way driven (cm)", ylabel="bits: arena's area over that of the error")
     right.set_ylim(-1.0, course.bits_wanted + 6.0)
     for axes in (left, right):

@@ -1,4 +1,4 @@
-"""Scenes from a robot's bag (crunchbot.robot.bag): the rows that came, and the truth where a simulation told it."""
+"""Scenes from a robot's bag (crunchbot.robot.bag): the rows that came, and the truth where a simulation reported it."""
 
 import tempfile
 from collections.abc import Callable
@@ -31,7 +31,7 @@ def is_bag(path: Path) -> bool:
 
 
 def read_bag(path: Path, warn: Callable[[str], None]):
-    """(scene, rows) of a bag, each damage told to `warn`; BagError when it holds none."""
+    """(scene, rows) of a bag, each damage asked to `warn`; BagError when it holds none."""
     with McapFile(path) as bag:
         reported = bag.metadata.get(RECORD, {})
         robot = reported.get("robot", "")

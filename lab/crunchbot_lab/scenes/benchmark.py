@@ -43,7 +43,7 @@ class BenchmarkError(UserError):
 
 @dataclass(frozen=True)
 class Entry:
-    """One scene of the list, or a user's own; beside: what others told of the same rows."""
+    """One scene of the list, or a user's own; beside: the answers of others for the same rows."""
 
     name: str
     scene: Scene

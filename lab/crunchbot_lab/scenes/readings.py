@@ -31,7 +31,7 @@ class World:
     radial_sigma_m: float = 0.005
     miss: float = 0.05  # of contacts
     ghost: float = 0.01  # of readings without contact
-    normal_sd_rad: float | None = None  # of the direction of a face that is touched; None: it is not told
+    normal_sd_rad: float | None = None  # of the direction of a face that is touched; None: it is not reported
     normal_wrong: float = 0.05  # share of them that are any direction
 
 
@@ -140,7 +140,7 @@ def measured(true_m: np.ndarray, robot: Robot, world: World, rng: np.random.Gene
 def normals(
     arena: Arena, robot: Robot, poses: np.ndarray, touched: np.ndarray, world: World, rng: np.random.Generator
 ) -> np.ndarray | None:
-    """(n, rays, 2) directions of faces, robot's frame, with their standard deviation, rad; nan: not told, as where not
+    """(n, rays, 2) directions of faces, robot's frame, with their standard deviation, rad; nan: not reported, as where not
     `touched` (n, rays) or at a corner. None: this robot tells none."""
     if world.normal_sd_rad is None:
         return None

@@ -18,7 +18,7 @@ OBJECT_TIP_DEG = {"object_1": 60.0, "object_2": 20.0, "object_3": -20.0, "object
 ARM_M = 0.16  # from the robot's centre to a whisker's base; the whisker stands perpendicular to it
 WHISKER_M = 0.14  # outside the follicle
 
-# What the filters are told. The demo's odometer errs by 1 % a run and 2 % a move; the paper says below 5 %.
+# What the filters are given. The demo's odometer errs by 1 % a run and 2 % a move; the paper says below 5 %.
 ODOMETRY_RELATIVE_SIGMA = 0.03
 RADIAL_SIGMA_M = 0.005
 
@@ -47,7 +47,7 @@ def _object_whisker(name: str, tip_angle: float) -> Whisker:
 
 
 def simulated(mechanics: str, seed: int) -> tuple[str, ...]:
-    """What the simulated world is told beside a scene: how whiskers bend (one of MECHANICS), and which whiskers."""
+    """What the simulated world is given beside a scene: how whiskers bend (one of MECHANICS), and which whiskers."""
     return (f"mechanics {mechanics}", f"batch {seed % 2**32}")
 
 

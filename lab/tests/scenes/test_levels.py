@@ -24,7 +24,7 @@ CLASSES = 3
 
 
 @dataclass
-class Told:
+class Reported:
     """What one level says of a run: texture (n, tips, classes), radial_m (n, rays), odometry and truth (n, 3)."""
 
     scene: object
@@ -60,7 +60,7 @@ def signal_run(seed, folder):
     radial = [[math.inf if r[f"{w.name}_mm"] is None else r[f"{w.name}_mm"] / 1000 for w in rays] for r in rows]
     odometry = [[r[k] for k in ("odo_x_m", "odo_y_m", "odo_theta_rad")] for r in rows]
     poses = [[t[k] for k in ("x_m", "y_m", "theta_rad")] for t in truth]
-    return Told(scene, *map(np.array, (texture, radial, odometry, poses)))
+    return Reported(scene, *map(np.array, (texture, radial, odometry, poses)))
 
 
 @pytest.fixture(scope="module")
@@ -68,13 +68,15 @@ def drawn():
     """Level-0 runs of the `robot` family."""
     made = [scenes.make("robot", seed, ROWS) for seed in SEEDS]
     return [
-        Told(m.scene, m.observations.texture, m.observations.radial_m, m.observations.odometry, m.observations.truth)
+        Reported(
+            m.scene, m.observations.texture, m.observations.radial_m, m.observations.odometry, m.observations.truth
+        )
         for m in made
     ]
 
 
 def confusion(runs):
-    """Counts by true and told texture, and lengths of runs of wrong windows."""
+    """Counts by true and reported texture, and lengths of runs of wrong windows."""
     counts, lengths = np.zeros((CLASSES, CLASSES)), []
     for reported in runs:
         for n, whisker in enumerate(reported.scene.robot.of_role("texture")):
@@ -107,7 +109,7 @@ def test_windows_are_as_far_apart(signals, drawn):
 
 
 def distances(runs):
-    """Errors in m of the distances told, against the true range with a little longer whisker; nan where it meets nothing."""
+    """Errors in m of the distances reported, against the true range with a little longer whisker; nan where it meets nothing."""
     errors = []
     for reported in runs:
         for n, whisker in enumerate(reported.scene.robot.of_role("object")):
@@ -142,7 +144,7 @@ def test_misses_agree(signals, drawn):
 
 
 def test_timing_of_contacts_agrees(signals, drawn):
-    """Distances told per minute but for a factor 1.5; shares of rows read, held back and unread within 0.08."""
+    """Distances reported per minute but for a factor 1.5; shares of rows read, held back and unread within 0.08."""
 
     def rates(runs):
         reported = sum(np.isfinite(t.radial_m).sum() for t in runs)

@@ -1,4 +1,4 @@
-"""Level-0 scenes: the same seed gives the same scene, files keep every bit, true poses stand clear, faults do as told."""
+"""Level-0 scenes: the same seed gives the same scene, files keep every bit, true poses stand clear, faults do as given."""
 
 import math
 

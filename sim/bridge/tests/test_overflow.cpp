@@ -192,7 +192,7 @@ template <void (*TEST)(Level)> void at_both_levels(void **)
     TEST(Level::BYTES);
 }
 
-// A host that has halted an idle endpoint is told so at its next read, not when the next frame comes.
+// A host that has halted an idle endpoint gets that answer at its next read, not when the next frame comes.
 void a_halted_endpoint_answers_though_it_has_nothing(void **)
 {
     constexpr uint8_t TO_ENDPOINT = 0x02, TO_INTERFACE = 0x01, CLEAR = 1, SET = 3, SET_INTERFACE = 11;

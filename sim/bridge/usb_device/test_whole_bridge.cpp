@@ -172,7 +172,7 @@ void a_reset_wakes_and_ends_the_run(void **)
     assert_int_equal(f.stream.size(), 0);
 }
 
-// The loader alone writes flash, and a node leaves for it only when it is told to.
+// The loader alone writes flash, and a node leaves for it only when it is asked to.
 void update_orders_to_running_nodes_do_nothing(void **)
 {
     constexpr int BEFORE = 20;

@@ -1,4 +1,4 @@
-/* An emulated robot on an endless floor, for tests: its wheels do what they are told and count without errors. */
+/* An emulated robot on an endless floor, for tests: its wheels do what they are ordered and count without errors. */
 #ifndef TESTS_ROBOT_H
 #define TESTS_ROBOT_H
 

@@ -137,7 +137,7 @@ static void test_line_of_the_elastica(void **state)
 static void test_whisks_to_slip_off(void **state)
 {
     (void)state;
-    const double peak[] = {2406, 1720, 1205, 819, 531, 418}; /* section 3, tested against the table elsewhere */
+    const double peak[] = {2406, 1720, 1205, 819, 531, 418}; /* section 3, tested against the table in another test */
     const double r[] = {90, 100, 110, 120, 130, 135};
     double rms, largest;
     residual(peak, r, 6, 2, &rms, &largest);

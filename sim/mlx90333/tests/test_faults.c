@@ -177,7 +177,7 @@ static void a_sensor_without_supply_lets_the_line_go_and_starts_anew(void **stat
     reselect(&bench, MLX90333_T5_NS);
     read_frame(&bench, 0xFF, frame);
     assert_frame(frame, 12.0, 34.0, 0);
-    assert_int_equal(mlx90333_violations(&bench.sensor), 0); /* the master was not told */
+    assert_int_equal(mlx90333_violations(&bench.sensor), 0); /* the master was not informed */
 }
 
 static void without_the_parameter_an_error_ends_in_no_reset(void **state)

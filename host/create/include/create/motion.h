@@ -3,8 +3,8 @@
  *
  * Errors of three kinds are kept apart, because they add up differently along an arc: scale errors (of wheel diameter,
  * base, slip) are the same in every step and add up linearly; what is estimated for lost time is independent from step
- * to step and adds up as variance; what a counter that tells whole units owes is at most a unit at the beginning and at
- * the end, however many steps lie between.
+ * to step and adds up as variance; what a counter that reports whole units still lacks is at most a unit at the
+ * beginning and at the end, however many steps lie between.
  */
 #ifndef CREATE_MOTION_H
 #define CREATE_MOTION_H

@@ -44,8 +44,8 @@ struct create_odometry_settings {
     enum create_model model;
     enum create_source policy;
     double wheel_base_m;    /* between the wheels */
-    double distance_scale;  /* true distance over told distance */
-    double angle_scale;     /* true angle over told angle */
+    double distance_scale;  /* true distance over reported distance */
+    double angle_scale;     /* true angle over reported angle */
     double relative_sigma;  /* standard deviation of these two scales; the paper's odometry: < 0.05 */
     double requested_sigma; /* instead of it where requested speeds are used */
     double drift_rad_per_m; /* standard deviation of the heading per distance: wheels are not alike */
@@ -58,7 +58,7 @@ struct create_odometry {
     uint64_t estimated;                 /* frames that never came, whose motion was estimated */
     struct create_evidence evidence;    /* about the remainder */
     enum create_standing standing;
-    double owed; /* units that should have been told and were not */
+    double missing; /* units that should have been reported and were not */
     bool started;
     double asked_m, asked_rad; /* motion asked for in the newest frame */
     int32_t left, right;       /* encoders at the newest frame */

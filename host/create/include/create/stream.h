@@ -21,7 +21,8 @@
 struct create_frame {
     int32_t value[CREATE_OI_PACKET_MAX + 1];
     uint32_t missed;  /* frames that should have come since the one before, judged by the bytes skipped */
-    uint32_t ordered; /* the last so many of them came after other speeds had been ordered; whoever orders sets it */
+    uint32_t ordered; /* the last so many of them came after other speeds had been ordered; the caller that orders
+                         speeds sets it */
 };
 
 struct create_stream_counts {

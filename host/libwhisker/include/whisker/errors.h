@@ -31,7 +31,7 @@
     X(RING_LOST, -30, "another process has changed the ring's memory", "start whiskerd again, attach again")           \
     X(RING_ACCESS, -31, "this ring is another user's, who keeps it closed",                                            \
       "become that user, give its whiskerd the umask 022, or choose another --ring")                                   \
-    X(RING_OWNER, -32, "this ring is another user's, whom this reader was not told to trust",                          \
+    X(RING_OWNER, -32, "this ring is another user's, whom this reader is not set to trust",                            \
       "name that user with --ring-owner, or choose another --ring")                                                    \
     X(RING_WRITER, -33, "the process that this ring names as its writer does not hold the ring",                       \
       "its writer may run in another container: stop it there, or choose another --ring")                              \

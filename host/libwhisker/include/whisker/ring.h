@@ -6,7 +6,7 @@
  *
  * Places and trust: the service's ring lies in a directory that only the service can write, every other ring where any
  * user can make one; readers look in this order. A reader accepts a ring of root, of its own user, of the service's,
- * and of the user that it is told to accept; another user's is refused unread.
+ * and of the user that it is asked to accept; another user's is refused unread.
  *
  * Memory: a ring's owner can make its file shorter under everybody's feet. That ends no process: from the first attach
  * or create on, SIGBUS over a ring's memory is handled here (every other SIGBUS goes where it went before), the memory
@@ -103,7 +103,7 @@ void whisker_reader_info(const struct whisker_reader *reader, struct whisker_rea
 /* The latest mapping of the bridge's clock; ns_per_cycle is 0 before the first. Returns 0, or TIMEOUT: never still. */
 int whisker_reader_clock(const struct whisker_reader *reader, struct whisker_clock *clock);
 
-/* What the daemon last told of itself; all zeros before the first time. Returns 0, or TIMEOUT: never still. */
+/* What the daemon last published of itself; all zeros before the first time. Returns 0, or TIMEOUT: never still. */
 int whisker_reader_stats(const struct whisker_reader *reader, struct whisker_daemon_stats *stats);
 
 #define WHISKER_RING_NAME_BYTES 208

@@ -74,7 +74,7 @@ int whisker_image_parse(const uint8_t *bytes, size_t count, struct whisker_image
 /* How far one lane has come. */
 struct whisker_update {
     bool wanted;     /* it takes part */
-    bool done;       /* the new image is valid and was told to run */
+    bool done;       /* the new image is valid and was started */
     bool silent;     /* it stopped answering */
     bool stuck;      /* it answers, but takes no more blocks */
     uint16_t state;  /* WHISKER_NODE_STATE_*: why it was refused, if neither done nor silent nor stuck */

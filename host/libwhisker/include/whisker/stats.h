@@ -17,7 +17,7 @@ struct whisker_daemon_stats {
     uint64_t bytes_skipped;  /* of the stream that were no frame */
     uint64_t records_absent; /* nothing answered on the lane */
     uint64_t records_crc;    /* damaged between node and bridge */
-    uint64_t records_tick;   /* of another tick than their frame, told by the bridge or found here */
+    uint64_t records_tick;   /* of another tick than their frame, reported by the bridge or found here */
     uint64_t records_usb;    /* damaged between bridge and host */
     uint64_t records_sensor; /* the node or its sensor says that the reading is bad */
     uint64_t reconnects;     /* times a bridge came back after it had gone */

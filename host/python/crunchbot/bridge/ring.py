@@ -289,7 +289,7 @@ class Reader:
 
     @property
     def stats(self) -> DaemonStats | None:
-        """What the daemon last told of itself; None when the ring's writer is none (a replay, say)."""
+        """What the daemon last published of itself; None when the ring's writer is none (a replay, say)."""
         stats = ffi.new("struct whisker_daemon_stats *")
         if lib.whisker_reader_stats(self._reader, stats) != 0 or stats.started_ns == 0:
             return None

@@ -26,7 +26,7 @@ def address(text: str) -> str:
 
 def run(arguments) -> int:
     if not ipaddress.ip_address(arguments.host).is_loopback:
-        print(f"whisker: {arguments.host}: whoever reaches this address can call this server", file=sys.stderr)
+        print(f"whisker: {arguments.host}: anyone who reaches this address can call this server", file=sys.stderr)
     stop = stop_on_signals()
     with open_link("pyro", arguments) as link:
         server = Server(link, arguments.host, arguments.port, arguments.write)

@@ -40,7 +40,7 @@ def add(parser) -> None:
     )
     parser.add_argument("--no-view", action="store_true", help="no page for a browser")
     parser.add_argument("--seed", type=whole_number(0, 2**32 - 1), default=1, help="of turns and simulation (1)")
-    text = "be reached at this address, by whoever reaches it (default: this machine only)"
+    text = "be reached at this address, by anyone who reaches it (default: this machine only)"
     parser.add_argument("--listen", default=parts.LOOPBACK, metavar="ADDRESS", help=text)
     text = "of three, for supervisor, pilot and navigator (default: %(default)s)"
     parser.add_argument("--first-port", type=whole_number(1, 65533), default=parts.FIRST_PORT, metavar="N", help=text)

@@ -89,7 +89,7 @@ class Sensor:
     `codes`: (rows, columns) of uint8, row 0 the smallest y, 0 to 254; 255, and beyond the map, not known. `cell_m`: edge
     of a cell; the map's lower left corner is the world's origin. `at_m`: the sensor's place on the robot. A reading
     counts in full after `spacing_m` of travel since the last one. `detail_m`: over which the codes change; the default
-    filter's cells are then at most half as wide; 0: not told. `levels`: how many codes there are; 0: one more than the
+    filter's cells are then at most half as wide; 0: not given. `levels`: how many codes there are; 0: one more than the
     largest of the map. With `edges` (bins + 1,) and `likelihood` (bins, levels) what it reads is one number."""
 
     codes: np.ndarray

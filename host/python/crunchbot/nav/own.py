@@ -33,7 +33,7 @@ class OwnSensor:
     ):
         """expected(x, y): what the sensor should read at places (n,), (n,) in m, (n,); nan: nobody knows. loglik(reading,
         levels): log-likelihood (codes,) of a reading where the levels (codes,) are expected. levels: at most 255 rising
-        values, to the nearest of which what is expected is rounded. cell_m: places are told apart so far. at_m,
+        values, to the nearest of which what is expected is rounded. cell_m: places are distinguished so far. at_m,
         spacing_m, detail_m: as those of Sensor. budget_s: of loglik's time for each reading on average; what takes more is left
         out (`skipped`); None: nothing is.
         """

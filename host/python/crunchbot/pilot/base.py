@@ -80,7 +80,7 @@ class Base:
         return self._socket.fileno()
 
     def drive(self, v_m_s: float, omega_rad_s: float, after: int | None = None) -> Sent:
-        """Drives forward at v and turns anticlockwise at omega, until told otherwise or for 0.3 s."""
+        """Drives forward at v and turns anticlockwise at omega, until the next order or for 0.3 s."""
         return self._sent(f"drive {v_m_s!r} {omega_rad_s!r}", after)
 
     def stop(self, after: int | None = None) -> Sent:

@@ -59,7 +59,7 @@ class Behaviour:
 
     For the table's conditions and effects: `since` (tick at which the state began), `done` (commanded m or rad since),
     `goal` (of the same), `sign` of a turn, `stuck` (reports in a row of no motion), `heard` (tick of the last report),
-    `bumps` (as last told), `side` to turn away from, `caught` (side of a floor whisker that is held), `escapes` in a row,
+    `bumps` (as last reported), `side` to turn away from, `caught` (side of a floor whisker that is held), `escapes` in a row,
     tick of the last (`escaped`), its changes of side (`flips`), and the tick at which it was over (`turned_away`).
     """
 

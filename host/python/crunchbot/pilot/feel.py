@@ -1,4 +1,4 @@
-"""How the surface lies that an object whisker touches, told in the robot's frame: the contact filter on a pilot's samples."""
+"""How the surface lies that an object whisker touches, reported in the robot's frame: the contact filter on a pilot's samples."""
 
 import math
 from collections import deque
@@ -16,7 +16,7 @@ REST_BLOCKS = 2  # that give the rest: creep of an earlier contact may be left i
 BLOCKS_BEFORE = REST_BLOCKS + 4  # the filter begins so long before the onset: it finds the touch in the noise itself
 NOISE_COUNTS = 11.0  # of one sample (crunchbot.touch.contact)
 LEAST_TICKS = 200  # of a contact, before which the ringing of the touch tells more than the surface
-SURE = 0.9  # probability that the tip is on a surface, from which its normal is told
+SURE = 0.9  # probability that the tip is on a surface, from which its normal is reported
 MODEL_RAD = 0.05  # error of a normal beside what the filter states: it knows a calibrated whisker, not the whisker
 
 

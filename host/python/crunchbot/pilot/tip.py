@@ -17,7 +17,7 @@ RETREAT_MOST_M = 0.15
 
 
 def contact_type(mount: Mount, distance_mm: float | None) -> str | None:
-    """What touched, "tip" or "shaft", of a contact told at this distance; None when it was not told."""
+    """What touched, "tip" or "shaft", of a contact reported at this distance; None when it was not reported."""
     if distance_mm is None:
         return None
     return "tip" if distance_mm > mount.length_mm - TIP_MM else "shaft"

@@ -239,7 +239,7 @@ class Walk:
         inner = self._inner_size(place, left)
         if inner == size and size <= RECORD_MOST:
             return self._plain_chunk(Record(place, place + RECORD.size + size, CHUNK))
-        # The shorter one first: whoever unpacks does not mind bytes that are too many.
+        # The shorter one first: a program that unpacks does not mind bytes that are too many.
         for length in sorted({size} if inner is None else {inner, size}):
             if length <= min(left, RECORD_MOST) and (record := self._confirmed(place, length)):
                 self._note(f"byte {place}: a chunk whose length is damaged; its checksum is right, nothing is left out")

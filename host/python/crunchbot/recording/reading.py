@@ -54,7 +54,7 @@ class Recording:
 
     @property
     def lane_names(self) -> tuple[str, ...]:
-        """Of all lanes, lane 0 first; "lane0" and so on where the recorder was told none."""
+        """Of all lanes, lane 0 first; "lane0" and so on where the recorder got no names."""
         reported = [name for name in self.metadata.get("lanes", "").split(",") if name]
         return tuple(reported[:LANES]) + tuple(f"lane{n}" for n in range(len(reported), LANES))
 

@@ -1,4 +1,4 @@
-"""Times of a recording: the bridge's clock told as host time, which never goes backwards."""
+"""Times of a recording: the bridge's clock converted to host time, which never goes backwards."""
 
 import time
 
@@ -29,7 +29,7 @@ class Timeline:
         self._cycles = 0
 
     def of(self, time_cycles: int, clock: Clock | None) -> int:
-        """The time of a frame; never before what was told earlier."""
+        """The time of a frame; never before an earlier answer."""
         self._seen = self._monotonic()
         if not self._cycles <= time_cycles < self._cycles + JUMP_CYCLES:
             self._anchor = None

@@ -63,7 +63,7 @@ def metadata(robot: str, scene: Path | None) -> dict[str, str]:
 
 
 class Bag:
-    """Writes what comes on a link until every stream has ended. `run`, or `take` what was received elsewhere."""
+    """Writes what comes on a link until every stream has ended. `run`, or `take` what was received by another reader."""
 
     def __init__(self, writer: TopicWriter, robot: str):
         self._writer, self._robot = writer, robot

@@ -1,7 +1,7 @@
 """The file that a navigator leaves for the one that is begun after it: what its filters believed, and after which row.
 
 A line with name, version and CRC-32 of all that follows; a line of JSON (FIELDS); then the components of each filter in the
-order of `filters`, as COMPONENT has them, little-endian. Written beside its place and renamed, so that whoever reads
+order of `filters`, as COMPONENT has them, little-endian. Written beside its place and renamed, so that a process that reads
 finds a whole one. It is not synced: it outlives a process that is killed, not a machine; after that it would be too
 old, and what a power cut leaves of it has another CRC.
 """

@@ -22,7 +22,7 @@ from .logs import last_line, note
 from .watchdog import VARIABLES, Watchdog
 
 GRACE_S = 10.0  # for a child to end after SIGTERM, before SIGKILL
-FOREIGN = (*VARIABLES, VARIABLE)  # what whoever started this process has told it alone
+FOREIGN = (*VARIABLES, VARIABLE)  # set for this process alone by the process that started it
 DEAD, STOPPED = "ZXx", "Tt"  # states of proc(5)
 
 

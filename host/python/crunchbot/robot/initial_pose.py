@@ -1,4 +1,4 @@
-"""Where a robot is, told by a person while it runs: messages of topic `initial_pose`, as those of ROS's /initialpose."""
+"""Where a robot is, given by a person while it runs: messages of topic `initial_pose`, as those of ROS's /initialpose."""
 
 import math
 
@@ -20,11 +20,11 @@ class InitialPoseError(ValueError):
 
 def send(link: Link, pose: tuple[float, float, float], sigma: tuple[float, float, float] = SIGMA) -> None:
     """Tell the navigator of this link's robot that it is at this pose now: x, y in m, heading in rad, in the arena's
-    frame; standard deviations alike. One stream for each pose, so that whoever tells the next may be another process."""
+    frame; standard deviations alike. One stream for each pose, so that the next may come from another process."""
     message = PoseWithCovariance.planar(pose, np.diag(np.square(sigma)))
     stream = link.publish(TOPIC)
     stream.send(PoseWithCovarianceStamped(Header.at(0, ARENA_FRAME), message))
-    stream.end(0, "told")
+    stream.end(0, "reported")
 
 
 def prior_of(message: PoseWithCovarianceStamped, arena: Arena) -> Prior:

@@ -7,7 +7,7 @@
         for received in inbox.take(timeout_s=1.0):
             ...
 
-Nothing is found by itself: a process listens where it is told and connects where it is told, on loopback unless told
+Nothing is found by itself: a process listens and connects only where options say, on loopback unless they say
 otherwise. A connection that is lost is made again, forever; what was lost meanwhile is counted by the streams' numbers.
 Each pair of processes needs a connection of its own: nobody passes messages on.
 """
@@ -35,7 +35,9 @@ INBOX_MOST = 10_000  # messages of a live subscription that nobody takes: over 1
 LEASE_MS = {False: 10_000, True: 60_000}  # by lock-step: a peer silent for so long is gone
 BLOCK_US = 600_000_000  # a lock-step sender waits so long for a reader that stands still
 MESSAGE_MOST = 1 << 18  # bytes: four beliefs of the most poses; zenoh drops what is larger
-QUEUE_BATCHES = 16  # of 64 KiB, zenoh's most: a live sender's burst finds room while the machine is busy elsewhere
+QUEUE_BATCHES = (
+    16  # of 64 KiB, zenoh's most: a live sender's burst finds room while the machine is busy with other work
+)
 RETRY = {"period_init_ms": 100, "period_max_ms": 1000, "period_increase_factor": 2}
 ENDPOINT = re.compile(r"(?:tcp|tls)/(\[[0-9a-fA-F:]+\]|[\w.-]+):(\d{1,5})")
 ALIVE, STREAM = "alive", "stream"  # keys of liveliness tokens: alive/<process>, stream/<number>/<topic>

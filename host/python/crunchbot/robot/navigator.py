@@ -122,7 +122,7 @@ class Navigator:
             self._take(step, stack)
 
     def _take_poses(self, received: list[Received], stack: ExitStack) -> None:
-        """The newest pose that was told counts: at once, or when the first row comes."""
+        """The newest given pose counts: at once, or when the first row comes."""
         for one in received:
             if not one.over:
                 self._told_error = ""
@@ -168,7 +168,7 @@ class Navigator:
         time.sleep(max(0.0, self._settings.drill_step_s - self._step_s))
 
     def _belief_is_due(self) -> bool:
-        """At the belief's pace; live, rows go first: when telling it is much work it is told less often."""
+        """At the belief's pace; live, rows go first: when publishing it is much work it is published less often."""
         due = self._now_ns >= self._belief_due_ns or self._belief_due_ns > self._now_ns + BELIEF_NS
         return due and (self._link.lock_step or time.monotonic() >= self._belief_rest_s)
 
@@ -184,7 +184,7 @@ class Navigator:
         self._belief_rest_s = now + (now - began) / BELIEF_SHARE
 
     def _begin(self, stack: ExitStack, normals: bool) -> None:
-        """The prior is of the run's start: whoever joins later cannot use it."""
+        """The prior is of the run's start: a process that joins later cannot use it."""
         before, out = self._beliefs_before, self._settings.out
         resumed = bool(before) or self._follower.first_seq > 0
         self._prior = CHECKPOINT if before else UNIFORM if resumed else SCENE_PRIOR

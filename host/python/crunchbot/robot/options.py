@@ -42,7 +42,7 @@ def link_that_warns(process: str, listen: Sequence[str], config: Path | None, **
     settings = read_config(config)
     for endpoint in listen:
         if not is_loopback(endpoint) and not is_guarded(endpoint, settings):
-            print(f"whisker: {endpoint}: whoever reaches this address can watch and take part", file=sys.stderr)
+            print(f"whisker: {endpoint}: anyone who reaches this address can watch and take part", file=sys.stderr)
     return Link(process, listen=listen, config=config, **more)
 
 

@@ -14,8 +14,8 @@ BRIDGE = "bridge"
 
 BASE_STEADY_S = 1.0  # a base that is started again stops the wheels: it comes at once
 
-# Inside the simulated bridge's umockdev the device is seen by whoever has these variables: they are left in file $0. At
-# the end whoever took it ends first, for umockdev does not survive a client that is left. When the supervisor has died
+# Inside the simulated bridge's umockdev the device is seen by a process that has these variables: they are left in file $0. At
+# the end the process that took it ends first, for umockdev does not survive a client that is left. When the supervisor has died
 # the world goes on for a second: a real one does not end with the robot's processes, and a base has to stop its wheels.
 # Each sleep is short, because it goes on when the shell is killed.
 LEAVE_ENVIRONMENT = """
@@ -61,7 +61,7 @@ class Places:
 
     @property
     def environment(self) -> Path:
-        """Of whoever is to see the simulated bridge."""
+        """Of a process that is to see the simulated bridge."""
         return self.folder / "environment"
 
 
@@ -146,7 +146,7 @@ class Simulated:
     seconds: float
     pace: float  # simulated seconds per second
     truth: Path
-    wheels: Path  # what the base's wheels were told
+    wheels: Path  # what the base's wheels were ordered
 
 
 def bridge(simulated: Simulated, body: Body, meeting: Meeting) -> Program:

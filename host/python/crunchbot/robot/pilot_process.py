@@ -1,7 +1,7 @@
 """The pilot as a process of its own, the netbook's: reads the ring, drives the base, tells the others what it perceives.
 
 `fly_in_step` follows a simulation that waits for it, to the end of the ring. `LiveFlight` goes on whatever comes and
-goes: ring, whiskerd, base, navigator; each loss is told in the pilot's health. The wheels stop when the ring gets another
+goes: ring, whiskerd, base, navigator; each loss is reported in the pilot's health. The wheels stop when the ring gets another
 writer. They stand while no samples come, or while who watches over the pilot is silent (lifeline.Heartbeat).
 """
 
@@ -29,7 +29,7 @@ NO_HEARTBEAT = "no heartbeat of the supervisor: wheels stopped; see whether `whi
 
 
 class Flight:
-    """A pilot, its wheels, and those who are told: the part that both clocks share."""
+    """A pilot, its wheels, and its publishers: the part that both clocks share."""
 
     def __init__(self, pilot: Pilot, wheels, rows: Rows, traces: Traces, teller: Teller | None):
         self.pilot, self._wheels = pilot, wheels

@@ -71,10 +71,10 @@ class Results:
 
     @Pyro5.api.expose
     def observation(self, since: int | None = None) -> dict | None:
-        """The newest row: its cells by the names of observations.csv, `number` (rows told so far) and `motion`.
+        """The newest row: its cells by the names of observations.csv, `number` (rows reported so far) and `motion`.
 
         motion: [x m, y m, theta rad] since row number `since` (None: since the row before); None when that is further
-        back than 30 minutes or not yet told.
+        back than 30 minutes or not yet reported.
         """
         with self._lock:
             if self._row is None:
@@ -108,7 +108,7 @@ class Results:
 
     @Pyro5.api.expose
     def health(self) -> dict[str, dict]:
-        """State, counters and last error of every process that has told any."""
+        """State, counters and last error of every process that has published any."""
         with self._lock:
             reported = self._health.items()
             return {name: {"state": h.state, "last_error": h.last_error} | h.counts for name, h in reported}
@@ -170,7 +170,7 @@ class Results:
         return message.seq
 
     def _judge(self, row: Observation) -> None:
-        """As whoever receives it would, before it is sent. ValueError, which Pyro can hand to the client."""
+        """As a receiver would, before it is sent. ValueError, which Pyro can hand to the client."""
         one = Received("observation", row, Envelope(0, row.seq, 0))
         try:
             decode(Observation, encode(row), "row")

@@ -94,7 +94,7 @@ class Step:
     t_ns: int  # the row's stamp, but never going back when the bridge's clock begins anew
     rows: int  # whose motion it is: 1, or more when some were skipped or missed
     envelope: Envelope  # the row's
-    within_ns: int = 0  # the time in which the motion was; 0: not all of what was moved since the last step is told
+    within_ns: int = 0  # the time in which the motion was; 0: not all of what was moved since the last step is reported
 
     def cells(self) -> dict[str, float | None]:
         """With what `lead` leaves of the motion."""

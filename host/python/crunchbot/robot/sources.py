@@ -21,7 +21,7 @@ class Verdict(Enum):
 
 
 class Sources:
-    """Streams by topic, in the order in which they were announced. Told of by zenoh's threads, asked by readers."""
+    """Streams by topic, in the order in which they were announced. Announced by zenoh's threads, read by readers."""
 
     def __init__(self):
         self._lock = threading.Lock()

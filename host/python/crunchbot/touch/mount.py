@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from ..scene import Whisker
 from .radial.whisk import WhiskModel
 
-LEAST_CONFIDENCE = 0.5  # a corner whose whisk is less surely one of those calibrated is not told
+LEAST_CONFIDENCE = 0.5  # a corner whose whisk is less surely one of those calibrated is not reported
 SURE = 0.9  # probability of face or corner; below, the bending by the turn alone decides
 NEAREST_MM = 60.0  # the line is fitted from 90 mm on; what reads much nearer was no plain contact
 

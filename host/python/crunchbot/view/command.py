@@ -112,7 +112,7 @@ async def _serve(arguments: argparse.Namespace, hub: Hub) -> int:
     async with serving(hub, arguments.host, arguments.port, arguments.allow_host) as port:
         address = ipaddress.ip_address(arguments.host)
         if not address.is_loopback:
-            print(f"whisker-view: {arguments.host}: whoever reaches this address can watch", file=sys.stderr)
+            print(f"whisker-view: {arguments.host}: anyone who reaches this address can watch", file=sys.stderr)
         host = "127.0.0.1" if address.is_unspecified else f"[{address}]" if address.version == 6 else str(address)
         url = f"http://{host}:{port}/"
         print(url, flush=True)

@@ -1,6 +1,6 @@
 """Who may be answered: only pages that this server has served, under a name that is surely this machine's.
 
-A web page of somebody else can make the browser connect here; it is told apart by its Origin. It can also let its own
+A web page of somebody else can make the browser connect here; it is distinguished by its Origin. It can also let its own
 name point at this machine (DNS rebinding): then the Host header carries that name.
 """
 

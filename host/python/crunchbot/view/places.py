@@ -1,11 +1,11 @@
-"""So many connections at a time, shared fairly: whoever takes most of the places cannot shut the others out."""
+"""So many connections at a time, shared fairly: a client that takes most of the places cannot shut the others out."""
 
 import ipaddress
 from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
-IPV6_NET = 64  # bits: whoever has one address of it has them all
+IPV6_NET = 64  # bits: a client that has one address of it has them all
 
 
 class Places:

@@ -1,7 +1,7 @@
 """What is known of the robot: the newest of each topic, the paths, the contacts, and when each process last spoke.
 
 Fed with the messages of crunchbot.robot.messages as they come; gives plain values for JSON. Nothing grows without bound,
-nothing is guessed: what no message has told is None. Metres, radians, seconds of the bridge's clock.
+nothing is guessed: what no message has reported is None. Metres, radians, seconds of the bridge's clock.
 """
 
 import math
@@ -21,7 +21,7 @@ CONTACTS_MOST = 60
 PROCESSES_MOST = 32
 COUNTERS_MOST = 24
 CELLS_MOST = 512
-TEXT_MOST = 200  # characters of anything told
+TEXT_MOST = 200  # characters of any received text
 COUNTER_TEXT_MOST = 40  # of a counter's name, and of its value
 SILENT_S = 3.0  # a process speaks once a second
 BACK_S = 2.0  # a clock that goes back so far has begun anew

@@ -58,7 +58,7 @@ class RobotFeed:
         return f'{{"topic":"robot",{",".join(body)}}}'
 
     def _changed(self, parts: dict) -> dict[str, str]:
-        """JSON of the parts that are not as they were told."""
+        """JSON of the parts that are not as last sent."""
         texts = {name: json.dumps(part, separators=(",", ":"), allow_nan=False) for name, part in parts.items()}
         changed = {name: part for name, part in texts.items() if self._told.get(name) != part}
         self._told = texts

@@ -1,4 +1,4 @@
-"""How surfaces lie that whiskers touched: told in a row, placed where the estimate of the same row has the robot."""
+"""How surfaces lie that whiskers touched: reported in a row, placed where the estimate of the same row has the robot."""
 
 import math
 from collections import deque
@@ -17,7 +17,7 @@ def touch_column(name: str) -> tuple[str, str] | None:
 
 
 class Surfaces:
-    """`told`: the newest, each with `x`, `y`, `normal` (direction in the arena), `normal_sd` and `point_sd`."""
+    """`reported`: the newest, each with `x`, `y`, `normal` (direction in the arena), `normal_sd` and `point_sd`."""
 
     def __init__(self):
         self.reported: deque[dict] = deque(maxlen=SURFACES_MOST)

@@ -19,7 +19,7 @@ from crunchbot.view.__main__ import main as view
 
 # ruff: noqa: F811 - fixtures are taken by their names
 
-COMPLAINT = "standard output: No space left on device; make room there, or send it elsewhere\n"
+COMPLAINT = "standard output: No space left on device; make room there, or send it to another place\n"
 PROGRAMS = ["whiskerd", "whisker-log", "whisker-flash", "whisker-base"]
 
 

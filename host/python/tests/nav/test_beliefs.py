@@ -1,4 +1,4 @@
-"""What every registered filter owes whoever judges it: components whose masses sum to 1, and no certainty out of nothing."""
+"""What every registered filter guarantees: components whose masses sum to 1, and no certainty out of nothing."""
 
 import numpy as np
 import pytest

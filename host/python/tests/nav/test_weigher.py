@@ -1,4 +1,4 @@
-"""Weights for filters from elsewhere: the library's own likelihood, row by row."""
+"""Weights for filters of other libraries: the library's own likelihood, row by row."""
 
 import math
 

@@ -341,7 +341,7 @@ def test_does_not_stay_in_a_corner(models, size_m):
 
 
 def test_a_contact_of_the_shaft_is_followed_by_one_of_the_tip(models):
-    """By the world's truth: a whisk that slips off the last millimetres is not told."""
+    """By the world's truth: a whisk that slips off the last millimetres is not reported."""
     start = (0.75, 1.25, 0.0)
     for side, beside in ((1.0, 0.09), (-1.0, 0.1), (1.0, 0.11)):
         low, high = sorted((1.25 - side * beside, 1.25 - side * (beside + 0.04)))

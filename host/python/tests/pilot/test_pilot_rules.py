@@ -73,7 +73,7 @@ def turning():
 
 
 def whisked_until(state, move=None, lane=LEFT):
-    """A whisk up to this state; `move`: told to have been the shaft's."""
+    """A whisk up to this state; `move`: asked to have been the shaft's."""
     robot = exploring()
     whisk(robot, move, lane)
     robot.until(state)

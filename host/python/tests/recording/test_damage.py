@@ -150,7 +150,7 @@ def test_a_format_that_one_bit_made_new_is_no_newer_release(tmp_path, whole):
 
 
 def test_every_byte_of_head_and_end_is_accounted_for(tmp_path, whole):
-    """All that is no chunk: a bit of it that is wrong loses no message, and is told."""
+    """All that is no chunk: a bit of it that is wrong loses no message, and is reported."""
     data, chunks = whole
     beside = [*range(chunks[0][0]), *range(chunks[-1][1], len(data))]
     for place in beside[:: len(beside) // 150]:

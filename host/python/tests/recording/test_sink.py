@@ -68,7 +68,7 @@ def recorder(tmp_path):
 
 
 class Seconds:
-    """time of the module `writing`, which passes when it is told to."""
+    """time of the module `writing`, which passes when it is asked to."""
 
     def __init__(self):
         self.now = 1000.0

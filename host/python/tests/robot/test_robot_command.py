@@ -26,7 +26,7 @@ from crunchbot_lab.demo import training
 from crunchbot_lab.simulation.scenes import make_scene
 
 PATIENCE_S = 60.0
-# As the simulation does it: the true pose to whoever connects. Its argument: a socket.
+# As the simulation does it: the true pose to each client that connects. Its argument: a socket.
 TELLS_TRUTH = """
 import socket, sys, time
 with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as server:
@@ -277,12 +277,12 @@ def test_without_a_configuration_of_zenoh_nothing_is_encrypted(commands):
 
 
 def test_a_robot_that_is_open_to_the_network_says_so_once(begun, keys, tmp_path):
-    line = "0.0.0.0:{}: whoever reaches this address can watch and take part\n"
+    line = "0.0.0.0:{}: anyone who reaches this address can watch and take part\n"
     open_to_all = begun("--listen", "0.0.0.0", "--first-port", port := free_port())[1]
-    assert f"whisker: tcp/{line.format(port)}" in open_to_all and open_to_all.count("whoever") == 1
+    assert f"whisker: tcp/{line.format(port)}" in open_to_all and open_to_all.count("anyone") == 1
     guarded = documented(keys, "pilot")
-    assert "whoever" not in begun("--listen", "0.0.0.0", "--zenoh-config", guarded)[1]
-    assert "whoever" not in begun()[1]
+    assert "anyone" not in begun("--listen", "0.0.0.0", "--zenoh-config", guarded)[1]
+    assert "anyone" not in begun()[1]
     one_sided = tmp_path / "one-sided.json5"
     one_sided.write_text(guarded.read_text().replace("enable_mtls: true", "enable_mtls: false"))
     words = ["--listen", "0.0.0.0", "--first-port", port := free_port(), "--zenoh-config", one_sided]

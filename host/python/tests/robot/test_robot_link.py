@@ -458,7 +458,7 @@ def opened(monkeypatch, capsys, *words: str) -> str:
     "endpoint", ["tcp/0.0.0.0:7448", "tcp/[::]:7448", "tcp/192.168.7.2:7448", "tls/robot.lan:7448"]
 )
 def test_a_door_that_is_open_to_the_network_is_told(monkeypatch, capsys, endpoint):
-    text = f"whisker: {endpoint}: whoever reaches this address can watch and take part\n"
+    text = f"whisker: {endpoint}: anyone who reaches this address can watch and take part\n"
     assert opened(monkeypatch, capsys, "--listen", endpoint) == text
     assert opened(monkeypatch, capsys, "--listen", "tcp/127.0.0.1:1", "--listen", endpoint) == text
 
@@ -476,7 +476,9 @@ def test_a_door_for_certificates_alone_is_not_open(monkeypatch, capsys, tmp_path
         file.write_text(f"{{transport: {{link: {{tls: {{enable_mtls: {str(mutual).lower()}}}}}}}}}  // JSON5")
         words = ["--zenoh-config", str(file), "--listen", "tls/0.0.0.0:7448"]
         assert bool(opened(monkeypatch, capsys, *words)) == reported
-    assert "whoever reaches" in opened(monkeypatch, capsys, "--zenoh-config", str(file), "--listen", "tcp/0.0.0.0:7448")
+    assert "anyone who reaches" in opened(
+        monkeypatch, capsys, "--zenoh-config", str(file), "--listen", "tcp/0.0.0.0:7448"
+    )
 
 
 @pytest.mark.parametrize("text", ["{", "{transport: 5}", "\x00", "{unheard_of: 1}"])

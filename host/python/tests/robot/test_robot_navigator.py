@@ -471,7 +471,7 @@ def test_options_of_the_command(made, capsys):
     code, _, err = run(capsys, "navigator", folder, "--listen", "tcp/0.0.0.0:1x", "--connect", "none")
     assert code == 2 and "not an endpoint" in err
     code, _, err = run(capsys, "navigator", folder, "--listen", "tcp/192.0.2.1:7449")
-    assert code == 1 and "whoever reaches this address can watch" in err and "cannot be listened on" in err
+    assert code == 1 and "anyone who reaches this address can watch" in err and "cannot be listened on" in err
     code, _, err = run(capsys, "navigator", folder / "none")
     assert code == 2 and "no such folder" in err
 
@@ -488,7 +488,7 @@ def _errors(got) -> list[str]:
 
 def test_a_pose_that_is_told_while_running_is_gone_on_from(made):
     folder, scene, rows = made
-    elsewhere = (scene.arena.size_m[0] - 0.4, scene.arena.size_m[1] - 0.4, -2.0)
+    far_place = (scene.arena.size_m[0] - 0.4, scene.arena.size_m[1] - 0.4, -2.0)
 
     def answers(robot, topic: str, wanted) -> list:
         """A row at a time until a message is as wanted: the last two of them."""
@@ -502,9 +502,9 @@ def test_a_pose_that_is_told_while_running_is_gone_on_from(made):
     left = iter(rows)
     with Robot("localisation", "health/navigator") as robot, robot.navigator(folder, "--filter", "adaptive"):
         answers(robot, "localisation", lambda x: x and x.prior == "scene")
-        initial_pose.send(robot.link, elsewhere, (0.02, 0.02, 0.02))
+        initial_pose.send(robot.link, far_place, (0.02, 0.02, 0.02))
         before, after = answers(robot, "localisation", lambda x: x and x.prior == "given")
-        apart = [np.hypot(*np.subtract(x.pose.pose.xytheta, elsewhere)[:2]) for x in (before, after) if x]
+        apart = [np.hypot(*np.subtract(x.pose.pose.xytheta, far_place)[:2]) for x in (before, after) if x]
         assert apart[-1] < 0.1 and (before is None or apart[0] > 0.5)
         initial_pose.send(robot.link, (-1.0, 0.0, 0.0))
         errors = []

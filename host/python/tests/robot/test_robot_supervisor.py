@@ -190,11 +190,11 @@ MOVER = """
 import sys, time
 from pathlib import Path
 from crunchbot.robot.lifeline import Heartbeat
-heart, told = Heartbeat.of_environment(), ""
+heart, reported = Heartbeat.of_environment(), ""
 while True:
     now = "ended" if heart.ended else "beats" if heart.beats else "silent"
-    if now != told:
-        told = now
+    if now != reported:
+        reported = now
         (Path(sys.argv[1]) / now).touch()
     time.sleep(0.01)
 """

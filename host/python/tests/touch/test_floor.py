@@ -91,6 +91,6 @@ def test_the_spectral_way_needs_no_rest_and_says_what_it_doubts():
     assert whisker.borders == 1
     whisker.look(rubbed("VINYL", WINDOW_SAMPLES, rng))
     assert whisker.borders == 2
-    whisker.pause()  # elsewhere now: another surface is no border
+    whisker.pause()  # the robot was moved: another surface is no border
     whisker.look(rubbed("ROUGH", WINDOW_SAMPLES, rng))
     assert whisker.borders == 2

@@ -1,4 +1,4 @@
-"""whisker-view over its WebSocket: what a page is told equals what the ring holds, whatever writer and page do."""
+"""whisker-view over its WebSocket: what a page receives equals what the ring holds, whatever writer and page do."""
 
 import asyncio
 import getpass

@@ -87,7 +87,7 @@ def test_a_row_is_told_by_whisker_whatever_the_names():
     assert set(tips) == {"floor_left", "floor_right"} and all(set(tip) == set(ARENA.textures) for tip in tips.values())
     assert [ray["name"] for ray in model.row["rays"]] == ["object_1", "object_2", "object_3", "object_4"]
     without = told_model(1, scene=None)
-    assert without.row["tips"] == model.row["tips"], "names can be told apart without a scene unless textures have _"
+    assert without.row["tips"] == model.row["tips"], "names can be distinguished without a scene unless textures have _"
 
 
 def test_cells_not_read_and_no_contact_are_different_things():
@@ -177,12 +177,12 @@ def test_a_process_that_fell_silent_is_told_from_one_that_ended_and_one_never_he
     model = RobotModel(clock=clock)
     for name in ("pilot", "bag"):
         model.take(f"health/{name}", health(name, counters=[("rows", "12")], error="disk full"))
-    model.take("health/bag", End(Header.at(0), 1, "told to"))
+    model.take("health/bag", End(Header.at(0), 1, "asked to"))
     clock.now += SILENT_S + 1.0
     reported = {process["name"]: process for process in model.health()}
     assert reported["pilot"]["silent"] and reported["pilot"]["age_s"] == 4 and reported["pilot"]["error"] == "disk full"
     assert reported["pilot"]["counters"] == {"rows": "12"}
-    assert not reported["bag"]["silent"] and reported["bag"]["ended"] and reported["bag"]["state"] == "ended: told to"
+    assert not reported["bag"]["silent"] and reported["bag"]["ended"] and reported["bag"]["state"] == "ended: asked to"
     assert reported["navigator"]["age_s"] is None
     model.take("health/pilot", health(pid=8))
     (pilot,) = [process for process in model.health() if process["name"] == "pilot"]

@@ -1,4 +1,4 @@
-"""The robot's part of whisker-view in headless Chromium: what a person sees is what the messages told, and no more."""
+"""The robot's part of whisker-view in headless Chromium: what a person sees is what the messages reported, and no more."""
 
 import asyncio
 
@@ -69,7 +69,7 @@ def test_what_is_not_known_is_said_to_be_not_known():
             )
             await b.until("robotPart.drawn")
             empty = "!new Uint32Array(robotPart.plan.live.getContext('2d').getImageData(0, 0, robotPart.plan.live.width, robotPart.plan.live.height).data.buffer).some((p) => p)"
-            assert await b.eval(empty), "something is drawn that nobody told"
+            assert await b.eval(empty), "something is drawn that nobody reported"
 
     asyncio.run(scenario())
 
@@ -289,7 +289,7 @@ def test_a_pose_is_told_by_a_drag_on_the_plan_or_by_numbers():
             await b.eval("$('pose-x').value = 99")
             await b.click("#pose-send")
             assert "outside the arena" in await b.until(
-                "!$('pose-said').textContent.startsWith('Told') && $('pose-said').textContent"
+                "!$('pose-said').textContent.startsWith('Reported') && $('pose-said').textContent"
             )
             assert post.poses[1:] == [pytest.approx((1.25, 0.75, -1.5708), abs=1e-3)]
             await b.press("Escape")

@@ -192,7 +192,7 @@ class Post:
 
     def __init__(self):
         self.inbox = Inbox("whisker/robot/", 10_000)
-        self.poses: list[tuple[float, float, float]] = []  # that pages have told
+        self.poses: list[tuple[float, float, float]] = []  # that pages have sent
         self.source = InboxSource("robot", self.inbox, "Listening at nothing", set_pose=self.poses.append)
         self._streams = defaultdict(envelopes)
 
@@ -212,7 +212,7 @@ class Post:
 @asynccontextmanager
 async def robot_view(post: Post, scene: Scene | None = SCENE, run=None, rows: int = 0, may_set_pose: bool = True):
     """A server that shows this robot; gives its port and hub. `run`: MadeUpRun or the like, whose
-    first rows it has been told."""
+    first rows it has received."""
     hub = Hub([f"whisker-test-no-ring-{os.getpid()}"], post.source, scene, may_set_pose=may_set_pose)
     post.play(run or MadeUpRun(), range(rows), hub.robot)
     async with serving(hub, "127.0.0.1", 0, []) as port:

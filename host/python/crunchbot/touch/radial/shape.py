@@ -6,7 +6,7 @@ import numpy as np
 
 from ...native import as_doubles, doubles, ffi, lib
 
-TERMS = ("turn", "rate", "told", "bow", "back")
+TERMS = ("turn", "rate", "reported", "bow", "back")
 SAMPLES_LEAST = 8
 CROP_SHARE = 0.1  # of the peak: what is above belongs to the contact
 

@@ -14,7 +14,7 @@ from ...native import lib
 from .shape import terms_of
 
 # Priors of the weights, mean and standard deviation. The whisker bends as far as it is pushed, so the angle's weight is
-# 1; unless the base turns otherwise than it is told, and the duration says little. Which of the two it is, the evidence
+# 1; unless the base turns otherwise than it is ordered, and the duration says little. Which of the two it is, the evidence
 # decides. Faster by 3:1 changes the bending by some percent (overshoot, creep); a report of the angle is worth something;
 # bow and return may tell of creep and rate, either way.
 WEIGHT_MEAN = np.array([1.0, 0.0, 0.5, 0.0, 0.0])

@@ -1,7 +1,7 @@
 /* The plan: metres to pixels, the floor by texture, obstacles, axes and a scale bar; drawn anew for a size, theme or scene. */
 const PLAN = { left: 34, foot: 44, edge: 16, head: 170, least: 260 }; // px around the floor; of the window above it; least height
 const STRIPE = 9; // px from one line or dot of a pattern to the next
-const PATTERNS = [ // told apart by shape, so that grey will do
+const PATTERNS = [ // distinguished by shape, so that grey will do
   () => {},
   (pen, n) => { pen.fillRect(n * 0.25, n * 0.25, n * 0.22, n * 0.22); },
   (pen, n) => { pen.moveTo(0, n); pen.lineTo(n, 0); },

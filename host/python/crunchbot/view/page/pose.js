@@ -1,6 +1,6 @@
 /* Tells the robot where it is: press on the plan and drag, or type x, y and heading. */
 const DRAG_PX = 8; // a shorter drag leaves the heading as it is typed
-const TOLD_S = 4; // so long is it said that a pose was told
+const TOLD_S = 4; // so long is it said that a pose was given
 
 class PoseTool {
   constructor(plan, wire, redraw) {
@@ -55,7 +55,7 @@ class PoseTool {
     $('pose-y').value = pose.y.toFixed(2);
     $('pose-heading').value = (pose.theta * 180 / Math.PI).toFixed(0);
     this.wire.send({ type: 'set_pose', ...pose });
-    this.say('Told.');
+    this.say('Reported.');
   }
 
   /* Whether an error of the server was about a pose; then it is said here. */

@@ -207,7 +207,7 @@ class Traces {
     pen.fillText(words, x, y);
   }
 
-  /* The cursor stands at a column; the bin under it is told by onRead. */
+  /* The cursor stands at a column; onRead gets the bin under it. */
   drawCursor() {
     const pen = this.marker.getContext('2d');
     pen.clearRect(0, 0, this.marker.width, this.marker.height);
