@@ -10,7 +10,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "tools"))
 from lint import arrows, circles, folders, functions, pages, words  # noqa: E402
 
-GUARDS = (arrows, functions)
+GUARDS = (arrows, functions, pages, words)
 PACKAGE = "host/python/crunchbot"
 
 
