@@ -1,4 +1,5 @@
 #include "bench.h"
+#include "make_rig.h"
 
 #include <cerrno>
 #include <chrono>

@@ -3,9 +3,6 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "bytes_rig.h"
-#include "rtl_rig.h"
-
 namespace bridge_sim
 {
 
@@ -47,14 +44,6 @@ sim_sensor_fault sensor_fault(LaneFaultKind kind)
 
 Rig::Rig(size_t populated, uint64_t seed, const std::vector<NodeTrait> &traits) : bus_(populated, seed, traits)
 {
-}
-
-std::unique_ptr<Rig> make_rig(Level level, size_t populated, uint64_t seed, const std::vector<NodeTrait> &traits)
-{
-    if (level == Level::BYTES) {
-        return std::make_unique<BytesRig>(populated, seed, traits);
-    }
-    return std::make_unique<RtlRig>(populated, seed, traits);
 }
 
 bool Rig::power_on(Descriptors &descriptors, const char *&error)

@@ -14,7 +14,7 @@ from whisker_protocol import LIMITS, SENSOR_ERRORS
 
 from .scenes import MECHANICS, START_CLEARANCE_M, make_scene, simulated
 
-BLOCK_TICKS = 40  # the robot is given one order per block (sim/bridge/pilot_answers.h)
+BLOCK_TICKS = 40  # the robot is given one order per block (sim/robot/pilot_answers.h)
 AHEAD_BLOCKS = 25  # orders given in advance: half a second, so that pacing is smooth
 TURN_RAD_S = 0.5  # a floor whisker's tip then goes at 0.1 m/s
 # What a robot does over and over: (seconds, rad/s). `whisk`: body whisks to either side, rest before each pair.

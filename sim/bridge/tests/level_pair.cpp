@@ -1,4 +1,5 @@
 #include "level_pair.h"
+#include "make_rig.h"
 
 #include <algorithm>
 #include <utility>

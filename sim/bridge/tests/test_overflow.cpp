@@ -3,6 +3,7 @@
 
 #include <cerrno>
 
+#include "make_rig.h"
 #include "tick_runner.h"
 
 using namespace bridge_sim;

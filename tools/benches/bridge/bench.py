@@ -110,7 +110,7 @@ def latency(link: tuple[int, int, int]) -> dict:
 
 def paced(build: Path, period: int) -> dict:
     """28 lanes at packet level with a tick asked for every `period` cycles, or what went wrong."""
-    command = [build / "sim/bridge/usb_device/bridge-pace", str(period), str(PACED_TICKS)]
+    command = [build / "tests/usb/bridge-pace", str(period), str(PACED_TICKS)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     return json.loads(done.stdout) if done.stdout else {"period": period, "error": done.stderr.strip()}
 

@@ -66,7 +66,7 @@ def bridge_speed(build: Path, lanes: int, link: tuple[int, int, int]) -> dict:
     """RTL and nodes alone, every frame checked by an internal host."""
     with tempfile.TemporaryDirectory() as folder:
         report = Path(folder) / "speed.json"
-        command = [build / "sim/bridge/whisker-bridge-sim", "--bench", "--seconds", BENCH_SECONDS]
+        command = [build / "sim/robot/whisker-bridge-sim", "--bench", "--seconds", BENCH_SECONDS]
         command += ["--lanes-populated", lanes, "--speed-report", report]
         command += ["--sck-divider", link[0], "--word-gap", link[1], "--sample-point", link[2]]
         subprocess.run([str(word) for word in command], check=True, stdout=subprocess.DEVNULL)

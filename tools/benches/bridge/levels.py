@@ -39,7 +39,7 @@ def processor_s(command: list) -> float:
 def speed(build: Path, case: str, lanes: int) -> float:
     """Simulated seconds per second of one processor."""
     level, (divider, gap, sample), seconds = CASES[case]
-    command = [build / "sim/bridge/whisker-bridge-sim", "--bench", "--level", level, "--lanes-populated", lanes]
+    command = [build / "sim/robot/whisker-bridge-sim", "--bench", "--level", level, "--lanes-populated", lanes]
     command += ["--sck-divider", divider, "--word-gap", gap, "--sample-point", sample, "--seconds"]
     return seconds / (processor_s([*command, START_UP_S + seconds]) - processor_s([*command, START_UP_S]))
 

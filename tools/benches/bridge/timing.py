@@ -4,7 +4,7 @@ SYNC.
 The mapping of ticks to the host's clock is judged on synthetic traces whose every delay is known (libwhisker's
 clock_bench).
 
-The bridge runs as on a board, on its own divider (sim/bridge/usb_device, bridge-free); two of them with clocks of their
+The bridge runs as on a board, on its own divider (tests/usb, bridge-free); two of them with clocks of their
 own and a cable between (fpga/tb/pair). Both are the Verilog, cycle by cycle, so the figures are the same on every
 machine.
 """
@@ -151,7 +151,7 @@ def table(found: dict) -> str:
 def run(build: Path, fresh: bool) -> None:
     """A few minutes; nothing is kept between runs, so `fresh` changes nothing."""
     reported = subprocess.run(
-        [build / "sim/bridge/usb_device/bridge-free", str(TICKS)], check=True, capture_output=True, text=True
+        [build / "tests/usb/bridge-free", str(TICKS)], check=True, capture_output=True, text=True
     )
     found = {"latency": json.loads(reported.stdout), "skew": pair(build.resolve() / "pair.json"), "clock": clock(build)}
     found["host"] = host(build, found["latency"])

@@ -45,7 +45,7 @@ def run(build: Path, fresh: bool, frames: int = TARGET) -> None:
         total = store.read_result(NAME)
     while total.get("frames", 0) < frames:
         began = time.monotonic()
-        found = soak(build / "sim/bridge/usb_device/usb-soak", min(CHUNK, frames), total["seeds"] + 1)
+        found = soak(build / "tests/usb/usb-soak", min(CHUNK, frames), total["seeds"] + 1)
         total["wall_s"] = round(total["wall_s"] + time.monotonic() - began, 1)
         total["seeds"] += 1
         total |= {name: total.get(name, 0) + count for name, count in found.items()}

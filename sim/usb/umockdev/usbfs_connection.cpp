@@ -4,6 +4,8 @@
 #include <cerrno>
 #include <cstring>
 
+#include "whisker_protocol.h"
+
 namespace bridge_sim
 {
 

@@ -2,14 +2,120 @@
 
 #include <chrono>
 #include <cinttypes>
+#include <csignal>
+#include <cstdio>
+#include <memory>
+#include <optional>
 #include <stdexcept>
 
+#include <poll.h>
+#include <sys/signalfd.h>
 #include <unistd.h>
 
-#include "simulation_parts.h"
+#include "device_port.h"
+#include "fault_list.h"
+#include "fault_plan.h"
+#include "make_rig.h"
+#include "node_list.h"
+#include "options.h"
+#include "rig.h"
+#include "usbfs_server.h"
+#include "usbip_server.h"
+#include "usbredir_server.h"
+extern "C" {
+#include "sim_world.h"
+}
 
 namespace bridge_sim
 {
+
+// ---- what a simulation is put together of, as its options say
+
+namespace
+{
+
+size_t populated(const Options &options, const sim_scene &scene)
+{
+    if (options.lanes_populated == 0) {
+        return scene.whiskers;
+    }
+    if (options.lanes_populated < scene.whiskers) {
+        throw std::runtime_error("--lanes-populated " + std::to_string(options.lanes_populated) + ": the scene has " +
+                                 std::to_string(scene.whiskers) + " whiskers; give at least as many");
+    }
+    return options.lanes_populated;
+}
+
+// A server says where it listens, for port 0 takes a free one.
+template <typename Server> std::unique_ptr<DevicePort> make_server(const char *protocol, uint16_t port)
+{
+    auto server = std::make_unique<Server>(port);
+    std::printf("serving %s at 127.0.0.1:%u\n", protocol, server->port());
+    std::fflush(stdout);
+    return server;
+}
+
+// In all threads, so before umockdev starts its own.
+int block_signals()
+{
+    sigset_t set;
+    sigemptyset(&set);
+    sigaddset(&set, SIGCHLD);
+    sigaddset(&set, SIGINT);
+    sigaddset(&set, SIGTERM);
+    sigprocmask(SIG_BLOCK, &set, nullptr);
+    signal(SIGPIPE, SIG_IGN);
+    return signalfd(-1, &set, SFD_NONBLOCK | SFD_CLOEXEC);
+}
+
+sim_scene read_scene(const std::string &path)
+{
+    sim_scene scene;
+    char error[512] = "";
+    if (sim_scene_read(path.c_str(), &scene, error, sizeof error) != 0) {
+        throw std::runtime_error(error);
+    }
+    return scene;
+}
+
+std::unique_ptr<Rig> rig_of(const Options &options, const sim_scene &scene)
+{
+    const size_t lanes = populated(options, scene);
+    auto rig = make_rig(options.link.level, lanes, options.seed, read_node_list(options.nodes, lanes));
+    if (!options.flash.empty()) {
+        rig->flash().keep_in(options.flash);
+    }
+    rig->flash().cut_after(options.flash_cut);
+    return rig;
+}
+
+std::optional<FaultPlan> plan_of(const Options &options, const sim_scene &scene)
+{
+    if (!options.fault_list.empty()) {
+        FaultList list = read_fault_list(options.fault_list, populated(options, scene));
+        return FaultPlan(std::move(list.lane), std::move(list.usb));
+    }
+    if (options.faults.empty()) {
+        return std::nullopt;
+    }
+    return FaultPlan(options.seed, populated(options, scene), options.ticks());
+}
+
+std::unique_ptr<DevicePort> port_of(const Options &options)
+{
+    switch (options.serve) {
+    case Serve::USBIP:
+        return make_server<UsbipServer>("usbip", options.port);
+    case Serve::USBREDIR:
+        return make_server<UsbredirServer>("usbredir", options.port);
+    default:
+        return std::make_unique<UsbfsServer>();
+    }
+}
+
+} // namespace
+
+// ---- the run
 
 namespace
 {
@@ -245,6 +351,112 @@ int Simulation::verdict() const
     }
     runner_.check_usb();
     return 0;
+}
+
+// ---- what comes from outside: the cable, the lanes, USB requests, signals
+
+void Simulation::obey_cable()
+{
+    while (const std::optional<Cable> asked = followers_.take_cable()) {
+        if ((*asked == Cable::PLUG) == plugged_) {
+            throw std::runtime_error(plugged_ ? "socket: 'plug', but the bridge is plugged in"
+                                              : "socket: 'unplug', but the bridge is not plugged in");
+        }
+        plugged_ ? unplug() : plug();
+    }
+}
+
+void Simulation::obey_lane_changes()
+{
+    while (const std::optional<LaneChange> change = followers_.take_lane_change()) {
+        if (change->lane >= rig_->bus().populated()) {
+            throw std::runtime_error("socket: lane " + std::to_string(change->lane) + " has no node");
+        }
+        runner_.set_dead(change->lane, change->dead);
+    }
+}
+
+void Simulation::plug()
+{
+    Descriptors descriptors;
+    const char *error = nullptr;
+    if (!rig_->power_cycle(descriptors, error)) {
+        throw std::runtime_error(std::string("the bridge does not enumerate: ") + error);
+    }
+    scheduler_.plug(true);
+    port_->plug(descriptors);
+    plugged_ = true;
+}
+
+// What is under way ends first, so that its results are handed over before the device is gone. The world stands still
+// until ticks are produced again.
+void Simulation::unplug()
+{
+    take_requests();
+    scheduler_.plug(false);
+    runner_.unplugged();
+    rig_->forget_frames();
+    deliver_completed();
+    port_->unplug();
+    take_requests(); // those handed in meanwhile end as well
+    plugged_ = false;
+}
+
+void Simulation::take_requests()
+{
+    for (DeviceRequest &request : port_->take_requests()) {
+        if (request.discard) {
+            scheduler_.discard(request.urb.id);
+        } else {
+            scheduler_.submit(std::move(request.urb));
+        }
+    }
+}
+
+void Simulation::deliver_completed()
+{
+    std::vector<Urb> urbs = scheduler_.take_completed();
+    if (urbs.empty()) {
+        return;
+    }
+    defect_.spoil(urbs);
+    port_->deliver(std::move(urbs));
+    take_requests();
+}
+
+void Simulation::wait(int timeout_ms)
+{
+    std::vector<pollfd> descriptors = {{signals_, POLLIN, 0}, {port_->wake_descriptor(), POLLIN, 0}};
+    followers_.add_to(descriptors);
+    if (create_) {
+        create_->add_to(descriptors);
+    }
+    if (poll(descriptors.data(), descriptors.size(), timeout_ms) <= 0) {
+        return;
+    }
+    if (descriptors[0].revents) {
+        read_signals();
+    }
+    if (descriptors[1].revents) {
+        take_requests();
+    }
+    if (create_) {
+        create_->receive();
+    }
+    followers_.receive();
+    obey_cable();
+    obey_lane_changes();
+}
+
+void Simulation::read_signals()
+{
+    signalfd_siginfo signal_info;
+    while (read(signals_, &signal_info, sizeof signal_info) == sizeof signal_info) {
+        if (signal_info.ssi_signo != SIGCHLD) {
+            stopped_ = true;
+            end_run();
+        }
+    }
 }
 
 } // namespace bridge_sim

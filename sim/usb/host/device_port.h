@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "urb_scheduler.h"
+#include "urb.h"
 
 namespace bridge_sim
 {

@@ -9,6 +9,7 @@
 #include <linux/usbdevice_fs.h>
 #include <umockdev.h>
 
+#include "device_port.h"
 #include "usbfs_connection.h"
 
 namespace bridge_sim

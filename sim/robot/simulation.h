@@ -11,11 +11,10 @@
 #include "defect.h"
 #include "device_port.h"
 #include "follower_server.h"
+#include "logs.h"
 #include "options.h"
 #include "pace.h"
 #include "speed_report.h"
-#include "truth_log.h"
-#include "wheel_log.h"
 
 namespace bridge_sim
 {

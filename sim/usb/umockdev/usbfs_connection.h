@@ -10,7 +10,7 @@
 #include <linux/usbdevice_fs.h>
 #include <umockdev.h>
 
-#include "usbfs_server.h"
+#include "urb.h"
 
 namespace bridge_sim
 {

@@ -9,7 +9,7 @@ import sys
 import warnings
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT / "fpga/usb"))
 warnings.filterwarnings("ignore", category=DeprecationWarning)  # LUNA's, about Amaranth's
 

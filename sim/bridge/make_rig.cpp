@@ -1,0 +1,17 @@
+#include "make_rig.h"
+
+#include "bytes_rig.h"
+#include "rtl_rig.h"
+
+namespace bridge_sim
+{
+
+std::unique_ptr<Rig> make_rig(Level level, size_t populated, uint64_t seed, const std::vector<NodeTrait> &traits)
+{
+    if (level == Level::BYTES) {
+        return std::make_unique<BytesRig>(populated, seed, traits);
+    }
+    return std::make_unique<RtlRig>(populated, seed, traits);
+}
+
+} // namespace bridge_sim
