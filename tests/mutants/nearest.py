@@ -39,7 +39,11 @@ def steps_for(root: Path, file: str) -> list[Step]:
     if file.endswith(".v"):
         return [
             Step(pytest=_benches(root, file)),
-            Step(build=("all",), ctest=("sim/usb", "sim/bridge", "sim/robot", "tests/usb", "fpga"), pytest=(PROOFS, BENCHES)),
+            Step(
+                build=("all",),
+                ctest=("sim/usb", "sim/bridge", "sim/robot", "tests/usb", "fpga"),
+                pytest=(PROOFS, BENCHES),
+            ),
         ]
     if file.endswith(".py"):
         return [Step(pytest=near) for near in [_importers(root, file)] if near] + [Step(pytest=PYTHON_TESTS)]

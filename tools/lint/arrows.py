@@ -38,7 +38,15 @@ ALLOWED = {
     "sim/usb/host": [],
     "sim/usb/device": ["sim/usb/host", "fpga/usb"],
     "sim/usb": ["protocol"],
-    "sim/bridge": ["sim/usb/host", "sim/usb/device", "sim/node", "sim/mlx90333", "sim/mechanics", "fpga/bridge_rtl", "fpga/usb"],
+    "sim/bridge": [
+        "sim/usb/host",
+        "sim/usb/device",
+        "sim/node",
+        "sim/mlx90333",
+        "sim/mechanics",
+        "fpga/bridge_rtl",
+        "fpga/usb",
+    ],
     "sim/robot": ["sim/bridge", "sim/usb", "sim/world", "sim/create", "sim/mechanics", "sim/node", "sim/mlx90333"],
 }
 # Of each Python package: room -> rooms it may use besides its own and the modules that lie in no room, which use none.

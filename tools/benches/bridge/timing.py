@@ -150,9 +150,7 @@ def table(found: dict) -> str:
 
 def run(build: Path, fresh: bool) -> None:
     """A few minutes; nothing is kept between runs, so `fresh` changes nothing."""
-    reported = subprocess.run(
-        [build / "tests/usb/bridge-free", str(TICKS)], check=True, capture_output=True, text=True
-    )
+    reported = subprocess.run([build / "tests/usb/bridge-free", str(TICKS)], check=True, capture_output=True, text=True)
     found = {"latency": json.loads(reported.stdout), "skew": pair(build.resolve() / "pair.json"), "clock": clock(build)}
     found["host"] = host(build, found["latency"])
     store.write_result("bridge_timing", found)
