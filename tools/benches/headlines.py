@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from .markdown import table
-from .store import COMMAND_OF_CHART, COMMAND_OF_RESULT, ORIGINS, RESULTS, read_result
+from .store import CHARTS, COMMAND_OF_CHART, COMMAND_OF_RESULT, ORIGINS, RESULTS, read_result
 from .studies import TRANSPORTS
 
 MOST = 20
@@ -282,4 +282,5 @@ def charts() -> list[list[str]]:
     return [
         [f"[{name}](charts/{name}.svg)", f"`.venv/bin/python {command}`"]
         for name, command in sorted(COMMAND_OF_CHART.items())
+        if (CHARTS / f"{name}.svg").exists()
     ]

@@ -2,6 +2,7 @@
 
 import statistics
 
+from .host.ring import PEERS
 from .markdown import table
 
 FILTERS = {"adaptive": "adaptive", "pose": "grid", "foveal": "foveal grid", "odometry": "odometry alone"}
@@ -16,14 +17,7 @@ MODELS = {
     "default": "default",
     "oracle": "oracle",
 }
-TRANSPORTS = {
-    "whisker": "whisker ring",
-    "iceoryx2": "iceoryx2",
-    "aeron": "Aeron IPC",
-    "zenoh": "zenoh, shared memory",
-    "zeromq": "ZeroMQ, ipc",
-    "lcm": "LCM, UDP multicast",
-}
+TRANSPORTS = {peer: title for peer, (title, *_) in PEERS.items() if peer != "memory"}
 
 
 def head(title: str, files: str, command: str) -> str:
@@ -250,7 +244,7 @@ def ring(found: dict) -> str:
                 *(" / ".join(_latency(rows, peer, mode, n, p) for n in readers[:2]) for p in ("p99", "p99.9")),
                 " / ".join(_rate(rows, peer, mode, n) for n in readers),
             ]
-            for peer, title_of in (*TRANSPORTS.items(), ("memory", "limit: 256 bytes of shared memory, no queue"))
+            for peer, title_of in (*TRANSPORTS.items(), ("memory", PEERS["memory"][0]))
             if (peer, mode, "2khz", 1) in rows
         ]
         parts.append(

@@ -15,16 +15,264 @@ import argparse
 import json
 import os
 import shutil
+import subprocess
+import sys
+import tempfile
+import time
 from pathlib import Path
 
 import matplotlib
 import numpy as np
+from matplotlib.figure import Figure
 from tqdm import tqdm
 
 from .. import store
-from .ring_charts import draw_latency, draw_throughput, draw_writer
-from .ring_peers import CACHE, PEERS, SOURCES, programs
-from .ring_run import READERS, Run, quantile
+
+ROOT = Path(__file__).resolve().parents[3]
+SOURCES = ROOT / "tools/benches/host/peers"
+CACHE = ROOT / "build/bench/ring"
+CMAKE_NEEDED = (3, 30)
+
+# name -> title, program, wait modes, what it needs
+PEERS = {
+    "whisker": ("whisker ring", "peer_whisker", ("poll", "wait")),
+    "iceoryx2": ("iceoryx2", "peer_iceoryx2", ("poll", "wait")),
+    "aeron": ("Aeron IPC", "peer_aeron", ("poll",)),  # has no receive that sleeps
+    "zenoh": ("zenoh, shared memory", "peer_zenoh", ("poll", "wait")),
+    "zeromq": ("ZeroMQ, ipc", "peer_zeromq", ("poll", "wait")),
+    "lcm": ("LCM, UDP multicast", "peer_lcm", ("poll", "wait")),
+    "memory": ("limit: bare shared memory", "peer_memory", ("poll",)),  # no queue: of latency alone
+}
+
+
+def build_c(build: Path, name: str, flags: list[str]) -> Path:
+    program = CACHE / "bin" / f"peer_{name}"
+    program.parent.mkdir(parents=True, exist_ok=True)
+    command = ["cc", "-O2", "-std=gnu11", f"-I{ROOT}/host/libwhisker/include"]
+    command += [str(SOURCES / f"peer_{name}.c"), str(SOURCES / "harness.c"), "-o", str(program), *flags]
+    subprocess.run(command, check=True)
+    return program
+
+
+def pkg_config(module: str) -> list[str] | None:
+    found = subprocess.run(["pkg-config", "--cflags", "--libs", module], capture_output=True, text=True)
+    return found.stdout.split() if found.returncode == 0 else None
+
+
+def cmake_folder() -> Path | None:
+    """Where a CMake new enough for Aeron is: the system's, or one in a virtual environment of the bench's own."""
+    text = subprocess.run(["cmake", "--version"], capture_output=True, text=True).stdout.split()
+    if tuple(map(int, text[2].split(".")[:2])) >= CMAKE_NEEDED:
+        return Path(shutil.which("cmake")).parent
+    folder = CACHE / "venv"
+    if not (folder / "bin/cmake").exists():
+        subprocess.run([sys.executable, "-m", "venv", str(folder)], check=True)
+        pip = [str(folder / "bin/pip"), "install", "--quiet", "--disable-pip-version-check", "--require-hashes"]
+        if subprocess.run([*pip, "-r", str(SOURCES / "requirements.lock")]).returncode != 0:
+            return None
+    return folder / "bin"
+
+
+def build_rust() -> Path | None:
+    """The folder of the Rust peers' programs; compiling takes minutes the first time."""
+    target = Path(os.environ.get("CARGO_TARGET_DIR", CACHE / "target"))
+    cmake = cmake_folder()
+    features = ["--features", "aeron"] if cmake and shutil.which("clang") else []
+    environment = {**os.environ, "CARGO_TARGET_DIR": str(target)}
+    if cmake:
+        environment["PATH"] = f"{cmake}:{environment['PATH']}"
+    command = ["cargo", "build", "--release", "--locked", "--quiet", *features]
+    print("ring bench: compiling iceoryx2, zenoh and Aeron (about ten minutes the first time)")
+    built = subprocess.run(command, cwd=SOURCES, env=environment)
+    return target / "release" if built.returncode == 0 else None
+
+
+def programs(build: Path) -> dict[str, Path]:
+    """The programs there are. What cannot be built is named, with what would help."""
+    archive = build / "host/libwhisker/libwhisker.a"
+    found = {"whisker": build_c(build, "whisker", [str(archive)]), "memory": build_c(build, "memory", [])}
+    for name, module, package in (("lcm", "lcm", "liblcm-dev"), ("zeromq", "libzmq", "libzmq3-dev")):
+        flags = pkg_config(module)
+        if flags:
+            found[name] = build_c(build, name, flags)
+        else:
+            print(f"ring bench: {PEERS[name][0]} left out; to have it: apt-get install {package}")
+    rust = build_rust() if shutil.which("cargo") else None
+    for name in ("iceoryx2", "zenoh", "aeron"):
+        if rust and (rust / f"peer_{name}").exists():
+            found[name] = rust / f"peer_{name}"
+        else:
+            print(f"ring bench: {PEERS[name][0]} left out; to have it: install Rust 1.85 or newer (rustup) and clang")
+    return found
+
+
+READERS = (1, 2, 8, 32)  # of a run; all on one processor
+# Latencies are kept as counts in bins 2.3 % wide, so that rounds can be added.
+EDGES = np.concatenate([[0], np.geomspace(50, 2e9, 769)])
+
+
+def settle(core: int) -> None:
+    """In a child: on its processor, and a session of its own.
+
+    The processes of a session share one weight in the scheduler, so many readers on one processor would take time from
+    the publisher on the other as soon as anything else runs there.
+    """
+    os.setsid()
+    os.sched_setaffinity(0, {core})
+
+
+class Run:
+    """Publisher and subscribers of one setting, each a process, in a folder of their own."""
+
+    def __init__(self, program: Path, mode: str, pace: str, readers: int, seconds: float):
+        self.program, self.mode, self.pace, self.readers, self.seconds = program, mode, pace, readers, seconds
+        cores = sorted(os.sched_getaffinity(0))
+        self.publisher_core, self.reader_core = cores[0], cores[-1]
+
+    def _start(self, folder: Path, role: str, index: int, core: int) -> subprocess.Popen:
+        words = [self.program, role, folder / "control", self.mode, self.pace, self.seconds, self.readers, index]
+        words.append(folder / f"latencies_{index}")
+        return subprocess.Popen(
+            [str(word) for word in words],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            env={**os.environ, "AERON_DIR": str(folder / "aeron")},
+            preexec_fn=lambda: settle(core),
+        )
+
+    def measure(self) -> dict:
+        with tempfile.TemporaryDirectory(dir="/dev/shm", prefix="whisker-bench-") as name:
+            folder = Path(name)
+            (folder / "control").write_bytes(bytes(8192))
+            started = []
+            try:
+                return self._measure(folder, started)
+            finally:
+                for process in started:
+                    process.kill()
+                    process.wait()
+
+    def _measure(self, folder: Path, started: list) -> dict:
+        if self.program.name == "peer_aeron":
+            started.append(
+                subprocess.Popen([str(self.program), "driver"], env={**os.environ, "AERON_DIR": str(folder / "aeron")})
+            )
+            time.sleep(1.0)
+        publisher = self._start(folder, "publish", 0, self.publisher_core)
+        started.append(publisher)
+        time.sleep(0.5)
+        subscribers = [self._start(folder, "subscribe", i, self.reader_core) for i in range(self.readers)]
+        started.extend(subscribers)
+        sent = self._result(publisher)
+        got = [self._result(process) for process in subscribers]
+        samples = [np.fromfile(folder / f"latencies_{i}", np.uint32) for i in range(self.readers)]
+        return {
+            **sent,
+            "received": [g["received"] for g in got],
+            "lost": sum(g["lost"] for g in got),
+            "bad": sum(g["bad"] for g in got),
+            "latency_ns": histogram(np.concatenate(samples) if samples else np.zeros(0, np.uint32)),
+        }
+
+    def _result(self, process: subprocess.Popen) -> dict:
+        out, error = process.communicate(timeout=self.seconds + 120)
+        if process.returncode != 0:
+            lines = error.strip().splitlines() or ["no reason given"]
+            raise RuntimeError(f"{self.program.name} failed: {lines[-1]}")
+        return json.loads(out.splitlines()[-1])
+
+
+def histogram(samples: np.ndarray) -> dict[str, int]:
+    counts, _ = np.histogram(samples, EDGES)
+    return {str(i): int(counts[i]) for i in np.flatnonzero(counts)}
+
+
+def quantile(counts: dict[str, int], percent: float) -> float:
+    """Microseconds; the middle of the bin that holds it."""
+    bins = sorted((int(i), n) for i, n in counts.items())
+    total = np.cumsum([n for _, n in bins])
+    at = bins[int(np.searchsorted(total, percent / 100 * total[-1]))][0]
+    return float((EDGES[at] + EDGES[at + 1]) / 2000)
+
+
+STYLES = {
+    "whisker": {"color": "#0b5394", "marker": "o", "linestyle": "-", "linewidth": 2.2},
+    "iceoryx2": {"color": "#c25700", "marker": "^", "linestyle": "--"},
+    "aeron": {"color": "#38761d", "marker": "s", "linestyle": "-."},
+    "zenoh": {"color": "#741b47", "marker": "D", "linestyle": ":"},
+    "zeromq": {"color": "#6b6b6b", "marker": "v", "linestyle": "--"},
+    "lcm": {"color": "#000000", "marker": "x", "linestyle": ":"},
+    "memory": {"color": "#999999", "marker": "", "linestyle": "-", "linewidth": 1},
+}
+
+
+def of(rows: list[dict], **wanted) -> list[dict]:
+    return [row for row in rows if all(row[key] == value for key, value in wanted.items())]
+
+
+def draw_latency(rows: list[dict]) -> Figure:
+    figure = Figure(figsize=(10.5, 6.6), layout="constrained")
+    panels = figure.subplots(2, 3, sharex=True, sharey=True)
+    for line, mode in zip(panels, ("poll", "wait"), strict=True):
+        for axes, name in zip(line, ("p50", "p99", "p99.9"), strict=True):
+            for peer, (title, *_) in PEERS.items():
+                points = [p for p in of(rows, peer=peer, mode=mode, pace="2khz") if p["latency_us"]]
+                if points:
+                    x, y = [p["readers"] for p in points], [p["latency_us"][name] for p in points]
+                    axes.plot(x, y, label=title, **STYLES[peer])
+            axes.set(xscale="log", yscale="log", xticks=READERS, xticklabels=READERS)
+            axes.set_title(f"readers {mode}: {name}", fontsize=10)
+            axes.grid(axis="y", color="0.9")
+            if name != "p50":
+                axes.axvspan(2.9, 40, color="0.95", zorder=0)
+    for axes in panels[-1]:
+        axes.set_xlabel("readers, all on one processor")
+    for line in panels:
+        line[0].set_ylabel("publish to reader (us)")
+    figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False)
+    figure.suptitle("256-byte frames at 2 kHz. Shaded: more readers than processors, so tails are the scheduler's")
+    return figure
+
+
+def draw_throughput(rows: list[dict]) -> Figure:
+    figure = Figure(figsize=(9.5, 4.2), layout="constrained")
+    panels = figure.subplots(1, 2, sharey=True)
+    for axes, mode in zip(panels, ("poll", "wait"), strict=True):
+        for peer, (title, *_) in PEERS.items():
+            points = of(rows, peer=peer, mode=mode, pace="flat")
+            if points:
+                x, y = [p["readers"] for p in points], [p["delivered_per_s"] for p in points]
+                axes.plot(x, y, label=title, **STYLES[peer])
+        axes.set(xscale="log", yscale="log", xticks=READERS, xticklabels=READERS)
+        axes.set(xlabel="readers, all on one processor", title=f"readers {mode}")
+        axes.grid(axis="y", color="0.9")
+    panels[0].set_ylabel("frames a second that reach every reader")
+    figure.legend(
+        *panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=6, fontsize=8.5, frameon=False
+    )
+    return figure
+
+
+def draw_writer(rows: list[dict]) -> Figure:
+    """What readers cost the ring's writer: a publication at 2 kHz, and a frame when it publishes without pause."""
+    figure = Figure(figsize=(9.5, 3.8), layout="constrained")
+    panels = figure.subplots(1, 2)
+    places = {readers: i for i, readers in enumerate((0, *READERS))}
+    for mode, style in (("poll", STYLES["whisker"]), ("wait", STYLES["iceoryx2"])):
+        paced, free = (of(rows, peer="whisker", mode=mode, pace=pace) for pace in ("2khz", "free"))
+        paced = sorted(paced, key=lambda p: p["readers"])
+        panels[0].plot([places[p["readers"]] for p in paced], [p["publish_ns"] for p in paced], label=mode, **style)
+        panels[1].plot([places[p["readers"]] for p in free], [1e9 / p["sent_per_s"] for p in free], label=mode, **style)
+    titles = ("2 kHz: median time of one publication", "without pause: time per frame")
+    for axes, title in zip(panels, titles, strict=True):
+        axes.set_title(title, fontsize=10)
+        axes.set_xticks(list(places.values()), list(places))
+        axes.set(xlabel="readers", ylabel="ns", yscale="log")
+        axes.grid(axis="y", color="0.9")
+    panels[0].legend(frameon=False, title="readers")
+    return figure
+
 
 ROUNDS = 3  # each setting again, in turn with the others, so that a busy minute of the machine hits all alike
 SECONDS = {"2khz": 3.0, "flat": 2.0, "free": 2.0}

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from ..markdown import table
 from .measure import EXIT, LENGTH, ROOT, Ours, chain, cone, spec
+from .measure import LEVELS as BENDING
 
 TIP, KAPPA, FRICTION, DAMPING = 0.3e-3, 1.0, 0.3, 0.1
 HEIGHTS_MM = (0.15, 0.3, 1.0, 3.0, -0.15, -0.3, -1.0, -3.0)
@@ -119,13 +120,9 @@ def write_table(rows: list[dict]) -> None:
 def page(mechanics: dict, edges: dict) -> str:
     """docs/results/mechanics.md: statics, modes and speed, then every case of an edge."""
     rows, found, whole = edges["rows"], edges["summary"], mechanics["summary"]
-    speeds = {
-        "closed form": "closed",
-        "large deflection": "large",
-        "closed form with modes": "closed_vibration",
-        "large deflection with modes": "large_vibration",
-        **{f"MuJoCo, {links} links": f"mujoco_{links}" for links in (5, 10, 20)},
-    }
+    speeds = {title: name for name, (title, *_) in BENDING.items()}
+    speeds |= {f"MuJoCo, {links} links": f"mujoco_{links}" for links in (5, 10, 20)}
+    timed = [[s, f"{whole['times_real'][name]:.3g}"] for s, name in speeds.items() if name in whole["times_real"]]
     at_edges = [
         [f"{row['height_mm']:g}", f"{row['speed']:g}"]
         + [
@@ -153,12 +150,7 @@ def page(mechanics: dict, edges: dict) -> str:
         )
         + "\n## Speed\n\n28 whiskers at 2 kHz on one core; 4 of them are in contact all the time and 8 are dragged "
         "over "
-        "floors.\n\n"
-        + table(
-            ["mechanics", "times real time"],
-            [[title, f"{whole['times_real'][key]:.3g}"] for title, key in speeds.items()],
-        )
-        + "\n## A tip at an edge of the floor\n\n"
+        "floors.\n\n" + table(["mechanics", "times real time"], timed) + "\n## A tip at an edge of the floor\n\n"
         "A flat floor has an edge across the path; negative heights are steps down. The stance is that of the outer "
         f"whiskers, the friction {FRICTION:g}, the damping ratio {DAMPING:g}. Held: from the first touch of the step's "
         "corner to the last, in ms. Peak: largest base moment along the path, in uN m. Steps of a floor with a pile, "
