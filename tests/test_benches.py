@@ -1,6 +1,7 @@
 """The front of the benches: every topic is there, can be asked for alone, and what it takes is what its run knows."""
 
 import ast
+import importlib
 import json
 import re
 import subprocess
@@ -171,3 +172,10 @@ def test_lines_of_a_page_are_broken_where_markdown_allows_it(monkeypatch, before
         assert not any(line.startswith("- ") for line in done.splitlines())
     else:
         assert done.replace(" \n", "\n") == after
+
+
+@pytest.mark.parametrize("topic", TOPICS)
+def test_a_topic_can_be_imported(topic, monkeypatch):
+    """Its imports are those of the tree as it is: a bench is run too seldom to find that out by itself."""
+    monkeypatch.syspath_prepend(str(ROOT / "tools"))
+    assert callable(importlib.import_module(f"benches.{TOPICS[topic]}").run)

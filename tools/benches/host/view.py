@@ -28,7 +28,6 @@ from websockets.asyncio.client import connect
 from crunchbot.bridge.ring import FRAME, Writer
 from crunchbot.robot.link import Link
 from crunchbot.robot.messages import (
-    COMPONENTS_MOST,
     TOPICS,
     VALUE,
     Belief,
@@ -40,6 +39,7 @@ from crunchbot.robot.messages import (
     PoseWithCovariance,
     ProcessHealth,
 )
+from crunchbot.robot.ranges import COMPONENTS_MOST
 from crunchbot_lab.report import figures
 from whisker_protocol import LANES, LIMITS
 
