@@ -179,3 +179,19 @@ def test_a_topic_can_be_imported(topic, monkeypatch):
     """Its imports are those of the tree as it is: a bench is run too seldom to find that out by itself."""
     monkeypatch.syspath_prepend(str(ROOT / "tools"))
     assert callable(importlib.import_module(f"benches.{TOPICS[topic]}").run)
+
+
+def test_the_programs_that_benches_start_are_built():
+    named = {
+        name
+        for path in BENCHES.rglob("*.py")
+        for name in re.findall(r'\bbuild(?:_dir)? / "((?:host|sim|tests)/[\w/-]+)"', path.read_text())
+    }
+    for name in named:
+        folder, _, program = name.rpartition("/")
+        lists = [
+            path for part in (ROOT / folder, *(ROOT / folder).parents) if (path := part / "CMakeLists.txt").exists()
+        ]
+        assert any(re.search(rf"\b{program}\b", path.read_text()) for path in lists), (
+            f"{name}: no CMakeLists.txt names it"
+        )
