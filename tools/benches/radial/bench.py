@@ -135,14 +135,14 @@ def stability() -> dict:
             for name in METHODS:
                 model = fitted(name, cal)
                 found[name] += [
-                    (*radial.estimate(model, c), r) for c, r in zip(contacts, held.whisks.radius_mm, strict=True)
+                    (*radial.estimate(model, c)[:4], r) for c, r in zip(contacts, held.whisks.radius_mm, strict=True)
                 ]
         out[how] = {name: _stability_of(rows) for name, rows in found.items()}
     return out
 
 
 def _stability_of(rows: list) -> dict:
-    mm, sigma, _, sure, truth = (np.array(v) for v in zip(*rows, strict=True))
+    mm, sigma, _type, sure, truth = (np.array(v) for v in zip(*rows, strict=True))
     numbers = np.isfinite(mm) & np.isfinite(sigma)
     return {
         "error_mm": rms((mm - truth)[numbers]),
