@@ -1,0 +1,57 @@
+"""Pages lead where they say: links reach a file, and the code tour names functions that are there."""
+
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGES = [
+    ROOT / path
+    for path in subprocess.run(
+        ["git", "-C", ROOT, "ls-files", "*.md"], capture_output=True, text=True, check=True
+    ).stdout.split()
+]
+LINK = re.compile(r"\]\(([^)\s]+)\)")
+TOUR = ROOT / "docs/code_tour.md"
+
+
+def text_of(page: Path) -> str:
+    """A page without its code, in which brackets mean something else."""
+    return re.sub(r"```.*?```|`[^`\n]*`", "", page.read_text(), flags=re.DOTALL)
+
+
+def anchors(page: Path) -> set[str]:
+    """What can be linked to in a page: its headings, as GitHub names them."""
+    headings = re.findall(r"^#+ (.+)$", page.read_text(), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", re.sub(r"[`*]", "", heading).lower()).replace(" ", "-") for heading in headings}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_links_reach_what_they_name(page):
+    lost = []
+    for link in LINK.findall(text_of(page)):
+        if "://" in link or link.startswith("mailto:"):
+            continue
+        path, _, anchor = link.partition("#")
+        target = (page.parent / path).resolve() if path else page
+        if not target.exists() or (anchor and target.suffix == ".md" and anchor not in anchors(target)):
+            lost.append(link)
+    assert lost == []
+
+
+def test_every_page_stands_on_a_shelf():
+    shelves = (ROOT / "docs/README.md").read_text()
+    missing = [page.name for page in (ROOT / "docs").glob("*.md") if f"({page.name})" not in shelves]
+    assert missing == ["README.md"]
+
+
+def test_the_code_tour_names_what_is_there():
+    rows = [row.split("|") for row in TOUR.read_text().splitlines() if row.startswith("|") and "`" in row]
+    assert len(rows) > 25
+    for _, _, names, files, _ in rows:
+        text = "".join((ROOT / file).read_text() for file in re.findall(r"`([^`]+)`", files))
+        for name in re.findall(r"`([^`]+)`", names):
+            word = name.removeprefix("class ").rpartition(".")[2]
+            assert re.search(rf"\b{word}\b", text), f"{name} is not in {files}"
