@@ -93,7 +93,9 @@ SPOILS = (
 
 def spoilt(contact: Contact, how: str, rng: np.random.Generator, other: Contact) -> Contact:
     """A contact as a broken chain would give it; `other`: the same contact as another whisker would see it."""
-    x = (other if how == "swapped" else contact).samples.copy()
+    if how == "swapped":
+        contact = other
+    x = contact.samples.copy()
     if how == "saturated":
         x = np.clip(x, 32768 - 800, 32768 + 800)
     elif how == "stuck":
