@@ -204,14 +204,12 @@ def radial(found: dict) -> str:
         + table(["case", *SPREADS.values()], beside)
         + "\n"
         + table(["figure", *SPREADS.values()], [*held, tips])
-        + f"\nCost of `default`: {cost['sample_us']:.3f} us per sample and {cost['release_us']:.2f} us when a contact "
-        f"ends. "
-        f"All of a whisk, {cost['samples']} samples: {cost['contact_us']['default']:.1f} us; equations 2 and 3: "
-        f"{cost['contact_us']['paper']:.1f} us.\n\n"
-        "## Broken samples\n\n"
+        + f"\nCost of `whisk`: {cost['sample_us']:.3f} us per sample and {cost['release_us']:.2f} us when a contact "
+        f"ends. All of a contact, {cost['samples']} samples:\n\n"
+        + table(["model", "us"], [[f"`{name}`", f"{us:.1f}"] for name, us in cost["contact_us"].items()])
+        + "\n## Broken samples\n\n"
         "Spread 4 %. A cell: error in mm, stated standard deviation in mm, confidence. Answers that are NaN, of any "
-        "model: "
-        f"{invalid}.\n\n"
+        f"model: {invalid}.\n\n"
         + table(["fault", "eq. 3", "rational", "default"], broken)
         + "\n`swapped`: another whisker of the same batch is in the lane.\n"
     )
