@@ -1,6 +1,6 @@
 /* The battery: what is drawn is counted, and the voltage falls with the charge. The numbers are those of a typical
  * 12-cell NiMH pack of the robot, not of the interface; an empty one switches the robot off. */
-#include "create_state.h"
+#include "sim_create_state.h"
 
 #include <math.h>
 

@@ -1,6 +1,6 @@
 /* Puts commands together from single bytes. An incomplete one waits for its bytes; a byte that begins none is skipped.
  */
-#include "create_state.h"
+#include "sim_create_state.h"
 
 #include <string.h>
 

@@ -1,5 +1,5 @@
 /* What each command does, and from which mode on. */
-#include "create_state.h"
+#include "sim_create_state.h"
 
 static enum create_oi_mode commands_least_mode(uint8_t opcode)
 {

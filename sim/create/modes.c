@@ -1,5 +1,5 @@
 /* Modes, and safe mode's ways out of itself. */
-#include "create_state.h"
+#include "sim_create_state.h"
 
 #include <math.h>
 

@@ -1,5 +1,5 @@
 /* Scripts and waits of Create 1. While one is under way the robot hears nothing else. */
-#include "create_state.h"
+#include "sim_create_state.h"
 
 #include <string.h>
 

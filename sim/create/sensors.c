@@ -1,5 +1,5 @@
 /* What packets tell. One table says which there are and how long they are, for both models. */
-#include "create_state.h"
+#include "sim_create_state.h"
 
 #include <math.h>
 

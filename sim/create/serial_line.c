@@ -1,5 +1,5 @@
 /* The line: bytes leave it at its pace, and some are lost, damaged or made up on the way. */
-#include "create_state.h"
+#include "sim_create_state.h"
 
 #include <string.h>
 

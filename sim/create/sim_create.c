@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "create_state.h"
+#include "sim_create_state.h"
 #include "whisker_constants.h"
 
 #define MM_PER_M 1e3

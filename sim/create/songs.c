@@ -1,5 +1,5 @@
 /* Songs are taken and take their time; there is no sound. */
-#include "create_state.h"
+#include "sim_create_state.h"
 
 enum { NOTES_MAX = 16, NOTE_UNITS_PER_S = 64 };
 

@@ -1,5 +1,5 @@
 /* Answers to questions, and the stream. */
-#include "create_state.h"
+#include "sim_create_state.h"
 
 #include <string.h>
 

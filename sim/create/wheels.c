@@ -1,5 +1,5 @@
 /* Speeds of the wheels, from what the commands ask for. */
-#include "create_state.h"
+#include "sim_create_state.h"
 
 #include <math.h>
 

@@ -1,4 +1,4 @@
-/* What sim_node.c, sim_node_lab.c and sim_node_flash.c share. */
+/* What sim_node.c and sim_node_flash.c share. */
 #ifndef SIM_NODE_STATE_H
 #define SIM_NODE_STATE_H
 

@@ -15,8 +15,9 @@
 #include "arena.h"
 #include "mech_floor.h"
 #include "mech_shaft.h"
+#include "sim_contact.h"
 #include "sim_rng.h"
-#include "sim_world.h"
+#include "sim_scene.h"
 
 struct sim_object_whisker {
     struct sim_whisker mount;

@@ -7,7 +7,6 @@ It goes on from what --out holds. Each trial is a process forked from this one, 
 import argparse
 import atexit
 import contextlib
-import importlib
 import json
 import os
 import random
@@ -246,7 +245,7 @@ def main() -> int:
     parser.add_argument("--out", type=Path, default=Path("build/drills/signals"))
     arguments = parser.parse_args()
     for name in cli.COMMANDS:
-        importlib.import_module(f"crunchbot.commands.{name.replace('-', '_')}")
+        cli.command_module(name)
     campaign = Campaign(arguments.out, arguments.seed)
     campaign.fill(SHARED, arguments.pairs, BATCH, at_stop_code)
     made = prepare(arguments.out.resolve())

@@ -1,5 +1,7 @@
 /* Figures: a corner's place within 1 mm and its regions honest while it is swept at 0.1 m/s; the reported motion; bad
  * input counted. Contacts are bent by the table, which is itself tested against numbers of others. */
+#include "contact_bank.h"
+#include "contact_filter.h"
 #include "contact_geometry.h"
 
 #include <string.h>

@@ -2,19 +2,11 @@
 #ifndef NAV_CONTACT_BANK_H
 #define NAV_CONTACT_BANK_H
 
-#include "contact_filter.h"
-
-/* A block, mirrored so that the tilt is positive: motion of the base (m), its turn (rad), duration, mean tilt (NAN: not
- * read) and the variance of its noise. */
-struct nav_contact_step {
-    double moved[2], turned, seconds, tilt, variance;
-};
+#include "contact_state.h"
 
 /* What a hypothesis says: place, velocity, direction of the normal, arc length, coefficient of friction, curvature; SI.
  */
 enum { SEEN_X, SEEN_Y, SEEN_VX, SEEN_VY, SEEN_NORMAL, SEEN_ARC, SEEN_FRICTION, SEEN_CURVATURE };
-
-typedef double nav_contact_square[NAV_CONTACT_STATES][NAV_CONTACT_STATES];
 
 void nav_contact_bank_begin(struct nav_contact_filter *, const struct nav_contact_step *);
 

@@ -3,7 +3,7 @@
 #ifndef NAV_CONTACT_GEOMETRY_H
 #define NAV_CONTACT_GEOMETRY_H
 
-#include "contact_bank.h"
+#include "contact_state.h"
 
 /* A hypothesis' state. FIRST: arc length of a contact on the shaft, direction of the force on the tip about the clamped
  * axis. ROUND: curvature of the surface; a corner has none.

@@ -33,6 +33,7 @@ HEADERS = {
             "touch/radial.h",
             "touch/radial_whisk.h",
             "touch/contact_beam.h",
+            "touch/contact_state.h",
             "touch/contact_filter.h",
             "touch/texture_features.h",
             "touch/texture_classifier.h",

@@ -61,13 +61,13 @@ def _parser(chosen: str) -> Parser:
     for name, text in COMMANDS.items():
         command = commands.add_parser(name, description=text)
         if name == chosen:
-            module = _module(name)
+            module = command_module(name)
             command.show_example(module.EXAMPLE)
             module.add(command)
     return parser
 
 
-def _module(name: str) -> ModuleType:
+def command_module(name: str) -> ModuleType:
     """The module of a subcommand. UserError for one of the laboratory where that package is not installed."""
     path = f"commands.{name.replace('-', '_')}"
     if name in LAB_COMMANDS:

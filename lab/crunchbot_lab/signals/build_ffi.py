@@ -25,6 +25,7 @@ BLOCK = re.compile(r"/\* cffi: begin \*/\n(.*?)/\* cffi: end \*/", re.DOTALL)
 MECHANICS = ("floor", "whisker", "elastica", "vibration", "shaft", "drag")
 HEADERS = [
     SIM / "world" / "sim_scene.h",
+    SIM / "world" / "sim_contact.h",
     SIM / "world" / "sim_world.h",
     SIM / "signals" / "signals.h",
     *(SIM / "mechanics" / f"mech_{name}.h" for name in MECHANICS),

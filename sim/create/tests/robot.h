@@ -10,8 +10,8 @@
 
 #include <cmocka.h>
 
-#include "create_state.h"
 #include "near.h"
+#include "sim_create_state.h"
 
 enum { HEARD_MAX = 1 << 16 };
 

@@ -69,7 +69,7 @@ ODDS = """
 ## What passes the checks
 
 A good sample that is not what the sensor measured must be one whose bytes pass every check by arithmetic. The storm
-(`sim/node/storm.c`) runs random faults one to three at a time; `storm_log.c` notes which bits of which frame and record
+(`sim/node/storm_batch.c`) runs random faults one to three at a time; `storm_log.c` notes which bits of which frame and record
 were hurt (a second sensor on the same wires, spared every fault, shows what was sent), works each check out again on
 the bytes that came, and compares them with what the fault must have made of them. {schedules} schedules, {ticks} ticks,
 {bad} records flagged:

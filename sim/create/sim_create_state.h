@@ -1,6 +1,6 @@
 /* The emulator's state, and what its parts do for each other. */
-#ifndef CREATE_STATE_H
-#define CREATE_STATE_H
+#ifndef SIM_CREATE_STATE_H
+#define SIM_CREATE_STATE_H
 
 #include "sim_create.h"
 #include "sim_rng.h"
