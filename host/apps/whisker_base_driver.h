@@ -2,7 +2,7 @@
 #ifndef WHISKER_BASE_DRIVER_H
 #define WHISKER_BASE_DRIVER_H
 
-#include "whisker_base_lease.h"
+#include "base_lease.h"
 
 /* Serves base and clients until SIGTERM, SIGINT or the guard's death. Returns the exit code. */
 int base_driver_run(const struct base_driver_start *start);

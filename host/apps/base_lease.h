@@ -1,6 +1,6 @@
 /* The messages between the two processes of whisker-base, guard and driver. */
-#ifndef WHISKER_BASE_LEASE_H
-#define WHISKER_BASE_LEASE_H
+#ifndef BASE_LEASE_H
+#define BASE_LEASE_H
 
 #include <stdint.h>
 
