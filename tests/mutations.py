@@ -155,7 +155,7 @@ MUTATIONS = [
     ),
     Mutation(
         "firmware: the build links both sensors' decoders",
-        "tests/test_firmware_tools.py",
+        "tests/repository/test_firmware_tools.py",
         "tools/firmware/build.sh",
         "*/sensor_frame*.c) ;;",
         "*/none.c) ;;",

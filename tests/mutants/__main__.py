@@ -35,7 +35,7 @@ TIMEOUTS_S = (
     300.0,
     1800.0,
 )  # for one command of the nearest tests, and of the others; a mutant that hangs is killed by it
-LOOKS_AT_TEXT = "--ignore=tests/test_mutations.py"  # fails with any change of a line that it names
+LOOKS_AT_TEXT = "--ignore=tests/repository/test_mutations.py"  # fails with any change of a line that it names
 PR_SET_CHILD_SUBREAPER = 36  # linux/prctl.h
 
 

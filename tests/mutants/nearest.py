@@ -15,7 +15,7 @@ C_FOLDERS = ("firmware/dspic", "host/libwhisker", "host/nav", "host/create", "ho
 # What the tests of a folder's own programs do not reach: processes driven from Python, nodes on the simulated chip.
 ALSO = {
     "firmware/dspic": ("sim/node",),
-    "host/apps": ("host/python/tests/pilot/test_base.py", "tests/test_daemon.py", "tests/test_flash.py"),
+    "host/apps": ("host/python/tests/pilot/test_base.py", "tests/chain/test_daemon.py", "tests/chain/test_flash.py"),
 }
 SLOW_PROGRAMS = "stress_ring|model"
 PROOFS = (

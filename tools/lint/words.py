@@ -20,7 +20,7 @@ WORD = re.compile(rf"\b(?:{'|'.join(INSTEAD)})\b", re.IGNORECASE)
 BUMP = re.compile(r"\bbumps?\b", re.IGNORECASE)
 # A bump is what the Create's bumper reports: in its interface, and in the pilot and the programs that read it.
 CREATE = re.compile(r"create|base|pilot|wheels|behaviour|bumper|protocol/|tests/mutations", re.IGNORECASE)
-OWN = ("tools/lint/words.py", "tests/test_guards.py")  # files that name the words to refuse them
+OWN = ("tools/lint/words.py", "tests/repository/test_guards.py")  # files that name the words to refuse them
 
 
 def complaints(root: Path = ROOT) -> list[str]:

@@ -105,7 +105,7 @@ def until(condition: Callable[[], bool]) -> None:
     give_up = time.monotonic() + PATIENCE_S
     while not condition():
         if time.monotonic() > give_up:
-            raise RuntimeError("bench_host: the bridge does not react; run tests/test_daemon.py")
+            raise RuntimeError("bench_host: the bridge does not react; run tests/chain/test_daemon.py")
         time.sleep(LOOK_S)
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 BENCHES = ROOT / "tools/benches"
 FRONT = (BENCHES / "__main__.py").read_text()
 TOPICS = dict(re.findall(r'^    "(\w+)": "([\w.]+)",$', FRONT, re.MULTILINE))

@@ -1,7 +1,7 @@
 """Measured figures that stand in pages which people write: they equal bench/results, and so each other.
 
 A figure that a page takes from a measurement has an entry here. What `tools/benches page` writes is compared as a whole
-(tests/test_benches.py), and so are the generated sections of other pages (below).
+(tests/repository/test_benches.py), and so are the generated sections of other pages (below).
 """
 
 import json
@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 RESULTS = ROOT / "bench/results"
 
 

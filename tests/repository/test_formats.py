@@ -38,7 +38,7 @@ from crunchbot_lab.demo import level1, training
 from crunchbot_lab.scenes import thymio
 from crunchbot_lab.simulation import bridge
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs/formats.md").read_text()
 SEPARATOR = re.compile(r"^\|[-| ]+\|$")
 

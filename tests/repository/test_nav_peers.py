@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 BUILD = Path(os.environ.get("WHISKER_BUILD", ROOT / "build/release"))
 sys.path.insert(0, str(ROOT / "tools"))
 from benches.nav import peer_runs  # noqa: E402

@@ -14,7 +14,7 @@ from chainrun import BUILD, END_S, Cable, program, running, simulation, write_fl
 from crunchbot.bridge.ring import FRAME, Clock
 from whisker_protocol import CODES, LIMITS, STATUS_CODE_SHIFT
 
-HIL = Path(__file__).parent / "hil"
+HIL = Path(__file__).resolve().parents[1] / "hil"
 sys.path.insert(0, str(HIL))
 from base_checks import SILENT_FRAMES, await_stop  # noqa: E402
 from bridge_checks import judge_clock  # noqa: E402
