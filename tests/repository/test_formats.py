@@ -19,8 +19,8 @@ from crunchbot import scene as scene_files
 from crunchbot.bridge import nodes, ring
 from crunchbot.commands import info, radial, stream, texture
 from crunchbot.nav import estimates, judging, localise, observations
+from crunchbot.observation import NORMAL, POINT, SURFACE
 from crunchbot.robot import checkpoint, rowfiles, track
-from crunchbot.scene import NORMAL, POINT, SURFACE
 from crunchbot.sensor_tables import SensorTable
 from crunchbot.touch import calibration
 from crunchbot.touch.radial import model as radial_models

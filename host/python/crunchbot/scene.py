@@ -6,12 +6,15 @@ Metres and radians. World frame: origin in the arena's lower left corner, x righ
 import math
 import re
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
+from . import observation
 from .files import UnreadableError
 from .images import nearest_levels, read_grey
+from .observation import Column, Layout, Quantity
 from .occupancy import NOWHERE, Box, Pose, from_map, placed, read_map
 from .scene_table import LARGEST_M, SceneError, Table
 from .sensor_tables import SensorTable, read_sensors, write_sensor
@@ -19,10 +22,6 @@ from .sensor_tables import SensorTable, read_sensors, write_sensor
 __all__ = ["LARGEST_M", "SceneError"]  # beside what is defined here
 
 ARENA, ROBOT, PRIOR, OBSERVATIONS = "arena.toml", "robot.toml", "prior.toml", "observations.csv"
-# Columns of OBSERVATIONS of an object whisker, after its name: what it touches, in the robot's frame at the row's end. A file may leave them out.
-NORMAL = ("normal_rad", "normal_sd_rad")
-POINT = ("point_x_m", "point_y_m", "point_sd_m")
-SURFACE = "surface_"  # before a texture: its log-likelihood for the face that the whisker sweeps along
 TEXTURES_MOST = 250  # texture indices are one byte in host/nav, with room for its marks
 WHISKERS_MOST, OBSTACLES_MOST = 1000, 10_000
 TILES_MOST = 10_000_000
@@ -98,6 +97,16 @@ class Scene:
     simulated: tuple[str, ...] = field(default=(), compare=False)  # more lines of `flat`; no part of the folder
     origin: Pose = NOWHERE  # of the arena's frame in that of the occupancy map it was made of
 
+    @cached_property
+    def layout(self) -> Layout:
+        """Columns of the rows of this robot on this floor. Those of NORMAL and POINT may be missing in a row."""
+        tips, rays = self.robot.of_role("texture"), [whisker.name for whisker in self.robot.of_role("object")]
+        columns = [column for tip in tips for column in observation.textures(tip.name, self.arena.textures)]
+        columns += map(observation.distance, rays)
+        columns += [Column(Quantity.READING, "", sensor.name) for sensor in self.robot.sensors]
+        columns += [column for of in (observation.normal, observation.point) for ray in rays for column in of(ray)]
+        return Layout(columns)
+
     def warnings(self) -> list[str]:
         """What is odd but allowed, one line each."""
         if self.prior is None or self.prior.mean is None:
@@ -133,6 +142,15 @@ def load(path, map_file=None) -> Scene:
     folder = Path(path)
     if not folder.is_dir():
         raise SceneError(f"{folder}: no such folder; give a scene folder with {ARENA} and {ROBOT}")
+    scene = _read(folder, map_file)
+    try:
+        _ = scene.layout
+    except ValueError as error:
+        raise SceneError(f"{folder / ROBOT}: {error}; rename a whisker, a texture or a sensor") from None
+    return scene
+
+
+def _read(folder: Path, map_file) -> Scene:
     prior = _prior(Table.read(folder / PRIOR)) if (folder / PRIOR).exists() else None
     if map_file is None or (folder / ARENA).exists():
         arena = _arena(Table.read(folder / ARENA))

@@ -5,6 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from crunchbot.observation import Row
 from crunchbot.pilot.behaviour import BLOCK_TICKS, EFFECT_TICKS, ODOMETRY_TICKS
 from crunchbot.pilot.pilot import Pilot
 from crunchbot.scene import Scene
@@ -24,7 +25,7 @@ def explore(
     status: Callable[[int], np.ndarray] | None = None,
     on_block: Callable[[int, np.ndarray], None] = lambda first, counts: None,
     world: World | None = None,
-) -> tuple[list[dict], list[dict]]:
+) -> tuple[list[Row], list[dict]]:
     """Let the pilot explore for `ticks` (a multiple of 200): observation rows, and truth rows as the chain writes them.
 
     `status(first_tick)` gives the (40, lanes) status of a block, all good by default; `on_block` sees (first tick, counts).

@@ -20,8 +20,8 @@ from tqdm import tqdm
 from crunchbot import scene as scenes
 from crunchbot.arguments import warn
 from crunchbot.nav import localise
-from crunchbot.nav.observations import cell
 from crunchbot.nav.scoring import position_errors
+from crunchbot.observation import cell
 from crunchbot.pilot.behaviour import BLOCK_TICKS
 from crunchbot.pilot.pilot import Pilot
 from crunchbot.recording.mcapfile import McapFile

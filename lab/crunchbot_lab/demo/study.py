@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from crunchbot.nav import localise
-from crunchbot.nav.observations import tells_normals
+from crunchbot.observation import Row, has_normals
 from crunchbot.pilot.pilot import Pilot
 from crunchbot.robot.models import load_models
 from crunchbot.scene import Scene
@@ -34,8 +34,8 @@ def study(seed: int, seconds: float, models: Path, mechanics: str = MECHANICS[0]
     return rounded({"seed": seed, "simulated_s": seconds, "whisks": len(pilot.whisks)} | scores)
 
 
-def _localise(name: str, scene: Scene, rows: list[dict]) -> np.ndarray:
-    made = localise.Filter(name, scene, normals=tells_normals(rows[0]))
+def _localise(name: str, scene: Scene, rows: list[Row]) -> np.ndarray:
+    made = localise.Filter(name, scene, normals=has_normals(rows[0]))
     return np.array([made.step(row).pose for row in rows])
 
 

@@ -4,8 +4,9 @@ from pathlib import Path
 
 import numpy as np
 
-from crunchbot.nav.observations import ODOMETRY, TRUTH, Observations, touch_keys
-from crunchbot.scene import NORMAL, OBSERVATIONS, POINT, Scene, write
+from crunchbot.nav.observations import Observations
+from crunchbot.observation import ODOMETRY, TIME, TRUTH, Quantity
+from crunchbot.scene import OBSERVATIONS, Scene, write
 
 DECIMALS = 6  # m, rad, nats; distances are rounded in mm to three
 
@@ -30,18 +31,17 @@ def rounded(observations: Observations) -> Observations:
 def write_scene(path, scene: Scene, observations: Observations) -> None:
     """The whole folder; observations as `rounded` gave them."""
     write(path, scene)
-    tips, rays = scene.robot.of_role("texture"), scene.robot.of_role("object")
-    header = ["t_s", *ODOMETRY, *(f"{w.name}_{t}" for w in tips for t in scene.arena.textures)]
-    header += [f"{w.name}_mm" for w in rays]
+    layout = scene.layout
+    header = [TIME, *ODOMETRY, *layout.of(Quantity.TEXTURE), *layout.of(Quantity.DISTANCE)]
     columns = [observations.t_text, *_numbers(observations.odometry)]
     columns += _cells(observations.texture.reshape(len(observations.t_s), -1), {"nan": "", "-inf": "inf"})
     columns += _cells(np.round(observations.radial_m * 1000.0, 3), {"inf": "", "-inf": "inf"})
     if observations.own is not None:
-        header += [sensor.name for sensor in scene.robot.sensors]
+        header += layout.of(Quantity.READING)
         columns += _cells(observations.own, {"nan": ""})
-    for names, values in ((NORMAL, observations.normal), (POINT, observations.point)):
+    for quantity, values in ((Quantity.NORMAL, observations.normal), (Quantity.POINT, observations.point)):
         if values is not None:
-            header += [key for w in rays for key in touch_keys(w, names)]
+            header += layout.of(quantity)
             columns += _cells(values.reshape(len(observations.t_s), -1), {"nan": ""})
     if observations.truth is not None:
         header += TRUTH

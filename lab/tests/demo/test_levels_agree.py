@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from crunchbot import scene as scenes
-from crunchbot.nav.observations import cell
+from crunchbot.observation import cell
 from crunchbot.pilot.pilot import Pilot
 from crunchbot.robot.models import load_models
 from crunchbot_lab.demo.chain import ChainRun, Link, run_chain

@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from tqdm import tqdm
 
 from crunchbot.nav import localise
-from crunchbot.nav.observations import cell
+from crunchbot.observation import cell
 from crunchbot.pilot.pilot import Pilot
 from crunchbot.robot.models import load_models
 from crunchbot_lab.demo.level1 import explore

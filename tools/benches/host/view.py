@@ -26,10 +26,10 @@ from tqdm import tqdm
 from websockets.asyncio.client import connect
 
 from crunchbot.bridge.ring import FRAME, Writer
+from crunchbot.observation import VALUE
 from crunchbot.robot.link import Link
 from crunchbot.robot.messages import (
     TOPICS,
-    VALUE,
     Belief,
     Header,
     Localisation,

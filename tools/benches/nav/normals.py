@@ -16,8 +16,9 @@ import numpy as np
 from tqdm import tqdm
 
 from crunchbot.nav import localise
-from crunchbot.nav.observations import Observations, read_observations, tells_normals
+from crunchbot.nav.observations import Observations, read_observations
 from crunchbot.nav.scoring import heading_errors, lock_row, position_errors
+from crunchbot.observation import has_normals
 from crunchbot.pilot.pilot import Pilot
 from crunchbot.robot.models import load_models
 from crunchbot.robot.rowfiles import Rows
@@ -80,8 +81,8 @@ def flown(build: Path, seed: int) -> dict:
     with path.open("w", newline="") as file:
         out = Rows(file)
         for row, true in zip(rows, truth, strict=True):
-            out.write(row | {f"true_{name}": true[name] for name in POSE})
-    assert tells_normals(rows[0])
+            out.write({**row} | {f"true_{name}": true[name] for name in POSE})
+    assert has_normals(rows[0])
     reported = read_observations(path, scene)
     read = np.isfinite(reported.normal[..., 0])
     errors = [off for n in range(read.shape[1]) for off in off_truth(scene, reported, n)]

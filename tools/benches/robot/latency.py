@@ -19,10 +19,11 @@ from matplotlib.figure import Figure
 
 from crunchbot.nav import localise
 from crunchbot.nav.observations import Observations
+from crunchbot.observation import Row
 from crunchbot.pilot.behaviour import BLOCK_TICKS, ODOMETRY_TICKS, TICK_S
 from crunchbot.pilot.pilot import Pilot
 from crunchbot.robot.link import Link
-from crunchbot.robot.messages import EXPLORING, Observation, decode, encode
+from crunchbot.robot.messages import Observation, decode, encode
 from crunchbot.robot.models import load_models
 from crunchbot.robot.rows import RowPublisher, to_message, to_row
 from crunchbot_lab import scenes
@@ -152,7 +153,7 @@ def _desktop(scene, rows: list[dict], watch: Stopwatch) -> None:
 
 
 def _packed(row: dict, n: int) -> bytes:
-    return encode(to_message(row, EXPLORING, n, np.zeros(3)))
+    return encode(to_message(Row.of(row), n, np.zeros(3)))
 
 
 def _unpacked(data: bytes) -> dict:
@@ -181,7 +182,7 @@ def _wall_ms(name: str) -> list[float]:
 
 def _round(publisher: RowPublisher, poses, row: dict) -> float:
     began = time.monotonic()
-    publisher.send(row, EXPLORING)
+    publisher.send(Row.of(row))
     if not poses.take(PATIENCE_S):
         raise RuntimeError("bench_robot: no pose came; run host/python/tests/robot/test_robot_navigator.py")
     return MS * (time.monotonic() - began)

@@ -203,7 +203,7 @@ def drawn_rows(
     ranges = np.array([geometry.ranges(scene.arena, path[1:], ray) for ray in rays]).T
     distance = ranges + SIGNALS.radial_sigma_m * rng.standard_normal(ranges.shape)
     return [
-        row
+        {**row}
         | dict(zip(localise.ODOMETRY, map(float, odometry[n]), strict=True))
         | _drawn_textures(scene, row, texture[n])
         | _drawn_distances(scene, row, distance[n])

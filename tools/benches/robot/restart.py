@@ -74,7 +74,7 @@ def messages(rows: list[dict], stream: int, first: int = 0, sum_from=(0.0, 0.0, 
     pose, out = np.array(sum_from), []
     for n, row in enumerate(rows):
         number = n if stream == 2 else first + n
-        message = to_message(row | {"t_s": 0.1 * (first + n + 1)}, 0, number, pose)
+        message = to_message(replace(row, t_s=0.1 * (first + n + 1)), number, pose)
         pose = message.pose
         out.append(Received("observation", message, Envelope(stream, number, message.header.stamp.ns)))
     return out

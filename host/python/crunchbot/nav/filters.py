@@ -1,16 +1,17 @@
 """Filters of host/nav on a scene: made, stepped, replayed over many rows, and asked for their belief."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..errors import UserError
 from ..native import as_doubles, doubles, ffi, lib, octets, pointer
-from ..scene import NORMAL, Prior, Scene
+from ..observation import NORMAL, Quantity, Row
+from ..scene import Prior, Scene
 from ..sensor_tables import SensorTable
-from .observations import ODOMETRY, Observations, touch_keys
+from .observations import Observations
 
 FAVOURITE, SPARE = "adaptive", "grid"
 SENSOR_UNKNOWN = 255
@@ -114,7 +115,7 @@ class Sensor:
 
 
 class Filter:
-    """One filter on one scene. Rows are dicts of cells as the pilot makes them: None is an empty cell, nan not read."""
+    """One filter on one scene. It takes rows as the pilot makes them, or their cells by column: None is an empty cell."""
 
     def __init__(
         self,
@@ -135,7 +136,6 @@ class Filter:
         self.scene = scene
         if components is not None and (fault := prior_fault(scene, components)):
             raise SettingError(f"filter '{name}': {fault}; give what a filter listed")
-        self._own_keys = [sensor.name for sensor in scene.robot.sensors]
         sensors = (*map(_of_table, scene.robot.sensors), *sensors)
         problem, self._keep = problem_of(scene, settings or {}, components, sensors)
         problem.seed, problem.robot.normals = seed, normals
@@ -145,19 +145,18 @@ class Filter:
             raise SettingError(f"filter '{name}' does not fit in memory; choose coarser cells with --set")
         self._filter = ffi.gc(made, lib.nav_filter_free)
         self._tips, self._rays = len(scene.robot.of_role("texture")), len(scene.robot.of_role("object"))
-        self._texture_keys = [[f"{w.name}_{t}" for t in scene.arena.textures] for w in scene.robot.of_role("texture")]
         self._classes = len(scene.arena.textures)
-        self._radial_keys = [f"{w.name}_mm" for w in scene.robot.of_role("object")]
-        self._normal_keys = [touch_keys(w, NORMAL) for w in scene.robot.of_role("object")]
 
-    def step(self, row: dict[str, float | None]) -> Estimate:
-        """Take one row of cells."""
-        texture = [[math.nan if row[k] is None else row[k] for k in keys] for keys in self._texture_keys]
-        radial = [math.inf if row[k] is None else row[k] / 1000.0 for k in self._radial_keys]
-        own = [math.nan if row.get(k) is None else row[k] for k in self._own_keys]
-        own += [math.nan] * (self._own - len(own))
-        normal = [[math.nan if row.get(k) is None else row[k] for k in keys] for keys in self._normal_keys]
-        return self.step_values(row["t_s"], [row[k] for k in ODOMETRY], texture, radial, own, normal)
+    def step(self, row: Row | Mapping[str, float | None]) -> Estimate:
+        """Take one row. KeyError when a column of the scene's layout is missing; readings and directions may be."""
+        row, layout = row if isinstance(row, Row) else Row.of(row), self.scene.layout
+        texture = row.read(layout.of(Quantity.TEXTURE)).reshape(self._tips, self._classes)
+        radial = row.read(layout.of(Quantity.DISTANCE), empty=math.inf) / 1000.0
+        own = np.full(self._own, math.nan)
+        readings = row.find(layout.of(Quantity.READING))
+        own[: len(readings)] = readings
+        normal = row.find(layout.of(Quantity.NORMAL)).reshape(self._rays, len(NORMAL))
+        return self.step_values(row.t_s, row.motion, texture, radial, own, normal)
 
     def step_values(self, t_s: float, odometry, texture, radial_m, own=(), normal=None) -> Estimate:
         """Take one row of numbers: odometry (3,): m, m, rad; texture (tips, classes), nan not read; radial_m (rays,) in m,

@@ -6,11 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
+from ..observation import ODOMETRY, TRUTH
 from ..occupancy import NOWHERE, Pose, to_map
 from ..scene import Scene
 from ..tables import unwritable
 from .filters import ESTIMATE, Estimate, Filter, SettingError, default_filter, filter_names, settings_list, to_estimate
-from .observations import ODOMETRY, TRUTH, Observations, observations_path, read_observations
+from .observations import Observations, observations_path, read_observations
 from .scoring import pose_errors
 
 __all__ = [

@@ -1,17 +1,14 @@
 """observations.csv of a scene folder as arrays. Strict in structure, forgiving in values (docs/formats.md)."""
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from ..scene import NORMAL, OBSERVATIONS, POINT, Scene, Whisker
+from ..observation import NORMAL, ODOMETRY, POINT, TIME, TRUTH, Quantity
+from ..scene import OBSERVATIONS, Scene
 from ..tables import number, numbers, read_columns, require_columns
-
-TRUTH = ("true_x_m", "true_y_m", "true_theta_rad")
-ODOMETRY = ("odo_x_m", "odo_y_m", "odo_theta_rad")
 
 
 @dataclass
@@ -43,52 +40,35 @@ def observations_path(folder) -> Path:
 
 def read_observations(path, scene: Scene) -> Observations:
     """Read the file; TableError when a column of the scene's whiskers is missing or the structure is broken."""
-    tips = [[f"{w.name}_{t}" for t in scene.arena.textures] for w in scene.robot.of_role("texture")]
-    rays = [f"{w.name}_mm" for w in scene.robot.of_role("object")]
-    own = [sensor.name for sensor in scene.robot.sensors]
-    text = read_columns(path, ["t_s", *ODOMETRY, *(key for keys in tips for key in keys), *rays, *own])
-    rows = len(text["t_s"])
-    texture = np.array([[_column(text[key], _texture_cell) for key in keys] for keys in tips]).reshape(
-        len(tips), len(scene.arena.textures), rows
-    )
+    tips, rays, own = (scene.layout.of(q) for q in (Quantity.TEXTURE, Quantity.DISTANCE, Quantity.READING))
+    text = read_columns(path, [TIME, *ODOMETRY, *tips, *rays, *own])
+    rows, shape = len(text[TIME]), (len(scene.robot.of_role("texture")), len(scene.arena.textures))
+    texture = np.array([_column(text[key], _texture_cell) for key in tips]).reshape(*shape, rows)
     radial = np.array([_column(text[key], _radial_cell) for key in rays]).reshape(len(rays), rows)
     known = all(name in text for name in TRUTH)
     return Observations(
-        numbers(text["t_s"]),
-        text["t_s"],
+        numbers(text[TIME]),
+        text[TIME],
         np.column_stack([numbers(text[key]) for key in ODOMETRY]),
         np.ascontiguousarray(texture.transpose(2, 0, 1)),
         np.ascontiguousarray(radial.T),
         np.column_stack([numbers(text[name]) for name in TRUTH]) if known else None,
         np.column_stack([_column(text[name], _own_cell) for name in own]) if own else None,
-        *(_touched(path, text, scene.robot.of_role("object"), names) for names in (NORMAL, POINT)),
+        _touched(path, text, scene, Quantity.NORMAL, len(NORMAL)),
+        _touched(path, text, scene, Quantity.POINT, len(POINT)),
     )
 
 
-def tells_normals(names: Iterable[str]) -> bool:
-    """Whether a row of these cells may hold the direction of a surface."""
-    return any(name.endswith(f"_{NORMAL[0]}") for name in names)
-
-
-def touch_keys(whisker: Whisker, names: tuple[str, ...]) -> list[str]:
-    """Columns of NORMAL or POINT."""
-    return [f"{whisker.name}_{name}" for name in names]
-
-
-def _touched(path, text: dict[str, list[str]], whiskers: list[Whisker], names: tuple[str, ...]) -> np.ndarray | None:
-    """(n, whiskers, names); None where no whisker has such columns. TableError when one has some of them only."""
-    out = np.full((len(text["t_s"]), len(whiskers), len(names)), np.nan)
-    given = [n for n, w in enumerate(whiskers) if any(key in text for key in touch_keys(w, names))]
+def _touched(path, text: dict[str, list[str]], scene: Scene, quantity: Quantity, width: int) -> np.ndarray | None:
+    """(n, whiskers, width); None where no whisker has such columns. TableError when one has some of them only."""
+    whiskers = scene.robot.of_role("object")
+    out = np.full((len(text[TIME]), len(whiskers), width), np.nan)
+    columns = [scene.layout.of(quantity, whisker.name) for whisker in whiskers]
+    given = [n for n, keys in enumerate(columns) if any(key in text for key in keys)]
     for n in given:
-        keys = touch_keys(whiskers[n], names)
-        require_columns(path, text, keys)
-        out[:, n] = np.column_stack([_column(text[key], _own_cell) for key in keys])
+        require_columns(path, text, columns[n])
+        out[:, n] = np.column_stack([_column(text[key], _own_cell) for key in columns[n]])
     return out if given else None
-
-
-def cell(value: float | None) -> str:
-    """A cell as docs/formats.md has it: empty, nan, or a number."""
-    return "" if value is None else f"{value:.6g}"
 
 
 def _column(cells: list[str], convert) -> list[float]:

@@ -17,7 +17,8 @@ from collections import deque
 
 import numpy as np
 
-from ..scene import NORMAL, POINT, SURFACE
+from .. import observation
+from ..observation import EXPLORING, NORMAL, POINT, RELEASE, WHISK, Layout, Quantity, Row
 from ..touch.contact import Contact
 from ..touch.floor import WINDOW_LEAST_GOOD, WINDOW_SAMPLES, floor_whisker
 from ..touch.mount import Mount
@@ -69,6 +70,7 @@ class Pilot:
             lane: floor_whisker(texture_models[self.names[lane]], np.random.default_rng([seed, lane]))
             for lane in (*self.texture_lanes, *self.face_lanes)
         }
+        self.layout = self._layout()
         self.bad_samples = 0
         self.whisks: list[dict] = []  # every whisk that was pushed to its end: see `_measure`
         self._recent = deque(maxlen=WINDOW_SAMPLES // BLOCK_TICKS)  # of the last 0.1 s: (samples, good) of all lanes
@@ -80,6 +82,19 @@ class Pilot:
         self._measured: dict[int, tuple[int, float]] = {}  # lane: release tick, mm
         self._pending = np.zeros(3)  # motion not yet in a row, in the frame of the last row that carried any
         self._was_whisking = False
+
+    def _layout(self) -> Layout:
+        """Columns of the rows: floor textures, textures of faces, distances, and how surfaces lie."""
+        columns = []
+        for lane in self.texture_lanes:
+            columns += observation.textures(self.names[lane], self.surfaces[lane].model.classes)
+        for lane in self.face_lanes:
+            classes = self.surfaces[lane].model.classes
+            columns += observation.textures(self.names[lane], classes, Quantity.SURFACE)
+        columns += [observation.distance(self.names[lane]) for lane in self.object_lanes]
+        for lane in self.feelers:
+            columns += observation.normal(self.names[lane]) + observation.point(self.names[lane])
+        return Layout(columns)
 
     def block(self, first_tick: int, alpha, beta, status) -> tuple[float, float]:
         """Decide on the 40 ticks from `first_tick`: arrays (40, lanes) of counts and status -> v in m/s, omega in rad/s."""
@@ -101,13 +116,8 @@ class Pilot:
         self._drives.order(self.behaviour.drive_since, drive)
         return drive
 
-    def odometry(
-        self, tick: int, dx: float, dy: float, dtheta: float, bumps: Bumps = NO_BUMPS
-    ) -> dict[str, float | None]:
-        """The observation row of the 0.1 s that end at `tick`; motion in the robot frame at their start.
-
-        Cells: None is an empty cell (not read for a texture, no contact for a distance), nan is a distance not read.
-        """
+    def odometry(self, tick: int, dx: float, dy: float, dtheta: float, bumps: Bumps = NO_BUMPS) -> Row:
+        """The observation row of the 0.1 s that end at `tick`; motion in the robot frame at their start."""
         self.behaviour.moved(tick, dx, dy, dtheta, bumps)
         self._pending = compose(self._pending, (dx, dy, dtheta))
         whisking = self.behaviour.whisking
@@ -116,21 +126,20 @@ class Pilot:
         moved = np.zeros(3) if held_back else self._pending
         if not held_back:
             self._pending = np.zeros(3)
-        row = {"t_s": round((tick + 1) * TICK_S, 4)}
-        row |= dict(zip(("odo_x_m", "odo_y_m", "odo_theta_rad"), map(float, moved), strict=True))
+        cells: list[float | None] = []
         for lane in self.texture_lanes:
-            row |= self._texture_cells(lane, tick, held_back=whisking or self._was_whisking)
+            cells += self._texture_cells(lane, tick, held_back=whisking or self._was_whisking)
         for lane in self.face_lanes:
-            row |= self._surface_cells(lane, tick)
-        for lane in self.object_lanes:
-            row[f"{self.names[lane]}_mm"] = self._radial_cell(lane, released, whisking)
+            cells += self._surface_cells(lane, tick)
+        cells += [self._radial_cell(lane, released, whisking) for lane in self.object_lanes]
         for lane in self.feelers:
-            felt = None if held_back else self._felt(lane, tick, released)
-            row |= self._felt_cells(lane, felt)
+            cells += _felt_cells(None if held_back else self._felt(lane, tick, released))
         for lane in released:
             del self._measured[lane]
         self._was_whisking = whisking
-        return row
+        measured = any(math.isfinite(distance) for _, distance in released.values())
+        kind = RELEASE if measured else WHISK if whisking else EXPLORING
+        return Row.made(kind, round((tick + 1) * TICK_S, 4), moved, self.layout.names, cells)
 
     def _follow_whisk(self, ticks, samples, good) -> None:
         """Gather the whisk's samples; once a whisker that was pushed long enough lets go, its distance is known."""
@@ -182,31 +191,28 @@ class Pilot:
         }
         self.whisks.append(made | {"type": kind, "tries": whisk.tries, "face": face})
 
-    def _texture_cells(self, lane: int, tick: int, held_back: bool) -> dict[str, float | None]:
+    def _texture_cells(self, lane: int, tick: int, held_back: bool) -> list[float | None]:
         whisker = self.surfaces[lane]
-        cells = {f"{self.names[lane]}_{name}": None for name in whisker.model.classes}
         if held_back or not self._sweeping(tick):
             whisker.pause()
             self._silent[lane] = 0
-            return cells
+            return _likelihoods(whisker, None)
         window = self._window(lane)
         loglik = whisker.look(window)
         self._notice_catch(lane, window, loglik)
-        return cells if loglik is None else dict(zip(cells, map(float, loglik), strict=True))
+        return _likelihoods(whisker, loglik)
 
     def _window(self, lane: int) -> np.ndarray:
         """(n, 2) samples of the last 0.1 s, nan where one is bad."""
         return np.concatenate([np.where(good[:, lane, None], s[:, lane], np.nan) for s, good in self._recent])
 
-    def _surface_cells(self, lane: int, tick: int) -> dict[str, float | None]:
+    def _surface_cells(self, lane: int, tick: int) -> list[float | None]:
         """What the window says of the face that an object whisker's tip sweeps along."""
         whisker = self.surfaces[lane]
-        cells = dict.fromkeys(f"{self.names[lane]}_{SURFACE}{name}" for name in whisker.model.classes)
         if not self._along_face(lane, tick):
             whisker.pause()
-            return cells
-        loglik = whisker.look(self._window(lane))
-        return cells if loglik is None else dict(zip(cells, map(float, loglik), strict=True))
+            return _likelihoods(whisker, None)
+        return _likelihoods(whisker, whisker.look(self._window(lane)))
 
     def _along_face(self, lane: int, tick: int) -> bool:
         """Whether the whisker touched during the whole window, the wheels at one speed; and by its tip, which slides, where that
@@ -237,19 +243,25 @@ class Pilot:
             return None
         return felt.after(self._drives.since(felt.tick, tick), tick)
 
-    def _felt_cells(self, lane: int, felt: Felt | None) -> dict[str, float | None]:
-        names = [f"{self.names[lane]}_{name}" for name in (*NORMAL, *POINT)]
-        if felt is None:
-            return dict.fromkeys(names)
-        normal = (None, None) if math.isnan(felt.normal) else (felt.normal, felt.normal_sd)
-        return dict(zip(names, (*normal, *felt.point, felt.point_sd), strict=True))
-
     def _radial_cell(self, lane: int, released: dict, whisking: bool) -> float | None:
         if lane in released:
             return released[lane][1]
         if self.contacts[lane].touching or not self.contacts[lane].settled or (whisking and not released):
             return math.nan
         return None
+
+
+def _likelihoods(whisker, loglik: np.ndarray | None) -> list[float | None]:
+    """A cell for each class of a floor whisker's model."""
+    return [None] * len(whisker.model.classes) if loglik is None else list(map(float, loglik))
+
+
+def _felt_cells(felt: Felt | None) -> list[float | None]:
+    """Cells of NORMAL and POINT."""
+    if felt is None:
+        return [None] * len(NORMAL + POINT)
+    normal = (None, None) if math.isnan(felt.normal) else (felt.normal, felt.normal_sd)
+    return [*normal, *felt.point, felt.point_sd]
 
 
 def joined(blocks: list[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:

@@ -32,8 +32,6 @@ from .ros import (
 from .schema import Codec, OutOfRange
 from .schema import encode as encode_as
 
-EXPLORING, WHISK, RELEASE = range(3)  # Observation.kind
-EMPTY, NOT_READ, VALUE = range(3)  # Observation.cells
 UNKNOWN, TIP, SHAFT = range(3)  # Contact.part
 FACE, CORNER = 1, 2  # Contact.shape; or UNKNOWN
 
@@ -44,7 +42,7 @@ class MessageError(UserError, ValueError):
 
 @dataclass(eq=False)
 class Observation:
-    """A row; crunchbot.robot.rows makes one of the cells of observations.csv and back."""
+    """A row (crunchbot.observation.Row), with its number and the sum of the motion: crunchbot.robot.rows."""
 
     header: Header
     seq: int

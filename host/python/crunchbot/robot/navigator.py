@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from ..nav.localise import Estimate
-from ..nav.observations import tells_normals
+from ..observation import has_normals
 from ..scene import Prior, Scene
 from . import belief, initial_pose
 from .health import ENDED, RUNNING, Health
@@ -155,7 +155,7 @@ class Navigator:
     def _take(self, step: Step, stack: ExitStack) -> None:
         began = time.monotonic()
         if not self._tracks:
-            self._begin(stack, tells_normals(step.row.names))
+            self._begin(stack, has_normals(step.row.names))
             self._begin_from_told()
         self._now_ns = step.row.header.stamp.ns
         header = Header.at(self._now_ns, ARENA_FRAME)

@@ -15,13 +15,12 @@ import numpy as np
 import Pyro5.api
 
 from ..errors import UserError
-from ..nav.observations import ODOMETRY
+from ..observation import ODOMETRY, Row
 from ..pilot.pilot import compose
 from .health import ENDED, RUNNING, Health
 from .inbox import Received
 from .link import Link
 from .messages import (
-    EXPLORING,
     HEALTH,
     Header,
     Localisation,
@@ -61,7 +60,7 @@ class Results:
         self._lock = threading.Lock()
         self._follower, self._number, self._total = Follower(), 0, np.zeros(3)
         self._history: deque[tuple[int, np.ndarray]] = deque([(0, self._total)], maxlen=HISTORY_ROWS)
-        self._row: dict | None = None
+        self._row: Row | None = None
         self._odometry: OdometryMessage | None = None
         self._answers: dict[str, Localisation] = {}
         self._health: dict[str, ProcessHealth] = {}
@@ -82,7 +81,7 @@ class Results:
             since = self._number - 1 if since is None else since
             start = next((pose for number, pose in reversed(self._history) if number == since), None)
             motion = None if start is None else between(start, self._total).tolist()
-            return self._row | {"number": self._number, "motion": motion}
+            return {**self._row} | {"number": self._number, "motion": motion}
 
     @Pyro5.api.expose
     def odometry(self) -> dict | None:
@@ -133,7 +132,7 @@ class Results:
                 f"t_s: {checked['t_s']:.6g} is not within 0 and {TIME.high:.6g}; give seconds since the start"
             )
         with self._lock:
-            return self._publish(checked)
+            return self._publish(Row.of(checked))
 
     def take(self, received) -> None:
         """What came on TOPICS and health."""
@@ -142,7 +141,7 @@ class Results:
                 self._number += step.rows
                 self._total = compose(self._total, step.motion)
                 self._history.append((self._number, self._total))
-                self._row = step.cells()
+                self._row = step.last()
             for message in (r.message for r in received if not r.over):
                 self._note(message)
 
@@ -159,11 +158,11 @@ class Results:
         follower = self._follower
         return {"rows": follower.weighed, "missed": follower.missed, "restarts": follower.restarts}
 
-    def _publish(self, row: dict[str, float | None]) -> int:
+    def _publish(self, row: Row) -> int:
         if self._rows is None:
             self._rows, self._odometries = RowPublisher(self._link), self._link.publish("odometry")
-        self._judge(to_message(row, EXPLORING, self._rows.sent, self._rows.pose))
-        message: Observation = self._rows.send(row, EXPLORING)
+        self._judge(to_message(row, self._rows.sent, self._rows.pose))
+        message: Observation = self._rows.send(row)
         header = Header(message.header.stamp, ODOMETRY_FRAME)
         pose = PoseWithCovariance.planar(message.pose, np.zeros((3, 3)))
         self._odometries.send(OdometryMessage(header, pose, child_frame_id=BASE_FRAME))

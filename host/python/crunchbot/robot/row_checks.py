@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 
-from ..scene import NORMAL, Scene
+from ..observation import NORMAL, Quantity, normal, parse
+from ..scene import Scene
 from .inbox import Received
 from .messages import REMEDIES, Observation
 from .rows import ROW_NS, between, leaps
@@ -77,14 +78,13 @@ class RowChecks:
 
 def columns(scene: Scene) -> frozenset[str]:
     """Cells that a row of this scene must have."""
-    textures = {f"{w.name}_{t}" for w in scene.robot.of_role("texture") for t in scene.arena.textures}
-    return frozenset(textures | {f"{w.name}_mm" for w in scene.robot.of_role("object")})
+    return frozenset(scene.layout.of(Quantity.TEXTURE) + scene.layout.of(Quantity.DISTANCE))
 
 
 def _alone(names: set[str]) -> str:
     """The standard deviation's cell that a direction lacks; empty: none does."""
-    directions = (name for name in names if name.endswith(f"_{NORMAL[0]}"))
-    wanted = (f"{name.removesuffix(NORMAL[0])}{NORMAL[1]}" for name in directions)
+    directions = (column.whisker for column in map(parse, names) if column.what == NORMAL[0])
+    wanted = (normal(whisker)[1].name for whisker in directions)
     return min((name for name in wanted if name not in names), default="")
 
 

@@ -5,7 +5,7 @@ from typing import TextIO
 
 import numpy as np
 
-from ..nav.observations import cell
+from ..observation import Row, cell
 from ..pilot.behaviour import TICK_S
 from ..pilot.pilot import Pilot
 
@@ -18,7 +18,7 @@ class Rows:
     def __init__(self, file: TextIO):
         self._file, self._begun = file, False
 
-    def write(self, row: dict[str, float | None]) -> None:
+    def write(self, row: Row) -> None:
         lines = [] if self._begun else [list(row)]
         lines.append([cell(value) for value in row.values()])
         csv.writer(self._file, lineterminator="\n").writerows(lines)

@@ -1,15 +1,15 @@
 """Observation rows on their way: from cells to messages at the pilot, and from whatever came to filter steps at the desktop."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..nav.observations import ODOMETRY, cell
+from ..observation import NOT_READ, RELEASE, Row, cell
 from ..pilot.pilot import compose
 from .inbox import Received
 from .link import Link
-from .messages import EMPTY, NOT_READ, RELEASE, VALUE, Header, Observation
+from .messages import Header, Observation
 from .ros import BASE_FRAME
 from .streams import Envelope
 
@@ -44,9 +44,9 @@ class RowPublisher:
         self.sent = 0
         self._last_ns = 0
 
-    def send(self, row: dict[str, float | None], kind: int) -> Observation:
-        """Send a row as Pilot.odometry gives it; returns what was sent."""
-        message = to_message(row, kind, self.sent, self.pose)
+    def send(self, row: Row) -> Observation:
+        """Send a row; returns what was sent."""
+        message = to_message(row, self.sent, self.pose)
         self._stream.send(message)
         self.pose, self._last_ns = message.pose, message.header.stamp.ns
         self.sent += 1
@@ -57,32 +57,25 @@ class RowPublisher:
         self._stream.end(self._last_ns, reason)
 
 
-def to_message(row: dict[str, float | None], kind: int, seq: int, pose) -> Observation:
+def to_message(row: Row, seq: int, pose) -> Observation:
     """The Observation of a row; `pose`: summed motion of those before."""
-    motion = np.array([float(cell(row[name])) for name in ODOMETRY])
-    named = {name: value for name, value in row.items() if name != "t_s" and name not in ODOMETRY}
-    kinds = [EMPTY if v is None else NOT_READ if math.isnan(v) else VALUE for v in named.values()]
-    values = [float(cell(v)) if k == VALUE else 0.0 for v, k in zip(named.values(), kinds, strict=True)]
-    header = Header.at(round(row["t_s"] * 1e9), BASE_FRAME)
-    return Observation(header, seq, kind, motion, compose(pose, motion), list(named), np.array(kinds), values)
+    motion = np.array([float(cell(value)) for value in row.motion])
+    values = [float(cell(value)) for value in row.numbers]
+    header = Header.at(round(row.t_s * 1e9), BASE_FRAME)
+    return Observation(header, seq, row.kind, motion, compose(pose, motion), list(row.names), row.cells, values)
 
 
-def to_row(message: Observation, motion=None, t_ns: int | None = None) -> dict[str, float | None]:
-    """Cells as Pilot.odometry gave them; `motion` and `t_ns` in place of the message's own."""
+def to_row(message: Observation, motion=None, t_ns: int | None = None) -> Row:
+    """The row as it was sent; `motion` and `t_ns` in place of the message's own."""
     stamp = message.header.stamp.ns if t_ns is None else t_ns
-    row = {"t_s": round(stamp / 1e9, 9)}
-    row |= zip(ODOMETRY, map(float, message.motion if motion is None else motion), strict=True)
-    cells = (None if k == EMPTY else math.nan if k == NOT_READ else float(v) for k, v in _pairs(message))
-    return row | dict(zip(message.names, cells, strict=True))
+    motion = message.motion if motion is None else motion
+    cells, numbers = np.asarray(message.cells), np.asarray(message.values)
+    return Row(message.kind, round(stamp / 1e9, 9), np.asarray(motion), tuple(message.names), cells, numbers)
 
 
-def _pairs(message: Observation):
-    return zip(message.cells, message.values, strict=True)
-
-
-def time_text(row: dict[str, float | None]) -> str:
+def time_text(row: Row) -> str:
     """A row's time as the files tell it."""
-    return f"{row['t_s']:.10g}"
+    return f"{row.t_s:.10g}"
 
 
 @dataclass(frozen=True)
@@ -96,24 +89,20 @@ class Step:
     envelope: Envelope  # the row's
     within_ns: int = 0  # the time in which the motion was; 0: not all of what was moved since the last step is reported
 
-    def cells(self) -> dict[str, float | None]:
+    def last(self) -> Row:
         """With what `lead` leaves of the motion."""
         return to_row(self.row, self._piece(self._count()), self.t_ns)
 
-    def lead(self) -> list[dict[str, float | None]]:
+    def lead(self) -> list[Row]:
         """Rows to be taken before, nothing read in them: the motion of many rows, in as many.
 
         In one, a filter would refuse it, or take the time between for rows whose motion is lost, and assume some more.
         """
         count = self._count()
-        # A distance of None means that there was no contact; nan means that nothing was read.
-        nothing = {name: math.nan if name.endswith("_mm") else None for name in self.row.names}
         apart_ns = min(self.within_ns // count, ROW_NS) or PIECE_NS
-        rows = []
-        for n in range(1, count):
-            row = {"t_s": round((self.t_ns - (count - n) * apart_ns) / 1e9, 9)}
-            rows.append(row | dict(zip(ODOMETRY, map(float, self._piece(n)), strict=True)) | nothing)
-        return rows
+        last, read = self.last(), np.full(len(self.row.names), NOT_READ, np.uint8)
+        times = (round((self.t_ns - (count - n) * apart_ns) / 1e9, 9) for n in range(1, count))
+        return [replace(last, t_s=t_s, motion=self._piece(n), cells=read) for n, t_s in enumerate(times, 1)]
 
     def _count(self) -> int:
         """Of the pieces: one a row, and none that a filter refuses as long as there are not too many."""

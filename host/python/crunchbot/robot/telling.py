@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from ..observation import Row
 from ..pilot.behaviour import TICK_S
 from ..pilot.pilot import Pilot
 from . import messages
@@ -45,9 +46,9 @@ class Teller:
         self._measured = len(self._pilot.whisks)
         self._tell_behaviour()
 
-    def row(self, row: dict, report: Report, samples: np.ndarray) -> None:
+    def row(self, row: Row, report: Report, samples: np.ndarray) -> None:
         """The row of the 0.1 s that end with the newest block, and the odometry and samples (lanes,) at its end."""
-        self._rows.send(row, self._kind(row))
+        self._rows.send(row)
         self._send("odometry", self._odometry(report))
         self._send("joints", self._joints(samples))
 
@@ -56,14 +57,6 @@ class Teller:
         self._rows.end(reason)
         for stream in self._streams.values():
             stream.end(self._stamp_ns, reason)
-
-    def _kind(self, row: dict) -> int:
-        if any(
-            row[f"{self._pilot.names[lane]}_mm"] is not None and np.isfinite(row[f"{self._pilot.names[lane]}_mm"])
-            for lane in self._pilot.object_lanes
-        ):
-            return messages.RELEASE
-        return messages.WHISK if self._pilot.behaviour.whisking else messages.EXPLORING
 
     def _odometry(self, report: Report) -> messages.Odometry:
         since_s = 1e-9 * (ROW_NS if self._told_ns is None else self._stamp_ns - self._told_ns)

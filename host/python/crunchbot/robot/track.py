@@ -41,8 +41,8 @@ class Track:
         """Motion first where it is long, then the row."""
         for row in step.lead():
             self.filter.step(row)
-        cells = step.cells()
-        t_s, estimate = time_text(cells), self.filter.step(cells)
+        row = step.last()
+        t_s, estimate = time_text(row), self.filter.step(row)
         if self._poses:
             c = estimate.covariance
             print(estimate.line(t_s), file=self._poses, flush=True)

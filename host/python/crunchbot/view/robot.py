@@ -12,15 +12,17 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..robot.messages import CORNER, FACE, HEALTH, NOT_READ, SHAFT, TIP, VALUE, End
+from ..observation import NOT_READ, VALUE, Column, Quantity, parse
+from ..robot.messages import CORNER, FACE, HEALTH, SHAFT, TIP, End
 from ..scene import LARGEST_M, Scene
-from .surfaces import Surfaces, touch_column
+from .surfaces import Surfaces
 
 PATH_MOST = 3000  # points kept: 5 minutes at 10 Hz
 CONTACTS_MOST = 60
 PROCESSES_MOST = 32
 COUNTERS_MOST = 24
 CELLS_MOST = 512
+TOUCHED = (Quantity.NORMAL, Quantity.POINT)  # shown as surfaces, not by whisker
 TEXT_MOST = 200  # characters of any received text
 COUNTER_TEXT_MOST = 40  # of a counter's name, and of its value
 SILENT_S = 3.0  # a process speaks once a second
@@ -40,6 +42,19 @@ def real(value, places: int = 3) -> float | None:
 def text(value: str, most: int = TEXT_MOST) -> str:
     """One line of bounded length."""
     return " ".join(value[: 2 * most].split())[:most]
+
+
+def _sorted(cells: list[tuple[Column, int, float]]) -> tuple[list[dict], list[dict]]:
+    """Cells by whisker: those of texture whiskers, those of object whiskers."""
+    tips, rays = {}, []
+    for column, cell, value in cells:
+        whisker = text(column.whisker)
+        if column.quantity is Quantity.DISTANCE:
+            state = {VALUE: "contact", NOT_READ: "unread"}.get(cell, "none")
+            rays.append({"name": whisker, "state": state, "mm": real(value, 1) if cell == VALUE else None})
+        else:
+            tips.setdefault(whisker, []).append((text(column.what), real(value) if cell == VALUE else None))
+    return [{"name": name, "loglik": values} for name, values in tips.items()], rays
 
 
 def placed(pose) -> dict | None:
@@ -127,31 +142,16 @@ class RobotModel:
         if self._seq is not None and row.seq > self._seq + 1:
             self.rows["unseen"] += row.seq - self._seq - 1
         self._seq = row.seq
-        cells = list(zip(row.names, row.cells.tolist(), row.values.tolist(), strict=True))[:CELLS_MOST]
-        tips, rays = self._sorted([cell for cell in cells if touch_column(cell[0]) is None])
-        self.surfaces.take(row.seq, cells)
+        columns = map(self._column, row.names)
+        cells = list(zip(columns, row.cells.tolist(), row.values.tolist(), strict=True))[:CELLS_MOST]
+        tips, rays = _sorted([cell for cell in cells if cell[0].quantity not in TOUCHED])
+        self.surfaces.take(row.seq, [cell for cell in cells if cell[0].quantity in TOUCHED])
         self.row = {"seq": row.seq, "kind": KINDS[row.kind], "tips": tips, "rays": rays}
 
-    def _sorted(self, cells: list[tuple]) -> tuple[list[dict], list[dict]]:
-        """Cells by whisker: those of texture whiskers, those of object whiskers."""
-        tips, rays = {}, []
-        for name, cell, value in cells:
-            whisker, _, what = name.rpartition("_")
-            whisker, what = self._names.get(name, (text(whisker), text(what)))
-            if what == "mm":
-                state = {VALUE: "contact", NOT_READ: "unread"}.get(cell, "none")
-                rays.append({"name": whisker, "state": state, "mm": real(value, 1) if cell == VALUE else None})
-            else:
-                tips.setdefault(whisker, []).append((what, real(value) if cell == VALUE else None))
-        return [{"name": name, "loglik": values} for name, values in tips.items()], rays
-
-    @property
-    def _names(self) -> dict[str, tuple[str, str]]:
-        """(whisker, texture) by name of a texture's cell; either may have an underscore in it."""
-        if self.scene is None:
-            return {}
-        tips = self.scene.robot.of_role("texture")
-        return {f"{tip.name}_{name}": (tip.name, name) for tip in tips for name in self.scene.arena.textures}
+    def _column(self, name: str) -> Column:
+        """By the scene's layout, or, without one, by the name alone."""
+        known = self.scene.layout.get(name) if self.scene else None
+        return known or parse(name)
 
     def _take_localisation(self, reported) -> None:
         self.rows["missed"] = reported.rows_missed

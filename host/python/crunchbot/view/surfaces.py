@@ -3,17 +3,10 @@
 import math
 from collections import deque
 
-from ..robot.messages import VALUE
-from ..scene import NORMAL, POINT
+from ..observation import NORMAL, POINT, VALUE, Column
 
 SURFACES_MOST = 60
 SENSIBLE_M = 1e5  # beyond, a number is none of a robot's
-
-
-def touch_column(name: str) -> tuple[str, str] | None:
-    """(whisker, column) of a cell that tells of a surface; None: it is another one."""
-    column = next((column for column in (*NORMAL, *POINT) if name.endswith(f"_{column}")), None)
-    return None if column is None else (name.removesuffix(f"_{column}"), column)
 
 
 class Surfaces:
@@ -23,12 +16,12 @@ class Surfaces:
         self.reported: deque[dict] = deque(maxlen=SURFACES_MOST)
         self._seq, self._cells = -1, {}
 
-    def take(self, seq: int, cells: list[tuple]) -> None:
-        """(name, kind, value) of a row."""
+    def take(self, seq: int, cells: list[tuple[Column, int, float]]) -> None:
+        """Columns of NORMAL and POINT, their cells and values in a row."""
         self._seq, self._cells = seq, {}
-        for name, kind, value in cells:
-            if kind == VALUE and abs(value) <= SENSIBLE_M and (found := touch_column(name)):
-                self._cells.setdefault(found[0], {})[found[1]] = value
+        for column, cell, value in cells:
+            if cell == VALUE and abs(value) <= SENSIBLE_M:
+                self._cells.setdefault(column.whisker, {})[column.what] = value
 
     def place(self, seq: int, pose: dict) -> None:
         """Where the robot was at the end of row `seq`: surfaces of that row are placed, once."""

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from crunchbot.nav import localise
-from crunchbot.nav.observations import tells_normals
+from crunchbot.observation import Row, has_normals
 from crunchbot.robot.inbox import Received
 from crunchbot.robot.row_checks import RowChecks
 from crunchbot.robot.rows import to_message
@@ -121,10 +121,10 @@ def test_without_the_columns_a_filter_is_what_it_was(made):
 
 def test_rows_from_the_network_are_judged(made):
     row = rows_of(made.observations, made.scene, 0)
-    assert tells_normals(row) and not tells_normals(["object1_mm"])
+    assert has_normals(row) and not has_normals(["object1_mm"])
 
     def fault(cells):
-        message = to_message(cells, 0, 0, np.zeros(3))
+        message = to_message(Row.of(cells), 0, np.zeros(3))
         return RowChecks(made.scene)(Received("observation", message, Envelope(0, 0, 0)))
 
     assert fault(row) == ""

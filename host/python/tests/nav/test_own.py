@@ -14,8 +14,8 @@ from crunchbot.nav import localise
 from crunchbot.nav.filters import Filter, SettingError
 from crunchbot.nav.observations import Observations
 from crunchbot.nav.own import OwnSensor
+from crunchbot.observation import Row
 from crunchbot.robot.inbox import Received
-from crunchbot.robot.messages import EXPLORING
 from crunchbot.robot.row_checks import RowChecks
 from crunchbot.robot.rows import to_message, to_row
 from crunchbot.robot.streams import Envelope
@@ -94,7 +94,7 @@ def test_a_row_of_the_network_may_hold_a_sensors_reading():
     row = {"t_s": 0.1, "odo_x_m": 0.0, "odo_y_m": 0.0, "odo_theta_rad": 0.0, "feeler_mm": None}
     faults = []
     for cells in ({}, {"light": 0.5}, {"light": None}, {"dark": 0.5}):
-        message = to_message(row | cells, EXPLORING, 0, np.zeros(3))
+        message = to_message(Row.of(row | cells), 0, np.zeros(3))
         faults.append(RowChecks(scene)(Received("observation", message, Envelope(1, 0, 0))))
         assert to_row(message) == row | cells
     assert faults[:3] == [""] * 3 and "no whisker has the cell dark" in faults[3]

@@ -9,7 +9,7 @@ import pytest
 from models import model as texture_model
 
 from crunchbot.nav import localise
-from crunchbot.nav.observations import tells_normals
+from crunchbot.observation import has_normals
 from crunchbot.pilot.behaviour import BLOCK_TICKS, ODOMETRY_TICKS
 from crunchbot.pilot.pilot import Pilot, compose
 from crunchbot.pilot.states import Whisk
@@ -184,7 +184,7 @@ def test_rows_hold_no_normals_where_a_model_is_the_papers_line(models):
     scene, start = make_scene(SEED)
     pilot = Pilot(scene.robot, *line_models(models, scene), SEED)
     rows, _ = explore(scene, start, pilot, SEED, 2_000)
-    assert not pilot.feelers and not tells_normals(rows[0])
+    assert not pilot.feelers and not has_normals(rows[0])
 
 
 def test_every_reported_motion_reaches_a_row_once(flown):

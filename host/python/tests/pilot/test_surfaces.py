@@ -98,7 +98,7 @@ def test_cells_are_empty_without_a_contact_and_filters_pass_them_by(models):
     with_cells, without = localise.Filter("ekf", scene), localise.Filter("ekf", scene)
     floor = {f"{w.name}_{t}": None for w in scene.robot.of_role("texture") for t in scene.arena.textures}
     for row, bare in zip(rows, plain, strict=True):
-        assert with_cells.step(floor | row).pose == without.step(floor | bare).pose
+        assert with_cells.step({**floor, **row}).pose == without.step(floor | bare).pose
 
 
 def test_a_file_with_such_cells_reads_as_one_without(models, tmp_path):
@@ -110,7 +110,7 @@ def test_a_file_with_such_cells_reads_as_one_without(models, tmp_path):
         with open(tmp_path / f"{n}.csv", "w", newline="") as file:
             written = Rows(file)
             for row in out:
-                written.write(floor | row)
+                written.write({**floor, **row})
         read.append(read_observations(tmp_path / f"{n}.csv", scene))
     assert "_surface_ROUGH" in (tmp_path / "0.csv").read_text() and np.isfinite(read[0].radial_m).any()
     assert np.array_equal(read[0].radial_m, read[1].radial_m, equal_nan=True)

@@ -14,7 +14,7 @@ from hostile import variants
 from linkkit import sample
 from robotkit import examples, to_rows
 
-from crunchbot.nav.observations import ODOMETRY
+from crunchbot.observation import ODOMETRY, Row
 from crunchbot.robot import messages as m
 from crunchbot.robot.inbox import Inbox, encoding_of
 from crunchbot.robot.navigator import Navigator, Settings
@@ -69,7 +69,7 @@ def scene_and_rows():
     made = scenes.make("small", 3, ROWS)
     out, pose = [], np.zeros(3)
     for n, row in enumerate(to_rows(made.observations, made.scene)):
-        out.append(m.decode(m.Observation, m.encode(to_message(row, m.EXPLORING, n, pose))))
+        out.append(m.decode(m.Observation, m.encode(to_message(Row.of(row), n, pose))))
         pose = out[-1].pose
     return made.scene, out
 

@@ -8,7 +8,8 @@ import threading
 import numpy as np
 from linkkit import free_endpoint
 
-from crunchbot.nav.observations import ODOMETRY
+from crunchbot import observation as o
+from crunchbot.observation import ODOMETRY
 from crunchbot.robot import messages as m
 
 
@@ -23,7 +24,7 @@ def examples() -> dict[str, object]:
     components = [rng.random(7).astype("f4") for _ in range(6)]
     return {
         "observation": m.Observation(
-            at, 7, m.RELEASE, rng.random(3), rng.random(3), ["l_carpet", "r_mm", "é"], [0, 1, 2], [0.0, 0.0, -3.5]
+            at, 7, o.RELEASE, rng.random(3), rng.random(3), ["l_carpet", "r_mm", "é"], [0, 1, 2], [0.0, 0.0, -3.5]
         ),
         "odometry": m.Odometry(at, pose, twist, "base"),
         "joints": m.JointState(at, ["a/alpha", "a/beta"], [0.5, np.nan], [1.0, 2.0], [3.0]),

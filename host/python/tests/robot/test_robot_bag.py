@@ -16,6 +16,7 @@ from rosbags.typesys import Stores, get_typestore
 from crunchbot.commands.bag import next_free
 from crunchbot.nav import localise
 from crunchbot.nav.observations import observations_path
+from crunchbot.observation import Row
 from crunchbot.pilot.pilot import compose
 from crunchbot.recording.mcapfile import McapFile
 from crunchbot.recording.writing import TopicWriter
@@ -55,7 +56,7 @@ def bag(scene, tmp_path_factory):
         rows, truth = RowPublisher(pilot), pilot.publish("truth")
         others = {topic: pilot.publish(topic) for topic in examples() if topic not in ("observation", "truth")}
         for n, row in enumerate(to_rows(observations, loaded)):
-            sent = rows.send(row, m.EXPLORING)
+            sent = rows.send(Row.of(row))
             truth.send(m.PoseStamped(sent.header, m.Pose.planar(*observations.truth[n])))
         for topic, stream in others.items():
             stream.send(examples()[topic])
@@ -154,7 +155,7 @@ def sent(scene, first: int = 0, last: int = ROWS):
     kept = Kept()
     publisher = RowPublisher(kept)
     for row in to_rows(scene[2], scene[1])[first:last]:
-        publisher.send(row, m.EXPLORING)
+        publisher.send(Row.of(row))
     return kept, publisher.pose
 
 

@@ -10,9 +10,9 @@ from robotkit import to_rows
 
 from crunchbot.nav import filters
 from crunchbot.nav.filters import COMPONENT, Filter, SettingError
+from crunchbot.observation import Row
 from crunchbot.pilot.pilot import compose
 from crunchbot.robot import belief, checkpoint, parts
-from crunchbot.robot import messages as m
 from crunchbot.robot.checkpoint import Checkpoint, CheckpointError
 from crunchbot.robot.inbox import Received
 from crunchbot.robot.memory import AGE_MOST_S, Memory, widen
@@ -42,7 +42,7 @@ def received(rows, stream: int = 7, sent_from_ns: int = 10**18) -> list[Received
     """As a pilot sends them, its sum of motion from zero."""
     pose, out = np.zeros(3), []
     for n, row in enumerate(rows):
-        message = to_message(row, m.EXPLORING, n, pose)
+        message = to_message(Row.of(row), n, pose)
         pose = message.pose
         out.append(Received("observation", message, Envelope(stream, n, sent_from_ns + n * ROW_NS)))
     return out
@@ -188,9 +188,8 @@ def test_after_another_pilot_the_belief_is_wider_by_what_the_robot_could_do(made
 
 def later(row: Received, seconds: float, stream: int | None = None, stamp_s: float | None = None) -> Received:
     """The row as it would be, so much later."""
-    message = to_message(
-        {**_cells(row), "t_s": stamp_s or _stamp_s(row) + seconds}, 0, row.message.seq + 1, np.zeros(3)
-    )
+    cells = {**_cells(row), "t_s": stamp_s or _stamp_s(row) + seconds}
+    message = to_message(Row.of(cells), row.message.seq + 1, np.zeros(3))
     reported = row.envelope
     sent_ns = reported.sent_ns + round(seconds * 1e9)
     return Received("observation", message, Envelope(stream or reported.stream, reported.number, sent_ns))
@@ -281,7 +280,7 @@ def test_a_long_motion_reaches_a_filter_whole(made, motion):
     alone = Filter("odometry", scene)
     for row in step.lead():
         alone.step(row)
-    pose = alone.step(step.cells()).pose
+    pose = alone.step(step.last()).pose
     expected = compose(scene.prior.mean, motion)
     assert pose[:2] == pytest.approx(expected[:2], abs=1e-6)
     assert np.exp(1j * pose[2]) == pytest.approx(np.exp(1j * expected[2]), abs=1e-6)

@@ -10,6 +10,7 @@ from keykit import documented, made_keys  # noqa: F401 - a fixture
 from linkkit import free_endpoint, sample
 from robotkit import Cable, examples, take_until
 
+from crunchbot import observation as o
 from crunchbot.robot import inbox as inbox_module
 from crunchbot.robot import messages as m
 from crunchbot.robot import options
@@ -23,7 +24,7 @@ PATIENCE_S = 30.0
 
 def row(seq: int) -> m.Observation:
     zeros = [0.0, 0.0, 0.0]
-    return m.Observation(m.Header.at(seq * 10**8), seq, m.EXPLORING, zeros, [0.1 * seq, 0.0, 0.0], [], [], [])
+    return m.Observation(m.Header.at(seq * 10**8), seq, o.EXPLORING, zeros, [0.1 * seq, 0.0, 0.0], [], [], [])
 
 
 def seqs(got) -> list[int]:

@@ -19,6 +19,7 @@ from crunchbot import scene as scene_folder
 from crunchbot.errors import UserError
 from crunchbot.nav import localise
 from crunchbot.nav.filters import COMPONENT
+from crunchbot.observation import Row
 from crunchbot.robot import belief, checkpoint, health, initial_pose
 from crunchbot.robot import messages as m
 from crunchbot.robot.inbox import encoding_of
@@ -72,7 +73,7 @@ class Robot:
 
     def send(self, rows) -> None:
         for row in rows:
-            self.rows.send(row, m.EXPLORING)
+            self.rows.send(Row.of(row))
 
 
 def lines(path: Path) -> list[str]:
@@ -230,7 +231,7 @@ def test_behind_by_many_rows_it_takes_the_newest_and_all_the_motion(made):
     with Inside(scene, "localisation", "health/*") as inside:
         watcher = inside.link.subscribe("observation")
         for row in rows:
-            inside.rows.send(row, m.EXPLORING)
+            inside.rows.send(Row.of(row))
         inside.rows.end("over")
         take_until(watcher, lambda got: got and got[-1].over, PATIENCE_S)
         inside.run()
@@ -255,7 +256,7 @@ def test_rows_that_come_late_are_weighed_as_far_as_there_is_time(made, took_s, s
     with Inside(scene) as inside:
         inside.navigator._weigh_s = took_s
         for row in rows:
-            inside.rows.send(row, m.EXPLORING)
+            inside.rows.send(Row.of(row))
         inside.rows.end("over")
         inbox = inside.navigator._inbox
         with inbox._condition:  # all of them have come before it looks
@@ -267,13 +268,13 @@ def test_rows_that_come_late_are_weighed_as_far_as_there_is_time(made, took_s, s
 def test_nonsense_is_counted_and_the_rest_goes_on(made):
     _, scene, rows = made
     with Inside(scene, "localisation", lock_step=True) as inside:
-        bad = m.encode(to_message(rows[0], m.EXPLORING, 0, np.zeros(3)))[:-4]
+        bad = m.encode(to_message(Row.of(rows[0]), 0, np.zeros(3)))[:-4]
         inside.rows._stream._publisher.put(
             bad, encoding=encoding_of(m.Observation), attachment=next(inside.rows._stream._envelopes).pack()
         )
         inside.rows.sent = 1
         for row in rows[:3]:
-            inside.rows.send(row, m.EXPLORING)
+            inside.rows.send(Row.of(row))
         inside.rows.end()
         inside.run()
     assert (inside.counters["refused"], inside.counters["weighed"], inside.counters["missed"]) == (1, 3, 0)
@@ -283,8 +284,8 @@ def spoiled(rows, n: int) -> list[m.Observation]:
     """In place of row n, each well-formed and impossible."""
     pose = np.zeros(3)
     for k in range(n):
-        pose = to_message(rows[k], m.EXPLORING, k, pose).pose
-    good = to_message(rows[n], m.EXPLORING, n, pose)
+        pose = to_message(Row.of(rows[k]), k, pose).pose
+    good = to_message(Row.of(rows[n]), n, pose)
     short = [name for name in good.names if not name.endswith("_mm")]
     far, sums = np.array([1000.0, 0.0, 0.0]), np.array([0.0, 1e5, 0.0])
     return [
@@ -313,9 +314,9 @@ def test_a_row_that_cannot_be_is_refused_and_the_pose_is_as_without_it(made, kin
             stream = inside.rows._stream
             for n, row in enumerate(rows):
                 if n != place:
-                    inside.rows.send(row, m.EXPLORING)
+                    inside.rows.send(Row.of(row))
                     continue
-                sound = to_message(row, m.EXPLORING, n, inside.rows.pose)
+                sound = to_message(Row.of(row), n, inside.rows.pose)
                 if hostile:
                     stream.send(spoiled(rows, place)[kind])
                 else:
@@ -339,7 +340,7 @@ def test_rows_of_another_robot_are_refused_by_name_and_the_navigator_stays(made)
     _, scene, rows = made
     with Inside(scene, "health/navigator", lock_step=True) as inside:
         for row in rows[:3]:
-            inside.rows.send({k: v for k, v in row.items() if not k.endswith("_mm")}, m.EXPLORING)
+            inside.rows.send(Row.of({k: v for k, v in row.items() if not k.endswith("_mm")}))
         inside.rows.end()
         inside.run()
         got = take_until(inside.inbox, lambda got: got and got[-1].message.state == health.ENDED, PATIENCE_S)
@@ -355,17 +356,17 @@ def test_a_second_pilot_is_refused_and_told(made):
     with Inside(scene, "localisation", "health/navigator", lock_step=True) as inside:
         thread = threading.Thread(target=inside.run)
         thread.start()
-        inside.rows.send(rows[0], m.EXPLORING)
+        inside.rows.send(Row.of(rows[0]))
         take_until(inside.inbox, lambda got: any(r.topic == "localisation" for r in got), PATIENCE_S)
         second = RowPublisher(inside.pilot)
         for row in rows[:5]:
-            second.send(row, m.EXPLORING)
+            second.send(Row.of(row))
         reported = take_until(
             inside.inbox,
             lambda got: any(r.topic != "localisation" and r.message.counts["refused"] == "5" for r in got),
             PATIENCE_S,
         )
-        inside.rows.send(rows[1], m.EXPLORING)
+        inside.rows.send(Row.of(rows[1]))
         inside.rows.end()
         thread.join()
     assert (inside.counters["refused"], inside.counters["weighed"], inside.counters["restarts"]) == (5, 2, 0)
@@ -379,7 +380,7 @@ def test_a_navigator_that_stays_goes_on_with_the_next_run(made):
         thread.start()
         for publisher in (inside.rows, RowPublisher(inside.pilot)):
             for row in rows[:4]:
-                publisher.send(row, m.EXPLORING)
+                publisher.send(Row.of(row))
             publisher.end()
             got = take_until(inside.inbox, lambda got: len(got) == 4, PATIENCE_S)
             assert not any(r.over for r in got)

@@ -19,7 +19,8 @@ from commandkit import END_S, command, run, signals_as_before  # noqa: F401 - a 
 from linkkit import free_endpoint, sample
 from robotkit import examples, take_until
 
-from crunchbot.nav.observations import ODOMETRY
+from crunchbot import observation as o
+from crunchbot.observation import ODOMETRY, Row
 from crunchbot.pilot.pilot import compose
 from crunchbot.robot import messages as m
 from crunchbot.robot.inbox import Inbox, Received
@@ -43,7 +44,7 @@ def observed(first: int, last: int, pose=(0.0, 0.0, 0.0), stream: int = 1):
     """Rows first .. last as received, and the sum of their motion."""
     out, pose = [], np.array(pose)
     for n in range(first, last + 1):
-        message = to_message(row(n), m.EXPLORING, n, pose)
+        message = to_message(Row.of(row(n)), n, pose)
         out.append(Received("observation", message, Envelope(stream, n, 0)))
         pose = message.pose
     return out, pose
@@ -127,7 +128,7 @@ def test_a_netbook_writes_and_clients_read_over_the_network():
             child.kill()
             child.communicate()
     rows = [r.message for r in got if r.topic == "observation" and not r.over]
-    assert [list(x.cells) for x in rows] == [[m.VALUE, m.EMPTY, m.NOT_READ]] * 5
+    assert [list(x.cells) for x in rows] == [[o.VALUE, o.EMPTY, o.NOT_READ]] * 5
     assert rows[-1].pose == pytest.approx(moved(range(5)))
     odometry = [r.message for r in got if r.topic == "odometry"]
     assert odometry[-1].pose.pose.xytheta == pytest.approx(tuple(moved(range(5))))

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from robotkit import to_rows
 
+from crunchbot import observation as o
 from crunchbot.nav import localise
-from crunchbot.nav.observations import cell
+from crunchbot.observation import Row, cell
 from crunchbot.pilot.pilot import compose
 from crunchbot.robot import messages as m
 from crunchbot.robot.inbox import Received
@@ -44,7 +45,7 @@ def messages_of(rows, kinds=None) -> list[m.Observation]:
     sink = Sink()
     publisher = RowPublisher(sink)
     for n, row in enumerate(rows):
-        publisher.send(row, kinds[n] if kinds else m.EXPLORING)
+        publisher.send(Row.of(row, kinds[n] if kinds else o.EXPLORING))
     return sink.sent
 
 
@@ -83,20 +84,22 @@ def test_a_row_survives_its_message():
         "t_mm": 171.23456789,
         "u_mm": -math.inf,
     }
-    message = m.decode(m.Observation, m.encode(to_message(row, m.RELEASE, 5, np.array([1.0, 0.0, math.pi / 2]))))
+    message = m.decode(
+        m.Observation, m.encode(to_message(Row.of(row, o.RELEASE), 5, np.array([1.0, 0.0, math.pi / 2])))
+    )
     again = to_row(message)
     assert {k: cell(v) for k, v in again.items()} == {k: cell(v) for k, v in row.items()}
     assert again["odo_x_m"] == 0.0123457 and again["t_s"] == 12.3
     assert message.pose == pytest.approx([1.00001, 0.0123457, math.pi / 2])
-    assert (message.seq, message.kind, message.header.stamp.ns) == (5, m.RELEASE, 12_300_000_000)
-    assert list(message.cells) == [m.VALUE, m.EMPTY, m.NOT_READ, m.EMPTY, m.VALUE, m.VALUE]
+    assert (message.seq, message.kind, message.header.stamp.ns) == (5, o.RELEASE, 12_300_000_000)
+    assert list(message.cells) == [o.VALUE, o.EMPTY, o.NOT_READ, o.EMPTY, o.VALUE, o.VALUE]
 
 
 def test_the_publisher_counts_sums_and_ends():
     sink = Sink()
     publisher = RowPublisher(sink)
     for row in motions(5):
-        publisher.send(row, m.EXPLORING)
+        publisher.send(Row.of(row))
     publisher.end("over")
     assert [row.seq for row in sink.sent[:-1]] == list(range(5)) and publisher.sent == 5
     assert sink.sent[-1] == (500_000_000, "over")
@@ -125,7 +128,7 @@ def test_missed_rows_are_integrated(most, weighed):
 
 
 def test_the_newest_row_counts_and_a_measured_distance_too():
-    kinds = [m.RELEASE if n in (3, 8) else m.EXPLORING for n in range(10)]
+    kinds = [o.RELEASE if n in (3, 8) else o.EXPLORING for n in range(10)]
     rows = received(messages_of(motions(10), kinds))
     steps = Follower().take(rows, 1)
     assert [step.row.seq for step in steps] == [3, 8, 9] and [step.rows for step in steps] == [4, 5, 1]
@@ -147,7 +150,7 @@ def test_the_filters_time_never_goes_back():
     rows = messages_of(motions(3))
     steps = follower.take([*received(rows), *received(rows, stream=2)])
     assert [step.t_ns // 10**8 for step in steps] == [1, 2, 3, 4, 5, 6]
-    assert [step.cells()["t_s"] for step in steps] == [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]
+    assert [step.last()["t_s"] for step in steps] == [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]
 
 
 def test_joining_in_mid_run():
@@ -167,7 +170,7 @@ def test_ends_are_passed_over():
 def fed(name, scene, steps) -> localise.Estimate:
     """What a filter says after these steps."""
     made = localise.Filter(name, scene)
-    return [made.step(row) for step in steps for row in (*step.lead(), step.cells())][-1]
+    return [made.step(row) for step in steps for row in (*step.lead(), step.last())][-1]
 
 
 def test_motion_of_rows_that_were_not_weighed_comes_in_as_many_rows():
@@ -180,7 +183,7 @@ def test_motion_of_rows_that_were_not_weighed_comes_in_as_many_rows():
     for name in rows[0].names:  # not read, as a row of cells says it
         assert all(math.isnan(row[name]) if name.endswith("_mm") else row[name] is None for row in lead)
     total = np.zeros(3)
-    for row in (*lead, step.cells()):
+    for row in (*lead, step.last()):
         total = compose(total, [row[key] for key in localise.ODOMETRY])
     assert total == pytest.approx(between(rows[4].pose, rows[30].pose), abs=1e-9)
 
@@ -211,7 +214,7 @@ def test_the_way_of_a_minute_and_more_leaves_the_rest_a_gap():
 def test_rows_that_are_missing_make_a_filter_no_surer_nor_much_less_sure(made, name):
     """Summed motion over 5 s is as good as 50 rows of odometry: no more is unknown after it than without the gap."""
     rows = messages_of(to_rows(made.observations, made.scene))
-    blind = [replace(row, cells=np.full_like(row.cells, m.NOT_READ)) for row in rows[60:110]]
+    blind = [replace(row, cells=np.full_like(row.cells, o.NOT_READ)) for row in rows[60:110]]
     reported = fed(name, made.scene, Follower().take(received([*rows[:60], *blind, rows[110]])))
     missed = fed(name, made.scene, Follower().take(received([*rows[:60], rows[110]])))
     width, other = (np.sqrt(np.trace(e.covariance[:2, :2])) for e in (reported, missed))
@@ -224,7 +227,7 @@ def test_the_pieces_of_any_motion_are_bounded(motion, within_ns):
     row = messages_of(motions(1))[0]
     step = Step(row, np.array(motion), 10**10, 1, received([row])[0].envelope, within_ns)
     assert len(step.lead()) < PIECES_MOST
-    angles = sum(r[localise.ODOMETRY[2]] for r in (*step.lead(), step.cells()))
+    angles = sum(r[localise.ODOMETRY[2]] for r in (*step.lead(), step.last()))
     assert math.cos(angles) == pytest.approx(math.cos(motion[2]), abs=1e-6)
 
 
@@ -281,10 +284,10 @@ def test_a_robot_moves_no_more_than_it_can_in_its_time(seconds, motion, why):
 def test_motion_that_a_whisk_held_back_is_none_too_much():
     rows = slow_rows(10)
     for n in range(10, 30):
-        still = replace(rows[9], seq=n, kind=m.WHISK, header=m.Header.at((n + 1) * 10**8), motion=np.zeros(3))
+        still = replace(rows[9], seq=n, kind=o.WHISK, header=m.Header.at((n + 1) * 10**8), motion=np.zeros(3))
         rows.append(still)
     motion = np.array([0.3, 0.0, 1.0])
-    row = replace(rows[9], seq=30, kind=m.RELEASE, header=m.Header.at(31 * 10**8), motion=motion)
+    row = replace(rows[9], seq=30, kind=o.RELEASE, header=m.Header.at(31 * 10**8), motion=motion)
     assert fault_after(rows, replace(row, pose=compose(rows[9].pose, motion))) == ""
 
 

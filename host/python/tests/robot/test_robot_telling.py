@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from crunchbot.observation import Row
 from crunchbot.pilot.behaviour import BLOCK_TICKS
 from crunchbot.pilot.states import State
 from crunchbot.pilot.wheels import NO_BUMPS
@@ -13,7 +14,7 @@ from crunchbot.robot.telling import TICK_NS, Teller
 from crunchbot.robot.wheels import Report
 
 ROW_BLOCKS = 5
-ROW = {"t_s": 0.1, "odo_x_m": 0.0, "odo_y_m": 0.0, "odo_theta_rad": 0.0}
+ROW = Row.of({"t_s": 0.1, "odo_x_m": 0.0, "odo_y_m": 0.0, "odo_theta_rad": 0.0})
 COVARIANCE = np.array([[4e-6, 1e-7, 2e-7], [1e-7, 1e-6, 3e-7], [2e-7, 3e-7, 9e-6]])
 
 

@@ -10,6 +10,7 @@ from functools import cache
 import numpy as np
 from linkkit import sample
 
+from crunchbot import observation as o
 from crunchbot.robot import messages as m
 from crunchbot.robot.inbox import Inbox
 from crunchbot.robot.rows import between
@@ -130,14 +131,14 @@ class MadeUpRun:
             under = texture_at(*at(true, tip.tip_m))
             for name in ARENA.textures:
                 names.append(f"{tip.name}_{name}")
-                cells.append(m.EMPTY if whisking else m.VALUE)
+                cells.append(o.EMPTY if whisking else o.VALUE)
                 values.append(0.0 if whisking else float(rng.normal(-1.0 if name[0] == under else -6.0, 0.8)))
         for ray in SCENE.robot.of_role("object"):
             radius = None if whisking else reach(ray, row)
             names.append(f"{ray.name}_mm")
-            cells.append(m.NOT_READ if whisking else m.EMPTY if radius is None else m.VALUE)
+            cells.append(o.NOT_READ if whisking else o.EMPTY if radius is None else o.VALUE)
             values.append(1e3 * (radius or 0.0))
-        kind = m.WHISK if whisking else m.EXPLORING
+        kind = o.WHISK if whisking else o.EXPLORING
         before, pose = (between(route(0.0), route(max(0, n) / 10)) for n in (row - 1, row))
         motion = between(before, pose)
         return m.Observation(

@@ -6,11 +6,12 @@ from functools import partial
 import numpy as np
 from viewrobot import ROW_NS
 
+from crunchbot import observation as o
 from crunchbot.nav.filters import Filter
+from crunchbot.observation import NORMAL, POINT
 from crunchbot.pilot.pilot import compose
 from crunchbot.robot import messages as m
 from crunchbot.robot.belief import condense, to_message
-from crunchbot.scene import NORMAL, POINT
 from crunchbot_lab.scenes import arenas
 from crunchbot_lab.scenes.families import Recipe, recipe
 from crunchbot_lab.scenes.making import make_recipe
@@ -59,15 +60,15 @@ class SceneRun:
 
     def _observation(self, row: int) -> m.Observation:
         texture, radial = self._rows.texture[row].ravel(), 1e3 * self._rows.radial_m[row]
-        cells = np.where(np.isnan(texture), m.EMPTY, m.VALUE)
-        cells = np.append(cells, np.select([np.isnan(radial), np.isinf(radial)], [m.NOT_READ, m.EMPTY], m.VALUE))
+        cells = np.where(np.isnan(texture), o.EMPTY, o.VALUE)
+        cells = np.append(cells, np.select([np.isnan(radial), np.isinf(radial)], [o.NOT_READ, o.EMPTY], o.VALUE))
         touched = self._touched(row)
-        cells = np.append(cells, np.where(np.isnan(touched), m.EMPTY, m.VALUE))
-        values = np.where(cells == m.VALUE, np.concatenate([texture, radial, touched]), 0.0)
+        cells = np.append(cells, np.where(np.isnan(touched), o.EMPTY, o.VALUE))
+        values = np.where(cells == o.VALUE, np.concatenate([texture, radial, touched]), 0.0)
         motion = self._rows.odometry[row]
         self._pose = compose(self._pose, motion)
         return m.Observation(
-            m.Header.at(row * ROW_NS), row, m.EXPLORING, motion, self._pose, self._names, cells.astype(np.uint8), values
+            m.Header.at(row * ROW_NS), row, o.EXPLORING, motion, self._pose, self._names, cells.astype(np.uint8), values
         )
 
     def _touched(self, row: int) -> np.ndarray:
