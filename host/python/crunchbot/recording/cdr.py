@@ -63,35 +63,6 @@ def _alignment(kind: np.dtype) -> int:
     return kind.base.itemsize
 
 
-class Encoder:
-    """Writes a message whose layout varies, such as one with strings."""
-
-    def __init__(self):
-        self._bytes = bytearray()
-
-    def number(self, code: str, value: int) -> "Encoder":
-        """A number of the struct module's `code`."""
-        self._bytes += bytes(-len(self._bytes) % struct.calcsize(code)) + struct.pack(f"<{code}", value)
-        return self
-
-    def array(self, kind, values) -> "Encoder":
-        """Numbers of the NumPy dtype `kind` one behind another, without their count. None of them takes no room at all."""
-        data = np.asarray(values, np.dtype(kind).newbyteorder("<"))
-        if data.size:
-            self._bytes += bytes(-len(self._bytes) % data.itemsize) + data.tobytes()
-        return self
-
-    def text(self, value: str) -> "Encoder":
-        """A string: its length with the closing zero, its bytes, the zero."""
-        data = value.encode() + b"\x00"
-        self.number("I", len(data))
-        self._bytes += data
-        return self
-
-    def message(self) -> bytes:
-        return HEADER + bytes(self._bytes)
-
-
 class Decoder:
     """Reads a message's values off its bytes and believes no length: Malformed when there are too few bytes for it."""
 

@@ -3,13 +3,15 @@
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib.resources import files
+from types import SimpleNamespace
 
 import numpy as np
 
 from whisker_protocol import LANES
 
 from ..bridge.ring import FRAME, SAMPLE, DaemonStats
-from .cdr import HEADER, Encoder, Layout
+from .cdr import HEADER, Layout
+from .types import encode
 
 BLOCK_FRAMES = 200  # 0.1 s: few enough messages to cost nothing, short enough to lose little
 FRAMES_MOST = 65536  # of a block; more is a damaged length
@@ -163,13 +165,11 @@ def encode_health(stamp_ns: int, frames: int, missing: int, overrun: int, bad: n
 
 def encode_diagnostics(stamp_ns: int, level: bytes, text: str, values: dict[str, object]) -> bytes:
     """A DiagnosticArray of one status."""
-    sec, nanosec = time_of(stamp_ns)
-    out = Encoder().number("i", sec).number("I", nanosec).text("")
-    out.number("I", 1).number("B", level[0]).text("whisker: stream").text(text).text("whisker bridge")
-    out.number("I", len(values))
-    for key, value in values.items():
-        out.text(key).text(str(value))
-    return out.message()
+    stamp = SimpleNamespace(**dict(zip(("sec", "nanosec"), time_of(stamp_ns), strict=True)))
+    status = SimpleNamespace(level=level[0], name="whisker: stream", message=text, hardware_id="whisker bridge")
+    status.values = [SimpleNamespace(key=key, value=str(value)) for key, value in values.items()]
+    array = SimpleNamespace(header=SimpleNamespace(stamp=stamp, frame_id=""), status=[status])
+    return encode("diagnostic_msgs/msg/DiagnosticArray", array)
 
 
 def time_of(stamp_ns: int) -> tuple[int, int]:

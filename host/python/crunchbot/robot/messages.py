@@ -12,6 +12,7 @@ import numpy as np
 
 from ..errors import UserError
 from ..recording.cdr import Malformed
+from ..recording.types import encode as encode_as
 from .ranges import RANGES, ROW
 from .ros import (
     Header,
@@ -30,7 +31,6 @@ from .ros import (
     Vector3,
 )
 from .schema import Codec, OutOfRange
-from .schema import encode as encode_as
 
 UNKNOWN, TIP, SHAFT = range(3)  # Contact.part
 FACE, CORNER = 1, 2  # Contact.shape; or UNKNOWN

@@ -1,32 +1,26 @@
-"""Any message of crunchbot/msgs to CDR and back, by what its .msg file says. Strict: a message is whole or is refused."""
+"""Any message of crunchbot/msgs from CDR, by its type. Strict: a message is whole and possible, or is refused by its field.
+
+rosbags' own decoder is not used here. It names no field, it reads strings without a closing zero and truth values of 2, and it
+knows no limits: what comes over a network is judged number by number (`ranges`).
+"""
 
 from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
+from rosbags.interfaces import Nodetype
 
-from ..recording.cdr import Decoder, Encoder, Malformed
-from ..recording.messages import SEPARATOR, definition
+from ..recording.cdr import Decoder, Malformed
+from ..recording.types import DTYPES, store
 from .ranges import Range
 
-PRIMITIVES = {
-    "bool": "u1",
-    "byte": "u1",
-    "uint8": "u1",
-    "int32": "i4",
-    "uint32": "u4",
-    "int64": "i8",
-    "uint64": "u8",
-    "float32": "f4",
-    "float64": "f8",
-}
 TEXT = "string"
 ONE, MANY = -1, 0  # of Field.count; other values are the length of a fixed array
 
 
 @dataclass(frozen=True)
 class Field:
-    """`kind`: a key of PRIMITIVES, TEXT, or "package/msg/Type"."""
+    """`kind`: a key of DTYPES, TEXT, or "package/msg/Type"."""
 
     name: str
     kind: str
@@ -36,38 +30,18 @@ class Field:
 @cache
 def fields_of(schema: str) -> tuple[Field, ...]:
     """The fields of "package/msg/Type" in the order of its file."""
-    package, _, name = schema.split("/")
-    lines = definition(f"{package}/msg/{name}").partition(SEPARATOR)[0].splitlines()
-    words = (line.partition("#")[0].split() for line in lines)
-    return tuple(_field(word[0], word[1], package) for word in words if word and "=" not in word[1])
+    return tuple(_field(name, *description) for name, description in store().fielddefs[schema][1])
 
 
-def _field(kind: str, name: str, package: str) -> Field:
-    kind, bracket, length = kind.partition("[")
-    count = ONE if not bracket else int(length.rstrip("]") or MANY)
-    if kind not in PRIMITIVES and kind != TEXT:
-        owner, _, kind = kind.rpartition("/")
-        kind = f"{owner or package}/msg/{kind}"
-    return Field(name, kind, count)
+def _field(name: str, node: Nodetype, detail) -> Field:
+    if node in (Nodetype.ARRAY, Nodetype.SEQUENCE):
+        (node, detail), length = detail
+        return Field(name, _kind(node, detail), length or MANY)
+    return Field(name, _kind(node, detail), ONE)
 
 
-def write(out: Encoder, schema: str, message) -> None:
-    """Append the fields of `message`, an object with an attribute of each name."""
-    for field in fields_of(schema):
-        value = getattr(message, field.name)
-        if field.count == MANY:
-            out.number("I", len(value))
-        elif field.count != ONE and len(value) != field.count:
-            raise ValueError(f"{schema}: {field.name} has {len(value)} elements, {field.count} belong; mend the sender")
-        _write_values(out, field, [value] if field.count == ONE else value)
-
-
-def _write_values(out: Encoder, field: Field, values) -> None:
-    if field.kind in PRIMITIVES:
-        out.array(PRIMITIVES[field.kind], values)
-    else:
-        for value in values:
-            out.text(value) if field.kind == TEXT else write(out, field.kind, value)
+def _kind(node: Nodetype, detail) -> str:
+    return detail if node is Nodetype.NAME else detail[0]
 
 
 class OutOfRange(Malformed):
@@ -104,8 +78,8 @@ class Codec:
         count = int(data.number("I")) if field.count == MANY else abs(field.count)
         if field.count == MANY and count > limits.count:
             raise OutOfRange(f"{count} elements, {limits.count} are the most")
-        if field.kind in PRIMITIVES:
-            values = data.array(PRIMITIVES[field.kind], count)
+        if field.kind in DTYPES:
+            values = data.array(DTYPES[field.kind], count)
             _check_numbers(values, limits)
             return _plain(field.kind, values[0]) if field.count == ONE else values
         inner = [self._element(data, field, limits, place) for _ in range(count)]
@@ -130,13 +104,6 @@ def _check_numbers(values: np.ndarray, limits: Range) -> None:
         at = np.flatnonzero(bad)[0]
         low, high = (np.broadcast_to(limit, values.shape)[at] for limit in (limits.low, limits.high))
         raise OutOfRange(f"{values[at]:.6g} is not within {low:.6g} and {high:.6g}")
-
-
-def encode(schema: str, message) -> bytes:
-    """CDR of an object with an attribute for each field of the schema."""
-    out = Encoder()
-    write(out, schema, message)
-    return out.message()
 
 
 def _plain(kind: str, value: np.generic):

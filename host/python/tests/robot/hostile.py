@@ -8,7 +8,7 @@ import numpy as np
 
 from crunchbot.robot import messages as m
 from crunchbot.robot.ranges import RANGES
-from crunchbot.robot.schema import MANY, ONE, PRIMITIVES, TEXT, Field, fields_of
+from crunchbot.robot.schema import DTYPES, MANY, ONE, TEXT, Field, fields_of
 
 FLOATS = (math.nan, math.inf, -math.inf, 1e308, -1e308, 3e38, -3e38)
 
@@ -17,7 +17,7 @@ def places(schema: str, path: tuple[str, ...] = ()) -> Iterator[tuple[str, tuple
     """(schema that holds it, path, field) of each number, text and sequence, those of messages within messages too."""
     for field in fields_of(schema):
         here = (*path, field.name)
-        if field.kind in PRIMITIVES or field.kind == TEXT or field.count == MANY:
+        if field.kind in DTYPES or field.kind == TEXT or field.count == MANY:
             yield schema, here, field
         else:
             yield from places(field.kind, here)
@@ -28,9 +28,9 @@ def beyond(schema: str, field: Field) -> list:
     limits = RANGES[f"{schema}:{field.name}"]
     if field.kind == TEXT:
         return ["x" * (int(limits.high) + 1)]
-    if field.kind not in PRIMITIVES:
+    if field.kind not in DTYPES or field.kind == "bool":  # an encoder makes a truth value of any number
         return []
-    kind = np.dtype(PRIMITIVES[field.kind])
+    kind = np.dtype(DTYPES[field.kind])
     if kind.kind == "f":
         low, high = float(np.min(limits.low)), float(np.max(limits.high))
         close = [v for v in (low - 0.01 - 1e-3 * abs(low), 1.001 * high) if math.isfinite(v)]

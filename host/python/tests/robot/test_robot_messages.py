@@ -13,9 +13,10 @@ from robotkit import examples, flat
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from crunchbot.recording.messages import definition
+from crunchbot.recording.types import store
 from crunchbot.robot import messages as m
 from crunchbot.robot.ranges import RANGES
-from crunchbot.robot.schema import MANY, PRIMITIVES, TEXT, fields_of
+from crunchbot.robot.schema import DTYPES, MANY, TEXT, fields_of
 
 
 @pytest.mark.parametrize("schema", m.TYPES)
@@ -112,14 +113,27 @@ def test_rows_whose_sequences_differ_are_refused():
         m.decode(m.Observation, m.encode(row))
 
 
-def test_a_truth_value_is_0_or_1():
+@pytest.mark.parametrize("flag", ["touching", "measured"])
+@pytest.mark.parametrize("value", [2, 255])
+def test_a_truth_value_is_0_or_1(flag, value):
     contact = examples()["contact"]
-    data = bytearray(m.encode(contact))
-    place = data.index(b"front\x00") + 6
-    assert data[place] == 1
-    data[place] = 2
-    with pytest.raises(m.MessageError, match="field touching: 2 is not within 0 and 1"):
-        m.decode(m.Contact, bytes(data))
+    one, other = (bytearray(m.encode(replace(contact, **{flag: on}))) for on in (True, False))
+    (place,) = (n for n, (a, b) in enumerate(zip(one, other, strict=True)) if a != b)
+    assert one[place] == 1
+    one[place] = value
+    with pytest.raises(m.MessageError, match=f"field {flag}: {value} is not within 0 and 1"):
+        m.decode(m.Contact, bytes(one))
+
+
+@pytest.mark.parametrize(
+    ("schema", "published"),
+    [
+        ("builtin_interfaces/msg/Time", "b106235e25a4c5ed35098aa0a61a3ee9c9b18d197f398b0e4206cea9acf9c197"),
+        ("std_msgs/msg/Header", "f49fb3ae2cf070f793645ff749683ac6b06203e41c891e17701b1cb597ce6a01"),
+    ],
+)
+def test_types_of_ros_have_the_hash_that_ros_publishes(schema, published):
+    assert store().hash_rihs01(schema) == f"RIHS01_{published}"
 
 
 def test_an_array_of_another_length_is_not_sent():
@@ -148,7 +162,7 @@ def test_every_field_has_a_range_and_every_range_a_field():
         limits = RANGES[place]
         if field.kind == TEXT:
             assert 0 < limits.high <= 4096, place
-        elif field.kind in PRIMITIVES and place != "whisker_msgs/msg/Observation:values":
+        elif field.kind in DTYPES and place != "whisker_msgs/msg/Observation:values":
             assert np.isfinite(limits.low).all() and np.isfinite(limits.high).all(), place
         assert (limits.count > 0) == (field.count == MANY), place
 
