@@ -10,6 +10,7 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+import tomli_w
 
 from . import observation
 from .files import UnreadableError
@@ -186,36 +187,34 @@ def write(path, scene: Scene) -> None:
     folder = Path(path)
     folder.mkdir(parents=True, exist_ok=True)
     arena, robot, prior = scene.arena, scene.robot, scene.prior
-    text = [_toml("size_m", arena.size_m), _toml("tile_m", arena.tile_m)]
-    text += [_toml("textures", arena.textures), _toml("floor", arena.floor)]
-    text += [_toml("wall", arena.wall)] if arena.wall else []
     surface = dict(arena.surfaces)
-    for header, boxes in (("obstacle", arena.obstacles), ("unknown", arena.unknown)):
-        for box in boxes:
-            text += ["", f"[[{header}]]", _toml("min_m", box[:2]), _toml("max_m", box[2:])]
-            text += [_toml("surface", surface[box])] if box in surface and header == "obstacle" else []
-    (folder / ARENA).write_text("\n".join(text) + "\n")
-    text = [_toml(key, getattr(robot, key)) for key in ("body_radius_m", "odometry_relative_sigma", "radial_sigma_m")]
-    for whisker in robot.whiskers:
-        text += ["", "[[whisker]]"] + [_toml(k, v) for k, v in vars(whisker).items() if v is not None]
-    for sensor in robot.sensors:
-        text += ["", "[[sensor]]"] + [_toml(key, value) for key, value in write_sensor(folder, sensor).items()]
-    (folder / ROBOT).write_text("\n".join(text) + "\n")
+    content = {"size_m": arena.size_m, "tile_m": arena.tile_m, "textures": arena.textures, "floor": arena.floor}
+    content |= {"wall": arena.wall} if arena.wall else {}
+    obstacles = [_corners(box) | ({"surface": surface[box]} if box in surface else {}) for box in arena.obstacles]
+    _write(folder / ARENA, content | {"obstacle": obstacles, "unknown": list(map(_corners, arena.unknown))})
+    content = {key: getattr(robot, key) for key in ("body_radius_m", "odometry_relative_sigma", "radial_sigma_m")}
+    sensors = [write_sensor(folder, sensor) for sensor in robot.sensors]
+    _write(folder / ROBOT, content | {"whisker": list(map(_given, robot.whiskers)), "sensor": sensors})
     if prior is not None:
-        (folder / PRIOR).write_text("\n".join(_toml(k, v) for k, v in vars(prior).items() if v is not None) + "\n")
+        _write(folder / PRIOR, _given(prior))
+
+
+def _corners(box: Box) -> dict:
+    return {"min_m": box[:2], "max_m": box[2:]}
+
+
+def _given(item) -> dict:
+    """Its fields, but for those that are None."""
+    return {key: value for key, value in vars(item).items() if value is not None}
+
+
+def _write(path: Path, content: dict) -> None:
+    """Tables of which there is none are left out."""
+    path.write_text(tomli_w.dumps({key: value for key, value in content.items() if value != []}))
 
 
 def _line(word: str, *values) -> str:
     return " ".join([word, *(value if isinstance(value, str) else repr(float(value)) for value in values)])
-
-
-def _toml(key: str, value) -> str:
-    def text(item) -> str:
-        if isinstance(item, tuple):
-            return "[" + ", ".join(map(text, item)) + "]"
-        return '"' + item.replace("\\", "\\\\").replace('"', '\\"') + '"' if isinstance(item, str) else repr(item)
-
-    return f"{key} = {text(value)}"
 
 
 TINY = 1e-9

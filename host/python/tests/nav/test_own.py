@@ -104,7 +104,7 @@ def test_a_row_of_the_network_may_hold_a_sensors_reading():
     "name, old, new, reported",
     [
         ("robot.toml", 'map = "light.png"', 'map = "none.png"', "'map' .*none.png: cannot be read"),
-        ("robot.toml", "at_m = [0.05, 0.0]", "at_m = [0.05]", "'at_m' must be a list of 2"),
+        ("robot.toml", "    0.05,\n    0.0,\n", "    0.05,\n", "'at_m' must be a list of 2"),
         ("light.csv", "from,to", "from,too", "column 'to' is missing"),
         ("light.csv", "-4.0", "9.0", "line 2: 'from' and 'to' are no bin"),
         ("light.csv", "0.0375,0.0375", "-1,0.0375", "line 2: a likelihood is negative"),

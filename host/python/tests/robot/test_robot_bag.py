@@ -103,7 +103,7 @@ def test_what_lies_beside_a_scenes_files_is_in_the_bag_too(scene, tmp_path):
     scenes.write_scene(tmp_path, replace(loaded, robot=replace(loaded.robot, sensors=(sensor,))), observations)
     arena = (tmp_path / "arena.toml").read_text()
     Image.fromarray((loaded.arena.floor_indices()[::-1] * 127).astype(np.uint8)).save(tmp_path / "floor.png")
-    (tmp_path / "arena.toml").write_text(re.sub(r"floor = .*", 'floor = "floor.png"', arena))
+    (tmp_path / "arena.toml").write_text(re.sub(r"floor = \[.*?\]", 'floor = "floor.png"', arena, flags=re.DOTALL))
     reported = metadata("robot", tmp_path)
     assert (
         reported["arena.toml"] == arena
