@@ -1,4 +1,7 @@
-"""What command lines have in common: the parser, arguments that several take, and types of arguments."""
+"""What command lines have in common: the parser, arguments that several take, and types of arguments.
+
+The parser is argparse's and no library's: a subcommand is imported only when it is called, and the core has no dependency for it.
+"""
 
 import argparse
 import math

@@ -1,5 +1,6 @@
 // The bytes of USB/IP 1.1.1 (Documentation/usb/usbip_protocol in the Linux kernel): what a client sends, decoded piece
-// by piece as it comes, and the server's answers. All numbers big-endian. No sockets, no device.
+// by piece as it comes, and the server's answers. All numbers big-endian. No sockets, no device. It is our own code: no
+// maintained library of a permissive licence serves USB/IP without a kernel module.
 #pragma once
 
 #include <cstdint>

@@ -15,6 +15,7 @@ from ..robot.models import load_models
 from ..robot.options import link_that_warns
 from ..robot.supervisor import Supervisor
 from ..robot.truth import TruthWatcher
+from ..robot.units import TARGET, Installed, units
 from ..stopping import stop_on_signals
 
 EXAMPLE = "whisker robot --simulated --desktop"
@@ -54,10 +55,14 @@ def add(parser) -> None:
         "--seconds", type=number_above(0.0), default=DAY_S, metavar="S", help="simulated length (a day)"
     )
     parser.add_argument("--pace", type=number_above(0.0), default=1.0, metavar="X", help="simulated seconds per second")
+    text = "write systemd units that start these processes on a real robot into this folder, and start nothing"
+    parser.add_argument("--units", type=Path, metavar="DIR", help=text)
     parser.set_defaults(run=run)
 
 
 def run(arguments) -> int:
+    if arguments.units:
+        return _write_units(arguments)
     stop = stop_on_signals()
     _look_first(arguments)
     logs = run_folder(arguments.out / "logs")
@@ -72,6 +77,31 @@ def run(arguments) -> int:
             print(f"starting {', '.join(program.name for program in table)}; logs: {logs}", flush=True)
             ended = Supervisor(table, logs, link, until).run(stop)
     print(f"all ended: {ended}")
+    return 0
+
+
+def _write_units(arguments) -> int:
+    """Units of pilot and desktop; whiskerd and whisker-base have theirs by `cmake --install`."""
+    if arguments.simulated or not (arguments.scene and arguments.models):
+        raise UserError("robot: --units without SCENE and --models, or with --simulated; give the real robot's")
+    load_models(arguments.models, scenes.load(arguments.scene).robot)
+    address = (arguments.listen, arguments.first_port, arguments.zenoh_config and arguments.zenoh_config.resolve())
+    meeting = Installed(arguments.ring, arguments.units, *address, port=arguments.port)
+    scene, models = arguments.scene.resolve(), arguments.models.resolve()
+    body = parts.Body(scene, models, arguments.create, arguments.port, arguments.seed)
+    table = [program for program in parts.netbook(body, meeting, arguments.desktop) if program.name != "base"]
+    if arguments.desktop:
+        table += parts.desktop(body, meeting, meeting.bag, None if arguments.no_view else arguments.view_port)
+    made = units(table, meeting)
+    try:
+        arguments.units.mkdir(parents=True, exist_ok=True)
+        for name, text in made.items():
+            (arguments.units / name).write_text(text)
+    except OSError as error:
+        raise UserError(f"--units {arguments.units}: cannot be written ({error.strerror}); choose another") from error
+    print(
+        f"{arguments.units}: {', '.join(made)}; next: copy them to /etc/systemd/system, systemctl enable --now {TARGET}"
+    )
     return 0
 
 

@@ -1,4 +1,4 @@
-"""What every process of the robot says of itself once a second."""
+"""What every process of the robot says of itself: once a second to the others, at each turn of its loop to its service manager."""
 
 import os
 import time
@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 from .link import Link
 from .messages import HEALTH, Header, KeyValue, ProcessHealth
+from .notify import Notify
 
 PERIOD_S = 1.0
 RUNNING, ENDED = "running", "ended"
@@ -21,9 +22,11 @@ class Health:
         self._stream = link.publish(f"{HEALTH}/{link.process}")
         self._process, self._counters = link.process, counters
         self._due_s, self._state = 0.0, ""
+        self._manager = Notify()
 
     def tell(self, stamp_ns: int, state: str = RUNNING, last_error: str = "") -> None:
         """`stamp_ns`: the bridge's clock as far as this process knows it."""
+        self._manager.stopping() if state == ENDED else self._manager.alive()
         now = time.monotonic()
         if now < self._due_s and state == self._state:
             return

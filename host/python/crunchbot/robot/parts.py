@@ -42,6 +42,11 @@ class Places:
     folder: Path
 
     @property
+    def reading(self) -> list:
+        """Options of what reads the ring."""
+        return ["--ring", self.ring]
+
+    @property
     def base(self) -> Path:
         return self.folder / "base.sock"
 
@@ -110,7 +115,7 @@ def daemon(meeting: Meeting, simulated: bool) -> Program:
 def netbook(body: Body, meeting: Meeting, with_desktop: bool) -> list[Program]:
     """Base and pilot. The pilot is the last, so that it is ended first, and stops the wheels."""
     base = [program("whisker-base"), "--port", body.port, "--socket", meeting.base, "--model", body.create, "--wait"]
-    pilot = [*whisker("pilot"), body.scene, "--models", body.models, "--ring", meeting.ring, "--base", meeting.base]
+    pilot = [*whisker("pilot"), body.scene, "--models", body.models, *meeting.reading, "--base", meeting.base]
     pilot += ["--seed", body.seed, "--listen", meeting.endpoint(1), "--connect", meeting.endpoint(2)]
     pilot += meeting.options
     pilot += ["--await", "navigator"] if with_desktop else []
@@ -131,7 +136,7 @@ def desktop(body: Body, meeting: Meeting, bag: Path | None, view_port: int | Non
         command = [*whisker("bag"), bag, "--scene", body.scene, "--stay", "--next", *everybody]
         table.append(Program.of("bag", command, tells=True))
     if view_port is not None:
-        command = [*whisker("view"), "--ring", meeting.ring, "--robot", "--scene", body.scene, "--port", view_port]
+        command = [*whisker("view"), *meeting.reading, "--robot", "--scene", body.scene, "--port", view_port]
         table.append(Program.of("view", [*command, *everybody]))
     return table
 
