@@ -1,4 +1,4 @@
-"""What a service manager is told by a process: that it is ready, that it lives, that it stops (sd_notify(3)).
+"""What a process reports to its service manager: that it is ready, that it lives, that it stops (sd_notify(3)).
 
 Without NOTIFY_SOCKET in the environment nothing is sent. Nothing here waits: a message that finds no room is lost.
 """

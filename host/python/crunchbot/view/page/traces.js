@@ -1,5 +1,5 @@
 /* The traces: a row per lane, in it a strip per axis; one bin is one column of device pixels. Plots are drawn on a canvas by
-   our own code: the page works without a network and is 150 kB smaller than with a plot library. */
+   our own code: the page works without a network, and no plot library has to be served with it. */
 const GUTTER = 86; // px left of the strips, for labels
 const FOOT = 22; // px below, for the time axis
 const HEAD = 280; // px of the window that are not for traces
