@@ -19,8 +19,8 @@ from quickmodels import quick_models
 
 from crunchbot import scene as scenes
 from crunchbot.bridge.ring import Reader
-from crunchbot.robot import link as links
-from crunchbot.robot import parts
+from crunchbot.robot.network import link as links
+from crunchbot.robot.processes import parts
 from crunchbot_lab.demo.chain import ChainRun, Link, run_chain
 from crunchbot_lab.report.run import FILTERS
 from crunchbot_lab.simulation.scenes import make_scene

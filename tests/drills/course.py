@@ -6,7 +6,7 @@ import time
 from bisect import bisect_left
 from dataclasses import asdict, dataclass, field, replace
 
-from crunchbot.robot.link import Link
+from crunchbot.robot.network.link import Link
 from crunchbot_lab.simulation.scenes import make_robot
 
 from .faults import FAULTS, WHISKER, Fault

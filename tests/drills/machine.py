@@ -10,11 +10,11 @@ from pathlib import Path
 
 from crunchbot import scene as scenes
 from crunchbot.pilot.base import Base, BaseError
-from crunchbot.robot import parts
-from crunchbot.robot.link import Link
-from crunchbot.robot.logs import run_folder
-from crunchbot.robot.supervisor import Supervisor
-from crunchbot.robot.truth import TruthWatcher
+from crunchbot.robot.network.link import Link
+from crunchbot.robot.network.truth import TruthWatcher
+from crunchbot.robot.processes import parts
+from crunchbot.robot.processes.logs import run_folder
+from crunchbot.robot.processes.supervisor import Supervisor
 from crunchbot_lab.simulation.scenes import make_scene
 
 from .relays import Hands, Line, Network, free_ports

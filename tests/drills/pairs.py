@@ -23,7 +23,7 @@ from pathlib import Path
 
 from quickmodels import quick_models
 
-from crunchbot.robot.children import DEAD
+from crunchbot.robot.processes.children import DEAD
 
 from .relays import free_ports
 

@@ -13,7 +13,7 @@ from bisect import bisect_right
 import numpy as np
 
 from crunchbot.bridge.ring import Reader, RingError
-from crunchbot.robot.link import Link
+from crunchbot.robot.network.link import Link
 from whisker_protocol import CODES, STATUS_CODE_SHIFT
 
 from .machine import Machine

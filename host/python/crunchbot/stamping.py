@@ -1,4 +1,4 @@
-"""Lines that begin with the time, for a process whose output is a log (crunchbot.robot.logs)."""
+"""Lines that begin with the time, for a process whose output is a log (crunchbot.robot.processes.logs)."""
 
 import os
 import sys

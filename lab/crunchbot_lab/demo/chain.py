@@ -12,8 +12,8 @@ from contextlib import ExitStack, closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from crunchbot.robot import parts
-from crunchbot.robot.children import Child, Program
+from crunchbot.robot.processes import parts
+from crunchbot.robot.processes.children import Child, Program
 
 from ..report.run import FILTERS
 

@@ -25,8 +25,8 @@ from crunchbot.observation import cell
 from crunchbot.pilot.behaviour import BLOCK_TICKS
 from crunchbot.pilot.pilot import Pilot
 from crunchbot.recording.mcapfile import McapFile
-from crunchbot.robot.messages import Contact, decode
 from crunchbot.robot.models import load_models
+from crunchbot.robot.network.messages import Contact, decode
 
 from ..report.long_figures import LOST_M
 from ..report.long_page import write_report

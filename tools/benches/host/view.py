@@ -27,8 +27,8 @@ from websockets.asyncio.client import connect
 
 from crunchbot.bridge.ring import FRAME, Writer
 from crunchbot.observation import VALUE
-from crunchbot.robot.link import Link
-from crunchbot.robot.messages import (
+from crunchbot.robot.network.link import Link
+from crunchbot.robot.network.messages import (
     TOPICS,
     Belief,
     Header,
@@ -39,7 +39,7 @@ from crunchbot.robot.messages import (
     PoseWithCovariance,
     ProcessHealth,
 )
-from crunchbot.robot.ranges import COMPONENTS_MOST
+from crunchbot.robot.network.ranges import COMPONENTS_MOST
 from crunchbot_lab.report import figures
 from whisker_protocol import LANES, LIMITS
 

@@ -22,10 +22,10 @@ from crunchbot.nav.observations import Observations
 from crunchbot.observation import Row
 from crunchbot.pilot.behaviour import BLOCK_TICKS, ODOMETRY_TICKS, TICK_S
 from crunchbot.pilot.pilot import Pilot
-from crunchbot.robot.link import Link
-from crunchbot.robot.messages import Observation, decode, encode
 from crunchbot.robot.models import load_models
-from crunchbot.robot.rows import RowPublisher, to_message, to_row
+from crunchbot.robot.network.link import Link
+from crunchbot.robot.network.messages import Observation, decode, encode
+from crunchbot.robot.network.rows import RowPublisher, to_message, to_row
 from crunchbot_lab import scenes
 from crunchbot_lab.demo.level1 import explore
 from crunchbot_lab.signals import World

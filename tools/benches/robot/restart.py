@@ -23,12 +23,12 @@ from pathlib import Path
 import numpy as np
 
 from crunchbot.pilot.pilot import Pilot
-from crunchbot.robot import belief
-from crunchbot.robot.inbox import Received
 from crunchbot.robot.memory import Memory
 from crunchbot.robot.models import load_models
-from crunchbot.robot.rows import Follower, to_message
-from crunchbot.robot.streams import Envelope
+from crunchbot.robot.network import belief
+from crunchbot.robot.network.inbox import Received
+from crunchbot.robot.network.rows import Follower, to_message
+from crunchbot.robot.network.streams import Envelope
 from crunchbot.robot.track import Track
 from crunchbot.scene import Prior
 from crunchbot_lab.demo.level1 import explore

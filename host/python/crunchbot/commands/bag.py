@@ -5,7 +5,7 @@ from pathlib import Path
 
 from ..recording.writing import TopicWriter
 from ..robot.bag import RECORD, Bag, metadata
-from ..robot.options import NAVIGATOR_ENDPOINT, PILOT_ENDPOINT, add_link, open_link
+from ..robot.network.options import NAVIGATOR_ENDPOINT, PILOT_ENDPOINT, add_link, open_link
 from ..stopping import stop_on_signals
 
 EXAMPLE = "whisker bag run.mcap --scene SCENE"

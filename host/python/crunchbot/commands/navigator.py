@@ -6,7 +6,7 @@ from pathlib import Path
 from ..arguments import seconds
 from ..nav import localise
 from ..robot.navigator import Navigator, Settings, write_report
-from ..robot.options import NAVIGATOR_ENDPOINT, PILOT_ENDPOINT, add_link, open_link
+from ..robot.network.options import NAVIGATOR_ENDPOINT, PILOT_ENDPOINT, add_link, open_link
 from ..scene import load
 from ..stopping import stop_on_signals
 from ..tables import unwritable

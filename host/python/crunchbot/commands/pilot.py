@@ -15,12 +15,12 @@ from ..pilot.base import Base
 from ..pilot.pilot import Pilot
 from ..pilot.wheels import EXACT, Wheels
 from ..robot.blocks import LiveRing
-from ..robot.health import Health
-from ..robot.lifeline import Heartbeat
-from ..robot.link import Link
 from ..robot.models import check_nodes, load_models
-from ..robot.options import NAVIGATOR_ENDPOINT, PILOT_ENDPOINT, add_link, open_link
+from ..robot.network.health import Health
+from ..robot.network.link import Link
+from ..robot.network.options import NAVIGATOR_ENDPOINT, PILOT_ENDPOINT, add_link, open_link
 from ..robot.pilot_process import Flight, LiveFlight, LiveWheels, fly_in_step
+from ..robot.processes.lifeline import Heartbeat
 from ..robot.rowfiles import Rows, Traces
 from ..robot.simulation_link import SimLink
 from ..robot.telling import Teller

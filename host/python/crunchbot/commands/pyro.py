@@ -4,7 +4,7 @@ import ipaddress
 import sys
 
 from ..arguments import whole_number
-from ..robot.options import NAVIGATOR_ENDPOINT, PILOT_ENDPOINT, add_link, open_link
+from ..robot.network.options import NAVIGATOR_ENDPOINT, PILOT_ENDPOINT, add_link, open_link
 from ..robot.pyro import PORT, Server
 from ..stopping import stop_on_signals
 

@@ -8,14 +8,14 @@ from .. import scene as scenes
 from ..arguments import RING, add_zenoh_config, number_above, whole_number
 from ..errors import UserError
 from ..lab import import_lab
-from ..robot import holders, parts
-from ..robot.link import read_config
-from ..robot.logs import run_folder
 from ..robot.models import load_models
-from ..robot.options import link_that_warns
-from ..robot.supervisor import Supervisor
-from ..robot.truth import TruthWatcher
-from ..robot.units import TARGET, Installed, units
+from ..robot.network.link import read_config
+from ..robot.network.options import link_that_warns
+from ..robot.network.truth import TruthWatcher
+from ..robot.processes import holders, parts
+from ..robot.processes.logs import run_folder
+from ..robot.processes.supervisor import Supervisor
+from ..robot.processes.units import TARGET, Installed, units
 from ..stopping import stop_on_signals
 
 EXAMPLE = "whisker robot --simulated --desktop"

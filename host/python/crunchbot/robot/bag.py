@@ -12,11 +12,11 @@ from pathlib import Path
 
 from ..recording.writing import TopicWriter
 from ..scene import ARENA, PRIOR, ROBOT, load, write
-from .health import ENDED, RUNNING, Health
-from .inbox import Inbox, Received
-from .link import Link
-from .messages import HEALTH, SCHEMAS, encode
-from .rows import ROW_NS, leaps
+from .network.health import ENDED, RUNNING, Health
+from .network.inbox import Inbox, Received
+from .network.link import Link
+from .network.messages import HEALTH, SCHEMAS, encode
+from .network.rows import ROW_NS, leaps
 
 RECORD, FORMAT = "whisker_robot", "1"  # name of the metadata record, and of what it promises
 SCENE_FILES = (ARENA, ROBOT, PRIOR)

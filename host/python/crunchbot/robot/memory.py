@@ -16,8 +16,8 @@ from ..pilot.states import EXPLORE_M_S, TURN_RAD_S
 from ..scene import Scene
 from . import checkpoint
 from .checkpoint import Checkpoint, CheckpointError
-from .inbox import Received
-from .rows import ROW_NS, Place, Step
+from .network.inbox import Received
+from .network.rows import ROW_NS, Place, Step
 
 AGE_MOST_S = 60.0  # what a uniform belief takes to find the place anyway
 FINEST = 1e-3  # m and rad: nobody knows a pose better

@@ -1,9 +1,9 @@
 """The navigator, the desktop's part: observations in, pose and belief out, at its own pace.
 
 When it falls behind it weighs the newest rows that a tenth of a second is enough for, and takes the motion of all
-before them (crunchbot.robot.rows.Follower); in lock-step it weighs every row. A navigator that begins in mid-run goes on
+before them (crunchbot.robot.network.rows.Follower); in lock-step it weighs every row. A navigator that begins in mid-run goes on
 from what the one before it wrote down (crunchbot.robot.memory); without that it knows nothing of the start any more:
-uniform prior. A pose that somebody tells (crunchbot.robot.initial_pose) takes the place of all that was believed.
+uniform prior. A pose that somebody tells (crunchbot.robot.network.initial_pose) takes the place of all that was believed.
 """
 
 import json
@@ -20,16 +20,16 @@ import numpy as np
 from ..nav.localise import Estimate
 from ..observation import has_normals
 from ..scene import Prior, Scene
-from . import belief, initial_pose
-from .health import ENDED, RUNNING, Health
-from .inbox import Received
-from .initial_pose import InitialPoseError
-from .link import Link
 from .memory import Memory
-from .messages import Header, Localisation, PoseWithCovariance, PoseWithCovarianceStamped
-from .ros import ARENA_FRAME
-from .row_checks import RowChecks
-from .rows import Follower, Step
+from .network import belief, initial_pose
+from .network.health import ENDED, RUNNING, Health
+from .network.inbox import Received
+from .network.initial_pose import InitialPoseError
+from .network.link import Link
+from .network.messages import Header, Localisation, PoseWithCovariance, PoseWithCovarianceStamped
+from .network.ros import ARENA_FRAME
+from .network.row_checks import RowChecks
+from .network.rows import Follower, Step
 from .track import Track
 
 BELIEF_NS = 500_000_000  # 2 Hz of the bridge's clock

@@ -13,9 +13,9 @@ from ..pilot.behaviour import BLOCK_TICKS, ODOMETRY_TICKS, TICK_S
 from ..pilot.pilot import Pilot
 from ..pilot.wheels import Bumps
 from .blocks import Block, LiveRing, blocks
-from .health import ENDED, RUNNING, Health
-from .lifeline import Heartbeat
-from .link import Link
+from .network.health import ENDED, RUNNING, Health
+from .network.link import Link
+from .processes.lifeline import Heartbeat
 from .rowfiles import Rows, Traces
 from .telling import TICK_NS, Teller
 from .wheels import LiveBase, Report

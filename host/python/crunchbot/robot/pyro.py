@@ -17,10 +17,10 @@ import Pyro5.api
 from ..errors import UserError
 from ..observation import ODOMETRY, Row
 from ..pilot.pilot import compose
-from .health import ENDED, RUNNING, Health
-from .inbox import Received
-from .link import Link
-from .messages import (
+from .network.health import ENDED, RUNNING, Health
+from .network.inbox import Received
+from .network.link import Link
+from .network.messages import (
     HEALTH,
     Header,
     Localisation,
@@ -30,13 +30,13 @@ from .messages import (
     decode,
     encode,
 )
-from .messages import Odometry as OdometryMessage
+from .network.messages import Odometry as OdometryMessage
+from .network.ranges import RANGES
+from .network.ros import BASE_FRAME, ODOMETRY_FRAME
+from .network.row_checks import RowChecks
+from .network.rows import Follower, RowPublisher, between, to_message
+from .network.streams import Envelope
 from .pyro_daemon import Daemon, configure
-from .ranges import RANGES
-from .ros import BASE_FRAME, ODOMETRY_FRAME
-from .row_checks import RowChecks
-from .rows import Follower, RowPublisher, between, to_message
-from .streams import Envelope
 
 OBJECT, PORT = "whisker.results", 7450
 HISTORY_ROWS = 18_000  # 30 minutes: how far back `observation(since)` reaches

@@ -7,10 +7,10 @@ import numpy as np
 from ..observation import Row
 from ..pilot.behaviour import TICK_S
 from ..pilot.pilot import Pilot
-from . import messages
-from .link import Link
-from .ros import BASE_FRAME, ODOMETRY_FRAME
-from .rows import ROW_NS, RowPublisher, compose
+from .network import messages
+from .network.link import Link
+from .network.ros import BASE_FRAME, ODOMETRY_FRAME
+from .network.rows import ROW_NS, RowPublisher, compose
 from .wheels import Report
 
 TICK_NS = round(TICK_S * 1e9)

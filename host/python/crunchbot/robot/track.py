@@ -8,7 +8,7 @@ import numpy as np
 
 from ..nav import localise
 from ..scene import Scene
-from .rows import Step, time_text
+from .network.rows import Step, time_text
 
 FILES = (("est", localise.ESTIMATE_HEADER), ("covariance", "t_s,xx_m2,xy_m2,yy_m2"))
 

@@ -1,6 +1,6 @@
 """What is known of the robot: the newest of each topic, the paths, the contacts, and when each process last spoke.
 
-Fed with the messages of crunchbot.robot.messages as they come; gives plain values for JSON. Nothing grows without bound,
+Fed with the messages of crunchbot.robot.network.messages as they come; gives plain values for JSON. Nothing grows without bound,
 nothing is guessed: what no message has reported is None. Metres, radians, seconds of the bridge's clock.
 """
 
@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..observation import NOT_READ, VALUE, Column, Quantity, parse
-from ..robot.messages import CORNER, FACE, HEALTH, SHAFT, TIP, End
+from ..robot.network.messages import CORNER, FACE, HEALTH, SHAFT, TIP, End
 from ..scene import LARGEST_M, Scene
 from .surfaces import Surfaces
 
@@ -115,7 +115,7 @@ class RobotModel:
         self._seq: int | None = None
 
     def take(self, topic: str, message) -> None:
-        """A message of a topic of crunchbot.robot.messages.TOPICS, or of health; of any, an End."""
+        """A message of a topic of crunchbot.robot.network.messages.TOPICS, or of health; of any, an End."""
         kind = HEALTH if topic.startswith(f"{HEALTH}/") else topic
         if isinstance(message, End):
             return self._take_end(topic.removeprefix(f"{HEALTH}/"), message)

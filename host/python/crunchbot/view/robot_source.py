@@ -1,4 +1,4 @@
-"""Where the robot's messages come from: a crunchbot.robot.inbox, which the server's rounds empty."""
+"""Where the robot's messages come from: a crunchbot.robot.network.inbox, which the server's rounds empty."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -57,8 +57,8 @@ def join(robot: str, connect: list[str], config: Path | None = None) -> InboxSou
     tcp/HOST:PORT or tls/HOST:PORT, which need not be there yet; none: those of this machine. `config`: a file of zenoh's
     own configuration. UserError: it cannot be."""
     try:
-        from ..robot import initial_pose
-        from ..robot.link import NAVIGATOR_ENDPOINT, PILOT_ENDPOINT, Link
+        from ..robot.network import initial_pose
+        from ..robot.network.link import NAVIGATOR_ENDPOINT, PILOT_ENDPOINT, Link
     except ImportError as error:
         raise UserError(f"--robot needs {error.name}, which is not installed; make setup installs it") from error
     endpoints = connect or [PILOT_ENDPOINT, NAVIGATOR_ENDPOINT]

@@ -3,9 +3,9 @@
 import socket
 from types import SimpleNamespace
 
-from crunchbot.robot.inbox import encoding_of
-from crunchbot.robot.messages import encode
-from crunchbot.robot.streams import Envelope
+from crunchbot.robot.network.inbox import encoding_of
+from crunchbot.robot.network.messages import encode
+from crunchbot.robot.network.streams import Envelope
 
 
 def free_endpoint() -> str:

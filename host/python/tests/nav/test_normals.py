@@ -8,10 +8,10 @@ import pytest
 
 from crunchbot.nav import localise
 from crunchbot.observation import Row, has_normals
-from crunchbot.robot.inbox import Received
-from crunchbot.robot.row_checks import RowChecks
-from crunchbot.robot.rows import to_message
-from crunchbot.robot.streams import Envelope
+from crunchbot.robot.network.inbox import Received
+from crunchbot.robot.network.row_checks import RowChecks
+from crunchbot.robot.network.rows import to_message
+from crunchbot.robot.network.streams import Envelope
 from crunchbot.tables import TableError
 from crunchbot_lab import scenes
 from crunchbot_lab.scenes import geometry

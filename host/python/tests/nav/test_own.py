@@ -15,10 +15,10 @@ from crunchbot.nav.filters import Filter, SettingError
 from crunchbot.nav.observations import Observations
 from crunchbot.nav.own import OwnSensor
 from crunchbot.observation import Row
-from crunchbot.robot.inbox import Received
-from crunchbot.robot.row_checks import RowChecks
-from crunchbot.robot.rows import to_message, to_row
-from crunchbot.robot.streams import Envelope
+from crunchbot.robot.network.inbox import Received
+from crunchbot.robot.network.row_checks import RowChecks
+from crunchbot.robot.network.rows import to_message, to_row
+from crunchbot.robot.network.streams import Envelope
 from crunchbot.scene import Arena, Prior, Robot, Scene, SceneError, Whisker, load
 from crunchbot.sensor_tables import NOT_KNOWN, SensorTable
 from crunchbot.tables import TableError

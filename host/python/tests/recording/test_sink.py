@@ -15,9 +15,9 @@ from crunchbot.recording import read
 from crunchbot.recording import writing as writing_module
 from crunchbot.recording.recorder import Recorder
 from crunchbot.recording.writing import RecordingWriter, TopicWriter, WriteError
-from crunchbot.robot import messages as m
 from crunchbot.robot.bag import RECORD, Bag
-from crunchbot.robot.link import Link
+from crunchbot.robot.network import messages as m
+from crunchbot.robot.network.link import Link
 
 PATIENCE_S = 30.0
 

@@ -9,7 +9,7 @@ from robotkit import examples, flat
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from crunchbot.recording.messages import definition
-from crunchbot.robot import messages as m
+from crunchbot.robot.network import messages as m
 
 ROSBAGS_EVERY = 8  # of those that are read, how many the other decoder reads too: it takes some ten times as long
 

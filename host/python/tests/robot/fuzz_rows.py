@@ -15,14 +15,14 @@ from linkkit import sample
 from robotkit import examples, to_rows
 
 from crunchbot.observation import ODOMETRY, Row
-from crunchbot.robot import messages as m
-from crunchbot.robot.inbox import Inbox, encoding_of
 from crunchbot.robot.navigator import Navigator, Settings
+from crunchbot.robot.network import messages as m
+from crunchbot.robot.network.inbox import Inbox, encoding_of
+from crunchbot.robot.network.row_checks import RowChecks
+from crunchbot.robot.network.rows import to_message
+from crunchbot.robot.network.sources import Sources
+from crunchbot.robot.network.streams import NUMBER_MOST, Envelope
 from crunchbot.robot.pyro import TOPICS, Results
-from crunchbot.robot.row_checks import RowChecks
-from crunchbot.robot.rows import to_message
-from crunchbot.robot.sources import Sources
-from crunchbot.robot.streams import NUMBER_MOST, Envelope
 from crunchbot_lab import scenes
 
 ROWS = 40

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from crunchbot.robot import messages as m
-from crunchbot.robot.ranges import RANGES
-from crunchbot.robot.schema import DTYPES, MANY, ONE, TEXT, Field, fields_of
+from crunchbot.robot.network import messages as m
+from crunchbot.robot.network.ranges import RANGES
+from crunchbot.robot.network.schema import DTYPES, MANY, ONE, TEXT, Field, fields_of
 
 FLOATS = (math.nan, math.inf, -math.inf, 1e308, -1e308, 3e38, -3e38)
 

@@ -10,7 +10,7 @@ from linkkit import free_endpoint
 
 from crunchbot import observation as o
 from crunchbot.observation import ODOMETRY
-from crunchbot.robot import messages as m
+from crunchbot.robot.network import messages as m
 
 
 def examples() -> dict[str, object]:

@@ -20,12 +20,12 @@ from crunchbot.observation import Row
 from crunchbot.pilot.pilot import compose
 from crunchbot.recording.mcapfile import McapFile
 from crunchbot.recording.writing import TopicWriter
-from crunchbot.robot import messages as m
 from crunchbot.robot.bag import RECORD, Bag, BagClock, metadata
-from crunchbot.robot.inbox import Received
-from crunchbot.robot.link import Link
-from crunchbot.robot.rows import RowPublisher
-from crunchbot.robot.streams import Envelope
+from crunchbot.robot.network import messages as m
+from crunchbot.robot.network.inbox import Received
+from crunchbot.robot.network.link import Link
+from crunchbot.robot.network.rows import RowPublisher
+from crunchbot.robot.network.streams import Envelope
 from crunchbot.scene import load
 from crunchbot.sensor_tables import SensorTable
 from crunchbot_lab import scenes

@@ -12,12 +12,14 @@ from crunchbot.nav import filters
 from crunchbot.nav.filters import COMPONENT, Filter, SettingError
 from crunchbot.observation import Row
 from crunchbot.pilot.pilot import compose
-from crunchbot.robot import belief, checkpoint, parts
+from crunchbot.robot import checkpoint
 from crunchbot.robot.checkpoint import Checkpoint, CheckpointError
-from crunchbot.robot.inbox import Received
 from crunchbot.robot.memory import AGE_MOST_S, Memory, widen
-from crunchbot.robot.rows import ROW_NS, Follower, Place, Step, to_message
-from crunchbot.robot.streams import Envelope
+from crunchbot.robot.network import belief
+from crunchbot.robot.network.inbox import Received
+from crunchbot.robot.network.rows import ROW_NS, Follower, Place, Step, to_message
+from crunchbot.robot.network.streams import Envelope
+from crunchbot.robot.processes import parts
 from crunchbot_lab import scenes
 
 ROWS = 60

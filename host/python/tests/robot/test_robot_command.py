@@ -18,9 +18,9 @@ from crunchbot import scene as scenes
 from crunchbot.bridge.ring import Writer
 from crunchbot.cli import _parser, main
 from crunchbot.commands import robot
-from crunchbot.robot import holders, parts
-from crunchbot.robot.children import Program
-from crunchbot.robot.link import Link
+from crunchbot.robot.network.link import Link
+from crunchbot.robot.processes import holders, parts
+from crunchbot.robot.processes.children import Program
 from crunchbot.view import command as view
 from crunchbot_lab.demo import training
 from crunchbot_lab.simulation.scenes import make_scene

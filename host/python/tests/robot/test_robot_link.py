@@ -11,13 +11,13 @@ from linkkit import free_endpoint, sample
 from robotkit import Cable, examples, take_until
 
 from crunchbot import observation as o
-from crunchbot.robot import inbox as inbox_module
-from crunchbot.robot import messages as m
-from crunchbot.robot import options
-from crunchbot.robot.inbox import TOPICS_MOST, Inbox, encoding_of
-from crunchbot.robot.link import MESSAGE_MOST, PILOT_ENDPOINT, Link, LinkError, is_loopback
-from crunchbot.robot.sources import STREAMS_MOST, Sources, Verdict
-from crunchbot.robot.streams import ENVELOPE, Envelope, EnvelopeError, Tally, envelopes, new_stream
+from crunchbot.robot.network import inbox as inbox_module
+from crunchbot.robot.network import messages as m
+from crunchbot.robot.network import options
+from crunchbot.robot.network.inbox import TOPICS_MOST, Inbox, encoding_of
+from crunchbot.robot.network.link import MESSAGE_MOST, PILOT_ENDPOINT, Link, LinkError, is_loopback
+from crunchbot.robot.network.sources import STREAMS_MOST, Sources, Verdict
+from crunchbot.robot.network.streams import ENVELOPE, Envelope, EnvelopeError, Tally, envelopes, new_stream
 
 PATIENCE_S = 30.0
 

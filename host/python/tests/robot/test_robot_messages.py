@@ -14,9 +14,9 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from crunchbot.recording.messages import definition
 from crunchbot.recording.types import store
-from crunchbot.robot import messages as m
-from crunchbot.robot.ranges import RANGES
-from crunchbot.robot.schema import DTYPES, MANY, TEXT, fields_of
+from crunchbot.robot.network import messages as m
+from crunchbot.robot.network.ranges import RANGES
+from crunchbot.robot.network.schema import DTYPES, MANY, TEXT, fields_of
 
 
 @pytest.mark.parametrize("schema", m.TYPES)

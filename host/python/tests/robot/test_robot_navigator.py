@@ -20,13 +20,14 @@ from crunchbot.errors import UserError
 from crunchbot.nav import localise
 from crunchbot.nav.filters import COMPONENT
 from crunchbot.observation import Row
-from crunchbot.robot import belief, checkpoint, health, initial_pose
-from crunchbot.robot import messages as m
-from crunchbot.robot.inbox import encoding_of
-from crunchbot.robot.link import Link
+from crunchbot.robot import checkpoint
 from crunchbot.robot.navigator import Navigator, Settings
-from crunchbot.robot.ranges import COMPONENTS_MOST
-from crunchbot.robot.rows import RowPublisher, to_message
+from crunchbot.robot.network import belief, health, initial_pose
+from crunchbot.robot.network import messages as m
+from crunchbot.robot.network.inbox import encoding_of
+from crunchbot.robot.network.link import Link
+from crunchbot.robot.network.ranges import COMPONENTS_MOST
+from crunchbot.robot.network.rows import RowPublisher, to_message
 from crunchbot_lab import scenes
 
 PATIENCE_S = 60.0

@@ -16,7 +16,7 @@ from crunchbot.commands import pilot as pilot_command
 from crunchbot.pilot.base import BaseLost, Motion
 from crunchbot.pilot.behaviour import BLOCK_TICKS, ODOMETRY_TICKS
 from crunchbot.robot import wheels as wheels_module
-from crunchbot.robot.health import RUNNING
+from crunchbot.robot.network.health import RUNNING
 from crunchbot.robot.pilot_process import LOST, NO_HEARTBEAT, SILENCE_S, Flight, LiveFlight, LiveWheels
 from crunchbot.robot.wheels import MODE, RETRY_S, LiveBase, Report, wheels_of
 from crunchbot.touch.radial.model import RadialModel

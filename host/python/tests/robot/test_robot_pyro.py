@@ -22,14 +22,14 @@ from robotkit import examples, take_until
 from crunchbot import observation as o
 from crunchbot.observation import ODOMETRY, Row
 from crunchbot.pilot.pilot import compose
-from crunchbot.robot import messages as m
-from crunchbot.robot.inbox import Inbox, Received
-from crunchbot.robot.link import Link
+from crunchbot.robot.network import messages as m
+from crunchbot.robot.network.inbox import Inbox, Received
+from crunchbot.robot.network.link import Link
+from crunchbot.robot.network.row_checks import RowChecks
+from crunchbot.robot.network.rows import to_message
+from crunchbot.robot.network.streams import Envelope
 from crunchbot.robot.pyro import NAMES_MOST, Results, Server
 from crunchbot.robot.pyro_daemon import REQUEST_MOST
-from crunchbot.robot.row_checks import RowChecks
-from crunchbot.robot.rows import to_message
-from crunchbot.robot.streams import Envelope
 
 PATIENCE_S = 60.0
 

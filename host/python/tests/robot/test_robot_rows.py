@@ -11,11 +11,11 @@ from crunchbot import observation as o
 from crunchbot.nav import localise
 from crunchbot.observation import Row, cell
 from crunchbot.pilot.pilot import compose
-from crunchbot.robot import messages as m
-from crunchbot.robot.inbox import Received
-from crunchbot.robot.row_checks import RowChecks
-from crunchbot.robot.rows import PIECES_MOST, Follower, RowPublisher, Step, between, to_message, to_row
-from crunchbot.robot.streams import Envelope
+from crunchbot.robot.network import messages as m
+from crunchbot.robot.network.inbox import Received
+from crunchbot.robot.network.row_checks import RowChecks
+from crunchbot.robot.network.rows import PIECES_MOST, Follower, RowPublisher, Step, between, to_message, to_row
+from crunchbot.robot.network.streams import Envelope
 from crunchbot_lab import scenes
 
 

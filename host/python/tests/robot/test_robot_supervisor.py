@@ -16,11 +16,11 @@ from linkkit import free_endpoint
 from robotkit import take_until
 
 from crunchbot.errors import UserError
-from crunchbot.robot.children import Child, Program, living
-from crunchbot.robot.lifeline import BEAT_S
-from crunchbot.robot.link import Link
-from crunchbot.robot.parts import LEAVE_ENVIRONMENT
-from crunchbot.robot.supervisor import PAUSE_MOST_S, PAUSE_S, Keeper, RunError, Supervisor
+from crunchbot.robot.network.link import Link
+from crunchbot.robot.processes.children import Child, Program, living
+from crunchbot.robot.processes.lifeline import BEAT_S
+from crunchbot.robot.processes.parts import LEAVE_ENVIRONMENT
+from crunchbot.robot.processes.supervisor import PAUSE_MOST_S, PAUSE_S, Keeper, RunError, Supervisor
 
 PATIENCE_S = 60.0
 FAILS = Program("fails", ("sh", "-c", "echo no such arena >&2; exit 3"))
@@ -178,8 +178,8 @@ def test_a_stopped_program_can_be_ended_in_order(tmp_path):
 SUPERVISED = """
 import sys, threading
 from pathlib import Path
-from crunchbot.robot.children import Program
-from crunchbot.robot.supervisor import Supervisor
+from crunchbot.robot.processes.children import Program
+from crunchbot.robot.processes.supervisor import Supervisor
 folder = Path(sys.argv[1])
 grandchildren = Program("grandchildren", ("sh", "-c", "sleep 1000 & sleep 1000"))
 plain = Program("plain", ("sleep", "1000"))
@@ -189,7 +189,7 @@ Supervisor([grandchildren, mover, plain], folder).run(threading.Event())
 MOVER = """
 import sys, time
 from pathlib import Path
-from crunchbot.robot.lifeline import Heartbeat
+from crunchbot.robot.processes.lifeline import Heartbeat
 heart, reported = Heartbeat.of_environment(), ""
 while True:
     now = "ended" if heart.ended else "beats" if heart.beats else "silent"

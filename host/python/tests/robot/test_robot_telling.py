@@ -9,7 +9,7 @@ from crunchbot.observation import Row
 from crunchbot.pilot.behaviour import BLOCK_TICKS
 from crunchbot.pilot.states import State
 from crunchbot.pilot.wheels import NO_BUMPS
-from crunchbot.robot.ros import PLANAR
+from crunchbot.robot.network.ros import PLANAR
 from crunchbot.robot.telling import TICK_NS, Teller
 from crunchbot.robot.wheels import Report
 

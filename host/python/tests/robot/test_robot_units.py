@@ -15,10 +15,10 @@ from linkkit import free_endpoint
 
 from crunchbot import scene as scenes_of
 from crunchbot.cli import main
-from crunchbot.robot import parts
-from crunchbot.robot.notify import Notify
-from crunchbot.robot.units import TARGET, WATCHDOG_S
-from crunchbot.robot.watchdog import TIMEOUT_S, Watchdog
+from crunchbot.robot.network.notify import Notify
+from crunchbot.robot.processes import parts
+from crunchbot.robot.processes.units import TARGET, WATCHDOG_S
+from crunchbot.robot.processes.watchdog import TIMEOUT_S, Watchdog
 from crunchbot_lab import scenes
 
 

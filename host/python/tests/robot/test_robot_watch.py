@@ -6,9 +6,9 @@ import socket
 import pytest
 
 from crunchbot.errors import UserError
-from crunchbot.robot.lifeline import SILENT_S, VARIABLE, Heartbeat, Pulse
-from crunchbot.robot.logs import last_line, run_folder
-from crunchbot.robot.watchdog import LOOK_MOST_S, TIMEOUT_S, Watchdog
+from crunchbot.robot.processes.lifeline import SILENT_S, VARIABLE, Heartbeat, Pulse
+from crunchbot.robot.processes.logs import last_line, run_folder
+from crunchbot.robot.processes.watchdog import LOOK_MOST_S, TIMEOUT_S, Watchdog
 
 SPARSE_BYTES = 1 << 36
 

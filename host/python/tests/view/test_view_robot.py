@@ -13,9 +13,9 @@ from test_view_http import mutated
 from viewkit import PATIENCE_S, nothing_logged, page
 from viewrobot import ARENA, ROW_NS, SCENE, MadeUpRun, Post, at, belief_message, estimate, reach, robot_view, route
 
-from crunchbot.robot import initial_pose
-from crunchbot.robot.link import Link
-from crunchbot.robot.messages import (
+from crunchbot.robot.network import initial_pose
+from crunchbot.robot.network.link import Link
+from crunchbot.robot.network.messages import (
     Contact,
     End,
     Header,

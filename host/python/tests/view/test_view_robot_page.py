@@ -8,7 +8,7 @@ from viewkit import made_frames, ring_of
 from viewpage import DRAWN, looking_at
 from viewrobot import ARENA, SCENE, MadeUpRun, Post, belief_message, estimate, robot_view, route
 
-from crunchbot.robot.messages import Behaviour, Header, KeyValue, ProcessHealth, Time
+from crunchbot.robot.network.messages import Behaviour, Header, KeyValue, ProcessHealth, Time
 from crunchbot.view.hub import Hub
 from crunchbot.view.robot import SILENT_S
 from crunchbot.view.server import serving

@@ -11,10 +11,10 @@ import numpy as np
 from linkkit import sample
 
 from crunchbot import observation as o
-from crunchbot.robot import messages as m
-from crunchbot.robot.inbox import Inbox
-from crunchbot.robot.rows import between
-from crunchbot.robot.streams import envelopes
+from crunchbot.robot.network import messages as m
+from crunchbot.robot.network.inbox import Inbox
+from crunchbot.robot.network.rows import between
+from crunchbot.robot.network.streams import envelopes
 from crunchbot.scene import Arena, Scene
 from crunchbot.view.hub import Hub
 from crunchbot.view.robot import RobotModel

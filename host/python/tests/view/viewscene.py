@@ -10,8 +10,8 @@ from crunchbot import observation as o
 from crunchbot.nav.filters import Filter
 from crunchbot.observation import NORMAL, POINT
 from crunchbot.pilot.pilot import compose
-from crunchbot.robot import messages as m
-from crunchbot.robot.belief import condense, to_message
+from crunchbot.robot.network import messages as m
+from crunchbot.robot.network.belief import condense, to_message
 from crunchbot_lab.scenes import arenas
 from crunchbot_lab.scenes.families import Recipe, recipe
 from crunchbot_lab.scenes.making import make_recipe

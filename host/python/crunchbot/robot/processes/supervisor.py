@@ -13,12 +13,12 @@ from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 
-from ..errors import UserError
+from ...errors import UserError
+from ..network.health import ENDED, RUNNING
+from ..network.link import Link
+from ..network.messages import HEALTH, Header, KeyValue, ProcessHealth
 from .children import GRACE_S, STOPPED, Child, Program
-from .health import ENDED, RUNNING
 from .lifeline import BEAT_S
-from .link import Link
-from .messages import HEALTH, Header, KeyValue, ProcessHealth
 
 PAUSE_S, PAUSE_MOST_S = 0.2, 5.0
 LEAVE_S = 0.2  # for what a program has left behind to end by itself: a driver stops the wheels first

@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
-from ..observation import NORMAL, Quantity, normal, parse
-from ..scene import Scene
+from ...observation import NORMAL, Quantity, normal, parse
+from ...scene import Scene
 from .inbox import Received
 from .messages import REMEDIES, Observation
 from .rows import ROW_NS, between, leaps

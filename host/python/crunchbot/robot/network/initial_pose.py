@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from ..scene import Arena, Prior
+from ...scene import Arena, Prior
 from .link import Link
 from .messages import Header, PoseWithCovariance, PoseWithCovarianceStamped
 from .ros import ARENA_FRAME

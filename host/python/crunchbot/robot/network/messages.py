@@ -10,9 +10,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..errors import UserError
-from ..recording.cdr import Malformed
-from ..recording.types import encode as encode_as
+from ...errors import UserError
+from ...recording.cdr import Malformed
+from ...recording.types import encode as encode_as
 from .ranges import RANGES, ROW
 from .ros import (
     Header,
@@ -42,7 +42,7 @@ class MessageError(UserError, ValueError):
 
 @dataclass(eq=False)
 class Observation:
-    """A row (crunchbot.observation.Row), with its number and the sum of the motion: crunchbot.robot.rows."""
+    """A row (crunchbot.observation.Row), with its number and the sum of the motion: crunchbot.robot.network.rows."""
 
     header: Header
     seq: int

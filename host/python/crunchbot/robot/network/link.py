@@ -21,7 +21,7 @@ from pathlib import Path
 
 import zenoh
 
-from ..errors import UserError
+from ...errors import UserError
 from .inbox import Inbox, Received, encoding_of
 from .messages import HEALTH, NAME, End, Header, encode, type_of
 from .sources import Sources

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..observation import NOT_READ, RELEASE, Row, cell
-from ..pilot.pilot import compose
+from ...observation import NOT_READ, RELEASE, Row, cell
+from ...pilot.pilot import compose
 from .inbox import Received
 from .link import Link
 from .messages import Header, Observation

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..nav.filters import COMPONENT
+from ...nav.filters import COMPONENT
 from .messages import Belief, Header
 from .ranges import COMPONENTS_MOST
 

@@ -10,8 +10,8 @@ from functools import cache
 import numpy as np
 from rosbags.interfaces import Nodetype
 
-from ..recording.cdr import Decoder, Malformed
-from ..recording.types import DTYPES, store
+from ...recording.cdr import Decoder, Malformed
+from ...recording.types import DTYPES, store
 from .ranges import Range
 
 TEXT = "string"

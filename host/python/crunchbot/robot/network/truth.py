@@ -4,7 +4,7 @@ import socket
 import threading
 from pathlib import Path
 
-from ..pilot.behaviour import TICK_S
+from ...pilot.behaviour import TICK_S
 from .link import Link
 from .messages import Header, Pose, PoseStamped
 from .ros import ARENA_FRAME

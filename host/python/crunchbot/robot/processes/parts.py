@@ -5,7 +5,7 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..programs import program
+from ...programs import program
 from .children import Program
 
 FIRST_PORT = 7447  # of three: supervisor, pilot, navigator; the latter two are those of robot.link

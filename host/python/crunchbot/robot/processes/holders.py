@@ -5,8 +5,8 @@ import socket
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from ..bridge.ring import Reader, RingError
-from ..errors import UserError
+from ...bridge.ring import Reader, RingError
+from ...errors import UserError
 
 LISTENS = "0A"  # of /proc/net/tcp
 PROC = Path("/proc")

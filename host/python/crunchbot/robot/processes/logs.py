@@ -7,7 +7,7 @@ from itertools import count
 from pathlib import Path
 from typing import TextIO
 
-from ..stamping import stamp
+from ...stamping import stamp
 
 TAIL_BYTES = 4096
 OURS = "-- "  # begins what is not the process's own, behind the time

@@ -16,7 +16,7 @@ import fcntl
 import os
 import time
 
-from ..errors import UserError
+from ...errors import UserError
 
 VARIABLE = "WHISKER_HEARTBEAT_FD"
 BEAT_S, SILENT_S = 0.1, 0.3

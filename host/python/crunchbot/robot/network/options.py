@@ -5,7 +5,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from ..arguments import add_zenoh_config
+from ...arguments import add_zenoh_config
 from .link import NAVIGATOR_ENDPOINT, PILOT_ENDPOINT, ROBOT, Link, is_guarded, is_loopback, read_config
 
 NOWHERE = "none"

@@ -16,7 +16,7 @@ from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..stamping import VARIABLE as TIMES
+from ...stamping import VARIABLE as TIMES
 from .lifeline import VARIABLE, Lifeline, Pulse
 from .logs import last_line, note
 from .watchdog import VARIABLES, Watchdog

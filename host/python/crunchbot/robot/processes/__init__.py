@@ -1,0 +1,1 @@
+"""How the processes of a robot are started, watched and ended: process table, supervisor, systemd units."""
