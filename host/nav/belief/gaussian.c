@@ -3,7 +3,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "mixture.h"
 #include "problem.h"
 
 enum { X, Y, T };
@@ -21,19 +20,6 @@ struct nav_gaussian nav_gaussian_uniform(const struct nav_arena *arena)
     g.covariance[0] = arena->size_x * arena->size_x / 12.0;
     g.covariance[4] = arena->size_y * arena->size_y / 12.0;
     g.covariance[8] = NAV_PI * NAV_PI / 3.0;
-    return g;
-}
-
-struct nav_gaussian nav_gaussian_prior(const struct nav_problem *problem)
-{
-    const struct nav_prior *prior = &problem->prior;
-    if (nav_mixture_given(prior))
-        return nav_mixture_gaussian(prior);
-    if (prior->uniform)
-        return nav_gaussian_uniform(&problem->arena);
-    struct nav_gaussian g = {.mean = prior->mean};
-    for (int i = 0; i < 3; i++)
-        g.covariance[4 * i] = prior->sigma[i] * prior->sigma[i];
     return g;
 }
 

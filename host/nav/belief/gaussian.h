@@ -28,15 +28,11 @@ struct nav_mode {
 };
 double nav_mode_distance(struct nav_pose mean, struct nav_pose);
 
-struct nav_problem;
 struct nav_estimate;
 struct nav_component;
 
 /* A uniform belief as a Gaussian: the arena's centre with the arena's own spread. */
 struct nav_gaussian nav_gaussian_uniform(const struct nav_arena *);
-
-/* The prior as a Gaussian. */
-struct nav_gaussian nav_gaussian_prior(const struct nav_problem *);
 
 /* Pose, covariance and confidence of a Gaussian belief. */
 void nav_gaussian_estimate(const struct nav_gaussian *, struct nav_estimate *);

@@ -1,10 +1,111 @@
 #include "histogram.h"
 
+#include <limits.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "histogram_pass.h"
+/* Cells that the blur of one pass reaches, and lines that it takes from. */
+enum { NAV_BLUR_MOST = 4, NAV_BLUR_LINES = 2 * NAV_BLUR_MOST + 1 };
+
+/* A group's cells, wherever they lie in memory. */
+typedef float nav_lanes __attribute__((vector_size(NAV_LANES * sizeof(float)), aligned(sizeof(float)), may_alias));
+typedef int32_t nav_lane_counts __attribute__((vector_size(NAV_LANES * sizeof(int32_t)), aligned(sizeof(int32_t))));
+
+/* A line written out. Groups outside begin .. end - 1 hold nothing; some cells beyond both ends may be written. */
+struct nav_line {
+    float *cell;
+    int begin, end;
+};
+
+/* Noise that a pass adds. */
+struct nav_blur {
+    int reach;                                           /* cells, of the position's */
+    float along[NAV_BLUR_LINES], across[NAV_BLUR_LINES]; /* its kernels, their middle at [reach] */
+    float side_turn;                                     /* weight of a neighbour in the headings' */
+};
+
+/* How far it is: the group of the line of the slice that is stored next (-1: the line is not begun), of lines before
+ * `end`; those before `made` are written out. */
+struct nav_progress {
+    int slice, line, group, end, made;
+    uint32_t groups; /* stored */
+    long touched;
+};
+
+/* Sums of a line, by lane: mass, that times x, xx; cells with mass; heaviest cell. */
+struct nav_line_sums {
+    nav_lanes mass[3], peak;
+    nav_lane_counts cells;
+};
+
+/* A pass under way. */
+struct nav_pass {
+    bool running;
+    const struct nav_weigh *weigh;
+    struct nav_blur blur;
+    struct nav_progress at;
+    int *roll_x, *roll_y; /* [nh] whole cells that slices move by */
+    struct nav_line raw, blurred[NAV_BLUR_LINES];
+    const float *row[NAV_BLUR_LINES]; /* lines that this one takes from, */
+    int groups_end;                   /* and where their groups end */
+    struct nav_line_sums sums;
+    struct nav_pose about;
+    double total;
+    long cells;
+    float heaviest; /* cell so far */
+    struct nav_pose mode;
+};
+
+static void histogram_line_widen(struct nav_line *line, int begin, int end)
+{
+    line->begin = begin < line->begin ? begin : line->begin;
+    line->end = end > line->end ? end : line->end;
+}
+
+static void histogram_line_clear(struct nav_line *line)
+{
+    if (line->end > line->begin)
+        memset(line->cell + line->begin * NAV_LANES, 0,
+               (size_t)(line->end - line->begin) * NAV_LANES * sizeof *line->cell);
+    line->begin = INT_MAX;
+    line->end = 0;
+}
+
+/* Whether any cell of a group holds mass: none is below 0. */
+static bool histogram_group_any(const float *mass)
+{
+    uint32_t bits[NAV_LANES], all = 0;
+    memcpy(bits, mass, sizeof bits);
+    for (int k = 0; k < NAV_LANES; k++)
+        all |= bits[k];
+    return all << 1 != 0;
+}
+
+/* Adds a group to the store, when there is room; ends a line. */
+static void histogram_store_group(struct nav_histogram *h, int group, const float *mass)
+{
+    uint32_t n = h->pass->at.groups;
+    if (n == h->room)
+        return;
+    h->next.at[n] = (uint16_t)group;
+    memcpy(h->next.mass + (size_t)n * NAV_LANES, mass, NAV_LANES * sizeof *mass);
+    h->pass->at.groups++;
+}
+
+static void histogram_end_line(struct nav_histogram *h, size_t line)
+{
+    h->next.first[line + 1] = h->pass->at.groups;
+}
+
+/* Adds to a shift and returns the whole cells that it has gathered, at most `most` either way; beyond these the shift
+ * stays within half a cell. */
+static int histogram_carry(double *shift, double by, double cell, int most)
+{
+    double whole = floor((*shift + by) / cell + 0.5);
+    *shift += by - whole * cell;
+    return (int)fmax(fmin(whole, most), -most);
+}
 
 enum { PAD = 2 * NAV_LANES }; /* cells on both sides of a line written out */
 
@@ -136,12 +237,12 @@ void nav_histogram_restart(struct nav_histogram *h, int level)
     h->total = 1.0;
 }
 
-void nav_store_begin(struct nav_histogram *h)
+static void histogram_store_begin(struct nav_histogram *h)
 {
     h->pass->at.groups = h->next.first[0] = 0;
 }
 
-void nav_store_swap(struct nav_histogram *h)
+static void histogram_store_swap(struct nav_histogram *h)
 {
     struct nav_cells done = h->next;
     h->next = h->now;
@@ -165,11 +266,11 @@ static void histogram_copy_place(struct nav_histogram *h)
 static void histogram_store_line(struct nav_histogram *h, struct nav_line *line, size_t number)
 {
     for (int g = line->begin; g < line->end; g++) {
-        if (nav_group_any(line->cell + g * NAV_LANES))
-            nav_store_group(h, g, line->cell + g * NAV_LANES);
+        if (histogram_group_any(line->cell + g * NAV_LANES))
+            histogram_store_group(h, g, line->cell + g * NAV_LANES);
     }
-    nav_store_end_line(h, number);
-    nav_line_clear(line);
+    histogram_end_line(h, number);
+    histogram_line_clear(line);
 }
 
 float *nav_histogram_write_out(struct nav_histogram *h, float **line)
@@ -185,13 +286,13 @@ void nav_histogram_take(struct nav_histogram *h)
     struct nav_line *line = &h->pass->raw;
     size_t cells = (size_t)h->shape.groups * NAV_LANES;
     histogram_copy_place(h);
-    nav_store_begin(h);
+    histogram_store_begin(h);
     for (size_t n = 0; n < histogram_shape_lines(&h->shape); n++) {
         memcpy(line->cell, h->next.mass + n * cells, cells * sizeof *line->cell);
-        nav_line_widen(line, 0, h->shape.groups);
+        histogram_line_widen(line, 0, h->shape.groups);
         histogram_store_line(h, line, n);
     }
-    nav_store_swap(h);
+    histogram_store_swap(h);
     h->total = 1.0;
 }
 
@@ -201,7 +302,7 @@ static void histogram_write_out(const struct nav_histogram *h, size_t number, st
     for (uint32_t n = h->now.first[number]; n < h->now.first[number + 1]; n++) {
         memcpy(line->cell + h->now.at[n] * NAV_LANES, h->now.mass + (size_t)n * NAV_LANES,
                NAV_LANES * sizeof *line->cell);
-        nav_line_widen(line, h->now.at[n], h->now.at[n] + 1);
+        histogram_line_widen(line, h->now.at[n], h->now.at[n] + 1);
     }
 }
 
@@ -225,7 +326,7 @@ void nav_histogram_add(struct nav_histogram *h, struct nav_grain *grain, int32_t
     size_t lines = histogram_shape_lines(&h->shape);
     int cell = 0;
     histogram_copy_place(h);
-    nav_store_begin(h);
+    histogram_store_begin(h);
     memset(h->next.first + 1, 0, lines * sizeof *h->next.first);
     for (int32_t n = 0; n < count; n++) {
         int64_t at = histogram_line_of(h, grain[n].pose, &cell);
@@ -240,11 +341,11 @@ void nav_histogram_add(struct nav_histogram *h, struct nav_grain *grain, int32_t
         for (int32_t n = (int32_t)h->next.first[number + 1] - 1; n >= 0; n = grain[n].next) {
             histogram_line_of(h, grain[n].pose, &cell);
             line->cell[cell] += (float)grain[n].mass;
-            nav_line_widen(line, cell / NAV_LANES, cell / NAV_LANES + 1);
+            histogram_line_widen(line, cell / NAV_LANES, cell / NAV_LANES + 1);
         }
         histogram_store_line(h, line, number);
     }
-    nav_store_swap(h);
+    histogram_store_swap(h);
 }
 
 /* Writes out the finer line that is half of a line's cells, `dx` cells to the right. */
@@ -257,7 +358,7 @@ static void histogram_split_line(const struct nav_histogram *h, size_t number, c
             int at = 2 * (h->now.at[n] * NAV_LANES + k) + dx;
             for (int i = at > 0 ? at : 0; i < at + 2 && i < finer->nx && mass > 0.0f; i++) {
                 line->cell[i] = mass;
-                nav_line_widen(line, i / NAV_LANES, i / NAV_LANES + 1);
+                histogram_line_widen(line, i / NAV_LANES, i / NAV_LANES + 1);
             }
         }
     }
@@ -271,13 +372,13 @@ bool nav_histogram_refine(struct nav_histogram *h)
     int turns = finer.nh / coarse.nh;
     if ((size_t)nav_histogram_groups(h) * 4u * (size_t)turns * 2u > h->room)
         return false;
-    nav_store_begin(h);
+    histogram_store_begin(h);
     h->next.rotation = h->now.rotation;
     for (int q = 0; q < finer.nh; q++) {
         int p = q / turns, dx, dy;
         h->next.shift_x[q] = h->next.shift_y[q] = 0.0;
-        dx = nav_histogram_carry(&h->next.shift_x[q], h->now.shift_x[p], finer.cell, finer.nx);
-        dy = nav_histogram_carry(&h->next.shift_y[q], h->now.shift_y[p], finer.cell, finer.ny);
+        dx = histogram_carry(&h->next.shift_x[q], h->now.shift_x[p], finer.cell, finer.nx);
+        dy = histogram_carry(&h->next.shift_y[q], h->now.shift_y[p], finer.cell, finer.ny);
         for (int j = 0; j < finer.ny; j++) {
             int from = j - dy >= 0 ? (j - dy) / 2 : -1;
             h->shape = coarse;
@@ -295,6 +396,423 @@ bool nav_histogram_refine(struct nav_histogram *h)
     h->heaviest *= 0.25f / (float)turns;
     h->cells *= 4L * turns;
     h->level--;
-    nav_store_swap(h);
+    histogram_store_swap(h);
     return true;
+}
+
+/* One pass: cells moved, noise added, likelihood applied, sums taken; line by line, so that what is in the making stays
+ * in the nearest cache. Sums run in fixed lanes of single precision along a line and in double precision over lines. */
+
+/* Blurring costs work, so variance is saved up to this share of a squared cell edge ... */
+static const double OWED_LEAST = 0.05;
+/* ... and no three-point kernel takes more than this (its middle weight stays at 1/2). */
+static const double KERNEL_MOST = 0.5;
+
+/* Lines passed over to write one out: its own, those of both neighbours, the blurred one. */
+enum { MAKE_MOST = 4 };
+
+double nav_histogram_fan(const struct nav_histogram *h, struct nav_pose step, double along_m)
+{
+    double distance = hypot(step.x, step.y);
+    return h->shape.cell_theta * h->shape.cell_theta / 12.0 * distance * fmax(distance, along_m);
+}
+
+/* Store that the shifts are taken from. */
+static const struct nav_cells *histogram_pass_cells(const struct nav_histogram *h)
+{
+    return h->pass->running ? &h->next : &h->now;
+}
+
+double nav_histogram_heading(const struct nav_histogram *h, int p)
+{
+    return (p + 0.5) * h->shape.cell_theta + histogram_pass_cells(h)->rotation;
+}
+
+double nav_histogram_shift_x(const struct nav_histogram *h, int p)
+{
+    return histogram_pass_cells(h)->shift_x[p];
+}
+
+double nav_histogram_shift_y(const struct nav_histogram *h, int p)
+{
+    return histogram_pass_cells(h)->shift_y[p];
+}
+
+bool nav_histogram_running(const struct nav_histogram *h)
+{
+    return h->pass->running;
+}
+
+double nav_histogram_debt(const struct nav_histogram *h)
+{
+    double cell = h->shape.cell, turn = h->shape.cell_theta;
+    return fmax(h->owed_position / (NAV_BLUR_MOST * KERNEL_MOST * cell * cell),
+                h->owed_heading / (KERNEL_MOST * turn * turn));
+}
+
+/* Takes what is due of a variance, as at most `most` kernels of three points: how many, and their side weight. A kernel
+ * with side weight s adds 2 s cell^2. */
+static int histogram_pass_due(double *pending, double cell, int most, double *side)
+{
+    double share = *pending / (cell * cell);
+    *side = 0.0;
+    if (share < OWED_LEAST)
+        return 0;
+    int kernels = (int)fmin(ceil(share / KERNEL_MOST), most);
+    double each = fmin(share / kernels, KERNEL_MOST);
+    *pending -= each * kernels * cell * cell;
+    *side = each / 2.0;
+    return kernels;
+}
+
+static void histogram_pass_kernels(struct nav_pass *p, double side, double scale)
+{
+    double kernel[NAV_BLUR_LINES + 2] = {0.0}, wider[NAV_BLUR_LINES + 2];
+    kernel[1] = 1.0;
+    for (int n = 0; n < p->blur.reach; n++) {
+        memcpy(wider, kernel, sizeof wider);
+        for (int k = 1; k <= NAV_BLUR_LINES; k++)
+            kernel[k] = (1.0 - 2.0 * side) * wider[k - 1] + side * (wider[k] + (k > 1 ? wider[k - 2] : 0.0));
+    }
+    for (int k = 0; k < NAV_BLUR_LINES; k++) {
+        p->blur.along[k] = (float)kernel[k + 1];
+        p->blur.across[k] = (float)(scale * kernel[k + 1]);
+    }
+}
+
+/* Moves slices by their headings: whole cells wait in `roll`. */
+static void histogram_pass_shift(struct nav_histogram *h, struct nav_pose step)
+{
+    struct nav_pass *pass = h->pass;
+    for (int p = 0; p < h->shape.nh; p++) {
+        double heading = (p + 0.5) * h->shape.cell_theta + h->now.rotation, c = cos(heading), s = sin(heading);
+        h->next.shift_x[p] = h->now.shift_x[p];
+        h->next.shift_y[p] = h->now.shift_y[p];
+        pass->roll_x[p] = histogram_carry(&h->next.shift_x[p], c * step.x - s * step.y, h->shape.cell, h->shape.nx);
+        pass->roll_y[p] = histogram_carry(&h->next.shift_y[p], s * step.x + c * step.y, h->shape.cell, h->shape.ny);
+    }
+    h->next.rotation = nav_wrap(h->now.rotation + step.theta);
+}
+
+static void histogram_pass_begin_slice(struct nav_histogram *h);
+
+void nav_histogram_begin(struct nav_histogram *h, struct nav_pose step, const struct nav_weigh *weigh,
+                         struct nav_pose about)
+{
+    struct nav_pass *p = h->pass;
+    double side, side_turn;
+    if (h->uniform) /* nothing blurs what is uniform */
+        h->owed_position = h->owed_heading = 0.0;
+    p->blur.reach = histogram_pass_due(&h->owed_position, h->shape.cell, NAV_BLUR_MOST, &side);
+    histogram_pass_due(&h->owed_heading, h->shape.cell_theta, 1, &side_turn);
+    p->blur.side_turn = (float)side_turn;
+    histogram_pass_kernels(p, side, 1.0 / h->total);
+    histogram_pass_shift(h, step);
+    p->weigh = weigh;
+    p->about = about;
+    p->total = 0.0;
+    p->cells = 0;
+    p->heaviest = 0.0f;
+    p->at.slice = 0;
+    p->running = true;
+    histogram_store_begin(h);
+    histogram_pass_begin_slice(h);
+}
+
+static struct nav_line *histogram_pass_blurred(const struct nav_histogram *h, int j)
+{
+    return &h->pass->blurred[(j + NAV_BLUR_LINES) % NAV_BLUR_LINES];
+}
+
+/* Adds a line of slice q, as it was, to line j of the slice; where its cells fall is rounded to whole cells. */
+static void histogram_pass_pour(struct nav_histogram *h, int q, int j, float weight)
+{
+    struct nav_pass *pass = h->pass;
+    struct nav_line *out = pass->blur.reach > 0 ? &pass->raw : histogram_pass_blurred(h, j);
+    int p = pass->at.slice, cells = h->shape.nx;
+    int dx = pass->roll_x[q] + (int)floor((h->next.shift_x[q] - h->next.shift_x[p]) / h->shape.cell + 0.5);
+    int dy = pass->roll_y[q] + (int)floor((h->next.shift_y[q] - h->next.shift_y[p]) / h->shape.cell + 0.5);
+    if (j - dy < 0 || j - dy >= h->shape.ny)
+        return;
+    const uint32_t *first = h->now.first + (size_t)q * (size_t)h->shape.ny + (size_t)(j - dy);
+    for (uint32_t n = first[0]; n < first[1]; n++) {
+        int i = h->now.at[n] * NAV_LANES + dx;
+        if (i <= -NAV_LANES || i >= cells)
+            continue;
+        *(nav_lanes *)(out->cell + i) += weight * *(const nav_lanes *)(h->now.mass + (size_t)n * NAV_LANES);
+        int group = (i + NAV_LANES) / NAV_LANES - 1, last = (i + 2 * NAV_LANES - 1) / NAV_LANES - 1;
+        histogram_line_widen(out, group > 0 ? group : 0, last < h->shape.groups ? last + 1 : h->shape.groups);
+        pass->at.touched += NAV_LANES;
+    }
+}
+
+/* What is beyond the walls is lost. */
+static void histogram_pass_trim(const struct nav_histogram *h, struct nav_line *line)
+{
+    int end = h->shape.groups * NAV_LANES;
+    for (int i = -2 * NAV_LANES; i < 0; i++)
+        line->cell[i] = 0.0f;
+    for (int i = h->shape.nx; i < end + 2 * NAV_LANES; i++)
+        line->cell[i] = 0.0f;
+}
+
+/* Blurs the line in `raw` along x and empties it. */
+static void histogram_pass_blur(struct nav_histogram *h, struct nav_line *out)
+{
+    struct nav_pass *pass = h->pass;
+    struct nav_line *raw = &pass->raw;
+    int reach = pass->blur.reach, begin = raw->begin, end = raw->end;
+    for (int k = 0; k < reach; k++) { /* mass this near to the next group reaches it */
+        begin -= begin == raw->begin && begin > 0 && raw->cell[raw->begin * NAV_LANES + k] > 0.0f;
+        end += end == raw->end && end < h->shape.groups && raw->cell[raw->end * NAV_LANES - 1 - k] > 0.0f;
+    }
+    histogram_line_widen(out, begin, end);
+    for (int g = begin; g < end; g++) {
+        nav_lanes sum = {0.0f};
+        for (int t = 0; t <= 2 * reach; t++)
+            sum += pass->blur.along[t] * *(const nav_lanes *)(raw->cell + g * NAV_LANES + t - reach);
+        *(nav_lanes *)(out->cell + g * NAV_LANES) = sum;
+        pass->at.touched += NAV_LANES;
+    }
+    histogram_pass_trim(h, out);
+    histogram_line_clear(raw);
+}
+
+/* Writes out the next line of the slice, moved and blurred along x and over headings. */
+static void histogram_pass_make(struct nav_histogram *h)
+{
+    struct nav_pass *pass = h->pass;
+    int p = pass->at.slice, nh = h->shape.nh, j = pass->at.made++;
+    struct nav_line *out = histogram_pass_blurred(h, j);
+    histogram_line_clear(out);
+    if (j < 0 || j >= h->shape.ny)
+        return;
+    long before = pass->at.touched;
+    histogram_pass_pour(h, p, j, 1.0f - 2.0f * pass->blur.side_turn);
+    if (pass->blur.side_turn > 0.0f) {
+        histogram_pass_pour(h, (p + 1) % nh, j, pass->blur.side_turn);
+        histogram_pass_pour(h, (p + nh - 1) % nh, j, pass->blur.side_turn);
+    }
+    if (pass->at.touched == before)
+        return;
+    histogram_pass_trim(h, pass->blur.reach > 0 ? &pass->raw : out);
+    if (pass->blur.reach > 0)
+        histogram_pass_blur(h, out);
+}
+
+/* Widens `extent` by the lines of slice p that hold mass, where they will be. */
+static void histogram_pass_widen(const struct nav_histogram *h, int p, int by, int extent[2])
+{
+    const uint32_t *first = h->now.first + (size_t)p * (size_t)h->shape.ny;
+    int low = 0, high = h->shape.ny;
+    if (first[low] == first[high])
+        return;
+    while (first[low + 1] == first[low])
+        low++;
+    while (first[high - 1] == first[high])
+        high--;
+    low += h->pass->roll_y[p] - by;
+    high += h->pass->roll_y[p] + by;
+    extent[0] = low < extent[0] ? low : extent[0];
+    extent[1] = high > extent[1] ? high : extent[1];
+}
+
+static bool histogram_pass_everywhere(const struct nav_histogram *h)
+{
+    return h->uniform || h->pass->weigh->extra > 0.0;
+}
+
+/* Lines of the slice that may hold mass after the pass: those before and behind hold none. */
+static void histogram_pass_extent(const struct nav_histogram *h, int extent[2])
+{
+    const struct nav_pass *p = h->pass;
+    int nh = h->shape.nh;
+    extent[0] = histogram_pass_everywhere(h) ? 0 : h->shape.ny;
+    extent[1] = histogram_pass_everywhere(h) ? h->shape.ny : 0;
+    histogram_pass_widen(h, p->at.slice, p->blur.reach, extent);
+    for (int k = -1; k <= 1 && p->blur.side_turn > 0.0f; k += 2) /* another's shift differs by less than two cells */
+        histogram_pass_widen(h, (p->at.slice + nh + k) % nh, p->blur.reach + 2, extent);
+    extent[0] = extent[0] > 0 ? extent[0] : 0;
+    extent[1] = extent[1] < h->shape.ny ? extent[1] : h->shape.ny;
+}
+
+/* Stores lines of the slice before `end` as empty. */
+static void histogram_pass_skip(struct nav_histogram *h, int end)
+{
+    struct nav_pass *p = h->pass;
+    for (; p->at.line < end; p->at.line++)
+        histogram_end_line(h, (size_t)p->at.slice * (size_t)h->shape.ny + (size_t)p->at.line);
+}
+
+static void histogram_pass_begin_slice(struct nav_histogram *h)
+{
+    struct nav_pass *p = h->pass;
+    int extent[2];
+    memset(h->moment[p->at.slice], 0, sizeof h->moment[p->at.slice]);
+    histogram_pass_extent(h, extent);
+    p->at.line = 0;
+    p->at.end = extent[1];
+    p->at.group = -1;
+    histogram_pass_skip(h, extent[0] < extent[1] ? extent[0] : h->shape.ny);
+    for (int n = 0; n < NAV_BLUR_LINES && p->at.line < h->shape.ny; n++)
+        histogram_line_clear(&p->blurred[n]);
+    p->at.made = p->at.line - p->blur.reach;
+}
+
+/* Finds the groups of the line that may hold mass. */
+static void histogram_pass_open(struct nav_histogram *h)
+{
+    struct nav_pass *p = h->pass;
+    struct nav_line all = {NULL, h->shape.groups, 0};
+    for (int t = 0; t <= 2 * p->blur.reach && !h->uniform; t++) {
+        const struct nav_line *from = histogram_pass_blurred(h, p->at.line + t - p->blur.reach);
+        p->row[t] = from->cell;
+        histogram_line_widen(&all, from->begin, from->end);
+    }
+    if (histogram_pass_everywhere(h))
+        histogram_line_widen(&all, 0, h->shape.groups);
+    p->sums = (struct nav_line_sums){.cells = {0}};
+    p->at.group = all.begin;
+    p->groups_end = all.end;
+}
+
+/* Mass of a group before it is weighed. */
+static void histogram_pass_mass(const struct nav_histogram *h, int g, float *mass)
+{
+    const struct nav_pass *p = h->pass;
+    float same = (float)(p->weigh->extra + (h->uniform ? 1.0 / nav_shape_inside(&h->shape) : 0.0));
+    nav_lanes sum = {0.0f};
+    for (int t = 0; t <= 2 * p->blur.reach && !h->uniform; t++)
+        sum += p->blur.across[t] * *(const nav_lanes *)(p->row[t] + g * NAV_LANES);
+    int inside = h->shape.nx - g * NAV_LANES;
+    float least = (float)p->weigh->least;
+    for (int k = 0; k < NAV_LANES; k++) {
+        float all = sum[k] + (k < inside ? same : 0.0f);
+        mass[k] = all >= least ? all : 0.0f;
+    }
+}
+
+/* Adds a group to the line's sums and to the store. */
+static void histogram_pass_take(struct nav_histogram *h, int g, const float *mass)
+{
+    static const nav_lanes STEPS = {0.5f, 1.5f, 2.5f, 3.5f, 4.5f, 5.5f, 6.5f, 7.5f};
+    struct nav_pass *p = h->pass;
+    struct nav_line_sums *sums = &p->sums;
+    float x = (float)(g * NAV_LANES * h->shape.cell + h->next.shift_x[p->at.slice] - p->about.x);
+    nav_lanes held = *(const nav_lanes *)mass, at = (float)h->shape.cell * STEPS + x;
+    sums->mass[0] += held;
+    sums->mass[1] += held * at;
+    sums->mass[2] += held * at * at;
+    for (int k = 0; k < NAV_LANES; k++)
+        sums->peak[k] = mass[k] > sums->peak[k] ? mass[k] : sums->peak[k];
+    sums->cells -= held > 0.0f;
+    histogram_store_group(h, g, mass);
+}
+
+static void histogram_pass_group(struct nav_histogram *h, int g)
+{
+    struct nav_pass *p = h->pass;
+    float mass[NAV_LANES], like[NAV_LANES];
+    histogram_pass_mass(h, g, mass);
+    p->at.touched += NAV_LANES;
+    if (!histogram_group_any(mass))
+        return;
+    if (p->weigh->group) {
+        p->at.touched += p->weigh->group(p->weigh->self, p->at.slice, p->at.line, g, mass, like);
+        for (int k = 0; k < NAV_LANES; k++)
+            mass[k] *= like[k];
+    }
+    if (histogram_group_any(mass))
+        histogram_pass_take(h, g, mass);
+}
+
+/* Finds the heaviest cell of the line's groups, and counts those with mass. */
+static void histogram_pass_survey(struct nav_histogram *h, uint32_t first)
+{
+    struct nav_pass *p = h->pass;
+    const float *mass = h->next.mass;
+    float peak = 0.0f;
+    for (int k = 0; k < NAV_LANES; k++) {
+        peak = fmaxf(peak, p->sums.peak[k]);
+        p->cells += p->sums.cells[k];
+    }
+    if (peak <= p->heaviest)
+        return;
+    size_t n = (size_t)first * NAV_LANES;
+    while (n + 1 < (size_t)p->at.groups * NAV_LANES && mass[n] < peak)
+        n++;
+    int i = h->next.at[n / NAV_LANES] * NAV_LANES + (int)(n % NAV_LANES);
+    p->heaviest = peak;
+    p->mode = (struct nav_pose){(i + 0.5) * h->shape.cell + h->next.shift_x[p->at.slice],
+                                (p->at.line + 0.5) * h->shape.cell + h->next.shift_y[p->at.slice],
+                                nav_wrap(nav_histogram_heading(h, p->at.slice))};
+}
+
+/* Ends a line: its sums go to the slice's. */
+static void histogram_pass_close(struct nav_histogram *h)
+{
+    struct nav_pass *p = h->pass;
+    size_t number = (size_t)p->at.slice * (size_t)h->shape.ny + (size_t)p->at.line;
+    double sum[3] = {0.0}, *m = h->moment[p->at.slice];
+    double y = (p->at.line + 0.5) * h->shape.cell + h->next.shift_y[p->at.slice] - p->about.y;
+    for (int k = 0; k < 3; k++) {
+        for (int n = 0; n < NAV_LANES; n++)
+            sum[k] += (double)p->sums.mass[k][n];
+    }
+    const double parts[NAV_MOMENTS] = {sum[0], sum[1], sum[0] * y, sum[2], sum[1] * y, sum[0] * y * y};
+    for (int k = 0; k < NAV_MOMENTS; k++)
+        m[k] += parts[k];
+    p->total += sum[0];
+    histogram_pass_survey(h, h->next.first[number]);
+    histogram_end_line(h, number);
+    p->at.line++;
+    p->at.group = -1;
+}
+
+/* Does groups of the line in work; false: the next one would take more than `most`. */
+static bool histogram_pass_line(struct nav_histogram *h, long most)
+{
+    struct nav_pass *p = h->pass;
+    long each = NAV_LANES + p->weigh->most;
+    for (; !h->uniform && p->at.made <= p->at.line + p->blur.reach; histogram_pass_make(h)) {
+        if (p->at.touched + MAKE_MOST * NAV_LANES * h->shape.groups > most)
+            return false;
+    }
+    if (p->at.group < 0)
+        histogram_pass_open(h);
+    for (; p->at.group < p->groups_end; p->at.group++) {
+        if (p->at.touched + each > most)
+            return false;
+        histogram_pass_group(h, p->at.group);
+    }
+    histogram_pass_close(h);
+    return true;
+}
+
+static void histogram_pass_end(struct nav_histogram *h)
+{
+    struct nav_pass *p = h->pass;
+    p->running = false;
+    h->total = p->total;
+    h->cells = p->cells;
+    h->about = p->about;
+    h->heaviest = p->heaviest;
+    h->mode = p->mode;
+    histogram_store_swap(h);
+}
+
+long nav_histogram_run(struct nav_histogram *h, long most)
+{
+    struct nav_pass *p = h->pass;
+    p->at.touched = 0;
+    while (p->running && (p->at.line == h->shape.ny || histogram_pass_line(h, most))) {
+        if (p->at.line < p->at.end)
+            continue;
+        histogram_pass_skip(h, h->shape.ny);
+        if (++p->at.slice < h->shape.nh)
+            histogram_pass_begin_slice(h);
+        else
+            histogram_pass_end(h);
+    }
+    return p->at.touched;
 }

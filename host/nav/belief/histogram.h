@@ -3,7 +3,7 @@
  * Each heading slice keeps its own shift in x and y and all slices share one rotation, so that motion does not smear:
  * only whole-cell moves are left to the cells, and odometry noise is added by blurs of the variance asked for. Of every
  * line of cells those groups of NAV_LANES are stored that hold mass, in the order of slices, lines and columns. Moves,
- * blurs, the likelihood and the sums for normalising are one pass from one store to another (histogram_pass.c), which
+ * blurs, the likelihood and the sums for normalising are one pass from one store to another, which
  * may be interrupted after every group.
  *
  * Level n has cells 2^n times as wide as level 0: a belief can begin coarse and be refined when its mass sits in few

@@ -46,6 +46,19 @@ struct nav_gaussian nav_mixture_gaussian(const struct nav_prior *prior)
     return g;
 }
 
+struct nav_gaussian nav_mixture_prior(const struct nav_problem *problem)
+{
+    const struct nav_prior *prior = &problem->prior;
+    if (nav_mixture_given(prior))
+        return nav_mixture_gaussian(prior);
+    if (prior->uniform)
+        return nav_gaussian_uniform(&problem->arena);
+    struct nav_gaussian g = {.mean = prior->mean};
+    for (int i = 0; i < 3; i++)
+        g.covariance[4 * i] = prior->sigma[i] * prior->sigma[i];
+    return g;
+}
+
 struct nav_pose nav_mixture_draw(const struct nav_prior *prior, struct nav_rng *rng)
 {
     double mark = nav_rng_uniform(rng);

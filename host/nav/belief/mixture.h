@@ -15,6 +15,9 @@ void nav_mixture_normalise(struct nav_component *, long count);
 /* Mean and covariance of the components, those of one Gaussian. */
 struct nav_gaussian nav_mixture_gaussian(const struct nav_prior *);
 
+/* Any prior as a Gaussian. */
+struct nav_gaussian nav_mixture_prior(const struct nav_problem *);
+
 /* A pose drawn from the components. */
 struct nav_pose nav_mixture_draw(const struct nav_prior *, struct nav_rng *);
 

@@ -117,7 +117,7 @@ static void adaptive_begin_mixture(struct adaptive *a)
         adaptive_global_restart(&a->global, 0);
     a->awake = true;
     a->odds = log(NAV_ANYWHERE / (1.0 - NAV_ANYWHERE));
-    a->answer.belief = nav_gaussian_prior(a->problem);
+    a->answer.belief = nav_mixture_prior(a->problem);
     adaptive_sum_up(a);
 }
 
@@ -130,7 +130,7 @@ static void adaptive_begin(struct adaptive *a)
     a->local = !a->problem->prior.uniform && adaptive_begin_cloud(a);
     a->awake = !a->local;
     a->kidnap.proven = a->local ? (double)INFINITY : 0.0; /* a start that is given */
-    a->answer.belief = nav_gaussian_prior(a->problem);
+    a->answer.belief = nav_mixture_prior(a->problem);
     a->gaussian.compared = a->local && nav_gaussian_mass(&a->answer.belief, NAV_NEAR_M, NAV_NEAR_RAD) >=
                                            1.0 - a->problem->settings.adaptive.scattered;
     adaptive_sum_up(a);

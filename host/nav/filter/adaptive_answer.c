@@ -1,4 +1,5 @@
 #include "adaptive_answer.h"
+#include "mixture.h"
 
 static double answer_mix(double share, double a, double b)
 {
@@ -18,7 +19,7 @@ static struct nav_gaussian answer_anywhere(const struct adaptive_held *h)
 {
     struct nav_problem lost = *h->problem;
     lost.prior.uniform = true;
-    return nav_gaussian_prior(&lost);
+    return nav_mixture_prior(&lost);
 }
 
 static struct nav_summary answer_from_local(const struct adaptive_held *h, struct nav_summary local)

@@ -7,6 +7,7 @@
 #include "filter.h"
 #include "gaussian.h"
 #include "likelihood.h"
+#include "mixture.h"
 
 struct foveal {
     const struct nav_problem *problem;
@@ -37,7 +38,7 @@ static void *foveal_create(const struct nav_problem *problem)
     if (!f)
         return NULL;
     f->problem = problem;
-    f->belief = nav_gaussian_prior(problem);
+    f->belief = nav_mixture_prior(problem);
     f->cells = (int)settings->foveal.cells;
     f->spacing = settings->foveal.diameter_m / (f->cells - 1);
     f->spacing_theta = settings->foveal.span_deg * NAV_PI / 180.0 / (f->cells - 1);

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "kalman.h"
+#include "mixture.h"
 
 static const double GATE = 9.0;        /* squared standard deviations */
 static const double ALONG_LEAST = 0.3; /* a crossing at a flatter angle than this cosine says too little */
@@ -43,7 +44,7 @@ static void *kalman_create(const struct nav_problem *problem, nav_kalman_lineari
     struct nav_kalman *k = calloc(1, sizeof *k);
     if (!k)
         return NULL;
-    *k = (struct nav_kalman){.problem = problem, .belief = nav_gaussian_prior(problem), .linearise = linearise};
+    *k = (struct nav_kalman){.problem = problem, .belief = nav_mixture_prior(problem), .linearise = linearise};
     if (!linearise)
         return k;
     k->likelihood = nav_likelihood_new(&problem->arena, &problem->robot, &problem->settings, 0.0);
@@ -263,7 +264,7 @@ static void kalman_read_crossing(struct nav_kalman *k, const struct nav_crossing
 int nav_kalman_init(struct nav_kalman *k, const struct nav_problem *problem, struct nav_likelihood *likelihood)
 {
     *k = (struct nav_kalman){.problem = problem,
-                             .belief = nav_gaussian_prior(problem),
+                             .belief = nav_mixture_prior(problem),
                              .linearise = kalman_linearise_mean,
                              .likelihood = likelihood};
     return nav_borders_init(&k->borders, &problem->arena, &problem->robot);

@@ -2,36 +2,14 @@
 #ifndef NAV_LIKELIHOOD_H
 #define NAV_LIKELIHOOD_H
 
-#include <stdint.h>
-
 #include "map_belief.h"
-#include "measurement.h"
-#include "obstacles.h"
+#include "sensing.h"
 #include "trust.h"
 
 /* One row's readings, sensors in the order of struct nav_sensors. */
 struct nav_evidence {
     const double *const *reading; /* [sensors] -> doubles, as the sensor's model reads them */
     const double *weight;         /* [sensors] 0: not read or nothing new; up to 1 */
-};
-
-struct nav_likelihood {
-    const struct nav_arena *arena;
-    const struct nav_robot *robot;
-    struct nav_sensors sensors;
-    int whiskers;            /* how many sensors there are, and */
-    struct nav_model *model; /* [whiskers] their models: as in `sensors` */
-    struct nav_obstacles obstacles;
-    float **table;                /* [whiskers][codes] log-likelihoods of the present row, weight and trust applied */
-    double **ratio;               /* [whiskers][codes] what the models gave, see measurement.h */
-    double *weight;               /* [whiskers] of the present row */
-    bool active[NAV_KINDS];       /* whether any sensor of a kind was read */
-    int reads, *read;             /* [reads] sensors that the present row read */
-    double ceiling;               /* log-likelihood of the present row at the codes that suit every sensor best */
-    uint8_t *scratch;             /* [whiskers] */
-    struct nav_trust *trust;      /* [whiskers], see trust.h */
-    const double *const *reading; /* [whiskers] of the row last read */
-    struct nav_map_belief map;    /* what is expected follows it */
 };
 
 /* blur_m: standard deviation of a contact's distance over the poses that one look-up stands for. NULL: no memory. */

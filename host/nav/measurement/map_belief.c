@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "likelihood.h"
+#include "trust.h"
 
 /* Prior odds that a place differs from the map, nats: what it costs to believe so. */
 static const double TILE = 6.0, BOX = 3.0, THING = 6.0;

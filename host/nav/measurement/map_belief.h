@@ -7,47 +7,7 @@
 #ifndef NAV_MAP_BELIEF_H
 #define NAV_MAP_BELIEF_H
 
-#include <stddef.h>
-#include <stdint.h>
-
-#include "measurement.h"
-
-struct nav_likelihood;
-
-enum { NAV_MAP_THINGS = 32 };
-
-/* Nats for `other` against the mapped texture, less those of the prior. */
-struct nav_map_tile {
-    float nats;
-    uint8_t other;
-};
-
-/* Something solid that the map lacks was felt here. */
-struct nav_map_thing {
-    double x, y, nats;
-};
-
-/* What may be wrong: a tile, a box, or that nothing is at a point. */
-enum nav_map_kind { NAV_MAP_TILE, NAV_MAP_BOX, NAV_MAP_THING };
-
-/* The place that a sensor's reading tells of, and how much of the belief has it tell of that. */
-struct nav_map_suspect {
-    enum nav_map_kind kind;
-    int which; /* tile or box; -1: none */
-    double x, y, mass;
-};
-
-struct nav_map_belief {
-    const struct nav_arena *reported;
-    struct nav_arena arena; /* as believed, but for boxes */
-    uint8_t *floor;         /* its textures */
-    struct nav_map_tile *tile;
-    float *gone; /* [boxes] nats for its absence, less those of the prior */
-    struct nav_map_thing thing[NAV_MAP_THINGS];
-    int things;                      /* kept */
-    struct nav_map_suspect *suspect; /* [sensors] of the present row */
-    double mass;                     /* of the poses added */
-};
+#include "sensing.h"
 
 /* 0, or -1 without memory; nav_map_free either way. */
 int nav_map_init(struct nav_map_belief *, const struct nav_arena *reported, size_t sensors);

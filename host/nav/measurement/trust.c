@@ -4,8 +4,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "likelihood.h"
-
 static const double WORKING_MOST = 0.995, WORKING_LEAST = 0.005;
 static const double BREAKS = 1e-4, MENDS = 0.005; /* chances per reading */
 static const double RELAX = 0.02;                 /* per reading, towards trust, while the belief itself is in doubt */

@@ -8,16 +8,7 @@
 #ifndef NAV_TRUST_H
 #define NAV_TRUST_H
 
-#include <stdint.h>
-
-struct nav_likelihood;
-
-struct nav_trust {
-    double working;    /* probability that the whisker works, 0 .. 1 */
-    double agreement;  /* fading sum of log p(reading | belief) / p(reading | broken) */
-    double *predicted; /* [codes] belief mass by expected code, of the present row */
-    int codes;
-};
+#include "sensing.h"
 
 /* 0, or -1 without memory. */
 int nav_trust_init(struct nav_trust *, int codes);

@@ -1,4 +1,5 @@
 #include "gaussian.h"
+#include "mixture.h"
 
 #include "filter.h"
 #include "near.h"
@@ -57,7 +58,7 @@ static void a_robot_that_may_be_anywhere_is_in_the_middle_give_or_take_the_arena
     p.arena.size_x = 3.0;
     p.arena.size_y = 1.2;
     p.prior.uniform = true;
-    struct nav_gaussian g = nav_gaussian_prior(&p);
+    struct nav_gaussian g = nav_mixture_prior(&p);
     const double variances[9] = {9.0 / 12.0, 0, 0, 0, 1.44 / 12.0, 0, 0, 0, 4.0 * NAV_PI * NAV_PI / 12.0};
     assert_near(g.mean.x, 1.5, 1e-12);
     assert_near(g.mean.y, 0.6, 1e-12);

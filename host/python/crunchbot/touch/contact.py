@@ -1,4 +1,4 @@
-"""When an object whisker touches and when it lets go, in ticks, from its samples alone (host/nav/touch/contact.h)."""
+"""When an object whisker touches and when it lets go, in ticks, from its samples alone (host/nav/touch/contact/contact.h)."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""The contact filter in contacts that sim/mechanics bends, vibration and all. Its parts: host/nav/tests/test_contact_filter.c."""
+"""The contact filter in contacts that sim/mechanics bends, vibration and all. Its parts: host/nav/tests/touch/test_contact_filter.c."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""Recorded whisks as shapes (host/nav/touch/radial_whisk.h), the numbers in which a model sees them."""
+"""Recorded whisks as shapes (host/nav/touch/radial/radial_whisk.h), the numbers in which a model sees them."""
 
 from dataclasses import dataclass, fields
 

@@ -1,4 +1,4 @@
-"""Radial distance from whole whisks: the model of one whisker (host/nav/touch/radial_whisk.h)."""
+"""Radial distance from whole whisks: the model of one whisker (host/nav/touch/radial/radial_whisk.h)."""
 
 import math
 

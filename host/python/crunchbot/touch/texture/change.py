@@ -1,4 +1,4 @@
-"""Where the surface under a whisker changes: numbers fitted here, arithmetic in C (host/nav/touch/texture_change.h)."""
+"""Where the surface under a whisker changes: numbers fitted here, arithmetic in C (host/nav/touch/texture/texture_change.h)."""
 
 from dataclasses import dataclass
 

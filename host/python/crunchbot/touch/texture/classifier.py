@@ -1,4 +1,4 @@
-"""The classifier for windows of one length: numbers in NumPy, arithmetic in C (host/nav/touch/texture_classifier.h)."""
+"""The classifier for windows of one length: numbers in NumPy, arithmetic in C (host/nav/touch/texture/texture_classifier.h)."""
 
 from dataclasses import dataclass, field
 

@@ -1,4 +1,4 @@
-"""Surfaces never trained: a hierarchical Gaussian model fitted here, arithmetic in C (host/nav/touch/texture_novelty.h)."""
+"""Surfaces never trained: a hierarchical Gaussian model fitted here, arithmetic in C (host/nav/touch/texture/texture_novelty.h)."""
 
 from dataclasses import dataclass
 
