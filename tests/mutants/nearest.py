@@ -14,7 +14,7 @@ PYTHON_TESTS = ("host/python/tests", "tests", "lab/tests")
 C_FOLDERS = ("firmware/dspic", "host/libwhisker", "host/nav", "host/create", "host/apps")
 # What the tests of a folder's own programs do not reach: processes driven from Python, nodes on the simulated chip.
 ALSO = {
-    "firmware/dspic": ("sim/node",),
+    "firmware/dspic": ("tests/node",),
     "host/apps": ("host/python/tests/pilot/test_base.py", "tests/chain/test_daemon.py", "tests/chain/test_flash.py"),
 }
 SLOW_PROGRAMS = "stress_ring|model"

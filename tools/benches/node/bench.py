@@ -48,7 +48,7 @@ def storm(build: Path, kept: Path, fresh: bool, batches: int) -> dict:
         path = kept / f"storm_{first}.jsonl"
         if fresh or not path.exists():
             done = subprocess.run(
-                [build / "sim/node/node_storm", str(first), str(CHUNK)], capture_output=True, text=True
+                [build / "tests/node/node_storm", str(first), str(CHUNK)], capture_output=True, text=True
             )
             path.write_text(done.stdout)
         lines = [json.loads(line) for line in path.read_text().splitlines()]
@@ -96,7 +96,7 @@ def link(build: Path) -> dict:
     """The fastest settings without loss, on 36 kinds of parts: oscillators, prefetch, DMA."""
 
     def lost(divider: int, gap: int, period: int) -> int:
-        words = [build / "sim/node/node_link", LINK_TICKS, divider, gap, period]
+        words = [build / "tests/node/node_link", LINK_TICKS, divider, gap, period]
         out = subprocess.run([str(word) for word in words], capture_output=True, text=True, check=True).stdout
         return int(out.split()[0])
 
@@ -116,7 +116,7 @@ def link(build: Path) -> dict:
 
 def timing(build: Path, spread: tuple[int, int], ticks=TICKS, nodes=NODES):
     """ns from SYNC to latch, conversion's age, ns from SYNC to armed record, as [node, tick]; cycles line."""
-    command = [build / "sim/node/node_timing", ticks, nodes, spread[0], spread[1], CONVERSION_NS, 7]
+    command = [build / "tests/node/node_timing", ticks, nodes, spread[0], spread[1], CONVERSION_NS, 7]
     out = subprocess.run([str(word) for word in command], capture_output=True, text=True, check=True).stdout
     cycles = [line.split()[1:] for line in out.splitlines() if line.startswith("cycles")][0]
     rows = np.array([line.split() for line in out.splitlines() if not line.startswith("cycles")], float)
@@ -192,7 +192,7 @@ def link_chart(found: dict) -> Figure:
 
 def table(build: Path, program: str, name: str) -> list[dict]:
     """What a test program writes down of its cases, kept among the results."""
-    subprocess.run([build / "sim/node" / program, store.RESULTS / f"{name}.json"], check=True)
+    subprocess.run([build / "tests/node" / program, store.RESULTS / f"{name}.json"], check=True)
     store.record_origin(name)
     return store.read_result(name)
 

@@ -30,7 +30,7 @@ the sensor, not on silicon.
 
 ## Fault matrix
 
-From `sim/node/fault_matrix.c`, on six sets of parts: both prefetch depths; chip 2 % slow, nominal, quick; sensor 10 %
+From `tests/node/fault_matrix.c`, on six sets of parts: both prefetch depths; chip 2 % slow, nominal, quick; sensor 10 %
 slow, nominal, quick. Each fault strikes tick n. Verdicts are those of consecutive records. The first one is that of the
 record which the transfer of tick n brings, that is the record of the tick before. A good run ends them.
 
@@ -56,7 +56,7 @@ order_missing, `F` link_overflow.
 CUTS = """
 ## The supply fails during an update
 
-From `sim/node/update_cuts.c`; three nodes each. Reported: no record is driven after the cut. Ticks: from the return of
+From `tests/node/update_cuts.c`; three nodes each. Reported: no record is driven after the cut. Ticks: from the return of
 the supply to the first record that is good, or that says `loader`. A second update succeeds each time. `make test` also
 cuts at 150 random times, and at 128 moments around the end that are one written word apart; `WHISKER_CUTS=n` makes
 more.
@@ -69,7 +69,7 @@ ODDS = """
 ## What passes the checks
 
 A good sample that is not what the sensor measured must be one whose bytes pass every check by arithmetic. The storm
-(`sim/node/storm_batch.c`) runs random faults one to three at a time; `storm_log.c` notes which bits of which frame and record
+(`tests/node/storm_batch.c`) runs random faults one to three at a time; `storm_log.c` notes which bits of which frame and record
 were hurt (a second sensor on the same wires, spared every fault, shows what was sent), works each check out again on
 the bytes that came, and compares them with what the fault must have made of them. {schedules} schedules, {ticks} ticks,
 {bad} records flagged:

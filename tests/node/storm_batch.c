@@ -1,4 +1,4 @@
-#include "storm_batch.h"
+#include "storm.h"
 
 #include "storm_log.h"
 #include "whisker_protocol.h"

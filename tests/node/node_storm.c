@@ -5,7 +5,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-#include "storm_batch.h"
+#include "storm.h"
 
 static bool node_storm_is_sound(const struct storm_counts *c)
 {

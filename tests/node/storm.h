@@ -100,4 +100,7 @@ const char *storm_kind_name(enum storm_kind kind);
 const char *storm_line_name(enum storm_line line);
 const char *storm_link_name(enum storm_link link);
 
+/* Batch `seed`: the same counts each time. */
+struct storm_counts storm_batch(uint64_t seed);
+
 #endif
