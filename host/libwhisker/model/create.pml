@@ -1,5 +1,5 @@
 /*
- * Who gets a ring's name (src/ring_file.c): rival writers, each killed at any point, over a ring whose writer is dead.
+ * Who gets a ring's name (src/ring/ring_file.c): rival writers, each killed at any point, over a ring whose writer is dead.
  * A writer that was given the name keeps it until it closes; two never have it at once; a dead writer's ring, or
  * a naming lock left by a process killed while it held it, holds nobody up.
  *

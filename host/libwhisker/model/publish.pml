@@ -1,5 +1,5 @@
 /*
- * The ring's publish/read protocol (src/ring_writer.c, src/ring_reader.c): no frame that advance or intact vouches for
+ * The ring's publish/read protocol (src/ring/ring_writer.c, src/ring/ring_reader.c): no frame that advance or intact vouches for
  * is torn, of another index, or of another ring; a writer may be killed before any store, and the next one makes a new
  * ring. A frame is two words. Memory is weaker than spin's own: stores between which the code has no fence happen here
  * in either order, and so do loads. Readers store nothing, so killing one is the same as never running it again.

@@ -1,5 +1,5 @@
 /*
- * Waiting and waking (src/ring_wait.c, readers_wait and commit of src/ring_writer.c): no reader sleeps on while there is
+ * Waiting and waking (src/ring/ring_reader.c, readers_wait and commit of src/ring/ring_writer.c): no reader sleeps on while there is
  * something to read, whichever process is killed when. The writer asks the kernel once per tick of a clock whether readers wait;
  * a reader says so by a lock, sleeps briefly until two ticks have passed, and only then relies on being woken. Longer
  * sleeps end by themselves only when the writer is dead: the look every 100 ms, which is not to be needed otherwise.

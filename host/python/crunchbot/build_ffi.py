@@ -97,7 +97,8 @@ def wheel_ffi() -> cffi.FFI:
         "\n".join(f'#include "{header}"' for header in ALL_HEADERS),
         sources=[os.path.relpath(file, ROOT) for file in files],
         include_dirs=[
-            str(path) for path in (library / "include", library / "src", ROOT / "protocol/gen", *nav_rooms())
+            str(path)
+            for path in (*(library / p for p in ("include", "src", "src/ring")), ROOT / "protocol/gen", *nav_rooms())
         ],
         define_macros=[("_GNU_SOURCE", None)],
         libraries=[library for needed in LIBRARIES.values() for library in needed],

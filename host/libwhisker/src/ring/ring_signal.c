@@ -7,7 +7,7 @@
 #include <sys/syscall.h>
 #include <unistd.h>
 
-#include "ring_find.h"
+#include "ring_map.h"
 #include "ring_layout.h"
 #include "whisker/errors.h"
 #include "whisker/ring.h"

@@ -2,6 +2,10 @@
 #ifndef WHISKER_RING_MAP_H
 #define WHISKER_RING_MAP_H
 
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
 #include "ring_file.h"
 #include "ring_layout.h"
 
@@ -26,10 +30,27 @@ int ring_map_check(int fd, const struct stat *file, uint32_t *capacity);
 
 void ring_unmap(struct ring_map *map);
 
-/* Whether the memory is still a ring: false once its file was made shorter (see ring_guard.h). */
+/* Whether the memory is still a ring: false once its file was made shorter (ring_map.c guards it). */
 static inline bool ring_is_whole(const struct ring_map *map)
 {
     return ring_load(&map->header->magic) == RING_MAGIC;
 }
+
+/* Which file is the ring of a name: looked for in all directories, without mapping any. */
+
+/* A ring that was found: its file, open and checked. */
+struct ring_found {
+    int fd;
+    uint32_t capacity;
+    struct stat file;
+};
+
+/* Finds the ring of this name that a reader is to read: the first whose owner is believed and whose writer lives.
+ * Returns 0, or what is wrong with the first file of the name: RING_NAME, RING_MISSING, RING_OWNER, RING_ACCESS,
+ * RING_LAYOUT, RING_VERSION, WRITER_DEAD, SYSTEM. */
+int ring_find(const char *name, uid_t named, struct ring_found *found);
+
+/* Whether a ring of this path lives, with any owner. */
+bool ring_lives(const char *path);
 
 #endif

@@ -4,7 +4,6 @@
 
 #include <time.h>
 
-#include "ring_find.h"
 #include "ring_map.h"
 #include "whisker/ring.h"
 
