@@ -7,8 +7,8 @@
 #include <sys/syscall.h>
 #include <unistd.h>
 
-#include "ring_map.h"
 #include "ring_layout.h"
+#include "ring_map.h"
 #include "whisker/errors.h"
 #include "whisker/ring.h"
 
