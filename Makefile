@@ -72,7 +72,7 @@ lint: setup ## formats, Python lint, and the guards of tools/lint: arrows, circl
 	@clang-format --dry-run --Werror $(SOURCES_C)
 	@.venv/bin/ruff format --quiet --check . || { echo "lint: Python is not formatted; run 'make format'" >&2; exit 1; }
 	@.venv/bin/ruff check --quiet .
-	@cd tools && ../$(PYTHON) -m lint arrows functions words pages
+	@cd tools && ../$(PYTHON) -m lint
 
 clean: ## remove what was built (not .venv)
 	@rm -rf build host/python/crunchbot/_native* lab/crunchbot_lab/signals/_sim*

@@ -89,7 +89,7 @@ FIGURES = (
         lambda d: (f"{100 * d['runs'][1]['cpu_share']:.0f}", f"{d['runs'][1]['bytes_per_s_page'] / 1000:.0f}"),
     ),
     Figure(
-        "docs/drills.md",
+        "tests/drills/README.md",
         r"(\d+)\s+faults, (\d+) with failures.*?median\s+([\d.]+) m, p90\s+([\d.]+) m,\s+([\d.]+) %",
         "drills",
         drill_errors,
@@ -118,7 +118,7 @@ FIGURES = (
         ),
     ),
     *(
-        Figure("docs/drills.md", rf"\| {title}{CELLS}", "restart", restarts(case))
+        Figure("tests/drills/README.md", rf"\| {title}{CELLS}", "restart", restarts(case))
         for title, case in (
             ("0 s", "gap 0 s"),
             ("1 s", "gap 1 s"),

@@ -10,7 +10,7 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tools"))
 from lint import arrows, circles, folders, functions, pages, words  # noqa: E402
 
-GUARDS = (arrows, functions, pages, words)
+GUARDS = (arrows, circles, folders, functions, pages, words)
 PACKAGE = "host/python/crunchbot"
 
 

@@ -10,24 +10,7 @@
 #ifndef PORT_H
 #define PORT_H
 
-#include "boot/loader.h" // struct loader
-#include "node.h"        // struct node
-
-#ifndef __dsPIC33F__
-struct dspic;
-#endif
-
-struct board {
-#ifndef __dsPIC33F__
-    struct dspic *chip; /* the register model */
-#endif
-    uint16_t trapped;    /* survives a reset: what led to it was a trap */
-    uint16_t asked;      /* survives a reset: the firmware itself asked for it, BOARD_ASKED_* */
-    uint16_t link_words; /* that the link waits for */
-    bool loading;        /* the loader runs, not the application */
-    struct node node;
-    struct loader loader;
-};
+#include "chip_board.h"
 
 /* Pins, as numbers of port B and of RP. Sensor lines are open drain on 5 V tolerant pins. docs/hardware.md */
 #define PIN_SENSOR_SEND 6u /* MLX90316 only: tied to PIN_SENSOR_DATA */

@@ -111,7 +111,7 @@ SFR_INLINE void cpu_table_write_high(struct board *board, uint16_t offset, uint1
 
 #else
 
-#include "port.h" // struct board: holds the model
+#include "chip_board.h" // struct board: holds the model
 #include "sfr_model.h"
 
 #define DMA_WORDS_AT(board, offset) (dspic_dma_ram((board)->chip) + (offset) / 2u)
