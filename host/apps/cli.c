@@ -1,6 +1,5 @@
 #include "cli.h"
 
-#include <ctype.h>
 #include <errno.h>
 #include <pwd.h>
 #include <signal.h>
@@ -9,7 +8,6 @@
 #include <string.h>
 #include <time.h>
 
-#include "whisker/device.h"
 #include "whisker/errors.h"
 #include "whisker/ring.h"
 
@@ -84,27 +82,4 @@ bool cli_user(const char *program, const char *option, const char *text, uint32_
     }
     *id = entry ? entry->pw_uid : (uint32_t)number;
     return true;
-}
-
-bool cli_number(const char *program, const char *option, const char *text, uint32_t min, uint32_t max, uint32_t *value)
-{
-    const bool is_hex = text[0] == '0' && (text[1] == 'x' || text[1] == 'X');
-    char *end;
-    errno = 0;
-    const unsigned long long number = strtoull(text, &end, is_hex ? 16 : 10);
-    if (errno || !isdigit((unsigned char)text[0]) || *end != '\0' || number < min || number > max) {
-        fprintf(stderr, "%s: --%s %s: give a whole number from %u to %u\n", program, option, text, min, max);
-        return false;
-    }
-    *value = (uint32_t)number;
-    return true;
-}
-
-uint8_t *cli_byte_setting(struct whisker_settings *settings, const char *name)
-{
-    return !strcmp(name, "sck-divider")    ? &settings->sck_divider
-           : !strcmp(name, "word-gap")     ? &settings->word_gap
-           : !strcmp(name, "sample-point") ? &settings->sample_point
-           : !strcmp(name, "batch")        ? &settings->batch
-                                           : NULL;
 }

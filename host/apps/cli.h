@@ -1,11 +1,9 @@
-/* What the programs share: numbers from the command line, and errors as one line. */
+/* What the programs share: users from the command line, signals, and errors as one line. */
 #ifndef WHISKER_CLI_H
 #define WHISKER_CLI_H
 
 #include <stdbool.h>
 #include <stdint.h>
-
-struct whisker_settings;
 
 enum { CLI_OK = 0, CLI_FAILED = 1, CLI_USAGE = 2 };
 
@@ -21,13 +19,6 @@ int cli_fail_ring(const char *program, const char *name, int error);
 
 /* Reads an option's user, by name or number; false, with one line printed, if there is none. */
 bool cli_user(const char *program, const char *option, const char *text, uint32_t *id);
-
-/* Reads an option's number, decimal or 0x; false, with one line printed, unless it is a whole number min..max. */
-bool cli_number(const char *program, const char *option, const char *text, uint32_t min, uint32_t max, uint32_t *value);
-
-/* The bridge's setting of one byte that an option of this name stands for (sck-divider, word-gap, sample-point, batch);
- * NULL if there is none. */
-uint8_t *cli_byte_setting(struct whisker_settings *settings, const char *name);
 
 /* CLOCK_MONOTONIC in ms. */
 int64_t cli_now_ms(void);

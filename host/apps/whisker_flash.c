@@ -1,11 +1,11 @@
 /* whisker-flash: loads firmware into the nodes of a bridge, all at once; lists them; loads gateware into the bridge. */
-#include <getopt.h>
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "cli.h"
+#include "command_line.h"
 #include "flash_gateware.h"
 #include "flash_table.h"
 #include "whisker/whisker.h"
@@ -19,8 +19,6 @@
 #define FRAMES_BATCH 2
 #define TRANSFERS 2
 
-enum { NUMBER = 'n' };
-
 struct options {
     const char *image, *bridge;
     bool list, health, dry_run, force, has_lane, has_serial;
@@ -31,95 +29,62 @@ struct options {
 static uint8_t image_bytes[IMAGE_BYTES_MAX + 1];
 static size_t image_count;
 
-static void whisker_flash_print_help(void)
+static bool whisker_flash_set_lane(void *options, const char *name, const char *text)
 {
-    printf(
+    struct options *o = options;
+    o->has_lane = true;
+    return command_line_number(PROGRAM, name, text, 0, WHISKER_FRAME_LANES - 1, &o->lane);
+}
+
+static bool whisker_flash_set_node(void *options, const char *name, const char *text)
+{
+    struct options *o = options;
+    o->has_serial = true;
+    return command_line_number(PROGRAM, name, text, 1, WHISKER_LIMIT_SERIAL_NONE - 1, &o->serial);
+}
+
+#define AT(field) offsetof(struct options, field)
+
+static const struct command_option OPTIONS[] = {
+    {"lane", "N", "only the node on this lane; it needs a serial number of its own", COMMAND_OWN, 0, 0, 0,
+     whisker_flash_set_lane},
+    {"node", "SERIAL", "only the node with this serial number", COMMAND_OWN, 0, 0, 0, whisker_flash_set_node},
+    {"dry-run", NULL, "say what would be done and whether the nodes would take it; change nothing", COMMAND_FLAG,
+     AT(dry_run), 0, 0, NULL},
+    {"force", NULL, "also an image that is older than what a node (or the bridge) runs, or of another\nbuild (sensor)",
+     COMMAND_FLAG, AT(force), 0, 0, NULL},
+    {"list", NULL, "who the nodes are", COMMAND_FLAG, AT(list), 0, 0, NULL},
+    {"health", NULL, "with --list: their fault counters that are not zero", COMMAND_FLAG, AT(health), 0, 0, NULL},
+    {"bridge", "TEXT", "the bridge with this serial number (the first that can be opened)", COMMAND_TEXT, AT(bridge), 0,
+     0, NULL},
+    {"sck-divider", "N", "as whiskerd, at most 16", COMMAND_BYTE, AT(settings.sck_divider), 0, UINT8_MAX, NULL},
+    {"word-gap", "N", "as whiskerd, at most 180", COMMAND_BYTE, AT(settings.word_gap), 0, UINT8_MAX, NULL},
+    {"sample-point", "N", "as whiskerd", COMMAND_BYTE, AT(settings.sample_point), 0, UINT8_MAX, NULL},
+};
+
+static const struct command_line LINE = {
+    .program = PROGRAM,
+    .usage =
         "Usage: whisker-flash IMAGE [OPTION...]\n"
         "       whisker-flash --list [--health]\n"
         "Loads a firmware image (.whex) into all nodes of a bridge at once and starts it. Stop whiskerd first.\n"
-        "A gateware image (.wgw) goes into the bridge itself; of the options it knows --dry-run, --force, --bridge.\n\n"
-        "  --lane N         only the node on this lane; it needs a serial number of its own\n"
-        "  --node SERIAL    only the node with this serial number\n"
-        "  --dry-run        say what would be done and whether the nodes would take it; change nothing\n"
-        "  --force          also an image that is older than what a node (or the bridge) runs, or of another build "
-        "(sensor)\n"
-        "  --list           who the nodes are\n"
-        "  --health         with --list: their fault counters that are not zero\n"
-        "  --bridge TEXT    the bridge with this serial number (the first that can be opened)\n"
-        "  --sck-divider N --word-gap N --sample-point N   as whiskerd; at most 16 and 180\n"
-        "  --help           this text\n\n"
-        "Example: whisker-flash node-0.2.whex\n"
-        "Exit code: 0 every node has it, 1 failed for some or all, 2 wrong use.\n");
-}
-
-static bool whisker_flash_set_number(struct options *options, const char *name, const char *text)
-{
-    uint8_t *byte = cli_byte_setting(&options->settings, name);
-    const bool is_lane = !strcmp(name, "lane"), is_node = !strcmp(name, "node");
-    const uint32_t most = is_lane ? WHISKER_FRAME_LANES - 1 : is_node ? WHISKER_LIMIT_SERIAL_NONE - 1 : UINT8_MAX;
-    uint32_t value = 0;
-    if (!cli_number(PROGRAM, name, text, is_node ? 1 : 0, most, &value)) {
-        return false;
-    }
-    if (byte) {
-        *byte = (uint8_t)value;
-    } else if (is_lane) {
-        options->lane = value;
-        options->has_lane = true;
-    } else {
-        options->serial = value;
-        options->has_serial = true;
-    }
-    return true;
-}
-
-static bool whisker_flash_set_word(struct options *options, int option, const char *text)
-{
-    switch (option) {
-    case 'b':
-        options->bridge = text;
-        return true;
-    case 'y':
-        return options->dry_run = true;
-    case 'F':
-        return options->force = true;
-    case 'L':
-        return options->list = true;
-    case 'H':
-        return options->health = true;
-    default:
-        return false;
-    }
-}
+        "A gateware image (.wgw) goes into the bridge itself; of the options it takes --dry-run, --force, --bridge.\n",
+    .notes = "Example: whisker-flash node-0.2.whex\n"
+             "Exit code: 0 every node has it, 1 failed for some or all, 2 wrong use.\n",
+    .option = OPTIONS,
+    .count = sizeof OPTIONS / sizeof *OPTIONS,
+};
 
 /* Returns 0 to go on, or an exit code plus one. */
 static int whisker_flash_read_options(struct options *options, int argc, char **argv)
 {
-    static const struct option known[] = {{"lane", required_argument, NULL, NUMBER},
-                                          {"node", required_argument, NULL, NUMBER},
-                                          {"sck-divider", required_argument, NULL, NUMBER},
-                                          {"word-gap", required_argument, NULL, NUMBER},
-                                          {"sample-point", required_argument, NULL, NUMBER},
-                                          {"bridge", required_argument, NULL, 'b'},
-                                          {"dry-run", no_argument, NULL, 'y'},
-                                          {"force", no_argument, NULL, 'F'},
-                                          {"list", no_argument, NULL, 'L'},
-                                          {"health", no_argument, NULL, 'H'},
-                                          {"help", no_argument, NULL, 'h'},
-                                          {NULL, 0, NULL, 0}};
-    int which = 0;
-    for (int option; (option = getopt_long(argc, argv, "", known, &which)) != -1;) {
-        if (option == 'h') {
-            whisker_flash_print_help();
-            return CLI_OK + 1;
-        }
-        if (!(option == NUMBER ? whisker_flash_set_number(options, known[which].name, optarg)
-                               : whisker_flash_set_word(options, option, optarg))) {
-            return CLI_USAGE + 1;
-        }
+    int rest;
+    const int result = command_line_read(&LINE, argc, argv, options, &rest);
+    if (result != COMMAND_LINE_READ) {
+        return result + 1;
     }
-    options->image = optind < argc ? argv[optind++] : NULL;
-    const bool wrong = optind < argc || (options->image != NULL) == options->list ||
+    options->image = rest < argc ? argv[rest++] : NULL;
+    const bool wrong = rest < argc || (options->image != NULL) == options->list ||
                        (options->has_lane && options->has_serial) || (options->health && !options->list);
     if (wrong) {
         fprintf(stderr, PROGRAM ": give one image, or --list, and at most one of --lane and --node; see --help\n");

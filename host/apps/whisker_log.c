@@ -1,6 +1,5 @@
 /* whisker-log: a reader of its own that counts what arrived and writes down what was flagged bad. */
 #include <errno.h>
-#include <getopt.h>
 #include <inttypes.h>
 #include <pwd.h>
 #include <stdio.h>
@@ -8,6 +7,7 @@
 #include <string.h>
 
 #include "cli.h"
+#include "command_line.h"
 #include "follower.h"
 #include "whisker/whisker.h"
 
@@ -36,78 +36,45 @@ struct session {
     uint64_t taken; /* ticks reported to the simulation */
 };
 
-static void whisker_log_print_help(void)
+static bool whisker_log_set_owner(void *options, const char *name, const char *text)
 {
-    printf("Usage: whisker-log --ring NAME [OPTION...]\n"
-           "Reads a ring until its writer closes it; counts frames and logs the records flagged bad.\n\n"
-           "  --ring NAME      the ring to read\n"
-           "  --ring-owner U   accept a ring of this user, too, not only root's, your own and the service's\n"
-           "  --lanes N        lanes 0 to N-1 are populated; others are not judged (%d)\n"
-           "  --bad FILE       CSV: lane, tick, code, errors of each bad record\n"
-           "  --summary FILE   JSON: what was counted\n"
-           "  --wait S         wait so many seconds for the ring to come up (10)\n"
-           "  --socket PATH    follow the simulation at this socket: it never runs too far ahead\n"
-           "  --help           this text\n\n"
-           "Example: whisker-log --ring whisker --lanes 6 --bad bad.csv --summary log.json\n"
-           "Exit code: 0 the ring was closed or a signal came, 1 failed, 2 wrong use.\n",
-           WHISKER_FRAME_LANES);
+    return cli_user(PROGRAM, name, text, &((struct options *)options)->owner);
 }
 
-static bool whisker_log_set_option(struct options *options, int option, const char *text)
-{
-    switch (option) {
-    case 'r':
-        options->ring = text;
-        return true;
-    case 'b':
-        options->bad = text;
-        return true;
-    case 's':
-        options->summary = text;
-        return true;
-    case 'f':
-        options->socket = text;
-        return true;
-    case 'o':
-        return cli_user(PROGRAM, "ring-owner", text, &options->owner);
-    case 'l':
-        return cli_number(PROGRAM, "lanes", text, 1, WHISKER_FRAME_LANES, &options->lanes);
-    case 'w':
-        return cli_number(PROGRAM, "wait", text, 0, 3600, &options->wait_s);
-    default:
-        return false;
-    }
-}
+#define AT(field) offsetof(struct options, field)
+
+static const struct command_option OPTIONS[] = {
+    {"ring", "NAME", "the ring to read", COMMAND_TEXT, AT(ring), 0, 0, NULL},
+    {"ring-owner", "U", "accept a ring of this user, too, not only root's, your own and the service's", COMMAND_OWN, 0,
+     0, 0, whisker_log_set_owner},
+    {"lanes", "N", "lanes 0 to N-1 are populated; others are not judged", COMMAND_NUMBER, AT(lanes), 1,
+     WHISKER_FRAME_LANES, NULL},
+    {"bad", "FILE", "CSV: lane, tick, code, errors of each bad record", COMMAND_TEXT, AT(bad), 0, 0, NULL},
+    {"summary", "FILE", "JSON: what was counted", COMMAND_TEXT, AT(summary), 0, 0, NULL},
+    {"wait", "S", "wait so many seconds for the ring to come up", COMMAND_NUMBER, AT(wait_s), 0, 3600, NULL},
+    {"socket", "PATH", "follow the simulation at this socket: it never runs too far ahead", COMMAND_TEXT, AT(socket), 0,
+     0, NULL},
+};
+
+static const struct command_line LINE = {
+    .program = PROGRAM,
+    .usage = "Usage: whisker-log --ring NAME [OPTION...]\n"
+             "Reads a ring until its writer closes it; counts frames and logs the records flagged bad.\n",
+    .notes = "Example: whisker-log --ring whisker --lanes 6 --bad bad.csv --summary log.json\n"
+             "Exit code: 0 the ring was closed or a signal came, 1 failed, 2 wrong use.\n",
+    .option = OPTIONS,
+    .count = sizeof OPTIONS / sizeof *OPTIONS,
+};
 
 /* Returns -1 to go on, or the exit code. */
 static int whisker_log_parse(int argc, char **argv, struct options *options)
 {
-    static const struct option known[] = {
-        {"ring", required_argument, NULL, 'r'},
-        {"bad", required_argument, NULL, 'b'},
-        {"summary", required_argument, NULL, 's'},
-        {"socket", required_argument, NULL, 'f'},
-        {"lanes", required_argument, NULL, 'l'},
-        {"wait", required_argument, NULL, 'w'},
-        {"ring-owner", required_argument, NULL, 'o'},
-        {"help", no_argument, NULL, 'h'},
-        {NULL, 0, NULL, 0},
-    };
-    for (int option; (option = getopt_long(argc, argv, "", known, NULL)) != -1;) {
-        if (option == 'h') {
-            whisker_log_print_help();
-            return CLI_OK;
-        }
-        if (!whisker_log_set_option(options, option, optarg)) {
-            return CLI_USAGE;
-        }
+    int rest;
+    const int result = command_line_read(&LINE, argc, argv, options, &rest);
+    if (result == COMMAND_LINE_READ && (!options->ring || rest != argc)) {
+        return command_line_wrong(PROGRAM, options->ring ? "there is a word too many" : "--ring NAME is missing");
     }
-    if (!options->ring || optind != argc) {
-        fprintf(stderr, PROGRAM ": %s; see " PROGRAM " --help\n",
-                options->ring ? "there is a word too many" : "--ring NAME is missing");
-        return CLI_USAGE;
-    }
-    return -1;
+    return result;
 }
 
 static void log_bad_records(struct session *session, const struct whisker_frame *frame)

@@ -1,7 +1,5 @@
 /* whisker-create-sim: the emulator on a pseudo-terminal, paced by the wall clock. See --help. */
 #include <errno.h>
-#include <getopt.h>
-#include <math.h>
 #include <poll.h>
 #include <signal.h>
 #include <stdio.h>
@@ -12,6 +10,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "command_line.h"
 #include "create_ground.h"
 #include "create_pty.h"
 #include "whisker_protocol.h"
@@ -28,16 +27,6 @@ enum {
     LINE_SIZE = 512
 };
 
-enum { HELP = 1, MODEL, LINK, SEED, ARENA, ROBOT };
-
-static const struct option OWN[] = {{"help", no_argument, NULL, HELP},
-                                    {"model", required_argument, NULL, MODEL},
-                                    {"link", required_argument, NULL, LINK},
-                                    {"seed", required_argument, NULL, SEED},
-                                    {"arena", required_argument, NULL, ARENA}};
-
-enum { OWN_COUNT = sizeof OWN / sizeof OWN[0] };
-
 struct settings {
     struct sim_create_options robot;
     const char *link, *arena;
@@ -52,104 +41,75 @@ struct emulator {
     uint64_t ticks;
 };
 
-static void create_sim_print_help(void)
-{
-    const char *name, *value, *help;
-    printf("Usage: " PROGRAM " [OPTION...]\n"
-           "Emulates an iRobot Create on a pseudo-terminal, in real time, until SIGINT or SIGTERM. A driver opens the\n"
-           "printed path, or the link, as its serial port. Each change of mode is printed.\n\n"
-           "  --model 1|2         Create 1 (57600 baud) or Create 2 (115200 baud) (1)\n"
-           "  --link PATH         make a symbolic link to the pseudo-terminal\n"
-           "  --arena FLAT        flat scene file of its surroundings, with walls to bump into (an open floor)\n"
-           "  --seed N            seed of the wheels' errors and of the line's faults (1)\n");
-    for (size_t i = 0; sim_create_describe(i, &name, &value, &help); i++) {
-        char both[LINE_SIZE];
-        snprintf(both, sizeof both, "%s %s", name, value ? value : "");
-        printf("  --%-17s %s\n", both, help);
-    }
-    printf("  --help              this text\n\n"
-           "Example: " PROGRAM " --link /tmp/create --model 2\n"
-           "Example: " PROGRAM " --link /tmp/create --drop-remainder --lose-bytes 0.001\n"
-           "Example: " PROGRAM " --link /tmp/create --event bump-left@3s --event silent@10s+2s\n"
-           "Exit code: 0 stopped on request, 1 failed, 2 wrong use.\n");
-}
-
 static int create_sim_complain(int code, const char *text)
 {
     fprintf(stderr, PROGRAM ": %s\n", text);
     return code;
 }
 
-/* Adds the robot's own options to the program's. */
-static void create_sim_list_options(struct option *options)
-{
-    const char *name, *value, *help;
-    memcpy(options, OWN, sizeof OWN);
-    for (size_t i = 0; OWN_COUNT + i + 1 < OPTIONS_MAX && sim_create_describe(i, &name, &value, &help); i++)
-        options[OWN_COUNT + i] = (struct option){name, value ? required_argument : no_argument, NULL, ROBOT};
-}
-
-static int create_sim_set_seed(struct settings *settings, const char *text)
+static bool create_sim_set_seed(void *settings, const char *name, const char *text)
 {
     char *end;
     errno = 0;
-    settings->robot.seed = strtoull(text, &end, 10);
-    if (errno || end == text || *end || text[0] == '-')
-        return create_sim_complain(WRONG_USE, "--seed: give a whole number from 0 on");
-    return 0;
+    ((struct settings *)settings)->robot.seed = strtoull(text, &end, 10);
+    return (!errno && end != text && !*end && text[0] != '-') ||
+           command_line_refuse(PROGRAM, name, text, "give a whole number from 0 on");
 }
 
-static int create_sim_set_model(struct settings *settings, const char *text)
+static bool create_sim_set_model(void *settings, const char *name, const char *text)
 {
-    if (strcmp(text, "1") && strcmp(text, "2"))
-        return create_sim_complain(WRONG_USE, "--model: give 1 or 2");
-    settings->robot.version = text[0] == '1' ? CREATE_OI_V2 : CREATE_OI_V3;
-    return 0;
+    ((struct settings *)settings)->robot.version = text[0] == '1' ? CREATE_OI_V2 : CREATE_OI_V3;
+    return !strcmp(text, "1") || !strcmp(text, "2") || command_line_refuse(PROGRAM, name, text, "give 1 or 2");
 }
 
-static int create_sim_set_robot(struct settings *settings, const char *name, const char *value)
+static bool create_sim_set_robot(void *settings, const char *name, const char *text)
 {
     char error[LINE_SIZE] = "--";
-    if (sim_create_set(&settings->robot, name, value, error + 2, sizeof error - 2))
-        return create_sim_complain(WRONG_USE, error);
-    return 0;
+    if (!sim_create_set(&((struct settings *)settings)->robot, name, text, error + 2, sizeof error - 2))
+        return true;
+    create_sim_complain(WRONG_USE, error);
+    return false;
 }
 
-/* Returns 0, an exit code, or -1 when all is done. */
-static int create_sim_set_option(struct settings *settings, int option, const char *name)
+static const struct command_option OWN[] = {
+    {"model", "1|2", "Create 1 (57600 baud) or Create 2 (115200 baud) (1)", COMMAND_OWN, 0, 0, 0, create_sim_set_model},
+    {"link", "PATH", "make a symbolic link to the pseudo-terminal", COMMAND_TEXT, offsetof(struct settings, link), 0, 0,
+     NULL},
+    {"arena", "FLAT", "flat scene file of its surroundings, with walls to bump into (an open floor)", COMMAND_TEXT,
+     offsetof(struct settings, arena), 0, 0, NULL},
+    {"seed", "N", "seed of the wheels' errors and of the line's faults (1)", COMMAND_OWN, 0, 0, 0, create_sim_set_seed},
+};
+
+/* The program's options, and behind them the robot's: how many. */
+static size_t create_sim_list_options(struct command_option options[OPTIONS_MAX])
 {
-    switch (option) {
-    case HELP:
-        create_sim_print_help();
-        return -1;
-    case MODEL:
-        return create_sim_set_model(settings, optarg);
-    case SEED:
-        return create_sim_set_seed(settings, optarg);
-    case LINK:
-        settings->link = optarg;
-        return 0;
-    case ARENA:
-        settings->arena = optarg;
-        return 0;
-    case ROBOT:
-        return create_sim_set_robot(settings, name, optarg);
-    default:
-        return create_sim_complain(WRONG_USE, "no such option, or its value is missing; see --help");
-    }
+    const char *name, *value, *help;
+    size_t count = sizeof OWN / sizeof OWN[0];
+    memcpy(options, OWN, sizeof OWN);
+    for (size_t i = 0; count < OPTIONS_MAX && sim_create_describe(i, &name, &value, &help); i++)
+        options[count++] = (struct command_option){name, value, help, COMMAND_OWN, 0, 0, 0, create_sim_set_robot};
+    return count;
 }
 
+/* Returns COMMAND_LINE_READ, or the exit code. */
 static int create_sim_read_options(int argc, char **argv, struct settings *settings)
 {
-    struct option options[OPTIONS_MAX] = {{0}};
-    int option, index = 0, result = 0;
-    create_sim_list_options(options);
-    opterr = 0;
-    while (!result && (option = getopt_long(argc, argv, "", options, &index)) != -1)
-        result = create_sim_set_option(settings, option, options[index].name);
-    if (!result && optind < argc)
-        return create_sim_complain(WRONG_USE, "takes options only; see --help");
-    return result;
+    struct command_option options[OPTIONS_MAX];
+    const struct command_line line = {
+        .program = PROGRAM,
+        .usage = "Usage: " PROGRAM " [OPTION...]\n"
+                 "Emulates an iRobot Create on a pseudo-terminal, in real time, until SIGINT or SIGTERM. A driver "
+                 "opens the\n"
+                 "printed path, or the link, as its serial port. Each change of mode is printed.\n",
+        .notes = "Example: " PROGRAM " --link /tmp/create --model 2\n"
+                 "Example: " PROGRAM " --link /tmp/create --drop-remainder --lose-bytes 0.001\n"
+                 "Example: " PROGRAM " --link /tmp/create --event bump-left@3s --event silent@10s+2s\n"
+                 "Exit code: 0 stopped on request, 1 failed, 2 wrong use.\n",
+        .option = options,
+        .count = create_sim_list_options(options),
+    };
+    int rest, result = command_line_read(&line, argc, argv, settings, &rest);
+    return result == COMMAND_LINE_READ && rest < argc ? command_line_wrong(PROGRAM, "takes options only") : result;
 }
 
 static sim_world *create_sim_make_world(const struct settings *settings, char *error, size_t size)
@@ -253,5 +213,5 @@ int main(int argc, char **argv)
 {
     struct settings settings = {.robot = sim_create_defaults(CREATE_OI_V2)};
     int result = create_sim_read_options(argc, argv, &settings);
-    return result ? (result < 0 ? 0 : result) : create_sim_emulate(&settings);
+    return result == COMMAND_LINE_READ ? create_sim_emulate(&settings) : result;
 }

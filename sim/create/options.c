@@ -141,8 +141,8 @@ static const struct {
     [LOSE_ORDERS] = {"lose-orders", "P", "share of the bytes sent to it that are lost"},
     [EVENT] = {"event", "WHAT@S[+L]",
                "WHAT happens S seconds after the start, for L (0.5); repeat it for more. WHAT:\n"
-               "                      bump, bump-left, bump-right, drop-left, drop-right, drop-caster, cliff-left,\n"
-               "                      cliff-front-left, cliff-front-right, cliff-right, virtual-wall, charger, silent"},
+               "bump, bump-left, bump-right, drop-left, drop-right, drop-caster, cliff-left,\n"
+               "cliff-front-left, cliff-front-right, cliff-right, virtual-wall, charger, silent"},
 };
 
 bool sim_create_describe(size_t number, const char **name, const char **value, const char **help)

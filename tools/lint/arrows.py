@@ -24,7 +24,8 @@ ALLOWED = {
     "host/nav/filter": ["host/nav/problem", "host/nav/measurement", "host/nav/field", "host/nav/belief"],
     "host/nav": [],
     "host/create": [],
-    "host/apps": ["host/libwhisker", "host/nav", "host/create"],
+    "host/command_line": [],
+    "host/apps": ["host/libwhisker", "host/nav", "host/create", "host/command_line"],
     "host/python": ["host/libwhisker", "host/nav", "protocol"],
     "lab": ["host/python", "sim/signals", "protocol"],
     "sim/mlx90333": ["sim/node", "firmware/dspic"],  # one copy of the data sheet
@@ -34,7 +35,7 @@ ALLOWED = {
     "sim/mechanics": ["host/nav/problem"],  # interpolation
     "sim/world": ["sim/mechanics", "sim/node"],
     "sim/signals": ["sim/world", "sim/mechanics", "sim/mlx90333", "sim/node"],
-    "sim/create": ["sim/world", "sim/mechanics"],
+    "sim/create": ["sim/world", "sim/mechanics", "host/command_line"],
     "sim/usb/host": [],
     "sim/usb/device": ["sim/usb/host", "fpga/usb"],
     "sim/usb": ["protocol"],
