@@ -6,8 +6,7 @@
 #ifndef SIM_WHISKER_CONSTANTS_H
 #define SIM_WHISKER_CONSTANTS_H
 
-#define SIM_PI 3.14159265358979323846
-#define SIM_DEGREE (SIM_PI / 180)
+#include "sim_angle.h"
 
 #define SIM_TICK_S 500e-6 /* [P] 2 kHz */
 

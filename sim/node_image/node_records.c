@@ -8,6 +8,7 @@
 #include <stdlib.h>
 
 #include "lane_bench.h"
+#include "sim_rng.h"
 #include "whisker_protocol.h"
 
 struct run {
@@ -16,18 +17,9 @@ struct run {
     struct sim_field field;
 };
 
-/* splitmix64 (Steele, Lea, Flood 2014). */
-static uint64_t node_records_draw(uint64_t *random)
-{
-    uint64_t z = *random += UINT64_C(0x9E3779B97F4A7C15);
-    z = (z ^ z >> 30) * UINT64_C(0xBF58476D1CE4E5B9);
-    z = (z ^ z >> 27) * UINT64_C(0x94D049BB133111EB);
-    return z ^ z >> 31;
-}
-
 static uint32_t node_records_below(struct run *run, uint32_t n)
 {
-    return (uint32_t)((node_records_draw(&run->random) >> 32) * n >> 32);
+    return (uint32_t)((sim_rng_mix(&run->random) >> 32) * n >> 32);
 }
 
 static double node_records_walk(struct run *run, double angle_deg)
@@ -52,7 +44,7 @@ static void node_records_break_link(struct run *run, struct lane_faults *f)
 {
     switch (node_records_below(run, 5)) {
     case 0:
-        f->mosi_flips = node_records_draw(&run->random);
+        f->mosi_flips = sim_rng_mix(&run->random);
         break;
     case 1:
         f->mosi_flips = UINT64_C(1) << node_records_below(run, 64);
@@ -103,7 +95,7 @@ int main(int argc, char **argv)
     struct run run = {.ticks = (unsigned)strtoul(argv[1], NULL, 10), .random = strtoull(argv[2], NULL, 10)};
     struct sim_node_parameters parts;
     static struct lane_bench bench;
-    sim_node_parameters_default(&parts, node_records_draw(&run.random));
+    sim_node_parameters_default(&parts, sim_rng_mix(&run.random));
     parts.chip.slave_prefetch = (uint8_t)(1u + node_records_below(&run, 2));
     parts.chip.dma_cycles = (uint8_t)node_records_below(&run, 13);
     parts.chip.frc_ppm = (int32_t)node_records_below(&run, 40001) - 20000;

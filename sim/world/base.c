@@ -8,15 +8,6 @@
 #define MOVE_SPREAD 0.02
 #define MOVE_LIMIT 0.05
 
-double sim_wrap(double angle)
-{
-    while (angle > SIM_PI)
-        angle -= 2 * SIM_PI;
-    while (angle <= -SIM_PI)
-        angle += 2 * SIM_PI;
-    return angle;
-}
-
 int sim_base_drive(struct sim_base *base, double v, double omega)
 {
     double fastest = fabs(v) + fabs(omega) * SIM_BASE_TRACK / 2;

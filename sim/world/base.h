@@ -4,6 +4,7 @@
 
 #include <stdint.h>
 
+#include "sim_angle.h"
 #include "sim_rng.h"
 #include "sim_scene.h"
 
@@ -38,7 +39,5 @@ void sim_odometer_count(struct sim_odometer *odometer, double distance_m, double
 
 /* Reports whole millimetres and whole degrees and keeps the remainder; the motion is that of the arc they make. */
 struct sim_pose sim_odometer_report(struct sim_odometer *odometer);
-
-double sim_wrap(double angle_rad); /* to (-pi, pi] */
 
 #endif

@@ -6,6 +6,7 @@
 #include <stdlib.h>
 
 #include "lane_bench.h"
+#include "sim_rng.h"
 #include "whisker_protocol.h"
 
 struct run {
@@ -36,13 +37,10 @@ static void node_timing_judged(void *context, unsigned tick, const struct lane_v
                (double)v->report.age_fs * 1e-6, node_timing_ns_since(v->report.armed_fs, v->sync_fs));
 }
 
-/* splitmix64 (Steele, Lea, Flood 2014), as a number from -1 to 1. */
+/* A number from -1 to 1. */
 static double node_timing_spread(uint64_t *random)
 {
-    uint64_t z = *random += UINT64_C(0x9E3779B97F4A7C15);
-    z = (z ^ z >> 30) * UINT64_C(0xBF58476D1CE4E5B9);
-    z = (z ^ z >> 27) * UINT64_C(0x94D049BB133111EB);
-    return (double)((z ^ z >> 31) >> 11) / 4503599627370496.0 - 1.0;
+    return (double)(sim_rng_mix(random) >> 11) / 4503599627370496.0 - 1.0;
 }
 
 static bool node_timing_run_node(struct run *run, const struct sim_node_parameters *parts)

@@ -1,5 +1,6 @@
 #include "storm.h"
 
+#include "sim_rng.h"
 #include "storm_log.h"
 #include "whisker_protocol.h"
 
@@ -44,23 +45,14 @@ struct storm {
     unsigned end_in; /* ticks until what is off comes on */
 };
 
-/* splitmix64 (Steele, Lea, Flood 2014). */
-static uint64_t storm_draw(struct storm *s)
-{
-    uint64_t z = s->random += UINT64_C(0x9E3779B97F4A7C15);
-    z = (z ^ z >> 30) * UINT64_C(0xBF58476D1CE4E5B9);
-    z = (z ^ z >> 27) * UINT64_C(0x94D049BB133111EB);
-    return z ^ z >> 31;
-}
-
 static uint32_t storm_below(struct storm *s, uint32_t n)
 {
-    return (uint32_t)((storm_draw(s) >> 32) * n >> 32);
+    return (uint32_t)((sim_rng_mix(&s->random) >> 32) * n >> 32);
 }
 
 static bool storm_coin(struct storm *s)
 {
-    return storm_draw(s) >> 63;
+    return sim_rng_mix(&s->random) >> 63;
 }
 
 static enum storm_kind storm_any_kind(struct storm *s)
@@ -97,7 +89,7 @@ static void storm_break_sensor(struct storm *s, enum storm_kind kind, struct lan
     if (kind == STORM_NOISY)
         f->sensor_argument = 1024u << storm_below(s, 5);
     if (kind == STORM_ERROR_BITS)
-        f->sensor_argument = (uint32_t)storm_draw(s) & ASSIGNED_ERRORS;
+        f->sensor_argument = (uint32_t)sim_rng_mix(&s->random) & ASSIGNED_ERRORS;
 }
 
 /* Faults of the link and its timing. */
@@ -222,7 +214,7 @@ static void storm_judged(void *context, unsigned tick, const struct lane_verdict
 static struct sim_node_parameters storm_any_parts(struct storm *s)
 {
     struct sim_node_parameters parts;
-    sim_node_parameters_default(&parts, storm_draw(s));
+    sim_node_parameters_default(&parts, sim_rng_mix(&s->random));
     parts.chip.slave_prefetch = (uint8_t)(1u + storm_below(s, 2));
     parts.chip.dma_cycles = (uint8_t)storm_below(s, 13);
     parts.chip.frc_ppm = (int32_t)storm_below(s, 40001) - 20000;

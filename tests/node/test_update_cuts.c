@@ -10,6 +10,7 @@
 
 #include <cmocka.h>
 
+#include "sim_rng.h"
 #include "update_cuts.h"
 
 enum { SEEDS = 3, HEADER_CUTS = 128, WORD_NS = 40000 };
@@ -61,14 +62,6 @@ static void cut_at(uint64_t after_ns, uint64_t seed, unsigned seen[FATE_NEW + 1]
     seen[o.fate]++;
 }
 
-/* splitmix64's mixing (Steele, Lea, Flood 2014). */
-static uint64_t mix(uint64_t x)
-{
-    x = (x ^ x >> 30) * UINT64_C(0xBF58476D1CE4E5B9);
-    x = (x ^ x >> 27) * UINT64_C(0x94D049BB133111EB);
-    return x ^ x >> 31;
-}
-
 static void power_may_fail_at_any_time(void **state)
 {
     const char *asked = getenv("WHISKER_CUTS");
@@ -76,8 +69,10 @@ static void power_may_fail_at_any_time(void **state)
     const uint64_t length_ns = length_of_an_update_ns() + 4u * SIM_TICK_NS;
     unsigned seen[FATE_NEW + 1] = {0};
     (void)state;
-    for (unsigned i = 0; i < cuts; i++)
-        cut_at(mix(i + UINT64_C(0x9E3779B97F4A7C15)) % length_ns, i, seen);
+    for (unsigned i = 0; i < cuts; i++) {
+        uint64_t draw = i;
+        cut_at(sim_rng_mix(&draw) % length_ns, i, seen);
+    }
     print_message("%u cuts: %u times the loader waits, %u the old image runs, %u the new one\n", cuts,
                   seen[FATE_LOADER], seen[FATE_OLD], seen[FATE_NEW]);
     assert_true(seen[FATE_LOADER] > 0 && seen[FATE_OLD] > 0 && seen[FATE_NEW] > 0);

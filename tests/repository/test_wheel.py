@@ -21,7 +21,7 @@ PRODUCT = (
     "README.md",
     "LICENSE",
 )
-LAB = ("lab", "sim/signals", "sim/world", "sim/mechanics", "sim/mlx90333", "sim/node", "firmware/dspic/core")
+LAB = ("lab", "sim/signals", "sim/world", "sim/mechanics", "sim/mlx90333", "sim/common", "firmware/dspic/core")
 BUILT = shutil.ignore_patterns("*.so", "*.egg-info", "__pycache__", "tests")
 ROUND_TRIP = """
 import sys, numpy as np, crunchbot

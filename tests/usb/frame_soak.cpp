@@ -1,5 +1,6 @@
 #include "frame_soak.h"
 
+#include "sim_rng.h"
 #include "whisker_protocol.h"
 
 namespace bridge_sim
@@ -20,12 +21,9 @@ constexpr unsigned PATIENCE = 2000;
 // A reset strikes up to this many cycles into a transaction: a bulk packet takes 530.
 constexpr uint64_t TRANSACTION_CYCLES = 600;
 
-uint64_t mix(uint64_t value) // SplitMix64
+uint64_t mix(uint64_t value)
 {
-    value += 0x9E3779B97F4A7C15ull;
-    value = (value ^ value >> 30) * 0xBF58476D1CE4E5B9ull;
-    value = (value ^ value >> 27) * 0x94D049BB133111EBull;
-    return value ^ value >> 31;
+    return sim_rng_mix(&value);
 }
 
 } // namespace

@@ -28,18 +28,27 @@ ALLOWED = {
     "host/apps": ["host/libwhisker", "host/nav", "host/create", "host/command_line"],
     "host/python": ["host/libwhisker", "host/nav", "protocol"],
     "lab": ["host/python", "sim/signals", "protocol"],
+    "sim/common": [],
     "sim/mlx90333": ["sim/node", "firmware/dspic"],  # one copy of the data sheet
     "sim/dspic": ["firmware/dspic"],  # addresses and bits, and what the accessors call
-    "sim/node": ["sim/mlx90333", "sim/dspic", "firmware/dspic"],
-    "sim/node_image": ["sim/node", "sim/mlx90333", "sim/dspic", "firmware/dspic", "protocol"],  # the image's header
-    "sim/mechanics": ["host/nav/problem"],  # interpolation
-    "sim/world": ["sim/mechanics", "sim/node"],
-    "sim/signals": ["sim/world", "sim/mechanics", "sim/mlx90333", "sim/node"],
-    "sim/create": ["sim/world", "sim/mechanics", "host/command_line"],
+    "sim/node": ["sim/common", "sim/mlx90333", "sim/dspic", "firmware/dspic"],
+    "sim/node_image": [
+        "sim/common",
+        "sim/node",
+        "sim/mlx90333",
+        "sim/dspic",
+        "firmware/dspic",
+        "protocol",
+    ],  # the image's header
+    "sim/mechanics": ["sim/common", "host/nav/problem"],  # interpolation
+    "sim/world": ["sim/common", "sim/mechanics"],
+    "sim/signals": ["sim/common", "sim/world", "sim/mechanics", "sim/mlx90333", "sim/node"],
+    "sim/create": ["sim/common", "sim/world", "sim/mechanics", "host/command_line"],
     "sim/usb/host": [],
     "sim/usb/device": ["sim/usb/host", "fpga/usb"],
     "sim/usb": ["protocol"],
     "sim/bridge": [
+        "sim/common",
         "sim/usb/host",
         "sim/usb/device",
         "sim/node",
@@ -48,7 +57,16 @@ ALLOWED = {
         "fpga/bridge_rtl",
         "fpga/usb",
     ],
-    "sim/robot": ["sim/bridge", "sim/usb", "sim/world", "sim/create", "sim/mechanics", "sim/node", "sim/mlx90333"],
+    "sim/robot": [
+        "sim/common",
+        "sim/bridge",
+        "sim/usb",
+        "sim/world",
+        "sim/create",
+        "sim/mechanics",
+        "sim/node",
+        "sim/mlx90333",
+    ],
 }
 # Of each Python package: room -> rooms it may use besides its own and the modules that lie in no room, which use none.
 # A room stands below all it uses: nothing reaches back.

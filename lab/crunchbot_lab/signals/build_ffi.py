@@ -33,10 +33,11 @@ HEADERS = [
 ]
 # A header of another folder that a declaration needs: the struct is known to C, opaque to Python.
 FOREIGN = "struct sim_field;"
-LIBRARIES = {name: SIM / name for name in ("signals", "world", "mechanics", "mlx90333")}  # in the order of the linker
+LIBRARIES = {
+    name: SIM / name for name in ("signals", "world", "mechanics", "mlx90333", "common")
+}  # in the order of the linker
 INCLUDED = [
     *LIBRARIES.values(),
-    SIM / "node",
     ROOT / "host/nav/problem",
     ROOT / "firmware/dspic/core",
     ROOT / "protocol/gen",

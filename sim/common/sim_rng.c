@@ -21,8 +21,7 @@ static void sim_rng_build_ziggurat(void)
         height[i] = exp(-0.5 * edge[i] * edge[i]);
 }
 
-/* splitmix64: spreads a seed over the state, as the authors of xoshiro advise. */
-static uint64_t sim_rng_spread(uint64_t *state)
+uint64_t sim_rng_mix(uint64_t *state)
 {
     *state += 0x9E3779B97F4A7C15u;
     uint64_t z = *state;
@@ -38,9 +37,10 @@ struct sim_rng sim_rng_stream(uint64_t seed, uint32_t purpose, uint32_t index)
     pthread_once(&once, sim_rng_build_ziggurat);
     uint64_t name = (uint64_t)purpose << 32 | index;
     uint64_t state = seed;
-    state = sim_rng_spread(&state) ^ sim_rng_spread(&name);
+    state = sim_rng_mix(&state) ^ sim_rng_mix(&name);
+    /* As the authors of xoshiro advise. */
     for (int i = 0; i < 4; i++)
-        rng.state[i] = sim_rng_spread(&state);
+        rng.state[i] = sim_rng_mix(&state);
     return rng;
 }
 

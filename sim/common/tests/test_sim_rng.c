@@ -1,3 +1,4 @@
+#include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -5,7 +6,7 @@
 
 #include <cmocka.h>
 
-#include "robot.h"
+#include "near.h"
 #include "sim_rng.h"
 
 static void test_equal_names_equal_streams(void **state)

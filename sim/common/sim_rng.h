@@ -4,9 +4,16 @@
 
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 struct sim_rng {
     uint64_t state[4];
 };
+
+/* The next number of splitmix64 (Steele, Lea, Flood 2014) from a state of 64 bits: seeds, and draws of tests. */
+uint64_t sim_rng_mix(uint64_t *state);
 
 /* Starts the stream that (seed, purpose, index) names: streams with different names are independent. */
 struct sim_rng sim_rng_stream(uint64_t seed, uint32_t purpose, uint32_t index);
@@ -18,5 +25,9 @@ double sim_rng_uniform(struct sim_rng *rng);
 
 /* Normal with mean 0 and standard deviation 1 (the ziggurat of Marsaglia and Tsang 2000, 256 layers). */
 double sim_rng_normal(struct sim_rng *rng);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif
