@@ -63,6 +63,7 @@ class ChainRun:
 
     def program(self, name: str) -> str:
         found = next((p for p in sorted(self.build.rglob(name)) if p.is_file() and os.access(p, os.X_OK)), None)
+        found = found or shutil.which(name)
         if found is None:
             raise ChainError(f"{self.build}: no program {name}; run 'make build' first")
         return str(found)
@@ -85,11 +86,14 @@ def run_chain(run: ChainRun, progress: Callable[[int], None]) -> float:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="whisker-")))
         stack.callback(_remove_ring, ring)
         places = Places(ring, folder, *_free_endpoints(2))
-        bridge = Child(_bridge(run, places), run.logs / "bridge.log", _ticks(progress))
+        body = parts.Body(run.scene, run.out / "models", run.create, places.serial, run.seed)
+        table = parts.Table(body, places, run.program)
+        bridge = Child(_bridge(run, table), run.logs / "bridge.log", _ticks(progress))
         children = [stack.enter_context(closing(bridge))]
         _await_file(places.simulation, bridge)
-        base = [_base(run, places)] if run.create else []
-        for program in [*base, _log(run, places), _pilot(run, places), _navigator(run, places), _bag(run, places)]:
+        base = [Program.of("base", [*table.base(), "--clock", "stream"], serves=True)] if run.create else []
+        others = [make(run, places, table) for make in (_pilot, _navigator, _bag)]
+        for program in [*base, _log(run, places), *others]:
             command = (*run.before.get(program.name, ()), *program.command)
             child = Child(replace(program, command=command), run.logs / f"{program.name}.log")
             children.append(stack.enter_context(closing(child)))
@@ -97,20 +101,16 @@ def run_chain(run: ChainRun, progress: Callable[[int], None]) -> float:
     return time.monotonic() - began
 
 
-def _bridge(run: ChainRun, places: Places) -> Program:
-    wrapper = shutil.which("umockdev-wrapper")
-    if wrapper is None:
+def _bridge(run: ChainRun, table: parts.Table) -> Program:
+    if shutil.which("umockdev-wrapper") is None:
         raise ChainError("umockdev-wrapper is not installed; run 'make setup' first")
-    simulation = [wrapper, run.program("whisker-bridge-sim"), "--scene", run.scene / "scene.flat", "--seed", run.seed]
-    simulation += ["--seconds", run.seconds, "--socket", places.simulation, "--followers", FOLLOWERS, "--progress"]
-    simulation += ["--truth", run.out / "truth.csv", "--faults", run.out / "faults.csv"]
-    simulation += ["--usb-faults", run.out / "usb_faults.csv", "--speed-report", run.out / "speed.json"]
-    simulation += ["--lanes-populated", run.lanes, "--level", run.level]
-    if run.create:
-        simulation += ["--create", run.create, "--create-link", places.serial]
-    daemon = [run.program("whiskerd"), "--ring", places.ring, "--sck-divider", run.link.sck_divider]
+    simulated = parts.Simulated(run.scene / "scene.flat", run.level, run.seed, run.seconds, None, run.out / "truth.csv")
+    simulation = [*table.bridge(simulated), "--followers", FOLLOWERS, "--progress", "--lanes-populated", run.lanes]
+    simulation += ["--faults", run.out / "faults.csv", "--usb-faults", run.out / "usb_faults.csv"]
+    simulation += ["--speed-report", run.out / "speed.json"]
+    daemon = [*table.daemon(), "--sck-divider", run.link.sck_divider]
     daemon += ["--word-gap", run.link.word_gap, "--sample-point", run.link.sample_point]
-    return Program.of("bridge", [*simulation, "--", *daemon])
+    return Program.of(parts.BRIDGE, [*simulation, "--", *daemon])
 
 
 def _log(run: ChainRun, places: Places) -> Program:
@@ -118,31 +118,23 @@ def _log(run: ChainRun, places: Places) -> Program:
     return Program.of("log", [*command, "--bad", run.out / "bad.csv", "--summary", run.out / "log.json"])
 
 
-def _base(run: ChainRun, places: Places) -> Program:
-    command = [run.program("whisker-base"), "--port", places.serial, "--socket", places.base]
-    return Program.of("base", [*command, "--model", run.create, "--clock", "stream"], serves=True)
-
-
-def _pilot(run: ChainRun, places: Places) -> Program:
-    command = [*parts.whisker("pilot"), run.scene, "--models", run.out / "models", "--seed", run.seed]
-    command += ["--ring", places.ring, "--simulation", places.simulation]
-    command += ["--base", places.base] if run.create else []
+def _pilot(run: ChainRun, places: Places, table: parts.Table) -> Program:
+    command = [*table.pilot(), "--simulation", places.simulation, *(["--base", places.base] if run.create else [])]
     command += ["--lock-step", "--listen", places.pilot, "--connect", "none"]
     command += [word for name in ("navigator", "bag") for word in ("--await", name)]
     command += ["--out", run.scene / "observations.csv", "--traces", run.out / "traces.csv"]
     return Program.of("pilot", [*command, "--report", run.out / "pilot.json"])
 
 
-def _navigator(run: ChainRun, places: Places) -> Program:
-    command = [*parts.whisker("navigator"), run.scene, "--lock-step", "--listen", places.navigator]
-    command += ["--connect", places.pilot]
+def _navigator(run: ChainRun, places: Places, table: parts.Table) -> Program:
+    command = [*table.navigator(), "--lock-step", "--listen", places.navigator, "--connect", places.pilot]
     command += [word for name in FILTERS for word in ("--filter", name)]
     return Program.of("navigator", [*command, "--out", run.out, "--report", run.out / "navigator.json"])
 
 
-def _bag(run: ChainRun, places: Places) -> Program:
-    command = [*parts.whisker("bag"), run.bag, "--scene", run.scene, "--lock-step"]
-    return Program.of("bag", [*command, "--connect", places.pilot, "--connect", places.navigator])
+def _bag(run: ChainRun, places: Places, table: parts.Table) -> Program:
+    command = [*table.bag(run.bag), "--lock-step", "--connect", places.pilot, "--connect", places.navigator]
+    return Program.of("bag", command)
 
 
 def _free_endpoints(count: int) -> list[str]:

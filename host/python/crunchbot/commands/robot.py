@@ -137,7 +137,7 @@ def _table(arguments, meeting: parts.Meeting) -> list:
         view = None if arguments.no_view else arguments.view_port
         table += parts.desktop(body, meeting, arguments.out / "robot.mcap", view)
     if not arguments.no_daemon:
-        table.append(parts.daemon(meeting, arguments.simulated))
+        table.append(parts.daemon(body, meeting, arguments.simulated))
     return table + parts.netbook(body, meeting, arguments.desktop)
 
 

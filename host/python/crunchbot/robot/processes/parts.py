@@ -2,6 +2,7 @@
 
 import signal
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -94,7 +95,7 @@ class Body:
 
     scene: Path
     models: Path
-    create: int
+    create: int | None  # None: wheels that obey at once, without a serial line
     port: Path
     seed: int  # of the random turns
 
@@ -104,9 +105,45 @@ def whisker(command: str) -> list[str]:
     return [sys.executable, "-m", "crunchbot.cli", command]
 
 
-def daemon(meeting: Meeting, simulated: bool) -> Program:
+class Table:
+    """The command of each process, for every way to run them: what is said here holds in all; a way adds its own options.
+
+    `find` gives the path of a compiled program.
+    """
+
+    def __init__(self, body: Body, places: Places, find: Callable[[str], str] = program):
+        self.body, self.places, self.find = body, places, find
+
+    def daemon(self) -> list:
+        return [self.find("whiskerd"), "--ring", self.places.ring]
+
+    def base(self) -> list:
+        paths = ["--port", self.body.port, "--socket", self.places.base]
+        return [self.find("whisker-base"), *paths, "--model", self.body.create]
+
+    def pilot(self) -> list:
+        body = self.body
+        return [*whisker("pilot"), body.scene, "--models", body.models, "--seed", body.seed, *self.places.reading]
+
+    def navigator(self) -> list:
+        return [*whisker("navigator"), self.body.scene]
+
+    def bag(self, file: Path) -> list:
+        return [*whisker("bag"), file, "--scene", self.body.scene]
+
+    def bridge(self, simulated: "Simulated") -> list:
+        """The simulation; what runs beside it is given behind `--`."""
+        command = [self.find("umockdev-wrapper"), self.find("whisker-bridge-sim"), "--scene", simulated.flat]
+        command += ["--seed", simulated.seed, "--seconds", simulated.seconds, "--level", simulated.level]
+        command += ["--socket", self.places.simulation, "--truth", simulated.truth]
+        return command + (
+            ["--create", self.body.create, "--create-link", self.places.serial] if self.body.create else []
+        )
+
+
+def daemon(body: Body, meeting: Meeting, simulated: bool) -> Program:
     """What fills the ring."""
-    command = [program("whiskerd"), "--ring", meeting.ring, "--wait"]
+    command = [*Table(body, meeting).daemon(), "--wait"]
     if simulated:
         command = ["sh", "-c", WITH_ENVIRONMENT, meeting.environment, *command]
     return Program.of("whiskerd", command)
@@ -114,27 +151,24 @@ def daemon(meeting: Meeting, simulated: bool) -> Program:
 
 def netbook(body: Body, meeting: Meeting, with_desktop: bool) -> list[Program]:
     """Base and pilot. The pilot is the last, so that it is ended first, and stops the wheels."""
-    base = [program("whisker-base"), "--port", body.port, "--socket", meeting.base, "--model", body.create, "--wait"]
-    pilot = [*whisker("pilot"), body.scene, "--models", body.models, *meeting.reading, "--base", meeting.base]
-    pilot += ["--seed", body.seed, "--listen", meeting.endpoint(1), "--connect", meeting.endpoint(2)]
-    pilot += meeting.options
-    pilot += ["--await", "navigator"] if with_desktop else []
+    table = Table(body, meeting)
+    pilot = [*table.pilot(), "--base", meeting.base, "--listen", meeting.endpoint(1), "--connect", meeting.endpoint(2)]
+    pilot += [*meeting.options, *(["--await", "navigator"] if with_desktop else [])]
     return [
-        Program.of("base", base, moves=True, fed=True, steady_s=BASE_STEADY_S),
+        Program.of("base", [*table.base(), "--wait"], moves=True, fed=True, steady_s=BASE_STEADY_S),
         Program.of("pilot", pilot, tells=True, moves=True),
     ]
 
 
 def desktop(body: Body, meeting: Meeting, bag: Path | None, view_port: int | None) -> list[Program]:
     """Navigator, and, where they are wanted, bag and view."""
-    navigator = [*whisker("navigator"), body.scene, "--stay", "--checkpoint", meeting.checkpoint]
-    navigator += ["--listen", meeting.endpoint(2), "--connect", meeting.endpoint(1)]
-    navigator += meeting.options
+    commands = Table(body, meeting)
+    navigator = [*commands.navigator(), "--stay", "--checkpoint", meeting.checkpoint]
+    navigator += ["--listen", meeting.endpoint(2), "--connect", meeting.endpoint(1), *meeting.options]
     table = [Program.of("navigator", navigator, tells=True)]
     everybody = [word for number in range(3) for word in ("--connect", meeting.endpoint(number))] + meeting.options
     if bag:
-        command = [*whisker("bag"), bag, "--scene", body.scene, "--stay", "--next", *everybody]
-        table.append(Program.of("bag", command, tells=True))
+        table.append(Program.of("bag", [*commands.bag(bag), "--stay", "--next", *everybody], tells=True))
     if view_port is not None:
         command = [*whisker("view"), *meeting.reading, "--robot", "--scene", body.scene, "--port", view_port]
         table.append(Program.of("view", [*command, *everybody]))
@@ -149,25 +183,13 @@ class Simulated:
     level: str  # rtl or bytes
     seed: int
     seconds: float
-    pace: float  # simulated seconds per second
+    pace: float | None  # simulated seconds per second; None: as fast as frames are taken
     truth: Path
-    wheels: Path  # what the base's wheels were ordered
+    wheels: Path | None = None  # what the base's wheels were ordered
 
 
 def bridge(simulated: Simulated, body: Body, meeting: Meeting) -> Program:
     """The simulation, at the wall's pace; whiskerd is started beside it."""
-    command = [program("umockdev-wrapper"), program("whisker-bridge-sim"), "--scene", simulated.flat]
-    command += ["--seconds", simulated.seconds, "--seed", simulated.seed, "--level", simulated.level]
-    command += [
-        "--pace",
-        simulated.pace,
-        "--socket",
-        meeting.simulation,
-        "--truth",
-        simulated.truth,
-        "--wheels",
-        simulated.wheels,
-    ]
-    command += ["--create", body.create, "--create-link", meeting.serial]
+    command = [*Table(body, meeting).bridge(simulated), "--pace", simulated.pace, "--wheels", simulated.wheels]
     command += ["--", "sh", "-c", LEAVE_ENVIRONMENT, meeting.environment]
     return Program.of(BRIDGE, command, orphaned=signal.SIGURG)  # the simulation takes no notice of it, its command does
