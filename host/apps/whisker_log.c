@@ -113,7 +113,7 @@ static void whisker_log_count_frame(struct session *session, const struct whiske
     log_bad_records(session, frame);
 }
 
-static void whisker_log_tell_simulation(struct session *session)
+static void whisker_log_report_simulation(struct session *session)
 {
     const struct tally *tally = &session->tally;
     if (tally->received > 0 && tally->last_tick + 1 - session->taken >= TAKEN_TICKS) {
@@ -142,7 +142,7 @@ static int whisker_log_read_batch(struct session *session)
     for (size_t i = 0; i < count; i++) {
         whisker_log_count_frame(session, &batch[i]);
     }
-    whisker_log_tell_simulation(session);
+    whisker_log_report_simulation(session);
     return WHISKER_OK;
 }
 

@@ -103,7 +103,7 @@ static int32_t sensors_value(sim_create *create, uint8_t id)
     return create->sensor[id];
 }
 
-static size_t sensors_tell_run(sim_create *create, uint8_t first, uint8_t last, uint8_t *to, size_t room)
+static size_t sensors_report_run(sim_create *create, uint8_t first, uint8_t last, uint8_t *to, size_t room)
 {
     size_t count = 0;
     for (uint8_t id = first; id <= last; id++)
@@ -119,13 +119,13 @@ static size_t sensors_tell_run(sim_create *create, uint8_t first, uint8_t last, 
     return count;
 }
 
-size_t create_tell(sim_create *create, uint8_t id, uint8_t *to, size_t room)
+size_t create_report(sim_create *create, uint8_t id, uint8_t *to, size_t room)
 {
     int version = create->model->version;
     if (id <= CREATE_OI_PACKET_MAX && PACKETS[id].versions & version)
-        return sensors_tell_run(create, id, id, to, room);
+        return sensors_report_run(create, id, id, to, room);
     for (size_t i = 0; i < sizeof GROUPS / sizeof GROUPS[0]; i++)
         if (GROUPS[i].id == id && GROUPS[i].versions & version)
-            return sensors_tell_run(create, GROUPS[i].first, GROUPS[i].last, to, room);
+            return sensors_report_run(create, GROUPS[i].first, GROUPS[i].last, to, room);
     return 0;
 }

@@ -118,7 +118,7 @@ void create_stop_wheels(sim_create *create);
 /* Renews what packets tell. */
 void create_renew(sim_create *create);
 /* Writes the data of a packet or group; returns its bytes, 0 for one this model does not have or without room. */
-size_t create_tell(sim_create *create, uint8_t id, uint8_t *to, size_t room);
+size_t create_report(sim_create *create, uint8_t id, uint8_t *to, size_t room);
 
 void create_answer(sim_create *create, const uint8_t *id, size_t count);
 void create_start_stream(sim_create *create, const uint8_t *id, size_t count);

@@ -10,7 +10,7 @@ void create_answer(sim_create *create, const uint8_t *id, size_t count)
     uint8_t answer[QUEUE_MAX];
     size_t bytes = 0;
     for (size_t i = 0; i < count; i++)
-        bytes += create_tell(create, id[i], answer + bytes, sizeof answer - bytes);
+        bytes += create_report(create, id[i], answer + bytes, sizeof answer - bytes);
     create_line_send(&create->line, answer, bytes);
 }
 
@@ -28,7 +28,7 @@ void create_send_frame(sim_create *create)
     if (!create->stream.on)
         return;
     for (size_t i = 0; i < create->stream.count && used < sizeof frame - 2; i++) {
-        size_t bytes = create_tell(create, create->stream.id[i], frame + used + 1, sizeof frame - 2 - used);
+        size_t bytes = create_report(create, create->stream.id[i], frame + used + 1, sizeof frame - 2 - used);
         frame[used] = create->stream.id[i];
         used += bytes ? bytes + 1 : 0;
     }

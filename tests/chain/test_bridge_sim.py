@@ -74,7 +74,7 @@ def test_more_lanes_than_the_scene_has_are_at_rest(build, tmp_path):
     assert (np.abs(frames["lane"]["alpha"][50:-1, 7].astype(int) - 0x8000) < 2000).all()
 
 
-def test_faults_are_told_to_the_simulation_in_the_order_they_strike(tmp_path):
+def test_faults_are_reported_to_the_simulation_in_the_order_they_strike(tmp_path):
     path = tmp_path / "faults.toml"
     path.write_text(FAULTS + '[[fault]]\ntick = 0\nlane = 1\nkind = "sensor_flip"\n')
     low = 1 << SENSOR_ERRORS["field_low"]["sensor_bit"]

@@ -84,7 +84,7 @@ def calibrated(tmp_path_factory):
     return folder, said
 
 
-def test_every_whisk_is_cut_out_and_told(calibrated):
+def test_every_whisk_is_cut_out_and_reported(calibrated):
     folder, said = calibrated
     assert (
         f"{WHISKS} of {WHISKS}, {RADIUS_MM:g} mm: pushed for 0.6" in said["live"]

@@ -283,7 +283,7 @@ def test_statistics_on_request(tmp_path, ring):
 
 
 @pytest.mark.parametrize("plugged", [True, False])
-def test_systemd_is_told_that_it_is_ready_lives_and_stops(tmp_path, ring, plugged):
+def test_systemd_is_reported_that_it_is_ready_lives_and_stops(tmp_path, ring, plugged):
     if "libsystemd" not in subprocess.run(["ldd", program("whiskerd")], capture_output=True, text=True).stdout:
         pytest.skip("whiskerd was built without libsystemd")
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listener:

@@ -35,5 +35,5 @@ def test_wheels_without_a_commander_are_stopped(events, name):
 
 
 @pytest.mark.parametrize("name", SHORT)
-def test_what_is_lost_is_told(events, name):
+def test_what_is_lost_is_reported(events, name):
     assert events[name].gap.reported, events[name].gap

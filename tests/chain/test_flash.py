@@ -86,7 +86,7 @@ def test_all_nodes_at_once_but_for_those_that_cannot(image, tmp_path):
     assert {state for _, _, state in listed.values()} == {"the application runs"}
 
 
-def test_serial_numbers_address_one_node_and_duplicates_are_told(image, tmp_path):
+def test_serial_numbers_address_one_node_and_duplicates_are_reported(image, tmp_path):
     shell = (
         f"$FLASH $LINK {image} --lane 0; echo one $?; $FLASH $LINK {image} --lane 2; echo two $?;"
         f"$FLASH $LINK {image} --node 99; echo three $?; $FLASH $LINK {image} --dry-run; echo four $?;"

@@ -121,7 +121,7 @@ def test_a_sound_base_passes_once_its_wheels_are_up(alone, tmp_path):
     assert code == 0
 
 
-def test_nothing_moves_before_its_wheels_are_up_and_a_bad_line_and_battery_are_told(alone, tmp_path):
+def test_nothing_moves_before_its_wheels_are_up_and_a_bad_line_and_battery_are_reported(alone, tmp_path):
     with emulated(tmp_path, "--model", "2", "--lose-bytes", "0.01", "--battery-low") as link:
         found, said, code = check_base(link, "--model", 2)
     assert list(found.values()) == ["FAILED", "FAILED", "ok", "skip", "skip", "skip"], said
@@ -130,7 +130,7 @@ def test_nothing_moves_before_its_wheels_are_up_and_a_bad_line_and_battery_are_t
     assert code == 1
 
 
-def test_a_base_whose_wheels_hang_in_safe_mode_is_told_to_go_on_blocks(alone, tmp_path):
+def test_a_base_whose_wheels_hang_in_safe_mode_is_reported_to_go_on_blocks(alone, tmp_path):
     with emulated(tmp_path, "--event", "drop-left@0+1000") as link:
         found, said, _ = check_base(link)
     assert found["base.mode"] == "FAILED" and "on blocks with --wheels-up" in said[2], said
@@ -153,7 +153,7 @@ def test_a_base_that_drives_on_is_no_good_after_half_a_second():
     assert base.frames <= 6 * SILENT_FRAMES
 
 
-def test_a_bridge_without_nodes_is_told_from_a_bad_one(alone, tmp_path):
+def test_a_bridge_without_nodes_is_reported_from_a_bad_one(alone, tmp_path):
     frames = np.zeros(SETTLE_TICKS + 10, FRAME)
     frames["lane"]["status"] = CODES["absent"] << STATUS_CODE_SHIFT
     rig = Rig(1.0, False, True, tmp_path, _stream=Stream(frames, None, None, None))

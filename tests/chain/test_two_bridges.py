@@ -104,7 +104,7 @@ def test_the_first_may_go_and_come_back():
     ]
 
 
-def test_a_bridge_that_is_not_there_is_told_in_one_line():
+def test_a_bridge_that_is_not_there_is_reported_in_one_line():
     done = subprocess.run(command(second="0003", words=()), capture_output=True, text=True, timeout=END_S)
     assert done.returncode == 1
     assert done.stderr == (

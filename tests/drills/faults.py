@@ -84,7 +84,7 @@ def _line(share: float) -> Callable[[Machine], None]:
 
 
 def _simulation(text: str) -> Callable[[Machine], None]:
-    return lambda machine: machine.tell_simulation(text)
+    return lambda machine: machine.report_simulation(text)
 
 
 DESKTOP = Desktop()

@@ -130,7 +130,7 @@ class Machine:
     def kill(self, name: str) -> None:
         os.kill(self.pid(name), signal.SIGKILL)
 
-    def tell_simulation(self, text: str) -> None:
+    def report_simulation(self, text: str) -> None:
         """One message to the simulation, whose connection then ends."""
         with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as link:
             link.connect(str(self.simulation))

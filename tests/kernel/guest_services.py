@@ -392,7 +392,7 @@ def base_inhibits_sleep(_: Checks) -> str:
     return f"{locks()} locks"
 
 
-def tell_asleep() -> None:
+def report_asleep() -> None:
     """In place of the kernel's suspend: writes down what the base says at that time."""
     reported = health(BASES[0])
     ASLEEP.write_text(f"held={reported['held']} v={reported['v_m_s']} omega={reported['omega_rad_s']}")
@@ -453,4 +453,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    tell_asleep() if sys.argv[1:] == [ASLEEP.name] else main()
+    report_asleep() if sys.argv[1:] == [ASLEEP.name] else main()

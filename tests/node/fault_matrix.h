@@ -51,7 +51,7 @@ struct fault_outcome fault_run(const struct fault_case *row, const struct sim_no
 /* What a node counted, as text; and what it should have counted if `letters` are all that happened: each tick once, but
  * a reset once for all the ticks that tell of it. */
 void fault_counted(const sim_node *node, char text[FAULT_TEXT]);
-void fault_told(const char *letters, char text[FAULT_TEXT]);
+void fault_reported(const char *letters, char text[FAULT_TEXT]);
 
 /* Parts number `n` of FAULT_PARTS: both prefetch depths, slow, nominal and quick oscillators. */
 enum { FAULT_PARTS = 6 };

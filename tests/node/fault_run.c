@@ -88,7 +88,7 @@ static void fault_run_compare_counters(struct fault_outcome *out, const struct f
 {
     char reported[FAULT_TEXT];
     fault_counted(node, out->counted);
-    fault_told(letters, reported);
+    fault_reported(letters, reported);
     out->counted_as_expected =
         row->counted ? fault_run_matches(row->counted, out->counted) : strcmp(reported, out->counted) == 0;
 }
@@ -180,7 +180,7 @@ void fault_counted(const sim_node *node, char text[FAULT_TEXT])
         fault_run_count(text, COUNTERS[i].letter, sim_node_counted(node, COUNTERS[i].counter));
 }
 
-void fault_told(const char *letters, char text[FAULT_TEXT])
+void fault_reported(const char *letters, char text[FAULT_TEXT])
 {
     text[0] = '\0';
     for (unsigned i = 0; i < COUNTER_COUNT; i++) {

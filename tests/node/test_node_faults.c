@@ -18,7 +18,7 @@ static bool is_right(const struct fault_case *row, const struct fault_outcome *o
            (o->altered == 0) == !row->undetectable && (o->violations == 0) == !row->breaches;
 }
 
-static void each_fault_is_told_and_costs_what_its_cause_allows(void **state)
+static void each_fault_is_reported_and_costs_what_its_cause_allows(void **state)
 {
     unsigned wrong = 0;
     (void)state;
@@ -76,7 +76,7 @@ static int write_table(const char *path)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(each_fault_is_told_and_costs_what_its_cause_allows),
+        cmocka_unit_test(each_fault_is_reported_and_costs_what_its_cause_allows),
         cmocka_unit_test(the_matrix_is_large_enough),
     };
     return argc > 1 ? write_table(argv[1]) : cmocka_run_group_tests(tests, NULL, NULL);

@@ -36,7 +36,7 @@ static void settle(struct update_bench *b)
     }
 }
 
-static void a_running_node_tells_who_it_is_and_loses_no_sample(void **state)
+static void a_running_node_reports_who_it_is_and_loses_no_sample(void **state)
 {
     (void)state;
     struct update_bench b;
@@ -173,7 +173,7 @@ static void another_chip_refuses_the_image(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_running_node_tells_who_it_is_and_loses_no_sample),
+        cmocka_unit_test(a_running_node_reports_who_it_is_and_loses_no_sample),
         cmocka_unit_test(faults_are_counted_once),
         cmocka_unit_test(an_update_runs_the_new_image),
         cmocka_unit_test(unfit_images_are_refused_and_the_old_one_stays),

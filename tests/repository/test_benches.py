@@ -44,7 +44,7 @@ def front(*words: str) -> subprocess.CompletedProcess:
     return subprocess.run([sys.executable, BENCHES, *words], capture_output=True, text=True, cwd=ROOT)
 
 
-def test_the_front_tells_topics_and_a_topic_tells_its_options():
+def test_the_front_reports_topics_and_a_topic_reports_its_options():
     assert ", ".join(TOPICS) in " ".join(front("--help").stdout.split())
     reported = front("node", "--help").stdout
     assert "usage: tools/benches node " in reported and "--batches" in reported and "--build-dir" in reported

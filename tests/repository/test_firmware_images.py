@@ -28,7 +28,7 @@ def sums() -> dict[str, str]:
     return {name: digest for digest, name in (line.split() for line in lines)}
 
 
-def test_every_image_is_the_one_whose_hash_is_told():
+def test_every_image_is_the_one_whose_hash_is_reported():
     found = {str(path.relative_to(IMAGES)): path for path in IMAGES.glob("*/*")}
     assert found.keys() == sums().keys() and len(found) == 4 * len(OPTIONS)
     for name, path in found.items():

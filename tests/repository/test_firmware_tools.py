@@ -438,7 +438,7 @@ def test_a_library_call_and_a_lost_flag_in_the_sample_path_are_found():
     assert check_listing.findings(outside) == []
 
 
-def test_the_listing_tells_the_cycles_of_the_sample_path():
+def test_the_listing_reports_the_cycles_of_the_sample_path():
     listing = (
         "00002300 <_port_on_t2>:\n"
         " 2300: 84 40 a9  bclr.b  0x84, #7\n 2302: 00 9f be  mov.d  w0, [w15++]\n"

@@ -123,7 +123,7 @@ def test_long_lines_are_found_outside_tables_and_code(tmp_path):
 
 def test_words_not_used_here_are_found(tmp_path):
     files = {
-        "a.c": "/* Told apart. */\nint told_apart;\n",
+        "a.c": "/* Told apart. */\nint reported_apart;\n",
         "host/create/bumper.c": "/* A bump. */\n",
         "b.md": "A bump.\n",
     }
@@ -133,7 +133,7 @@ def test_words_not_used_here_are_found(tmp_path):
     ]
 
 
-def test_each_complaint_is_a_line_and_the_exit_code_tells_it():
+def test_each_complaint_is_a_line_and_the_exit_code_reports_it():
     done = subprocess.run(
         [sys.executable, "-m", "lint", "nonsense"], cwd=ROOT / "tools", capture_output=True, text=True, timeout=60
     )

@@ -23,7 +23,7 @@ def test_what_all_native_peers_share_builds_with_the_headers_of_this_tree(tmp_pa
     assert peer_runs.failure(configure(peer_runs.PEERS, tmp_path), build) == ""
 
 
-def test_a_build_that_fails_is_told_with_its_error_and_not_as_a_missing_package(tmp_path, monkeypatch, capsys):
+def test_a_build_that_fails_is_reported_with_its_error_and_not_as_a_missing_package(tmp_path, monkeypatch, capsys):
     source = tmp_path / "peers"
     source.mkdir()
     lines = ["cmake_minimum_required(VERSION 3.25)", "project(broken C)", "add_executable(mrpt_peer broken.c)"]

@@ -51,7 +51,7 @@ def test_every_locked_package_is_there_with_all_its_hashes(components):
     assert sorted(reported) == sorted(re.findall(r"sha256:(\w+)", lock))
 
 
-def test_scope_tells_a_robot_from_its_tools(components):
+def test_scope_reports_a_robot_from_its_tools(components):
     scope = {one["name"]: one["scope"] for one in components.values()}
     required = ("numpy", "pyro5", "serpent", "luna-usb", "amaranth", "libusb-1.0-0", "libhidapi-libusb0", "libc6")
     assert {name: scope[name] for name in required} == dict.fromkeys(required, "required")

@@ -208,7 +208,7 @@ void requests_in_the_configured_state(void **)
     in_state(CONFIGURED);
 }
 
-void the_configuration_is_told(void **)
+void the_configuration_is_reported(void **)
 {
     Fixture f;
     Bytes data;
@@ -342,7 +342,7 @@ int main()
         cmocka_unit_test(requests_in_the_default_state),
         cmocka_unit_test(requests_in_the_address_state),
         cmocka_unit_test(requests_in_the_configured_state),
-        cmocka_unit_test(the_configuration_is_told),
+        cmocka_unit_test(the_configuration_is_reported),
         cmocka_unit_test(endpoints_are_silent_until_configured),
         cmocka_unit_test(halt_stalls_and_clearing_it_resets_the_toggle),
         cmocka_unit_test(a_new_configuration_and_a_reset_end_a_halt),

@@ -116,7 +116,7 @@ static void one_wrong_bit_of_the_body_is_enough(void **state)
     assert_true(image_body_is_good(&flash_board, header, row));
 }
 
-static void version_and_options_are_told_of_a_sound_header_only(void **state)
+static void version_and_options_are_reported_of_a_sound_header_only(void **state)
 {
     (void)state;
     uint16_t version, options;
@@ -140,7 +140,7 @@ int main(void)
         cmocka_unit_test(a_length_is_whole_rows_that_fit),
         cmocka_unit_test(an_application_may_run_if_header_and_body_are_right),
         cmocka_unit_test(one_wrong_bit_of_the_body_is_enough),
-        cmocka_unit_test(version_and_options_are_told_of_a_sound_header_only),
+        cmocka_unit_test(version_and_options_are_reported_of_a_sound_header_only),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -141,7 +141,7 @@ static void what_is_refused_leaves_the_application_as_it_is(void **state)
     assert_true(flash_board.runs);
 }
 
-static void a_wrong_body_is_told_and_does_not_run(void **state)
+static void a_wrong_body_is_reported_and_does_not_run(void **state)
 {
     (void)state;
     begin_test();
@@ -167,7 +167,7 @@ static void an_unfinished_image_neither_ends_nor_runs(void **state)
     assert_false(flash_board.runs);
 }
 
-static void flash_that_does_not_hold_is_told_at_once(void **state)
+static void flash_that_does_not_hold_is_reported_at_once(void **state)
 {
     (void)state;
     for (uint16_t row = WHISKER_LIMIT_APPLICATION_ROW + 1u; row <= WHISKER_LIMIT_APPLICATION_ROW + BODY_ROWS; row++) {
@@ -196,7 +196,7 @@ static void questions_do_not_disturb_a_row_being_gathered(void **state)
     assert_answer(BODY_BLOCKS, WHISKER_NODE_STATE_COMPLETE);
 }
 
-static void it_tells_who_it_is(void **state)
+static void it_reports_who_it_is(void **state)
 {
     (void)state;
     begin_test();
@@ -220,11 +220,11 @@ int main(void)
         cmocka_unit_test(blocks_out_of_turn_are_ignored),
         cmocka_unit_test(the_same_header_again_goes_on_another_begins_anew),
         cmocka_unit_test(what_is_refused_leaves_the_application_as_it_is),
-        cmocka_unit_test(a_wrong_body_is_told_and_does_not_run),
+        cmocka_unit_test(a_wrong_body_is_reported_and_does_not_run),
         cmocka_unit_test(an_unfinished_image_neither_ends_nor_runs),
-        cmocka_unit_test(flash_that_does_not_hold_is_told_at_once),
+        cmocka_unit_test(flash_that_does_not_hold_is_reported_at_once),
         cmocka_unit_test(questions_do_not_disturb_a_row_being_gathered),
-        cmocka_unit_test(it_tells_who_it_is),
+        cmocka_unit_test(it_reports_who_it_is),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

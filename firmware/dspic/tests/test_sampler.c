@@ -240,7 +240,7 @@ static void a_jump_is_not_believed_until_the_sensor_was_resynchronised(void **st
     assert_int_equal(read_alpha(&bench, 0x8000), WHISKER_CODE_STEP);
 }
 
-static void until_ready_ticks_tell_the_kind_of_reset(void **state)
+static void until_ready_ticks_report_the_kind_of_reset(void **state)
 {
     (void)state;
     struct bench bench;
@@ -277,7 +277,7 @@ int main(void)
         cmocka_unit_test(a_sync_at_any_moment_of_a_resynchronisation_reports_it_and_disturbs_nothing),
         cmocka_unit_test(a_sync_at_any_moment_of_a_reading_gives_it_up_and_resynchronises),
         cmocka_unit_test(a_jump_is_not_believed_until_the_sensor_was_resynchronised),
-        cmocka_unit_test(until_ready_ticks_tell_the_kind_of_reset),
+        cmocka_unit_test(until_ready_ticks_report_the_kind_of_reset),
         cmocka_unit_test(events_nobody_asked_for_are_ignored),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

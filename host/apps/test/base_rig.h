@@ -53,7 +53,7 @@ static inline void say(int client, const char *message, int64_t now_ms)
 }
 
 /* One frame of a base in safe mode that was asked for this speed, and in it moved so far. */
-static inline void tell_frame(int asked_mm_s, int moved_mm, int64_t now_ms)
+static inline void report_frame(int asked_mm_s, int moved_mm, int64_t now_ms)
 {
     uint8_t frame[CREATE_STREAM_BYTES], sum = 0;
     int32_t value[CREATE_OI_PACKET_MAX + 1] = {[CREATE_OI_MODE] = CREATE_OI_MODE_SAFE,

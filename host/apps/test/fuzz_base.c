@@ -210,7 +210,7 @@ static void say_anything(struct input *input, int i)
 }
 
 /* A frame of the stream, made good, so that odometry and modes are in it. */
-static void tell_frame(struct input *input)
+static void report_frame(struct input *input)
 {
     const struct create_stream *stream = &robot.stream;
     uint8_t frame[CREATE_STREAM_BYTES], sum = 0;
@@ -224,7 +224,7 @@ static void tell_frame(struct input *input)
     }
 }
 
-static void tell_anything(struct input *input)
+static void report_anything(struct input *input)
 {
     uint8_t bytes[16];
     const size_t count = take(input) % sizeof bytes;
@@ -269,10 +269,10 @@ static void act(struct input *input)
         base_robot_watch(&robot, now_ms);
         break;
     case 3:
-        tell_frame(input);
+        report_frame(input);
         break;
     case 4:
-        what & 8 ? handle_cable() : what & 16 ? hold(what) : tell_anything(input);
+        what & 8 ? handle_cable() : what & 16 ? hold(what) : report_anything(input);
         break;
     default:
         say_phrase(input, i);

@@ -148,7 +148,7 @@ static const char *const *with_fake(const char *what)
     return words;
 }
 
-static void bridges_that_cannot_be_used_are_told_in_one_line(void **state)
+static void bridges_that_cannot_be_used_are_reported_in_one_line(void **state)
 {
     (void)state;
     assert_refused(with_fake("access"), 1, "bridge: no permission to open the bridge; install the udev rule");
@@ -159,7 +159,7 @@ static void bridges_that_cannot_be_used_are_told_in_one_line(void **state)
     assert_false(ring_exists());
 }
 
-static void a_host_clock_that_goes_back_is_told_and_nothing_is_lost(void **state)
+static void a_host_clock_that_goes_back_is_reported_and_nothing_is_lost(void **state)
 {
     (void)state;
     static const char *const clocks[] = {"realtime", "monotonic"};
@@ -173,7 +173,7 @@ static void a_host_clock_that_goes_back_is_told_and_nothing_is_lost(void **state
     }
 }
 
-static void what_is_wrong_with_tick_in_is_told_once(void **state)
+static void what_is_wrong_with_tick_in_is_reported_once(void **state)
 {
     (void)state;
     const char *words[] = {WHISKERD_FAKE, "--ring", ring_name(), "--tick-in", "rising", NULL};
@@ -480,9 +480,9 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(daemon_without_a_bridge_fails_in_one_line),
         cmocka_unit_test(two_bridges_that_cannot_be_one_are_refused),
-        cmocka_unit_test(bridges_that_cannot_be_used_are_told_in_one_line),
-        cmocka_unit_test(a_host_clock_that_goes_back_is_told_and_nothing_is_lost),
-        cmocka_unit_test(what_is_wrong_with_tick_in_is_told_once),
+        cmocka_unit_test(bridges_that_cannot_be_used_are_reported_in_one_line),
+        cmocka_unit_test(a_host_clock_that_goes_back_is_reported_and_nothing_is_lost),
+        cmocka_unit_test(what_is_wrong_with_tick_in_is_reported_once),
         cmocka_unit_test(wrong_use_is_refused_in_one_line),
         cmocka_unit_test(help_has_an_example),
         cmocka_unit_test(log_without_a_ring_fails_in_one_line),

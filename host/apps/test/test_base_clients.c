@@ -113,7 +113,7 @@ static void by_the_streams_clock_frames_count(void **state)
     assert_answer(ask(0, "drive 0 0", OPENED_MS), "sent ");
     for (int i = 0; i < BASE_PLACE_FRAMES; i++) {
         assert_answer(ask(1, "drive 0.1 0", OPENED_MS + 100 * BASE_PLACE_MS), "error another client commands");
-        tell_frame(0, 0, OPENED_MS);
+        report_frame(0, 0, OPENED_MS);
     }
     assert_answer(ask(1, "drive 0.1 0", OPENED_MS), "sent ");
 }
@@ -241,7 +241,7 @@ static void while_one_reason_holds_the_wheels_stand(void **state)
 static void a_line_that_stays_silent_is_logged_once_and_then_every_hour(void **state)
 {
     (void)state;
-    tell_frame(0, 0, OPENED_MS);
+    report_frame(0, 0, OPENED_MS);
     log_lines = 0; /* that of its empty battery */
     int64_t now_ms = OPENED_MS + BASE_SILENCE_MS;
     for (; now_ms < OPENED_MS + BASE_TELL_MS + BASE_SILENCE_MS; now_ms += BASE_SILENCE_MS) {
@@ -254,9 +254,9 @@ static void a_line_that_stays_silent_is_logged_once_and_then_every_hour(void **s
     assert_int_equal(log_lines, 1);
     base_robot_watch(&robot, now_ms);
     assert_int_equal(log_lines, 2);
-    tell_frame(0, 0, now_ms + 1);
+    report_frame(0, 0, now_ms + 1);
     assert_int_equal(log_lines, 3);
-    tell_frame(0, 0, now_ms + 2);
+    report_frame(0, 0, now_ms + 2);
     assert_int_equal(log_lines, 3);
     base_robot_watch(&robot, now_ms + 2 + BASE_SILENCE_MS); /* another silence */
     assert_int_equal(log_lines, 4);

@@ -30,7 +30,7 @@ static int begin(void **state)
     assert_true(base_clients_add(&clients, pair(SOCK_SEQPACKET, &other), OPENED_MS));
     say(commander, "drive 0.2 0", OPENED_MS);
     for (int64_t now_ms = OPENED_MS; now_ms < HEARD_MS; now_ms += CREATE_OI_PERIOD_MS) {
-        tell_frame(SPEED_MM_S, FRAME_MM, now_ms + CREATE_OI_PERIOD_MS);
+        report_frame(SPEED_MM_S, FRAME_MM, now_ms + CREATE_OI_PERIOD_MS);
     }
     driven_m = 0;
     return 0;
@@ -48,7 +48,7 @@ static int end(void **state)
 /* The first frame after the silence says that the base stands: it drove until `stopped_ms`, to a frame. */
 static void assert_driven_until(int64_t stopped_ms)
 {
-    tell_frame(0, 0, BACK_MS);
+    report_frame(0, 0, BACK_MS);
     const double expected_m = (double)(stopped_ms - HEARD_MS) / CREATE_OI_PERIOD_MS * FRAME_M;
     if (fabs(driven_m - expected_m) > 1.5 * FRAME_M) {
         fail_msg("%.4f m driven, expected %.4f", driven_m, expected_m);

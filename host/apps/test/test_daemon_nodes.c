@@ -67,7 +67,7 @@ static void sixteen_counters_fit(void **state)
     assert_non_null(strstr(lines[1], "OVERRUN 65535")); /* the last */
 }
 
-static void no_node_is_told_too(void **state)
+static void no_node_is_reported_too(void **state)
 {
     (void)state;
     fake_nodes_reset(0);
@@ -76,7 +76,7 @@ static void no_node_is_told_too(void **state)
     assert_string_equal(lines[0], "0 nodes answer");
 }
 
-static void a_bridge_that_refuses_is_told_in_one_line(void **state)
+static void a_bridge_that_refuses_is_reported_in_one_line(void **state)
 {
     (void)state;
     fakes.fail_after = 0;
@@ -93,8 +93,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         TEST(each_node_gets_a_line_with_what_it_counted),
         TEST(sixteen_counters_fit),
-        TEST(no_node_is_told_too),
-        TEST(a_bridge_that_refuses_is_told_in_one_line),
+        TEST(no_node_is_reported_too),
+        TEST(a_bridge_that_refuses_is_reported_in_one_line),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

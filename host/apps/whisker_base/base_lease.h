@@ -7,7 +7,7 @@
 #include "whisker_base_options.h"
 
 /* What the driver reports to its guard, one per packet; PORT comes with the descriptor. */
-enum base_tell { BASE_PORT = 'P', BASE_NO_PORT = 'N', BASE_ALIVE = 'A' };
+enum base_report { BASE_PORT = 'P', BASE_NO_PORT = 'N', BASE_ALIVE = 'A' };
 
 /*
  * What the guard sends to the driver again and again: until when, by CLOCK_MONOTONIC, the wheels may turn. It is never

@@ -22,7 +22,7 @@ struct driver {
     struct base_clients clients;
     struct base_sleep sleep;
     struct pollfd polled[POLLED];
-    int told_port; /* descriptor the guard holds too */
+    int reported_port; /* descriptor the guard holds too */
     int64_t alive_ms, tried_ms;
     bool opened;       /* the port was open before: the next time is a reconnect */
     int64_t accept_ms; /* until then no connection is taken: there was no descriptor for one */
@@ -30,7 +30,7 @@ struct driver {
 };
 
 /* Tells the guard one thing, with the port's descriptor where it is not negative. */
-static void whisker_base_driver_tell(const struct driver *driver, enum base_tell what, int port)
+static void whisker_base_driver_report(const struct driver *driver, enum base_report what, int port)
 {
     char byte = (char)what;
     union {
@@ -51,17 +51,17 @@ static void whisker_base_driver_tell(const struct driver *driver, enum base_tell
     sendmsg(driver->start.guard, &message, MSG_NOSIGNAL | (what == BASE_ALIVE ? MSG_DONTWAIT : 0));
 }
 
-static void whisker_base_driver_tell_port(struct driver *driver)
+static void whisker_base_driver_report_port(struct driver *driver)
 {
-    driver->told_port = driver->robot.port;
-    whisker_base_driver_tell(driver, driver->told_port < 0 ? BASE_NO_PORT : BASE_PORT, driver->told_port);
+    driver->reported_port = driver->robot.port;
+    whisker_base_driver_report(driver, driver->reported_port < 0 ? BASE_NO_PORT : BASE_PORT, driver->reported_port);
 }
 
-static void whisker_base_driver_tell_alive(struct driver *driver)
+static void whisker_base_driver_report_alive(struct driver *driver)
 {
     if (!driver->start.options->stream_clock && cli_now_ms() - driver->alive_ms >= ALIVE_MS) {
         driver->alive_ms = cli_now_ms();
-        whisker_base_driver_tell(driver, BASE_ALIVE, -1);
+        whisker_base_driver_report(driver, BASE_ALIVE, -1);
     }
 }
 
@@ -178,10 +178,10 @@ static void whisker_base_driver_serve(struct driver *driver)
              i++) {
         }
     }
-    if (driver->told_port != driver->robot.port) {
-        whisker_base_driver_tell_port(driver);
+    if (driver->reported_port != driver->robot.port) {
+        whisker_base_driver_report_port(driver);
     }
-    whisker_base_driver_tell_alive(driver);
+    whisker_base_driver_report_alive(driver);
 }
 
 static void whisker_base_driver_on_sleep(void *context, bool about_to)
@@ -198,7 +198,7 @@ static bool whisker_base_driver_open_first(struct driver *driver)
     if (!driver->opened && !start->options->wait && start->restarts == 0) {
         return false;
     }
-    whisker_base_driver_tell_port(driver);
+    whisker_base_driver_report_port(driver);
     return true;
 }
 

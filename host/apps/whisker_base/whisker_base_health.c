@@ -47,7 +47,7 @@ void base_robot_health(const struct base_robot *robot, char *text, size_t room)
         "reconnects=%llu silences=%llu commander_stops=%llu mode_losses=%llu",
         robot->options->odometry.model == CREATE_2 ? 2 : 1, odometry->settings.wheel_base_m,
         create_model_facts(odometry->settings.model)->speed_step_m_s, robot->port < 0 ? "gone" : "open",
-        seen ? whisker_base_health_mode_name(base_robot_mode_told(robot)) : "unknown",
+        seen ? whisker_base_health_mode_name(base_robot_mode_reported(robot)) : "unknown",
         whisker_base_health_mode_name((int32_t)robot->wanted), value[CREATE_OI_VOLTAGE], value[CREATE_OI_CHARGE],
         value[CREATE_OI_CAPACITY], robot->low, value[CREATE_OI_CHARGING_SOURCES], robot->speeds.left_mm_s,
         robot->speeds.right_mm_s, robot->speeds.v_m_s, robot->speeds.omega_rad_s,

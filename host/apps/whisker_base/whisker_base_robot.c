@@ -202,8 +202,8 @@ static uint32_t whisker_base_robot_frames_since_change(const struct base_robot *
 
 static void whisker_base_robot_log_back(struct base_robot *robot)
 {
-    if (robot->told_ms > 0) {
-        robot->told_ms = 0;
+    if (robot->reported_ms > 0) {
+        robot->reported_ms = 0;
         base_log(&robot->log.back, LOG_NOTE, "%s: frames come again", robot->options->port);
     }
 }
@@ -301,8 +301,8 @@ bool base_robot_mode(struct base_robot *robot, enum create_oi_mode mode, int64_t
 /* A line that stays silent is reported once, and then every hour. */
 static void whisker_base_robot_log_silence(struct base_robot *robot, int64_t now_ms)
 {
-    if (robot->told_ms == 0 || now_ms - robot->told_ms >= BASE_TELL_MS) {
-        robot->told_ms = now_ms;
+    if (robot->reported_ms == 0 || now_ms - robot->reported_ms >= BASE_TELL_MS) {
+        robot->reported_ms = now_ms;
         base_log(&robot->log.silence, LOG_WARN,
                  "%s: no frame for %d ms; wheels stopped, stream asked for again every %d ms; check cable, --baud and "
                  "battery",

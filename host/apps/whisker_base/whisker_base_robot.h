@@ -52,13 +52,13 @@ struct base_robot {
     enum create_oi_mode wanted;
     int32_t mode_offset; /* some firmwares tell a mode one higher than it is */
     uint32_t frames_since_mode;
-    bool entered;       /* the wanted mode was seen in force since it was last asked for */
-    bool low, told_low; /* battery */
-    bool silent;        /* it was heard, and then no more: until a frame comes the wheels stay stopped */
-    unsigned held;      /* bits of enum base_hold: while one is set the wheels stay stopped */
+    bool entered;           /* the wanted mode was seen in force since it was last asked for */
+    bool low, reported_low; /* battery */
+    bool silent;            /* it was heard, and then no more: until a frame comes the wheels stay stopped */
+    unsigned held;          /* bits of enum base_hold: while one is set the wheels stay stopped */
     int64_t drive_ms, frame_ms, opened_ms;
-    int64_t told_ms;    /* when a silence was logged that still lasts; 0: none does */
-    int64_t changed_ms; /* when other speeds than before were ordered */
+    int64_t reported_ms; /* when a silence was logged that still lasts; 0: none does */
+    int64_t changed_ms;  /* when other speeds than before were ordered */
     uint32_t frames_since_drive;
     int error; /* why the port could not be opened, as last reported */
     uint64_t reconnects, silences, commander_stops, mode_losses, missed;
@@ -107,7 +107,7 @@ void base_robot_end(struct base_robot *robot, int64_t now_ms);
 void base_robot_health(const struct base_robot *robot, char *text, size_t room);
 
 /* Mode of the newest frame, as of enum create_oi_mode. */
-int32_t base_robot_mode_told(const struct base_robot *robot);
+int32_t base_robot_mode_reported(const struct base_robot *robot);
 
 /* Takes note of mode and battery in a new frame, and says once what a person should know. */
 void base_robot_heed(struct base_robot *robot);

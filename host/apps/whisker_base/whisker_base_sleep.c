@@ -60,7 +60,7 @@ static void sleep_ask_lock(struct base_sleep *sleep)
                                  "ssss", "sleep", "whisker-base", "stops the wheels first", "delay") >= 0;
 }
 
-static void sleep_tell(struct base_sleep *sleep, bool about_to)
+static void sleep_report(struct base_sleep *sleep, bool about_to)
 {
     if (sleep->about_to != about_to) {
         sleep->about_to = about_to;
@@ -77,7 +77,7 @@ static int sleep_on_prepare(sd_bus_message *message, void *context, sd_bus_error
     if (sd_bus_message_read(message, "b", &about_to) <= 0) {
         return 0;
     }
-    sleep_tell(sleep, about_to);
+    sleep_report(sleep, about_to);
     if (about_to) {
         sleep_unlock(sleep);
     } else if (sleep->lock < 0 && !sleep->asked) {
@@ -99,7 +99,7 @@ static void sleep_lose(struct base_sleep *sleep, int error)
     sleep->bus = sd_bus_close_unref(sleep->bus);
     sleep->asked = false;
     sleep_unlock(sleep);
-    sleep_tell(sleep, false);
+    sleep_report(sleep, false);
 }
 
 /* The notices are asked for before the lock: none is missed while it is held. */

@@ -8,7 +8,7 @@
 #define LOW_CHARGE 10
 #define LOW_MV 12000
 
-int32_t base_robot_mode_told(const struct base_robot *robot)
+int32_t base_robot_mode_reported(const struct base_robot *robot)
 {
     return robot->frame.value[CREATE_OI_MODE] - robot->mode_offset;
 }
@@ -16,7 +16,7 @@ int32_t base_robot_mode_told(const struct base_robot *robot)
 unsigned base_robot_bits(const struct base_robot *robot)
 {
     const int32_t *value = robot->frame.value;
-    const bool idle = base_robot_kept(robot) || base_robot_mode_told(robot) != (int32_t)robot->wanted;
+    const bool idle = base_robot_kept(robot) || base_robot_mode_reported(robot) != (int32_t)robot->wanted;
     return (unsigned)value[CREATE_OI_BUMPS_DROPS] | (value[CREATE_OI_CLIFF_LEFT] ? BASE_CLIFF_LEFT : 0u) |
            (value[CREATE_OI_CLIFF_FRONT_LEFT] ? BASE_CLIFF_FRONT_LEFT : 0u) |
            (value[CREATE_OI_CLIFF_FRONT_RIGHT] ? BASE_CLIFF_FRONT_RIGHT : 0u) |
@@ -38,7 +38,7 @@ static void whisker_base_state_watch_mode_offset(struct base_robot *robot)
 {
     robot->frames_since_mode++;
     if (!robot->entered && robot->frames_since_mode >= MODE_FRAMES && robot->wanted >= CREATE_OI_MODE_SAFE &&
-        base_robot_mode_told(robot) == (int32_t)robot->wanted + 1) {
+        base_robot_mode_reported(robot) == (int32_t)robot->wanted + 1) {
         robot->mode_offset = 1;
         daemon_log(LOG_NOTE, "%s: this firmware tells modes one higher than they are", robot->options->port);
     }
@@ -48,7 +48,7 @@ static void whisker_base_state_watch_mode_offset(struct base_robot *robot)
 static void whisker_base_state_watch_mode(struct base_robot *robot)
 {
     whisker_base_state_watch_mode_offset(robot);
-    const bool in_force = base_robot_mode_told(robot) == (int32_t)robot->wanted;
+    const bool in_force = base_robot_mode_reported(robot) == (int32_t)robot->wanted;
     if (robot->entered && !in_force) {
         robot->mode_losses++;
         robot->speeds = (struct create_speeds){0};
@@ -62,8 +62,8 @@ static void whisker_base_state_watch_battery(struct base_robot *robot)
 {
     const int32_t *value = robot->frame.value;
     robot->low = value[CREATE_OI_VOLTAGE] < LOW_MV || value[CREATE_OI_CHARGE] * LOW_CHARGE < value[CREATE_OI_CAPACITY];
-    if (robot->low && !robot->told_low) {
-        robot->told_low = true;
+    if (robot->low && !robot->reported_low) {
+        robot->reported_low = true;
         daemon_log(LOG_WARN, "%s: the battery is low: %d mV, %d of %d mAh; charge it", robot->options->port,
                    value[CREATE_OI_VOLTAGE], value[CREATE_OI_CHARGE], value[CREATE_OI_CAPACITY]);
     }

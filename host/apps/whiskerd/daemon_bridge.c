@@ -14,7 +14,7 @@ static void daemon_bridge_begin(struct daemon_bridge *bridge)
     decoder->counts = counts;
     decoder->mark = bridge->lost_at_ms == 0 ? 0 : WHISKER_FRAME_GAP;
     bridge->ticks = (struct whisker_timing){0};
-    bridge->ticks_told = 0;
+    bridge->ticks_reported = 0;
     bridge->last_seen = bridge->dated = false;
 }
 
@@ -56,13 +56,13 @@ void daemon_bridge_lose(struct daemon_bridge *bridge, struct daemon_stats *stats
     daemon_log_error(LOG_WARN, bridge->name, error);
 }
 
-static void daemon_bridge_tell_ticks(struct daemon_bridge *bridge, const struct whisker_timing *now)
+static void daemon_bridge_report_ticks(struct daemon_bridge *bridge, const struct whisker_timing *now)
 {
     const int error = whisker_timing_judge(&bridge->ticks, now);
     const uint32_t bit = error ? UINT32_C(1) << (WHISKER_ERROR_TICK_IN_SILENT - error) : 0;
     bridge->ticks = *now;
-    if (bit & ~bridge->ticks_told) {
-        bridge->ticks_told |= bit;
+    if (bit & ~bridge->ticks_reported) {
+        bridge->ticks_reported |= bit;
         daemon_log_error(LOG_WARN, "tick_in", error);
         daemon_log(LOG_NOTE,
                    "%s, tick_in: %u edges taken, %u early, %u uneven, %u silences; shortest distance %u cycles",
@@ -89,16 +89,16 @@ void daemon_bridge_look_at_ticks(struct daemon_bridge *bridge, struct whisker_cl
         whisker_clock_report(clock, daemon_bridge_cycles(bridge, now.tick), now.usb_time, now.sof_cycles);
     }
     if (from_pin) {
-        daemon_bridge_tell_ticks(bridge, &now);
+        daemon_bridge_report_ticks(bridge, &now);
     }
 }
 
-void daemon_bridge_tell_damage(struct daemon_bridge *bridge)
+void daemon_bridge_report_damage(struct daemon_bridge *bridge)
 {
     const struct whisker_decoder *decoder = &bridge->source.decoder;
-    if (decoder->first_error && !bridge->damage_told) {
+    if (decoder->first_error && !bridge->damage_reported) {
         daemon_log(LOG_ERROR, "%s: after frame %llu: %s; %s", bridge->name, (unsigned long long)decoder->counts.frames,
                    whisker_error_text(decoder->first_error), whisker_error_remedy(decoder->first_error));
-        bridge->damage_told = true;
+        bridge->damage_reported = true;
     }
 }

@@ -14,11 +14,11 @@ struct daemon_bridge {
     struct whisker_device *device; /* NULL: waiting for it */
     struct daemon_source source;
     struct whisker_timing ticks; /* of tick_in, when last asked for */
-    uint32_t ticks_told;         /* bit n: error TICK_IN_SILENT - n of this run is in the log */
+    uint32_t ticks_reported;     /* bit n: error TICK_IN_SILENT - n of this run is in the log */
     int64_t lost_at_ms;
     int logged;     /* why it could not be opened, as last logged */
     bool last_seen; /* the last frame after a stop has come */
-    bool damage_told;
+    bool damage_reported;
     bool dated; /* its frames say when they were by the host's start-of-frame packets */
 };
 
@@ -38,6 +38,6 @@ void daemon_bridge_look_at_ticks(struct daemon_bridge *bridge, struct whisker_cl
 
 /* USB guards every packet by a CRC of its own, so a malformed frame is a fault of the bridge: said once, while the
  * other frames go on. */
-void daemon_bridge_tell_damage(struct daemon_bridge *bridge);
+void daemon_bridge_report_damage(struct daemon_bridge *bridge);
 
 #endif

@@ -135,7 +135,7 @@ static void daemon_stream_announce(struct daemon_stream *stream, const struct da
     snprintf(line, sizeof line, "%s %s (gateware %u, wire %u) at %s streams into ring %s", bridge->name, about->serial,
              identity->gateware, identity->wire_version, about->path, stream->options->ring);
     stream->stats.reported.reconnects += back;
-    daemon_stream_tell(stream);
+    daemon_stream_report(stream);
     daemon_log(LOG_DETAIL, "%s", line);
     daemon_notify_ready(line);
     if (back) {
@@ -164,7 +164,7 @@ static void daemon_stream_lose(struct daemon_stream *stream, int i, int error)
     daemon_bridge_lose(&stream->bridge[i], &stream->stats, error);
     whisker_pair_run(&stream->pair, i, false);
     daemon_stream_publish_pairs(stream);
-    daemon_stream_tell(stream);
+    daemon_stream_report(stream);
     daemon_notify_ready("the bridge has gone; waiting for it");
 }
 
@@ -205,9 +205,9 @@ int daemon_stream_receive(struct daemon_stream *stream)
     return last;
 }
 
-static void daemon_stream_tell_pair(struct daemon_stream *stream)
+static void daemon_stream_report_pair(struct daemon_stream *stream)
 {
-    const struct whisker_pair_counts *now = &stream->pair.counts, *reported = &stream->pair_told;
+    const struct whisker_pair_counts *now = &stream->pair.counts, *reported = &stream->pair_reported;
     if (now->realigned != reported->realigned) {
         daemon_log(LOG_NOTE, "second bridge: its tick 0 is tick %lld of the first", (long long)stream->pair.offset);
     }
@@ -216,7 +216,7 @@ static void daemon_stream_tell_pair(struct daemon_stream *stream)
                    "second bridge: out of step: its ticks come more than 125 us beside the first one's, or the "
                    "two are on two host controllers; wire its tick_in to the first one's tick_out, use one hub");
     }
-    stream->pair_told = *now;
+    stream->pair_reported = *now;
 }
 
 static void daemon_stream_log_stats(const struct daemon_stream *stream)
@@ -233,7 +233,7 @@ static void daemon_stream_log_stats(const struct daemon_stream *stream)
     }
 }
 
-void daemon_stream_tell(struct daemon_stream *stream)
+void daemon_stream_report(struct daemon_stream *stream)
 {
     struct whisker_clock clock;
     daemon_stats_settle_begin(&stream->stats);
@@ -246,10 +246,10 @@ void daemon_stream_tell(struct daemon_stream *stream)
     whisker_ring_set_stats(stream->ring, &stream->stats.reported);
 }
 
-static void daemon_stream_tell_bridges(struct daemon_stream *stream, bool ticks)
+static void daemon_stream_report_bridges(struct daemon_stream *stream, bool ticks)
 {
     for (int i = 0; i < stream->bridges; i++) {
-        daemon_bridge_tell_damage(&stream->bridge[i]);
+        daemon_bridge_report_damage(&stream->bridge[i]);
         if (ticks) {
             daemon_bridge_look_at_ticks(&stream->bridge[i], i == 0 ? &stream->clock : NULL);
         }
@@ -260,7 +260,7 @@ static void daemon_stream_answer_requests(struct daemon_stream *stream)
 {
     if (report_wanted) {
         report_wanted = 0;
-        daemon_stream_tell(stream);
+        daemon_stream_report(stream);
         daemon_stream_log_stats(stream);
     }
     for (int i = 0; nodes_wanted && i < stream->bridges; i++) {
@@ -274,14 +274,14 @@ static void daemon_stream_answer_requests(struct daemon_stream *stream)
 void daemon_stream_keep_house(struct daemon_stream *stream)
 {
     daemon_notify_alive();
-    const int64_t left_ms = stream->tell_at_ms - cli_now_ms();
+    const int64_t left_ms = stream->report_at_ms - cli_now_ms();
     const bool due = left_ms <= 0 || left_ms > TELL_MS; /* more: the clock went back */
     if (due) {
-        stream->tell_at_ms = cli_now_ms() + TELL_MS;
-        daemon_stream_tell(stream);
-        daemon_stream_tell_pair(stream);
+        stream->report_at_ms = cli_now_ms() + TELL_MS;
+        daemon_stream_report(stream);
+        daemon_stream_report_pair(stream);
     }
-    daemon_stream_tell_bridges(stream, due);
+    daemon_stream_report_bridges(stream, due);
     daemon_stream_answer_requests(stream);
 }
 
@@ -327,10 +327,10 @@ bool daemon_stream_end(struct daemon_stream *stream)
         whisker_device_close(bridge->device);
         bridge->device = NULL;
         whisker_decoder_end(&bridge->source.decoder);
-        daemon_bridge_tell_damage(bridge);
-        whole &= !bridge->damage_told;
+        daemon_bridge_report_damage(bridge);
+        whole &= !bridge->damage_reported;
     }
-    daemon_stream_tell(stream);
+    daemon_stream_report(stream);
     if (stream->stats.reported.connected_ns != 0) {
         daemon_stream_log_stats(stream);
     }

@@ -24,10 +24,10 @@ struct daemon_stream {
     struct daemon_inlet inlet[DAEMON_BRIDGES];
     int bridges; /* of them in use */
     struct whisker_pair pair;
-    struct whisker_pair_counts pair_told; /* what of it is in the log */
+    struct whisker_pair_counts pair_reported; /* what of it is in the log */
     struct whisker_clock_fit clock;
     struct daemon_stats stats;
-    int64_t tell_at_ms;
+    int64_t report_at_ms;
 };
 
 /* From now on SIGUSR1 and SIGUSR2 are requests for the log: statistics, and the nodes. */
@@ -53,7 +53,7 @@ int daemon_stream_drain(struct daemon_stream *stream);
 void daemon_stream_keep_house(struct daemon_stream *stream);
 
 /* Clock mapping and statistics into the ring. */
-void daemon_stream_tell(struct daemon_stream *stream);
+void daemon_stream_report(struct daemon_stream *stream);
 
 /* Closes the bridges; tells readers and log the last of it. Returns false if a bridge sent malformed frames. */
 bool daemon_stream_end(struct daemon_stream *stream);

@@ -87,7 +87,7 @@ static void command_nearest_steps(double left, double right, long most, long *be
 }
 
 /* Steps in whole mm/s, rounded away from 0: both a base that rounds and one that cuts off drive this step then. */
-static int command_told(double speed_m_s)
+static int command_reported(double speed_m_s)
 {
     const double mm_s = speed_m_s * 1e3;
     return (int)copysign(ceil(fabs(mm_s) - 1e-9), mm_s);
@@ -108,6 +108,6 @@ struct create_speeds create_choose_speeds(enum create_model model, double wheel_
                           &right_steps);
     left = (double)left_steps * step;
     right = (double)right_steps * step;
-    return (struct create_speeds){command_told(left), command_told(right), (left + right) / 2,
+    return (struct create_speeds){command_reported(left), command_reported(right), (left + right) / 2,
                                   (right - left) / wheel_base_m};
 }

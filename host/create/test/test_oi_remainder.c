@@ -29,7 +29,7 @@ static void auto_sees_the_whisk_before_it_knows_the_firmware(void **state)
     }
 }
 
-static void a_straight_drive_tells_that_remainders_are_kept(void **state)
+static void a_straight_drive_reports_that_remainders_are_kept(void **state)
 {
     (void)state;
     struct base base = base_begin(CREATE_1, CREATE_AUTO, true);
@@ -41,7 +41,7 @@ static void a_straight_drive_tells_that_remainders_are_kept(void **state)
     assert_close(base.motion.theta, 3 * WHISK_RAD_S, DEGREE);
 }
 
-static void a_straight_drive_tells_that_remainders_are_dropped(void **state)
+static void a_straight_drive_reports_that_remainders_are_dropped(void **state)
 {
     (void)state;
     struct base base = base_begin(CREATE_1, CREATE_AUTO, false);
@@ -56,7 +56,7 @@ static void a_straight_drive_tells_that_remainders_are_dropped(void **state)
 }
 
 /* 7.5 and 3.6 mm per frame: too near whole units to tell; backwards it works as well. */
-static void only_a_speed_that_tells_them_apart_is_evidence(void **state)
+static void only_a_speed_that_separates_them_is_evidence(void **state)
 {
     (void)state;
     struct base base = base_begin(CREATE_1, CREATE_AUTO, false);
@@ -71,7 +71,7 @@ static void only_a_speed_that_tells_them_apart_is_evidence(void **state)
 }
 
 /* Zeros are what a body tells that stands: only whole units in a turn are evidence, and these against dropping. */
-static void slow_turns_tell_that_remainders_are_kept_and_never_that_they_are_dropped(void **state)
+static void slow_turns_report_that_remainders_are_kept_and_never_that_they_are_dropped(void **state)
 {
     (void)state;
     struct base base = base_begin(CREATE_1, CREATE_AUTO, true);
@@ -114,10 +114,10 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_reported_whisk_is_no_turn_where_remainders_are_dropped),
         cmocka_unit_test(auto_sees_the_whisk_before_it_knows_the_firmware),
-        cmocka_unit_test(a_straight_drive_tells_that_remainders_are_kept),
-        cmocka_unit_test(a_straight_drive_tells_that_remainders_are_dropped),
-        cmocka_unit_test(only_a_speed_that_tells_them_apart_is_evidence),
-        cmocka_unit_test(slow_turns_tell_that_remainders_are_kept_and_never_that_they_are_dropped),
+        cmocka_unit_test(a_straight_drive_reports_that_remainders_are_kept),
+        cmocka_unit_test(a_straight_drive_reports_that_remainders_are_dropped),
+        cmocka_unit_test(only_a_speed_that_separates_them_is_evidence),
+        cmocka_unit_test(slow_turns_report_that_remainders_are_kept_and_never_that_they_are_dropped),
         cmocka_unit_test(evidence_outlasts_interruptions),
         cmocka_unit_test(stray_numbers_are_not_believed),
     };

@@ -44,7 +44,7 @@ static void a_body_that_is_held_back_is_believed_rather_than_its_orders(void **s
 }
 
 /* Encoders count, whatever the packets 19 and 20 of an old firmware tell: here nothing. */
-static void encoders_tell_that_a_body_stands(void **state)
+static void encoders_report_that_a_body_stands(void **state)
 {
     (void)state;
     struct base base = base_begin(CREATE_2, CREATE_AUTO, true);
@@ -69,7 +69,7 @@ int main(void)
         cmocka_unit_test(before_a_wall_nothing_is_integrated_nor_learnt),
         cmocka_unit_test(a_held_turn_is_noticed_where_remainders_are_kept),
         cmocka_unit_test(a_body_that_is_held_back_is_believed_rather_than_its_orders),
-        cmocka_unit_test(encoders_tell_that_a_body_stands),
+        cmocka_unit_test(encoders_report_that_a_body_stands),
     };
     return cmocka_run_group_tests_name("standing", tests, NULL, NULL);
 }

@@ -179,7 +179,7 @@ static void a_stream_begun_in_the_middle_is_no_fault(void **state)
     assert_adds_up(&feed->stream);
 }
 
-static void missed_frames_are_told(void **state)
+static void missed_frames_are_reported(void **state)
 {
     (void)state;
     uint8_t bytes[FRAMES * 64];
@@ -243,7 +243,7 @@ int main(void)
         cmocka_unit_test(what_cannot_be_asked_for_is_refused),
         cmocka_unit_test(frames_nobody_asked_for_are_corrupt),
         cmocka_unit_test(a_stream_begun_in_the_middle_is_no_fault),
-        cmocka_unit_test(missed_frames_are_told),
+        cmocka_unit_test(missed_frames_are_reported),
         cmocka_unit_test(exactly_the_damaged_frame_is_lost),
     };
     return cmocka_run_group_tests_name("stream", tests, NULL, NULL);

@@ -82,7 +82,7 @@ static int discovery_try_open(libusb_device *found, const char *serial, libusb_d
 }
 
 /* What a person must know first: a bridge that refuses says more than another one that is not the one wanted. */
-static int discovery_more_telling(int before, int now)
+static int discovery_more_reporting(int before, int now)
 {
     return before == WHISKER_ERROR_DEVICE_MISSING || before == WHISKER_ERROR_DEVICE_SERIAL ? now : before;
 }
@@ -99,7 +99,7 @@ int discovery_open(libusb_context *usb, const char *serial, libusb_device_handle
     int error = WHISKER_ERROR_DEVICE_MISSING;
     for (ssize_t i = 0; i < count && !*handle; i++) {
         if (usb_is_bridge(all[i])) {
-            error = discovery_more_telling(error, discovery_try_open(all[i], serial, handle, about));
+            error = discovery_more_reporting(error, discovery_try_open(all[i], serial, handle, about));
         }
     }
     libusb_free_device_list(all, 1);

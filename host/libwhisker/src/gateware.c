@@ -205,7 +205,7 @@ static void gateware_wanted_sector(const struct writing *w, uint32_t address, ui
     memcpy(wanted, w->image->body + address, left < SECTOR ? left : SECTOR);
 }
 
-static void gateware_tell(struct writing *w, uint32_t address)
+static void gateware_report(struct writing *w, uint32_t address)
 {
     const uint32_t left = w->image->length - address;
     w->done += left < SECTOR ? left : SECTOR;
@@ -262,7 +262,7 @@ static int gateware_write_sector(struct writing *w, uint32_t address)
     const int has = gateware_has_sector(w, address, wanted);
     const int error = has == 0 ? gateware_rewrite(w, address, wanted) : has < 0 ? has : WHISKER_OK;
     if (!error) {
-        gateware_tell(w, address);
+        gateware_report(w, address);
     }
     return error;
 }

@@ -173,7 +173,7 @@ static void arrivals_are_reported_by_event_and_by_looking(void **state)
 }
 
 /* Unplugged between opening and starting: not "refused", which is what hidapi makes of it. */
-static void a_bridge_gone_before_its_start_is_told_so(void **state)
+static void a_bridge_gone_before_its_start_is_reported_so(void **state)
 {
     (void)state;
     struct whisker_counters counters;
@@ -362,7 +362,7 @@ static void tick_in_is_judged_by_what_has_changed(void **state)
     assert_int_equal(whisker_timing_judge(&begun, &begun), 0); /* no two periods have passed */
 }
 
-static void refused_settings_are_told(void **state)
+static void refused_settings_are_reported(void **state)
 {
     (void)state;
     struct whisker_settings settings;
@@ -479,14 +479,14 @@ int main(void)
         WITH_BRIDGE(bridges_are_listed_also_without_permission),
         WITH_BRIDGE(hidapi_ends_with_its_last_handle),
         WITH_BRIDGE(arrivals_are_reported_by_event_and_by_looking),
-        WITH_BRIDGE(a_bridge_gone_before_its_start_is_told_so),
+        WITH_BRIDGE(a_bridge_gone_before_its_start_is_reported_so),
         WITH_BRIDGE(the_batch_divides_what_is_queued),
         WITH_BRIDGE(who_throws_frames_away_queues_few_and_takes_few),
         WITH_BRIDGE(start_queues_transfers_and_sends_the_settings),
         WITH_BRIDGE(a_bridge_left_running_is_stopped_and_emptied_first),
         WITH_BRIDGE(bytes_come_in_order_and_transfers_are_queued_again),
         WITH_BRIDGE(flush_delivers_what_a_transfer_already_held),
-        WITH_BRIDGE(refused_settings_are_told),
+        WITH_BRIDGE(refused_settings_are_reported),
         WITH_BRIDGE(unplugging_and_failing_end_the_stream),
         WITH_BRIDGE(counters_are_read_and_go_on_where_the_bridge_wraps),
         WITH_BRIDGE(the_identity_names_board_and_build),

@@ -86,7 +86,7 @@ static void good_frame_has_its_fields(void **state)
     assert_int_equal(frame.lane[6].status, WHISKER_CODE_LANE_OFF << WHISKER_STATUS_CODE_SHIFT);
 }
 
-static void last_and_dropped_are_told(void **state)
+static void last_and_dropped_are_reported(void **state)
 {
     (void)state;
     struct whisker_frame frame;
@@ -183,7 +183,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_vector_has_its_outcome),
         cmocka_unit_test(good_frame_has_its_fields),
-        cmocka_unit_test(last_and_dropped_are_told),
+        cmocka_unit_test(last_and_dropped_are_reported),
         cmocka_unit_test(every_record_vector_is_kept_or_flagged),
         cmocka_unit_test(any_flipped_bit_is_noticed),
         cmocka_unit_test(crc_table_agrees_with_the_protocol),

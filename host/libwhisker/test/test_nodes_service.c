@@ -107,7 +107,7 @@ static void the_first_answer_stands(void **state)
                      WHISKER_CODE_ANSWER << WHISKER_STATUS_CODE_SHIFT | WHISKER_SERVICE_COMMAND_INFO);
 }
 
-static void ticks_that_do_not_run_are_told(void **state)
+static void ticks_that_do_not_run_are_reported(void **state)
 {
     (void)state;
     fake_nodes_reset(1);
@@ -131,7 +131,7 @@ static void errors_of_the_channel_are_passed_on(void **state)
     assert_int_equal(ask_chip(1, 20), WHISKER_ERROR_DEVICE_CONTROL);
 }
 
-static void nodes_tell_who_they_are(void **state)
+static void nodes_report_who_they_are(void **state)
 {
     (void)state;
     struct whisker_node nodes[WHISKER_FRAME_LANES];
@@ -164,7 +164,7 @@ static void empty_lanes_are_waited_for_once(void **state)
     assert_int_equal(fakes.orders, first + 3 * 2);
 }
 
-static void a_node_that_goes_silent_while_it_tells_is_not_present(void **state)
+static void a_node_that_goes_silent_while_it_reports_is_not_present(void **state)
 {
     (void)state;
     struct whisker_node nodes[WHISKER_FRAME_LANES];
@@ -204,11 +204,11 @@ int main(void)
         cmocka_unit_test(lanes_that_are_not_asked_for_are_not_waited_for),
         cmocka_unit_test(an_answer_to_another_order_is_none),
         cmocka_unit_test(the_first_answer_stands),
-        cmocka_unit_test(ticks_that_do_not_run_are_told),
+        cmocka_unit_test(ticks_that_do_not_run_are_reported),
         cmocka_unit_test(errors_of_the_channel_are_passed_on),
-        cmocka_unit_test(nodes_tell_who_they_are),
+        cmocka_unit_test(nodes_report_who_they_are),
         cmocka_unit_test(empty_lanes_are_waited_for_once),
-        cmocka_unit_test(a_node_that_goes_silent_while_it_tells_is_not_present),
+        cmocka_unit_test(a_node_that_goes_silent_while_it_reports_is_not_present),
         cmocka_unit_test(counters_are_those_asked_for),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

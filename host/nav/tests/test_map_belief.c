@@ -56,7 +56,7 @@ static void a_tile_that_keeps_saying_otherwise_is_believed(void **state)
     nav_likelihood_free(l);
 }
 
-static void a_tile_found_as_told_is_harder_to_change(void **state)
+static void a_tile_found_as_reported_is_harder_to_change(void **state)
 {
     (void)state;
     struct nav_likelihood *l = reported();
@@ -179,7 +179,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_tile_that_keeps_saying_otherwise_is_believed),
-        cmocka_unit_test(a_tile_found_as_told_is_harder_to_change),
+        cmocka_unit_test(a_tile_found_as_reported_is_harder_to_change),
         cmocka_unit_test(a_box_where_nothing_is_felt_is_gone),
         cmocka_unit_test(a_box_that_is_felt_stays),
         cmocka_unit_test(contacts_with_what_the_map_lacks_are_expected_at_last),

@@ -16,7 +16,7 @@ static void noise_does_not_depend_on_how_rows_cut_a_drive(void **state)
 }
 
 /* Drives and turns; the wheels report `reported` times the truth; the filter sees the truth within `spread`. */
-static struct nav_calibration drive(double reported, double told_turn, double spread, double confidence, int rows)
+static struct nav_calibration drive(double reported, double reported_turn, double spread, double confidence, int rows)
 {
     struct nav_calibration c;
     struct nav_rng rng;
@@ -25,7 +25,7 @@ static struct nav_calibration drive(double reported, double told_turn, double sp
     nav_rng_seed(&rng, 5, 0);
     for (int i = 0; i < rows; i++) {
         struct nav_pose step = i % 40 < 25 ? (struct nav_pose){0.02, 0.0, 0.0} : (struct nav_pose){0.0, 0.0, 0.1};
-        struct nav_motion motion = {.step = {step.x * reported, 0.0, step.theta * told_turn}};
+        struct nav_motion motion = {.step = {step.x * reported, 0.0, step.theta * reported_turn}};
         motion = nav_calibration_apply(&c, &motion);
         truth = nav_compose(truth, step);
         struct nav_estimate e = {.pose = truth, .confidence = confidence};

@@ -123,7 +123,7 @@ static void filters_learn_their_heading_from_it(void **state)
     }
 }
 
-static void a_robot_that_tells_none_is_as_it_was(void **state)
+static void a_robot_that_reports_none_is_as_it_was(void **state)
 {
     (void)state;
     struct nav_problem p = room();
@@ -140,7 +140,7 @@ int main(void)
         cmocka_unit_test(a_direction_is_a_wrapped_gaussian_on_a_floor_of_outliers),
         cmocka_unit_test(bad_directions_are_counted_and_not_read),
         cmocka_unit_test(filters_learn_their_heading_from_it),
-        cmocka_unit_test(a_robot_that_tells_none_is_as_it_was),
+        cmocka_unit_test(a_robot_that_reports_none_is_as_it_was),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -85,7 +85,7 @@ NOISE = np.random.default_rng(1).normal(0.0, 5.0, (10 * LENGTH, CHANNELS))
 COMPONENTS = np.zeros(2, COMPONENT)
 COMPONENTS["pose"], COMPONENTS["sigma_m"], COMPONENTS["sigma_rad"], COMPONENTS["mass"] = (0.5, 0.5, 0.0), 0.1, 0.1, 0.5
 PLAIN = TextureModel.train({"A": [NOISE], "B": [3.0 * NOISE]})
-WHISK = {"t_s": np.arange(64.0), "samples": NOISE[:64], "whisk_rad_s": np.ones(64), "told_rad_s": np.ones(64)}
+WHISK = {"t_s": np.arange(64.0), "samples": NOISE[:64], "whisk_rad_s": np.ones(64), "reported_rad_s": np.ones(64)}
 PUSH = {"bases": np.zeros((8, 3)), "tilts": np.zeros((8, 2)), "good": np.ones(8, bool)}
 BLOCK = {"ticks": np.arange(8), "samples": NOISE[:8], "good": np.ones(8, bool)}
 
@@ -125,7 +125,7 @@ CASES = {
     "touch.radial.shape.shape_of": Case(
         lambda **columns: shape_of(Whisk(**columns)),
         WHISK,
-        {"t_s": (0,), "samples": (0,), "whisk_rad_s": (0,), "told_rad_s": (0,)},
+        {"t_s": (0,), "samples": (0,), "whisk_rad_s": (0,), "reported_rad_s": (0,)},
     ),
     "touch.texture.novelty.Novelty.native": of_part(
         novelty(), Novelty.native, turn=(0, 1), mean=(1,), recording=(0, 1), noise=(0,), limit=(0,)

@@ -63,7 +63,7 @@ def test_faults_with_a_byte_order_mark_are_read(tmp_path):
     assert read_faults(tmp_path / "f.toml", 2000) == "usb 3 host_away\n"
 
 
-def test_a_key_of_two_lines_is_told_in_one(folder):
+def test_a_key_of_two_lines_is_reported_in_one(folder):
     (folder / "arena.toml").write_text('"a\\nb" = 1\n' + (folder / "arena.toml").read_text())
     with pytest.raises(SceneError) as error:
         load(folder)

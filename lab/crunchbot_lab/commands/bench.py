@@ -7,7 +7,7 @@ from crunchbot.arguments import add_action
 from crunchbot.errors import UserError
 from crunchbot.nav import localise
 from crunchbot.nav.estimates import read_estimates
-from crunchbot.nav.judging import NEAR_M, bits_told, bits_wanted, judge, starts_of, travel_of
+from crunchbot.nav.judging import NEAR_M, bits_reported, bits_wanted, judge, starts_of, travel_of
 from crunchbot.nav.scoring import position_errors
 from crunchbot.tables import TableError, unwritable
 
@@ -128,4 +128,4 @@ def course(wanted: benchmark.Entry, engines, near_m: float):
     scene, rows = wanted.scene, wanted.observations
     errors = {e.name: (e.rows, position_errors(e.poses, rows.truth[e.rows])) for e in engines}
     travel, (x, y) = travel_of(rows, starts_of(rows)), scene.arena.size_m
-    return Course(wanted.name, travel, x * y, near_m, bits_wanted(scene, near_m), bits_told(scene, rows), errors)
+    return Course(wanted.name, travel, x * y, near_m, bits_wanted(scene, near_m), bits_reported(scene, rows), errors)

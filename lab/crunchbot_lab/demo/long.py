@@ -75,7 +75,7 @@ def demonstrate(options: argparse.Namespace) -> dict:
     results |= travelled(out, scene)
     results["whisks"] = len(json.loads((out / "pilot.json").read_text())["whisks"])
     if chained:
-        results["contacts"] = contacts_told(out / "robot.mcap")
+        results["contacts"] = contacts_reported(out / "robot.mcap")
     results["wall_s"] = time.monotonic() - began
     write_summary(out, results)
     tell(results)
@@ -169,7 +169,7 @@ def travelled(out: Path, scene: scenes.Scene) -> dict:
     }
 
 
-def contacts_told(path: Path) -> int:
+def contacts_reported(path: Path) -> int:
     """Onsets in a bag."""
     with McapFile(path) as bag:
         reported = (m for m in bag.messages() if m.topic.endswith(CONTACT_TOPIC))

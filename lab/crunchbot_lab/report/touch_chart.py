@@ -21,7 +21,7 @@ class Course:
     area_m2: float
     near_m: float
     bits_wanted: float
-    bits_told: np.ndarray | None  # (n,)
+    bits_reported: np.ndarray | None  # (n,)
     errors_m: dict[str, tuple[np.ndarray, np.ndarray]]
 
 
@@ -49,8 +49,8 @@ def draw(course: Course) -> Figure:
     left.set(yscale="log", xlabel="way driven (cm)", ylabel="distance from the truth (cm)", title=course.title)
     right.axhline(course.bits_wanted, color="0.4", linewidth=0.8)
     right.annotate("wanted for a near row", (way_cm[-1], course.bits_wanted), ha="right", va="bottom", color="0.4")
-    if course.bits_told is not None:
-        right.plot(way_cm, course.bits_told, color="0.2", linewidth=2.4, label="from the floor, at most")
+    if course.bits_reported is not None:
+        right.plot(way_cm, course.bits_reported, color="0.2", linewidth=2.4, label="from the floor, at most")
     right.set(xlabel="way driven (cm)", ylabel="bits: arena's area over that of the error")
     right.set_ylim(-1.0, course.bits_wanted + 6.0)
     for axes in (left, right):

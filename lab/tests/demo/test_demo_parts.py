@@ -210,7 +210,7 @@ def test_a_killed_whiskerds_ring_is_removed(tmp_path):
     assert not left
 
 
-def test_a_failure_of_who_ends_last_is_told_too():
+def test_a_failure_of_who_ends_last_is_reported_too():
     """When all have ended before anybody looks."""
 
     def ended(failed):
@@ -275,7 +275,7 @@ def test_foreign_folder_is_never_removed(tmp_path):
     assert not (fresh_folder(mine) / "old.csv").exists()
 
 
-def test_how_whiskers_bend_is_told_to_the_world_and_is_no_part_of_the_folder(tmp_path):
+def test_how_whiskers_bend_is_reported_to_the_world_and_is_no_part_of_the_folder(tmp_path):
     scene, start = make_scene(5, "modes")
     assert {"mechanics modes", "batch 5"} <= set(scene.flat(start).splitlines())
     scenes.write(tmp_path, scene)

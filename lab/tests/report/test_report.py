@@ -125,7 +125,7 @@ def test_page_shows_the_summary_beside_the_paper(run_folder):
         assert text in page
 
 
-def test_page_tells_of_base_network_and_bag(run_folder):
+def test_page_reports_of_base_network_and_bag(run_folder):
     page = write_report(run_folder).read_text()
     for text in (
         "iRobot Create 1",

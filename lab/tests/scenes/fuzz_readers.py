@@ -104,14 +104,14 @@ def broken(path: Path, data: bytes, rng: np.random.Generator) -> bytes:
     return ways[rng.integers(len(ways))](data, rng)
 
 
-def tell_texture(path: Path) -> None:
+def report_texture(path: Path) -> None:
     found = texture.load(path)
     if found.channels == SAMPLES.shape[1]:
         for decision in texture.classify(found, np.arange(len(SAMPLES)) / 2000.0, SAMPLES):
             assert 0.0 <= decision.confidence <= 1.0
 
 
-def tell_radius(path: Path) -> None:
+def report_radius(path: Path) -> None:
     found = radial.load(path)
     contact = radial.Contact(np.arange(len(SAMPLES)) / 2000.0, SAMPLES)
     with contextlib.suppress(ValueError):  # a model of other channels
@@ -136,8 +136,8 @@ def seeds(folder: Path, made: Scene) -> list[tuple]:
     readers = {name: lambda _: load(folder) for name in ("arena.toml", "robot.toml", "prior.toml")}
     readers |= {"observations.csv": lambda path: read_observations(path, made)}
     readers |= {"faults.toml": lambda path: read_faults(path, 2000)}
-    readers |= {"texture.json": tell_texture, "plain.json": tell_texture}
-    readers |= {"radial.json": tell_radius, "curve.json": tell_radius}
+    readers |= {"texture.json": report_texture, "plain.json": report_texture}
+    readers |= {"radial.json": report_radius, "curve.json": report_radius}
     return [(folder / name, (folder / name).read_bytes(), read) for name, read in readers.items()]
 
 

@@ -79,7 +79,7 @@ def test_what_is_missing_is_one_line(capsys, words, reported):
     assert code == 2 and reported in error and error.count("\n") == 1
 
 
-def test_stored_figures_that_are_damaged_are_told(tmp_path):
+def test_stored_figures_that_are_damaged_are_reported(tmp_path):
     (tmp_path / "touch.json").write_text("{")
     with pytest.raises(benchmark.BenchmarkError, match="make it anew"):
         benchmark.stored(tmp_path / "touch.json")

@@ -153,8 +153,8 @@ def test_timing_of_contacts_agrees(signals, drawn):
         unread = np.mean([np.mean(np.isnan(t.radial_m)) for t in runs])
         return reported, np.array([held, windows, unread])
 
-    (reported, shares), (drawn_told, drawn_shares) = rates(signals), rates(drawn)
-    assert 1 / 1.5 < reported / drawn_told < 1.5
+    (reported, shares), (drawn_reported, drawn_shares) = rates(signals), rates(drawn)
+    assert 1 / 1.5 < reported / drawn_reported < 1.5
     assert shares == pytest.approx(drawn_shares, abs=0.08)
 
 

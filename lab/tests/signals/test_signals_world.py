@@ -71,7 +71,7 @@ def test_spreads_are_the_papers_by_object_whisker():
     assert all(world.spread(lane) == 0.0 for lane, name in enumerate(world.lanes) if "floor" in name)
 
 
-def test_catches_are_told():
+def test_catches_are_reported():
     rough = flat(start=(0.4, 1.25, 0.0)).replace(
         "texture_whisker left_floor", "mechanics modes\ntexture_whisker left_floor"
     )

@@ -92,7 +92,7 @@ std::pair<unsigned, unsigned> watched(BoardDevice &board)
 }
 
 // Changes in four slow blinks, and sixteenths of the time in which it is lit.
-void one_led_tells_all(void **)
+void one_led_reports_all(void **)
 {
     Trial trial(BOARDS[USB3300_BOARD], {});
     BoardDevice &board = with_phy(trial);
@@ -189,7 +189,7 @@ int main(int argc, char **argv)
     const CMUnitTest tests[] = {
         cmocka_unit_test(every_board_enumerates_and_runs),
         cmocka_unit_test(a_phy_whose_clock_hangs_is_reset),
-        cmocka_unit_test(one_led_tells_all),
+        cmocka_unit_test(one_led_reports_all),
         cmocka_unit_test(a_dropped_frame_lights_the_error_led),
         cmocka_unit_test(a_full_speed_board_has_no_other_speed),
         cmocka_unit_test(every_fault_is_noticed),

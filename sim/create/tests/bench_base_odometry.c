@@ -4,7 +4,7 @@
  *
  * MODEL 1 or 2; what is less than a unit at a reading is kept or dropped; POLICY as whisker-base's --odometry. Each
  * move lasts until AMOUNT (m, or rad where V is 0) have been ordered at the speeds that the base can do, on an open
- * floor, with the wheel errors of sim/world. Columns: seed, true_m, true_rad, told_m, told_rad, ordered_m_s,
+ * floor, with the wheel errors of sim/world. Columns: seed, true_m, true_rad, reported_m, reported_rad, ordered_m_s,
  * ordered_rad_s.
  */
 #include <math.h>
@@ -32,7 +32,7 @@ struct bench {
     sim_world *world;
     struct create_stream stream;
     struct create_odometry odometry;
-    double true_m, true_rad, told_m, told_rad;
+    double true_m, true_rad, reported_m, reported_rad;
     struct sim_pose pose;
 };
 
@@ -57,8 +57,8 @@ static void tick(struct bench *bench)
         for (size_t i = 0; i < count; i++)
             if (create_stream_push(&bench->stream, bytes[i], &frame)) {
                 const struct create_step step = create_odometry_take(&bench->odometry, &frame);
-                bench->told_m += step.distance;
-                bench->told_rad += step.angle;
+                bench->reported_m += step.distance;
+                bench->reported_rad += step.angle;
             }
 }
 
@@ -91,8 +91,8 @@ static void move(struct bench *bench, char **words, unsigned long seed)
     let_pass(bench, lround(TICKS_PER_S * fabs(atof(words[AMOUNT]) / speed)));
     order(bench, bytes, create_put_stop(bytes));
     let_pass(bench, REST_TICKS);
-    printf("%lu,%.6f,%.6f,%.6f,%.6f,%.6f,%.6f\n", seed, bench->true_m, bench->true_rad, bench->told_m, bench->told_rad,
-           speeds.v_m_s, speeds.omega_rad_s);
+    printf("%lu,%.6f,%.6f,%.6f,%.6f,%.6f,%.6f\n", seed, bench->true_m, bench->true_rad, bench->reported_m,
+           bench->reported_rad, speeds.v_m_s, speeds.omega_rad_s);
 }
 
 static int policy_of(const char *name)
@@ -139,7 +139,7 @@ int main(int argc, char **argv)
         return 2;
     }
     const unsigned long first = strtoul(argv[FIRST_SEED], NULL, 10), seeds = strtoul(argv[SEEDS], NULL, 10);
-    puts("seed,true_m,true_rad,told_m,told_rad,ordered_m_s,ordered_rad_s");
+    puts("seed,true_m,true_rad,reported_m,reported_rad,ordered_m_s,ordered_rad_s");
     for (unsigned long seed = first; seed < first + seeds; seed++)
         if (!measure(argv, seed, error, sizeof error)) {
             fprintf(stderr, "bench_base_odometry: %s\n", error);

@@ -208,7 +208,7 @@ static void a_slave_overflows_in_the_stall_once_its_channel_is_done(void **state
     assert_true(get(SPI2STAT) & SPISTAT_SPIROV);
 }
 
-static void the_chip_tells_its_id_and_its_number(void **state)
+static void the_chip_reports_its_id_and_its_number(void **state)
 {
     (void)state;
     struct dspic_parameters parameters = standard();
@@ -246,7 +246,7 @@ int main(void)
         TEST(disi_keeps_the_keys_together),
         TEST(interrupts_wait_out_the_stall_and_timers_do_not),
         TEST(a_slave_overflows_in_the_stall_once_its_channel_is_done),
-        TEST(the_chip_tells_its_id_and_its_number),
+        TEST(the_chip_reports_its_id_and_its_number),
         TEST(the_high_byte_of_a_word_reads_apart),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

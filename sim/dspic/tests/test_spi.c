@@ -37,7 +37,7 @@ static void the_line_is_sampled_on_the_falling_edge(void **state)
     assert_int_equal(get(SPI1BUF), 0xF8);
 }
 
-static void an_unread_word_overflows_and_reception_stops_until_told(void **state)
+static void an_unread_word_overflows_and_reception_stops_until_reported(void **state)
 {
     (void)state;
     master();
@@ -296,7 +296,7 @@ int main(void)
         TEST(reading_the_buffer_clears_its_full_flag),
         TEST(a_byte_takes_eight_clocks_at_the_divided_rate),
         TEST(the_line_is_sampled_on_the_falling_edge),
-        TEST(an_unread_word_overflows_and_reception_stops_until_told),
+        TEST(an_unread_word_overflows_and_reception_stops_until_reported),
         TEST(software_cannot_set_the_flags_of_the_status),
         TEST(a_disabled_module_ignores_writes),
         TEST(settings_of_an_enabled_module_stay),

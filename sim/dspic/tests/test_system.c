@@ -45,7 +45,7 @@ static void the_watchdog_resets_a_firmware_that_forgets_it(void **state)
     assert_int_equal(get(RCON), RCON_WDTO); /* and it is off again */
 }
 
-static void resets_tell_their_cause(void **state)
+static void resets_report_their_cause(void **state)
 {
     (void)state;
     assert_int_equal(get(RCON), RCON_POR | RCON_BOR);
@@ -286,7 +286,7 @@ int main(void)
         TEST(the_clock_switches_only_behind_its_keys),
         TEST(more_than_40_mips_is_noticed),
         TEST(the_watchdog_resets_a_firmware_that_forgets_it),
-        TEST(resets_tell_their_cause),
+        TEST(resets_report_their_cause),
         TEST(a_reset_ends_the_interrupt_it_is_called_from),
         TEST(a_pause_between_the_keys_voids_them),
         TEST(the_keys_of_one_half_do_not_open_the_other),

@@ -102,7 +102,7 @@ static void each_error_bit_comes_through_in_a_sound_frame(void **state)
     }
 }
 
-static void two_bits_flip_where_told(void **state)
+static void two_bits_flip_where_reported(void **state)
 {
     (void)state;
     struct bench bench;
@@ -130,7 +130,7 @@ static unsigned flipped(enum sim_sensor_fault fault, unsigned argument)
     return count;
 }
 
-static void noise_flips_bits_as_often_as_told(void **state)
+static void noise_flips_bits_as_often_as_reported(void **state)
 {
     (void)state;
     assert_int_equal(flipped(SIM_SENSOR_NOISY, 0), 0);
@@ -201,8 +201,8 @@ int main(void)
         cmocka_unit_test(a_lost_clock_is_lost_once),
         cmocka_unit_test(a_frozen_sensor_sends_sound_frames_of_the_past),
         cmocka_unit_test(each_error_bit_comes_through_in_a_sound_frame),
-        cmocka_unit_test(two_bits_flip_where_told),
-        cmocka_unit_test(noise_flips_bits_as_often_as_told),
+        cmocka_unit_test(two_bits_flip_where_reported),
+        cmocka_unit_test(noise_flips_bits_as_often_as_reported),
         cmocka_unit_test(a_floating_line_follows_nobody),
         cmocka_unit_test(an_extra_clock_slips_the_frame_by_a_bit_once),
         cmocka_unit_test(a_sensor_without_supply_lets_the_line_go_and_starts_anew),

@@ -203,7 +203,7 @@ static double deviation(const struct mlx90333_parameters *p)
     return sqrt(squares / 4000 - sum / 4000 * (sum / 4000));
 }
 
-static void noise_is_as_large_as_told_and_seeded(void **state)
+static void noise_is_as_large_as_reported_and_seeded(void **state)
 {
     (void)state;
     struct mlx90333_parameters p = standard();
@@ -324,7 +324,7 @@ int main(void)
         cmocka_unit_test(the_resolution_rounds_to_its_steps),
         cmocka_unit_test(each_kappa_weighs_its_own_component),
         cmocka_unit_test(a_wrong_kappa_shows_in_the_frame),
-        cmocka_unit_test(noise_is_as_large_as_told_and_seeded),
+        cmocka_unit_test(noise_is_as_large_as_reported_and_seeded),
         cmocka_unit_test(without_conversions_of_its_own_a_reading_is_as_at_the_latch),
         cmocka_unit_test(the_conversion_period_bounds_the_age),
         cmocka_unit_test(the_phase_of_the_conversions_differs_from_part_to_part),

@@ -23,7 +23,7 @@ static bool block_sigterm(sigset_t *set)
     return sigprocmask(SIG_BLOCK, set, NULL) == 0;
 }
 
-static bool told_to_stop(void)
+static bool reported_to_stop(void)
 {
     sigset_t waiting;
     return sigpending(&waiting) == 0 && sigismember(&waiting, SIGTERM) == 1;
@@ -68,7 +68,7 @@ static int stream(libusb_device_handle *device, FILE *file, int size, unsigned t
             frame[total++ % sizeof frame] = buffer[i];
             last = total % sizeof frame == 0 && last_seen(frame);
         }
-        if (!stopped && told_to_stop()) {
+        if (!stopped && reported_to_stop()) {
             stopped = send_report(device, WHISKER_WIRE_VERSION, 0) > 0;
         }
     }

@@ -160,7 +160,7 @@ def test_orders_take_effect_at_their_tick(tmp_path):
     assert sum(signed(frame[8:10]) for frame in reported) == pytest.approx(degrees, rel=ODOMETRY_ERROR, abs=2)
 
 
-def test_a_wall_is_told(tmp_path):
+def test_a_wall_is_reported(tmp_path):
     orders = {39: OPENING + drive_direct(500, 500)}
     robot = drive(tmp_path / "run", 1.8, 8, orders=orders)
     reported = frames(robot["bytes"])

@@ -36,7 +36,7 @@ bool UlpiPhy::transmitting() const
 
 // --------------------------------------------------------------------------------------------------- what the PHY says
 
-void UlpiPhy::tell_status(bool active)
+void UlpiPhy::report_status(bool active)
 {
     queue_.push_back({false, static_cast<uint8_t>(line_ | VBUS_VALID | (active ? RX_ACTIVE : 0))});
 }
@@ -57,7 +57,7 @@ void UlpiPhy::hear_bus(const UtmiToDevice &in)
     line_ = line;
     active_ = active;
     if (changed) {
-        tell_status(active_);
+        report_status(active_);
     }
     if (in.rx_valid && active) {
         queue_.push_back({true, in.rx_data});
@@ -95,7 +95,7 @@ PhyPins UlpiPhy::speak(const UtmiToDevice &in)
     if (busy_ > 0) {
         queue_.clear();
         if (--busy_ == 0) {
-            tell_status(active_);
+            report_status(active_);
         }
         return pins_ = {true, false, 0};
     }

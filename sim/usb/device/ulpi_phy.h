@@ -55,7 +55,7 @@ class UlpiPhy
     };
 
     void hear_bus(const UtmiToDevice &in);
-    void tell_status(bool active);
+    void report_status(bool active);
     PhyPins turn_around();
     PhyPins leave_bus(bool tx_ready);
     PhyPins say();

@@ -192,7 +192,7 @@ void babble_is_an_error(void **)
     assert_true(f.in() == Outcome::BABBLE);
 }
 
-void nak_and_stall_are_told_apart(void **)
+void nak_and_stall_are_reported_apart(void **)
 {
     Fixture f;
     f.device.script = {{PID_NAK}, {PID_STALL}};
@@ -266,7 +266,7 @@ int main()
         cmocka_unit_test(unsound_pid_is_an_error),
         cmocka_unit_test(silence_times_out),
         cmocka_unit_test(babble_is_an_error),
-        cmocka_unit_test(nak_and_stall_are_told_apart),
+        cmocka_unit_test(nak_and_stall_are_reported_apart),
         cmocka_unit_test(out_toggles_only_when_acknowledged),
         cmocka_unit_test(lost_ack_makes_the_copy_expected),
         cmocka_unit_test(an_answer_to_a_damaged_token_is_a_violation),

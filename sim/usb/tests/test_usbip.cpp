@@ -174,7 +174,7 @@ void transfers_go_there_and_back(void **)
     assert_true(client.receive(HEADER + 3) == due);
 }
 
-void errors_are_told(void **)
+void errors_are_reported(void **)
 {
     Attached attached;
     auto &[server, client] = attached;
@@ -271,7 +271,7 @@ int main()
         cmocka_unit_test(list_shows_the_device),
         cmocka_unit_test(unplugged_it_is_not_listed_nor_imported),
         cmocka_unit_test(transfers_go_there_and_back),
-        cmocka_unit_test(errors_are_told),
+        cmocka_unit_test(errors_are_reported),
         cmocka_unit_test(unlink_ends_a_transfer),
         cmocka_unit_test(unlinked_data_is_not_lost),
         cmocka_unit_test(one_client_has_it),

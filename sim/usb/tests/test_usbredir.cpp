@@ -194,7 +194,7 @@ void a_control_transfer_goes_there_and_back(void **)
     assert_true(test.guest.id == 11 && test.guest.status == usb_redir_success && test.guest.data == Bytes(18, 5));
 }
 
-void a_stall_is_told(void **)
+void a_stall_is_reported(void **)
 {
     Plugged test;
     usb_redir_control_packet_header header{0, 9, 0x21, 0, 0x0301, 1, 3};
@@ -327,7 +327,7 @@ int main()
         cmocka_unit_test(the_device_is_announced),
         cmocka_unit_test(it_is_announced_when_it_is_plugged),
         cmocka_unit_test(a_control_transfer_goes_there_and_back),
-        cmocka_unit_test(a_stall_is_told),
+        cmocka_unit_test(a_stall_is_reported),
         cmocka_unit_test(long_bulk_transfers_have_long_lengths),
         cmocka_unit_test(a_cancelled_transfer_is_answered_so),
         cmocka_unit_test(settings_have_answers_of_their_own),

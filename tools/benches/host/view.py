@@ -74,7 +74,7 @@ def write_ring(name: str, over) -> None:
             time.sleep(max(0.0, began + done / HZ - time.monotonic()))
 
 
-def tell_robot(endpoint: str, over) -> None:
+def report_robot(endpoint: str, over) -> None:
     """Send what pilot, navigator and simulation would, at their pace, until the parent ends it."""
     rng = np.random.default_rng(1)
     with Link("bench", listen=[endpoint]) as link:
@@ -180,7 +180,7 @@ def measure(part: str, pages: int) -> dict:
     command = [sys.executable, "-m", "crunchbot.view", "--ring", ring, "--port", "0"]
     target, place = write_ring, ring
     if part == "robot":
-        target, place = tell_robot, free_endpoint()
+        target, place = report_robot, free_endpoint()
         command += ["--robot", "--connect", place]
     writer = multiprocessing.Process(target=target, args=(place, over))
     writer.start()

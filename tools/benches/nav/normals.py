@@ -88,11 +88,11 @@ def flown(build: Path, seed: int) -> dict:
     errors = [off for n in range(read.shape[1]) for off in off_truth(scene, reported, n)]
     anywhere = replace(scene, prior=Prior("uniform"))
     sharp = replace(anywhere, robot=replace(scene.robot, radial_sigma_m=POINT_M))
-    points, rows_told = np.isfinite(reported.point[..., 0]), with_points(scene, reported)
-    alone = np.isfinite(rows_told.radial_m) & ~np.isfinite(reported.radial_m)
+    points, rows_reported = np.isfinite(reported.point[..., 0]), with_points(scene, reported)
+    alone = np.isfinite(rows_reported.radial_m) & ~np.isfinite(reported.radial_m)
     made = both(anywhere, reported) | {"read": int(read.sum()), "normals": errors}
     made |= {"points": int(points.sum()), "points_alone": int(alone.sum())}
-    return made | {"sharp": {name: [figures(name, sharp, rows_told), made[name][0]] for name in FILTERS}}
+    return made | {"sharp": {name: [figures(name, sharp, rows_reported), made[name][0]] for name in FILTERS}}
 
 
 def with_points(scene: Scene, reported: Observations) -> Observations:

@@ -111,4 +111,4 @@ def spoilt(contact: Contact, how: str, rng: np.random.Generator, other: Contact)
         x[rng.random(len(x)) < 0.2] = np.nan
     elif how == "all NaN":
         x[:] = np.nan
-    return Contact(contact.t_s, x, contact.whisk_rad_s, contact.told_rad_s)
+    return Contact(contact.t_s, x, contact.whisk_rad_s, contact.reported_rad_s)

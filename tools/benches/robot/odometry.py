@@ -47,7 +47,7 @@ def _move(program: Path, case: tuple[str, str, str], v_m_s: float, omega_rad_s: 
     text = subprocess.run(list(map(str, words)), check=True, capture_output=True, text=True).stdout
     rows = list(csv.DictReader(io.StringIO(text)))
     kind, speed = ("m", "ordered_m_s") if v_m_s else ("rad", "ordered_rad_s")
-    error = np.array([float(row[f"told_{kind}"]) / float(row[f"true_{kind}"]) - 1.0 for row in rows])
+    error = np.array([float(row[f"reported_{kind}"]) / float(row[f"true_{kind}"]) - 1.0 for row in rows])
     return {
         "asked": v_m_s or omega_rad_s,
         "ordered": float(rows[0][speed]),

@@ -185,7 +185,7 @@ static void a_bridge_that_starts_again_begins_a_new_fit(void **state)
     assert_true(get().uncertainty_ns > 1e6);
 }
 
-static void a_monotonic_clock_that_goes_back_is_told_and_survived(void **state)
+static void a_monotonic_clock_that_goes_back_is_reported_and_survived(void **state)
 {
     (void)state;
     uint64_t i = 1;
@@ -195,7 +195,7 @@ static void a_monotonic_clock_that_goes_back_is_told_and_survived(void **state)
     assert_int_equal(get().monotonic_ns, 1008000000 - TRACE_LATENCY_NS);
 }
 
-static void a_realtime_clock_that_is_set_is_told_and_followed(void **state)
+static void a_realtime_clock_that_is_set_is_reported_and_followed(void **state)
 {
     (void)state;
     const int64_t hour_ns = INT64_C(3600000000000);
@@ -312,8 +312,8 @@ int main(void)
         cmocka_unit_test_setup(a_bus_that_falls_silent_begins_a_new_fit, begin),
         cmocka_unit_test_setup(a_bus_whose_time_stood_still_begins_a_new_fit, begin),
         cmocka_unit_test_setup(a_bridge_that_starts_again_begins_a_new_fit, begin),
-        cmocka_unit_test_setup(a_monotonic_clock_that_goes_back_is_told_and_survived, begin),
-        cmocka_unit_test_setup(a_realtime_clock_that_is_set_is_told_and_followed, begin),
+        cmocka_unit_test_setup(a_monotonic_clock_that_goes_back_is_reported_and_survived, begin),
+        cmocka_unit_test_setup(a_realtime_clock_that_is_set_is_reported_and_followed, begin),
         cmocka_unit_test_setup(clocks_that_jump_apart_begin_a_new_fit, begin),
         cmocka_unit_test_setup(a_long_stall_moves_nothing, begin),
         cmocka_unit_test_setup(the_line_lies_closest_below_all_points, begin),

@@ -64,7 +64,7 @@ static void batch_across_the_wrap_arrives_whole(void **state)
     assert_int_equal(whisker_ring_publish(f->ring, batch, TEST_CAPACITY / 4 + 1), WHISKER_ERROR_ARGUMENT);
 }
 
-static void overtaken_reader_is_told_and_goes_on(void **state)
+static void overtaken_reader_is_reported_and_goes_on(void **state)
 {
     const struct test_ring_pair *f = *state;
     test_publish(f->ring, 0, TEST_CAPACITY + 1);
@@ -81,7 +81,7 @@ static void overtaken_reader_is_told_and_goes_on(void **state)
     assert_int_equal(info.frames_missing, 0); /* they were in the ring: the reader was late */
 }
 
-static void reader_overtaken_while_it_reads_is_told(void **state)
+static void reader_overtaken_while_it_reads_is_reported(void **state)
 {
     const struct test_ring_pair *f = *state;
     test_publish(f->ring, 0, 8);
@@ -261,7 +261,7 @@ static void bytes_are_decoded_straight_into_the_ring(void **state)
     assert_int_equal(whisker_ring_feed(f->ring, &decoder, much, sizeof much, NULL, NULL), WHISKER_ERROR_ARGUMENT);
 }
 
-static void clock_and_statistics_are_told(void **state)
+static void clock_and_statistics_are_reported(void **state)
 {
     const struct test_ring_pair *f = *state;
     struct whisker_clock clock;
@@ -337,8 +337,8 @@ int main(void)
         WITH_RING(frames_come_in_order_and_once),
         WITH_RING(window_across_the_wrap_is_one_array),
         WITH_RING(batch_across_the_wrap_arrives_whole),
-        WITH_RING(overtaken_reader_is_told_and_goes_on),
-        WITH_RING(reader_overtaken_while_it_reads_is_told),
+        WITH_RING(overtaken_reader_is_reported_and_goes_on),
+        WITH_RING(reader_overtaken_while_it_reads_is_reported),
         WITH_RING(newest_frames_are_one_array_wherever_the_reader_stands),
         WITH_RING(advance_beyond_the_window_is_refused),
         WITH_RING(missing_sequence_numbers_are_counted),
@@ -349,7 +349,7 @@ int main(void)
         WITH_RING(new_ring_of_the_name_is_seen_and_followed),
         WITH_RING(second_writer_is_refused),
         WITH_RING(bytes_are_decoded_straight_into_the_ring),
-        WITH_RING(clock_and_statistics_are_told),
+        WITH_RING(clock_and_statistics_are_reported),
         cmocka_unit_test(documented_offsets_are_the_real_ones),
         cmocka_unit_test(bad_names_and_sizes_are_refused),
     };

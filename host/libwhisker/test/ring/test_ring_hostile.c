@@ -311,7 +311,7 @@ static int attach_and_create_elsewhere(const char *name)
     return reported ? EXIT_SUCCESS : EXIT_FAILURE;
 }
 
-static void ring_of_another_user_is_told(void **state)
+static void ring_of_another_user_is_reported(void **state)
 {
     (void)state;
     int status;
@@ -442,13 +442,13 @@ static int bus_error_without_handler(void)
     return bus_error_elsewhere();
 }
 
-static void reader_of_a_shortened_ring_is_told(void **state)
+static void reader_of_a_shortened_ring_is_reported(void **state)
 {
     (void)state;
     assert_int_equal(outside("reader"), 0);
 }
 
-static void writer_of_a_shortened_ring_is_told_and_makes_another(void **state)
+static void writer_of_a_shortened_ring_is_reported_and_makes_another(void **state)
 {
     (void)state;
     assert_int_equal(outside("writer"), 0);
@@ -529,10 +529,10 @@ int main(int argc, char **argv)
         cmocka_unit_test(counts_that_cannot_be_are_no_ring_to_a_new_reader),
         cmocka_unit_test(lock_of_a_name_is_its_owners_alone),
         cmocka_unit_test(file_of_another_program_is_not_replaced),
-        cmocka_unit_test(ring_of_another_user_is_told),
+        cmocka_unit_test(ring_of_another_user_is_reported),
         cmocka_unit_test(locks_of_a_reader_hold_up_no_writer),
-        cmocka_unit_test(reader_of_a_shortened_ring_is_told),
-        cmocka_unit_test(writer_of_a_shortened_ring_is_told_and_makes_another),
+        cmocka_unit_test(reader_of_a_shortened_ring_is_reported),
+        cmocka_unit_test(writer_of_a_shortened_ring_is_reported_and_makes_another),
         cmocka_unit_test(other_bus_errors_go_where_they_went_before),
         cmocka_unit_test(rings_are_listed_and_stale_ones_removed),
     };

@@ -72,7 +72,7 @@ struct writer {
     uint32_t pid; /* 0: its own */
 };
 
-static void write_until_told(const struct writer *as, int ready)
+static void write_until_reported(const struct writer *as, int ready)
 {
     struct whisker_ring *ring;
     prctl(PR_SET_PDEATHSIG, SIGKILL);
@@ -99,7 +99,7 @@ static pid_t start_writer(struct writer as)
     assert_int_equal(pipe2(ready, O_CLOEXEC), 0);
     const pid_t child = fork();
     if (child == 0) {
-        write_until_told(&as, ready[1]);
+        write_until_reported(&as, ready[1]);
     }
     assert_int_equal(read(ready[0], &reported, 1), 1);
     assert_int_equal(reported, 'y');
@@ -421,7 +421,7 @@ static int meet_living_ring(void)
     return create_and_explain("another writer holds this ring (%s, user root's); stop the other whiskerd");
 }
 
-static void what_another_user_left_is_told_with_its_remedy(void **state)
+static void what_another_user_left_is_reported_with_its_remedy(void **state)
 {
     (void)state;
     need_root();
@@ -459,7 +459,7 @@ int main(void)
         cmocka_unit_test(reader_of_the_ring_gets_no_signal),
         cmocka_unit_test(process_named_by_a_strangers_ring_gets_no_signal),
         cmocka_unit_test(writer_of_the_service_is_only_roots_to_signal),
-        cmocka_unit_test(what_another_user_left_is_told_with_its_remedy),
+        cmocka_unit_test(what_another_user_left_is_reported_with_its_remedy),
     };
     return cmocka_run_group_tests_name("trust in the ring", tests, make_service_directory, remove_service_directory);
 }

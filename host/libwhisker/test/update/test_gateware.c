@@ -275,7 +275,7 @@ static void what_cannot_take_an_image_is_left_untouched(void **state)
     check_refused(WHISKER_ERROR_GATEWARE_FALLBACK);
 }
 
-static void a_flash_that_stays_busy_or_is_worn_is_told(void **state)
+static void a_flash_that_stays_busy_or_is_worn_is_reported(void **state)
 {
     chip.stuck = true;
     assert_int_equal(update(), WHISKER_ERROR_FLASH_BUSY);
@@ -329,7 +329,7 @@ int main(void)
         cmocka_unit_test_setup(a_cut_of_power_at_any_order_leaves_an_image_to_start, set_up),
         cmocka_unit_test_setup(an_interrupted_update_goes_on_where_it_was, set_up),
         cmocka_unit_test_setup(what_cannot_take_an_image_is_left_untouched, set_up),
-        cmocka_unit_test_setup(a_flash_that_stays_busy_or_is_worn_is_told, set_up),
+        cmocka_unit_test_setup(a_flash_that_stays_busy_or_is_worn_is_reported, set_up),
         cmocka_unit_test_setup(only_an_image_for_this_bridge_fits, set_up),
         cmocka_unit_test_setup(a_damaged_image_is_none, set_up),
     };

@@ -94,7 +94,7 @@ static void nodes_that_miss_orders_still_get_all_blocks(void **state)
     assert_done(0x3F);
 }
 
-static void a_node_that_misses_the_start_is_told_again(void **state)
+static void a_node_that_misses_the_start_is_reported_again(void **state)
 {
     (void)state;
     fakes.node[2].misses_runs = 2;
@@ -122,7 +122,7 @@ static void nodes_with_the_same_number_load_together(void **state)
     assert_int_equal(fakes.node[0].firmware, OLD);
 }
 
-static void a_node_of_another_number_is_told_apart(void **state)
+static void a_node_of_another_number_is_reported_apart(void **state)
 {
     (void)state;
     fakes.node[5].state = WHISKER_NODE_STATE_LOADER; /* or it would not even look at the header */
@@ -233,7 +233,7 @@ static void a_node_that_does_not_leave_its_application_is_left(void **state)
     assert_int_equal(fakes.node[1].firmware, OLD);
 }
 
-static void flash_that_does_not_hold_is_told(void **state)
+static void flash_that_does_not_hold_is_reported(void **state)
 {
     (void)state;
     fakes.node[2].flash_fails_at = 12;
@@ -320,10 +320,10 @@ int main(void)
         TEST(all_take_an_image_at_the_same_time),
         TEST(nodes_that_erase_for_30_ms_are_waited_for),
         TEST(nodes_that_miss_orders_still_get_all_blocks),
-        TEST(a_node_that_misses_the_start_is_told_again),
+        TEST(a_node_that_misses_the_start_is_reported_again),
         TEST(one_node_is_addressed_by_its_number),
         TEST(nodes_with_the_same_number_load_together),
-        TEST(a_node_of_another_number_is_told_apart),
+        TEST(a_node_of_another_number_is_reported_apart),
         TEST(an_image_for_another_chip_is_refused_and_the_rest_go_on),
         TEST(an_older_wire_version_is_refused),
         TEST(a_lane_lost_midway_is_left_behind),
@@ -332,7 +332,7 @@ int main(void)
         TEST(a_node_that_takes_no_more_is_given_up),
         TEST(nodes_that_wait_for_a_slow_one_are_not_given_up),
         TEST(a_node_that_does_not_leave_its_application_is_left),
-        TEST(flash_that_does_not_hold_is_told),
+        TEST(flash_that_does_not_hold_is_reported),
         TEST(no_lanes_are_no_work),
         TEST(a_bridge_that_goes_ends_the_update_at_any_order),
         TEST(a_sound_image_is_taken_apart),

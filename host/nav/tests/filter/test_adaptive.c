@@ -302,7 +302,7 @@ static struct wander sparse_new(uint64_t seed)
 
 enum { SPARSE = 4 * ROWS };
 
-static void a_gaussian_carries_where_it_tells_as_well(void **state)
+static void a_gaussian_carries_where_it_reports_as_well(void **state)
 {
     (void)state;
     long gaussian = 0;
@@ -316,7 +316,7 @@ static void a_gaussian_carries_where_it_tells_as_well(void **state)
     assert_true(gaussian > 3 * SPARSE); /* of five times as many rows */
 }
 
-static void hypotheses_carry_where_rows_tell_more(void **state)
+static void hypotheses_carry_where_rows_report_more(void **state)
 {
     (void)state;
     for (uint64_t seed = 91; seed <= 95; seed++) {
@@ -386,8 +386,8 @@ int main(void)
         cmocka_unit_test(what_is_not_read_makes_it_no_surer),
         cmocka_unit_test(a_prior_inside_a_box_starts_with_the_whole_arena),
         cmocka_unit_test(a_known_start_is_listed_as_its_hypotheses_and_no_others),
-        cmocka_unit_test(a_gaussian_carries_where_it_tells_as_well),
-        cmocka_unit_test(hypotheses_carry_where_rows_tell_more),
+        cmocka_unit_test(a_gaussian_carries_where_it_reports_as_well),
+        cmocka_unit_test(hypotheses_carry_where_rows_report_more),
         cmocka_unit_test(a_robot_carried_off_while_a_gaussian_carries_is_found),
         cmocka_unit_test(hypotheses_are_listed_as_wide_along_y_as_along_x),
     };

@@ -47,7 +47,7 @@ static int carried_class(const struct carried *c)
                              m->y + s * WANDER_TIP[0].x + o * WANDER_TIP[0].y);
 }
 
-static void a_row_that_suits_all_of_it_tells_nothing(void **state)
+static void a_row_that_suits_all_of_it_reports_nothing(void **state)
 {
     (void)state;
     struct carried c;
@@ -59,7 +59,7 @@ static void a_row_that_suits_all_of_it_tells_nothing(void **state)
     carried_end(&c);
 }
 
-static void rows_that_tell_its_parts_apart_are_too_much_for_it(void **state)
+static void rows_that_separate_its_parts_are_too_much_for_it(void **state)
 {
     (void)state;
     struct carried c;
@@ -87,7 +87,7 @@ static void rows_that_only_a_wider_one_explains_speak_against_it(void **state)
     carried_end(&c);
 }
 
-static void it_may_carry_when_it_has_long_told_as_well_as_particles(void **state)
+static void it_may_carry_when_it_has_long_reported_as_well_as_particles(void **state)
 {
     (void)state;
     struct carried c;
@@ -132,10 +132,10 @@ static void draws_have_its_moments_and_more_of_them_are_wider(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_row_that_suits_all_of_it_tells_nothing),
-        cmocka_unit_test(rows_that_tell_its_parts_apart_are_too_much_for_it),
+        cmocka_unit_test(a_row_that_suits_all_of_it_reports_nothing),
+        cmocka_unit_test(rows_that_separate_its_parts_are_too_much_for_it),
         cmocka_unit_test(rows_that_only_a_wider_one_explains_speak_against_it),
-        cmocka_unit_test(it_may_carry_when_it_has_long_told_as_well_as_particles),
+        cmocka_unit_test(it_may_carry_when_it_has_long_reported_as_well_as_particles),
         cmocka_unit_test(draws_have_its_moments_and_more_of_them_are_wider),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

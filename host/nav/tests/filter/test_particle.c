@@ -261,7 +261,7 @@ static void weights_that_stay_low_bring_fresh_particles_where_the_row_fits(void 
     particle_destroy(f);
 }
 
-static void the_work_told_counts_particles_weighed_and_particles_moved(void **state)
+static void the_work_reported_counts_particles_weighed_and_particles_moved(void **state)
 {
     (void)state;
     struct nav_problem p = quiet();
@@ -422,7 +422,7 @@ int main(void)
         cmocka_unit_test(two_particles_follow_a_robot_that_they_know),
         cmocka_unit_test(the_same_seed_gives_the_same_bytes),
         cmocka_unit_test(weights_that_stay_low_bring_fresh_particles_where_the_row_fits),
-        cmocka_unit_test(the_work_told_counts_particles_weighed_and_particles_moved),
+        cmocka_unit_test(the_work_reported_counts_particles_weighed_and_particles_moved),
         cmocka_unit_test(fresh_particles_take_their_share_of_the_places_and_none_beyond),
         cmocka_unit_test(weights_never_become_more_uneven_than_allowed),
         cmocka_unit_test(a_row_that_no_particle_can_explain_changes_no_weight),

@@ -240,7 +240,7 @@ static void a_cylinder_gives_its_contour_and_normal(void **state)
     assert_true(a.corner < 0.1);
 }
 
-static void a_body_whisk_is_told_from_a_drive(void **state)
+static void a_body_whisk_is_reported_from_a_drive(void **state)
 {
     (void)state;
     struct nav_contact_filter f = filter();
@@ -252,7 +252,7 @@ static void a_body_whisk_is_told_from_a_drive(void **state)
     assert_int_equal(a.motion, NAV_CONTACT_BODY_WHISK);
 }
 
-static void an_object_that_moves_is_told_with_its_speed(void **state)
+static void an_object_that_moves_is_reported_with_its_speed(void **state)
 {
     (void)state;
     struct nav_contact_filter f = filter();
@@ -479,7 +479,7 @@ static void a_corner_that_goes_along_with_the_shaft_is_caught(void **state)
     assert_near(a.arc_m, place, 3e-3);
 }
 
-static void a_surface_tells_its_curvature(void **state)
+static void a_surface_reports_its_curvature(void **state)
 {
     (void)state;
     struct nav_contact_filter f = filter_of(without_friction());
@@ -502,14 +502,14 @@ int main(void)
         cmocka_unit_test(what_is_known_leaves_a_tenth_of_the_error),
         cmocka_unit_test(a_gain_that_is_off_is_within_the_deviation),
         cmocka_unit_test(a_cylinder_gives_its_contour_and_normal),
-        cmocka_unit_test(a_body_whisk_is_told_from_a_drive),
-        cmocka_unit_test(an_object_that_moves_is_told_with_its_speed),
+        cmocka_unit_test(a_body_whisk_is_reported_from_a_drive),
+        cmocka_unit_test(an_object_that_moves_is_reported_with_its_speed),
         cmocka_unit_test(a_face_under_the_tip_gives_its_normal),
         cmocka_unit_test(the_part_of_a_hypothesis_beyond_the_tip_goes_over_to_the_shaft),
         cmocka_unit_test(what_no_hypothesis_explains_is_none_of_them),
         cmocka_unit_test(an_object_is_followed_over_a_gap),
         cmocka_unit_test(a_corner_that_goes_along_with_the_shaft_is_caught),
-        cmocka_unit_test(a_surface_tells_its_curvature),
+        cmocka_unit_test(a_surface_reports_its_curvature),
         cmocka_unit_test(bad_samples_are_counted_and_not_read),
         cmocka_unit_test(whatever_comes_the_answers_are_finite),
         cmocka_unit_test(what_only_rests_is_no_contact_and_a_new_one_begins_anew),

@@ -82,7 +82,7 @@ static void a_longer_or_faster_push_is_no_nearer_contact(void **state)
     assert_near(reported(&m, &w).radius_mm, 110.0, 0.8);
 }
 
-static void the_tip_is_told_from_the_shaft(void **state)
+static void the_tip_is_reported_from_the_shaft(void **state)
 {
     (void)state;
     struct nav_whisk_model m = model(0.02);
@@ -132,7 +132,7 @@ int main(void)
         cmocka_unit_test(height_is_equation_3_and_the_clamped_law_at_its_ends),
         cmocka_unit_test(radius_and_its_deviation),
         cmocka_unit_test(a_longer_or_faster_push_is_no_nearer_contact),
-        cmocka_unit_test(the_tip_is_told_from_the_shaft),
+        cmocka_unit_test(the_tip_is_reported_from_the_shaft),
         cmocka_unit_test(what_fits_no_calibrated_whisk_is_doubted),
         cmocka_unit_test(a_peak_alone_is_less_sure),
     };

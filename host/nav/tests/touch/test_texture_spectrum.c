@@ -169,7 +169,7 @@ static void missing_samples_and_spikes_are_bridged_and_counted(void **state)
     assert_true(none[0] == 0.0 && none[1] == 0.0);
 }
 
-static void stuck_railed_and_caught_channels_are_told(void **state)
+static void stuck_railed_and_caught_channels_are_reported(void **state)
 {
     (void)state;
     const double still[] = {3.0, 3.0}, low[] = {0.0, 0.0}, high[] = {100.0, 100.0}, span[] = {60.0, 60.0};
@@ -275,7 +275,7 @@ int main(void)
         cmocka_unit_test(a_constant_window_has_finite_features),
         cmocka_unit_test(missing_samples_and_spikes_are_bridged_and_counted),
         cmocka_unit_test(two_samples_at_or_beyond_a_stop_are_a_rail),
-        cmocka_unit_test(stuck_railed_and_caught_channels_are_told),
+        cmocka_unit_test(stuck_railed_and_caught_channels_are_reported),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -99,7 +99,7 @@ static double trace_turned(double rate, double seconds)
     return isfinite(rate) ? fabs(rate) * seconds : seconds;
 }
 
-void nav_trace_add(struct nav_trace *trace, double t_s, const double *sample, double whisk_rad_s, double told_rad_s)
+void nav_trace_add(struct nav_trace *trace, double t_s, const double *sample, double whisk_rad_s, double reported_rad_s)
 {
     if (!trace_usable(trace, t_s, sample)) {
         trace->bad++;
@@ -110,7 +110,7 @@ void nav_trace_add(struct nav_trace *trace, double t_s, const double *sample, do
     double since = t_s - trace->start_s - trace->last.t_s;
     struct nav_trace_point now = {.t_s = t_s - trace->start_s,
                                   .turn = trace->last.turn + trace_turned(whisk_rad_s, since),
-                                  .reported = trace->last.reported + trace_turned(told_rad_s, since)};
+                                  .reported = trace->last.reported + trace_turned(reported_rad_s, since)};
     for (int a = 0; a < trace->axes; a++)
         now.at[a] = sample[a];
     trace_count_equal(trace, &now);
@@ -124,9 +124,9 @@ void nav_trace_add(struct nav_trace *trace, double t_s, const double *sample, do
 }
 
 void nav_trace_run(struct nav_trace *trace, size_t n, const double *t_s, const double *samples,
-                   const double *whisk_rad_s, const double *told_rad_s)
+                   const double *whisk_rad_s, const double *reported_rad_s)
 {
     for (size_t i = 0; i < n; i++)
         nav_trace_add(trace, t_s[i], samples + i * (size_t)trace->axes, whisk_rad_s ? whisk_rad_s[i] : (double)NAN,
-                      told_rad_s ? told_rad_s[i] : (double)NAN);
+                      reported_rad_s ? reported_rad_s[i] : (double)NAN);
 }

@@ -34,14 +34,14 @@ struct nav_trace {
 void nav_trace_begin(struct nav_trace *, int axes);
 
 /* Takes one sample at a time t_s later than all before. whisk_rad_s: the commanded rate of turn, NAN: not known;
- * told_rad_s: the rate the base reports, NAN: not known. A sample with a channel or time that is not finite, or not
+ * reported_rad_s: the rate the base reports, NAN: not known. A sample with a channel or time that is not finite, or not
  * later, is counted as bad and left out. Each channel goes through a median of NAV_TRACE_MEDIAN samples, so that bad
  * records do not count; the first and last two samples are not binned. */
-void nav_trace_add(struct nav_trace *, double t_s, const double *sample, double whisk_rad_s, double told_rad_s);
+void nav_trace_add(struct nav_trace *, double t_s, const double *sample, double whisk_rad_s, double reported_rad_s);
 
 /* Takes n samples [n][axes] with times [n] and rates [n]; a NULL rate is not known. */
 void nav_trace_run(struct nav_trace *, size_t n, const double *t_s, const double *samples, const double *whisk_rad_s,
-                   const double *told_rad_s);
+                   const double *reported_rad_s);
 /* cffi: end */
 
 /* 1 over the samples in a bin: its sums times this are its means. */

@@ -21,9 +21,9 @@ from ..robot.network.link import Link
 from ..robot.network.options import NAVIGATOR_ENDPOINT, PILOT_ENDPOINT, add_link, open_link
 from ..robot.pilot_process import Flight, LiveFlight, LiveWheels, fly_in_step
 from ..robot.processes.lifeline import Heartbeat
+from ..robot.publisher import Publisher
 from ..robot.rowfiles import Rows, Traces
 from ..robot.simulation_link import SimLink
-from ..robot.telling import Teller
 from ..robot.wheels import RETRY_S, IdealWheels, LiveBase, SteppedBase, wheels_of
 from ..scene import load
 from ..stopping import stop_on_signals
@@ -84,7 +84,7 @@ def _parts(arguments, link: Link, wheels: Wheels, stack: ExitStack) -> SimpleNam
     pilot = Pilot(robot, texture, radial, arguments.seed, wheels)
     out = stack.enter_context(open(arguments.out, "w", newline=""))  # noqa: SIM115
     traces = stack.enter_context(open(arguments.traces, "w", newline=""))  # noqa: SIM115
-    parts = {"rows": Rows(out), "traces": Traces(traces, pilot), "teller": Teller(link, pilot)}
+    parts = {"rows": Rows(out), "traces": Traces(traces, pilot), "publisher": Publisher(link, pilot)}
     return SimpleNamespace(pilot=pilot, flight=None, base_health={}, **parts)
 
 
@@ -100,8 +100,8 @@ def _fly_in_step(arguments, stack: ExitStack) -> SimpleNamespace:
     reader = stack.enter_context(Reader(arguments.ring, RING_WAIT_S, arguments.ring_owner))
     sim = stack.enter_context(SimLink(arguments.simulation))
     wheels = SteppedBase(sim, base) if base else IdealWheels(sim)
-    parts.flight = Flight(parts.pilot, wheels, parts.rows, parts.traces, parts.teller)
-    fly_in_step(parts.flight, reader, parts.teller)
+    parts.flight = Flight(parts.pilot, wheels, parts.rows, parts.traces, parts.publisher)
+    fly_in_step(parts.flight, reader, parts.publisher)
     parts.base_health = wheels.health()
     return parts
 
@@ -113,12 +113,12 @@ def _fly_live(arguments, stack: ExitStack) -> SimpleNamespace:
     parts = _parts(arguments, link, _known_wheels(base, link, stop), stack)
     wheels = LiveWheels(base)
     ring = stack.enter_context(closing(LiveRing(arguments.ring, len(parts.pilot.names), owner=arguments.ring_owner)))
-    parts.flight = Flight(parts.pilot, wheels, parts.rows, parts.traces, parts.teller)
+    parts.flight = Flight(parts.pilot, wheels, parts.rows, parts.traces, parts.publisher)
     live = LiveFlight(parts.flight, ring, wheels, link, heartbeat)
     link.announce()
     _greet(arguments.others, link, stop)
     live.run(stop.is_set)
-    parts.teller.end("stopped")
+    parts.publisher.end("stopped")
     parts.base_health = base.health()
     return parts
 
@@ -134,11 +134,11 @@ def _known_wheels(base: LiveBase, link: Link, stop: threading.Event) -> Wheels:
     """Waits for the base to say what it can do; meanwhile the pilot's health says so."""
     health = Health(link, dict)
     while not (reported := base.health()) and not stop.wait(RETRY_S):
-        health.tell(0, base.trouble, base.trouble)
+        health.report(0, base.trouble, base.trouble)
     return wheels_of(reported) if reported else EXACT
 
 
 def _write_report(path: Path, parts: SimpleNamespace) -> None:
     pilot = parts.pilot
-    content = {"ticks_used": parts.flight.ticks_used, "rows": parts.teller.rows, "bad_samples": pilot.bad_samples}
+    content = {"ticks_used": parts.flight.ticks_used, "rows": parts.publisher.rows, "bad_samples": pilot.bad_samples}
     path.write_text(json.dumps(content | {"whisks": pilot.whisks, "base": parts.base_health}, indent=1) + "\n")

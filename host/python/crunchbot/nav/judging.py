@@ -118,7 +118,7 @@ def bits_wanted(scene: Scene, near_m: float = NEAR_M) -> float:
     return math.log2(x * y / (math.pi * near_m**2))
 
 
-def bits_told(scene: Scene, observations: Observations) -> np.ndarray | None:
+def bits_reported(scene: Scene, observations: Observations) -> np.ndarray | None:
     """(n,) bits that the floor can have given at most up to a row, since the last start: each tile that a texture whisker meets
     for the first time tells log2(textures). The moment at which a border is crossed is not counted. None for a robot with
     object whiskers, whose contacts no such bound holds for."""

@@ -77,12 +77,12 @@ class Recorder:
             room = self._block if frames is None else min(self._block, frames - self.tally.frames)
             if self._take(room, all_frames) == 0:
                 break
-        self._tell_second()
+        self._report_second()
 
     def finish(self) -> None:
         """Say what is still to be said, write the index, close the file."""
         self._say_lost(0)
-        self._tell_health()
+        self._report_health()
         totals = {name: str(value) for name, value in vars(self.tally).items() if isinstance(value, int)}
         self._writer.finish(_of_bridge(self._reader) | totals)
 
@@ -144,7 +144,7 @@ class Recorder:
 
     def _interrupted(self, error: RingError, patience_s: float) -> None:
         if error.name == "TIMEOUT":
-            self._tell_second()
+            self._report_second()
         elif error.name in ("WRITER_DEAD", "RESTARTED"):
             self._writer.flush()
             self._reader.reattach(patience_s)
@@ -153,14 +153,14 @@ class Recorder:
         else:
             raise error
 
-    def _tell_second(self) -> None:
+    def _report_second(self) -> None:
         if step := self._timeline.wall_step_ns():
             self._writer.event(self._timeline.now(), CLOCK_SET, step_ns=step)
         if self._timeline.now() - self._second_ns >= SECOND_NS:
-            self._tell_health()
+            self._report_health()
         self._writer.flush_when_due()
 
-    def _tell_health(self) -> None:
+    def _report_health(self) -> None:
         now, second = self._timeline.now(), self.tally - self._second
         stats = self._reader.stats
         self._writer.health(now, second.frames, second.missing, second.overrun, second.records_bad, stats)

@@ -94,10 +94,10 @@ class Bag:
         link.announce()
         while not stop.is_set() and (stay or not _is_over(inbox)):
             self.take(inbox.take(LOOK_S))
-            health.tell(0, RUNNING, inbox.last_error)
+            health.report(0, RUNNING, inbox.last_error)
             self._writer.flush_when_due()
-        self._writer.finish({name: str(value) for name, value in self._told(inbox).items()})
-        health.tell(0, ENDED, inbox.last_error)
+        self._writer.finish({name: str(value) for name, value in self._reported(inbox).items()})
+        health.report(0, ENDED, inbox.last_error)
         return self.counters(inbox)
 
     def counters(self, inbox: Inbox) -> dict[str, int]:
@@ -105,7 +105,7 @@ class Bag:
         counted = {name: getattr(inbox, name) for name in ("missed", "refused", "overflown")}
         return {"messages": self.messages} | counted
 
-    def _told(self, inbox: Inbox) -> dict[str, int]:
+    def _reported(self, inbox: Inbox) -> dict[str, int]:
         tallies = inbox.tallies.items()
         each = {
             f"{topic}.{name}": getattr(t, name) for topic, t in tallies for name in ("received", "missed", "refused")

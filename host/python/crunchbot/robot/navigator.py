@@ -62,8 +62,8 @@ class Navigator:
     def __init__(self, link: Link, scene: Scene, settings: Settings):
         self._link, self._scene, self._settings = link, scene, settings
         self._inbox = link.subscribe(ROWS, initial_pose.TOPIC, judge=RowChecks(scene))
-        self._told: Prior | None = None
-        self._told_error = ""
+        self._reported: Prior | None = None
+        self._reported_error = ""
         self._follower = Follower()
         self._memory = Memory(settings.checkpoint, scene, settings.filters)
         self._beliefs_before: dict[str, np.ndarray] = {}
@@ -100,10 +100,10 @@ class Navigator:
                 if ends and not self._settings.stay:
                     reason = ends[0]
                     break
-                self._health.tell(self._now_ns, RUNNING if received else WAITING, self._last_error())
+                self._health.report(self._now_ns, RUNNING if received else WAITING, self._last_error())
         for stream in (self._poses, self._answers, self._beliefs):
             stream.end(self._now_ns, reason)
-        self._health.tell(self._now_ns, ENDED, self._last_error())
+        self._health.report(self._now_ns, ENDED, self._last_error())
         return self.counters()
 
     def _affordable(self) -> float:
@@ -113,7 +113,7 @@ class Navigator:
         return max(1, CATCH_UP_S // self._weigh_s) if self._weigh_s else 1
 
     def _last_error(self) -> str:
-        return self._inbox.last_error or self._told_error or self._memory.note
+        return self._inbox.last_error or self._reported_error or self._memory.note
 
     def _take_rows(self, received: list[Received], stack: ExitStack) -> None:
         if not self._tracks:
@@ -125,23 +125,23 @@ class Navigator:
         """The newest given pose counts: at once, or when the first row comes."""
         for one in received:
             if not one.over:
-                self._told_error = ""
+                self._reported_error = ""
                 try:
-                    self._told = initial_pose.prior_of(one.message, self._scene.arena)
+                    self._reported = initial_pose.prior_of(one.message, self._scene.arena)
                 except InitialPoseError as error:
-                    self._told_error = str(error)
-        self._begin_from_told()
+                    self._reported_error = str(error)
+        self._begin_from_reported()
 
-    def _begin_from_told(self) -> None:
+    def _begin_from_reported(self) -> None:
         """All filters, or none where the first refuses it: they share the arena."""
-        if not self._tracks or not self._told:
+        if not self._tracks or not self._reported:
             return
-        prior, self._told = self._told, None
+        prior, self._reported = self._reported, None
         try:
             for track in self._tracks:
                 track.filter.set_prior(prior)
         except ValueError as error:
-            self._told_error = f"{initial_pose.TOPIC}: {error}"
+            self._reported_error = f"{initial_pose.TOPIC}: {error}"
         else:
             self._prior = GIVEN
 
@@ -156,14 +156,14 @@ class Navigator:
         began = time.monotonic()
         if not self._tracks:
             self._begin(stack, has_normals(step.row.names))
-            self._begin_from_told()
+            self._begin_from_reported()
         self._now_ns = step.row.header.stamp.ns
         header = Header.at(self._now_ns, ARENA_FRAME)
         for track in self._tracks:
             self._answer(track, step, header, track.take(step))
         self._weigh_s = max(time.monotonic() - began, self._settings.drill_step_s)
         if self._belief_is_due():
-            self._tell_beliefs(header, step)
+            self._report_beliefs(header, step)
         self._step_s = time.monotonic() - began
         time.sleep(max(0.0, self._settings.drill_step_s - self._step_s))
 
@@ -172,7 +172,7 @@ class Navigator:
         due = self._now_ns >= self._belief_due_ns or self._belief_due_ns > self._now_ns + BELIEF_NS
         return due and (self._link.lock_step or time.monotonic() >= self._belief_rest_s)
 
-    def _tell_beliefs(self, header: Header, step: Step) -> None:
+    def _report_beliefs(self, header: Header, step: Step) -> None:
         began, self._belief_due_ns = time.monotonic(), self._now_ns + BELIEF_NS
         few = {}
         for track in self._tracks:

@@ -16,8 +16,8 @@ from .blocks import Block, LiveRing, blocks
 from .network.health import ENDED, RUNNING, Health
 from .network.link import Link
 from .processes.lifeline import Heartbeat
+from .publisher import TICK_NS, Publisher
 from .rowfiles import Rows, Traces
-from .telling import TICK_NS, Teller
 from .wheels import LiveBase, Report
 
 SILENCE_S = 0.2  # without samples for so long the wheels are stopped
@@ -31,9 +31,9 @@ NO_HEARTBEAT = "no heartbeat of the supervisor: wheels stopped; see whether `whi
 class Flight:
     """A pilot, its wheels, and its publishers: the part that both clocks share."""
 
-    def __init__(self, pilot: Pilot, wheels, rows: Rows, traces: Traces, teller: Teller | None):
+    def __init__(self, pilot: Pilot, wheels, rows: Rows, traces: Traces, publisher: Publisher | None):
         self.pilot, self._wheels = pilot, wheels
-        self._rows, self._traces, self._teller = rows, traces, teller
+        self._rows, self._traces, self._teller = rows, traces, publisher
         self.ticks_used = self.reports_missing = 0
 
     def take(self, block: Block) -> None:
@@ -60,12 +60,12 @@ class Flight:
         self.pilot.behaviour.moved(tick, 0.0, 0.0, 0.0, LOST)
 
 
-def fly_in_step(flight: Flight, reader: Reader, teller: Teller | None) -> None:
+def fly_in_step(flight: Flight, reader: Reader, publisher: Publisher | None) -> None:
     """From the ring to drives and rows until the ring is closed."""
     for block in blocks(reader, len(flight.pilot.names)):
         flight.take(block)
-    if teller:
-        teller.end("the ring was closed")
+    if publisher:
+        publisher.end("the ring was closed")
 
 
 class LiveWheels:
@@ -117,7 +117,7 @@ class LiveFlight:
         finally:
             self._wheels.base.stop()
             self._wheels.base.close()
-            self._health.tell(self._stamp_ns, ENDED, self._last_error)
+            self._health.report(self._stamp_ns, ENDED, self._last_error)
 
     def _step(self) -> None:
         come = self._ring.take(LOOK_S)
@@ -137,7 +137,7 @@ class LiveFlight:
         self._look_for_navigator()
         state = self.state
         self._last_error = self._last_error if state == RUNNING else state
-        self._health.tell(self._stamp_ns, state, self._last_error)
+        self._health.report(self._stamp_ns, state, self._last_error)
 
     def _stop_for_another_writer(self) -> None:
         """A new whiskerd can be there before SILENCE_S has passed. The wheels must not turn on by samples of the old one."""

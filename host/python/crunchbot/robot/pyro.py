@@ -245,8 +245,8 @@ class Server:
         try:
             while not stop.is_set():
                 self._results.take(self._inbox.take(LOOK_S))
-                self._health.tell(0, RUNNING, self._inbox.last_error)
-            self._health.tell(0, ENDED, self._inbox.last_error)
+                self._health.report(0, RUNNING, self._inbox.last_error)
+            self._health.report(0, ENDED, self._inbox.last_error)
         except Exception as error:  # noqa: BLE001 - `run` raises it
             self._error = error
             stop.set()

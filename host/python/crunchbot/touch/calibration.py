@@ -129,7 +129,7 @@ class WhiskFinder:
         self._ticks = np.empty(0, np.int64)
         self._times = np.empty(0)
         self._counts = np.empty((0, 2))
-        self._told = -1  # onset of the last contact given or thrown away
+        self._reported = -1  # onset of the last contact given or thrown away
 
     def add(self, frames: np.ndarray) -> Iterator[Whisk]:
         """Contacts that these frames complete. CalibrationError when the bridge began anew meanwhile."""
@@ -150,9 +150,9 @@ class WhiskFinder:
 
     def _completed(self) -> Iterator[Whisk]:
         onset, release = self._contact.onset, self._contact.release
-        if onset == self._told or release < onset or self._ticks[-1] < release + AFTER_TICKS:
+        if onset == self._reported or release < onset or self._ticks[-1] < release + AFTER_TICKS:
             return
-        self._told = onset
+        self._reported = onset
         if release - onset >= SHORTEST_TICKS:
             chosen = (self._ticks >= onset - BEFORE_TICKS) & (self._ticks < release + AFTER_TICKS)
             yield Whisk(self._times[chosen], self._counts[chosen])

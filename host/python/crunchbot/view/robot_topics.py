@@ -19,12 +19,12 @@ class SceneFeed:
     """Arena and robot of the scene, as JSON, once."""
 
     def __init__(self, hub: Hub, options: dict):
-        self._model, self._told = hub.robot, False
+        self._model, self._reported = hub.robot, False
 
     def take(self) -> str | None:
-        if self._told:
+        if self._reported:
             return None
-        self._told = True
+        self._reported = True
         scene = self._model.scene
         reported = {"arena": None, "robot": None, "text": "arena not known: start whisker-view with --scene SCENE"}
         if scene is not None:
@@ -41,7 +41,7 @@ class RobotFeed:
     def __init__(self, hub: Hub, options: dict):
         self._hub, self._model = hub, hub.robot
         self._due, self._run = 0.0, None
-        self._told: dict[str, str] = {}
+        self._reported: dict[str, str] = {}
         self._next = {"path": 0, "true_path": 0}
         hub.robot_watchers += 1
 
@@ -60,8 +60,8 @@ class RobotFeed:
     def _changed(self, parts: dict) -> dict[str, str]:
         """JSON of the parts that are not as last sent."""
         texts = {name: json.dumps(part, separators=(",", ":"), allow_nan=False) for name, part in parts.items()}
-        changed = {name: part for name, part in texts.items() if self._told.get(name) != part}
-        self._told = texts
+        changed = {name: part for name, part in texts.items() if self._reported.get(name) != part}
+        self._reported = texts
         return changed
 
     def _points(self) -> dict[str, str]:
@@ -113,13 +113,13 @@ class BeliefFeed:
     """The newest belief: weighted poses with their widths, as binary; older ones that a page had no time for are dropped."""
 
     def __init__(self, hub: Hub, options: dict):
-        self._model, self._told, self._due = hub.robot, None, 0.0
+        self._model, self._reported, self._due = hub.robot, None, 0.0
 
     def take(self) -> bytes | None:
         belief, now = self._model.belief, time.monotonic()
-        if belief is None or belief is self._told or now < self._due:
+        if belief is None or belief is self._reported or now < self._due:
             return None
-        self._told, self._due = belief, now + BELIEF_S
+        self._reported, self._due = belief, now + BELIEF_S
         poses = self._model.belief_columns()
         head = BELIEF_HEAD.pack(BELIEF_ID, 0, len(poses), belief.components, belief.header.stamp.ns / 1e9, belief.mass)
         return head + poses.tobytes()

@@ -97,13 +97,13 @@ class Rings:
     """Names of the rings that can be asked for and whose they are, as JSON, at first and when they change."""
 
     def __init__(self, hub: Hub, options: dict):
-        self._hub, self._told = hub, None
+        self._hub, self._reported = hub, None
 
     def take(self) -> str | None:
         message = {"topic": "rings", "rings": self._hub.rings(), "owners": self._hub.owners()}
-        if message == self._told:
+        if message == self._reported:
             return None
-        self._told = message
+        self._reported = message
         return json.dumps(message)
 
     def close(self) -> None:

@@ -190,7 +190,7 @@ def test_the_pattern_is_compared_sample_by_sample():
     assert pattern.wrong(frames) == ["2 frames were lost"]
 
 
-def test_a_bridge_that_cannot_be_asked_is_told_in_one_line(tmp_path):
+def test_a_bridge_that_cannot_be_asked_is_reported_in_one_line(tmp_path):
     whiskerd = tmp_path / "whiskerd"
     whiskerd.write_text("#!/bin/sh\necho 'whiskerd: bridge: another process uses the bridge; stop it' >&2\nexit 1\n")
     whiskerd.chmod(0o755)

@@ -59,7 +59,7 @@ def test_a_window_of_a_young_ring_is_short(ring):
             assert len(window) == 3
 
 
-def test_views_used_too_long_are_told(ring):
+def test_views_used_too_long_are_reported(ring):
     frames = make_frames(3 * CAPACITY)
     with Reader(ring.name) as reader:
         ring.publish(frames[:10])
@@ -93,7 +93,7 @@ def test_the_clock_maps_both_ways_of_now(ring):
         assert int(clock.realtime(60 * hz)) == 7 * 10**9
 
 
-def test_what_the_daemon_tells_arrives_as_text_and_numbers(ring):
+def test_what_the_daemon_reports_arrives_as_text_and_numbers(ring):
     ring.set_stats(started_ns=5, frames=7, serial=b"B\xff1", firmware=b"x" * 31, error=-40)
     with Reader(ring.name) as reader:
         stats = reader.stats

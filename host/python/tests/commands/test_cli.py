@@ -149,7 +149,7 @@ def test_lists_and_help(capsys):
         assert "example:\n  whisker radial" in run(capsys, *words, "--help")[1]
 
 
-def test_texture_learns_and_tells(capsys, tmp_path):
+def test_texture_learns_and_reports(capsys, tmp_path):
     rng = np.random.default_rng(1)
     for name, spread in (("calm", 10.0), ("rough", 80.0)):
         (tmp_path / "d" / name).mkdir(parents=True)
@@ -168,7 +168,7 @@ def test_texture_learns_and_tells(capsys, tmp_path):
     assert code == 2 and "1 channels, but the model has 2" in err
 
 
-def test_radial_learns_and_tells(capsys, tmp_path):
+def test_radial_learns_and_reports(capsys, tmp_path):
     contacts, model = tmp_path / "c.csv", tmp_path / "m.json"
     radii = np.repeat([90.0, 100.0, 110.0, 120.0, 130.0], 5)
     write_whisks(contacts, (181.0 - radii) * 50, radii)

@@ -76,7 +76,7 @@ def test_the_simulated_bridge_and_its_daemon_have_the_same_lanes(monkeypatch, tm
     assert reported == {"--lanes-populated": str(lanes), "--lane-mask": str(mask)}
 
 
-def test_info_tells_ring_daemon_and_clock(capsys):
+def test_info_reports_ring_daemon_and_clock(capsys):
     with live_ring(make_frames(300)) as name:
         code, out, _ = run(capsys, "info", "--ring", name, "--json")
         reported = json.loads(out)
@@ -136,7 +136,7 @@ def test_lanes_without_a_node_are_no_bad_samples(capsys, tmp_path):
     assert f"1000 frames, 0 lost, {bad} bad samples; 22 lanes without a good one" in out
 
 
-def test_a_recorder_told_to_stop_finishes_its_file(tmp_path):
+def test_a_recorder_reported_to_stop_finishes_its_file(tmp_path):
     path = tmp_path / "a.mcap"
     words = ["record", path, "--ring"]
     with (

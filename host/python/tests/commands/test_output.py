@@ -45,17 +45,17 @@ def test_help_that_finds_no_room_is_one_line(into_full, name):
 @pytest.mark.parametrize(
     "words", [["info"], ["info", "--json"], ["top", "--once"], ["stream", "--frames", "5", "--backlog"]]
 )
-def test_what_a_ring_tells_finds_no_room(into_full, words):
+def test_what_a_ring_reports_finds_no_room(into_full, words):
     with live_ring(make_frames(300)) as name:
         assert into_full(main, *words, "--ring", name) == (1, f"whisker: {COMPLAINT}")
 
 
 @pytest.mark.parametrize("words", [[], ["--json"], ["--list-filters"], ["--list-settings"]])
-def test_what_a_filter_tells_finds_no_room(into_full, folder, words):
+def test_what_a_filter_reports_finds_no_room(into_full, folder, words):
     assert into_full(main, "localise", folder, "--filter", "odometry", *words) == (1, f"whisker: {COMPLAINT}")
 
 
-def test_what_models_tell_finds_no_room(into_full, tmp_path):
+def test_what_models_report_finds_no_room(into_full, tmp_path):
     model().save(tmp_path / "t.json")
     RadialModel(-0.011, 181.5, 2.5, 90.0, 138.0).save(tmp_path / "r.json")
     write_whisks(tmp_path / "w.csv", [500.0, 400.0], [90, 100])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from crunchbot.nav.estimates import Estimates, read_estimates
-from crunchbot.nav.judging import bits_told, bits_wanted, carried_rows, judge, starts_of, travel_of
+from crunchbot.nav.judging import bits_reported, bits_wanted, carried_rows, judge, starts_of, travel_of
 from crunchbot.nav.observations import Observations
 from crunchbot.scene import Arena, Robot, Scene, Whisker
 from crunchbot.tables import TableError
@@ -109,7 +109,7 @@ def test_a_file_of_another_engine_is_read_by_order_or_by_time(tmp_path):
         ("t_s,x_m,y_m,theta_rad", [], "no rows"),
     ],
 )
-def test_a_file_that_cannot_be_matched_is_told_in_a_line(tmp_path, header, lines, reported):
+def test_a_file_that_cannot_be_matched_is_reported_in_a_line(tmp_path, header, lines, reported):
     with pytest.raises(TableError, match=reported):
         read_estimates(write(tmp_path / "est.csv", header, lines), "est", straight())
 
@@ -120,8 +120,8 @@ def test_the_bound_counts_each_tile_once_and_holds_for_floor_sensors_only():
     one = Scene(arena, Robot(0.0, 0.1, 0.01, (Whisker("a", "texture", tip_m=(0.0, 0.0)),)))
     two = Scene(arena, Robot(0.0, 0.1, 0.01, tuple(Whisker(n, "texture", tip_m=(0.0, 0.0)) for n in "ab")))
     blind = Scene(arena, Robot(0.0, 0.1, 0.01, (Whisker("a", "object", base_m=(0, 0), yaw_rad=0.0, length_m=0.1),)))
-    reported = bits_told(one, rows)
+    reported = bits_reported(one, rows)
     assert reported[0] == 1.0 and reported[-1] == 14.0 and (np.diff(reported) >= 0).all()
-    assert np.array_equal(reported, bits_told(two, rows))
-    assert bits_told(blind, rows) is None
+    assert np.array_equal(reported, bits_reported(two, rows))
+    assert bits_reported(blind, rows) is None
     assert bits_wanted(one, 0.06) == pytest.approx(math.log2(4.2 * 0.6 / (math.pi * 0.06**2)))

@@ -86,14 +86,14 @@ def test_a_direction_without_its_deviation_is_no_structure(made, tmp_path):
         localise.read_observations(path, made.scene)
 
 
-def test_rows_of_one_whisker_may_tell_it_alone(made, tmp_path):
+def test_rows_of_one_whisker_may_report_it_alone(made, tmp_path):
     path = written(made, tmp_path)
     path.write_text(path.read_text().replace("object2_", "stranger_").replace("stranger_mm", "object2_mm"))
     observations = localise.read_observations(path, made.scene)
     assert np.isnan(observations.normal[:, 1]).all() and np.isfinite(observations.normal[:, 0]).any()
 
 
-def test_points_are_read_where_they_are_told(made, tmp_path):
+def test_points_are_read_where_they_are_reported(made, tmp_path):
     point = np.round(np.random.default_rng(1).normal(size=(len(made.observations), 4, 3)), 6)
     rows = replace(made.observations, point=point)
     scenes.write_scene(tmp_path, made.scene, rows)

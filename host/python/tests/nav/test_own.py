@@ -110,7 +110,7 @@ def test_a_row_of_the_network_may_hold_a_sensors_reading():
         ("light.csv", "0.0375,0.0375", "-1,0.0375", "line 2: a likelihood is negative"),
     ],
 )
-def test_what_is_wrong_with_a_sensors_files_is_told_in_a_line(tmp_path, name, old, new, reported):
+def test_what_is_wrong_with_a_sensors_files_is_reported_in_a_line(tmp_path, name, old, new, reported):
     scenes.write_scene(tmp_path, *lit_scene())
     text = (tmp_path / name).read_text()
     assert old in text

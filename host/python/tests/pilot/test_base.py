@@ -352,7 +352,7 @@ def test_a_base_that_leaves_its_mode_waits_for_its_commander(start):
     assert "has left its mode: a cliff" in driver.log.read_text()
 
 
-def test_a_firmware_that_tells_modes_one_too_high_is_understood(start):
+def test_a_firmware_that_reports_modes_one_too_high_is_understood(start):
     driver = start("--clock", "stream")
     peer = driver.peer
     with driver.client() as client:
@@ -425,7 +425,7 @@ def test_a_silent_line_is_not_put_back_into_a_mode_that_it_left(start):
     assert driver.peer.await_order(bytes([START, STREAM])).endswith(STOP)
 
 
-def test_a_low_battery_is_told_once(start):
+def test_a_low_battery_is_reported_once(start):
     driver = start("--clock", "stream")
     with driver.client() as client:
         await_frame(client, driver)
@@ -554,7 +554,7 @@ def refused(*words, env=None) -> tuple[int, str]:
     return done.returncode, done.stderr
 
 
-def test_wrong_use_is_told_in_one_line(tmp_path):
+def test_wrong_use_is_reported_in_one_line(tmp_path):
     socket = tmp_path / "s"
     for words, expected in (
         (["--socket", socket], "--port PATH is missing"),

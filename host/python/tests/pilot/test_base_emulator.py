@@ -136,7 +136,7 @@ def test_a_line_that_is_silent_for_a_second_is_back(robot):
         it.wait_frame()
 
 
-def test_a_base_that_neither_told_nor_heard_went_on_as_it_did(robot):
+def test_a_base_that_neither_reported_nor_heard_went_on_as_it_did(robot):
     """Driving, and 2.8 s in which it hears no order to stop, and tells so in its first frame after."""
     it = robot("--event", "silent@1.5+2.8")
     far = 0.0
@@ -147,19 +147,19 @@ def test_a_base_that_neither_told_nor_heard_went_on_as_it_did(robot):
     assert 0.38 < far < 0.75
 
 
-def test_a_firmware_that_tells_modes_one_too_high_is_understood(robot):
+def test_a_firmware_that_reports_modes_one_too_high_is_understood(robot):
     it = robot("--mode-plus-one")
     while it.wait_frame().bits & IDLE:
         pass
     assert it.base.health()["mode"] == "safe"
 
 
-def test_a_bump_is_told(robot):
+def test_a_bump_is_reported(robot):
     it = robot("--event", "bump-left@0.3+1000")
     it.drive_until(0.1, 0, lambda motions: motions and motions[-1].bits & BUMP_LEFT)
 
 
-def test_a_low_battery_is_told(robot):
+def test_a_low_battery_is_reported(robot):
     it = robot("--battery-low")
     it.wait_frame()
     assert it.base.health()["low_battery"] == "1"

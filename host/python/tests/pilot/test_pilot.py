@@ -105,7 +105,7 @@ def test_stays_inside_the_arena_and_off_the_blocks(flown):
         assert scene.arena.is_free(row["x_m"], row["y_m"], scene.robot.body_radius_m - 0.001)
 
 
-def test_truth_tells_how_far_a_floor_whiskers_tip_went_in_each_row(flown):
+def test_truth_reports_how_far_a_floor_whiskers_tip_went_in_each_row(flown):
     """At least the straight line between its two places; hardly more on the whole, for few rows have a bend in them."""
     scene, _, _, truth, _ = flown
     poses = [[row[key] for key in ("x_m", "y_m", "theta_rad")] for row in truth]
@@ -140,7 +140,7 @@ def test_radial_readings_are_the_distance_at_their_row(flown, models):
     assert np.max(np.abs(errors)) < 30.0
 
 
-def test_rows_tell_how_the_surface_lies_where_a_whiskers_tip_met_it(models):
+def test_rows_report_how_the_surface_lies_where_a_whiskers_tip_met_it(models):
     """By chance a direction is within 15 degrees once in twelve times."""
     errors = []
     for seed in range(1, 8):
@@ -163,7 +163,7 @@ def test_rows_tell_how_the_surface_lies_where_a_whiskers_tip_met_it(models):
     assert np.mean(np.abs(errors) < 15.0) >= 0.8
 
 
-def test_rows_tell_no_direction_of_a_corner_under_the_shaft(models):
+def test_rows_report_no_direction_of_a_corner_under_the_shaft(models):
     """In the turn alone it bends as at a tip on a face; the filter follows the object over the gap after driving into it."""
     scene = room((2.5, 2.5), [(1.25, 1.12, 1.29, 1.16)])
     pilot = Pilot(scene.robot, *load_models(models, scene.robot), SEED)

@@ -211,7 +211,7 @@ def test_the_move_brings_the_corner_under_the_tip(whisker, radius_mm):
     assert move.turn_rad * mount.corner_turn > 0.0
 
 
-def test_a_contact_at_the_tip_needs_no_move_and_is_told_so():
+def test_a_contact_at_the_tip_needs_no_move_and_is_reported_so():
     mount = Mount.of(make_robot().of_role("object")[1])
     assert move_for_tip(mount, mount.length_mm) is None
     kinds = [contact_type(mount, reported) for reported in (None, 90.0, 129.0, 131.0, 140.0)]

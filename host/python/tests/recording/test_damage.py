@@ -114,7 +114,7 @@ def test_zeros_over_the_end_of_one_chunk_and_the_head_of_the_next_cost_these_two
 
 
 @pytest.mark.parametrize("is_cut_off", [False, True])
-def test_a_chunk_that_is_not_there_is_told(tmp_path, whole, is_cut_off):
+def test_a_chunk_that_is_not_there_is_reported(tmp_path, whole, is_cut_off):
     data, chunks = whole
     first, last = chunks[2][0], chunks[3][0]  # with the index records behind it
     data = data[:first] + data[last : chunks[3][1] if is_cut_off else None]
@@ -126,7 +126,7 @@ def test_a_chunk_that_is_not_there_is_told(tmp_path, whole, is_cut_off):
         assert "the index at its end lists 4 chunks; 3 are whole, or they moved" in damage
 
 
-def test_a_chunk_twice_is_told(tmp_path, whole):
+def test_a_chunk_twice_is_reported(tmp_path, whole):
     data, chunks = whole
     first, last = chunks[1][0], chunks[2][0]
     _, damage = look(tmp_path / "a.mcap", data[:last] + data[first:last] + data[last:])
@@ -202,7 +202,7 @@ def test_no_more_is_lost_than_was_hit_and_none_of_it_unsaid():
     assert sum(counts.values()) == 240 and any("lost and counted" in what for what in counts)
 
 
-def test_metadata_that_disagree_are_told_of_a_file_that_was_cut_off(tmp_path, whole):
+def test_metadata_that_disagree_are_reported_of_a_file_that_was_cut_off(tmp_path, whole):
     data = whole[0][: whole[1][-1][1]]
     place = data.index(b"left,right")
     _, damage = look(tmp_path / "a.mcap", flip(data, place, 0))

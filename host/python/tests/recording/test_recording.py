@@ -95,7 +95,7 @@ def test_other_tools_open_it(tmp_path):
     assert kinds == [(1, 1010, 10)] and bad == np.count_nonzero(kept["lane"]["status"])
 
 
-def test_losses_before_the_ring_and_restarts_are_told(tmp_path):
+def test_losses_before_the_ring_and_restarts_are_reported(tmp_path):
     frames = make_frames(1000)
     again = make_frames(300)
     again["sequence"] = frames["sequence"][-1] + 3 + np.arange(300)
@@ -165,7 +165,7 @@ def test_replay_is_bit_for_bit(tmp_path):
     assert events(tmp_path / "a.mcap") == events(tmp_path / "b.mcap")
 
 
-def test_replay_keeps_time_and_tells_the_clock(tmp_path):
+def test_replay_keeps_time_and_reports_the_clock(tmp_path):
     write(tmp_path / "a.mcap", make_frames(2000))
     name = ring_name()
     with read(tmp_path / "a.mcap") as recording, Writer(name) as ring, Reader(name) as reader:
@@ -335,7 +335,7 @@ def test_the_wall_clock_set_is_an_event(tmp_path):
         assert [(event.kind, event.step_ns) for event in recording.events()] == [("clock set", -5 * 10**9)]
 
 
-def test_a_missing_ring_is_told_while_recording(tmp_path):
+def test_a_missing_ring_is_reported_while_recording(tmp_path):
     name = ring_name()
     with pytest.raises(RingError, match="start whiskerd"):
         Reader(name)

@@ -144,7 +144,7 @@ def test_a_sync_that_fails_is_one_line(disk, seconds, recorder, number):
     )
 
 
-def test_a_sync_that_fails_at_the_end_is_told(disk, recorder):
+def test_a_sync_that_fails_at_the_end_is_reported(disk, recorder):
     ring, recorder, path = recorder
     take(ring, recorder, 0)
     disk.error = OSError(errno.EIO, "broken")

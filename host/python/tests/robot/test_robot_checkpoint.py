@@ -263,7 +263,7 @@ def test_all_motion_since_the_place_comes_with_the_first_row_and_nothing_counts_
     assert sum(step.rows for step in steps) == 31
 
 
-def test_from_another_pilot_only_what_it_told_is_motion(made):
+def test_from_another_pilot_only_what_it_reported_is_motion(made):
     _, rows = made
     sent = received(rows, stream=8)
     follower = Follower()

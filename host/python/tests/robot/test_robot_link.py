@@ -87,7 +87,7 @@ class Pair:
         self.pilot.close()
 
 
-def test_rows_arrive_in_order_and_the_end_is_told():
+def test_rows_arrive_in_order_and_the_end_is_reported():
     with Pair() as pair:
         pair.send(*range(300))
         pair.rows.end(30 * 10**9, "over")
@@ -172,7 +172,7 @@ def test_a_restarted_reader_joins_where_the_stream_is():
     assert (pair.tally.joined_at, pair.tally.missed) == (6, 0)
 
 
-def test_a_cut_cable_is_survived_and_the_gap_is_told():
+def test_a_cut_cable_is_survived_and_the_gap_is_reported():
     endpoint = free_endpoint()
     with Cable(endpoint) as cable, Pair(endpoint, way=cable.endpoint) as pair:
         pair.send(0)
@@ -458,7 +458,7 @@ def opened(monkeypatch, capsys, *words: str) -> str:
 @pytest.mark.parametrize(
     "endpoint", ["tcp/0.0.0.0:7448", "tcp/[::]:7448", "tcp/192.168.7.2:7448", "tls/robot.lan:7448"]
 )
-def test_a_door_that_is_open_to_the_network_is_told(monkeypatch, capsys, endpoint):
+def test_a_door_that_is_open_to_the_network_is_reported(monkeypatch, capsys, endpoint):
     text = f"whisker: {endpoint}: anyone who reaches this address can watch and take part\n"
     assert opened(monkeypatch, capsys, "--listen", endpoint) == text
     assert opened(monkeypatch, capsys, "--listen", "tcp/127.0.0.1:1", "--listen", endpoint) == text

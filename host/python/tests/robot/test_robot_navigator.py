@@ -167,7 +167,7 @@ def test_a_killed_navigator_goes_on_from_its_checkpoint(made, tmp_path, name):
     folder, scene, rows = made
     options = ["--filter", name, "--checkpoint", tmp_path / "file"]
     with Robot("localisation", "health/navigator") as robot:
-        reported, health_told = killed_and_begun_anew(robot, folder, rows, options)
+        reported, health_reported = killed_and_begun_anew(robot, folder, rows, options)
     assert {(x.first_seq, x.prior, x.rows_missed) for x in reported} == {(25, "checkpoint", 0)}
     alone = localise.Filter(name, scene)
     never_killed = [alone.step(row) for row in rows]
@@ -176,7 +176,7 @@ def test_a_killed_navigator_goes_on_from_its_checkpoint(made, tmp_path, name):
         assert off < 0.1, (answer.observation_seq, off)
     # The last checkpoint is of row 15: what came between it and the first row is one motion.
     assert reported[0].rows_integrated == 10 and reported[0].confidence > 0.5 * never_killed[25].confidence
-    assert {x.last_error for x in health_told} == {""} and health_told[-1].counts["prior"] == "checkpoint"
+    assert {x.last_error for x in health_reported} == {""} and health_reported[-1].counts["prior"] == "checkpoint"
 
 
 @pytest.mark.parametrize(
@@ -187,14 +187,14 @@ def test_a_killed_navigator_goes_on_from_its_checkpoint(made, tmp_path, name):
         (lambda file: file.write_bytes(file.read_bytes().replace(b"checkpoint 1", b"checkpoint 9", 1)), "version 9"),
     ],
 )
-def test_a_bad_checkpoint_is_told_and_nothing_else_is_lost(made, tmp_path, spoil, why):
+def test_a_bad_checkpoint_is_reported_and_nothing_else_is_lost(made, tmp_path, spoil, why):
     folder, _, rows = made
     file = tmp_path / "file"
     with Robot("localisation", "health/navigator") as robot:
         options = ["--filter", "particle", "--checkpoint", file]
-        reported, health_told = killed_and_begun_anew(robot, folder, rows, options, lambda: spoil(file))
+        reported, health_reported = killed_and_begun_anew(robot, folder, rows, options, lambda: spoil(file))
     assert {(x.first_seq, x.prior) for x in reported} == {(25, "uniform")} and len(reported) == ROWS - 25
-    assert why in health_told[-1].last_error and health_told[-1].last_error.startswith(f"{file}: not used: ")
+    assert why in health_reported[-1].last_error and health_reported[-1].last_error.startswith(f"{file}: not used: ")
     assert checkpoint.load(file).seq >= 55  # written anew
 
 
@@ -327,13 +327,14 @@ def test_a_row_that_cannot_be_is_refused_and_the_pose_is_as_without_it(made, kin
             inside.run()
             got = take_until(inside.inbox, _all_over, PATIENCE_S)
         reported.append([r.message.pose.pose.xytheta for r in got if r.topic == "localisation" and not r.over])
-        health_told = [r.message for r in got if r.topic == "health/navigator" and not r.over][-1]
+        health_reported = [r.message for r in got if r.topic == "health/navigator" and not r.over][-1]
         assert (inside.counters["refused"], inside.counters["weighed"]) == (hostile, ROWS - 1)
         assert inside.counters["missed"] == 1 and inside.error is None
         assert (
-            health_told.last_error.startswith("observation: field ") == hostile and "\n" not in health_told.last_error
+            health_reported.last_error.startswith("observation: field ") == hostile
+            and "\n" not in health_reported.last_error
         )
-        assert health_told.counts["refused"] == str(int(hostile))
+        assert health_reported.counts["refused"] == str(int(hostile))
     assert reported[0] == reported[1]
 
 
@@ -352,7 +353,7 @@ def test_rows_of_another_robot_are_refused_by_name_and_the_navigator_stays(made)
     )
 
 
-def test_a_second_pilot_is_refused_and_told(made):
+def test_a_second_pilot_is_refused_and_reported(made):
     _, scene, rows = made
     with Inside(scene, "localisation", "health/navigator", lock_step=True) as inside:
         thread = threading.Thread(target=inside.run)
@@ -444,7 +445,7 @@ def test_two_hypotheses_stay_two():
     assert few["mass"][near].sum() == pytest.approx(0.5, abs=1e-3) and len(few) <= COMPONENTS_MOST
 
 
-def test_health_is_told_at_once_when_the_state_is_new(monkeypatch):
+def test_health_is_reported_at_once_when_the_state_is_new(monkeypatch):
     reported, now = [], [10.0]
 
     class Sink:
@@ -460,7 +461,7 @@ def test_health_is_told_at_once_when_the_state_is_new(monkeypatch):
     speaker = health.Health(Sink(), lambda: {"rows": len(reported)})
     for at, state in ((10.0, "running"), (10.5, "running"), (10.6, "waiting"), (11.5, "waiting"), (11.7, "waiting")):
         now[0] = at
-        speaker.tell(5, state)
+        speaker.report(5, state)
     assert [(x.state, x.counts["rows"]) for x in reported] == [("running", "0"), ("waiting", "1"), ("waiting", "2")]
 
 
@@ -488,7 +489,7 @@ def _errors(got) -> list[str]:
     return [r.message.last_error for r in got if getattr(r.message, "last_error", "")]
 
 
-def test_a_pose_that_is_told_while_running_is_gone_on_from(made):
+def test_a_pose_that_is_reported_while_running_is_gone_on_from(made):
     folder, scene, rows = made
     far_place = (scene.arena.size_m[0] - 0.4, scene.arena.size_m[1] - 0.4, -2.0)
 
@@ -514,7 +515,7 @@ def test_a_pose_that_is_told_while_running_is_gone_on_from(made):
         assert errors[0] == "initial_pose: (-1, 0) is outside the arena; give a place inside"
 
 
-def test_a_told_pose_has_a_frame_and_a_width(made):
+def test_a_reported_pose_has_a_frame_and_a_width(made):
     arena = made[1].arena
 
     def message(frame: str, sigma: float):

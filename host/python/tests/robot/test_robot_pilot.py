@@ -185,7 +185,7 @@ def test_what_is_too_old_is_left_out_and_counted(live):
     assert live.made.counters()["blocks_left_out"] == 5
 
 
-def test_health_tells_of_navigator_and_base(live):
+def test_health_reports_of_navigator_and_base(live):
     live.ring.bring(0)
     live.steps()
     live.link.peers, live.base.trouble = set(), "no base"
@@ -217,16 +217,16 @@ def test_the_command_ends_well_when_it_is_stopped_before_anything_came(capsys, m
     assert json.loads((tmp_path / "report.json").read_text())["ticks_used"] == 0
 
 
-def test_a_row_is_told_with_the_samples_at_its_end():
+def test_a_row_is_reported_with_the_samples_at_its_end():
     """As odometry is: both are of the row's own time."""
     row, report = {"t_s": 0.1}, Report((0.01, 0.0, 0.0))
     pilot = SimpleNamespace(block=lambda *_: (0.1, 0.0), odometry=lambda *_: row)
     wheels = SimpleNamespace(drive=lambda *_: None, odometry=lambda tick: report)
     reported, nothing = [], SimpleNamespace(write=lambda *_: None)
-    teller = SimpleNamespace(row=lambda *what: reported.append(what), block=lambda last: None)
+    publisher = SimpleNamespace(row=lambda *what: reported.append(what), block=lambda last: None)
     samples = np.zeros((BLOCK_TICKS, 6), SAMPLE)
     samples["alpha"] = np.arange(BLOCK_TICKS)[:, None]
-    Flight(pilot, wheels, nothing, nothing, teller).take((ODOMETRY_TICKS - BLOCK_TICKS, samples))
+    Flight(pilot, wheels, nothing, nothing, publisher).take((ODOMETRY_TICKS - BLOCK_TICKS, samples))
     ((made, moved, last),) = reported
     assert made is row and moved is report and last["alpha"].tolist() == [BLOCK_TICKS - 1] * 6
 
@@ -254,7 +254,7 @@ class Driver:
         return None
 
 
-def test_a_base_that_goes_is_told_and_found_again(monkeypatch):
+def test_a_base_that_goes_is_reported_and_found_again(monkeypatch):
     monkeypatch.setattr(wheels_module, "Base", Driver)
     monkeypatch.setattr(Driver, "alive", False)
     clock = Clock()

@@ -135,7 +135,7 @@ def test_the_newest_row_counts_and_a_measured_distance_too():
     assert [step.row.seq for step in Follower().take(rows, 3)] == [3, 7, 8, 9]
 
 
-def test_a_pilot_that_begins_anew_loses_no_motion_that_was_told():
+def test_a_pilot_that_begins_anew_loses_no_motion_that_was_reported():
     first, then = messages_of(motions(10)), messages_of(motions(7, seed=9))
     follower = Follower()
     steps = follower.take(received(first[:4]), 1)
@@ -196,7 +196,7 @@ def test_a_gap_in_time_within_a_stream_is_no_gap_in_motion():
     assert [len(step.lead()) for step in steps] == [0, 0, 50, 0] and [step.rows for step in steps] == [1] * 4
 
 
-def test_what_another_pilot_did_not_tell_stays_a_gap():
+def test_what_another_pilot_did_not_report_stays_a_gap():
     rows = messages_of(motions(9))
     follower = Follower()
     follower.take(received(rows[:3]))

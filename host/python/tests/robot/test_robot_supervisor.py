@@ -270,7 +270,7 @@ def test_it_rests_between_two_looks_and_never_longer_than_heartbeats_are_apart(t
     assert len(rests) == looks and all(0.0 <= rest <= BEAT_S for rest in rests)
 
 
-def test_health_tells_of_every_end_and_all_end_with_it(tmp_path):
+def test_health_reports_of_every_end_and_all_end_with_it(tmp_path):
     endpoint, stop, answer = free_endpoint(), threading.Event(), []
     with Link("supervisor", listen=[endpoint]) as link, Link("test", connect=[endpoint]) as mine:
         inbox = mine.subscribe("health/*")

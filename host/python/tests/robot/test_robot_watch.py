@@ -64,7 +64,7 @@ def test_without_a_supervisor_the_heart_always_beats(monkeypatch):
 
 
 @pytest.mark.parametrize("text", ["", "none", "-1", "987654"])
-def test_a_heartbeat_that_is_none_is_told(monkeypatch, text):
+def test_a_heartbeat_that_is_none_is_reported(monkeypatch, text):
     monkeypatch.setenv(VARIABLE, text)
     with pytest.raises(UserError, match=VARIABLE):
         Heartbeat.of_environment()

@@ -84,7 +84,7 @@ def test_rest_and_noise_of_every_lane(capsys, tmp_path, ring):
     assert not (tmp_path / "lane3.csv").exists()
 
 
-def test_a_lane_that_moves_or_fails_is_told():
+def test_a_lane_that_moves_or_fails_is_reported():
     frames = make_frames(1000)
     frames["lane_mask"] = 0b111
     frames["lane"]["alpha"][:, 0] = np.arange(1000)
@@ -125,7 +125,7 @@ def test_guided_it_waits_for_enter_and_forgets_what_came_before(capsys, tmp_path
     assert len(read_whisks(tmp_path / "lane3.csv", with_radius=True).contact) == 4
 
 
-def test_one_frame_is_enough_to_go_on_and_none_is_told():
+def test_one_frame_is_enough_to_go_on_and_none_is_reported():
     takes = iter([make_frames(1), make_frames(0)])
     feed = Feed(SimpleNamespace(name="made-up", two_bridges=False, take=lambda wait_s: next(takes)))
     assert len(feed.next()) == 1

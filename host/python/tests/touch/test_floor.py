@@ -45,7 +45,7 @@ def test_rest_follows_drift_and_one_block_moves_it_little():
     assert np.array_equal(whisker.rest, rest)
 
 
-def test_surfaces_are_told_apart_about_a_drifted_rest():
+def test_surfaces_are_reported_apart_about_a_drifted_rest():
     rng = np.random.default_rng(4)
     whisker = FloorWhisker(trained(rng), rng)
     drift = 27.0  # not a multiple of the step, and more than vinyl's own spread

@@ -8,7 +8,7 @@ from crunchbot_lab.simulation.scenes import make_robot
 MOUNTS = [Mount.of(whisker) for whisker in make_robot().of_role("object")]
 
 
-def test_inner_whiskers_tell_corner_from_face_by_the_turn():
+def test_inner_whiskers_report_corner_from_face_by_the_turn():
     assert [(m.corner_turn, m.face_turn) for m in MOUNTS[1:3]] == [(1.0, -1.0), (-1.0, 1.0)]
 
 

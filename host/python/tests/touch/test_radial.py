@@ -24,7 +24,7 @@ def test_fit_equals_numpys_least_squares():
     assert model.predict(5000.0) == pytest.approx((a1 * 5000 + a0, model.sigma_mm))
 
 
-def test_tip_and_shaft_are_told_by_the_outermost_radius():
+def test_tip_and_shaft_are_reported_by_the_outermost_radius():
     model = RadialModel(-0.01, 180.0, 3.0, 90.0, 138.0)
     assert [model.contact_type(mm) for mm in (100.0, 134.0, 136.0, 150.0)] == ["shaft", "shaft", "tip", "tip"]
 
@@ -90,7 +90,7 @@ def test_saved_models_load_alike(tmp_path):
     assert RadialModel.load(tmp_path / "m.json").predict(4000.0) == model.predict(4000.0)
 
 
-def test_models_whose_errors_at_left_out_places_are_alike_are_told_apart_by_left_out_contacts():
+def test_models_whose_errors_at_left_out_places_are_alike_are_reported_apart_by_left_out_contacts():
     errors = {"far": (2.5, 1.0), "near": (2.0, 1.9), "nearly": (2.2, 1.6), "none": (np.inf, np.inf)}
     errors = {name: np.array(pair) for name, pair in errors.items()}
     assert _best(errors, 30) == "nearly"  # 2.0 is known to 13 %

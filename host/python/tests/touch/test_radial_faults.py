@@ -47,7 +47,7 @@ WARNED = {
 
 
 @pytest.mark.parametrize("how", WARNED)
-def test_a_fault_is_told_in_a_line_and_the_rest_is_fitted(capsys, tmp_path, good, how):
+def test_a_fault_is_reported_in_a_line_and_the_rest_is_fitted(capsys, tmp_path, good, how):
     spoil, reported = WARNED[how]
     write(tmp_path / "c.csv", spoil(good))
     code, out, err = run(capsys, "radial", "fit", tmp_path / "c.csv", "--out", tmp_path / "m.json", "--model", "whisk")
@@ -82,7 +82,7 @@ def test_good_recordings_are_read_without_a_word(capsys, tmp_path, good):
 
 
 @pytest.mark.filterwarnings("error")
-def test_another_whisker_is_doubted_in_a_line_and_every_contact_still_told(capsys, tmp_path, good):
+def test_another_whisker_is_doubted_in_a_line_and_every_contact_still_reported(capsys, tmp_path, good):
     write(tmp_path / "c.csv", good)
     run(capsys, "radial", "fit", tmp_path / "c.csv", "--out", tmp_path / "m.json", "--model", "whisk")
     swapped = [[*row[:4], row[5], row[4]] for row in good]

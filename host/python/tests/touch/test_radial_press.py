@@ -69,7 +69,7 @@ def test_it_answers_during_the_press_and_knows_when_it_cannot_yet(fitted):
     assert at[38.0].sigma_mm <= at[12.0].sigma_mm < at[-10.0].sigma_mm
 
 
-def test_directions_are_told_apart_and_each_has_its_own_regression():
+def test_directions_are_reported_apart_and_each_has_its_own_regression():
     model = radial.fit(presses(turns=(0, 1, 2)), "press").model
     held = presses(5, repeats=2, turns=(0, 1, 2))
     found = [model.predict(c) for c in held.recorded]

@@ -177,7 +177,7 @@ def write(path, made: Whisks, columns="contact,radius_mm,t_s,whisk_rad_s,x,y"):
     path.write_text("\n".join(lines) + "\n")
 
 
-def test_the_command_tells_how_sure_it_is(capsys, tmp_path, calibrated):
+def test_the_command_reports_how_sure_it_is(capsys, tmp_path, calibrated):
     write(tmp_path / "c.csv", calibrated[1])
     assert run(capsys, "radial", "fit", tmp_path / "c.csv", "--out", tmp_path / "m.json")[0] == 0
     code, out, _ = run(capsys, "radial", "predict", tmp_path / "m.json", tmp_path / "c.csv", "--json")

@@ -50,7 +50,7 @@ def share_right(model, window, seeds=range(20, 24), **changes):
     return np.mean([d.label == k for k, d in found])
 
 
-def test_surfaces_are_told_apart_on_recordings_never_seen(model):
+def test_surfaces_are_reported_apart_on_recordings_never_seen(model):
     assert share_right(model, WINDOW) > 0.95
     assert share_right(model, WINDOW, gain=1.5) > 0.9
 
@@ -111,7 +111,7 @@ def hiss(seed, bursts, gain=1.0, n=2000, length=25):
     return np.round(32768 + gain * rng.uniform(40, 80) * np.sqrt(2 * loud + 0.2)[:, None] * rng.normal(size=(n, 1)))
 
 
-def test_what_comes_in_bursts_is_told_by_shorter_stretches(tmp_path):
+def test_what_comes_in_bursts_is_reported_by_shorter_stretches(tmp_path):
     bursty = train({f"{b}": [hiss(s, b) for s in range(6)] for b in (False, True)}, RATE_HZ)
     assert {r.shorter for r in bursty.classifiers if r.length >= WINDOW} == {STRETCHES}
     right = np.mean(
@@ -138,7 +138,7 @@ def teeth(seed, falling, n=64):
     return np.round(32768 + 400 * (saw[::-1] if falling else saw)[:, None] + rng.normal(0, 20, (n, 1)))
 
 
-def test_short_recordings_that_bands_do_not_tell_apart_are_told_by_their_shape(tmp_path):
+def test_short_recordings_that_bands_do_not_report_apart_are_reported_by_their_shape(tmp_path):
     few = train({f"{f}": [teeth(s, f) for s in range(12)] for f in (False, True)}, 640.0)
     assert len(next(c for c in few.classifiers if c.length == 64).shape) == 3 * 84
     found = [(f, d) for f in (0, 1) for s in range(20, 40) for d in few.judge(teeth(s, bool(f)), 64)]
@@ -171,7 +171,7 @@ def test_a_border_inside_or_between_windows_is_reported(model):
         assert found[-1].label == 2 and not found[0].border
 
 
-def test_a_border_is_told_before_its_window_is_full_and_what_lies_before_it_is_left_out(model):
+def test_a_border_is_reported_before_its_window_is_full_and_what_lies_before_it_is_left_out(model):
     x = np.concatenate([drag("VINYL", 1010, 60), drag("ROUGH", 590, 60)])
     x[1010:] += x[1009] - x[1010]
     found = model.judge(x, WINDOW, notices=True)
@@ -374,7 +374,7 @@ def test_commands_train_and_classify_as_promised(capsys, tmp_path, method):
         assert set(lines[0]["loglik"]) == {"VINYL", "ROUGH"} and more or len(lines) == 5
 
 
-def test_training_tells_figures_and_what_it_could_not_learn(capsys, tmp_path, recwarn):
+def test_training_reports_figures_and_what_it_could_not_learn(capsys, tmp_path, recwarn):
     """One recording of a class, a channel that never changes, rows that are not finite, a hidden folder."""
     for name in ("VINYL", "ROUGH"):
         x = drag(name, 800, 0)
@@ -560,7 +560,7 @@ def test_a_faulty_recording_is_named_with_what_is_wrong(capsys, tmp_path, fault)
     assert found == code
 
 
-def test_surfaces_that_may_be_misspelt_or_were_recorded_once_are_told(capsys, tmp_path):
+def test_surfaces_that_may_be_misspelt_or_were_recorded_once_are_reported(capsys, tmp_path):
     names = "SMOOTH", "SMOTH", "TILE1", "TILE2", "SMOOHT"
     for name in names:
         write(tmp_path / name / "0.csv", drag("VINYL", 200, 0))

@@ -30,29 +30,29 @@ def test_share_and_counts_are_those_of_the_whisk(model):
     assert model.along(np.array([[80.0, -60.0]]))[0] == pytest.approx(100.0, rel=0.01)
 
 
-def test_a_corner_is_told_where_it_is(model):
+def test_a_corner_is_reported_where_it_is(model):
     assert INNER.whisked(model, shown(model), INNER.corner_turn, 0.02) == pytest.approx(CORNER_MM, abs=5.0)
     assert INNER.whisked(model, shown(model), -INNER.corner_turn, 0.02) == pytest.approx(TIP_MM)
 
 
-def test_a_corner_on_the_side_that_was_not_calibrated_is_not_told(model):
+def test_a_corner_on_the_side_that_was_not_calibrated_is_not_reported(model):
     """Driving forward, an outer whisker meets corners on its right; its post stood on its left."""
     assert OUTER.whisked(model, shown(model, gain=-1.0), OUTER.corner_turn, 0.02) is None
 
 
-def test_a_face_that_bends_it_like_a_corner_is_told_at_the_tip(model):
+def test_a_face_that_bends_it_like_a_corner_is_reported_at_the_tip(model):
     for mount in (OUTER, INNER):
         assert mount.whisked(model, shown(model), mount.corner_turn, 0.98) == pytest.approx(TIP_MM)
 
 
-def test_a_tip_dragged_along_a_face_bends_little_and_is_told(model):
+def test_a_tip_dragged_along_a_face_bends_little_and_is_reported(model):
     weak = shown(model, 138.0, gain=0.3)
     assert model.estimate(weak).confidence < 0.5  # none of those calibrated
     for mount in (OUTER, INNER):
         assert mount.whisked(model, weak, mount.corner_turn, math.nan) == pytest.approx(TIP_MM)
 
 
-def test_what_bends_more_than_any_corner_or_to_the_other_side_is_not_told(model):
+def test_what_bends_more_than_any_corner_or_to_the_other_side_is_not_reported(model):
     for gain in (1.8, -1.0):
         caught = shown(model, 90.0, gain=gain)
         for turn in (1.0, -1.0):

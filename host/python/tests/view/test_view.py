@@ -168,7 +168,7 @@ def test_a_slow_page_gets_the_newest_and_holds_up_nobody():
         asyncio.run(scenario(writer))
 
 
-def test_rings_are_found_named_and_told_when_they_change():
+def test_rings_are_found_named_and_reported_when_they_change():
     async def scenario(writer):
         other = ring_name()
         async with view_of(writer.name) as port, page(port) as p:

@@ -60,7 +60,7 @@ class Clock:
         return self.now
 
 
-def told_model(rows: int, scene=SCENE, **options) -> RobotModel:
+def reported_model(rows: int, scene=SCENE, **options) -> RobotModel:
     model = RobotModel(scene)
     Post().play(MadeUpRun(**options), range(rows), model)
     return model
@@ -70,7 +70,7 @@ def health(name="pilot", pid=7, state="running", counters=(), error="") -> Proce
     return ProcessHealth(Header.at(0), name, pid, state, [KeyValue(*pair) for pair in counters], error)
 
 
-def test_what_no_message_has_told_is_not_known():
+def test_what_no_message_has_reported_is_not_known():
     model = RobotModel()
     assert (model.now_s, model.pose, model.truth, model.behaviour, model.row, model.belief) == (None,) * 6
     assert model.age() is None and model.rows == {"missed": None, "unseen": 0}
@@ -78,21 +78,21 @@ def test_what_no_message_has_told_is_not_known():
         ("navigator", None, False),
         ("pilot", None, False),
     ]
-    assert told_model(50, simulated=False).truth is None
+    assert reported_model(50, simulated=False).truth is None
 
 
-def test_a_row_is_told_by_whisker_whatever_the_names():
-    model = told_model(1)
+def test_a_row_is_reported_by_whisker_whatever_the_names():
+    model = reported_model(1)
     tips = {tip["name"]: dict(tip["loglik"]) for tip in model.row["tips"]}
     assert set(tips) == {"floor_left", "floor_right"} and all(set(tip) == set(ARENA.textures) for tip in tips.values())
     assert [ray["name"] for ray in model.row["rays"]] == ["object_1", "object_2", "object_3", "object_4"]
-    without = told_model(1, scene=None)
+    without = reported_model(1, scene=None)
     assert without.row["tips"] == model.row["tips"], "names can be distinguished without a scene unless textures have _"
 
 
 def test_cells_not_read_and_no_contact_are_different_things():
     touched = next(row for row in range(2000) if row % 100 < 80 and reach(SCENE.robot.of_role("object")[1], row))
-    exploring, whisking = told_model(touched + 1), told_model(91)
+    exploring, whisking = reported_model(touched + 1), reported_model(91)
     states = {ray["name"]: (ray["state"], ray["mm"]) for ray in exploring.row["rays"]}
     assert states["object_2"] == ("contact", round(1e3 * reach(SCENE.robot.of_role("object")[1], touched), 1))
     assert states["object_4"] == ("none", None)
@@ -102,7 +102,7 @@ def test_cells_not_read_and_no_contact_are_different_things():
 
 
 def test_rows_that_never_came_are_counted():
-    model = told_model(40, skip={10, 11, 30})
+    model = reported_model(40, skip={10, 11, 30})
     assert model.rows == {"missed": 3, "unseen": 3}
 
 
@@ -114,7 +114,7 @@ def test_a_pose_is_as_wide_as_its_spread_over_both_axes():
 
 
 def test_a_clock_that_began_anew_forgets_the_run_and_not_the_health():
-    model = told_model(100)
+    model = reported_model(100)
     Post().play(MadeUpRun(), range(2), model)
     assert model.run == 1 and model.now_s == 0.1
     assert len(model.path.points) == len(model.true_path.points) == 2 and model.path.end == 2
@@ -172,7 +172,7 @@ def test_a_surface_without_a_direction_is_not_drawn():
     assert not model.surfaces.reported
 
 
-def test_a_process_that_fell_silent_is_told_from_one_that_ended_and_one_never_heard():
+def test_a_process_that_fell_silent_is_reported_from_one_that_ended_and_one_never_heard():
     clock = Clock()
     model = RobotModel(clock=clock)
     for name in ("pilot", "bag"):
@@ -190,7 +190,7 @@ def test_a_process_that_fell_silent_is_told_from_one_that_ended_and_one_never_he
 
 
 def test_a_pose_that_no_arena_can_have_is_not_known():
-    model = told_model(5)
+    model = reported_model(5)
     model.take("truth", PoseStamped(Header.at(6 * ROW_NS), Pose.planar(2 * LARGEST_M, 0.0, 0.0)))
     assert model.truth is None and len(model.true_path.points) == 5
 
@@ -261,7 +261,7 @@ def test_a_page_that_does_not_acknowledge_holds_nothing_back():
     asyncio.run(scenario())
 
 
-def test_a_page_is_told_of_unknown_ground_and_not_of_tables():
+def test_a_page_is_reported_of_unknown_ground_and_not_of_tables():
     sensor = SensorTable("light", (0.0, 0.0), 0.0, 0.0, np.zeros((5, 5), np.uint8))
     arena = replace(ARENA, unknown=((0.0, 0.0, 0.5, 0.5),))
     reported = json.loads(SceneFeed(Hub([], scene=Scene(arena, replace(SCENE.robot, sensors=(sensor,)))), {}).take())
@@ -279,7 +279,7 @@ def test_a_page_is_told_of_unknown_ground_and_not_of_tables():
         (False, {"x": 0.3, "y": 2, "theta": -1.5}, "set_pose: not allowed here"),
     ],
 )
-def test_a_page_tells_a_pose_where_it_may(may, pose, said):
+def test_a_page_reports_a_pose_where_it_may(may, pose, said):
     async def scenario():
         post = Post()
         async with robot_view(post, may_set_pose=may) as (port, _), page(port) as script:

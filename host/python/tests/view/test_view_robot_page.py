@@ -91,7 +91,7 @@ def test_without_a_robot_the_page_is_that_of_the_rings_and_says_how_to_get_one()
     asyncio.run(scenario())
 
 
-def test_the_plan_shows_estimate_truth_and_belief_where_they_were_told_to_be():
+def test_the_plan_shows_estimate_truth_and_belief_where_they_were_reported_to_be():
     run = MadeUpRun(skip={100, 101})
 
     async def scenario():
@@ -118,7 +118,7 @@ def test_the_plan_shows_estimate_truth_and_belief_where_they_were_told_to_be():
     asyncio.run(scenario())
 
 
-def test_textures_are_told_apart_in_grey():
+def test_textures_are_reported_apart_in_grey():
     async def scenario():
         async with looking_at(Post()) as (b, _):
             await b.until("robotPart.scene?.arena && robotPart.plan.scale")
@@ -262,7 +262,7 @@ def test_the_daemon_of_a_ring_on_this_machine_is_among_the_processes():
         asyncio.run(scenario(writer))
 
 
-def test_a_pose_is_told_by_a_drag_on_the_plan_or_by_numbers():
+def test_a_pose_is_reported_by_a_drag_on_the_plan_or_by_numbers():
     async def scenario():
         post = Post()
         async with looking_at(post, rows=5) as (b, _):

@@ -13,7 +13,7 @@ RUNNING, ENDED = "running", "ended"
 
 
 class Health:
-    """`tell` as often as convenient, at least once a second: it sends when a second has passed or the state is new.
+    """`report` as often as convenient, at least once a second: it sends when a second has passed or the state is new.
 
     `counters()` gives what is counted, by name; asked for only when something is sent.
     """
@@ -24,7 +24,7 @@ class Health:
         self._due_s, self._state = 0.0, ""
         self._manager = Notify()
 
-    def tell(self, stamp_ns: int, state: str = RUNNING, last_error: str = "") -> None:
+    def report(self, stamp_ns: int, state: str = RUNNING, last_error: str = "") -> None:
         """`stamp_ns`: the bridge's clock as far as this process knows it."""
         self._manager.stopping() if state == ENDED else self._manager.alive()
         now = time.monotonic()

@@ -27,7 +27,7 @@ def check_port(host: str, port: int, option: str) -> None:
             probe.bind((host, port))
             probe.listen()
         except OSError as error:
-            who = _told(_holders(_sockets_at(port)))
+            who = _reported(_holders(_sockets_at(port)))
             raise HeldError(
                 f"robot: port {port} of {host}: {error.strerror}{who}; end that, or choose another with {option}"
             ) from None
@@ -40,7 +40,7 @@ def check_ring(name: str) -> None:
             pid = reader.info.writer_pid
     except RingError:
         return
-    text = f"robot: ring {name}: another process writes it{_told([pid])}"
+    text = f"robot: ring {name}: another process writes it{_reported([pid])}"
     raise HeldError(f"{text}; end that, use it with --no-daemon, or choose another name with --ring")
 
 
@@ -50,12 +50,12 @@ def check_serial(port: Path) -> str:
         return f"{port}: there is no such port yet; plug the adapter in, or look in /dev/serial/by-id for its name"
     if holders := _holders([str(port.resolve())]):
         raise HeldError(
-            f"robot: {port}: another process has it open{_told(holders)}; end that, or choose another with --port"
+            f"robot: {port}: another process has it open{_reported(holders)}; end that, or choose another with --port"
         )
     return ""
 
 
-def _told(pids: Iterable[int]) -> str:
+def _reported(pids: Iterable[int]) -> str:
     names = [f"process {pid} ({_name(pid)})" for pid in pids]
     return f", by {', '.join(names)}" if names else ""
 

@@ -134,8 +134,8 @@ class Supervisor:
     def __init__(self, table: list[Program], logs: Path, link: Link | None = None, until: str | None = None):
         self._woken, self._until, self._link = threading.Event(), until, link
         self._keepers = [Keeper(program, logs, self._woken.set) for program in table]
-        self._streams = {k.program.name: link.publish(f"{HEALTH}/{k.program.name}") for k in self._told()}
-        self._began_s, self._tell_s, self._beat_s = time.monotonic(), 0.0, 0.0
+        self._streams = {k.program.name: link.publish(f"{HEALTH}/{k.program.name}") for k in self._reported()}
+        self._began_s, self._report_s, self._beat_s = time.monotonic(), 0.0, 0.0
 
     def run(self, stop: threading.Event) -> str:
         """Returns why it ended: a line for a person. UserError: a program was given wrong arguments, or `until` failed."""
@@ -148,7 +148,7 @@ class Supervisor:
                 for keeper in self._keepers:
                     keeper.step()
                     self._beat()
-                self._tell()
+                self._report()
                 self._look(min(LOOK_S, *(keeper.wait_s() for keeper in self._keepers)))
             return "stopped"
         finally:
@@ -158,7 +158,7 @@ class Supervisor:
         """Of a program of the table; 0: it is not running."""
         return next(keeper.pid for keeper in self._keepers if keeper.program.name == name)
 
-    def _told(self) -> list[Keeper]:
+    def _reported(self) -> list[Keeper]:
         """Those that this process tells of: the others do so themselves."""
         return [k for k in self._keepers if not k.program.tells] if self._link else []
 
@@ -190,15 +190,15 @@ class Supervisor:
             for keeper in self._keepers:
                 keeper.beat()
 
-    def _tell(self) -> None:
+    def _report(self) -> None:
         now = time.monotonic()
-        if now < self._tell_s:
+        if now < self._report_s:
             return
-        self._tell_s = now + TELL_S
-        for keeper in self._told():
-            self._tell_of(keeper, RUNNING if keeper.pid else "waiting to be started again")
+        self._report_s = now + TELL_S
+        for keeper in self._reported():
+            self._report_of(keeper, RUNNING if keeper.pid else "waiting to be started again")
 
-    def _tell_of(self, keeper: Keeper, state: str) -> None:
+    def _report_of(self, keeper: Keeper, state: str) -> None:
         header = Header.at(round((time.monotonic() - self._began_s) * 1e9))
         name, counters = keeper.program.name, [KeyValue("restarts", str(keeper.restarts))]
         self._streams[name].send(ProcessHealth(header, name, keeper.pid, state, counters, keeper.last_error))
@@ -211,5 +211,5 @@ class Supervisor:
             while keeper.pid and time.monotonic() < give_up_s:
                 self._look(LOOK_S)
             keeper.close()
-        for keeper in self._told():
-            self._tell_of(keeper, ENDED)
+        for keeper in self._reported():
+            self._report_of(keeper, ENDED)

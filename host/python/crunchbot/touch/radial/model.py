@@ -28,7 +28,7 @@ PRESS_FORMAT = "whisker radial press model 1"
 # How the base moves: turn commanded, turn as the base reports it, translation, depth. As the members of Contact.
 MOTION_COLUMNS = {
     "whisk_rad_s": "whisk_rad_s",
-    "base_rad_s": "told_rad_s",
+    "base_rad_s": "reported_rad_s",
     "push_mm_s": "push_mm_s",
     "depth_mm": "depth_mm",
 }

@@ -19,7 +19,7 @@ class Contact:
     t_s: np.ndarray
     samples: np.ndarray
     whisk_rad_s: np.ndarray | None = None
-    told_rad_s: np.ndarray | None = None
+    reported_rad_s: np.ndarray | None = None
     push_mm_s: np.ndarray | None = None
     depth_mm: np.ndarray | None = None
 
@@ -39,7 +39,7 @@ def shape_of(contact: Contact):
     t_s = _column(contact, "t_s", part)
     rates = [
         ffi.NULL if getattr(contact, name) is None else _column(contact, name, part)
-        for name in ("whisk_rad_s", "told_rad_s")
+        for name in ("whisk_rad_s", "reported_rad_s")
     ]
     samples = np.ascontiguousarray(samples[part])
     trace, shape = ffi.new("struct nav_trace *"), ffi.new("struct nav_shape *")

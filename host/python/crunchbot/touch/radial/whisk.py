@@ -67,7 +67,7 @@ class WhiskModel:
             rate = None
         elif rate is None:
             rate = np.full(len(contact.t_s), math.exp(log_rate))
-        return shape_of(Contact(contact.t_s, contact.samples, rate, contact.told_rad_s))
+        return shape_of(Contact(contact.t_s, contact.samples, rate, contact.reported_rad_s))
 
     def counts_per_rad(self, whisk_rad_s: float) -> float:
         """Counts per radian by which the plug tilts; `whisk_rad_s`: of calibration, where its file did not tell."""

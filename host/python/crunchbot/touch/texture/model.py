@@ -144,7 +144,7 @@ def classify(model, t_s: np.ndarray, samples: np.ndarray, window_ms: float = 100
     found = []
     for some_t, some in zip(np.split(t_s, gaps), np.split(np.asarray(samples, float), gaps), strict=True):
         if isinstance(model, SpectralModel):
-            found += [_told(model, some_t, d) for d in model.judge(some, length, sequential)]
+            found += [_reported(model, some_t, d) for d in model.judge(some, length, sequential)]
         elif sequential:
             found += _sequential(model, some_t, some, length)
         else:
@@ -153,7 +153,7 @@ def classify(model, t_s: np.ndarray, samples: np.ndarray, window_ms: float = 100
     return found
 
 
-def _told(model: SpectralModel, t_s: np.ndarray, d) -> Decision:
+def _reported(model: SpectralModel, t_s: np.ndarray, d) -> Decision:
     label = "unknown" if d.label < 0 else model.classes[d.label]
     by_class = dict(zip(model.classes, map(float, d.loglik), strict=True))
     return Decision(float(t_s[d.end - 1]), by_class, label, model.classes[d.best], d.confidence, d.border)

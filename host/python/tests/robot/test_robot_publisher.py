@@ -10,7 +10,7 @@ from crunchbot.pilot.behaviour import BLOCK_TICKS
 from crunchbot.pilot.states import State
 from crunchbot.pilot.wheels import NO_BUMPS
 from crunchbot.robot.network.ros import PLANAR
-from crunchbot.robot.telling import TICK_NS, Teller
+from crunchbot.robot.publisher import TICK_NS, Publisher
 from crunchbot.robot.wheels import Report
 
 ROW_BLOCKS = 5
@@ -36,10 +36,10 @@ def reported():
 
     def after(*motions, rows_before=0):
         link = Heard()
-        teller, samples = Teller(link, pilot), np.zeros(0, [("alpha", "u2"), ("beta", "u2"), ("status", "u1")])
+        publisher, samples = Publisher(link, pilot), np.zeros(0, [("alpha", "u2"), ("beta", "u2"), ("status", "u1")])
         for n, motion in enumerate(motions, start=1 + rows_before):
-            teller.block(n * ROW_BLOCKS * BLOCK_TICKS - 1)
-            teller.row(ROW, Report(motion, COVARIANCE, NO_BUMPS), samples)
+            publisher.block(n * ROW_BLOCKS * BLOCK_TICKS - 1)
+            publisher.row(ROW, Report(motion, COVARIANCE, NO_BUMPS), samples)
         return link.topics["odometry"]
 
     return after
@@ -63,16 +63,16 @@ def test_the_pose_is_the_sum_of_the_motions_and_pretends_no_covariance(reported)
     assert not last.pose.covariance.any()
 
 
-def test_a_contact_is_told_once_as_it_begins_and_once_as_it_ends():
+def test_a_contact_is_reported_once_as_it_begins_and_once_as_it_ends():
     contact = SimpleNamespace(onset=-1, release=-1, touching=False)
     behaviour = SimpleNamespace(state=State.FORWARD, since=0, reason="", whisking=False)
     pilot = SimpleNamespace(contacts={2: contact}, whisks=[], names={2: "left"}, object_lanes=[2], behaviour=behaviour)
     link = Heard()
-    teller = Teller(link, pilot)
+    publisher = Publisher(link, pilot)
     changes = {2: {"onset": 90, "touching": True}, 4: {"release": 170, "touching": False}}
     for n in range(6):
         vars(contact).update(changes.get(n, {}))
-        teller.block((n + 1) * BLOCK_TICKS - 1)
+        publisher.block((n + 1) * BLOCK_TICKS - 1)
     reported = [(c.whisker, c.touching, c.onset.ns, c.release.ns, c.header.stamp.ns) for c in link.topics["contact"]]
     ends = [(n + 1) * BLOCK_TICKS * TICK_NS for n in changes]
     assert reported == [("left", True, 90 * TICK_NS, 0, ends[0]), ("left", False, 90 * TICK_NS, 170 * TICK_NS, ends[1])]

@@ -1,4 +1,4 @@
-/* What topic robot tells, in words: pose, behaviour, observation row, contacts, processes. What is not known is said so. */
+/* What topic robot says, in words: pose, behaviour, observation row, contacts, processes. What is not known is said so. */
 const AGED_S = 2; // what is older is no longer how it is
 const NATS = 10; // log-likelihoods so far below the best have no bar
 

@@ -1,4 +1,4 @@
-"""What the pilot tells the others over zenoh: observation rows, odometry, joints, contacts, behaviour."""
+"""What the pilot publishes over zenoh: observation rows, odometry, joints, contacts, behaviour."""
 
 import math
 
@@ -20,13 +20,13 @@ PARTS = {"tip": messages.TIP, "shaft": messages.SHAFT, None: messages.UNKNOWN}
 TOPICS = ("odometry", "joints", "contact", "behaviour")
 
 
-class Teller:
+class Publisher:
     """Publishes what a pilot does; `block` after each of its blocks, `row` after each of its rows."""
 
     def __init__(self, link: Link, pilot: Pilot):
         self._pilot, self._streams = pilot, {topic: link.publish(topic) for topic in TOPICS}
         self._rows, self._stamp_ns, self._pose = RowPublisher(link), 0, np.zeros(3)
-        self._told_ns: int | None = None  # stamp of the odometry before
+        self._reported_ns: int | None = None  # stamp of the odometry before
         self._contacts = {lane: (c.onset, c.release) for lane, c in pilot.contacts.items()}
         self._measured, self._state = len(pilot.whisks), None
 
@@ -40,11 +40,11 @@ class Teller:
         for lane, contact in self._pilot.contacts.items():
             if (contact.onset, contact.release) != self._contacts[lane]:
                 self._contacts[lane] = (contact.onset, contact.release)
-                self._tell_contact(lane)
+                self._report_contact(lane)
         for whisk in self._pilot.whisks[self._measured :]:
-            self._tell_measured(whisk)
+            self._report_measured(whisk)
         self._measured = len(self._pilot.whisks)
-        self._tell_behaviour()
+        self._report_behaviour()
 
     def row(self, row: Row, report: Report, samples: np.ndarray) -> None:
         """The row of the 0.1 s that end with the newest block, and the odometry and samples (lanes,) at its end."""
@@ -59,8 +59,8 @@ class Teller:
             stream.end(self._stamp_ns, reason)
 
     def _odometry(self, report: Report) -> messages.Odometry:
-        since_s = 1e-9 * (ROW_NS if self._told_ns is None else self._stamp_ns - self._told_ns)
-        self._told_ns, self._pose = self._stamp_ns, compose(self._pose, report.motion)
+        since_s = 1e-9 * (ROW_NS if self._reported_ns is None else self._stamp_ns - self._reported_ns)
+        self._reported_ns, self._pose = self._stamp_ns, compose(self._pose, report.motion)
         header = messages.Header.at(self._stamp_ns, ODOMETRY_FRAME)
         speeds, covariance = np.divide(report.motion, since_s), report.covariance / since_s**2
         pose = messages.PoseWithCovariance(messages.Pose.planar(*self._pose))
@@ -73,12 +73,12 @@ class Teller:
         header = messages.Header.at(self._stamp_ns, BASE_FRAME)
         return messages.JointState(header, names, ((angles - MIDDLE) * RAD_PER_COUNT).ravel())
 
-    def _tell_contact(self, lane: int) -> None:
+    def _report_contact(self, lane: int) -> None:
         contact, name = self._pilot.contacts[lane], self._pilot.names[lane]
         release = 0 if contact.touching else contact.release
         self._send("contact", self._contact(name, contact.touching, contact.onset, release))
 
-    def _tell_measured(self, whisk: dict) -> None:
+    def _report_measured(self, whisk: dict) -> None:
         reported = self._contact(whisk["whisker"], False, whisk["onset"], whisk["release"])
         reported.measured = whisk["distance_mm"] is not None
         if reported.measured:
@@ -92,7 +92,7 @@ class Teller:
         times = (messages.Time.of(max(0, tick) * TICK_NS) for tick in (onset, release))
         return messages.Contact(header, name, touching, *times)
 
-    def _tell_behaviour(self) -> None:
+    def _report_behaviour(self) -> None:
         behaviour = self._pilot.behaviour
         if behaviour.state is not self._state:
             self._state = behaviour.state
