@@ -262,7 +262,7 @@ def pack(board: Board, out: Path) -> Path:
 
 
 def add_images(board: Board, lanes: int, bitstream: Path) -> None:
-    """Beside a bitstream: its image for `whisker flash`, and the page that leads to the image to fall back to."""
+    """Writes beside a bitstream its image for `whisker flash`, and the page that leads to the image to fall back to."""
     content = image.gateware_image(bitstream.read_bytes(), board.number, lanes, int(commit(), 16))
     bitstream.with_suffix(".wgw").write_bytes(content)
     jump = image.jump_page(image.fallback_address(board.flash))

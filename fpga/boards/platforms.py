@@ -95,7 +95,7 @@ CYNTHION = Platform(
 
 
 def platforms() -> dict[str, Platform]:
-    """By the name of our file."""
+    """The platform by the name of our file."""
     from amaranth_boards.ecpix5 import ECPIX545Platform
     from amaranth_boards.tang_primer_20k import TangPrimer20kDockPlatform
     from amaranth_boards.ulx3s import ULX3S_85F_Platform

@@ -141,7 +141,7 @@ def pin_limits(speed: int, phy: str) -> dict[str, float]:
 
 
 def late(speed: int, phy: str) -> float:
-    """By how much at most the PHY's clock runs behind the FPGA's, in ns."""
+    """The most by which the PHY's clock runs behind the FPGA's, in ns."""
     return PADS[speed].clock_to_pin if PHYS[phy].clock_out else 0.0
 
 

@@ -163,7 +163,7 @@ class Rig:
         await self.step()
 
     async def quiet(self):
-        """Until every byte in the FIFO has been read."""
+        """Steps until every byte in the FIFO has been read."""
         length = -1
         while length != len(self.host.data):
             length = len(self.host.data)

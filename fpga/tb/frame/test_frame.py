@@ -103,7 +103,7 @@ async def send(dut, f: dict[str, int], is_last: bool = False):
 
 
 async def finished(dut):
-    """Until the framer has handed over its last byte."""
+    """Steps until the framer has handed over its last byte."""
     await FallingEdge(dut.clk)
     if int(dut.busy.value):
         await FallingEdge(dut.busy)
@@ -111,7 +111,7 @@ async def finished(dut):
 
 
 async def drained(dut, stream: Stream):
-    """Until nothing has come out for a while."""
+    """Steps until nothing has come out for a while."""
     length = -1
     while length != len(stream.data):
         length = len(stream.data)

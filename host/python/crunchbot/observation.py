@@ -126,13 +126,13 @@ class Row(Mapping):
 
     @classmethod
     def of(cls, cells: Mapping[str, float | None], kind: int = EXPLORING) -> "Row":
-        """From cells by column; KeyError when time or motion is missing."""
+        """Makes a row from cells by column; KeyError when time or motion is missing."""
         names = tuple(name for name in cells if name != TIME and name not in ODOMETRY)
         return cls.made(kind, cells[TIME], [cells[name] for name in ODOMETRY], names, [cells[name] for name in names])
 
     @classmethod
     def made(cls, kind: int, t_s: float, motion, names: tuple[str, ...], cells: Iterable[float | None]) -> "Row":
-        """From the cells of these columns in order."""
+        """Makes a row from the cells of these columns in order."""
         cells = list(cells)
         found = [EMPTY if v is None else NOT_READ if math.isnan(v) else VALUE for v in cells]
         numbers = [v if k == VALUE else 0.0 for v, k in zip(cells, found, strict=True)]
@@ -163,7 +163,7 @@ class Row(Mapping):
         return np.where(cells == VALUE, self.numbers[at], np.where(cells == EMPTY, empty, math.nan))
 
     def find(self, names: Iterable[str]) -> np.ndarray:
-        """As `read`, nan at columns that are missing."""
+        """Reads as `read` does, with nan at columns that are missing."""
         known = _positions(self.names)
         at = [known.get(name, -1) for name in names]
         values = np.where(self.cells == VALUE, self.numbers, math.nan)

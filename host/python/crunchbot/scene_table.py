@@ -68,7 +68,7 @@ class Table:
         return name
 
     def tables(self, key: str, most: int) -> list["Table"]:
-        """At most so many tables; none if the key is missing."""
+        """Returns at most so many tables; none if the key is missing."""
         value = self.content.pop(key, [])
         if not isinstance(value, list) or not all(isinstance(item, dict) for item in value):
             raise self.fail(key, f"must be tables; write each as [[{key}]]")

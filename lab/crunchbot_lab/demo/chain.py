@@ -71,7 +71,7 @@ class ChainRun:
 
 @dataclass(frozen=True)
 class Places(parts.Places):
-    """With endpoints for zenoh."""
+    """Where the processes of a chain meet: at endpoints of zenoh, too."""
 
     pilot: str
     navigator: str

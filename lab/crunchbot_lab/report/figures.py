@@ -48,7 +48,7 @@ def arena(run: Run) -> Figure:
 
 
 def texture(run: Run) -> Figure:
-    """As the paper's Fig. 4: what each floor whisker reported, over its true tile, with the deflection below."""
+    """A chart as the paper's Fig. 4: what each floor whisker reported, over its true tile, with the deflection below."""
     figure = Figure(figsize=(11.4, 5.4), layout="constrained")
     names = run.texture_names
     panels = figure.subplots(2 * len(names), 1, sharex=True, height_ratios=[3, 2] * len(names))
@@ -62,7 +62,7 @@ def texture(run: Run) -> Figure:
 
 
 def radial(run: Run) -> Figure:
-    """As the paper's Fig. 5: peak deflection against radial distance, one panel a whisker, with its fitted line."""
+    """A chart as the paper's Fig. 5: peak deflection against radial distance, one panel a whisker, with its fitted line."""
     figure = Figure(figsize=(11.4, 3.2), layout="constrained")
     panels = figure.subplots(1, len(run.object_names), sharex=True, sharey=True, squeeze=False)[0]
     for axes, name in zip(panels, run.object_names, strict=True):

@@ -12,7 +12,7 @@ DECIMALS = 6  # m, rad, nats; distances are rounded in mm to three
 
 
 def rounded(observations: Observations) -> Observations:
-    """With the digits that the file keeps."""
+    """Rounds observations to the digits that the file keeps."""
     truth = observations.truth
     return Observations(
         np.round(observations.t_s, DECIMALS),

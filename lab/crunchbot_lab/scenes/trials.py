@@ -67,7 +67,7 @@ def _faulty(run: localise.Run) -> int:
 
 
 def _judged(run: localise.Run, rows: Observations, distance: np.ndarray, regions: int, locked: int) -> dict:
-    """At evenly spread rows: level and area of the region, confidence, error; `locked`: the first row after lock."""
+    """Judges evenly spread rows: level and area of the region, confidence, error; `locked`: the first row after lock."""
     at = localise.judged_rows(rows, regions)
     return {
         "after_lock": [row >= locked for row in at],

@@ -113,7 +113,7 @@ def signal_writer(ring: str, number: int) -> None:
 
 @dataclass(frozen=True)
 class Clock:
-    """From the bridge's clock to the host's (struct whisker_clock)."""
+    """The conversion from the bridge's clock to the host's (struct whisker_clock)."""
 
     device_cycles: int
     monotonic_ns: int

@@ -80,7 +80,7 @@ def describe_ring(reader: Reader) -> dict:
 
 
 def lines(reported: dict) -> list[str]:
-    """As a person reads it: a heading per part, a line per value."""
+    """The text for a person: a heading per part, a line per value."""
     out = []
     for part, values in reported.items():
         tables = values if isinstance(values, list) else [values]

@@ -117,7 +117,7 @@ def classify(arguments) -> int:
 
 
 def decisions(arguments, model, path, window_ms: float) -> list:
-    """Of one recording; its faults are warned of."""
+    """Classifies one recording; its faults are warned of."""
     t_s, samples = texture.read_recording(path, getattr(model, "columns", None), warn)
     if samples.shape[1] != model.channels:
         text = f"{samples.shape[1]} channels, but the model has {model.channels}; use recordings of the same sensor"

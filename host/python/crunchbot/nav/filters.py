@@ -104,7 +104,7 @@ class Sensor:
 
     @property
     def count(self) -> int:
-        """Of codes."""
+        """The number of codes."""
         known = self.codes[self.codes < SENSOR_UNKNOWN]
         return self.levels or (int(known.max()) + 1 if len(known) else 1)
 

@@ -12,7 +12,7 @@ from .observations import Observations
 
 @dataclass
 class Motion:
-    """Of one row, in the robot's frame before it."""
+    """The motion of one row, in the robot's frame before it."""
 
     step: np.ndarray  # (3,): x, y in m, theta in rad
     sigma_m: float  # per axis

@@ -58,7 +58,7 @@ class Felt:
     slip: float = 0.0
 
     def after(self, motion: np.ndarray, tick: int) -> "Felt":
-        """The same from where the robot is at `tick`, after this motion."""
+        """What was felt, as seen from where the robot is at `tick`, after this motion."""
         x, y = self.point[0] - motion[0], self.point[1] - motion[1]
         c, s = math.cos(motion[2]), math.sin(motion[2])
         normal = math.remainder(self.normal - motion[2], 2.0 * math.pi)

@@ -24,7 +24,7 @@ def contact_type(mount: Mount, distance_mm: float | None) -> str | None:
 
 
 def move_for_tip(mount: Mount, distance_mm: float, aim_mm: float = AIM_MM) -> TipMove | None:
-    """From the pose in which the unbent whisker just touches at `distance_mm`; None when no small move does it."""
+    """The move from the pose in which the unbent whisker just touches at `distance_mm`; None when no small move does it."""
     x, y = _point(mount, 1e-3 * distance_mm)
     aim_x, aim_y = _point(mount, 1e-3 * (mount.length_mm - aim_mm))
     reach = math.hypot(aim_x, aim_y)
@@ -39,6 +39,6 @@ def move_for_tip(mount: Mount, distance_mm: float, aim_mm: float = AIM_MM) -> Ti
 
 
 def _point(mount: Mount, radius_m: float) -> tuple[float, float]:
-    """Of the shaft at this radius, robot frame, m."""
+    """The place of the shaft at this radius, robot frame, m."""
     along = (math.cos(mount.yaw_rad), math.sin(mount.yaw_rad))
     return mount.base_m[0] + radius_m * along[0], mount.base_m[1] + radius_m * along[1]

@@ -16,7 +16,7 @@ class Wheels:
 
     @classmethod
     def stepped(cls, step_m_s: float, track_m: float, effect_ticks: int = EFFECT_TICKS) -> "Wheels":
-        """Of a base whose wheel speeds are multiples of `step_m_s`: the nearest to the paper's that move at all."""
+        """The wheels of a base whose speeds are multiples of `step_m_s`: the nearest to the paper's that move at all."""
 
         def nearest(wheel_m_s: float) -> float:
             return step_m_s * max(1, round(wheel_m_s / step_m_s))
@@ -25,7 +25,7 @@ class Wheels:
 
     @property
     def push_ticks(self) -> int:
-        """Of the push from the onset: the angle is the same at any rate."""
+        """Ticks of the push from the onset: the angle is the same at any rate."""
         return round(PUSH_TICKS * WHISK_RAD_S / self.whisk_rad_s)
 
 
@@ -45,7 +45,7 @@ class Bumps:
 
     @classmethod
     def of_bits(cls, bits: int) -> "Bumps":
-        """Of the bits of whisker-base's odometry messages."""
+        """The flags that the bits of whisker-base's odometry messages stand for."""
         return cls(
             left=bool(bits & base.BUMP_LEFT),
             right=bool(bits & base.BUMP_RIGHT),

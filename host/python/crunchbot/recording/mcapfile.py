@@ -65,7 +65,7 @@ class McapFile:
 
     @property
     def topics(self) -> set[str]:
-        """As far as they are known by now."""
+        """The topics that are known by now."""
         return {channel.topic for channel in self._channels.values()}
 
     def note(self, text: str) -> None:
@@ -103,7 +103,7 @@ class McapFile:
         self._check_end()
 
     def _is_mcap(self) -> bool:
-        """By its first or last bytes, or by anything else that only such files have."""
+        """A file is recognised by its first or last bytes, or by anything else that only such files have."""
         ends = (self._walk.read(0, len(MAGIC)), self._walk.read(max(self._walk.size - len(MAGIC), 0), len(MAGIC)))
         return MAGIC in ends or self._walk.search(0, min(self._walk.size, SEARCHED)) is not None
 

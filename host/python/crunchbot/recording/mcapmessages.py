@@ -48,7 +48,7 @@ def add_channel(channels: dict[int, Channel], body: memoryview) -> None:
 
 
 class Reading:
-    """From front to back. `messages` first; then `check_rest` and `losses`."""
+    """Reads a file from front to back. Call `messages` first; then `check_rest` and `losses`."""
 
     def __init__(self, walk: Walk, channels: dict[int, Channel], is_index_whole: bool, note: Callable[[str], None]):
         """`channels`: of the index at the file's end, added to; what the index counts matters if it is whole."""

@@ -144,7 +144,7 @@ def with_length(body: memoryview) -> memoryview:
 
 
 def _unpack(compression: str, packed: memoryview, size: int) -> bytes | memoryview:
-    """At most size + 1 bytes."""
+    """Returns at most size + 1 bytes."""
     try:
         if compression == "zstd":
             return zstandard.ZstdDecompressor(max_window_size=CHUNK_MOST).stream_reader(packed).read(size + 1)

@@ -95,7 +95,7 @@ class Walk:
             raise self._unreadable(error) from error
 
     def read(self, place: int, count: int) -> bytes:
-        """At most `count` bytes, fewer at the end of the file. RecordingError when the file cannot be read."""
+        """Reads at most `count` bytes, fewer at the end of the file. RecordingError when the file cannot be read."""
         try:
             return os.pread(self._number, count, place)
         except OSError as error:
@@ -234,7 +234,7 @@ class Walk:
         return opcode in SHAPES and size <= self.size - place - RECORD.size
 
     def _chunk(self, place: int, size: int) -> Record:
-        """By its length, if that agrees with the length inside; else by whichever of the two its checksum confirms."""
+        """A chunk. Its end follows from its length, if the length inside agrees; else from the one that the checksum confirms."""
         left = self.size - place - RECORD.size
         inner = self._inner_size(place, left)
         if inner == size and size <= RECORD_MOST:

@@ -60,7 +60,7 @@ class Recording:
 
     @property
     def clock_hz(self) -> float:
-        """Of the bridge: what one unit of time_cycles is."""
+        """The bridge's clock: what one unit of time_cycles is."""
         try:
             clock_hz = float(self.metadata.get("clock_hz", ""))
         except ValueError:

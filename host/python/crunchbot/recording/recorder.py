@@ -1,4 +1,4 @@
-"""From a ring to a recording, without loss: what is lost before or in spite of it is said in the file."""
+"""Writes a ring to a recording without loss. The file says what was lost before."""
 
 import threading
 import time

@@ -1,4 +1,4 @@
-"""From a recording to a ring: the same frames, bit for bit, in their own time or any other."""
+"""Writes a recording to a ring: the same frames, bit for bit, at their own pace or any other."""
 
 import threading
 import time

@@ -39,7 +39,7 @@ class ChunkWriter(Writer):
     """The package's writer, whose chunks describe the channels that they use: each can be read without the others."""
 
     def add_message(self, channel_id: int, *arguments) -> None:
-        """As the package's. It has no public way to repeat a channel; the names are those of the pinned release."""
+        """Works as the package's method. It has no public way to repeat a channel; the names are those of the pinned release."""
         if channel_id not in self._Writer__chunk_builder.message_indices:
             self._Writer__chunk_builder.add_channel(self._Writer__channels[channel_id])
         super().add_message(channel_id, *arguments)

@@ -88,7 +88,7 @@ class Bag:
         return self._clock.row(stamp_ns) if one.topic == "observation" else self._clock.other(stamp_ns)
 
     def run(self, link: Link, stop: threading.Event, stay: bool = False) -> dict[str, int]:
-        """Until all streams but health have ended (unless `stay`), or stopped. Returns what was counted."""
+        """Records until all streams but health have ended (unless `stay`), or until stopped. Returns the counters."""
         inbox = link.subscribe("**")
         health = Health(link, lambda: self.counters(inbox))
         link.announce()

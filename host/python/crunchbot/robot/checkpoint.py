@@ -44,7 +44,7 @@ class Checkpoint:
 
 
 def identity(scene: Scene) -> str:
-    """Of what a belief is about: arena and robot. Priors may differ."""
+    """A hash of what a belief is about: arena and robot. Priors may differ."""
     return sha256(repr((scene.arena, scene.robot)).encode()).hexdigest()
 
 

@@ -146,7 +146,7 @@ class Navigator:
             self._prior = GIVEN
 
     def _recall(self, received: list[Received]) -> None:
-        """With the first row: go on from where another navigator was, if it left word."""
+        """At the first row: goes on from where another navigator was, if it left a checkpoint."""
         first = next((r for r in received if not r.over), None)
         if first and (recalled := self._memory.recall(first)):
             place, self._beliefs_before = recalled
@@ -168,7 +168,7 @@ class Navigator:
         time.sleep(max(0.0, self._settings.drill_step_s - self._step_s))
 
     def _belief_is_due(self) -> bool:
-        """At the belief's pace; live, rows go first: when publishing it is much work it is published less often."""
+        """A belief is due at its own pace. In live runs rows go first: a belief that costs much to publish is published less often."""
         due = self._now_ns >= self._belief_due_ns or self._belief_due_ns > self._now_ns + BELIEF_NS
         return due and (self._link.lock_step or time.monotonic() >= self._belief_rest_s)
 

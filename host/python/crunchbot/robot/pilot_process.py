@@ -61,7 +61,7 @@ class Flight:
 
 
 def fly_in_step(flight: Flight, reader: Reader, publisher: Publisher | None) -> None:
-    """From the ring to drives and rows until the ring is closed."""
+    """Turns the ring's blocks into drives and rows until the ring is closed."""
     for block in blocks(reader, len(flight.pilot.names)):
         flight.take(block)
     if publisher:

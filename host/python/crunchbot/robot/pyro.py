@@ -169,7 +169,7 @@ class Results:
         return message.seq
 
     def _judge(self, row: Observation) -> None:
-        """As a receiver would, before it is sent. ValueError, which Pyro can hand to the client."""
+        """Judges a row as a receiver would, before it is sent. ValueError, which Pyro can hand to the client."""
         one = Received("observation", row, Envelope(0, row.seq, 0))
         try:
             decode(Observation, encode(row), "row")
@@ -179,7 +179,7 @@ class Results:
             raise ValueError(f"row: {fault}")
 
     def end(self) -> None:
-        """Of what was written here: its readers know that no more comes."""
+        """Ends the streams that were written here: their readers then know that no more comes."""
         if self._rows:
             self._rows.end("server stopped")
 
@@ -226,7 +226,7 @@ class Server:
         return self._results.counters() | {"refused": self._inbox.refused}
 
     def run(self, stop: threading.Event) -> None:
-        """Until `stop` is set."""
+        """Serves until `stop` is set."""
         self._link.announce()
         listener = threading.Thread(target=self._listen, args=[stop])
         listener.start()

@@ -30,7 +30,7 @@ class Mount:
 
     @classmethod
     def of(cls, whisker: Whisker) -> "Mount":
-        """From the robot's description; lengths in m, robot frame x forward, y left."""
+        """Makes a mount from the robot's description; lengths in m, robot frame x forward, y left."""
         tip_y = whisker.base_m[1] + whisker.length_m * math.sin(whisker.yaw_rad)
         corner_turn = math.copysign(1.0, -math.sin(whisker.yaw_rad))
         face_turn = math.copysign(1.0, -tip_y)

@@ -85,7 +85,7 @@ class Hub:
         self.source.set_pose(tuple(map(float, pose)))
 
     async def next_round(self) -> None:
-        """Until the rings have been read once more."""
+        """Waits until the rings have been read once more."""
         await self._round.wait()
 
     async def run(self) -> None:

@@ -149,7 +149,7 @@ class RobotModel:
         self.row = {"seq": row.seq, "kind": KINDS[row.kind], "tips": tips, "rays": rays}
 
     def _column(self, name: str) -> Column:
-        """By the scene's layout, or, without one, by the name alone."""
+        """The column of this name, by the scene's layout, or, without a scene, by the name alone."""
         known = self.scene.layout.get(name) if self.scene else None
         return known or parse(name)
 

@@ -156,13 +156,13 @@ class Link:
         self._kept.append(self._session.liveliness().declare_token(f"{self._prefix}{ALIVE}/{self.process}"))
 
     def wait_for(self, processes: Iterable[str], timeout_s: float | None = None) -> bool:
-        """Until all these have announced themselves; False when some have not within `timeout_s`."""
+        """Waits until all these have announced themselves; False when some have not within `timeout_s`."""
         wanted = set(processes)
         with self._peers_changed:
             return self._peers_changed.wait_for(lambda: wanted <= self.peers, timeout_s)
 
     def wait_gone(self, process: str, timeout_s: float | None = None) -> bool:
-        """Until a process is no longer there; False when it still is after `timeout_s`."""
+        """Waits until a process is no longer there; False when it still is after `timeout_s`."""
         with self._peers_changed:
             return self._peers_changed.wait_for(lambda: process not in self.peers, timeout_s)
 

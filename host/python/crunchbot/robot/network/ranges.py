@@ -35,12 +35,12 @@ class Range:
 
 
 def about(most: float, **more) -> Range:
-    """From -most to most."""
+    """The range from -most to most."""
     return Range(-most, most, **more)
 
 
 def up_to(most: float, **more) -> Range:
-    """From 0 to most."""
+    """The range from 0 to most."""
     return Range(0, most, **more)
 
 

@@ -90,7 +90,7 @@ class Step:
     within_ns: int = 0  # the time in which the motion was; 0: not all of what was moved since the last step is reported
 
     def last(self) -> Row:
-        """With what `lead` leaves of the motion."""
+        """The row itself, with what `lead` leaves of the motion."""
         return to_row(self.row, self._piece(self._count()), self.t_ns)
 
     def lead(self) -> list[Row]:
@@ -105,7 +105,7 @@ class Step:
         return [replace(last, t_s=t_s, motion=self._piece(n), cells=read) for n, t_s in enumerate(times, 1)]
 
     def _count(self) -> int:
-        """Of the pieces: one a row, and none that a filter refuses as long as there are not too many."""
+        """How many pieces: one a row, and none that a filter refuses as long as there are not too many."""
         x, y, turn = self._way()
         fitting = max(math.ceil(math.hypot(x, y) / MOST_M), math.ceil(abs(turn) / MOST_RAD))
         return max(1, min(max(round(self.within_ns / ROW_NS), fitting), PIECES_MOST))
@@ -148,7 +148,7 @@ class Follower:
 
     @property
     def first_seq(self) -> int:
-        """Of the first row that came; 0 while none has."""
+        """The number of the first row that came; 0 while none has."""
         return self._first.seq if self._first else 0
 
     def resume(self, place: Place) -> None:

@@ -43,7 +43,7 @@ class Sources:
             self.changes += 1
 
     def judge(self, topic: str, present: int | None, stream: int) -> Verdict:
-        """Of a message of `stream`, by a reader that takes those of the stream `present` (None: of none yet)."""
+        """Judges a message of `stream` for a reader that takes those of the stream `present` (None: of none yet)."""
         with self._lock:
             known = self._alive.get(topic, {})
             if stream not in known:

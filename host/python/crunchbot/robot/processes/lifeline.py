@@ -30,7 +30,7 @@ class Lifeline:
         self.reading, self._writing = os.pipe2(os.O_CLOEXEC)
 
     def tie(self, group: int, sign: int) -> None:
-        """From now on this process group has the signal when the pipe closes; the child alone holds the reading end."""
+        """Ties a process group to the pipe: it gets the signal when the pipe closes. The child alone holds the reading end."""
         fcntl.fcntl(self.reading, fcntl.F_SETSIG, sign)
         fcntl.fcntl(self.reading, fcntl.F_SETOWN, -group)
         fcntl.fcntl(self.reading, fcntl.F_SETFL, fcntl.fcntl(self.reading, fcntl.F_GETFL) | os.O_ASYNC)

@@ -57,23 +57,23 @@ class Places:
 
     @property
     def serial(self) -> Path:
-        """Of the simulated base."""
+        """The serial port of the simulated base."""
         return self.folder / "create"
 
     @property
     def checkpoint(self) -> Path:
-        """Of the navigator; the folder's life is the run's, so none is older than that."""
+        """The navigator's checkpoint. The folder is made for the run, so no checkpoint is older than the run."""
         return self.folder / "navigator.checkpoint"
 
     @property
     def environment(self) -> Path:
-        """Of a process that is to see the simulated bridge."""
+        """The file with the environment of a process that is to see the simulated bridge."""
         return self.folder / "environment"
 
 
 @dataclass(frozen=True)
 class Meeting(Places):
-    """With those of other machines, at three ports of one address."""
+    """Where processes of several machines meet: at three ports of one address, too."""
 
     address: str = LOOPBACK
     first_port: int = FIRST_PORT

@@ -70,7 +70,7 @@ class Keeper:
         return True
 
     def wait_s(self) -> float:
-        """At most so long until `step` has something to do."""
+        """Seconds until `step` has something to do, at most."""
         if self.pid:
             return LOOK_S
         return LEAVE_LOOK_S if self._child else max(0.0, self._due_s - self._clock())
@@ -155,7 +155,7 @@ class Supervisor:
             self._close()
 
     def pid(self, name: str) -> int:
-        """Of a program of the table; 0: it is not running."""
+        """The process number of a program of the table; 0: it is not running."""
         return next(keeper.pid for keeper in self._keepers if keeper.program.name == name)
 
     def _reported(self) -> list[Keeper]:

@@ -51,7 +51,7 @@ class CurveModel(Known):
 
     @classmethod
     def of(cls, fields: Fields) -> "CurveModel":
-        """From what `content` gave; ValueError names the field that is wrong."""
+        """Makes a model from what `content` gave; ValueError names the field that is wrong."""
         numbers = {name: fields.number(name) for name in cls.NUMBERS[:4]} | {"scale": fields.number("scale", LEAST)}
         radii = zip(cls.NUMBERS[5:], radii_of(fields, *cls.NUMBERS[5:]), strict=True)
         return cls({"kind": fields.text("kind", *cls.KINDS)} | numbers | dict(radii))

@@ -96,11 +96,11 @@ class RadialModel(Known):
 
     @classmethod
     def of(cls, fields: Fields) -> "RadialModel":
-        """From what `content` gave."""
+        """Makes a model from what `content` gave."""
         return cls(fields.number("a1"), fields.number("a0"), *radii_of(fields, "sigma_mm", "low_mm", "high_mm"))
 
     def save(self, path) -> None:
-        """As JSON, for `load`."""
+        """Writes the model as JSON, for `load`."""
         save(self, path)
 
     @classmethod
@@ -226,7 +226,7 @@ def fit(whisks: Whisks, name: str = "default") -> Fitted:
 
 
 def _best(errors: dict[str, np.ndarray], contacts: int) -> str:
-    """By RMS errors of places and of contacts left out. The RMS of n errors has a relative standard error of (2 n)^-1/2."""
+    """Compares models by the RMS errors of places and of contacts left out. The RMS of n errors has a relative standard error of (2 n)^-1/2."""
     least = min(place for place, _ in errors.values()) * (1.0 + 1.0 / np.sqrt(2.0 * contacts))
     return min((one for one in errors if errors[one][0] <= least), key=lambda one: tuple(errors[one][::-1]))
 

@@ -183,7 +183,7 @@ class Stage:
 
     @classmethod
     def of(cls, fields: Fields, axes: int) -> "Stage":
-        """From what PressModel.content gave."""
+        """Makes a model from what PressModel.content gave."""
         features = 1 + axes + 2
         columns = 2 + features + CENTRES
         shapes = {"mean": (features,), "scale": (features,), "span": (2,), "weights": (columns,)}
@@ -254,7 +254,7 @@ class PressModel(Known):
 
     @classmethod
     def fit(cls, contacts: list[Contact], radius_mm, direction_deg=None) -> "PressModel":
-        """From contacts at known radii (n,) mm, and directions (n,) degrees where known; ValueError when too few."""
+        """Fits a model to contacts at known radii (n,) mm, and directions (n,) degrees where known; ValueError when too few."""
         radii = np.asarray(radius_mm, np.float64)
         directions = np.full(len(radii), np.nan) if direction_deg is None else np.asarray(direction_deg, np.float64)
         window = ONSET_SHARE * min((_reach(contact) for contact in contacts), default=0.0)
@@ -311,7 +311,7 @@ class PressModel(Known):
 
     @classmethod
     def of(cls, fields: Fields) -> "PressModel":
-        """From what `content` gave; ValueError names the field that is wrong."""
+        """Makes a model from what `content` gave; ValueError names the field that is wrong."""
         axes = fields.whole("axes", 1, AXES_MOST)
         numbers = {name: fields.number(name, 0.0, RADIUS_MOST_MM) for name in cls.NUMBERS}
         fields.number("low_mm", LEAST, numbers["high_mm"])

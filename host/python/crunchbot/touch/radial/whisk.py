@@ -32,7 +32,7 @@ class WhiskModel:
 
     @classmethod
     def of(cls, fields: Fields) -> "WhiskModel":
-        """From what `content` gave; ValueError names the field that is wrong."""
+        """Makes a model from what `content` gave; ValueError names the field that is wrong."""
         found = {name: fields.number(name) for name in cls.SCALARS[1:]}
         for name in ("spread", "kappa", "direction_sd", "log_misfit_sd", "low_mm"):
             fields.number(name, LEAST)
@@ -90,7 +90,7 @@ class WhiskModel:
         return math.exp(lib.nav_whisk_height(self._c.kappa, self._c.cone_mm, radius_mm))
 
     def share_of(self, shape) -> float:
-        """The same as a whisk shows it, negative when it bent away from the direction of calibration; nan: no whole whisk."""
+        """What `share` gives for a radius, as a whisk shows it; negative: bent away from the direction of calibration; nan: no whole whisk."""
         if shape.quality != lib.NAV_SHAPE_WHOLE or not (shape.turn > 0 and shape.peak > 0):
             return math.nan
         turned = math.log(shape.turn) - self._c.mean[TERMS.index("turn")]
@@ -105,7 +105,7 @@ class WhiskModel:
 
     @classmethod
     def fit(cls, shapes: list, radius_mm, axes: int) -> "WhiskModel":
-        """From shapes of contacts at known radii; ValueError when too few are usable or all at one radius."""
+        """Fits a model to shapes of contacts at known radii; ValueError when too few are usable or all at one radius."""
         radii = np.asarray(radius_mm, np.float64)
         use = [
             n for n, s in enumerate(shapes) if s.quality == lib.NAV_SHAPE_WHOLE and s.peak > 0 and np.isfinite(radii[n])

@@ -62,7 +62,7 @@ class Change:
 def fit_change(
     parts: list[np.ndarray], labels: np.ndarray, folds: np.ndarray, length: int, floor: np.ndarray
 ) -> Change | None:
-    """From cleaned recordings (n, channels), their classes and folds; the limit from recordings left out in turn.
+    """Fits the detector to cleaned recordings (n, channels), their classes and folds; the limit from recordings left out in turn.
 
     None when they are too short to tell a limit."""
     if min(map(len, parts)) < length:

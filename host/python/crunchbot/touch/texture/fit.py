@@ -61,7 +61,7 @@ def fit(data: Windows, floor: np.ndarray) -> Fitted:
 
 
 def _better(so_far: "_Trial", change: dict, must_gain: float) -> "_Trial":
-    """With features of another kind, where there is something to gain and they pay."""
+    """Adds features of another kind, where there is something to gain and they pay."""
     if so_far.best.loss <= LEAST_GAIN:
         return so_far
     found = _Trial(so_far.data, so_far.kind | change, HIDDEN[:1])
@@ -191,5 +191,5 @@ def temperature(scores: np.ndarray, label: np.ndarray, weight: np.ndarray | None
 
 
 def log_posterior(loglik: np.ndarray, label: np.ndarray) -> np.ndarray:
-    """Of the right class under equal priors, nats; log-likelihoods (m, classes), best 0 -> (m,)."""
+    """Log posterior of the right class under equal priors, nats; log-likelihoods (m, classes), best 0 -> (m,)."""
     return loglik[np.arange(len(label)), label] - np.log(np.exp(loglik).sum(axis=1))

@@ -310,7 +310,7 @@ def rate_faults(t_s: np.ndarray, trained_hz: float) -> list[str]:
 
 
 def longest_run(x: np.ndarray) -> int:
-    """Of equal samples."""
+    """The length of the longest run of equal samples."""
     changes = np.flatnonzero(np.diff(x)) + 1
     return int(np.diff(np.concatenate([[0], changes, [len(x)]])).max())
 

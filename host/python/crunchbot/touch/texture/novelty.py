@@ -48,7 +48,7 @@ class Novelty:
 
 
 def fit_novelty(features: list[np.ndarray], labels: np.ndarray, folds: np.ndarray, length: int) -> Novelty | None:
-    """From the features (m, F) of the windows in a row of every recording, m >= 0.
+    """Fits the score to the features (m, F) of the windows in a row of every recording, m >= 0.
 
     Limits separate recordings held out (fold by fold, and those that are alike together) from classes left out, and keep
     all but REFUSE_MOST of the former. None when fewer than two recordings of a class are left where a fold is held out.
@@ -88,7 +88,7 @@ def _left_out(labels: np.ndarray, classes: list) -> list[tuple]:
 
 
 class _Spread:
-    """Of a recording's windows: how many, their mean, and the scatter about it; worked out once for all that is left out."""
+    """The statistics of a recording's windows: count, mean and scatter. They serve all the models that leave something out."""
 
     def __init__(self, features: np.ndarray):
         self.windows, self.mean = len(features), features.mean(axis=0)
@@ -96,7 +96,7 @@ class _Spread:
 
 
 def _ratios(features: list, spreads: list, labels: np.ndarray, left_out: list[tuple], length: int) -> list[np.ndarray]:
-    """By step, ratios of recordings left out: of each (recordings, classes that are left)."""
+    """Ratios of recordings left out, by step: of each (recordings, classes that are left)."""
     steps = [[] for _ in range(STEPS)]
     for out, classes in left_out:
         kept = np.flatnonzero(~out)
@@ -148,7 +148,7 @@ def _spread(scores: np.ndarray, steps: list[list]) -> None:
 
 
 def _limits(trained: list[np.ndarray], never: list[np.ndarray]) -> np.ndarray:
-    """By step, the ratio that errs least on both, and refuses at most REFUSE_MOST of the trained ones; without
+    """The ratio by step that errs least on both, and refuses at most REFUSE_MOST of the trained ones; without
     classes left out, 0 unless that refuses more. A step that no recording reached has the limit of the step before."""
     limits = np.zeros(STEPS)
     for step, (known, strangers) in enumerate(zip(trained, never, strict=True)):

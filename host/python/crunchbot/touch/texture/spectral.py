@@ -191,7 +191,7 @@ class Stream:
 
     @staticmethod
     def _limits(model: SpectralModel, longest: int) -> dict[str, np.ndarray]:
-        """With the span of windows at least as long as those judged; the longest classifier's if there is none."""
+        """The limits, with the span of the first classifier whose windows are as long as those judged, else of the longest."""
         span = next((c.span for c in model.classifiers if c.length >= longest), model.classifiers[-1].span)
         return {n: as_doubles(v, n, (model.channels,)) for n, v in (model.limits | {"span": span}).items()}
 

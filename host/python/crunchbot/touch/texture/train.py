@@ -197,7 +197,7 @@ def calibration_error(right: np.ndarray, confidence: np.ndarray, bins: int = 10)
 
 
 def _novelty(model: SpectralModel, parts, labels, folds, base: int):
-    """Of windows of the base length, the classifier's features; None without such a classifier."""
+    """The classifier's features of windows of the base length; None without such a classifier."""
     classifier = next((r for r in model.classifiers if r.length == base), None)
     if classifier is None:
         return None
