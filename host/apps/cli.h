@@ -14,7 +14,7 @@ int cli_fail(const char *program, const char *subject, int error);
  * printed, if that could not be. */
 int cli_end(const char *program, int code);
 
-/* As cli_fail for the ring `name`: says also which file is meant and whose it is. */
+/* Does the same for the ring `name`; the line also says which file is meant and whose it is. */
 int cli_fail_ring(const char *program, const char *name, int error);
 
 /* Reads an option's user, by name or number; false, with one line printed, if there is none. */

@@ -7,7 +7,7 @@
 #define DAEMON_PROGRAM "whiskerd"
 #endif
 
-/* As syslog numbers them. INFO goes to a journal, and to a terminal only when asked for. */
+/* Levels, numbered as in syslog. INFO goes to a journal, and to a terminal only when asked for. */
 enum daemon_priority { LOG_ERROR = 3, LOG_WARN = 4, LOG_NOTE = 5, LOG_DETAIL = 6 };
 
 /* Finds out who reads standard error. verbose: LOG_DETAIL also to others than the journal. */

@@ -13,7 +13,7 @@
 #include <time.h>
 #include <unistd.h>
 
-/* As sd_notify(), which waits while the socket of a manager that hangs is full: a daemon must not hang with it. */
+/* Does what sd_notify() does, but never waits: a daemon must not hang with a manager that hangs. */
 static void daemon_notify_notify(const char *text)
 {
     const char *path = getenv("NOTIFY_SOCKET");

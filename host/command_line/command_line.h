@@ -25,7 +25,8 @@ struct command_option {
     enum command_kind kind;
     size_t at; /* offset in the program's struct */
     uint32_t least, most;
-    /* Of COMMAND_OWN. False, with one line printed, when the text is wrong. text: NULL where the option takes none. */
+    /* For COMMAND_OWN. Returns false, with one line printed, when the text is wrong. text: NULL where the option takes
+     * none. */
     bool (*set)(void *options, const char *name, const char *text);
 };
 

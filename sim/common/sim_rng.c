@@ -38,7 +38,7 @@ struct sim_rng sim_rng_stream(uint64_t seed, uint32_t purpose, uint32_t index)
     uint64_t name = (uint64_t)purpose << 32 | index;
     uint64_t state = seed;
     state = sim_rng_mix(&state) ^ sim_rng_mix(&name);
-    /* As the authors of xoshiro advise. */
+    /* The authors of xoshiro advise to seed by splitmix64. */
     for (int i = 0; i < 4; i++)
         rng.state[i] = sim_rng_mix(&state);
     return rng;

@@ -15,7 +15,7 @@ void create_script_store(sim_create *create, const uint8_t *bytes, size_t count)
     memmove(create->script.byte, bytes, create->script.count);
 }
 
-/* From the next tick on: a script that plays itself again never keeps the robot within one tick. */
+/* It plays from the next tick on: a script that plays itself again never keeps the robot within one tick. */
 void create_script_play(sim_create *create)
 {
     create->script.running = create->script.count > 0;

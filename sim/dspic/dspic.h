@@ -98,7 +98,7 @@ void dspic_input(struct dspic *chip, unsigned rp, bool level, uint64_t now_fs);
  * present time, dspic_outside_at and dspic_disturb_*. One such time is remembered. */
 void dspic_outside_at(struct dspic *chip, uint64_t at_fs);
 
-/* The same from within the pin callback, for a pin whose edges start nothing (data of a master). */
+/* Sets a pin from within the pin callback; the pin's edges start nothing (data of a master). */
 void dspic_wire(struct dspic *chip, unsigned rp, bool level);
 
 enum dspic_drive dspic_output(const struct dspic *chip, unsigned rp);

@@ -15,7 +15,7 @@ static uint64_t dspic_timer_count_fs(const struct dspic *chip, unsigned n)
     return PRESCALE[chip->sfr[CONTROL[n] / 2u] >> TCON_TCKPS_SHIFT & 3u] * chip->cycle_fs;
 }
 
-/* With a period of 0 it stays at 0 (A). */
+/* A timer with a period of 0 stays at 0 (A). */
 static bool dspic_timer_runs(const struct dspic *chip, unsigned n)
 {
     return dspic_timer_on(chip, n) && (chip->sfr[PERIOD[n] / 2u] > 0 || chip->timer[n].from > 0);

@@ -21,7 +21,8 @@
 #include "mech_floor.h"
 
 /* cffi: begin */
-/* Of the tip: held by the floor, sliding over it or in the air, hooked by a pile, held at the corner of a step. */
+/* States of the tip: held by the floor, sliding over it or in the air, hooked by a pile, held at the corner of a step.
+ */
 enum { MECH_STICKS, MECH_SLIPS, MECH_HOOKED, MECH_EDGE };
 
 /* How a whisker is mounted over the floor. Lengths in m. */

@@ -126,7 +126,7 @@ static bool mech_shaft_sound(const struct mech_shaft *shaft, const struct mech_t
 /* Begins, follows and ends contacts; returns the static law's input. */
 static double mech_shaft_follow(struct mech_shaft *shaft, const struct mech_touch *touch)
 {
-    /* Until the first angle that is not 0 nothing says from which side. */
+    /* Before the first angle that is not 0 nothing says from which side. */
     bool touching = mech_shaft_sound(shaft, touch) && (shaft->engaged || touch->theta != 0);
     if (!touching) {
         shaft->slipped = false;

@@ -77,7 +77,7 @@ void mech_basis_move(const struct mech_whisker *whisker, const struct mech_modes
 /* Lets a tick pass while the input goes linearly to a value. */
 void mech_basis_step(const struct mech_basis *basis, struct mech_motion *motion, double input);
 
-/* The same for a part of a tick, s. */
+/* Does the same for a part of a tick, s. */
 void mech_basis_step_part(const struct mech_basis *basis, struct mech_motion *motion, double input, double time_s);
 
 /* Carries a motion over to another condition, whose input is now this. */

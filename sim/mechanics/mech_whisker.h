@@ -68,7 +68,7 @@ double mech_whisker_stiffness(const struct mech_whisker *whisker, double a);
 /* Field angles of a tilt in two planes at once: the magnet turns in the plane of the two. */
 void mech_whisker_fields(const struct mech_whisker *whisker, const double tilt[2], double field[2]);
 
-/* The same whisker with another diameter at the tip, the exit's kept. */
+/* Returns the same whisker with another diameter at the tip; the exit's is kept. */
 struct mech_whisker mech_whisker_with_tip(struct mech_whisker whisker, double tip_diameter);
 /* cffi: end */
 

@@ -1,4 +1,4 @@
-/* From the magnet's field to the words of a frame: asynchronous conversions, filter, transfer, noise. */
+/* Makes the words of a frame of the magnet's field: asynchronous conversions, filter, transfer, noise. */
 #ifndef MLX90333_SENSE_H
 #define MLX90333_SENSE_H
 

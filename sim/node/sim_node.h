@@ -24,7 +24,7 @@ typedef struct sim_node sim_node;
 /* A node without power: it answers nothing. `seed` decides the sensor's oscillator (+-10 %) and what its data sheet
  * leaves undefined. NULL if there is no memory. */
 sim_node *sim_node_new(uint64_t seed);
-/* The same with a serial number, and the device id of its chip (0x0629). */
+/* Makes a node with a serial number, and the device id of its chip (0x0629). */
 sim_node *sim_node_new_named(uint64_t seed, uint32_t serial, uint16_t chip);
 void sim_node_free(sim_node *node);
 

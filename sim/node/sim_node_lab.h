@@ -16,7 +16,7 @@ struct sim_node_parameters {
 /* What sim_node_new(seed) uses. */
 void sim_node_parameters_default(struct sim_node_parameters *parameters, uint64_t seed);
 
-/* As sim_node_new. */
+/* Makes a node as sim_node_new does. */
 sim_node *sim_node_new_as(const struct sim_node_parameters *parameters);
 
 enum sim_node_pin { SIM_NODE_SYNC, SIM_NODE_SELECT, SIM_NODE_SCK, SIM_NODE_MOSI };

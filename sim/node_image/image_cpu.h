@@ -48,7 +48,8 @@ struct image_cpu {
     uint64_t acted;   /* `cycles` when the program last wrote a register that the outside sees at once */
 };
 
-/* As after a reset: at the reset vector, stack and flags as the data sheet says; data memory stays. */
+/* Puts the processor as after a reset: at the reset vector, stack and flags as the data sheet says; data memory stays.
+ */
 void image_cpu_reset(struct image_cpu *cpu);
 
 /* Data memory full of anything, as a supply that comes on leaves it. */
@@ -61,7 +62,7 @@ void image_cpu_run(struct image_cpu *cpu);
 uint16_t image_cpu_stack(const struct image_cpu *cpu);
 uint16_t image_cpu_status(const struct image_cpu *cpu);
 
-/* From the vector at this address of program memory to the return from it. */
+/* Runs from the vector at this address of program memory to the return from it. */
 void image_cpu_interrupt(struct image_cpu *cpu, uint32_t vector);
 
 #endif

@@ -6,7 +6,7 @@
 
 #include "dspic.h" // FLASH_WORDS
 
-/* As the p-code's own numbers are. */
+/* The numbers are those of the p-code. */
 enum pcode {
     PCODE_COPY = 1,
     PCODE_LOAD,

@@ -24,7 +24,7 @@ bool heartbeat_begin(struct heartbeat *heartbeat, int64_t now_ms);
 /* Reads what has come, when poll() has found something. False: the supervisor has ended, and the pipe is closed. */
 bool heartbeat_read(struct heartbeat *heartbeat, int64_t now_ms);
 
-/* Until when the heartbeat counts as alive; INT64_MAX: nothing is watched. */
+/* The time until which the heartbeat counts as alive; INT64_MAX: nothing is watched. */
 int64_t heartbeat_until_ms(const struct heartbeat *heartbeat);
 
 #endif

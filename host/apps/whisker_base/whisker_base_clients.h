@@ -61,7 +61,7 @@ bool base_clients_add(struct base_clients *clients, int socket, int64_t now_ms);
 /* Whether a new client had better wait: there is no place, and a client that may lose its own has still to speak. */
 bool base_clients_crowded(const struct base_clients *clients, int64_t now_ms);
 
-/* As base_on_step: one frame's motion, for every client. */
+/* Adds one frame's motion for every client; it is called as base_on_step. */
 void base_clients_step(void *context, const struct create_step *step, unsigned bits);
 
 /* Byte of the stream up to which clients want it taken in; UINT64_MAX: nobody leads, or time is the wall's. */

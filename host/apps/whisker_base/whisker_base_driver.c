@@ -202,7 +202,7 @@ static bool whisker_base_driver_open_first(struct driver *driver)
     return true;
 }
 
-/* Until it is asked to end, or has nothing to go on with. Returns the exit code. */
+/* Runs until it is asked to end, or has nothing to go on with. Returns the exit code. */
 static int whisker_base_driver_run(struct driver *driver)
 {
     while (!cli_stop_wanted()) {

@@ -20,7 +20,7 @@ struct base_log_limit {
 /* Whether one more line may be logged; *hidden: lines before it that were not. */
 bool base_log_pass(struct base_log_limit *limit, int64_t now_ms, unsigned *hidden);
 
-/* As daemon_log(), bounded in real time, whatever clock the wheels go by. */
+/* Logs as daemon_log() does, at a rate bounded in real time, whatever clock the wheels go by. */
 __attribute__((format(printf, 3, 4))) void base_log(struct base_log_limit *limit, enum daemon_priority priority,
                                                     const char *format, ...);
 

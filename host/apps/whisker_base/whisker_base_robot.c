@@ -193,7 +193,7 @@ static uint32_t whisker_base_robot_frames_of_gap(const struct base_robot *robot,
     return gap ? (uint32_t)(gap_ms / CREATE_OI_PERIOD_MS - 1) : 0;
 }
 
-/* Of the frames missed, those since other speeds were ordered. */
+/* Counts the missed frames since other speeds were ordered. */
 static uint32_t whisker_base_robot_frames_since_change(const struct base_robot *robot, int64_t now_ms)
 {
     const uint32_t since = (uint32_t)((now_ms - robot->changed_ms) / CREATE_OI_PERIOD_MS);

@@ -26,7 +26,7 @@ void daemon_stats_begin(struct daemon_stats *stats, const struct whisker_setting
     stats->reported.second_lane_mask = second_lane_mask;
 }
 
-/* Of two bridges the names are the first one's. */
+/* With two bridges the names are those of the first. */
 void daemon_stats_connected(struct daemon_stats *stats, struct daemon_source *source,
                             const struct whisker_device_info *about, const struct whisker_identity *identity)
 {

@@ -1,4 +1,4 @@
-/* From one bridge, or two, to the ring: frames, clock mapping, statistics, and what is due beside them. */
+/* Passes what one bridge sends, or two, to the ring: frames, clock mapping, statistics, and what is due beside them. */
 #ifndef WHISKER_DAEMON_STREAM_H
 #define WHISKER_DAEMON_STREAM_H
 
@@ -30,7 +30,7 @@ struct daemon_stream {
     int64_t report_at_ms;
 };
 
-/* From now on SIGUSR1 and SIGUSR2 are requests for the log: statistics, and the nodes. */
+/* Makes SIGUSR1 and SIGUSR2 requests for the log: statistics, and the nodes. */
 void daemon_stream_catch_requests(void);
 
 /* Into this ring, no bridge yet. */

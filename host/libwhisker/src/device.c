@@ -18,7 +18,7 @@
 #define STALE_TIMEOUT_MS 100
 #define STALE_BYTES 4096
 #define STATUS_TIMEOUT_MS 1000
-/* Of an open device: libusb's event, its timer, the device. */
+/* What an open device waits for: libusb's event, its timer, the device. */
 #define DESCRIPTORS_MAX 8
 #define WAIT_MAX 2
 

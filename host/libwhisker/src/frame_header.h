@@ -15,7 +15,7 @@ struct frame_damage {
     unsigned slipped; /* by their tick */
 };
 
-/* As whisker_frame_decode, of a whole frame, and counts. */
+/* Decodes a whole frame as whisker_frame_decode does, and counts. */
 int frame_decode(const uint8_t *bytes, struct whisker_frame *frame, struct frame_damage *damage);
 
 #endif

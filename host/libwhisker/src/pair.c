@@ -37,7 +37,7 @@ int whisker_pair_add(struct whisker_pair *pair, int bridge, const struct whisker
     return WHISKER_OK;
 }
 
-/* Of a held frame, as the first bridge counts. */
+/* The tick of a held frame, as the first bridge counts. */
 static int64_t pair_tick_of(struct whisker_pair *pair, int bridge, unsigned i)
 {
     return (int64_t)pair_held(pair, bridge, i)->tick + (bridge ? pair->offset : 0);

@@ -39,7 +39,7 @@ struct nav_shape nav_levels_shape(const struct nav_levels *, int level);
 /* Cells of all slices and lines, those that fill up a line's last group included. */
 size_t nav_shape_cells(const struct nav_shape *);
 
-/* The same without those. */
+/* Counts the cells without those. */
 double nav_shape_inside(const struct nav_shape *);
 
 /* Mass, cell by cell. Cell i of line j of slice p is centred at ((i + 1/2) cell + shift_x[p], (j + 1/2) cell +
@@ -74,7 +74,7 @@ struct nav_histogram {
     struct nav_cells now, next;
     struct nav_pass *pass;
     double owed_position, owed_heading; /* variance not yet added, m^2 per axis, rad^2 */
-    /* Of the last pass: */
+    /* What the last pass found: */
     double (*moment)[NAV_MOMENTS]; /* [nh] relative to */
     struct nav_pose about;         /* this place */
     double total;                  /* mass of all cells, in the cells' unit; */

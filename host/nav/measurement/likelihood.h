@@ -34,7 +34,7 @@ float nav_likelihood_of(const struct nav_likelihood *, const uint8_t *codes);
  */
 float nav_likelihood_at(const struct nav_likelihood *, const struct nav_place *, uint8_t *codes);
 
-/* The same, but -INFINITY where the robot cannot stand. */
+/* Gives the same log-likelihood, but -INFINITY where the robot cannot stand. */
 double nav_likelihood_standing(const struct nav_likelihood *, const struct nav_place *);
 
 size_t nav_likelihood_bytes(const struct nav_likelihood *);

@@ -88,7 +88,7 @@ int nav_arena_texture(const struct nav_arena *, double x, double y);
  * itself in a box or beyond a wall; NaN when the way leads through ground never mapped first. */
 double nav_arena_range(const struct nav_arena *, double x, double y, double heading, double reach);
 
-/* The same along the unit vector (c, s). */
+/* Gives the same distance along the unit vector (c, s). */
 double nav_arena_range_along(const struct nav_arena *, double x, double y, double c, double s, double reach);
 
 /* Whether a round body centred on (x, y) stands clear of walls and boxes; ground never mapped is clear. */

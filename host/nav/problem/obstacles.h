@@ -29,7 +29,7 @@ void nav_obstacles_free(struct nav_obstacles *);
  * included; *near is filled only then. */
 bool nav_obstacles_near(const struct nav_obstacles *, double x, double y, struct nav_arena *near);
 
-/* As nav_arena_free, for radii up to the reach. */
+/* Answers as nav_arena_free does, for radii up to the reach. */
 bool nav_obstacles_clear(const struct nav_obstacles *, double x, double y, double radius);
 
 /* Number of the arena's box that holds a point within reach of the robot, -1: none. */

@@ -42,7 +42,7 @@ struct whisker_clock_point {
     double late_ns;
 };
 
-/* From a bridge's cycles to its USB controller's time, ns since some start of frame. */
+/* Maps a bridge's cycles to its USB controller's time, ns since some start of frame. */
 struct whisker_clock_usb {
     double nominal_ns;      /* per cycle of the bridge */
     double rate_ns;         /* likewise, as found */

@@ -57,7 +57,8 @@ struct whisker_reader_info {
  */
 int whisker_reader_attach(const char *name, int timeout_ms, struct whisker_reader **reader);
 
-/* As whisker_reader_attach; also accepts rings of the user with id `owner`. WHISKER_RING_NO_OWNER: no other user's. */
+/* Does what whisker_reader_attach does, and accepts rings of the user `owner`, too. WHISKER_RING_NO_OWNER: no other
+ * user's. */
 int whisker_reader_attach_owned(const char *name, uint32_t owner, int timeout_ms, struct whisker_reader **reader);
 
 /* Lets go of the ring; NULL is allowed. */

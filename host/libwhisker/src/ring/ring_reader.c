@@ -289,7 +289,7 @@ static int ring_wait_look(const struct whisker_reader *reader)
     return state == RING_CLOSED ? WHISKER_ERROR_CLOSED : WHISKER_ERROR_TIMEOUT;
 }
 
-/* As look, with the writer's life: when it is over, what it published last is seen by looking once more. */
+/* Looks, and checks the writer's life: when it is over, what it published last is seen by looking once more. */
 static int ring_wait_look_closely(const struct whisker_reader *reader)
 {
     int seen = ring_wait_look(reader);

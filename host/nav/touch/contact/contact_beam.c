@@ -27,7 +27,7 @@ struct shape {
     double slope, x, y, moment;
 };
 
-/* By q, where ds = (1 - s) dq spreads the steps by the diameter: bending is moment over (1 - s)^4. */
+/* Integrates over q, where ds = (1 - s) dq spreads the steps by the diameter: bending is moment over (1 - s)^4. */
 static struct point beam_derivative(struct point at, double left, double along, double across)
 {
     double moment = along * at.y - across * at.x;
@@ -157,7 +157,7 @@ bool nav_contact_beam_make(struct nav_contact_beam *beam, double tip)
             }                                                                                                          \
         }
 
-/* From the fields f and their derivatives to place and moment. arc: contact's; arc_1: its derivative. */
+/* Makes place and moment of the fields f and their derivatives. arc: contact's; arc_1: its derivative. */
 static void beam_bend(double arc, double arc_1, double slope, double f[4][FIELDS], struct nav_contact_bend *bend)
 {
     bend->x = arc - slope * slope * f[0][SHORT];

@@ -231,7 +231,7 @@ static double *features_logs(const struct spectrum *b, const double *x, double s
     return out;
 }
 
-/* Of a channel's stretches: the mean of each log, then its standard deviation. */
+/* Statistics of a channel's stretches: the mean of each log, then its standard deviation. */
 static double *features_stretches(const struct nav_texture_features *f, const double *x, double floor, double *out)
 {
     int count = f->stretch.bands + 2;
