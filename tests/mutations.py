@@ -73,8 +73,8 @@ MUTATIONS = [
         "sensor: sum without the error word",
         "test_sensor_frame",
         "firmware/dspic/core/sensor_frame.c",
-        "if (sum == sum_of(data, MLX90333_FRAME_SUM - MLX90333_FRAME_ALPHA))",
-        "if (sum == sum_of(data, MLX90333_FRAME_ERRORS - MLX90333_FRAME_ALPHA))",
+        "if (sum == sensor_frame_sum_of(data, MLX90333_FRAME_SUM - MLX90333_FRAME_ALPHA))",
+        "if (sum == sensor_frame_sum_of(data, MLX90333_FRAME_ERRORS - MLX90333_FRAME_ALPHA))",
     ),
     Mutation(
         "firmware: an overflow of the sensor's SPI is not cleared",
@@ -101,14 +101,14 @@ MUTATIONS = [
         "firmware: no resynchronisation after a bad frame",
         "test_sampler",
         "firmware/dspic/core/sampler.c",
-        "    if (is_good(reading))\n        sampler->state",
+        "    if (sampler_is_good(reading))\n        sampler->state",
         "    if (reading)\n        sampler->state",
     ),
     Mutation(
         "firmware: a sum without the error word is not accepted beside one",
         "test_sensor_frame",
         "firmware/dspic/core/sensor_frame.c",
-        "return error_word != 0 && sum == sum_of(data, MLX90333_FRAME_ERRORS - MLX90333_FRAME_ALPHA);",
+        "return error_word != 0 && sum == sensor_frame_sum_of(data, MLX90333_FRAME_ERRORS - MLX90333_FRAME_ALPHA);",
         "return false;",
     ),
     Mutation(

@@ -11,7 +11,7 @@ from pathlib import Path
 BUILD = "build/release"
 PACKAGES = {"host/python": "crunchbot", "lab": "crunchbot_lab"}  # place: package
 PYTHON_TESTS = ("host/python/tests", "tests", "lab/tests")
-C_FOLDERS = ("firmware/dspic", "host/libwhisker", "host/nav", "host/create", "host/apps")
+C_FOLDERS = ("firmware/dspic", "host/libwhisker", "host/nav", "host/create", "host/command_line", "host/apps")
 # What the tests of a folder's own programs do not reach: processes driven from Python, nodes on the simulated chip.
 ALSO = {
     "firmware/dspic": ("tests/node",),

@@ -5,7 +5,7 @@
 #include "board/flash.h"
 #include "crc32.h"
 
-static bool header_is_sound(const uint8_t *header)
+static bool image_header_is_sound(const uint8_t *header)
 {
     const uint32_t crc =
         crc32_of(WHISKER_CRC32_INIT, header, (uint16_t)WHISKER_IMAGE_HEADER_HEADER_CRC32) ^ WHISKER_CRC32_XOR_OUT;
@@ -15,7 +15,7 @@ static bool header_is_sound(const uint8_t *header)
 }
 
 /* Rows that fit and are `length` bytes long, 0 if there are none. No division by what is no power of two at 32 bits. */
-static uint16_t rows_of(uint32_t length)
+static uint16_t image_rows_of(uint32_t length)
 {
     uint16_t rows = 0;
     while (length >= WHISKER_LIMIT_FLASH_ROW_BYTES && rows < IMAGE_ROWS_MAX) {
@@ -27,7 +27,7 @@ static uint16_t rows_of(uint32_t length)
 
 uint8_t image_judge(const uint8_t header[WHISKER_IMAGE_HEADER_BYTES], uint16_t chip)
 {
-    if (!header_is_sound(header))
+    if (!image_header_is_sound(header))
         return WHISKER_NODE_STATE_BAD_HEADER;
     if (whisker_get_u16(header + WHISKER_IMAGE_HEADER_CHIP) != chip)
         return WHISKER_NODE_STATE_OTHER_CHIP;
@@ -40,7 +40,7 @@ uint8_t image_judge(const uint8_t header[WHISKER_IMAGE_HEADER_BYTES], uint16_t c
 
 uint16_t image_rows(const uint8_t header[WHISKER_IMAGE_HEADER_BYTES])
 {
-    return rows_of(whisker_get_u32(header + WHISKER_IMAGE_HEADER_LENGTH));
+    return image_rows_of(whisker_get_u32(header + WHISKER_IMAGE_HEADER_LENGTH));
 }
 
 bool image_body_is_good(struct board *board, const uint8_t header[WHISKER_IMAGE_HEADER_BYTES], uint8_t *row)
@@ -68,7 +68,7 @@ bool image_is_valid(struct board *board, uint8_t *row)
 bool image_version(struct board *board, uint8_t *row, uint16_t *version, uint16_t *options)
 {
     board_flash_read(board, (uint16_t)WHISKER_LIMIT_APPLICATION_ROW, row);
-    const bool there = header_is_sound(row);
+    const bool there = image_header_is_sound(row);
     *version = there ? whisker_get_u16(row + WHISKER_IMAGE_HEADER_VERSION) : 0u;
     *options = there ? whisker_get_u16(row + WHISKER_IMAGE_HEADER_OPTIONS) : 0u;
     return there;

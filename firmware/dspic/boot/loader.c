@@ -17,23 +17,23 @@ void loader_start(struct loader *loader, struct board *board)
 }
 
 /* Does the flash hold these bytes? Compares a row at a time, through a buffer of its own. */
-static bool holds(struct board *board, uint16_t row, const uint8_t *bytes)
+static bool loader_holds(struct board *board, uint16_t row, const uint8_t *bytes)
 {
     uint8_t found[ROW_BYTES];
     board_flash_read(board, row, found);
     return memcmp(found, bytes, sizeof found) == 0;
 }
 
-static void write_row(struct loader *loader, uint16_t row)
+static void loader_write_row(struct loader *loader, uint16_t row)
 {
     if (row % WHISKER_LIMIT_FLASH_PAGE_ROWS == 0)
         board_flash_erase(loader->board, row);
     board_flash_write(loader->board, row, loader->row);
-    if (!holds(loader->board, row, loader->row))
+    if (!loader_holds(loader->board, row, loader->row))
         loader->state = WHISKER_NODE_STATE_FLASH_FAILED;
 }
 
-static void begin(struct loader *loader, const uint8_t *order)
+static void loader_begin(struct loader *loader, const uint8_t *order)
 {
     const uint8_t *header = order + WHISKER_SERVICE_DATA;
     if (!service_addresses(order, board_serial(loader->board))) {
@@ -49,30 +49,30 @@ static void begin(struct loader *loader, const uint8_t *order)
     memcpy(loader->header, header, sizeof loader->header);
     board_flash_erase(loader->board, WHISKER_LIMIT_APPLICATION_ROW);
     memset(loader->row, ERASED, sizeof loader->row);
-    if (!holds(loader->board, WHISKER_LIMIT_APPLICATION_ROW, loader->row))
+    if (!loader_holds(loader->board, WHISKER_LIMIT_APPLICATION_ROW, loader->row))
         loader->state = WHISKER_NODE_STATE_FLASH_FAILED;
 }
 
-static uint16_t blocks(const struct loader *loader)
+static uint16_t loader_blocks(const struct loader *loader)
 {
     return (uint16_t)(image_rows(loader->header) * ROW_BLOCKS);
 }
 
-static void take_block(struct loader *loader, const uint8_t *order)
+static void loader_take_block(struct loader *loader, const uint8_t *order)
 {
     const uint16_t number = whisker_get_u16(order + WHISKER_SERVICE_ARGUMENT);
-    if (loader->state != WHISKER_NODE_STATE_LOADING || number != loader->next || number >= blocks(loader))
+    if (loader->state != WHISKER_NODE_STATE_LOADING || number != loader->next || number >= loader_blocks(loader))
         return;
     const uint16_t part = number % ROW_BLOCKS;
     memcpy(loader->row + part * SERVICE_BLOCK_BYTES, order + WHISKER_SERVICE_DATA, SERVICE_BLOCK_BYTES);
     loader->next = (uint16_t)(number + 1u);
     if (part == ROW_BLOCKS - 1u)
-        write_row(loader, (uint16_t)(IMAGE_FIRST_ROW + number / ROW_BLOCKS));
+        loader_write_row(loader, (uint16_t)(IMAGE_FIRST_ROW + number / ROW_BLOCKS));
 }
 
-static void finish(struct loader *loader)
+static void loader_finish(struct loader *loader)
 {
-    if (loader->state != WHISKER_NODE_STATE_LOADING || loader->next != blocks(loader))
+    if (loader->state != WHISKER_NODE_STATE_LOADING || loader->next != loader_blocks(loader))
         return;
     if (!image_body_is_good(loader->board, loader->header, loader->row)) {
         loader->state = WHISKER_NODE_STATE_BAD_IMAGE;
@@ -82,11 +82,11 @@ static void finish(struct loader *loader)
     memset(loader->row, ERASED, sizeof loader->row);
     memcpy(loader->row, loader->header, sizeof loader->header);
     board_flash_write(loader->board, WHISKER_LIMIT_APPLICATION_ROW, loader->row);
-    if (!holds(loader->board, WHISKER_LIMIT_APPLICATION_ROW, loader->row))
+    if (!loader_holds(loader->board, WHISKER_LIMIT_APPLICATION_ROW, loader->row))
         loader->state = WHISKER_NODE_STATE_FLASH_FAILED;
 }
 
-static void run(struct loader *loader, const uint8_t *order)
+static void loader_run(struct loader *loader, const uint8_t *order)
 {
     if (loader->state == WHISKER_NODE_STATE_LOADING || !service_addresses(order, board_serial(loader->board)))
         return;
@@ -119,7 +119,7 @@ bool loader_info(struct board *board, uint8_t item, uint8_t state, uint8_t *row,
 }
 
 /* A row being gathered is not to be lost to a question: it is answered with a buffer of its own. */
-static void tell(struct loader *loader, struct service *service, uint8_t item)
+static void loader_tell(struct loader *loader, struct service *service, uint8_t item)
 {
     uint8_t row[ROW_BYTES];
     uint16_t alpha = 0, beta = 0;
@@ -134,19 +134,19 @@ void loader_serve(struct loader *loader, struct service *service)
         return;
     switch (order[WHISKER_SERVICE_COMMAND]) {
     case WHISKER_SERVICE_COMMAND_INFO:
-        tell(loader, service, order[WHISKER_SERVICE_ARGUMENT]);
+        loader_tell(loader, service, order[WHISKER_SERVICE_ARGUMENT]);
         return;
     case WHISKER_SERVICE_COMMAND_BEGIN:
-        begin(loader, order);
+        loader_begin(loader, order);
         break;
     case WHISKER_SERVICE_COMMAND_BLOCK:
-        take_block(loader, order);
+        loader_take_block(loader, order);
         break;
     case WHISKER_SERVICE_COMMAND_FINISH:
-        finish(loader);
+        loader_finish(loader);
         break;
     case WHISKER_SERVICE_COMMAND_RUN:
-        run(loader, order);
+        loader_run(loader, order);
         break;
     default:
         break;

@@ -3,35 +3,35 @@
 #include "board/link.h"  // board_link_arm
 #include "board/timer.h" // board_watch_start
 
-static void count(struct node *node, uint8_t fault)
+static void node_count(struct node *node, uint8_t fault)
 {
     if (node->health[fault] < UINT16_MAX)
         node->health[fault]++;
 }
 
 /* The tick is over: what its record said at last. */
-static void count_tick(struct node *node, uint16_t status)
+static void node_count_tick(struct node *node, uint16_t status)
 {
     const uint8_t code = (uint8_t)(status >> WHISKER_STATUS_CODE_SHIFT);
     if (!node->numbered)
-        count(node, WHISKER_HEALTH_ORDER_MISSING);
+        node_count(node, WHISKER_HEALTH_ORDER_MISSING);
     if (code != WHISKER_CODE_OK && code < WHISKER_CODE_RESET_POWER)
-        count(node, code);
+        node_count(node, code);
     else if (code == WHISKER_CODE_OVERRUN)
-        count(node, WHISKER_HEALTH_OVERRUN);
+        node_count(node, WHISKER_HEALTH_OVERRUN);
     else if (code == WHISKER_CODE_OK && status != 0)
-        count(node, WHISKER_HEALTH_SENSOR_ERROR);
+        node_count(node, WHISKER_HEALTH_SENSOR_ERROR);
 }
 
-static bool is_complete(const struct sensor_reading *reading)
+static bool node_is_complete(const struct sensor_reading *reading)
 {
     return reading->status >> WHISKER_STATUS_CODE_SHIFT == WHISKER_CODE_OK;
 }
 
 /* Gives the link the record of the present tick, as far as it is known. */
-static void publish(struct node *node)
+static void node_publish(struct node *node)
 {
-    if (node->displaced && is_complete(&node->reading))
+    if (node->displaced && node_is_complete(&node->reading))
         node->reading = sensor_reading_of_code(WHISKER_CODE_LATE);
     if (node->serving)
         return; /* its end will */
@@ -40,7 +40,7 @@ static void publish(struct node *node)
     board_link_arm(node->board, node->records[node->armed]);
 }
 
-static void start(struct node *node, struct board *board, uint8_t code)
+static void node_reset(struct node *node, struct board *board, uint8_t code)
 {
     node->board = board;
     node->tick = 0xFFu; /* the first SYNC makes it 0 */
@@ -54,20 +54,20 @@ static void start(struct node *node, struct board *board, uint8_t code)
     for (uint8_t i = 0; i < WHISKER_HEALTH_COUNT; i++)
         node->health[i] = 0;
     service_start(&node->service);
-    publish(node);
+    node_publish(node);
 }
 
 void node_start(struct node *node, struct board *board, uint8_t code)
 {
-    start(node, board, code);
+    node_reset(node, board, code);
     if (code >= WHISKER_CODE_RESET_POWER)
-        count(node, code);
+        node_count(node, code);
     sampler_start(&node->sampler, board, code);
 }
 
 void node_start_loader(struct node *node, struct board *board)
 {
-    start(node, board, WHISKER_CODE_LOADER);
+    node_reset(node, board, WHISKER_CODE_LOADER);
     sampler_off(&node->sampler, board, WHISKER_CODE_LOADER);
 }
 
@@ -81,7 +81,7 @@ void node_on_sync(struct node *node)
     const uint8_t code = sampler_on_sync(&node->sampler); /* first: all nodes' readings begin together */
     board_watch_start(node->board);
     if (node->begun)
-        count_tick(node, node->reading.status);
+        node_count_tick(node, node->reading.status);
     node->begun = true;
     node->serving = false; /* a second window that never came */
     node->reading = sensor_reading_of_code(code);
@@ -97,20 +97,20 @@ void node_on_timer(struct node *node)
 void node_on_sensor_byte(struct node *node, uint8_t byte)
 {
     if (sampler_on_byte(&node->sampler, byte, &node->reading))
-        publish(node);
+        node_publish(node);
 }
 
 void node_on_sensor_overrun(struct node *node)
 {
     if (sampler_on_overrun(&node->sampler, &node->reading))
-        publish(node);
+        node_publish(node);
 }
 
 void node_on_transfer_end(struct node *node)
 {
     if (!node->ordered) {
         node->serving = false;
-        publish(node); /* what was clocked of the record armed is lost, with the bridge's knowledge */
+        node_publish(node); /* what was clocked of the record armed is lost, with the bridge's knowledge */
     }
     node->ordered = false;
 }
@@ -119,14 +119,15 @@ void node_on_order(struct node *node, const uint16_t words[LINK_WORDS])
 {
     struct order order;
     node->displaced = board_watch_exceeds(node->board, NODE_ORDER_MOST_US); /* first: parsing takes its time */
-    const bool whole = order_parse(words, &order);
+    const bool whole = record_parse_order(words, &order);
     if (!whole)
-        count(node, WHISKER_HEALTH_ORDER_CRC);
-    else if (!node->numbered && !is_complete(&node->reading)) /* else SYNC was missed: a reading ends after its order */
+        node_count(node, WHISKER_HEALTH_ORDER_CRC);
+    else if (!node->numbered &&
+             !node_is_complete(&node->reading)) /* else SYNC was missed: a reading ends after its order */
         node->tick = order.tick;
     node->numbered = true;
     node->ordered = true;
-    publish(node);
+    node_publish(node);
     if (whole && order.command == WHISKER_COMMAND_SERVICE) {
         node->serving = true;
         board_link_arm_service(node->board, service_words(&node->service));
@@ -140,14 +141,14 @@ void node_on_service(struct node *node, const uint16_t words[SERVICE_WORDS])
 
 void node_on_link_overflow(struct node *node)
 {
-    count(node, WHISKER_HEALTH_LINK_OVERFLOW);
+    node_count(node, WHISKER_HEALTH_LINK_OVERFLOW);
 }
 
 bool node_tell_health(struct node *node)
 {
     const uint8_t *order = service_next(&node->service);
     if (!order) {
-        count(node, WHISKER_HEALTH_SERVICE_CRC);
+        node_count(node, WHISKER_HEALTH_SERVICE_CRC);
         return true;
     }
     const uint8_t item = (uint8_t)(order[WHISKER_SERVICE_ARGUMENT] - WHISKER_INFO_HEALTH);

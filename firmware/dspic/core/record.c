@@ -12,7 +12,7 @@ void record_pack(const struct sensor_reading *reading, uint8_t tick, uint16_t wo
         words[i] = (uint16_t)((uint16_t)bytes[2u * i] << 8 | bytes[2u * i + 1u]);
 }
 
-bool order_parse(const uint16_t words[LINK_WORDS], struct order *order)
+bool record_parse_order(const uint16_t words[LINK_WORDS], struct order *order)
 {
     uint8_t bytes[WHISKER_ORDER_BYTES];
     for (uint8_t i = 0; i < LINK_WORDS; i++) {

@@ -20,6 +20,6 @@ struct order {
 };
 
 /* False, and `order` untouched, if the CRC of the four received words is wrong. */
-bool order_parse(const uint16_t words[LINK_WORDS], struct order *order);
+bool record_parse_order(const uint16_t words[LINK_WORDS], struct order *order);
 
 #endif

@@ -38,13 +38,13 @@
 #error "/SS may rise too soon after the last clock edge"
 #endif
 
-static void wait_in(struct sampler *sampler, enum sampler_state state, uint16_t us)
+static void sampler_wait_in(struct sampler *sampler, enum sampler_state state, uint16_t us)
 {
     sampler->state = (uint8_t)state;
     board_timer_start(sampler->board, us);
 }
 
-static void transfer_byte(struct sampler *sampler)
+static void sampler_transfer_byte(struct sampler *sampler)
 {
     sampler->state = SAMPLER_BYTE;
     board_sensor_transfer(sampler->board, sampler->count == 0 ? SENSOR_MASTER_START : MLX90333_MASTER_BYTE);
@@ -57,7 +57,7 @@ void sampler_start(struct sampler *sampler, struct board *board, uint8_t unready
     sampler->count = 0;
     sampler->followed = false;
     board_sensor_select(board, true);
-    wait_in(sampler, SAMPLER_STARTING, STARTUP_US);
+    sampler_wait_in(sampler, SAMPLER_STARTING, STARTUP_US);
 }
 
 void sampler_off(struct sampler *sampler, struct board *board, uint8_t code)
@@ -72,12 +72,12 @@ uint8_t sampler_on_sync(struct sampler *sampler)
     switch (sampler->state) {
     case SAMPLER_READY:
         sampler->count = 0;
-        transfer_byte(sampler);
+        sampler_transfer_byte(sampler);
         return WHISKER_CODE_LATE;
     case SAMPLER_BYTE:
     case SAMPLER_GAP:
         sampler->followed = false;
-        wait_in(sampler, SAMPLER_RELEASE, RELEASE_US);
+        sampler_wait_in(sampler, SAMPLER_RELEASE, RELEASE_US);
         return WHISKER_CODE_RESYNC;
     default:
         return sampler->unready;
@@ -89,61 +89,62 @@ bool sampler_on_timer(struct sampler *sampler)
     switch (sampler->state) {
     case SAMPLER_RELEASE:
         board_sensor_select(sampler->board, true);
-        wait_in(sampler, SAMPLER_RESYNC_HIGH, RESYNC_US);
+        sampler_wait_in(sampler, SAMPLER_RESYNC_HIGH, RESYNC_US);
         return false;
     case SAMPLER_STARTING: /* what /SS did before the sensor was awake does not count */
-        wait_in(sampler, SAMPLER_RESYNC_HIGH, RESYNC_US);
+        sampler_wait_in(sampler, SAMPLER_RESYNC_HIGH, RESYNC_US);
         return false;
     case SAMPLER_RESYNC_HIGH:
         board_sensor_select(sampler->board, false);
-        wait_in(sampler, SAMPLER_RESYNC_LOW, SELECT_US);
+        sampler_wait_in(sampler, SAMPLER_RESYNC_LOW, SELECT_US);
         return false;
     case SAMPLER_RESYNC_LOW:
         sampler->unready = WHISKER_CODE_RESYNC;
         sampler->state = SAMPLER_READY;
         return true;
     case SAMPLER_GAP:
-        transfer_byte(sampler);
+        sampler_transfer_byte(sampler);
         return false;
     default:
         return false;
     }
 }
 
-static bool jumped(uint16_t before, uint16_t now)
+static bool sampler_jumped(uint16_t before, uint16_t now)
 {
     const uint16_t by = (uint16_t)(now > before ? now - before : before - now);
     return by > SAMPLER_STEP_MOST;
 }
 
 /* Takes a reading that no whisker can have made for a bad one. */
-static void doubt(struct sampler *sampler, struct sensor_reading *reading)
+static void sampler_doubt(struct sampler *sampler, struct sensor_reading *reading)
 {
-    if (sampler->followed && (jumped(sampler->alpha, reading->alpha) || jumped(sampler->beta, reading->beta)))
+    if (sampler->followed &&
+        (sampler_jumped(sampler->alpha, reading->alpha) || sampler_jumped(sampler->beta, reading->beta)))
         *reading = sensor_reading_of_code(WHISKER_CODE_STEP);
 }
 
-static bool is_good(const struct sensor_reading *reading)
+static bool sampler_is_good(const struct sensor_reading *reading)
 {
     return reading->status >> WHISKER_STATUS_CODE_SHIFT == WHISKER_CODE_OK;
 }
 
-static void end_frame(struct sampler *sampler, struct sensor_reading *reading)
+static void sampler_end_frame(struct sampler *sampler, struct sensor_reading *reading)
 {
 #ifdef SAMPLER_RESYNC_EVERY_FRAME
-    wait_in(sampler, SAMPLER_RELEASE, RAISE_US); /* first: there is no time to wait for the decoding */
+    sampler_wait_in(sampler, SAMPLER_RELEASE, RAISE_US); /* first: there is no time to wait for the decoding */
 #endif
     *reading = sensor_frame_decode(sampler->frame);
-    if (is_good(reading))
-        doubt(sampler, reading);
+    if (sampler_is_good(reading))
+        sampler_doubt(sampler, reading);
     sampler->followed = reading->status == 0; /* angles beside an error word are no measure for the next ones */
     sampler->alpha = reading->alpha;
     sampler->beta = reading->beta;
 #ifndef SAMPLER_RESYNC_EVERY_FRAME
-    if (is_good(reading))
+    if (sampler_is_good(reading))
         sampler->state = SAMPLER_READY;
     else
-        wait_in(sampler, SAMPLER_RELEASE, RAISE_US);
+        sampler_wait_in(sampler, SAMPLER_RELEASE, RAISE_US);
 #endif
 }
 
@@ -153,10 +154,10 @@ bool sampler_on_byte(struct sampler *sampler, uint8_t byte, struct sensor_readin
         return false;
     sampler->frame[sampler->count++] = byte;
     if (sampler->count < SENSOR_FRAME_BYTES) {
-        wait_in(sampler, SAMPLER_GAP, sampler->count == 1u ? START_GAP_US : GAP_US);
+        sampler_wait_in(sampler, SAMPLER_GAP, sampler->count == 1u ? START_GAP_US : GAP_US);
         return false;
     }
-    end_frame(sampler, reading);
+    sampler_end_frame(sampler, reading);
     return true;
 }
 
@@ -166,7 +167,7 @@ bool sampler_on_overrun(struct sampler *sampler, struct sensor_reading *reading)
         return false;
     *reading = sensor_reading_of_code(WHISKER_CODE_OVERRUN);
     sampler->followed = false;
-    wait_in(sampler, SAMPLER_RELEASE, RAISE_US);
+    sampler_wait_in(sampler, SAMPLER_RELEASE, RAISE_US);
     return true;
 }
 

@@ -11,8 +11,8 @@
  * (docs/hardware.md).
  *
  * A frame that slipped by a bit passes its sum about one time in eight, for all its bytes are halved or doubled, and so
- * is their sum (docs/node_faults.md): an angle that jumps further than a whisker can move in a tick is not believed,
- * and the sensor resynchronised. */
+ * is their sum (docs/results/node_faults.md): an angle that jumps further than a whisker can move in a tick is not
+ * believed, and the sensor resynchronised. */
 #ifndef SAMPLER_H
 #define SAMPLER_H
 

@@ -18,7 +18,7 @@ uint16_t sensor_frame_errors(uint16_t word)
     return errors;
 }
 
-static uint8_t sum_of(const uint8_t *bytes, uint8_t n)
+static uint8_t sensor_frame_sum_of(const uint8_t *bytes, uint8_t n)
 {
     uint8_t sum = 0;
     for (uint8_t i = 0; i < n; i++)
@@ -26,18 +26,18 @@ static uint8_t sum_of(const uint8_t *bytes, uint8_t n)
     return sum;
 }
 
-static bool sum_is_right(const uint8_t *frame, uint16_t error_word)
+static bool sensor_frame_sum_is_right(const uint8_t *frame, uint16_t error_word)
 {
     const uint8_t *data = frame + MLX90333_FRAME_ALPHA;
     const uint8_t sum = frame[MLX90333_FRAME_SUM];
     if ((error_word & ~ASSIGNED_ERRORS) != 0)
         return false;
-    if (sum == sum_of(data, MLX90333_FRAME_SUM - MLX90333_FRAME_ALPHA))
+    if (sum == sensor_frame_sum_of(data, MLX90333_FRAME_SUM - MLX90333_FRAME_ALPHA))
         return true;
-    return error_word != 0 && sum == sum_of(data, MLX90333_FRAME_ERRORS - MLX90333_FRAME_ALPHA);
+    return error_word != 0 && sum == sensor_frame_sum_of(data, MLX90333_FRAME_ERRORS - MLX90333_FRAME_ALPHA);
 }
 
-static bool all_ones(const uint8_t *frame)
+static bool sensor_frame_all_ones(const uint8_t *frame)
 {
     uint8_t common = 0xFFu;
     for (uint8_t i = 0; i < MLX90333_FRAME_BYTES; i++)
@@ -48,11 +48,11 @@ static bool all_ones(const uint8_t *frame)
 struct sensor_reading sensor_frame_decode(const uint8_t frame[MLX90333_FRAME_BYTES])
 {
     const uint16_t error_word = whisker_get_u16(frame + MLX90333_FRAME_ERRORS);
-    if (all_ones(frame))
+    if (sensor_frame_all_ones(frame))
         return sensor_reading_of_code(WHISKER_CODE_SENSOR_ABSENT);
     if (frame[MLX90333_FRAME_START] != MLX90333_START_BYTE)
         return sensor_reading_of_code(WHISKER_CODE_SENSOR_START);
-    if (!sum_is_right(frame, error_word))
+    if (!sensor_frame_sum_is_right(frame, error_word))
         return sensor_reading_of_code(WHISKER_CODE_SENSOR_SUM);
     const struct sensor_reading reading = {
         whisker_get_u16(frame + MLX90333_FRAME_ALPHA),

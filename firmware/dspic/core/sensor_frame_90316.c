@@ -25,14 +25,15 @@ uint16_t sensor_frame_errors(uint16_t word)
     return errors;
 }
 
-static uint16_t word_at(const uint8_t *bytes)
+static uint16_t sensor_frame_90316_word_at(const uint8_t *bytes)
 {
     return (uint16_t)((uint16_t)bytes[0] << 8 | bytes[1]);
 }
 
 struct sensor_reading sensor_frame_decode(const uint8_t frame[SENSOR_FRAME_BYTES])
 {
-    const uint16_t data = word_at(frame + MLX90316_FRAME_DATA), inverted = word_at(frame + MLX90316_FRAME_INVERTED);
+    const uint16_t data = sensor_frame_90316_word_at(frame + MLX90316_FRAME_DATA),
+                   inverted = sensor_frame_90316_word_at(frame + MLX90316_FRAME_INVERTED);
     struct sensor_reading reading = {(uint16_t)(data & MLX90316_ANGLE_MASK), REST, 0};
     if (frame[0] != MLX90316_MASTER_START)
         return sensor_reading_of_code(WHISKER_CODE_SENSOR_START); /* the line does not even carry the master's byte */

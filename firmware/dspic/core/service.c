@@ -32,7 +32,7 @@ void service_take(struct service *service, const uint16_t words[SERVICE_WORDS])
     service->waiting = true;
 }
 
-static bool is_whole(const uint8_t *bytes)
+static bool service_is_whole(const uint8_t *bytes)
 {
     uint8_t sent[4];
     const uint32_t crc = crc32_of(WHISKER_CRC32_INIT, bytes, (uint16_t)WHISKER_SERVICE_CRC32) ^ WHISKER_CRC32_XOR_OUT;
@@ -44,7 +44,7 @@ static bool is_whole(const uint8_t *bytes)
 
 const uint8_t *service_next(struct service *service)
 {
-    if (is_whole(service->bytes))
+    if (service_is_whole(service->bytes))
         return service->bytes;
     service->waiting = false;
     return NULL;

@@ -32,7 +32,7 @@ static void check_order(const uint8_t *bytes)
     for (unsigned i = 0; i < LINK_WORDS; i++)
         words[i] = (uint16_t)(bytes[2u * i] << 8 | bytes[2u * i + 1u]);
     const bool right = whisker_crc8(bytes, WHISKER_ORDER_CRC) == bytes[WHISKER_ORDER_CRC];
-    demand(order_parse(words, &order) == right);
+    demand(record_parse_order(words, &order) == right);
     demand(!right || (order.tick == bytes[WHISKER_ORDER_TICK] && order.command == bytes[WHISKER_ORDER_COMMAND]));
 }
 
@@ -44,7 +44,7 @@ static void check_record(const uint8_t *bytes)
     uint16_t words[LINK_WORDS];
     struct order order = {0, 0};
     record_pack(&reading, bytes[6], words);
-    demand(order_parse(words, &order) && order.tick == bytes[6]);
+    demand(record_parse_order(words, &order) && order.tick == bytes[6]);
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)

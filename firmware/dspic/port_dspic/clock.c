@@ -18,24 +18,24 @@
 #define PLL_FEEDBACK (PLL_M - 2u)
 #define PLL_DIVISORS (PLL_N1 - 2u) /* PLLPOST 0: N2 = 2 */
 
-static uint16_t source(struct board *board)
+static uint16_t clock_source(struct board *board)
 {
     return sfr_read(board, OSCCON) >> OSCCON_COSC_SHIFT & 7u;
 }
 
 /* The loader has done it for the application. COSC and LOCK alone do not say so: a reset other than power-on may leave
  * them while the divisors go back to their reset values, which make 23 MHz. */
-static bool is_done(struct board *board)
+static bool clock_is_done(struct board *board)
 {
-    return source(board) == OSC_FRC_PLL && sfr_read(board, OSCCON) & OSCCON_LOCK &&
+    return clock_source(board) == OSC_FRC_PLL && sfr_read(board, OSCCON) & OSCCON_LOCK &&
            sfr_read(board, PLLFBD) == PLL_FEEDBACK && sfr_read(board, CLKDIV) == PLL_DIVISORS;
 }
 
-static void switch_to(struct board *board, uint8_t oscillator)
+static void clock_switch_to(struct board *board, uint8_t oscillator)
 {
     cpu_write_osccon_high(board, oscillator);
     cpu_write_osccon_low(board, OSCCON_OSWEN);
-    while (sfr_read(board, OSCCON) & OSCCON_OSWEN || source(board) != oscillator) {
+    while (sfr_read(board, OSCCON) & OSCCON_OSWEN || clock_source(board) != oscillator) {
         /* about a millisecond, once */
     }
 }
@@ -43,13 +43,13 @@ static void switch_to(struct board *board, uint8_t oscillator)
 void clock_start(struct board *board)
 {
     sfr_set(board, RCON, RCON_SWDTEN); /* a PLL that never locks would hang the node for ever: it tries again */
-    if (is_done(board))
+    if (clock_is_done(board))
         return;
-    if (source(board) != OSC_FRC)
-        switch_to(board, OSC_FRC); /* the divisors must not change while the PLL runs the chip */
+    if (clock_source(board) != OSC_FRC)
+        clock_switch_to(board, OSC_FRC); /* the divisors must not change while the PLL runs the chip */
     sfr_write(board, PLLFBD, PLL_FEEDBACK);
     sfr_write(board, CLKDIV, PLL_DIVISORS);
-    switch_to(board, OSC_FRC_PLL);
+    clock_switch_to(board, OSC_FRC_PLL);
     while (!(sfr_read(board, OSCCON) & OSCCON_LOCK)) {
         /* the switch waits for it */
     }

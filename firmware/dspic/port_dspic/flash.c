@@ -7,7 +7,7 @@
 #define ROW_ADDRESSES (2u * FLASH_ROW_WORDS)
 
 /* Points the table instructions at a row; returns its offset in their page. */
-static uint16_t point_at(struct board *board, uint16_t row)
+static uint16_t flash_point_at(struct board *board, uint16_t row)
 {
     const uint32_t address = (uint32_t)row * ROW_ADDRESSES;
     sfr_write(board, TBLPAG, (uint16_t)(address >> 16));
@@ -16,7 +16,7 @@ static uint16_t point_at(struct board *board, uint16_t row)
 
 void board_flash_read(struct board *board, uint16_t row, uint8_t *bytes)
 {
-    const uint16_t offset = point_at(board, row);
+    const uint16_t offset = flash_point_at(board, row);
     for (uint16_t i = 0; i < FLASH_ROW_WORDS; i++) {
         const uint16_t low = cpu_table_read_low(board, (uint16_t)(offset + 2u * i));
         bytes[3u * i] = (uint8_t)(low & 0xFFu);
@@ -25,7 +25,7 @@ void board_flash_read(struct board *board, uint16_t row, uint8_t *bytes)
     }
 }
 
-static void operate(struct board *board, uint16_t operation)
+static void flash_operate(struct board *board, uint16_t operation)
 {
     sfr_write(board, NVMCON, operation);
     cpu_start_flash(board);
@@ -35,24 +35,24 @@ void board_flash_erase(struct board *board, uint16_t row)
 {
     if (row < WHISKER_LIMIT_APPLICATION_ROW)
         return;
-    const uint16_t offset = point_at(board, row);
+    const uint16_t offset = flash_point_at(board, row);
     cpu_clear_watchdog(board);
     cpu_table_write_low(board, offset, 0xFFFFu); /* any table write there says which page is meant */
-    operate(board, NVMCON_ERASE_PAGE);
+    flash_operate(board, NVMCON_ERASE_PAGE);
 }
 
 void board_flash_write(struct board *board, uint16_t row, const uint8_t *bytes)
 {
     if (row < WHISKER_LIMIT_APPLICATION_ROW)
         return;
-    const uint16_t offset = point_at(board, row);
+    const uint16_t offset = flash_point_at(board, row);
     cpu_clear_watchdog(board);
     for (uint16_t i = 0; i < FLASH_ROW_WORDS; i++) {
         const uint16_t low = (uint16_t)(bytes[3u * i] | (uint16_t)bytes[3u * i + 1u] << 8);
         cpu_table_write_low(board, (uint16_t)(offset + 2u * i), low);
         cpu_table_write_high(board, (uint16_t)(offset + 2u * i), bytes[3u * i + 2u]);
     }
-    operate(board, NVMCON_WRITE_ROW);
+    flash_operate(board, NVMCON_WRITE_ROW);
 }
 
 uint16_t board_chip_id(struct board *board)

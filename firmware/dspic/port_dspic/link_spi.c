@@ -18,7 +18,7 @@
 #define OUT_CHANNEL 0u
 #define IN_CHANNEL 1u
 
-static void set_channel(struct board *board, uint16_t channel, uint16_t offset, uint16_t words)
+static void link_spi_set_channel(struct board *board, uint16_t channel, uint16_t offset, uint16_t words)
 {
     sfr_write(board, DMA_REG(DMA0REQ, channel), IRQ_SPI2);
     sfr_write(board, DMA_REG(DMA0STA, channel), offset);
@@ -30,15 +30,15 @@ void link_start(struct board *board)
 {
     sfr_write(board, SPI2STAT, 0);
     sfr_write(board, SPI2CON1, LINK_CON1);
-    set_channel(board, OUT_CHANNEL, OUT_OFFSET, LINK_WORDS - 1u); /* the first word goes by hand */
-    set_channel(board, IN_CHANNEL, IN_OFFSET, LINK_WORDS);
+    link_spi_set_channel(board, OUT_CHANNEL, OUT_OFFSET, LINK_WORDS - 1u); /* the first word goes by hand */
+    link_spi_set_channel(board, IN_CHANNEL, IN_OFFSET, LINK_WORDS);
 }
 
 #define SETTLE_READS 8u
 
 /* Some of the family ignore a write that follows too soon. SPITBF does not tell that from a slave that has taken the
  * word into its shift register: the module begins anew, so that the word cannot be there twice, and has more time. */
-static void preload(struct board *board, uint16_t word)
+static void link_spi_preload(struct board *board, uint16_t word)
 {
     sfr_write(board, SPI2STAT, SPISTAT_SPIEN);
     sfr_write(board, SPI2BUF, word);
@@ -52,7 +52,7 @@ static void preload(struct board *board, uint16_t word)
 }
 
 /* Module and DMA begin anew: whatever was clocked too much or too little is over. */
-static void arm(struct board *board, const uint16_t *words, uint16_t to_receive)
+static void link_spi_arm(struct board *board, const uint16_t *words, uint16_t to_receive)
 {
     volatile uint16_t *out = DMA_WORDS_AT(board, OUT_OFFSET);
     sfr_write(board, DMA_REG(DMA0CON, OUT_CHANNEL), OUT_CON);
@@ -64,18 +64,18 @@ static void arm(struct board *board, const uint16_t *words, uint16_t to_receive)
     sfr_write(board, DMA_REG(DMA0CNT, IN_CHANNEL), (uint16_t)(to_receive - 1u));
     sfr_write(board, DMA_REG(DMA0CON, IN_CHANNEL), IN_CON | DMACON_CHEN);
     sfr_write(board, DMA_REG(DMA0CON, OUT_CHANNEL), OUT_CON | DMACON_CHEN);
-    preload(board, words[0]);
+    link_spi_preload(board, words[0]);
     board->link_words = to_receive;
 }
 
 void board_link_arm(struct board *board, const uint16_t *words)
 {
-    arm(board, words, LINK_WORDS);
+    link_spi_arm(board, words, LINK_WORDS);
 }
 
 void board_link_arm_service(struct board *board, const uint16_t *words)
 {
-    arm(board, words, SERVICE_WORDS);
+    link_spi_arm(board, words, SERVICE_WORDS);
 }
 
 void port_on_dma1(struct board *board)

@@ -11,7 +11,7 @@
 
 static const uint8_t SERVED[] = {IRQ_INT1, IRQ_T2, IRQ_SPI1, IRQ_SPI1_ERROR, IRQ_SPI2_ERROR, IRQ_DMA1, IRQ_INT2};
 
-static void enable(struct board *board, uint16_t irq)
+static void port_enable(struct board *board, uint16_t irq)
 {
     const uint16_t shift = (uint16_t)(4u * (irq % 4u)), address = (uint16_t)(IPC0 + 2u * (irq / 4u));
     sfr_clear(board, address, (uint16_t)(7u << shift));
@@ -21,7 +21,7 @@ static void enable(struct board *board, uint16_t irq)
 }
 
 /* Why the chip was reset, and forgets it. A plain power-up is none of the node's troubles. */
-static uint8_t reset_code(struct board *board)
+static uint8_t port_reset_code(struct board *board)
 {
     const uint16_t cause = sfr_read(board, RCON);
     const bool trapped = board->trapped == TRAPPED, asked = board->asked == BOARD_ASKED_APPLICATION;
@@ -36,7 +36,7 @@ static uint8_t reset_code(struct board *board)
 }
 
 /* What a reset's cause cannot say: the application has neither failed nor been left. */
-static bool loader_is_asked_for(struct board *board)
+static bool port_loader_is_asked_for(struct board *board)
 {
     return board->asked == BOARD_ASKED_LOADER && !(sfr_read(board, RCON) & RCON_POR);
 }
@@ -44,7 +44,7 @@ static bool loader_is_asked_for(struct board *board)
 void port_boot(struct board *board)
 {
     clock_start(board);
-    if (loader_is_asked_for(board) || !image_is_valid(board, board->loader.row))
+    if (port_loader_is_asked_for(board) || !image_is_valid(board, board->loader.row))
         port_start_loader(board);
     else
 #ifdef NODE_LOADER
@@ -54,7 +54,7 @@ void port_boot(struct board *board)
 #endif
 }
 
-static void start_peripherals(struct board *board)
+static void port_start_peripherals(struct board *board)
 {
     clock_start(board);
     pins_start(board);
@@ -62,33 +62,33 @@ static void start_peripherals(struct board *board)
     link_start(board);
 }
 
-static void serve_interrupts(struct board *board)
+static void port_serve_interrupts(struct board *board)
 {
     for (uint16_t i = 0; i < sizeof SERVED; i++)
-        enable(board, SERVED[i]);
+        port_enable(board, SERVED[i]);
     sfr_set(board, RCON, RCON_SWDTEN);
 }
 
 void port_start(struct board *board)
 {
     board->loading = false;
-    start_peripherals(board);
-    node_start(&board->node, board, reset_code(board));
-    serve_interrupts(board);
+    port_start_peripherals(board);
+    node_start(&board->node, board, port_reset_code(board));
+    port_serve_interrupts(board);
 }
 
 void port_start_loader(struct board *board)
 {
     board->loading = true;
-    start_peripherals(board);
-    (void)reset_code(board);
+    port_start_peripherals(board);
+    (void)port_reset_code(board);
     loader_start(&board->loader, board);
     node_start_loader(&board->node, board);
-    serve_interrupts(board);
+    port_serve_interrupts(board);
 }
 
 /* The application's answers: who it is, and the way to the loader. */
-static void serve_application(struct board *board)
+static void port_serve_application(struct board *board)
 {
     struct service *service = &board->node.service;
     const uint8_t *order = service->bytes;
@@ -102,21 +102,21 @@ static void serve_application(struct board *board)
     service_answer(service, alpha, beta);
 }
 
-static void serve(struct board *board)
+static void port_serve(struct board *board)
 {
     if (node_tell_health(&board->node))
         return;
     if (board->loading)
         loader_serve(&board->loader, &board->node.service);
     else
-        serve_application(board);
+        port_serve_application(board);
 }
 
 void port_loop(struct board *board)
 {
     cpu_clear_watchdog(board);
     if (board->node.service.waiting)
-        serve(board);
+        port_serve(board);
     else
         cpu_idle(board);
 }

@@ -105,7 +105,7 @@ static void every_tick_is_read_from_its_order(void **state)
         uint16_t words[LINK_WORDS];
         struct order order = {0, 0};
         order_words((uint8_t)tick, WHISKER_COMMAND_SAMPLE, words);
-        assert_true(order_parse(words, &order));
+        assert_true(record_parse_order(words, &order));
         assert_int_equal(order.tick, tick);
         assert_int_equal(order.command, WHISKER_COMMAND_SAMPLE);
     }
@@ -125,7 +125,7 @@ static void up_to_three_flipped_bits_never_pass_and_change_nothing(void **state)
                     words[b / 16] ^= (uint16_t)(1u << b % 16);
                 if (c != b)
                     words[c / 16] ^= (uint16_t)(1u << c % 16);
-                assert_false(order_parse(words, &order));
+                assert_false(record_parse_order(words, &order));
                 assert_int_equal(order.tick, 0xA5);
                 assert_int_equal(order.command, 0x5A);
             }
@@ -158,8 +158,8 @@ static void a_dead_mosi_is_no_order(void **state)
     const uint16_t low[LINK_WORDS] = {0, 0, 0, 0};
     const uint16_t high[LINK_WORDS] = {0xFFFF, 0xFFFF, 0xFFFF, 0xFFFF};
     struct order order;
-    assert_false(order_parse(low, &order));
-    assert_false(order_parse(high, &order));
+    assert_false(record_parse_order(low, &order));
+    assert_false(record_parse_order(high, &order));
 }
 
 int main(void)
