@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { OPTIONS_MOST = 40, HELP = 'h', OPTION = 'o', COLUMN = 22, WORD_BYTES = 64 };
+enum { OPTIONS_MOST = 64, HELP = 'h', OPTION = 'o', COLUMN = 22, WORD_BYTES = 64 };
 
 int command_line_wrong(const char *program, const char *text)
 {
@@ -122,7 +122,7 @@ int command_line_read(const struct command_line *line, int argc, char **argv, vo
     known[count] = (struct option){"help", no_argument, NULL, HELP};
     opterr = 0;
     int which = 0;
-    for (int option; (option = getopt_long(argc, argv, ":", known, &which)) != -1;) {
+    for (int option; (option = getopt_long(argc, argv, line->stops_at_word ? "+:" : ":", known, &which)) != -1;) {
         if (option == HELP) {
             command_line_print_help(line, options);
             return COMMAND_LINE_HELP;

@@ -6,6 +6,10 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 enum { COMMAND_LINE_READ = -1, COMMAND_LINE_HELP = 0, COMMAND_LINE_WRONG = 2 };
 
 /* What an option sets, at its place in the program's struct. */
@@ -36,6 +40,7 @@ struct command_line {
     const char *notes; /* and after them */
     const struct command_option *option;
     size_t count;
+    bool stops_at_word; /* what follows the first word that is no option is not looked at: it is a command */
 };
 
 /* Reads argv into *options, which holds the defaults. Returns COMMAND_LINE_READ, with the number of the first word that
@@ -51,5 +56,9 @@ bool command_line_refuse(const char *program, const char *option, const char *te
 /* Reads an option's number, decimal or 0x; false, with one line printed, unless it is a whole number least..most. */
 bool command_line_number(const char *program, const char *option, const char *text, uint32_t least, uint32_t most,
                          uint32_t *value);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

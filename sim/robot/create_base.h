@@ -9,7 +9,7 @@
 
 #include <poll.h>
 
-#include "create_options.h"
+#include "options.h"
 #include "pilot_answers.h"
 extern "C" {
 #include "create_ground.h"

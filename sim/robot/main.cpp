@@ -10,7 +10,6 @@ namespace
 {
 
 constexpr int FAILED = 1;
-constexpr int WRONG_COMMAND_LINE = 2;
 
 int run_bench(const bridge_sim::Options &options)
 {
@@ -33,10 +32,6 @@ int run_bench(const bridge_sim::Options &options)
 
 int run(const bridge_sim::Options &options)
 {
-    if (options.help) {
-        std::fputs(bridge_sim::usage(), stdout);
-        return 0;
-    }
     if (options.bench) {
         return run_bench(options);
     }
@@ -44,25 +39,19 @@ int run(const bridge_sim::Options &options)
     return simulation.run();
 }
 
-int fail(const std::exception &error, int code)
-{
-    std::fprintf(stderr, "whisker-bridge-sim: %s\n", error.what());
-    return code;
-}
-
 } // namespace
 
 int main(int argc, char **argv)
 {
     bridge_sim::Options options;
-    try {
-        options = bridge_sim::parse_options(argc, argv);
-    } catch (const std::exception &error) {
-        return fail(error, WRONG_COMMAND_LINE);
+    const int wrong = bridge_sim::parse_options(argc, argv, options);
+    if (wrong != COMMAND_LINE_READ) {
+        return wrong;
     }
     try {
         return run(options);
     } catch (const std::exception &error) {
-        return fail(error, FAILED);
+        std::fprintf(stderr, "%s: %s\n", bridge_sim::PROGRAM, error.what());
+        return FAILED;
     }
 }

@@ -5,8 +5,11 @@
 #include <vector>
 
 #include "bench.h"
-#include "create_options.h"
+#include "command_line.h"
 #include "defect.h"
+extern "C" {
+#include "sim_create.h"
+}
 
 namespace bridge_sim
 {
@@ -14,8 +17,16 @@ namespace bridge_sim
 // Who gets the device: a command under umockdev, or the client that connects to a port.
 enum class Serve { COMMAND, USBIP, USBREDIR };
 
+constexpr char PROGRAM[] = "whisker-bridge-sim";
+
+// The Create: --create and the options of sim/create, each with "create-" before it.
+struct CreateOptions {
+    bool on = false;
+    std::string link; // where the pseudo-terminal is linked
+    sim_create_options robot = sim_create_defaults(CREATE_OI_V2);
+};
+
 struct Options {
-    bool help = false;
     bool bench = false;
     bool progress = false;
     bool unplugged = false;
@@ -45,9 +56,8 @@ struct Options {
     uint64_t ticks() const;
 };
 
-// Throws std::runtime_error with one line that names the option and the remedy.
-Options parse_options(int argc, char **argv);
-
-const char *usage();
+// Reads the command line. Returns COMMAND_LINE_READ, or the exit code: help was printed, or one line that names the
+// option and the remedy.
+int parse_options(int argc, char **argv, Options &options);
 
 } // namespace bridge_sim

@@ -58,6 +58,7 @@ ALLOWED = {
         "fpga/usb",
     ],
     "sim/robot": [
+        "host/command_line",
         "sim/common",
         "sim/bridge",
         "sim/usb",

@@ -32,7 +32,7 @@ static const struct command_option OPTIONS[] = {
     {"a-long-name-of-a-gap", "N", "between", COMMAND_BYTE, offsetof(struct options, gap), 0, UINT8_MAX, NULL},
     {"own", "X", "a letter", COMMAND_OWN, 0, 0, 0, set_own},
 };
-static const struct command_line LINE = {"demo", "Usage: demo\n", "Example: demo\n", OPTIONS, 6};
+static const struct command_line LINE = {"demo", "Usage: demo\n", "Example: demo\n", OPTIONS, 6, false};
 
 /* Reads a line; what goes to standard output or error is in `printed`. */
 static int read_line(char *const *words, struct options *options, int *rest, char printed[2000], int stream)
