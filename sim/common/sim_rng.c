@@ -30,6 +30,11 @@ uint64_t sim_rng_mix(uint64_t *state)
     return z ^ (z >> 31);
 }
 
+uint64_t sim_rng_mmix(uint64_t *state)
+{
+    return *state = *state * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
+}
+
 struct sim_rng sim_rng_stream(uint64_t seed, uint32_t purpose, uint32_t index)
 {
     struct sim_rng rng;

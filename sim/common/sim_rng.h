@@ -15,6 +15,9 @@ struct sim_rng {
 /* The next number of splitmix64 (Steele, Lea, Flood 2014) from a state of 64 bits: seeds, and draws of tests. */
 uint64_t sim_rng_mix(uint64_t *state);
 
+/* The next state of Knuth's generator MMIX, whose top bits are random: for models that keep 64 bits of state. */
+uint64_t sim_rng_mmix(uint64_t *state);
+
 /* Starts the stream that (seed, purpose, index) names: streams with different names are independent. */
 struct sim_rng sim_rng_stream(uint64_t seed, uint32_t purpose, uint32_t index);
 

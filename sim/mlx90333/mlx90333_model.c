@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "sim_rng.h"
 #include "whisker_protocol.h" // whisker_put_u16
 
 /* Slow mode: 7 MHz for 20, but times are the data sheet's own (C): three times the gaps, five times t5. */
@@ -59,11 +60,9 @@ void mlx90333_set_fault(struct mlx90333 *sensor, enum sim_sensor_fault fault, un
     sensor->argument = (uint16_t)argument;
 }
 
-/* Knuth's MMIX generator, top bits: a handful of draws per run need no better one. */
 static uint32_t mlx90333_model_draw(struct mlx90333 *sensor)
 {
-    sensor->random = sensor->random * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
-    return (uint32_t)(sensor->random >> 32);
+    return (uint32_t)(sim_rng_mmix(&sensor->random) >> 32);
 }
 
 static void mlx90333_model_require(struct mlx90333 *sensor, bool kept, enum mlx90333_violation violation)

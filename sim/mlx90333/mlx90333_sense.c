@@ -3,6 +3,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "sim_rng.h"
+
 #define DEG (45.0 / atan(1.0))
 #define ERROR_FIELD_LOW 0x0080u  /* F_FIELDTOOLOW */
 #define ERROR_FIELD_HIGH 0x0100u /* F_FIELDTOOHIGH */
@@ -26,11 +28,9 @@ void mlx90333_parameters_default(struct mlx90333_parameters *parameters)
                                                .field_high_mt = 70.0};
 }
 
-/* Knuth's MMIX generator, top bits. */
 static double mlx90333_sense_uniform(struct mlx90333_sense *sense)
 {
-    sense->random = sense->random * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
-    return ((double)(sense->random >> 11) + 0.5) / 9007199254740992.0;
+    return ((double)(sim_rng_mmix(&sense->random) >> 11) + 0.5) / 9007199254740992.0;
 }
 
 static double mlx90333_sense_normal(struct mlx90333_sense *sense)

@@ -29,7 +29,7 @@ ALLOWED = {
     "host/python": ["host/libwhisker", "host/nav", "protocol"],
     "lab": ["host/python", "sim/signals", "protocol"],
     "sim/common": [],
-    "sim/mlx90333": ["sim/node", "firmware/dspic"],  # one copy of the data sheet
+    "sim/mlx90333": ["sim/common", "sim/node", "firmware/dspic"],  # one copy of the data sheet
     "sim/dspic": ["firmware/dspic"],  # addresses and bits, and what the accessors call
     "sim/node": ["sim/common", "sim/mlx90333", "sim/dspic", "firmware/dspic"],
     "sim/node_image": [
