@@ -195,7 +195,7 @@ def refused(folder: Path, *options) -> str:
 
 
 def test_wrong_use_is_refused(tmp_path):
-    assert "--create '3'" in refused(tmp_path, "--create", 3, "--create-link", tmp_path / "c")
+    assert "--create 3: give 1 or 2" in refused(tmp_path, "--create", 3, "--create-link", tmp_path / "c")
     assert "--create-link" in refused(tmp_path, "--create", 1)
     assert "needs --create" in refused(tmp_path, "--create-link", tmp_path / "c")
     assert "--create-lose-bytes" in refused(tmp_path, "--create", 1, "--create-lose-bytes", 7)
