@@ -28,6 +28,7 @@ cmd:spin spin
 cmd:avr-gcc gcc-avr
 file:/usr/lib/avr/include/avr/io.h avr-libc
 cmd:simavr simavr
+cmd:abidiff abigail-tools
 file:/usr/lib/llvm-14/lib/clang/14.0.6/lib/linux/libclang_rt.fuzzer-x86_64.a libclang-rt-14-dev
 py:ensurepip python3-venv
 py:Python.h python3-dev

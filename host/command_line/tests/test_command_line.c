@@ -119,8 +119,20 @@ static void test_the_help_shows_each_option_and_its_default(void **state)
                                  "  --mask M            which (0xabc)\n"
                                  "  --a-long-name-of-a-gap N  between (7)\n"
                                  "  --own X             a letter\n"
+                                 "  --version           version of this program\n"
                                  "  --help              this text\n\n"
                                  "Example: demo\n");
+}
+
+static void test_the_version_is_that_of_the_libraries(void **state)
+{
+    (void)state;
+    struct options options = {.count = 5};
+    char printed[2000];
+    int rest;
+    char *words[] = {"--version", NULL};
+    assert_int_equal(read_line(words, &options, &rest, printed, STDOUT_FILENO), COMMAND_LINE_HELP);
+    assert_string_equal(printed, "demo " PROGRAM_VERSION "\n");
 }
 
 int main(void)
@@ -129,6 +141,7 @@ int main(void)
         cmocka_unit_test(test_values_are_set),
         cmocka_unit_test(test_what_is_wrong_is_one_line),
         cmocka_unit_test(test_the_help_shows_each_option_and_its_default),
+        cmocka_unit_test(test_the_version_is_that_of_the_libraries),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

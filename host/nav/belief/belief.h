@@ -8,6 +8,11 @@
 
 #include "problem.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+#pragma GCC visibility push(default)
+
 /* cffi: begin */
 struct nav_region {
     double level;   /* mass of the smallest region of highest density in (x, y) that holds the point */
@@ -22,5 +27,10 @@ int nav_belief_region(const struct nav_component *, long n, double x, double y, 
  * outermost bins. Returns the number of bins; fills them if `room` suffices. */
 long nav_belief_bins(const struct nav_component *, long n, double size_x, double size_y, double *bins, long room);
 /* cffi: end */
+
+#pragma GCC visibility pop
+#ifdef __cplusplus
+}
+#endif
 
 #endif

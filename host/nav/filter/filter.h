@@ -4,6 +4,11 @@
 
 #include "problem.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+#pragma GCC visibility push(default)
+
 /* cffi: begin */
 struct nav_filter;
 
@@ -61,5 +66,10 @@ extern const struct nav_filter_ops nav_grid_filter;     /* exact, equation 4 */
 extern const struct nav_filter_ops nav_particle_filter; /* Monte-Carlo localisation */
 extern const struct nav_filter_ops nav_adaptive_filter; /* as much belief as the rows leave open */
 extern const struct nav_filter_ops nav_multi_filter;    /* several Gaussians with weights */
+
+#pragma GCC visibility pop
+#ifdef __cplusplus
+}
+#endif
 
 #endif

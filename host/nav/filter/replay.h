@@ -5,6 +5,11 @@
 
 #include "filter.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+#pragma GCC visibility push(default)
+
 /* cffi: begin */
 /* Rows as columns of numbers, row-major, as struct nav_row has them. */
 struct nav_rows {
@@ -24,5 +29,10 @@ struct nav_rows {
 void nav_replay(struct nav_filter *, const struct nav_rows *, long first, long count, struct nav_estimate *out,
                 double *step_us);
 /* cffi: end */
+
+#pragma GCC visibility pop
+#ifdef __cplusplus
+}
+#endif
 
 #endif

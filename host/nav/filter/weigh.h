@@ -5,6 +5,11 @@
 
 #include "filter.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+#pragma GCC visibility push(default)
+
 /* cffi: begin */
 struct nav_weigher;
 
@@ -24,5 +29,10 @@ void nav_weigher_weigh(const struct nav_weigher *, const double *poses, long n, 
 /* The most that the row's log-likelihood can be at any pose. */
 double nav_weigher_ceiling(const struct nav_weigher *);
 /* cffi: end */
+
+#pragma GCC visibility pop
+#ifdef __cplusplus
+}
+#endif
 
 #endif

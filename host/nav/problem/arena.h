@@ -8,6 +8,11 @@
 
 #include "pose.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+#pragma GCC visibility push(default)
+
 /* cffi: begin */
 /* A solid box standing on the floor, m. */
 struct nav_box {
@@ -94,5 +99,10 @@ double nav_arena_range_along(const struct nav_arena *, double x, double y, doubl
 /* Whether a round body centred on (x, y) stands clear of walls and boxes; ground never mapped is clear. */
 bool nav_arena_free(const struct nav_arena *, double x, double y, double radius);
 /* cffi: end */
+
+#pragma GCC visibility pop
+#ifdef __cplusplus
+}
+#endif
 
 #endif

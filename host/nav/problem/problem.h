@@ -10,6 +10,11 @@
 #include "pose.h"
 #include "settings.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+#pragma GCC visibility push(default)
+
 /* cffi: begin */
 /* A component of a Gaussian mixture: normal in x and y (sigma_m each) and in heading, independent. */
 struct nav_component {
@@ -78,5 +83,10 @@ const char *nav_prior_fault(const struct nav_arena *, const struct nav_prior *, 
  * little enough that a belief which was right stays the answer. Filters that hold one Gaussian, or a few, cannot keep
  * it. */
 #define NAV_ANYWHERE 0.01
+
+#pragma GCC visibility pop
+#ifdef __cplusplus
+}
+#endif
 
 #endif

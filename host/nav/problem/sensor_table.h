@@ -4,6 +4,11 @@
 
 #include "arena.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+#pragma GCC visibility push(default)
+
 /* cffi: begin */
 /* `self` of nav_sensor_map_expect and of the function below. values = 1, codes = those of the map. */
 struct nav_sensor_table {
@@ -16,5 +21,10 @@ struct nav_sensor_table {
 /* A reading in no bin is a bad cell. */
 void nav_sensor_table_fill(const void *table, const double *reading, double *likelihood);
 /* cffi: end */
+
+#pragma GCC visibility pop
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -2,6 +2,11 @@
 #ifndef NAV_SETTINGS_H
 #define NAV_SETTINGS_H
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+#pragma GCC visibility push(default)
+
 /* cffi: begin */
 struct nav_texture_settings {
     double temper;    /* exponent on a window's likelihood; 0: estimated from the windows (texture_model.c) */
@@ -113,5 +118,10 @@ int nav_settings_set(struct nav_settings *, const char *name, double value);
 /* Name, default, lowest and highest value of setting number `index`; 0, or -1 beyond the last. */
 int nav_settings_describe(int index, const char **name, double *standard, double *low, double *high);
 /* cffi: end */
+
+#pragma GCC visibility pop
+#ifdef __cplusplus
+}
+#endif
 
 #endif

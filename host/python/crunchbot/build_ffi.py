@@ -21,10 +21,10 @@ ROOT = HOST.parent
 BLOCK = re.compile(r"/\* cffi: begin \*/\n(.*?)/\* cffi: end \*/", re.DOTALL)
 
 # What each library needs beside itself; the order is the linker's.
-LIBRARIES = {"nav": ["m"], "whisker": ["rt", "pthread"]}
+LIBRARIES = {"whisker-nav": ["m"], "whisker": ["rt", "pthread"]}
 # Headers that others build on come first: cffi wants a struct before its use.
 HEADERS = {
-    "nav": [
+    "whisker-nav": [
         HOST / "nav" / name
         for name in (
             "touch/contact/contact.h",

@@ -151,7 +151,7 @@ def python_entries(most: int) -> list[Entry]:
 
 def mrpt_entries(build: Path, most: int) -> list[Entry]:
     """Builds the program if MRPT is there; a build that fails ends the bench with its error."""
-    library = next(iter(sorted(build.rglob("libnav.a"))), None)
+    library = next(iter(sorted(build.rglob("libwhisker-nav.a"))), None)
     cmake = ("cmake", "-S", PEERS, "-B", NATIVE, f"-DNAV_LIBRARY={library}")
     if error := failure(cmake, ("cmake", "--build", NATIVE)):
         raise SystemExit(

@@ -12,6 +12,11 @@
 #include "create/model.h"
 #include "create_oi.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+#pragma GCC visibility push(default)
+
 #define CREATE_COMMAND_BYTES 64
 
 /* Wheel speeds in whole mm/s as the order tells them, and what they make of the robot: really driven, not asked for. */
@@ -44,5 +49,10 @@ size_t create_put_stream(uint8_t *bytes, const uint8_t *ids, size_t count);
 
 /* Opcode 150: pauses the stream. */
 size_t create_put_pause(uint8_t *bytes);
+
+#pragma GCC visibility pop
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -4,6 +4,11 @@
 
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+#pragma GCC visibility push(default)
+
 enum create_model {
     CREATE_1, /* Open Interface version 2: the paper's robot */
     CREATE_2  /* version 3, Roomba 600 too: encoders, wheel speeds in steps */
@@ -19,5 +24,10 @@ struct create_model_facts {
 
 /* Facts of protocol/create_oi.h in units of SI. */
 const struct create_model_facts *create_model_facts(enum create_model model);
+
+#pragma GCC visibility pop
+#ifdef __cplusplus
+}
+#endif
 
 #endif

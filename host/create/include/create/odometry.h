@@ -16,6 +16,11 @@
 #include "create/motion.h"
 #include "create/stream.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+#pragma GCC visibility push(default)
+
 enum create_source {
     CREATE_REPORTED,  /* packets 19 and 20 */
     CREATE_REQUESTED, /* packets 41 and 42, times 15 ms */
@@ -77,5 +82,10 @@ struct create_step create_odometry_take(struct create_odometry *odometry, const 
 
 /* "reported", "requested", "encoders", "auto". */
 const char *create_source_name(enum create_source source);
+
+#pragma GCC visibility pop
+#ifdef __cplusplus
+}
+#endif
 
 #endif

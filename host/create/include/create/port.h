@@ -6,6 +6,11 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+#pragma GCC visibility push(default)
+
 /* Whether the interface knows this baud (opcode 129), so that this library can set it. */
 bool create_port_knows(uint32_t baud);
 
@@ -20,5 +25,10 @@ int create_port_read(int port, uint8_t *bytes, size_t room);
 
 /* Writes all bytes, or fails: false with errno if the line is gone or takes nothing. */
 bool create_port_write(int port, const uint8_t *bytes, size_t count);
+
+#pragma GCC visibility pop
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -15,6 +15,11 @@
 
 #include "create_oi.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+#pragma GCC visibility push(default)
+
 #define CREATE_STREAM_BYTES 256 /* more than the longest frame */
 
 /* The newest values of the packets asked for, by packet id; the others are 0. Units: protocol/create_oi.h. */
@@ -56,5 +61,10 @@ size_t create_stream_begin(struct create_stream *stream, const uint8_t *ids, siz
 
 /* Takes one byte. True: it ended a whole frame, written to *frame. */
 bool create_stream_push(struct create_stream *stream, uint8_t byte, struct create_frame *frame);
+
+#pragma GCC visibility pop
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -14,6 +14,9 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
 #pragma GCC visibility push(default)
 /* cffi: begin */
 /*
@@ -101,5 +104,8 @@ void whisker_clock_report(struct whisker_clock_fit *fit, uint64_t cycles, uint16
 /* The mapping at the latest arrival; ns_per_cycle 0 before the first. */
 void whisker_clock_get(const struct whisker_clock_fit *fit, struct whisker_clock *clock);
 #pragma GCC visibility pop
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -13,6 +13,9 @@
 
 #include "whisker/stats.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
 #pragma GCC visibility push(default)
 struct whisker_device;
 
@@ -173,5 +176,8 @@ int whisker_hotplug_wait(struct whisker_hotplug *hotplug, int timeout_ms);
 /* NULL is allowed. */
 void whisker_hotplug_close(struct whisker_hotplug *hotplug);
 #pragma GCC visibility pop
+#ifdef __cplusplus
+}
+#endif
 
 #endif

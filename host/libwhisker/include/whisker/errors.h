@@ -82,6 +82,9 @@ enum whisker_error {
 #undef WHISKER_ERROR_ENTRY
 };
 
+#ifdef __cplusplus
+extern "C" {
+#endif
 #pragma GCC visibility push(default)
 /* cffi: begin */
 /* What happened, as one line; never NULL. 0 gives "no error". */
@@ -92,5 +95,8 @@ const char *whisker_error_remedy(int error);
 const char *whisker_error_name(int error);
 /* cffi: end */
 #pragma GCC visibility pop
+#ifdef __cplusplus
+}
+#endif
 
 #endif

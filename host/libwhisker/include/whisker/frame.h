@@ -6,6 +6,9 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
 #pragma GCC visibility push(default)
 /* cffi: begin */
 #define WHISKER_FRAME_LANES 28
@@ -84,5 +87,8 @@ bool whisker_decoder_next(struct whisker_decoder *decoder, const uint8_t **bytes
 /* Ends the stream: bytes still held are counted as one truncated frame and forgotten. */
 void whisker_decoder_end(struct whisker_decoder *decoder);
 #pragma GCC visibility pop
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -16,6 +16,9 @@
 
 #include "whisker/device.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
 #pragma GCC visibility push(default)
 
 /* An image file's bytes, checked. */
@@ -53,5 +56,8 @@ typedef void (*whisker_gateware_progress)(void *context, uint32_t bytes, uint32_
 int whisker_gateware_update(struct whisker_device *device, const struct whisker_gateware *image,
                             whisker_gateware_progress progress, void *context);
 #pragma GCC visibility pop
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -44,6 +44,9 @@ struct whisker_pair {
     bool blind;     /* no offset agrees with the start-of-frame numbers */
 };
 
+#ifdef __cplusplus
+extern "C" {
+#endif
 #pragma GCC visibility push(default)
 /* Begins two new streams; both run. tick_period: cycles, as set on both bridges. */
 void whisker_pair_init(struct whisker_pair *pair, uint32_t tick_period);
@@ -67,5 +70,8 @@ int whisker_pair_add(struct whisker_pair *pair, int bridge, const struct whisker
  */
 int whisker_pair_next(struct whisker_pair *pair, struct whisker_frame frames[2]);
 #pragma GCC visibility pop
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -29,6 +29,9 @@
 #define WHISKER_RING_SERVICE_USER "whisker"            /* its user; without such a user there is no service to trust */
 #define WHISKER_RING_DIRECTORY "/dev/shm"              /* everybody else's */
 
+#ifdef __cplusplus
+extern "C" {
+#endif
 #pragma GCC visibility push(default)
 /* cffi: begin */
 #define WHISKER_RING_NO_OWNER 4294967295U /* as a user id: nobody's */
@@ -185,5 +188,8 @@ void whisker_ring_close(struct whisker_ring *ring);
 int whisker_ring_feed(struct whisker_ring *ring, struct whisker_decoder *decoder, const uint8_t *bytes, size_t count,
                       const struct whisker_frame **frames, size_t *made);
 #pragma GCC visibility pop
+#ifdef __cplusplus
+}
+#endif
 
 #endif

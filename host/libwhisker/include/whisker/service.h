@@ -19,6 +19,9 @@
 
 #define WHISKER_SERVICE_DATA_BYTES 48 /* of an order */
 
+#ifdef __cplusplus
+extern "C" {
+#endif
 #pragma GCC visibility push(default)
 
 struct whisker_service_order {
@@ -93,5 +96,8 @@ int whisker_nodes_update(struct whisker_device *device, uint32_t lanes, uint32_t
                          const struct whisker_image *image, whisker_update_progress progress, void *context,
                          struct whisker_update updates[WHISKER_FRAME_LANES]);
 #pragma GCC visibility pop
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -10,5 +10,6 @@
 #include "whisker/pair.h"
 #include "whisker/ring.h"
 #include "whisker/service.h"
+#include "whisker/version.h"
 
 #endif

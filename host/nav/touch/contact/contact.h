@@ -6,6 +6,11 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+#pragma GCC visibility push(default)
+
 /* cffi: begin */
 struct nav_contact_config {
     double onset_counts;   /* a contact begins when the deflection stays above this ... */
@@ -45,5 +50,10 @@ enum nav_contact_event nav_contact_update(struct nav_contact *, double alpha, do
 void nav_contact_run(struct nav_contact *, const double *samples, const uint8_t *good, size_t n, uint8_t *events,
                      double *peaks);
 /* cffi: end */
+
+#pragma GCC visibility pop
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -10,6 +10,11 @@
 
 #include <stdbool.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+#pragma GCC visibility push(default)
+
 #define NAV_BEAM_DIRECTION 2.85 /* rad: largest direction of a force on the tip in the table */
 
 /* cffi: begin */
@@ -37,5 +42,10 @@ bool nav_contact_beam_shaft(const struct nav_contact_beam *, double arc, double 
 /* direction: of the force on the tip about the clamped axis, rad; 0.6 to 2.85. */
 bool nav_contact_beam_end(const struct nav_contact_beam *, double direction, double slope, struct nav_contact_bend *);
 /* cffi: end */
+
+#pragma GCC visibility pop
+#ifdef __cplusplus
+}
+#endif
 
 #endif

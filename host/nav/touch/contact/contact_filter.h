@@ -21,6 +21,11 @@
 
 #include "contact_state.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+#pragma GCC visibility push(default)
+
 /* cffi: begin */
 /* What is known of the middle of the last block; lengths m, whisker's frame. */
 struct nav_contact_answer {
@@ -58,5 +63,10 @@ size_t nav_contact_filter_run(struct nav_contact_filter *, const double *bases, 
                               const uint8_t *good, size_t n, struct nav_contact_answer *reports, double *middles,
                               size_t most);
 /* cffi: end */
+
+#pragma GCC visibility pop
+#ifdef __cplusplus
+}
+#endif
 
 #endif

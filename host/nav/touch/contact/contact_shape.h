@@ -7,6 +7,11 @@
 
 #include "contact_trace.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+#pragma GCC visibility push(default)
+
 /* cffi: begin */
 enum nav_shape_quality {
     NAV_SHAPE_NONE, /* nothing that stands out of the noise: no other member counts */
@@ -35,5 +40,10 @@ struct nav_shape {
 
 void nav_shape_of(const struct nav_trace *, struct nav_shape *);
 /* cffi: end */
+
+#pragma GCC visibility pop
+#ifdef __cplusplus
+}
+#endif
 
 #endif

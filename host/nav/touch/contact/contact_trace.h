@@ -6,6 +6,11 @@
 
 #include <stddef.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+#pragma GCC visibility push(default)
+
 /* cffi: begin */
 enum { NAV_TRACE_BINS = 128, NAV_TRACE_AXES = 8, NAV_TRACE_MEDIAN = 5 };
 
@@ -49,5 +54,10 @@ static inline double nav_trace_share(const struct nav_trace *trace, int bin)
 {
     return 1.0 / (bin == trace->used - 1 ? trace->filled : trace->width);
 }
+
+#pragma GCC visibility pop
+#ifdef __cplusplus
+}
+#endif
 
 #endif

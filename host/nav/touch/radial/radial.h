@@ -4,6 +4,11 @@
 
 #include <stddef.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+#pragma GCC visibility push(default)
+
 /* cffi: begin */
 /* r = a1 f1 + a0 (equation 3). */
 struct nav_radial {
@@ -25,5 +30,10 @@ long nav_radial_fit(struct nav_radial *, const double *peak_counts, const double
 /* Predicted radius of one peak, mm. */
 double nav_radial_predict(const struct nav_radial *, double peak_counts);
 /* cffi: end */
+
+#pragma GCC visibility pop
+#ifdef __cplusplus
+}
+#endif
 
 #endif

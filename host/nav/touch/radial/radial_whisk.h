@@ -14,6 +14,11 @@
 
 #include "contact_shape.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+#pragma GCC visibility push(default)
+
 /* cffi: begin */
 enum nav_whisk_term {
     NAV_WHISK_TURN,     /* ln of the commanded angle of the push, rad; of its seconds where no rate is known */
@@ -55,5 +60,10 @@ void nav_whisk_terms(const struct nav_shape *, double *terms);
 /* Estimates; never NAN. A whisk without contact has the prior's mean and deviation, and no confidence. */
 void nav_whisk_estimate(const struct nav_whisk_model *, const struct nav_shape *, struct nav_whisk_estimate *);
 /* cffi: end */
+
+#pragma GCC visibility pop
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -8,6 +8,11 @@
 #ifndef NAV_TEXTURE_CHANGE_H
 #define NAV_TEXTURE_CHANGE_H
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+#pragma GCC visibility push(default)
+
 /* cffi: begin */
 struct nav_texture_change;
 
@@ -49,5 +54,10 @@ void nav_texture_change_reset(struct nav_texture_change *);
 
 int nav_texture_change_length(const struct nav_texture_change *);
 double nav_texture_change_limit(const struct nav_texture_change *);
+
+#pragma GCC visibility pop
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -9,6 +9,11 @@
 
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+#pragma GCC visibility push(default)
+
 /* cffi: begin */
 struct nav_texture_classifier;
 
@@ -42,5 +47,10 @@ const double *nav_texture_classifier_features(const struct nav_texture_classifie
 
 int nav_texture_classifier_count(const struct nav_texture_classifier *); /* of features */
 int nav_texture_classifier_length(const struct nav_texture_classifier *);
+
+#pragma GCC visibility pop
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -2,6 +2,11 @@
 #ifndef NAV_TEXTURE_CLEAN_H
 #define NAV_TEXTURE_CLEAN_H
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+#pragma GCC visibility push(default)
+
 /* cffi: begin */
 /* What the training recordings showed of each channel; any array may be NULL: then nothing of that kind is doubted. */
 struct nav_texture_limits {
@@ -24,5 +29,10 @@ struct nav_texture_health {
  * replaced by the straight line between its good neighbours (at an end: the nearest). All are 0 when none is good. */
 struct nav_texture_health nav_texture_clean(double *window, int n, const struct nav_texture_limits *);
 /* cffi: end */
+
+#pragma GCC visibility pop
+#ifdef __cplusplus
+}
+#endif
 
 #endif

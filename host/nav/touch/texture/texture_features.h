@@ -17,6 +17,11 @@
 #ifndef NAV_TEXTURE_FEATURES_H
 #define NAV_TEXTURE_FEATURES_H
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+#pragma GCC visibility push(default)
+
 /* cffi: begin */
 struct nav_texture_features;
 
@@ -41,5 +46,10 @@ int nav_texture_shape_count(int length);
 /* window: [length][channels], finite; out: nav_texture_features_count() finite numbers. Allocates nothing. */
 void nav_texture_features_work(struct nav_texture_features *, const double *window, double *out);
 /* cffi: end */
+
+#pragma GCC visibility pop
+#ifdef __cplusplus
+}
+#endif
 
 #endif

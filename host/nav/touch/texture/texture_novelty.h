@@ -8,6 +8,11 @@
 #ifndef NAV_TEXTURE_NOVELTY_H
 #define NAV_TEXTURE_NOVELTY_H
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+#pragma GCC visibility push(default)
+
 /* cffi: begin */
 struct nav_texture_novelty;
 
@@ -38,5 +43,10 @@ void nav_texture_novelty_reset(struct nav_texture_novelty *);
 /* cffi: end */
 
 int nav_texture_novelty_features(const struct nav_texture_novelty *);
+
+#pragma GCC visibility pop
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -15,6 +15,11 @@
 #include "texture_clean.h"
 #include "texture_novelty.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+#pragma GCC visibility push(default)
+
 /* cffi: begin */
 struct nav_texture_stream;
 
@@ -78,5 +83,10 @@ void nav_texture_filter_change(double *posterior, int classes, double chance);
 
 /* Weighs the classes by loglik[classes], whose largest is 0, times `temper`, >= 0. */
 void nav_texture_filter_weigh(double *posterior, int classes, const double *loglik, double temper);
+
+#pragma GCC visibility pop
+#ifdef __cplusplus
+}
+#endif
 
 #endif
