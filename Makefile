@@ -6,7 +6,7 @@ BUILD := build/release
 PYTHON := .venv/bin/python
 SOURCES_C = $(shell git ls-files '*.c' '*.h' '*.cpp' | grep -v '/gen/')
 
-.PHONY: help demo demo-long test test-all test-kernel test-hil mutants bench sbom build setup abi gen firmware firmware-images firmware-check flash bitstream format lint clean
+.PHONY: help demo demo-long test test-all test-kernel test-hil mutants bench wheels wheels-check sbom build setup abi gen firmware firmware-images firmware-check flash bitstream format lint clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
@@ -35,6 +35,12 @@ mutants: build ## change COUNT=300 lines at random, one at a time, and count wha
 
 bench: build ## measure speed and accuracy again, as ratios in one run: bench/results, docs/charts
 	@$(PYTHON) tools/benches --build-dir $(BUILD)
+
+wheels: build ## Python wheels into dist/: abi3 for x86-64 and aarch64, and the simulation's programs
+	@$(PYTHON) tools/wheels --build-dir $(BUILD)
+
+wheels-check: wheels ## the wheels as users get them: empty environments, a simulated robot, aarch64 by emulation
+	@$(PYTHON) tools/wheels/check.py
 
 sbom: build ## the software bill of materials: build/sbom.json (CycloneDX)
 	@$(PYTHON) tools/sbom.py --build-dir $(BUILD)

@@ -28,6 +28,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).resolve().parents[1]
+ON_ROBOT = ("robot", "record", "scenes", "view")  # extras of pyproject.toml
 GATEWARE = ["luna-usb"]  # its USB core becomes Verilog of the bridge
 PROGRAMS = ("whiskerd", "whisker-log", "whisker-flash", "whisker-base")
 LOCKED = re.compile(r"^([^\s[]+)(?:\[\S+\])?==(\S+)((?: \\\n +--hash=sha256:[0-9a-f]{64})+)$", re.MULTILINE)
@@ -77,7 +78,8 @@ def python_packages(lock: str) -> Iterator[Component]:
     """Each entry of requirements.lock."""
     entries = LOCKED.findall(lock)
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    names = [Requirement(line).name for line in project["dependencies"]] + GATEWARE
+    extras = [line for extra, lines in project["optional-dependencies"].items() if extra in ON_ROBOT for line in lines]
+    names = [Requirement(line).name for line in (*project["dependencies"], *extras)] + GATEWARE
     on_robot = needed(names, {canonicalize_name(name) for name, _, _ in entries})
     for name, version, hashes in entries:
         found = [HashType(alg=HashAlgorithm.SHA_256, content=one) for one in re.findall(r"sha256:(\w+)", hashes)]

@@ -2,6 +2,7 @@
 on its own."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -10,6 +11,8 @@ from pathlib import Path
 
 import pytest
 from chainrun import BUILD, ROOT
+
+from crunchbot import __version__
 
 PRODUCT = (
     "host/python",
@@ -62,13 +65,27 @@ def wheels(tmp_path_factory) -> tuple[Path, Path]:
     return wheel(place, place / "source"), wheel(place, place / "source/lab")
 
 
-def fresh_venv(place: Path, *packages: Path) -> Path:
-    """A virtual environment with these wheels; what they depend on is lent by this one."""
+def fresh_venv(place: Path, *packages: Path, lent: tuple[str, ...] = ()) -> Path:
+    """A virtual environment with these wheels; what they depend on is lent by this one: all, or what is named."""
     run(sys.executable, "-m", "venv", "--without-pip", place)
     site = Path(sysconfig.get_path("purelib", vars={"base": str(place)}))
     options = ["--quiet", "--no-deps", "--disable-pip-version-check"]
-    run(sys.executable, "-m", "pip", "--python", place / "bin/python", "install", *options, *packages)
-    (site / "lent.pth").write_text(sysconfig.get_path("purelib") + "\n")
+    run(
+        sys.executable,
+        "-m",
+        "pip",
+        "--python",
+        place / "bin/python",
+        "install",
+        *options,
+        *packages,
+        env=bare_environment(),
+    )
+    if lent:
+        for name in (one for pattern in lent for one in Path(sysconfig.get_path("purelib")).glob(pattern)):
+            (site / name.name).symlink_to(name)
+    else:
+        (site / "lent.pth").write_text(sysconfig.get_path("purelib") + "\n")
     return place
 
 
@@ -76,6 +93,13 @@ def fresh_venv(place: Path, *packages: Path) -> Path:
 def venv(wheels, tmp_path_factory) -> Path:
     """With the product alone."""
     return fresh_venv(tmp_path_factory.mktemp("product") / "venv", wheels[0])
+
+
+@pytest.fixture(scope="module")
+def core(wheels, tmp_path_factory) -> Path:
+    """With the product and what it cannot do without: numpy and cffi."""
+    needed = ("numpy", "numpy.libs", "_cffi_backend*", "cffi", "cffi.libs")
+    return fresh_venv(tmp_path_factory.mktemp("core") / "venv", wheels[0], lent=needed)
 
 
 @pytest.fixture(scope="module")
@@ -94,6 +118,38 @@ def test_the_command_line_works(venv):
     assert (
         "adaptive" in run(venv / "bin/whisker", "localise", "--list-filters", env=bare_environment(), cwd=venv).stdout
     )
+
+
+def test_one_wheel_serves_every_python_from_3_11(wheels):
+    assert all("-cp311-abi3-" in wheel.name for wheel in wheels)
+
+
+def test_filters_ring_and_perception_need_numpy_and_cffi_alone(core):
+    environment = bare_environment()
+    assert "adaptive" in run(core / "bin/whisker", "localise", "--list-filters", env=environment, cwd=core).stdout
+    assert run(core / "bin/whisker", "--version", env=environment, cwd=core).stdout == f"whisker {__version__}\n"
+    modules = ("nav.filters", "nav.own", "nav.weigher", "bridge.ring", "touch.contact_filter", "touch.radial.model")
+    modules += ("touch.texture.model", "touch.texture.train", "scene", "observation", "pilot.pilot")
+    run(core / "bin/python", "-c", "\n".join(f"import crunchbot.{one}" for one in modules), env=environment, cwd=core)
+
+
+@pytest.mark.parametrize(
+    ("command", "extra"), [("record", "record"), ("view", "view"), ("robot", "robot"), ("navigator", "robot")]
+)
+def test_a_command_names_the_extra_that_it_needs(core, command, extra):
+    done = subprocess.run(
+        [core / "bin/whisker", command], env=bare_environment(), cwd=core, capture_output=True, text=True
+    )
+    assert done.returncode == 2 and done.stderr.count("\n") == 1
+    assert re.fullmatch(
+        rf"whisker: {command}: needs the package \w+; run: pip install 'crunchbot\[{extra}\]'\n", done.stderr
+    )
+
+
+def test_import_is_quick(core):
+    """In modules, for time depends on the machine: what the package itself imports is next to nothing."""
+    count = "import sys; before = set(sys.modules); import crunchbot; print(len(set(sys.modules) - before))"
+    assert int(run(core / "bin/python", "-c", count, env=bare_environment(), cwd=core).stdout) <= 2
 
 
 def test_the_laboratory_is_named_where_it_is_missing(venv):

@@ -102,7 +102,7 @@ def wheel_ffi() -> cffi.FFI:
         ],
         define_macros=[("_GNU_SOURCE", None)],
         libraries=[library for needed in LIBRARIES.values() for library in needed],
-        extra_compile_args=["-O3", "-std=gnu11", "-fvisibility=hidden", *HARDENED_COMPILE],
+        extra_compile_args=["-O3", "-std=gnu11", "-ffp-contract=off", "-fvisibility=hidden", *HARDENED_COMPILE],
         extra_link_args=HARDENED_LINK,
     )
     return ffi

@@ -9,8 +9,10 @@ import importlib
 import sys
 from types import ModuleType
 
+from . import __version__
 from .arguments import Parser
 from .ends import exit_code
+from .errors import UserError
 from .lab import import_lab
 
 # name (its module has underscores for dashes): what it does
@@ -36,6 +38,13 @@ COMMANDS = {
     "texture": "learn and tell floor surfaces",
     "radial": "learn and tell the distance of contacts along a whisker",
 }
+# Commands that need more than numpy: the extra that installs it
+EXTRAS = {
+    **dict.fromkeys(("record", "replay"), "record"),
+    "view": "view",
+    **dict.fromkeys(("robot", "pilot", "navigator", "bag", "pyro", "top"), "robot"),
+    **dict.fromkeys(("localise", "calibrate", "scene"), "scenes"),
+}
 LAB_COMMANDS = ("bridge-sim", "scene", "bench")  # of the package crunchbot_lab
 
 
@@ -44,6 +53,17 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def _run(words: list[str]) -> int:
+    try:
+        return _run_command(words)
+    except ModuleNotFoundError as error:
+        command = next(iter(words), "")
+        if command not in EXTRAS or (error.name or "").startswith("crunchbot"):
+            raise
+        text = f"{command}: needs the package {error.name}; run: pip install 'crunchbot[{EXTRAS[command]}]'"
+        raise UserError(text) from error
+
+
+def _run_command(words: list[str]) -> int:
     arguments = _parser(next(iter(words), "")).parse_args(words)
     return arguments.run(arguments)
 
@@ -53,8 +73,11 @@ def _parser(chosen: str) -> Parser:
     width = max(map(len, COMMANDS))
     listed = "\n".join(f"  {name:{width}}  {text}" for name, text in COMMANDS.items())
     purpose = "Whiskered robots: sensing, tactile perception, localisation by touch."
-    parser = Parser(prog="whisker", usage="whisker COMMAND ...", description=f"{purpose}\n\ncommands:\n{listed}")
+    parser = Parser(
+        prog="whisker", usage="whisker [--version] COMMAND ...", description=f"{purpose}\n\ncommands:\n{listed}"
+    )
     parser.show_example("whisker bridge-sim &  whisker top")
+    parser.add_argument("--version", action="version", version=f"whisker {__version__}")
     commands = parser.add_subparsers(
         prog="whisker", dest="command", required=True, metavar="COMMAND", help=argparse.SUPPRESS
     )

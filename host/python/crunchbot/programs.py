@@ -1,5 +1,6 @@
 """The compiled programs (whiskerd, whisker-base, whisker-bridge-sim ...): where they are."""
 
+import importlib
 import os
 import shutil
 from pathlib import Path
@@ -10,7 +11,8 @@ SOURCE_TREE = Path(__file__).resolve().parents[3]
 
 
 def program(name: str) -> str:
-    """A program's path: from $WHISKER_BUILD, the source tree's build folder, or $PATH. UserError where there is none."""
+    """A program's path: from $WHISKER_BUILD, the source tree's build folder, $PATH, or the package crunchbot_sim.
+    UserError where there is none."""
     places = [Path(os.environ[key]) for key in ("WHISKER_BUILD",) if key in os.environ] + [
         SOURCE_TREE / "build/release"
     ]
@@ -20,5 +22,23 @@ def program(name: str) -> str:
                 return str(path)
     if found := shutil.which(name):
         return found
-    remedy = "install umockdev" if name.startswith("umockdev") else "run 'make build' in a source tree"
+    if found := _packaged(name):
+        return found
+    remedy = (
+        "install umockdev"
+        if name.startswith("umockdev")
+        else "pip install crunchbot-sim, or run 'make build' in a source tree"
+    )
     raise UserError(f"{name}: not found; {remedy}, or name the folder in $WHISKER_BUILD")
+
+
+def _packaged(name: str) -> str | None:
+    """The program of the package crunchbot_sim. UserError: it is there, and libraries that it loads are not."""
+    try:
+        package = importlib.import_module("crunchbot_sim")
+    except ModuleNotFoundError:
+        return None
+    if missing := package.missing_packages():
+        raise UserError(f"{name}: needs Debian packages; run: apt-get install {' '.join(missing)}")
+    path = package.PROGRAMS / name
+    return str(path) if os.access(path, os.X_OK) else None

@@ -10,7 +10,6 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-import tomli_w
 
 from . import observation
 from .files import UnreadableError
@@ -210,6 +209,8 @@ def _given(item) -> dict:
 
 def _write(path: Path, content: dict) -> None:
     """Tables of which there is none are left out."""
+    import tomli_w  # only who writes a scene needs it
+
     path.write_text(tomli_w.dumps({key: value for key, value in content.items() if value != []}))
 
 

@@ -66,7 +66,7 @@ def wheel_ffi() -> cffi.FFI:
         "crunchbot_lab.signals._sim",
         sources=[os.path.relpath(file, LAB) for file in files],
         define_macros=[("_GNU_SOURCE", None)],
-        extra_compile_args=["-O3", "-std=gnu11", "-fvisibility=hidden"],
+        extra_compile_args=["-O3", "-std=gnu11", "-ffp-contract=off", "-fvisibility=hidden"],
     )
 
 

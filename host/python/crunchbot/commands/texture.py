@@ -4,10 +4,9 @@ import json
 from collections import Counter
 from pathlib import Path
 
-from tqdm import tqdm
-
 from ..arguments import add_action, plain, warn
 from ..nav.localise import SettingError
+from ..progress import bar as progress_bar
 from ..tables import TableError, unwritable
 from ..touch.texture import model as texture
 from ..touch.texture import train as texture_train
@@ -50,7 +49,9 @@ def train(arguments) -> int:
             warn(f"{file}: {text}; remove it, or ask for less")
     try:
         if arguments.method == "default":
-            with tqdm(total=1, desc="train", bar_format="{desc} {bar} {percentage:3.0f} %", disable=None) as bar:
+            with progress_bar(
+                total=1, desc="train", bar_format="{desc} {bar} {percentage:3.0f} %", disable=None
+            ) as bar:
                 progress = lambda done, of: advance(bar, done, of)  # noqa: E731
                 model = texture_train.train(recordings, rate_hz, window_ms, progress, hazard)
             model.columns = texture.channel_names(next(iter(files.values()))[0])
@@ -136,7 +137,7 @@ def classify_folder(arguments, model, window_ms: float) -> int:
     if not files:
         raise TableError(arguments.recording, None, "no surface folder; give one folder per surface, or one CSV file")
     answers = {}
-    for name, some in tqdm(files.items(), desc="classify", unit="surface", disable=None):
+    for name, some in progress_bar(files.items(), desc="classify", unit="surface", disable=None):
         answers[name] = Counter(d.label for file in some for d in decisions(arguments, model, file, window_ms))
     columns = [*model.classes, "unknown"]
     for line in rows(answers, columns) if arguments.json else table(answers, columns):
