@@ -72,8 +72,9 @@ firmware-check: build ## execute the node's images against the firmware's C, at 
 flash: ## first programming of a node by wire, no compiler needed: TOOL=ipecmd|pk2cmd|picberry SERIAL=n [SENSOR=..] [HEX=file]
 	@tools/firmware/flash.sh --tool "$(TOOL)" $(if $(SERIAL),--serial "$(SERIAL)") $(if $(HEX),--hex "$(HEX)")
 
-bitstream: setup ## the bridge for a board one can buy: BOARD=ecpix5|colorlight_i9|colorlight_i5|cynthion|tang_primer_20k|ulx3s [LANES=n] [SEED=n] [SERIAL=text]
-	@$(PYTHON) fpga/boards/build.py "$(BOARD)" --seed $(SEED) $(if $(LANES),--lanes "$(LANES)") $(if $(SERIAL),--serial "$(SERIAL)")
+bitstream: setup ## the bridge for a board one can buy: BOARD=ecpix5|colorlight_i9|colorlight_i5|cynthion|tang_primer_20k|ulx3s [LANES=n] [SEED=n] [SERIAL=text] [USB_ID=vid:pid]
+	@$(PYTHON) fpga/boards/build.py "$(BOARD)" --seed $(SEED) $(if $(LANES),--lanes "$(LANES)") $(if $(SERIAL),--serial "$(SERIAL)") \
+		$(if $(USB_ID),--usb-id "$(USB_ID)")
 
 format: setup ## format C, C++ and Python
 	@clang-format -i $(SOURCES_C)

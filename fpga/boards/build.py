@@ -1,12 +1,13 @@
 """Makes a board's bitstream with open tools: `build.py BOARD`. Yosys synthesises, nextpnr places and routes, ecppack packs;
 for Gowin's FPGAs see gowin.py.
 
-Every step is also a function for tests and benches. Files go to build/boards/BOARD/: netlist.json, report.json, and the bitstream
-BOARD.bit, or BOARD.fs for Gowin's.
+Every step is also a function for tests and benches. Files go to build/boards/BOARD/: netlist.json, report.json, and the bitstream:
+BOARD.bit, or BOARD.fs for Gowin's; BOARD-testid.bit or .fs where it has the USB id for private tests.
 """
 
 import argparse
 import json
+import re
 import subprocess
 import sys
 import tomllib
@@ -33,6 +34,8 @@ PHY_REGISTERS = tuple(f"*ulpi_shim*/w:{name}" for name in ("ulpi_data_out", "ulp
 
 
 FLASH_REGISTERS = tuple(f"*flash_control*/w:{name}" for name in ("flash_cs_n", "flash_mosi", "miso"))
+# Vendor and product as USB_ID= gives them. Without, the test id: what is made then is for private tests only.
+USB_ID = re.compile("[0-9a-fA-F]{4}:[0-9a-fA-F]{4}")
 FLASH_PORTS = ("flash_cs_n", "flash_mosi", "flash_miso", "flash_high")
 
 
@@ -123,12 +126,13 @@ def commit() -> str:
     return found.stdout[:4] if found.returncode == 0 and not dirty.stdout else "0"
 
 
-def generate_usb(out: Path, board: Board, serial: str = "0001") -> Path:
-    """The board's USB device as Verilog."""
+def generate_usb(out: Path, board: Board, serial: str = "0001", usb_id: str | None = None) -> Path:
+    """The board's USB device as Verilog; usb_id: see USB_ID."""
     path = out / "whisker_usb.v"
     command = [sys.executable, str(REPO / "fpga/usb/generate.py"), str(path), "--serial", serial]
     command += ["--board", str(board.number), "--commit", commit(), "--milliamps", str(board.milliamps)]
     command += [] if board.self_powered else ["--bus-powered"]
+    command += ["--usb-id", usb_id] if usb_id else []
     command += ["--full-speed"] if board.phy == report.GATEWARE else []
     subprocess.run(command, check=True)
     return path
@@ -212,10 +216,10 @@ def place(board: Board, lanes: int, netlist: Path, out: Path, seed: int = 1, spe
     return report.read(out / result)
 
 
-def prepare(board: Board, lanes: int, out: Path, serial: str = "0001") -> Path:
+def prepare(board: Board, lanes: int, out: Path, serial: str = "0001", usb_id: str | None = None) -> Path:
     """The netlist of a whole board; ToolError if a cell has another clock than the PHY's."""
     out.mkdir(parents=True, exist_ok=True)
-    files, registers = sources(generate_usb(out, board, serial)), NODE_REGISTERS + PHY_REGISTERS
+    files, registers = sources(generate_usb(out, board, serial, usb_id)), NODE_REGISTERS + PHY_REGISTERS
     if board.phy == report.GATEWARE:
         files, registers = [*files, generate_fs_phy(out)], NODE_REGISTERS
     leds = board.pins.get("led_n")
@@ -269,15 +273,20 @@ def add_images(board: Board, lanes: int, bitstream: Path) -> None:
     bitstream.with_name(f"{board.name}_jump.bin").write_bytes(jump)
 
 
-def make(board: Board, lanes: int, out: Path, seeds: list[int], serial: str) -> Path:
+def named(bitstream: Path, usb_id: str | None) -> Path:
+    """The bitstream under the name that says whether it may be given to others."""
+    return bitstream if usb_id else bitstream.replace(bitstream.with_stem(f"{bitstream.stem}-testid"))
+
+
+def make(board: Board, lanes: int, out: Path, seeds: list[int], serial: str, usb_id: str | None) -> Path:
     """All steps, placed with one seed after another until one meets the clock and the PHY's limits; ToolError if none does."""
-    netlist = prepare(board, lanes, out, serial)
+    netlist = prepare(board, lanes, out, serial, usb_id)
     for seed in seeds:
         placed = place(board, lanes, netlist, out, seed)
         print(summary(board, seed, placed), flush=True)
         problems = report.timing_problems(placed, board.speed, board.phy)
         if not problems:
-            return pack(board, out)
+            return named(pack(board, out), usb_id)
         print(f"bitstream: seed {seed} misses: {'; '.join(problems)}", file=sys.stderr, flush=True)
     raise ToolError(
         f"{board.title} with {lanes} lanes: none of the seeds {seeds[0]} to {seeds[-1]} meets the limits; try others"
@@ -292,6 +301,11 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1, help="first placement seed")
     parser.add_argument("--tries", type=int, default=8, help="placements to try, until one meets the limits")
     parser.add_argument("--serial", default="0001", help="USB serial number")
+    parser.add_argument(
+        "--usb-id",
+        metavar="VID:PID",
+        help="USB numbers of your own (default: the test id 1209:0001, not to be shipped)",
+    )
     parser.add_argument("--out", type=Path, help="folder (default: build/boards/BOARD)")
     parser.add_argument("--netlist", action="store_true", help="end after synthesis, with the netlist as Verilog")
     arguments = parser.parse_args()
@@ -299,6 +313,10 @@ def main() -> int:
         print("\n".join(boards()))
         return 0
     try:
+        if arguments.usb_id and not USB_ID.fullmatch(arguments.usb_id):
+            raise ToolError(
+                f"USB id '{arguments.usb_id}' is not VID:PID; give four hexadecimal digits each, as 1d50:6000"
+            )
         board = load(arguments.board or "")
         out = arguments.out or REPO / "build" / "boards" / board.name
         lanes = arguments.lanes or board.lanes
@@ -306,7 +324,7 @@ def main() -> int:
             print(netlist_verilog(board, lanes, out.resolve()))
             return 0
         seeds = [arguments.seed + n for n in range(arguments.tries)]
-        bitstream = make(board, lanes, out.resolve(), seeds, arguments.serial)
+        bitstream = make(board, lanes, out.resolve(), seeds, arguments.serial, arguments.usb_id)
         if board.flash:
             add_images(board, lanes, bitstream)
         print(bitstream)

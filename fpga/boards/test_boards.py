@@ -220,6 +220,13 @@ def test_missed_limits_are_named(values, speed, phy, problems, tmp_path):
     assert len(report.timing_problems(report.read(path), speed, phy)) == problems
 
 
+def test_a_bitstream_with_the_test_id_is_named_so(tmp_path):
+    made = tmp_path / "ecpix5.bit"
+    made.write_bytes(b"bits")
+    assert build.named(made, "1d50:6000") == made
+    assert build.named(made, None).name == "ecpix5-testid.bit" and not made.exists()
+
+
 def test_the_build_tries_seeds_until_one_does(tmp_path, monkeypatch, capfd):
     placed = {seed: nextpnr_report(70, 4 if seed == 3 else 5, 9, 4) for seed in (1, 2, 3, 4)}
 
@@ -231,12 +238,12 @@ def test_the_build_tries_seeds_until_one_does(tmp_path, monkeypatch, capfd):
     monkeypatch.setattr(build, "place", place)
     monkeypatch.setattr(build, "pack", lambda board, out: out / "packed")
     board = build.load("colorlight_i9")
-    assert build.make(board, 6, tmp_path, [1, 2, 3, 4], "0001") == tmp_path / "packed"
+    assert build.make(board, 6, tmp_path, [1, 2, 3, 4], "0001", "1d50:6000") == tmp_path / "packed"
     said = capfd.readouterr()
     assert "seed 3: 70.0 MHz" in said.out and "seed 4" not in said.out
     assert [line[:24] for line in said.err.splitlines()] == ["bitstream: seed 1 misses", "bitstream: seed 2 misses"]
     with pytest.raises(ToolError, match="none of the seeds 1 to 2"):
-        build.make(board, 6, tmp_path, [1, 2], "0001")
+        build.make(board, 6, tmp_path, [1, 2], "0001", "1d50:6000")
 
 
 def test_gowins_slowest_clock_is_the_one_that_counts(tmp_path):

@@ -44,7 +44,7 @@ class Build:
     """What differs from board to board and from build to build; the default is the simulated bridge.
 
     commit: first 16 bits, 0 if unknown; milliamps: drawn from the host at most, 0 to 500; full_speed_only: the PHY has no
-    high speed, so there is no other speed to describe (USB 2.0 section 9.6.2).
+    high speed, so there is no other speed to describe (USB 2.0 section 9.6.2); usb_id: vendor and product.
     """
 
     serial: str = "0001"
@@ -53,6 +53,7 @@ class Build:
     self_powered: bool = True
     milliamps: int = 2
     full_speed_only: bool = False
+    usb_id: tuple[int, int] = (LIMITS["usb_vendor_id"], LIMITS["usb_product_id"])
 
     @property
     def attributes(self) -> int:
@@ -143,8 +144,7 @@ def descriptors(build: Build) -> DeviceDescriptorCollection:
     reports = report_descriptor()
     with collection.DeviceDescriptor() as device:
         device.bcdUSB = float(f"{USB_RELEASE >> 8:x}.{USB_RELEASE & 0xFF:02x}")  # the emitter's way of writing BCD
-        device.idVendor = LIMITS["usb_vendor_id"]
-        device.idProduct = LIMITS["usb_product_id"]
+        device.idVendor, device.idProduct = build.usb_id
         device.bcdDevice = LIMITS["gateware_version"]
         device.iManufacturer = "CrunchBot"
         device.iProduct = "Whisker bridge"

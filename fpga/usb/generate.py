@@ -168,6 +168,12 @@ def generate(build: Build) -> str:
     return NOTICE + verilog.convert(top, name="whisker_usb", ports=ports, strip_internal_attrs=True)
 
 
+def usb_id(text: str) -> tuple[int, int]:
+    """Vendor and product of "1209:0001"."""
+    vendor, product = (int(number, 16) for number in text.split(":"))
+    return vendor, product
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description="Write the bridge's USB device as Verilog.")
     parser.add_argument("out", type=Path, help="Verilog file to write")
@@ -182,9 +188,10 @@ def main() -> None:
         "--milliamps", type=int, default=default.milliamps, help="that it draws at most (default: %(default)s)"
     )
     parser.add_argument("--full-speed", action="store_true", help="the PHY has no high speed")
+    parser.add_argument("--usb-id", type=usb_id, default=default.usb_id, metavar="VID:PID", help="in hexadecimal")
     given = parser.parse_args()
     powers = not given.bus_powered, given.milliamps
-    build = Build(given.serial, given.board, given.commit, *powers, given.full_speed)
+    build = Build(given.serial, given.board, given.commit, *powers, given.full_speed, given.usb_id)
     given.out.write_text(generate(build))
 
 

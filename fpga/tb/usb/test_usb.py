@@ -42,6 +42,8 @@ def test_descriptors_name_the_device_and_its_endpoints():
     assert int.from_bytes(device[8:10], "little") == LIMITS["usb_vendor_id"]
     assert int.from_bytes(device[10:12], "little") == LIMITS["usb_product_id"]
     assert int.from_bytes(configuration[2:4], "little") == len(configuration)
+    other = descriptors(Build(usb_id=(0x1D50, 0x6000)))
+    assert {bytes(raw)[8:12] for kind, _, raw in other if int(kind) == 1} == {bytes.fromhex("501d0060")}
     endpoints = [configuration[i : i + 7] for i in range(len(configuration)) if configuration[i : i + 2] == b"\x07\x05"]
     bulk, hid = endpoints
     assert (bulk[2], bulk[3], int.from_bytes(bulk[4:6], "little")) == (LIMITS["usb_bulk_in"], 2, PACKET)

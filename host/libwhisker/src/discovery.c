@@ -24,13 +24,18 @@ static struct whisker_device_info discovery_describe(libusb_device *found)
 static int discovery_list_bridges(libusb_context *usb, struct whisker_device_info *list, int room)
 {
     libusb_device **all;
+    struct usb_identity identity;
+    const int unknown = usb_read_identity(&identity);
+    if (unknown) {
+        return unknown;
+    }
     const ssize_t count = libusb_get_device_list(usb, &all);
     if (count < 0) {
         return usb_error((int)count);
     }
     int bridges = 0;
     for (ssize_t i = 0; i < count; i++) {
-        if (usb_is_bridge(all[i])) {
+        if (usb_is_bridge(all[i], &identity)) {
             if (bridges < room) {
                 list[bridges] = discovery_describe(all[i]);
             }
@@ -91,14 +96,19 @@ int discovery_open(libusb_context *usb, const char *serial, libusb_device_handle
                    struct whisker_device_info *about)
 {
     libusb_device **all;
+    struct usb_identity identity;
     *handle = NULL;
+    const int unknown = usb_read_identity(&identity);
+    if (unknown) {
+        return unknown;
+    }
     const ssize_t count = libusb_get_device_list(usb, &all);
     if (count < 0) {
         return usb_error((int)count);
     }
     int error = WHISKER_ERROR_DEVICE_MISSING;
     for (ssize_t i = 0; i < count && !*handle; i++) {
-        if (usb_is_bridge(all[i])) {
+        if (usb_is_bridge(all[i], &identity)) {
             error = discovery_more_reporting(error, discovery_try_open(all[i], serial, handle, about));
         }
     }

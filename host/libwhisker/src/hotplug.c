@@ -36,7 +36,12 @@ static int LIBUSB_CALL hotplug_on_arrival(libusb_context *usb, libusb_device *de
 
 int whisker_hotplug_open(struct whisker_hotplug **hotplug)
 {
+    struct usb_identity identity;
     *hotplug = NULL;
+    const int unknown = usb_read_identity(&identity);
+    if (unknown) {
+        return unknown;
+    }
     struct whisker_hotplug *made = calloc(1, sizeof *made);
     if (!made) {
         return WHISKER_ERROR_MEMORY;
@@ -45,11 +50,11 @@ int whisker_hotplug_open(struct whisker_hotplug **hotplug)
         free(made);
         return WHISKER_ERROR_DEVICE_USB;
     }
-    made->watching = libusb_has_capability(LIBUSB_CAP_HAS_HOTPLUG) &&
-                     libusb_hotplug_register_callback(made->usb, LIBUSB_HOTPLUG_EVENT_DEVICE_ARRIVED,
-                                                      LIBUSB_HOTPLUG_ENUMERATE, WHISKER_LIMIT_USB_VENDOR_ID,
-                                                      WHISKER_LIMIT_USB_PRODUCT_ID, LIBUSB_HOTPLUG_MATCH_ANY,
-                                                      hotplug_on_arrival, made, &made->callback) == LIBUSB_SUCCESS;
+    made->watching =
+        libusb_has_capability(LIBUSB_CAP_HAS_HOTPLUG) &&
+        libusb_hotplug_register_callback(made->usb, LIBUSB_HOTPLUG_EVENT_DEVICE_ARRIVED, LIBUSB_HOTPLUG_ENUMERATE,
+                                         identity.vendor, identity.product, LIBUSB_HOTPLUG_MATCH_ANY,
+                                         hotplug_on_arrival, made, &made->callback) == LIBUSB_SUCCESS;
     *hotplug = made;
     return WHISKER_OK;
 }

@@ -1,12 +1,15 @@
 #include "usb.h"
 
 #include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
 
 #include "whisker/errors.h"
 #include "whisker_protocol.h"
 
 /* USB allows seven tiers. */
 #define PORTS_MAX 7
+#define HEXADECIMAL "0123456789abcdefABCDEF"
 
 int usb_error(int error)
 {
@@ -25,11 +28,26 @@ int usb_error(int error)
     }
 }
 
-bool usb_is_bridge(libusb_device *candidate)
+int usb_read_identity(struct usb_identity *identity)
+{
+    const char *text = getenv("WHISKER_USB_ID");
+    *identity = (struct usb_identity){WHISKER_LIMIT_USB_VENDOR_ID, WHISKER_LIMIT_USB_PRODUCT_ID};
+    if (!text) {
+        return WHISKER_OK;
+    }
+    if (strlen(text) != 9 || text[4] != ':' || strspn(text, HEXADECIMAL) != 4 || strspn(text + 5, HEXADECIMAL) != 4) {
+        return WHISKER_ERROR_USB_ID;
+    }
+    identity->vendor = (uint16_t)strtoul(text, NULL, 16);
+    identity->product = (uint16_t)strtoul(text + 5, NULL, 16);
+    return WHISKER_OK;
+}
+
+bool usb_is_bridge(libusb_device *candidate, const struct usb_identity *identity)
 {
     struct libusb_device_descriptor about;
-    return libusb_get_device_descriptor(candidate, &about) == 0 && about.idVendor == WHISKER_LIMIT_USB_VENDOR_ID &&
-           about.idProduct == WHISKER_LIMIT_USB_PRODUCT_ID;
+    return libusb_get_device_descriptor(candidate, &about) == 0 && about.idVendor == identity->vendor &&
+           about.idProduct == identity->product;
 }
 
 void usb_path(libusb_device *device, char *path, size_t n)

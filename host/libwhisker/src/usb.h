@@ -4,14 +4,23 @@
 
 #include <libusb.h>
 #include <stdbool.h>
+#include <stdint.h>
 
 #include "whisker/device.h"
 
 /* The code of errors.h for one of libusb's. */
 int usb_error(int error);
 
-/* Does it have the bridge's vendor and product numbers? */
-bool usb_is_bridge(libusb_device *candidate);
+/* What a bridge's device descriptor holds. */
+struct usb_identity {
+    uint16_t vendor, product;
+};
+
+/* The numbers of $WHISKER_USB_ID ("1209:0001"), or, where it is not set, the protocol's. Returns 0, or
+ * WHISKER_ERROR_USB_ID. */
+int usb_read_identity(struct usb_identity *identity);
+
+bool usb_is_bridge(libusb_device *candidate, const struct usb_identity *identity);
 
 /* Fills in where it is plugged in. */
 void usb_path(libusb_device *device, char *path, size_t n);

@@ -109,8 +109,8 @@ int libusb_get_device_descriptor(libusb_device *device, struct libusb_device_des
 {
     (void)device;
     memset(about, 0, sizeof *about);
-    about->idVendor = WHISKER_LIMIT_USB_VENDOR_ID;
-    about->idProduct = WHISKER_LIMIT_USB_PRODUCT_ID;
+    about->idVendor = fake.vendor ? fake.vendor : WHISKER_LIMIT_USB_VENDOR_ID;
+    about->idProduct = fake.product ? fake.product : WHISKER_LIMIT_USB_PRODUCT_ID;
     about->iSerialNumber = SERIAL_INDEX;
     return 0;
 }

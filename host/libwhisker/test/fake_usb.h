@@ -16,6 +16,7 @@ struct fake_usb {
     int bridges; /* plugged in; their serial numbers are "0001", "0002", ... */
     bool has_hid;
     int open_error, claim_error;
+    uint16_t vendor, product; /* in its descriptor; 0: the protocol's */
     uint8_t identity[16];
     int identity_bytes;
     uint8_t timing[32];

@@ -5,6 +5,7 @@
 #include <stdint.h>
 
 #include <cmocka.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "fake_usb.h"
@@ -98,6 +99,25 @@ static void another_wire_version_or_shape_is_refused_and_named(void **state)
     fake_reset();
     whisker_put_u16(fake.identity + WHISKER_REPORT_IDENTITY_FRAME_BYTES, 128);
     assert_int_equal(assert_not_opened(WHISKER_ERROR_DEVICE_IDENTITY).frame_bytes, 128);
+}
+
+static void a_bridge_with_other_numbers_is_found_by_them(void **state)
+{
+    (void)state;
+    struct whisker_device_info list[1];
+    assert_int_equal(setenv("WHISKER_USB_ID", "1d50:6000", 1), 0);
+    assert_int_equal(whisker_device_list(list, 1), 0);
+    assert_not_opened(WHISKER_ERROR_DEVICE_MISSING);
+    fake.vendor = 0x1D50;
+    fake.product = 0x6000;
+    assert_int_equal(whisker_device_list(list, 1), 1);
+    static const char *const WRONG[] = {"", "1209", "1209:001", "1209:00011", "0x12:0001", "1209-0001", "12:09:0001"};
+    for (size_t n = 0; n < sizeof WRONG / sizeof *WRONG; n++) {
+        assert_int_equal(setenv("WHISKER_USB_ID", WRONG[n], 1), 0);
+        assert_int_equal(whisker_device_list(list, 1), WHISKER_ERROR_USB_ID);
+        assert_not_opened(WHISKER_ERROR_USB_ID);
+    }
+    assert_int_equal(unsetenv("WHISKER_USB_ID"), 0);
 }
 
 static void the_bridge_asked_for_is_opened(void **state)
@@ -475,6 +495,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         WITH_BRIDGE(open_says_why_it_fails),
         WITH_BRIDGE(another_wire_version_or_shape_is_refused_and_named),
+        WITH_BRIDGE(a_bridge_with_other_numbers_is_found_by_them),
         WITH_BRIDGE(the_bridge_asked_for_is_opened),
         WITH_BRIDGE(bridges_are_listed_also_without_permission),
         WITH_BRIDGE(hidapi_ends_with_its_last_handle),

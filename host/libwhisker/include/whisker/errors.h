@@ -73,6 +73,8 @@
       "take the board's power away and give it back, and begin again")                                                 \
     X(FLASH_VERIFY, -69, "the bridge's flash does not hold what was written",                                          \
       "begin again; if it stays so, the flash is worn out: replace the board")                                         \
+    X(USB_ID, -70, "the environment's WHISKER_USB_ID is not four hexadecimal digits, a colon and four more",           \
+      "give the numbers of the bridge, as 1209:0001, or unset it")                                                     \
     X(HOST_CLOCK, -50, "the host's clock was set or went backwards", "none needed; a time service avoids it")
 
 enum whisker_error {

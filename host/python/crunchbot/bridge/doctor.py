@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from whisker_protocol import LIMITS, WIRE_VERSION
+from whisker_protocol import WIRE_VERSION
 
 from . import pattern, usbtree
 from .ring import DaemonStats, Reader, RingError, error_line, found_rings, user_name
@@ -110,7 +110,7 @@ def _permission(bridge: usbtree.Bridge) -> Finding:
 
 def rules(root: Path) -> list[Finding]:
     """Whether a udev rule names the bridge."""
-    vendor = f"{LIMITS['usb_vendor_id']:04x}"
+    vendor = f"{usbtree.identity()[0]:04x}"
     for folder in RULES:
         for path in sorted((root / folder).glob("*.rules")):
             try:

@@ -1,11 +1,15 @@
 """Bridges as the kernel's USB tree shows them: presence, speed, permissions, who holds them. Needs no USB library."""
 
 import os
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
 from whisker_protocol import LIMITS
 
+from ..errors import UserError
+
+TEST_ID = (LIMITS["usb_vendor_id"], LIMITS["usb_product_id"])  # for private tests only
 HIGH_SPEED_MBIT = 480.0
 
 
@@ -38,9 +42,20 @@ def holders(bridge: Bridge, root: Path = Path("/")) -> list[tuple[int, str]]:
     return found
 
 
+def identity() -> tuple[int, int]:
+    """Vendor and product of the bridges: of $WHISKER_USB_ID ("1209:0001"), else TEST_ID. UserError: it is no such text."""
+    text = os.environ.get("WHISKER_USB_ID")
+    if text is None:
+        return TEST_ID
+    if not re.fullmatch("[0-9a-fA-F]{4}:[0-9a-fA-F]{4}", text):
+        raise UserError(
+            f"WHISKER_USB_ID {text!r}: not VID:PID; give the numbers of the bridge, as 1209:0001, or unset it"
+        )
+    return int(text[:4], 16), int(text[5:], 16)
+
+
 def _is_bridge(folder: Path) -> bool:
-    wanted = (LIMITS["usb_vendor_id"], LIMITS["usb_product_id"])
-    return (_hex(folder / "idVendor"), _hex(folder / "idProduct")) == wanted
+    return (_hex(folder / "idVendor"), _hex(folder / "idProduct")) == identity()
 
 
 def _bridge(root: Path, folder: Path) -> Bridge:

@@ -8,14 +8,16 @@ import signal
 import sys
 import time
 
-from whisker_protocol import WIRE_VERSION
+from whisker_protocol import LIMITS, WIRE_VERSION
 
+from .. import __version__
 from ..arguments import add_ring
 from ..bridge import usbtree
 from ..bridge.ring import Reader, RingError, signal_writer
 from ..programs import program
 
 EXAMPLE = "whisker info --json"
+TEST_ID_TEXT = "{:04x}:{:04x}".format(*usbtree.TEST_ID)
 
 
 def add(parser) -> None:
@@ -30,7 +32,8 @@ def add(parser) -> None:
 def run(arguments) -> int:
     if arguments.nodes:
         return ask_nodes(arguments.ring)
-    reported = {"host": {"wire_version": WIRE_VERSION}, "usb": [describe_usb(found) for found in usbtree.bridges()]}
+    host = {"version": __version__, "wire_version": WIRE_VERSION, "gateware": LIMITS["gateware_version"]}
+    reported = {"host": host, "usb": [describe_usb(found) for found in usbtree.bridges()]}
     try:
         with Reader(arguments.ring, arguments.wait, arguments.ring_owner) as reader:
             reported |= describe_ring(reader)
@@ -38,8 +41,27 @@ def run(arguments) -> int:
         if not reported["usb"] or error.name != "RING_MISSING":
             raise
         reported["ring"] = {"name": arguments.ring, "state": str(error)}
+    reported["advice"] = advice(reported)
     print(json.dumps(reported) if arguments.json else "\n".join(lines(reported)))
     return 0
+
+
+def advice(reported: dict) -> list[str]:
+    """What does not fit together, and what must not be given to others: a line each, with the remedy."""
+    found, daemon = [], reported.get("daemon", {})
+    host_wire, host_gateware = WIRE_VERSION, LIMITS["gateware_version"]
+    wire, gateware = daemon.get("wire_version", 0), daemon.get("gateware", 0)
+    if wire not in (0, host_wire):
+        found.append(f"bridge: wire version {wire}, host: {host_wire}; install gateware and host of one release")
+    elif 0 < gateware < host_gateware:
+        text = "it works; for what is new: make bitstream BOARD=..., whisker flash BOARD.wgw"
+        found.append(f"bridge: gateware {gateware}, this release: {host_gateware}; {text}")
+    elif gateware > host_gateware:
+        found.append(f"bridge: gateware {gateware}, this release: {host_gateware}; install a newer crunchbot")
+    if reported["usb"] and usbtree.identity() == usbtree.TEST_ID:
+        text = "do not give it to others; build it with USB_ID= (docs/boards.md, USB identity)"
+        found.append(f"bridge: USB id {TEST_ID_TEXT} is for private tests only; {text}")
+    return found
 
 
 def ask_nodes(ring: str) -> int:
@@ -82,9 +104,10 @@ def describe_ring(reader: Reader) -> dict:
 def lines(reported: dict) -> list[str]:
     """The text for a person: a heading per part, a line per value."""
     out = []
-    for part, values in reported.items():
+    *parts, (_, advised) = reported.items()
+    for part, values in parts:
         tables = values if isinstance(values, list) else [values]
         for table in tables:
             out += [part, *(f"  {key}: {value}" for key, value in table.items())]
         out += [f"{part}: no bridge is plugged in"] if not tables else []
-    return out
+    return out + advised

@@ -11,8 +11,9 @@ import pytest
 from commandkit import END_S, STATS, live_ring, run, signals_as_before  # noqa: F401 - a fixture
 from rings import make_frames, ring_name
 
-from crunchbot.bridge import doctor, pattern
+from crunchbot.bridge import doctor, pattern, usbtree
 from crunchbot.bridge.ring import FRAME, FoundRing, Reader, Writer
+from crunchbot.errors import UserError
 
 
 @pytest.fixture
@@ -46,6 +47,19 @@ def publish_until(stop, name):
             frames["tick"] += 200
             frames["sequence"] += 200
             writer.publish(frames)
+
+
+def test_bridges_are_found_by_the_numbers_that_are_set(host, monkeypatch):
+    assert [bridge.serial for bridge in usbtree.bridges(host)] == ["B0042"]
+    monkeypatch.setenv("WHISKER_USB_ID", "1d50:6000")
+    assert usbtree.bridges(host) == []
+    (host / "sys/bus/usb/devices/1-2/idVendor").write_text("1d50\n")
+    (host / "sys/bus/usb/devices/1-2/idProduct").write_text("6000\n")
+    assert [bridge.serial for bridge in usbtree.bridges(host)] == ["B0042"]
+    for wrong in ("", "1209", "1209:00011", "0x12:0001"):
+        monkeypatch.setenv("WHISKER_USB_ID", wrong)
+        with pytest.raises(UserError, match="not VID:PID; give the numbers of the bridge, as 1209:0001"):
+            usbtree.bridges(host)
 
 
 def test_doctor_finds_nothing_where_all_is_well(host):

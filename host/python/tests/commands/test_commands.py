@@ -13,12 +13,14 @@ import pytest
 from commandkit import END_S, command, live_ring, run, signals_as_before  # noqa: F401 - a fixture
 from rings import make_frames
 
+from crunchbot import __version__
 from crunchbot.cli import COMMANDS, _parser, main
+from crunchbot.commands import info
 from crunchbot.commands.top import BARS, sparkline
 from crunchbot.recording import read
 from crunchbot.recording.writing import RecordingWriter
 from crunchbot_lab.commands import bridge_sim
-from whisker_protocol import WIRE_VERSION
+from whisker_protocol import LIMITS, WIRE_VERSION
 
 
 def test_help_names_every_command_and_imports_none(capsys):
@@ -83,7 +85,26 @@ def test_info_reports_ring_daemon_and_clock(capsys):
         assert code == 0 and reported["ring"]["published"] == 300 and reported["ring"]["writer_pid"] == os.getpid()
         assert reported["daemon"]["serial"] == "B0042" and reported["daemon"]["lanes"] == [0, 2]
         assert reported["clock"]["uncertainty_ns"] == 5000.0 and reported["host"]["wire_version"] == WIRE_VERSION
+        assert reported["host"]["version"] == __version__ and reported["advice"] == []
         assert "  serial: B0042" in run(capsys, "info", "--ring", name)[1]
+
+
+def test_info_names_versions_and_what_does_not_fit():
+    bridge = {"wire_version": WIRE_VERSION, "gateware": LIMITS["gateware_version"]}
+
+    def advised(daemon: dict, usb: list) -> str:
+        return "\n".join(info.advice({"daemon": bridge | daemon, "usb": usb}))
+
+    assert advised({}, []) == ""
+    assert "install gateware and host of one release" in advised({"wire_version": WIRE_VERSION + 1}, [])
+    assert "whisker flash BOARD.wgw" in advised({"gateware": LIMITS["gateware_version"] - 1}, [])
+    assert "install a newer crunchbot" in advised({"gateware": LIMITS["gateware_version"] + 1}, [])
+    assert "1209:0001 is for private tests only; do not give it to others" in advised({}, [{}])
+
+
+def test_info_warns_of_no_id_of_ones_own(monkeypatch):
+    monkeypatch.setenv("WHISKER_USB_ID", "1d50:6000")
+    assert info.advice({"usb": [{}]}) == []
 
 
 def test_stream_prints_chosen_lanes_and_ticks(capsys):
