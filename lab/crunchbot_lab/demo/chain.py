@@ -6,12 +6,15 @@ import os
 import shutil
 import socket
 import tempfile
+import threading
 import time
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from crunchbot.robot.network import link as network
+from crunchbot.robot.network.truth import TruthWatcher
 from crunchbot.robot.processes import parts
 from crunchbot.robot.processes.children import Child, Program
 
@@ -75,6 +78,7 @@ class Places(parts.Places):
 
     pilot: str
     navigator: str
+    truth: str
 
 
 def run_chain(run: ChainRun, progress: Callable[[int], None]) -> float:
@@ -85,12 +89,14 @@ def run_chain(run: ChainRun, progress: Callable[[int], None]) -> float:
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="whisker-")))
         stack.callback(_remove_ring, ring)
-        places = Places(ring, folder, *_free_endpoints(2))
+        places = Places(ring, folder, *_free_endpoints(3))
         body = parts.Body(run.scene, run.out / "models", run.create, places.serial, run.seed)
         table = parts.Table(body, places, run.program)
         bridge = Child(_bridge(run, table), run.logs / "bridge.log", _ticks(progress))
         children = [stack.enter_context(closing(bridge))]
         _await_file(places.simulation, bridge)
+        link = stack.enter_context(network.Link("truth", listen=[places.truth], lock_step=True))
+        TruthWatcher(places.simulation, link, threading.Event()).start()
         base = [Program.of("base", [*table.base(), "--clock", "stream"], serves=True)] if run.create else []
         others = [make(run, places, table) for make in (_pilot, _navigator, _bag)]
         for program in [*base, _log(run, places), *others]:
@@ -133,7 +139,8 @@ def _navigator(run: ChainRun, places: Places, table: parts.Table) -> Program:
 
 
 def _bag(run: ChainRun, places: Places, table: parts.Table) -> Program:
-    command = [*table.bag(run.bag), "--lock-step", "--connect", places.pilot, "--connect", places.navigator]
+    command = [*table.bag(run.bag), "--lock-step", "--connect", places.pilot]
+    command += ["--connect", places.navigator, "--connect", places.truth]
     return Program.of("bag", command)
 
 

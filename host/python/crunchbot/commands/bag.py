@@ -3,6 +3,7 @@
 from itertools import chain, count
 from pathlib import Path
 
+from .. import scene as scenes
 from ..recording.writing import TopicWriter
 from ..robot.bag import RECORD, Bag, metadata
 from ..robot.network.options import NAVIGATOR_ENDPOINT, PILOT_ENDPOINT, add_link, open_link
@@ -13,7 +14,9 @@ EXAMPLE = "whisker bag run.mcap --scene SCENE"
 
 def add(parser) -> None:
     parser.add_argument("file", metavar="FILE.MCAP")
-    parser.add_argument("--scene", type=Path, metavar="SCENE", help="keep this scene folder's files in the bag")
+    parser.add_argument(
+        "--scene", type=Path, metavar="SCENE", help="keep this scene folder's files in the bag, and write /tf and /map"
+    )
     add_link(parser, [], [PILOT_ENDPOINT, NAVIGATOR_ENDPOINT])
     parser.add_argument("--stay", action="store_true", help="go on after the end of a run")
     parser.add_argument("--overwrite", action="store_true", help="replace FILE.MCAP if it exists")
@@ -30,10 +33,11 @@ def next_free(path: Path) -> Path:
 
 def run(arguments) -> int:
     reported = metadata(arguments.robot, arguments.scene)
+    scene = scenes.load(arguments.scene) if arguments.scene else None
     stop = stop_on_signals()
     with open_link("bag", arguments) as link:
         file = next_free(Path(arguments.file)) if arguments.next else arguments.file
         with TopicWriter(file, RECORD, reported, arguments.overwrite) as writer:
-            counted = Bag(writer, arguments.robot).run(link, stop, arguments.stay)
+            counted = Bag(writer, arguments.robot, scene).run(link, stop, arguments.stay)
     print(f"{file}: " + ", ".join(f"{name} {value}" for name, value in counted.items()))
     return 0

@@ -69,10 +69,10 @@ class TopicWriter:
     def __exit__(self, *exception) -> None:
         self.close()
 
-    def topic(self, topic: str, schema: str) -> None:
-        """Make a topic known; `schema`: "package/msg/Type" of crunchbot/msgs."""
-        text = messages.definition(schema).encode()
-        number = self._writer.register_schema(schema, SchemaEncoding.ROS2, text)
+    def topic(self, topic: str, schema: str, definition: str | None = None) -> None:
+        """Make a topic known; `schema`: "package/msg/Type". Its definition is that of crunchbot/msgs where none is given."""
+        text = definition or messages.definition(schema)
+        number = self._writer.register_schema(schema, SchemaEncoding.ROS2, text.encode())
         # The profile asks for the first key; empty: the reader's default quality of service.
         extra = {"offered_qos_profiles": "", NUMBERED: "1"}
         self._channels[topic] = self._writer.register_channel(topic, MessageEncoding.CDR, number, extra)

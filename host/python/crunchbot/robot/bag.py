@@ -1,6 +1,6 @@
 """The robot's bag: every topic of a run in an MCAP file that ROS 2 tools open, whole up to its last second.
 
-Topics are /<robot>/<topic>. Log times follow the bridge's clock from the moment the bag began; the headers' stamps are
+Topics are /<robot>/<topic>; with a scene also /tf and /map, by which ROS 2's tools place the rest. Log times follow the bridge's clock from the moment the bag began; the headers' stamps are
 the bridge's own. With a scene, `whisker scene from BAG` makes a scene folder of what was observed.
 """
 
@@ -11,42 +11,19 @@ from dataclasses import replace
 from pathlib import Path
 
 from ..recording.writing import TopicWriter
-from ..scene import ARENA, PRIOR, ROBOT, load, write
+from ..scene import ARENA, PRIOR, ROBOT, Scene, load, write
+from .log_clock import LogClock
 from .network.health import ENDED, RUNNING, Health
 from .network.inbox import Inbox, Received
 from .network.link import Link
 from .network.messages import HEALTH, SCHEMAS, encode
-from .network.rows import ROW_NS, leaps
+from .standard import types
+from .standard.view import KINDS, StandardView
 
 RECORD, FORMAT = "whisker_robot", "1"  # name of the metadata record, and of what it promises
 SCENE_FILES = (ARENA, ROBOT, PRIOR)
 LOOK_S = 0.5
-APART_NS = 60 * 10**9  # a message further from the newest row does not have this bridge's clock
-
-
-class BagClock:
-    """Log times: the wall's when the bag began, then those of the rows; a bridge that begins anew goes on behind.
-
-    Only rows move it: they come in order, from one process. What others stamp may be late, or of a bridge before.
-    """
-
-    def __init__(self, wall_ns: int):
-        self._offset: int | None = None
-        self._row_ns, self.latest = 0, wall_ns
-
-    def row(self, stamp_ns: int) -> int:
-        """The log time of a row."""
-        if self._offset is None:
-            self._offset = self.latest - stamp_ns
-        elif leaps(self._row_ns, stamp_ns):
-            self._offset = self.latest + ROW_NS - stamp_ns
-        self._row_ns, self.latest = stamp_ns, stamp_ns + self._offset
-        return self.latest
-
-    def other(self, stamp_ns: int) -> int:
-        """The log time of another message with the bridge's stamp: the newest row's when that makes no sense."""
-        reported = self.latest if self._offset is None else stamp_ns + self._offset
-        return reported if abs(reported - self.latest) <= APART_NS else self.latest
+PLACING = ("/tf", "/map")
 
 
 def metadata(robot: str, scene: Path | None) -> dict[str, str]:
@@ -65,10 +42,11 @@ def metadata(robot: str, scene: Path | None) -> dict[str, str]:
 class Bag:
     """Writes what comes on a link until every stream has ended. `run`, or `take` what was received by another reader."""
 
-    def __init__(self, writer: TopicWriter, robot: str):
+    def __init__(self, writer: TopicWriter, robot: str, scene: Scene | None = None):
         self._writer, self._robot = writer, robot
+        self._view = StandardView(scene, time.time_ns()) if scene else None
         self._known: set[str] = set()
-        self._clock = BagClock(time.time_ns())
+        self._clock = LogClock(time.time_ns())
         self.messages = 0
 
     def take(self, received: list[Received]) -> None:
@@ -82,6 +60,23 @@ class Bag:
                 self._writer.topic(topic, SCHEMAS[type(one.message)])
             self._writer.add(topic, self._time(one), encode(one.message))
             self.messages += 1
+            self._place(one)
+
+    def _place(self, one: Received) -> None:
+        """The frames that follow from a message, and at the first row the map."""
+        if self._view is None:
+            return
+        standards = list(self._view.take(one.topic, one.message))
+        if one.topic == "observation" and "/map" not in self._known:
+            standards += self._view.first()
+        for standard in standards:
+            if standard.topic not in PLACING:
+                continue
+            if standard.topic not in self._known:
+                self._known.add(standard.topic)
+                kind = KINDS[standard.topic]
+                self._writer.topic(standard.topic, kind.replace("/", "/msg/"), types.definition(kind))
+            self._writer.add(standard.topic, standard.stamp_ns, types.encode(standard.message))
 
     def _time(self, one: Received) -> int:
         stamp_ns = one.message.header.stamp.ns

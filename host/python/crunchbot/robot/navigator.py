@@ -27,7 +27,7 @@ from .network.inbox import Received
 from .network.initial_pose import InitialPoseError
 from .network.link import Link
 from .network.messages import Header, Localisation, PoseWithCovariance, PoseWithCovarianceStamped
-from .network.ros import ARENA_FRAME
+from .network.ros import MAP_FRAME
 from .network.row_checks import RowChecks
 from .network.rows import Follower, Step
 from .track import Track
@@ -158,7 +158,7 @@ class Navigator:
             self._begin(stack, has_normals(step.row.names))
             self._begin_from_reported()
         self._now_ns = step.row.header.stamp.ns
-        header = Header.at(self._now_ns, ARENA_FRAME)
+        header = Header.at(self._now_ns, MAP_FRAME)
         for track in self._tracks:
             self._answer(track, step, header, track.take(step))
         self._weigh_s = max(time.monotonic() - began, self._settings.drill_step_s)

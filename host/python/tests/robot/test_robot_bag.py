@@ -20,7 +20,8 @@ from crunchbot.observation import Row
 from crunchbot.pilot.pilot import compose
 from crunchbot.recording.mcapfile import McapFile
 from crunchbot.recording.writing import TopicWriter
-from crunchbot.robot.bag import RECORD, Bag, BagClock, metadata
+from crunchbot.robot.bag import RECORD, Bag, metadata
+from crunchbot.robot.log_clock import LogClock
 from crunchbot.robot.network import messages as m
 from crunchbot.robot.network.inbox import Received
 from crunchbot.robot.network.link import Link
@@ -69,7 +70,7 @@ def bag(scene, tmp_path_factory):
 
 def test_ros_tools_open_it(bag, scene):
     _, loaded, observations = scene
-    rows, seen, times = [], {}, []
+    rows, seen, times, placed = [], {}, [], {}
     with AnyReader([bag], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
         kinds = {c.topic: c.msgtype for c in reader.connections}
         for connection, time_ns, data in reader.messages():
@@ -77,9 +78,14 @@ def test_ros_tools_open_it(bag, scene):
             if connection.topic == "/robot/observation":
                 rows.append(message)
                 times.append(time_ns)
+            elif connection.topic in ("/tf", "/map"):
+                placed.setdefault(connection.topic, []).append(message)
             elif connection.topic != "/robot/truth":
                 seen[connection.topic.removeprefix("/robot/")] = message
     assert kinds.pop("/robot/health/bag", "whisker_msgs/msg/ProcessHealth") == "whisker_msgs/msg/ProcessHealth"
+    assert kinds.pop("/tf") == "tf2_msgs/msg/TFMessage" and kinds.pop("/map") == "nav_msgs/msg/OccupancyGrid"
+    frames = {(t.header.frame_id, t.child_frame_id) for one in placed["/tf"] for t in one.transforms}
+    assert ("odom", "base_link") in frames and len(placed["/map"]) == 1
     assert kinds == {f"/robot/{topic}": m.SCHEMAS[type(message)] for topic, message in examples().items()}
     assert [row.seq for row in rows] == list(range(ROWS)) and set(np.diff(times)) == {10**8}
     for topic, message in examples().items():
@@ -207,7 +213,7 @@ def test_a_damaged_bag_gives_a_scene_and_a_warning(bag, scene, tmp_path, capsys)
 
 
 def test_log_times_follow_the_bridge_and_outlive_it():
-    clock, began, second = BagClock(10**18), 10**18, 10**9
+    clock, began, second = LogClock(10**18), 10**18, 10**9
     assert clock.other(3 * second) == began
     assert [clock.row(s * second) - began for s in (500, 501)] == [0, second]
     assert [clock.other(s * second) - began for s in (499, 501, 502)] == [-second, second, 2 * second]
@@ -218,7 +224,7 @@ def test_log_times_follow_the_bridge_and_outlive_it():
 
 
 def test_log_times_stay_what_a_file_can_hold_whatever_rows_are_stamped():
-    clock, began = BagClock(10**18), 10**18
+    clock, began = LogClock(10**18), 10**18
     for n in range(200):
         clock.row(n % 2 * (10**9 - 1) * 10**9)
     assert began < clock.latest <= began + 200 * 10**8

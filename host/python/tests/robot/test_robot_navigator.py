@@ -523,7 +523,7 @@ def test_a_reported_pose_has_a_frame_and_a_width(made):
         return m.PoseWithCovarianceStamped(m.Header.at(0, frame), pose)
 
     assert initial_pose.prior_of(message("", 0.0), arena).sigma == (initial_pose.FINEST,) * 3
-    prior = initial_pose.prior_of(message("arena", 0.3), arena)
+    prior = initial_pose.prior_of(message("map", 0.3), arena)
     assert prior.mean == pytest.approx((1.0, 2.0, 0.5)) and prior.sigma == pytest.approx((0.3,) * 3)
-    with pytest.raises(initial_pose.InitialPoseError, match="frame 'odom'; give a pose in frame 'arena'"):
+    with pytest.raises(initial_pose.InitialPoseError, match="frame 'odom'; give a pose in frame 'map'"):
         initial_pose.prior_of(message("odom", 0.3), arena)

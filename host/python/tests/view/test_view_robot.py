@@ -108,7 +108,7 @@ def test_rows_that_never_came_are_counted():
 
 def test_a_pose_is_as_wide_as_its_spread_over_both_axes():
     model, pose = RobotModel(), PoseWithCovariance.planar((1.0, 2.0, 0.5), WIDE)
-    model.take("localisation", Localisation(Header.at(ROW_NS, "arena"), "grid", pose, 0.5, 1))
+    model.take("localisation", Localisation(Header.at(ROW_NS, "map"), "grid", pose, 0.5, 1))
     assert (model.pose["sigma_m"], model.pose["sigma_rad"]) == (0.05, 0.2)
     assert (model.pose["x"], model.pose["y"], model.pose["theta"]) == (1.0, 2.0, 0.5)
 
@@ -157,7 +157,7 @@ def test_a_surface_is_placed_by_the_estimate_of_its_own_row():
     model.take("observation", surface_row(4, **reported))
     for seq in (3, 4, 4):
         pose = PoseWithCovariance.planar((1.0 + seq, 2.0, np.pi / 2), np.diag([1e-4, 1e-4, 0.01]))
-        model.take("localisation", Localisation(Header.at(seq * ROW_NS, "arena"), "grid", pose, 0.5, seq))
+        model.take("localisation", Localisation(Header.at(seq * ROW_NS, "map"), "grid", pose, 0.5, seq))
     (surface,) = model.surfaces.reported
     assert (surface["x"], surface["y"]) == pytest.approx((4.9, 2.2))
     assert surface["normal"] == pytest.approx(-np.pi / 2, abs=1e-3)
@@ -168,7 +168,7 @@ def test_a_surface_is_placed_by_the_estimate_of_its_own_row():
 def test_a_surface_without_a_direction_is_not_drawn():
     model, pose = RobotModel(SCENE), PoseWithCovariance.planar((1.0, 2.0, 0.0), WIDE)
     model.take("observation", surface_row(1, point_x_m=0.2, point_y_m=0.1, point_sd_m=0.001))
-    model.take("localisation", Localisation(Header.at(ROW_NS, "arena"), "grid", pose, 0.5, 1))
+    model.take("localisation", Localisation(Header.at(ROW_NS, "map"), "grid", pose, 0.5, 1))
     assert not model.surfaces.reported
 
 

@@ -93,7 +93,7 @@ def belief_message(stamp_ns: int, places, seed: int = 1, number: int = 400, mass
         around = rng.normal((x, y, theta), (sigma, sigma, 0.15), (n, 3))
         rows.append(np.column_stack([around, np.full(n, share / n), np.full(n, 0.02), np.full(n, 0.1)]))
     columns = np.concatenate(rows).T.astype(np.float32)
-    return m.Belief(m.Header.at(stamp_ns, "arena"), "adaptive", stamp_ns // ROW_NS, columns.shape[1], mass, *columns)
+    return m.Belief(m.Header.at(stamp_ns, "map"), "adaptive", stamp_ns // ROW_NS, columns.shape[1], mass, *columns)
 
 
 @dataclass
@@ -112,7 +112,7 @@ class MadeUpRun:
             reported.append(("observation", self.observation(row)))
         reported += [("localisation", self.localisation(row))] + self.contact(row)
         if self.simulated:
-            reported.append(("truth", m.PoseStamped(m.Header.at(stamp, "arena"), m.Pose.planar(*route(stamp / 1e9)))))
+            reported.append(("truth", m.PoseStamped(m.Header.at(stamp, "map"), m.Pose.planar(*route(stamp / 1e9)))))
         if row % 5 == 0:
             reported.append(("belief", self.belief(row)))
         if row % 10 == 0:
@@ -151,7 +151,7 @@ class MadeUpRun:
         pose = m.PoseWithCovariance.planar(estimate(t_s), np.diag([sigma**2, sigma**2, 0.01]))
         confidence = min(0.97, 1.0 - 0.75 * math.exp(-t_s / 9)) - 0.3 * math.exp(-(((t_s - 30) / 3) ** 2))
         missed = len([k for k in self.skip if k < row])
-        header = m.Header.at(row * ROW_NS, "arena")
+        header = m.Header.at(row * ROW_NS, "map")
         return m.Localisation(header, "adaptive", pose, confidence, row, 1, 0, missed, 0, "scene")
 
     def contact(self, row: int) -> list[tuple[str, m.Contact]]:

@@ -44,12 +44,12 @@ class SceneRun:
         pose = m.PoseWithCovariance.planar(estimate[0]["pose"], estimate[0]["covariance"])
         reported = [("observation", self._observation(row))]
         confidence = float(estimate[0]["confidence"])
-        reported.append(("localisation", m.Localisation(at("arena"), FILTER, pose, confidence, row, prior="uniform")))
-        reported.append(("truth", m.PoseStamped(at("arena"), m.Pose.planar(*self._rows.truth[row]))))
+        reported.append(("localisation", m.Localisation(at("map"), FILTER, pose, confidence, row, prior="uniform")))
+        reported.append(("truth", m.PoseStamped(at("map"), m.Pose.planar(*self._rows.truth[row]))))
         reported += [("contact", contact) for ray in range(len(self._rays)) for contact in self._contact(row, ray)]
         if row % 5 == 0:
             components = self._filter.components()
-            reported.append(("belief", to_message(at("arena"), FILTER, row, len(components), condense(components))))
+            reported.append(("belief", to_message(at("map"), FILTER, row, len(components), condense(components))))
         if row % 10 == 0:
             counts = [m.KeyValue("rows", str(row)), m.KeyValue("states", str(estimate[0]["states"]))]
             reported.append(("health/pilot", m.ProcessHealth(at(), "pilot", 4005, "running", counts[:1])))

@@ -7,7 +7,7 @@ import numpy as np
 from ...scene import Arena, Prior
 from .link import Link
 from .messages import Header, PoseWithCovariance, PoseWithCovarianceStamped
-from .ros import ARENA_FRAME
+from .ros import MAP_FRAME
 
 TOPIC = "initial_pose"
 SIGMA = (0.1, 0.1, 0.2)  # m, m, rad: of a pose that is pointed at
@@ -22,15 +22,20 @@ def send(link: Link, pose: tuple[float, float, float], sigma: tuple[float, float
     """Tell the navigator of this link's robot that it is at this pose now: x, y in m, heading in rad, in the arena's
     frame; standard deviations alike. One stream for each pose, so that the next may come from another process."""
     message = PoseWithCovariance.planar(pose, np.diag(np.square(sigma)))
+    send_message(link, PoseWithCovarianceStamped(Header.at(0, MAP_FRAME), message))
+
+
+def send_message(link: Link, message: PoseWithCovarianceStamped) -> None:
+    """The same, as a message of another program has it."""
     stream = link.publish(TOPIC)
-    stream.send(PoseWithCovarianceStamped(Header.at(0, ARENA_FRAME), message))
+    stream.send(message)
     stream.end(0, "reported")
 
 
 def prior_of(message: PoseWithCovarianceStamped, arena: Arena) -> Prior:
     """The belief that such a message asks for; InitialPoseError when it is of another frame, or outside the arena."""
-    if message.header.frame_id not in ("", ARENA_FRAME):
-        raise InitialPoseError(f"{TOPIC}: frame '{message.header.frame_id}'; give a pose in frame '{ARENA_FRAME}'")
+    if message.header.frame_id not in ("", MAP_FRAME):
+        raise InitialPoseError(f"{TOPIC}: frame '{message.header.frame_id}'; give a pose in frame '{MAP_FRAME}'")
     x, y, _ = message.pose.pose.xytheta
     if not (0.0 <= x <= arena.size_m[0] and 0.0 <= y <= arena.size_m[1]):
         raise InitialPoseError(f"{TOPIC}: ({x:.3g}, {y:.3g}) is outside the arena; give a place inside")

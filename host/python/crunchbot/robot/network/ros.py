@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-BASE_FRAME, ODOMETRY_FRAME, ARENA_FRAME = "base_link", "odom", "arena"
+BASE_FRAME, ODOMETRY_FRAME, MAP_FRAME = "base_link", "odom", "map"
 
 
 @dataclass(eq=False)

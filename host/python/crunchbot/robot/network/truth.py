@@ -7,7 +7,7 @@ from pathlib import Path
 from ...pilot.behaviour import TICK_S
 from .link import Link
 from .messages import Header, Pose, PoseStamped
-from .ros import ARENA_FRAME
+from .ros import MAP_FRAME
 
 RETRY_S = 0.2
 MESSAGE_BYTES = 256
@@ -28,6 +28,7 @@ class TruthWatcher(threading.Thread):
             server.settimeout(RETRY_S)
             server.send(b"watch")
             self._watch(server)
+        self._stream.end(0, "the simulation has ended")
 
     def _watch(self, server: socket.socket) -> None:
         while not self._stop_event.is_set():
@@ -40,5 +41,5 @@ class TruthWatcher(threading.Thread):
             if not words or words[0] == "end":
                 return
             tick, *pose = words[1:]
-            header = Header.at(round((int(tick) + 1) * TICK_S * 1e9), ARENA_FRAME)
+            header = Header.at(round((int(tick) + 1) * TICK_S * 1e9), MAP_FRAME)
             self._stream.send(PoseStamped(header, Pose.planar(*map(float, pose))))

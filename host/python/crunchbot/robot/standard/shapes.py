@@ -1,0 +1,119 @@
+"""Arena, belief and robot as grids and markers: pictures of a scene in standard messages."""
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+
+from ...scene import Arena, Robot
+from .types import make
+
+CELLS_MOST = 1000  # along a side of a map
+MAP_CELL_M, BELIEF_CELL_M = 0.02, 0.05
+FREE, SOLID, UNKNOWN = 0, 100, -1
+BODY_HEIGHT_M, WHISKER_M, TIP_M = 0.09, 0.004, 0.012
+# Marker.type
+LINE_STRIP, SPHERE, CYLINDER = 4, 2, 3
+# red, green, blue, opacity; contacts and free whiskers differ in brightness too
+BODY, FREE_WHISKER, TOUCHING, TIP = (
+    (0.4, 0.45, 0.5, 0.6),
+    (0.25, 0.25, 0.25, 1.0),
+    (1.0, 0.6, 0.1, 1.0),
+    (0.1, 0.5, 0.7, 1.0),
+)
+
+
+def pose(x: float, y: float, theta: float = 0.0, z: float = 0.0) -> SimpleNamespace:
+    """m and rad."""
+    turn = make("geometry_msgs/Quaternion", z=math.sin(theta / 2.0), w=math.cos(theta / 2.0))
+    return make("geometry_msgs/Pose", position=make("geometry_msgs/Point", x=x, y=y, z=z), orientation=turn)
+
+
+def occupancy(arena: Arena, header: SimpleNamespace) -> SimpleNamespace:
+    """nav_msgs/OccupancyGrid of boxes, of ground that was never mapped, and of the walls as a border of one cell."""
+    cell = max(MAP_CELL_M, max(arena.size_m) / CELLS_MOST)
+    columns, rows = (math.ceil(size / cell - 1e-9) for size in arena.size_m)
+    cells = np.full((rows + 2, columns + 2), SOLID, np.int8)
+    cells[1:-1, 1:-1] = FREE
+    for boxes, value in ((arena.unknown, UNKNOWN), (arena.obstacles, SOLID)):
+        for x0, y0, x1, y1 in boxes:
+            across = slice(1 + math.floor(x0 / cell + 1e-9), 1 + math.ceil(x1 / cell - 1e-9))
+            cells[1 + math.floor(y0 / cell + 1e-9) : 1 + math.ceil(y1 / cell - 1e-9), across] = value
+    return _grid(cells, cell, (-cell, -cell), header)
+
+
+def belief(message, arena: Arena, header: SimpleNamespace) -> SimpleNamespace:
+    """nav_msgs/OccupancyGrid of a belief's mass: 100 in the cell that holds most."""
+    cell = max(BELIEF_CELL_M, max(arena.size_m) / CELLS_MOST)
+    columns, rows = (max(1, math.ceil(size / cell - 1e-9)) for size in arena.size_m)
+    mass = np.zeros((rows, columns))
+    column = np.clip((np.asarray(message.x) / cell).astype(int), 0, columns - 1)
+    row = np.clip((np.asarray(message.y) / cell).astype(int), 0, rows - 1)
+    np.add.at(mass, (row, column), message.weight)
+    share = mass / mass.max() if mass.max() > 0.0 else mass
+    return _grid(np.rint(100 * share).astype(np.int8), cell, (0.0, 0.0), header)
+
+
+def _grid(cells: np.ndarray, cell_m: float, origin: tuple[float, float], header: SimpleNamespace) -> SimpleNamespace:
+    rows, columns = cells.shape
+    info = make("nav_msgs/MapMetaData", resolution=cell_m, width=columns, height=rows, origin=pose(*origin))
+    return make("nav_msgs/OccupancyGrid", header=header, info=info, data=cells.ravel())
+
+
+def robot_markers(robot: Robot, touching: dict[str, float], header: SimpleNamespace) -> SimpleNamespace:
+    """visualization_msgs/MarkerArray of body and whiskers in the robot's frame. touching: by whisker, the distance of its
+    contact from its base, m, or nan where that is not known."""
+    diameter = 2.0 * robot.body_radius_m
+    body = _marker(
+        header, "body", 0, CYLINDER, BODY, (diameter, diameter, BODY_HEIGHT_M), pose(0.0, 0.0, 0.0, BODY_HEIGHT_M / 2)
+    )
+    made = [body]
+    for number, whisker in enumerate(robot.whiskers):
+        if whisker.role == "texture":
+            made.append(_marker(header, "tips", number, SPHERE, TIP, (TIP_M,) * 3, pose(*whisker.tip_m)))
+            continue
+        is_touching = whisker.name in touching
+        reach = touching.get(whisker.name, math.nan)
+        length = whisker.length_m if math.isnan(reach) else min(reach, whisker.length_m)
+        (x, y), (c, s) = whisker.base_m, (math.cos(whisker.yaw_rad), math.sin(whisker.yaw_rad))
+        line = _marker(
+            header,
+            "whiskers",
+            number,
+            LINE_STRIP,
+            TOUCHING if is_touching else FREE_WHISKER,
+            (WHISKER_M, 0.0, 0.0),
+            pose(0.0, 0.0),
+        )
+        line.points = [
+            make("geometry_msgs/Point", x=x + d * c, y=y + d * s, z=BODY_HEIGHT_M / 2) for d in (0.0, length)
+        ]
+        made.append(line)
+        end = _marker(
+            header,
+            "contacts",
+            number,
+            SPHERE,
+            TOUCHING,
+            (TIP_M,) * 3,
+            pose(x + length * c, y + length * s, 0.0, BODY_HEIGHT_M / 2),
+        )
+        end.action = 0 if is_touching else 2  # ADD, DELETE
+        made.append(end)
+    return make("visualization_msgs/MarkerArray", markers=made)
+
+
+def _marker(header, namespace: str, number: int, kind: int, colour, scale, place) -> SimpleNamespace:
+    red, green, blue, opacity = colour
+    x, y, z = scale
+    return make(
+        "visualization_msgs/Marker",
+        header=header,
+        ns=namespace,
+        id=number,
+        type=kind,
+        pose=place,
+        scale=make("geometry_msgs/Vector3", x=x, y=y, z=z),
+        color=make("std_msgs/ColorRGBA", r=red, g=green, b=blue, a=opacity),
+        frame_locked=True,
+    )
