@@ -14,4 +14,8 @@ class ProgramsWheel(bdist_wheel):
         return "py3", "none", super().get_tag()[2]
 
 
-setup(distclass=Programs, cmdclass={"bdist_wheel": ProgramsWheel})
+setup(
+    distclass=Programs,
+    cmdclass={"bdist_wheel": ProgramsWheel},
+    options={"build": {"build_base": "../../build/wheel-sim"}},
+)
