@@ -6,7 +6,7 @@ BUILD := build/release
 PYTHON := .venv/bin/python
 SOURCES_C = $(shell git ls-files '*.c' '*.h' '*.cpp' | grep -v '/gen/')
 
-.PHONY: help demo demo-long test test-all test-kernel test-hil mutants bench wheels wheels-check sbom build setup abi gen firmware firmware-images firmware-check flash bitstream format lint clean
+.PHONY: help demo demo-long test test-all test-kernel test-hil mutants bench wheels wheels-check release release-check sbom build setup abi gen firmware firmware-images firmware-check flash bitstream format lint clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
@@ -41,6 +41,12 @@ wheels: build ## Python wheels into dist/: abi3 for x86-64 and aarch64, and the 
 
 wheels-check: wheels ## the wheels as users get them: empty environments, a simulated robot, aarch64 by emulation
 	@$(PYTHON) tools/wheels/check.py
+
+release: build sbom ## what a release consists of, into dist/: wheels, bitstreams, node images, sources, SHA256SUMS; [BOARDS="a b"] [USB_ID=vid:pid]
+	@$(PYTHON) tools/release $(if $(BOARDS),--boards $(BOARDS)) $(if $(USB_ID),--usb-id "$(USB_ID)")
+
+release-check: build sbom ## make a release twice and compare every byte; [BOARDS="a b"]
+	@$(PYTHON) tools/release --twice $(if $(BOARDS),--boards $(BOARDS)) $(if $(USB_ID),--usb-id "$(USB_ID)")
 
 sbom: build ## the software bill of materials: build/sbom.json (CycloneDX)
 	@$(PYTHON) tools/sbom.py --build-dir $(BUILD)

@@ -10,6 +10,7 @@ import os
 import shutil
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -28,12 +29,18 @@ SYSTEM_LIBRARIES = [
 
 def run(*words: object, **environment: str) -> None:
     """Runs a command; its output is shown when it fails, and the tool ends."""
-    done = subprocess.run(
-        [str(word) for word in words], cwd=ROOT, env=os.environ | environment, capture_output=True, text=True
-    )
+    settings = os.environ | {"SOURCE_DATE_EPOCH": committed_at(), "PYTHONHASHSEED": "0"} | environment
+    done = subprocess.run([str(word) for word in words], cwd=ROOT, env=settings, capture_output=True, text=True)
     if done.returncode != 0:
         print(done.stdout[-3000:], done.stderr[-3000:], sep="\n", file=sys.stderr)
         sys.exit(f"wheels: {' '.join(map(str, words[:4]))} failed; the lines above say why")
+
+
+@cache
+def committed_at() -> str:
+    """Seconds of the newest commit: files in the wheels have this time, so that the same commit gives the same bytes."""
+    done = subprocess.run(["git", "log", "-1", "--format=%ct"], cwd=ROOT, capture_output=True, text=True)
+    return done.stdout.strip() or "315532800"
 
 
 def tool(name: str) -> Path:
