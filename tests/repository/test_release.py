@@ -1,0 +1,59 @@
+"""What a release says of itself: versions, citation, licences, the forges' files."""
+
+import re
+
+import pytest
+import yaml
+from chainrun import ROOT
+
+from crunchbot import __version__
+from crunchbot.recording.reading import FORMAT as RECORDING
+from crunchbot.robot.bag import FORMAT as BAG
+from crunchbot.touch.texture.spectral import FORMAT as TEXTURE
+from whisker_protocol import LIMITS, WIRE_VERSION
+
+NOTES = (ROOT / "CHANGELOG.md").read_text()
+
+
+def test_the_table_of_versions_is_that_of_the_sources():
+    table = dict(re.findall(r"^\| ([^|]+) \| (?:soname )?([\d.]+) \|", NOTES, re.MULTILINE))
+    layout = (ROOT / "host/libwhisker/src/ring/ring_layout.h").read_text()
+    assert table == {
+        "wire between node, bridge and host": str(WIRE_VERSION),
+        "gateware": str(LIMITS["gateware_version"]),
+        "ring in shared memory": re.search(r"RING_LAYOUT_VERSION (\d+)u", layout)[1],
+        "libwhisker, libwhisker-nav, libwhisker-create": __version__.rpartition(".")[0],
+        "recording": RECORDING,
+        "robot's bag": BAG,
+        "texture model": TEXTURE.rpartition(" ")[2],
+    }
+    assert re.search(rf"^## {re.escape(__version__)}\b", NOTES, re.MULTILINE)
+
+
+def test_the_citation_is_of_this_version_and_names_the_paper():
+    cited = yaml.safe_load((ROOT / "CITATION.cff").read_text())
+    assert cited["version"] == __version__ and cited["license"] == "Apache-2.0"
+    (paper,) = cited["references"]
+    assert paper["year"] == 2011 and [one["family-names"] for one in paper["authors"]][0] == "Fox"
+
+
+def test_every_file_has_a_licence_whose_text_is_here():
+    text = (ROOT / "REUSE.toml").read_text()
+    assert 'path = "**"' in text and 'SPDX-License-Identifier = "Apache-2.0"' in text
+    assert (ROOT / "LICENSES/Apache-2.0.txt").read_bytes() == (ROOT / "LICENSE").read_bytes()
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / ".github").rglob("*.yml")), ids=lambda path: path.name)
+def test_forges_files_can_be_read_and_call_what_is_there(path):
+    content = yaml.safe_load(path.read_text())
+    assert content
+    targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
+    assert set(re.findall(r"run: make ([a-z-]+)", path.read_text())) <= targets
+
+
+@pytest.mark.parametrize("name", ["bug", "hardware", "wish"])
+def test_issue_forms_have_what_a_forge_asks_for(name):
+    form = yaml.safe_load((ROOT / f".github/ISSUE_TEMPLATE/{name}.yml").read_text())
+    assert form["name"] and form["description"] and form["body"]
+    ids = [field["id"] for field in form["body"]]
+    assert len(set(ids)) == len(ids) and all(field["attributes"]["label"] for field in form["body"])
