@@ -256,6 +256,21 @@ static void daemon_stream_report_bridges(struct daemon_stream *stream, bool tick
     }
 }
 
+static void daemon_stream_list_nodes(struct daemon_stream *stream)
+{
+    static struct daemon_report report;
+    report.used = 0;
+    for (int i = 0; i < stream->bridges; i++) {
+        if (stream->bridge[i].device) {
+            daemon_nodes_log(stream->bridge[i].device, stream->bridge[i].settings.lane_mask, &report);
+        }
+    }
+    const int error = whisker_ring_set_nodes(stream->ring, report.text);
+    if (error) {
+        daemon_log_error(LOG_WARN, "nodes, for readers", error);
+    }
+}
+
 static void daemon_stream_answer_requests(struct daemon_stream *stream)
 {
     if (report_wanted) {
@@ -263,12 +278,10 @@ static void daemon_stream_answer_requests(struct daemon_stream *stream)
         daemon_stream_report(stream);
         daemon_stream_log_stats(stream);
     }
-    for (int i = 0; nodes_wanted && i < stream->bridges; i++) {
-        if (stream->bridge[i].device) {
-            daemon_nodes_log(stream->bridge[i].device, stream->bridge[i].settings.lane_mask);
-        }
+    if (nodes_wanted && daemon_stream_connected(stream) > 0) {
+        nodes_wanted = 0;
+        daemon_stream_list_nodes(stream);
     }
-    nodes_wanted = nodes_wanted && daemon_stream_connected(stream) == 0;
 }
 
 void daemon_stream_keep_house(struct daemon_stream *stream)

@@ -147,6 +147,11 @@ void whisker_ring_explain(const char *name, int error, char *line, size_t room);
  */
 int whisker_ring_signal_writer(const char *name, int number);
 
+/* Reads the newest text of whisker_ring_set_nodes for the ring `name` into `text`, cut where `room` bytes end, and when
+ * it was written (CLOCK_REALTIME). owner: as whisker_reader_attach_owned. Returns 0, or RING_MISSING (no text),
+ * RING_NAME, RING_OWNER, RING_LAYOUT, RING_ACCESS, SYSTEM, ARGUMENT (no room). */
+int whisker_ring_nodes(const char *name, uint32_t owner, char *text, size_t room, int64_t *written_ns);
+
 /* Removes a ring of WHISKER_RING_DIRECTORY whose writer died; the next writer of its name does so, too. Returns 0, or
  * RING_MISSING, RING_BUSY (its writer lives), RING_LAYOUT (no ring), RING_NAME, RING_ACCESS (another user's), SYSTEM.
  */
@@ -174,6 +179,10 @@ int whisker_ring_publish(struct whisker_ring *ring, const struct whisker_frame *
 /* Tell the readers the clock mapping and the daemon's statistics; a few times a second is enough. Never waits. */
 void whisker_ring_set_clock(struct whisker_ring *ring, const struct whisker_clock *clock);
 void whisker_ring_set_stats(struct whisker_ring *ring, const struct whisker_daemon_stats *stats);
+
+/* Puts a text, what the nodes answered, in the place of the one before, for whisker_ring_nodes; it goes when the ring
+ * is closed. Returns 0, RING_ACCESS (another user's file is in the way), SYSTEM. */
+int whisker_ring_set_nodes(struct whisker_ring *ring, const char *text);
 
 /* Removes the name, tells the readers that the stream has ended, and lets go; what they hold they can finish reading.
  * NULL is allowed. */

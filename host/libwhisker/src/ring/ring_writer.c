@@ -5,6 +5,7 @@
 
 #include "futex.h"
 #include "ring_internal.h"
+#include "ring_nodes.h"
 #include "whisker/errors.h"
 
 static uint64_t ring_writer_nanoseconds_since_boot(void)
@@ -194,6 +195,7 @@ void whisker_ring_close(struct whisker_ring *ring)
         return;
     }
     struct ring_header *header = ring->map.header;
+    ring_nodes_remove(ring->path);
     ring_file_unname(ring->map.fd, ring->path);
     ring_store_release(&header->state, RING_CLOSED);
     ring_signal_raise(&header->signal);

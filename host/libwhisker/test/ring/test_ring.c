@@ -37,6 +37,33 @@ static void frames_come_in_order_and_once(void **state)
     assert_int_equal(read_all(f->reader, 10), 11);
 }
 
+static void what_the_nodes_answered_is_read_whole_and_goes_with_the_ring(void **state)
+{
+    const struct test_ring_pair *f = *state;
+    char text[64], small[4];
+    int64_t first_ns, then_ns;
+    const char *name = test_ring_name();
+    const uint32_t owner = WHISKER_RING_NO_OWNER;
+    assert_int_equal(whisker_ring_nodes(name, owner, text, sizeof text, &first_ns), WHISKER_ERROR_RING_MISSING);
+    assert_int_equal(whisker_ring_set_nodes(f->ring, "lane 0: serial 7, a long line\n"), 0);
+    assert_int_equal(whisker_ring_nodes(name, owner, text, sizeof text, &first_ns), 0);
+    assert_string_equal(text, "lane 0: serial 7, a long line\n");
+    assert_int_equal(whisker_ring_set_nodes(f->ring, "none\n"), 0);
+    assert_int_equal(whisker_ring_nodes(name, owner, text, sizeof text, &then_ns), 0);
+    assert_string_equal(text, "none\n");
+    assert_true(then_ns >= first_ns);
+    assert_int_equal(whisker_ring_nodes(name, owner, small, sizeof small, &then_ns), 0);
+    assert_string_equal(small, "non");
+    assert_int_equal(whisker_ring_nodes(name, owner, small, 0, &then_ns), WHISKER_ERROR_ARGUMENT);
+    assert_int_equal(whisker_ring_nodes("a/b", owner, text, sizeof text, &then_ns), WHISKER_ERROR_RING_NAME);
+    char path[256];
+    snprintf(path, sizeof path, "/dev/shm/.%s.nodes", name);
+    assert_int_equal(access(path, R_OK), 0);
+    whisker_ring_close(f->ring);
+    ((struct test_ring_pair *)*state)->ring = NULL;
+    assert_int_not_equal(access(path, R_OK), 0);
+}
+
 static void window_across_the_wrap_is_one_array(void **state)
 {
     const struct test_ring_pair *f = *state;
@@ -335,6 +362,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         WITH_RING(frames_come_in_order_and_once),
+        WITH_RING(what_the_nodes_answered_is_read_whole_and_goes_with_the_ring),
         WITH_RING(window_across_the_wrap_is_one_array),
         WITH_RING(batch_across_the_wrap_arrives_whole),
         WITH_RING(overtaken_reader_is_reported_and_goes_on),

@@ -29,6 +29,7 @@ FRAME = np.dtype(
 assert FRAME.itemsize == ffi.sizeof("struct whisker_frame")
 FRAMES = ffi.typeof("struct whisker_frame[]")
 CAPACITY: int = lib.WHISKER_RING_FRAMES
+NODES_BYTES = 1 << 16  # more than whiskerd writes
 STOP_S = 0.2  # how soon the wish to stop is noticed while a ring is waited for
 
 
@@ -109,6 +110,19 @@ def _found(entry) -> FoundRing:
 def signal_writer(ring: str, number: int) -> None:
     """Send a signal to the process that writes the ring; RingError when there is none or it cannot be proved to be it."""
     check(lib.whisker_ring_signal_writer(ring.encode(), number), ring)
+
+
+def read_nodes(ring: str, owner: int | None = None) -> tuple[str, int] | None:
+    """What the nodes answered when whiskerd was last asked, and when, in ns of the wall's clock; None: it never was."""
+    text, written_ns = ffi.new("char[]", NODES_BYTES), ffi.new("int64_t *")
+    accepted = lib.WHISKER_RING_NO_OWNER if owner is None else owner
+    try:
+        check(lib.whisker_ring_nodes(ring.encode(), accepted, text, NODES_BYTES, written_ns), ring)
+    except RingError as error:
+        if error.name != "RING_MISSING":
+            raise
+        return None
+    return ffi.string(text).decode(errors="replace"), written_ns[0]
 
 
 @dataclass(frozen=True)

@@ -13,10 +13,11 @@ from whisker_protocol import LIMITS, WIRE_VERSION
 from .. import __version__
 from ..arguments import add_ring
 from ..bridge import usbtree
-from ..bridge.ring import Reader, RingError, signal_writer
+from ..bridge.ring import Reader, RingError, read_nodes, signal_writer
 from ..programs import program
 
 EXAMPLE = "whisker info --json"
+ANSWER_S = 10.0  # whiskerd asks its nodes within 200 ticks
 TEST_ID_TEXT = "{:04x}:{:04x}".format(*usbtree.TEST_ID)
 
 
@@ -24,7 +25,9 @@ def add(parser) -> None:
     add_ring(parser)
     parser.add_argument("--json", action="store_true", help="one object on one line")
     parser.add_argument(
-        "--nodes", action="store_true", help="ask the nodes themselves; a whiskerd that runs tells in its log"
+        "--nodes",
+        action="store_true",
+        help="who the nodes are, their versions, and what they counted; no sample is lost",
     )
     parser.set_defaults(run=run)
 
@@ -74,6 +77,7 @@ def ask_nodes(ring: str) -> int:
     if not streaming:
         lister = program("whisker-flash")
         return os.spawnv(os.P_WAIT, lister, [lister, "--list", "--health"])
+    before = read_nodes(ring)
     try:
         signal_writer(ring, signal.SIGUSR2)
     except RingError as error:
@@ -82,8 +86,20 @@ def ask_nodes(ring: str) -> int:
         text = f"whiskerd of user {owner} has the bridge; run: sudo whisker info --nodes --ring {shlex.quote(ring)}"
         print(text, file=sys.stderr)
         return 1
-    print("whiskerd has the bridge: its log lists the nodes now (journalctl -u whiskerd, or its terminal)")
-    return 0
+    return 0 if print_answer(ring, before) else 1
+
+
+def print_answer(ring: str, before: tuple[str, int] | None) -> bool:
+    """Prints what whiskerd writes for its readers once it has asked the nodes. False: nothing came in time."""
+    deadline = time.monotonic() + ANSWER_S
+    while (answer := read_nodes(ring)) == before:
+        if time.monotonic() > deadline:
+            text = f"info: whiskerd of ring {ring} has not answered within {ANSWER_S:g} s; look into its log"
+            print(f"whisker: {text}", file=sys.stderr)
+            return False
+        time.sleep(0.05)
+    print(answer[0], end="")
+    return True
 
 
 def describe_usb(bridge: usbtree.Bridge) -> dict:
