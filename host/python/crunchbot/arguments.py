@@ -9,6 +9,7 @@ import pwd
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any, NoReturn
 
 from .errors import UserError
 
@@ -19,10 +20,10 @@ RING = "whisker"  # the name whiskerd's unit gives its ring
 class Parser(argparse.ArgumentParser):
     """Complaints are one line; help keeps its line breaks."""
 
-    def __init__(self, **options):
+    def __init__(self, **options: Any):
         super().__init__(formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False, **options)
 
-    def error(self, message: str):
+    def error(self, message: str) -> NoReturn:
         self.exit(UserError.exit_code, f"{self.prog}: {message}; see '{self.prog} --help'\n")
 
     def show_example(self, command_line: str) -> None:
@@ -35,7 +36,7 @@ def warn(line: str) -> None:
     print(f"whisker: warning: {line}", file=sys.stderr)
 
 
-def add_action(actions, name: str, text: str, example: str, run) -> Parser:
+def add_action(actions: Any, name: str, text: str, example: str, run: Callable[[argparse.Namespace], int]) -> Parser:
     """One action of a command that has several, such as `whisker texture train`."""
     parser = actions.add_parser(name, help=text, description=text)
     parser.show_example(example)
@@ -48,7 +49,7 @@ def plain(values: dict) -> dict:
     return {key: None if isinstance(value, float) and value != value else value for key, value in values.items()}
 
 
-def add_ring(parser) -> None:
+def add_ring(parser: argparse.ArgumentParser) -> None:
     """--ring, --ring-owner and --wait, for commands that read a ring."""
     parser.add_argument("--ring", default=RING, metavar="NAME", help="the ring to read (default: %(default)s)")
     add_ring_owner(parser)
@@ -57,13 +58,13 @@ def add_ring(parser) -> None:
     )
 
 
-def add_ring_owner(parser) -> None:
+def add_ring_owner(parser: argparse.ArgumentParser) -> None:
     """--ring-owner, for commands that read a ring; None: no other user's."""
     text = "accept a ring of this user, too, not only root's, your own and the service's"
     parser.add_argument("--ring-owner", type=user, metavar="USER", help=text)
 
 
-def add_zenoh_config(parser, endpoints: str = "are those given here") -> None:
+def add_zenoh_config(parser: argparse.ArgumentParser, endpoints: str = "are those given here") -> None:
     """--zenoh-config, for commands on the robot's network. `endpoints`: what becomes of theirs."""
     text = f"zenoh's own configuration (JSON5): TLS and access control, see docs/remote.md; endpoints {endpoints}"
     parser.add_argument("--zenoh-config", type=Path, metavar="FILE", help=text)

@@ -3,6 +3,7 @@
 import json
 import tomllib
 from collections.abc import Callable
+from pathlib import Path
 
 BYTES_MOST = 1 << 28  # no table, scene or model is larger
 
@@ -11,7 +12,7 @@ class UnreadableError(ValueError):
     """Why a file cannot be read, in a few words without the file's name: who reads it adds that and the remedy."""
 
 
-def read_text(path) -> str:
+def read_text(path: str | Path) -> str:
     """UTF-8, with or without a byte-order mark."""
     try:
         with open(path, "rb") as file:
@@ -25,13 +26,13 @@ def read_text(path) -> str:
         raise UnreadableError("not a text file") from error
 
 
-def read_toml(path) -> tuple[str, dict]:
+def read_toml(path: str | Path) -> tuple[str, dict]:
     """(source, content)"""
     source = read_text(path).replace("\r\n", "\n")
     return source, _parsed(tomllib.loads, source, "TOML")
 
 
-def read_json(path) -> object:
+def read_json(path: str | Path) -> object:
     return _parsed(json.loads, read_text(path), "JSON")
 
 

@@ -2,6 +2,7 @@
 
 import warnings
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -19,7 +20,7 @@ class Grey:
     opaque: np.ndarray | None = None
 
 
-def read_grey(path) -> Grey:
+def read_grey(path: str | Path) -> Grey:
     """The grey levels of an image, colours averaged; UnreadableError says why there are none."""
     from PIL import Image  # only who reads an image needs it
 

@@ -4,7 +4,10 @@ C reads and writes as far as a length says, whatever the array holds. So every a
 the shape that C will assume.
 """
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import ArrayLike
 
 try:
     from ._native import ffi, lib
@@ -18,17 +21,17 @@ DOUBLE, OCTET = np.dtype(np.float64), np.dtype(np.uint8)
 DOUBLES, OCTETS = ffi.typeof("double[]"), ffi.typeof("uint8_t[]")
 
 
-def doubles(array: np.ndarray, name: str, shape: Shape):
+def doubles(array: np.ndarray, name: str, shape: Shape) -> ffi.CData:
     """`pointer` to float64."""
     return pointer(DOUBLES, DOUBLE, array, name, shape)
 
 
-def octets(array: np.ndarray, name: str, shape: Shape):
+def octets(array: np.ndarray, name: str, shape: Shape) -> ffi.CData:
     """`pointer` to uint8."""
     return pointer(OCTETS, OCTET, array, name, shape)
 
 
-def pointer(ctype, dtype: np.dtype, array: np.ndarray, name: str, shape: Shape):
+def pointer(ctype: Any, dtype: np.dtype, array: np.ndarray, name: str, shape: Shape) -> ffi.CData:
     """A C-contiguous array of `dtype` and `shape` as the C array `ctype`; ValueError names the argument that is none.
 
     What C keeps beyond the call, the caller keeps alive.
@@ -44,7 +47,7 @@ def pointer(ctype, dtype: np.dtype, array: np.ndarray, name: str, shape: Shape):
     return ffi.from_buffer(ctype, array)
 
 
-def as_doubles(values, name: str, shape: Shape) -> np.ndarray:
+def as_doubles(values: ArrayLike, name: str, shape: Shape) -> np.ndarray:
     """Numbers as a contiguous float64 array of this shape; ValueError names the argument. No numbers fit any empty shape."""
     try:
         array = np.asarray(values, DOUBLE, order="C")

@@ -11,6 +11,7 @@ from enum import Enum
 from functools import cached_property, lru_cache
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 TIME = "t_s"
 ODOMETRY = ("odo_x_m", "odo_y_m", "odo_theta_rad")
@@ -131,7 +132,9 @@ class Row(Mapping):
         return cls.made(kind, cells[TIME], [cells[name] for name in ODOMETRY], names, [cells[name] for name in names])
 
     @classmethod
-    def made(cls, kind: int, t_s: float, motion, names: tuple[str, ...], cells: Iterable[float | None]) -> "Row":
+    def made(
+        cls, kind: int, t_s: float, motion: ArrayLike, names: tuple[str, ...], cells: Iterable[float | None]
+    ) -> "Row":
         """Makes a row from the cells of these columns in order."""
         cells = list(cells)
         found = [EMPTY if v is None else NOT_READ if math.isnan(v) else VALUE for v in cells]

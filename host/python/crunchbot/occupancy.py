@@ -36,7 +36,7 @@ class Occupancy:
     unknown: tuple[Box, ...]
 
 
-def read_map(path) -> Occupancy:
+def read_map(path: str | Path) -> Occupancy:
     """A map by its YAML file; SceneError names file, field and remedy."""
     path = Path(path)
     try:

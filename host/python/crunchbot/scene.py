@@ -133,7 +133,7 @@ class Scene:
         return "\n".join([*lines, *self.simulated, _line("start", *start_pose)]) + "\n"
 
 
-def load(path, map_file=None) -> Scene:
+def load(path: str | Path, map_file: str | Path | None = None) -> Scene:
     """Read a scene folder; prior.toml may be absent. SceneError names file, line or key, and the remedy.
 
     map_file: YAML of an occupancy map, whose boxes take the place of arena.toml's, or of all of it where there is none;
@@ -181,7 +181,7 @@ def _moved(prior: Prior | None, origin: Pose) -> Prior | None:
     return Prior(prior.kind, mean, (math.hypot(cosine * x, sine * y), math.hypot(sine * x, cosine * y), theta))
 
 
-def write(path, scene: Scene) -> None:
+def write(path: str | Path, scene: Scene) -> None:
     """Write the folder that `load` reads back as an equal scene."""
     folder = Path(path)
     folder.mkdir(parents=True, exist_ok=True)

@@ -2,6 +2,7 @@
 
 import re
 from pathlib import Path
+from typing import Any
 
 from .errors import UserError
 from .files import UnreadableError, read_toml
@@ -32,7 +33,7 @@ class Table:
         place = f"{self.path}, line {line}" if line else f"{self.path}"
         return SceneError(" ".join(f"{place}: '{key}' {text}".splitlines()))
 
-    def take(self, key: str):
+    def take(self, key: str) -> Any:
         if key not in self.content:
             raise self.fail(
                 key, f"is missing{f' in [[{self.header}]] number {self.nth + 1}' if self.header else ''}; add it"

@@ -3,6 +3,8 @@
 import os
 import sys
 import time
+from collections.abc import Iterable
+from typing import TextIO
 
 VARIABLE = "WHISKER_LOG_TIMES"  # set by who keeps the log
 
@@ -22,7 +24,7 @@ def stamp_output() -> None:
 class Stamped:
     """A text stream whose lines begin with the time; else it is the stream that it was made of."""
 
-    def __init__(self, stream):
+    def __init__(self, stream: TextIO):
         self._stream, self._begins = stream, True
 
     def write(self, text: str) -> int:
@@ -34,7 +36,7 @@ class Stamped:
             self._stream.write("".join(stamped))
         return len(text)
 
-    def writelines(self, lines) -> None:
+    def writelines(self, lines: Iterable[str]) -> None:
         for line in lines:
             self.write(line)
 

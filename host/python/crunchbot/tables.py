@@ -4,6 +4,7 @@ import csv
 import math
 from collections import Counter
 from collections.abc import Callable, Container
+from pathlib import Path
 
 import numpy as np
 
@@ -20,12 +21,12 @@ def ignore(line: str) -> None:
 class TableError(UserError, ValueError):
     """A file whose structure is wrong. Its text is one line: file, line where known, what and the remedy."""
 
-    def __init__(self, path, line: int | None, text: str):
+    def __init__(self, path: str | Path, line: int | None, text: str):
         place = f"{path}, line {line}" if line else f"{path}"
         super().__init__(f"{place}: {text}")
 
 
-def unwritable(path, error: OSError) -> TableError:
+def unwritable(path: str | Path, error: OSError) -> TableError:
     """What to say of an --out that cannot be written."""
     return TableError(path, None, f"cannot be written ({error.strerror}); choose another --out")
 
@@ -38,7 +39,7 @@ def number(cell: str) -> float:
         return math.nan
 
 
-def read_rows(path) -> tuple[list[str], list[list[str]]]:
+def read_rows(path: str | Path) -> tuple[list[str], list[list[str]]]:
     """Header and rows of a CSV file: header first, no duplicate column, no ragged row."""
     try:
         lines = list(csv.reader(read_text(path).splitlines()))
@@ -60,14 +61,14 @@ def _name(cell: str) -> str:
     return cell.strip()
 
 
-def read_columns(path, required: list[str]) -> dict[str, list[str]]:
+def read_columns(path: str | Path, required: list[str]) -> dict[str, list[str]]:
     """Columns as text by name; TableError when one of `required` is missing."""
     header, rows = read_rows(path)
     require_columns(path, set(header), required)
     return {name: [row[i].strip() for row in rows] for i, name in enumerate(header)}
 
 
-def require_columns(path, known: Container[str], required: list[str]) -> None:
+def require_columns(path: str | Path, known: Container[str], required: list[str]) -> None:
     """TableError when one of `required` is not among the known columns."""
     for name in required:
         if name not in known:

@@ -1,7 +1,10 @@
 """`whisker bench`: scores any engine's estimates on a fixed list of scenes and logs (crunchbot_lab.scenes.benchmark)."""
 
+import argparse
 import json
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from crunchbot.arguments import add_action
 from crunchbot.errors import UserError
@@ -26,7 +29,7 @@ COLUMNS = (  # title, key of the figure, factor, format
 )
 
 
-def add(parser) -> None:
+def add(parser: argparse.ArgumentParser) -> None:
     actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
     p = add_action(actions, "touch", "where the robot is, by touch", EXAMPLE, touch)
     p.add_argument("--list", action="store_true", help="print the scenes of the list and leave")
@@ -57,7 +60,7 @@ class BenchError(UserError):
     """What a command line lacks; one line."""
 
 
-def touch(arguments) -> int:
+def touch(arguments: argparse.Namespace) -> int:
     if arguments.list:
         print("\n".join(benchmark.NAMES))
         return 0
@@ -121,7 +124,7 @@ def _draw(path: str, wanted: benchmark.Entry, engines, near_m: float) -> None:
         raise BenchError(f"--chart {path}: {error}; name a file .svg or .png") from error
 
 
-def course(wanted: benchmark.Entry, engines, near_m: float):
+def course(wanted: benchmark.Entry, engines: Sequence[Any], near_m: float) -> Any:
     """What the chart draws of some engines' estimates of one scene."""
     from ..report.touch_chart import Course
 

@@ -3,6 +3,7 @@
 With whiskerd on it, or, by --usbip or --usbredir, as a USB device for a Linux kernel.
 """
 
+import argparse
 import re
 import signal
 import subprocess
@@ -36,7 +37,7 @@ REMEDIES = {
 }
 
 
-def add(parser) -> None:
+def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--ring", default=RING, metavar="NAME", help="the ring whiskerd makes (default: %(default)s)")
     parser.add_argument(
         "--lanes", type=whole_number(1, LANES), metavar="N", help="populated lanes (the scene's whiskers)"
@@ -67,7 +68,7 @@ def add(parser) -> None:
     parser.set_defaults(run=run)
 
 
-def run(arguments) -> int:
+def run(arguments: argparse.Namespace) -> int:
     stop = stop_on_signals()
     with tempfile.TemporaryDirectory(prefix="whisker-") as folder:
         command = _command(arguments, Path(folder))

@@ -1,5 +1,7 @@
 """`whisker scene`: draws level-0 scenes of a family, or makes one of a recording (crunchbot_lab.scenes)."""
 
+import argparse
+
 from crunchbot.arguments import add_action, warn
 from crunchbot.nav.filters import SettingError
 from crunchbot.nav.observations import observations_path, read_observations
@@ -12,7 +14,7 @@ from .. import scenes
 EXAMPLE = "whisker scene make --family anchor+kidnap --seed 7 --out scenes/7"
 
 
-def add(parser) -> None:
+def add(parser: argparse.ArgumentParser) -> None:
     actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
     p = add_action(actions, "make", "draw a scene of a family, observations and truth included", EXAMPLE, make)
     p.add_argument("--family", metavar="F", help="a base and any modifiers, joined by '+'; see --list-families")
@@ -40,7 +42,7 @@ def add(parser) -> None:
     p.add_argument("--out", required=True, metavar="DIR", help="folder to write")
 
 
-def make(arguments) -> int:
+def make(arguments: argparse.Namespace) -> int:
     if arguments.list_families:
         print("\n".join(f"{name}: {recipe.text}" for name, recipe in scenes.BASES.items()))
         print("\n".join(f"+{name}: {text}" for name, (text, _) in scenes.MODIFIERS.items()))
@@ -55,7 +57,7 @@ def make(arguments) -> int:
     return 0
 
 
-def from_recording(arguments) -> int:
+def from_recording(arguments: argparse.Namespace) -> int:
     if arguments.kind not in ("", *scenes.READERS):
         raise SettingError(f"scene from: kind '{arguments.kind}' is unknown; choose one of {', '.join(scenes.READERS)}")
     scene, observations = scenes.read_recording(arguments.recording, warn, arguments.kind)
@@ -64,7 +66,7 @@ def from_recording(arguments) -> int:
     return 0
 
 
-def with_map(arguments) -> int:
+def with_map(arguments: argparse.Namespace) -> int:
     scene = load(arguments.scene, arguments.map)
     boxes = max(len(scene.arena.obstacles), len(scene.arena.unknown))
     if boxes > OBSTACLES_MOST:

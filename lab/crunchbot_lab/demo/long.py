@@ -83,7 +83,9 @@ def demonstrate(options: argparse.Namespace) -> dict:
     return results
 
 
-def explore_signals(out: Path, scene: scenes.Scene, start: tuple[float, float, float], options) -> dict:
+def explore_signals(
+    out: Path, scene: scenes.Scene, start: tuple[float, float, float], options: argparse.Namespace
+) -> dict:
     """Writes the same files as a chain, from a run at level 1, as far as there is something to put in them."""
     began, ticks = time.monotonic(), round(options.seconds * TICKS_PER_S)
     pilot = Pilot(scene.robot, *load_models(out / "models", scene.robot), options.seed)

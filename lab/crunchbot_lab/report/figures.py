@@ -2,6 +2,7 @@
 
 import io
 from collections.abc import Callable
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -93,7 +94,7 @@ def errors(run: Run) -> Figure:
     return figure
 
 
-def draw_floor(axes, run: Run) -> None:
+def draw_floor(axes: Any, run: Run) -> None:
     """Floor, blocks and walls from above."""
     arena, tile = run.arena, run.arena["tile_m"]
     letters = [name[0] for name in arena["textures"]]

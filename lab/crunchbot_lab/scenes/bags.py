@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from crunchbot.errors import UserError
-from crunchbot.nav.observations import observations_path, read_observations
+from crunchbot.nav.observations import Observations, observations_path, read_observations
 from crunchbot.observation import TIME, TRUTH, Quantity, Row, cell
 from crunchbot.recording.mcapfile import McapFile, RecordingError
 from crunchbot.robot.bag import RECORD, SCENE_FILES
@@ -31,7 +31,7 @@ def is_bag(path: Path) -> bool:
         return False
 
 
-def read_bag(path: Path, warn: Callable[[str], None]):
+def read_bag(path: Path, warn: Callable[[str], None]) -> tuple[Scene, Observations]:
     """(scene, rows) of a bag, each damage asked to `warn`; BagError when it holds none."""
     with McapFile(path) as bag:
         reported = bag.metadata.get(RECORD, {})

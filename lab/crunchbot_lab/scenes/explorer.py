@@ -5,6 +5,7 @@ release. What a whisk tells was taken from signal-level runs, and tests/scenes/t
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -116,7 +117,7 @@ class _Explorer:
         return steady and moving and not self.behaviour.whisking and not was_whisking
 
 
-def explore(arena: Arena, robot: Robot, start, rows: int, rng: np.random.Generator) -> Explored:
+def explore(arena: Arena, robot: Robot, start: Sequence[float], rows: int, rng: np.random.Generator) -> Explored:
     """Let the pilot's behaviour explore for `rows` of 0.1 s."""
     robot_in = _Explorer(arena, robot, start, rng)
     path, held, sweeping, radial, was = [robot_in.pose], [], [], [], False

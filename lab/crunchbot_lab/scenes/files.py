@@ -28,7 +28,7 @@ def rounded(observations: Observations) -> Observations:
     )
 
 
-def write_scene(path, scene: Scene, observations: Observations) -> None:
+def write_scene(path: str | Path, scene: Scene, observations: Observations) -> None:
     """The whole folder; observations as `rounded` gave them."""
     write(path, scene)
     layout = scene.layout

@@ -2,6 +2,7 @@
 code (host/nav/problem/arena.c). Poses are (n, 3): x, y in m, theta in rad."""
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -84,7 +85,7 @@ def _slab(start, direction, low, high):
     return enter, leave
 
 
-def free_test(arena: Arena, radius: float):
+def free_test(arena: Arena, radius: float) -> Callable[[float, float], bool]:
     """A fast function (x, y) -> bool: whether a round body stands clear by CLEAR_M of walls and obstacles."""
     reach = radius + CLEAR_M
     high_x, high_y, square = arena.size_m[0] - reach, arena.size_m[1] - reach, reach * reach
@@ -103,7 +104,7 @@ def free_test(arena: Arena, radius: float):
     return free
 
 
-def range_test(arena: Arena, whisker: Whisker):
+def range_test(arena: Arena, whisker: Whisker) -> Callable[[float, float, float], float]:
     """A fast function (x, y, theta) -> m: `ranges` for one pose."""
     base_x, base_y = whisker.base_m
     yaw, length = whisker.yaw_rad, whisker.length_m

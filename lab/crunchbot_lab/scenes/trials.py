@@ -15,7 +15,9 @@ LOST_M = 0.25
 FOLDS = {"symmetric2": 2, "symmetric4": 4}
 
 
-def trials(family: str, seeds: list[int], filter: str, settings: dict, rows: int | None = None, regions: int = 10):
+def trials(
+    family: str, seeds: list[int], filter: str, settings: dict, rows: int | None = None, regions: int = 10
+) -> dict[str, list[dict]]:
     """Trials of several seeds: {"trials": [figures of each]}."""
     return {"trials": [trial(family, seed, filter, settings, rows, regions) for seed in seeds]}
 

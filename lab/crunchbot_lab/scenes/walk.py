@@ -1,6 +1,7 @@
 """Wandering through free space: straight on with a little curve, and a turn on the spot where the way is blocked."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,7 +30,9 @@ def draw_pose(arena: Arena, radius: float, rng: np.random.Generator) -> np.ndarr
     raise ValueError("no free space for this body; make the arena larger or the body smaller")
 
 
-def wander(arena: Arena, radius: float, start, steps: int, rng: np.random.Generator, pace: Pace) -> np.ndarray:
+def wander(
+    arena: Arena, radius: float, start: Sequence[float], steps: int, rng: np.random.Generator, pace: Pace
+) -> np.ndarray:
     """Path (steps + 1, 3) from `start`: row k of a scene goes from pose k to pose k + 1."""
     free = free_test(arena, radius)
     x, y, heading = map(float, start)

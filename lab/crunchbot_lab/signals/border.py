@@ -12,7 +12,7 @@ __all__ = ["ffi", "lib", "pointer"]
 TYPES = {"double[]": np.float64, "uint16_t[]": np.uint16, "unsigned char[]": np.uint8}
 
 
-def pointer(kind: str, array: np.ndarray, name: str, shape: tuple[int, ...]):
+def pointer(kind: str, array: np.ndarray, name: str, shape: tuple[int, ...]) -> ffi.CData:
     """A contiguous array of this shape as a C array of TYPES; ValueError names the argument that is none."""
     dtype = np.dtype(TYPES[kind])
     if array.shape != shape or array.dtype != dtype or not array.flags.c_contiguous:

@@ -12,6 +12,7 @@ import shutil
 import sys
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import cffi
 
@@ -44,7 +45,7 @@ INCLUDED = [
 ]
 
 
-def new_ffi(module: str, **options) -> cffi.FFI:
+def new_ffi(module: str, **options: Any) -> cffi.FFI:
     """The module's declarations, and how it is compiled."""
     ffi = cffi.FFI()
     ffi.cdef("\n".join([FOREIGN, *(block for header in HEADERS for block in BLOCK.findall(header.read_text()))]))

@@ -11,9 +11,10 @@ Levels: see sim/mechanics/mech_whisker.h. Equal arguments give equal counts.
 import itertools
 import math
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .border import ffi, lib, pointer
 from .world import TICK_S
@@ -113,7 +114,14 @@ def _counts(whisker: Whisker, tilt: np.ndarray, tick_s: float, seed: int) -> np.
 
 
 def touch(
-    whisker: Whisker, radius_m, theta_rad, base_rate_rad_s=0.0, *, seed: int, level: int = WHOLE, tick_s: float = TICK_S
+    whisker: Whisker,
+    radius_m: ArrayLike,
+    theta_rad: ArrayLike,
+    base_rate_rad_s: ArrayLike = 0.0,
+    *,
+    seed: int,
+    level: int = WHOLE,
+    tick_s: float = TICK_S,
 ) -> Series:
     """A prescribed contact: for every tick the radius (0: none), imposed angle and the mount's rate of turn."""
     given = np.broadcast_arrays(radius_m, theta_rad, base_rate_rad_s)
@@ -154,14 +162,14 @@ def contact(
 
 def drag(
     whisker: Whisker,
-    travel_m,
-    floor,
-    height_m=0.0,
+    travel_m: ArrayLike,
+    floor: ArrayLike,
+    height_m: ArrayLike = 0.0,
     *,
     seed: int,
     level: int = WHOLE,
     tick_s: float = TICK_S,
-    textures=_TEXTURES,
+    textures: Any = _TEXTURES,
     **stance: float,
 ) -> Series:
     """A prescribed sweep: for every tick the mount's travel, number of the floor under the tip and its height.

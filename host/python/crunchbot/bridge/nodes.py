@@ -18,7 +18,7 @@ class NodeError(UserError):
     """A list of nodes that cannot be used, or a model of another node's whisker; one line."""
 
 
-def read_nodes(path) -> dict[int, int]:
+def read_nodes(path: str | Path) -> dict[int, int]:
     """Serial numbers by lane; later lines count. NodeError when the file cannot be read or lists none."""
     try:
         lines = Path(path).read_text().splitlines()

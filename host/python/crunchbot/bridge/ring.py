@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from whisker_protocol import LANES
 
@@ -135,11 +136,11 @@ class Clock:
     ns_per_cycle: float
     uncertainty_ns: float
 
-    def monotonic(self, time_cycles) -> np.ndarray:
+    def monotonic(self, time_cycles: ArrayLike) -> np.ndarray:
         """CLOCK_MONOTONIC in ns at `time_cycles` (scalar or array of the bridge's cycles)."""
         return self.monotonic_ns + self._since(time_cycles)
 
-    def realtime(self, time_cycles) -> np.ndarray:
+    def realtime(self, time_cycles: ArrayLike) -> np.ndarray:
         """CLOCK_REALTIME in ns at `time_cycles`."""
         return self.realtime_ns + self._since(time_cycles)
 

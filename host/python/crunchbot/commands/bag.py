@@ -1,5 +1,6 @@
 """`whisker bag`: everything a robot's processes say, in an MCAP file for ROS 2 tools (crunchbot.robot.bag)."""
 
+import argparse
 from itertools import chain, count
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from ..stopping import stop_on_signals
 EXAMPLE = "whisker bag run.mcap --scene SCENE"
 
 
-def add(parser) -> None:
+def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", metavar="FILE.MCAP")
     parser.add_argument(
         "--scene", type=Path, metavar="SCENE", help="keep this scene folder's files in the bag, and write /tf and /map"
@@ -31,7 +32,7 @@ def next_free(path: Path) -> Path:
     return next(candidate for candidate in chain([path], numbered) if not candidate.exists())
 
 
-def run(arguments) -> int:
+def run(arguments: argparse.Namespace) -> int:
     reported = metadata(arguments.robot, arguments.scene)
     scene = scenes.load(arguments.scene) if arguments.scene else None
     stop = stop_on_signals()

@@ -1,5 +1,6 @@
 """`whisker calibrate`: rest of every lane, and contacts at known distances for `whisker radial fit`."""
 
+import argparse
 import itertools
 import sys
 from contextlib import closing
@@ -30,7 +31,7 @@ from ..touch.radial.model import Contact, fit, read_whisks, shape_of
 EXAMPLE = "whisker calibrate --out calibration --lane 2 --radii 90,100,110,120,130 --repeats 5"
 
 
-def add(parser) -> None:
+def add(parser: argparse.ArgumentParser) -> None:
     add_ring(parser)
     parser.add_argument(
         "--out", required=True, type=Path, metavar="DIR", help="writes rest.toml, and <lane>.csv with --lane"
@@ -58,7 +59,7 @@ def add(parser) -> None:
     parser.set_defaults(run=run, parser=parser)
 
 
-def run(arguments) -> int:
+def run(arguments: argparse.Namespace) -> int:
     if (arguments.lane is None) != (arguments.radii is None):
         arguments.parser.error("--lane and --radii belong together: give both, or neither to measure rest alone")
     names = [whisker.name for whisker in load(arguments.scene).robot.whiskers] if arguments.scene else []

@@ -1,5 +1,7 @@
 """`whisker doctor`: finds out why it does not work (crunchbot.bridge.doctor)."""
 
+import argparse
+
 from ..arguments import RING, add_ring_owner
 from ..bridge import doctor
 from ..programs import program
@@ -7,7 +9,7 @@ from ..programs import program
 EXAMPLE = "whisker doctor --ring whisker"
 
 
-def add(parser) -> None:
+def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--ring", default=RING, metavar="NAME", help="the ring that should work (default: %(default)s)")
     add_ring_owner(parser)
     text = "prove FPGA, FIFO and USB of a bridge that no whiskerd holds, by its own pattern; no node is needed"
@@ -16,7 +18,7 @@ def add(parser) -> None:
     parser.set_defaults(run=run)
 
 
-def run(arguments) -> int:
+def run(arguments: argparse.Namespace) -> int:
     """Exit code 0: nothing stands in the way; 1: something does."""
     if arguments.pattern:
         findings = doctor.prove(program("whiskerd"), arguments.serial)

@@ -1,5 +1,6 @@
 """`whisker flash`: loads firmware into the nodes, or gateware into the bridge. The work is whisker-flash's, which speaks USB."""
 
+import argparse
 import os
 
 from ..programs import program
@@ -7,7 +8,7 @@ from ..programs import program
 EXAMPLE = "whisker flash node-0.2.whex"
 
 
-def add(parser) -> None:
+def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("image", help="firmware image (.whex) for the nodes, or gateware image (.wgw) for the bridge")
     which = parser.add_mutually_exclusive_group()
     which.add_argument("--lane", type=int, metavar="N", help="only the node on this lane")
@@ -20,7 +21,7 @@ def add(parser) -> None:
     parser.set_defaults(run=run)
 
 
-def run(arguments) -> int:
+def run(arguments: argparse.Namespace) -> int:
     words = [program("whisker-flash"), arguments.image]
     for option, value in (("lane", arguments.lane), ("node", arguments.serial), ("bridge", arguments.bridge)):
         words += [f"--{option}", str(value)] if value is not None else []

@@ -1,5 +1,6 @@
 """`whisker foxglove`: a running robot in Foxglove (crunchbot.robot.foxglove)."""
 
+import argparse
 import time
 from pathlib import Path
 
@@ -14,7 +15,7 @@ EXAMPLE = "whisker foxglove robot-run/scene"
 PORT = 8765  # Foxglove's own
 
 
-def add(parser) -> None:
+def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scene", type=Path, metavar="SCENE", help="the robot's scene folder")
     parser.add_argument(
         "--host", default="127.0.0.1", metavar="ADDRESS", help="to be reached at (default: %(default)s)"
@@ -24,7 +25,7 @@ def add(parser) -> None:
     parser.set_defaults(run=run)
 
 
-def run(arguments) -> int:
+def run(arguments: argparse.Namespace) -> int:
     view = StandardView(scenes.load(arguments.scene), time.time_ns())
     stop = stop_on_signals()
     with open_link("foxglove", arguments) as link:

@@ -1,5 +1,6 @@
 """`whisker info`: what the ring, the daemon and the bridge say of themselves."""
 
+import argparse
 import dataclasses
 import json
 import os
@@ -21,7 +22,7 @@ ANSWER_S = 10.0  # whiskerd asks its nodes within 200 ticks
 TEST_ID_TEXT = "{:04x}:{:04x}".format(*usbtree.TEST_ID)
 
 
-def add(parser) -> None:
+def add(parser: argparse.ArgumentParser) -> None:
     add_ring(parser)
     parser.add_argument("--json", action="store_true", help="one object on one line")
     parser.add_argument(
@@ -32,7 +33,7 @@ def add(parser) -> None:
     parser.set_defaults(run=run)
 
 
-def run(arguments) -> int:
+def run(arguments: argparse.Namespace) -> int:
     if arguments.nodes:
         return ask_nodes(arguments.ring)
     host = {"version": __version__, "wire_version": WIRE_VERSION, "gateware": LIMITS["gateware_version"]}

@@ -1,5 +1,6 @@
 """`whisker localise`: runs a filter over a scene folder (crunchbot.nav.localise)."""
 
+import argparse
 import json
 import sys
 
@@ -11,7 +12,7 @@ from ..scene import PRIOR, SceneError, load
 EXAMPLE = "whisker localise scenes/paper --filter grid --set grid.cell_m=0.1 --out est.csv --json"
 
 
-def add(parser) -> None:
+def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scene", nargs="?", help="folder with arena.toml, robot.toml, prior.toml, observations.csv")
     parser.add_argument(
         "--filter", default=localise.default_filter(), metavar="NAME", help="see --list-filters (default: %(default)s)"
@@ -31,7 +32,7 @@ def add(parser) -> None:
     parser.set_defaults(run=run)
 
 
-def run(arguments) -> int:
+def run(arguments: argparse.Namespace) -> int:
     if arguments.list_filters:
         print("\n".join(localise.filter_names()))
         return 0

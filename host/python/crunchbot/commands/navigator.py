@@ -1,5 +1,6 @@
 """`whisker navigator`: the desktop's filters on the rows of a robot (crunchbot.robot.navigator)."""
 
+import argparse
 import sys
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from ..tables import unwritable
 EXAMPLE = "whisker navigator SCENE --connect tcp/netbook:7448"
 
 
-def add(parser) -> None:
+def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scene", metavar="SCENE", help="scene folder: arena, robot and prior")
     text = f"repeatable; the first one's pose is the robot's (default: {localise.default_filter()})"
     parser.add_argument("--filter", action="append", metavar="NAME", choices=localise.filter_names(), help=text)
@@ -31,7 +32,7 @@ def add(parser) -> None:
     parser.set_defaults(run=run)
 
 
-def run(arguments) -> int:
+def run(arguments: argparse.Namespace) -> int:
     filters = tuple(dict.fromkeys(arguments.filter or [localise.default_filter()]))
     scene = load(arguments.scene)
     for warning in scene.warnings():

@@ -1,5 +1,6 @@
 """`whisker pilot`: the netbook's part of a robot: samples to wheel speeds and observation rows (crunchbot.robot)."""
 
+import argparse
 import json
 import threading
 import time
@@ -41,7 +42,7 @@ class PilotError(UserError):
     exit_code = 1
 
 
-def add(parser) -> None:
+def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scene", type=Path, metavar="SCENE", help="scene folder, of which robot.toml is read")
     parser.add_argument("--models", type=Path, required=True, help="folder with texture.json and <whisker>.json")
     parser.add_argument("--nodes", help="what 'whisker info --nodes' printed: models of other nodes are refused")
@@ -61,7 +62,7 @@ def add(parser) -> None:
     parser.set_defaults(run=run)
 
 
-def run(arguments) -> int:
+def run(arguments: argparse.Namespace) -> int:
     if not (arguments.base or arguments.simulation):
         raise UserError("pilot: no wheels; give --base SOCKET, or --simulation SOCKET")
     with ExitStack() as stack:

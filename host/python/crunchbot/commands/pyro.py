@@ -1,5 +1,6 @@
 """`whisker pyro`: a robot's results as a Pyro object, the paper's interface (crunchbot.robot.pyro)."""
 
+import argparse
 import ipaddress
 import sys
 
@@ -11,7 +12,7 @@ from ..stopping import stop_on_signals
 EXAMPLE = "whisker pyro --connect tcp/netbook:7448 --connect tcp/127.0.0.1:7449"
 
 
-def add(parser) -> None:
+def add(parser: argparse.ArgumentParser) -> None:
     add_link(parser, [], [PILOT_ENDPOINT, NAVIGATOR_ENDPOINT])
     parser.add_argument("--host", type=address, default="127.0.0.1", help="address to serve at (default: %(default)s)")
     parser.add_argument("--port", type=whole_number(0, 65535), default=PORT, help="0 takes a free one (%(default)s)")
@@ -24,7 +25,7 @@ def address(text: str) -> str:
     return str(ipaddress.ip_address(text))
 
 
-def run(arguments) -> int:
+def run(arguments: argparse.Namespace) -> int:
     if not ipaddress.ip_address(arguments.host).is_loopback:
         print(f"whisker: {arguments.host}: anyone who reaches this address can call this server", file=sys.stderr)
     stop = stop_on_signals()

@@ -1,5 +1,6 @@
 """`whisker radial`: fits contacts of known radius and predicts others (crunchbot.touch.radial)."""
 
+import argparse
 import json
 
 import numpy as np
@@ -18,7 +19,7 @@ whisks by the physics of the shaft, which the pilot needs to tell a face from a 
 depths of a push, which answers during the press; default: the one that predicts left-out places best"""
 
 
-def add(parser) -> None:
+def add(parser: argparse.ArgumentParser) -> None:
     actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
     p = add_action(actions, "fit", "fit contacts of known radius", EXAMPLE, fit)
     p.add_argument("contacts", help="CSV: contact, radius_mm, t_s, channels; where known " + COLUMNS)
@@ -38,7 +39,7 @@ def add(parser) -> None:
     p.add_argument("--json", action="store_true", help="one object per line, one every 20 ms at 2 kHz")
 
 
-def fit(arguments) -> int:
+def fit(arguments: argparse.Namespace) -> int:
     whisks = radial.read_whisks(arguments.contacts, with_radius=True, warn=warn)
     try:
         found = radial.fit(whisks, arguments.model)
@@ -55,7 +56,7 @@ def fit(arguments) -> int:
     return 0
 
 
-def predict(arguments) -> int:
+def predict(arguments: argparse.Namespace) -> int:
     model = radial.load(arguments.model)
     if arguments.during and not isinstance(model, radial.PressModel):
         raise TableError(arguments.model, None, "only a press model answers during a press; fit with '--model press'")
@@ -92,7 +93,7 @@ def _predict(arguments, model, contact: str, recorded: radial.Contact, peak: flo
     return found.confidence
 
 
-def follow(arguments) -> int:
+def follow(arguments: argparse.Namespace) -> int:
     model = radial.load(arguments.model)
     if not isinstance(model, radial.WhiskModel):
         raise TableError(arguments.model, None, "it is no model of whole whisks; fit with '--model whisk'")

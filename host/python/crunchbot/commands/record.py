@@ -1,5 +1,7 @@
 """`whisker record`: from a ring to an MCAP file (crunchbot.recording)."""
 
+import argparse
+
 from whisker_protocol import LIMITS
 
 from ..arguments import add_ring, number_above, whole_number
@@ -12,7 +14,7 @@ from ..stopping import stop_on_signals
 EXAMPLE = "whisker record drive.mcap --seconds 60"
 
 
-def add(parser) -> None:
+def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", metavar="FILE.MCAP")
     add_ring(parser)
     parser.add_argument("--frames", type=whole_number(1), metavar="N", help="stop after so many frames")
@@ -22,7 +24,7 @@ def add(parser) -> None:
     parser.set_defaults(run=run)
 
 
-def run(arguments) -> int:
+def run(arguments: argparse.Namespace) -> int:
     names = [whisker.name for whisker in load(arguments.scene).robot.whiskers] if arguments.scene else []
     stop = stop_on_signals()
     with await_reader(arguments.ring, arguments.wait, stop, arguments.ring_owner) as reader:

@@ -11,7 +11,7 @@ from ..stopping import stop_on_signals
 EXAMPLE = "whisker replay drive.mcap --speed 2 --ring replayed"
 
 
-def add(parser) -> None:
+def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", metavar="FILE.MCAP")
     parser.add_argument("--ring", default=RING, metavar="NAME", help="the ring to make (default: %(default)s)")
     text = "how many times as fast as it was recorded, or max: as fast as the machine can; readers that fall behind by more than the ring lose frames"
@@ -29,7 +29,7 @@ def add(parser) -> None:
     parser.set_defaults(run=run)
 
 
-def run(arguments) -> int:
+def run(arguments: argparse.Namespace) -> int:
     stop = stop_on_signals()
     with read(arguments.file) as recording, Writer(arguments.ring, arguments.ring_frames) as writer:
         replay = Replay(recording, writer, arguments.speed)

@@ -1,5 +1,6 @@
 """`whisker robot`: starts all processes of a robot, on hardware or simulated, and starts again what ends."""
 
+import argparse
 import sys
 import tempfile
 from pathlib import Path
@@ -24,7 +25,7 @@ VIEW_PORT = 8028
 PORT = Path("/dev/ttyUSB0")
 
 
-def add(parser) -> None:
+def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scene", nargs="?", type=Path, metavar="SCENE", help="scene folder: arena, robot, prior")
     parser.add_argument("--models", type=Path, metavar="DIR", help="folder with texture.json and <whisker>.json")
     parser.add_argument("--create", type=int, choices=(1, 2), default=1, help="the base: iRobot Create (%(default)s)")
@@ -60,7 +61,7 @@ def add(parser) -> None:
     parser.set_defaults(run=run)
 
 
-def run(arguments) -> int:
+def run(arguments: argparse.Namespace) -> int:
     if arguments.units:
         return _write_units(arguments)
     stop = stop_on_signals()

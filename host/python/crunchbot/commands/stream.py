@@ -1,7 +1,10 @@
 """`whisker stream`: prints frames as they come."""
 
+import argparse
 import json
 import sys
+import threading
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -17,7 +20,7 @@ FIELDS = ("alpha", "beta", "status")
 STOP_S = 0.5  # how soon a signal is noticed when no frames come
 
 
-def add(parser) -> None:
+def add(parser: argparse.ArgumentParser) -> None:
     add_ring(parser)
     parser.add_argument(
         "--lanes",
@@ -35,7 +38,7 @@ def add(parser) -> None:
     parser.set_defaults(run=run)
 
 
-def run(arguments) -> int:
+def run(arguments: argparse.Namespace) -> int:
     stop = stop_on_signals()
     left = arguments.frames
     with await_reader(arguments.ring, arguments.wait, stop, arguments.ring_owner) as reader:
@@ -60,7 +63,7 @@ def run(arguments) -> int:
     return 0
 
 
-def batches(reader: Reader, stop):
+def batches(reader: Reader, stop: threading.Event) -> Iterator[np.ndarray]:
     """Copies of all new frames, until the ring is closed or `stop` is set; RingError when frames were lost."""
     while not stop.is_set():
         frames = reader.take(STOP_S)
@@ -70,7 +73,7 @@ def batches(reader: Reader, stop):
             yield frames
 
 
-def csv_lines(frames: np.ndarray, lanes: list[int]):
+def csv_lines(frames: np.ndarray, lanes: list[int]) -> Iterator[str]:
     """A line per frame: tick, seconds of the bridge's clock, sequence number, then alpha, beta, status by lane."""
     table = np.stack([frames["lane"][field][:, lanes] for field in FIELDS], axis=2).reshape(
         len(frames), len(lanes) * len(FIELDS)
@@ -80,7 +83,7 @@ def csv_lines(frames: np.ndarray, lanes: list[int]):
         yield f"{tick},{t_s:.7f},{sequence},{','.join(map(str, row))}\n"
 
 
-def json_lines(frames: np.ndarray, lanes: list[int]):
+def json_lines(frames: np.ndarray, lanes: list[int]) -> Iterator[str]:
     """An object per frame; "lanes": {"2": [alpha, beta, status], ...}."""
     for frame in frames:
         samples = {str(n): [int(frame["lane"][field][n]) for field in FIELDS] for n in lanes}

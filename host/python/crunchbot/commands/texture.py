@@ -1,8 +1,10 @@
 """`whisker texture`: learns surfaces from recordings and tells them apart (crunchbot.touch.texture)."""
 
+import argparse
 import json
 from collections import Counter
 from pathlib import Path
+from typing import Any
 
 from ..arguments import add_action, plain, warn
 from ..nav.localise import SettingError
@@ -16,7 +18,7 @@ METHODS = "default: spectra, calibrated on recordings held out; naive-bayes: the
 EXAMPLE = "whisker texture train recordings --out model.json"
 
 
-def add(parser) -> None:
+def add(parser: argparse.ArgumentParser) -> None:
     actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
     p = add_action(actions, "train", "learn from one folder per surface, one CSV per recording", EXAMPLE, train)
     p.add_argument("folder")
@@ -35,7 +37,7 @@ def add(parser) -> None:
     p.add_argument("--json", action="store_true", help="one object per line and window; of a folder: per surface")
 
 
-def train(arguments) -> int:
+def train(arguments: argparse.Namespace) -> int:
     window_ms = length_of_time(arguments.window_ms)
     hazard = changes_a_window(arguments.speed_m_s, arguments.tile_m, window_ms)
     recordings, rate_hz = texture.read_training(arguments.folder, warn)
@@ -68,12 +70,12 @@ def train(arguments) -> int:
     return 0
 
 
-def advance(bar, done: int, of: int) -> None:
+def advance(bar: Any, done: int, of: int) -> None:
     bar.total = of
     bar.update(done - bar.n)
 
 
-def report(model) -> list[str]:
+def report(model: Any) -> list[str]:
     """Figures of recordings held out, and what there was too little data to learn, a line each."""
     f, ms = model.figures, 1000.0 / model.rate_hz
     lines = [
@@ -103,7 +105,7 @@ def changes_a_window(speed_m_s: float | None, tile_m: float | None, window_ms: f
     return changes
 
 
-def classify(arguments) -> int:
+def classify(arguments: argparse.Namespace) -> int:
     window_ms = length_of_time(arguments.window_ms)
     model = texture.load(arguments.model)
     if Path(arguments.recording).is_dir():
@@ -117,7 +119,7 @@ def classify(arguments) -> int:
     return 0
 
 
-def decisions(arguments, model, path, window_ms: float) -> list:
+def decisions(arguments: argparse.Namespace, model: Any, path: str | Path, window_ms: float) -> list:
     """Classifies one recording; its faults are warned of."""
     t_s, samples = texture.read_recording(path, getattr(model, "columns", None), warn)
     if samples.shape[1] != model.channels:
@@ -131,7 +133,7 @@ def decisions(arguments, model, path, window_ms: float) -> list:
     return found
 
 
-def classify_folder(arguments, model, window_ms: float) -> int:
+def classify_folder(arguments: argparse.Namespace, model: Any, window_ms: float) -> int:
     """A row for each surface's folder: decisions, and the share of each answer in percent."""
     files = texture.surface_files(arguments.recording)
     if not files:

@@ -1,5 +1,6 @@
 """`whisker top`: the ring's lanes in a terminal, drawn with plain ANSI codes."""
 
+import argparse
 import contextlib
 import os
 import select
@@ -30,7 +31,7 @@ HEAD = f"{'lane':<18}{'alpha':>7}{'beta':>7}{'noise':>7}{'good/s':>8}{'bad %':>7
 ENTER, LEAVE, HOME, REST, LINE = "\x1b[?1049h\x1b[?25l", "\x1b[?25h\x1b[?1049l", "\x1b[H", "\x1b[J", "\x1b[K\r\n"
 
 
-def add(parser) -> None:
+def add(parser: argparse.ArgumentParser) -> None:
     add_ring(parser)
     parser.add_argument("--interval", type=number_above(0.0), default=0.5, metavar="S", help="between pictures (0.5)")
     parser.add_argument("--scene", help="scene folder whose robot.toml names the lanes, lane 0 first")
@@ -38,7 +39,7 @@ def add(parser) -> None:
     parser.set_defaults(run=run)
 
 
-def run(arguments) -> int:
+def run(arguments: argparse.Namespace) -> int:
     names = [whisker.name for whisker in load(arguments.scene).robot.whiskers] if arguments.scene else []
     stop = stop_on_signals()
     with await_reader(arguments.ring, arguments.wait, stop, arguments.ring_owner) as reader:

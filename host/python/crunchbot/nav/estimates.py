@@ -1,6 +1,7 @@
 """Estimates of any engine as a CSV file: a pose for each row of a scene, or for some of them."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -24,7 +25,7 @@ class Estimates:
     step_us: np.ndarray | None = None  # (m,) CPU time
 
 
-def read_estimates(path, name: str, observations: Observations) -> Estimates:
+def read_estimates(path: str | Path, name: str, observations: Observations) -> Estimates:
     """A CSV file with x_m, y_m, theta_rad and any of t_s, confidence, xx_m2, xy_m2, yy_m2, step_us.
 
     With as many rows as the observations they are taken in order; else each is found by its t_s. TableError names file

@@ -3,8 +3,10 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..errors import UserError
 from ..native import as_doubles, doubles, ffi, lib, octets, pointer
@@ -158,7 +160,15 @@ class Filter:
         normal = row.find(layout.of(Quantity.NORMAL)).reshape(self._rays, len(NORMAL))
         return self.step_values(row.t_s, row.motion, texture, radial, own, normal)
 
-    def step_values(self, t_s: float, odometry, texture, radial_m, own=(), normal=None) -> Estimate:
+    def step_values(
+        self,
+        t_s: float,
+        odometry: ArrayLike,
+        texture: ArrayLike,
+        radial_m: ArrayLike,
+        own: ArrayLike = (),
+        normal: ArrayLike | None = None,
+    ) -> Estimate:
         """Take one row of numbers: odometry (3,): m, m, rad; texture (tips, classes), nan not read; radial_m (rays,) in m,
         nan not read, inf no contact; own (values,): log-likelihoods of the user's sensors, nan not read; normal (rays, 2)
         in rad with its standard deviation, nan not read. ValueError when one has another shape."""
@@ -304,7 +314,7 @@ def _of_table(sensor: SensorTable) -> Sensor:
 
 def problem_of(
     scene: Scene, settings: dict[str, float], components: np.ndarray | None = None, sensors: Sequence[Sensor] = ()
-):
+) -> tuple[ffi.CData, Any]:
     """The C problem and the arrays it points into."""
     arena, robot = scene.arena, scene.robot
     floor = arena.floor_indices()

@@ -146,7 +146,7 @@ def warnings(result: Run) -> list[str]:
     return out
 
 
-def write_estimates(path, result: Run, observations: Observations, origin: Pose = NOWHERE) -> None:
+def write_estimates(path: str | Path, result: Run, observations: Observations, origin: Pose = NOWHERE) -> None:
     """est.csv: one row per input row, in the same order; poses in the frame in which the scene's has this origin."""
     poses = result.poses if origin == NOWHERE else to_map(result.poses, origin)
     answers = zip(observations.t_text, poses.tolist(), result.table["confidence"].tolist(), strict=True)

@@ -34,11 +34,11 @@ class Observations:
         return self.t_s > latest
 
 
-def observations_path(folder) -> Path:
+def observations_path(folder: str | Path) -> Path:
     return Path(folder) / OBSERVATIONS
 
 
-def read_observations(path, scene: Scene) -> Observations:
+def read_observations(path: str | Path, scene: Scene) -> Observations:
     """Read the file; TableError when a column of the scene's whiskers is missing or the structure is broken."""
     tips, rays, own = (scene.layout.of(q) for q in (Quantity.TEXTURE, Quantity.DISTANCE, Quantity.READING))
     text = read_columns(path, [TIME, *ODOMETRY, *tips, *rays, *own])

@@ -47,7 +47,7 @@ class OwnSensor:
             _codes(size_m, cell_m, expected, self.levels), cell_m, at_m, spacing_m, detail_m, len(self.levels)
         )
 
-    def read(self, reading) -> np.ndarray:
+    def read(self, reading: object) -> np.ndarray:
         """(codes,) log-likelihoods of a reading; all nan: it is left out."""
         if self._budget_s is not None and self._debt_s >= self._budget_s:
             self._debt_s -= self._budget_s

@@ -14,6 +14,8 @@ along in the last 200 samples.
 
 import math
 from collections import deque
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -39,7 +41,7 @@ class Pilot:
 
     def __init__(
         self,
-        robot,
+        robot: Any,
         texture_models: dict,
         radial_models: dict,
         seed: int,
@@ -96,7 +98,7 @@ class Pilot:
             columns += observation.normal(self.names[lane]) + observation.point(self.names[lane])
         return Layout(columns)
 
-    def block(self, first_tick: int, alpha, beta, status) -> tuple[float, float]:
+    def block(self, first_tick: int, alpha: np.ndarray, beta: np.ndarray, status: np.ndarray) -> tuple[float, float]:
         """Decide on the 40 ticks from `first_tick`: arrays (40, lanes) of counts and status -> v in m/s, omega in rad/s."""
         samples = np.stack([alpha, beta], axis=-1).astype(np.float64)[:, : len(self.names)]
         good = np.asarray(status)[:, : len(self.names)] == 0
@@ -270,7 +272,7 @@ def joined(blocks: list[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.
     return np.concatenate(ticks), np.concatenate(samples)
 
 
-def compose(first, then) -> np.ndarray:
+def compose(first: Sequence[float], then: Sequence[float]) -> np.ndarray:
     """Motion `first` followed by `then` (each x, y in m and theta in rad, in the frame at its own start)."""
     c, s = math.cos(first[2]), math.sin(first[2])
     return np.array([first[0] + c * then[0] - s * then[1], first[1] + s * then[0] + c * then[1], first[2] + then[2]])

@@ -7,6 +7,7 @@ as uint32, then its elements (DDS-XTypes 1.3, 7.4.1; DDSI-RTPS 2.5, 10.2).
 import struct
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 HEADER = b"\x00\x01\x00\x00"  # CDR_LE, no options
 LENGTH = np.dtype("<u4")
@@ -29,13 +30,13 @@ class Layout:
         if not inner:
             self._put("cdr_header", np.dtype("S4"), 1)
 
-    def value(self, name: str, kind) -> "Layout":
+    def value(self, name: str, kind: DTypeLike) -> "Layout":
         """One number, or one inner structure (NumPy dtype `kind`)."""
         kind = np.dtype(kind)
         self._put(name, kind, _alignment(kind))
         return self
 
-    def sequence(self, name: str, kind, count: int) -> "Layout":
+    def sequence(self, name: str, kind: DTypeLike, count: int) -> "Layout":
         """`count` elements (at least 1) behind their number, which is the field `<name>_count`."""
         kind = np.dtype(kind)
         self.value(f"{name}_count", LENGTH)
@@ -76,7 +77,7 @@ class Decoder:
         size = struct.calcsize(code)
         return struct.unpack(f"<{code}", self._take(1, size))[0]
 
-    def array(self, kind, count: int) -> np.ndarray:
+    def array(self, kind: DTypeLike, count: int) -> np.ndarray:
         """`count` numbers of the NumPy dtype `kind`, an array of their own."""
         kind = np.dtype(kind).newbyteorder("<")
         return np.frombuffer(self._take(count, kind.itemsize), kind).copy()

@@ -8,6 +8,7 @@ be believed.
 from collections.abc import Iterator
 from contextlib import suppress
 from itertools import islice
+from pathlib import Path
 from typing import BinaryIO
 
 from .mcapmessages import NUMBERED, Channel, Message, Reading, add_channel
@@ -28,7 +29,7 @@ class McapFile:
     records of one name together, what comes later counts.
     """
 
-    def __init__(self, path):
+    def __init__(self, path: str | Path):
         """RecordingError when it cannot be opened, or is no MCAP file even in parts."""
         self.path = path
         self.damage: list[str] = []

@@ -9,6 +9,7 @@ import re
 import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 from ..errors import UserError
 from .mcaprecords import (
@@ -84,7 +85,7 @@ class Record:
 class Walk:
     """The records of one file."""
 
-    def __init__(self, path, number: int, note: Callable[[str], None]):
+    def __init__(self, path: str | Path, number: int, note: Callable[[str], None]):
         """`number`: file descriptor, the caller's to close; `note` takes a line for each damage."""
         self._path, self._number, self._note = path, number, note
         self._unpacks, self._vain = False, 0

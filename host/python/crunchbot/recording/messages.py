@@ -100,7 +100,7 @@ def encode_block(frames: np.ndarray) -> np.ndarray:
     return block
 
 
-def decode_block(data) -> tuple[int, np.ndarray]:
+def decode_block(data: bytes | memoryview) -> tuple[int, np.ndarray]:
     """(stamp in ns, frames (n,) of dtype FRAME) of a Block's bytes; MessageError when they are none."""
     head = _message(data[: HEAD.itemsize], HEAD)
     count = int(head["tick_count"])
@@ -128,7 +128,7 @@ def encode_event(stamp_ns: int, kind: int, tick: int = 0, frames: int = 0, step_
     return event.tobytes()
 
 
-def decode_event(data) -> Event:
+def decode_event(data: bytes | memoryview) -> Event:
     """MessageError when the bytes are no Event."""
     event = _message(data, EVENT)
     kind = KINDS.get(int(event["kind"]))
@@ -149,7 +149,9 @@ def _health_layout() -> np.dtype:
     return layout.dtype()
 
 
-def encode_health(stamp_ns: int, frames: int, missing: int, overrun: int, bad: np.ndarray, stats: DaemonStats | None):
+def encode_health(
+    stamp_ns: int, frames: int, missing: int, overrun: int, bad: np.ndarray, stats: DaemonStats | None
+) -> bytes:
     """A Health's bytes; bad: samples not good by lane (LANES,)."""
     health = np.zeros((), _health_layout())
     health["cdr_header"] = HEADER

@@ -1,6 +1,7 @@
 """What a recording holds: frames, events and what is known of where they came from."""
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 
@@ -24,7 +25,7 @@ class Recording:
     `events` has come to its end.
     """
 
-    def __init__(self, path):
+    def __init__(self, path: str | Path):
         """RecordingError when the file cannot be read, is no MCAP, or holds no frames of whiskers."""
         self._file = McapFile(path)
         self.path = path
@@ -111,6 +112,6 @@ class Recording:
         return f" ({self.damage[0].removeprefix(f'{self.path}: ')})" if self.damage else ""
 
 
-def read(path) -> Recording:
+def read(path: str | Path) -> Recording:
     """Open a recording; see Recording."""
     return Recording(path)

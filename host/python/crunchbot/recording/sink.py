@@ -10,6 +10,7 @@ import os
 import stat
 import threading
 from pathlib import Path
+from typing import BinaryIO
 
 from .mcapfile import RecordingError
 
@@ -21,7 +22,7 @@ class Syncer:
     failed with. It ends the syncing, because the kernel tells of lost data once only.
     """
 
-    def __init__(self, file):
+    def __init__(self, file: BinaryIO):
         """`file`: an open regular file; stays the caller's to close, after `stop`."""
         self._file, self._wanted, self._stopping = file, threading.Event(), False
         self.error: OSError | None = None
@@ -67,7 +68,7 @@ def sync_folder(folder: Path) -> None:
 class Sink:
     """A file that remembers up to where it is whole, and goes back there when the disk is full."""
 
-    def __init__(self, path, overwrite: bool):
+    def __init__(self, path: str | Path, overwrite: bool):
         """RecordingError when there is no such place, or something is there that must not be replaced."""
         try:
             self._file = open(path, "wb" if overwrite else "xb", buffering=0)  # noqa: SIM115 - closed by close()
@@ -79,7 +80,7 @@ class Sink:
         is_file = stat.S_ISREG(os.fstat(self._file.fileno()).st_mode)  # pipes and devices know no fdatasync
         self._syncer = Syncer(self._file) if is_file else None
 
-    def write(self, data) -> int:
+    def write(self, data: bytes | memoryview) -> int:
         """All of data; OSError when there is no room."""
         rest = memoryview(data)
         while rest:

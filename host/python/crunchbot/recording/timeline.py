@@ -1,6 +1,7 @@
 """Times of a recording: the bridge's clock converted to host time, which never goes backwards."""
 
 import time
+from collections.abc import Callable
 
 from whisker_protocol import LIMITS
 
@@ -20,7 +21,9 @@ class Timeline:
     Setting the wall clock changes nothing, except that `wall_step_ns` tells.
     """
 
-    def __init__(self, monotonic_ns=time.monotonic_ns, realtime_ns=time.time_ns):
+    def __init__(
+        self, monotonic_ns: Callable[[], int] = time.monotonic_ns, realtime_ns: Callable[[], int] = time.time_ns
+    ):
         self._monotonic, self._realtime = monotonic_ns, realtime_ns
         self._seen = monotonic_ns()
         self._last = realtime_ns()

@@ -3,6 +3,7 @@
 from functools import cache
 from importlib.resources import files
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 from rosbags.interfaces import Nodetype
@@ -34,7 +35,7 @@ def store() -> Typestore:
     return made
 
 
-def encode(schema: str, message) -> bytes:
+def encode(schema: str, message: Any) -> bytes:
     """Little-endian CDR of an object with an attribute for each field of "package/msg/Type". ValueError when a fixed array has
     another length."""
     return bytes(store().serialize_cdr(_prepared(schema, message), schema, little_endian=True))

@@ -4,6 +4,8 @@ import contextlib
 import errno
 import time
 from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from mcap.well_known import MessageEncoding, Profile, SchemaEncoding
@@ -38,7 +40,7 @@ class WriteError(RecordingError):
 class ChunkWriter(Writer):
     """The package's writer, whose chunks describe the channels that they use: each can be read without the others."""
 
-    def add_message(self, channel_id: int, *arguments) -> None:
+    def add_message(self, channel_id: int, *arguments: Any) -> None:
         """Works as the package's method. It has no public way to repeat a channel; the names are those of the pinned release."""
         if channel_id not in self._Writer__chunk_builder.message_indices:
             self._Writer__chunk_builder.add_channel(self._Writer__channels[channel_id])
@@ -52,7 +54,7 @@ class TopicWriter:
     After a WriteError (disk full, say) only `close` may be called; the file is whole up to the last `flush`.
     """
 
-    def __init__(self, path, record: str, metadata: dict[str, str], overwrite: bool = False):
+    def __init__(self, path: str | Path, record: str, metadata: dict[str, str], overwrite: bool = False):
         """`record`: name of the metadata record, which `metadata` begins."""
         self.path, self._record, self._metadata = path, record, metadata
         self._sink = Sink(path, overwrite)
@@ -131,7 +133,9 @@ class TopicWriter:
 class RecordingWriter(TopicWriter):
     """An MCAP file with the topics of a recording. Times must not go backwards."""
 
-    def __init__(self, path, metadata: dict[str, str], lane_names: Sequence[str] = (), overwrite: bool = False):
+    def __init__(
+        self, path: str | Path, metadata: dict[str, str], lane_names: Sequence[str] = (), overwrite: bool = False
+    ):
         """`metadata`: what is known of ring and bridge; `lane_names`: without commas, lane 0 first."""
         if len(lane_names) > LANES or any("," in name for name in lane_names):
             raise RecordingError(f"{path}: lane names: give at most {LANES}, without commas")
@@ -147,7 +151,9 @@ class RecordingWriter(TopicWriter):
         """An interruption: kind and fields of messages.encode_event."""
         self.add(EVENTS_TOPIC, time_ns, messages.encode_event(time_ns, kind, **what))
 
-    def health(self, time_ns: int, frames: int, missing: int, overrun: int, bad: np.ndarray, stats: DaemonStats | None):
+    def health(
+        self, time_ns: int, frames: int, missing: int, overrun: int, bad: np.ndarray, stats: DaemonStats | None
+    ) -> None:
         """The counts of one second, typed and as diagnostics."""
         self.add(HEALTH_TOPIC, time_ns, messages.encode_health(time_ns, frames, missing, overrun, bad, stats))
         lost = missing + overrun

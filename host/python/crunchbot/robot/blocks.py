@@ -1,7 +1,7 @@
 """Frames of a ring as blocks of 40 ticks, each with every tick: those that never came are marked bad."""
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
@@ -71,7 +71,7 @@ class LiveRing:
     They are the bridge's own until the bridge begins to count anew; from then on they go on after the time it took.
     """
 
-    def __init__(self, name: str, lanes: int, clock=time.monotonic, owner: int | None = None):
+    def __init__(self, name: str, lanes: int, clock: Callable[[], float] = time.monotonic, owner: int | None = None):
         self.name, self._owner = name, owner
         self.trouble = (
             f"ring {name}: not there yet; start whiskerd --ring {name}"  # why no samples come; empty: they come

@@ -5,6 +5,7 @@ import queue
 import threading
 from collections.abc import Callable
 from types import SimpleNamespace
+from typing import Any
 
 import foxglove
 from foxglove.websocket import Capability, ServerListener
@@ -35,17 +36,17 @@ class Listener(ServerListener):
     def __init__(self, tasks: queue.SimpleQueue):
         self._tasks, self._advertised = tasks, {}
 
-    def on_subscribe(self, client, channel) -> None:
+    def on_subscribe(self, client: Any, channel: Any) -> None:
         if channel.topic in LATCHED:
             self._tasks.put(("again", channel.topic))
 
-    def on_client_advertise(self, client, channel) -> None:
+    def on_client_advertise(self, client: Any, channel: Any) -> None:
         self._advertised[client.id, channel.id] = (channel.topic, channel.encoding)
 
-    def on_client_unadvertise(self, client, client_channel_id: int) -> None:
+    def on_client_unadvertise(self, client: Any, client_channel_id: int) -> None:
         self._advertised.pop((client.id, client_channel_id), None)
 
-    def on_message_data(self, client, client_channel_id: int, data: bytes) -> None:
+    def on_message_data(self, client: Any, client_channel_id: int, data: bytes) -> None:
         topic, encoding = self._advertised.get((client.id, client_channel_id), ("", ""))
         if topic == POSE_TOPIC:
             self._tasks.put((encoding, data))

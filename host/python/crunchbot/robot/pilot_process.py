@@ -7,6 +7,7 @@ writer. They stand while no samples come, or while who watches over the pilot is
 
 import time
 from collections.abc import Callable
+from typing import Any
 
 from ..bridge.ring import Reader
 from ..pilot.behaviour import BLOCK_TICKS, ODOMETRY_TICKS, TICK_S
@@ -31,7 +32,7 @@ NO_HEARTBEAT = "no heartbeat of the supervisor: wheels stopped; see whether `whi
 class Flight:
     """A pilot, its wheels, and its publishers: the part that both clocks share."""
 
-    def __init__(self, pilot: Pilot, wheels, rows: Rows, traces: Traces, publisher: Publisher | None):
+    def __init__(self, pilot: Pilot, wheels: Any, rows: Rows, traces: Traces, publisher: Publisher | None):
         self.pilot, self._wheels = pilot, wheels
         self._rows, self._traces, self._teller = rows, traces, publisher
         self.ticks_used = self.reports_missing = 0
@@ -100,7 +101,7 @@ class LiveFlight:
         wheels: LiveWheels,
         link: Link,
         heartbeat: Heartbeat,
-        clock=time.monotonic,
+        clock: Callable[[], float] = time.monotonic,
     ):
         self._flight, self._ring, self._wheels, self._link, self._clock = flight, ring, wheels, link, clock
         self._health, self._heartbeat = Health(link, self.counters), heartbeat

@@ -10,6 +10,8 @@ seen = results.observation(seen["number"])     # seen["motion"]: everything sinc
 import math
 import threading
 from collections import deque
+from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 import Pyro5.api
@@ -134,7 +136,7 @@ class Results:
         with self._lock:
             return self._publish(Row.of(checked))
 
-    def take(self, received) -> None:
+    def take(self, received: Iterable[Any]) -> None:
         """What came on TOPICS and health."""
         with self._lock:
             for step in self._follower.take([r for r in received if r.topic == "observation"]):

@@ -8,6 +8,7 @@ import contextlib
 import socket
 import threading
 import time
+from typing import Any
 
 import Pyro5.errors
 import Pyro5.protocol
@@ -24,7 +25,7 @@ SERIALIZER = "serpent"  # Pyro's own; marshal must never read what strangers sen
 class PlainMessage(Pyro5.protocol.ReceivingMessage):
     """A request that is no longer when it has been read: compressed ones are refused before they are."""
 
-    def __init__(self, header, payload=None):
+    def __init__(self, header: bytes, payload: bytes | None = None):
         super().__init__(header, payload)
         if self.flags & Pyro5.protocol.FLAGS_COMPRESSED:
             raise Pyro5.errors.ProtocolError("compressed requests are refused; set Pyro5.config.COMPRESSION to False")
@@ -64,12 +65,12 @@ class Daemon(Pyro5.server.Daemon):
             self._note(conn, greeted)
         return greeted
 
-    def handleRequest(self, conn) -> None:  # noqa: N802 - Pyro's name
+    def handleRequest(self, conn: Any) -> None:  # noqa: N802 - Pyro's name
         """Waits for a request and answers it."""
         super().handleRequest(conn)
         self._note(conn, True)
 
-    def clientDisconnect(self, conn) -> None:  # noqa: N802 - Pyro's name
+    def clientDisconnect(self, conn: Any) -> None:  # noqa: N802 - Pyro's name
         """Called by Pyro at the end of a connection that had greeted."""
         self._note(conn, False)
 

@@ -8,6 +8,7 @@ sent when the block ended: the same run gives the same bytes. Live: as soon as i
 """
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -76,7 +77,7 @@ class SteppedBase:
 class LiveBase:
     """The driver as it comes and goes: what cannot be asked is None, `trouble` says why, and it is tried again."""
 
-    def __init__(self, path: str, clock=time.monotonic):
+    def __init__(self, path: str, clock: Callable[[], float] = time.monotonic):
         self.trouble = f"{path}: not yet asked"
         self.lost = 0  # times the driver was gone
         self._path, self._clock, self._next_try = path, clock, float("-inf")

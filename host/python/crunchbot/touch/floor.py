@@ -1,5 +1,7 @@
 """What a floor whisker says of a window: by the paper's classifier, about a rest that is followed, or by the spectral one."""
 
+from typing import Any
+
 import numpy as np
 
 from .texture.spectral import SpectralModel
@@ -21,7 +23,7 @@ def centred(recording: np.ndarray, middle: np.ndarray, rng: np.random.Generator)
     return dithered(recording - recording.mean(axis=0) + middle, rng)
 
 
-def floor_whisker(model, rng: np.random.Generator) -> "FloorWhisker | SpectralFloorWhisker":
+def floor_whisker(model: Any, rng: np.random.Generator) -> "FloorWhisker | SpectralFloorWhisker":
     """What reads a floor whisker with a texture model of either method."""
     return SpectralFloorWhisker(model) if isinstance(model, SpectralModel) else FloorWhisker(model, rng)
 
@@ -32,7 +34,7 @@ class FloorWhisker:
     The sensor's rest drifts by more than the smoothest floor moves the whisker.
     """
 
-    def __init__(self, model, rng: np.random.Generator):
+    def __init__(self, model: Any, rng: np.random.Generator):
         self.model = model
         self.rest = model.rest.copy()
         self._rng = rng

@@ -8,6 +8,7 @@ that side presses it further; a face ahead is pressed by a turn that brings the 
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 from ..scene import Whisker
 from .radial.whisk import WhiskModel
@@ -46,7 +47,7 @@ class Mount:
             return None
         return line_mm
 
-    def whisked(self, model: WhiskModel, shape, turn: float, face: float) -> float | None:
+    def whisked(self, model: WhiskModel, shape: Any, turn: float, face: float) -> float | None:
         """Distance of a contact pressed by this turn, mm, from its whole whisk; None when unsure.
 
         `face`: probability that the tip is on a surface, by the contact filter; nan: not known. A tip on a face bends by

@@ -9,6 +9,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -33,7 +34,7 @@ PARTS = {TIP: "tip", SHAFT: "shaft"}
 SHAPES = {FACE: "face", CORNER: "corner"}
 
 
-def real(value, places: int = 3) -> float | None:
+def real(value: Any, places: int = 3) -> float | None:
     """A number for JSON; None: it is none."""
     value = float(value)
     return round(value, places) if math.isfinite(value) else None
@@ -57,7 +58,7 @@ def _sorted(cells: list[tuple[Column, int, float]]) -> tuple[list[dict], list[di
     return [{"name": name, "loglik": values} for name, values in tips.items()], rays
 
 
-def placed(pose) -> dict | None:
+def placed(pose: Any) -> dict | None:
     """x, y, theta of a Pose; None: it is of no place that an arena can have."""
     place = pose.xytheta
     return dict(zip(("x", "y", "theta"), map(real, place), strict=True)) if max(map(abs, place)) <= LARGEST_M else None
@@ -70,7 +71,7 @@ class Path:
         self.points: deque[tuple] = deque(maxlen=PATH_MOST)
         self.end = 0
 
-    def add(self, *values) -> None:
+    def add(self, *values: Any) -> None:
         self.points.append(tuple(real(value) for value in values))
         self.end += 1
 
@@ -114,7 +115,7 @@ class RobotModel:
         self.rows = {"missed": None, "unseen": 0}
         self._seq: int | None = None
 
-    def take(self, topic: str, message) -> None:
+    def take(self, topic: str, message: Any) -> None:
         """A message of a topic of crunchbot.robot.network.messages.TOPICS, or of health; of any, an End."""
         kind = HEALTH if topic.startswith(f"{HEALTH}/") else topic
         if isinstance(message, End):

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from ..errors import UserError
 
@@ -37,7 +38,14 @@ class NoRobot:
 class InboxSource(NoRobot):
     """Takes what an Inbox holds; `close` ends the link it belongs to, `set_pose` tells a pose over it."""
 
-    def __init__(self, name: str, inbox, text: str = "", close=lambda: None, set_pose: Callable | None = None):
+    def __init__(
+        self,
+        name: str,
+        inbox: Any,
+        text: str = "",
+        close: Callable[[], None] = lambda: None,
+        set_pose: Callable | None = None,
+    ):
         self.name, self._inbox, self._text, self.close = name, inbox, text, close
         self.set_pose = set_pose or super().set_pose
 

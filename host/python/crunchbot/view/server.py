@@ -5,9 +5,11 @@ import errno
 import logging
 import os
 import socket
+from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from functools import partial
 from http import HTTPStatus
+from typing import Any
 
 from websockets.asyncio.server import Server, ServerConnection, serve
 from websockets.datastructures import Headers
@@ -39,7 +41,7 @@ class ViewError(UserError):
 class Connection(ServerConnection):
     """A connection that the view knows of from its first moment to its last."""
 
-    def __init__(self, view: "ViewServer", *arguments, **options):
+    def __init__(self, view: "ViewServer", *arguments: Any, **options: Any):
         super().__init__(*arguments, **options)
         self._view = view
         self.client: Client | None = None  # once it is open
@@ -121,7 +123,7 @@ def _response(status: HTTPStatus, headers: dict[str, str], body: bytes) -> Respo
 
 
 @asynccontextmanager
-async def serving(hub: Hub, address: str, port: int, allowed: list[str]):
+async def serving(hub: Hub, address: str, port: int, allowed: list[str]) -> AsyncIterator[int]:
     """Serve while the context lasts; gives the port (0 asks for a free one). ViewError: the address cannot be had."""
     view = ViewServer(hub, Guard(address, allowed))
     try:

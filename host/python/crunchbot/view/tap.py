@@ -2,6 +2,7 @@
 
 import time
 from collections import deque
+from collections.abc import Callable
 from dataclasses import asdict
 
 import numpy as np
@@ -26,7 +27,7 @@ NEVER = -(1 << 62)
 class Tap:
     """`poll` often enough that the ring does not wrap in between; then `pyramid`, `tally` and `status` are up to date."""
 
-    def __init__(self, name: str, clock=time.monotonic, owner: int | None = None):
+    def __init__(self, name: str, clock: Callable[[], float] = time.monotonic, owner: int | None = None):
         self.name, self._owner = name, owner
         self.pyramid, self.tally = Pyramid(), Tally()
         self.tick_s = LIMITS["tick_period"] / LIMITS["clock_hz"]

@@ -6,6 +6,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 from .messages import REMEDIES, SCHEMAS, TOPICS, End, MessageError, Observation, decode, type_of
 from .sources import Sources, Verdict
@@ -73,7 +74,7 @@ class Inbox:
         """How many of those missed had come and found no room."""
         return self._overflown
 
-    def put(self, sample) -> None:
+    def put(self, sample: Any) -> None:
         """Called by zenoh's thread; keeps a zenoh.Sample as it came."""
         attachment = None if sample.attachment is None else sample.attachment.to_bytes()
         entry = (str(sample.key_expr), str(sample.encoding), sample.payload.to_bytes(), attachment)

@@ -18,6 +18,7 @@ import re
 import threading
 from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import Any
 
 import zenoh
 
@@ -74,7 +75,7 @@ class Publisher:
         self._token = session.liveliness().declare_token(f"{prefix}{STREAM}/{stream:08x}/{topic}")
         self.sent, self.ended = 0, False
 
-    def send(self, message) -> None:
+    def send(self, message: Any) -> None:
         """Send a message of the topic's class; without a subscriber it is gone, and counted by nobody."""
         if type(message) is not self._kind:
             raise TypeError(f"{type(message).__name__} where {self._kind.__name__} belongs")

@@ -7,6 +7,7 @@ clock, 0 at its start.
 import math
 import re
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -174,12 +175,12 @@ def type_of(topic: str) -> type:
     return ProcessHealth if kind == HEALTH and NAME.fullmatch(process) else TOPICS[topic]
 
 
-def encode(message) -> bytes:
+def encode(message: Any) -> bytes:
     """CDR of a message; ValueError when a fixed array has another length than its schema says."""
     return encode_as(SCHEMAS[type(message)], message)
 
 
-def decode(kind: type, data: bytes, topic: str = ""):
+def decode(kind: type, data: bytes, topic: str = "") -> Any:
     """A message of class `kind`; MessageError names `topic`, field and remedy."""
     try:
         message = CODEC.decode(data, SCHEMAS[kind])

@@ -4,6 +4,7 @@ import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from ...arguments import add_zenoh_config
 from .link import NAVIGATOR_ENDPOINT, PILOT_ENDPOINT, ROBOT, Link, is_guarded, is_loopback, read_config
@@ -37,7 +38,7 @@ def open_link(process: str, arguments: argparse.Namespace) -> Link:
     return link_that_warns(process, robot=arguments.robot, **ends, **more)
 
 
-def link_that_warns(process: str, listen: Sequence[str], config: Path | None, **more) -> Link:
+def link_that_warns(process: str, listen: Sequence[str], config: Path | None, **more: Any) -> Link:
     """A Link, and a line on standard error for each endpoint of `listen` that is open to other machines."""
     settings = read_config(config)
     for endpoint in listen:

@@ -6,6 +6,7 @@ Limits are those of the machine, with room to spare: what is outside them is a m
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 # What intake.c of host/nav/measurement takes in one row: the Create drives at most 0.5 m/s, and a row may carry a whisk.
 ROW_MOST_M, ROW_MOST_RAD = 1.0, math.pi
@@ -34,12 +35,12 @@ class Range:
     finite: bool = True
 
 
-def about(most: float, **more) -> Range:
+def about(most: float, **more: Any) -> Range:
     """The range from -most to most."""
     return Range(-most, most, **more)
 
 
-def up_to(most: float, **more) -> Range:
+def up_to(most: float, **more: Any) -> Range:
     """The range from 0 to most."""
     return Range(0, most, **more)
 

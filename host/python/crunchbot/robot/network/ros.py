@@ -1,9 +1,11 @@
 """Messages that ROS 2 itself defines, as Python objects: fields and units are those of its .msg files (crunchbot/msgs)."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 BASE_FRAME, ODOMETRY_FRAME, MAP_FRAME = "base_link", "odom", "map"
 
@@ -84,7 +86,7 @@ class PoseWithCovariance:
     covariance: np.ndarray = field(default_factory=lambda: np.zeros(36))
 
     @classmethod
-    def planar(cls, pose, covariance) -> "PoseWithCovariance":
+    def planar(cls, pose: Sequence[float], covariance: ArrayLike) -> "PoseWithCovariance":
         """(x, y, theta) in m and rad, and their covariance (3, 3)."""
         return cls(Pose.planar(*pose), spread(covariance))
 
@@ -93,7 +95,7 @@ class PoseWithCovariance:
         return np.asarray(self.covariance).reshape(6, 6)[PLANAR]
 
 
-def spread(covariance) -> np.ndarray:
+def spread(covariance: ArrayLike) -> np.ndarray:
     """A covariance (3, 3) of x, y, theta as the 36 numbers of a ROS message."""
     full = np.zeros((6, 6))
     full[PLANAR] = covariance
@@ -124,7 +126,7 @@ class TwistWithCovariance:
     covariance: np.ndarray = field(default_factory=lambda: np.zeros(36))
 
     @classmethod
-    def planar(cls, speeds, covariance) -> "TwistWithCovariance":
+    def planar(cls, speeds: Sequence[float], covariance: ArrayLike) -> "TwistWithCovariance":
         """(x, y, theta) per second, in m and rad, and their covariance (3, 3)."""
         x, y, turn = map(float, speeds)
         return cls(Twist(Vector3(x, y, 0.0), Vector3(0.0, 0.0, turn)), spread(covariance))

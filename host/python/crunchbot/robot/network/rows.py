@@ -1,9 +1,11 @@
 """Observation rows on their way: from cells to messages at the pilot, and from whatever came to filter steps at the desktop."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ...observation import NOT_READ, RELEASE, Row, cell
 from ...pilot.pilot import compose
@@ -23,7 +25,7 @@ PIECES_MOST = 600
 LEAP_NS = 24 * 3600 * 10**9  # a clock that goes on by more than a day has begun anew, like one that goes back
 
 
-def between(start, end) -> np.ndarray:
+def between(start: Sequence[float], end: Sequence[float]) -> np.ndarray:
     """The motion that leads from one summed pose to another: compose(start, between(start, end)) is end."""
     c, s = math.cos(start[2]), math.sin(start[2])
     dx, dy = end[0] - start[0], end[1] - start[1]
@@ -57,7 +59,7 @@ class RowPublisher:
         self._stream.end(self._last_ns, reason)
 
 
-def to_message(row: Row, seq: int, pose) -> Observation:
+def to_message(row: Row, seq: int, pose: Sequence[float]) -> Observation:
     """The Observation of a row; `pose`: summed motion of those before."""
     motion = np.array([float(cell(value)) for value in row.motion])
     values = [float(cell(value)) for value in row.numbers]
@@ -65,7 +67,7 @@ def to_message(row: Row, seq: int, pose) -> Observation:
     return Observation(header, seq, row.kind, motion, compose(pose, motion), list(row.names), row.cells, values)
 
 
-def to_row(message: Observation, motion=None, t_ns: int | None = None) -> Row:
+def to_row(message: Observation, motion: ArrayLike | None = None, t_ns: int | None = None) -> Row:
     """The row as it was sent; `motion` and `t_ns` in place of the message's own."""
     stamp = message.header.stamp.ns if t_ns is None else t_ns
     motion = message.motion if motion is None else motion

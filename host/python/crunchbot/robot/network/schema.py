@@ -6,6 +6,7 @@ knows no limits: what comes over a network is judged number by number (`ranges`)
 
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 import numpy as np
 from rosbags.interfaces import Nodetype
@@ -55,7 +56,7 @@ class Codec:
     types: dict[str, type]
     ranges: dict[str, Range]
 
-    def decode(self, data: bytes, schema: str):
+    def decode(self, data: bytes, schema: str) -> Any:
         """The message; Malformed names the field that is wrong."""
         decoder = Decoder(data)
         message = self._read(decoder, schema, "")

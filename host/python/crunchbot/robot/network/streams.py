@@ -8,6 +8,7 @@ import itertools
 import os
 import struct
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 VERSION = 1
@@ -51,7 +52,7 @@ def new_stream() -> int:
     return int.from_bytes(os.urandom(4), "little")
 
 
-def envelopes(stream: int | None = None):
+def envelopes(stream: int | None = None) -> Iterator[Envelope]:
     """Envelopes of a stream (None: a new one), in order; `next(...)` when one is sent."""
     stream = new_stream() if stream is None else stream
     return (Envelope(stream, number, time.time_ns()) for number in itertools.count())

@@ -15,6 +15,7 @@ from collections.abc import Callable
 from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from ...stamping import VARIABLE as TIMES
 from .lifeline import VARIABLE, Lifeline, Pulse
@@ -45,7 +46,7 @@ class Program:
     orphaned: int = signal.SIGTERM
 
     @classmethod
-    def of(cls, name: str, command: list, **options) -> "Program":
+    def of(cls, name: str, command: list, **options: Any) -> "Program":
         """The words of `command` may be anything that prints: paths, numbers."""
         return cls(name, tuple(map(str, command)), **options)
 

@@ -15,6 +15,7 @@ import contextlib
 import fcntl
 import os
 import time
+from collections.abc import Callable
 
 from ...errors import UserError
 
@@ -67,7 +68,7 @@ class Pulse:
 class Heartbeat:
     """The child's side. fd: the pipe's reading end; None: nobody watches over this process, and it always beats."""
 
-    def __init__(self, fd: int | None, clock=time.monotonic):
+    def __init__(self, fd: int | None, clock: Callable[[], float] = time.monotonic):
         self._fd, self._clock, self._heard_s, self._ended = fd, clock, clock(), False
         if fd is not None:
             os.set_blocking(fd, False)

@@ -36,7 +36,9 @@ class RunError(UserError):
 class Keeper:
     """One line of the table: its child, and when it is started again."""
 
-    def __init__(self, program: Program, logs: Path, on_end: Callable[[], None], clock=time.monotonic):
+    def __init__(
+        self, program: Program, logs: Path, on_end: Callable[[], None], clock: Callable[[], float] = time.monotonic
+    ):
         self.program, self.restarts, self.last_error = program, 0, ""
         self.refused = self.failed = False  # it ended with exit code 2 and never ran steadily; its last run failed
         self._log, self._on_end, self._clock = logs / f"{program.name}.log", on_end, clock

@@ -2,6 +2,7 @@
 
 import math
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 
@@ -42,7 +43,7 @@ def occupancy(arena: Arena, header: SimpleNamespace) -> SimpleNamespace:
     return _grid(cells, cell, (-cell, -cell), header)
 
 
-def belief(message, arena: Arena, header: SimpleNamespace) -> SimpleNamespace:
+def belief(message: Any, arena: Arena, header: SimpleNamespace) -> SimpleNamespace:
     """nav_msgs/OccupancyGrid of a belief's mass: 100 in the cell that holds most."""
     cell = max(BELIEF_CELL_M, max(arena.size_m) / CELLS_MOST)
     columns, rows = (max(1, math.ceil(size / cell - 1e-9)) for size in arena.size_m)

@@ -2,8 +2,10 @@
 
 from functools import cache
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
@@ -16,7 +18,7 @@ def store() -> Typestore:
     return get_typestore(Stores.ROS2_JAZZY)
 
 
-def make(kind: str, **fields) -> SimpleNamespace:
+def make(kind: str, **fields: Any) -> SimpleNamespace:
     """A message "package/Type" with these fields; the others are empty. TypeError for a field that it does not have."""
     empty = _empty_fields(kind)
     if not fields.keys() <= empty.keys():
@@ -29,7 +31,7 @@ def encode(message: SimpleNamespace) -> bytes:
     return bytes(store().serialize_cdr(message, message.__kind__, little_endian=True))
 
 
-def decode(kind: str, data: bytes):
+def decode(kind: str, data: bytes) -> Any:
     """The message that CDR bytes hold."""
     return store().deserialize_cdr(data, _full(kind))
 
@@ -39,7 +41,7 @@ def definition(kind: str) -> str:
     return store().generate_msgdef(_full(kind), ros_version=2)[0]
 
 
-def doubles(values) -> np.ndarray:
+def doubles(values: ArrayLike) -> np.ndarray:
     """Numbers as the encoder asks for them. ValueError: they are none."""
     return np.ascontiguousarray(values, np.float64)
 

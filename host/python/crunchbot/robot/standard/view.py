@@ -9,6 +9,7 @@ from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 
@@ -71,7 +72,7 @@ class StandardView:
         now = self._clock.latest
         yield Standard("/map", now, shapes.occupancy(self._scene.arena, _header(now, MAP_FRAME)))
 
-    def take(self, topic: str, message) -> Iterator[Standard]:
+    def take(self, topic: str, message: Any) -> Iterator[Standard]:
         """A message of a topic of network.messages.TOPICS, or of health."""
         take = getattr(self, f"_take_{topic.partition('/')[0]}", None)
         if take is None or isinstance(message, End):

@@ -62,7 +62,7 @@ class CurveModel(Known):
         return {"kind": self.kind} | {name: getattr(self, name) for name in self.NUMBERS}
 
     @classmethod
-    def fit(cls, kind: str, peak_counts, radius_mm) -> "CurveModel":
+    def fit(cls, kind: str, peak_counts: np.ndarray, radius_mm: np.ndarray) -> "CurveModel":
         """Least squares; sigma_mm is the RMS error of places left out. ValueError when they do not determine it."""
         peaks, radii = (np.asarray(v, np.float64) for v in (peak_counts, radius_mm))
         use = np.isfinite(peaks) & np.isfinite(radii)

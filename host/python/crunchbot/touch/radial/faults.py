@@ -1,6 +1,7 @@
 """Faults of recorded contacts: what cannot be learned from, and what is read in spite of a fault."""
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 
@@ -13,7 +14,7 @@ SATURATED_RUN, SATURATED_LEAST = 3, 3  # samples in a row at a channel's extreme
 NAMED_MOST = 5  # contacts in a line
 
 
-def radii_of_contacts(path, names: list[str], radius_mm: np.ndarray, rows: list[np.ndarray]) -> np.ndarray:
+def radii_of_contacts(path: str | Path, names: list[str], radius_mm: np.ndarray, rows: list[np.ndarray]) -> np.ndarray:
     """The one radius of each contact; TableError where a contact has none above 0, or two."""
     for name, some in zip(names, rows, strict=True):
         known = radius_mm[some]
@@ -29,7 +30,14 @@ def radii_of_contacts(path, names: list[str], radius_mm: np.ndarray, rows: list[
     return np.array([np.nanmedian(radius_mm[some]) for some in rows])
 
 
-def faulty(path, channels: list[str], names: list[str], contacts: list[Contact], directions, warn: Warn) -> np.ndarray:
+def faulty(
+    path: str | Path,
+    channels: list[str],
+    names: list[str],
+    contacts: list[Contact],
+    directions: np.ndarray | None,
+    warn: Warn,
+) -> np.ndarray:
     """Whether a contact (n,) is too short or stuck to learn from. Every fault is a line to `warn`; TableError for those that
     leave nothing to read."""
     good = [np.isfinite(c.samples).all(axis=1) & np.isfinite(c.t_s) for c in contacts]

@@ -4,9 +4,10 @@ the places left out; calibration recordings and model files."""
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ...fields import Fields
 from ...files import read_json
@@ -51,7 +52,7 @@ class Estimate(NamedTuple):
     direction_deg: float | None = None
 
 
-def peak(samples: np.ndarray, rest) -> float:
+def peak(samples: np.ndarray, rest: ArrayLike) -> float:
     """Equation 2: largest deflection about `rest` over a contact, counts. samples (n, axes); nan when none is finite."""
     samples = as_doubles(samples, "samples", (None, None))
     count, axes = samples.shape
@@ -71,7 +72,7 @@ class RadialModel(Known):
         raise AttributeError(name)
 
     @classmethod
-    def fit(cls, peak_counts, radius_mm) -> "RadialModel":
+    def fit(cls, peak_counts: np.ndarray, radius_mm: np.ndarray) -> "RadialModel":
         """Least squares over contacts; ValueError when fewer than three are usable or all peaks are equal."""
         peaks = as_doubles(peak_counts, "peak_counts", (None,))
         radii = as_doubles(radius_mm, "radius_mm", peaks.shape)
@@ -99,12 +100,12 @@ class RadialModel(Known):
         """Makes a model from what `content` gave."""
         return cls(fields.number("a1"), fields.number("a0"), *radii_of(fields, "sigma_mm", "low_mm", "high_mm"))
 
-    def save(self, path) -> None:
+    def save(self, path: str | Path) -> None:
         """Writes the model as JSON, for `load`."""
         save(self, path)
 
     @classmethod
-    def load(cls, path) -> "RadialModel":
+    def load(cls, path: str | Path) -> "RadialModel":
         """Read what `save` wrote; TableError with one line when it is something else."""
         model = load(path)
         if not isinstance(model, cls):
@@ -124,7 +125,7 @@ class Whisks:
     node: int | None = None  # serial number of the node whose whisker it is, where the file tells
     direction_deg: np.ndarray | None = None  # of the touch about the shaft, where the file tells
 
-    def part(self, use) -> "Whisks":
+    def part(self, use: ArrayLike) -> "Whisks":
         """Only the contacts of these indices."""
         arrays = (None if a is None else a[use] for a in (self.peak_counts, self.radius_mm))
         directions = None if self.direction_deg is None else self.direction_deg[use]
@@ -136,7 +137,7 @@ class Whisks:
         return self.recorded[0].samples.shape[1] if self.recorded else 0
 
 
-def read_whisks(path, with_radius: bool, warn: Warn = ignore) -> Whisks:
+def read_whisks(path: str | Path, with_radius: bool, warn: Warn = ignore) -> Whisks:
     """Contacts of a calibration CSV; `with_radius`: the column radius_mm is required, else not even read, and contacts that
     cannot be learned from are left out. `warn(line)` is called with each fault that does not keep it from being read."""
     text = read_columns(path, ["contact", "t_s"] + (["radius_mm"] if with_radius else []))
@@ -260,14 +261,14 @@ def _left_out(whisks: Whisks, name: str, groups) -> float:
     return float(np.sqrt(np.mean(np.square(off)))) if off else float("nan")
 
 
-def save(model, path) -> None:
+def save(model: Any, path: str | Path) -> None:
     """Write a model of any kind as JSON."""
     formats = {RadialModel: FORMAT, WhiskModel: WHISK_FORMAT, CurveModel: CURVE_FORMAT, PressModel: PRESS_FORMAT}
     node = {} if model.node is None else {NODE_COLUMN: model.node}
     Path(path).write_text(json.dumps({"format": formats[type(model)]} | node | model.content, indent=1) + "\n")
 
 
-def load(path) -> "RadialModel | CurveModel | WhiskModel | PressModel":
+def load(path: str | Path) -> "RadialModel | CurveModel | WhiskModel | PressModel":
     """Read what `save` wrote; TableError with one line when it is something else."""
     kinds = {
         FORMAT: RadialModel.of,
@@ -284,11 +285,11 @@ def load(path) -> "RadialModel | CurveModel | WhiskModel | PressModel":
         raise not_a_model(path, error) from error
 
 
-def not_a_model(path, error: ValueError) -> TableError:
+def not_a_model(path: str | Path, error: ValueError) -> TableError:
     return TableError(path, None, f"no radial model: {error}; make one with 'whisker radial fit'")
 
 
-def estimate(model, contact: Contact, peak_counts: float | None = None) -> Estimate:
+def estimate(model: Any, contact: Contact, peak_counts: float | None = None) -> Estimate:
     """What a model of any kind says of one contact; `peak_counts`: equation 2, where it is known already."""
     if isinstance(model, WhiskModel | PressModel) and contact.samples.shape[1] != model.axes:
         raise ValueError(f"{contact.samples.shape[1]} channels, but the model has {model.axes}")

@@ -253,7 +253,9 @@ class PressModel(Known):
         self.sigma_mm = self.place_mm
 
     @classmethod
-    def fit(cls, contacts: list[Contact], radius_mm, direction_deg=None) -> "PressModel":
+    def fit(
+        cls, contacts: list[Contact], radius_mm: np.ndarray, direction_deg: np.ndarray | None = None
+    ) -> "PressModel":
         """Fits a model to contacts at known radii (n,) mm, and directions (n,) degrees where known; ValueError when too few."""
         radii = np.asarray(radius_mm, np.float64)
         directions = np.full(len(radii), np.nan) if direction_deg is None else np.asarray(direction_deg, np.float64)

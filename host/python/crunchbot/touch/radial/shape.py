@@ -1,6 +1,7 @@
 """Recorded whisks as shapes (host/nav/touch/radial/radial_whisk.h), the numbers in which a model sees them."""
 
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 
@@ -29,7 +30,7 @@ class Contact:
         return Contact(*(None if column is None else column[:end] for column in columns))
 
 
-def shape_of(contact: Contact):
+def shape_of(contact: Contact) -> ffi.CData:
     """struct nav_shape of a recorded whisk; what is recorded long before and after it is left out. ValueError: a column has
     another length than the others, or no channel."""
     samples = as_doubles(contact.samples, "samples", (None, None))[:, : lib.NAV_TRACE_AXES]
@@ -71,7 +72,7 @@ def _crop(contact: Contact) -> slice:
     return slice(max(0, runs[0] - margin), min(count, runs[-1] + margin))
 
 
-def terms_of(shape) -> np.ndarray:
+def terms_of(shape: Any) -> np.ndarray:
     """The model's terms of a whisk (TERMS); nan where one was not measured."""
     out = np.empty(len(TERMS))
     lib.nav_whisk_terms(shape, doubles(out, "terms", (len(TERMS),)))

@@ -1,6 +1,7 @@
 """Radial distance from whole whisks: the model of one whisker (host/nav/touch/radial/radial_whisk.h)."""
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -59,7 +60,7 @@ class WhiskModel:
             return getattr(self._c, name)
         raise AttributeError(name)
 
-    def shape_of(self, contact: Contact):
+    def shape_of(self, contact: Contact) -> ffi.CData:
         """struct nav_shape of a contact, its commanded rate as in calibration where it is not known with this one."""
         log_rate = self._c.mean[TERMS.index("rate")]
         rate = contact.whisk_rad_s
@@ -75,7 +76,7 @@ class WhiskModel:
         rate = whisk_rad_s if abs(self._c.mean[TERMS.index("rate")]) < LOG_RATE_NONE else 1.0
         return math.exp(self._c.log_gain - self._c.mean[turn]) / rate
 
-    def along(self, deflection) -> np.ndarray:
+    def along(self, deflection: np.ndarray) -> np.ndarray:
         """Deflections (n, axes), counts, as a signed length (n,) along the direction of calibration."""
         return np.asarray(deflection) @ np.array(list(self._c.direction)[: self.axes])
 
@@ -89,7 +90,7 @@ class WhiskModel:
         """h(a): tilt of the plug per angle pushed at this radius."""
         return math.exp(lib.nav_whisk_height(self._c.kappa, self._c.cone_mm, radius_mm))
 
-    def share_of(self, shape) -> float:
+    def share_of(self, shape: Any) -> float:
         """What `share` gives for a radius, as a whisk shows it; negative: bent away from the direction of calibration; nan: no whole whisk."""
         if shape.quality != lib.NAV_SHAPE_WHOLE or not (shape.turn > 0 and shape.peak > 0):
             return math.nan
@@ -97,14 +98,14 @@ class WhiskModel:
         size = math.exp(math.log(shape.peak) - self._c.log_gain - turned)
         return math.copysign(size, self.along([list(shape.direction)[: self.axes]])[0])
 
-    def estimate(self, shape):
+    def estimate(self, shape: Any) -> ffi.CData:
         """struct nav_whisk_estimate of a whisk."""
         out = ffi.new("struct nav_whisk_estimate *")
         lib.nav_whisk_estimate(self._c, shape, out)
         return out
 
     @classmethod
-    def fit(cls, shapes: list, radius_mm, axes: int) -> "WhiskModel":
+    def fit(cls, shapes: list, radius_mm: np.ndarray, axes: int) -> "WhiskModel":
         """Fits a model to shapes of contacts at known radii; ValueError when too few are usable or all at one radius."""
         radii = np.asarray(radius_mm, np.float64)
         use = [

@@ -38,7 +38,7 @@ class Change:
     ARRAYS = {"floor": 1} | {f"{at}{n}": d for at in ("", "edge_") for n, d in RULE.items()}
     NUMBERS = ("length", "share", "limit")
 
-    def native(self):
+    def native(self) -> ffi.CData:
         """A detector of its own, with nothing held; ValueError when a size or number is impossible."""
         features, classes = feature_count(self.floor, self.length, False), len(self.bias)
         shapes = {"steady": (features, classes), "apart": (classes, classes), "weight": (features, classes)}

@@ -1,6 +1,7 @@
 """The classifier for windows of one length: numbers in NumPy, arithmetic in C (host/nav/touch/texture/texture_classifier.h)."""
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -35,7 +36,7 @@ class Classifier:
     NUMBERS = ("length", "levels", "shorter", "hidden", "temper", "seed")
 
     @property
-    def native(self):
+    def native(self) -> ffi.CData:
         """The C classifier; ValueError when the sizes do not fit each other or a number is impossible."""
         if self._made is None:
             self._made = self._make()
@@ -62,13 +63,13 @@ class Classifier:
         return out
 
 
-def pointers(part, where: str, shapes: dict[str, tuple]) -> dict:
+def pointers(part: Any, where: str, shapes: dict[str, tuple]) -> dict:
     """A part's arrays for C, by name; ValueError for one of another shape."""
     arrays = {name: as_doubles(getattr(part, name), f"{where}: {name}", shape) for name, shape in shapes.items()}
     return {name: doubles(array, name, shapes[name]) for name, array in arrays.items()}
 
 
-def made(kind: str, numbers: dict, where: str):
+def made(kind: str, numbers: dict, where: str) -> ffi.CData:
     """A nav_texture_`kind` of its numbers, which it copies; ValueError when a size or number is impossible."""
     found = getattr(lib, f"nav_texture_{kind}_new")(ffi.new(f"struct nav_texture_{kind}_numbers *", numbers))
     if found == ffi.NULL:

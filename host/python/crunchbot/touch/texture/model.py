@@ -4,8 +4,10 @@ import json
 from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ...fields import Fields
 from ...files import UnreadableError, read_json
@@ -32,7 +34,7 @@ RATES_APART = 0.1  # relative: recordings to be learnt together are sampled alik
 class TextureModel:
     """One whisker's model: class names in order, rest and bins by axis, log P(x|T) by class, axis and bin."""
 
-    def __init__(self, classes: list[str], rest, low, high, table: np.ndarray):
+    def __init__(self, classes: list[str], rest: ArrayLike, low: ArrayLike, high: ArrayLike, table: np.ndarray):
         """rest, low, high: one number per axis, counts (low and high relative to rest); table (classes, axes, bins)."""
         self.classes, self.table = list(classes), table
         self.rest = np.atleast_1d(np.asarray(rest, dtype=np.float64))
@@ -42,7 +44,9 @@ class TextureModel:
             raise ValueError("texture model: every range needs low < high")
 
     @classmethod
-    def train(cls, recordings: dict[str, list[np.ndarray]], rest=None, bins: int = BINS) -> "TextureModel":
+    def train(
+        cls, recordings: dict[str, list[np.ndarray]], rest: ArrayLike | None = None, bins: int = BINS
+    ) -> "TextureModel":
         """Learn from raw counts, arrays (n, axes) by class. `rest`: by axis; default the median of all training data."""
         recordings = {name: [_counts(r, "recording") for r in group] for name, group in recordings.items()}
         widths = {r.shape[1] for group in recordings.values() for r in group}
@@ -68,20 +72,20 @@ class TextureModel:
         places = np.clip((samples - self.low) * (bins / (self.high - self.low)), 0, bins - 1).astype(int)
         return np.array([np.bincount(axis, minlength=bins) for axis in places.T])
 
-    def loglik(self, window: np.ndarray, rest=None) -> np.ndarray:
+    def loglik(self, window: np.ndarray, rest: ArrayLike | None = None) -> np.ndarray:
         """Equation 1: log-likelihood of the window (n, axes) of raw counts by class. `rest`: default the model's."""
         rest = self.rest if rest is None else as_doubles(rest, "rest", (self.channels,))
         histogram = self._histogram(_counts(window, "window", self.channels), rest)
         return self.table.reshape(len(self.classes), -1) @ histogram.ravel()
 
-    def save(self, path) -> None:
+    def save(self, path: str | Path) -> None:
         content = {"format": FORMAT, "classes": self.classes}
         content |= {key: getattr(self, key).tolist() for key in ("rest", "low", "high")}
         content["loglik"] = np.round(self.table, 6).tolist()
         Path(path).write_text(json.dumps(content) + "\n")
 
     @classmethod
-    def from_json(cls, path, content: object) -> "TextureModel":
+    def from_json(cls, path: str | Path, content: object) -> "TextureModel":
         """What `save` wrote, parsed; TableError with one line when it is something else."""
         try:
             return cls._of(Fields(content))
@@ -103,7 +107,7 @@ class TextureModel:
         return len(self.low)
 
 
-def load(path) -> "TextureModel | SpectralModel":
+def load(path: str | Path) -> "TextureModel | SpectralModel":
     """A model of either method, as its format says."""
     try:
         content = read_json(path)
@@ -132,7 +136,9 @@ def posterior(loglik: np.ndarray, temper: float = TEMPER) -> np.ndarray:
     return weight / weight.sum()
 
 
-def classify(model, t_s: np.ndarray, samples: np.ndarray, window_ms: float = 100.0, sequential=False) -> list[Decision]:
+def classify(
+    model: Any, t_s: np.ndarray, samples: np.ndarray, window_ms: float = 100.0, sequential: bool = False
+) -> list[Decision]:
     """Decide window by window, or as soon as sure: t_s (n,), samples (n, axes) of raw counts.
 
     A last, shorter window is left out, and none reaches across a gap of the time column.
@@ -183,7 +189,7 @@ def _decide(model: TextureModel, t_s: float, window: np.ndarray) -> Decision:
     return Decision(t_s, by_class, best, best, float(chance.max()), bool(border))
 
 
-def channel_names(path) -> list[str]:
+def channel_names(path: str | Path) -> list[str]:
     """The columns of a CSV recording beside t_s, in order; TableError without any."""
     return _channels(path, read_columns(path, required=["t_s"]))
 
@@ -195,7 +201,9 @@ def _channels(path, columns) -> list[str]:
     return channels
 
 
-def read_recording(path, order: list[str] | None = None, warn: Warn = ignore) -> tuple[np.ndarray, np.ndarray]:
+def read_recording(
+    path: str | Path, order: list[str] | None = None, warn: Warn = ignore
+) -> tuple[np.ndarray, np.ndarray]:
     """One CSV recording -> t_s (n,), channels (n, axes). TableError for the channels of `order` in another order.
 
     `warn(line)` is called with each fault that does not keep it from being read."""
@@ -213,7 +221,7 @@ def read_recording(path, order: list[str] | None = None, warn: Warn = ignore) ->
     return t_s, samples
 
 
-def read_training(path, warn: Warn = ignore) -> tuple[dict[str, list[np.ndarray]], float]:
+def read_training(path: str | Path, warn: Warn = ignore) -> tuple[dict[str, list[np.ndarray]], float]:
     """One folder per surface, one CSV per recording -> channels by class, and the sampling rate (Hz).
 
     `warn(line)` is called with each fault of a recording that training goes on in spite of."""
@@ -256,7 +264,7 @@ def _a_letter_apart(one: str, other: str) -> bool:
     return len(apart) == 1 or (len(apart) == 2 and apart[0] == apart[1][::-1])
 
 
-def surface_files(path) -> dict[str, list[Path]]:
+def surface_files(path: str | Path) -> dict[str, list[Path]]:
     """The CSV recordings of each surface's folder, by its name; hidden folders and files are left out.
 
     TableError for a folder without recordings, and for two that differ in upper and lower case only.

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...native import as_doubles, doubles, lib
+from ...native import as_doubles, doubles, ffi, lib
 from .classifier import made, pointers
 
 SHRINK = 0.3  # share of the diagonal in the covariance of windows within a recording
@@ -32,7 +32,7 @@ class Novelty:
     ARRAYS = {"turn": 2, "mean": 2, "recording": 2, "noise": 1, "limit": 1}  # and their dimensions
     NUMBERS = ("length", "scale")
 
-    def native(self):
+    def native(self) -> ffi.CData:
         """A detector of its own, that has seen no window; ValueError when a size or number is impossible."""
         rows, features = as_doubles(self.mean, "novelty: mean", (None, None)).shape
         shapes = {"turn": (features, features), "mean": (rows, features), "recording": (rows, features)}

@@ -88,7 +88,7 @@ class SpectralModel:
         found = self.stream(window, step, 4 * window if sequential else 0).push(samples)
         return [d for d in found if notices or not d.notice]
 
-    def save(self, path) -> None:
+    def save(self, path: str | Path) -> None:
         content = {"format": FORMAT, "classes": self.classes, "rate_hz": self.rate_hz, "window_ms": self.window_ms}
         content |= {name: getattr(self, name) for name in ("temper", "doubt", "hazard", "columns", "figures")}
         content["limits"] = {name: _listed(self.limits[name]) for name in LIMITS}
@@ -109,7 +109,7 @@ class SpectralModel:
             raise ValueError("limits and classifiers differ in channels")
 
     @classmethod
-    def from_json(cls, path, content: object) -> "SpectralModel":
+    def from_json(cls, path: str | Path, content: object) -> "SpectralModel":
         """What `save` wrote; TableError with one line when it is something else."""
         try:
             return cls._of(Fields(content))
@@ -139,7 +139,7 @@ class SpectralModel:
         return model
 
 
-def no_model(path, error: Exception) -> TableError:
+def no_model(path: str | Path, error: Exception) -> TableError:
     return TableError(path, None, f"no texture model: {error}; make one with 'whisker texture train'")
 
 
