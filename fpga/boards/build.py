@@ -278,16 +278,23 @@ def named(bitstream: Path, usb_id: str | None) -> Path:
     return bitstream if usb_id else bitstream.replace(bitstream.with_stem(f"{bitstream.stem}-testid"))
 
 
+def step(text: str) -> None:
+    """What takes long is announced on standard error; standard output holds the results."""
+    print(f"bitstream: {text}", file=sys.stderr, flush=True)
+
+
 def make(board: Board, lanes: int, out: Path, seeds: list[int], serial: str, usb_id: str | None) -> Path:
     """All steps, placed with one seed after another until one meets the clock and the PHY's limits; ToolError if none does."""
+    step(f"{board.title}: synthesis of {lanes} lanes, one to three minutes; log: {out / 'synth.log'}")
     netlist = prepare(board, lanes, out, serial, usb_id)
     for seed in seeds:
+        step(f"place and route, seed {seed}, one to five minutes; log: {out / f'place_{seed}.log'}")
         placed = place(board, lanes, netlist, out, seed)
         print(summary(board, seed, placed), flush=True)
         problems = report.timing_problems(placed, board.speed, board.phy)
         if not problems:
             return named(pack(board, out), usb_id)
-        print(f"bitstream: seed {seed} misses: {'; '.join(problems)}", file=sys.stderr, flush=True)
+        step(f"seed {seed} misses: {'; '.join(problems)}")
     raise ToolError(
         f"{board.title} with {lanes} lanes: none of the seeds {seeds[0]} to {seeds[-1]} meets the limits; try others"
     )

@@ -241,7 +241,9 @@ def test_the_build_tries_seeds_until_one_does(tmp_path, monkeypatch, capfd):
     assert build.make(board, 6, tmp_path, [1, 2, 3, 4], "0001", "1d50:6000") == tmp_path / "packed"
     said = capfd.readouterr()
     assert "seed 3: 70.0 MHz" in said.out and "seed 4" not in said.out
-    assert [line[:24] for line in said.err.splitlines()] == ["bitstream: seed 1 misses", "bitstream: seed 2 misses"]
+    steps = [line.removeprefix("bitstream: ").split(",")[0].split(":")[0] for line in said.err.splitlines()]
+    tried = ["place and route", "seed 1 misses", "place and route", "seed 2 misses", "place and route"]
+    assert steps == [board.title, *tried]
     with pytest.raises(ToolError, match="none of the seeds 1 to 2"):
         build.make(board, 6, tmp_path, [1, 2], "0001", "1d50:6000")
 

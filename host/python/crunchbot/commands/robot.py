@@ -9,6 +9,7 @@ from .. import scene as scenes
 from ..arguments import RING, add_zenoh_config, number_above, whole_number
 from ..errors import UserError
 from ..lab import import_lab
+from ..progress import bar
 from ..robot.models import load_models
 from ..robot.network.link import read_config
 from ..robot.network.options import link_that_warns
@@ -153,9 +154,12 @@ def _simulated(arguments, meeting: parts.Meeting) -> tuple[parts.Body, parts.Sim
     (out / "scene.flat").write_text(scene.flat(start))
     models = arguments.models or out / "models"
     if arguments.models is None and not (models / "texture.json").exists():
-        training = import_lab("demo.training", user)
-        print("learning textures and distances of this robot: half a minute", flush=True)
-        training.learn(models, scene, seed, lambda: None)
+        kept = import_lab("demo.kept_models", user)
+        models_wanted = 1 + len(scene.robot.of_role("object"))
+        print("learning textures and distances of this robot, or copying what was learnt before", flush=True)
+        with bar(total=models_wanted, desc="models", unit="model", disable=None) as done:
+            result = kept.learn_or_copy(models, scene, seed, lambda: done.update(1))
+        print(f"models: {result}", flush=True)
     body = parts.Body(folder, models, arguments.create, meeting.serial, seed)
     reported = (arguments.level, seed, arguments.seconds, arguments.pace, out / "truth.csv", out / "wheels.csv")
     return body, parts.Simulated(out / "scene.flat", *reported)

@@ -2,6 +2,7 @@
 
 import sys
 
+from .. import __version__
 from ..arguments import Parser
 from ..ends import exit_code
 from .command import EXAMPLE, add
@@ -16,6 +17,7 @@ def _run(argv: list[str] | None) -> int:
         prog="whisker-view", description="Serves a local page of a ring: traces, loss, health. Prints its address."
     )
     parser.show_example(EXAMPLE)
+    parser.add_argument("--version", action="version", version=f"whisker-view {__version__}")
     add(parser)
     arguments = parser.parse_args(argv)
     return arguments.run(arguments)

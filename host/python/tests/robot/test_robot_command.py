@@ -39,6 +39,12 @@ with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as server:
 """
 
 
+@pytest.fixture(autouse=True)
+def _own_cache(monkeypatch, tmp_path):
+    """Models that other tests or the user kept are not this test's."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+
+
 def free_port() -> str:
     return free_endpoint().rpartition(":")[2]
 
@@ -134,13 +140,17 @@ def test_a_simulated_robot_learns_once_and_nothing_where_models_are_given(capsys
     def learn(models, *_):
         learnt.append(models)
         models.mkdir(exist_ok=True)
-        (models / "texture.json").touch()
+        (models / "texture.json").write_text(f"{len(learnt)}")
 
     monkeypatch.setattr("crunchbot_lab.demo.training.learn", learn)
     common = ["robot", "--simulated", "--out", tmp_path / "out", "--first-port"]
     for options in ([], [], ["--models", tmp_path / "out/models"], ["--models", tmp_path]):
         run(capsys, *common, free_port(), *options)
     assert learnt == [tmp_path / "out/models"]
+    run(capsys, "robot", "--simulated", "--out", tmp_path / "again", "--first-port", free_port())
+    assert len(learnt) == 1 and (tmp_path / "again/models/texture.json").read_text() == "1"
+    run(capsys, "robot", "--simulated", "--seed", 2, "--out", tmp_path / "other", "--first-port", free_port())
+    assert len(learnt) == 2 and (tmp_path / "other/models/texture.json").read_text() == "2"
 
 
 @pytest.fixture

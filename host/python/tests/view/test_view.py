@@ -18,6 +18,7 @@ from rings import ring_name
 from viewkit import NODES, PATIENCE_S, Block, made_frames, nothing_logged, page, ring_of, spoil, view_of
 from websockets.exceptions import ConnectionClosed
 
+from crunchbot import __version__
 from crunchbot.bridge.ring import Clock, Writer
 from crunchbot.cli import main as whisker_main
 from crunchbot.view.__main__ import main
@@ -417,3 +418,9 @@ def test_the_program_serves_prints_its_address_and_ends_at_sigterm():
             process.send_signal(signal.SIGTERM)
             assert process.wait(PATIENCE_S) == 0
             assert process.stderr.read() == ""
+
+
+def test_the_program_states_its_version(capsys):
+    with pytest.raises(SystemExit) as end:
+        main(["--version"])
+    assert end.value.code == 0 and capsys.readouterr().out == f"whisker-view {__version__}\n"
