@@ -6,7 +6,7 @@ BUILD := build/release
 PYTHON := .venv/bin/python
 SOURCES_C = $(shell git ls-files '*.c' '*.h' '*.cpp' | grep -v '/gen/')
 
-.PHONY: help demo demo-long test test-all test-kernel test-hil mutants bench wheels wheels-check release release-check sbom build setup abi gen firmware firmware-images firmware-check flash bitstream format lint clean
+.PHONY: help demo demo-long test test-all test-kernel test-hil mutants bench wheels wheels-check release release-check sbom build setup abi example-data gen firmware firmware-images firmware-check flash bitstream format lint clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
@@ -56,6 +56,9 @@ build: setup ## compile libraries, daemon, firmware core, simulated bridge and t
 
 setup: ## install what is missing: Debian packages, locked Python packages
 	@tools/setup.sh
+
+example-data: build ## make the data set of `whisker examples` again: host/python/crunchbot/data
+	@$(PYTHON) tools/example_data.py
 
 abi: build ## write the binary interface of the libraries again, after a change on purpose: host/abi
 	@for library in libwhisker/libwhisker nav/libwhisker-nav create/libwhisker-create; do \

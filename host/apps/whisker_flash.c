@@ -69,7 +69,7 @@ static const struct command_line LINE = {
         "       whisker-flash --list [--health]\n"
         "Loads a firmware image (.whex) into all nodes of a bridge at once and starts it. Stop whiskerd first.\n"
         "A gateware image (.wgw) goes into the bridge itself; of the options it takes --dry-run, --force, --bridge.\n",
-    .notes = "Example: whisker-flash node-0.2.whex\n"
+    .notes = "Example: whisker-flash examples/node.whex\n"
              "Exit code: 0 every node has it, 1 failed for some or all, 2 wrong use.\n",
     .option = OPTIONS,
     .count = sizeof OPTIONS / sizeof *OPTIONS,

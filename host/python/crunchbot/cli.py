@@ -17,6 +17,7 @@ from .lab import import_lab
 
 # name (its module has underscores for dashes): what it does
 COMMANDS = {
+    "examples": "a small data set, with which every example works",
     "info": "what ring, daemon and bridge say of themselves",
     "top": "lanes, rates and losses in the terminal",
     "view": "traces, losses and health in a browser; the same as whisker-view",

@@ -16,7 +16,7 @@ from crunchbot.tables import TableError, unwritable
 
 from ..scenes import benchmark, write_scene
 
-EXAMPLE = "whisker bench touch --scene anchor+global --estimate est.csv"
+EXAMPLE = "whisker bench touch --scene anchor+global --filter adaptive"
 COLUMNS = (  # title, key of the figure, factor, format
     ("near %", "near_share", 100, "5.1f"),
     ("after 20 cm %", "near_share_after_20cm", 100, "5.1f"),

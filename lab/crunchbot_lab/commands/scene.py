@@ -22,7 +22,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     p.add_argument("--steps", type=int, metavar="N", help="rows of 0.1 s (default: the family's)")
     p.add_argument("--out", metavar="DIR", help="folder to write")
     p.add_argument("--list-families", action="store_true", help="print bases and modifiers and leave")
-    example = "whisker scene from build/demo --out scenes/demo"
+    example = "whisker scene from robot-run/robot.mcap --out scenes/run"
     p = add_action(actions, "from", "make a scene of a run's recording", example, from_recording)
     p.add_argument(
         "kind",
@@ -32,7 +32,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     p.add_argument("recording", help="folder that a run left, as build/demo, a robot's bag, or a Thymio's recording")
     p.add_argument("--out", required=True, metavar="DIR", help="folder to write")
-    example = "whisker scene map scenes/home home.yaml --out scenes/mapped"
+    example = "whisker scene map examples/scene examples/home.yaml --out scenes/mapped"
     text = "put an occupancy map into a scene folder, for all commands that take one"
     p = add_action(actions, "map", text, example, with_map)
     p.add_argument(

@@ -10,7 +10,7 @@ from ..robot.bag import RECORD, Bag, metadata
 from ..robot.network.options import NAVIGATOR_ENDPOINT, PILOT_ENDPOINT, add_link, open_link
 from ..stopping import stop_on_signals
 
-EXAMPLE = "whisker bag run.mcap --scene SCENE"
+EXAMPLE = "whisker bag run.mcap --scene robot-run/scene"
 
 
 def add(parser: argparse.ArgumentParser) -> None:

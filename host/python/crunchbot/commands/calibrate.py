@@ -28,7 +28,7 @@ from ..touch.calibration import (
 )
 from ..touch.radial.model import Contact, fit, read_whisks, shape_of
 
-EXAMPLE = "whisker calibrate --out calibration --lane 2 --radii 90,100,110,120,130 --repeats 5"
+EXAMPLE = "whisker calibrate --out calibration"
 
 
 def add(parser: argparse.ArgumentParser) -> None:

@@ -5,7 +5,7 @@ import os
 
 from ..programs import program
 
-EXAMPLE = "whisker flash node-0.2.whex"
+EXAMPLE = "whisker flash examples/node.whex"
 
 
 def add(parser: argparse.ArgumentParser) -> None:

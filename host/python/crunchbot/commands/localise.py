@@ -9,7 +9,7 @@ from ..nav.localise import SettingError
 from ..occupancy import from_map
 from ..scene import PRIOR, SceneError, load
 
-EXAMPLE = "whisker localise scenes/paper --filter grid --set grid.cell_m=0.1 --out est.csv --json"
+EXAMPLE = "whisker localise examples/scene --filter grid --set grid.cell_m=0.1 --out est.csv --json"
 
 
 def add(parser: argparse.ArgumentParser) -> None:

@@ -29,7 +29,7 @@ from ..robot.wheels import RETRY_S, IdealWheels, LiveBase, SteppedBase, wheels_o
 from ..scene import load
 from ..stopping import stop_on_signals
 
-EXAMPLE = "whisker pilot SCENE --models MODELS --base /run/user/1000/base"
+EXAMPLE = "whisker pilot robot-run/scene --models robot-run/models --base base.sock"
 RING_WAIT_S = 10.0  # for the ring of a simulation that waits for us
 OTHERS_WAIT_S = 60.0
 GREETING_S = 10.0  # a live pilot goes on without them

@@ -11,7 +11,7 @@ from ..tables import TableError, unwritable
 from ..touch.contact_filter import ContactFilter, Reports
 from ..touch.radial import model as radial
 
-EXAMPLE = "whisker radial fit contacts.csv --out model.json"
+EXAMPLE = "whisker radial fit examples/contacts.csv --out model.json"
 COLUMNS = "whisk_rad_s and base_rad_s, or push_mm_s, or depth_mm; direction_deg of the touch"
 DOUBTED, DOUBTED_LEAST = 0.5, 3  # confidence; fewer contacts say nothing of the whisker
 KINDS = """paper or linear: equation 3, a line through the peaks; quadratic, rational: a curve instead; whisk: whole body
@@ -25,14 +25,14 @@ def add(parser: argparse.ArgumentParser) -> None:
     p.add_argument("contacts", help="CSV: contact, radius_mm, t_s, channels; where known " + COLUMNS)
     p.add_argument("--out", required=True, metavar="MODEL.JSON")
     p.add_argument("--model", choices=radial.MODELS, default="default", help=KINDS)
-    example = "whisker radial predict model.json contacts.csv --json"
+    example = "whisker radial predict examples/radial.json examples/contacts.csv --json"
     p = add_action(actions, "predict", "tell the radius of each contact", example, predict)
     p.add_argument("model")
     p.add_argument("contacts", help="CSV as for fit; radius_mm is not read and may be absent")
     p.add_argument("--json", action="store_true", help="one object per line and contact")
     text = "a press model's answers as each contact grows, one line for every tenth of its samples"
     p.add_argument("--during", action="store_true", help=text)
-    example = "whisker radial follow model.json contacts.csv --json"
+    example = "whisker radial follow examples/whisk.json examples/contacts.csv --json"
     p = add_action(actions, "follow", "tell where each contact is while it is pressed", example, follow)
     p.add_argument("model", help="of whole whisks: 'whisker radial fit --model whisk'")
     p.add_argument("contacts", help="CSV as for fit, with whisk_rad_s or push_mm_s; radius_mm is not read")

@@ -8,7 +8,7 @@ from ..recording import read
 from ..recording.replay import Replay
 from ..stopping import stop_on_signals
 
-EXAMPLE = "whisker replay drive.mcap --speed 2 --ring replayed"
+EXAMPLE = "whisker replay examples/drive.mcap --speed 2 --ring replayed"
 
 
 def add(parser: argparse.ArgumentParser) -> None:

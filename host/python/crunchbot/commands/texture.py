@@ -15,7 +15,7 @@ from ..touch.texture import train as texture_train
 from ..touch.texture.spectral import HAZARD, HAZARD_LEAST
 
 METHODS = "default: spectra, calibrated on recordings held out; naive-bayes: the paper's equation 1"
-EXAMPLE = "whisker texture train recordings --out model.json"
+EXAMPLE = "whisker texture train examples/surfaces --out model.json"
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -28,7 +28,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     text = "of a drive, with --tile-m: how often the surface changes; default: once in fifty windows"
     p.add_argument("--speed-m-s", type=float, help=text)
     p.add_argument("--tile-m", type=float, help="length of one surface along a drive, with --speed-m-s")
-    example = "whisker texture classify model.json drive.csv --window-ms 100 --json"
+    example = "whisker texture classify examples/texture.json examples/surfaces/ROUGH/1.csv --window-ms 100 --json"
     p = add_action(actions, "classify", "tell the surface window by window", example, classify)
     p.add_argument("model")
     p.add_argument("recording", help="a CSV file, or a folder as for 'train': then a confusion matrix")
