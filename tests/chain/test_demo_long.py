@@ -48,7 +48,7 @@ def test_a_short_run_at_level_1_leaves_its_summary_and_its_page(tmp_path, monkey
     assert 1 <= summary["tiles_visited"] <= summary["tiles"] <= 25
     page = (out / "report.html").read_text()
     assert "foveal (eqs. 5-7)" in page
-    assert page.count("<svg") == 3
+    assert page.count("<svg") == 6, "three figures, wide and narrow"
 
 
 def test_a_folder_of_somebody_elses_is_not_touched(tmp_path, capsys):

@@ -5,12 +5,12 @@ A chart is an SVG file: it is text, the same data give the same file, and git st
 """
 
 import json
-import os
-import subprocess
 from pathlib import Path
 
 import matplotlib
 from matplotlib.figure import Figure
+
+from crunchbot_lab.report.origin import commit, machine
 
 from .markdown import wrap
 
@@ -91,24 +91,6 @@ def record_origin(name: str, folder: Path = RESULTS) -> None:
     origins = json.loads(path.read_text()) if path.exists() else {}
     origins[name] = {"commit": commit(), "machine": machine()}
     path.write_text(json.dumps(dict(sorted(origins.items())), indent=1) + "\n")
-
-
-def commit() -> str:
-    """The commit of this tree; says so if tracked files differ from it, but for results and pages."""
-    changes = ("status", "--porcelain", "--untracked-files=no", "--", ".", ":!bench/results", ":!docs")
-    words = (("rev-parse", "--short=12", "HEAD"), changes)
-    done = [subprocess.run(["git", "-C", ROOT, *w], capture_output=True, text=True, check=False) for w in words]
-    if done[0].returncode:
-        return "not recorded"
-    return done[0].stdout.strip() + (", changed" if done[1].stdout.strip() else "")
-
-
-def machine() -> str:
-    """Model and number of the processors, and the load of the last five minutes."""
-    lines = Path("/proc/cpuinfo").read_text().splitlines()
-    models = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
-    processors, load = len(os.sched_getaffinity(0)), os.getloadavg()[1]
-    return f"{models[0] if models else 'unknown processor'}, {processors} processors, load {load:.1f}"
 
 
 def write_chart(name: str, drawn: Figure | str, folder: Path = CHARTS) -> None:

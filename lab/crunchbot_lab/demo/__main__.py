@@ -17,11 +17,12 @@ from crunchbot.nav import localise
 from crunchbot.stopping import interrupt_on_signals
 from crunchbot.tables import TableError
 
-from ..report import write_report
+from ..report import origin, write_report
 from ..report.run import FILTERS
 from ..simulation.scenes import MECHANICS, make_scene
 from . import summary as scores
 from .chain import ChainError, ChainRun, Link, run_chain
+from .study import study
 from .training import METHODS, learn, radial_scores, write_radial_points
 
 TICKS_PER_S = 2000
@@ -31,6 +32,9 @@ MARK = "demo.txt"
 def parse(argv: list[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m crunchbot_lab.demo", description=__doc__)
     add_run_options(parser, Path("build/demo"), 60.0)
+    parser.add_argument(
+        "--spread", type=int, default=8, help="seeds from this one on that are replayed without bits (%(default)s)"
+    )
     return parser.parse_args(argv)
 
 
@@ -87,6 +91,7 @@ def demonstrate(options: argparse.Namespace) -> None:
     results |= learn_models(out, scene, options)
     results |= run(out, options)
     results |= judge(out, scene)
+    replay_seeds(out, scene, options)
     results["wall_s"] = time.monotonic() - began
     write_summary(out, results)
     report = write_report(out)
@@ -103,6 +108,25 @@ def prepare(options: argparse.Namespace) -> tuple[Path, scenes.Scene, tuple[floa
     return out, scene, start
 
 
+def replay_seeds(out: Path, scene: scenes.Scene, options: argparse.Namespace) -> None:
+    """seeds.csv: median position errors in other arenas, of the same whiskers and models, at level 1."""
+    seeds = range(options.seed, options.seed + options.spread)
+    rows = []
+    for seed in tqdm(seeds, desc="other seeds, signals", unit="seed"):
+        found = study(seed, options.seconds, out / "models", options.mechanics, scene.simulated)
+        keys = {name: "pose_error_median_m" if name == "grid" else f"{name}_error_median_m" for name in FILTERS}
+        rows.append({"seed": seed} | {f"{name}_m": found[key] for name, key in keys.items()})
+    write_dicts(out / "seeds.csv", ["seed", *(f"{name}_m" for name in FILTERS)], rows)
+
+
+def write_dicts(path: Path, header: list[str], rows: list[dict]) -> None:
+    """A CSV file of rows by column."""
+    with open(path, "w", newline="") as file:
+        writer = csv.DictWriter(file, header, lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+
+
 def write_summary(out: Path, results: dict) -> None:
     """summary.json, with six decimals."""
     (out / "summary.json").write_text(json.dumps(scores.rounded(results), indent=1) + "\n")
@@ -116,6 +140,7 @@ def fresh_folder(path: Path) -> Path:
         shutil.rmtree(path)
     path.mkdir(parents=True)
     (path / MARK).write_text("Written by python -m crunchbot_lab.demo, which may remove this folder.\n")
+    (path / "origin.json").write_text(json.dumps(origin.of_this_run(), indent=1) + "\n")
     return path
 
 

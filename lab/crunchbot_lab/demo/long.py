@@ -7,7 +7,6 @@ processes, as in the demo). Leaves in the folder what the demo leaves (radial co
 """
 
 import argparse
-import csv
 import json
 import math
 import sys
@@ -40,6 +39,7 @@ from .__main__ import (
     prepare,
     read_poses,
     run,
+    write_dicts,
     write_summary,
 )
 from .level1 import explore
@@ -98,8 +98,9 @@ def explore_signals(
 
         rows, truth = explore(scene, start, pilot, options.seed, ticks, on_block=on_block)
     path = localise.observations_path(out / "scene")
-    write_dicts(path, [{key: cell(value) for key, value in row.items()} for row in rows])
-    write_dicts(out / "truth.csv", truth)
+    cells = [{key: cell(value) for key, value in row.items()} for row in rows]
+    write_dicts(path, list(cells[0]), cells)
+    write_dicts(out / "truth.csv", list(truth[0]), truth)
     observations = localise.read_observations(path, scene)
     for name in tqdm(FILTERS, desc="filters", unit="filter"):
         localise.write_estimates(out / f"est_{name}.csv", localise.run(name, scene, observations), observations)
@@ -120,14 +121,6 @@ class Onsets:
         for lane, contact in self._contacts.items():
             self.count += contact.onset != self._seen[lane]
             self._seen[lane] = contact.onset
-
-
-def write_dicts(path: Path, rows: list[dict]) -> None:
-    """A CSV file with the first row's keys as its header."""
-    with open(path, "w", newline="") as file:
-        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
 
 
 def long_scores(out: Path, name: str) -> dict:

@@ -6,6 +6,7 @@ python -m crunchbot_lab.demo.study --seeds 1 2 3
 import argparse
 import sys
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -23,9 +24,15 @@ from .summary import pose_scores, rounded, texture_scores
 from .training import METHODS, learn, radial_scores
 
 
-def study(seed: int, seconds: float, models: Path, mechanics: str = MECHANICS[0]) -> dict:
-    """The navigation and texture figures of the summary for one seed, from a level-1 run with the models in a folder."""
+def study(
+    seed: int, seconds: float, models: Path, mechanics: str = MECHANICS[0], whiskers: tuple[str, ...] | None = None
+) -> dict:
+    """The navigation and texture figures of the summary for one seed, from a level-1 run with the models in a folder.
+
+    whiskers: what the simulated world is given of them (`Scene.simulated`), if they are not the seed's own.
+    """
     scene, start = make_scene(seed, mechanics)
+    scene = scene if whiskers is None else replace(scene, simulated=whiskers)
     pilot = Pilot(scene.robot, *load_models(models, scene.robot), seed)
     rows, truth = explore(scene, start, pilot, seed, round(seconds * 2000))
     poses = np.array([[row[key] for key in ("x_m", "y_m", "theta_rad")] for row in truth])

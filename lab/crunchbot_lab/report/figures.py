@@ -1,4 +1,7 @@
-"""The report's figures, to be drawn by `svg`. Line style and marker tell the curves apart in grey; colour only helps."""
+"""The report's figures, to be drawn by `svg`. Line style and marker tell the curves apart in grey; colour only helps.
+
+Each is drawn wide, or narrow for a telephone: the same panels below each other, with text of the same size.
+"""
 
 import io
 from collections.abc import Callable
@@ -19,8 +22,8 @@ STYLES = {
     "foveal": {"color": "#c25700", "linestyle": "--", "marker": "^"},
     "odometry": {"color": "#6b6b6b", "linestyle": ":", "marker": "s"},
 }
-SHADES = ("#ffffff", "#dcdcdc", "#b4b4b4")
-HATCHES = ("", "", "....")
+HATCHES = ("", "....", "////")  # of textures, as the live page draws them
+WIDE_IN, NARROW_IN = 11.4, 4.6
 SETTINGS = {
     "font.family": "sans-serif",
     "font.size": 9.5,
@@ -28,14 +31,20 @@ SETTINGS = {
     "axes.spines.right": False,
     "svg.fonttype": "none",
     "legend.frameon": False,
-    "hatch.linewidth": 0.4,
-    "hatch.color": "#8a8a8a",
+    "hatch.linewidth": 0.5,
+    "hatch.color": "#aab2bc",
 }
 
 
-def arena(run: Run) -> Figure:
+def sized(wide_high: float, narrow_high: float, narrow: bool) -> Figure:
+    """An empty figure of these heights, inches."""
+    size = (NARROW_IN, narrow_high) if narrow else (WIDE_IN, wide_high)
+    return Figure(figsize=size, layout="constrained")
+
+
+def arena(run: Run, narrow: bool = False) -> Figure:
     """The arena from above: floor, blocks, true path, and each estimate with its two-sigma ellipses."""
-    figure = Figure(figsize=(11.4, 11.2), layout="constrained")
+    figure = sized(11.2, 5.9, narrow)
     panels = figure.subplots(2, len(FILTERS) // 2, sharex=True, sharey=True).ravel()
     for axes, name in zip(panels, FILTERS, strict=True):
         draw_floor(axes, run)
@@ -44,13 +53,13 @@ def arena(run: Run) -> Figure:
         axes.set(xlabel="x (m)", ylabel="y (m)")
         axes.label_outer()
     handles = [*panels[0].get_legend_handles_labels()[0], *_texture_handles(run)]
-    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
+    figure.legend(handles=handles, loc="outside lower center", ncols=2 if narrow else len(handles))
     return figure
 
 
-def texture(run: Run) -> Figure:
+def texture(run: Run, narrow: bool = False) -> Figure:
     """A chart as the paper's Fig. 4: what each floor whisker reported, over its true tile, with the deflection below."""
-    figure = Figure(figsize=(11.4, 5.4), layout="constrained")
+    figure = sized(5.4, 6.4, narrow)
     names = run.texture_names
     panels = figure.subplots(2 * len(names), 1, sharex=True, height_ratios=[3, 2] * len(names))
     for n, name in enumerate(names):
@@ -62,21 +71,22 @@ def texture(run: Run) -> Figure:
     return figure
 
 
-def radial(run: Run) -> Figure:
+def radial(run: Run, narrow: bool = False) -> Figure:
     """A chart as the paper's Fig. 5: peak deflection against radial distance, one panel a whisker, with its fitted line."""
-    figure = Figure(figsize=(11.4, 3.2), layout="constrained")
-    panels = figure.subplots(1, len(run.object_names), sharex=True, sharey=True, squeeze=False)[0]
+    rows = 2 if narrow and len(run.object_names) % 2 == 0 else 1
+    figure = sized(3.2, 5.2, narrow)
+    panels = figure.subplots(rows, len(run.object_names) // rows, sharex=True, sharey=True, squeeze=False).ravel()
     for axes, name in zip(panels, run.object_names, strict=True):
         _draw_contacts(axes, run, name)
-    panels[0].set_ylabel("peak deflection (degrees of field)")
+    figure.supylabel("peak deflection (degrees of field)", fontsize=9.5)
     handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=3)
+    figure.legend(handles, labels, loc="outside lower center", ncols=2 if narrow else 3)
     return figure
 
 
-def errors(run: Run) -> Figure:
+def errors(run: Run, narrow: bool = False) -> Figure:
     """Position and heading error of the estimates over time."""
-    figure = Figure(figsize=(11.4, 4.6), layout="constrained")
+    figure = sized(4.6, 5.2, narrow)
     top, bottom = figure.subplots(2, 1, sharex=True)
     seconds = (run.truth["tick"] + 1) * 500e-6
     for name in FILTERS:
@@ -90,7 +100,31 @@ def errors(run: Run) -> Figure:
         axes.set_ylim(bottom=0)
         axes.grid(axis="y", color="#e4e4e4", linewidth=0.6)
     bottom.set_xlim(0, seconds[-1])
-    figure.legend(loc="outside lower center", ncols=len(FILTERS))
+    figure.legend(loc="outside lower center", ncols=2 if narrow else len(FILTERS))
+    return figure
+
+
+def spread(run: Run, narrow: bool = False) -> Figure:
+    """Median position errors of several seeds, a row a filter: each replayed seed, their median, and this run's own."""
+    figure = sized(2.7, 3.4, narrow)
+    axes = figure.subplots()
+    for row, name in enumerate(FILTERS):
+        style, seeds = STYLES[name], run.seeds[f"{name}_m"]
+        labels = ("a replayed seed", "their median", "this run") if row == 0 else (None, None, None)
+        axes.plot(
+            seeds, [row] * len(seeds), style["marker"], color=style["color"], markersize=6,
+            fillstyle="none", linestyle="", label=labels[0],
+        )  # fmt: skip
+        axes.plot(np.median(seeds), row, "|", color="black", markersize=13, markeredgewidth=2.5, label=labels[1])
+        here = np.median(run.position_error(name))
+        axes.plot(here, row + 0.3, "kv", markersize=8, linestyle="", label=labels[2])
+    axes.set_yticks(range(len(FILTERS)), [TITLES[name] for name in FILTERS])
+    axes.set_ylim(len(FILTERS) - 0.4, -0.6)
+    axes.set(xscale="log", xlabel="median position error of a run (m)")
+    axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    axes.xaxis.set_minor_formatter(lambda value, _: f"{value:g}" if f"{value:.0e}"[0] in "25" else "")
+    axes.grid(axis="x", which="both", color="#e4e4e4", linewidth=0.6)
+    figure.legend(loc="outside lower center", ncols=2 if narrow else 3)
     return figure
 
 
@@ -104,17 +138,22 @@ def draw_floor(axes: Any, run: Run) -> None:
             corner = (column * tile, row * tile)
             axes.add_patch(
                 Rectangle(
-                    corner, tile, tile, facecolor=SHADES[shade], hatch=HATCHES[shade], edgecolor="#8a8a8a", linewidth=0
+                    corner, tile, tile, facecolor="white", hatch=_hatch(shade), edgecolor="#aab2bc", linewidth=0.4
                 )
             )
     for block in arena.get("obstacle", []):
         (x0, y0), (x1, y1) = block["min_m"], block["max_m"]
-        axes.add_patch(Rectangle((x0, y0), x1 - x0, y1 - y0, facecolor="#3a3a3a", zorder=2))
+        axes.add_patch(Rectangle((x0, y0), x1 - x0, y1 - y0, facecolor="#c9ced5", edgecolor="black", zorder=2))
     size = arena["size_m"]
     axes.add_patch(Rectangle((0, 0), *size, fill=False, linewidth=2, zorder=3))
     axes.set_aspect("equal")
     axes.set_xlim(-0.05, size[0] + 0.05)
     axes.set_ylim(-0.05, size[1] + 0.05)
+
+
+def _hatch(texture: int) -> str:
+    """Of the nth texture."""
+    return HATCHES[texture % len(HATCHES)]
 
 
 def _draw_paths(axes, run: Run, name: str) -> None:
@@ -158,7 +197,7 @@ def _two_sigma_ellipse(centre, matrix: np.ndarray, colour: str) -> Ellipse:
 def _texture_handles(run: Run) -> list[Patch]:
     names = run.arena["textures"]
     return [
-        Patch(facecolor=SHADES[n], hatch=HATCHES[n], edgecolor="#8a8a8a", linewidth=0.5, label=name)
+        Patch(facecolor="white", hatch=_hatch(n), edgecolor="#aab2bc", linewidth=0.5, label=name)
         for n, name in enumerate(names)
     ]
 
@@ -171,7 +210,7 @@ def _draw_decisions(axes, run: Run, name: str) -> None:
     for first, last in zip([0, *edges], [*edges, len(tiles)], strict=True):
         shade = classes.index(str(tiles[first]))
         span = (seconds[first] - 0.1, seconds[last - 1])
-        axes.axvspan(*span, facecolor=SHADES[shade], hatch=HATCHES[shade], edgecolor="#8a8a8a", linewidth=0)
+        axes.axvspan(*span, facecolor="white", hatch=_hatch(shade), edgecolor="#aab2bc", linewidth=0.4)
     logliks = np.stack([run.observations[f"{name}_{c}"] for c in classes], axis=1)
     read = np.isfinite(logliks).all(axis=1)
     decided = np.argmax(logliks[read], axis=1)
@@ -180,7 +219,7 @@ def _draw_decisions(axes, run: Run, name: str) -> None:
     axes.plot(seconds[read][~right], decided[~right], "x", color="#b00020", markersize=5, markeredgewidth=1.3)
     axes.set_yticks(range(len(classes)), classes)
     axes.set_ylim(-0.6, len(classes) - 0.4)
-    axes.set_title(f"{name}: reported texture ( | agrees with the tile, x does not)", loc="left", fontsize=9.5)
+    axes.set_title(f"{name}: reported ( | agrees with the tile, x does not)", loc="left", fontsize=9.5)
 
 
 def _draw_trace(axes, run: Run, name: str) -> None:
@@ -210,13 +249,10 @@ def _draw_contacts(axes, run: Run, name: str) -> None:
     axes.set_xlabel("radial distance (mm)")
 
 
-def svg(draw: Callable[[Run], Figure], run: Run) -> str:
+def svg(draw: Callable[..., Figure], run: Run, narrow: bool = False) -> str:
     """A figure as an <svg> element; the same data give the same text."""
     text = io.StringIO()
-    with _settings(draw):
-        FigureCanvasSVG(draw(run)).print_svg(text, metadata={"Date": None, "Creator": None})
+    with matplotlib.rc_context(SETTINGS | {"svg.hashsalt": draw.__name__ + ("_narrow" if narrow else "")}):
+        figure = draw(run, narrow=True) if narrow else draw(run)
+        FigureCanvasSVG(figure).print_svg(text, metadata={"Date": None, "Creator": None})
     return "".join(text.getvalue().partition("<svg")[1:])
-
-
-def _settings(draw: Callable):
-    return matplotlib.rc_context(SETTINGS | {"svg.hashsalt": draw.__name__})

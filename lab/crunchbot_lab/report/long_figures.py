@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from .figures import STYLES, TITLES, draw_floor
+from .figures import STYLES, TITLES, draw_floor, sized
 from .run import FILTERS, Run
 
 LOST_M = 0.25  # an estimate further off is lost
@@ -12,11 +12,12 @@ LEAST_M = 1e-3  # of a logarithmic axis
 LOST_STYLE = {"color": "0.3", "linewidth": 0.8, "linestyle": ":"}
 
 
-def path(run: Run) -> Figure:
+def path(run: Run, narrow: bool = False) -> Figure:
     """The true path from above, and where each estimate that is not odometry was lost."""
     names = [name for name in FILTERS if name != "odometry"]
-    figure = Figure(figsize=(11.4, 4.6), layout="constrained")
-    for axes, name in zip(figure.subplots(1, len(names), sharey=True), names, strict=True):
+    figure = sized(4.6, 12.6, narrow)
+    shape = (len(names), 1) if narrow else (1, len(names))
+    for axes, name in zip(figure.subplots(*shape, sharex=True, sharey=True), names, strict=True):
         draw_floor(axes, run)
         x, y = run.truth["x_m"], run.truth["y_m"]
         axes.plot(x, y, color="#0b5394", linewidth=0.5, label="true path", zorder=4)
@@ -25,13 +26,13 @@ def path(run: Run) -> Figure:
         axes.set_title(TITLES[name], fontsize=10)
         axes.set(xlabel="x (m)", ylabel="y (m)")
         axes.label_outer()
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=2)
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=1 if narrow else 2)
     return figure
 
 
-def errors(run: Run) -> Figure:
+def errors(run: Run, narrow: bool = False) -> Figure:
     """Medians of 10 s of every estimate's position error over the run."""
-    figure = Figure(figsize=(11.4, 4.2), layout="constrained")
+    figure = sized(4.2, 4.2, narrow)
     axes = figure.subplots()
     count = max(1, len(run.truth["tick"]) // WINDOW_ROWS)
     minutes = np.array([part[-1] for part in np.array_split(run.truth["tick"], count)]) * 500e-6 / 60
@@ -43,13 +44,13 @@ def errors(run: Run) -> Figure:
     axes.annotate("lost", (1.0, LOST_M), xycoords=("axes fraction", "data"), ha="right", va="bottom", color="0.3")
     axes.set(yscale="log", xlabel="time (minutes)", ylabel="position error, median of 10 s (m)")
     axes.grid(axis="y", color="#e4e4e4", linewidth=0.6)
-    figure.legend(loc="outside lower center", ncols=len(FILTERS))
+    figure.legend(loc="outside lower center", ncols=2 if narrow else len(FILTERS))
     return figure
 
 
-def shares(run: Run) -> Figure:
+def shares(run: Run, narrow: bool = False) -> Figure:
     """Share of the time within an error, of every estimate."""
-    figure = Figure(figsize=(7.4, 4.2), layout="constrained")
+    figure = sized(4.2, 4.2, narrow)
     axes = figure.subplots()
     for name in FILTERS:
         error = np.sort(np.maximum(run.position_error(name), LEAST_M))

@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-from . import figures, long_figures
-from .html import card_row, document, figure, percent, table
+from . import figures, long_figures, spoken
+from .html import document, figure, percent, section, table, tiles
 from .long_figures import LOST_M
-from .page import base_table, loss_table, network_table
+from .page import chain_cards, origin_card
 from .run import FILTERS, Run
 
 LEVELS = {
@@ -25,42 +25,35 @@ def write_report(folder: Path) -> Path:
 def render(run: Run) -> str:
     """The page as text."""
     s = run.summary
-    title = f"CrunchBot: {s['simulated_s'] / 60:g} minutes, seed {s['seed']}"
+    lead = f"{LEVELS[s['level']]} Random exploration; the belief starts 0.2 m and 10 degrees wrong."
+    path = "The arena from above. Grey blocks with a border are obstacles; dots mark where the robot was while an estimate was lost."
+    lost = f"Beyond {LOST_M:g} m an estimate counts as lost."
     parts = [
-        f"<h1>{title}</h1>",
-        f'<p class="lead">{LEVELS[s["level"]]} Random exploration; the belief starts 0.2 m and 10 degrees wrong.</p>',
-        _cards(s),
-        "<h2>Where it was</h2>",
-        _drawn(
-            long_figures.path,
-            run,
-            "The arena from above. Black blocks are obstacles; dots mark where the robot was while an estimate was lost.",
+        origin_card(run),
+        _tiles(s),
+        section("Where it was", figure(long_figures.path, run, spoken.arena(run), path)),
+        section(
+            "How far off",
+            figure(long_figures.errors, run, spoken.errors(run), "Every row counts from the first."),
+            figure(long_figures.shares, run, spoken.shares(run), lost),
+            _filters_table(s),
         ),
-        "<h2>How far off</h2>",
-        _drawn(long_figures.errors, run, "Every row counts from the first."),
-        _drawn(long_figures.shares, run, f"Beyond {LOST_M:g} m an estimate counts as lost."),
-        _filters_table(s),
-        "<h2>What it met</h2>",
-        _counts_table(s),
-        *_chain(run),
+        section("What it met", _counts_table(s)),
+        *chain_cards(run),
     ]
-    return document(title, parts)
+    return document(f"CrunchBot: {s['simulated_s'] / 60:g} minutes, seed {s['seed']}", lead, parts)
 
 
-def _drawn(draw, run: Run, caption: str) -> str:
-    return figure(figures.svg(draw, run), caption)
-
-
-def _cards(s: dict) -> str:
+def _tiles(s: dict) -> str:
     adaptive = s["filters"]["adaptive"]
-    return card_row(
-        (
-            (f"{adaptive['median_m'] * 1000:.0f} mm", "median position error, adaptive"),
-            (percent(adaptive["lost_share"]), "of the time lost, adaptive"),
-            (percent(s["texture_accuracy"]), "texture windows right"),
-            (f"{s['driven_m']:.0f} m", f"driven, {s['tiles_visited']} of {s['tiles']} tiles"),
-            (f"{s['simulated_s'] / s['chain_wall_s']:.2f} x", f"of real time, level {s['level']}"),
-        )
+    return tiles(
+        [
+            (f"{adaptive['median_m'] * 1000:.0f} mm", "median position error, adaptive", False),
+            (percent(adaptive["lost_share"]), "of the time lost, adaptive", adaptive["lost_share"] > 0),
+            (percent(s["texture_accuracy"]), "texture windows right", False),
+            (f"{s['driven_m']:.0f} m", f"driven, {s['tiles_visited']} of {s['tiles']} tiles", False),
+            (f"{s['simulated_s'] / s['chain_wall_s']:.2f} x", f"of real time, level {s['level']}", False),
+        ]
     )
 
 
@@ -85,16 +78,3 @@ def _counts_table(s: dict) -> str:
         ("texture windows right, tip 50 mm inside its tile", percent(s["texture_accuracy"])),
     ]
     return table("In the whole run", ("quantity", "value"), rows)
-
-
-def _chain(run: Run) -> list[str]:
-    """What only a run of all processes has."""
-    if not run.navigator:
-        return []
-    return [
-        "<h2>The base</h2>",
-        base_table(run),
-        "<h2>Throughput and loss</h2>",
-        loss_table(run.summary),
-        network_table(run),
-    ]

@@ -5,11 +5,22 @@ from pathlib import Path
 
 import numpy as np
 
-from . import figures
-from .html import card_row, document, figure, percent, table
+from . import figures, motion, spoken
+from .figures import TITLES
+from .html import document, figure, pairs, paragraph, percent, script, section, table, tiles
+from .long_figures import LOST_M
 from .run import FILTERS, Run
 
 PAPER_STD_MM = (5.68, 2.78, 1.82, 4.37)  # the paper's table under Fig. 5, whiskers 1 to 4
+WHAT = {
+    "grid": "Exact Bayes on a fixed grid: every cell of the arena and every heading keeps its probability, which odometry moves "
+    "and each row of readings multiplies (the paper's eq. 4).",
+    "adaptive": "The default: one Gaussian while that says all, particles while the belief has a shape, a histogram of the whole "
+    "arena while the robot may be anywhere; it passes from one to another by itself.",
+    "foveal": "The paper's filter: a grid of 11 by 11 by 11 poses about the estimate, fused into one Gaussian after each row "
+    "(eqs. 5-7); an estimate that has left the small grid's reach may never come back.",
+    "odometry": "No whisker at all: adds up what the wheels report, from the wrong start; what the others must beat.",
+}
 
 
 def write_report(folder: Path) -> Path:
@@ -24,40 +35,67 @@ def render(run: Run) -> str:
     """The page as text."""
     s = run.summary
     parts = [
-        f"<h1>CrunchBot: from magnet to pose, seed {s['seed']}</h1>",
-        f'<p class="lead">{_lead(s)}</p>',
-        _cards(s),
-        "<h2>Where it was, and where it thought it was</h2>",
-        figure(
-            figures.svg(figures.arena, run),
-            "The arena from above. Black blocks are obstacles. The belief starts 0.2 m and 10 degrees wrong.",
+        origin_card(run),
+        _tiles(s),
+        motion.card(run),
+        section(
+            "What each filter is",
+            '<dl class="filters">'
+            + "".join(f"<div><dt>{TITLES[n]}</dt><dd>{WHAT[n]}</dd></div>" for n in FILTERS)
+            + "</dl>",
         ),
-        figure(
-            figures.svg(figures.errors, run), "Every step from the first is counted. Medians are in the table below."
+        section(
+            "How far off",
+            figure(figures.errors, run, spoken.errors(run), "Every row counts from the first."),
+            _estimates_table(run),
         ),
-        _estimates_table(run),
-        "<h2>Floor texture</h2>",
-        figure(
-            figures.svg(figures.texture, run),
-            "One mark for each 100 ms window that was read; none is read during body whisks, at rest, or while the speed changes. "
-            f"Accuracy {percent(s['texture_accuracy'])} at least 50 mm inside a tile ({percent(s['texture_windows_share'])} of moving windows), "
-            f"{percent(s['texture_accuracy_all'])} of all windows read.",
+        *_spread(run),
+        section(
+            "The whole way",
+            figure(
+                figures.arena,
+                run,
+                spoken.arena(run),
+                "The arena from above. Grey blocks with a border are obstacles. The belief starts 0.2 m and 10 degrees wrong.",
+            ),
         ),
-        "<h2>Distance along the whisker</h2>",
-        figure(
-            figures.svg(figures.radial, run),
-            "Five calibration contacts per 10 mm fit each line; the errors below are of contacts that were held out. "
-            "Markers of the two sets are shifted by 1.5 mm either way to be seen apart.",
+        section("Floor texture", figure(figures.texture, run, spoken.texture(run), _texture_caption(s))),
+        section(
+            "Distance along the whisker",
+            figure(
+                figures.radial,
+                run,
+                spoken.radial(run),
+                "Five calibration contacts per 10 mm fit each line; the errors below are of contacts that were held out. "
+                "Markers of the two sets are shifted by 1.5 mm either way to be seen apart.",
+            ),
+            _radial_table(run),
         ),
-        _radial_table(run),
-        "<h2>The base</h2>",
-        base_table(run),
-        "<h2>Throughput and loss</h2>",
-        loss_table(s),
-        network_table(run),
-        f"<p>Every topic of the run, for ROS 2 tools and Foxglove: <code>{escape(run.bag.name)}</code>, beside this page.</p>",
+        *chain_cards(run),
+        f'<p class="lead">Every topic of the run, for ROS 2 tools and Foxglove: <code>{escape(run.bag.name)}</code>, '
+        "beside this page.</p>",
+        script(),
     ]
-    return document(f"CrunchBot demo, seed {s['seed']}", parts)
+    return document(f"CrunchBot: from magnet to pose, seed {s['seed']}", _lead(s), parts)
+
+
+def origin_card(run: Run) -> str:
+    """What was run, of which commit, where and when."""
+    made = run.origin
+    rows = [("Command", f"`{made['command']}`")] if made else []
+    rows += [("Seed", f"{run.summary['seed']}"), ("Time", f"{run.summary['simulated_s']:g} s simulated")]
+    if made:
+        rows += [("Commit", f"{made['commit']}, version {made['version']}"), ("Machine", made["machine"])]
+        rows += [("Made", made["date"])]
+    return section("This run", pairs(rows))
+
+
+def chain_cards(run: Run) -> list[str]:
+    """Base, losses and network: what only a run of all processes has."""
+    if not run.navigator:
+        return []
+    sheets = "".join((loss_table(run.summary), network_table(run), base_table(run)))
+    return [section("Throughput, loss, base", f'<div class="sheets">{sheets}</div>')]
 
 
 def _lead(s: dict) -> str:
@@ -67,27 +105,65 @@ def _lead(s: dict) -> str:
     )
 
 
-def _cards(s: dict) -> str:
-    cards = (
-        (f"{s['pose_error_median_m'] * 1000:.0f} mm", "median position error, grid"),
-        (percent(s["texture_accuracy"]), "texture windows right"),
-        (f"{s['frames_lost']}", f"frames lost of {s['frames_sent']:,}"),
-        (
-            "equal" if s["records_bad_match"] else "NOT EQUAL",
-            f"{s['records_bad_injected']} bad records injected and reported",
-        ),
-        (f"{s['simulated_s'] / s['chain_wall_s']:.2f} x", "of real time, whole chain"),
+def _tiles(s: dict) -> str:
+    reported, injected = s["records_bad_reported"], s["records_bad_injected"]
+    equal = s["records_bad_match"]
+    return tiles(
+        [
+            (f"{s['adaptive_error_median_m'] * 1000:.0f} mm", "median position error, adaptive", False),
+            (percent(s["texture_accuracy"]), "texture windows right", False),
+            (f"{s['frames_lost']}", f"frames lost of {s['frames_sent']:,}", s["frames_lost"] > 0),
+            (
+                f"{reported} of {injected}" if equal else "NOT EQUAL",
+                "bad records put in, all reported, no other" if equal else "bad records put in, and reported",
+                not equal,
+            ),
+            (f"{s['simulated_s'] / s['chain_wall_s']:.2f} x", "of real time, whole chain", False),
+        ]
     )
-    return card_row(cards)
+
+
+def _texture_caption(s: dict) -> str:
+    return (
+        "One mark for each 100 ms window that was read; none is read during body whisks, at rest, or while the speed changes. "
+        f"Accuracy {percent(s['texture_accuracy'])} at least 50 mm inside a tile ({percent(s['texture_windows_share'])} of moving windows), "
+        f"{percent(s['texture_accuracy_all'])} of all windows read."
+    )
 
 
 def _estimates_table(run: Run) -> str:
     rows = []
     for name in FILTERS:
-        position, heading = run.position_error(name), run.heading_error(name)
-        values = (np.median(position), np.quantile(position, 0.9), np.median(heading))
-        rows.append((figures.TITLES[name], *(f"{value:.3f}" for value in values)))
-    return table("Errors over all steps", ("estimate", "median (m)", "90 % (m)", "heading, median (rad)"), rows)
+        position, heading = run.position_error(name), np.degrees(run.heading_error(name))
+        metres = (np.median(position), np.quantile(position, 0.9), position.max())
+        rows.append(
+            (
+                TITLES[name],
+                *(f"{m:.3f}" for m in metres),
+                f"{np.median(heading):.1f}",
+                percent((position > LOST_M).mean()),
+            )
+        )
+    header = ("estimate", "median (m)", "90 % (m)", "largest (m)", "heading, median (degrees)", f"beyond {LOST_M:g} m")
+    return table("Errors over all rows", header, rows)
+
+
+def _spread(run: Run) -> list[str]:
+    """Other seeds beside this one."""
+    if not run.seeds:
+        return []
+    seeds = run.seeds["seed"]
+    text = (
+        f"One run says little. Seeds {seeds.min():.0f} to {seeds.max():.0f} (other floors, obstacles and starts) were replayed with "
+        "the same whiskers and models by the command above, at the level of signals: without bits, faults, serial line and network."
+    )
+    rows = []
+    for name in FILTERS:
+        errors, here = run.seeds[f"{name}_m"], np.median(run.position_error(name))
+        rows.append((TITLES[name], *(f"{m:.3f}" for m in (here, np.median(errors), errors.min(), errors.max()))))
+    header = ("estimate", "this run (m)", "median of the seeds (m)", "best (m)", "worst (m)")
+    shown = figure(figures.spread, run, spoken.spread(run), "Median position error of each run; logarithmic.")
+    return [section("Other seeds", paragraph(text), shown, table("Median position error", header, rows))]
 
 
 def _radial_table(run: Run) -> str:

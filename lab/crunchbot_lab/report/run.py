@@ -1,6 +1,8 @@
 """What a finished run left behind, read back from its folder.
 
 summary.json            figures, as in docs/formats.md
+origin.json             command, commit, version, machine, date
+seeds.csv               seed, <filter>_m: median position errors at level 1 (absent: not replayed)
 truth.csv               tick, x_m, y_m, theta_rad, <whisker>_tile, <whisker>_inside_mm, <whisker>_moved_mm
 scene/observations.csv  what the filters read
 est_<filter>.csv        t_s, x_m, y_m, theta_rad, confidence
@@ -60,6 +62,9 @@ class Run:
     pilot: dict  # rows, whisks, base: what whisker-base reported of itself
     navigator: dict  # counters
     bag: Path
+    origin: dict[str, str]
+    seeds: dict[str, np.ndarray]  # seed, <filter>_m; empty: not replayed
+    scene_folder: Path
 
     @classmethod
     def load(cls, folder: Path) -> "Run":
@@ -81,6 +86,9 @@ class Run:
             pilot=json.loads((folder / "pilot.json").read_text()),
             navigator=_if_there(folder / "navigator.json", lambda path: json.loads(path.read_text())),
             bag=folder / "robot.mcap",
+            origin=_if_there(folder / "origin.json", lambda path: json.loads(path.read_text())),
+            seeds=_if_there(folder / "seeds.csv", read_columns),
+            scene_folder=scene,
         )
 
     def position_error(self, name: str) -> np.ndarray:

@@ -1,13 +1,20 @@
 """The report from a small made-up run: complete, self-contained, and honest about what it is given."""
 
+import asyncio
+import base64
 import json
 import re
+from contextlib import closing
 
+import chromium
 import numpy as np
 import pytest
 
-from crunchbot_lab.report import figures, write_report
-from crunchbot_lab.report.run import Run
+from crunchbot.recording.writing import TopicWriter
+from crunchbot.robot.bag import RECORD
+from crunchbot.robot.network.messages import SCHEMAS, Belief, Header, Time, encode
+from crunchbot_lab.report import figures, html, motion, origin, write_report
+from crunchbot_lab.report.run import FILTERS, Run
 
 ROWS = 40
 TEXTURES = ["VINYL", "SMOOTH", "ROUGH"]
@@ -18,7 +25,7 @@ SUMMARY = {
     "texture_accuracy": 0.95, "texture_accuracy_all": 0.9, "texture_windows_share": 0.5,
     "radial_std_mm": {"object_1": 5.5, "object_2": 2.5}, "radial_std_predicted_mm": {"object_1": 5.6, "object_2": 2.8},
     "pose_error_median_m": 0.05, "pose_error_p90_m": 0.11, "heading_error_median_rad": 0.04,
-    "odometry_error_median_m": 0.25, "foveal_error_median_m": 0.12,
+    "odometry_error_median_m": 0.25, "foveal_error_median_m": 0.12, "adaptive_error_median_m": 0.018,
 }  # fmt: skip
 
 ARENA = """size_m = [1.0, 1.0]
@@ -54,6 +61,27 @@ base_m = [0.1, -0.1]
 yaw_rad = 0.0
 length_m = 0.14
 """
+
+
+ORIGIN = {
+    "command": "python -m crunchbot_lab.demo --seed 7 <x>", "commit": "0123456789ab", "version": "9.8.7",
+    "machine": "an abacus, 2 processors, load 0.1", "date": "2026-01-02 03:04 UTC",
+}  # fmt: skip
+AT = (0.25, 0.75, -3.0)  # of the belief in the bag, from row 11 on
+
+
+def write_bag(path):
+    """A bag with two beliefs of the grid, of rows 0 and 11."""
+    rng = np.random.default_rng(5)
+    with closing(TopicWriter(path, RECORD, {"robot": "robot"})) as writer:
+        writer.topic("/robot/belief", SCHEMAS[Belief])
+        for seq in (0, 11):
+            n = 500
+            columns = [(at + 0.01 * rng.standard_normal(n)).astype("f4") for at in AT]
+            widths = [np.full(n, value, "f4") for value in (1 / n, 0.02, 0.05)]
+            belief = Belief(Header(Time(seq, 0), "map"), "grid", seq, 4321 + seq, 1.0, *columns, *widths)
+            writer.add("/robot/belief", seq, encode(belief))
+        writer.finish()
 
 
 def write_csv(path, columns):
@@ -107,12 +135,16 @@ def run_folder(tmp_path):
                                                "peak_counts": (181.0 - radius) / 0.036, "predicted_mm": radius + 0.5})  # fmt: skip
     traces = {f"{n}_{e}_deg": v + 0 * t for n in names for e, v in (("min", 0.1), ("max", 0.9))}
     write_csv(tmp_path / "traces.csv", {"t_s": t} | traces)
+    (tmp_path / "origin.json").write_text(json.dumps(ORIGIN))
+    seeds = {f"{name}_m": [0.1, 0.2, 0.3] for name in ("grid", "adaptive", "foveal", "odometry")}
+    write_csv(tmp_path / "seeds.csv", {"seed": [7, 8, 9]} | seeds)
+    write_bag(tmp_path / "robot.mcap")
     return tmp_path
 
 
 def test_page_is_complete_and_self_contained(run_folder):
     page = write_report(run_folder).read_text()
-    assert page.count("<svg") == 4
+    assert page.count("<svg") == 10, "five figures, wide and narrow"
     fetched = re.findall(r'(?:src|href)\s*=\s*"(?!#)[^"]*"|url\((?!#)[^)]*\)|@import', page)
     assert fetched == []
     for text in ("position error (m)", "heading error (degrees)", "radial distance (mm)", "time (s)", "deflection"):
@@ -121,7 +153,7 @@ def test_page_is_complete_and_self_contained(run_folder):
 
 def test_page_shows_the_summary_beside_the_paper(run_folder):
     page = write_report(run_folder).read_text()
-    for text in ("5.50", "5.60", "5.68", "2.78", "95.0 %", "8,000", ">equal<"):
+    for text in ("5.50", "5.60", "5.68", "2.78", "95.0 %", "8,000", ">equal<", "11 of 11"):
         assert text in page
 
 
@@ -129,7 +161,7 @@ def test_page_reports_of_base_network_and_bag(run_folder):
     page = write_report(run_folder).read_text()
     for text in (
         "iRobot Create 1",
-        "sensor frames of 15 ms, whole</td><td>266<",
+        "sensor frames of 15 ms, whole</th><td>266<",
         "rows missed by the navigator",
         "robot.mcap",
     ):
@@ -152,3 +184,106 @@ def test_deflection_is_drawn_no_higher_than_it_was(run_folder):
 
 def test_same_run_same_page(run_folder):
     assert write_report(run_folder).read_text() == write_report(run_folder).read_text()
+
+
+def test_the_head_says_command_seed_commit_machine_and_date(run_folder):
+    page = write_report(run_folder).read_text()
+    head = page[: page.index('id="motion-card"')]
+    for text in (
+        "--seed 7 &lt;x&gt;",
+        "0123456789ab, version 9.8.7",
+        "an abacus",
+        "2026-01-02 03:04 UTC",
+        "<dd>7</dd>",
+    ):
+        assert text in head
+
+
+def test_every_figure_has_its_words_and_every_filter_its_sentence(run_folder):
+    page = write_report(run_folder).read_text()
+    spoken = re.findall(r'<svg role="img" aria-label="([^"]{60,})"', page)
+    assert len(spoken) == page.count("<svg") and len(set(spoken)) == 5
+    assert any("grid (eq. 4): median 0.02 m and 1 degrees" in words for words in spoken)
+    assert len(re.findall(r"<div><dt>[^<]+</dt><dd>[^<]{60,}</dd></div>", page)) == len(FILTERS)
+
+
+def test_seeds_stand_beside_the_run_only_if_they_were_replayed(run_folder):
+    assert "Seeds 7 to 9" in write_report(run_folder).read_text()
+    (run_folder / "seeds.csv").unlink()
+    assert "Other seeds" not in write_report(run_folder).read_text()
+
+
+def test_figures_have_the_colours_of_the_page_and_no_others(run_folder):
+    run = Run.load(run_folder)
+    for draw in (figures.arena, figures.errors, figures.texture, figures.radial, figures.spread):
+        drawn = figures.svg(draw, run)
+        assert re.search(r"#[0-9a-f]{6}\b", drawn)
+        assert re.findall(r"(?:fill|stroke)[:=] *\"?(#[0-9a-f]{6})\b", html.themed(drawn)) == []
+    used = set(re.findall(r"var\((--[a-z-]+)\)", html.style())) | set(html.THEMED.values())
+    for scheme in html.style().split("@media (prefers-color-scheme: dark)")[:2]:
+        assert used <= set(re.findall(r"(--[a-z-]+):", scheme))
+
+
+def test_the_motion_has_every_row_and_the_beliefs_of_the_bag(run_folder):
+    data = motion.data(Run.load(run_folder))
+    assert [len(data["truth"])] + [len(data["filters"][name]["poses"]) for name in FILTERS] == [ROWS] * 5
+    assert data["truth"][-1] == [4.0, 0.6, 0.25, 0.0]
+    first, second = data["filters"]["grid"]["beliefs"]
+    assert (first["row"], second["row"], second["total"], data["filters"]["foveal"]["beliefs"]) == (0, 11, 4332, [])
+    numbers = np.frombuffer(base64.b64decode(second["poses"]), "<i2").reshape(-1, 6) * np.array(data["scales"])
+    assert 1 < len(numbers) <= motion.COMPONENTS_MOST
+    assert numbers[:, 3].sum() == pytest.approx(1.0, abs=0.01)
+    assert np.average(numbers[:, :3], axis=0, weights=numbers[:, 3]) == pytest.approx(AT, abs=0.01)
+
+
+def test_a_commit_is_of_this_tree_or_not_recorded(tmp_path):
+    assert re.match(r"[0-9a-f]{12}(, changed)?$|not recorded$", origin.commit())
+    assert origin.commit(tmp_path) == "not recorded"
+
+
+SHOWN = """[...document.querySelectorAll('.plan')].map((box) => box.getAttribute('aria-label'))"""
+BEYOND = """[...document.querySelectorAll('main .card > *, main .card table, main .tile, figure, header *')].filter((e) =>
+  e.offsetParent && (e.getBoundingClientRect().right > innerWidth - 8 || e.scrollWidth > e.clientWidth + 1 && e.clientWidth)
+).map((e) => e.outerHTML.slice(0, 90))"""
+
+
+@pytest.mark.skipif(chromium.PROGRAM is None, reason="chromium is not installed (apt install chromium)")
+def test_in_a_browser_light_and_dark_wide_and_on_a_telephone(run_folder):
+    async def scenario():
+        papers = {}
+        for scheme in ("light", "dark"):
+            for width in (1280, 390):
+                async with chromium.browser() as b:
+                    media = [{"name": "prefers-color-scheme", "value": scheme}]
+                    await b.call("Emulation.setEmulatedMedia", features=media)
+                    await b.look(f"file://{path}", width)
+                    assert await b.eval("document.documentElement.scrollWidth") == width
+                    assert await b.eval(BEYOND) == []
+                    papers[scheme] = await b.eval("getComputedStyle(document.body).backgroundColor")
+                    seen = await b.eval(
+                        "[...document.querySelectorAll('figure svg')].filter((s) => s.clientWidth).length"
+                    )
+                    assert seen == 5
+                    await moves(b)
+                    assert b.troubles == [] and b.requests == [f"file://{path}"]
+        assert papers["light"] != papers["dark"]
+
+    async def moves(b):
+        end = await b.eval(SHOWN)
+        assert len(end) == 4 and "4.0 s" in end[0] and "odometry alone says x 0.80 m" in end[3]
+        at = "const t = document.getElementById('motion-time'); t.value = {}; t.dispatchEvent(new Event('input'))"
+        await b.eval(f"{{ {at.format(11)} }}")
+        assert "4\u202f332 poses in one place" in (await b.eval(SHOWN))[0], "the belief of the row itself"
+        await b.eval(f"{{ {at.format(9)} }}")
+        then = await b.eval(SHOWN)
+        assert (
+            "1.0 s. True place x 0.30 m, y 0.25 m; grid (eq. 4) says x 0.32 m, y 0.25 m, 0.02 m and 1° off" in then[0]
+        )
+        assert "4\u202f321 poses in one place" in then[0] and "no belief was recorded" in then[1]
+        await b.eval(
+            "document.getElementById('motion-speed').value = 16; document.getElementById('motion-play').click()"
+        )
+        await b.until("motion.playing === false && motion.row === motion.last")
+
+    path = write_report(run_folder)
+    asyncio.run(scenario())

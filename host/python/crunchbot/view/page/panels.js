@@ -1,34 +1,6 @@
 /* What topic status tells, as words and numbers: banner, tiles, health, lanes, kinds of bad records, events. */
-const $ = (id) => document.getElementById(id);
 const STATES = { live: '● live', stalled: '▲ no frames', waiting: '○ no ring', ended: '■ ended', refused: '■ refused', gone: '■ not connected' };
 const EMPTY = ['absent', 'lane_off']; // no loss: there is no node, or the lane is off
-
-const count = (n) => Math.round(n).toString().replace(/\B(?=(\d{3})+$)/g, '\u202f');
-const sum = (list) => list.reduce((a, b) => a + b, 0);
-const words = (kind) => kind.replaceAll('_', ' ');
-
-function duration(s) {
-  if (s < 10) return `${s.toFixed(1)} s`;
-  if (s < 120) return `${Math.round(s)} s`;
-  return s < 7200 ? `${Math.round(s / 60)} min` : `${(s / 3600).toFixed(1)} h`;
-}
-
-function nanoseconds(ns) {
-  return ns < 1e3 ? `${Math.round(ns)} ns` : ns < 1e6 ? `${(ns / 1e3).toFixed(ns < 1e4 ? 1 : 0)} µs` : ns < 1e9 ? `${(ns / 1e6).toFixed(1)} ms` : duration(ns / 1e9);
-}
-
-/* An element with text or children; text is never read as HTML. */
-function make(tag, content = '', attributes = {}) {
-  const element = document.createElement(tag);
-  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
-  element.append(...[content].flat());
-  return element;
-}
-
-/* Text with `commands` between backquotes. */
-function rich(text) {
-  return text.split('`').map((part, n) => (n % 2 ? make('code', part) : part));
-}
 
 /* What a person can do next: [grave, headline, line, steps], or null when all is well. */
 function advice(s, others) {

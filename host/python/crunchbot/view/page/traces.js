@@ -238,9 +238,3 @@ function degreesText(degrees, scale) {
   const text = degrees.toFixed(scale < 1 ? 2 : scale < 20 ? 1 : 0);
   return `${Number(text) ? text.replace('-', '−') : text.replace('-', '')}°`;
 }
-
-/* A CSS colour #rrggbb as the four bytes of a pixel. */
-function pixelOf(colour) {
-  const value = parseInt(colour.slice(1), 16);
-  return (0xff000000 | ((value & 0xff) << 16) | (value & 0xff00) | (value >> 16)) >>> 0;
-}
