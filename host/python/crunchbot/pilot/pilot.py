@@ -100,8 +100,9 @@ class Pilot:
 
     def block(self, first_tick: int, alpha: np.ndarray, beta: np.ndarray, status: np.ndarray) -> tuple[float, float]:
         """Decide on the 40 ticks from `first_tick`: arrays (40, lanes) of counts and status -> v in m/s, omega in rad/s."""
-        samples = np.stack([alpha, beta], axis=-1).astype(np.float64)[:, : len(self.names)]
-        good = np.asarray(status)[:, : len(self.names)] == 0
+        lanes, good = len(self.names), np.asarray(status)[:, : len(self.names)] == 0
+        samples = np.empty((lanes, len(good), 2)).swapaxes(0, 1)  # those of one lane lie together
+        samples[:, :, 0], samples[:, :, 1] = alpha[:, :lanes], beta[:, :lanes]
         ticks = np.arange(first_tick, first_tick + len(good))
         self.bad_samples += int(good.size - np.count_nonzero(good))
         self._recent.append((samples, good))

@@ -1,6 +1,7 @@
 """Where the robot has been of late and where it met something, by its own odometry."""
 
 import math
+from collections import deque
 from dataclasses import dataclass
 
 AHEAD_M = 0.2  # from the robot's centre to what its whiskers or bumpers meet ...
@@ -27,7 +28,7 @@ class Whereabouts:
 
     def __init__(self):
         self._x = self._y = self._theta = 0.0
-        self._path: list[tuple[int, float, float]] = []
+        self._path: deque[tuple[int, float, float]] = deque()
         self._met: list[Encounter] = []
 
     def moved(self, tick: int, dx: float, dy: float, dtheta: float) -> None:
@@ -35,7 +36,8 @@ class Whereabouts:
         c, s = math.cos(self._theta), math.sin(self._theta)
         self._x, self._y, self._theta = self._x + c * dx - s * dy, self._y + s * dx + c * dy, self._theta + dtheta
         self._path.append((tick, self._x, self._y))
-        self._path = [p for p in self._path if p[0] > tick - self.MEMORY_TICKS]
+        while self._path and self._path[0][0] <= tick - self.MEMORY_TICKS:
+            self._path.popleft()
         self._met = [m for m in self._met if m.tick > tick - self.MEMORY_TICKS]
 
     def meet(self, tick: int, bearing_rad: float) -> None:

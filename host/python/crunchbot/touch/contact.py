@@ -31,6 +31,7 @@ class Contact:
         self.onset = -1
         self.release = -1
         self._earlier = np.empty(0, np.int64)  # ticks of the last good samples of earlier blocks
+        self._make_room(0)
 
     @property
     def touching(self) -> bool:
@@ -50,22 +51,28 @@ class Contact:
         """Take ticks (n,), samples (n, 2) in counts and good (n,): a bad sample begins, keeps and ends nothing."""
         if not len(ticks) == len(samples) == len(good):
             raise ValueError(f"{len(ticks)} ticks, {len(samples)} samples, {len(good)} good; give one of each")
-        ticks, samples = ticks[good], np.ascontiguousarray(samples[good])
+        if not good.all():
+            ticks, samples = ticks[good], samples[good]
         count, before = len(ticks), len(self._earlier)
-        events, peaks, all_good = np.zeros(count, np.uint8), np.zeros(count), np.ones(count, np.uint8)
-        lib.nav_contact_run(
-            self._state,
-            doubles(samples, "samples", (count, 2)),
-            octets(all_good, "good", (count,)),
-            count,
-            octets(events, "events", (count,)),
-            doubles(peaks, "peaks", (count,)),
-        )
+        if count > len(self._events):
+            self._make_room(count)
+        samples = doubles(np.ascontiguousarray(samples), "samples", (count, 2))
+        lib.nav_contact_run(self._state, samples, self._good_out, count, self._events_out, self._peaks_out)
+        events = self._events[:count]
         ticks = np.concatenate([self._earlier, ticks])
         self._earlier = ticks[-RELEASE_SAMPLES:]
+        if not events.any():
+            return
         for index in before + np.flatnonzero(events):
             # An event comes with the last sample of the run that proves it; the contact changed with the first.
             if events[index - before] == lib.NAV_CONTACT_ONSET:
                 self.onset = int(ticks[max(0, index - ONSET_SAMPLES + 1)])
             else:
                 self.release = int(ticks[max(0, index - RELEASE_SAMPLES + 1)])
+
+    def _make_room(self, count: int) -> None:
+        """Arrays that C fills for a block of so many samples."""
+        self._events, self._good, self._peaks = np.zeros(count, np.uint8), np.ones(count, np.uint8), np.zeros(count)
+        self._events_out = octets(self._events, "events", (count,))
+        self._good_out = octets(self._good, "good", (count,))
+        self._peaks_out = doubles(self._peaks, "peaks", (count,))
