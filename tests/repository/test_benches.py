@@ -1,6 +1,7 @@
 """The front of the benches: every topic is there, can be asked for alone, and what it takes is what its run knows."""
 
 import ast
+import contextlib
 import importlib
 import json
 import re
@@ -25,14 +26,14 @@ def module_of(topic: str) -> Path:
 
 
 @pytest.mark.parametrize("topic", TOPICS)
-def test_run_takes_a_build_and_fresh_and_all_its_options(topic):
+def test_run_takes_a_build_and_all_its_options(topic):
     found = functions(module_of(topic))
     run = found["run"].args
-    assert [a.arg.lstrip("_") for a in run.args[:2]] == ["build", "fresh"]
-    assert len(run.args) - len(run.defaults) == 2  # the rest has standards: `make bench` gives none of it
+    assert run.args[0].arg.lstrip("_") == "build"
+    assert len(run.args) - len(run.defaults) == 1  # the rest has standards
     options = ast.unparse(found["options"]) if "options" in found else ""
     wanted = set(re.findall(r"add_argument\('--(\w+)'", options))
-    assert run.kwarg or wanted == {a.arg for a in run.args[2:]}
+    assert run.kwarg or wanted == {a.arg for a in run.args[1:]}
 
 
 def test_every_module_with_a_run_is_a_topic():
@@ -195,3 +196,99 @@ def test_the_programs_that_benches_start_are_built():
         assert any(re.search(rf"\b{program}\b", path.read_text()) for path in lists), (
             f"{name}: no CMakeLists.txt names it"
         )
+
+
+@pytest.fixture
+def rounds(monkeypatch, tmp_path):
+    """The module of rounds, whose topics are functions of the test, measured in this process."""
+    monkeypatch.syspath_prepend(str(ROOT / "tools"))
+    from benches import rounds, store
+
+    monkeypatch.setattr(store, "BENCH", tmp_path)
+    monkeypatch.setattr(store, "commit", lambda: "0123456789ab")
+    rounds.topics = {}
+
+    def measure(topic: str, words: list[str]) -> dict:
+        monkeypatch.setattr(store, "LEFT_OUT", {})
+        monkeypatch.setattr(store, "WROTE", [])
+        with contextlib.suppress(RuntimeError), rounds.reported(topic, words):
+            rounds.topics[topic]()
+        return json.loads(rounds.report_of(topic).read_text())
+
+    monkeypatch.setattr(rounds, "measure", measure)
+    return rounds
+
+
+def test_a_round_goes_on_with_what_is_missing_and_a_topic_that_fails_is_no_hindrance(rounds, capsys):
+    ran, is_broken = [], [True]
+
+    def fails():
+        ran.append("fails")
+        if is_broken[0]:
+            raise RuntimeError("no such\nprogram")
+
+    def peerless():
+        ran.append("peerless")
+        rounds.store.leave_out("iceoryx2", "ld: cannot find -lbsd")
+
+    rounds.topics = {"fails": fails, "peerless": peerless}
+    chosen = {"fails": [], "peerless": ["--rounds", "1"]}
+    assert rounds.measure_all(chosen, ROOT, fresh=False) == 1 and ran == ["fails", "peerless"]
+    said = capsys.readouterr().out
+    assert "FAILED" in said and "RuntimeError: no such program" in said
+    assert "left out: iceoryx2 (ld: cannot find -lbsd)" in said
+    is_broken[0] = False
+    assert rounds.measure_all(chosen, ROOT, fresh=False) == 0 and ran[2:] == ["fails"]
+    lines = [line for line in capsys.readouterr().out.splitlines() if " of 2  " in line]
+    assert len(lines) == 2 and "kept" in lines[1] and "-lbsd" in lines[1]
+    assert rounds.measure_all(chosen, ROOT, fresh=True) == 0 and ran[3:] == ["fails", "peerless"]
+    assert rounds.measure_all(chosen | {"peerless": ["--rounds", "2"]}, ROOT, fresh=False) == 0
+    assert ran[5:] == ["peerless"], "other options, other measurements"
+
+
+def test_what_is_kept_is_of_the_state_of_the_tree(monkeypatch, tmp_path):
+    monkeypatch.syspath_prepend(str(ROOT / "tools"))
+    from benches import store
+
+    monkeypatch.setattr(store, "ROOT", tmp_path)
+    git = ["git", "-C", tmp_path, "-c", "user.name=a", "-c", "user.email=a@b"]
+    for name in ("host.c", "fpga.v", "docs/page.md", "bench/results/ring.json"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text("one\n")
+    for words in (["init", "-q"], ["add", "."], ["commit", "-q", "-m", "one"]):
+        subprocess.run([*git, *words], check=True)
+
+    def states() -> tuple[str, str]:
+        store.state.cache_clear()
+        return store.state(), store.state("fpga.v")
+
+    first = states()
+    for name in ("docs/page.md", "bench/results/ring.json"):
+        (tmp_path / name).write_text("two\n")
+    assert states() == first, "what benches write is no part of it"
+    (tmp_path / "host.c").write_text("two\n")
+    changed = states()
+    assert changed[0] != first[0] and changed[1] == first[1]
+    subprocess.run([*git, "commit", "-q", "-a", "-m", "two"], check=True)
+    assert states() == changed, "it is what the files hold, not the commit"
+    store.state.cache_clear()
+
+
+def test_a_peers_own_error_is_found(monkeypatch, tmp_path):
+    monkeypatch.syspath_prepend(str(ROOT / "tools"))
+    from benches import store
+
+    (tmp_path / "a.c").write_text("int main(void) { return 0; }\n")
+    (tmp_path / "b.c").write_text("int main(void) { return nothing; }\n")
+    assert store.failure(["cc", tmp_path / "a.c", "-o", tmp_path / "a"]) == ""
+    assert "-lbsd-not-there" in store.failure(["cc", tmp_path / "a.c", "-lbsd-not-there", "-o", tmp_path / "a"])
+    assert "nothing" in store.failure(["true"], ["cc", tmp_path / "b.c", "-o", tmp_path / "b"])
+
+
+def test_a_measurement_is_whole_or_not_there(monkeypatch, tmp_path):
+    monkeypatch.syspath_prepend(str(ROOT / "tools"))
+    from benches import store
+
+    with pytest.raises(ZeroDivisionError):
+        store.once(tmp_path / "part/a.json", lambda: 1 / 0)
+    assert store.once(tmp_path / "part/a.json", lambda: [1]) == [1] == store.once(tmp_path / "part/a.json", lambda: [2])

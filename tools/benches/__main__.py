@@ -4,11 +4,14 @@
     .venv/bin/python tools/benches --only ring nav    some topics, one after the other
     .venv/bin/python tools/benches nav --quick        one topic, with options of its own; `nav --help` lists them
 
-A measurement that is done is kept in build/bench: an interrupted run goes on where it stopped; `--fresh` begins again.
+A topic's measurements are kept in build/bench for the state of the tree that they are of: an interrupted run goes on
+where it stopped, and in another state all is measured anew; `--fresh` begins again. All topics together take the sizes
+of ROUND, so that they end within 100 minutes on two cores; `--whole` takes each at its full size.
 """
 
 import argparse
 import importlib
+import shutil
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -44,6 +47,15 @@ TOPICS = {  # topic -> module, by room; the page is last, for it shows what the 
     "view": "host.view",
     "page": "pages",
 }
+# Options of the topics whose full size takes more than some minutes, as `make bench` gives them.
+ROUND = {
+    "nav": ["--seeds", "20"],
+    "nav_peers": ["--seeds", "20"],
+    "nav_size": ["--seeds", "10"],
+    "ring": ["--rounds", "1"],
+    "robot": ["--levels", "0", "1", "2"],
+    "usb": ["--frames", "500000"],
+}
 
 
 def main() -> None:
@@ -57,26 +69,40 @@ def main() -> None:
 
 
 def run_one(topic: str, words: list[str]) -> None:
+    """Runs a topic and keeps what it reports of itself."""
     bench = bench_of(topic)
     parser = front(f"tools/benches {topic}", bench.__doc__)
     if hasattr(bench, "options"):
         bench.options(parser)
     chosen = vars(parser.parse_args(words))
-    bench.run(chosen.pop("build_dir").resolve(), chosen.pop("fresh"), **chosen)
+    from benches import rounds, store
+
+    if chosen.pop("fresh"):
+        shutil.rmtree(store.kept(topic), ignore_errors=True)
+    with rounds.reported(topic, words):
+        bench.run(chosen.pop("build_dir").resolve(), **chosen)
 
 
 def run_many(words: list[str]) -> None:
     topics = list(TOPICS)
     parser = front("tools/benches", __doc__)
     parser.add_argument("--only", nargs="+", choices=topics, default=topics, metavar="TOPIC", help=", ".join(topics))
+    parser.add_argument("--whole", action="store_true", help="each topic at its full size: many hours")
     chosen = parser.parse_args(words)
-    for topic in chosen.only:
-        print(f"bench: {topic}", flush=True)
-        bench_of(topic).run(chosen.build_dir.resolve(), chosen.fresh)
+    from benches import rounds
+
+    sizes = {} if chosen.whole else ROUND
+    try:
+        failed = rounds.measure_all(
+            {t: sizes.get(t, []) for t in chosen.only}, chosen.build_dir.resolve(), chosen.fresh
+        )
+    except KeyboardInterrupt:
+        sys.exit("bench: interrupted; the same command goes on here")
+    sys.exit(1 if failed else 0)
 
 
 def bench_of(topic: str) -> ModuleType:
-    """A module with run(build, fresh, ...), what it measures in its text, and options(parser) if run takes more."""
+    """A module with run(build, ...), what it measures in its text, and options(parser) if run takes more."""
     return importlib.import_module(f"benches.{TOPICS[topic]}")
 
 

@@ -269,7 +269,7 @@ def page() -> str:
         + "\n## Studies\n\nEach study has a page with all its figures:\n\n"
         + table(["page", "what"], [[f"[{path}]({path})", what] for path, what in STUDIES.items()])
         + "\n## How to make a chart again\n\n"
-        "`make bench` makes all of them; a command below makes one. It measures anew what is not in `build/bench`.\n\n"
+        "`make bench` makes all of them; a command below makes one. It goes on where an interrupted run of the same tree ended.\n\n"
         + table(["chart", "command"], charts())
     )
 

@@ -56,7 +56,7 @@ PAGES: dict[str, Callable[[], str]] = {
 }
 
 
-def run(_build: Path, _fresh: bool) -> None:
+def run(_build: Path) -> None:
     for path, make in PAGES.items():
         write_page(ROOT / path, make())
     print(f"{len(PAGES)} pages of docs/results")

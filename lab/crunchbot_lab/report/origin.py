@@ -11,6 +11,8 @@ import crunchbot
 
 SOURCES = Path(__file__).resolve().parents[3]  # of a source tree
 NOT_RECORDED = "not recorded"
+# Tracked files that measurements write, and pages: no part of the state that is measured.
+WRITTEN = (":!bench/results", ":!docs", ":!*.md", ":!sim/mechanics/tests/reference_*.h")
 
 
 def of_this_run() -> dict[str, str]:
@@ -26,10 +28,10 @@ def of_this_run() -> dict[str, str]:
 
 
 def commit(root: Path = SOURCES) -> str:
-    """The commit of a source tree; says so if tracked files differ from it, but for results and pages."""
+    """The commit of a source tree; says so if tracked files differ from it, but for WRITTEN."""
     if not (root / "lab/crunchbot_lab").is_dir():  # installed: what is around it is of another project
         return NOT_RECORDED
-    changes = ("status", "--porcelain", "--untracked-files=no", "--", ".", ":!bench/results", ":!docs")
+    changes = ("status", "--porcelain", "--untracked-files=no", "--", ".", *WRITTEN)
     words = (("rev-parse", "--short=12", "HEAD"), changes)
     done = [_git(root, *w) for w in words]
     if done[0].returncode:

@@ -1,16 +1,14 @@
 """The bridge in an FPGA: every board at every number of lanes, resources, clock, cycles per tick.
 
-Place and route takes minutes each, an hour in all; every one is kept in build/bench/bridge, so that an interrupted run
-goes on where it stopped; `--placements N` ends after N new ones, and the table says what is missing. Timing figures are
-nextpnr's own; the limits of the PHY's pins are those of fpga/boards/report.py.
+Place and route takes minutes each, an hour in all, and comes out the same from the same gateware and tools: every one is
+kept as long as these stand. `--placements N` ends after N new ones, and the table says what is missing. Timing figures
+are nextpnr's own; the limits of the PHY's pins are those of fpga/boards/report.py.
 """
 
 import json
-import shutil
 import subprocess
 import sys
 import textwrap
-from collections.abc import Callable
 from pathlib import Path
 
 from matplotlib.figure import Figure
@@ -21,7 +19,7 @@ from ..markdown import wrap
 from .chain import LINKS
 
 ROOT = Path(__file__).resolve().parents[3]
-CACHE = ROOT / "build/bench/bridge"
+CACHE = store.kept("bridge", "fpga", "protocol", "requirements.lock")
 sys.path[:0] = [str(ROOT / "fpga" / folder) for folder in ("boards", "tb")]
 
 import build as boards  # noqa: E402
@@ -44,16 +42,6 @@ WAYS, CELLS = ("out_ns", "in_ns", "through_ns"), ("LUT", "FF", "block RAM", "dis
 MARKERS = "os^vD*P"
 
 
-def once(name: str, measure: Callable[[], dict]) -> dict:
-    """A measurement, from the cache if an earlier run has made it."""
-    path = CACHE / f"{name}.json"
-    if not path.exists():
-        value = measure()
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps(value, indent=1) + "\n")
-    return json.loads(path.read_text())
-
-
 def placed(name: str, lanes: int, seed: int) -> dict:
     """One place and route; the netlist is made once per board and number of lanes."""
     board = boards.load(name)
@@ -74,7 +62,7 @@ def default_build(name: str, lanes: int, left: list[int]) -> dict | None:
             if not left[0]:
                 return None
             left[0] -= 1
-        found = once(path, lambda seed=seed: placed(name, lanes, seed))
+        found = store.once(CACHE / f"{path}.json", lambda seed=seed: placed(name, lanes, seed))
         if not found["problems"]:
             break
     return {"lanes": lanes, "seed": seed, **found}
@@ -122,7 +110,9 @@ def sustained(found: dict) -> bool:
 
 def rates(build: Path) -> dict:
     """What the bridge sustains when nodes can follow: by its settings' limit, and measured, faster and faster."""
-    tried = [once(f"pace_{period}", lambda p=period: paced(build, p)) for period in PACES]
+    tried = [
+        store.once(store.kept("bridge") / f"pace_{period}.json", lambda p=period: paced(build, p)) for period in PACES
+    ]
     fastest = min(found["period"] for found in tried if sustained(found))
     hertz = {"settings_hz": LIMITS["clock_hz"] / LIMITS["tick_period_min"], "link_hz": LIMITS["clock_hz"] / fastest}
     return {
@@ -222,13 +212,11 @@ def options(parser) -> None:
     )
 
 
-def run(build: Path, fresh: bool, placements: int = 10**6) -> None:
+def run(build: Path, placements: int = 10**6) -> None:
     """All figures of the bridge: bench/results/bridge.json, docs/charts/bridge_*, the table of docs/boards.md.
 
     `build` runs the pace alone.
     """
-    if fresh:
-        shutil.rmtree(CACHE, ignore_errors=True)
     found = fabric(placements)
     found |= {"latency": {title: latency(link) for title, link in LINKS.items()}, "rates": rates(build)}
     store.write_result("bridge", found)

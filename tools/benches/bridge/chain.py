@@ -1,16 +1,13 @@
 """Measures the whole chain at RTL level and the demo's localisation: speed as a ratio to real time, errors beside it.
 
-A measurement that is done is kept in build/bench/chain: an interrupted run goes on where it stopped; `--fresh` begins
-again. A filter's cost is its time per observation row beside the 0.1 s in which a robot must have its answer.
+A filter's cost is its time per observation row beside the 0.1 s in which a robot must have its answer.
 """
 
 import csv
 import json
-import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -30,7 +27,7 @@ from crunchbot_lab.simulation.scenes import make_scene
 from .. import store
 
 ROOT = Path(__file__).resolve().parents[3]
-CACHE = ROOT / "build/bench/chain"
+CACHE = store.kept("chain")
 ROW_S = 0.1
 BENCH_SECONDS = 5
 CHAIN_SECONDS = 60
@@ -47,15 +44,6 @@ FILTERS = {
     "grid 5 cm x 10 deg": ("grid", {}),
     "grid 2.5 cm x 5 deg": ("grid", {"grid.cell_m": 0.025, "grid.cell_deg": 5.0}),
 }
-
-
-def once(name: str, measure: Callable[[], dict]) -> dict:
-    """A measurement, from the cache if an earlier run has made it."""
-    path = CACHE / f"{name}.json"
-    if not path.exists():
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps(measure(), indent=1) + "\n")
-    return json.loads(path.read_text())
 
 
 # ---------------------------------------------------------------------------------------------------------------------
@@ -96,7 +84,7 @@ def measure_chain(build: Path) -> dict:
         for n in LANES
     ]
     jobs += [(f"chain_{n}", lambda n=n: chain_speed(build, n)) for n in CHAIN_LANES]
-    done = {name: once(name, job) for name, job in tqdm(jobs, desc="chain", unit="run")}
+    done = {name: store.once(CACHE / f"{name}.json", job) for name, job in tqdm(jobs, desc="chain", unit="run")}
     bridge = {title: [done[f"bridge_{n}_{link[0]}"] for n in LANES] for title, link in LINKS.items()}
     return {"bridge": bridge, "whole_chain": [done[f"chain_{n}"] for n in CHAIN_LANES]}
 
@@ -163,7 +151,7 @@ def _judge(scene, observations: localise.Observations, name: str, settings: dict
 
 def measure_localisation() -> dict:
     return {
-        str(seed): once(f"localisation_{seed}", lambda s=seed: localisation(s))
+        str(seed): store.once(CACHE / f"localisation_{seed}.json", lambda s=seed: localisation(s))
         for seed in tqdm(SEEDS, desc="localisation", unit="seed")
     }
 
@@ -191,7 +179,6 @@ def draw_localisation(runs: dict) -> Figure:
 def save(name: str, data: dict, figure: Figure) -> None:
     store.write_result(name, data)
     store.write_chart(name, figure)
-    print(f"bench/results/{name}.json, docs/charts/{name}.svg")
 
 
 def save_demo() -> None:
@@ -202,12 +189,9 @@ def save_demo() -> None:
     store.write_result("demo", json.loads((DEMO / "summary.json").read_text()))
 
 
-def run(build: Path, fresh: bool) -> None:
-    if fresh:
-        shutil.rmtree(CACHE, ignore_errors=True)
+def run(build: Path) -> None:
     chain = measure_chain(build)
     save("chain_speed", chain, draw_chain(chain))
     save_demo()
     runs = measure_localisation()
     save("localisation", runs, draw_localisation(runs))
-    shutil.rmtree(CACHE)

@@ -68,9 +68,8 @@ def draw(found: dict) -> Figure:
     return figure
 
 
-def run(build: Path, fresh: bool) -> None:
-    """Half a minute in all: nothing is kept between runs, so `fresh` changes nothing."""
+def run(build: Path) -> None:
+    """Half a minute in all: nothing is kept between runs."""
     found = measure(build)
     store.write_result("levels", found)
     store.write_chart("levels_speed", draw(found))
-    print("bench/results/levels.json, docs/charts/levels_speed.svg")

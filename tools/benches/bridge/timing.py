@@ -148,12 +148,11 @@ def table(found: dict) -> str:
     return "\n".join(lines)
 
 
-def run(build: Path, fresh: bool) -> None:
-    """A few minutes; nothing is kept between runs, so `fresh` changes nothing."""
+def run(build: Path) -> None:
+    """A few minutes; nothing is kept between runs."""
     reported = subprocess.run([build / "tests/usb/bridge-free", str(TICKS)], check=True, capture_output=True, text=True)
     found = {"latency": json.loads(reported.stdout), "skew": pair(build.resolve() / "pair.json"), "clock": clock(build)}
     found["host"] = host(build, found["latency"])
     store.write_result("bridge_timing", found)
     before, rest = PAGE.read_text().split(BEGIN)
     PAGE.write_text(f"{before}{BEGIN}\n\n{wrap(table(found))}\n\n{END}{rest.split(END)[1]}")
-    print("bench/results/bridge_timing.json, docs/timing.md")

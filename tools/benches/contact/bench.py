@@ -110,7 +110,7 @@ def draw(results: dict) -> Figure:
     return figure
 
 
-def run(build: Path, fresh: bool, each: int = CONTACTS) -> None:
+def run(build: Path, each: int = CONTACTS) -> None:
     """Measure all kinds with the friction known and not, and against a chain of links in MuJoCo."""
     results: dict = {"tick_s": TICK_S, "first_s": FIRST_S, "kinds": {}, "course": {}, "whisked": {}}
     for name, case in CASES.items():

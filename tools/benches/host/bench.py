@@ -9,12 +9,10 @@
   library; umockdev's are left out, what the kernel would do is not in. libusb's are an upper bound: under umockdev it
   is woken also when there is nothing.
 - Memory: of whiskerd while it streams. Clock: an hour of the synthetic trace of the library's test.
-What is done is kept in build/bench/host.
 """
 
 import csv
 import io
-import json
 import os
 import re
 import shutil
@@ -39,7 +37,7 @@ from whisker_protocol import LANES, LIMITS
 from .. import store
 
 ROOT = Path(__file__).resolve().parents[3]
-CACHE = ROOT / "build/bench/host"
+CACHE = store.kept("host")
 HZ = LIMITS["clock_hz"] // LIMITS["tick_period"]
 ATOM_HZ = 0.8e9  # instructions per second of the paper's netbook
 LINK = ("--sck-divider", "6", "--word-gap", "30", "--sample-point", "5")
@@ -56,15 +54,6 @@ EVENTS = {
     "unplug": "pulled: daemon knows",
     "replug": "put back: first sample",
 }
-
-
-def once(name: str, measure: Callable[[], dict]) -> dict:
-    """A measurement, from the cache if an earlier run has made it."""
-    path = CACHE / f"{name}.json"
-    if not path.exists():
-        data = measure()
-        path.write_text(json.dumps(data, indent=1) + "\n")
-    return json.loads(path.read_text())
 
 
 def program(build: Path, name: str) -> str:
@@ -266,20 +255,19 @@ def draw_clock(rows: dict) -> Figure:
 # ---------------------------------------------------------------------------------------------------------------------
 
 
-def run(build: Path, fresh: bool) -> None:
+def run(build: Path) -> None:
     """Measure what is not measured yet, write results and charts."""
-    if fresh:
-        shutil.rmtree(CACHE, ignore_errors=True)
-    CACHE.mkdir(parents=True, exist_ok=True)
-    times = once("cable", lambda: cable_times(build))
+    times = store.once(CACHE / "cable.json", lambda: cable_times(build))
     results = {
         "times_s": {event: {"median": float(np.median(t)), "max": max(t), "n": len(t)} for event, t in times.items()},
-        "memory": once("memory", lambda: memory(build)),
+        "memory": store.once(CACHE / "memory.json", lambda: memory(build)),
     }
     store.write_chart("host_cable", figures.svg(draw_cable, times))
     if shutil.which("valgrind"):
-        batches = tqdm(BATCHES, desc="instructions", unit="batch")
-        counts = {str(b): once(f"instructions_{b}", lambda b=b: instructions(build, b)) for b in batches}
+        counts = {
+            str(b): store.once(CACHE / f"instructions_{b}.json", lambda b=b: instructions(build, b))
+            for b in tqdm(BATCHES, desc="instructions", unit="batch")
+        }
         results["lanes"], results["rate_hz"] = LANES, HZ
         results["instructions_per_frame"] = {
             batch: {**count, "total": sum(count.values()), "atom_share": sum(count.values()) * HZ / ATOM_HZ}
@@ -287,8 +275,9 @@ def run(build: Path, fresh: bool) -> None:
         }
     else:
         results["instructions_per_frame"] = "skipped: valgrind is not on this machine"
-    clocks = {str(seed): once(f"clock_{seed}", lambda s=seed: clock(build, s)) for seed in CLOCK_SEEDS}
+    clocks = {
+        str(seed): store.once(CACHE / f"clock_{seed}.json", lambda s=seed: clock(build, s)) for seed in CLOCK_SEEDS
+    }
     results["clock"] = {seed: {k: v for k, v in c.items() if k != "rows"} for seed, c in clocks.items()}
     store.write_chart("host_clock", figures.svg(draw_clock, clocks[str(CLOCK_SEEDS[0])]["rows"]))
     store.write_result("host", results)
-    print("bench/results/host.json, docs/charts/host_{cable,clock}.svg")

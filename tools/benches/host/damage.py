@@ -109,7 +109,7 @@ def measure() -> dict:
     return rows
 
 
-def run(build: Path, fresh: bool) -> None:
+def run(build: Path) -> None:
     """Measure and write. `build` is not used, and nothing is kept from run to run."""
     rows = measure()
     store.write_result("damage", {"seed": SEED, "files": FILES, "readers": rows})

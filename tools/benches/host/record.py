@@ -6,10 +6,9 @@ The frames are those of simulated robots that drive (level 1: world, whiskers, s
 two minutes long and repeated: a chunk of a recording holds two seconds and is packed on its own, so that repeating
 saves nothing. One process publishes a tenth of a second of frames and records it, in turn; then the file is read again
 and compared. Instructions are counted by valgrind, as the difference between a short and a long recording; they are
-those of the recorder alone. What is done is kept in build/bench/record.
+those of the recorder alone.
 """
 
-import json
 import os
 import re
 import subprocess
@@ -165,34 +164,22 @@ def draw(results: dict) -> Figure:
     return figure
 
 
-def once(cache: Path, name: str, measure) -> dict | float:
-    """A measurement, from the cache if an earlier run has made it."""
-    path = cache / f"{name}.json"
-    if not path.exists():
-        path.write_text(json.dumps(measure()) + "\n")
-    return json.loads(path.read_text())
-
-
-def run(build: Path, fresh: bool) -> None:
+def run(build: Path) -> None:
     """Measure what is not measured yet, write results and chart. `build` is not used: the Python module is what
     counts."""
-    cache = ROOT / "build/bench/record"
+    cache = store.kept("record")
     cache.mkdir(parents=True, exist_ok=True)
-    if fresh:
-        for path in cache.glob("*.json"):
-            path.unlink()
     file = cache / "bench.mcap"
     driving = simulated_frames(PERIOD_S, True)
     still = simulated_frames(PERIOD_S, False)
     results = {
         "lanes": LANES,
         "rate_hz": HZ,
-        "still": once(cache, "still", lambda: record_and_read(file, still, PERIOD_S, "standing robot")),
-        "hour": once(cache, "hour", lambda: record_and_read(file, driving, HOUR_S, "an hour")),
-        "instructions_per_frame": once(cache, "instructions", lambda: instructions_per_frame(driving)),
+        "still": store.once(cache / "still.json", lambda: record_and_read(file, still, PERIOD_S, "standing robot")),
+        "hour": store.once(cache / "hour.json", lambda: record_and_read(file, driving, HOUR_S, "an hour")),
+        "instructions_per_frame": store.once(cache / "instructions.json", lambda: instructions_per_frame(driving)),
     }
     file.unlink(missing_ok=True)
     results["atom_share"] = results["instructions_per_frame"] * HZ / ATOM_HZ
     store.write_result("record", results)
     store.write_chart("record_cost", figures.svg(draw, results))
-    print("bench/results/record.json, docs/charts/record_cost.svg")

@@ -30,7 +30,7 @@ from .. import store
 
 ROOT = Path(__file__).resolve().parents[3]
 SOURCES = ROOT / "tools/benches/host/peers"
-CACHE = ROOT / "build/bench/ring"
+BUILT, RUNS = store.BENCH / "ring", store.kept("ring")
 CMAKE_NEEDED = (3, 30)
 
 # name -> title, program, wait modes, what it needs
@@ -45,65 +45,73 @@ PEERS = {
 }
 
 
-def build_c(build: Path, name: str, flags: list[str]) -> Path:
-    program = CACHE / "bin" / f"peer_{name}"
+def build_c(name: str, flags: list[str]) -> Path | None:
+    """A program in C; None: it is left out."""
+    program = BUILT / "bin" / f"peer_{name}"
     program.parent.mkdir(parents=True, exist_ok=True)
     command = ["cc", "-O2", "-std=gnu11", f"-I{ROOT}/host/libwhisker/include"]
-    command += [str(SOURCES / f"peer_{name}.c"), str(SOURCES / "harness.c"), "-o", str(program), *flags]
-    subprocess.run(command, check=True)
+    command += [SOURCES / f"peer_{name}.c", SOURCES / "harness.c", "-o", program, *flags]
+    return built(name, program, store.failure(command))
+
+
+def built(name: str, program: Path, error: str) -> Path | None:
+    if error:
+        store.leave_out(PEERS[name][0], error)
+        return None
     return program
 
 
-def pkg_config(module: str) -> list[str] | None:
-    found = subprocess.run(["pkg-config", "--cflags", "--libs", module], capture_output=True, text=True)
-    return found.stdout.split() if found.returncode == 0 else None
+def build_linked(name: str, module: str, package: str) -> Path | None:
+    """A program in C over a library that pkg-config knows; None: it is left out."""
+    found = subprocess.run(["pkg-config", "--cflags", "--libs", module], capture_output=True, text=True, check=False)
+    if found.returncode != 0:
+        return built(name, BUILT, f"no library; apt-get install {package}")
+    return build_c(name, found.stdout.split())
 
 
-def cmake_folder() -> Path | None:
-    """Where a CMake new enough for Aeron is: the system's, or one in a virtual environment of the bench's own."""
+def cmake_folder() -> Path:
+    """Where a CMake new enough for Aeron is: the system's, or one in a virtual environment of the bench's own.
+
+    RuntimeError: neither can be had.
+    """
     text = subprocess.run(["cmake", "--version"], capture_output=True, text=True).stdout.split()
     if tuple(map(int, text[2].split(".")[:2])) >= CMAKE_NEEDED:
         return Path(shutil.which("cmake")).parent
-    folder = CACHE / "venv"
+    folder = BUILT / "venv"
     if not (folder / "bin/cmake").exists():
-        subprocess.run([sys.executable, "-m", "venv", str(folder)], check=True)
-        pip = [str(folder / "bin/pip"), "install", "--quiet", "--disable-pip-version-check", "--require-hashes"]
-        if subprocess.run([*pip, "-r", str(SOURCES / "requirements.lock")]).returncode != 0:
-            return None
+        pip = [folder / "bin/pip", "install", "--quiet", "--disable-pip-version-check", "--require-hashes"]
+        install = [*pip, "-r", SOURCES / "requirements.lock"]
+        if error := store.failure([sys.executable, "-m", "venv", folder], install):
+            raise RuntimeError(f"CMake {CMAKE_NEEDED[0]}.{CMAKE_NEEDED[1]} cannot be installed: {error}")
     return folder / "bin"
 
 
-def build_rust() -> Path | None:
-    """The folder of the Rust peers' programs; compiling takes minutes the first time."""
-    target = Path(os.environ.get("CARGO_TARGET_DIR", CACHE / "target"))
-    cmake = cmake_folder()
-    features = ["--features", "aeron"] if cmake and shutil.which("clang") else []
+def build_rust(name: str) -> Path | None:
+    """A program in Rust, each by a build of its own; compiling takes minutes the first time. None: it is left out."""
+    if not shutil.which("cargo"):
+        return built(name, BUILT, "no cargo; install Rust 1.85 or newer (rustup)")
+    target = Path(os.environ.get("CARGO_TARGET_DIR", BUILT / "target"))
     environment = {**os.environ, "CARGO_TARGET_DIR": str(target)}
-    if cmake:
-        environment["PATH"] = f"{cmake}:{environment['PATH']}"
-    command = ["cargo", "build", "--release", "--locked", "--quiet", *features]
-    print("ring bench: compiling iceoryx2, zenoh and Aeron (about ten minutes the first time)")
-    built = subprocess.run(command, cwd=SOURCES, env=environment)
-    return target / "release" if built.returncode == 0 else None
+    try:
+        if name == "aeron":
+            environment["PATH"] = f"{cmake_folder()}:{environment['PATH']}"
+    except RuntimeError as error:
+        return built(name, BUILT, str(error))
+    print(f"ring bench: compiling {PEERS[name][0]} (minutes the first time)", flush=True)
+    command = ["cargo", "build", "--release", "--locked", "--quiet", "--features", name, "--bin", f"peer_{name}"]
+    return built(name, target / f"release/peer_{name}", store.failure(command, cwd=SOURCES, env=environment))
 
 
 def programs(build: Path) -> dict[str, Path]:
-    """The programs there are. What cannot be built is named, with what would help."""
-    archive = build / "host/libwhisker/libwhisker.a"
-    found = {"whisker": build_c(build, "whisker", [str(archive)]), "memory": build_c(build, "memory", [])}
-    for name, module, package in (("lcm", "lcm", "liblcm-dev"), ("zeromq", "libzmq", "libzmq3-dev")):
-        flags = pkg_config(module)
-        if flags:
-            found[name] = build_c(build, name, flags)
-        else:
-            print(f"ring bench: {PEERS[name][0]} left out; to have it: apt-get install {package}")
-    rust = build_rust() if shutil.which("cargo") else None
-    for name in ("iceoryx2", "zenoh", "aeron"):
-        if rust and (rust / f"peer_{name}").exists():
-            found[name] = rust / f"peer_{name}"
-        else:
-            print(f"ring bench: {PEERS[name][0]} left out; to have it: install Rust 1.85 or newer (rustup) and clang")
-    return found
+    """The programs there are. What cannot be built is left out alone, with its own error."""
+    found = {
+        "whisker": build_c("whisker", [str(build / "host/libwhisker/libwhisker.a")]),
+        "memory": build_c("memory", []),
+        "lcm": build_linked("lcm", "lcm", "liblcm-dev"),
+        "zeromq": build_linked("zeromq", "libzmq", "libzmq3-dev"),
+        **{name: build_rust(name) for name in ("iceoryx2", "zenoh", "aeron")},
+    }
+    return {name: found[name] for name in found if found[name]}
 
 
 READERS = (1, 2, 8, 32)  # of a run; all on one processor
@@ -293,13 +301,6 @@ def settings(found: dict[str, Path]) -> list[tuple[str, str, str, int]]:
     return rows
 
 
-def once(path: Path, run: Run) -> dict:
-    if not path.exists():
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps(run.measure()) + "\n")
-    return json.loads(path.read_text())
-
-
 def measure(found: dict[str, Path], rounds: int, scale: float) -> list[dict]:
     rows = settings(found)
     done: dict[tuple, list[dict]] = {row: [] for row in rows}
@@ -309,7 +310,8 @@ def measure(found: dict[str, Path], rounds: int, scale: float) -> list[dict]:
                 peer, mode, pace, readers = row
                 bar.set_postfix_str(f"{peer} {mode} {pace} {readers}")
                 run = Run(found[peer], mode, pace, readers, SECONDS[pace] * scale)
-                done[row].append(once(CACHE / "runs" / f"{peer}_{mode}_{pace}_{readers}_{turn}.json", run))
+                path = RUNS / f"{peer}_{mode}_{pace}_{readers}_{turn}_{scale:g}.json"
+                done[row].append(store.once(path, run.measure))
                 bar.update()
     return [summary(*row, done[row]) for row in rows]
 
@@ -334,12 +336,12 @@ def summary(peer: str, mode: str, pace: str, readers: int, runs: list[dict]) -> 
     }
 
 
-def save(rows: list[dict], left_out: list[str]) -> None:
+def save(rows: list[dict], left_out: list[str], rounds: int) -> None:
     versions = [line.strip() for line in (SOURCES / "Cargo.toml").read_text().splitlines() if "version = " in line]
     data = {
         "cores": len(os.sched_getaffinity(0)),
         "frame_bytes": 256,
-        "rounds": ROUNDS,
+        "rounds": rounds,
         "seconds": SECONDS,
         "versions": versions,
         "left_out": left_out,
@@ -348,16 +350,13 @@ def save(rows: list[dict], left_out: list[str]) -> None:
     store.write_result("ring", data)
     for name, draw in (("latency", draw_latency), ("throughput", draw_throughput), ("writer", draw_writer)):
         store.write_chart(f"ring_{name}", draw(rows))
-    print("bench/results/ring.json, docs/charts/ring_latency.svg, ring_throughput.svg, ring_writer.svg")
 
 
-def run(build: Path, fresh: bool, rounds: int = ROUNDS, scale: float = 1.0) -> None:
+def run(build: Path, rounds: int = ROUNDS, scale: float = 1.0) -> None:
     """Measure what is not measured yet, and redraw."""
     matplotlib.rcParams["svg.hashsalt"] = "whisker"
-    if fresh:
-        shutil.rmtree(CACHE / "runs", ignore_errors=True)
     found = programs(build.resolve())
-    save(measure(found, rounds, scale), sorted(PEERS.keys() - found.keys()))
+    save(measure(found, rounds, scale), sorted(PEERS.keys() - found.keys()), rounds)
 
 
 def options(parser: argparse.ArgumentParser) -> None:

@@ -5,7 +5,7 @@ and of a robot whose belief has as many poses as a message may.
 
 Three processes: a writer at the pace of the hardware (or of the robot's streams, over zenoh), whisker-view, and pages
 without a screen that take what comes as the real page does. CPU time is the server process's own, user and system, over
-each run; a run that is done is kept in build/bench/view.
+each run.
 """
 
 import asyncio
@@ -13,7 +13,6 @@ import itertools
 import json
 import multiprocessing
 import os
-import shutil
 import socket
 import subprocess
 import sys
@@ -226,17 +225,13 @@ def draw(runs: dict[str, list[dict]]) -> Figure:
     return figure
 
 
-def run(build: Path, fresh: bool) -> None:
+def run(build: Path) -> None:
     """Measure what is missing and draw; `build` is not used: whisker-view is all Python."""
-    cache = ROOT / "build/bench/view"
-    if fresh:
-        shutil.rmtree(cache, ignore_errors=True)
-    cache.mkdir(parents=True, exist_ok=True)
-    paths = {(part, pages): cache / f"{part}-{pages}.json" for part in PARTS for pages in PAGES}
-    for (part, pages), path in tqdm(paths.items(), desc="whisker-view", unit="run"):
-        if not path.exists():
-            path.write_text(json.dumps(measure(part, pages)))
-    runs = {part: [json.loads(paths[part, pages].read_text()) for pages in PAGES] for part in PARTS}
+    cache, turns = store.kept("view"), [(part, pages) for part in PARTS for pages in PAGES]
+    runs: dict[str, list[dict]] = {part: [] for part in PARTS}
+    for part, pages in tqdm(turns, desc="whisker-view", unit="run"):
+        found = store.once(cache / f"{part}-{pages}.json", lambda part=part, pages=pages: measure(part, pages))
+        runs[part].append(found)
     found = {
         "lanes": LANES,
         "hz": HZ,
@@ -245,4 +240,3 @@ def run(build: Path, fresh: bool) -> None:
     }
     store.write_result("view", found)
     store.write_chart("view_cost", figures.svg(draw, runs))
-    print("bench/results/view.json, docs/charts/view_cost.svg")

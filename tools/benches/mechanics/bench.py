@@ -7,7 +7,6 @@ MuJoCo's rounds take turns.
 """
 
 import json
-import shutil
 from pathlib import Path
 
 import matplotlib
@@ -19,7 +18,6 @@ from .. import store
 from .edges import HEIGHTS_MM, SPEEDS, draw_edges, edge_summary, measure_edges, page
 from .edges import write_table as write_edge_table
 from .measure import (
-    CACHE,
     FINEST,
     LEVELS,
     LINKS,
@@ -182,7 +180,6 @@ def save(data: dict) -> None:
     store.write_result("mechanics", data)
     for name, draw in (("speed", draw_speed), ("moment", draw_moment)):
         store.write_chart(f"mechanics_{name}", draw(data))
-    print("bench/results/mechanics.json, docs/charts/mechanics_speed.svg, mechanics_moment.svg")
 
 
 def save_edges(rows: list[dict], data: dict) -> None:
@@ -204,12 +201,9 @@ def keep(ours: Ours, links: list[dict]) -> None:
                 row["kept"].append(p)
 
 
-def run(build: Path, fresh: bool) -> None:
+def run(build: Path) -> None:
     """Measure what is not measured yet, and redraw. The simulator is the one that tools/build.sh has built."""
     matplotlib.rcParams["svg.hashsalt"] = "whisker"
-    if fresh:
-        for folder in ("chain", "speed"):
-            shutil.rmtree(CACHE / folder, ignore_errors=True)
     ours = Ours()
     steps = len(static_cases()) + len(LINKS) + len(mode_cases()) + ROUNDS + len(HEIGHTS_MM) * len(SPEEDS)
     with tqdm(total=steps, desc="mechanics") as bar:

@@ -6,14 +6,12 @@
                                         passes
     tools/benches nav --page           measures nothing: writes the page of what has been measured
 
-Every job leaves a file in build/bench/nav/jobs: a stopped run goes on where it was; `--fresh` begins again. Figures but
-those of time are the same for any number of workers. Seeds are none that filters were developed on.
+Figures but those of time are the same for any number of workers. Seeds are none that filters were developed on.
 """
 
 import argparse
 import hashlib
 import json
-import shutil
 import subprocess
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -310,19 +308,18 @@ def measure(bench: Bench, parts: list[str]) -> None:
 
 
 def full(workers=None, backend: str = "processes", build: Path = BUILD, seeds: int = 100) -> Bench:
-    cache = ROOT / "build/bench/nav"
+    cache = store.kept("nav")
     places = (cache, store.RESULTS, store.CHARTS, ROOT / "docs/results/nav.md")
     return Bench(scale(seeds), *places, workers, backend, build)
 
 
 def small(workers=None, backend: str = "processes", build: Path = BUILD) -> Bench:
-    cache = ROOT / "build/bench/nav-quick"
+    cache = store.BENCH / "nav-quick"
     return Bench(QUICK, cache, cache, cache, cache / "nav.md", workers, backend, build)
 
 
 def run(
     build: Path,
-    fresh: bool,
     only: Sequence[str] = tuple(PARTS),
     quick: bool = False,
     page: bool = False,
@@ -332,10 +329,7 @@ def run(
 ) -> None:
     """The filters are those of the Python module; `build` holds nav_bench."""
     bench = small(workers, backend, build) if quick else full(workers, backend, build, seeds)
-    if fresh:
-        shutil.rmtree(bench.jobs, ignore_errors=True)
     measure(bench, [] if page else only)
-    print(bench.document)
 
 
 def options(parser: argparse.ArgumentParser) -> None:

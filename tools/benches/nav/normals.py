@@ -9,7 +9,6 @@ filter on its whiskers' signals.
 import argparse
 import math
 from dataclasses import replace
-from json import dumps, loads
 from pathlib import Path
 
 import numpy as np
@@ -224,23 +223,20 @@ def page(data: dict) -> str:
     return "\n".join(lines) + "\n"
 
 
-def run(build: Path, fresh: bool, seeds: int = 8, flights: int = 6) -> None:
+def run(build: Path, seeds: int = 8, flights: int = 6) -> None:
     jobs = [(drawn, family, seed) for family in FAMILIES for seed in range(seeds)]
     jobs += [(flown, build, seed) for seed in range(flights)]
     found: dict[str, list[dict]] = {}
-    (build / "normals").mkdir(parents=True, exist_ok=True)
+    cache = store.kept("normals")
     for make, what, seed in tqdm(jobs, desc="normals", unit="run"):
         family = what if make is drawn else FLIGHT
-        kept = build / "normals" / f"{family}_{seed}.json"
-        if fresh or not kept.exists():
-            kept.write_text(dumps(make(what, seed)))
-        found.setdefault(family, []).append(loads(kept.read_text()))
+        one = store.once(cache / f"{family}_{seed}.json", lambda make=make, what=what, seed=seed: make(what, seed))
+        found.setdefault(family, []).append(one)
     data = {"families": {family: judged(runs) for family, runs in found.items()}}
     data["directions"] = of_directions(found[FLIGHT])
     data["points"] = of_points(found[FLIGHT])
     store.write_result("nav_normals", data)
     store.write_page(PAGE, page(data))
-    print("bench/results/nav_normals.json, docs/results/nav_normals.md")
 
 
 def options(parser: argparse.ArgumentParser) -> None:

@@ -6,7 +6,6 @@ Likelihoods and filters are host/nav's; the arena is drawn at random, as the pap
 bench/results/nav_paper.json and docs/charts/nav_fig6a, nav_fig6b, nav_fig6c, nav_banana.
 """
 
-import json
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -29,7 +28,7 @@ from .. import store
 from . import paper_charts as charts
 
 ROOT = Path(__file__).resolve().parents[3]
-CACHE = ROOT / "build/bench/nav_paper"
+CACHE = store.kept("nav_paper")
 CELLS, DIAMETER_M, SPAN_RAD = 11, 0.25, math.pi / 2  # the paper's fovea
 SPACING_M, SPACING_RAD = DIAMETER_M / (CELLS - 1), SPAN_RAD / (CELLS - 1)
 FIGURE_SEED = 9001
@@ -268,23 +267,16 @@ def end_to_end(world: str, seed: int) -> dict:
     return out
 
 
-def once(name: str, fresh: bool, measure) -> dict:
-    path = CACHE / f"{name}.json"
-    if fresh or not path.exists():
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps(measure()) + "\n")
-    return json.loads(path.read_text())
-
-
-def claims(fresh: bool) -> dict:
+def claims() -> dict:
     motions = [
-        once(f"motion_{way}_{turn}_{start}", fresh, lambda m=(way, turn, start): compare_motion(*m))
+        store.once(CACHE / f"motion_{way}_{turn}_{start}.json", lambda m=(way, turn, start): compare_motion(*m))
         for way, turn, start in tqdm(MOTIONS, desc="nav_paper: motions")
     ]
     jobs = [(world, seed) for world in WORLDS for seed in range(SEEDS)]
     runs = {world: [] for world in WORLDS}
     for world, seed in tqdm(jobs, desc="nav_paper: end to end"):
-        runs[world].append(once(f"{world}_{seed}".replace(" ", "-"), fresh, lambda w=world, s=seed: end_to_end(w, s)))
+        path = CACHE / f"{world}_{seed}.json".replace(" ", "-")
+        runs[world].append(store.once(path, lambda w=world, s=seed: end_to_end(w, s)))
     return {"motions": motions, "end_to_end": {world: total(part) for world, part in runs.items()}, "seeds": SEEDS}
 
 
@@ -298,9 +290,9 @@ def total(runs: list[dict]) -> dict:
     return out
 
 
-def run(_build: Path, fresh: bool) -> None:
+def run(_build: Path) -> None:
     made = scenes.make("anchor", FIGURE_SEED)
-    a, b, c, claim = fig6a(made), fig6b(made), fig6c(), claims(fresh)
+    a, b, c, claim = fig6a(made), fig6b(made), fig6c(), claims()
     drawn = {
         "nav_fig6a": lambda: charts.likelihoods(made.scene.arena, a),
         "nav_fig6b": lambda: charts.fusion(b),
@@ -318,4 +310,3 @@ def run(_build: Path, fresh: bool) -> None:
         "banana": claim,
     }
     store.write_result("nav_paper", result)
-    print("bench/results/nav_paper.json, docs/charts/" + ", ".join(drawn))

@@ -4,14 +4,12 @@
 
 Every filter takes the rows of the same scenes through host/nav's intake and weighs poses by host/nav's
 likelihood; what differs is the filter. Times are CPU time per row, all of it: intake, motion, weights, resampling,
-estimate. A run that is done is kept in build/bench/nav_peers. A peer that is not there is skipped by name. A program of
+estimate. A peer that cannot be had is left out with its own error, and the others are measured. A program of
 one's own joins by NAV_PEER_<NAME>=PROGRAM, called as PROGRAM SCENE.txt EST.csv --particles N --seed S (peer.hpp).
 """
 
 import argparse
-import json
 import os
-import re
 import subprocess
 import sys
 import tempfile
@@ -31,7 +29,7 @@ from crunchbot_lab import scenes
 from .. import store
 
 ROOT = Path(__file__).resolve().parents[3]
-CACHE = ROOT / "build/bench/nav_peers"
+CACHE = store.kept("nav_peers")
 PEERS = Path(__file__).resolve().parent / "peers"
 VENV, NATIVE = ROOT / "build/bench/peers-venv", ROOT / "build/bench/peers"
 APT = "apt-get install libmrpt-slam-dev"
@@ -120,17 +118,6 @@ def python(peer: str, *options) -> Callable:
     return run
 
 
-def failure(*commands: tuple) -> str:
-    """The error of the first of these commands that fails, one line; empty: none did."""
-    for command in commands:
-        done = subprocess.run([str(word) for word in command], capture_output=True, text=True)
-        if done.returncode != 0:
-            lines = [line.strip() for line in (done.stdout + done.stderr).splitlines() if line.strip()]
-            reported = next((line for line in lines if re.search(r"\berror\b", line, re.IGNORECASE)), None)
-            return reported or (lines[-1] if lines else f"exit code {done.returncode}")
-    return ""
-
-
 def python_entries(most: int) -> list[Entry]:
     """Installs the packages into a virtual environment of their own, once."""
     pip = (VENV / "bin/pip", "install", "--disable-pip-version-check", "--require-hashes")
@@ -138,8 +125,8 @@ def python_entries(most: int) -> list[Entry]:
     if not ready.exists():
         lock = PEERS / "requirements.lock"
         install = ((*pip, "-r", PEERS / "build.lock"), (*pip, "--no-build-isolation", "-r", lock))
-        if error := failure((sys.executable, "-m", "venv", VENV), *install):
-            print(f"nav_peers: filterpy, particles, pfilter skipped: {lock} cannot be installed: {error}")
+        if error := store.failure((sys.executable, "-m", "venv", VENV), *install):
+            store.leave_out("filterpy, particles, pfilter", f"{lock.relative_to(ROOT)} cannot be installed: {error}")
             return []
         ready.touch()
     return [
@@ -150,15 +137,14 @@ def python_entries(most: int) -> list[Entry]:
 
 
 def mrpt_entries(build: Path, most: int) -> list[Entry]:
-    """Builds the program if MRPT is there; a build that fails ends the bench with its error."""
+    """Builds the program if MRPT is there."""
     library = next(iter(sorted(build.rglob("libwhisker-nav.a"))), None)
     cmake = ("cmake", "-S", PEERS, "-B", NATIVE, f"-DNAV_LIBRARY={library}")
-    if error := failure(cmake, ("cmake", "--build", NATIVE)):
-        raise SystemExit(
-            f"nav_peers: {PEERS} does not build: {error}; mend it, or look at it with cmake --build {NATIVE}"
-        )
+    if error := store.failure(cmake, ("cmake", "--build", NATIVE)):
+        store.leave_out("MRPT, programs of one's own", f"{PEERS.relative_to(ROOT)} does not build: {error}")
+        return []
     if not (NATIVE / "mrpt_peer").exists():
-        print(f"nav_peers: MRPT skipped: not installed; {APT}")
+        store.leave_out("MRPT", f"not installed; {APT}")
         return []
     peer = NATIVE / "mrpt_peer"
     sizes = [Entry("mrpt standard", str(n), most, native(peer, "--particles", n)) for n in (100, 500, 2000)]
@@ -175,7 +161,7 @@ def guests(most: int) -> list[Entry]:
     prefix = "NAV_PEER_"
     found = {key.removeprefix(prefix).lower(): value for key, value in os.environ.items() if key.startswith(prefix)}
     for name in {"beluga", "nav2"} - found.keys():
-        print(f"nav_peers: {name} skipped: no program; set {prefix}{name.upper()} to one that peer.hpp describes")
+        store.leave_out(name, f"no program; set {prefix}{name.upper()} to one that peer.hpp describes")
     return [
         Entry(name, str(n), min(most, PYTHON_SEEDS), native(Path(path), "--particles", n))
         for name, path in sorted(found.items())
@@ -195,16 +181,15 @@ def judge(made: scenes.Made, steps: Steps) -> dict:
     }
 
 
-def measure(entry: Entry, family: str, seed: int, fresh: bool) -> dict:
+def measure(entry: Entry, family: str, seed: int) -> dict:
     name = "_".join([entry.filter, entry.setting, family, str(seed)]).replace(" ", "-")
-    kept = CACHE / f"{name}.json"
-    if fresh or not kept.exists():
+
+    def judged() -> dict:
         made = scenes.make(family, FIRST_SEED + seed)
         with tempfile.TemporaryDirectory() as folder:
-            result = judge(made, entry.run(Path(folder), made, seed))
-        kept.parent.mkdir(parents=True, exist_ok=True)
-        kept.write_text(json.dumps(result) + "\n")
-    return json.loads(kept.read_text())
+            return judge(made, entry.run(Path(folder), made, seed))
+
+    return store.once(CACHE / f"{name}.json", judged)
 
 
 def summed_up(entry: Entry, family: str, runs: list[dict]) -> dict:
@@ -228,7 +213,7 @@ def summed_up(entry: Entry, family: str, runs: list[dict]) -> dict:
     }
 
 
-def run(build: Path, fresh: bool, seeds: int = SEEDS) -> None:
+def run(build: Path, seeds: int = SEEDS) -> None:
     known = localise.filter_names()
     entries = [
         Entry(*key, seeds, ours(key[0].split()[0], settings))
@@ -239,9 +224,8 @@ def run(build: Path, fresh: bool, seeds: int = SEEDS) -> None:
     jobs = [(e, family, seed) for e in entries for family in FAMILIES for seed in range(e.seeds)]
     results = {}
     for entry, family, seed in tqdm(jobs, desc="nav_peers", unit="run"):
-        results.setdefault((entry, family), []).append(measure(entry, family, seed, fresh))
+        results.setdefault((entry, family), []).append(measure(entry, family, seed))
     store.write_result("nav_peers", [summed_up(*key, runs) for key, runs in results.items()])
-    print("bench/results/nav_peers.json")
 
 
 def options(parser: argparse.ArgumentParser) -> None:

@@ -144,9 +144,7 @@ def page(data: dict) -> str:
     return "\n".join(lines) + "\n"
 
 
-def run(
-    _build: Path, _fresh: bool, seeds: int = 20, first: int = FIRST_SEED, side: Sequence[int] = (), json: Path = RESULT
-) -> None:
+def run(_build: Path, seeds: int = 20, first: int = FIRST_SEED, side: Sequence[int] = (), json: Path = RESULT) -> None:
     sides = {}
     for metres in side or SIDES:
         sides[str(metres)] = measure(metres, range(first, first + seeds))

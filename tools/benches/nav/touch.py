@@ -46,7 +46,7 @@ def score(name: str, data: str | None, others: list) -> list[dict] | None:
     try:
         wanted = benchmark.entry(name, data)
     except benchmark.BenchmarkError as error:
-        print(f"touch: {error}; its stored scores stay")
+        store.leave_out(name, f"{error}; its stored scores stay")
         return None
     ours = [benchmark.run_filter(filter, wanted) for filter in localise.filter_names()]
     found = [*ours, *(run_peer(peer, wanted) for peer in others)]
@@ -71,8 +71,8 @@ def draw(table: dict[str, list[dict]]):
     return figure
 
 
-def run(build: Path, fresh: bool, data: str | None = None) -> None:
-    table, others = {} if fresh else benchmark.stored(FILE), peers(build)
+def run(build: Path, data: str | None = None) -> None:
+    table, others = benchmark.stored(FILE), peers(build)
     for name in tqdm(benchmark.NAMES, desc="touch", unit="scene"):
         scores = score(name, data, others)
         if scores is not None:
@@ -81,7 +81,6 @@ def run(build: Path, fresh: bool, data: str | None = None) -> None:
     store.record_origin("touch")
     with matplotlib.rc_context({"svg.hashsalt": "whisker", "svg.fonttype": "none"}):
         store.write_chart("touch", draw(benchmark.stored(FILE)))
-    print("bench/results/touch.json, docs/charts/touch.svg")
 
 
 def options(parser: argparse.ArgumentParser) -> None:

@@ -368,7 +368,6 @@ def leave_out(filter: str, seeds: range) -> None:
 
 def run(
     _build: Path,
-    _fresh: bool,
     filter: str = "adaptive",
     seeds: int = 20,
     first: int = FIRST_SEED,

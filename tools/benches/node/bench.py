@@ -4,8 +4,7 @@
                                                 docs/results/node_faults.md, docs/charts/node_*.svg
 
 All on the register model of the chip and the edge-by-edge model of the sensor; nothing here has run on silicon. A
-thousand batches of a thousand fault schedules take about six minutes of one core; what is done is kept in
-build/bench/node.
+thousand batches of a thousand fault schedules take about six minutes of one core; what is done is kept.
 """
 
 import argparse
@@ -41,12 +40,12 @@ TOTALS = ("schedules", "ticks", "bad", "missed_line", "missed_link", "displaced"
 TOTALS += ("spurious", "stuck", "violations", "overwritten")
 
 
-def storm(build: Path, kept: Path, fresh: bool, batches: int) -> dict:
+def storm(build: Path, kept: Path, batches: int) -> dict:
     """Schedules of random faults, a million by default: what was flagged against what was broken."""
 
     def chunk(first: int) -> list[dict]:
         path = kept / f"storm_{first}.jsonl"
-        if fresh or not path.exists():
+        if not path.exists():
             done = subprocess.run(
                 [build / "tests/node/node_storm", str(first), str(CHUNK)], capture_output=True, text=True
             )
@@ -247,13 +246,13 @@ def fastest(build: Path) -> dict:
     return {"link": found}
 
 
-def run(build: Path, fresh: bool, only: str = "", batches: int = BATCHES) -> None:
+def run(build: Path, only: str = "", batches: int = BATCHES) -> None:
     """All of it, or only one part: the others stay as they were measured before."""
-    kept = build / "bench/node"
+    kept = store.kept("node")
     kept.mkdir(parents=True, exist_ok=True)
     parts = {
         "faults": lambda: tables(build),
-        "storm": lambda: {"storm": storm(build, kept, fresh, batches)},
+        "storm": lambda: {"storm": storm(build, kept, batches)},
         "link": lambda: fastest(build),
         "skew": lambda: skew(build),
         "load": lambda: {"load": load(build)},

@@ -97,7 +97,7 @@ def cuts(node: Node) -> dict:
     return {"build": node.name, "runs": len(runs), "right": right, "ticks_most": max(one["ticks"] for _, one in runs)}
 
 
-def run(build: Path, _fresh: bool) -> None:
+def run(build: Path) -> None:
     with tempfile.TemporaryDirectory() as folder:
         nodes = [Node(name, build, Path(folder)) for name in BUILDS]
         node = nodes[0]

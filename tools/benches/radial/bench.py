@@ -5,12 +5,11 @@
 Whiskers are drawn from a batch (stiffness, creep, friction, gain), calibrated with the paper's 5 whisks at 6 radii, and
 judged on others. A real whisker's recordings are not part of this project: clone
 github.com/BioMorphic-Intelligence-Lab/Whisker-3D-Localization and give its folder dataset, here or as WHISKER3D_DIR;
-without it that part is skipped by name. Simulated parts that are done are kept in build/bench/radial. Writes
+without it that part is skipped by name. Writes
 bench/results/radial*.json, docs/results/radial_real.md and docs/charts/radial_*.
 """
 
 import argparse
-import json
 import os
 import time
 from pathlib import Path
@@ -31,7 +30,7 @@ from .real import METHODS, page, real_whisker
 from .trials import PAPER_MM, RADII_MM, SOURCES, SPOILS, SPREADS, Kind, Set, Whisker, recorded, spoilt
 
 ROOT = Path(__file__).resolve().parents[3]
-CACHE = ROOT / "build/bench/radial"
+CACHE = store.kept("radial")
 SEED = 48611  # chosen after the last change to the models; nothing was developed on these whiskers
 WHISKERS, FIT, HELD = 4, 5, 6  # whiskers of each spread; whisks at each radius
 TIP_WHISKERS = 24  # of each spread: shares near 98 % ask for many whisks
@@ -284,22 +283,17 @@ def draw_fig5(results: dict) -> Figure:
     return figure
 
 
-def run(build: Path, fresh: bool, whisker3d: str | None = None) -> None:
+def run(build: Path, whisker3d: str | None = None) -> None:
     """Measure what is not yet measured, and redraw. `build` is not used: the C library comes with the Python module."""
-    CACHE.mkdir(parents=True, exist_ok=True)
     folder = whisker3d or os.environ.get("WHISKER3D_DIR")
     if folder:
         real = _rounded(real_whisker(Path(folder)))
         store.write_result("radial_real", real)
         store.write_page(ROOT / "docs/results/radial_real.md", page(real))
     else:
-        print("radial: the real whisker skipped: give --whisker3d DIR or WHISKER3D_DIR (see the module's text)")
-    results = {}
-    for name, measure in tqdm(PARTS.items(), desc="radial"):
-        kept = CACHE / f"{name}.json"
-        if fresh or not kept.exists():
-            kept.write_text(json.dumps(measure(), indent=1, default=float) + "\n")
-        results[name] = json.loads(kept.read_text())
+        store.leave_out("real whisker", "give --whisker3d DIR or WHISKER3D_DIR (tools/benches radial --help)")
+    parts = tqdm(PARTS.items(), desc="radial")
+    results = {name: store.once(CACHE / f"{name}.json", measure) for name, measure in parts}
     points = results["fig5"]["whiskers"]
     kept = results | {
         "fig5": {"combined_mm": results["fig5"]["combined_mm"], "error_mm": [w["error_mm"] for w in points]}

@@ -4,16 +4,14 @@
     .venv/bin/python tools/benches robot --only levels page    some parts; --levels 0 1: of the levels only the fast
     ones
 
-What is done is kept in build/bench/robot: an interrupted run goes on where it stopped, seed by seed; `page` tells what
-there is so far.
+An interrupted run goes on where it stopped, seed by seed; `page` tells what there is so far.
 """
 
 import argparse
 import json
-import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from crunchbot.stopping import interrupt_on_signals
@@ -24,18 +22,10 @@ from .. import store
 from . import instructions, latency, levels, odometry, page
 
 ROOT = Path(__file__).resolve().parents[3]
-RESULTS, CACHE = store.RESULTS, ROOT / "build/bench/robot"
+RESULTS, CACHE = store.RESULTS, store.kept("robot")
 LONG_RUNS = (("signals", 7301), ("signals", 7302), ("signals", 7303), ("bytes", 7301))
 LEVELS = (0, 1, 2, 3)
 ALONE = ("odometry", "latency", "instructions")  # parts whose results stand in one file
-
-
-def once(path: Path, measure: Callable[[], dict]) -> dict:
-    """A measurement, from the cache if an earlier run has made it."""
-    if not path.exists():
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps(measure(), indent=1) + "\n")
-    return json.loads(path.read_text())
 
 
 def long_run(build: Path, level: str, seed: int) -> dict:
@@ -58,13 +48,13 @@ def measure(build: Path, part: str, chosen: set[int]) -> None:
         levels.measure(build, CACHE / "levels", chosen)
     elif part == "long":
         for level, seed in LONG_RUNS:
-            once(CACHE / f"long_{level}_{seed}.json", lambda level=level, seed=seed: long_run(build, level, seed))
+            store.once(CACHE / f"long_{level}_{seed}.json", lambda level=level, seed=seed: long_run(build, level, seed))
     elif part == "odometry":
-        once(CACHE / "odometry.json", lambda: odometry.measure(build))
+        store.once(CACHE / "odometry.json", lambda: odometry.measure(build))
     elif part == "latency":
-        once(CACHE / "latency.json", lambda: latency.measure(models()))
+        store.once(CACHE / "latency.json", lambda: latency.measure(models()))
     elif part == "instructions":
-        once(CACHE / "instructions.json", lambda: instructions.measure(build, models()))
+        store.once(CACHE / "instructions.json", lambda: instructions.measure(build, models()))
 
 
 def gather() -> dict:
@@ -99,15 +89,12 @@ def publish() -> None:
         if read(RESULTS / f"robot_{part}.json") != data:
             store.write_result(f"robot_{part}", data)
     store.write_page(ROOT / "docs/results/robot.md", page.page(found))
-    print("bench/results/robot_*.json, docs/charts/robot_*.svg, docs/results/robot.md")
 
 
 PARTS = ("odometry", "levels", "latency", "instructions", "long", "page")
 
 
-def run(build: Path, fresh: bool, only: Sequence[str] = PARTS, levels: Sequence[int] = LEVELS) -> None:
-    if fresh:
-        shutil.rmtree(CACHE, ignore_errors=True)
+def run(build: Path, only: Sequence[str] = PARTS, levels: Sequence[int] = LEVELS) -> None:
     interrupt_on_signals()  # a run that is ended leaves no process behind
     for part in only:
         measure(build, part, set(levels))

@@ -15,7 +15,6 @@ filter, gets the rows after a gap:
 import argparse
 import json
 import pickle
-import shutil
 import tempfile
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -38,7 +37,7 @@ from crunchbot_lab.simulation.scenes import make_scene
 from .. import store
 
 ROOT = Path(__file__).resolve().parents[3]
-RUNS = ROOT / "build/bench/restart"
+RUNS = store.kept("restart")
 FIRST_SEED, SCENES, FILTER = 9101, 20, "adaptive"
 RUN_S, FIRST_S, LAST_S, AFTER_S = 200, 30.0, 130.0, 60.0
 NEAR_M, STAYS_S = 0.25, 3.0  # as in the drills
@@ -184,12 +183,8 @@ def quantiles(values: np.ndarray) -> np.ndarray:
     return np.quantile(values, [0.5, 0.9, 1.0], method="higher")
 
 
-def run(
-    build: Path, fresh: bool, scenes: int = SCENES, moments: int = 4, runs: Path = RUNS, out: Path | None = None
-) -> None:
+def run(build: Path, scenes: int = SCENES, moments: int = 4, runs: Path = RUNS, out: Path | None = None) -> None:
     """`build` is not used: the Python modules are what counts."""
-    if fresh:
-        shutil.rmtree(runs, ignore_errors=True)
     entries = []
     for seed in range(FIRST_SEED, FIRST_SEED + scenes):
         entries += trials(seed, moments, runs)

@@ -6,12 +6,11 @@ Simulated floors (level 1) are drawn from seeds that nothing was developed on. R
 project: clone github.com/wngfra/FabricSlide (MIT) and github.com/norlab-ulaval/BorealTC (MIT) and give their folders
 data/fabric, data/borealtc and data/vulpi (in BorealTC), here or as FABRICSLIDE_DIR, BOREALTC_DIR and VULPI_DIR; without
 them their parts are skipped by name.
-Parts that are done are kept in build/bench/texture. Writes bench/results/texture.json,
+Writes bench/results/texture.json,
 docs/results/texture.md and docs/charts/texture_*.
 """
 
 import argparse
-import json
 import os
 from pathlib import Path
 
@@ -28,7 +27,7 @@ from .surfaces import faces, faces_contact
 
 ROOT = Path(__file__).resolve().parents[3]
 PAGE = ROOT / "docs/results/texture.md"
-CACHE = ROOT / "build/bench/texture"
+CACHE = store.kept("texture")
 FLOORS = (course, cost, single_surfaces, other_robot, borders, refusals, floors_left_out, stability)
 PARTS = {f.__name__: f for f in (*FLOORS, faces, faces_contact)}
 REAL = {  # by the folder that is given
@@ -38,9 +37,8 @@ REAL = {  # by the folder that is given
 }
 
 
-def run(build: Path, fresh: bool, **folders: str | None) -> None:
+def run(build: Path, **folders: str | None) -> None:
     """Measure what is not yet measured, and redraw. `build` is not used: the C library comes with the Python module."""
-    CACHE.mkdir(parents=True, exist_ok=True)
     given = {n: folders.get(n) or os.environ.get(f"{n.upper()}_DIR") for n in REAL}
     parts = dict(PARTS)
     for folder, name, measure in ((f, n, m) for f, some in REAL.items() for n, m in some.items()):
@@ -49,13 +47,10 @@ def run(build: Path, fresh: bool, **folders: str | None) -> None:
         elif (CACHE / f"{name}.json").exists():
             parts[name] = None  # what was measured when its folder was given
         else:
-            print(f"texture: {name} skipped: give --{folder} DIR or {folder.upper()}_DIR (see the module's text)")
+            store.leave_out(name, f"give --{folder} DIR or {folder.upper()}_DIR (tools/benches texture --help)")
     results = {}
     for name, measure in tqdm(parts.items(), desc="texture"):
-        kept = CACHE / f"{name}.json"
-        if measure and (fresh or not kept.exists()):
-            kept.write_text(json.dumps(measure(), indent=1, default=float) + "\n")
-        results[name] = json.loads(kept.read_text())
+        results[name] = store.once(CACHE / f"{name}.json", measure)
     store.write_result("texture", results)
     store.write_page(PAGE, page(results))
     for name, figure in draw(results).items():

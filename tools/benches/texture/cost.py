@@ -14,6 +14,7 @@ import numpy as np
 from crunchbot.touch.texture.classifier import plain_features
 from crunchbot.touch.texture.model import TextureModel
 
+from .. import store
 from .scores import METHODS, WINDOW, decide, summary
 from .simulated import TEST_SEEDS, TRAIN_SEED, trained
 from .trials import drives
@@ -71,10 +72,10 @@ def peers(arrays: dict, program: str = "peer.py") -> dict:
         ":all:",
     ]
     if not (VENV / "ready").exists():
-        for command in ([sys.executable, "-m", "venv", VENV], [*pip, "-r", PEERS / "requirements.lock"]):
-            if subprocess.run(command, capture_output=True).returncode:
-                print("texture: scikit-learn and convolution kernels skipped: requirements.lock cannot be installed")
-                return {}
+        lock = PEERS / "requirements.lock"
+        if error := store.failure((sys.executable, "-m", "venv", VENV), (*pip, "-r", lock)):
+            store.leave_out("scikit-learn, convolution kernels", f"{lock.relative_to(ROOT)}: {error}")
+            return {}
         (VENV / "ready").touch()
     with tempfile.TemporaryDirectory() as folder:
         np.savez(Path(folder) / "w.npz", **arrays)
