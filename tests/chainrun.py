@@ -106,7 +106,7 @@ def record(folder: Path, seconds: float, seed: int, script, *options, link=FAST_
     with running(command) as process:
         driver = Driver(path, script, process)
         frames = []
-        with Reader(ring, wait_s=10.0) as reader:
+        with Reader(ring, wait_s=END_S) as reader:
             for view in reader.frames():
                 frames.append(view.copy())
                 driver.answer(int(view["tick"][-1]) + 1)

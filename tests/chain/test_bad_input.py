@@ -88,7 +88,7 @@ def test_second_daemon(tmp_path):
     command = simulation(tmp_path, scene, 600, 1, RING)
     command = [*command[: command.index("--") + 1], "sh", "-c", both]
     with running(command, stdin=subprocess.PIPE) as process:
-        with Reader(RING, wait_s=10.0) as reader:
+        with Reader(RING, wait_s=END_S) as reader:
             next(reader.frames())
             process.stdin.write("go\n")
             process.stdin.flush()

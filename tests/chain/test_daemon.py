@@ -104,7 +104,7 @@ def shell(folder: Path, ring: str, script: str) -> list[str]:
 
 
 def test_ring_lives_on_while_the_bridge_is_away(tmp_path, ring):
-    with bridge(tmp_path, ring) as (process, cable), Reader(ring, wait_s=10.0) as reader:
+    with bridge(tmp_path, ring) as (process, cable), Reader(ring, wait_s=END_S) as reader:
         until(lambda: reader.info.published > 400, process, reader)
         generation = reader.info.generation
         for away in (1, 2):
@@ -136,7 +136,7 @@ def begins_anew_after_each_gap(frames: np.ndarray, gaps: int) -> bool:
 
 
 def test_loose_contact_is_survived(tmp_path, ring):
-    with bridge(tmp_path, ring) as (process, cable), Reader(ring, wait_s=10.0) as reader:
+    with bridge(tmp_path, ring) as (process, cable), Reader(ring, wait_s=END_S) as reader:
         for blinks in range(1, 6):
             before = reader.info.published
             until(lambda n=before: reader.info.published > n + 100, process, reader)
@@ -152,7 +152,7 @@ def test_loose_contact_is_survived(tmp_path, ring):
 def test_waits_for_its_first_bridge(tmp_path, ring):
     with (
         bridge(tmp_path, ring, "--unplugged", words=["--wait"]) as (process, cable),
-        Reader(ring, wait_s=10.0) as reader,
+        Reader(ring, wait_s=END_S) as reader,
     ):
         until(lambda: reader.stats is not None, process, reader)
         assert reader.stats.connected == 0 and reader.info.published == 0
@@ -165,7 +165,7 @@ def test_waits_for_its_first_bridge(tmp_path, ring):
 
 
 def test_once_ends_when_the_bridge_goes(tmp_path, ring):
-    with bridge(tmp_path, ring, words=["--once"]) as (process, cable), Reader(ring, wait_s=10.0) as reader:
+    with bridge(tmp_path, ring, words=["--once"]) as (process, cable), Reader(ring, wait_s=END_S) as reader:
         until(lambda: reader.info.published > 100, process, reader)
         cable.pull()
         _, errors = process.communicate(timeout=END_S)
@@ -175,7 +175,7 @@ def test_once_ends_when_the_bridge_goes(tmp_path, ring):
 
 
 def test_readers_know_bridge_and_clock(tmp_path, ring):
-    with bridge(tmp_path, ring) as (process, _), Reader(ring, wait_s=10.0) as reader:
+    with bridge(tmp_path, ring) as (process, _), Reader(ring, wait_s=END_S) as reader:
         until(lambda: connected(reader) and reader.clock is not None, process, reader)
         stats, clock = reader.stats, reader.clock
         finish(process)
@@ -193,7 +193,7 @@ def test_readers_know_bridge_and_clock(tmp_path, ring):
 def test_killed_daemon_hinders_no_next_one(tmp_path, ring):
     # The next one waits: umockdev, unlike a kernel, notices the end of a process only a moment later.
     script = "trap : TERM; $D & a=$!; read go; kill -KILL $a; wait $a; $D --wait & b=$!; read go; kill $b; wait $b"
-    with running(shell(tmp_path, ring, script), stdin=subprocess.PIPE) as process, Reader(ring, wait_s=10.0) as reader:
+    with running(shell(tmp_path, ring, script), stdin=subprocess.PIPE) as process, Reader(ring, wait_s=END_S) as reader:
         until(lambda: reader.info.published > 100, process, reader)
         first = reader.info.generation
         process.stdin.write("go\n")
@@ -211,14 +211,14 @@ def test_killed_daemon_hinders_no_next_one(tmp_path, ring):
 def test_a_client_that_died_before_its_answer_holds_no_interface(tmp_path, ring):
     client = f"{sys.executable} {Path(__file__).with_name('dying_client.py')}"
     script = f"trap : TERM; {client} || exit 9; $D --wait & b=$!; read go; kill $b; wait $b"
-    with running(shell(tmp_path, ring, script), stdin=subprocess.PIPE) as process, Reader(ring, wait_s=10.0) as reader:
+    with running(shell(tmp_path, ring, script), stdin=subprocess.PIPE) as process, Reader(ring, wait_s=END_S) as reader:
         until(lambda: reader.info.published > 100, process, reader)
         process.communicate("go\n", timeout=END_S)
 
 
 def test_replacement_takes_over_name_and_bridge(tmp_path, ring):
     script = "trap : TERM; $D & a=$!; read go; $D --replace & b=$!; wait $a; echo first $? >&2; read go; kill $b; wait $b; echo second $? >&2"
-    with running(shell(tmp_path, ring, script), stdin=subprocess.PIPE) as process, Reader(ring, wait_s=10.0) as reader:
+    with running(shell(tmp_path, ring, script), stdin=subprocess.PIPE) as process, Reader(ring, wait_s=END_S) as reader:
         until(lambda: reader.info.published > 100, process, reader)
         process.stdin.write("go\n")
         process.stdin.flush()
@@ -274,7 +274,7 @@ def test_the_service_has_its_ring_in_its_runtime_directory(tmp_path, ring):
 
 
 def test_statistics_on_request(tmp_path, ring):
-    with bridge(tmp_path, ring) as (process, _), Reader(ring, wait_s=10.0) as reader:
+    with bridge(tmp_path, ring) as (process, _), Reader(ring, wait_s=END_S) as reader:
         until(lambda: reader.info.published > 100, process, reader)
         os.kill(reader.info.writer_pid, signal.SIGUSR1)
         line = process.stderr.readline()
@@ -302,7 +302,7 @@ def test_systemd_is_reported_that_it_is_ready_lives_and_stops(tmp_path, ring, pl
 
 
 def test_nodes_on_request_while_frames_go_on(tmp_path, ring):
-    with bridge(tmp_path, ring) as (process, _), Reader(ring, wait_s=10.0) as reader:
+    with bridge(tmp_path, ring) as (process, _), Reader(ring, wait_s=END_S) as reader:
         until(lambda: reader.info.published > 100, process, reader)
         asked = subprocess.run(
             [sys.executable, "-m", "crunchbot.cli", "info", "--nodes", "--ring", ring], capture_output=True, text=True

@@ -87,7 +87,7 @@ def test_under_a_pace_the_world_goes_on_without_its_bridge(tmp_path):
     scene, _ = write_flat_scene(tmp_path, SEED)
     path, ring = tmp_path / "sim.sock", f"whisker-test-pace-{os.getpid()}"
     command = simulation(tmp_path, scene, 3600, SEED, ring, "--socket", path, "--pace", 1, "--level", "bytes")
-    with running(command) as process, Reader(ring, wait_s=10.0) as reader, watching(path) as server:
+    with running(command) as process, Reader(ring, wait_s=END_S) as reader, watching(path) as server:
         reader.wait(10.0)
         server.send(b"unplug")
         while reader.stats is None or reader.stats.connected:
@@ -109,7 +109,7 @@ def test_under_a_pace_the_world_goes_on_while_its_host_is_stopped(tmp_path, leve
     scene, _ = write_flat_scene(tmp_path, SEED)
     path, ring = tmp_path / "sim.sock", f"whisker-test-stopped-{os.getpid()}"
     command = simulation(tmp_path, scene, 3600, SEED, ring, "--socket", path, "--pace", 1, "--level", level)
-    with running(command) as process, Reader(ring, wait_s=10.0) as reader, watching(path) as server:
+    with running(command) as process, Reader(ring, wait_s=END_S) as reader, watching(path) as server:
         reader.wait(10.0)
         host = reader.info.writer_pid
         os.kill(host, signal.SIGSTOP)

@@ -6,9 +6,9 @@ import signal
 import subprocess
 
 import pytest
+from patience import PATIENCE_S
 
 SIMULATION = os.environ.get("WHISKER_CREATE_SIM", "")
-TIMEOUT_S = 60
 MM_PER_COUNT = math.pi * 72.0 / 508.8  # Create 2's encoders and wheels
 WHEEL_BASE_MM = 235.0
 SAFE, FULL = 2, 3
@@ -29,7 +29,7 @@ class Emulator:
     def end(self) -> list[str]:
         """Stops it; the modes it has printed."""
         self.process.send_signal(signal.SIGTERM)
-        output, _ = self.process.communicate(timeout=TIMEOUT_S)
+        output, _ = self.process.communicate(timeout=PATIENCE_S)
         assert self.process.returncode == 0
         assert not self.link.is_symlink()
         return [line.split()[-1] for line in output.splitlines()]
@@ -100,19 +100,19 @@ def test_it_drives_and_reads(emulator):
 
 def test_wrong_use_is_refused():
     for options in (["--model", "3"], ["--lose-bytes", "2"], ["--event", "kick@1"], ["--nothing"], ["word"]):
-        done = subprocess.run([SIMULATION, *options], capture_output=True, text=True, timeout=TIMEOUT_S)
+        done = subprocess.run([SIMULATION, *options], capture_output=True, text=True, timeout=PATIENCE_S)
         assert done.returncode == 2
         assert done.stderr.startswith("whisker-create-sim: ") and done.stderr.count("\n") == 1
 
 
 def test_help_has_examples():
-    done = subprocess.run([SIMULATION, "--help"], capture_output=True, text=True, timeout=TIMEOUT_S)
+    done = subprocess.run([SIMULATION, "--help"], capture_output=True, text=True, timeout=PATIENCE_S)
     assert done.returncode == 0
     assert done.stdout.count("Example: ") == 3
 
 
 def test_an_arena_that_cannot_be_read(tmp_path):
     command = [SIMULATION, "--arena", str(tmp_path / "none.flat")]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT_S)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S)
     assert done.returncode == 1
     assert "none.flat" in done.stderr

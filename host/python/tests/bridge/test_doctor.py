@@ -8,7 +8,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from commandkit import END_S, STATS, live_ring, run, signals_as_before  # noqa: F401 - a fixture
+from commandkit import STATS, live_ring, run, signals_as_before  # noqa: F401 - a fixture
+from patience import PATIENCE_S
 from rings import make_frames, ring_name
 
 from crunchbot.bridge import doctor, pattern, usbtree
@@ -133,7 +134,7 @@ def test_doctor_looks_at_the_lanes_that_are_in_use_now(masks):
     frames["lane"]["status"][:, 2] = 33 << 10
     takes = iter([frames, None])
     reader = SimpleNamespace(seek_latest=lambda back: None, take=lambda wait_s: next(takes))
-    reported = any("lane 2:" in finding.text for finding in doctor.samples(reader, END_S))
+    reported = any("lane 2:" in finding.text for finding in doctor.samples(reader, PATIENCE_S))
     assert reported == (masks[1] == 0b101)
 
 
@@ -158,7 +159,7 @@ def test_doctor_reads_the_daemons_mind(host):
 def test_doctor_finds_rings_left_behind(tmp_path):
     name = ring_name()
     program = f"import os; from crunchbot.bridge.ring import Writer; w = Writer('{name}', 64); os._exit(0)"
-    subprocess.run([sys.executable, "-c", program], check=True, timeout=END_S)
+    subprocess.run([sys.executable, "-c", program], check=True, timeout=PATIENCE_S)
     try:
         found = doctor.stale_rings("whisker")
         assert any(f"ring {name} of user " in f.text and f.remedy == f"remove it: rm /dev/shm/{name}" for f in found)

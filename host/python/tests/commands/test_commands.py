@@ -10,7 +10,8 @@ import threading
 
 import numpy as np
 import pytest
-from commandkit import END_S, command, live_ring, run, signals_as_before  # noqa: F401 - a fixture
+from commandkit import command, live_ring, run, signals_as_before  # noqa: F401 - a fixture
+from patience import PATIENCE_S
 from rings import make_frames
 
 from crunchbot import __version__
@@ -27,7 +28,7 @@ def test_help_names_every_command_and_imports_none(capsys):
     code, out, _ = run(capsys, "--help")
     assert code == 0 and all(f"\n  {name} " in out for name in COMMANDS)
     program = "import sys; from crunchbot.cli import main; main(['--help']); print(sorted(sys.modules))"
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=END_S)
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=PATIENCE_S)
     assert "numpy" not in done.stdout and "cffi" not in done.stdout and "argparse" in done.stdout
 
 
@@ -129,7 +130,7 @@ def test_stream_ends_quietly_with_its_reader():
         with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
             process.stdout.readline()
             process.stdout.close()
-            assert process.stderr.read() == b"" and process.wait(END_S) == 0
+            assert process.stderr.read() == b"" and process.wait(PATIENCE_S) == 0
 
 
 def test_record_and_replay_from_the_command_line(capsys, tmp_path):
@@ -138,7 +139,7 @@ def test_record_and_replay_from_the_command_line(capsys, tmp_path):
     with live_ring(frames) as name:
         code, out, _ = run(capsys, "record", first, "--ring", name, "--seconds", 0.6)
         assert code == 0 and f"{first}: 1200 frames, 0 lost, " in out
-    recorder = threading.Thread(target=main, args=(["record", str(second), "--ring", name, "--wait", str(END_S)],))
+    recorder = threading.Thread(target=main, args=(["record", str(second), "--ring", name, "--wait", str(PATIENCE_S)],))
     recorder.start()
     assert run(capsys, "replay", first, "--ring", name, "--speed", "max")[0] == 0
     recorder.join()
@@ -167,7 +168,7 @@ def test_a_recorder_reported_to_stop_finishes_its_file(tmp_path):
         while not path.exists() or path.stat().st_size < 20_000:
             assert process.poll() is None
         process.terminate()
-        assert process.wait(END_S) == 0
+        assert process.wait(PATIENCE_S) == 0
     with read(path) as recording:
         assert recording.complete and sum(map(len, recording.blocks())) == 1000
 
@@ -198,7 +199,7 @@ def test_top_draws_in_a_terminal_and_leaves_it_as_it_was():
             with contextlib.suppress(OSError):  # the other end closes
                 while data := os.read(ours, 65536):
                     seen += data
-            assert process.wait(END_S) == 0
+            assert process.wait(PATIENCE_S) == 0
         os.close(ours)
     text = seen.decode()
     assert text.startswith("\x1b[?1049h\x1b[?25l") and text.rstrip().endswith("\x1b[?25h\x1b[?1049l")

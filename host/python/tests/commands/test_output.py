@@ -5,9 +5,10 @@ import subprocess
 import sys
 
 import pytest
-from commandkit import END_S, command, live_ring, signals_as_before  # noqa: F401 - a fixture
+from commandkit import command, live_ring, signals_as_before  # noqa: F401 - a fixture
 from folders import folder, recorded  # noqa: F401 - fixtures
 from models import model
+from patience import PATIENCE_S
 from rings import make_frames
 from whisks import write_whisks
 
@@ -73,7 +74,7 @@ def test_a_page_whose_address_finds_no_room_is_not_served(into_full):
 
 def test_a_process_of_its_own_says_it_once():
     with open("/dev/full", "w") as full:
-        done = subprocess.run(command("--help"), stdout=full, stderr=subprocess.PIPE, text=True, timeout=END_S)
+        done = subprocess.run(command("--help"), stdout=full, stderr=subprocess.PIPE, text=True, timeout=PATIENCE_S)
     assert (done.returncode, done.stderr) == (1, f"whisker: {COMPLAINT}")
 
 
@@ -89,7 +90,7 @@ def test_what_was_printed_before_the_work_comes_before_what_the_work_prints(monk
 def test_a_reader_that_goes_is_no_fault():
     reader, writer = os.pipe()
     os.close(reader)
-    done = subprocess.run(command("--help"), stdout=writer, stderr=subprocess.PIPE, text=True, timeout=END_S)
+    done = subprocess.run(command("--help"), stdout=writer, stderr=subprocess.PIPE, text=True, timeout=PATIENCE_S)
     os.close(writer)
     assert (done.returncode, done.stderr) == (0, "")
 
@@ -97,5 +98,7 @@ def test_a_reader_that_goes_is_no_fault():
 @pytest.mark.parametrize("name", PROGRAMS)
 def test_programs_whose_help_finds_no_room_say_so(name):
     with open("/dev/full", "w") as full:
-        done = subprocess.run([program(name), "--help"], stdout=full, stderr=subprocess.PIPE, text=True, timeout=END_S)
+        done = subprocess.run(
+            [program(name), "--help"], stdout=full, stderr=subprocess.PIPE, text=True, timeout=PATIENCE_S
+        )
     assert (done.returncode, done.stderr) == (1, f"{name}: {COMPLAINT}")

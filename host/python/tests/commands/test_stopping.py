@@ -6,10 +6,10 @@ import sys
 import threading
 
 import pytest
+from patience import PATIENCE_S
 
 from crunchbot.bridge.ring import RingError, await_reader
 
-END_S = 60
 TWICE = """
 import signal
 from crunchbot.stopping import {use}
@@ -24,7 +24,9 @@ finally:
 
 
 def run(**parts) -> subprocess.CompletedProcess:
-    return subprocess.run([sys.executable, "-c", TWICE.format(**parts)], capture_output=True, text=True, timeout=END_S)
+    return subprocess.run(
+        [sys.executable, "-c", TWICE.format(**parts)], capture_output=True, text=True, timeout=PATIENCE_S
+    )
 
 
 @pytest.mark.parametrize("first", ["SIGINT", "SIGTERM", "SIGHUP"])

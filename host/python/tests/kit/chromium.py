@@ -9,6 +9,7 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 from urllib.request import urlopen
 
+from patience import PATIENCE_S
 from websockets.asyncio.client import connect
 
 PROGRAM = shutil.which("chromium")
@@ -24,7 +25,6 @@ FLAGS = [
     "--hide-scrollbars",
     "--remote-debugging-port=0",
 ]
-PATIENCE_S = 20.0
 LOOK_S = 0.02
 
 

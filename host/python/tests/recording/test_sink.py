@@ -8,6 +8,7 @@ import time
 import numpy as np
 import pytest
 from linkkit import free_endpoint
+from patience import PATIENCE_S
 from rings import make_frames, ring_name
 
 from crunchbot.bridge.ring import Reader, Writer
@@ -18,8 +19,6 @@ from crunchbot.recording.writing import RecordingWriter, TopicWriter, WriteError
 from crunchbot.robot.bag import RECORD, Bag
 from crunchbot.robot.network import messages as m
 from crunchbot.robot.network.link import Link
-
-PATIENCE_S = 30.0
 
 
 def eventually(condition) -> None:

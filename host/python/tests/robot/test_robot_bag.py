@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from commandkit import END_S, command, run, signals_as_before  # noqa: F401 - a fixture
+from commandkit import command, run, signals_as_before  # noqa: F401 - a fixture
 from linkkit import free_endpoint
+from patience import PATIENCE_S
 from PIL import Image
 from robotkit import examples, flat, to_rows
 from rosbags.highlevel import AnyReader
@@ -31,7 +32,6 @@ from crunchbot.scene import load
 from crunchbot.sensor_tables import SensorTable
 from crunchbot_lab import scenes
 
-PATIENCE_S = 60.0
 ROWS = 30
 
 
@@ -63,7 +63,7 @@ def bag(scene, tmp_path_factory):
             stream.send(examples()[topic])
         for stream in (rows, *[s for topic, s in others.items() if not topic.startswith("health")], truth):
             stream.end("over") if stream is rows else stream.end(0, "over")
-        out, _ = child.communicate(timeout=END_S)
+        out, _ = child.communicate(timeout=PATIENCE_S)
     assert child.returncode == 0 and out.startswith(f"{path}: messages ") and ", missed 0, refused 0" in out
     return path
 

@@ -12,6 +12,7 @@ import pytest
 from commandkit import run, signals_as_before  # noqa: F401 - a fixture
 from keykit import documented, made_keys  # noqa: F401 - a fixture
 from linkkit import free_endpoint
+from patience import PATIENCE_S
 from robotkit import examples
 
 from crunchbot import scene as scenes
@@ -25,7 +26,6 @@ from crunchbot.view import command as view
 from crunchbot_lab.demo import training
 from crunchbot_lab.simulation.scenes import make_scene
 
-PATIENCE_S = 60.0
 # As the simulation does it: the true pose to each client that connects. Its argument: a socket.
 TELLS_TRUTH = """
 import socket, sys, time

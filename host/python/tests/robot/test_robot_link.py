@@ -8,6 +8,7 @@ import time
 import pytest
 from keykit import documented, made_keys  # noqa: F401 - a fixture
 from linkkit import free_endpoint, sample
+from patience import PATIENCE_S
 from robotkit import Cable, examples, take_until
 
 from crunchbot import observation as o
@@ -18,8 +19,6 @@ from crunchbot.robot.network.inbox import TOPICS_MOST, Inbox, encoding_of
 from crunchbot.robot.network.link import MESSAGE_MOST, PILOT_ENDPOINT, Link, LinkError, is_loopback
 from crunchbot.robot.network.sources import STREAMS_MOST, Sources, Verdict
 from crunchbot.robot.network.streams import ENVELOPE, Envelope, EnvelopeError, Tally, envelopes, new_stream
-
-PATIENCE_S = 30.0
 
 
 def row(seq: int) -> m.Observation:

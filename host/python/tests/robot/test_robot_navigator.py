@@ -10,9 +10,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from commandkit import END_S, command, run, signals_as_before  # noqa: F401 - a fixture
+from commandkit import command, run, signals_as_before  # noqa: F401 - a fixture
 from fuzz_rows import fuzz
 from linkkit import free_endpoint
+from patience import PATIENCE_S
 from robotkit import take_until, to_rows
 
 from crunchbot import scene as scene_folder
@@ -30,7 +31,6 @@ from crunchbot.robot.network.ranges import COMPONENTS_MOST
 from crunchbot.robot.network.rows import RowPublisher, to_message
 from crunchbot_lab import scenes
 
-PATIENCE_S = 60.0
 ROWS = 60
 
 
@@ -90,7 +90,7 @@ def test_in_lock_step_the_process_gives_what_localise_gives(made, tmp_path):
         robot.send(rows)
         robot.rows.end("enough")
         got = take_until(robot.inbox, lambda got: sum(r.over for r in got) == 3, PATIENCE_S)
-        assert child.wait(END_S) == 0
+        assert child.wait(PATIENCE_S) == 0
     observations = localise.read_observations(localise.observations_path(folder), scene)
     sixfold = [{k: v if v is None or k == "t_s" else float(f"{v:.6g}") for k, v in row.items()} for row in rows]
     for name in filters:
@@ -132,7 +132,7 @@ def test_a_killed_navigator_comes_back_knowing_that_it_knows_nothing(made, tmp_p
             robot.send(rows[25:])
             robot.rows.end()
             got = take_until(robot.inbox, _all_over, PATIENCE_S)
-            assert child.wait(END_S) == 0
+            assert child.wait(PATIENCE_S) == 0
     reported = [r.message for r in got if r.topic == "localisation" and not r.over]
     assert {(x.first_seq, x.prior, x.rows_missed) for x in reported} == {(25, "uniform", 0)} and len(
         reported
@@ -157,7 +157,7 @@ def killed_and_begun_anew(robot, folder, rows, options, spoil=lambda: None):
         robot.send(rows[25:])
         robot.rows.end()
         over = take_until(robot.inbox, _all_over, PATIENCE_S)
-        assert child.wait(END_S) == 0
+        assert child.wait(PATIENCE_S) == 0
     reported = [r.message for r in over if r.topic == "localisation" and not r.over]
     return reported, [r.message for r in over if r.topic == "health/navigator" and not r.over]
 

@@ -15,8 +15,9 @@ import numpy as np
 import Pyro5.api
 import pytest
 import serpent
-from commandkit import END_S, command, run, signals_as_before  # noqa: F401 - a fixture
+from commandkit import command, run, signals_as_before  # noqa: F401 - a fixture
 from linkkit import free_endpoint, sample
+from patience import PATIENCE_S
 from robotkit import examples, take_until
 
 from crunchbot import observation as o
@@ -30,8 +31,6 @@ from crunchbot.robot.network.rows import to_message
 from crunchbot.robot.network.streams import Envelope
 from crunchbot.robot.pyro import NAMES_MOST, Results, Server
 from crunchbot.robot.pyro_daemon import REQUEST_MOST
-
-PATIENCE_S = 60.0
 
 
 def row(n: int) -> dict:
@@ -122,7 +121,7 @@ def test_a_netbook_writes_and_clients_read_over_the_network():
                 seen = client.observation()
                 assert seen is None or seen["front_mm"] != seen["front_mm"]
             child.terminate()
-            assert child.wait(END_S) == 0
+            assert child.wait(PATIENCE_S) == 0
             got += take_until(inbox, lambda got: any(r.over for r in got), PATIENCE_S)
         finally:
             child.kill()

@@ -13,6 +13,7 @@ from types import SimpleNamespace
 
 import pytest
 from linkkit import free_endpoint
+from patience import PATIENCE_S
 from robotkit import take_until
 
 from crunchbot.errors import UserError
@@ -22,7 +23,6 @@ from crunchbot.robot.processes.lifeline import BEAT_S
 from crunchbot.robot.processes.parts import LEAVE_ENVIRONMENT
 from crunchbot.robot.processes.supervisor import PAUSE_MOST_S, PAUSE_S, Keeper, RunError, Supervisor
 
-PATIENCE_S = 60.0
 FAILS = Program("fails", ("sh", "-c", "echo no such arena >&2; exit 3"))
 STAYS = Program("stays", ("sh", "-c", "exec sleep 1000"))
 

@@ -11,7 +11,20 @@ import pytest
 from linkkit import free_endpoint
 from test_view_http import mutated
 from viewkit import PATIENCE_S, nothing_logged, page
-from viewrobot import ARENA, ROW_NS, SCENE, MadeUpRun, Post, at, belief_message, estimate, reach, robot_view, route
+from viewrobot import (
+    ARENA,
+    ROW_NS,
+    SCENE,
+    Clock,
+    MadeUpRun,
+    Post,
+    at,
+    belief_message,
+    estimate,
+    reach,
+    robot_view,
+    route,
+)
 
 from crunchbot.robot.network import initial_pose
 from crunchbot.robot.network.link import Link
@@ -48,16 +61,6 @@ from crunchbot.view.robot_topics import BELIEF_HEAD, BELIEF_ID, POINTS_MOST, Bel
 FUZZ_INPUTS = 5000
 WIDE = np.array([[0.0009, 0.0003, 0.0], [0.0003, 0.0016, 0.0], [0.0, 0.0, 0.04]])  # 3 cm by 4 cm, 0.2 rad
 __all__ = ["nothing_logged"]  # a fixture that every test here uses
-
-
-class Clock:
-    """A monotonic clock that stands until it is moved."""
-
-    def __init__(self):
-        self.now = 1000.0
-
-    def __call__(self) -> float:
-        return self.now
 
 
 def reported_model(rows: int, scene=SCENE, **options) -> RobotModel:

@@ -4,9 +4,10 @@ import asyncio
 
 import chromium
 import pytest
+from patience import PATIENCE_S
 from viewkit import made_frames, ring_of
 from viewpage import DRAWN, looking_at
-from viewrobot import ARENA, SCENE, MadeUpRun, Post, belief_message, estimate, robot_view, route
+from viewrobot import ARENA, SCENE, Clock, MadeUpRun, Post, belief_message, estimate, robot_view, route
 
 from crunchbot.robot.network.messages import Behaviour, Header, KeyValue, ProcessHealth, Time
 from crunchbot.view.hub import Hub
@@ -167,12 +168,11 @@ def test_words_are_those_of_the_messages():
 
 def test_a_process_that_fell_silent_and_a_robot_that_is_gone_are_shown_as_such():
     async def scenario():
-        post = Post()
-        async with looking_at(post, rows=50) as (b, hub):
+        post, clock = Post(), Clock()
+        async with looking_at(post, rows=50, clock=clock) as (b, _):
             await b.until(DRAWN)
             assert await b.eval("$('robot-state').dataset.state") == "live"
-            clock = hub.robot._clock
-            hub.robot._clock = lambda: clock() + SILENT_S + 2
+            clock.now += SILENT_S + 2
             said = await b.until("!$('robot-note').hidden && $('robot-note').innerText")
             assert "Nothing heard of the robot" in said and "how it last was" in said
             assert (await b.text("#processes")).count("▲ silent for") == 2
@@ -278,7 +278,7 @@ def test_a_pose_is_reported_by_a_drag_on_the_plan_or_by_numbers():
                 where = {"x": x, "y": y - up * scale, "button": "left", "clickCount": 1}
                 await b.call("Input.dispatchMouseEvent", type=kind, **where)
             await b.until("$('pose-said').textContent")
-            async with asyncio.timeout(30):
+            async with asyncio.timeout(PATIENCE_S):
                 while not post.poses:
                     await asyncio.sleep(0.01)
             assert post.poses[0] == pytest.approx((0.5, 1.0, 1.571), abs=0.02)

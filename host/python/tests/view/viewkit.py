@@ -9,6 +9,7 @@ from itertools import count
 
 import numpy as np
 import pytest
+from patience import PATIENCE_S
 from rings import ring_name
 from websockets.asyncio.client import connect
 
@@ -19,7 +20,6 @@ from crunchbot.view.topics import BLOCK
 from whisker_protocol import CODES, LANES, LIMITS, STATUS_CODE_SHIFT
 
 NODES = 3
-PATIENCE_S = 20.0  # for what must come; a test that fails ends
 
 
 @pytest.fixture(autouse=True)

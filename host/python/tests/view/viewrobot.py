@@ -2,6 +2,7 @@
 
 import math
 import os
+import time
 from collections import defaultdict
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
@@ -188,6 +189,16 @@ class MadeUpRun:
         return m.ProcessHealth(m.Header.at(row * ROW_NS), name, 4000 + len(name), "running", pairs)
 
 
+class Clock:
+    """A monotonic clock that stands until it is moved."""
+
+    def __init__(self):
+        self.now = 1000.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
 class Post:
     """A robot without a network: what is posted is in `source`, as bytes that are yet to be decoded."""
 
@@ -211,10 +222,13 @@ class Post:
 
 
 @asynccontextmanager
-async def robot_view(post: Post, scene: Scene | None = SCENE, run=None, rows: int = 0, may_set_pose: bool = True):
+async def robot_view(
+    post: Post, scene: Scene | None = SCENE, run=None, rows: int = 0, may_set_pose: bool = True, clock=time.monotonic
+):
     """A server that shows this robot; gives its port and hub. `run`: MadeUpRun or the like, whose
     first rows it has received."""
     hub = Hub([f"whisker-test-no-ring-{os.getpid()}"], post.source, scene, may_set_pose=may_set_pose)
+    hub.robot._clock = clock
     post.play(run or MadeUpRun(), range(rows), hub.robot)
     async with serving(hub, "127.0.0.1", 0, []) as port:
         yield port, hub
