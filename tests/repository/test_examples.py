@@ -51,6 +51,7 @@ WITH_ROBOT = {
     "whisker pilot": FOREVER,
     "whisker navigator": FOREVER,
     "whisker foxglove": FOREVER,
+    "whisker ros2": FOREVER,
     "whisker bag": FOREVER,
     "whisker pyro": FOREVER,
     "whisker scene from": "rows",
@@ -102,7 +103,7 @@ def run(line: str, place: Path, seconds: float | None = None) -> tuple[int, str]
 def with_own_names(line: str, more: str, first_port: int = 0) -> str:
     """A line with this run's ring and ports in place of the shared ones; options go to the end of the last command."""
     line = re.sub(r"--ring whisker\b", f"--ring {RING}", line)
-    line = re.sub(r":744(\d)", lambda found: f":{first_port + int(found[1]) - 7}", line)
+    line = re.sub(r":745(\d)", lambda found: f":{first_port + int(found[1]) - 7}", line)
     command, arrow, file = line.partition(" >")
     return f"{command} {more}{arrow}{file}"
 
@@ -199,6 +200,7 @@ def test_examples_beside_a_robot(robot, place, command):
         "whisker navigator": "--listen none",
         "whisker pilot": f"--listen none --ring {RING}-4",
         "whisker foxglove": f"--port 0 --connect tcp/127.0.0.1:{robot + 1}",
+        "whisker ros2": f"--connect tcp/127.0.0.1:{robot + 1} --router {free_endpoint()}",
         "whisker bag": f"--connect tcp/127.0.0.1:{robot + 1}",
         "whisker pyro": "--port 0",
     }.get(command, "")

@@ -31,6 +31,7 @@ COMMANDS = {
     "robot": "all processes of a robot, on hardware or simulated",
     "pilot": "the netbook's part of a robot: samples to wheel speeds and observations",
     "navigator": "pose and belief of a robot as its rows come, over the network",
+    "ros2": "a running robot as a node of ROS 2 by rmw_zenoh, without ROS: standard messages, frames, /initialpose",
     "foxglove": "a running robot in Foxglove: pose, belief, whiskers, map, health; a pose set there is obeyed",
     "bag": "record everything a robot's processes say, for ROS 2 tools",
     "pyro": "a robot's results as a Pyro object, the paper's interface",
@@ -45,7 +46,7 @@ EXTRAS = {
     **dict.fromkeys(("record", "replay"), "record"),
     "view": "view",
     **dict.fromkeys(("robot", "pilot", "navigator", "bag", "pyro", "top"), "robot"),
-    "foxglove": "foxglove",
+    **{name: name for name in ("ros2", "foxglove")},
     **dict.fromkeys(("localise", "calibrate", "scene"), "scenes"),
 }
 LAB_COMMANDS = ("bridge-sim", "scene", "bench")  # of the package crunchbot_lab

@@ -12,7 +12,7 @@ from ..scene import load
 from ..stopping import stop_on_signals
 from ..tables import unwritable
 
-EXAMPLE = "whisker navigator robot-run/scene --connect tcp/127.0.0.1:7448"
+EXAMPLE = "whisker navigator robot-run/scene --connect tcp/127.0.0.1:7458"
 
 
 def add(parser: argparse.ArgumentParser) -> None:

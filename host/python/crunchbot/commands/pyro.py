@@ -9,7 +9,7 @@ from ..robot.network.options import NAVIGATOR_ENDPOINT, PILOT_ENDPOINT, add_link
 from ..robot.pyro import PORT, Server
 from ..stopping import stop_on_signals
 
-EXAMPLE = "whisker pyro --connect tcp/127.0.0.1:7448 --connect tcp/127.0.0.1:7449"
+EXAMPLE = "whisker pyro --connect tcp/127.0.0.1:7458 --connect tcp/127.0.0.1:7459"
 
 
 def add(parser: argparse.ArgumentParser) -> None:

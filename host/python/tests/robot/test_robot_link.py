@@ -420,7 +420,7 @@ def test_envelopes():
     assert next(envelopes()).stream != next(envelopes()).stream
 
 
-@pytest.mark.parametrize("endpoint", ["7448", "tcp/host", "udp/127.0.0.1:1", "tcp/127.0.0.1:65536", "tcp/a b:1"])
+@pytest.mark.parametrize("endpoint", ["7458", "tcp/host", "udp/127.0.0.1:1", "tcp/127.0.0.1:65536", "tcp/a b:1"])
 def test_endpoints_that_are_none(endpoint):
     with pytest.raises(LinkError, match="not an endpoint; give tcp/HOST:PORT"):
         Link("pilot", connect=[endpoint])
@@ -455,7 +455,7 @@ def opened(monkeypatch, capsys, *words: str) -> str:
 
 
 @pytest.mark.parametrize(
-    "endpoint", ["tcp/0.0.0.0:7448", "tcp/[::]:7448", "tcp/192.168.7.2:7448", "tls/robot.lan:7448"]
+    "endpoint", ["tcp/0.0.0.0:7458", "tcp/[::]:7458", "tcp/192.168.7.2:7458", "tls/robot.lan:7458"]
 )
 def test_a_door_that_is_open_to_the_network_is_reported(monkeypatch, capsys, endpoint):
     text = f"whisker: {endpoint}: anyone who reaches this address can watch and take part\n"
@@ -464,7 +464,7 @@ def test_a_door_that_is_open_to_the_network_is_reported(monkeypatch, capsys, end
 
 
 @pytest.mark.parametrize(
-    "words", [[], ["--listen", "none"], ["--listen", "tcp/[::1]:7448"], ["--connect", "tcp/10.0.0.1:1"]]
+    "words", [[], ["--listen", "none"], ["--listen", "tcp/[::1]:7458"], ["--connect", "tcp/10.0.0.1:1"]]
 )
 def test_a_door_that_only_this_machine_reaches_is_not(monkeypatch, capsys, words):
     assert opened(monkeypatch, capsys, *words) == ""
@@ -474,10 +474,10 @@ def test_a_door_for_certificates_alone_is_not_open(monkeypatch, capsys, tmp_path
     file = tmp_path / "zenoh.json5"
     for mutual, reported in ((True, False), (False, True)):
         file.write_text(f"{{transport: {{link: {{tls: {{enable_mtls: {str(mutual).lower()}}}}}}}}}  // JSON5")
-        words = ["--zenoh-config", str(file), "--listen", "tls/0.0.0.0:7448"]
+        words = ["--zenoh-config", str(file), "--listen", "tls/0.0.0.0:7458"]
         assert bool(opened(monkeypatch, capsys, *words)) == reported
     assert "anyone who reaches" in opened(
-        monkeypatch, capsys, "--zenoh-config", str(file), "--listen", "tcp/0.0.0.0:7448"
+        monkeypatch, capsys, "--zenoh-config", str(file), "--listen", "tcp/0.0.0.0:7458"
     )
 
 

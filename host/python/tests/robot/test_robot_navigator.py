@@ -470,10 +470,10 @@ def test_options_of_the_command(made, capsys):
     code, _, err = run(capsys, "navigator", folder, "--filter", "magic")
     assert code == 2 and "magic" in err and err.count("\n") == 1
     code, _, err = run(capsys, "navigator", folder, "--connect", "nowhere")
-    assert code == 2 and err == "whisker: 'nowhere': not an endpoint; give tcp/HOST:PORT, as tcp/127.0.0.1:7448\n"
+    assert code == 2 and err == "whisker: 'nowhere': not an endpoint; give tcp/HOST:PORT, as tcp/127.0.0.1:7458\n"
     code, _, err = run(capsys, "navigator", folder, "--listen", "tcp/0.0.0.0:1x", "--connect", "none")
     assert code == 2 and "not an endpoint" in err
-    code, _, err = run(capsys, "navigator", folder, "--listen", "tcp/192.0.2.1:7449")
+    code, _, err = run(capsys, "navigator", folder, "--listen", "tcp/192.0.2.1:7459")
     assert code == 1 and "anyone who reaches this address can watch" in err and "cannot be listened on" in err
     code, _, err = run(capsys, "navigator", folder / "none")
     assert code == 2 and "no such folder" in err

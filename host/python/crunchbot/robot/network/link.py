@@ -29,7 +29,7 @@ from .sources import Sources
 from .streams import Envelope, envelopes, new_stream
 
 ROBOT = "robot"
-PILOT_ENDPOINT, NAVIGATOR_ENDPOINT = "tcp/127.0.0.1:7448", "tcp/127.0.0.1:7449"
+PILOT_ENDPOINT, NAVIGATOR_ENDPOINT = "tcp/127.0.0.1:7458", "tcp/127.0.0.1:7459"
 # Of these only the newest matters: they never hold up their sender, and when there is no room the older go.
 NEWEST_ONLY = {"belief", HEALTH}
 INBOX_MOST = 10_000  # messages of a live subscription that nobody takes: over 16 minutes of rows

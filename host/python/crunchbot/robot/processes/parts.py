@@ -9,7 +9,7 @@ from pathlib import Path
 from ...programs import program
 from .children import Program
 
-FIRST_PORT = 7447  # of three: supervisor, pilot, navigator; the latter two are those of robot.link
+FIRST_PORT = 7457  # of three: supervisor, pilot, navigator; the latter two are those of robot.link
 LOOPBACK = "127.0.0.1"
 BRIDGE = "bridge"
 

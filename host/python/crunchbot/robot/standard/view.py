@@ -41,7 +41,7 @@ KINDS = {
     "/diagnostics": "diagnostic_msgs/DiagnosticArray",
 }
 LATCHED = ("/map",)  # a subscriber that comes late gets the last one
-POSE_TOPIC = "/initialpose"  # obeyed
+POSE_TOPIC, POSE_KIND = "/initialpose", "geometry_msgs/PoseWithCovarianceStamped"  # obeyed
 
 
 @dataclass(frozen=True)
