@@ -45,6 +45,7 @@ NodeBus::NodeBus(size_t populated, uint64_t seed, const std::vector<NodeTrait> &
         if (!nodes_.back()) {
             throw std::runtime_error("no memory for the nodes");
         }
+        sim_node_by_records(nodes_.back().get(), true);
     }
 }
 
@@ -96,8 +97,11 @@ void NodeBus::fail_supplies()
 void NodeBus::run()
 {
     fail_supplies();
-    for (const auto &node : nodes_) {
-        sim_node_run(node.get());
+    for (size_t lane = 0; lane < nodes_.size(); lane++) {
+        sim_node_run(nodes_[lane].get());
+        if (sim_node_differs(nodes_[lane].get())) {
+            throw std::runtime_error("lane " + std::to_string(lane) + ": the node's registers make another record");
+        }
     }
 }
 
@@ -136,6 +140,32 @@ void NodeBus::select_edge(bool low)
     }
     driven_ = UINT32_MAX;
     miso_ = UINT32_MAX;
+}
+
+std::array<uint64_t, LANES> NodeBus::transfer(uint64_t order)
+{
+    std::array<uint64_t, LANES> arrives;
+    arrives.fill(UINT64_MAX);
+    for (size_t lane = 0; lane < nodes_.size(); lane++) {
+        sent_[lane] = arrives[lane] = sim_node_transfer(nodes_[lane].get(), order);
+    }
+    if (fault_ != LinkFault::NONE) {
+        arrives[fault_lane_] = damaged(arrives[fault_lane_]);
+    }
+    remember_transfer();
+    return arrives;
+}
+
+uint64_t NodeBus::damaged(uint64_t bits) const
+{
+    switch (fault_) {
+    case LinkFault::DEAD:
+        return UINT64_MAX;
+    case LinkFault::STALE:
+        return previous_[fault_lane_];
+    default:
+        return fault_bit_ < RECORD_BITS ? bits ^ UINT64_C(1) << (RECORD_BITS - 1 - fault_bit_) : bits;
+    }
 }
 
 void NodeBus::remember_transfer()

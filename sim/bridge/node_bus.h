@@ -58,7 +58,12 @@ class NodeBus
         return miso_;
     }
 
-    // The rest of the tick, in the nodes' own virtual time: they read their sensors.
+    // The edges of a whole transfer at once: select, the bits of this order, first one highest, and select again.
+    // Returns what arrives of each lane, likewise.
+    std::array<uint64_t, LANES> transfer(uint64_t order);
+
+    // The rest of the tick, in the nodes' own virtual time: they read their sensors. Throws std::runtime_error if a
+    // node that was run at record level differs from its registers.
     void run();
 
   private:
@@ -82,6 +87,7 @@ class NodeBus
     void sck_edge(bool level, bool mosi);
     void remember_transfer();
     void damage();
+    uint64_t damaged(uint64_t bits) const;
     void fail_supplies();
 
     std::vector<std::unique_ptr<sim_node, NodeDeleter>> nodes_;

@@ -81,6 +81,11 @@ uint64_t dspic_now_fs(const struct dspic *chip);
 /* When something happens next by itself; UINT64_MAX: nothing. */
 uint64_t dspic_next_fs(const struct dspic *chip);
 
+/* The main loop idles with no interrupt pending, and nothing but the watchdog and a free-running T3 is to come. Then so
+ * much time may pass in which nothing happens: what is to come moves with it. */
+bool dspic_rests(const struct dspic *chip);
+void dspic_skip(struct dspic *chip, uint64_t fs);
+
 /* The supply fails at this time, also in the middle of an erase or write, which is then done in part. */
 void dspic_cut_power_at(struct dspic *chip, uint64_t at_fs);
 bool dspic_powered(const struct dspic *chip);

@@ -111,6 +111,26 @@ uint64_t dspic_next_fs(const struct dspic *chip)
     return chip->due_fs[dspic_events_next_event(chip)];
 }
 
+bool dspic_rests(const struct dspic *chip)
+{
+    bool rests = chip->powered && chip->idle && !chip->hung && chip->level == 0 && chip->requested == 0;
+    for (enum event e = EVENT_SPI1; e < EVENTS; e++)
+        rests &= e == EVENT_T3 || e == EVENT_WATCHDOG || chip->due_fs[e] == NEVER;
+    for (unsigned word = 0; word * 16u < IRQ_COUNT; word++)
+        rests &= !(chip->sfr[IFS0 / 2u + word] & chip->sfr[IEC0 / 2u + word]);
+    return rests;
+}
+
+void dspic_skip(struct dspic *chip, uint64_t fs)
+{
+    chip->now_fs += fs;
+    chip->soon_fs += chip->soon_fs == NEVER ? 0 : fs;
+    for (enum event e = EVENT_SPI1; e < EVENTS; e++)
+        chip->due_fs[e] += chip->due_fs[e] == NEVER ? 0 : fs;
+    for (unsigned n = 0; n < sizeof chip->timer / sizeof *chip->timer; n++)
+        chip->timer[n].since_fs += fs;
+}
+
 void dspic_cut_power_at(struct dspic *chip, uint64_t at_fs)
 {
     dspic_plan_event(chip, EVENT_POWER, at_fs);

@@ -144,6 +144,12 @@ static void mlx90333_model_latch(struct mlx90333 *sensor, uint64_t now_ns)
         sensor->reset_due = true; /* once this frame has been sent */
 }
 
+const uint8_t *mlx90333_read(struct mlx90333 *sensor, uint64_t latch_ns)
+{
+    mlx90333_model_latch(sensor, latch_ns);
+    return sensor->frame;
+}
+
 /* True if the byte before was over long enough ago. */
 static bool mlx90333_model_check_byte_start(struct mlx90333 *sensor, uint64_t now_ns)
 {

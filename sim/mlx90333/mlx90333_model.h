@@ -93,6 +93,9 @@ void mlx90333_select(struct mlx90333 *sensor, uint64_t now_ns, bool level);
 /* Edge of SCLK while the master lets the line go (`master` true) or pulls it low. Returns the line's level after it. */
 bool mlx90333_clock(struct mlx90333 *sensor, uint64_t now_ns, bool level, bool master);
 
+/* The frame that a master reads who keeps to the data sheet, latched at `latch_ns`: without wires, or their faults. */
+const uint8_t *mlx90333_read(struct mlx90333 *sensor, uint64_t latch_ns);
+
 /* All violations of the master's so far. */
 uint32_t mlx90333_violations(const struct mlx90333 *sensor);
 

@@ -7,7 +7,6 @@
 #include "sim_node_state.h"
 
 #define OSCILLATOR_SPREAD_PERMILLE (MLX90333_OSCILLATOR_PERCENT * 10u)
-#define TICK_FS (SIM_TICK_NS * DSPIC_FS_PER_NS)
 /* When in a tick the bridge selects its nodes and lets them go; its edges in between take no time here. */
 #define SELECT_FS (3000u * DSPIC_FS_PER_NS)
 #define DESELECT_FS (20000u * DSPIC_FS_PER_NS)
@@ -268,6 +267,8 @@ void sim_node_free(sim_node *node)
 
 void sim_node_power_on(sim_node *node)
 {
+    if (node->quick.on)
+        node->quick.level->leave(node);
     mlx90333_power_on(&node->sensor, 0, &node->parameters.sensor);
     mlx90333_power_on(&node->twin, 0, &node->parameters.sensor);
     node->twin.parameters.resets_after_error = false;
@@ -279,16 +280,25 @@ void sim_node_power_on(sim_node *node)
     node->tick_fs = dspic_now_fs(node->chip);
 }
 
-void sim_node_set_field(sim_node *node, uint64_t since_fs, struct sim_field field)
+void sim_node_set_sensor_field(struct mlx90333 *sensor, uint64_t since_fs, struct sim_field field)
 {
     const struct mlx90333_field of = {
         .since_ns = since_fs / DSPIC_FS_PER_NS, .alpha_deg = field.alpha_deg, .beta_deg = field.beta_deg};
-    mlx90333_set_field(&node->sensor, &of);
-    mlx90333_set_field(&node->twin, &of);
+    mlx90333_set_field(sensor, &of);
+}
+
+void sim_node_set_field(sim_node *node, uint64_t since_fs, struct sim_field field)
+{
+    sim_node_set_sensor_field(&node->sensor, since_fs, field);
+    sim_node_set_sensor_field(&node->twin, since_fs, field);
 }
 
 void sim_node_sync(sim_node *node, struct sim_field field)
 {
+    if (node->quick.on && node->quick.level->sync(node, field))
+        return;
+    node->came = (struct sim_node_tick){.field = field,
+                                        .step = node->came.step == SIM_NODE_ASLEEP ? SIM_NODE_SYNCED : SIM_NODE_ODD};
     node->bits = 0;
     node->second = false;
     node->deaf = !node->powered || sim_node_dark(node) || dspic_now_fs(node->chip) > node->tick_fs + STALLED_FS;
@@ -302,9 +312,31 @@ void sim_node_sync(sim_node *node, struct sim_field field)
     dspic_run_until(node->chip, node->tick_fs + SELECT_FS);
 }
 
+void sim_node_note_select(struct sim_node_tick *came, bool low)
+{
+    const enum sim_node_step from = low ? SIM_NODE_SYNCED : SIM_NODE_SELECTED;
+    const bool whole = low || (came->bits == 8u * WHISKER_RECORD_BYTES && !came->high);
+    came->step = came->step != from || !whole ? SIM_NODE_ODD : low ? SIM_NODE_SELECTED : SIM_NODE_ENDED;
+}
+
+void sim_node_note_sck(struct sim_node_tick *came, bool level, bool mosi)
+{
+    if (came->step != SIM_NODE_SELECTED || level == came->high || (level && came->bits == 8u * WHISKER_RECORD_BYTES)) {
+        came->step = SIM_NODE_ODD;
+        return;
+    }
+    came->high = level;
+    came->bits = (uint8_t)(came->bits + level);
+    if (!level)
+        came->order = came->order << 1 | mosi;
+}
+
 void sim_node_select(sim_node *node, bool low)
 {
     static const uint64_t AT_FS[2][2] = {{DESELECT_FS, SELECT_FS}, {SERVICE_DESELECT_FS, SERVICE_SELECT_FS}};
+    if (node->quick.on && node->quick.level->select(node, low))
+        return;
+    sim_node_note_select(&node->came, low);
     if (low)
         node->second = node->bits >= 8u * WHISKER_RECORD_BYTES; /* after a whole transfer, not one cut short */
     if (!node->deaf)
@@ -313,6 +345,10 @@ void sim_node_select(sim_node *node, bool low)
 
 bool sim_node_sck(sim_node *node, bool level, bool mosi)
 {
+    bool miso = true;
+    if (node->quick.on && node->quick.level->sck(node, level, mosi, &miso))
+        return miso;
+    sim_node_note_sck(&node->came, level, mosi);
     if (node->deaf)
         return true;
     node->bits += level;
@@ -321,16 +357,44 @@ bool sim_node_sck(sim_node *node, bool level, bool mosi)
     return dspic_output(node->chip, PIN_LINK_MISO) != DSPIC_LOW;
 }
 
+uint64_t sim_node_transfer(sim_node *node, uint64_t order)
+{
+    uint64_t bits = 0;
+    if (node->quick.on && node->came.step == SIM_NODE_SYNCED) {
+        bits = node->quick.record;
+        node->came =
+            (struct sim_node_tick){node->came.field, order, 8u * WHISKER_RECORD_BYTES, false, SIM_NODE_SELECTED};
+    } else {
+        sim_node_select(node, true);
+        for (unsigned i = 8u * WHISKER_RECORD_BYTES; i-- > 0;) {
+            bits = bits << 1 | sim_node_sck(node, true, order >> i & 1u);
+            (void)sim_node_sck(node, false, order >> i & 1u);
+        }
+    }
+    sim_node_select(node, false);
+    return bits;
+}
+
+void sim_node_run_registers(sim_node *node)
+{
+    node->tick_fs += SIM_NODE_TICK_FS;
+    dspic_run_until(node->chip, node->tick_fs);
+}
+
 void sim_node_run(sim_node *node)
 {
-    if (!node->powered)
+    if (!node->powered || (node->quick.on && node->quick.level->run(node)))
         return;
-    node->tick_fs += TICK_FS;
-    dspic_run_until(node->chip, node->tick_fs);
+    sim_node_run_registers(node);
+    if (node->quick.level)
+        node->quick.level->enter(node);
+    node->came.step = SIM_NODE_ASLEEP;
 }
 
 void sim_node_cut(sim_node *node, uint64_t after_ns)
 {
+    if (node->quick.on)
+        node->quick.level->leave(node);
     dspic_cut_power_at(node->chip, node->tick_fs + after_ns * DSPIC_FS_PER_NS);
 }
 

@@ -40,6 +40,9 @@ void sim_node_select(sim_node *node, bool low);
 /* Edge of the link's SCK with the level of MOSI at that time. Returns MISO after it; true (pulled up) when idle. */
 bool sim_node_sck(sim_node *node, bool level, bool mosi);
 
+/* A whole transfer: select, the 64 bits of this order, first bit highest, and select again. Returns the record's. */
+uint64_t sim_node_transfer(sim_node *node, uint64_t order);
+
 /* The rest of this tick: the sensor is read bit by bit until the time of the next SYNC. */
 void sim_node_run(sim_node *node);
 
@@ -55,6 +58,14 @@ void sim_node_cut(sim_node *node, uint64_t after_ns);
 /* After a cut: is there no supply? Then this brings it back, in step with the other nodes. */
 bool sim_node_dark(const sim_node *node);
 void sim_node_restore(sim_node *node);
+
+/* Ticks in which nothing but a reading and its record is due may be taken as a whole, without the chip's registers:
+ * what the bridge receives is the same. One tick in a thousand is run with them all the same, and so is the tick before
+ * anything else happens. Not for the functions of sim_node_lab.h. */
+void sim_node_by_records(sim_node *node, bool allowed);
+
+/* A tick that was taken as a whole, then run with the registers, has brought something else. */
+bool sim_node_differs(const sim_node *node);
 
 /* First programming by wire: an image file's bytes, header and body, into the flash as the loader would leave them,
  * without any check. A new node holds an application of version SIM_NODE_VERSION. */

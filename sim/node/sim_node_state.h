@@ -6,6 +6,54 @@
 #include "port.h" // struct board
 #include "sim_node_lab.h"
 
+#define SIM_NODE_TICK_FS (SIM_TICK_NS * DSPIC_FS_PER_NS)
+
+/* What has come from the bridge in the present tick. */
+enum sim_node_step {
+    SIM_NODE_ASLEEP, /* no SYNC yet */
+    SIM_NODE_SYNCED,
+    SIM_NODE_SELECTED,
+    SIM_NODE_ENDED, /* a whole transfer */
+    SIM_NODE_ODD,   /* anything else */
+};
+struct sim_node_tick {
+    struct sim_field field;
+    uint64_t order; /* bits of MOSI so far, the newest one lowest */
+    uint8_t bits;   /* clocked */
+    bool high;      /* level of SCK */
+    enum sim_node_step step;
+};
+
+/* What a tick begins with and leaves to the next one, but for time. */
+struct sim_node_state_of_tick {
+    struct sampler sampler;
+    struct sensor_reading reading;
+    uint8_t tick;
+    struct mlx90333_sense sense;
+};
+
+/* Ticks at record level (sim_node_record.c): to it if nothing stands against it, at the end of a tick; and back, at
+ * once. What comes meanwhile: false: it has been left, and the caller goes on with the registers. */
+struct sim_node_level {
+    void (*enter)(struct sim_node *node);
+    void (*leave)(struct sim_node *node);
+    bool (*sync)(struct sim_node *node, struct sim_field field);
+    bool (*select)(struct sim_node *node, bool low);
+    bool (*sck)(struct sim_node *node, bool level, bool mosi, bool *miso);
+    bool (*run)(struct sim_node *node);
+};
+struct sim_node_quick {
+    const struct sim_node_level *level; /* NULL: all ticks are run with the registers */
+    bool on;
+    bool differs;         /* the registers brought something else */
+    unsigned until_check; /* ticks */
+    uint64_t ticks;       /* since the chip stands */
+    uint64_t latch_ns;    /* from SYNC until the sensor latches */
+    uint64_t record;      /* for the next transfer, first bit highest */
+    struct sim_node_tick last;
+    struct sim_node_state_of_tick before, now; /* the last tick */
+};
+
 struct sim_node {
     struct dspic *chip;
     struct board board;
@@ -27,10 +75,20 @@ struct sim_node {
     uint64_t armed_fs; /* when the link last got a record */
     uint64_t record;   /* that record, first bit highest */
     uint32_t arms;     /* how often it got one */
+    struct sim_node_tick came;
+    struct sim_node_quick quick;
 };
 
-/* The field from then on, for sensor and twin. */
+/* The field from then on, for one sensor, and for sensor and twin. */
+void sim_node_set_sensor_field(struct mlx90333 *sensor, uint64_t since_fs, struct sim_field field);
 void sim_node_set_field(struct sim_node *node, uint64_t since_fs, struct sim_field field);
+
+/* Takes down what comes. */
+void sim_node_note_select(struct sim_node_tick *came, bool low);
+void sim_node_note_sck(struct sim_node_tick *came, bool level, bool mosi);
+
+/* The rest of a tick with the chip's registers. */
+void sim_node_run_registers(struct sim_node *node);
 
 /* The flash as it comes from the first programming. */
 void sim_node_program_default(struct sim_node *node);

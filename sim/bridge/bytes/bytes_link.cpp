@@ -34,6 +34,25 @@ uint32_t clock_bit(NodeBus &bus, bool mosi)
     return miso;
 }
 
+static_assert(WHISKER_ORDER_BYTES == sizeof(uint64_t) && WHISKER_RECORD_BYTES == sizeof(uint64_t));
+
+// A tick's first window.
+Records sample_window(NodeBus &bus, const Bytes &order)
+{
+    Records records{};
+    uint64_t bits = 0;
+    for (const uint8_t byte : order) {
+        bits = bits << 8 | byte;
+    }
+    const std::array<uint64_t, LANES> arrived = bus.transfer(bits);
+    for (size_t lane = 0; lane < LANES; lane++) {
+        for (size_t at = 0; at < WHISKER_RECORD_BYTES; at++) {
+            records[lane][at] = static_cast<uint8_t>(arrived[lane] >> (56 - 8 * at));
+        }
+    }
+    return records;
+}
+
 } // namespace
 
 void link_sync(NodeBus &bus)
@@ -44,6 +63,9 @@ void link_sync(NodeBus &bus)
 
 Records link_window(NodeBus &bus, const Bytes &order)
 {
+    if (order.size() == WHISKER_ORDER_BYTES) {
+        return sample_window(bus, order);
+    }
     Records records{};
     bus.pins(false, false, false, false);
     for (size_t at = 0; at < order.size(); at++) {
