@@ -64,11 +64,11 @@ struct Fixture {
     {
         while (count-- > 0) {
             bridge.start_tick();
+            bridge.cycle();
             assert_true(bridge.link_busy());
             while (bridge.link_busy()) {
                 bridge.cycle();
             }
-            bridge.cycle(); // the nodes see select rise
             nodes.run();
         }
     }
@@ -77,6 +77,7 @@ struct Fixture {
     {
         while (count-- > 0) {
             bridge.start_tick();
+            bridge.cycle();
             assert_false(bridge.link_busy());
             host.idle(1000);
             assert_true(bridge.running());

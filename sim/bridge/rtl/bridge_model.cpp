@@ -1,7 +1,7 @@
 #include "bridge_model.h"
 
-#include "Vwhisker_bridge.h"
-#include "Vwhisker_bridge___024root.h"
+#include "Vclocked_bridge.h"
+#include "Vclocked_bridge___024root.h"
 
 namespace bridge_sim
 {
@@ -14,15 +14,10 @@ constexpr int RESET_CYCLES = 16;
 } // namespace
 
 BridgeModel::BridgeModel(NodeBus &bus, NorFlash &flash)
-    : bus_(bus), flash_(flash), top_(std::make_unique<Vwhisker_bridge>())
+    : bus_(bus), flash_(flash), top_(std::make_unique<Vclocked_bridge>())
 {
-    top_->utmi_vbus_valid = 1;
-    top_->utmi_session_valid = 1;
-    top_->utmi_session_end = 0;
-    top_->utmi_rx_error = 0;
     top_->tick_external = 1;
     top_->tick_strobe = 0;
-    top_->tick_in = 0;
     top_->miso = UINT32_MAX >> (32 - LANES);
     reset();
 }
@@ -79,31 +74,37 @@ bool BridgeModel::running() const
 
 bool BridgeModel::every_frame() const
 {
-    return top_->rootp->whisker_bridge__DOT__options & WHISKER_CONTROL_OPTION_EVERY_FRAME;
+    return top_->rootp->clocked_bridge__DOT__bridge__DOT__options & WHISKER_CONTROL_OPTION_EVERY_FRAME;
 }
 
 uint32_t BridgeModel::tick_period() const
 {
-    return top_->rootp->whisker_bridge__DOT__tick_period;
+    return top_->rootp->clocked_bridge__DOT__bridge__DOT__tick_period;
 }
 
 uint32_t BridgeModel::frames_dropped() const
 {
-    return top_->rootp->whisker_bridge__DOT__dropped;
+    return top_->rootp->clocked_bridge__DOT__bridge__DOT__dropped;
 }
 
-// Inputs settle with the clock low, outputs are read as they stand at the rising edge, then the edge comes. The node
+// One evaluation (clocked_bridge.v): the edge that ended the cycle before, then the outputs of this one. The model is
+// made to believe that it saw the clock low since its last edge; its falling edge clocks nothing but the flash. The node
 // wires answer in between: a record's bit is on MISO at the first edge after the SCK edge that shifted it out.
 void BridgeModel::cycle()
 {
-    Vwhisker_bridge &top = *top_;
+    Vclocked_bridge &top = *top_;
     top.utmi_rx_data = in.rx_data;
     top.utmi_rx_active = in.rx_active;
     top.utmi_rx_valid = in.rx_valid;
     top.utmi_tx_ready = in.tx_ready;
     top.utmi_line_state = in.line_state;
-    top.clk = 0;
+    top.clk = 1;
+    top.rootp->__Vtrigprevexpr___TOP__clk__0 = 0;
     top.eval();
+    if (!top.flash_cs_n) {
+        top.clk = 0;
+        top.eval();
+    }
     out.tx_data = top.utmi_tx_data;
     out.tx_valid = top.utmi_tx_valid;
     out.xcvr_select = top.utmi_xcvr_select;
@@ -111,8 +112,6 @@ void BridgeModel::cycle()
     out.op_mode = top.utmi_op_mode;
     top.miso = bus_.pins(top.sync, top.select_n, top.sck, top.mosi) & (UINT32_MAX >> (32 - LANES));
     top.flash_miso = flash_.step(top.flash_cs_n, top.flash_sck, top.flash_mosi);
-    top.clk = 1;
-    top.eval();
     cycles++;
     if (free_) {
         run_nodes();

@@ -7,7 +7,7 @@
 #include "node_bus.h"
 #include "utmi.h"
 
-class Vwhisker_bridge;
+class Vclocked_bridge;
 
 namespace bridge_sim
 {
@@ -28,9 +28,10 @@ class BridgeModel : public UtmiDevice
     // As after power came: registers, FIFO and USB device begin anew.
     void reset();
 
-    // Begins a tick: one cycle of the external tick strobe.
+    // Begins a tick: one cycle of the external tick strobe. The link is busy after the next cycle.
     void start_tick();
 
+    // As they are in the cycle that begins.
     bool sync() const;               // the pin
     bool link_busy() const;          // SYNC and transfer on the node link in progress
     bool running() const;            // from start until the last frame is in the FIFO
@@ -43,7 +44,7 @@ class BridgeModel : public UtmiDevice
 
     NodeBus &bus_;
     FlashPins flash_;
-    std::unique_ptr<Vwhisker_bridge> top_;
+    std::unique_ptr<Vclocked_bridge> top_;
     bool free_ = false;  // ticks by itself
     bool busy_ = false;  // the link was, a cycle ago
     bool ended_ = false; // its transfer has

@@ -78,6 +78,7 @@ bool RtlRig::transfer(const std::function<bool()> &usb_step)
     const unsigned frames = microframes(bridge_.tick_period());
     host_.start_of_frame();
     bridge_.start_tick();
+    bridge_.cycle();
     if (!bridge_.link_busy()) {
         return false;
     }
@@ -85,7 +86,6 @@ bool RtlRig::transfer(const std::function<bool()> &usb_step)
         host_.start_of_frame();
     }
     wait_while([this] { return bridge_.link_busy(); }, usb_step);
-    bridge_.cycle(); // the nodes see select rise
     return true;
 }
 
