@@ -1,5 +1,6 @@
 #include "frame_check.h"
 
+#include <sstream>
 #include <stdexcept>
 
 namespace bridge_sim
@@ -29,10 +30,14 @@ CheckedFrame read_frame(const uint8_t *at)
     return frame;
 }
 
-void require(bool ok, uint64_t frame, const std::string &what)
+// The words of `what` are put together only if something is wrong: this is asked of every record.
+template <typename... Words> void require(bool ok, uint64_t frame, const Words &...what)
 {
     if (!ok) {
-        throw std::runtime_error("frame " + std::to_string(frame) + ": " + what);
+        std::ostringstream text;
+        text << "frame " << frame << ": ";
+        (text << ... << what);
+        throw std::runtime_error(text.str());
     }
 }
 
@@ -48,10 +53,10 @@ void check_records(const uint8_t *at, uint64_t number)
 {
     for (size_t lane = 0; lane < WHISKER_LIMIT_LANES; lane++) {
         const uint8_t *record = at + WHISKER_FRAME_HEADER_BYTES + lane * WHISKER_RECORD_BYTES;
-        require(whisker_crc8(record, WHISKER_RECORD_CRC) == record[WHISKER_RECORD_CRC], number,
-                "record CRC of lane " + std::to_string(lane) + " is wrong");
-        require(record[WHISKER_RECORD_TICK] == at[WHISKER_FRAME_HEADER_TICK], number,
-                "record of lane " + std::to_string(lane) + " carries another tick");
+        require(whisker_crc8(record, WHISKER_RECORD_CRC) == record[WHISKER_RECORD_CRC], number, "record CRC of lane ",
+                lane, " is wrong");
+        require(record[WHISKER_RECORD_TICK] == at[WHISKER_FRAME_HEADER_TICK], number, "record of lane ", lane,
+                " carries another tick");
     }
 }
 
@@ -104,11 +109,10 @@ void FrameCheck::check(const uint8_t *bytes)
 void FrameCheck::check_order(const CheckedFrame &frame)
 {
     require(!ended_, frames_, "comes after the last frame of its run");
-    require(frame.tick == next_tick_, frames_,
-            "is tick " + std::to_string(frame.tick) + " instead of " + std::to_string(next_tick_));
+    require(frame.tick == next_tick_, frames_, "is tick ", frame.tick, " instead of ", next_tick_);
     require(frame.time == uint64_t{tick_period_} * frame.tick, frames_, "has a wrong time");
-    require(!sequence_known_ || frame.sequence == next_sequence_, frames_,
-            "has sequence " + std::to_string(frame.sequence) + " instead of " + std::to_string(next_sequence_));
+    require(!sequence_known_ || frame.sequence == next_sequence_, frames_, "has sequence ", frame.sequence,
+            " instead of ", next_sequence_);
     require(frame.dropped == 0, frames_, "reports dropped frames");
     next_tick_ = frame.tick + 1;
     next_sequence_ = frame.sequence + 1;

@@ -101,12 +101,18 @@ void mlx90333_sense_field(struct mlx90333_sense *sense, const struct mlx90333_fi
     sense->field = *field;
 }
 
+static double mlx90333_sense_held(double value, double low, double high)
+{
+    return value < low ? low : value > high ? high : value;
+}
+
 uint16_t mlx90333_counts(const struct mlx90333_parameters *p, double angle_deg)
 {
     const double steps = 65536.0 / p->step_counts, step = steps / 2.0 + angle_deg * (steps / p->span_deg);
-    double whole = floor(fmin(fmax(step, 0.0), steps - 1.0) + 0.5);
-    whole = fmin(whole, steps - 1.0) * p->step_counts;
-    return (uint16_t)(isfinite(angle_deg) ? fmin(fmax(whole, p->clamp_low), p->clamp_high) : p->clamp_low);
+    if (!isfinite(angle_deg))
+        return p->clamp_low;
+    const double whole = floor(mlx90333_sense_held(step, 0.0, steps - 1.0) + 0.5);
+    return (uint16_t)mlx90333_sense_held(whole * p->step_counts, p->clamp_low, p->clamp_high);
 }
 
 static double mlx90333_sense_filtered(const struct mlx90333_sense *sense, int axis)

@@ -88,8 +88,8 @@ uint32_t BridgeModel::frames_dropped() const
 }
 
 // One evaluation (clocked_bridge.v): the edge that ended the cycle before, then the outputs of this one. The model is
-// made to believe that it saw the clock low since its last edge; its falling edge clocks nothing but the flash. The node
-// wires answer in between: a record's bit is on MISO at the first edge after the SCK edge that shifted it out.
+// made to believe that it saw the clock low since its last edge; its falling edge clocks nothing but the flash. The
+// node wires answer in between: a record's bit is on MISO at the first edge after the SCK edge that shifted it out.
 void BridgeModel::cycle()
 {
     Vclocked_bridge &top = *top_;
