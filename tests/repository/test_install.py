@@ -6,6 +6,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from catkin_pkg.package import parse_package
 from chainrun import BUILD, END_S, ROOT, running, simulation, write_flat_scene
 
 import crunchbot
@@ -251,3 +252,24 @@ def test_udev_rule_names_the_bridge_and_its_unit(prefix):
     assert len(rules) == 1
     if "verify" in subprocess.run([tool("udevadm"), "--help"], capture_output=True, text=True).stdout:
         run("udevadm", "verify", prefix / "lib/udev/rules.d/70-whisker.rules")
+
+
+def test_the_package_of_messages_is_as_ros_needs_it(prefix):
+    """Manifest and rules of names as colcon and rosidl have them; what the messages use is what manifest and build name."""
+    package = prefix / "share/whisker_msgs"
+    manifest = parse_package(str(package))
+    manifest.validate()
+    assert (manifest.name, manifest.version, manifest.get_build_type()) == ("whisker_msgs", VERSION, "ament_cmake")
+    assert [group.name for group in manifest.member_of_groups] == ["rosidl_interface_packages"]
+    messages = {path.stem: path.read_text() for path in (package / "msg").glob("*.msg")}
+    assert messages.keys() >= {"Observation", "Belief", "Block"}
+    fields = [line.partition("#")[0].split() for text in messages.values() for line in text.splitlines()]
+    for kind, name, *_ in filter(None, fields):
+        assert re.fullmatch(r"(?!.*__)[a-z][a-z0-9_]*(?<!_)|[A-Z]([A-Z0-9_]*[A-Z0-9])?=\d+", name), (kind, name)
+    used = {kind.partition("/")[0] for kind, *_ in filter(None, fields) if "/" in kind}
+    generators = {"rosidl_default_generators", "ament_cmake"}
+    build = (package / "CMakeLists.txt").read_text()
+    assert used == {depend.name for depend in manifest.build_depends}
+    assert used == set(re.search(r"DEPENDENCIES ([\w ]+)\)", build)[1].split())
+    assert used | generators == set(re.findall(r"find_package\((\w+) REQUIRED\)", build))
+    assert generators == {depend.name for depend in manifest.buildtool_depends}
