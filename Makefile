@@ -6,7 +6,7 @@ BUILD := build/release
 PYTHON := .venv/bin/python
 SOURCES_C = $(shell git ls-files '*.c' '*.h' '*.cpp' | grep -v '/gen/')
 
-.PHONY: help demo demo-long test test-all test-kernel test-hil mutants bench wheels wheels-check release release-check sbom build setup abi example-data gen firmware firmware-images firmware-check flash bitstream format lint clean
+.PHONY: help demo demo-long test test-all test-kernel test-hil mutants bench wheels wheels-check debian release release-check sbom build setup setup-tests abi example-data gen firmware firmware-images firmware-check flash bitstream format lint clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
@@ -17,7 +17,7 @@ demo: build ## the whole chain on simulated hardware, magnet to pose: about two 
 demo-long: build ## 30 simulated minutes of the whole robot, with a report; SEED=n; LEVEL=bytes, or signals (a minute), or rtl
 	@$(PYTHON) -m crunchbot_lab.demo.long --out build/demo-long --build-dir $(BUILD) --seed $(SEED) --level $(LEVEL)
 
-test: build lint ## everything that fits in 15 minutes on two cores
+test: setup-tests build lint ## everything that fits in 15 minutes on two cores
 	@tools/run_tests.sh $(BUILD)
 
 test-all: test ## and what is long: sanitizers over the whole tree, longer fuzzing
@@ -42,6 +42,9 @@ wheels: build ## Python wheels into dist/: abi3 for x86-64 and aarch64, and the 
 wheels-check: wheels ## the wheels as users get them: empty environments, a simulated robot, aarch64 by emulation
 	@$(PYTHON) tools/wheels/check.py
 
+debian: ## Debian packages into dist/debian, built in and tried in roots of their own: [RELEASES="bookworm trixie"]; as root
+	@python3 tools/debian $(RELEASES)
+
 release: build sbom ## what a release consists of, into dist/: wheels, bitstreams, node images, sources, SHA256SUMS; [BOARDS="a b"] [USB_ID=vid:pid]
 	@$(PYTHON) tools/release $(if $(BOARDS),--boards $(BOARDS)) $(if $(USB_ID),--usb-id "$(USB_ID)")
 
@@ -54,8 +57,11 @@ sbom: build ## the software bill of materials: build/sbom.json (CycloneDX)
 build: setup ## compile libraries, daemon, firmware core, simulated bridge and the Python modules
 	@tools/build.sh $(BUILD)
 
-setup: ## install what is missing: Debian packages, locked Python packages
+setup: ## install what the build lacks: Debian packages, locked Python packages
 	@tools/setup.sh
+
+setup-tests: ## and what the tests need besides: clang, spin, compiler and simulator for AVR, libabigail
+	@tools/setup.sh --tests
 
 example-data: build ## make the data set of `whisker examples` again: host/python/crunchbot/data
 	@$(PYTHON) tools/example_data.py
@@ -86,11 +92,11 @@ bitstream: setup ## the bridge for a board one can buy: BOARD=ecpix5|colorlight_
 		$(if $(USB_ID),--usb-id "$(USB_ID)")
 
 format: setup ## format C, C++ and Python
-	@clang-format -i $(SOURCES_C)
+	@.venv/bin/clang-format -i $(SOURCES_C)
 	@.venv/bin/ruff format --quiet .
 
 lint: setup ## formats, Python lint, and the guards of tools/lint: arrows, circles, folders, names, words, pages
-	@clang-format --dry-run --Werror $(SOURCES_C)
+	@.venv/bin/clang-format --dry-run --Werror $(SOURCES_C)
 	@.venv/bin/ruff format --quiet --check . || { echo "lint: Python is not formatted; run 'make format'" >&2; exit 1; }
 	@.venv/bin/ruff check --quiet .
 	@cd tools && ../$(PYTHON) -m lint
