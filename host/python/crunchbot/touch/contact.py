@@ -31,7 +31,7 @@ class Contact:
         self.onset = -1
         self.release = -1
         self._earlier = np.empty(0, np.int64)  # ticks of the last good samples of earlier blocks
-        self._make_room(0)
+        self._events = np.zeros(0, np.uint8)  # of a block, and what C needs for one of this length
 
     @property
     def touching(self) -> bool:
@@ -54,8 +54,13 @@ class Contact:
         if not good.all():
             ticks, samples = ticks[good], samples[good]
         count, before = len(ticks), len(self._earlier)
+        if count == 0:
+            return
         if count > len(self._events):
-            self._make_room(count)
+            self._events, self._good, self._peaks = np.zeros(count, np.uint8), np.ones(count, np.uint8), np.zeros(count)
+            self._events_out = octets(self._events, "events", (count,))
+            self._good_out = octets(self._good, "good", (count,))
+            self._peaks_out = doubles(self._peaks, "peaks", (count,))
         samples = doubles(np.ascontiguousarray(samples), "samples", (count, 2))
         lib.nav_contact_run(self._state, samples, self._good_out, count, self._events_out, self._peaks_out)
         events = self._events[:count]
@@ -69,10 +74,3 @@ class Contact:
                 self.onset = int(ticks[max(0, index - ONSET_SAMPLES + 1)])
             else:
                 self.release = int(ticks[max(0, index - RELEASE_SAMPLES + 1)])
-
-    def _make_room(self, count: int) -> None:
-        """Arrays that C fills for a block of so many samples."""
-        self._events, self._good, self._peaks = np.zeros(count, np.uint8), np.ones(count, np.uint8), np.zeros(count)
-        self._events_out = octets(self._events, "events", (count,))
-        self._good_out = octets(self._good, "good", (count,))
-        self._peaks_out = doubles(self._peaks, "peaks", (count,))
