@@ -6,7 +6,7 @@ BUILD := build/release
 PYTHON := .venv/bin/python
 SOURCES_C = $(shell git ls-files '*.c' '*.h' '*.cpp' | grep -v '/gen/')
 
-.PHONY: help demo demo-long test test-all test-kernel test-hil mutants bench wheels wheels-check debian release release-check sbom build setup setup-tests abi example-data gen firmware firmware-images firmware-check flash bitstream format lint clean
+.PHONY: help demo demo-long test test-all test-kernel test-hil mutants bench wheels wheels-check debian release release-check sbom build setup setup-tests abi example-data manual gen firmware firmware-images firmware-check flash bitstream format lint clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
@@ -70,6 +70,9 @@ abi: build ## write the binary interface of the libraries again, after a change 
 	@for library in libwhisker/libwhisker nav/libwhisker-nav create/libwhisker-create; do \
 		abidw --no-corpus-path --no-comp-dir-path --no-show-locs --no-elf-needed --type-id-style hash \
 			--out-file host/abi/$${library#*/}.abi $(BUILD)/host/$$library.so || exit 1; done
+
+manual: build ## write manual pages and shell completion again, after a change of options: host/manual
+	@cd tools && ../$(PYTHON) -m manual
 
 gen: setup ## regenerate protocol/gen from protocol/whisker.toml
 	@$(PYTHON) tools/protogen.py

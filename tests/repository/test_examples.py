@@ -70,7 +70,7 @@ def examples() -> dict[str, str]:
             found[name] = parser.epilog.removeprefix("example:").strip()
 
     for command in cli.COMMANDS:
-        parser = cli._parser(command)
+        parser = cli.parser_of(command)
         commands = next(a for a in parser._actions if isinstance(a, argparse._SubParsersAction))
         note(f"whisker {command}", commands.choices[command])
     return found

@@ -68,11 +68,11 @@ def _run(words: list[str]) -> int:
 
 
 def _run_command(words: list[str]) -> int:
-    arguments = _parser(next(iter(words), "")).parse_args(words)
+    arguments = parser_of(next(iter(words), "")).parse_args(words)
     return arguments.run(arguments)
 
 
-def _parser(chosen: str) -> Parser:
+def parser_of(chosen: str) -> Parser:
     """The parser of the whole command line, with the arguments of the chosen subcommand only."""
     width = max(map(len, COMMANDS))
     listed = "\n".join(f"  {name:{width}}  {text}" for name, text in COMMANDS.items())

@@ -13,14 +13,19 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def _run(argv: list[str] | None) -> int:
-    parser = Parser(
+    arguments = parser().parse_args(argv)
+    return arguments.run(arguments)
+
+
+def parser() -> Parser:
+    """The parser of the command line."""
+    made = Parser(
         prog="whisker-view", description="Serves a local page of a ring: traces, loss, health. Prints its address."
     )
-    parser.show_example(EXAMPLE)
-    parser.add_argument("--version", action="version", version=f"whisker-view {__version__}")
-    add(parser)
-    arguments = parser.parse_args(argv)
-    return arguments.run(arguments)
+    made.show_example(EXAMPLE)
+    made.add_argument("--version", action="version", version=f"whisker-view {__version__}")
+    add(made)
+    return made
 
 
 if __name__ == "__main__":

@@ -17,7 +17,7 @@ from robotkit import examples
 
 from crunchbot import scene as scenes
 from crunchbot.bridge.ring import Writer
-from crunchbot.cli import _parser, main
+from crunchbot.cli import main, parser_of
 from crunchbot.commands import robot
 from crunchbot.robot.network.link import Link
 from crunchbot.robot.processes import holders, parts
@@ -90,7 +90,7 @@ def commands(monkeypatch, begun):
     def understood(*options) -> dict:
         begun(*options)
         words = [program.command[len(beginning) :] for program in tables[-1] if "crunchbot.cli" in program.command]
-        return {line[0]: _parser(line[0]).parse_args(line) for line in words}
+        return {line[0]: parser_of(line[0]).parse_args(line) for line in words}
 
     return understood
 
@@ -353,7 +353,7 @@ def test_with_the_documented_configuration_view_hears_the_supervisor(supervised,
     ended = supervised("--first-port", port, "--zenoh-config", documented(keys, "pilot"))
     with (
         Link("view", listen=[guests_end], config=file) as guest,
-        closing(view._source(_parser("view").parse_args(["view", *ends, "--zenoh-config", str(file)]))) as source,
+        closing(view._source(parser_of("view").parse_args(["view", *ends, "--zenoh-config", str(file)]))) as source,
     ):
         streams = {topic: guest.publish(topic) for topic in forged}
         give_up_s = time.monotonic() + PATIENCE_S
