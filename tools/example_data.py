@@ -92,13 +92,8 @@ def add_rates(path: Path, rates: np.ndarray) -> None:
 
 def make_models(folder: Path) -> None:
     """What the commands learn from those."""
-    fit = ["radial", "fit", "contacts.csv", "--out"]
-    commands = (
-        ["texture", "train", "surfaces", "--out", "texture.json"],
-        [*fit, "radial.json"],
-        [*fit, "whisk.json", "--model", "whisk"],
-    )
-    for words in commands:
+    fit = ["radial", "fit", "contacts.csv", "--out", "radial.json"]
+    for words in (["texture", "train", "surfaces", "--out", "texture.json"], fit):
         subprocess.run([*WHISKER, *words], cwd=folder, check=True)
 
 

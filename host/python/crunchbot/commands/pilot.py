@@ -77,12 +77,17 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _parts(arguments, link: Link, wheels: Wheels, stack: ExitStack) -> SimpleNamespace:
+def _body(arguments) -> tuple:
+    """The robot and its models (robot, texture, radial), read before anything is waited for."""
     robot = load(arguments.scene).robot
     texture, radial = load_models(arguments.models, robot)
     if arguments.nodes:
         check_nodes(arguments.nodes, robot, radial)
-    pilot = Pilot(robot, texture, radial, arguments.seed, wheels)
+    return robot, texture, radial
+
+
+def _parts(arguments, body: tuple, link: Link, wheels: Wheels, stack: ExitStack) -> SimpleNamespace:
+    pilot = Pilot(*body, arguments.seed, wheels)
     out = stack.enter_context(open(arguments.out, "w", newline=""))  # noqa: SIM115
     traces = stack.enter_context(open(arguments.traces, "w", newline=""))  # noqa: SIM115
     parts = {"rows": Rows(out), "traces": Traces(traces, pilot), "publisher": Publisher(link, pilot)}
@@ -91,9 +96,10 @@ def _parts(arguments, link: Link, wheels: Wheels, stack: ExitStack) -> SimpleNam
 
 def _fly_in_step(arguments, stack: ExitStack) -> SimpleNamespace:
     """Everybody must be there before the first tick, for what is sent then must reach them."""
+    body = _body(arguments)
     link = stack.enter_context(open_link("pilot", arguments))
     base = stack.enter_context(Base(arguments.base)) if arguments.base else None
-    parts = _parts(arguments, link, wheels_of(base.health()) if base else EXACT, stack)
+    parts = _parts(arguments, body, link, wheels_of(base.health()) if base else EXACT, stack)
     link.announce()
     if not link.wait_for(arguments.others, OTHERS_WAIT_S):
         gone = ", ".join(sorted(set(arguments.others) - link.peers))
@@ -108,10 +114,10 @@ def _fly_in_step(arguments, stack: ExitStack) -> SimpleNamespace:
 
 
 def _fly_live(arguments, stack: ExitStack) -> SimpleNamespace:
-    stop, heartbeat = stop_on_signals(), Heartbeat.of_environment()
+    stop, heartbeat, body = stop_on_signals(), Heartbeat.of_environment(), _body(arguments)
     link = stack.enter_context(open_link("pilot", arguments))
     base = LiveBase(arguments.base)
-    parts = _parts(arguments, link, _known_wheels(base, link, stop), stack)
+    parts = _parts(arguments, body, link, _known_wheels(base, link, stop), stack)
     wheels = LiveWheels(base)
     ring = stack.enter_context(closing(LiveRing(arguments.ring, len(parts.pilot.names), owner=arguments.ring_owner)))
     parts.flight = Flight(parts.pilot, wheels, parts.rows, parts.traces, parts.publisher)

@@ -32,7 +32,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     p.add_argument("--json", action="store_true", help="one object per line and contact")
     text = "a press model's answers as each contact grows, one line for every tenth of its samples"
     p.add_argument("--during", action="store_true", help=text)
-    example = "whisker radial follow examples/whisk.json examples/contacts.csv --json"
+    example = "whisker radial follow examples/radial.json examples/contacts.csv --json"
     p = add_action(actions, "follow", "tell where each contact is while it is pressed", example, follow)
     p.add_argument("model", help="of whole whisks: 'whisker radial fit --model whisk'")
     p.add_argument("contacts", help="CSV as for fit, with whisk_rad_s or push_mm_s; radius_mm is not read")
