@@ -67,10 +67,7 @@ const Bytes *BytesStream::packet() const
 void BytesStream::packet_taken()
 {
     const bool again = ready_->ended && ready_->data.size() == WHISKER_LIMIT_BULK_PACKET;
-    ready_.reset();
-    if (again) {
-        ready_.emplace();
-    }
+    ready_ = again ? std::optional<Packet>(Packet()) : std::nullopt;
     flow();
 }
 
