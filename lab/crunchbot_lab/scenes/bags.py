@@ -10,11 +10,11 @@ from crunchbot.errors import UserError
 from crunchbot.nav.observations import Observations, observations_path, read_observations
 from crunchbot.observation import TIME, TRUTH, Quantity, Row, cell
 from crunchbot.recording.mcapfile import McapFile, RecordingError
-from crunchbot.robot.bag import RECORD, SCENE_FILES
 from crunchbot.robot.network.inbox import Received
 from crunchbot.robot.network.messages import MessageError, Observation, PoseStamped, decode
 from crunchbot.robot.network.rows import Follower, time_text
 from crunchbot.robot.network.streams import Envelope
+from crunchbot.robot.played import RECORD, SCENE_FILES
 from crunchbot.scene import Scene, load
 
 

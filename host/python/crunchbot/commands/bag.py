@@ -6,8 +6,9 @@ from pathlib import Path
 
 from .. import scene as scenes
 from ..recording.writing import TopicWriter
-from ..robot.bag import RECORD, Bag, metadata
+from ..robot.bag import Bag, metadata
 from ..robot.network.options import NAVIGATOR_ENDPOINT, PILOT_ENDPOINT, add_link, open_link
+from ..robot.played import RECORD
 from ..stopping import stop_on_signals
 
 EXAMPLE = "whisker bag run.mcap --scene robot-run/scene"

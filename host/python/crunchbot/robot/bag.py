@@ -11,17 +11,16 @@ from dataclasses import replace
 from pathlib import Path
 
 from ..recording.writing import TopicWriter
-from ..scene import ARENA, PRIOR, ROBOT, Scene, load, write
+from ..scene import Scene, load, write
 from .log_clock import LogClock
 from .network.health import ENDED, RUNNING, Health
 from .network.inbox import Inbox, Received
 from .network.link import Link
 from .network.messages import HEALTH, SCHEMAS, encode
+from .played import FORMAT, SCENE_FILES
 from .standard import types
 from .standard.view import KINDS, StandardView
 
-RECORD, FORMAT = "whisker_robot", "1"  # name of the metadata record, and of what it promises
-SCENE_FILES = (ARENA, ROBOT, PRIOR)
 LOOK_S = 0.5
 PLACING = ("/tf", "/map")
 

@@ -34,6 +34,7 @@ def hello(hub: Hub) -> dict:
         "rings": hub.rings(),
         "robot": hub.source.name,
         "may_set_pose": hub.may_set_pose,
+        "playback": bool(hub.source.playback()),
         "window": WINDOW,
         "widths": WIDTHS,
         "bins": BINS,
@@ -142,8 +143,11 @@ class Client:
             case "set_pose":
                 self._become_page()
                 self._hub.set_pose(request)
+            case "play":
+                self._become_page()
+                self._hub.play(request)
             case _:
-                raise RequestError("type: not ack, subscribe, unsubscribe or set_pose")
+                raise RequestError("type: not ack, subscribe, unsubscribe, set_pose or play")
 
     def _become_page(self) -> None:
         if not self._is_page and not self._enter():

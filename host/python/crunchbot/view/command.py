@@ -7,13 +7,17 @@ import ipaddress
 import logging
 import sys
 import webbrowser
+from pathlib import Path
 
 from ..arguments import add_ring_owner, add_zenoh_config
+from ..errors import UserError
+from ..robot.played import read_bag
 from ..scene import load
 from ..stopping import listen
 from .hub import Hub
+from .playback import Playback
 from .rings import is_name
-from .robot_source import NoRobot, join
+from .robot_source import WANTED, NoRobot, join
 from .server import ViewError, serving
 
 EXAMPLE = "whisker-view --ring whisker --open --robot"
@@ -22,8 +26,16 @@ RING = "whisker"
 ROBOT = "robot"
 
 
+class PlaybackError(UserError):
+    """Options that do not go with a recording; one line."""
+
+    exit_code = 2
+
+
 def add(parser: argparse.ArgumentParser) -> None:
     """Add the arguments and set `run`."""
+    text = "a robot's bag to play, in place of what runs now: of 'whisker bag' or 'whisker robot'"
+    parser.add_argument("file", nargs="?", type=Path, metavar="FILE.mcap", help=text)
     parser.add_argument(
         "--ring", action="append", metavar="NAME", help=f"a ring to read from the start; repeatable (default: {RING})"
     )
@@ -81,13 +93,16 @@ def _address(text: str) -> str:
 def run(arguments: argparse.Namespace) -> int:
     """Serve until interrupted or terminated."""
     logging.getLogger("crunchbot.view").addHandler(logging.NullHandler())
-    rings = list(dict.fromkeys(arguments.ring or [RING]))
+    rings = [] if arguments.file else list(dict.fromkeys(arguments.ring or [RING]))
     for name in rings:
         if not is_name(name):
             raise ViewError(f"--ring {name!r}: not the name of a ring; use letters, digits, dash and dot")
     scene = None if arguments.scene is None else load(arguments.scene)
     may_set_pose = arguments.allow_pose or ipaddress.ip_address(arguments.host).is_loopback
     source = _source(arguments)
+    if arguments.file:
+        played = read_bag(arguments.file, [topic.removesuffix("/*") for topic in WANTED])
+        source, scene = Playback(played), scene or played.scene
     try:
         return asyncio.run(_serve(arguments, Hub(rings, source, scene, arguments.ring_owner, may_set_pose)))
     finally:
@@ -97,6 +112,11 @@ def run(arguments: argparse.Namespace) -> int:
 def _source(arguments: argparse.Namespace) -> NoRobot:
     """The robot, if any option asks for it."""
     config = arguments.zenoh_config
+    if arguments.file:
+        if arguments.ring or arguments.robot or arguments.connect or config:
+            text = "a recording is played without --ring, --robot, --connect and --zenoh-config"
+            raise PlaybackError(f"{arguments.file}: {text}")
+        return NoRobot()
     asked = arguments.robot or arguments.scene or arguments.connect or config
     return join(arguments.robot or ROBOT, arguments.connect, config) if asked else NoRobot()
 

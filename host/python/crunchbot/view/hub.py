@@ -6,7 +6,7 @@ import time
 from ..scene import LARGEST_M, Scene
 from .rings import find_rings
 from .robot import RobotModel
-from .robot_source import NoRobot
+from .robot_source import SPEED_LEAST, SPEED_MOST, NoRobot
 from .tap import Tap
 
 ROUND_S = 1 / 30
@@ -34,8 +34,9 @@ class Hub:
         `ring_owner`: the user whose rings are read, too; `may_set_pose`: pages may tell where the robot is.
         """
         self.names, self._ring_owner = names, ring_owner
-        self.source, self.robot = source or NoRobot(), RobotModel(scene)
-        self.may_set_pose = may_set_pose and bool(self.source.name)
+        self.source = source or NoRobot()
+        self.robot = RobotModel(scene, self.source.clock)
+        self.may_set_pose = may_set_pose and bool(self.source.name) and not self.source.playback()
         self.robot_watchers = 0
         self._taps = {name: Tap(name, owner=ring_owner) for name in names}
         self._watchers = dict.fromkeys(names, 0)
@@ -84,6 +85,21 @@ class Hub:
             raise RequestError("set_pose: outside the arena; point at a place inside")
         self.source.set_pose(tuple(map(float, pose)))
 
+    def play(self, request: dict) -> None:
+        """Play the recording as a page asks for. RequestError: it asks for something else, or there is none."""
+        playback = self.source.playback()
+        if not playback:
+            raise RequestError("play: no recording is played; start whisker-view with FILE.mcap")
+        limits = {"speed": (SPEED_LEAST, SPEED_MOST), "at_s": (0.0, playback["length_s"])}
+        asked = {name: request[name] for name in ("playing", *limits) if request.get(name) is not None}
+        if type(asked.get("playing", True)) is not bool:
+            raise RequestError("play: playing is neither true nor false")
+        for name, (low, high) in limits.items():
+            value = asked.get(name, low)
+            if type(value) not in (int, float) or not low <= value <= high:
+                raise RequestError(f"play: {name} is not a number from {low:g} to {high:g}")
+        self.source.play(**asked)
+
     async def next_round(self) -> None:
         """Waits until the rings have been read once more."""
         await self._round.wait()
@@ -94,6 +110,8 @@ class Hub:
             began = time.monotonic()
             for tap in self._taps.values():
                 tap.poll()
+            if self.source.jumped():
+                self.robot.begin_anew()
             for topic, message in self.source.poll():
                 self.robot.take(topic, message)
             self._round.set()

@@ -7,7 +7,18 @@ from pathlib import Path
 FOLDER = Path(__file__).resolve().parent / "page"
 SCRIPTS = (  # in the order they need each other
     *("kit.js", "wire.js", "history.js", "traces.js", "panels.js"),
-    *("plan.js", "belief.js", "actors.js", "timeline.js", "words.js", "pose.js", "robot.js", "parts.js", "main.js"),
+    *(
+        "plan.js",
+        "belief.js",
+        "actors.js",
+        "timeline.js",
+        "words.js",
+        "pose.js",
+        "player.js",
+        "robot.js",
+        "parts.js",
+        "main.js",
+    ),
 )
 
 

@@ -100,8 +100,13 @@ class RobotModel:
 
     def __init__(self, scene: Scene | None = None, clock: Callable[[], float] = time.monotonic):
         self.scene, self._clock = scene, clock
+        self.run = -1
+        self.begin_anew()
+
+    def begin_anew(self) -> None:
+        """Forget all but the scene."""
         self.processes = {name: Process() for name in EXPECTED}
-        self.run = 0
+        self.run += 1
         self._heard: dict[str, float] = {}
         self._forget()
 
@@ -114,6 +119,7 @@ class RobotModel:
         self.surfaces = Surfaces()
         self.rows = {"missed": None, "unseen": 0}
         self._seq: int | None = None
+        self._filter = ""
 
     def take(self, topic: str, message: Any) -> None:
         """A message of a topic of crunchbot.robot.network.messages.TOPICS, or of health; of any, an End."""
@@ -155,6 +161,10 @@ class RobotModel:
         return known or parse(name)
 
     def _take_localisation(self, reported) -> None:
+        """Of several filters the first is the one whose pose is the robot's."""
+        self._filter = self._filter or reported.filter
+        if reported.filter != self._filter:
+            return
         self.rows["missed"] = reported.rows_missed
         self.pose = placed(reported.pose.pose)
         if self.pose is None:
@@ -179,7 +189,8 @@ class RobotModel:
             self.true_path.add(reported.header.stamp.ns / 1e9, *self.truth.values())
 
     def _take_belief(self, reported) -> None:
-        self.belief = reported
+        if reported.filter == (self._filter or reported.filter):
+            self.belief = reported
 
     def _take_behaviour(self, reported) -> None:
         since = reported.since.ns / 1e9

@@ -1,12 +1,14 @@
 """Where the robot's messages come from: a crunchbot.robot.network.inbox, which the server's rounds empty."""
 
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
 from ..errors import UserError
 
 WANTED = ("observation", "contact", "behaviour", "localisation", "belief", "truth", "health/*")
+SPEED_LEAST, SPEED_MOST = 0.1, 100.0  # of a recording
 TOLD_MOST = 200  # characters of what is wrong with a message
 
 
@@ -23,9 +25,28 @@ class NoRobot:
         """Messages that could not be read (`count`), what was wrong with the `last`, and those `missed` on the way."""
         return {"count": 0, "last": "", "missed": 0}
 
-    def poll(self) -> list[tuple]:
+    def poll(self) -> Iterable[tuple]:
         """(topic, message) of what has come since the last call, in order. Never waits."""
         return []
+
+    def jumped(self) -> bool:
+        """Whether what `poll` gives next is of another time than before: all that was known is to be forgotten."""
+        return False
+
+    def clock(self) -> float:
+        """By which the age of what has come is measured, s."""
+        return time.monotonic()
+
+    def look(self) -> None:
+        """A page begins to look at the robot."""
+
+    def playback(self) -> dict | None:
+        """Of a recording: `at_s`, `length_s`, `playing`, `speed`. None: this is live."""
+        return None
+
+    def play(self, playing: bool | None = None, speed: float | None = None, at_s: float | None = None) -> None:
+        """Go on or stand, so many times as fast, from this moment of the recording; None: as before."""
+        raise UserError("no recording is played; start whisker-view with FILE.mcap")
 
     def set_pose(self, pose: tuple[float, float, float]) -> None:
         """Tell the navigator that the robot is here: x, y in m, heading in rad."""

@@ -44,6 +44,7 @@ class RobotFeed:
         self._reported: dict[str, str] = {}
         self._next = {"path": 0, "true_path": 0}
         hub.robot_watchers += 1
+        hub.source.look()
 
     def take(self) -> str | None:
         now = time.monotonic()
@@ -88,6 +89,7 @@ def _parts(hub: Hub) -> dict:
         "run": model.run,
         "name": hub.source.name,
         "link": hub.source.link(),
+        "playback": hub.source.playback(),
         "refused": hub.source.refused(),
         "heard_s": None if heard is None else round(heard, 1 if heard < 2 else 0),
         "now_s": None if model.now_s is None else round(model.now_s, 1),

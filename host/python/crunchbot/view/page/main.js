@@ -27,7 +27,7 @@ const parts = new Parts((part) => {
 });
 
 function remember() {
-  const hash = new URLSearchParams({ ring: view.ring, ticks: view.width, range: view.range });
+  const hash = new URLSearchParams({ ...(view.ring && { ring: view.ring }), ticks: view.width, range: view.range });
   if (view.chosen) hash.set('lanes', view.lanes.join(','));
   if (view.axes.length === 1) hash.set('axes', view.axes[0] ? 'beta' : 'alpha');
   if (parts.chosen) hash.set('part', parts.now);
@@ -117,7 +117,9 @@ wire.on('hello', (hello) => {
   view.rest = hello.rest_count;
   panels.hello(hello);
   robotPart.poseTool.hello(hello);
-  if (!parts.chosen) parts.choose(hello.robot ? 'robot' : 'traces', false);
+  robotPart.player.hello(hello);
+  if (hello.playback) parts.choose('robot', false);
+  else if (!parts.chosen) parts.choose(hello.robot ? 'robot' : 'traces', false);
   if (!traces) {
     history = new History(hello.lanes);
     traces = new Traces(history, view);
@@ -125,6 +127,7 @@ wire.on('hello', (hello) => {
     traces.onRead = readOut;
     view.lanes = view.lanes.filter((lane) => lane < hello.lanes);
   }
+  if (hello.playback) return; // no ring belongs to it
   wire.subscribe('rings', {});
   chooseRing(hello.rings.includes(view.ring) ? view.ring : hello.rings[0]);
 });
@@ -188,7 +191,7 @@ $('axes').addEventListener('change', (event) => { view.axes = { both: [0, 1], al
 $('plot').addEventListener('pointermove', (event) => { const box = $('plot').getBoundingClientRect(); traces?.point(event.clientX - box.left, event.clientY - box.top); });
 $('plot').addEventListener('pointerleave', () => { if (traces) { traces.point(-1, -1); $('readout').textContent = ''; } });
 
-const KEYS = { r: () => parts.choose('robot', true), w: () => parts.choose('traces', true), ' ': () => pause(!paused), '+': () => scale(-1), '=': () => scale(-1), '-': () => scale(1), a: () => $('all').click(), n: () => $('noded').click(), p: () => $('set-pose').click(), d: () => $('theme').click(), '?': () => $('help').click() };
+const KEYS = { r: () => parts.choose('robot', true), w: () => { if (!robotPart.player.on) parts.choose('traces', true); }, ' ': () => (robotPart.player.on ? robotPart.player.toggle() : pause(!paused)), '+': () => scale(-1), '=': () => scale(-1), '-': () => scale(1), a: () => $('all').click(), n: () => $('noded').click(), p: () => $('set-pose').click(), d: () => $('theme').click(), '?': () => $('help').click() };
 addEventListener('keydown', (event) => {
   if (event.ctrlKey || event.metaKey || event.altKey || !traces) return;
   const inPlot = event.target === $('plot');

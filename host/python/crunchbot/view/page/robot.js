@@ -13,6 +13,7 @@ class RobotPart {
     this.forget();
     this.wire = wire;
     this.poseTool = new PoseTool(this.plan, wire, () => this.redraw());
+    this.player = new Player(wire);
     wire.on('scene', (scene) => this.showScene(scene));
     wire.on('robot', (word) => this.take(word));
     wire.on('belief', (message) => this.takeBelief(message));
@@ -58,6 +59,7 @@ class RobotPart {
     const { world } = this;
     if ('run' in message) world.belief.clear();
     const word = (world.word = { ...world.word, ...message });
+    if (message.playback) this.player.take(message.playback);
     if (message.path) keep(world.path, message.path, POINTS_MOST);
     if (message.true_path) keep(world.truth, message.true_path, POINTS_MOST);
     world.contacts = word.contacts;
@@ -76,6 +78,7 @@ class RobotPart {
 
   /* What topic status tells of the ring. */
   takeRing(status) {
+    if (this.player.on) return;
     this.ring = status;
     if (this.world.word) tellProcesses(this.world.word, status);
   }
@@ -83,7 +86,8 @@ class RobotPart {
   tell(word) {
     const advice = robotAdvice(word);
     this.note(advice);
-    if (!advice) this.pill('live', '● live');
+    if (word.playback) this.pill(word.playback.playing ? 'live' : 'paused', word.playback.playing ? '▶ recording' : '❚❚ recording');
+    else if (!advice) this.pill('live', '● live');
     else if (word.heard_s !== null) this.pill('stalled', '▲ silent');
     else this.pill('waiting', word.link.state === 'off' ? '○ no robot' : '○ not heard yet');
     tellPose(word, this.world.belief);

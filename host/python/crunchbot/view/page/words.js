@@ -110,6 +110,7 @@ function robotAdvice(word) {
   const start = 'For a demonstration without hardware: `make demo`';
   if (!word) return [false, 'Nothing is known of the robot yet', goesOn, []];
   if (word.link.state === 'off') return [false, 'whisker-view does not listen to a robot', 'It was started for rings only.', ['Start it with `whisker-view --robot NAME --scene SCENE`']];
+  if (word.playback) return null;
   if (word.heard_s === null) return [false, `Nothing has been heard of the robot “${word.name}” yet`, `${word.link.text}. ${goesOn}`, ['Start the pilot on the robot, the navigator here; `--connect tcp/HOST:PORT` if it is in another place.', start]];
   if (word.heard_s > AGED_S) return [true, `Nothing heard of the robot for ${duration(word.heard_s)}`, `What is shown is how it last was. ${goesOn}`, ['Is the pilot running? Is the network there?']];
   return null;
