@@ -126,7 +126,7 @@ class Bench:
         return self._scores(rows, truth, answers) | {"whisks": len(pilot.whisks), "processor_s": cost}
 
     def _drawn(self, folder: Path) -> dict:
-        """The path of the signal-level run, with answers drawn as `whisker scene make robot` draws them; its cost is
+        """The path of the signal-level run, with answers drawn as `whisker scene make --family robot` draws them; its cost is
         that command's."""
         pilot, rows, truth = self._explored(folder)
         rows = drawn_rows(*self.scene, rows, truth, self.seed)

@@ -42,7 +42,7 @@ def _levels(found: dict) -> list[str]:
         "start of all processes included, training not.",
         "Mechanics of the object and floor whiskers are those of `sim/mechanics`; each level trains and calibrates at "
         "its own. Level 0 keeps the path and the rows that were",
-        "read of the level-1 run with mechanics `static`, and draws the answers as `whisker scene make robot` does.\n",
+        "read of the level-1 run with mechanics `static`, and draws the answers as `whisker scene make --family robot` does.\n",
         table(header, rows),
         *([f"Not measured on these mechanics yet: {', '.join(left)}.\n"] if left else []),
         "![Error and texture accuracy against real-time factor](../charts/robot_levels.svg)\n",
