@@ -111,7 +111,7 @@ static void test_slip_off_table(void **state)
     (void)state;
     for (size_t i = 0; i < COUNT(SLIP); i++) {
         struct mech_whisker clamped = smooth(INFINITY), plug = smooth(1);
-        double peak, at, a = SLIP[i].a_mm * 1e-3;
+        double peak = 0.0, at = 0.0, a = SLIP[i].a_mm * 1e-3;
         assert_near(slip_off(&clamped, a, &peak, &at), SLIP[i].clamped_deg, SLIP[i].a_mm < 110 ? 1 : 0.31);
         assert_share(peak * 1e6, SLIP[i].peak_unm, SLIP[i].a_mm > 136 ? 0.03 : 0.002);
         assert_near(at / SIM_DEGREE, SLIP[i].peak_deg, 0.31);
