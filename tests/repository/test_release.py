@@ -57,3 +57,17 @@ def test_issue_forms_have_what_a_forge_asks_for(name):
     assert form["name"] and form["description"] and form["body"]
     ids = [field["id"] for field in form["body"]]
     assert len(set(ids)) == len(ids) and all(field["attributes"]["label"] for field in form["body"])
+
+
+def test_the_debian_packages_are_of_this_version_and_all_are_built():
+    first = (ROOT / "debian/changelog").read_text().splitlines()[0]
+    assert first.startswith(f"crunchbot ({__version__}) ")
+    named = re.findall(r"^Package: (\S+)", (ROOT / "debian/control").read_text(), re.MULTILINE)
+    tool = (ROOT / "tools/debian/__main__.py").read_text()
+    built = re.search(r"^PACKAGES = \((.*?)^\)", tool, re.MULTILINE | re.DOTALL)[1]
+    assert sorted(named) == sorted(re.findall(r'"(\S+)"', built.replace("DEVELOPMENT", '"libwhisker-dev"')))
+    soname = __version__.rpartition(".")[0]
+    assert {name for name in named if name.startswith("lib")} == {
+        "libwhisker-dev",
+        *(f"libwhisker{part}{soname}" for part in ("", "-nav", "-create")),
+    }
