@@ -24,6 +24,7 @@ PLACES = {
     State.TURN_AWAY: (3, 0),
     State.TURN: (1, 1),
     State.ESCAPE: (4, 1),
+    State.WAIT: (0, 1),
     State.CLEAR: (1, 2),
     State.BACK_OFF: (2, 2),
     State.HALT: (4, 2),

@@ -77,6 +77,7 @@ ROOMS = {
         "bridge": [],
         "touch": ["bridge"],
         "pilot": ["touch"],
+        "planning": ["pilot"],
         "nav": [],
         "recording": ["bridge"],
         "robot": ["bridge", "touch", "pilot", "nav", "recording"],

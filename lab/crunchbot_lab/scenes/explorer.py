@@ -19,7 +19,8 @@ from crunchbot.pilot.behaviour import (
     TURN_RAD_S,
     Behaviour,
 )
-from crunchbot.pilot.states import PLAIN
+from crunchbot.pilot.choices import Choices
+from crunchbot.pilot.states import PLAIN, Habits
 from crunchbot.scene import Arena, Robot
 from crunchbot.touch.mount import Mount
 
@@ -61,8 +62,18 @@ class _Feeler:
             self.range_m = range_m
 
 
-class _Explorer:
-    def __init__(self, arena: Arena, robot: Robot, start, rng: np.random.Generator):
+class Explorer:
+    """The pilot's behaviour in an arena, row by row; `explored` gives all rows so far."""
+
+    def __init__(
+        self,
+        arena: Arena,
+        robot: Robot,
+        start: Sequence[float],
+        rng: np.random.Generator,
+        habits: Habits = PLAIN,
+        choices: Choices | None = None,
+    ):
         self.pose = tuple(map(float, start))
         self.free = free_test(arena, robot.body_radius_m)
         self.rays = robot.of_role("object")
@@ -70,10 +81,34 @@ class _Explorer:
         self.feelers = {n: _Feeler(whisker.length_m) for n, whisker in enumerate(self.rays)}
         self.mounts = {n: Mount.of(whisker) for n, whisker in enumerate(self.rays)}
         turns = {n: mount.corner_turn for n, mount in self.mounts.items()}
-        self.behaviour = Behaviour(self.feelers, turns, rng, habits=PLAIN)
+        sides = {n: -mount.face_turn for n, mount in self.mounts.items()}
+        self.behaviour = Behaviour(self.feelers, turns, rng, sides, habits=habits, choices=choices)
         self.waiting = [(0.0, 0.0)] * (1 + DELAY_BLOCKS)
         self.tick = 0
         self.measured: dict[int, float] = {}
+        self.path, self._was_whisking = [self.pose], False
+        self._held: list[bool] = []
+        self._sweeping: list[bool] = []
+        self._radial: list[list[float]] = []
+
+    def row(self) -> None:
+        """Explore for 0.1 s."""
+        for _ in range(BLOCKS_PER_ROW):
+            self.block()
+        (x, y, heading), (to_x, to_y, to_heading) = self.path[-1], self.pose
+        self.behaviour.moved(self.tick - 1, math.hypot(to_x - x, to_y - y), 0.0, to_heading - heading)
+        self._held.append(self.behaviour.whisking and not self.measured)
+        self._sweeping.append(self.sweeping(self._was_whisking))
+        self._radial.append(self.radial())
+        self._was_whisking = self.behaviour.whisking
+        self.path.append(self.pose)
+
+    def explored(self, rows: int) -> Explored:
+        """The rows so far; up to `rows` it stands still after them, and nothing is read."""
+        more = rows - len(self._held)
+        radial = np.array([*self._radial, *[[math.nan] * len(self.rays)] * more]).reshape(rows, len(self.rays))
+        marks = (np.array([*mark, *[False] * more], bool) for mark in (self._held, self._sweeping))
+        return Explored(np.array([*self.path, *[self.pose] * more]), *marks, radial)
 
     def block(self) -> None:
         self._move(*self.waiting.pop(0))
@@ -119,21 +154,7 @@ class _Explorer:
 
 def explore(arena: Arena, robot: Robot, start: Sequence[float], rows: int, rng: np.random.Generator) -> Explored:
     """Let the pilot's behaviour explore for `rows` of 0.1 s."""
-    robot_in = _Explorer(arena, robot, start, rng)
-    path, held, sweeping, radial, was = [robot_in.pose], [], [], [], False
+    explorer = Explorer(arena, robot, start, rng)
     for _ in range(rows):
-        for _ in range(BLOCKS_PER_ROW):
-            robot_in.block()
-        (x, y, _), (to_x, to_y, _) = path[-1], robot_in.pose
-        robot_in.behaviour.moved(robot_in.tick - 1, math.hypot(to_x - x, to_y - y), 0.0, robot_in.pose[2] - path[-1][2])
-        held.append(robot_in.behaviour.whisking and not robot_in.measured)
-        sweeping.append(robot_in.sweeping(was))
-        radial.append(robot_in.radial())
-        was = robot_in.behaviour.whisking
-        path.append(robot_in.pose)
-    return Explored(
-        np.array(path),
-        np.array(held, bool),
-        np.array(sweeping, bool),
-        np.array(radial).reshape(rows, len(robot_in.rays)),
-    )
+        explorer.row()
+    return explorer.explored(rows)

@@ -13,7 +13,7 @@ from crunchbot.nav.observations import Observations
 from crunchbot.scene import Arena, Prior, Robot, Scene
 
 from . import walk
-from .explorer import TIP_M, explore
+from .explorer import TIP_M, Explored, explore
 from .families import KIDNAP_LEAST_M, SLIP_ROWS, Recipe, recipe
 from .files import rounded
 from .readings import contacts, hold_back, measured, normals, odometry, texture_windows
@@ -53,9 +53,7 @@ def make(name: str, seed: int, rows: int | None = None) -> Made:
 
 def make_recipe(r: Recipe, seed: int, rows: int | None = None, path_seed: int | None = None) -> Made:
     """The scene of a recipe and seed; `path_seed` draws everything but the arena, where many drives of one are wanted."""
-    rng = {
-        stream: np.random.default_rng([seed if path_seed is None else path_seed, n]) for n, stream in enumerate(STREAMS)
-    }
+    rng = streams(seed if path_seed is None else path_seed)
     rng["arena"] = np.random.default_rng([seed, STREAMS.index("arena")])
     rows = r.rows if rows is None else rows
     robot = r.robot()
@@ -64,7 +62,7 @@ def make_recipe(r: Recipe, seed: int, rows: int | None = None, path_seed: int | 
     first = rows if r.kidnap_row is None else min(rows, r.kidnap_row)
     parts, kidnaps = [_drive(r, arena, robot, start, first, rng)], ()
     if rows > first:
-        there = _elsewhere(arena, robot.body_radius_m, parts[0].truth[-1], rng["kidnap"])
+        there = carried_to(arena, robot.body_radius_m, parts[0].truth[-1], rng["kidnap"])
         parts.append(_drive(r, arena, robot, there, rows - first, rng))
         kidnaps = (first,)
     taken = Observations(
@@ -81,25 +79,41 @@ def make_recipe(r: Recipe, seed: int, rows: int | None = None, path_seed: int | 
     return Made(scene, rounded(taken), kidnaps)
 
 
+def streams(seed: int) -> dict[str, np.random.Generator]:
+    """A stream of random numbers for each kind of chance."""
+    return {stream: np.random.default_rng([seed, n]) for n, stream in enumerate(STREAMS)}
+
+
 def _drive(r: Recipe, arena: Arena, robot: Robot, start: np.ndarray, rows: int, rng: dict) -> Observations:
     """One uninterrupted drive; its times are not set."""
     if r.body_whisks:
-        e = explore(arena, robot, start, rows, rng["path"])
-        reported = hold_back(odometry(e.path, r.world, rng["odometry"]), e.held)
-        radial = measured(e.radial_m, robot, r.world, rng["radial"])
-        texture = texture_windows(arena, robot, e.path[1:], r.world, rng["texture"])
-        texture[~e.sweeping] = np.nan
-        by_tip = e.radial_m > np.array([w.length_m - TIP_M for w in robot.of_role("object")])
-        normal = normals(arena, robot, e.path[1:], by_tip & np.isfinite(radial), r.world, rng["normal"])
-        return Observations(np.zeros(rows), [], reported, texture, radial, e.path[1:], normal=normal)
+        return explored_rows(r, arena, robot, explore(arena, robot, start, rows, rng["path"]), rng)
     path = walk.wander(arena, robot.body_radius_m, start, rows, rng["path"], r.pace)
     reported = odometry(path, r.world, rng["odometry"])
     if r.slips:
         path, reported = _slipped(path, reported, r, rng["slip"])
+    return walked_rows(r, arena, robot, path, reported, rng)
+
+
+def explored_rows(r: Recipe, arena: Arena, robot: Robot, e: Explored, rng: dict) -> Observations:
+    """What the robot reports of an exploration; times are not set."""
+    reported = hold_back(odometry(e.path, r.world, rng["odometry"]), e.held)
+    radial = measured(e.radial_m, robot, r.world, rng["radial"])
+    texture = texture_windows(arena, robot, e.path[1:], r.world, rng["texture"])
+    texture[~e.sweeping] = np.nan
+    by_tip = e.radial_m > np.array([w.length_m - TIP_M for w in robot.of_role("object")])
+    normal = normals(arena, robot, e.path[1:], by_tip & np.isfinite(radial), r.world, rng["normal"])
+    return Observations(np.zeros(len(e.held)), [], reported, texture, radial, e.path[1:], normal=normal)
+
+
+def walked_rows(
+    r: Recipe, arena: Arena, robot: Robot, path: np.ndarray, reported: np.ndarray, rng: dict
+) -> Observations:
+    """What the robot reports along a path (n + 1, 3) with this odometry (n, 3); times are not set."""
     texture = texture_windows(arena, robot, path[1:], r.world, rng["texture"])
     radial = contacts(arena, robot, path[1:], r.world, rng["radial"])
     normal = normals(arena, robot, path[1:], np.isfinite(radial), r.world, rng["normal"])
-    return Observations(np.zeros(rows), [], reported, texture, radial, path[1:], normal=normal)
+    return Observations(np.zeros(len(reported)), [], reported, texture, radial, path[1:], normal=normal)
 
 
 def _slipped(path: np.ndarray, reported: np.ndarray, r: Recipe, rng: np.random.Generator):
@@ -113,7 +127,8 @@ def _slipped(path: np.ndarray, reported: np.ndarray, r: Recipe, rng: np.random.G
     return path[np.append(0, source + 1)], moved
 
 
-def _elsewhere(arena: Arena, radius: float, pose: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def carried_to(arena: Arena, radius: float, pose: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """A pose (3,) in free space, at least KIDNAP_LEAST_M from `pose`."""
     while True:
         there = walk.draw_pose(arena, radius, rng)
         if math.hypot(*(there - pose)[:2]) >= KIDNAP_LEAST_M:

@@ -13,6 +13,7 @@ import math
 import numpy as np
 
 from ..touch.contact import Contact
+from .choices import Choices, Random
 from .rules import RULES, SPEEDS, Rule
 from .states import (
     BACK_OFF_M_S,
@@ -71,13 +72,15 @@ class Behaviour:
         sides: dict[int, float] | None = None,
         wheels: Wheels = EXACT,
         habits: Habits = FULL,
+        choices: Choices | None = None,
     ):
         """By lane of the object whiskers: `contacts`, `first_turn` (sign of the search's first rotation) and `sides` (+1 left
-        of the robot, -1 right)."""
+        of the robot, -1 right). `choices`: None: random ones, of `rng`."""
         self.contacts = contacts
         self.first_turn = first_turn
         self.rng = rng
         self.sides, self.wheels, self.habits = sides or {}, wheels, habits
+        self.choices = choices or Random(rng)
         self.state = State.SETTLE
         self.drive = (0.0, 0.0)
         self.drive_since = 0  # first tick at which the present drive is in effect

@@ -12,6 +12,7 @@ from .states import (
     OUT_LIMIT_RAD,
     STUCK_REPORTS,
     TIP_PATIENCE_TICKS,
+    WAIT_TICKS,
     State,
 )
 
@@ -28,6 +29,18 @@ def rests_known(b, tick: int) -> bool:
 
 def touched(b, tick: int) -> bool:
     return bool(touching(b))
+
+
+def touched_and_worth_a_whisk(b, tick: int) -> bool:
+    return touched(b, tick) and b.choices.whisk(b, tick)
+
+
+def no_turn_is_worth_it(b, tick: int) -> bool:
+    return b.sign == 0.0
+
+
+def waited(b, tick: int) -> bool:
+    return tick - b.since >= WAIT_TICKS
 
 
 def touched_since(b, tick: int) -> bool:

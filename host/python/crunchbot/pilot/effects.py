@@ -11,7 +11,6 @@ from .states import (
     CROWD_TICKS,
     ESCAPE_M,
     ESCAPE_MOST_M,
-    EXPLORE_M_S,
     TIP_SLACK_RAD,
     Whisk,
 )
@@ -19,22 +18,22 @@ from .whereabouts import ASIDE_RAD, BEHIND_RAD
 
 
 def draw_distance(b, tick: int) -> None:
-    b.goal = EXPLORE_M_S * b.rng.uniform(3.0, 8.0)
+    b.goal = b.choices.distance(b, tick)
 
 
-def draw_turn(b, least_deg: float, most_deg: float) -> None:
-    b.goal = math.radians(b.rng.uniform(least_deg, most_deg))
-    b.sign = 1.0 if b.rng.random() < 0.5 else -1.0
+def draw_turn(b, tick: int, least_deg: float, most_deg: float) -> None:
+    turn = b.choices.turn(b, tick, least_deg, most_deg)
+    b.goal, b.sign = abs(turn), math.copysign(1.0, turn) if turn else 0.0
 
 
 def draw_small_turn(b, tick: int) -> None:
-    draw_turn(b, 25.0, 90.0)
+    draw_turn(b, tick, 25.0, 90.0)
 
 
 def draw_large_turn(b, tick: int) -> None:
     """To any side, but away from what is known to be on one."""
-    draw_turn(b, 60.0, 150.0)
-    b.sign, b.side = -b.side or b.sign, 0.0
+    draw_turn(b, tick, 60.0, 150.0)
+    b.sign, b.side = -b.side * abs(b.sign) or b.sign, 0.0
 
 
 def draw_turn_away(b, tick: int) -> None:

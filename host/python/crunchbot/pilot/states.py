@@ -24,6 +24,7 @@ STUCK_REPORTS = 3  # of 0.1 s
 STUCK_SHARE = 0.25  # of the commanded motion
 LOST_TICKS = 1000  # without an odometry report for 0.5 s the base is lost
 HALT_TICKS = 200
+WAIT_TICKS = 2000  # before it is asked again whether anything is worth doing
 # The same place: a body's radius or so. Contacts so near each other so soon are one trap, not two finds.
 CROWD_M = 0.3
 CROWD_TICKS = 30_000
@@ -42,6 +43,7 @@ class State(Enum):
     SETTLE = "settle"
     FORWARD = "forward"
     TURN = "turn"
+    WAIT = "wait"
     BACK_OFF = "back off"
     WHISK_IN = "whisk in"
     PUSH = "push"

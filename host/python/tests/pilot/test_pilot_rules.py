@@ -4,6 +4,7 @@ import importlib.util
 import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 from test_pilot_behaviour import LEFT, RIGHT, Bench
 
@@ -18,7 +19,7 @@ from crunchbot.pilot.behaviour import (
     State,
 )
 from crunchbot.pilot.rules import RULES, SPEEDS
-from crunchbot.pilot.states import FULL, LOST_TICKS, TIP_SLACK_RAD, TipMove
+from crunchbot.pilot.states import FULL, LOST_TICKS, TIP_SLACK_RAD, WAIT_TICKS, TipMove
 from crunchbot.pilot.tip import AIM_MM, contact_type, move_for_tip
 from crunchbot.pilot.wheels import EXACT, NO_BUMPS, Bumps, Wheels
 from crunchbot.pilot.whereabouts import Whereabouts
@@ -160,7 +161,33 @@ def set_down():
     return felt(NO_BUMPS, State.FORWARD, robot)
 
 
+class Chosen:
+    """Choices that are given: a turn, and whether to whisk; a second turn is left."""
+
+    def __init__(self, turn=0.5, whisk=False):
+        self.turns, self.worth = [turn], whisk
+
+    def turn(self, b, tick, least_deg, most_deg):
+        return self.turns.pop() if self.turns else 0.5
+
+    def distance(self, b, tick):
+        return 0.3
+
+    def whisk(self, b, tick):
+        return self.worth
+
+
+def choosing(*states, **chosen):
+    robot = Robot(choices=Chosen(**chosen))
+    robot.until(State.FORWARD)
+    for state in states:
+        robot.until(state)
+    return robot
+
+
 SCRIPTS = (
+    lambda: choosing(State.WAIT, State.TURN, turn=0.0),
+    lambda: touched(choosing(), State.CLEAR),
     exploring,
     lambda: left_after(turning(), State.FORWARD),
     lambda: whisked_until(State.TURN),
@@ -192,7 +219,35 @@ def test_every_state_has_speeds_a_way_in_and_a_way_out():
 
 
 def test_a_change_of_state_says_why():
-    assert touched(exploring(), State.BACK_OFF).behaviour.reason == "touched"
+    assert touched(exploring(), State.BACK_OFF).behaviour.reason == "touched and worth a whisk"
+
+
+def test_it_stands_still_while_no_turn_is_worth_it():
+    robot = choosing(State.WAIT, turn=0.0)
+    drives = {robot.block() for _ in range(WAIT_TICKS // BLOCK_TICKS - 1)}
+    assert drives == {(0.0, 0.0)} and robot.behaviour.state == State.WAIT
+
+
+def test_a_turn_is_the_chosen_one():
+    robot = choosing(State.TURN, turn=-0.8)
+    assert (robot.behaviour.goal, robot.behaviour.sign) == (0.8, -1.0)
+    robot.until(State.FORWARD)
+    assert robot.behaviour.goal == 0.3
+
+
+def test_what_is_known_on_one_side_does_not_turn_a_robot_that_stands():
+    robot = felt(NO_BUMPS, State.WAIT, felt(Bumps(left=True), State.CLEAR, choosing(turn=0.0)))
+    assert robot.block() == (0.0, 0.0)
+
+
+def test_where_it_has_been_is_in_its_own_frame():
+    here = Whereabouts()
+    here.moved(200, 1.0, 0.0, 0.0)
+    here.meet(200, 0.0)
+    here.moved(400, 0.0, 0.0, math.pi / 2)
+    assert here.things() == pytest.approx(np.array([[0.0, -0.2]]), abs=1e-12)
+    assert here.been() == pytest.approx(np.array([[0.0, 0.0, -math.pi / 2], [0.0, 0.0, 0.0]]), abs=1e-12)
+    assert here.place == (1.0, 0.0)
 
 
 # The tip.
