@@ -25,6 +25,7 @@ FOREVER = 130  # ended by Ctrl-C
 OFFLINE = {
     "whisker examples": "examples: contacts.csv, ",
     "whisker localise": '"pose_error_median_m": 0.0',
+    "whisker map": '"faces": ',
     "whisker scene make": "scenes/7: anchor+kidnap, seed 7, 1200 rows",
     "whisker scene map": "scenes/mapped: examples/scene with examples/home.yaml, 1 boxes",
     "whisker bench touch": "adaptive",
@@ -32,7 +33,6 @@ OFFLINE = {
     "whisker texture classify": '"label": "ROUGH"',
     "whisker radial fit": "chosen",
     "whisker radial predict": '"radius_mm": ',
-    "whisker export": "drive.parquet: 4000 frames, lanes lane0, lane1, lane2, lane3, lane4, lane5",
     "whisker radial follow": '"motion": "body whisk"',
     "whisker flash": "no bridge is connected",
 }

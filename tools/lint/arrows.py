@@ -22,6 +22,7 @@ ALLOWED = {
     "host/nav/field": ["host/nav/problem", "host/nav/measurement"],
     "host/nav/belief": ["host/nav/problem", "host/nav/measurement", "host/nav/field"],
     "host/nav/filter": ["host/nav/problem", "host/nav/measurement", "host/nav/field", "host/nav/belief"],
+    "host/nav/mapping": ["host/nav/problem", "host/nav/measurement", "host/nav/filter"],  # rows of a replay
     "host/nav": [],
     "host/create": [],
     "host/command_line": [],

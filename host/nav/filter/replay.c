@@ -11,18 +11,22 @@ static double replay_now_us(void)
     return (double)t.tv_sec * 1e6 + (double)t.tv_nsec * 1e-3;
 }
 
+struct nav_row nav_rows_at(const struct nav_rows *rows, long at)
+{
+    const double *odometry = rows->odometry + 3 * at;
+    return (struct nav_row){.t_s = rows->t_s[at],
+                            .odometry = {odometry[0], odometry[1], odometry[2]},
+                            .texture = rows->texture + at * rows->texture_width,
+                            .radial_m = rows->radial_m + at * rows->radial_width,
+                            .normal = rows->normal ? rows->normal + 2 * at * rows->radial_width : NULL,
+                            .own = rows->own ? rows->own + at * rows->own_width : NULL};
+}
+
 void nav_replay(struct nav_filter *filter, const struct nav_rows *rows, long first, long count,
                 struct nav_estimate *out, double *step_us)
 {
     for (long k = 0; k < count; k++) {
-        long at = first + k;
-        const double *odometry = rows->odometry + 3 * at;
-        struct nav_row row = {.t_s = rows->t_s[at],
-                              .odometry = {odometry[0], odometry[1], odometry[2]},
-                              .texture = rows->texture + at * rows->texture_width,
-                              .radial_m = rows->radial_m + at * rows->radial_width,
-                              .normal = rows->normal ? rows->normal + 2 * at * rows->radial_width : NULL,
-                              .own = rows->own ? rows->own + at * rows->own_width : NULL};
+        struct nav_row row = nav_rows_at(rows, first + k);
         double begun = replay_now_us();
         nav_filter_step(filter, &row, &out[k]);
         step_us[k] = replay_now_us() - begun;

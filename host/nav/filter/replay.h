@@ -30,6 +30,9 @@ void nav_replay(struct nav_filter *, const struct nav_rows *, long first, long c
                 double *step_us);
 /* cffi: end */
 
+/* One row of them. */
+struct nav_row nav_rows_at(const struct nav_rows *, long row);
+
 #pragma GCC visibility pop
 #ifdef __cplusplus
 }

@@ -50,6 +50,7 @@ HEADERS = {
             "belief/belief.h",
             "filter/replay.h",
             "filter/weigh.h",
+            "mapping/mapper.h",
         )
     ],
     "whisker": [

@@ -27,7 +27,6 @@ COMMANDS = {
     "flash": "load firmware into the nodes, or gateware into the bridge",
     "record": "write a ring to an MCAP file",
     "replay": "feed a ring from a recording, as the device would",
-    "export": "a recording as CSV, Parquet or NWB",
     "stream": "print frames as CSV or JSON lines",
     "robot": "all processes of a robot, on hardware or simulated",
     "pilot": "the netbook's part of a robot: samples to wheel speeds and observations",
@@ -37,6 +36,7 @@ COMMANDS = {
     "bag": "record everything a robot's processes say, for ROS 2 tools",
     "pyro": "a robot's results as a Pyro object, the paper's interface",
     "localise": "where the robot was, row by row of a scene folder",
+    "map": "a map of an unknown arena by touch alone, from the rows of a scene folder",
     "scene": "make scene folders for localise",
     "bench": "score estimates of any engine on a fixed list of scenes and logs",
     "texture": "learn and tell floor surfaces",
@@ -47,8 +47,8 @@ EXTRAS = {
     **dict.fromkeys(("record", "replay"), "record"),
     "view": "view",
     **dict.fromkeys(("robot", "pilot", "navigator", "bag", "pyro", "top"), "robot"),
-    **{name: name for name in ("export", "ros2", "foxglove")},
-    **dict.fromkeys(("localise", "calibrate", "scene"), "scenes"),
+    **{name: name for name in ("ros2", "foxglove")},
+    **dict.fromkeys(("localise", "map", "calibrate", "scene"), "scenes"),
 }
 LAB_COMMANDS = ("bridge-sim", "scene", "bench")  # of the package crunchbot_lab
 

@@ -150,6 +150,14 @@ def load(path: str | Path, map_file: str | Path | None = None) -> Scene:
     return scene
 
 
+def load_robot(path: str | Path) -> Robot:
+    """The robot of a scene folder, whose arena is not read. SceneError names file, line or key, and the remedy."""
+    folder = Path(path)
+    if not folder.is_dir():
+        raise SceneError(f"{folder}: no such folder; give a scene folder with {ROBOT} and {OBSERVATIONS}")
+    return _robot(Table.read(folder / ROBOT), (LARGEST_M, LARGEST_M))
+
+
 def _read(folder: Path, map_file) -> Scene:
     prior = _prior(Table.read(folder / PRIOR)) if (folder / PRIOR).exists() else None
     if map_file is None or (folder / ARENA).exists():

@@ -192,23 +192,10 @@ class Filter:
         if not 0 <= first <= first + count <= held:
             raise ValueError(f"rows {first} to {first + count}: outside the {held} rows given; choose rows inside")
         table, step_us = np.zeros(count, ESTIMATE), np.zeros(count)
-        own = np.full((held, self._own), math.nan) if rows.own is None else rows.own
-        packed = ffi.new(
-            "struct nav_rows *",
-            {
-                "t_s": doubles(rows.t_s, "t_s", (held,)),
-                "odometry": doubles(rows.odometry, "odometry", (held, 3)),
-                "texture": doubles(rows.texture, "texture", (held, self._tips, self._classes)),
-                "radial_m": doubles(rows.radial_m, "radial_m", (held, self._rays)),
-                "normal": ffi.NULL if rows.normal is None else doubles(rows.normal, "normal", (held, self._rays, 2)),
-                "own": doubles(own, "own", (held, self._own)),
-                "own_width": self._own,
-                "texture_width": self._tips * self._classes,
-                "radial_width": self._rays,
-            },
-        )
+        packed, keep = pack(rows, (self._tips, self._classes), self._rays, self._own)
         out = pointer(ESTIMATES, ESTIMATE, table, "table", (count,))
         lib.nav_replay(self._filter, packed, first, count, out, doubles(step_us, "step_us", (count,)))
+        del keep  # until here
         return table, step_us
 
     def set_prior(self, prior: Prior) -> None:
@@ -257,6 +244,28 @@ class Filter:
     @property
     def bad_rows(self) -> int:
         return lib.nav_filter_bad_rows(self._filter)
+
+
+def pack(rows: Observations, texture: tuple[int, int], rays: int, own: int) -> tuple[Any, tuple]:
+    """Rows as struct nav_rows and what it points into: texture (tips, classes), numbers of object whiskers and of values of
+    own sensors. ValueError when the rows are not of such a robot."""
+    held = len(rows.t_s)
+    values = np.full((held, own), math.nan) if rows.own is None else rows.own
+    packed = ffi.new(
+        "struct nav_rows *",
+        {
+            "t_s": doubles(rows.t_s, "t_s", (held,)),
+            "odometry": doubles(rows.odometry, "odometry", (held, 3)),
+            "texture": doubles(rows.texture, "texture", (held, *texture)),
+            "radial_m": doubles(rows.radial_m, "radial_m", (held, rays)),
+            "normal": ffi.NULL if rows.normal is None else doubles(rows.normal, "normal", (held, rays, 2)),
+            "own": doubles(values, "own", (held, own)),
+            "own_width": own,
+            "texture_width": texture[0] * texture[1],
+            "radial_width": rays,
+        },
+    )
+    return packed, (rows, values)
 
 
 def _components(array: np.ndarray):

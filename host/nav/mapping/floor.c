@@ -1,0 +1,163 @@
+#include "floor.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const double BLUR_M = 0.012; /* of a border, as windows show it */
+static const double NEAR = 3.0;     /* standard deviations from a border within which it matters */
+static const double SURE = 0.9;     /* of a tile's texture, before its borders correct the pose */
+static const double RIGHT_RAD = 0.006;
+static const double AXES_KNOWN = 1.0, RIGHT_MOST = 0.15;
+
+int nav_floor_init(struct nav_floor *f, int classes)
+{
+    *f = (struct nav_floor){.classes = classes};
+    f->tile = calloc((size_t)NAV_FLOOR_SIDE * NAV_FLOOR_SIDE * (size_t)classes, sizeof *f->tile);
+    return f->tile ? 0 : -1;
+}
+
+void nav_floor_free(struct nav_floor *f)
+{
+    free(f->tile);
+}
+
+void nav_floor_copy(struct nav_floor *to, const struct nav_floor *from)
+{
+    float *tile = to->tile;
+    *to = *from;
+    to->tile = tile;
+    if (from->known)
+        memcpy(tile, from->tile, (size_t)NAV_FLOOR_SIDE * NAV_FLOOR_SIDE * (size_t)from->classes * sizeof *tile);
+}
+
+/* NULL: beyond the lattice. */
+static float *floor_tile(const struct nav_floor *f, int column, int row)
+{
+    int c = column + NAV_FLOOR_SIDE / 2, r = row + NAV_FLOOR_SIDE / 2;
+    if (c < 0 || r < 0 || c >= NAV_FLOOR_SIDE || r >= NAV_FLOOR_SIDE)
+        return NULL;
+    return f->tile + (ptrdiff_t)(r * NAV_FLOOR_SIDE + c) * f->classes;
+}
+
+/* p(window | tile) / p(window | any), by what is believed of the tile. */
+static double floor_ratio(const struct nav_floor *f, const float *tile, const float *ratio)
+{
+    double best = -INFINITY, total = 0.0, sum = 0.0;
+    if (!tile)
+        return 1.0;
+    for (int k = 0; k < f->classes; k++)
+        best = fmax(best, (double)tile[k]);
+    for (int k = 0; k < f->classes; k++) {
+        double p = exp((double)tile[k] - best);
+        total += p;
+        sum += p * (double)ratio[k];
+    }
+    return sum / total;
+}
+
+static void floor_learn(const struct nav_floor *f, float *tile, double share, const float *ratio)
+{
+    for (int k = 0; tile && k < f->classes; k++)
+        tile[k] += (float)share * logf(ratio[k]);
+}
+
+/* Probability of the tile's likeliest texture. */
+static double floor_sure(const struct nav_floor *f, const float *tile)
+{
+    double best = -INFINITY, total = 0.0;
+    if (!tile)
+        return 0.0;
+    for (int k = 0; k < f->classes; k++)
+        best = fmax(best, (double)tile[k]);
+    for (int k = 0; k < f->classes; k++)
+        total += exp((double)tile[k] - best);
+    return 1.0 / total;
+}
+
+/* A tip in the lattice: its tile, the nearest line and the tile beyond it. */
+struct floor_view {
+    int column, row, across_column, across_row;
+    double off;             /* m from the line, into the tip's own tile: above 0 */
+    struct nav_linear form; /* of `off` */
+};
+
+static void floor_look(const struct nav_floor *f, const struct nav_joint *j, double x, double y, struct floor_view *v)
+{
+    const double *m = j->mean;
+    double c = cos(m[NAV_JOINT_HEADING]), s = sin(m[NAV_JOINT_HEADING]), lx = c * x - s * y, ly = s * x + c * y;
+    double nx = cos(m[NAV_JOINT_LATTICE_TURN]), ny = sin(m[NAV_JOINT_LATTICE_TURN]), pitch = m[NAV_JOINT_PITCH];
+    double dx = m[NAV_JOINT_X] + lx - f->x, dy = m[NAV_JOINT_Y] + ly - f->y;
+    double at[2] = {nx * dx + ny * dy, nx * dy - ny * dx};
+    double u = (at[0] - m[NAV_JOINT_LATTICE_U]) / pitch, w = (at[1] - m[NAV_JOINT_LATTICE_V]) / pitch;
+    double line_u = round(u), line_w = round(w), off_u = (u - line_u) * pitch, off_w = (w - line_w) * pitch;
+    bool first = fabs(off_u) < fabs(off_w);
+    double off = first ? off_u : off_w, sign = off < 0.0 ? -1.0 : 1.0;
+    double ax = first ? nx : -ny, ay = first ? ny : nx;
+    *v = (struct floor_view){.column = (int)floor(u), .row = (int)floor(w), .off = fabs(off)};
+    v->across_column = first ? v->column - (int)sign : v->column;
+    v->across_row = first ? v->row : v->row - (int)sign;
+    nav_linear_add(&v->form, NAV_JOINT_X, sign * ax);
+    nav_linear_add(&v->form, NAV_JOINT_Y, sign * ay);
+    nav_linear_add(&v->form, NAV_JOINT_HEADING, sign * (ay * lx - ax * ly));
+    nav_linear_add(&v->form, NAV_JOINT_LATTICE_TURN, sign * (first ? at[1] : -at[0]));
+    nav_linear_add(&v->form, first ? NAV_JOINT_LATTICE_U : NAV_JOINT_LATTICE_V, -sign);
+    nav_linear_add(&v->form, NAV_JOINT_PITCH, -sign * (first ? line_u : line_w));
+}
+
+/* The window is of the tip's own tile with the probability that the tip is on this side; the moments of the Gaussian
+ * that comes nearest to the product (assumed-density filtering). */
+double nav_floor_take(struct nav_floor *f, struct nav_joint *j, double x, double y, const float *ratio)
+{
+    struct floor_view v;
+    if (!f->known)
+        return 0.0;
+    floor_look(f, j, x, y, &v);
+    float *own = floor_tile(f, v.column, v.row), *across = floor_tile(f, v.across_column, v.across_row);
+    double variance = nav_joint_variance(j, &v.form), sd = sqrt(variance + BLUR_M * BLUR_M), z = v.off / sd;
+    double a = floor_ratio(f, own, ratio), b = floor_ratio(f, across, ratio), beyond = 0.5 * erfc(z / sqrt(2.0));
+    if (z > NEAR) {
+        floor_learn(f, own, 1.0, ratio);
+        return log(a);
+    }
+    double total = a * (1.0 - beyond) + b * beyond, density = exp(-0.5 * z * z) / (sd * sqrt(2.0 * NAV_PI));
+    double slope = (a - b) * density / total, curve = -z / sd * slope - slope * slope;
+    bool sure = floor_sure(f, own) > SURE && floor_sure(f, across) > SURE;
+    floor_learn(f, own, a * (1.0 - beyond) / total, ratio);
+    floor_learn(f, across, b * beyond / total, ratio);
+    if (sure)
+        nav_joint_correct(j, &v.form, variance, variance * slope, variance * (1.0 + variance * curve));
+    return log(total);
+}
+
+double nav_floor_sure(const struct nav_floor *f, int column, int row, int *texture)
+{
+    const float *tile = f->known ? floor_tile(f, column, row) : NULL;
+    bool read = false;
+    *texture = 0;
+    for (int k = 0; tile && k < f->classes; k++) {
+        read = read || tile[k] != 0.0F;
+        *texture = tile[k] > tile[*texture] ? k : *texture;
+    }
+    return read ? floor_sure(f, tile) : 0.0;
+}
+
+void nav_floor_adopt(struct nav_floor *f, struct nav_joint *j, const struct nav_lattice *l)
+{
+    f->known = true;
+    f->x = l->x;
+    f->y = l->y;
+    memset(f->tile, 0, (size_t)NAV_FLOOR_SIDE * NAV_FLOOR_SIDE * (size_t)f->classes * sizeof *f->tile);
+    nav_joint_set(j, NAV_JOINT_LATTICE_U, l->u, l->sigma_m * l->sigma_m);
+    nav_joint_set(j, NAV_JOINT_LATTICE_V, l->v, l->sigma_m * l->sigma_m);
+    nav_joint_set(j, NAV_JOINT_PITCH, l->pitch, l->sigma_pitch * l->sigma_pitch);
+    nav_joint_set(j, NAV_JOINT_LATTICE_TURN, l->turn, l->sigma_turn * l->sigma_turn);
+    struct nav_linear form = {.terms = 0};
+    nav_linear_add(&form, NAV_JOINT_LATTICE_TURN, 1.0);
+    nav_linear_add(&form, NAV_JOINT_AXES, -1.0);
+    double off = l->turn - j->mean[NAV_JOINT_AXES], variance = nav_joint_variance(j, &form);
+    if (variance < AXES_KNOWN)
+        off -= NAV_PI / 2.0 * round(off / (NAV_PI / 2.0));
+    if (variance > AXES_KNOWN || fabs(off) < fmin(3.0 * sqrt(variance), RIGHT_MOST))
+        nav_joint_measure(j, &form, -off, RIGHT_RAD * RIGHT_RAD);
+}

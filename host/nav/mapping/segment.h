@@ -1,0 +1,12 @@
+/* Contacts in a row: a segment of one of the map's faces, or of a new one. */
+#ifndef NAV_SEGMENT_H
+#define NAV_SEGMENT_H
+
+#include "faces.h"
+
+/* Tells which face the loose contacts about this one are of, where they lie in a row, or makes a face of them. chance:
+ * 0 to 1, by which it is drawn; below 0: the likeliest. Returns the log-likelihood that this adds. */
+double nav_segment_take(struct nav_faces *, struct nav_joint *, const struct nav_touches *, const struct nav_contact *,
+                        double chance);
+
+#endif

@@ -1,0 +1,168 @@
+/* The mapper on hand-made rows: a joint Gaussian against a closed form, a wall met twice, and rows that nobody can use.
+ */
+#include "mapper.h"
+
+#include <math.h>
+
+#include "joint.h"
+#include "near.h"
+#include "rooms.h"
+#include "touches.h"
+
+static void test_a_measurement_corrects_what_is_correlated(void **state)
+{
+    (void)state;
+    double mean[NAV_JOINT_FACES], cov[NAV_JOINT_FACES * NAV_JOINT_FACES];
+    struct nav_joint j = {.room = NAV_JOINT_FACES, .mean = mean, .cov = cov};
+    struct nav_linear x = {.terms = 0}, y = {.terms = 0};
+    nav_joint_begin(&j, 0.0, 0.0);
+    nav_joint_move(&j, (struct nav_pose){0.0, 0.0, 0.0}, (struct nav_noise){0.0, 0.01});
+    nav_joint_move(&j, (struct nav_pose){2.0, 0.0, 0.0}, (struct nav_noise){0.0, 0.0});
+    nav_linear_add(&x, NAV_JOINT_X, 1.0);
+    nav_linear_add(&y, NAV_JOINT_Y, 1.0);
+    assert_near(nav_joint_variance(&j, &x), 0.0, 1e-12);
+    assert_near(nav_joint_variance(&j, &y), 0.04, 1e-12); /* 2 m times 0.1 rad, squared */
+    nav_joint_measure(&j, &y, 0.2, 0.04);
+    assert_near(mean[NAV_JOINT_Y], 0.1, 1e-12);
+    assert_near(mean[NAV_JOINT_HEADING], 0.05, 1e-12);
+    assert_near(nav_joint_variance(&j, &y), 0.02, 1e-12);
+    assert_near(cov[NAV_JOINT_HEADING * (NAV_JOINT_FACES + 1)], 0.005, 1e-12);
+}
+
+static void test_contacts_in_a_row_make_a_line(void **state)
+{
+    (void)state;
+    struct nav_touches t = {.held = 0};
+    struct nav_touches_line line;
+    int last = 0;
+    for (int n = 0; n < 6; n++)
+        last = nav_touches_keep(&t, (struct nav_touch){.x = 0.3, .y = 0.05 * n, .along_x = 1.0, .variance = 1e-6});
+    (void)nav_touches_keep(&t, (struct nav_touch){.x = 0.2, .y = 0.1, .along_x = 1.0, .variance = 1e-6});
+    assert_true(nav_touches_fit(&t, last, t.held, &line));
+    assert_int_equal(nav_touches_count(line.used), 6);
+    assert_near(fabs(nav_wrap(line.normal)), NAV_PI, 1e-9);
+    assert_near(line.x, 0.3, 1e-9);
+    assert_near(line.span, 0.25, 1e-9);
+    assert_false(nav_touches_fit(&t, last, line.used & ~7ULL, &line));
+}
+
+/* The true distance from a wall at x = 1 m for the whisker of rooms.h. */
+static double wall_distance(struct nav_pose pose)
+{
+    double base_x = pose.x + 0.05 * cos(pose.theta), along = (1.0 - base_x) / cos(pose.theta);
+    return cos(pose.theta) > 0.1 && along >= 0.0 && along <= 0.2 ? along : (double)INFINITY;
+}
+
+struct drive {
+    struct nav_mapper *mapper;
+    struct nav_pose pose; /* true */
+    double t_s;
+    struct nav_estimate estimate;
+};
+
+/* A step of the robot, whose wheels report `gain` times the distance. */
+static void drive_step(struct drive *d, double forward, double turn, double gain)
+{
+    d->pose = nav_compose(d->pose, (struct nav_pose){forward, 0.0, turn});
+    d->t_s += 0.1;
+    double texture[2] = {NAN, NAN}, radial = wall_distance(d->pose);
+    struct nav_row row = {
+        .t_s = d->t_s, .odometry = {gain * forward, 0.0, turn}, .texture = texture, .radial_m = &radial};
+    nav_mapper_step(d->mapper, &row, &d->estimate);
+}
+
+/* Drives to the wall, sweeps along it, and back. */
+static void drive_bout(struct drive *d, double gain)
+{
+    for (int n = 0; n < 30; n++)
+        drive_step(d, 0.02, 0.0, gain);
+    for (int n = 0; n < 20; n++)
+        drive_step(d, 0.0, n < 5 || n >= 15 ? 0.1 : -0.1, gain);
+    for (int n = 0; n < 30; n++)
+        drive_step(d, -0.02, 0.0, 1.0);
+}
+
+static struct drive drive_begin(const struct nav_problem *p)
+{
+    struct nav_mapper_options options = nav_mapper_default();
+    return (struct drive){.mapper = nav_mapper_new(p, &options), .pose = {0.2, 0.0, 0.0}};
+}
+
+static void test_a_wall_felt_again_corrects_the_pose(void **state)
+{
+    (void)state;
+    struct nav_problem p = room();
+    struct nav_mapper_face face[8];
+    struct drive d = drive_begin(&p);
+    drive_bout(&d, 1.0);
+    assert_int_equal(nav_mapper_faces(d.mapper, face, 8), 1);
+    assert_near(face[0].x0, 0.8, 0.01); /* the first pose, at 0.2 m, is the origin */
+    assert_near(face[0].x1, 0.8, 0.01);
+    assert_near(fabs(face[0].normal), NAV_PI, 0.1);
+    for (int bout = 0; bout < 3; bout++)
+        drive_bout(&d, 1.05); /* 3 cm a bout, 9 cm in all, by the wheels */
+    for (int n = 0; n < 30; n++)
+        drive_step(&d, 0.02, 0.0, 1.0);
+    assert_near(d.estimate.pose.x, d.pose.x - 0.2, 0.01);
+    nav_mapper_free(d.mapper);
+}
+
+static void test_without_contacts_it_is_never_surer(void **state)
+{
+    (void)state;
+    struct nav_problem p = room();
+    struct drive d = drive_begin(&p);
+    double before = 0.0;
+    d.pose.theta = NAV_PI; /* away from the wall */
+    for (int n = 0; n < 600; n++) {
+        drive_step(&d, 0.02, 0.0, 1.0);
+        double now = d.estimate.covariance[0] + d.estimate.covariance[4];
+        assert_true(now >= before);
+        before = now;
+    }
+    assert_true(d.estimate.confidence < 0.5);
+    assert_int_equal(nav_mapper_faces(d.mapper, NULL, 0), 0);
+    nav_mapper_free(d.mapper);
+}
+
+static void test_bad_cells_are_counted_and_not_read(void **state)
+{
+    (void)state;
+    struct nav_problem p = room();
+    struct drive d = drive_begin(&p);
+    double texture[2] = {INFINITY, NAN}, radial = -1.0;
+    struct nav_row row = {.t_s = 0.1, .odometry = {NAN, 0.0, 1e9}, .texture = texture, .radial_m = &radial};
+    for (int n = 0; n < 100; n++) {
+        row.t_s += 0.1;
+        nav_mapper_step(d.mapper, &row, &d.estimate);
+        assert_true(isfinite(d.estimate.pose.x + d.estimate.pose.y + d.estimate.pose.theta));
+    }
+    assert_int_equal(nav_mapper_bad_cells(d.mapper), 100 * 5);
+    row.t_s = 5.0;
+    nav_mapper_step(d.mapper, &row, &d.estimate);
+    assert_int_equal(nav_mapper_bad_rows(d.mapper), 1);
+    assert_int_equal(nav_mapper_faces(d.mapper, NULL, 0), 0);
+    nav_mapper_free(d.mapper);
+}
+
+static void test_options_have_limits(void **state)
+{
+    (void)state;
+    struct nav_problem p = room();
+    assert_null(nav_mapper_new(&p, &(struct nav_mapper_options){.particles = 0}));
+    assert_null(nav_mapper_new(&p, &(struct nav_mapper_options){.particles = 1000000}));
+    nav_mapper_free(NULL);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_a_measurement_corrects_what_is_correlated),
+        cmocka_unit_test(test_contacts_in_a_row_make_a_line),
+        cmocka_unit_test(test_a_wall_felt_again_corrects_the_pose),
+        cmocka_unit_test(test_without_contacts_it_is_never_surer),
+        cmocka_unit_test(test_bad_cells_are_counted_and_not_read),
+        cmocka_unit_test(test_options_have_limits),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

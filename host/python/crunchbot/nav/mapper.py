@@ -1,0 +1,137 @@
+"""The mapper of host/nav on the rows of a robot: poses as they come, and the map at any time.
+
+Everything is in the frame of the first pose: x forward, y left of the robot as it stood then.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import UserError
+from ..native import doubles, ffi, lib, pointer
+from ..scene import Arena, Robot, Scene
+from .filters import ESTIMATE, ESTIMATES, pack, problem_of
+from .observations import Observations
+
+FACE = np.dtype(
+    [(name, "f8") for name in ("x0", "y0", "x1", "y1", "normal", "normal_sigma", "offset_sigma", "hits")]
+    + [("face", "i4"), ("right", "i4")]
+)
+FACES = ffi.typeof("struct nav_mapper_face[]")
+assert FACE.itemsize == ffi.sizeof("struct nav_mapper_face")
+SEED_MOST = 2**64 - 1
+PARTICLES_MOST = 5000
+PATCH_M = 0.3
+TILES_EACH_WAY = 24  # of the lattice's first tile: host/nav/mapping/floor.h
+
+
+class MappingError(UserError, ValueError):
+    """Options that no mapper takes; one line."""
+
+
+@dataclass(frozen=True)
+class Lattice:
+    """Tile (0, 0) has its lower left corner at `x`, `y` (m); tiles of `pitch` m follow along `turn` (rad) and across it."""
+
+    x: float
+    y: float
+    turn: float
+    pitch: float
+    sigma_m: float
+    sigma_turn: float
+    sigma_pitch: float
+
+
+@dataclass(frozen=True)
+class TouchMap:
+    """What is believed of the world. `faces`: (n,) of FACE, stretches that were felt; `axes`: direction of their right
+    angles, rad, None: not known; `lattice`: None where the evidence is for none. `tiles`: (column, row) of the lattice to
+    (index of its likeliest texture, probability)."""
+
+    faces: np.ndarray
+    axes: float | None
+    lattice: Lattice | None
+    tiles: dict[tuple[int, int], tuple[int, float]]
+
+
+def default_particles() -> int:
+    """How many hypotheses a mapper holds where nobody says."""
+    return int(lib.nav_mapper_default().particles)
+
+
+class Mapper:
+    """Takes rows of observations and knows, after each, the pose and the map."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        textures: tuple[str, ...],
+        seed: int = 0,
+        particles: int | None = None,
+        lattice: bool = True,
+        normals: bool = False,
+    ):
+        """`lattice`: whether to look for one; `normals`: rows may hold directions of the surfaces that whiskers touch.
+        MappingError when an option is out of range, or there is no memory."""
+        particles = default_particles() if particles is None else particles
+        if not 1 <= particles <= PARTICLES_MOST:
+            raise MappingError(f"--particles {particles}: outside 1 to {PARTICLES_MOST}; choose a number inside")
+        if not 0 <= seed <= SEED_MOST:
+            raise MappingError(f"--seed {seed}: outside 0 to 2^64 - 1; choose a number inside")
+        self._problem, self._keep = problem_of(Scene(_nowhere(textures), robot), {})
+        self._texture = (len(robot.of_role("texture")), len(textures))
+        self._rays = len(robot.of_role("object"))
+        self._problem.seed, self._problem.robot.normals = seed, normals
+        options = ffi.new("struct nav_mapper_options *", {"particles": particles, "lattice": lattice})
+        made = lib.nav_mapper_new(self._problem, options)
+        if made == ffi.NULL:
+            raise MappingError(f"--particles {particles}: they do not fit in memory; choose fewer")
+        self._mapper = ffi.gc(made, lib.nav_mapper_free)
+
+    def replay(self, rows: Observations, first: int, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """Rows `first` to `first + count`: (count,) of ESTIMATE and (count,) microseconds of CPU time. ValueError when there
+        are not so many."""
+        if not 0 <= first <= first + count <= len(rows):
+            raise ValueError(f"rows {first} to {first + count}: outside the {len(rows)} rows given; choose rows inside")
+        table, step_us = np.zeros(count, ESTIMATE), np.zeros(count)
+        packed, keep = pack(rows, self._texture, self._rays, 0)
+        out = pointer(ESTIMATES, ESTIMATE, table, "table", (count,))
+        lib.nav_mapper_replay(self._mapper, packed, first, count, out, doubles(step_us, "step_us", (count,)))
+        del keep  # until here
+        return table, step_us
+
+    def map(self) -> TouchMap:
+        """The map after the last row."""
+        count = lib.nav_mapper_faces(self._mapper, ffi.NULL, 0)
+        faces = np.zeros(count, FACE)
+        lib.nav_mapper_faces(self._mapper, pointer(FACES, FACE, faces, "faces", (count,)), count)
+        found = lib.nav_mapper_lattice(self._mapper)
+        axes = None if found.axes != found.axes else float(found.axes)
+        if not found.pitch > 0.0:
+            return TouchMap(faces, axes, None, {})
+        place = (found.x, found.y, found.turn, found.pitch)
+        lattice = Lattice(*place, found.sigma_m, found.sigma_turn, found.sigma_pitch)
+        return TouchMap(faces, axes, lattice, dict(self._tiles()))
+
+    def _tiles(self) -> Iterator[tuple[tuple[int, int], tuple[int, float]]]:
+        texture = ffi.new("int *")
+        for column in range(-TILES_EACH_WAY, TILES_EACH_WAY):
+            for row in range(-TILES_EACH_WAY, TILES_EACH_WAY):
+                sure = lib.nav_mapper_tile(self._mapper, column, row, texture)
+                if sure > 0.0:
+                    yield (column, row), (int(texture[0]), float(sure))
+
+    @property
+    def bad_cells(self) -> int:
+        return lib.nav_mapper_bad_cells(self._mapper)
+
+    @property
+    def bad_rows(self) -> int:
+        return lib.nav_mapper_bad_rows(self._mapper)
+
+
+def _nowhere(textures: tuple[str, ...]) -> Arena:
+    """An arena of which nothing but the textures' names is known. Its tile stands for the least patch of one texture that
+    is looked for; runs of wrong windows are shorter than half of it."""
+    return Arena((PATCH_M, PATCH_M), PATCH_M, textures, ("?",), ())

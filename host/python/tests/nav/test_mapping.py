@@ -1,0 +1,148 @@
+"""Maps by touch alone: the mapper on drawn scenes, and `whisker map` from rows to a folder that `localise` takes."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from crunchbot import cli
+from crunchbot.nav import localise, mapping
+from crunchbot.nav.map_scene import map_scene
+from crunchbot.nav.mapper import Mapper, MappingError
+from crunchbot.occupancy import read_map
+from crunchbot.scene import load
+from crunchbot_lab.scenes import write_scene
+from crunchbot_lab.scenes.geometry import compose
+from crunchbot_lab.scenes.making import make
+
+ROWS = 2000
+
+
+def mapped(family: str, seed: int, rows: int = ROWS):
+    made = make(family, seed, rows)
+    return made, mapping.run(made.scene.robot, made.scene.arena.textures, made.observations)
+
+
+def aligned(poses: np.ndarray, truth: np.ndarray) -> np.ndarray:
+    """(n,) distances in m after the rigid motion that brings poses (n, 3) closest to the truth (n, 3)."""
+    a, b = (p[:, :2] - p[:, :2].mean(axis=0) for p in (poses, truth))
+    turn = math.atan2((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum(), (a * b).sum())
+    c, s = math.cos(turn), math.sin(turn)
+    return np.hypot(*(a @ np.array([[c, s], [-s, c]]) - b).T)
+
+
+def odometry(steps: np.ndarray) -> np.ndarray:
+    path = [np.zeros(3)]
+    for step in steps:
+        path.append(compose(path[-1], step))
+    return np.array(path[1:])
+
+
+@pytest.mark.parametrize(("family", "most_m"), [("anchor", 0.04), ("free", 0.04), ("robot", 0.07), ("raw", 0.2)])
+def test_poses_are_better_than_odometry(family, most_m):
+    made, run = mapped(family, 11)
+    truth = made.observations.truth
+    error = np.median(aligned(run.table["pose"], truth))
+    assert error < most_m
+    assert error < 0.7 * np.median(aligned(odometry(made.observations.odometry), truth))
+
+
+def test_the_tiles_of_the_floor_are_found():
+    made, run = mapped("anchor", 12)
+    assert run.touched.lattice is not None
+    assert abs(run.touched.lattice.pitch - made.scene.arena.tile_m) < 0.02
+    axes = run.touched.axes - run.touched.lattice.turn
+    assert abs(math.remainder(axes, math.pi / 2)) < math.radians(1)
+
+
+def test_no_tiles_are_made_up():
+    _, run = mapped("one-texture", 13)
+    assert run.touched.lattice is None and not run.touched.tiles
+
+
+def test_the_same_rows_give_the_same_map():
+    made = make("anchor", 14, 300)
+    runs = [mapping.run(made.scene.robot, made.scene.arena.textures, made.observations) for _ in range(2)]
+    assert np.array_equal(runs[0].table, runs[1].table)
+    assert np.array_equal(runs[0].touched.faces, runs[1].touched.faces)
+
+
+def test_a_robot_that_feels_nothing_is_less_and_less_sure():
+    made = make("no-whisker", 3, 600)
+    run = mapping.run(made.scene.robot, made.scene.arena.textures, made.observations)
+    heading, place = run.table["covariance"][:, 2, 2], run.table["covariance"][:, 0, 0]
+    assert heading[-1] > 2.0 * heading[50] and place[-1] > 2.0 * place[50]
+    assert run.table["confidence"][-1] < run.table["confidence"][50]
+    assert not len(run.touched.faces)
+    assert run.scene().arena.obstacles == ()
+
+
+@pytest.mark.parametrize(
+    "family", ["anchor+outliers", "anchor+dead", "anchor+nan-second", "anchor+dropped", "anchor+reordered", "ring"]
+)
+def test_faults_leave_it_finite_and_better_than_odometry(family):
+    made, run = mapped(family, 15, 1200)
+    poses, truth = run.table["pose"], made.observations.truth
+    assert np.isfinite(poses).all() and np.isfinite(run.table["covariance"]).all()
+    steps = odometry(made.observations.odometry)
+    assert np.median(aligned(poses, truth)) < max(np.median(aligned(steps, truth)), 0.06)
+
+
+def test_options_out_of_range_are_refused():
+    robot = make("anchor", 1, 1).scene.robot
+    with pytest.raises(MappingError, match="--particles 0"):
+        Mapper(robot, ("A",), particles=0)
+    with pytest.raises(MappingError, match="--seed -1"):
+        Mapper(robot, ("A",), seed=-1)
+
+
+@pytest.fixture(scope="module")
+def folders(tmp_path_factory):
+    """A scene folder without an arena, and its map."""
+    made, where = make("anchor", 16, ROWS), tmp_path_factory.mktemp("map")
+    write_scene(where / "scene", made.scene, made.observations)
+    (where / "scene/arena.toml").unlink()
+    assert cli.main(["map", str(where / "scene"), "--out", str(where / "map"), "--json"]) == 0
+    return made, where / "scene", where / "map"
+
+
+def test_the_map_is_a_scene_in_which_the_same_rows_are_located(folders):
+    made, _, folder = folders
+    result = localise.run("adaptive", load(folder), made.observations)
+    assert np.median(aligned(result.poses, made.observations.truth)) < 0.08
+
+
+def test_the_map_is_one_that_map_servers_read(folders):
+    _, _, folder = folders
+    occupancy, scene = read_map(folder / "map.yaml"), load(folder)
+    assert occupancy.solid and occupancy.unknown
+    assert np.allclose(occupancy.size_m, scene.arena.size_m, atol=0.05)
+    assert load(folder, folder / "map.yaml").arena.obstacles
+
+
+def test_what_is_wrong_is_one_line(tmp_path, capsys):
+    assert cli.main(["map", str(tmp_path / "none"), "--out", str(tmp_path / "map")]) != 0
+    assert "no such folder" in capsys.readouterr().err
+    made = make("anchor", 1, 5)
+    write_scene(tmp_path / "scene", made.scene, made.observations)
+    (tmp_path / "scene/observations.csv").write_text("t_s,odo_x_m,odo_y_m,odo_theta_rad\n")
+    assert cli.main(["map", str(tmp_path / "scene"), "--out", str(tmp_path / "map")]) != 0
+    error = capsys.readouterr().err
+    assert "observations.csv, line 1" in error and error.count("\n") == 1
+
+
+def test_rows_of_no_length_make_a_map_of_nothing(tmp_path, capsys):
+    made = make("anchor", 1, 3)
+    write_scene(tmp_path / "scene", made.scene, made.observations)
+    lines = (tmp_path / "scene/observations.csv").read_text().splitlines()
+    (tmp_path / "scene/observations.csv").write_text(lines[0] + "\n")
+    assert cli.main(["map", str(tmp_path / "scene"), "--out", str(tmp_path / "map"), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["faces"] == 0
+    load(tmp_path / "map")
+
+
+def test_a_map_without_contacts_has_no_solid_cell():
+    made, run = mapped("no-obstacle", 17, 5)
+    where = map_scene(run.touched, run.table["pose"], made.observations, run.robot, run.textures)
+    assert not where.arena.obstacles and (where.cells == 0).any()
