@@ -29,7 +29,7 @@ PACKAGES = (
 # In the root where the packages were built: a program in C and one in C++ by one command each.
 COMPILED = """
 cd /build/src/host/examples
-for source in *.c; do cc -o /tmp/example $source $(pkg-config --cflags --libs whisker whisker-nav whisker-create); done
+for source in *.c; do cc -o /tmp/example $source $(pkg-config --cflags --libs whisker whisker-nav whisker-create) -lm; done
 for source in *.cpp; do c++ -std=c++17 -o /tmp/example $source $(pkg-config --cflags --libs whisker-nav); done
 """
 # In an empty root.
