@@ -33,6 +33,7 @@ OFFLINE = {
     "whisker texture classify": '"label": "ROUGH"',
     "whisker radial fit": "chosen",
     "whisker radial predict": '"radius_mm": ',
+    "whisker export": "drive.parquet: 4000 frames, lanes lane0, lane1, lane2, lane3, lane4, lane5",
     "whisker radial follow": '"motion": "body whisk"',
     "whisker flash": "no bridge is connected",
 }

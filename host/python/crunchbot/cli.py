@@ -27,6 +27,7 @@ COMMANDS = {
     "flash": "load firmware into the nodes, or gateware into the bridge",
     "record": "write a ring to an MCAP file",
     "replay": "feed a ring from a recording, as the device would",
+    "export": "a recording as CSV, Parquet or NWB",
     "stream": "print frames as CSV or JSON lines",
     "robot": "all processes of a robot, on hardware or simulated",
     "pilot": "the netbook's part of a robot: samples to wheel speeds and observations",
@@ -47,7 +48,7 @@ EXTRAS = {
     **dict.fromkeys(("record", "replay"), "record"),
     "view": "view",
     **dict.fromkeys(("robot", "pilot", "navigator", "bag", "pyro", "top"), "robot"),
-    **{name: name for name in ("ros2", "foxglove")},
+    **{name: name for name in ("export", "ros2", "foxglove")},
     **dict.fromkeys(("localise", "map", "calibrate", "scene"), "scenes"),
 }
 LAB_COMMANDS = ("bridge-sim", "scene", "bench")  # of the package crunchbot_lab

@@ -1,0 +1,34 @@
+"""`whisker export`: a recording as CSV, Parquet or NWB (crunchbot.recording.exporting)."""
+
+import argparse
+from pathlib import Path
+
+from ..arguments import lane_list, warn
+from ..bridge.wide import LANES_MAX
+from ..recording import read
+from ..recording.exporting import FORMATS, export
+from ..recording.table import ExportError, Table
+
+EXAMPLE = "whisker export examples/drive.mcap drive.parquet"
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("file", metavar="FILE.MCAP", help="of 'whisker record'")
+    text = f"to be written; the format is that of its ending: {', '.join(FORMATS)}"
+    parser.add_argument("out", type=Path, metavar="OUT", help=text)
+    text = "such as 0,2,5-7 (default: those in use)"
+    parser.add_argument("--lanes", type=lane_list(LANES_MAX), metavar="LIST", help=text)
+    parser.add_argument("--overwrite", action="store_true", help="replace OUT if it exists")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    if arguments.out.exists() and not arguments.overwrite:
+        raise ExportError(f"{arguments.out}: is there already; give --overwrite, or another name")
+    with read(arguments.file) as recording:
+        table = Table(recording, arguments.lanes)
+        export(table, arguments.out)
+        for line in recording.damage:
+            warn(line)
+    print(f"{arguments.out}: {table.frames} frames, lanes {', '.join(table.names)}")
+    return 0
