@@ -6,13 +6,16 @@ BUILD := build/release
 PYTHON := .venv/bin/python
 SOURCES_C = $(shell git ls-files '*.c' '*.h' '*.cpp' | grep -v '/gen/')
 
-.PHONY: help demo demo-long test test-all test-kernel test-hil mutants bench wheels wheels-check debian release release-check sbom build setup setup-tests abi example-data manual gen firmware firmware-images firmware-check flash bitstream format lint clean
+.PHONY: help demo demo-rtl demo-long test test-all test-kernel test-hil mutants bench wheels wheels-check debian release release-check sbom build setup setup-tests abi example-data manual gen firmware firmware-images firmware-check flash bitstream format lint clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
 
-demo: build ## the whole chain on simulated hardware, magnet to pose: about two minutes; SEED=n chooses the seed
+demo: build ## the whole chain on simulated hardware, magnet to pose: about half a minute; SEED=n chooses the seed
 	@$(PYTHON) -m crunchbot_lab.demo --out build/demo --build-dir $(BUILD) --seed $(SEED)
+
+demo-rtl: build ## the same with every clock cycle of the bridge simulated, not only those of the first seconds: about a minute
+	@$(PYTHON) -m crunchbot_lab.demo --out build/demo --build-dir $(BUILD) --seed $(SEED) --level rtl
 
 demo-long: build ## 30 simulated minutes of the whole robot, with a report; SEED=n; LEVEL=bytes, or signals (a minute), or rtl
 	@$(PYTHON) -m crunchbot_lab.demo.long --out build/demo-long --build-dir $(BUILD) --seed $(SEED) --level $(LEVEL)

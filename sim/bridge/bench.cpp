@@ -70,8 +70,9 @@ std::string at(size_t lane, uint64_t tick)
 } // namespace
 
 Bench::Bench(const BenchSettings &settings)
-    : settings_(settings), rig_(make_rig(settings.level, settings.populated, settings.seed)), scheduler_(*rig_),
-      log_(settings.lane_fault_path, settings.usb_fault_path), runner_(*rig_, scheduler_, plan_of(settings), log_),
+    : settings_(settings), rig_(make_rig(settings.level, settings.populated, settings.seed, {}, settings.rtl_ticks)),
+      scheduler_(*rig_), log_(settings.lane_fault_path, settings.usb_fault_path),
+      runner_(*rig_, scheduler_, plan_of(settings), log_),
       check_([this](const CheckedFrame &frame) { check_frame(frame); }), generator_(settings.seed)
 {
 }

@@ -20,6 +20,7 @@ struct BenchSettings {
     uint8_t sample_point = WHISKER_LIMIT_SCK_DIVIDER_MIN - 1;
     bool faults = false;
     Level level = Level::RTL;
+    uint64_t rtl_ticks = 0; // at level mixed: the first ones
     std::string lane_fault_path;
     std::string usb_fault_path;
 };

@@ -109,6 +109,10 @@ void NodeBus::edges(Levels now, bool mosi)
 {
     const Levels before = levels_;
     levels_ = now;
+    if (played_) {
+        play_edge(now, before);
+        return;
+    }
     if (now.sync && !before.sync) {
         sync_edge();
     }
@@ -144,16 +148,41 @@ void NodeBus::select_edge(bool low)
 
 std::array<uint64_t, LANES> NodeBus::transfer(uint64_t order)
 {
-    std::array<uint64_t, LANES> arrives;
-    arrives.fill(UINT64_MAX);
+    arrived_.fill(UINT64_MAX);
     for (size_t lane = 0; lane < nodes_.size(); lane++) {
-        sent_[lane] = arrives[lane] = sim_node_transfer(nodes_[lane].get(), order);
+        sent_[lane] = arrived_[lane] = sim_node_transfer(nodes_[lane].get(), order);
     }
     if (fault_ != LinkFault::NONE) {
-        arrives[fault_lane_] = damaged(arrives[fault_lane_]);
+        arrived_[fault_lane_] = damaged(arrived_[fault_lane_]);
     }
     remember_transfer();
-    return arrives;
+    return arrived_;
+}
+
+const std::array<uint64_t, LANES> &NodeBus::arrived() const
+{
+    return arrived_;
+}
+
+void NodeBus::play(const std::array<uint64_t, LANES> *records)
+{
+    played_ = records;
+}
+
+void NodeBus::play_edge(Levels now, Levels before)
+{
+    if (now.select_n != before.select_n) {
+        bits_ = 0;
+        miso_ = UINT32_MAX;
+    }
+    if (!now.sck || before.sck) {
+        return;
+    }
+    bits_++;
+    for (size_t lane = 0; lane < LANES; lane++) {
+        const uint32_t bit = (*played_)[lane] >> (RECORD_BITS - bits_) & 1u;
+        miso_ = (miso_ & ~(1u << lane)) | bit << lane;
+    }
 }
 
 uint64_t NodeBus::damaged(uint64_t bits) const

@@ -62,6 +62,12 @@ class NodeBus
     // Returns what arrives of each lane, likewise.
     std::array<uint64_t, LANES> transfer(uint64_t order);
 
+    // What that transfer brought, damage included.
+    const std::array<uint64_t, LANES> &arrived() const;
+
+    // The next transfers bring these bits, likewise, and the nodes hear nothing of them; null: the nodes answer again.
+    void play(const std::array<uint64_t, LANES> *records);
+
     // The rest of the tick, in the nodes' own virtual time: they read their sensors. Throws std::runtime_error if a
     // node that was run at record level differs from its registers.
     void run();
@@ -82,6 +88,7 @@ class NodeBus
     };
 
     void edges(Levels now, bool mosi);
+    void play_edge(Levels now, Levels before);
     void sync_edge();
     void select_edge(bool low);
     void sck_edge(bool level, bool mosi);
@@ -94,6 +101,8 @@ class NodeBus
     std::array<sim_field, LANES> fields_{};
     std::array<uint64_t, LANES> sent_{};     // bits of this transfer so far, first bit highest
     std::array<uint64_t, LANES> previous_{}; // bits of the transfer before
+    std::array<uint64_t, LANES> arrived_{};
+    const std::array<uint64_t, LANES> *played_ = nullptr;
     std::vector<SupplyCut> cuts_;
     unsigned bits_ = 0; // rising SCK edges since select went low
     Levels levels_{false, true, false};

@@ -73,6 +73,7 @@ NorFlash &Rig::flash()
 void Rig::spoil(const LaneFault &fault)
 {
     const LinkFault link = link_fault(fault.kind);
+    disturbed();
     if (link == LinkFault::NONE) {
         bus_.spoil_reading(fault.lane, sensor_fault(fault.kind), fault.argument);
     } else {

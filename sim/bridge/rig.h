@@ -14,8 +14,9 @@
 namespace bridge_sim
 {
 
-// How much of the bridge is simulated; what comes over USB is the same.
-enum class Level { RTL, BYTES };
+// How much of the bridge is simulated; what comes over USB is the same. MIXED: bytes where nothing but plain sampling
+// goes on, RTL else.
+enum class Level { RTL, BYTES, MIXED };
 
 class Rig
 {
@@ -53,6 +54,14 @@ class Rig
     virtual bool ticks_by_itself() const
     {
         return false;
+    }
+
+    // Is the present tick the registers' (RTL)?
+    virtual bool at_rtl() const = 0;
+
+    // Something but plain sampling is to come; for what does not come by one of the functions here.
+    virtual void disturbed()
+    {
     }
 
     // Spoils the reading that the next tick starts, or the transfer that the next tick makes.

@@ -128,6 +128,7 @@ void TickRunner::inject_usb_fault(uint64_t number)
 
 void TickRunner::start_usb_fault(const UsbFault &fault)
 {
+    rig_.disturbed();
     switch (fault.kind) {
     case UsbFaultKind::LOST_ACK:
         return rig_.arm(WireFault::LOST_ACK);

@@ -22,7 +22,7 @@ int run_bench(const bridge_sim::Options &options)
     settings.usb_fault_path = options.usb_faults;
     bridge_sim::Bench bench(settings);
     const bridge_sim::BenchResult result = bench.run();
-    const bridge_sim::Speed speed = {result.ticks, result.cycles, result.wall_s, settings.populated};
+    const bridge_sim::Speed speed = {result.ticks, result.cycles, result.wall_s, settings.populated, {}};
     bridge_sim::write_speed_report(options.speed_report, speed, bench.faults());
     std::printf("%" PRIu64 " ticks, %zu lanes populated: every frame as sent; %.1f cycles per tick, %.2f simulated "
                 "seconds per second\n",

@@ -71,6 +71,15 @@ bool set_pace(void *options, const char *name, const char *text)
                                   &of(options).pace);
 }
 
+bool set_rtl_seconds(void *options, const char *name, const char *text)
+{
+    double seconds = 0;
+    const bool right =
+        refuse_unless_positive(name, text, SECONDS_MAX, "give simulated seconds, more than 0, at most 86400", &seconds);
+    of(options).link.rtl_ticks = static_cast<uint64_t>(std::llround(seconds * TICKS_PER_SECOND));
+    return right;
+}
+
 bool set_defect(void *options, const char *name, const char *text)
 {
     try {
@@ -84,8 +93,9 @@ bool set_defect(void *options, const char *name, const char *text)
 bool set_level(void *options, const char *name, const char *text)
 {
     const std::string level = text;
-    of(options).link.level = level == "rtl" ? Level::RTL : Level::BYTES;
-    return level == "rtl" || level == "bytes" || command_line_refuse(PROGRAM, name, text, "give rtl or bytes");
+    of(options).link.level = level == "rtl" ? Level::RTL : level == "bytes" ? Level::BYTES : Level::MIXED;
+    return level == "rtl" || level == "bytes" || level == "mixed" ||
+           command_line_refuse(PROGRAM, name, text, "give rtl, bytes or mixed");
 }
 
 template <Serve SERVE> bool set_port(void *options, const char *name, const char *text)
@@ -194,9 +204,11 @@ std::vector<command_option> all_options()
             set_text<&Options::speed_report>),
         own("defect", "KIND", "misbehave: wire-version (claims another), frame (damages one) or truncate (cuts\none)",
             set_defect),
-        own("level", "rtl|bytes",
-            "the Verilated bridge, cycle by cycle, or its model at the level of transactions:\nthe same frames (rtl)",
+        own("level", "rtl|bytes|mixed",
+            "the Verilated bridge, cycle by cycle; its model at the level of transactions; or that\nwhere nothing but "
+            "plain sampling goes on, and the first one else: the same frames\n(rtl)",
             set_level),
+        own("rtl-seconds", "S", "level mixed: cycle by cycle for the first S simulated seconds (0)", set_rtl_seconds),
         own("usbip", "PORT", "serve the device by USB/IP on this port of 127.0.0.1 (0: a free one, which is\nprinted)",
             set_port<Serve::USBIP>),
         own("usbredir", "PORT", "serve it by usbredir, for QEMU's usb-redir", set_port<Serve::USBREDIR>),

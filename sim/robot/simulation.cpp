@@ -81,7 +81,8 @@ sim_scene read_scene(const std::string &path)
 std::unique_ptr<Rig> rig_of(const Options &options, const sim_scene &scene)
 {
     const size_t lanes = populated(options, scene);
-    auto rig = make_rig(options.link.level, lanes, options.seed, read_node_list(options.nodes, lanes));
+    auto rig =
+        make_rig(options.link.level, lanes, options.seed, read_node_list(options.nodes, lanes), options.link.rtl_ticks);
     if (!options.flash.empty()) {
         rig->flash().keep_in(options.flash);
     }
@@ -246,6 +247,8 @@ void Simulation::produce_tick()
     }
     step_world();
     runner_.tick(tick_, fields_.data());
+    speed_.rtl_ticks.resize(tick_ / PROGRESS_TICKS + 1);
+    speed_.rtl_ticks.back() += rig_->at_rtl() ? 1 : 0;
     after_tick(tick_++);
     if (tick_ == total_) {
         end_run();
@@ -318,7 +321,8 @@ void Simulation::end_run()
 void Simulation::close_run()
 {
     over_ = true;
-    speed_ = {tick_, rig_->cycles() - first_tick_cycles_, now_s() - first_tick_s_, rig_->bus().populated()};
+    speed_ = {tick_, rig_->cycles() - first_tick_cycles_, now_s() - first_tick_s_, rig_->bus().populated(),
+              std::move(speed_.rtl_ticks)};
     followers_.send_end(tick_);
 }
 

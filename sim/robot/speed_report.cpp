@@ -39,6 +39,15 @@ std::string usb_counts(const FaultLog &faults)
     return text;
 }
 
+std::string seconds_text(const std::vector<uint64_t> &seconds)
+{
+    std::string text;
+    for (const uint64_t ticks : seconds) {
+        text += (text.empty() ? "" : ", ") + std::to_string(ticks);
+    }
+    return text;
+}
+
 } // namespace
 
 void write_speed_report(const std::string &path, const Speed &speed, const FaultLog &faults)
@@ -54,6 +63,7 @@ void write_speed_report(const std::string &path, const Speed &speed, const Fault
                  speed.ticks, speed.simulated_s(), speed.wall_s, speed.realtime_factor());
     std::fprintf(file, " \"cycles\": %" PRIu64 ", \"cycles_per_tick\": %.2f, \"lanes_populated\": %zu,\n", speed.cycles,
                  speed.cycles_per_tick(), speed.lanes_populated);
+    std::fprintf(file, " \"rtl_ticks\": [%s],\n", seconds_text(speed.rtl_ticks).c_str());
     std::fprintf(file, " \"pairs_injected\": %zu, \"usb_faults_injected\": %" PRIu64 ", \"usb_faults\": {%s}}\n",
                  faults.pairs().size(), faults.usb_count(), usb_counts(faults).c_str());
     std::fclose(file);

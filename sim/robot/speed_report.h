@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "fault_log.h"
 
@@ -13,6 +14,7 @@ struct Speed {
     uint64_t cycles = 0; // of the 60 MHz clock that were simulated
     double wall_s = 0;
     size_t lanes_populated = 0;
+    std::vector<uint64_t> rtl_ticks; // of each simulated second, those that the Verilated bridge made
 
     double simulated_s() const;
     double realtime_factor() const; // simulated seconds per wall second

@@ -35,6 +35,13 @@ def parse(argv: list[str] | None) -> argparse.Namespace:
     parser.add_argument(
         "--spread", type=int, default=8, help="seeds from this one on that are replayed without bits (%(default)s)"
     )
+    parser.add_argument(
+        "--level",
+        choices=("mixed", "rtl", "bytes"),
+        default="mixed",
+        help="of the bridge: every clock cycle (rtl), its bytes, or cycles for the first seconds and around faults; "
+        "the same frames (%(default)s)",
+    )
     return parser.parse_args(argv)
 
 
@@ -89,13 +96,14 @@ def demonstrate(options: argparse.Namespace) -> None:
     out, scene, _ = prepare(options)
     results = {"seed": options.seed, "simulated_s": options.seconds, "lanes": options.lanes}
     results |= learn_models(out, scene, options)
-    results |= run(out, options)
+    results |= run(out, options, options.level)
     results |= judge(out, scene)
     replay_seeds(out, scene, options)
     results["wall_s"] = time.monotonic() - began
     write_summary(out, results)
     report = write_report(out)
     tell(results)
+    print(f"level: {levels_told(json.loads((out / 'speed.json').read_text())['rtl_ticks'])}")
     print(report)
 
 
@@ -225,6 +233,19 @@ def tell(s: dict) -> None:
     print(
         f"pose:  grid {1000 * s['pose_error_median_m']:.0f} mm median error, adaptive {1000 * s['adaptive_error_median_m']:.0f} mm, "
         f"foveal {1000 * s['foveal_error_median_m']:.0f} mm, odometry alone {1000 * s['odometry_error_median_m']:.0f} mm"
+    )
+
+
+def levels_told(rtl_ticks: list[int]) -> str:
+    """Which level of detail made which simulated second, from the ticks at RTL of each."""
+    whole = next((second for second, ticks in enumerate(rtl_ticks) if ticks < TICKS_PER_S), len(rtl_ticks))
+    rest = rtl_ticks[whole:]
+    if not rest:
+        return f"all {whole} s at RTL, clock cycle by clock cycle"
+    touched = sum(ticks > 0 for ticks in rest)
+    return (
+        f"the first {whole} s at RTL, clock cycle by clock cycle; then bytes, with RTL for {sum(rest)} ticks in {touched} "
+        f"of {len(rest)} s, around faults and requests"
     )
 
 

@@ -49,7 +49,8 @@ class ChainRun:
     lanes: int  # populated
     link: Link
     create: int | None = 1  # the base: iRobot Create 1 or 2; None: wheels that obey at once, without a serial line
-    level: str = "rtl"  # of the bridge; or bytes: the same frames
+    level: str = "rtl"  # of the bridge; or bytes, or mixed: the same frames
+    rtl_seconds: float = 5.0  # level mixed: so long from the start every clock cycle of the bridge is simulated
     before: Mapping[str, tuple[str, ...]] = field(default_factory=dict)  # by a program's name: words before its own
 
     @property
@@ -114,6 +115,7 @@ def _bridge(run: ChainRun, table: parts.Table) -> Program:
     simulation = [*table.bridge(simulated), "--followers", FOLLOWERS, "--progress", "--lanes-populated", run.lanes]
     simulation += ["--faults", run.out / "faults.csv", "--usb-faults", run.out / "usb_faults.csv"]
     simulation += ["--speed-report", run.out / "speed.json"]
+    simulation += ["--rtl-seconds", run.rtl_seconds] if run.level == "mixed" else []
     daemon = [*table.daemon(), "--sck-divider", run.link.sck_divider]
     daemon += ["--word-gap", run.link.word_gap, "--sample-point", run.link.sample_point]
     return Program.of(parts.BRIDGE, [*simulation, "--", *daemon])

@@ -130,6 +130,36 @@ void BytesBridge::serve()
     order_.clear();
 }
 
+// ------------------------------------------------------------------------------------------- from level to level
+
+void BytesBridge::go_on(const LinkSettings &settings, const SamplingState &state)
+{
+    halt();
+    settings_ = settings;
+    run_ = running_ = ticked_ = usb_known_ = true;
+    number_ = state.number;
+    time_ = state.time;
+    before_ = state.before;
+    usb_frame_ = state.usb_frame;
+    usb_microframe_ = state.usb_microframe;
+    usb_time_ = state.usb_time;
+    usb_time_before_ = state.usb_time_before;
+    counters_ = {state.ticks, state.frames, state.dropped, state.sequence,
+                 state.good,  state.absent, state.crc,     state.tick};
+}
+
+SamplingState BytesBridge::sampling() const
+{
+    const Counters &c = counters_;
+    return {number_,   time_,      before_, usb_frame_, usb_microframe_, usb_time_, usb_time_before_, c.ticks, c.frames,
+            c.dropped, c.sequence, c.good,  c.absent,   c.crc,           c.tick};
+}
+
+bool BytesBridge::drained() const
+{
+    return stream_.drained();
+}
+
 // ----------------------------------------------------------------------------------------------------------- frames
 
 Bytes BytesBridge::header(bool last) const
@@ -153,6 +183,7 @@ Bytes BytesBridge::header(bool last) const
 void BytesBridge::make_frame(const Records &records, const Verdicts &verdicts)
 {
     Bytes frame = header(finishing_);
+    frame.reserve(WHISKER_FRAME_BYTES);
     for (size_t lane = 0; lane < LANES; lane++) {
         const Record record = verdicts[lane] == WHISKER_CODE_OK
                                   ? records[lane]

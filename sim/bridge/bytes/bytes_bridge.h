@@ -7,6 +7,7 @@
 #include "bytes_settings.h"
 #include "bytes_stream.h"
 #include "flash/nor_flash.h"
+#include "sampling_state.h"
 
 namespace bridge_sim
 {
@@ -40,6 +41,11 @@ class BytesBridge
 
     // Its transfers, and the frame made of what they brought. Without effect when halt() ended the tick.
     void end_tick();
+
+    // Goes on with a run of plain sampling, whose frames so far have all been taken; and how far it has come.
+    void go_on(const LinkSettings &settings, const SamplingState &state);
+    SamplingState sampling() const;
+    bool drained() const; // all frames have been taken
 
     // The bulk endpoint: the packet it has ready (null: none), and its acknowledgement.
     const Bytes *packet() const;

@@ -57,6 +57,11 @@ bool BytesRig::every_frame() const
     return bridge_.every_frame();
 }
 
+bool BytesRig::at_rtl() const
+{
+    return false;
+}
+
 uint32_t BytesRig::frames_dropped() const
 {
     return bridge_.frames_dropped();

@@ -23,6 +23,7 @@ class BytesRig : public Rig
     bool running() const override;
     uint32_t frames_dropped() const override;
     bool every_frame() const override;
+    bool at_rtl() const override;
 
     // Start-of-frame packets up to this microframe of the host's, without a tick: it may have other devices.
     void wait_until(uint64_t microframe);

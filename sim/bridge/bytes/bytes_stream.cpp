@@ -53,6 +53,11 @@ void BytesStream::write(const Bytes &frame, bool ends)
     }
 }
 
+bool BytesStream::drained() const
+{
+    return fifo_.empty() && filling_.data.empty() && !ready_ && !kept_;
+}
+
 bool BytesStream::waiting() const
 {
     return kept_.has_value();

@@ -20,6 +20,9 @@ class BytesStream
     // `ends` any frame ends it.
     bool push(const Bytes &frame, bool keep, bool ends);
 
+    // Has every byte been taken?
+    bool drained() const;
+
     // Is there a frame that waits for room?
     bool waiting() const;
 

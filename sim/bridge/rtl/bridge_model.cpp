@@ -72,19 +72,66 @@ bool BridgeModel::running() const
     return top_->running;
 }
 
+// The registers' names as Verilator writes them.
+#define REGISTER(name) top_->rootp->clocked_bridge__DOT__bridge__DOT__##name
+
+LinkSettings BridgeModel::settings() const
+{
+    return {REGISTER(sck_divider), REGISTER(word_gap),  REGISTER(sample_point),
+            REGISTER(options),     REGISTER(lane_mask), REGISTER(tick_period)};
+}
+
+SamplingState BridgeModel::sampling() const
+{
+    return {REGISTER(tick_number),
+            REGISTER(ticker__DOT__tick_time),
+            REGISTER(previous_time),
+            REGISTER(usb_clock__DOT__frame),
+            REGISTER(usb_clock__DOT__microframe),
+            REGISTER(usb_time),
+            REGISTER(previous_usb_time),
+            REGISTER(ticks),
+            REGISTER(frames),
+            REGISTER(dropped),
+            REGISTER(sequence_number),
+            REGISTER(records_good),
+            REGISTER(records_absent),
+            REGISTER(records_crc),
+            REGISTER(records_tick)};
+}
+
+void BridgeModel::go_on(const SamplingState &state)
+{
+    REGISTER(tick_number) = state.number;
+    REGISTER(ticker__DOT__tick_time) = state.time;
+    REGISTER(previous_time) = state.before;
+    REGISTER(usb_clock__DOT__frame) = state.usb_frame;
+    REGISTER(usb_clock__DOT__microframe) = state.usb_microframe;
+    REGISTER(usb_time) = state.usb_time;
+    REGISTER(previous_usb_time) = state.usb_time_before;
+    REGISTER(ticks) = state.ticks;
+    REGISTER(frames) = state.frames;
+    REGISTER(dropped) = state.dropped;
+    REGISTER(sequence_number) = state.sequence;
+    REGISTER(records_good) = state.good;
+    REGISTER(records_absent) = state.absent;
+    REGISTER(records_crc) = state.crc;
+    REGISTER(records_tick) = state.tick;
+}
+
 bool BridgeModel::every_frame() const
 {
-    return top_->rootp->clocked_bridge__DOT__bridge__DOT__options & WHISKER_CONTROL_OPTION_EVERY_FRAME;
+    return REGISTER(options) & WHISKER_CONTROL_OPTION_EVERY_FRAME;
 }
 
 uint32_t BridgeModel::tick_period() const
 {
-    return top_->rootp->clocked_bridge__DOT__bridge__DOT__tick_period;
+    return REGISTER(tick_period);
 }
 
 uint32_t BridgeModel::frames_dropped() const
 {
-    return top_->rootp->clocked_bridge__DOT__bridge__DOT__dropped;
+    return REGISTER(dropped);
 }
 
 // One evaluation (clocked_bridge.v): the edge that ended the cycle before, then the outputs of this one. The model is

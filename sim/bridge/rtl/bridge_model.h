@@ -3,8 +3,10 @@
 
 #include <memory>
 
+#include "bytes_settings.h"
 #include "flash/nor_flash.h"
 #include "node_bus.h"
+#include "sampling_state.h"
 #include "utmi.h"
 
 class Vclocked_bridge;
@@ -38,6 +40,12 @@ class BridgeModel : public UtmiDevice
     uint32_t frames_dropped() const; // since start
     bool every_frame() const;        // each frame ends its packet
     uint32_t tick_period() const;    // cycles
+
+    // At level bytes a run of plain sampling may go on from here, between two ticks with no frame in the bridge; it
+    // comes back as far as it has come, at such a time.
+    LinkSettings settings() const;
+    SamplingState sampling() const;
+    void go_on(const SamplingState &state);
 
   private:
     void run_nodes();

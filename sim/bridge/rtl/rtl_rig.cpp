@@ -63,6 +63,11 @@ bool RtlRig::every_frame() const
     return bridge_.every_frame();
 }
 
+bool RtlRig::at_rtl() const
+{
+    return true;
+}
+
 uint32_t RtlRig::frames_dropped() const
 {
     return bridge_.frames_dropped();
@@ -75,6 +80,15 @@ void RtlRig::power_up()
 
 bool RtlRig::transfer(const std::function<bool()> &usb_step)
 {
+    if (!begin_tick()) {
+        return false;
+    }
+    end_tick(usb_step);
+    return true;
+}
+
+bool RtlRig::begin_tick()
+{
     const unsigned frames = microframes(bridge_.tick_period());
     host_.start_of_frame();
     bridge_.start_tick();
@@ -85,8 +99,12 @@ bool RtlRig::transfer(const std::function<bool()> &usb_step)
     for (unsigned i = 1; i < frames; i++) {
         host_.start_of_frame();
     }
-    wait_while([this] { return bridge_.link_busy(); }, usb_step);
     return true;
+}
+
+void RtlRig::end_tick(const std::function<bool()> &usb_step)
+{
+    wait_while([this] { return bridge_.link_busy(); }, usb_step);
 }
 
 void RtlRig::finish_run(const std::function<bool()> &usb_step)

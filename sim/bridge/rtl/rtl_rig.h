@@ -22,11 +22,16 @@ class RtlRig : public Rig
     bool running() const override;
     uint32_t frames_dropped() const override;
     bool every_frame() const override;
+    bool at_rtl() const override;
 
   protected:
     void power_up() override;
     bool transfer(const std::function<bool()> &usb_step) override;
     void finish_run(const std::function<bool()> &usb_step) override;
+
+    // The two halves of a transfer: its start (false: no tick is taken now), and what is left of it.
+    bool begin_tick();
+    void end_tick(const std::function<bool()> &usb_step);
 
     BridgeModel bridge_;
     UsbHost host_;

@@ -74,6 +74,16 @@ void UsbHost::start_of_frame()
     idle(PACKET_GAP);
 }
 
+uint16_t UsbHost::microframe() const
+{
+    return microframe_;
+}
+
+void UsbHost::set_microframe(uint64_t microframe)
+{
+    microframe_ = static_cast<uint16_t>(microframe);
+}
+
 // ------------------------------------------------------------------------------------------- errors, meant and unmeant
 
 void UsbHost::arm(WireFault fault)

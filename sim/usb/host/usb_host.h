@@ -51,6 +51,10 @@ class UsbHost
     // Start-of-frame token; the caller decides when one is due.
     void start_of_frame();
 
+    // How many of them there were, modulo 65536; a host that goes on after another one takes its number over.
+    uint16_t microframe() const;
+    void set_microframe(uint64_t microframe);
+
     // IN transaction. On OK `data` holds the payload (which may be empty). `limit`: the endpoint's packet size.
     Outcome in(uint8_t endpoint, size_t limit, Bytes &data);
 

@@ -67,7 +67,7 @@ def chain_speed(build: Path, lanes: int) -> dict:
     out = DEMO.with_name(f"demo_{lanes}") if lanes != CHAIN_LANES[0] else DEMO
     command = [sys.executable, "-m", "crunchbot_lab.demo", "--out", out, "--build-dir", build, "--lanes", lanes]
     subprocess.run(
-        [str(word) for word in [*command, "--seconds", CHAIN_SECONDS]],
+        [str(word) for word in [*command, "--level", "rtl", "--seconds", CHAIN_SECONDS]],
         check=True,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,

@@ -1,0 +1,63 @@
+// Levels mixed in one run, by need. Registers stand still while nothing but plain sampling goes on: level bytes makes
+// the frames meanwhile. Before anything else is asked of the bridge (a control transfer, a fault, a host that does not
+// read) the registers go on from where level bytes last stood with no frame under way, and make the ticks since then
+// once more, of the same records: their packets must be the same.
+#pragma once
+
+#include "bytes_bridge.h"
+#include "rtl_rig.h"
+
+namespace bridge_sim
+{
+
+class MixedRig : public RtlRig
+{
+  public:
+    // The first `rtl_ticks` ticks are made by the registers.
+    MixedRig(size_t populated, uint64_t seed, const std::vector<NodeTrait> &traits, uint64_t rtl_ticks);
+
+    bool enumerate(Descriptors &descriptors, const char *&error) override;
+    Outcome control(const SetupRequest &request, Bytes &data) override;
+    Outcome in(uint8_t endpoint, size_t limit, Bytes &data) override;
+    void arm(WireFault fault) override;
+    uint32_t frames_dropped() const override;
+    bool at_rtl() const override;
+
+    // Throws std::runtime_error if the registers make other packets of the ticks since then.
+    void disturbed() override;
+
+  protected:
+    void power_up() override;
+    bool transfer(const std::function<bool()> &usb_step) override;
+
+  private:
+    struct Tick {
+        unsigned microframes; // start-of-frame packets that came with it
+        std::array<uint64_t, LANES> records;
+    };
+
+    struct Again {
+        size_t packets = 0;           // taken again
+        uint64_t made = 0, taken = 0; // bytes
+    };
+
+    void try_bytes(const std::function<bool()> &usb_step);
+    void mark();
+    bool byte_tick(const std::function<bool()> &usb_step);
+    void make_again(const Tick &tick, Again &again);
+    bool take_again(Again &again);
+
+    BytesBridge bytes_;
+    bool at_bytes_ = false;
+    bool in_tick_ = false;      // of level bytes, before its start
+    bool begun_ = false;        // and the registers have started it
+    uint64_t rtl_ticks_;        // still to come
+    uint64_t quiet_ = 0;        // ticks since anything but sampling went on
+    uint64_t microframe_ = 0;   // of the host, at level bytes
+    SamplingState marked_{};    // where the registers go on
+    uint64_t marked_frame_ = 0; // the host's microframe then
+    std::vector<Tick> ticks_;   // since then
+    std::vector<Bytes> taken_;  // packets since then
+};
+
+} // namespace bridge_sim

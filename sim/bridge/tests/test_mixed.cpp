@@ -1,0 +1,207 @@
+// Levels mixed in one run against RTL alone: the same fields, faults, orders and stops; every byte that the host
+// receives is the same.
+#include <cstdlib>
+
+#include "bytes_link.h"
+#include "cmocka_cpp.h"
+#include "make_rig.h"
+#include "tick_runner.h"
+
+namespace
+{
+
+using namespace bridge_sim;
+
+constexpr size_t POPULATED = 6, TRANSFERS = 4, TRANSFER_BYTES = 4096;
+constexpr uint64_t RTL_TICKS = 300, TICKS = 6000;
+constexpr uint8_t SET_TYPE = 0x21, SET_REPORT = 9, GET_TYPE = 0xA1, GET_REPORT = 1;
+constexpr uint16_t FEATURE = 0x0300;
+
+// A host and a bridge: what it received, as text.
+class Side
+{
+  public:
+    Side(Level level, uint64_t seed)
+        : rig_(make_rig(level, POPULATED, seed, {}, RTL_TICKS)), scheduler_(*rig_), log_("", ""),
+          runner_(*rig_, scheduler_, FaultPlan(seed, POPULATED, TICKS), log_)
+    {
+        Descriptors descriptors;
+        const char *error = nullptr;
+        assert_true(rig_->power_on(descriptors, error));
+    }
+
+    void request(uint8_t type, uint8_t number, Bytes data, uint8_t id, uint16_t length)
+    {
+        Urb urb;
+        urb.setup = {type, number, static_cast<uint16_t>(FEATURE | id), WHISKER_LIMIT_USB_HID_INTERFACE, length};
+        urb.data = std::move(data);
+        scheduler_.submit(std::move(urb));
+    }
+
+    void run(bool on, uint8_t options)
+    {
+        Bytes report(WHISKER_REPORT_CONTROL_BYTES);
+        report[WHISKER_REPORT_CONTROL_ID] = WHISKER_REPORT_ID_CONTROL;
+        report[WHISKER_REPORT_CONTROL_WIRE_VERSION] = WHISKER_WIRE_VERSION;
+        report[WHISKER_REPORT_CONTROL_RUN] = on;
+        report[WHISKER_REPORT_CONTROL_SCK_DIVIDER] = WHISKER_LIMIT_SCK_DIVIDER_MIN;
+        report[WHISKER_REPORT_CONTROL_WORD_GAP] = WHISKER_LIMIT_WORD_GAP_MIN;
+        report[WHISKER_REPORT_CONTROL_SAMPLE_POINT] = WHISKER_LIMIT_SCK_DIVIDER_MIN - 1;
+        report[WHISKER_REPORT_CONTROL_OPTIONS] = options;
+        whisker_put_u32(&report[WHISKER_REPORT_CONTROL_LANE_MASK], UINT32_MAX >> (32 - LANES));
+        whisker_put_u32(&report[WHISKER_REPORT_CONTROL_TICK_PERIOD], WHISKER_LIMIT_TICK_PERIOD);
+        request(SET_TYPE, SET_REPORT, report, WHISKER_REPORT_ID_CONTROL, WHISKER_REPORT_CONTROL_BYTES);
+        settle();
+    }
+
+    void tick(uint64_t number, const sim_field *fields)
+    {
+        while (submitted_ < TRANSFERS) {
+            Urb urb;
+            urb.kind = UrbKind::BULK_IN;
+            urb.length = TRANSFER_BYTES;
+            scheduler_.submit(std::move(urb));
+            submitted_++;
+        }
+        while (!runner_.ready()) {
+            settle();
+        }
+        runner_.tick(number, fields);
+        rtl_ticks_ += rig_->at_rtl();
+        take();
+    }
+
+    void end(const sim_field *fields)
+    {
+        run(false, 0);
+        runner_.last_tick(fields);
+        settle();
+        request(GET_TYPE, GET_REPORT, {}, WHISKER_REPORT_ID_COUNTERS, 255);
+        settle();
+        runner_.check_usb();
+    }
+
+    void settle()
+    {
+        while (scheduler_.step()) {
+        }
+        take();
+    }
+
+    const std::string &frames() const
+    {
+        return frames_;
+    }
+
+    // To all other requests, each with its status.
+    const std::string &answers() const
+    {
+        return answers_;
+    }
+
+    uint64_t rtl_ticks() const
+    {
+        return rtl_ticks_;
+    }
+
+  private:
+    void take()
+    {
+        for (const Urb &urb : scheduler_.take_completed()) {
+            const bool bulk = urb.kind == UrbKind::BULK_IN;
+            submitted_ -= bulk ? 1 : 0;
+            std::string &of = bulk ? frames_ : answers_;
+            of.append(urb.data.begin(), urb.data.end());
+            answers_ += bulk ? "" : std::to_string(urb.status) + "\n";
+        }
+    }
+
+    std::unique_ptr<Rig> rig_;
+    UrbScheduler scheduler_;
+    FaultLog log_;
+    TickRunner runner_;
+    std::string frames_, answers_;
+    size_t submitted_ = 0;
+    uint64_t rtl_ticks_ = 0;
+};
+
+class Pair
+{
+  public:
+    explicit Pair(uint64_t seed) : sides_{Side(Level::RTL, seed), Side(Level::MIXED, seed)}, draw_(seed)
+    {
+    }
+
+    // Two runs, the second one with other options; each with orders to the nodes now and then.
+    void run()
+    {
+        uint64_t number = 0;
+        for (const uint8_t options : {uint8_t{0}, uint8_t{WHISKER_CONTROL_OPTION_EVERY_FRAME}}) {
+            both([options](Side &side) { side.run(true, options); });
+            for (const uint64_t until = number + TICKS / 2; number < until; number++) {
+                one_tick(number);
+            }
+            both([this](Side &side) { side.end(fields_.data()); });
+            assert_true(sides_[0].frames() == sides_[1].frames());
+            assert_true(sides_[0].answers() == sides_[1].answers());
+        }
+    }
+
+    uint64_t rtl_ticks(size_t side) const
+    {
+        return sides_[side].rtl_ticks();
+    }
+
+  private:
+    template <typename Action> void both(Action action)
+    {
+        for (Side &side : sides_) {
+            action(side);
+        }
+    }
+
+    void one_tick(uint64_t number)
+    {
+        for (sim_field &field : fields_) {
+            field.alpha_deg += static_cast<double>(draw_() % 100) / 10 - 4.95;
+            field.beta_deg -= field.alpha_deg / 100;
+        }
+        if (draw_() % 700 == 0) {
+            Bytes order(WHISKER_REPORT_SERVICE_BYTES);
+            order[WHISKER_REPORT_SERVICE_ID] = WHISKER_REPORT_ID_SERVICE;
+            order[WHISKER_REPORT_SERVICE_WIRE_VERSION] = WHISKER_WIRE_VERSION;
+            order[WHISKER_REPORT_SERVICE_COMMAND] = WHISKER_SERVICE_COMMAND_INFO;
+            both([&order](Side &side) {
+                side.request(SET_TYPE, SET_REPORT, order, WHISKER_REPORT_ID_SERVICE, WHISKER_REPORT_SERVICE_BYTES);
+            });
+        } else if (draw_() % 700 == 0) {
+            both([](Side &side) { side.request(GET_TYPE, GET_REPORT, {}, WHISKER_REPORT_ID_ANSWERS, 255); });
+        }
+        both([this, number](Side &side) { side.tick(number, fields_.data()); });
+    }
+
+    Side sides_[2];
+    std::array<sim_field, LANES> fields_{};
+    std::mt19937_64 draw_;
+};
+
+void test_levels_mixed_give_the_same_bytes(void **)
+{
+    for (uint64_t seed = 1; seed <= 2; seed++) {
+        Pair pair(seed);
+        pair.run();
+        assert_int_equal(pair.rtl_ticks(0), TICKS);
+        assert_true(pair.rtl_ticks(1) >= RTL_TICKS);
+        assert_true(pair.rtl_ticks(1) < TICKS / 2);
+    }
+}
+
+} // namespace
+
+int main()
+{
+    const CMUnitTest tests[] = {
+        cmocka_unit_test(test_levels_mixed_give_the_same_bytes),
+    };
+    return cmocka_run_group_tests(tests, nullptr, nullptr);
+}
