@@ -1,6 +1,5 @@
 #include <avr/pgmspace.h>
 #include <setjmp.h>
-#include <stdbool.h>
 
 #include "cmocka.h"
 #include "machine.h"
@@ -13,26 +12,22 @@ void fail_at(const char *what, uint16_t line)
     longjmp(next_test, 1);
 }
 
-/* Whether a test passed. In a function of its own: longjmp leaves the caller's variables as they were. */
-__attribute__((noinline)) static bool passes(const struct CMUnitTest *test)
-{
-    if (setjmp(next_test) != 0)
-        return false;
-    test->function(NULL);
-    return true;
-}
-
 int run_tests(const struct CMUnitTest *tests, uint16_t count)
 {
-    uint16_t passed = 0;
+    /* Static, for longjmp may change any variable of this function that is in a register. */
+    static const struct CMUnitTest *test, *end;
+    static uint16_t passed, all;
+    all = count;
     machine_start();
-    for (uint16_t i = 0; i < count; i++) {
-        if (passes(&tests[i]))
+    for (test = tests, end = tests + all; test < end; test++) {
+        if (setjmp(next_test) == 0) {
+            test->function(NULL);
             passed++;
-        else
-            printf("FAILED %s\n", tests[i].name);
+        } else {
+            printf("FAILED %s\n", test->name);
+        }
     }
-    printf("%u of %u tests passed, int has %u bits\n", passed, count, 8 * (uint16_t)sizeof(int));
+    printf("%u of %u tests passed, int has %u bits\n", passed, all, 8 * (uint16_t)sizeof(int));
     machine_stop();
     return 0;
 }
