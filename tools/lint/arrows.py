@@ -81,7 +81,7 @@ ROOMS = {
         "planning": ["pilot"],
         "nav": [],
         "recording": ["bridge"],
-        "robot": ["bridge", "touch", "pilot", "nav", "recording"],
+        "robot": ["bridge", "touch", "pilot", "planning", "nav", "recording"],
         "view": ["bridge", "robot"],
         "commands": ["bridge", "touch", "pilot", "nav", "recording", "robot", "view"],
     },

@@ -21,6 +21,7 @@ from ..robot.network.health import Health
 from ..robot.network.link import Link
 from ..robot.network.options import NAVIGATOR_ENDPOINT, PILOT_ENDPOINT, add_link, open_link
 from ..robot.pilot_process import Flight, LiveFlight, LiveWheels, fly_in_step
+from ..robot.policy import PLAN, POLICIES, RANDOM, FollowedBelief, choices_of
 from ..robot.processes.lifeline import Heartbeat
 from ..robot.publisher import Publisher
 from ..robot.rowfiles import Rows, Traces
@@ -43,7 +44,12 @@ class PilotError(UserError):
 
 
 def add(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("scene", type=Path, metavar="SCENE", help="scene folder, of which robot.toml is read")
+    parser.add_argument(
+        "scene",
+        type=Path,
+        metavar="SCENE",
+        help="scene folder, of which robot.toml is read, and with --choose plan the arena",
+    )
     parser.add_argument("--models", type=Path, required=True, help="folder with texture.json and <whisker>.json")
     parser.add_argument("--nodes", help="what 'whisker info --nodes' printed: models of other nodes are refused")
     parser.add_argument("--ring", default=RING, metavar="NAME", help="the ring to read (default: %(default)s)")
@@ -52,6 +58,8 @@ def add(parser: argparse.ArgumentParser) -> None:
     text = "of a simulation that waits for the pilot; without --base its wheels are driven directly"
     parser.add_argument("--simulation", metavar="SOCKET", help=text)
     parser.add_argument("--seed", type=whole_number(0), default=1, help="of the random turns (default: %(default)s)")
+    text = "turns and distances: at random; by what the navigator's belief is expected to gain; along walls; in lanes (random)"
+    parser.add_argument("--choose", choices=POLICIES, default=RANDOM, help=text)
     add_link(parser, [PILOT_ENDPOINT], [NAVIGATOR_ENDPOINT])
     parser.add_argument(
         "--await", action="append", default=[], dest="others", metavar="PROCESS", help="begin when it is there, too"
@@ -78,19 +86,23 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _body(arguments) -> tuple:
-    """The robot and its models (robot, texture, radial), read before anything is waited for."""
-    robot = load(arguments.scene).robot
+    """The scene and the models of its robot (scene, texture, radial), read before anything is waited for."""
+    scene = load(arguments.scene)
+    robot = scene.robot
     texture, radial = load_models(arguments.models, robot)
     if arguments.nodes:
         check_nodes(arguments.nodes, robot, radial)
-    return robot, texture, radial
+    return scene, texture, radial
 
 
 def _parts(arguments, body: tuple, link: Link, wheels: Wheels, stack: ExitStack) -> SimpleNamespace:
-    pilot = Pilot(*body, arguments.seed, wheels)
+    scene, texture, radial = body
+    pilot = Pilot(scene.robot, texture, radial, arguments.seed, wheels)
+    belief = FollowedBelief(link) if arguments.choose == PLAN else None
+    pilot.behaviour.choices = choices_of(arguments.choose, scene, belief or (lambda: None), pilot.behaviour.choices)
     out = stack.enter_context(open(arguments.out, "w", newline=""))  # noqa: SIM115
     traces = stack.enter_context(open(arguments.traces, "w", newline=""))  # noqa: SIM115
-    parts = {"rows": Rows(out), "traces": Traces(traces, pilot), "publisher": Publisher(link, pilot)}
+    parts = {"rows": Rows(out), "traces": Traces(traces, pilot), "publisher": Publisher(link, pilot, belief)}
     return SimpleNamespace(pilot=pilot, flight=None, base_health={}, **parts)
 
 

@@ -14,6 +14,7 @@ from ..robot.models import load_models
 from ..robot.network.link import read_config
 from ..robot.network.options import link_that_warns
 from ..robot.network.truth import TruthWatcher
+from ..robot.policy import POLICIES, RANDOM
 from ..robot.processes import holders, parts
 from ..robot.processes.logs import run_folder
 from ..robot.processes.supervisor import Supervisor
@@ -43,6 +44,8 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--no-view", action="store_true", help="no page for a browser")
     parser.add_argument("--seed", type=whole_number(0, 2**32 - 1), default=1, help="of turns and simulation (1)")
+    text = "turns and distances: as of whisker pilot; plan needs --desktop here, or a navigator (default: %(default)s)"
+    parser.add_argument("--choose", choices=POLICIES, default=RANDOM, help=text)
     text = "be reached at this address, by anyone who reaches it (default: this machine only)"
     parser.add_argument("--listen", default=parts.LOOPBACK, metavar="ADDRESS", help=text)
     text = "of three, for supervisor, pilot and navigator (default: %(default)s)"
@@ -90,7 +93,7 @@ def _write_units(arguments) -> int:
     address = (arguments.listen, arguments.first_port, arguments.zenoh_config and arguments.zenoh_config.resolve())
     meeting = Installed(arguments.ring, arguments.units, *address, port=arguments.port)
     scene, models = arguments.scene.resolve(), arguments.models.resolve()
-    body = parts.Body(scene, models, arguments.create, arguments.port, arguments.seed)
+    body = parts.Body(scene, models, arguments.create, arguments.port, arguments.seed, arguments.choose)
     table = [program for program in parts.netbook(body, meeting, arguments.desktop) if program.name != "base"]
     if arguments.desktop:
         table += parts.desktop(body, meeting, meeting.bag, None if arguments.no_view else arguments.view_port)
@@ -133,7 +136,9 @@ def _table(arguments, meeting: parts.Meeting) -> list:
         body, simulated = _simulated(arguments, meeting)
         table = [parts.bridge(simulated, body, meeting)]
     else:
-        body = parts.Body(arguments.scene, arguments.models, arguments.create, arguments.port, arguments.seed)
+        body = parts.Body(
+            arguments.scene, arguments.models, arguments.create, arguments.port, arguments.seed, arguments.choose
+        )
         table = []
     if arguments.desktop:
         view = None if arguments.no_view else arguments.view_port
@@ -160,6 +165,6 @@ def _simulated(arguments, meeting: parts.Meeting) -> tuple[parts.Body, parts.Sim
         with bar(total=models_wanted, desc="models", unit="model", disable=None) as done:
             result = kept.learn_or_copy(models, scene, seed, lambda: done.update(1))
         print(f"models: {result}", flush=True)
-    body = parts.Body(folder, models, arguments.create, meeting.serial, seed)
+    body = parts.Body(folder, models, arguments.create, meeting.serial, seed, arguments.choose)
     reported = (arguments.level, seed, arguments.seconds, arguments.pace, out / "truth.csv", out / "wheels.csv")
     return body, parts.Simulated(out / "scene.flat", *reported)

@@ -27,7 +27,6 @@ from ..touch.mount import Mount
 from ..touch.radial.model import Contact as Recorded
 from ..touch.radial.model import WhiskModel, estimate, peak
 from .behaviour import BLOCK_TICKS, EXPLORE_M_S, TICK_S, TURN_RAD_S, Behaviour, Habits, Whisk
-from .choices import Choices
 from .feel import SURE, Drives, Feeler, Felt
 from .states import FULL
 from .tip import contact_type, move_for_tip
@@ -48,10 +47,9 @@ class Pilot:
         seed: int,
         wheels: Wheels = EXACT,
         habits: Habits = FULL,
-        choices: Choices | None = None,
     ):
         """`robot.whiskers` in lane order; models by whisker name: texture models of the floor, and of faces for any object
-        whisker; radial ones of any kind, calibrated at the rate of whisking of `wheels`; `seed` of the random turns, which `choices` may replace."""
+        whisker; radial ones of any kind, calibrated at the rate of whisking of `wheels`; `seed` of the random turns."""
         self.names = {lane: whisker.name for lane, whisker in enumerate(robot.whiskers)}
         self.texture_lanes = [n for n, w in enumerate(robot.whiskers) if w.role == "texture"]
         self.floor_sides = {lane: math.copysign(1.0, robot.whiskers[lane].tip_m[1]) for lane in self.texture_lanes}
@@ -68,7 +66,7 @@ class Pilot:
         first_turn = {lane: mount.corner_turn for lane, mount in self.mounts.items()}
         sides = {lane: -mount.face_turn for lane, mount in self.mounts.items()}
         rng = np.random.default_rng(seed)
-        self.behaviour = Behaviour(self.contacts, first_turn, rng, sides, wheels, habits, choices)
+        self.behaviour = Behaviour(self.contacts, first_turn, rng, sides, wheels, habits)
         self.face_lanes = [lane for lane in self.object_lanes if self.names[lane] in texture_models]
         self.surfaces = {
             lane: floor_whisker(texture_models[self.names[lane]], np.random.default_rng([seed, lane]))

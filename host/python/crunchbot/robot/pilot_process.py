@@ -16,6 +16,7 @@ from ..pilot.wheels import Bumps
 from .blocks import Block, LiveRing, blocks
 from .network.health import ENDED, RUNNING, Health
 from .network.link import Link
+from .policy import expected
 from .processes.lifeline import Heartbeat
 from .publisher import TICK_NS, Publisher
 from .rowfiles import Rows, Traces
@@ -191,4 +192,5 @@ class LiveFlight:
             "base_lost": self._wheels.base.lost,
             "reports_missing": self._wheels.missing,
             "navigator_lost": self.navigator_lost,
+            **expected(self._flight.pilot.behaviour.choices),
         } | {f"base_{key}": value for key, value in self._wheels.base.health().items()}

@@ -9,6 +9,7 @@ from crunchbot.nav.filters import COMPONENT
 from crunchbot.pilot.whereabouts import Whereabouts
 from crunchbot.planning import information
 from crunchbot.planning.actions import REACH_M, STEP_RAD, Fan, Vehicle
+from crunchbot.planning.beside import HUG_M, IN_RAD, LANE_M, OUT_RAD, Along, Lanes
 from crunchbot.planning.choices import Planned
 from crunchbot.planning.places import CELL_M, FINE_M, FREE, NOTHING, TURNS, ArenaMap, Places
 from crunchbot.planning.planner import DOUBT, KNOWN, NO_PAST, NOTHING_TOLD, SHUT_IN, Past, Planner
@@ -235,3 +236,17 @@ def test_ground_not_known_is_no_symbol():
         places.index(np.array([[0.26, 0.76, 0.0], [0.76, 0.76, 0.0], [0.26, 0.26, 0.0]]))
     ]
     assert at.tolist() == [0, NOTHING, 1]
+
+
+def test_lanes_turn_twice_to_a_side_and_then_to_the_other():
+    lanes = Lanes()
+    ways = [(lanes.turn(None, 0, 60.0, 150.0), lanes.distance(None, 0)) for _ in range(4)]
+    quarter = math.pi / 2
+    assert ways == [(quarter, LANE_M), (quarter, math.inf), (-quarter, LANE_M), (-quarter, math.inf)]
+
+
+def test_along_a_wall_it_turns_out_and_in():
+    along = Along()
+    assert along.distance(None, 0) == math.inf
+    assert (along.turn(None, 0, 60.0, 150.0), along.distance(None, 0)) == (OUT_RAD, HUG_M)
+    assert (along.turn(None, 0, 25.0, 90.0), along.distance(None, 0)) == (-IN_RAD, math.inf)

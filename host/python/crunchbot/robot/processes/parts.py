@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ...programs import program
+from ..policy import RANDOM
 from .children import Program
 
 FIRST_PORT = 7457  # of three: supervisor, pilot, navigator; the latter two are those of robot.link
@@ -98,6 +99,7 @@ class Body:
     create: int | None  # None: wheels that obey at once, without a serial line
     port: Path
     seed: int  # of the random turns
+    choose: str = RANDOM  # what takes their place
 
 
 def whisker(command: str) -> list[str]:
@@ -123,7 +125,8 @@ class Table:
 
     def pilot(self) -> list:
         body = self.body
-        return [*whisker("pilot"), body.scene, "--models", body.models, "--seed", body.seed, *self.places.reading]
+        pilot = [*whisker("pilot"), body.scene, "--models", body.models, "--seed", body.seed, *self.places.reading]
+        return pilot if body.choose == RANDOM else [*pilot, "--choose", body.choose]
 
     def navigator(self) -> list:
         return [*whisker("navigator"), self.body.scene]
