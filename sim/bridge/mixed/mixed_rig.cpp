@@ -11,9 +11,6 @@ namespace
 constexpr uint8_t BULK_ENDPOINT = WHISKER_LIMIT_USB_BULK_IN & 0xFu;
 // Ticks without a disturbance before level bytes takes over: longer than any of them lasts.
 constexpr uint64_t QUIET_TICKS = 16;
-// After so many frames data toggle and buffers of the endpoint stand as before: 130 whole packets, or a packet each.
-constexpr size_t BLOCK_TICKS = 256;
-static_assert(BLOCK_TICKS * WHISKER_FRAME_BYTES % (2 * WHISKER_LIMIT_BULK_PACKET) == 0);
 // With more than that the host is late: what the FIFO does about it is for the registers.
 constexpr uint64_t BYTES_WAITING_MOST = 4 * WHISKER_LIMIT_BULK_PACKET;
 constexpr uint64_t REST_CYCLES = 64;
@@ -113,6 +110,7 @@ void MixedRig::try_bytes(const std::function<bool()> &usb_step)
     mark();
 }
 
+// The data toggle and the endpoint's two buffers stay where the registers have them: the host's toggle does, too.
 void MixedRig::mark()
 {
     marked_ = bytes_.sampling();
@@ -133,7 +131,7 @@ bool MixedRig::byte_tick(const std::function<bool()> &usb_step)
         begun_ ? end_tick(usb_step) : void();
         return begun_;
     }
-    if (ticks_.size() >= BLOCK_TICKS && ticks_.size() % BLOCK_TICKS == 0 && bytes_.drained()) {
+    if (bytes_.drained()) {
         mark();
     }
     const unsigned frames = microframes(bytes_.tick_period());
