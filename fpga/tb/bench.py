@@ -2,6 +2,7 @@
 
 import os
 import random
+import shutil
 import sys
 from pathlib import Path
 
@@ -45,6 +46,9 @@ def run_bench(
     # PYTHON3: it would call "python", which Debian does not have.
     os.environ["MAKEFLAGS"] = f"CFG_CXXFLAGS_PCH_I=-include OPT_GLOBAL=-O0 OPT_SLOW=-O0 PYTHON3={sys.executable}"
     os.environ.setdefault("COCOTB_ANSI_OUTPUT", "0")
+    if ccache := shutil.which("ccache"):
+        os.environ.setdefault("OBJCACHE", ccache)
+        os.environ |= {"CCACHE_BASEDIR": str(REPO), "CCACHE_NOHASHDIR": "1"}
     parameters = parameters or {}
     name = "_".join([here.stem, *(str(value) for value in parameters.values())])
     build = Path(os.environ.get("WHISKER_BENCH_BUILD", REPO / "build" / "benches")) / name
