@@ -22,8 +22,9 @@ from ..report.run import FILTERS
 from ..simulation.scenes import MECHANICS, make_scene
 from . import summary as scores
 from .chain import ChainError, ChainRun, Link, run_chain
+from .kept_models import learn_or_copy
 from .study import study
-from .training import METHODS, learn, radial_scores, write_radial_points
+from .training import METHODS, calibrations, learn, radial_scores, write_radial_points
 
 TICKS_PER_S = 2000
 MARK = "demo.txt"
@@ -153,9 +154,13 @@ def fresh_folder(path: Path) -> Path:
 
 
 def learn_models(out: Path, scene: scenes.Scene, options: argparse.Namespace) -> dict:
-    """Texture and radial models, from level-1 recordings."""
+    """Texture and radial models, from level-1 recordings, or copied if this robot has learnt them before."""
     with tqdm(total=1 + len(scene.robot.of_role("object")), desc="train and calibrate", unit="model") as bar:
-        models, contacts = learn(out / "models", scene, options.seed, bar.update, options.texture)
+        if options.texture == METHODS[0]:
+            learn_or_copy(out / "models", scene, options.seed, bar.update)
+        else:
+            learn(out / "models", scene, options.seed, bar.update, options.texture)
+    models, contacts = calibrations(out / "models")
     write_radial_points(out, models, contacts)
     return radial_scores(scene, models, contacts)
 

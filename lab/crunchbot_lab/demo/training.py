@@ -25,6 +25,7 @@ DRIVE_S = 8.0
 # What exploring consists of: share of the speed, turn (rad/s), seconds.
 MOVES = ((1.0, 0.0, 3.0), (0.0, TURN_RAD_S, 1.5), (1.0, 0.0, 1.5), (0.0, -TURN_RAD_S, 1.5), (-1.0, 0.0, 0.5))
 
+CONTACTS = "contacts.json"  # beside the models
 METHODS = ("spectral", "paper")  # of texture; the first is the default
 
 FIT_CONTACTS = 5  # at each radius: the paper's calibration
@@ -38,18 +39,30 @@ def learn(
 ) -> tuple[dict, dict]:
     """All models of the scene's robot, saved in `folder`; `progress()` after each. `method`: texture's, of METHODS.
 
-    Returns the paper's lines by whisker name, and their contacts, as `calibrate` does.
+    Returns the paper's lines and the contacts, as `calibrations` reads them.
     """
     folder.mkdir(parents=True, exist_ok=True)
     train_texture(folder, scene, seed, method)
     if scene.arena.wall or scene.arena.surfaces:
         train_surfaces(folder, scene, seed)
     progress()
-    models, contacts = {}, {}
+    contacts = {}
     for whisker in scene.robot.of_role("object"):
-        models[whisker.name], contacts[whisker.name] = calibrate(folder, scene, whisker.name, seed)
+        contacts[whisker.name] = calibrate(folder, scene, whisker.name, seed)
         progress()
-    return models, contacts
+    lists = {name: {key: [part.tolist() for part in pair] for key, pair in of.items()} for name, of in contacts.items()}
+    (folder / CONTACTS).write_text(json.dumps(lists) + "\n")
+    return calibrations(folder)
+
+
+def calibrations(folder: Path) -> tuple[dict[str, RadialModel], dict[str, dict]]:
+    """What `learn` has left for the report: the paper's lines by whisker name, and the contacts of `calibrate`."""
+    lists = json.loads((folder / CONTACTS).read_text())
+    contacts = {name: {key: tuple(map(np.array, pair)) for key, pair in of.items()} for name, of in lists.items()}
+    lines = {
+        name: RadialModel.fit(peaks, radii) for name, (radii, peaks) in ((n, c["fit"]) for n, c in contacts.items())
+    }
+    return lines, contacts
 
 
 def train_texture(folder: Path, scene: Scene, seed: int, method: str = METHODS[0]) -> TextureModel | SpectralModel:
@@ -85,10 +98,10 @@ def fit_texture(recordings: dict[str, list[np.ndarray]], seed: int) -> TextureMo
     )
 
 
-def calibrate(folder: Path, scene: Scene, name: str, seed: int) -> tuple[RadialModel, dict]:
+def calibrate(folder: Path, scene: Scene, name: str, seed: int) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Whisk one whisker against a corner at known distances: the pilot's model of whole whisks into the folder.
 
-    Returns the paper's line for the report, and the contacts: {"fit", "held out"} -> (radius mm (n,), peak counts (n,)).
+    Returns the contacts: {"fit", "held out"} -> (radius mm (n,), peak counts (n,)).
     """
     path = folder / "radial" / f"{name}.csv"
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -98,8 +111,7 @@ def calibrate(folder: Path, scene: Scene, name: str, seed: int) -> tuple[RadialM
     tests = _contacts(scene, name, 2 * seed + 1, HELD_OUT_CONTACTS)
     radii = np.array([contact.radius_mm for contact in tests])
     peaks = np.array([peak(c.counts, np.median(c.counts[: REST_SAMPLES // 4], axis=0)) for c in tests])
-    line = RadialModel.fit(whisks.peak_counts, whisks.radius_mm)
-    return line, {"fit": (whisks.radius_mm, whisks.peak_counts), "held out": (radii, peaks)}
+    return {"fit": (whisks.radius_mm, whisks.peak_counts), "held out": (radii, peaks)}
 
 
 def radial_scores(scene: Scene, models: dict[str, RadialModel], contacts: dict[str, dict]) -> dict:

@@ -14,10 +14,10 @@ from crunchbot import scene as scenes
 from crunchbot.observation import cell
 from crunchbot.pilot.pilot import Pilot
 from crunchbot.robot.models import load_models
+from crunchbot_lab.demo import kept_models
 from crunchbot_lab.demo.chain import ChainRun, Link, run_chain
 from crunchbot_lab.demo.level1 import explore
 from crunchbot_lab.demo.summary import read_pairs
-from crunchbot_lab.demo.training import learn
 from crunchbot_lab.simulation.scenes import make_scene
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -27,13 +27,13 @@ SEED, SECONDS, LANES = 3, 8.0, 6
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
     build = ROOT / os.environ.get("WHISKER_BUILD", "build/release")
-    if not (build / "sim" / "bridge" / "whisker-bridge-sim").exists():
+    if not (build / "sim" / "robot" / "whisker-bridge-sim").exists():
         pytest.skip(f"{build}: the simulated bridge is not built; run 'make build'")
     made = ChainRun(tmp_path_factory.mktemp("run"), build, SEED, SECONDS, LANES, Link(6, 30, 5), create=None)
     scene, start = make_scene(SEED)
     scenes.write(made.scene, scene)
     (made.scene / "scene.flat").write_text(scene.flat(start))
-    learn(made.out / "models", scene, SEED, lambda: None)
+    kept_models.learn_or_copy(made.out / "models", scene, SEED, lambda: None)
     run_chain(made, lambda tick: None)
     return made
 

@@ -12,8 +12,8 @@ from crunchbot.pilot.pilot import Pilot
 from crunchbot.pilot.states import PLAIN
 from crunchbot.robot.models import load_models
 from crunchbot_lab import scenes
+from crunchbot_lab.demo import kept_models
 from crunchbot_lab.demo.level1 import explore
-from crunchbot_lab.demo.training import learn
 from crunchbot_lab.scenes import geometry
 from crunchbot_lab.simulation.scenes import make_scene
 
@@ -39,7 +39,7 @@ def signals(tmp_path_factory):
     """Signal-level runs. One robot: what it learnt once serves in every arena."""
     folder = tmp_path_factory.mktemp("models")
     scene = robot_in(SEEDS[0])[0]
-    learn(folder, scene, SEEDS[0], lambda: None)
+    kept_models.learn_or_copy(folder, scene, SEEDS[0], lambda: None)
     return [signal_run(seed, folder) for seed in SEEDS]
 
 

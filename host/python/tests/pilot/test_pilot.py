@@ -16,10 +16,9 @@ from crunchbot.pilot.states import Whisk
 from crunchbot.robot.models import load_models
 from crunchbot.scene import Arena, Scene
 from crunchbot.touch.contact import Contact
-from crunchbot.touch.radial.model import fit
+from crunchbot_lab.demo import kept_models, training
 from crunchbot_lab.demo.level1 import explore
 from crunchbot_lab.demo.study import study
-from crunchbot_lab.demo.training import learn, read_whisks
 from crunchbot_lab.scenes.geometry import directions
 from crunchbot_lab.signals import World
 from crunchbot_lab.simulation.scenes import TEXTURES, make_robot, make_scene
@@ -33,7 +32,7 @@ ODOMETRY = ("odo_x_m", "odo_y_m", "odo_theta_rad")
 @pytest.fixture(scope="module")
 def models(tmp_path_factory):
     folder = tmp_path_factory.mktemp("models")
-    learn(folder, make_scene(SEED)[0], SEED, lambda: None)
+    kept_models.learn_or_copy(folder, make_scene(SEED)[0], SEED, lambda: None)
     return folder
 
 
@@ -176,8 +175,7 @@ def test_rows_report_no_direction_of_a_corner_under_the_shaft(models):
 def line_models(models, scene):
     """The texture models, and the paper's lines of the same whisks."""
     texture, radial = load_models(models, scene.robot)
-    recorded = {name: read_whisks(models / "radial" / f"{name}.csv", with_radius=True) for name in radial}
-    return texture, {name: fit(whisks, "linear").model for name, whisks in recorded.items()}
+    return texture, {name: line for name, line in training.calibrations(models)[0].items() if name in radial}
 
 
 def test_rows_hold_no_normals_where_a_model_is_the_papers_line(models):
