@@ -25,6 +25,7 @@ PRODUCT = (
     "LICENSE",
 )
 LAB = ("lab", "sim/signals", "sim/world", "sim/mechanics", "sim/mlx90333", "sim/common", "firmware/dspic/core")
+BUILD_S = 600  # for a wheel and an environment, on a machine at load 15
 BUILT = shutil.ignore_patterns("*.so", "*.egg-info", "__pycache__", "tests")
 ROUND_TRIP = """
 import sys, numpy as np, crunchbot
@@ -42,7 +43,7 @@ assert "foveal" in filter_names() and "MSG: whisker_msgs/Lane" in definition("wh
 
 
 def run(*words, **options) -> subprocess.CompletedProcess:
-    done = subprocess.run([str(word) for word in words], capture_output=True, text=True, timeout=300, **options)
+    done = subprocess.run([str(word) for word in words], capture_output=True, text=True, timeout=BUILD_S, **options)
     assert done.returncode == 0, done.stdout + done.stderr
     return done
 
@@ -50,7 +51,11 @@ def run(*words, **options) -> subprocess.CompletedProcess:
 def wheel(place: Path, project: Path) -> Path:
     """The wheel of a project's folder."""
     options = ["--quiet", "--no-deps", "--no-build-isolation", "--disable-pip-version-check"]
-    run(sys.executable, "-m", "pip", "wheel", *options, "--wheel-dir", place / project.name, project)
+    cached = (
+        {"CC": "ccache cc", "CCACHE_BASEDIR": str(place), "CCACHE_NOHASHDIR": "1"} if shutil.which("ccache") else {}
+    )
+    words = [sys.executable, "-m", "pip", "wheel", *options, "--wheel-dir", place / project.name, project]
+    run(*words, env=os.environ | cached)
     return next((place / project.name).glob("*.whl"))
 
 

@@ -13,6 +13,7 @@ from crunchbot.programs import program
 
 FRAME_BYTES = 38  # of what whisker-base asks a Create 1 for
 WHISK_RAD_S = math.pi / 24
+FRAME_BY_FRAME = ("--clock", "stream")  # it takes in no frame before the client asks for it, however late that is
 
 
 class Robot:
@@ -41,11 +42,12 @@ class Robot:
         return self.base.odometry(after=self.count("bytes") + FRAME_BYTES)
 
     def drive_until(self, v_m_s: float, omega_rad_s: float, done) -> list:
-        """Drives until done(motions so far); returns them."""
-        motions = []
+        """Drives until done(motions so far); returns them, and leaves in `frames` how many there were at each."""
+        motions, self.frames = [], []
         while not done(motions):
             self.base.drive(v_m_s, omega_rad_s)
             motions.append(self.wait_frame())
+            self.frames.append(self.count("frames"))
         self.base.stop()
         return motions
 
@@ -77,28 +79,31 @@ def turned(angle_rad):
     return lambda motions: abs(sum(motion.theta_rad for motion in motions)) >= angle_rad
 
 
+def turning(robot: Robot, motions: list) -> tuple[float, int]:
+    """Angle (rad) and frames after the first motion that shows a turn: before it the order may not have been obeyed."""
+    first = next(n for n, motion in enumerate(motions) if motion.theta_rad)
+    return sum(motion.theta_rad for motion in motions[first + 1 :]), robot.frames[-1] - robot.frames[first]
+
+
 def driven(distance_m):
     return lambda motions: abs(sum(motion.x_m for motion in motions)) >= distance_m
 
 
 @pytest.mark.parametrize("options, remainder", [((), "kept"), (("--drop-remainder",), "dropped")])
 def test_a_create_1_shows_how_it_counts_and_the_whisk_is_seen_either_way(robot, options, remainder):
-    it = robot(*options)
+    it = robot(*options, driver=FRAME_BY_FRAME)
     it.drive_until(0.1, 0, driven(0.25))
     assert it.base.health()["remainder"] == remainder
-    frames = it.count("frames")
-    it.drive_until(0, WHISK_RAD_S, turned(0.1))
-    asked = (it.count("frames") - frames) * 0.015 * 2 * 0.017 / 0.258  # what so many frames are worth
-    assert asked == pytest.approx(0.1, abs=0.04)  # one degree, 0.017, at each end, and wheels that are not exact
+    seen, frames = turning(it, it.drive_until(0, WHISK_RAD_S, turned(0.1)))
+    asked = frames * 0.015 * 2 * 0.017 / 0.258  # what so many frames are worth
+    assert asked == pytest.approx(seen, abs=0.04)  # one degree, 0.017, at each end, and wheels that are not exact
 
 
 def test_a_create_2_whisks_at_the_speed_it_says(robot):
-    it = robot("--model", "2", driver=("--model", "2"))
+    it = robot("--model", "2", driver=("--model", "2", *FRAME_BY_FRAME))
     sent = it.base.drive(0, WHISK_RAD_S)
-    frames = it.count("frames")
-    motions = it.drive_until(0, WHISK_RAD_S, turned(0.15))
-    seen = sum(motion.theta_rad for motion in motions)
-    expected = (it.count("frames") - frames) * 0.015 * sent.omega_rad_s
+    seen, frames = turning(it, it.drive_until(0, WHISK_RAD_S, turned(0.15)))
+    expected = frames * 0.015 * sent.omega_rad_s
     assert sent.omega_rad_s == pytest.approx(2 * 0.0285 / 0.235)
     assert seen == pytest.approx(expected, abs=0.03)  # it begins and ends within a frame or two
     assert it.base.health()["angle_source"] == "encoders"

@@ -11,7 +11,7 @@ from contextlib import closing
 import pytest
 from commandkit import run, signals_as_before  # noqa: F401 - a fixture
 from keykit import documented, made_keys  # noqa: F401 - a fixture
-from linkkit import free_endpoint
+from linkkit import free_endpoint, free_port
 from patience import PATIENCE_S
 from robotkit import examples
 
@@ -45,10 +45,6 @@ def _own_cache(monkeypatch, tmp_path):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
 
 
-def free_port() -> str:
-    return free_endpoint().rpartition(":")[2]
-
-
 @pytest.fixture
 def begun(monkeypatch, capsys, tmp_path):
     """A call: what the command says on both outputs with these options; it starts nothing, for it is stopped before."""
@@ -60,7 +56,7 @@ def begun(monkeypatch, capsys, tmp_path):
     scenes.write(tmp_path / "scene", make_scene(5)[0])
 
     def said(*options) -> tuple[str, str]:
-        place = ["--out", tmp_path, "--first-port", free_port(), "--ring", "whisker-test-robot-command"]
+        place = ["--out", tmp_path, "--first-port", free_port(3), "--ring", "whisker-test-robot-command"]
         code, out, err = run(capsys, "robot", tmp_path / "scene", "--models", tmp_path, *place, *options)
         assert code == 0, err
         return out, err
@@ -119,7 +115,7 @@ def test_a_simulated_robot_learns_its_own_whiskers(capsys, monkeypatch, tmp_path
     scenes.write(tmp_path / "given", make_scene(5)[0])
     options = [tmp_path / "given"] if given else []
     code, _, err = run(
-        capsys, "robot", *options, "--simulated", "--seed", 7, "--out", tmp_path / "out", "--first-port", free_port()
+        capsys, "robot", *options, "--simulated", "--seed", 7, "--out", tmp_path / "out", "--first-port", free_port(3)
     )
     assert code == 0, err
     flown = (tmp_path / "out/scene.flat").read_text().splitlines()
@@ -145,11 +141,11 @@ def test_a_simulated_robot_learns_once_and_nothing_where_models_are_given(capsys
     monkeypatch.setattr("crunchbot_lab.demo.training.learn", learn)
     common = ["robot", "--simulated", "--out", tmp_path / "out", "--first-port"]
     for options in ([], [], ["--models", tmp_path / "out/models"], ["--models", tmp_path]):
-        run(capsys, *common, free_port(), *options)
+        run(capsys, *common, free_port(3), *options)
     assert learnt == [tmp_path / "out/models"]
-    run(capsys, "robot", "--simulated", "--out", tmp_path / "again", "--first-port", free_port())
+    run(capsys, "robot", "--simulated", "--out", tmp_path / "again", "--first-port", free_port(3))
     assert len(learnt) == 1 and (tmp_path / "again/models/texture.json").read_text() == "1"
-    run(capsys, "robot", "--simulated", "--seed", 2, "--out", tmp_path / "other", "--first-port", free_port())
+    run(capsys, "robot", "--simulated", "--seed", 2, "--out", tmp_path / "other", "--first-port", free_port(3))
     assert len(learnt) == 2 and (tmp_path / "other/models/texture.json").read_text() == "2"
 
 
@@ -159,7 +155,7 @@ def refused(capsys, monkeypatch, tmp_path):
     monkeypatch.setattr(robot, "Supervisor", None)
 
     def line(*options, port=None) -> tuple[int, str]:
-        place = ["--out", tmp_path, "--first-port", port or free_port(), "--ring", "whisker-test-robot-command"]
+        place = ["--out", tmp_path, "--first-port", port or free_port(3), "--ring", "whisker-test-robot-command"]
         code, out, err = run(capsys, "robot", *options, *place)
         assert out == "" and err.count("\n") == 1, err
         return code, err
@@ -288,14 +284,14 @@ def test_without_a_configuration_of_zenoh_nothing_is_encrypted(commands):
 
 def test_a_robot_that_is_open_to_the_network_says_so_once(begun, keys, tmp_path):
     line = "0.0.0.0:{}: anyone who reaches this address can watch and take part\n"
-    open_to_all = begun("--listen", "0.0.0.0", "--first-port", port := free_port())[1]
+    open_to_all = begun("--listen", "0.0.0.0", "--first-port", port := free_port(3))[1]
     assert f"whisker: tcp/{line.format(port)}" in open_to_all and open_to_all.count("anyone") == 1
     guarded = documented(keys, "pilot")
     assert "anyone" not in begun("--listen", "0.0.0.0", "--zenoh-config", guarded)[1]
     assert "anyone" not in begun()[1]
     one_sided = tmp_path / "one-sided.json5"
     one_sided.write_text(guarded.read_text().replace("enable_mtls: true", "enable_mtls: false"))
-    words = ["--listen", "0.0.0.0", "--first-port", port := free_port(), "--zenoh-config", one_sided]
+    words = ["--listen", "0.0.0.0", "--first-port", port := free_port(3), "--zenoh-config", one_sided]
     assert f"whisker: tls/{line.format(port)}" in begun(*words)[1]
 
 
@@ -346,7 +342,7 @@ def supervised(monkeypatch, given, tmp_path, stand_ins):
 
 def test_with_the_documented_configuration_view_hears_the_supervisor(supervised, stand_ins, keys):
     """It believes the netbook's certificate about health and truth, and not that of another view."""
-    port, guests_end = free_port(), free_endpoint().replace("tcp/", "tls/")
+    port, guests_end = free_port(3), free_endpoint().replace("tcp/", "tls/")
     forged = {"health/base": examples()["health/pilot"], "truth": examples()["truth"]}
     ends = [word for end in (f"tls/127.0.0.1:{port}", guests_end) for word in ("--connect", end)]
     file, heard = documented(keys, "view"), []
